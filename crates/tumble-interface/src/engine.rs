@@ -1,0 +1,188 @@
+//! What a front sees of an engine, whatever its precision.
+
+use crate::error::{SceneError, StepError};
+use crate::frame::{Column, Frame};
+use crate::scene::Integrator;
+
+/// Growth of the energy over its scale at which a run is stopped.
+pub const BLOW_UP: f64 = 1000.0;
+
+/// What one frame took.
+#[derive(Debug, Clone, PartialEq, Default, serde::Serialize)]
+pub struct StepReport {
+    /// Sub-steps taken, all systems together.
+    pub steps: u64,
+    /// Sub-steps tried and rejected by adaptive integrators.
+    pub rejected: u64,
+    /// Smallest and largest sub-step [s].
+    pub step_range: Option<(f64, f64)>,
+    /// Newton iterations.
+    pub newton: u64,
+    /// Iterations of the linear solver.
+    pub linear: u64,
+    /// Largest final residual of Newton's method, relative to the first of its step.
+    pub residual: f64,
+    /// Steps whose Newton iteration did not reach its tolerance.
+    pub unconverged: u64,
+    /// Links that broke.
+    pub broken: u64,
+    /// Energy taken out by the position clamp [J].
+    pub clamped: f64,
+}
+
+impl StepReport {
+    /// Adds what another step took.
+    pub fn add(&mut self, other: &StepReport) {
+        self.steps += other.steps;
+        self.rejected += other.rejected;
+        self.step_range = match (self.step_range, other.step_range) {
+            (Some(a), Some(b)) => Some((a.0.min(b.0), a.1.max(b.1))),
+            (a, b) => a.or(b),
+        };
+        self.newton += other.newton;
+        self.linear += other.linear;
+        self.residual = self.residual.max(other.residual);
+        self.unconverged += other.unconverged;
+        self.broken += other.broken;
+        self.clamped += other.clamped;
+    }
+}
+
+/// The books of the world at one time.
+#[derive(Debug, Clone, PartialEq, Default, serde::Serialize)]
+pub struct Ledger {
+    /// Simulated time [s].
+    pub time: f64,
+    /// Mass [kg], pinned masses included.
+    pub mass: f64,
+    /// Momentum [kg m/s].
+    pub momentum: [f64; 3],
+    /// Angular momentum about the origin [kg m²/s].
+    pub angular_momentum: [f64; 3],
+    /// Kinetic energy [J].
+    pub kinetic: f64,
+    /// Potential energy of elements [J].
+    pub elastic: f64,
+    /// Potential energy of gravity and other forces that have one [J].
+    pub external: f64,
+    /// Longest link over its rest length; 0 without links.
+    pub stretch: f64,
+    /// Deepest mass inside a collider or its thickness [m].
+    pub penetration: f64,
+    /// Fastest mass [m/s].
+    pub speed: f64,
+    /// Masses that touch a collider.
+    pub contacts: u64,
+    /// Links broken so far.
+    pub broken: u64,
+}
+
+impl Ledger {
+    /// Kinetic plus potential energy [J].
+    pub fn energy(&self) -> f64 {
+        self.kinetic + self.elastic + self.external
+    }
+}
+
+/// A force written by a user, on the masses of one system.
+pub trait UserForce: Send {
+    /// Forces [N] at time t [s] from positions [m], velocities [m/s] and masses [kg]; three numbers per mass, added to `force`.
+    fn force(&mut self, t: f64, x: &[f64], v: &[f64], mass: &[f64], force: &mut [f64]) -> Result<(), String>;
+}
+
+/// Accelerations [m/s²] from time [s], positions [m] and velocities [m/s], three numbers per mass.
+pub type Acceleration<'a> = dyn FnMut(f64, &[f64], &[f64]) -> Result<Vec<f64>, String> + Send + 'a;
+
+/// An integrator written by a user, for one system.
+pub trait UserIntegrator: Send {
+    /// Takes x and v from t to t + h in place.
+    fn step(&mut self, t: f64, h: f64, x: &mut [f64], v: &mut [f64], acceleration: &mut Acceleration<'_>) -> Result<(), String>;
+}
+
+/// The pre-flight estimate of one system.
+#[derive(Debug, Clone, PartialEq, serde::Serialize)]
+pub struct Stability {
+    /// System.
+    pub system: String,
+    /// Integrator in use.
+    pub integrator: Integrator,
+    /// Sub-step in use [s].
+    pub step: f64,
+    /// Highest angular frequency [rad/s].
+    pub frequency: f64,
+    /// Damping rate c of that mode in x'' + c x' + w² x = 0 [1/s].
+    pub damping: f64,
+    /// Highest damping rate of any mode [1/s].
+    pub damping_max: f64,
+    /// Object and particle that move most in the stiffest mode.
+    pub culprit: Option<(String, usize)>,
+    /// Largest stable step of every integrator with a fixed step [s]; zero: none is; infinite: every one is.
+    pub limits: Vec<(Integrator, f64)>,
+}
+
+impl Stability {
+    /// Largest stable step of an integrator [s]; `None` for those that choose their steps.
+    pub fn limit(&self, integrator: Integrator) -> Option<f64> {
+        self.limits.iter().find(|(i, _)| *i == integrator).map(|(_, h)| *h)
+    }
+}
+
+/// A change that was tried after a failure.
+#[derive(Debug, Clone, PartialEq, serde::Serialize)]
+pub struct Cure {
+    /// The override that makes the change: `system.0.step=0.001`.
+    pub set: String,
+    /// Whether the run got past the failure with it.
+    pub survived: bool,
+    /// Energy at the end of the trial over the energy's scale before it.
+    pub energy_ratio: f64,
+}
+
+/// A simulation that can be stepped and read.
+pub trait Engine: Send {
+    /// Simulated time [s].
+    fn time(&self) -> f64;
+
+    /// Frames simulated so far.
+    fn frame_index(&self) -> u64;
+
+    /// Simulates one frame. `go_on` is asked between sub-steps; when it says no, the state goes back to the last
+    /// frame and `Ok(None)` is returned. After an error the state is that of the last good frame, too.
+    fn step(&mut self, go_on: &(dyn Fn() -> bool + Sync)) -> Result<Option<StepReport>, StepError>;
+
+    /// The current state: the named columns of every object that has them.
+    fn frame(&self, columns: &[&str]) -> Frame;
+
+    /// What does not change: triangles, links, masses, rest positions, collider meshes.
+    fn topology(&self) -> Vec<Column>;
+
+    /// The books, now.
+    fn ledger(&self) -> Ledger;
+
+    /// Hash of everything that the next step depends on.
+    fn hash(&self) -> u64;
+
+    /// Everything that the next step depends on, as bytes (safetensors).
+    fn save(&self) -> Vec<u8>;
+
+    /// Goes to a saved state of the same scene.
+    fn restore(&mut self, bytes: &[u8]) -> Result<(), SceneError>;
+
+    /// The largest stable steps, from the stiffest mode of each system as it is now.
+    fn stability(&mut self) -> Vec<Stability>;
+
+    /// After a failed step: changes of step or integrator, each tried from the last good frame.
+    fn cures(&mut self) -> Vec<Cure>;
+
+    /// Warnings from building the scene.
+    fn warnings(&self) -> &[String];
+
+    /// Adds a user's force to the system of that name.
+    fn add_force(&mut self, system: &str, force: Box<dyn UserForce>) -> Result<(), SceneError>;
+
+    /// Replaces the integrator of the system of that name.
+    fn replace_integrator(&mut self, system: &str, integrator: Box<dyn UserIntegrator>) -> Result<(), SceneError>;
+
+    /// Sets a column (`position` or `velocity`) of an object, three numbers per mass.
+    fn write(&mut self, object: &str, column: &str, values: &[f64]) -> Result<(), SceneError>;
+}

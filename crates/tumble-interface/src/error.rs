@@ -1,0 +1,160 @@
+//! The errors that leave the engine. None of them is a panic; each names the place and the cure.
+
+use std::fmt;
+
+/// One thing wrong with a scene.
+#[derive(Debug, Clone, PartialEq, Eq, serde::Serialize)]
+pub struct Issue {
+    /// Where, in the words of the scene: `sheet "flag".links.bend`.
+    pub path: String,
+    /// Line of the scene file, counted from 1, where known.
+    pub line: Option<usize>,
+    /// What is wrong and what would be right.
+    pub message: String,
+}
+
+impl Issue {
+    /// An issue at `path`, without a line.
+    pub fn new(path: impl Into<String>, message: impl Into<String>) -> Self {
+        Self { path: path.into(), line: None, message: message.into() }
+    }
+}
+
+impl fmt::Display for Issue {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        if let Some(line) = self.line {
+            write!(f, "line {line}: ")?;
+        }
+        if !self.path.is_empty() {
+            write!(f, "{}: ", self.path)?;
+        }
+        f.write_str(&self.message)
+    }
+}
+
+/// Everything that is wrong with a scene, all at once.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct SceneError {
+    /// At least one issue, in the order of the file.
+    pub issues: Vec<Issue>,
+}
+
+impl SceneError {
+    /// An error with a single issue.
+    pub fn one(path: impl Into<String>, message: impl Into<String>) -> Self {
+        Self { issues: vec![Issue::new(path, message)] }
+    }
+}
+
+impl fmt::Display for SceneError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        for (i, issue) in self.issues.iter().enumerate() {
+            if i > 0 {
+                f.write_str("\n")?;
+            }
+            write!(f, "{issue}")?;
+        }
+        Ok(())
+    }
+}
+
+impl std::error::Error for SceneError {}
+
+/// Why a step could not be taken. The engine's state is that of the last good frame.
+#[derive(Debug, Clone, PartialEq)]
+pub enum StepError {
+    /// A number stopped being finite.
+    NotFinite(Breakdown),
+    /// The energy grew beyond [`crate::engine::BLOW_UP`] times its scale.
+    Exploded(Breakdown),
+    /// An iterative solver did not reach its tolerance and the scene asked for an error.
+    Solve {
+        /// System that solved.
+        system: String,
+        /// Simulated time [s].
+        time: f64,
+        /// Iterations made.
+        iterations: usize,
+        /// Residual reached, relative to the first.
+        residual: f64,
+        /// Residual asked for.
+        tolerance: f64,
+    },
+    /// An adaptive integrator asked for a step below the smallest useful one.
+    StepTooSmall {
+        /// System that stepped.
+        system: String,
+        /// Simulated time [s].
+        time: f64,
+        /// Step asked for [s].
+        step: f64,
+    },
+    /// A user's force or integrator failed.
+    User(String),
+}
+
+/// Where and when the physics broke.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Breakdown {
+    /// System that broke.
+    pub system: String,
+    /// Object that holds the culprit.
+    pub object: String,
+    /// What broke first: `position`, `velocity` or `energy`.
+    pub column: String,
+    /// Index of the particle within its object.
+    pub index: usize,
+    /// Simulated time [s].
+    pub time: f64,
+    /// Integrator in use.
+    pub integrator: String,
+    /// Sub-step in use [s].
+    pub step: f64,
+    /// Largest stable sub-step by the pre-flight estimate [s]; zero if no step is stable, infinite if every step is.
+    pub stable_step: f64,
+    /// Energy over its scale, where it could be computed.
+    pub energy_ratio: Option<f64>,
+}
+
+impl fmt::Display for Breakdown {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Self { system, object, column, index, time, integrator, step, stable_step, .. } = self;
+        write!(f, "system \"{system}\" ({integrator}, step {step:.3e} s) at t = {time:.4} s: ")?;
+        write!(f, "first bad {column} in \"{object}\", particle {index}. ")?;
+        if *stable_step == 0.0 {
+            write!(f, "{integrator} has no stable step for this system")
+        } else if stable_step.is_finite() {
+            write!(f, "Largest stable step by estimate: {stable_step:.3e} s")
+        } else {
+            write!(f, "The linear estimate finds every step stable")
+        }
+    }
+}
+
+impl fmt::Display for StepError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::NotFinite(b) => write!(f, "not a finite number: {b}"),
+            Self::Exploded(b) => {
+                write!(f, "energy exploded")?;
+                if let Some(ratio) = b.energy_ratio {
+                    write!(f, " (x {ratio:.3e})")?;
+                }
+                write!(f, ": {b}")
+            }
+            Self::Solve { system, time, iterations, residual, tolerance } => write!(
+                f,
+                "system \"{system}\" at t = {time:.4} s: the solver stopped after {iterations} iterations at a relative residual of {residual:.2e}, asked for {tolerance:.2e}; \
+                 allow more iterations, take a smaller step, or set solver.on_failure = \"warn\""
+            ),
+            Self::StepTooSmall { system, time, step } => write!(
+                f,
+                "system \"{system}\" at t = {time:.4} s: the adaptive integrator asked for a step of {step:.2e} s; \
+                 loosen adaptive.tolerance or use an implicit integrator"
+            ),
+            Self::User(message) => f.write_str(message),
+        }
+    }
+}
+
+impl std::error::Error for StepError {}

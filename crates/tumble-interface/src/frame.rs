@@ -1,0 +1,79 @@
+//! All that leaves the engine: named columns with a unit and a shape.
+
+/// The numbers of a column.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Data {
+    /// Single precision.
+    F32(Vec<f32>),
+    /// Double precision.
+    F64(Vec<f64>),
+    /// Indices.
+    U32(Vec<u32>),
+}
+
+impl Data {
+    /// Count of numbers.
+    pub fn len(&self) -> usize {
+        match self {
+            Self::F32(v) => v.len(),
+            Self::F64(v) => v.len(),
+            Self::U32(v) => v.len(),
+        }
+    }
+
+    /// Whether there are none.
+    pub fn is_empty(&self) -> bool {
+        self.len() == 0
+    }
+}
+
+impl From<Vec<f32>> for Data {
+    fn from(v: Vec<f32>) -> Self {
+        Self::F32(v)
+    }
+}
+
+impl From<Vec<f64>> for Data {
+    fn from(v: Vec<f64>) -> Self {
+        Self::F64(v)
+    }
+}
+
+impl From<Vec<u32>> for Data {
+    fn from(v: Vec<u32>) -> Self {
+        Self::U32(v)
+    }
+}
+
+/// A table column of an object: `position` [m], n x 3.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Column {
+    /// Object it belongs to.
+    pub object: String,
+    /// What it is: `position`, `velocity`, `link_strain`.
+    pub name: String,
+    /// SI unit, `1` for a pure number.
+    pub unit: &'static str,
+    /// Numbers per row; the number of rows is `data.len() / width`.
+    pub width: usize,
+    /// Row after row.
+    pub data: Data,
+}
+
+/// The state of the world at one time, as columns.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct Frame {
+    /// Simulated time [s].
+    pub time: f64,
+    /// Frame number, 0 at the start.
+    pub index: u64,
+    /// Columns, object by object in scene order.
+    pub columns: Vec<Column>,
+}
+
+impl Frame {
+    /// The column `name` of `object`, if there is one.
+    pub fn column(&self, object: &str, name: &str) -> Option<&Column> {
+        self.columns.iter().find(|c| c.object == object && c.name == name)
+    }
+}

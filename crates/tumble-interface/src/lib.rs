@@ -1,0 +1,18 @@
+//! The two doors of the engine: a [`scene::Scene`] goes in, [`frame::Frame`]s come out.
+//!
+//! Nothing here depends on the engine's scalar type, so the single- and the double-precision engine
+//! share it, and fronts (Python, command line, browser) see both through one [`engine::Engine`] trait.
+
+pub mod check;
+pub mod engine;
+pub mod error;
+pub mod frame;
+pub mod mesh;
+pub mod scene;
+pub mod tree;
+
+pub use engine::Engine;
+pub use error::{Issue, SceneError, StepError};
+pub use frame::{Column, Data, Frame};
+pub use mesh::Mesh;
+pub use scene::Scene;

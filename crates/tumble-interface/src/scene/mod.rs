@@ -1,0 +1,209 @@
+//! The scene: every word that a scene file may hold, with unit, default and range. These structs are the
+//! schema; JSON Schema, the reference page and the Python stubs are generated from them.
+
+mod forces;
+mod output;
+mod shapes;
+mod structures;
+mod systems;
+
+pub use forces::{Anchor, Field, Force};
+pub use output::{Camera, Expect, Output, Probe};
+pub use shapes::{Collider, MeshFile, Shape};
+pub use structures::{Block, Diagonals, Link, LinkSettings, Links, Material, Net, Particles, Pin, Region, Rod, Rope, Sheet, Spring};
+pub use systems::{Adaptive, Hessian, Integrator, Linear, Method, OnFailure, Solver, System};
+
+use crate::check::check;
+use crate::error::{Issue, SceneError};
+use crate::tree::Node;
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+/// A whole simulation: what is there, how it moves, what is written out.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Scene {
+    /// Version of the scene language; this is 1.
+    #[schemars(range(min = 1, max = 1))]
+    pub version: u32,
+    /// One line for people.
+    #[serde(default)]
+    pub title: String,
+    /// Seed of every random number.
+    #[serde(default)]
+    pub seed: u32,
+    /// Scalar type of the engine.
+    #[serde(default)]
+    pub precision: Precision,
+    /// 2 keeps everything in `plane`; 3 is space.
+    #[serde(default = "three")]
+    #[schemars(range(min = 2, max = 3))]
+    pub dimension: u8,
+    /// The plane of a two-dimensional scene.
+    #[serde(default)]
+    pub plane: Plane,
+    /// Frames and their rate.
+    #[serde(default)]
+    pub time: Time,
+    /// What acts everywhere.
+    #[serde(default)]
+    pub world: WorldSettings,
+    /// Numerical methods; without any, one `dynamics` system holds every object.
+    #[serde(default)]
+    pub system: Vec<System>,
+    /// Free masses and springs between them, listed one by one.
+    #[serde(default)]
+    pub particles: Vec<Particles>,
+    /// Chains of springs, or rods.
+    #[serde(default)]
+    pub rope: Vec<Rope>,
+    /// Lattices of springs in a rectangle.
+    #[serde(default)]
+    pub sheet: Vec<Sheet>,
+    /// Lattices of springs, or tetrahedra, in a box.
+    #[serde(default)]
+    pub block: Vec<Block>,
+    /// Springs along the edges of any mesh.
+    #[serde(default)]
+    pub net: Vec<Net>,
+    /// Forces on the masses of `dynamics` systems.
+    #[serde(default)]
+    pub force: Vec<Force>,
+    /// Velocity fields that carry the particles of `tracers` systems.
+    #[serde(default)]
+    pub field: Vec<Field>,
+    /// Solid things that masses cannot enter.
+    #[serde(default)]
+    pub collider: Vec<Collider>,
+    /// Springs between objects, also of different systems.
+    #[serde(default)]
+    pub anchor: Vec<Anchor>,
+    /// What a run writes.
+    #[serde(default)]
+    pub output: Output,
+    /// From where pictures are taken.
+    #[serde(default)]
+    pub camera: Camera,
+    /// Bounds that a run must keep; a run that breaks one ends with exit code 1.
+    #[serde(default)]
+    pub expect: Expect,
+}
+
+/// Scalar type of the engine.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum Precision {
+    /// 32-bit numbers: fast, seven digits.
+    #[default]
+    Single,
+    /// 64-bit numbers: for orders of convergence and long orbits.
+    Double,
+}
+
+/// The plane of a two-dimensional scene.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum Plane {
+    /// Seen from above.
+    Xy,
+    /// Seen from the front: gravity acts.
+    #[default]
+    Xz,
+}
+
+/// Frames and their rate.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields, default)]
+pub struct Time {
+    /// Frames per second.
+    #[schemars(extend("x-unit" = "1/s", "exclusiveMinimum" = 0.0))]
+    pub fps: f64,
+    /// Frames to simulate after the first.
+    #[schemars(range(min = 1, max = 100_000_000))]
+    pub frames: u32,
+    /// Exchanges between systems per frame.
+    #[schemars(range(min = 1, max = 100_000))]
+    pub exchanges: u32,
+}
+
+impl Default for Time {
+    fn default() -> Self {
+        Self { fps: 24.0, frames: 120, exchanges: 1 }
+    }
+}
+
+/// What acts everywhere.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields, default)]
+pub struct WorldSettings {
+    /// Gravity, z up.
+    #[schemars(extend("x-unit" = "m/s²"))]
+    pub gravity: [f64; 3],
+    /// A scene that would need more memory than this is refused before any is taken.
+    #[schemars(extend("x-unit" = "GiB", "exclusiveMinimum" = 0.0))]
+    pub memory_limit: f64,
+}
+
+impl Default for WorldSettings {
+    fn default() -> Self {
+        Self { gravity: [0.0, 0.0, -9.8], memory_limit: 8.0 }
+    }
+}
+
+fn three() -> u8 {
+    3
+}
+
+/// Every item of the list is > 0.
+fn items_above_zero(schema: &mut schemars::Schema) {
+    if let Some(items) = schema.get_mut("items").and_then(|i| i.as_object_mut()) {
+        items.insert("exclusiveMinimum".into(), 0.0.into());
+    }
+}
+
+impl Scene {
+    /// The JSON Schema (draft 2020-12) of a scene, with units as `x-unit`.
+    pub fn schema() -> serde_json::Value {
+        schemars::schema_for!(Scene).into()
+    }
+
+    /// Checks a tree and gives it meaning. Reports everything wrong with the words, types, units and ranges at once;
+    /// what depends on several values together (a pin on a missing corner) is checked when the world is built.
+    pub fn from_tree(tree: &Node) -> Result<Scene, SceneError> {
+        if tree.too_deep() {
+            return Err(SceneError::one("", "nested too deeply to be a scene"));
+        }
+        let issues = check(tree, &Self::schema());
+        if !issues.is_empty() {
+            return Err(SceneError { issues });
+        }
+        let unreadable = |message: String| SceneError { issues: vec![Issue::new("", message)] };
+        let json = tree.to_json().ok_or_else(|| unreadable("a number is not finite".into()))?;
+        serde_json::from_value(json).map_err(|e| unreadable(e.to_string()))
+    }
+
+    /// Reads a scene from TOML text.
+    pub fn from_toml(text: &str) -> Result<Scene, SceneError> {
+        Self::from_tree(&Node::from_toml(text)?)
+    }
+
+    /// The scene as JSON, every default written out.
+    pub fn to_json(&self) -> serde_json::Value {
+        serde_json::to_value(self).unwrap_or_default()
+    }
+
+    /// Duration of one frame [s].
+    pub fn frame_time(&self) -> f64 {
+        1.0 / self.time.fps
+    }
+
+    /// Meshes that the scene names, by path, in order of appearance.
+    pub fn mesh_files(&self) -> Vec<&MeshFile> {
+        let nets = self.net.iter().map(|n| &n.mesh);
+        let shapes = self.collider.iter().filter_map(|c| match &c.shape {
+            Shape::Mesh(mesh) => Some(mesh),
+            _ => None,
+        });
+        nets.chain(shapes).collect()
+    }
+}

@@ -1,0 +1,110 @@
+//! What a run writes, from where it is seen, and what it must keep.
+
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+/// What a run writes.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields, default)]
+pub struct Output {
+    /// Columns of the frames: `position`, `velocity`, `orientation`, `angular_velocity`, `link_strain`.
+    pub columns: Vec<String>,
+    /// Write `film.mp4`.
+    pub film: bool,
+    /// Write `scene.usda` with a layer per frame.
+    pub usd: bool,
+    /// Write `energy.png`.
+    pub plot: bool,
+    /// Frames of which to write a still picture.
+    pub stills: Vec<u32>,
+    /// Frames between checkpoints; a run that is stopped goes on from the last one.
+    #[schemars(range(min = 1))]
+    pub checkpoint: u32,
+}
+
+impl Default for Output {
+    fn default() -> Self {
+        Self {
+            columns: vec!["position".into(), "velocity".into()],
+            film: false,
+            usd: false,
+            plot: true,
+            stills: Vec::new(),
+            checkpoint: 10,
+        }
+    }
+}
+
+/// From where pictures are taken.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields, default)]
+pub struct Camera {
+    /// Where it stands; without it, far enough to see everything.
+    #[schemars(extend("x-unit" = "m"))]
+    pub position: Option<[f64; 3]>,
+    /// What it looks at; without it, the middle of everything.
+    #[schemars(extend("x-unit" = "m"))]
+    pub target: Option<[f64; 3]>,
+    /// Horizontal angle of view.
+    #[schemars(extend("x-unit" = "°", "exclusiveMinimum" = 0.0, "exclusiveMaximum" = 170.0))]
+    pub view_angle: f64,
+    /// Width and height of pictures.
+    #[schemars(inner(range(min = 16, max = 8192)), extend("x-unit" = "pixel"))]
+    pub resolution: [u32; 2],
+}
+
+impl Default for Camera {
+    fn default() -> Self {
+        Self { position: None, target: None, view_angle: 35.0, resolution: [640, 360] }
+    }
+}
+
+/// Bounds that every frame must keep.
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields, default)]
+pub struct Expect {
+    /// Longest link over its rest length.
+    #[schemars(extend("x-unit" = "1", "exclusiveMinimum" = 0.0))]
+    pub max_stretch: Option<f64>,
+    /// Deepest mass inside a collider.
+    #[schemars(range(min = 0.0), extend("x-unit" = "m"))]
+    pub max_penetration: Option<f64>,
+    /// Fastest mass.
+    #[schemars(range(min = 0.0), extend("x-unit" = "m/s"))]
+    pub max_speed: Option<f64>,
+    /// |E - E_0| over the largest kinetic or potential energy so far.
+    #[schemars(range(min = 0.0), extend("x-unit" = "1"))]
+    pub max_energy_drift: Option<f64>,
+    /// Growth of the energy over the largest kinetic or potential energy so far.
+    #[schemars(range(min = 0.0), extend("x-unit" = "1"))]
+    pub max_energy_growth: Option<f64>,
+    /// Kinetic energy at the last frame.
+    #[schemars(range(min = 0.0), extend("x-unit" = "J"))]
+    pub max_final_kinetic: Option<f64>,
+    /// Links that have broken by the last frame.
+    pub broken_links: Option<u32>,
+    /// Values of single masses at the last frame.
+    pub probe: Vec<Probe>,
+}
+
+/// A value of one mass at the last frame.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Probe {
+    /// Name of the object.
+    pub object: String,
+    /// Column of the frame.
+    #[serde(default = "position")]
+    pub column: String,
+    /// Index of the mass within the object.
+    pub index: u32,
+    /// The value expected.
+    pub value: [f64; 3],
+    /// How far off it may be, as a distance.
+    #[schemars(extend("exclusiveMinimum" = 0.0))]
+    pub tolerance: f64,
+}
+
+fn position() -> String {
+    "position".into()
+}

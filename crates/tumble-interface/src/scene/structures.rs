@@ -1,0 +1,388 @@
+//! Structures of masses and links. Stiffness is given so that it does not depend on how finely an
+//! object is divided: k_s = modulus x (length, area or volume that the link stands for) / l0².
+
+use super::{MeshFile, items_above_zero};
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+/// Free masses, and springs between chosen ones.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Particles {
+    /// Name in frames.
+    pub name: String,
+    /// System that moves it; without it, the first that can.
+    #[serde(default)]
+    pub system: Option<String>,
+    /// Where the masses start.
+    #[schemars(length(min = 1), extend("x-unit" = "m"))]
+    pub position: Vec<[f64; 3]>,
+    /// How fast they start: one velocity each, or a single one for all.
+    #[serde(default)]
+    #[schemars(extend("x-unit" = "m/s"))]
+    pub velocity: Vec<[f64; 3]>,
+    /// Mass of each, or a single one for all.
+    #[serde(default = "one_each")]
+    #[schemars(length(min = 1), transform = items_above_zero, extend("x-unit" = "kg"))]
+    pub mass: Vec<f64>,
+    /// Masses that stay where they are.
+    #[serde(default)]
+    pub pin: Vec<Pin>,
+    /// Springs between them.
+    #[serde(default)]
+    pub spring: Vec<Spring>,
+    /// Radius in pictures.
+    #[serde(default = "centimetre")]
+    #[schemars(extend("x-unit" = "m", "exclusiveMinimum" = 0.0))]
+    pub radius: f64,
+    /// Red, green and blue, 0 to 1, in pictures.
+    #[serde(default)]
+    pub color: Option<[f64; 3]>,
+}
+
+/// A spring between two masses of one object.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Spring {
+    /// Indices of the two masses.
+    pub between: [u32; 2],
+    /// Spring constant k_s.
+    #[schemars(range(min = 0.0), extend("x-unit" = "N/m"))]
+    pub stiffness: f64,
+    /// Rest length; 0 makes f = k_s (b - a); without it, the distance at the start.
+    #[serde(default)]
+    #[schemars(range(min = 0.0), extend("x-unit" = "m"))]
+    pub rest_length: Option<f64>,
+    /// Internal damping: force along the spring per speed of lengthening.
+    #[serde(default)]
+    #[schemars(range(min = 0.0), extend("x-unit" = "N s/m"))]
+    pub damping: f64,
+    /// Stiffening: force k_s r (1 + hardening (r / l0)²) at the extension r.
+    #[serde(default)]
+    #[schemars(range(min = 0.0), extend("x-unit" = "1"))]
+    pub hardening: f64,
+    /// Pulls but does not push, like a thread.
+    #[serde(default)]
+    pub tension_only: bool,
+    /// Breaks for good when |r| / l0 exceeds this.
+    #[serde(default)]
+    #[schemars(extend("x-unit" = "1", "exclusiveMinimum" = 0.0))]
+    pub break_strain: Option<f64>,
+}
+
+/// A chain of masses between two points.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Rope {
+    /// Name in frames.
+    pub name: String,
+    /// System that moves it; without it, the first that can.
+    #[serde(default)]
+    pub system: Option<String>,
+    /// Where it starts.
+    #[schemars(extend("x-unit" = "m"))]
+    pub from: [f64; 3],
+    /// Where it ends.
+    #[schemars(extend("x-unit" = "m"))]
+    pub to: [f64; 3],
+    /// Rest length; without it, the distance between the ends. A longer rope starts as a circular arc hanging down.
+    #[serde(default)]
+    #[schemars(extend("x-unit" = "m", "exclusiveMinimum" = 0.0))]
+    pub length: Option<f64>,
+    /// Straight pieces; there is one mass more.
+    #[schemars(range(min = 1, max = 1_000_000_000))]
+    pub segments: u32,
+    /// Mass per length.
+    #[serde(default = "tenth")]
+    #[schemars(extend("x-unit" = "kg/m", "exclusiveMinimum" = 0.0))]
+    pub density: f64,
+    /// Spring families, modulus in N: `structural` between neighbours, `bend` between next-nearest ones. Not with `rod`.
+    #[serde(default)]
+    pub links: Option<Links>,
+    /// Makes it a rod with orientation frames, which bends and twists.
+    #[serde(default)]
+    pub rod: Option<Rod>,
+    /// Masses that stay where they are: `"start"`, `"end"`, `"vertex 3"`. A pinned end of a rod is clamped.
+    #[serde(default)]
+    pub pin: Vec<Pin>,
+    /// Radius in pictures.
+    #[serde(default = "centimetre")]
+    #[schemars(extend("x-unit" = "m", "exclusiveMinimum" = 0.0))]
+    pub radius: f64,
+    /// Red, green and blue, 0 to 1, in pictures.
+    #[serde(default)]
+    pub color: Option<[f64; 3]>,
+}
+
+/// Elastic moduli of a rod.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Rod {
+    /// Stretching stiffness E A.
+    #[schemars(extend("x-unit" = "N", "exclusiveMinimum" = 0.0))]
+    pub stretch: f64,
+    /// Shearing stiffness k G A; without it, that of stretching.
+    #[serde(default)]
+    #[schemars(extend("x-unit" = "N", "exclusiveMinimum" = 0.0))]
+    pub shear: Option<f64>,
+    /// Bending stiffness E I.
+    #[schemars(range(min = 0.0), extend("x-unit" = "N m²"))]
+    pub bend: f64,
+    /// Twisting stiffness G J; without it, that of bending.
+    #[serde(default)]
+    #[schemars(range(min = 0.0), extend("x-unit" = "N m²"))]
+    pub twist: Option<f64>,
+    /// Rotational inertia per length, the same about every axis; without it, that of a round wire of the picture radius.
+    #[serde(default)]
+    #[schemars(extend("x-unit" = "kg m", "exclusiveMinimum" = 0.0))]
+    pub inertia: Option<f64>,
+    /// Damping of all four, as a time: damping = time x stiffness.
+    #[serde(default)]
+    #[schemars(range(min = 0.0), extend("x-unit" = "s"))]
+    pub damping: f64,
+}
+
+/// A rectangle of masses and links.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Sheet {
+    /// Name in frames.
+    pub name: String,
+    /// System that moves it; without it, the first that can.
+    #[serde(default)]
+    pub system: Option<String>,
+    /// Lengths of its sides.
+    #[schemars(transform = items_above_zero, extend("x-unit" = "m"))]
+    pub size: [f64; 2],
+    /// Masses along each side.
+    #[schemars(inner(range(min = 2, max = 1_000_000_000)))]
+    pub resolution: [u32; 2],
+    /// Its middle.
+    #[serde(default)]
+    #[schemars(extend("x-unit" = "m"))]
+    pub center: [f64; 3],
+    /// Turn about x, then y, then z, from lying flat in the plane z = 0.
+    #[serde(default)]
+    #[schemars(extend("x-unit" = "°"))]
+    pub rotate: [f64; 3],
+    /// Mass per area.
+    #[serde(default = "fifth")]
+    #[schemars(extend("x-unit" = "kg/m²", "exclusiveMinimum" = 0.0))]
+    pub density: f64,
+    /// Spring families, modulus in N/m.
+    #[serde(default = "sheet_links")]
+    pub links: Links,
+    /// Dihedral bending stiffness between neighbouring triangles.
+    #[serde(default)]
+    #[schemars(range(min = 0.0), extend("x-unit" = "N m"))]
+    pub hinge: f64,
+    /// Masses that stay where they are: `"corner 0 0"`, `"vertex 3 4"`, `"edge x-"`.
+    #[serde(default)]
+    pub pin: Vec<Pin>,
+    /// Red, green and blue, 0 to 1, in pictures.
+    #[serde(default)]
+    pub color: Option<[f64; 3]>,
+}
+
+/// A box of masses and links, or of tetrahedra.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Block {
+    /// Name in frames.
+    pub name: String,
+    /// System that moves it; without it, the first that can.
+    #[serde(default)]
+    pub system: Option<String>,
+    /// Lengths of its edges.
+    #[schemars(transform = items_above_zero, extend("x-unit" = "m"))]
+    pub size: [f64; 3],
+    /// Masses along each edge.
+    #[schemars(inner(range(min = 2, max = 1_000_000_000)))]
+    pub resolution: [u32; 3],
+    /// Its middle.
+    #[serde(default)]
+    #[schemars(extend("x-unit" = "m"))]
+    pub center: [f64; 3],
+    /// Turn about x, then y, then z.
+    #[serde(default)]
+    #[schemars(extend("x-unit" = "°"))]
+    pub rotate: [f64; 3],
+    /// Mass per volume.
+    #[serde(default = "thousand")]
+    #[schemars(extend("x-unit" = "kg/m³", "exclusiveMinimum" = 0.0))]
+    pub density: f64,
+    /// Spring families, modulus in Pa. Not with `material`.
+    #[serde(default)]
+    pub links: Option<Links>,
+    /// Fills it with elastic tetrahedra.
+    #[serde(default)]
+    pub material: Option<Material>,
+    /// Masses that stay where they are: `"corner 0 0 0"`, `"vertex 1 2 3"`, `"face z-"`.
+    #[serde(default)]
+    pub pin: Vec<Pin>,
+    /// Red, green and blue, 0 to 1, in pictures.
+    #[serde(default)]
+    pub color: Option<[f64; 3]>,
+}
+
+/// A stable Neo-Hookean solid.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Material {
+    /// Young's modulus.
+    #[schemars(extend("x-unit" = "Pa", "exclusiveMinimum" = 0.0))]
+    pub young: f64,
+    /// Poisson's ratio.
+    #[schemars(extend("x-unit" = "1", "exclusiveMinimum" = 0.0, "exclusiveMaximum" = 0.5))]
+    pub poisson: f64,
+    /// Damping as a time: damping = time x stiffness.
+    #[serde(default)]
+    #[schemars(range(min = 0.0), extend("x-unit" = "s"))]
+    pub damping: f64,
+}
+
+/// Masses at the vertices of a mesh, springs along its edges.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Net {
+    /// Name in frames.
+    pub name: String,
+    /// System that moves it; without it, the first that can.
+    #[serde(default)]
+    pub system: Option<String>,
+    /// The mesh.
+    pub mesh: MeshFile,
+    /// Mass per area.
+    #[serde(default = "fifth")]
+    #[schemars(extend("x-unit" = "kg/m²", "exclusiveMinimum" = 0.0))]
+    pub density: f64,
+    /// Spring families, modulus in N/m: `structural` along edges, `bend` across them.
+    #[serde(default = "sheet_links")]
+    pub links: Links,
+    /// Dihedral bending stiffness between neighbouring triangles.
+    #[serde(default)]
+    #[schemars(range(min = 0.0), extend("x-unit" = "N m"))]
+    pub hinge: f64,
+    /// Masses that stay where they are: `"vertex 3"`, or all within a radius of a point.
+    #[serde(default)]
+    pub pin: Vec<Pin>,
+    /// Red, green and blue, 0 to 1, in pictures.
+    #[serde(default)]
+    pub color: Option<[f64; 3]>,
+}
+
+/// Families of links. A family that is left out is not there.
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields, default)]
+pub struct Links {
+    /// Between nearest neighbours.
+    pub structural: Option<Link>,
+    /// Along diagonals.
+    pub shear: Option<Link>,
+    /// Between next-nearest neighbours (skip one); a fiftieth of the structural modulus is a good start.
+    pub bend: Option<Link>,
+    /// One diagonal of each cell, or both.
+    pub diagonals: Diagonals,
+}
+
+/// Which diagonals the shear family has.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum Diagonals {
+    /// One of each cell: stiffer one way than the other.
+    One,
+    /// Both.
+    #[default]
+    Both,
+}
+
+/// A link family: its modulus alone, or all its settings.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(untagged)]
+pub enum Link {
+    /// Modulus: N for a rope, N/m for a sheet, Pa for a block.
+    Modulus(#[schemars(range(min = 0.0), extend("x-unit" = "N, N/m or Pa"))] f64),
+    /// All settings.
+    Settings(LinkSettings),
+}
+
+impl Link {
+    /// All settings, defaults filled in.
+    pub fn settings(&self) -> LinkSettings {
+        match self {
+            Self::Modulus(modulus) => LinkSettings { modulus: *modulus, ..LinkSettings::default() },
+            Self::Settings(settings) => settings.clone(),
+        }
+    }
+}
+
+/// Settings of a link family.
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct LinkSettings {
+    /// Elastic modulus: N for a rope, N/m for a sheet, Pa for a block.
+    #[schemars(range(min = 0.0), extend("x-unit" = "N, N/m or Pa"))]
+    pub modulus: f64,
+    /// Internal damping along the link: N s for a rope, N s/m for a sheet, Pa s for a block.
+    #[serde(default)]
+    #[schemars(range(min = 0.0), extend("x-unit" = "modulus x s"))]
+    pub damping: f64,
+    /// Stiffening: force k_s r (1 + hardening (r / l0)²) at the extension r.
+    #[serde(default)]
+    #[schemars(range(min = 0.0), extend("x-unit" = "1"))]
+    pub hardening: f64,
+    /// Pulls but does not push, like a thread.
+    #[serde(default)]
+    pub tension_only: bool,
+    /// Breaks for good when |r| / l0 exceeds this.
+    #[serde(default)]
+    #[schemars(extend("x-unit" = "1", "exclusiveMinimum" = 0.0))]
+    pub break_strain: Option<f64>,
+}
+
+/// Masses that stay where they are.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(untagged)]
+pub enum Pin {
+    /// In words: `"all"`, `"start"`, `"corner 0 1"`, `"vertex 3 4"`, `"edge x-"`, `"face z+"`.
+    Words(String),
+    /// All within a radius of a point.
+    Region(Region),
+}
+
+/// All masses within a radius of a point at the start.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Region {
+    /// The point.
+    #[schemars(extend("x-unit" = "m"))]
+    pub center: [f64; 3],
+    /// The radius.
+    #[schemars(extend("x-unit" = "m", "exclusiveMinimum" = 0.0))]
+    pub radius: f64,
+}
+
+fn sheet_links() -> Links {
+    let family = |modulus| Some(Link::Settings(LinkSettings { modulus, ..LinkSettings::default() }));
+    Links { structural: family(500.0), shear: family(200.0), bend: family(10.0), diagonals: Diagonals::Both }
+}
+
+fn one_each() -> Vec<f64> {
+    vec![1.0]
+}
+
+fn centimetre() -> f64 {
+    0.01
+}
+
+fn tenth() -> f64 {
+    0.1
+}
+
+fn fifth() -> f64 {
+    0.2
+}
+
+fn thousand() -> f64 {
+    1000.0
+}

@@ -1,0 +1,241 @@
+//! Numerical methods and their settings.
+
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+/// A numerical method and how it steps.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct System {
+    /// Objects name it with `system = "..."`.
+    pub name: String,
+    /// Which method.
+    #[serde(default)]
+    pub method: Method,
+    /// How y' = f(y, t) is stepped.
+    #[serde(default)]
+    pub integrator: Integrator,
+    /// Sub-steps per exchange. Without `substeps` and `step`, explicit integrators take as many as 0.7 of their
+    /// estimated stability limit asks for, implicit ones take one.
+    #[serde(default)]
+    #[schemars(range(min = 1, max = 10_000_000))]
+    pub substeps: Option<u32>,
+    /// Largest sub-step; the exchange interval is divided into equal sub-steps no longer than this.
+    #[serde(default)]
+    #[schemars(extend("x-unit" = "s", "exclusiveMinimum" = 0.0))]
+    pub step: Option<f64>,
+    /// Settings of `adaptive_euler` and `dormand_prince`.
+    #[serde(default)]
+    pub adaptive: Adaptive,
+    /// Springs longer than this many times their rest length are shortened to it after each step
+    /// (`modified_euler` and `verlet` only).
+    #[serde(default)]
+    #[schemars(extend("x-unit" = "1", "exclusiveMinimum" = 1.0))]
+    pub clamp: Option<f64>,
+    /// Settings of the implicit integrators.
+    #[serde(default)]
+    pub solver: Solver,
+}
+
+/// A numerical method.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum Method {
+    /// Masses under forces: x'' = f(x, v, t) / m.
+    #[default]
+    Dynamics,
+    /// Massless particles carried by velocity fields: x' = u(x, t).
+    Tracers,
+}
+
+/// A scheme for y' = f(y, t).
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum Integrator {
+    /// x += h v, v += h a. Order 1; gains energy.
+    ForwardEuler,
+    /// v += h a, then x += h v. Order 1; bounded energy below its limit.
+    #[default]
+    SymplecticEuler,
+    /// x += h/2 (v + v + h a), v += h a. Order 1 in v; gains energy slowly.
+    ModifiedEuler,
+    /// Explicit midpoint. Order 2.
+    Midpoint,
+    /// Heun's method (explicit trapezoid). Order 2.
+    Heun,
+    /// The classical Runge-Kutta method. Order 4.
+    Rk4,
+    /// Forward Euler with step doubling: one step T against two of T/2.
+    AdaptiveEuler,
+    /// Dormand-Prince 5(4) with a PI step controller.
+    DormandPrince,
+    /// Stoermer: positions at t and t - h. Order 2, symplectic.
+    Verlet,
+    /// Velocity Verlet. Order 2, symplectic.
+    VelocityVerlet,
+    /// Implicit (backward) Euler. Order 1; damps, stable for every step.
+    ImplicitEuler,
+    /// Implicit midpoint. Order 2; keeps quadratic invariants.
+    ImplicitMidpoint,
+    /// Two-step backward differentiation. Order 2; damps high frequencies.
+    Bdf2,
+}
+
+impl Integrator {
+    /// All of them, from the simplest on.
+    pub const ALL: [Integrator; 13] = [
+        Self::ForwardEuler,
+        Self::SymplecticEuler,
+        Self::ModifiedEuler,
+        Self::Midpoint,
+        Self::Heun,
+        Self::Rk4,
+        Self::AdaptiveEuler,
+        Self::DormandPrince,
+        Self::Verlet,
+        Self::VelocityVerlet,
+        Self::ImplicitEuler,
+        Self::ImplicitMidpoint,
+        Self::Bdf2,
+    ];
+
+    /// The word in the scene.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::ForwardEuler => "forward_euler",
+            Self::SymplecticEuler => "symplectic_euler",
+            Self::ModifiedEuler => "modified_euler",
+            Self::Midpoint => "midpoint",
+            Self::Heun => "heun",
+            Self::Rk4 => "rk4",
+            Self::AdaptiveEuler => "adaptive_euler",
+            Self::DormandPrince => "dormand_prince",
+            Self::Verlet => "verlet",
+            Self::VelocityVerlet => "velocity_verlet",
+            Self::ImplicitEuler => "implicit_euler",
+            Self::ImplicitMidpoint => "implicit_midpoint",
+            Self::Bdf2 => "bdf2",
+        }
+    }
+
+    /// Whether a step solves equations.
+    pub fn is_implicit(self) -> bool {
+        matches!(self, Self::ImplicitEuler | Self::ImplicitMidpoint | Self::Bdf2)
+    }
+
+    /// Whether it chooses its own steps.
+    pub fn is_adaptive(self) -> bool {
+        matches!(self, Self::AdaptiveEuler | Self::DormandPrince)
+    }
+
+    /// Whether it needs y split into positions and velocities.
+    pub fn needs_velocities(self) -> bool {
+        matches!(self, Self::SymplecticEuler | Self::ModifiedEuler | Self::Verlet | Self::VelocityVerlet)
+    }
+
+    /// Order of convergence.
+    pub fn order(self) -> u32 {
+        match self {
+            Self::ForwardEuler | Self::SymplecticEuler | Self::ModifiedEuler | Self::AdaptiveEuler | Self::ImplicitEuler => 1,
+            Self::Midpoint | Self::Heun | Self::Verlet | Self::VelocityVerlet | Self::ImplicitMidpoint | Self::Bdf2 => 2,
+            Self::Rk4 => 4,
+            Self::DormandPrince => 5,
+        }
+    }
+}
+
+/// Settings of the integrators that choose their own steps.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields, default)]
+pub struct Adaptive {
+    /// Largest error of one step: of any position for `adaptive_euler`; the absolute part of the weight of
+    /// positions and velocities for `dormand_prince`.
+    #[schemars(extend("x-unit" = "m", "exclusiveMinimum" = 0.0))]
+    pub tolerance: f64,
+    /// Relative part of the weight (`dormand_prince`).
+    #[schemars(range(min = 0.0), extend("x-unit" = "1"))]
+    pub relative: f64,
+    /// First step tried; without it, a hundredth of the exchange interval.
+    #[schemars(extend("x-unit" = "s", "exclusiveMinimum" = 0.0))]
+    pub first_step: Option<f64>,
+    /// A step below this many times the exchange interval ends the run with an error.
+    #[schemars(extend("x-unit" = "1", "exclusiveMinimum" = 0.0))]
+    pub smallest: f64,
+}
+
+impl Default for Adaptive {
+    fn default() -> Self {
+        Self { tolerance: 1e-4, relative: 0.0, first_step: None, smallest: 1e-9 }
+    }
+}
+
+/// Settings of the implicit integrators.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields, default)]
+pub struct Solver {
+    /// How the linear systems of Newton's method are solved.
+    pub linear: Linear,
+    /// Which second derivatives the matrix holds.
+    pub hessian: Hessian,
+    /// Residual at which Newton's method stops, relative to the first. Default 1e-3 (single), 1e-10 (double).
+    #[schemars(extend("x-unit" = "1", "exclusiveMinimum" = 0.0, "exclusiveMaximum" = 1.0))]
+    pub newton_tolerance: Option<f64>,
+    /// Newton iterations at most.
+    #[schemars(range(min = 1, max = 1000))]
+    pub newton_iterations: u32,
+    /// Residual at which the linear solver stops, relative to the right-hand side. Default 1e-2 (single), 1e-6 (double).
+    #[schemars(extend("x-unit" = "1", "exclusiveMinimum" = 0.0, "exclusiveMaximum" = 1.0))]
+    pub linear_tolerance: Option<f64>,
+    /// Iterations of the linear solver at most.
+    #[schemars(range(min = 1, max = 1_000_000))]
+    pub linear_iterations: u32,
+    /// Take one linearized step (one Newton iteration, no line search).
+    pub linearized: bool,
+    /// What happens when Newton's method does not reach its tolerance.
+    pub on_failure: OnFailure,
+}
+
+impl Default for Solver {
+    fn default() -> Self {
+        Self {
+            linear: Linear::Pcg,
+            hessian: Hessian::Definite,
+            newton_tolerance: None,
+            newton_iterations: 20,
+            linear_tolerance: None,
+            linear_iterations: 2000,
+            linearized: false,
+            on_failure: OnFailure::Warn,
+        }
+    }
+}
+
+/// A linear solver.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum Linear {
+    /// Conjugate gradients, matrix-free, preconditioned.
+    Pcg,
+    /// Sparse Cholesky factorization.
+    Cholesky,
+}
+
+/// The matrix of Newton's method.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum Hessian {
+    /// Exact second derivatives; may be indefinite under compression.
+    Exact,
+    /// The negative part of each element left out: always positive definite.
+    Definite,
+}
+
+/// What to do when a solver stops early.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum OnFailure {
+    /// Go on and count it in the report.
+    Warn,
+    /// Stop the run.
+    Error,
+}

@@ -1,0 +1,247 @@
+//! A scene before it has a meaning: a tree of values that remember their line. TOML, JSON and a Python
+//! dict all become this tree, so that one checker serves them.
+
+use crate::error::{Issue, SceneError};
+
+/// A value and the line it stands on.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Node {
+    /// The value.
+    pub value: Value,
+    /// Line in the file, from 1; `None` for values that come from JSON, Python or the command line.
+    pub line: Option<usize>,
+}
+
+/// A value.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Value {
+    /// JSON null, Python None.
+    Null,
+    /// true or false
+    Bool(bool),
+    /// A whole number.
+    Int(i64),
+    /// Any other number, also `nan` and `inf`, which the checker refuses with their place.
+    Float(f64),
+    /// A string.
+    Text(String),
+    /// A list.
+    List(Vec<Node>),
+    /// Keys in the order of the file.
+    Table(Vec<(String, Node)>),
+}
+
+/// Deepest nesting that is read; a scene needs about eight levels.
+const DEPTH: usize = 64;
+
+impl From<Value> for Node {
+    fn from(value: Value) -> Self {
+        Self { value, line: None }
+    }
+}
+
+impl Node {
+    /// The value under `key`, if this is a table that has it.
+    pub fn entry(&self, key: &str) -> Option<&Node> {
+        match &self.value {
+            Value::Table(entries) => entries.iter().find(|(k, _)| k == key).map(|(_, n)| n),
+            _ => None,
+        }
+    }
+
+    /// The string under `key`.
+    pub fn text(&self, key: &str) -> Option<&str> {
+        match self.entry(key) {
+            Some(Node { value: Value::Text(s), .. }) => Some(s),
+            _ => None,
+        }
+    }
+
+    /// Reads TOML text.
+    pub fn from_toml(text: &str) -> Result<Node, SceneError> {
+        let lines = Lines::of(text);
+        let table = toml::de::DeTable::parse(text).map_err(|e| SceneError {
+            issues: vec![Issue {
+                path: String::new(),
+                line: e.span().map(|s| lines.at(s.start)),
+                message: format!("not TOML: {}", e.message()),
+            }],
+        })?;
+        Ok(Node { value: convert_table(table.get_ref(), &lines), line: Some(1) })
+    }
+
+    /// Reads JSON text.
+    pub fn from_json(text: &str) -> Result<Node, SceneError> {
+        let value: serde_json::Value = serde_json::from_str(text).map_err(|e| SceneError {
+            issues: vec![Issue { path: String::new(), line: Some(e.line()), message: format!("not JSON: {e}") }],
+        })?;
+        Ok(from_json_value(&value))
+    }
+
+    /// Sets the value at a dotted path: `time.fps`, `system.0.step`, `sheet.flag.size` (by index or by name).
+    pub fn set(&mut self, path: &str, value: Node) -> Result<(), SceneError> {
+        let error = |message: String| SceneError::one(path, message);
+        let mut node = self;
+        for key in path.split('.') {
+            node = match &mut node.value {
+                Value::Table(entries) => {
+                    let i = entries.iter().position(|(k, _)| k == key).unwrap_or_else(|| {
+                        entries.push((key.to_string(), Value::Table(Vec::new()).into()));
+                        entries.len() - 1
+                    });
+                    &mut entries[i].1
+                }
+                Value::List(items) => {
+                    let names: Vec<String> = items.iter().filter_map(|n| n.text("name").map(str::to_string)).collect();
+                    let i = items.iter().position(|n| n.text("name") == Some(key));
+                    let i = i.or_else(|| key.parse().ok().filter(|i| *i < items.len()));
+                    let i =
+                        i.ok_or_else(|| error(format!("there is no \"{key}\"; there are {} items: {}", items.len(), names.join(", "))))?;
+                    &mut items[i]
+                }
+                _ => return Err(error(format!("\"{key}\" stands below a value, not a table"))),
+            };
+        }
+        *node = value;
+        Ok(())
+    }
+
+    /// Applies an override `path=value`; the value is TOML, or else a plain word.
+    pub fn set_text(&mut self, assignment: &str) -> Result<(), SceneError> {
+        let Some((path, text)) = assignment.split_once('=') else {
+            return Err(SceneError::one(assignment, "expected path.to.key=value"));
+        };
+        let parsed = Node::from_toml(&format!("value = {text}")).ok();
+        let mut value = parsed.and_then(|n| n.entry("value").cloned()).unwrap_or_else(|| Value::Text(text.trim().to_string()).into());
+        forget_lines(&mut value);
+        self.set(path.trim(), value)
+    }
+
+    /// The tree as JSON; `None` if it holds a number that is not finite.
+    pub fn to_json(&self) -> Option<serde_json::Value> {
+        use serde_json::Value as J;
+        Some(match &self.value {
+            Value::Null => J::Null,
+            Value::Bool(b) => J::Bool(*b),
+            Value::Int(i) => J::from(*i),
+            // A whole number written as 24.0 may stand where an integer is asked for.
+            Value::Float(x) if x.fract() == 0.0 && x.abs() < 1e15 => J::from(*x as i64),
+            Value::Float(x) => J::Number(serde_json::Number::from_f64(*x)?),
+            Value::Text(s) => J::String(s.clone()),
+            Value::List(items) => J::Array(items.iter().map(Node::to_json).collect::<Option<_>>()?),
+            Value::Table(entries) => J::Object(entries.iter().map(|(k, n)| Some((k.clone(), n.to_json()?))).collect::<Option<_>>()?),
+        })
+    }
+
+    /// Whether the tree is nested more deeply than a scene can be.
+    pub fn too_deep(&self) -> bool {
+        fn depth(node: &Node, left: usize) -> bool {
+            match &node.value {
+                _ if left == 0 => true,
+                Value::List(items) => items.iter().any(|n| depth(n, left - 1)),
+                Value::Table(entries) => entries.iter().any(|(_, n)| depth(n, left - 1)),
+                _ => false,
+            }
+        }
+        depth(self, DEPTH)
+    }
+}
+
+fn forget_lines(node: &mut Node) {
+    node.line = None;
+    match &mut node.value {
+        Value::List(items) => items.iter_mut().for_each(forget_lines),
+        Value::Table(entries) => entries.iter_mut().for_each(|(_, n)| forget_lines(n)),
+        _ => {}
+    }
+}
+
+/// Byte offsets at which lines start.
+struct Lines(Vec<usize>);
+
+impl Lines {
+    fn of(text: &str) -> Self {
+        Self(std::iter::once(0).chain(text.match_indices('\n').map(|(i, _)| i + 1)).collect())
+    }
+
+    /// Line of a byte offset, from 1.
+    fn at(&self, offset: usize) -> usize {
+        self.0.partition_point(|start| *start <= offset)
+    }
+}
+
+fn convert_table(table: &toml::de::DeTable<'_>, lines: &Lines) -> Value {
+    let mut entries: Vec<(usize, String, Node)> =
+        table.iter().map(|(key, value)| (key.span().start, key.get_ref().to_string(), convert(value, lines))).collect();
+    entries.sort_by_key(|(start, _, _)| *start);
+    Value::Table(entries.into_iter().map(|(_, k, n)| (k, n)).collect())
+}
+
+fn convert(item: &toml::Spanned<toml::de::DeValue<'_>>, lines: &Lines) -> Node {
+    use toml::de::DeValue;
+    let value = match item.get_ref() {
+        DeValue::String(s) => Value::Text(s.to_string()),
+        DeValue::Integer(i) => match i64::from_str_radix(i.as_str(), i.radix()) {
+            Ok(i) => Value::Int(i),
+            Err(_) => Value::Float(i.as_str().parse().unwrap_or(f64::INFINITY)),
+        },
+        DeValue::Float(x) => Value::Float(x.as_str().parse().unwrap_or(f64::NAN)),
+        DeValue::Boolean(b) => Value::Bool(*b),
+        DeValue::Datetime(d) => Value::Text(d.to_string()),
+        DeValue::Array(items) => Value::List(items.iter().map(|n| convert(n, lines)).collect()),
+        DeValue::Table(table) => convert_table(table, lines),
+    };
+    Node { value, line: Some(lines.at(item.span().start)) }
+}
+
+fn from_json_value(value: &serde_json::Value) -> Node {
+    use serde_json::Value as J;
+    match value {
+        J::Null => Value::Null,
+        J::Bool(b) => Value::Bool(*b),
+        J::Number(n) => n.as_i64().map_or_else(|| Value::Float(n.as_f64().unwrap_or(f64::NAN)), Value::Int),
+        J::String(s) => Value::Text(s.clone()),
+        J::Array(items) => Value::List(items.iter().map(from_json_value).collect()),
+        J::Object(map) => Value::Table(map.iter().map(|(k, v)| (k.clone(), from_json_value(v))).collect()),
+    }
+    .into()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const TEXT: &str = "version = 1\n[time]\nfps = 24\n[[sheet]]\nname = 'a'\nsize = [1.0,\n 2]\n[[sheet]]\nname = 'b'\n";
+
+    #[test]
+    fn toml_values_remember_their_lines() {
+        let node = Node::from_toml(TEXT).unwrap();
+        assert_eq!(node.entry("time").unwrap().entry("fps").unwrap().line, Some(3));
+        let Value::List(sheets) = &node.entry("sheet").unwrap().value else { panic!() };
+        let Value::List(size) = &sheets[0].entry("size").unwrap().value else { panic!() };
+        assert_eq!((size[0].line, size[1].line), (Some(6), Some(7)));
+        assert_eq!(sheets[1].text("name"), Some("b"));
+    }
+
+    #[test]
+    fn a_toml_error_has_its_line() {
+        let error = Node::from_toml("version = 1\nx = = 2\n").unwrap_err();
+        assert_eq!(error.issues[0].line, Some(2));
+    }
+
+    #[test]
+    fn overrides_reach_tables_and_named_items() {
+        let mut node = Node::from_toml(TEXT).unwrap();
+        node.set_text("time.fps=30").unwrap();
+        node.set_text("sheet.b.size=[3, 4]").unwrap();
+        node.set_text("sheet.0.name=c").unwrap();
+        node.set_text("system.x=1").unwrap();
+        assert_eq!(node.entry("time").unwrap().entry("fps").unwrap().value, Value::Int(30));
+        let json = node.to_json().unwrap();
+        assert_eq!(json["sheet"][1]["size"][1], 4);
+        assert_eq!(json["sheet"][0]["name"], "c");
+        assert!(node.set_text("sheet.z.size=1").unwrap_err().to_string().contains("there is no \"z\""));
+        assert!(node.set_text("time.fps.x=1").is_err());
+        assert!(node.set_text("nothing").is_err());
+    }
+}
