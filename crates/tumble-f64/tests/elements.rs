@@ -1,0 +1,346 @@
+//! Every element against finite differences of its own energy, in double precision: force = -dE/dq, the exact Hessian
+//! product, its symmetry, no net force and no net torque. One definition is enough only if this holds.
+
+use tumble_f64::elements::*;
+use tumble_f64::math::{Real, Row, Vec3, ZERO, rotation, row, xyz};
+use tumble_interface::scene::Hessian;
+
+/// Numbers between -1 and 1 without a pattern.
+struct Numbers(u64);
+
+impl Numbers {
+    fn next(&mut self) -> f64 {
+        self.0 = self.0.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+        ((self.0 >> 11) as f64) / (1_u64 << 52) as f64 - 1.0
+    }
+
+    fn vector(&mut self) -> Vec3<Real> {
+        Vec3 { x: self.next(), y: self.next(), z: self.next() }
+    }
+
+    fn row(&mut self) -> Row {
+        row(self.vector(), 0.0)
+    }
+}
+
+struct Case {
+    batch: Box<dyn Batch>,
+    x: Vec<Row>,
+    /// Rows from here on are frames.
+    points: usize,
+    /// Whether it acts between its nodes only.
+    internal: bool,
+}
+
+fn batch<E: Element<N, M, D>, Y: Law<P>, const N: usize, const M: usize, const D: usize, const P: usize>(
+    rows: usize,
+    members: &[Members<N, D, P>],
+) -> Box<dyn Batch> {
+    Box::new(Elements::<E, Y, N, M, D, P>::new(rows, members).unwrap())
+}
+
+fn cases() -> Vec<Case> {
+    let mut r = Numbers(7);
+    let mut points = |n: usize| -> Vec<Row> { (0..n).map(|_| r.row()).collect() };
+    let mut cases = Vec::new();
+    let mut add = |batch, x: Vec<Row>, points, internal| cases.push(Case { batch, x, points, internal });
+
+    let spring = |nodes, l, b| Members { nodes, rest: [l], law: [], stiffness: 3.0, damping: b };
+    let springs = [spring([0, 1], 0.4, 0.2), spring([1, 2], 2.5, 0.0), spring([3, 0], 0.9, 0.3), spring([2, 4], 0.1, 0.1)];
+    add(batch::<Distance, Linear, 2, 1, 1, 0>(5, &springs), points(5), 5, true);
+    add(Box::new(Pairs::<Distance, Linear, 1, 1, 0>::new(5, &springs, &[]).unwrap()), points(5), 5, true);
+    let thread = |nodes, l, p| Members { nodes, rest: [l], law: [0.7, p], stiffness: 3.0, damping: 0.1 };
+    let threads = [thread([0, 1], 0.4, 0.0), thread([1, 2], 2.9, 0.0), thread([3, 0], 3.0, 1.0)];
+    add(batch::<Distance, Nonlinear, 2, 1, 1, 2>(4, &threads), points(4), 4, true);
+    add(Box::new(Pairs::<Distance, Nonlinear, 1, 1, 2>::new(4, &threads, &[]).unwrap()), points(4), 4, true);
+    add(batch::<Limit, Linear, 2, 1, 1, 0>(5, &springs), points(5), 5, true);
+    let vectors = [[0, 1], [1, 2], [0, 2]].map(|nodes| Members { nodes, rest: [], law: [], stiffness: 2.0, damping: 0.0 });
+    add(batch::<Vector, Linear, 2, 3, 0, 0>(3, &vectors), points(3), 3, true);
+    add(Box::new(Pairs::<Vector, Linear, 3, 0, 0>::new(3, &vectors, &[]).unwrap()), points(3), 3, true);
+    let hinges = [
+        Members { nodes: [0, 1, 2, 3], rest: [0.3], law: [], stiffness: 1.5, damping: 0.2 },
+        Members { nodes: [2, 3, 4, 5], rest: [0.0], law: [], stiffness: 0.5, damping: 0.0 },
+    ];
+    add(batch::<Hinge, Linear, 4, 1, 1, 0>(6, &hinges), points(6), 6, true);
+    let rest: Vec<Row> = points(4);
+    let (b, volume) = rest_matrix([0, 1, 2, 3].map(|i| xyz(rest[i])));
+    assert!(volume.abs() > 0.01);
+    let shear = [Members { nodes: [0, 1, 2, 3], rest: b, law: [], stiffness: 2.0, damping: 0.0 }];
+    add(batch::<TetShear, Linear, 4, 9, 9, 0>(4, &shear), points(4), 4, true);
+    let strain = [Members { damping: 0.3, ..shear[0] }];
+    add(batch::<TetStrain, Linear, 4, 6, 9, 0>(4, &strain), points(4), 4, true);
+    let mut rest = [1.3; 10];
+    rest[..9].copy_from_slice(&b);
+    let inflate = [Members { nodes: [0, 1, 2, 3], rest, law: [], stiffness: 5.0, damping: 0.1 }];
+    add(batch::<TetVolume, Linear, 4, 1, 10, 0>(4, &inflate), points(4), 4, true);
+    let planes = [
+        Members { nodes: [0], rest: [0.0, 0.6, 0.8, 1.7], law: [], stiffness: 4.0, damping: 0.0 },
+        Members { nodes: [1], rest: [0.0, 0.0, 1.0, -2.0], law: [], stiffness: 4.0, damping: 0.0 },
+    ];
+    add(batch::<PointPlane, Linear, 1, 1, 4, 0>(2, &planes), points(2), 2, false);
+
+    let frame = |axis: [f64; 3]| rotation::from_z_to(Vec3::from(axis)).row();
+    let mut x = points(3);
+    x.extend([frame([1.0, 2.0, 0.5]), frame([0.8, 2.0, 0.3])]);
+    let stretch = [[0, 1, 3], [1, 2, 4]].map(|nodes| Members { nodes, rest: [0.7, 0.6], law: [], stiffness: 2.0, damping: 0.1 });
+    add(batch::<StretchShear, Linear, 3, 3, 2, 0>(5, &stretch), x.clone(), 3, true);
+    let bend = [Members { nodes: [3, 4], rest: [2.0 / 0.7, 0.1, -0.2, 0.3, 0.8], law: [], stiffness: 1.2, damping: 0.1 }];
+    add(batch::<BendTwist, Linear, 2, 3, 5, 0>(5, &bend), x.clone(), 3, true);
+    // The same frames with one quaternion negated are the same orientations.
+    x[4] = x[4].map(|q| -q);
+    add(batch::<BendTwist, Linear, 2, 3, 5, 0>(5, &bend), x, 3, true);
+    cases
+}
+
+fn moved(case: &Case, u: &[Row], h: f64) -> Vec<Row> {
+    let step = |i: usize| if i < case.points { row(xyz(case.x[i]) + xyz(u[i]) * h, 0.0) } else { rotation::turn(case.x[i], xyz(u[i]) * h) };
+    (0..case.x.len()).map(step).collect()
+}
+
+fn inner(a: &[Row], b: &[Row]) -> f64 {
+    a.iter().zip(b).map(|(a, b)| xyz(*a).dot(xyz(*b))).sum()
+}
+
+#[test]
+fn force_is_minus_the_gradient_of_the_energy() {
+    let mut r = Numbers(3);
+    for mut case in cases() {
+        let n = case.x.len();
+        let mut force = vec![ZERO; n];
+        case.batch.add_forces(&case.x, &vec![ZERO; n], &mut force);
+        for _ in 0..4 {
+            let u: Vec<Row> = (0..n).map(|_| r.row()).collect();
+            let h = 1e-5;
+            let slope = (case.batch.energy(&moved(&case, &u, h)) - case.batch.energy(&moved(&case, &u, -h))) / (2.0 * h);
+            let expected = -inner(&force, &u);
+            assert!(expected.abs() > 1e-3, "{}: the test sees no force", case.batch.name());
+            // Measured: at most 3e-9 (central difference, h² third derivative plus round-off / h).
+            assert!((slope - expected).abs() < 2e-8 * expected.abs().max(1.0), "{}: {slope} {expected}", case.batch.name());
+        }
+    }
+}
+
+#[test]
+fn the_exact_product_is_the_second_derivative_of_the_energy() {
+    let mut r = Numbers(5);
+    for mut case in cases() {
+        let n = case.x.len();
+        let u: Vec<Row> = (0..n).map(|_| r.row()).collect();
+        let mut product = vec![ZERO; n];
+        case.batch.linearize(&case.x, Weights { stiffness: 1.0, damping: 0.0, hessian: Hessian::Exact });
+        case.batch.add_product(&case.x, &u, &mut product);
+        let h = 1e-4;
+        let e = |h| case.batch.energy(&moved(&case, &u, h));
+        let second = (e(h) - 2.0 * e(0.0) + e(-h)) / (h * h);
+        let expected = inner(&product, &u);
+        assert!(expected.abs() > 1e-3, "{}", case.batch.name());
+        assert!((second - expected).abs() < 2e-6 * expected.abs().max(1.0), "{}: {second} {expected}", case.batch.name());
+        if case.points == n {
+            // Without frames the product is also the slope of the force, component by component.
+            let force = |case: &mut Case, h: f64| {
+                let mut f = vec![ZERO; n];
+                let x = moved(case, &u, h);
+                case.batch.add_forces(&x, &vec![ZERO; n], &mut f);
+                f
+            };
+            let (plus, minus) = (force(&mut case, 1e-5), force(&mut case, -1e-5));
+            for i in 0..n {
+                let slope = (xyz(minus[i]) - xyz(plus[i])) * (1.0 / 2e-5);
+                let error = (slope - xyz(product[i])).norm() / (1.0 + xyz(product[i]).norm());
+                // Measured: 1.1e-8 for the hinge, whose third derivative is large, 1e-9 for the others.
+                assert!(error < 5e-8, "{}: {error:e}", case.batch.name());
+            }
+        }
+    }
+}
+
+#[test]
+fn matrices_are_symmetric_and_the_definite_one_is() {
+    let mut r = Numbers(11);
+    for mut case in cases() {
+        let n = case.x.len();
+        for hessian in [Hessian::Exact, Hessian::Definite] {
+            case.batch.linearize(&case.x, Weights { stiffness: 1.0, damping: 2.0, hessian });
+            for _ in 0..4 {
+                let [u, w]: [Vec<Row>; 2] = std::array::from_fn(|_| (0..n).map(|_| r.row()).collect());
+                let (mut ku, mut kw) = (vec![ZERO; n], vec![ZERO; n]);
+                case.batch.add_product(&case.x, &u, &mut ku);
+                case.batch.add_product(&case.x, &w, &mut kw);
+                let (a, b) = (inner(&ku, &w), inner(&u, &kw));
+                assert!((a - b).abs() < 1e-12 * (1.0 + a.abs()), "{}: {a} {b}", case.batch.name());
+                if hessian == Hessian::Definite {
+                    assert!(inner(&ku, &u) > -1e-12, "{}", case.batch.name());
+                }
+            }
+        }
+    }
+}
+
+#[test]
+fn entries_and_diagonal_are_those_of_the_product() {
+    let mut r = Numbers(13);
+    for mut case in cases() {
+        let n = case.x.len();
+        for hessian in [Hessian::Exact, Hessian::Definite] {
+            case.batch.linearize(&case.x, Weights { stiffness: 0.7, damping: 2.0, hessian });
+            let u: Vec<Row> = (0..n).map(|_| r.row()).collect();
+            let mut product = vec![ZERO; n];
+            case.batch.add_product(&case.x, &u, &mut product);
+            let mut sum = vec![[0.0; 3]; n];
+            let mut diagonal = vec![[0.0; 6]; n];
+            case.batch.entries(&case.x, &mut |i, j, block| {
+                for a in 0..3 {
+                    for b in 0..3 {
+                        sum[i][a] += block[a][b] * u[j][b];
+                    }
+                }
+                if i == j {
+                    for (c, (a, b)) in [(0, 0), (1, 1), (2, 2), (0, 1), (1, 2), (2, 0)].into_iter().enumerate() {
+                        diagonal[i][c] += block[a][b];
+                    }
+                }
+            });
+            let mut blocks = vec![[0.0; 6]; n];
+            case.batch.add_diagonal(&case.x, &mut blocks);
+            for i in 0..n {
+                assert!((Vec3::from(sum[i]) - xyz(product[i])).norm() < 1e-12 * (1.0 + xyz(product[i]).norm()), "{}", case.batch.name());
+                for c in 0..6 {
+                    assert!((diagonal[i][c] - blocks[i][c]).abs() < 1e-12 * (1.0 + blocks[i][c].abs()), "{}", case.batch.name());
+                }
+            }
+        }
+    }
+}
+
+#[test]
+fn internal_elements_exert_no_net_force_and_no_net_torque() {
+    let mut r = Numbers(17);
+    for mut case in cases().into_iter().filter(|c| c.internal) {
+        let n = case.x.len();
+        let v: Vec<Row> = (0..n).map(|_| r.row()).collect();
+        let mut force = vec![ZERO; n];
+        case.batch.add_forces(&case.x, &v, &mut force);
+        let (mut net, mut torque, mut size) = (Vec3::default(), Vec3::default(), 0.0);
+        for i in 0..n {
+            let f = xyz(force[i]);
+            size += f.norm();
+            if i < case.points {
+                net = net + f;
+                torque = torque + xyz(case.x[i]).cross(f);
+            } else {
+                torque = torque + tumble_f64::math::Quat::from_row(case.x[i]).turn(f);
+            }
+        }
+        assert!(size > 0.1, "{}: the test sees no force", case.batch.name());
+        assert!(net.norm() < 1e-14 * size && torque.norm() < 2e-14 * size, "{}: {net:?} {torque:?}", case.batch.name());
+    }
+}
+
+#[test]
+fn internal_damping_opposes_motion_and_leaves_rigid_motion_alone() {
+    let mut r = Numbers(19);
+    for mut case in cases().into_iter().filter(|c| c.internal) {
+        let n = case.x.len();
+        let mut at_rest = vec![ZERO; n];
+        case.batch.add_forces(&case.x, &vec![ZERO; n], &mut at_rest);
+        let (v0, omega) = (r.vector(), r.vector());
+        let rigid: Vec<Row> = (0..n)
+            .map(|i| {
+                let q = tumble_f64::math::Quat::from_row(case.x[i]);
+                if i < case.points { row(v0 + omega.cross(xyz(case.x[i])), 0.0) } else { row(q.conj().turn(omega), 0.0) }
+            })
+            .collect();
+        let any: Vec<Row> = (0..n).map(|_| r.row()).collect();
+        for (v, is_rigid) in [(rigid, true), (any, false)] {
+            let mut moving = vec![ZERO; n];
+            case.batch.add_forces(&case.x, &v, &mut moving);
+            let power: f64 = (0..n).map(|i| (xyz(moving[i]) - xyz(at_rest[i])).dot(xyz(v[i]))).sum();
+            if is_rigid {
+                assert!(power.abs() < 1e-13, "{}: {power}", case.batch.name());
+            } else if !["limit", "vector", "tetrahedron shear"].contains(&case.batch.name()) {
+                assert!(power < -1e-5, "{}: {power}", case.batch.name());
+            }
+        }
+    }
+}
+
+#[test]
+fn gathered_pairs_agree_with_the_element_pass_and_break() {
+    let mut r = Numbers(23);
+    let (n, m) = (101, 400);
+    let x: Vec<Row> = (0..n).map(|_| r.row()).collect();
+    let v: Vec<Row> = (0..n).map(|_| r.row()).collect();
+    let mut end = || ((r.next() + 1.0) * 0.5 * n as f64) as u32 % n as u32;
+    let members: Vec<Members<2, 1, 0>> = (0..m)
+        .map(|_| {
+            let i = end();
+            Members { nodes: [i, (i + 1 + end() % (n as u32 - 1)) % n as u32], rest: [0.8], law: [], stiffness: 2.0, damping: 0.3 }
+        })
+        .collect();
+    let mut passes = Elements::<Distance, Linear, 2, 1, 1, 0>::new(n, &members).unwrap();
+    let mut pairs = Pairs::<Distance, Linear, 1, 1, 0>::new(n, &members, &vec![1.0; m]).unwrap();
+    let forces = |batch: &mut dyn Batch| {
+        let mut f = vec![ZERO; n];
+        batch.add_forces(&x, &v, &mut f);
+        f
+    };
+    let (a, b) = (forces(&mut passes), forces(&mut pairs));
+    assert!((0..n).all(|i| (xyz(a[i]) - xyz(b[i])).norm() < 1e-13));
+    assert_eq!(passes.energy(&x), pairs.energy(&x));
+    let strain = pairs.link_strain(&x);
+    let beyond = strain.iter().filter(|s| s.abs() > 1.0).count();
+    assert!(beyond > 10 && beyond < m - 10, "{beyond}");
+    assert_eq!(pairs.break_links(&x), beyond as u64);
+    assert_eq!(pairs.break_links(&x), 0);
+    assert_eq!(pairs.link_strain(&x).iter().filter(|s| s.is_nan()).count(), beyond);
+    let kept: Vec<_> = members.iter().zip(&strain).filter(|(_, s)| s.abs() <= 1.0).map(|(m, _)| *m).collect();
+    let mut rest = Elements::<Distance, Linear, 2, 1, 1, 0>::new(n, &kept).unwrap();
+    let (c, d) = (forces(&mut rest), forces(&mut pairs));
+    assert!((0..n).all(|i| (xyz(c[i]) - xyz(d[i])).norm() < 1e-13));
+    pairs.set_broken(&[]);
+    assert_eq!(forces(&mut pairs), b);
+}
+
+#[test]
+fn a_projected_spring_moves_as_computed_by_hand() {
+    // Masses 1 kg and 3 kg, 2 m apart, rest length 1 m, k = 100 N/m, h = 0.1 s: alpha = 1/(k h²) = 1, lambda = -1/(1 + 1/3 + 1).
+    let members = [Members { nodes: [0, 1], rest: [1.0], law: [], stiffness: 100.0, damping: 0.0 }];
+    let mut batch = Elements::<Distance, Linear, 2, 1, 1, 0>::new(2, &members).unwrap();
+    let mut x = vec![[0.0, 0.0, 0.0, 1.0], [2.0, 0.0, 0.0, 1.0 / 3.0]];
+    batch.project(&mut x, 0.1);
+    let lambda = -1.0 / (1.0 + 1.0 / 3.0 + 1.0);
+    assert!((x[0][0] + lambda).abs() < 1e-15 && (x[1][0] - (2.0 + lambda / 3.0)).abs() < 1e-15, "{x:?}");
+    let rigid = [Members { stiffness: f64::INFINITY, ..members[0] }];
+    let mut limit = Elements::<Limit, Linear, 2, 1, 1, 0>::new(2, &rigid).unwrap();
+    limit.project(&mut x, 0.1);
+    assert!((x[1][0] - x[0][0] - 1.0).abs() < 1e-15, "{x:?}");
+    let short = vec![[0.0, 0.0, 0.0, 1.0], [0.5, 0.0, 0.0, 1.0]];
+    let mut y = short.clone();
+    limit.project(&mut y, 0.1);
+    assert_eq!(y, short);
+}
+
+#[test]
+fn an_unloaded_tetrahedron_is_at_rest() {
+    let corners = [[0.0, 0.0, 0.0], [1.0, 0.1, 0.0], [0.2, 0.9, 0.1], [0.1, 0.0, 1.1]].map(Vec3::from);
+    let (b, volume) = rest_matrix(corners);
+    let (mu, lambda) = (3.0, 11.0);
+    let mut rest = [1.0 + mu / lambda; 10];
+    rest[..9].copy_from_slice(&b);
+    let mut shear = Elements::<TetShear, Linear, 4, 9, 9, 0>::new(
+        4,
+        &[Members { nodes: [0, 1, 2, 3], rest: b, law: [], stiffness: mu * volume, damping: 0.0 }],
+    )
+    .unwrap();
+    let mut inflate = Elements::<TetVolume, Linear, 4, 1, 10, 0>::new(
+        4,
+        &[Members { nodes: [0, 1, 2, 3], rest, law: [], stiffness: lambda * volume, damping: 0.0 }],
+    )
+    .unwrap();
+    let x: Vec<Row> = corners.iter().map(|c| row(*c, 0.0)).collect();
+    let mut f = vec![ZERO; 4];
+    shear.add_forces(&x, &x, &mut f);
+    assert!(xyz(f[1]).norm() > 0.1);
+    inflate.add_forces(&x, &x, &mut f);
+    assert!(f.iter().all(|f| xyz(*f).norm() < 1e-14), "{f:?}");
+}

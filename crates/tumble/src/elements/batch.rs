@@ -1,0 +1,244 @@
+//! Many elements of one kind behind one small trait, so that no system knows which kinds there are.
+
+use super::list::{List, Members, packs};
+use super::{Element, Law, forces};
+use crate::math::parallel::{CHUNK, chunks, fold};
+use crate::math::simd::{Index, Kernel, Width, dispatch};
+use crate::math::{Real, Row, ZERO, add};
+use rayon::prelude::*;
+use std::ops::Range;
+use tumble_interface::scene::Hessian;
+
+/// A symmetric 3 x 3 matrix: xx, yy, zz, xy, yz, zx.
+pub type Block = [Real; 6];
+
+/// How much of the stiffness matrix K and of the damping matrix D a product holds.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Weights {
+    /// Factor of K.
+    pub stiffness: Real,
+    /// Factor of D [1/s].
+    pub damping: Real,
+    /// Which K.
+    pub hessian: Hessian,
+}
+
+/// Elements of one kind. Rows of `x` are points and frames; rows of everything else hold three numbers per node.
+pub trait Batch: Send + Sync {
+    /// Name of the kind.
+    fn name(&self) -> &'static str;
+    /// Count of elements.
+    fn len(&self) -> usize;
+    /// Whether there are none.
+    fn is_empty(&self) -> bool {
+        self.len() == 0
+    }
+    /// Potential energy [J], zero at rest.
+    fn energy(&self, x: &[Row]) -> f64;
+    /// Adds the forces [N] and torques [N m], internal damping included.
+    fn add_forces(&mut self, x: &[Row], v: &[Row], force: &mut [Row]);
+    /// Prepares products with the matrix at x.
+    fn linearize(&mut self, x: &[Row], weights: Weights);
+    /// Adds (K and D, weighted as linearized) u.
+    fn add_product(&mut self, x: &[Row], u: &[Row], out: &mut [Row]);
+    /// Adds the diagonal blocks of the matrix.
+    fn add_diagonal(&mut self, x: &[Row], blocks: &mut [Block]);
+    /// Gives every block of the matrix, as row, column and entries; both triangles.
+    fn entries(&self, x: &[Row], sink: &mut dyn FnMut(usize, usize, [[f64; 3]; 3]));
+    /// Projects the positions of points once, element by element in colour order; x[i][3] are inverse masses.
+    /// `h` is the sub-step [s]; an infinite stiffness is rigid.
+    fn project(&mut self, x: &mut [Row], h: f64);
+    /// Lengthening over rest length of every element that is a link.
+    fn link_strain(&self, _x: &[Row]) -> Vec<Real> {
+        Vec::new()
+    }
+    /// Breaks the links that are strained beyond their limit; returns how many.
+    fn break_links(&mut self, _x: &[Row]) -> u64 {
+        0
+    }
+    /// Which links have broken, as indices.
+    fn broken(&self) -> Vec<u32> {
+        Vec::new()
+    }
+    /// Mends all links, then breaks these.
+    fn set_broken(&mut self, _broken: &[u32]) {}
+}
+
+/// For every row, the slots (element times N plus node) that act on it.
+struct Incidence {
+    first: usize,
+    start: Vec<u32>,
+    slot: Vec<u32>,
+}
+
+impl Incidence {
+    fn new<const N: usize>(nodes: &[Index; N]) -> Self {
+        let all = || nodes.iter().flat_map(|i| i.get().iter().copied());
+        let (first, last) = all().fold((u32::MAX, 0), |(a, b), i| (a.min(i), b.max(i)));
+        let rows = if first > last { 0 } else { (last - first + 1) as usize };
+        let first = if rows == 0 { 0 } else { first as usize };
+        let mut start = vec![0_u32; rows + 1];
+        for i in all() {
+            start[i as usize - first + 1] += 1;
+        }
+        for i in 0..rows {
+            start[i + 1] += start[i];
+        }
+        let (mut next, mut slot) = (start.clone(), vec![0; start[rows] as usize]);
+        for e in 0..nodes[0].get().len() {
+            for (a, index) in nodes.iter().enumerate() {
+                let row = index.get()[e] as usize - first;
+                slot[next[row] as usize] = (e * N + a) as u32;
+                next[row] += 1;
+            }
+        }
+        Self { first, start, slot }
+    }
+
+    /// out[row] += the sum of its slots, in slot order.
+    fn add<T: Copy + Send + Sync, O: Send>(&self, slots: &[T], out: &mut [O], add: impl Fn(&mut O, T) + Sync) {
+        let rows = self.start.len() - 1;
+        chunks(&mut out[self.first..self.first + rows], |start, out| {
+            for (i, o) in out.iter_mut().enumerate() {
+                for s in self.start[start + i]..self.start[start + i + 1] {
+                    add(o, slots[self.slot[s as usize] as usize]);
+                }
+            }
+        });
+    }
+}
+
+/// Elements whose forces are computed element by element into slots, then summed row by row in a fixed order: no
+/// colours, no races.
+pub struct Elements<E, Y, const N: usize, const M: usize, const D: usize, const P: usize> {
+    list: List<E, Y, N, M, D, P>,
+    incidence: Incidence,
+    slots: Vec<Row>,
+    energy_at_rest: f64,
+}
+
+impl<E: Element<N, M, D>, Y: Law<P>, const N: usize, const M: usize, const D: usize, const P: usize> Elements<E, Y, N, M, D, P> {
+    /// Elements over rows 0..rows; `None` if a node is not one of them.
+    pub fn new(rows: usize, members: &[Members<N, D, P>]) -> Option<Self> {
+        let list = List::new(rows, members)?;
+        Some(Self { incidence: Incidence::new(&list.nodes), slots: vec![ZERO; N * members.len()], energy_at_rest: 0.0, list })
+    }
+
+    /// Elements that hold this energy [J] at rest; it is left out of the books.
+    pub fn with_energy_at_rest(mut self, energy: f64) -> Self {
+        self.energy_at_rest = energy;
+        self
+    }
+
+    /// Calls `f(list, range, slots)` for every chunk of elements.
+    fn fill(&mut self, f: impl Fn(&List<E, Y, N, M, D, P>, Range<usize>, &mut [Row]) + Sync) {
+        let list = &self.list;
+        self.slots
+            .par_chunks_mut(N * CHUNK)
+            .enumerate()
+            .for_each(|(i, slots)| f(list, i * CHUNK..((i + 1) * CHUNK).min(list.len()), slots));
+    }
+}
+
+struct Forces<'a, E, Y, const N: usize, const M: usize, const D: usize, const P: usize> {
+    list: &'a List<E, Y, N, M, D, P>,
+    range: Range<usize>,
+    x: &'a [Row],
+    v: Option<&'a [Row]>,
+    slots: &'a mut [Row],
+}
+
+impl<E: Element<N, M, D>, Y: Law<P>, const N: usize, const M: usize, const D: usize, const P: usize> Kernel
+    for Forces<'_, E, Y, N, M, D, P>
+{
+    type Output = ();
+    #[inline(always)]
+    fn run<W: Width>(self, w: W) {
+        packs!(W, w, self.range, |e| {
+            let p = self.list.pack(w, e);
+            let rows = self.list.rows(w, self.x, e);
+            let damping = match self.v {
+                Some(v) => Some((p.damping, self.list.vectors(w, v, e))),
+                None => None,
+            };
+            let f = forces::<E, Y, _, N, M, D, P>(p.stiffness, p.law, p.rest, rows, damping);
+            for a in 0..N {
+                w.scatter([f[a].x, f[a].y, f[a].z, w.splat(0.0)], self.slots, (e - self.range.start) * N + a, N);
+            }
+        });
+    }
+}
+
+struct Products<'a, E, Y, const N: usize, const M: usize, const D: usize, const P: usize> {
+    list: &'a List<E, Y, N, M, D, P>,
+    range: Range<usize>,
+    x: &'a [Row],
+    u: &'a [Row],
+    slots: &'a mut [Row],
+}
+
+impl<E: Element<N, M, D>, Y: Law<P>, const N: usize, const M: usize, const D: usize, const P: usize> Kernel
+    for Products<'_, E, Y, N, M, D, P>
+{
+    type Output = ();
+    #[inline(always)]
+    fn run<W: Width>(self, w: W) {
+        packs!(W, w, self.range, |e| {
+            let p = self.list.pack(w, e);
+            let rows = self.list.rows(w, self.x, e);
+            let f = self.list.product(&p, rows, self.list.vectors(w, self.u, e));
+            for a in 0..N {
+                w.scatter([f[a].x, f[a].y, f[a].z, w.splat(0.0)], self.slots, (e - self.range.start) * N + a, N);
+            }
+        });
+    }
+}
+
+impl<E: Element<N, M, D>, Y: Law<P>, const N: usize, const M: usize, const D: usize, const P: usize> Batch for Elements<E, Y, N, M, D, P> {
+    fn name(&self) -> &'static str {
+        E::NAME
+    }
+
+    fn len(&self) -> usize {
+        self.list.len()
+    }
+
+    fn energy(&self, x: &[Row]) -> f64 {
+        self.list.energy(x) - self.energy_at_rest
+    }
+
+    fn add_forces(&mut self, x: &[Row], v: &[Row], force: &mut [Row]) {
+        self.list.check(&[x, v, force]);
+        let v = self.list.damped.then_some(v);
+        self.fill(|list, range, slots| dispatch(Forces { list, range, x, v, slots }));
+        self.incidence.add(&self.slots, force, |o, f| *o = add(*o, f));
+    }
+
+    fn linearize(&mut self, _x: &[Row], weights: Weights) {
+        self.list.weights = weights;
+    }
+
+    fn add_product(&mut self, x: &[Row], u: &[Row], out: &mut [Row]) {
+        self.list.check(&[x, u, out]);
+        self.fill(|list, range, slots| dispatch(Products { list, range, x, u, slots }));
+        self.incidence.add(&self.slots, out, |o, f| *o = add(*o, f));
+    }
+
+    fn add_diagonal(&mut self, x: &[Row], blocks: &mut [Block]) {
+        self.list.check(&[x]);
+        let slots = fold(self.len(), |range| self.list.diagonal(x, range)).concat();
+        self.incidence.add(&slots, blocks, |o, f: Block| {
+            for i in 0..6 {
+                o[i] += f[i];
+            }
+        });
+    }
+
+    fn entries(&self, x: &[Row], sink: &mut dyn FnMut(usize, usize, [[f64; 3]; 3])) {
+        self.list.entries(x, sink);
+    }
+
+    fn project(&mut self, x: &mut [Row], h: f64) {
+        self.list.project(x, h);
+    }
+}

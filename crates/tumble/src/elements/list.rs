@@ -1,0 +1,302 @@
+//! Elements of one kind as columns, with everything about them that needs no scratch: energies, products of single
+//! elements, colours, projection.
+
+use super::batch::Weights;
+use super::{Element, Law, energy, gauss_newton, hessian, project, tangents};
+use crate::math::parallel::{CHUNK, fold};
+use crate::math::simd::{Index, Kernel, Scalar, Width, dispatch};
+use crate::math::{Lane, Quat, Real, Row, Vec3, axpy, row};
+use rayon::prelude::*;
+use std::marker::PhantomData;
+use std::ops::Range;
+use tumble_interface::scene::Hessian;
+
+/// One element, as a recipe gives it.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Members<const N: usize, const D: usize, const P: usize> {
+    /// Rows of its nodes.
+    pub nodes: [u32; N],
+    /// Its rest numbers.
+    pub rest: [f64; D],
+    /// Parameters of its law.
+    pub law: [f64; P],
+    /// Its stiffness.
+    pub stiffness: f64,
+    /// Its internal damping.
+    pub damping: f64,
+}
+
+/// Elements E with the law Y over N nodes, with M measures, D rest numbers and P law parameters, as columns.
+pub struct List<E, Y, const N: usize, const M: usize, const D: usize, const P: usize> {
+    pub nodes: [Index; N],
+    pub rest: [Vec<Real>; D],
+    pub law: [Vec<Real>; P],
+    pub stiffness: Vec<Real>,
+    pub damping: Vec<Real>,
+    pub damped: bool,
+    pub weights: Weights,
+    colors: Option<Vec<Vec<u32>>>,
+    kind: PhantomData<(E, Y)>,
+}
+
+/// What one pack of elements loads.
+pub struct Pack<L, const D: usize, const P: usize> {
+    pub rest: [L; D],
+    pub law: [L; P],
+    pub stiffness: L,
+    pub damping: L,
+}
+
+/// Runs `$body` with `$w` and the first element `$e` of each pack of `$range`, then one by one.
+macro_rules! packs {
+    ($width:ident, $w:ident, $range:expr, |$e:ident| $body:expr) => {{
+        let mut $e = $range.start;
+        while $e + $width::N <= $range.end {
+            $body;
+            $e += $width::N;
+        }
+        let $w = $crate::math::simd::Scalar;
+        while $e < $range.end {
+            $body;
+            $e += 1;
+        }
+    }};
+}
+pub(super) use packs;
+
+impl<E: Element<N, M, D>, Y: Law<P>, const N: usize, const M: usize, const D: usize, const P: usize> List<E, Y, N, M, D, P> {
+    /// `None` if a node is not one of the rows 0..rows.
+    pub fn new(rows: usize, members: &[Members<N, D, P>]) -> Option<Self> {
+        let column = |f: &dyn Fn(&Members<N, D, P>) -> f64| -> Vec<Real> { members.iter().map(|m| f(m) as Real).collect() };
+        let mut nodes: [Index; N] = std::array::from_fn(|_| Index::default());
+        for (a, index) in nodes.iter_mut().enumerate() {
+            *index = Index::new(members.iter().map(|m| m.nodes[a]).collect(), rows)?;
+        }
+        Some(Self {
+            nodes,
+            rest: std::array::from_fn(|d| column(&|m| m.rest[d])),
+            law: std::array::from_fn(|p| column(&|m| m.law[p])),
+            stiffness: column(&|m| m.stiffness),
+            damping: column(&|m| m.damping),
+            damped: members.iter().any(|m| m.damping != 0.0),
+            weights: Weights { stiffness: 1.0, damping: 0.0, hessian: Hessian::Definite },
+            colors: None,
+            kind: PhantomData,
+        })
+    }
+
+    pub fn len(&self) -> usize {
+        self.stiffness.len()
+    }
+
+    /// Panics unless every column of rows is long enough for the unchecked loads.
+    pub fn check(&self, columns: &[&[Row]]) {
+        for rows in columns {
+            assert!(self.nodes.iter().all(|i| i.rows() <= rows.len()), "a column is shorter than the rows that elements use");
+        }
+    }
+
+    #[inline(always)]
+    pub fn pack<W: Width>(&self, w: W, e: usize) -> Pack<W::L, D, P> {
+        let stiffness = w.load(&self.stiffness[e..]);
+        let (mut rest, mut law) = ([stiffness; D], [stiffness; P]);
+        for d in 0..D {
+            rest[d] = w.load(&self.rest[d][e..]);
+        }
+        for p in 0..P {
+            law[p] = w.load(&self.law[p][e..]);
+        }
+        Pack { rest, law, stiffness, damping: w.load(&self.damping[e..]) }
+    }
+
+    /// The rows of the nodes; frames, the last ones, scaled to length 1.
+    #[inline(always)]
+    pub fn rows<W: Width>(&self, w: W, x: &[Row], e: usize) -> [[W::L; 4]; N] {
+        let mut out = [[w.splat(0.0); 4]; N];
+        for a in 0..N {
+            // SAFETY: every public entry has called `check` on x.
+            out[a] = unsafe { w.gather(x, &self.nodes[a].get()[e..]) };
+            if a >= N - E::FRAMES {
+                out[a] = Quat::from_row(out[a]).normalized().row();
+            }
+        }
+        out
+    }
+
+    /// Vectors (velocities, directions) at the nodes.
+    #[inline(always)]
+    pub fn vectors<W: Width>(&self, w: W, v: &[Row], e: usize) -> [Vec3<W::L>; N] {
+        let zero = w.splat(0.0);
+        let mut out = [Vec3 { x: zero, y: zero, z: zero }; N];
+        for a in 0..N {
+            // SAFETY: every public entry has called `check` on v.
+            let [x, y, z, _] = unsafe { w.gather(v, &self.nodes[a].get()[e..]) };
+            out[a] = Vec3 { x, y, z };
+        }
+        out
+    }
+
+    /// The weighted matrix of one pack times u.
+    #[inline(always)]
+    pub fn product<L: Lane>(&self, p: &Pack<L, D, P>, x: [[L; 4]; N], u: [Vec3<L>; N]) -> [Vec3<L>; N] {
+        let k = p.stiffness * p.stiffness.like(f64::from(self.weights.stiffness));
+        let b = p.damping * p.damping.like(f64::from(self.weights.damping));
+        if self.weights.hessian == Hessian::Exact {
+            let mut out = hessian::<E, Y, L, N, M, D, P>(k, p.law, p.rest, x, u);
+            if self.damped {
+                let damping = gauss_newton::<E, L, N, M, D>([b; M], p.rest, x, u);
+                for a in 0..N {
+                    out[a] = out[a] + damping[a];
+                }
+            }
+            return out;
+        }
+        let mut c = tangents::<E, Y, L, N, M, D, P>(k, p.law, p.rest, x);
+        for i in 0..M {
+            c[i] = c[i] + b;
+        }
+        gauss_newton::<E, L, N, M, D>(c, p.rest, x, u)
+    }
+
+    /// The 3N x 3N matrix of one element, as (node, component, column).
+    fn matrix(&self, x: &[Row], e: usize, mut take: impl FnMut(usize, usize, [Vec3<Real>; N])) {
+        let p = self.pack(Scalar, e);
+        let rows = self.rows(Scalar, x, e);
+        for a in 0..N {
+            for c in 0..3 {
+                let mut u = [Vec3 { x: 0.0, y: 0.0, z: 0.0 }; N];
+                let mut unit = [0.0; 3];
+                unit[c] = 1.0;
+                u[a] = unit.into();
+                take(a, c, self.product(&p, rows, u));
+            }
+        }
+    }
+
+    /// The 3 x 3 blocks on the diagonal for the elements of a range: N blocks an element, as xx, yy, zz, xy, yz, zx.
+    pub fn diagonal(&self, x: &[Row], range: Range<usize>) -> Vec<[Real; 6]> {
+        let mut slots = vec![[0.0; 6]; N * range.len()];
+        for e in range.clone() {
+            let mut columns = [[Vec3 { x: 0.0, y: 0.0, z: 0.0 }; 3]; N];
+            self.matrix(x, e, |a, c, product| columns[a][c] = product[a]);
+            for (a, [cx, cy, cz]) in columns.iter().enumerate() {
+                slots[(e - range.start) * N + a] = [cx.x, cy.y, cz.z, cy.x, cz.y, cx.z];
+            }
+        }
+        slots
+    }
+
+    /// Every block of every element's matrix.
+    pub fn entries(&self, x: &[Row], sink: &mut dyn FnMut(usize, usize, [[f64; 3]; 3])) {
+        self.check(&[x]);
+        for e in 0..self.len() {
+            let mut blocks = [[[[0.0; 3]; 3]; N]; N];
+            self.matrix(x, e, |b, c, product| {
+                for a in 0..N {
+                    let column: [Real; 3] = product[a].into();
+                    for r in 0..3 {
+                        blocks[a][b][r][c] = f64::from(column[r]);
+                    }
+                }
+            });
+            for a in 0..N {
+                for b in 0..N {
+                    sink(self.nodes[a].get()[e] as usize, self.nodes[b].get()[e] as usize, blocks[a][b]);
+                }
+            }
+        }
+    }
+
+    /// The energy of all elements [J].
+    pub fn energy(&self, x: &[Row]) -> f64 {
+        self.check(&[x]);
+        fold(self.len(), |range| dispatch(Energies { list: self, range, x })).into_iter().sum()
+    }
+
+    /// Groups of elements that share no node, greedily in element order.
+    fn color(&self) -> Vec<Vec<u32>> {
+        let rows = self.nodes.iter().map(Index::rows).max().unwrap_or(0);
+        let mut used: Vec<u64> = vec![0; rows];
+        let mut colors: Vec<Vec<u32>> = Vec::new();
+        let mut late: Vec<u32> = Vec::new();
+        for e in 0..self.len() {
+            let taken = self.nodes.iter().fold(0, |t, i| t | used[i.get()[e] as usize]);
+            let color = (!taken).trailing_zeros() as usize;
+            if color == 64 {
+                late.push(e as u32);
+                continue;
+            }
+            for index in &self.nodes {
+                used[index.get()[e] as usize] |= 1 << color;
+            }
+            if color == colors.len() {
+                colors.push(Vec::new());
+            }
+            colors[color].push(e as u32);
+        }
+        // Elements around a node with more than 64 of them go one by one.
+        colors.extend(late.into_iter().map(|e| vec![e]));
+        colors
+    }
+
+    /// Projects every element once; see `Batch::project`.
+    pub fn project(&mut self, x: &mut [Row], h: f64) {
+        self.check(&[x]);
+        let colors = self.colors.take().unwrap_or_else(|| self.color());
+        for color in &colors {
+            let correction = |e: &u32| {
+                let e = *e as usize;
+                let p = self.pack(Scalar, e);
+                let rows = self.rows(Scalar, x, e);
+                let mut w = [0.0; N];
+                for a in 0..N {
+                    w[a] = rows[a][3];
+                }
+                let alpha = (1.0 / (f64::from(p.stiffness) * h * h)) as Real;
+                project::<E, Real, N, M, D>(alpha, 0.0, p.rest, rows, w).0
+            };
+            let corrections: Vec<[Vec3<Real>; N]> = color.par_iter().with_min_len(CHUNK).map(correction).collect();
+            for (e, dx) in color.iter().zip(corrections) {
+                for a in 0..N {
+                    let i = self.nodes[a].get()[*e as usize] as usize;
+                    x[i] = axpy(x[i], 1.0, row(dx[a], 0.0));
+                }
+            }
+        }
+        self.colors = Some(colors);
+    }
+}
+
+struct Energies<'a, E, Y, const N: usize, const M: usize, const D: usize, const P: usize> {
+    list: &'a List<E, Y, N, M, D, P>,
+    range: Range<usize>,
+    x: &'a [Row],
+}
+
+impl<E: Element<N, M, D>, Y: Law<P>, const N: usize, const M: usize, const D: usize, const P: usize> Kernel
+    for Energies<'_, E, Y, N, M, D, P>
+{
+    type Output = f64;
+    #[inline(always)]
+    fn run<W: Width>(self, w: W) -> f64 {
+        let mut total = 0.0;
+        packs!(W, w, self.range, |e| {
+            let p = self.list.pack(w, e);
+            let rows = self.list.rows(w, self.x, e);
+            total += sum(w, energy::<E, Y, _, N, M, D, P>(p.stiffness, p.law, p.rest, rows));
+        });
+        total
+    }
+}
+
+/// The numbers of a pack added one after the other in double precision, so that every width gives the same sum.
+#[inline(always)]
+fn sum<W: Width>(w: W, v: W::L) -> f64 {
+    let mut each = [0.0; 16];
+    w.store(v, &mut each);
+    let mut total = 0.0;
+    for value in &each[..W::N] {
+        total += f64::from(*value);
+    }
+    total
+}

@@ -1,0 +1,243 @@
+//! L3: elastic laws over a few nodes. An element is two pure functions, `residual` r(x) and `pullback` J(x)^T y
+//! with J = dr/dx; energy, force, internal damping, Hessian products and the position-based projection are derived
+//! from them here, once, for every element.
+//!
+//!   E = k/2 |r|²,   f = -J^T (k r + b J v)                            (elements.1, elements.2)
+//!
+//! A node is a point [x, y, z, -] or a frame (unit quaternion). What moves a frame is a rotation vector in the frame's
+//! own axes, so velocities, forces and products hold three numbers per node: velocity or angular velocity, force or torque.
+//! Verified in `tests/elements.rs`: force = -dE/dx, exact Hessian, symmetry, zero net force and torque.
+
+mod batch;
+mod bend;
+mod contact;
+mod distance;
+mod law;
+mod list;
+mod pairs;
+mod rod;
+mod tetrahedron;
+mod vector;
+
+pub use batch::{Batch, Block, Elements, Weights};
+pub use bend::Hinge;
+pub use contact::PointPlane;
+pub use distance::{Distance, Limit};
+pub use law::{Law, Linear, Nonlinear};
+pub use list::Members;
+pub use pairs::{Pair, Pairs};
+pub use rod::{BendTwist, StretchShear};
+pub use tetrahedron::{TetShear, TetStrain, TetVolume, rest_matrix};
+pub use vector::Vector;
+
+use crate::math::{Dual, Lane, Quat, Vec3};
+
+/// One elastic law over N nodes with an M-vector as measure and D rest numbers.
+pub trait Element<const N: usize, const M: usize, const D: usize>: Send + Sync + 'static {
+    /// Name in reports.
+    const NAME: &'static str;
+    /// How many of the nodes, the last ones, are frames.
+    const FRAMES: usize = 0;
+    /// The measure r that the stiffness multiplies.
+    fn residual<L: Lane>(rest: [L; D], x: [[L; 4]; N]) -> [L; M];
+    /// J(x)^T y: forces on points, and on the four numbers of a frame.
+    fn pullback<L: Lane>(rest: [L; D], x: [[L; 4]; N], y: [L; M]) -> [[L; 4]; N];
+}
+
+/// The first three numbers of a node.
+#[inline(always)]
+pub fn point<L: Lane>([x, y, z, _]: [L; 4]) -> Vec3<L> {
+    Vec3 { x, y, z }
+}
+
+/// A force on a point.
+#[inline(always)]
+pub fn force<L: Lane>(v: Vec3<L>) -> [L; 4] {
+    [v.x, v.y, v.z, v.x.zero()]
+}
+
+/// Positions with a direction of motion: points move straight, frames turn.
+#[inline(always)]
+fn lift<L: Lane, const N: usize>(frames: usize, x: [[L; 4]; N], u: [Vec3<L>; N]) -> [[Dual<L>; 4]; N] {
+    let mut out = [[Dual::constant(x[0][0].zero()); 4]; N];
+    for i in 0..N {
+        let slope = if i < N - frames { force(u[i]) } else { (Quat::from_row(x[i]) * Quat::pure(u[i])).scaled(x[0][0].like(0.5)).row() };
+        for c in 0..4 {
+            out[i][c] = Dual { re: x[i][c], slope: slope[c] };
+        }
+    }
+    out
+}
+
+/// Forces on nodes: on a frame the four numbers become a torque in the frame's own axes.
+#[inline(always)]
+fn lower<L: Lane, const N: usize>(frames: usize, x: [[L; 4]; N], g: [[L; 4]; N]) -> [Vec3<L>; N] {
+    let mut out = [point(g[0]); N];
+    for i in 0..N {
+        out[i] = if i < N - frames { point(g[i]) } else { (Quat::from_row(x[i]).conj() * Quat::from_row(g[i])).v * x[0][0].like(0.5) };
+    }
+    out
+}
+
+#[inline(always)]
+fn constant<L: Lane, const D: usize>(rest: [L; D], any: L) -> [Dual<L>; D] {
+    let mut out = [Dual::constant(any); D];
+    for i in 0..D {
+        out[i] = Dual::constant(rest[i]);
+    }
+    out
+}
+
+/// J u: how fast r changes when the nodes move with u.
+#[inline(always)]
+pub fn rate<E: Element<N, M, D>, L: Lane, const N: usize, const M: usize, const D: usize>(
+    rest: [L; D],
+    x: [[L; 4]; N],
+    u: [Vec3<L>; N],
+) -> [L; M] {
+    let r = E::residual(constant(rest, x[0][0]), lift(E::FRAMES, x, u));
+    let mut out = [x[0][0]; M];
+    for i in 0..M {
+        out[i] = r[i].slope;
+    }
+    out
+}
+
+/// The energy.
+#[inline(always)]
+pub fn energy<E: Element<N, M, D>, Y: Law<P>, L: Lane, const N: usize, const M: usize, const D: usize, const P: usize>(
+    k: L,
+    law: [L; P],
+    rest: [L; D],
+    x: [[L; 4]; N],
+) -> L {
+    let r = E::residual(rest, x);
+    let mut sum = k.zero();
+    for i in 0..M {
+        sum = sum + Y::energy(k, law, r[i]);
+    }
+    sum
+}
+
+/// Forces from the stress and, with velocities, from internal damping b.
+#[inline(always)]
+pub fn forces<E: Element<N, M, D>, Y: Law<P>, L: Lane, const N: usize, const M: usize, const D: usize, const P: usize>(
+    k: L,
+    law: [L; P],
+    rest: [L; D],
+    x: [[L; 4]; N],
+    damping: Option<(L, [Vec3<L>; N])>,
+) -> [Vec3<L>; N] {
+    let r = E::residual(rest, x);
+    let mut y = r;
+    for i in 0..M {
+        y[i] = -Y::stress(k, law, r[i]);
+    }
+    if let Some((b, v)) = damping {
+        let speed = rate::<E, L, N, M, D>(rest, x, v);
+        for i in 0..M {
+            y[i] = y[i] - b * speed[i];
+        }
+    }
+    lower(E::FRAMES, x, E::pullback(rest, x, y))
+}
+
+/// The product of the exact Hessian of the energy with u. On frames it is the second derivative along rotations at
+/// constant rate, which is symmetric.
+#[inline(always)]
+pub fn hessian<E: Element<N, M, D>, Y: Law<P>, L: Lane, const N: usize, const M: usize, const D: usize, const P: usize>(
+    k: L,
+    law: [L; P],
+    rest: [L; D],
+    x: [[L; 4]; N],
+    u: [Vec3<L>; N],
+) -> [Vec3<L>; N] {
+    let (rest, lifted) = (constant(rest, k), lift(E::FRAMES, x, u));
+    let mut y = E::residual(rest, lifted);
+    for i in 0..M {
+        y[i] = Y::stress(Dual::constant(k), constant(law, k), y[i]);
+    }
+    let g = E::pullback(rest, lifted, y);
+    let (mut value, mut slope) = (x, x);
+    for i in 0..N {
+        for c in 0..4 {
+            value[i][c] = g[i][c].re;
+            slope[i][c] = g[i][c].slope;
+        }
+    }
+    let mut product = lower(E::FRAMES, x, slope);
+    // q'' = -|u|²/4 q along a rotation.
+    for i in N - E::FRAMES..N {
+        let radial = Quat::from_row(x[i]).dot(Quat::from_row(value[i]));
+        product[i] = product[i] - u[i] * (radial * radial.like(0.25));
+    }
+    product
+}
+
+/// J^T (c_i (J u)_i): with c = tangent of the law, the Hessian without its indefinite part (Gauss-Newton); with c = b,
+/// the matrix of internal damping.
+#[inline(always)]
+pub fn gauss_newton<E: Element<N, M, D>, L: Lane, const N: usize, const M: usize, const D: usize>(
+    c: [L; M],
+    rest: [L; D],
+    x: [[L; 4]; N],
+    u: [Vec3<L>; N],
+) -> [Vec3<L>; N] {
+    let mut y = rate::<E, L, N, M, D>(rest, x, u);
+    for i in 0..M {
+        y[i] = y[i] * c[i];
+    }
+    lower(E::FRAMES, x, E::pullback(rest, x, y))
+}
+
+/// The slope of the law at each component of r, negative ones taken as zero.
+#[inline(always)]
+pub fn tangents<E: Element<N, M, D>, Y: Law<P>, L: Lane, const N: usize, const M: usize, const D: usize, const P: usize>(
+    k: L,
+    law: [L; P],
+    rest: [L; D],
+    x: [[L; 4]; N],
+) -> [L; M] {
+    let mut r = E::residual(rest, x);
+    for i in 0..M {
+        r[i] = Y::tangent(k, law, r[i]).above_zero();
+    }
+    r
+}
+
+/// One step of the position-based projection of |r| to zero with compliance `alpha` = 1/(k h²) [1/(m^-2 kg)], which
+/// is 0 for a rigid constraint. Points only; `w` are inverse masses. Returns the corrections.
+///
+///   dx_i = -w_i g_i (c + alpha lambda) / (sum_j w_j |g_j|² + alpha),   g = J^T r/|r|, c = |r|      (elements.5)
+///
+/// Source: [macklin2016], eq. 18.
+#[inline(always)]
+pub fn project<E: Element<N, M, D>, L: Lane, const N: usize, const M: usize, const D: usize>(
+    alpha: L,
+    lambda: L,
+    rest: [L; D],
+    x: [[L; 4]; N],
+    w: [L; N],
+) -> ([Vec3<L>; N], L) {
+    let r = E::residual(rest, x);
+    let mut norm_sq = alpha.zero();
+    for i in 0..M {
+        norm_sq = norm_sq + r[i] * r[i];
+    }
+    let c = norm_sq.sqrt();
+    let mut y = r;
+    for i in 0..M {
+        y[i] = c.positive(r[i] / c, c.zero());
+    }
+    let g = E::pullback(rest, x, y);
+    let mut weight = alpha;
+    for i in 0..N {
+        weight = weight + w[i] * point(g[i]).norm_sq();
+    }
+    let delta = weight.positive(-(c + alpha * lambda) / weight, c.zero());
+    let mut out = [point(g[0]); N];
+    for i in 0..N {
+        out[i] = point(g[i]) * (w[i] * delta);
+    }
+    (out, delta)
+}

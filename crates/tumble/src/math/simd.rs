@@ -1,0 +1,524 @@
+//! Registers as lanes. A kernel is written once over [`Width`]; [`dispatch`] runs it on the widest registers
+//! of the machine. Every width computes the same bits: each lane does the same correctly rounded operations.
+//!
+//! Rows of four numbers are loaded as whole registers and transposed, which beats gather instructions by 1.8x.
+//! In kernels use `for` loops and `#[inline(always)]` functions only: closures and `array::map` become calls
+//! compiled without the wide registers.
+
+use super::{Lane, Real, Row};
+use pulp::Simd;
+use std::ops::{Add, Div, Mul, Neg, Sub};
+
+/// Indices into rows 0..rows, checked at construction, so that kernels may load without checks.
+#[derive(Debug, Clone, Default, PartialEq, Eq)]
+pub struct Index {
+    index: Vec<u32>,
+    rows: usize,
+}
+
+impl Index {
+    /// Wraps indices; `None` if one is not below `rows`.
+    pub fn new(index: Vec<u32>, rows: usize) -> Option<Self> {
+        index.iter().all(|i| (*i as usize) < rows).then_some(Self { index, rows })
+    }
+
+    /// The indices.
+    pub fn get(&self) -> &[u32] {
+        &self.index
+    }
+
+    /// How many rows they index at least.
+    pub fn rows(&self) -> usize {
+        self.rows
+    }
+}
+
+/// A set of registers that hold N numbers each.
+pub trait Width: Copy + Send + Sync {
+    /// N numbers.
+    type L: Lane;
+    /// Count of numbers.
+    const N: usize;
+    /// The constant `c`.
+    fn splat(self, c: Real) -> Self::L;
+    /// Loads `from[..N]`.
+    fn load(self, from: &[Real]) -> Self::L;
+    /// Stores to `to[..N]`.
+    fn store(self, v: Self::L, to: &mut [Real]);
+    /// Loads the rows `index[..N]` and transposes them: four registers with x, y, z and w of N rows.
+    ///
+    /// # Safety
+    /// Every index is below `rows.len()`.
+    unsafe fn gather(self, rows: &[Row], index: &[u32]) -> [Self::L; 4];
+    /// Stores N rows at `start`, `start + stride`, ...
+    fn scatter(self, v: [Self::L; 4], rows: &mut [Row], start: usize, stride: usize);
+    /// Loads N consecutive rows from `start`.
+    fn rows(self, rows: &[Row], start: usize) -> [Self::L; 4];
+}
+
+/// A kernel, generic over the register width.
+pub trait Kernel {
+    /// What it returns.
+    type Output;
+    /// Does the work.
+    fn run<W: Width>(self, w: W) -> Self::Output;
+}
+
+/// One number at a time.
+#[derive(Debug, Clone, Copy)]
+pub struct Scalar;
+
+impl Width for Scalar {
+    type L = Real;
+    const N: usize = 1;
+    #[inline(always)]
+    fn splat(self, c: Real) -> Real {
+        c
+    }
+    #[inline(always)]
+    fn load(self, from: &[Real]) -> Real {
+        from[0]
+    }
+    #[inline(always)]
+    fn store(self, v: Real, to: &mut [Real]) {
+        to[0] = v;
+    }
+    #[inline(always)]
+    unsafe fn gather(self, rows: &[Row], index: &[u32]) -> [Real; 4] {
+        // SAFETY: the caller has checked the index.
+        unsafe { *rows.get_unchecked(index[0] as usize) }
+    }
+    #[inline(always)]
+    fn scatter(self, v: [Real; 4], rows: &mut [Row], start: usize, _stride: usize) {
+        rows[start] = v;
+    }
+    #[inline(always)]
+    fn rows(self, rows: &[Row], start: usize) -> [Real; 4] {
+        rows[start]
+    }
+}
+
+#[cfg(not(feature = "double"))]
+type Register<S> = <S as Simd>::f32s;
+#[cfg(feature = "double")]
+type Register<S> = <S as Simd>::f64s;
+
+/// A register with arithmetic operators.
+#[derive(Clone, Copy)]
+pub struct Pack<S: Simd> {
+    simd: S,
+    v: Register<S>,
+}
+
+macro_rules! operations {
+    ($splat:ident, $add:ident, $sub:ident, $mul:ident, $div:ident, $neg:ident, $sqrt:ident, $greater:ident, $select:ident) => {
+        impl<S: Simd> Add for Pack<S> {
+            type Output = Self;
+            #[inline(always)]
+            fn add(self, b: Self) -> Self {
+                Self { simd: self.simd, v: self.simd.$add(self.v, b.v) }
+            }
+        }
+        impl<S: Simd> Sub for Pack<S> {
+            type Output = Self;
+            #[inline(always)]
+            fn sub(self, b: Self) -> Self {
+                Self { simd: self.simd, v: self.simd.$sub(self.v, b.v) }
+            }
+        }
+        impl<S: Simd> Mul for Pack<S> {
+            type Output = Self;
+            #[inline(always)]
+            fn mul(self, b: Self) -> Self {
+                Self { simd: self.simd, v: self.simd.$mul(self.v, b.v) }
+            }
+        }
+        impl<S: Simd> Div for Pack<S> {
+            type Output = Self;
+            #[inline(always)]
+            fn div(self, b: Self) -> Self {
+                Self { simd: self.simd, v: self.simd.$div(self.v, b.v) }
+            }
+        }
+        impl<S: Simd> Neg for Pack<S> {
+            type Output = Self;
+            #[inline(always)]
+            fn neg(self) -> Self {
+                Self { simd: self.simd, v: self.simd.$neg(self.v) }
+            }
+        }
+        impl<S: Simd> Lane for Pack<S> {
+            #[inline(always)]
+            fn like(self, c: f64) -> Self {
+                Self { simd: self.simd, v: self.simd.$splat(c as Real) }
+            }
+            #[inline(always)]
+            fn sqrt(self) -> Self {
+                Self { simd: self.simd, v: self.simd.$sqrt(self.v) }
+            }
+            #[inline(always)]
+            fn positive(self, then: Self, other: Self) -> Self {
+                let mask = self.simd.$greater(self.v, self.simd.$splat(0.0));
+                Self { simd: self.simd, v: self.simd.$select(mask, then.v, other.v) }
+            }
+        }
+    };
+}
+
+#[cfg(not(feature = "double"))]
+operations!(splat_f32s, add_f32s, sub_f32s, mul_f32s, div_f32s, neg_f32s, sqrt_f32s, greater_than_f32s, select_f32s);
+#[cfg(feature = "double")]
+operations!(splat_f64s, add_f64s, sub_f64s, mul_f64s, div_f64s, neg_f64s, sqrt_f64s, greater_than_f64s, select_f64s);
+
+/// The instruction sets that a kernel can be run on, for tests that compare their bits.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Level {
+    /// One number at a time.
+    Scalar,
+    /// AVX2: 256-bit registers.
+    Avx2,
+    /// AVX-512: 512-bit registers.
+    Avx512,
+}
+
+impl Level {
+    /// The levels that this machine has.
+    pub fn available() -> Vec<Level> {
+        #[cfg(target_arch = "x86_64")]
+        let wide = [(Self::Avx2, x86::avx2().is_some()), (Self::Avx512, x86::avx512().is_some())];
+        #[cfg(not(target_arch = "x86_64"))]
+        let wide = [];
+        std::iter::once(Self::Scalar).chain(wide.into_iter().filter(|(_, has)| *has).map(|(level, _)| level)).collect()
+    }
+}
+
+/// Runs a kernel on the widest registers of this machine.
+#[inline]
+pub fn dispatch<K: Kernel>(kernel: K) -> K::Output {
+    dispatch_at(Level::Avx512, kernel)
+}
+
+/// Runs a kernel on registers no wider than `level`.
+#[inline]
+pub fn dispatch_at<K: Kernel>(level: Level, kernel: K) -> K::Output {
+    #[cfg(target_arch = "x86_64")]
+    {
+        if let (Level::Avx512, Some(simd)) = (level, x86::avx512()) {
+            return Simd::vectorize(simd, x86::InAvx512 { kernel, simd });
+        }
+        if let (Level::Avx2 | Level::Avx512, Some(simd)) = (level, x86::avx2()) {
+            return Simd::vectorize(simd, x86::InAvx2 { kernel, simd });
+        }
+    }
+    let _ = level;
+    kernel.run(Scalar)
+}
+
+#[cfg(target_arch = "x86_64")]
+mod x86 {
+    use super::{Kernel, Pack, Real, Row, Width};
+    use pulp::x86::{V3, V4};
+    use pulp::{Simd, WithSimd, cast};
+
+    pub fn avx2() -> Option<V3> {
+        static TOKEN: std::sync::OnceLock<Option<V3>> = std::sync::OnceLock::new();
+        *TOKEN.get_or_init(V3::try_new)
+    }
+
+    pub fn avx512() -> Option<V4> {
+        static TOKEN: std::sync::OnceLock<Option<V4>> = std::sync::OnceLock::new();
+        *TOKEN.get_or_init(V4::try_new)
+    }
+
+    /// Enters the functions that pulp compiles for the instruction set; the token keeps its type.
+    macro_rules! entry {
+        ($name:ident, $token:ident) => {
+            pub struct $name<K> {
+                pub kernel: K,
+                pub simd: $token,
+            }
+            impl<K: Kernel> WithSimd for $name<K> {
+                type Output = K::Output;
+                #[inline(always)]
+                fn with_simd<S: Simd>(self, _: S) -> K::Output {
+                    self.kernel.run(self.simd)
+                }
+            }
+        };
+    }
+    entry!(InAvx2, V3);
+    entry!(InAvx512, V4);
+
+    /// Everything that does not depend on how rows are transposed.
+    macro_rules! width {
+        ($token:ident, $n:expr, $splat:ident, $load:ident, $store:ident) => {
+            impl Width for $token {
+                type L = Pack<$token>;
+                const N: usize = $n;
+                #[inline(always)]
+                fn splat(self, c: Real) -> Self::L {
+                    Pack { simd: self, v: self.$splat(c) }
+                }
+                #[inline(always)]
+                fn load(self, from: &[Real]) -> Self::L {
+                    Pack { simd: self, v: self.$load(&from[..$n]) }
+                }
+                #[inline(always)]
+                fn store(self, v: Self::L, to: &mut [Real]) {
+                    self.$store(&mut to[..$n], v.v);
+                }
+                #[inline(always)]
+                unsafe fn gather(self, rows: &[Row], index: &[u32]) -> [Self::L; 4] {
+                    let index = &index[..$n];
+                    let mut picked = [[0.0; 4]; $n];
+                    for i in 0..$n {
+                        debug_assert!((index[i] as usize) < rows.len());
+                        // SAFETY: the caller has checked the indices.
+                        picked[i] = unsafe { *rows.get_unchecked(index[i] as usize) };
+                    }
+                    self.transpose(picked)
+                }
+                #[inline(always)]
+                fn scatter(self, v: [Self::L; 4], rows: &mut [Row], start: usize, stride: usize) {
+                    let untransposed = self.untranspose(v);
+                    assert!(start + ($n - 1) * stride < rows.len());
+                    for i in 0..$n {
+                        rows[start + i * stride] = untransposed[i];
+                    }
+                }
+                #[inline(always)]
+                fn rows(self, rows: &[Row], start: usize) -> [Self::L; 4] {
+                    let rows = &rows[start..start + $n];
+                    let mut picked = [[0.0; 4]; $n];
+                    for i in 0..$n {
+                        picked[i] = rows[i];
+                    }
+                    self.transpose(picked)
+                }
+            }
+        };
+    }
+
+    /// Rows of four numbers to four registers and back.
+    trait Transpose: Simd {
+        type Rows;
+        fn transpose(self, rows: Self::Rows) -> [Pack<Self>; 4];
+        fn untranspose(self, v: [Pack<Self>; 4]) -> Self::Rows;
+    }
+
+    macro_rules! packs {
+        ($simd:expr, [$x:expr, $y:expr, $z:expr, $w:expr]) => {
+            [
+                Pack { simd: $simd, v: cast($x) },
+                Pack { simd: $simd, v: cast($y) },
+                Pack { simd: $simd, v: cast($z) },
+                Pack { simd: $simd, v: cast($w) },
+            ]
+        };
+    }
+
+    #[cfg(not(feature = "double"))]
+    mod single {
+        use super::*;
+
+        width!(V3, 8, splat_f32s, partial_load_f32s, partial_store_f32s);
+        width!(V4, 16, splat_f32s, partial_load_f32s, partial_store_f32s);
+
+        /// Transposes four by four inside each 128-bit part; its own inverse.
+        macro_rules! four_by_four {
+            ($s:expr, $lo:ident, $hi:ident, $shuffle:ident, [$a:expr, $b:expr, $c:expr, $d:expr]) => {{
+                let (ab, cd) = ($s.$lo($a, $b), $s.$lo($c, $d));
+                let (ef, gh) = ($s.$hi($a, $b), $s.$hi($c, $d));
+                [$s.$shuffle::<0x44>(ab, cd), $s.$shuffle::<0xEE>(ab, cd), $s.$shuffle::<0x44>(ef, gh), $s.$shuffle::<0xEE>(ef, gh)]
+            }};
+        }
+
+        impl Transpose for V3 {
+            type Rows = [Row; 8];
+            #[inline(always)]
+            fn transpose(self, r: [Row; 8]) -> [Pack<Self>; 4] {
+                let s = self.avx;
+                let mut p = [s._mm256_castps128_ps256(cast(r[0])); 4];
+                for i in 0..4 {
+                    p[i] = s._mm256_insertf128_ps::<1>(s._mm256_castps128_ps256(cast(r[i])), cast(r[4 + i]));
+                }
+                let [x, y, z, w] = four_by_four!(s, _mm256_unpacklo_ps, _mm256_unpackhi_ps, _mm256_shuffle_ps, [p[0], p[1], p[2], p[3]]);
+                packs!(self, [x, y, z, w])
+            }
+            #[inline(always)]
+            fn untranspose(self, [x, y, z, w]: [Pack<Self>; 4]) -> [Row; 8] {
+                let s = self.avx;
+                let (x, y, z, w) = (cast(x.v), cast(y.v), cast(z.v), cast(w.v));
+                let p = four_by_four!(s, _mm256_unpacklo_ps, _mm256_unpackhi_ps, _mm256_shuffle_ps, [x, y, z, w]);
+                let mut rows = [[0.0; 4]; 8];
+                for i in 0..4 {
+                    rows[i] = cast(s._mm256_extractf128_ps::<0>(p[i]));
+                    rows[4 + i] = cast(s._mm256_extractf128_ps::<1>(p[i]));
+                }
+                rows
+            }
+        }
+
+        impl Transpose for V4 {
+            type Rows = [Row; 16];
+            #[inline(always)]
+            fn transpose(self, r: [Row; 16]) -> [Pack<Self>; 4] {
+                let s = self.avx512f;
+                let mut p = [s._mm512_castps128_ps512(cast(r[0])); 4];
+                for i in 0..4 {
+                    let part = s._mm512_castps128_ps512(cast(r[i]));
+                    let part = s._mm512_insertf32x4::<1>(part, cast(r[4 + i]));
+                    let part = s._mm512_insertf32x4::<2>(part, cast(r[8 + i]));
+                    p[i] = s._mm512_insertf32x4::<3>(part, cast(r[12 + i]));
+                }
+                let [x, y, z, w] = four_by_four!(s, _mm512_unpacklo_ps, _mm512_unpackhi_ps, _mm512_shuffle_ps, [p[0], p[1], p[2], p[3]]);
+                packs!(self, [x, y, z, w])
+            }
+            #[inline(always)]
+            fn untranspose(self, [x, y, z, w]: [Pack<Self>; 4]) -> [Row; 16] {
+                let s = self.avx512f;
+                let (x, y, z, w) = (cast(x.v), cast(y.v), cast(z.v), cast(w.v));
+                let p = four_by_four!(s, _mm512_unpacklo_ps, _mm512_unpackhi_ps, _mm512_shuffle_ps, [x, y, z, w]);
+                let mut rows = [[0.0; 4]; 16];
+                for i in 0..4 {
+                    rows[i] = cast(s._mm512_extractf32x4_ps::<0>(p[i]));
+                    rows[4 + i] = cast(s._mm512_extractf32x4_ps::<1>(p[i]));
+                    rows[8 + i] = cast(s._mm512_extractf32x4_ps::<2>(p[i]));
+                    rows[12 + i] = cast(s._mm512_extractf32x4_ps::<3>(p[i]));
+                }
+                rows
+            }
+        }
+    }
+
+    #[cfg(feature = "double")]
+    mod double {
+        use super::*;
+        use std::arch::x86_64::__m256d;
+
+        width!(V3, 4, splat_f64s, partial_load_f64s, partial_store_f64s);
+        width!(V4, 8, splat_f64s, partial_load_f64s, partial_store_f64s);
+
+        /// Transposes four by four; its own inverse.
+        #[inline(always)]
+        fn four_by_four(s: pulp::core_arch::x86::Avx, a: __m256d, b: __m256d, c: __m256d, d: __m256d) -> [__m256d; 4] {
+            let (ab, cd) = (s._mm256_unpacklo_pd(a, b), s._mm256_unpacklo_pd(c, d));
+            let (ef, gh) = (s._mm256_unpackhi_pd(a, b), s._mm256_unpackhi_pd(c, d));
+            [
+                s._mm256_permute2f128_pd::<0x20>(ab, cd),
+                s._mm256_permute2f128_pd::<0x20>(ef, gh),
+                s._mm256_permute2f128_pd::<0x31>(ab, cd),
+                s._mm256_permute2f128_pd::<0x31>(ef, gh),
+            ]
+        }
+
+        impl Transpose for V3 {
+            type Rows = [Row; 4];
+            #[inline(always)]
+            fn transpose(self, r: [Row; 4]) -> [Pack<Self>; 4] {
+                let [x, y, z, w] = four_by_four(self.avx, cast(r[0]), cast(r[1]), cast(r[2]), cast(r[3]));
+                packs!(self, [x, y, z, w])
+            }
+            #[inline(always)]
+            fn untranspose(self, [x, y, z, w]: [Pack<Self>; 4]) -> [Row; 4] {
+                let [a, b, c, d] = four_by_four(self.avx, cast(x.v), cast(y.v), cast(z.v), cast(w.v));
+                [cast(a), cast(b), cast(c), cast(d)]
+            }
+        }
+
+        impl Transpose for V4 {
+            type Rows = [Row; 8];
+            #[inline(always)]
+            fn transpose(self, r: [Row; 8]) -> [Pack<Self>; 4] {
+                let s = self.avx512f;
+                let low = four_by_four(self.avx, cast(r[0]), cast(r[1]), cast(r[2]), cast(r[3]));
+                let high = four_by_four(self.avx, cast(r[4]), cast(r[5]), cast(r[6]), cast(r[7]));
+                let mut p = [s._mm512_castpd256_pd512(low[0]); 4];
+                for i in 0..4 {
+                    p[i] = s._mm512_insertf64x4::<1>(s._mm512_castpd256_pd512(low[i]), high[i]);
+                }
+                packs!(self, [p[0], p[1], p[2], p[3]])
+            }
+            #[inline(always)]
+            fn untranspose(self, [x, y, z, w]: [Pack<Self>; 4]) -> [Row; 8] {
+                let s = self.avx512f;
+                let (x, y, z, w) = (cast(x.v), cast(y.v), cast(z.v), cast(w.v));
+                let mut rows = [[0.0; 4]; 8];
+                let low = |v| s._mm512_castpd512_pd256(v);
+                let high = |v| s._mm512_extractf64x4_pd::<1>(v);
+                let a = four_by_four(self.avx, low(x), low(y), low(z), low(w));
+                let b = four_by_four(self.avx, high(x), high(y), high(z), high(w));
+                for i in 0..4 {
+                    rows[i] = cast(a[i]);
+                    rows[4 + i] = cast(b[i]);
+                }
+                rows
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    struct Norms<'a> {
+        rows: &'a [Row],
+        index: &'a Index,
+        out: &'a mut [Real],
+        moved: &'a mut [Row],
+    }
+
+    impl Kernel for Norms<'_> {
+        type Output = usize;
+        #[inline(always)]
+        fn run<W: Width>(self, w: W) -> usize {
+            let full = self.index.get().len() / W::N * W::N;
+            for start in (0..full).step_by(W::N) {
+                // SAFETY: Index::new has checked it.
+                let [x, y, z, q] = unsafe { w.gather(self.rows, &self.index.get()[start..]) };
+                let n = (x * x + y * y + z * z).sqrt() / (q + q.like(2.0));
+                w.store(x.positive(n, -n), &mut self.out[start..]);
+                w.scatter([y, x, q, z], self.moved, 2 * start, 2);
+            }
+            W::N
+        }
+    }
+
+    #[test]
+    fn every_width_gathers_computes_and_scatters_the_same_bits() {
+        let n = 64;
+        let rows: Vec<Row> = (0..n).map(|i| [i as Real - 20.3, 0.1 * i as Real, (i * i % 7) as Real, 1.0 / (1.0 + i as Real)]).collect();
+        let index = Index::new((0..n as u32).map(|i| i * 37 % 64).collect(), n).unwrap();
+        let run = |level| {
+            let (mut out, mut moved) = (vec![0.0; n], vec![[0.0; 4]; 2 * n]);
+            let width = dispatch_at(level, Norms { rows: &rows, index: &index, out: &mut out, moved: &mut moved });
+            (width, out, moved)
+        };
+        let (one, out, moved) = run(Level::Scalar);
+        assert_eq!(one, 1);
+        assert_eq!(
+            moved[2 * 5],
+            [
+                rows[index.get()[5] as usize][1],
+                rows[index.get()[5] as usize][0],
+                rows[index.get()[5] as usize][3],
+                rows[index.get()[5] as usize][2]
+            ]
+        );
+        let mut widths = vec![one];
+        for level in Level::available() {
+            let (width, o, m) = run(level);
+            widths.push(width);
+            assert!(out.iter().zip(&o).all(|(a, b)| a.to_bits() == b.to_bits()), "{level:?}");
+            assert_eq!(moved, m, "{level:?}");
+        }
+        assert!(widths.windows(2).all(|w| w[0] <= w[1]), "{widths:?}");
+    }
+
+    #[test]
+    fn an_index_beyond_the_rows_is_refused() {
+        assert!(Index::new(vec![0, 3], 3).is_none());
+        assert!(Index::new(vec![0, 2], 3).is_some());
+    }
+}
