@@ -7,6 +7,19 @@ use crate::scene::Integrator;
 /// Growth of the energy over its scale at which a run is stopped.
 pub const BLOW_UP: f64 = 1000.0;
 
+/// A step that an adaptive integrator tried.
+#[derive(Debug, Clone, Copy, PartialEq, serde::Serialize)]
+pub struct Trial {
+    /// Simulated time at its start [s].
+    pub time: f64,
+    /// Its length [s].
+    pub step: f64,
+    /// Its estimated error over the tolerance.
+    pub error: f64,
+    /// Whether it was kept.
+    pub accepted: bool,
+}
+
 /// What one frame took.
 #[derive(Debug, Clone, PartialEq, Default, serde::Serialize)]
 pub struct StepReport {
@@ -28,6 +41,8 @@ pub struct StepReport {
     pub broken: u64,
     /// Energy taken out by the position clamp [J].
     pub clamped: f64,
+    /// Steps tried by adaptive integrators, in order.
+    pub trials: Vec<Trial>,
 }
 
 impl StepReport {
@@ -45,6 +60,7 @@ impl StepReport {
         self.unconverged += other.unconverged;
         self.broken += other.broken;
         self.clamped += other.clamped;
+        self.trials.extend_from_slice(&other.trials);
     }
 }
 
@@ -85,7 +101,7 @@ impl Ledger {
 }
 
 /// A force written by a user, on the masses of one system.
-pub trait UserForce: Send {
+pub trait UserForce: Send + Sync {
     /// Forces [N] at time t [s] from positions [m], velocities [m/s] and masses [kg]; three numbers per mass, added to `force`.
     fn force(&mut self, t: f64, x: &[f64], v: &[f64], mass: &[f64], force: &mut [f64]) -> Result<(), String>;
 }
@@ -94,7 +110,7 @@ pub trait UserForce: Send {
 pub type Acceleration<'a> = dyn FnMut(f64, &[f64], &[f64]) -> Result<Vec<f64>, String> + Send + 'a;
 
 /// An integrator written by a user, for one system.
-pub trait UserIntegrator: Send {
+pub trait UserIntegrator: Send + Sync {
     /// Takes x and v from t to t + h in place.
     fn step(&mut self, t: f64, h: f64, x: &mut [f64], v: &mut [f64], acceleration: &mut Acceleration<'_>) -> Result<(), String>;
 }
@@ -116,14 +132,25 @@ pub struct Stability {
     pub damping_max: f64,
     /// Object and particle that move most in the stiffest mode.
     pub culprit: Option<(String, usize)>,
-    /// Largest stable step of every integrator with a fixed step [s]; zero: none is; infinite: every one is.
-    pub limits: Vec<(Integrator, f64)>,
+    /// Limits of every integrator with a fixed step.
+    pub limits: Vec<Limit>,
+}
+
+/// Predicted limits of an integrator; zero: no step will do; infinite: every one will.
+#[derive(Debug, Clone, Copy, PartialEq, serde::Serialize)]
+pub struct Limit {
+    /// The integrator.
+    pub integrator: Integrator,
+    /// Largest step at which no mode grows [s].
+    pub stable: f64,
+    /// Largest step at which no mode grows to [`BLOW_UP`] times its energy within 100 of its periods [s].
+    pub usable: f64,
 }
 
 impl Stability {
-    /// Largest stable step of an integrator [s]; `None` for those that choose their steps.
-    pub fn limit(&self, integrator: Integrator) -> Option<f64> {
-        self.limits.iter().find(|(i, _)| *i == integrator).map(|(_, h)| *h)
+    /// The limits of an integrator; `None` for those that choose their steps.
+    pub fn limit(&self, integrator: Integrator) -> Option<Limit> {
+        self.limits.iter().find(|l| l.integrator == integrator).copied()
     }
 }
 

@@ -1,0 +1,126 @@
+//! L4: all that systems say to each other. A system posts impulses to ports of others and reads the state that they
+//! have published; it never sees another system.
+//!
+//! The world delivers an impulse to a system on the system's own next turn, before it advances: absorbing them after
+//! everyone has advanced would conserve momentum too, and multiply the energy (see `docs/theory/coupling.md`).
+
+use crate::geometry::Vector;
+
+/// A mass that another system may push: its place in the list of ports.
+pub type Port = usize;
+
+/// The published state of a port.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct PortState {
+    /// System and row that own it.
+    pub owner: (usize, usize),
+    /// Position [m].
+    pub position: Vector,
+    /// Velocity [m/s].
+    pub velocity: Vector,
+    /// Time at which they hold [s].
+    pub time: f64,
+}
+
+/// Ports and mail.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct Exchange {
+    ports: Vec<PortState>,
+    mail: Vec<(Port, Vector)>,
+    /// Sum of all impulses ever posted and ever delivered [N s].
+    pub posted: Vector,
+    /// Sum of all impulses ever delivered [N s].
+    pub delivered: Vector,
+}
+
+impl Exchange {
+    /// Makes a row of a system a port.
+    pub fn open(&mut self, system: usize, row: usize) -> Port {
+        self.ports.push(PortState { owner: (system, row), ..PortState::default() });
+        self.ports.len() - 1
+    }
+
+    /// The state of a port.
+    pub fn port(&self, port: Port) -> PortState {
+        self.ports[port]
+    }
+
+    /// Ports of a system, to publish them.
+    pub fn ports_of(&mut self, system: usize) -> impl Iterator<Item = &mut PortState> {
+        self.ports.iter_mut().filter(move |p| p.owner.0 == system)
+    }
+
+    /// Posts an impulse [N s] to a port.
+    pub fn post(&mut self, port: Port, impulse: Vector) {
+        self.posted = self.posted + impulse;
+        self.mail.push((port, impulse));
+    }
+
+    /// Takes the mail of a system, as rows and impulses, in the order in which it was posted.
+    pub fn take(&mut self, system: usize) -> Vec<(usize, Vector)> {
+        let (mine, others) = self.mail.drain(..).partition::<Vec<_>, _>(|(port, _)| self.ports[*port].owner.0 == system);
+        self.mail = others;
+        for (_, impulse) in &mine {
+            self.delivered = self.delivered + *impulse;
+        }
+        mine.into_iter().map(|(port, impulse)| (self.ports[port].owner.1, impulse)).collect()
+    }
+
+    /// Everything as numbers, for a snapshot: ports in order, then the mail.
+    pub fn save(&self) -> Vec<f64> {
+        let v = |v: Vector| <[f64; 3]>::from(v);
+        let mut out = vec![self.ports.len() as f64];
+        for p in &self.ports {
+            out.extend(v(p.position).into_iter().chain(v(p.velocity)).chain([p.time]));
+        }
+        out.extend(v(self.posted).into_iter().chain(v(self.delivered)));
+        for (port, impulse) in &self.mail {
+            out.push(*port as f64);
+            out.extend(v(*impulse));
+        }
+        out
+    }
+
+    /// The inverse of [`Exchange::save`]; `None` if the numbers are not of this exchange.
+    pub fn restore(&mut self, numbers: &[f64]) -> Option<()> {
+        let (count, rest) = numbers.split_first()?;
+        let n = self.ports.len();
+        if *count as usize != n || rest.len() < 7 * n + 6 || (rest.len() - 7 * n - 6) % 4 != 0 {
+            return None;
+        }
+        let v = |s: &[f64]| Vector { x: s[0], y: s[1], z: s[2] };
+        let (ports, rest) = rest.split_at(7 * n);
+        let (sums, mail) = rest.split_at(6);
+        if mail.chunks_exact(4).any(|m| !(m[0] >= 0.0 && m[0] < n as f64)) {
+            return None;
+        }
+        for (port, s) in self.ports.iter_mut().zip(ports.chunks_exact(7)) {
+            (port.position, port.velocity, port.time) = (v(&s[..3]), v(&s[3..6]), s[6]);
+        }
+        (self.posted, self.delivered) = (v(&sums[..3]), v(&sums[3..]));
+        self.mail = mail.chunks_exact(4).map(|m| (m[0] as usize, v(&m[1..]))).collect();
+        Some(())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_impulse_is_delivered_once_to_its_system() {
+        let mut exchange = Exchange::default();
+        let (a, b) = (exchange.open(0, 5), exchange.open(1, 7));
+        exchange.post(a, [1.0, 0.0, 0.0].into());
+        exchange.post(b, [0.0, 2.0, 0.0].into());
+        exchange.post(b, [0.0, 0.0, 3.0].into());
+        let mut copy = exchange.clone();
+        copy.take(0);
+        assert!(copy.restore(&exchange.save()).is_some() && copy == exchange);
+        assert!(copy.restore(&exchange.save()[1..]).is_none());
+        assert_eq!(exchange.take(1), vec![(7, [0.0, 2.0, 0.0].into()), (7, [0.0, 0.0, 3.0].into())]);
+        assert_eq!(exchange.take(1), vec![]);
+        assert_eq!(exchange.take(0), vec![(5, [1.0, 0.0, 0.0].into())]);
+        assert_eq!(exchange.posted, exchange.delivered);
+    }
+}

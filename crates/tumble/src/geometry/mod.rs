@@ -1,0 +1,14 @@
+//! L1: shapes, meshes and what is near them. Always in double precision.
+
+pub mod bvh;
+pub mod contact;
+pub mod sdf;
+pub mod shape;
+
+pub use bvh::Bvh;
+pub use contact::{Collider, Touch};
+pub use sdf::GridSdf;
+pub use shape::Shape;
+
+/// A point or direction.
+pub type Vector = crate::math::Vec3<f64>;

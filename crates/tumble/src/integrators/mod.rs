@@ -1,0 +1,165 @@
+//! L3: schemes for y' = f(y, t). They know nothing of the physics they move: an [`Equation`] gives rates, a scheme says
+//! when rates are evaluated and how the state moves.
+//!
+//! y is (x, v): rows of points and frames, and their velocities. An equation of first order has no v.
+//! Orders, stability limits and invariants are verified in `tests/integrators.rs`.
+
+mod adaptive;
+mod implicit;
+pub mod newton;
+mod runge_kutta;
+mod split;
+pub mod stability;
+
+pub use adaptive::adaptive_step;
+pub use runge_kutta::{DORMAND_PRINCE, Tableau, tableau};
+
+use crate::math::parallel::chunks2;
+use crate::math::{Real, Row, ZERO, axpy, rotation, xyz};
+use tumble_interface::StepError;
+use tumble_interface::engine::StepReport;
+use tumble_interface::scene::Integrator;
+
+/// How positions follow velocities.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Kinematics {
+    /// Rows below this are points, the others frames.
+    pub points: usize,
+    /// Whether there are velocities: x' = v and v' = rate; else x' = rate.
+    pub second_order: bool,
+}
+
+impl Kinematics {
+    /// Moves x along v for the time h: points straight, frames turning at constant rate.
+    pub fn drift(self, x: &mut [Row], v: &mut [Row], h: Real) {
+        chunks2(x, v, |start, x, v| {
+            for (i, (x, v)) in x.iter_mut().zip(v).enumerate() {
+                *x = self.moved(start + i, *x, *v, h);
+            }
+        });
+    }
+
+    /// One row of [`Kinematics::drift`].
+    #[inline(always)]
+    pub fn moved(self, i: usize, x: Row, v: Row, h: Real) -> Row {
+        if i < self.points { axpy(x, h, v) } else { rotation::turn(x, xyz(v) * h) }
+    }
+
+    /// x' of one row of an equation of second order.
+    #[inline(always)]
+    fn rate(self, i: usize, x: Row, v: Row) -> Row {
+        if i < self.points { v } else { rotation::rate(x, xyz(v)) }
+    }
+
+    /// Scales frames back to length 1.
+    fn normalize(self, x: &mut [Row]) {
+        for q in x.iter_mut().skip(self.points) {
+            *q = crate::math::Quat::from_row(*q).normalized().row();
+        }
+    }
+}
+
+/// y' = f(y, t).
+pub trait Equation {
+    /// Points, frames and order.
+    fn kinematics(&self) -> Kinematics;
+
+    /// v' [m/s², rad/s²] at (t, x, v), or x' [m/s] for an equation of first order. The fourth number of every row is 0.
+    fn rate(&mut self, t: f64, x: &[Row], v: &[Row], out: &mut [Row]) -> Result<(), StepError>;
+
+    /// Solves the implicit stage x = x* + gh v, v = v* + gh rate(t, x, v) (or x = x* + gh rate(t, x)). On entry x and v
+    /// are the guess.
+    fn solve(&mut self, stage: &Stage<'_>, x: &mut [Row], v: &mut [Row], report: &mut StepReport) -> Result<(), StepError>;
+}
+
+/// An implicit stage: every implicit scheme here solves stages of this form.
+#[derive(Debug, Clone, Copy)]
+pub struct Stage<'a> {
+    /// Time at which rates are taken [s].
+    pub t: f64,
+    /// The step times the scheme's coefficient [s].
+    pub gh: f64,
+    /// x*.
+    pub x: &'a [Row],
+    /// v*.
+    pub v: &'a [Row],
+}
+
+/// What a scheme keeps from step to step: columns of rows, and whether they are up to date with (x, v).
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct Memory {
+    /// Rows of earlier steps; how many columns and what they hold is the scheme's business.
+    pub columns: Vec<Vec<Row>>,
+    /// Whether the columns belong to the current state. Whoever changes x or v from outside sets this to false, and the
+    /// scheme starts anew from (x, v).
+    pub ready: bool,
+    /// Next step that an adaptive scheme tries [s]; 0 at the start.
+    pub next_step: f64,
+    /// Error of its last accepted step, over the tolerance; 0 at the start.
+    pub last_error: f64,
+}
+
+impl Memory {
+    /// Room for a scheme over n rows.
+    pub fn new(scheme: Integrator, n: usize) -> Self {
+        let count = match scheme {
+            Integrator::Verlet | Integrator::Bdf2 | Integrator::DormandPrince => 2,
+            Integrator::VelocityVerlet => 1,
+            _ => 0,
+        };
+        Self { columns: vec![vec![ZERO; n]; count], ..Self::default() }
+    }
+}
+
+/// Rows for one step, kept between steps to save allocations.
+#[derive(Debug, Clone, Default)]
+pub struct Scratch {
+    columns: Vec<Vec<Row>>,
+}
+
+impl Scratch {
+    /// K columns of n rows; their contents are left over from earlier uses.
+    fn take<const K: usize>(&mut self, n: usize) -> [&mut [Row]; K] {
+        self.take_some(n, K)
+    }
+
+    /// K columns, of which the first `used` have n rows and the others none.
+    fn take_some<const K: usize>(&mut self, n: usize, used: usize) -> [&mut [Row]; K] {
+        if self.columns.len() < K {
+            self.columns.resize_with(K, Vec::new);
+        }
+        for column in &mut self.columns[..used] {
+            if column.len() != n {
+                column.clear();
+                column.resize(n, ZERO);
+            }
+        }
+        let mut columns = self.columns.iter_mut();
+        // There are at least K columns.
+        std::array::from_fn(|_| columns.next().map_or(&mut [][..], |c| &mut c[..]))
+    }
+}
+
+/// One step of a scheme with a fixed step: x and v from t to t + h. `memory` are the scheme's columns for these rows,
+/// `ready` whether they belong to (x, v); afterwards they do.
+pub fn step(
+    scheme: Integrator,
+    equation: &mut dyn Equation,
+    (t, h): (f64, f64),
+    (x, v): (&mut [Row], &mut [Row]),
+    memory: &mut [&mut [Row]],
+    ready: bool,
+    scratch: &mut Scratch,
+    report: &mut StepReport,
+) -> Result<(), StepError> {
+    match scheme {
+        Integrator::SymplecticEuler => split::symplectic_euler(equation, t, h, x, v, scratch),
+        Integrator::ModifiedEuler => split::modified_euler(equation, t, h, x, v, scratch),
+        Integrator::Verlet => split::verlet(equation, t, h, x, v, memory, ready, scratch),
+        Integrator::VelocityVerlet => split::velocity_verlet(equation, t, h, x, v, memory, ready, scratch),
+        Integrator::ImplicitEuler => implicit::euler(equation, t, h, x, v, scratch, report),
+        Integrator::ImplicitMidpoint => implicit::midpoint(equation, t, h, x, v, scratch, report),
+        Integrator::Bdf2 => implicit::bdf2(equation, t, h, x, v, memory, ready, scratch, report),
+        explicit => runge_kutta::step(tableau(explicit), equation, t, h, x, v, scratch),
+    }
+}

@@ -1,0 +1,134 @@
+//! Schemes that move velocities and positions in turn: x' = v, v' = a(t, x, v).
+//!
+//! Verified against their closed recurrences on the oscillator and their orders on Kepler's problem.
+
+use super::{Equation, Scratch};
+use crate::math::parallel::{chunks, chunks2};
+use crate::math::{Real, Row, add, axpy, scale, sub};
+use tumble_interface::StepError;
+
+/// v += h a(t, x, v), then x += h v.                                   (integrators.2)
+///
+/// Order 1. Symplectic for a(x): energy oscillates and does not drift for w h < 2.
+pub(super) fn symplectic_euler(equation: &mut dyn Equation, t: f64, h: f64, x: &mut [Row], v: &mut [Row], scratch: &mut Scratch) -> Result<(), StepError> {
+    let [a] = scratch.take(x.len());
+    equation.rate(t, x, v, a)?;
+    let (kinematics, h, a) = (equation.kinematics(), h as Real, &*a);
+    chunks2(x, v, |start, x, v| {
+        for (i, (x, v)) in x.iter_mut().zip(v).enumerate() {
+            *v = axpy(*v, h, a[start + i]);
+            *x = kinematics.moved(start + i, *x, *v, h);
+        }
+    });
+    Ok(())
+}
+
+/// x += h/2 (v_t + v_t+h),   v_t+h = v + h a(t, x, v).                 (integrators.3)
+///
+/// The lecture's modified Euler. Order 1, because the rate is taken once, at the start: the quadratic form
+/// x² - (w h/2) x v/w + (v/w)² of the oscillator grows by exactly 1 + w²h²/2 a step.
+pub(super) fn modified_euler(equation: &mut dyn Equation, t: f64, h: f64, x: &mut [Row], v: &mut [Row], scratch: &mut Scratch) -> Result<(), StepError> {
+    let [a] = scratch.take(x.len());
+    equation.rate(t, x, v, a)?;
+    let (kinematics, h, a) = (equation.kinematics(), h as Real, &*a);
+    chunks2(x, v, |start, x, v| {
+        for (i, (x, v)) in x.iter_mut().zip(v).enumerate() {
+            let after = axpy(*v, h, a[start + i]);
+            *x = kinematics.moved(start + i, *x, scale(add(*v, after), 0.5), h);
+            *v = after;
+        }
+    });
+    Ok(())
+}
+
+/// Stoermer's form: x_t+h = 2 x_t - x_t-h + h² a_t,   v_t = (x_t - x_t-h)/h + h/2 a_t.        (integrators.6)
+///
+/// Order 2, symplectic, w h < 2. Memory: x_t-h and a_t. Frames, which have no differences, take the velocity form.
+pub(super) fn verlet(
+    equation: &mut dyn Equation,
+    t: f64,
+    h: f64,
+    x: &mut [Row],
+    v: &mut [Row],
+    memory: &mut [&mut [Row]],
+    ready: bool,
+    scratch: &mut Scratch,
+) -> Result<(), StepError> {
+    let [before, a] = memory else { return Ok(()) };
+    let kinematics = equation.kinematics();
+    let [guess] = scratch.take(x.len());
+    let (half, h) = ((h / 2.0) as Real, h as Real);
+    let points = kinematics.points;
+    let time = t + f64::from(h);
+    if !ready {
+        equation.rate(t, x, v, a)?;
+        let (x, v, a) = (&*x, &*v, &**a);
+        chunks(before, |start, before| {
+            for (i, b) in before.iter_mut().enumerate() {
+                let i = start + i;
+                *b = axpy(axpy(x[i], -h, v[i]), h * half, a[i]);
+            }
+        });
+    }
+    for i in 0..x.len() {
+        let after = if i < points {
+            axpy(sub(add(x[i], x[i]), before[i]), h * h, a[i])
+        } else {
+            kinematics.moved(i, x[i], axpy(v[i], half, a[i]), h)
+        };
+        // The velocity without its last half kick, and a first-order guess of the whole for forces that depend on it.
+        let drift = if i < points { scale(sub(after, x[i]), 1.0 / h) } else { axpy(v[i], half, a[i]) };
+        guess[i] = axpy(drift, half, a[i]);
+        v[i] = drift;
+        before[i] = x[i];
+        x[i] = after;
+    }
+    equation.rate(time, x, guess, a)?;
+    kick(v, half, a);
+    Ok(())
+}
+
+/// v += h/2 a_t,  x += h v,  v += h/2 a_t+h.                           (integrators.7)
+///
+/// Order 2, symplectic, w h < 2. Memory: a_t, which the next step uses again.
+pub(super) fn velocity_verlet(
+    equation: &mut dyn Equation,
+    t: f64,
+    h: f64,
+    x: &mut [Row],
+    v: &mut [Row],
+    memory: &mut [&mut [Row]],
+    ready: bool,
+    scratch: &mut Scratch,
+) -> Result<(), StepError> {
+    let [a] = memory else { return Ok(()) };
+    let kinematics = equation.kinematics();
+    let [guess] = scratch.take(x.len());
+    if !ready {
+        equation.rate(t, x, v, a)?;
+    }
+    let (after, half, h) = (t + h, (h / 2.0) as Real, h as Real);
+    kick(v, half, a);
+    {
+        let (v, a) = (&*v, &**a);
+        chunks2(x, guess, |start, x, guess| {
+            for (i, (x, guess)) in x.iter_mut().zip(guess).enumerate() {
+                let i = start + i;
+                *x = kinematics.moved(i, *x, v[i], h);
+                *guess = axpy(v[i], half, a[i]);
+            }
+        });
+    }
+    equation.rate(after, x, guess, a)?;
+    kick(v, half, a);
+    Ok(())
+}
+
+/// v += h a.
+fn kick(v: &mut [Row], h: Real, a: &[Row]) {
+    chunks(v, |start, v| {
+        for (i, v) in v.iter_mut().enumerate() {
+            *v = axpy(*v, h, a[start + i]);
+        }
+    });
+}

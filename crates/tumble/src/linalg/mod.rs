@@ -1,0 +1,4 @@
+//! L1: linear solvers. Each has parameters, an info with iterations and residual, and no hidden failure.
+
+pub mod cholesky;
+pub mod pcg;

@@ -1,0 +1,45 @@
+//! L2: the columns of a system of masses. Data only.
+
+use crate::math::{Real, Row};
+use std::ops::Range;
+
+/// What moves: points, then frames.
+#[derive(Debug, Clone, Default)]
+pub struct State {
+    /// Points [x, y, z, 1/m] [m, 1/kg], then unit quaternions.
+    pub x: Vec<Row>,
+    /// Velocities [m/s] of points, angular velocities in their own axes [rad/s] of frames; the fourth number is 0.
+    pub v: Vec<Row>,
+}
+
+/// How much each row weighs.
+#[derive(Debug, Clone, Default)]
+pub struct Masses {
+    /// Masses [kg] of points and moments of inertia [kg m²] of frames, pinned ones included.
+    pub mass: Vec<Real>,
+    /// 1/mass, 0 for what is pinned.
+    pub inverse: Vec<Real>,
+    /// Count of points; the rows after them are frames.
+    pub points: usize,
+}
+
+/// A thing in a system: which rows it has, and how it hangs together.
+#[derive(Debug, Clone, Default)]
+pub struct Object {
+    /// Name in the scene.
+    pub name: String,
+    /// Its points, as rows.
+    pub points: Range<usize>,
+    /// Its frames, as rows.
+    pub frames: Range<usize>,
+    /// Triangles over its points, counted from its first.
+    pub triangles: Vec<[u32; 3]>,
+    /// Points in the order of a curve, counted from its first; empty if it is none.
+    pub curve: Vec<u32>,
+    /// Its links: index of the batch and the elements in it.
+    pub links: Vec<(usize, Range<usize>)>,
+    /// The two points of each link, counted from its first, in the order of `links`.
+    pub link_ends: Vec<[u32; 2]>,
+    /// Radius in pictures [m]; 0 for a surface.
+    pub radius: f64,
+}

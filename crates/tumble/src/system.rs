@@ -1,0 +1,127 @@
+//! L4: what the world asks of a system, and the archive that snapshots are made of.
+
+use crate::exchange::Exchange;
+use crate::math::Row;
+use tumble_interface::engine::{Ledger, Stability, StepReport, UserForce, UserIntegrator};
+use tumble_interface::{Column, StepError};
+
+/// One numerical method with its state.
+pub trait System: Send + Sync {
+    /// Name in the scene.
+    fn name(&self) -> &str;
+
+    /// Takes what was posted to it since its last turn.
+    fn absorb(&mut self, exchange: &mut Exchange);
+
+    /// Goes from t to t + dt [s] with its own sub-steps. `go_on` is asked between them; `false` ends the work, and the
+    /// state is then to be thrown away.
+    fn advance(&mut self, t: f64, dt: f64, exchange: &mut Exchange, go_on: &(dyn Fn() -> bool + Sync)) -> Result<StepReport, StepError>;
+
+    /// Publishes its state at its new time t [s].
+    fn publish(&self, t: f64, exchange: &mut Exchange);
+
+    /// The named columns of its objects.
+    fn columns(&self, names: &[&str], out: &mut Vec<Column>);
+
+    /// What does not change about its objects.
+    fn topology(&self, out: &mut Vec<Column>);
+
+    /// Its books at time t [s].
+    fn ledger(&self, t: f64) -> Ledger;
+
+    /// What has broken, if anything: a number that is not finite, or an energy beyond its scale. Of a state without fault
+    /// the scale is taken.
+    fn breakdown(&mut self, t: f64) -> Option<StepError>;
+
+    /// While watched, a system looks for a breakdown after every sub-step and returns the first as an error.
+    fn watch(&mut self, on: bool);
+
+    /// Largest stable steps from its stiffest modes now; `None` if it has none to tell.
+    fn stability(&mut self, dt: f64) -> Option<Stability>;
+
+    /// Writes everything that the next step depends on.
+    fn save(&self, archive: &mut Archive);
+
+    /// Reads it back; `None` if it is not of this system.
+    fn restore(&mut self, archive: &mut Archive) -> Option<()>;
+
+    /// Adds a user's force; `false` if it cannot take one.
+    fn add_force(&mut self, _force: Box<dyn UserForce>) -> bool {
+        false
+    }
+
+    /// Steps with a user's integrator; `false` if it cannot.
+    fn replace_integrator(&mut self, _integrator: Box<dyn UserIntegrator>) -> bool {
+        false
+    }
+
+    /// Sets a column of an object; `None` if it has no such object, `Some(false)` if the column or the count is wrong.
+    fn write(&mut self, object: &str, column: &str, values: &[f64]) -> Option<bool>;
+}
+
+/// A part of a snapshot.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Part {
+    /// Rows in the engine's scalar.
+    Rows(Vec<Row>),
+    /// Numbers in double precision.
+    Numbers(Vec<f64>),
+    /// Indices.
+    Indices(Vec<u32>),
+}
+
+/// Parts in the order in which they were written, each with a name.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct Archive {
+    /// Names and parts.
+    pub parts: Vec<(String, Part)>,
+    /// Where reading goes on.
+    next: usize,
+}
+
+impl Archive {
+    /// Writes a part.
+    pub fn push(&mut self, name: impl Into<String>, part: Part) {
+        self.parts.push((name.into(), part));
+    }
+
+    /// Reads the next part if it has this name.
+    fn pop(&mut self, name: &str) -> Option<&Part> {
+        let (found, part) = self.parts.get(self.next)?;
+        (found == name).then_some(())?;
+        self.next += 1;
+        Some(part)
+    }
+
+    /// Reads rows into a column of the same length.
+    pub fn rows(&mut self, name: &str, into: &mut [Row]) -> Option<()> {
+        match self.pop(name)? {
+            Part::Rows(rows) if rows.len() == into.len() => {
+                into.copy_from_slice(rows);
+                Some(())
+            }
+            _ => None,
+        }
+    }
+
+    /// Reads numbers.
+    pub fn numbers(&mut self, name: &str) -> Option<Vec<f64>> {
+        match self.pop(name)? {
+            Part::Numbers(numbers) => Some(numbers.clone()),
+            _ => None,
+        }
+    }
+
+    /// Reads indices.
+    pub fn indices(&mut self, name: &str) -> Option<Vec<u32>> {
+        match self.pop(name)? {
+            Part::Indices(indices) => Some(indices.clone()),
+            _ => None,
+        }
+    }
+
+    /// Starts reading from the beginning.
+    pub fn rewind(&mut self) {
+        self.next = 0;
+    }
+}

@@ -1,0 +1,211 @@
+//! What a system tells about itself: columns, topology, ledger, and whether it has broken down.
+
+use super::Dynamics;
+use crate::integrators::stability::limits;
+use crate::math::parallel::{fold, max, sum};
+use crate::math::{Quat, Real, Row, Vec3, is_finite, xyz64};
+use crate::system::System;
+use tumble_interface::engine::{BLOW_UP, Ledger};
+use tumble_interface::error::Breakdown;
+use tumble_interface::{Column, Data, StepError};
+
+/// What the energy is measured against.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct Scale {
+    /// Energy at the start [J].
+    start: f64,
+    /// Potential energy of external forces at the start [J].
+    external: f64,
+    /// Largest kinetic, elastic or external change of energy in any good frame [J].
+    size: f64,
+}
+
+impl Scale {
+    /// The scale of a system that starts with these books and could fall by `height` [m].
+    pub fn new(books: &Ledger, fall: f64) -> Self {
+        Self { start: books.energy(), external: books.external, size: books.kinetic.max(books.elastic).max(fall) }
+    }
+
+    pub fn numbers(self) -> [f64; 3] {
+        [self.start, self.external, self.size]
+    }
+
+    pub fn from_numbers(numbers: &[f64]) -> Option<Self> {
+        match numbers {
+            [start, external, size] => Some(Self { start: *start, external: *external, size: *size }),
+            _ => None,
+        }
+    }
+
+    /// Growth of the energy over its scale; `None` while there is no scale.
+    fn growth(self, books: &Ledger) -> Option<f64> {
+        (self.size > 0.0).then(|| (books.energy() - self.start) / self.size)
+    }
+}
+
+impl Dynamics {
+    pub(super) fn write_columns(&self, names: &[&str], out: &mut Vec<Column>) {
+        for object in &self.objects {
+            for name in names {
+                let (unit, width, data): (_, _, Vec<Real>) = match *name {
+                    "position" => ("m", 3, flat(&self.state.x[object.points.clone()], 3)),
+                    "velocity" => ("m/s", 3, flat(&self.state.v[object.points.clone()], 3)),
+                    "orientation" if !object.frames.is_empty() => ("1", 4, flat(&self.state.x[object.frames.clone()], 4)),
+                    "angular_velocity" if !object.frames.is_empty() => ("rad/s", 3, flat(&self.state.v[object.frames.clone()], 3)),
+                    "link_strain" if !object.links.is_empty() => ("1", 1, self.link_strain(object)),
+                    _ => continue,
+                };
+                out.push(Column { object: object.name.clone(), name: (*name).into(), unit, width, data: Data::from(data) });
+            }
+        }
+    }
+
+    fn link_strain(&self, object: &crate::state::Object) -> Vec<Real> {
+        let strain = |(batch, range): &(usize, std::ops::Range<usize>)| self.laws.batches[*batch].link_strain(&self.state.x)[range.clone()].to_vec();
+        object.links.iter().flat_map(strain).collect()
+    }
+
+    pub(super) fn write_topology(&self, out: &mut Vec<Column>) {
+        for object in &self.objects {
+            let mut add = |name: &str, unit, width, data: Data| {
+                if !data.is_empty() {
+                    out.push(Column { object: object.name.clone(), name: name.into(), unit, width, data });
+                }
+            };
+            add("mass", "kg", 1, Data::from(self.laws.masses.mass[object.points.clone()].to_vec()));
+            let pinned = object.points.clone().filter(|i| self.laws.masses.inverse[*i] == 0.0).map(|i| (i - object.points.start) as u32);
+            add("pinned", "1", 1, Data::U32(pinned.collect()));
+            add("triangles", "1", 3, Data::U32(object.triangles.concat()));
+            add("links", "1", 2, Data::U32(object.link_ends.concat()));
+            add("curve", "1", 1, Data::U32(object.curve.clone()));
+            if object.radius > 0.0 {
+                add("radius", "m", 1, Data::F64(vec![object.radius]));
+            }
+        }
+    }
+
+    pub(super) fn books(&self, t: f64) -> Ledger {
+        let (x, v, masses) = (&self.state.x, &self.state.v, &self.laws.masses);
+        let n = masses.points;
+        let mass = |i: usize| f64::from(masses.mass[i]);
+        let mut momentum = Vec3::<f64>::default();
+        let mut angular = Vec3::<f64>::default();
+        let parts = fold(n, |range| {
+            let (mut p, mut l) = (Vec3::<f64>::default(), Vec3::<f64>::default());
+            for i in range {
+                let mv = xyz64(v[i]) * mass(i);
+                p = p + mv;
+                l = l + xyz64(x[i]).cross(mv);
+            }
+            (p, l)
+        });
+        for (p, l) in parts {
+            momentum = momentum + p;
+            angular = angular + l;
+        }
+        for i in n..x.len() {
+            angular = angular + Quat::from_row(x[i].map(f64::from)).turn(xyz64(v[i]) * mass(i));
+        }
+        let stretch = self.laws.batches.iter().flat_map(|b| b.link_strain(x)).fold(0.0_f64, |m, s| if f64::from(s) + 1.0 > m { f64::from(s) + 1.0 } else { m });
+        let depths = |i: usize| {
+            let p = xyz64(x[i]);
+            self.laws.colliders.iter().filter_map(move |c| c.touch(p)).map(|t| t.depth)
+        };
+        let touching = !self.laws.colliders.is_empty();
+        Ledger {
+            time: t,
+            mass: sum(n, |range| range.map(mass).sum()),
+            momentum: momentum.into(),
+            angular_momentum: angular.into(),
+            kinetic: sum(x.len(), |range| range.map(|i| 0.5 * mass(i) * xyz64(v[i]).norm_sq()).sum()),
+            elastic: self.laws.batches.iter().map(|b| b.energy(x)).sum(),
+            external: self.laws.external_energy(t, x),
+            stretch,
+            penetration: if touching { max(n, |range| range.flat_map(depths).fold(0.0, f64::max)).max(0.0) } else { 0.0 },
+            speed: max(n, |range| range.map(|i| xyz64(v[i]).norm_sq()).fold(0.0, f64::max)).max(0.0).sqrt(),
+            contacts: if touching { sum(n, |range| range.filter(|i| depths(*i).next().is_some()).count() as f64) as u64 } else { 0 },
+            broken: self.broken,
+        }
+    }
+
+    /// Takes the scale of the energy from the start: what moves and stretches, and a fall by the system's own size.
+    pub(super) fn set_scale(&mut self) {
+        let n = self.laws.masses.points;
+        let books = self.books(0.0);
+        let far = |a: Vec3<f64>, b: Vec3<f64>| (a - b).norm();
+        let first = self.state.x.first().map(|x| xyz64(*x)).unwrap_or_default();
+        let size = max(n, |range| range.map(|i| far(xyz64(self.state.x[i]), first)).fold(0.0, f64::max)).max(0.0);
+        let fall = books.mass * Vec3::from(self.laws.gravity).norm() * size;
+        self.scale = Scale::new(&books, fall);
+    }
+
+    /// Takes the scale of the energy from a good frame.
+    pub(super) fn rescale(&mut self, t: f64) {
+        let books = self.books(t);
+        let external = (books.external - self.scale.external).abs();
+        self.scale.size = self.scale.size.max(books.kinetic).max(books.elastic).max(external);
+    }
+
+    pub(super) fn broken_down(&self, t: f64) -> Option<StepError> {
+        let state = &self.state;
+        let bad = |rows: &[Row]| fold(rows.len(), |mut range| range.find(|i| !is_finite(rows[*i]))).into_iter().flatten().next();
+        let mut found = [("position", bad(&state.x)), ("velocity", bad(&state.v))].into_iter().find_map(|(column, i)| Some((column, i?, None)));
+        if found.is_none() {
+            let books = self.books(t);
+            let ratio = self.scale.growth(&books).filter(|g| *g > BLOW_UP || g.is_nan());
+            if let Some(ratio) = ratio {
+                let fastest = (0..self.laws.masses.points).max_by(|a, b| xyz64(state.v[*a]).norm_sq().total_cmp(&xyz64(state.v[*b]).norm_sq()));
+                found = Some(("velocity", fastest.unwrap_or(0), Some(ratio)));
+            }
+        }
+        let (column, i, energy_ratio) = found?;
+        let (object, index) = self.whose(i);
+        let breakdown = Breakdown {
+            system: self.name().into(),
+            object,
+            column: column.into(),
+            index,
+            time: t,
+            integrator: self.integrator.name().into(),
+            step: 0.0,
+            stable_step: 0.0,
+            energy_ratio,
+        };
+        Some(if energy_ratio.is_none() { StepError::NotFinite(breakdown) } else { StepError::Exploded(breakdown) })
+    }
+
+    /// Object and index within it of a row.
+    pub(super) fn whose(&self, i: usize) -> (String, usize) {
+        let owner = |o: &&crate::state::Object| o.points.contains(&i) || o.frames.contains(&i);
+        self.objects.iter().find(owner).map_or((String::new(), i), |o| (o.name.clone(), if o.points.contains(&i) { i - o.points.start } else { i - o.frames.start }))
+    }
+
+    /// The pre-flight estimate.
+    pub(super) fn estimate(&mut self, dt: f64) -> tumble_interface::engine::Stability {
+        use tumble_interface::scene::Integrator;
+        let modes = self.modes();
+        let list = modes.list();
+        let fixed = Integrator::ALL.into_iter().filter(|i| !i.is_adaptive());
+        let limits = fixed
+            .map(|integrator| {
+                let (stable, usable) = limits(integrator, &list);
+                tumble_interface::engine::Limit { integrator, stable, usable }
+            })
+            .collect();
+        let substeps = self.substeps(dt);
+        tumble_interface::engine::Stability {
+            system: self.name.clone(),
+            integrator: self.integrator,
+            step: dt / f64::from(substeps),
+            frequency: modes.stiffest.frequency,
+            damping: modes.stiffest.damping,
+            damping_max: modes.most_damped.damping,
+            culprit: modes.culprit.map(|i| self.whose(i)),
+            limits,
+        }
+    }
+}
+
+fn flat(rows: &[Row], width: usize) -> Vec<Real> {
+    rows.iter().flat_map(|r| r[..width].iter().copied()).collect()
+}

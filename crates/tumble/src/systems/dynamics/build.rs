@@ -1,0 +1,344 @@
+//! From the parts that recipes collect to a system.
+
+use super::{Dynamics, Stepping, books};
+use crate::elements::{
+    BendTwist, Distance, Element, Elements, Hinge, Linear, Members, Nonlinear, Pairs, StretchShear, TetShear, TetStrain, TetVolume, Vector,
+};
+use crate::forces::Force;
+use crate::geometry::Collider;
+use crate::integrators::Memory;
+use crate::math::{Real, Vec3};
+use crate::state::{Masses, Object, State};
+use std::ops::Range;
+use std::sync::Arc;
+use tumble_interface::SceneError;
+use tumble_interface::scene::{Adaptive, Integrator, Solver};
+
+/// How a system steps.
+pub struct Settings {
+    /// Name in the scene.
+    pub name: String,
+    /// Its place among the systems of the world.
+    pub index: usize,
+    /// Scheme.
+    pub integrator: Integrator,
+    /// Division of the exchange interval.
+    pub stepping: Stepping,
+    /// Of the adaptive schemes.
+    pub adaptive: Adaptive,
+    /// Of the implicit schemes.
+    pub solver: Solver,
+    /// Springs longer than this many times their rest length are shortened.
+    pub clamp: Option<f64>,
+    /// Gravity [m/s²].
+    pub gravity: [f64; 3],
+    /// Solids.
+    pub colliders: Arc<Vec<Collider>>,
+}
+
+/// A spring as recipes give it.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct SpringPart {
+    /// Its masses.
+    pub ends: [u32; 2],
+    /// Spring constant [N/m].
+    pub stiffness: f64,
+    /// Damping along it [N s/m].
+    pub damping: f64,
+    /// Rest length [m]; 0 makes f = k (b - a).
+    pub rest: f64,
+    /// Stiffening c/l0².
+    pub hardening: f64,
+    /// Pulls only.
+    pub tension_only: bool,
+    /// Strain at which it breaks.
+    pub break_strain: Option<f64>,
+}
+
+/// Springs of one kind, with the strains at which they break.
+#[derive(Default)]
+struct Springs<const D: usize, const P: usize> {
+    members: Vec<Members<2, D, P>>,
+    limits: Vec<f64>,
+}
+
+impl<const D: usize, const P: usize> Springs<D, P> {
+    fn push(&mut self, part: &SpringPart, rest: [f64; D], law: [f64; P], damping: f64) {
+        self.members.push(Members { nodes: part.ends, rest, law, stiffness: part.stiffness, damping });
+        self.limits.push(part.break_strain.unwrap_or(f64::INFINITY));
+    }
+}
+
+/// Masses and elements under construction. Nodes are counted from 0: points by points, frames by frames.
+#[derive(Default)]
+pub struct Parts {
+    points: Vec<(Vec3<f64>, Vec3<f64>, f64, bool)>,
+    frames: Vec<([f64; 4], f64, bool)>,
+    linear: Springs<1, 0>,
+    nonlinear: Springs<1, 2>,
+    vector: Springs<0, 0>,
+    dampers: Vec<Members<2, 1, 0>>,
+    hinges: Vec<Members<4, 1, 0>>,
+    shears: Vec<Members<4, 9, 0>>,
+    volumes: Vec<Members<4, 10, 0>>,
+    strains: Vec<Members<4, 9, 0>>,
+    stretches: Vec<Members<3, 2, 0>>,
+    bends: Vec<Members<2, 5, 0>>,
+    energy_at_rest: [f64; 2],
+    objects: Vec<Draft>,
+    /// Forces on each mass by itself, with the rows that they act on.
+    pub forces: Vec<(Box<dyn Force>, Vec<Range<usize>>)>,
+}
+
+/// An object and how many links of each kind there were before it.
+struct Draft {
+    object: Object,
+    links: [usize; 3],
+}
+
+impl Parts {
+    /// Begins an object; what is added from here on belongs to it.
+    pub fn begin(&mut self, name: &str, radius: f64) {
+        let (p, f) = (self.points.len(), self.frames.len());
+        let object = Object { name: name.into(), points: p..p, frames: f..f, radius, ..Object::default() };
+        self.objects.push(Draft { object, links: self.counts() });
+    }
+
+    fn counts(&self) -> [usize; 3] {
+        [self.linear.members.len(), self.nonlinear.members.len(), self.vector.members.len()]
+    }
+
+    /// The object under construction.
+    pub fn object(&mut self) -> Option<&mut Object> {
+        self.objects.last_mut().map(|d| &mut d.object)
+    }
+
+    /// Points of every object so far, by name.
+    pub fn ranges(&self) -> impl Iterator<Item = (&str, Range<usize>)> {
+        self.objects.iter().map(|d| (d.object.name.as_str(), d.object.points.clone()))
+    }
+
+    /// Adds a mass [kg] at x [m] with velocity v [m/s]; returns its index.
+    pub fn point(&mut self, x: Vec3<f64>, v: Vec3<f64>, mass: f64) -> u32 {
+        self.points.push((x, v, mass, false));
+        let n = self.points.len();
+        if let Some(object) = self.object() {
+            object.points.end = n;
+        }
+        n as u32 - 1
+    }
+
+    /// Adds a frame with a moment of inertia [kg m²]; returns its index among the frames.
+    pub fn frame(&mut self, q: [f64; 4], inertia: f64) -> u32 {
+        self.frames.push((q, inertia, false));
+        let n = self.frames.len();
+        if let Some(object) = self.object() {
+            object.frames.end = n;
+        }
+        n as u32 - 1
+    }
+
+    /// Holds a point.
+    pub fn pin(&mut self, point: u32) {
+        self.points[point as usize].3 = true;
+    }
+
+    /// Holds a frame.
+    pub fn clamp_frame(&mut self, frame: u32) {
+        self.frames[frame as usize].2 = true;
+    }
+
+    /// Position of a point [m].
+    pub fn position(&self, point: u32) -> Vec3<f64> {
+        self.points[point as usize].0
+    }
+
+    /// Adds mass [kg] to a point.
+    pub fn add_mass(&mut self, point: u32, mass: f64) {
+        self.points[point as usize].2 += mass;
+    }
+
+    /// Adds a spring.
+    pub fn spring(&mut self, part: SpringPart) {
+        if part.rest == 0.0 {
+            self.vector.push(&part, [], [], 0.0);
+            if part.damping > 0.0 {
+                // The rate of x1 - x0 would resist rotation; a spring without stiffness damps along the line only.
+                self.dampers.push(Members { nodes: part.ends, rest: [0.0], law: [], stiffness: 0.0, damping: part.damping });
+            }
+        } else if part.hardening == 0.0 && !part.tension_only {
+            self.linear.push(&part, [part.rest], [], part.damping);
+        } else {
+            let law = [part.hardening / (part.rest * part.rest), if part.tension_only { 0.0 } else { 1.0 }];
+            self.nonlinear.push(&part, [part.rest], law, part.damping);
+        }
+    }
+
+    /// Adds a dihedral hinge over edge 0 1 with opposite corners 2 and 3.
+    pub fn hinge(&mut self, nodes: [u32; 4], rest: f64, stiffness: f64) {
+        self.hinges.push(Members { nodes, rest: [rest], law: [], stiffness, damping: 0.0 });
+    }
+
+    /// Adds a stable Neo-Hookean tetrahedron of rest volume V [m³] with the material's Lamé constants [Pa] and damping
+    /// time [s].
+    pub fn tetrahedron(&mut self, nodes: [u32; 4], b: [f64; 9], volume: f64, lame_mu: f64, lame_lambda: f64, damping: f64) {
+        let lambda = lame_lambda + lame_mu;
+        let mut rest = [1.0 + lame_mu / lambda; 10];
+        rest[..9].copy_from_slice(&b);
+        self.shears.push(Members { nodes, rest: b, law: [], stiffness: lame_mu * volume, damping: 0.0 });
+        self.volumes.push(Members { nodes, rest, law: [], stiffness: lambda * volume, damping: 0.0 });
+        if damping > 0.0 {
+            // Energy of small strains mu |e|² = (2 mu)/2 |e|².
+            self.strains.push(Members { nodes, rest: b, law: [], stiffness: 0.0, damping: 2.0 * lame_mu * volume * damping });
+        }
+        self.energy_at_rest[0] += 1.5 * lame_mu * volume;
+        self.energy_at_rest[1] += 0.5 * lame_mu * lame_mu / lambda * volume;
+    }
+
+    /// Adds the stretch and shear of a rod segment between two points, with its frame.
+    pub fn rod_stretch(&mut self, points: [u32; 2], frame: u32, rest: [f64; 2], stiffness: f64, damping: f64) {
+        self.stretches.push(Members { nodes: [points[0], points[1], frame], rest, law: [], stiffness, damping });
+    }
+
+    /// Adds the bend and twist between two frames.
+    pub fn rod_bend(&mut self, frames: [u32; 2], rest: [f64; 5], stiffness: f64, damping: f64) {
+        self.bends.push(Members { nodes: frames, rest, law: [], stiffness, damping });
+    }
+
+    /// Whether nothing moves.
+    pub fn is_empty(&self) -> bool {
+        self.points.is_empty() && self.frames.is_empty()
+    }
+
+    /// The system.
+    pub fn build(mut self, settings: Settings) -> Result<Dynamics, SceneError> {
+        let points = self.points.len();
+        let rows = points + self.frames.len();
+        for nodes in self.stretches.iter_mut().map(|m| &mut m.nodes) {
+            nodes[2] += points as u32;
+        }
+        for node in self.bends.iter_mut().flat_map(|m| &mut m.nodes) {
+            *node += points as u32;
+        }
+        let (mut state, mut masses) = (State::default(), Masses { points, ..Masses::default() });
+        for (x, v, mass, pinned) in &self.points {
+            let w = if *pinned { 0.0 } else { 1.0 / mass };
+            state.x.push([x.x as Real, x.y as Real, x.z as Real, w as Real]);
+            state.v.push(if *pinned { [0.0; 4] } else { [v.x as Real, v.y as Real, v.z as Real, 0.0] });
+            masses.mass.push(*mass as Real);
+            masses.inverse.push(w as Real);
+        }
+        for (q, inertia, pinned) in &self.frames {
+            state.x.push(q.map(|q| q as Real));
+            state.v.push([0.0; 4]);
+            masses.mass.push(*inertia as Real);
+            masses.inverse.push(if *pinned { 0.0 } else { (1.0 / inertia) as Real });
+        }
+        let lost = || SceneError::one(format!("system \"{}\"", settings.name), "an element refers to a mass that is not there");
+        let end = self.counts();
+        let mut batches = Batches { rows, list: Vec::new() };
+        let clamp = settings.clamp.map(|ratio| {
+            let short = |m: &Members<2, 1, 0>| Members { rest: [m.rest[0] * ratio], stiffness: f64::INFINITY, damping: 0.0, ..*m };
+            let linear = self.linear.members.iter().map(short);
+            let others = self.nonlinear.members.iter().map(|m| short(&Members { nodes: m.nodes, rest: m.rest, law: [], stiffness: 0.0, damping: 0.0 }));
+            Elements::new(rows, &linear.chain(others).collect::<Vec<_>>())
+        });
+        let kinds = [
+            batches.springs::<Distance, Linear, 1, 1, 0>(&self.linear),
+            batches.springs::<Distance, Nonlinear, 1, 1, 2>(&self.nonlinear),
+            batches.springs::<Vector, Linear, 3, 0, 0>(&self.vector),
+        ];
+        let made = [
+            batches.add::<Distance, 2, 1, 1>(&self.dampers, 0.0),
+            batches.add::<Hinge, 4, 1, 1>(&self.hinges, 0.0),
+            batches.add::<TetShear, 4, 9, 9>(&self.shears, self.energy_at_rest[0]),
+            batches.add::<TetVolume, 4, 1, 10>(&self.volumes, self.energy_at_rest[1]),
+            batches.add::<TetStrain, 4, 6, 9>(&self.strains, 0.0),
+            batches.add::<StretchShear, 3, 3, 2>(&self.stretches, 0.0),
+            batches.add::<BendTwist, 2, 3, 5>(&self.bends, 0.0),
+        ];
+        if made.contains(&None) || kinds.contains(&None) {
+            return Err(lost());
+        }
+        let next: Vec<[usize; 3]> = self.objects.iter().skip(1).map(|d| d.links).chain([end]).collect();
+        let ends = |kind: usize, i: usize| match kind {
+            0 => self.linear.members[i].nodes,
+            1 => self.nonlinear.members[i].nodes,
+            _ => self.vector.members[i].nodes,
+        };
+        let mut objects = Vec::new();
+        for (draft, next) in self.objects.into_iter().zip(next) {
+            let mut object = draft.object;
+            object.frames = object.frames.start + points..object.frames.end + points;
+            for kind in 0..3 {
+                let range = draft.links[kind]..next[kind];
+                if let (Some(Some(batch)), false) = (kinds[kind], range.is_empty()) {
+                    object.link_ends.extend(range.clone().map(|i| ends(kind, i).map(|p| p - object.points.start as u32)));
+                    object.links.push((batch, range));
+                }
+            }
+            objects.push(object);
+        }
+        let laws = super::laws::Laws {
+            batches: batches.list,
+            forces: self.forces,
+            gravity: settings.gravity,
+            masses,
+            colliders: settings.colliders.clone(),
+            solver: settings.solver.clone(),
+            ..Default::default()
+        };
+        let mut system = Dynamics {
+            memory: Memory::new(settings.integrator, rows),
+            name: settings.name.clone(),
+            index: settings.index,
+            integrator: settings.integrator,
+            stepping: settings.stepping,
+            adaptive: settings.adaptive.clone(),
+            state,
+            laws,
+            objects,
+            tethers: Vec::new(),
+            clamp: clamp.flatten(),
+            user: None,
+            scratch: Default::default(),
+            before: Vec::new(),
+            before_v: Vec::new(),
+            unclamped: Vec::new(),
+            scale: books::Scale::default(),
+            broken: 0,
+            watched: false,
+        };
+        system.set_scale();
+        Ok(system)
+    }
+}
+
+/// Batches in the order in which they act.
+struct Batches {
+    rows: usize,
+    list: Vec<Box<dyn crate::elements::Batch>>,
+}
+
+impl Batches {
+    /// Adds springs, if there are any; `None` if one is not between rows, else the index of the batch.
+    fn springs<E: crate::elements::Pair<M, D>, Y: crate::elements::Law<P>, const M: usize, const D: usize, const P: usize>(
+        &mut self,
+        springs: &Springs<D, P>,
+    ) -> Option<Option<usize>> {
+        if springs.members.is_empty() {
+            return Some(None);
+        }
+        self.list.push(Box::new(Pairs::<E, Y, M, D, P>::new(self.rows, &springs.members, &springs.limits)?));
+        Some(Some(self.list.len() - 1))
+    }
+
+    /// Adds elements, if there are any; `None` if a node is not a row.
+    fn add<E: Element<N, M, D>, const N: usize, const M: usize, const D: usize>(&mut self, members: &[Members<N, D, 0>], energy_at_rest: f64) -> Option<()> {
+        if !members.is_empty() {
+            let elements = Elements::<E, Linear, N, M, D, 0>::new(self.rows, members)?;
+            self.list.push(Box::new(elements.with_energy_at_rest(energy_at_rest)));
+        }
+        Some(())
+    }
+}

@@ -1,0 +1,212 @@
+//! The linear systems of implicit stages: (M/gh² + D/gh + K) dx = rhs.
+
+use super::contact::Penalty;
+use super::laws::Laws;
+use crate::elements::{Batch, Block, Weights};
+use crate::integrators::newton::{self, Linear, Stiff};
+use crate::linalg::cholesky::{Assembly, Cholesky};
+use crate::linalg::pcg::{self, Operator, Params};
+use crate::math::parallel::{chunks, sum};
+use crate::math::{Real, Row, ZERO, dot, xyz64};
+use tumble_interface::StepError;
+use tumble_interface::scene::{Hessian, Linear as Method, Solver};
+
+/// Storage of the implicit schemes, kept between steps.
+#[derive(Default)]
+pub struct Implicit {
+    pub newton: newton::Workspace,
+    pcg: pcg::Workspace,
+    cholesky: Cholesky,
+    /// Per row: mass, forces on each mass by itself and contact.
+    local: Vec<Block>,
+    /// Per row: the inverse of the whole diagonal block; zero for a pinned row.
+    inverse: Vec<Block>,
+}
+
+/// The matrix as an operator.
+struct Matrix<'a> {
+    batches: &'a mut [Box<dyn Batch>],
+    x: &'a [Row],
+    local: &'a [Block],
+    inverse: &'a [Block],
+}
+
+impl Operator for Matrix<'_> {
+    fn apply(&mut self, u: &[Row], out: &mut [Row]) {
+        let local = self.local;
+        chunks(out, |start, out| {
+            for (k, o) in out.iter_mut().enumerate() {
+                *o = times(&local[start + k], u[start + k]);
+            }
+        });
+        for batch in self.batches.iter_mut() {
+            batch.add_product(self.x, u, out);
+        }
+    }
+
+    /// Block Jacobi. A pinned row gets 0, so that what the residual holds there never matters.
+    fn precondition(&self, i: usize, r: Row) -> Row {
+        times(&self.inverse[i], r)
+    }
+}
+
+#[inline(always)]
+fn times(b: &Block, u: Row) -> Row {
+    [b[0] * u[0] + b[3] * u[1] + b[5] * u[2], b[3] * u[0] + b[1] * u[1] + b[4] * u[2], b[5] * u[0] + b[4] * u[1] + b[2] * u[2], 0.0]
+}
+
+/// The inverse of a symmetric block, by cofactors in double precision; the inverse of its diagonal if it is not
+/// positive definite.
+fn inverse(b: &Block) -> Block {
+    let [xx, yy, zz, xy, yz, zx] = b.map(f64::from);
+    let (cx, cy, cz) = (yy * zz - yz * yz, xx * zz - zx * zx, xx * yy - xy * xy);
+    let (cxy, cyz, czx) = (yz * zx - xy * zz, xy * zx - xx * yz, xy * yz - yy * zx);
+    let det = xx * cx + xy * cxy + zx * czx;
+    if xx > 0.0 && cz > 0.0 && det > 0.0 {
+        return [cx, cy, cz, cxy, cyz, czx].map(|c| (c / det) as Real);
+    }
+    let safe = |d: f64| if d == 0.0 { 1.0 } else { 1.0 / d.abs() };
+    [safe(xx) as Real, safe(yy) as Real, safe(zz) as Real, 0.0, 0.0, 0.0]
+}
+
+impl Implicit {
+    /// Fills `local` with mass over gh², forces and contact, prepares the batches, and inverts the diagonal blocks.
+    /// Returns the round-off of the forces in the norm sqrt(sum |.|²/m).
+    fn linearize(&mut self, laws: &mut Laws, t: f64, x: &[Row], v: &[Row], gh: f64, hessian: Hessian) -> f64 {
+        let n = x.len();
+        self.local.resize(n, [0.0; 6]);
+        self.inverse.resize(n, [0.0; 6]);
+        let Laws { batches, forces, masses, colliders, .. } = laws;
+        let (masses, colliders) = (&*masses, &colliders[..]);
+        // The stiffness of everything, without mass.
+        let forces = &*forces;
+        chunks(&mut self.local, |start, local| {
+            let end = start + local.len();
+            local.fill([0.0; 6]);
+            for (law, ranges) in forces {
+                for i in ranges.iter().flat_map(|r| r.start.max(start)..r.end.min(end)) {
+                    let (k, d) = law.matrix(t, f64::from(masses.mass[i]), xyz64(x[i]), xyz64(v[i]));
+                    add_block(&mut local[i - start], k, 1.0);
+                    add_block(&mut local[i - start], d, (1.0 / gh) as Real);
+                }
+            }
+            for i in start..end.min(masses.points) {
+                for contact in Penalty::of(colliders, f64::from(masses.mass[i]), x[i], v[i], gh) {
+                    add_block(&mut local[i - start], contact.matrix(gh), 1.0);
+                }
+            }
+        });
+        self.inverse.copy_from_slice(&self.local);
+        let weights = Weights { stiffness: 1.0, damping: (1.0 / gh) as Real, hessian };
+        for batch in batches {
+            batch.linearize(x, weights);
+            batch.add_diagonal(x, &mut self.inverse);
+        }
+        let diagonal = &self.inverse;
+        let noise = sum(n, |range| {
+            range
+                .map(|i| {
+                    let trace = diagonal[i][..3].iter().map(|d| f64::from(*d).abs()).sum::<f64>();
+                    let force = f64::from(Real::EPSILON) * trace * dot(x[i], x[i]).sqrt();
+                    f64::from(masses.inverse[i]) * force * force
+                })
+                .sum()
+        });
+        let inertia = 1.0 / (gh * gh);
+        let all = self.local.iter_mut().zip(&mut self.inverse).zip(masses.mass.iter().zip(&masses.inverse));
+        for ((local, diagonal), (m, w)) in all {
+            let m = (f64::from(*m) * inertia) as Real;
+            add_block(local, [m, m, m, 0.0, 0.0, 0.0], 1.0);
+            add_block(diagonal, [m, m, m, 0.0, 0.0, 0.0], 1.0);
+            *diagonal = if *w > 0.0 { inverse(diagonal) } else { [0.0; 6] };
+        }
+        noise.sqrt()
+    }
+
+    fn solve(&mut self, laws: &mut Laws, x: &[Row], rhs: &[Row], out: &mut [Row], settings: &Solver) -> Linear {
+        if settings.linear == Method::Cholesky {
+            let pinned = |i: usize| laws.masses.inverse[i] == 0.0;
+            let mut assembly = Assembly::new(x.len());
+            for (i, b) in self.local.iter().enumerate() {
+                let [xx, yy, zz, xy, yz, zx] = if pinned(i) { [1.0, 1.0, 1.0, 0.0, 0.0, 0.0] } else { b.map(f64::from) };
+                assembly.add(i, i, [[xx, xy, zx], [xy, yy, yz], [zx, yz, zz]]);
+            }
+            for batch in &laws.batches {
+                batch.entries(x, &mut |i, j, block| {
+                    if !pinned(i) && !pinned(j) {
+                        assembly.add(i, j, block);
+                    }
+                });
+            }
+            let indefinite = self.cholesky.factorize(&assembly).is_err();
+            self.cholesky.solve(rhs, out);
+            return Linear { iterations: 1, indefinite };
+        }
+        let tolerance = settings.linear_tolerance.unwrap_or(if cfg!(feature = "double") { 1e-6 } else { 1e-2 });
+        let params = Params { tolerance, iterations: settings.linear_iterations as usize };
+        let mut matrix = Matrix { batches: &mut laws.batches, x, local: &self.local, inverse: &self.inverse };
+        let info = pcg::solve(&mut matrix, rhs, out, params, &mut self.pcg);
+        Linear { iterations: info.iterations, indefinite: info.indefinite }
+    }
+}
+
+fn add_block(to: &mut Block, b: Block, c: Real) {
+    for i in 0..6 {
+        to[i] += c * b[i];
+    }
+}
+
+impl Stiff for Laws {
+    fn inverse_mass(&self) -> &[Real] {
+        &self.masses.inverse
+    }
+
+    fn force(&mut self, t: f64, x: &[Row], v: &[Row], gh: f64, out: &mut [Row]) -> Result<(), StepError> {
+        self.forces(t, x, v, out)?;
+        if self.colliders.is_empty() {
+            return Ok(());
+        }
+        let (colliders, masses) = (&self.colliders[..], &self.masses);
+        chunks(out, |start, out| {
+            for (k, f) in out.iter_mut().enumerate() {
+                let i = start + k;
+                if i < masses.points && masses.inverse[i] > 0.0 {
+                    for contact in Penalty::of(colliders, f64::from(masses.mass[i]), x[i], v[i], gh) {
+                        let push = contact.force(x[i]);
+                        *f = [f[0] + push.x as Real, f[1] + push.y as Real, f[2] + push.z as Real, 0.0];
+                    }
+                }
+            }
+        });
+        Ok(())
+    }
+
+    fn linearize(&mut self, t: f64, x: &[Row], v: &[Row], gh: f64, hessian: Hessian) -> f64 {
+        let mut implicit = std::mem::take(&mut self.implicit);
+        let noise = implicit.linearize(self, t, x, v, gh, hessian);
+        self.implicit = implicit;
+        noise
+    }
+
+    fn solve_linear(&mut self, x: &[Row], rhs: &[Row], out: &mut [Row], settings: &Solver) -> Linear {
+        out.fill(ZERO);
+        let mut implicit = std::mem::take(&mut self.implicit);
+        let info = implicit.solve(self, x, rhs, out, settings);
+        self.implicit = implicit;
+        info
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn blocks_are_inverted() {
+        let b: Block = [4.0, 3.0, 5.0, 1.0, -0.5, 0.3];
+        let u = [1.0, -2.0, 0.5, 0.0];
+        let back = times(&inverse(&b), times(&b, u));
+        assert!((0..3).all(|i| (back[i] - u[i]).abs() < 1e-5), "{back:?}");
+        assert_eq!(inverse(&[2.0, -4.0, 0.0, 0.0, 0.0, 0.0]), [0.5, 0.25, 1.0, 0.0, 0.0, 0.0]);
+    }
+}

@@ -1,0 +1,485 @@
+//! Masses under forces: x'' = f(x, v, t)/m, stepped by any integrator. Points and frames, elements between them, forces
+//! on each, contact with solids.
+
+mod books;
+mod build;
+mod contact;
+mod implicit;
+mod laws;
+mod modes;
+
+pub use build::{Parts, Settings, SpringPart};
+
+use crate::elements::{Batch, Elements, Limit, Linear};
+use crate::exchange::{Exchange, Port};
+use crate::integrators::{self, Equation, Memory, Scratch, adaptive_step};
+use crate::math::parallel::CHUNK;
+use crate::math::{Real, Row, Vec3, ZERO, axpy, row, sub, xyz64};
+use crate::state::{Object, State};
+use crate::system::{Archive, Part, System};
+use laws::{Laws, Local};
+use rayon::prelude::*;
+use tumble_interface::engine::{Ledger, Stability, StepReport, UserForce, UserIntegrator};
+use tumble_interface::scene::{Adaptive, Integrator};
+use tumble_interface::{Column, StepError};
+
+/// How an exchange interval is divided.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Stepping {
+    /// Into this many equal sub-steps.
+    Substeps(u32),
+    /// Into equal sub-steps no longer than this [s].
+    Step(f64),
+    /// Into as many as 0.7 of the stability limit asks for.
+    Automatic,
+}
+
+/// A system of masses.
+pub struct Dynamics {
+    name: String,
+    index: usize,
+    integrator: Integrator,
+    stepping: Stepping,
+    adaptive: Adaptive,
+    state: State,
+    laws: Laws,
+    objects: Vec<Object>,
+    tethers: Vec<Tether>,
+    clamp: Option<Elements<Limit, Linear, 2, 1, 1, 0>>,
+    user: Option<Box<dyn UserIntegrator>>,
+    memory: Memory,
+    scratch: Scratch,
+    /// Positions and velocities at the start of a sub-step, for contact.
+    before: Vec<Row>,
+    before_v: Vec<Row>,
+    /// Positions before the clamp.
+    unclamped: Vec<Row>,
+    /// What the energy is measured against, and the energy at the start [J].
+    scale: books::Scale,
+    broken: u64,
+    watched: bool,
+}
+
+/// A damped spring to a port of another system, as impulses at the start of each sub-step.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Tether {
+    /// The mass of this system.
+    pub row: usize,
+    /// The mass of the other.
+    pub port: Port,
+    /// Spring constant [N/m].
+    pub stiffness: f64,
+    /// Damping along the spring [N s/m].
+    pub damping: f64,
+    /// Rest length [m].
+    pub rest_length: f64,
+}
+
+impl Dynamics {
+    /// Hangs a mass of this system on a mass of another.
+    pub fn tether(&mut self, tether: Tether) {
+        self.tethers.push(tether);
+    }
+
+    /// Row of the i-th point of an object.
+    pub fn row_of(&self, object: &str, i: usize) -> Option<usize> {
+        let object = self.objects.iter().find(|o| o.name == object)?;
+        (i < object.points.len()).then_some(object.points.start + i)
+    }
+
+    /// Position [m] and inverse mass [1/kg] of a row.
+    pub fn point(&self, row: usize) -> (Vec3<f64>, f64) {
+        (xyz64(self.state.x[row]), f64::from(self.laws.masses.inverse[row]))
+    }
+
+    /// Speed that gravity gives in two steps: slower impacts do not bounce.
+    fn resting_speed(&self, h: f64) -> f64 {
+        2.0 * h * Vec3::from(self.laws.gravity).norm()
+    }
+
+    /// Sub-steps of an interval of length dt.
+    fn substeps(&mut self, dt: f64) -> u32 {
+        match self.stepping {
+            Stepping::Substeps(n) => n,
+            Stepping::Step(step) => (dt / step * (1.0 - 1e-9)).ceil().max(1.0) as u32,
+            Stepping::Automatic => {
+                let limit = if self.integrator.is_implicit() { f64::INFINITY } else { self.limit() };
+                let n = if limit > 0.0 { (dt / (0.7 * limit)).ceil().clamp(1.0, 1e6) as u32 } else { 1 };
+                self.stepping = Stepping::Substeps(n);
+                n
+            }
+        }
+    }
+
+    /// Largest usable step of the integrator in use [s].
+    fn limit(&mut self) -> f64 {
+        let modes = self.modes();
+        integrators::stability::limits(self.integrator, &modes.list()).1
+    }
+
+    /// Springs to other systems: half of the interaction that this system owns. Each is an impulse h f, so what one side
+    /// gets the other loses, whatever the integrator.
+    fn pull_tethers(&mut self, t: f64, h: f64, exchange: &mut Exchange) {
+        for k in 0..self.tethers.len() {
+            let tether = self.tethers[k];
+            let other = exchange.port(tether.port);
+            let (x, v) = (xyz64(self.state.x[tether.row]), xyz64(self.state.v[tether.row]));
+            let d = other.position + other.velocity * (t - other.time) - x;
+            let length = d.norm();
+            let n = d.normalized();
+            let pull = tether.stiffness * (length - tether.rest_length) + tether.damping * n.dot(other.velocity - v);
+            let impulse = n * (h * pull);
+            exchange.post(tether.port, -impulse);
+            self.push(tether.row, impulse);
+        }
+    }
+
+    fn push(&mut self, i: usize, impulse: Vec3<f64>) {
+        let w = f64::from(self.laws.masses.inverse[i]);
+        let dv = impulse * w;
+        self.state.v[i] = axpy(self.state.v[i], 1.0, row(Vec3 { x: dv.x as Real, y: dv.y as Real, z: dv.z as Real }, 0.0));
+        self.memory.ready = false;
+    }
+
+    /// One sub-step of a scheme with a fixed step, contact, clamp and breaking included.
+    fn substep(&mut self, t: f64, h: f64, report: &mut StepReport) -> Result<(), StepError> {
+        self.remember();
+        let mut user = self.user.take();
+        let result = match &mut user {
+            Some(user) => self.user_step(user.as_mut(), t, h),
+            None => {
+                let y = (&mut self.state.x[..], &mut self.state.v[..]);
+                let mut columns: Vec<&mut [Row]> = self.memory.columns.iter_mut().map(|c| &mut c[..]).collect();
+                integrators::step(self.integrator, &mut self.laws, (t, h), y, &mut columns, self.memory.ready, &mut self.scratch, report)
+            }
+        };
+        self.user = user;
+        result?;
+        self.memory.ready = true;
+        report.steps += 1;
+        report.step_range = Some(report.step_range.map_or((h, h), |(a, b)| (a.min(h), b.max(h))));
+        self.after(h, report);
+        Ok(())
+    }
+
+    /// Keeps what contact and clamp compare with.
+    fn remember(&mut self) {
+        if !self.laws.colliders.is_empty() {
+            self.before.resize(self.state.x.len(), ZERO);
+            self.before_v.resize(self.state.x.len(), ZERO);
+            self.before.copy_from_slice(&self.state.x);
+            self.before_v.copy_from_slice(&self.state.v);
+        }
+    }
+
+    /// What follows a step: clamp, contact, breaking. Whatever it changes, the scheme starts anew from.
+    fn after(&mut self, h: f64, report: &mut StepReport) {
+        if let Some(clamp) = &mut self.clamp {
+            let masses = &self.laws.masses;
+            let kinetic = |v: &[Row]| (0..masses.points).map(|i| 0.5 * f64::from(masses.mass[i]) * xyz64(v[i]).norm_sq()).sum::<f64>();
+            let energy = |state: &State| kinetic(&state.v) + self.laws.batches.iter().map(|b| b.energy(&state.x)).sum::<f64>();
+            let was = energy(&self.state);
+            self.unclamped.clone_from(&self.state.x);
+            clamp.project(&mut self.state.x, h);
+            let inverse_h = (1.0 / h) as Real;
+            let mut moved = false;
+            for i in 0..masses.points {
+                let change = sub(self.state.x[i], self.unclamped[i]);
+                if change != ZERO {
+                    self.state.v[i] = axpy(self.state.v[i], inverse_h, change);
+                    moved = true;
+                }
+            }
+            if moved {
+                self.memory.ready = false;
+                report.clamped += was - energy(&self.state);
+            }
+        }
+        if !self.laws.colliders.is_empty() {
+            let resting = self.resting_speed(h);
+            let implicit = self.integrator.is_implicit() && self.user.is_none();
+            let (points, inverse) = (self.laws.masses.points, &self.laws.masses.inverse);
+            let (colliders, before, before_v) = (&self.laws.colliders[..], &self.before, &self.before_v);
+            let touched: Vec<bool> = self.state.x[..points]
+                .par_chunks_mut(CHUNK)
+                .zip(self.state.v[..points].par_chunks_mut(CHUNK))
+                .enumerate()
+                .map(|(c, (x, v))| {
+                    let mut any = false;
+                    for (k, (x, v)) in x.iter_mut().zip(v).enumerate() {
+                        let i = c * CHUNK + k;
+                        if inverse[i] > 0.0 {
+                            any |= if implicit {
+                                contact::bounce(colliders, *x, before_v[i], v, resting)
+                            } else {
+                                contact::resolve(colliders, before[i], x, v, resting)
+                            };
+                        }
+                    }
+                    any
+                })
+                .collect();
+            if touched.contains(&true) {
+                self.memory.ready = false;
+            }
+        }
+        let broken: u64 = self.laws.batches.iter_mut().map(|b| b.break_links(&self.state.x)).sum();
+        if broken > 0 {
+            report.broken += broken;
+            self.broken += broken;
+            self.memory.ready = false;
+        }
+    }
+
+    fn user_step(&mut self, user: &mut dyn UserIntegrator, t: f64, h: f64) -> Result<(), StepError> {
+        let n = self.laws.masses.points;
+        let flat = |rows: &[Row]| -> Vec<f64> { rows.iter().flat_map(|r| [f64::from(r[0]), f64::from(r[1]), f64::from(r[2])]).collect() };
+        let (mut x, mut v) = (flat(&self.state.x[..n]), flat(&self.state.v[..n]));
+        let (state, laws) = (&self.state, &mut self.laws);
+        let mut acceleration = |t: f64, x: &[f64], v: &[f64]| -> Result<Vec<f64>, String> {
+            if x.len() != 3 * n || v.len() != 3 * n {
+                return Err(format!("acceleration takes {n} rows of three numbers"));
+            }
+            let rows = |from: &[f64], old: &[Row]| -> Vec<Row> {
+                let new = from.chunks_exact(3).zip(old).map(|(p, o)| [p[0] as Real, p[1] as Real, p[2] as Real, o[3]]);
+                new.chain(old[n..].iter().copied()).collect()
+            };
+            let mut out = vec![ZERO; state.x.len()];
+            laws.rate(t, &rows(x, &state.x), &rows(v, &state.v), &mut out).map_err(|e| e.to_string())?;
+            Ok(flat(&out[..n]))
+        };
+        user.step(t, h, &mut x, &mut v, &mut acceleration).map_err(StepError::User)?;
+        for i in 0..n {
+            if self.laws.masses.inverse[i] > 0.0 {
+                let take = |from: &[f64], w: Real| [from[3 * i] as Real, from[3 * i + 1] as Real, from[3 * i + 2] as Real, w];
+                self.state.x[i] = take(&x, self.state.x[i][3]);
+                self.state.v[i] = take(&v, 0.0);
+            }
+        }
+        Ok(())
+    }
+
+    /// All sub-steps of an interval, chunk by chunk, where no mass feels another: every number is then read and written
+    /// once an interval, and the scratch of any scheme stays in the cache.
+    fn advance_local(&mut self, t: f64, h: f64, substeps: u32, go_on: &(dyn Fn() -> bool + Sync)) -> Result<(), StepError> {
+        let (scheme, resting) = (self.integrator, self.resting_speed(h));
+        let (laws, colliders, state) = (&self.laws, &self.laws.colliders[..], &mut self.state);
+        let mut memory: Vec<Vec<&mut [Row]>> = Vec::new();
+        memory.resize_with(state.x.len().div_ceil(CHUNK), Vec::new);
+        for column in &mut self.memory.columns {
+            for (part, rows) in memory.iter_mut().zip(column.chunks_mut(CHUNK)) {
+                part.push(rows);
+            }
+        }
+        let was_ready = self.memory.ready;
+        let results: Vec<Result<bool, StepError>> = state
+            .x
+            .par_chunks_mut(CHUNK)
+            .zip(state.v.par_chunks_mut(CHUNK))
+            .zip(memory)
+            .enumerate()
+            .map_init(Scratch::default, |scratch, (c, ((x, v), mut memory))| {
+                let start = c * CHUNK;
+                let mut motion = Local { laws, start };
+                let points = motion.kinematics().points;
+                let inverse = laws.weights(start..start + x.len()).inverse;
+                let (mut ready, mut before) = (was_ready, Vec::new());
+                for k in 0..substeps {
+                    if k % 64 == 63 && !go_on() {
+                        return Ok(false);
+                    }
+                    if !colliders.is_empty() {
+                        before.clear();
+                        before.extend_from_slice(x);
+                    }
+                    let time = t + f64::from(k) * h;
+                    integrators::step(scheme, &mut motion, (time, h), (x, v), &mut memory, ready, scratch, &mut StepReport::default())?;
+                    ready = true;
+                    for i in 0..before.len().min(points) {
+                        if inverse[i] > 0.0 && contact::resolve(colliders, before[i], &mut x[i], &mut v[i], resting) {
+                            ready = false;
+                        }
+                    }
+                }
+                Ok(ready)
+            })
+            .collect();
+        self.memory.ready = true;
+        for result in results {
+            self.memory.ready &= result?;
+        }
+        Ok(())
+    }
+
+    /// While watched: the first breakdown as an error.
+    fn look(&self, t: f64) -> Result<(), StepError> {
+        if self.watched { self.broken_down(t).map_or(Ok(()), Err) } else { Ok(()) }
+    }
+
+    fn named(&self, error: StepError) -> StepError {
+        match error {
+            StepError::Solve { time, iterations, residual, tolerance, .. } => {
+                StepError::Solve { system: self.name.clone(), time, iterations, residual, tolerance }
+            }
+            StepError::StepTooSmall { time, step, .. } => StepError::StepTooSmall { system: self.name.clone(), time, step },
+            other => other,
+        }
+    }
+}
+
+impl System for Dynamics {
+    fn name(&self) -> &str {
+        &self.name
+    }
+
+    fn absorb(&mut self, exchange: &mut Exchange) {
+        for (row, impulse) in exchange.take(self.index) {
+            self.push(row, impulse);
+        }
+    }
+
+    fn advance(&mut self, t: f64, dt: f64, exchange: &mut Exchange, go_on: &(dyn Fn() -> bool + Sync)) -> Result<StepReport, StepError> {
+        let mut report = StepReport::default();
+        if self.integrator.is_adaptive() && self.user.is_none() {
+            let mut done = 0.0;
+            while done < dt && go_on() {
+                self.remember();
+                let left = dt - done;
+                let y = (&mut self.state.x[..], &mut self.state.v[..]);
+                let times = (t + done, left, dt);
+                let taken = adaptive_step(self.integrator, &self.adaptive, &mut self.laws, times, y, &mut self.memory, &mut self.scratch, &mut report);
+                let h = taken.map_err(|e| self.named(e))?;
+                // The last step ends exactly at dt.
+                done = if h == left { dt } else { done + h };
+                report.steps += 1;
+                report.step_range = Some(report.step_range.map_or((h, h), |(a, b)| (a.min(h), b.max(h))));
+                self.pull_tethers(t + done, h, exchange);
+                self.after(h, &mut report);
+                self.look(t + done)?;
+            }
+            return Ok(report);
+        }
+        let substeps = self.substeps(dt);
+        let h = dt / f64::from(substeps);
+        let each = self.laws.is_local() && self.tethers.is_empty() && self.user.is_none() && self.clamp.is_none() && !self.integrator.is_implicit() && !self.watched;
+        if each {
+            self.advance_local(t, h, substeps, go_on).map_err(|e| self.named(e))?;
+            report.steps = u64::from(substeps);
+            report.step_range = Some((h, h));
+            return Ok(report);
+        }
+        for k in 0..substeps {
+            if !go_on() {
+                break;
+            }
+            let time = t + f64::from(k) * h;
+            self.pull_tethers(time, h, exchange);
+            self.substep(time, h, &mut report).map_err(|e| self.named(e))?;
+            self.look(time + h)?;
+        }
+        Ok(report)
+    }
+
+    fn publish(&self, t: f64, exchange: &mut Exchange) {
+        for port in exchange.ports_of(self.index) {
+            let i = port.owner.1;
+            (port.position, port.velocity, port.time) = (xyz64(self.state.x[i]), xyz64(self.state.v[i]), t);
+        }
+    }
+
+    fn columns(&self, names: &[&str], out: &mut Vec<Column>) {
+        self.write_columns(names, out);
+    }
+
+    fn topology(&self, out: &mut Vec<Column>) {
+        self.write_topology(out);
+    }
+
+    fn ledger(&self, t: f64) -> Ledger {
+        self.books(t)
+    }
+
+    fn breakdown(&mut self, t: f64) -> Option<StepError> {
+        let found = self.broken_down(t);
+        if found.is_none() {
+            self.rescale(t);
+        }
+        found
+    }
+
+    fn watch(&mut self, on: bool) {
+        self.watched = on;
+    }
+
+    fn stability(&mut self, dt: f64) -> Option<Stability> {
+        Some(self.estimate(dt))
+    }
+
+    fn save(&self, archive: &mut Archive) {
+        archive.push("x", Part::Rows(self.state.x.clone()));
+        archive.push("v", Part::Rows(self.state.v.clone()));
+        for column in &self.memory.columns {
+            archive.push("memory", Part::Rows(column.clone()));
+        }
+        let substeps = if let Stepping::Substeps(n) = self.stepping { f64::from(n) } else { 0.0 };
+        let ready = f64::from(u8::from(self.memory.ready));
+        let numbers = vec![ready, self.memory.next_step, self.memory.last_error, substeps, self.broken as f64];
+        archive.push("numbers", Part::Numbers(numbers.into_iter().chain(self.scale.numbers()).collect()));
+        for batch in &self.laws.batches {
+            archive.push("broken", Part::Indices(batch.broken()));
+        }
+    }
+
+    fn restore(&mut self, archive: &mut Archive) -> Option<()> {
+        archive.rows("x", &mut self.state.x)?;
+        archive.rows("v", &mut self.state.v)?;
+        for column in &mut self.memory.columns {
+            archive.rows("memory", column)?;
+        }
+        let numbers = archive.numbers("numbers")?;
+        let [ready, next_step, last_error, substeps, broken, scale @ ..] = &numbers[..] else { return None };
+        (self.memory.ready, self.memory.next_step, self.memory.last_error) = (*ready == 1.0, *next_step, *last_error);
+        if *substeps >= 1.0 {
+            self.stepping = Stepping::Substeps(*substeps as u32);
+        }
+        self.broken = *broken as u64;
+        self.scale = books::Scale::from_numbers(scale)?;
+        for batch in &mut self.laws.batches {
+            let broken = archive.indices("broken")?;
+            if broken.iter().any(|e| *e as usize >= batch.len()) {
+                return None;
+            }
+            batch.set_broken(&broken);
+        }
+        Some(())
+    }
+
+    fn add_force(&mut self, force: Box<dyn UserForce>) -> bool {
+        self.laws.user.push(force);
+        self.memory.ready = false;
+        true
+    }
+
+    fn replace_integrator(&mut self, integrator: Box<dyn UserIntegrator>) -> bool {
+        self.user = Some(integrator);
+        true
+    }
+
+    fn write(&mut self, object: &str, column: &str, values: &[f64]) -> Option<bool> {
+        let points = self.objects.iter().find(|o| o.name == object)?.points.clone();
+        let velocity = match column {
+            "position" => false,
+            "velocity" => true,
+            _ => return Some(false),
+        };
+        if values.len() != 3 * points.len() {
+            return Some(false);
+        }
+        for (i, value) in points.zip(values.chunks_exact(3)) {
+            let rows = if velocity { &mut self.state.v } else { &mut self.state.x };
+            rows[i] = [value[0] as Real, value[1] as Real, value[2] as Real, rows[i][3]];
+        }
+        self.memory.ready = false;
+        Some(true)
+    }
+}

@@ -1,0 +1,4 @@
+//! L5: the numerical methods. None imports another.
+
+pub mod dynamics;
+pub mod tracers;

@@ -1,0 +1,222 @@
+//! Massless particles carried by velocity fields: x' = u(x, t). The plain case of y' = f(y, t).
+
+use crate::exchange::Exchange;
+use crate::forces::Flow;
+use crate::integrators::{self, Equation, Kinematics, Memory, Scratch, Stage, adaptive_step};
+use crate::math::parallel::chunks;
+use crate::math::{Real, Row, Vec3, is_finite, xyz, xyz64};
+use crate::state::Object;
+use crate::system::{Archive, Part, System};
+use tumble_interface::engine::{Ledger, Stability, StepReport};
+use tumble_interface::error::Breakdown;
+use tumble_interface::scene::{Adaptive, Integrator};
+use tumble_interface::{Column, Data, StepError};
+
+/// How a system of tracers steps.
+#[derive(Debug, Clone)]
+pub struct Settings {
+    /// Name in the scene.
+    pub name: String,
+    /// Scheme; one that does not need velocities.
+    pub integrator: Integrator,
+    /// Sub-steps of an interval, if their number is given.
+    pub substeps: Option<u32>,
+    /// Longest sub-step [s], if given.
+    pub step: Option<f64>,
+    /// Of the adaptive schemes.
+    pub adaptive: Adaptive,
+}
+
+/// A system of tracers.
+pub struct Tracers {
+    settings: Settings,
+    flow: Flow,
+    x: Vec<Row>,
+    objects: Vec<Object>,
+    memory: Memory,
+    scratch: Scratch,
+    /// Largest distance from the origin at the start [m].
+    size: f64,
+}
+
+impl Tracers {
+    /// A system of points in a flow; every object is a range of them.
+    pub fn new(settings: Settings, flow: Flow, x: &[Vec3<f64>], objects: Vec<Object>) -> Self {
+        let size = x.iter().map(|x| x.norm()).fold(1e-30, f64::max);
+        let x: Vec<Row> = x.iter().map(|x| [x.x as Real, x.y as Real, x.z as Real, 0.0]).collect();
+        Self { memory: Memory::new(settings.integrator, x.len()), settings, flow, x, objects, scratch: Scratch::default(), size }
+    }
+}
+
+struct Carried<'a>(&'a Flow);
+
+impl Equation for Carried<'_> {
+    fn kinematics(&self) -> Kinematics {
+        Kinematics { points: usize::MAX, second_order: false }
+    }
+
+    fn rate(&mut self, _t: f64, x: &[Row], _v: &[Row], out: &mut [Row]) -> Result<(), StepError> {
+        let flow = self.0;
+        chunks(out, |start, out| {
+            for (k, o) in out.iter_mut().enumerate() {
+                let u = flow.velocity(xyz(x[start + k]));
+                *o = [u.x, u.y, u.z, 0.0];
+            }
+        });
+        Ok(())
+    }
+
+    /// Newton's method for each point by itself: x = x* + gh u(x), with the exact 3 x 3 gradient of u.
+    fn solve(&mut self, stage: &Stage<'_>, x: &mut [Row], _v: &mut [Row], report: &mut StepReport) -> Result<(), StepError> {
+        let flow = self.0;
+        let one = |start: Vec3<f64>, guess: Vec3<f64>| {
+            let mut x = guess;
+            for _ in 0..20 {
+                let residual = x - start - flow.velocity(x) * stage.gh;
+                let [a, b, c] = flow.gradient(x);
+                let unit = |i: usize| Vec3::from(std::array::from_fn::<f64, 3, _>(|j| f64::from(u8::from(i == j))));
+                let (a, b, c) = (unit(0) - a * stage.gh, unit(1) - b * stage.gh, unit(2) - c * stage.gh);
+                let det = a.dot(b.cross(c));
+                let step = Vec3 { x: residual.dot(b.cross(c)), y: a.dot(residual.cross(c)), z: a.dot(b.cross(residual)) } * (1.0 / det);
+                x = x - step;
+                if step.norm() <= 1e-15 * (1.0 + x.norm()) {
+                    break;
+                }
+            }
+            x
+        };
+        chunks(x, |first, x| {
+            for (k, x) in x.iter_mut().enumerate() {
+                let found = one(xyz64(stage.x[first + k]), xyz64(*x));
+                *x = [found.x as Real, found.y as Real, found.z as Real, 0.0];
+            }
+        });
+        report.newton += 1;
+        Ok(())
+    }
+}
+
+impl System for Tracers {
+    fn name(&self) -> &str {
+        &self.settings.name
+    }
+
+    fn absorb(&mut self, _exchange: &mut Exchange) {}
+
+    fn advance(&mut self, t: f64, dt: f64, _exchange: &mut Exchange, go_on: &(dyn Fn() -> bool + Sync)) -> Result<StepReport, StepError> {
+        let mut report = StepReport::default();
+        let mut equation = Carried(&self.flow);
+        let integrator = self.settings.integrator;
+        if integrator.is_adaptive() {
+            let mut done = 0.0;
+            while done < dt && go_on() {
+                let left = dt - done;
+                let times = (t + done, left, dt);
+                let (memory, scratch) = (&mut self.memory, &mut self.scratch);
+                let h = adaptive_step(integrator, &self.settings.adaptive, &mut equation, times, (&mut self.x, &mut []), memory, scratch, &mut report)?;
+                done = if h == left { dt } else { done + h };
+                report.steps += 1;
+            }
+            return Ok(report);
+        }
+        let by_step = self.settings.step.map(|step| (dt / step * (1.0 - 1e-9)).ceil().max(1.0) as u32);
+        let n = self.settings.substeps.or(by_step).unwrap_or(1);
+        let h = dt / f64::from(n);
+        for k in 0..n {
+            if !go_on() {
+                break;
+            }
+            let mut columns: Vec<&mut [Row]> = self.memory.columns.iter_mut().map(|c| &mut c[..]).collect();
+            let time = t + f64::from(k) * h;
+            integrators::step(integrator, &mut equation, (time, h), (&mut self.x, &mut []), &mut columns, self.memory.ready, &mut self.scratch, &mut report)?;
+            self.memory.ready = true;
+            report.steps += 1;
+        }
+        report.step_range = Some((h, h));
+        Ok(report)
+    }
+
+    fn publish(&self, _t: f64, _exchange: &mut Exchange) {}
+
+    fn columns(&self, names: &[&str], out: &mut Vec<Column>) {
+        for object in &self.objects {
+            for name in names {
+                let rows = &self.x[object.points.clone()];
+                let (unit, rows): (_, Vec<[Real; 3]>) = match *name {
+                    "position" => ("m", rows.iter().map(|x| [x[0], x[1], x[2]]).collect()),
+                    "velocity" => ("m/s", rows.iter().map(|x| self.flow.velocity(xyz(*x)).into()).collect()),
+                    _ => continue,
+                };
+                out.push(Column { object: object.name.clone(), name: (*name).into(), unit, width: 3, data: Data::from(rows.concat()) });
+            }
+        }
+    }
+
+    fn topology(&self, out: &mut Vec<Column>) {
+        for object in &self.objects {
+            out.push(Column { object: object.name.clone(), name: "radius".into(), unit: "m", width: 1, data: Data::F64(vec![object.radius]) });
+        }
+    }
+
+    fn ledger(&self, t: f64) -> Ledger {
+        let speed = self.x.iter().map(|x| self.flow.velocity(xyz64(*x)).norm()).fold(0.0, f64::max);
+        Ledger { time: t, speed, ..Ledger::default() }
+    }
+
+    /// A tracer is lost when it is not finite, or a million times as far out as the farthest at the start.
+    fn breakdown(&mut self, t: f64) -> Option<StepError> {
+        let far = |x: &Row| !is_finite(*x) || xyz64(*x).norm() > 1e6 * self.size;
+        let i = self.x.iter().position(far)?;
+        let object = self.objects.iter().find(|o| o.points.contains(&i));
+        let breakdown = Breakdown {
+            system: self.settings.name.clone(),
+            object: object.map_or(String::new(), |o| o.name.clone()),
+            column: "position".into(),
+            index: object.map_or(i, |o| i - o.points.start),
+            time: t,
+            integrator: self.settings.integrator.name().into(),
+            step: 0.0,
+            stable_step: f64::INFINITY,
+            energy_ratio: None,
+        };
+        Some(StepError::NotFinite(breakdown))
+    }
+
+    fn watch(&mut self, _on: bool) {}
+
+    fn stability(&mut self, _dt: f64) -> Option<Stability> {
+        None
+    }
+
+    fn save(&self, archive: &mut Archive) {
+        archive.push("x", Part::Rows(self.x.clone()));
+        for column in &self.memory.columns {
+            archive.push("memory", Part::Rows(column.clone()));
+        }
+        let ready = f64::from(u8::from(self.memory.ready));
+        archive.push("numbers", Part::Numbers(vec![ready, self.memory.next_step, self.memory.last_error]));
+    }
+
+    fn restore(&mut self, archive: &mut Archive) -> Option<()> {
+        archive.rows("x", &mut self.x)?;
+        for column in &mut self.memory.columns {
+            archive.rows("memory", column)?;
+        }
+        let numbers = archive.numbers("numbers")?;
+        let [ready, next_step, last_error] = numbers[..] else { return None };
+        (self.memory.ready, self.memory.next_step, self.memory.last_error) = (ready == 1.0, next_step, last_error);
+        Some(())
+    }
+
+    fn write(&mut self, object: &str, column: &str, values: &[f64]) -> Option<bool> {
+        let points = self.objects.iter().find(|o| o.name == object)?.points.clone();
+        if column != "position" || values.len() != 3 * points.len() {
+            return Some(false);
+        }
+        for (x, value) in self.x[points].iter_mut().zip(values.chunks_exact(3)) {
+            *x = [value[0] as Real, value[1] as Real, value[2] as Real, 0.0];
+        }
+        self.memory.ready = false;
+        Some(true)
+    }
+}

@@ -1,0 +1,270 @@
+//! L6: systems in order, the exchange, the clock: THE stepping loop. Knows no concrete system.
+
+use crate::exchange::Exchange;
+use crate::math::{Real, Row};
+use crate::system::{Archive, Part, System};
+use safetensors::tensor::{Dtype, SafeTensors, TensorView, serialize};
+use std::collections::HashMap;
+use std::hash::Hasher;
+use tumble_interface::engine::{Ledger, Stability, StepReport};
+use tumble_interface::{Column, SceneError, StepError};
+use twox_hash::XxHash3_64;
+
+/// Everything that moves.
+pub struct World {
+    systems: Vec<Box<dyn System>>,
+    exchange: Exchange,
+    /// Length of an exchange interval [s].
+    dt: f64,
+    exchanges: u32,
+    frame: u64,
+    /// The state at the last good frame.
+    good: Archive,
+}
+
+impl World {
+    /// A world of systems at t = 0; a frame of `frame_time` [s] has `exchanges` exchange intervals.
+    pub fn new(systems: Vec<Box<dyn System>>, exchange: Exchange, frame_time: f64, exchanges: u32) -> Self {
+        let dt = frame_time / f64::from(exchanges);
+        let mut world = Self { systems, exchange, dt, exchanges, frame: 0, good: Archive::default() };
+        for system in &world.systems {
+            system.publish(0.0, &mut world.exchange);
+        }
+        world.good = world.snapshot();
+        world
+    }
+
+    /// Simulated time [s].
+    pub fn time(&self) -> f64 {
+        (self.frame * u64::from(self.exchanges)) as f64 * self.dt
+    }
+
+    /// Frames simulated so far.
+    pub fn frame_index(&self) -> u64 {
+        self.frame
+    }
+
+    /// One frame. Each system in turn takes its mail, goes its own way through the interval, and publishes where it is:
+    /// what it posts reaches the others on their next turn, the same interval for those after it, the next for those
+    /// before it. After an error, or when `go_on` says no (`None`), the state is that of the last good frame.
+    pub fn step(&mut self, go_on: &(dyn Fn() -> bool + Sync)) -> Result<Option<StepReport>, StepError> {
+        let result = self.intervals(go_on);
+        let report = match result {
+            Ok(report) if go_on() => report,
+            Ok(_) => {
+                self.roll_back();
+                return Ok(None);
+            }
+            Err(error) => {
+                self.roll_back();
+                return Err(self.explain(error));
+            }
+        };
+        let time = (self.frame + 1) as f64 * f64::from(self.exchanges) * self.dt;
+        if let Some(error) = self.systems.iter_mut().find_map(|s| s.breakdown(time)) {
+            let error = self.first_breakdown().unwrap_or(error);
+            return Err(self.explain(error));
+        }
+        self.frame += 1;
+        self.good = self.snapshot();
+        Ok(Some(report))
+    }
+
+    fn intervals(&mut self, go_on: &(dyn Fn() -> bool + Sync)) -> Result<StepReport, StepError> {
+        let mut report = StepReport::default();
+        for k in 0..u64::from(self.exchanges) {
+            // From whole numbers, so that time does not drift.
+            let t = (self.frame * u64::from(self.exchanges) + k) as f64 * self.dt;
+            for system in &mut self.systems {
+                system.absorb(&mut self.exchange);
+                report.add(&system.advance(t, self.dt, &mut self.exchange, go_on)?);
+                system.publish(t + self.dt, &mut self.exchange);
+            }
+        }
+        Ok(report)
+    }
+
+    /// Goes back to the last good frame and steps again, watching every sub-step.
+    fn first_breakdown(&mut self) -> Option<StepError> {
+        self.roll_back();
+        self.systems.iter_mut().for_each(|s| s.watch(true));
+        let found = self.intervals(&|| true).err();
+        self.systems.iter_mut().for_each(|s| s.watch(false));
+        self.roll_back();
+        found
+    }
+
+    /// Adds the step in use and the stable one, at the last good frame.
+    fn explain(&mut self, mut error: StepError) -> StepError {
+        if let StepError::NotFinite(b) | StepError::Exploded(b) = &mut error {
+            let dt = self.dt;
+            let system = self.systems.iter_mut().find(|s| s.name() == b.system);
+            if let Some(stability) = system.and_then(|s| s.stability(dt)) {
+                b.step = stability.step;
+                b.stable_step = stability.limit(stability.integrator).map_or(f64::INFINITY, |l| l.stable);
+            }
+        }
+        error
+    }
+
+    fn roll_back(&mut self) {
+        let mut good = std::mem::take(&mut self.good);
+        // A snapshot of this very world always fits.
+        let _ = self.read(&mut good);
+        self.good = good;
+    }
+
+    fn snapshot(&self) -> Archive {
+        let mut archive = Archive::default();
+        archive.push("world", Part::Numbers(vec![self.frame as f64]));
+        archive.push("exchange", Part::Numbers(self.exchange.save()));
+        for system in &self.systems {
+            system.save(&mut archive);
+        }
+        archive
+    }
+
+    fn read(&mut self, archive: &mut Archive) -> Option<()> {
+        archive.rewind();
+        let [frame] = archive.numbers("world")?[..] else { return None };
+        self.frame = frame as u64;
+        self.exchange.restore(&archive.numbers("exchange")?)?;
+        self.systems.iter_mut().try_for_each(|s| s.restore(archive))
+    }
+
+    /// Hash of everything that the next step depends on.
+    pub fn hash(&self) -> u64 {
+        let mut hasher = XxHash3_64::with_seed(0);
+        for (name, part) in &self.good.parts {
+            hasher.write(name.as_bytes());
+            hasher.write(bytes(part));
+        }
+        hasher.finish()
+    }
+
+    /// The state of the last good frame as safetensors.
+    pub fn save(&self) -> Vec<u8> {
+        let views: Vec<(String, TensorView<'_>)> = self
+            .good
+            .parts
+            .iter()
+            .enumerate()
+            .filter_map(|(k, (name, part))| {
+                let (dtype, shape) = match part {
+                    Part::Rows(rows) => (REAL, vec![rows.len(), 4]),
+                    Part::Numbers(numbers) => (Dtype::F64, vec![numbers.len()]),
+                    Part::Indices(indices) => (Dtype::U32, vec![indices.len()]),
+                };
+                Some((format!("{k:05} {name}"), TensorView::new(dtype, shape, bytes(part)).ok()?))
+            })
+            .collect();
+        let about = HashMap::from([("tumble".to_string(), env!("CARGO_PKG_VERSION").to_string())]);
+        serialize(views, Some(about)).unwrap_or_default()
+    }
+
+    /// Goes to a saved state of the same scene; on an error the state stays as it was.
+    pub fn restore(&mut self, bytes: &[u8]) -> Result<(), SceneError> {
+        let wrong = |message: &str| SceneError::one("checkpoint", message);
+        let tensors = SafeTensors::deserialize(bytes).map_err(|e| wrong(&format!("not a checkpoint: {e}")))?;
+        let mut named = tensors.tensors();
+        named.sort_by(|a, b| a.0.cmp(&b.0));
+        let mut archive = Archive::default();
+        for (name, tensor) in &named {
+            let part = part(tensor).ok_or_else(|| wrong("it was written by an engine of another precision"))?;
+            archive.push(name.split_once(' ').map_or("", |(_, n)| n), part);
+        }
+        if self.read(&mut archive).is_none() || archive.parts.len() != self.good.parts.len() {
+            self.roll_back();
+            return Err(wrong("it belongs to another scene: names or sizes differ"));
+        }
+        self.good = self.snapshot();
+        Ok(())
+    }
+
+    /// Columns of every object.
+    pub fn columns(&self, names: &[&str]) -> Vec<Column> {
+        let mut out = Vec::new();
+        self.systems.iter().for_each(|s| s.columns(names, &mut out));
+        out
+    }
+
+    /// What does not change about every object.
+    pub fn topology(&self) -> Vec<Column> {
+        let mut out = Vec::new();
+        self.systems.iter().for_each(|s| s.topology(&mut out));
+        out
+    }
+
+    /// The books of all systems together.
+    pub fn ledger(&self) -> Ledger {
+        let time = self.time();
+        let mut total = Ledger { time, ..Ledger::default() };
+        for books in self.systems.iter().map(|s| s.ledger(time)) {
+            total.mass += books.mass;
+            for a in 0..3 {
+                total.momentum[a] += books.momentum[a];
+                total.angular_momentum[a] += books.angular_momentum[a];
+            }
+            total.kinetic += books.kinetic;
+            total.elastic += books.elastic;
+            total.external += books.external;
+            total.stretch = total.stretch.max(books.stretch);
+            total.penetration = total.penetration.max(books.penetration);
+            total.speed = total.speed.max(books.speed);
+            total.contacts += books.contacts;
+            total.broken += books.broken;
+        }
+        total
+    }
+
+    /// The pre-flight estimate of every system that has one.
+    pub fn stability(&mut self) -> Vec<Stability> {
+        let dt = self.dt;
+        self.systems.iter_mut().filter_map(|s| s.stability(dt)).collect()
+    }
+
+    /// The system of that name.
+    pub fn system(&mut self, name: &str) -> Option<&mut dyn System> {
+        self.systems.iter_mut().find(|s| s.name() == name).map(|s| &mut **s as &mut dyn System)
+    }
+
+    /// Names of the systems.
+    pub fn names(&self) -> Vec<&str> {
+        self.systems.iter().map(|s| s.name()).collect()
+    }
+
+    /// Sets a column of an object; see [`System::write`].
+    pub fn write(&mut self, object: &str, column: &str, values: &[f64]) -> Option<bool> {
+        let done = self.systems.iter_mut().find_map(|s| s.write(object, column, values))?;
+        let time = self.time();
+        self.systems.iter().for_each(|s| s.publish(time, &mut self.exchange));
+        self.good = self.snapshot();
+        Some(done)
+    }
+}
+
+#[cfg(not(feature = "double"))]
+const REAL: Dtype = Dtype::F32;
+#[cfg(feature = "double")]
+const REAL: Dtype = Dtype::F64;
+
+fn bytes(part: &Part) -> &[u8] {
+    match part {
+        Part::Rows(rows) => bytemuck::cast_slice(rows),
+        Part::Numbers(numbers) => bytemuck::cast_slice(numbers),
+        Part::Indices(indices) => bytemuck::cast_slice(indices),
+    }
+}
+
+fn part(tensor: &TensorView<'_>) -> Option<Part> {
+    let data = tensor.data();
+    Some(match (tensor.dtype(), tensor.shape()) {
+        (dtype, [_, 4]) if dtype == REAL => {
+            let numbers: Vec<Real> = bytemuck::allocation::pod_collect_to_vec(data);
+            Part::Rows(numbers.chunks_exact(4).map(|r| [r[0], r[1], r[2], r[3]]).collect::<Vec<Row>>())
+        }
+        (Dtype::F64, [_]) => Part::Numbers(bytemuck::allocation::pod_collect_to_vec(data)),
+        (Dtype::U32, [_]) => Part::Indices(bytemuck::allocation::pod_collect_to_vec(data)),
+        _ => return None,
+    })
+}
