@@ -189,8 +189,11 @@ pub trait Engine: Send {
     /// Hash of everything that the next step depends on.
     fn hash(&self) -> u64;
 
-    /// Everything that the next step depends on, as bytes (safetensors).
-    fn save(&self) -> Vec<u8>;
+    /// Everything that the next step depends on, as bytes (safetensors), with texts about it.
+    fn save(&self, about: &[(&str, &str)]) -> Vec<u8>;
+
+    /// Names of the systems.
+    fn systems(&self) -> Vec<String>;
 
     /// Goes to a saved state of the same scene.
     fn restore(&mut self, bytes: &[u8]) -> Result<(), SceneError>;
@@ -199,7 +202,7 @@ pub trait Engine: Send {
     fn stability(&mut self) -> Vec<Stability>;
 
     /// After a failed step: changes of step or integrator, each tried from the last good frame.
-    fn cures(&mut self) -> Vec<Cure>;
+    fn cures(&mut self, go_on: &(dyn Fn() -> bool + Sync)) -> Vec<Cure>;
 
     /// Warnings from building the scene.
     fn warnings(&self) -> &[String];

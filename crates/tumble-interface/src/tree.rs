@@ -75,18 +75,27 @@ impl Node {
         let value: serde_json::Value = serde_json::from_str(text).map_err(|e| SceneError {
             issues: vec![Issue { path: String::new(), line: Some(e.line()), message: format!("not JSON: {e}") }],
         })?;
-        Ok(from_json_value(&value))
+        Ok(Self::from_value(&value))
+    }
+
+    /// A tree of JSON values, without lines.
+    pub fn from_value(value: &serde_json::Value) -> Node {
+        from_json_value(value)
     }
 
     /// Sets the value at a dotted path: `time.fps`, `system.0.step`, `sheet.flag.size` (by index or by name).
     pub fn set(&mut self, path: &str, value: Node) -> Result<(), SceneError> {
         let error = |message: String| SceneError::one(path, message);
         let mut node = self;
-        for key in path.split('.') {
+        let mut keys = path.split('.').peekable();
+        while let Some(key) = keys.next() {
             node = match &mut node.value {
                 Value::Table(entries) => {
                     let i = entries.iter().position(|(k, _)| k == key).unwrap_or_else(|| {
-                        entries.push((key.to_string(), Value::Table(Vec::new()).into()));
+                        let table: Node = Value::Table(Vec::new()).into();
+                        // `system.0.step` makes the first system of a scene that names none.
+                        let is_list = keys.peek() == Some(&"0");
+                        entries.push((key.to_string(), if is_list { Value::List(vec![table]).into() } else { table }));
                         entries.len() - 1
                     });
                     &mut entries[i].1
@@ -115,6 +124,38 @@ impl Node {
         let mut value = parsed.and_then(|n| n.entry("value").cloned()).unwrap_or_else(|| Value::Text(text.trim().to_string()).into());
         forget_lines(&mut value);
         self.set(path.trim(), value)
+    }
+
+    /// Line of the place that an issue names, `sheet "flag".pin[0]`, or of the nearest one around it.
+    pub fn line_of(&self, path: &str) -> Option<usize> {
+        let mut node = self;
+        let mut line = None;
+        let mut rest = path;
+        while !rest.is_empty() {
+            let next = if let Some(index) = rest.strip_prefix('[').and_then(|r| r.split_once(']')) {
+                rest = index.1;
+                match &node.value {
+                    Value::List(items) => index.0.parse::<usize>().ok().and_then(|i| items.get(i)),
+                    _ => None,
+                }
+            } else if let Some((name, after)) = rest.strip_prefix(" \"").and_then(|r| r.split_once('"')) {
+                rest = after;
+                match &node.value {
+                    Value::List(items) => items.iter().find(|n| n.text("name") == Some(name)),
+                    _ => None,
+                }
+            } else {
+                rest = rest.strip_prefix('.').unwrap_or(rest);
+                let end = rest.find(['.', '[', ' ']).unwrap_or(rest.len());
+                let (key, after) = rest.split_at(end);
+                rest = after;
+                node.entry(key)
+            };
+            let Some(next) = next else { break };
+            node = next;
+            line = node.line.or(line);
+        }
+        line
     }
 
     /// The tree as JSON; `None` if it holds a number that is not finite.
@@ -243,5 +284,17 @@ mod tests {
         assert!(node.set_text("sheet.z.size=1").unwrap_err().to_string().contains("there is no \"z\""));
         assert!(node.set_text("time.fps.x=1").is_err());
         assert!(node.set_text("nothing").is_err());
+        let mut node = Node::from_toml("version = 1").unwrap();
+        node.set_text("system.0.substeps=4").unwrap();
+        assert!(matches!(&node.entry("system").unwrap().value, Value::List(l) if l.len() == 1 && l[0].entry("substeps").is_some()));
+    }
+
+    #[test]
+    fn places_have_lines() {
+        let node = Node::from_toml("version = 1\n[[sheet]]\nname = \"a\"\n[[sheet]]\nname = \"b\"\npin = [\n\"x\",\n\"y\"]\n[time]\nfps = 3\n").unwrap();
+        assert_eq!(node.line_of("sheet \"b\".pin[1]"), Some(8));
+        assert_eq!(node.line_of("sheet \"b\".size"), node.line_of("sheet \"b\""));
+        assert_eq!(node.line_of("time.fps"), Some(10));
+        assert_eq!(node.line_of("nothing"), None);
     }
 }

@@ -142,8 +142,8 @@ impl World {
         hasher.finish()
     }
 
-    /// The state of the last good frame as safetensors.
-    pub fn save(&self) -> Vec<u8> {
+    /// The state of the last good frame as safetensors, with texts about it.
+    pub fn save(&self, about: &[(&str, &str)]) -> Vec<u8> {
         let views: Vec<(String, TensorView<'_>)> = self
             .good
             .parts
@@ -158,7 +158,7 @@ impl World {
                 Some((format!("{k:05} {name}"), TensorView::new(dtype, shape, bytes(part)).ok()?))
             })
             .collect();
-        let about = HashMap::from([("tumble".to_string(), env!("CARGO_PKG_VERSION").to_string())]);
+        let about: HashMap<String, String> = about.iter().map(|(k, v)| ((*k).into(), (*v).into())).collect();
         serialize(views, Some(about)).unwrap_or_default()
     }
 
@@ -241,6 +241,11 @@ impl World {
         self.good = self.snapshot();
         Some(done)
     }
+}
+
+/// The texts that [`World::save`] was given.
+pub fn about(bytes: &[u8]) -> Option<HashMap<String, String>> {
+    SafeTensors::read_metadata(bytes).ok()?.1.metadata().clone()
 }
 
 #[cfg(not(feature = "double"))]

@@ -197,11 +197,11 @@ impl Scene {
         1.0 / self.time.fps
     }
 
-    /// Meshes that the scene names, by path, in order of appearance.
-    pub fn mesh_files(&self) -> Vec<&MeshFile> {
-        let nets = self.net.iter().map(|n| &n.mesh);
-        let shapes = self.collider.iter().filter_map(|c| match &c.shape {
-            Shape::Mesh(mesh) => Some(mesh),
+    /// Meshes that the scene names, with the place of each, in order of appearance.
+    pub fn mesh_files_mut(&mut self) -> Vec<(String, &mut MeshFile)> {
+        let nets = self.net.iter_mut().map(|n| (format!("net \"{}\".mesh", n.name), &mut n.mesh));
+        let shapes = self.collider.iter_mut().filter_map(|c| match &mut c.shape {
+            Shape::Mesh(mesh) => Some((format!("collider \"{}\".shape.mesh", c.name), mesh)),
             _ => None,
         });
         nets.chain(shapes).collect()

@@ -83,6 +83,9 @@ pub enum Shape {
 pub struct MeshFile {
     /// File, relative to the scene file.
     pub path: String,
+    /// Hash of the file's content; without it, any content will do.
+    #[serde(default)]
+    pub hash: Option<String>,
     /// Factor on the size.
     #[serde(default = "one")]
     #[schemars(extend("x-unit" = "1", "exclusiveMinimum" = 0.0))]

@@ -8,6 +8,7 @@ use serde::{Deserialize, Serialize};
 #[serde(deny_unknown_fields)]
 pub struct System {
     /// Objects name it with `system = "..."`.
+    #[serde(default = "main")]
     pub name: String,
     /// Which method.
     #[serde(default)]
@@ -35,6 +36,25 @@ pub struct System {
     /// Settings of the implicit integrators.
     #[serde(default)]
     pub solver: Solver,
+}
+
+impl Default for System {
+    fn default() -> Self {
+        Self {
+            name: main(),
+            method: Method::default(),
+            integrator: Integrator::default(),
+            substeps: None,
+            step: None,
+            adaptive: Adaptive::default(),
+            clamp: None,
+            solver: Solver::default(),
+        }
+    }
+}
+
+fn main() -> String {
+    "main".into()
 }
 
 /// A numerical method.

@@ -221,28 +221,9 @@ fn closest_on_triangle(p: Vector, [a, b, c]: [Vector; 3]) -> (Vector, Feature) {
 pub(crate) mod tests {
     use super::*;
 
-    /// A sphere of radius 1 as an octahedron divided `n` times.
+    /// A sphere of radius 1.
     pub fn sphere(n: u32) -> Mesh {
-        let mut mesh = Mesh {
-            vertices: vec![[1.0, 0.0, 0.0], [-1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, -1.0, 0.0], [0.0, 0.0, 1.0], [0.0, 0.0, -1.0]],
-            triangles: vec![[0, 2, 4], [2, 1, 4], [1, 3, 4], [3, 0, 4], [2, 0, 5], [1, 2, 5], [3, 1, 5], [0, 3, 5]],
-        };
-        for _ in 0..n {
-            let mut middle = std::collections::HashMap::new();
-            let mut finer = Vec::new();
-            for t in &mesh.triangles {
-                let m = [(t[0], t[1]), (t[1], t[2]), (t[2], t[0])].map(|(a, b)| {
-                    *middle.entry((a.min(b), a.max(b))).or_insert_with(|| {
-                        let m = (Vector::from(mesh.vertices[a as usize]) + Vector::from(mesh.vertices[b as usize])).normalized();
-                        mesh.vertices.push(m.into());
-                        mesh.vertices.len() as u32 - 1
-                    })
-                });
-                finer.extend([[t[0], m[0], m[2]], [m[0], t[1], m[1]], [m[2], m[1], t[2]], m]);
-            }
-            mesh.triangles = finer;
-        }
-        mesh
+        crate::geometry::surface::sphere(n, Vector::default(), 1.0)
     }
 
     /// Points evenly spread over the cube |x| < 1.5 (the R3 sequence).

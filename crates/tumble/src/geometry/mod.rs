@@ -4,6 +4,7 @@ pub mod bvh;
 pub mod contact;
 pub mod sdf;
 pub mod shape;
+pub mod surface;
 
 pub use bvh::Bvh;
 pub use contact::{Collider, Touch};

@@ -153,9 +153,10 @@ impl Parts {
         self.points[point as usize].0
     }
 
-    /// Adds mass [kg] to a point.
-    pub fn add_mass(&mut self, point: u32, mass: f64) {
-        self.points[point as usize].2 += mass;
+    /// Inverse mass of a point [1/kg], 0 if it is held.
+    pub fn inverse_mass(&self, point: u32) -> f64 {
+        let (_, _, mass, pinned) = self.points[point as usize];
+        if pinned { 0.0 } else { 1.0 / mass }
     }
 
     /// Adds a spring.
@@ -271,13 +272,19 @@ impl Parts {
             let mut object = draft.object;
             object.frames = object.frames.start + points..object.frames.end + points;
             for kind in 0..3 {
+                // An anchor is an object without masses: its spring is in the books, but in no frame.
+                if object.points.is_empty() {
+                    break;
+                }
                 let range = draft.links[kind]..next[kind];
                 if let (Some(Some(batch)), false) = (kinds[kind], range.is_empty()) {
                     object.link_ends.extend(range.clone().map(|i| ends(kind, i).map(|p| p - object.points.start as u32)));
                     object.links.push((batch, range));
                 }
             }
-            objects.push(object);
+            if !object.points.is_empty() {
+                objects.push(object);
+            }
         }
         let laws = super::laws::Laws {
             batches: batches.list,

@@ -55,8 +55,9 @@ impl Laws {
         }
         if !self.user.is_empty() {
             let flat = |rows: &[Row]| -> Vec<f64> { rows.iter().flat_map(|r| [f64::from(r[0]), f64::from(r[1]), f64::from(r[2])]).collect() };
-            let (x, v) = (flat(x), flat(v));
-            let mass: Vec<f64> = self.masses.mass.iter().map(|m| f64::from(*m)).collect();
+            let n = self.masses.points;
+            let (x, v) = (flat(&x[..n]), flat(&v[..n]));
+            let mass: Vec<f64> = self.masses.mass[..n].iter().map(|m| f64::from(*m)).collect();
             let mut force = vec![0.0; x.len()];
             for user in &mut self.user {
                 user.force(t, &x, &v, &mass, &mut force).map_err(StepError::User)?;

@@ -1,0 +1,80 @@
+//! What all readers share: fans, welding and the last check.
+
+use std::collections::HashMap;
+use tumble_interface::Mesh;
+
+/// Appends the fan of triangles around the first corner of a polygon: (0, 1, 2), (0, 2, 3), ...
+pub fn fan(triangles: &mut Vec<[u32; 3]>, polygon: &[u32]) {
+    if let [first, rest @ ..] = polygon {
+        triangles.extend(rest.windows(2).map(|pair| [*first, pair[0], pair[1]]));
+    }
+}
+
+/// Numbers positions so that equal ones get the same number. Equal means equal bits, but -0 equals 0.
+#[derive(Default)]
+pub struct Weld {
+    index: HashMap<[u64; 3], u32>,
+}
+
+impl Weld {
+    /// The number of `position`, which is `next` if it is new. Not-a-number equals itself here; [`finish`] rejects it.
+    pub fn number(&mut self, position: [f64; 3], next: usize) -> Result<u32, String> {
+        let key = position.map(|x| (x + 0.0).to_bits()); // -0 + 0 = 0
+        if let Some(i) = self.index.get(&key) {
+            return Ok(*i);
+        }
+        let i = u32::try_from(next).map_err(|_| too_many(next))?;
+        self.index.insert(key, i);
+        Ok(i)
+    }
+}
+
+/// Checks that the mesh is one, and drops vertices that no triangle uses.
+pub fn finish(mesh: Mesh) -> Result<Mesh, String> {
+    let Mesh { vertices, mut triangles } = mesh;
+    let n = vertices.len();
+    if triangles.is_empty() {
+        return Err(format!("no triangles in the file ({n} vertices); export a surface mesh, not points or curves"));
+    }
+    if u32::try_from(n).is_err() {
+        return Err(too_many(n));
+    }
+    if let Some(i) = vertices.iter().position(|v| v.iter().any(|x| !x.is_finite())) {
+        return Err(format!("vertex {i} (counted from 0) at {:?} is not finite; repair the mesh or export it again", vertices[i]));
+    }
+    let mut used = vec![false; n];
+    for (t, triangle) in triangles.iter().enumerate() {
+        for i in triangle {
+            match used.get_mut(*i as usize) {
+                Some(used) => *used = true,
+                None => return Err(format!("triangle {t} uses vertex {i}, but there are {n} (counted from 0); {DAMAGED}")),
+            }
+        }
+    }
+    if used.iter().all(|used| *used) {
+        return Ok(Mesh { vertices, triangles });
+    }
+    let mut kept = 0;
+    let mut new = vec![0; n];
+    for (new, used) in new.iter_mut().zip(&used) {
+        *new = kept;
+        kept += u32::from(*used);
+    }
+    for i in triangles.as_flattened_mut() {
+        *i = new[*i as usize];
+    }
+    let vertices = vertices.into_iter().zip(used).filter_map(|(v, used)| used.then_some(v)).collect();
+    Ok(Mesh { vertices, triangles })
+}
+
+/// Cure for a file whose parts contradict each other.
+pub const DAMAGED: &str = "the file is damaged, export it again";
+
+fn too_many(n: usize) -> String {
+    format!("{n} vertices are more than indices can tell apart ({}); decimate the mesh", u32::MAX)
+}
+
+/// The four bytes at `start`, if there are so many.
+pub fn word(bytes: &[u8], start: usize) -> Option<[u8; 4]> {
+    bytes.get(start..)?.first_chunk().copied()
+}

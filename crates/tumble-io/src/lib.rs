@@ -1,0 +1,92 @@
+//! Bytes of a mesh file in, a [`Mesh`] out. Nothing here opens a file, so the browser uses it too.
+//!
+//! What is common to all formats: coordinates are taken as they stand in the file (no axis is turned, no unit
+//! converted); a polygon becomes the fan of triangles around its first corner, which is right for convex ones; objects,
+//! groups and materials are merged; normals, colours and textures are dropped; vertices that no triangle uses are
+//! dropped, the others keep their order. Any bytes give a mesh or a one-line message that names the cure, never a panic;
+//! work and memory grow with the length of the file, not with the counts it declares (instances in a GLB have a limit).
+//! Verified by `tests/formats.rs` and `tests/fuzz.rs`.
+
+mod build;
+mod glb;
+mod obj;
+mod ply;
+mod stl;
+
+use tumble_interface::Mesh;
+
+/// A mesh file format.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub enum Format {
+    /// Wavefront OBJ. Vertices are the `v` lines: seams of normals or texture coordinates split nothing.
+    Obj,
+    /// Stanford PLY: ASCII, binary little-endian or binary big-endian.
+    Ply,
+    /// STL, ASCII or binary. The format repeats each vertex in each triangle: equal positions are welded.
+    Stl,
+    /// Binary glTF 2.0 with its buffer inside, node transforms applied. **glTF is y-up**; the coordinates are left so.
+    /// The format splits vertices at seams of normals and texture coordinates: within one mesh of one node, equal
+    /// positions are welded. Skins, morph targets and animations are ignored.
+    Glb,
+}
+
+impl Format {
+    /// The formats that can be read.
+    pub const ALL: [Self; 4] = [Self::Obj, Self::Ply, Self::Stl, Self::Glb];
+
+    /// The format that the file extension of `path` stands for, upper or lower case.
+    pub fn from_path(path: &str) -> Option<Self> {
+        let (_, extension) = path.rsplit_once('.')?;
+        Self::ALL.into_iter().find(|f| f.name().eq_ignore_ascii_case(extension))
+    }
+
+    /// Its name: the file extension, in capitals.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Obj => "OBJ",
+            Self::Ply => "PLY",
+            Self::Stl => "STL",
+            Self::Glb => "GLB",
+        }
+    }
+}
+
+/// Reads the triangles of a file.
+///
+/// The mesh has at least one triangle, every index is in range and every coordinate is finite. Whether it is closed
+/// is for [`Mesh::defects`] to say.
+///
+/// # Errors
+/// One line: what is wrong with the file, where, and what to do.
+pub fn mesh(bytes: &[u8], format: Format) -> Result<Mesh, String> {
+    let read = match format {
+        _ if bytes.is_empty() => Err("the file is empty; export the mesh again".to_owned()),
+        Format::Obj => obj::read(bytes),
+        Format::Ply => ply::read(bytes),
+        Format::Stl => stl::read(bytes),
+        Format::Glb => glb::read(bytes),
+    };
+    read.and_then(build::finish).map_err(|message| format!("{}: {}", format.name(), one_line(&message)))
+}
+
+/// Longest message [characters]; the file may be quoted in it, and a line of a file may be of any length.
+const LONGEST_MESSAGE: usize = 300;
+
+/// Without line breaks, control characters and excess.
+fn one_line(message: &str) -> String {
+    let mut words = message.split(|c: char| c.is_whitespace() || c.is_control()).filter(|word| !word.is_empty());
+    let mut line = String::new();
+    while line.len() < 4 * LONGEST_MESSAGE
+        && let Some(word) = words.next()
+    {
+        if !line.is_empty() {
+            line.push(' ');
+        }
+        line.extend(word.chars().take(LONGEST_MESSAGE));
+    }
+    if let Some((cut, _)) = line.char_indices().nth(LONGEST_MESSAGE) {
+        line.truncate(cut);
+        line.push_str(" ...");
+    }
+    line
+}

@@ -1,0 +1,161 @@
+//! Stanford PLY, by the crate `ply-rs-bw`. What it would believe unseen is checked first: the declared counts.
+
+use crate::build::{DAMAGED, fan};
+use ply_rs_bw::parser::{ParseError, Parser, Reader};
+use ply_rs_bw::ply::{ElementDef, Encoding, Property, PropertyAccess, PropertyAccessResult, PropertyType, ScalarType};
+use tumble_interface::Mesh;
+
+pub fn read(bytes: &[u8]) -> Result<Mesh, String> {
+    if !bytes.starts_with(b"ply") {
+        return Err("the file does not begin with \"ply\"; check the file extension".to_owned());
+    }
+    let end = header_length(bytes).ok_or("the header has no end (a line \"end_header\"); the file is cut off, export it again")?;
+    let (header, payload) = bytes.split_at(end);
+    // The parser wants UTF-8; comments may be in any encoding.
+    let header: Vec<u8> = header.iter().map(|b| if b.is_ascii() { *b } else { b'?' }).collect();
+    let mut reader = Reader::new(std::io::Read::chain(&header[..], payload));
+    let header = Parser::<Skipped>::new().read_header(&mut reader).map_err(|e| format!("header: {e}"))?;
+
+    let least: u128 = header.elements.values().map(|e| e.count as u128 * least_bytes(e, header.encoding) as u128).sum();
+    // The last line of an ASCII file may lack its line break.
+    if least > payload.len() as u128 + 1 {
+        let counts: Vec<_> = header.elements.values().map(|e| format!("{} {}", e.count, e.name)).collect();
+        return Err(format!(
+            "the header declares {} elements, at least {least} bytes, but {} follow; the file is cut off or damaged, export it again",
+            counts.join(" + "),
+            payload.len()
+        ));
+    }
+
+    let mut mesh = Mesh::default();
+    let mut polygons = Vec::new();
+    let cut = |e: ParseError| {
+        let text = e.to_string();
+        // The parser counts rows of a binary file as lines.
+        let text = match header.encoding {
+            Encoding::Ascii => &text,
+            _ => text.split_once(": ").map_or(text.as_str(), |(_, text)| text),
+        };
+        format!("{text}; {DAMAGED}")
+    };
+    for element in header.elements.values() {
+        match element.name.as_str() {
+            "vertex" => {
+                if let Some(axis) = ["x", "y", "z"].iter().find(|axis| !element.properties.contains_key(**axis)) {
+                    return Err(format!("the vertices have no property \"{axis}\"; export x, y and z"));
+                }
+                let vertices = Parser::<Vertex>::new().read_payload_for_element(&mut reader, element, &header).map_err(cut)?;
+                mesh.vertices = vertices.into_iter().map(|v| v.position).collect();
+            }
+            "face" => {
+                polygons = Parser::<Polygon>::new().read_payload_for_element(&mut reader, element, &header).map_err(cut)?;
+            }
+            _ => {
+                Parser::<Skipped>::new().read_payload_for_element(&mut reader, element, &header).map_err(cut)?;
+            }
+        }
+    }
+    for (f, polygon) in polygons.iter().enumerate() {
+        match &polygon.corners {
+            None => return Err(format!("face {f} has no list \"vertex_indices\" of numbers 0, 1, 2, ...; {DAMAGED}")),
+            Some(corners) if corners.len() < 3 => {
+                return Err(format!("face {f} has {} vertices, it needs 3; {DAMAGED}", corners.len()));
+            }
+            Some(corners) => fan(&mut mesh.triangles, corners),
+        }
+    }
+    if mesh.triangles.is_empty() && header.elements.contains_key("tristrips") {
+        return Err("the file has triangle strips, which are not read; export it with faces".to_owned());
+    }
+    Ok(mesh)
+}
+
+/// Bytes up to and with the line `end_header`.
+fn header_length(bytes: &[u8]) -> Option<usize> {
+    let end = b"\nend_header";
+    let line = 1 + bytes.windows(end.len()).position(|window| window == end)?;
+    let length = bytes[line..].iter().position(|b| *b == b'\n')?;
+    Some(line + length + 1)
+}
+
+/// Fewest bytes one row of an element can take; at least one, so that a count is bounded by the length of the file.
+fn least_bytes(element: &ElementDef, encoding: Encoding) -> usize {
+    let binary = element.properties.values().map(|p| match &p.data_type {
+        PropertyType::Scalar(scalar) | PropertyType::List(scalar, _) => size(scalar),
+    });
+    match encoding {
+        Encoding::Ascii => 2 * element.properties.len(), // a digit and what parts it from the next
+        Encoding::BinaryBigEndian | Encoding::BinaryLittleEndian => binary.sum(),
+    }
+    .max(1)
+}
+
+fn size(scalar: &ScalarType) -> usize {
+    match scalar {
+        ScalarType::Char | ScalarType::UChar => 1,
+        ScalarType::Short | ScalarType::UShort => 2,
+        ScalarType::Int | ScalarType::UInt | ScalarType::Float => 4,
+        ScalarType::Double => 8,
+    }
+}
+
+/// A row of `vertex`.
+struct Vertex {
+    position: [f64; 3],
+}
+
+impl PropertyAccess for Vertex {
+    fn new() -> Self {
+        Self { position: [f64::NAN; 3] }
+    }
+
+    fn set_property(&mut self, name: &str, value: Property) -> PropertyAccessResult {
+        let axis = match name {
+            "x" => 0,
+            "y" => 1,
+            "z" => 2,
+            _ => return PropertyAccessResult::Ignored,
+        };
+        self.position[axis] = match value {
+            Property::Char(x) => x.into(),
+            Property::UChar(x) => x.into(),
+            Property::Short(x) => x.into(),
+            Property::UShort(x) => x.into(),
+            Property::Int(x) => x.into(),
+            Property::UInt(x) => x.into(),
+            Property::Float(x) => x.into(),
+            Property::Double(x) => x,
+            _ => return PropertyAccessResult::UnsupportedType,
+        };
+        PropertyAccessResult::Set
+    }
+}
+
+/// A row of `face`.
+struct Polygon {
+    /// `None` if there is no such property, if it is no list of integers or if one is negative.
+    corners: Option<Vec<u32>>,
+}
+
+impl PropertyAccess for Polygon {
+    fn new() -> Self {
+        Self { corners: None }
+    }
+
+    fn set_property(&mut self, name: &str, value: Property) -> PropertyAccessResult {
+        if !matches!(name, "vertex_indices" | "vertex_index") {
+            return PropertyAccessResult::Ignored;
+        }
+        self.corners = value.to_u32_list();
+        PropertyAccessResult::Set
+    }
+}
+
+/// A row of any other element.
+struct Skipped;
+
+impl PropertyAccess for Skipped {
+    fn new() -> Self {
+        Self
+    }
+}

@@ -1,0 +1,143 @@
+//! Small files of every format, written by hand.
+#![allow(dead_code)] // each test binary uses some
+
+use tumble_interface::Mesh;
+
+/// A tetrahedron with outward faces and three different edge lengths.
+pub fn tetrahedron() -> Mesh {
+    Mesh {
+        vertices: vec![[0.0; 3], [1.0, 0.0, 0.0], [0.0, 2.0, 0.0], [0.0, 0.0, 3.0]],
+        triangles: vec![[0, 2, 1], [0, 1, 3], [1, 2, 3], [0, 3, 2]],
+    }
+}
+
+/// Corners of the unit cube and its six faces, outward.
+pub const CUBE: [[f64; 3]; 8] = [
+    [0.0, 0.0, 0.0],
+    [1.0, 0.0, 0.0],
+    [1.0, 1.0, 0.0],
+    [0.0, 1.0, 0.0],
+    [0.0, 0.0, 1.0],
+    [1.0, 0.0, 1.0],
+    [1.0, 1.0, 1.0],
+    [0.0, 1.0, 1.0],
+];
+pub const CUBE_FACES: [[u32; 4]; 6] = [[0, 3, 2, 1], [4, 5, 6, 7], [0, 1, 5, 4], [1, 2, 6, 5], [2, 3, 7, 6], [3, 0, 4, 7]];
+
+/// The cube as fans: (a, b, c), (a, c, d) of each face.
+pub fn cube() -> Mesh {
+    let triangles = CUBE_FACES.iter().flat_map(|[a, b, c, d]| [[*a, *b, *c], [*a, *c, *d]]).collect();
+    Mesh { vertices: CUBE.to_vec(), triangles }
+}
+
+pub fn volume(mesh: &Mesh) -> f64 {
+    let six = |[a, b, c]: [[f64; 3]; 3]| {
+        a[0] * (b[1] * c[2] - b[2] * c[1]) - a[1] * (b[0] * c[2] - b[2] * c[0]) + a[2] * (b[0] * c[1] - b[1] * c[0])
+    };
+    mesh.triangles.iter().map(|t| six(t.map(|i| mesh.vertices[i as usize]))).sum::<f64>() / 6.0
+}
+
+/// The cube with quads, as OBJ.
+pub fn obj() -> Vec<u8> {
+    let mut text = "# a cube\no cube\n".to_owned();
+    for [x, y, z] in CUBE {
+        text += &format!("v {x} {y} {z}\n");
+    }
+    for [a, b, c, d] in CUBE_FACES {
+        text += &format!("f {} {} {} {}\n", a + 1, b + 1, c + 1, d + 1);
+    }
+    text.into_bytes()
+}
+
+/// The cube with quads, as PLY; `format` as in the header.
+pub fn ply(format: &str) -> Vec<u8> {
+    let mut bytes = format!(
+        "ply\nformat {format} 1.0\ncomment a cube\nelement vertex 8\nproperty float x\nproperty float y\nproperty float z\n\
+         property uchar red\nelement face 6\nproperty list uchar int vertex_indices\nend_header\n"
+    )
+    .into_bytes();
+    match format {
+        "ascii" => {
+            let rows = CUBE.map(|[x, y, z]| format!("{x} {y} {z} 255\n"));
+            let faces = CUBE_FACES.map(|[a, b, c, d]| format!("4 {a} {b} {c} {d}\n"));
+            bytes.extend(rows.concat().bytes().chain(faces.concat().bytes()));
+        }
+        _ => {
+            let swap = |mut word: [u8; 4]| {
+                if format == "binary_big_endian" {
+                    word.reverse();
+                }
+                word
+            };
+            for x in CUBE {
+                bytes.extend(x.iter().flat_map(|x| swap((*x as f32).to_le_bytes())));
+                bytes.push(255);
+            }
+            for face in CUBE_FACES {
+                bytes.push(4);
+                bytes.extend(face.iter().flat_map(|i| swap(i.to_le_bytes())));
+            }
+        }
+    }
+    bytes
+}
+
+/// Any mesh as ASCII STL.
+pub fn stl_ascii(mesh: &Mesh) -> Vec<u8> {
+    let mut text = "solid thing\n".to_owned();
+    for t in &mesh.triangles {
+        text += "  facet normal 0 0 0\n    outer loop\n";
+        for [x, y, z] in t.map(|i| mesh.vertices[i as usize]) {
+            text += &format!("      vertex {x} {y} {z}\n");
+        }
+        text += "    endloop\n  endfacet\n";
+    }
+    (text + "endsolid thing\n").into_bytes()
+}
+
+/// Any mesh as binary STL, after a comment of 80 bytes.
+pub fn stl_binary(mesh: &Mesh, comment: &[u8]) -> Vec<u8> {
+    let mut bytes = comment.to_vec();
+    bytes.resize(80, b' ');
+    bytes.extend((mesh.triangles.len() as u32).to_le_bytes());
+    for t in &mesh.triangles {
+        bytes.extend([0; 12]);
+        bytes.extend(t.iter().flat_map(|i| mesh.vertices[*i as usize]).flat_map(|x| (x as f32).to_le_bytes()));
+        bytes.extend([0; 2]);
+    }
+    bytes
+}
+
+/// A GLB of JSON text and buffer.
+pub fn glb(json: &str, buffer: &[u8]) -> Vec<u8> {
+    let chunk = |name: &[u8], data: &[u8], fill: u8| {
+        let mut data = data.to_vec();
+        data.resize(data.len().next_multiple_of(4), fill);
+        [&(data.len() as u32).to_le_bytes(), name, &data].concat()
+    };
+    let chunks = [chunk(b"JSON", json.as_bytes(), b' '), chunk(b"BIN\0", buffer, 0)].concat();
+    [&b"glTF"[..], &2_u32.to_le_bytes(), &(12 + chunks.len() as u32).to_le_bytes(), &chunks].concat()
+}
+
+/// The tetrahedron: positions at byte 0, indices (u16) at byte 48.
+pub fn glb_buffer() -> Vec<u8> {
+    let mesh = tetrahedron();
+    let positions = mesh.vertices.iter().flatten().flat_map(|x| (*x as f32).to_le_bytes());
+    positions.chain(mesh.triangles.iter().flatten().flat_map(|i| (*i as u16).to_le_bytes())).collect()
+}
+
+/// JSON of the tetrahedron, shown by these nodes; `scene` lists the top ones.
+pub fn glb_json(nodes: &str, scene: &str) -> String {
+    format!(
+        r#"{{"asset": {{"version": "2.0"}}, "scene": 0, "scenes": [{{"nodes": [{scene}]}}], "nodes": [{nodes}],
+        "meshes": [{{"primitives": [{{"attributes": {{"POSITION": 0}}, "indices": 1}}]}}],
+        "accessors": [{{"bufferView": 0, "componentType": 5126, "count": 4, "type": "VEC3"}},
+                      {{"bufferView": 1, "componentType": 5123, "count": 12, "type": "SCALAR"}}],
+        "bufferViews": [{{"buffer": 0, "byteLength": 48}}, {{"buffer": 0, "byteOffset": 48, "byteLength": 24}}],
+        "buffers": [{{"byteLength": 72}}]}}"#
+    )
+}
+
+pub fn glb_tetrahedron(nodes: &str, scene: &str) -> Vec<u8> {
+    glb(&glb_json(nodes, scene), &glb_buffer())
+}

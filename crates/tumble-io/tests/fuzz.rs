@@ -1,0 +1,163 @@
+//! No bytes make a reader panic, hang or return a mesh that is none.
+
+mod files;
+
+use files::*;
+use proptest::prelude::*;
+use proptest::sample::Index;
+use tumble_io::{Format, mesh};
+
+/// A file of every kind, with the formats that may read it.
+fn valid() -> Vec<(Vec<u8>, Format)> {
+    vec![
+        (obj(), Format::Obj),
+        (ply("ascii"), Format::Ply),
+        (ply("binary_little_endian"), Format::Ply),
+        (ply("binary_big_endian"), Format::Ply),
+        (stl_ascii(&tetrahedron()), Format::Stl),
+        (stl_binary(&tetrahedron(), b"solid"), Format::Stl),
+        (glb_tetrahedron(r#"{"children": [1]}, {"mesh": 0, "translation": [1, 2, 3]}"#, "0"), Format::Glb),
+    ]
+}
+
+/// Reads; whatever comes out keeps the promises of [`mesh`].
+fn read(bytes: &[u8], format: Format) {
+    match mesh(bytes, format) {
+        Ok(mesh) => {
+            assert!(!mesh.triangles.is_empty());
+            assert!(mesh.vertices.iter().flatten().all(|x| x.is_finite()));
+            assert!(mesh.triangles.iter().flatten().all(|i| (*i as usize) < mesh.vertices.len()));
+            mesh.defects();
+        }
+        Err(message) => assert!(!message.is_empty() && !message.contains('\n') && message.chars().count() < 320, "{message}"),
+    }
+}
+
+/// One change of a file.
+#[derive(Debug, Clone)]
+enum Change {
+    Byte(Index, u8),
+    Word(Index, u32),
+    Remove(Index, usize),
+    Repeat(Index, usize),
+    Insert(Index, &'static str),
+}
+
+/// What tends to be believed: signs, ends of number ranges, key words.
+const TOKENS: [&str; 16] =
+    ["-", "0", "99999999999999999999", "1e999", "nan", "\n", "\r", " ", "/", "\\\n", "\"", "[", "}", "null", "list", "\u{e9}"];
+
+fn change() -> impl Strategy<Value = Change> {
+    let index = any::<Index>;
+    prop_oneof![
+        (index(), any::<u8>()).prop_map(|(at, byte)| Change::Byte(at, byte)),
+        (index(), prop_oneof![Just(0), Just(1), Just(u32::MAX), Just(i32::MAX as u32), Just(1 << 31), any::<u32>()])
+            .prop_map(|(at, word)| Change::Word(at, word)),
+        (index(), 1..40_usize).prop_map(|(at, n)| Change::Remove(at, n)),
+        (index(), 1..40_usize).prop_map(|(at, n)| Change::Repeat(at, n)),
+        (index(), prop::sample::select(&TOKENS[..])).prop_map(|(at, token)| Change::Insert(at, token)),
+    ]
+}
+
+fn apply(bytes: &mut Vec<u8>, change: &Change) {
+    if bytes.is_empty() {
+        return;
+    }
+    let n = bytes.len();
+    match change {
+        Change::Byte(at, byte) => bytes[at.index(n)] = *byte,
+        Change::Word(at, word) => {
+            let at = at.index(n);
+            let end = (at + 4).min(n);
+            bytes[at..end].copy_from_slice(&word.to_le_bytes()[..end - at]);
+        }
+        Change::Remove(at, length) => {
+            let at = at.index(n);
+            bytes.drain(at..(at + length).min(n));
+        }
+        Change::Repeat(at, length) => {
+            let at = at.index(n);
+            let again = bytes[at..(at + length).min(n)].to_vec();
+            bytes.splice(at..at, again);
+        }
+        Change::Insert(at, token) => {
+            let at = at.index(n);
+            bytes.splice(at..at, token.bytes());
+        }
+    }
+}
+
+#[test]
+fn every_truncation_is_survived() {
+    for (bytes, format) in valid() {
+        assert!(mesh(&bytes, format).is_ok(), "{format:?}");
+        for end in 0..bytes.len() {
+            read(&bytes[..end], format);
+        }
+    }
+}
+
+#[test]
+fn every_single_byte_at_either_end_of_its_range_is_survived() {
+    for (bytes, format) in valid() {
+        for at in 0..bytes.len() {
+            for byte in [0, 0x7f, 0x80, 0xff, b'-', b'9', bytes[at] ^ 1] {
+                let mut changed = bytes.clone();
+                changed[at] = byte;
+                read(&changed, format);
+            }
+        }
+    }
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig { cases: 4000, failure_persistence: None, ..ProptestConfig::default() })]
+
+    #[test]
+    fn random_bytes_are_survived(bytes in prop::collection::vec(any::<u8>(), 0..600)) {
+        for format in Format::ALL {
+            read(&bytes, format);
+        }
+    }
+
+    /// Past the first check, so that what follows sees the noise.
+    #[test]
+    fn random_bytes_after_a_true_beginning_are_survived(which in 0..7_usize, cut in any::<Index>(), noise in prop::collection::vec(any::<u8>(), 0..300)) {
+        let (mut bytes, format) = valid().swap_remove(which);
+        bytes.truncate(cut.index(bytes.len()));
+        bytes.extend(noise);
+        read(&bytes, format);
+    }
+
+    #[test]
+    fn changed_files_are_survived(which in 0..7_usize, changes in prop::collection::vec(change(), 1..8)) {
+        let (mut bytes, format) = valid().swap_remove(which);
+        for change in &changes {
+            apply(&mut bytes, change);
+        }
+        read(&bytes, format);
+    }
+
+    /// The JSON of a GLB, with the chunk lengths made right again, so that it is reached.
+    #[test]
+    fn changed_json_is_survived(changes in prop::collection::vec(change(), 1..6)) {
+        let mut json = glb_json(r#"{"children": [1]}, {"mesh": 0, "scale": [1, 2, 3]}"#, "0").into_bytes();
+        for change in &changes {
+            apply(&mut json, change);
+        }
+        read(&glb(&String::from_utf8_lossy(&json), &glb_buffer()), Format::Glb);
+    }
+
+    /// Any number in the JSON replaced: still well-formed, so counts, offsets and indices are believed as far as they can be.
+    #[test]
+    fn changed_numbers_are_survived(which in any::<Index>(), number in prop_oneof![0..100_u64, Just(u64::MAX), Just(u64::from(u32::MAX)), any::<u64>()]) {
+        let json = glb_json(r#"{"children": [1]}, {"mesh": 0}"#, "0");
+        let digits: Vec<usize> = (1..json.len()).filter(|i| {
+            let b = json.as_bytes();
+            b[*i].is_ascii_digit() && matches!(b[i - 1], b' ' | b'[')
+        }).collect();
+        let at = digits[which.index(digits.len())];
+        let end = at + json[at..].bytes().take_while(u8::is_ascii_digit).count();
+        read(&glb(&format!("{}{number}{}", &json[..at], &json[end..]), &glb_buffer()), Format::Glb);
+    }
+}

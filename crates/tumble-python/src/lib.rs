@@ -1,0 +1,31 @@
+//! The binding: Scene, World, Frame -> NumPy, and the error tree. No physics.
+
+mod arrays;
+mod errors;
+mod scene;
+mod user;
+mod world;
+
+use pyo3::prelude::*;
+
+#[pymodule]
+mod _engine {
+    use super::{PyResult, errors};
+    use pyo3::prelude::{Bound, PyModule, PyModuleMethods};
+
+    #[pymodule_export]
+    use super::scene::{Scene, load_mesh};
+    #[pymodule_export]
+    use super::world::World;
+
+    #[pymodule_init]
+    fn init(module: &Bound<'_, PyModule>) -> PyResult<()> {
+        module.add("version", env!("CARGO_PKG_VERSION"))?;
+        errors::add(module)
+    }
+}
+
+/// The clock of nobody: lets the interpreter look for Ctrl-C.
+fn interrupted() -> Option<PyErr> {
+    Python::attach(|py| py.check_signals().err())
+}

@@ -1,0 +1,144 @@
+//! Scene: words in, checked; mesh files read.
+
+use crate::errors::{self, scene_error};
+use numpy::{PyArray1, PyArray2, PyArrayMethods};
+use pyo3::prelude::*;
+use std::collections::HashMap;
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+use tumble_interface::tree::Node;
+use tumble_interface::{Issue, Mesh, SceneError};
+use tumble_io::Format;
+use twox_hash::XxHash3_64;
+
+/// A checked scene: what is there, how it moves, what is written out.
+#[pyclass(frozen, skip_from_py_object, module = "tumble")]
+#[derive(Clone)]
+pub struct Scene {
+    pub scene: tumble_interface::Scene,
+    pub assets: Arc<HashMap<String, Mesh>>,
+    pub folder: PathBuf,
+    /// The tree as it was given, for overrides and for the lines of issues.
+    node: Node,
+}
+
+impl Scene {
+    fn from_node(py: Python<'_>, node: Node, folder: PathBuf) -> PyResult<Self> {
+        let result = py.detach(|| -> Result<Self, SceneError> {
+            let mut scene = tumble_interface::Scene::from_tree(&node)?;
+            let assets = load_assets(&mut scene, &folder)?;
+            Ok(Self { scene, assets: Arc::new(assets), folder, node: node.clone() })
+        });
+        result.map_err(|e| scene_error(py, &with_lines(e, &node)))
+    }
+
+    /// The error with the lines of its places.
+    pub fn error(&self, py: Python<'_>, error: SceneError) -> PyErr {
+        scene_error(py, &with_lines(error, &self.node))
+    }
+}
+
+fn with_lines(mut error: SceneError, node: &Node) -> SceneError {
+    for issue in &mut error.issues {
+        issue.line = issue.line.or_else(|| node.line_of(&issue.path));
+    }
+    error
+}
+
+#[pymethods]
+impl Scene {
+    #[new]
+    #[pyo3(signature = (tree, folder=None))]
+    fn new(py: Python<'_>, tree: &Bound<'_, PyAny>, folder: Option<PathBuf>) -> PyResult<Self> {
+        let json: serde_json::Value = pythonize::depythonize(tree).map_err(|e| {
+            let message = format!("the scene is no tree of dicts, lists, strings, numbers and booleans: {e}");
+            scene_error(py, &SceneError::one("", message))
+        })?;
+        Self::from_node(py, Node::from_value(&json), folder.unwrap_or_default())
+    }
+
+    #[staticmethod]
+    #[pyo3(signature = (path, set=Vec::new()))]
+    fn load(py: Python<'_>, path: PathBuf, set: Vec<String>) -> PyResult<Self> {
+        let text = std::fs::read_to_string(&path).map_err(|e| scene_error(py, &SceneError::one("", errors::file_error(&path, &e))))?;
+        let is_json = path.extension().is_some_and(|e| e.eq_ignore_ascii_case("json"));
+        let node = if is_json { Node::from_json(&text) } else { Node::from_toml(&text) };
+        let mut node = node.map_err(|e| scene_error(py, &e))?;
+        for assignment in set {
+            node.set_text(&assignment).map_err(|e| scene_error(py, &e))?;
+        }
+        Self::from_node(py, node, path.parent().map(Path::to_path_buf).unwrap_or_default())
+    }
+
+    #[pyo3(signature = (*overrides))]
+    fn replace(&self, py: Python<'_>, overrides: Vec<String>) -> PyResult<Self> {
+        let mut node = self.node.clone();
+        for assignment in overrides {
+            node.set_text(&assignment).map_err(|e| scene_error(py, &e))?;
+        }
+        Self::from_node(py, node, self.folder.clone())
+    }
+
+    fn to_dict<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
+        Ok(pythonize::pythonize(py, &self.scene.to_json())?)
+    }
+
+    #[getter]
+    fn folder(&self) -> String {
+        self.folder.display().to_string()
+    }
+
+    #[staticmethod]
+    fn schema(py: Python<'_>) -> PyResult<Bound<'_, PyAny>> {
+        Ok(pythonize::pythonize(py, &tumble_interface::Scene::schema())?)
+    }
+
+    fn __repr__(&self) -> String {
+        format!("Scene(title={:?})", self.scene.title)
+    }
+}
+
+/// Reads every mesh file that the scene names, once, and notes the hash of its content.
+fn load_assets(scene: &mut tumble_interface::Scene, folder: &Path) -> Result<HashMap<String, Mesh>, SceneError> {
+    let (mut assets, mut hashes, mut issues) = (HashMap::new(), HashMap::new(), Vec::new());
+    for (place, file) in scene.mesh_files_mut() {
+        if !assets.contains_key(&file.path) {
+            match read_mesh(&folder.join(&file.path)) {
+                Ok((mesh, hash)) => {
+                    assets.insert(file.path.clone(), mesh);
+                    hashes.insert(file.path.clone(), hash);
+                }
+                Err(message) => {
+                    issues.push(Issue::new(format!("{place}.path"), message));
+                    continue;
+                }
+            }
+        }
+        let found = hashes.get(&file.path).cloned();
+        if file.hash.is_some() && file.hash != found {
+            let message = format!("the content of \"{}\" has changed since this scene was resolved; restore the file, or leave out hash", file.path);
+            issues.push(Issue::new(format!("{place}.hash"), message));
+        }
+        file.hash = found;
+    }
+    if issues.is_empty() { Ok(assets) } else { Err(SceneError { issues }) }
+}
+
+fn read_mesh(path: &Path) -> Result<(Mesh, String), String> {
+    let Some(format) = Format::from_path(&path.to_string_lossy()) else {
+        return Err(format!("\"{}\" has none of the suffixes .obj, .ply, .stl, .glb", path.display()));
+    };
+    let bytes = std::fs::read(path).map_err(|e| errors::file_error(path, &e))?;
+    let mesh = tumble_io::mesh(&bytes, format).map_err(|e| format!("\"{}\": {e}", path.display()))?;
+    Ok((mesh, format!("{:016x}", XxHash3_64::oneshot(&bytes))))
+}
+
+/// Vertices n x 3 and triangles m x 3 of a mesh file.
+#[pyfunction]
+#[allow(clippy::type_complexity)]
+pub fn load_mesh(py: Python<'_>, path: PathBuf) -> PyResult<(Bound<'_, PyArray2<f64>>, Bound<'_, PyArray2<u32>>)> {
+    let (mesh, _) = read_mesh(&path).map_err(|e| scene_error(py, &SceneError::one("", e)))?;
+    let (n, m) = (mesh.vertices.len(), mesh.triangles.len());
+    let vertices = PyArray1::from_vec(py, mesh.vertices.concat()).reshape([n, 3])?;
+    Ok((vertices, PyArray1::from_vec(py, mesh.triangles.concat()).reshape([m, 3])?))
+}

@@ -1,0 +1,98 @@
+//! Forces and integrators written in Python. They get and give arrays of shape n x 3.
+
+use numpy::{PyArray1, PyArray2, PyArrayMethods, PyUntypedArrayMethods};
+use pyo3::prelude::*;
+use tumble_interface::engine::{Acceleration, UserForce, UserIntegrator};
+
+/// force(t, x, v, mass) -> n x 3.
+pub struct Force(pub Py<PyAny>);
+
+/// step(t, h, x, v, acceleration) -> (x, v).
+pub struct Integrator(pub Py<PyAny>);
+
+fn array<'py>(py: Python<'py>, flat: &[f64]) -> PyResult<Bound<'py, PyArray2<f64>>> {
+    PyArray1::from_slice(py, flat).reshape([flat.len() / 3, 3])
+}
+
+/// The numbers of anything like an n x 3 array.
+fn numbers(value: &Bound<'_, PyAny>, n: usize, what: &str) -> PyResult<Vec<f64>> {
+    let py = value.py();
+    let array = py.import("numpy")?.call_method1("ascontiguousarray", (value, "float64"))?;
+    let array = array.cast_into::<numpy::PyArrayDyn<f64>>()?;
+    if array.shape() != [n, 3] {
+        return Err(pyo3::exceptions::PyValueError::new_err(format!("{what} has shape {:?}, expected ({n}, 3)", array.shape())));
+    }
+    Ok(array.to_vec()?)
+}
+
+fn message(py: Python<'_>, who: &str, error: &PyErr) -> String {
+    let name = error.get_type(py).name().map_or_else(|_| "error".into(), |n| n.to_string());
+    format!("the {who} failed: {name}: {}", error.value(py))
+}
+
+impl UserForce for Force {
+    fn force(&mut self, t: f64, x: &[f64], v: &[f64], mass: &[f64], force: &mut [f64]) -> Result<(), String> {
+        Python::attach(|py| {
+            let call = || -> PyResult<Vec<f64>> {
+                let result = self.0.bind(py).call1((t, array(py, x)?, array(py, v)?, PyArray1::from_slice(py, mass)))?;
+                numbers(&result, mass.len(), "the force")
+            };
+            let values = call().map_err(|e| message(py, "user's force", &e))?;
+            force.iter_mut().zip(values).for_each(|(f, v)| *f += v);
+            Ok(())
+        })
+    }
+}
+
+/// The acceleration as a Python callable, valid only within the step that it was made for.
+#[pyclass]
+struct Rate {
+    /// Asks with (t, x, v); the engine answers on the other side.
+    ask: std::sync::Mutex<Option<Borrowed>>,
+}
+
+/// A borrowed acceleration. It never outlives the step: `Integrator::step` takes it back before it returns.
+struct Borrowed(*mut Acceleration<'static>);
+
+// SAFETY: the closure behind the pointer is Send, and the mutex around it gives one thread at a time access.
+unsafe impl Send for Borrowed {}
+
+#[pymethods]
+impl Rate {
+    fn __call__<'py>(&self, py: Python<'py>, t: f64, x: &Bound<'py, PyAny>, v: &Bound<'py, PyAny>) -> PyResult<Bound<'py, PyArray2<f64>>> {
+        use pyo3::exceptions::{PyRuntimeError, PyValueError};
+        let n = x.len()?;
+        let (x, v) = (numbers(x, n, "x")?, numbers(v, n, "v")?);
+        let mut guard = self.ask.lock().map_err(|_| PyRuntimeError::new_err("acceleration was called while it failed"))?;
+        let Some(borrowed) = guard.as_mut() else {
+            return Err(PyRuntimeError::new_err("acceleration can be called only within the step it was given to"));
+        };
+        // SAFETY: the pointer is taken back before the closure ends, and the lock is held while it is used.
+        let acceleration = unsafe { &mut *borrowed.0 };
+        let a = acceleration(t, &x, &v).map_err(PyValueError::new_err)?;
+        array(py, &a)
+    }
+}
+
+impl UserIntegrator for Integrator {
+    fn step(&mut self, t: f64, h: f64, x: &mut [f64], v: &mut [f64], acceleration: &mut Acceleration<'_>) -> Result<(), String> {
+        Python::attach(|py| {
+            let mut call = || -> PyResult<(Vec<f64>, Vec<f64>)> {
+                let pointer: *mut Acceleration<'_> = acceleration;
+                // SAFETY: only the lifetime is changed; the pointer is taken back below, before the borrow ends.
+                let pointer: *mut Acceleration<'static> = unsafe { std::mem::transmute(pointer) };
+                let rate = Bound::new(py, Rate { ask: std::sync::Mutex::new(Some(Borrowed(pointer))) })?;
+                let result = self.0.bind(py).call1((t, h, array(py, x)?, array(py, v)?, &rate));
+                if let Ok(mut ask) = rate.borrow().ask.lock() {
+                    *ask = None;
+                }
+                let (x1, v1): (Bound<'_, PyAny>, Bound<'_, PyAny>) = result?.extract()?;
+                Ok((numbers(&x1, x.len() / 3, "x")?, numbers(&v1, v.len() / 3, "v")?))
+            };
+            let (x1, v1) = call().map_err(|e| message(py, "user's integrator", &e))?;
+            x.copy_from_slice(&x1);
+            v.copy_from_slice(&v1);
+            Ok(())
+        })
+    }
+}

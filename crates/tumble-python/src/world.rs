@@ -1,0 +1,261 @@
+//! World: a scene in motion.
+
+use crate::arrays;
+use crate::errors::{ExportError, scene_error, step_error};
+use crate::scene::Scene;
+use crate::user;
+use pyo3::prelude::*;
+use pyo3::types::PyDict;
+use std::path::PathBuf;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::mpsc::{RecvTimeoutError, channel};
+use std::time::Duration;
+use tumble_interface::engine::{Engine, StepReport};
+use tumble_interface::scene::Precision;
+use tumble_interface::{Column, SceneError};
+
+/// How often a long call looks for Ctrl-C.
+const LOOK: Duration = Duration::from_millis(50);
+
+/// A scene in motion.
+#[pyclass(module = "tumble")]
+pub struct World {
+    scene: Py<Scene>,
+    engine: Box<dyn Engine + Sync>,
+    pool: Option<Arc<rayon::ThreadPool>>,
+}
+
+/// Works without the interpreter, on the world's threads; Ctrl-C makes `go_on` say no and is raised.
+fn work<T: Send>(py: Python<'_>, pool: Option<&Arc<rayon::ThreadPool>>, task: impl FnOnce(&(dyn Fn() -> bool + Sync)) -> T + Send) -> PyResult<T> {
+    let stop = AtomicBool::new(false);
+    let go_on = || !stop.load(Ordering::Relaxed);
+    let (result, interrupt) = py.detach(|| {
+        std::thread::scope(|scope| {
+            let (sender, receiver) = channel();
+            let go_on = &go_on;
+            scope.spawn(move || {
+                let result = match pool {
+                    Some(pool) => pool.install(|| task(go_on)),
+                    None => task(go_on),
+                };
+                let _ = sender.send(result);
+            });
+            let mut interrupt = None;
+            loop {
+                match receiver.recv_timeout(LOOK) {
+                    Ok(result) => return (Some(result), interrupt),
+                    Err(RecvTimeoutError::Timeout) if interrupt.is_none() => {
+                        interrupt = crate::interrupted();
+                        stop.store(interrupt.is_some(), Ordering::Relaxed);
+                    }
+                    Err(RecvTimeoutError::Timeout) => {}
+                    Err(RecvTimeoutError::Disconnected) => return (None, interrupt),
+                }
+            }
+        })
+    });
+    match (result, interrupt) {
+        (_, Some(interrupt)) => Err(interrupt),
+        (Some(result), None) => Ok(result),
+        (None, None) => Err(pyo3::exceptions::PyRuntimeError::new_err("the engine's thread ended without a result")),
+    }
+}
+
+fn thread_pool(py: Python<'_>, threads: Option<usize>) -> PyResult<Option<Arc<rayon::ThreadPool>>> {
+    let Some(threads) = threads else { return Ok(None) };
+    if threads == 0 {
+        return Err(scene_error(py, &SceneError::one("threads", "0, expected at least 1")));
+    }
+    let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build();
+    let pool = pool.map_err(|e| scene_error(py, &SceneError::one("threads", format!("{threads} threads cannot be started: {e}"))))?;
+    Ok(Some(Arc::new(pool)))
+}
+
+fn build(py: Python<'_>, scene: &Scene, pool: Option<&Arc<rayon::ThreadPool>>) -> PyResult<Box<dyn Engine + Sync>> {
+    let (words, assets) = (scene.scene.clone(), scene.assets.clone());
+    let built = work(py, pool, |_| -> Result<Box<dyn Engine + Sync>, SceneError> {
+        Ok(match words.precision {
+            Precision::Single => Box::new(tumble::scene::Simulation::new(words, assets)?),
+            Precision::Double => Box::new(tumble_f64::scene::Simulation::new(words, assets)?),
+        })
+    })?;
+    built.map_err(|e| scene.error(py, e))
+}
+
+impl World {
+    /// The system of that name, or the first.
+    fn system(&self, name: Option<String>) -> String {
+        name.unwrap_or_else(|| self.engine.systems().into_iter().next().unwrap_or_default())
+    }
+
+    fn output_columns(&self, py: Python<'_>) -> Vec<Column> {
+        let scene = self.scene.bind(py).get();
+        let names: Vec<&str> = scene.scene.output.columns.iter().map(String::as_str).collect();
+        self.engine.frame(&names).columns
+    }
+}
+
+#[pymethods]
+impl World {
+    #[new]
+    #[pyo3(signature = (scene, threads=None))]
+    fn new(py: Python<'_>, scene: &Bound<'_, PyAny>, threads: Option<usize>) -> PyResult<Self> {
+        let scene: Py<Scene> = match scene.cast::<Scene>() {
+            Ok(scene) => scene.clone().unbind(),
+            Err(_) => py.get_type::<Scene>().call1((scene,))?.cast_into::<Scene>()?.unbind(),
+        };
+        let pool = thread_pool(py, threads)?;
+        let engine = build(py, scene.bind(py).get(), pool.as_ref())?;
+        Ok(Self { scene, engine, pool })
+    }
+
+    #[getter]
+    fn scene(&self, py: Python<'_>) -> Py<Scene> {
+        self.scene.clone_ref(py)
+    }
+
+    #[getter]
+    fn time(&self) -> f64 {
+        self.engine.time()
+    }
+
+    #[getter]
+    fn frame_index(&self) -> u64 {
+        self.engine.frame_index()
+    }
+
+    #[getter]
+    fn systems(&self) -> Vec<String> {
+        self.engine.systems()
+    }
+
+    #[getter]
+    fn warnings(&self) -> Vec<String> {
+        self.engine.warnings().to_vec()
+    }
+
+    #[pyo3(signature = (frames=1))]
+    fn step<'py>(&mut self, py: Python<'py>, frames: u64) -> PyResult<Bound<'py, PyAny>> {
+        let mut total = StepReport::default();
+        for _ in 0..frames {
+            let (engine, pool) = (&mut self.engine, self.pool.as_ref());
+            match work(py, pool, |go_on| engine.step(go_on))? {
+                Ok(Some(report)) => total.add(&report),
+                Ok(None) => {}
+                Err(error) => return Err(step_error(py, &error)),
+            }
+        }
+        Ok(pythonize::pythonize(py, &total)?)
+    }
+
+    #[getter]
+    fn frame<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
+        arrays::columns(py, self.output_columns(py))
+    }
+
+    #[pyo3(signature = (*names))]
+    fn columns<'py>(&self, py: Python<'py>, names: Vec<String>) -> PyResult<Bound<'py, PyDict>> {
+        let names: Vec<&str> = names.iter().map(String::as_str).collect();
+        arrays::columns(py, self.engine.frame(&names).columns)
+    }
+
+    #[getter]
+    fn units<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
+        let mut all = self.output_columns(py);
+        all.extend(self.engine.topology());
+        arrays::units(py, &all)
+    }
+
+    #[getter]
+    fn topology<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
+        arrays::columns(py, self.engine.topology())
+    }
+
+    #[getter]
+    fn ledger<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
+        let (engine, pool) = (&self.engine, self.pool.as_ref());
+        let ledger = work(py, pool, |_| engine.ledger())?;
+        let books = pythonize::pythonize(py, &ledger)?;
+        books.set_item("energy", ledger.energy())?;
+        Ok(books)
+    }
+
+    fn hash(&self) -> String {
+        format!("{:016x}", self.engine.hash())
+    }
+
+    fn save(&self, py: Python<'_>, path: PathBuf) -> PyResult<()> {
+        let scene = self.scene.bind(py).get();
+        let (words, folder) = (scene.scene.to_json().to_string(), scene.folder.display().to_string());
+        let bytes = self.engine.save(&[("tumble", env!("CARGO_PKG_VERSION")), ("scene", &words), ("folder", &folder)]);
+        py.detach(|| std::fs::write(&path, bytes)).map_err(|e| ExportError::new_err(format!("\"{}\" cannot be written: {e}", path.display())))
+    }
+
+    #[staticmethod]
+    #[pyo3(signature = (path, threads=None))]
+    fn restore(py: Python<'_>, path: PathBuf, threads: Option<usize>) -> PyResult<Self> {
+        let bytes = read(py, &path)?;
+        let about = tumble::world::about(&bytes).unwrap_or_default();
+        let (Some(words), Some(folder)) = (about.get("scene"), about.get("folder")) else {
+            return Err(scene_error(py, &SceneError::one("", format!("\"{}\" is no checkpoint", path.display()))));
+        };
+        let tree = py.import("json")?.call_method1("loads", (words,))?;
+        let scene = py.get_type::<Scene>().call1((tree, folder))?;
+        let mut world = Self::new(py, &scene, threads)?;
+        world.engine.restore(&bytes).map_err(|e| scene_error(py, &e))?;
+        Ok(world)
+    }
+
+    fn load(&mut self, py: Python<'_>, path: PathBuf) -> PyResult<()> {
+        let bytes = read(py, &path)?;
+        self.engine.restore(&bytes).map_err(|e| scene_error(py, &e))
+    }
+
+    fn stability<'py>(&mut self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
+        let (engine, pool) = (&mut self.engine, self.pool.as_ref());
+        let all = work(py, pool, |_| engine.stability())?;
+        Ok(pythonize::pythonize(py, &all)?)
+    }
+
+    fn cures<'py>(&mut self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
+        let (engine, pool) = (&mut self.engine, self.pool.as_ref());
+        let all = work(py, pool, |go_on| engine.cures(go_on))?;
+        Ok(pythonize::pythonize(py, &all)?)
+    }
+
+    #[pyo3(signature = (force, system=None))]
+    fn add_force(&mut self, py: Python<'_>, force: Py<PyAny>, system: Option<String>) -> PyResult<()> {
+        callable(py, &force, "force")?;
+        let system = self.system(system);
+        self.engine.add_force(&system, Box::new(user::Force(force))).map_err(|e| scene_error(py, &e))
+    }
+
+    #[pyo3(signature = (step, system=None))]
+    fn set_integrator(&mut self, py: Python<'_>, step: Py<PyAny>, system: Option<String>) -> PyResult<()> {
+        callable(py, &step, "step")?;
+        let system = self.system(system);
+        self.engine.replace_integrator(&system, Box::new(user::Integrator(step))).map_err(|e| scene_error(py, &e))
+    }
+
+    fn write(&mut self, py: Python<'_>, object: &str, column: &str, values: &Bound<'_, PyAny>) -> PyResult<()> {
+        let array = py.import("numpy")?.call_method1("ascontiguousarray", (values, "float64"))?;
+        let values: Vec<f64> = array.call_method0("ravel")?.extract()?;
+        self.engine.write(object, column, &values).map_err(|e| scene_error(py, &e))
+    }
+
+    fn __repr__(&self) -> String {
+        format!("World(frame={}, time={})", self.engine.frame_index(), self.engine.time())
+    }
+}
+
+fn callable(py: Python<'_>, value: &Py<PyAny>, what: &str) -> PyResult<()> {
+    if value.bind(py).is_callable() {
+        return Ok(());
+    }
+    Err(pyo3::exceptions::PyTypeError::new_err(format!("{what} must be callable")))
+}
+
+fn read(py: Python<'_>, path: &std::path::Path) -> PyResult<Vec<u8>> {
+    std::fs::read(path).map_err(|e| scene_error(py, &SceneError::one("", crate::errors::file_error(path, &e))))
+}

@@ -1,0 +1,91 @@
+//! L7: things. Each recipe fills a system with the masses and elements of one kind of thing.
+//!
+//! Every link of a family gets k_s = modulus x (length, area or volume that it stands for) / l0², so that stiffness does
+//! not depend on how finely a thing is divided; the links of a family in one direction together stand for the whole thing
+//! once.                                                               (springs.6)
+
+mod block;
+mod lattice;
+mod net;
+mod particles;
+mod pins;
+mod rope;
+mod scenery;
+mod sheet;
+
+pub use block::block;
+pub use net::net;
+pub use particles::{Tracer, particles, tracers};
+pub use rope::rope;
+pub use scenery::{placed, scenery, solid};
+pub use sheet::sheet;
+
+use crate::geometry::Vector;
+use crate::systems::dynamics::{Parts, SpringPart};
+use tumble_interface::Issue;
+use tumble_interface::scene::Link;
+
+/// Where a recipe puts masses and elements, and what it finds wrong.
+pub struct Site<'a> {
+    /// The system under construction.
+    pub parts: &'a mut Parts,
+    /// Everything wrong so far.
+    pub issues: &'a mut Vec<Issue>,
+    /// Direction that counts as up.
+    pub up: Vector,
+}
+
+impl Site<'_> {
+    fn wrong(&mut self, path: impl Into<String>, message: impl Into<String>) {
+        self.issues.push(Issue::new(path, message));
+    }
+
+    /// Adds a link of a family that stands for `measure` [m, m², m³], at rest where it is.
+    fn link(&mut self, family: &Link, ends: [u32; 2], measure: f64) {
+        let rest = (self.parts.position(ends[1]) - self.parts.position(ends[0])).norm();
+        self.link_of(family, ends, measure, rest);
+    }
+
+    /// The same with a rest length [m]; nothing if that is zero.
+    fn link_of(&mut self, family: &Link, ends: [u32; 2], measure: f64, rest: f64) {
+        let settings = family.settings();
+        if rest > 0.0 {
+            let share = measure / (rest * rest);
+            self.parts.spring(SpringPart {
+                ends,
+                stiffness: settings.modulus * share,
+                damping: settings.damping * share,
+                rest,
+                hardening: settings.hardening,
+                tension_only: settings.tension_only,
+                break_strain: settings.break_strain,
+            });
+        }
+    }
+
+    /// Hinges across every edge of a mesh of points that has two triangles; `stiffness` is the bending stiffness per
+    /// width [N m], the rest angle that of the mesh. k = 3 B l²/(A1 + A2). Source: [grinspun2003].
+    fn hinges(&mut self, mesh: &tumble_interface::Mesh, first: u32, stiffness: f64) {
+        use crate::elements::{Element, Hinge};
+        if stiffness == 0.0 {
+            return;
+        }
+        let vertex = |i: u32| Vector::from(mesh.vertices[i as usize]);
+        for ([a, b], faces) in mesh.edges() {
+            let [t, u] = faces[..] else { continue };
+            let (t, u) = (mesh.triangles[t as usize], mesh.triangles[u as usize]);
+            let opposite = |t: [u32; 3]| t.into_iter().find(|i| *i != a && *i != b);
+            let (Some(c), Some(d)) = (opposite(t), opposite(u)) else { continue };
+            // n1 = e x (x2 - x0) must be the outward normal of its triangle: edge a b runs forward in it.
+            let forward = (0..3).any(|k| t[k] == a && t[(k + 1) % 3] == b);
+            let (c, d) = if forward { (c, d) } else { (d, c) };
+            let area = |t: [u32; 3]| (vertex(t[1]) - vertex(t[0])).cross(vertex(t[2]) - vertex(t[0])).norm() / 2.0;
+            let (areas, length_sq) = (area(t) + area(u), (vertex(b) - vertex(a)).norm_sq());
+            if areas > 0.0 && length_sq > 0.0 {
+                let row = |i: u32| [vertex(i).x, vertex(i).y, vertex(i).z, 0.0];
+                let [rest] = Hinge::residual([0.0], [row(a), row(b), row(c), row(d)]);
+                self.parts.hinge([a, b, c, d].map(|i| i + first), rest, 3.0 * stiffness * length_sq / areas);
+            }
+        }
+    }
+}

@@ -1,0 +1,48 @@
+//! Masses at the vertices of a mesh, springs along its edges.
+
+use super::Site;
+use super::pins::{Pinnable, pinned};
+use crate::geometry::Vector;
+use tumble_interface::Mesh;
+use tumble_interface::scene::Net;
+
+/// Adds the masses, links, hinges and triangles. `mesh` stands where it belongs.
+///
+/// An edge stands for the area of its triangles: an equilateral net then has the modulus of its links as Young's modulus.
+pub fn net(site: &mut Site<'_>, thing: &Net, mesh: &Mesh) {
+    let path = format!("net \"{}\"", thing.name);
+    site.parts.begin(&thing.name, 0.0);
+    let corner = |i: u32| Vector::from(mesh.vertices[i as usize]);
+    let area = |t: &[u32; 3]| (corner(t[1]) - corner(t[0])).cross(corner(t[2]) - corner(t[0])).norm() / 2.0;
+    let areas: Vec<f64> = mesh.triangles.iter().map(area).collect();
+    let mut mass = vec![0.0; mesh.vertices.len()];
+    for (t, area) in mesh.triangles.iter().zip(&areas) {
+        t.iter().for_each(|i| mass[*i as usize] += thing.density * area / 3.0);
+    }
+    if let Some(i) = mass.iter().position(|m| *m == 0.0) {
+        return site.wrong(format!("{path}.mesh"), format!("vertex {i} has no triangle with an area, so it would have no mass; remove it from the mesh"));
+    }
+    let first = mesh.vertices.iter().zip(&mass).map(|(x, m)| site.parts.point(Vector::from(*x), Vector::default(), *m)).min().unwrap_or(0);
+    if thing.links.shear.is_some() && thing.links.structural.is_none() {
+        site.wrong(format!("{path}.links.shear"), "a net of triangles has no diagonals; known here: structural, bend");
+    }
+    let edges = mesh.edges();
+    for ([a, b], faces) in &edges {
+        let measure: f64 = faces.iter().map(|t| areas[*t as usize]).sum();
+        if let Some(family) = &thing.links.structural {
+            site.link(family, [first + a, first + b], measure);
+        }
+        if let (Some(family), [t, u]) = (&thing.links.bend, &faces[..]) {
+            let opposite = |t: u32| mesh.triangles[t as usize].into_iter().find(|i| i != a && i != b);
+            if let (Some(c), Some(d)) = (opposite(*t), opposite(*u)) {
+                site.link(family, [first + c, first + d], measure);
+            }
+        }
+    }
+    site.hinges(mesh, first, thing.hinge);
+    let pins = pinned(site, &Pinnable { path: &path, n: &[mesh.vertices.len() as u32], first, is_lattice: false }, &thing.pin);
+    pins.iter().for_each(|p| site.parts.pin(*p));
+    if let Some(object) = site.parts.object() {
+        object.triangles.clone_from(&mesh.triangles);
+    }
+}

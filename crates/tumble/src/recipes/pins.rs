@@ -1,0 +1,141 @@
+//! Which masses a pin means.
+
+use super::Site;
+use crate::geometry::Vector;
+use tumble_interface::scene::{Pin, Region};
+
+/// What a thing offers to pin.
+pub struct Pinnable<'a> {
+    /// Where it stands in the scene: `sheet "flag"`.
+    pub path: &'a str,
+    /// Masses along each of its directions; a single number for a plain list.
+    pub n: &'a [u32],
+    /// First mass.
+    pub first: u32,
+    /// Whether it has a start and an end, corners and edges, or is only a list.
+    pub is_lattice: bool,
+}
+
+/// The masses that the pins mean, in order, each once.
+pub fn pinned(site: &mut Site<'_>, thing: &Pinnable<'_>, pins: &[Pin]) -> Vec<u32> {
+    let mut all = Vec::new();
+    for (i, pin) in pins.iter().enumerate() {
+        let found = match pin {
+            Pin::Words(words) => in_words(thing, words),
+            Pin::Region(region) => within(site, thing, region),
+        };
+        match found {
+            Ok(found) => all.extend(found.into_iter().map(|p| p + thing.first)),
+            Err(message) => site.wrong(format!("{}.pin[{i}]", thing.path), message),
+        }
+    }
+    all.sort_unstable();
+    all.dedup();
+    all
+}
+
+fn within(site: &Site<'_>, thing: &Pinnable<'_>, region: &Region) -> Result<Vec<u32>, String> {
+    let count: u32 = thing.n.iter().product();
+    let distance = |i: u32| (site.parts.position(thing.first + i) - Vector::from(region.center)).norm();
+    let found: Vec<u32> = (0..count).filter(|i| distance(*i) <= region.radius).collect();
+    if found.is_empty() {
+        let nearest = (0..count).map(distance).fold(f64::INFINITY, f64::min);
+        return Err(format!("no mass lies within {} m; the nearest is {nearest:.4} m away", region.radius));
+    }
+    Ok(found)
+}
+
+fn in_words(thing: &Pinnable<'_>, words: &str) -> Result<Vec<u32>, String> {
+    let mut parts = words.split_whitespace();
+    let (word, rest) = (parts.next().unwrap_or(""), parts.collect::<Vec<_>>());
+    let n = thing.n;
+    let count: u32 = n.iter().product();
+    match word {
+        "all" if rest.is_empty() => Ok((0..count).collect()),
+        "start" if n.len() == 1 && thing.is_lattice && rest.is_empty() => Ok(vec![0]),
+        "end" if n.len() == 1 && thing.is_lattice && rest.is_empty() => Ok(vec![count - 1]),
+        "vertex" => {
+            let node = whole_numbers(&rest, n.len())?;
+            match (0..n.len()).find(|a| node[*a] >= n[*a]) {
+                Some(a) => Err(format!("there is no {words}: index {} is {}, the last one is {}", a + 1, node[a], n[a] - 1)),
+                None => Ok(vec![index(n, &node)]),
+            }
+        }
+        "corner" if n.len() > 1 => {
+            let corner = whole_numbers(&rest, n.len())?;
+            match corner.iter().any(|c| *c > 1) {
+                true => Err(format!("there is no {words}; a corner has a 0 or a 1 for each direction")),
+                false => Ok(vec![index(n, &corner.iter().zip(n).map(|(c, n)| c * (n - 1)).collect::<Vec<_>>())]),
+            }
+        }
+        "edge" | "face" if (word == "edge" && n.len() == 2) || (word == "face" && n.len() == 3) => side(n, word, &rest),
+        _ => Err(format!("\"{words}\" is not known here; known are {}, or a table with center and radius", known(thing))),
+    }
+}
+
+/// All masses on the low or the high side: `x-`, `z+`.
+fn side(n: &[u32], word: &str, rest: &[&str]) -> Result<Vec<u32>, String> {
+    let axes = &["x", "y", "z"][..n.len()];
+    let found = match rest {
+        [side] => axes.iter().position(|a| side.strip_prefix(a).is_some_and(|sign| sign == "-" || sign == "+")).map(|a| (a, side.ends_with('+'))),
+        _ => None,
+    };
+    let Some((axis, high)) = found else {
+        let sides: Vec<String> = axes.iter().flat_map(|a| [format!("{a}-"), format!("{a}+")]).collect();
+        return Err(format!("{word} takes one of {}", sides.join(", ")));
+    };
+    let level = if high { n[axis] - 1 } else { 0 };
+    let stride: u32 = n[..axis].iter().product();
+    Ok((0..n.iter().product()).filter(|i| i / stride % n[axis] == level).collect())
+}
+
+fn whole_numbers(words: &[&str], count: usize) -> Result<Vec<u32>, String> {
+    let numbers: Vec<u32> = words.iter().filter_map(|w| w.parse().ok()).collect();
+    if numbers.len() != words.len() || numbers.len() != count {
+        return Err(format!("expected {count} whole number{} after the word", if count == 1 { "" } else { "s" }));
+    }
+    Ok(numbers)
+}
+
+fn index(n: &[u32], node: &[u32]) -> u32 {
+    node.iter().zip(n).rev().fold(0, |sum, (i, n)| sum * n + i)
+}
+
+fn known(thing: &Pinnable<'_>) -> &'static str {
+    match (thing.is_lattice, thing.n.len()) {
+        (false, _) => "\"all\", \"vertex 3\"",
+        (_, 1) => "\"all\", \"start\", \"end\", \"vertex 3\"",
+        (_, 2) => "\"all\", \"corner 0 1\", \"vertex 3 4\", \"edge x-\"",
+        _ => "\"all\", \"corner 0 1 0\", \"vertex 3 4 5\", \"face z+\"",
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn found(n: &[u32], words: &str) -> Result<Vec<u32>, String> {
+        in_words(&Pinnable { path: "", n, first: 0, is_lattice: true }, words)
+    }
+
+    #[test]
+    fn words_mean_masses() {
+        assert_eq!(found(&[3, 2], "corner 1 0").unwrap(), [2]);
+        assert_eq!(found(&[3, 2], "vertex 1 1").unwrap(), [4]);
+        assert_eq!(found(&[3, 2], "edge x+").unwrap(), [2, 5]);
+        assert_eq!(found(&[3, 2], "edge y-").unwrap(), [0, 1, 2]);
+        assert_eq!(found(&[2, 2, 3], "face z+").unwrap(), [8, 9, 10, 11]);
+        assert_eq!(found(&[4], "end").unwrap(), [3]);
+        for (n, words, part) in [
+            (&[3, 2][..], "corner 2 0", "0 or a 1"),
+            (&[3, 2], "vertex 3 0", "the last one is 2"),
+            (&[3, 2], "vertex 1", "2 whole numbers"),
+            (&[3, 2], "edge z-", "x-, x+, y-, y+"),
+            (&[3, 2], "start", "not known here"),
+            (&[4], "", "not known here"),
+        ] {
+            let message = found(n, words).unwrap_err();
+            assert!(message.contains(part), "{words}: {message}");
+        }
+    }
+}

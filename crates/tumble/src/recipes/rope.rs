@@ -1,0 +1,157 @@
+//! A chain of springs, or a rod, between two points.
+
+use super::Site;
+use super::pins::{Pinnable, pinned};
+use crate::geometry::Vector;
+use crate::math::Quat;
+use crate::math::functions::{cos, sin};
+use crate::math::rotation::from_z_to;
+use tumble_interface::scene::{Link, LinkSettings, Links, Rod, Rope};
+
+/// Adds the masses, and links or rod elements.
+pub fn rope(site: &mut Site<'_>, thing: &Rope) {
+    let path = format!("rope \"{}\"", thing.name);
+    let distance = (Vector::from(thing.to) - Vector::from(thing.from)).norm();
+    let length = thing.length.unwrap_or(distance);
+    if length == 0.0 {
+        return site.wrong(format!("{path}.to"), "the ends coincide; move one of them, or give a length");
+    }
+    let n = thing.segments;
+    site.parts.begin(&thing.name, thing.radius);
+    let spacing = length / f64::from(n);
+    let places = course(thing.from.into(), thing.to.into(), length, n, site.up);
+    let mut first = 0;
+    for (i, x) in places.iter().enumerate() {
+        let rim = i == 0 || i == n as usize;
+        let mass = thing.density * spacing * if rim { 0.5 } else { 1.0 };
+        let index = site.parts.point(*x, Vector::default(), mass);
+        if i == 0 {
+            first = index;
+        }
+    }
+    if let Some(object) = site.parts.object() {
+        object.curve = (0..=n).collect();
+    }
+    let pins = pinned(site, &Pinnable { path: &path, n: &[n + 1], first, is_lattice: true }, &thing.pin);
+    pins.iter().for_each(|p| site.parts.pin(*p));
+    match (&thing.rod, &thing.links) {
+        (Some(_), Some(_)) => site.wrong(format!("{path}.links"), "a rod has no links; leave out links or rod"),
+        (Some(rod), None) => {
+            let ends = [pins.contains(&first), pins.contains(&(first + n))];
+            frames(site, thing, rod, &places, first, ends, spacing);
+        }
+        (None, links) => {
+            let links = links.clone().unwrap_or_else(default_links);
+            if links.shear.is_some() {
+                site.wrong(format!("{path}.links.shear"), "a rope has no diagonals; known here: structural, bend");
+            }
+            chain(site, &links, first, n, spacing);
+        }
+    }
+}
+
+/// Without links, a rope is a chain of stiff springs.
+fn default_links() -> Links {
+    Links { structural: Some(Link::Settings(LinkSettings { modulus: 1000.0, ..LinkSettings::default() })), ..Links::default() }
+}
+
+/// Springs by the rest length, which a slack or a taut start does not have between its masses.
+fn chain(site: &mut Site<'_>, links: &Links, first: u32, n: u32, spacing: f64) {
+    for (family, step) in [(&links.structural, 1), (&links.bend, 2)] {
+        let Some(family) = family else { continue };
+        for i in 0..(n + 1).saturating_sub(step) {
+            site.link_of(family, [first + i, first + i + step], spacing, spacing * f64::from(step));
+        }
+    }
+}
+
+/// A frame per segment, its third axis along the segment, carried on from the first without twist.
+fn frames(site: &mut Site<'_>, thing: &Rope, rod: &Rod, places: &[Vector], first: u32, clamped: [bool; 2], spacing: f64) {
+    let twist = rod.twist.unwrap_or(rod.bend);
+    if rod.bend == 0.0 && twist > 0.0 {
+        return site.wrong(format!("rope \"{}\".rod.bend", thing.name), "0 N m², expected > 0 N m² for a rod that resists twist");
+    }
+    // A round wire of density rho A has rho A r²/4 about its diameter and twice as much about its axis.
+    let inertia = rod.inertia.unwrap_or(thing.density * thing.radius * thing.radius / 2.0) * spacing;
+    let shear = (rod.shear.unwrap_or(rod.stretch) / rod.stretch).sqrt();
+    let n = places.len() - 1;
+    let mut turn = Quat { v: Vector::default(), w: 1.0 };
+    let mut before = 0;
+    for i in 0..n {
+        let d = (places[i + 1] - places[i]).normalized();
+        turn = if i == 0 { from_z_to(d) } else { shortest(turn.axis_z(), d) * turn };
+        let frame = site.parts.frame(turn.row(), inertia);
+        if (i == 0 && clamped[0]) || (i + 1 == n && clamped[1]) {
+            site.parts.clamp_frame(frame);
+        }
+        let k = rod.stretch * spacing;
+        site.parts.rod_stretch([first + i as u32, first + i as u32 + 1], frame, [spacing, shear], k, k * rod.damping);
+        if i > 0 && rod.bend > 0.0 {
+            let k = rod.bend * spacing;
+            site.parts.rod_bend([before, frame], [2.0 / spacing, 0.0, 0.0, 0.0, (twist / rod.bend).sqrt()], k, k * rod.damping);
+        }
+        before = frame;
+    }
+}
+
+/// The shortest rotation from one unit vector to another.
+fn shortest(a: Vector, b: Vector) -> Quat<f64> {
+    let q = Quat { v: a.cross(b), w: 1.0 + a.dot(b) };
+    if q.w > 1e-12 { q.normalized() } else { from_z_to(b) * from_z_to(a).conj() }
+}
+
+/// Where the masses start: on a straight line, or, if the rope is longer than the distance of its ends, on a circular arc
+/// that hangs down, with n equal chords of length/n: c/L = sin(phi)/(n sin(phi/n)) for half the opening angle phi.
+fn course(from: Vector, to: Vector, length: f64, n: u32, up: Vector) -> Vec<Vector> {
+    let chord = to - from;
+    let (c, count) = (chord.norm(), f64::from(n));
+    let straight = |i: u32| from + chord * (f64::from(i) / count);
+    if length <= c * (1.0 + 1e-12) || n < 2 {
+        return (0..=n).map(straight).collect();
+    }
+    let along = if c > 0.0 { chord.normalized() } else { any_across(up) };
+    let across = up - along * up.dot(along);
+    let down = -(if across.norm() > 1e-6 { across.normalized() } else { any_across(along) });
+    let (mut low, mut high) = (0.0, std::f64::consts::PI);
+    for _ in 0..100 {
+        let phi = 0.5 * (low + high);
+        if sin(phi) / (count * sin(phi / count)) > c / length { low = phi } else { high = phi }
+    }
+    let phi = 0.5 * (low + high);
+    let radius = length / (2.0 * count * sin(phi / count));
+    let middle = from + chord * 0.5;
+    let on_arc = |i: u32| {
+        let angle = phi * (2.0 * f64::from(i) / count - 1.0);
+        middle + along * (radius * sin(angle)) + down * (radius * (cos(angle) - cos(phi)))
+    };
+    // The ends are met exactly.
+    (0..=n).map(|i| if i == 0 { from } else if i == n { to } else { on_arc(i) }).collect()
+}
+
+/// A horizontal direction across v, if there is one.
+fn any_across(v: Vector) -> Vector {
+    let x = Vector { x: 1.0, y: 0.0, z: 0.0 };
+    let across = x - v * v.dot(x);
+    if across.norm() > 1e-6 { across.normalized() } else { Vector { x: 0.0, y: 1.0, z: 0.0 } }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_slack_rope_starts_with_segments_of_rest_length() {
+        let up = Vector { x: 0.0, y: 0.0, z: 1.0 };
+        for (to, length) in [([1.0, 0.0, 0.0], 1.5), ([0.0, 0.0, -1.0], 1.2), ([0.0; 3], 2.0), ([0.3, 0.4, 0.1], 7.0)] {
+            let places = course(Vector::default(), to.into(), length, 20, up);
+            assert_eq!(places[20], to.into());
+            for w in places.windows(2) {
+                let l = (w[1] - w[0]).norm();
+                assert!((l - length / 20.0).abs() < 1e-9, "{to:?} {l}");
+            }
+            assert!(places.iter().all(|p| p.z < 1e-9 || to[2] != 0.0));
+        }
+        let taut = course(Vector::default(), [3.0, 0.0, 0.0].into(), 2.0, 4, up);
+        assert!((taut[1].x - 0.75).abs() < 1e-15);
+    }
+}

@@ -1,0 +1,41 @@
+//! A rectangle of masses and links.
+
+use super::Site;
+use super::lattice::Lattice;
+use super::pins::{Pinnable, pinned};
+use tumble_interface::Mesh;
+use tumble_interface::scene::Sheet;
+
+/// Adds the masses, links, hinges and triangles.
+///
+/// ```text
+///   y-   (i, j+1)---(i+1, j+1)       index i + nx j; the triangles and the single diagonal of
+///   up       |     /    |            shear links run from (i, j) to (i+1, j+1)
+///            |   /      |
+///          (i, j)----(i+1, j)
+/// ```
+pub fn sheet(site: &mut Site<'_>, thing: &Sheet) {
+    let path = format!("sheet \"{}\"", thing.name);
+    site.parts.begin(&thing.name, 0.0);
+    let lattice = Lattice::build(site, thing.resolution, thing.size, thing.center, thing.rotate, thing.density);
+    lattice.links(site, &thing.links);
+    let first = lattice.index([0; 3]);
+    let mut triangles = Vec::new();
+    for j in 1..lattice.n[1] {
+        for i in 1..lattice.n[0] {
+            let [a, b, c, d] = [[i - 1, j - 1], [i, j - 1], [i, j], [i - 1, j]].map(|[i, j]| lattice.index([i, j, 0]) - first);
+            triangles.extend([[a, b, c], [a, c, d]]);
+        }
+    }
+    let pins = pinned(site, &Pinnable { path: &path, n: &lattice.n[..2], first, is_lattice: true }, &thing.pin);
+    pins.iter().for_each(|p| site.parts.pin(*p));
+    if thing.hinge > 0.0 {
+        let vertices = lattice.nodes().map(|node| site.parts.position(lattice.index(node)).into()).collect();
+        let mesh = Mesh { vertices, triangles };
+        site.hinges(&mesh, first, thing.hinge);
+        triangles = mesh.triangles;
+    }
+    if let Some(object) = site.parts.object() {
+        object.triangles = triangles;
+    }
+}

@@ -1,0 +1,269 @@
+//! Fills systems with objects, forces, solids and anchors.
+
+use super::Assets;
+use super::checks::{check, objects, place, targets};
+use super::memory::memory;
+use crate::exchange::Exchange;
+use crate::forces::{Acceleration, Attraction, Drag, Flow, Force};
+use crate::geometry::{Collider, Vector};
+use crate::recipes::{self, Site};
+use crate::state::Object;
+use crate::system::System;
+use crate::systems::dynamics::{Dynamics, Parts, Settings, SpringPart, Stepping, Tether};
+use crate::systems::tracers::{self, Tracers};
+use crate::world::World;
+use std::sync::Arc;
+use tumble_interface::scene::{Anchor, Force as Words, Method, Plane, Scene, System as Plan};
+use tumble_interface::{Column, Data, Issue, Mesh, SceneError};
+
+/// A world, the surfaces of its colliders, and what is doubtful about it.
+pub struct Built {
+    pub world: World,
+    pub scenery: Vec<Column>,
+    pub warnings: Vec<String>,
+}
+
+/// The systems of a scene, or the default one.
+pub fn plans(scene: &Scene) -> Vec<Plan> {
+    if scene.system.is_empty() { vec![Plan::default()] } else { scene.system.clone() }
+}
+
+/// Builds the scene, or tells everything that is wrong with it.
+pub fn build(scene: &Scene, assets: &Assets) -> Result<Built, SceneError> {
+    let plans = plans(scene);
+    let mut issues = check(scene, &plans);
+    let (needed, limit) = (memory(scene) / 1024.0_f64.powi(3), scene.world.memory_limit);
+    if needed > limit {
+        let message = format!("the scene needs about {needed:.1} GiB, the limit is {limit} GiB; lower a resolution, or raise world.memory_limit");
+        issues.push(Issue::new("world.memory_limit", message));
+    }
+    if !issues.is_empty() {
+        return Err(SceneError { issues });
+    }
+    let mut warnings = Vec::new();
+    let (colliders, scenery) = solids(scene, assets, &mut issues);
+    let mut parts = fill(scene, &plans, assets, &mut issues);
+    let anchors: Vec<Link> = scene.anchor.iter().filter_map(|anchor| link(scene, &plans, anchor, &parts, &mut issues)).collect();
+    for anchor in &anchors {
+        if let [(s, a), (t, b)] = anchor.ends
+            && s == t
+        {
+            let rest = anchor.rest_length;
+            parts[s].begin(&anchor.name, 0.0);
+            parts[s].spring(SpringPart { ends: [a, b], stiffness: anchor.stiffness, damping: anchor.damping, rest, hardening: 0.0, tension_only: false, break_strain: None });
+        }
+    }
+    act(scene, &mut parts);
+    if !issues.is_empty() {
+        return Err(SceneError { issues });
+    }
+    let mut exchange = Exchange::default();
+    let colliders = Arc::new(colliders);
+    let gravity = gravity(scene);
+    let dt = scene.frame_time() / f64::from(scene.time.exchanges);
+    let mut systems: Vec<Box<dyn System>> = Vec::new();
+    for (index, (plan, parts)) in plans.iter().zip(parts).enumerate() {
+        if plan.method == Method::Tracers {
+            systems.push(Box::new(carried(scene, &plans, index)));
+            continue;
+        }
+        let settings = Settings {
+            name: plan.name.clone(),
+            index,
+            integrator: plan.integrator,
+            stepping: stepping(plan),
+            adaptive: plan.adaptive.clone(),
+            solver: plan.solver.clone(),
+            clamp: plan.clamp,
+            gravity,
+            colliders: colliders.clone(),
+        };
+        let mut system = parts.build(settings)?;
+        anchors.iter().for_each(|anchor| hang(&mut system, index, anchor, dt, &mut exchange, &mut warnings));
+        systems.push(Box::new(system));
+    }
+    Ok(Built { world: World::new(systems, exchange, scene.frame_time(), scene.time.exchanges), scenery, warnings })
+}
+
+fn stepping(plan: &Plan) -> Stepping {
+    match (plan.substeps, plan.step) {
+        (Some(n), _) => Stepping::Substeps(n),
+        (None, Some(step)) => Stepping::Step(step),
+        // An implicit scheme needs no more than one step an interval.
+        (None, None) if plan.integrator.is_implicit() => Stepping::Substeps(1),
+        (None, None) => Stepping::Automatic,
+    }
+}
+
+/// The scene's gravity, without the part that points out of the plane of a two-dimensional scene.
+fn gravity(scene: &Scene) -> [f64; 3] {
+    let mut g = scene.world.gravity;
+    if scene.dimension == 2 {
+        g[if scene.plane == Plane::Xz { 1 } else { 2 }] = 0.0;
+    }
+    g
+}
+
+fn solids(scene: &Scene, assets: &Assets, issues: &mut Vec<Issue>) -> (Vec<Collider>, Vec<Column>) {
+    let (mut colliders, mut scenery) = (Vec::new(), Vec::new());
+    for thing in &scene.collider {
+        let mesh: Option<Mesh> = match &thing.shape {
+            tumble_interface::scene::Shape::Mesh(file) => assets.get(&file.path).map(|mesh| recipes::placed(mesh, file)),
+            _ => None,
+        };
+        match recipes::solid(thing, mesh.as_ref()) {
+            Ok(collider) => colliders.push(collider),
+            Err((key, message)) => issues.push(Issue::new(format!("collider \"{}\"{key}", thing.name), message)),
+        }
+        let surface = recipes::scenery(thing, mesh.as_ref());
+        let mut add = |name: &str, unit, data| scenery.push(Column { object: thing.name.clone(), name: name.into(), unit, width: 3, data });
+        add("position", "m", Data::F64(surface.vertices.concat()));
+        add("triangles", "1", Data::U32(surface.triangles.concat()));
+    }
+    (colliders, scenery)
+}
+
+/// Parts of every system, filled by the recipes in the order of the scene.
+fn fill(scene: &Scene, plans: &[Plan], assets: &Assets, issues: &mut Vec<Issue>) -> Vec<Parts> {
+    let mut parts: Vec<Parts> = plans.iter().map(|_| Parts::default()).collect();
+    let up: Vector = if scene.dimension == 2 && scene.plane == Plane::Xy { [0.0, 1.0, 0.0] } else { [0.0, 0.0, 1.0] }.into();
+    let mut at = |kind: &str, system: &Option<String>, recipe: &mut dyn FnMut(&mut Site<'_>)| {
+        if let Some(index) = place(plans, kind, system.as_deref()) {
+            recipe(&mut Site { parts: &mut parts[index], issues: &mut *issues, up });
+        }
+    };
+    for thing in &scene.particles {
+        let tracers = place(plans, "particles", thing.system.as_deref()).is_some_and(|i| plans[i].method == Method::Tracers);
+        at("particles", &thing.system, &mut |site| {
+            if tracers {
+                recipes::tracers(thing, &mut |path, message| site.issues.push(Issue::new(path, message)));
+            } else {
+                recipes::particles(site, thing);
+            }
+        });
+    }
+    for thing in &scene.rope {
+        at("rope", &thing.system, &mut |site| recipes::rope(site, thing));
+    }
+    for thing in &scene.sheet {
+        at("sheet", &thing.system, &mut |site| recipes::sheet(site, thing));
+    }
+    for thing in &scene.block {
+        at("block", &thing.system, &mut |site| recipes::block(site, thing));
+    }
+    for thing in &scene.net {
+        at("net", &thing.system, &mut |site| match assets.get(&thing.mesh.path) {
+            Some(mesh) => recipes::net(site, thing, &recipes::placed(mesh, &thing.mesh)),
+            None => site.issues.push(Issue::new(format!("net \"{}\".mesh", thing.name), "the mesh has not been loaded")),
+        });
+    }
+    parts
+}
+
+/// Gives every system the forces that act on its objects.
+fn act(scene: &Scene, parts: &mut [Parts]) {
+    for force in &scene.force {
+        for parts in &mut *parts {
+            let on = |name: &str| targets(force).is_none_or(|on| on.iter().any(|o| o == name));
+            let rows: Vec<_> = parts.ranges().filter(|(name, range)| on(name) && !range.is_empty()).map(|(_, range)| range).collect();
+            if !rows.is_empty() {
+                parts.forces.push((law(force), rows));
+            }
+        }
+    }
+}
+
+fn law(force: &Words) -> Box<dyn Force> {
+    match *force {
+        Words::Drag { coefficient, rate, .. } => Box::new(Drag { coefficient, rate }),
+        Words::Attraction { center, gm, .. } => Box::new(Attraction { center: center.into(), gm }),
+        Words::Acceleration { value, .. } => Box::new(Acceleration(value)),
+    }
+}
+
+fn carried(scene: &Scene, plans: &[Plan], index: usize) -> Tracers {
+    let plan = &plans[index];
+    let (mut x, mut all) = (Vec::new(), Vec::new());
+    for thing in scene.particles.iter().filter(|t| place(plans, "particles", t.system.as_deref()) == Some(index)) {
+        let first = x.len();
+        x.extend(recipes::tracers(thing, &mut |_, _| {}).x);
+        all.push(Object { name: thing.name.clone(), points: first..x.len(), radius: thing.radius, ..Object::default() });
+    }
+    let settings = tracers::Settings {
+        name: plan.name.clone(),
+        integrator: plan.integrator,
+        substeps: plan.substeps,
+        step: plan.step,
+        adaptive: plan.adaptive.clone(),
+    };
+    Tracers::new(settings, Flow::new(&scene.field), &x, all)
+}
+
+/// An anchor whose ends have been found: system and point of each.
+struct Link {
+    name: String,
+    ends: [(usize, u32); 2],
+    stiffness: f64,
+    damping: f64,
+    rest_length: f64,
+    /// 1/m1 + 1/m2 [1/kg].
+    inverse_mass: f64,
+}
+
+fn link(scene: &Scene, plans: &[Plan], anchor: &Anchor, parts: &[Parts], issues: &mut Vec<Issue>) -> Option<Link> {
+    let mut end = |k: usize| -> Option<(usize, u32, Vector, f64)> {
+        let path = format!("anchor \"{}\".between[{k}]", anchor.name);
+        let words = &anchor.between[k];
+        let mut wrong = |message: String| issues.push(Issue::new(path.clone(), message));
+        let Some((name, index)) = words.rsplit_once(' ').and_then(|(n, i)| Some((n.trim(), i.parse::<usize>().ok()?))) else {
+            wrong(format!("\"{words}\", expected an object and an index: \"flag 3\""));
+            return None;
+        };
+        let Some((kind, _, system)) = objects(scene).into_iter().find(|(_, n, _)| *n == name) else {
+            let hint = tumble_interface::check::suggestion(name, objects(scene).iter().map(|o| o.1));
+            wrong(format!("there is no object \"{name}\"{hint}"));
+            return None;
+        };
+        let s = place(plans, kind, system)?;
+        let Some(range) = parts[s].ranges().find(|(n, _)| *n == name).map(|(_, r)| r) else {
+            wrong(format!("\"{name}\" has no masses to pull"));
+            return None;
+        };
+        if index >= range.len() {
+            wrong(format!("there is no mass {index} in \"{name}\"; the last one is {}", range.len().saturating_sub(1)));
+            return None;
+        }
+        let i = (range.start + index) as u32;
+        Some((s, i, parts[s].position(i), parts[s].inverse_mass(i)))
+    };
+    let (a, b) = (end(0), end(1));
+    let (a, b) = (a?, b?);
+    Some(Link {
+        name: anchor.name.clone(),
+        ends: [(a.0, a.1), (b.0, b.1)],
+        stiffness: anchor.stiffness,
+        damping: anchor.damping,
+        rest_length: anchor.rest_length.unwrap_or((a.2 - b.2).norm()),
+        inverse_mass: a.3 + b.3,
+    })
+}
+
+/// Between systems the one of the first end owns the spring; the other gives a port.
+fn hang(system: &mut Dynamics, index: usize, anchor: &Link, dt: f64, exchange: &mut Exchange, warnings: &mut Vec<String>) {
+    let [(s, a), (t, b)] = anchor.ends;
+    if s != index || s == t {
+        return;
+    }
+    let port = exchange.open(t, b as usize);
+    system.tether(Tether { row: a as usize, port, stiffness: anchor.stiffness, damping: anchor.damping, rest_length: anchor.rest_length });
+    let turn = dt * (anchor.stiffness * anchor.inverse_mass).sqrt();
+    let damp = dt * anchor.damping * anchor.inverse_mass;
+    if turn > 0.5 || damp > 0.5 {
+        let times = (2.0 * turn.max(damp)).ceil();
+        warnings.push(format!(
+            "anchor \"{}\": omega dt = {turn:.2}, c dt/m = {damp:.2}; systems exchange impulses explicitly, which needs both below 0.5: \
+             raise time.exchanges {times} times, or put both objects into one system",
+            anchor.name
+        ));
+    }
+}

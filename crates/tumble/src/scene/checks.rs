@@ -1,0 +1,161 @@
+//! What the schema cannot say: things that depend on several values together.
+
+use std::collections::HashSet;
+use tumble_interface::Issue;
+use tumble_interface::check::suggestion;
+use tumble_interface::scene::{Force, Integrator, Method, Plane, Scene, Shape, System};
+
+/// Column names that a frame may hold.
+pub const COLUMNS: [&str; 5] = ["position", "velocity", "orientation", "angular_velocity", "link_strain"];
+
+/// Names of objects, with the kind of each.
+pub fn objects(scene: &Scene) -> Vec<(&'static str, &str, Option<&str>)> {
+    let particles = scene.particles.iter().map(|o| ("particles", o.name.as_str(), o.system.as_deref()));
+    let ropes = scene.rope.iter().map(|o| ("rope", o.name.as_str(), o.system.as_deref()));
+    let sheets = scene.sheet.iter().map(|o| ("sheet", o.name.as_str(), o.system.as_deref()));
+    let blocks = scene.block.iter().map(|o| ("block", o.name.as_str(), o.system.as_deref()));
+    let nets = scene.net.iter().map(|o| ("net", o.name.as_str(), o.system.as_deref()));
+    particles.chain(ropes).chain(sheets).chain(blocks).chain(nets).collect()
+}
+
+/// Everything wrong that can be seen before anything is built; `systems` are those of the scene, or the default one.
+pub fn check(scene: &Scene, systems: &[System]) -> Vec<Issue> {
+    let mut issues = Vec::new();
+    let mut wrong = |path: String, message: String| issues.push(Issue::new(path, message));
+    let objects = objects(scene);
+    if objects.is_empty() {
+        wrong(String::new(), "nothing to simulate: add particles, a rope, a sheet, a block or a net".into());
+    }
+    let colliders = scene.collider.iter().map(|c| ("collider", c.name.as_str()));
+    let mut names = HashSet::new();
+    for (kind, name) in objects.iter().map(|(k, n, _)| (*k, *n)).chain(colliders) {
+        if name.is_empty() || name.contains('/') {
+            wrong(format!("{kind} \"{name}\".name"), "expected a name that is not empty and has no slash".into());
+        }
+        if !names.insert(name) {
+            wrong(format!("{kind} \"{name}\".name"), "another object has this name; names must differ".into());
+        }
+    }
+    let mut names = HashSet::new();
+    for system in systems {
+        let path = format!("system \"{}\"", system.name);
+        if !names.insert(system.name.as_str()) {
+            wrong(format!("{path}.name"), "another system has this name; names must differ".into());
+        }
+        check_system(system, &path, &mut wrong);
+    }
+    let known = || systems.iter().map(|s| s.name.as_str());
+    for (kind, name, system) in &objects {
+        match (system, place(systems, kind, *system)) {
+            (Some(given), None) if !known().any(|s| s == *given) => {
+                let hint = suggestion(given, known());
+                let list = known().collect::<Vec<_>>().join(", ");
+                wrong(format!("{kind} \"{name}\".system"), format!("there is no system \"{given}\"{hint} (systems: {list})"));
+            }
+            (Some(given), None) => wrong(format!("{kind} \"{name}\".system"), format!("system \"{given}\" moves tracers; this needs a dynamics system")),
+            (None, None) => wrong(format!("{kind} \"{name}\".system"), "no system can move it: add a [[system]] with method = \"dynamics\"".into()),
+            _ => {}
+        }
+    }
+    for (i, force) in scene.force.iter().enumerate() {
+        for on in targets(force).into_iter().flatten() {
+            if !objects.iter().any(|(_, name, _)| name == on) {
+                let hint = suggestion(on, objects.iter().map(|o| o.1));
+                wrong(format!("force[{i}].on"), format!("there is no object \"{on}\"{hint}"));
+            }
+        }
+    }
+    for (i, column) in scene.output.columns.iter().enumerate() {
+        if !COLUMNS.contains(&column.as_str()) {
+            let hint = suggestion(column, COLUMNS);
+            wrong(format!("output.columns[{i}]"), format!("\"{column}\", expected one of {}{hint}", COLUMNS.join(", ")));
+        }
+    }
+    for (i, probe) in scene.expect.probe.iter().enumerate() {
+        if !objects.iter().any(|(_, name, _)| *name == probe.object) {
+            let hint = suggestion(&probe.object, objects.iter().map(|o| o.1));
+            wrong(format!("expect.probe[{i}].object"), format!("there is no object \"{}\"{hint}", probe.object));
+        }
+        if !scene.output.columns.contains(&probe.column) {
+            wrong(format!("expect.probe[{i}].column"), format!("\"{}\" is not among output.columns", probe.column));
+        }
+    }
+    if scene.dimension == 2 {
+        check_plane(scene, &mut wrong);
+    }
+    issues
+}
+
+/// The system that moves an object of this kind: the one it names, else the first that can.
+pub fn place(systems: &[System], kind: &str, named: Option<&str>) -> Option<usize> {
+    let can = |s: &System| s.method == Method::Dynamics || kind == "particles";
+    systems.iter().position(|s| can(s) && named.is_none_or(|name| s.name == name))
+}
+
+/// The objects that a force names.
+pub fn targets(force: &Force) -> Option<&Vec<String>> {
+    match force {
+        Force::Drag { on, .. } | Force::Attraction { on, .. } | Force::Acceleration { on, .. } => on.as_ref(),
+    }
+}
+
+fn check_system(system: &System, path: &str, wrong: &mut impl FnMut(String, String)) {
+    let integrator = system.integrator;
+    if system.substeps.is_some() && system.step.is_some() {
+        wrong(format!("{path}.step"), "given beside substeps; leave out one of them".into());
+    }
+    if integrator.is_adaptive() && (system.substeps.is_some() || system.step.is_some()) {
+        let message = format!("{} chooses its own steps; leave out substeps and step, or set adaptive.tolerance", integrator.name());
+        wrong(format!("{path}.integrator"), message);
+    }
+    if system.method == Method::Tracers && integrator.needs_velocities() {
+        let known: Vec<&str> = Integrator::ALL.into_iter().filter(|i| !i.needs_velocities()).map(Integrator::name).collect();
+        let message = format!("{} needs velocities, and tracers have none; expected one of {}", integrator.name(), known.join(", "));
+        wrong(format!("{path}.integrator"), message);
+    }
+    if system.clamp.is_some() && (system.method == Method::Tracers || !matches!(integrator, Integrator::ModifiedEuler | Integrator::Verlet)) {
+        wrong(format!("{path}.clamp"), "the position clamp goes with modified_euler or verlet".into());
+    }
+}
+
+/// In two dimensions nothing may stick out of the plane.
+fn check_plane(scene: &Scene, wrong: &mut impl FnMut(String, String)) {
+    let (axis, name) = if scene.plane == Plane::Xz { (1, "y") } else { (2, "z") };
+    for thing in &scene.particles {
+        for (key, list) in [("position", &thing.position), ("velocity", &thing.velocity)] {
+            if let Some(i) = list.iter().position(|p| p[axis] != 0.0) {
+                wrong(format!("particles \"{}\".{key}[{i}]", thing.name), format!("{name} = {}, expected 0 in a scene of dimension 2", list[i][axis]));
+            }
+        }
+    }
+    for thing in &scene.rope {
+        for (key, p) in [("from", thing.from), ("to", thing.to)] {
+            if p[axis] != 0.0 {
+                wrong(format!("rope \"{}\".{key}", thing.name), format!("{name} = {}, expected 0 in a scene of dimension 2", p[axis]));
+            }
+        }
+    }
+    for (kind, name) in scene.block.iter().map(|b| ("block", &b.name)).chain(scene.net.iter().map(|n| ("net", &n.name))) {
+        wrong(format!("{kind} \"{name}\""), "it does not fit into a plane; use dimension = 3".into());
+    }
+    for thing in &scene.sheet {
+        let turn = if axis == 1 { [90.0, 0.0, 0.0] } else { [0.0; 3] };
+        let fits = if axis == 1 { thing.rotate == turn } else { thing.rotate[0] == 0.0 && thing.rotate[1] == 0.0 };
+        if !fits || thing.center[axis] != 0.0 {
+            let message = format!("it does not lie in the plane of a scene of dimension 2; set rotate = {turn:?} and {name} of center to 0");
+            wrong(format!("sheet \"{}\".rotate", thing.name), message);
+        }
+    }
+    for thing in &scene.collider {
+        let fits = match &thing.shape {
+            Shape::Sphere { center, .. } => center[axis] == 0.0,
+            Shape::Box { center, rotate, .. } => center[axis] == 0.0 && (0..3).all(|a| a == axis || rotate[a] == 0.0),
+            Shape::Plane { normal, .. } => normal[axis] == 0.0,
+            Shape::Floor { .. } => axis == 1,
+            Shape::Mesh(_) => false,
+        };
+        if !fits {
+            wrong(format!("collider \"{}\".shape", thing.name), "it is not symmetric about the plane of a scene of dimension 2; use dimension = 3".into());
+        }
+    }
+}

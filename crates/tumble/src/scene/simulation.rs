@@ -1,0 +1,142 @@
+//! A scene in motion: what fronts hold in their hands.
+
+use super::Assets;
+use super::build::{build, plans};
+use super::cures;
+use crate::world::World;
+use tumble_interface::engine::{Cure, Engine, Ledger, Stability, StepReport, UserForce, UserIntegrator};
+use tumble_interface::scene::Integrator;
+use tumble_interface::{Column, Frame, Issue, Scene, SceneError, StepError};
+
+/// A world together with the scene that it was built from.
+pub struct Simulation {
+    scene: Scene,
+    assets: Assets,
+    world: World,
+    scenery: Vec<Column>,
+    warnings: Vec<String>,
+    /// The failure of the last step: index and step of the system.
+    failure: Option<(usize, f64)>,
+}
+
+impl Simulation {
+    /// Builds a scene. Meshes that it names are in `assets`, by their path.
+    pub fn new(scene: Scene, assets: Assets) -> Result<Self, SceneError> {
+        let built = build(&scene, &assets)?;
+        Ok(Self { scene, assets, world: built.world, scenery: built.scenery, warnings: built.warnings, failure: None })
+    }
+
+    /// The scene that it was built from.
+    pub fn scene(&self) -> &Scene {
+        &self.scene
+    }
+
+    fn system_error(&self, system: &str, message: &str) -> SceneError {
+        let names = self.world.names();
+        if names.contains(&system) {
+            return SceneError::one(format!("system \"{system}\""), message);
+        }
+        let hint = tumble_interface::check::suggestion(system, names.iter().copied());
+        SceneError::one(format!("system \"{system}\""), format!("there is no such system{hint} (systems: {})", names.join(", ")))
+    }
+}
+
+impl Engine for Simulation {
+    fn time(&self) -> f64 {
+        self.world.time()
+    }
+
+    fn frame_index(&self) -> u64 {
+        self.world.frame_index()
+    }
+
+    fn step(&mut self, go_on: &(dyn Fn() -> bool + Sync)) -> Result<Option<StepReport>, StepError> {
+        self.failure = None;
+        let result = self.world.step(go_on);
+        if let Err(error) = &result {
+            let (name, step) = match error {
+                StepError::NotFinite(b) | StepError::Exploded(b) => (b.system.as_str(), b.step),
+                StepError::Solve { system, .. } | StepError::StepTooSmall { system, .. } => (system.as_str(), 0.0),
+                StepError::User(_) => ("", 0.0),
+            };
+            self.failure = self.world.names().iter().position(|n| *n == name).map(|i| (i, step));
+        }
+        result
+    }
+
+    fn frame(&self, columns: &[&str]) -> Frame {
+        Frame { time: self.world.time(), index: self.world.frame_index(), columns: self.world.columns(columns) }
+    }
+
+    fn topology(&self) -> Vec<Column> {
+        let mut all = self.world.topology();
+        all.extend(self.scenery.iter().cloned());
+        all
+    }
+
+    fn ledger(&self) -> Ledger {
+        self.world.ledger()
+    }
+
+    fn hash(&self) -> u64 {
+        self.world.hash()
+    }
+
+    fn save(&self, about: &[(&str, &str)]) -> Vec<u8> {
+        self.world.save(about)
+    }
+
+    fn systems(&self) -> Vec<String> {
+        self.world.names().into_iter().map(str::to_string).collect()
+    }
+
+    fn restore(&mut self, bytes: &[u8]) -> Result<(), SceneError> {
+        self.failure = None;
+        self.world.restore(bytes)
+    }
+
+    fn stability(&mut self) -> Vec<Stability> {
+        self.world.stability()
+    }
+
+    fn cures(&mut self, go_on: &(dyn Fn() -> bool + Sync)) -> Vec<Cure> {
+        let Some((system, step)) = self.failure else { return Vec::new() };
+        let plan = &plans(&self.scene)[system];
+        // The estimate is that of the start, where the trials begin.
+        let Ok(mut start) = Self::new(self.scene.clone(), self.assets.clone()) else { return Vec::new() };
+        let stability = start.stability().into_iter().find(|s| s.system == plan.name);
+        let usable: Vec<(Integrator, f64)> =
+            stability.iter().flat_map(|s| s.limits.iter().map(|l| (l.integrator, l.usable))).collect();
+        let step = if step > 0.0 { step } else { stability.map_or(self.scene.frame_time(), |s| s.step) };
+        cures::cures(&self.scene, &self.assets, self.world.frame_index() + 1, system, step, &usable, go_on)
+    }
+
+    fn warnings(&self) -> &[String] {
+        &self.warnings
+    }
+
+    fn add_force(&mut self, system: &str, force: Box<dyn UserForce>) -> Result<(), SceneError> {
+        match self.world.system(system).map(|s| s.add_force(force)) {
+            Some(true) => Ok(()),
+            _ => Err(self.system_error(system, "it moves tracers, which feel no force")),
+        }
+    }
+
+    fn replace_integrator(&mut self, system: &str, integrator: Box<dyn UserIntegrator>) -> Result<(), SceneError> {
+        match self.world.system(system).map(|s| s.replace_integrator(integrator)) {
+            Some(true) => Ok(()),
+            _ => Err(self.system_error(system, "it moves tracers, which have no velocities to integrate")),
+        }
+    }
+
+    fn write(&mut self, object: &str, column: &str, values: &[f64]) -> Result<(), SceneError> {
+        if let Some(i) = values.iter().position(|v| !v.is_finite()) {
+            return Err(SceneError { issues: vec![Issue::new(format!("{object}.{column}"), format!("number {i} is {}, expected a finite one", values[i]))] });
+        }
+        match self.world.write(object, column, values) {
+            Some(true) => Ok(()),
+            Some(false) => Err(SceneError::one(format!("{object}.{column}"), "expected position or velocity, three numbers for each mass")),
+            None => Err(SceneError::one(object, "there is no such object")),
+        }
+    }
+}

@@ -1,0 +1,150 @@
+"""The engine. All quantities in SI units, z up; arrays are row by row, one row per mass."""
+
+import os
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+Array = npt.NDArray[Any]
+Columns = dict[str, dict[str, Array]]
+"""Object name -> column name -> array."""
+
+Path = str | os.PathLike[str]
+
+version: str
+"""Version of tumble."""
+
+class TumbleError(Exception):
+    """Anything that tumble reports."""
+
+class SceneError(TumbleError):
+    """The input is wrong. Its text names every place and its cure."""
+
+    issues: list[dict[str, Any]]
+    """One dict per problem: path, line (or None), message."""
+
+class StepError(TumbleError):
+    """The simulation failed; the world stands at its last good frame."""
+
+    report: dict[str, Any]
+    """kind (not_finite, exploded, solve, step_too_small, user); for the first two also system, object, column, index,
+    time [s], integrator, step [s], stable_step [s], energy_ratio."""
+
+class ExportError(TumbleError):
+    """A result could not be written or drawn."""
+
+class Scene:
+    """A checked scene: what is there, how it moves, what is written out."""
+
+    def __init__(self, tree: Mapping[str, Any], folder: Path = ".") -> None:
+        """A scene from a dict; mesh files are looked for in `folder`. Raises SceneError."""
+
+    @staticmethod
+    def load(path: Path, set: Sequence[str] = ()) -> Scene:
+        """Reads a .toml or .json file. `set` overrides keys: "time.fps=30", "sheet.flag.size=[1, 2]". Raises SceneError."""
+
+    def replace(self, *overrides: str) -> Scene:
+        """A copy with keys overridden, as in `load`. Raises SceneError."""
+
+    def to_dict(self) -> dict[str, Any]:
+        """The resolved scene: every default written out, mesh files with the hash of their content."""
+
+    @property
+    def folder(self) -> str:
+        """Folder in which mesh files are looked for."""
+
+    @staticmethod
+    def schema() -> dict[str, Any]:
+        """JSON Schema of a scene; units are under "x-unit"."""
+
+class World:
+    """A scene in motion."""
+
+    def __init__(self, scene: Scene | Mapping[str, Any], threads: int | None = None) -> None:
+        """Builds the scene at t = 0. `threads` limits the processor cores used; the bits do not depend on it.
+        Raises SceneError."""
+
+    @property
+    def scene(self) -> Scene: ...
+    @property
+    def time(self) -> float:
+        """Simulated time [s]."""
+
+    @property
+    def frame_index(self) -> int:
+        """Frames simulated so far."""
+
+    @property
+    def systems(self) -> list[str]:
+        """Names of the systems."""
+
+    @property
+    def warnings(self) -> list[str]:
+        """What is doubtful about the scene."""
+
+    def step(self, frames: int = 1) -> dict[str, Any]:
+        """Simulates frames; returns what they took: steps, rejected, step_range [s], newton, linear, residual, unconverged,
+        broken, clamped [J], trials (of adaptive integrators: time, step, error, accepted). Releases the GIL; Ctrl-C goes
+        back to the last frame and raises KeyboardInterrupt. Raises StepError."""
+
+    @property
+    def frame(self) -> Columns:
+        """The columns that the scene's `output.columns` names, of every object that has them."""
+
+    def columns(self, *names: str) -> Columns:
+        """The named columns: position [m] n x 3, velocity [m/s] n x 3, orientation n x 4 (x, y, z, w), angular_velocity
+        [rad/s] n x 3, link_strain n."""
+
+    @property
+    def units(self) -> dict[str, dict[str, str]]:
+        """Units of all columns: object -> column -> SI unit."""
+
+    @property
+    def topology(self) -> Columns:
+        """What does not change. Objects: mass [kg] n, pinned (indices), triangles m x 3, links l x 2, curve (indices in
+        order), radius [m] 1. Colliders: position [m] n x 3, triangles m x 3."""
+
+    @property
+    def ledger(self) -> dict[str, Any]:
+        """The books: time, mass, momentum (3), angular_momentum (3), kinetic, elastic, external, energy [J], stretch,
+        penetration [m], speed [m/s], contacts, broken."""
+
+    def hash(self) -> str:
+        """Hash of everything that the next step depends on, 16 hexadecimal digits."""
+
+    def save(self, path: Path) -> None:
+        """Writes a checkpoint (safetensors, the scene inside). Raises ExportError."""
+
+    @staticmethod
+    def restore(path: Path, threads: int | None = None) -> World:
+        """The world of a checkpoint. Raises SceneError."""
+
+    def load(self, path: Path) -> None:
+        """Goes to a checkpoint of the same scene. Raises SceneError; the world then stays as it was."""
+
+    def stability(self) -> list[dict[str, Any]]:
+        """For each system, from its stiffest mode as it is now: system, integrator, step [s], frequency [rad/s], damping,
+        damping_max [1/s], culprit (object, index), limits (integrator, stable [s], usable [s])."""
+
+    def cures(self) -> list[dict[str, Any]]:
+        """After a StepError: changes that were tried from the last good frame: set, survived, energy_ratio."""
+
+    def add_force(self, force: Callable[[float, Array, Array, Array], npt.ArrayLike], system: str | None = None) -> None:
+        """Adds a force: force(t, x, v, mass) -> n x 3 [N], from x [m] and v [m/s], n x 3, and mass [kg], n."""
+
+    def set_integrator(
+        self,
+        step: Callable[
+            [float, float, Array, Array, Callable[[float, Array, Array], Array]], tuple[npt.ArrayLike, npt.ArrayLike]
+        ],
+        system: str | None = None,
+    ) -> None:
+        """Steps with step(t, h, x, v, acceleration) -> (x, v), where acceleration(t, x, v) -> n x 3 [m/s²]."""
+
+    def write(self, object: str, column: str, values: npt.ArrayLike) -> None:
+        """Sets position [m] or velocity [m/s], n x 3, of an object. Raises SceneError."""
+
+def load_mesh(path: Path) -> tuple[npt.NDArray[np.float64], npt.NDArray[np.uint32]]:
+    """Vertices [file units] n x 3 and triangles m x 3 of an OBJ, PLY, STL or GLB file. Raises SceneError."""
