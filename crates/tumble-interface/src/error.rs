@@ -100,7 +100,7 @@ pub struct Breakdown {
     pub system: String,
     /// Object that holds the culprit.
     pub object: String,
-    /// What broke first: `position`, `velocity` or `energy`.
+    /// What broke first: `position` or `velocity`.
     pub column: String,
     /// Index of the particle within its object.
     pub index: usize,

@@ -17,7 +17,7 @@ pub struct System {
     #[serde(default)]
     pub integrator: Integrator,
     /// Sub-steps per exchange. Without `substeps` and `step`, explicit integrators take as many as 0.7 of their
-    /// estimated stability limit asks for, implicit ones take one.
+    /// estimated usable step asks for, implicit ones take one.
     #[serde(default)]
     #[schemars(range(min = 1, max = 10_000_000))]
     pub substeps: Option<u32>,
@@ -77,7 +77,7 @@ pub enum Integrator {
     /// v += h a, then x += h v. Order 1; bounded energy below its limit.
     #[default]
     SymplecticEuler,
-    /// x += h/2 (v + v + h a), v += h a. Order 1 in v; gains energy slowly.
+    /// x += h/2 (v + v + h a), v += h a. Order 1; gains energy half as fast as forward Euler.
     ModifiedEuler,
     /// Explicit midpoint. Order 2.
     Midpoint,

@@ -17,7 +17,7 @@ use crate::math::Lane;
 /// x [m]   k [N m].   No trigonometry, smooth through flat.
 /// Degenerate: folded onto itself (theta = pi) r is infinite; a triangle without area or an edge without length
 /// has no normal and gives no force.
-/// Source: [grinspun2003] for the energy, [bridson2003] for the gradient of theta.
+/// Source: [tamstorf2013] for the measure, [bridson2003] for the gradient of theta.
 pub struct Hinge;
 
 impl Element<4, 1, 1> for Hinge {

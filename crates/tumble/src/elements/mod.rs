@@ -205,7 +205,7 @@ pub fn tangents<E: Element<N, M, D>, Y: Law<P>, L: Lane, const N: usize, const M
     r
 }
 
-/// One step of the position-based projection of |r| to zero with compliance `alpha` = 1/(k h²) [1/(m^-2 kg)], which
+/// One step of the position-based projection of |r| to zero with compliance `alpha` = 1/(k h²) [1/kg] for a measure in metres, which
 /// is 0 for a rigid constraint. Points only; `w` are inverse masses. Returns the corrections.
 ///
 ///   dx_i = -w_i g_i (c + alpha lambda) / (sum_j w_j |g_j|² + alpha),   g = J^T r/|r|, c = |r|      (elements.5)

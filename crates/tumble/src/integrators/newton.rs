@@ -114,7 +114,7 @@ pub fn solve(
         v.copy_from_slice(trial_v);
         x.copy_from_slice(trial_x);
         // Below the round-off of the forces no further progress can be seen; nor where full steps stop helping near it.
-        converged = size <= tolerance * first || size <= 2.0 * floor || (alpha == 1.0 && size > 0.5 * before && size <= 50.0 * floor);
+        converged = size <= tolerance * first || size <= floor || (alpha == 1.0 && size > 0.5 * before && size <= 10.0 * floor);
     }
     let relative = if first > 0.0 { size / first } else { 0.0 };
     report.residual = report.residual.max(relative);

@@ -2,7 +2,7 @@
 //!
 //! Every link of a family gets k_s = modulus x (length, area or volume that it stands for) / l0², so that stiffness does
 //! not depend on how finely a thing is divided; the links of a family in one direction together stand for the whole thing
-//! once.                                                               (springs.6)
+//! once.                                                               (springs.8)
 
 mod block;
 mod lattice;
@@ -64,7 +64,8 @@ impl Site<'_> {
     }
 
     /// Hinges across every edge of a mesh of points that has two triangles; `stiffness` is the bending stiffness per
-    /// width [N m], the rest angle that of the mesh. k = 3 B l²/(A1 + A2). Source: [grinspun2003].
+    /// width [N m], the rest angle that of the mesh. k = B l²/(A1 + A2), which gives a sheet bent
+    /// to a cylinder its stiffness B.                                  (bending.6)
     fn hinges(&mut self, mesh: &tumble_interface::Mesh, first: u32, stiffness: f64) {
         use crate::elements::{Element, Hinge};
         if stiffness == 0.0 {
@@ -84,7 +85,7 @@ impl Site<'_> {
             if areas > 0.0 && length_sq > 0.0 {
                 let row = |i: u32| [vertex(i).x, vertex(i).y, vertex(i).z, 0.0];
                 let [rest] = Hinge::residual([0.0], [row(a), row(b), row(c), row(d)]);
-                self.parts.hinge([a, b, c, d].map(|i| i + first), rest, 3.0 * stiffness * length_sq / areas);
+                self.parts.hinge([a, b, c, d].map(|i| i + first), rest, stiffness * length_sq / areas);
             }
         }
     }

@@ -81,16 +81,35 @@ fn frames(site: &mut Site<'_>, thing: &Rope, rod: &Rod, places: &[Vector], first
         let d = (places[i + 1] - places[i]).normalized();
         turn = if i == 0 { from_z_to(d) } else { shortest(turn.axis_z(), d) * turn };
         let frame = site.parts.frame(turn.row(), inertia);
-        if (i == 0 && clamped[0]) || (i + 1 == n && clamped[1]) {
-            site.parts.clamp_frame(frame);
+        for end in [(i == 0 && clamped[0]), (i + 1 == n && clamped[1])] {
+            if end {
+                clamp(site, rod, frame, turn, spacing, twist);
+            }
         }
         let k = rod.stretch * spacing;
         site.parts.rod_stretch([first + i as u32, first + i as u32 + 1], frame, [spacing, shear], k, k * rod.damping);
         if i > 0 && rod.bend > 0.0 {
-            let k = rod.bend * spacing;
-            site.parts.rod_bend([before, frame], [2.0 / spacing, 0.0, 0.0, 0.0, (twist / rod.bend).sqrt()], k, k * rod.damping);
+            bend(site, rod, [before, frame], spacing, twist);
         }
         before = frame;
+    }
+}
+
+/// Bend and twist between two frames at a distance of l [m].
+fn bend(site: &mut Site<'_>, rod: &Rod, frames: [u32; 2], l: f64, twist: f64) {
+    let k = rod.bend * l;
+    site.parts.rod_bend(frames, [2.0 / l, 0.0, 0.0, 0.0, (twist / rod.bend).sqrt()], k, k * rod.damping);
+}
+
+/// Holds a frame at the very end of the rod, half a segment from that of its last segment: holding the latter itself would
+/// clamp the rod half a segment too far along, an error of order 1.    (rods.5)
+fn clamp(site: &mut Site<'_>, rod: &Rod, frame: u32, turn: Quat<f64>, spacing: f64, twist: f64) {
+    if rod.bend > 0.0 {
+        let held = site.parts.frame(turn.row(), 1.0);
+        site.parts.clamp_frame(held);
+        bend(site, rod, [held, frame], spacing / 2.0, twist);
+    } else {
+        site.parts.clamp_frame(frame);
     }
 }
 

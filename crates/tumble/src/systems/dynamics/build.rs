@@ -12,7 +12,7 @@ use crate::state::{Masses, Object, State};
 use std::ops::Range;
 use std::sync::Arc;
 use tumble_interface::SceneError;
-use tumble_interface::scene::{Adaptive, Integrator, Solver};
+use tumble_interface::scene::{Adaptive, Hessian, Integrator, Solver};
 
 /// How a system steps.
 pub struct Settings {
@@ -47,7 +47,7 @@ pub struct SpringPart {
     pub damping: f64,
     /// Rest length [m]; 0 makes f = k (b - a).
     pub rest: f64,
-    /// Stiffening c/l0².
+    /// Stiffening c.
     pub hardening: f64,
     /// Pulls only.
     pub tension_only: bool,
@@ -286,7 +286,13 @@ impl Parts {
                 objects.push(object);
             }
         }
+        let mut stiffness = vec![[0.0; 6]; rows];
+        for batch in &mut batches.list {
+            batch.linearize(&state.x, crate::elements::Weights { stiffness: 1.0, damping: 0.0, hessian: Hessian::Definite });
+            batch.add_diagonal(&state.x, &mut stiffness);
+        }
         let laws = super::laws::Laws {
+            grip: stiffness.iter().map(|k| (k[0] + k[1] + k[2]) / 3.0).collect(),
             batches: batches.list,
             forces: self.forces,
             gravity: settings.gravity,

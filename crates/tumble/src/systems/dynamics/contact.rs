@@ -5,8 +5,10 @@ use crate::elements::{Block, Linear, PointPlane, forces};
 use crate::geometry::{Collider, Touch, Vector};
 use crate::math::{Real, Row, row, xyz64};
 
-/// Penalty stiffness over m/h²: a resting mass sinks in by g h²/30, 0.03 mm at 240 steps a second.
+/// Penalty stiffness over m/h²: a resting mass sinks in by g h²/30, 0.006 mm at 240 steps a second.
 const PENALTY: f64 = 30.0;
+/// Penalty stiffness over that of the links which pull the mass in.
+const GRIP: f64 = 4.0;
 /// Speed below which friction of the implicit schemes is proportional to the speed [m/s].
 const CREEP: f64 = 1e-3;
 
@@ -53,26 +55,34 @@ pub fn bounce(colliders: &[Collider], x: Row, before: Row, v: &mut Row, resting:
     touched
 }
 
+/// Penalty stiffness [N/m] of a mass [kg] that its links hold with `grip` [N/m], in a stage of length gh.   (contact.6)
+pub fn stiffness(mass: Real, grip: Real, gh: f64) -> f64 {
+    PENALTY * f64::from(mass) / (gh * gh) + GRIP * f64::from(grip)
+}
+
 /// Penalty and friction of one mass in an implicit stage.
 pub struct Penalty {
     touch: Touch,
     rest: [f64; 4],
     stiffness: f64,
+    /// mu times the normal force at the start of the stage [N].
     friction: f64,
     slide: Vector,
 }
 
 impl Penalty {
-    /// The contacts of a mass at x with velocity v in a stage of length gh.
-    pub fn of<'a>(colliders: &'a [Collider], mass: f64, x: Row, v: Row, gh: f64) -> impl Iterator<Item = Penalty> + 'a {
+    /// The contacts of a mass at x with velocity v, with this penalty stiffness [N/m]. Friction takes its normal force from
+    /// `start`, where the mass was when the stage began: with that force held fixed friction has a convex potential, and
+    /// Newton's method converges.
+    pub fn of(colliders: &[Collider], stiffness: f64, x: Row, v: Row, start: Row) -> impl Iterator<Item = Penalty> {
         colliders.iter().filter_map(move |collider| {
             let (position, velocity) = (xyz64(x), xyz64(v));
             let touch = collider.touch(position)?;
             let n = touch.normal;
             Some(Penalty {
                 rest: [n.x, n.y, n.z, n.dot(position) + touch.depth],
-                stiffness: PENALTY * mass / (gh * gh),
-                friction: collider.friction,
+                stiffness,
+                friction: collider.friction * stiffness * if collider.friction > 0.0 { collider.touch(xyz64(start)).map_or(0.0, |t| t.depth) } else { 0.0 },
                 slide: velocity - n * velocity.dot(n),
                 touch,
             })
@@ -81,7 +91,7 @@ impl Penalty {
 
     /// mu N/|v_t|, finite where the mass rests [N s/m].
     fn drag(&self) -> f64 {
-        self.friction * self.stiffness * self.touch.depth / self.slide.norm().max(CREEP)
+        self.friction / self.slide.norm().max(CREEP)
     }
 
     /// The force [N]: the point-plane element and Coulomb friction.

@@ -29,6 +29,10 @@ pub struct Laws {
     pub masses: Masses,
     /// Solids.
     pub colliders: Arc<Vec<Collider>>,
+    /// Stiffness with which the elements hold each row at the start [N/m].
+    pub grip: Vec<Real>,
+    /// Positions at the start of the implicit stage.
+    pub start: Vec<Row>,
     /// Settings of implicit stages.
     pub solver: Solver,
     /// Storage of implicit stages.
@@ -163,6 +167,10 @@ impl Equation for Laws {
     }
 
     fn solve(&mut self, stage: &Stage<'_>, x: &mut [Row], v: &mut [Row], report: &mut StepReport) -> Result<(), StepError> {
+        if !self.colliders.is_empty() {
+            self.start.clear();
+            self.start.extend_from_slice(x);
+        }
         let mut work = std::mem::take(&mut self.implicit.newton);
         let solver = self.solver.clone();
         let result = newton::solve(self, stage, x, v, &solver, &mut work, report);

@@ -119,12 +119,13 @@ impl Dynamics {
 
     /// Springs to other systems: half of the interaction that this system owns. Each is an impulse h f, so what one side
     /// gets the other loses, whatever the integrator.
-    fn pull_tethers(&mut self, t: f64, h: f64, exchange: &mut Exchange) {
+    fn pull_tethers(&mut self, h: f64, exchange: &mut Exchange) {
         for k in 0..self.tethers.len() {
             let tether = self.tethers[k];
             let other = exchange.port(tether.port);
             let (x, v) = (xyz64(self.state.x[tether.row]), xyz64(self.state.v[tether.row]));
-            let d = other.position + other.velocity * (t - other.time) - x;
+            // The state as published: carrying it on to t would deliver a partner's kick an interval late.
+            let d = other.position - x;
             let length = d.norm();
             let n = d.normalized();
             let pull = tether.stiffness * (length - tether.rest_length) + tether.damping * n.dot(other.velocity - v);
@@ -353,7 +354,7 @@ impl System for Dynamics {
                 done = if h == left { dt } else { done + h };
                 report.steps += 1;
                 report.step_range = Some(report.step_range.map_or((h, h), |(a, b)| (a.min(h), b.max(h))));
-                self.pull_tethers(t + done, h, exchange);
+                self.pull_tethers(h, exchange);
                 self.after(h, &mut report);
                 self.look(t + done)?;
             }
@@ -373,7 +374,7 @@ impl System for Dynamics {
                 break;
             }
             let time = t + f64::from(k) * h;
-            self.pull_tethers(time, h, exchange);
+            self.pull_tethers(h, exchange);
             self.substep(time, h, &mut report).map_err(|e| self.named(e))?;
             self.look(time + h)?;
         }

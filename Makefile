@@ -1,0 +1,55 @@
+# Everything a person needs. `make demo` and `make test` set up whatever is missing.
+PYTHON ?= python3
+VENV := .venv
+BIN := $(VENV)/bin
+RUST := $(wildcard Cargo.toml Cargo.lock crates/*/Cargo.toml) $(shell find crates -name '*.rs')
+
+.PHONY: help setup demo test lint test-rust test-python validate bench clean
+
+help:
+	@echo "make demo      set up, drape a sheet over the Stanford bunny, show where the film is"
+	@echo "make test      set up, pass all tests"
+	@echo "make setup     leave $(BIN)/tumble"
+	@echo "make validate  the long figures"
+	@echo "make bench     speed against peers, which it installs into .venv-bench"
+
+setup: $(VENV)/.engine
+
+$(VENV)/.python: pyproject.toml
+	test -x $(BIN)/python || $(PYTHON) -m venv $(VENV)
+	$(BIN)/python -m pip install --quiet --upgrade pip "maturin>=1.9,<2"
+	@touch $@
+
+# The engine and the package, editable, with everything that pictures and tests need.
+$(VENV)/.engine: $(VENV)/.python $(RUST)
+	$(BIN)/maturin develop --release --quiet --extras pictures,dev
+	@touch $@
+
+demo: setup
+	$(BIN)/tumble run drape/sheet-on-bunny --out out/demo --force
+
+test: setup lint test-rust test-python
+	@echo "All tests passed."
+
+lint: setup
+	cargo fmt --all --check
+	cargo clippy --workspace --all-targets --quiet -- -D warnings
+	$(BIN)/ruff format --check python
+	$(BIN)/ruff check --quiet python
+	$(BIN)/mypy
+
+test-rust:
+	cargo test --workspace --exclude tumble-python --release --quiet
+
+test-python: setup
+	$(BIN)/python -m pytest -m "not slow"
+
+validate: setup
+	cargo test --workspace --exclude tumble-python --release --quiet -- --include-ignored --nocapture
+	$(BIN)/python -m pytest -m "slow" -s
+
+bench: setup
+	$(PYTHON) benchmarks/bench.py
+
+clean:
+	rm -rf target out dist $(VENV) .venv-bench
