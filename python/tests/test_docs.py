@@ -21,3 +21,9 @@ def test_snippet(code: str) -> None:
 
 def test_there_are_snippets() -> None:
     assert len(SNIPPETS) >= 7
+
+
+def test_the_scene_page_is_up_to_date() -> None:
+    from tumble.words import page
+
+    assert (ROOT / "docs" / "scene.md").read_text(encoding="utf-8") == page(), "python -m tumble.words > docs/scene.md"

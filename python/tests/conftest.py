@@ -1,0 +1,100 @@
+"""What the tests share: small scenes, and the command line."""
+
+import copy
+import json
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from tumble import Run
+from tumble.cli import main
+from tumble.run import simulate
+
+Tree = dict[str, Any]
+
+
+@pytest.fixture
+def spring() -> Tree:
+    """A mass that hangs on a spring and starts with a push; 25 frames, a checkpoint every 10."""
+    return {
+        "version": 1,
+        "time": {"fps": 24, "frames": 25},
+        "particles": [
+            {
+                "name": "p",
+                "position": [[0, 0, 1], [0, 0, 0.5]],
+                "velocity": [[0, 0, 0], [0.5, 0, 0]],
+                "pin": ["vertex 0"],
+                "spring": [{"between": [0, 1], "stiffness": 100.0}],
+            }
+        ],
+        "output": {"plot": False},
+    }
+
+
+@pytest.fixture
+def reference(spring: Tree, tmp_path: Path) -> Run:
+    """The run of `spring`, never stopped."""
+    return simulate(spring, tmp_path / "reference")
+
+
+@pytest.fixture
+def sheet() -> Tree:
+    """A small sheet that falls on a ball."""
+    return {
+        "version": 1,
+        "time": {"fps": 24, "frames": 6},
+        "sheet": [{"name": "sheet", "size": [1.0, 1.0], "resolution": [6, 6], "center": [0.0, 0.0, 0.35]}],
+        "collider": [{"name": "ball", "shape": {"sphere": {"radius": 0.3}}}],
+        "output": {"plot": False},
+    }
+
+
+@pytest.fixture
+def exploding(spring: Tree) -> Tree:
+    """Forward Euler on a stiff spring that starts stretched: breaks within a frame."""
+    tree = copy.deepcopy(spring)
+    tree["system"] = [{"name": "soft", "integrator": "forward_euler", "step": 0.004}]
+    tree["particles"][0]["spring"] = [{"between": [0, 1], "stiffness": 1e6, "rest_length": 0.4}]
+    return tree
+
+
+@pytest.fixture
+def scene_file(tmp_path: Path) -> Callable[..., Path]:
+    """Writes a scene and returns its path: `scene_file(tree, "name.json")`."""
+
+    def write(tree: Tree, name: str = "scene.json") -> Path:
+        path = tmp_path / name
+        path.write_text(json.dumps(tree))
+        return path
+
+    return write
+
+
+@dataclass(frozen=True)
+class Answer:
+    """What a command said and how it ended."""
+
+    code: int
+    out: str
+    err: str
+
+
+@pytest.fixture
+def tumble(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> Callable[..., Answer]:
+    """Runs the command line in an empty folder: `tumble("run", "scene.json")`."""
+    monkeypatch.chdir(tmp_path)
+
+    def command(*arguments: object) -> Answer:
+        with pytest.raises(SystemExit) as end:
+            main([str(a) for a in arguments])
+        captured = capsys.readouterr()
+        code = end.value.code
+        return Answer(code if isinstance(code, int) else 0, captured.out, captured.err)
+
+    return command

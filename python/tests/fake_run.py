@@ -1,0 +1,153 @@
+"""Runs that were never simulated, for tests of what reads runs: everything follows a formula of time."""
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+Array = npt.NDArray[Any]
+Columns = dict[str, dict[str, Array]]
+
+FPS = 10.0
+GREEN = [0.05, 0.5, 0.1]
+RED = [0.6, 0.05, 0.05]
+BLUE = [0.05, 0.1, 0.6]
+BALL = np.array([0.0, 0.0, 0.3])
+BALL_RADIUS = 0.3
+RADIUS = 0.06
+N = 9
+"""Vertices along each side of the sheet."""
+
+
+@dataclass
+class FakeRun:
+    """Has what `tumble.run.Run` has, as far as pictures and exports read it."""
+
+    scene: dict[str, Any]
+    static: Columns
+    columns: Callable[[float], Columns]
+    n_frames: int = 5
+    folder: Path = Path("nowhere")
+    manifest: dict[str, Any] = field(default_factory=dict)
+
+    def time(self, i: int) -> float:
+        return i / FPS
+
+    def frame(self, i: int) -> Columns:
+        if not 0 <= i < self.n_frames:
+            raise IndexError(i)
+        return self.columns(self.time(i))
+
+    @property
+    def ledger(self) -> dict[str, Array]:
+        t = np.arange(self.n_frames) / FPS
+        kinetic = np.sin(3 * t) ** 2
+        books = {"frame": np.arange(self.n_frames), "time": t, "mass": np.full(len(t), 2.0)}
+        books |= {f"momentum_{axis}": np.sin(t + k) for k, axis in enumerate("xyz")}
+        books |= {"kinetic": kinetic, "elastic": 0.25 - 0.25 * kinetic, "external": 0.75 - 0.75 * kinetic}
+        return books | {"stretch": 1 + 0.1 * t, "speed": np.abs(np.cos(t)), "contacts": np.arange(len(t))}
+
+
+def scene(**words: Any) -> dict[str, Any]:
+    """The resolved words that every scene has, and more."""
+    return {
+        "version": 1,
+        "title": "a test",
+        "dimension": 3,
+        "plane": "xz",
+        "time": {"fps": FPS, "frames": 4, "exchanges": 1},
+        "world": {"gravity": [0.0, 0.0, -9.8]},
+        "system": [{"name": "soft", "method": "dynamics"}],
+        "camera": {"position": None, "target": None, "view_angle": 35.0, "resolution": [160, 90]},
+    } | words
+
+
+def ball(n: int = 12) -> tuple[Array, Array]:
+    """A sphere around BALL: vertices, triangles that run counter-clockwise seen from outside."""
+    polar, turn = np.meshgrid(np.linspace(0, np.pi, n + 1)[1:-1], 2 * np.pi * np.arange(2 * n) / (2 * n), indexing="ij")
+    rings = np.stack([np.sin(polar) * np.cos(turn), np.sin(polar) * np.sin(turn), np.cos(polar)], -1).reshape(-1, 3)
+    vertices = np.concatenate([[[0, 0, 1.0]], rings, [[0, 0, -1.0]]])
+    m, last = 2 * n, len(rings) + 1
+    triangles = [(0, 1 + j, 1 + (j + 1) % m) for j in range(m)]
+    for i in range(n - 2):
+        for j in range(m):
+            a, b = 1 + i * m + j, 1 + i * m + (j + 1) % m
+            triangles += [(a, a + m, b + m), (a, b + m, b)]
+    triangles += [(last, last - m + (j + 1) % m, last - m + j) for j in range(m)]
+    return BALL + BALL_RADIUS * vertices, np.array(triangles, dtype=np.uint32)
+
+
+def cube() -> tuple[Array, Array]:
+    """A cube of edge 1 around 0, of 8 vertices."""
+    vertices = np.array([[x, y, z] for x in (0, 1) for y in (0, 1) for z in (0, 1)]) - 0.5
+    squares = [(0, 1, 3, 2), (4, 6, 7, 5), (0, 4, 5, 1), (2, 3, 7, 6), (0, 2, 6, 4), (1, 5, 7, 3)]
+    return vertices, np.array([t for a, b, c, d in squares for t in ((a, b, c), (a, c, d))], dtype=np.uint32)
+
+
+def lattice() -> tuple[Array, Array, Array]:
+    """A flat sheet of side 1: vertices, triangles, links."""
+    s = np.linspace(-0.5, 0.5, N)
+    vertices = np.stack([*np.meshgrid(s, s, indexing="ij"), np.zeros((N, N))], -1).reshape(-1, 3)
+    i = np.arange(N * N).reshape(N, N)
+    a, b, c, d = (k.ravel() for k in (i[:-1, :-1], i[1:, :-1], i[1:, 1:], i[:-1, 1:]))
+    triangles = np.concatenate([np.stack([a, b, c], 1), np.stack([a, c, d], 1)])
+    sides = [(i[:-1], i[1:]), (i[:, :-1], i[:, 1:])]
+    links = np.concatenate([np.stack([p.ravel(), q.ravel()], 1) for p, q in sides])
+    return vertices, triangles.astype(np.uint32), links.astype(np.uint32)
+
+
+def studio(**more: Any) -> FakeRun:
+    """A sheet that waves beside a ball on a floor, a rope above and masses on springs in front."""
+    flat, triangles, links = lattice()
+    along = np.linspace(0, 1, 20)
+    masses = np.array([[-0.9, -0.6, 0.1], [-0.6, -0.6, 0.1], [-0.3, -0.6, 0.1]])
+
+    def columns(t: float) -> Columns:
+        wave, speed = 0.1 * np.sin(6 * flat[:, 0] + 5 * t), 0.5 * np.cos(6 * flat[:, 0] + 5 * t)
+        zero = np.zeros_like(wave)
+        sheet = np.stack([flat[:, 0] + 1.0, wave, flat[:, 1] + 0.6], 1)
+        # The rope's masses are stored from its end to its start.
+        rope = np.stack([-0.8 + 1.6 * along, 0 * along, 1.2 - 0.4 * t * along * (1 - along)], 1)[::-1]
+        slope = np.stack([0 * along, 0 * along, -0.4 * along * (1 - along)], 1)[::-1]
+        return {
+            "a sheet": {"position": f32(sheet), "velocity": f32(np.stack([zero, speed, zero], 1))},
+            "rope": {"position": f32(rope), "velocity": f32(slope)},
+            "masses": {
+                "position": masses + np.array([0.0, 0.0, 0.1 * t]),
+                "velocity": np.tile([0.0, 0.0, 0.1], (3, 1)),
+            },
+        }
+
+    position, faces = ball()
+    floor = np.array([[-50.0, -50, 0], [50, -50, 0], [50, 50, 0], [-50, 50, 0]])
+    words = scene(
+        particles=[{"name": "masses", "radius": RADIUS, "color": RED}],
+        rope=[{"name": "rope", "radius": 0.03, "color": None}],
+        sheet=[{"name": "a sheet", "color": BLUE}],
+        collider=[
+            {"name": "ball", "shape": {"sphere": {"center": BALL.tolist(), "radius": BALL_RADIUS}}, "color": GREEN},
+            {"name": "floor", "shape": {"floor": {"height": 0.0}}, "color": None},
+        ],
+    )
+    static = {
+        "a sheet": {"mass": np.ones(N * N), "triangles": triangles, "links": links},
+        "rope": {"mass": np.ones(20), "curve": np.arange(20, dtype=np.uint32)[::-1], "radius": np.array([0.03])},
+        "masses": {"mass": np.ones(3), "links": np.array([[0, 1], [1, 2]], np.uint32), "radius": np.array([RADIUS])},
+        "ball": {"position": position, "triangles": faces},
+        "floor": {"position": floor, "triangles": np.array([[0, 1, 2], [0, 2, 3]], dtype=np.uint32)},
+    }
+    return FakeRun(words | more, static, columns)
+
+
+def one(name: str, section: str, static: dict[str, Array], position: Array, **words: Any) -> FakeRun:
+    """A run of one object that stays where it is."""
+    return FakeRun(
+        scene(**{section: [{"name": name}]}) | words, {name: static}, lambda t: {name: {"position": position}}
+    )
+
+
+def f32(values: Array) -> Array:
+    return np.ascontiguousarray(values, dtype=np.float32)

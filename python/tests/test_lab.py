@@ -1,0 +1,381 @@
+"""The lab: do its numbers agree with what is known in closed form, and are its pages whole?"""
+
+import csv
+import math
+from collections.abc import Callable
+from itertools import pairwise
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from matplotlib.image import imread
+
+from tumble import Scene, SceneError
+from tumble.lab import exact, findings, integrators, patterns, structures
+from tumble.lab.cells import Purse
+from tumble.lab.limits import Found, largest_steps, stiffest_mode
+from tumble.lab.measure import Results
+from tumble.lab.schemes import BY_WORD, SCHEMES
+from tumble.lab.subject import Subject, subject
+
+Tree = dict[str, Any]
+
+W = 3.0
+"""Angular frequency of the oscillator [rad/s]."""
+
+
+def oscillator(**spring: Any) -> Tree:
+    return {
+        "version": 1,
+        "title": "An oscillator",
+        "world": {"gravity": [0, 0, 0]},
+        "particles": [
+            {
+                "name": "p",
+                "position": [[0, 0, 0], [1, 0, 0]],
+                "pin": ["vertex 0"],
+                "spring": [{"between": [0, 1], "stiffness": W * W, "rest_length": 0, **spring}],
+            }
+        ],
+    }
+
+
+def damped(c: float) -> Tree:
+    """Stretched by little, so that even a thousandfold energy keeps it near its rest length and the spring linear."""
+    tree = oscillator(rest_length=1.0, damping=c)
+    tree["particles"][0]["position"] = [[0, 0, 0], [1.001, 0, 0]]
+    return tree
+
+
+def swirl() -> Tree:
+    return {
+        "version": 1,
+        "system": [{"name": "dust", "method": "tracers", "integrator": "midpoint"}],
+        "field": [{"kind": "swirl", "rate": 2.0}],
+        "particles": [{"name": "p", "position": [[1, 0, 0], [0.3, 0.4, 0.1]]}],
+    }
+
+
+def steps_of(tree: Tree, *words: str, budget: float = 60.0) -> dict[str, Found]:
+    return largest_steps(subject(Scene(tree)), [BY_WORD[w] for w in words], Purse(budget), lambda: None)
+
+
+def ratio_at_limit(z: float, growth: Callable[[float], float]) -> float:
+    """ln of the energy's growth within 100 periods, over ln 1000."""
+    return math.log(growth(z)) * 200 * math.pi / z / math.log(1000)
+
+
+@pytest.fixture(scope="module")
+def undamped() -> dict[str, Found]:
+    return steps_of(oscillator(), "forward_euler", "symplectic_euler", "verlet", "rk4", "implicit_euler", "bdf2")
+
+
+@pytest.mark.parametrize("word", ["forward_euler", "symplectic_euler", "verlet", "rk4"])
+def test_the_largest_usable_step_is_the_predicted_one(undamped: dict[str, Found], word: str) -> None:
+    found = undamped[word]
+    # Bisection ends within 1.5 % below; measured 0.991 for all four.
+    assert 0.9 < found.measured / found.predicted < 1.1
+    assert 0.9 < found.disturbed / found.predicted < 1.1
+
+
+def test_the_largest_usable_step_is_that_of_the_closed_form(undamped: dict[str, Found]) -> None:
+    z = {word: W * found.measured for word, found in undamped.items()}
+    # Forward Euler multiplies the energy by 1 + z² a step (integrators.21); 2 % of z are 2 % of the exponent.
+    assert ratio_at_limit(z["forward_euler"], lambda z: 1 + z * z) == pytest.approx(1.0, abs=0.03)
+    assert z["verlet"] == pytest.approx(2.0, rel=0.02)
+    assert z["rk4"] == pytest.approx(math.sqrt(8), rel=0.02)
+
+
+def test_implicit_schemes_survive_every_step(undamped: dict[str, Found]) -> None:
+    for word in ("implicit_euler", "bdf2"):
+        assert undamped[word].measured == math.inf
+        assert undamped[word].largest_tried * W == pytest.approx(78.0)
+
+
+def test_what_broke_is_named(undamped: dict[str, Found]) -> None:
+    for word in ("forward_euler", "symplectic_euler", "verlet", "rk4"):
+        autopsy = undamped[word].autopsy
+        assert autopsy is not None
+        assert (autopsy.failure["object"], autopsy.failure["index"]) == ("p", 1)
+        assert 0 < autopsy.failure["time"] <= autopsy.duration
+
+
+def test_damping_is_in_the_prediction_and_in_the_measurement() -> None:
+    c = 0.6
+    found = steps_of(damped(c), "forward_euler", "symplectic_euler")
+    # (integrators.30): w²h² + 2 c h = 4. Growth beyond it is fast, so usable is stable.
+    h = found["symplectic_euler"].disturbed
+    assert W * W * h * h + 2 * c * h == pytest.approx(4.0, rel=0.04)
+    # (integrators.31): stable up to c/w², usable a little beyond; an undamped one could use a twentieth.
+    h = found["forward_euler"].disturbed
+    assert 1.0 < h / (c / W**2) < 1.1
+    assert 0.9 < h / found["forward_euler"].predicted < 1.1
+
+
+def test_the_stiffest_mode_of_a_chain() -> None:
+    tree = oscillator()
+    tree["particles"][0] |= {
+        "position": [[i, 0, 0] for i in range(6)],
+        "pin": ["vertex 0", "vertex 5"],
+        "spring": [{"between": [i, i + 1], "stiffness": 4.0, "rest_length": 0} for i in range(5)],
+        "velocity": [[0, 0, 0]],
+    }
+    mode = stiffest_mode(subject(Scene(tree)))
+    assert mode is not None
+    # Neighbours in antiphase: sin(4 pi i/5), in every coordinate (oscillator.8's chain).
+    shape = np.sin(4 * np.pi * np.arange(6) / 5)
+    shape /= np.linalg.norm(shape)
+    along = np.abs(shape @ mode)
+    assert np.linalg.norm(along) == pytest.approx(1.0, abs=1e-3)
+
+
+def studied(tree: Tree, **settings: Any) -> Results:
+    return integrators.study(Scene(tree), **settings)
+
+
+def test_observed_orders() -> None:
+    words = ["forward_euler", "midpoint", "rk4", "verlet", "implicit_midpoint"]
+    results = studied(oscillator(), integrators=words, steps=[0.04, 0.02, 0.01, 0.005], duration=3.7, budget=20.0)
+    seen = {s.word: findings.order(results, s) for s in results.schemes}
+    # Measured 1.03, 2.00, 4.00, 2.00, 2.00.
+    for word in words:
+        assert abs(seen[word] - BY_WORD[word].order) < 0.3, seen
+    assert results.reference is not None
+    assert results.reference.how == "the exact solution"
+
+
+def test_a_converged_solution_stands_in_for_the_exact_one() -> None:
+    tree = oscillator(rest_length=0.5)
+    settings: dict[str, Any] = {
+        "integrators": ["verlet"],
+        "steps": [0.02, 0.01, 0.005],
+        "duration": 2.3,
+        "budget": 10.0,
+    }
+    results = studied(tree, **settings)
+    assert results.reference is not None
+    assert "dormand_prince" in results.reference.how
+    assert results.reference.uncertainty < 1e-9
+    # x - 1/2 = cos(w t)/2, as long as the mass does not pass the pin.
+    end = results.reference.positions[-1][1]
+    assert end == pytest.approx([0.5 + 0.5 * math.cos(W * 2.3), 0, 0], abs=1e-9)
+    assert findings.order(results, BY_WORD["verlet"]) == pytest.approx(2.0, abs=0.1)
+
+
+def test_exact_solution_of_linear_springs() -> None:
+    """Against the equation itself: x'' = (k (x0 - x) + k' (y - x))/m + g - c x', by finite differences."""
+    tree = oscillator()
+    tree["world"] = {"gravity": [0, 0, -2.0]}
+    tree["force"] = [{"kind": "drag", "rate": 0.3}]
+    tree["particles"][0] |= {
+        "position": [[0, 0, 0], [1, 0.2, 0], [2, 0, 1]],
+        "velocity": [[0, 0, 0], [0.1, 0, 0], [0, -1, 0]],
+        "mass": [1.0, 0.5, 2.0],
+        "spring": [
+            {"between": [0, 1], "stiffness": 4.0, "rest_length": 0},
+            {"between": [1, 2], "stiffness": 7.0, "rest_length": 0},
+        ],
+    }
+    solution = subject(Scene(tree)).solution
+    assert solution is not None
+    d, t = 1e-4, 1.3
+    before, x, after = (solution.at(t + s * d) for s in (-1, 0, 1))
+    v, a = (after - before) / (2 * d), (after - 2 * x + before) / d**2
+    force = 4.0 * (x[0] - x[1]) + 7.0 * (x[2] - x[1])
+    # Differences are off by 1e-16/d² = 1e-8 from round-off and by d²/12 times the fourth derivative, under 1e-5.
+    assert a[1] == pytest.approx(force / 0.5 + [0, 0, -2] - 0.3 * v[1], abs=1e-5)
+    assert a[2] == pytest.approx(7.0 * (x[1] - x[2]) / 2.0 + [0, 0, -2] - 0.3 * v[2], abs=1e-5)
+    assert solution.at(0.0) == pytest.approx(np.array([[0, 0, 0], [1, 0.2, 0], [2, 0, 1]]))
+    assert np.linalg.norm(a[1]) > 0.1
+
+
+def test_no_exact_solution_where_something_is_not_linear() -> None:
+    for change in ({"rest_length": 0.5}, {"damping": 0.1}):
+        assert subject(Scene(oscillator(**change))).solution is None, change
+    tree = oscillator()
+    tree["collider"] = [{"name": "floor", "shape": {"plane": {"normal": [0, 0, 1]}}}]
+    assert subject(Scene(tree)).solution is None
+
+
+def test_exponential() -> None:
+    a = np.array([[0.0, 2.0], [-2.0, 0.0]])
+    turn = [[math.cos(14), math.sin(14)], [-math.sin(14), math.cos(14)]]
+    assert exact.exponential(7 * a) == pytest.approx(np.array(turn), abs=1e-12)
+
+
+def test_tracers_are_limited_by_their_field() -> None:
+    found = steps_of(swirl(), "forward_euler", "rk4", "implicit_euler")
+    # (integrators.32): the squared radius grows by 1 + z² a step, as the oscillator's energy does.
+    z = 2.0 * found["forward_euler"].predicted
+    assert ratio_at_limit(z, lambda z: 1 + z * z) == pytest.approx(1.0, abs=1e-3)
+    for word in ("forward_euler", "rk4"):
+        assert 0.9 < found[word].measured / found[word].predicted < 1.1
+    assert found["implicit_euler"].measured == math.inf
+
+
+def test_page_of_an_oscillator(tmp_path: Path) -> None:
+    told: list[tuple[int, int]] = []
+    path = integrators.page(
+        Scene(oscillator()),
+        tmp_path / "lab",
+        integrators=["forward_euler", "verlet", "rk4", "implicit_euler", "dormand_prince"],
+        steps=[0.5, 0.1, 0.02, 0.004],
+        progress=lambda done, total: told.append((done, total)),
+        budget=10.0,
+    )
+    text = whole(path)
+    assert "An oscillator" in text
+    for word in ("forward_euler", "verlet", "rk4", "implicit_euler", "dormand_prince"):
+        assert word in text
+    assert "bdf2" not in text
+    assert "p, particle 1" in text
+    assert told[0][0] == 0
+    assert told[-1][0] == told[-1][1] > 10
+    assert all(a[0] <= b[0] for a, b in pairwise(told))
+    rows = table(path)
+    errors = [float(r["error"]) for r in rows if r["experiment"] == "accuracy" and r["integrator"] == "verlet"]
+    assert len(errors) == 4
+    assert errors == sorted(errors, reverse=True)
+    summary = {r["integrator"]: r for r in rows if r["experiment"] == "summary"}
+    assert float(summary["verlet"]["usable_predicted"]) == pytest.approx(2 / W, rel=1e-3)
+
+
+def test_page_of_tracers(tmp_path: Path) -> None:
+    path = integrators.page(Scene(swirl()), tmp_path, steps=[0.1, 0.05, 0.025], budget=10.0)
+    text = whole(path)
+    for scheme in SCHEMES:
+        assert (scheme.word in text) != scheme.needs_velocities, scheme.word
+
+
+def test_page_of_contact_with_a_single_adaptive_integrator(tmp_path: Path) -> None:
+    tree = {
+        "version": 1,
+        "time": {"fps": 24, "frames": 12},
+        "rope": [
+            {"name": "rope", "from": [-0.2, 0, 0.2], "to": [0.2, 0, 0.25], "segments": 3, "links": {"structural": 20}}
+        ],
+        "collider": [{"name": "floor", "shape": {"plane": {"normal": [0, 0, 1]}}}],
+    }
+    text = whole(integrators.page(Scene(tree), tmp_path, integrators=["dormand_prince"], budget=10.0))
+    assert "Contact and breaking" in text
+
+
+def test_what_takes_too_long_is_left_out_and_said_so(tmp_path: Path) -> None:
+    tree = {"version": 1, "sheet": [{"name": "sheet", "size": [1, 1], "resolution": [40, 40], "pin": ["corner 0 0"]}]}
+    path = integrators.page(Scene(tree), tmp_path, integrators=["forward_euler", "verlet"], budget=0.3)
+    assert "did not fit into the time allowed" in whole(path)
+
+
+def test_wrong_questions() -> None:
+    with pytest.raises(ValueError, match="leapfrog"):
+        studied(oscillator(), integrators=["leapfrog"])
+    still = oscillator(rest_length=1.0)
+    with pytest.raises(SceneError, match="nothing moves"):
+        studied(still)
+
+
+def test_the_scene_is_run_as_it_is_but_for_the_integrator() -> None:
+    tree = oscillator()
+    tree["system"] = [{"name": "soft", "integrator": "modified_euler", "clamp": 1.5, "step": 0.1}]
+    tree["force"] = [{"kind": "drag", "rate": 0.5}]
+    tested: Subject = subject(Scene(tree))
+    world = tested.world(BY_WORD["rk4"], 0.25, 3, 5)
+    system = world.scene.to_dict()["system"][0]
+    assert (system["integrator"], system["substeps"], system["clamp"]) == ("rk4", 5, None)
+    assert world.scene.to_dict()["force"][0]["rate"] == 0.5
+    assert world.scene.to_dict()["precision"] == "double"
+    world.step()
+    assert world.time == pytest.approx(0.25)
+    assert tested.world(BY_WORD["verlet"], 0.25, 1, 5).scene.to_dict()["system"][0]["clamp"] == 1.5
+
+
+@pytest.fixture(scope="module")
+def measured() -> structures.Study:
+    return structures.study()
+
+
+def moduli(rows: list[list[patterns.Measured]], pattern: int) -> dict[str, float]:
+    return {m.deformation.key: m.modulus for m in rows[pattern]}
+
+
+def test_moduli_are_those_of_the_continuum(measured: structures.Study) -> None:
+    """(structures.2, .3, .7, .10) and (bending.8); the terms of second order in a strain of 1e-4 are 1e-8."""
+    for row in [*measured.sheet, *measured.block]:
+        for m in row:
+            assert m.modulus == pytest.approx(m.exact, rel=1e-6, abs=1e-9), (m.pattern.title, m.deformation.key)
+    for pattern, matrix in zip(patterns.SHEETS, measured.matrices, strict=True):
+        assert matrix == pytest.approx(pattern.stiffness, abs=1e-4), pattern.title
+
+
+def test_structural_links_alone_do_not_resist_shear(measured: structures.Study) -> None:
+    for rows in (measured.sheet, measured.block):
+        structural = moduli(rows, 0)
+        assert structural["shear +"] == structural["shear -"] == 0.0
+        assert structural["stretch x"] == pytest.approx(100.0)
+        assert moduli(rows, 1)["shear +"] == pytest.approx(50.0, rel=1e-6)
+
+
+def test_one_diagonal_has_a_bias_and_two_have_none(measured: structures.Study) -> None:
+    one, both = moduli(measured.sheet, 1), moduli(measured.sheet, 2)
+    # k1 = k2 = 100: (k1/4 + k2)/(k1/4) along one diagonal and the other, sides held.
+    assert one["stretch +45"] / one["stretch -45"] == pytest.approx(5.0, rel=1e-6)
+    assert both["stretch +45"] / both["stretch -45"] == pytest.approx(1.0, abs=1e-6)
+    # Sheared by 0.3, the diagonal of sqrt(2) becomes sqrt(2 ± 2 sin 0.3).
+    longer, shorter = (math.sqrt(2 + 2 * s * math.sin(0.3)) - math.sqrt(2) for s in (1, -1))
+    assert measured.shear_bias[1] == pytest.approx((longer / shorter) ** 2, rel=1e-6)
+    assert measured.shear_bias[1] < 0.8
+    assert measured.shear_bias[2] == pytest.approx(1.0, abs=1e-6)
+    # Pulled along the grid it leans over by as much as it stretches.
+    assert patterns.lean(measured.matrices[1]) == pytest.approx(-1.0, abs=1e-3)
+    assert patterns.lean(measured.matrices[2]) == pytest.approx(0.0, abs=1e-3)
+
+
+def test_young_modulus_over_direction(measured: structures.Study) -> None:
+    directions = np.linspace(0, np.pi, 37)
+    one, both = (patterns.young(measured.matrices[k], directions) for k in (1, 2))
+    # (structures.6): 8 k2/3 with k2 = 50, all round. (structures.8): 2 k2 and 2 k1 k2/(k1 + 4 k2) with k2 = 100.
+    assert both == pytest.approx(np.full(37, 400 / 3), rel=1e-3)
+    assert one[9] == pytest.approx(200.0, rel=1e-3)
+    assert one[27] == pytest.approx(40.0, rel=1e-3)
+
+
+def test_folding(measured: structures.Study) -> None:
+    words = [{m.deformation.key: m.word for m in row} for row in measured.sheet]
+    for key in ("fold y", "fold x"):
+        assert [w[key] for w in words] == ["no", "no", "no", "weakly", "yes"]
+    # Only the diagonal that crosses the creases is in their way.
+    assert (words[1]["fold +45"], words[1]["fold -45"]) == ("no", "weakly")
+    hinges = moduli(measured.sheet, 4)
+    assert hinges["fold -45"] / hinges["fold +45"] == pytest.approx(3.0, rel=1e-6)
+
+
+def test_page_of_structures(tmp_path: Path) -> None:
+    told: list[tuple[int, int]] = []
+    path = structures.page(tmp_path / "lab", progress=lambda done, total: told.append((done, total)))
+    text = whole(path)
+    for pattern in patterns.SHEETS:
+        assert pattern.title in text
+    assert told[-1][0] == told[-1][1]
+    assert all(a[0] <= b[0] for a, b in pairwise(told))
+    rows = table(path)
+    shear = [r for r in rows if r["deformation"] == "shear +" and r["structure"] == "sheet"]
+    assert [r["resists"] for r in shear] == ["no", "yes", "yes", "yes", "yes"]
+
+
+def whole(path: Path) -> str:
+    """The text of a page, which needs nothing from elsewhere; its picture can be read."""
+    text = path.read_text(encoding="utf-8")
+    assert "://" not in text
+    assert "<script" not in text
+    assert text.count("<img") == text.count('src="data:image/') >= 1
+    assert text.rstrip().endswith("</html>")
+    picture = imread(path.with_suffix(".png"))
+    assert picture.shape[1] > 1000
+    assert float(picture.std()) > 0.02
+    return text
+
+
+def table(path: Path) -> list[dict[str, str]]:
+    with path.with_suffix(".csv").open(encoding="utf-8") as file:
+        return list(csv.DictReader(file))

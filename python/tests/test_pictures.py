@@ -1,0 +1,547 @@
+"""Pictures, films and plots: what is drawn is where it should be, in its colour, on every machine."""
+
+import importlib.util
+import os
+import signal
+import subprocess
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import fake_run
+import numpy as np
+import pytest
+
+import tumble.film
+import tumble.pictures
+from tumble import ExportError
+from tumble.film import film
+from tumble.pictures import Studio, framing, picture, render, renderers, resolve, surfaces
+from tumble.pictures.denoise import denoise
+from tumble.pictures.things import Ground, Mesh, Spheres, Stage, Tubes
+from tumble.plots import energy, ledger, unit
+from tumble.style import display, linear, rgb
+
+SIZE = (160, 90)
+PLAIN = "matplotlib"
+OPEN = (0.1, -0.45, 0.0)
+"""A point of the floor of `fake_run.studio` with nothing near it."""
+
+
+@pytest.fixture(params=tumble.pictures.RENDERERS)
+def renderer(request: pytest.FixtureRequest) -> str:
+    name = str(request.param)
+    if name not in renderers():
+        pytest.skip(f"{name} does not work here")
+    return name
+
+
+def hue(color: Any) -> Any:
+    """A colour without its brightness."""
+    color = np.asarray(color, dtype=float)
+    return color / np.linalg.norm(color)
+
+
+def around(image: Any, studio: Studio, point: Any) -> Any:
+    """The mean colour, in linear light, of 3 x 3 pixels around the image of a point."""
+    x, y = (int(v) for v in studio.camera.project(np.asarray(point, dtype=float))[:2])
+    assert 1 <= x < image.shape[1] - 1 and 1 <= y < image.shape[0] - 1
+    return linear(image[y - 1 : y + 2, x - 1 : x + 2] / 255).mean(axis=(0, 1))
+
+
+# Pictures
+
+
+def test_objects_are_where_the_camera_says_in_their_colours(renderer: str) -> None:
+    run = fake_run.studio()
+    studio = Studio(run, renderer, SIZE, samples=4)
+    image = studio.picture(2)
+    assert image.shape == (90, 160, 3) and image.dtype == np.uint8
+    sheet = run.frame(2)["a sheet"]["position"]
+    toward = studio.camera.position - fake_run.BALL
+    front = fake_run.BALL + fake_run.BALL_RADIUS * toward / np.linalg.norm(toward)
+    for point, color in (
+        (sheet[fake_run.N * (fake_run.N // 2) + fake_run.N // 2], fake_run.BLUE),
+        (run.frame(2)["masses"]["position"][1], fake_run.RED),
+        (front, fake_run.GREEN),
+    ):
+        assert hue(around(image, studio, point)) @ hue(color) > 0.93
+    corner = image[2, 2] / 255
+    assert corner.min() > 0.8 and np.ptp(corner) < 0.06  # the background
+    assert len(np.unique(image.reshape(-1, 3), axis=0)) > 500
+
+
+def test_a_floor_is_shown_in_its_colour(renderer: str) -> None:
+    run = fake_run.studio()
+    run.scene["collider"][1]["color"] = [0.5, 0.25, 0.1]
+    studio = Studio(run, renderer, SIZE, samples=4)
+    floor = around(studio.picture(0), studio, OPEN)
+    assert hue(floor) @ hue([0.5, 0.25, 0.1]) > 0.97
+
+
+def test_shadows_fall_on_the_ground(renderer: str) -> None:
+    run = fake_run.studio()
+    studio = Studio(run, renderer, SIZE, samples=8)
+    image = studio.picture(0)
+    from tumble.pictures.look import key_light
+
+    light = key_light(studio.camera)
+    beneath = fake_run.BALL - light * fake_run.BALL[2] / light[2]
+    assert around(image, studio, beneath).mean() < 0.75 * around(image, studio, OPEN).mean()
+
+
+def test_what_is_near_hides_what_is_far(renderer: str) -> None:
+    x = {"far": np.array([[0.0, 1.0, 0.0]]), "near": np.array([[0.0, -1.0, 0.0]])}
+    colors = {"far": fake_run.BLUE, "near": fake_run.RED}
+    for names in (["near", "far"], ["far", "near"]):
+        run = fake_run.FakeRun(
+            fake_run.scene(
+                particles=[{"name": n, "color": colors[n]} for n in names],
+                camera={"position": [0.0, -6.0, 0.0], "target": [0.0, 0.0, 0.0], "resolution": SIZE},
+            ),
+            {n: {"radius": np.array([0.5])} for n in names},
+            lambda t: {n: {"position": x[n]} for n in x},
+        )
+        studio = Studio(run, renderer, samples=4)
+        assert hue(around(studio.picture(0), studio, [0.0, -1.5, 0.0])) @ hue(fake_run.RED) > 0.9
+
+
+def test_a_plane_scene_is_seen_head_on(renderer: str) -> None:
+    run = fake_run.studio(dimension=2)
+    studio = Studio(run, renderer, SIZE, samples=4)
+    camera = studio.camera
+    assert camera.parallel
+    np.testing.assert_allclose(np.stack(camera.axes), [[1, 0, 0], [0, 0, 1], [0, 1, 0]], atol=1e-12)
+    image = studio.picture(0)
+    assert hue(around(image, studio, run.frame(0)["masses"]["position"][0])) @ hue(fake_run.RED) > 0.93
+    assert hue(around(image, studio, fake_run.BALL)) @ hue(fake_run.GREEN) > 0.93
+    below = camera.project(np.array([-0.9, 0.0, 0.0]))[1] + 3
+    assert image[int(below), 20].mean() < image[int(below) - 12, 20].mean()  # the floor, seen from the side
+
+
+def test_the_size_is_that_of_the_scene_unless_given() -> None:
+    run = fake_run.studio(camera={"resolution": [64, 48], "view_angle": 35.0})
+    assert picture(run, 0, PLAIN).shape == (48, 64, 3)
+    assert picture(run, 0, PLAIN, size=(40, 60)).shape == (60, 40, 3)
+
+
+def test_pictures_are_the_same_bytes_again(renderer: str) -> None:
+    run = fake_run.studio()
+    first, second = (picture(run, 1, renderer, (64, 36)) for _ in range(2))
+    assert np.mean(first != second) < 1e-3  # rounding may differ where threads meet
+
+
+def test_what_cannot_be_drawn_is_told() -> None:
+    run = fake_run.studio()
+    with pytest.raises(ExportError, match="frames 0 to 4"):
+        picture(run, 5, PLAIN, SIZE)
+    with pytest.raises(ExportError, match="no renderer"):
+        picture(run, 0, "crayons", SIZE)
+    run.n_frames = 0
+    with pytest.raises(ExportError, match="no frames"):
+        picture(run, 0, PLAIN, SIZE)
+
+
+# Renderers
+
+
+@pytest.fixture
+def forgetful() -> Iterator[None]:
+    """What was found out about renderers does not outlive the test."""
+    tumble.pictures._works.cache_clear()
+    yield
+    tumble.pictures._works.cache_clear()
+
+
+def test_matplotlib_draws_where_nothing_else_is_installed(monkeypatch: pytest.MonkeyPatch, forgetful: None) -> None:
+    monkeypatch.setattr(importlib.util, "find_spec", lambda name: None)
+    assert renderers() == [PLAIN]
+    assert resolve("auto") == PLAIN
+    assert picture(fake_run.studio(), 0, size=(48, 32)).shape == (32, 48, 3)
+    with pytest.raises(ExportError, match="pip install"):
+        resolve("mitsuba")
+
+
+def test_a_library_that_takes_the_process_down_is_not_used(monkeypatch: pytest.MonkeyPatch, forgetful: None) -> None:
+    monkeypatch.setattr(tumble.pictures, "PROBES", dict.fromkeys(("mitsuba", "pyvista"), "import os; os.abort()"))
+    monkeypatch.setattr(importlib.util, "find_spec", lambda name: object())
+    assert resolve() == PLAIN
+    with pytest.raises(ExportError, match="libegl1"):
+        resolve("pyvista")
+
+
+# Framing
+
+
+def test_everything_is_in_the_picture_at_every_frame() -> None:
+    run = fake_run.studio()
+    camera = framing.camera(run, SIZE)
+    low, high = np.full(2, np.inf), np.full(2, -np.inf)
+    for i in range(run.n_frames):
+        points = np.concatenate([*(c["position"] for c in run.frame(i).values()), run.static["ball"]["position"]])
+        seen = camera.project(points)
+        assert (seen[:, 2] > 0).all()
+        low, high = np.minimum(low, seen[:, :2].min(axis=0)), np.maximum(high, seen[:, :2].max(axis=0))
+    assert (low > 0).all() and (high < SIZE).all()
+    # It fills the picture one way, and is in the middle of it both ways.
+    assert ((high - low) / SIZE).max() > 0.8
+    np.testing.assert_allclose((low + high) / 2, np.array(SIZE) / 2, atol=0.04 * SIZE[0])
+
+
+def test_the_camera_of_the_scene_is_used() -> None:
+    words = {"position": [3.0, -4.0, 2.0], "target": [0.5, 0.0, 0.5], "view_angle": 50.0, "resolution": [100, 50]}
+    camera = framing.camera(fake_run.studio(camera=words))
+    np.testing.assert_array_equal(camera.position, words["position"])
+    assert camera.view_angle == pytest.approx(50.0)
+    np.testing.assert_allclose(camera.project(np.array([0.5, 0.0, 0.5])), [50, 25, camera.distance])
+    # A point to the right at the target's distance, at the edge of the angle of view.
+    edge = camera.target + camera.axes[0] * camera.distance * np.tan(np.radians(25))
+    np.testing.assert_allclose(camera.project(edge)[:2], [100, 25])
+
+
+def test_a_camera_that_is_told_only_where_to_look_still_sees_all() -> None:
+    words = {"position": None, "target": [1.5, 0.0, 0.0], "view_angle": 35.0, "resolution": [100, 50]}
+    run = fake_run.studio(camera=words)
+    camera = framing.camera(run)
+    np.testing.assert_array_equal(camera.target, words["target"])
+    seen = camera.project(run.frame(0)["rope"]["position"])
+    assert (seen[:, :2] > 0).all() and (seen[:, 0] < 100).all()
+
+
+def test_a_huge_collider_does_not_make_the_rest_tiny() -> None:
+    run = fake_run.studio()
+    near = framing.camera(run, SIZE).distance
+    run.static["ball"]["position"] = 1000 * run.static["ball"]["position"]
+    assert framing.camera(run, SIZE).distance < 8 * near
+
+
+@pytest.mark.parametrize("size", [1e-9, 1.0, 1e20])
+def test_any_scale_can_be_drawn(size: float) -> None:
+    x = size * np.array([[0.0, 0, 0], [1, 0, 0], [0, 0, 1]])
+    run = fake_run.one("p", "particles", {"radius": np.array([1e-30])}, x, world={"gravity": [0.0, 0.0, 0.0]})
+    run.scene["particles"][0]["color"] = fake_run.RED
+    studio = Studio(run, PLAIN, (640, 360))
+    assert hue(around(studio.picture(0), studio, x[1])) @ hue(fake_run.RED) > 0.9
+
+
+def test_a_single_mass_that_does_not_move() -> None:
+    studio = Studio(fake_run.one("p", "particles", {"radius": np.array([0.0])}, np.zeros((1, 3))), PLAIN, SIZE)
+    assert studio.picture(0).std() > 1
+
+
+# Things
+
+
+def test_things_of_a_frame() -> None:
+    run = fake_run.studio()
+    things = {t.name: t for t in Stage(run).things(1)}
+    kinds = {"a sheet": Mesh, "rope": Tubes, "masses": Spheres, "masses springs": Tubes, "ball": Mesh, "floor": Ground}
+    assert {name: type(t) for name, t in things.items()} == kinds
+    rope = things["rope"]
+    assert isinstance(rope, Tubes)
+    np.testing.assert_allclose(rope.points[0], [-0.8, 0, 1.2], atol=1e-6)  # in the order of the curve
+    ball = things["ball"]
+    assert isinstance(ball, Mesh) and ball.closed
+    np.testing.assert_allclose(ball.normals, (ball.vertices - fake_run.BALL) / fake_run.BALL_RADIUS, atol=0.06)
+
+
+def test_objects_without_a_colour_get_different_ones() -> None:
+    names = [f"p{k}" for k in range(6)]
+    run = fake_run.FakeRun(
+        fake_run.scene(particles=[{"name": n} for n in names]),
+        {n: {"radius": np.array([0.1])} for n in names},
+        lambda t: {n: {"position": np.zeros((1, 3))} for n in names},
+    )
+    assert len({t.color for t in Stage(run).things(0)}) == 6
+
+
+def grounds(run: fake_run.FakeRun) -> list[str]:
+    return [t.name for t in Studio(run, PLAIN, SIZE).things(0) if isinstance(t, Ground)]
+
+
+def test_a_neutral_ground_only_where_there_is_none() -> None:
+    assert grounds(fake_run.studio()) == ["floor"]
+    x = np.array([[0.0, 0, 0], [1, 0, 0]])
+    assert grounds(fake_run.one("p", "particles", {}, x)) == [""]
+    assert grounds(fake_run.one("p", "particles", {}, x, world={"gravity": [0.0, 0.0, 0.0]})) == []
+    assert grounds(fake_run.one("p", "particles", {}, x, dimension=2)) == []
+
+
+def test_a_ground_that_the_camera_is_inside_of_is_not_drawn() -> None:
+    run = fake_run.studio()
+    run.scene["collider"][1]["shape"] = {"plane": {"point": [0, 0, -1], "normal": [0, 0, -2.0]}}
+    assert grounds(run) == []
+
+
+def torn(kind: str, static: dict[str, Any], x: Any, link: int) -> fake_run.FakeRun:
+    """A run in which a link breaks after the start; another one never has a rest length."""
+
+    def columns(t: float) -> fake_run.Columns:
+        strain = np.zeros(len(static["links"]))
+        strain[-1] = np.nan
+        if t > 0:
+            strain[link] = np.nan
+        return {"thing": {"position": x, "link_strain": strain}}
+
+    return fake_run.FakeRun(fake_run.scene(**{kind: [{"name": "thing"}]}), {"thing": static}, columns)
+
+
+def test_a_torn_sheet_has_a_hole() -> None:
+    x, triangles, links = fake_run.lattice()
+    middle = len(links) // 4 + 2
+    stage = Stage(torn("sheet", {"triangles": triangles, "links": links}, x, middle))
+    before, after = (next(t for t in stage.things(i) if isinstance(t, Mesh)).triangles for i in (0, 1))
+    assert len(before) == len(triangles)
+    gone = {tuple(t) for t in before.tolist()} - {tuple(t) for t in after.tolist()}
+    assert len(gone) == 2 and all(set(links[middle].tolist()) <= set(t) for t in gone)
+
+
+def test_a_torn_rope_is_in_pieces() -> None:
+    x = np.stack([np.arange(6.0), np.zeros(6), np.zeros(6)], 1)
+    links = np.stack([np.arange(5), np.arange(1, 6)], 1)
+    stage = Stage(torn("rope", {"curve": np.arange(6), "links": links}, x, 2))
+    counts = [next(t for t in stage.things(i) if isinstance(t, Tubes)).counts.tolist() for i in (0, 1)]
+    assert counts == [[6], [3, 3]]
+
+
+def test_nothing_is_thinner_than_asked() -> None:
+    run = fake_run.studio()
+    sizes = {t.name: t.radii.max() for t in Stage(run).things(0, 0.05) if isinstance(t, Spheres)}
+    assert sizes == {"masses": pytest.approx(0.15)}  # few masses: three times as thick
+
+
+# Surfaces
+
+
+def test_a_cube_is_cut_at_its_edges_and_a_ball_is_not() -> None:
+    vertices, triangles = fake_run.cube()
+    source, cut = surfaces.split(vertices, triangles.astype(int))
+    assert len(source) == 24
+    np.testing.assert_array_equal(source[cut], triangles)
+    normals = np.abs(surfaces.normals(vertices[source], cut))
+    np.testing.assert_allclose(np.sort(normals, axis=1), np.tile([0, 0, 1], (24, 1)), atol=1e-12)
+    vertices, triangles = fake_run.ball()
+    assert len(surfaces.split(vertices, triangles.astype(int))[0]) == len(vertices)
+
+
+def test_which_surfaces_are_closed() -> None:
+    vertices, triangles = fake_run.cube()
+    t = triangles.astype(int)
+    assert surfaces.outward(vertices, t)
+    assert not surfaces.outward(vertices, t[:, ::-1])
+    assert not surfaces.outward(vertices, t[1:])
+
+
+@pytest.mark.parametrize("shape", ["straight", "circle", "point", "fold"])
+def test_tubes_are_closed_and_round(shape: str) -> None:
+    s = np.linspace(0, 2 * np.pi, 30)
+    line = {
+        "straight": np.stack([s, 0 * s, 0 * s], 1),
+        "circle": np.stack([np.cos(s), np.sin(s), 0.1 * s], 1),
+        "point": np.zeros((3, 3)),
+        "fold": np.array([[0.0, 0, 0], [1, 0, 0], [0, 0, 0.0], [1, 0, 0]]),
+    }[shape]
+    vertices, triangles, normals = surfaces.tubes(line, np.array([len(line)]), 0.05)
+    assert np.isfinite(vertices).all()
+    np.testing.assert_allclose(np.linalg.norm(normals, axis=1), 1.0, atol=1e-9)
+    away = np.linalg.norm(vertices[:, None] - line, axis=2).min(axis=1)
+    np.testing.assert_allclose(away, 0.05, atol=1e-9)
+    if shape in ("straight", "circle"):
+        facing = np.sum(surfaces.face_normals(vertices, triangles) * normals[triangles].sum(axis=1), axis=1)
+        assert (facing > -1e-12).all() and (facing > 1e-9).mean() > 0.9
+
+
+def test_balls_are_round_and_outward() -> None:
+    centers = np.array([[0.0, 0, 0], [5, 0, 0]])
+    vertices, triangles, _ = surfaces.balls(centers, np.array([1.0, 2.0]))
+    n = len(vertices) // 2
+    np.testing.assert_allclose(np.linalg.norm(vertices[n:] - centers[1], axis=1), 2.0)
+    assert surfaces.outward(vertices[:n], triangles[: len(triangles) // 2])
+
+
+def test_rims_are_turned_to_the_eye() -> None:
+    vertices, triangles = fake_run.ball()
+    t, eye = triangles.astype(int), np.array([0.0, -4.0, 0.3])
+    shading = surfaces.normals(vertices, t)
+
+    def contradictions(v: Any, f: Any, n: Any) -> int:
+        front = np.sum(surfaces.face_normals(v, f) * (eye - v[f].mean(axis=1)), axis=1) > 0
+        return int((np.sum(n[f] * (eye - v[f]), axis=2) < 0)[front].sum())
+
+    assert contradictions(vertices, t, shading) > 10
+    turned = surfaces.turned(vertices, t, shading, eye)
+    assert contradictions(*turned) == 0
+    np.testing.assert_array_equal(turned[0][turned[1]], vertices[t])
+
+
+def test_noise_goes_and_edges_stay() -> None:
+    rng = np.random.default_rng(5)
+    clean = np.full((40, 60, 3), 0.3)
+    clean[:, 30:] = 0.6
+    noisy = clean + 0.03 * rng.standard_normal((40, 60, 1))
+    place = np.stack([*np.meshgrid(np.arange(60.0), np.arange(40.0)), np.zeros((40, 60))], -1)
+    place[:, 30:, 2] = 20.0  # another surface, far behind
+    normal = np.broadcast_to([0.0, 0.0, 1.0], place.shape)
+    smooth = denoise(noisy, normal, place, 1.0)
+    inside = np.ones((40, 60), dtype=bool)
+    inside[:, 29:31] = False  # the edge itself is left alone
+    error = np.abs(smooth - clean)[inside]
+    assert error.mean() < 0.15 * np.abs(noisy - clean)[inside].mean()  # measured 0.09
+    np.testing.assert_array_equal(smooth[:, 29:31], noisy[:, 29:31])
+    np.testing.assert_allclose(smooth[:, 40:].mean(), 0.6, atol=0.003)
+
+
+def test_display_and_linear_are_inverse() -> None:
+    levels = np.arange(256) / 255
+    np.testing.assert_allclose(display(linear(levels)), levels, atol=1e-12)
+    np.testing.assert_allclose(rgb("#ff0080"), [1.0, 0.0, 0.2158605], atol=1e-6)
+
+
+# Films
+
+
+def decoded(path: Path) -> tuple[dict[str, Any], list[Any]]:
+    """What a film says of itself, and its pictures."""
+    import imageio_ffmpeg
+
+    reader = imageio_ffmpeg.read_frames(str(path))
+    meta = next(reader)
+    width, height = meta["size"]
+    return meta, [np.frombuffer(f, dtype=np.uint8).reshape(height, width, 3) for f in reader]
+
+
+def test_a_film_shows_every_frame_in_order(tmp_path: Path) -> None:
+    run = fake_run.studio()
+    calls: list[tuple[int, int]] = []
+    path = film(run, tmp_path / "new" / "film.mp4", PLAIN, size=SIZE, progress=lambda *c: calls.append(c), processes=2)
+    assert calls == [(k, 5) for k in range(1, 6)]
+    meta, pictures = decoded(path)
+    assert meta["size"] == SIZE and meta["fps"] == pytest.approx(fake_run.FPS)
+    assert meta["pix_fmt"].startswith("yuv420p") and meta["codec"] == "h264"
+    assert len(pictures) == 5
+    stills = [picture(run, i, PLAIN, SIZE).astype(float) for i in range(5)]
+    apart = np.array([[np.abs(p - s).mean() for s in stills] for p in pictures])
+    assert (apart.argmin(axis=1) == np.arange(5)).all()
+    assert apart.diagonal().max() < 3.0
+    assert [p.name for p in path.parent.iterdir()] == ["film.mp4"]
+
+
+def test_odd_sizes_and_fewer_frames(tmp_path: Path) -> None:
+    path = film(fake_run.studio(), tmp_path / "film.mp4", PLAIN, every=2, size=(81, 45), processes=1)
+    meta, pictures = decoded(path)
+    assert meta["size"] == (82, 46) and meta["fps"] == pytest.approx(fake_run.FPS / 2)
+    assert len(pictures) == 3
+
+
+def test_a_film_by_another_renderer(renderer: str, tmp_path: Path) -> None:
+    run = fake_run.studio()
+    run.n_frames = 2
+    _, pictures = decoded(film(run, tmp_path / "film.mp4", renderer, size=(64, 36), processes=2))
+    assert len(pictures) == 2 and np.std(pictures[0]) > 5
+
+
+def test_a_script_without_a_guard_can_make_films(tmp_path: Path) -> None:
+    script = tmp_path / "script.py"
+    script.write_text(
+        "import sys; sys.path[:0] = sys.argv[1].split(';')\n"
+        "import fake_run\n"
+        "from tumble.film import film\n"
+        "film(fake_run.studio(), 'film.mp4', 'matplotlib', size=(32, 18), processes=2)\n"
+    )
+    here = [str(Path(fake_run.__file__).parent), str(Path(tumble.film.__file__).parents[1])]
+    subprocess.run([sys.executable, script, ";".join(here)], cwd=tmp_path, check=True, timeout=120)
+    assert len(decoded(tmp_path / "film.mp4")[1]) == 5
+
+
+def test_what_ffmpeg_says_when_it_fails_is_told(tmp_path: Path) -> None:
+    (tmp_path / ".film.mp4.part").mkdir()
+    with pytest.raises(ExportError, match=r"film\.mp4: ffmpeg failed: .*directory"):
+        film(fake_run.studio(), tmp_path / "film.mp4", PLAIN, size=(32, 18), processes=1)
+
+
+def test_a_picture_that_fails_leaves_no_film(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    def fail(*arguments: object) -> None:
+        raise ExportError("no paint")
+
+    monkeypatch.setattr(tumble.film, "render", fail)
+    with pytest.raises(ExportError, match="no paint"):
+        film(fake_run.studio(), tmp_path / "film.mp4", PLAIN, size=(32, 18), processes=1)
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_a_process_that_dies_is_told(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(tumble.film, "_draw", _die)
+    with pytest.raises(ExportError, match="died"):
+        film(fake_run.studio(), tmp_path / "film.mp4", PLAIN, size=(32, 18), processes=2)
+    assert list(tmp_path.iterdir()) == []
+
+
+def _die(*arguments: object) -> None:
+    os.kill(os.getpid(), signal.SIGKILL)
+
+
+def test_a_film_is_not_written_over_before_the_new_one_is_complete(tmp_path: Path) -> None:
+    path = tmp_path / "film.mp4"
+    path.write_bytes(b"old")
+
+    def stop(done: int, total: int) -> None:
+        assert path.read_bytes() == b"old"
+        if done == 2:
+            raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        film(fake_run.studio(), path, PLAIN, size=(32, 18), progress=stop, processes=1)
+    assert path.read_bytes() == b"old" and [p.name for p in tmp_path.iterdir()] == ["film.mp4"]
+
+
+# Plots
+
+
+def test_plots_are_pictures(tmp_path: Path) -> None:
+    from matplotlib.image import imread
+
+    run = fake_run.studio()
+    for path in (energy(run, tmp_path / "a" / "energy.png"), ledger(run, ["momentum", "speed"], tmp_path / "l.png")):
+        image = imread(path)
+        assert image.shape[0] > 300 and image.shape[1] > 800 and image[..., :3].std() > 0.02
+    assert ledger(run, "contacts", tmp_path / "l.svg").read_text().startswith("<?xml")
+
+
+def test_the_total_energy_and_its_drift(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    figures: list[Any] = []
+    monkeypatch.setattr(tumble.plots, "_save", lambda figure, path: figures.append(figure))
+    run = fake_run.studio()
+    energy(run, "energy.png")
+    upper, lower = figures[0].axes
+    labels = [text.get_text() for text in upper.texts]
+    assert labels == ["kinetic", "elastic", "external", "total"]
+    assert upper.get_ylabel() == "energy [J]" and lower.get_xlabel() == "time [s]"
+    np.testing.assert_allclose(upper.lines[3].get_ydata(), 1.0)
+    np.testing.assert_allclose(lower.lines[1].get_ydata(), 0.0, atol=1e-12)
+    places = sorted(text.get_position()[1] for text in upper.texts)
+    assert (np.diff(places) > 0.03).all()
+
+
+def test_a_vector_stands_for_its_columns(monkeypatch: pytest.MonkeyPatch) -> None:
+    figures: list[Any] = []
+    monkeypatch.setattr(tumble.plots, "_save", lambda figure, path: figures.append(figure))
+    ledger(fake_run.studio(), ["momentum", "speed", "kinetic", "elastic", "contacts", "stretch"], "x.png")
+    labels = ["momentum [kg m/s]", "speed [m/s]", "[J]", "contacts", "stretch [1]"]
+    assert [ax.get_ylabel() for ax in figures[0].axes] == labels
+    assert len(figures[0].axes[0].lines) == 3
+    assert (unit("angular_momentum_y"), unit("contacts")) == ("kg m²/s", "")
+
+
+def test_a_column_that_does_not_exist(tmp_path: Path) -> None:
+    with pytest.raises(ExportError, match='"sped"; it has frame, time'):
+        ledger(fake_run.studio(), "sped", tmp_path / "x.png")
+    with pytest.raises(ExportError, match="nope"):
+        energy(fake_run.studio(), tmp_path / "x.nope")
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_a_render_of_nothing_is_the_background(renderer: str) -> None:
+    camera = framing.camera(fake_run.studio(), (32, 18)).unit()
+    image = render(renderer, [], camera, 4)
+    assert image.min() > 200 and image.shape == (18, 32, 3)

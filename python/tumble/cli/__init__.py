@@ -1,0 +1,93 @@
+"""The command line: `tumble VERB`, one file per verb.
+
+Exit codes: 0 fine, 1 the simulation failed or broke an expectation, 2 the input is wrong, 130 stopped with Ctrl-C.
+"""
+
+import errno
+import sys
+from collections.abc import Sequence
+from typing import Annotated, Any
+
+import typer
+from typer.core import TyperGroup
+
+from tumble.cli import check, export, lab, plot, render, run, scenes
+from tumble.cli.console import complain, survive_narrow_streams
+
+
+class Verbs(TyperGroup):
+    """Turns whatever a verb raises into one clear message and an exit code."""
+
+    def invoke(self, ctx: Any) -> Any:
+        try:
+            return super().invoke(ctx)
+        except KeyboardInterrupt:
+            complain("stopped")
+            raise typer.Exit(130) from None
+        except MemoryError:
+            complain("out of memory: the scene needs more than this machine has; take a lower resolution")
+            raise typer.Exit(1) from None
+        except OSError as error:
+            if error.errno == errno.EPIPE:
+                raise
+            where = f"{error.filename}: " if error.filename else ""
+            complain(f"{where}{error.strerror or error}")
+            raise typer.Exit(1) from None
+        except Exception as error:
+            # The engine is not loaded for `--help`; its errors can only come from it.
+            engine = sys.modules.get("tumble._engine")
+            if engine is None or not isinstance(error, engine.TumbleError):
+                raise
+            complain(str(error))
+            raise typer.Exit(2 if isinstance(error, engine.SceneError) else 1) from None
+
+
+def _version(asked: bool) -> None:
+    if asked:
+        from tumble import __version__
+
+        print(f"tumble {__version__}")
+        raise typer.Exit()
+
+
+def _root(
+    version: Annotated[
+        bool, typer.Option("--version", callback=_version, is_eager=True, help="Print the version and exit.")
+    ] = False,
+) -> None:
+    """Simulates masses, springs, cloth, ropes and solids.
+
+    \b
+    A first round:
+      tumble scenes                     what is there
+      tumble check sheet-on-bunny       is the step small enough?
+      tumble run sheet-on-bunny         simulate into out/sheet-on-bunny
+      tumble render sheet-on-bunny      look at the last frame
+
+    \b
+    Exit codes: 0 fine; 1 the simulation failed or broke an expectation;
+    2 the input is wrong; 130 stopped with Ctrl-C.
+    """
+
+
+def application() -> typer.Typer:
+    """All verbs."""
+    app = typer.Typer(
+        name="tumble",
+        cls=Verbs,
+        callback=_root,
+        no_args_is_help=True,
+        rich_markup_mode=None,  # rich would take longer to load than everything else
+        pretty_exceptions_enable=False,
+        context_settings={"help_option_names": ["-h", "--help"]},
+    )
+    for verb in (run.run, check.check, render.render, export.export, plot.plot, scenes.scenes):
+        app.command()(verb)
+    app.add_typer(lab.app, name="lab")
+    return app
+
+
+def main(arguments: Sequence[str] | None = None) -> None:
+    """Runs the command line and exits."""
+    survive_narrow_streams()
+    application()(args=arguments, prog_name="tumble")

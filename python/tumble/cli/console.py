@@ -1,0 +1,115 @@
+"""What is said to people: text that survives pipes and narrow encodings, progress as a bar or as plain lines."""
+
+import codecs
+import math
+import sys
+import time
+from types import TracebackType
+from typing import TYPE_CHECKING, Any, Self
+
+if TYPE_CHECKING:
+    from rich.progress import Progress as Bar
+    from rich.progress import TaskID
+
+_PLAIN = {"²": "^2", "³": "^3", "×": "x", "·": "*", "°": " deg", "ω": "w", "µ": "u", "–": "-", "…": "...", "≤": "<="}
+
+
+def _transliterate(error: UnicodeError) -> tuple[str, int]:
+    if not isinstance(error, UnicodeEncodeError):
+        raise error
+    text = error.object[error.start : error.end]
+    return "".join(_PLAIN.get(c, "?") for c in text), error.end
+
+
+def survive_narrow_streams() -> None:
+    """Where a stream cannot say m/s², it says m/s^2."""
+    codecs.register_error("tumble", _transliterate)
+    for stream in (sys.stdout, sys.stderr):
+        reconfigure = getattr(stream, "reconfigure", None)
+        if reconfigure is not None:
+            reconfigure(errors="tumble")
+
+
+def say(text: object = "", end: str = "\n") -> None:
+    """A result, on stdout. (typer.echo would write UTF-8 where the stream says that it takes ASCII.)"""
+    print(text, end=end, flush=True)
+
+
+def complain(text: str) -> None:
+    """An error, on stderr."""
+    _mark("error: ", "1;31", text)
+
+
+def warn(text: str) -> None:
+    """Something doubtful, on stderr."""
+    _mark("warning: ", "33", text)
+
+
+def _mark(word: str, color: str, text: str) -> None:
+    print(f"\033[{color}m{word}\033[0m{text}" if sys.stderr.isatty() else word + text, file=sys.stderr, flush=True)
+
+
+def seconds(value: float) -> str:
+    """A step or a limit on it, for people: `2.08e-03 s`."""
+    if value == 0.0:
+        return "none"
+    if math.isinf(value):
+        return "any"
+    return f"{value:.3g} s" if value >= 0.01 else f"{value:.2e} s"
+
+
+def size(n: float) -> str:
+    """Bytes, for people."""
+    for unit in ("B", "kB", "MB", "GB"):
+        if n < 999.5:
+            return f"{n:.3g} {unit}"
+        n /= 1000
+    return f"{n:.3g} TB"
+
+
+def counted(n: int, word: str) -> str:
+    """`1 frame`, `2 frames`."""
+    return f"{n} {word}" if n == 1 else f"{n} {word}{'es' if word.endswith('s') else 's'}"
+
+
+class Progress:
+    """Shows how far something is: `with Progress("simulate") as progress: progress(done, total)`.
+
+    A bar on a terminal; elsewhere a line at the start, then one per tenth of the whole or per five seconds.
+    """
+
+    def __init__(self, what: str) -> None:
+        self.what = what
+        self.bar: Bar | None = None
+        self.task: TaskID | None = None
+        self.said = -math.inf
+        self.when = 0.0
+
+    def __enter__(self) -> Self:
+        if sys.stderr.isatty():
+            from rich.console import Console
+            from rich.progress import BarColumn, MofNCompleteColumn, TextColumn, TimeRemainingColumn
+            from rich.progress import Progress as Bar
+
+            columns: list[Any] = [TextColumn("{task.description:9}"), BarColumn(), MofNCompleteColumn()]
+            self.bar = Bar(*columns, TimeRemainingColumn(elapsed_when_finished=True), console=Console(stderr=True))
+            self.bar.start()
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        if self.bar is not None:
+            self.bar.stop()
+
+    def __call__(self, done: int, total: int) -> None:
+        if self.bar is not None:
+            if self.task is None:
+                self.task = self.bar.add_task(self.what, total=total)
+            self.bar.update(self.task, completed=done, total=total)
+            return
+        now = time.monotonic()
+        share = done / total if total else 1.0
+        if share - self.said >= 0.1 or now - self.when >= 5.0 or (done == total and share > self.said):
+            self.said, self.when = share, now
+            print(f"{self.what:9} {done:6} / {total}  {share:4.0%}", file=sys.stderr, flush=True)

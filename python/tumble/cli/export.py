@@ -1,0 +1,83 @@
+"""`tumble export`: a run in the formats of other programs."""
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from tumble.cli import find
+from tumble.cli.console import Progress, say
+
+if TYPE_CHECKING:
+    from tumble import Run
+
+
+def export(
+    run: find.RunArgument,
+    usd: Annotated[
+        bool, typer.Option("--usd", help="scene.usda with a layer per frame, for Blender, Houdini and usdview.")
+    ] = False,
+    npz: Annotated[
+        bool, typer.Option("--npz", help="columns.npz: every column of all frames, frames x rows x width.")
+    ] = False,
+    out: Annotated[
+        Path | None, typer.Option(metavar="DIR", help="Folder to write into.", show_default="that of the run")
+    ] = None,
+) -> None:
+    """Write a run in the formats of other programs.
+
+    \b
+    Examples:
+      tumble export out/sheet-on-bunny --usd
+      tumble export out/sheet-on-bunny --npz --out results
+    """
+    if not (usd or npz):
+        raise typer.BadParameter("choose at least one format: --usd, --npz")
+    found = find.run(run)
+    folder = out or found.folder
+    if usd:
+        from tumble.export.usd import write
+
+        with Progress("usd") as progress:
+            say(write(found, folder, progress=progress))
+    if npz:
+        with Progress("npz") as progress:
+            say(stack(found, folder, progress))
+
+
+def stack(run: "Run", folder: Path, progress: Progress) -> Path:
+    """Writes columns.npz: keys `time` [s] and `object/column`, frames x rows x width."""
+    import zipfile
+
+    import numpy as np
+
+    from tumble.folder import writing
+
+    path = folder / "columns.npz"
+    temporary = path.with_name(path.name + ".tmp")
+    first = run.frame(0) if run.n_frames else {}
+    keys = [(name, column) for name, table in first.items() for column in table]
+    with writing(path):
+        folder.mkdir(parents=True, exist_ok=True)
+        try:
+            with zipfile.ZipFile(temporary, "w") as archive:
+                with archive.open("time.npy", "w", force_zip64=True) as member:
+                    np.lib.format.write_array(member, run.ledger["time"])
+                # Frame after frame, so that a run that is larger than the memory can be exported.
+                for k, (name, column) in enumerate(keys):
+                    array = first[name][column]
+                    shape = (run.n_frames, *array.shape)
+                    header = {
+                        "descr": np.lib.format.dtype_to_descr(array.dtype),
+                        "fortran_order": False,
+                        "shape": shape,
+                    }
+                    with archive.open(f"{name}/{column}.npy", "w", force_zip64=True) as member:
+                        np.lib.format.write_array_header_2_0(member, header)
+                        for i in range(run.n_frames):
+                            member.write(np.ascontiguousarray(run.frame(i)[name][column]).tobytes())
+                            progress(k * run.n_frames + i + 1, len(keys) * run.n_frames)
+            temporary.replace(path)
+        finally:
+            temporary.unlink(missing_ok=True)
+    return path

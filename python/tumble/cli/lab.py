@@ -1,0 +1,90 @@
+"""`tumble lab`: experiments that show how the methods behave, as pages to read."""
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from tumble.cli import find
+from tumble.cli.console import Progress, say
+
+app = typer.Typer(no_args_is_help=True, rich_markup_mode=None)
+
+OutOption = Annotated[Path | None, typer.Option(metavar="DIR", help="Folder of the page.", show_default="out/lab/...")]
+
+
+@app.callback()
+def lab() -> None:
+    """Experiments on methods, as pages to read.
+
+    \b
+    Examples:
+      tumble lab integrators integrators/spiral
+      tumble lab structures
+    """
+
+
+@app.command()
+def integrators(
+    scene: find.SceneArgument,
+    set: find.SetOption = None,
+    integrator: Annotated[
+        list[str] | None, typer.Option(metavar="NAME", help="Only this one. Repeatable.", show_default="all that can")
+    ] = None,
+    step: Annotated[
+        list[float] | None,
+        typer.Option(metavar="S", help="A sub-step to try [s]. Repeatable.", show_default="around the limits"),
+    ] = None,
+    duration: Annotated[
+        float | None, typer.Option(metavar="S", help="Simulated time over which errors are compared [s].")
+    ] = None,
+    budget: Annotated[
+        float, typer.Option(metavar="S", help="Time after which longer experiments are left out [s].")
+    ] = 45.0,
+    out: OutOption = None,
+) -> None:
+    """Run a scene with every integrator: order, energy, cost.
+
+    \b
+    Examples:
+      tumble lab integrators integrators/spiral
+      tumble lab integrators my.toml --integrator rk4 --integrator verlet
+    """
+    for name, values in {"--step": step or (), "--duration": [duration], "--budget": [budget]}.items():
+        if any(value is not None and not 0 < value < float("inf") for value in values):
+            raise typer.BadParameter("expected > 0 s", param_hint=name)
+    checked = find.scene(scene, set)
+    folder = out or find.OUT / "lab" / f"integrators-{find.scene_file(scene).stem}"
+    from tumble.lab.integrators import page
+    from tumble.lab.schemes import BY_WORD
+
+    for name in integrator or ():
+        if name not in BY_WORD:
+            text = f"no integrator {name!r}{find.near(name, list(BY_WORD)) or '; there are ' + ', '.join(BY_WORD)}"
+            raise typer.BadParameter(text, param_hint="--integrator")
+    with Progress("lab") as progress:
+        written = page(
+            checked,
+            folder,
+            steps=step or None,
+            integrators=integrator or None,
+            duration=duration,
+            progress=progress,
+            budget=budget,
+        )
+    say(written)
+
+
+@app.command()
+def structures(out: OutOption = None) -> None:
+    """Pull on sheets and blocks whose links differ.
+
+    \b
+    Example:
+      tumble lab structures
+    """
+    from tumble.lab.structures import page
+
+    with Progress("lab") as progress:
+        written = page(out or find.OUT / "lab" / "structures", progress=progress)
+    say(written)

@@ -1,0 +1,114 @@
+"""`tumble render`: pictures and films of a run."""
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from tumble.cli import find
+from tumble.cli.console import Progress, say
+
+if TYPE_CHECKING:
+    from tumble import Run
+
+
+def render(
+    run: find.RunArgument,
+    frame: Annotated[
+        list[int] | None, typer.Option(metavar="I", help="Frame of which to draw a still; -1 is the last. Repeatable.")
+    ] = None,
+    as_film: Annotated[bool, typer.Option("--film", help="Draw all frames into an .mp4.")] = False,
+    renderer: Annotated[
+        str, typer.Option(metavar="NAME", help="What draws; `auto` takes the best that is here.")
+    ] = "auto",
+    every: Annotated[int, typer.Option(min=1, metavar="N", help="Only every Nth frame of the film.")] = 1,
+    size: Annotated[str | None, typer.Option(metavar="WxH", help="Pixels, instead of the scene's.")] = None,
+    out: Annotated[Path | None, typer.Option(metavar="FILE", help="The .png or .mp4 to write.")] = None,
+) -> None:
+    """Draw a run: stills, or a film.
+
+    Without options, a still of the last frame.
+
+    \b
+    Examples:
+      tumble render out/sheet-on-bunny
+      tumble render out/sheet-on-bunny --frame 0 --frame 60
+      tumble render out/sheet-on-bunny --film --size 1280x720
+    """
+    if as_film and frame:
+        raise typer.BadParameter("--film draws all frames and --frame a single one; choose one")
+    if frame and len(frame) > 1 and out is not None:
+        raise typer.BadParameter("--out names one file, and there are several frames")
+    found = find.run(run)
+    pixels = _pixels(size)
+    for i in frame or ():
+        if not -found.n_frames <= i < found.n_frames:
+            text = f"frame {i}, expected 0 to {found.n_frames - 1}: the run has {found.n_frames} frames"
+            raise typer.BadParameter(text, param_hint="--frame")
+    look_for(renderer)
+    _ending(out, ".mp4" if as_film else ".png")
+    if as_film:
+        target = out or found.folder / "film.mp4"
+        film(found, target, renderer, every, pixels)
+        say(target)
+        return
+    for i in frame or [-1]:
+        say(still(found, i % found.n_frames, out, renderer, pixels))
+
+
+def look_for(renderer: str) -> None:
+    """Refuses the name of no renderer. (One that does not work on this machine says so when it is to draw.)"""
+    from tumble.pictures import RENDERERS
+
+    known = ["auto", *RENDERERS]
+    if renderer not in known:
+        text = f"no renderer {renderer!r}{find.near(renderer, known) or '; there are ' + ', '.join(known)}"
+        raise typer.BadParameter(text, param_hint="--renderer")
+
+
+def _ending(path: Path | None, ending: str) -> None:
+    if path is not None and path.suffix.lower() != ending:
+        raise typer.BadParameter(f"{path}, expected a name that ends with {ending}", param_hint="--out")
+
+
+def _pixels(text: str | None) -> tuple[int, int] | None:
+    if text is None:
+        return None
+    try:
+        width, height = (int(n) for n in text.lower().split("x"))
+    except ValueError:
+        width = height = 0
+    if not (16 <= width <= 8192 and 16 <= height <= 8192):
+        raise typer.BadParameter(
+            f"{text!r}, expected WIDTHxHEIGHT of 16 to 8192 each, as 1280x720", param_hint="--size"
+        )
+    return width, height
+
+
+def film(run: "Run", path: Path, renderer: str = "auto", every: int = 1, size: tuple[int, int] | None = None) -> None:
+    """Writes a film, showing how far it is."""
+    from tumble.film import film as write
+
+    with Progress("film") as progress:
+        write(run, path, renderer=renderer, every=every, size=size, progress=progress)
+
+
+def still(
+    run: "Run", i: int, path: Path | None = None, renderer: str = "auto", size: tuple[int, int] | None = None
+) -> Path:
+    """Writes a picture of a frame, stills/NNNNNN.png if not told otherwise."""
+    import io
+
+    from matplotlib.image import imsave
+
+    from tumble.folder import write_whole, writing
+    from tumble.pictures import picture
+
+    path = path or run.folder / "stills" / f"{i:06}.png"
+    pixels = picture(run, i, renderer=renderer, size=size)
+    buffer = io.BytesIO()
+    imsave(buffer, pixels, format="png")
+    with writing(path.parent):
+        path.parent.mkdir(parents=True, exist_ok=True)
+    write_whole(path, buffer.getvalue())
+    return path

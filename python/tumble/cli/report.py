@@ -1,0 +1,110 @@
+"""How a run went, in words: the summary of one that finished, the report of one whose physics broke."""
+
+import math
+import sys
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING, Any
+
+from tumble.cli.console import counted, seconds, size
+from tumble.cli.find import as_overrides, command, settings
+
+if TYPE_CHECKING:
+    from tumble import Run, StepError
+
+_NO_GAIN = 0.1
+"""Growth of the energy over its scale below which a change counts as gaining none."""
+
+_RESULTS = ["film.mp4", "scene.usda", "energy.png", "stills"]
+
+
+def summary(run: "Run") -> str:
+    """Where the results are and what they took."""
+    from tumble import expect
+
+    ledger, last = run.ledger, run.n_frames - 1
+    data = sum(f.stat().st_size for f in (run.folder / "frames").glob("*.npz"))
+    steps = counted(int(ledger["steps"].sum()), "step")
+    took = f"{run.time(last):.6g} s simulated in {run.manifest['timings']['simulate']:.3g} s, {steps}"
+    lines = [f"{run.folder}: {counted(run.n_frames, 'frame')} ({size(data)}), {took}, hash {run.hashes[last]}"]
+    if unconverged := int(ledger["unconverged"].sum()):
+        lines.append(
+            f"  {unconverged} steps stopped before Newton's method converged: allow more iterations, or a smaller step"
+        )
+    lines += [f"  {run.folder / name}" for name in _RESULTS if (run.folder / name).exists()]
+    if asked := expect.count(run.scene):
+        kept = asked - len(run.manifest["expectations"])
+        lines.append(f"  expectations: {kept} of {asked} kept")
+    return "\n".join(lines)
+
+
+def failure(run: "Run", error: "StepError", scene: str, overrides: Sequence[str], again: Sequence[str] = ()) -> str:
+    """What broke, where and when, the step against its limit, and what was tried; `again` ends the command to copy."""
+    report = getattr(error, "report", {})
+    cures = _ranked(run.manifest["failure"]["cures"])
+    lines = [f"{_headline(report)}, after frame {run.n_frames - 1}"]
+    if "index" in report:
+        lines += _place(report)
+    else:
+        lines.append(f"  {error}")
+    if cures:
+        lines.append("What was tried:")
+    for i, cure in enumerate(cures):
+        change = " ".join(settings(as_overrides(run.scene, cure["set"])))
+        growth = float(cure["energy_ratio"])
+        energy = f"energy {growth:+.2g} of its scale" if math.isfinite(growth) else ""
+        mark = "  <- recommended" if i == 0 and cure["survived"] else ""
+        lines.append(f"  {'helped' if cure['survived'] else 'failed'}  {change:56} {energy}{mark}".rstrip())
+    kept = f"Kept: {counted(run.n_frames, 'frame')} in {run.folder}"
+    if cures and cures[0]["survived"]:
+        sets = [*overrides, *as_overrides(run.scene, cures[0]["set"])]
+        lines.append(f"{kept}. Try\n  {command('run', scene, sets, *again, '--force')}")
+    elif cures:
+        lines.append(f"{kept}. None of this helped: look for masses that are far too light or springs far too stiff")
+    else:
+        lines.append(f"{kept}.")
+    return "\n".join(lines)
+
+
+def _headline(report: Mapping[str, Any]) -> str:
+    what = {
+        "not_finite": "a number stopped being finite",
+        "exploded": "the energy exploded",
+        "solve": "the solver did not converge",
+        "step_too_small": "the adaptive step became too small",
+        "user": "a force or integrator of yours raised an error",
+    }.get(str(report.get("kind")), "the simulation broke")
+    when = f" at t = {report['time']:.6g} s" if isinstance(report.get("time"), float) else ""
+    return f"FAILED: {what}{when}"
+
+
+def _place(report: Mapping[str, Any]) -> list[str]:
+    integrator, stable = report["integrator"], float(report["stable_step"])
+    if stable == 0.0:
+        limit = f"none: {integrator} has no stable step for this system, it gains energy at any"
+    elif stable == float("inf"):
+        limit = "any, by the linear estimate"
+    else:
+        limit = (
+            f"{seconds(stable)} by estimate, damping included; the step used is {report['step'] / stable:.3g} x that"
+        )
+    lines = [
+        f'  system       "{report["system"]}", {integrator}',
+        f'  first bad    {report["column"]} of particle {report["index"]} of "{report["object"]}"',
+        f"  step used    {seconds(report['step'])}",
+        f"  stable step  {limit}",
+    ]
+    if report.get("energy_ratio") is not None:
+        lines.append(f"  energy       {float(report['energy_ratio']):.3g} times its scale")
+    return lines
+
+
+def _ranked(cures: Sequence[Mapping[str, Any]]) -> list[Mapping[str, Any]]:
+    """The best first: those that helped and gained no energy, in the order in which they were tried."""
+
+    def rank(cure: Mapping[str, Any]) -> float:
+        growth = float(cure["energy_ratio"])
+        if not cure["survived"]:
+            return math.inf
+        return max(growth, _NO_GAIN) if math.isfinite(growth) else sys.float_info.max
+
+    return sorted(cures, key=rank)

@@ -1,0 +1,141 @@
+"""`tumble run`: simulate a scene into a folder."""
+
+import sys
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from tumble.cli import find, report
+from tumble.cli.console import Progress, complain, counted, say, warn
+
+if TYPE_CHECKING:
+    from tumble import Run, TumbleError
+
+
+def run(
+    scene: find.SceneArgument,
+    set: find.SetOption = None,
+    out: Annotated[Path | None, typer.Option(metavar="DIR", help="Folder of the run.", show_default="out/NAME")] = None,
+    frames: Annotated[int | None, typer.Option(metavar="N", help="Frames to simulate, instead of the scene's.")] = None,
+    resume: Annotated[bool, typer.Option("--resume", help="Go on where the run in the folder was stopped.")] = False,
+    force: Annotated[bool, typer.Option("--force", help="Replace the run in the folder.")] = False,
+    threads: Annotated[
+        int | None, typer.Option(min=1, metavar="N", help="Processor cores to use; the result does not depend on it.")
+    ] = None,
+    film: Annotated[bool | None, typer.Option(help="Write film.mp4.", show_default="as the scene says")] = None,
+    usd: Annotated[bool | None, typer.Option(help="Write scene.usda.", show_default="as the scene says")] = None,
+    plot: Annotated[bool | None, typer.Option(help="Write energy.png.", show_default="as the scene says")] = None,
+    stills: Annotated[bool, typer.Option(help="Write the stills that the scene asks for.")] = True,
+    renderer: Annotated[str, typer.Option(metavar="NAME", help="What draws film and stills.")] = "auto",
+) -> None:
+    """Simulate a scene into a folder, out/NAME by default.
+
+    A run that was stopped goes on with --resume, to the same bits. A run that breaks its scene's [expect] table ends
+    with code 1.
+
+    \b
+    Examples:
+      tumble run sheet-on-bunny
+      tumble run my.toml --frames 48 --set system.soft.step=0.001 --film
+      tumble run my.toml --resume
+    """
+    from tumble import StepError
+    from tumble.run import Run, simulate
+
+    if resume and force:
+        raise typer.BadParameter("--resume goes on with a run and --force replaces it; choose one")
+    overrides = list(set or ())
+    if frames is not None:
+        overrides.append(f"time.frames={frames}")
+    from tumble.cli.render import look_for
+    from tumble.pictures import resolve
+
+    look_for(renderer)
+    checked = find.scene(scene, overrides)
+    folder = out if out is not None else find.OUT / find.scene_file(scene).stem
+    wanted = checked.to_dict()["output"]
+    asked = {
+        "film": wanted["film"] if film is None else film,
+        "usd": wanted["usd"] if usd is None else usd,
+        "plot": wanted["plot"] if plot is None else plot,
+    }
+    frames_to_draw = wanted["stills"] if stills else []
+    if renderer != "auto" and (asked["film"] or frames_to_draw):
+        resolve(renderer)  # Says now, rather than after the simulation, if it does not work here.
+    try:
+        with Progress("simulate") as progress:
+            done = simulate(checked, folder, resume=resume, threads=threads, progress=progress, overwrite=force)
+    except StepError as error:
+        again = [] if out is None else ["--out", str(out)]
+        print(report.failure(Run(folder), error, scene, overrides, again), file=sys.stderr)
+        raise typer.Exit(1) from None
+    except KeyboardInterrupt:
+        again = ["--resume"] if out is None else ["--out", str(out), "--resume"]
+        _say_what_is_kept(folder, find.command("run", scene, overrides, *again))
+        raise typer.Exit(130) from None
+
+    for text in done.manifest["warnings"]:
+        warn(text)
+    try:
+        failures = _write_results(done, asked, frames_to_draw, renderer)
+    except KeyboardInterrupt:
+        complain(
+            f"stopped; the simulation in {folder} is complete, see `tumble render --help` and `tumble export --help`"
+        )
+        raise typer.Exit(130) from None
+    say(report.summary(done))
+    for failure in failures:
+        complain(str(failure))
+    broken = done.manifest["expectations"]
+    for expectation in broken:
+        complain(f"broken expectation: {expectation['text']}")
+    if broken or failures:
+        raise typer.Exit(1)
+
+
+def _say_what_is_kept(folder: Path, cure: str) -> None:
+    from tumble import Run, TumbleError
+
+    try:
+        kept = Run(folder).n_frames
+    except TumbleError:
+        complain("stopped before anything was written")
+        return
+    complain(f"stopped; {counted(kept, 'frame')} in {folder} can be read. Go on with\n  {cure}")
+
+
+def _write_results(run: "Run", asked: dict[str, bool], stills: list[int], renderer: str) -> "list[TumbleError]":
+    """Writes what the scene asks for. What fails does not keep the rest from being written."""
+    from tumble import TumbleError
+    from tumble.cli.render import film, still
+
+    failures: list[TumbleError] = []
+
+    def usd() -> None:
+        from tumble.export.usd import write
+
+        with Progress("usd") as progress:
+            write(run, run.folder, progress=progress)
+
+    def plot() -> None:
+        from tumble.plots import energy
+
+        energy(run, run.folder / "energy.png")
+
+    def draw_film() -> None:
+        film(run, run.folder / "film.mp4", renderer)
+
+    def draw_stills() -> None:
+        for i in stills:
+            if i < run.n_frames:
+                still(run, i, None, renderer)
+
+    tasks = {"plot": plot, "usd": usd, "film": draw_film, "stills": draw_stills}
+    for name, task in tasks.items():
+        if asked.get(name, True):
+            try:
+                task()
+            except TumbleError as error:
+                failures.append(error)
+    return failures

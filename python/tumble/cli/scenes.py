@@ -1,0 +1,30 @@
+"""`tumble scenes`: the scenes that come with tumble."""
+
+from itertools import groupby
+from typing import Annotated
+
+import typer
+
+from tumble.cli import find
+from tumble.cli.console import say
+
+
+def scenes(
+    name: Annotated[str | None, typer.Argument(metavar="[NAME]", help="Scene whose file to print.")] = None,
+) -> None:
+    """List the scenes that come with tumble, or print one.
+
+    \b
+    Examples:
+      tumble scenes
+      tumble scenes sheet-on-bunny > my.toml
+    """
+    if name is not None:
+        say(find.scene_file(name).read_text(encoding="utf-8"), end="")
+        return
+    known = find.shipped()
+    width = max((len(file.stem) for file in known.values()), default=0)
+    for row, files in groupby(known.values(), key=lambda file: file.parent.name):
+        say(row)
+        for file in files:
+            say(f"  {file.stem:{width}}  {find.title(file)}".rstrip())

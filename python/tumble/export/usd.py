@@ -1,0 +1,321 @@
+"""A run as Universal Scene Description: scene.usda, and beside it usd/ with a layer per frame.
+
+    scene.usda              camera, lights, frame rate; refers to objects.usdc; names the frames as value clips
+    usd/objects.usdc        what does not change: topology, ids, widths, colours, colliders; points at the start
+    usd/manifest.usda       which attributes the frames hold
+    usd/frame.000000.usdc   points, velocities, normals and extents of a frame, at time code 0; and so on
+
+Why value clips: sub-layers cannot do it (the strongest layer that has any time sample of an attribute hides the
+samples of all others), and one file with all samples keeps them all in memory while it is written. Value clips are
+opened when their frame is asked for, and values between two frames are interpolated. They belong to how the USD
+library looks up values, so that programs built on it need no support of their own (tried: Blender 4.2 and 5.0). A
+program that reads USD in another way may see the start only, which is in objects.usdc.
+
+The clips must be stronger than the points at the start, and defaults beside clips are stronger than these: that is
+why objects.usdc is referenced and not a sub-layer.
+"""
+
+import contextlib
+import os
+import re
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from tumble._engine import ExportError
+from tumble.folder import writing
+from tumble.pictures.framing import camera
+from tumble.pictures.look import key_light
+from tumble.pictures.surfaces import normals, split
+from tumble.pictures.things import Columns, Object, Recording, objects, positions
+
+ROOT = "/scene"
+SENSOR = 0.36
+"""Width of the camera's sensor [tenth of a metre], the unit that USD takes for lenses."""
+
+SPRING = 0.25
+"""Radius of springs over the radius of the masses that they join."""
+
+DIGITS = 6
+
+Floats = npt.NDArray[np.float32]
+
+
+@dataclass(frozen=True)
+class Part:
+    """A prim: the whole of an object, or its springs."""
+
+    thing: Object
+    path: str
+    title: str
+    kind: str
+    """Points, Mesh or BasisCurves."""
+    order: npt.NDArray[np.int64] | None = None
+    """Masses in the order of the points; without it, all masses in theirs."""
+    counts: npt.NDArray[np.int64] | None = None
+    """Points of each curve."""
+    radius: float = 0.0
+    cut: tuple[npt.NDArray[np.int64], npt.NDArray[np.int64]] | None = None
+    """What `surfaces.split` says of a solid that has sharp edges."""
+
+
+def write(run: Recording, folder: str | os.PathLike[str], progress: Callable[[int, int], None] | None = None) -> Path:
+    """Writes scene.usda and usd/ into a folder and returns the path of scene.usda, which is written last.
+    `progress(done, total)` is called after each frame. Positions are single precision, bit for bit those of a run in
+    single precision. Raises ExportError."""
+    if run.n_frames < 1:
+        raise ExportError("the run has no frames")
+    goal = Path(folder)
+    layers = goal / "usd"
+    start = run.frame(0)
+    parts = _parts(objects(run), start)
+    digits = max(DIGITS, len(str(run.n_frames - 1)))
+    with _writing(goal / "scene.usda"):
+        layers.mkdir(parents=True, exist_ok=True)
+        for old in layers.glob("frame.*.usdc"):
+            if not old.name[6:-5].isdigit() or len(old.name) != digits + 11 or int(old.name[6:-5]) >= run.n_frames:
+                old.unlink()
+        for i in range(run.n_frames):
+            columns = start if i == 0 else run.frame(i)
+            _save(_frame(parts, columns, i), layers / f"frame.{i:0{digits}d}.usdc")
+            if progress is not None:
+                progress(i + 1, run.n_frames)
+        _save(_manifest(parts, start), layers / "manifest.usda")
+        _save(_objects(parts, start), layers / "objects.usdc")
+        scene = goal / "scene.usda"
+        _save(_scene(run, "#" * digits), scene)
+    return scene
+
+
+@contextlib.contextmanager
+def _writing(path: Path) -> Iterator[None]:
+    """Turns refusals of the system and of the USD library into an ExportError."""
+    try:
+        with writing(path):
+            yield
+    except RuntimeError as error:
+        # One line per error, each with the place in the library's source and the reason in quotes.
+        reasons = re.findall(r" : '(.*)'", str(error))
+        raise ExportError(f"{path}: cannot be written: {reasons[0] if reasons else error}") from error
+
+
+def _parts(found: list[Object], start: Columns) -> list[Part]:
+    from pxr import Tf
+
+    taken = {"camera", "key_light", "sky", "looks"}
+
+    def path(name: str) -> str:
+        stem = Tf.MakeValidIdentifier(name)
+        free = next(n for n in (stem, *(f"{stem}_{k}" for k in range(2, 1_000_000))) if n not in taken)
+        taken.add(free)
+        return f"{ROOT}/{free}"
+
+    parts = []
+    for thing in found:
+        if thing.kind == "points":
+            parts.append(Part(thing, path(thing.name), thing.name, "Points", radius=thing.radius))
+        elif thing.kind == "curve":
+            counts = np.array([len(thing.curve)])
+            where = path(thing.name)
+            parts.append(Part(thing, where, thing.name, "BasisCurves", thing.curve, counts, thing.radius))
+        elif len(thing.triangles):
+            cut = None if thing.kind == "sheet" else split(_places(thing, start), thing.triangles)
+            parts.append(Part(thing, path(thing.name), thing.name, "Mesh", cut=cut))
+    for thing in found:
+        if thing.kind == "points" and len(thing.links):
+            title = f"{thing.name} springs"
+            counts = np.full(len(thing.links), 2)
+            where = path(title)
+            parts.append(Part(thing, where, title, "BasisCurves", thing.links.ravel(), counts, SPRING * thing.radius))
+    return parts
+
+
+def _places(thing: Object, columns: Columns) -> npt.NDArray[np.float64]:
+    return positions(columns, thing) if thing.position is None else thing.position
+
+
+def _values(part: Part, columns: Columns) -> Iterator[tuple[str, str, Floats]]:
+    """What a frame says of a part: attribute, type and values."""
+    x = _places(part.thing, columns)
+    v = columns.get(part.thing.name, {}).get("velocity")
+    chosen = slice(None) if part.order is None else part.order
+    points = np.ascontiguousarray(x[chosen], dtype=np.float32)
+    yield "points", "point3f[]", points
+    if v is not None:
+        yield "velocities", "vector3f[]", np.ascontiguousarray(np.reshape(v, (-1, 3))[chosen], dtype=np.float32)
+    if part.kind == "Mesh":
+        source, triangles = part.cut or (np.arange(len(x)), part.thing.triangles)
+        n = normals(x[source], triangles)
+        yield "normals", "normal3f[]", np.ascontiguousarray(n[triangles.ravel()] if part.cut else n, dtype=np.float32)
+    if len(points):
+        low, high = points.min(axis=0) - np.float32(part.radius), points.max(axis=0) + np.float32(part.radius)
+        yield "extent", "float3[]", np.stack([low, high])
+
+
+def _frame(parts: list[Part], columns: Columns, i: int) -> Any:
+    """The layer of a frame."""
+    from pxr import Sdf, Vt
+
+    layer = Sdf.Layer.CreateAnonymous(".usdc")
+    with Sdf.ChangeBlock():
+        for part in parts:
+            if part.thing.position is None:
+                prim = Sdf.CreatePrimInLayer(layer, part.path)
+                for name, kind, values in _values(part, columns):
+                    attribute = Sdf.AttributeSpec(prim, name, Sdf.ValueTypeNames.Find(kind))
+                    layer.SetTimeSample(attribute.path, float(i), Vt.Vec3fArray.FromNumpy(values))
+    return layer
+
+
+def _manifest(parts: list[Part], start: Columns) -> Any:
+    from pxr import Sdf
+
+    layer = Sdf.Layer.CreateAnonymous(".usda")
+    for part in parts:
+        if part.thing.position is None:
+            prim = Sdf.CreatePrimInLayer(layer, part.path)
+            for name, kind, _ in _values(part, start):
+                Sdf.AttributeSpec(prim, name, Sdf.ValueTypeNames.Find(kind))
+    return layer
+
+
+def _objects(parts: list[Part], start: Columns) -> Any:
+    """What does not change, and the start."""
+    from pxr import Gf, Sdf, Usd, UsdGeom, UsdShade, Vt
+
+    layer = Sdf.Layer.CreateAnonymous(".usdc")
+    stage = Usd.Stage.Open(layer)
+    _units(stage)
+    stage.SetDefaultPrim(UsdGeom.Xform.Define(stage, ROOT).GetPrim())
+    UsdGeom.Scope.Define(stage, f"{ROOT}/looks")
+    for part in parts:
+        prim = stage.DefinePrim(part.path, part.kind)
+        prim.SetDisplayName(part.title)
+        for name, kind, values in _values(part, start):
+            attribute = prim.CreateAttribute(name, Sdf.ValueTypeNames.Find(kind), False)
+            attribute.Set(Vt.Vec3fArray.FromNumpy(values))
+        n = len(prim.GetAttribute("points").Get())
+        shown = UsdGeom.Gprim(prim)
+        color = Gf.Vec3f(*part.thing.color)
+        shown.CreateDisplayColorAttr([color])
+        if part.kind == "Points":
+            cloud = UsdGeom.Points(prim)
+            cloud.CreateIdsAttr(Vt.Int64Array.FromNumpy(np.arange(n, dtype=np.int64)))
+            cloud.CreateWidthsAttr(Vt.FloatArray(n, 2 * part.radius))
+        elif part.kind == "BasisCurves":
+            curves = UsdGeom.BasisCurves(prim)
+            curves.CreateTypeAttr(UsdGeom.Tokens.linear)
+            curves.CreateWrapAttr(UsdGeom.Tokens.nonperiodic)
+            assert part.counts is not None
+            curves.CreateCurveVertexCountsAttr(Vt.IntArray.FromNumpy(part.counts.astype(np.int32)))
+            curves.CreateWidthsAttr(Vt.FloatArray(n, 2 * part.radius))
+            curves.SetWidthsInterpolation(UsdGeom.Tokens.vertex)
+        else:
+            mesh = UsdGeom.Mesh(prim)
+            triangles = part.thing.triangles.astype(np.int32)
+            mesh.CreateFaceVertexCountsAttr(Vt.IntArray(len(triangles), 3))
+            mesh.CreateFaceVertexIndicesAttr(Vt.IntArray.FromNumpy(np.ascontiguousarray(triangles.ravel())))
+            mesh.CreateSubdivisionSchemeAttr(UsdGeom.Tokens.none)
+            mesh.SetNormalsInterpolation(UsdGeom.Tokens.faceVarying if part.cut else UsdGeom.Tokens.vertex)
+            mesh.CreateDoubleSidedAttr(part.thing.kind == "sheet")
+        look = UsdShade.Material.Define(stage, f"{ROOT}/looks/{part.path[len(ROOT) + 1 :]}")
+        shader = UsdShade.Shader.Define(stage, look.GetPath().AppendChild("surface"))
+        shader.CreateIdAttr("UsdPreviewSurface")
+        shader.CreateInput("diffuseColor", Sdf.ValueTypeNames.Color3f).Set(color)
+        shader.CreateInput("roughness", Sdf.ValueTypeNames.Float).Set(0.8 if part.thing.kind == "sheet" else 0.4)
+        look.CreateSurfaceOutput().ConnectToSource(shader.ConnectableAPI(), "surface")
+        UsdShade.MaterialBindingAPI.Apply(prim).Bind(look)
+    return layer
+
+
+def _scene(run: Recording, hashes: str) -> Any:
+    """The root: frame rate, camera, lights, and where the rest is."""
+    from pxr import Gf, Sdf, Usd, UsdGeom, UsdLux
+
+    layer = Sdf.Layer.CreateAnonymous(".usda")
+    stage = Usd.Stage.Open(layer)
+    _units(stage)
+    rate = float(run.scene.get("time", {}).get("fps", 24.0))
+    stage.SetTimeCodesPerSecond(rate)
+    stage.SetFramesPerSecond(rate)
+    stage.SetStartTimeCode(0)
+    stage.SetEndTimeCode(run.n_frames - 1)
+    stage.SetMetadata("customLayerData", {"creator": "tumble"})
+    root = UsdGeom.Xform.Define(stage, ROOT).GetPrim()
+    stage.SetDefaultPrim(root)
+    if run.scene.get("title"):
+        root.SetDisplayName(str(run.scene["title"]))
+
+    view = camera(run)
+    lens = UsdGeom.Camera.Define(stage, f"{ROOT}/camera")
+    lens.AddTransformOp().Set(_placed(view.axes[0], view.axes[1], -view.axes[2], view.position))
+    sensor = 10 * view.width if view.parallel else SENSOR
+    if view.parallel:
+        lens.CreateProjectionAttr(UsdGeom.Tokens.orthographic)
+    else:
+        lens.CreateFocalLengthAttr(sensor * view.distance / view.width)
+    lens.CreateHorizontalApertureAttr(sensor)
+    lens.CreateVerticalApertureAttr(sensor * view.height / view.width)
+    lens.CreateFocusDistanceAttr(view.distance)
+    lens.CreateClippingRangeAttr(Gf.Vec2f(1e-3 * view.distance, 1e3 * view.distance))
+
+    key = UsdLux.DistantLight.Define(stage, f"{ROOT}/key_light")
+    key.CreateIntensityAttr(1.0)
+    key.CreateNormalizeAttr(True)
+    key.CreateAngleAttr(12.0)
+    toward = key_light(view)
+    across = np.cross(view.axes[1], toward)
+    across /= np.linalg.norm(across)
+    key.AddTransformOp().Set(_placed(across, np.cross(toward, across), toward, np.zeros(3)))
+    sky = UsdLux.DomeLight.Define(stage, f"{ROOT}/sky")
+    sky.CreateIntensityAttr(0.5)
+    sky.CreateColorAttr(Gf.Vec3f(0.95, 1.0, 1.08))
+
+    # Last, and beneath the stage, which would look for the files while they have no place yet.
+    del stage
+    spec = layer.GetPrimAtPath(ROOT)
+    spec.referenceList.Prepend(Sdf.Reference("./usd/objects.usdc"))
+    clips = {
+        "primPath": ROOT,
+        "manifestAssetPath": Sdf.AssetPath("./usd/manifest.usda"),
+        "templateAssetPath": f"./usd/frame.{hashes}.usdc",
+        "templateStartTime": 0.0,
+        "templateEndTime": float(run.n_frames - 1),
+        "templateStride": 1.0,
+    }
+    spec.SetInfo("clips", {"default": clips})
+    return layer
+
+
+def _units(stage: Any) -> None:
+    from pxr import UsdGeom, UsdPhysics
+
+    UsdGeom.SetStageMetersPerUnit(stage, 1.0)
+    UsdGeom.SetStageUpAxis(stage, UsdGeom.Tokens.z)
+    UsdPhysics.SetStageKilogramsPerUnit(stage, 1.0)
+
+
+def _placed(x: Any, y: Any, z: Any, origin: Any) -> Any:
+    """The matrix that takes the axes to x, y, z and 0 to the origin; USD multiplies from the left with rows."""
+    from pxr import Gf
+
+    rows = np.eye(4)
+    rows[:3, :3] = np.stack([x, y, z])
+    rows[3, :3] = origin
+    return Gf.Matrix4d(rows.tolist())
+
+
+def _save(layer: Any, path: Path) -> None:
+    """Writes a layer under a temporary name, then renames it."""
+    unfinished = path.with_name(f"{path.stem}.part{path.suffix}")
+    try:
+        if not layer.Export(str(unfinished)):
+            raise OSError(f"{path.name} could not be written")
+        unfinished.replace(path)
+    finally:
+        with contextlib.suppress(OSError):
+            unfinished.unlink(missing_ok=True)

@@ -1,0 +1,265 @@
+"""The files of a run folder, written so that a stop at any moment leaves what was finished readable.
+
+Whole files are written under a temporary name and renamed; tables grow by whole lines, and a line that was cut off is
+not read.
+"""
+
+import errno
+import io
+import json
+import math
+import os
+import zipfile
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from contextlib import contextmanager, suppress
+from pathlib import Path
+from typing import IO, Any
+
+import numpy as np
+import numpy.typing as npt
+
+from tumble._engine import ExportError, World
+
+Columns = dict[str, dict[str, npt.NDArray[Any]]]
+"""Object name -> column name -> array."""
+
+FORMAT = 1
+"""Version of the run folder."""
+
+# fmt: off
+LEDGER = [
+    "frame", "time", "mass",
+    "momentum_x", "momentum_y", "momentum_z",
+    "angular_momentum_x", "angular_momentum_y", "angular_momentum_z",
+    "kinetic", "elastic", "external", "energy",
+    "stretch", "penetration", "speed", "contacts", "broken",
+    "steps", "rejected", "newton", "linear", "residual", "unconverged", "clamped",
+    "smallest_step", "largest_step", "seconds", "hash",
+]
+# fmt: on
+"""Columns of ledger.csv, one row per frame: SI units; `seconds` is the time that computing the frame took."""
+
+TRIALS = ["time", "step", "error", "accepted", "frame"]
+"""Columns of trials.csv, one row per step that an adaptive integrator tried on the way to `frame`."""
+
+_WRITTEN = """
+static.npz columns.json ledger.csv trials.csv frames/*.npz checkpoints/*.safetensors
+film.mp4 .film.mp4.part energy.png ledger.png stills/*.png columns.npz
+scene.usda usd/frame.*.usdc usd/manifest.usda usd/objects.usdc
+run.json
+"""
+"""What a run writes and --force deletes: the manifest last, because a folder without it is not taken for a run."""
+
+
+class RunFolder:
+    """Where everything is."""
+
+    def __init__(self, path: str | os.PathLike[str]) -> None:
+        self.path = Path(path)
+        self.manifest = self.path / "run.json"
+        self.static = self.path / "static.npz"
+        self.columns = self.path / "columns.json"
+        self.ledger = self.path / "ledger.csv"
+        self.trials = self.path / "trials.csv"
+
+    def frame(self, i: int) -> Path:
+        return self.path / "frames" / f"{i:06}.npz"
+
+    def checkpoint(self, i: int) -> Path:
+        return self.path / "checkpoints" / f"{i:06}.safetensors"
+
+    def _numbers(self, folder: str, ending: str) -> list[int]:
+        files = (self.path / folder).glob(f"*{ending}")
+        return sorted(int(f.stem) for f in files if f.stem.isdigit())
+
+    def checkpoints(self) -> list[int]:
+        """Frames of which there is a checkpoint."""
+        return self._numbers("checkpoints", ".safetensors")
+
+    def is_run(self) -> bool:
+        return self.manifest.is_file()
+
+    def is_free(self) -> bool:
+        """Whether a new run can go here: nothing is here yet."""
+        return not os.path.lexists(self.path) or (self.path.is_dir() and not any(self.path.iterdir()))
+
+    def make(self) -> None:
+        for folder in ("frames", "checkpoints"):
+            with writing(self.path / folder):
+                (self.path / folder).mkdir(parents=True, exist_ok=True)
+
+    def clear(self) -> None:
+        """Deletes what a run writes; anything else stays."""
+        with writing(self.path):
+            for pattern in _WRITTEN.split():
+                for file in [*self.path.glob(pattern), *self.path.glob(pattern + ".tmp")]:
+                    file.unlink()
+            for folder in ("frames", "checkpoints", "stills", "usd"):
+                with suppress(OSError):
+                    (self.path / folder).rmdir()
+
+    def drop_after(self, frame: int) -> None:
+        """Deletes the frames and checkpoints after a frame."""
+        with writing(self.path):
+            late = [self.frame(i) for i in self._numbers("frames", ".npz") if i > frame]
+            late += [self.checkpoint(i) for i in self.checkpoints() if i > frame]
+            for file in [*late, *self.path.glob("frames/*.tmp"), *self.path.glob("checkpoints/*.tmp")]:
+                file.unlink()
+
+    def intact(self, limit: int) -> int:
+        """How many frames, counted from the start and up to `limit`, can be read."""
+        for i in range(limit):
+            try:
+                zipfile.ZipFile(self.frame(i)).close()
+            except (OSError, zipfile.BadZipFile):
+                return i
+        return limit
+
+
+@contextmanager
+def writing(path: Path) -> Iterator[None]:
+    """Turns the system's refusals into an ExportError that says what to do."""
+    try:
+        yield
+    except OSError as error:
+        raise _explain(path, error) from error
+
+
+def _explain(path: Path, error: OSError) -> ExportError:
+    kept = "; what was finished before is readable"
+    match error.errno:
+        case errno.ENOSPC | errno.EDQUOT:
+            text = f"no space left on the disk{kept}: free some, then go on with --resume"
+        case errno.EACCES | errno.EPERM | errno.EROFS:
+            text = f"this place cannot be written ({error.strerror}); choose another one with --out"
+        case errno.ENOENT:
+            text = "the folder has vanished, or cannot be made; choose another one with --out"
+        case errno.ENOTDIR | errno.EEXIST:
+            text = f"there is a file where a folder should be ({error.strerror}); choose another one with --out"
+        case _:
+            text = f"cannot be written: {error.strerror or error}{kept}"
+    return ExportError(f"{path}: {text}")
+
+
+def write_whole(path: Path, data: bytes) -> None:
+    """Writes a file that is there either completely or not at all."""
+    temporary = path.with_name(path.name + ".tmp")
+    with writing(path):
+        try:
+            with temporary.open("wb") as file:
+                file.write(data)
+            temporary.replace(path)
+        except OSError:
+            with suppress(OSError):
+                temporary.unlink()
+            raise
+
+
+def write_columns(path: Path, columns: Columns) -> None:
+    """Columns as an uncompressed .npz with keys `object/column`."""
+    arrays = {f"{name}/{column}": array for name, table in columns.items() for column, array in table.items()}
+    buffer = io.BytesIO()
+    np.savez(buffer, **arrays)  # type: ignore[arg-type]
+    write_whole(path, buffer.getvalue())
+
+
+def read_columns(path: Path) -> Columns:
+    """The columns of an .npz."""
+    columns: Columns = {}
+    try:
+        with np.load(path) as archive:
+            for key in archive.files:
+                name, _, column = key.rpartition("/")
+                columns.setdefault(name, {})[column] = archive[key]
+    except FileNotFoundError:
+        raise ExportError(f"{path}: is missing; --resume computes again what is lost") from None
+    except (OSError, ValueError, EOFError, zipfile.BadZipFile) as error:
+        raise ExportError(f"{path}: is damaged ({error}); --resume computes again what is lost") from error
+    return columns
+
+
+def write_checkpoint(world: World, path: Path) -> None:
+    temporary = path.with_name(path.name + ".tmp")
+    with writing(path):
+        try:
+            world.save(temporary)
+            temporary.replace(path)
+        except ExportError as error:
+            raise ExportError(f"{error}; what was finished before is readable, and --resume goes on from it") from error
+        finally:
+            with suppress(OSError):
+                temporary.unlink()
+
+
+def write_json(path: Path, tree: Mapping[str, Any]) -> None:
+    write_whole(path, (json.dumps(plain(tree), indent=1, allow_nan=False, ensure_ascii=False) + "\n").encode())
+
+
+def plain(value: Any) -> Any:
+    """A value in the words of JSON; infinities and nan, for which it has none, become "inf", "-inf" and "nan"."""
+    match value:
+        case Mapping():
+            return {str(key): plain(item) for key, item in value.items()}
+        case bool() | int() | str() | None:
+            return value
+        case float():
+            return value if math.isfinite(value) else str(value)
+        case np.ndarray() | np.generic():
+            return plain(value.tolist())
+        case Iterable():
+            return [plain(item) for item in value]
+        case _:
+            return str(value)
+
+
+def cell(value: str | int | float) -> str:
+    """A field of a table; reading a number gives the same bits."""
+    if isinstance(value, str):
+        return value
+    return str(int(value)) if isinstance(value, bool | int | np.integer | np.bool) else repr(float(value))
+
+
+def read_rows(path: Path, header: Sequence[str]) -> list[list[str]]:
+    """The complete rows of a table; reading stops at the first that is not. Only the ledger's `hash` is no number."""
+    try:
+        lines = path.read_text(encoding="utf-8", errors="replace").splitlines(keepends=True)
+    except OSError:
+        return []
+    if not lines or lines[0].rstrip("\n").split(",") != list(header):
+        return []
+    rows = []
+    for line in lines[1:]:
+        fields = line.rstrip("\n").split(",")
+        numbers = fields[:-1] if header[-1] == "hash" else fields
+        if not line.endswith("\n") or len(fields) != len(header) or not all(map(_is_number, numbers)):
+            break
+        rows.append(fields)
+    return rows
+
+
+def _is_number(text: str) -> bool:
+    try:
+        float(text)
+    except ValueError:
+        return False
+    return True
+
+
+class Table:
+    """A .csv file that grows by whole lines."""
+
+    def __init__(self, path: Path, header: Sequence[str], rows: Iterable[Sequence[str]] = ()) -> None:
+        """Starts with the rows given, as they were read."""
+        self.path = path
+        write_whole(path, "".join(",".join(line) + "\n" for line in [header, *rows]).encode())
+        with writing(path):
+            self.file: IO[str] = path.open("a", encoding="utf-8", newline="\n")
+
+    def add(self, rows: Iterable[Iterable[str | int | float]]) -> None:
+        with writing(self.path):
+            self.file.write("".join(",".join(map(cell, row)) + "\n" for row in rows))
+            self.file.flush()
+
+    def close(self) -> None:
+        with suppress(OSError):
+            self.file.close()

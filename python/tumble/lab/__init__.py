@@ -1,0 +1,1 @@
+"""Experiments on the methods, each a page to read: which integrator to take, which links make which structure."""

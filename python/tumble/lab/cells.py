@@ -1,0 +1,141 @@
+"""One run of a scene under one integrator with one step: what it took and how it ended."""
+
+import time
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+
+from tumble._engine import StepError, World
+from tumble.lab.schemes import Scheme
+from tumble.lab.subject import Subject
+
+MOST = 10_000_000
+"""Sub-steps that a frame of a scene may have."""
+
+SURVIVED, BLEW_UP, STOPPED, SKIPPED = "survived", "blew up", "stopped", "skipped"
+
+
+@dataclass
+class Cell:
+    """A run, whole or not."""
+
+    experiment: str
+    scheme: Scheme
+    step: float
+    """Sub-step [s]; of adaptive integrators the mean one."""
+    tolerance: float | None
+    duration: float
+    """How long it was to be [s]."""
+    outcome: str = SURVIVED
+    reached: float = 0.0
+    """How far it came [s]."""
+    steps: int = 0
+    rejected: int = 0
+    newton: int = 0
+    linear: int = 0
+    unconverged: int = 0
+    seconds: float = 0.0
+    """Time on the clock."""
+    step_range: tuple[float, float] | None = None
+    error: float = float("nan")
+    """Largest distance from the true solution over the size of the motion."""
+    failure: dict[str, Any] = field(default_factory=dict)
+    """system, object, index, time, if it blew up and the engine saw it."""
+
+    @property
+    def evaluations(self) -> int:
+        """Forces computed; for implicit integrators with the products of the linear solver."""
+        if self.scheme.implicit:
+            return self.newton + self.linear
+        return self.scheme.evaluations * (self.steps + self.rejected)
+
+    def per_second(self, amount: float) -> float:
+        """Of an amount that the run took, the share of one simulated second."""
+        return amount / self.reached if self.reached > 0 else float("nan")
+
+
+class TooSlow(Exception):
+    """A run was given up."""
+
+
+def run(
+    subject: Subject,
+    scheme: Scheme,
+    experiment: str,
+    interval: float,
+    frames: int,
+    substeps: int = 1,
+    tolerance: float | None = None,
+    patience: float = float("inf"),
+    each: Callable[[World], bool] = lambda world: True,
+) -> Cell:
+    """Runs `frames` of `interval` [s]. After each, `each` may say that it has seen enough: the run then counts as blown
+    up. One that takes longer than `patience` [s] is given up and counts as skipped."""
+    cell = Cell(experiment, scheme, interval / substeps, tolerance, interval * frames)
+    if substeps > MOST:
+        cell.outcome = SKIPPED
+        return cell
+    world = subject.world(scheme, interval, frames, substeps, tolerance)
+    try:
+        for _ in range(frames):
+            begin = time.perf_counter()
+            report = world.step()
+            cell.seconds += time.perf_counter() - begin
+            _add(cell, report)
+            cell.reached = world.time
+            if not each(world):
+                cell.outcome = BLEW_UP
+                break
+            if cell.seconds > patience:
+                cell.outcome = SKIPPED
+                break
+    except StepError as error:
+        blown = error.report.get("kind") in ("not_finite", "exploded")
+        cell.outcome = BLEW_UP if blown else STOPPED
+        cell.failure = dict(error.report)
+        cell.reached = float(error.report.get("time") or world.time)
+    if scheme.adaptive and cell.steps:
+        cell.step = cell.reached / cell.steps
+    return cell
+
+
+def _add(cell: Cell, report: dict[str, Any]) -> None:
+    cell.steps += int(report["steps"])
+    cell.rejected += int(report["rejected"])
+    cell.newton += int(report["newton"])
+    cell.linear += int(report["linear"])
+    cell.unconverged += int(report["unconverged"])
+    # The last step of a frame is cut to end with it; the others were chosen.
+    trials = [t["step"] for t in report.get("trials") or [] if t["accepted"]]
+    trials = trials[:-1] or trials
+    span = (min(trials), max(trials)) if trials else report.get("step_range")
+    if span is not None:
+        old = cell.step_range or span
+        cell.step_range = (min(old[0], span[0]), max(old[1], span[1]))
+
+
+@dataclass
+class Purse:
+    """Time that may be spent [s]."""
+
+    left: float
+    given: float = 0.0
+
+    def part(self, n: int) -> "Purse":
+        """A part for the next of n: twice its share, so that none is left without."""
+        share = 2.0 * self.left / (n + 1)
+        return Purse(share, share)
+
+    def settle(self, part: "Purse") -> None:
+        """Takes what a part has spent."""
+        self.left = max(0.0, self.left - (part.given - part.left))
+
+    def pays(self, cost: float) -> bool:
+        """Whether a run that is expected to take so long may start."""
+        return bool(np.isfinite(cost) and cost <= self.left)
+
+    def spend(self, cell: Cell) -> Cell:
+        self.left -= cell.seconds
+        return cell

@@ -1,0 +1,228 @@
+"""What the lab tests: a scene whose integrator, step and length can be changed at will."""
+
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+
+from tumble._engine import Scene, World
+from tumble.lab import exact
+from tumble.lab.exact import Floats, Linear, Tree
+from tumble.lab.schemes import BY_WORD, Scheme
+
+GROWTH = 1000.0
+"""Growth of the energy that counts as a blow-up."""
+
+PERIODS = 100.0
+"""Periods of the stiffest mode within which it counts."""
+
+
+def rms(a: Floats) -> float:
+    """Root mean square of the lengths of rows."""
+    return float(np.sqrt(np.mean(np.sum(a * a, axis=1)))) if len(a) else 0.0
+
+
+@dataclass
+class Limits:
+    """Predicted limits of the steps of one integrator [s]; zero: none will do, infinite: any will."""
+
+    stable: float
+    usable: float
+
+
+@dataclass
+class Subject:
+    """A scene under test, in double precision."""
+
+    tree: Tree
+    folder: str
+    tracers: bool
+    """Whether it is velocity fields, not forces, that move it."""
+    rate: float
+    """Highest rate of anything in it, max(w, c) of the stiffest and the most damped mode [rad/s]; 0 without any."""
+    frequency: float
+    damping: float
+    culprit: tuple[str, int] | None
+    limits: dict[str, Limits]
+    solution: Linear | None
+    start: Floats
+    """Positions at the start [m], n x 3."""
+    threads: int | None
+    notes: list[str] = field(default_factory=list)
+
+    @property
+    def duration(self) -> float:
+        """Length of the scene [s]."""
+        return float(self.tree["time"]["frames"]) / float(self.tree["time"]["fps"])
+
+    @property
+    def discontinuous(self) -> bool:
+        """Whether something in it happens from one moment to the next: contact, or breaking."""
+        links = [thing.get("links") or {} for kind in ("rope", "sheet", "block", "net") for thing in self.tree[kind]]
+        laws = [law for of in links for law in of.values() if isinstance(law, dict)]
+        laws += [spring for thing in self.tree["particles"] for spring in thing["spring"]]
+        return bool(self.tree["collider"]) or any(law.get("break_strain") for law in laws)
+
+    @property
+    def limited(self) -> bool:
+        """Whether something in it pulls back or brakes, so that a step can be too long."""
+        if self.tracers:
+            return self.rate > 0
+        things = [kind for kind in ("rope", "sheet", "block", "net", "anchor") if self.tree[kind]]
+        springs = any(thing["spring"] for thing in self.tree["particles"])
+        drag = any(force["kind"] == "drag" for force in self.tree["force"])
+        return self.rate > 0 and bool(things or springs or drag)
+
+    def world(
+        self, scheme: Scheme, interval: float, frames: int, substeps: int | None = None, tolerance: float | None = None
+    ) -> World:
+        """The scene under an integrator, in frames of `interval` [s]."""
+        systems = []
+        for system in self.tree["system"]:
+            own = dict(system)
+            if (own["method"] == "tracers") == self.tracers:
+                own |= {"integrator": scheme.word, "substeps": substeps, "step": None}
+                if scheme.adaptive:
+                    own |= {
+                        "substeps": None,
+                        "adaptive": {**own["adaptive"], "tolerance": tolerance, "smallest": 1e-12},
+                    }
+                if scheme.word not in ("modified_euler", "verlet"):
+                    own["clamp"] = None
+            systems.append(own)
+        time = {"fps": 1.0 / interval, "frames": frames, "exchanges": 1}
+        return World(Scene({**self.tree, "time": time, "system": systems}, self.folder), self.threads)
+
+    @property
+    def extent(self) -> float:
+        """Size of the thing at the start [m]."""
+        if not len(self.start):
+            return 1.0
+        return rms(self.start - self.start.mean(axis=0)) or rms(self.start) or 1.0
+
+    def objects(self, world: World) -> list[str]:
+        """Names of the objects under test."""
+        topology = world.topology
+        return [name for name in world.columns("position") if ("mass" in topology.get(name, {})) != self.tracers]
+
+    def positions(self, world: World) -> Floats:
+        """Positions [m] of all that is under test, n x 3."""
+        return self._all(world, "position")
+
+    def velocities(self, world: World) -> Floats:
+        """Velocities [m/s] of all that is under test, n x 3."""
+        return self._all(world, "velocity")
+
+    def _all(self, world: World, column: str) -> Floats:
+        columns = world.columns(column)
+        own = [columns[name][column] for name in self.objects(world)]
+        return np.concatenate(own).astype(float) if own else np.zeros((0, 3))
+
+    def write(self, world: World, column: str, values: Floats) -> None:
+        """Sets positions or velocities of all that is under test."""
+        columns, done = world.columns(column), 0
+        for name in self.objects(world):
+            n = len(columns[name][column])
+            world.write(name, column, values[done : done + n])
+            done += n
+
+
+def subject(scene: Scene) -> Subject:
+    """Makes a scene ready for testing."""
+    tree = scene.to_dict()
+    tree["precision"] = "double"
+    tree["output"] = {"columns": ["position"], "plot": False}
+    tree["expect"] = {}
+    if not tree["system"]:
+        tree["system"] = [{"name": "main", "method": "dynamics", "integrator": "symplectic_euler"}]
+    for system in tree["system"]:
+        system.setdefault("method", "dynamics")
+        system["adaptive"] = dict(system.get("adaptive") or {})
+    methods = {system["method"] for system in tree["system"]}
+    tracers = methods == {"tracers"}
+    notes = []
+    if len(methods) > 1:
+        notes.append("Tracers move as the scene says; what is compared here are the masses.")
+    if any(system.get("clamp") for system in tree["system"]):
+        notes.append("The position clamp goes with modified_euler and verlet only; the others run without it.")
+    bare = Subject(tree, scene.folder, tracers, 0.0, 0.0, 0.0, None, {}, None, np.zeros((0, 3)), None, notes)
+    world = bare.world(BY_WORD["rk4"], 1.0 / float(tree["time"]["fps"]), 1, substeps=1)
+    bare.start = bare.positions(world)
+    bare.threads = 1 if len(bare.start) <= 4096 else None
+    if tracers:
+        bare.solution = exact.tracers(tree["field"], bare.start)
+        _tracer_limits(bare)
+    else:
+        bare.solution = exact.springs(tree, world)
+        _mass_limits(bare, world.stability())
+    return bare
+
+
+def _mass_limits(subject: Subject, systems: list[dict[str, Any]]) -> None:
+    if not systems:
+        return
+    stiffest = max(systems, key=lambda s: float(s["frequency"]))
+    subject.frequency, subject.damping = float(stiffest["frequency"]), float(stiffest["damping"])
+    subject.rate = max(max(float(s["frequency"]), float(s["damping_max"])) for s in systems)
+    culprit = stiffest["culprit"]
+    subject.culprit = (str(culprit[0]), int(culprit[1])) if culprit else None
+    for system in systems:
+        for limit in system["limits"]:
+            known = subject.limits.setdefault(limit["integrator"], Limits(np.inf, np.inf))
+            known.stable = min(known.stable, float(limit["stable"]))
+            known.usable = min(known.usable, float(limit["usable"]))
+
+
+_STAGES = {"forward_euler": 1, "midpoint": 2, "heun": 2, "rk4": 4}
+
+
+def _growth(word: str, z: complex) -> float:
+    """|y| after one step of y' = lambda y from |y| = 1, z = h lambda."""
+    if word in _STAGES:
+        terms = np.cumprod([1.0 + 0j] + [z / k for k in range(1, _STAGES[word] + 1)])
+        return float(abs(terms.sum()))
+    if word == "implicit_euler":
+        return float(1.0 / abs(1.0 - z))
+    if word == "implicit_midpoint":
+        return float(abs((1.0 + z / 2) / (1.0 - z / 2)))
+    return float(max(abs(np.roots([1.0 - 2.0 / 3.0 * z, -4.0 / 3.0, 1.0 / 3.0]))))
+
+
+def _tracer_limits(subject: Subject) -> None:
+    """Limits from the eigenvalues of the field: a step multiplies an eigenvector by R(h lambda), and squared distances
+    must not grow a thousandfold within a hundred turns, as energies must not (integrators.35)."""
+    matrix = exact.field_matrix(subject.tree["field"])
+    if matrix is None:
+        return
+    values = [complex(v) for v in np.linalg.eigvals(matrix[0]) if abs(v) > 1e-12]
+    subject.rate = max((abs(v) for v in values), default=0.0)
+    subject.frequency = max((abs(v.imag) for v in values), default=0.0)
+    subject.damping = max((-v.real for v in values), default=0.0)
+    if not values or max(v.real for v in values) > 1e-12 * subject.rate:
+        if values:
+            subject.notes.append("The field itself drives tracers apart, so growth says nothing about the steps.")
+            subject.rate = 0.0
+        return
+
+    def fine(word: str, h: float, usable: bool) -> bool:
+        def one(v: complex) -> bool:
+            log = float(np.log(max(_growth(word, h * v), 1e-300)))
+            steps = 2.0 * np.pi * PERIODS / (abs(v) * h)
+            return 2.0 * log * steps <= np.log(GROWTH) if usable else log <= 1e-12
+
+        return all(one(v) for v in values)
+
+    for word in [*_STAGES, "implicit_euler", "implicit_midpoint", "bdf2"]:
+        found = []
+        for usable in (False, True):
+            tried = np.geomspace(1e-3, 1e3, 97) / subject.rate
+            bad = next((k for k, h in enumerate(tried) if not fine(word, float(h), usable)), None)
+            if bad is None or bad == 0:
+                found.append(np.inf if bad is None else 0.0)
+                continue
+            low, high = float(tried[bad - 1]), float(tried[bad])
+            for _ in range(40):
+                middle = 0.5 * (low + high)
+                low, high = (middle, high) if fine(word, middle, usable) else (low, middle)
+            found.append(low)
+        subject.limits[word] = Limits(*found)

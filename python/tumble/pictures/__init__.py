@@ -1,0 +1,167 @@
+"""Pictures of a run: `picture(run, i)`.
+
+Three renderers draw the same things from the same camera: `mitsuba` (path tracing, the finest), `pyvista`
+(rasterization, quick) and `matplotlib` (always there). "auto" takes the finest that works on this machine.
+"""
+
+import functools
+import importlib.util
+import os
+import subprocess
+import sys
+from collections.abc import Callable
+
+import numpy as np
+import numpy.typing as npt
+
+from tumble._engine import ExportError
+from tumble.pictures import framing
+from tumble.pictures.framing import Camera
+from tumble.pictures.pyvista_ import headless
+from tumble.pictures.surfaces import Floats, unit
+from tumble.pictures.things import Ground, Mesh, Recording, Stage, Thing, placed
+from tumble.style import GROUND, SOLID
+
+__all__ = ["RENDERERS", "Studio", "picture", "render", "renderers", "resolve"]
+
+Picture = npt.NDArray[np.uint8]
+"""Height x width x 3."""
+
+RENDERERS = ("mitsuba", "pyvista", "matplotlib")
+"""The finest first."""
+
+PROBES = {
+    "mitsuba": "import mitsuba; mitsuba.set_variant('scalar_rgb')",
+    "pyvista": "import pyvista as pv; p = pv.Plotter(off_screen=True, window_size=[32, 32]); p.add_mesh(pv.Sphere()); "
+    "assert p.screenshot(return_img=True).std() > 0",
+}
+"""What must work for a renderer to be there. It is tried in a process of its own: without EGL, VTK ends the process."""
+
+SAMPLES = 16
+"""Samples per pixel of stills."""
+
+THINNEST = 0.0015
+"""Spheres and tubes are drawn at least this thick, in pictures' widths of radius, so that nothing is lost."""
+
+GAP = 0.03
+"""How far below everything a neutral ground lies, in extents of everything."""
+
+
+def renderers() -> list[str]:
+    """The renderers that work on this machine, the finest first."""
+    return [name for name in RENDERERS if _works(name)]
+
+
+def resolve(renderer: str = "auto") -> str:
+    """The renderer that "auto" stands for; any other name as it is. Raises ExportError if it does not work here."""
+    if renderer == "auto":
+        return next(name for name in RENDERERS if _works(name))
+    if renderer not in RENDERERS:
+        raise ExportError(f'no renderer "{renderer}"; there are: auto, {", ".join(RENDERERS)}')
+    if not _works(renderer):
+        cure = "pip install 'tumble[pictures]'"
+        if renderer == "pyvista" and importlib.util.find_spec("pyvista"):
+            cure = "it needs OpenGL: on Debian, apt install libegl1 libgl1-mesa-dri"
+        raise ExportError(f"the renderer {renderer} does not work here ({cure})")
+    return renderer
+
+
+def picture(run: Recording, i: int, renderer: str = "auto", size: tuple[int, int] | None = None) -> Picture:
+    """A picture of frame i, in sRGB; the size is that of the scene's camera if not given. Raises ExportError."""
+    return Studio(run, renderer, size).picture(i)
+
+
+class Studio:
+    """Takes pictures of one run; what frames have in common, as the camera's place, is worked out once."""
+
+    def __init__(
+        self, run: Recording, renderer: str = "auto", size: tuple[int, int] | None = None, samples: int = SAMPLES
+    ) -> None:
+        """`samples` per pixel are what mitsuba takes. Raises ExportError if the renderer does not work here, or there
+        is nothing to draw."""
+        if run.n_frames < 1:
+            raise ExportError("the run has no frames")
+        self.run = run
+        self.renderer = resolve(renderer)
+        self.samples = samples
+        points = functools.cache(lambda: framing.outline(run))
+        self.camera = framing.camera(run, size, points)
+        self.stage = Stage(run)
+        self._backdrop = self._grounds_below(points)
+
+    def picture(self, i: int) -> Picture:
+        """A picture of frame i."""
+        return render(self.renderer, self.things(i), self.camera.unit(), self.samples)
+
+    def things(self, i: int) -> list[Thing]:
+        """What is to be drawn of frame i, moved and scaled for `Camera.unit`."""
+        if not 0 <= i < self.run.n_frames:
+            raise ExportError(f"there is no frame {i}; there are frames 0 to {self.run.n_frames - 1}")
+        things = self.stage.things(i, THINNEST * self.camera.width)
+        if self.stage.flat:
+            things = [self._slab(t) if isinstance(t, Ground) else t for t in things]
+        else:
+            things = [t for t in things if not isinstance(t, Ground) or self._in_front(t)] + self._backdrop
+        return placed(things, self.camera.target, self.camera.distance)
+
+    def _in_front(self, ground: Ground) -> bool:
+        """Whether the camera is on the open side of a ground, not inside it."""
+        return float((self.camera.position - ground.point) @ ground.normal) > 0
+
+    def _grounds_below(self, points: Callable[[], Floats]) -> list[Thing]:
+        """A neutral ground to catch shadows, in scenes in space that have gravity and no ground of their own."""
+        if any(o.plane is not None for o in self.stage.objects):
+            return []
+        gravity = self.run.scene.get("world", {}).get("gravity", (0.0, 0.0, -9.8))
+        if self.stage.flat or not gravity[2] < 0:
+            return []
+        low, high = points().min(axis=0), points().max(axis=0)
+        point = np.array([0.0, 0.0, low[2] - GAP * float(np.max(high - low))])
+        ground = Ground("", point, np.array([0.0, 0.0, 1.0]), GROUND)
+        return [ground] if self._in_front(ground) else []
+
+    def _slab(self, ground: Ground) -> Thing:
+        """A ground of a plane scene, which is seen from the side: what lies below its line."""
+        camera = self.camera
+        forward = camera.axes[2]
+        normal = unit(ground.normal - forward * float(ground.normal @ forward))
+        along = np.cross(normal, forward)
+        line = camera.target - normal * float((camera.target - ground.point) @ normal) + 0.05 * camera.width * forward
+        far = 4 * (camera.width + camera.height)
+        corners = line + far * np.array([along, -along, -along - normal, along - normal])
+        triangles = np.array([[0, 2, 1], [0, 3, 2]])
+        facing = np.broadcast_to(-forward, (4, 3)).copy()
+        color = SOLID if ground.color == GROUND else ground.color
+        return Mesh(ground.name, corners, triangles, facing, color)
+
+
+def render(renderer: str, things: list[Thing], camera: Camera, samples: int = SAMPLES) -> Picture:
+    """Draws things with one of the renderers. Raises ExportError if it fails."""
+    try:
+        if renderer == "mitsuba":
+            from tumble.pictures import mitsuba_
+
+            return mitsuba_.draw(things, camera, samples)
+        if renderer == "pyvista":
+            from tumble.pictures import pyvista_
+
+            return pyvista_.draw(things, camera)
+        from tumble.pictures import matplotlib_
+
+        return matplotlib_.draw(things, camera)
+    except (ImportError, MemoryError, OSError, RuntimeError, ValueError) as error:
+        raise ExportError(f"the renderer {renderer} failed: {error}") from error
+
+
+@functools.cache
+def _works(renderer: str) -> bool:
+    if renderer not in PROBES:
+        return True
+    if importlib.util.find_spec(renderer) is None:
+        return False
+    command = [sys.executable, "-c", PROBES[renderer]]
+    try:
+        probe = subprocess.run(command, capture_output=True, timeout=120, check=False, env=os.environ | headless())
+    except (OSError, subprocess.SubprocessError):
+        return False
+    return probe.returncode == 0

@@ -1,0 +1,327 @@
+"""What there is to see in a run: its objects, and for each frame meshes, spheres, tubes and grounds with colours.
+
+Renderers draw these four and know nothing of scenes. Particles become spheres (and tubes for their springs), ropes
+tubes, sheets, blocks and nets meshes, colliders meshes, floors and planes grounds. Torn links show: a triangle or a
+piece of rope across a link that broke is left out (this needs `link_strain` among the scene's output columns).
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import Any, Literal, Protocol
+
+import numpy as np
+import numpy.typing as npt
+
+from tumble._engine import ExportError
+from tumble.pictures.surfaces import Floats, Indices, balls, normals, outward, split, tubes
+from tumble.style import GROUND, PALETTE, SOLID, Rgb, rgb
+
+Array = npt.NDArray[Any]
+Columns = Mapping[str, Mapping[str, Array]]
+"""Object name -> column name -> array."""
+
+
+class Recording(Protocol):
+    """What pictures, films, plots and exports read of a run."""
+
+    @property
+    def folder(self) -> Path:
+        """Where the run is on disk."""
+
+    @property
+    def scene(self) -> Mapping[str, Any]:
+        """The resolved scene."""
+
+    @property
+    def static(self) -> Columns:
+        """What does not change: triangles, links, curve, radius; position of colliders [m]."""
+
+    @property
+    def n_frames(self) -> int:
+        """Frames there are; frame 0 is the start."""
+
+    @property
+    def ledger(self) -> Mapping[str, Array]:
+        """Books, one row per frame."""
+
+    def frame(self, i: int) -> Columns:
+        """Columns of a frame."""
+
+    def time(self, i: int) -> float:
+        """Time of a frame [s]."""
+
+
+Kind = Literal["points", "curve", "sheet", "block", "solid", "ground"]
+
+
+@dataclass(frozen=True)
+class Object:
+    """A thing that the scene names."""
+
+    name: str
+    kind: Kind
+    color: Rgb
+    radius: float = 0.01
+    """Radius in pictures [m], of points and curves."""
+    triangles: Indices = field(default_factory=lambda: np.zeros((0, 3), dtype=np.int64))
+    links: Indices = field(default_factory=lambda: np.zeros((0, 2), dtype=np.int64))
+    curve: Indices = field(default_factory=lambda: np.zeros(0, dtype=np.int64))
+    position: Floats | None = None
+    """Vertices [m] of what does not move."""
+    plane: tuple[Floats, Floats] | None = None
+    """A point and the unit normal of a ground."""
+
+
+@dataclass(frozen=True)
+class Mesh:
+    """A surface of triangles, seen from both sides."""
+
+    name: str
+    vertices: Floats
+    triangles: Indices
+    normals: Floats
+    color: Rgb
+    fabric: bool = False
+    closed: bool = False
+    """Whether only the side to which the normals point can be seen."""
+
+
+@dataclass(frozen=True)
+class Spheres:
+    """Balls."""
+
+    name: str
+    centers: Floats
+    radii: Floats
+    color: Rgb
+
+
+@dataclass(frozen=True)
+class Tubes:
+    """Round curves: `counts` says how many of the points each one takes."""
+
+    name: str
+    points: Floats
+    counts: Indices
+    radius: float
+    color: Rgb
+
+
+@dataclass(frozen=True)
+class Ground:
+    """A plane that ends out of sight."""
+
+    name: str
+    point: Floats
+    normal: Floats
+    color: Rgb
+
+
+Body = Mesh | Spheres | Tubes
+Thing = Body | Ground
+
+FEW = 200
+"""An object of fewer masses than these is drawn at least three times as thick as the thinnest."""
+
+SYSTEMS = ("system", "anchor", "force", "field")
+"""Sections of a scene whose names are not names of objects."""
+
+
+def objects(run: Recording) -> list[Object]:
+    """The objects of a run, in its order."""
+    words: dict[str, tuple[str, Mapping[str, Any]]] = {
+        entry["name"]: (section, entry)
+        for section, entries in run.scene.items()
+        if section not in SYSTEMS and isinstance(entries, list)
+        for entry in entries
+        if isinstance(entry, Mapping) and "name" in entry
+    }
+    found: list[Object] = []
+    colors = 0
+    for name, columns in run.static.items():
+        section, entry = words.get(name, ("", {}))
+        solid = section == "collider" or "position" in columns
+        plane = _plane(entry.get("shape")) if solid else None
+        color: Rgb
+        if entry.get("color") is not None:
+            r, g, b = (float(c) for c in entry["color"])
+            color = (r, g, b)
+        elif solid:
+            color = SOLID if plane is None else GROUND
+        else:
+            color = rgb(PALETTE[colors % len(PALETTE)])
+            colors += 1
+        kind: Kind = "points"
+        if solid:
+            kind = "solid" if plane is None else "ground"
+        elif len(columns.get("triangles", ())):
+            kind = "block" if section == "block" else "sheet"
+        elif len(columns.get("curve", ())):
+            kind = "curve"
+        found.append(
+            Object(
+                name=name,
+                kind=kind,
+                color=color,
+                radius=float(np.ravel(columns["radius"])[0]) if len(columns.get("radius", ())) else 0.01,
+                triangles=_indices(columns, "triangles", 3),
+                links=_indices(columns, "links", 2),
+                curve=_indices(columns, "curve", 1).ravel(),
+                position=np.asarray(columns["position"], dtype=float).reshape(-1, 3) if "position" in columns else None,
+                plane=plane,
+            )
+        )
+    return found
+
+
+def moving(found: list[Object]) -> list[Object]:
+    """Those that are in the frames."""
+    return [o for o in found if o.kind not in ("solid", "ground")]
+
+
+def positions(columns: Columns, thing: Object) -> Floats:
+    """Positions [m] of an object in a frame, n x 3. Raises ExportError if the run did not keep them."""
+    column = columns.get(thing.name, {}).get("position")
+    if column is None:
+        raise ExportError(f'"{thing.name}" has no positions in this run: add "position" to output.columns of the scene')
+    return np.asarray(column, dtype=float).reshape(-1, 3)
+
+
+class Stage:
+    """All that can be seen of a run."""
+
+    def __init__(self, run: Recording) -> None:
+        self.run = run
+        self.flat: str | None = str(run.scene.get("plane", "xz")) if run.scene.get("dimension", 3) == 2 else None
+        self.objects = objects(run)
+        self._start: Columns = run.frame(0) if run.n_frames else {}
+        bodies = {o.name: o for o in self.objects if o.kind in ("solid", "block") and len(o.triangles)}
+        starts = {name: self._start_of(o) for name, o in bodies.items()}
+        self._cuts = {name: split(starts[name], o.triangles) for name, o in bodies.items()}
+        self._closed = {name for name, o in bodies.items() if outward(starts[name], o.triangles)}
+
+    def things(self, i: int, thinnest: float = 0.0) -> list[Thing]:
+        """What is to be drawn of frame i. Nothing is thinner than the radius `thinnest` [m]."""
+        columns = self.run.frame(i)
+        drawn: list[Thing] = []
+        for thing in self.objects:
+            if thing.plane is not None:
+                drawn.append(Ground(thing.name, *thing.plane, thing.color))
+            elif thing.kind == "solid":
+                if thing.position is not None and len(thing.triangles):
+                    drawn.append(self._mesh(thing, thing.position, thing.triangles))
+            else:
+                drawn += self._moving(thing, columns, thinnest)
+        return drawn
+
+    def _moving(self, thing: Object, columns: Columns, thinnest: float) -> list[Thing]:
+        x = positions(columns, thing)
+        broken = self._broken(thing, columns)
+        thing = replace(thing, radius=max(thing.radius, thinnest * (3 if len(x) < FEW else 1)))
+        if thing.kind in ("sheet", "block"):
+            triangles = _without(thing.triangles, thing.links[broken])
+            shown: list[Thing] = [self._mesh(thing, x, triangles)]
+            if self.flat is not None and len(thing.links):
+                shade = (thing.color[0] * 0.35, thing.color[1] * 0.35, thing.color[2] * 0.35)
+                # In front of the surface; seen in parallel, they stay in place.
+                front = np.array([0.0, 0.0, 1.0] if self.flat == "xy" else [0.0, -1.0, 0.0]) * 4 * thinnest
+                shown.append(_springs(thing, x + front, thing.links[~broken], thinnest, shade))
+            return shown
+        if thing.kind == "curve":
+            return _pieces(thing, x, thing.links[broken])
+        shown = [Spheres(thing.name, x, np.full(len(x), thing.radius), thing.color)]
+        if len(thing.links):
+            shade = (thing.color[0] * 0.6, thing.color[1] * 0.6, thing.color[2] * 0.6)
+            shown.append(_springs(thing, x, thing.links[~broken], max(0.25 * thing.radius, thinnest), shade))
+        return shown
+
+    def _mesh(self, thing: Object, x: Floats, triangles: Indices) -> Mesh:
+        whole = len(triangles) == len(thing.triangles)
+        if whole and thing.name in self._cuts:
+            source, triangles = self._cuts[thing.name]
+            x = x[source]
+        closed = whole and thing.name in self._closed
+        return Mesh(thing.name, x, triangles, normals(x, triangles), thing.color, thing.kind == "sheet", closed)
+
+    def _start_of(self, thing: Object) -> Floats:
+        return thing.position if thing.position is not None else positions(self._start, thing)
+
+    def _broken(self, thing: Object, columns: Columns) -> npt.NDArray[np.bool_]:
+        """Which links have broken. Their strain is not a number; nor is that of links without a rest length, ever."""
+        strain = columns.get(thing.name, {}).get("link_strain")
+        none = np.zeros(len(thing.links), dtype=bool)
+        if strain is None or len(strain) != len(thing.links) or not np.isnan(strain).any():
+            return none
+        start = self._start.get(thing.name, {}).get("link_strain")
+        if start is None or len(start) != len(strain):
+            return none
+        return np.ravel(np.isnan(strain) & ~np.isnan(start))
+
+
+def _indices(columns: Mapping[str, Array], name: str, width: int) -> Indices:
+    return np.asarray(columns.get(name, ()), dtype=np.int64).reshape(-1, width)
+
+
+def _plane(shape: object) -> tuple[Floats, Floats] | None:
+    if not isinstance(shape, Mapping):
+        return None
+    if "floor" in shape:
+        return np.array([0.0, 0.0, float((shape["floor"] or {}).get("height", 0.0))]), np.array([0.0, 0.0, 1.0])
+    if "plane" in shape:
+        normal = np.array(shape["plane"]["normal"], dtype=float)
+        return np.array(shape["plane"].get("point", (0, 0, 0)), dtype=float), normal / np.linalg.norm(normal)
+    return None
+
+
+def _springs(thing: Object, x: Floats, links: Indices, radius: float, color: Rgb) -> Tubes:
+    return Tubes(f"{thing.name} springs", x[links].reshape(-1, 3), np.full(len(links), 2), radius, color)
+
+
+def _pieces(thing: Object, x: Floats, torn: Indices) -> list[Thing]:
+    """A rope, in pieces where it is torn."""
+    cuts = {(int(a), int(b)) for a, b in np.sort(torn, axis=1)}
+    ends = [
+        k + 1
+        for k, (a, b) in enumerate(zip(thing.curve[:-1].tolist(), thing.curve[1:].tolist(), strict=True))
+        if (min(a, b), max(a, b)) in cuts
+    ]
+    counts = np.diff([0, *ends, len(thing.curve)])
+    return [Tubes(thing.name, x[thing.curve], counts, thing.radius, thing.color)]
+
+
+def _without(triangles: Indices, torn: Indices) -> Indices:
+    """Triangles that have no torn link as an edge."""
+    if not len(torn):
+        return triangles
+    size = int(max(triangles.max(), torn.max())) + 1
+    low, high = np.sort(torn, axis=1).T
+    keys = low * size + high
+    edges = np.sort(np.stack([triangles, np.roll(triangles, -1, axis=1)], axis=-1), axis=-1)
+    return triangles[~np.isin(edges[..., 0] * size + edges[..., 1], keys).any(axis=1)]
+
+
+def placed(things: list[Thing], origin: Floats, scale: float) -> list[Thing]:
+    """The same things with `origin` moved to 0 and lengths divided by `scale`."""
+    out: list[Thing] = []
+    for t in things:
+        if isinstance(t, Mesh):
+            out.append(replace(t, vertices=(t.vertices - origin) / scale))
+        elif isinstance(t, Spheres):
+            out.append(replace(t, centers=(t.centers - origin) / scale, radii=t.radii / scale))
+        elif isinstance(t, Tubes):
+            out.append(replace(t, points=(t.points - origin) / scale, radius=t.radius / scale))
+        else:
+            out.append(replace(t, point=(t.point - origin) / scale))
+    return out
+
+
+def as_triangles(thing: Body, finer: int = 2) -> tuple[Floats, Indices, Floats]:
+    """Vertices, triangles and normals of a thing, for renderers that have nothing rounder. Balls are icosahedra that
+    are divided `finer` times, fewer if there are many."""
+    if isinstance(thing, Mesh):
+        return thing.vertices, thing.triangles, thing.normals
+    if isinstance(thing, Spheres):
+        many = sum(len(thing.centers) > limit for limit in (500, 5_000, 50_000))
+        return balls(thing.centers, thing.radii, max(finer - many, 0))
+    return tubes(thing.points, thing.counts, thing.radius)

@@ -1,0 +1,195 @@
+"""Curves of a run's books: energy, and any columns of the ledger."""
+
+import contextlib
+import os
+from collections.abc import Iterator, Sequence
+from itertools import pairwise
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import numpy.typing as npt
+
+from tumble._engine import ExportError
+from tumble.folder import writing
+from tumble.pictures.things import Recording
+from tumble.style import FAINT, INK, PALETTE, RC
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+Floats = npt.NDArray[np.float64]
+
+UNITS = {
+    "time": "s",
+    "mass": "kg",
+    "momentum": "kg m/s",
+    "angular_momentum": "kg m²/s",
+    "kinetic": "J",
+    "elastic": "J",
+    "external": "J",
+    "energy": "J",
+    "stretch": "1",
+    "penetration": "m",
+    "speed": "m/s",
+    "residual": "1",
+    "clamped": "J",
+    "smallest_step": "s",
+    "largest_step": "s",
+    "seconds": "s",
+}
+"""Units of the ledger's columns; those not named here are counts. Columns of vectors end in _x, _y, _z."""
+
+ROW = 1.4
+"""Height of a pair of axes [inch], times its share."""
+
+LABEL = 0.15
+"""From one label beside a curve to the next [inch]."""
+
+ENERGIES = {"kinetic": PALETTE[0], "elastic": PALETTE[2], "external": PALETTE[3]}
+
+
+def energy(run: Recording, path: str | os.PathLike[str]) -> Path:
+    """Plots kinetic, elastic, external and total energy, and below them how far the total has drifted from the start,
+    over the largest kinetic or potential energy so far. Raises ExportError."""
+    t = _column(run, "time")
+    parts = {name: _column(run, name) for name in ENERGIES}
+    total = np.sum(list(parts.values()), axis=0)
+    potential = np.abs(parts["elastic"] + parts["external"] - (parts["elastic"] + parts["external"])[:1])
+    scale = np.maximum.accumulate(np.maximum(parts["kinetic"], potential)) if len(t) else t
+    with _settings():
+        figure, (upper, lower) = _figure([3.0, 1.0])
+        curves = [(name, parts[name], color) for name, color in ENERGIES.items() if np.any(parts[name] != 0)]
+        _draw(upper, 3.0, t, [*curves, ("total", total, INK)])
+        upper.set_ylabel("energy [J]")
+        upper.set_title(_title(run, "energy"))
+        drift = np.divide(total - total[:1], scale, out=np.zeros_like(total), where=scale > 0)
+        lower.axhline(0.0, color=FAINT, linewidth=0.8)
+        lower.plot(t, drift, color=INK, linewidth=1.3)
+        lower.set_ylabel("drift [1]")
+        lower.set_xlabel("time [s]")
+        return _save(figure, path)
+
+
+def ledger(run: Recording, columns: str | Sequence[str], path: str | os.PathLike[str]) -> Path:
+    """Plots columns of the ledger over time; those of one unit share a pair of axes. A vector's name stands for its
+    three columns. Raises ExportError."""
+    wanted = [columns] if isinstance(columns, str) else list(columns)
+    names = [n for name in wanted for n in _expanded(run, name)]
+    if not names:
+        raise ExportError("no columns to plot")
+    groups: dict[str, list[str]] = {}
+    for name in names:
+        groups.setdefault(unit(name), []).append(name)
+    t = _column(run, "time")
+    with _settings():
+        share = 2.0 if len(groups) == 1 else 1.0
+        figure, axes = _figure([share] * len(groups))
+        for ax, (symbol, members) in zip(axes, groups.items(), strict=True):
+            curves = [(n, _column(run, n), PALETTE[k % len(PALETTE)]) for k, n in enumerate(members)]
+            _draw(ax, share, t, curves)
+            ax.set_ylabel(_label(members, symbol))
+        axes[0].set_title(_title(run, ""))
+        axes[-1].set_xlabel("time [s]")
+        return _save(figure, path)
+
+
+def unit(column: str) -> str:
+    """The unit of a column of the ledger; nothing for counts."""
+    stem = column[:-2] if column.endswith(("_x", "_y", "_z")) else column
+    return UNITS.get(stem, "")
+
+
+def _column(run: Recording, name: str) -> Floats:
+    books = run.ledger
+    if name not in books and name == "energy":
+        return np.asarray(np.sum([_column(run, part) for part in ENERGIES], axis=0))
+    if name not in books:
+        raise ExportError(f'the ledger has no column "{name}"; it has {", ".join(books)}')
+    return np.asarray(books[name], dtype=float)
+
+
+def _expanded(run: Recording, name: str) -> list[str]:
+    parts = [f"{name}_{axis}" for axis in "xyz"]
+    return parts if name not in run.ledger and all(p in run.ledger for p in parts) else [name]
+
+
+def _label(names: Sequence[str], symbol: str) -> str:
+    """What an axis shows: a column, or the vector whose parts they are; of several, only the unit."""
+    stems = {name[:-2] if name.endswith(("_x", "_y", "_z")) else name for name in names}
+    words = stems.pop().replace("_", " ") if len(stems) == 1 else "" if symbol else "count"
+    return f"{words} [{symbol}]".strip() if symbol else words
+
+
+def _title(run: Recording, subject: str) -> str:
+    title = str(run.scene.get("title") or "")
+    return f"{title}: {subject}" if title and subject else title or subject
+
+
+@contextlib.contextmanager
+def _settings() -> Iterator[None]:
+    import matplotlib
+
+    settings: Any = RC
+    with matplotlib.rc_context(settings):
+        yield
+
+
+def _figure(heights: Sequence[float]) -> tuple["Figure", list["Axes"]]:
+    from matplotlib.figure import Figure
+
+    figure = Figure(figsize=(6.4, 0.9 + ROW * sum(heights)), layout="constrained")
+    grid = figure.subplots(len(heights), 1, sharex=True, squeeze=False, height_ratios=list(heights))
+    axes: list[Axes] = list(grid[:, 0])
+    figure.align_ylabels(axes)
+    return figure, axes
+
+
+def _draw(ax: "Axes", share: float, t: Floats, curves: Sequence[tuple[str, Floats, str]]) -> None:
+    """Curves with their names beside their ends, moved apart where they would meet; `share` is the height in rows."""
+    for _, values, color in curves:
+        ax.plot(t, values, color=color)
+    if not len(t):
+        return
+    ends = [(float(v[np.isfinite(v)][-1]) if np.isfinite(v).any() else 0.0) for _, v, _ in curves]
+    ax.margins(x=0.01)
+    low, high = ax.get_ylim()
+    places = _apart([(e - low) / (high - low) for e in ends], LABEL / (ROW * share))
+    for (name, _, color), place in zip(curves, places, strict=True):
+        label = name.replace("_", " ")
+        ax.annotate(label, (1.015, place), xycoords="axes fraction", va="center", color=color, fontsize=9)
+
+
+def _apart(wanted: Sequence[float], gap: float) -> list[float]:
+    """Places near the wanted ones, at least `gap` from each other."""
+    order = sorted(range(len(wanted)), key=lambda k: wanted[k])
+    places = list(wanted)
+    for _ in range(50):
+        moved = False
+        for a, b in pairwise(order):
+            short = gap - (places[b] - places[a])
+            if short > 1e-9:
+                places[a] -= short / 2
+                places[b] += short / 2
+                moved = True
+        if not moved:
+            break
+    return places
+
+
+def _save(figure: "Figure", path: str | os.PathLike[str]) -> Path:
+    """Writes a figure under a temporary name, then renames it. The ending of the name says the format."""
+    goal = Path(path)
+    unfinished = goal.with_name(f".{goal.stem}.part{goal.suffix or '.png'}")
+    try:
+        with writing(goal):
+            goal.parent.mkdir(parents=True, exist_ok=True)
+            figure.savefig(unfinished)
+            unfinished.replace(goal)
+    except ValueError as error:
+        raise ExportError(f"{goal}: cannot be written: {error}") from error
+    finally:
+        with contextlib.suppress(OSError):
+            unfinished.unlink(missing_ok=True)
+    return goal

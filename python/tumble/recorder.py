@@ -1,0 +1,251 @@
+"""Writes a run while it happens."""
+
+import os
+import platform
+import sys
+import time
+from collections.abc import Mapping
+from contextlib import suppress
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from tumble import _engine, expect
+from tumble._engine import ExportError, SceneError, StepError, World
+from tumble.folder import (
+    FORMAT,
+    LEDGER,
+    TRIALS,
+    Columns,
+    RunFolder,
+    Table,
+    read_rows,
+    write_checkpoint,
+    write_columns,
+    write_json,
+)
+
+MANIFEST_INTERVAL = 5.0
+"""Seconds between updates of run.json while a run goes on; more where the list of hashes is so long that writing takes
+more than a hundredth of it."""
+
+KEPT_CHECKPOINTS = 2
+
+ADAPTIVE = ("adaptive_euler", "dormand_prince")
+"""Integrators that choose their steps."""
+
+_EMPTY_REPORT: dict[str, Any] = {}
+
+
+class Recorder:
+    """The open run folder of a world that is being simulated."""
+
+    def __init__(self, files: RunFolder, world: World, threads: int | None, earlier: Mapping[str, Any] | None) -> None:
+        """`earlier` is the manifest of the run that goes on."""
+        self.files = files
+        self.world = world
+        self.scene = world.scene.to_dict()
+        self.hashes: list[str] = []
+        self.tables: list[Table] = []
+        self.written = -1
+        """The last frame that is on disk."""
+        self.began = time.perf_counter()
+        self.update_due = self.began + MANIFEST_INTERVAL
+        timings = dict((earlier or {}).get("timings", {}))
+        self.timings = {key: float(timings.get(key, 0.0)) for key in ("simulate", "write", "total")}
+        self.total_before = self.timings["total"]
+        self.manifest: dict[str, Any] = {
+            "format": FORMAT,
+            "tumble": _engine.version,
+            "name": files.path.resolve().name,
+            "status": "running",
+            "failure": None,
+            "frames": self.scene["time"]["frames"],
+            "fps": self.scene["time"]["fps"],
+            "seed": self.scene["seed"],
+            "precision": self.scene["precision"],
+            "bits": "portable",
+            "resumed": int((earlier or {}).get("resumed", -1)) + 1,
+            "machine": machine(threads),
+            "timings": self.timings,
+            "warnings": list(world.warnings),
+            "stability": world.stability(),
+            "expectations": [],
+            "probes": [],
+            "scene": self.scene,
+            "hashes": self.hashes,
+        }
+
+    def start(self) -> None:
+        """Opens a new folder and writes the start, frame 0."""
+        self.files.make()
+        self._write_manifest()
+        topology, columns = self.world.topology, self.world.frame
+        write_columns(self.files.static, topology)
+        write_json(self.files.columns, describe(self.world.units, topology, columns))
+        self._open([], [])
+        self._record(columns, _EMPTY_REPORT, 0.0)
+
+    def go_on(self) -> None:
+        """Opens the folder of a stopped run at the frame of the world; later frames are dropped."""
+        frame = self.world.frame_index
+        rows = read_rows(self.files.ledger, LEDGER)[: frame + 1]
+        trials = [r for r in read_rows(self.files.trials, TRIALS) if float(r[-1]) <= frame]
+        self.files.drop_after(frame)
+        self._open(rows, trials)
+        self.hashes.extend(r[-1] for r in rows)
+        self.written = frame
+        self._write_manifest()
+
+    def _open(self, rows: list[list[str]], trials: list[list[str]]) -> None:
+        self.ledger = Table(self.files.ledger, LEDGER, rows)
+        self.tables.append(self.ledger)
+        self.trials: Table | None = None
+        if any(system["integrator"] in ADAPTIVE for system in self.scene["system"]):
+            self.trials = Table(self.files.trials, TRIALS, trials)
+            self.tables.append(self.trials)
+
+    def frame(self, report: Mapping[str, Any], seconds: float) -> None:
+        """Writes the frame at which the world is; `report` says what it took."""
+        self.timings["simulate"] += seconds
+        begin = time.perf_counter()
+        self._record(self.world.frame, report, seconds)
+        if self.written % self.scene["output"]["checkpoint"] == 0 or self.written == self.manifest["frames"]:
+            self.checkpoint()
+        self.timings["write"] += time.perf_counter() - begin
+        if time.perf_counter() > self.update_due:
+            self._write_manifest()
+
+    def _record(self, columns: Columns, report: Mapping[str, Any], seconds: float) -> None:
+        """The frame first and its line of the ledger last: a frame with a line is complete."""
+        index = self.world.frame_index
+        state = self.world.hash()
+        write_columns(self.files.frame(index), columns)
+        if self.trials is not None:
+            trials = report.get("trials", ())
+            self.trials.add([t["time"], t["step"], t["error"], int(t["accepted"]), index] for t in trials)
+        self.ledger.add([ledger_row(index, self.world.ledger, report, seconds, state)])
+        self.hashes.append(state)
+        self.written = index
+
+    def checkpoint(self) -> None:
+        """Saves the state, so that the run can go on from here, and drops all but the last ones."""
+        if self.world.frame_index != self.written:
+            return  # Stopped between the step and the frame's file.
+        path = self.files.checkpoint(self.written)
+        if not path.exists():
+            write_checkpoint(self.world, path)
+        for old in self.files.checkpoints()[:-KEPT_CHECKPOINTS]:
+            with suppress(OSError):
+                self.files.checkpoint(old).unlink()
+
+    def finish(self) -> None:
+        self.manifest["status"] = "finished"
+        self.manifest["probes"] = expect.probes(self.world, self.scene)
+        self.checkpoint()
+        self._write_manifest()
+
+    def judge(self, broken: list[expect.Broken]) -> None:
+        """Notes the expectations that were broken."""
+        self.manifest["expectations"] = [b.to_dict() for b in broken]
+        self._write_manifest()
+
+    def fail(self, error: StepError) -> None:
+        """Notes why the physics broke, then tries what would have helped."""
+        self.stop("failed", str(error), getattr(error, "report", {}))
+        with suppress(KeyboardInterrupt):  # The failure is worth more than its cures.
+            self.manifest["failure"]["cures"] = self.world.cures()
+        self.stop("failed")
+
+    def stop(self, status: str, message: str | None = None, report: Mapping[str, Any] | None = None) -> None:
+        """Notes, as far as the disk allows, that the run ended early and why."""
+        self.manifest["status"] = status
+        if message is not None:
+            self.manifest["failure"] = {"message": message, "report": report or {}, "frame": self.written, "cures": []}
+        for write in (self.checkpoint, self._write_manifest):
+            with suppress(ExportError, OSError):
+                write()
+
+    def close(self) -> None:
+        for table in self.tables:
+            table.close()
+
+    def _write_manifest(self) -> None:
+        begin = time.perf_counter()
+        self.timings["total"] = self.total_before + begin - self.began
+        write_json(self.files.manifest, self.manifest)
+        end = time.perf_counter()
+        self.update_due = end + max(MANIFEST_INTERVAL, 100 * (end - begin))
+
+
+def ledger_row(
+    index: int, books: Mapping[str, Any], report: Mapping[str, Any], seconds: float, state: str
+) -> list[str | int | float]:
+    smallest, largest = report.get("step_range") or (np.nan, np.nan)
+    values: dict[str, str | int | float] = {"frame": index, "seconds": seconds, "hash": state}
+    values.update(smallest_step=smallest, largest_step=largest)
+    for name in ("momentum", "angular_momentum"):
+        values.update({f"{name}_{axis}": float(x) for axis, x in zip("xyz", books[name], strict=True)})
+    for name in LEDGER:
+        if name not in values:
+            values[name] = books[name] if name in books else report.get(name, 0)
+    return [values[name] for name in LEDGER]
+
+
+def describe(units: Mapping[str, Mapping[str, str]], *tables: Columns) -> dict[str, dict[str, Any]]:
+    """Object -> column -> unit, shape and type."""
+    described: dict[str, dict[str, Any]] = {}
+    for place, columns in zip(("static", "frames"), tables, strict=True):
+        for name, table in columns.items():
+            for column, array in table.items():
+                unit = units.get(name, {}).get(column, "1")
+                entry = {"unit": unit, "shape": array.shape, "dtype": array.dtype.name, "in": place}
+                described.setdefault(name, {})[column] = entry
+    return described
+
+
+def machine(threads: int | None) -> dict[str, Any]:
+    return {
+        "cpus": os.cpu_count(),
+        "threads": threads,
+        "platform": platform.platform(),
+        "processor": platform.machine(),
+        "python": sys.version.split()[0],
+        "numpy": np.__version__,
+    }
+
+
+def changed(old: Mapping[str, Any], new: Mapping[str, Any]) -> str | None:
+    """The first difference between two resolved scenes that changes what is simulated or kept, in words."""
+
+    def physical(scene: Mapping[str, Any]) -> dict[str, Any]:
+        kept = {k: v for k, v in scene.items() if k not in ("title", "camera", "expect", "output", "time")}
+        kept["time"] = {k: v for k, v in scene["time"].items() if k != "frames"}
+        kept["output"] = {"columns": scene["output"]["columns"]}
+        return kept
+
+    return _difference("", physical(old), physical(new))
+
+
+def _difference(path: str, old: Any, new: Any) -> str | None:
+    if isinstance(old, Mapping) and isinstance(new, Mapping):
+        pairs = [(key, old.get(key), new.get(key)) for key in dict.fromkeys([*old, *new])]
+    elif isinstance(old, list) and isinstance(new, list) and len(old) == len(new):
+        pairs = [(str(i), a, b) for i, (a, b) in enumerate(zip(old, new, strict=True))]
+    else:
+        return None if old == new else f"{path[1:]} was {_short(old)}, is {_short(new)}"
+    found = (_difference(f"{path}.{key}", a, b) for key, a, b in pairs)
+    return next((f for f in found if f is not None), None)
+
+
+def _short(value: Any) -> str:
+    text = repr(value)
+    return text if len(text) <= 40 else text[:37] + "..."
+
+
+def refuse(path: Path, text: str) -> SceneError:
+    """The error for a folder that does not fit."""
+    error = SceneError(f"{path}: {text}")
+    error.issues = [{"path": str(path), "line": None, "message": text}]
+    return error

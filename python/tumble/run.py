@@ -1,0 +1,232 @@
+"""A run: simulated frame by frame into a folder, and read from it."""
+
+import json
+import os
+import time
+from collections.abc import Callable, Mapping
+from functools import cached_property
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from tumble import _engine, expect
+from tumble._engine import ExportError, Scene, SceneError, StepError, World
+from tumble.folder import FORMAT, LEDGER, TRIALS, Columns, RunFolder, plain, read_columns, read_rows
+from tumble.recorder import Recorder, changed, refuse
+
+Progress = Callable[[int, int], None]
+"""Called with frames done and frames in all."""
+
+
+def simulate(
+    scene: Scene | Mapping[str, Any],
+    folder: str | os.PathLike[str],
+    frames: int | None = None,
+    resume: bool = False,
+    threads: int | None = None,
+    progress: Progress | None = None,
+    overwrite: bool = False,
+) -> "Run":
+    """Simulates a scene into a folder.
+
+    `frames` overrides the scene's. `resume` goes on where an earlier run in the folder was stopped, to the same bits as
+    if it had not been; without an earlier run it starts one. `overwrite` replaces an earlier run.
+
+    Raises SceneError if the scene or the folder is wrong, before anything is written; StepError if the physics breaks;
+    ExportError if a file cannot be written. Whatever was finished by then can be read with `Run.open`.
+    """
+    scene = scene if isinstance(scene, Scene) else Scene(scene)
+    if frames is not None:
+        scene = scene.replace(f"time.frames={frames}")
+    files = RunFolder(folder)
+    earlier = _admit(files, scene, resume, overwrite)
+    world = World(scene, threads)
+    expect.probes(world, scene.to_dict())
+    if earlier is not None and not _return_to_checkpoint(world, files):
+        earlier, overwrite = None, True
+        world = World(scene, threads)
+    if earlier is None and overwrite and files.is_run():
+        files.clear()
+    recorder = Recorder(files, world, threads, earlier)
+    try:
+        recorder.start() if earlier is None else recorder.go_on()
+        _advance(world, recorder, progress)
+        recorder.finish()
+        run = Run(folder)
+        recorder.judge(expect.check(run))
+    except StepError as error:
+        recorder.fail(error)
+        raise
+    except KeyboardInterrupt:
+        recorder.stop("interrupted", "stopped by the user")
+        raise
+    except ExportError as error:
+        recorder.stop("failed", str(error))
+        raise
+    finally:
+        recorder.close()
+    return Run(folder)
+
+
+def _advance(world: World, recorder: Recorder, progress: Progress | None) -> None:
+    total = recorder.manifest["frames"]
+    if progress is not None:
+        progress(min(world.frame_index, total), total)
+    while world.frame_index < total:
+        begin = time.perf_counter()
+        report = world.step()
+        recorder.frame(report, time.perf_counter() - begin)
+        if progress is not None:
+            progress(world.frame_index, total)
+
+
+def _admit(files: RunFolder, scene: Scene, resume: bool, overwrite: bool) -> dict[str, Any] | None:
+    """The manifest of the run to go on with, if any; refuses a folder in which something else is."""
+    if files.is_free():
+        return None
+    if not files.is_run():
+        what = "holds files, but no run" if files.path.is_dir() else "is a file"
+        raise refuse(files.path, f"{what}; choose another folder with --out")
+    if overwrite and not resume:
+        return None
+    manifest = read_manifest(files)
+    if not resume:
+        done = max(len(read_rows(files.ledger, LEDGER)) - 1, 0)
+        state = f"{manifest.get('status')}, {done} of {manifest.get('frames')} frames"
+        cure = "go on with --resume, replace it with --force, or choose another folder with --out"
+        raise refuse(files.path, f"holds a run already ({state}); {cure}")
+    if manifest.get("tumble") != _engine.version:
+        text = f"was simulated by tumble {manifest.get('tumble')}, and this is {_engine.version}: the bits could differ"
+        raise refuse(files.path, f"{text}; start again with --force, or choose another folder with --out")
+    # Both scenes as JSON has them, so that 1 and 1.0, lists and tuples compare as equal.
+    difference = changed(manifest["scene"], json.loads(json.dumps(plain(scene.to_dict()))))
+    if difference is not None:
+        text = f"the scene has changed since the run was started: {difference}"
+        raise refuse(files.path, f"{text}; start again with --force, or choose another folder with --out")
+    return manifest
+
+
+def _return_to_checkpoint(world: World, files: RunFolder) -> bool:
+    """Goes to the newest checkpoint that is sound and before which every frame can be read."""
+    hashes = [row[-1] for row in read_rows(files.ledger, LEDGER)]
+    if not files.static.is_file() or not files.columns.is_file():
+        return False
+    intact = files.intact(len(hashes))
+    for frame in reversed([k for k in files.checkpoints() if k < intact]):
+        try:
+            world.load(files.checkpoint(frame))
+        except (SceneError, OSError):
+            continue
+        if world.frame_index == frame and world.hash() == hashes[frame]:
+            return True
+    return False
+
+
+def read_manifest(files: RunFolder) -> dict[str, Any]:
+    """run.json, if it can be understood."""
+    try:
+        manifest: dict[str, Any] = json.loads(files.manifest.read_bytes())
+    except OSError as error:
+        raise ExportError(f"{files.manifest}: cannot be read ({error.strerror})") from error
+    except ValueError as error:
+        raise ExportError(f"{files.manifest}: is damaged ({error}); simulate again with --force") from error
+    if not isinstance(manifest, dict) or not isinstance(manifest.get("scene"), dict):
+        raise refuse(files.path, "run.json is not that of a run")
+    if manifest.get("format") != FORMAT:
+        text = f"is a run of format {manifest.get('format')}; this tumble reads format {FORMAT}"
+        raise refuse(files.path, text)
+    return manifest
+
+
+class Run:
+    """A run folder, to be read. Frames that were finished can be read whatever happened after them."""
+
+    def __init__(self, path: str | os.PathLike[str]) -> None:
+        """Raises SceneError if there is no run at `path`."""
+        files = RunFolder(path)
+        if not files.is_run():
+            what = "there is no such folder" if not files.path.exists() else "there is no run.json in it"
+            raise refuse(files.path, f"is not a run: {what}; `tumble run SCENE --out {files.path}` makes one")
+        self._files = files
+        self.folder: Path = files.path
+        self.manifest: dict[str, Any] = read_manifest(files)
+        self.scene: dict[str, Any] = self.manifest["scene"]
+        """The resolved scene."""
+        self._rows = read_rows(files.ledger, LEDGER)
+        while self._rows and not files.frame(len(self._rows) - 1).is_file():
+            self._rows.pop()
+
+    @classmethod
+    def open(cls, path: str | os.PathLike[str]) -> "Run":
+        """The run in a folder. Raises SceneError if there is none."""
+        return cls(path)
+
+    def __repr__(self) -> str:
+        return f"Run({str(self.folder)!r}: {self.n_frames} frames, {self.status})"
+
+    def __len__(self) -> int:
+        return self.n_frames
+
+    @property
+    def status(self) -> str:
+        """running (or killed), finished, failed or interrupted."""
+        return str(self.manifest["status"])
+
+    @property
+    def n_frames(self) -> int:
+        """Frames that can be read; frame 0 is the start."""
+        return len(self._rows)
+
+    @property
+    def fps(self) -> float:
+        """Frames per second."""
+        return float(self.scene["time"]["fps"])
+
+    @cached_property
+    def static(self) -> Columns:
+        """What does not change: masses, links, triangles, colliders; see `World.topology`."""
+        return read_columns(self._files.static)
+
+    @cached_property
+    def columns(self) -> dict[str, dict[str, dict[str, Any]]]:
+        """Object -> column -> unit, shape, dtype, and the file it is `in`: frames or static."""
+        try:
+            described: dict[str, dict[str, dict[str, Any]]] = json.loads(self._files.columns.read_bytes())
+        except (OSError, ValueError) as error:
+            raise ExportError(f"{self._files.columns}: cannot be read ({error})") from error
+        return described
+
+    def frame(self, i: int) -> Columns:
+        """The columns of a frame, by object; -1 is the last. Raises IndexError, or ExportError if a file is damaged."""
+        return read_columns(self._files.frame(self._index(i)))
+
+    def time(self, i: int) -> float:
+        """Simulated time of a frame [s]."""
+        return float(self._rows[self._index(i)][LEDGER.index("time")])
+
+    def _index(self, i: int) -> int:
+        if not -self.n_frames <= i < self.n_frames:
+            raise IndexError(f"frame {i} of a run with {self.n_frames} frames")
+        return i % self.n_frames
+
+    @cached_property
+    def ledger(self) -> dict[str, npt.NDArray[np.float64]]:
+        """The books, one number per frame: the columns of ledger.csv."""
+        return _numbers([row[:-1] for row in self._rows], LEDGER[:-1])
+
+    @property
+    def hashes(self) -> list[str]:
+        """Hash of the state at each frame."""
+        return [row[-1] for row in self._rows]
+
+    @cached_property
+    def trials(self) -> dict[str, npt.NDArray[np.float64]]:
+        """The steps that adaptive integrators tried: time [s], step [s], error over tolerance, accepted, frame."""
+        return _numbers(read_rows(self._files.trials, TRIALS), TRIALS)
+
+
+def _numbers(rows: list[list[str]], header: list[str]) -> dict[str, npt.NDArray[np.float64]]:
+    table = np.array(rows, dtype=np.float64).reshape(len(rows), len(header))
+    return dict(zip(header, table.T, strict=True))
