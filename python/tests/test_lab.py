@@ -258,7 +258,7 @@ def test_page_of_contact_with_a_single_adaptive_integrator(tmp_path: Path) -> No
         "collider": [{"name": "floor", "shape": {"plane": {"normal": [0, 0, 1]}}}],
     }
     text = whole(integrators.page(Scene(tree), tmp_path, integrators=["dormand_prince"], budget=10.0))
-    assert "Contact and breaking" in text
+    assert "Contact, breaking" in text
 
 
 def test_what_takes_too_long_is_left_out_and_said_so(tmp_path: Path) -> None:

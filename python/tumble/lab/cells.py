@@ -56,10 +56,6 @@ class Cell:
         return amount / self.reached if self.reached > 0 else float("nan")
 
 
-class TooSlow(Exception):
-    """A run was given up."""
-
-
 def run(
     subject: Subject,
     scheme: Scheme,
@@ -73,7 +69,8 @@ def run(
 ) -> Cell:
     """Runs `frames` of `interval` [s]. After each, `each` may say that it has seen enough: the run then counts as blown
     up. One that takes longer than `patience` [s] is given up and counts as skipped."""
-    cell = Cell(experiment, scheme, interval / substeps, tolerance, interval * frames)
+    h = interval / subject.taken(interval, substeps)
+    cell = Cell(experiment, scheme, h, tolerance, interval * frames)
     if substeps > MOST:
         cell.outcome = SKIPPED
         return cell

@@ -149,6 +149,8 @@ def _accuracy_section(results: Results) -> Section:
     truth = results.reference
     if truth is None:
         source = "No converged solution was found in the time allowed, so there are no errors to show."
+    elif not figures.comparable(results):
+        source = "Here every run that ended is exact, or lost altogether: there is nothing to draw."
     elif truth.uncertainty > 1e-12:
         source = f"Compared with {truth.how}, which is itself known to {number(truth.uncertainty, 1)} (grey)."
     else:
@@ -267,7 +269,10 @@ def _notes(results: Results) -> list[str]:
                 "is judged."
             )
     if results.subject.discontinuous:
-        notes.append("Contact and breaking happen at the end of a step, which costs every scheme its order: expect 1.")
+        notes.append(
+            "Contact, breaking and pulls between systems happen at the end of a step, which costs every scheme its "
+            "order: expect 1."
+        )
     left_out = findings.skipped(results)
     if left_out:
         words = ", ".join(dict.fromkeys(c.scheme.word for c in left_out))
@@ -275,9 +280,9 @@ def _notes(results: Results) -> list[str]:
     unsolved = sorted({c.scheme.word for c in results.accuracy if c.unconverged})
     if unsolved:
         notes.append(f"Newton's method missed its tolerance in some steps of {', '.join(unsolved)}.")
-    rough = [f"{w}: {f.note}" for w, f in results.found.items() if f.note]
-    if rough:
-        notes.append("Largest steps: " + "; ".join(rough) + ".")
+    for remark in dict.fromkeys(f.note for f in results.found.values() if f.note):
+        words = ", ".join(w for w, f in results.found.items() if f.note == remark)
+        notes.append(f"Largest steps of {words}: {remark}.")
     notes.append("≈ marks costs beyond the shortest step that was run, by the order seen.")
     notes.append(
         "Times are those of this machine, the shortest of up to three runs. All numbers are in integrators.csv."

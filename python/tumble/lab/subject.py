@@ -57,11 +57,16 @@ class Subject:
 
     @property
     def discontinuous(self) -> bool:
-        """Whether something in it happens from one moment to the next: contact, or breaking."""
+        """Whether something in it happens at the end of a step only: contact, breaking, pulls between systems."""
         links = [thing.get("links") or {} for kind in ("rope", "sheet", "block", "net") for thing in self.tree[kind]]
         laws = [law for of in links for law in of.values() if isinstance(law, dict)]
         laws += [spring for thing in self.tree["particles"] for spring in thing["spring"]]
-        return bool(self.tree["collider"]) or any(law.get("break_strain") for law in laws)
+        return self.coupled or bool(self.tree["collider"]) or any(law.get("break_strain") for law in laws)
+
+    @property
+    def coupled(self) -> bool:
+        """Whether its systems pull on each other."""
+        return len(self.tree["system"]) > 1 and bool(self.tree["anchor"])
 
     @property
     def limited(self) -> bool:
@@ -77,6 +82,9 @@ class Subject:
         self, scheme: Scheme, interval: float, frames: int, substeps: int | None = None, tolerance: float | None = None
     ) -> World:
         """The scene under an integrator, in frames of `interval` [s]."""
+        exchanges = self._exchanges(interval, None if scheme.adaptive else substeps)
+        if substeps is not None:
+            substeps = self.taken(interval, substeps) // exchanges
         systems = []
         for system in self.tree["system"]:
             own = dict(system)
@@ -90,8 +98,21 @@ class Subject:
                 if scheme.word not in ("modified_euler", "verlet"):
                     own["clamp"] = None
             systems.append(own)
-        time = {"fps": 1.0 / interval, "frames": frames, "exchanges": 1}
+        time = {"fps": 1.0 / interval, "frames": frames, "exchanges": exchanges}
         return World(Scene({**self.tree, "time": time, "system": systems}, self.folder), self.threads)
+
+    def taken(self, interval: float, substeps: int) -> int:
+        """Sub-steps that a frame really takes: a multiple of its exchanges."""
+        exchanges = self._exchanges(interval, substeps)
+        return -(-substeps // exchanges) * exchanges
+
+    def _exchanges(self, interval: float, substeps: int | None) -> int:
+        """Exchanges in a frame: systems pull on each other as often as in the scene, but not within a step."""
+        if not self.coupled:
+            return 1
+        time = self.tree["time"]
+        wanted = max(1, round(interval * float(time["fps"]) * int(time["exchanges"])))
+        return min(wanted, substeps or wanted, 100_000)
 
     @property
     def extent(self) -> float:

@@ -33,7 +33,7 @@ impl Pair<1, 1> for Distance {
         let inverse = length.positive(length.like(1.0) / length, length.zero());
         let transverse = Y::stress(k, law, r) * inverse;
         let transverse = if exact { transverse } else { transverse.above_zero() };
-        let along = (Y::tangent(k, law, r) - transverse).above_zero() + b;
+        let along = ((Y::tangent(k, law, r) - transverse).above_zero() + b).above_zero();
         (d * (along.sqrt() * inverse), transverse)
     }
 

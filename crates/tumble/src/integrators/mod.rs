@@ -2,7 +2,7 @@
 //! when rates are evaluated and how the state moves.
 //!
 //! y is (x, v): rows of points and frames, and their velocities. An equation of first order has no v.
-//! Orders, stability limits and invariants are verified in `tests/integrators.rs`.
+//! Orders, stability limits and invariants are verified in `tests/integrators_*.rs` and `tests/stability_estimate.rs`.
 
 mod adaptive;
 mod implicit;

@@ -251,7 +251,10 @@ fn link(scene: &Scene, plans: &[Plan], anchor: &Anchor, parts: &[Parts], issues:
 /// Between systems the one of the first end owns the spring; the other gives a port.
 fn hang(system: &mut Dynamics, index: usize, anchor: &Link, dt: f64, exchange: &mut Exchange, warnings: &mut Vec<String>) {
     let [(s, a), (t, b)] = anchor.ends;
-    if s != index || s == t {
+    if s != t && t == index {
+        system.expect_pushes();
+    }
+    if s == t || s != index {
         return;
     }
     let port = exchange.open(t, b as usize);

@@ -21,9 +21,23 @@ pub struct Scale {
 }
 
 impl Scale {
-    /// The scale of a system that starts with these books and could fall by `height` [m].
-    pub fn new(books: &Ledger, fall: f64) -> Self {
-        Self { start: books.energy(), external: books.external, size: books.kinetic.max(books.elastic).max(fall) }
+    /// The scale of a system that starts with these books, which could gain `fall` [J] by falling through its own height.
+    /// Energies up to `noise` [J] are no scale.
+    pub fn new(books: &Ledger, fall: f64, noise: f64) -> Self {
+        let mut scale = Self { start: books.energy(), external: books.external, size: fall };
+        scale.widen(books.kinetic.max(books.elastic), noise);
+        scale
+    }
+
+    /// Is at least as large as another scale.
+    pub fn keep(&mut self, other: Self) {
+        self.size = self.size.max(other.size);
+    }
+
+    fn widen(&mut self, energy: f64, noise: f64) {
+        if energy > noise {
+            self.size = self.size.max(energy);
+        }
     }
 
     pub fn numbers(self) -> [f64; 3] {
@@ -136,14 +150,24 @@ impl Dynamics {
         let first = self.state.x.first().map(|x| xyz64(*x)).unwrap_or_default();
         let size = max(n, |range| range.map(|i| far(xyz64(self.state.x[i]), first)).fold(0.0, f64::max)).max(0.0);
         let fall = books.mass * Vec3::from(self.laws.gravity).norm() * size;
-        self.scale = Scale::new(&books, fall);
+        self.scale = Scale::new(&books, fall, self.noise());
     }
 
-    /// Takes the scale of the energy from a good frame.
+    /// Energy [J] that a thing at rest may seem to hold: a thousand times what its links store because positions are rounded.
+    fn noise(&self) -> f64 {
+        let (x, grip) = (&self.state.x, &self.laws.grip);
+        let rounding = |i: usize| f64::from(Real::EPSILON) * xyz64(x[i]).norm();
+        1e3 * sum(x.len(), |range| range.map(|i| f64::from(grip[i]) * rounding(i) * rounding(i)).sum())
+    }
+
+    /// Takes the scale of the energy from a good frame. Energy that came from nowhere does not count, or a slow explosion
+    /// would carry its scale along; where others push, nobody knows where energy came from.
     pub(super) fn rescale(&mut self, t: f64) {
         let books = self.books(t);
+        let driven = self.pushed || !self.laws.user.is_empty();
+        let gain = if driven { 0.0 } else { (books.energy() - self.scale.start).max(0.0) };
         let external = (books.external - self.scale.external).abs();
-        self.scale.size = self.scale.size.max(books.kinetic).max(books.elastic).max(external);
+        self.scale.widen(books.kinetic.max(books.elastic).max(external) - gain, self.noise());
     }
 
     pub(super) fn broken_down(&self, t: f64) -> Option<StepError> {

@@ -298,6 +298,7 @@ impl Parts {
             gravity: settings.gravity,
             masses,
             colliders: settings.colliders.clone(),
+            penalty: settings.integrator == Integrator::ImplicitEuler,
             solver: settings.solver.clone(),
             ..Default::default()
         };
@@ -320,6 +321,7 @@ impl Parts {
             unclamped: Vec::new(),
             scale: books::Scale::default(),
             broken: 0,
+            pushed: false,
             watched: false,
         };
         system.set_scale();

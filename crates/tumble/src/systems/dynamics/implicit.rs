@@ -76,8 +76,9 @@ impl Implicit {
         let n = x.len();
         self.local.resize(n, [0.0; 6]);
         self.inverse.resize(n, [0.0; 6]);
-        let Laws { batches, forces, masses, colliders, grip, start: start_x, .. } = laws;
-        let (masses, colliders, grip, start_x) = (&*masses, &colliders[..], &grip[..], &start_x[..]);
+        let Laws { batches, forces, masses, colliders, penalty, grip, start: start_x, .. } = laws;
+        let colliders = if *penalty { &colliders[..] } else { &[] };
+        let (masses, grip, start_x) = (&*masses, &grip[..], &start_x[..]);
         // The stiffness of everything, without mass.
         let forces = &*forces;
         chunks(&mut self.local, |start, local| {
@@ -164,7 +165,7 @@ impl Stiff for Laws {
 
     fn force(&mut self, t: f64, x: &[Row], v: &[Row], gh: f64, out: &mut [Row]) -> Result<(), StepError> {
         self.forces(t, x, v, out)?;
-        if self.colliders.is_empty() {
+        if self.colliders.is_empty() || !self.penalty {
             return Ok(());
         }
         let (colliders, masses, grip, start_x) = (&self.colliders[..], &self.masses, &self.grip[..], &self.start[..]);

@@ -29,6 +29,8 @@ pub struct Laws {
     pub masses: Masses,
     /// Solids.
     pub colliders: Arc<Vec<Collider>>,
+    /// Whether implicit stages see the solids as penalties.
+    pub penalty: bool,
     /// Stiffness with which the elements hold each row at the start [N/m].
     pub grip: Vec<Real>,
     /// Positions at the start of the implicit stage.

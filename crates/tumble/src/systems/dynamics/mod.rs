@@ -57,6 +57,8 @@ pub struct Dynamics {
     /// What the energy is measured against, and the energy at the start [J].
     scale: books::Scale,
     broken: u64,
+    /// Whether other systems push masses of this one.
+    pushed: bool,
     watched: bool,
 }
 
@@ -79,6 +81,12 @@ impl Dynamics {
     /// Hangs a mass of this system on a mass of another.
     pub fn tether(&mut self, tether: Tether) {
         self.tethers.push(tether);
+        self.pushed = true;
+    }
+
+    /// Other systems will push masses of this one.
+    pub fn expect_pushes(&mut self) {
+        self.pushed = true;
     }
 
     /// Row of the i-th point of an object.
@@ -198,7 +206,7 @@ impl Dynamics {
         }
         if !self.laws.colliders.is_empty() {
             let resting = self.resting_speed(h);
-            let implicit = self.integrator.is_implicit() && self.user.is_none();
+            let penalty = self.laws.penalty && self.user.is_none();
             let (points, inverse) = (self.laws.masses.points, &self.laws.masses.inverse);
             let (colliders, before, before_v) = (&self.laws.colliders[..], &self.before, &self.before_v);
             let touched: Vec<bool> = self.state.x[..points]
@@ -210,7 +218,7 @@ impl Dynamics {
                     for (k, (x, v)) in x.iter_mut().zip(v).enumerate() {
                         let i = c * CHUNK + k;
                         if inverse[i] > 0.0 {
-                            any |= if implicit {
+                            any |= if penalty {
                                 contact::bounce(colliders, *x, before_v[i], v, resting)
                             } else {
                                 contact::resolve(colliders, before[i], x, v, resting)
@@ -477,10 +485,18 @@ impl System for Dynamics {
             return Some(false);
         }
         for (i, value) in points.zip(values.chunks_exact(3)) {
+            // What is pinned stays where it is: a velocity would carry it away.
+            if velocity && self.laws.masses.inverse[i] == 0.0 {
+                continue;
+            }
             let rows = if velocity { &mut self.state.v } else { &mut self.state.x };
             rows[i] = [value[0] as Real, value[1] as Real, value[2] as Real, rows[i][3]];
         }
         self.memory.ready = false;
+        // What was put in from outside is a new start for the energy, not a growth.
+        let before = self.scale;
+        self.set_scale();
+        self.scale.keep(before);
         Some(true)
     }
 }

@@ -15,14 +15,16 @@ pub struct Modes {
     pub stiffest: Mode,
     /// The mode of highest damping rate.
     pub most_damped: Mode,
+    /// A mode of high frequency and low damping, which limits the schemes that need damping.
+    pub least_damped: Mode,
     /// The row that moves most in the stiffest mode.
     pub culprit: Option<usize>,
 }
 
 impl Modes {
-    /// Both modes.
-    pub fn list(&self) -> [Mode; 2] {
-        [self.stiffest, self.most_damped]
+    /// All of them.
+    pub fn list(&self) -> [Mode; 3] {
+        [self.stiffest, self.most_damped, self.least_damped]
     }
 }
 
@@ -39,7 +41,15 @@ impl Dynamics {
             let size = |i: &usize| dot(shape[*i], shape[*i]);
             (0..shape.len()).max_by(|a, b| size(a).total_cmp(&size(b)))
         });
-        Modes { stiffest: Mode { frequency, damping }, most_damped: Mode { frequency: other, damping: d.max(0.0) }, culprit: culprit.flatten() }
+        let stiffest = Mode { frequency, damping };
+        let mut least_damped = stiffest;
+        if d > 0.0 && frequency > 0.0 {
+            // The largest of w² - s c: among modes of like frequency the one that is damped least.
+            let (_, shape) = self.largest(1.0, -0.5 * frequency * frequency / d);
+            let (w_sq, c) = (rate_in(self, &shape, (1.0, 0.0)), rate_in(self, &shape, (0.0, 1.0)));
+            least_damped = Mode { frequency: w_sq.sqrt(), damping: c };
+        }
+        Modes { stiffest, most_damped: Mode { frequency: other, damping: d.max(0.0) }, least_damped, culprit: culprit.flatten() }
     }
 
     /// y = M^-1/2 (stiffness K + damping D) M^-1/2 u.

@@ -1,0 +1,88 @@
+"""Speed against peers, measured in the same run: python benchmarks/bench.py [case ...]"""
+
+import csv
+import json
+import os
+import platform
+import subprocess
+import sys
+from pathlib import Path
+
+HERE = Path(__file__).parent
+ROOT = HERE.parent
+VENV = ROOT / ".venv-bench"
+PEERS = ["numba", "scipy", "taichi"]
+OURS = ["numpy", "typer", "rich"]
+CASES = ["start", "springs", "implicit", "particles"]
+# What is aimed at: (case, ours, theirs, at least this ratio), or at most for costs.
+TARGETS = {
+    ("springs", "taichi"): (5.0, "at least"),
+    ("springs", "numba"): (3.0, "at least"),
+    ("implicit", "scipy cg"): (5.0, "at least"),
+    ("implicit", "scipy spsolve"): (5.0, "at least"),
+    ("particles", "triad"): (0.6, "at least"),
+    ("import", "import numpy"): (1.5, "at most"),
+    ("help", "import numpy"): (4.0, "at most"),
+}
+
+
+def set_up() -> Path:
+    """A virtual environment with tumble, as built by make setup, and the peers."""
+    python = VENV / "bin" / "python"
+    marker = VENV / ".ready"
+    if not marker.exists():
+        print("installing the peers into .venv-bench ...", flush=True)
+        subprocess.run([sys.executable, "-m", "venv", VENV], check=True)
+        subprocess.run([python, "-m", "pip", "install", "--quiet", *OURS, *PEERS], check=True)
+        marker.touch()
+    return python
+
+
+def run(python: Path, case: str, threads: int) -> list[dict]:
+    """The JSON lines of one case."""
+    environment = dict(os.environ, PYTHONPATH=str(ROOT / "python"), NUMBA_NUM_THREADS=str(threads), OMP_NUM_THREADS=str(threads))
+    environment["RAYON_NUM_THREADS"] = str(threads)
+    command = [python, HERE / f"{case}.py", str(threads)]
+    done = subprocess.run(command, env=environment, capture_output=True, text=True)
+    if done.returncode:
+        print(done.stderr[-3000:])
+        raise SystemExit(f"{case} failed")
+    return [json.loads(line) for line in done.stdout.splitlines() if line.startswith("{")]
+
+
+def main() -> None:
+    cases = sys.argv[1:] or CASES
+    python = set_up()
+    cores = os.cpu_count() or 1
+    rows: list[dict] = []
+    for case in cases:
+        for threads in [1] if case == "start" else sorted({1, cores}):
+            print(f"{case}, {threads} thread{'s' if threads > 1 else ''} ...", flush=True)
+            rows += run(python, case, threads)
+    print(f"\n{platform.processor() or platform.machine()}, {cores} cores, medians\n")
+    width = max(len(r["who"]) for r in rows)
+    missed = 0
+    for row in rows:
+        print(f"{row['case']:10} {row['who']:{width}} {row['threads']:2}T {row['value']:12.4g} {row['unit']:12} {row['check']}")
+        ours = next(
+            (r for r in rows if r["case"] == row["case"] and r["threads"] == row["threads"] and r["who"].startswith("tumble")), None
+        )
+        target = TARGETS.get((row["case"], row["who"]))
+        if ours is None or target is None:
+            continue
+        bound, sense = target
+        # Of times the smaller is the better, of everything else the larger.
+        faster = row["value"] / ours["value"] if row["unit"] == "s" else ours["value"] / row["value"]
+        ratio = 1.0 / faster if sense == "at most" else faster
+        met = ratio >= bound if sense == "at least" else ratio <= bound
+        missed += not met
+        print(f"{'':10} -> tumble / {row['who']}: {ratio:.2f} (aim: {sense} {bound}) {'met' if met else 'MISSED'}")
+    with (HERE / "results.csv").open("w", newline="") as file:
+        writer = csv.DictWriter(file, ["case", "who", "threads", "value", "unit", "check"])
+        writer.writeheader()
+        writer.writerows(rows)
+    print(f"\n{missed} aims missed; benchmarks/results.csv has the figures")
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,124 @@
+//! What the verification tests share: scenes from text, columns as vectors, observed orders.
+
+#![allow(dead_code)] // every test is a crate of its own and uses a part of this
+
+use tumble_f64::scene::Simulation;
+use tumble_interface::engine::StepReport;
+use tumble_interface::scene::Integrator;
+use tumble_interface::{Data, Engine, Scene};
+
+pub type Vector = tumble_f64::geometry::Vector;
+
+/// Schemes with a fixed step.
+pub fn fixed() -> Vec<Integrator> {
+    Integrator::ALL.into_iter().filter(|i| !i.is_adaptive()).collect()
+}
+
+/// A simulation of a scene in TOML; `version = 1` is added.
+pub fn simulation(text: &str) -> Simulation {
+    let scene = Scene::from_toml(&format!("version = 1\n{text}")).unwrap_or_else(|e| panic!("{e}\n{text}"));
+    Simulation::new(scene, Default::default()).unwrap_or_else(|e| panic!("{e}\n{text}"))
+}
+
+/// One frame, which must not fail.
+pub fn step(sim: &mut Simulation) -> StepReport {
+    sim.step(&|| true).unwrap_or_else(|e| panic!("{e}")).unwrap()
+}
+
+/// Some frames, which must not fail; their reports together.
+pub fn run(sim: &mut Simulation, frames: usize) -> StepReport {
+    let mut report = StepReport::default();
+    (0..frames).for_each(|_| report.add(&step(sim)));
+    report
+}
+
+/// A column of vectors.
+pub fn column(sim: &Simulation, object: &str, name: &str) -> Vec<Vector> {
+    let frame = sim.frame(&[name]);
+    match &frame.column(object, name).unwrap_or_else(|| panic!("no {name} of {object}")).data {
+        Data::F64(numbers) => numbers.chunks_exact(3).map(|c| [c[0], c[1], c[2]].into()).collect(),
+        other => panic!("{object}.{name} is {other:?}"),
+    }
+}
+
+/// Positions [m].
+pub fn positions(sim: &Simulation, object: &str) -> Vec<Vector> {
+    column(sim, object, "position")
+}
+
+/// Velocities [m/s].
+pub fn velocities(sim: &Simulation, object: &str) -> Vec<Vector> {
+    column(sim, object, "velocity")
+}
+
+/// Sets a column.
+pub fn write(sim: &mut Simulation, object: &str, name: &str, values: &[Vector]) {
+    let flat: Vec<f64> = values.iter().flat_map(|v| <[f64; 3]>::from(*v)).collect();
+    sim.write(object, name, &flat).unwrap_or_else(|e| panic!("{e}"));
+}
+
+/// A scene's list of vectors.
+pub fn list(values: &[Vector]) -> String {
+    let one = |v: &Vector| format!("[{:e}, {:e}, {:e}]", v.x, v.y, v.z);
+    format!("[{}]", values.iter().map(one).collect::<Vec<_>>().join(", "))
+}
+
+pub fn vector(x: f64, y: f64, z: f64) -> Vector {
+    [x, y, z].into()
+}
+
+/// log2 of each error over the next: the observed order where each belongs to half the step of the one before.
+pub fn orders(errors: &[f64]) -> Vec<f64> {
+    errors.windows(2).map(|e| (e[0] / e[1]).log2()).collect()
+}
+
+/// Numbers for people.
+pub fn show(numbers: &[f64]) -> String {
+    numbers.iter().map(|n| format!("{n:.3e}")).collect::<Vec<_>>().join(" ")
+}
+
+/// Slope of the line through points (x, y) that fits best.
+pub fn slope(points: &[(f64, f64)]) -> f64 {
+    let n = points.len() as f64;
+    let (mx, my) = (points.iter().map(|p| p.0).sum::<f64>() / n, points.iter().map(|p| p.1).sum::<f64>() / n);
+    points.iter().map(|(x, y)| (x - mx) * (y - my)).sum::<f64>() / points.iter().map(|(x, _)| (x - mx) * (x - mx)).sum::<f64>()
+}
+
+/// Times at which a sampled smooth function passes zero, with its slope there: from samples (t, y, y') by the cubic that
+/// has both values and both slopes, an error of order 4 in the interval.
+pub fn zeros(samples: &[(f64, f64, f64)]) -> Vec<(f64, f64)> {
+    let mut found = Vec::new();
+    for pair in samples.windows(2) {
+        let [(t0, a, da), (t1, b, db)] = *pair else { unreachable!() };
+        if (a < 0.0) == (b < 0.0) {
+            continue;
+        }
+        let h = t1 - t0;
+        let cubic = |s: f64| {
+            let (s2, s3) = (s * s, s * s * s);
+            a * (1.0 - 3.0 * s2 + 2.0 * s3) + b * (3.0 * s2 - 2.0 * s3) + h * (da * (s - 2.0 * s2 + s3) + db * (s3 - s2))
+        };
+        let slope = |s: f64| (b - a) / h * 6.0 * s * (1.0 - s) + da * (1.0 - 4.0 * s + 3.0 * s * s) + db * (3.0 * s * s - 2.0 * s);
+        let (mut low, mut high) = (0.0, 1.0);
+        for _ in 0..60 {
+            let middle = 0.5 * (low + high);
+            if (cubic(middle) < 0.0) == (a < 0.0) { low = middle } else { high = middle }
+        }
+        found.push((t0 + h * low, slope(low)));
+    }
+    found
+}
+
+/// Numbers between -1 and 1 without a pattern, the same in every run.
+pub struct Numbers(pub u64);
+
+impl Numbers {
+    pub fn next(&mut self) -> f64 {
+        self.0 = self.0.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+        ((self.0 >> 11) as f64) / (1_u64 << 52) as f64 - 1.0
+    }
+
+    pub fn vector(&mut self) -> Vector {
+        [self.next(), self.next(), self.next()].into()
+    }
+}

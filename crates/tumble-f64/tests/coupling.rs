@@ -1,0 +1,160 @@
+//! Two systems that meet in an anchor: each impulse is delivered exactly once, the energy stays, the order is one, and the order
+//! of the systems does not matter. See docs/theory/coupling.md.
+
+mod common;
+
+use common::{orders, positions, run, simulation, slope, step, vector, velocities};
+use safetensors::SafeTensors;
+use tumble_f64::reference::Oscillator;
+use tumble_f64::scene::Simulation;
+use tumble_interface::Engine;
+
+const MASSES: [f64; 2] = [1.0, 2.0];
+/// Reduced mass [kg].
+const M: f64 = 2.0 / 3.0;
+/// Angular frequency of the pair [rad/s]: w dt = 0.05 at 3337 exchanges in 20 s.
+const W: f64 = 8.3425;
+
+/// Masses "a" and "b", each in a system of its own, on an anchor of length 1 m that is stretched by 0.1 m and belongs to a's system;
+/// they also move together. `swapped` lets b's system go first.
+fn pair(exchanges: u32, swapped: bool, substeps: u32, fps: f64) -> Simulation {
+    let one = |name: &str| format!("[[system]]\nname = \"{name}\"\nintegrator = \"symplectic_euler\"\nsubsteps = {substeps}\n");
+    let systems = if swapped { one("second") + &one("first") } else { one("first") + &one("second") };
+    simulation(&format!(
+        "time = {{ fps = {fps:e}, exchanges = {exchanges} }}\nworld.gravity = [0, 0, 0]\n{systems}\
+         [[particles]]\nname = \"a\"\nsystem = \"first\"\nposition = [[0, 0, 0]]\nvelocity = [[0, 0.5, 0]]\nmass = [{}]\n\
+         [[particles]]\nname = \"b\"\nsystem = \"second\"\nposition = [[1.1, 0, 0]]\nvelocity = [[0, 0.5, 0]]\nmass = [{}]\n\
+         [[anchor]]\nname = \"tie\"\nbetween = [\"a 0\", \"b 0\"]\nrest_length = 1.0\nstiffness = {:e}\n",
+        MASSES[0],
+        MASSES[1],
+        M * W * W
+    ))
+}
+
+/// Lengthening of the anchor, and its rate.
+fn stretch(sim: &Simulation) -> (f64, f64) {
+    let d = positions(sim, "b")[0] - positions(sim, "a")[0];
+    let u = velocities(sim, "b")[0] - velocities(sim, "a")[0];
+    (d.norm() - 1.0, d.normalized().dot(u))
+}
+
+/// Energy of the oscillation over that at the start.
+fn energy(sim: &Simulation) -> f64 {
+    let (r, speed) = stretch(sim);
+    (r * r + speed * speed / (W * W)) / 0.01
+}
+
+/// What the exchange has posted and delivered [N s], and the momentum in the mail, from a snapshot: ports (7 numbers each),
+/// posted, delivered, then the mail as port and impulse.
+fn exchange(sim: &Simulation) -> ([f64; 3], [f64; 3], [f64; 3]) {
+    let bytes = sim.save(&[]);
+    let tensors = SafeTensors::deserialize(&bytes).unwrap();
+    let name = tensors.names().into_iter().find(|n| n.ends_with(" exchange")).unwrap().to_string();
+    let numbers: Vec<f64> = tensors.tensor(&name).unwrap().data().chunks_exact(8).map(|b| f64::from_le_bytes(b.try_into().unwrap())).collect();
+    let rest = &numbers[1 + 7 * numbers[0] as usize..];
+    let three = |s: &[f64]| [s[0], s[1], s[2]];
+    let mail = rest[6..].chunks_exact(4).fold([0.0; 3], |sum, m| [sum[0] + m[1], sum[1] + m[2], sum[2] + m[3]]);
+    (three(rest), three(&rest[3..]), mail)
+}
+
+#[test]
+fn every_impulse_is_delivered_and_momentum_is_kept() {
+    for swapped in [false, true] {
+        for substeps in [1, 4] {
+            let mut sim = pair(20, swapped, substeps, 1.0);
+            let mut worst = 0.0_f64;
+            for _ in 0..20 {
+                step(&mut sim);
+                let (posted, delivered, mail) = exchange(&sim);
+                let p = sim.ledger().momentum;
+                for a in 0..3 {
+                    worst = worst.max((posted[a] - delivered[a] - mail[a]).abs());
+                    worst = worst.max((p[a] + mail[a] - [0.0, 1.5, 0.0][a]).abs());
+                }
+                assert!(posted[0].abs() > 1e-3, "something is exchanged");
+                // The partner's mail is empty where it goes second; else its last impulse waits for its next turn.
+                assert_eq!(mail == [0.0; 3], !swapped, "{mail:?}");
+            }
+            println!("swapped {swapped}, {substeps} sub-steps: impulses and momentum kept to {worst:.1e} N s");
+            // 400 impulses of 0.3 N s, each rounded to 1e-17.
+            assert!(worst < 1e-14);
+        }
+    }
+}
+
+/// (coupling.2): together the two are one symplectic Euler, with the energy between (1 - z/2)/(1 + z/2) and its inverse.
+#[test]
+fn the_energy_stays() {
+    for swapped in [false, true] {
+        // 3337 exchanges of 20/3337 s: w dt = 0.05.
+        let mut sim = pair(1, swapped, 1, 3337.0 / 20.0);
+        let mut range = (f64::INFINITY, 0.0_f64);
+        let mut all = Vec::new();
+        for _ in 0..3337 {
+            step(&mut sim);
+            let e = energy(&sim);
+            range = (range.0.min(e), range.1.max(e));
+            all.push(e);
+        }
+        // Means over the first and the last period of 126 exchanges: within a period the energy swings.
+        let mean = |part: &[f64]| part.iter().sum::<f64>() / part.len() as f64;
+        let ratio = mean(&all[all.len() - 126..]) / mean(&all[..126]);
+        println!("swapped {swapped}: energy after 20 s x {ratio:.5}, between {:.4} and {:.4} of the start", range.0, range.1);
+        assert!((ratio - 1.0).abs() < 0.01, "{ratio}");
+        // At the start the spring is stretched and nothing moves, x² = 1: the form x² - z x u + u² = const lets x² + u² reach
+        // 1/(1 - z/2) = 1.0256. Seen with b a step ahead or behind, once more.
+        assert!(range.1 < 1.053 && range.0 > 0.95, "{range:?}");
+        // No drift: the line through the energies of 26 periods rises by less than a thousandth.
+        let points: Vec<(f64, f64)> = all.iter().enumerate().map(|(i, e)| (i as f64 / 3337.0, *e)).collect();
+        assert!(slope(&points).abs() < 1e-3, "{}", slope(&points));
+    }
+}
+
+#[test]
+fn the_exchange_has_order_one_whichever_system_goes_first() {
+    let exact = Oscillator { frequency: W, damping: 0.0, x0: 0.1, v0: 0.0 };
+    // Two masses on a line that also move along: both move with 0.5 m/s, the spring adds its part.
+    let places = |t: f64| {
+        let r = exact.at(t).0 - 0.1;
+        [-r * M / MASSES[0], 1.1 + r * M / MASSES[1]]
+    };
+    let mut at_finest = Vec::new();
+    for swapped in [false, true] {
+        let errors: Vec<f64> = (0..4)
+            .map(|k| {
+                let mut sim = pair(100 << k, swapped, 1, 1.0);
+                run(&mut sim, 1);
+                let (a, b) = (positions(&sim, "a")[0], positions(&sim, "b")[0]);
+                if k == 3 {
+                    at_finest.push(a);
+                }
+                let [ea, eb] = places(1.0);
+                (a - vector(ea, 0.5, 0.0)).norm().max((b - vector(eb, 0.5, 0.0)).norm())
+            })
+            .collect();
+        let observed = orders(&errors);
+        println!("swapped {swapped}: errors {}, orders {observed:.3?}", common::show(&errors));
+        for p in observed {
+            assert!((p - 1.0).abs() < 0.2, "order {p}");
+        }
+        assert!(errors[3] > 1e-6 && errors[3] < 1e-3);
+    }
+    // The two orders differ by no more than either errs: 8.3 rad/s x 0.1 m x dt.
+    let apart = (at_finest[0] - at_finest[1]).norm();
+    println!("the two orders end {apart:.1e} m apart");
+    assert!(apart > 1e-9 && apart < W * 0.1 / 800.0);
+}
+
+/// More sub-steps inside a system do not change what the exchange does: order one in its interval.
+#[test]
+fn sub_steps_do_not_spoil_the_energy() {
+    for swapped in [false, true] {
+        let mut sim = pair(1, swapped, 8, 3337.0 / 20.0);
+        run(&mut sim, 3337);
+        let end = energy(&sim);
+        println!("swapped {swapped}, 8 sub-steps: energy after 20 s x {end:.4}");
+        // A sub-step sees the other as it was published, up to an interval ago or ahead: 0.9934 and 0.9936 measured, of the 2.6 % by
+        // which the energy swings.
+        assert!((end - 1.0).abs() < 0.026);
+    }
+}

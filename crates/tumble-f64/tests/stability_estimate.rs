@@ -1,0 +1,96 @@
+//! The largest step that `tumble check` predicts, against the largest one found by bisection, on a stiff sheet.
+
+mod common;
+
+use common::{Vector, positions, simulation, step, vector, velocities, write};
+use std::f64::consts::PI;
+use tumble_f64::scene::Simulation;
+use tumble_interface::Engine;
+use tumble_interface::engine::BLOW_UP;
+use tumble_interface::scene::Integrator;
+
+fn sheet(scheme: Integrator, h: f64, damping: f64) -> Simulation {
+    simulation(&format!(
+        "time.fps = {:e}\nworld.gravity = [0, 0, 0]\n[[system]]\nintegrator = \"{}\"\nsubsteps = 1\n\
+         [[sheet]]\nname = \"sheet\"\nsize = [1, 1]\nresolution = [8, 8]\npin = [\"corner 0 0\", \"corner 1 0\"]\n\
+         links = {{ structural = {{ modulus = 5000, damping = {:e} }}, shear = {{ modulus = 2000, damping = {:e} }}, bend = {{ modulus = 200, damping = {:e} }} }}\n",
+        1.0 / h,
+        scheme.name(),
+        5000.0 * damping,
+        2000.0 * damping,
+        200.0 * damping
+    ))
+}
+
+/// The shape of the stiffest mode: symplectic Euler just beyond its limit lets it grow above all others, because
+/// |growth| rises with w.
+fn stiffest_shape(frequency: f64) -> Vec<Vector> {
+    let mut sim = sheet(Integrator::SymplecticEuler, 2.02 / frequency, 0.0);
+    let mut v: Vec<Vector> = (0..64).map(|i| vector((i as f64).sin(), (1.7 * i as f64).cos(), 0.0) * 1e-9).collect();
+    let rest = positions(&sim, "sheet");
+    for _ in 0..12 {
+        write(&mut sim, "sheet", "velocity", &v);
+        write(&mut sim, "sheet", "position", &rest);
+        for _ in 0..40 {
+            step(&mut sim);
+        }
+        v = velocities(&sim, "sheet");
+        let size = v.iter().map(|v| v.norm_sq()).sum::<f64>().sqrt();
+        v.iter_mut().for_each(|v| *v = *v * (1e-9 / size));
+    }
+    v
+}
+
+/// Whether the energy of that mode stays below 1000 times its start for 100 of its periods.
+fn usable(scheme: Integrator, h: f64, frequency: f64, damping: f64, shape: &[Vector]) -> bool {
+    let mut sim = sheet(scheme, h, damping);
+    write(&mut sim, "sheet", "velocity", shape);
+    let start = sim.ledger().energy();
+    let steps = (200.0 * PI / (frequency * h)).ceil() as usize;
+    for _ in 0..steps {
+        if sim.step(&|| true).is_err() {
+            return false;
+        }
+        let books = sim.ledger();
+        // Energy in the mode: what moves and what is stretched.
+        if !(books.energy() < BLOW_UP * start) {
+            return false;
+        }
+    }
+    true
+}
+
+#[test]
+fn the_predicted_step_is_the_measured_one() {
+    let frequency = sheet(Integrator::Rk4, 1e-4, 0.0).stability()[0].frequency;
+    let shape = stiffest_shape(frequency);
+    // b = 2e-5 s k: forward Euler is then stable up to h = b/k, because c = 2e-5 s w² for every mode. (integrators.31)
+    for (scheme, damping) in [
+        (Integrator::SymplecticEuler, 0.0),
+        (Integrator::Verlet, 0.0),
+        (Integrator::VelocityVerlet, 0.0),
+        (Integrator::Rk4, 0.0),
+        (Integrator::Midpoint, 0.0),
+        (Integrator::Heun, 0.0),
+        (Integrator::ForwardEuler, 2e-5),
+        (Integrator::SymplecticEuler, 2e-4),
+        (Integrator::Verlet, 2e-5),
+    ] {
+        let predicted = sheet(scheme, 1e-4, damping).stability()[0].limit(scheme).unwrap().usable;
+        let (mut low, mut high) = (0.7 * predicted, 1.4 * predicted);
+        let fine = |h: f64| usable(scheme, h, frequency, damping, &shape);
+        assert!(fine(low) && !fine(high), "{}: the limit is not near {predicted:e}", scheme.name());
+        for _ in 0..9 {
+            let middle = 0.5 * (low + high);
+            if fine(middle) { low = middle } else { high = middle }
+        }
+        let measured = 0.5 * (low + high);
+        println!(
+            "{:18} b/k = {damping:.0e} s: predicted {predicted:.4e} s (w h = {:.4}), measured {measured:.4e} s, {:+.2} %",
+            scheme.name(),
+            predicted * frequency,
+            100.0 * (predicted / measured - 1.0)
+        );
+        assert!((predicted / measured - 1.0).abs() < 0.05);
+    }
+}

@@ -1,0 +1,175 @@
+//! The same scene gives the same bits: on any count of threads, after saving and restoring, beside an unrelated object, and after a
+//! failed or abandoned step. `crates/tumble-f64/tests/determinism.rs` runs this file again in double precision.
+
+use std::fmt::Write;
+use tumble::scene::Simulation;
+use tumble_interface::engine::Engine;
+use tumble_interface::{Scene, StepError};
+
+fn simulation(text: &str) -> Simulation {
+    let scene = Scene::from_toml(&format!("version = 1\n{text}")).unwrap_or_else(|e| panic!("{e}"));
+    Simulation::new(scene, Default::default()).unwrap_or_else(|e| panic!("{e}"))
+}
+
+fn run(sim: &mut Simulation, frames: usize) {
+    for _ in 0..frames {
+        sim.step(&|| true).unwrap_or_else(|e| panic!("{e}")).unwrap();
+    }
+}
+
+/// A sheet that falls on a ball; 5184 masses are more than one chunk of the parallel loops.
+fn sheet(system: &str, extra: &str) -> String {
+    format!(
+        "time.fps = 60\n[[system]]\n{system}\n[[sheet]]\nname = \"sheet\"\nsize = [1, 1]\nresolution = [72, 72]\ncenter = [0.02, 0.01, 0.305]\nhinge = 1e-4\n{extra}\n\
+         [[collider]]\nname = \"ball\"\nfriction = 0.4\nshape.sphere.radius = 0.3\n"
+    )
+}
+
+/// Name, scene, frames: every kind of element, contact, memory and solver.
+fn scenes() -> Vec<(&'static str, String, usize)> {
+    let links = "links = { structural = { modulus = 50, damping = 0.01 }, shear = 20, bend = 2 }";
+    let torn = "links = { structural = { modulus = 20, break_strain = 0.01 }, shear = 8 }\npin = [\"corner 0 0\", \"corner 1 1\"]";
+    let mut dust = String::from("[[system]]\nintegrator = \"velocity_verlet\"\nsubsteps = 3\n[[force]]\nkind = \"drag\"\nrate = 0.3\n[[particles]]\nname = \"dust\"\nposition = [");
+    let mut tracers = String::from(
+        "[[system]]\nmethod = \"tracers\"\nintegrator = \"heun\"\nsubsteps = 3\n[[field]]\nkind = \"swirl\"\nrate = 2\n[[particles]]\nname = \"smoke\"\nposition = [",
+    );
+    for i in 0..10_000 {
+        let t = f64::from(i);
+        write!(dust, "[{}, {}, {}],", (t * 0.37).sin(), (t * 0.11).cos(), (t * 0.0731).sin() + 1.0).unwrap();
+        write!(tracers, "[{}, {}, {}],", (t * 0.37).sin(), (t * 0.11).cos(), (t * 0.0731).sin()).unwrap();
+    }
+    dust += "]\n[[collider]]\nname = \"floor\"\nrestitution = 0.3\nfriction = 0.2\nshape.floor.height = 0\n";
+    tracers += "]\n";
+    let rod = "[[system]]\nintegrator = \"SCHEME\"\nsubsteps = N\n[[rope]]\nname = \"rod\"\nfrom = [0, 0, 0]\nto = [0.6, 0.2, 0.4]\nsegments = 60\npin = [\"start\"]\n\
+               rod = { stretch = 100, bend = 1e-3, twist = 1e-3, inertia = 1e-4, damping = 1e-4 }\n";
+    let rod = |scheme, n| rod.replace("SCHEME", scheme).replace("= N", n);
+    let jelly = "[[system]]\nintegrator = \"symplectic_euler\"\nsubsteps = 6\n[[block]]\nname = \"jelly\"\nsize = [0.3, 0.3, 0.3]\nresolution = [17, 17, 15]\ncenter = [0, 0, 0.155]\n\
+                 material = { young = 2000, poisson = 0.4, damping = 0.002 }\n[[collider]]\nname = \"floor\"\nfriction = 0.3\nshape.floor.height = 0\n";
+    let rope = "[[system]]\nintegrator = \"bdf2\"\nsolver.linear = \"cholesky\"\n[[rope]]\nname = \"rope\"\nfrom = [0, 0, 0]\nto = [1, 0, 0]\nlength = 1.2\nsegments = 40\npin = [\"start\", \"end\"]\n";
+    vec![
+        ("sheet, explicit", sheet("integrator = \"symplectic_euler\"\nsubsteps = 12", links), 20),
+        ("sheet, verlet", sheet("integrator = \"verlet\"\nsubsteps = 12", links), 6),
+        ("sheet, implicit", sheet("integrator = \"implicit_euler\"", links), 20),
+        ("sheet, dormand-prince", sheet("integrator = \"dormand_prince\"\nadaptive.tolerance = 1e-3", links), 3),
+        ("sheet, torn", sheet("integrator = \"velocity_verlet\"\nsubsteps = 12", torn), 20),
+        ("rod, explicit", rod("symplectic_euler", "= 40"), 20),
+        ("rod, implicit", rod("implicit_midpoint", "= 4"), 20),
+        ("jelly", jelly.to_string(), 8),
+        ("dust", dust, 20),
+        ("tracers", tracers, 20),
+        ("rope, cholesky", rope.to_string(), 20),
+    ]
+}
+
+#[test]
+fn any_count_of_threads_gives_the_same_bits() {
+    for (name, text, frames) in scenes() {
+        let hash = |threads: usize| {
+            let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+            pool.install(|| {
+                let mut sim = simulation(&text);
+                let start = sim.hash();
+                run(&mut sim, frames);
+                assert_ne!(sim.hash(), start, "{name}: nothing happens");
+                let books = sim.ledger();
+                (sim.hash(), books.contacts, books.broken)
+            })
+        };
+        let one = hash(1);
+        println!("{name:22} {:016x} after {frames} frames, {} contacts, {} broken", one.0, one.1, one.2);
+        assert_eq!(one, hash(2), "{name}: 2 threads");
+        assert_eq!(one, hash(8), "{name}: 8 threads");
+        assert!(!name.contains("torn") || one.2 > 0, "{name}: nothing tears");
+        assert!(!name.contains("sheet, explicit") || one.1 > 10, "{name}: no contact");
+    }
+}
+
+#[test]
+fn a_run_that_is_restored_midway_goes_on_to_the_same_bits() {
+    for (name, text, frames) in scenes() {
+        let (first, rest) = (frames / 2, frames - frames / 2);
+        let mut sim = simulation(&text);
+        run(&mut sim, first);
+        let saved = sim.save(&[("about", "half-way")]);
+        let at_half = sim.hash();
+        run(&mut sim, rest);
+        let mut fresh = simulation(&text);
+        fresh.restore(&saved).unwrap_or_else(|e| panic!("{name}: {e}"));
+        assert_eq!(fresh.hash(), at_half, "{name}");
+        run(&mut fresh, rest);
+        assert_eq!(fresh.hash(), sim.hash(), "{name}");
+        assert_eq!((fresh.time(), fresh.frame_index()), (sim.time(), sim.frame_index()));
+        // And the same object can go back.
+        sim.restore(&saved).unwrap();
+        run(&mut sim, rest);
+        assert_eq!(fresh.hash(), sim.hash(), "{name}, back");
+    }
+}
+
+#[test]
+fn a_far_object_in_another_system_changes_nothing() {
+    for scheme in ["symplectic_euler", "verlet", "implicit_euler", "dormand_prince"] {
+        let steps = if scheme == "dormand_prince" { "" } else { "substeps = 10" };
+        let near = format!(
+            "[[system]]\nname = \"near\"\nintegrator = \"{scheme}\"\n{steps}\n\
+             [[sheet]]\nname = \"flag\"\nsystem = \"near\"\nsize = [1, 1]\nresolution = [12, 9]\npin = [\"corner 0 0\", \"corner 1 0\"]\nhinge = 1e-3\n"
+        );
+        let far = "[[system]]\nname = \"far\"\nintegrator = \"rk4\"\nsubsteps = 20\n\
+                   [[rope]]\nname = \"lost\"\nsystem = \"far\"\nfrom = [900, 0, 0]\nto = [901, 0, 0]\nsegments = 9\npin = [\"start\"]\nlinks = { structural = 50 }\n";
+        let columns = |text: &str| {
+            let mut sim = simulation(text);
+            run(&mut sim, 10);
+            let frame = sim.frame(&["position", "velocity", "link_strain"]);
+            frame.columns.into_iter().filter(|c| c.object == "flag").map(|c| format!("{:?}", c.data)).collect::<Vec<_>>()
+        };
+        let alone = columns(&near);
+        assert_eq!(alone.len(), 3);
+        assert_eq!(alone, columns(&format!("{near}{far}")), "{scheme}: after it");
+        // Before it in the scene, too: nothing depends on the place of a system.
+        let (system, object) = near.split_at(near.find("[[sheet]]").unwrap());
+        let (far_system, far_object) = far.split_at(far.find("[[rope]]").unwrap());
+        assert_eq!(alone, columns(&format!("{far_system}{system}{far_object}{object}")), "{scheme}: before it");
+    }
+}
+
+#[test]
+fn after_an_error_the_state_is_that_of_the_last_good_frame() {
+    // Forward Euler on a stiff sheet multiplies its energy by some 2 a step.
+    let mut sim = simulation(
+        "time.fps = 100\n[[system]]\nintegrator = \"forward_euler\"\nsubsteps = 20\n\
+         [[sheet]]\nname = \"sheet\"\nsize = [1, 1]\nresolution = [9, 9]\npin = [\"corner 0 0\"]\nlinks = { structural = 2000, shear = 800, bend = 40 }\n",
+    );
+    let mut good = (sim.hash(), sim.frame(&["position"]), sim.ledger());
+    let error = loop {
+        match sim.step(&|| true) {
+            Ok(_) => good = (sim.hash(), sim.frame(&["position"]), sim.ledger()),
+            Err(error) => break error,
+        }
+        assert!(sim.frame_index() < 1000, "it should have exploded");
+    };
+    println!("{error}");
+    assert!(matches!(error, StepError::Exploded(_) | StepError::NotFinite(_)));
+    assert_eq!(sim.hash(), good.0);
+    assert_eq!(sim.frame(&["position"]), good.1);
+    assert_eq!(sim.ledger(), good.2);
+    // It fails again in the same way.
+    assert_eq!(sim.step(&|| true), Err(error));
+    assert_eq!(sim.hash(), good.0);
+}
+
+#[test]
+fn an_abandoned_step_leaves_no_trace() {
+    for (name, text, _) in scenes().into_iter().filter(|(name, _, _)| ["sheet, verlet", "rod, explicit", "dust", "sheet, dormand-prince"].contains(name)) {
+        let mut sim = simulation(&text);
+        run(&mut sim, 1);
+        let before = sim.hash();
+        let asked = std::sync::atomic::AtomicU32::new(0);
+        let two_steps = || asked.fetch_add(1, std::sync::atomic::Ordering::Relaxed) < 2;
+        assert_eq!(sim.step(&two_steps), Ok(None), "{name}");
+        assert_eq!((sim.hash(), sim.frame_index()), (before, 1), "{name}");
+        run(&mut sim, 2);
+        let mut other = simulation(&text);
+        run(&mut other, 3);
+        assert_eq!(sim.hash(), other.hash(), "{name}");
+    }
+}

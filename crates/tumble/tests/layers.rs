@@ -1,0 +1,205 @@
+//! The layers of the engine: a module imports only modules that stand before it in the list of `src/lib.rs`, and no module in
+//! `systems/` imports a sibling (DESIGN.md, section 2).
+
+use std::fs;
+use std::path::{Path, PathBuf};
+
+fn source() -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("src")
+}
+
+/// The modules of lib.rs in order, the lowest first.
+fn modules() -> Vec<String> {
+    let text = fs::read_to_string(source().join("lib.rs")).unwrap();
+    let names = text.lines().filter_map(|line| line.strip_prefix("pub mod ").or(line.strip_prefix("mod "))?.strip_suffix(';'));
+    names.map(str::to_string).collect()
+}
+
+fn files(folder: &Path) -> Vec<PathBuf> {
+    let mut found = Vec::new();
+    let mut entries: Vec<PathBuf> = fs::read_dir(folder).unwrap().map(|e| e.unwrap().path()).collect();
+    entries.sort();
+    for path in entries {
+        if path.is_dir() {
+            found.extend(files(&path));
+        } else if path.extension().is_some_and(|e| e == "rs") {
+            found.push(path);
+        }
+    }
+    found
+}
+
+/// The path of the module in a file: systems/dynamics/mod.rs -> [systems, dynamics].
+fn module(file: &Path) -> Vec<String> {
+    let relative = file.strip_prefix(source()).unwrap().with_extension("");
+    let mut path: Vec<String> = relative.iter().map(|p| p.to_str().unwrap().to_string()).collect();
+    if path.last().is_some_and(|p| p == "mod" || p == "lib") {
+        path.pop();
+    }
+    path
+}
+
+/// A module that is named in code, as a path from the root of the crate, with the number of its line.
+type Import = (usize, Vec<String>);
+
+/// All paths in a text that start at `crate` or climb with `super`, with groups in braces multiplied out.
+fn imports(of: &[String], text: &str) -> Vec<Import> {
+    let mut found = Vec::new();
+    // How many modules deep each open brace is: `mod tests {` adds one.
+    let mut inner: Vec<bool> = Vec::new();
+    let code = without_comments_and_strings(text);
+    let bytes = code.as_bytes();
+    let mut i = 0;
+    while i < bytes.len() {
+        let rest = &code[i..];
+        let starts_word = i == 0 || !(bytes[i - 1].is_ascii_alphanumeric() || bytes[i - 1] == b'_' || bytes[i - 1] == b':' || bytes[i - 1] == b'$');
+        if starts_word && (rest.starts_with("crate::") || rest.starts_with("super::")) {
+            let line = code[..i].lines().count().max(1);
+            let depth = inner.iter().filter(|m| **m).count();
+            let mut base: Vec<String> = of.to_vec();
+            base.extend((0..depth).map(|_| "inner".to_string()));
+            let mut at = i;
+            if rest.starts_with("crate::") {
+                base.clear();
+                at += "crate::".len();
+            }
+            while code[at..].starts_with("super::") {
+                assert!(base.pop().is_some(), "super of the root in {of:?}, line {line}");
+                at += "super::".len();
+            }
+            found.extend(leaves(&code[at..]).into_iter().map(|leaf| (line, base.iter().cloned().chain(leaf).collect())));
+            i = at;
+            continue;
+        }
+        match bytes[i] {
+            b'{' => {
+                let before = code[..i].trim_end();
+                let words: Vec<&str> = before.rsplitn(3, char::is_whitespace).collect();
+                inner.push(words.get(1) == Some(&"mod"));
+            }
+            b'}' => drop(inner.pop()),
+            _ => {}
+        }
+        i += 1;
+    }
+    found
+}
+
+/// The first two names of every path in `a::b`, `a::{b, c::d}`, `{a, b::c}`.
+fn leaves(text: &str) -> Vec<Vec<String>> {
+    let text = text.trim_start();
+    if let Some(group) = text.strip_prefix('{') {
+        let (mut depth, mut start, mut out) = (0, 0, Vec::new());
+        for (i, c) in group.char_indices() {
+            match c {
+                '{' => depth += 1,
+                '}' if depth > 0 => depth -= 1,
+                ',' | '}' if depth == 0 => {
+                    out.extend(leaves(&group[start..i]));
+                    start = i + 1;
+                    if c == '}' {
+                        break;
+                    }
+                }
+                _ => {}
+            }
+        }
+        return out;
+    }
+    let end = text.find(|c: char| !(c.is_alphanumeric() || c == '_')).unwrap_or(text.len());
+    let name = text[..end].to_string();
+    if name.is_empty() {
+        return Vec::new();
+    }
+    match text[end..].strip_prefix("::") {
+        Some(rest) => {
+            let more = leaves(rest);
+            if more.is_empty() { vec![vec![name]] } else { more.into_iter().map(|m| [vec![name.clone()], m].concat()).collect() }
+        }
+        None => vec![vec![name]],
+    }
+}
+
+fn without_comments_and_strings(text: &str) -> String {
+    let mut out = String::with_capacity(text.len());
+    for line in text.lines() {
+        let mut in_string = false;
+        let mut characters = line.chars().peekable();
+        while let Some(c) = characters.next() {
+            match c {
+                '\\' if in_string => drop(characters.next()),
+                '"' => in_string = !in_string,
+                '\'' if !in_string => {
+                    // A character such as '{' or '"'; a lifetime has no closing quote two places on.
+                    let rest: String = characters.clone().take(3).collect();
+                    let length = if rest.starts_with('\\') { 2 } else { 1 };
+                    if rest.chars().nth(length) == Some('\'') {
+                        (0..=length).for_each(|_| drop(characters.next()));
+                    }
+                }
+                '/' if !in_string && characters.peek() == Some(&'/') => break,
+                _ if in_string => {}
+                _ => out.push(c),
+            }
+        }
+        out.push('\n');
+    }
+    out
+}
+
+/// What is wrong with the imports of a module.
+fn faults(order: &[String], of: &[String], imports: &[Import]) -> Vec<String> {
+    let place = |name: &String| order.iter().position(|m| m == name);
+    let Some(own) = of.first().and_then(place) else { return Vec::new() };
+    let mut faults = Vec::new();
+    for (line, path) in imports {
+        let Some(other) = path.first().and_then(place) else {
+            faults.push(format!("{}:{line}: {} is no module of lib.rs", of.join("::"), path.join("::")));
+            continue;
+        };
+        if other > own {
+            faults.push(format!("{}:{line}: {} stands above it", of.join("::"), path.join("::")));
+        }
+        if of[0] == "systems" && path[0] == "systems" && of.len() > 1 && path.len() > 1 && path[1] != of[1] {
+            faults.push(format!("{}:{line}: {} is a sibling", of.join("::"), path.join("::")));
+        }
+    }
+    faults
+}
+
+#[test]
+fn modules_import_only_lower_layers() {
+    let order = modules();
+    assert_eq!(order.first().map(String::as_str), Some("math"));
+    assert_eq!(order.last().map(String::as_str), Some("scene"));
+    let (mut seen, mut wrong) = (0, Vec::new());
+    for file in files(&source()) {
+        let of = module(&file);
+        let imports = imports(&of, &fs::read_to_string(&file).unwrap());
+        seen += imports.iter().filter(|(_, path)| path.first() != of.first()).count();
+        wrong.extend(faults(&order, &of, &imports));
+        assert!(of.is_empty() || order.contains(&of[0]), "{} is in no layer", file.display());
+    }
+    println!("{} modules, {seen} imports of other layers", order.len());
+    assert!(seen > 100, "the test sees no imports");
+    assert!(wrong.is_empty(), "{}", wrong.join("\n"));
+}
+
+#[test]
+fn the_test_sees_what_it_forbids() {
+    let order: Vec<String> = ["math", "state", "systems", "world"].map(String::from).into();
+    let check = |of: &[&str], text: &str| {
+        let of: Vec<String> = of.iter().map(|s| s.to_string()).collect();
+        faults(&order, &of, &imports(&of, text)).len()
+    };
+    assert_eq!(check(&["state"], "use crate::math::Vec3;\nuse super::math;\nfn f() { crate::math::max(1, 2) }"), 0);
+    assert_eq!(check(&["state"], "use crate::world::World;"), 1);
+    assert_eq!(check(&["state"], "use crate::{math::Vec3, systems::{dynamics, tracers}};"), 2);
+    assert_eq!(check(&["state"], "fn f() -> crate::world::World { panic!(\"crate::world\") } // crate::world"), 1);
+    assert_eq!(check(&["state"], "use super::world::World;"), 1);
+    assert_eq!(check(&["systems", "dynamics"], "use super::tracers::Tracers;\nuse crate::systems::tracers;"), 2);
+    assert_eq!(check(&["systems", "dynamics"], "mod tests { use super::*; use super::super::tracers; }"), 1);
+    assert_eq!(check(&["systems", "dynamics", "books"], "use super::Dynamics; use super::super::dynamics::laws; use super::super::tracers;"), 1);
+    assert_eq!(check(&["systems"], "use crate::systems::dynamics::Parts;"), 0);
+    assert_eq!(check(&["math"], "use crate::lost::Thing;"), 1);
+}

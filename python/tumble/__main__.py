@@ -1,0 +1,6 @@
+"""`python -m tumble` is the command `tumble`."""
+
+from tumble.cli import main
+
+if __name__ == "__main__":
+    main()
