@@ -40,7 +40,9 @@ def set_up() -> Path:
 
 def run(python: Path, case: str, threads: int) -> list[dict]:
     """The JSON lines of one case."""
-    environment = dict(os.environ, PYTHONPATH=str(ROOT / "python"), NUMBA_NUM_THREADS=str(threads), OMP_NUM_THREADS=str(threads))
+    environment = dict(
+        os.environ, PYTHONPATH=str(ROOT / "python"), NUMBA_NUM_THREADS=str(threads), OMP_NUM_THREADS=str(threads)
+    )
     environment["RAYON_NUM_THREADS"] = str(threads)
     command = [python, HERE / f"{case}.py", str(threads)]
     done = subprocess.run(command, env=environment, capture_output=True, text=True)
@@ -63,9 +65,16 @@ def main() -> None:
     width = max(len(r["who"]) for r in rows)
     missed = 0
     for row in rows:
-        print(f"{row['case']:10} {row['who']:{width}} {row['threads']:2}T {row['value']:12.4g} {row['unit']:12} {row['check']}")
+        print(
+            f"{row['case']:10} {row['who']:{width}} {row['threads']:2}T {row['value']:12.4g} {row['unit']:12} {row['check']}"
+        )
         ours = next(
-            (r for r in rows if r["case"] == row["case"] and r["threads"] == row["threads"] and r["who"].startswith("tumble")), None
+            (
+                r
+                for r in rows
+                if r["case"] == row["case"] and r["threads"] == row["threads"] and r["who"].startswith("tumble")
+            ),
+            None,
         )
         target = TARGETS.get((row["case"], row["who"]))
         if ours is None or target is None:

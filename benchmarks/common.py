@@ -22,4 +22,7 @@ def median(work: Callable[[], object], repeats: int = 5) -> float:
 
 def show(case: str, who: str, value: float, unit: str, check: str) -> None:
     """One line of the table."""
-    print(json.dumps({"case": case, "who": who, "threads": THREADS, "value": value, "unit": unit, "check": check}), flush=True)
+    print(
+        json.dumps({"case": case, "who": who, "threads": THREADS, "value": value, "unit": unit, "check": check}),
+        flush=True,
+    )

@@ -64,6 +64,7 @@ def assemble(x, ends, stiffness, rest, mass):
 def main():
     import scipy.sparse as sp
     import scipy.sparse.linalg as spl
+
     import tumble
 
     world = tumble.World(scene(), threads=THREADS)
@@ -102,14 +103,22 @@ def main():
 
     def cg():
         iterations[0] = 0
-        return spl.cg(a, b, rtol=TOLERANCE, M=blocks, callback=lambda _: iterations.__setitem__(0, iterations[0] + 1))[0]
+        return spl.cg(a, b, rtol=TOLERANCE, M=blocks, callback=lambda _: iterations.__setitem__(0, iterations[0] + 1))[
+            0
+        ]
 
     solution = cg()
     theirs = guess.copy().ravel()
     theirs[free] += solution
     off = np.abs(theirs.reshape(-1, 3) - ours).max() / np.abs(solution).max()
     residual = np.linalg.norm(a @ solution - b) / np.linalg.norm(b)
-    show("implicit", "tumble", seconds, "s", f"{reports[-1]['linear']} iterations, whole step; differs from scipy by {off:.1e} of the correction")
+    show(
+        "implicit",
+        "tumble",
+        seconds,
+        "s",
+        f"{reports[-1]['linear']} iterations, whole step; differs from scipy by {off:.1e} of the correction",
+    )
     show("implicit", "scipy cg", median(cg, 3), "s", f"{iterations[0]} iterations, solve only, residual {residual:.1e}")
     show("implicit", "scipy spsolve", median(lambda: spl.spsolve(a, b), 1), "s", "solve only")
     del sp

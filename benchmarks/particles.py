@@ -37,7 +37,6 @@ def main():
     a, b, c = (np.ones(40_000_000, np.float64) for _ in range(3))
     seconds = median(lambda: triad(a, b, c))
     bandwidth = 24 * len(a) / seconds / 1e9
-    del a, b, c
     # Every exchange interval is one pass over memory; sixteen of them a frame make what a frame adds (snapshot, books) small.
     passes = 16
     world = bench_tumble(passes)

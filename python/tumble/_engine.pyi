@@ -131,7 +131,9 @@ class World:
     def cures(self) -> list[dict[str, Any]]:
         """After a StepError: changes that were tried from the last good frame: set, survived, energy_ratio."""
 
-    def add_force(self, force: Callable[[float, Array, Array, Array], npt.ArrayLike], system: str | None = None) -> None:
+    def add_force(
+        self, force: Callable[[float, Array, Array, Array], npt.ArrayLike], system: str | None = None
+    ) -> None:
         """Adds a force: force(t, x, v, mass) -> n x 3 [N], from x [m] and v [m/s], n x 3, and mass [kg], n."""
 
     def set_integrator(

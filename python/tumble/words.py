@@ -22,7 +22,8 @@ def page() -> str:
         lines += ["", f"## {name}", "", definition.get("description", ""), ""]
         if "properties" in definition:
             lines += _table(definition, definitions)
-        for branch in definition.get("oneOf", definition.get("anyOf", [])):
+        branches: list[Schema] = definition.get("oneOf") or definition.get("anyOf") or []
+        for branch in branches:
             lines += _branch(branch, definitions)
     return "\n".join(line.rstrip() for line in lines) + "\n"
 

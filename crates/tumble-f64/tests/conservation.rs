@@ -79,7 +79,10 @@ fn momentum_is_kept_by_every_scheme_and_angular_momentum_by_the_promised_ones() 
         for scheme in fixed() {
             let mut sim = everything(scheme, damping, false, 400.0);
             let (p, l, signal) = drift(&mut sim, 100);
-            println!("{:18} damping x {damping}: momentum {p:.1e}, angular momentum {l:.1e}, velocities changed by {signal:.1}", scheme.name());
+            println!(
+                "{:18} damping x {damping}: momentum {p:.1e}, angular momentum {l:.1e}, velocities changed by {signal:.1}",
+                scheme.name()
+            );
             let solved = if scheme.is_implicit() { SOLVED } else { ROUND_OFF };
             assert!(signal > 0.1, "nothing happens");
             assert!(p < solved, "{} momentum {p:e}", scheme.name());
@@ -111,7 +114,8 @@ fn rods_keep_momentum_and_angular_momentum() {
     }
     // Implicit midpoint keeps what is quadratic in x and v; the spin of a frame, in axes that turn, is not. Its error is one of
     // the scheme, of order 2.
-    let errors: Vec<f64> = [200.0, 400.0, 800.0].map(|fps| drift(&mut everything(Integrator::ImplicitMidpoint, 0.0, true, fps), fps as usize / 4).1).into();
+    let errors: Vec<f64> =
+        [200.0, 400.0, 800.0].map(|fps| drift(&mut everything(Integrator::ImplicitMidpoint, 0.0, true, fps), fps as usize / 4).1).into();
     let orders = common::orders(&errors);
     println!("implicit_midpoint with rod: angular momentum {}, orders {orders:.2?}", common::show(&errors));
     assert!(errors[2] > 1e-12 && errors[0] < 1e-5);
@@ -193,9 +197,9 @@ fn net(seed: u64, n: usize, h: f64) -> String {
             (a != b).then(|| format!("{{ between = [{a}, {b}], stiffness = {k:e}, rest_length = 0 }}"))
         })
         .collect();
-    let pin = if seed % 2 == 0 { "pin = [\"vertex 0\"]\n" } else { "" };
+    let pin = if seed.is_multiple_of(2) { "pin = [\"vertex 0\"]\n" } else { "" };
     format!(
-        "time.fps = {:e}\nworld.gravity = [0, 0, 0]\n[[system]]\nintegrator = \"implicit_euler\"\nsubsteps = 1\n\
+        "time.fps = {:e}\nworld.gravity = [0, 0, 0]\n[[system]]\nintegrator = \"implicit_euler\"\nsubsteps = 1\nsolver = {{ newton_tolerance = 1e-13, linear_tolerance = 1e-10 }}\n\
          [[particles]]\nname = \"net\"\n{pin}position = {}\nvelocity = {}\nmass = {masses:?}\nspring = [{}]\n",
         1.0 / h,
         list(&places),
@@ -216,7 +220,8 @@ proptest! {
         for _ in 0..10 {
             step(&mut sim);
             let after = sim.ledger().energy();
-            // Newton's method solves the linear system to 1e-10 of its first residual; what has died out is round-off.
+            // The linear system is solved to 1e-13 of its first residual, which may be 1e4 times the forces that remain; what has
+            // died out is round-off.
             prop_assert!(after <= before * (1.0 + 1e-9) + 1e-20 * start, "{before:e} -> {after:e}");
             prop_assert!(after >= 0.0);
             before = after;

@@ -50,7 +50,8 @@ fn a_slider_sticks_below_the_angle_of_friction_and_slides_above_it() {
         println!("{:18} 1 degree below: slid {way:.1e} m in 1 s, {speed:.1e} m/s, {height:+.1e} m above", scheme.name());
         // Explicit schemes stay in place but for round-off; forward Euler, which moves before it falls, has the velocity of one step
         // at every other. Implicit ones creep with less than 1 mm/s, after a start without normal force.      (contact.8)
-        let (creep, fall) = if scheme.is_implicit() { (1.5e-3, 1e-3) } else { (1e-12, 1.01 * G * (limit - 1.0).to_radians().sin() / 400.0) };
+        let (creep, fall) =
+            if scheme.is_implicit() { (1.5e-3, 1e-3) } else { (1e-12, 1.01 * G * (limit - 1.0).to_radians().sin() / 400.0) };
         assert!(way.abs() < creep && speed.abs() < fall, "{}", scheme.name());
         for beyond in [1.0, 10.0] {
             let degrees = limit + beyond;
@@ -64,7 +65,12 @@ fn a_slider_sticks_below_the_angle_of_friction_and_slides_above_it() {
             let by_speed = (v1 - v0) / 0.5;
             // From the start at rest; implicit schemes start with a step without normal force, so from the speed half-way.
             let by_way = if scheme.is_implicit() { 8.0 * (x1 - x0 - 0.5 * v0) } else { 8.0 / 3.0 * (x1 - x0) };
-            println!("{:18} {beyond} above: acceleration {:+.1e}, way {:+.1e} off", scheme.name(), by_speed / expected - 1.0, by_way / expected - 1.0);
+            println!(
+                "{:18} {beyond} above: acceleration {:+.1e}, way {:+.1e} off",
+                scheme.name(),
+                by_speed / expected - 1.0,
+                by_way / expected - 1.0
+            );
             assert!((by_speed / expected - 1.0).abs() < 0.02, "{} {by_speed} {expected}", scheme.name());
             assert!((by_way / expected - 1.0).abs() < 0.02, "{} {by_way} {expected}", scheme.name());
             assert!(height.abs() < 1e-4);
@@ -151,7 +157,9 @@ fn every_solid_holds_a_sheet() {
         ("mesh", "shape.mesh = { path = \"ball.obj\", resolution = 48 }"),
     ];
     for (name, shape) in shapes {
-        for scheme in [Integrator::SymplecticEuler, Integrator::VelocityVerlet, Integrator::Rk4, Integrator::ImplicitEuler, Integrator::Bdf2] {
+        for scheme in
+            [Integrator::SymplecticEuler, Integrator::VelocityVerlet, Integrator::Rk4, Integrator::ImplicitEuler, Integrator::Bdf2]
+        {
             let mut sim = sheet_on(shape, scheme);
             let mut deepest = 0.0_f64;
             let mut contacts = 0;

@@ -84,7 +84,8 @@ fn a_pair_oscillates_and_decays_as_the_damped_oscillator() {
 #[test]
 fn a_rusty_spring_falls_like_a_new_one() {
     for scheme in fixed() {
-        let system = format!("integrator = \"{}\"\nsubsteps = 10\nsolver.newton_tolerance = 1e-13\nsolver.linear_tolerance = 1e-9", scheme.name());
+        let system =
+            format!("integrator = \"{}\"\nsubsteps = 10\nsolver.newton_tolerance = 1e-13\nsolver.linear_tolerance = 1e-9", scheme.name());
         let mut free = pair(&system, 0.0, 9.8, "");
         let mut rusty = pair(&system, 2.0, 9.8, "");
         run(&mut free, 100);
@@ -92,7 +93,12 @@ fn a_rusty_spring_falls_like_a_new_one() {
         let ((a, va), (b, vb)) = (center(&free), center(&rusty));
         let off = (a - b).norm().max((va - vb).norm());
         let oscillation = |sim: &Simulation| stretch(sim).0.hypot(stretch(sim).1 / 11.18);
-        println!("{:18} centres differ by {off:.1e} m; oscillation {:.1e} m new, {:.1e} m rusty", scheme.name(), oscillation(&free), oscillation(&rusty));
+        println!(
+            "{:18} centres differ by {off:.1e} m; oscillation {:.1e} m new, {:.1e} m rusty",
+            scheme.name(),
+            oscillation(&free),
+            oscillation(&rusty)
+        );
         // Round-off of 1000 steps on numbers up to 10 m/s; Verlet's velocities are differences of positions over 1 ms: 1e-12.
         // What Newton's method leaves of the residual, 1e-13 of m g a step, adds up to 1e-11.
         let bound = if scheme == Integrator::Verlet || scheme.is_implicit() { 2e-11 } else { 2e-13 };

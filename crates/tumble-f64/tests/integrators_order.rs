@@ -116,12 +116,22 @@ fn point(row: Row) -> Vector {
 /// Dormand-Prince with n equal steps: a tolerance that accepts everything, and the step set before each.
 fn dormand_prince_fixed(equation: &mut dyn Equation, time: f64, n: u32, x: &mut [Row], v: &mut [Row]) {
     let settings = Adaptive { tolerance: 1e300, ..Adaptive::default() };
-    let (mut memory, mut scratch, mut report) = (Memory::new(Integrator::DormandPrince, x.len()), Scratch::default(), StepReport::default());
+    let (mut memory, mut scratch, mut report) =
+        (Memory::new(Integrator::DormandPrince, x.len()), Scratch::default(), StepReport::default());
     let h = time / f64::from(n);
     for k in 0..n {
         memory.next_step = h;
         let y = (&mut *x, &mut *v);
-        let taken = adaptive_step(Integrator::DormandPrince, &settings, equation, (f64::from(k) * h, time, time), y, &mut memory, &mut scratch, &mut report);
+        let taken = adaptive_step(
+            Integrator::DormandPrince,
+            &settings,
+            equation,
+            (f64::from(k) * h, time, time),
+            y,
+            &mut memory,
+            &mut scratch,
+            &mut report,
+        );
         assert_eq!(taken, Ok(h));
     }
 }
@@ -202,7 +212,10 @@ fn the_local_error_of_adaptive_schemes_is_within_the_tolerance() {
             steps += 1;
         });
         let estimated = report.trials.iter().filter(|t| t.accepted).map(|t| t.error).fold(0.0, f64::max);
-        println!("{} at {tolerance:.0e}: local error at most {worst:.3} of the tolerance in {steps} steps (estimated {estimated:.3})", scheme.name());
+        println!(
+            "{} at {tolerance:.0e}: local error at most {worst:.3} of the tolerance in {steps} steps (estimated {estimated:.3})",
+            scheme.name()
+        );
         match scheme {
             // The estimate h²/4 |a| is the error up to h³: 3 % at the largest steps of 1e-4.
             Integrator::AdaptiveEuler => assert!((0.7..1.04).contains(&worst), "{worst}"),

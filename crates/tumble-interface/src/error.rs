@@ -64,9 +64,9 @@ impl std::error::Error for SceneError {}
 #[derive(Debug, Clone, PartialEq)]
 pub enum StepError {
     /// A number stopped being finite.
-    NotFinite(Breakdown),
+    NotFinite(Box<Breakdown>),
     /// The energy grew beyond [`crate::engine::BLOW_UP`] times its scale.
-    Exploded(Breakdown),
+    Exploded(Box<Breakdown>),
     /// An iterative solver did not reach its tolerance and the scene asked for an error.
     Solve {
         /// System that solved.

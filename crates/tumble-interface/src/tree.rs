@@ -291,7 +291,9 @@ mod tests {
 
     #[test]
     fn places_have_lines() {
-        let node = Node::from_toml("version = 1\n[[sheet]]\nname = \"a\"\n[[sheet]]\nname = \"b\"\npin = [\n\"x\",\n\"y\"]\n[time]\nfps = 3\n").unwrap();
+        let node =
+            Node::from_toml("version = 1\n[[sheet]]\nname = \"a\"\n[[sheet]]\nname = \"b\"\npin = [\n\"x\",\n\"y\"]\n[time]\nfps = 3\n")
+                .unwrap();
         assert_eq!(node.line_of("sheet \"b\".pin[1]"), Some(8));
         assert_eq!(node.line_of("sheet \"b\".size"), node.line_of("sheet \"b\""));
         assert_eq!(node.line_of("time.fps"), Some(10));

@@ -8,7 +8,12 @@ use tumble_interface::error::Breakdown;
 
 create_exception!(tumble, TumbleError, PyException, "Anything that tumble reports.");
 create_exception!(tumble, SceneError, TumbleError, "The input is wrong. Its text names every place and its cure; `issues` lists them.");
-create_exception!(tumble, StepError, TumbleError, "The simulation failed; the world stands at its last good frame. `report` has the figures.");
+create_exception!(
+    tumble,
+    StepError,
+    TumbleError,
+    "The simulation failed; the world stands at its last good frame. `report` has the figures."
+);
 create_exception!(tumble, ExportError, TumbleError, "A result could not be written or drawn.");
 
 pub fn add(module: &Bound<'_, PyModule>) -> PyResult<()> {

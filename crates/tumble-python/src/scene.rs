@@ -116,7 +116,8 @@ fn load_assets(scene: &mut tumble_interface::Scene, folder: &Path) -> Result<Has
         }
         let found = hashes.get(&file.path).cloned();
         if file.hash.is_some() && file.hash != found {
-            let message = format!("the content of \"{}\" has changed since this scene was resolved; restore the file, or leave out hash", file.path);
+            let message =
+                format!("the content of \"{}\" has changed since this scene was resolved; restore the file, or leave out hash", file.path);
             issues.push(Issue::new(format!("{place}.hash"), message));
         }
         file.hash = found;

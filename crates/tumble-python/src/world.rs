@@ -27,7 +27,11 @@ pub struct World {
 }
 
 /// Works without the interpreter, on the world's threads; Ctrl-C makes `go_on` say no and is raised.
-fn work<T: Send>(py: Python<'_>, pool: Option<&Arc<rayon::ThreadPool>>, task: impl FnOnce(&(dyn Fn() -> bool + Sync)) -> T + Send) -> PyResult<T> {
+fn work<T: Send>(
+    py: Python<'_>,
+    pool: Option<&Arc<rayon::ThreadPool>>,
+    task: impl FnOnce(&(dyn Fn() -> bool + Sync)) -> T + Send,
+) -> PyResult<T> {
     let stop = AtomicBool::new(false);
     let go_on = || !stop.load(Ordering::Relaxed);
     let (result, interrupt) = py.detach(|| {
@@ -189,7 +193,8 @@ impl World {
         let scene = self.scene.bind(py).get();
         let (words, folder) = (scene.scene.to_json().to_string(), scene.folder.display().to_string());
         let bytes = self.engine.save(&[("tumble", env!("CARGO_PKG_VERSION")), ("scene", &words), ("folder", &folder)]);
-        py.detach(|| std::fs::write(&path, bytes)).map_err(|e| ExportError::new_err(format!("\"{}\" cannot be written: {e}", path.display())))
+        py.detach(|| std::fs::write(&path, bytes))
+            .map_err(|e| ExportError::new_err(format!("\"{}\" cannot be written: {e}", path.display())))
     }
 
     #[staticmethod]

@@ -85,7 +85,7 @@ impl Exchange {
     pub fn restore(&mut self, numbers: &[f64]) -> Option<()> {
         let (count, rest) = numbers.split_first()?;
         let n = self.ports.len();
-        if *count as usize != n || rest.len() < 7 * n + 6 || (rest.len() - 7 * n - 6) % 4 != 0 {
+        if *count as usize != n || rest.len() < 7 * n + 6 || !(rest.len() - 7 * n - 6).is_multiple_of(4) {
             return None;
         }
         let v = |s: &[f64]| Vector { x: s[0], y: s[1], z: s[2] };

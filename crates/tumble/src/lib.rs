@@ -4,17 +4,20 @@
 //! [`Simulation`](scene::Simulation). No files, no clock, no GPU here. Modules import only those above them in this list;
 //! `tests/layers.rs` enforces it.
 
-pub mod math;
-pub mod geometry;
-pub mod linalg;
-pub mod reference;
-pub mod state;
+// One source for two scalars: what converts in one engine is idle in the other.
+#![cfg_attr(feature = "double", allow(clippy::useless_conversion, clippy::unnecessary_cast))]
+
 pub mod elements;
-pub mod forces;
-pub mod integrators;
 pub mod exchange;
+pub mod forces;
+pub mod geometry;
+pub mod integrators;
+pub mod linalg;
+pub mod math;
+pub mod recipes;
+pub mod reference;
+pub mod scene;
+pub mod state;
 pub mod system;
 pub mod systems;
 pub mod world;
-pub mod recipes;
-pub mod scene;

@@ -52,7 +52,8 @@ fn imports(of: &[String], text: &str) -> Vec<Import> {
     let mut i = 0;
     while i < bytes.len() {
         let rest = &code[i..];
-        let starts_word = i == 0 || !(bytes[i - 1].is_ascii_alphanumeric() || bytes[i - 1] == b'_' || bytes[i - 1] == b':' || bytes[i - 1] == b'$');
+        let starts_word =
+            i == 0 || !(bytes[i - 1].is_ascii_alphanumeric() || bytes[i - 1] == b'_' || bytes[i - 1] == b':' || bytes[i - 1] == b'$');
         if starts_word && (rest.starts_with("crate::") || rest.starts_with("super::")) {
             let line = code[..i].lines().count().max(1);
             let depth = inner.iter().filter(|m| **m).count();
@@ -127,14 +128,16 @@ fn without_comments_and_strings(text: &str) -> String {
         let mut characters = line.chars().peekable();
         while let Some(c) = characters.next() {
             match c {
-                '\\' if in_string => drop(characters.next()),
+                '\\' if in_string => {
+                    characters.next();
+                }
                 '"' => in_string = !in_string,
                 '\'' if !in_string => {
                     // A character such as '{' or '"'; a lifetime has no closing quote two places on.
                     let rest: String = characters.clone().take(3).collect();
                     let length = if rest.starts_with('\\') { 2 } else { 1 };
                     if rest.chars().nth(length) == Some('\'') {
-                        (0..=length).for_each(|_| drop(characters.next()));
+                        characters.nth(length);
                     }
                 }
                 '/' if !in_string && characters.peek() == Some(&'/') => break,
@@ -199,7 +202,10 @@ fn the_test_sees_what_it_forbids() {
     assert_eq!(check(&["state"], "use super::world::World;"), 1);
     assert_eq!(check(&["systems", "dynamics"], "use super::tracers::Tracers;\nuse crate::systems::tracers;"), 2);
     assert_eq!(check(&["systems", "dynamics"], "mod tests { use super::*; use super::super::tracers; }"), 1);
-    assert_eq!(check(&["systems", "dynamics", "books"], "use super::Dynamics; use super::super::dynamics::laws; use super::super::tracers;"), 1);
+    assert_eq!(
+        check(&["systems", "dynamics", "books"], "use super::Dynamics; use super::super::dynamics::laws; use super::super::tracers;"),
+        1
+    );
     assert_eq!(check(&["systems"], "use crate::systems::dynamics::Parts;"), 0);
     assert_eq!(check(&["math"], "use crate::lost::Thing;"), 1);
 }

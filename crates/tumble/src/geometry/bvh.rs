@@ -69,7 +69,10 @@ impl Bvh {
         for (t, n) in triangles.iter().zip(&faces) {
             for k in 0..3 {
                 let [a, b, c] = [0, 1, 2].map(|i| t[(k + i) % 3]);
-                let (u, v) = ((vertices[b as usize] - vertices[a as usize]).normalized(), (vertices[c as usize] - vertices[a as usize]).normalized());
+                let (u, v) = (
+                    (vertices[b as usize] - vertices[a as usize]).normalized(),
+                    (vertices[c as usize] - vertices[a as usize]).normalized(),
+                );
                 let angle = acos(u.dot(v).clamp(-1.0, 1.0));
                 corners[a as usize] = corners[a as usize] + *n * angle;
                 let sum: &mut Vector = across.entry((a.min(b), a.max(b))).or_default();

@@ -29,7 +29,8 @@ impl GridSdf {
         let n = size.map(|s| ((s + 2.0 * border) / dx).ceil() as usize + 1);
         let tiles = n.map(|n| n.div_ceil(TILE));
         let node = |i: usize, j: usize, k: usize| origin + Vector { x: i as f64, y: j as f64, z: k as f64 } * dx;
-        let distance = |p| if shell { bvh.closest(p, f64::INFINITY).map_or(f64::INFINITY, |c| c.distance_sq.sqrt()) } else { bvh.signed_distance(p) };
+        let distance =
+            |p| if shell { bvh.closest(p, f64::INFINITY).map_or(f64::INFINITY, |c| c.distance_sq.sqrt()) } else { bvh.signed_distance(p) };
         // A tile far from the surface has one sign; only nodes inside the solid and near it need their own search.
         let radius = dx * (TILE - 1) as f64 * 3.0_f64.sqrt() / 2.0;
         let band = margin + 3.0 * dx;

@@ -38,14 +38,20 @@ pub fn cuboid(center: Vector, half: Vector, turn: Quat<f64>) -> Mesh {
     let sign = |bit: usize, k: usize| if k >> bit & 1 == 1 { 1.0 } else { -1.0 };
     let corner = |k: usize| center + turn.turn(Vector { x: sign(0, k) * half.x, y: sign(1, k) * half.y, z: sign(2, k) * half.z });
     let faces = [[0, 2, 3, 1], [4, 5, 7, 6], [0, 1, 5, 4], [2, 6, 7, 3], [0, 4, 6, 2], [1, 3, 7, 5]];
-    Mesh { vertices: (0..8).map(|k| corner(k).into()).collect(), triangles: faces.iter().flat_map(|[a, b, c, d]| [[*a, *b, *c], [*a, *c, *d]]).collect() }
+    Mesh {
+        vertices: (0..8).map(|k| corner(k).into()).collect(),
+        triangles: faces.iter().flat_map(|[a, b, c, d]| [[*a, *b, *c], [*a, *c, *d]]).collect(),
+    }
 }
 
 /// A square around a point, seen counter-clockwise from where the normal points.
 pub fn square(center: Vector, normal: Vector, half: f64) -> Mesh {
     let turn = from_z_to(normal);
     let corner = |x: f64, y: f64| (center + turn.turn(Vector { x: x * half, y: y * half, z: 0.0 })).into();
-    Mesh { vertices: vec![corner(-1.0, -1.0), corner(1.0, -1.0), corner(1.0, 1.0), corner(-1.0, 1.0)], triangles: vec![[0, 1, 2], [0, 2, 3]] }
+    Mesh {
+        vertices: vec![corner(-1.0, -1.0), corner(1.0, -1.0), corner(1.0, 1.0), corner(-1.0, 1.0)],
+        triangles: vec![[0, 1, 2], [0, 2, 3]],
+    }
 }
 
 #[cfg(test)]

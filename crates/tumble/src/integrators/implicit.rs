@@ -6,7 +6,15 @@ use tumble_interface::StepError;
 use tumble_interface::engine::StepReport;
 
 /// x += h v_t+h,  v_t+h = v + h a(t+h).  Order 1, damps, stable for every h.        (integrators.10)
-pub(super) fn euler(equation: &mut dyn Equation, t: f64, h: f64, x: &mut [Row], v: &mut [Row], scratch: &mut Scratch, report: &mut StepReport) -> Result<(), StepError> {
+pub(super) fn euler(
+    equation: &mut dyn Equation,
+    t: f64,
+    h: f64,
+    x: &mut [Row],
+    v: &mut [Row],
+    scratch: &mut Scratch,
+    report: &mut StepReport,
+) -> Result<(), StepError> {
     let [x0, v0] = scratch.take(x.len());
     x0.copy_from_slice(x);
     v0[..v.len()].copy_from_slice(v);
@@ -16,7 +24,15 @@ pub(super) fn euler(equation: &mut dyn Equation, t: f64, h: f64, x: &mut [Row], 
 /// Implicit Euler over h/2 to the midpoint, then the same movement again.            (integrators.11)
 ///
 /// Order 2; keeps quadratic invariants such as angular momentum; does not damp.
-pub(super) fn midpoint(equation: &mut dyn Equation, t: f64, h: f64, x: &mut [Row], v: &mut [Row], scratch: &mut Scratch, report: &mut StepReport) -> Result<(), StepError> {
+pub(super) fn midpoint(
+    equation: &mut dyn Equation,
+    t: f64,
+    h: f64,
+    x: &mut [Row],
+    v: &mut [Row],
+    scratch: &mut Scratch,
+    report: &mut StepReport,
+) -> Result<(), StepError> {
     let [x0, v0] = scratch.take(x.len());
     x0.copy_from_slice(x);
     v0[..v.len()].copy_from_slice(v);
@@ -55,7 +71,8 @@ pub(super) fn bdf2(
         x0[i] = x[i];
         if ready {
             // A quaternion and its negative are one orientation: take the nearer.
-            let before = if i >= kinematics.points && Quat::from_row(x[i]).dot(Quat::from_row(x1[i])) < 0.0 { scale(x1[i], -1.0) } else { x1[i] };
+            let before =
+                if i >= kinematics.points && Quat::from_row(x[i]).dot(Quat::from_row(x1[i])) < 0.0 { scale(x1[i], -1.0) } else { x1[i] };
             x0[i] = axpy(x[i], third, sub(x[i], before));
             if i >= kinematics.points {
                 x0[i] = Quat::from_row(x0[i]).normalized().row();

@@ -10,7 +10,14 @@ use tumble_interface::StepError;
 /// v += h a(t, x, v), then x += h v.                                   (integrators.2)
 ///
 /// Order 1. Symplectic for a(x): energy oscillates and does not drift for w h < 2.
-pub(super) fn symplectic_euler(equation: &mut dyn Equation, t: f64, h: f64, x: &mut [Row], v: &mut [Row], scratch: &mut Scratch) -> Result<(), StepError> {
+pub(super) fn symplectic_euler(
+    equation: &mut dyn Equation,
+    t: f64,
+    h: f64,
+    x: &mut [Row],
+    v: &mut [Row],
+    scratch: &mut Scratch,
+) -> Result<(), StepError> {
     let [a] = scratch.take(x.len());
     equation.rate(t, x, v, a)?;
     let (kinematics, h, a) = (equation.kinematics(), h as Real, &*a);
@@ -27,7 +34,14 @@ pub(super) fn symplectic_euler(equation: &mut dyn Equation, t: f64, h: f64, x: &
 ///
 /// The lecture's modified Euler. Order 1, because the rate is taken once, at the start: the quadratic form
 /// x² - (w h/2) x v/w + (v/w)² of the oscillator grows by exactly 1 + w²h²/2 a step.
-pub(super) fn modified_euler(equation: &mut dyn Equation, t: f64, h: f64, x: &mut [Row], v: &mut [Row], scratch: &mut Scratch) -> Result<(), StepError> {
+pub(super) fn modified_euler(
+    equation: &mut dyn Equation,
+    t: f64,
+    h: f64,
+    x: &mut [Row],
+    v: &mut [Row],
+    scratch: &mut Scratch,
+) -> Result<(), StepError> {
     let [a] = scratch.take(x.len());
     equation.rate(t, x, v, a)?;
     let (kinematics, h, a) = (equation.kinematics(), h as Real, &*a);

@@ -174,7 +174,8 @@ mod tests {
     #[test]
     fn negative_curvature_is_reported() {
         let mut x = vec![ZERO];
-        let info = solve(&mut Indefinite, &[[1.0, 0.0, 0.0, 0.0]], &mut x, Params { tolerance: 1e-6, iterations: 9 }, &mut Workspace::default());
+        let info =
+            solve(&mut Indefinite, &[[1.0, 0.0, 0.0, 0.0]], &mut x, Params { tolerance: 1e-6, iterations: 9 }, &mut Workspace::default());
         assert!(info.indefinite);
         assert_eq!(x[0], [1.0, 0.0, 0.0, 0.0]);
     }

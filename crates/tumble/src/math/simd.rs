@@ -251,7 +251,7 @@ mod x86 {
 
     /// Everything that does not depend on how rows are transposed.
     macro_rules! width {
-        ($token:ident, $n:expr, $splat:ident, $load:ident, $store:ident) => {
+        ($token:ident, $n:expr, $splat:ident) => {
             impl Width for $token {
                 type L = Pack<$token>;
                 const N: usize = $n;
@@ -261,11 +261,14 @@ mod x86 {
                 }
                 #[inline(always)]
                 fn load(self, from: &[Real]) -> Self::L {
-                    Pack { simd: self, v: self.$load(&from[..$n]) }
+                    // Not pulp's partial load, which is a call.
+                    let mut numbers = [0.0; $n];
+                    numbers.copy_from_slice(&from[..$n]);
+                    Pack { simd: self, v: cast::<[Real; $n], _>(numbers) }
                 }
                 #[inline(always)]
                 fn store(self, v: Self::L, to: &mut [Real]) {
-                    self.$store(&mut to[..$n], v.v);
+                    to[..$n].copy_from_slice(&cast::<_, [Real; $n]>(v.v));
                 }
                 #[inline(always)]
                 unsafe fn gather(self, rows: &[Row], index: &[u32]) -> [Self::L; 4] {
@@ -321,8 +324,8 @@ mod x86 {
     mod single {
         use super::*;
 
-        width!(V3, 8, splat_f32s, partial_load_f32s, partial_store_f32s);
-        width!(V4, 16, splat_f32s, partial_load_f32s, partial_store_f32s);
+        width!(V3, 8, splat_f32s);
+        width!(V4, 16, splat_f32s);
 
         /// Transposes four by four inside each 128-bit part; its own inverse.
         macro_rules! four_by_four {
@@ -396,8 +399,8 @@ mod x86 {
         use super::*;
         use std::arch::x86_64::__m256d;
 
-        width!(V3, 4, splat_f64s, partial_load_f64s, partial_store_f64s);
-        width!(V4, 8, splat_f64s, partial_load_f64s, partial_store_f64s);
+        width!(V3, 4, splat_f64s);
+        width!(V4, 8, splat_f64s);
 
         /// Transposes four by four; its own inverse.
         #[inline(always)]

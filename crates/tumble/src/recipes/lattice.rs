@@ -18,7 +18,14 @@ pub struct Lattice {
 
 impl Lattice {
     /// Adds the masses; `density` is per length, area or volume, and masses at the rim stand for less of it.
-    pub fn build<const D: usize>(site: &mut Site<'_>, resolution: [u32; D], size: [f64; D], center: [f64; 3], rotate: [f64; 3], density: f64) -> Self {
+    pub fn build<const D: usize>(
+        site: &mut Site<'_>,
+        resolution: [u32; D],
+        size: [f64; D],
+        center: [f64; 3],
+        rotate: [f64; 3],
+        density: f64,
+    ) -> Self {
         let (mut n, mut spacing, mut half) = ([1; 3], [1.0; 3], [0.0; 3]);
         for a in 0..D {
             n[a] = resolution[a];
@@ -80,7 +87,17 @@ impl Lattice {
         }
         if let Some(family) = &links.shear {
             for (a, b) in [(0, 1), (1, 2), (0, 2)].into_iter().filter(|(_, b)| *b < self.directions) {
-                let diagonal = |sign: i64| -> [i64; 3] { std::array::from_fn(|c| if c == a { 1 } else if c == b { sign } else { 0 }) };
+                let diagonal = |sign: i64| -> [i64; 3] {
+                    std::array::from_fn(|c| {
+                        if c == a {
+                            1
+                        } else if c == b {
+                            sign
+                        } else {
+                            0
+                        }
+                    })
+                };
                 match links.diagonals {
                     Diagonals::One => self.family(site, family, diagonal(1), 1.0),
                     Diagonals::Both => [1, -1].into_iter().for_each(|sign| self.family(site, family, diagonal(sign), 0.5)),

@@ -20,7 +20,10 @@ pub fn net(site: &mut Site<'_>, thing: &Net, mesh: &Mesh) {
         t.iter().for_each(|i| mass[*i as usize] += thing.density * area / 3.0);
     }
     if let Some(i) = mass.iter().position(|m| *m == 0.0) {
-        return site.wrong(format!("{path}.mesh"), format!("vertex {i} has no triangle with an area, so it would have no mass; remove it from the mesh"));
+        return site.wrong(
+            format!("{path}.mesh"),
+            format!("vertex {i} has no triangle with an area, so it would have no mass; remove it from the mesh"),
+        );
     }
     let first = mesh.vertices.iter().zip(&mass).map(|(x, m)| site.parts.point(Vector::from(*x), Vector::default(), *m)).min().unwrap_or(0);
     if thing.links.shear.is_some() && thing.links.structural.is_none() {

@@ -12,7 +12,10 @@ pub fn particles(site: &mut Site<'_>, thing: &Particles) {
     let n = thing.position.len();
     site.parts.begin(&thing.name, thing.radius);
     if !matches!(thing.velocity.len(), 0 | 1) && thing.velocity.len() != n {
-        site.wrong(format!("{path}.velocity"), format!("{} velocities for {n} positions, expected none, one, or {n}", thing.velocity.len()));
+        site.wrong(
+            format!("{path}.velocity"),
+            format!("{} velocities for {n} positions, expected none, one, or {n}", thing.velocity.len()),
+        );
     }
     if thing.mass.len() != 1 && thing.mass.len() != n {
         site.wrong(format!("{path}.mass"), format!("{} masses for {n} positions, expected one or {n}", thing.mass.len()));
@@ -44,7 +47,15 @@ pub fn particles(site: &mut Site<'_>, thing: &Particles) {
             continue;
         }
         let (stiffness, damping) = (spring.stiffness, spring.damping);
-        site.parts.spring(SpringPart { ends, stiffness, damping, rest, hardening: spring.hardening, tension_only: spring.tension_only, break_strain: spring.break_strain });
+        site.parts.spring(SpringPart {
+            ends,
+            stiffness,
+            damping,
+            rest,
+            hardening: spring.hardening,
+            tension_only: spring.tension_only,
+            break_strain: spring.break_strain,
+        });
     }
 }
 
@@ -58,7 +69,10 @@ pub struct Tracer {
 pub fn tracers(thing: &Particles, wrong: &mut impl FnMut(String, &str)) -> Tracer {
     let mut refuse = |key: &str, given: bool| {
         if given {
-            wrong(format!("particles \"{}\".{key}", thing.name), "tracers have no mass and go with the flow; leave it out, or use a dynamics system");
+            wrong(
+                format!("particles \"{}\".{key}", thing.name),
+                "tracers have no mass and go with the flow; leave it out, or use a dynamics system",
+            );
         }
     };
     refuse("velocity", !thing.velocity.is_empty());

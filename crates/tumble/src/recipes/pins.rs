@@ -77,7 +77,9 @@ fn in_words(thing: &Pinnable<'_>, words: &str) -> Result<Vec<u32>, String> {
 fn side(n: &[u32], word: &str, rest: &[&str]) -> Result<Vec<u32>, String> {
     let axes = &["x", "y", "z"][..n.len()];
     let found = match rest {
-        [side] => axes.iter().position(|a| side.strip_prefix(a).is_some_and(|sign| sign == "-" || sign == "+")).map(|a| (a, side.ends_with('+'))),
+        [side] => {
+            axes.iter().position(|a| side.strip_prefix(a).is_some_and(|sign| sign == "-" || sign == "+")).map(|a| (a, side.ends_with('+')))
+        }
         _ => None,
     };
     let Some((axis, high)) = found else {

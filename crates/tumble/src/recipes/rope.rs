@@ -144,7 +144,17 @@ fn course(from: Vector, to: Vector, length: f64, n: u32, up: Vector) -> Vec<Vect
         middle + along * (radius * sin(angle)) + down * (radius * (cos(angle) - cos(phi)))
     };
     // The ends are met exactly.
-    (0..=n).map(|i| if i == 0 { from } else if i == n { to } else { on_arc(i) }).collect()
+    (0..=n)
+        .map(|i| {
+            if i == 0 {
+                from
+            } else if i == n {
+                to
+            } else {
+                on_arc(i)
+            }
+        })
+        .collect()
 }
 
 /// A horizontal direction across v, if there is one.

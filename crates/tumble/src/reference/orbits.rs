@@ -16,18 +16,18 @@ pub mod arenstorf {
     /// Jacobi's constant of the orbit.
     pub const JACOBI: f64 = 2.856_412_520_209_87;
     /// Positions at an eighth, a quarter and a half of the period, to eight decimals.
-    pub const CHECKPOINTS: [(f64, [f64; 2]); 3] =
-        [(PERIOD / 8.0, [-0.628_488_26, 0.645_125_03]), (PERIOD / 4.0, [-0.088_719_21, 1.102_775_76]), (PERIOD / 2.0, [-1.244_822_05, 0.0])];
+    pub const CHECKPOINTS: [(f64, [f64; 2]); 3] = [
+        (PERIOD / 8.0, [-0.628_488_26, 0.645_125_03]),
+        (PERIOD / 4.0, [-0.088_719_21, 1.102_775_76]),
+        (PERIOD / 2.0, [-1.244_822_05, 0.0]),
+    ];
 
     /// Acceleration.                                                    (orbits.6)
     pub fn acceleration([x, y]: [f64; 2], [vx, vy]: [f64; 2]) -> [f64; 2] {
         let (earth, moon) = (MU, 1.0 - MU);
         let d1 = ((x + earth) * (x + earth) + y * y).powi(3).sqrt();
         let d2 = ((x - moon) * (x - moon) + y * y).powi(3).sqrt();
-        [
-            x + 2.0 * vy - moon * (x + earth) / d1 - earth * (x - moon) / d2,
-            y - 2.0 * vx - moon * y / d1 - earth * y / d2,
-        ]
+        [x + 2.0 * vy - moon * (x + earth) / d1 - earth * (x - moon) / d2, y - 2.0 * vx - moon * y / d1 - earth * y / d2]
     }
 
     /// Jacobi's constant of any state.                                  (orbits.8)

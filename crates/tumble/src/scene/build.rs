@@ -34,7 +34,8 @@ pub fn build(scene: &Scene, assets: &Assets) -> Result<Built, SceneError> {
     let mut issues = check(scene, &plans);
     let (needed, limit) = (memory(scene) / 1024.0_f64.powi(3), scene.world.memory_limit);
     if needed > limit {
-        let message = format!("the scene needs about {needed:.1} GiB, the limit is {limit} GiB; lower a resolution, or raise world.memory_limit");
+        let message =
+            format!("the scene needs about {needed:.1} GiB, the limit is {limit} GiB; lower a resolution, or raise world.memory_limit");
         issues.push(Issue::new("world.memory_limit", message));
     }
     if !issues.is_empty() {
@@ -50,7 +51,15 @@ pub fn build(scene: &Scene, assets: &Assets) -> Result<Built, SceneError> {
         {
             let rest = anchor.rest_length;
             parts[s].begin(&anchor.name, 0.0);
-            parts[s].spring(SpringPart { ends: [a, b], stiffness: anchor.stiffness, damping: anchor.damping, rest, hardening: 0.0, tension_only: false, break_strain: None });
+            parts[s].spring(SpringPart {
+                ends: [a, b],
+                stiffness: anchor.stiffness,
+                damping: anchor.damping,
+                rest,
+                hardening: 0.0,
+                tension_only: false,
+                break_strain: None,
+            });
         }
     }
     act(scene, &mut parts);

@@ -52,8 +52,12 @@ pub fn check(scene: &Scene, systems: &[System]) -> Vec<Issue> {
                 let list = known().collect::<Vec<_>>().join(", ");
                 wrong(format!("{kind} \"{name}\".system"), format!("there is no system \"{given}\"{hint} (systems: {list})"));
             }
-            (Some(given), None) => wrong(format!("{kind} \"{name}\".system"), format!("system \"{given}\" moves tracers; this needs a dynamics system")),
-            (None, None) => wrong(format!("{kind} \"{name}\".system"), "no system can move it: add a [[system]] with method = \"dynamics\"".into()),
+            (Some(given), None) => {
+                wrong(format!("{kind} \"{name}\".system"), format!("system \"{given}\" moves tracers; this needs a dynamics system"))
+            }
+            (None, None) => {
+                wrong(format!("{kind} \"{name}\".system"), "no system can move it: add a [[system]] with method = \"dynamics\"".into())
+            }
             _ => {}
         }
     }
@@ -113,7 +117,8 @@ fn check_system(system: &System, path: &str, wrong: &mut impl FnMut(String, Stri
         let message = format!("{} needs velocities, and tracers have none; expected one of {}", integrator.name(), known.join(", "));
         wrong(format!("{path}.integrator"), message);
     }
-    if system.clamp.is_some() && (system.method == Method::Tracers || !matches!(integrator, Integrator::ModifiedEuler | Integrator::Verlet)) {
+    if system.clamp.is_some() && (system.method == Method::Tracers || !matches!(integrator, Integrator::ModifiedEuler | Integrator::Verlet))
+    {
         wrong(format!("{path}.clamp"), "the position clamp goes with modified_euler or verlet".into());
     }
 }
@@ -124,7 +129,10 @@ fn check_plane(scene: &Scene, wrong: &mut impl FnMut(String, String)) {
     for thing in &scene.particles {
         for (key, list) in [("position", &thing.position), ("velocity", &thing.velocity)] {
             if let Some(i) = list.iter().position(|p| p[axis] != 0.0) {
-                wrong(format!("particles \"{}\".{key}[{i}]", thing.name), format!("{name} = {}, expected 0 in a scene of dimension 2", list[i][axis]));
+                wrong(
+                    format!("particles \"{}\".{key}[{i}]", thing.name),
+                    format!("{name} = {}, expected 0 in a scene of dimension 2", list[i][axis]),
+                );
             }
         }
     }
@@ -142,7 +150,8 @@ fn check_plane(scene: &Scene, wrong: &mut impl FnMut(String, String)) {
         let turn = if axis == 1 { [90.0, 0.0, 0.0] } else { [0.0; 3] };
         let fits = if axis == 1 { thing.rotate == turn } else { thing.rotate[0] == 0.0 && thing.rotate[1] == 0.0 };
         if !fits || thing.center[axis] != 0.0 {
-            let message = format!("it does not lie in the plane of a scene of dimension 2; set rotate = {turn:?} and {name} of center to 0");
+            let message =
+                format!("it does not lie in the plane of a scene of dimension 2; set rotate = {turn:?} and {name} of center to 0");
             wrong(format!("sheet \"{}\".rotate", thing.name), message);
         }
     }
@@ -155,7 +164,10 @@ fn check_plane(scene: &Scene, wrong: &mut impl FnMut(String, String)) {
             Shape::Mesh(_) => false,
         };
         if !fits {
-            wrong(format!("collider \"{}\".shape", thing.name), "it is not symmetric about the plane of a scene of dimension 2; use dimension = 3".into());
+            wrong(
+                format!("collider \"{}\".shape", thing.name),
+                "it is not symmetric about the plane of a scene of dimension 2; use dimension = 3".into(),
+            );
         }
     }
 }

@@ -1,7 +1,7 @@
 //! After a failure: changes of step or integrator, each tried.
 
-use super::simulation::Simulation;
 use super::Assets;
+use super::simulation::Simulation;
 use tumble_interface::engine::{BLOW_UP, Cure, Engine};
 use tumble_interface::scene::{Integrator, Scene};
 
@@ -12,7 +12,15 @@ const COST: (f64, f64) = (50.0, 20_000.0);
 ///
 /// `failed` is the frame that failed, counted from 1; `system` the index of the system, with the step it used and the
 /// usable steps of other integrators, as estimated before the failure.
-pub fn cures(scene: &Scene, assets: &Assets, failed: u64, system: usize, step: f64, usable: &[(Integrator, f64)], go_on: &(dyn Fn() -> bool + Sync)) -> Vec<Cure> {
+pub fn cures(
+    scene: &Scene,
+    assets: &Assets,
+    failed: u64,
+    system: usize,
+    step: f64,
+    usable: &[(Integrator, f64)],
+    go_on: &(dyn Fn() -> bool + Sync),
+) -> Vec<Cure> {
     let dt = scene.frame_time() / f64::from(scene.time.exchanges);
     let own = super::build::plans(scene)[system].integrator;
     let usable_step = |i: Integrator| usable.iter().find(|(integrator, _)| *integrator == i).map_or(0.0, |(_, step)| *step);
@@ -34,7 +42,15 @@ pub fn cures(scene: &Scene, assets: &Assets, failed: u64, system: usize, step: f
     trials.into_iter().map(|(integrator, n)| attempt(scene, assets, failed, system, integrator, n, go_on)).collect()
 }
 
-fn attempt(scene: &Scene, assets: &Assets, failed: u64, system: usize, integrator: Integrator, n: u32, go_on: &(dyn Fn() -> bool + Sync)) -> Cure {
+fn attempt(
+    scene: &Scene,
+    assets: &Assets,
+    failed: u64,
+    system: usize,
+    integrator: Integrator,
+    n: u32,
+    go_on: &(dyn Fn() -> bool + Sync),
+) -> Cure {
     let mut changed = scene.clone();
     changed.system = super::build::plans(scene);
     let plan = &mut changed.system[system];

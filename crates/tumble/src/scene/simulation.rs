@@ -105,8 +105,7 @@ impl Engine for Simulation {
         // The estimate is that of the start, where the trials begin.
         let Ok(mut start) = Self::new(self.scene.clone(), self.assets.clone()) else { return Vec::new() };
         let stability = start.stability().into_iter().find(|s| s.system == plan.name);
-        let usable: Vec<(Integrator, f64)> =
-            stability.iter().flat_map(|s| s.limits.iter().map(|l| (l.integrator, l.usable))).collect();
+        let usable: Vec<(Integrator, f64)> = stability.iter().flat_map(|s| s.limits.iter().map(|l| (l.integrator, l.usable))).collect();
         let step = if step > 0.0 { step } else { stability.map_or(self.scene.frame_time(), |s| s.step) };
         cures::cures(&self.scene, &self.assets, self.world.frame_index() + 1, system, step, &usable, go_on)
     }
@@ -131,7 +130,9 @@ impl Engine for Simulation {
 
     fn write(&mut self, object: &str, column: &str, values: &[f64]) -> Result<(), SceneError> {
         if let Some(i) = values.iter().position(|v| !v.is_finite()) {
-            return Err(SceneError { issues: vec![Issue::new(format!("{object}.{column}"), format!("number {i} is {}, expected a finite one", values[i]))] });
+            return Err(SceneError {
+                issues: vec![Issue::new(format!("{object}.{column}"), format!("number {i} is {}, expected a finite one", values[i]))],
+            });
         }
         match self.world.write(object, column, values) {
             Some(true) => Ok(()),

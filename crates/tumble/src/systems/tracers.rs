@@ -113,7 +113,16 @@ impl System for Tracers {
                 let left = dt - done;
                 let times = (t + done, left, dt);
                 let (memory, scratch) = (&mut self.memory, &mut self.scratch);
-                let h = adaptive_step(integrator, &self.settings.adaptive, &mut equation, times, (&mut self.x, &mut []), memory, scratch, &mut report)?;
+                let h = adaptive_step(
+                    integrator,
+                    &self.settings.adaptive,
+                    &mut equation,
+                    times,
+                    (&mut self.x, &mut []),
+                    memory,
+                    scratch,
+                    &mut report,
+                )?;
                 done = if h == left { dt } else { done + h };
                 report.steps += 1;
             }
@@ -128,7 +137,16 @@ impl System for Tracers {
             }
             let mut columns: Vec<&mut [Row]> = self.memory.columns.iter_mut().map(|c| &mut c[..]).collect();
             let time = t + f64::from(k) * h;
-            integrators::step(integrator, &mut equation, (time, h), (&mut self.x, &mut []), &mut columns, self.memory.ready, &mut self.scratch, &mut report)?;
+            integrators::step(
+                integrator,
+                &mut equation,
+                (time, h),
+                (&mut self.x, &mut []),
+                &mut columns,
+                self.memory.ready,
+                &mut self.scratch,
+                &mut report,
+            )?;
             self.memory.ready = true;
             report.steps += 1;
         }
@@ -154,7 +172,13 @@ impl System for Tracers {
 
     fn topology(&self, out: &mut Vec<Column>) {
         for object in &self.objects {
-            out.push(Column { object: object.name.clone(), name: "radius".into(), unit: "m", width: 1, data: Data::F64(vec![object.radius]) });
+            out.push(Column {
+                object: object.name.clone(),
+                name: "radius".into(),
+                unit: "m",
+                width: 1,
+                data: Data::F64(vec![object.radius]),
+            });
         }
     }
 
@@ -168,7 +192,7 @@ impl System for Tracers {
         let far = |x: &Row| !is_finite(*x) || xyz64(*x).norm() > 1e6 * self.size;
         let i = self.x.iter().position(far)?;
         let object = self.objects.iter().find(|o| o.points.contains(&i));
-        let breakdown = Breakdown {
+        let breakdown = Box::new(Breakdown {
             system: self.settings.name.clone(),
             object: object.map_or(String::new(), |o| o.name.clone()),
             column: "position".into(),
@@ -178,7 +202,7 @@ impl System for Tracers {
             step: 0.0,
             stable_step: f64::INFINITY,
             energy_ratio: None,
-        };
+        });
         Some(StepError::NotFinite(breakdown))
     }
 

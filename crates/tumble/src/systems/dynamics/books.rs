@@ -75,7 +75,8 @@ impl Dynamics {
     }
 
     fn link_strain(&self, object: &crate::state::Object) -> Vec<Real> {
-        let strain = |(batch, range): &(usize, std::ops::Range<usize>)| self.laws.batches[*batch].link_strain(&self.state.x)[range.clone()].to_vec();
+        let strain =
+            |(batch, range): &(usize, std::ops::Range<usize>)| self.laws.batches[*batch].link_strain(&self.state.x)[range.clone()].to_vec();
         object.links.iter().flat_map(strain).collect()
     }
 
@@ -120,7 +121,12 @@ impl Dynamics {
         for i in n..x.len() {
             angular = angular + Quat::from_row(x[i].map(f64::from)).turn(xyz64(v[i]) * mass(i));
         }
-        let stretch = self.laws.batches.iter().flat_map(|b| b.link_strain(x)).fold(0.0_f64, |m, s| if f64::from(s) + 1.0 > m { f64::from(s) + 1.0 } else { m });
+        let stretch = self
+            .laws
+            .batches
+            .iter()
+            .flat_map(|b| b.link_strain(x))
+            .fold(0.0_f64, |m, s| if f64::from(s) + 1.0 > m { f64::from(s) + 1.0 } else { m });
         let depths = |i: usize| {
             let p = xyz64(x[i]);
             self.laws.colliders.iter().filter_map(move |c| c.touch(p)).map(|t| t.depth)
@@ -173,18 +179,20 @@ impl Dynamics {
     pub(super) fn broken_down(&self, t: f64) -> Option<StepError> {
         let state = &self.state;
         let bad = |rows: &[Row]| fold(rows.len(), |mut range| range.find(|i| !is_finite(rows[*i]))).into_iter().flatten().next();
-        let mut found = [("position", bad(&state.x)), ("velocity", bad(&state.v))].into_iter().find_map(|(column, i)| Some((column, i?, None)));
+        let mut found =
+            [("position", bad(&state.x)), ("velocity", bad(&state.v))].into_iter().find_map(|(column, i)| Some((column, i?, None)));
         if found.is_none() {
             let books = self.books(t);
             let ratio = self.scale.growth(&books).filter(|g| *g > BLOW_UP || g.is_nan());
             if let Some(ratio) = ratio {
-                let fastest = (0..self.laws.masses.points).max_by(|a, b| xyz64(state.v[*a]).norm_sq().total_cmp(&xyz64(state.v[*b]).norm_sq()));
+                let fastest =
+                    (0..self.laws.masses.points).max_by(|a, b| xyz64(state.v[*a]).norm_sq().total_cmp(&xyz64(state.v[*b]).norm_sq()));
                 found = Some(("velocity", fastest.unwrap_or(0), Some(ratio)));
             }
         }
         let (column, i, energy_ratio) = found?;
         let (object, index) = self.whose(i);
-        let breakdown = Breakdown {
+        let breakdown = Box::new(Breakdown {
             system: self.name().into(),
             object,
             column: column.into(),
@@ -194,14 +202,17 @@ impl Dynamics {
             step: 0.0,
             stable_step: 0.0,
             energy_ratio,
-        };
+        });
         Some(if energy_ratio.is_none() { StepError::NotFinite(breakdown) } else { StepError::Exploded(breakdown) })
     }
 
     /// Object and index within it of a row.
     pub(super) fn whose(&self, i: usize) -> (String, usize) {
         let owner = |o: &&crate::state::Object| o.points.contains(&i) || o.frames.contains(&i);
-        self.objects.iter().find(owner).map_or((String::new(), i), |o| (o.name.clone(), if o.points.contains(&i) { i - o.points.start } else { i - o.frames.start }))
+        self.objects
+            .iter()
+            .find(owner)
+            .map_or((String::new(), i), |o| (o.name.clone(), if o.points.contains(&i) { i - o.points.start } else { i - o.frames.start }))
     }
 
     /// The pre-flight estimate.

@@ -241,7 +241,11 @@ impl Parts {
         let clamp = settings.clamp.map(|ratio| {
             let short = |m: &Members<2, 1, 0>| Members { rest: [m.rest[0] * ratio], stiffness: f64::INFINITY, damping: 0.0, ..*m };
             let linear = self.linear.members.iter().map(short);
-            let others = self.nonlinear.members.iter().map(|m| short(&Members { nodes: m.nodes, rest: m.rest, law: [], stiffness: 0.0, damping: 0.0 }));
+            let others = self
+                .nonlinear
+                .members
+                .iter()
+                .map(|m| short(&Members { nodes: m.nodes, rest: m.rest, law: [], stiffness: 0.0, damping: 0.0 }));
             Elements::new(rows, &linear.chain(others).collect::<Vec<_>>())
         });
         let kinds = [
@@ -349,7 +353,11 @@ impl Batches {
     }
 
     /// Adds elements, if there are any; `None` if a node is not a row.
-    fn add<E: Element<N, M, D>, const N: usize, const M: usize, const D: usize>(&mut self, members: &[Members<N, D, 0>], energy_at_rest: f64) -> Option<()> {
+    fn add<E: Element<N, M, D>, const N: usize, const M: usize, const D: usize>(
+        &mut self,
+        members: &[Members<N, D, 0>],
+        energy_at_rest: f64,
+    ) -> Option<()> {
         if !members.is_empty() {
             let elements = Elements::<E, Linear, N, M, D, 0>::new(self.rows, members)?;
             self.list.push(Box::new(elements.with_energy_at_rest(energy_at_rest)));

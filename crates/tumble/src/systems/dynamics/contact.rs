@@ -83,7 +83,9 @@ impl Penalty {
             Some(Penalty {
                 rest: [n.x, n.y, n.z, n.dot(position) + touch.depth],
                 stiffness,
-                friction: collider.friction * stiffness * if collider.friction > 0.0 { collider.touch(xyz64(start)).map_or(0.0, |t| t.depth) } else { 0.0 },
+                friction: collider.friction
+                    * stiffness
+                    * if collider.friction > 0.0 { collider.touch(xyz64(start)).map_or(0.0, |t| t.depth) } else { 0.0 },
                 slide: velocity - n * velocity.dot(n),
                 touch,
             })

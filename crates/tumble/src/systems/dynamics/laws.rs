@@ -60,7 +60,8 @@ impl Laws {
             batch.add_forces(x, v, &mut self.coupled);
         }
         if !self.user.is_empty() {
-            let flat = |rows: &[Row]| -> Vec<f64> { rows.iter().flat_map(|r| [f64::from(r[0]), f64::from(r[1]), f64::from(r[2])]).collect() };
+            let flat =
+                |rows: &[Row]| -> Vec<f64> { rows.iter().flat_map(|r| [f64::from(r[0]), f64::from(r[1]), f64::from(r[2])]).collect() };
             let n = self.masses.points;
             let (x, v) = (flat(&x[..n]), flat(&v[..n]));
             let mass: Vec<f64> = self.masses.mass[..n].iter().map(|m| f64::from(*m)).collect();

@@ -356,7 +356,16 @@ impl System for Dynamics {
                 let left = dt - done;
                 let y = (&mut self.state.x[..], &mut self.state.v[..]);
                 let times = (t + done, left, dt);
-                let taken = adaptive_step(self.integrator, &self.adaptive, &mut self.laws, times, y, &mut self.memory, &mut self.scratch, &mut report);
+                let taken = adaptive_step(
+                    self.integrator,
+                    &self.adaptive,
+                    &mut self.laws,
+                    times,
+                    y,
+                    &mut self.memory,
+                    &mut self.scratch,
+                    &mut report,
+                );
                 let h = taken.map_err(|e| self.named(e))?;
                 // The last step ends exactly at dt.
                 done = if h == left { dt } else { done + h };
@@ -370,7 +379,12 @@ impl System for Dynamics {
         }
         let substeps = self.substeps(dt);
         let h = dt / f64::from(substeps);
-        let each = self.laws.is_local() && self.tethers.is_empty() && self.user.is_none() && self.clamp.is_none() && !self.integrator.is_implicit() && !self.watched;
+        let each = self.laws.is_local()
+            && self.tethers.is_empty()
+            && self.user.is_none()
+            && self.clamp.is_none()
+            && !self.integrator.is_implicit()
+            && !self.watched;
         if each {
             self.advance_local(t, h, substeps, go_on).map_err(|e| self.named(e))?;
             report.steps = u64::from(substeps);

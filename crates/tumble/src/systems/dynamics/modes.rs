@@ -68,7 +68,12 @@ impl Dynamics {
                 let s = scaled[i];
                 out[i] = crate::math::add(
                     out[i],
-                    [b[0] * s[0] + b[3] * s[1] + b[5] * s[2], b[3] * s[0] + b[1] * s[1] + b[4] * s[2], b[5] * s[0] + b[4] * s[1] + b[2] * s[2], 0.0],
+                    [
+                        b[0] * s[0] + b[3] * s[1] + b[5] * s[2],
+                        b[3] * s[0] + b[1] * s[1] + b[4] * s[2],
+                        b[5] * s[0] + b[4] * s[1] + b[2] * s[2],
+                        0.0,
+                    ],
                 );
             }
         }
@@ -98,7 +103,11 @@ impl Dynamics {
             let moves = |i: usize| if self.laws.masses.inverse[i] > 0.0 { 1.0 } else { 0.0 };
             // A fixed start without symmetry: fractional parts of multiples of irrational numbers.
             let part = |i: usize, a: f64| ((i as f64 + 1.0) * a).fract() - 0.5;
-            let mut q: Vec<Row> = (0..n).map(|i| scale([part(i, 0.754_877_666) as Real, part(i, 0.569_840_291) as Real, part(i, 0.618_033_989) as Real, 0.0], moves(i))).collect();
+            let mut q: Vec<Row> = (0..n)
+                .map(|i| {
+                    scale([part(i, 0.754_877_666) as Real, part(i, 0.569_840_291) as Real, part(i, 0.618_033_989) as Real, 0.0], moves(i))
+                })
+                .collect();
             let norm = inner(&q, &q).sqrt();
             q.iter_mut().for_each(|q| *q = scale(*q, if norm > 0.0 { (1.0 / norm) as Real } else { 0.0 }));
             q
@@ -118,7 +127,14 @@ impl Dynamics {
         (value, vector)
     }
 
-    fn recurrence(&mut self, first: &[Row], weights: (f64, f64), alpha: &mut Vec<f64>, beta: &mut Vec<f64>, mut each: impl FnMut(usize, &[Row])) {
+    fn recurrence(
+        &mut self,
+        first: &[Row],
+        weights: (f64, f64),
+        alpha: &mut Vec<f64>,
+        beta: &mut Vec<f64>,
+        mut each: impl FnMut(usize, &[Row]),
+    ) {
         let mut q = first.to_vec();
         let mut before = vec![ZERO; q.len()];
         for k in 0..STEPS {
