@@ -54,7 +54,8 @@ fn usable(scheme: Integrator, h: f64, frequency: f64, damping: f64, shape: &[Vec
         }
         let books = sim.ledger();
         // Energy in the mode: what moves and what is stretched.
-        if !(books.energy() < BLOW_UP * start) {
+        let energy = books.energy();
+        if energy.is_nan() || energy >= BLOW_UP * start {
             return false;
         }
     }

@@ -1,8 +1,9 @@
 //! tumble: a physical-simulation engine for computer animation and for learning it.
 //!
 //! A [`Scene`](tumble_interface::Scene) goes in, [`Frame`](tumble_interface::Frame)s come out; between them stands a
-//! [`Simulation`](scene::Simulation). No files, no clock, no GPU here. Modules import only those above them in this list;
-//! `tests/layers.rs` enforces it.
+//! [`Simulation`](scene::Simulation). No files, no clock, no GPU here. Layers, each importing only those before it (`tests/layers.rs`
+//! enforces it): math, geometry, linalg, reference, state, elements, forces, integrators, exchange, system, systems, world,
+//! recipes, scene.
 
 // One source for two scalars: what converts in one engine is idle in the other.
 #![cfg_attr(feature = "double", allow(clippy::useless_conversion, clippy::unnecessary_cast))]

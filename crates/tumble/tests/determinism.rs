@@ -17,16 +17,17 @@ fn run(sim: &mut Simulation, frames: usize) {
     }
 }
 
-/// A sheet that falls on a ball; 5184 masses are more than one chunk of the parallel loops.
-fn sheet(system: &str, extra: &str) -> String {
+/// A sheet that falls on a ball; 4356 masses are more than one chunk of the parallel loops.
+fn sheet(system: &str, links: &str) -> String {
     format!(
-        "time.fps = 60\n[[system]]\n{system}\n[[sheet]]\nname = \"sheet\"\nsize = [1, 1]\nresolution = [72, 72]\ndensity = 1\ncenter = [0.02, 0.01, 0.305]\nhinge = 2e-5\n{extra}\n\
+        "time.fps = 60\n[[system]]\n{system}\n[[sheet]]\nname = \"sheet\"\nsize = [1, 1]\nresolution = [66, 66]\ndensity = 1\ncenter = [0.02, 0.01, 0.305]\n{links}\n\
          [[collider]]\nname = \"ball\"\nfriction = 0.4\nshape.sphere.radius = 0.3\n"
     )
 }
 
 /// Name, scene, frames: every kind of element, contact, memory and solver.
 fn scenes() -> Vec<(&'static str, String, usize)> {
+    let hinges = "hinge = 2e-5\nlinks = { structural = { modulus = 50, damping = 0.005 }, shear = 20 }";
     let links = "links = { structural = { modulus = 50, damping = 0.005 }, shear = 20, bend = 2 }";
     let torn = "links = { structural = { modulus = 20, break_strain = 0.01 }, shear = 8 }\npin = [\"corner 0 0\", \"corner 1 1\"]";
     let mut dust = String::from(
@@ -45,18 +46,22 @@ fn scenes() -> Vec<(&'static str, String, usize)> {
     let rod = "[[system]]\nintegrator = \"SCHEME\"\nsubsteps = N\n[[rope]]\nname = \"rod\"\nfrom = [0, 0, 0]\nto = [0.6, 0.2, 0.4]\nsegments = 60\npin = [\"start\"]\n\
                rod = { stretch = 100, bend = 1e-3, twist = 1e-3, inertia = 1e-4, damping = 1e-4 }\n";
     let rod = |scheme, n| rod.replace("SCHEME", scheme).replace("= N", n);
-    let jelly = "[[system]]\nintegrator = \"symplectic_euler\"\nsubsteps = 6\n[[block]]\nname = \"jelly\"\nsize = [0.3, 0.3, 0.3]\nresolution = [17, 17, 15]\ncenter = [0, 0, 0.155]\n\
+    let jelly = "[[system]]\nintegrator = \"symplectic_euler\"\nsubsteps = 10\n[[block]]\nname = \"jelly\"\nsize = [0.3, 0.3, 0.3]\nresolution = [17, 17, 15]\ncenter = [0, 0, 0.155]\n\
                  material = { young = 2000, poisson = 0.4, damping = 0.002 }\n[[collider]]\nname = \"floor\"\nfriction = 0.3\nshape.floor.height = 0\n";
     let rope = "[[system]]\nintegrator = \"bdf2\"\nsolver.linear = \"cholesky\"\n[[rope]]\nname = \"rope\"\nfrom = [0, 0, 0]\nto = [1, 0, 0]\nlength = 1.2\nsegments = 40\npin = [\"start\", \"end\"]\n";
     vec![
-        ("sheet, explicit", sheet("integrator = \"symplectic_euler\"\nsubsteps = 12", links), 20),
+        ("sheet, explicit", sheet("integrator = \"symplectic_euler\"\nsubsteps = 24", links), 20),
         ("sheet, verlet", sheet("integrator = \"verlet\"\nsubsteps = 12", links), 6),
-        ("sheet, implicit", sheet("integrator = \"implicit_euler\"", links), 20),
+        (
+            "sheet, implicit",
+            sheet("integrator = \"implicit_euler\"\nsolver = { newton_tolerance = 1e-3, linear_tolerance = 1e-2 }", links),
+            20,
+        ),
         ("sheet, dormand-prince", sheet("integrator = \"dormand_prince\"\nadaptive.tolerance = 1e-3", links), 3),
         ("sheet, torn", sheet("integrator = \"velocity_verlet\"\nsubsteps = 12", torn), 20),
-        ("rod, explicit", rod("symplectic_euler", "= 40"), 20),
-        ("rod, implicit", rod("implicit_midpoint", "= 4"), 20),
-        ("jelly", jelly.to_string(), 8),
+        ("rod, explicit", rod("symplectic_euler", "= 200"), 20),
+        ("rod, implicit", rod("implicit_midpoint", "= 4"), 10),
+        ("jelly", jelly.to_string(), 4),
         ("dust", dust, 20),
         ("tracers", tracers, 20),
         ("rope, cholesky", rope.to_string(), 20),
@@ -77,18 +82,20 @@ fn any_count_of_threads_gives_the_same_bits() {
                 (sim.hash(), books.contacts, books.broken)
             })
         };
+        let start = std::time::Instant::now();
         let one = hash(1);
-        println!("{name:22} {:016x} after {frames} frames, {} contacts, {} broken", one.0, one.1, one.2);
+        println!("{name:22} {:016x} after {frames} frames, {} contacts, {} broken, {:.1?}", one.0, one.1, one.2, start.elapsed());
         assert_eq!(one, hash(2), "{name}: 2 threads");
         assert_eq!(one, hash(8), "{name}: 8 threads");
         assert!(!name.contains("torn") || one.2 > 0, "{name}: nothing tears");
-        assert!(!name.contains("sheet, explicit") || one.1 > 10, "{name}: no contact");
+        assert!(!name.contains("sheet, implicit") || one.1 > 10, "{name}: no contact");
     }
 }
 
 #[test]
 fn a_run_that_is_restored_midway_goes_on_to_the_same_bits() {
     for (name, text, frames) in scenes() {
+        let frames = frames.min(8);
         let (first, rest) = (frames / 2, frames - frames / 2);
         let mut sim = simulation(&text);
         run(&mut sim, first);
@@ -161,16 +168,21 @@ fn after_an_error_the_state_is_that_of_the_last_good_frame() {
 
 #[test]
 fn an_abandoned_step_leaves_no_trace() {
-    for (name, text, _) in
-        scenes().into_iter().filter(|(name, _, _)| ["sheet, verlet", "rod, explicit", "dust", "sheet, dormand-prince"].contains(name))
+    use std::sync::atomic::{AtomicU32, Ordering};
+    for (name, text, _) in scenes().into_iter().filter(|(name, _, _)| ["sheet, verlet", "rod, explicit", "dust", "tracers"].contains(name))
     {
         let mut sim = simulation(&text);
         run(&mut sim, 1);
         let before = sim.hash();
-        let asked = std::sync::atomic::AtomicU32::new(0);
-        let two_steps = || asked.fetch_add(1, std::sync::atomic::Ordering::Relaxed) < 2;
-        assert_eq!(sim.step(&two_steps), Ok(None), "{name}");
-        assert_eq!((sim.hash(), sim.frame_index()), (before, 1), "{name}");
+        // At once; and, where there are many sub-steps, in the middle.
+        for after in [0, 5] {
+            let asked = AtomicU32::new(0);
+            let go_on = || asked.fetch_add(1, Ordering::Relaxed) < after;
+            if after == 0 || name.contains(',') {
+                assert_eq!(sim.step(&go_on), Ok(None), "{name}");
+            }
+            assert_eq!((sim.hash(), sim.frame_index()), (before, 1), "{name}");
+        }
         run(&mut sim, 2);
         let mut other = simulation(&text);
         run(&mut other, 3);
