@@ -46,11 +46,11 @@ test-rust:
 	cargo test --workspace --exclude tumble-python --release --quiet
 
 test-python: setup
-	$(BIN)/python -m pytest -m "not slow"
+	$(BIN)/python -m pytest
 
 validate: setup
 	cargo test --workspace --exclude tumble-python --release --quiet -- --include-ignored --nocapture
-	$(BIN)/python -m pytest -m "slow" -s
+	$(BIN)/python -m pytest -s
 
 bench: setup
 	$(PYTHON) benchmarks/bench.py

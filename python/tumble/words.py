@@ -9,7 +9,31 @@ Schema = dict[str, Any]
 HEAD = """# Every word of a scene
 
 Generated from the schema by `python -m tumble.words`; a test keeps it up to date. A scene is a TOML or JSON file or a
-Python dict. Lengths are in metres, z is up; a key without a default must be given."""
+Python dict. Lengths are in metres, z is up; a key without a default must be given.
+
+```toml
+version = 1
+[[system]]
+integrator = "implicit_euler"
+substeps = 4
+[[sheet]]
+name = "flag"
+size = [1.0, 0.6]
+resolution = [20, 12]                          # masses along each side, x first
+links = { structural = 500.0, shear = { modulus = 200.0, damping = 0.1 }, bend = 5.0 }
+pin = ["corner 0 0", "edge x-", { center = [0.5, 0.3, 0.0], radius = 0.1 }]
+[[force]]
+kind = "drag"                                  # forces and fields are told apart by their kind
+rate = 0.2
+[[collider]]
+name = "ball"
+shape = { sphere = { radius = 0.3 } }          # shapes by their one key
+[[collider]]
+name = "bunny"
+shape = { mesh = { path = "bunny.ply" } }
+```
+
+Only masses collide: between two masses a sheet may cut into a sharp edge."""
 
 
 def page() -> str:
@@ -67,6 +91,8 @@ def _branch(branch: Schema, definitions: dict[str, Schema]) -> list[str]:
         inner = branch["properties"][keys[0]]
         if "properties" in inner:
             return ["", title, "", text, "", *_table(inner, definitions)]
+        if "$ref" in inner:
+            return ["", title, "", f"{text} Its keys are those of {_type(inner, definitions)}."]
     else:
         title = "### a table"
     return ["", title, "", text, "", *_table(branch, definitions)]

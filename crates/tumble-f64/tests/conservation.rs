@@ -1,5 +1,7 @@
 //! What internal forces must not change: momentum, angular momentum, and, where a scheme promises it, energy.
 
+#![allow(clippy::unwrap_used, clippy::panic)] // helpers of tests fail by panicking, too
+
 mod common;
 
 use common::{Numbers, Vector, fixed, list, positions, run, simulation, step, vector, velocities, write};
@@ -67,10 +69,12 @@ fn drift(sim: &mut Simulation, steps: usize) -> (f64, f64, f64) {
 }
 
 /// Round-off of 100 steps: each changes momenta by rounding 1e-16 of forces times h, which are up to 10 times the momenta, and
-/// rounding errors add up at random; Verlet's velocities are differences of positions over h, 1e-16 |x|/h.
+/// rounding errors add up at random; Verlet's velocities are differences of positions over h, 1e-16 |x|/h. Measured: 4e-13 (Verlet),
+/// 1e-15 (all others).
 const ROUND_OFF: f64 = 1e-12;
 
-/// Implicit schemes conserve what their Newton iterations have converged to: 1e-13 of the first residual a step.
+/// Implicit schemes conserve what their Newton iterations have converged to: 1e-13 of the first residual a step. Measured: 9e-16, as
+/// the residual has no net force either.
 const SOLVED: f64 = 1e-10;
 
 #[test]
@@ -91,6 +95,7 @@ fn momentum_is_kept_by_every_scheme_and_angular_momentum_by_the_promised_ones() 
                     assert!(l < solved, "{} angular momentum {l:e}", scheme.name());
                 }
                 // A kick or a drift with the wrong partner: first order in h for the Euler schemes, higher powers for the others.
+                // Measured: 5e-5 to 2e-4, then 4e-8 to 3e-6, RK4 4e-10.
                 Integrator::ForwardEuler | Integrator::ImplicitEuler | Integrator::ModifiedEuler => {
                     assert!((1e-5..1.0).contains(&l), "{} {l:e}", scheme.name());
                 }
@@ -140,7 +145,7 @@ fn net_force_and_torque_are_round_off() {
         assert!(impulse > 1e-5);
     }
     println!("net force {:.1e}, net torque {:.1e} of the largest force on one mass", worst.0, worst.1);
-    // Some 500 elements, each off by 1e-16 of its own force; forces in the jelly are larger than in the sheet.
+    // Measured: 2.0e-12 and 8.1e-13. Some 500 elements, each off by 1e-16 of its own force; forces in the jelly are larger than in the sheet.
     assert!(worst.0 < 1e-11 && worst.1 < 1e-11);
 }
 
@@ -149,9 +154,9 @@ fn net_force_and_torque_are_round_off() {
 fn symplectic_schemes_keep_the_energy_bounded() {
     for (scheme, swing) in [
         // Order 1: the energy swings by some w h of the modes that move.
-        (Integrator::SymplecticEuler, 0.2),
-        (Integrator::Verlet, 0.05),
-        (Integrator::VelocityVerlet, 0.05),
+        (Integrator::SymplecticEuler, 0.05),
+        (Integrator::Verlet, 0.01),
+        (Integrator::VelocityVerlet, 0.01),
     ] {
         let mut sim = simulation(&format!(
             "time.fps = 50\nworld.gravity = [0, 0, 0]\n[[system]]\nintegrator = \"{}\"\nsubsteps = 20\n\
@@ -172,6 +177,7 @@ fn symplectic_schemes_keep_the_energy_bounded() {
         }
         println!("{:18} energy {:.4} .. {:.4} in 2000 steps, {:.4} .. {:.4} in 8000 more", scheme.name(), early.0, early.1, late.0, late.1);
         assert!(late.1 - late.0 > 1e-5, "it moves");
+        // Measured: 0.989 .. 1.018 for symplectic Euler, 1.0005 .. 1.0022 for both Verlets.
         assert!((late.0 - 1.0).abs() < swing && (late.1 - 1.0).abs() < swing);
         // No drift: what comes later is not much wider than what came first.
         assert!(late.1 - late.0 < 2.0 * (early.1 - early.0));

@@ -1,5 +1,7 @@
 //! Internal damping resists lengthening and nothing else; viscous damping resists every motion. See docs/theory/springs.md.
 
+#![allow(clippy::unwrap_used, clippy::panic)] // helpers of tests fail by panicking, too
+
 mod common;
 
 use common::{Numbers, Vector, fixed, list, positions, run, simulation, slope, step, vector, velocities, write, zeros};
@@ -73,6 +75,7 @@ fn a_pair_oscillates_and_decays_as_the_damped_oscillator() {
             let rate = -2.0 * slope(&logs);
             let (off_f, off_c) = (frequency / exact.damped_frequency() - 1.0, rate / exact.damping - 1.0);
             println!("b = {b} {:18} frequency {:+.1e}, rate {:+.1e} off over {n} half-periods", scheme.name(), off_f, off_c);
+            // Measured: rates 6.3e-4 off for symplectic Euler with b = 3, all others below 1.3e-4.
             assert!(n >= 6);
             assert!(off_f.abs() < 1e-3, "{frequency} against {}", exact.damped_frequency());
             assert!(off_c.abs() < 1e-3, "{rate} against {}", exact.damping);
@@ -101,6 +104,7 @@ fn a_rusty_spring_falls_like_a_new_one() {
         );
         // Round-off of 1000 steps on numbers up to 10 m/s; Verlet's velocities are differences of positions over 1 ms: 1e-12.
         // What Newton's method leaves of the residual, 1e-13 of m g a step, adds up to 1e-11.
+        // Measured: 2.7e-12 (Verlet), 1.6e-14 (all others).
         let bound = if scheme == Integrator::Verlet || scheme.is_implicit() { 2e-11 } else { 2e-13 };
         assert!(off < bound, "{off:e}");
         // It fell by g t²/2, to first order in h, and the rusty one has stopped to oscillate: e^(-b t/2M) = 0.016.
@@ -185,7 +189,7 @@ fn internal_damping_leaves_rigid_motion_alone() {
         noise[**i % 200]
     });
     println!("velocities change by {translation:.1e} (translation), {rotation:.1e} (rotation), {deformation:.1e} m/s (deformation)");
-    // Round-off of velocities of 5 m/s, times b h/m <= 10.
+    // Round-off of velocities of 5 m/s, times b h/m <= 10. Measured: 7.0e-16, 4.4e-16, 2.5.
     assert!(translation < 1e-13 && rotation < 1e-13);
     assert!(deformation > 1.0);
 }
@@ -207,7 +211,7 @@ fn a_spinning_pair_keeps_its_energy() {
     let (change, off) = energies(3.0, "");
     let (dragged, _) = energies(0.0, "[[force]]\nkind = \"drag\"\nrate = 0.2\n");
     println!("spinning for 4 s: energy {change:+.1e} with internal damping, {dragged:+.2} with drag; length off by {off:.1e}");
-    // RK4 with w h = 0.002 turns by a relative (w h)^4/120 = 1e-13 too little a step; 8000 steps.
+    // RK4 with w h = 0.002 turns by a relative (w h)^4/120 = 1e-13 too little a step; 8000 steps. Measured: -1.2e-14, 1.1e-12 m.
     assert!(change.abs() < 1e-11 && off.abs() < 1e-11, "{change:e} {off:e}");
     assert!(dragged < -0.4);
 }

@@ -1,5 +1,7 @@
 //! Orders and errors of every scheme against exact orbits: Kepler's with e = 0.5, Arenstorf's and the Pleiades.
 
+#![allow(clippy::unwrap_used, clippy::panic)] // helpers of tests fail by panicking, too
+
 mod common;
 
 use common::{Vector, fixed, orders, positions, run, simulation, slope, step, vector, velocities};
@@ -61,7 +63,7 @@ fn observed_orders_are_those_of_theory() {
             .collect();
         let observed = orders(&errors);
         println!("{:18} errors {}, orders {observed:.3?}", scheme.name(), common::show(&errors));
-        // Measured: see the report of the run; every order is within 0.06 of theory.
+        // Measured: within 0.02 of theory at every step, but for RK4 with 4.15, 4.08, 4.04.
         for p in &observed {
             assert!((p - f64::from(scheme.order())).abs() < 0.2, "{} has order {p}", scheme.name());
         }
@@ -152,6 +154,7 @@ fn dormand_prince_has_order_five() {
             ((point(x[0]) - ex).norm_sq() + (point(v[0]) - ev).norm_sq()).sqrt()
         })
         .collect();
+    // Measured: 5.01, 5.14, 5.11.
     let observed = orders(&errors);
     println!("dormand_prince     errors {}, orders {observed:.3?}", common::show(&errors));
     for p in &observed {
@@ -217,9 +220,9 @@ fn the_local_error_of_adaptive_schemes_is_within_the_tolerance() {
             scheme.name()
         );
         match scheme {
-            // The estimate h²/4 |a| is the error up to h³: 3 % at the largest steps of 1e-4.
+            // The estimate h²/4 |a| is the error up to h³: 3 % at the largest steps of 1e-4. Measured: 0.837, 0.813.
             Integrator::AdaptiveEuler => assert!((0.7..1.04).contains(&worst), "{worst}"),
-            // It is that of order 4; the result of order 5 is better.
+            // It is that of order 4; the result of order 5 is better. Measured: 0.66, 0.13, 0.025.
             _ => assert!((1e-4..1.0).contains(&worst), "{worst}"),
         }
     }
@@ -311,11 +314,13 @@ fn the_global_error_of_dormand_prince_is_proportional_to_the_tolerance() {
         let points: Vec<(f64, f64)> = tolerances.iter().zip(&found).map(|(t, (e, _))| (t.log10(), e.log10())).collect();
         let slope = slope(&points);
         println!("{name}: slope of log error over log tolerance {slope:.3}");
+        // Measured: 0.877 (Arenstorf), 1.127 (Pleiades, where at loose tolerances the error term of order 6 is the larger one).
         assert!((slope - 1.0).abs() < 0.2, "{name}: {slope}");
         // The end states are those of the references: they are known to 1e-10 (Arenstorf, which returns to 1.6e-10 at 3e-14)
         // and 1e-11 (Pleiades).
         let (error, evaluations) = found[found.len() - 1];
         assert!(error > 5e-12, "{name}: {error:e}");
+        // Measured: 1.2e-9 with 8777, 5.6e-11 with 13724.
         let (bound, most) = if name == "arenstorf" { (5e-9, 12_000) } else { (5e-10, 20_000) };
         assert!(error < bound && evaluations < most, "{name}: {error:e} with {evaluations}");
     }
@@ -326,6 +331,7 @@ fn the_global_error_of_dormand_prince_is_proportional_to_the_tolerance() {
 fn arenstorf_closes_cheaply() {
     let (error, evaluations) = arenstorf_at(1e-9);
     println!("arenstorf at 1e-9: {error:.1e} with {evaluations} evaluations");
+    // Measured: 1.0e-7 with 3760.
     assert!(error < 1e-5 && evaluations < 5000);
     // On the way: the checkpoints, to their eight decimals and the error at that time.
     for (time, place) in arenstorf::CHECKPOINTS {

@@ -1,6 +1,8 @@
 //! Every scheme on the oscillator x'' = -w² x, a unit mass on a spring of rest length zero: not only stable or unstable, but
 //! by how much in each step. The laws are derived in docs/theory/integrators.md.
 
+#![allow(clippy::unwrap_used, clippy::panic)] // helpers of tests fail by panicking, too
+
 mod common;
 
 use common::{Vector, fixed, positions, run, simulation, step, vector, velocities};
@@ -126,7 +128,8 @@ fn symplectic_schemes_keep_their_forms() {
             println!("{} z = {z}: form kept to {worst:.1e}, energy swings by {swing:.2}", scheme.name());
             // Round-off of 1000 steps at 1e-16, at most all of one sign, over a form that is down to 0.1 of its terms. Verlet's
             // velocities are differences of positions over h: 1/z times as much.
-            assert!(worst < 1e-11);
+            // Measured: at most 1.1e-14.
+            assert!(worst < 1e-12);
             assert!(swing > 0.01);
         }
     }
@@ -188,6 +191,7 @@ fn implicit_euler_decays_by_exactly_its_factor_for_every_step() {
         println!("implicit_euler z = {z}: 1/(1 + z²) to {worst:.1e}");
         // The matrix is a multiple of one 3 x 3 identity, which the preconditioner inverts. v = (v* - z² x)/(1 + z²) loses
         // nothing, x = x* + v cancels to 1/z² of its terms for z >> 1: round-off times z in x, times z² in its square.
+        // Measured: 8.9e-16 up to z = 1.9, 3.8e-14 at 10, 2.5e-10 at 1000.
         assert!(worst < 1e-14 * (1.0 + z * z), "{worst:e}");
         assert!(worst < 1e-9);
     }
@@ -206,7 +210,8 @@ fn implicit_midpoint_keeps_the_energy() {
         }
         println!("implicit_midpoint z = {z}: energy kept to {worst:.1e} over 1000 steps");
         // 1000 steps of round-off 1e-16; x_m = x + v_m/2 cancels to 1/z of its terms.
-        assert!(worst < 1e-12 * (1.0 + z), "{worst:e}");
+        // Measured: 6.8e-15 up to z = 1.9, 2.0e-13 at 100.
+        assert!(worst < 1e-13 * (1.0 + z), "{worst:e}");
     }
 }
 
@@ -242,7 +247,7 @@ fn bdf2_is_its_recurrence_and_decays() {
             last = form(&sim, z, 0.0);
         }
         println!("bdf2 z = {z}: recurrence to {worst:.1e}, energy x {:.1e} after 40 steps", last / start);
-        // Round-off of 40 steps; cancellation as for implicit Euler.
+        // Round-off of 40 steps; cancellation as for implicit Euler. Measured: 5.0e-15, at z = 1000 3.5e-14.
         assert!(worst < 1e-14 * (1.0 + z), "{worst:e}");
         // The larger root is 1 - z^4/4 for small z: 0.9980 in energy after 40 steps at z = 0.1; less for every larger z.
         assert!(last < 0.9985 * start);

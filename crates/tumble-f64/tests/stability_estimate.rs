@@ -1,5 +1,7 @@
 //! The largest step that `tumble check` predicts, against the largest one found by bisection, on a stiff sheet.
 
+#![allow(clippy::unwrap_used, clippy::panic)] // helpers of tests fail by panicking, too
+
 mod common;
 
 use common::{Vector, positions, simulation, step, vector, velocities, write};
@@ -93,6 +95,7 @@ fn the_predicted_step_is_the_measured_one() {
             predicted * frequency,
             100.0 * (predicted / measured - 1.0)
         );
+        // Measured: within 0.13 %, the width of the last interval of the bisection.
         assert!((predicted / measured - 1.0).abs() < 0.05);
     }
 }

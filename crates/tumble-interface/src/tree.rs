@@ -93,8 +93,8 @@ impl Node {
                 Value::Table(entries) => {
                     let i = entries.iter().position(|(k, _)| k == key).unwrap_or_else(|| {
                         let table: Node = Value::Table(Vec::new()).into();
-                        // `system.0.step` makes the first system of a scene that names none.
-                        let is_list = keys.peek() == Some(&"0");
+                        // `system.0.step` makes the first system of a scene that names none; so does its default name.
+                        let is_list = matches!(keys.peek(), Some(&"0" | &"main"));
                         entries.push((key.to_string(), if is_list { Value::List(vec![table]).into() } else { table }));
                         entries.len() - 1
                     });
@@ -104,6 +104,8 @@ impl Node {
                     let names: Vec<String> = items.iter().filter_map(|n| n.text("name").map(str::to_string)).collect();
                     let i = items.iter().position(|n| n.text("name") == Some(key));
                     let i = i.or_else(|| key.parse().ok().filter(|i| *i < items.len()));
+                    // An item without a name has the default one.
+                    let i = i.or_else(|| items.iter().position(|n| key == "main" && n.entry("name").is_none()));
                     let i =
                         i.ok_or_else(|| error(format!("there is no \"{key}\"; there are {} items: {}", items.len(), names.join(", "))))?;
                     &mut items[i]

@@ -3,10 +3,11 @@
 use crate::errors::{self, scene_error};
 use numpy::{PyArray1, PyArray2, PyArrayMethods};
 use pyo3::prelude::*;
+use pyo3::types::{PyBool, PyDict, PyFloat, PyInt, PyList, PyString, PyTuple};
 use std::collections::HashMap;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
-use tumble_interface::tree::Node;
+use tumble_interface::tree::{Node, Value};
 use tumble_interface::{Issue, Mesh, SceneError};
 use tumble_io::Format;
 use twox_hash::XxHash3_64;
@@ -50,11 +51,8 @@ impl Scene {
     #[new]
     #[pyo3(signature = (tree, folder=None))]
     fn new(py: Python<'_>, tree: &Bound<'_, PyAny>, folder: Option<PathBuf>) -> PyResult<Self> {
-        let json: serde_json::Value = pythonize::depythonize(tree).map_err(|e| {
-            let message = format!("the scene is no tree of dicts, lists, strings, numbers and booleans: {e}");
-            scene_error(py, &SceneError::one("", message))
-        })?;
-        Self::from_node(py, Node::from_value(&json), folder.unwrap_or_default())
+        let node = to_node(tree, "", 0).map_err(|e| scene_error(py, &e))?;
+        Self::from_node(py, node, folder.unwrap_or_default())
     }
 
     #[staticmethod]
@@ -96,6 +94,49 @@ impl Scene {
     fn __repr__(&self) -> String {
         format!("Scene(title={:?})", self.scene.title)
     }
+}
+
+/// Deepest nesting that is read.
+const DEPTH: usize = 80;
+
+/// The tree of a dict. NumPy arrays and numbers are lists and numbers, too.
+fn to_node(value: &Bound<'_, PyAny>, path: &str, depth: usize) -> Result<Node, SceneError> {
+    let wrong = |message: String| SceneError::one(path, message);
+    if depth > DEPTH {
+        return Err(wrong("nested too deeply to be a scene".into()));
+    }
+    let value_of = if value.is_none() {
+        Value::Null
+    } else if let Ok(b) = value.cast::<PyBool>() {
+        Value::Bool(b.is_true())
+    } else if let Ok(text) = value.cast::<PyString>() {
+        Value::Text(text.to_string())
+    } else if value.is_instance_of::<PyInt>() {
+        value.extract::<i64>().map_or_else(|_| Value::Float(value.extract().unwrap_or(f64::INFINITY)), Value::Int)
+    } else if value.is_instance_of::<PyFloat>() {
+        Value::Float(value.extract().unwrap_or(f64::NAN))
+    } else if let Ok(table) = value.cast::<PyDict>() {
+        let mut entries = Vec::new();
+        for (key, below) in table {
+            let key: String = key.extract().map_err(|_| wrong(format!("the key {key} is no string")))?;
+            let node = to_node(&below, &if path.is_empty() { key.clone() } else { format!("{path}.{key}") }, depth + 1)?;
+            entries.push((key, node));
+        }
+        Value::Table(entries)
+    } else if value.is_instance_of::<PyList>() || value.is_instance_of::<PyTuple>() {
+        let mut items = Vec::new();
+        for (i, below) in value.try_iter().into_iter().flatten().enumerate() {
+            let below = below.map_err(|e| wrong(e.to_string()))?;
+            items.push(to_node(&below, &format!("{path}[{i}]"), depth + 1)?);
+        }
+        Value::List(items)
+    } else if let Ok(list) = value.call_method0("tolist") {
+        return to_node(&list, path, depth + 1);
+    } else {
+        let kind = value.get_type().name().map_or_else(|_| "value".into(), |n| n.to_string());
+        return Err(wrong(format!("a {kind}, expected a dict, a list, a string, a number or a boolean")));
+    };
+    Ok(value_of.into())
 }
 
 /// Reads every mesh file that the scene names, once, and notes the hash of its content.

@@ -68,8 +68,8 @@ fn work<T: Send>(
 
 fn thread_pool(py: Python<'_>, threads: Option<usize>) -> PyResult<Option<Arc<rayon::ThreadPool>>> {
     let Some(threads) = threads else { return Ok(None) };
-    if threads == 0 {
-        return Err(scene_error(py, &SceneError::one("threads", "0, expected at least 1")));
+    if !(1..=1024).contains(&threads) {
+        return Err(scene_error(py, &SceneError::one("threads", format!("{threads}, expected >= 1 and <= 1024"))));
     }
     let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build();
     let pool = pool.map_err(|e| scene_error(py, &SceneError::one("threads", format!("{threads} threads cannot be started: {e}"))))?;
@@ -191,8 +191,10 @@ impl World {
 
     fn save(&self, py: Python<'_>, path: PathBuf) -> PyResult<()> {
         let scene = self.scene.bind(py).get();
-        let (words, folder) = (scene.scene.to_json().to_string(), scene.folder.display().to_string());
-        let bytes = self.engine.save(&[("tumble", env!("CARGO_PKG_VERSION")), ("scene", &words), ("folder", &folder)]);
+        // One text: several would be written in no fixed order.
+        let folder = scene.folder.display().to_string();
+        let about = serde_json::json!({ "version": env!("CARGO_PKG_VERSION"), "scene": scene.scene.to_json(), "folder": folder });
+        let bytes = self.engine.save(&[("tumble", &about.to_string())]);
         py.detach(|| std::fs::write(&path, bytes))
             .map_err(|e| ExportError::new_err(format!("\"{}\" cannot be written: {e}", path.display())))
     }
@@ -202,11 +204,11 @@ impl World {
     fn restore(py: Python<'_>, path: PathBuf, threads: Option<usize>) -> PyResult<Self> {
         let bytes = read(py, &path)?;
         let about = tumble::world::about(&bytes).unwrap_or_default();
-        let (Some(words), Some(folder)) = (about.get("scene"), about.get("folder")) else {
+        let about: Option<serde_json::Value> = about.get("tumble").and_then(|text| serde_json::from_str(text).ok());
+        let Some((scene, folder)) = about.as_ref().and_then(|about| Some((about.get("scene")?, about.get("folder")?.as_str()?))) else {
             return Err(scene_error(py, &SceneError::one("", format!("\"{}\" is no checkpoint", path.display()))));
         };
-        let tree = py.import("json")?.call_method1("loads", (words,))?;
-        let scene = py.get_type::<Scene>().call1((tree, folder))?;
+        let scene = py.get_type::<Scene>().call1((pythonize::pythonize(py, scene)?, folder))?;
         let mut world = Self::new(py, &scene, threads)?;
         world.engine.restore(&bytes).map_err(|e| scene_error(py, &e))?;
         Ok(world)

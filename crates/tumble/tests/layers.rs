@@ -1,6 +1,8 @@
 //! The layers of the engine: a module imports only modules of lower layers, and no module in `systems/` imports a sibling
 //! (ARCHITECTURE.md).
 
+#![allow(clippy::unwrap_used, clippy::panic)] // helpers of tests fail by panicking, too
+
 use std::fs;
 use std::path::{Path, PathBuf};
 

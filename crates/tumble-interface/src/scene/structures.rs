@@ -97,6 +97,7 @@ pub struct Rope {
     #[schemars(extend("x-unit" = "kg/m", "exclusiveMinimum" = 0.0))]
     pub density: f64,
     /// Spring families, modulus in N: `structural` between neighbours, `bend` between next-nearest ones. Not with `rod`.
+    /// Without it, structural 1000.
     #[serde(default)]
     pub links: Option<Links>,
     /// Makes it a rod with orientation frames, which bends and twists.
@@ -169,7 +170,7 @@ pub struct Sheet {
     #[serde(default = "fifth")]
     #[schemars(extend("x-unit" = "kg/m²", "exclusiveMinimum" = 0.0))]
     pub density: f64,
-    /// Spring families, modulus in N/m.
+    /// Spring families, modulus in N/m. Without it, structural 500, shear 200 and bend 10.
     #[serde(default = "sheet_links")]
     pub links: Links,
     /// Dihedral bending stiffness between neighbouring triangles.
@@ -256,8 +257,8 @@ pub struct Net {
     #[serde(default = "fifth")]
     #[schemars(extend("x-unit" = "kg/m²", "exclusiveMinimum" = 0.0))]
     pub density: f64,
-    /// Spring families, modulus in N/m: `structural` along edges, `bend` across them.
-    #[serde(default = "sheet_links")]
+    /// Spring families, modulus in N/m: `structural` along edges, `bend` across them. Without it, structural 500 and bend 10.
+    #[serde(default = "net_links")]
     pub links: Links,
     /// Dihedral bending stiffness between neighbouring triangles.
     #[serde(default)]
@@ -365,6 +366,10 @@ pub struct Region {
 fn sheet_links() -> Links {
     let family = |modulus| Some(Link::Settings(LinkSettings { modulus, ..LinkSettings::default() }));
     Links { structural: family(500.0), shear: family(200.0), bend: family(10.0), diagonals: Diagonals::Both }
+}
+
+fn net_links() -> Links {
+    Links { shear: None, ..sheet_links() }
 }
 
 fn one_each() -> Vec<f64> {

@@ -34,9 +34,11 @@ pub fn adaptive_step(
             Integrator::DormandPrince => dormand_prince(settings, equation, t, h, x, v, memory, scratch)?,
             _ => step_doubling(settings, equation, t, h, x, v, scratch)?,
         };
+        // A number that is not finite: the step is far too long, or the equation itself is not finite, which ends the loop below.
         let accepted = error <= 1.0;
         report.trials.push(Trial { time: t, step: h, error, accepted });
         let factor = match scheme {
+            _ if !error.is_finite() => 0.1,
             Integrator::DormandPrince => pi_factor(error, memory.last_error, accepted),
             // The error of one Euler step is proportional to h².
             _ => (0.9 / error.sqrt()).clamp(0.1, 5.0),

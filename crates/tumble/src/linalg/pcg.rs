@@ -4,7 +4,7 @@
 //! same bits on any number of threads. Source: [shewchuk1994], B3; negative curvature: [nocedal2006], 7.1.
 
 use crate::math::parallel::{CHUNK, sum};
-use crate::math::{Real, Row, ZERO, axpy, dot};
+use crate::math::{Real, Row, ZERO, add, axpy};
 use rayon::prelude::*;
 
 /// A symmetric operator and its preconditioner.
@@ -97,7 +97,43 @@ pub fn solve(operator: &mut (impl Operator + Sync), b: &[Row], x: &mut [Row], pa
 }
 
 fn product(a: &[Row], b: &[Row]) -> f64 {
-    sum(a.len(), |range| range.map(|i| dot(a[i], b[i])).sum())
+    sum(a.len(), |range| {
+        let mut total = Total::default();
+        for (a, b) in a[range.clone()].chunks(BLOCK).zip(b[range].chunks(BLOCK)) {
+            let mut block = ZERO;
+            for (a, b) in a.iter().zip(b) {
+                block = add(block, product_of(*a, *b));
+            }
+            total.add(block);
+        }
+        total.sum()
+    })
+}
+
+/// Rows whose products are added in the engine's scalar before they join a sum in double precision: conversions would
+/// cost more than the products.
+const BLOCK: usize = 8;
+
+/// Four sums in double precision, side by side.
+#[derive(Default)]
+struct Total([f64; 4]);
+
+impl Total {
+    #[inline(always)]
+    fn add(&mut self, block: Row) {
+        for i in 0..4 {
+            self.0[i] += f64::from(block[i]);
+        }
+    }
+
+    fn sum(self) -> f64 {
+        (self.0[0] + self.0[1]) + (self.0[2] + self.0[3])
+    }
+}
+
+#[inline(always)]
+fn product_of(a: Row, b: Row) -> Row {
+    [a[0] * b[0], a[1] * b[1], a[2] * b[2], a[3] * b[3]]
 }
 
 /// x += alpha p, r -= alpha q, q = preconditioned r; returns r . q. One pass over memory.
@@ -108,14 +144,18 @@ fn update(operator: &(impl Operator + Sync), alpha: Real, x: &mut [Row], r: &mut
         .zip(p.par_chunks(CHUNK).zip(q.par_chunks_mut(CHUNK)))
         .enumerate()
         .map(|(c, ((x, r), (p, q)))| {
-            let mut sum = 0.0;
-            for k in 0..x.len() {
-                x[k] = axpy(x[k], alpha, p[k]);
-                r[k] = axpy(r[k], -alpha, q[k]);
-                q[k] = operator.precondition(c * CHUNK + k, r[k]);
-                sum += dot(r[k], q[k]);
+            let (mut total, mut block) = (Total::default(), ZERO);
+            for (k, ((x, r), (p, q))) in x.iter_mut().zip(r).zip(p.iter().zip(q)).enumerate() {
+                *x = axpy(*x, alpha, *p);
+                *r = axpy(*r, -alpha, *q);
+                *q = operator.precondition(c * CHUNK + k, *r);
+                block = add(block, product_of(*r, *q));
+                if k % BLOCK == BLOCK - 1 {
+                    total.add(std::mem::replace(&mut block, ZERO));
+                }
             }
-            sum
+            total.add(block);
+            total.sum()
         })
         .collect();
     parts.iter().sum()

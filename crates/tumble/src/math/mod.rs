@@ -73,8 +73,9 @@ pub fn sub(a: Row, b: Row) -> Row {
 /// The product of two rows, summed over all four numbers, in double precision.
 #[inline(always)]
 pub fn dot(a: Row, b: Row) -> f64 {
-    let p = [0, 1, 2, 3].map(|i| f64::from(a[i]) * f64::from(b[i]));
-    (p[0] + p[1]) + (p[2] + p[3])
+    // Not `array::map`, which would be a call.
+    let p = |i: usize| f64::from(a[i]) * f64::from(b[i]);
+    (p(0) + p(1)) + (p(2) + p(3))
 }
 
 /// Whether all four numbers are finite.

@@ -26,7 +26,7 @@ pub fn net(site: &mut Site<'_>, thing: &Net, mesh: &Mesh) {
         );
     }
     let first = mesh.vertices.iter().zip(&mass).map(|(x, m)| site.parts.point(Vector::from(*x), Vector::default(), *m)).min().unwrap_or(0);
-    if thing.links.shear.is_some() && thing.links.structural.is_none() {
+    if thing.links.shear.is_some() {
         site.wrong(format!("{path}.links.shear"), "a net of triangles has no diagonals; known here: structural, bend");
     }
     let edges = mesh.edges();

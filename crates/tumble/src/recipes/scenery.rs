@@ -41,6 +41,9 @@ pub fn solid(thing: &Thing, mesh: Option<&Mesh>) -> Result<Collider, (&'static s
                 );
                 return Err((".shape.mesh", message));
             }
+            if !file.shell && volume(mesh) < 0.0 {
+                return Err((".shape.mesh", "the triangles face inward; reverse them, or set shell = true with a thickness".into()));
+            }
             if file.shell && thing.thickness == 0.0 {
                 return Err((".thickness", "0 m, expected > 0 m for a shell, which has no inside".into()));
             }
@@ -52,6 +55,12 @@ pub fn solid(thing: &Thing, mesh: Option<&Mesh>) -> Result<Collider, (&'static s
         (Words::Mesh(_), None) => return Err((".shape.mesh", "the mesh has not been loaded".into())),
     };
     Ok(Collider { shape, thickness: thing.thickness, friction: thing.friction, restitution: thing.restitution })
+}
+
+/// Six times the volume of a closed mesh [m³], negative if its triangles face inward.
+fn volume(mesh: &Mesh) -> f64 {
+    let corner = |i: u32| Vector::from(mesh.vertices[i as usize]);
+    mesh.triangles.iter().map(|t| corner(t[0]).dot(corner(t[1]).cross(corner(t[2])))).sum()
 }
 
 /// The surface of a collider for pictures.

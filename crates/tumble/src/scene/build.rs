@@ -32,7 +32,7 @@ pub fn plans(scene: &Scene) -> Vec<Plan> {
 pub fn build(scene: &Scene, assets: &Assets) -> Result<Built, SceneError> {
     let plans = plans(scene);
     let mut issues = check(scene, &plans);
-    let (needed, limit) = (memory(scene) / 1024.0_f64.powi(3), scene.world.memory_limit);
+    let (needed, limit) = (memory(scene, assets) / 1024.0_f64.powi(3), scene.world.memory_limit);
     if needed > limit {
         let message =
             format!("the scene needs about {needed:.1} GiB, the limit is {limit} GiB; lower a resolution, or raise world.memory_limit");
@@ -91,7 +91,13 @@ pub fn build(scene: &Scene, assets: &Assets) -> Result<Built, SceneError> {
         anchors.iter().for_each(|anchor| hang(&mut system, index, anchor, dt, &mut exchange, &mut warnings));
         systems.push(Box::new(system));
     }
-    Ok(Built { world: World::new(systems, exchange, scene.frame_time(), scene.time.exchanges), scenery, warnings })
+    let world = World::new(systems, exchange, scene.frame_time(), scene.time.exchanges);
+    let (books, thickest) = (world.ledger(), scene.collider.iter().map(|c| c.thickness).fold(0.0, f64::max));
+    if books.penetration > thickest {
+        let deep = books.penetration - thickest;
+        warnings.push(format!("masses start up to {deep:.3} m inside a collider, and will be thrown out of it; move one of them"));
+    }
+    Ok(Built { world, scenery, warnings })
 }
 
 fn stepping(plan: &Plan) -> Stepping {

@@ -43,6 +43,19 @@ pub fn check(scene: &Scene, systems: &[System]) -> Vec<Issue> {
             wrong(format!("{path}.name"), "another system has this name; names must differ".into());
         }
         check_system(system, &path, &mut wrong);
+        let interval = scene.frame_time() / f64::from(scene.time.exchanges);
+        if let Some(step) = system.step.filter(|step| interval / step > 1e7) {
+            wrong(format!("{path}.step"), format!("{step:e} s divides an exchange interval of {interval:.3e} s into more than 1e7 steps"));
+        }
+    }
+    for anchor in &scene.anchor {
+        let path = format!("anchor \"{}\"", anchor.name);
+        if objects.iter().any(|(_, name, _)| *name == anchor.name) {
+            wrong(format!("{path}.name"), "an object has this name; names must differ".into());
+        }
+        if anchor.between[0].split_whitespace().eq(anchor.between[1].split_whitespace()) {
+            wrong(format!("{path}.between"), "both ends are the same mass".into());
+        }
     }
     let known = || systems.iter().map(|s| s.name.as_str());
     for (kind, name, system) in &objects {

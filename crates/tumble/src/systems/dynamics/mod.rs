@@ -89,17 +89,6 @@ impl Dynamics {
         self.pushed = true;
     }
 
-    /// Row of the i-th point of an object.
-    pub fn row_of(&self, object: &str, i: usize) -> Option<usize> {
-        let object = self.objects.iter().find(|o| o.name == object)?;
-        (i < object.points.len()).then_some(object.points.start + i)
-    }
-
-    /// Position [m] and inverse mass [1/kg] of a row.
-    pub fn point(&self, row: usize) -> (Vec3<f64>, f64) {
-        (xyz64(self.state.x[row]), f64::from(self.laws.masses.inverse[row]))
-    }
-
     /// Speed that gravity gives in two steps: slower impacts do not bounce.
     fn resting_speed(&self, h: f64) -> f64 {
         2.0 * h * Vec3::from(self.laws.gravity).norm()
@@ -371,6 +360,7 @@ impl System for Dynamics {
                 done = if h == left { dt } else { done + h };
                 report.steps += 1;
                 report.step_range = Some(report.step_range.map_or((h, h), |(a, b)| (a.min(h), b.max(h))));
+                // The step's length is known only now.
                 self.pull_tethers(h, exchange);
                 self.after(h, &mut report);
                 self.look(t + done)?;
