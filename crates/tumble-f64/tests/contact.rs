@@ -181,10 +181,10 @@ fn every_solid_holds_a_sheet() {
             // Free fall in 0.75 s would be 2.3 m (drag included): it is held.
             assert!(top > 0.25, "{name} {}: {top}", scheme.name());
             // A tenth of the thickness: the sheet never reaches the surface itself. The pass ends every step outside, but for the mesh,
-            // whose distance is interpolated (measured: 8e-6 m, BDF2 with five times the step 1e-4); implicit Euler sinks in by
+            // whose distance is interpolated (measured: 1.4e-5 m, BDF2 with five times the step 1e-4); implicit Euler sinks in by
             // g h²/30 = 0.02 mm and by the pull of the links (measured: 1.7e-4 m).
             assert!(deepest < 0.1 * 0.005, "{name} {}: {deepest:e}", scheme.name());
-            assert!(scheme.is_implicit() || deepest < 2e-5, "{name} {}: {deepest:e}", scheme.name());
+            assert!(scheme.is_implicit() || deepest < 5e-5, "{name} {}: {deepest:e}", scheme.name());
         }
     }
 }

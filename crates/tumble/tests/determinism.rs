@@ -56,7 +56,7 @@ fn scenes() -> Vec<(&'static str, String, usize)> {
         ("sheet, verlet", sheet("integrator = \"verlet\"\nsubsteps = 12", links), 6),
         (
             "sheet, implicit",
-            sheet("integrator = \"implicit_euler\"\nsolver = { newton_tolerance = 1e-3, linear_tolerance = 1e-2 }", links),
+            sheet("integrator = \"implicit_euler\"\nsolver = { newton_tolerance = 1e-3, linear_tolerance = 1e-2 }", hinges),
             20,
         ),
         ("sheet, dormand-prince", sheet("integrator = \"dormand_prince\"\nadaptive.tolerance = 1e-3", links), 3),

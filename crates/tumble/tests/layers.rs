@@ -194,7 +194,8 @@ fn faults(order: &[String], of: &[String], imports: &[Import]) -> Vec<String> {
 fn modules_import_only_lower_layers() {
     let order = LAYERS.map(String::from);
     let (mut known, mut there) = (order.to_vec(), modules());
-    (known.sort(), there.sort());
+    known.sort();
+    there.sort();
     assert_eq!(known, there, "a module of lib.rs has no layer, or a layer no module");
     let (mut seen, mut wrong) = (0, Vec::new());
     for file in files(&source()) {
