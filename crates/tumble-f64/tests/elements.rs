@@ -97,6 +97,22 @@ fn moved(case: &Case, u: &[Row], h: f64) -> Vec<Row> {
     (0..case.x.len()).map(step).collect()
 }
 
+/// Forces on all rows.
+fn forces(batch: &mut dyn Batch, x: &[Row], v: &[Row]) -> Vec<Row> {
+    let mut out = vec![ZERO; x.len()];
+    batch.begin_forces(x, v);
+    batch.add_forces(x, v, 0, &mut out);
+    out
+}
+
+/// The product with u on all rows.
+fn product(batch: &mut dyn Batch, x: &[Row], u: &[Row]) -> Vec<Row> {
+    let mut out = vec![ZERO; x.len()];
+    batch.begin_product(x, u);
+    batch.add_product(u, 0, &mut out);
+    out
+}
+
 fn inner(a: &[Row], b: &[Row]) -> f64 {
     a.iter().zip(b).map(|(a, b)| xyz(*a).dot(xyz(*b))).sum()
 }
@@ -106,8 +122,7 @@ fn force_is_minus_the_gradient_of_the_energy() {
     let mut r = Numbers(3);
     for mut case in cases() {
         let n = case.x.len();
-        let mut force = vec![ZERO; n];
-        case.batch.add_forces(&case.x, &vec![ZERO; n], &mut force);
+        let force = forces(case.batch.as_mut(), &case.x, &vec![ZERO; n]);
         for _ in 0..4 {
             let u: Vec<Row> = (0..n).map(|_| r.row()).collect();
             let h = 1e-5;
@@ -126,9 +141,8 @@ fn the_exact_product_is_the_second_derivative_of_the_energy() {
     for mut case in cases() {
         let n = case.x.len();
         let u: Vec<Row> = (0..n).map(|_| r.row()).collect();
-        let mut product = vec![ZERO; n];
         case.batch.linearize(&case.x, Weights { stiffness: 1.0, damping: 0.0, hessian: Hessian::Exact });
-        case.batch.add_product(&case.x, &u, &mut product);
+        let product = product(case.batch.as_mut(), &case.x, &u);
         let h = 1e-4;
         let e = |h| case.batch.energy(&moved(&case, &u, h));
         let second = (e(h) - 2.0 * e(0.0) + e(-h)) / (h * h);
@@ -138,10 +152,8 @@ fn the_exact_product_is_the_second_derivative_of_the_energy() {
         if case.points == n {
             // Without frames the product is also the slope of the force, component by component.
             let force = |case: &mut Case, h: f64| {
-                let mut f = vec![ZERO; n];
                 let x = moved(case, &u, h);
-                case.batch.add_forces(&x, &vec![ZERO; n], &mut f);
-                f
+                forces(case.batch.as_mut(), &x, &vec![ZERO; n])
             };
             let (plus, minus) = (force(&mut case, 1e-5), force(&mut case, -1e-5));
             for i in 0..n {
@@ -163,9 +175,7 @@ fn matrices_are_symmetric_and_the_definite_one_is() {
             case.batch.linearize(&case.x, Weights { stiffness: 1.0, damping: 2.0, hessian });
             for _ in 0..4 {
                 let [u, w]: [Vec<Row>; 2] = std::array::from_fn(|_| (0..n).map(|_| r.row()).collect());
-                let (mut ku, mut kw) = (vec![ZERO; n], vec![ZERO; n]);
-                case.batch.add_product(&case.x, &u, &mut ku);
-                case.batch.add_product(&case.x, &w, &mut kw);
+                let [ku, kw] = [&u, &w].map(|u| product(case.batch.as_mut(), &case.x, u));
                 let (a, b) = (inner(&ku, &w), inner(&u, &kw));
                 assert!((a - b).abs() < 1e-12 * (1.0 + a.abs()), "{}: {a} {b}", case.batch.name());
                 if hessian == Hessian::Definite {
@@ -184,8 +194,7 @@ fn entries_and_diagonal_are_those_of_the_product() {
         for hessian in [Hessian::Exact, Hessian::Definite] {
             case.batch.linearize(&case.x, Weights { stiffness: 0.7, damping: 2.0, hessian });
             let u: Vec<Row> = (0..n).map(|_| r.row()).collect();
-            let mut product = vec![ZERO; n];
-            case.batch.add_product(&case.x, &u, &mut product);
+            let product = product(case.batch.as_mut(), &case.x, &u);
             let mut sum = vec![[0.0; 3]; n];
             let mut diagonal = vec![[0.0; 6]; n];
             case.batch.entries(&case.x, &mut |i, j, block| {
@@ -218,8 +227,7 @@ fn internal_elements_exert_no_net_force_and_no_net_torque() {
     for mut case in cases().into_iter().filter(|c| c.internal) {
         let n = case.x.len();
         let v: Vec<Row> = (0..n).map(|_| r.row()).collect();
-        let mut force = vec![ZERO; n];
-        case.batch.add_forces(&case.x, &v, &mut force);
+        let force = forces(case.batch.as_mut(), &case.x, &v);
         let (mut net, mut torque, mut size) = (Vec3::default(), Vec3::default(), 0.0);
         for i in 0..n {
             let f = xyz(force[i]);
@@ -241,8 +249,7 @@ fn internal_damping_opposes_motion_and_leaves_rigid_motion_alone() {
     let mut r = Numbers(19);
     for mut case in cases().into_iter().filter(|c| c.internal) {
         let n = case.x.len();
-        let mut at_rest = vec![ZERO; n];
-        case.batch.add_forces(&case.x, &vec![ZERO; n], &mut at_rest);
+        let at_rest = forces(case.batch.as_mut(), &case.x, &vec![ZERO; n]);
         let (v0, omega) = (r.vector(), r.vector());
         let rigid: Vec<Row> = (0..n)
             .map(|i| {
@@ -252,8 +259,7 @@ fn internal_damping_opposes_motion_and_leaves_rigid_motion_alone() {
             .collect();
         let any: Vec<Row> = (0..n).map(|_| r.row()).collect();
         for (v, is_rigid) in [(rigid, true), (any, false)] {
-            let mut moving = vec![ZERO; n];
-            case.batch.add_forces(&case.x, &v, &mut moving);
+            let moving = forces(case.batch.as_mut(), &case.x, &v);
             let power: f64 = (0..n).map(|i| (xyz(moving[i]) - xyz(at_rest[i])).dot(xyz(v[i]))).sum();
             if is_rigid {
                 assert!(power.abs() < 1e-13, "{}: {power}", case.batch.name());
@@ -267,38 +273,47 @@ fn internal_damping_opposes_motion_and_leaves_rigid_motion_alone() {
 #[test]
 fn gathered_pairs_agree_with_the_element_pass_and_break() {
     let mut r = Numbers(23);
-    let (n, m) = (101, 400);
+    let n = 101_u32;
     let x: Vec<Row> = (0..n).map(|_| r.row()).collect();
     let v: Vec<Row> = (0..n).map(|_| r.row()).collect();
-    let mut end = || ((r.next() + 1.0) * 0.5 * n as f64) as u32 % n as u32;
-    let members: Vec<Members<2, 1, 0>> = (0..m)
+    let spring = |a, b, stiffness| Members { nodes: [a, b], rest: [0.8], law: [], stiffness, damping: 0.3 };
+    let mut end = || ((r.next() + 1.0) * 0.5 * f64::from(n)) as u32 % n;
+    // Without order, and a sheet of nine columns, in which neighbours are runs of rows and springs are alike.
+    let random: Vec<_> = (0..400)
         .map(|_| {
             let i = end();
-            Members { nodes: [i, (i + 1 + end() % (n as u32 - 1)) % n as u32], rest: [0.8], law: [], stiffness: 2.0, damping: 0.3 }
+            spring(i, (i + 1 + end() % (n - 1)) % n, 2.0)
         })
         .collect();
-    let mut passes = Elements::<Distance, Linear, 2, 1, 1, 0>::new(n, &members).unwrap();
-    let mut pairs = Pairs::<Distance, Linear, 1, 1, 0>::new(n, &members, &vec![1.0; m]).unwrap();
-    let forces = |batch: &mut dyn Batch| {
-        let mut f = vec![ZERO; n];
-        batch.add_forces(&x, &v, &mut f);
-        f
-    };
-    let (a, b) = (forces(&mut passes), forces(&mut pairs));
-    assert!((0..n).all(|i| (xyz(a[i]) - xyz(b[i])).norm() < 1e-13));
-    assert_eq!(passes.energy(&x), pairs.energy(&x));
-    let strain = pairs.link_strain(&x);
-    let beyond = strain.iter().filter(|s| s.abs() > 1.0).count();
-    assert!(beyond > 10 && beyond < m - 10, "{beyond}");
-    assert_eq!(pairs.break_links(&x), beyond as u64);
-    assert_eq!(pairs.break_links(&x), 0);
-    assert_eq!(pairs.link_strain(&x).iter().filter(|s| s.is_nan()).count(), beyond);
-    let kept: Vec<_> = members.iter().zip(&strain).filter(|(_, s)| s.abs() <= 1.0).map(|(m, _)| *m).collect();
-    let mut rest = Elements::<Distance, Linear, 2, 1, 1, 0>::new(n, &kept).unwrap();
-    let (c, d) = (forces(&mut rest), forces(&mut pairs));
-    assert!((0..n).all(|i| (xyz(c[i]) - xyz(d[i])).norm() < 1e-13));
-    pairs.set_broken(&[]);
-    assert_eq!(forces(&mut pairs), b);
+    let offsets = [(1, 2.0), (9, 2.0), (10, 1.0), (2, 0.5)];
+    let columns = |d: u32, k: f64| (0..n - d).filter(|i| i % 9 < 7).map(move |i| spring(i, i + d, k));
+    let sheet: Vec<_> = offsets.into_iter().flat_map(|(d, k)| columns(d, k)).collect();
+    for members in [random, sheet] {
+        let m = members.len();
+        let mut passes = Elements::<Distance, Linear, 2, 1, 1, 0>::new(x.len(), &members).unwrap();
+        let mut pairs = Pairs::<Distance, Linear, 1, 1, 0>::new(x.len(), &members, &vec![1.0; m]).unwrap();
+        let same = |a: &[Row], b: &[Row]| a.iter().zip(b).all(|(a, b)| (xyz(*a) - xyz(*b)).norm() < 1e-13);
+        let whole = forces(&mut pairs, &x, &v);
+        assert!(same(&forces(&mut passes, &x, &v), &whole));
+        assert_eq!(passes.energy(&x), pairs.energy(&x));
+        let weights = Weights { stiffness: 0.7, damping: 0.2, hessian: Hessian::Exact };
+        pairs.linearize(&x, weights);
+        passes.linearize(&x, weights);
+        assert!(same(&product(&mut passes, &x, &v), &product(&mut pairs, &x, &v)));
+        let strain = pairs.link_strain(&x);
+        assert_eq!(pairs.largest_strain(&x), strain.iter().copied().fold(f64::MIN, f64::max));
+        let beyond = strain.iter().filter(|s| s.abs() > 1.0).count();
+        assert!(beyond > 10 && beyond < m - 10, "{beyond}");
+        assert_eq!(pairs.break_links(&x), beyond as u64);
+        assert_eq!(pairs.break_links(&x), 0);
+        assert_eq!(pairs.link_strain(&x).iter().filter(|s| s.is_nan()).count(), beyond);
+        assert!(pairs.largest_strain(&x) <= 1.0);
+        let kept: Vec<_> = members.iter().zip(&strain).filter(|(_, s)| s.abs() <= 1.0).map(|(m, _)| *m).collect();
+        let mut rest = Elements::<Distance, Linear, 2, 1, 1, 0>::new(x.len(), &kept).unwrap();
+        assert!(same(&forces(&mut rest, &x, &v), &forces(&mut pairs, &x, &v)));
+        pairs.set_broken(&[]);
+        assert_eq!(forces(&mut pairs, &x, &v), whole);
+    }
 }
 
 #[test]
@@ -338,9 +353,7 @@ fn an_unloaded_tetrahedron_is_at_rest() {
     )
     .unwrap();
     let x: Vec<Row> = corners.iter().map(|c| row(*c, 0.0)).collect();
-    let mut f = vec![ZERO; 4];
-    shear.add_forces(&x, &x, &mut f);
+    let [f, g] = [&mut shear as &mut dyn Batch, &mut inflate].map(|batch| forces(batch, &x, &x));
     assert!(xyz(f[1]).norm() > 0.1);
-    inflate.add_forces(&x, &x, &mut f);
-    assert!(f.iter().all(|f| xyz(*f).norm() < 1e-14), "{f:?}");
+    assert!(f.iter().zip(&g).all(|(f, g)| (xyz(*f) + xyz(*g)).norm() < 1e-14), "{f:?} {g:?}");
 }

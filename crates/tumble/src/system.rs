@@ -75,14 +75,31 @@ pub enum Part {
 pub struct Archive {
     /// Names and parts.
     pub parts: Vec<(String, Part)>,
-    /// Where reading goes on.
+    /// Where reading or writing goes on.
     next: usize,
 }
 
 impl Archive {
-    /// Writes a part.
+    /// Writes a part, over the old one at this place.
     pub fn push(&mut self, name: impl Into<String>, part: Part) {
-        self.parts.push((name.into(), part));
+        let named = (name.into(), part);
+        match self.parts.get_mut(self.next) {
+            Some(old) => *old = named,
+            None => self.parts.push(named),
+        }
+        self.next += 1;
+    }
+
+    /// Writes rows, into the memory of the old ones if they have the same name: a snapshot is taken at every frame, and
+    /// new memory would cost more than the copy.
+    pub fn push_rows(&mut self, name: &str, rows: &[Row]) {
+        match self.parts.get_mut(self.next) {
+            Some((old, Part::Rows(into))) if old == name => {
+                rows.clone_into(into);
+                self.next += 1;
+            }
+            _ => self.push(name, Part::Rows(rows.to_vec())),
+        }
     }
 
     /// Reads the next part if it has this name.
@@ -120,7 +137,7 @@ impl Archive {
         }
     }
 
-    /// Starts reading from the beginning.
+    /// Starts from the beginning.
     pub fn rewind(&mut self) {
         self.next = 0;
     }

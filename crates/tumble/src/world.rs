@@ -30,7 +30,7 @@ impl World {
         for system in &world.systems {
             system.publish(0.0, &mut world.exchange);
         }
-        world.good = world.snapshot();
+        world.keep();
         world
     }
 
@@ -66,7 +66,7 @@ impl World {
             return Err(self.explain(error));
         }
         self.frame += 1;
-        self.good = self.snapshot();
+        self.keep();
         Ok(Some(report))
     }
 
@@ -114,14 +114,15 @@ impl World {
         self.good = good;
     }
 
-    fn snapshot(&self) -> Archive {
-        let mut archive = Archive::default();
-        archive.push("world", Part::Numbers(vec![self.frame as f64]));
-        archive.push("exchange", Part::Numbers(self.exchange.save()));
+    /// Takes the state as the last good frame.
+    fn keep(&mut self) {
+        let good = &mut self.good;
+        good.rewind();
+        good.push("world", Part::Numbers(vec![self.frame as f64]));
+        good.push("exchange", Part::Numbers(self.exchange.save()));
         for system in &self.systems {
-            system.save(&mut archive);
+            system.save(good);
         }
-        archive
     }
 
     fn read(&mut self, archive: &mut Archive) -> Option<()> {
@@ -177,7 +178,7 @@ impl World {
             self.roll_back();
             return Err(wrong("it belongs to another scene: names or sizes differ"));
         }
-        self.good = self.snapshot();
+        self.keep();
         Ok(())
     }
 
@@ -238,7 +239,7 @@ impl World {
         let done = self.systems.iter_mut().find_map(|s| s.write(object, column, values))?;
         let time = self.time();
         self.systems.iter().for_each(|s| s.publish(time, &mut self.exchange));
-        self.good = self.snapshot();
+        self.keep();
         Some(done)
     }
 }

@@ -1,16 +1,14 @@
 //! Many elements of one kind behind one small trait, so that no system knows which kinds there are.
 
-use super::list::{List, Members, packs};
-use super::{Element, Law, forces};
+use super::list::{List, Members};
+use super::{Element, Law};
+use crate::linalg::blocks::Block;
 use crate::math::parallel::{CHUNK, chunks, fold};
-use crate::math::simd::{Index, Kernel, Width, dispatch};
+use crate::math::simd::{Index, Kernel, Width, dispatch, packs};
 use crate::math::{Real, Row, ZERO, add};
 use rayon::prelude::*;
 use std::ops::Range;
 use tumble_interface::scene::Hessian;
-
-/// A symmetric 3 x 3 matrix: xx, yy, zz, xy, yz, zx.
-pub type Block = [Real; 6];
 
 /// How much of the stiffness matrix K and of the damping matrix D a product holds.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -35,12 +33,17 @@ pub trait Batch: Send + Sync {
     }
     /// Potential energy [J], zero at rest.
     fn energy(&self, x: &[Row]) -> f64;
-    /// Adds the forces [N] and torques [N m], internal damping included.
-    fn add_forces(&mut self, x: &[Row], v: &[Row], force: &mut [Row]);
+    /// Prepares the forces at (x, v): what has to be known of all elements before rows can be summed.
+    fn begin_forces(&mut self, _x: &[Row], _v: &[Row]) {}
+    /// Adds the forces [N] and torques [N m], internal damping included, on the rows from `start` on, a multiple of CHUNK.
+    /// x and v are those of all rows, as begun with.
+    fn add_forces(&self, x: &[Row], v: &[Row], start: usize, force: &mut [Row]);
     /// Prepares products with the matrix at x.
     fn linearize(&mut self, x: &[Row], weights: Weights);
-    /// Adds (K and D, weighted as linearized) u.
-    fn add_product(&mut self, x: &[Row], u: &[Row], out: &mut [Row]);
+    /// Prepares the product with u.
+    fn begin_product(&mut self, _x: &[Row], _u: &[Row]) {}
+    /// Adds (K and D, weighted as linearized) u to the rows from `start` on, a multiple of CHUNK; u is as begun with.
+    fn add_product(&self, u: &[Row], start: usize, out: &mut [Row]);
     /// Adds the diagonal blocks of the matrix.
     fn add_diagonal(&mut self, x: &[Row], blocks: &mut [Block]);
     /// Gives every block of the matrix, as row, column and entries; both triangles.
@@ -51,6 +54,10 @@ pub trait Batch: Send + Sync {
     /// Lengthening over rest length of every element that is a link.
     fn link_strain(&self, _x: &[Row]) -> Vec<Real> {
         Vec::new()
+    }
+    /// The largest of them; negative infinity if there is none.
+    fn largest_strain(&self, _x: &[Row]) -> f64 {
+        f64::NEG_INFINITY
     }
     /// Breaks the links that are strained beyond their limit; returns how many.
     fn break_links(&mut self, _x: &[Row]) -> u64 {
@@ -95,16 +102,15 @@ impl Incidence {
         Self { first, start, slot }
     }
 
-    /// out[row] += the sum of its slots, in slot order.
-    fn add<T: Copy + Send + Sync, O: Send>(&self, slots: &[T], out: &mut [O], add: impl Fn(&mut O, T) + Sync) {
-        let rows = self.start.len() - 1;
-        chunks(&mut out[self.first..self.first + rows], |start, out| {
-            for (i, o) in out.iter_mut().enumerate() {
-                for s in self.start[start + i]..self.start[start + i + 1] {
-                    add(o, slots[self.slot[s as usize] as usize]);
-                }
+    /// out[row] += the sum of its slots, in slot order, for the rows from `start` on.
+    fn add<T: Copy, O>(&self, slots: &[T], start: usize, out: &mut [O], add: impl Fn(&mut O, T)) {
+        let end = (start + out.len()).min(self.first + self.start.len() - 1);
+        for row in start.max(self.first)..end {
+            let i = row - self.first;
+            for s in &self.slot[self.start[i] as usize..self.start[i + 1] as usize] {
+                add(&mut out[row - start], slots[*s as usize]);
             }
-        });
+        }
     }
 }
 
@@ -161,7 +167,7 @@ impl<E: Element<N, M, D>, Y: Law<P>, const N: usize, const M: usize, const D: us
                 Some(v) => Some((p.damping, self.list.vectors(w, v, e))),
                 None => None,
             };
-            let f = forces::<E, Y, _, N, M, D, P>(p.stiffness, p.law, p.rest, rows, damping);
+            let f = super::forces::<E, Y, _, N, M, D, P>(p.stiffness, p.law, p.rest, rows, damping);
             for a in 0..N {
                 w.scatter([f[a].x, f[a].y, f[a].z, w.splat(0.0)], self.slots, (e - self.range.start) * N + a, N);
             }
@@ -207,30 +213,38 @@ impl<E: Element<N, M, D>, Y: Law<P>, const N: usize, const M: usize, const D: us
         self.list.energy(x) - self.energy_at_rest
     }
 
-    fn add_forces(&mut self, x: &[Row], v: &[Row], force: &mut [Row]) {
-        self.list.check(&[x, v, force]);
+    fn begin_forces(&mut self, x: &[Row], v: &[Row]) {
+        self.list.check(&[x, v]);
         let v = self.list.damped.then_some(v);
         self.fill(|list, range, slots| dispatch(Forces { list, range, x, v, slots }));
-        self.incidence.add(&self.slots, force, |o, f| *o = add(*o, f));
+    }
+
+    fn add_forces(&self, _x: &[Row], _v: &[Row], start: usize, force: &mut [Row]) {
+        self.incidence.add(&self.slots, start, force, |o, f| *o = add(*o, f));
     }
 
     fn linearize(&mut self, _x: &[Row], weights: Weights) {
         self.list.weights = weights;
     }
 
-    fn add_product(&mut self, x: &[Row], u: &[Row], out: &mut [Row]) {
-        self.list.check(&[x, u, out]);
+    fn begin_product(&mut self, x: &[Row], u: &[Row]) {
+        self.list.check(&[x, u]);
         self.fill(|list, range, slots| dispatch(Products { list, range, x, u, slots }));
-        self.incidence.add(&self.slots, out, |o, f| *o = add(*o, f));
+    }
+
+    fn add_product(&self, _u: &[Row], start: usize, out: &mut [Row]) {
+        self.incidence.add(&self.slots, start, out, |o, f| *o = add(*o, f));
     }
 
     fn add_diagonal(&mut self, x: &[Row], blocks: &mut [Block]) {
         self.list.check(&[x]);
         let slots = fold(self.len(), |range| self.list.diagonal(x, range)).concat();
-        self.incidence.add(&slots, blocks, |o, f: Block| {
-            for i in 0..6 {
-                o[i] += f[i];
-            }
+        chunks(blocks, |start, blocks| {
+            self.incidence.add(&slots, start, blocks, |o, f: Block| {
+                for i in 0..6 {
+                    o[i] += f[i];
+                }
+            });
         });
     }
 

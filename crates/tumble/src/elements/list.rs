@@ -4,7 +4,7 @@
 use super::batch::Weights;
 use super::{Element, Law, energy, gauss_newton, hessian, project, tangents};
 use crate::math::parallel::{CHUNK, fold};
-use crate::math::simd::{Index, Kernel, Scalar, Width, dispatch};
+use crate::math::simd::{Index, Kernel, Scalar, Width, dispatch, packs};
 use crate::math::{Lane, Quat, Real, Row, Vec3, axpy, row};
 use rayon::prelude::*;
 use std::marker::PhantomData;
@@ -40,29 +40,13 @@ pub struct List<E, Y, const N: usize, const M: usize, const D: usize, const P: u
 }
 
 /// What one pack of elements loads.
+#[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Pack<L, const D: usize, const P: usize> {
     pub rest: [L; D],
     pub law: [L; P],
     pub stiffness: L,
     pub damping: L,
 }
-
-/// Runs `$body` with `$w` and the first element `$e` of each pack of `$range`, then one by one.
-macro_rules! packs {
-    ($width:ident, $w:ident, $range:expr, |$e:ident| $body:expr) => {{
-        let mut $e = $range.start;
-        while $e + $width::N <= $range.end {
-            $body;
-            $e += $width::N;
-        }
-        let $w = $crate::math::simd::Scalar;
-        while $e < $range.end {
-            $body;
-            $e += 1;
-        }
-    }};
-}
-pub(super) use packs;
 
 impl<E: Element<N, M, D>, Y: Law<P>, const N: usize, const M: usize, const D: usize, const P: usize> List<E, Y, N, M, D, P> {
     /// `None` if a node is not one of the rows 0..rows.

@@ -14,12 +14,14 @@ mod contact;
 mod distance;
 mod law;
 mod list;
+mod neighbours;
 mod pairs;
 mod rod;
 mod tetrahedron;
 mod vector;
 
-pub use batch::{Batch, Block, Elements, Weights};
+pub use crate::linalg::blocks::Block;
+pub use batch::{Batch, Elements, Weights};
 pub use bend::Hinge;
 pub use contact::PointPlane;
 pub use distance::{Distance, Limit};

@@ -1,18 +1,18 @@
-//! Elements between two points, gathered: every point sums over its own list of neighbours (sliced ELL: slices of 16
-//! rows, padded to the longest list in the slice). Each spring is evaluated from both ends, which costs arithmetic and
-//! saves the pass through memory: 2x faster than two passes on a sheet, and the two evaluations are exact opposites.
+//! Elements between two points, gathered: every point sums over its own list of neighbours. Each spring is evaluated from
+//! both ends, which costs arithmetic and saves the pass through memory, and the two evaluations are exact opposites.
 
-use super::batch::{Batch, Block, Weights};
+use super::batch::{Batch, Weights};
 use super::list::{List, Members};
-use super::{Distance, Element, Law, Vector, forces};
+use super::neighbours::{Columns, Neighbours, SLICE};
+use super::{Distance, Element, Law, Vector};
+use crate::linalg::blocks::Block;
 use crate::math::parallel::{chunks, fold};
-use crate::math::simd::{Index, Kernel, Scalar, Width, dispatch};
-use crate::math::{Lane, Real, Row, Vec3, ZERO, xyz};
+use crate::math::simd::{Kernel, Scalar, Width, dispatch, packs};
+use crate::math::{Lane, Real, Row, Vec3, xyz};
 use rayon::prelude::*;
+use std::marker::PhantomData;
+use std::ops::Range;
 use tumble_interface::scene::Hessian;
-
-/// Rows per slice; every register width divides it.
-const SLICE: usize = 16;
 
 /// An element between two points that is the same seen from either end, and whose matrix is c n n^T + s I with n along
 /// the line between them.
@@ -20,8 +20,12 @@ pub trait Pair<const M: usize, const D: usize>: Element<2, M, D> {
     /// sqrt(c) n and s for stiffness k and damping b, from d = x1 - x0. `exact` keeps a negative s.
     fn stiffness<Y: Law<P>, L: Lane, const P: usize>(k: L, b: L, law: [L; P], rest: [L; D], d: Vec3<L>, exact: bool) -> (Vec3<L>, L);
 
+    /// The force on x0 for stiffness k, from d = x1 - x0 and, with damping b, its rate of change: what `forces` derives,
+    /// with one division.
+    fn pull<Y: Law<P>, L: Lane, const P: usize>(k: L, law: [L; P], rest: [L; D], d: Vec3<L>, damping: Option<(L, Vec3<L>)>) -> Vec3<L>;
+
     /// Lengthening over rest length at the length l; NaN if the pair has no rest length.
-    fn strain(rest: [Real; D], length: Real) -> Real;
+    fn strain<L: Lane>(rest: [L; D], length: L) -> L;
 }
 
 /// K = (t - s) n n^T + s I,  t = d stress/dr,  s = stress/|d|                   (springs.3)
@@ -37,7 +41,19 @@ impl Pair<1, 1> for Distance {
         (d * (along.sqrt() * inverse), transverse)
     }
 
-    fn strain([l]: [Real; 1], length: Real) -> Real {
+    #[inline(always)]
+    fn pull<Y: Law<P>, L: Lane, const P: usize>(k: L, law: [L; P], [l]: [L; 1], d: Vec3<L>, damping: Option<(L, Vec3<L>)>) -> Vec3<L> {
+        let length = d.norm();
+        let n = d * length.positive(length.like(1.0) / length, length.zero());
+        let mut stress = Y::stress(k, law, length - l);
+        if let Some((b, rate)) = damping {
+            stress = stress + b * n.dot(rate);
+        }
+        n * stress
+    }
+
+    #[inline(always)]
+    fn strain<L: Lane>([l]: [L; 1], length: L) -> L {
         (length - l) / l
     }
 }
@@ -50,8 +66,18 @@ impl Pair<3, 0> for Vector {
         (Vec3 { x: zero, y: zero, z: zero }, Y::tangent(k, law, d.x) + b)
     }
 
-    fn strain(_: [Real; 0], _: Real) -> Real {
-        Real::NAN
+    #[inline(always)]
+    fn pull<Y: Law<P>, L: Lane, const P: usize>(k: L, law: [L; P], _: [L; 0], d: Vec3<L>, damping: Option<(L, Vec3<L>)>) -> Vec3<L> {
+        let stress = Vec3 { x: Y::stress(k, law, d.x), y: Y::stress(k, law, d.y), z: Y::stress(k, law, d.z) };
+        match damping {
+            Some((b, rate)) => stress + rate * b,
+            None => stress,
+        }
+    }
+
+    #[inline(always)]
+    fn strain<L: Lane>(_: [L; 0], length: L) -> L {
+        length.like(f64::NAN)
     }
 }
 
@@ -59,8 +85,10 @@ impl Pair<3, 0> for Vector {
 pub struct Pairs<E, Y, const M: usize, const D: usize, const P: usize> {
     list: List<E, Y, 2, M, D, P>,
     lists: Neighbours<D, P>,
-    /// For products: sqrt(c) n and s of every entry.
-    cache: Vec<Row>,
+    /// Positions, or what a product is taken with, and velocities.
+    columns: [Columns; 2],
+    /// For products: sqrt(c) n and s, each for the sixteen entries of a slot in turn.
+    cache: Vec<[[Real; SLICE]; 4]>,
     /// Strain at which each spring breaks; empty if none does.
     limits: Vec<Real>,
     broken: Vec<Broken>,
@@ -73,77 +101,6 @@ struct Broken {
     damping: Real,
 }
 
-/// The neighbours of every row, slice by slice: 16 first neighbours, 16 second ones, ...
-struct Neighbours<const D: usize, const P: usize> {
-    /// First row; a multiple of nothing, the slices start here.
-    first: usize,
-    rows: usize,
-    /// Where each slice starts, in entries; one more than there are slices.
-    start: Vec<u32>,
-    neighbour: Index,
-    rest: [Vec<Real>; D],
-    law: [Vec<Real>; P],
-    stiffness: Vec<Real>,
-    damping: Vec<Real>,
-    /// The two entries of each spring.
-    entries: Vec<[u32; 2]>,
-}
-
-impl<const D: usize, const P: usize> Neighbours<D, P> {
-    fn new(rows: usize, members: &[Members<2, D, P>]) -> Option<Self> {
-        let ends = || members.iter().flat_map(|m| m.nodes);
-        let (low, high) = ends().fold((u32::MAX, 0), |(a, b), i| (a.min(i), b.max(i)));
-        let (first, count) = if low > high { (0, 0) } else { (low as usize, (high - low + 1) as usize) };
-        let mut degree = vec![0_u32; count];
-        let place: Vec<[u32; 2]> = members
-            .iter()
-            .map(|m| {
-                m.nodes.map(|i| {
-                    let d = &mut degree[i as usize - first];
-                    *d += 1;
-                    *d - 1
-                })
-            })
-            .collect();
-        let mut start = vec![0_u32];
-        for slice in degree.chunks(SLICE) {
-            let width = slice.iter().copied().max().unwrap_or(0);
-            start.push(start[start.len() - 1] + width * SLICE as u32);
-        }
-        let total = start[start.len() - 1] as usize;
-        // A padding entry is a spring of no stiffness from a row to itself.
-        let mut neighbour = vec![low.min(high); total];
-        let (mut stiffness, mut damping) = (vec![0.0; total], vec![0.0; total]);
-        let (mut rest, mut law): ([Vec<Real>; D], [Vec<Real>; P]) =
-            (std::array::from_fn(|_| vec![0.0; total]), std::array::from_fn(|_| vec![0.0; total]));
-        let entry = |i: u32, slot: u32| {
-            let i = i as usize - first;
-            start[i / SLICE] as usize + slot as usize * SLICE + i % SLICE
-        };
-        let mut entries = Vec::with_capacity(members.len());
-        for (m, place) in members.iter().zip(&place) {
-            let e = [entry(m.nodes[0], place[0]), entry(m.nodes[1], place[1])];
-            for side in 0..2 {
-                neighbour[e[side]] = m.nodes[1 - side];
-                stiffness[e[side]] = m.stiffness as Real;
-                damping[e[side]] = m.damping as Real;
-                for d in 0..D {
-                    rest[d][e[side]] = m.rest[d] as Real;
-                }
-                for p in 0..P {
-                    law[p][e[side]] = m.law[p] as Real;
-                }
-            }
-            entries.push(e.map(|e| e as u32));
-        }
-        Some(Self { first, rows: count, start, neighbour: Index::new(neighbour, rows)?, rest, law, stiffness, damping, entries })
-    }
-
-    fn slices(&self) -> usize {
-        self.start.len() - 1
-    }
-}
-
 impl<E: Pair<M, D>, Y: Law<P>, const M: usize, const D: usize, const P: usize> Pairs<E, Y, M, D, P> {
     /// Springs over rows 0..rows; `None` if an end is not one of them. `limits` are the strains at which springs break
     /// (infinite: never), or empty.
@@ -152,6 +109,7 @@ impl<E: Pair<M, D>, Y: Law<P>, const M: usize, const D: usize, const P: usize> P
         Some(Self {
             list: List::new(rows, members)?,
             lists: Neighbours::new(rows, members)?,
+            columns: Default::default(),
             cache: Vec::new(),
             limits,
             broken: Vec::new(),
@@ -162,10 +120,7 @@ impl<E: Pair<M, D>, Y: Law<P>, const M: usize, const D: usize, const P: usize> P
         let e = spring as usize;
         self.list.stiffness[e] = stiffness;
         self.list.damping[e] = damping;
-        for entry in self.lists.entries[e] {
-            self.lists.stiffness[entry as usize] = stiffness;
-            self.lists.damping[entry as usize] = damping;
-        }
+        self.lists.set(e, stiffness, damping);
     }
 
     fn tear(&mut self, spring: u32) {
@@ -177,12 +132,6 @@ impl<E: Pair<M, D>, Y: Law<P>, const M: usize, const D: usize, const P: usize> P
     fn strain_of(&self, x: &[Row], e: usize) -> Real {
         let ends = [0, 1].map(|a| xyz(x[self.list.nodes[a].get()[e] as usize]));
         E::strain(std::array::from_fn(|d| self.list.rest[d][e]), (ends[1] - ends[0]).norm())
-    }
-
-    /// Runs `f(slice, out of its rows)` over all slices, in parallel by fixed groups.
-    fn slices<T: Send>(&self, out: &mut [T], f: impl Fn(std::ops::Range<usize>, &mut [T]) + Sync) {
-        let (first, rows) = (self.lists.first, self.lists.rows);
-        chunks(&mut out[first..first + rows], |start, out| f(start / SLICE..(start + out.len()).div_ceil(SLICE), out));
     }
 }
 
@@ -212,11 +161,12 @@ macro_rules! row_packs {
 
 struct Gather<'a, E, Y, const M: usize, const D: usize, const P: usize> {
     lists: &'a Neighbours<D, P>,
-    slices: std::ops::Range<usize>,
+    columns: &'a [Columns; 2],
+    slices: Range<usize>,
     x: &'a [Row],
     v: Option<&'a [Row]>,
     out: &'a mut [Row],
-    kind: std::marker::PhantomData<(E, Y)>,
+    kind: PhantomData<(E, Y)>,
 }
 
 impl<E: Pair<M, D>, Y: Law<P>, const M: usize, const D: usize, const P: usize> Gather<'_, E, Y, M, D, P> {
@@ -225,32 +175,31 @@ impl<E: Pair<M, D>, Y: Law<P>, const M: usize, const D: usize, const P: usize> G
     fn pack<W: Width>(&mut self, w: W, slice: usize, lane: usize) {
         let lists = self.lists;
         let i = slice * SLICE + lane;
-        let here = w.rows(self.x, lists.first + i);
         let zero = w.splat(0.0);
+        let [x, y, z, _] = w.rows(self.x, lists.first + i);
+        let here = Vec3 { x, y, z };
+        let moving = match self.v {
+            Some(v) => {
+                let [x, y, z, _] = w.rows(v, lists.first + i);
+                Some((v, Vec3 { x, y, z }))
+            }
+            None => None,
+        };
         let mut sum = Vec3 { x: zero, y: zero, z: zero };
         let mut entry = lists.start[slice] as usize + lane;
         while entry < lists.start[slice + 1] as usize {
-            let index = &lists.neighbour.get()[entry..];
-            // SAFETY: `check` has been called on x and v.
-            let there = unsafe { w.gather(self.x, index) };
-            let (mut rest, mut law) = ([zero; D], [zero; P]);
-            for d in 0..D {
-                rest[d] = w.load(&lists.rest[d][entry..]);
-            }
-            for p in 0..P {
-                law[p] = w.load(&lists.law[p][entry..]);
-            }
-            let damping = match self.v {
-                Some(v) => {
-                    let [x, y, z, _] = w.rows(v, lists.first + i);
+            // SAFETY: `begin_forces` has checked x and v, and filled the columns.
+            let d = unsafe { lists.load(w, self.x, &self.columns[0], entry) } - here;
+            let p = lists.pack(w, entry);
+            let damping = match moving {
+                Some((v, velocity)) => {
                     // SAFETY: as above.
-                    let [a, b, c, _] = unsafe { w.gather(v, index) };
-                    Some((w.load(&lists.damping[entry..]), [Vec3 { x, y, z }, Vec3 { x: a, y: b, z: c }]))
+                    let rate = unsafe { lists.load(w, v, &self.columns[1], entry) } - velocity;
+                    Some((p.damping, rate))
                 }
                 None => None,
             };
-            let [f, _] = forces::<E, Y, _, 2, M, D, P>(w.load(&lists.stiffness[entry..]), law, rest, [here, there], damping);
-            sum = sum + f;
+            sum = sum + E::pull::<Y, _, P>(p.stiffness, p.law, p.rest, d, damping);
             entry += SLICE;
         }
         let at = i - self.slices.start * SLICE;
@@ -268,11 +217,56 @@ impl<E: Pair<M, D>, Y: Law<P>, const M: usize, const D: usize, const P: usize> K
     }
 }
 
+/// Fills the cache of a range of slices.
+struct Linearize<'a, E, Y, const M: usize, const D: usize, const P: usize> {
+    lists: &'a Neighbours<D, P>,
+    weights: Weights,
+    slices: Range<usize>,
+    x: &'a [Row],
+    cache: &'a mut [[[Real; SLICE]; 4]],
+    kind: PhantomData<(E, Y)>,
+}
+
+impl<E: Pair<M, D>, Y: Law<P>, const M: usize, const D: usize, const P: usize> Linearize<'_, E, Y, M, D, P> {
+    #[inline(always)]
+    fn pack<W: Width>(&mut self, w: W, slice: usize, lane: usize) {
+        let lists = self.lists;
+        let [x, y, z, _] = w.rows(self.x, lists.first + slice * SLICE + lane);
+        let here = Vec3 { x, y, z };
+        let (scale_k, scale_b) = (w.splat(self.weights.stiffness), w.splat(self.weights.damping));
+        let mut entry = lists.start[slice] as usize + lane;
+        while entry < lists.start[slice + 1] as usize {
+            // SAFETY: `linearize` has checked x.
+            let [x, y, z, _] = unsafe { w.gather(self.x, &lists.neighbour.get()[entry..]) };
+            let p = lists.pack(w, entry);
+            let (k, b) = (scale_k * p.stiffness, scale_b * p.damping);
+            let exact = self.weights.hessian == Hessian::Exact;
+            let (q, s) = E::stiffness::<Y, _, P>(k, b, p.law, p.rest, Vec3 { x, y, z } - here, exact);
+            let slot = &mut self.cache[(entry - lists.start[self.slices.start] as usize) / SLICE];
+            w.store(q.x, &mut slot[0][lane..]);
+            w.store(q.y, &mut slot[1][lane..]);
+            w.store(q.z, &mut slot[2][lane..]);
+            w.store(s, &mut slot[3][lane..]);
+            entry += SLICE;
+        }
+    }
+}
+
+impl<E: Pair<M, D>, Y: Law<P>, const M: usize, const D: usize, const P: usize> Kernel for Linearize<'_, E, Y, M, D, P> {
+    type Output = ();
+    #[inline(always)]
+    fn run<W: Width>(mut self, w: W) {
+        let (slices, rows) = (self.slices.clone(), self.lists.rows);
+        row_packs!(W, w, slices, rows, |slice, lane| self.pack(w, slice, lane));
+    }
+}
+
 /// out += sum over neighbours of (q . (u_i - u_j)) q + s (u_i - u_j), with q and s cached.
 struct Product<'a, const D: usize, const P: usize> {
     lists: &'a Neighbours<D, P>,
-    cache: &'a [Row],
-    slices: std::ops::Range<usize>,
+    columns: &'a Columns,
+    cache: &'a [[[Real; SLICE]; 4]],
+    slices: Range<usize>,
     u: &'a [Row],
     out: &'a mut [Row],
 }
@@ -282,17 +276,17 @@ impl<const D: usize, const P: usize> Product<'_, D, P> {
     fn pack<W: Width>(&mut self, w: W, slice: usize, lane: usize) {
         let lists = self.lists;
         let i = slice * SLICE + lane;
-        let [ux, uy, uz, _] = w.rows(self.u, lists.first + i);
+        let [x, y, z, _] = w.rows(self.u, lists.first + i);
+        let here = Vec3 { x, y, z };
         let zero = w.splat(0.0);
         let mut sum = Vec3 { x: zero, y: zero, z: zero };
         let mut entry = lists.start[slice] as usize + lane;
         while entry < lists.start[slice + 1] as usize {
-            // SAFETY: `check` has been called on u.
-            let [x, y, z, _] = unsafe { w.gather(self.u, &lists.neighbour.get()[entry..]) };
-            let d = Vec3 { x: ux - x, y: uy - y, z: uz - z };
-            let [qx, qy, qz, s] = w.rows(self.cache, entry);
-            let q = Vec3 { x: qx, y: qy, z: qz };
-            sum = sum + q * q.dot(d) + d * s;
+            // SAFETY: `begin_product` has checked u and filled the columns.
+            let d = here - unsafe { lists.load(w, self.u, self.columns, entry) };
+            let slot = &self.cache[entry / SLICE];
+            let q = Vec3 { x: w.load(&slot[0][lane..]), y: w.load(&slot[1][lane..]), z: w.load(&slot[2][lane..]) };
+            sum = sum + q * q.dot(d) + d * w.load(&slot[3][lane..]);
             entry += SLICE;
         }
         let at = i - self.slices.start * SLICE;
@@ -310,6 +304,30 @@ impl<const D: usize, const P: usize> Kernel for Product<'_, D, P> {
     }
 }
 
+/// The largest strain of a range of springs.
+struct LargestStrain<'a, E, Y, const M: usize, const D: usize, const P: usize> {
+    list: &'a List<E, Y, 2, M, D, P>,
+    range: Range<usize>,
+    x: &'a [Row],
+}
+
+impl<E: Pair<M, D>, Y: Law<P>, const M: usize, const D: usize, const P: usize> Kernel for LargestStrain<'_, E, Y, M, D, P> {
+    type Output = Real;
+    #[inline(always)]
+    fn run<W: Width>(self, w: W) -> Real {
+        let (mut largest, mut each) = (Real::NEG_INFINITY, [Real::NEG_INFINITY; 16]);
+        packs!(W, w, self.range, |e| {
+            let p = self.list.pack(w, e);
+            let [a, b] = self.list.vectors(w, self.x, e);
+            w.store(E::strain(p.rest, (b - a).norm()), &mut each);
+            for strain in &each[..W::N] {
+                largest = if *strain > largest { *strain } else { largest };
+            }
+        });
+        largest
+    }
+}
+
 impl<E: Pair<M, D>, Y: Law<P>, const M: usize, const D: usize, const P: usize> Batch for Pairs<E, Y, M, D, P> {
     fn name(&self) -> &'static str {
         E::NAME
@@ -323,63 +341,65 @@ impl<E: Pair<M, D>, Y: Law<P>, const M: usize, const D: usize, const P: usize> B
         self.list.energy(x)
     }
 
-    fn add_forces(&mut self, x: &[Row], v: &[Row], force: &mut [Row]) {
-        self.list.check(&[x, v, force]);
+    fn begin_forces(&mut self, x: &[Row], v: &[Row]) {
+        self.list.check(&[x, v]);
+        self.lists.fill(&mut self.columns[0], x);
+        if self.list.damped {
+            self.lists.fill(&mut self.columns[1], v);
+        }
+    }
+
+    fn add_forces(&self, x: &[Row], v: &[Row], start: usize, force: &mut [Row]) {
+        self.list.check(&[x, v]);
         let v = self.list.damped.then_some(v);
-        self.slices(force, |slices, out| {
-            dispatch(Gather::<E, Y, M, D, P> { lists: &self.lists, slices, x, v, out, kind: std::marker::PhantomData });
-        });
+        let (slices, out) = self.lists.within(start, force);
+        dispatch(Gather::<E, Y, M, D, P> { lists: &self.lists, columns: &self.columns, slices, x, v, out, kind: PhantomData });
     }
 
     fn linearize(&mut self, x: &[Row], weights: Weights) {
         self.list.check(&[x]);
         self.list.weights = weights;
-        let mut cache = std::mem::take(&mut self.cache);
-        cache.resize(self.lists.stiffness.len(), ZERO);
-        let (lists, exact) = (&self.lists, weights.hessian == Hessian::Exact);
-        let fill = |slice: usize, cache: &mut [Row]| {
-            let base = lists.start[slice] as usize;
-            for (k, q) in cache.iter_mut().enumerate() {
-                let entry = base + k;
-                // Padding reads the last row again where the last slice is short; its stiffness is zero.
-                let i = (slice * SLICE + k % SLICE).min(lists.rows - 1);
-                let d = xyz(x[lists.neighbour.get()[entry] as usize]) - xyz(x[lists.first + i]);
-                let (k, b) = (weights.stiffness * lists.stiffness[entry], weights.damping * lists.damping[entry]);
-                let rest = std::array::from_fn(|d| lists.rest[d][entry]);
-                let law = std::array::from_fn(|p| lists.law[p][entry]);
-                let (n, s) = E::stiffness::<Y, Real, P>(k, b, law, rest, d, exact);
-                *q = [n.x, n.y, n.z, s];
-            }
-        };
-        let mut parts = Vec::with_capacity(lists.slices());
-        let mut left = &mut cache[..];
-        for slice in 0..lists.slices() {
-            let (part, rest) = left.split_at_mut((lists.start[slice + 1] - lists.start[slice]) as usize);
-            parts.push((slice, part));
+        let lists = &self.lists;
+        self.cache.clear();
+        self.cache.resize(lists.stiffness.len() / SLICE, [[0.0; SLICE]; 4]);
+        // Sixty-four slices at a time.
+        let mut parts = Vec::new();
+        let mut left = &mut self.cache[..];
+        for first in (0..lists.slices()).step_by(64) {
+            let slices = first..(first + 64).min(lists.slices());
+            let entries = lists.start[slices.end] - lists.start[slices.start];
+            let (part, rest) = left.split_at_mut(entries as usize / SLICE);
+            parts.push((slices, part));
             left = rest;
         }
-        parts.into_par_iter().with_min_len(64).for_each(|(slice, part)| fill(slice, part));
-        self.cache = cache;
+        parts.into_par_iter().for_each(|(slices, cache)| {
+            dispatch(Linearize::<E, Y, M, D, P> { lists, weights, slices, x, cache, kind: PhantomData });
+        });
     }
 
-    fn add_product(&mut self, _x: &[Row], u: &[Row], out: &mut [Row]) {
-        self.list.check(&[u, out]);
-        self.slices(out, |slices, out| dispatch(Product { lists: &self.lists, cache: &self.cache, slices, u, out }));
+    fn begin_product(&mut self, _x: &[Row], u: &[Row]) {
+        self.list.check(&[u]);
+        self.lists.fill(&mut self.columns[0], u);
+    }
+
+    fn add_product(&self, u: &[Row], start: usize, out: &mut [Row]) {
+        self.list.check(&[u]);
+        let (slices, out) = self.lists.within(start, out);
+        dispatch(Product { lists: &self.lists, columns: &self.columns[0], cache: &self.cache, slices, u, out });
     }
 
     fn add_diagonal(&mut self, _x: &[Row], blocks: &mut [Block]) {
         let (lists, cache) = (&self.lists, &self.cache);
-        self.slices(blocks, |slices, out| {
+        chunks(blocks, |start, blocks| {
+            let (slices, out) = lists.within(start, blocks);
             for (k, block) in out.iter_mut().enumerate() {
-                let slice = slices.start + k / SLICE;
-                let mut entry = lists.start[slice] as usize + k % SLICE;
-                while entry < lists.start[slice + 1] as usize {
-                    let [x, y, z, s] = cache[entry];
+                let (slice, lane) = (slices.start + k / SLICE, k % SLICE);
+                for slot in &cache[lists.start[slice] as usize / SLICE..lists.start[slice + 1] as usize / SLICE] {
+                    let [x, y, z, s] = [0, 1, 2, 3].map(|c| slot[c][lane]);
                     let terms = [x * x + s, y * y + s, z * z + s, x * y, y * z, z * x];
                     for c in 0..6 {
                         block[c] += terms[c];
                     }
-                    entry += SLICE;
                 }
             }
         });
@@ -422,6 +442,15 @@ impl<E: Pair<M, D>, Y: Law<P>, const M: usize, const D: usize, const P: usize> B
         strain
     }
 
+    fn largest_strain(&self, x: &[Row]) -> f64 {
+        self.list.check(&[x]);
+        let parts = match self.broken.is_empty() {
+            true => fold(self.len(), |range| dispatch(LargestStrain { list: &self.list, range, x })),
+            false => self.link_strain(x),
+        };
+        parts.into_iter().fold(f64::NEG_INFINITY, |m, s| m.max(f64::from(s)))
+    }
+
     fn break_links(&mut self, x: &[Row]) -> u64 {
         if self.limits.is_empty() {
             return 0;
@@ -446,6 +475,50 @@ impl<E: Pair<M, D>, Y: Law<P>, const M: usize, const D: usize, const P: usize> B
         }
         for spring in broken {
             self.tear(*spring);
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::elements::Linear;
+    use crate::math::simd::{Level, dispatch_at};
+
+    /// Forces, cache and product of a sheet with a few springs across it, on registers of one width.
+    fn all(level: Level) -> (Vec<Row>, Vec<[[Real; SLICE]; 4]>, Vec<Row>) {
+        let n = 16 * 9 + 5;
+        let number = |i: usize, c: usize| ((i * 37 + c * 101) % 97) as Real * 0.01 - 0.4;
+        let rows = |seed: usize| -> Vec<Row> { (0..n).map(|i| [number(i, seed), number(i, seed + 1), number(i, seed + 2), 0.0]).collect() };
+        let (x, v) = (rows(1), rows(5));
+        let spring = |a: usize, b: usize| Members { nodes: [a as u32, b as u32], rest: [0.3], law: [], stiffness: 3.0, damping: 0.2 };
+        let members: Vec<Members<2, 1, 0>> = (0..n - 17)
+            .filter(|i| i % 17 != 16)
+            .flat_map(|i| [spring(i, i + 1), spring(i, i + 17)])
+            .chain((0..20).map(|i| spring(i * 7, n - 1 - i)))
+            .collect();
+        let mut pairs = Pairs::<Distance, Linear, 1, 1, 0>::new(n, &members, &[]).unwrap();
+        let (lists, slices) = (&pairs.lists, 0..pairs.lists.slices());
+        assert!(lists.slices() == 10 && lists.rows == n);
+        for (columns, rows) in pairs.columns.iter_mut().zip([&x, &v]) {
+            lists.fill(columns, rows);
+        }
+        let (mut force, mut product) = (vec![[0.0; 4]; n], vec![[0.0; 4]; n]);
+        let (columns, kind) = (&pairs.columns, PhantomData::<(Distance, Linear)>);
+        dispatch_at(level, Gather { lists, columns, slices: slices.clone(), x: &x, v: Some(&v), out: &mut force, kind });
+        let mut cache = vec![[[0.0; SLICE]; 4]; lists.stiffness.len() / SLICE];
+        let weights = Weights { stiffness: 0.7, damping: 0.2, hessian: Hessian::Exact };
+        dispatch_at(level, Linearize { lists, weights, slices: slices.clone(), x: &x, cache: &mut cache, kind });
+        dispatch_at(level, Product { lists, columns: &columns[0], cache: &cache, slices, u: &x, out: &mut product });
+        (force, cache, product)
+    }
+
+    #[test]
+    fn every_width_gives_the_same_bits() {
+        let one = all(Level::Scalar);
+        assert!(one.0.iter().all(|f| f[0] != 0.0) && one.2.iter().any(|f| f[1] != 0.0));
+        for level in Level::available() {
+            assert_eq!(all(level), one, "{level:?}");
         }
     }
 }

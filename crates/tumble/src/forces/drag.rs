@@ -2,7 +2,8 @@
 
 use super::Force;
 use crate::elements::Block;
-use crate::math::{Real, Row, Vec3, axpy};
+use crate::math::rows::{self, Each};
+use crate::math::{Lane, Real, Row, Vec3, ZERO};
 
 /// f = -k_d v with k_d = coefficient + rate m.                          (springs.5)
 ///
@@ -14,12 +15,16 @@ pub struct Drag {
     pub rate: f64,
 }
 
+impl Each for &Drag {
+    #[inline(always)]
+    fn at<L: Lane>(&self, mass: L, v: L, _: L, force: L) -> L {
+        force - (mass.like(self.coefficient) + mass.like(self.rate) * mass) * v
+    }
+}
+
 impl Force for Drag {
     fn add(&self, _t: f64, mass: &[Real], _x: &[Row], v: &[Row], force: &mut [Row]) {
-        let (coefficient, rate) = (self.coefficient as Real, self.rate as Real);
-        for ((f, m), v) in force.iter_mut().zip(mass).zip(v) {
-            *f = axpy(*f, -(coefficient + rate * m), *v);
-        }
+        rows::each(force, mass, v, ZERO, self);
     }
 
     fn matrix(&self, _t: f64, mass: f64, _x: Vec3<f64>, _v: Vec3<f64>) -> (Block, Block) {

@@ -9,7 +9,8 @@ pub use drag::Drag;
 pub use field::Flow;
 
 use crate::elements::Block;
-use crate::math::{Real, Row, Vec3};
+use crate::math::rows::{self, Each};
+use crate::math::{Lane, Real, Row, Vec3};
 
 /// A force on every mass by itself. Slices are the rows of the masses it acts on.
 pub trait Force: Send + Sync {
@@ -28,12 +29,17 @@ pub trait Force: Send + Sync {
 /// A uniform acceleration, f = m a.
 pub struct Acceleration(pub [f64; 3]);
 
+impl Each for &Acceleration {
+    #[inline(always)]
+    fn at<L: Lane>(&self, mass: L, _: L, acceleration: L, force: L) -> L {
+        force + mass * acceleration
+    }
+}
+
 impl Force for Acceleration {
-    fn add(&self, _t: f64, mass: &[Real], _x: &[Row], _v: &[Row], force: &mut [Row]) {
-        let a = self.0.map(|a| a as Real);
-        for (f, m) in force.iter_mut().zip(mass) {
-            *f = [f[0] + m * a[0], f[1] + m * a[1], f[2] + m * a[2], f[3]];
-        }
+    fn add(&self, _t: f64, mass: &[Real], x: &[Row], _v: &[Row], force: &mut [Row]) {
+        let [ax, ay, az] = self.0.map(|a| a as Real);
+        rows::each(force, mass, x, [ax, ay, az, 0.0], self);
     }
 
     fn energy(&self, _t: f64, mass: f64, x: Vec3<f64>) -> f64 {

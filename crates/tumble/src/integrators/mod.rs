@@ -14,8 +14,7 @@ pub mod stability;
 pub use adaptive::adaptive_step;
 pub use runge_kutta::{DORMAND_PRINCE, Tableau, tableau};
 
-use crate::math::parallel::chunks2;
-use crate::math::{Real, Row, ZERO, axpy, rotation, xyz};
+use crate::math::{Real, Row, ZERO, axpy, rotation, rows, xyz};
 use tumble_interface::StepError;
 use tumble_interface::engine::StepReport;
 use tumble_interface::scene::Integrator;
@@ -30,13 +29,13 @@ pub struct Kinematics {
 }
 
 impl Kinematics {
-    /// Moves x along v for the time h: points straight, frames turning at constant rate.
-    pub fn drift(self, x: &mut [Row], v: &mut [Row], h: Real) {
-        chunks2(x, v, |start, x, v| {
-            for (i, (x, v)) in x.iter_mut().zip(v).enumerate() {
-                *x = self.moved(start + i, *x, *v, h);
-            }
-        });
+    /// Moves the rows from `start` on along v for the time h: points straight, frames turning at constant rate.
+    pub fn drift(self, start: usize, x: &mut [Row], v: &[Row], h: Real) {
+        let points = self.points.saturating_sub(start).min(x.len());
+        rows::axpy(&mut x[..points], h, &v[..points]);
+        for (x, v) in x.iter_mut().zip(v).skip(points) {
+            *x = rotation::turn(*x, xyz(*v) * h);
+        }
     }
 
     /// One row of [`Kinematics::drift`].

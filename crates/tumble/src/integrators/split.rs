@@ -4,7 +4,7 @@
 
 use super::{Equation, Scratch};
 use crate::math::parallel::{chunks, chunks2};
-use crate::math::{Real, Row, add, axpy, scale, sub};
+use crate::math::{Real, Row, add, axpy, rows, scale, sub};
 use tumble_interface::StepError;
 
 /// v += h a(t, x, v), then x += h v.                                   (integrators.2)
@@ -22,10 +22,8 @@ pub(super) fn symplectic_euler(
     equation.rate(t, x, v, a)?;
     let (kinematics, h, a) = (equation.kinematics(), h as Real, &*a);
     chunks2(x, v, |start, x, v| {
-        for (i, (x, v)) in x.iter_mut().zip(v).enumerate() {
-            *v = axpy(*v, h, a[start + i]);
-            *x = kinematics.moved(start + i, *x, *v, h);
-        }
+        rows::axpy(v, h, &a[start..start + v.len()]);
+        kinematics.drift(start, x, v, h);
     });
     Ok(())
 }
@@ -46,11 +44,11 @@ pub(super) fn modified_euler(
     equation.rate(t, x, v, a)?;
     let (kinematics, h, a) = (equation.kinematics(), h as Real, &*a);
     chunks2(x, v, |start, x, v| {
-        for (i, (x, v)) in x.iter_mut().zip(v).enumerate() {
-            let after = axpy(*v, h, a[start + i]);
-            *x = kinematics.moved(start + i, *x, scale(add(*v, after), 0.5), h);
-            *v = after;
-        }
+        // After half a kick the velocity is the mean of the two.
+        let a = &a[start..start + v.len()];
+        rows::axpy(v, h / 2.0, a);
+        kinematics.drift(start, x, v, h);
+        rows::axpy(v, h / 2.0, a);
     });
     Ok(())
 }
@@ -84,18 +82,30 @@ pub(super) fn verlet(
             }
         });
     }
-    for i in 0..x.len() {
-        let after = if i < points {
-            axpy(sub(add(x[i], x[i]), before[i]), h * h, a[i])
-        } else {
-            kinematics.moved(i, x[i], axpy(v[i], half, a[i]), h)
-        };
+    {
+        let (v, a) = (&*v, &**a);
+        chunks2(x, before, |start, x, before| {
+            for (i, (x, before)) in x.iter_mut().zip(before).enumerate() {
+                let i = start + i;
+                let after = if i < points {
+                    axpy(sub(add(*x, *x), *before), h * h, a[i])
+                } else {
+                    kinematics.moved(i, *x, axpy(v[i], half, a[i]), h)
+                };
+                *before = std::mem::replace(x, after);
+            }
+        });
+    }
+    {
         // The velocity without its last half kick, and a first-order guess of the whole for forces that depend on it.
-        let drift = if i < points { scale(sub(after, x[i]), 1.0 / h) } else { axpy(v[i], half, a[i]) };
-        guess[i] = axpy(drift, half, a[i]);
-        v[i] = drift;
-        before[i] = x[i];
-        x[i] = after;
+        let (x, before, a) = (&*x, &**before, &**a);
+        chunks2(v, guess, |start, v, guess| {
+            for (i, (v, guess)) in v.iter_mut().zip(guess).enumerate() {
+                let i = start + i;
+                *v = if i < points { scale(sub(x[i], before[i]), 1.0 / h) } else { axpy(*v, half, a[i]) };
+                *guess = axpy(*v, half, a[i]);
+            }
+        });
     }
     equation.rate(time, x, guess, a)?;
     kick(v, half, a);
@@ -126,11 +136,10 @@ pub(super) fn velocity_verlet(
     {
         let (v, a) = (&*v, &**a);
         chunks2(x, guess, |start, x, guess| {
-            for (i, (x, guess)) in x.iter_mut().zip(guess).enumerate() {
-                let i = start + i;
-                *x = kinematics.moved(i, *x, v[i], h);
-                *guess = axpy(v[i], half, a[i]);
-            }
+            let rows = start..start + x.len();
+            kinematics.drift(start, x, &v[rows.clone()], h);
+            guess.copy_from_slice(&v[rows.clone()]);
+            rows::axpy(guess, half, &a[rows]);
         });
     }
     equation.rate(after, x, guess, a)?;
@@ -141,8 +150,6 @@ pub(super) fn velocity_verlet(
 /// v += h a.
 fn kick(v: &mut [Row], h: Real, a: &[Row]) {
     chunks(v, |start, v| {
-        for (i, v) in v.iter_mut().enumerate() {
-            *v = axpy(*v, h, a[start + i]);
-        }
+        rows::axpy(v, h, &a[start..start + v.len()]);
     });
 }

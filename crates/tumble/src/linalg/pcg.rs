@@ -3,16 +3,18 @@
 //! Vectors are in the engine's scalar, all products in double precision over fixed chunks, so that the iterates have the
 //! same bits on any number of threads. Source: [shewchuk1994], B3; negative curvature: [nocedal2006], 7.1.
 
-use crate::math::parallel::{CHUNK, sum};
-use crate::math::{Real, Row, ZERO, add, axpy};
+use crate::math::parallel::{CHUNK, chunks, sum};
+use crate::math::{Real, Row, ZERO, rows};
 use rayon::prelude::*;
 
-/// A symmetric operator and its preconditioner.
+/// A symmetric operator and its preconditioner, chunk by chunk: `start` is a multiple of CHUNK.
 pub trait Operator {
-    /// out = A u.
-    fn apply(&mut self, u: &[Row], out: &mut [Row]);
-    /// An approximation of A^-1 r, row by row.
-    fn precondition(&self, i: usize, r: Row) -> Row;
+    /// Prepares the product with u.
+    fn begin(&mut self, _u: &[Row]) {}
+    /// out = A u on the rows from `start` on; u is as begun with.
+    fn apply(&self, u: &[Row], start: usize, out: &mut [Row]);
+    /// out = an approximation of A^-1 r on the rows from `start` on.
+    fn precondition(&self, start: usize, r: &[Row], out: &mut [Row]);
 }
 
 /// When to stop.
@@ -54,12 +56,8 @@ pub fn solve(operator: &mut (impl Operator + Sync), b: &[Row], x: &mut [Row], pa
     let Workspace { r, p, q } = work;
     x.fill(ZERO);
     r.copy_from_slice(b);
-    p.par_chunks_mut(CHUNK).enumerate().for_each(|(c, p)| {
-        for (k, p) in p.iter_mut().enumerate() {
-            *p = operator.precondition(c * CHUNK + k, b[c * CHUNK + k]);
-        }
-    });
-    let first = product(r, p);
+    chunks(p, |start, p| operator.precondition(start, &b[start..start + p.len()], p));
+    let first = sum(n, |range| rows::dot(&r[range.clone()], &p[range]));
     let mut info = Info { residual: 1.0, ..Info::default() };
     let mut rz = first;
     if first.is_nan() || first <= 0.0 {
@@ -67,8 +65,12 @@ pub fn solve(operator: &mut (impl Operator + Sync), b: &[Row], x: &mut [Row], pa
         return info;
     }
     while info.iterations < params.iterations {
-        operator.apply(p, q);
-        let curvature = product(p, q);
+        operator.begin(p);
+        let (direction, a) = (&p[..], &*operator);
+        let curvature = chunk_sum(q, |start, q| {
+            a.apply(direction, start, q);
+            rows::dot(&direction[start..start + q.len()], q)
+        });
         if curvature.is_nan() || curvature <= 0.0 {
             info.indefinite = true;
             if info.iterations == 0 {
@@ -86,54 +88,15 @@ pub fn solve(operator: &mut (impl Operator + Sync), b: &[Row], x: &mut [Row], pa
         // q holds the preconditioned residual now.
         let beta = (after / rz) as Real;
         rz = after;
-        let q = &*q;
-        p.par_chunks_mut(CHUNK).zip(q.par_chunks(CHUNK)).for_each(|(p, z)| {
-            for (p, z) in p.iter_mut().zip(z) {
-                *p = axpy(*z, beta, *p);
-            }
-        });
+        let z = &*q;
+        chunks(p, |start, p| rows::xpby(p, beta, &z[start..start + p.len()]));
     }
     info
 }
 
-fn product(a: &[Row], b: &[Row]) -> f64 {
-    sum(a.len(), |range| {
-        let mut total = Total::default();
-        for (a, b) in a[range.clone()].chunks(BLOCK).zip(b[range].chunks(BLOCK)) {
-            let mut block = ZERO;
-            for (a, b) in a.iter().zip(b) {
-                block = add(block, product_of(*a, *b));
-            }
-            total.add(block);
-        }
-        total.sum()
-    })
-}
-
-/// Rows whose products are added in the engine's scalar before they join a sum in double precision: conversions would
-/// cost more than the products.
-const BLOCK: usize = 8;
-
-/// Four sums in double precision, side by side.
-#[derive(Default)]
-struct Total([f64; 4]);
-
-impl Total {
-    #[inline(always)]
-    fn add(&mut self, block: Row) {
-        for i in 0..4 {
-            self.0[i] += f64::from(block[i]);
-        }
-    }
-
-    fn sum(self) -> f64 {
-        (self.0[0] + self.0[1]) + (self.0[2] + self.0[3])
-    }
-}
-
-#[inline(always)]
-fn product_of(a: Row, b: Row) -> Row {
-    [a[0] * b[0], a[1] * b[1], a[2] * b[2], a[3] * b[3]]
+/// The sum of `f(start, chunk)` over the chunks of `a`, added in order.
+fn chunk_sum(a: &mut [Row], f: impl Fn(usize, &mut [Row]) -> f64 + Sync) -> f64 {
+    a.par_chunks_mut(CHUNK).enumerate().map(|(c, a)| f(c * CHUNK, a)).collect::<Vec<f64>>().iter().sum()
 }
 
 /// x += alpha p, r -= alpha q, q = preconditioned r; returns r . q. One pass over memory.
@@ -144,18 +107,10 @@ fn update(operator: &(impl Operator + Sync), alpha: Real, x: &mut [Row], r: &mut
         .zip(p.par_chunks(CHUNK).zip(q.par_chunks_mut(CHUNK)))
         .enumerate()
         .map(|(c, ((x, r), (p, q)))| {
-            let (mut total, mut block) = (Total::default(), ZERO);
-            for (k, ((x, r), (p, q))) in x.iter_mut().zip(r).zip(p.iter().zip(q)).enumerate() {
-                *x = axpy(*x, alpha, *p);
-                *r = axpy(*r, -alpha, *q);
-                *q = operator.precondition(c * CHUNK + k, *r);
-                block = add(block, product_of(*r, *q));
-                if k % BLOCK == BLOCK - 1 {
-                    total.add(std::mem::replace(&mut block, ZERO));
-                }
-            }
-            total.add(block);
-            total.sum()
+            rows::axpy(x, alpha, p);
+            rows::axpy(r, -alpha, q);
+            operator.precondition(c * CHUNK, r, q);
+            rows::dot(r, q)
         })
         .collect();
     parts.iter().sum()
@@ -169,7 +124,7 @@ mod tests {
     struct Line(usize);
 
     impl Operator for Line {
-        fn apply(&mut self, u: &[Row], out: &mut [Row]) {
+        fn apply(&self, u: &[Row], _start: usize, out: &mut [Row]) {
             for i in 0..self.0 {
                 for c in 0..3 {
                     let at = |j: usize| if j < self.0 { u[j][c] } else { 0.0 };
@@ -177,8 +132,10 @@ mod tests {
                 }
             }
         }
-        fn precondition(&self, _: usize, r: Row) -> Row {
-            [r[0] / 2.0, r[1] / 4.0, r[2] / 6.0, 0.0]
+        fn precondition(&self, _: usize, r: &[Row], out: &mut [Row]) {
+            for (o, r) in out.iter_mut().zip(r) {
+                *o = [r[0] / 2.0, r[1] / 4.0, r[2] / 6.0, 0.0];
+            }
         }
     }
 
@@ -203,11 +160,11 @@ mod tests {
     struct Indefinite;
 
     impl Operator for Indefinite {
-        fn apply(&mut self, u: &[Row], out: &mut [Row]) {
+        fn apply(&self, u: &[Row], _start: usize, out: &mut [Row]) {
             out[0] = [-u[0][0], u[0][1], u[0][2], 0.0];
         }
-        fn precondition(&self, _: usize, r: Row) -> Row {
-            r
+        fn precondition(&self, _: usize, r: &[Row], out: &mut [Row]) {
+            out.copy_from_slice(r);
         }
     }
 

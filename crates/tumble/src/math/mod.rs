@@ -6,6 +6,7 @@ pub mod lane;
 pub mod parallel;
 pub mod quat;
 pub mod rotation;
+pub mod rows;
 pub mod simd;
 pub mod vec3;
 

@@ -54,7 +54,26 @@ pub trait Width: Copy + Send + Sync {
     fn scatter(self, v: [Self::L; 4], rows: &mut [Row], start: usize, stride: usize);
     /// Loads N consecutive rows from `start`.
     fn rows(self, rows: &[Row], start: usize) -> [Self::L; 4];
+    /// For N consecutive numbers of a column of rows, the first of them number `at`: the number of each one's row.
+    fn spread(self, of_rows: &[Real], at: usize) -> Self::L;
 }
+
+/// Runs `$body` with `$w` and the first number `$e` of each pack of `$range`, then one by one.
+macro_rules! packs {
+    ($width:ident, $w:ident, $range:expr, |$e:ident| $body:expr) => {{
+        let mut $e = $range.start;
+        while $e + $width::N <= $range.end {
+            $body;
+            $e += $width::N;
+        }
+        let $w = $crate::math::simd::Scalar;
+        while $e < $range.end {
+            $body;
+            $e += 1;
+        }
+    }};
+}
+pub(crate) use packs;
 
 /// A kernel, generic over the register width.
 pub trait Kernel {
@@ -95,6 +114,10 @@ impl Width for Scalar {
     #[inline(always)]
     fn rows(self, rows: &[Row], start: usize) -> [Real; 4] {
         rows[start]
+    }
+    #[inline(always)]
+    fn spread(self, of_rows: &[Real], at: usize) -> Real {
+        of_rows[at / 4]
     }
 }
 
@@ -298,6 +321,12 @@ mod x86 {
                     }
                     self.transpose(picked)
                 }
+                #[inline(always)]
+                fn spread(self, of_rows: &[Real], at: usize) -> Self::L {
+                    let mut numbers = [0.0; $n / 4];
+                    numbers.copy_from_slice(&of_rows[at / 4..at / 4 + $n / 4]);
+                    self.each_four_times(numbers)
+                }
             }
         };
     }
@@ -305,6 +334,9 @@ mod x86 {
     /// Rows of four numbers to four registers and back.
     trait Transpose: Simd {
         type Rows;
+        type OfRows;
+        /// a a a a b b b b ...
+        fn each_four_times(self, numbers: Self::OfRows) -> Pack<Self>;
         fn transpose(self, rows: Self::Rows) -> [Pack<Self>; 4];
         fn untranspose(self, v: [Pack<Self>; 4]) -> Self::Rows;
     }
@@ -338,6 +370,11 @@ mod x86 {
 
         impl Transpose for V3 {
             type Rows = [Row; 8];
+            type OfRows = [f32; 2];
+            #[inline(always)]
+            fn each_four_times(self, [a, b]: [f32; 2]) -> Pack<Self> {
+                Pack { simd: self, v: cast([a, a, a, a, b, b, b, b]) }
+            }
             #[inline(always)]
             fn transpose(self, r: [Row; 8]) -> [Pack<Self>; 4] {
                 let s = self.avx;
@@ -364,6 +401,13 @@ mod x86 {
 
         impl Transpose for V4 {
             type Rows = [Row; 16];
+            type OfRows = [f32; 4];
+            #[inline(always)]
+            fn each_four_times(self, numbers: [f32; 4]) -> Pack<Self> {
+                let s = self.avx512f;
+                let place = cast([0_i32, 0, 0, 0, 1, 1, 1, 1, 2, 2, 2, 2, 3, 3, 3, 3]);
+                Pack { simd: self, v: cast(s._mm512_permutexvar_ps(place, s._mm512_castps128_ps512(cast(numbers)))) }
+            }
             #[inline(always)]
             fn transpose(self, r: [Row; 16]) -> [Pack<Self>; 4] {
                 let s = self.avx512f;
@@ -417,6 +461,11 @@ mod x86 {
 
         impl Transpose for V3 {
             type Rows = [Row; 4];
+            type OfRows = [f64; 1];
+            #[inline(always)]
+            fn each_four_times(self, [a]: [f64; 1]) -> Pack<Self> {
+                Pack { simd: self, v: self.splat_f64s(a) }
+            }
             #[inline(always)]
             fn transpose(self, r: [Row; 4]) -> [Pack<Self>; 4] {
                 let [x, y, z, w] = four_by_four(self.avx, cast(r[0]), cast(r[1]), cast(r[2]), cast(r[3]));
@@ -431,6 +480,11 @@ mod x86 {
 
         impl Transpose for V4 {
             type Rows = [Row; 8];
+            type OfRows = [f64; 2];
+            #[inline(always)]
+            fn each_four_times(self, [a, b]: [f64; 2]) -> Pack<Self> {
+                Pack { simd: self, v: cast([a, a, a, a, b, b, b, b]) }
+            }
             #[inline(always)]
             fn transpose(self, r: [Row; 8]) -> [Pack<Self>; 4] {
                 let s = self.avx512f;

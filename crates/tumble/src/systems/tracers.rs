@@ -213,9 +213,9 @@ impl System for Tracers {
     }
 
     fn save(&self, archive: &mut Archive) {
-        archive.push("x", Part::Rows(self.x.clone()));
+        archive.push_rows("x", &self.x);
         for column in &self.memory.columns {
-            archive.push("memory", Part::Rows(column.clone()));
+            archive.push_rows("memory", column);
         }
         let ready = f64::from(u8::from(self.memory.ready));
         archive.push("numbers", Part::Numbers(vec![ready, self.memory.next_step, self.memory.last_error]));

@@ -57,6 +57,40 @@ impl Scale {
     }
 }
 
+/// What points add up to, in one pass.
+#[derive(Default)]
+struct Sums {
+    mass: f64,
+    momentum: Vec3<f64>,
+    angular: Vec3<f64>,
+    kinetic: f64,
+    speed_sq: f64,
+}
+
+impl Sums {
+    fn of(mass: &[Real], x: &[Row], v: &[Row]) -> Self {
+        let mut sums = Self::default();
+        for ((m, x), v) in mass.iter().zip(x).zip(v) {
+            let (m, x, v) = (f64::from(*m), xyz64(*x), xyz64(*v));
+            let (p, speed_sq) = (v * m, v.norm_sq());
+            sums.mass += m;
+            sums.momentum = sums.momentum + p;
+            sums.angular = sums.angular + x.cross(p);
+            sums.kinetic += 0.5 * m * speed_sq;
+            sums.speed_sq = sums.speed_sq.max(speed_sq);
+        }
+        sums
+    }
+
+    fn add(&mut self, other: &Self) {
+        self.mass += other.mass;
+        self.momentum = self.momentum + other.momentum;
+        self.angular = self.angular + other.angular;
+        self.kinetic += other.kinetic;
+        self.speed_sq = self.speed_sq.max(other.speed_sq);
+    }
+}
+
 impl Dynamics {
     pub(super) fn write_columns(&self, names: &[&str], out: &mut Vec<Column>) {
         for object in &self.objects {
@@ -102,31 +136,16 @@ impl Dynamics {
     pub(super) fn books(&self, t: f64) -> Ledger {
         let (x, v, masses) = (&self.state.x, &self.state.v, &self.laws.masses);
         let n = masses.points;
-        let mass = |i: usize| f64::from(masses.mass[i]);
-        let mut momentum = Vec3::<f64>::default();
-        let mut angular = Vec3::<f64>::default();
-        let parts = fold(n, |range| {
-            let (mut p, mut l) = (Vec3::<f64>::default(), Vec3::<f64>::default());
-            for i in range {
-                let mv = xyz64(v[i]) * mass(i);
-                p = p + mv;
-                l = l + xyz64(x[i]).cross(mv);
-            }
-            (p, l)
-        });
-        for (p, l) in parts {
-            momentum = momentum + p;
-            angular = angular + l;
+        let mut total = Sums::default();
+        for part in fold(n, |range| Sums::of(&masses.mass[range.clone()], &x[range.clone()], &v[range])) {
+            total.add(&part);
         }
         for i in n..x.len() {
-            angular = angular + Quat::from_row(x[i].map(f64::from)).turn(xyz64(v[i]) * mass(i));
+            let (inertia, turning) = (f64::from(masses.mass[i]), xyz64(v[i]));
+            total.angular = total.angular + Quat::from_row(x[i].map(f64::from)).turn(turning * inertia);
+            total.kinetic += 0.5 * inertia * turning.norm_sq();
         }
-        let stretch = self
-            .laws
-            .batches
-            .iter()
-            .flat_map(|b| b.link_strain(x))
-            .fold(0.0_f64, |m, s| if f64::from(s) + 1.0 > m { f64::from(s) + 1.0 } else { m });
+        let stretch = self.laws.batches.iter().map(|b| b.largest_strain(x) + 1.0).fold(0.0, f64::max);
         let depths = |i: usize| {
             let p = xyz64(x[i]);
             self.laws.colliders.iter().filter_map(move |c| c.touch(p)).map(|t| t.depth)
@@ -134,15 +153,15 @@ impl Dynamics {
         let touching = !self.laws.colliders.is_empty();
         Ledger {
             time: t,
-            mass: sum(n, |range| range.map(mass).sum()),
-            momentum: momentum.into(),
-            angular_momentum: angular.into(),
-            kinetic: sum(x.len(), |range| range.map(|i| 0.5 * mass(i) * xyz64(v[i]).norm_sq()).sum()),
+            mass: total.mass,
+            momentum: total.momentum.into(),
+            angular_momentum: total.angular.into(),
+            kinetic: total.kinetic,
             elastic: self.laws.batches.iter().map(|b| b.energy(x)).sum(),
             external: self.laws.external_energy(t, x),
             stretch,
             penetration: if touching { max(n, |range| range.flat_map(depths).fold(0.0, f64::max)).max(0.0) } else { 0.0 },
-            speed: max(n, |range| range.map(|i| xyz64(v[i]).norm_sq()).fold(0.0, f64::max)).max(0.0).sqrt(),
+            speed: total.speed_sq.sqrt(),
             contacts: if touching { sum(n, |range| range.filter(|i| depths(*i).next().is_some()).count() as f64) as u64 } else { 0 },
             broken: self.broken,
         }
@@ -166,23 +185,29 @@ impl Dynamics {
         1e3 * sum(x.len(), |range| range.map(|i| f64::from(grip[i]) * rounding(i) * rounding(i)).sum())
     }
 
-    /// Takes the scale of the energy from a good frame. Energy that came from nowhere does not count, or a slow explosion
-    /// would carry its scale along; where others push, nobody knows where energy came from.
-    pub(super) fn rescale(&mut self, t: f64) {
-        let books = self.books(t);
+    /// Takes the scale of the energy from the books of a good frame. Energy that came from nowhere does not count, or a slow
+    /// explosion would carry its scale along; where others push, nobody knows where energy came from.
+    pub(super) fn rescale(&mut self, books: &Ledger) {
         let driven = self.pushed || !self.laws.user.is_empty();
         let gain = if driven { 0.0 } else { (books.energy() - self.scale.start).max(0.0) };
         let external = (books.external - self.scale.external).abs();
-        self.scale.widen(books.kinetic.max(books.elastic).max(external) - gain, self.noise());
+        let energy = books.kinetic.max(books.elastic).max(external) - gain;
+        if energy > self.scale.size {
+            self.scale.widen(energy, self.noise());
+        }
     }
 
-    pub(super) fn broken_down(&self, t: f64) -> Option<StepError> {
+    /// The books at time t [s], or what has broken down.
+    pub(super) fn checked_books(&self, t: f64) -> Result<Ledger, StepError> {
         let state = &self.state;
+        let books = self.books(t);
+        // One number that is not finite makes these sums so.
+        let finite = books.kinetic.is_finite() && books.angular_momentum.iter().all(|l| l.is_finite());
         let bad = |rows: &[Row]| fold(rows.len(), |mut range| range.find(|i| !is_finite(rows[*i]))).into_iter().flatten().next();
-        let mut found =
-            [("position", bad(&state.x)), ("velocity", bad(&state.v))].into_iter().find_map(|(column, i)| Some((column, i?, None)));
+        let columns = [("position", &state.x), ("velocity", &state.v)];
+        let search = || columns.into_iter().find_map(|(column, rows)| Some((column, bad(rows)?, None)));
+        let mut found = if finite { None } else { search() };
         if found.is_none() {
-            let books = self.books(t);
             let ratio = self.scale.growth(&books).filter(|g| *g > BLOW_UP || g.is_nan());
             if let Some(ratio) = ratio {
                 let fastest =
@@ -190,7 +215,7 @@ impl Dynamics {
                 found = Some(("velocity", fastest.unwrap_or(0), Some(ratio)));
             }
         }
-        let (column, i, energy_ratio) = found?;
+        let Some((column, i, energy_ratio)) = found else { return Ok(books) };
         let (object, index) = self.whose(i);
         let breakdown = Box::new(Breakdown {
             system: self.name().into(),
@@ -203,7 +228,7 @@ impl Dynamics {
             stable_step: 0.0,
             energy_ratio,
         });
-        Some(if energy_ratio.is_none() { StepError::NotFinite(breakdown) } else { StepError::Exploded(breakdown) })
+        Err(if energy_ratio.is_none() { StepError::NotFinite(breakdown) } else { StepError::Exploded(breakdown) })
     }
 
     /// Object and index within it of a row.

@@ -2,8 +2,9 @@
 
 use super::contact::{self, Penalty};
 use super::laws::Laws;
-use crate::elements::{Batch, Block, Weights};
+use crate::elements::{Batch, Weights};
 use crate::integrators::newton::{self, Linear, Stiff};
+use crate::linalg::blocks::{Block, Blocks};
 use crate::linalg::cholesky::{Assembly, Cholesky};
 use crate::linalg::pcg::{self, Operator, Params};
 use crate::math::parallel::{chunks, sum};
@@ -19,40 +20,33 @@ pub struct Implicit {
     cholesky: Cholesky,
     /// Per row: mass, forces on each mass by itself and contact.
     local: Vec<Block>,
+    local_columns: Blocks,
     /// Per row: the inverse of the whole diagonal block; zero for a pinned row.
     inverse: Vec<Block>,
+    inverse_columns: Blocks,
 }
 
-/// The matrix as an operator.
+/// The matrix as an operator, with block Jacobi: a pinned row gets 0, so that what the residual holds there never matters.
 struct Matrix<'a> {
     batches: &'a mut [Box<dyn Batch>],
     x: &'a [Row],
-    local: &'a [Block],
-    inverse: &'a [Block],
+    local: &'a Blocks,
+    inverse: &'a Blocks,
 }
 
 impl Operator for Matrix<'_> {
-    fn apply(&mut self, u: &[Row], out: &mut [Row]) {
-        let local = self.local;
-        chunks(out, |start, out| {
-            for (k, o) in out.iter_mut().enumerate() {
-                *o = times(&local[start + k], u[start + k]);
-            }
-        });
-        for batch in self.batches.iter_mut() {
-            batch.add_product(self.x, u, out);
-        }
+    fn begin(&mut self, u: &[Row]) {
+        self.batches.iter_mut().for_each(|b| b.begin_product(self.x, u));
     }
 
-    /// Block Jacobi. A pinned row gets 0, so that what the residual holds there never matters.
-    fn precondition(&self, i: usize, r: Row) -> Row {
-        times(&self.inverse[i], r)
+    fn apply(&self, u: &[Row], start: usize, out: &mut [Row]) {
+        self.local.multiply(start, &u[start..start + out.len()], out);
+        self.batches.iter().for_each(|b| b.add_product(u, start, out));
     }
-}
 
-#[inline(always)]
-fn times(b: &Block, u: Row) -> Row {
-    [b[0] * u[0] + b[3] * u[1] + b[5] * u[2], b[3] * u[0] + b[1] * u[1] + b[4] * u[2], b[5] * u[0] + b[4] * u[1] + b[2] * u[2], 0.0]
+    fn precondition(&self, start: usize, r: &[Row], out: &mut [Row]) {
+        self.inverse.multiply(start, r, out);
+    }
 }
 
 /// The inverse of a symmetric block, by cofactors in double precision; the inverse of its diagonal if it is not
@@ -122,6 +116,8 @@ impl Implicit {
             add_block(diagonal, [m, m, m, 0.0, 0.0, 0.0], 1.0);
             *diagonal = if *w > 0.0 { inverse(diagonal) } else { [0.0; 6] };
         }
+        self.local_columns.set(&self.local);
+        self.inverse_columns.set(&self.inverse);
         noise.sqrt()
     }
 
@@ -146,7 +142,7 @@ impl Implicit {
         }
         let tolerance = settings.linear_tolerance.unwrap_or(if cfg!(feature = "double") { 1e-6 } else { 1e-2 });
         let params = Params { tolerance, iterations: settings.linear_iterations as usize };
-        let mut matrix = Matrix { batches: &mut laws.batches, x, local: &self.local, inverse: &self.inverse };
+        let mut matrix = Matrix { batches: &mut laws.batches, x, local: &self.local_columns, inverse: &self.inverse_columns };
         let info = pcg::solve(&mut matrix, rhs, out, params, &mut self.pcg);
         Linear { iterations: info.iterations, indefinite: info.indefinite }
     }
@@ -206,9 +202,15 @@ mod tests {
     #[test]
     fn blocks_are_inverted() {
         let b: Block = [4.0, 3.0, 5.0, 1.0, -0.5, 0.3];
-        let u = [1.0, -2.0, 0.5, 0.0];
-        let back = times(&inverse(&b), times(&b, u));
-        assert!((0..3).all(|i| (back[i] - u[i]).abs() < 1e-5), "{back:?}");
+        let u = [[1.0, -2.0, 0.5, 0.0]];
+        let times = |block: Block, u: [Row; 1]| {
+            let (mut blocks, mut out) = (Blocks::default(), [ZERO]);
+            blocks.set(&[block]);
+            blocks.multiply(0, &u, &mut out);
+            out
+        };
+        let back = times(inverse(&b), times(b, u));
+        assert!((0..3).all(|i| (back[0][i] - u[0][i]).abs() < 1e-5), "{back:?}");
         assert_eq!(inverse(&[2.0, -4.0, 0.0, 0.0, 0.0, 0.0]), [0.5, 0.25, 1.0, 0.0, 0.0, 0.0]);
     }
 }

@@ -6,7 +6,8 @@ use crate::forces::Force;
 use crate::geometry::Collider;
 use crate::integrators::{Equation, Kinematics, Stage, newton};
 use crate::math::parallel::{chunks, sum};
-use crate::math::{Real, Row, Vec3, ZERO, xyz64};
+use crate::math::rows::{self, Each};
+use crate::math::{Lane, Real, Row, Vec3, ZERO, add, xyz64};
 use crate::state::Masses;
 use std::ops::Range;
 use std::sync::Arc;
@@ -39,8 +40,8 @@ pub struct Laws {
     pub solver: Solver,
     /// Storage of implicit stages.
     pub implicit: Implicit,
-    /// Sums of element forces; scratch.
-    pub coupled: Vec<Row>,
+    /// Users' forces, three numbers a point; scratch.
+    pub pushes: Vec<f64>,
 }
 
 impl Laws {
@@ -49,31 +50,36 @@ impl Laws {
         self.batches.is_empty() && self.user.is_empty()
     }
 
-    /// The forces of elements and users, or nothing if there are none.
-    fn couple(&mut self, t: f64, x: &[Row], v: &[Row]) -> Result<(), StepError> {
-        if self.is_local() {
+    /// Prepares the sums of forces at (x, v): elements, and users' forces.
+    fn begin(&mut self, t: f64, x: &[Row], v: &[Row]) -> Result<(), StepError> {
+        for batch in &mut self.batches {
+            batch.begin_forces(x, v);
+        }
+        if self.user.is_empty() {
             return Ok(());
         }
-        self.coupled.resize(x.len(), ZERO);
-        chunks(&mut self.coupled, |_, f| f.fill(ZERO));
-        for batch in &mut self.batches {
-            batch.add_forces(x, v, &mut self.coupled);
-        }
-        if !self.user.is_empty() {
-            let flat =
-                |rows: &[Row]| -> Vec<f64> { rows.iter().flat_map(|r| [f64::from(r[0]), f64::from(r[1]), f64::from(r[2])]).collect() };
-            let n = self.masses.points;
-            let (x, v) = (flat(&x[..n]), flat(&v[..n]));
-            let mass: Vec<f64> = self.masses.mass[..n].iter().map(|m| f64::from(*m)).collect();
-            let mut force = vec![0.0; x.len()];
-            for user in &mut self.user {
-                user.force(t, &x, &v, &mass, &mut force).map_err(StepError::User)?;
-            }
-            for (f, add) in self.coupled.iter_mut().zip(force.chunks_exact(3)) {
-                *f = [f[0] + add[0] as Real, f[1] + add[1] as Real, f[2] + add[2] as Real, 0.0];
-            }
+        let n = self.masses.points;
+        let (x, v) = (flat(&x[..n]), flat(&v[..n]));
+        let mass: Vec<f64> = self.masses.mass[..n].iter().map(|m| f64::from(*m)).collect();
+        self.pushes.clear();
+        self.pushes.resize(x.len(), 0.0);
+        for user in &mut self.user {
+            user.force(t, &x, &v, &mass, &mut self.pushes).map_err(StepError::User)?;
         }
         Ok(())
+    }
+
+    /// Forces on the rows from `start` on, gravity left out.
+    fn sum(&self, t: f64, start: usize, x: &[Row], v: &[Row], out: &mut [Row]) {
+        let end = start + out.len();
+        out.fill(ZERO);
+        for batch in &self.batches {
+            batch.add_forces(x, v, start, out);
+        }
+        for (f, push) in out.iter_mut().zip(self.pushes.get(3 * start..).unwrap_or_default().chunks_exact(3)) {
+            *f = add(*f, [push[0] as Real, push[1] as Real, push[2] as Real, 0.0]);
+        }
+        self.add_local(t, start, &self.masses.mass[start..end], &x[start..end], &v[start..end], out);
     }
 
     /// Adds the forces on each mass by itself, gravity left out, to the rows from `start` on.
@@ -90,44 +96,25 @@ impl Laws {
         }
     }
 
-    /// Starts sums of forces with those of elements and users.
-    fn take_coupled(&self, start: usize, out: &mut [Row]) {
-        match self.is_local() {
-            true => out.fill(ZERO),
-            false => out.copy_from_slice(&self.coupled[start..start + out.len()]),
-        }
-    }
-
-    /// Masses of some rows.
-    pub fn weights(&self, rows: Range<usize>) -> RowMasses<'_> {
-        RowMasses { mass: &self.masses.mass[rows.clone()], inverse: &self.masses.inverse[rows] }
-    }
-
-    /// Accelerations of the rows from `start` on; `out` holds the coupled forces.
-    fn accelerate(&self, t: f64, start: usize, weights: RowMasses<'_>, x: &[Row], v: &[Row], out: &mut [Row]) {
-        self.add_local(t, start, weights.mass, x, v, out);
-        let g = self.gravity.map(|g| g as Real);
-        let points = self.masses.points.saturating_sub(start);
-        for (i, (f, w)) in out.iter_mut().zip(weights.inverse).enumerate() {
-            let fall = if i < points && *w > 0.0 { g } else { [0.0; 3] };
-            *f = [f[0] * w + fall[0], f[1] * w + fall[1], f[2] * w + fall[2], 0.0];
-        }
+    /// Turns the forces on the rows from `start` on into accelerations.
+    fn accelerate(&self, start: usize, x: &[Row], out: &mut [Row]) {
+        let [gx, gy, gz] = self.gravity.map(|g| g as Real);
+        let inverse = &self.masses.inverse[start..start + out.len()];
+        let (points, frames) = out.split_at_mut(self.masses.points.saturating_sub(start).min(inverse.len()));
+        let (x_points, x_frames) = x.split_at(points.len());
+        rows::each(points, &inverse[..x_points.len()], x_points, [gx, gy, gz, 0.0], Weigh);
+        rows::each(frames, &inverse[x_points.len()..], x_frames, ZERO, Weigh);
     }
 
     /// Forces of everything but contact [N, N m].
     pub fn forces(&mut self, t: f64, x: &[Row], v: &[Row], out: &mut [Row]) -> Result<(), StepError> {
-        self.couple(t, x, v)?;
+        self.begin(t, x, v)?;
         let laws = &*self;
         let (g, points) = (self.gravity.map(|g| g as Real), self.masses.points);
         chunks(out, |start, out| {
-            let rows = start..start + out.len();
-            let mass = laws.weights(rows.clone()).mass;
-            laws.take_coupled(start, out);
-            laws.add_local(t, start, mass, &x[rows.clone()], &v[rows], out);
-            for (i, (f, m)) in out.iter_mut().zip(mass).enumerate() {
-                if start + i < points {
-                    *f = [f[0] + m * g[0], f[1] + m * g[1], f[2] + m * g[2], 0.0];
-                }
+            laws.sum(t, start, x, v, out);
+            for (f, m) in out.iter_mut().zip(&laws.masses.mass[start..]).take(points.saturating_sub(start)) {
+                *f = [f[0] + m * g[0], f[1] + m * g[1], f[2] + m * g[2], 0.0];
             }
         });
         Ok(())
@@ -144,13 +131,19 @@ impl Laws {
     }
 }
 
-/// Masses of the rows at hand, and their inverses, 0 for pinned ones.
-#[derive(Clone, Copy)]
-pub struct RowMasses<'a> {
-    /// [kg], [kg m²] for frames.
-    pub mass: &'a [Real],
-    /// 1/mass.
-    pub inverse: &'a [Real],
+/// The first three numbers of each row, one after the other.
+pub fn flat(rows: &[Row]) -> Vec<f64> {
+    rows.iter().flat_map(|r| [f64::from(r[0]), f64::from(r[1]), f64::from(r[2])]).collect()
+}
+
+/// f/m + g; what is pinned does not fall.
+struct Weigh;
+
+impl Each for Weigh {
+    #[inline(always)]
+    fn at<L: Lane>(&self, inverse: L, _: L, gravity: L, force: L) -> L {
+        force * inverse + inverse.positive(gravity, inverse.zero())
+    }
 }
 
 impl Equation for Laws {
@@ -159,12 +152,11 @@ impl Equation for Laws {
     }
 
     fn rate(&mut self, t: f64, x: &[Row], v: &[Row], out: &mut [Row]) -> Result<(), StepError> {
-        self.couple(t, x, v)?;
+        self.begin(t, x, v)?;
         let laws = &*self;
         chunks(out, |start, out| {
-            let rows = start..start + out.len();
-            laws.take_coupled(start, out);
-            laws.accelerate(t, start, laws.weights(rows.clone()), &x[rows.clone()], &v[rows], out);
+            laws.sum(t, start, x, v, out);
+            laws.accelerate(start, &x[start..start + out.len()], out);
         });
         Ok(())
     }
@@ -197,8 +189,8 @@ impl Equation for Local<'_> {
 
     fn rate(&mut self, t: f64, x: &[Row], v: &[Row], out: &mut [Row]) -> Result<(), StepError> {
         out.fill(ZERO);
-        let weights = self.laws.weights(self.start..self.start + x.len());
-        self.laws.accelerate(t, self.start, weights, x, v, out);
+        self.laws.add_local(t, self.start, &self.laws.masses.mass[self.start..self.start + x.len()], x, v, out);
+        self.laws.accelerate(self.start, x, out);
         Ok(())
     }
 

@@ -3,6 +3,7 @@
 use super::Dynamics;
 use crate::elements::Weights;
 use crate::integrators::stability::Mode;
+use crate::math::parallel::chunks;
 use crate::math::{Real, Row, ZERO, dot, scale, xyz64};
 use tumble_interface::scene::Hessian;
 
@@ -59,8 +60,10 @@ impl Dynamics {
         let scaled: Vec<Row> = u.iter().enumerate().map(|(i, u)| scale(*u, root(i))).collect();
         let mut out = vec![ZERO; u.len()];
         for batch in &mut self.laws.batches {
-            batch.add_product(x, &scaled, &mut out);
+            batch.begin_product(x, &scaled);
         }
+        let batches = &self.laws.batches;
+        chunks(&mut out, |start, out| batches.iter().for_each(|b| b.add_product(&scaled, start, out)));
         for (law, ranges) in &self.laws.forces {
             for i in ranges.iter().cloned().flatten() {
                 let (k, d) = law.matrix(0.0, f64::from(masses.mass[i]), xyz64(x[i]), xyz64(self.state.v[i]));
