@@ -26,9 +26,9 @@ impl Force for Attraction {
         }
     }
 
-    fn energy(&self, _t: f64, mass: f64, x: Vec3<f64>) -> f64 {
+    fn energy(&self, _t: f64, mass: f64, x: Vec3<f64>) -> Option<f64> {
         let r = (x - self.center).norm();
-        if r > 0.0 { -mass * self.gm / r } else { 0.0 }
+        Some(if r > 0.0 { -mass * self.gm / r } else { 0.0 })
     }
 
     /// m gm (1/r³ - 3 d d^T/r^5): exact, and indefinite (a tide stretches along d).

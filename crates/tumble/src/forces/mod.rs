@@ -17,9 +17,9 @@ pub trait Force: Send + Sync {
     /// Adds the forces [N] at time t [s].
     fn add(&self, t: f64, mass: &[Real], x: &[Row], v: &[Row], force: &mut [Row]);
 
-    /// Potential energy of one mass [J]; 0 for a force that has none.
-    fn energy(&self, _t: f64, _mass: f64, _x: Vec3<f64>) -> f64 {
-        0.0
+    /// Potential energy of one mass [J]; `None` for a force that has none, wherever the mass is.
+    fn energy(&self, _t: f64, _mass: f64, _x: Vec3<f64>) -> Option<f64> {
+        None
     }
 
     /// -df/dx [N/m] and -df/dv [N s/m] of one mass, for implicit schemes; a symmetric approximation will do.
@@ -42,8 +42,8 @@ impl Force for Acceleration {
         rows::each(force, mass, x, [ax, ay, az, 0.0], self);
     }
 
-    fn energy(&self, _t: f64, mass: f64, x: Vec3<f64>) -> f64 {
-        -mass * Vec3::from(self.0).dot(x)
+    fn energy(&self, _t: f64, mass: f64, x: Vec3<f64>) -> Option<f64> {
+        Some(-mass * Vec3::from(self.0).dot(x))
     }
 
     fn matrix(&self, _: f64, _: f64, _: Vec3<f64>, _: Vec3<f64>) -> (Block, Block) {

@@ -3,6 +3,7 @@
 use super::Dynamics;
 use crate::integrators::stability::limits;
 use crate::math::parallel::{fold, max, sum};
+use crate::math::simd::{Kernel, Width, dispatch};
 use crate::math::{Quat, Real, Row, Vec3, is_finite, xyz64};
 use crate::system::System;
 use tumble_interface::engine::{BLOW_UP, Ledger};
@@ -61,29 +62,72 @@ impl Scale {
 #[derive(Default)]
 struct Sums {
     mass: f64,
+    first_moment: Vec3<f64>,
     momentum: Vec3<f64>,
     angular: Vec3<f64>,
     kinetic: f64,
     speed_sq: f64,
 }
 
-impl Sums {
-    fn of(mass: &[Real], x: &[Row], v: &[Row]) -> Self {
-        let mut sums = Self::default();
-        for ((m, x), v) in mass.iter().zip(x).zip(v) {
-            let (m, x, v) = (f64::from(*m), xyz64(*x), xyz64(*v));
-            let (p, speed_sq) = (v * m, v.norm_sq());
-            sums.mass += m;
-            sums.momentum = sums.momentum + p;
-            sums.angular = sums.angular + x.cross(p);
-            sums.kinetic += 0.5 * m * speed_sq;
-            sums.speed_sq = sums.speed_sq.max(speed_sq);
+/// Points summed side by side.
+const LANES: usize = 8;
+
+/// The sums over some points. Eight of each go side by side, whatever the width of the registers.
+struct Summation<'a> {
+    mass: &'a [Real],
+    x: &'a [Row],
+    v: &'a [Row],
+}
+
+impl Kernel for Summation<'_> {
+    type Output = Sums;
+    #[inline(always)]
+    fn run<W: Width>(self, _: W) -> Sums {
+        let mut lanes = [[0.0_f64; LANES]; 12];
+        for ((mass, x), v) in self.mass.chunks(LANES).zip(self.x.chunks(LANES)).zip(self.v.chunks(LANES)) {
+            let mut rows = [[0.0_f64; LANES]; 7];
+            for j in 0..mass.len() {
+                rows[0][j] = f64::from(mass[j]);
+                for c in 0..3 {
+                    rows[1 + c][j] = f64::from(x[j][c]);
+                    rows[4 + c][j] = f64::from(v[j][c]);
+                }
+            }
+            let [m, x, y, z, u, v, w] = rows;
+            for j in 0..LANES {
+                let (px, py, pz) = (m[j] * u[j], m[j] * v[j], m[j] * w[j]);
+                let speed_sq = u[j] * u[j] + v[j] * v[j] + w[j] * w[j];
+                lanes[0][j] += m[j];
+                lanes[1][j] += m[j] * x[j];
+                lanes[2][j] += m[j] * y[j];
+                lanes[3][j] += m[j] * z[j];
+                lanes[4][j] += px;
+                lanes[5][j] += py;
+                lanes[6][j] += pz;
+                lanes[7][j] += y[j] * pz - z[j] * py;
+                lanes[8][j] += z[j] * px - x[j] * pz;
+                lanes[9][j] += x[j] * py - y[j] * px;
+                lanes[10][j] += 0.5 * m[j] * speed_sq;
+                lanes[11][j] = if speed_sq > lanes[11][j] { speed_sq } else { lanes[11][j] };
+            }
+        }
+        let mut sums = Sums::default();
+        for j in 0..LANES {
+            sums.mass += lanes[0][j];
+            sums.first_moment = sums.first_moment + Vec3 { x: lanes[1][j], y: lanes[2][j], z: lanes[3][j] };
+            sums.momentum = sums.momentum + Vec3 { x: lanes[4][j], y: lanes[5][j], z: lanes[6][j] };
+            sums.angular = sums.angular + Vec3 { x: lanes[7][j], y: lanes[8][j], z: lanes[9][j] };
+            sums.kinetic += lanes[10][j];
+            sums.speed_sq = sums.speed_sq.max(lanes[11][j]);
         }
         sums
     }
+}
 
+impl Sums {
     fn add(&mut self, other: &Self) {
         self.mass += other.mass;
+        self.first_moment = self.first_moment + other.first_moment;
         self.momentum = self.momentum + other.momentum;
         self.angular = self.angular + other.angular;
         self.kinetic += other.kinetic;
@@ -137,7 +181,7 @@ impl Dynamics {
         let (x, v, masses) = (&self.state.x, &self.state.v, &self.laws.masses);
         let n = masses.points;
         let mut total = Sums::default();
-        for part in fold(n, |range| Sums::of(&masses.mass[range.clone()], &x[range.clone()], &v[range])) {
+        for part in fold(n, |range| dispatch(Summation { mass: &masses.mass[range.clone()], x: &x[range.clone()], v: &v[range] })) {
             total.add(&part);
         }
         for i in n..x.len() {
@@ -158,7 +202,7 @@ impl Dynamics {
             angular_momentum: total.angular.into(),
             kinetic: total.kinetic,
             elastic: self.laws.batches.iter().map(|b| b.energy(x)).sum(),
-            external: self.laws.external_energy(t, x),
+            external: self.laws.external_energy(t, x) - Vec3::from(self.laws.gravity).dot(total.first_moment),
             stretch,
             penetration: if touching { max(n, |range| range.flat_map(depths).fold(0.0, f64::max)).max(0.0) } else { 0.0 },
             speed: total.speed_sq.sqrt(),

@@ -7,7 +7,7 @@ use crate::geometry::Collider;
 use crate::integrators::{Equation, Kinematics, Stage, newton};
 use crate::math::parallel::{chunks, sum};
 use crate::math::rows::{self, Each};
-use crate::math::{Lane, Real, Row, Vec3, ZERO, add, xyz64};
+use crate::math::{Lane, Real, Row, ZERO, add, xyz64};
 use crate::state::Masses;
 use std::ops::Range;
 use std::sync::Arc;
@@ -120,14 +120,13 @@ impl Laws {
         Ok(())
     }
 
-    /// Potential energy of gravity and of the forces that have one [J].
+    /// Potential energy of the forces that have one [J], gravity left out.
     pub fn external_energy(&self, t: f64, x: &[Row]) -> f64 {
-        let (g, mass) = (Vec3::from(self.gravity), &self.masses.mass);
-        let fall = sum(self.masses.points, |range| range.map(|i| -f64::from(mass[i]) * g.dot(xyz64(x[i]))).sum());
-        let one = |law: &dyn Force, range: &Range<usize>| -> f64 {
-            sum(range.len(), |part| part.map(|k| range.start + k).map(|i| law.energy(t, f64::from(mass[i]), xyz64(x[i]))).sum())
-        };
-        fall + self.forces.iter().flat_map(|(law, ranges)| ranges.iter().map(|r| one(law.as_ref(), r))).sum::<f64>()
+        let mass = &self.masses.mass;
+        let of = |law: &dyn Force, i: usize| law.energy(t, f64::from(mass[i]), xyz64(x[i]));
+        let has_one = |(law, range): &(&dyn Force, &Range<usize>)| !range.is_empty() && of(*law, range.start).is_some();
+        let all = self.forces.iter().flat_map(|(law, ranges)| ranges.iter().map(|range| (law.as_ref(), range)));
+        all.filter(has_one).map(|(law, range)| sum(range.len(), |part| part.filter_map(|k| of(law, range.start + k)).sum())).sum()
     }
 }
 
