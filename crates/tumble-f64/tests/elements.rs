@@ -62,6 +62,11 @@ fn cases() -> Vec<Case> {
         Members { nodes: [2, 3, 4, 5], rest: [0.0], law: [], stiffness: 0.5, damping: 0.0 },
     ];
     add(batch::<Hinge, Linear, 4, 1, 1, 0>(6, &hinges), points(6), 6, true);
+    // Almost folded onto itself, from either side.
+    for side in [0.05, -0.05] {
+        let x = [[0.0, 0.0, 0.0], [0.1, 1.0, 0.0], [1.1, 0.4, 0.0], [0.9, 0.6, side]].map(|p| row(p.into(), 0.0));
+        add(batch::<Hinge, Linear, 4, 1, 1, 0>(4, &hinges[..1]), x.to_vec(), 4, true);
+    }
     let rest: Vec<Row> = points(4);
     let (b, volume) = rest_matrix([0, 1, 2, 3].map(|i| xyz(rest[i])));
     assert!(volume.abs() > 0.01);
@@ -333,6 +338,27 @@ fn a_projected_spring_moves_as_computed_by_hand() {
     let mut y = short.clone();
     limit.project(&mut y, 0.1);
     assert_eq!(y, short);
+}
+
+#[test]
+fn a_hinge_turns_through_a_whole_fold() {
+    // E = k/2 (2 sin(theta/2))² = k (1 - cos theta), and the moment is its slope k sin(theta), at every angle.
+    let k = 1.5;
+    let member = [Members { nodes: [0, 1, 2, 3], rest: [0.0], law: [], stiffness: k, damping: 0.0 }];
+    let mut hinge = batch::<Hinge, Linear, 4, 1, 1, 0>(4, &member);
+    for step in 0..=64 {
+        let theta = f64::from(step - 32) / 32.0 * std::f64::consts::PI;
+        let x = [[0.0, 0.0, 0.0], [0.0, 2.0, 0.0], [-1.0, 0.7, 0.0], [theta.cos(), 1.1, -theta.sin()]].map(|p| row(p.into(), 0.0));
+        let energy = hinge.energy(&x);
+        assert!((energy - k * (1.0 - theta.cos())).abs() < 1e-14, "{theta}: {energy}");
+        let f = xyz(forces(hinge.as_mut(), &x, &[ZERO; 4])[3]);
+        let along = Vec3 { x: -theta.sin(), y: 0.0, z: -theta.cos() };
+        assert!((f - along * (-k * theta.sin())).norm() < 1e-13, "{theta}: {f:?}");
+        hinge.linearize(&x, Weights { stiffness: 1.0, damping: 0.0, hessian: Hessian::Exact });
+        let push = [ZERO, ZERO, ZERO, row(along, 0.0)];
+        let stiffness = inner(&product(hinge.as_mut(), &x, &push), &push);
+        assert!((stiffness - k * theta.cos()).abs() < 1e-6, "{theta}: {stiffness}");
+    }
 }
 
 #[test]
