@@ -326,6 +326,48 @@ fn the_global_error_of_dormand_prince_is_proportional_to_the_tolerance() {
     }
 }
 
+/// The same slope on problems that the controller's constants were not chosen on: they were tuned on Arenstorf's orbit and the
+/// Pleiades (ten settings were tried), so that those two alone would prove little.
+#[test]
+fn the_proportionality_holds_on_problems_it_was_not_tuned_on() {
+    let eccentric = |e| {
+        let orbit = Kepler { gm: 1.0, semi_major: 1.0, eccentricity: e };
+        move |tolerance: f64| {
+            let ((x, v), (end, _)) = (orbit.at(0.4), orbit.at(0.4 + 12.0));
+            let center = vector(0.3, -0.2, 0.1);
+            let (mut x, mut v) = ([row(x + center)], [row(v)]);
+            let settings = Adaptive { tolerance, ..Adaptive::default() };
+            follow(Integrator::DormandPrince, &settings, &mut kepler(), 12.0, &mut x, &mut v, |_, _, _| {});
+            (point(x[0]) - center - end).norm()
+        }
+    };
+    // Van der Pol's oscillator, mu = 3, over two and a half cycles of relaxation, against 2^17 steps of fixed length.
+    let van_der_pol = || {
+        Motion::new(|x: &[Row], v: &[Row], out: &mut [Row]| {
+            out[0] = [3.0 * (1.0 - x[0][0] * x[0][0]) * v[0][0] - x[0][0], 0.0, 0.0, 0.0];
+        })
+    };
+    let start = || ([[2.0, 0.0, 0.0, 0.0]], [ZERO]);
+    let (mut end, mut end_v) = start();
+    dormand_prince_fixed(&mut van_der_pol(), 22.0, 1 << 17, &mut end, &mut end_v);
+    let relaxation = |tolerance: f64| {
+        let (mut x, mut v) = start();
+        let settings = Adaptive { tolerance, ..Adaptive::default() };
+        follow(Integrator::DormandPrince, &settings, &mut van_der_pol(), 22.0, &mut x, &mut v, |_, _, _| {});
+        (x[0][0] - end[0][0]).abs().hypot(v[0][0] - end_v[0][0])
+    };
+    let problems: [(&str, &dyn Fn(f64) -> f64); 3] =
+        [("Kepler, e = 0.6", &eccentric(0.6)), ("Kepler, e = 0.9", &eccentric(0.9)), ("van der Pol", &relaxation)];
+    for (name, problem) in problems {
+        let tolerances: Vec<f64> = (24..=44).map(|k| 10.0_f64.powf(-0.25 * f64::from(k))).collect();
+        let points: Vec<(f64, f64)> = tolerances.iter().map(|t| (t.log10(), problem(*t).log10())).collect();
+        let slope = slope(&points);
+        println!("{name}: slope of log error over log tolerance {slope:.3}, error {:.1e} at 1e-11", 10.0_f64.powf(points[20].1));
+        // Measured: 1.036, 1.057, 1.050.
+        assert!((slope - 1.0).abs() < 0.2, "{name}: {slope}");
+    }
+}
+
 /// A gate for codes with adaptive steps (../shared/validation, 1.2): 1e-5 with at most 5000 evaluations.
 #[test]
 fn arenstorf_closes_cheaply() {
