@@ -1,6 +1,5 @@
 """The command line: exit codes, messages that say what to do, never a traceback."""
 
-import json
 import os
 import re
 import shlex
@@ -99,14 +98,37 @@ def test_a_cure_also_works_where_the_scene_lists_no_system(
     exploding: Tree, scene_file: SceneFile, tumble: Command
 ) -> None:
     del exploding["system"]
-    settings = {"integrator": "rk4", "substeps": "24"}
-    change = " ".join(f"system.0.{key}={value}" for key, value in settings.items())
-    tree = json.loads(json.dumps({"system": []}))
-    (override,) = find.as_overrides(tree, change)
-    assert tumble("run", scene_file(exploding), "--frames", 2, "--set", override).code == 0
+    answer = tumble(
+        "run", scene_file(exploding), "--set", "system.0.integrator=forward_euler", "--set", "system.0.step=0.02"
+    )
+    assert answer.code == 1
+    cure = copied(answer.err, "run")
+    # What it changes is not said twice.
+    assert sum("integrator" in word for word in cure) == 1
+    assert tumble(*cure).code == 0
     (system,) = Run("out/scene").scene["system"]
-    assert (system["name"], system["integrator"], system["substeps"]) == ("main", "rk4", 24)
-    assert find.as_overrides({"system": [{"name": "a"}]}, change) == change.split()
+    assert system["name"] == "main"
+    assert system["integrator"] != "forward_euler"
+
+
+def test_overrides_that_a_change_replaces() -> None:
+    given = ["system.0.integrator=rk4", "system.0.step = 0.1", "time.frames=3"]
+    assert find.without(given, ["system.0.substeps=4"]) == [given[0], given[2]]
+    assert find.without(given, ["system.0.integrator=verlet"]) == given[1:]
+
+
+def test_errors_found_while_building_name_the_file(spring: Tree, scene_file: SceneFile, tumble: Command) -> None:
+    spring["anchor"] = [{"name": "a", "between": ["p 0", "p 7"], "stiffness": 1.0}]
+    for verb in ("check", "run"):
+        answer = tumble(verb, scene_file(spring))
+        assert answer.code == 2
+        assert "scene.toml: " in answer.err or "scene.json: " in answer.err
+        assert "there is no mass 7" in answer.err
+
+
+def test_check_lists_anchors(spring: Tree, scene_file: SceneFile, tumble: Command) -> None:
+    spring["anchor"] = [{"name": "a", "between": ["p 0", "p 1"], "stiffness": 1.0}]
+    assert 'anchor     "a": from p 0 to p 1' in tumble("check", scene_file(spring)).out
 
 
 def test_the_first_change_that_gains_no_energy_is_recommended() -> None:

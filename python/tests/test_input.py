@@ -42,7 +42,42 @@ def missing_mesh(tree: Tree) -> Tree:
     return tree | {"collider": [{"name": "c", "shape": {"mesh": {"path": "gone.ply"}}}]}
 
 
+def tracers(tree: Tree) -> Tree:
+    """The particles as tracers, without what only masses have."""
+    thing = {key: tree["particles"][0][key] for key in ("name", "position")}
+    field = [{"kind": "swirl", "axis": [0, 0, 1], "rate": 1.0}]
+    return tree | {
+        "particles": [thing],
+        "system": [{"name": "t", "method": "tracers", "integrator": "rk4"}],
+        "field": field,
+    }
+
+
+def force_on_tracers(tree: Tree) -> Tree:
+    return tracers(tree) | {"force": [{"kind": "drag", "rate": 1.0, "on": ["p"]}]}
+
+
+def no_axis(tree: Tree) -> Tree:
+    return tracers(tree) | {"field": [{"kind": "swirl", "axis": [0, 0, 0], "rate": 1.0}]}
+
+
+def several(tree: Tree) -> Tree:
+    """Wrong in ways that are seen at different times."""
+    tree = wrong(pin=["vertex 9"])(tree)
+    return tree | {
+        "output": {"columns": ["colour"]},
+        "anchor": [{"name": "a", "between": ["p 0", "q 0"], "stiffness": 1.0}],
+    }
+
+
 WRONG = [
+    (force_on_tracers, r"force\[0\]\.on.*tracers.*no force"),
+    (no_axis, r"field\[0\]\.axis.*direction"),
+    (several, r"pin\[0\].*last one is vertex 1"),
+    (several, r"output\.columns\[0\].*colour"),
+    (several, r"anchor.*no object \"q\""),
+    (wrong(mass=[1e-60]), r'"p".*mass of 1\.000e-60.*double'),
+    (wrong(spring=[{"between": [0, 1], "stiffness": 1e50}]), r'"p".*spring constant of 1\.000e50.*double'),
     (unknown_key, "partcles.*did you mean.*particles"),
     (wrong(spring=[{"between": [0, 1], "stiffness": -1.0}]), r"stiffness.*-1.*>= 0.*N/m"),
     (wrong(mass=[0.0]), r"mass.*0.*> 0.*kg"),
@@ -73,8 +108,8 @@ def test_wrong_input_ends_with_2_and_leaves_nothing(
 @pytest.mark.parametrize(
     ("text", "message"),
     [
-        ("version = 1\n[[particles]]\nname = 'p'\nposition = [[0, 0, nan]]\n", "NaN m"),
-        ("version = 1\n[[particles]]\nname = 'p'\nposition = [[0, 0, 1e999]]\n", "inf m"),
+        ("version = 1\n[[particles]]\nname = 'p'\nposition = [[0, 0, nan]]\n", "NaN, expected a finite number in m"),
+        ("version = 1\n[[particles]]\nname = 'p'\nposition = [[0, 0, 1e999]]\n", "inf, expected a finite number in m"),
         ("version = 1\nx = = 2\n", "line 2"),
         ("", "version"),
     ],
@@ -111,3 +146,63 @@ def test_unknown_names_suggest_near_ones(spring: Tree, scene_file: SceneFile, tu
         assert answer.code == 2, arguments
         assert hint in answer.err, (arguments, answer.err)
         assert "Traceback" not in answer.err
+
+
+def test_words_that_nothing_heeds_are_told(spring: Tree, scene_file: SceneFile, tumble: Command) -> None:
+    field = {"field": [{"kind": "sink", "rate": 1.0}], "output": {"stills": [400], "plot": False}}
+    answer = tumble("check", scene_file(spring | field))
+    assert (answer.code, "nothing follows the fields" in answer.err, "no frame 400" in answer.err) == (0, True, True)
+    floor = {"collider": [{"name": "f", "shape": {"floor": {"height": 0.0}}}]}
+    answer = tumble("check", scene_file(tracers(spring) | floor))
+    assert (answer.code, "feel no colliders" in answer.err) == (0, True)
+
+
+def broken(*_: Any) -> Any:
+    raise KeyError("wind")
+
+
+def bad_shape(*_: Any) -> Any:
+    return [1.0, 2.0]
+
+
+def nothing(*_: Any) -> None:
+    return None
+
+
+def not_finite(t: float, x: Any, v: Any, mass: Any) -> Any:
+    return x * float("nan")
+
+
+@pytest.mark.parametrize(
+    ("function", "cause", "message"),
+    [
+        (broken, KeyError, "force broken failed: KeyError: 'wind'"),
+        (bad_shape, ValueError, r"force bad_shape failed.*shape \[2\], expected \(2, 3\)"),
+        (nothing, TypeError, "force nothing failed.*None.*is a return missing"),
+        (not_finite, ValueError, "force not_finite failed.*NaN for particle 0"),
+    ],
+)
+def test_a_force_that_fails_is_named_and_keeps_its_cause(
+    spring: Tree, function: Callable[..., Any], cause: type[Exception], message: str
+) -> None:
+    from tumble import StepError, World
+
+    world = World(spring)
+    world.add_force(function)
+    with pytest.raises(StepError, match=message) as raised:
+        world.step()
+    assert isinstance(raised.value.__cause__, cause)
+    assert raised.value.report["kind"] == "user"
+    assert world.frame_index == 0
+
+
+def test_an_integrator_that_returns_something_else(spring: Tree) -> None:
+    from tumble import StepError, World
+
+    world = World(spring)
+    world.set_integrator(bad_shape)
+    with pytest.raises(StepError, match=r"integrator bad_shape failed.*x has shape.*expected \(2, 3\)"):
+        world.step()
+    world.set_integrator(nothing)
+    with pytest.raises(StepError, match=r"integrator nothing failed.*returned a NoneType, expected \(x, v\)"):
+        world.step()

@@ -2,6 +2,7 @@
 
 import contextlib
 import os
+import textwrap
 from collections.abc import Iterator, Sequence
 from itertools import pairwise
 from pathlib import Path
@@ -11,6 +12,7 @@ import numpy as np
 import numpy.typing as npt
 
 from tumble._engine import ExportError
+from tumble.expect import energy_changes
 from tumble.folder import writing
 from tumble.pictures.things import Recording
 from tumble.style import FAINT, INK, PALETTE, RC
@@ -52,22 +54,20 @@ ENERGIES = {"kinetic": PALETTE[0], "elastic": PALETTE[2], "external": PALETTE[3]
 
 def energy(run: Recording, path: str | os.PathLike[str]) -> Path:
     """Plots kinetic, elastic, external and total energy, and below them how far the total has drifted from the start,
-    over the largest kinetic or potential energy so far. Raises ExportError."""
+    over the largest energy so far, as `[expect]` measures it. Raises ExportError."""
     t = _column(run, "time")
     parts = {name: _column(run, name) for name in ENERGIES}
     total = np.sum(list(parts.values()), axis=0)
-    potential = np.abs(parts["elastic"] + parts["external"] - (parts["elastic"] + parts["external"])[:1])
-    scale = np.maximum.accumulate(np.maximum(parts["kinetic"], potential)) if len(t) else t
     with _settings():
         figure, (upper, lower) = _figure([3.0, 1.0])
         curves = [(name, parts[name], color) for name, color in ENERGIES.items() if np.any(parts[name] != 0)]
         _draw(upper, 3.0, t, [*curves, ("total", total, INK)])
         upper.set_ylabel("energy [J]")
         upper.set_title(_title(run, "energy"))
-        drift = np.divide(total - total[:1], scale, out=np.zeros_like(total), where=scale > 0)
+        drift = energy_changes({**parts, "energy": total})
         lower.axhline(0.0, color=FAINT, linewidth=0.8)
         lower.plot(t, drift, color=INK, linewidth=1.3)
-        lower.set_ylabel("drift [1]")
+        lower.set_ylabel("drift /\nlargest")
         lower.set_xlabel("time [s]")
         return _save(figure, path)
 
@@ -123,8 +123,9 @@ def _label(names: Sequence[str], symbol: str) -> str:
 
 
 def _title(run: Recording, subject: str) -> str:
+    """The title of the scene and the subject, on as many lines as the figure is wide for."""
     title = str(run.scene.get("title") or "")
-    return f"{title}: {subject}" if title and subject else title or subject
+    return textwrap.fill(f"{title}: {subject}" if title and subject else title or subject, 72)
 
 
 @contextlib.contextmanager

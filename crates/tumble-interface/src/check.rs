@@ -45,7 +45,9 @@ impl<'a> Checker<'a> {
         }
         match &node.value {
             Value::Float(x) if !x.is_finite() => {
-                self.report(node, path, format!("{}, expected {}", show(node, unit), self.describe(schema, unit)))
+                let (bounds, unit) = (range(schema, None), unit.filter(|u| *u != "1").map(|u| format!(" in {u}")).unwrap_or_default());
+                let expected = format!("a finite number {bounds}").trim_end().to_string() + &unit;
+                self.report(node, path, format!("{}, expected {expected}", show(node, None)))
             }
             Value::Int(_) | Value::Float(_) => {
                 if !in_range(number(node), schema) {

@@ -80,7 +80,7 @@ pub enum StepError {
         /// Residual asked for.
         tolerance: f64,
     },
-    /// An adaptive integrator asked for a step below the smallest useful one.
+    /// The step that is needed is below the smallest useful one.
     StepTooSmall {
         /// System that stepped.
         system: String,
@@ -119,7 +119,7 @@ pub struct Breakdown {
 impl fmt::Display for Breakdown {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let Self { system, object, column, index, time, integrator, step, stable_step, .. } = self;
-        write!(f, "system \"{system}\" ({integrator}, step {step:.3e} s) at t = {time:.4} s: ")?;
+        write!(f, "system \"{system}\" ({integrator}, step {step:.3e} s) at t = {} s: ", short(*time))?;
         write!(f, "first bad {column} in \"{object}\", particle {index}. ")?;
         if *stable_step == 0.0 {
             write!(f, "{integrator} has no stable step for this system")
@@ -129,6 +129,11 @@ impl fmt::Display for Breakdown {
             write!(f, "The linear estimate finds every step stable")
         }
     }
+}
+
+/// A number with six digits, and no more zeros than it needs.
+fn short(x: f64) -> f64 {
+    format!("{x:.5e}").parse().unwrap_or(x)
 }
 
 impl fmt::Display for StepError {
@@ -144,13 +149,15 @@ impl fmt::Display for StepError {
             }
             Self::Solve { system, time, iterations, residual, tolerance } => write!(
                 f,
-                "system \"{system}\" at t = {time:.4} s: the solver stopped after {iterations} iterations at a relative residual of {residual:.2e}, asked for {tolerance:.2e}; \
-                 allow more iterations, take a smaller step, or set solver.on_failure = \"warn\""
+                "system \"{system}\" at t = {} s: the solver stopped after {iterations} iterations at a relative residual of {residual:.2e}, asked for {tolerance:.2e}; \
+                 raise solver.newton_iterations, take a smaller step, or set solver.on_failure = \"warn\"",
+                short(*time)
             ),
             Self::StepTooSmall { system, time, step } => write!(
                 f,
-                "system \"{system}\" at t = {time:.4} s: the adaptive integrator asked for a step of {step:.2e} s; \
-                 loosen adaptive.tolerance or use an implicit integrator"
+                "system \"{system}\" at t = {} s: a step of {step:.2e} s would be needed; loosen adaptive.tolerance, soften the \
+                 stiffest spring, or use an implicit integrator",
+                short(*time)
             ),
             Self::User(message) => f.write_str(message),
         }

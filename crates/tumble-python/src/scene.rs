@@ -43,6 +43,7 @@ fn with_lines(mut error: SceneError, node: &Node) -> SceneError {
     for issue in &mut error.issues {
         issue.line = issue.line.or_else(|| node.line_of(&issue.path));
     }
+    error.issues.sort_by_key(|issue| issue.line);
     error
 }
 
@@ -55,6 +56,7 @@ impl Scene {
         Self::from_node(py, node, folder.unwrap_or_default())
     }
 
+    /// Reads a .toml or .json file. `set` overrides keys: "time.fps=30", "sheet.flag.size=[1, 2]". Raises SceneError.
     #[staticmethod]
     #[pyo3(signature = (path, set=Vec::new()))]
     fn load(py: Python<'_>, path: PathBuf, set: Vec<String>) -> PyResult<Self> {
@@ -68,6 +70,7 @@ impl Scene {
         Self::from_node(py, node, path.parent().map(Path::to_path_buf).unwrap_or_default())
     }
 
+    /// A copy with keys overridden, as in `load`. Raises SceneError.
     #[pyo3(signature = (*overrides))]
     fn replace(&self, py: Python<'_>, overrides: Vec<String>) -> PyResult<Self> {
         let mut node = self.node.clone();
@@ -77,15 +80,18 @@ impl Scene {
         Self::from_node(py, node, self.folder.clone())
     }
 
+    /// The resolved scene: every default written out, mesh files with the hash of their content.
     fn to_dict<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
         Ok(pythonize::pythonize(py, &self.scene.to_json())?)
     }
 
+    /// Folder in which mesh files are looked for.
     #[getter]
     fn folder(&self) -> String {
         self.folder.display().to_string()
     }
 
+    /// JSON Schema of a scene; units are under "x-unit".
     #[staticmethod]
     fn schema(py: Python<'_>) -> PyResult<Bound<'_, PyAny>> {
         Ok(pythonize::pythonize(py, &tumble_interface::Scene::schema())?)

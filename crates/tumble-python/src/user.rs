@@ -2,13 +2,36 @@
 
 use numpy::{PyArray1, PyArray2, PyArrayMethods, PyUntypedArrayMethods};
 use pyo3::prelude::*;
+use std::sync::{Arc, Mutex};
 use tumble_interface::engine::{Acceleration, UserForce, UserIntegrator};
 
+/// What a user's function has raised last: the cause of the StepError that follows.
+#[derive(Clone, Default)]
+pub struct Raised(Arc<Mutex<Option<PyErr>>>);
+
+impl Raised {
+    /// Takes it out.
+    pub fn take(&self) -> Option<PyErr> {
+        self.0.lock().ok()?.take()
+    }
+
+    /// Keeps the error, and says who failed and how.
+    fn keep(&self, py: Python<'_>, who: &str, function: &Bound<'_, PyAny>, error: PyErr) -> String {
+        let function = function.getattr("__name__").and_then(|n| n.extract::<String>()).unwrap_or_else(|_| "without a name".into());
+        let kind = error.get_type(py).name().map_or_else(|_| "error".into(), |n| n.to_string());
+        let text = format!("the user's {who} {function} failed: {kind}: {}", error.value(py));
+        if let Ok(mut raised) = self.0.lock() {
+            *raised = Some(error);
+        }
+        text
+    }
+}
+
 /// force(t, x, v, mass) -> n x 3.
-pub struct Force(pub Py<PyAny>);
+pub struct Force(pub Py<PyAny>, pub Raised);
 
 /// step(t, h, x, v, acceleration) -> (x, v).
-pub struct Integrator(pub Py<PyAny>);
+pub struct Integrator(pub Py<PyAny>, pub Raised);
 
 fn array<'py>(py: Python<'py>, flat: &[f64]) -> PyResult<Bound<'py, PyArray2<f64>>> {
     PyArray1::from_slice(py, flat).reshape([flat.len() / 3, 3])
@@ -16,18 +39,17 @@ fn array<'py>(py: Python<'py>, flat: &[f64]) -> PyResult<Bound<'py, PyArray2<f64
 
 /// The numbers of anything like an n x 3 array.
 fn numbers(value: &Bound<'_, PyAny>, n: usize, what: &str) -> PyResult<Vec<f64>> {
+    use pyo3::exceptions::{PyTypeError, PyValueError};
     let py = value.py();
+    if value.is_none() {
+        return Err(PyTypeError::new_err(format!("{what} is None, expected an array of shape ({n}, 3); is a return missing?")));
+    }
     let array = py.import("numpy")?.call_method1("ascontiguousarray", (value, "float64"))?;
     let array = array.cast_into::<numpy::PyArrayDyn<f64>>()?;
     if array.shape() != [n, 3] {
-        return Err(pyo3::exceptions::PyValueError::new_err(format!("{what} has shape {:?}, expected ({n}, 3)", array.shape())));
+        return Err(PyValueError::new_err(format!("{what} has shape {:?}, expected ({n}, 3)", array.shape())));
     }
     Ok(array.to_vec()?)
-}
-
-fn message(py: Python<'_>, who: &str, error: &PyErr) -> String {
-    let name = error.get_type(py).name().map_or_else(|_| "error".into(), |n| n.to_string());
-    format!("the {who} failed: {name}: {}", error.value(py))
 }
 
 impl UserForce for Force {
@@ -35,9 +57,16 @@ impl UserForce for Force {
         Python::attach(|py| {
             let call = || -> PyResult<Vec<f64>> {
                 let result = self.0.bind(py).call1((t, array(py, x)?, array(py, v)?, PyArray1::from_slice(py, mass)))?;
-                numbers(&result, mass.len(), "the force")
+                let values = numbers(&result, mass.len(), "what it returned")?;
+                let bad = values.iter().position(|f| !f.is_finite());
+                // Where the state itself has blown up the report of the engine says more.
+                if let Some(i) = bad.filter(|_| x.iter().chain(v).all(|y| y.is_finite())) {
+                    let text = format!("what it returned is {} for particle {}, expected finite numbers", values[i], i / 3);
+                    return Err(pyo3::exceptions::PyValueError::new_err(text));
+                }
+                Ok(values)
             };
-            let values = call().map_err(|e| message(py, "user's force", &e))?;
+            let values = call().map_err(|e| self.1.keep(py, "force", self.0.bind(py), e))?;
             force.iter_mut().zip(values).for_each(|(f, v)| *f += v);
             Ok(())
         })
@@ -86,10 +115,15 @@ impl UserIntegrator for Integrator {
                 if let Ok(mut ask) = rate.borrow().ask.lock() {
                     *ask = None;
                 }
-                let (x1, v1): (Bound<'_, PyAny>, Bound<'_, PyAny>) = result?.extract()?;
-                Ok((numbers(&x1, x.len() / 3, "x")?, numbers(&v1, v.len() / 3, "v")?))
+                let pair = result?;
+                let both: Vec<Bound<'_, PyAny>> = pair.try_iter().and_then(Iterator::collect).unwrap_or_default();
+                let [x1, v1] = &both[..] else {
+                    let kind = pair.get_type().name().map_or_else(|_| "value".into(), |n| n.to_string());
+                    return Err(pyo3::exceptions::PyTypeError::new_err(format!("it returned a {kind}, expected (x, v)")));
+                };
+                Ok((numbers(x1, x.len() / 3, "x")?, numbers(v1, v.len() / 3, "v")?))
             };
-            let (x1, v1) = call().map_err(|e| message(py, "user's integrator", &e))?;
+            let (x1, v1) = call().map_err(|e| self.1.keep(py, "integrator", self.0.bind(py), e))?;
             x.copy_from_slice(&x1);
             v.copy_from_slice(&v1);
             Ok(())

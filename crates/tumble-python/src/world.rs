@@ -24,6 +24,8 @@ pub struct World {
     scene: Py<Scene>,
     engine: Box<dyn Engine + Sync>,
     pool: Option<Arc<rayon::ThreadPool>>,
+    /// What users' functions have raised.
+    raised: user::Raised,
 }
 
 /// Works without the interpreter, on the world's threads; Ctrl-C makes `go_on` say no and is raised.
@@ -111,7 +113,7 @@ impl World {
         };
         let pool = thread_pool(py, threads)?;
         let engine = build(py, scene.bind(py).get(), pool.as_ref())?;
-        Ok(Self { scene, engine, pool })
+        Ok(Self { scene, engine, pool, raised: user::Raised::default() })
     }
 
     #[getter]
@@ -119,26 +121,33 @@ impl World {
         self.scene.clone_ref(py)
     }
 
+    /// Simulated time [s].
     #[getter]
     fn time(&self) -> f64 {
         self.engine.time()
     }
 
+    /// Frames simulated so far.
     #[getter]
     fn frame_index(&self) -> u64 {
         self.engine.frame_index()
     }
 
+    /// Names of the systems.
     #[getter]
     fn systems(&self) -> Vec<String> {
         self.engine.systems()
     }
 
+    /// What is doubtful about the scene.
     #[getter]
     fn warnings(&self) -> Vec<String> {
         self.engine.warnings().to_vec()
     }
 
+    /// Simulates frames; returns what they took: steps, rejected, step_range [s], newton, linear, residual, unconverged,
+    /// broken, clamped [J], trials (of adaptive integrators: time, step, error, accepted). Releases the GIL; Ctrl-C goes
+    /// back to the last frame and raises KeyboardInterrupt. Raises StepError.
     #[pyo3(signature = (frames=1))]
     fn step<'py>(&mut self, py: Python<'py>, frames: u64) -> PyResult<Bound<'py, PyAny>> {
         let mut total = StepReport::default();
@@ -147,23 +156,31 @@ impl World {
             match work(py, pool, |go_on| engine.step(go_on))? {
                 Ok(Some(report)) => total.add(&report),
                 Ok(None) => {}
-                Err(error) => return Err(step_error(py, &error)),
+                Err(error) => {
+                    let exception = step_error(py, &error);
+                    exception.set_cause(py, self.raised.take());
+                    return Err(exception);
+                }
             }
         }
         Ok(pythonize::pythonize(py, &total)?)
     }
 
+    /// The columns that the scene's `output.columns` names, of every object that has them.
     #[getter]
     fn frame<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
         arrays::columns(py, self.output_columns(py))
     }
 
+    /// The named columns: position [m] n x 3, velocity [m/s] n x 3, orientation n x 4 (x, y, z, w), angular_velocity
+    /// [rad/s] n x 3, link_strain n.
     #[pyo3(signature = (*names))]
     fn columns<'py>(&self, py: Python<'py>, names: Vec<String>) -> PyResult<Bound<'py, PyDict>> {
         let names: Vec<&str> = names.iter().map(String::as_str).collect();
         arrays::columns(py, self.engine.frame(&names).columns)
     }
 
+    /// Units of all columns: object -> column -> SI unit.
     #[getter]
     fn units<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
         let mut all = self.output_columns(py);
@@ -171,11 +188,15 @@ impl World {
         arrays::units(py, &all)
     }
 
+    /// What does not change. Objects: mass [kg] n, pinned (indices), triangles m x 3, links l x 2, curve (indices in
+    /// order), radius [m] 1. Colliders: position [m] n x 3, triangles m x 3.
     #[getter]
     fn topology<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
         arrays::columns(py, self.engine.topology())
     }
 
+    /// The books: time, mass, momentum (3), angular_momentum (3), kinetic, elastic, external, energy [J], stretch,
+    /// penetration [m], speed [m/s], contacts, broken.
     #[getter]
     fn ledger<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
         let (engine, pool) = (&self.engine, self.pool.as_ref());
@@ -185,10 +206,12 @@ impl World {
         Ok(books)
     }
 
+    /// Hash of everything that the next step depends on, 16 hexadecimal digits.
     fn hash(&self) -> String {
         format!("{:016x}", self.engine.hash())
     }
 
+    /// Writes a checkpoint (safetensors, the scene inside). Raises ExportError.
     fn save(&self, py: Python<'_>, path: PathBuf) -> PyResult<()> {
         let scene = self.scene.bind(py).get();
         // One text: several would be written in no fixed order.
@@ -199,6 +222,7 @@ impl World {
             .map_err(|e| ExportError::new_err(format!("\"{}\" cannot be written: {e}", path.display())))
     }
 
+    /// The world of a checkpoint. Raises SceneError.
     #[staticmethod]
     #[pyo3(signature = (path, threads=None))]
     fn restore(py: Python<'_>, path: PathBuf, threads: Option<usize>) -> PyResult<Self> {
@@ -214,37 +238,44 @@ impl World {
         Ok(world)
     }
 
+    /// Goes to a checkpoint of the same scene. Raises SceneError; the world then stays as it was.
     fn load(&mut self, py: Python<'_>, path: PathBuf) -> PyResult<()> {
         let bytes = read(py, &path)?;
         self.engine.restore(&bytes).map_err(|e| scene_error(py, &e))
     }
 
+    /// For each system, from its stiffest mode as it is now: system, integrator, step [s], frequency [rad/s], damping,
+    /// damping_max [1/s], culprit (object, index), limits (integrator, stable [s], usable [s]).
     fn stability<'py>(&mut self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
         let (engine, pool) = (&mut self.engine, self.pool.as_ref());
         let all = work(py, pool, |_| engine.stability())?;
         Ok(pythonize::pythonize(py, &all)?)
     }
 
+    /// After a StepError: changes that were tried from the last good frame: set, survived, energy_ratio.
     fn cures<'py>(&mut self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
         let (engine, pool) = (&mut self.engine, self.pool.as_ref());
         let all = work(py, pool, |go_on| engine.cures(go_on))?;
         Ok(pythonize::pythonize(py, &all)?)
     }
 
+    /// Adds a force: force(t, x, v, mass) -> n x 3 [N], from x [m] and v [m/s], n x 3, and mass [kg], n.
     #[pyo3(signature = (force, system=None))]
     fn add_force(&mut self, py: Python<'_>, force: Py<PyAny>, system: Option<String>) -> PyResult<()> {
         callable(py, &force, "force")?;
         let system = self.system(system);
-        self.engine.add_force(&system, Box::new(user::Force(force))).map_err(|e| scene_error(py, &e))
+        self.engine.add_force(&system, Box::new(user::Force(force, self.raised.clone()))).map_err(|e| scene_error(py, &e))
     }
 
+    /// Steps with step(t, h, x, v, acceleration) -> (x, v), where acceleration(t, x, v) -> n x 3 [m/s²].
     #[pyo3(signature = (step, system=None))]
     fn set_integrator(&mut self, py: Python<'_>, step: Py<PyAny>, system: Option<String>) -> PyResult<()> {
         callable(py, &step, "step")?;
         let system = self.system(system);
-        self.engine.replace_integrator(&system, Box::new(user::Integrator(step))).map_err(|e| scene_error(py, &e))
+        self.engine.replace_integrator(&system, Box::new(user::Integrator(step, self.raised.clone()))).map_err(|e| scene_error(py, &e))
     }
 
+    /// Sets position [m] or velocity [m/s], n x 3, of an object. Raises SceneError.
     fn write(&mut self, py: Python<'_>, object: &str, column: &str, values: &Bound<'_, PyAny>) -> PyResult<()> {
         let array = py.import("numpy")?.call_method1("ascontiguousarray", (values, "float64"))?;
         let values: Vec<f64> = array.call_method0("ravel")?.extract()?;

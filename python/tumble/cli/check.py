@@ -33,8 +33,9 @@ def check(
     from tumble.expect import probes
 
     checked = find.scene(scene, set)
-    world = World(checked, threads)
-    probes(world, checked.to_dict())
+    with find.naming(find.scene_file(scene)):
+        world = World(checked, threads)
+        probes(world, checked.to_dict())
     say(_contents(checked, world))
     estimates = world.stability()
     cures: list[list[str]] = []
@@ -42,7 +43,7 @@ def check(
         say()
         say(_table(checked, estimate))
         if predict(estimate)[0] == 2:
-            cures += _cures(checked, estimate)
+            cures += _cures(checked.to_dict(), estimate)
     without = [name for name in world.systems if name not in {e["system"] for e in estimates}]
     if without:
         say(f"\nno estimate for: {', '.join(without)}")
@@ -52,7 +53,7 @@ def check(
     if cures:
         say("will explode. Any of these helps, by the estimate:")
         for cure in cures:
-            say(f"  {find.command('run', scene, [*(set or ()), *cure])}")
+            say(f"  {find.command('run', scene, [*find.without(set or (), cure), *cure])}")
         raise typer.Exit(1)
     say(f"fine: {find.command('run', scene, set)}")
 
@@ -72,6 +73,8 @@ def _contents(scene: "Scene", world: "World") -> str:
         if name in positions and "mass" not in table:
             parts.insert(0, counted(len(positions[name]["position"]), "tracer"))
         lines.append(f'{"collider" if name in solid else "object":10} "{name}": {", ".join(parts) or "no mesh"}')
+    for anchor in tree["anchor"]:
+        lines.append(f'anchor     "{anchor["name"]}": from {" to ".join(anchor["between"])}')
     masses, links = (sum(len(t.get(key, ())) for t in topology.values()) for key in ("mass", "links"))
     frame = sum(array.nbytes for table in world.frame.values() for array in table.values())
     totals = [counted(masses, "mass"), counted(links, "link"), counted(len(world.systems), "system")]
@@ -143,9 +146,9 @@ def _table(scene: "Scene", estimate: dict[str, Any]) -> str:
     return "\n".join(lines)
 
 
-def _cures(scene: "Scene", estimate: dict[str, Any]) -> list[list[str]]:
+def _cures(tree: dict[str, Any], estimate: dict[str, Any]) -> list[list[str]]:
     """Changes that the estimate finds stable: of the step alone, where that is enough, or of the integrator."""
-    tree, limits, system = scene.to_dict(), _limits(estimate), estimate["system"]
+    limits, system = _limits(estimate), estimate["system"]
     plan: dict[str, Any] = next((s for s in tree["system"] if s["name"] == system), {})
     interval = 1.0 / tree["time"]["fps"] / tree["time"]["exchanges"]
 
@@ -160,4 +163,4 @@ def _cures(scene: "Scene", estimate: dict[str, Any]) -> list[list[str]]:
             if name in limits and name != own and limits[name][0] > 0.0:
                 enough = estimate["step"] <= limits[name][0]
                 changes.append({"integrator": name} | ({} if enough else shorter(limits[name][0])))
-    return [find.overrides(tree, system, change) for change in changes]
+    return [[f"system.{system}.{key}={value}" for key, value in change.items()] for change in changes]

@@ -3,9 +3,10 @@
 import difflib
 import shlex
 import tomllib
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
@@ -82,11 +83,21 @@ def scene_file(argument: str) -> Path:
 
 def scene(argument: str, overrides: Sequence[str] | None) -> "Scene":
     """The checked scene. Its errors name the file."""
-    from tumble import Scene, SceneError
+    from tumble import Scene
 
     file = scene_file(argument)
-    try:
+    with naming(file):
         return Scene.load(file, list(overrides or ()))
+
+
+@contextmanager
+def naming(file: Path) -> Iterator[None]:
+    """Puts the name of the scene's file before what is wrong with the scene, also if that is found only later, when the
+    scene is built."""
+    from tumble import SceneError
+
+    try:
+        yield
     except SceneError as error:
         lines = str(error).splitlines()
         text = f"{file}: {lines[0]}" if len(lines) == 1 else "\n  ".join([f"{file}:", *lines])
@@ -119,25 +130,17 @@ def command(verb: str, argument: str, overrides: Sequence[str] | None = None, *m
     return " ".join([shlex.join(["tumble", verb, argument]), *settings(overrides or ()), *map(shlex.quote, more)])
 
 
+def without(overrides: Sequence[str], changes: Sequence[str]) -> list[str]:
+    """The overrides that the changes do not replace."""
+    replaced = {change.split("=", 1)[0] for change in changes}
+    rivals = {"substeps": "step", "step": "substeps"}
+    for key in list(replaced):
+        stem, _, last = key.rpartition(".")
+        if last in rivals:
+            replaced.add(f"{stem}.{rivals[last]}")
+    return [override for override in overrides if override.split("=", 1)[0].strip() not in replaced]
+
+
 def settings(overrides: Sequence[str]) -> list[str]:
     """Overrides as options to copy."""
     return [f"--set {shlex.quote(override)}" for override in overrides]
-
-
-def overrides(tree: Mapping[str, Any], system: str, settings: Mapping[str, str]) -> list[str]:
-    """The overrides that change settings of a system, by name or index, in a resolved scene.
-
-    A scene that lists no system has one all the same, `main`; to change it is to list it.
-    """
-    if tree["system"]:
-        return [f"system.{system}.{key}={value}" for key, value in settings.items()]
-    texts = [f'"{value}"' if value.isidentifier() else value for value in settings.values()]
-    table = ", ".join(f"{key}={text}" for key, text in zip(settings, texts, strict=True))
-    return [f'system=[{{name="main", {table}}}]']
-
-
-def as_overrides(tree: Mapping[str, Any], change: str) -> list[str]:
-    """The overrides of a change that was tried: `system.0.integrator=rk4 system.0.substeps=4`."""
-    settings = dict(part.removeprefix("system.").split(".", 1)[1].split("=", 1) for part in change.split())
-    system = change.removeprefix("system.").split(".", 1)[0]
-    return overrides(tree, system, settings)

@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 from tumble.cli.console import counted, seconds, size
-from tumble.cli.find import as_overrides, command, settings
+from tumble.cli.find import command, settings, without
 
 if TYPE_CHECKING:
     from tumble import Run, StepError
@@ -27,8 +27,10 @@ def summary(run: "Run") -> str:
     took = f"{run.time(last):.6g} s simulated in {run.manifest['timings']['simulate']:.3g} s, {steps}"
     lines = [f"{run.folder}: {counted(run.n_frames, 'frame')} ({size(data)}), {took}, hash {run.hashes[last]}"]
     if unconverged := int(ledger["unconverged"].sum()):
+        worst = float(ledger["residual"].max())
         lines.append(
-            f"  {unconverged} steps stopped before Newton's method converged: allow more iterations, or a smaller step"
+            f"  {counted(unconverged, 'step')} stopped before Newton's method converged, at a residual of up to {worst:.1e} of "
+            "the first: raise solver.newton_iterations, or take a smaller step"
         )
     lines += [f"  {run.folder / name}" for name in _RESULTS if (run.folder / name).exists()]
     if asked := expect.count(run.scene):
@@ -49,14 +51,15 @@ def failure(run: "Run", error: "StepError", scene: str, overrides: Sequence[str]
     if cures:
         lines.append("What was tried:")
     for i, cure in enumerate(cures):
-        change = " ".join(settings(as_overrides(run.scene, cure["set"])))
+        change = " ".join(settings(cure["set"].split()))
         growth = float(cure["energy_ratio"])
         energy = f"energy {growth:+.2g} of its scale" if math.isfinite(growth) else ""
         mark = "  <- recommended" if i == 0 and cure["survived"] else ""
         lines.append(f"  {'helped' if cure['survived'] else 'failed'}  {change:56} {energy}{mark}".rstrip())
     kept = f"Kept: {counted(run.n_frames, 'frame')} in {run.folder}"
     if cures and cures[0]["survived"]:
-        sets = [*overrides, *as_overrides(run.scene, cures[0]["set"])]
+        changes = cures[0]["set"].split()
+        sets = [*without(overrides, changes), *changes]
         lines.append(f"{kept}. Try\n  {command('run', scene, sets, *again, '--force')}")
     elif cures:
         lines.append(f"{kept}. None of this helped: look for masses that are far too light or springs far too stiff")

@@ -64,14 +64,14 @@ def run(
     if renderer != "auto" and (asked["film"] or frames_to_draw):
         resolve(renderer)  # Says now, rather than after the simulation, if it does not work here.
     try:
-        with Progress("simulate") as progress:
+        with find.naming(find.scene_file(scene)), Progress("simulate") as progress:
             done = simulate(checked, folder, resume=resume, threads=threads, progress=progress, overwrite=force)
     except StepError as error:
-        again = [] if out is None else ["--out", str(out)]
+        again = [*(["--out", str(out)] if out else []), *_flags(film, usd, plot, stills, renderer)]
         print(report.failure(Run(folder), error, scene, overrides, again), file=sys.stderr)
         raise typer.Exit(1) from None
     except KeyboardInterrupt:
-        again = ["--resume"] if out is None else ["--out", str(out), "--resume"]
+        again = [*(["--out", str(out)] if out else []), "--resume", *_flags(film, usd, plot, stills, renderer)]
         _say_what_is_kept(folder, find.command("run", scene, overrides, *again))
         raise typer.Exit(130) from None
 
@@ -92,6 +92,13 @@ def run(
         complain(f"broken expectation: {expectation['text']}")
     if broken or failures:
         raise typer.Exit(1)
+
+
+def _flags(film: bool | None, usd: bool | None, plot: bool | None, stills: bool, renderer: str) -> list[str]:
+    """The options on results, as they were given."""
+    asked = {"film": film, "usd": usd, "plot": plot, "stills": None if stills else False}
+    flags = [f"--{'' if wanted else 'no-'}{name}" for name, wanted in asked.items() if wanted is not None]
+    return [*flags, *(["--renderer", renderer] if renderer != "auto" else [])]
 
 
 def _say_what_is_kept(folder: Path, cure: str) -> None:
@@ -121,15 +128,20 @@ def _write_results(run: "Run", asked: dict[str, bool], stills: list[int], render
     def plot() -> None:
         from tumble.plots import energy
 
-        energy(run, run.folder / "energy.png")
+        if run.ledger["mass"].any():  # Tracers have none.
+            energy(run, run.folder / "energy.png")
 
     def draw_film() -> None:
         film(run, run.folder / "film.mp4", renderer)
 
     def draw_stills() -> None:
-        for i in stills:
-            if i < run.n_frames:
+        there = [i for i in stills if i < run.n_frames]
+        with Progress("stills") as progress:
+            for k, i in enumerate(there):
                 still(run, i, None, renderer)
+                progress(k + 1, len(there))
+        if late := [str(i) for i in stills if i >= run.n_frames]:
+            warn(f"no still of frame {', '.join(late)}: the last frame is {run.n_frames - 1}")
 
     tasks = {"plot": plot, "usd": usd, "film": draw_film, "stills": draw_stills}
     for name, task in tasks.items():

@@ -24,7 +24,7 @@ pub struct Collider {
     #[serde(default)]
     #[schemars(range(min = 0.0, max = 1.0), extend("x-unit" = "1"))]
     pub restitution: f64,
-    /// Red, green and blue, 0 to 1, in pictures.
+    /// Red, green and blue in pictures, 0 to 1, in linear light (a half is sRGB's 188 of 255).
     #[serde(default)]
     pub color: Option<[f64; 3]>,
 }

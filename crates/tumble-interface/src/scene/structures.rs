@@ -35,7 +35,7 @@ pub struct Particles {
     #[serde(default = "centimetre")]
     #[schemars(extend("x-unit" = "m", "exclusiveMinimum" = 0.0))]
     pub radius: f64,
-    /// Red, green and blue, 0 to 1, in pictures.
+    /// Red, green and blue in pictures, 0 to 1, in linear light (a half is sRGB's 188 of 255).
     #[serde(default)]
     pub color: Option<[f64; 3]>,
 }
@@ -110,7 +110,7 @@ pub struct Rope {
     #[serde(default = "centimetre")]
     #[schemars(extend("x-unit" = "m", "exclusiveMinimum" = 0.0))]
     pub radius: f64,
-    /// Red, green and blue, 0 to 1, in pictures.
+    /// Red, green and blue in pictures, 0 to 1, in linear light (a half is sRGB's 188 of 255).
     #[serde(default)]
     pub color: Option<[f64; 3]>,
 }
@@ -180,7 +180,7 @@ pub struct Sheet {
     /// Masses that stay where they are: `"corner 0 0"`, `"vertex 3 4"`, `"edge x-"`.
     #[serde(default)]
     pub pin: Vec<Pin>,
-    /// Red, green and blue, 0 to 1, in pictures.
+    /// Red, green and blue in pictures, 0 to 1, in linear light (a half is sRGB's 188 of 255).
     #[serde(default)]
     pub color: Option<[f64; 3]>,
 }
@@ -221,7 +221,7 @@ pub struct Block {
     /// Masses that stay where they are: `"corner 0 0 0"`, `"vertex 1 2 3"`, `"face z-"`.
     #[serde(default)]
     pub pin: Vec<Pin>,
-    /// Red, green and blue, 0 to 1, in pictures.
+    /// Red, green and blue in pictures, 0 to 1, in linear light (a half is sRGB's 188 of 255).
     #[serde(default)]
     pub color: Option<[f64; 3]>,
 }
@@ -267,7 +267,7 @@ pub struct Net {
     /// Masses that stay where they are: `"vertex 3"`, or all within a radius of a point.
     #[serde(default)]
     pub pin: Vec<Pin>,
-    /// Red, green and blue, 0 to 1, in pictures.
+    /// Red, green and blue in pictures, 0 to 1, in linear light (a half is sRGB's 188 of 255).
     #[serde(default)]
     pub color: Option<[f64; 3]>,
 }

@@ -57,6 +57,7 @@ fn in_words(thing: &Pinnable<'_>, words: &str) -> Result<Vec<u32>, String> {
         "vertex" => {
             let node = whole_numbers(&rest, n.len())?;
             match (0..n.len()).find(|a| node[*a] >= n[*a]) {
+                Some(_) if n.len() == 1 => Err(format!("there is no {words}; the last one is vertex {}", count.saturating_sub(1))),
                 Some(a) => Err(format!("there is no {words}: index {} is {}, the last one is {}", a + 1, node[a], n[a] - 1)),
                 None => Ok(vec![index(n, &node)]),
             }

@@ -37,11 +37,9 @@ pub fn build(scene: &Scene, assets: &Assets) -> Result<Built, SceneError> {
         let message =
             format!("the scene needs about {needed:.1} GiB, the limit is {limit} GiB; lower a resolution, or raise world.memory_limit");
         issues.push(Issue::new("world.memory_limit", message));
-    }
-    if !issues.is_empty() {
         return Err(SceneError { issues });
     }
-    let mut warnings = Vec::new();
+    let mut warnings = unused(scene, &plans);
     let (colliders, scenery) = solids(scene, assets, &mut issues);
     let mut parts = fill(scene, &plans, assets, &mut issues);
     let anchors: Vec<Link> = scene.anchor.iter().filter_map(|anchor| link(scene, &plans, anchor, &parts, &mut issues)).collect();
@@ -87,7 +85,7 @@ pub fn build(scene: &Scene, assets: &Assets) -> Result<Built, SceneError> {
             gravity,
             colliders: colliders.clone(),
         };
-        let mut system = parts.build(settings)?;
+        let mut system = parts.build(settings).map_err(|e| placed(scene, e))?;
         anchors.iter().for_each(|anchor| hang(&mut system, index, anchor, dt, &mut exchange, &mut warnings));
         systems.push(Box::new(system));
     }
@@ -98,6 +96,37 @@ pub fn build(scene: &Scene, assets: &Assets) -> Result<Built, SceneError> {
         warnings.push(format!("masses start up to {deep:.3} m inside a collider, and will be thrown out of it; move one of them"));
     }
     Ok(Built { world, scenery, warnings })
+}
+
+/// The issues of objects, at their places in the scene.
+fn placed(scene: &Scene, mut error: SceneError) -> SceneError {
+    for issue in &mut error.issues {
+        if let Some((kind, name, _)) = objects(scene).into_iter().find(|(_, name, _)| *name == issue.path) {
+            issue.path = format!("{kind} \"{name}\"");
+        }
+    }
+    error
+}
+
+/// What the scene says and nothing heeds.
+fn unused(scene: &Scene, plans: &[Plan]) -> Vec<String> {
+    let carried = |(kind, _, system): &(&str, &str, Option<&str>)| place(plans, kind, *system).map(|i| plans[i].method);
+    let methods: Vec<Method> = objects(scene).iter().filter_map(carried).collect();
+    let mut warnings = Vec::new();
+    if !scene.field.is_empty() && !methods.contains(&Method::Tracers) {
+        warnings.push("no object is moved by a system of tracers, so that nothing follows the fields".into());
+    }
+    if !methods.contains(&Method::Dynamics) {
+        for (words, given) in [("forces", !scene.force.is_empty()), ("colliders", !scene.collider.is_empty())] {
+            if given {
+                warnings.push(format!("all objects are tracers, which feel no {words}"));
+            }
+        }
+    }
+    if let Some(last) = scene.output.stills.iter().find(|i| **i > scene.time.frames) {
+        warnings.push(format!("output.stills: there is no frame {last}; the last one is {}", scene.time.frames));
+    }
+    warnings
 }
 
 fn stepping(plan: &Plan) -> Stepping {

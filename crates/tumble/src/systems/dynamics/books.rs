@@ -300,7 +300,7 @@ impl Dynamics {
         tumble_interface::engine::Stability {
             system: self.name.clone(),
             integrator: self.integrator,
-            step: dt / f64::from(substeps),
+            step: dt / substeps,
             frequency: modes.stiffest.frequency,
             damping: modes.stiffest.damping,
             damping_max: modes.most_damped.damping,

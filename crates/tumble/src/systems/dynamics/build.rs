@@ -11,8 +11,8 @@ use crate::math::{Real, Vec3};
 use crate::state::{Masses, Object, State};
 use std::ops::Range;
 use std::sync::Arc;
-use tumble_interface::SceneError;
 use tumble_interface::scene::{Adaptive, Hessian, Integrator, Solver};
+use tumble_interface::{Issue, SceneError};
 
 /// How a system steps.
 pub struct Settings {
@@ -211,8 +211,37 @@ impl Parts {
         self.points.is_empty() && self.frames.is_empty()
     }
 
+    /// Whether every number survives the engine's scalar: neither infinite nor, where it must not be, zero.
+    fn check_range(&self) -> Result<(), SceneError> {
+        let fits = |x: f64| (x as Real).is_finite() && (x == 0.0 || x as Real != 0.0);
+        let mut issues = Vec::new();
+        let springs = [
+            self.linear.members.iter().map(|m| (m.stiffness, m.damping)).collect::<Vec<_>>(),
+            self.nonlinear.members.iter().map(|m| (m.stiffness, m.damping)).collect(),
+            self.vector.members.iter().map(|m| (m.stiffness, m.damping)).collect(),
+        ];
+        let ends: Vec<[usize; 3]> = self.objects.iter().skip(1).map(|d| d.links).chain([self.counts()]).collect();
+        for (draft, end) in self.objects.iter().zip(ends) {
+            let mut wrong = |what: &str, number: f64| {
+                let (low, high) = (Real::MIN_POSITIVE, Real::MAX);
+                let message = format!("a {what} of {number:.3e}, expected between {low:.0e} and {high:.0e}; or set precision = \"double\"");
+                issues.push(Issue::new(draft.object.name.as_str(), message));
+            };
+            let masses = self.points[draft.object.points.clone()].iter().map(|p| p.2);
+            if let Some(mass) = masses.into_iter().find(|m| !fits(*m) || !fits(1.0 / m)) {
+                wrong("mass", mass);
+            }
+            let links = (0..3).flat_map(|kind| &springs[kind][draft.links[kind]..end[kind]]);
+            if let Some((k, b)) = links.into_iter().find(|(k, b)| !fits(*k) || !fits(*b)) {
+                if fits(*k) { wrong("damping", *b) } else { wrong("spring constant", *k) }
+            }
+        }
+        if issues.is_empty() { Ok(()) } else { Err(SceneError { issues }) }
+    }
+
     /// The system.
     pub fn build(mut self, settings: Settings) -> Result<Dynamics, SceneError> {
+        self.check_range()?;
         let points = self.points.len();
         let rows = points + self.frames.len();
         for nodes in self.stretches.iter_mut().map(|m| &mut m.nodes) {

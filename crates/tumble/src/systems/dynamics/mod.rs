@@ -13,7 +13,7 @@ pub use build::{Parts, Settings, SpringPart};
 use crate::elements::{Batch, Elements, Limit, Linear};
 use crate::exchange::{Exchange, Port};
 use crate::integrators::{self, Equation, Memory, Scratch, adaptive_step};
-use crate::math::parallel::CHUNK;
+use crate::math::parallel::{CHUNK, sum};
 use crate::math::{Real, Row, Vec3, ZERO, axpy, row, sub, xyz64};
 use crate::state::{Object, State};
 use crate::system::{Archive, Part, System};
@@ -25,6 +25,9 @@ use tumble_interface::{Column, StepError};
 
 /// Rows of masses that do not feel each other which are stepped together: 24 KB in single precision, with accelerations.
 const BLOCK: usize = 512;
+
+/// Sub-steps of an exchange interval beyond which a step counts as too small.
+const MOST_SUBSTEPS: f64 = 1e7;
 
 /// How an exchange interval is divided.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -98,14 +101,16 @@ impl Dynamics {
     }
 
     /// Sub-steps of an interval of length dt.
-    fn substeps(&mut self, dt: f64) -> u32 {
+    fn substeps(&mut self, dt: f64) -> f64 {
         match self.stepping {
-            Stepping::Substeps(n) => n,
-            Stepping::Step(step) => (dt / step * (1.0 - 1e-9)).ceil().max(1.0) as u32,
+            Stepping::Substeps(n) => f64::from(n),
+            Stepping::Step(step) => (dt / step * (1.0 - 1e-9)).ceil().max(1.0),
             Stepping::Automatic => {
                 let limit = if self.integrator.is_implicit() { f64::INFINITY } else { self.limit() };
-                let n = if limit > 0.0 { (dt / (0.7 * limit)).ceil().clamp(1.0, 1e6) as u32 } else { 1 };
-                self.stepping = Stepping::Substeps(n);
+                let n = if limit > 0.0 { (dt / (0.7 * limit)).ceil().max(1.0) } else { 1.0 };
+                if n <= MOST_SUBSTEPS {
+                    self.stepping = Stepping::Substeps(n as u32);
+                }
                 n
             }
         }
@@ -177,7 +182,8 @@ impl Dynamics {
     fn after(&mut self, h: f64, report: &mut StepReport) {
         if let Some(clamp) = &mut self.clamp {
             let masses = &self.laws.masses;
-            let kinetic = |v: &[Row]| (0..masses.points).map(|i| 0.5 * f64::from(masses.mass[i]) * xyz64(v[i]).norm_sq()).sum::<f64>();
+            let one = |v: &[Row], i: usize| 0.5 * f64::from(masses.mass[i]) * xyz64(v[i]).norm_sq();
+            let kinetic = |v: &[Row]| sum(masses.points, |range| range.map(|i| one(v, i)).sum());
             let energy = |state: &State| kinetic(&state.v) + self.laws.batches.iter().map(|b| b.energy(&state.x)).sum::<f64>();
             let was = energy(&self.state);
             self.unclamped.clone_from(&self.state.x);
@@ -371,7 +377,10 @@ impl System for Dynamics {
             return Ok(report);
         }
         let substeps = self.substeps(dt);
-        let h = dt / f64::from(substeps);
+        if substeps > MOST_SUBSTEPS {
+            return Err(StepError::StepTooSmall { system: self.name.clone(), time: t, step: dt / substeps });
+        }
+        let (substeps, h) = (substeps as u32, dt / substeps);
         let each = self.laws.is_local()
             && self.tethers.is_empty()
             && self.user.is_none()
