@@ -45,8 +45,7 @@ impl<'a> Checker<'a> {
         }
         match &node.value {
             Value::Float(x) if !x.is_finite() => {
-                let (bounds, unit) = (range(schema, None), unit.filter(|u| *u != "1").map(|u| format!(" in {u}")).unwrap_or_default());
-                let expected = format!("a finite number {bounds}").trim_end().to_string() + &unit;
+                let expected = self.describe(schema, unit).replacen("number", "finite number", 1);
                 self.report(node, path, format!("{}, expected {expected}", show(node, None)))
             }
             Value::Int(_) | Value::Float(_) => {
@@ -253,15 +252,17 @@ fn in_range(x: f64, schema: &Schema) -> bool {
     low.is_none_or(|b| x >= b) && high.is_none_or(|b| x <= b) && above.is_none_or(|b| x > b) && below.is_none_or(|b| x < b)
 }
 
-/// `>= 0 N/m`, `> 0 and <= 1`.
+/// `>= 0 N/m`, `> 0 and <= 1`, or without bounds `in m`.
 fn range(schema: &Schema, unit: Option<&str>) -> String {
     let [low, high, above, below] = bounds(schema);
     let parts: Vec<String> = [(">=", low), (">", above), ("<=", high), ("<", below)]
         .into_iter()
         .filter_map(|(sign, b)| b.map(|b| format!("{sign} {}", plain(b))))
         .collect();
-    let unit = unit.filter(|u| *u != "1").map(|u| format!(" {u}")).unwrap_or_default();
-    if parts.is_empty() { unit.trim_start().to_string() } else { format!("{}{unit}", parts.join(" and ")) }
+    match (parts.is_empty(), unit.filter(|u| *u != "1")) {
+        (true, unit) => unit.map(|u| format!("in {u}")).unwrap_or_default(),
+        (false, unit) => format!("{} {}", parts.join(" and "), unit.unwrap_or_default()).trim_end().to_string(),
+    }
 }
 
 fn plain(x: f64) -> String {

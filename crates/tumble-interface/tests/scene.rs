@@ -70,7 +70,7 @@ kind = "attraction"
          dormand_prince, verlet, velocity_verlet, implicit_euler, implicit_midpoint, bdf2; did you mean \"implicit_euler\"?",
         "line 10: sheet \"flag\".size[1]: -2 m, expected > 0 m",
         "line 11: sheet \"flag\".resolution[1]: 0, expected >= 2 and <= 1e9",
-        "line 12: sheet \"flag\".density: NaN kg/m², expected a number > 0 kg/m²",
+        "line 12: sheet \"flag\".density: NaN, expected a finite number > 0 kg/m²",
         "line 13: sheet \"flag\".links.structral: unknown key; did you mean \"structural\"?",
         "line 13: sheet \"flag\".links.shear: -1 N, N/m or Pa, expected >= 0 N, N/m or Pa",
         "line 13: sheet \"flag\".links.bend.modulus: -2 N, N/m or Pa, expected >= 0 N, N/m or Pa",
@@ -78,7 +78,7 @@ kind = "attraction"
         "line 16: collider[0].name: 3, expected a string",
         "line 17: force[0].kind: missing, expected one of drag, attraction, acceleration",
         "line 20: force[1].kind: \"drgg\", expected one of drag, attraction, acceleration; did you mean \"drag\"?",
-        "line 21: force[2].gm: missing, expected a number m³/s²",
+        "line 21: force[2].gm: missing, expected a number in m³/s²",
     ];
     assert_eq!(found, expected);
 }
@@ -94,7 +94,7 @@ fn wrong_types_say_what_was_expected() {
         "line 5: sheet \"a\".size: \"big\", expected a list of 2, each a number > 0 m",
         "line 6: sheet \"a\".resolution[0]: 4.5, expected a whole number >= 2 and <= 1e9",
         "line 7: sheet \"a\".pin[0]: 3, expected a string or a table",
-        "line 10: rope \"r\".from: a list of 2, expected a list of 3, each a number m",
+        "line 10: rope \"r\".from: a list of 2, expected a list of 3, each a number in m",
     ];
     assert_eq!(found, expected);
 }
