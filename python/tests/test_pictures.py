@@ -263,15 +263,42 @@ def grounds(run: fake_run.FakeRun) -> list[str]:
 def test_a_neutral_ground_only_where_there_is_none() -> None:
     assert grounds(fake_run.studio()) == ["floor"]
     x = np.array([[0.0, 0, 0], [1, 0, 0]])
-    assert grounds(fake_run.one("p", "particles", {}, x)) == [""]
-    assert grounds(fake_run.one("p", "particles", {}, x, world={"gravity": [0.0, 0.0, 0.0]})) == []
-    assert grounds(fake_run.one("p", "particles", {}, x, dimension=2)) == []
+    mass = {"mass": np.ones(2)}
+    assert grounds(fake_run.one("p", "particles", mass, x)) == [""]
+    assert grounds(fake_run.one("p", "particles", mass, x, world={"gravity": [0.0, 0.0, 0.0]})) == []
+    assert grounds(fake_run.one("p", "particles", mass, x, dimension=2)) == []
+    assert grounds(fake_run.one("p", "particles", {}, x)) == []  # Tracers do not fall.
 
 
 def test_a_ground_that_the_camera_is_inside_of_is_not_drawn() -> None:
     run = fake_run.studio()
     run.scene["collider"][1]["shape"] = {"plane": {"point": [0, 0, -1], "normal": [0, 0, -2.0]}}
     assert grounds(run) == []
+
+
+def test_particles_with_a_trail_show_where_they_have_been() -> None:
+    run = fake_run.FakeRun(
+        fake_run.scene(particles=[{"name": "p", "trail": 0.2}]),
+        {"p": {"radius": np.array([0.1])}},
+        lambda t: {"p": {"position": np.array([[t, 0.0, 0.0], [0.0, t, 0.0]])}},
+    )
+    stage = Stage(run)
+    assert [type(t) for t in stage.things(0)] == [Spheres]
+    for i, known in ((1, 2), (4, 3), (2, 3)):  # Frames are 0.1 s apart; any order will do.
+        way = next(t for t in stage.things(i) if isinstance(t, Tubes))
+        assert way.counts.tolist() == [known, known]
+        np.testing.assert_allclose(way.points[:known, 0], [0.1 * k for k in range(i - known + 1, i + 1)])
+
+
+def test_anchors_are_drawn_between_their_masses() -> None:
+    anchor = {"name": "a", "between": ["p 1", "q 0"]}
+    run = fake_run.FakeRun(
+        fake_run.scene(particles=[{"name": "p"}, {"name": "q"}], anchor=[anchor]),
+        {n: {"radius": np.array([0.1])} for n in "pq"},
+        lambda t: {"p": {"position": np.eye(3)[:2]}, "q": {"position": np.full((1, 3), t)}},
+    )
+    (tube,) = (t for t in Stage(run).things(3) if isinstance(t, Tubes))
+    np.testing.assert_allclose(tube.points, [[0, 1, 0], [0.3, 0.3, 0.3]])
 
 
 def torn(kind: str, static: dict[str, Any], x: Any, link: int) -> fake_run.FakeRun:

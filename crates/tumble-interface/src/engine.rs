@@ -46,6 +46,12 @@ pub struct StepReport {
 }
 
 impl StepReport {
+    /// Counts a sub-step of length h [s].
+    pub fn stepped(&mut self, h: f64) {
+        self.steps += 1;
+        self.step_range = Some(self.step_range.map_or((h, h), |(a, b)| (a.min(h), b.max(h))));
+    }
+
     /// Adds what another step took.
     pub fn add(&mut self, other: &StepReport) {
         self.steps += other.steps;

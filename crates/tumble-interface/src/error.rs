@@ -93,6 +93,17 @@ pub enum StepError {
     User(String),
 }
 
+impl StepError {
+    /// The error with the name of the system that made it: schemes do not know whom they step.
+    #[must_use]
+    pub fn in_system(mut self, name: &str) -> Self {
+        if let Self::Solve { system, .. } | Self::StepTooSmall { system, .. } = &mut self {
+            *system = name.into();
+        }
+        self
+    }
+}
+
 /// Where and when the physics broke.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Breakdown {

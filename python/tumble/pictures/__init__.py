@@ -109,11 +109,12 @@ class Studio:
         return float((self.camera.position - ground.point) @ ground.normal) > 0
 
     def _grounds_below(self, points: Callable[[], Floats]) -> list[Thing]:
-        """A neutral ground to catch shadows, in scenes in space that have gravity and no ground of their own."""
+        """A neutral ground to catch shadows, in scenes in space where things fall and that have no ground of their own."""
         if any(o.plane is not None for o in self.stage.objects):
             return []
         gravity = self.run.scene.get("world", {}).get("gravity", (0.0, 0.0, -9.8))
-        if self.stage.flat or not gravity[2] < 0:
+        weighs = any("mass" in columns for columns in self.run.static.values())  # Tracers do not.
+        if self.stage.flat or not gravity[2] < 0 or not weighs:
             return []
         low, high = points().min(axis=0), points().max(axis=0)
         point = np.array([0.0, 0.0, low[2] - GAP * float(np.max(high - low))])

@@ -1,8 +1,9 @@
 """What there is to see in a run: its objects, and for each frame meshes, spheres, tubes and grounds with colours.
 
-Renderers draw these four and know nothing of scenes. Particles become spheres (and tubes for their springs), ropes
-tubes, sheets, blocks and nets meshes, colliders meshes, floors and planes grounds. Torn links show: a triangle or a
-piece of rope across a link that broke is left out (this needs `link_strain` among the scene's output columns).
+Renderers draw these four and know nothing of scenes. Particles become spheres (and tubes for their springs and the way
+behind them), ropes and anchors tubes, sheets, blocks and nets meshes, colliders meshes, floors and planes grounds. Torn
+links show: a triangle or a piece of rope across a link that broke is left out (this needs `link_strain` among the
+scene's output columns).
 """
 
 from collections.abc import Mapping
@@ -64,6 +65,8 @@ class Object:
     color: Rgb
     radius: float = 0.01
     """Radius in pictures [m], of points and curves."""
+    trail: float = 0.0
+    """How much of the way behind points is drawn [s]."""
     triangles: Indices = field(default_factory=lambda: np.zeros((0, 3), dtype=np.int64))
     links: Indices = field(default_factory=lambda: np.zeros((0, 2), dtype=np.int64))
     curve: Indices = field(default_factory=lambda: np.zeros(0, dtype=np.int64))
@@ -165,6 +168,7 @@ def objects(run: Recording) -> list[Object]:
                 kind=kind,
                 color=color,
                 radius=float(np.ravel(columns["radius"])[0]) if len(columns.get("radius", ())) else 0.01,
+                trail=float(entry.get("trail", 0.0)),
                 triangles=_indices(columns, "triangles", 3),
                 links=_indices(columns, "links", 2),
                 curve=_indices(columns, "curve", 1).ravel(),
@@ -200,6 +204,8 @@ class Stage:
         starts = {name: self._start_of(o) for name, o in bodies.items()}
         self._cuts = {name: split(starts[name], o.triangles) for name, o in bodies.items()}
         self._closed = {name for name, o in bodies.items() if outward(starts[name], o.triangles)}
+        self._anchors = [_ends(anchor["between"]) for anchor in run.scene.get("anchor", ())]
+        self._ways: dict[int, Columns] = {}
 
     def things(self, i: int, thinnest: float = 0.0) -> list[Thing]:
         """What is to be drawn of frame i. Nothing is thinner than the radius `thinnest` [m]."""
@@ -213,7 +219,28 @@ class Stage:
                     drawn.append(self._mesh(thing, thing.position, thing.triangles))
             else:
                 drawn += self._moving(thing, columns, thinnest)
+                if thing.trail > 0.0 and (way := self._way(thing, i, columns, thinnest)):
+                    drawn.append(way)
+        if self._anchors:
+            known = {o.name: o for o in self.objects}
+            ends = [positions(columns, known[name])[index] for pair in self._anchors for name, index in pair]
+            counts = np.full(len(self._anchors), 2)
+            drawn.append(Tubes("anchors", np.array(ends), counts, max(0.004, thinnest), SOLID))
         return drawn
+
+    def _way(self, thing: Object, i: int, columns: Columns, thinnest: float) -> Tubes | None:
+        """Where the particles have been, up to frame i."""
+        since = self.run.time(i) - thing.trail - 1e-9
+        frames = [k for k in range(i + 1) if self.run.time(k) >= since]
+        for k in frames:
+            if k not in self._ways:
+                self._ways[k] = columns if k == i else self.run.frame(k)
+        if len(frames) < 2:
+            return None
+        way = np.stack([positions(self._ways[k], thing) for k in frames], axis=1)
+        shade = (thing.color[0] * 0.6, thing.color[1] * 0.6, thing.color[2] * 0.6)
+        counts = np.full(len(way), len(frames))
+        return Tubes(f"{thing.name} trail", way.reshape(-1, 3), counts, max(0.3 * thing.radius, thinnest), shade)
 
     def _moving(self, thing: Object, columns: Columns, thinnest: float) -> list[Thing]:
         x = positions(columns, thing)
@@ -257,6 +284,12 @@ class Stage:
         if start is None or len(start) != len(strain):
             return none
         return np.ravel(np.isnan(strain) & ~np.isnan(start))
+
+
+def _ends(between: list[str]) -> list[tuple[str, int]]:
+    """Object and index of each end of an anchor: "flag 3"."""
+    pairs = [words.rsplit(" ", 1) for words in between]
+    return [(name.strip(), int(index)) for name, index in pairs]
 
 
 def _indices(columns: Mapping[str, Array], name: str, width: int) -> Indices:

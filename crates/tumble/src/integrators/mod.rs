@@ -139,6 +139,11 @@ impl Scratch {
     }
 }
 
+/// How many equal steps, none longer than `step` but for round-off, an interval dt [s] takes.
+pub fn equal_steps(dt: f64, step: f64) -> f64 {
+    (dt / step * (1.0 - 1e-9)).ceil().max(1.0)
+}
+
 /// One step of a scheme with a fixed step: x and v from t to t + h. `memory` are the scheme's columns for these rows,
 /// `ready` whether they belong to (x, v); afterwards they do.
 pub fn step(

@@ -122,13 +122,14 @@ impl System for Tracers {
                     memory,
                     scratch,
                     &mut report,
-                )?;
+                )
+                .map_err(|e| e.in_system(&self.settings.name))?;
                 done = if h == left { dt } else { done + h };
-                report.steps += 1;
+                report.stepped(h);
             }
             return Ok(report);
         }
-        let by_step = self.settings.step.map(|step| (dt / step * (1.0 - 1e-9)).ceil().max(1.0) as u32);
+        let by_step = self.settings.step.map(|step| integrators::equal_steps(dt, step) as u32);
         let n = self.settings.substeps.or(by_step).unwrap_or(1);
         let h = dt / f64::from(n);
         for k in 0..n {
@@ -148,9 +149,8 @@ impl System for Tracers {
                 &mut report,
             )?;
             self.memory.ready = true;
-            report.steps += 1;
+            report.stepped(h);
         }
-        report.step_range = Some((h, h));
         Ok(report)
     }
 

@@ -104,7 +104,7 @@ impl Dynamics {
     fn substeps(&mut self, dt: f64) -> f64 {
         match self.stepping {
             Stepping::Substeps(n) => f64::from(n),
-            Stepping::Step(step) => (dt / step * (1.0 - 1e-9)).ceil().max(1.0),
+            Stepping::Step(step) => integrators::equal_steps(dt, step),
             Stepping::Automatic => {
                 let limit = if self.integrator.is_implicit() { f64::INFINITY } else { self.limit() };
                 let n = if limit > 0.0 { (dt / (0.7 * limit)).ceil().max(1.0) } else { 1.0 };
@@ -162,8 +162,7 @@ impl Dynamics {
         self.user = user;
         result?;
         self.memory.ready = true;
-        report.steps += 1;
-        report.step_range = Some(report.step_range.map_or((h, h), |(a, b)| (a.min(h), b.max(h))));
+        report.stepped(h);
         self.after(h, report);
         Ok(())
     }
@@ -322,16 +321,6 @@ impl Dynamics {
     fn look(&self, t: f64) -> Result<(), StepError> {
         if self.watched { self.checked_books(t).map(|_| ()) } else { Ok(()) }
     }
-
-    fn named(&self, error: StepError) -> StepError {
-        match error {
-            StepError::Solve { time, iterations, residual, tolerance, .. } => {
-                StepError::Solve { system: self.name.clone(), time, iterations, residual, tolerance }
-            }
-            StepError::StepTooSmall { time, step, .. } => StepError::StepTooSmall { system: self.name.clone(), time, step },
-            other => other,
-        }
-    }
 }
 
 impl System for Dynamics {
@@ -364,11 +353,10 @@ impl System for Dynamics {
                     &mut self.scratch,
                     &mut report,
                 );
-                let h = taken.map_err(|e| self.named(e))?;
+                let h = taken.map_err(|e| e.in_system(&self.name))?;
                 // The last step ends exactly at dt.
                 done = if h == left { dt } else { done + h };
-                report.steps += 1;
-                report.step_range = Some(report.step_range.map_or((h, h), |(a, b)| (a.min(h), b.max(h))));
+                report.stepped(h);
                 // The step's length is known only now.
                 self.pull_tethers(h, exchange);
                 self.after(h, &mut report);
@@ -388,7 +376,7 @@ impl System for Dynamics {
             && !self.integrator.is_implicit()
             && !self.watched;
         if each {
-            self.advance_local(t, h, substeps, go_on).map_err(|e| self.named(e))?;
+            self.advance_local(t, h, substeps, go_on).map_err(|e| e.in_system(&self.name))?;
             report.steps = u64::from(substeps);
             report.step_range = Some((h, h));
             return Ok(report);
@@ -399,7 +387,7 @@ impl System for Dynamics {
             }
             let time = t + f64::from(k) * h;
             self.pull_tethers(h, exchange);
-            self.substep(time, h, &mut report).map_err(|e| self.named(e))?;
+            self.substep(time, h, &mut report).map_err(|e| e.in_system(&self.name))?;
             self.look(time + h)?;
         }
         Ok(report)
