@@ -99,3 +99,27 @@ fn the_predicted_step_is_the_measured_one() {
         assert!((predicted / measured - 1.0).abs() < 0.05);
     }
 }
+
+/// Springs of the same frequency, all but one damped: the stiffest mode is any mixture of them, and the undamped one alone
+/// says what forward Euler can take, which is nothing.
+#[test]
+fn of_modes_of_one_frequency_the_least_damped_limits() {
+    let pair = |i: usize, damping: f64| {
+        format!(
+            "[[particles]]\nname = \"p{i}\"\nposition = [[0, 0, 0], [1, 0, 0]]\npin = [\"vertex 0\"]\n\
+             spring = [{{ between = [0, 1], stiffness = 100, damping = {damping}, rest_length = 1 }}]\n"
+        )
+    };
+    let head = "time.fps = 100\nworld.gravity = [0, 0, 0]\n[[system]]\nintegrator = \"forward_euler\"\nsubsteps = 1\n";
+    let of = |damping: &[f64]| {
+        let text = head.to_string() + &(0..).zip(damping).map(|(i, d)| pair(i, *d)).collect::<String>();
+        let limit = simulation(&text).stability()[0].limit(Integrator::ForwardEuler).unwrap();
+        (limit.stable, limit.usable)
+    };
+    // Damped alone: stable below c/w² = 4/100 s. Together: as the undamped one alone, w h = 0.0110 (integrators.35).
+    let (damped, mixed, undamped) = (of(&[4.0]), of(&[4.0, 4.0, 4.0, 0.0, 4.0, 4.0, 4.0]), of(&[0.0]));
+    println!("stable and usable: damped {damped:?}, mixed {mixed:?}, undamped {undamped:?}");
+    assert!((damped.0 - 0.04).abs() < 1e-6);
+    assert!(undamped.0 == 0.0 && (undamped.1 - 0.0110 / 10.0).abs() < 1e-5);
+    assert!((mixed.1 / undamped.1 - 1.0).abs() < 0.02 && mixed.0 < 0.02 * damped.0);
+}
