@@ -111,10 +111,33 @@ def test_a_cure_also_works_where_the_scene_lists_no_system(
     assert system["integrator"] != "forward_euler"
 
 
+def test_a_spring_too_stiff_for_any_step_is_cured_by_an_implicit_scheme(
+    spring: Tree, scene_file: SceneFile, tumble: Command
+) -> None:
+    spring["precision"] = "double"
+    spring["particles"][0]["spring"][0]["stiffness"] = 1e20
+    answer = tumble("run", scene_file(spring))
+    assert answer.code == 1
+    for word in ("the step that is needed became too small", "implicit integrator", "<- recommended"):
+        assert word in answer.err, word
+    cure = copied(answer.err, "run")
+    assert "system.0.integrator=implicit_euler" in cure
+    assert tumble(*cure).code == 0
+
+
 def test_overrides_that_a_change_replaces() -> None:
-    given = ["system.0.integrator=rk4", "system.0.step = 0.1", "time.frames=3"]
-    assert find.without(given, ["system.0.substeps=4"]) == [given[0], given[2]]
-    assert find.without(given, ["system.0.integrator=verlet"]) == given[1:]
+    given = ["system.soft.integrator=rk4", "system.1.step = 0.1", "time.frames=3"]
+    assert find.without(given, ["system.0.integrator=verlet"], ["soft", "stiff"]) == given[1:]
+    assert find.without(given, ["system.stiff.step=1e-3", "system.1.integrator=rk4"], ["soft", "stiff"]) == given[::2]
+
+
+def test_a_folder_that_is_taken_is_not_blamed_on_the_scene(
+    spring: Tree, scene_file: SceneFile, tumble: Command
+) -> None:
+    assert tumble("run", scene_file(spring), "--out", "there").code == 0
+    answer = tumble("run", scene_file(spring), "--out", "there")
+    assert answer.code == 2
+    assert answer.err.startswith("error: there: ")
 
 
 def test_errors_found_while_building_name_the_file(spring: Tree, scene_file: SceneFile, tumble: Command) -> None:

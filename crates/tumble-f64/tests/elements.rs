@@ -1,7 +1,9 @@
 //! Every element against finite differences of its own energy, in double precision: force = -dE/dq, the exact Hessian
 //! product, its symmetry, no net force and no net torque. One definition is enough only if this holds.
 
+use tumble_f64::elements::forces as derived;
 use tumble_f64::elements::*;
+use tumble_f64::math::parallel::CHUNK;
 use tumble_f64::math::{Real, Row, Vec3, ZERO, rotation, row, xyz};
 use tumble_interface::scene::Hessian;
 
@@ -319,6 +321,78 @@ fn gathered_pairs_agree_with_the_element_pass_and_break() {
         pairs.set_broken(&[]);
         assert_eq!(forces(&mut pairs, &x, &v), whole);
     }
+}
+
+/// Rows are summed chunk by chunk; where a chunk ends must not matter.
+#[test]
+fn chunks_of_rows_give_what_all_rows_give() {
+    let mut r = Numbers(29);
+    let (first, n) = (37_u32, 2 * CHUNK as u32 + 37);
+    let x: Vec<Row> = (0..n).map(|_| r.row()).collect();
+    let v: Vec<Row> = (0..n).map(|_| r.row()).collect();
+    let spring = |a, b| Members { nodes: [a, b], rest: [0.8], law: [], stiffness: 2.0, damping: 0.3 };
+    let members: Vec<_> =
+        (first..n - 61).flat_map(|i| [spring(i, i + 1), spring(i + 60, i), spring(i, first + (i * 7919) % (n - first))]).collect();
+    let mut pairs = Pairs::<Distance, Linear, 1, 1, 0>::new(n as usize, &members, &[]).unwrap();
+    let mut passes = Elements::<Distance, Linear, 2, 1, 1, 0>::new(n as usize, &members).unwrap();
+    for batch in [&mut pairs as &mut dyn Batch, &mut passes] {
+        batch.linearize(&x, Weights { stiffness: 0.7, damping: 0.2, hessian: Hessian::Exact });
+        let chunked = |add: &dyn Fn(usize, &mut [Row])| {
+            let mut out = vec![ZERO; n as usize];
+            out.chunks_mut(CHUNK).enumerate().for_each(|(c, out)| add(c * CHUNK, out));
+            out
+        };
+        let whole = forces(batch, &x, &v);
+        assert!(whole[CHUNK - 1] != ZERO && whole[CHUNK] != ZERO && whole[..first as usize].iter().all(|f| *f == ZERO));
+        assert_eq!(chunked(&|start, out| batch.add_forces(&x, &v, start, out)), whole);
+        let whole = product(batch, &x, &v);
+        assert_eq!(chunked(&|start, out| batch.add_product(&v, start, out)), whole);
+    }
+    // And the two kinds agree, so that the whole is right.
+    let (a, b) = (forces(&mut pairs, &x, &v), forces(&mut passes, &x, &v));
+    assert!(a.iter().zip(&b).all(|(a, b)| (xyz(*a) - xyz(*b)).norm() < 1e-12));
+}
+
+#[test]
+fn the_force_of_a_gathered_spring_is_the_derived_one() {
+    let mut r = Numbers(31);
+    let (k, b, rest) = (3.0, 0.4, [0.7]);
+    for _ in 0..20 {
+        let (x, v) = ([r.row(), r.row()], [r.vector(), r.vector()]);
+        let (d, rate) = (xyz(x[1]) - xyz(x[0]), v[1] - v[0]);
+        let same = |pull: Vec3<Real>, [f, _]: [Vec3<Real>; 2]| assert!((pull - f).norm() < 1e-14, "{pull:?} {f:?}");
+        for damping in [None, Some(b)] {
+            let (lists, line) = (damping.map(|b| (b, v)), damping.map(|b| (b, rate)));
+            same(
+                Distance::pull::<Linear, Real, 0>(k, [], rest, d, line),
+                derived::<Distance, Linear, Real, 2, 1, 1, 0>(k, [], rest, x, lists),
+            );
+            let law = [0.7, 0.0];
+            same(
+                Distance::pull::<Nonlinear, Real, 2>(k, law, rest, d, line),
+                derived::<Distance, Nonlinear, Real, 2, 1, 1, 2>(k, law, rest, x, lists),
+            );
+            same(Vector::pull::<Linear, Real, 0>(k, [], [], d, line), derived::<Vector, Linear, Real, 2, 3, 0, 0>(k, [], [], x, lists));
+        }
+    }
+}
+
+/// What a triangle without area does, and lengths from micrometres to a hundred kilometres.
+#[test]
+fn hinges_work_at_every_size_and_a_triangle_without_area_bends_nothing() {
+    let fold = |size: f64, tip: [f64; 3]| {
+        [[0.0, 0.0, 0.0], [0.1, 1.0, 0.0], [-0.8, 0.4, 0.0], tip].map(|p| row(Vec3::from(p) * size, 0.0)).to_vec()
+    };
+    let member = |rest: f64| [Members { nodes: [0, 1, 2, 3], rest: [rest], law: [], stiffness: 1.5, damping: 0.0 }];
+    let reference = batch::<Hinge, Linear, 4, 1, 1, 0>(4, &member(0.3)).energy(&fold(1.0, [0.9, 0.6, 0.5]));
+    for size in [1e-6, 1e5] {
+        let energy = batch::<Hinge, Linear, 4, 1, 1, 0>(4, &member(0.3)).energy(&fold(size, [0.9, 0.6, 0.5]));
+        assert!((energy / reference - 1.0).abs() < 1e-12, "{size}: {energy} {reference}");
+    }
+    let mut flat = batch::<Hinge, Linear, 4, 1, 1, 0>(4, &member(0.3));
+    let x = fold(1.0, [0.05, 0.5, 0.0]);
+    assert_eq!(flat.energy(&x), 0.0);
+    assert!(forces(flat.as_mut(), &x, &[ZERO; 4]).iter().all(|f| xyz(*f).norm() == 0.0));
 }
 
 #[test]

@@ -13,7 +13,7 @@ use std::sync::mpsc::{RecvTimeoutError, channel};
 use std::time::Duration;
 use tumble_interface::engine::{Engine, StepReport};
 use tumble_interface::scene::Precision;
-use tumble_interface::{Column, SceneError};
+use tumble_interface::{Column, SceneError, StepError};
 
 /// How often a long call looks for Ctrl-C.
 const LOOK: Duration = Duration::from_millis(50);
@@ -158,7 +158,11 @@ impl World {
                 Ok(None) => {}
                 Err(error) => {
                     let exception = step_error(py, &error);
-                    exception.set_cause(py, self.raised.take());
+                    // A user's function may have caught what another raised, and gone on.
+                    let raised = self.raised.take();
+                    if matches!(error, StepError::User(_)) {
+                        exception.set_cause(py, raised);
+                    }
                     return Err(exception);
                 }
             }

@@ -137,6 +137,11 @@ impl Archive {
         }
     }
 
+    /// Forgets what lies beyond the part that was written last.
+    pub fn end(&mut self) {
+        self.parts.truncate(self.next);
+    }
+
     /// Starts from the beginning.
     pub fn rewind(&mut self) {
         self.next = 0;

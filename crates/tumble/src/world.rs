@@ -123,6 +123,7 @@ impl World {
         for system in &self.systems {
             system.save(good);
         }
+        good.end();
     }
 
     fn read(&mut self, archive: &mut Archive) -> Option<()> {

@@ -53,7 +53,7 @@ def check(
     if cures:
         say("will explode. Any of these helps, by the estimate:")
         for cure in cures:
-            say(f"  {find.command('run', scene, [*find.without(set or (), cure), *cure])}")
+            say(f"  {find.command('run', scene, [*find.without(set or (), cure, world.systems), *cure])}")
         raise typer.Exit(1)
     say(f"fine: {find.command('run', scene, set)}")
 

@@ -91,14 +91,16 @@ def scene(argument: str, overrides: Sequence[str] | None) -> "Scene":
 
 
 @contextmanager
-def naming(file: Path) -> Iterator[None]:
-    """Puts the name of the scene's file before what is wrong with the scene, also if that is found only later, when the
-    scene is built."""
+def naming(file: Path, besides: Path | None = None) -> Iterator[None]:
+    """Puts the name of the scene's file before what is wrong with the scene, also if that is found only when it is built.
+    What is wrong with the folder `besides` is not the scene's fault."""
     from tumble import SceneError
 
     try:
         yield
     except SceneError as error:
+        if any(issue["path"] == str(besides) for issue in getattr(error, "issues", ())):
+            raise
         lines = str(error).splitlines()
         text = f"{file}: {lines[0]}" if len(lines) == 1 else "\n  ".join([f"{file}:", *lines])
         named = SceneError(text)
@@ -130,15 +132,17 @@ def command(verb: str, argument: str, overrides: Sequence[str] | None = None, *m
     return " ".join([shlex.join(["tumble", verb, argument]), *settings(overrides or ()), *map(shlex.quote, more)])
 
 
-def without(overrides: Sequence[str], changes: Sequence[str]) -> list[str]:
-    """The overrides that the changes do not replace."""
-    replaced = {change.split("=", 1)[0] for change in changes}
-    rivals = {"substeps": "step", "step": "substeps"}
-    for key in list(replaced):
-        stem, _, last = key.rpartition(".")
-        if last in rivals:
-            replaced.add(f"{stem}.{rivals[last]}")
-    return [override for override in overrides if override.split("=", 1)[0].strip() not in replaced]
+def without(overrides: Sequence[str], changes: Sequence[str], systems: Sequence[str]) -> list[str]:
+    """The overrides that the changes do not replace; a system is meant by its index or by its name, of `systems`."""
+
+    def key(override: str) -> str:
+        words = override.split("=", 1)[0].strip().split(".")
+        if words[0] == "system" and len(words) > 1 and words[1] in systems:
+            words[1] = str(systems.index(words[1]))
+        return ".".join(words)
+
+    replaced = {key(change) for change in changes}
+    return [override for override in overrides if key(override) not in replaced]
 
 
 def settings(overrides: Sequence[str]) -> list[str]:

@@ -59,7 +59,8 @@ def failure(run: "Run", error: "StepError", scene: str, overrides: Sequence[str]
     kept = f"Kept: {counted(run.n_frames, 'frame')} in {run.folder}"
     if cures and cures[0]["survived"]:
         changes = cures[0]["set"].split()
-        sets = [*without(overrides, changes), *changes]
+        systems = [system["name"] for system in run.scene["system"]] or ["main"]
+        sets = [*without(overrides, changes, systems), *changes]
         lines.append(f"{kept}. Try\n  {command('run', scene, sets, *again, '--force')}")
     elif cures:
         lines.append(f"{kept}. None of this helped: look for masses that are far too light or springs far too stiff")
@@ -73,7 +74,7 @@ def _headline(report: Mapping[str, Any]) -> str:
         "not_finite": "a number stopped being finite",
         "exploded": "the energy exploded",
         "solve": "the solver did not converge",
-        "step_too_small": "the adaptive step became too small",
+        "step_too_small": "the step that is needed became too small",
         "user": "a force or integrator of yours raised an error",
     }.get(str(report.get("kind")), "the simulation broke")
     when = f" at t = {report['time']:.6g} s" if isinstance(report.get("time"), float) else ""

@@ -32,7 +32,7 @@ _LIKE = {
     "+ shear, one diagonal": "twill: leans over when pulled, stiffer one way than the other",
     "+ shear, both diagonals": "a membrane: even in its plane, folds for free",
     "+ both + bend (skip one)": "a cloth that does not fold onto itself, but bends for free",
-    "+ both + hinges": "paper, real cloth: every fold is resisted, in proportion to its angle",
+    "+ both + hinges": "paper, real cloth: every fold is resisted, the more the sharper, up to a right angle",
 }
 
 
@@ -125,7 +125,7 @@ def _points(measured: Study) -> list[str]:
         f"<b>One diagonal has a bias:</b> stretched along it, a sheet is {ratio:.2g} times as stiff as across it, and "
         "pulled along the grid it leans over. Both diagonals together have none.",
         "<b>Shear links do not resist folding, skip-one links hardly:</b> their energy grows with the fourth power of "
-        f"the angle. Hinges resist in proportion, {hinges['fold -45'] / hinges['fold y']:.2g} times as much where "
+        f"the angle. Hinges resist small folds in proportion, {hinges['fold -45'] / hinges['fold y']:.2g} times as much where "
         "creases cross the diagonals of the triangles.",
     ]
 

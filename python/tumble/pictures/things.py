@@ -205,7 +205,7 @@ class Stage:
         self._cuts = {name: split(starts[name], o.triangles) for name, o in bodies.items()}
         self._closed = {name for name, o in bodies.items() if outward(starts[name], o.triangles)}
         self._anchors = [_ends(anchor["between"]) for anchor in run.scene.get("anchor", ())]
-        self._ways: dict[int, Columns] = {}
+        self._ways: dict[tuple[str, int], Floats] = {}
 
     def things(self, i: int, thinnest: float = 0.0) -> list[Thing]:
         """What is to be drawn of frame i. Nothing is thinner than the radius `thinnest` [m]."""
@@ -230,14 +230,18 @@ class Stage:
 
     def _way(self, thing: Object, i: int, columns: Columns, thinnest: float) -> Tubes | None:
         """Where the particles have been, up to frame i."""
-        since = self.run.time(i) - thing.trail - 1e-9
-        frames = [k for k in range(i + 1) if self.run.time(k) >= since]
-        for k in frames:
-            if k not in self._ways:
-                self._ways[k] = columns if k == i else self.run.frame(k)
+        first = i
+        while first > 0 and self.run.time(first - 1) >= self.run.time(i) - thing.trail - 1e-9:
+            first -= 1
+        known = self._ways
+        kept = {(thing.name, k): known.get((thing.name, k)) for k in range(first, i + 1)}
+        self._ways = {key: x for key, x in known.items() if key[0] != thing.name}
+        for (name, k), x in kept.items():
+            self._ways[name, k] = positions(columns if k == i else self.run.frame(k), thing) if x is None else x
+        frames = range(first, i + 1)
         if len(frames) < 2:
             return None
-        way = np.stack([positions(self._ways[k], thing) for k in frames], axis=1)
+        way = np.stack([self._ways[thing.name, k] for k in frames], axis=1)
         shade = (thing.color[0] * 0.6, thing.color[1] * 0.6, thing.color[2] * 0.6)
         counts = np.full(len(way), len(frames))
         return Tubes(f"{thing.name} trail", way.reshape(-1, 3), counts, max(0.3 * thing.radius, thinnest), shade)

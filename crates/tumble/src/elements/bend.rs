@@ -18,35 +18,38 @@ use crate::math::Lane;
 /// Degenerate: folded onto itself (theta = pi) the side of the fold, and with it the sign of r + r0, is anyone's guess;
 /// for r0 = 0 neither energy nor force notice. A triangle without area or an edge without length has no normal and gives
 /// no force.
-/// Source: [bridson2003] for the measure and the gradient of theta.
+/// Source: [bridson2003] for the gradient of theta. Differs: there sin(theta/2) is the moment; here 2 sin(theta/2) is the
+/// measure, so that the moment is k sin(theta).
 pub struct Hinge;
 
-/// 2 sin(theta/2) and cos(theta/2), from the quotient that loses no digits: by cos(theta/2) on a hinge that is more open
+/// 2 sin(theta/2), cos(theta/2) and |n1||n2|, which is zero where there is no angle; from the quotient that loses no digits: by cos(theta/2) on a hinge that is more open
 /// than a right angle, by sin(theta/2) on the others.
 #[inline(always)]
-fn half_angle<L: Lane>([x0, x1, x2, x3]: [[L; 4]; 4]) -> (L, L) {
+fn half_angle<L: Lane>([x0, x1, x2, x3]: [[L; 4]; 4]) -> (L, L, L) {
     let (x0, e) = (point(x0), point(x1) - point(x0));
     let (n1, n2) = (e.cross(point(x2) - x0), (point(x3) - x0).cross(e));
-    let scale = e.norm() * (n1.norm_sq() * n2.norm_sq()).sqrt();
+    let scale = n1.norm() * n2.norm();
     let (zero, one, two) = (scale.zero(), scale.like(1.0), scale.like(2.0));
-    let sin = scale.positive(n1.cross(n2).dot(e) / scale, zero);
-    let cos = scale.positive(n1.dot(n2) * e.norm() / scale, one);
+    let sin = scale.positive(n1.cross(n2).dot(e) / e.norm() / scale, zero);
+    let cos = scale.positive(n1.dot(n2) / scale, one);
     let open = ((one + cos) * scale.like(0.5)).sqrt();
     let folded = ((one - cos) * two).sqrt();
     let folded = sin.positive(folded, -folded);
-    (cos.positive(sin / open, folded), cos.positive(open, sin / folded))
+    (cos.positive(sin / open, folded), cos.positive(open, sin / folded), scale)
 }
 
 impl Element<4, 1, 1> for Hinge {
     const NAME: &'static str = "hinge";
     #[inline(always)]
     fn residual<L: Lane>([r0]: [L; 1], x: [[L; 4]; 4]) -> [L; 1] {
-        [half_angle(x).0 - r0]
+        let (twice_sin, _, scale) = half_angle(x);
+        [scale.positive(twice_sin - r0, scale.zero())]
     }
     #[inline(always)]
     fn pullback<L: Lane>(_: [L; 1], x: [[L; 4]; 4], [y]: [L; 1]) -> [[L; 4]; 4] {
         // dr = cos(theta/2) dtheta
-        let y = y * half_angle(x).1;
+        let (_, cos, scale) = half_angle(x);
+        let y = scale.positive(y * cos, scale.zero());
         let [x0, x1, x2, x3] = [point(x[0]), point(x[1]), point(x[2]), point(x[3])];
         let e = x1 - x0;
         let (n1, n2) = (e.cross(x2 - x0), (x3 - x0).cross(e));
@@ -61,5 +64,21 @@ impl Element<4, 1, 1> for Hinge {
         let g0 = m1 * (x1 - x2).dot(unit) + m2 * (x1 - x3).dot(unit);
         let g1 = m1 * (x2 - x0).dot(unit) + m2 * (x3 - x0).dot(unit);
         [force(g0), force(g1), force(g2), force(g3)]
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn single_precision_is_enough_from_micrometres_to_kilometres() {
+        for size in [1e-6_f32, 1.0, 1e5].map(|s| s as crate::math::Real) {
+            let x =
+                [[0.0, 0.0, 0.0], [0.0, 1.0, 0.0], [-1.0, 0.4, 0.0], [0.8, 0.6, 0.6]].map(|[x, y, z]| [x * size, y * size, z * size, 0.0]);
+            let [r] = Hinge::residual([0.0], x);
+            // The angle whose sine is 0.6 and whose cosine is 0.8.
+            assert!((r.abs() - 2.0 * ((1.0 - 0.8) / 2.0 as crate::math::Real).sqrt()).abs() < 1e-5, "{size}: {r}");
+        }
     }
 }

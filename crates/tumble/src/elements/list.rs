@@ -267,20 +267,36 @@ impl<E: Element<N, M, D>, Y: Law<P>, const N: usize, const M: usize, const D: us
         packs!(W, w, self.range, |e| {
             let p = self.list.pack(w, e);
             let rows = self.list.rows(w, self.x, e);
-            total += sum(w, energy::<E, Y, _, N, M, D, P>(p.stiffness, p.law, p.rest, rows));
+            let energies = energy::<E, Y, _, N, M, D, P>(p.stiffness, p.law, p.rest, rows);
+            let mut each = [0.0; 16];
+            w.store(energies, &mut each);
+            // One after the other, so that every width gives the same sum.
+            for one in &each[..W::N] {
+                total += f64::from(*one);
+            }
         });
         total
     }
 }
 
-/// The numbers of a pack added one after the other in double precision, so that every width gives the same sum.
-#[inline(always)]
-fn sum<W: Width>(w: W, v: W::L) -> f64 {
-    let mut each = [0.0; 16];
-    w.store(v, &mut each);
-    let mut total = 0.0;
-    for value in &each[..W::N] {
-        total += f64::from(*value);
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::elements::{Distance, Linear};
+    use crate::math::simd::{Level, dispatch_at};
+
+    #[test]
+    fn every_width_sums_the_same_energy() {
+        // Energies over fourteen decades, so that the order of the sum shows.
+        let n = 101_u32;
+        let x: Vec<Row> = (0..=n).map(|i| [0.1 * i as Real, (i * i % 17) as Real, 0.0, 0.0]).collect();
+        let spring =
+            |i: u32| Members { nodes: [i, i + 1], rest: [0.3], law: [], stiffness: 10.0_f64.powi((i % 15) as i32 - 7), damping: 0.0 };
+        let list = List::<Distance, Linear, 2, 1, 1, 0>::new(x.len(), &(0..n).map(spring).collect::<Vec<_>>()).unwrap();
+        let sum = |level| dispatch_at(level, Energies { list: &list, range: 3..n as usize, x: &x });
+        assert!(sum(Level::Scalar) > 1e6);
+        for level in Level::available() {
+            assert_eq!(sum(level).to_bits(), sum(Level::Scalar).to_bits(), "{level:?}");
+        }
     }
-    total
 }

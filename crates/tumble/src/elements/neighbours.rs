@@ -213,7 +213,7 @@ impl<const D: usize, const P: usize> Neighbours<D, P> {
     /// The vectors of the rows at the other ends of a pack of entries.
     ///
     /// # Safety
-    /// `rows` holds every row that the lists were made for, and `columns` have been filled from them.
+    /// `rows` holds every row that the lists were made for.
     #[inline(always)]
     pub unsafe fn load<W: Width>(&self, w: W, rows: &[Row], columns: &Columns, entry: usize) -> Vec3<W::L> {
         let run = self.run[entry / SLICE];

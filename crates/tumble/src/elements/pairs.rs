@@ -188,7 +188,7 @@ impl<E: Pair<M, D>, Y: Law<P>, const M: usize, const D: usize, const P: usize> G
         let mut sum = Vec3 { x: zero, y: zero, z: zero };
         let mut entry = lists.start[slice] as usize + lane;
         while entry < lists.start[slice + 1] as usize {
-            // SAFETY: `begin_forces` has checked x and v, and filled the columns.
+            // SAFETY: `add_forces` has checked x and v.
             let d = unsafe { lists.load(w, self.x, &self.columns[0], entry) } - here;
             let p = lists.pack(w, entry);
             let damping = match moving {
@@ -282,7 +282,7 @@ impl<const D: usize, const P: usize> Product<'_, D, P> {
         let mut sum = Vec3 { x: zero, y: zero, z: zero };
         let mut entry = lists.start[slice] as usize + lane;
         while entry < lists.start[slice + 1] as usize {
-            // SAFETY: `begin_product` has checked u and filled the columns.
+            // SAFETY: `add_product` has checked u.
             let d = here - unsafe { lists.load(w, self.u, self.columns, entry) };
             let slot = &self.cache[entry / SLICE];
             let q = Vec3 { x: w.load(&slot[0][lane..]), y: w.load(&slot[1][lane..]), z: w.load(&slot[2][lane..]) };

@@ -3,7 +3,7 @@
 //! Vectors are in the engine's scalar, all products in double precision over fixed chunks, so that the iterates have the
 //! same bits on any number of threads. Source: [shewchuk1994], B3; negative curvature: [nocedal2006], 7.1.
 
-use crate::math::parallel::{CHUNK, chunks, sum};
+use crate::math::parallel::{CHUNK, chunk_sum, chunks, sum};
 use crate::math::{Real, Row, ZERO, rows};
 use rayon::prelude::*;
 
@@ -92,11 +92,6 @@ pub fn solve(operator: &mut (impl Operator + Sync), b: &[Row], x: &mut [Row], pa
         chunks(p, |start, p| rows::xpby(p, beta, &z[start..start + p.len()]));
     }
     info
-}
-
-/// The sum of `f(start, chunk)` over the chunks of `a`, added in order.
-fn chunk_sum(a: &mut [Row], f: impl Fn(usize, &mut [Row]) -> f64 + Sync) -> f64 {
-    a.par_chunks_mut(CHUNK).enumerate().map(|(c, a)| f(c * CHUNK, a)).collect::<Vec<f64>>().iter().sum()
 }
 
 /// x += alpha p, r -= alpha q, q = preconditioned r; returns r . q. One pass over memory.

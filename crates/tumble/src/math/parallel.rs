@@ -25,6 +25,11 @@ pub fn chunks2<A: Send, B: Send>(a: &mut [A], b: &mut [B], f: impl Fn(usize, &mu
     a.par_chunks_mut(CHUNK).zip(b.par_chunks_mut(CHUNK)).enumerate().for_each(|(i, (a, b))| f(i * CHUNK, a, b));
 }
 
+/// Sum of `f(start, chunk)` over the chunks of `a`, added in order.
+pub fn chunk_sum<A: Send>(a: &mut [A], f: impl Fn(usize, &mut [A]) -> f64 + Sync) -> f64 {
+    a.par_chunks_mut(CHUNK).enumerate().map(|(c, a)| f(c * CHUNK, a)).collect::<Vec<f64>>().iter().sum()
+}
+
 /// Sum of `f(range)` over the chunks of 0..n, added in order.
 pub fn sum(n: usize, f: impl Fn(Range<usize>) -> f64 + Sync) -> f64 {
     fold(n, f).into_iter().sum()

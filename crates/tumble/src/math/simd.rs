@@ -341,7 +341,7 @@ mod x86 {
         fn untranspose(self, v: [Pack<Self>; 4]) -> Self::Rows;
     }
 
-    macro_rules! packs {
+    macro_rules! four_packs {
         ($simd:expr, [$x:expr, $y:expr, $z:expr, $w:expr]) => {
             [
                 Pack { simd: $simd, v: cast($x) },
@@ -383,7 +383,7 @@ mod x86 {
                     p[i] = s._mm256_insertf128_ps::<1>(s._mm256_castps128_ps256(cast(r[i])), cast(r[4 + i]));
                 }
                 let [x, y, z, w] = four_by_four!(s, _mm256_unpacklo_ps, _mm256_unpackhi_ps, _mm256_shuffle_ps, [p[0], p[1], p[2], p[3]]);
-                packs!(self, [x, y, z, w])
+                four_packs!(self, [x, y, z, w])
             }
             #[inline(always)]
             fn untranspose(self, [x, y, z, w]: [Pack<Self>; 4]) -> [Row; 8] {
@@ -419,7 +419,7 @@ mod x86 {
                     p[i] = s._mm512_insertf32x4::<3>(part, cast(r[12 + i]));
                 }
                 let [x, y, z, w] = four_by_four!(s, _mm512_unpacklo_ps, _mm512_unpackhi_ps, _mm512_shuffle_ps, [p[0], p[1], p[2], p[3]]);
-                packs!(self, [x, y, z, w])
+                four_packs!(self, [x, y, z, w])
             }
             #[inline(always)]
             fn untranspose(self, [x, y, z, w]: [Pack<Self>; 4]) -> [Row; 16] {
@@ -469,7 +469,7 @@ mod x86 {
             #[inline(always)]
             fn transpose(self, r: [Row; 4]) -> [Pack<Self>; 4] {
                 let [x, y, z, w] = four_by_four(self.avx, cast(r[0]), cast(r[1]), cast(r[2]), cast(r[3]));
-                packs!(self, [x, y, z, w])
+                four_packs!(self, [x, y, z, w])
             }
             #[inline(always)]
             fn untranspose(self, [x, y, z, w]: [Pack<Self>; 4]) -> [Row; 4] {
@@ -494,7 +494,7 @@ mod x86 {
                 for i in 0..4 {
                     p[i] = s._mm512_insertf64x4::<1>(s._mm512_castpd256_pd512(low[i]), high[i]);
                 }
-                packs!(self, [p[0], p[1], p[2], p[3]])
+                four_packs!(self, [p[0], p[1], p[2], p[3]])
             }
             #[inline(always)]
             fn untranspose(self, [x, y, z, w]: [Pack<Self>; 4]) -> [Row; 8] {

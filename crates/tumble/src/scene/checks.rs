@@ -1,5 +1,6 @@
 //! What the schema cannot say: things that depend on several values together.
 
+use crate::systems::dynamics::MOST_SUBSTEPS;
 use std::collections::HashSet;
 use tumble_interface::Issue;
 use tumble_interface::check::suggestion;
@@ -44,8 +45,11 @@ pub fn check(scene: &Scene, systems: &[System]) -> Vec<Issue> {
         }
         check_system(system, &path, &mut wrong);
         let interval = scene.frame_time() / f64::from(scene.time.exchanges);
-        if let Some(step) = system.step.filter(|step| interval / step > 1e7) {
-            wrong(format!("{path}.step"), format!("{step:e} s divides an exchange interval of {interval:.3e} s into more than 1e7 steps"));
+        if let Some(step) = system.step.filter(|step| interval / step > MOST_SUBSTEPS) {
+            wrong(
+                format!("{path}.step"),
+                format!("{step:e} s divides an exchange interval of {interval:.3e} s into more than {MOST_SUBSTEPS:.0e} steps"),
+            );
         }
     }
     for anchor in &scene.anchor {

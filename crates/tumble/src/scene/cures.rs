@@ -2,6 +2,7 @@
 
 use super::Assets;
 use super::simulation::Simulation;
+use crate::systems::dynamics::MOST_SUBSTEPS;
 use tumble_interface::engine::{BLOW_UP, Cure, Engine};
 use tumble_interface::scene::{Integrator, Scene};
 
@@ -24,9 +25,11 @@ pub fn cures(
     let dt = scene.frame_time() / f64::from(scene.time.exchanges);
     let own = super::build::plans(scene)[system].integrator;
     let usable_step = |i: Integrator| usable.iter().find(|(integrator, _)| *integrator == i).map_or(0.0, |(_, step)| *step);
-    let substeps = |limit: f64| (limit > 0.0).then(|| (dt / (0.7 * limit)).ceil().clamp(1.0, 1e7) as u32);
+    let substeps = |limit: f64| (limit > 0.0).then(|| (dt / (0.7 * limit)).ceil().clamp(1.0, MOST_SUBSTEPS) as u32);
     let mut trials: Vec<(Integrator, u32)> = Vec::new();
-    let now = (dt / step).round().max(1.0) as u32;
+    // Where even an automatic step was refused as too small, implicit schemes are tried with one.
+    let now = (dt / step).round().max(1.0);
+    let now = if now > MOST_SUBSTEPS { 1 } else { now as u32 };
     for integrator in [own, Integrator::SymplecticEuler, Integrator::Rk4, Integrator::ImplicitEuler] {
         let n = if integrator.is_implicit() { Some(now) } else { substeps(usable_step(integrator)).map(|n| n.max(now)) };
         // The same again, or what was tried already, helps nobody.

@@ -140,10 +140,10 @@ impl Dynamics {
         for object in &self.objects {
             for name in names {
                 let (unit, width, data): (_, _, Vec<Real>) = match *name {
-                    "position" => ("m", 3, flat(&self.state.x[object.points.clone()], 3)),
-                    "velocity" => ("m/s", 3, flat(&self.state.v[object.points.clone()], 3)),
-                    "orientation" if !object.frames.is_empty() => ("1", 4, flat(&self.state.x[object.frames.clone()], 4)),
-                    "angular_velocity" if !object.frames.is_empty() => ("rad/s", 3, flat(&self.state.v[object.frames.clone()], 3)),
+                    "position" => ("m", 3, numbers(&self.state.x[object.points.clone()], 3)),
+                    "velocity" => ("m/s", 3, numbers(&self.state.v[object.points.clone()], 3)),
+                    "orientation" if !object.frames.is_empty() => ("1", 4, numbers(&self.state.x[object.frames.clone()], 4)),
+                    "angular_velocity" if !object.frames.is_empty() => ("rad/s", 3, numbers(&self.state.v[object.frames.clone()], 3)),
                     "link_strain" if !object.links.is_empty() => ("1", 1, self.link_strain(object)),
                     _ => continue,
                 };
@@ -310,6 +310,6 @@ impl Dynamics {
     }
 }
 
-fn flat(rows: &[Row], width: usize) -> Vec<Real> {
+fn numbers(rows: &[Row], width: usize) -> Vec<Real> {
     rows.iter().flat_map(|r| r[..width].iter().copied()).collect()
 }

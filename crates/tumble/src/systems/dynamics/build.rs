@@ -341,6 +341,7 @@ impl Parts {
             index: settings.index,
             integrator: settings.integrator,
             stepping: settings.stepping,
+            automatic: 0,
             adaptive: settings.adaptive.clone(),
             state,
             laws,

@@ -27,7 +27,7 @@ use tumble_interface::{Column, StepError};
 const BLOCK: usize = 512;
 
 /// Sub-steps of an exchange interval beyond which a step counts as too small.
-const MOST_SUBSTEPS: f64 = 1e7;
+pub const MOST_SUBSTEPS: f64 = 1e7;
 
 /// How an exchange interval is divided.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -46,6 +46,8 @@ pub struct Dynamics {
     index: usize,
     integrator: Integrator,
     stepping: Stepping,
+    /// Sub-steps that automatic stepping has chosen; 0 before the first interval.
+    automatic: u32,
     adaptive: Adaptive,
     state: State,
     laws: Laws,
@@ -105,11 +107,12 @@ impl Dynamics {
         match self.stepping {
             Stepping::Substeps(n) => f64::from(n),
             Stepping::Step(step) => integrators::equal_steps(dt, step),
+            Stepping::Automatic if self.automatic > 0 => f64::from(self.automatic),
             Stepping::Automatic => {
                 let limit = if self.integrator.is_implicit() { f64::INFINITY } else { self.limit() };
                 let n = if limit > 0.0 { (dt / (0.7 * limit)).ceil().max(1.0) } else { 1.0 };
                 if n <= MOST_SUBSTEPS {
-                    self.stepping = Stepping::Substeps(n as u32);
+                    self.automatic = n as u32;
                 }
                 n
             }
@@ -436,9 +439,8 @@ impl System for Dynamics {
         for column in &self.memory.columns {
             archive.push_rows("memory", column);
         }
-        let substeps = if let Stepping::Substeps(n) = self.stepping { f64::from(n) } else { 0.0 };
         let ready = f64::from(u8::from(self.memory.ready));
-        let numbers = vec![ready, self.memory.next_step, self.memory.last_error, substeps, self.broken as f64];
+        let numbers = vec![ready, self.memory.next_step, self.memory.last_error, f64::from(self.automatic), self.broken as f64];
         archive.push("numbers", Part::Numbers(numbers.into_iter().chain(self.scale.numbers()).collect()));
         for batch in &self.laws.batches {
             archive.push("broken", Part::Indices(batch.broken()));
@@ -452,11 +454,9 @@ impl System for Dynamics {
             archive.rows("memory", column)?;
         }
         let numbers = archive.numbers("numbers")?;
-        let [ready, next_step, last_error, substeps, broken, scale @ ..] = &numbers[..] else { return None };
+        let [ready, next_step, last_error, automatic, broken, scale @ ..] = &numbers[..] else { return None };
         (self.memory.ready, self.memory.next_step, self.memory.last_error) = (*ready == 1.0, *next_step, *last_error);
-        if *substeps >= 1.0 {
-            self.stepping = Stepping::Substeps(*substeps as u32);
-        }
+        self.automatic = *automatic as u32;
         self.broken = *broken as u64;
         self.scale = books::Scale::from_numbers(scale)?;
         for batch in &mut self.laws.batches {
