@@ -7,6 +7,7 @@ import signal
 import subprocess
 import sys
 from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -272,7 +273,10 @@ def test_shipped_scenes_are_right(tumble: Command) -> None:
 
 def start(file: Path, *more: str) -> subprocess.Popen[str]:
     """A run in a process of its own, already simulating."""
-    process = subprocess.Popen([*PYTHON, "run", str(file), *more], stderr=subprocess.PIPE, text=True)
+    # A shell that runs the tests in the background has them ignore Ctrl-C, which children inherit.
+    heed = partial(signal.signal, signal.SIGINT, signal.SIG_DFL)
+    command = [*PYTHON, "run", str(file), *more]
+    process = subprocess.Popen(command, stderr=subprocess.PIPE, text=True, preexec_fn=heed)
     assert process.stderr is not None
     while "simulate" not in process.stderr.readline():
         assert process.poll() is None

@@ -3,7 +3,7 @@
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-/// A force on every mass of the `dynamics` systems, or of the objects in `on`.
+/// A force on every mass of the `dynamics` systems, or of the objects in `on`, or between all of them.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(tag = "kind", rename_all = "snake_case", deny_unknown_fields)]
 pub enum Force {
@@ -31,6 +31,20 @@ pub enum Force {
         #[schemars(extend("x-unit" = "m³/s²"))]
         gm: f64,
         /// Names of objects; without it, all.
+        #[serde(default)]
+        on: Option<Vec<String>>,
+    },
+    /// Newton's gravitation of every mass on every other of the same system, F = G m1 m2 / d².
+    Gravitation {
+        /// G.
+        #[serde(default = "newton")]
+        #[schemars(extend("x-unit" = "N m²/kg²"))]
+        constant: f64,
+        /// Softening length s: 1/d² becomes d/(d² + s²)^(3/2).
+        #[serde(default)]
+        #[schemars(range(min = 0.0), extend("x-unit" = "m"))]
+        softening: f64,
+        /// Names of objects that pull each other; without it, all.
         #[serde(default)]
         on: Option<Vec<String>>,
     },
@@ -99,6 +113,10 @@ pub struct Anchor {
     #[serde(default)]
     #[schemars(range(min = 0.0), extend("x-unit" = "m"))]
     pub rest_length: Option<f64>,
+}
+
+fn newton() -> f64 {
+    6.67428e-11
 }
 
 fn up() -> [f64; 3] {

@@ -31,8 +31,12 @@ pub trait Batch: Send + Sync {
     fn is_empty(&self) -> bool {
         self.len() == 0
     }
-    /// Potential energy [J], zero at rest.
+    /// Potential energy [J], zero at rest (or far apart).
     fn energy(&self, x: &[Row]) -> f64;
+    /// Whether that energy is stored in a deformation; else it counts among those of forces.
+    fn is_elastic(&self) -> bool {
+        true
+    }
     /// Prepares the forces at (x, v): what has to be known of all elements before rows can be summed.
     fn begin_forces(&mut self, _x: &[Row], _v: &[Row]) {}
     /// Adds the forces [N] and torques [N m], internal damping included, on the rows from `start` on, a multiple of CHUNK.

@@ -4,7 +4,7 @@
 use super::batch::Weights;
 use super::{Element, Law, energy, gauss_newton, hessian, project, tangents};
 use crate::math::parallel::{CHUNK, fold};
-use crate::math::simd::{Index, Kernel, Scalar, Width, dispatch, packs};
+use crate::math::simd::{Index, Kernel, Scalar, Width, count, dispatch, packs};
 use crate::math::{Lane, Quat, Real, Row, Vec3, axpy, row};
 use rayon::prelude::*;
 use std::marker::PhantomData;
@@ -271,7 +271,7 @@ impl<E: Element<N, M, D>, Y: Law<P>, const N: usize, const M: usize, const D: us
             let mut each = [0.0; 16];
             w.store(energies, &mut each);
             // One after the other, so that every width gives the same sum.
-            for one in &each[..W::N] {
+            for one in &each[..count(w)] {
                 total += f64::from(*one);
             }
         });

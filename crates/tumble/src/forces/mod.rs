@@ -3,10 +3,12 @@
 mod attraction;
 mod drag;
 mod field;
+mod gravitation;
 
 pub use attraction::Attraction;
 pub use drag::Drag;
 pub use field::Flow;
+pub use gravitation::Gravitation;
 
 use crate::elements::Block;
 use crate::math::rows::{self, Each};

@@ -67,6 +67,11 @@ impl<L: Lane> Lane for Dual<L> {
         Self { re: root, slope: root.positive(slope, root.zero()) }
     }
     #[inline(always)]
+    fn rsqrt(self) -> Self {
+        let y = self.re.rsqrt();
+        Self { re: y, slope: -(self.slope * y * y * y) * y.like(0.5) }
+    }
+    #[inline(always)]
     fn positive(self, then: Self, other: Self) -> Self {
         Self { re: self.re.positive(then.re, other.re), slope: self.re.positive(then.slope, other.slope) }
     }

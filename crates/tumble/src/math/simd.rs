@@ -5,6 +5,8 @@
 //! In kernels use `for` loops and `#[inline(always)]` functions only: closures and `array::map` become calls
 //! compiled without the wide registers.
 
+#[cfg(not(feature = "double"))]
+use super::lane::{RSQRT, newton_rsqrt};
 use super::{Lane, Real, Row};
 use pulp::Simd;
 use std::ops::{Add, Div, Mul, Neg, Sub};
@@ -56,6 +58,12 @@ pub trait Width: Copy + Send + Sync {
     fn rows(self, rows: &[Row], start: usize) -> [Self::L; 4];
     /// For N consecutive numbers of a column of rows, the first of them number `at`: the number of each one's row.
     fn spread(self, of_rows: &[Real], at: usize) -> Self::L;
+}
+
+/// How many numbers the registers of `w` hold; in the body of `packs!`, where `W` is the widest of two.
+#[inline(always)]
+pub fn count<W: Width>(_w: W) -> usize {
+    W::N
 }
 
 /// Runs `$body` with `$w` and the first number `$e` of each pack of `$range`, then one by one.
@@ -178,6 +186,19 @@ macro_rules! operations {
             #[inline(always)]
             fn sqrt(self) -> Self {
                 Self { simd: self.simd, v: self.simd.$sqrt(self.v) }
+            }
+            #[cfg(not(feature = "double"))]
+            #[inline(always)]
+            fn rsqrt(self) -> Self {
+                let s = self.simd;
+                let half = s.wrapping_dyn_shr_u32s(s.transmute_u32s_f32s(self.v), s.splat_u32s(1));
+                let guess = s.transmute_f32s_u32s(s.sub_u32s(s.splat_u32s(RSQRT), half));
+                newton_rsqrt(self, Self { simd: s, v: guess })
+            }
+            #[cfg(feature = "double")]
+            #[inline(always)]
+            fn rsqrt(self) -> Self {
+                self.like(1.0) / self.sqrt()
             }
             #[inline(always)]
             fn positive(self, then: Self, other: Self) -> Self {

@@ -210,19 +210,23 @@ fn act(scene: &Scene, parts: &mut [Parts]) {
         for parts in &mut *parts {
             let on = |name: &str| targets(force).is_none_or(|on| on.iter().any(|o| o == name));
             let rows: Vec<_> = parts.ranges().filter(|(name, range)| on(name) && !range.is_empty()).map(|(_, range)| range).collect();
-            if !rows.is_empty() {
-                parts.forces.push((law(force), rows));
+            match law(force) {
+                _ if rows.is_empty() => {}
+                Some(law) => parts.forces.push((law, rows)),
+                None => parts.between.push((force.clone(), rows)),
             }
         }
     }
 }
 
-fn law(force: &Words) -> Box<dyn Force> {
-    match *force {
+/// The law of a force on each mass by itself.
+fn law(force: &Words) -> Option<Box<dyn Force>> {
+    Some(match *force {
         Words::Drag { coefficient, rate, .. } => Box::new(Drag { coefficient, rate }),
         Words::Attraction { center, gm, .. } => Box::new(Attraction { center: center.into(), gm }),
         Words::Acceleration { value, .. } => Box::new(Acceleration(value)),
-    }
+        Words::Gravitation { .. } => return None,
+    })
 }
 
 fn carried(scene: &Scene, plans: &[Plan], index: usize) -> Tracers {

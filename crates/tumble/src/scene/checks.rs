@@ -127,7 +127,9 @@ fn tracers(systems: &[System], kind: &str, named: Option<&str>) -> bool {
 /// The objects that a force names.
 pub fn targets(force: &Force) -> Option<&Vec<String>> {
     match force {
-        Force::Drag { on, .. } | Force::Attraction { on, .. } | Force::Acceleration { on, .. } => on.as_ref(),
+        Force::Drag { on, .. } | Force::Attraction { on, .. } | Force::Gravitation { on, .. } | Force::Acceleration { on, .. } => {
+            on.as_ref()
+        }
     }
 }
 

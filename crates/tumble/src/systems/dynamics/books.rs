@@ -177,6 +177,11 @@ impl Dynamics {
         }
     }
 
+    /// Energy of the elastic batches, or of the others [J].
+    fn between(&self, elastic: bool) -> f64 {
+        self.laws.batches.iter().filter(|b| b.is_elastic() == elastic).map(|b| b.energy(&self.state.x)).sum()
+    }
+
     pub(super) fn books(&self, t: f64) -> Ledger {
         let (x, v, masses) = (&self.state.x, &self.state.v, &self.laws.masses);
         let n = masses.points;
@@ -201,8 +206,8 @@ impl Dynamics {
             momentum: total.momentum.into(),
             angular_momentum: total.angular.into(),
             kinetic: total.kinetic,
-            elastic: self.laws.batches.iter().map(|b| b.energy(x)).sum(),
-            external: self.laws.external_energy(t, x) - Vec3::from(self.laws.gravity).dot(total.first_moment),
+            elastic: self.between(true),
+            external: self.between(false) + self.laws.external_energy(t, x) - Vec3::from(self.laws.gravity).dot(total.first_moment),
             stretch,
             penetration: if touching { max(n, |range| range.flat_map(depths).fold(0.0, f64::max)).max(0.0) } else { 0.0 },
             speed: total.speed_sq.sqrt(),
@@ -211,7 +216,8 @@ impl Dynamics {
         }
     }
 
-    /// Takes the scale of the energy from the start: what moves and stretches, and a fall by the system's own size.
+    /// Takes the scale of the energy from the start: what moves and stretches, a fall by the system's own size, and
+    /// gravitation.
     pub(super) fn set_scale(&mut self) {
         let n = self.laws.masses.points;
         let books = self.books(0.0);
@@ -219,7 +225,8 @@ impl Dynamics {
         let first = self.state.x.first().map(|x| xyz64(*x)).unwrap_or_default();
         let size = max(n, |range| range.map(|i| far(xyz64(self.state.x[i]), first)).fold(0.0, f64::max)).max(0.0);
         let fall = books.mass * Vec3::from(self.laws.gravity).norm() * size;
-        self.scale = Scale::new(&books, fall, self.noise());
+        // What holds masses together is a scale, too, even if they start at rest.
+        self.scale = Scale::new(&books, fall.max(self.between(false).abs()), self.noise());
     }
 
     /// Energy [J] that a thing at rest may seem to hold: a thousand times what its links store because positions are rounded.

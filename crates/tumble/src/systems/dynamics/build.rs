@@ -4,14 +4,14 @@ use super::{Dynamics, Stepping, books};
 use crate::elements::{
     BendTwist, Distance, Element, Elements, Hinge, Linear, Members, Nonlinear, Pairs, StretchShear, TetShear, TetStrain, TetVolume, Vector,
 };
-use crate::forces::Force;
+use crate::forces::{Force, Gravitation};
 use crate::geometry::Collider;
 use crate::integrators::Memory;
 use crate::math::{Real, Vec3};
 use crate::state::{Masses, Object, State};
 use std::ops::Range;
 use std::sync::Arc;
-use tumble_interface::scene::{Adaptive, Hessian, Integrator, Solver};
+use tumble_interface::scene::{Adaptive, Force as Words, Hessian, Integrator, Solver};
 use tumble_interface::{Issue, SceneError};
 
 /// How a system steps.
@@ -88,6 +88,8 @@ pub struct Parts {
     objects: Vec<Draft>,
     /// Forces on each mass by itself, with the rows that they act on.
     pub forces: Vec<(Box<dyn Force>, Vec<Range<usize>>)>,
+    /// Forces between all masses of some rows.
+    pub between: Vec<(Words, Vec<Range<usize>>)>,
 }
 
 /// An object and how many links of each kind there were before it.
@@ -317,6 +319,11 @@ impl Parts {
             }
             if !object.points.is_empty() {
                 objects.push(object);
+            }
+        }
+        for (words, ranges) in self.between {
+            if let Words::Gravitation { constant, softening, .. } = words {
+                batches.list.push(Box::new(Gravitation::new(ranges, &masses.mass, constant, softening)));
             }
         }
         let mut stiffness = vec![[0.0; 6]; rows];
