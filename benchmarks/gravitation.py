@@ -68,7 +68,9 @@ def bench_numba(x, mass):
 def main():
     x, mass = start()
     seconds, velocity = bench_tumble(x, mass)
-    show("gravitation", "tumble", STEPS * N * N / seconds, "pairs/s", f"{N} bodies, with the energy of every fourth step")
+    show(
+        "gravitation", "tumble", STEPS * N * N / seconds, "pairs/s", f"{N} bodies, with the energy of every fourth step"
+    )
     seconds, other = bench_numba(x, mass)
     off = np.abs(velocity - other).max() / np.abs(other).max()
     show("gravitation", "numba", STEPS * N * N / seconds, "pairs/s", f"fused, velocities differ by {off:.1e}")
