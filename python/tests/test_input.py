@@ -206,3 +206,25 @@ def test_an_integrator_that_returns_something_else(spring: Tree) -> None:
     world.set_integrator(nothing)
     with pytest.raises(StepError, match=r"integrator nothing failed.*returned a NoneType, expected \(x, v\)"):
         world.step()
+
+
+def test_a_force_reaches_every_mass_of_a_large_system() -> None:
+    import numpy as np
+
+    from tumble import World
+
+    n, h = 9000, 1e-3  # More than two chunks of rows.
+    wanted = np.arange(n)[:, None] * np.array([1e-3, -2e-3, 5e-4])
+    world = World(
+        {
+            "version": 1,
+            "precision": "double",
+            "time": {"fps": 1 / h},
+            "world": {"gravity": [0, 0, 0]},
+            "system": [{"integrator": "symplectic_euler", "substeps": 1}],
+            "particles": [{"name": "p", "position": np.zeros((n, 3)), "mass": [2.0]}],
+        }
+    )
+    world.add_force(lambda t, x, v, mass: mass[:, None] * wanted)
+    world.step()
+    np.testing.assert_allclose(world.columns("velocity")["p"]["velocity"], h * wanted, rtol=1e-12)

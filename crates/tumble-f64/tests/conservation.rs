@@ -260,3 +260,22 @@ fn a_sheet_that_folds_through_itself_gains_no_energy() {
         assert!(off < 1e-4, "{off}");
     }
 }
+
+/// Gravity pulls points and turns nothing.
+#[test]
+fn a_falling_rod_does_not_turn() {
+    for scheme in [Integrator::SymplecticEuler, Integrator::VelocityVerlet, Integrator::Rk4] {
+        let mut sim = simulation(&format!(
+            "time.fps = 1000\n[[system]]\nintegrator = \"{}\"\nsubsteps = 4\n\
+             [[rope]]\nname = \"r\"\nfrom = [0, 0, 0]\nto = [1, 0, 0]\nsegments = 6\ndensity = 0.1\n\
+             rod = {{ stretch = 10, shear = 10, bend = 0.01, twist = 0.01, inertia = 1e-4 }}\n",
+            scheme.name()
+        ));
+        for _ in 0..20 {
+            step(&mut sim);
+        }
+        let turning = common::column(&sim, "r", "angular_velocity");
+        assert!(!turning.is_empty() && turning.iter().all(|w| w.norm() < 1e-9), "{}: {turning:?}", scheme.name());
+        assert!(velocities(&sim, "r").iter().all(|v| (v.z + 9.8 * 0.02).abs() < 1e-9), "it falls");
+    }
+}

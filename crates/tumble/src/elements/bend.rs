@@ -81,4 +81,17 @@ mod tests {
             assert!((r.abs() - 2.0 * ((1.0 - 0.8) / 2.0 as crate::math::Real).sqrt()).abs() < 1e-5, "{size}: {r}");
         }
     }
+
+    #[test]
+    fn the_two_sides_of_a_fold_differ_in_sign() {
+        for theta in [0.5_f64, 1.2, 2.0, 3.0] {
+            let r = |theta: f64| {
+                let x = [[0.0, 0.0, 0.0], [0.0, 2.0, 0.0], [-1.0, 0.7, 0.0], [theta.cos(), 1.1, -theta.sin()]];
+                Hinge::residual([0.0], x.map(|[x, y, z]| [x as crate::math::Real, y as crate::math::Real, z as crate::math::Real, 0.0]))[0]
+            };
+            let exact = 2.0 * (theta / 2.0).sin();
+            assert!((f64::from(r(theta).abs()) - exact).abs() < 1e-5 && r(-theta) == -r(theta), "{theta}: {} {}", r(theta), r(-theta));
+            assert!(r(theta) * r(0.1) > 0.0, "{theta}");
+        }
+    }
 }
