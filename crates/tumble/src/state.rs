@@ -19,6 +19,8 @@ pub struct Masses {
     pub mass: Vec<Real>,
     /// 1/mass, 0 for what is pinned.
     pub inverse: Vec<Real>,
+    /// Electric charges [C]; empty where nothing is charged.
+    pub charge: Vec<Real>,
     /// Count of points; the rows after them are frames.
     pub points: usize,
 }

@@ -25,6 +25,10 @@ pub struct Particles {
     #[serde(default = "one_each")]
     #[schemars(length(min = 1), transform = items_above_zero, extend("x-unit" = "kg"))]
     pub mass: Vec<f64>,
+    /// Electric charge of each, or a single one for all.
+    #[serde(default)]
+    #[schemars(extend("x-unit" = "C"))]
+    pub charge: Vec<f64>,
     /// Masses that stay where they are.
     #[serde(default)]
     pub pin: Vec<Pin>,

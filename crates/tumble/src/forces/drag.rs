@@ -1,9 +1,9 @@
 //! Viscous damping.
 
-use super::Force;
+use super::{Force, Group, One};
 use crate::elements::Block;
 use crate::math::rows::{self, Each};
-use crate::math::{Lane, Real, Row, Vec3, ZERO};
+use crate::math::{Lane, Real, Row, ZERO};
 
 /// f = -k_d v with k_d = coefficient + rate m.                          (springs.5)
 ///
@@ -23,12 +23,12 @@ impl Each for &Drag {
 }
 
 impl Force for Drag {
-    fn add(&self, _t: f64, mass: &[Real], _x: &[Row], v: &[Row], force: &mut [Row]) {
-        rows::each(force, mass, v, ZERO, self);
+    fn add(&self, _t: f64, group: Group<'_>, force: &mut [Row]) {
+        rows::each(force, group.mass, group.v, ZERO, self);
     }
 
-    fn matrix(&self, _t: f64, mass: f64, _x: Vec3<f64>, _v: Vec3<f64>) -> (Block, Block) {
-        let d = (self.coefficient + self.rate * mass) as Real;
+    fn matrix(&self, _t: f64, one: &One) -> (Block, Block) {
+        let d = (self.coefficient + self.rate * one.mass) as Real;
         ([0.0; 6], [d, d, d, 0.0, 0.0, 0.0])
     }
 }

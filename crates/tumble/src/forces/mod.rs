@@ -12,20 +12,76 @@ pub use gravitation::Gravitation;
 
 use crate::elements::Block;
 use crate::math::rows::{self, Each};
-use crate::math::{Lane, Real, Row, Vec3};
+use crate::math::{Lane, Real, Row, Vec3, xyz64};
+use crate::state::Masses;
+use std::ops::Range;
 
-/// A force on every mass by itself. Slices are the rows of the masses it acts on.
+/// Some masses, as columns of the same length.
+#[derive(Clone, Copy)]
+pub struct Group<'a> {
+    /// Masses [kg].
+    pub mass: &'a [Real],
+    /// Charges [C]; empty where nothing is charged.
+    pub charge: &'a [Real],
+    /// Positions [m].
+    pub x: &'a [Row],
+    /// Velocities [m/s].
+    pub v: &'a [Row],
+}
+
+impl<'a> Group<'a> {
+    /// The rows from `start` on, of which x and v are given.
+    pub fn new(masses: &'a Masses, start: usize, x: &'a [Row], v: &'a [Row]) -> Self {
+        let rows = start..start + x.len();
+        Self { mass: &masses.mass[rows.clone()], charge: masses.charge.get(rows).unwrap_or_default(), x, v }
+    }
+
+    /// Some of them.
+    pub fn part(&self, range: Range<usize>) -> Self {
+        Self {
+            mass: &self.mass[range.clone()],
+            charge: self.charge.get(range.clone()).unwrap_or_default(),
+            x: &self.x[range.clone()],
+            v: &self.v[range],
+        }
+    }
+
+    /// One of them.
+    pub fn one(&self, i: usize) -> One {
+        One {
+            mass: f64::from(self.mass[i]),
+            charge: self.charge.get(i).map_or(0.0, |q| f64::from(*q)),
+            x: xyz64(self.x[i]),
+            v: xyz64(self.v[i]),
+        }
+    }
+}
+
+/// One mass, in double precision.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct One {
+    /// Mass [kg].
+    pub mass: f64,
+    /// Charge [C].
+    pub charge: f64,
+    /// Position [m].
+    pub x: Vec3<f64>,
+    /// Velocity [m/s].
+    pub v: Vec3<f64>,
+}
+
+/// A force on every mass by itself.
 pub trait Force: Send + Sync {
-    /// Adds the forces [N] at time t [s].
-    fn add(&self, t: f64, mass: &[Real], x: &[Row], v: &[Row], force: &mut [Row]);
+    /// Adds the forces [N] at time t [s] on a group of masses.
+    fn add(&self, t: f64, group: Group<'_>, force: &mut [Row]);
 
     /// Potential energy of one mass [J]; `None` for a force that has none, wherever the mass is.
-    fn energy(&self, _t: f64, _mass: f64, _x: Vec3<f64>) -> Option<f64> {
+    fn energy(&self, _t: f64, _one: &One) -> Option<f64> {
         None
     }
 
     /// -df/dx [N/m] and -df/dv [N s/m] of one mass, for implicit schemes; a symmetric approximation will do.
-    fn matrix(&self, t: f64, mass: f64, x: Vec3<f64>, v: Vec3<f64>) -> (Block, Block);
+    fn matrix(&self, t: f64, one: &One) -> (Block, Block);
 }
 
 /// A uniform acceleration, f = m a.
@@ -39,16 +95,16 @@ impl Each for &Acceleration {
 }
 
 impl Force for Acceleration {
-    fn add(&self, _t: f64, mass: &[Real], x: &[Row], _v: &[Row], force: &mut [Row]) {
+    fn add(&self, _t: f64, group: Group<'_>, force: &mut [Row]) {
         let [ax, ay, az] = self.0.map(|a| a as Real);
-        rows::each(force, mass, x, [ax, ay, az, 0.0], self);
+        rows::each(force, group.mass, group.x, [ax, ay, az, 0.0], self);
     }
 
-    fn energy(&self, _t: f64, mass: f64, x: Vec3<f64>) -> Option<f64> {
-        Some(-mass * Vec3::from(self.0).dot(x))
+    fn energy(&self, _t: f64, one: &One) -> Option<f64> {
+        Some(-one.mass * Vec3::from(self.0).dot(one.x))
     }
 
-    fn matrix(&self, _: f64, _: f64, _: Vec3<f64>, _: Vec3<f64>) -> (Block, Block) {
+    fn matrix(&self, _t: f64, _one: &One) -> (Block, Block) {
         ([0.0; 6], [0.0; 6])
     }
 }

@@ -5,6 +5,7 @@ pub mod functions;
 pub mod lane;
 pub mod parallel;
 pub mod quat;
+pub mod random;
 pub mod rotation;
 pub mod rows;
 pub mod simd;
@@ -13,6 +14,7 @@ pub mod vec3;
 pub use dual::Dual;
 pub use lane::Lane;
 pub use quat::Quat;
+pub use random::Random;
 pub use vec3::Vec3;
 
 /// The engine's scalar: f32, or f64 in the twin crate.

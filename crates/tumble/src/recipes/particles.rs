@@ -20,11 +20,17 @@ pub fn particles(site: &mut Site<'_>, thing: &Particles) {
     if thing.mass.len() != 1 && thing.mass.len() != n {
         site.wrong(format!("{path}.mass"), format!("{} masses for {n} positions, expected one or {n}", thing.mass.len()));
     }
+    if thing.charge.len() > 1 && thing.charge.len() != n {
+        site.wrong(format!("{path}.charge"), format!("{} charges for {n} positions, expected none, one or {n}", thing.charge.len()));
+    }
     let one = |list: &[f64], i: usize| *list.get(i).or(list.first()).unwrap_or(&1.0);
     let mut first = 0;
     for (i, x) in thing.position.iter().enumerate() {
         let v = thing.velocity.get(i).or(thing.velocity.first()).copied().unwrap_or_default();
         let index = site.parts.point(Vector::from(*x), Vector::from(v), one(&thing.mass, i));
+        if let Some(charge) = thing.charge.get(i).or(thing.charge.first()) {
+            site.parts.charge(index, *charge);
+        }
         if i == 0 {
             first = index;
         }
@@ -77,6 +83,7 @@ pub fn tracers(thing: &Particles, wrong: &mut impl FnMut(String, &str)) -> Trace
     };
     refuse("velocity", !thing.velocity.is_empty());
     refuse("mass", thing.mass != [1.0]);
+    refuse("charge", !thing.charge.is_empty());
     refuse("pin", !thing.pin.is_empty());
     refuse("spring", !thing.spring.is_empty());
     Tracer { x: thing.position.iter().map(|x| Vector::from(*x)).collect() }

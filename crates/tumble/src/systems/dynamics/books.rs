@@ -207,7 +207,7 @@ impl Dynamics {
             angular_momentum: total.angular.into(),
             kinetic: total.kinetic,
             elastic: self.between(true),
-            external: self.between(false) + self.laws.external_energy(t, x) - Vec3::from(self.laws.gravity).dot(total.first_moment),
+            external: self.between(false) + self.laws.external_energy(t, x, v) - Vec3::from(self.laws.gravity).dot(total.first_moment),
             stretch,
             penetration: if touching { max(n, |range| range.flat_map(depths).fold(0.0, f64::max)).max(0.0) } else { 0.0 },
             speed: total.speed_sq.sqrt(),

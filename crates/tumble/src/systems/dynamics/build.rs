@@ -74,6 +74,8 @@ impl<const D: usize, const P: usize> Springs<D, P> {
 pub struct Parts {
     points: Vec<(Vec3<f64>, Vec3<f64>, f64, bool)>,
     frames: Vec<([f64; 4], f64, bool)>,
+    /// Points with an electric charge [C].
+    charges: Vec<(u32, f64)>,
     linear: Springs<1, 0>,
     nonlinear: Springs<1, 2>,
     vector: Springs<0, 0>,
@@ -138,6 +140,11 @@ impl Parts {
             object.frames.end = n;
         }
         n as u32 - 1
+    }
+
+    /// Gives a point an electric charge [C].
+    pub fn charge(&mut self, point: u32, charge: f64) {
+        self.charges.push((point, charge));
     }
 
     /// Holds a point.
@@ -265,6 +272,12 @@ impl Parts {
             state.v.push([0.0; 4]);
             masses.mass.push(*inertia as Real);
             masses.inverse.push(if *pinned { 0.0 } else { (1.0 / inertia) as Real });
+        }
+        if !self.charges.is_empty() {
+            masses.charge = vec![0.0; rows];
+            for (i, charge) in &self.charges {
+                masses.charge[*i as usize] = *charge as Real;
+            }
         }
         let lost = || SceneError::one(format!("system \"{}\"", settings.name), "an element refers to a mass that is not there");
         let end = self.counts();

@@ -3,12 +3,13 @@
 use super::contact::{self, Penalty};
 use super::laws::Laws;
 use crate::elements::{Batch, Weights};
+use crate::forces::Group;
 use crate::integrators::newton::{self, Linear, Stiff};
 use crate::linalg::blocks::{Block, Blocks};
 use crate::linalg::cholesky::{Assembly, Cholesky};
 use crate::linalg::pcg::{self, Operator, Params};
 use crate::math::parallel::{chunks, sum};
-use crate::math::{Real, Row, ZERO, xyz64};
+use crate::math::{Real, Row, ZERO};
 use tumble_interface::StepError;
 use tumble_interface::scene::{Hessian, Linear as Method, Solver};
 
@@ -73,6 +74,7 @@ impl Implicit {
         let Laws { batches, forces, masses, colliders, penalty, grip, start: start_x, .. } = laws;
         let colliders = if *penalty { &colliders[..] } else { &[] };
         let (masses, grip, start_x) = (&*masses, &grip[..], &start_x[..]);
+        let group = Group::new(masses, 0, x, v);
         // The stiffness of everything, without mass.
         let forces = &*forces;
         chunks(&mut self.local, |start, local| {
@@ -80,7 +82,7 @@ impl Implicit {
             local.fill([0.0; 6]);
             for (law, ranges) in forces {
                 for i in ranges.iter().flat_map(|r| r.start.max(start)..r.end.min(end)) {
-                    let (k, d) = law.matrix(t, f64::from(masses.mass[i]), xyz64(x[i]), xyz64(v[i]));
+                    let (k, d) = law.matrix(t, &group.one(i));
                     add_block(&mut local[i - start], k, 1.0);
                     add_block(&mut local[i - start], d, (1.0 / gh) as Real);
                 }

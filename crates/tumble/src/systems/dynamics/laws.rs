@@ -2,12 +2,12 @@
 
 use super::implicit::Implicit;
 use crate::elements::Batch;
-use crate::forces::Force;
+use crate::forces::{Force, Group};
 use crate::geometry::Collider;
 use crate::integrators::{Equation, Kinematics, Stage, newton};
 use crate::math::parallel::{chunks, sum};
 use crate::math::rows::{self, Each};
-use crate::math::{Lane, Real, Row, ZERO, add, xyz64};
+use crate::math::{Lane, Real, Row, ZERO, add};
 use crate::state::Masses;
 use std::ops::Range;
 use std::sync::Arc;
@@ -79,18 +79,18 @@ impl Laws {
         for (f, push) in out.iter_mut().zip(self.pushes.get(3 * start..).unwrap_or_default().chunks_exact(3)) {
             *f = add(*f, [push[0] as Real, push[1] as Real, push[2] as Real, 0.0]);
         }
-        self.add_local(t, start, &self.masses.mass[start..end], &x[start..end], &v[start..end], out);
+        self.add_local(t, start, &x[start..end], &v[start..end], out);
     }
 
     /// Adds the forces on each mass by itself, gravity left out, to the rows from `start` on.
-    fn add_local(&self, t: f64, start: usize, mass: &[Real], x: &[Row], v: &[Row], force: &mut [Row]) {
-        let end = start + x.len();
+    fn add_local(&self, t: f64, start: usize, x: &[Row], v: &[Row], force: &mut [Row]) {
+        let (end, group) = (start + x.len(), Group::new(&self.masses, start, x, v));
         for (law, ranges) in &self.forces {
             for range in ranges {
                 let (a, b) = (range.start.max(start), range.end.min(end));
                 if a < b {
                     let (a, b) = (a - start, b - start);
-                    law.add(t, &mass[a..b], &x[a..b], &v[a..b], &mut force[a..b]);
+                    law.add(t, group.part(a..b), &mut force[a..b]);
                 }
             }
         }
@@ -121,9 +121,9 @@ impl Laws {
     }
 
     /// Potential energy of the forces that have one [J], gravity left out.
-    pub fn external_energy(&self, t: f64, x: &[Row]) -> f64 {
-        let mass = &self.masses.mass;
-        let of = |law: &dyn Force, i: usize| law.energy(t, f64::from(mass[i]), xyz64(x[i]));
+    pub fn external_energy(&self, t: f64, x: &[Row], v: &[Row]) -> f64 {
+        let group = Group::new(&self.masses, 0, x, v);
+        let of = |law: &dyn Force, i: usize| law.energy(t, &group.one(i));
         let has_one = |(law, range): &(&dyn Force, &Range<usize>)| !range.is_empty() && of(*law, range.start).is_some();
         let all = self.forces.iter().flat_map(|(law, ranges)| ranges.iter().map(|range| (law.as_ref(), range)));
         all.filter(has_one).map(|(law, range)| sum(range.len(), |part| part.filter_map(|k| of(law, range.start + k)).sum())).sum()
@@ -188,7 +188,7 @@ impl Equation for Local<'_> {
 
     fn rate(&mut self, t: f64, x: &[Row], v: &[Row], out: &mut [Row]) -> Result<(), StepError> {
         out.fill(ZERO);
-        self.laws.add_local(t, self.start, &self.laws.masses.mass[self.start..self.start + x.len()], x, v, out);
+        self.laws.add_local(t, self.start, x, v, out);
         self.laws.accelerate(self.start, x, out);
         Ok(())
     }

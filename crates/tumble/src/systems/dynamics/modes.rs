@@ -2,9 +2,10 @@
 
 use super::Dynamics;
 use crate::elements::Weights;
+use crate::forces::Group;
 use crate::integrators::stability::Mode;
 use crate::math::parallel::chunks;
-use crate::math::{Real, Row, ZERO, dot, scale, xyz64};
+use crate::math::{Real, Row, ZERO, dot, scale};
 use tumble_interface::scene::Hessian;
 
 /// Lanczos steps; the largest eigenvalue of a sheet is then within 1e-3 of its limit.
@@ -64,9 +65,10 @@ impl Dynamics {
         }
         let batches = &self.laws.batches;
         chunks(&mut out, |start, out| batches.iter().for_each(|b| b.add_product(&scaled, start, out)));
+        let group = Group::new(masses, 0, x, &self.state.v);
         for (law, ranges) in &self.laws.forces {
             for i in ranges.iter().cloned().flatten() {
-                let (k, d) = law.matrix(0.0, f64::from(masses.mass[i]), xyz64(x[i]), xyz64(self.state.v[i]));
+                let (k, d) = law.matrix(0.0, &group.one(i));
                 let b: [Real; 6] = std::array::from_fn(|c| (weights.0 * f64::from(k[c]) + weights.1 * f64::from(d[c])) as Real);
                 let s = scaled[i];
                 out[i] = crate::math::add(
