@@ -89,6 +89,15 @@ pub enum StepError {
         /// Step asked for [s].
         step: f64,
     },
+    /// More would be needed than there may be.
+    Capacity {
+        /// System that needed it.
+        system: String,
+        /// Simulated time [s].
+        time: f64,
+        /// What ran out, and the cure.
+        what: String,
+    },
     /// A user's force or integrator failed.
     User(String),
 }
@@ -170,6 +179,7 @@ impl fmt::Display for StepError {
                  stiffest spring, or use an implicit integrator",
                 short(*time)
             ),
+            Self::Capacity { system, time, what } => write!(f, "system \"{system}\" at t = {} s: {what}", short(*time)),
             Self::User(message) => f.write_str(message),
         }
     }

@@ -68,6 +68,12 @@ pub fn step_error(py: Python<'_>, error: &tumble_interface::StepError) -> PyErr 
                 report.set_item("time", time)?;
                 report.set_item("step", step)?;
             }
+            E::Capacity { system, time, what } => {
+                report.set_item("kind", "capacity")?;
+                report.set_item("system", system)?;
+                report.set_item("time", time)?;
+                report.set_item("message", what)?;
+            }
             E::User(message) => {
                 report.set_item("kind", "user")?;
                 report.set_item("message", message)?;

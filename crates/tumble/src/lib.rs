@@ -2,8 +2,8 @@
 //!
 //! A [`Scene`](tumble_interface::Scene) goes in, [`Frame`](tumble_interface::Frame)s come out; between them stands a
 //! [`Simulation`](scene::Simulation). No files, no clock, no GPU here. Layers, each importing only those before it (`tests/layers.rs`
-//! enforces it): math, geometry, linalg, reference, state, elements, forces, integrators, exchange, system, systems, world,
-//! recipes, scene.
+//! enforces it): math, geometry, linalg, reference, state, elements, forces, integrators, exchange, system, pool, systems,
+//! world, recipes, scene.
 
 // One source for two scalars: what converts in one engine is idle in the other.
 #![cfg_attr(feature = "double", allow(clippy::useless_conversion, clippy::unnecessary_cast))]
@@ -15,6 +15,7 @@ pub mod geometry;
 pub mod integrators;
 pub mod linalg;
 pub mod math;
+pub mod pool;
 pub mod recipes;
 pub mod reference;
 pub mod scene;

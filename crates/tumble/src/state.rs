@@ -42,6 +42,8 @@ pub struct Object {
     pub links: Vec<(usize, Range<usize>)>,
     /// The two points of each link, counted from its first, in the order of `links`.
     pub link_ends: Vec<[u32; 2]>,
+    /// The emitter in the system's pool whose particles these are; their number changes.
+    pub stream: Option<usize>,
     /// Radius in pictures [m]; 0 for a surface.
     pub radius: f64,
 }

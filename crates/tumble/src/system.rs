@@ -1,7 +1,9 @@
 //! L4: what the world asks of a system, and the archive that snapshots are made of.
 
 use crate::exchange::Exchange;
-use crate::math::Row;
+use crate::math::parallel::CHUNK;
+use crate::math::{Real, Row};
+use rayon::prelude::*;
 use tumble_interface::engine::{Ledger, Stability, StepReport, UserForce, UserIntegrator};
 use tumble_interface::{Column, StepError};
 
@@ -64,6 +66,8 @@ pub trait System: Send + Sync {
 pub enum Part {
     /// Rows in the engine's scalar.
     Rows(Vec<Row>),
+    /// Numbers in the engine's scalar, so many to a row.
+    Table(usize, Vec<Real>),
     /// Numbers in double precision.
     Numbers(Vec<f64>),
     /// Indices.
@@ -102,6 +106,50 @@ impl Archive {
         }
     }
 
+    /// Room for a table, in the memory of the old one.
+    fn table(&mut self, name: &str, width: usize, rows: usize) -> &mut [Real] {
+        let old = match self.parts.get_mut(self.next) {
+            Some((old, Part::Table(_, into))) if old == name => std::mem::take(into),
+            _ => Vec::new(),
+        };
+        let mut numbers = old;
+        if numbers.capacity() < width * rows {
+            numbers = Vec::with_capacity(width * rows);
+        }
+        numbers.resize(width * rows, 0.0);
+        self.push(name, Part::Table(width, numbers));
+        match &mut self.parts[self.next - 1].1 {
+            Part::Table(_, numbers) => numbers,
+            _ => &mut [],
+        }
+    }
+
+    /// Writes the first three numbers of each row.
+    pub fn push_points(&mut self, name: &str, rows: &[Row]) {
+        let into = self.table(name, 3, rows.len());
+        into.par_chunks_mut(3 * CHUNK).zip(rows.par_chunks(CHUNK)).for_each(|(into, rows)| {
+            for (into, row) in into.chunks_exact_mut(3).zip(rows) {
+                into.copy_from_slice(&row[..3]);
+            }
+        });
+    }
+
+    /// Writes a column of numbers.
+    pub fn push_numbers(&mut self, name: &str, numbers: &[Real]) {
+        self.table(name, 1, numbers.len()).copy_from_slice(numbers);
+    }
+
+    /// Writes a column of indices.
+    pub fn push_indices(&mut self, name: &str, indices: &[u32]) {
+        match self.parts.get_mut(self.next) {
+            Some((old, Part::Indices(into))) if old == name => {
+                indices.clone_into(into);
+                self.next += 1;
+            }
+            _ => self.push(name, Part::Indices(indices.to_vec())),
+        }
+    }
+
     /// Reads the next part if it has this name.
     fn pop(&mut self, name: &str) -> Option<&Part> {
         let (found, part) = self.parts.get(self.next)?;
@@ -115,6 +163,30 @@ impl Archive {
         match self.pop(name)? {
             Part::Rows(rows) if rows.len() == into.len() => {
                 into.copy_from_slice(rows);
+                Some(())
+            }
+            _ => None,
+        }
+    }
+
+    /// Reads the first three numbers of as many rows as there are.
+    pub fn points(&mut self, name: &str, into: &mut [Row]) -> Option<()> {
+        match self.pop(name)? {
+            Part::Table(3, numbers) if numbers.len() == 3 * into.len() => {
+                for (row, numbers) in into.iter_mut().zip(numbers.chunks_exact(3)) {
+                    row[..3].copy_from_slice(numbers);
+                }
+                Some(())
+            }
+            _ => None,
+        }
+    }
+
+    /// Reads a column of numbers of any length.
+    pub fn column(&mut self, name: &str, into: &mut Vec<Real>) -> Option<()> {
+        match self.pop(name)? {
+            Part::Table(1, numbers) => {
+                numbers.clone_into(into);
                 Some(())
             }
             _ => None,

@@ -154,6 +154,7 @@ impl World {
             .filter_map(|(k, (name, part))| {
                 let (dtype, shape) = match part {
                     Part::Rows(rows) => (REAL, vec![rows.len(), 4]),
+                    Part::Table(width, numbers) => (REAL, vec![numbers.len() / width, *width]),
                     Part::Numbers(numbers) => (Dtype::F64, vec![numbers.len()]),
                     Part::Indices(indices) => (Dtype::U32, vec![indices.len()]),
                 };
@@ -258,6 +259,7 @@ const REAL: Dtype = Dtype::F64;
 fn bytes(part: &Part) -> &[u8] {
     match part {
         Part::Rows(rows) => bytemuck::cast_slice(rows),
+        Part::Table(_, numbers) => bytemuck::cast_slice(numbers),
         Part::Numbers(numbers) => bytemuck::cast_slice(numbers),
         Part::Indices(indices) => bytemuck::cast_slice(indices),
     }
@@ -270,6 +272,7 @@ fn part(tensor: &TensorView<'_>) -> Option<Part> {
             let numbers: Vec<Real> = bytemuck::allocation::pod_collect_to_vec(data);
             Part::Rows(numbers.chunks_exact(4).map(|r| [r[0], r[1], r[2], r[3]]).collect::<Vec<Row>>())
         }
+        (dtype, [_, width]) if dtype == REAL => Part::Table(*width, bytemuck::allocation::pod_collect_to_vec(data)),
         (Dtype::F64, [_]) => Part::Numbers(bytemuck::allocation::pod_collect_to_vec(data)),
         (Dtype::U32, [_]) => Part::Indices(bytemuck::allocation::pod_collect_to_vec(data)),
         _ => return None,

@@ -11,7 +11,7 @@ fn source() -> PathBuf {
 }
 
 /// The modules of the engine, the lowest first: each imports only those before it.
-const LAYERS: [&str; 14] = [
+const LAYERS: [&str; 15] = [
     "math",
     "geometry",
     "linalg",
@@ -22,6 +22,7 @@ const LAYERS: [&str; 14] = [
     "integrators",
     "exchange",
     "system",
+    "pool",
     "systems",
     "world",
     "recipes",

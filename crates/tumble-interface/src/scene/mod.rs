@@ -1,12 +1,14 @@
 //! The scene: every word that a scene file may hold, with unit, default and range. These structs are the
 //! schema; JSON Schema, the reference page and the Python stubs are generated from them.
 
+mod emitters;
 mod forces;
 mod output;
 mod shapes;
 mod structures;
 mod systems;
 
+pub use emitters::{Between, Burst, Emitter, Kill, Source, WhenFull};
 pub use forces::{Anchor, Field, Force};
 pub use output::{Camera, Expect, Output, Probe};
 pub use shapes::{Collider, MeshFile, Shape};
@@ -29,7 +31,7 @@ pub struct Scene {
     /// One line for people.
     #[serde(default)]
     pub title: String,
-    /// Seed of every random number; no method draws one yet.
+    /// Seed of every random number.
     #[serde(default)]
     pub seed: u32,
     /// Scalar type of the engine.
@@ -54,6 +56,9 @@ pub struct Scene {
     /// Free masses and springs between them, listed one by one.
     #[serde(default)]
     pub particles: Vec<Particles>,
+    /// Sources of particles that are born and die.
+    #[serde(default)]
+    pub emitter: Vec<Emitter>,
     /// Chains of springs, or rods.
     #[serde(default)]
     pub rope: Vec<Rope>,
@@ -204,6 +209,20 @@ impl Scene {
             Shape::Mesh(mesh) => Some((format!("collider \"{}\".shape.mesh", c.name), mesh)),
             _ => None,
         });
-        nets.chain(shapes).collect()
+        let sources = self.emitter.iter_mut().flat_map(|e| {
+            let Emitter { name, from, kill, .. } = e;
+            let source = match from {
+                Source::MeshSurface(mesh) => Some((format!("emitter \"{name}\".from.mesh_surface"), mesh)),
+                Source::MeshVolume(mesh) => Some((format!("emitter \"{name}\".from.mesh_volume"), mesh)),
+                _ => None,
+            };
+            let regions = kill.iter_mut().enumerate().filter_map(|(i, rule)| match rule {
+                Kill::Inside(Shape::Mesh(mesh)) => Some((format!("emitter \"{name}\".kill[{i}].inside.mesh"), mesh)),
+                Kill::Outside(Shape::Mesh(mesh)) => Some((format!("emitter \"{name}\".kill[{i}].outside.mesh"), mesh)),
+                _ => None,
+            });
+            source.into_iter().chain(regions).collect::<Vec<_>>()
+        });
+        nets.chain(shapes).chain(sources).collect()
     }
 }

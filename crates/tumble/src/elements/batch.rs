@@ -37,6 +37,8 @@ pub trait Batch: Send + Sync {
     fn is_elastic(&self) -> bool {
         true
     }
+    /// The rows of the objects that it acts between, and what they weigh, have changed.
+    fn renew(&mut self, _ranges: Vec<Range<usize>>, _masses: &crate::state::Masses) {}
     /// Prepares the forces at (x, v): what has to be known of all elements before rows can be summed.
     fn begin_forces(&mut self, _x: &[Row], _v: &[Row]) {}
     /// Adds the forces [N] and torques [N m], internal damping included, on the rows from `start` on, a multiple of CHUNK.

@@ -2,12 +2,14 @@
 
 pub mod bvh;
 pub mod contact;
+pub mod sampling;
 pub mod sdf;
 pub mod shape;
 pub mod surface;
 
 pub use bvh::Bvh;
 pub use contact::{Collider, Touch};
+pub use sampling::Sampler;
 pub use sdf::GridSdf;
 pub use shape::Shape;
 

@@ -13,7 +13,7 @@ use crate::systems::dynamics::{Dynamics, Parts, Settings, SpringPart, Stepping, 
 use crate::systems::tracers::{self, Tracers};
 use crate::world::World;
 use std::sync::Arc;
-use tumble_interface::scene::{Anchor, Force as Words, Method, Plane, Scene, System as Plan};
+use tumble_interface::scene::{Anchor, Force as Words, MeshFile, Method, Plane, Scene, System as Plan};
 use tumble_interface::{Column, Data, Issue, Mesh, SceneError};
 
 /// A world, the surfaces of its colliders, and what is doubtful about it.
@@ -34,8 +34,9 @@ pub fn build(scene: &Scene, assets: &Assets) -> Result<Built, SceneError> {
     let mut issues = check(scene, &plans);
     let (needed, limit) = (memory(scene, assets) / 1024.0_f64.powi(3), scene.world.memory_limit);
     if needed > limit {
-        let message =
-            format!("the scene needs about {needed:.1} GiB, the limit is {limit} GiB; lower a resolution, or raise world.memory_limit");
+        let message = format!(
+            "the scene needs about {needed:.1} GiB, the limit is {limit} GiB; lower a resolution, a rate or a lifetime, set most, or raise world.memory_limit"
+        );
         issues.push(Issue::new("world.memory_limit", message));
         return Err(SceneError { issues });
     }
@@ -77,6 +78,7 @@ pub fn build(scene: &Scene, assets: &Assets) -> Result<Built, SceneError> {
         let settings = Settings {
             name: plan.name.clone(),
             index,
+            interval: dt,
             integrator: plan.integrator,
             stepping: stepping(plan),
             adaptive: plan.adaptive.clone(),
@@ -186,6 +188,11 @@ fn fill(scene: &Scene, plans: &[Plan], assets: &Assets, issues: &mut Vec<Issue>)
             }
         });
     }
+    let flat = (scene.dimension == 2).then_some(if scene.plane == Plane::Xz { 1 } else { 2 });
+    for thing in &scene.emitter {
+        let mesh = |file: &MeshFile| assets.get(&file.path);
+        at("emitter", &thing.system, &mut |site| recipes::emitter(site, thing, scene.seed, flat, &mesh));
+    }
     for thing in &scene.rope {
         at("rope", &thing.system, &mut |site| recipes::rope(site, thing));
     }
@@ -209,11 +216,11 @@ fn act(scene: &Scene, parts: &mut [Parts]) {
     for force in &scene.force {
         for parts in &mut *parts {
             let on = |name: &str| targets(force).is_none_or(|on| on.iter().any(|o| o == name));
-            let rows: Vec<_> = parts.ranges().filter(|(name, range)| on(name) && !range.is_empty()).map(|(_, range)| range).collect();
+            let objects: Vec<usize> = parts.bodies().filter(|(_, name)| on(name)).map(|(i, _)| i).collect();
             match law(force) {
-                _ if rows.is_empty() => {}
-                Some(law) => parts.forces.push((law, rows)),
-                None => parts.between.push((force.clone(), rows)),
+                _ if objects.is_empty() => {}
+                Some(law) => parts.forces.push((law, objects)),
+                None => parts.between.push((force.clone(), objects)),
             }
         }
     }

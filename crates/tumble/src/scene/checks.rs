@@ -16,7 +16,8 @@ pub fn objects(scene: &Scene) -> Vec<(&'static str, &str, Option<&str>)> {
     let sheets = scene.sheet.iter().map(|o| ("sheet", o.name.as_str(), o.system.as_deref()));
     let blocks = scene.block.iter().map(|o| ("block", o.name.as_str(), o.system.as_deref()));
     let nets = scene.net.iter().map(|o| ("net", o.name.as_str(), o.system.as_deref()));
-    particles.chain(ropes).chain(sheets).chain(blocks).chain(nets).collect()
+    let emitters = scene.emitter.iter().map(|o| ("emitter", o.name.as_str(), o.system.as_deref()));
+    particles.chain(emitters).chain(ropes).chain(sheets).chain(blocks).chain(nets).collect()
 }
 
 /// Everything wrong that can be seen before anything is built; `systems` are those of the scene, or the default one.
@@ -25,7 +26,7 @@ pub fn check(scene: &Scene, systems: &[System]) -> Vec<Issue> {
     let mut wrong = |path: String, message: String| issues.push(Issue::new(path, message));
     let objects = objects(scene);
     if objects.is_empty() {
-        wrong(String::new(), "nothing to simulate: add particles, a rope, a sheet, a block or a net".into());
+        wrong(String::new(), "nothing to simulate: add particles, an emitter, a rope, a sheet, a block or a net".into());
     }
     let colliders = scene.collider.iter().map(|c| ("collider", c.name.as_str()));
     let mut names = HashSet::new();

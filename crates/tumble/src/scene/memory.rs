@@ -3,10 +3,12 @@
 use super::Assets;
 use crate::geometry::GridSdf;
 use tumble_interface::Scene;
-use tumble_interface::scene::{Diagonals, Shape};
+use tumble_interface::scene::{Diagonals, Shape, Source};
 
 /// Bytes for a mass: its rows in state, scratch, snapshot and history, in double precision.
 const MASS: f64 = 1200.0;
+/// Bytes for an emitted particle: its rows, id and age, twice, and a snapshot on its way to a file, in double precision.
+const BORN: f64 = 400.0;
 /// Bytes for a link: as part, in the list of its kind, and in the gather lists of both ends.
 const LINK: f64 = 260.0;
 /// Bytes for a tetrahedron with its two or three laws.
@@ -18,6 +20,9 @@ pub fn memory(scene: &Scene, assets: &Assets) -> f64 {
     let mut bytes = 0.0;
     for thing in &scene.particles {
         bytes += thing.position.len() as f64 * MASS + thing.spring.len() as f64 * LINK;
+    }
+    for (thing, count) in scene.emitter.iter().zip(alive(scene)) {
+        bytes += count * (BORN + 32.0 * thing.columns.len() as f64);
     }
     for thing in &scene.rope {
         let links = if thing.rod.is_some() { 6.0 } else { 2.0 };
@@ -48,4 +53,30 @@ pub fn memory(scene: &Scene, assets: &Assets) -> f64 {
         }
     }
     bytes
+}
+
+/// Particles of each emitter that may live at once until the last frame of the scene.
+fn alive(scene: &Scene) -> Vec<f64> {
+    let duration = scene.frame_time() * f64::from(scene.time.frames);
+    // Of every emitter: births a second, and all of its bursts.
+    let mut births: Vec<(f64, f64)> = Vec::new();
+    let mut counts = Vec::new();
+    for thing in &scene.emitter {
+        let burst: f64 = thing.burst.iter().map(|b| f64::from(b.count)).sum();
+        let (rate, bursts) = match &thing.from {
+            Source::Particles { of } => {
+                let parent = scene.emitter.iter().zip(&births).find(|(parent, _)| parent.name == *of);
+                let each = |parent: f64| thing.rate * parent + burst;
+                parent.map_or((0.0, 0.0), |(p, (rate, bursts))| {
+                    let each = each(p.lifetime.unwrap_or(duration).min(duration) * (1.0 + p.lifetime_spread));
+                    (rate * each, bursts * each)
+                })
+            }
+            _ => (thing.rate, burst),
+        };
+        births.push((rate, bursts));
+        let life = thing.lifetime.map_or(duration, |l| (l * (1.0 + thing.lifetime_spread)).min(duration));
+        counts.push((rate * life + bursts).min(thing.most.map_or(f64::INFINITY, f64::from)));
+    }
+    counts
 }

@@ -57,7 +57,7 @@ impl Engine for Simulation {
             let (name, step) = match error {
                 StepError::NotFinite(b) | StepError::Exploded(b) => (b.system.as_str(), b.step),
                 StepError::Solve { system, .. } | StepError::StepTooSmall { system, .. } => (system.as_str(), 0.0),
-                StepError::User(_) => ("", 0.0),
+                StepError::Capacity { .. } | StepError::User(_) => ("", 0.0),
             };
             self.failure = self.world.names().iter().position(|n| *n == name).map(|i| (i, step));
         }

@@ -30,6 +30,11 @@ impl Scale {
         scale
     }
 
+    /// Energy [J] that came from outside, and is a scale from now on.
+    pub fn add(&mut self, energy: f64) {
+        self.size += energy;
+    }
+
     /// Is at least as large as another scale.
     pub fn keep(&mut self, other: Self) {
         self.size = self.size.max(other.size);
@@ -149,6 +154,9 @@ impl Dynamics {
                 };
                 out.push(Column { object: object.name.clone(), name: (*name).into(), unit, width, data: Data::from(data) });
             }
+            if let Some(stream) = object.stream {
+                self.write_life(stream, &object.name, out);
+            }
         }
     }
 
@@ -165,6 +173,12 @@ impl Dynamics {
                     out.push(Column { object: object.name.clone(), name: name.into(), unit, width, data });
                 }
             };
+            if let Some(stream) = object.stream {
+                if !self.pool.emitter(stream).has_radii() {
+                    add("radius", "m", 1, Data::F64(vec![object.radius]));
+                }
+                continue;
+            }
             add("mass", "kg", 1, Data::from(self.laws.masses.mass[object.points.clone()].to_vec()));
             let pinned = object.points.clone().filter(|i| self.laws.masses.inverse[*i] == 0.0).map(|i| (i - object.points.start) as u32);
             add("pinned", "1", 1, Data::U32(pinned.collect()));
@@ -239,7 +253,7 @@ impl Dynamics {
     /// Takes the scale of the energy from the books of a good frame. Energy that came from nowhere does not count, or a slow
     /// explosion would carry its scale along; where others push, nobody knows where energy came from.
     pub(super) fn rescale(&mut self, books: &Ledger) {
-        let driven = self.pushed || !self.laws.user.is_empty();
+        let driven = self.pushed || !self.laws.user.is_empty() || !self.pool.is_empty();
         let gain = if driven { 0.0 } else { (books.energy() - self.scale.start).max(0.0) };
         let external = (books.external - self.scale.external).abs();
         let energy = books.kinetic.max(books.elastic).max(external) - gain;

@@ -1,5 +1,6 @@
 //! From the parts that recipes collect to a system.
 
+use super::laws::Acting;
 use super::{Dynamics, Stepping, books};
 use crate::elements::{
     BendTwist, Distance, Element, Elements, Hinge, Linear, Members, Nonlinear, Pairs, StretchShear, TetShear, TetStrain, TetVolume, Vector,
@@ -8,6 +9,7 @@ use crate::forces::{Force, Gravitation};
 use crate::geometry::Collider;
 use crate::integrators::Memory;
 use crate::math::{Real, Vec3};
+use crate::pool::{Emitter, Pool};
 use crate::state::{Masses, Object, State};
 use std::ops::Range;
 use std::sync::Arc;
@@ -20,6 +22,8 @@ pub struct Settings {
     pub name: String,
     /// Its place among the systems of the world.
     pub index: usize,
+    /// Length of an exchange interval [s].
+    pub interval: f64,
     /// Scheme.
     pub integrator: Integrator,
     /// Division of the exchange interval.
@@ -88,10 +92,11 @@ pub struct Parts {
     bends: Vec<Members<2, 5, 0>>,
     energy_at_rest: [f64; 2],
     objects: Vec<Draft>,
-    /// Forces on each mass by itself, with the rows that they act on.
-    pub forces: Vec<(Box<dyn Force>, Vec<Range<usize>>)>,
-    /// Forces between all masses of some rows.
-    pub between: Vec<(Words, Vec<Range<usize>>)>,
+    emitters: Vec<Emitter>,
+    /// Forces on each mass by itself, with the objects that they act on, counted from the first that was begun.
+    pub forces: Vec<(Box<dyn Force>, Vec<usize>)>,
+    /// Forces between all masses of some objects.
+    pub between: Vec<(Words, Vec<usize>)>,
 }
 
 /// An object and how many links of each kind there were before it.
@@ -115,6 +120,27 @@ impl Parts {
     /// The object under construction.
     pub fn object(&mut self) -> Option<&mut Object> {
         self.objects.last_mut().map(|d| &mut d.object)
+    }
+
+    /// Begins an object whose particles an emitter makes.
+    pub fn emitter(&mut self, emitter: Emitter) {
+        self.begin(&emitter.words().name.clone(), emitter.words().radius);
+        let stream = self.emitters.len();
+        if let Some(object) = self.object() {
+            object.stream = Some(stream);
+        }
+        self.emitters.push(emitter);
+    }
+
+    /// The emitter of that name, counted from the first.
+    pub fn stream(&self, name: &str) -> Option<usize> {
+        self.emitters.iter().position(|e| e.words().name == name)
+    }
+
+    /// Objects that have masses or will have some, with the place of each.
+    pub fn bodies(&self) -> impl Iterator<Item = (usize, &str)> {
+        let has = |d: &&Draft| !d.object.points.is_empty() || d.object.stream.is_some();
+        self.objects.iter().enumerate().filter(move |(_, d)| has(d)).map(|(i, d)| (i, d.object.name.as_str()))
     }
 
     /// Points of every object so far, by name.
@@ -217,7 +243,7 @@ impl Parts {
 
     /// Whether nothing moves.
     pub fn is_empty(&self) -> bool {
-        self.points.is_empty() && self.frames.is_empty()
+        self.points.is_empty() && self.frames.is_empty() && self.emitters.is_empty()
     }
 
     /// Whether every number survives the engine's scalar: neither infinite nor, where it must not be, zero.
@@ -252,6 +278,10 @@ impl Parts {
     pub fn build(mut self, settings: Settings) -> Result<Dynamics, SceneError> {
         self.check_range()?;
         let points = self.points.len();
+        if !self.emitters.is_empty() && !self.frames.is_empty() {
+            let message = "it holds rods and emitters; rods have frames, which must come last: give one of them a system of its own";
+            return Err(SceneError::one(format!("system \"{}\"", settings.name), message));
+        }
         let rows = points + self.frames.len();
         for nodes in self.stretches.iter_mut().map(|m| &mut m.nodes) {
             nodes[2] += points as u32;
@@ -273,7 +303,7 @@ impl Parts {
             masses.mass.push(*inertia as Real);
             masses.inverse.push(if *pinned { 0.0 } else { (1.0 / inertia) as Real });
         }
-        if !self.charges.is_empty() {
+        if !self.charges.is_empty() || self.emitters.iter().any(|e| e.words().charge != 0.0) {
             masses.charge = vec![0.0; rows];
             for (i, charge) in &self.charges {
                 masses.charge[*i as usize] = *charge as Real;
@@ -316,6 +346,7 @@ impl Parts {
             _ => self.vector.members[i].nodes,
         };
         let mut objects = Vec::new();
+        let mut places = Vec::new();
         for (draft, next) in self.objects.into_iter().zip(next) {
             let mut object = draft.object;
             object.frames = object.frames.start + points..object.frames.end + points;
@@ -330,11 +361,21 @@ impl Parts {
                     object.links.push((batch, range));
                 }
             }
-            if !object.points.is_empty() {
+            places.push(objects.len());
+            if object.stream.is_some() {
+                object.points = points..points;
+            }
+            if !object.points.is_empty() || object.stream.is_some() {
                 objects.push(object);
             }
         }
-        for (words, ranges) in self.between {
+        let placed = |on: Vec<usize>| -> Vec<usize> { on.into_iter().map(|i| places[i]).collect() };
+        let rows_of = |on: &[usize]| -> Vec<Range<usize>> { on.iter().map(|i| objects[*i].points.clone()).collect() };
+        let mut between = Vec::new();
+        for (words, on) in self.between {
+            let on = placed(on);
+            let ranges = rows_of(&on);
+            between.push((batches.list.len(), on));
             if let Words::Gravitation { constant, softening, .. } = words {
                 batches.list.push(Box::new(Gravitation::new(ranges, &masses.mass, constant, softening)));
             }
@@ -344,10 +385,15 @@ impl Parts {
             batch.linearize(&state.x, crate::elements::Weights { stiffness: 1.0, damping: 0.0, hessian: Hessian::Definite });
             batch.add_diagonal(&state.x, &mut stiffness);
         }
+        let acting = |(law, on)| {
+            let objects = placed(on);
+            Acting { law, ranges: rows_of(&objects), objects }
+        };
+        let forces = self.forces.into_iter().map(acting).collect();
         let laws = super::laws::Laws {
             grip: stiffness.iter().map(|k| (k[0] + k[1] + k[2]) / 3.0).collect(),
             batches: batches.list,
-            forces: self.forces,
+            forces,
             gravity: settings.gravity,
             masses,
             colliders: settings.colliders.clone(),
@@ -377,8 +423,11 @@ impl Parts {
             broken: 0,
             pushed: false,
             watched: false,
+            between,
+            pool: Pool::new(points, self.emitters),
         };
         system.set_scale();
+        system.begin_life(settings.interval).map_err(|e| SceneError::one(format!("system \"{}\"", settings.name), e.to_string()))?;
         Ok(system)
     }
 }

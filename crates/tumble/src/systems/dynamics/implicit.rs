@@ -1,7 +1,7 @@
 //! The linear systems of implicit stages: (M/gh² + D/gh + K) dx = rhs.
 
 use super::contact::{self, Penalty};
-use super::laws::Laws;
+use super::laws::{Acting, Laws};
 use crate::elements::{Batch, Weights};
 use crate::forces::Group;
 use crate::integrators::newton::{self, Linear, Stiff};
@@ -80,7 +80,7 @@ impl Implicit {
         chunks(&mut self.local, |start, local| {
             let end = start + local.len();
             local.fill([0.0; 6]);
-            for (law, ranges) in forces {
+            for Acting { law, ranges, .. } in forces {
                 for i in ranges.iter().flat_map(|r| r.start.max(start)..r.end.min(end)) {
                     let (k, d) = law.matrix(t, &group.one(i));
                     add_block(&mut local[i - start], k, 1.0);

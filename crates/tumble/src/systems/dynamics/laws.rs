@@ -15,13 +15,23 @@ use tumble_interface::StepError;
 use tumble_interface::engine::{StepReport, UserForce};
 use tumble_interface::scene::Solver;
 
+/// A force on each mass by itself, and on whose.
+pub struct Acting {
+    /// The force.
+    pub law: Box<dyn Force>,
+    /// Objects that it acts on.
+    pub objects: Vec<usize>,
+    /// Their rows.
+    pub ranges: Vec<Range<usize>>,
+}
+
 /// Every law of a system.
 #[derive(Default)]
 pub struct Laws {
     /// Elements between masses.
     pub batches: Vec<Box<dyn Batch>>,
-    /// Forces on each mass by itself, with the rows that they act on.
-    pub forces: Vec<(Box<dyn Force>, Vec<Range<usize>>)>,
+    /// Forces on each mass by itself.
+    pub forces: Vec<Acting>,
     /// Forces written by users.
     pub user: Vec<Box<dyn UserForce>>,
     /// Gravity on points [m/s²].
@@ -85,7 +95,7 @@ impl Laws {
     /// Adds the forces on each mass by itself, gravity left out, to the rows from `start` on.
     fn add_local(&self, t: f64, start: usize, x: &[Row], v: &[Row], force: &mut [Row]) {
         let (end, group) = (start + x.len(), Group::new(&self.masses, start, x, v));
-        for (law, ranges) in &self.forces {
+        for Acting { law, ranges, .. } in &self.forces {
             for range in ranges {
                 let (a, b) = (range.start.max(start), range.end.min(end));
                 if a < b {
@@ -97,10 +107,10 @@ impl Laws {
     }
 
     /// Turns the forces on the rows from `start` on into accelerations.
-    fn accelerate(&self, start: usize, x: &[Row], out: &mut [Row]) {
+    fn accelerate(&self, masses: &Masses, start: usize, x: &[Row], out: &mut [Row]) {
         let [gx, gy, gz] = self.gravity.map(|g| g as Real);
-        let inverse = &self.masses.inverse[start..start + out.len()];
-        let (points, frames) = out.split_at_mut(self.masses.points.saturating_sub(start).min(inverse.len()));
+        let inverse = &masses.inverse[start..start + out.len()];
+        let (points, frames) = out.split_at_mut(masses.points.saturating_sub(start).min(inverse.len()));
         let (x_points, x_frames) = x.split_at(points.len());
         rows::each(points, &inverse[..x_points.len()], x_points, [gx, gy, gz, 0.0], Weigh);
         rows::each(frames, &inverse[x_points.len()..], x_frames, ZERO, Weigh);
@@ -125,7 +135,7 @@ impl Laws {
         let group = Group::new(&self.masses, 0, x, v);
         let of = |law: &dyn Force, i: usize| law.energy(t, &group.one(i));
         let has_one = |(law, range): &(&dyn Force, &Range<usize>)| !range.is_empty() && of(*law, range.start).is_some();
-        let all = self.forces.iter().flat_map(|(law, ranges)| ranges.iter().map(|range| (law.as_ref(), range)));
+        let all = self.forces.iter().flat_map(|f| f.ranges.iter().map(|range| (f.law.as_ref(), range)));
         all.filter(has_one).map(|(law, range)| sum(range.len(), |part| part.filter_map(|k| of(law, range.start + k)).sum())).sum()
     }
 }
@@ -155,7 +165,7 @@ impl Equation for Laws {
         let laws = &*self;
         chunks(out, |start, out| {
             laws.sum(t, start, x, v, out);
-            laws.accelerate(start, &x[start..start + out.len()], out);
+            laws.accelerate(&laws.masses, start, &x[start..start + out.len()], out);
         });
         Ok(())
     }
@@ -173,23 +183,33 @@ impl Equation for Laws {
     }
 }
 
-/// The equation of motion of some rows of a system in which no mass feels another.
+/// The equation of motion of some masses that feel no other: rows of a system, or newborn that are not in it yet.
 pub struct Local<'a> {
     /// The laws of the whole system.
     pub laws: &'a Laws,
-    /// First row.
+    /// What they weigh.
+    pub masses: &'a Masses,
+    /// First of their rows in `masses`.
     pub start: usize,
+    /// Of newborn, the object that they belong to.
+    pub newborn: Option<usize>,
 }
 
 impl Equation for Local<'_> {
     fn kinematics(&self) -> Kinematics {
-        Kinematics { points: self.laws.masses.points.saturating_sub(self.start), second_order: true }
+        Kinematics { points: self.masses.points.saturating_sub(self.start), second_order: true }
     }
 
     fn rate(&mut self, t: f64, x: &[Row], v: &[Row], out: &mut [Row]) -> Result<(), StepError> {
         out.fill(ZERO);
-        self.laws.add_local(t, self.start, x, v, out);
-        self.laws.accelerate(self.start, x, out);
+        match self.newborn {
+            None => self.laws.add_local(t, self.start, x, v, out),
+            Some(object) => {
+                let group = Group::new(self.masses, self.start, x, v);
+                self.laws.forces.iter().filter(|f| f.objects.contains(&object)).for_each(|f| f.law.add(t, group, out));
+            }
+        }
+        self.laws.accelerate(self.masses, self.start, x, out);
         Ok(())
     }
 

@@ -6,6 +6,7 @@ mod build;
 mod contact;
 mod implicit;
 mod laws;
+mod life;
 mod modes;
 
 pub use build::{Parts, Settings, SpringPart};
@@ -15,6 +16,7 @@ use crate::exchange::{Exchange, Port};
 use crate::integrators::{self, Equation, Memory, Scratch, adaptive_step};
 use crate::math::parallel::{CHUNK, sum};
 use crate::math::{Real, Row, Vec3, ZERO, axpy, row, sub, xyz64};
+use crate::pool::Pool;
 use crate::state::{Object, State};
 use crate::system::{Archive, Part, System};
 use laws::{Laws, Local, flat};
@@ -52,6 +54,10 @@ pub struct Dynamics {
     state: State,
     laws: Laws,
     objects: Vec<Object>,
+    /// Particles that are born and die; their rows are the last.
+    pool: Pool,
+    /// Batches between all masses of some objects, with these objects.
+    between: Vec<(usize, Vec<usize>)>,
     tethers: Vec<Tether>,
     clamp: Option<Elements<Limit, Linear, 2, 1, 1, 0>>,
     user: Option<Box<dyn UserIntegrator>>,
@@ -111,7 +117,8 @@ impl Dynamics {
             Stepping::Automatic => {
                 let limit = if self.integrator.is_implicit() { f64::INFINITY } else { self.limit() };
                 let n = if limit > 0.0 { (dt / (0.7 * limit)).ceil().max(1.0) } else { 1.0 };
-                if n <= MOST_SUBSTEPS {
+                // What has no masses yet has no limit to keep to later.
+                if n <= MOST_SUBSTEPS && !self.state.x.is_empty() {
                     self.automatic = n as u32;
                 }
                 n
@@ -289,7 +296,7 @@ impl Dynamics {
             .enumerate()
             .map_init(Scratch::default, |scratch, (c, ((x, v), mut memory))| {
                 let start = c * BLOCK;
-                let mut motion = Local { laws, start };
+                let mut motion = Local { laws, masses: &laws.masses, start, newborn: None };
                 let points = motion.kinematics().points;
                 let inverse = &laws.masses.inverse[start..start + x.len()];
                 let (mut ready, mut before) = (was_ready, Vec::new());
@@ -339,6 +346,8 @@ impl System for Dynamics {
 
     fn advance(&mut self, t: f64, dt: f64, exchange: &mut Exchange, go_on: &(dyn Fn() -> bool + Sync)) -> Result<StepReport, StepError> {
         let mut report = StepReport::default();
+        let end = t + dt;
+        let mut unborn = self.conceive(t, dt)?;
         if self.integrator.is_adaptive() && self.user.is_none() {
             let mut done = 0.0;
             while done < dt && go_on() {
@@ -363,8 +372,10 @@ impl System for Dynamics {
                 // The step's length is known only now.
                 self.pull_tethers(h, exchange);
                 self.after(h, &mut report);
+                self.deliver(&mut unborn, t + done, h, end)?;
                 self.look(t + done)?;
             }
+            self.bury(end, dt)?;
             return Ok(report);
         }
         let substeps = self.substeps(dt);
@@ -380,6 +391,8 @@ impl System for Dynamics {
             && !self.watched;
         if each {
             self.advance_local(t, h, substeps, go_on).map_err(|e| e.in_system(&self.name))?;
+            self.deliver_grown(unborn, (t, h, substeps))?;
+            self.bury(end, dt)?;
             report.steps = u64::from(substeps);
             report.step_range = Some((h, h));
             return Ok(report);
@@ -391,8 +404,10 @@ impl System for Dynamics {
             let time = t + f64::from(k) * h;
             self.pull_tethers(h, exchange);
             self.substep(time, h, &mut report).map_err(|e| e.in_system(&self.name))?;
+            self.deliver(&mut unborn, if k + 1 == substeps { end } else { time + h }, h, end)?;
             self.look(time + h)?;
         }
+        self.bury(end, dt)?;
         Ok(report)
     }
 
@@ -434,8 +449,13 @@ impl System for Dynamics {
     }
 
     fn save(&self, archive: &mut Archive) {
-        archive.push_rows("x", &self.state.x);
-        archive.push_rows("v", &self.state.v);
+        if !self.pool.is_empty() {
+            self.pool.save(archive);
+        }
+        let points = self.laws.masses.points;
+        archive.push_points("x", &self.state.x[..points]);
+        archive.push_rows("turn", &self.state.x[points..]);
+        archive.push_points("v", &self.state.v);
         for column in &self.memory.columns {
             archive.push_rows("memory", column);
         }
@@ -448,8 +468,14 @@ impl System for Dynamics {
     }
 
     fn restore(&mut self, archive: &mut Archive) -> Option<()> {
-        archive.rows("x", &mut self.state.x)?;
-        archive.rows("v", &mut self.state.v)?;
+        if !self.pool.is_empty() {
+            self.pool.restore(archive)?;
+            self.take_pool();
+        }
+        let points = self.laws.masses.points;
+        archive.points("x", &mut self.state.x[..points])?;
+        archive.rows("turn", &mut self.state.x[points..])?;
+        archive.points("v", &mut self.state.v)?;
         for column in &mut self.memory.columns {
             archive.rows("memory", column)?;
         }

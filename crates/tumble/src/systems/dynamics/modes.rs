@@ -1,6 +1,7 @@
 //! The stiffest and the most damped mode of a system, by Lanczos' method on M^-1/2 A M^-1/2.
 
 use super::Dynamics;
+use super::laws::Acting;
 use crate::elements::Weights;
 use crate::forces::Group;
 use crate::integrators::stability::Mode;
@@ -66,7 +67,7 @@ impl Dynamics {
         let batches = &self.laws.batches;
         chunks(&mut out, |start, out| batches.iter().for_each(|b| b.add_product(&scaled, start, out)));
         let group = Group::new(masses, 0, x, &self.state.v);
-        for (law, ranges) in &self.laws.forces {
+        for Acting { law, ranges, .. } in &self.laws.forces {
             for i in ranges.iter().cloned().flatten() {
                 let (k, d) = law.matrix(0.0, &group.one(i));
                 let b: [Real; 6] = std::array::from_fn(|c| (weights.0 * f64::from(k[c]) + weights.1 * f64::from(d[c])) as Real);

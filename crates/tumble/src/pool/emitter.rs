@@ -1,0 +1,303 @@
+//! When and where particles are born, with what they are born, and of what they die. Every number that a particle is born
+//! with is a function of the scene's seed, the emitter's name and the particle's id, so that nothing of it needs storing.
+
+use crate::geometry::{Sampler, Shape, Vector, sampling};
+use crate::math::{Random, Row, xyz64};
+use rayon::prelude::*;
+use tumble_interface::scene::{Between, Emitter as Words, WhenFull};
+
+/// What random numbers are drawn for: the moment of birth, mass, radius and colour; the direction, speed and lifetime;
+/// users' columns; the place.
+const MOMENT: u32 = 0;
+const MOTION: u32 = 1;
+const COLUMNS: u32 = 2;
+const PLACE: u32 = 1 << 16;
+
+/// Part of a particle by which a count may be off by rounding.
+const ROUNDING: f64 = 1e-6;
+
+/// Where an emitter's particles come from.
+pub enum Origin {
+    /// A place in space.
+    Place(Sampler),
+    /// The particles of the emitter with this index.
+    Particles(usize),
+}
+
+/// A rule by which particles die.
+pub enum Kill {
+    /// Inside a solid.
+    Inside(Shape),
+    /// Outside a solid.
+    Outside(Shape),
+    /// Nearer to a collider than this [m].
+    NearCollider(f64),
+    /// Slower than this [m/s].
+    SlowerThan(f64),
+    /// Faster than this [m/s].
+    FasterThan(f64),
+}
+
+/// Whether a point is nearer to a collider than a distance [m].
+pub type Near<'a> = dyn Fn(Vector, f64) -> bool + Sync + 'a;
+
+/// A source of particles.
+pub struct Emitter {
+    words: Words,
+    random: Random,
+    /// Where they come from.
+    pub from: Origin,
+    kill: Vec<Kill>,
+    /// Direction that counts as up.
+    up: Vector,
+    /// The axis that is missing in two dimensions.
+    flat: Option<usize>,
+}
+
+/// A particle that has just been born.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Birth {
+    /// When [s].
+    pub time: f64,
+    /// Where [m].
+    pub x: Vector,
+    /// How fast [m/s].
+    pub v: Vector,
+    /// Who.
+    pub id: u32,
+}
+
+/// A particle that others are born from.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Parent {
+    /// Time at which the others hold [s].
+    pub time: f64,
+    /// Position [m].
+    pub x: Vector,
+    /// Velocity [m/s].
+    pub v: Vector,
+    /// Age [s].
+    pub age: f64,
+}
+
+/// A number between c (1 - spread) and c (1 + spread), where u in [0, 1) says.
+fn spread(c: f64, spread: f64, u: impl FnOnce() -> f64) -> f64 {
+    if spread == 0.0 { c } else { c * (1.0 + spread * (2.0 * u() - 1.0)) }
+}
+
+impl Emitter {
+    /// An emitter of a scene, with what its words stand for.
+    pub fn new(words: Words, seed: u32, from: Origin, kill: Vec<Kill>, up: Vector, flat: Option<usize>) -> Self {
+        Self { random: Random::new(seed, &words.name), words, from, kill, up, flat }
+    }
+
+    /// What the scene says about it.
+    pub fn words(&self) -> &Words {
+        &self.words
+    }
+
+    /// Users' columns and their ranges.
+    pub fn columns(&self) -> impl Iterator<Item = (&String, &Between)> {
+        self.words.columns.iter()
+    }
+
+    /// Particles alive at most.
+    pub fn most(&self) -> Option<usize> {
+        self.words.most.map(|most| most as usize)
+    }
+
+    /// How many more may be born where `len` live; `None` if it is full and that is an error.
+    pub fn room(&self, len: usize) -> Option<Room> {
+        Some(match (self.most(), self.words.when_full) {
+            (None, _) | (_, WhenFull::ReplaceOldest) => Room { most: self.most().unwrap_or(usize::MAX), error: false },
+            (Some(most), full) => Room { most: most.saturating_sub(len), error: full == WhenFull::Error },
+        })
+    }
+
+    /// Mass of a particle [kg].
+    pub fn mass(&self, id: u32) -> f64 {
+        spread(self.words.mass, self.words.mass_spread, || self.draw(id, MOMENT)[1])
+    }
+
+    /// Radius in pictures [m].
+    pub fn radius(&self, id: u32) -> f64 {
+        spread(self.words.radius, self.words.radius_spread, || self.draw(id, MOMENT)[2])
+    }
+
+    /// Whether each has a radius of its own.
+    pub fn has_radii(&self) -> bool {
+        self.words.radius_spread > 0.0
+    }
+
+    /// Whether each has a colour of its own.
+    pub fn has_colors(&self) -> bool {
+        self.words.color.is_some() && (self.words.color_to.is_some() || self.words.color_end.is_some())
+    }
+
+    /// Whether each has a mass of its own.
+    pub fn has_masses(&self) -> bool {
+        self.words.mass_spread > 0.0
+    }
+
+    /// Age at which it dies [s].
+    pub fn lifetime(&self, id: u32) -> f64 {
+        let Some(lifetime) = self.words.lifetime else { return f64::INFINITY };
+        spread(lifetime, self.words.lifetime_spread, || self.draw(id, MOTION)[3])
+    }
+
+    /// Colour at an age [s]; `None` if the emitter has none, or one for all.
+    pub fn color(&self, id: u32, age: f64) -> Option<[f64; 3]> {
+        let Words { color, color_to, color_end, .. } = &self.words;
+        let color = (*color)?;
+        let mix = |a: [f64; 3], b: [f64; 3], t: f64| std::array::from_fn(|c| a[c] + (b[c] - a[c]) * t);
+        let own = color_to.map(|to| mix(color, to, self.draw(id, MOMENT)[3]));
+        let end = color_end.map(|end| mix(own.unwrap_or(color), end, (age / self.lifetime(id)).clamp(0.0, 1.0)));
+        end.or(own)
+    }
+
+    /// A number of a user's column, 0 if there is no such column.
+    pub fn number(&self, name: &str, id: u32) -> f64 {
+        let Some((k, (_, between))) = self.columns().enumerate().find(|(_, (known, _))| *known == name) else { return 0.0 };
+        let u = self.draw(id, COLUMNS + k as u32 / 4)[k % 4];
+        between.from + (between.to.unwrap_or(between.from) - between.from) * u
+    }
+
+    /// Whether no one ever dies.
+    pub fn is_immortal(&self) -> bool {
+        self.words.lifetime.is_none() && self.kill.is_empty()
+    }
+
+    /// Whether a particle is to die.
+    pub fn dies(&self, id: u32, age: f64, x: Row, v: Row, near: &Near<'_>) -> bool {
+        let youngest = self.words.lifetime.unwrap_or(f64::INFINITY) * (1.0 - self.words.lifetime_spread);
+        if age >= youngest && age >= self.lifetime(id) {
+            return true;
+        }
+        self.kill.iter().any(|rule| match rule {
+            Kill::Inside(shape) => shape.distance(xyz64(x)).0 < 0.0,
+            Kill::Outside(shape) => shape.distance(xyz64(x)).0 > 0.0,
+            Kill::NearCollider(distance) => near(xyz64(x), *distance),
+            Kill::SlowerThan(speed) => xyz64(v).norm_sq() < speed * speed,
+            Kill::FasterThan(speed) => xyz64(v).norm_sq() > speed * speed,
+        })
+    }
+
+    fn draw(&self, id: u32, purpose: u32) -> [f64; 4] {
+        self.random.uniform(u64::from(id), 0, purpose)
+    }
+
+    /// Particles that the rate has made by the time t [s]; a real number.
+    fn flow(&self, t: f64) -> f64 {
+        let end = self.words.end.unwrap_or(f64::INFINITY).min(t);
+        self.words.rate * (end - self.words.start).max(0.0)
+    }
+
+    /// Those born in (t, t + dt] [s], ids from `next` on.
+    pub fn births(&self, t: f64, dt: f64, next: u64, room: Room) -> Option<Vec<Birth>> {
+        let Origin::Place(place) = &self.from else { return Some(Vec::new()) };
+        let (before, after) = (self.flow(t), self.flow(t + dt));
+        let first = (before + ROUNDING).floor();
+        let count = ((after + ROUNDING).floor() - first) as usize;
+        let jitter = self.words.jitter;
+        // Moments within the interval, from 0 to 1; where the rate begins or ends within it, the flow says when.
+        let (begin, end) = (self.words.start.clamp(t, t + dt), self.words.end.unwrap_or(f64::INFINITY).clamp(t, t + dt));
+        let mut moments: Vec<f64> = (0..room.take(count)?)
+            .map(|k| {
+                let even = ((first + k as f64 + 1.0 - before) / (after - before)).clamp(0.0, 1.0);
+                let any = if jitter > 0.0 { self.draw((next + k as u64) as u32, MOMENT)[0] } else { even };
+                begin + (end - begin) * (even + (any - even) * jitter)
+            })
+            .collect();
+        // A moment belongs to the interval that it ends.
+        let slack = 1e-9 * dt;
+        for burst in self.words.burst.iter().filter(|b| b.time > t + slack && b.time <= t + dt + slack) {
+            let left = Room { most: room.most - moments.len(), ..room };
+            moments.resize(moments.len() + left.take(burst.count as usize)?, burst.time.min(t + dt));
+        }
+        moments.sort_by(f64::total_cmp);
+        self.bear(next, moments.len(), |k, id| {
+            let (x, normal) = place.sample(&|k| self.draw(id, PLACE + k));
+            Birth { time: moments[k], x, v: self.velocity(id, normal, Vector::default()), id }
+        })
+    }
+
+    /// Those born of the dead.
+    pub fn orphans(&self, dead: &[Parent], next: u64, room: Room) -> Option<Vec<Birth>> {
+        let each: usize = self.words.burst.iter().map(|b| b.count as usize).sum();
+        self.bear(next, room.take(dead.len() * each)?, |k, id| {
+            let parent = dead[k / each];
+            Birth { time: parent.time, x: parent.x, v: self.velocity(id, parent.v, parent.v), id }
+        })
+    }
+
+    /// Those born in the last dt [s] of the living: child k of a parent at its age k/rate.
+    pub fn children(&self, living: &[Parent], dt: f64, next: u64, room: Room) -> Option<Vec<Birth>> {
+        let rate = self.words.rate;
+        let within = |p: &Parent, k: f64| {
+            let time = p.time - p.age + k / rate;
+            time >= self.words.start && self.words.end.is_none_or(|end| time <= end)
+        };
+        let mut due = Vec::new();
+        for (i, parent) in living.iter().enumerate() {
+            let first = ((parent.age - dt).max(0.0) * rate + ROUNDING).floor() + 1.0;
+            let last = (parent.age * rate + ROUNDING).floor();
+            let count = (last - first + 1.0).max(0.0) as u64;
+            due.extend((0..count).map(|k| (i, first + k as f64)).filter(|(_, k)| within(parent, *k)));
+        }
+        self.bear(next, room.take(due.len())?, |j, id| {
+            let (i, k) = due[j];
+            let parent = living[i];
+            let ago = (parent.age - k / rate).clamp(0.0, dt);
+            Birth { time: parent.time - ago, x: parent.x - parent.v * ago, v: self.velocity(id, parent.v, parent.v), id }
+        })
+    }
+
+    fn bear(&self, next: u64, count: usize, birth: impl Fn(usize, u32) -> Birth + Sync) -> Option<Vec<Birth>> {
+        if next + count as u64 > u64::from(u32::MAX) {
+            return None;
+        }
+        let one = |k: usize| {
+            let mut birth = birth(k, (next + k as u64) as u32);
+            if let Some(axis) = self.flat {
+                (birth.x, birth.v) = (flattened(birth.x, axis, false), flattened(birth.v, axis, true));
+            }
+            birth
+        };
+        Some((0..count).into_par_iter().with_min_len(256).map(one).collect())
+    }
+
+    /// The velocity of a newborn where the source has this normal and moves with this velocity.
+    fn velocity(&self, id: u32, normal: Vector, source: Vector) -> Vector {
+        let words = &self.words;
+        let base = Vector::from(words.velocity) + source * words.inherit;
+        if words.speed == 0.0 {
+            return base;
+        }
+        let [u, v, w, _] = self.draw(id, MOTION);
+        let axis = words.direction.map_or(normal, Vector::from);
+        let axis = if axis.norm_sq() > 0.0 { axis } else { self.up };
+        base + sampling::about(axis, u, v, words.cone.to_radians()) * spread(words.speed, words.speed_spread, || w)
+    }
+}
+
+/// Without its component along an axis; a velocity keeps its length if it can.
+fn flattened(v: Vector, axis: usize, keep: bool) -> Vector {
+    let mut flat: [f64; 3] = v.into();
+    flat[axis] = 0.0;
+    let flat = Vector::from(flat);
+    if keep { flat.normalized() * v.norm() } else { flat }
+}
+
+/// How many may be born.
+#[derive(Debug, Clone, Copy)]
+pub struct Room {
+    most: usize,
+    /// Whether more than that is an error.
+    error: bool,
+}
+
+impl Room {
+    fn take(self, wanted: usize) -> Option<usize> {
+        if wanted <= self.most { Some(wanted) } else { (!self.error).then_some(self.most) }
+    }
+}

@@ -1,0 +1,313 @@
+//! L4: particles that are born and die. Those of an emitter are neighbouring rows at the end of a system's columns; their
+//! order means nothing, and changes when one dies: the last takes its place. So a birth or a death costs a few rows'
+//! moves, however many there are.
+
+mod emitter;
+
+pub use emitter::{Birth, Emitter, Kill, Near, Origin, Parent};
+
+use crate::math::{Real, Row, xyz64};
+use crate::system::{Archive, Part};
+use rayon::prelude::*;
+use std::ops::Range;
+
+/// Rows per task when looking for the dead.
+const TASK: usize = 16_384;
+
+/// The living particles of one emitter.
+struct Stream {
+    emitter: Emitter,
+    /// How many live.
+    len: usize,
+    /// The id of the next.
+    next: u64,
+}
+
+/// The particles of all emitters of a system.
+#[derive(Default)]
+pub struct Pool {
+    /// First of their rows.
+    first: usize,
+    streams: Vec<Stream>,
+    /// Ids, unique within a stream, never used again.
+    id: Vec<u32>,
+    /// Ages at the end of the current exchange interval [s].
+    age: Vec<Real>,
+    /// Users' numbers, by name: one for each row, 0 where its stream has none.
+    columns: Vec<(String, Vec<Real>)>,
+}
+
+/// The columns that move with the rows of a pool.
+pub struct Columns<'a> {
+    /// Columns of rows.
+    pub rows: Vec<&'a mut Vec<Row>>,
+    /// Columns of numbers.
+    pub numbers: Vec<&'a mut Vec<Real>>,
+}
+
+impl Pool {
+    /// No particles yet; theirs are the rows from `first` on.
+    pub fn new(first: usize, emitters: Vec<Emitter>) -> Self {
+        let mut columns: Vec<(String, Vec<Real>)> = Vec::new();
+        for (name, _) in emitters.iter().flat_map(Emitter::columns) {
+            if columns.iter().all(|(known, _)| known != name) {
+                columns.push((name.clone(), Vec::new()));
+            }
+        }
+        let streams = emitters.into_iter().map(|emitter| Stream { emitter, len: 0, next: 0 }).collect();
+        Self { first, streams, columns, ..Self::default() }
+    }
+
+    /// How many emitters there are.
+    pub fn len(&self) -> usize {
+        self.streams.len()
+    }
+
+    /// Whether there are none.
+    pub fn is_empty(&self) -> bool {
+        self.streams.is_empty()
+    }
+
+    /// An emitter.
+    pub fn emitter(&self, s: usize) -> &Emitter {
+        &self.streams[s].emitter
+    }
+
+    /// The rows of an emitter.
+    pub fn rows(&self, s: usize) -> Range<usize> {
+        let start = self.first + self.streams[..s].iter().map(|s| s.len).sum::<usize>();
+        start..start + self.streams[s].len
+    }
+
+    /// Rows of everything, and the first that has none.
+    pub fn end(&self) -> usize {
+        self.first + self.id.len()
+    }
+
+    /// Ids of the rows of an emitter.
+    pub fn ids(&self, s: usize) -> &[u32] {
+        let rows = self.rows(s);
+        &self.id[rows.start - self.first..rows.end - self.first]
+    }
+
+    /// Their ages [s].
+    pub fn ages(&self, s: usize) -> &[Real] {
+        let rows = self.rows(s);
+        &self.age[rows.start - self.first..rows.end - self.first]
+    }
+
+    /// A column of users' numbers.
+    pub fn column(&self, s: usize, name: &str) -> Option<&[Real]> {
+        let rows = self.rows(s);
+        let has = self.streams[s].emitter.columns().any(|(known, _)| known == name);
+        let (_, column) = self.columns.iter().find(|(known, _)| has && known == name)?;
+        Some(&column[rows.start - self.first..rows.end - self.first])
+    }
+
+    /// The same, to write.
+    pub fn column_mut(&mut self, s: usize, name: &str) -> Option<&mut [Real]> {
+        self.column(s, name)?;
+        let (rows, first) = (self.rows(s), self.first);
+        let (_, column) = self.columns.iter_mut().find(|(known, _)| known == name)?;
+        Some(&mut column[rows.start - first..rows.end - first])
+    }
+
+    /// Everyone grows older by dt [s].
+    pub fn grow_older(&mut self, dt: f64) {
+        let dt = dt as Real;
+        self.age.par_chunks_mut(TASK).for_each(|ages| ages.iter_mut().for_each(|age| *age += dt));
+    }
+
+    /// Those whom an emitter bears in (t, t + dt] by itself, in the order of their birth. `None` if it is full and may not
+    /// be, or has used up its ids.
+    pub fn births(&mut self, s: usize, t: f64, dt: f64) -> Option<Vec<Birth>> {
+        let Stream { emitter, len, next } = &mut self.streams[s];
+        let births = emitter.births(t, dt, *next, emitter.room(*len)?)?;
+        *next += births.len() as u64;
+        Some(births)
+    }
+
+    /// Those whom an emitter bears when its parents die.
+    pub fn orphans(&mut self, s: usize, parents: &[Parent]) -> Option<Vec<Birth>> {
+        let Stream { emitter, len, next } = &mut self.streams[s];
+        let births = emitter.orphans(parents, *next, emitter.room(*len)?)?;
+        *next += births.len() as u64;
+        Some(births)
+    }
+
+    /// Those whom an emitter bears in the dt [s] before t, while its parents live.
+    pub fn children(&mut self, s: usize, t: f64, dt: f64, x: &[Row], v: &[Row]) -> Option<Vec<Birth>> {
+        let Some(parent) = self.parent(s) else { return Some(Vec::new()) };
+        let rows = self.rows(parent);
+        let of =
+            |k: usize| Parent { time: t, x: xyz64(x[rows.start + k]), v: xyz64(v[rows.start + k]), age: f64::from(self.ages(parent)[k]) };
+        let parents: Vec<Parent> = (0..rows.len()).map(of).collect();
+        let Stream { emitter, len, next } = &mut self.streams[s];
+        let births = emitter.children(&parents, dt, *next, emitter.room(*len)?)?;
+        *next += births.len() as u64;
+        Some(births)
+    }
+
+    /// The emitter of the parents of an emitter.
+    pub fn parent(&self, s: usize) -> Option<usize> {
+        match self.streams[s].emitter.from {
+            Origin::Particles(parent) => Some(parent),
+            Origin::Place(_) => None,
+        }
+    }
+
+    /// Makes rows for the newborn of an emitter, of which everything but `owned` is filled, and tells which.
+    pub fn insert(&mut self, s: usize, births: &[Birth], t: f64, owned: Columns<'_>) -> Range<usize> {
+        let (k, total) = (births.len(), self.id.len());
+        let mut moves = Vec::new();
+        for later in (s + 1..self.streams.len()).rev() {
+            let rows = self.rows(later);
+            let some = k.min(rows.len());
+            let to = rows.end.max(rows.start + k);
+            moves.extend((0..some).map(|i| (rows.start + i, to + i)));
+        }
+        let start = self.rows(s).end;
+        self.resize(total + k, owned, &moves);
+        self.streams[s].len += k;
+        let Self { first, streams, id, age, columns } = self;
+        let emitter = &streams[s].emitter;
+        for (i, birth) in births.iter().enumerate() {
+            let row = start + i - *first;
+            id[row] = birth.id;
+            age[row] = (t - birth.time) as Real;
+        }
+        for (name, column) in columns {
+            for (i, birth) in births.iter().enumerate() {
+                column[start + i - *first] = emitter.number(name, birth.id) as Real;
+            }
+        }
+        start..start + k
+    }
+
+    /// Takes rows of an emitter away; `dead` counts from its first, in order.
+    pub fn remove(&mut self, s: usize, dead: &[u32], owned: Columns<'_>) {
+        if dead.is_empty() {
+            return;
+        }
+        let rows = self.rows(s);
+        let (d, left) = (dead.len(), rows.len() - dead.len());
+        let holes = dead.iter().map(|i| *i as usize).take_while(|i| *i < left);
+        // The dead at the end need no one to take their place, and take no one's.
+        let mut tail = dead[dead.partition_point(|i| (*i as usize) < left)..].iter().map(|i| *i as usize).peekable();
+        let fillers = (left..rows.len()).filter(|i| tail.next_if_eq(i).is_none());
+        let mut moves: Vec<(usize, usize)> = holes.zip(fillers).map(|(hole, from)| (rows.start + from, rows.start + hole)).collect();
+        for later in s + 1..self.streams.len() {
+            let rows = self.rows(later);
+            let some = d.min(rows.len());
+            let (from, to) = if rows.len() >= d { (rows.end - d, rows.start - d) } else { (rows.start, rows.start - d) };
+            moves.extend((0..some).map(|i| (from + i, to + i)));
+        }
+        let total = self.id.len() - d;
+        self.resize(total, owned, &moves);
+        self.streams[s].len = left;
+    }
+
+    /// Moves rows and cuts or lengthens every column; room is made before, and taken away after.
+    fn resize(&mut self, total: usize, owned: Columns<'_>, moves: &[(usize, usize)]) {
+        fn arrange<T: Copy + Default>(column: &mut Vec<T>, rows: usize, first: usize, moves: &[(usize, usize)]) {
+            if rows > column.len() {
+                column.resize(rows, T::default());
+            }
+            for (from, to) in moves {
+                column[to - first] = column[from - first];
+            }
+            column.truncate(rows);
+        }
+        let first = self.first;
+        for column in owned.rows {
+            arrange(column, first + total, 0, moves);
+        }
+        for column in owned.numbers {
+            arrange(column, first + total, 0, moves);
+        }
+        arrange(&mut self.id, total, first, moves);
+        arrange(&mut self.age, total, first, moves);
+        for (_, column) in &mut self.columns {
+            arrange(column, total, first, moves);
+        }
+    }
+
+    /// Who of an emitter is to die, counted from its first row, in order. x and v are all rows of the system; `near` tells
+    /// whether a point is near a collider.
+    pub fn dead(&self, s: usize, x: &[Row], v: &[Row], near: &Near<'_>) -> Vec<u32> {
+        let (rows, emitter) = (self.rows(s), &self.streams[s].emitter);
+        if emitter.is_immortal() {
+            return Vec::new();
+        }
+        let (x, v, ids, ages) = (&x[rows.clone()], &v[rows], self.ids(s), self.ages(s));
+        let tasks: Vec<Range<usize>> = (0..x.len()).step_by(TASK).map(|a| a..(a + TASK).min(x.len())).collect();
+        let dies = |i: &usize| emitter.dies(ids[*i], f64::from(ages[*i]), x[*i], v[*i], near);
+        tasks.into_par_iter().flat_map_iter(|task| task.filter(dies).map(|i| i as u32)).collect()
+    }
+
+    /// The oldest of an emitter that has to make room for the newborn, if it may.
+    pub fn surplus(&self, s: usize, newborn: usize) -> Vec<u32> {
+        let stream = &self.streams[s];
+        let most = stream.emitter.most().unwrap_or(usize::MAX);
+        let over = (stream.len + newborn).saturating_sub(most).min(stream.len);
+        if over == 0 {
+            return Vec::new();
+        }
+        let (ids, ages) = (self.ids(s), self.ages(s));
+        let mut all: Vec<u32> = (0..stream.len as u32).collect();
+        let older = |a: &u32, b: &u32| {
+            let (a, b) = (*a as usize, *b as usize);
+            ages[b].total_cmp(&ages[a]).then(ids[a].cmp(&ids[b]))
+        };
+        if over < all.len() {
+            all.select_nth_unstable_by(over - 1, older);
+            all.truncate(over);
+        }
+        all.sort_unstable();
+        all
+    }
+
+    /// The dead as parents of others: when and where they died, in an interval that ends at t [s].
+    pub fn mourn(&self, s: usize, dead: &[u32], t: f64, x: &[Row], v: &[Row]) -> Vec<Parent> {
+        let (rows, emitter) = (self.rows(s), &self.streams[s].emitter);
+        let one = |k: &u32| {
+            let (k, row) = (*k as usize, rows.start + *k as usize);
+            let age = f64::from(self.ages(s)[k]);
+            let late = (age - emitter.lifetime(self.ids(s)[k])).max(0.0);
+            let v = xyz64(v[row]);
+            Parent { time: t - late, x: xyz64(x[row]) - v * late, v, age: age - late }
+        };
+        dead.iter().map(one).collect()
+    }
+
+    /// Writes everything that the next births and deaths depend on.
+    pub fn save(&self, archive: &mut Archive) {
+        let counts = self.streams.iter().flat_map(|s| [s.len as f64, s.next as f64]);
+        archive.push("pool", Part::Numbers(counts.collect()));
+        archive.push_indices("id", &self.id);
+        archive.push_numbers("age", &self.age);
+        for (name, column) in &self.columns {
+            archive.push_numbers(name, column);
+        }
+    }
+
+    /// Reads it back; `None` if it is not of this pool.
+    pub fn restore(&mut self, archive: &mut Archive) -> Option<()> {
+        let counts = archive.numbers("pool")?;
+        if counts.len() != 2 * self.streams.len() {
+            return None;
+        }
+        for (stream, counts) in self.streams.iter_mut().zip(counts.chunks_exact(2)) {
+            (stream.len, stream.next) = (counts[0] as usize, counts[1] as u64);
+        }
+        let total = self.streams.iter().map(|s| s.len).sum::<usize>();
+        self.id = archive.indices("id")?;
+        archive.column("age", &mut self.age)?;
+        let mut fits = self.id.len() == total && self.age.len() == total;
+        for (name, column) in &mut self.columns {
+            archive.column(name, column)?;
+            fits &= column.len() == total;
+        }
+        fits.then_some(())
+    }
+}

@@ -1,0 +1,133 @@
+//! Sources of particles, from the words of a scene.
+
+use super::Site;
+use super::scenery::{placed, solid};
+use crate::geometry::{Sampler, Shape, Vector};
+use crate::math::rotation::{from_degrees, from_z_to};
+use crate::pool::{Emitter, Kill, Origin};
+use tumble_interface::Mesh;
+use tumble_interface::scene::{Collider, Emitter as Words, Kill as Rule, MeshFile, Shape as Solid, Source};
+
+/// Columns that every emitted particle may have.
+const TAKEN: [&str; 7] = ["position", "velocity", "id", "age", "radius", "mass", "color"];
+
+/// Adds an emitter. `mesh` finds the mesh of a file; `flat` is the axis that is missing in two dimensions.
+pub fn emitter<'a>(site: &mut Site<'_>, words: &Words, seed: u32, flat: Option<usize>, mesh: &dyn Fn(&MeshFile) -> Option<&'a Mesh>) {
+    let path = format!("emitter \"{}\"", words.name);
+    let mut wrong = |key: &str, message: &str| site.issues.push(tumble_interface::Issue::new(format!("{path}{key}"), message));
+    let children = matches!(words.from, Source::Particles { .. });
+    if words.rate == 0.0 && words.burst.iter().all(|b| b.count == 0) {
+        wrong("", "it makes no particles; give it a rate, or a burst with a count");
+    }
+    if let (true, Some(i)) = (children, words.burst.iter().position(|b| b.time != 0.0)) {
+        wrong(&format!(".burst[{i}].time"), "children are born when the parent dies; leave it out");
+    }
+    if words.end.is_some_and(|end| end <= words.start) {
+        wrong(".end", "it is not after start");
+    }
+    if words.direction == Some([0.0; 3]) {
+        wrong(".direction", "[0, 0, 0], expected a direction");
+    }
+    if words.color.is_none() && (words.color_to.is_some() || words.color_end.is_some()) {
+        wrong(".color", "color_to and color_end need a color to start from");
+    }
+    if words.color_end.is_some() && words.lifetime.is_none() {
+        wrong(".color_end", "particles without a lifetime have no end to fade to; set lifetime");
+    }
+    if words.most.is_none() && words.when_full != Default::default() {
+        wrong(".when_full", "it never is full; set most");
+    }
+    if let Some(name) = words.columns.keys().find(|name| TAKEN.contains(&name.as_str()) || name.is_empty() || name.contains('/')) {
+        wrong(&format!(".columns.{name}"), &format!("expected a name without slash that is none of {}", TAKEN.join(", ")));
+    }
+    if let Some((name, b)) = words.columns.iter().find(|(_, b)| b.to.is_some_and(|to| to < b.from)) {
+        wrong(&format!(".columns.{name}.to"), &format!("{}, expected >= {}", b.to.unwrap_or_default(), b.from));
+    }
+    let vector = |v: &[f64; 3]| Vector::from(*v);
+    let mut sampled = |key: &str, file: &MeshFile, sampler: fn(&Mesh) -> Option<Sampler>, nothing: &str| match mesh(file) {
+        None => {
+            wrong(key, "the mesh has not been loaded");
+            None
+        }
+        Some(mesh) => {
+            let sampler = sampler(&placed(mesh, file));
+            if sampler.is_none() {
+                wrong(key, nothing);
+            }
+            sampler
+        }
+    };
+    let place = match &words.from {
+        Source::Point { at } => Some(Sampler::Point(vector(at))),
+        Source::Curve { points } => {
+            let curve = Sampler::curve(points);
+            if curve.is_none() {
+                wrong(".from.curve.points", "they are all in one place; use a point");
+            }
+            curve
+        }
+        Source::Disk { normal: [0.0, 0.0, 0.0], .. } => {
+            wrong(".from.disk.normal", "[0, 0, 0], expected a direction");
+            None
+        }
+        Source::Disk { center, normal, radius } => Some(Sampler::Disk(vector(center), from_z_to(vector(normal)), *radius)),
+        Source::Sphere { center, radius, surface } => Some(Sampler::Ball(vector(center), *radius, *surface)),
+        Source::Box { center, size, rotate } => Some(Sampler::Box(vector(center), vector(size), from_degrees(*rotate))),
+        Source::MeshSurface(file) => sampled(".from.mesh_surface", file, Sampler::surface, "the mesh has no triangle with an area"),
+        Source::MeshVolume(file) => {
+            let open = mesh(file).is_some_and(|mesh| {
+                let defects = mesh.defects();
+                defects.open_edges + defects.bad_edges > 0
+            });
+            let nothing = "the mesh has no inside; close it, turn its triangles outward, or use mesh_surface";
+            let closed = |mesh: &Mesh| Sampler::volume(mesh);
+            if open {
+                wrong(".from.mesh_volume", nothing);
+                None
+            } else {
+                sampled(".from.mesh_volume", file, closed, nothing)
+            }
+        }
+        Source::Particles { .. } => None,
+    };
+    let mut kill = Vec::new();
+    for (i, rule) in words.kill.iter().enumerate() {
+        let mut region = |shape: &Solid| -> Option<Shape> {
+            let file = if let Solid::Mesh(file) = shape { mesh(file).map(|mesh| placed(mesh, file)) } else { None };
+            match solid(&region(shape), file.as_ref()) {
+                Ok(solid) => Some(solid.shape),
+                Err((key, message)) => {
+                    let key = key.trim_start_matches(".shape");
+                    wrong(&format!(".kill[{i}]{key}"), &message);
+                    None
+                }
+            }
+        };
+        kill.extend(match rule {
+            Rule::Inside(shape) => region(shape).map(Kill::Inside),
+            Rule::Outside(shape) => region(shape).map(Kill::Outside),
+            Rule::NearCollider(distance) => Some(Kill::NearCollider(*distance)),
+            Rule::SlowerThan(speed) => Some(Kill::SlowerThan(*speed)),
+            Rule::FasterThan(speed) => Some(Kill::FasterThan(*speed)),
+        });
+    }
+    let parent = match &words.from {
+        Source::Particles { of } => {
+            let parent = site.parts.stream(of);
+            if parent.is_none() {
+                let message = format!("\"{of}\" is no emitter of the same system that stands before this one");
+                wrong(".from.particles.of", &message);
+            }
+            parent.map(Origin::Particles)
+        }
+        _ => None,
+    };
+    if let Some(origin) = place.map(Origin::Place).or(parent) {
+        site.parts.emitter(Emitter::new(words.clone(), seed, origin, kill, site.up, flat));
+    }
+}
+
+/// A solid that only bounds a region.
+fn region(shape: &Solid) -> Collider {
+    Collider { name: String::new(), shape: shape.clone(), thickness: 0.0, friction: 0.0, restitution: 0.0, color: None }
+}
