@@ -51,6 +51,14 @@ fn scenes() -> Vec<(&'static str, String, usize)> {
     let jelly = "[[system]]\nintegrator = \"symplectic_euler\"\nsubsteps = 10\n[[block]]\nname = \"jelly\"\nsize = [0.3, 0.3, 0.3]\nresolution = [17, 17, 15]\ncenter = [0, 0, 0.155]\n\
                  material = { young = 2000, poisson = 0.4, damping = 0.002 }\n[[collider]]\nname = \"floor\"\nfriction = 0.3\nshape.floor.height = 0\n";
     let rope = "[[system]]\nintegrator = \"bdf2\"\nsolver.linear = \"cholesky\"\n[[rope]]\nname = \"rope\"\nfrom = [0, 0, 0]\nto = [1, 0, 0]\nlength = 1.2\nsegments = 40\npin = [\"start\", \"end\"]\n";
+    let spray = "[[system]]\nintegrator = \"velocity_verlet\"\nsubsteps = 3\n[[force]]\nkind = \"drag\"\nrate = 0.3\n\
+                 [[emitter]]\nname = \"spray\"\nrate = 60000\njitter = 1\nspeed = 3\ncone = 20\nlifetime = 0.4\nlifetime_spread = 0.5\nmass_spread = 0.3\nfrom.disk.radius = 0.1\n\
+                 columns = { heat = { from = 1, to = 2 } }\nkill = [{ near_collider = 0.001 }]\n\
+                 [[emitter]]\nname = \"mist\"\nburst = [{ count = 2 }]\nspeed = 1\ncone = 180\ninherit = 0.5\nlifetime = 0.1\nfrom.particles.of = \"spray\"\n\
+                 [[collider]]\nname = \"floor\"\nshape.floor.height = -0.2\n";
+    let swarm = "world.gravity = [0, 0, 0]\n[[system]]\nintegrator = \"rk4\"\nsubsteps = 2\n[[force]]\nkind = \"gravitation\"\nconstant = 1e-4\nsoftening = 0.05\n\
+                 [[emitter]]\nname = \"swarm\"\nrate = 1500\nspeed = 0.3\ncone = 180\nlifetime = 0.5\nlifetime_spread = 0.3\nfrom.sphere.radius = 0.3\n\
+                 [[particles]]\nname = \"sun\"\nposition = [[0.1, 0, 0]]\nmass = [100]\n";
     vec![
         ("sheet, explicit", sheet("integrator = \"symplectic_euler\"\nsubsteps = 24", links), 20),
         ("sheet, verlet", sheet("integrator = \"verlet\"\nsubsteps = 12", links), 6),
@@ -66,6 +74,8 @@ fn scenes() -> Vec<(&'static str, String, usize)> {
         ("jelly", jelly.to_string(), 4),
         ("dust", dust, 20),
         ("tracers", tracers, 20),
+        ("spray", spray.to_string(), 20),
+        ("swarm", swarm.to_string(), 16),
         ("rope, cholesky", rope.to_string(), 20),
     ]
 }

@@ -78,6 +78,8 @@ pub struct Parent {
     pub v: Vector,
     /// Age [s].
     pub age: f64,
+    /// Age when the exchange interval began [s]; negative for one born in it.
+    pub before: f64,
 }
 
 /// A number between c (1 - spread) and c (1 + spread), where u in [0, 1) says.
@@ -230,8 +232,8 @@ impl Emitter {
         })
     }
 
-    /// Those born in the last dt [s] of the living: child k of a parent at its age k/rate.
-    pub fn children(&self, living: &[Parent], dt: f64, next: u64, room: Room) -> Option<Vec<Birth>> {
+    /// Those born of the living in an exchange interval: child k of a parent at its age k/rate.
+    pub fn children(&self, living: &[Parent], next: u64, room: Room) -> Option<Vec<Birth>> {
         let rate = self.words.rate;
         let within = |p: &Parent, k: f64| {
             let time = p.time - p.age + k / rate;
@@ -239,7 +241,7 @@ impl Emitter {
         };
         let mut due = Vec::new();
         for (i, parent) in living.iter().enumerate() {
-            let first = ((parent.age - dt).max(0.0) * rate + ROUNDING).floor() + 1.0;
+            let first = (parent.before.max(0.0) * rate + ROUNDING).floor() + 1.0;
             let last = (parent.age * rate + ROUNDING).floor();
             let count = (last - first + 1.0).max(0.0) as u64;
             due.extend((0..count).map(|k| (i, first + k as f64)).filter(|(_, k)| within(parent, *k)));
@@ -247,7 +249,7 @@ impl Emitter {
         self.bear(next, room.take(due.len())?, |j, id| {
             let (i, k) = due[j];
             let parent = living[i];
-            let ago = (parent.age - k / rate).clamp(0.0, dt);
+            let ago = (parent.age - k / rate).max(0.0);
             Birth { time: parent.time - ago, x: parent.x - parent.v * ago, v: self.velocity(id, parent.v, parent.v), id }
         })
     }

@@ -138,12 +138,9 @@ impl Pool {
     /// Those whom an emitter bears in the dt [s] before t, while its parents live.
     pub fn children(&mut self, s: usize, t: f64, dt: f64, x: &[Row], v: &[Row]) -> Option<Vec<Birth>> {
         let Some(parent) = self.parent(s) else { return Some(Vec::new()) };
-        let rows = self.rows(parent);
-        let of =
-            |k: usize| Parent { time: t, x: xyz64(x[rows.start + k]), v: xyz64(v[rows.start + k]), age: f64::from(self.ages(parent)[k]) };
-        let parents: Vec<Parent> = (0..rows.len()).map(of).collect();
+        let parents: Vec<Parent> = (0..self.streams[parent].len).map(|k| self.until_death(parent, k, (t, dt), x, v)).collect();
         let Stream { emitter, len, next } = &mut self.streams[s];
-        let births = emitter.children(&parents, dt, *next, emitter.room(*len)?)?;
+        let births = emitter.children(&parents, *next, emitter.room(*len)?)?;
         *next += births.len() as u64;
         Some(births)
     }
@@ -267,17 +264,18 @@ impl Pool {
         all
     }
 
-    /// The dead as parents of others: when and where they died, in an interval that ends at t [s].
-    pub fn mourn(&self, s: usize, dead: &[u32], t: f64, x: &[Row], v: &[Row]) -> Vec<Parent> {
-        let (rows, emitter) = (self.rows(s), &self.streams[s].emitter);
-        let one = |k: &u32| {
-            let (k, row) = (*k as usize, rows.start + *k as usize);
-            let age = f64::from(self.ages(s)[k]);
-            let late = (age - emitter.lifetime(self.ids(s)[k])).max(0.0);
-            let v = xyz64(v[row]);
-            Parent { time: t - late, x: xyz64(x[row]) - v * late, v, age: age - late }
-        };
-        dead.iter().map(one).collect()
+    /// A particle of an emitter as a parent of others: as it is at the end t of an interval of length dt [s], or as it was when it
+    /// died.
+    fn until_death(&self, s: usize, k: usize, (t, dt): (f64, f64), x: &[Row], v: &[Row]) -> Parent {
+        let (row, age) = (self.rows(s).start + k, f64::from(self.ages(s)[k]));
+        let late = (age - self.streams[s].emitter.lifetime(self.ids(s)[k])).max(0.0);
+        let v = xyz64(v[row]);
+        Parent { time: t - late, x: xyz64(x[row]) - v * late, v, age: age - late, before: age - dt }
+    }
+
+    /// The dead as parents of others, where an interval (t, dt) ends.
+    pub fn mourn(&self, s: usize, dead: &[u32], interval: (f64, f64), x: &[Row], v: &[Row]) -> Vec<Parent> {
+        dead.iter().map(|k| self.until_death(s, *k as usize, interval, x, v)).collect()
     }
 
     /// Writes everything that the next births and deaths depend on.
@@ -309,5 +307,62 @@ impl Pool {
             fits &= column.len() == total;
         }
         fits.then_some(())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::geometry::{Sampler, Vector};
+    use tumble_interface::Scene;
+
+    /// Three emitters in a row; x[0] of every particle is told by its emitter and id, so that one that went astray shows.
+    #[test]
+    fn rows_keep_their_particles() {
+        let text = "version = 1\n[[emitter]]\nname = \"a\"\nfrom.point = {}\n[[emitter]]\nname = \"b\"\nfrom.point = {}\ncolumns = { heat = { from = 0, to = 1 } }\n\
+                    [[emitter]]\nname = \"c\"\nfrom.point = {}\n";
+        let words = Scene::from_toml(text).unwrap().emitter;
+        let make = |w: &tumble_interface::scene::Emitter| {
+            Emitter::new(w.clone(), 1, Origin::Place(Sampler::Point(Vector::default())), Vec::new(), [0.0, 0.0, 1.0].into(), None)
+        };
+        let mut pool = Pool::new(5, words.iter().map(make).collect());
+        let (mut x, mut mass): (Vec<Row>, Vec<Real>) = (vec![[-1.0; 4]; 5], vec![-1.0; 5]);
+        let mut living: [Vec<u32>; 3] = Default::default();
+        let mut next = [0_u32; 3];
+        let draw = crate::math::Random::new(3, "rows");
+        for round in 0..400 {
+            let [which, what, many, _] = draw.uniform(round, 0, 0);
+            let s = (which * 3.0) as usize;
+            if what < 0.55 {
+                let k = (many * many * 60.0) as u32;
+                let births: Vec<Birth> =
+                    (0..k).map(|i| Birth { time: 0.0, x: Vector::default(), v: Vector::default(), id: next[s] + i }).collect();
+                let rows = pool.insert(s, &births, 0.0, Columns { rows: vec![&mut x], numbers: vec![&mut mass] });
+                assert_eq!(rows.len(), births.len());
+                for (row, birth) in rows.zip(&births) {
+                    (x[row], mass[row]) = ([(s as u32 * 100_000 + birth.id) as Real; 4], birth.id as Real);
+                }
+                living[s].extend(next[s]..next[s] + k);
+                next[s] += k;
+            } else {
+                let dead: Vec<u32> = (0..living[s].len() as u32).filter(|i| draw.uniform(round, 1 + i, 0)[0] < many * many).collect();
+                let gone: Vec<u32> = dead.iter().map(|i| pool.ids(s)[*i as usize]).collect();
+                pool.remove(s, &dead, Columns { rows: vec![&mut x], numbers: vec![&mut mass] });
+                living[s].retain(|id| !gone.contains(id));
+            }
+            assert_eq!(x.len(), pool.end());
+            assert!(x[..5].iter().all(|x| x[0] == -1.0));
+            for s in 0..3 {
+                let mut ids = pool.ids(s).to_vec();
+                for (row, id) in pool.rows(s).zip(&ids) {
+                    assert_eq!((x[row][0], mass[row]), ((s as u32 * 100_000 + id) as Real, *id as Real), "round {round}");
+                }
+                let heat = pool.column(1, "heat").unwrap();
+                assert!(heat.iter().zip(pool.ids(1)).all(|(h, id)| *h == pool.emitter(1).number("heat", *id) as Real));
+                ids.sort_unstable();
+                assert_eq!(ids, living[s], "round {round}");
+            }
+        }
+        assert!(next.iter().all(|n| *n > 300) && pool.end() > 50, "{next:?}");
     }
 }

@@ -180,7 +180,7 @@ impl Dynamics {
             let near = |p: Vec3<f64>, distance: f64| colliders.iter().any(|c| c.shape.distance(p).0 < distance);
             let dead = self.pool.dead(s, &self.state.x, &self.state.v, &near);
             let is_parent = (0..n).any(|child| self.pool.parent(child) == Some(s));
-            mourned.push(if is_parent { self.pool.mourn(s, &dead, t, &self.state.x, &self.state.v) } else { Vec::new() });
+            mourned.push(if is_parent { self.pool.mourn(s, &dead, (t, dt), &self.state.x, &self.state.v) } else { Vec::new() });
             if !dead.is_empty() {
                 self.pool.remove(s, &dead, owned(&mut self.state.x, &mut self.state.v, &mut self.laws.masses, &mut self.memory));
                 self.count_rows();
