@@ -1,12 +1,14 @@
 //! The scene: every word that a scene file may hold, with unit, default and range. These structs are the
 //! schema; JSON Schema, the reference page and the Python stubs are generated from them.
 
+mod animated;
 mod forces;
 mod output;
 mod shapes;
 mod structures;
 mod systems;
 
+pub use animated::{Animated, AnimatedVector, Component, Interpolation, Keys, VectorKeys};
 pub use forces::{Anchor, Field, Force};
 pub use output::{Camera, Expect, Output, Probe};
 pub use shapes::{Collider, MeshFile, Shape};
