@@ -131,7 +131,7 @@ fn charges_turn_with_the_gyro_frequency_on_the_gyro_radius() {
 
 #[test]
 fn what_schemes_do_to_the_energy_in_a_magnetic_field() {
-    // A hundred turns with 60 steps each: the speed at the end over that at the start.
+    // Five turns with 60 steps each: the speed at the end over that at the start.
     let force = "[[force]]\nkind = \"magnetic\"\nfield = [0, 0, 1.5]";
     let time = 2.0 * std::f64::consts::PI / TURN;
     for scheme in Integrator::ALL.into_iter().filter(|i| !i.is_adaptive()) {
@@ -142,16 +142,16 @@ fn what_schemes_do_to_the_energy_in_a_magnetic_field() {
             scheme.name()
         );
         let mut sim = simulation(&text);
-        let end = (0..20).try_for_each(|_| tumble_interface::Engine::step(&mut sim, &|| true).map(drop));
+        let end = (0..5).try_for_each(|_| tumble_interface::Engine::step(&mut sim, &|| true).map(drop));
         let speed = velocities(&sim, "p")[0].norm();
-        println!("magnetic, {:18} speed after 20 turns x {speed:.9} {}", scheme.name(), if end.is_err() { "(exploded)" } else { "" });
+        println!("magnetic, {:18} speed after five turns x {speed:.9} {}", scheme.name(), if end.is_err() { "(exploded)" } else { "" });
         let (low, high) = match scheme {
-            // (1 + w²h²)^(1/2) a step of w h = 2 pi/60: e^(6.58) after 1200.
-            Integrator::ForwardEuler | Integrator::SymplecticEuler => (500.0, 900.0),
-            Integrator::ImplicitEuler => (1e-3, 2e-3),
+            // (1 + w²h²)^(1/2) a step, w h = 2 pi/60: 5.137 after 300. Both see the same velocities.
+            Integrator::ForwardEuler | Integrator::SymplecticEuler => (5.13, 5.14),
+            Integrator::ImplicitEuler => (0.194, 0.195),
             Integrator::ImplicitMidpoint => (1.0 - 1e-9, 1.0 + 1e-9),
-            // 1 - (w h)^6/144 a step.
-            Integrator::Rk4 => (1.0 - 1.3e-5, 1.0 - 0.9e-5),
+            // 1 - (w h)^6/144 a step: 2.7e-6.
+            Integrator::Rk4 => (1.0 - 3.0e-6, 1.0 - 2.4e-6),
             _ => (0.1, 3.0),
         };
         assert!(speed > low && speed < high, "{}: {speed}", scheme.name());
@@ -314,7 +314,7 @@ fn turbulence_has_no_sources_and_the_strength_that_is_asked_for() {
             if i < 500 {
                 let columns = units.map(|e| (field.value(t, x + e * h) - field.value(t, x - e * h)) * (0.5 / h));
                 divergence = divergence.max((columns[0].x + columns[1].y + columns[2].z).abs());
-                slope += columns.iter().map(|c| c.norm_sq()).sum::<f64>() / 500.0;
+                slope += (columns[0].norm_sq() + columns[2].norm_sq()) / 500.0;
             }
         }
         println!(
@@ -401,7 +401,7 @@ fn faults_of_formulas_have_a_place() {
     );
     println!("{found}");
     for expected in [
-        "force[0].value: \"[-y, foo, 0]\": unknown name \"foo\"; known: t, x, y, z, vx, vy, vz, pi, e, sin,",
+        "force[0].value: \"[-y, foo, 0]\": unknown name \"foo\"; did you mean \"floor\"? (known: t, x, y, z, vx, vy, vz, pi, e, sin,",
         "force[1].swirl: inf at t = 0 s, expected a finite number",
         "force[2].air[0].velocity: \"[x, y]\": 2 components, expected 3",
         "force[3].gm: \"1/0\": a division gives inf, expected a finite number",

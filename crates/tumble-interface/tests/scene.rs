@@ -181,7 +181,7 @@ value = { kyes = [] }
         "line 8: force[1].swirl.keys[0]: a list of 3, expected a list of 2, each a number in s, then the unit of the value",
         "line 8: force[1].swirl.interpolation: \"smoth\", expected one of linear, smooth, step; did you mean \"smooth\"?",
         "line 11: force[2].value.kyes: unknown key; did you mean \"keys\"?",
-        "line 11: force[2].value.keys: missing, expected a list of at least 1, each a list of 4, each a number",
+        "line 11: force[2].value.keys: missing, expected a list of at least 1, each a list of 4, each a number in s, then the unit of the value",
     ];
     assert_eq!(found, expected);
 }

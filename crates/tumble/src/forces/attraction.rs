@@ -36,7 +36,7 @@ impl Push for Newton {
         let d = x - Vec3 { x: mass.like(self.center.x), y: mass.like(self.center.y), z: mass.like(self.center.z) };
         let near_sq = d.norm_sq();
         let r_sq = near_sq + mass.like(self.softening_sq);
-        let pull = near_sq.positive(mass.like(self.gm) / (r_sq * r_sq.sqrt()), mass.zero());
+        let pull = r_sq.positive(mass.like(self.gm) / (r_sq * r_sq.sqrt()), mass.zero());
         if self.inverse_radius_sq == 0.0 {
             return d * (-mass * pull);
         }

@@ -51,7 +51,10 @@ impl Turbulence {
 
     /// Sum over the eight corners of (grad W) x (G d) + W axial(G): the curl of psi = sum of W G d.
     fn curl(&self, tau: f64, q: Vec3<f64>, octave: u32) -> Vec3<f64> {
-        let q = [q.x, q.y, q.z];
+        let mut q = [q.x, q.y, q.z];
+        if let Some(axis) = self.flat {
+            q[axis] = 0.0;
+        }
         let (mut cell, mut part, mut weight, mut slope) = ([0_u32; 3], [0.0; 3], [[0.0; 2]; 3], [0.0; 3]);
         for a in 0..3 {
             let below = functions::floor(q[a]);

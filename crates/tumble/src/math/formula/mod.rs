@@ -268,7 +268,7 @@ fn unknown(name: &str, of: Of) -> String {
         names.chain(CONSTANTS.iter().map(|c| c.0)).chain(FUNCTIONS.iter().map(|f| f.0))
     };
     let hint = suggestion(name, known());
-    format!("unknown name \"{name}\"{hint}; known: {}", known().collect::<Vec<_>>().join(", "))
+    format!("unknown name \"{name}\"{hint} (known: {})", known().collect::<Vec<_>>().join(", "))
 }
 
 fn shortened(text: &str) -> String {

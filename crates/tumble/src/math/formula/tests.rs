@@ -44,7 +44,7 @@ fn operators_bind_as_in_mathematics() {
 #[test]
 fn faults_are_named() {
     for (text, message) in [
-        ("foo*2", "\"foo*2\": unknown name \"foo\"; known: t, x, y, z, pi, e, sin, cos,"),
+        ("foo*2", "\"foo*2\": unknown name \"foo\"; did you mean \"floor\"? (known: t, x, y, z, pi, e, sin, cos,"),
         ("sine(x)", "unknown name \"sine\"; did you mean \"sin\"?"),
         ("vx", "unknown name \"vx\""),
         ("1/0", "a division gives inf, expected a finite number"),
