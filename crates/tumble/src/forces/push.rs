@@ -71,3 +71,40 @@ fn block(column: impl Fn(Vec3<f64>) -> Vec3<f64>) -> Block {
     let [a, b, c] = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]].map(|e| column(e.into()));
     [a.x, b.y, c.z, 0.5 * (a.y + b.x), 0.5 * (b.z + c.y), 0.5 * (a.z + c.x)].map(|k| -k as Real)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::forces::{Drag, Vortex};
+    use crate::math::simd::{Level, dispatch_at};
+
+    fn every_width_agrees(law: &impl Push) {
+        // 45 masses: no multiple of any register.
+        let number = |i: usize, c: usize| ((i * 131 + c * 37) % 1009) as Real * 0.003 - 1.5;
+        let rows = |c: usize| -> Vec<Row> { (0..45).map(|i| [number(i, c), number(i, c + 1), number(i, c + 2), 7.0]).collect() };
+        let (x, v, weight): (_, _, Vec<Real>) = (rows(1), rows(4), (0..45).map(|i| 1.0 + number(i, 8)).collect());
+        let forces = |level| {
+            let mut force = rows(9);
+            dispatch_at(level, Pushed { law, weight: &weight, x: &x, v: &v, force: &mut force });
+            force
+        };
+        let one = forces(Level::Scalar);
+        let (before, at) = (rows(9), |c: usize, rows: &[Row]| Vec3 { x: rows[c][0], y: rows[c][1], z: rows[c][2] });
+        for i in 0..45 {
+            let push = law.at(weight[i], at(i, &x), at(i, &v));
+            assert_eq!(one[i], [before[i][0] + push.x, before[i][1] + push.y, before[i][2] + push.z, 7.0]);
+            assert!(push.norm_sq() > 0.0);
+        }
+        for level in Level::available() {
+            assert_eq!(forces(level), one, "{level:?}");
+        }
+    }
+
+    #[test]
+    fn every_width_gives_the_same_bits() {
+        every_width_agrees(&Drag { coefficient: 0.3, rate: 0.2, quadratic: 0.7 });
+        let axis = Vec3 { x: 0.6, y: 0.0, z: 0.8 };
+        let center = [0.1, 0.2, 0.3].into();
+        every_width_agrees(&Vortex { center, axis, core: 0.5, swirl: 3.0.into(), inward: 1.0.into(), lift: 2.0.into() }.now(0.0));
+    }
+}
