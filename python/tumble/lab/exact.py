@@ -53,7 +53,9 @@ def field_matrix(fields: list[Tree]) -> tuple[Floats, Floats] | None:
     a, b = np.zeros((3, 3)), np.zeros(3)
     for field in fields:
         kind = field["kind"]
-        if kind not in ("uniform", "swirl", "sink") or not _is_constant(field["velocity" if kind == "uniform" else "rate"]):
+        if kind not in ("uniform", "swirl", "sink") or not _is_constant(
+            field["velocity" if kind == "uniform" else "rate"]
+        ):
             return None
         if kind == "uniform":
             b += field["velocity"]
