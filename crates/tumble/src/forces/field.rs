@@ -5,6 +5,7 @@ use super::vortex::Vortex;
 use crate::math::{Dual, Lane, Real, Row, Signal, Vec3, VectorSignal, ZERO, add, row, xyz, xyz64};
 
 /// One velocity field.
+#[allow(clippy::large_enum_variant)] // a scene has few
 pub enum Current {
     /// The same everywhere.
     Uniform(VectorSignal),

@@ -62,6 +62,6 @@ fn sign(x: f64) -> f64 {
 
 /// 0 below a, 1 above b, and a cubic between them.
 fn smoothstep(a: f64, b: f64, x: f64) -> f64 {
-    let s = ((x - a) / (b - a)).max(0.0).min(1.0);
+    let s = ((x - a) / (b - a)).clamp(0.0, 1.0);
     s * s * (3.0 - 2.0 * s)
 }
