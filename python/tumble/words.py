@@ -120,7 +120,8 @@ def _default(value: Schema) -> str:
 def _type(value: Schema, definitions: dict[str, Schema]) -> str:
     if "$ref" in value:
         name = value["$ref"].rpartition("/")[2]
-        return f"[{name}](#{name.lower()})"
+        unit = f" {value['x-unit']}" if "x-unit" in value else ""
+        return f"[{name}](#{name.lower()}){unit}"
     for key in ("anyOf", "oneOf"):
         if key in value:
             return " or ".join(_type(branch, definitions) for branch in value[key] if branch.get("type") != "null")

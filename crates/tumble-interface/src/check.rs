@@ -180,7 +180,7 @@ impl<'a> Checker<'a> {
         match types(schema).first().copied() {
             Some("integer") => format!("a whole number {}", range(schema, unit)).trim_end().to_string(),
             Some("number") => format!("a number {}", range(schema, unit)).trim_end().to_string(),
-            Some("string") => "a string".to_string(),
+            Some("string") => schema["x-meaning"].as_str().unwrap_or("a string").to_string(),
             Some("boolean") => "true or false".to_string(),
             Some("array") => {
                 let of = if schema["items"].is_object() {
@@ -194,7 +194,7 @@ impl<'a> Checker<'a> {
                     _ => format!("a list, each {of}"),
                 }
             }
-            Some("object") => "a table".to_string(),
+            Some("object") => schema["x-meaning"].as_str().unwrap_or("a table").to_string(),
             _ => "another value".to_string(),
         }
     }

@@ -1,7 +1,7 @@
 //! A wrong scene gives all its errors at once, each with line, path, value, unit and range.
 
 use tumble_interface::Scene;
-use tumble_interface::scene::{Integrator, Shape};
+use tumble_interface::scene::{Animated, AnimatedVector, Component, Force, Integrator, Interpolation, Shape};
 
 fn errors(text: &str) -> Vec<String> {
     Scene::from_toml(text).unwrap_err().issues.iter().map(ToString::to_string).collect()
@@ -76,9 +76,9 @@ kind = "attraction"
         "line 13: sheet \"flag\".links.bend.modulus: -2 N, N/m or Pa, expected >= 0 N, N/m or Pa",
         "line 15: collider[0].shape: expected one of the keys sphere, box, plane, floor, mesh; did you mean \"sphere\"?",
         "line 16: collider[0].name: 3, expected a string",
-        "line 17: force[0].kind: missing, expected one of drag, attraction, gravitation, acceleration",
-        "line 20: force[1].kind: \"drgg\", expected one of drag, attraction, gravitation, acceleration; did you mean \"drag\"?",
-        "line 21: force[2].gm: missing, expected a number in m³/s²",
+        "line 17: force[0].kind: missing, expected one of drag, wind, attraction, gravitation, acceleration, magnetic, electric, vortex, turbulence, propulsion",
+        "line 20: force[1].kind: \"drgg\", expected one of drag, wind, attraction, gravitation, acceleration, magnetic, electric, vortex, turbulence, propulsion; did you mean \"drag\"?",
+        "line 21: force[2].gm: missing, expected a number in m³/s² or a formula or keyframes",
     ];
     assert_eq!(found, expected);
 }
@@ -131,4 +131,57 @@ fn the_schema_gives_every_number_a_unit() {
     // Directions have no unit, colours and probes neither: pure numbers, or the unit of what is probed.
     missing.retain(|m| !["normal", "axis", "color", "value", "tolerance", "kind", "Shape.oneOf"].iter().any(|w| m.contains(w)));
     assert!(missing.is_empty(), "{missing:#?}");
+}
+
+#[test]
+fn animated_values_are_numbers_formulas_or_keyframes() {
+    let scene = Scene::from_toml(
+        r#"version = 1
+[[force]]
+kind = "attraction"
+center = { keys = [[0, 1, 2, 3], [2, 4, 5, 6]], interpolation = "smooth" }
+gm = "2*sin(t)"
+[[force]]
+kind = "acceleration"
+value = [1, "x*y", 0.5]
+[[force]]
+kind = "vortex"
+swirl = { keys = [[0, 1]] }
+[[field]]
+kind = "formula"
+velocity = "[-y, x, 0]"
+"#,
+    )
+    .unwrap();
+    let Force::Attraction { center: AnimatedVector::Keys(keys), gm: Animated::Formula(gm), power, .. } = &scene.force[0] else {
+        panic!("{:?}", scene.force[0])
+    };
+    assert_eq!((keys.keys[1], keys.interpolation, gm.as_str(), *power), ([2.0, 4.0, 5.0, 6.0], Interpolation::Smooth, "2*sin(t)", 2.0));
+    let Force::Acceleration { value: AnimatedVector::Components(parts), .. } = &scene.force[1] else { panic!("{:?}", scene.force[1]) };
+    assert_eq!((&parts[0], &parts[1]), (&Component::Value(1.0), &Component::Formula("x*y".into())));
+    let again: Scene = serde_json::from_value(scene.to_json()).unwrap();
+    assert_eq!(again, scene);
+    let found = errors(
+        r#"version = 1
+[[force]]
+kind = "attraction"
+center = [1, 2]
+gm = true
+[[force]]
+kind = "vortex"
+swirl = { keys = [[0, 1, 2]], interpolation = "smoth" }
+[[force]]
+kind = "acceleration"
+value = { kyes = [] }
+"#,
+    );
+    let expected = [
+        "line 4: force[0].center: a list of 2, expected a list of 3, each a number in m or a formula",
+        "line 5: force[0].gm: true, expected a number in m³/s² or a formula or keyframes",
+        "line 8: force[1].swirl.keys[0]: a list of 3, expected a list of 2, each a number in s, then the unit of the value",
+        "line 8: force[1].swirl.interpolation: \"smoth\", expected one of linear, smooth, step; did you mean \"smooth\"?",
+        "line 11: force[2].value.kyes: unknown key; did you mean \"keys\"?",
+        "line 11: force[2].value.keys: missing, expected a list of at least 1, each a list of 4, each a number in s, then the unit of the value",
+    ];
+    assert_eq!(found, expected);
 }

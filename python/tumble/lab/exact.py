@@ -53,6 +53,10 @@ def field_matrix(fields: list[Tree]) -> tuple[Floats, Floats] | None:
     a, b = np.zeros((3, 3)), np.zeros(3)
     for field in fields:
         kind = field["kind"]
+        if kind not in ("uniform", "swirl", "sink") or not _is_constant(
+            field["velocity" if kind == "uniform" else "rate"]
+        ):
+            return None
         if kind == "uniform":
             b += field["velocity"]
             continue
@@ -62,13 +66,17 @@ def field_matrix(fields: list[Tree]) -> tuple[Floats, Floats] | None:
             axis = np.asarray(field.get("axis") or [0.0, 0.0, 1.0], dtype=float)
             w = rate * axis / np.linalg.norm(axis)
             part = np.array([[0, -w[2], w[1]], [w[2], 0, -w[0]], [-w[1], w[0], 0]])
-        elif kind == "sink":
-            part = -rate * np.eye(3)
         else:
-            return None
+            part = -rate * np.eye(3)
         a += part
         b -= part @ center
     return a, b
+
+
+def _is_constant(value: Any) -> bool:
+    """Whether an animated value is a number, or a vector of numbers, and neither formula nor keyframes."""
+    parts = value if isinstance(value, list) else [value]
+    return all(isinstance(part, int | float) for part in parts)
 
 
 def tracers(fields: list[Tree], positions: Floats) -> Linear | None:
@@ -105,9 +113,9 @@ def springs(tree: Tree, world: World) -> Linear | None:
     for force in tree["force"]:
         if force.get("on") is not None and name not in force["on"]:
             continue
-        if force["kind"] == "drag":
+        if force["kind"] == "drag" and not force.get("quadratic"):
             drag += force.get("coefficient", 0.0) / mass + force.get("rate", 0.0)
-        elif force["kind"] == "acceleration":
+        elif force["kind"] == "acceleration" and _is_constant(force["value"]):
             constant = constant + np.asarray(force["value"], dtype=float)
         else:
             return None

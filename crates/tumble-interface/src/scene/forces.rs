@@ -1,5 +1,6 @@
 //! Forces, velocity fields and anchors.
 
+use super::{Animated, AnimatedVector};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -7,7 +8,7 @@ use serde::{Deserialize, Serialize};
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(tag = "kind", rename_all = "snake_case", deny_unknown_fields)]
 pub enum Force {
-    /// Viscous damping f = -k_d v.
+    /// Viscous and quadratic damping f = -(k_d + c |v|) v.
     Drag {
         /// k_d, for each mass.
         #[serde(default)]
@@ -17,19 +18,56 @@ pub enum Force {
         #[serde(default)]
         #[schemars(range(min = 0.0), extend("x-unit" = "1/s"))]
         rate: f64,
+        /// c, in front of the square of the speed.
+        #[serde(default)]
+        #[schemars(range(min = 0.0), extend("x-unit" = "kg/m"))]
+        quadratic: f64,
         /// Names of objects; without it, all.
         #[serde(default)]
         on: Option<Vec<String>>,
     },
-    /// Attraction to a fixed point, f = -m gm d / |d|³.
-    Attraction {
-        /// The point.
+    /// Drag in air that moves: f = -(k_d + c |v - u|) (v - u).
+    Wind {
+        /// k_d, for each mass.
         #[serde(default)]
+        #[schemars(range(min = 0.0), extend("x-unit" = "N s/m"))]
+        coefficient: f64,
+        /// k_d per kilogram.
+        #[serde(default)]
+        #[schemars(range(min = 0.0), extend("x-unit" = "1/s"))]
+        rate: f64,
+        /// c, in front of the square of the relative speed.
+        #[serde(default)]
+        #[schemars(range(min = 0.0), extend("x-unit" = "kg/m"))]
+        quadratic: f64,
+        /// Velocity fields of the air; they add up.
+        air: Vec<Field>,
+        /// Names of objects; without it, all.
+        #[serde(default)]
+        on: Option<Vec<String>>,
+    },
+    /// Attraction to a point, f = -m gm d / r^(power + 1) with r² = |d|² + softening². A negative gm repels.
+    Attraction {
+        /// The point; may change in time.
+        #[serde(default = "origin")]
         #[schemars(extend("x-unit" = "m"))]
-        center: [f64; 3],
-        /// Gravitational parameter G M.
+        center: AnimatedVector,
+        /// Strength: with power 2 the gravitational parameter G M; may change in time.
         #[schemars(extend("x-unit" = "m³/s²"))]
-        gm: f64,
+        gm: Animated,
+        /// The force falls with this power of the distance: 2 gravity, 1 a line, 0 constant, -1 a spring. The unit of gm is
+        /// then m^(power + 1)/s².
+        #[serde(default = "two")]
+        #[schemars(range(min = -4.0, max = 12.0), extend("x-unit" = "1"))]
+        power: f64,
+        /// Softening length: no singularity at the point.
+        #[serde(default)]
+        #[schemars(range(min = 0.0), extend("x-unit" = "m"))]
+        softening: f64,
+        /// Fades out towards this distance and ends there; without it, it has no end.
+        #[serde(default)]
+        #[schemars(extend("x-unit" = "m", "exclusiveMinimum" = 0.0))]
+        radius: Option<f64>,
         /// Names of objects; without it, all.
         #[serde(default)]
         on: Option<Vec<String>>,
@@ -48,11 +86,104 @@ pub enum Force {
         #[serde(default)]
         on: Option<Vec<String>>,
     },
-    /// A uniform acceleration beside the world's gravity.
+    /// An acceleration beside the world's gravity: uniform, changing in time, or a formula of t, x, y, z, vx, vy, vz.
     Acceleration {
         /// The acceleration.
         #[schemars(extend("x-unit" = "m/s²"))]
-        value: [f64; 3],
+        value: AnimatedVector,
+        /// Names of objects; without it, all.
+        #[serde(default)]
+        on: Option<Vec<String>>,
+    },
+    /// A magnetic field: f = q v x B on charged particles.
+    Magnetic {
+        /// B: uniform, changing in time, or a formula of t, x, y, z.
+        #[schemars(extend("x-unit" = "T"))]
+        field: AnimatedVector,
+        /// Names of objects; without it, all.
+        #[serde(default)]
+        on: Option<Vec<String>>,
+    },
+    /// An electric field: f = q E on charged particles.
+    Electric {
+        /// E: uniform, changing in time, or a formula of t, x, y, z.
+        #[schemars(extend("x-unit" = "V/m"))]
+        field: AnimatedVector,
+        /// Names of objects; without it, all.
+        #[serde(default)]
+        on: Option<Vec<String>>,
+    },
+    /// A vortex: acceleration around, towards and along an axis, largest around it at the core radius c and falling as 1/r
+    /// outside. It speeds things up for ever: add drag, or blow with a `vortex` in the air of a `wind`.
+    Vortex {
+        /// A point of the axis; may change in time.
+        #[serde(default = "origin")]
+        #[schemars(extend("x-unit" = "m"))]
+        center: AnimatedVector,
+        /// Direction of the axis, of any length.
+        #[serde(default = "up")]
+        axis: [f64; 3],
+        /// Core radius c.
+        #[serde(default = "one")]
+        #[schemars(extend("x-unit" = "m", "exclusiveMinimum" = 0.0))]
+        core: f64,
+        /// Largest acceleration around the axis, at r = c; counter-clockwise seen from the tip of the axis.
+        #[schemars(extend("x-unit" = "m/s²"))]
+        swirl: Animated,
+        /// Largest acceleration towards the axis, at r = c.
+        #[serde(default = "nothing")]
+        #[schemars(extend("x-unit" = "m/s²"))]
+        inward: Animated,
+        /// Largest acceleration along the axis, at r = 0.
+        #[serde(default = "nothing")]
+        #[schemars(extend("x-unit" = "m/s²"))]
+        lift: Animated,
+        /// Names of objects; without it, all.
+        #[serde(default)]
+        on: Option<Vec<String>>,
+    },
+    /// Random acceleration that swirls and neither gathers nor scatters: curl noise.
+    Turbulence {
+        /// Root mean square.
+        #[schemars(extend("x-unit" = "m/s²"))]
+        strength: Animated,
+        /// Size of the largest swirls.
+        #[serde(default = "one")]
+        #[schemars(extend("x-unit" = "m", "exclusiveMinimum" = 0.0))]
+        scale: f64,
+        /// How many sizes of swirls, each half as large as the one before.
+        #[serde(default = "three")]
+        #[schemars(range(min = 1, max = 12))]
+        octaves: u32,
+        /// Strength of each size over that of the one before.
+        #[serde(default = "half")]
+        #[schemars(range(min = 0.0, max = 1.0), extend("x-unit" = "1"))]
+        roughness: f64,
+        /// How often it changes.
+        #[serde(default)]
+        #[schemars(range(min = 0.0), extend("x-unit" = "1/s"))]
+        rate: f64,
+        /// Chooses one of many fields, beside the seed of the scene.
+        #[serde(default)]
+        seed: u32,
+        /// Names of objects; without it, all.
+        #[serde(default)]
+        on: Option<Vec<String>>,
+    },
+    /// Thrust along the direction of motion: f = (thrust + m (speed - |v|)/time) v/|v|. What is at rest stays.
+    Propulsion {
+        /// Constant thrust; negative brakes.
+        #[serde(default = "nothing")]
+        #[schemars(extend("x-unit" = "N"))]
+        thrust: Animated,
+        /// Desired speed; without it, thrust alone.
+        #[serde(default)]
+        #[schemars(extend("x-unit" = "m/s"))]
+        speed: Option<Animated>,
+        /// Time in which the difference to the desired speed falls to 1/e.
+        #[serde(default = "one")]
+        #[schemars(extend("x-unit" = "s", "exclusiveMinimum" = 0.0))]
+        time: f64,
         /// Names of objects; without it, all.
         #[serde(default)]
         on: Option<Vec<String>>,
@@ -65,9 +196,9 @@ pub enum Force {
 pub enum Field {
     /// The same velocity everywhere.
     Uniform {
-        /// The velocity.
+        /// The velocity; may change in time.
         #[schemars(extend("x-unit" = "m/s"))]
-        velocity: [f64; 3],
+        velocity: AnimatedVector,
     },
     /// Turning about an axis: u = rate axis x (x - center). Exact paths are circles.
     Swirl {
@@ -78,9 +209,9 @@ pub enum Field {
         /// Direction of the axis, of any length.
         #[serde(default = "up")]
         axis: [f64; 3],
-        /// Angular velocity.
+        /// Angular velocity; may change in time.
         #[schemars(extend("x-unit" = "rad/s"))]
-        rate: f64,
+        rate: Animated,
     },
     /// Flow into a point: u = -rate (x - center). Exact paths decay without passing the centre.
     Sink {
@@ -88,9 +219,65 @@ pub enum Field {
         #[serde(default)]
         #[schemars(extend("x-unit" = "m"))]
         center: [f64; 3],
-        /// Decay rate; negative makes a source.
+        /// Decay rate; negative makes a source. May change in time.
         #[schemars(extend("x-unit" = "1/s"))]
+        rate: Animated,
+    },
+    /// A vortex that turns as a solid in its core and as 1/r outside, with an inflow and an updraft.
+    Vortex {
+        /// A point of the axis; may change in time.
+        #[serde(default = "origin")]
+        #[schemars(extend("x-unit" = "m"))]
+        center: AnimatedVector,
+        /// Direction of the axis, of any length.
+        #[serde(default = "up")]
+        axis: [f64; 3],
+        /// Core radius c.
+        #[serde(default = "one")]
+        #[schemars(extend("x-unit" = "m", "exclusiveMinimum" = 0.0))]
+        core: f64,
+        /// Largest velocity around the axis, at r = c.
+        #[schemars(extend("x-unit" = "m/s"))]
+        swirl: Animated,
+        /// Largest velocity towards the axis, at r = c.
+        #[serde(default = "nothing")]
+        #[schemars(extend("x-unit" = "m/s"))]
+        inward: Animated,
+        /// Largest velocity along the axis, at r = 0.
+        #[serde(default = "nothing")]
+        #[schemars(extend("x-unit" = "m/s"))]
+        lift: Animated,
+    },
+    /// Random flow without sources: curl noise.
+    Turbulence {
+        /// Root mean square of the velocity.
+        #[schemars(extend("x-unit" = "m/s"))]
+        strength: Animated,
+        /// Size of the largest swirls.
+        #[serde(default = "one")]
+        #[schemars(extend("x-unit" = "m", "exclusiveMinimum" = 0.0))]
+        scale: f64,
+        /// How many sizes of swirls, each half as large as the one before.
+        #[serde(default = "three")]
+        #[schemars(range(min = 1, max = 12))]
+        octaves: u32,
+        /// Strength of each size over that of the one before.
+        #[serde(default = "half")]
+        #[schemars(range(min = 0.0, max = 1.0), extend("x-unit" = "1"))]
+        roughness: f64,
+        /// How often it changes.
+        #[serde(default)]
+        #[schemars(range(min = 0.0), extend("x-unit" = "1/s"))]
         rate: f64,
+        /// Chooses one of many fields, beside the seed of the scene.
+        #[serde(default)]
+        seed: u32,
+    },
+    /// A formula of t, x, y, z.
+    Formula {
+        /// The velocity.
+        #[schemars(extend("x-unit" = "m/s"))]
+        velocity: AnimatedVector,
     },
 }
 
@@ -119,6 +306,48 @@ fn newton() -> f64 {
     6.67428e-11
 }
 
+fn origin() -> AnimatedVector {
+    [0.0; 3].into()
+}
+
+fn nothing() -> Animated {
+    0.0.into()
+}
+
+fn half() -> f64 {
+    0.5
+}
+
+fn one() -> f64 {
+    1.0
+}
+
+fn two() -> f64 {
+    2.0
+}
+
+fn three() -> u32 {
+    3
+}
+
 fn up() -> [f64; 3] {
     [0.0, 0.0, 1.0]
+}
+
+impl Force {
+    /// The objects that it acts on; `None` for all.
+    pub fn on(&self) -> Option<&Vec<String>> {
+        match self {
+            Self::Drag { on, .. }
+            | Self::Wind { on, .. }
+            | Self::Attraction { on, .. }
+            | Self::Gravitation { on, .. }
+            | Self::Acceleration { on, .. }
+            | Self::Magnetic { on, .. }
+            | Self::Electric { on, .. }
+            | Self::Vortex { on, .. }
+            | Self::Turbulence { on, .. }
+            | Self::Propulsion { on, .. } => on.as_ref(),
+        }
+    }
 }

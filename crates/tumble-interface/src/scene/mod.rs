@@ -1,6 +1,7 @@
 //! The scene: every word that a scene file may hold, with unit, default and range. These structs are the
 //! schema; JSON Schema, the reference page and the Python stubs are generated from them.
 
+mod animated;
 mod emitters;
 mod forces;
 mod output;
@@ -8,6 +9,7 @@ mod shapes;
 mod structures;
 mod systems;
 
+pub use animated::{Animated, AnimatedVector, Component, Interpolation, Keys, VectorKeys};
 pub use emitters::{Between, Burst, Emitter, Kill, Source, WhenFull};
 pub use forces::{Anchor, Field, Force};
 pub use output::{Camera, Expect, Output, Probe};

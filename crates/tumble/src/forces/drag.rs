@@ -1,18 +1,22 @@
-//! Viscous damping.
+//! Resistance of the medium: viscous and quadratic damping.
 
+use super::push::{Push, derivatives, push};
 use super::{Force, Group, One};
 use crate::elements::Block;
 use crate::math::rows::{self, Each};
-use crate::math::{Lane, Real, Row, ZERO};
+use crate::math::{Lane, Real, Row, Vec3, ZERO};
 
-/// f = -k_d v with k_d = coefficient + rate m.                          (springs.5)
+/// f = -(k_d + c |v|) v with k_d = coefficient + rate m.                          (particles.3)
 ///
-/// coefficient [N s/m]   rate [1/s]. It damps every motion, falling too.
+/// coefficient [N s/m]   rate [1/s]   c = quadratic [kg/m]. It damps every motion, falling too.
+#[derive(Debug, Clone, Copy)]
 pub struct Drag {
     /// The same for every mass [N s/m].
     pub coefficient: f64,
     /// Per mass [1/s].
     pub rate: f64,
+    /// In front of the square of the speed [kg/m].
+    pub quadratic: f64,
 }
 
 impl Each for &Drag {
@@ -22,13 +26,27 @@ impl Each for &Drag {
     }
 }
 
+impl Push for Drag {
+    #[inline(always)]
+    fn at<L: Lane>(&self, mass: L, _: Vec3<L>, v: Vec3<L>) -> Vec3<L> {
+        -(v * (mass.like(self.coefficient) + mass.like(self.rate) * mass + mass.like(self.quadratic) * v.norm_sq().sqrt()))
+    }
+}
+
 impl Force for Drag {
     fn add(&self, _t: f64, group: Group<'_>, force: &mut [Row]) {
-        rows::each(force, group.mass, group.v, ZERO, self);
+        if self.quadratic == 0.0 {
+            rows::each(force, group.mass, group.v, ZERO, self);
+        } else {
+            push(self, group, force);
+        }
     }
 
     fn matrix(&self, _t: f64, one: &One) -> (Block, Block) {
-        let d = (self.coefficient + self.rate * one.mass) as Real;
-        ([0.0; 6], [d, d, d, 0.0, 0.0, 0.0])
+        if self.quadratic == 0.0 {
+            let d = (self.coefficient + self.rate * one.mass) as Real;
+            return ([0.0; 6], [d, d, d, 0.0, 0.0, 0.0]);
+        }
+        derivatives(self, one.mass, one)
     }
 }

@@ -1,18 +1,30 @@
 //! L3: forces that act on each mass by itself, and velocity fields. One file per law.
 
+mod acceleration;
 mod attraction;
 mod drag;
 mod field;
 mod gravitation;
+mod magnetic;
+mod propulsion;
+mod push;
+mod turbulence;
+mod vortex;
+mod wind;
 
+pub use acceleration::Acceleration;
 pub use attraction::Attraction;
 pub use drag::Drag;
-pub use field::Flow;
+pub use field::{Current, Flow};
 pub use gravitation::Gravitation;
+pub use magnetic::{Electric, Magnetic};
+pub use propulsion::Propulsion;
+pub use turbulence::Turbulence;
+pub use vortex::{Vortex, Whirl};
+pub use wind::Wind;
 
 use crate::elements::Block;
-use crate::math::rows::{self, Each};
-use crate::math::{Lane, Real, Row, Vec3, xyz64};
+use crate::math::{Real, Row, Vec3, xyz64};
 use crate::state::Masses;
 use std::ops::Range;
 
@@ -84,27 +96,25 @@ pub trait Force: Send + Sync {
     fn matrix(&self, t: f64, one: &One) -> (Block, Block);
 }
 
-/// A uniform acceleration, f = m a.
-pub struct Acceleration(pub [f64; 3]);
-
-impl Each for &Acceleration {
-    #[inline(always)]
-    fn at<L: Lane>(&self, mass: L, _: L, acceleration: L, force: L) -> L {
-        force + mass * acceleration
-    }
+/// A force in a scene of dimension 2: without what points out of the plane.
+pub struct InPlane {
+    /// The force.
+    pub law: Box<dyn Force>,
+    /// The axis across the plane.
+    pub axis: usize,
 }
 
-impl Force for Acceleration {
-    fn add(&self, _t: f64, group: Group<'_>, force: &mut [Row]) {
-        let [ax, ay, az] = self.0.map(|a| a as Real);
-        rows::each(force, group.mass, group.x, [ax, ay, az, 0.0], self);
+impl Force for InPlane {
+    fn add(&self, t: f64, group: Group<'_>, force: &mut [Row]) {
+        self.law.add(t, group, force);
+        force.iter_mut().for_each(|f| f[self.axis] = 0.0);
     }
 
-    fn energy(&self, _t: f64, one: &One) -> Option<f64> {
-        Some(-one.mass * Vec3::from(self.0).dot(one.x))
+    fn energy(&self, t: f64, one: &One) -> Option<f64> {
+        self.law.energy(t, one)
     }
 
-    fn matrix(&self, _t: f64, _one: &One) -> (Block, Block) {
-        ([0.0; 6], [0.0; 6])
+    fn matrix(&self, t: f64, one: &One) -> (Block, Block) {
+        self.law.matrix(t, one)
     }
 }

@@ -54,3 +54,28 @@ pub fn sinh(x: f64) -> f64 {
 pub fn asinh(x: f64) -> f64 {
     libm::asinh(x)
 }
+
+/// tan x.
+pub fn tan(x: f64) -> f64 {
+    libm::tan(x)
+}
+
+/// arc tangent.
+pub fn atan(x: f64) -> f64 {
+    libm::atan(x)
+}
+
+/// Decimal logarithm.
+pub fn log10(x: f64) -> f64 {
+    libm::log10(x)
+}
+
+/// Hyperbolic tangent.
+pub fn tanh(x: f64) -> f64 {
+    libm::tanh(x)
+}
+
+/// The largest whole number that is not above x.
+pub fn floor(x: f64) -> f64 {
+    libm::floor(x)
+}

@@ -1,6 +1,8 @@
 //! L0: the scalar type, lanes, vectors, quaternions, derivatives, fixed-order parallel loops.
 
+pub mod animated;
 pub mod dual;
+pub mod formula;
 pub mod functions;
 pub mod lane;
 pub mod parallel;
@@ -11,6 +13,7 @@ pub mod rows;
 pub mod simd;
 pub mod vec3;
 
+pub use animated::{Signal, VectorSignal};
 pub use dual::Dual;
 pub use lane::Lane;
 pub use quat::Quat;

@@ -1,10 +1,10 @@
 //! Fills systems with objects, forces, solids and anchors.
 
 use super::Assets;
-use super::checks::{check, objects, place, targets};
+use super::checks::{check, objects, place};
+use super::laws::Reader;
 use super::memory::memory;
 use crate::exchange::Exchange;
-use crate::forces::{Acceleration, Attraction, Drag, Flow, Force};
 use crate::geometry::{Collider, Vector};
 use crate::recipes::{self, Site};
 use crate::state::Object;
@@ -13,7 +13,7 @@ use crate::systems::dynamics::{Dynamics, Parts, Settings, SpringPart, Stepping, 
 use crate::systems::tracers::{self, Tracers};
 use crate::world::World;
 use std::sync::Arc;
-use tumble_interface::scene::{Anchor, Force as Words, MeshFile, Method, Plane, Scene, System as Plan};
+use tumble_interface::scene::{Anchor, Emitter, Force as Words, MeshFile, Method, Particles, Plane, Scene, System as Plan};
 use tumble_interface::{Column, Data, Issue, Mesh, SceneError};
 
 /// A world, the surfaces of its colliders, and what is doubtful about it.
@@ -61,7 +61,7 @@ pub fn build(scene: &Scene, assets: &Assets) -> Result<Built, SceneError> {
             });
         }
     }
-    act(scene, &mut parts);
+    act(scene, &mut parts, &mut issues);
     if !issues.is_empty() {
         return Err(SceneError { issues });
     }
@@ -123,6 +123,15 @@ fn unused(scene: &Scene, plans: &[Plan]) -> Vec<String> {
             if given {
                 warnings.push(format!("all objects are tracers, which feel no {words}"));
             }
+        }
+    }
+    for (i, force) in scene.force.iter().enumerate() {
+        let reached = |name: &String| force.on().is_none_or(|on| on.contains(name));
+        let charged = |p: &Particles| p.charge.iter().any(|q| *q != 0.0) && reached(&p.name);
+        let emitted = |e: &Emitter| e.charge != 0.0 && reached(&e.name);
+        let any = scene.particles.iter().any(charged) || scene.emitter.iter().any(emitted);
+        if matches!(force, Words::Magnetic { .. } | Words::Electric { .. }) && !any {
+            warnings.push(format!("force[{i}]: nothing in its reach has a charge; give particles a charge"));
         }
     }
     if let Some(last) = scene.output.stills.iter().find(|i| **i > scene.time.frames) {
@@ -211,29 +220,24 @@ fn fill(scene: &Scene, plans: &[Plan], assets: &Assets, issues: &mut Vec<Issue>)
     parts
 }
 
-/// Gives every system the forces that act on its objects.
-fn act(scene: &Scene, parts: &mut [Parts]) {
-    for force in &scene.force {
+/// Gives every system the forces that act on its objects, and reads the fields.
+fn act(scene: &Scene, parts: &mut [Parts], issues: &mut Vec<Issue>) {
+    let mut reader = Reader::new(scene, issues);
+    for (i, force) in scene.force.iter().enumerate() {
+        let path = format!("force[{i}]");
+        // What is wrong with a force is told even where it acts on nothing.
+        reader.law(&path, force);
         for parts in &mut *parts {
-            let on = |name: &str| targets(force).is_none_or(|on| on.iter().any(|o| o == name));
+            let on = |name: &str| force.on().is_none_or(|on| on.iter().any(|o| o == name));
             let objects: Vec<usize> = parts.bodies().filter(|(_, name)| on(name)).map(|(i, _)| i).collect();
-            match law(force) {
+            match reader.law(&path, force) {
                 _ if objects.is_empty() => {}
                 Some(law) => parts.forces.push((law, objects)),
                 None => parts.between.push((force.clone(), objects)),
             }
         }
     }
-}
-
-/// The law of a force on each mass by itself.
-fn law(force: &Words) -> Option<Box<dyn Force>> {
-    Some(match *force {
-        Words::Drag { coefficient, rate, .. } => Box::new(Drag { coefficient, rate }),
-        Words::Attraction { center, gm, .. } => Box::new(Attraction { center: center.into(), gm }),
-        Words::Acceleration { value, .. } => Box::new(Acceleration(value)),
-        Words::Gravitation { .. } => return None,
-    })
+    reader.flow("field", &scene.field);
 }
 
 fn carried(scene: &Scene, plans: &[Plan], index: usize) -> Tracers {
@@ -251,7 +255,7 @@ fn carried(scene: &Scene, plans: &[Plan], index: usize) -> Tracers {
         step: plan.step,
         adaptive: plan.adaptive.clone(),
     };
-    Tracers::new(settings, Flow::new(&scene.field), &x, all)
+    Tracers::new(settings, Reader::new(scene, &mut Vec::new()).flow("field", &scene.field), &x, all)
 }
 
 /// An anchor whose ends have been found: system and point of each.

@@ -4,7 +4,7 @@ use crate::systems::dynamics::MOST_SUBSTEPS;
 use std::collections::HashSet;
 use tumble_interface::Issue;
 use tumble_interface::check::suggestion;
-use tumble_interface::scene::{Field, Force, Integrator, Method, Plane, Scene, Shape, System};
+use tumble_interface::scene::{Integrator, Method, Plane, Scene, Shape, System};
 
 /// Column names that a frame may hold.
 pub const COLUMNS: [&str; 5] = ["position", "velocity", "orientation", "angular_velocity", "link_strain"];
@@ -80,18 +80,13 @@ pub fn check(scene: &Scene, systems: &[System]) -> Vec<Issue> {
         }
     }
     for (i, force) in scene.force.iter().enumerate() {
-        for on in targets(force).into_iter().flatten() {
+        for on in force.on().into_iter().flatten() {
             if !objects.iter().any(|(_, name, _)| name == on) {
                 let hint = suggestion(on, objects.iter().map(|o| o.1));
                 wrong(format!("force[{i}].on"), format!("there is no object \"{on}\"{hint}"));
             } else if objects.iter().any(|(kind, name, system)| name == on && tracers(systems, kind, *system)) {
                 wrong(format!("force[{i}].on"), format!("\"{on}\" are tracers, which feel no force; put them into a dynamics system"));
             }
-        }
-    }
-    for (i, field) in scene.field.iter().enumerate() {
-        if matches!(field, Field::Swirl { axis, .. } if *axis == [0.0; 3]) {
-            wrong(format!("field[{i}].axis"), "[0, 0, 0], expected a direction".into());
         }
     }
     for (i, column) in scene.output.columns.iter().enumerate() {
@@ -123,15 +118,6 @@ pub fn place(systems: &[System], kind: &str, named: Option<&str>) -> Option<usiz
 
 fn tracers(systems: &[System], kind: &str, named: Option<&str>) -> bool {
     place(systems, kind, named).is_some_and(|i| systems[i].method == Method::Tracers)
-}
-
-/// The objects that a force names.
-pub fn targets(force: &Force) -> Option<&Vec<String>> {
-    match force {
-        Force::Drag { on, .. } | Force::Attraction { on, .. } | Force::Gravitation { on, .. } | Force::Acceleration { on, .. } => {
-            on.as_ref()
-        }
-    }
 }
 
 fn check_system(system: &System, path: &str, wrong: &mut impl FnMut(String, String)) {

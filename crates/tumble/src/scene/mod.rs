@@ -3,6 +3,7 @@
 mod build;
 mod checks;
 mod cures;
+mod laws;
 mod memory;
 mod simulation;
 

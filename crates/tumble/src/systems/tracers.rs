@@ -4,7 +4,7 @@ use crate::exchange::Exchange;
 use crate::forces::Flow;
 use crate::integrators::{self, Equation, Kinematics, Memory, Scratch, Stage, adaptive_step};
 use crate::math::parallel::chunks;
-use crate::math::{Real, Row, Vec3, is_finite, xyz, xyz64};
+use crate::math::{Real, Row, Vec3, ZERO, is_finite, xyz64};
 use crate::state::Object;
 use crate::system::{Archive, Part, System};
 use tumble_interface::engine::{Ledger, Stability, StepReport};
@@ -37,6 +37,8 @@ pub struct Tracers {
     scratch: Scratch,
     /// Largest distance from the origin at the start [m].
     size: f64,
+    /// Now [s].
+    time: f64,
 }
 
 impl Tracers {
@@ -44,10 +46,11 @@ impl Tracers {
     pub fn new(settings: Settings, flow: Flow, x: &[Vec3<f64>], objects: Vec<Object>) -> Self {
         let size = x.iter().map(|x| x.norm()).fold(1e-30, f64::max);
         let x: Vec<Row> = x.iter().map(|x| [x.x as Real, x.y as Real, x.z as Real, 0.0]).collect();
-        Self { memory: Memory::new(settings.integrator, x.len()), settings, flow, x, objects, scratch: Scratch::default(), size }
+        Self { memory: Memory::new(settings.integrator, x.len()), settings, flow, x, objects, scratch: Scratch::default(), size, time: 0.0 }
     }
 }
 
+/// Points in a flow.
 struct Carried<'a>(&'a Flow);
 
 impl Equation for Carried<'_> {
@@ -55,25 +58,20 @@ impl Equation for Carried<'_> {
         Kinematics { points: usize::MAX, second_order: false }
     }
 
-    fn rate(&mut self, _t: f64, x: &[Row], _v: &[Row], out: &mut [Row]) -> Result<(), StepError> {
+    fn rate(&mut self, t: f64, x: &[Row], _v: &[Row], out: &mut [Row]) -> Result<(), StepError> {
         let flow = self.0;
-        chunks(out, |start, out| {
-            for (k, o) in out.iter_mut().enumerate() {
-                let u = flow.velocity(xyz(x[start + k]));
-                *o = [u.x, u.y, u.z, 0.0];
-            }
-        });
+        chunks(out, |start, out| flow.velocities(t, &x[start..start + out.len()], out));
         Ok(())
     }
 
-    /// Newton's method for each point by itself: x = x* + gh u(x), with the exact 3 x 3 gradient of u.
+    /// Newton's method for each point by itself: x = x* + gh u(x, t), with the 3 x 3 gradient of u.
     fn solve(&mut self, stage: &Stage<'_>, x: &mut [Row], _v: &mut [Row], report: &mut StepReport) -> Result<(), StepError> {
         let flow = self.0;
         let one = |start: Vec3<f64>, guess: Vec3<f64>| {
             let mut x = guess;
             for _ in 0..20 {
-                let residual = x - start - flow.velocity(x) * stage.gh;
-                let [a, b, c] = flow.gradient(x);
+                let residual = x - start - flow.at(stage.t, x) * stage.gh;
+                let [a, b, c] = flow.gradient(stage.t, x);
                 let unit = |i: usize| Vec3::from(std::array::from_fn::<f64, 3, _>(|j| f64::from(u8::from(i == j))));
                 let (a, b, c) = (unit(0) - a * stage.gh, unit(1) - b * stage.gh, unit(2) - c * stage.gh);
                 let det = a.dot(b.cross(c));
@@ -127,6 +125,7 @@ impl System for Tracers {
                 done = if h == left { dt } else { done + h };
                 report.stepped(h);
             }
+            self.time = t + dt;
             return Ok(report);
         }
         let by_step = self.settings.step.map(|step| integrators::equal_steps(dt, step) as u32);
@@ -151,6 +150,7 @@ impl System for Tracers {
             self.memory.ready = true;
             report.stepped(h);
         }
+        self.time = t + dt;
         Ok(report)
     }
 
@@ -162,7 +162,11 @@ impl System for Tracers {
                 let rows = &self.x[object.points.clone()];
                 let (unit, rows): (_, Vec<[Real; 3]>) = match *name {
                     "position" => ("m", rows.iter().map(|x| [x[0], x[1], x[2]]).collect()),
-                    "velocity" => ("m/s", rows.iter().map(|x| self.flow.velocity(xyz(*x)).into()).collect()),
+                    "velocity" => ("m/s", {
+                        let mut u = vec![ZERO; rows.len()];
+                        self.flow.velocities(self.time, rows, &mut u);
+                        u.iter().map(|u| [u[0], u[1], u[2]]).collect()
+                    }),
                     _ => continue,
                 };
                 out.push(Column { object: object.name.clone(), name: (*name).into(), unit, width: 3, data: Data::from(rows.concat()) });
@@ -183,7 +187,7 @@ impl System for Tracers {
     }
 
     fn ledger(&self, t: f64) -> Ledger {
-        let speed = self.x.iter().map(|x| self.flow.velocity(xyz64(*x)).norm()).fold(0.0, f64::max);
+        let speed = self.x.iter().map(|x| self.flow.at(t, xyz64(*x)).norm()).fold(0.0, f64::max);
         Ledger { time: t, speed, ..Ledger::default() }
     }
 
@@ -218,7 +222,7 @@ impl System for Tracers {
             archive.push_rows("memory", column);
         }
         let ready = f64::from(u8::from(self.memory.ready));
-        archive.push("numbers", Part::Numbers(vec![ready, self.memory.next_step, self.memory.last_error]));
+        archive.push("numbers", Part::Numbers(vec![ready, self.memory.next_step, self.memory.last_error, self.time]));
     }
 
     fn restore(&mut self, archive: &mut Archive) -> Option<()> {
@@ -227,7 +231,8 @@ impl System for Tracers {
             archive.rows("memory", column)?;
         }
         let numbers = archive.numbers("numbers")?;
-        let [ready, next_step, last_error] = numbers[..] else { return None };
+        let [ready, next_step, last_error, time] = numbers[..] else { return None };
+        self.time = time;
         (self.memory.ready, self.memory.next_step, self.memory.last_error) = (ready == 1.0, next_step, last_error);
         Some(())
     }

@@ -1,0 +1,169 @@
+//! From the words of forces and fields to laws: formulas are read, and what is wrong with them is told.
+
+use crate::forces::{
+    Acceleration, Attraction, Current, Drag, Electric, Flow, Force, InPlane, Magnetic, Propulsion, Turbulence, Vortex, Wind,
+};
+use crate::math::formula::Of;
+use crate::math::{Signal, Vec3, VectorSignal};
+use tumble_interface::Issue;
+use tumble_interface::scene::{Animated, AnimatedVector, Field, Force as Words, Plane, Scene};
+
+/// Times at which a value that changes is tried, at most.
+const TRIALS: u32 = 1000;
+
+/// Reads values that may change in time, and gathers what is wrong with them.
+pub struct Reader<'a> {
+    /// What is wrong.
+    pub issues: &'a mut Vec<Issue>,
+    /// Times of the run [s].
+    times: Vec<f64>,
+    flat: Option<usize>,
+    seed: u32,
+}
+
+impl<'a> Reader<'a> {
+    /// For a scene.
+    pub fn new(scene: &Scene, issues: &'a mut Vec<Issue>) -> Self {
+        let frames = scene.time.frames;
+        let times = (0..=TRIALS.min(frames)).map(|i| f64::from(i) * f64::from(frames) / f64::from(TRIALS.min(frames)));
+        Self { issues, times: times.map(|i| i * scene.frame_time()).collect(), flat: flat(scene), seed: scene.seed }
+    }
+
+    /// A number, which must be at least `least` and finite during the run.
+    pub fn signal(&mut self, path: &str, words: &Animated, least: f64) -> Signal {
+        let signal = match Signal::new(words) {
+            Ok(signal) => signal,
+            Err(message) => return self.wrong(path, message).into(),
+        };
+        let tried = if signal.is_constant() { &self.times[..1] } else { &self.times[..] };
+        let bad = tried.iter().map(|t| (*t, signal.value(*t))).find(|(_, value)| !value.is_finite() || *value < least);
+        if let Some((t, value)) = bad {
+            let expected = if least.is_finite() { format!(">= {least}") } else { "a finite number".into() };
+            let at = if signal.is_constant() { String::new() } else { format!(" at t = {t} s") };
+            self.wrong(path, format!("{value}{at}, expected {expected}"));
+        }
+        signal
+    }
+
+    /// A vector; finite during the run where it is a function of time alone.
+    pub fn vector(&mut self, path: &str, words: &AnimatedVector, of: Of) -> VectorSignal {
+        let signal = match VectorSignal::new(words, of) {
+            Ok(signal) => signal,
+            Err(message) => {
+                self.wrong(path, message);
+                return [0.0; 3].into();
+            }
+        };
+        if signal.is_uniform() {
+            let bad = self.times.iter().map(|t| (*t, signal.value(*t))).find(|(_, v)| !v.norm_sq().is_finite());
+            if let Some((t, v)) = bad {
+                self.wrong(path, format!("[{}, {}, {}] at t = {t} s, expected finite numbers", v.x, v.y, v.z));
+            }
+        }
+        signal
+    }
+
+    fn direction(&mut self, path: &str, axis: [f64; 3]) -> Vec3<f64> {
+        if axis == [0.0; 3] {
+            self.wrong(path, "[0, 0, 0], expected a direction".into());
+            return [0.0, 0.0, 1.0].into();
+        }
+        Vec3::from(axis).normalized()
+    }
+
+    fn wrong(&mut self, path: &str, message: String) -> f64 {
+        let issue = Issue::new(path, message);
+        if !self.issues.contains(&issue) {
+            self.issues.push(issue);
+        }
+        0.0
+    }
+
+    /// The law of a force on each mass by itself; `None` for a force between masses.
+    pub fn law(&mut self, path: &str, words: &Words) -> Option<Box<dyn Force>> {
+        let at = |key: &str| format!("{path}.{key}");
+        const ANY: f64 = f64::NEG_INFINITY;
+        let law: Box<dyn Force> = match words {
+            Words::Gravitation { .. } => return None,
+            Words::Drag { coefficient, rate, quadratic, .. } => {
+                Box::new(Drag { coefficient: *coefficient, rate: *rate, quadratic: *quadratic })
+            }
+            Words::Wind { coefficient, rate, quadratic, air, .. } => Box::new(Wind {
+                drag: Drag { coefficient: *coefficient, rate: *rate, quadratic: *quadratic },
+                air: self.flow(&at("air"), air),
+            }),
+            Words::Attraction { center, gm, power, softening, radius, .. } => Box::new(Attraction {
+                center: self.vector(&at("center"), center, Of::Time),
+                gm: self.signal(&at("gm"), gm, ANY),
+                power: *power,
+                softening: *softening,
+                radius: radius.unwrap_or(f64::INFINITY),
+            }),
+            Words::Acceleration { value, .. } => Box::new(Acceleration(self.vector(&at("value"), value, Of::Motion))),
+            Words::Magnetic { field, .. } => Box::new(Magnetic(self.vector(&at("field"), field, Of::Place))),
+            Words::Electric { field, .. } => Box::new(Electric(self.vector(&at("field"), field, Of::Place))),
+            Words::Vortex { center, axis, core, swirl, inward, lift, .. } => {
+                Box::new(self.vortex(path, center, *axis, *core, [swirl, inward, lift]))
+            }
+            Words::Turbulence { strength, scale, octaves, roughness, rate, seed, .. } => {
+                Box::new(self.turbulence(path, strength, [*scale, *roughness, *rate], *octaves, *seed))
+            }
+            Words::Propulsion { thrust, speed, time, .. } => Box::new(Propulsion {
+                thrust: self.signal(&at("thrust"), thrust, ANY),
+                speed: speed.as_ref().map(|speed| self.signal(&at("speed"), speed, 0.0)),
+                time: *time,
+            }),
+        };
+        Some(match self.flat {
+            Some(axis) => Box::new(InPlane { law, axis }),
+            None => law,
+        })
+    }
+
+    fn vortex(&mut self, path: &str, center: &AnimatedVector, axis: [f64; 3], core: f64, values: [&Animated; 3]) -> Vortex {
+        let center = self.vector(&format!("{path}.center"), center, Of::Time);
+        let axis = self.direction(&format!("{path}.axis"), axis);
+        let mut read = |key: &str, words| self.signal(&format!("{path}.{key}"), words, f64::NEG_INFINITY);
+        let [swirl, inward, lift] = [("swirl", values[0]), ("inward", values[1]), ("lift", values[2])].map(|(key, words)| read(key, words));
+        Vortex { center, axis, core, swirl, inward, lift }
+    }
+
+    fn turbulence(&mut self, path: &str, strength: &Animated, numbers: [f64; 3], octaves: u32, seed: u32) -> Turbulence {
+        let [scale, roughness, rate] = numbers;
+        let strength = self.signal(&format!("{path}.strength"), strength, f64::NEG_INFINITY);
+        let seed = seed.wrapping_mul(0x27D4_EB2F).wrapping_add(self.seed);
+        Turbulence { strength, scale, octaves, roughness, rate, seed, flat: self.flat }
+    }
+
+    /// The sum of velocity fields; `path` is that of the list.
+    pub fn flow(&mut self, path: &str, fields: &[Field]) -> Flow {
+        let fields = fields.iter().enumerate().map(|(i, field)| self.field(&format!("{path}[{i}]"), field)).collect();
+        Flow { fields, flat: self.flat }
+    }
+
+    fn field(&mut self, path: &str, field: &Field) -> Current {
+        let at = |key: &str| format!("{path}.{key}");
+        const ANY: f64 = f64::NEG_INFINITY;
+        match field {
+            Field::Uniform { velocity } => Current::Uniform(self.vector(&at("velocity"), velocity, Of::Time)),
+            Field::Swirl { center, axis, rate } => Current::Swirl {
+                center: (*center).into(),
+                axis: self.direction(&at("axis"), *axis),
+                rate: self.signal(&at("rate"), rate, ANY),
+            },
+            Field::Sink { center, rate } => Current::Sink { center: (*center).into(), rate: self.signal(&at("rate"), rate, ANY) },
+            Field::Vortex { center, axis, core, swirl, inward, lift } => {
+                Current::Vortex(self.vortex(path, center, *axis, *core, [swirl, inward, lift]))
+            }
+            Field::Turbulence { strength, scale, octaves, roughness, rate, seed } => {
+                Current::Turbulence(self.turbulence(path, strength, [*scale, *roughness, *rate], *octaves, *seed))
+            }
+            Field::Formula { velocity } => Current::Formula(self.vector(&at("velocity"), velocity, Of::Place)),
+        }
+    }
+}
+
+/// The axis across the plane of a scene of dimension 2.
+fn flat(scene: &Scene) -> Option<usize> {
+    (scene.dimension == 2).then(|| if scene.plane == Plane::Xz { 1 } else { 2 })
+}
