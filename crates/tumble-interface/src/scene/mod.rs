@@ -9,7 +9,7 @@ mod systems;
 
 pub use forces::{Anchor, Field, Force};
 pub use output::{Camera, Expect, Output, Probe};
-pub use shapes::{Collider, MeshFile, Shape};
+pub use shapes::{Collider, Interpolation, MeshFile, MeshFrame, MeshFrames, MeshRef, Motion, Pose, Shape};
 pub use structures::{Block, Diagonals, Link, LinkSettings, Links, Material, Net, Particles, Pin, Region, Rod, Rope, Sheet, Spring};
 pub use systems::{Adaptive, Hessian, Integrator, Linear, Method, OnFailure, Solver, System};
 
@@ -197,13 +197,28 @@ impl Scene {
         1.0 / self.time.fps
     }
 
-    /// Meshes that the scene names, with the place of each, in order of appearance.
-    pub fn mesh_files_mut(&mut self) -> Vec<(String, &mut MeshFile)> {
-        let nets = self.net.iter_mut().map(|n| (format!("net \"{}\".mesh", n.name), &mut n.mesh));
-        let shapes = self.collider.iter_mut().filter_map(|c| match &mut c.shape {
-            Shape::Mesh(mesh) => Some((format!("collider \"{}\".shape.mesh", c.name), mesh)),
-            _ => None,
-        });
-        nets.chain(shapes).collect()
+    /// Meshes that the scene names, in order of appearance.
+    pub fn mesh_files_mut(&mut self) -> Vec<MeshRef<'_>> {
+        fn one(place: String, file: &mut MeshFile) -> MeshRef<'_> {
+            MeshRef { place, path: &file.path, hash: &mut file.hash }
+        }
+        let mut all: Vec<MeshRef<'_>> = Vec::new();
+        all.extend(self.net.iter_mut().map(|n| one(format!("net \"{}\".mesh", n.name), &mut n.mesh)));
+        for thing in &mut self.collider {
+            let place = format!("collider \"{}\".shape", thing.name);
+            match &mut thing.shape {
+                Shape::Mesh(mesh) => all.push(one(format!("{place}.mesh"), mesh)),
+                Shape::AnimatedMesh(mesh) => {
+                    let frames = mesh.frames.iter_mut().enumerate();
+                    all.extend(frames.map(|(i, f)| MeshRef {
+                        place: format!("{place}.animated_mesh.frames[{i}]"),
+                        path: &f.path,
+                        hash: &mut f.hash,
+                    }));
+                }
+                _ => {}
+            }
+        }
+        all
     }
 }
