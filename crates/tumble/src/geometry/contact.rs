@@ -74,6 +74,22 @@ impl Collider {
     /// Where a mass first meets the solid that goes straight from `from` at time t0 to `to` at t1. One that starts in
     /// touch meets it at once if it goes in; one that starts deeper is no matter of a way.
     pub fn sweep(&self, from: Vector, to: Vector, t0: f64, t1: f64) -> Option<Impact> {
+        self.passage(from, to, t0, t1).or_else(|| self.landing(from, to, t0, t1))
+    }
+
+    /// A way that ends in touch with a mesh but passes no triangle: the surface counts as flat.
+    fn landing(&self, from: Vector, to: Vector, t0: f64, t1: f64) -> Option<Impact> {
+        if !matches!(self.shape, Shape::Mesh { .. } | Shape::Animated { .. }) {
+            return None;
+        }
+        let Touch { depth, normal, velocity } = self.touch(to, t1)?;
+        let fall = (velocity * (t1 - t0) - (to - from)).dot(normal);
+        // Deeper at the start: no matter of a way.
+        let flat = fall > 0.0 && depth - fall <= self.thickness + 1e-6 * (1.0 + from.norm());
+        flat.then(|| Impact { part: (1.0 - depth / fall).max(0.0), normal, velocity })
+    }
+
+    fn passage(&self, from: Vector, to: Vector, t0: f64, t1: f64) -> Option<Impact> {
         let Some((start, twist)) = self.at(t0) else {
             let (part, normal, moves) = self.shape.sweep(from, to, (t0, t1), self.thickness, self.inside)?;
             return Some(Impact { part, normal, velocity: moves + self.belt });

@@ -48,7 +48,11 @@ pub fn resolve(colliders: &[Collider], step: &Step, before: (Row, Row), x: &mut 
         let way = position - xyz64(before.0) - surface * step.h;
         let along = way - normal * way.dot(normal);
         let back = (collider.friction * depth).min(along.norm());
-        let position = position + normal * depth - along.normalized() * back;
+        let mut position = position + normal * depth - along.normalized() * back;
+        if collider.inside && back > 0.0 {
+            // A container bends towards what goes along its wall.
+            position = collider.touch(position, step.end()).map_or(position, |t| position + t.normal * t.depth);
+        }
         let velocity = rebound(collider, velocity - surface, normal, step.resting) + surface;
         *x = row(real(position), x[3]);
         *v = row(real(velocity), 0.0);
@@ -83,8 +87,8 @@ fn meet(colliders: &[Collider], step: &Step, before: (Row, Row), x: &mut Row, v:
         let mut first: Option<(Impact, &Collider)> = None;
         for collider in colliders {
             let Some(hit) = collider.sweep(from, to, step.t + gone, step.end()) else { continue };
-            let speed = (start + (end - start) * hit.part - hit.velocity).dot(hit.normal);
-            let approach = speed.min(((to - from) * (1.0 / left) - hit.velocity).dot(hit.normal));
+            let speeds = [start + (end - start) * hit.part, (to - from) * (1.0 / left), end];
+            let approach = speeds.map(|v| (v - hit.velocity).dot(hit.normal)).into_iter().fold(f64::INFINITY, f64::min);
             let stays = || collider.touch(to, step.end()).is_some_and(|t| t.normal.dot(hit.normal) > 0.0);
             if first.as_ref().is_none_or(|(f, _)| hit.part < f.part) && (approach < -step.resting || !stays()) {
                 first = Some((hit, collider));
