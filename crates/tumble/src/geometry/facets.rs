@@ -162,9 +162,8 @@ impl Facets {
     /// Largest speed of a vertex [m/s].
     pub fn fastest(&self) -> f64 {
         let ways = self.frames.windows(2).zip(self.times.windows(2));
-        let speed = |(f, t): (&[Vec<Vector>], &[f64])| {
-            f[0].iter().zip(&f[1]).map(|(a, b)| (*b - *a).norm()).fold(0.0, f64::max) / (t[1] - t[0])
-        };
+        let speed =
+            |(f, t): (&[Vec<Vector>], &[f64])| f[0].iter().zip(&f[1]).map(|(a, b)| (*b - *a).norm()).fold(0.0, f64::max) / (t[1] - t[0]);
         ways.map(speed).fold(0.0, f64::max)
     }
 
@@ -351,7 +350,11 @@ fn passes(a: Vector, d: Vector, start: [Vector; 3], end: [Vector; 3], sides: Sid
         let mut s = s.clamp(l, h);
         if c[2] != 0.0 || c[3] != 0.0 {
             for _ in 0..80 {
-                if (f(s) < 0.0) == (fl < 0.0) { l = s } else { h = s }
+                if (f(s) < 0.0) == (fl < 0.0) {
+                    l = s
+                } else {
+                    h = s
+                }
                 s = 0.5 * (l + h);
             }
         }

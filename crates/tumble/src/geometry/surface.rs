@@ -45,7 +45,8 @@ pub fn capsule(a: Vector, b: Vector, radius: f64) -> Mesh {
         (center + turn.turn(Vector { x: cos(up) * cos(around), y: cos(up) * sin(around), z: sin(up) }) * radius).into()
     };
     let mut vertices = vec![at(a, -1.0, 0)];
-    let rings = (1..=RINGS).map(|k| (a, f64::from(k) / f64::from(RINGS) - 1.0)).chain((0..RINGS).map(|k| (b, f64::from(k) / f64::from(RINGS))));
+    let rings =
+        (1..=RINGS).map(|k| (a, f64::from(k) / f64::from(RINGS) - 1.0)).chain((0..RINGS).map(|k| (b, f64::from(k) / f64::from(RINGS))));
     for (center, ring) in rings {
         vertices.extend((0..SIDES).map(|side| at(center, ring, side)));
     }

@@ -67,7 +67,10 @@ pub fn solid(thing: &Thing, meshes: &[Mesh]) -> Result<Collider, Wrong> {
             };
             for (i, pair) in words.frames.windows(2).enumerate() {
                 if pair[1].time <= pair[0].time {
-                    return wrong(&format!("{key}[{}].time", i + 1), format!("{} s, expected > {} s: times rise", pair[1].time, pair[0].time));
+                    return wrong(
+                        &format!("{key}[{}].time", i + 1),
+                        format!("{} s, expected > {} s: times rise", pair[1].time, pair[0].time),
+                    );
                 }
             }
             for (i, mesh) in meshes.iter().enumerate() {

@@ -26,7 +26,15 @@ impl Simulation {
     /// Builds a scene. Meshes that it names are in `assets`, by their path.
     pub fn new(scene: Scene, assets: Assets) -> Result<Self, SceneError> {
         let built = build(&scene, &assets)?;
-        Ok(Self { scene, assets, world: built.world, scenery: built.scenery, colliders: built.colliders, warnings: built.warnings, failure: None })
+        Ok(Self {
+            scene,
+            assets,
+            world: built.world,
+            scenery: built.scenery,
+            colliders: built.colliders,
+            warnings: built.warnings,
+            failure: None,
+        })
     }
 
     /// The scene that it was built from.

@@ -49,9 +49,11 @@ pub fn resolve(colliders: &[Collider], step: &Step, before: (Row, Row), x: &mut 
         let along = way - normal * way.dot(normal);
         let back = (collider.friction * depth).min(along.norm());
         let mut position = position + normal * depth - along.normalized() * back;
-        if collider.inside && back > 0.0 {
-            // A container bends towards what goes along its wall.
-            position = collider.touch(position, step.end()).map_or(position, |t| position + t.normal * t.depth);
+        if collider.inside {
+            // A container bends towards what goes along its wall, and has corners.
+            for _ in 0..3 {
+                position = collider.touch(position, step.end()).map_or(position, |t| position + t.normal * t.depth);
+            }
         }
         let velocity = rebound(collider, velocity - surface, normal, step.resting) + surface;
         *x = row(real(position), x[3]);
@@ -104,7 +106,7 @@ fn meet(colliders: &[Collider], step: &Step, before: (Row, Row), x: &mut Row, v:
         start = rebound(collider, start + pull * (left * s) - surface, n, step.resting);
         let rest = step.h - gone;
         let (press, lift) = (pull.dot(n), start.dot(n));
-        if lift <= step.resting && press < 0.0 {
+        if lift <= 0.01 * step.resting && press < 0.0 {
             // It stays on the surface, which takes what presses, and rubs.
             let free = start + (pull - n * press) * rest;
             let slide = free - n * free.dot(n);
@@ -202,14 +204,7 @@ impl Penalty {
     /// Newton's method converges.
     ///
     /// `times` are those of the start and of the end of the stage.
-    pub fn of(
-        colliders: &[Collider],
-        times: (f64, f64),
-        stiffness: f64,
-        x: Row,
-        v: Row,
-        start: Row,
-    ) -> impl Iterator<Item = Penalty> {
+    pub fn of(colliders: &[Collider], times: (f64, f64), stiffness: f64, x: Row, v: Row, start: Row) -> impl Iterator<Item = Penalty> {
         colliders.iter().filter_map(move |collider| {
             let position = xyz64(x);
             let touch = collider.touch(position, times.1)?;
