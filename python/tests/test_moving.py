@@ -84,7 +84,7 @@ def test_the_scene_keeps_the_hash_of_every_frame(tmp_path: Path) -> None:
 
 def test_frames_of_an_animated_mesh_have_the_same_triangles(tmp_path: Path) -> None:
     good = scene(tmp_path)
-    (tmp_path / "plate.1.obj").write_text(PLATE.format(x=0, z=0) + "v 3 3 3\n")
+    (tmp_path / "plate.1.obj").write_text(PLATE.format(x=0, z=0) + "v 3 3 3\nf 2 3 4\n")
     with pytest.raises(SceneError, match=r"flap.*frames\[1\].*4 vertices instead of 3"):
         tumble.World(tumble.Scene.load(tmp_path / "scene.json"))
     assert good.to_dict()["collider"][3]["name"] == "flap"
