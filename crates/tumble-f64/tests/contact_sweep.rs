@@ -75,7 +75,8 @@ fn a_bouncing_ball_rests_when_the_series_says() {
             let first = if scheme == Integrator::SymplecticEuler { 1.0 } else { 0.0 };
             let slack = first * h * (1.0 + e) / (1.0 - e);
             assert!(last - time < 1.5 * h + slack && last - time > -4.0 * h * e / (1.0 - e) - h - slack, "{} {e} {last}", scheme.name());
-            let off = 1e-4 + first * 2.0 * h * G * time / 2.0;
+            // Their way is 4 g h² e²/(1 - e²) at most; measured: 1.1e-5, 5.1e-5, 1.5e-4 m short.
+            let off = 2e-5 + 4.0 * G * h * h * e * e / (1.0 - e * e) + first * 2.0 * h * G * time / 2.0;
             assert!((path - way).abs() < off, "{} {e} {path}", scheme.name());
             assert!(last > 1.0);
         }
