@@ -45,7 +45,7 @@ fn now(sim: &Simulation) -> (Vector, Vector) {
 #[test]
 fn a_bouncing_ball_rests_when_the_series_says() {
     let h = 1e-3;
-    for scheme in [Integrator::VelocityVerlet, Integrator::Rk4, Integrator::SymplecticEuler] {
+    for scheme in [Integrator::VelocityVerlet, Integrator::Rk4] {
         for (e, time, way) in [(0.5, 1.354_570_9, 1.666_667), (0.8, 4.063_712_8, 4.555_556), (0.9, 8.578_949_2, 9.526_316)] {
             let sim = &mut one(
                 &words(scheme, 1.0 / h, 1),
@@ -70,13 +70,10 @@ fn a_bouncing_ball_rests_when_the_series_says() {
             }
             path += 1.0;
             println!("{:16} e = {e}: rests after {last:.4} s ({:+.1e}), way {path:.6} m ({:+.1e})", scheme.name(), last - time, path - way);
-            // Impacts slower than 2 g h do not bounce: what is left of the series then is at most 4 h e/(1 - e), 0.036 s for e = 0.9;
-            // a scheme of order 1 errs by h g/2 in the speed of the first impact, h in the time of each of some dozens of flights.
-            let first = if scheme == Integrator::SymplecticEuler { 1.0 } else { 0.0 };
-            let slack = first * h * (1.0 + e) / (1.0 - e);
-            assert!(last - time < 1.5 * h + slack && last - time > -4.0 * h * e / (1.0 - e) - h - slack, "{} {e} {last}", scheme.name());
-            // Their way is 4 g h² e²/(1 - e²) at most; measured: 1.1e-5, 5.1e-5, 1.5e-4 m short.
-            let off = 2e-5 + 4.0 * G * h * h * e * e / (1.0 - e * e) + first * 2.0 * h * G * time / 2.0;
+            // Both schemes are exact in flight. Impacts slower than 2 g h do not bounce: what is left of the series then is at most
+            // 4 h e/(1 - e), 0.036 s for e = 0.9 (measured: 0.034), and a way of 4 g h² e²/(1 - e²) (measured: 1.1e-5, 5.1e-5, 1.5e-4 m).
+            assert!(last - time < 1.5 * h && last - time > -4.0 * h * e / (1.0 - e) - h, "{} {e} {last}", scheme.name());
+            let off = 2e-5 + 4.0 * G * h * h * e * e / (1.0 - e * e);
             assert!((path - way).abs() < off, "{} {e} {path}", scheme.name());
             assert!(last > 1.0);
         }
