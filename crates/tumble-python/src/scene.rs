@@ -148,12 +148,13 @@ fn to_node(value: &Bound<'_, PyAny>, path: &str, depth: usize) -> Result<Node, S
 /// Reads every mesh file that the scene names, once, and notes the hash of its content.
 fn load_assets(scene: &mut tumble_interface::Scene, folder: &Path) -> Result<HashMap<String, Mesh>, SceneError> {
     let (mut assets, mut hashes, mut issues) = (HashMap::new(), HashMap::new(), Vec::new());
-    for (place, file) in scene.mesh_files_mut() {
-        if !assets.contains_key(&file.path) {
-            match read_mesh(&folder.join(&file.path)) {
+    for file in scene.mesh_files_mut() {
+        let place = &file.place;
+        if !assets.contains_key(file.path) {
+            match read_mesh(&folder.join(file.path)) {
                 Ok((mesh, hash)) => {
-                    assets.insert(file.path.clone(), mesh);
-                    hashes.insert(file.path.clone(), hash);
+                    assets.insert(file.path.to_string(), mesh);
+                    hashes.insert(file.path.to_string(), hash);
                 }
                 Err(message) => {
                     issues.push(Issue::new(format!("{place}.path"), message));
@@ -161,13 +162,13 @@ fn load_assets(scene: &mut tumble_interface::Scene, folder: &Path) -> Result<Has
                 }
             }
         }
-        let found = hashes.get(&file.path).cloned();
-        if file.hash.is_some() && file.hash != found {
+        let found = hashes.get(file.path).cloned();
+        if file.hash.is_some() && *file.hash != found {
             let message =
                 format!("the content of \"{}\" has changed since this scene was resolved; restore the file, or leave out hash", file.path);
             issues.push(Issue::new(format!("{place}.hash"), message));
         }
-        file.hash = found;
+        *file.hash = found;
     }
     if issues.is_empty() { Ok(assets) } else { Err(SceneError { issues }) }
 }

@@ -193,7 +193,8 @@ impl World {
     }
 
     /// What does not change. Objects: mass [kg] n, pinned (indices), triangles m x 3, links l x 2, curve (indices in
-    /// order), radius [m] 1. Colliders: position [m] n x 3, triangles m x 3.
+    /// order), radius [m] 1. Colliders: position [m] n x 3, triangles m x 3; of moving ones frames hold
+    /// translation [m] 3 and turn 4, x = turn p + translation, or position of vertices that move by themselves.
     #[getter]
     fn topology<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
         arrays::columns(py, self.engine.topology())

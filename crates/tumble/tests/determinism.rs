@@ -44,6 +44,10 @@ fn scenes() -> Vec<(&'static str, String, usize)> {
         write!(tracers, "[{}, {}, {}],", (t * 0.37).sin(), (t * 0.11).cos(), (t * 0.0731).sin()).unwrap();
     }
     dust += "]\n[[collider]]\nname = \"floor\"\nrestitution = 0.3\nfriction = 0.2\nshape.floor.height = 0\n";
+    let stirred = dust.clone()
+        + "[[collider]]\nname = \"paddle\"\nrestitution = 0.5\nfriction = 0.2\nmotion = { spin = [0, 0, 9], keys = [{ time = 0 }, { time = 0.2, translate = [0, 0, 0.5], rotate = [20, 0, 90] }] }\n\
+           shape.capsule = { from = [-1, 0, 0.5], to = [1, 0, 0.5], radius = 0.2 }\n\
+           [[collider]]\nname = \"room\"\ninside = true\nrestitution = 0.8\nmotion.velocity = [3, 0, 0]\nshape.box = { center = [0, 0, 1], size = [2.5, 2.5, 2.5] }\n";
     tracers += "]\n";
     let rod = "[[system]]\nintegrator = \"SCHEME\"\nsubsteps = N\n[[rope]]\nname = \"rod\"\nfrom = [0, 0, 0]\nto = [0.6, 0.2, 0.4]\nsegments = 60\npin = [\"start\"]\n\
                rod = { stretch = 100, bend = 1e-3, twist = 1e-3, inertia = 1e-4, damping = 1e-4 }\n";
@@ -60,6 +64,7 @@ fn scenes() -> Vec<(&'static str, String, usize)> {
                  [[emitter]]\nname = \"swarm\"\nrate = 1500\nspeed = 0.3\ncone = 180\nlifetime = 0.5\nlifetime_spread = 0.3\nfrom.sphere.radius = 0.3\n\
                  [[particles]]\nname = \"sun\"\nposition = [[0.1, 0, 0]]\nmass = [100]\n";
     vec![
+        ("dust, stirred", stirred, 8),
         ("sheet, explicit", sheet("integrator = \"symplectic_euler\"\nsubsteps = 24", links), 20),
         ("sheet, verlet", sheet("integrator = \"verlet\"\nsubsteps = 12", links), 6),
         (

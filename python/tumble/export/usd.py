@@ -135,7 +135,28 @@ def _parts(found: list[Object], start: Columns) -> list[Part]:
 
 
 def _places(thing: Object, columns: Columns) -> npt.NDArray[np.float64]:
-    return positions(columns, thing) if thing.position is None else thing.position
+    """Vertices; of a collider that moves as a whole, before it is turned and moved."""
+    still = thing.position
+    if still is None or "position" in columns.get(thing.name, {}):
+        return positions(columns, thing)
+    return still
+
+
+def _deforms(part: Part, columns: Columns) -> bool:
+    """Whether its points differ from frame to frame."""
+    return part.thing.position is None or "position" in columns.get(part.thing.name, {})
+
+
+def _placement(part: Part, columns: Columns) -> list[tuple[str, str, Any]]:
+    """Translation and turn of a collider that moves as a whole: attribute, type and value."""
+    from pxr import Gf
+
+    own = columns.get(part.thing.name, {})
+    if "turn" not in own:
+        return []
+    x, y, z, w = (float(q) for q in np.ravel(own["turn"]))
+    shift = Gf.Vec3d(*(float(c) for c in np.ravel(own["translation"])))
+    return [("xformOp:translate", "double3", shift), ("xformOp:orient", "quatd", Gf.Quatd(w, x, y, z))]
 
 
 def _values(part: Part, columns: Columns) -> Iterator[tuple[str, str, Floats]]:
@@ -163,8 +184,13 @@ def _frame(parts: list[Part], columns: Columns, i: int) -> Any:
     layer = Sdf.Layer.CreateAnonymous(".usdc")
     with Sdf.ChangeBlock():
         for part in parts:
-            if part.thing.position is None:
+            placement = _placement(part, columns)
+            if placement or _deforms(part, columns):
                 prim = Sdf.CreatePrimInLayer(layer, part.path)
+            for name, kind, value in placement:
+                attribute = Sdf.AttributeSpec(prim, name, Sdf.ValueTypeNames.Find(kind))
+                layer.SetTimeSample(attribute.path, float(i), value)
+            if _deforms(part, columns):
                 for name, kind, values in _values(part, columns):
                     attribute = Sdf.AttributeSpec(prim, name, Sdf.ValueTypeNames.Find(kind))
                     layer.SetTimeSample(attribute.path, float(i), Vt.Vec3fArray.FromNumpy(values))
@@ -176,9 +202,12 @@ def _manifest(parts: list[Part], start: Columns) -> Any:
 
     layer = Sdf.Layer.CreateAnonymous(".usda")
     for part in parts:
-        if part.thing.position is None:
+        named = [(name, kind) for name, kind, _ in _placement(part, start)]
+        if _deforms(part, start):
+            named += [(name, kind) for name, kind, _ in _values(part, start)]
+        if named:
             prim = Sdf.CreatePrimInLayer(layer, part.path)
-            for name, kind, _ in _values(part, start):
+            for name, kind in named:
                 Sdf.AttributeSpec(prim, name, Sdf.ValueTypeNames.Find(kind))
     return layer
 
@@ -198,6 +227,11 @@ def _objects(parts: list[Part], start: Columns) -> Any:
         for name, kind, values in _values(part, start):
             attribute = prim.CreateAttribute(name, Sdf.ValueTypeNames.Find(kind), False)
             attribute.Set(Vt.Vec3fArray.FromNumpy(values))
+        placement = _placement(part, start)
+        if placement:
+            order = UsdGeom.Xformable(prim)
+            order.AddTranslateOp().Set(placement[0][2])
+            order.AddOrientOp(UsdGeom.XformOp.PrecisionDouble).Set(placement[1][2])
         n = len(prim.GetAttribute("points").Get())
         shown = UsdGeom.Gprim(prim)
         color = Gf.Vec3f(*part.thing.color)

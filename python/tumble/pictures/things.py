@@ -74,6 +74,8 @@ class Object:
     """Vertices [m] of what does not move."""
     plane: tuple[Floats, Floats] | None = None
     """A point and the unit normal of a ground."""
+    container: bool = False
+    """Whether masses are inside, so that it is drawn as its edges."""
 
 
 @dataclass(frozen=True)
@@ -174,6 +176,7 @@ def objects(run: Recording) -> list[Object]:
                 curve=_indices(columns, "curve", 1).ravel(),
                 position=np.asarray(columns["position"], dtype=float).reshape(-1, 3) if "position" in columns else None,
                 plane=plane,
+                container=bool(entry.get("inside", False)),
             )
         )
     return found
@@ -190,6 +193,18 @@ def positions(columns: Columns, thing: Object) -> Floats:
     if column is None:
         raise ExportError(f'"{thing.name}" has no positions in this run: add "position" to output.columns of the scene')
     return np.asarray(column, dtype=float).reshape(-1, 3)
+
+
+def carried(thing: Object, columns: Columns, x: Floats) -> Floats:
+    """Points [m] of a collider where it is in a frame: its own vertices, or turned and moved as a whole."""
+    own = columns.get(thing.name, {})
+    if "position" in own and thing.plane is None:
+        x = np.asarray(own["position"], dtype=float).reshape(-1, 3)
+    if "turn" not in own:
+        return x
+    q = np.ravel(own["turn"]).astype(float)
+    t = 2.0 * np.cross(q[:3], x)
+    return np.asarray(x + q[3] * t + np.cross(q[:3], t) + np.ravel(own["translation"]), dtype=float)
 
 
 class Stage:
@@ -213,10 +228,16 @@ class Stage:
         drawn: list[Thing] = []
         for thing in self.objects:
             if thing.plane is not None:
-                drawn.append(Ground(thing.name, *thing.plane, thing.color))
+                point, normal = thing.plane
+                tip = carried(thing, columns, np.stack([point, point + normal]))
+                drawn.append(Ground(thing.name, tip[0], tip[1] - tip[0], thing.color))
             elif thing.kind == "solid":
                 if thing.position is not None and len(thing.triangles):
-                    drawn.append(self._mesh(thing, thing.position, thing.triangles))
+                    x = carried(thing, columns, thing.position)
+                    if not thing.container:
+                        drawn.append(self._mesh(thing, x, thing.triangles))
+                    else:
+                        drawn.append(self._edges(thing, x, thinnest))
             else:
                 drawn += self._moving(thing, columns, thinnest)
                 if thing.trail > 0.0 and (way := self._way(thing, i, columns, thinnest)):
@@ -274,6 +295,25 @@ class Stage:
             x = x[source]
         closed = whole and thing.name in self._closed
         return Mesh(thing.name, x, triangles, normals(x, triangles), thing.color, thing.kind == "sheet", closed)
+
+    def _edges(self, thing: Object, x: Floats, thinnest: float) -> Tubes:
+        """The sharp edges of a container; of a round one a few of its rings."""
+        faces = np.cross(
+            x[thing.triangles[:, 1]] - x[thing.triangles[:, 0]], x[thing.triangles[:, 2]] - x[thing.triangles[:, 0]]
+        )
+        faces /= np.maximum(np.linalg.norm(faces, axis=1, keepdims=True), 1e-300)
+        across: dict[tuple[int, int], list[int]] = {}
+        for k, triangle in enumerate(thing.triangles.tolist()):
+            for a, b in zip(triangle, triangle[1:] + triangle[:1], strict=True):
+                across.setdefault((min(a, b), max(a, b)), []).append(k)
+        sharp = [e for e, near in across.items() if len(near) != 2 or faces[near[0]] @ faces[near[1]] < 0.7]
+        start = np.asarray(thing.position)
+        if not sharp:
+            middle = 0.5 * (start.min(axis=0) + start.max(axis=0))
+            side = (start - middle)[np.array(list(across))]
+            sharp = [e for e, s in zip(across, side, strict=True) if any((abs(s[:, k]) < 1e-9).all() for k in range(3))]
+        links = np.array(sharp or list(across), dtype=np.int64)
+        return Tubes(thing.name, x[links].reshape(-1, 3), np.full(len(links), 2), max(0.006, thinnest), thing.color)
 
     def _start_of(self, thing: Object) -> Floats:
         return thing.position if thing.position is not None else positions(self._start, thing)

@@ -13,7 +13,7 @@ pub use animated::{Animated, AnimatedVector, Component, Interpolation, Keys, Vec
 pub use emitters::{Between, Burst, Emitter, Kill, Source, WhenFull};
 pub use forces::{Anchor, Field, Force};
 pub use output::{Camera, Expect, Output, Probe};
-pub use shapes::{Collider, MeshFile, Shape};
+pub use shapes::{Collider, MeshFile, MeshFrame, MeshFrames, MeshRef, Motion, Pace, Pose, Shape};
 pub use structures::{Block, Diagonals, Link, LinkSettings, Links, Material, Net, Particles, Pin, Region, Rod, Rope, Sheet, Spring};
 pub use systems::{Adaptive, Hessian, Integrator, Linear, Method, OnFailure, Solver, System};
 
@@ -204,27 +204,42 @@ impl Scene {
         1.0 / self.time.fps
     }
 
-    /// Meshes that the scene names, with the place of each, in order of appearance.
-    pub fn mesh_files_mut(&mut self) -> Vec<(String, &mut MeshFile)> {
-        let nets = self.net.iter_mut().map(|n| (format!("net \"{}\".mesh", n.name), &mut n.mesh));
-        let shapes = self.collider.iter_mut().filter_map(|c| match &mut c.shape {
-            Shape::Mesh(mesh) => Some((format!("collider \"{}\".shape.mesh", c.name), mesh)),
-            _ => None,
-        });
-        let sources = self.emitter.iter_mut().flat_map(|e| {
-            let Emitter { name, from, kill, .. } = e;
-            let source = match from {
-                Source::MeshSurface(mesh) => Some((format!("emitter \"{name}\".from.mesh_surface"), mesh)),
-                Source::MeshVolume(mesh) => Some((format!("emitter \"{name}\".from.mesh_volume"), mesh)),
-                _ => None,
-            };
-            let regions = kill.iter_mut().enumerate().filter_map(|(i, rule)| match rule {
-                Kill::Inside(Shape::Mesh(mesh)) => Some((format!("emitter \"{name}\".kill[{i}].inside.mesh"), mesh)),
-                Kill::Outside(Shape::Mesh(mesh)) => Some((format!("emitter \"{name}\".kill[{i}].outside.mesh"), mesh)),
-                _ => None,
-            });
-            source.into_iter().chain(regions).collect::<Vec<_>>()
-        });
-        nets.chain(shapes).chain(sources).collect()
+    /// Meshes that the scene names, in order of appearance.
+    pub fn mesh_files_mut(&mut self) -> Vec<MeshRef<'_>> {
+        fn one(place: String, file: &mut MeshFile) -> MeshRef<'_> {
+            MeshRef { place, path: &file.path, hash: &mut file.hash }
+        }
+        let mut all: Vec<MeshRef<'_>> = Vec::new();
+        all.extend(self.net.iter_mut().map(|n| one(format!("net \"{}\".mesh", n.name), &mut n.mesh)));
+        for thing in &mut self.collider {
+            let place = format!("collider \"{}\".shape", thing.name);
+            match &mut thing.shape {
+                Shape::Mesh(mesh) => all.push(one(format!("{place}.mesh"), mesh)),
+                Shape::AnimatedMesh(mesh) => {
+                    let frames = mesh.frames.iter_mut().enumerate();
+                    all.extend(frames.map(|(i, f)| MeshRef {
+                        place: format!("{place}.animated_mesh.frames[{i}]"),
+                        path: &f.path,
+                        hash: &mut f.hash,
+                    }));
+                }
+                _ => {}
+            }
+        }
+        for Emitter { name, from, kill, .. } in &mut self.emitter {
+            match from {
+                Source::MeshSurface(mesh) => all.push(one(format!("emitter \"{name}\".from.mesh_surface"), mesh)),
+                Source::MeshVolume(mesh) => all.push(one(format!("emitter \"{name}\".from.mesh_volume"), mesh)),
+                _ => {}
+            }
+            for (i, rule) in kill.iter_mut().enumerate() {
+                match rule {
+                    Kill::Inside(Shape::Mesh(mesh)) => all.push(one(format!("emitter \"{name}\".kill[{i}].inside.mesh"), mesh)),
+                    Kill::Outside(Shape::Mesh(mesh)) => all.push(one(format!("emitter \"{name}\".kill[{i}].outside.mesh"), mesh)),
+                    _ => {}
+                }
+            }
+        }
+        all
     }
 }

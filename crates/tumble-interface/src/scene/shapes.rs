@@ -24,9 +24,67 @@ pub struct Collider {
     #[serde(default)]
     #[schemars(range(min = 0.0, max = 1.0), extend("x-unit" = "1"))]
     pub restitution: f64,
+    /// Turned inside out: a container that keeps masses in. Not for planes and shells.
+    #[serde(default)]
+    pub inside: bool,
+    /// Velocity of the surface itself, as of a conveyor belt; the shape stays, and turns this along when it turns.
+    #[serde(default)]
+    #[schemars(extend("x-unit" = "m/s"))]
+    pub belt: [f64; 3],
+    /// How it moves, as a rigid whole; without it, it stays.
+    #[serde(default)]
+    pub motion: Option<Motion>,
     /// Red, green and blue in pictures, 0 to 1, in linear light (a half is sRGB's 188 of 255).
     #[serde(default)]
     pub color: Option<[f64; 3]>,
+}
+
+/// A rigid motion: along keyframes, then on at constant velocity and spin. At t = 0, without keyframes, the thing is where
+/// its shape says.
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields, default)]
+pub struct Motion {
+    /// Velocity of the pivot.
+    #[schemars(extend("x-unit" = "m/s"))]
+    pub velocity: [f64; 3],
+    /// Angular velocity about the pivot: its direction is the axis, after the right hand.
+    #[schemars(extend("x-unit" = "rad/s"))]
+    pub spin: [f64; 3],
+    /// The point about which spin and keyframes turn, where it is without motion.
+    #[schemars(extend("x-unit" = "m"))]
+    pub pivot: [f64; 3],
+    /// Places at rising times; before the first and after the last it stays.
+    pub keys: Vec<Pose>,
+    /// What happens between keyframes.
+    pub interpolation: Pace,
+}
+
+/// A keyframe of a motion.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Pose {
+    /// When.
+    #[schemars(extend("x-unit" = "s"))]
+    pub time: f64,
+    /// Movement away from where the shape says.
+    #[serde(default)]
+    #[schemars(extend("x-unit" = "m"))]
+    pub translate: [f64; 3],
+    /// Turn about x, then y, then z. The way to the next keyframe is the shorter one: below 180°.
+    #[serde(default)]
+    #[schemars(extend("x-unit" = "°"))]
+    pub rotate: [f64; 3],
+}
+
+/// What happens between keyframes.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum Pace {
+    /// Constant velocity from one to the next.
+    #[default]
+    Linear,
+    /// From rest to rest: s² (3 - 2 s) of the way.
+    Smooth,
 }
 
 /// A solid.
@@ -73,8 +131,70 @@ pub enum Shape {
         #[schemars(extend("x-unit" = "m"))]
         height: f64,
     },
+    /// A cylinder with round ends: everything closer than its radius to a segment.
+    Capsule {
+        /// One end of the segment.
+        #[schemars(extend("x-unit" = "m"))]
+        from: [f64; 3],
+        /// The other end.
+        #[schemars(extend("x-unit" = "m"))]
+        to: [f64; 3],
+        /// Its radius.
+        #[schemars(extend("x-unit" = "m", "exclusiveMinimum" = 0.0))]
+        radius: f64,
+    },
     /// A triangle mesh from a file.
     Mesh(MeshFile),
+    /// A triangle mesh whose vertices move, from a file for each of some times.
+    AnimatedMesh(MeshFrames),
+}
+
+/// A mesh for each of some times, linear in time between them. All have the same triangles.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct MeshFrames {
+    /// The meshes, at rising times; before the first and after the last nothing moves.
+    pub frames: Vec<MeshFrame>,
+    /// Factor on the size.
+    #[serde(default = "one")]
+    #[schemars(extend("x-unit" = "1", "exclusiveMinimum" = 0.0))]
+    pub scale: f64,
+    /// Turn about x, then y, then z.
+    #[serde(default)]
+    #[schemars(extend("x-unit" = "°"))]
+    pub rotate: [f64; 3],
+    /// Movement after scaling and turning.
+    #[serde(default)]
+    #[schemars(extend("x-unit" = "m"))]
+    pub translate: [f64; 3],
+    /// Treat the mesh as a shell without an inside; for meshes that are not closed (needs a thickness).
+    #[serde(default)]
+    pub shell: bool,
+}
+
+/// The shape of an animated mesh at one time.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct MeshFrame {
+    /// When.
+    #[schemars(extend("x-unit" = "s"))]
+    pub time: f64,
+    /// File, relative to the scene file.
+    pub path: String,
+    /// Hash of the file's content; without it, any content will do.
+    #[serde(default)]
+    pub hash: Option<String>,
+}
+
+/// A mesh file that a scene names: its place in the scene, its path, and the hash of its content.
+#[derive(Debug)]
+pub struct MeshRef<'a> {
+    /// Place in the scene, for messages.
+    pub place: String,
+    /// File, relative to the scene file.
+    pub path: &'a str,
+    /// Hash of the file's content.
+    pub hash: &'a mut Option<String>,
 }
 
 /// A triangle mesh from an OBJ, PLY, STL or GLB file, placed in the world: scaled, turned, then moved.

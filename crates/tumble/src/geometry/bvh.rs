@@ -23,14 +23,15 @@ pub struct Bvh {
     corners: Vec<Vector>,
 }
 
+/// A box of the tree.
 #[derive(Debug, Clone, Copy)]
-struct Node {
+pub(super) struct Node {
     low: Vector,
     high: Vector,
     /// Of a leaf the first triangle, of an inner node its right child; the left one follows the node.
-    next: u32,
+    pub next: u32,
     /// Count of triangles, 0 for an inner node.
-    count: u32,
+    pub count: u32,
 }
 
 /// The closest point of a mesh.
@@ -136,16 +137,16 @@ fn bounds(points: &[Vector]) -> (Vector, Vector) {
     points.iter().skip(1).fold((points[0], points[0]), |(l, h), p| (low(l, *p), high(h, *p)))
 }
 
-fn low(a: Vector, b: Vector) -> Vector {
+pub(super) fn low(a: Vector, b: Vector) -> Vector {
     Vector { x: a.x.min(b.x), y: a.y.min(b.y), z: a.z.min(b.z) }
 }
 
-fn high(a: Vector, b: Vector) -> Vector {
+pub(super) fn high(a: Vector, b: Vector) -> Vector {
     Vector { x: a.x.max(b.x), y: a.y.max(b.y), z: a.z.max(b.z) }
 }
 
 /// Splits at the median of the longest axis of the centres.
-fn build(
+pub(super) fn build(
     nodes: &mut Vec<Node>,
     triangles: &mut [[u32; 3]],
     first: usize,
@@ -181,14 +182,14 @@ fn box_distance_sq(node: &Node, p: Vector) -> f64 {
 
 /// What the closest point lies on; edge k runs from corner k to corner k + 1.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-enum Feature {
+pub(super) enum Feature {
     Face,
     Edge(usize),
     Vertex(usize),
 }
 
 /// The closest point of a triangle, by the regions of its barycentric coordinates. Source: [ericson2004], 5.1.5.
-fn closest_on_triangle(p: Vector, [a, b, c]: [Vector; 3]) -> (Vector, Feature) {
+pub(super) fn closest_on_triangle(p: Vector, [a, b, c]: [Vector; 3]) -> (Vector, Feature) {
     let (ab, ac, ap) = (b - a, c - a, p - a);
     let (d1, d2) = (ab.dot(ap), ac.dot(ap));
     if d1 <= 0.0 && d2 <= 0.0 {

@@ -1,18 +1,30 @@
 //! Where masses touch solids. Candidates come from here for every method; each method resolves them its own way.
 
-use super::{Shape, Vector};
+use super::motion::{Pose, Twist};
+use super::{Motion, Shape, Vector};
+
+/// A solid turns less than this while the way of a mass past it counts as straight [rad].
+const TURN: f64 = 0.25;
+/// Pieces of a way at most: a solid that turns more in a step is not resolved.
+const PIECES: f64 = 64.0;
 
 /// A solid with a surface.
 #[derive(Debug, Clone)]
 pub struct Collider {
     /// Its shape.
     pub shape: Shape,
+    /// Whether it keeps masses in instead of out.
+    pub inside: bool,
     /// Masses are kept this far from the surface [m].
     pub thickness: f64,
     /// Coulomb friction coefficient.
     pub friction: f64,
     /// Speed after a bounce over speed before.
     pub restitution: f64,
+    /// Velocity of the surface along itself [m/s].
+    pub belt: Vector,
+    /// How it moves; `None` if it does not.
+    pub motion: Option<Motion>,
 }
 
 /// A mass within the thickness of a solid.
@@ -20,15 +32,103 @@ pub struct Collider {
 pub struct Touch {
     /// How deep it is below the thickness [m], > 0.
     pub depth: f64,
-    /// Unit normal out of the solid.
+    /// Unit normal towards where masses may be.
     pub normal: Vector,
+    /// Velocity of the surface [m/s].
+    pub velocity: Vector,
+}
+
+/// A mass that meets a solid on its way.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Impact {
+    /// Part of the way, 0 to 1.
+    pub part: f64,
+    /// Unit normal towards where the mass came from.
+    pub normal: Vector,
+    /// Velocity of the surface [m/s].
+    pub velocity: Vector,
 }
 
 impl Collider {
-    /// The contact of a mass at p, if it is closer than the thickness.
-    pub fn touch(&self, p: Vector) -> Option<Touch> {
-        let (distance, normal) = self.shape.distance(p);
+    fn at(&self, t: f64) -> Option<(Pose, Twist)> {
+        self.motion.as_ref().map(|m| m.at(t))
+    }
+
+    /// The contact of a mass at p at time t, if it is closer than the thickness.
+    pub fn touch(&self, p: Vector, t: f64) -> Option<Touch> {
+        let place = self.at(t);
+        let local = place.map_or(p, |(pose, _)| pose.back(p));
+        let (distance, normal, moves) = self.shape.near(local, t, self.thickness);
+        let (distance, normal) = if self.inside { (-distance, -normal) } else { (distance, normal) };
         let depth = self.thickness - distance;
-        (depth > 0.0 && normal.norm_sq() > 0.0).then_some(Touch { depth, normal })
+        if depth <= 0.0 || normal.norm_sq() == 0.0 {
+            return None;
+        }
+        let slide = moves + self.belt;
+        Some(match place {
+            None => Touch { depth, normal, velocity: slide },
+            Some((pose, twist)) => Touch { depth, normal: pose.turn.turn(normal), velocity: twist.at(p) + pose.turn.turn(slide) },
+        })
+    }
+
+    /// Whether a point is nearer to the solid than a distance [m], or in it.
+    pub fn is_near(&self, p: Vector, t: f64, distance: f64) -> bool {
+        let local = self.at(t).map_or(p, |(pose, _)| pose.back(p));
+        let far = self.shape.near(local, t, distance).0;
+        (if self.inside { -far } else { far }) < distance
+    }
+
+    /// Where a mass first meets the solid that goes straight from `from` at time t0 to `to` at t1. One that starts in
+    /// touch meets it at once if it goes in; one that starts deeper is no matter of a way.
+    pub fn sweep(&self, from: Vector, to: Vector, t0: f64, t1: f64) -> Option<Impact> {
+        self.passage(from, to, t0, t1).or_else(|| self.landing(from, to, t0, t1))
+    }
+
+    /// A way that ends in touch with a mesh but passes no triangle: the surface counts as flat.
+    fn landing(&self, from: Vector, to: Vector, t0: f64, t1: f64) -> Option<Impact> {
+        if !matches!(self.shape, Shape::Mesh { .. } | Shape::Animated { .. }) {
+            return None;
+        }
+        let Touch { depth, normal, velocity } = self.touch(to, t1)?;
+        let fall = (velocity * (t1 - t0) - (to - from)).dot(normal);
+        // Deeper at the start: no matter of a way.
+        let flat = fall > 0.0 && depth - fall <= self.thickness + 1e-6 * (1.0 + from.norm());
+        flat.then(|| Impact { part: (1.0 - depth / fall).max(0.0), normal, velocity })
+    }
+
+    fn passage(&self, from: Vector, to: Vector, t0: f64, t1: f64) -> Option<Impact> {
+        let Some((start, twist)) = self.at(t0) else {
+            let (part, normal, moves) = self.shape.sweep(from, to, (t0, t1), self.thickness, self.inside)?;
+            return Some(Impact { part, normal, velocity: moves + self.belt });
+        };
+        // Straight in the frame of the solid, piece by piece: the pieces join, so that nothing slips through.
+        let pieces = (twist.angular.norm() * (t1 - t0) / TURN).ceil().clamp(1.0, PIECES);
+        let mut a = start.back(from);
+        let mut before = t0;
+        for k in 0..pieces as usize {
+            let (s, e) = (k as f64 / pieces, (k + 1) as f64 / pieces);
+            let time = t0 + (t1 - t0) * e;
+            let Some((pose, _)) = self.at(time) else { break };
+            let b = pose.back(from + (to - from) * e);
+            if let Some((part, normal, moves)) = self.shape.sweep(a, b, (before, time), self.thickness, self.inside) {
+                let part = s + (e - s) * part;
+                let (pose, twist) = self.at(t0 + (t1 - t0) * part)?;
+                let velocity = twist.at(from + (to - from) * part) + pose.turn.turn(moves + self.belt);
+                return Some(Impact { part, normal: pose.turn.turn(normal), velocity });
+            }
+            (a, before) = (b, time);
+        }
+        None
+    }
+
+    /// Whether it, or its surface, ever moves.
+    pub fn moves(&self) -> bool {
+        self.motion.is_some() || self.belt.norm_sq() > 0.0 || matches!(self.shape, Shape::Animated { .. })
+    }
+
+    /// Largest velocity of its surface within `size` [m] of its pivot, over all times [m/s].
+    pub fn fastest(&self, size: f64) -> f64 {
+        let own = if let Shape::Animated { facets, .. } = &self.shape { facets.fastest() } else { 0.0 };
+        own + self.belt.norm() + self.motion.as_ref().map_or(0.0, |m| m.fastest(self.shape.reach(m.pivot).min(size)))
     }
 }

@@ -2,13 +2,17 @@
 
 pub mod bvh;
 pub mod contact;
+pub mod facets;
+pub mod motion;
 pub mod sampling;
 pub mod sdf;
 pub mod shape;
 pub mod surface;
 
 pub use bvh::Bvh;
-pub use contact::{Collider, Touch};
+pub use contact::{Collider, Impact, Touch};
+pub use facets::Facets;
+pub use motion::Motion;
 pub use sampling::Sampler;
 pub use sdf::GridSdf;
 pub use shape::Shape;

@@ -85,6 +85,11 @@ impl GridSdf {
         if far > 0.0 { ((value * value + far * far).sqrt(), beyond * (1.0 / far)) } else { (value, gradient) }
     }
 
+    /// Edge of a cell [m].
+    pub fn cell(&self) -> f64 {
+        self.dx
+    }
+
     /// Memory [B] that a grid of this resolution over a box of these edges takes.
     pub fn bytes(size: [f64; 3], resolution: u32, margin: f64) -> f64 {
         let dx = size.iter().copied().fold(0.0, f64::max) / f64::from(resolution);

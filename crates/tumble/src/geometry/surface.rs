@@ -2,6 +2,7 @@
 
 use super::Vector;
 use crate::math::Quat;
+use crate::math::functions::{cos, sin};
 use crate::math::rotation::from_z_to;
 use std::collections::HashMap;
 use tumble_interface::Mesh;
@@ -31,6 +32,38 @@ pub fn sphere(levels: u32, center: Vector, radius: f64) -> Mesh {
         *v = (center + Vector::from(*v) * radius).into();
     }
     mesh
+}
+
+/// A cylinder with round ends around the segment from a to b, rings from one pole to the other.
+pub fn capsule(a: Vector, b: Vector, radius: f64) -> Mesh {
+    /// Sides, and rings of each end.
+    const SIDES: u32 = 32;
+    const RINGS: u32 = 8;
+    let turn = if (b - a).norm() > 0.0 { from_z_to(b - a) } else { from_z_to(Vector { x: 0.0, y: 0.0, z: 1.0 }) };
+    let at = |center: Vector, ring: f64, side: u32| -> [f64; 3] {
+        let (up, around) = (ring * std::f64::consts::FRAC_PI_2, f64::from(side) / f64::from(SIDES) * std::f64::consts::TAU);
+        (center + turn.turn(Vector { x: cos(up) * cos(around), y: cos(up) * sin(around), z: sin(up) }) * radius).into()
+    };
+    let mut vertices = vec![at(a, -1.0, 0)];
+    let rings =
+        (1..=RINGS).map(|k| (a, f64::from(k) / f64::from(RINGS) - 1.0)).chain((0..RINGS).map(|k| (b, f64::from(k) / f64::from(RINGS))));
+    for (center, ring) in rings {
+        vertices.extend((0..SIDES).map(|side| at(center, ring, side)));
+    }
+    vertices.push(at(b, 1.0, 0));
+    let (rows, last) = (2 * RINGS, 2 * RINGS * SIDES + 1);
+    let mut triangles = Vec::new();
+    for i in 0..SIDES {
+        let j = (i + 1) % SIDES;
+        triangles.push([0, 1 + j, 1 + i]);
+        for row in 0..rows - 1 {
+            let (low, high) = (1 + row * SIDES, 1 + (row + 1) * SIDES);
+            triangles.extend([[low + i, low + j, high + j], [low + i, high + j, high + i]]);
+        }
+        let top = 1 + (rows - 1) * SIDES;
+        triangles.push([last, top + i, top + j]);
+    }
+    Mesh { vertices, triangles }
 }
 
 /// A box with these half edges, turned.
@@ -71,6 +104,11 @@ mod tests {
         let ball = sphere(4, [1.0, 2.0, 3.0].into(), 2.0);
         assert_eq!(ball.defects(), Defects::default());
         assert!((volume(&ball) / (32.0 / 3.0 * std::f64::consts::PI) - 1.0).abs() < 0.01);
+        let (a, b) = (Vector::from([1.0, 0.0, 0.0]), Vector::from([1.0, 3.0, 4.0]));
+        let pill = capsule(a, b, 2.0);
+        assert_eq!(pill.defects(), Defects::default());
+        // A cylinder of length 5 and a ball.
+        assert!((volume(&pill) / (std::f64::consts::PI * (20.0 + 32.0 / 3.0)) - 1.0).abs() < 0.01);
         let block = cuboid([1.0, 0.0, 0.0].into(), [0.5, 1.0, 2.0].into(), crate::math::rotation::from_degrees([10.0, 20.0, 30.0]));
         assert_eq!(block.defects(), Defects::default());
         assert!((volume(&block) - 8.0).abs() < 1e-12);

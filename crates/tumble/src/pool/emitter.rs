@@ -1,7 +1,7 @@
 //! When and where particles are born, with what they are born, and of what they die. Every number that a particle is born
 //! with is a function of the scene's seed, the emitter's name and the particle's id, so that nothing of it needs storing.
 
-use crate::geometry::{Sampler, Shape, Vector, sampling};
+use crate::geometry::{Collider, Sampler, Vector, sampling};
 use crate::math::{Random, Row, xyz64};
 use rayon::prelude::*;
 use tumble_interface::scene::{Between, Emitter as Words, WhenFull};
@@ -27,9 +27,9 @@ pub enum Origin {
 /// A rule by which particles die.
 pub enum Kill {
     /// Inside a solid.
-    Inside(Shape),
+    Inside(Collider),
     /// Outside a solid.
-    Outside(Shape),
+    Outside(Collider),
     /// Nearer to a collider than this [m].
     NearCollider(f64),
     /// Slower than this [m/s].
@@ -169,15 +169,15 @@ impl Emitter {
         self.words.lifetime.is_none() && self.kill.is_empty()
     }
 
-    /// Whether a particle is to die.
-    pub fn dies(&self, id: u32, age: f64, x: Row, v: Row, near: &Near<'_>) -> bool {
+    /// Whether a particle is to die at time t [s].
+    pub fn dies(&self, t: f64, (id, age): (u32, f64), (x, v): (Row, Row), near: &Near<'_>) -> bool {
         let youngest = self.words.lifetime.unwrap_or(f64::INFINITY) * (1.0 - self.words.lifetime_spread);
         if age >= youngest && age >= self.lifetime(id) {
             return true;
         }
         self.kill.iter().any(|rule| match rule {
-            Kill::Inside(shape) => shape.distance(xyz64(x)).0 < 0.0,
-            Kill::Outside(shape) => shape.distance(xyz64(x)).0 > 0.0,
+            Kill::Inside(solid) => solid.is_near(xyz64(x), t, 0.0),
+            Kill::Outside(solid) => !solid.is_near(xyz64(x), t, 0.0),
             Kill::NearCollider(distance) => near(xyz64(x), *distance),
             Kill::SlowerThan(speed) => xyz64(v).norm_sq() < speed * speed,
             Kill::FasterThan(speed) => xyz64(v).norm_sq() > speed * speed,

@@ -229,16 +229,16 @@ impl Pool {
         }
     }
 
-    /// Who of an emitter is to die, counted from its first row, in order. x and v are all rows of the system; `near` tells
+    /// Who of an emitter is to die at time t [s], counted from its first row, in order. x and v are all rows of the system; `near` tells
     /// whether a point is near a collider.
-    pub fn dead(&self, s: usize, x: &[Row], v: &[Row], near: &Near<'_>) -> Vec<u32> {
+    pub fn dead(&self, s: usize, t: f64, x: &[Row], v: &[Row], near: &Near<'_>) -> Vec<u32> {
         let (rows, emitter) = (self.rows(s), &self.streams[s].emitter);
         if emitter.is_immortal() {
             return Vec::new();
         }
         let (x, v, ids, ages) = (&x[rows.clone()], &v[rows], self.ids(s), self.ages(s));
         let tasks: Vec<Range<usize>> = (0..x.len()).step_by(TASK).map(|a| a..(a + TASK).min(x.len())).collect();
-        let dies = |i: &usize| emitter.dies(ids[*i], f64::from(ages[*i]), x[*i], v[*i], near);
+        let dies = |i: &usize| emitter.dies(t, (ids[*i], f64::from(ages[*i])), (x[*i], v[*i]), near);
         tasks.into_par_iter().flat_map_iter(|task| task.filter(dies).map(|i| i as u32)).collect()
     }
 

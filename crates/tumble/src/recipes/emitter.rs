@@ -2,7 +2,7 @@
 
 use super::Site;
 use super::scenery::{placed, solid};
-use crate::geometry::{Sampler, Shape, Vector};
+use crate::geometry::{Sampler, Vector};
 use crate::math::rotation::{from_degrees, from_z_to};
 use crate::pool::{Emitter, Kill, Origin};
 use tumble_interface::Mesh;
@@ -92,10 +92,11 @@ pub fn emitter<'a>(site: &mut Site<'_>, words: &Words, seed: u32, flat: Option<u
     };
     let mut kill = Vec::new();
     for (i, rule) in words.kill.iter().enumerate() {
-        let mut region = |shape: &Solid| -> Option<Shape> {
-            let file = if let Solid::Mesh(file) = shape { mesh(file).map(|mesh| placed(mesh, file)) } else { None };
-            match solid(&region(shape), file.as_ref()) {
-                Ok(solid) => Some(solid.shape),
+        let mut region = |shape: &Solid| -> Option<crate::geometry::Collider> {
+            let file: Vec<Mesh> =
+                if let Solid::Mesh(file) = shape { mesh(file).map(|mesh| placed(mesh, file)).into_iter().collect() } else { Vec::new() };
+            match solid(&region(shape), &file) {
+                Ok(solid) => Some(solid),
                 Err((key, message)) => {
                     let key = key.trim_start_matches(".shape");
                     wrong(&format!(".kill[{i}]{key}"), &message);
@@ -129,5 +130,15 @@ pub fn emitter<'a>(site: &mut Site<'_>, words: &Words, seed: u32, flat: Option<u
 
 /// A solid that only bounds a region.
 fn region(shape: &Solid) -> Collider {
-    Collider { name: String::new(), shape: shape.clone(), thickness: 0.0, friction: 0.0, restitution: 0.0, color: None }
+    Collider {
+        name: String::new(),
+        shape: shape.clone(),
+        thickness: 0.0,
+        friction: 0.0,
+        restitution: 0.0,
+        color: None,
+        inside: false,
+        belt: [0.0; 3],
+        motion: None,
+    }
 }

@@ -19,7 +19,7 @@ pub use emitter::emitter;
 pub use net::net;
 pub use particles::{Tracer, particles, tracers};
 pub use rope::rope;
-pub use scenery::{placed, scenery, solid};
+pub use scenery::{animated, placed, scenery, solid};
 pub use sheet::sheet;
 
 use crate::geometry::Vector;

@@ -1,9 +1,10 @@
 //! Colliders: the solids that masses feel, and the meshes that pictures show.
 
-use crate::geometry::{Collider, GridSdf, Shape, Vector, surface};
+use crate::geometry::motion::Key;
+use crate::geometry::{Collider, Facets, GridSdf, Motion, Shape, Vector, surface};
 use crate::math::rotation::from_degrees;
 use tumble_interface::Mesh;
-use tumble_interface::scene::{Collider as Thing, MeshFile, Shape as Words};
+use tumble_interface::scene::{Collider as Thing, MeshFile, MeshFrames, Motion as Moves, Pace, Shape as Words};
 
 /// Half the side of the square that stands for an endless plane in pictures [m].
 const PLANE: f64 = 10.0;
@@ -15,46 +16,129 @@ pub fn placed(mesh: &Mesh, file: &MeshFile) -> Mesh {
     Mesh { vertices: mesh.vertices.iter().map(place).collect(), triangles: mesh.triangles.clone() }
 }
 
-/// The solid of a collider; `mesh` stands where it belongs. `Err` says what is wrong with which key.
-pub fn solid(thing: &Thing, mesh: Option<&Mesh>) -> Result<Collider, (&'static str, String)> {
-    let shape = match (&thing.shape, mesh) {
-        (Words::Sphere { center, radius }, _) => Shape::Sphere { center: (*center).into(), radius: *radius },
-        (Words::Box { center, size, rotate }, _) => {
+/// The meshes of an animation put in their place.
+pub fn animated(meshes: &[&Mesh], frames: &MeshFrames) -> Vec<Mesh> {
+    let file = MeshFile {
+        path: String::new(),
+        hash: None,
+        scale: frames.scale,
+        rotate: frames.rotate,
+        translate: frames.translate,
+        resolution: 8,
+        shell: frames.shell,
+    };
+    meshes.iter().map(|mesh| placed(mesh, &file)).collect()
+}
+
+/// What is wrong with which key.
+type Wrong = (String, String);
+
+/// The solid of a collider; its meshes, one for each keyframe, stand where they belong. `Err` says what is wrong with
+/// which key.
+pub fn solid(thing: &Thing, meshes: &[Mesh]) -> Result<Collider, Wrong> {
+    let wrong = |key: &str, message: String| Err((key.to_string(), message));
+    let shape = match &thing.shape {
+        Words::Sphere { center, radius } => Shape::Sphere { center: (*center).into(), radius: *radius },
+        Words::Box { center, size, rotate } => {
             Shape::Box { center: (*center).into(), half: Vector::from(*size) * 0.5, turn: from_degrees(*rotate) }
         }
-        (Words::Plane { point, normal }, _) => {
+        Words::Plane { point, normal } => {
             let normal = Vector::from(*normal);
             if normal.norm() == 0.0 {
-                return Err((".shape.plane.normal", "[0, 0, 0] has no direction".into()));
+                return wrong(".shape.plane.normal", "[0, 0, 0] has no direction".into());
             }
             let normal = normal.normalized();
             Shape::Plane { normal, offset: normal.dot(Vector::from(*point)) }
         }
-        (Words::Floor { height }, _) => Shape::Plane { normal: [0.0, 0.0, 1.0].into(), offset: *height },
-        (Words::Mesh(file), Some(mesh)) => {
-            let defects = mesh.defects();
-            let holes = defects.open_edges + defects.bad_edges;
-            if holes > 0 && !file.shell {
-                let message = format!(
-                    "the mesh has {} open and {} inconsistent edges, so it has no inside; close it, or set shell = true with a thickness",
-                    defects.open_edges, defects.bad_edges
-                );
-                return Err((".shape.mesh", message));
-            }
-            if !file.shell && volume(mesh) < 0.0 {
-                return Err((".shape.mesh", "the triangles face inward; reverse them, or set shell = true with a thickness".into()));
-            }
-            if file.shell && thing.thickness == 0.0 {
-                return Err((".thickness", "0 m, expected > 0 m for a shell, which has no inside".into()));
-            }
-            match GridSdf::new(mesh, file.resolution, thing.thickness, file.shell) {
-                Some(grid) => Shape::Mesh(grid),
-                None => return Err((".shape.mesh", "the mesh has no triangle with an area".into())),
+        Words::Floor { height } => Shape::Plane { normal: [0.0, 0.0, 1.0].into(), offset: *height },
+        Words::Capsule { from, to, radius } => Shape::Capsule { from: (*from).into(), to: (*to).into(), radius: *radius },
+        Words::Mesh(file) => {
+            let Some(mesh) = meshes.first() else { return wrong(".shape.mesh", "the mesh has not been loaded".into()) };
+            whole(mesh, ".shape.mesh", file.shell, thing.thickness)?;
+            match (GridSdf::new(mesh, file.resolution, thing.thickness, file.shell), Facets::new(&[mesh], &[0.0])) {
+                (Some(grid), Some(facets)) => Shape::Mesh { grid, facets, shell: file.shell },
+                _ => return wrong(".shape.mesh", "the mesh has no triangle with an area".into()),
             }
         }
-        (Words::Mesh(_), None) => return Err((".shape.mesh", "the mesh has not been loaded".into())),
+        Words::AnimatedMesh(words) => {
+            let key = ".shape.animated_mesh.frames";
+            let Some(first) = meshes.first().filter(|_| meshes.len() == words.frames.len()) else {
+                return wrong(key, "the list is empty, expected a mesh for each of some times".into());
+            };
+            for (i, pair) in words.frames.windows(2).enumerate() {
+                if pair[1].time <= pair[0].time {
+                    return wrong(
+                        &format!("{key}[{}].time", i + 1),
+                        format!("{} s, expected > {} s: times rise", pair[1].time, pair[0].time),
+                    );
+                }
+            }
+            for (i, mesh) in meshes.iter().enumerate() {
+                let (n, m) = (mesh.vertices.len(), first.vertices.len());
+                if n != m || mesh.triangles != first.triangles {
+                    let what = if n == m { "other triangles".to_string() } else { format!("{n} vertices instead of {m}") };
+                    return wrong(&format!("{key}[{i}]"), format!("the mesh has {what} than the first; all frames need the same ones"));
+                }
+                whole(mesh, &format!("{key}[{i}]"), words.shell, thing.thickness)?;
+            }
+            let times: Vec<f64> = words.frames.iter().map(|f| f.time).collect();
+            match Facets::new(&meshes.iter().collect::<Vec<_>>(), &times) {
+                Some(facets) => Shape::Animated { facets, shell: words.shell },
+                None => return wrong(key, "the mesh has no triangles".into()),
+            }
+        }
     };
-    Ok(Collider { shape, thickness: thing.thickness, friction: thing.friction, restitution: thing.restitution })
+    let shell = matches!(shape, Shape::Mesh { shell: true, .. } | Shape::Animated { shell: true, .. });
+    if thing.inside && (shell || matches!(shape, Shape::Plane { .. })) {
+        let what = if shell { "a shell has no inside" } else { "a plane has two sides alike; reverse its normal" };
+        return wrong(".inside", format!("true, but {what}"));
+    }
+    Ok(Collider {
+        shape,
+        inside: thing.inside,
+        thickness: thing.thickness,
+        friction: thing.friction,
+        restitution: thing.restitution,
+        belt: thing.belt.into(),
+        motion: thing.motion.as_ref().map(motion).transpose()?,
+    })
+}
+
+fn motion(words: &Moves) -> Result<Motion, Wrong> {
+    for (i, pair) in words.keys.windows(2).enumerate() {
+        if pair[1].time <= pair[0].time {
+            let message = format!("{} s, expected > {} s: times rise", pair[1].time, pair[0].time);
+            return Err((format!(".motion.keys[{}].time", i + 1), message));
+        }
+    }
+    let keys = words.keys.iter().map(|k| Key { time: k.time, shift: k.translate.into(), turn: from_degrees(k.rotate) });
+    Ok(Motion {
+        velocity: words.velocity.into(),
+        spin: words.spin.into(),
+        pivot: words.pivot.into(),
+        keys: keys.collect(),
+        smooth: words.interpolation == Pace::Smooth,
+    })
+}
+
+/// Whether a mesh has an inside, or needs none.
+fn whole(mesh: &Mesh, key: &str, shell: bool, thickness: f64) -> Result<(), Wrong> {
+    let wrong = |key: &str, message: String| Err((key.to_string(), message));
+    let defects = mesh.defects();
+    if defects.open_edges + defects.bad_edges > 0 && !shell {
+        let message = format!(
+            "the mesh has {} open and {} inconsistent edges, so it has no inside; close it, or set shell = true with a thickness",
+            defects.open_edges, defects.bad_edges
+        );
+        return wrong(key, message);
+    }
+    if !shell && volume(mesh) < 0.0 {
+        return wrong(key, "the triangles face inward; reverse them, or set shell = true with a thickness".into());
+    }
+    if shell && thickness == 0.0 {
+        return wrong(".thickness", "0 m, expected > 0 m for a shell, which has no inside".into());
+    }
+    Ok(())
 }
 
 /// Six times the volume of a closed mesh [m³], negative if its triangles face inward.
@@ -64,12 +148,13 @@ fn volume(mesh: &Mesh) -> f64 {
 }
 
 /// The surface of a collider for pictures.
-pub fn scenery(thing: &Thing, mesh: Option<&Mesh>) -> Mesh {
+pub fn scenery(thing: &Thing, meshes: &[Mesh]) -> Mesh {
     match &thing.shape {
         Words::Sphere { center, radius } => surface::sphere(4, (*center).into(), *radius),
         Words::Box { center, size, rotate } => surface::cuboid((*center).into(), Vector::from(*size) * 0.5, from_degrees(*rotate)),
         Words::Plane { point, normal } => surface::square((*point).into(), Vector::from(*normal).normalized(), PLANE),
         Words::Floor { height } => surface::square([0.0, 0.0, *height].into(), [0.0, 0.0, 1.0].into(), PLANE),
-        Words::Mesh(_) => mesh.cloned().unwrap_or_default(),
+        Words::Capsule { from, to, radius } => surface::capsule((*from).into(), (*to).into(), *radius),
+        Words::Mesh(_) | Words::AnimatedMesh(_) => meshes.first().cloned().unwrap_or_default(),
     }
 }

@@ -13,13 +13,14 @@ use crate::systems::dynamics::{Dynamics, Parts, Settings, SpringPart, Stepping, 
 use crate::systems::tracers::{self, Tracers};
 use crate::world::World;
 use std::sync::Arc;
-use tumble_interface::scene::{Anchor, Emitter, Force as Words, MeshFile, Method, Particles, Plane, Scene, System as Plan};
+use tumble_interface::scene::{Anchor, Emitter, Force as Words, MeshFile, Method, Particles, Plane, Scene, Shape, System as Plan};
 use tumble_interface::{Column, Data, Issue, Mesh, SceneError};
 
 /// A world, the surfaces of its colliders, and what is doubtful about it.
 pub struct Built {
     pub world: World,
     pub scenery: Vec<Column>,
+    pub colliders: Arc<Vec<Collider>>,
     pub warnings: Vec<String>,
 }
 
@@ -97,7 +98,7 @@ pub fn build(scene: &Scene, assets: &Assets) -> Result<Built, SceneError> {
         let deep = books.penetration - thickest;
         warnings.push(format!("masses start up to {deep:.3} m inside a collider, and will be thrown out of it; move one of them"));
     }
-    Ok(Built { world, scenery, warnings })
+    Ok(Built { world, scenery, colliders, warnings })
 }
 
 /// The issues of objects, at their places in the scene.
@@ -162,15 +163,19 @@ fn gravity(scene: &Scene) -> [f64; 3] {
 fn solids(scene: &Scene, assets: &Assets, issues: &mut Vec<Issue>) -> (Vec<Collider>, Vec<Column>) {
     let (mut colliders, mut scenery) = (Vec::new(), Vec::new());
     for thing in &scene.collider {
-        let mesh: Option<Mesh> = match &thing.shape {
-            tumble_interface::scene::Shape::Mesh(file) => assets.get(&file.path).map(|mesh| recipes::placed(mesh, file)),
-            _ => None,
+        let meshes: Vec<Mesh> = match &thing.shape {
+            Shape::Mesh(file) => assets.get(&file.path).map(|mesh| recipes::placed(mesh, file)).into_iter().collect(),
+            Shape::AnimatedMesh(frames) => {
+                let found: Vec<&Mesh> = frames.frames.iter().filter_map(|f| assets.get(&f.path)).collect();
+                recipes::animated(&found, frames)
+            }
+            _ => Vec::new(),
         };
-        match recipes::solid(thing, mesh.as_ref()) {
+        match recipes::solid(thing, &meshes) {
             Ok(collider) => colliders.push(collider),
             Err((key, message)) => issues.push(Issue::new(format!("collider \"{}\"{key}", thing.name), message)),
         }
-        let surface = recipes::scenery(thing, mesh.as_ref());
+        let surface = recipes::scenery(thing, &meshes);
         let mut add = |name: &str, unit, data| scenery.push(Column { object: thing.name.clone(), name: name.into(), unit, width: 3, data });
         add("position", "m", Data::F64(surface.vertices.concat()));
         add("triangles", "1", Data::U32(surface.triangles.concat()));

@@ -178,8 +178,16 @@ fn check_plane(scene: &Scene, wrong: &mut impl FnMut(String, String)) {
             Shape::Box { center, rotate, .. } => center[axis] == 0.0 && (0..3).all(|a| a == axis || rotate[a] == 0.0),
             Shape::Plane { normal, .. } => normal[axis] == 0.0,
             Shape::Floor { .. } => axis == 1,
-            Shape::Mesh(_) => false,
+            Shape::Capsule { from, to, .. } => from[axis] == 0.0 && to[axis] == 0.0,
+            Shape::Mesh(_) | Shape::AnimatedMesh(_) => false,
         };
+        let about = |v: &[f64; 3]| (0..3).all(|a| a == axis || v[a] == 0.0);
+        let stays = thing.belt[axis] == 0.0
+            && thing.motion.as_ref().is_none_or(|m| {
+                let keys = m.keys.iter().all(|k| k.translate[axis] == 0.0 && about(&k.rotate));
+                m.velocity[axis] == 0.0 && about(&m.spin) && keys
+            });
+        let fits = fits && stays;
         if !fits {
             wrong(
                 format!("collider \"{}\".shape", thing.name),

@@ -51,6 +51,11 @@ pub fn memory(scene: &Scene, assets: &Assets) -> f64 {
             let size = if file.rotate == [0.0; 3] { size } else { [size.iter().map(|s| s * s).sum::<f64>().sqrt(); 3] };
             bytes += GridSdf::bytes(size, file.resolution, thing.thickness);
         }
+        if let Shape::AnimatedMesh(frames) = &thing.shape {
+            // Vertices, and two corners of the boxes, about one for each vertex.
+            let meshes = frames.frames.iter().filter_map(|f| assets.get(&f.path));
+            bytes += meshes.map(|mesh| mesh.vertices.len() as f64 * 160.0).sum::<f64>();
+        }
     }
     bytes
 }

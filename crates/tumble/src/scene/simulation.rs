@@ -3,7 +3,9 @@
 use super::Assets;
 use super::build::{build, plans};
 use super::cures;
+use crate::geometry::{Collider, Shape};
 use crate::world::World;
+use std::sync::Arc;
 use tumble_interface::engine::{Cure, Engine, Ledger, Stability, StepReport, UserForce, UserIntegrator};
 use tumble_interface::scene::Integrator;
 use tumble_interface::{Column, Frame, Issue, Scene, SceneError, StepError};
@@ -14,6 +16,7 @@ pub struct Simulation {
     assets: Assets,
     world: World,
     scenery: Vec<Column>,
+    colliders: Arc<Vec<Collider>>,
     warnings: Vec<String>,
     /// The failure of the last step: index and step of the system.
     failure: Option<(usize, f64)>,
@@ -23,12 +26,39 @@ impl Simulation {
     /// Builds a scene. Meshes that it names are in `assets`, by their path.
     pub fn new(scene: Scene, assets: Assets) -> Result<Self, SceneError> {
         let built = build(&scene, &assets)?;
-        Ok(Self { scene, assets, world: built.world, scenery: built.scenery, warnings: built.warnings, failure: None })
+        Ok(Self {
+            scene,
+            assets,
+            world: built.world,
+            scenery: built.scenery,
+            colliders: built.colliders,
+            warnings: built.warnings,
+            failure: None,
+        })
     }
 
     /// The scene that it was built from.
     pub fn scene(&self) -> &Scene {
         &self.scene
+    }
+
+    /// Where the moving colliders are: `translation` and `turn` of the mesh in the topology, x = turn p + translation, and
+    /// `position` of vertices that move by themselves.
+    fn places(&self, out: &mut Vec<Column>) {
+        let time = self.world.time();
+        for (thing, collider) in self.scene.collider.iter().zip(self.colliders.iter()) {
+            let mut add = |name: &str, unit, width, data: Vec<f64>| {
+                out.push(Column { object: thing.name.clone(), name: name.into(), unit, width, data: data.into() });
+            };
+            if let Shape::Animated { facets, .. } = &collider.shape {
+                add("position", "m", 3, facets.vertices(time).concat());
+            }
+            if let Some(motion) = &collider.motion {
+                let (pose, _) = motion.at(time);
+                add("translation", "m", 3, <[f64; 3]>::from(pose.shift).to_vec());
+                add("turn", "1", 4, pose.turn.row().to_vec());
+            }
+        }
     }
 
     fn system_error(&self, system: &str, message: &str) -> SceneError {
@@ -65,7 +95,11 @@ impl Engine for Simulation {
     }
 
     fn frame(&self, columns: &[&str]) -> Frame {
-        Frame { time: self.world.time(), index: self.world.frame_index(), columns: self.world.columns(columns) }
+        let mut all = self.world.columns(columns);
+        if columns.contains(&"position") {
+            self.places(&mut all);
+        }
+        Frame { time: self.world.time(), index: self.world.frame_index(), columns: all }
     }
 
     fn topology(&self) -> Vec<Column> {

@@ -3,7 +3,7 @@
 //! midpoint, and BDF2 has a history that an impact makes wrong.
 
 use crate::elements::{Block, Linear, PointPlane, forces};
-use crate::geometry::{Collider, Touch, Vector};
+use crate::geometry::{Collider, Impact, Touch, Vector};
 use crate::math::{Real, Row, row, xyz64};
 
 /// Penalty stiffness over m/h²: a resting mass sinks in by g h²/30, 0.006 mm at 240 steps a second.
@@ -13,47 +13,174 @@ const GRIP: f64 = 4.0;
 /// Speed below which friction of the implicit schemes is proportional to the speed [m/s].
 const CREEP: f64 = 1e-3;
 
-/// Moves one mass out of the solids and gives it the velocity after the impact; says whether it touched one.
+/// Impacts of one mass in one step; after the last it waits where it is for the next step.
+const BOUNCES: usize = 256;
+
+/// A step as contact sees it.
+#[derive(Debug, Clone, Copy)]
+pub struct Step {
+    /// Its start [s].
+    pub t: f64,
+    /// Its length [s].
+    pub h: f64,
+    /// Speed of approach below which nothing bounces [m/s]: what gravity gives in two steps.
+    pub resting: f64,
+}
+
+impl Step {
+    fn end(&self) -> f64 {
+        self.t + self.h
+    }
+}
+
+/// Moves one mass out of the solids and gives it the velocity after the impact; says whether it touched one. `before` is
+/// where it was when the step began, and its velocity then.
 ///
-/// Position: out along the normal; of the way made along the surface since `before` as much is taken back as friction
-/// allows, mu times the depth. Velocity: v_n -> -e v_n, and v_t loses at most mu times the change of v_n. A speed of
-/// approach below `resting` [m/s], what gravity gives in two steps, does not bounce.      (contact.2, contact.3)
-pub fn resolve(colliders: &[Collider], before: Row, x: &mut Row, v: &mut Row, resting: f64) -> bool {
-    let mut touched = false;
+/// First what it met on its way, impact by impact; then, where it ended too deep, position: out along the normal; of the
+/// way made along the surface as much is taken back as friction allows, mu times the depth. Velocity: v_n -> -e v_n, and
+/// v_t loses at most mu times the change of v_n, all relative to the surface.      (contact.2, contact.3)
+pub fn resolve(colliders: &[Collider], step: &Step, before: (Row, Row), x: &mut Row, v: &mut Row) -> bool {
+    let mut touched = meet(colliders, step, before, x, v);
     for collider in colliders {
         let (position, velocity) = (xyz64(*x), xyz64(*v));
-        let Some(Touch { depth, normal }) = collider.touch(position) else { continue };
+        let Some(Touch { depth, normal, velocity: surface }) = collider.touch(position, step.end()) else { continue };
         touched = true;
-        let way = position - xyz64(before);
+        let way = position - xyz64(before.0) - surface * step.h;
         let along = way - normal * way.dot(normal);
         let back = (collider.friction * depth).min(along.norm());
-        let position = position + normal * depth - along.normalized() * back;
-        let approach = velocity.dot(normal);
-        let slide = velocity - normal * approach;
-        let bounce = if approach < -resting { -collider.restitution * approach } else { 0.0 };
-        let after = approach.max(bounce);
-        let loss = (collider.friction * (after - approach)).min(slide.norm());
-        let velocity = slide - slide.normalized() * loss + normal * after;
+        let mut position = position + normal * depth - along.normalized() * back;
+        if collider.inside {
+            // A container bends towards what goes along its wall, and has corners.
+            for _ in 0..3 {
+                position = collider.touch(position, step.end()).map_or(position, |t| position + t.normal * t.depth);
+            }
+        }
+        let velocity = rebound(collider, velocity - surface, normal, step.resting) + surface;
         *x = row(real(position), x[3]);
         *v = row(real(velocity), 0.0);
     }
     touched
 }
 
-/// After an implicit step: a mass that came in faster than `resting` leaves with e times its speed.
-pub fn bounce(colliders: &[Collider], x: Row, before: Row, v: &mut Row, resting: f64) -> bool {
+/// The velocity after an impact, relative to the surface.                                          (contact.3)
+fn rebound(collider: &Collider, velocity: Vector, normal: Vector, resting: f64) -> Vector {
+    let approach = velocity.dot(normal);
+    let slide = velocity - normal * approach;
+    let bounce = if approach < -resting { -collider.restitution * approach } else { 0.0 };
+    let after = approach.max(bounce);
+    slide - limited(slide, collider.friction * (after - approach)) + normal * after
+}
+
+/// A vector, but no longer than `most`.
+fn limited(v: Vector, most: f64) -> Vector {
+    v.normalized() * most.min(v.norm())
+}
+
+/// Follows a mass through its step from impact to impact, under the acceleration that the step has found; says whether
+/// there was one. Slow contact that ends in touch is left to the pass at the end.                  (contact.12)
+fn meet(colliders: &[Collider], step: &Step, before: (Row, Row), x: &mut Row, v: &mut Row) -> bool {
+    let (mut from, mut to) = (xyz64(before.0), xyz64(*x));
+    let (mut start, mut end) = (xyz64(before.1), xyz64(*v));
+    let pull = (end - start) * (1.0 / step.h);
+    let mut gone = 0.0;
+    let mut touched = false;
+    for bounce in 0..BOUNCES {
+        let left = step.h - gone;
+        let mut first: Option<(Impact, &Collider)> = None;
+        for collider in colliders {
+            let Some(hit) = collider.sweep(from, to, step.t + gone, step.end()) else { continue };
+            let speeds = [start + (end - start) * hit.part, (to - from) * (1.0 / left), end];
+            let approach = speeds.map(|v| (v - hit.velocity).dot(hit.normal)).into_iter().fold(f64::INFINITY, f64::min);
+            let stays = || collider.touch(to, step.end()).is_some_and(|t| t.normal.dot(hit.normal) > 0.0);
+            if first.as_ref().is_none_or(|(f, _)| hit.part < f.part) && (approach < -step.resting || !stays()) {
+                first = Some((hit, collider));
+            }
+        }
+        let Some((hit, collider)) = first else { break };
+        touched = true;
+        let (n, surface) = (hit.normal, hit.velocity);
+        let bend = pull * (0.5 * left * left);
+        let s = on_parabola(hit.part, ((to - from) - surface * left).dot(n), bend.dot(n));
+        from = from + (to - from) * s - bend * (s * (1.0 - s));
+        gone += left * s;
+        start = rebound(collider, start + pull * (left * s) - surface, n, step.resting);
+        let rest = step.h - gone;
+        let (press, lift) = (pull.dot(n), start.dot(n));
+        if lift <= 0.01 * step.resting && press < 0.0 {
+            // It stays on the surface, which takes what presses, and rubs.
+            let free = start + (pull - n * press) * rest;
+            let slide = free - n * free.dot(n);
+            let after = free - limited(slide, -collider.friction * press * rest);
+            to = from + ((start + after) * 0.5 + surface) * rest;
+            (start, end) = (start + surface, after + surface);
+        } else {
+            start = start + surface;
+            to = from + start * rest + pull * (0.5 * rest * rest);
+            end = start + pull * rest;
+        }
+        if bounce + 1 == BOUNCES || rest <= 0.0 {
+            (to, end) = (from, start);
+            break;
+        }
+    }
+    if touched {
+        *x = row(real(to), x[3]);
+        *v = row(real(end), 0.0);
+    }
+    touched
+}
+
+/// When the plane that a straight way meets at `part` is met by the parabola with the same ends: the straight way changes
+/// its height by `fall` < 0, and the parabola lies lower than it by `bend` s (1 - s).
+fn on_parabola(part: f64, fall: f64, bend: f64) -> f64 {
+    // bend s² + (fall - bend) s - fall part = 0 has one root that is on the way down.
+    let (b, c) = (fall - bend, -fall * part);
+    let under = (b * b - 4.0 * bend * c).max(0.0).sqrt() - b;
+    let s = if under > 0.0 && c > 0.0 {
+        2.0 * c / under
+    } else if b > 0.0 && bend < 0.0 {
+        // It starts in touch, goes up and comes down again.
+        -b / bend
+    } else {
+        part
+    };
+    if s.is_finite() { s.clamp(0.0, 1.0) } else { part }
+}
+
+/// After an implicit step: a mass that came in faster than `resting` leaves with e times its speed. One that the penalty
+/// could not hold, deeper than gravity takes it in two steps or beyond the solid, is caught on its way.
+pub fn bounce(colliders: &[Collider], step: &Step, before: (Row, Row), x: &mut Row, v: &mut Row) -> bool {
+    let (from, to) = (xyz64(before.0), xyz64(*x));
+    for collider in colliders {
+        let deep = collider.touch(to, step.end());
+        if deep.is_some_and(|t| t.depth > collider.thickness + step.resting * step.h && t.depth < -2.0 * step.h * approach(&t, before.1)) {
+            // As if nothing had held it.
+            *v = before.1;
+            *x = row(real(from + xyz64(*v) * step.h), x[3]);
+            return resolve(colliders, step, before, x, v);
+        }
+        if let Some(hit) = collider.sweep(from, to, step.t, step.end())
+            && !deep.is_some_and(|t| t.normal.dot(hit.normal) > 0.0)
+        {
+            return resolve(colliders, step, before, x, v);
+        }
+    }
     let mut touched = false;
     for collider in colliders.iter().filter(|c| c.restitution > 0.0) {
-        let Some(Touch { normal, .. }) = collider.touch(xyz64(x)) else { continue };
-        let approach = xyz64(before).dot(normal);
-        let wanted = -collider.restitution * approach;
-        let velocity = xyz64(*v);
-        if approach < -resting && velocity.dot(normal) < wanted {
+        let Some(touch) = collider.touch(xyz64(*x), step.end()) else { continue };
+        let approach = approach(&touch, before.1);
+        let (normal, velocity) = (touch.normal, xyz64(*v));
+        let wanted = touch.velocity.dot(normal) - collider.restitution * approach;
+        if approach < -step.resting && velocity.dot(normal) < wanted {
             *v = row(real(velocity + normal * (wanted - velocity.dot(normal))), 0.0);
             touched = true;
         }
     }
     touched
+}
+
+fn approach(touch: &Touch, v: Row) -> f64 {
+    (xyz64(v) - touch.velocity).dot(touch.normal)
 }
 
 /// Penalty stiffness [N/m] of a mass [kg] that its links hold with `grip` [N/m], in a stage of length gh.   (contact.6)
@@ -75,17 +202,20 @@ impl Penalty {
     /// The contacts of a mass at x with velocity v, with this penalty stiffness [N/m]. Friction takes its normal force from
     /// `start`, where the mass was when the stage began: with that force held fixed friction has a convex potential, and
     /// Newton's method converges.
-    pub fn of(colliders: &[Collider], stiffness: f64, x: Row, v: Row, start: Row) -> impl Iterator<Item = Penalty> {
+    ///
+    /// `times` are those of the start and of the end of the stage.
+    pub fn of(colliders: &[Collider], times: (f64, f64), stiffness: f64, x: Row, v: Row, start: Row) -> impl Iterator<Item = Penalty> {
         colliders.iter().filter_map(move |collider| {
-            let (position, velocity) = (xyz64(x), xyz64(v));
-            let touch = collider.touch(position)?;
+            let position = xyz64(x);
+            let touch = collider.touch(position, times.1)?;
+            let velocity = xyz64(v) - touch.velocity;
             let n = touch.normal;
             Some(Penalty {
                 rest: [n.x, n.y, n.z, n.dot(position) + touch.depth],
                 stiffness,
                 friction: collider.friction
                     * stiffness
-                    * if collider.friction > 0.0 { collider.touch(xyz64(start)).map_or(0.0, |t| t.depth) } else { 0.0 },
+                    * if collider.friction > 0.0 { collider.touch(xyz64(start), times.0).map_or(0.0, |t| t.depth) } else { 0.0 },
                 slide: velocity - n * velocity.dot(n),
                 touch,
             })

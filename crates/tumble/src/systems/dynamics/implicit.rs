@@ -89,7 +89,7 @@ impl Implicit {
             }
             let touching = if colliders.is_empty() { start } else { end.min(masses.points) };
             for i in start..touching {
-                for touch in Penalty::of(colliders, contact::stiffness(masses.mass[i], grip[i], gh), x[i], v[i], start_x[i]) {
+                for touch in Penalty::of(colliders, (t - gh, t), contact::stiffness(masses.mass[i], grip[i], gh), x[i], v[i], start_x[i]) {
                     add_block(&mut local[i - start], touch.matrix(gh), 1.0);
                 }
             }
@@ -171,7 +171,9 @@ impl Stiff for Laws {
             for (k, f) in out.iter_mut().enumerate() {
                 let i = start + k;
                 if i < masses.points && masses.inverse[i] > 0.0 {
-                    for touch in Penalty::of(colliders, contact::stiffness(masses.mass[i], grip[i], gh), x[i], v[i], start_x[i]) {
+                    for touch in
+                        Penalty::of(colliders, (t - gh, t), contact::stiffness(masses.mass[i], grip[i], gh), x[i], v[i], start_x[i])
+                    {
                         let push = touch.force(x[i]);
                         *f = [f[0] + push.x as Real, f[1] + push.y as Real, f[2] + push.z as Real, 0.0];
                     }

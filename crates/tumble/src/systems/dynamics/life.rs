@@ -93,7 +93,10 @@ impl Dynamics {
         let mut x: Vec<Row> = births.iter().zip(&masses.inverse).map(|(b, w)| row(b.x, *w)).collect();
         let mut v: Vec<Row> = births.iter().map(|b| row(b.v, 0.0)).collect();
         let (laws, colliders, resting) = (&self.laws, &self.laws.colliders[..], self.resting_speed(h));
-        let touch = |before: Row, x: &mut Row, v: &mut Row| !colliders.is_empty() && contact::resolve(colliders, before, x, v, resting);
+        let touch = |t: f64, h: f64, before: (Row, Row), x: &mut Row, v: &mut Row| {
+            let step = contact::Step { t, h, resting };
+            !colliders.is_empty() && h > 0.0 && contact::resolve(colliders, &step, before, x, v)
+        };
         let scheme = if self.integrator.is_implicit() || self.integrator.is_adaptive() {
             tumble_interface::scene::Integrator::Midpoint
         } else {
@@ -111,22 +114,22 @@ impl Dynamics {
             }
             motion.rate(until - 0.5 * h, &xm, &vm, &mut a)?;
             for i in 0..n {
-                let before = x[i];
+                let before = (x[i], v[i]);
                 x[i] = axpy(x[i], tau(i), vm[i]);
                 v[i] = axpy(v[i], tau(i), a[i]);
-                touch(before, &mut x[i], &mut v[i]);
+                touch(until - f64::from(tau(i)), f64::from(tau(i)), before, &mut x[i], &mut v[i]);
             }
             let mut memory = Memory::new(scheme, n);
             let (mut ready, mut scratch) = (false, Scratch::default());
             for k in 0..more {
-                let before = x.to_vec();
+                let before: Vec<(Row, Row)> = x.iter().copied().zip(v.iter().copied()).collect();
                 let mut columns: Vec<&mut [Row]> = memory.columns.iter_mut().map(|c| &mut c[..]).collect();
                 let time = until + f64::from(k) * h;
                 let mut report = StepReport::default();
                 integrators::step(scheme, &mut motion, (time, h), (&mut *x, &mut *v), &mut columns, ready, &mut scratch, &mut report)?;
                 ready = true;
                 for i in 0..n {
-                    ready &= !touch(before[i], &mut x[i], &mut v[i]);
+                    ready &= !touch(time, h, before[i], &mut x[i], &mut v[i]);
                 }
             }
             Ok(())
@@ -177,8 +180,8 @@ impl Dynamics {
         }
         for s in 0..n {
             let colliders = &self.laws.colliders;
-            let near = |p: Vec3<f64>, distance: f64| colliders.iter().any(|c| c.shape.distance(p).0 < distance);
-            let dead = self.pool.dead(s, &self.state.x, &self.state.v, &near);
+            let near = |p: Vec3<f64>, distance: f64| colliders.iter().any(|c| c.is_near(p, t, distance));
+            let dead = self.pool.dead(s, t, &self.state.x, &self.state.v, &near);
             let is_parent = (0..n).any(|child| self.pool.parent(child) == Some(s));
             mourned.push(if is_parent { self.pool.mourn(s, &dead, (t, dt), &self.state.x, &self.state.v) } else { Vec::new() });
             if !dead.is_empty() {

@@ -173,7 +173,7 @@ impl Dynamics {
         result?;
         self.memory.ready = true;
         report.stepped(h);
-        self.after(h, report);
+        self.after(t, h, report);
         Ok(())
     }
 
@@ -187,8 +187,8 @@ impl Dynamics {
         }
     }
 
-    /// What follows a step: clamp, contact, breaking. Whatever it changes, the scheme starts anew from.
-    fn after(&mut self, h: f64, report: &mut StepReport) {
+    /// What follows a step of length h from t on: clamp, contact, breaking. Whatever it changes, the scheme starts anew from.
+    fn after(&mut self, t: f64, h: f64, report: &mut StepReport) {
         if let Some(clamp) = &mut self.clamp {
             let masses = &self.laws.masses;
             let one = |v: &[Row], i: usize| 0.5 * f64::from(masses.mass[i]) * xyz64(v[i]).norm_sq();
@@ -212,7 +212,7 @@ impl Dynamics {
             }
         }
         if !self.laws.colliders.is_empty() {
-            let resting = self.resting_speed(h);
+            let step = contact::Step { t, h, resting: self.resting_speed(h) };
             let penalty = self.laws.penalty && self.user.is_none();
             let (points, inverse) = (self.laws.masses.points, &self.laws.masses.inverse);
             let (colliders, before, before_v) = (&self.laws.colliders[..], &self.before, &self.before_v);
@@ -226,9 +226,9 @@ impl Dynamics {
                         let i = c * CHUNK + k;
                         if inverse[i] > 0.0 {
                             any |= if penalty {
-                                contact::bounce(colliders, *x, before_v[i], v, resting)
+                                contact::bounce(colliders, &step, (before[i], before_v[i]), x, v)
                             } else {
-                                contact::resolve(colliders, before[i], x, v, resting)
+                                contact::resolve(colliders, &step, (before[i], before_v[i]), x, v)
                             };
                         }
                     }
@@ -299,7 +299,7 @@ impl Dynamics {
                 let mut motion = Local { laws, masses: &laws.masses, start, newborn: None };
                 let points = motion.kinematics().points;
                 let inverse = &laws.masses.inverse[start..start + x.len()];
-                let (mut ready, mut before) = (was_ready, Vec::new());
+                let (mut ready, mut before, mut before_v) = (was_ready, Vec::new(), Vec::new());
                 for k in 0..substeps {
                     if k % 64 == 63 && !go_on() {
                         return Ok(false);
@@ -307,12 +307,16 @@ impl Dynamics {
                     if !colliders.is_empty() {
                         before.clear();
                         before.extend_from_slice(x);
+                        before_v.clear();
+                        before_v.extend_from_slice(v);
                     }
                     let time = t + f64::from(k) * h;
                     integrators::step(scheme, &mut motion, (time, h), (x, v), &mut memory, ready, scratch, &mut StepReport::default())?;
                     ready = true;
+                    let step = contact::Step { t: time, h, resting };
                     for i in 0..before.len().min(points) {
-                        if inverse[i] > 0.0 && contact::resolve(colliders, before[i], &mut x[i], &mut v[i], resting) {
+                        let was = (before[i], before_v[i]);
+                        if inverse[i] > 0.0 && contact::resolve(colliders, &step, was, &mut x[i], &mut v[i]) {
                             ready = false;
                         }
                     }
@@ -352,7 +356,7 @@ impl System for Dynamics {
             let mut done = 0.0;
             while done < dt && go_on() {
                 self.remember();
-                let left = dt - done;
+                let (begun, left) = (done, dt - done);
                 let y = (&mut self.state.x[..], &mut self.state.v[..]);
                 let times = (t + done, left, dt);
                 let taken = adaptive_step(
@@ -371,7 +375,7 @@ impl System for Dynamics {
                 report.stepped(h);
                 // The step's length is known only now.
                 self.pull_tethers(h, exchange);
-                self.after(h, &mut report);
+                self.after(t + begun, h, &mut report);
                 self.deliver(&mut unborn, t + done, h, end)?;
                 self.look(t + done)?;
             }
