@@ -7,10 +7,12 @@ mod shapes;
 mod structures;
 mod systems;
 
-pub use forces::{Anchor, Field, Force};
+pub use forces::{Anchor, Field, Force, Goal};
 pub use output::{Camera, Expect, Output, Probe};
 pub use shapes::{Collider, MeshFile, Shape};
-pub use structures::{Block, Diagonals, Link, LinkSettings, Links, Material, Net, Particles, Pin, Region, Rod, Rope, Sheet, Spring};
+pub use structures::{
+    Block, Cloud, CloudShape, Diagonals, Link, LinkSettings, Links, Material, Net, Particles, Pin, Region, Rod, Rope, Sheet, Spring,
+};
 pub use systems::{Adaptive, Hessian, Integrator, Linear, Method, OnFailure, Solver, System};
 
 use crate::check::check;
@@ -29,7 +31,7 @@ pub struct Scene {
     /// One line for people.
     #[serde(default)]
     pub title: String,
-    /// Seed of every random number; no method draws one yet.
+    /// Seed of every random number.
     #[serde(default)]
     pub seed: u32,
     /// Scalar type of the engine.

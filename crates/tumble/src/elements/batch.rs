@@ -37,6 +37,10 @@ pub trait Batch: Send + Sync {
     fn is_elastic(&self) -> bool {
         true
     }
+    /// For a force that drives: the energy up to which it may bring the masses [J]. Energy then does not have to come from anywhere.
+    fn drives(&self) -> Option<f64> {
+        None
+    }
     /// Prepares the forces at (x, v): what has to be known of all elements before rows can be summed.
     fn begin_forces(&mut self, _x: &[Row], _v: &[Row]) {}
     /// Adds the forces [N] and torques [N m], internal damping included, on the rows from `start` on, a multiple of CHUNK.

@@ -1,14 +1,28 @@
-//! L3: forces that act on each mass by itself, and velocity fields. One file per law.
+//! L3: forces that act on each mass by itself or between masses, and velocity fields. One file per law.
 
 mod attraction;
+mod cohesion;
 mod drag;
 mod field;
+mod flock;
 mod gravitation;
+mod lennard_jones;
+mod near;
+mod repulsion;
+mod row_list;
+mod viscosity;
 
 pub use attraction::Attraction;
+pub use cohesion::Cohesion;
 pub use drag::Drag;
 pub use field::Flow;
+pub use flock::{Flock, Goal, Habits};
 pub use gravitation::Gravitation;
+pub use lennard_jones::LennardJones;
+pub use near::{Near, PairLaw};
+pub use repulsion::Repulsion;
+use row_list::Rows;
+pub use viscosity::Viscosity;
 
 use crate::elements::Block;
 use crate::math::rows::{self, Each};

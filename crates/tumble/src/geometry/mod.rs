@@ -2,12 +2,14 @@
 
 pub mod bvh;
 pub mod contact;
+pub mod neighbours;
 pub mod sdf;
 pub mod shape;
 pub mod surface;
 
 pub use bvh::Bvh;
 pub use contact::{Collider, Touch};
+pub use neighbours::{Meet, Neighbours};
 pub use sdf::GridSdf;
 pub use shape::Shape;
 

@@ -15,7 +15,7 @@ mod sheet;
 
 pub use block::block;
 pub use net::net;
-pub use particles::{Tracer, particles, tracers};
+pub use particles::{Tracer, draw_cloud, particles, tracers};
 pub use rope::rope;
 pub use scenery::{placed, scenery, solid};
 pub use sheet::sheet;

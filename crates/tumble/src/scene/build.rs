@@ -1,7 +1,7 @@
 //! Fills systems with objects, forces, solids and anchors.
 
 use super::Assets;
-use super::checks::{check, objects, place, targets};
+use super::checks::{check, objects, others, place, targets};
 use super::memory::memory;
 use crate::exchange::Exchange;
 use crate::forces::{Acceleration, Attraction, Drag, Flow, Force};
@@ -12,6 +12,7 @@ use crate::system::System;
 use crate::systems::dynamics::{Dynamics, Parts, Settings, SpringPart, Stepping, Tether};
 use crate::systems::tracers::{self, Tracers};
 use crate::world::World;
+use std::borrow::Cow;
 use std::sync::Arc;
 use tumble_interface::scene::{Anchor, Force as Words, Method, Plane, Scene, System as Plan};
 use tumble_interface::{Column, Data, Issue, Mesh, SceneError};
@@ -39,6 +40,8 @@ pub fn build(scene: &Scene, assets: &Assets) -> Result<Built, SceneError> {
         issues.push(Issue::new("world.memory_limit", message));
         return Err(SceneError { issues });
     }
+    let drawn = with_clouds(scene);
+    let scene = &*drawn;
     let mut warnings = unused(scene, &plans);
     let (colliders, scenery) = solids(scene, assets, &mut issues);
     let mut parts = fill(scene, &plans, assets, &mut issues);
@@ -96,6 +99,16 @@ pub fn build(scene: &Scene, assets: &Assets) -> Result<Built, SceneError> {
         warnings.push(format!("masses start up to {deep:.3} m inside a collider, and will be thrown out of it; move one of them"));
     }
     Ok(Built { world, scenery, warnings })
+}
+
+/// The scene with the masses of its clouds drawn.
+fn with_clouds(scene: &Scene) -> Cow<'_, Scene> {
+    if scene.particles.iter().all(|thing| thing.cloud.is_none()) {
+        return Cow::Borrowed(scene);
+    }
+    let mut scene = scene.clone();
+    scene.particles.iter_mut().for_each(|thing| recipes::draw_cloud(thing, scene.seed));
+    Cow::Owned(scene)
 }
 
 /// The issues of objects, at their places in the scene.
@@ -208,12 +221,19 @@ fn fill(scene: &Scene, plans: &[Plan], assets: &Assets, issues: &mut Vec<Issue>)
 fn act(scene: &Scene, parts: &mut [Parts]) {
     for force in &scene.force {
         for parts in &mut *parts {
-            let on = |name: &str| targets(force).is_none_or(|on| on.iter().any(|o| o == name));
-            let rows: Vec<_> = parts.ranges().filter(|(name, range)| on(name) && !range.is_empty()).map(|(_, range)| range).collect();
+            let others = others(force);
+            let other = |name: &str| others.is_some_and(|(_, others)| others.iter().any(|o| o == name));
+            // A flock without a list are all but its predators.
+            let spared = |name: &str| matches!(force, Words::Flock { .. }) && other(name);
+            let on = |name: &str| targets(force).map_or(!spared(name), |on| on.iter().any(|o| o == name));
+            let rows = |of: &dyn Fn(&str) -> bool| -> Vec<_> {
+                parts.ranges().filter(|(name, range)| of(name) && !range.is_empty()).map(|(_, range)| range).collect()
+            };
+            let (on, others) = (rows(&on), others.map(|_| rows(&other)));
             match law(force) {
-                _ if rows.is_empty() => {}
-                Some(law) => parts.forces.push((law, rows)),
-                None => parts.between.push((force.clone(), rows)),
+                _ if on.is_empty() => {}
+                Some(law) => parts.forces.push((law, on)),
+                None => parts.between.push((force.clone(), on, others)),
             }
         }
     }
@@ -225,7 +245,12 @@ fn law(force: &Words) -> Option<Box<dyn Force>> {
         Words::Drag { coefficient, rate, .. } => Box::new(Drag { coefficient, rate }),
         Words::Attraction { center, gm, .. } => Box::new(Attraction { center: center.into(), gm }),
         Words::Acceleration { value, .. } => Box::new(Acceleration(value)),
-        Words::Gravitation { .. } => return None,
+        Words::Gravitation { .. }
+        | Words::LennardJones { .. }
+        | Words::Repulsion { .. }
+        | Words::Cohesion { .. }
+        | Words::Viscosity { .. }
+        | Words::Flock { .. } => return None,
     })
 }
 

@@ -52,6 +52,14 @@ pub fn check(scene: &Scene, systems: &[System]) -> Vec<Issue> {
             );
         }
     }
+    for thing in &scene.particles {
+        let message = match (thing.position.is_empty(), thing.cloud.is_some()) {
+            (true, false) => "missing, expected positions or a cloud",
+            (false, true) => "given beside cloud; leave out one of them",
+            _ => continue,
+        };
+        wrong(format!("particles \"{}\".position", thing.name), message.into());
+    }
     for anchor in &scene.anchor {
         let path = format!("anchor \"{}\"", anchor.name);
         if objects.iter().any(|(_, name, _)| *name == anchor.name) {
@@ -79,13 +87,20 @@ pub fn check(scene: &Scene, systems: &[System]) -> Vec<Issue> {
         }
     }
     for (i, force) in scene.force.iter().enumerate() {
-        for on in targets(force).into_iter().flatten() {
+        let (key, others) = others(force).unwrap_or(("", &[]));
+        let on = targets(force).into_iter().flatten().map(|on| ("on", on));
+        for (key, on) in on.chain(others.iter().map(|other| (key, other))) {
             if !objects.iter().any(|(_, name, _)| name == on) {
                 let hint = suggestion(on, objects.iter().map(|o| o.1));
-                wrong(format!("force[{i}].on"), format!("there is no object \"{on}\"{hint}"));
+                wrong(format!("force[{i}].{key}"), format!("there is no object \"{on}\"{hint}"));
             } else if objects.iter().any(|(kind, name, system)| name == on && tracers(systems, kind, *system)) {
-                wrong(format!("force[{i}].on"), format!("\"{on}\" are tracers, which feel no force; put them into a dynamics system"));
+                wrong(format!("force[{i}].{key}"), format!("\"{on}\" are tracers, which feel no force; put them into a dynamics system"));
             }
+        }
+        if let Force::Flock { predators, on: Some(on), .. } = force
+            && let Some(both) = predators.iter().find(|p| on.contains(p))
+        {
+            wrong(format!("force[{i}].predators"), format!("\"{both}\" is in `on`, too; a predator is no prey of its own"));
         }
     }
     for (i, field) in scene.field.iter().enumerate() {
@@ -127,9 +142,26 @@ fn tracers(systems: &[System], kind: &str, named: Option<&str>) -> bool {
 /// The objects that a force names.
 pub fn targets(force: &Force) -> Option<&Vec<String>> {
     match force {
-        Force::Drag { on, .. } | Force::Attraction { on, .. } | Force::Gravitation { on, .. } | Force::Acceleration { on, .. } => {
-            on.as_ref()
+        Force::Drag { on, .. }
+        | Force::Attraction { on, .. }
+        | Force::Gravitation { on, .. }
+        | Force::LennardJones { on, .. }
+        | Force::Repulsion { on, .. }
+        | Force::Cohesion { on, .. }
+        | Force::Viscosity { on, .. }
+        | Force::Flock { on, .. }
+        | Force::Acceleration { on, .. } => on.as_ref(),
+    }
+}
+
+/// The objects that a force names beside its targets, with the word for them.
+pub fn others(force: &Force) -> Option<(&'static str, &[String])> {
+    match force {
+        Force::LennardJones { from, .. } | Force::Repulsion { from, .. } | Force::Cohesion { from, .. } | Force::Viscosity { from, .. } => {
+            from.as_deref().map(|from| ("from", from))
         }
+        Force::Flock { predators, .. } => Some(("predators", predators)),
+        _ => None,
     }
 }
 
@@ -157,6 +189,14 @@ fn check_system(system: &System, path: &str, wrong: &mut impl FnMut(String, Stri
 fn check_plane(scene: &Scene, wrong: &mut impl FnMut(String, String)) {
     let (axis, name) = if scene.plane == Plane::Xz { (1, "y") } else { (2, "z") };
     for thing in &scene.particles {
+        for (key, p) in thing.cloud.iter().flat_map(|c| [("center", c.center), ("size", c.size)]) {
+            if p[axis] != 0.0 {
+                wrong(
+                    format!("particles \"{}\".cloud.{key}", thing.name),
+                    format!("{name} = {}, expected 0 in a scene of dimension 2", p[axis]),
+                );
+            }
+        }
         for (key, list) in [("position", &thing.position), ("velocity", &thing.velocity)] {
             if let Some(i) = list.iter().position(|p| p[axis] != 0.0) {
                 wrong(

@@ -4,10 +4,10 @@ use super::{Dynamics, Stepping, books};
 use crate::elements::{
     BendTwist, Distance, Element, Elements, Hinge, Linear, Members, Nonlinear, Pairs, StretchShear, TetShear, TetStrain, TetVolume, Vector,
 };
-use crate::forces::{Force, Gravitation};
+use crate::forces::{Cohesion, Flock, Force, Goal, Gravitation, Habits, LennardJones, Near, Repulsion, Viscosity};
 use crate::geometry::Collider;
 use crate::integrators::Memory;
-use crate::math::{Real, Vec3};
+use crate::math::{Real, Vec3, functions};
 use crate::state::{Masses, Object, State};
 use std::ops::Range;
 use std::sync::Arc;
@@ -90,8 +90,8 @@ pub struct Parts {
     objects: Vec<Draft>,
     /// Forces on each mass by itself, with the rows that they act on.
     pub forces: Vec<(Box<dyn Force>, Vec<Range<usize>>)>,
-    /// Forces between all masses of some rows.
-    pub between: Vec<(Words, Vec<Range<usize>>)>,
+    /// Forces between masses of some rows, and the other rows that the words name.
+    pub between: Vec<(Words, Vec<Range<usize>>, Option<Vec<Range<usize>>>)>,
 }
 
 /// An object and how many links of each kind there were before it.
@@ -334,10 +334,8 @@ impl Parts {
                 objects.push(object);
             }
         }
-        for (words, ranges) in self.between {
-            if let Words::Gravitation { constant, softening, .. } = words {
-                batches.list.push(Box::new(Gravitation::new(ranges, &masses.mass, constant, softening)));
-            }
+        for (words, on, others) in self.between {
+            batches.list.extend(between(words, on, others, &masses, &settings.colliders));
         }
         let mut stiffness = vec![[0.0; 6]; rows];
         for batch in &mut batches.list {
@@ -381,6 +379,71 @@ impl Parts {
         system.set_scale();
         Ok(system)
     }
+}
+
+/// The batch of a force between masses.
+fn between(
+    words: Words,
+    on: Vec<Range<usize>>,
+    others: Option<Vec<Range<usize>>>,
+    masses: &Masses,
+    colliders: &Arc<Vec<Collider>>,
+) -> Option<Box<dyn crate::elements::Batch>> {
+    Some(match words {
+        Words::Gravitation { constant, softening, .. } => Box::new(Gravitation::new(on, &masses.mass, constant, softening)),
+        Words::LennardJones { epsilon, sigma, cutoff, smooth, .. } => {
+            Box::new(Near::new(LennardJones::new(epsilon, sigma, cutoff.unwrap_or(2.5 * sigma), smooth), on, others))
+        }
+        Words::Repulsion { stiffness, distance, exponent, .. } => {
+            Box::new(Near::new(Repulsion { stiffness, distance, exponent }, on, others))
+        }
+        Words::Cohesion { strength, radius, .. } => Box::new(Near::new(Cohesion { strength, radius }, on, others)),
+        Words::Viscosity { coefficient, radius, central, .. } => {
+            Box::new(Near::new(Viscosity { coefficient, radius, central }, on, others))
+        }
+        Words::Flock {
+            radius,
+            nearest,
+            view,
+            cohesion,
+            alignment,
+            separation,
+            spacing,
+            speed,
+            propulsion,
+            max_acceleration,
+            goal,
+            avoidance,
+            clearance,
+            fear,
+            fear_radius,
+            chase,
+            predator_speed,
+            ..
+        } => {
+            let habits = Habits {
+                radius,
+                nearest: nearest.unwrap_or(0) as usize,
+                view: if view < 360.0 { functions::cos((0.5 * view).to_radians()) } else { -2.0 },
+                cohesion,
+                alignment,
+                separation,
+                spacing: spacing.unwrap_or(0.5 * radius),
+                speed,
+                propulsion,
+                limit: max_acceleration.unwrap_or(0.0),
+                goals: goal.into_iter().map(|g| Goal { point: g.point.into(), strength: g.strength }).collect(),
+                avoidance,
+                clearance: clearance.unwrap_or(radius),
+                fear,
+                fear_radius: fear_radius.unwrap_or(3.0 * radius),
+                chase,
+                predator_speed: predator_speed.unwrap_or(speed),
+            };
+            Box::new(Flock::new(habits, on, others.unwrap_or_default(), masses, colliders.clone()))
+        }
+        Words::Drag { .. } | Words::Attraction { .. } | Words::Acceleration { .. } => return None,
+    })
 }
 
 /// Batches in the order in which they act.
