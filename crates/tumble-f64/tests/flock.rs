@@ -194,3 +194,25 @@ fn integrators_agree_on_a_flock() {
         assert!((ratio.log2() - f64::from(order)).abs() < 0.35, "{scheme}: {ratio}");
     }
 }
+
+/// The order of the model of Vicsek falls with the noise as published: 40 points in a square of 3.1 m (../shared/validation).
+#[test]
+fn order_falls_with_noise_as_in_vicsek() {
+    use tumble_f64::systems::vicsek::Vicsek;
+    let table =
+        [(0.5, 0.9891), (1.0, 0.9568), (1.5, 0.9041), (2.0, 0.8334), (3.0, 0.6475), (4.0, 0.417), (5.0, 0.197), (std::f64::consts::TAU, 0.1406)];
+    for (noise, published) in table {
+        let mean = |seed: u32| {
+            let mut flock = Vicsek::new(seed, 40, 3.1, 1.0, 0.03, noise);
+            (0..1000).for_each(|_| flock.step());
+            let steps = 12_000;
+            (0..steps).map(|_| (flock.step(), flock.order()).1).sum::<f64>() / f64::from(steps)
+        };
+        let seeds = [mean(1), mean(2), mean(3)];
+        let average = seeds.iter().sum::<f64>() / 3.0;
+        let scatter = seeds.iter().map(|m| (m - average).abs()).fold(0.0, f64::max);
+        println!("noise {noise:.2}: order {average:.4}, published {published}, scatter {scatter:.4}");
+        // The table has four digits of a mean over three seeds, too.
+        assert!((average - published).abs() < 3.0 * scatter + 0.003 && scatter < 0.03, "{noise}: {average} {published} {scatter}");
+    }
+}

@@ -133,7 +133,7 @@ pub enum Force {
         nearest: Option<u32>,
         /// Field of view around the direction of motion; 360 sees all around.
         #[serde(default = "full_turn")]
-        #[schemars(range(min = 1.0, max = 360.0), extend("x-unit" = "deg"))]
+        #[schemars(range(min = 1.0, max = 360.0), extend("x-unit" = "°"))]
         view: f64,
         /// Towards the centre of the neighbours, per metre of the way.
         #[serde(default)]

@@ -9,7 +9,7 @@ use crate::math::Lane;
 ///
 /// Below a fifth of sigma it goes on as the parabola in r with the same slope: finite everywhere.
 ///
-/// Source: [lennard-jones1931]; the shift is [allen2017], section 5.2.2.
+/// Source: [lennardjones1931]; the shift is [allen2017], section 5.2.2.
 #[derive(Debug, Clone, Copy)]
 pub struct LennardJones {
     epsilon: f64,
