@@ -161,7 +161,9 @@ def main():
     small = check_tumble(*start(2000))
     x, v = start(N)
     seconds, velocity = bench_tumble(x, v)
-    show("flock", "tumble", seconds, "s", f"{N} boids a step; accelerations of 2000 differ from all pairs by {small:.1e}")
+    show(
+        "flock", "tumble", seconds, "s", f"{N} boids a step; accelerations of 2000 differ from all pairs by {small:.1e}"
+    )
     seconds, other = bench_numba(x, v)
     off = np.abs(velocity - other).max() / np.abs(other).max()
     show("flock", "numba", seconds, "s", f"fused, velocities differ by {off:.1e}")

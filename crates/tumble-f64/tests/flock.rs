@@ -199,8 +199,16 @@ fn integrators_agree_on_a_flock() {
 #[test]
 fn order_falls_with_noise_as_in_vicsek() {
     use tumble_f64::systems::vicsek::Vicsek;
-    let table =
-        [(0.5, 0.9891), (1.0, 0.9568), (1.5, 0.9041), (2.0, 0.8334), (3.0, 0.6475), (4.0, 0.417), (5.0, 0.197), (std::f64::consts::TAU, 0.1406)];
+    let table = [
+        (0.5, 0.9891),
+        (1.0, 0.9568),
+        (1.5, 0.9041),
+        (2.0, 0.8334),
+        (3.0, 0.6475),
+        (4.0, 0.417),
+        (5.0, 0.197),
+        (std::f64::consts::TAU, 0.1406),
+    ];
     for (noise, published) in table {
         let mean = |seed: u32| {
             let mut flock = Vicsek::new(seed, 40, 3.1, 1.0, 0.03, noise);

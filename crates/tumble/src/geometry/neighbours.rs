@@ -131,13 +131,15 @@ impl Neighbours {
         self.sort();
         self.place.clear();
         self.place.resize(x.len(), NOWHERE);
-        (self.cells.clear(), self.start.clear());
+        self.cells.clear();
+        self.start.clear();
         let mut last = u128::MAX;
         for (place, i) in self.order.iter().enumerate() {
             self.place[*i as usize] = place as u32;
             let key = self.keys[*i as usize];
             if key != last {
-                (self.cells.push(key), self.start.push(place as u32));
+                self.cells.push(key);
+                self.start.push(place as u32);
                 last = key;
             }
         }
