@@ -1,7 +1,7 @@
 //! The model of Vicsek: points of constant speed in a periodic square, each of which takes the mean direction of all within a
 //! radius, itself included, and errs.
 //!
-//!   theta_i(t + 1) = arg(sum over j of e^(i theta_j)) + eta (u - 1/2),   x_i(t + 1) = x_i(t) + speed e^(i theta_i(t))      (flocks.6)
+//!   theta_i(t + 1) = arg(sum over j of e^(i theta_j)) + eta (u - 1/2),   x_i(t + 1) = x_i(t) + speed e^(i theta_i(t + 1))  (flocks.6)
 //!
 //! u is uniform in [0, 1). Time is counted in steps: this is a map, not a differential equation, and has no integrator.
 //!
@@ -84,14 +84,14 @@ impl Vicsek {
         self.grid.sorted(|i| [x[i][0], x[i][1], cos(theta[i]) as Real, sin(theta[i]) as Real], &mut self.numbers);
         self.grid.gather(&self.law, &self.numbers, &mut self.sums);
         for i in 0..self.x.len() {
-            for (a, part) in [cos(self.theta[i]), sin(self.theta[i])].into_iter().enumerate() {
-                let moved = f64::from(self.x[i][a]) + self.speed * part;
-                self.x[i][a] = (moved - (moved / self.side).floor() * self.side) as Real;
-            }
             if let Some(place) = self.grid.place(i) {
                 let [c, s] = self.sums[place].map(f64::from);
                 let [u, ..] = self.random.uniform(i as u64, self.step, NOISE);
                 self.theta[i] = atan2(s, c) + self.noise * (u - 0.5);
+            }
+            for (a, part) in [cos(self.theta[i]), sin(self.theta[i])].into_iter().enumerate() {
+                let moved = f64::from(self.x[i][a]) + self.speed * part;
+                self.x[i][a] = (moved - (moved / self.side).floor() * self.side) as Real;
             }
         }
         self.step += 1;
