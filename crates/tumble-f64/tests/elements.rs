@@ -111,7 +111,7 @@ fn moved(case: &Case, u: &[Row], h: f64) -> Vec<Row> {
 /// Forces on all rows.
 fn forces(batch: &mut dyn Batch, x: &[Row], v: &[Row]) -> Vec<Row> {
     let mut out = vec![ZERO; x.len()];
-    batch.begin_forces(x, v);
+    batch.begin_forces(0.0, x, v);
     batch.add_forces(x, v, 0, &mut out);
     out
 }

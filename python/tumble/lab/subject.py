@@ -75,8 +75,9 @@ class Subject:
             return self.rate > 0
         things = [kind for kind in ("rope", "sheet", "block", "net", "anchor") if self.tree[kind]]
         springs = any(thing["spring"] for thing in self.tree["particles"])
-        drag = any(force["kind"] == "drag" for force in self.tree["force"])
-        return self.rate > 0 and bool(things or springs or drag)
+        hold = {"drag", "lennard_jones", "repulsion", "cohesion", "viscosity"}
+        forces = any(force["kind"] in hold for force in self.tree["force"])
+        return self.rate > 0 and bool(things or springs or forces)
 
     def world(
         self, scheme: Scheme, interval: float, frames: int, substeps: int | None = None, tolerance: float | None = None

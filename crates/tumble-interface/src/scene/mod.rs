@@ -11,10 +11,12 @@ mod systems;
 
 pub use animated::{Animated, AnimatedVector, Component, Interpolation, Keys, VectorKeys};
 pub use emitters::{Between, Burst, Emitter, Kill, Source, WhenFull};
-pub use forces::{Anchor, Field, Force};
+pub use forces::{Anchor, Field, Force, Goal};
 pub use output::{Camera, Expect, Output, Probe};
 pub use shapes::{Collider, MeshFile, MeshFrame, MeshFrames, MeshRef, Motion, Pace, Pose, Shape};
-pub use structures::{Block, Diagonals, Link, LinkSettings, Links, Material, Net, Particles, Pin, Region, Rod, Rope, Sheet, Spring};
+pub use structures::{
+    Block, Cloud, CloudShape, Diagonals, Link, LinkSettings, Links, Material, Net, Particles, Pin, Region, Rod, Rope, Sheet, Spring,
+};
 pub use systems::{Adaptive, Hessian, Integrator, Linear, Method, OnFailure, Solver, System};
 
 use crate::check::check;

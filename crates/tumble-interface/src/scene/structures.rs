@@ -14,9 +14,13 @@ pub struct Particles {
     /// System that moves it; without it, the first that can.
     #[serde(default)]
     pub system: Option<String>,
-    /// Where the masses start.
-    #[schemars(length(min = 1), extend("x-unit" = "m"))]
+    /// Where the masses start; this or `cloud`.
+    #[serde(default)]
+    #[schemars(extend("x-unit" = "m"))]
     pub position: Vec<[f64; 3]>,
+    /// Masses at random places; this or `position`.
+    #[serde(default)]
+    pub cloud: Option<Cloud>,
     /// How fast they start: one velocity each, or a single one for all.
     #[serde(default)]
     #[schemars(extend("x-unit" = "m/s"))]
@@ -46,6 +50,40 @@ pub struct Particles {
     /// Red, green and blue in pictures, 0 to 1, in linear light (a half is sRGB's 188 of 255).
     #[serde(default)]
     pub color: Option<[f64; 3]>,
+}
+
+/// Masses at random places, the same for the same seed and name.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Cloud {
+    /// How many.
+    #[schemars(range(min = 1, max = 100_000_000))]
+    pub count: u32,
+    /// The middle.
+    #[serde(default)]
+    #[schemars(extend("x-unit" = "m"))]
+    pub center: [f64; 3],
+    /// Edges of the box, or diameters of the sphere; zero along one axis makes it flat.
+    #[schemars(inner(range(min = 0.0)), extend("x-unit" = "m"))]
+    pub size: [f64; 3],
+    /// What is filled.
+    #[serde(default)]
+    pub shape: CloudShape,
+    /// Speed into directions drawn at random, in the plane of a flat cloud; it adds to `velocity`.
+    #[serde(default)]
+    #[schemars(range(min = 0.0), extend("x-unit" = "m/s"))]
+    pub speed: f64,
+}
+
+/// What a cloud fills.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum CloudShape {
+    /// A box.
+    #[default]
+    Box,
+    /// A ball, or what a ball becomes with three different diameters.
+    Sphere,
 }
 
 /// A spring between two masses of one object.

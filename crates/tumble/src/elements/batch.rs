@@ -37,10 +37,14 @@ pub trait Batch: Send + Sync {
     fn is_elastic(&self) -> bool {
         true
     }
-    /// The rows of the objects that it acts between, and what they weigh, have changed.
-    fn renew(&mut self, _ranges: Vec<Range<usize>>, _masses: &crate::state::Masses) {}
-    /// Prepares the forces at (x, v): what has to be known of all elements before rows can be summed.
-    fn begin_forces(&mut self, _x: &[Row], _v: &[Row]) {}
+    /// For a force that drives: the energy up to which it may bring the masses [J]. Energy then does not have to come from anywhere.
+    fn drives(&self) -> Option<f64> {
+        None
+    }
+    /// The rows of the objects that it acts between have changed, those of the others that it names, and what they weigh.
+    fn renew(&mut self, _on: Vec<Range<usize>>, _others: Option<Vec<Range<usize>>>, _masses: &crate::state::Masses) {}
+    /// Prepares the forces at (t, x, v): what has to be known of all elements before rows can be summed.
+    fn begin_forces(&mut self, _t: f64, _x: &[Row], _v: &[Row]) {}
     /// Adds the forces [N] and torques [N m], internal damping included, on the rows from `start` on, a multiple of CHUNK.
     /// x and v are those of all rows, as begun with.
     fn add_forces(&self, x: &[Row], v: &[Row], start: usize, force: &mut [Row]);
@@ -219,7 +223,7 @@ impl<E: Element<N, M, D>, Y: Law<P>, const N: usize, const M: usize, const D: us
         self.list.energy(x) - self.energy_at_rest
     }
 
-    fn begin_forces(&mut self, x: &[Row], v: &[Row]) {
+    fn begin_forces(&mut self, _t: f64, x: &[Row], v: &[Row]) {
         self.list.check(&[x, v]);
         let v = self.list.damped.then_some(v);
         self.fill(|list, range, slots| dispatch(Forces { list, range, x, v, slots }));

@@ -341,7 +341,7 @@ impl<E: Pair<M, D>, Y: Law<P>, const M: usize, const D: usize, const P: usize> B
         self.list.energy(x)
     }
 
-    fn begin_forces(&mut self, x: &[Row], v: &[Row]) {
+    fn begin_forces(&mut self, _t: f64, x: &[Row], v: &[Row]) {
         self.list.check(&[x, v]);
         self.lists.fill(&mut self.columns[0], x);
         if self.list.damped {

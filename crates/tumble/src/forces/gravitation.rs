@@ -233,7 +233,7 @@ impl Batch for Gravitation {
         false
     }
 
-    fn begin_forces(&mut self, x: &[Row], _v: &[Row]) {
+    fn begin_forces(&mut self, _t: f64, x: &[Row], _v: &[Row]) {
         self.positions.fill(&self.ranges, x);
     }
 
@@ -348,7 +348,7 @@ mod tests {
             let mut law = Gravitation::new(vec![0..3], &[1.0, 2.0, 1.0], 1.0, softening);
             let x = [[1.0, 2.0, 3.0, 0.0], [1.0, 2.0, 3.0, 0.0], [1.0, 2.0, 4.0, 0.0]];
             let mut f = [[0.0; 4]; 3];
-            law.begin_forces(&x, &x);
+            law.begin_forces(0.0, &x, &x);
             law.add_forces(&x, &x, 0, &mut f);
             let pull = (1.0 + (softening * softening) as Real).powf(-1.5);
             assert!((f[0][2] - pull).abs() < 1e-6 && (f[1][2] - 2.0 * pull).abs() < 1e-6 && f[0][0] == 0.0, "{f:?}");

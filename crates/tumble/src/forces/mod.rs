@@ -1,25 +1,39 @@
-//! L3: forces that act on each mass by itself, and velocity fields. One file per law.
+//! L3: forces that act on each mass by itself or between masses, and velocity fields. One file per law.
 
 mod acceleration;
 mod attraction;
+mod cohesion;
 mod drag;
 mod field;
+mod flock;
 mod gravitation;
+mod lennard_jones;
 mod magnetic;
+mod near;
 mod propulsion;
 mod push;
+mod repulsion;
+mod row_list;
 mod turbulence;
+mod viscosity;
 mod vortex;
 mod wind;
 
 pub use acceleration::Acceleration;
 pub use attraction::Attraction;
+pub use cohesion::Cohesion;
 pub use drag::Drag;
 pub use field::{Current, Flow};
+pub use flock::{Flock, Goal, Habits};
 pub use gravitation::Gravitation;
+pub use lennard_jones::LennardJones;
 pub use magnetic::{Electric, Magnetic};
+pub use near::{Near, PairLaw};
 pub use propulsion::Propulsion;
+pub use repulsion::Repulsion;
+use row_list::Rows;
 pub use turbulence::Turbulence;
+pub use viscosity::Viscosity;
 pub use vortex::{Vortex, Whirl};
 pub use wind::Wind;
 

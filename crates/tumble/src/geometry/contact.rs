@@ -71,11 +71,13 @@ impl Collider {
         })
     }
 
-    /// Whether a point is nearer to the solid than a distance [m], or in it.
-    pub fn is_near(&self, p: Vector, t: f64, distance: f64) -> bool {
-        let local = self.at(t).map_or(p, |(pose, _)| pose.back(p));
-        let far = self.shape.near(local, t, distance).0;
-        (if self.inside { -far } else { far }) < distance
+    /// Distance [m] of a point from where masses may not be, negative inside, and the direction away from it; of no more than a
+    /// lower bound beyond `within` [m].
+    pub fn distance(&self, p: Vector, t: f64, within: f64) -> (f64, Vector) {
+        let place = self.at(t);
+        let (distance, normal, _) = self.shape.near(place.map_or(p, |(pose, _)| pose.back(p)), t, within);
+        let normal = place.map_or(normal, |(pose, _)| pose.turn.turn(normal));
+        if self.inside { (-distance, -normal) } else { (distance, normal) }
     }
 
     /// Where a mass first meets the solid that goes straight from `from` at time t0 to `to` at t1. One that starts in

@@ -176,8 +176,8 @@ impl Emitter {
             return true;
         }
         self.kill.iter().any(|rule| match rule {
-            Kill::Inside(solid) => solid.is_near(xyz64(x), t, 0.0),
-            Kill::Outside(solid) => !solid.is_near(xyz64(x), t, 0.0),
+            Kill::Inside(solid) => solid.distance(xyz64(x), t, 0.0).0 < 0.0,
+            Kill::Outside(solid) => solid.distance(xyz64(x), t, 0.0).0 > 0.0,
             Kill::NearCollider(distance) => near(xyz64(x), *distance),
             Kill::SlowerThan(speed) => xyz64(v).norm_sq() < speed * speed,
             Kill::FasterThan(speed) => xyz64(v).norm_sq() > speed * speed,

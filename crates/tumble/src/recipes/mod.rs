@@ -17,7 +17,7 @@ mod sheet;
 pub use block::block;
 pub use emitter::emitter;
 pub use net::net;
-pub use particles::{Tracer, particles, tracers};
+pub use particles::{Tracer, draw_cloud, particles, tracers};
 pub use rope::rope;
 pub use scenery::{animated, placed, scenery, solid};
 pub use sheet::sheet;

@@ -3,8 +3,62 @@
 use super::Site;
 use super::pins::{Pinnable, pinned};
 use crate::geometry::Vector;
+use crate::math::Random;
+use crate::math::functions::{cos, pow, sin};
 use crate::systems::dynamics::SpringPart;
-use tumble_interface::scene::Particles;
+use tumble_interface::scene::{CloudShape, Particles};
+
+/// What the random numbers of a cloud are drawn for.
+const PLACE: u32 = 0;
+const DIRECTION: u32 = 1;
+
+/// Puts the masses of an object's cloud into its lists.
+pub fn draw_cloud(thing: &mut Particles, seed: u32) {
+    let Some(cloud) = thing.cloud.take() else { return };
+    let random = Random::new(seed, &thing.name);
+    let full: Vec<usize> = (0..3).filter(|a| cloud.size[*a] > 0.0).collect();
+    thing.position = (0..u64::from(cloud.count))
+        .map(|id| {
+            let [a, b, c, _] = random.uniform(id, 0, PLACE);
+            // In a sphere: a direction and a radius whose power, of as many dimensions as there are, is uniform.
+            let offset = match cloud.shape {
+                CloudShape::Box => [a - 0.5, b - 0.5, c - 0.5],
+                CloudShape::Sphere => {
+                    let radius = 0.5 * pow(c, 1.0 / full.len().max(1) as f64);
+                    direction(&full, a, b).map(|d| d * radius)
+                }
+            };
+            std::array::from_fn(|k| cloud.center[k] + cloud.size[k] * offset[k])
+        })
+        .collect();
+    let fits = thing.velocity.len() <= 1 || thing.velocity.len() == cloud.count as usize;
+    if cloud.speed > 0.0 && fits {
+        let given = |id: usize| thing.velocity.get(id).or(thing.velocity.first()).copied().unwrap_or_default();
+        thing.velocity = (0..cloud.count as usize)
+            .map(|id| {
+                let [a, b, ..] = random.uniform(id as u64, 0, DIRECTION);
+                let (v, d) = (given(id), direction(&full, a, b));
+                std::array::from_fn(|k| v[k] + cloud.speed * d[k])
+            })
+            .collect();
+    }
+}
+
+/// A direction from two numbers that are uniform in [0, 1): on the sphere, the circle or the line of these axes.
+fn direction(axes: &[usize], a: f64, b: f64) -> [f64; 3] {
+    let turn = std::f64::consts::TAU * a;
+    let mut d = [0.0; 3];
+    match *axes {
+        [k] => d[k] = if a < 0.5 { -1.0 } else { 1.0 },
+        [k, l] => (d[k], d[l]) = (cos(turn), sin(turn)),
+        _ => {
+            let z = 2.0 * b - 1.0;
+            let r = (1.0 - z * z).sqrt();
+            d = [r * cos(turn), r * sin(turn), z];
+        }
+    }
+    d
+}
 
 /// Adds the masses and springs.
 pub fn particles(site: &mut Site<'_>, thing: &Particles) {

@@ -1,7 +1,7 @@
 //! Fills systems with objects, forces, solids and anchors.
 
 use super::Assets;
-use super::checks::{check, objects, place};
+use super::checks::{check, objects, others, place};
 use super::laws::Reader;
 use super::memory::memory;
 use crate::exchange::Exchange;
@@ -12,6 +12,7 @@ use crate::system::System;
 use crate::systems::dynamics::{Dynamics, Parts, Settings, SpringPart, Stepping, Tether};
 use crate::systems::tracers::{self, Tracers};
 use crate::world::World;
+use std::borrow::Cow;
 use std::sync::Arc;
 use tumble_interface::scene::{Anchor, Emitter, Force as Words, MeshFile, Method, Particles, Plane, Scene, Shape, System as Plan};
 use tumble_interface::{Column, Data, Issue, Mesh, SceneError};
@@ -41,6 +42,8 @@ pub fn build(scene: &Scene, assets: &Assets) -> Result<Built, SceneError> {
         issues.push(Issue::new("world.memory_limit", message));
         return Err(SceneError { issues });
     }
+    let drawn = with_clouds(scene);
+    let scene = &*drawn;
     let mut warnings = unused(scene, &plans);
     let (colliders, scenery) = solids(scene, assets, &mut issues);
     let mut parts = fill(scene, &plans, assets, &mut issues);
@@ -99,6 +102,16 @@ pub fn build(scene: &Scene, assets: &Assets) -> Result<Built, SceneError> {
         warnings.push(format!("masses start up to {deep:.3} m inside a collider, and will be thrown out of it; move one of them"));
     }
     Ok(Built { world, scenery, colliders, warnings })
+}
+
+/// The scene with the masses of its clouds drawn.
+fn with_clouds(scene: &Scene) -> Cow<'_, Scene> {
+    if scene.particles.iter().all(|thing| thing.cloud.is_none()) {
+        return Cow::Borrowed(scene);
+    }
+    let mut scene = scene.clone();
+    scene.particles.iter_mut().for_each(|thing| recipes::draw_cloud(thing, scene.seed));
+    Cow::Owned(scene)
 }
 
 /// The issues of objects, at their places in the scene.
@@ -233,12 +246,18 @@ fn act(scene: &Scene, parts: &mut [Parts], issues: &mut Vec<Issue>) {
         // What is wrong with a force is told even where it acts on nothing.
         reader.law(&path, force);
         for parts in &mut *parts {
-            let on = |name: &str| force.on().is_none_or(|on| on.iter().any(|o| o == name));
-            let objects: Vec<usize> = parts.bodies().filter(|(_, name)| on(name)).map(|(i, _)| i).collect();
+            let others = others(force);
+            let other = |name: &str| others.is_some_and(|(_, others)| others.iter().any(|o| o == name));
+            // A flock without a list are all but its predators.
+            let spared = |name: &str| matches!(force, Words::Flock { .. }) && other(name);
+            let on = |name: &str| force.on().map_or(!spared(name), |on| on.iter().any(|o| o == name));
+            let bodies =
+                |of: &dyn Fn(&str) -> bool| -> Vec<usize> { parts.bodies().filter(|(_, name)| of(name)).map(|(i, _)| i).collect() };
+            let (on, others) = (bodies(&on), others.map(|_| bodies(&other)));
             match reader.law(&path, force) {
-                _ if objects.is_empty() => {}
-                Some(law) => parts.forces.push((law, objects)),
-                None => parts.between.push((force.clone(), objects)),
+                _ if on.is_empty() => {}
+                Some(law) => parts.forces.push((law, on)),
+                None => parts.between.push((force.clone(), on, others)),
             }
         }
     }

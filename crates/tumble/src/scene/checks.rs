@@ -4,7 +4,7 @@ use crate::systems::dynamics::MOST_SUBSTEPS;
 use std::collections::HashSet;
 use tumble_interface::Issue;
 use tumble_interface::check::suggestion;
-use tumble_interface::scene::{Integrator, Method, Plane, Scene, Shape, System};
+use tumble_interface::scene::{Force, Integrator, Method, Plane, Scene, Shape, System};
 
 /// Column names that a frame may hold.
 pub const COLUMNS: [&str; 5] = ["position", "velocity", "orientation", "angular_velocity", "link_strain"];
@@ -53,6 +53,14 @@ pub fn check(scene: &Scene, systems: &[System]) -> Vec<Issue> {
             );
         }
     }
+    for thing in &scene.particles {
+        let message = match (thing.position.is_empty(), thing.cloud.is_some()) {
+            (true, false) => "missing, expected positions or a cloud",
+            (false, true) => "given beside cloud; leave out one of them",
+            _ => continue,
+        };
+        wrong(format!("particles \"{}\".position", thing.name), message.into());
+    }
     for anchor in &scene.anchor {
         let path = format!("anchor \"{}\"", anchor.name);
         if objects.iter().any(|(_, name, _)| *name == anchor.name) {
@@ -80,13 +88,20 @@ pub fn check(scene: &Scene, systems: &[System]) -> Vec<Issue> {
         }
     }
     for (i, force) in scene.force.iter().enumerate() {
-        for on in force.on().into_iter().flatten() {
+        let (key, others) = others(force).unwrap_or(("", &[]));
+        let on = force.on().into_iter().flatten().map(|on| ("on", on));
+        for (key, on) in on.chain(others.iter().map(|other| (key, other))) {
             if !objects.iter().any(|(_, name, _)| name == on) {
                 let hint = suggestion(on, objects.iter().map(|o| o.1));
-                wrong(format!("force[{i}].on"), format!("there is no object \"{on}\"{hint}"));
+                wrong(format!("force[{i}].{key}"), format!("there is no object \"{on}\"{hint}"));
             } else if objects.iter().any(|(kind, name, system)| name == on && tracers(systems, kind, *system)) {
-                wrong(format!("force[{i}].on"), format!("\"{on}\" are tracers, which feel no force; put them into a dynamics system"));
+                wrong(format!("force[{i}].{key}"), format!("\"{on}\" are tracers, which feel no force; put them into a dynamics system"));
             }
+        }
+        if let Force::Flock { predators, on: Some(on), .. } = force
+            && let Some(both) = predators.iter().find(|p| on.contains(p))
+        {
+            wrong(format!("force[{i}].predators"), format!("\"{both}\" is in `on`, too; a predator is no prey of its own"));
         }
     }
     for (i, column) in scene.output.columns.iter().enumerate() {
@@ -120,6 +135,17 @@ fn tracers(systems: &[System], kind: &str, named: Option<&str>) -> bool {
     place(systems, kind, named).is_some_and(|i| systems[i].method == Method::Tracers)
 }
 
+/// The objects that a force names beside its targets, with the word for them.
+pub fn others(force: &Force) -> Option<(&'static str, &[String])> {
+    match force {
+        Force::LennardJones { from, .. } | Force::Repulsion { from, .. } | Force::Cohesion { from, .. } | Force::Viscosity { from, .. } => {
+            from.as_deref().map(|from| ("from", from))
+        }
+        Force::Flock { predators, .. } => Some(("predators", predators)),
+        _ => None,
+    }
+}
+
 fn check_system(system: &System, path: &str, wrong: &mut impl FnMut(String, String)) {
     let integrator = system.integrator;
     if system.substeps.is_some() && system.step.is_some() {
@@ -144,6 +170,14 @@ fn check_system(system: &System, path: &str, wrong: &mut impl FnMut(String, Stri
 fn check_plane(scene: &Scene, wrong: &mut impl FnMut(String, String)) {
     let (axis, name) = if scene.plane == Plane::Xz { (1, "y") } else { (2, "z") };
     for thing in &scene.particles {
+        for (key, p) in thing.cloud.iter().flat_map(|c| [("center", c.center), ("size", c.size)]) {
+            if p[axis] != 0.0 {
+                wrong(
+                    format!("particles \"{}\".cloud.{key}", thing.name),
+                    format!("{name} = {}, expected 0 in a scene of dimension 2", p[axis]),
+                );
+            }
+        }
         for (key, list) in [("position", &thing.position), ("velocity", &thing.velocity)] {
             if let Some(i) = list.iter().position(|p| p[axis] != 0.0) {
                 wrong(

@@ -84,7 +84,12 @@ impl<'a> Reader<'a> {
         let at = |key: &str| format!("{path}.{key}");
         const ANY: f64 = f64::NEG_INFINITY;
         let law: Box<dyn Force> = match words {
-            Words::Gravitation { .. } => return None,
+            Words::Gravitation { .. }
+            | Words::LennardJones { .. }
+            | Words::Repulsion { .. }
+            | Words::Cohesion { .. }
+            | Words::Viscosity { .. }
+            | Words::Flock { .. } => return None,
             Words::Drag { coefficient, rate, quadratic, .. } => {
                 Box::new(Drag { coefficient: *coefficient, rate: *rate, quadratic: *quadratic })
             }

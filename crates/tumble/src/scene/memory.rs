@@ -19,7 +19,8 @@ pub fn memory(scene: &Scene, assets: &Assets) -> f64 {
     let diagonals = |d: &Diagonals| if *d == Diagonals::Both { 2.0 } else { 1.0 };
     let mut bytes = 0.0;
     for thing in &scene.particles {
-        bytes += thing.position.len() as f64 * MASS + thing.spring.len() as f64 * LINK;
+        bytes += (thing.position.len() as f64 + thing.cloud.as_ref().map_or(0.0, |c| f64::from(c.count))) * MASS
+            + thing.spring.len() as f64 * LINK;
     }
     for (thing, count) in scene.emitter.iter().zip(alive(scene)) {
         bytes += count * (BORN + 32.0 * thing.columns.len() as f64);

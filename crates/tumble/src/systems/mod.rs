@@ -2,3 +2,4 @@
 
 pub mod dynamics;
 pub mod tracers;
+pub mod vicsek;

@@ -240,11 +240,13 @@ impl Dynamics {
         let size = max(n, |range| range.map(|i| far(xyz64(self.state.x[i]), first)).fold(0.0, f64::max)).max(0.0);
         let fall = books.mass * Vec3::from(self.laws.gravity).norm() * size;
         // What holds masses together is a scale, too, even if they start at rest.
+        // So is what a driving force may bring them to.
+        let driven: f64 = self.laws.batches.iter().filter_map(|b| b.drives()).sum();
         // What a moving solid hits leaves with at most twice its velocity.
         let reach = self.laws.colliders.iter().filter_map(|c| c.motion.as_ref()).map(|m| far(m.pivot, first)).fold(size, |a, b| a + b);
         let fastest = self.laws.colliders.iter().map(|c| c.fastest(reach)).fold(0.0, f64::max);
         let hit = 2.0 * books.mass * fastest * fastest;
-        self.scale = Scale::new(&books, fall.max(self.between(false).abs()).max(hit), self.noise());
+        self.scale = Scale::new(&books, fall.max(self.between(false).abs()).max(hit).max(driven), self.noise());
     }
 
     /// Energy [J] that a thing at rest may seem to hold: a thousand times what its links store because positions are rounded.
@@ -257,7 +259,8 @@ impl Dynamics {
     /// Takes the scale of the energy from the books of a good frame. Energy that came from nowhere does not count, or a slow
     /// explosion would carry its scale along; where others push, nobody knows where energy came from.
     pub(super) fn rescale(&mut self, books: &Ledger) {
-        let driven = self.pushed || !self.laws.user.is_empty() || !self.pool.is_empty() || self.laws.colliders.iter().any(|c| c.moves());
+        let drives = self.laws.colliders.iter().any(|c| c.moves()) || self.laws.batches.iter().any(|b| b.drives().is_some());
+        let driven = self.pushed || drives || !self.laws.user.is_empty() || !self.pool.is_empty();
         let gain = if driven { 0.0 } else { (books.energy() - self.scale.start).max(0.0) };
         let external = (books.external - self.scale.external).abs();
         let energy = books.kinetic.max(books.elastic).max(external) - gain;

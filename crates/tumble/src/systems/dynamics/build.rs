@@ -5,10 +5,10 @@ use super::{Dynamics, Stepping, books};
 use crate::elements::{
     BendTwist, Distance, Element, Elements, Hinge, Linear, Members, Nonlinear, Pairs, StretchShear, TetShear, TetStrain, TetVolume, Vector,
 };
-use crate::forces::{Force, Gravitation};
+use crate::forces::{Cohesion, Flock, Force, Goal, Gravitation, Habits, LennardJones, Near, Repulsion, Viscosity};
 use crate::geometry::Collider;
 use crate::integrators::Memory;
-use crate::math::{Real, Vec3};
+use crate::math::{Real, Vec3, functions};
 use crate::pool::{Emitter, Pool};
 use crate::state::{Masses, Object, State};
 use std::ops::Range;
@@ -95,8 +95,8 @@ pub struct Parts {
     emitters: Vec<Emitter>,
     /// Forces on each mass by itself, with the objects that they act on, counted from the first that was begun.
     pub forces: Vec<(Box<dyn Force>, Vec<usize>)>,
-    /// Forces between all masses of some objects.
-    pub between: Vec<(Words, Vec<usize>)>,
+    /// Forces between masses of some objects, and the other objects that the words name.
+    pub between: Vec<(Words, Vec<usize>, Option<Vec<usize>>)>,
 }
 
 /// An object and how many links of each kind there were before it.
@@ -371,13 +371,12 @@ impl Parts {
         }
         let placed = |on: Vec<usize>| -> Vec<usize> { on.into_iter().map(|i| places[i]).collect() };
         let rows_of = |on: &[usize]| -> Vec<Range<usize>> { on.iter().map(|i| objects[*i].points.clone()).collect() };
-        let mut between = Vec::new();
-        for (words, on) in self.between {
-            let on = placed(on);
-            let ranges = rows_of(&on);
-            between.push((batches.list.len(), on));
-            if let Words::Gravitation { constant, softening, .. } = words {
-                batches.list.push(Box::new(Gravitation::new(ranges, &masses.mass, constant, softening)));
+        let mut pairs = Vec::new();
+        for (words, on, others) in self.between {
+            let (on, others) = (placed(on), others.map(&placed));
+            if let Some(batch) = between(words, rows_of(&on), others.as_deref().map(rows_of), &masses, &settings.colliders) {
+                pairs.push((batches.list.len(), on, others));
+                batches.list.push(batch);
             }
         }
         let mut stiffness = vec![[0.0; 6]; rows];
@@ -423,13 +422,79 @@ impl Parts {
             broken: 0,
             pushed: false,
             watched: false,
-            between,
+            between: pairs,
             pool: Pool::new(points, self.emitters),
         };
         system.set_scale();
         system.begin_life(settings.interval).map_err(|e| SceneError::one(format!("system \"{}\"", settings.name), e.to_string()))?;
         Ok(system)
     }
+}
+
+/// The batch of a force between masses.
+fn between(
+    words: Words,
+    on: Vec<Range<usize>>,
+    others: Option<Vec<Range<usize>>>,
+    masses: &Masses,
+    colliders: &Arc<Vec<Collider>>,
+) -> Option<Box<dyn crate::elements::Batch>> {
+    Some(match words {
+        Words::Gravitation { constant, softening, .. } => Box::new(Gravitation::new(on, &masses.mass, constant, softening)),
+        Words::LennardJones { epsilon, sigma, cutoff, smooth, .. } => {
+            Box::new(Near::new(LennardJones::new(epsilon, sigma, cutoff.unwrap_or(2.5 * sigma), smooth), on, others))
+        }
+        Words::Repulsion { stiffness, distance, exponent, .. } => {
+            Box::new(Near::new(Repulsion { stiffness, distance, exponent }, on, others))
+        }
+        Words::Cohesion { strength, radius, .. } => Box::new(Near::new(Cohesion { strength, radius }, on, others)),
+        Words::Viscosity { coefficient, radius, central, .. } => {
+            Box::new(Near::new(Viscosity { coefficient, radius, central }, on, others))
+        }
+        Words::Flock {
+            radius,
+            nearest,
+            view,
+            cohesion,
+            alignment,
+            separation,
+            spacing,
+            speed,
+            propulsion,
+            max_acceleration,
+            goal,
+            avoidance,
+            clearance,
+            fear,
+            fear_radius,
+            chase,
+            predator_speed,
+            ..
+        } => {
+            let habits = Habits {
+                radius,
+                nearest: nearest.unwrap_or(0) as usize,
+                view: if view < 360.0 { functions::cos((0.5 * view).to_radians()) } else { -2.0 },
+                cohesion,
+                alignment,
+                separation,
+                spacing: spacing.unwrap_or(0.5 * radius),
+                speed,
+                propulsion,
+                limit: max_acceleration.unwrap_or(0.0),
+                goals: goal.into_iter().map(|g| Goal { point: g.point.into(), strength: g.strength }).collect(),
+                avoidance,
+                clearance: clearance.unwrap_or(radius),
+                fear,
+                fear_radius: fear_radius.unwrap_or(3.0 * radius),
+                chase,
+                predator_speed: predator_speed.unwrap_or(speed),
+            };
+            Box::new(Flock::new(habits, on, others.unwrap_or_default(), masses, colliders.clone()))
+        }
+        // Forces on each mass by itself.
+        _ => return None,
+    })
 }
 
 /// Batches in the order in which they act.

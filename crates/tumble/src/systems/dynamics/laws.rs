@@ -63,7 +63,7 @@ impl Laws {
     /// Prepares the sums of forces at (x, v): elements, and users' forces.
     fn begin(&mut self, t: f64, x: &[Row], v: &[Row]) -> Result<(), StepError> {
         for batch in &mut self.batches {
-            batch.begin_forces(x, v);
+            batch.begin_forces(t, x, v);
         }
         if self.user.is_empty() {
             return Ok(());

@@ -180,7 +180,7 @@ impl Dynamics {
         }
         for s in 0..n {
             let colliders = &self.laws.colliders;
-            let near = |p: Vec3<f64>, distance: f64| colliders.iter().any(|c| c.is_near(p, t, distance));
+            let near = |p: Vec3<f64>, distance: f64| colliders.iter().any(|c| c.distance(p, t, distance).0 < distance);
             let dead = self.pool.dead(s, t, &self.state.x, &self.state.v, &near);
             let is_parent = (0..n).any(|child| self.pool.parent(child) == Some(s));
             mourned.push(if is_parent { self.pool.mourn(s, &dead, (t, dt), &self.state.x, &self.state.v) } else { Vec::new() });
@@ -218,9 +218,9 @@ impl Dynamics {
                 *range = self.objects[*object].points.clone();
             }
         }
-        for (batch, objects) in &self.between {
-            let ranges = objects.iter().map(|o| self.objects[*o].points.clone()).collect();
-            self.laws.batches[*batch].renew(ranges, &self.laws.masses);
+        let rows = |objects: &Vec<usize>| objects.iter().map(|o| self.objects[*o].points.clone()).collect();
+        for (batch, on, others) in &self.between {
+            self.laws.batches[*batch].renew(rows(on), others.as_ref().map(rows), &self.laws.masses);
         }
     }
 

@@ -56,8 +56,8 @@ pub struct Dynamics {
     objects: Vec<Object>,
     /// Particles that are born and die; their rows are the last.
     pool: Pool,
-    /// Batches between all masses of some objects, with these objects.
-    between: Vec<(usize, Vec<usize>)>,
+    /// Batches between masses of some objects, with these objects and others that they name.
+    between: Vec<(usize, Vec<usize>, Option<Vec<usize>>)>,
     tethers: Vec<Tether>,
     clamp: Option<Elements<Limit, Linear, 2, 1, 1, 0>>,
     user: Option<Box<dyn UserIntegrator>>,
