@@ -76,8 +76,8 @@ kind = "attraction"
         "line 13: sheet \"flag\".links.bend.modulus: -2 N, N/m or Pa, expected >= 0 N, N/m or Pa",
         "line 15: collider[0].shape: expected one of the keys sphere, box, plane, floor, mesh; did you mean \"sphere\"?",
         "line 16: collider[0].name: 3, expected a string",
-        "line 17: force[0].kind: missing, expected one of drag, attraction, gravitation, acceleration",
-        "line 20: force[1].kind: \"drgg\", expected one of drag, attraction, gravitation, acceleration; did you mean \"drag\"?",
+        "line 17: force[0].kind: missing, expected one of drag, attraction, gravitation, electrostatics, acceleration",
+        "line 20: force[1].kind: \"drgg\", expected one of drag, attraction, gravitation, electrostatics, acceleration; did you mean \"drag\"?",
         "line 21: force[2].gm: missing, expected a number in m³/s²",
     ];
     assert_eq!(found, expected);

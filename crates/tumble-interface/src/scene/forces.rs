@@ -48,6 +48,20 @@ pub enum Force {
         #[serde(default)]
         on: Option<Vec<String>>,
     },
+    /// Coulomb's force between all charged masses of the same system, F = k q1 q2 / d²: like charges push each other.
+    Electrostatics {
+        /// k.
+        #[serde(default = "coulomb")]
+        #[schemars(extend("x-unit" = "N m²/C²"))]
+        constant: f64,
+        /// Softening length s: 1/d² becomes d/(d² + s²)^(3/2).
+        #[serde(default)]
+        #[schemars(range(min = 0.0), extend("x-unit" = "m"))]
+        softening: f64,
+        /// Names of objects whose charges feel each other; without it, all.
+        #[serde(default)]
+        on: Option<Vec<String>>,
+    },
     /// A uniform acceleration beside the world's gravity.
     Acceleration {
         /// The acceleration.
@@ -113,6 +127,10 @@ pub struct Anchor {
     #[serde(default)]
     #[schemars(range(min = 0.0), extend("x-unit" = "m"))]
     pub rest_length: Option<f64>,
+}
+
+fn coulomb() -> f64 {
+    8.987_551_792_3e9
 }
 
 fn newton() -> f64 {

@@ -1,14 +1,16 @@
 //! L3: forces that act on each mass by itself, and velocity fields. One file per law.
 
 mod attraction;
+mod direct_sum;
 mod drag;
 mod field;
-mod gravitation;
+mod halos;
 
 pub use attraction::Attraction;
+pub use direct_sum::{Attractor, DirectSum};
 pub use drag::Drag;
 pub use field::Flow;
-pub use gravitation::Gravitation;
+pub use halos::Halos;
 
 use crate::elements::Block;
 use crate::math::rows::{self, Each};

@@ -5,6 +5,7 @@
 //! once.                                                               (springs.8)
 
 mod block;
+mod galaxy;
 mod lattice;
 mod net;
 mod particles;
@@ -14,6 +15,7 @@ mod scenery;
 mod sheet;
 
 pub use block::block;
+pub use galaxy::galaxy;
 pub use net::net;
 pub use particles::{Tracer, particles, tracers};
 pub use rope::rope;

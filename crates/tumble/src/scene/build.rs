@@ -13,7 +13,7 @@ use crate::systems::dynamics::{Dynamics, Parts, Settings, SpringPart, Stepping, 
 use crate::systems::tracers::{self, Tracers};
 use crate::world::World;
 use std::sync::Arc;
-use tumble_interface::scene::{Anchor, Force as Words, Method, Plane, Scene, System as Plan};
+use tumble_interface::scene::{Anchor, Bits, Force as Words, Method, Plane, Scene, System as Plan};
 use tumble_interface::{Column, Data, Issue, Mesh, SceneError};
 
 /// A world, the surfaces of its colliders, and what is doubtful about it.
@@ -83,6 +83,7 @@ pub fn build(scene: &Scene, assets: &Assets) -> Result<Built, SceneError> {
             solver: plan.solver.clone(),
             clamp: plan.clamp,
             gravity,
+            native: scene.bits == Bits::Native,
             colliders: colliders.clone(),
         };
         let mut system = parts.build(settings).map_err(|e| placed(scene, e))?;
@@ -201,6 +202,16 @@ fn fill(scene: &Scene, plans: &[Plan], assets: &Assets, issues: &mut Vec<Issue>)
             None => site.issues.push(Issue::new(format!("net \"{}\".mesh", thing.name), "the mesh has not been loaded")),
         });
     }
+    for thing in &scene.galaxy {
+        let pull = scene.force.iter().find(|f| matches!(f, Words::Gravitation { .. }) && targets(f).is_none_or(|on| on.contains(&thing.name)));
+        at("galaxy", &thing.system, &mut |site| match pull {
+            Some(Words::Gravitation { constant, softening, .. }) => recipes::galaxy(site, thing, scene.seed, *constant, *softening),
+            _ => {
+                let message = "nothing holds it together: add a [[force]] with kind = \"gravitation\" on it";
+                site.issues.push(Issue::new(format!("galaxy \"{}\"", thing.name), message));
+            }
+        });
+    }
     parts
 }
 
@@ -225,7 +236,7 @@ fn law(force: &Words) -> Option<Box<dyn Force>> {
         Words::Drag { coefficient, rate, .. } => Box::new(Drag { coefficient, rate }),
         Words::Attraction { center, gm, .. } => Box::new(Attraction { center: center.into(), gm }),
         Words::Acceleration { value, .. } => Box::new(Acceleration(value)),
-        Words::Gravitation { .. } => return None,
+        Words::Gravitation { .. } | Words::Electrostatics { .. } => return None,
     })
 }
 

@@ -4,7 +4,7 @@ use super::{Dynamics, Stepping, books};
 use crate::elements::{
     BendTwist, Distance, Element, Elements, Hinge, Linear, Members, Nonlinear, Pairs, StretchShear, TetShear, TetStrain, TetVolume, Vector,
 };
-use crate::forces::{Force, Gravitation};
+use crate::forces::{Attractor, DirectSum, Force, Halos};
 use crate::geometry::Collider;
 use crate::integrators::Memory;
 use crate::math::{Real, Vec3};
@@ -32,6 +32,8 @@ pub struct Settings {
     pub clamp: Option<f64>,
     /// Gravity [m/s²].
     pub gravity: [f64; 3],
+    /// Whether forces between all masses may use the fastest arithmetic of the machine.
+    pub native: bool,
     /// Solids.
     pub colliders: Arc<Vec<Collider>>,
 }
@@ -76,6 +78,8 @@ pub struct Parts {
     frames: Vec<([f64; 4], f64, bool)>,
     /// Points with an electric charge [C].
     charges: Vec<(u32, f64)>,
+    /// Points that are spread out as Plummer's sphere, with its radius [m], in order.
+    halos: Vec<(u32, f64)>,
     linear: Springs<1, 0>,
     nonlinear: Springs<1, 2>,
     vector: Springs<0, 0>,
@@ -145,6 +149,11 @@ impl Parts {
     /// Gives a point an electric charge [C].
     pub fn charge(&mut self, point: u32, charge: f64) {
         self.charges.push((point, charge));
+    }
+
+    /// Spreads a point out as Plummer's sphere of a radius [m].
+    pub fn halo(&mut self, point: u32, radius: f64) {
+        self.halos.push((point, radius));
     }
 
     /// Holds a point.
@@ -335,9 +344,19 @@ impl Parts {
             }
         }
         for (words, ranges) in self.between {
-            if let Words::Gravitation { constant, softening, .. } = words {
-                batches.list.push(Box::new(Gravitation::new(ranges, &masses.mass, constant, softening)));
+            let (attractor, softening) = match words {
+                Words::Gravitation { constant, softening, .. } => (Attractor::Mass(constant), softening),
+                Words::Electrostatics { constant, softening, .. } => (Attractor::Charge(-constant), softening),
+                _ => continue,
+            };
+            let halos = if let Attractor::Mass(_) = attractor { &self.halos[..] } else { &[] };
+            let points = without(&ranges, halos);
+            if let Attractor::Mass(constant) = attractor
+                && points != ranges
+            {
+                batches.list.push(Box::new(Halos::new(constant, softening, halos, &ranges, &masses)));
             }
+            batches.list.push(Box::new(DirectSum::new(attractor, softening, settings.native, points, &masses)));
         }
         let mut stiffness = vec![[0.0; 6]; rows];
         for batch in &mut batches.list {
@@ -381,6 +400,21 @@ impl Parts {
         system.set_scale();
         Ok(system)
     }
+}
+
+/// The ranges without the halos.
+fn without(ranges: &[Range<usize>], halos: &[(u32, f64)]) -> Vec<Range<usize>> {
+    let mut rest = Vec::new();
+    for range in ranges {
+        let mut from = range.start;
+        for at in halos.iter().map(|(row, _)| *row as usize).filter(|row| range.contains(row)) {
+            rest.push(from..at);
+            from = at + 1;
+        }
+        rest.push(from..range.end);
+    }
+    rest.retain(|range| !range.is_empty());
+    rest
 }
 
 /// Batches in the order in which they act.
