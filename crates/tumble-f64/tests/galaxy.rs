@@ -21,7 +21,7 @@ fn stars(frame: f64, steps: usize, softening: f64, galaxies: &str) -> Simulation
 /// The radii that enclose these parts of the stars.
 fn radii(mut r: Vec<f64>, parts: &[f64]) -> Vec<f64> {
     r.sort_by(f64::total_cmp);
-    parts.iter().map(|p| r[(p * r.len() as f64) as usize]).collect()
+    parts.iter().map(|p| r[(*p * r.len() as f64) as usize]).collect()
 }
 
 /// The pull of the sampled disk inwards, over rings, against Freeman's formula.
@@ -162,7 +162,7 @@ fn plummers_sphere_is_in_equilibrium() {
     let parts = [0.1, 0.25, 0.5, 0.75, 0.9];
     let lagrange = |sim: &Simulation| radii(positions(sim, "s").iter().map(|x| x.norm()).collect(), &parts);
     let r0 = lagrange(&sim);
-    let virial = |books: &tumble_interface::Ledger| 2.0 * books.kinetic / books.external.abs();
+    let virial = |books: &tumble_interface::engine::Ledger| 2.0 * books.kinetic / books.external.abs();
     println!("at the start: 2K/|W| = {:.4}, E = {:.4}, radii {r0:.4?}", virial(&start), start.energy());
     // 1 +- 0.02 + N^-1/2; the 0.1 % of mass that is cut off is far out.
     assert!((virial(&start) - 1.0).abs() < 0.02 + 1.0 / (n as f64).sqrt());

@@ -29,7 +29,7 @@ pub struct Scene {
     /// One line for people.
     #[serde(default)]
     pub title: String,
-    /// Seed of every random number; no method draws one yet.
+    /// Seed of every random number: those that place the stars of galaxies.
     #[serde(default)]
     pub seed: u32,
     /// Scalar type of the engine.
