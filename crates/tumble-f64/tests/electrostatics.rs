@@ -7,11 +7,11 @@ mod common;
 use common::{Vector, positions, simulation, step, velocities};
 use tumble_interface::Engine;
 
-/// An alpha particle of 5 MeV meets a pinned nucleus of gold.
-const K: f64 = 8.9875517923e9;
-const E: f64 = 1.602176634e-19;
-const MASS: f64 = 6.6446573e-27;
-const SPEED: f64 = 1.5e7;
+/// In units of our own: k, the charge of a proton, and the mass and speed of an alpha particle.
+const K: f64 = 1.0;
+const E: f64 = 1.0;
+const MASS: f64 = 6.6;
+const SPEED: f64 = 5.0;
 
 /// tan(theta/2) = k q Q/(m v² b) belongs to a start that is infinitely far away. From x = -L at the impact parameter b the
 /// conserved quantities give the orbit: angular momentum l = b v and energy per mass e = v²/2 + K/r, so that the speed far
@@ -20,9 +20,9 @@ fn directions(gm: f64, start: Vector, v: Vector) -> (f64, f64) {
     let r = start.norm();
     let energy = 0.5 * v.norm_sq() + gm / r;
     let l = start.x * v.y - start.y * v.x;
-    // Laplace's vector of a repelling centre, v x l + gm x/|x|: it points away from the pericentre.
+    // Laplace's vector of a repelling centre, v x l + gm x/|x|: it points to the pericentre.
     let laplace = [v.y * l + gm * start.x / r, -v.x * l + gm * start.y / r];
-    // Far away the directions d of the orbit have d . A = +-w |l|... : cos of the half opening is gm/|A|.
+    // x . A = l² + gm |x|: far away the direction of x is at the angle acos(gm/|A|) from it.
     let size = (laplace[0] * laplace[0] + laplace[1] * laplace[1]).sqrt();
     let half = (gm / size).acos();
     let axis = laplace[1].atan2(laplace[0]);
@@ -44,9 +44,9 @@ fn alpha_particles_are_scattered_by_rutherfords_angle() {
         let time = 2.0 * far / SPEED;
         let mut sim = simulation(&format!(
             "time.fps = {:e}\nworld.gravity = [0, 0, 0]\n[[system]]\nintegrator = \"dormand_prince\"\nadaptive = {{ tolerance = {:e}, relative = 0 }}\n\
-             [[particles]]\nname = \"gold\"\nposition = [[0, 0, 0]]\nmass = [3.27e-25]\ncharge = [{:e}]\npin = [\"vertex 0\"]\n\
+             [[particles]]\nname = \"gold\"\nposition = [[0, 0, 0]]\nmass = [325]\ncharge = [{:e}]\npin = [\"vertex 0\"]\n\
              [[particles]]\nname = \"alpha\"\nposition = [[{:e}, {b:e}, 0]]\nvelocity = [[{SPEED:e}, 0, 0]]\nmass = [{MASS:e}]\ncharge = [{:e}]\n\
-             [[force]]\nkind = \"electrostatics\"\n",
+             [[force]]\nkind = \"electrostatics\"\nconstant = 1\n",
             1.0 / time,
             1e-10 * closest,
             79.0 * E,
@@ -65,10 +65,9 @@ fn alpha_particles_are_scattered_by_rutherfords_angle() {
         // At a finite distance the velocity has not yet its last direction: what pushes on turns it by b gm/(w r)²/... < gm b/(w² r²).
         let got = v.y.atan2(v.x);
         let want = out.1.atan2(out.0);
-        let still = gm * (x0.y.abs() + x.norm() * 0.0) / (w * w * x.norm_sq());
+        let still = gm * x0.y / (w * w * x.norm_sq());
         let naive = 2.0 * (gm / (SPEED * SPEED * b)).atan();
         println!("b = {:.1}: {:.6} rad, exact {:.6}, from infinity {:.6}, bound {still:.1e}", b / closest, got, want, naive);
-        let _ = w;
         // Measured: below 1e-9.
         assert!((got - want).abs() < still + 1e-8, "{got} {want}");
         // Rutherford's formula as it stands: off by the potential at the start, K/(L m v²/2) = 1/2000, and by the angle b/L.
@@ -109,6 +108,15 @@ fn opposite_charges_orbit_each_other_and_keep_what_they_must() {
     assert!((x[0] - Vector::from([0.25, 0.0, 0.0])).norm() < 0.25 * 2.0e-4);
     assert!(x[2] == Vector::from([1e3, 2.0, 3.0]));
     assert!((end.energy() / start.energy() - 1.0).abs() < 1e-9 && p < 1e-12 && turned < 1e-12);
+}
+
+/// k of the scene language, and the energy of two charges, k q1 q2/d.
+#[test]
+fn coulombs_constant_is_that_of_si() {
+    let sim = simulation(
+        "[[particles]]\nname = \"p\"\nposition = [[0, 0, 0], [2, 0, 0]]\ncharge = [1, -1]\n[[force]]\nkind = \"electrostatics\"\n[world]\ngravity = [0, 0, 0]\n",
+    );
+    assert!((sim.ledger().external / -4.493_775_896_15e9 - 1.0).abs() < 1e-12);
 }
 
 /// Like charges push: two of them at rest fly apart, and all their energy becomes motion.

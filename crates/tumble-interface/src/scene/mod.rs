@@ -10,7 +10,9 @@ mod systems;
 pub use forces::{Anchor, Field, Force};
 pub use output::{Camera, Expect, Output, Probe};
 pub use shapes::{Collider, MeshFile, Shape};
-pub use structures::{Block, Diagonals, Galaxy, Halo, Link, LinkSettings, Links, Material, Net, Particles, Pin, Profile, Region, Rod, Rope, Sheet, Spring};
+pub use structures::{
+    Block, Diagonals, Galaxy, Halo, Link, LinkSettings, Links, Material, Net, Particles, Pin, Profile, Region, Rod, Rope, Sheet, Spring,
+};
 pub use systems::{Adaptive, Hessian, Integrator, Linear, Method, OnFailure, Solver, System};
 
 use crate::check::check;

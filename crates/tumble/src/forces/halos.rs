@@ -160,7 +160,8 @@ impl Batch for Halos {
                 for j in law.partners(i) {
                     let d = law.x[j] - law.x[i];
                     let (s3, q) = law.matrix(i, j, d);
-                    let terms = [s3 - q * d.x * d.x, s3 - q * d.y * d.y, s3 - q * d.z * d.z, -q * d.x * d.y, -q * d.y * d.z, -q * d.z * d.x];
+                    let terms =
+                        [s3 - q * d.x * d.x, s3 - q * d.y * d.y, s3 - q * d.z * d.z, -q * d.x * d.y, -q * d.y * d.z, -q * d.z * d.x];
                     for a in 0..6 {
                         block[a] += (weight * terms[a]) as Real;
                     }

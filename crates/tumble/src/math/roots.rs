@@ -6,8 +6,8 @@
 //! Source: [moroz2018].   Differs: no factor but one in each step, and the cube straight from the second step.
 //! Native: an estimate by the machine, fused operations.
 
-use super::simd::Width;
 use super::Real;
+use super::simd::Width;
 
 /// c of the step.
 const C: f64 = 1.436_355_569_136_327;

@@ -29,7 +29,8 @@ pub fn galaxy(site: &mut Site<'_>, thing: &Galaxy, seed: u32, constant: f64, sof
     let mut stars: Vec<(Vector, Vector)> = match thing.profile {
         Profile::Disk => {
             let halo = thing.halo.as_ref().map_or((0.0, 1.0), |h| (constant * h.mass, h.radius * h.radius + softening * softening));
-            let model = Model { disk: Disk { gm, length: thing.length }, halo, height: thing.thickness * thing.length, toomre: thing.toomre };
+            let model =
+                Model { disk: Disk { gm, length: thing.length }, halo, height: thing.thickness * thing.length, toomre: thing.toomre };
             (0..n).map(|id| model.star(&random, u64::from(id))).collect()
         }
         Profile::Plummer => {

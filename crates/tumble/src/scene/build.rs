@@ -203,7 +203,8 @@ fn fill(scene: &Scene, plans: &[Plan], assets: &Assets, issues: &mut Vec<Issue>)
         });
     }
     for thing in &scene.galaxy {
-        let pull = scene.force.iter().find(|f| matches!(f, Words::Gravitation { .. }) && targets(f).is_none_or(|on| on.contains(&thing.name)));
+        let pull =
+            scene.force.iter().find(|f| matches!(f, Words::Gravitation { .. }) && targets(f).is_none_or(|on| on.contains(&thing.name)));
         at("galaxy", &thing.system, &mut |site| match pull {
             Some(Words::Gravitation { constant, softening, .. }) => recipes::galaxy(site, thing, scene.seed, *constant, *softening),
             _ => {
