@@ -97,6 +97,7 @@ fn native_bits_agree_with_portable_ones_to_round_off() {
         let (portable, native) = (run("portable"), run("native"));
         let size = |v: &[f64]| v.iter().map(|v| v * v).sum::<f64>().sqrt();
         let off = size(&portable.iter().zip(&native).map(|(a, b)| a - b).collect::<Vec<_>>()) / size(&portable);
+        #[allow(clippy::useless_conversion)] // single precision needs it
         let unit = f64::from(tumble::math::Real::EPSILON);
         println!("softening {softening}: native and portable differ by {:.2} units of round-off", off / unit);
         // A term is right to three units, a block of 1024 terms to a few more. Measured: 0.5 to 2 units.

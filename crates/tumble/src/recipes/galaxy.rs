@@ -48,8 +48,8 @@ pub fn galaxy(site: &mut Site<'_>, thing: &Galaxy, seed: u32, constant: f64, sof
     for (x, v) in &mut stars {
         let (mut at, mut moves) = (*x - off, *v - drift);
         // A mirror image turns the other way.
-        at.y = at.y * sense;
-        moves.y = moves.y * sense;
+        at.y *= sense;
+        moves.y *= sense;
         site.parts.point(center + turn.turn(at), velocity + turn.turn(moves), thing.mass / f64::from(n));
     }
     if let Some(halo) = &thing.halo {
