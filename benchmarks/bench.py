@@ -21,8 +21,11 @@ TARGETS = {
     ("implicit", "scipy cg"): (5.0, "at least"),
     ("implicit", "scipy spsolve"): (5.0, "at least"),
     ("particles", "triad"): (0.6, "at least"),
-    ("gravitation", "numba"): (0.6, "at least"),
     ("flock", "numba"): (4.0, "at least"),
+    ("direct sum, single, portable", "numba"): (0.6, "at least"),
+    ("direct sum, single, native", "numba"): (1.3, "at least"),
+    ("direct sum, double, portable", "numba"): (1.0, "at least"),
+    ("direct sum, double, native", "numba"): (2.0, "at least"),
     ("import", "import numpy"): (1.5, "at most"),
     ("help", "import numpy"): (4.0, "at most"),
 }

@@ -67,6 +67,13 @@ def test_the_manifest_tells_how_it_was_made(spring: Tree, reference: Run) -> Non
     assert len(set(manifest["hashes"])) == N + 1
 
 
+def test_native_bits_are_noted_with_the_instructions(spring: Tree, tmp_path: Path) -> None:
+    spring["bits"] = "native"
+    manifest = simulate(Scene(spring), tmp_path / "run").manifest
+    assert manifest["bits"] == "native"
+    assert manifest["machine"]["instructions"] in ("scalar", "avx2", "avx512")
+
+
 def test_the_ledger_counts_steps(reference: Run) -> None:
     ledger = reference.ledger
     assert list(ledger) == LEDGER[:-1]

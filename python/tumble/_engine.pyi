@@ -14,6 +14,8 @@ Columns = dict[str, dict[str, Array]]
 Path = str | os.PathLike[str]
 
 version: str
+instructions: str
+"""The widest instructions of this machine that are used: bits = "native" holds for machines with the same."""
 """Version of tumble."""
 
 class TumbleError(Exception):

@@ -65,7 +65,7 @@ class Recorder:
             "fps": self.scene["time"]["fps"],
             "seed": self.scene["seed"],
             "precision": self.scene["precision"],
-            "bits": "portable",
+            "bits": self.scene["bits"],
             "resumed": int((earlier or {}).get("resumed", -1)) + 1,
             "machine": machine(threads),
             "timings": self.timings,
@@ -211,6 +211,7 @@ def machine(threads: int | None) -> dict[str, Any]:
         "threads": threads,
         "platform": platform.platform(),
         "processor": platform.machine(),
+        "instructions": _engine.instructions,
         "python": sys.version.split()[0],
         "numpy": np.__version__,
     }

@@ -3,8 +3,10 @@
 
 use tumble_f64::elements::forces as derived;
 use tumble_f64::elements::*;
+use tumble_f64::forces::{Attractor, DirectSum, Halos};
 use tumble_f64::math::parallel::CHUNK;
 use tumble_f64::math::{Real, Row, Vec3, ZERO, rotation, row, xyz};
+use tumble_f64::state::Masses;
 use tumble_interface::scene::Hessian;
 
 /// Numbers between -1 and 1 without a pattern.
@@ -70,8 +72,9 @@ fn cases() -> Vec<Case> {
         add(batch::<Hinge, Linear, 4, 1, 1, 0>(4, &hinges[..1]), x.to_vec(), 4, true);
     }
     for softening in [0.0, 0.6] {
-        let pull = tumble_f64::forces::Gravitation::new(vec![0..2, 3..7], &[2.0, 3.0, 9.0, 1.5, 0.5, 2.5, 1.0], 0.7, softening);
-        add(Box::new(pull), points(7), 7, true);
+        let mass = vec![2.0, 3.0, 9.0, 1.5, 0.5, 2.5, 1.0];
+        let masses = Masses { mass, ..Masses::default() };
+        add(Box::new(DirectSum::new(Attractor::Mass(0.7), softening, false, &[], vec![0..2, 3..7], &masses)), points(7), 7, true);
     }
     let rest: Vec<Row> = points(4);
     let (b, volume) = rest_matrix([0, 1, 2, 3].map(|i| xyz(rest[i])));
@@ -100,6 +103,13 @@ fn cases() -> Vec<Case> {
     // The same frames with one quaternion negated are the same orientations.
     x[4] = x[4].map(|q| -q);
     add(batch::<BendTwist, Linear, 2, 3, 5, 0>(5, &bend), x, 3, true);
+    for softening in [0.0, 0.6] {
+        let masses = Masses { charge: vec![1.0, -2.0, 9.0, 0.5, -1.5, 2.5, 1.0], ..Masses::default() };
+        add(Box::new(DirectSum::new(Attractor::Charge(-0.7), softening, false, &[], vec![0..2, 3..7], &masses)), points(7), 7, true);
+        let masses = Masses { mass: vec![2.0, 3.0, 9.0, 1.5, 0.5, 2.5, 1.0], ..Masses::default() };
+        let halos = [(1, 0.7), (2, 0.4), (4, 0.5)];
+        add(Box::new(Halos::new(0.7, softening, &halos, &[0..2, 3..7], &masses)), points(7), 7, true);
+    }
     cases
 }
 
@@ -274,7 +284,7 @@ fn internal_damping_opposes_motion_and_leaves_rigid_motion_alone() {
             let power: f64 = (0..n).map(|i| (xyz(moving[i]) - xyz(at_rest[i])).dot(xyz(v[i]))).sum();
             if is_rigid {
                 assert!(power.abs() < 1e-13, "{}: {power}", case.batch.name());
-            } else if !["limit", "vector", "tetrahedron shear", "gravitation"].contains(&case.batch.name()) {
+            } else if !["limit", "vector", "tetrahedron shear", "gravitation", "electrostatics", "halos"].contains(&case.batch.name()) {
                 assert!(power < -1e-5, "{}: {power}", case.batch.name());
             }
         }

@@ -21,6 +21,8 @@ mod _engine {
     #[pymodule_init]
     fn init(module: &Bound<'_, PyModule>) -> PyResult<()> {
         module.add("version", env!("CARGO_PKG_VERSION"))?;
+        let level = tumble::math::simd::Level::available().last().map_or("scalar", |level| level.name());
+        module.add("instructions", level)?;
         errors::add(module)
     }
 }

@@ -63,8 +63,13 @@ fn scenes() -> Vec<(&'static str, String, usize)> {
     let swarm = "world.gravity = [0, 0, 0]\n[[system]]\nintegrator = \"rk4\"\nsubsteps = 2\n[[force]]\nkind = \"gravitation\"\nconstant = 1e-4\nsoftening = 0.05\n\
                  [[emitter]]\nname = \"swarm\"\nrate = 1500\nspeed = 0.3\ncone = 180\nlifetime = 0.5\nlifetime_spread = 0.3\nfrom.sphere.radius = 0.3\n\
                  [[particles]]\nname = \"sun\"\nposition = [[0.1, 0, 0]]\nmass = [100]\n";
+    let stars = "world.gravity = [0, 0, 0]\n[[system]]\nintegrator = \"velocity_verlet\"\nsubsteps = 2\n[[force]]\nkind = \"gravitation\"\nconstant = 1\nsoftening = 0.1\n\
+                 [[force]]\nkind = \"electrostatics\"\nconstant = 1e-3\nsoftening = 0.1\n[[galaxy]]\nname = \"g\"\nstars = 4200\nmass = 1\nlength = 1\nradius = 0.01\n\
+                 halo = { mass = 4, radius = 2 }\n[[particles]]\nname = \"ions\"\nposition = [[0.1, 0, 1], [0.3, 1, 0], [2, 1, 1]]\ncharge = [1, -1, 2]\n";
     vec![
         ("dust, stirred", stirred, 8),
+        ("stars", stars.to_string(), 3),
+        ("stars, native", format!("bits = \"native\"\n{stars}"), 3),
         ("sheet, explicit", sheet("integrator = \"symplectic_euler\"\nsubsteps = 24", links), 20),
         ("sheet, verlet", sheet("integrator = \"verlet\"\nsubsteps = 12", links), 6),
         (
@@ -83,6 +88,38 @@ fn scenes() -> Vec<(&'static str, String, usize)> {
         ("swarm", swarm.to_string(), 16),
         ("rope, cholesky", rope.to_string(), 20),
     ]
+}
+
+/// The two tiers differ, by the round-off of a force.
+#[test]
+fn native_bits_agree_with_portable_ones_to_round_off() {
+    for softening in [0.1, 0.0] {
+        let run = |bits: &str| {
+            let mut sim = simulation(&format!(
+                "bits = \"{bits}\"\ntime.fps = 100\nworld.gravity = [0, 0, 0]\n[[system]]\nintegrator = \"symplectic_euler\"\nsubsteps = 1\n\
+                 [[galaxy]]\nname = \"g\"\nprofile = \"plummer\"\nstars = 2000\nmass = 1\nlength = 1\nradius = 0.01\n\
+                 [[force]]\nkind = \"gravitation\"\nconstant = 1\nsoftening = {softening}\n"
+            ));
+            let n = 3 * 2000;
+            sim.write("g", "velocity", &vec![0.0; n]).unwrap();
+            run(&mut sim, 1);
+            match sim.frame(&["velocity"]).columns.into_iter().next().unwrap().data {
+                tumble_interface::Data::F32(v) => v.into_iter().map(f64::from).collect::<Vec<f64>>(),
+                tumble_interface::Data::F64(v) => v,
+                tumble_interface::Data::U32(_) => panic!("velocities are no indices"),
+            }
+        };
+        let (portable, native) = (run("portable"), run("native"));
+        let size = |v: &[f64]| v.iter().map(|v| v * v).sum::<f64>().sqrt();
+        let off = size(&portable.iter().zip(&native).map(|(a, b)| a - b).collect::<Vec<_>>()) / size(&portable);
+        #[allow(clippy::useless_conversion)] // single precision needs it
+        let unit = f64::from(tumble::math::Real::EPSILON);
+        println!("softening {softening}: native and portable differ by {:.2} units of round-off", off / unit);
+        // A term is right to three units, a block of 1024 terms to a few more. Measured: 0.5 to 2 units.
+        assert!(off < 10.0 * unit, "{off:e}");
+        let wide = tumble::math::simd::Level::available().len() > 1;
+        assert_eq!(off > 0.0, wide, "{off:e}");
+    }
 }
 
 #[test]

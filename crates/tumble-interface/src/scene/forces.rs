@@ -235,6 +235,20 @@ pub enum Force {
         #[serde(default)]
         on: Option<Vec<String>>,
     },
+    /// Coulomb's force between all charged masses of the same system, F = k q1 q2 / d²: like charges push each other.
+    Electrostatics {
+        /// k.
+        #[serde(default = "coulomb")]
+        #[schemars(extend("x-unit" = "N m²/C²"))]
+        constant: f64,
+        /// Softening length s: 1/d² becomes d/(d² + s²)^(3/2).
+        #[serde(default)]
+        #[schemars(range(min = 0.0), extend("x-unit" = "m"))]
+        softening: f64,
+        /// Names of objects whose charges feel each other; without it, all.
+        #[serde(default)]
+        on: Option<Vec<String>>,
+    },
     /// An acceleration beside the world's gravity: uniform, changing in time, or a formula of t, x, y, z, vx, vy, vz.
     Acceleration {
         /// The acceleration.
@@ -463,6 +477,10 @@ pub struct Anchor {
     pub rest_length: Option<f64>,
 }
 
+fn coulomb() -> f64 {
+    8.987_551_792_3e9
+}
+
 fn newton() -> f64 {
     6.67428e-11
 }
@@ -519,6 +537,7 @@ impl Force {
             | Self::Wind { on, .. }
             | Self::Attraction { on, .. }
             | Self::Gravitation { on, .. }
+            | Self::Electrostatics { on, .. }
             | Self::LennardJones { on, .. }
             | Self::Repulsion { on, .. }
             | Self::Cohesion { on, .. }

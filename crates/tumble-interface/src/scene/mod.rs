@@ -15,7 +15,8 @@ pub use forces::{Anchor, Field, Force, Goal};
 pub use output::{Camera, Expect, Output, Probe};
 pub use shapes::{Collider, MeshFile, MeshFrame, MeshFrames, MeshRef, Motion, Pace, Pose, Shape};
 pub use structures::{
-    Block, Cloud, CloudShape, Diagonals, Link, LinkSettings, Links, Material, Net, Particles, Pin, Region, Rod, Rope, Sheet, Spring,
+    Block, Cloud, CloudShape, Diagonals, Galaxy, Halo, Link, LinkSettings, Links, Material, Net, Particles, Pin, Profile, Region, Rod,
+    Rope, Sheet, Spring,
 };
 pub use systems::{Adaptive, Hessian, Integrator, Linear, Method, OnFailure, Solver, System};
 
@@ -41,6 +42,9 @@ pub struct Scene {
     /// Scalar type of the engine.
     #[serde(default)]
     pub precision: Precision,
+    /// What may differ from machine to machine.
+    #[serde(default)]
+    pub bits: Bits,
     /// 2 keeps everything in `plane`; 3 is space.
     #[serde(default = "three")]
     #[schemars(range(min = 2, max = 3))]
@@ -75,6 +79,9 @@ pub struct Scene {
     /// Springs along the edges of any mesh.
     #[serde(default)]
     pub net: Vec<Net>,
+    /// Stars, placed at random and set going so that they hold together; needs a force of gravitation.
+    #[serde(default)]
+    pub galaxy: Vec<Galaxy>,
     /// Forces on the masses of `dynamics` systems.
     #[serde(default)]
     pub force: Vec<Force>,
@@ -107,6 +114,18 @@ pub enum Precision {
     Single,
     /// 64-bit numbers: for orders of convergence and long orbits.
     Double,
+}
+
+/// What may differ from machine to machine.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum Bits {
+    /// Nothing: the same scene gives the same bits on every machine.
+    #[default]
+    Portable,
+    /// Forces between all masses use the fastest arithmetic of the machine (fused, estimated roots): the same bits on any
+    /// count of threads and after restoring, on machines with the same instructions.
+    Native,
 }
 
 /// The plane of a two-dimensional scene.

@@ -116,6 +116,89 @@ pub struct Spring {
     pub break_strain: Option<f64>,
 }
 
+/// Stars, placed at random and set going so that they hold together under the gravitation of the scene.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Galaxy {
+    /// Name in frames; with the scene's seed, the key of its random numbers.
+    pub name: String,
+    /// System that moves it; without it, the first that can.
+    #[serde(default)]
+    pub system: Option<String>,
+    /// How the stars lie.
+    #[serde(default)]
+    pub profile: Profile,
+    /// Count of stars.
+    #[serde(default = "many")]
+    #[schemars(range(min = 1, max = 100_000_000))]
+    pub stars: u32,
+    /// Mass of all stars together.
+    #[schemars(extend("x-unit" = "kg", "exclusiveMinimum" = 0.0))]
+    pub mass: f64,
+    /// Scale length: of the disk's exponential, or a of Plummer's sphere.
+    #[schemars(extend("x-unit" = "m", "exclusiveMinimum" = 0.0))]
+    pub length: f64,
+    /// Height z0 of the disk over its scale length; its density is in proportion to sech²(z/z0).
+    #[serde(default = "tenth")]
+    #[schemars(range(min = 0.0), extend("x-unit" = "1"))]
+    pub thickness: f64,
+    /// Toomre's Q: speeds at random, in units of those at which a disk just does not fall apart into lumps.
+    #[serde(default = "stable")]
+    #[schemars(range(min = 0.0), extend("x-unit" = "1"))]
+    pub toomre: f64,
+    /// Dark matter round the stars of a disk; it is one mass more, the last one.
+    #[serde(default)]
+    pub halo: Option<Halo>,
+    /// Where its centre starts.
+    #[serde(default)]
+    #[schemars(extend("x-unit" = "m"))]
+    pub center: [f64; 3],
+    /// How fast its centre starts.
+    #[serde(default)]
+    #[schemars(extend("x-unit" = "m/s"))]
+    pub velocity: [f64; 3],
+    /// Turned about x, y and z, in this order; a disk lies in the plane of x and y before.
+    #[serde(default)]
+    #[schemars(extend("x-unit" = "degree"))]
+    pub rotate: [f64; 3],
+    /// Turns clockwise as seen from above, before `rotate`.
+    #[serde(default)]
+    pub clockwise: bool,
+    /// Radius of a star in pictures.
+    #[schemars(extend("x-unit" = "m", "exclusiveMinimum" = 0.0))]
+    pub radius: f64,
+    /// How much of the way behind each is drawn in pictures.
+    #[serde(default)]
+    #[schemars(range(min = 0.0), extend("x-unit" = "s"))]
+    pub trail: f64,
+    /// Red, green and blue in pictures, 0 to 1, in linear light (a half is sRGB's 188 of 255).
+    #[serde(default)]
+    pub color: Option<[f64; 3]>,
+}
+
+/// How the stars of a galaxy lie.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum Profile {
+    /// A disk whose density falls exponentially, turning almost in circles.
+    #[default]
+    Disk,
+    /// Plummer's sphere in equilibrium.
+    Plummer,
+}
+
+/// A halo: a mass that is spread out as Plummer's sphere, and moves as one body.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Halo {
+    /// Its mass.
+    #[schemars(extend("x-unit" = "kg", "exclusiveMinimum" = 0.0))]
+    pub mass: f64,
+    /// Its radius b: 35 % of the mass are within.
+    #[schemars(extend("x-unit" = "m", "exclusiveMinimum" = 0.0))]
+    pub radius: f64,
+}
+
 /// A chain of masses between two points.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
@@ -436,4 +519,12 @@ fn fifth() -> f64 {
 
 fn thousand() -> f64 {
     1000.0
+}
+
+fn many() -> u32 {
+    16_384
+}
+
+fn stable() -> f64 {
+    1.5
 }

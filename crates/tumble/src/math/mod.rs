@@ -8,6 +8,7 @@ pub mod lane;
 pub mod parallel;
 pub mod quat;
 pub mod random;
+pub mod roots;
 pub mod rotation;
 pub mod rows;
 pub mod simd;

@@ -58,7 +58,22 @@ pub trait Width: Copy + Send + Sync {
     fn rows(self, rows: &[Row], start: usize) -> [Self::L; 4];
     /// For N consecutive numbers of a column of rows, the first of them number `at`: the number of each one's row.
     fn spread(self, of_rows: &[Real], at: usize) -> Self::L;
+    /// The number whose bits are `GUESS` less half the bits of x > 0: some 2/3 of 1/sqrt(x), to 3.5 %.
+    fn guess(self, x: Self::L) -> Self::L;
+    /// a b + c, rounded once where the machine can: not the same bits everywhere.
+    fn fused(self, a: Self::L, b: Self::L, c: Self::L) -> Self::L;
+    /// Whether there is `estimate`.
+    const ESTIMATES: bool;
+    /// 1/sqrt(x) to 2^-14 by an instruction whose bits differ between makers of machines.
+    fn estimate(self, x: Self::L) -> Self::L;
 }
+
+/// What `guess` starts from.                                          (orbits.15)
+#[cfg(not(feature = "double"))]
+pub const GUESS: u32 = 0x5ef2_c6a6;
+/// What `guess` starts from.                                          (orbits.15)
+#[cfg(feature = "double")]
+pub const GUESS: u64 = 0x5fde_58d4_c7b5_3800;
 
 /// How many numbers the registers of `w` hold; in the body of `packs!`, where `W` is the widest of two.
 #[inline(always)]
@@ -126,6 +141,19 @@ impl Width for Scalar {
     #[inline(always)]
     fn spread(self, of_rows: &[Real], at: usize) -> Real {
         of_rows[at / 4]
+    }
+    #[inline(always)]
+    fn guess(self, x: Real) -> Real {
+        Real::from_bits(GUESS.wrapping_sub(x.to_bits() >> 1))
+    }
+    #[inline(always)]
+    fn fused(self, a: Real, b: Real, c: Real) -> Real {
+        a * b + c
+    }
+    const ESTIMATES: bool = false;
+    #[inline(always)]
+    fn estimate(self, x: Real) -> Real {
+        self.guess(x)
     }
 }
 
@@ -236,6 +264,17 @@ impl Level {
     }
 }
 
+impl Level {
+    /// Its name in manifests.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Scalar => "scalar",
+            Self::Avx2 => "avx2",
+            Self::Avx512 => "avx512",
+        }
+    }
+}
+
 /// Runs a kernel on the widest registers of this machine.
 #[inline]
 pub fn dispatch<K: Kernel>(kernel: K) -> K::Output {
@@ -260,7 +299,7 @@ pub fn dispatch_at<K: Kernel>(level: Level, kernel: K) -> K::Output {
 
 #[cfg(target_arch = "x86_64")]
 mod x86 {
-    use super::{Kernel, Pack, Real, Row, Width};
+    use super::{GUESS, Kernel, Pack, Real, Row, Width};
     use pulp::x86::{V3, V4};
     use pulp::{Simd, WithSimd, cast};
 
@@ -295,7 +334,7 @@ mod x86 {
 
     /// Everything that does not depend on how rows are transposed.
     macro_rules! width {
-        ($token:ident, $n:expr, $splat:ident) => {
+        ($token:ident, $n:expr, $splat:ident, $fused:ident, $guess:expr, $estimates:expr, $estimate:expr) => {
             impl Width for $token {
                 type L = Pack<$token>;
                 const N: usize = $n;
@@ -348,6 +387,19 @@ mod x86 {
                     numbers.copy_from_slice(&of_rows[at / 4..at / 4 + $n / 4]);
                     self.each_four_times(numbers)
                 }
+                #[inline(always)]
+                fn guess(self, x: Self::L) -> Self::L {
+                    Pack { simd: self, v: $guess(self, x.v) }
+                }
+                #[inline(always)]
+                fn fused(self, a: Self::L, b: Self::L, c: Self::L) -> Self::L {
+                    Pack { simd: self, v: self.$fused(a.v, b.v, c.v) }
+                }
+                const ESTIMATES: bool = $estimates;
+                #[inline(always)]
+                fn estimate(self, x: Self::L) -> Self::L {
+                    Pack { simd: self, v: $estimate(self, x.v) }
+                }
             }
         };
     }
@@ -377,8 +429,20 @@ mod x86 {
     mod single {
         use super::*;
 
-        width!(V3, 8, splat_f32s);
-        width!(V4, 16, splat_f32s);
+        /// GUESS - bits/2.
+        #[inline(always)]
+        fn guess<S: Simd>(s: S, x: S::f32s) -> S::f32s {
+            let half = s.wrapping_dyn_shr_u32s(s.transmute_u32s_f32s(x), s.splat_u32s(1));
+            s.transmute_f32s_u32s(s.sub_u32s(s.splat_u32s(GUESS), half))
+        }
+
+        #[inline(always)]
+        fn estimate(s: V4, x: <V4 as Simd>::f32s) -> <V4 as Simd>::f32s {
+            cast(s.avx512f._mm512_rsqrt14_ps(cast(x)))
+        }
+
+        width!(V3, 8, splat_f32s, mul_add_f32s, guess, false, guess);
+        width!(V4, 16, splat_f32s, mul_add_f32s, guess, true, estimate);
 
         /// Transposes four by four inside each 128-bit part; its own inverse.
         macro_rules! four_by_four {
@@ -464,8 +528,27 @@ mod x86 {
         use super::*;
         use std::arch::x86_64::__m256d;
 
-        width!(V3, 4, splat_f64s);
-        width!(V4, 8, splat_f64s);
+        /// GUESS - bits/2.
+        #[inline(always)]
+        fn guess3(s: V3, x: <V3 as Simd>::f64s) -> <V3 as Simd>::f64s {
+            let half = s.avx2._mm256_srli_epi64::<1>(cast(x));
+            cast(s.avx2._mm256_sub_epi64(cast(s.splat_u64s(GUESS)), half))
+        }
+
+        /// GUESS - bits/2.
+        #[inline(always)]
+        fn guess4(s: V4, x: <V4 as Simd>::f64s) -> <V4 as Simd>::f64s {
+            let half = s.avx512f._mm512_srli_epi64::<1>(cast(x));
+            cast(s.avx512f._mm512_sub_epi64(cast(s.splat_u64s(GUESS)), half))
+        }
+
+        #[inline(always)]
+        fn estimate(s: V4, x: <V4 as Simd>::f64s) -> <V4 as Simd>::f64s {
+            cast(s.avx512f._mm512_rsqrt14_pd(cast(x)))
+        }
+
+        width!(V3, 4, splat_f64s, mul_add_f64s, guess3, false, guess3);
+        width!(V4, 8, splat_f64s, mul_add_f64s, guess4, true, estimate);
 
         /// Transposes four by four; its own inverse.
         #[inline(always)]

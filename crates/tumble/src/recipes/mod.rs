@@ -6,6 +6,7 @@
 
 mod block;
 mod emitter;
+mod galaxy;
 mod lattice;
 mod net;
 mod particles;
@@ -16,6 +17,7 @@ mod sheet;
 
 pub use block::block;
 pub use emitter::emitter;
+pub use galaxy::galaxy;
 pub use net::net;
 pub use particles::{Tracer, draw_cloud, particles, tracers};
 pub use rope::rope;

@@ -14,7 +14,7 @@ use crate::systems::tracers::{self, Tracers};
 use crate::world::World;
 use std::borrow::Cow;
 use std::sync::Arc;
-use tumble_interface::scene::{Anchor, Emitter, Force as Words, MeshFile, Method, Particles, Plane, Scene, Shape, System as Plan};
+use tumble_interface::scene::{Anchor, Bits, Emitter, Force as Words, MeshFile, Method, Particles, Plane, Scene, Shape, System as Plan};
 use tumble_interface::{Column, Data, Issue, Mesh, SceneError};
 
 /// A world, the surfaces of its colliders, and what is doubtful about it.
@@ -89,6 +89,7 @@ pub fn build(scene: &Scene, assets: &Assets) -> Result<Built, SceneError> {
             solver: plan.solver.clone(),
             clamp: plan.clamp,
             gravity,
+            native: scene.bits == Bits::Native,
             colliders: colliders.clone(),
         };
         let mut system = parts.build(settings).map_err(|e| placed(scene, e))?;
@@ -144,7 +145,7 @@ fn unused(scene: &Scene, plans: &[Plan]) -> Vec<String> {
         let charged = |p: &Particles| p.charge.iter().any(|q| *q != 0.0) && reached(&p.name);
         let emitted = |e: &Emitter| e.charge != 0.0 && reached(&e.name);
         let any = scene.particles.iter().any(charged) || scene.emitter.iter().any(emitted);
-        if matches!(force, Words::Magnetic { .. } | Words::Electric { .. }) && !any {
+        if matches!(force, Words::Magnetic { .. } | Words::Electric { .. } | Words::Electrostatics { .. }) && !any {
             warnings.push(format!("force[{i}]: nothing in its reach has a charge; give particles a charge"));
         }
     }
@@ -233,6 +234,16 @@ fn fill(scene: &Scene, plans: &[Plan], assets: &Assets, issues: &mut Vec<Issue>)
         at("net", &thing.system, &mut |site| match assets.get(&thing.mesh.path) {
             Some(mesh) => recipes::net(site, thing, &recipes::placed(mesh, &thing.mesh)),
             None => site.issues.push(Issue::new(format!("net \"{}\".mesh", thing.name), "the mesh has not been loaded")),
+        });
+    }
+    for thing in &scene.galaxy {
+        let pull = scene.force.iter().find(|f| matches!(f, Words::Gravitation { .. }) && f.on().is_none_or(|on| on.contains(&thing.name)));
+        at("galaxy", &thing.system, &mut |site| match pull {
+            Some(Words::Gravitation { constant, softening, .. }) => recipes::galaxy(site, thing, scene.seed, *constant, *softening),
+            _ => {
+                let message = "nothing holds it together: add a [[force]] with kind = \"gravitation\" on it";
+                site.issues.push(Issue::new(format!("galaxy \"{}\"", thing.name), message));
+            }
         });
     }
     parts

@@ -17,7 +17,8 @@ pub fn objects(scene: &Scene) -> Vec<(&'static str, &str, Option<&str>)> {
     let blocks = scene.block.iter().map(|o| ("block", o.name.as_str(), o.system.as_deref()));
     let nets = scene.net.iter().map(|o| ("net", o.name.as_str(), o.system.as_deref()));
     let emitters = scene.emitter.iter().map(|o| ("emitter", o.name.as_str(), o.system.as_deref()));
-    particles.chain(emitters).chain(ropes).chain(sheets).chain(blocks).chain(nets).collect()
+    let galaxies = scene.galaxy.iter().map(|o| ("galaxy", o.name.as_str(), o.system.as_deref()));
+    particles.chain(emitters).chain(ropes).chain(sheets).chain(blocks).chain(nets).chain(galaxies).collect()
 }
 
 /// Everything wrong that can be seen before anything is built; `systems` are those of the scene, or the default one.
@@ -26,7 +27,7 @@ pub fn check(scene: &Scene, systems: &[System]) -> Vec<Issue> {
     let mut wrong = |path: String, message: String| issues.push(Issue::new(path, message));
     let objects = objects(scene);
     if objects.is_empty() {
-        wrong(String::new(), "nothing to simulate: add particles, an emitter, a rope, a sheet, a block or a net".into());
+        wrong(String::new(), "nothing to simulate: add particles, an emitter, a rope, a sheet, a block, a net or a galaxy".into());
     }
     let colliders = scene.collider.iter().map(|c| ("collider", c.name.as_str()));
     let mut names = HashSet::new();
@@ -196,6 +197,9 @@ fn check_plane(scene: &Scene, wrong: &mut impl FnMut(String, String)) {
     }
     for (kind, name) in scene.block.iter().map(|b| ("block", &b.name)).chain(scene.net.iter().map(|n| ("net", &n.name))) {
         wrong(format!("{kind} \"{name}\""), "it does not fit into a plane; use dimension = 3".into());
+    }
+    for thing in &scene.galaxy {
+        wrong(format!("galaxy \"{}\"", thing.name), "it does not fit into a plane; use dimension = 3".into());
     }
     for thing in &scene.sheet {
         let turn = if axis == 1 { [90.0, 0.0, 0.0] } else { [0.0; 3] };

@@ -85,6 +85,7 @@ impl<'a> Reader<'a> {
         const ANY: f64 = f64::NEG_INFINITY;
         let law: Box<dyn Force> = match words {
             Words::Gravitation { .. }
+            | Words::Electrostatics { .. }
             | Words::LennardJones { .. }
             | Words::Repulsion { .. }
             | Words::Cohesion { .. }

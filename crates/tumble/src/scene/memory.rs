@@ -25,6 +25,7 @@ pub fn memory(scene: &Scene, assets: &Assets) -> f64 {
     for (thing, count) in scene.emitter.iter().zip(alive(scene)) {
         bytes += count * (BORN + 32.0 * thing.columns.len() as f64);
     }
+    bytes += scene.galaxy.iter().map(|thing| f64::from(thing.stars) * MASS).sum::<f64>();
     for thing in &scene.rope {
         let links = if thing.rod.is_some() { 6.0 } else { 2.0 };
         bytes += (f64::from(thing.segments) + 1.0) * (2.0 * MASS + links * LINK);

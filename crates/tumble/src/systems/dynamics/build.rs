@@ -5,7 +5,7 @@ use super::{Dynamics, Stepping, books};
 use crate::elements::{
     BendTwist, Distance, Element, Elements, Hinge, Linear, Members, Nonlinear, Pairs, StretchShear, TetShear, TetStrain, TetVolume, Vector,
 };
-use crate::forces::{Cohesion, Flock, Force, Goal, Gravitation, Habits, LennardJones, Near, Repulsion, Viscosity};
+use crate::forces::{Attractor, Cohesion, DirectSum, Flock, Force, Goal, Habits, Halos, LennardJones, Near, Repulsion, Viscosity};
 use crate::geometry::Collider;
 use crate::integrators::Memory;
 use crate::math::{Real, Vec3, functions};
@@ -36,6 +36,8 @@ pub struct Settings {
     pub clamp: Option<f64>,
     /// Gravity [m/s²].
     pub gravity: [f64; 3],
+    /// Whether forces between all masses may use the fastest arithmetic of the machine.
+    pub native: bool,
     /// Solids.
     pub colliders: Arc<Vec<Collider>>,
 }
@@ -80,6 +82,8 @@ pub struct Parts {
     frames: Vec<([f64; 4], f64, bool)>,
     /// Points with an electric charge [C].
     charges: Vec<(u32, f64)>,
+    /// Points that are spread out as Plummer's sphere, with its radius [m], in order.
+    halos: Vec<(u32, f64)>,
     linear: Springs<1, 0>,
     nonlinear: Springs<1, 2>,
     vector: Springs<0, 0>,
@@ -171,6 +175,11 @@ impl Parts {
     /// Gives a point an electric charge [C].
     pub fn charge(&mut self, point: u32, charge: f64) {
         self.charges.push((point, charge));
+    }
+
+    /// Spreads a point out as Plummer's sphere of a radius [m].
+    pub fn halo(&mut self, point: u32, radius: f64) {
+        self.halos.push((point, radius));
     }
 
     /// Holds a point.
@@ -374,8 +383,8 @@ impl Parts {
         let mut pairs = Vec::new();
         for (words, on, others) in self.between {
             let (on, others) = (placed(on), others.map(&placed));
-            if let Some(batch) = between(words, rows_of(&on), others.as_deref().map(rows_of), &masses, &settings.colliders) {
-                pairs.push((batches.list.len(), on, others));
+            for batch in between(words, rows_of(&on), others.as_deref().map(rows_of), &masses, &self.halos, &settings) {
+                pairs.push((batches.list.len(), on.clone(), others.clone()));
                 batches.list.push(batch);
             }
         }
@@ -431,16 +440,28 @@ impl Parts {
     }
 }
 
-/// The batch of a force between masses.
+/// The batches of a force between masses.
 fn between(
     words: Words,
     on: Vec<Range<usize>>,
     others: Option<Vec<Range<usize>>>,
     masses: &Masses,
-    colliders: &Arc<Vec<Collider>>,
-) -> Option<Box<dyn crate::elements::Batch>> {
-    Some(match words {
-        Words::Gravitation { constant, softening, .. } => Box::new(Gravitation::new(on, &masses.mass, constant, softening)),
+    halos: &[(u32, f64)],
+    settings: &Settings,
+) -> Vec<Box<dyn crate::elements::Batch>> {
+    vec![match words {
+        Words::Gravitation { constant, softening, .. } => {
+            let attractor = Attractor::Mass(constant);
+            let points: Box<dyn crate::elements::Batch> =
+                Box::new(DirectSum::new(attractor, softening, settings.native, halos, on.clone(), masses));
+            if halos.is_empty() {
+                return vec![points];
+            }
+            return vec![Box::new(Halos::new(constant, softening, halos, &on, masses)), points];
+        }
+        Words::Electrostatics { constant, softening, .. } => {
+            Box::new(DirectSum::new(Attractor::Charge(-constant), softening, settings.native, &[], on, masses))
+        }
         Words::LennardJones { epsilon, sigma, cutoff, smooth, .. } => {
             Box::new(Near::new(LennardJones::new(epsilon, sigma, cutoff.unwrap_or(2.5 * sigma), smooth), on, others))
         }
@@ -490,11 +511,11 @@ fn between(
                 chase,
                 predator_speed: predator_speed.unwrap_or(speed),
             };
-            Box::new(Flock::new(habits, on, others.unwrap_or_default(), masses, colliders.clone()))
+            Box::new(Flock::new(habits, on, others.unwrap_or_default(), masses, settings.colliders.clone()))
         }
         // Forces on each mass by itself.
-        _ => return None,
-    })
+        _ => return Vec::new(),
+    }]
 }
 
 /// Batches in the order in which they act.
