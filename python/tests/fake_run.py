@@ -151,3 +151,33 @@ def one(name: str, section: str, static: dict[str, Array], position: Array, **wo
 
 def f32(values: Array) -> Array:
     return np.ascontiguousarray(values, dtype=np.float32)
+
+
+def fountain(color: bool = True, radius: bool = True, frames: int = 6) -> FakeRun:
+    """Droplets that come and go: none at the start; rows in no order; some live shorter than others."""
+    born = np.arange(40) / 80  # Two in the first frame after the start, then eight a frame.
+    life = np.where(np.arange(40) % 3 == 0, 0.15, 0.4)
+    throw = np.stack([np.cos(2.4 * np.arange(40)), np.sin(2.4 * np.arange(40)), np.full(40, 3.0)], 1)
+
+    def columns(t: float) -> Columns:
+        age = t - born
+        alive = np.flatnonzero((age > 0) & (age < life))
+        alive = alive[np.argsort(alive * 7919 % 41)]
+        a = age[alive, None]
+        fall = np.array([0.0, 0.0, -9.8])
+        table = {
+            "position": f32(throw[alive] * a + 0.5 * fall * a**2),
+            "velocity": f32(throw[alive] + fall * a),
+            "id": alive.astype(np.uint32),
+            "age": f32(a[:, 0]),
+            "heat": f32(300.0 + alive),
+        }
+        if radius:
+            table["radius"] = f32(0.01 + 0.001 * (alive % 5))
+        if color:
+            table["color"] = f32(np.stack([alive / 40, 0.5 + 0 * alive, 1 - alive / 40], 1))
+        return {"spray": table}
+
+    words = scene(emitter=[{"name": "spray", "color": BLUE}])
+    static: Columns = {"spray": {} if radius else {"radius": np.array([0.02])}}
+    return FakeRun(words, static, columns, n_frames=frames)

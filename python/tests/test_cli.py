@@ -221,6 +221,16 @@ def test_export_npz_stacks_all_frames(spring: Tree, scene_file: SceneFile, tumbl
     assert not list(Path("results").glob("*.tmp"))
 
 
+def test_ply_by_option_or_by_the_scene(spring: Tree, scene_file: SceneFile, tumble: Command) -> None:
+    tumble("run", scene_file(spring), "--frames", 2)
+    assert not Path("out/scene/ply").exists()
+    assert tumble("export", "out/scene", "--ply").code == 0
+    files = ["p.000000.ply", "p.000001.ply", "p.000002.ply"]
+    assert sorted(p.name for p in Path("out/scene/ply").iterdir()) == files
+    assert tumble("run", scene_file(spring), "--frames", 1, "--set", "output.ply=true", "--force").code == 0
+    assert sorted(p.name for p in Path("out/scene/ply").iterdir()) == files[:2]
+
+
 # Scenes
 
 

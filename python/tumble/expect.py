@@ -120,15 +120,20 @@ def _probe(probe: Mapping[str, Any], value: Sequence[float], last: int) -> Broke
 
 
 def probes(world: World, scene: Mapping[str, Any]) -> list[list[float]]:
-    """The values that the scene's probes look at, now. Raises SceneError where there is nothing to look at."""
+    """The values that the scene's probes look at, now; of particles that come and go, `index` is the id, and of one
+    that is not there nan. Raises SceneError where there is nothing to look at."""
     found, issues = [], []
     for i, probe in enumerate(scene.get("expect", {}).get("probe", ())):
         column, name, index = probe["column"], probe["object"], probe["index"]
-        table = world.columns(column)
+        table = world.columns(column, "id") if column != "id" else world.columns("id")
+        table = {name: columns for name, columns in table.items() if column in columns}
         path = f"expect.probe[{i}]"
         if name not in table:
             known = ", ".join(f'"{n}"' for n in table) or "none"
             issues.append(f'{path}: no object "{name}" has a column "{column}"; those that have one: {known}')
+        elif "id" in table[name]:
+            rows = table[name][column][table[name]["id"] == index]
+            found.append([float(x) for x in np.atleast_1d(rows[0])] if len(rows) else [np.nan])
         elif index >= len(table[name][column]):
             issues.append(f'{path}.index: {index}, expected < {len(table[name][column])}, the length of "{name}"')
         else:

@@ -89,7 +89,8 @@ def _pictures(studio: Studio, frames: range, processes: int) -> Generator[Pictur
     processes = min(processes, len(frames))
     camera = studio.camera.unit()
     if processes <= 1:
-        yield from (render(studio.renderer, studio.things(i), camera, SAMPLES) for i in frames)
+        night = studio.stage.night
+        yield from (render(studio.renderer, studio.things(i), camera, SAMPLES, night) for i in frames)
         return
     context = multiprocessing.get_context("spawn")
     pool = ProcessPoolExecutor(processes, mp_context=context, initializer=_worker, initargs=(studio.renderer,))
@@ -100,7 +101,7 @@ def _pictures(studio: Studio, frames: range, processes: int) -> Generator[Pictur
                 yield waiting.popleft().result()
             things = studio.things(i)
             with _no_main():
-                waiting.append(pool.submit(_draw, studio.renderer, things, camera))
+                waiting.append(pool.submit(_draw, studio.renderer, things, camera, studio.stage.night))
         while waiting:
             yield waiting.popleft().result()
     except BrokenProcessPool as error:
@@ -109,8 +110,8 @@ def _pictures(studio: Studio, frames: range, processes: int) -> Generator[Pictur
         pool.shutdown(wait=True, cancel_futures=True)
 
 
-def _draw(renderer: str, things: list[Thing], camera: Camera) -> Picture:
-    return render(renderer, things, camera, SAMPLES)
+def _draw(renderer: str, things: list[Thing], camera: Camera, night: bool) -> Picture:
+    return render(renderer, things, camera, SAMPLES, night)
 
 
 def _worker(renderer: str) -> None:

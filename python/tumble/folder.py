@@ -45,7 +45,7 @@ TRIALS = ["time", "step", "error", "accepted", "frame"]
 _WRITTEN = """
 static.npz columns.json ledger.csv trials.csv frames/*.npz checkpoints/*.safetensors
 film.mp4 .film.mp4.part energy.png ledger.png stills/*.png columns.npz
-scene.usda usd/frame.*.usdc usd/manifest.usda usd/objects.usdc
+scene.usda usd/frame.*.usdc usd/manifest.usda usd/objects.usdc ply/*.ply
 run.json
 """
 """What a run writes and --force deletes: the manifest last, because a folder without it is not taken for a run."""
@@ -94,7 +94,7 @@ class RunFolder:
             for pattern in _WRITTEN.split():
                 for file in [*self.path.glob(pattern), *self.path.glob(pattern + ".tmp")]:
                     file.unlink()
-            for folder in ("frames", "checkpoints", "stills", "usd"):
+            for folder in ("frames", "checkpoints", "stills", "usd", "ply"):
                 with suppress(OSError):
                     (self.path / folder).rmdir()
 

@@ -194,13 +194,15 @@ def ledger_row(
 
 
 def describe(units: Mapping[str, Mapping[str, str]], *tables: Columns) -> dict[str, dict[str, Any]]:
-    """Object -> column -> unit, shape and type."""
+    """Object -> column -> unit, shape and type. Where particles come and go, the first length is None."""
     described: dict[str, dict[str, Any]] = {}
     for place, columns in zip(("static", "frames"), tables, strict=True):
         for name, table in columns.items():
             for column, array in table.items():
                 unit = units.get(name, {}).get(column, "1")
-                entry = {"unit": unit, "shape": array.shape, "dtype": array.dtype.name, "in": place}
+                varies = place == "frames" and "id" in table
+                shape = (None, *array.shape[1:]) if varies else array.shape
+                entry = {"unit": unit, "shape": shape, "dtype": array.dtype.name, "in": place}
                 described.setdefault(name, {})[column] = entry
     return described
 

@@ -191,7 +191,8 @@ class Run:
 
     @cached_property
     def columns(self) -> dict[str, dict[str, dict[str, Any]]]:
-        """Object -> column -> unit, shape, dtype, and the file it is `in`: frames or static."""
+        """Object -> column -> unit, shape, dtype, and the file it is `in`: frames or static. Of particles that come and
+        go the first length is None; their column `id` says which is which."""
         try:
             described: dict[str, dict[str, dict[str, Any]]] = json.loads(self._files.columns.read_bytes())
         except (OSError, ValueError) as error:

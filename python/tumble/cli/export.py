@@ -20,6 +20,7 @@ def export(
     npz: Annotated[
         bool, typer.Option("--npz", help="columns.npz: every column of all frames, frames x rows x width.")
     ] = False,
+    ply: Annotated[bool, typer.Option("--ply", help="ply/NAME.FRAME.ply: the particles of each frame.")] = False,
     out: Annotated[
         Path | None, typer.Option(metavar="DIR", help="Folder to write into.", show_default="that of the run")
     ] = None,
@@ -30,9 +31,10 @@ def export(
     Examples:
       tumble export out/sheet-on-bunny --usd
       tumble export out/sheet-on-bunny --npz --out results
+      tumble export out/fountain --ply
     """
-    if not (usd or npz):
-        raise typer.BadParameter("choose at least one format: --usd, --npz")
+    if not (usd or npz or ply):
+        raise typer.BadParameter("choose at least one format: --usd, --npz, --ply")
     found = find.run(run)
     folder = out or found.folder
     if usd:
@@ -43,10 +45,19 @@ def export(
     if npz:
         with Progress("npz") as progress:
             say(stack(found, folder, progress))
+    if ply:
+        from tumble.export.ply import write as write_ply
+
+        with Progress("ply") as progress:
+            say(write_ply(found, folder, progress))
 
 
 def stack(run: "Run", folder: Path, progress: Progress) -> Path:
-    """Writes columns.npz: keys `time` [s] and `object/column`, frames x rows x width."""
+    """Writes columns.npz: keys `time` [s] and `object/column`, frames x rows x width.
+
+    Of particles that come and go, the rows of all frames follow each other, rows x width: those of frame i are
+    `first[i]` to `first[i + 1]` of the key `object/first`.
+    """
     import zipfile
 
     import numpy as np
@@ -57,16 +68,22 @@ def stack(run: "Run", folder: Path, progress: Progress) -> Path:
     temporary = path.with_name(path.name + ".tmp")
     first = run.frame(0) if run.n_frames else {}
     keys = [(name, column) for name, table in first.items() for column in table]
+    starts = {name: _starts(run, name) for name, table in first.items() if "id" in table}
     with writing(path):
         folder.mkdir(parents=True, exist_ok=True)
         try:
             with zipfile.ZipFile(temporary, "w") as archive:
                 with archive.open("time.npy", "w", force_zip64=True) as member:
                     np.lib.format.write_array(member, run.ledger["time"])
+                for name, rows in starts.items():
+                    with archive.open(f"{name}/first.npy", "w", force_zip64=True) as member:
+                        np.lib.format.write_array(member, np.array(rows, dtype=np.int64))
                 # Frame after frame, so that a run that is larger than the memory can be exported.
                 for k, (name, column) in enumerate(keys):
                     array = first[name][column]
                     shape = (run.n_frames, *array.shape)
+                    if name in starts:
+                        shape = (starts[name][-1], *array.shape[1:])
                     header = {
                         "descr": np.lib.format.dtype_to_descr(array.dtype),
                         "fortran_order": False,
@@ -81,3 +98,11 @@ def stack(run: "Run", folder: Path, progress: Progress) -> Path:
         finally:
             temporary.unlink(missing_ok=True)
     return path
+
+
+def _starts(run: "Run", name: str) -> list[int]:
+    """At which row each frame of an object starts, and the number of all rows."""
+    starts = [0]
+    for i in range(run.n_frames):
+        starts.append(starts[-1] + len(run.frame(i)[name]["id"]))
+    return starts

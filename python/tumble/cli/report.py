@@ -14,7 +14,7 @@ if TYPE_CHECKING:
 _NO_GAIN = 0.1
 """Growth of the energy over its scale below which a change counts as gaining none."""
 
-_RESULTS = ["film.mp4", "scene.usda", "energy.png", "stills"]
+_RESULTS = ["film.mp4", "scene.usda", "ply", "energy.png", "stills"]
 
 
 def summary(run: "Run") -> str:

@@ -25,6 +25,7 @@ def run(
     ] = None,
     film: Annotated[bool | None, typer.Option(help="Write film.mp4.", show_default="as the scene says")] = None,
     usd: Annotated[bool | None, typer.Option(help="Write scene.usda.", show_default="as the scene says")] = None,
+    ply: Annotated[bool | None, typer.Option(help="Write ply/.", show_default="as the scene says")] = None,
     plot: Annotated[bool | None, typer.Option(help="Write energy.png.", show_default="as the scene says")] = None,
     stills: Annotated[bool, typer.Option(help="Write the stills that the scene asks for.")] = True,
     renderer: Annotated[str, typer.Option(metavar="NAME", help="What draws film and stills.")] = "auto",
@@ -58,6 +59,7 @@ def run(
     asked = {
         "film": wanted["film"] if film is None else film,
         "usd": wanted["usd"] if usd is None else usd,
+        "ply": wanted["ply"] if ply is None else ply,
         "plot": wanted["plot"] if plot is None else plot,
     }
     frames_to_draw = wanted["stills"] if stills else []
@@ -67,11 +69,11 @@ def run(
         with find.naming(find.scene_file(scene), folder), Progress("simulate") as progress:
             done = simulate(checked, folder, resume=resume, threads=threads, progress=progress, overwrite=force)
     except StepError as error:
-        again = [*(["--out", str(out)] if out else []), *_flags(film, usd, plot, stills, renderer)]
+        again = [*(["--out", str(out)] if out else []), *_flags(film, usd, ply, plot, stills, renderer)]
         print(report.failure(Run(folder), error, scene, overrides, again), file=sys.stderr)
         raise typer.Exit(1) from None
     except KeyboardInterrupt:
-        again = [*(["--out", str(out)] if out else []), "--resume", *_flags(film, usd, plot, stills, renderer)]
+        again = [*(["--out", str(out)] if out else []), "--resume", *_flags(film, usd, ply, plot, stills, renderer)]
         _say_what_is_kept(folder, find.command("run", scene, overrides, *again))
         raise typer.Exit(130) from None
 
@@ -94,9 +96,11 @@ def run(
         raise typer.Exit(1)
 
 
-def _flags(film: bool | None, usd: bool | None, plot: bool | None, stills: bool, renderer: str) -> list[str]:
+def _flags(
+    film: bool | None, usd: bool | None, ply: bool | None, plot: bool | None, stills: bool, renderer: str
+) -> list[str]:
     """The options on results, as they were given."""
-    asked = {"film": film, "usd": usd, "plot": plot, "stills": None if stills else False}
+    asked = {"film": film, "usd": usd, "ply": ply, "plot": plot, "stills": None if stills else False}
     flags = [f"--{'' if wanted else 'no-'}{name}" for name, wanted in asked.items() if wanted is not None]
     return [*flags, *(["--renderer", renderer] if renderer != "auto" else [])]
 
@@ -125,6 +129,12 @@ def _write_results(run: "Run", asked: dict[str, bool], stills: list[int], render
         with Progress("usd") as progress:
             write(run, run.folder, progress=progress)
 
+    def ply() -> None:
+        from tumble.export.ply import write
+
+        with Progress("ply") as progress:
+            write(run, run.folder, progress)
+
     def plot() -> None:
         from tumble.plots import energy
 
@@ -143,7 +153,7 @@ def _write_results(run: "Run", asked: dict[str, bool], stills: list[int], render
         if late := [str(i) for i in stills if i >= run.n_frames]:
             warn(f"no still of frame {', '.join(late)}: the last frame is {run.n_frames - 1}")
 
-    tasks = {"plot": plot, "usd": usd, "film": draw_film, "stills": draw_stills}
+    tasks = {"plot": plot, "usd": usd, "ply": ply, "film": draw_film, "stills": draw_stills}
     for name, task in tasks.items():
         if asked.get(name, True):
             try:

@@ -3,7 +3,8 @@
     scene.usda              camera, lights, frame rate; refers to objects.usdc; names the frames as value clips
     usd/objects.usdc        what does not change: topology, ids, widths, colours, colliders; points at the start
     usd/manifest.usda       which attributes the frames hold
-    usd/frame.000000.usdc   points, velocities, normals and extents of a frame, at time code 0; and so on
+    usd/frame.000000.usdc   points, velocities, normals and extents of a frame, at time code 0; and so on; of particles
+                            that come and go also ids, widths, colours and all other numbers that they have
 
 Why value clips: sub-layers cannot do it (the strongest layer that has any time sample of an attribute hides the
 samples of all others), and one file with all samples keeps them all in memory while it is written. Value clips are
@@ -13,6 +14,9 @@ program that reads USD in another way may see the start only, which is in object
 
 The clips must be stronger than the points at the start, and defaults beside clips are stronger than these: that is
 why objects.usdc is referenced and not a sub-layer.
+
+Of particles that come and go, a row can be another particle in the next frame: between frames they are where their
+velocities take them (`UsdGeom.PointBased.ComputePointsAtTime`), not between equal rows.
 """
 
 import contextlib
@@ -31,7 +35,7 @@ from tumble.folder import writing
 from tumble.pictures.framing import camera
 from tumble.pictures.look import key_light
 from tumble.pictures.surfaces import normals, split
-from tumble.pictures.things import Columns, Object, Recording, objects, positions
+from tumble.pictures.things import Columns, Object, Recording, colors, objects, positions, radii
 
 ROOT = "/scene"
 SENSOR = 0.36
@@ -42,7 +46,10 @@ SPRING = 0.25
 
 DIGITS = 6
 
-Floats = npt.NDArray[np.float32]
+KNOWN = ("position", "velocity", "id", "radius", "color")
+"""Columns that become something else than a primvar of their name."""
+
+Numbers = npt.NDArray[np.float32] | npt.NDArray[np.int64]
 
 
 @dataclass(frozen=True)
@@ -159,7 +166,21 @@ def _placement(part: Part, columns: Columns) -> list[tuple[str, str, Any]]:
     return [("xformOp:translate", "double3", shift), ("xformOp:orient", "quatd", Gf.Quatd(w, x, y, z))]
 
 
-def _values(part: Part, columns: Columns) -> Iterator[tuple[str, str, Floats]]:
+def _varying(part: Part, columns: Columns) -> bool:
+    """Whether a part is particles that come and go."""
+    return part.kind == "Points" and "id" in columns.get(part.thing.name, {})
+
+
+def _array(values: Numbers) -> Any:
+    """Numbers as the library wants them."""
+    from pxr import Vt
+
+    if values.dtype == np.int64:
+        return Vt.Int64Array.FromNumpy(values)
+    return Vt.Vec3fArray.FromNumpy(values) if values.ndim == 2 else Vt.FloatArray.FromNumpy(values)
+
+
+def _values(part: Part, columns: Columns) -> Iterator[tuple[str, str, Numbers]]:
     """What a frame says of a part: attribute, type and values."""
     x = _places(part.thing, columns)
     v = columns.get(part.thing.name, {}).get("velocity")
@@ -172,14 +193,35 @@ def _values(part: Part, columns: Columns) -> Iterator[tuple[str, str, Floats]]:
         source, triangles = part.cut or (np.arange(len(x)), part.thing.triangles)
         n = normals(x[source], triangles)
         yield "normals", "normal3f[]", np.ascontiguousarray(n[triangles.ravel()] if part.cut else n, dtype=np.float32)
+    varying = _varying(part, columns)
+    radius: Any = np.float32(part.radius)
+    if varying:
+        table = columns[part.thing.name]
+        yield "ids", "int64[]", np.ascontiguousarray(table["id"], dtype=np.int64)
+        if "radius" in table:
+            radius = radii(columns, part.thing).astype(np.float32)[:, None]
+            yield "widths", "float[]", np.ascontiguousarray(2 * radius[:, 0])
+        if "color" in table:
+            yield "primvars:displayColor", "color3f[]", colors(columns, part.thing).astype(np.float32)
+        for name, numbers in table.items():
+            if name not in KNOWN and np.shape(numbers) == (len(points),):
+                yield f"primvars:{_identifier(name)}", "float[]", np.ascontiguousarray(numbers, dtype=np.float32)
     if len(points):
-        low, high = points.min(axis=0) - np.float32(part.radius), points.max(axis=0) + np.float32(part.radius)
-        yield "extent", "float3[]", np.stack([low, high])
+        yield "extent", "float3[]", np.stack([(points - radius).min(axis=0), (points + radius).max(axis=0)])
+    elif varying:
+        most = np.finfo(np.float32).max
+        yield "extent", "float3[]", np.array([[most] * 3, [-most] * 3], dtype=np.float32)  # The empty range.
+
+
+def _identifier(name: str) -> str:
+    from pxr import Tf
+
+    return str(Tf.MakeValidIdentifier(name))
 
 
 def _frame(parts: list[Part], columns: Columns, i: int) -> Any:
     """The layer of a frame."""
-    from pxr import Sdf, Vt
+    from pxr import Sdf
 
     layer = Sdf.Layer.CreateAnonymous(".usdc")
     with Sdf.ChangeBlock():
@@ -193,7 +235,7 @@ def _frame(parts: list[Part], columns: Columns, i: int) -> Any:
             if _deforms(part, columns):
                 for name, kind, values in _values(part, columns):
                     attribute = Sdf.AttributeSpec(prim, name, Sdf.ValueTypeNames.Find(kind))
-                    layer.SetTimeSample(attribute.path, float(i), Vt.Vec3fArray.FromNumpy(values))
+                    layer.SetTimeSample(attribute.path, float(i), _array(values))
     return layer
 
 
@@ -226,17 +268,25 @@ def _objects(parts: list[Part], start: Columns) -> Any:
         prim.SetDisplayName(part.title)
         for name, kind, values in _values(part, start):
             attribute = prim.CreateAttribute(name, Sdf.ValueTypeNames.Find(kind), False)
-            attribute.Set(Vt.Vec3fArray.FromNumpy(values))
+            attribute.Set(_array(values))
+            if name.startswith("primvars:"):
+                UsdGeom.Primvar(attribute).SetInterpolation(UsdGeom.Tokens.vertex)
         placement = _placement(part, start)
         if placement:
             order = UsdGeom.Xformable(prim)
             order.AddTranslateOp().Set(placement[0][2])
             order.AddOrientOp(UsdGeom.XformOp.PrecisionDouble).Set(placement[1][2])
         n = len(prim.GetAttribute("points").Get())
-        shown = UsdGeom.Gprim(prim)
         color = Gf.Vec3f(*part.thing.color)
-        shown.CreateDisplayColorAttr([color])
-        if part.kind == "Points":
+        colored = prim.GetAttribute("primvars:displayColor").HasAuthoredValue()
+        if not colored:
+            UsdGeom.Gprim(prim).CreateDisplayColorAttr([color])
+        if _varying(part, start):
+            cloud = UsdGeom.Points(prim)
+            if not prim.GetAttribute("widths").HasAuthoredValue():
+                cloud.CreateWidthsAttr(Vt.FloatArray(1, 2 * part.radius))
+                cloud.SetWidthsInterpolation(UsdGeom.Tokens.constant)
+        elif part.kind == "Points":
             cloud = UsdGeom.Points(prim)
             cloud.CreateIdsAttr(Vt.Int64Array.FromNumpy(np.arange(n, dtype=np.int64)))
             cloud.CreateWidthsAttr(Vt.FloatArray(n, 2 * part.radius))
@@ -259,7 +309,14 @@ def _objects(parts: list[Part], start: Columns) -> Any:
         look = UsdShade.Material.Define(stage, f"{ROOT}/looks/{part.path[len(ROOT) + 1 :]}")
         shader = UsdShade.Shader.Define(stage, look.GetPath().AppendChild("surface"))
         shader.CreateIdAttr("UsdPreviewSurface")
-        shader.CreateInput("diffuseColor", Sdf.ValueTypeNames.Color3f).Set(color)
+        paint = shader.CreateInput("diffuseColor", Sdf.ValueTypeNames.Color3f)
+        paint.Set(color)
+        if colored:
+            reader = UsdShade.Shader.Define(stage, look.GetPath().AppendChild("colors"))
+            reader.CreateIdAttr("UsdPrimvarReader_float3")
+            reader.CreateInput("varname", Sdf.ValueTypeNames.String).Set("displayColor")
+            out = reader.CreateOutput("result", Sdf.ValueTypeNames.Float3)
+            paint.ConnectToSource(reader.ConnectableAPI(), out.GetBaseName())
         shader.CreateInput("roughness", Sdf.ValueTypeNames.Float).Set(0.8 if part.thing.kind == "sheet" else 0.4)
         look.CreateSurfaceOutput().ConnectToSource(shader.ConnectableAPI(), "surface")
         UsdShade.MaterialBindingAPI.Apply(prim).Bind(look)

@@ -5,8 +5,10 @@ Three renderers draw the same things from the same camera: `mitsuba` (path traci
 """
 
 import functools
+import hashlib
 import importlib.util
 import os
+import pickle
 import subprocess
 import sys
 from collections.abc import Callable
@@ -15,12 +17,12 @@ import numpy as np
 import numpy.typing as npt
 
 from tumble._engine import ExportError
-from tumble.pictures import framing
+from tumble.pictures import framing, splats
 from tumble.pictures.framing import Camera
 from tumble.pictures.pyvista_ import headless
 from tumble.pictures.surfaces import Floats, unit
-from tumble.pictures.things import Ground, Mesh, Recording, Stage, Thing, placed
-from tumble.style import GROUND, SOLID
+from tumble.pictures.things import Cloud, Ground, Mesh, Recording, Stage, Thing, placed
+from tumble.style import GROUND, SOLID, display, linear
 
 __all__ = ["RENDERERS", "Studio", "picture", "render", "renderers", "resolve"]
 
@@ -91,7 +93,7 @@ class Studio:
 
     def picture(self, i: int) -> Picture:
         """A picture of frame i."""
-        return render(self.renderer, self.things(i), self.camera.unit(), self.samples)
+        return render(self.renderer, self.things(i), self.camera.unit(), self.samples, self.stage.night)
 
     def things(self, i: int) -> list[Thing]:
         """What is to be drawn of frame i, moved and scaled for `Camera.unit`."""
@@ -114,7 +116,11 @@ class Studio:
             return []
         gravity = self.run.scene.get("world", {}).get("gravity", (0.0, 0.0, -9.8))
         weighs = any("mass" in columns for columns in self.run.static.values())  # Tracers do not.
-        if self.stage.flat or not gravity[2] < 0 or not weighs:
+        weighs = weighs or (
+            any("id" in columns for columns in self.run.frame(0).values())
+            and any(s.get("method") == "dynamics" for s in self.run.scene.get("system", ()))
+        )
+        if self.stage.flat or self.stage.night or not gravity[2] < 0 or not weighs:
             return []
         low, high = points().min(axis=0), points().max(axis=0)
         point = np.array([0.0, 0.0, low[2] - GAP * float(np.max(high - low))])
@@ -136,8 +142,41 @@ class Studio:
         return Mesh(ground.name, corners, triangles, facing, color)
 
 
-def render(renderer: str, things: list[Thing], camera: Camera, samples: int = SAMPLES) -> Picture:
-    """Draws things with one of the renderers. Raises ExportError if it fails."""
+def render(renderer: str, things: list[Thing], camera: Camera, samples: int = SAMPLES, night: bool = False) -> Picture:
+    """Draws things with one of the renderers, and clouds over them. Raises ExportError if it fails."""
+    clouds = [t for t in things if isinstance(t, Cloud)]
+    if not clouds and not night:
+        return _drawn(renderer, things, camera, samples)
+    scenery: list[Thing] = [t for t in things if not isinstance(t, Cloud)]
+    # By night nothing at all is dark, and drawn at once.
+    light, depth = (None, np.full(camera.size[::-1], np.inf))
+    if scenery or not night:
+        light, depth = _scenery(renderer, scenery, camera, samples)
+    try:
+        if night:
+            shown = splats.glow(light, depth, scenery, clouds, camera)
+        else:
+            assert light is not None
+            shown = splats.discs(light, depth, clouds, camera)
+    except (MemoryError, ValueError) as error:
+        raise ExportError(f"particles cannot be drawn: {error}") from error
+    return np.round(255 * display(shown)).astype(np.uint8)
+
+
+_KEPT: dict[bytes, tuple[Floats, Floats]] = {}
+
+
+def _scenery(renderer: str, things: list[Thing], camera: Camera, samples: int) -> tuple[Floats, Floats]:
+    """The picture of all but clouds in linear light, and how far away it is; that of the last time if nothing moved."""
+    key = hashlib.blake2b(pickle.dumps((renderer, things, camera, samples))).digest()
+    if key not in _KEPT:
+        _KEPT.clear()
+        picture = linear(_drawn(renderer, things, camera, samples) / 255)
+        _KEPT[key] = picture, splats.depths(things, camera)
+    return _KEPT[key]
+
+
+def _drawn(renderer: str, things: list[Thing], camera: Camera, samples: int) -> Picture:
     try:
         if renderer == "mitsuba":
             from tumble.pictures import mitsuba_

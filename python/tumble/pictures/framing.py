@@ -2,8 +2,9 @@
 
 Where the scene's camera leaves something open, it stands far enough away for everything to fit in at every frame.
 What must fit are the points that lie farthest out in 26 directions, of each object, in up to 200 frames (fewer where
-they are large). Floors need not fit; colliders far larger than what moves need to fit only near it. A two-dimensional
-scene is seen head-on in parallel projection.
+they are large); of many particles those few that have strayed far from the others need not. Floors need not fit;
+colliders far larger than what moves need to fit only near it. A two-dimensional scene is seen head-on in parallel
+projection.
 """
 
 from collections.abc import Callable, Mapping
@@ -22,6 +23,15 @@ DIRECTIONS: Floats = unit(np.array([d for d in product((-1.0, 0.0, 1.0), repeat=
 
 FROM_FRONT = (0.42, -1.0, 0.40)
 """Direction from which a scene in space is seen."""
+
+MANY = 200
+"""Of more particles than these, strays need not fit."""
+
+STRAY = 1.6
+"""Distance from the middle of an object, over that within which 95 % of its particles are, beyond which they stray."""
+
+SAMPLE = 5_000
+"""Particles of an object that are looked at in a frame, about."""
 
 LOOKED_AT = 200
 """Frames at which the extent is taken, at most."""
@@ -169,18 +179,32 @@ def _up(forward: Floats) -> Floats:
     return np.array([0.0, 1.0, 0.0] if steep else [0.0, 0.0, 1.0])
 
 
+def together(x: Floats) -> Floats:
+    """Positions of many particles without those that have strayed; a regular sample of very many."""
+    if len(x) <= MANY:
+        return x
+    x = x[:: max(len(x) // SAMPLE, 1)]
+    # Half of the directions: the others are opposite to them.
+    off = np.abs((d := x @ DIRECTIONS[:13].T) - np.median(d, axis=0))
+    near: Floats = x[(off <= STRAY * np.quantile(off, 0.95, axis=0)).all(axis=1)]
+    return near
+
+
 def outline(run: Recording) -> Floats:
     """Points that must be in the picture; at least one."""
     found = objects(run)
     radius = {o.name: o.radius if o.kind in ("points", "curve") else 0.0 for o in found}
     parts = []
-    masses = sum(len(positions(run.frame(0), o)) for o in moving(found)) if run.n_frames else 0
+    some = {0, run.n_frames // 2, run.n_frames - 1} if run.n_frames else set()
+    masses = max((sum(len(positions(run.frame(i), o)) for o in moving(found)) for i in some), default=0)
     looks = int(min(run.n_frames, LOOKED_AT, max(5.0, READ / (3 * masses + 1))))
     for i in np.unique(np.linspace(0, run.n_frames - 1, looks).astype(int)):
         columns = run.frame(int(i))
         for o in moving(found):
             x = positions(columns, o)
             x = x[np.isfinite(x).all(axis=1)]
+            if o.kind == "points" and not len(o.links):
+                x = together(x)
             if len(x):
                 parts.append(x[np.argmax(x @ DIRECTIONS.T, axis=0)] + radius[o.name] * DIRECTIONS)
     bodies = [o.position for o in found if o.kind == "solid" and o.position is not None and len(o.position)]

@@ -7,11 +7,14 @@ import numpy as np
 
 from tumble.pictures.framing import Camera
 from tumble.pictures.surfaces import Floats, Indices, joined, unit
-from tumble.pictures.things import Ground, Thing, as_triangles
+from tumble.pictures.things import Body, Ground, Thing, as_triangles
 from tumble.style import display, rgb
 
 SKY = "#f4f6f8", "#dfe4ea"
 """Background, at the top and at the bottom of the picture."""
+
+NIGHT = (0.0022, 0.003, 0.0062), (0.0045, 0.0052, 0.0085)
+"""Background by night in linear light, at the top and at the bottom."""
 
 FADE = (0.75, 2.2)
 """Distances from the camera's target, in pictures' widths, between which the ground fades away."""
@@ -86,7 +89,7 @@ def _across(normal: Floats) -> tuple[Floats, Floats]:
 
 def _shadow(ground: Ground, things: list[Thing], camera: Camera, u: Floats, v: Floats) -> Floats:
     """How dark the shadow is, 0 to 1, at points of a ground: a map of where light is caught, blurred."""
-    bodies = joined([as_triangles(t, 1) for t in things if not isinstance(t, Ground)])
+    bodies = joined([as_triangles(t, 1) for t in things if isinstance(t, Body)])
     light = key_light(camera)
     slope = float(light @ ground.normal)
     cells, half = 384, 1.0 * camera.width

@@ -47,7 +47,7 @@ def draw(things: list[Thing], camera: Camera) -> npt.NDArray[np.uint8]:
     for ground in (t for t in things if isinstance(t, Ground)):
         vertices, triangles, colors = painted(ground, things, camera, RINGS)
         _paint(axes, camera, vertices, triangles, colors, np.zeros(len(triangles)))
-    bodies = [t for t in things if not isinstance(t, Ground)]
+    bodies = [t for t in things if isinstance(t, Body)]
     shaded = [_shaded(t, camera) for t in bodies]
     if shaded:
         behind = [BEHIND * camera.width if isinstance(t, Mesh) and not t.fabric else 0.0 for t in bodies]

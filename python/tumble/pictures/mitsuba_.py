@@ -50,7 +50,7 @@ def draw(things: list[Thing], camera: Camera, samples: int) -> Picture:
     mi.set_log_level(mi.LogLevel.Error)
     grounds = [t for t in things if isinstance(t, Ground)]
     floors = {f"ground {k}": _ground(mi, t, camera) for k, t in enumerate(grounds)}
-    bodies = [t for t in things if not isinstance(t, Ground)]
+    bodies = [t for t in things if isinstance(t, Body)]
     with tempfile.TemporaryDirectory() as folder:
         shapes = _shapes(mi, bodies, camera, Path(folder))
         light = _render(mi, camera, samples, PATHS, shapes | floors)

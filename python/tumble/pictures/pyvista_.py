@@ -11,7 +11,7 @@ import numpy.typing as npt
 from tumble.pictures.framing import Camera
 from tumble.pictures.look import SKY, key_light, painted
 from tumble.pictures.surfaces import Floats, Indices
-from tumble.pictures.things import Ground, Mesh, Thing, as_triangles
+from tumble.pictures.things import Body, Ground, Mesh, Thing, as_triangles
 from tumble.style import display
 
 RINGS = 160
@@ -32,6 +32,8 @@ def draw(things: list[Thing], camera: Camera) -> npt.NDArray[np.uint8]:
                 ground = _poly(pv, vertices, triangles)
                 ground["paint"] = np.round(255 * colors).astype(np.uint8)
                 plotter.add_mesh(ground, scalars="paint", rgb=True, lighting=False)
+                continue
+            if not isinstance(thing, Body):
                 continue
             vertices, triangles, normals = as_triangles(thing, 3)
             if not len(triangles):

@@ -1,9 +1,10 @@
 """What there is to see in a run: its objects, and for each frame meshes, spheres, tubes and grounds with colours.
 
 Renderers draw these four and know nothing of scenes. Particles become spheres (and tubes for their springs and the way
-behind them), ropes and anchors tubes, sheets, blocks and nets meshes, colliders meshes, floors and planes grounds. Torn
-links show: a triangle or a piece of rope across a link that broke is left out (this needs `link_strain` among the
-scene's output columns).
+behind them), or, where there are many or they come and go, a cloud, which `splats` paints over the picture; ropes and
+anchors become tubes, sheets, blocks and nets meshes, colliders meshes, floors and planes grounds. Torn links show: a
+triangle or a piece of rope across a link that broke is left out (this needs `link_strain` among the scene's output
+columns).
 """
 
 from collections.abc import Mapping
@@ -123,8 +124,30 @@ class Ground:
     color: Rgb
 
 
+@dataclass(frozen=True)
+class Cloud:
+    """Many small balls, or lights by night, and the ways behind them."""
+
+    name: str
+    centers: Floats
+    radii: Floats
+    colors: Floats
+    """Of each one, n x 3."""
+    ways: Floats
+    """Straight pieces of the ways, m x 2 x 3."""
+    way_colors: Floats
+    fading: Floats
+    """1 for pieces that end now, 0 for those that are as old as the trail is long."""
+
+
 Body = Mesh | Spheres | Tubes
-Thing = Body | Ground
+Thing = Body | Ground | Cloud
+
+MANY = 2_000
+"""An object of more particles than these is drawn as a cloud."""
+
+FINER = 0.6
+"""Particles of clouds may be this much thinner than the thinnest."""
 
 FEW = 200
 """An object of fewer masses than these is drawn at least three times as thick as the thinnest."""
@@ -144,7 +167,9 @@ def objects(run: Recording) -> list[Object]:
     }
     found: list[Object] = []
     colors = 0
-    for name, columns in run.static.items():
+    # What varies from particle to particle is in the frames; an object may have nothing else.
+    start = run.frame(0) if run.n_frames else {}
+    for name, columns in {**{n: {} for n in start if n not in run.static}, **run.static}.items():
         section, entry = words.get(name, ("", {}))
         solid = section == "collider" or "position" in columns
         plane = _plane(entry.get("shape")) if solid else None
@@ -207,6 +232,22 @@ def carried(thing: Object, columns: Columns, x: Floats) -> Floats:
     return np.asarray(x + q[3] * t + np.cross(q[:3], t) + np.ravel(own["translation"]), dtype=float)
 
 
+def radii(columns: Columns, thing: Object) -> Floats:
+    """Radius of each particle of an object in a frame [m]."""
+    table = columns.get(thing.name, {})
+    if "radius" in table:
+        return np.asarray(table["radius"], dtype=float).ravel()
+    return np.full(len(table.get("position", ())), thing.radius)
+
+
+def colors(columns: Columns, thing: Object) -> Floats:
+    """Colour of each particle of an object in a frame, in linear light, n x 3."""
+    table = columns.get(thing.name, {})
+    if "color" in table:
+        return np.asarray(table["color"], dtype=float).reshape(-1, 3)
+    return np.tile(np.array(thing.color), (len(table.get("position", ())), 1))
+
+
 class Stage:
     """All that can be seen of a run."""
 
@@ -220,7 +261,9 @@ class Stage:
         self._cuts = {name: split(starts[name], o.triangles) for name, o in bodies.items()}
         self._closed = {name for name, o in bodies.items() if outward(starts[name], o.triangles)}
         self._anchors = [_ends(anchor["between"]) for anchor in run.scene.get("anchor", ())]
+        self.night = run.scene.get("camera", {}).get("look") == "night"
         self._ways: dict[tuple[str, int], Floats] = {}
+        self._pieces: dict[tuple[str, int], tuple[Floats, Floats]] = {}
 
     def things(self, i: int, thinnest: float = 0.0) -> list[Thing]:
         """What is to be drawn of frame i. Nothing is thinner than the radius `thinnest` [m]."""
@@ -238,6 +281,8 @@ class Stage:
                         drawn.append(self._mesh(thing, x, thing.triangles))
                     else:
                         drawn.append(self._edges(thing, x, thinnest))
+            elif self._is_cloud(thing, columns):
+                drawn.append(self._cloud(thing, i, columns, thinnest))
             else:
                 drawn += self._moving(thing, columns, thinnest)
                 if thing.trail > 0.0 and (way := self._way(thing, i, columns, thinnest)):
@@ -248,6 +293,33 @@ class Stage:
             counts = np.full(len(self._anchors), 2)
             drawn.append(Tubes("anchors", np.array(ends), counts, max(0.004, thinnest), SOLID))
         return drawn
+
+    def _is_cloud(self, thing: Object, columns: Columns) -> bool:
+        """Whether an object is drawn by `splats`."""
+        if thing.kind != "points" or len(thing.links):
+            return False
+        table = columns.get(thing.name, {})
+        return self.night or "id" in table or len(table.get("position", ())) > MANY
+
+    def _cloud(self, thing: Object, i: int, columns: Columns, thinnest: float) -> Cloud:
+        x = positions(columns, thing)
+        few = 3 if len(x) < FEW and "id" not in columns[thing.name] else 1
+        r = np.maximum(radii(columns, thing), FINER * few * thinnest)
+        pieces, shades, ages = [np.zeros((0, 2, 3))], [np.zeros((0, 3))], [np.zeros(0)]
+        now, k = self.run.time(i), i - 1
+        while thing.trail > 0.0 and k >= 0 and self.run.time(k) >= now - thing.trail - 1e-9:
+            if (thing.name, k) not in self._pieces:
+                after = columns if k + 1 == i else self.run.frame(k + 1)
+                self._pieces[thing.name, k] = _piece(thing, self.run.frame(k), after)
+            way, shade = self._pieces[thing.name, k]
+            pieces.append(way)
+            shades.append(shade)
+            ages.append(np.full(len(way), (now - self.run.time(k + 1)) / thing.trail))
+            k -= 1
+        for old in [key for key in self._pieces if key[0] == thing.name and not k < key[1] < i]:
+            del self._pieces[old]
+        ways, faded = np.concatenate(pieces), np.clip(1 - np.concatenate(ages), 0.0, 1.0)
+        return Cloud(thing.name, x, r, colors(columns, thing), ways, np.concatenate(shades), faded)
 
     def _way(self, thing: Object, i: int, columns: Columns, thinnest: float) -> Tubes | None:
         """Where the particles have been, up to frame i."""
@@ -330,6 +402,16 @@ class Stage:
         return np.ravel(np.isnan(strain) & ~np.isnan(start))
 
 
+def _piece(thing: Object, before: Columns, after: Columns) -> tuple[Floats, Floats]:
+    """The ways of particles from one frame to the next, m x 2 x 3, and their colours; of those that are in both."""
+    x, y, shade = positions(before, thing), positions(after, thing), colors(after, thing)
+    old, new = before[thing.name].get("id"), after[thing.name].get("id")
+    if old is not None and new is not None:
+        _, k, m = np.intersect1d(old, new, assume_unique=True, return_indices=True)
+        x, y, shade = x[k], y[m], shade[m]
+    return np.stack([x, y], axis=1), shade
+
+
 def _ends(between: list[str]) -> list[tuple[str, int]]:
     """Object and index of each end of an anchor: "flag 3"."""
     pairs = [words.rsplit(" ", 1) for words in between]
@@ -388,6 +470,9 @@ def placed(things: list[Thing], origin: Floats, scale: float) -> list[Thing]:
             out.append(replace(t, centers=(t.centers - origin) / scale, radii=t.radii / scale))
         elif isinstance(t, Tubes):
             out.append(replace(t, points=(t.points - origin) / scale, radius=t.radius / scale))
+        elif isinstance(t, Cloud):
+            ways = (t.ways - origin) / scale
+            out.append(replace(t, centers=(t.centers - origin) / scale, radii=t.radii / scale, ways=ways))
         else:
             out.append(replace(t, point=(t.point - origin) / scale))
     return out

@@ -12,7 +12,7 @@ mod systems;
 pub use animated::{Animated, AnimatedVector, Component, Interpolation, Keys, VectorKeys};
 pub use emitters::{Between, Burst, Emitter, Kill, Source, WhenFull};
 pub use forces::{Anchor, Field, Force, Goal};
-pub use output::{Camera, Expect, Output, Probe};
+pub use output::{Camera, Expect, Look, Output, Probe};
 pub use shapes::{Collider, MeshFile, MeshFrame, MeshFrames, MeshRef, Motion, Pace, Pose, Shape};
 pub use structures::{
     Block, Cloud, CloudShape, Diagonals, Galaxy, Halo, Link, LinkSettings, Links, Material, Net, Particles, Pin, Profile, Region, Rod,

@@ -13,6 +13,8 @@ pub struct Output {
     pub film: bool,
     /// Write `scene.usda` with a layer per frame.
     pub usd: bool,
+    /// Write `ply/`: the particles of each object at each frame.
+    pub ply: bool,
     /// Write `energy.png`.
     pub plot: bool,
     /// Frames of which to write a still picture.
@@ -28,6 +30,7 @@ impl Default for Output {
             columns: vec!["position".into(), "velocity".into()],
             film: false,
             usd: false,
+            ply: false,
             plot: true,
             stills: Vec::new(),
             checkpoint: 10,
@@ -51,12 +54,25 @@ pub struct Camera {
     /// Width and height of pictures.
     #[schemars(inner(range(min = 16, max = 8192)), extend("x-unit" = "pixel"))]
     pub resolution: [u32; 2],
+    /// How pictures are lit.
+    pub look: Look,
 }
 
 impl Default for Camera {
     fn default() -> Self {
-        Self { position: None, target: None, view_angle: 35.0, resolution: [640, 360] }
+        Self { position: None, target: None, view_angle: 35.0, resolution: [640, 360], look: Look::Studio }
     }
+}
+
+/// How pictures are lit.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum Look {
+    /// Daylight on a bright ground.
+    #[default]
+    Studio,
+    /// Particles glow in the dark: stars, sparks, fireworks.
+    Night,
 }
 
 /// Bounds that every frame must keep.
