@@ -2,7 +2,7 @@
 //!
 //! A particle is born at its own moment: it takes one step of its own length to the end of the sub-step that it is born in, by
 //! the midpoint rule, under the forces on single masses; from there on it goes with all others. The dead leave when the
-//! exchange interval ends, and who is born of them is born where and when they died.              (particles.30)
+//! exchange interval ends, and who is born of them is born where and when they died.              (particles.11)
 
 use super::laws::Local;
 use super::{BLOCK, Dynamics, contact};
