@@ -17,12 +17,20 @@ pub struct State {
 pub struct Masses {
     /// Masses [kg] of points and moments of inertia [kg m²] of frames, pinned ones included.
     pub mass: Vec<Real>,
-    /// 1/mass, 0 for what is pinned.
-    pub inverse: Vec<Real>,
+    /// 1/inertia of frames, 0 for clamped ones; 1/mass of a point stands in its row.
+    pub inverse_inertia: Vec<Real>,
     /// Electric charges [C]; empty where nothing is charged.
     pub charge: Vec<Real>,
     /// Count of points; the rows after them are frames.
     pub points: usize,
+}
+
+impl Masses {
+    /// 1/mass or 1/inertia of row i, 0 for what is held; x are all rows.
+    #[inline(always)]
+    pub fn inverse(&self, i: usize, x: &[Row]) -> Real {
+        if i < self.points { x[i][3] } else { self.inverse_inertia[i - self.points] }
+    }
 }
 
 /// A thing in a system: which rows it has, and how it hangs together.

@@ -66,7 +66,11 @@ fn scenes() -> Vec<(&'static str, String, usize)> {
     let stars = "world.gravity = [0, 0, 0]\n[[system]]\nintegrator = \"velocity_verlet\"\nsubsteps = 2\n[[force]]\nkind = \"gravitation\"\nconstant = 1\nsoftening = 0.1\n\
                  [[force]]\nkind = \"electrostatics\"\nconstant = 1e-3\nsoftening = 0.1\n[[galaxy]]\nname = \"g\"\nstars = 4200\nmass = 1\nlength = 1\nradius = 0.01\n\
                  halo = { mass = 4, radius = 2 }\n[[particles]]\nname = \"ions\"\nposition = [[0.1, 0, 1], [0.3, 1, 0], [2, 1, 1]]\ncharge = [1, -1, 2]\n";
+    let smoke = "[[system]]\nmethod = \"tracers\"\nintegrator = \"rk4\"\nsubsteps = 2\n[[field]]\nkind = \"swirl\"\nrate = 3\n[[field]]\nkind = \"turbulence\"\nstrength = 0.3\nscale = 0.4\n\
+                 [[emitter]]\nname = \"smoke\"\nrate = \"20000*(1 + sin(9*t))\"\npath = \"[0.3*cos(5*t), 0.3*sin(5*t), 0]\"\nlifetime = 0.5\nlifetime_spread = 0.2\nfrom.sphere.radius = 0.1\n\
+                 [[particles]]\nname = \"three\"\nposition = [[1, 0, 0], [0, 1, 0], [0, 0, 1]]\n";
     vec![
+        ("smoke", smoke.to_string(), 16),
         ("dust, stirred", stirred, 8),
         ("stars", stars.to_string(), 3),
         ("stars, native", format!("bits = \"native\"\n{stars}"), 3),

@@ -1,6 +1,6 @@
 //! Particles that are born and die.
 
-use super::{MeshFile, Shape};
+use super::{Animated, AnimatedVector, MeshFile, Shape};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
@@ -18,9 +18,9 @@ pub struct Emitter {
     /// Where they are born.
     pub from: Source,
     /// Particles a second; from other particles, children of each a second.
-    #[serde(default)]
-    #[schemars(range(min = 0.0, max = 1e12), extend("x-unit" = "1/s"))]
-    pub rate: f64,
+    #[serde(default = "nothing")]
+    #[schemars(extend("x-unit" = "1/s"))]
+    pub rate: Animated,
     /// Particles born at once; from other particles, `count` children of each when it dies.
     #[serde(default)]
     pub burst: Vec<Burst>,
@@ -37,10 +37,14 @@ pub struct Emitter {
     #[serde(default)]
     #[schemars(range(min = 0.0, max = 1.0), extend("x-unit" = "1"))]
     pub jitter: f64,
+    /// Way of the source from where `from` puts it.
+    #[serde(default = "origin")]
+    #[schemars(extend("x-unit" = "m"))]
+    pub path: AnimatedVector,
     /// Velocity that all of them get.
-    #[serde(default)]
+    #[serde(default = "origin")]
     #[schemars(extend("x-unit" = "m/s"))]
-    pub velocity: [f64; 3],
+    pub velocity: AnimatedVector,
     /// Speed along `direction`, added to `velocity`.
     #[serde(default)]
     #[schemars(extend("x-unit" = "m/s"))]
@@ -234,6 +238,14 @@ pub enum WhenFull {
     ReplaceOldest,
     /// The run ends with an error.
     Error,
+}
+
+fn nothing() -> Animated {
+    0.0.into()
+}
+
+fn origin() -> AnimatedVector {
+    [0.0; 3].into()
 }
 
 fn one() -> f64 {

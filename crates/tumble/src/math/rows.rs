@@ -1,6 +1,6 @@
 //! Arithmetic on whole columns of rows, number by number, on wide registers. Every width gives the same bits.
 
-use super::simd::{Kernel, Width, dispatch, packs};
+use super::simd::{Kernel, Width, count, dispatch, packs};
 use super::{Lane, Real, Row};
 
 /// What becomes of one number `out` of a row, given one number of each row in hand.
@@ -39,6 +39,41 @@ impl<F: Each> Kernel for All<'_, F> {
 pub fn each(out: &mut [Row], of_rows: &[Real], a: &[Row], constant: Row, each: impl Each) {
     assert!(of_rows.len() == out.len() && a.len() == out.len());
     dispatch(All { out, of_rows, a, constant, each });
+}
+
+struct AllByLast<'a, F> {
+    out: &'a mut [Row],
+    a: &'a [Row],
+    constant: Row,
+    each: F,
+}
+
+impl<F: Each> Kernel for AllByLast<'_, F> {
+    type Output = ();
+    #[inline(always)]
+    fn run<W: Width>(self, w: W) {
+        let out = self.out.as_flattened_mut();
+        let mut pattern = [0.0; 16];
+        for i in 0..16 {
+            pattern[i] = self.constant[i % 4];
+        }
+        packs!(W, w, (0..out.len()), |e| {
+            let here = &mut out[e..];
+            let mut last = [0.0; 4];
+            for i in 0..count(w).div_ceil(4) {
+                last[i] = self.a[e / 4 + i][3];
+            }
+            let new = self.each.at(w.spread(&last, e % 4), w.load(&self.a.as_flattened()[e..]), w.load(&pattern[e % 4..]), w.load(here));
+            w.store(new, here);
+        });
+    }
+}
+
+/// The same where the last number of each row of `a` is the one that belongs to the whole row.
+#[inline]
+pub fn each_by_last(out: &mut [Row], a: &[Row], constant: Row, each: impl Each) {
+    assert!(a.len() == out.len());
+    dispatch(AllByLast { out, a, constant, each });
 }
 
 struct Axpy<'a> {
@@ -170,6 +205,8 @@ mod tests {
         for level in Level::available() {
             let mut out = b.clone();
             dispatch_at(level, All { out: &mut out, of_rows: &of_rows, a: &a, constant, each: Sum3 });
+            let mut last = b.clone();
+            dispatch_at(level, AllByLast { out: &mut last, a: &a, constant, each: Sum3 });
             let mut y = b.clone();
             dispatch_at(level, Axpy { y: &mut y, c: 0.37, x: &a });
             let mut z = b.clone();
@@ -177,6 +214,7 @@ mod tests {
             for i in 0..77 {
                 for c in 0..4 {
                     assert_eq!(out[i][c], of_rows[i] * a[i][c] + constant[c] * (0.1 as Real) + b[i][c], "{level:?}");
+                    assert_eq!(last[i][c], a[i][3] * a[i][c] + constant[c] * (0.1 as Real) + b[i][c], "{level:?}");
                     assert_eq!(y[i][c], b[i][c] + 0.37 * a[i][c], "{level:?}");
                     assert_eq!(z[i][c], a[i][c] + 0.37 * b[i][c], "{level:?}");
                 }

@@ -2,7 +2,7 @@
 //! with is a function of the scene's seed, the emitter's name and the particle's id, so that nothing of it needs storing.
 
 use crate::geometry::{Collider, Sampler, Vector, sampling};
-use crate::math::{Random, Row, xyz64};
+use crate::math::{Random, Row, Signal, VectorSignal, xyz64};
 use rayon::prelude::*;
 use tumble_interface::scene::{Between, Emitter as Words, WhenFull};
 
@@ -41,9 +41,20 @@ pub enum Kill {
 /// Whether a point is nearer to a collider than a distance [m].
 pub type Near<'a> = dyn Fn(Vector, f64) -> bool + Sync + 'a;
 
+/// What of an emitter may change in time.
+pub struct Course {
+    /// Particles a second.
+    pub rate: Signal,
+    /// Velocity that all get [m/s].
+    pub velocity: VectorSignal,
+    /// Way of the source [m].
+    pub path: VectorSignal,
+}
+
 /// A source of particles.
 pub struct Emitter {
     words: Words,
+    course: Course,
     random: Random,
     /// Where they come from.
     pub from: Origin,
@@ -89,13 +100,22 @@ fn spread(c: f64, spread: f64, u: impl FnOnce() -> f64) -> f64 {
 
 impl Emitter {
     /// An emitter of a scene, with what its words stand for.
-    pub fn new(words: Words, seed: u32, from: Origin, kill: Vec<Kill>, up: Vector, flat: Option<usize>) -> Self {
-        Self { random: Random::new(seed, &words.name), words, from, kill, up, flat }
+    pub fn new(words: Words, course: Course, seed: u32, from: Origin, kill: Vec<Kill>, up: Vector, flat: Option<usize>) -> Self {
+        Self { random: Random::new(seed, &words.name), words, course, from, kill, up, flat }
     }
 
     /// What the scene says about it.
     pub fn words(&self) -> &Words {
         &self.words
+    }
+
+    /// That it can bear no more, as an error's text.
+    pub fn full(&self) -> String {
+        let Words { name, most, .. } = &self.words;
+        match most {
+            Some(most) => format!("emitter \"{name}\" is full: {most} particles live; raise most, or set when_full = \"wait\""),
+            None => format!("emitter \"{name}\" has given out all of its 4294967295 ids"),
+        }
     }
 
     /// Users' columns and their ranges.
@@ -188,16 +208,21 @@ impl Emitter {
         self.random.uniform(u64::from(id), 0, purpose)
     }
 
-    /// Particles that the rate has made by the time t [s]; a real number.
-    fn flow(&self, t: f64) -> f64 {
-        let end = self.words.end.unwrap_or(f64::INFINITY).min(t);
-        self.words.rate * (end - self.words.start).max(0.0)
+    /// Particles that the rate has made by the time t + dt [s], a real number, if it was `before` at t. A constant rate is
+    /// taken from the start, a changing one by Simpson's rule.
+    pub fn flow(&self, before: f64, t: f64, dt: f64) -> f64 {
+        let (start, end) = (self.words.start, self.words.end.unwrap_or(f64::INFINITY));
+        let (a, b) = (t.clamp(start, end), (t + dt).clamp(start, end));
+        let rate = |t: f64| self.course.rate.value(t).max(0.0);
+        if self.course.rate.is_constant() {
+            return rate(t) * (b - start);
+        }
+        before + (b - a) / 6.0 * (rate(a) + 4.0 * rate(0.5 * (a + b)) + rate(b))
     }
 
-    /// Those born in (t, t + dt] [s], ids from `next` on.
-    pub fn births(&self, t: f64, dt: f64, next: u64, room: Room) -> Option<Vec<Birth>> {
+    /// Those born in (t, t + dt] [s] while the flow goes from `before` to `after`, ids from `next` on.
+    pub fn births(&self, (t, dt): (f64, f64), (before, after): (f64, f64), next: u64, room: Room) -> Option<Vec<Birth>> {
         let Origin::Place(place) = &self.from else { return Some(Vec::new()) };
-        let (before, after) = (self.flow(t), self.flow(t + dt));
         let first = (before + ROUNDING).floor();
         let count = ((after + ROUNDING).floor() - first) as usize;
         let jitter = self.words.jitter;
@@ -219,7 +244,8 @@ impl Emitter {
         moments.sort_by(f64::total_cmp);
         self.bear(next, moments.len(), |k, id| {
             let (x, normal) = place.sample(&|k| self.draw(id, PLACE + k));
-            Birth { time: moments[k], x, v: self.velocity(id, normal, Vector::default()), id }
+            let (shift, motion) = self.source(moments[k]);
+            Birth { time: moments[k], x: x + shift, v: self.velocity(moments[k], id, normal, motion), id }
         })
     }
 
@@ -228,13 +254,13 @@ impl Emitter {
         let each: usize = self.words.burst.iter().map(|b| b.count as usize).sum();
         self.bear(next, room.take(dead.len() * each)?, |k, id| {
             let parent = dead[k / each];
-            Birth { time: parent.time, x: parent.x, v: self.velocity(id, parent.v, parent.v), id }
+            Birth { time: parent.time, x: parent.x, v: self.velocity(parent.time, id, parent.v, parent.v), id }
         })
     }
 
     /// Those born of the living in an exchange interval: child k of a parent at its age k/rate.
     pub fn children(&self, living: &[Parent], next: u64, room: Room) -> Option<Vec<Birth>> {
-        let rate = self.words.rate;
+        let rate = self.course.rate.value(0.0);
         let within = |p: &Parent, k: f64| {
             let time = p.time - p.age + k / rate;
             time >= self.words.start && self.words.end.is_none_or(|end| time <= end)
@@ -250,7 +276,8 @@ impl Emitter {
             let (i, k) = due[j];
             let parent = living[i];
             let ago = (parent.age - k / rate).max(0.0);
-            Birth { time: parent.time - ago, x: parent.x - parent.v * ago, v: self.velocity(id, parent.v, parent.v), id }
+            let time = parent.time - ago;
+            Birth { time, x: parent.x - parent.v * ago, v: self.velocity(time, id, parent.v, parent.v), id }
         })
     }
 
@@ -268,10 +295,17 @@ impl Emitter {
         Some((0..count).into_par_iter().with_min_len(256).map(one).collect())
     }
 
-    /// The velocity of a newborn where the source has this normal and moves with this velocity.
-    fn velocity(&self, id: u32, normal: Vector, source: Vector) -> Vector {
+    /// Where the source is at a time, and how fast it moves: by central differences.
+    fn source(&self, t: f64) -> (Vector, Vector) {
+        const STEP: f64 = 1e-4;
+        let path = &self.course.path;
+        (path.value(t), (path.value(t + STEP) - path.value(t - STEP)) * (0.5 / STEP))
+    }
+
+    /// The velocity of one born at time t where the source has this normal and moves with this velocity.
+    fn velocity(&self, t: f64, id: u32, normal: Vector, source: Vector) -> Vector {
         let words = &self.words;
-        let base = Vector::from(words.velocity) + source * words.inherit;
+        let base = self.course.velocity.value(t) + source * words.inherit;
         if words.speed == 0.0 {
             return base;
         }

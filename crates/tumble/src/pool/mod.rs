@@ -4,12 +4,13 @@
 
 mod emitter;
 
-pub use emitter::{Birth, Emitter, Kill, Near, Origin, Parent};
+pub use emitter::{Birth, Course, Emitter, Kill, Near, Origin, Parent};
 
 use crate::math::{Real, Row, xyz64};
 use crate::system::{Archive, Part};
 use rayon::prelude::*;
 use std::ops::Range;
+use tumble_interface::{Column, Data};
 
 /// Rows per task when looking for the dead.
 const TASK: usize = 16_384;
@@ -21,6 +22,8 @@ struct Stream {
     len: usize,
     /// The id of the next.
     next: u64,
+    /// Particles that the rate has made so far; a real number.
+    flow: f64,
 }
 
 /// The particles of all emitters of a system.
@@ -54,7 +57,7 @@ impl Pool {
                 columns.push((name.clone(), Vec::new()));
             }
         }
-        let streams = emitters.into_iter().map(|emitter| Stream { emitter, len: 0, next: 0 }).collect();
+        let streams = emitters.into_iter().map(|emitter| Stream { emitter, len: 0, next: 0, flow: 0.0 }).collect();
         Self { first, streams, columns, ..Self::default() }
     }
 
@@ -121,15 +124,17 @@ impl Pool {
     /// Those whom an emitter bears in (t, t + dt] by itself, in the order of their birth. `None` if it is full and may not
     /// be, or has used up its ids.
     pub fn births(&mut self, s: usize, t: f64, dt: f64) -> Option<Vec<Birth>> {
-        let Stream { emitter, len, next } = &mut self.streams[s];
-        let births = emitter.births(t, dt, *next, emitter.room(*len)?)?;
+        let Stream { emitter, len, next, flow } = &mut self.streams[s];
+        let before = *flow;
+        *flow = emitter.flow(before, t, dt);
+        let births = emitter.births((t, dt), (before, *flow), *next, emitter.room(*len)?)?;
         *next += births.len() as u64;
         Some(births)
     }
 
     /// Those whom an emitter bears when its parents die.
     pub fn orphans(&mut self, s: usize, parents: &[Parent]) -> Option<Vec<Birth>> {
-        let Stream { emitter, len, next } = &mut self.streams[s];
+        let Stream { emitter, len, next, .. } = &mut self.streams[s];
         let births = emitter.orphans(parents, *next, emitter.room(*len)?)?;
         *next += births.len() as u64;
         Some(births)
@@ -139,7 +144,7 @@ impl Pool {
     pub fn children(&mut self, s: usize, t: f64, dt: f64, x: &[Row], v: &[Row]) -> Option<Vec<Birth>> {
         let Some(parent) = self.parent(s) else { return Some(Vec::new()) };
         let parents: Vec<Parent> = (0..self.streams[parent].len).map(|k| self.until_death(parent, k, (t, dt), x, v)).collect();
-        let Stream { emitter, len, next } = &mut self.streams[s];
+        let Stream { emitter, len, next, .. } = &mut self.streams[s];
         let births = emitter.children(&parents, *next, emitter.room(*len)?)?;
         *next += births.len() as u64;
         Some(births)
@@ -273,14 +278,38 @@ impl Pool {
         Parent { time: t - late, x: xyz64(x[row]) - v * late, v, age: age - late, before: age - dt }
     }
 
-    /// The dead as parents of others, where an interval (t, dt) ends.
+    /// The dead as parents of others, in the order of their death, where an interval (t, dt) ends.
     pub fn mourn(&self, s: usize, dead: &[u32], interval: (f64, f64), x: &[Row], v: &[Row]) -> Vec<Parent> {
-        dead.iter().map(|k| self.until_death(s, *k as usize, interval, x, v)).collect()
+        let of = |k: &u32| (self.until_death(s, *k as usize, interval, x, v), self.ids(s)[*k as usize]);
+        let mut all: Vec<(Parent, u32)> = dead.iter().map(of).collect();
+        all.sort_by(|(a, i), (b, j)| a.time.total_cmp(&b.time).then(i.cmp(j)));
+        all.into_iter().map(|(parent, _)| parent).collect()
+    }
+
+    /// The columns that only emitted particles have. `mass` are the masses of all rows, where there are any.
+    pub fn write(&self, s: usize, object: &str, mass: &[Real], out: &mut Vec<Column>) {
+        let (ids, ages, emitter) = (self.ids(s), self.ages(s), self.emitter(s));
+        let mut add = |name: &str, unit, width, data| out.push(Column { object: object.into(), name: name.into(), unit, width, data });
+        add("id", "1", 1, Data::U32(ids.to_vec()));
+        add("age", "s", 1, Data::from(ages.to_vec()));
+        if emitter.has_radii() {
+            add("radius", "m", 1, Data::from(ids.iter().map(|id| emitter.radius(*id) as Real).collect::<Vec<Real>>()));
+        }
+        if let (true, Some(mass)) = (emitter.has_masses(), mass.get(self.rows(s))) {
+            add("mass", "kg", 1, Data::from(mass.to_vec()));
+        }
+        if emitter.has_colors() {
+            let colors = ids.iter().zip(ages).flat_map(|(id, age)| emitter.color(*id, f64::from(*age)).unwrap_or_default());
+            add("color", "1", 3, Data::from(colors.map(|c| c as Real).collect::<Vec<Real>>()));
+        }
+        for (name, _) in emitter.columns() {
+            add(name, "1", 1, Data::from(self.column(s, name).unwrap_or_default().to_vec()));
+        }
     }
 
     /// Writes everything that the next births and deaths depend on.
     pub fn save(&self, archive: &mut Archive) {
-        let counts = self.streams.iter().flat_map(|s| [s.len as f64, s.next as f64]);
+        let counts = self.streams.iter().flat_map(|s| [s.len as f64, s.next as f64, s.flow]);
         archive.push("pool", Part::Numbers(counts.collect()));
         archive.push_indices("id", &self.id);
         archive.push_numbers("age", &self.age);
@@ -292,11 +321,11 @@ impl Pool {
     /// Reads it back; `None` if it is not of this pool.
     pub fn restore(&mut self, archive: &mut Archive) -> Option<()> {
         let counts = archive.numbers("pool")?;
-        if counts.len() != 2 * self.streams.len() {
+        if counts.len() != 3 * self.streams.len() {
             return None;
         }
-        for (stream, counts) in self.streams.iter_mut().zip(counts.chunks_exact(2)) {
-            (stream.len, stream.next) = (counts[0] as usize, counts[1] as u64);
+        for (stream, counts) in self.streams.iter_mut().zip(counts.chunks_exact(3)) {
+            (stream.len, stream.next, stream.flow) = (counts[0] as usize, counts[1] as u64, counts[2]);
         }
         let total = self.streams.iter().map(|s| s.len).sum::<usize>();
         self.id = archive.indices("id")?;
@@ -323,7 +352,8 @@ mod tests {
                     [[emitter]]\nname = \"c\"\nfrom.point = {}\n";
         let words = Scene::from_toml(text).unwrap().emitter;
         let make = |w: &tumble_interface::scene::Emitter| {
-            Emitter::new(w.clone(), 1, Origin::Place(Sampler::Point(Vector::default())), Vec::new(), [0.0, 0.0, 1.0].into(), None)
+            let course = Course { rate: 0.0.into(), velocity: [0.0; 3].into(), path: [0.0; 3].into() };
+            Emitter::new(w.clone(), course, 1, Origin::Place(Sampler::Point(Vector::default())), Vec::new(), [0.0, 0.0, 1.0].into(), None)
         };
         let mut pool = Pool::new(5, words.iter().map(make).collect());
         let (mut x, mut mass): (Vec<Row>, Vec<Real>) = (vec![[-1.0; 4]; 5], vec![-1.0; 5]);

@@ -4,23 +4,45 @@ use super::Site;
 use super::scenery::{placed, solid};
 use crate::geometry::{Sampler, Vector};
 use crate::math::rotation::{from_degrees, from_z_to};
-use crate::pool::{Emitter, Kill, Origin};
+use crate::pool::{Course, Emitter, Kill, Origin};
 use tumble_interface::Mesh;
 use tumble_interface::scene::{Collider, Emitter as Words, Kill as Rule, MeshFile, Shape as Solid, Source};
 
 /// Columns that every emitted particle may have.
 const TAKEN: [&str; 7] = ["position", "velocity", "id", "age", "radius", "mass", "color"];
 
-/// Adds an emitter. `mesh` finds the mesh of a file; `flat` is the axis that is missing in two dimensions.
-pub fn emitter<'a>(site: &mut Site<'_>, words: &Words, seed: u32, flat: Option<usize>, mesh: &dyn Fn(&MeshFile) -> Option<&'a Mesh>) {
+/// Adds an emitter. `mesh` finds the mesh of a file; `flat` is the axis that is missing in two dimensions, and `tracers` whether
+/// the particles go with the flow.
+pub fn emitter<'a>(
+    site: &mut Site<'_>,
+    words: &Words,
+    course: Course,
+    (seed, flat, tracers): (u32, Option<usize>, bool),
+    mesh: &dyn Fn(&MeshFile) -> Option<&'a Mesh>,
+) {
     let path = format!("emitter \"{}\"", words.name);
     let mut wrong = |key: &str, message: &str| site.issues.push(tumble_interface::Issue::new(format!("{path}{key}"), message));
     let children = matches!(words.from, Source::Particles { .. });
-    if words.rate == 0.0 && words.burst.iter().all(|b| b.count == 0) {
+    if words.rate.constant() == Some(0.0) && words.burst.iter().all(|b| b.count == 0) {
         wrong("", "it makes no particles; give it a rate, or a burst with a count");
     }
     if let (true, Some(i)) = (children, words.burst.iter().position(|b| b.time != 0.0)) {
         wrong(&format!(".burst[{i}].time"), "children are born when the parent dies; leave it out");
+    }
+    if children && !course.rate.is_constant() {
+        wrong(".rate", "the rate of children goes by the age of each parent and is constant");
+    }
+    if children && words.path.constant() != Some([0.0; 3]) {
+        wrong(".path", "children are born where their parents are; leave it out");
+    }
+    let given = [
+        (".velocity", words.velocity.constant() != Some([0.0; 3])),
+        (".speed", words.speed != 0.0),
+        (".mass", words.mass != 1.0 || words.mass_spread != 0.0),
+        (".charge", words.charge != 0.0),
+    ];
+    for (key, _) in given.iter().filter(|(_, given)| tracers && *given) {
+        wrong(key, "tracers have no mass and go with the flow; leave it out, or use a dynamics system");
     }
     if words.end.is_some_and(|end| end <= words.start) {
         wrong(".end", "it is not after start");
@@ -124,7 +146,7 @@ pub fn emitter<'a>(site: &mut Site<'_>, words: &Words, seed: u32, flat: Option<u
         _ => None,
     };
     if let Some(origin) = place.map(Origin::Place).or(parent) {
-        site.parts.emitter(Emitter::new(words.clone(), seed, origin, kill, site.up, flat));
+        site.parts.emitter(Emitter::new(words.clone(), course, seed, origin, kill, site.up, flat));
     }
 }
 

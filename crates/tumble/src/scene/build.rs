@@ -6,6 +6,8 @@ use super::laws::Reader;
 use super::memory::memory;
 use crate::exchange::Exchange;
 use crate::geometry::{Collider, Vector};
+use crate::math::formula::Of;
+use crate::pool::{Course, Emitter as Emission};
 use crate::recipes::{self, Site};
 use crate::state::Object;
 use crate::system::System;
@@ -74,9 +76,9 @@ pub fn build(scene: &Scene, assets: &Assets) -> Result<Built, SceneError> {
     let gravity = gravity(scene);
     let dt = scene.frame_time() / f64::from(scene.time.exchanges);
     let mut systems: Vec<Box<dyn System>> = Vec::new();
-    for (index, (plan, parts)) in plans.iter().zip(parts).enumerate() {
+    for (index, (plan, mut parts)) in plans.iter().zip(parts).enumerate() {
         if plan.method == Method::Tracers {
-            systems.push(Box::new(carried(scene, &plans, index)));
+            systems.push(Box::new(carried(scene, &plans, index, dt, parts.take_emitters())?));
             continue;
         }
         let settings = Settings {
@@ -219,7 +221,17 @@ fn fill(scene: &Scene, plans: &[Plan], assets: &Assets, issues: &mut Vec<Issue>)
     let flat = (scene.dimension == 2).then_some(if scene.plane == Plane::Xz { 1 } else { 2 });
     for thing in &scene.emitter {
         let mesh = |file: &MeshFile| assets.get(&file.path);
-        at("emitter", &thing.system, &mut |site| recipes::emitter(site, thing, scene.seed, flat, &mesh));
+        let at_path = |key: &str| format!("emitter \"{}\".{key}", thing.name);
+        at("emitter", &thing.system, &mut |site| {
+            let mut reader = Reader::new(scene, site.issues);
+            let course = Course {
+                rate: reader.signal(&at_path("rate"), &thing.rate, 0.0),
+                velocity: reader.vector(&at_path("velocity"), &thing.velocity, Of::Time),
+                path: reader.vector(&at_path("path"), &thing.path, Of::Time),
+            };
+            let tracers = place(plans, "emitter", thing.system.as_deref()).is_some_and(|i| plans[i].method == Method::Tracers);
+            recipes::emitter(site, thing, course, (scene.seed, flat, tracers), &mesh);
+        });
     }
     for thing in &scene.rope {
         at("rope", &thing.system, &mut |site| recipes::rope(site, thing));
@@ -275,7 +287,7 @@ fn act(scene: &Scene, parts: &mut [Parts], issues: &mut Vec<Issue>) {
     reader.flow("field", &scene.field);
 }
 
-fn carried(scene: &Scene, plans: &[Plan], index: usize) -> Tracers {
+fn carried(scene: &Scene, plans: &[Plan], index: usize, interval: f64, emitters: Vec<Emission>) -> Result<Tracers, SceneError> {
     let plan = &plans[index];
     let (mut x, mut all) = (Vec::new(), Vec::new());
     for thing in scene.particles.iter().filter(|t| place(plans, "particles", t.system.as_deref()) == Some(index)) {
@@ -290,7 +302,14 @@ fn carried(scene: &Scene, plans: &[Plan], index: usize) -> Tracers {
         step: plan.step,
         adaptive: plan.adaptive.clone(),
     };
-    Tracers::new(settings, Reader::new(scene, &mut Vec::new()).flow("field", &scene.field), &x, all)
+    for (stream, emitter) in emitters.iter().enumerate() {
+        let (name, radius) = (emitter.words().name.clone(), emitter.words().radius);
+        all.push(Object { name, points: x.len()..x.len(), radius, stream: Some(stream), ..Object::default() });
+    }
+    let flow = Reader::new(scene, &mut Vec::new()).flow("field", &scene.field);
+    let mut tracers = Tracers::new(settings, flow, &x, all, emitters);
+    tracers.begin_life(interval).map_err(|e| SceneError::one(format!("system \"{}\"", plan.name), e.to_string()))?;
+    Ok(tracers)
 }
 
 /// An anchor whose ends have been found: system and point of each.

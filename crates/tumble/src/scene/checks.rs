@@ -128,7 +128,7 @@ pub fn check(scene: &Scene, systems: &[System]) -> Vec<Issue> {
 
 /// The system that moves an object of this kind: the one it names, else the first that can.
 pub fn place(systems: &[System], kind: &str, named: Option<&str>) -> Option<usize> {
-    let can = |s: &System| s.method == Method::Dynamics || kind == "particles";
+    let can = |s: &System| s.method == Method::Dynamics || matches!(kind, "particles" | "emitter");
     systems.iter().position(|s| can(s) && named.is_none_or(|name| s.name == name))
 }
 

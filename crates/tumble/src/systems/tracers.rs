@@ -5,6 +5,7 @@ use crate::forces::Flow;
 use crate::integrators::{self, Equation, Kinematics, Memory, Scratch, Stage, adaptive_step};
 use crate::math::parallel::chunks;
 use crate::math::{Real, Row, Vec3, ZERO, is_finite, xyz64};
+use crate::pool::{Birth, Columns, Emitter, Pool};
 use crate::state::Object;
 use crate::system::{Archive, Part, System};
 use tumble_interface::engine::{Ledger, Stability, StepReport};
@@ -33,6 +34,8 @@ pub struct Tracers {
     flow: Flow,
     x: Vec<Row>,
     objects: Vec<Object>,
+    /// Points that are born and die; their rows are the last.
+    pool: Pool,
     memory: Memory,
     scratch: Scratch,
     /// Largest distance from the origin at the start [m].
@@ -42,12 +45,106 @@ pub struct Tracers {
 }
 
 impl Tracers {
-    /// A system of points in a flow; every object is a range of them.
-    pub fn new(settings: Settings, flow: Flow, x: &[Vec3<f64>], objects: Vec<Object>) -> Self {
+    /// A system of points in a flow; every object is a range of them, or the points of an emitter.
+    pub fn new(settings: Settings, flow: Flow, x: &[Vec3<f64>], objects: Vec<Object>, emitters: Vec<Emitter>) -> Self {
         let size = x.iter().map(|x| x.norm()).fold(1e-30, f64::max);
         let x: Vec<Row> = x.iter().map(|x| [x.x as Real, x.y as Real, x.z as Real, 0.0]).collect();
-        Self { memory: Memory::new(settings.integrator, x.len()), settings, flow, x, objects, scratch: Scratch::default(), size, time: 0.0 }
+        let memory = Memory::new(settings.integrator, x.len());
+        let pool = Pool::new(x.len(), emitters);
+        Self { memory, settings, flow, x, objects, pool, scratch: Scratch::default(), size, time: 0.0 }
     }
+
+    /// Those who are there at the start; an exchange interval has the length dt [s].
+    pub fn begin_life(&mut self, dt: f64) -> Result<(), StepError> {
+        let mut unborn = self.conceive(-dt, dt)?;
+        self.deliver(&mut unborn, 0.0, 0.0)
+    }
+
+    /// Everyone grows older; tells who of each emitter will be born in the interval, in the order of their birth.
+    fn conceive(&mut self, t: f64, dt: f64) -> Result<Vec<Vec<Birth>>, StepError> {
+        self.pool.grow_older(dt);
+        (0..self.pool.len()).map(|s| self.pool.births(s, t, dt).ok_or_else(|| self.full(s, t))).collect()
+    }
+
+    fn full(&self, s: usize, t: f64) -> StepError {
+        StepError::Capacity { system: self.settings.name.clone(), time: t, what: self.pool.emitter(s).full() }
+    }
+
+    /// Takes those born by the time `until`, to which a step of Runge and Kutta's carries them from their birth. The interval ends at `end`.
+    fn deliver(&mut self, unborn: &mut [Vec<Birth>], until: f64, end: f64) -> Result<(), StepError> {
+        for (s, unborn) in unborn.iter_mut().enumerate() {
+            let due = if until >= end { unborn.len() } else { unborn.partition_point(|b| b.time <= until) };
+            let births: Vec<Birth> = unborn.drain(..due).collect();
+            self.settle(s, &births, until, end);
+        }
+        Ok(())
+    }
+
+    fn settle(&mut self, s: usize, births: &[Birth], until: f64, end: f64) {
+        if births.is_empty() {
+            return;
+        }
+        let surplus = self.pool.surplus(s, births.len());
+        self.pool.remove(s, &surplus, owned(&mut self.x, &mut self.memory));
+        let births = &births[births.len().saturating_sub(self.pool.emitter(s).most().unwrap_or(usize::MAX))..];
+        let rows = self.pool.insert(s, births, end, owned(&mut self.x, &mut self.memory));
+        for (x, birth) in self.x[rows].iter_mut().zip(births) {
+            let tau = until - birth.time;
+            let (flow, t, start) = (&self.flow, birth.time, birth.x);
+            let k1 = flow.at(t, start);
+            let k2 = flow.at(t + 0.5 * tau, start + k1 * (0.5 * tau));
+            let k3 = flow.at(t + 0.5 * tau, start + k2 * (0.5 * tau));
+            let k4 = flow.at(until, start + k3 * tau);
+            let there = start + (k1 + (k2 + k3) * 2.0 + k4) * (tau / 6.0);
+            *x = [there.x as Real, there.y as Real, there.z as Real, 0.0];
+            self.size = self.size.max(there.norm()).max(1e-3);
+        }
+        self.count_rows();
+    }
+
+    /// At the time t, where an interval of length dt [s] ends: the dead leave, and children of the dead and of the living come.
+    fn bury(&mut self, t: f64, dt: f64) -> Result<(), StepError> {
+        let n = self.pool.len();
+        if n == 0 {
+            return Ok(());
+        }
+        let mut v = vec![ZERO; self.x.len()];
+        self.flow.velocities(t, &self.x, &mut v);
+        let mut born: Vec<Vec<Birth>> = Vec::with_capacity(n);
+        for s in 0..n {
+            born.push(self.pool.children(s, t, dt, &self.x, &v).ok_or_else(|| self.full(s, t))?);
+        }
+        for s in 0..n {
+            let dead = self.pool.dead(s, t, &self.x, &v, &|_, _| false);
+            let parents = self.pool.mourn(s, &dead, (t, dt), &self.x, &v);
+            for child in (0..n).filter(|child| self.pool.parent(*child) == Some(s)).collect::<Vec<_>>() {
+                born[child].extend(self.pool.orphans(child, &parents).ok_or_else(|| self.full(child, t))?);
+            }
+            let mut columns = owned(&mut self.x, &mut self.memory);
+            columns.rows.push(&mut v);
+            self.pool.remove(s, &dead, columns);
+        }
+        self.count_rows();
+        for (s, births) in born.iter().enumerate() {
+            self.settle(s, births, t, t);
+        }
+        Ok(())
+    }
+
+    /// Tells everything that counts rows how many there are now.
+    fn count_rows(&mut self) {
+        self.memory.ready = false;
+        for object in &mut self.objects {
+            if let Some(s) = object.stream {
+                object.points = self.pool.rows(s);
+            }
+        }
+    }
+}
+
+/// The columns whose rows the pool moves.
+fn owned<'a>(x: &'a mut Vec<Row>, memory: &'a mut Memory) -> Columns<'a> {
+    Columns { rows: std::iter::once(x).chain(&mut memory.columns).collect(), numbers: Vec::new() }
 }
 
 /// Points in a flow.
@@ -103,8 +200,8 @@ impl System for Tracers {
 
     fn advance(&mut self, t: f64, dt: f64, _exchange: &mut Exchange, go_on: &(dyn Fn() -> bool + Sync)) -> Result<StepReport, StepError> {
         let mut report = StepReport::default();
-        let mut equation = Carried(&self.flow);
-        let integrator = self.settings.integrator;
+        let (integrator, end) = (self.settings.integrator, t + dt);
+        let mut unborn = self.conceive(t, dt)?;
         if integrator.is_adaptive() {
             let mut done = 0.0;
             while done < dt && go_on() {
@@ -114,7 +211,7 @@ impl System for Tracers {
                 let h = adaptive_step(
                     integrator,
                     &self.settings.adaptive,
-                    &mut equation,
+                    &mut Carried(&self.flow),
                     times,
                     (&mut self.x, &mut []),
                     memory,
@@ -124,8 +221,10 @@ impl System for Tracers {
                 .map_err(|e| e.in_system(&self.settings.name))?;
                 done = if h == left { dt } else { done + h };
                 report.stepped(h);
+                self.deliver(&mut unborn, if done == dt { end } else { t + done }, end)?;
             }
-            self.time = t + dt;
+            self.bury(end, dt)?;
+            self.time = end;
             return Ok(report);
         }
         let by_step = self.settings.step.map(|step| integrators::equal_steps(dt, step) as u32);
@@ -139,7 +238,7 @@ impl System for Tracers {
             let time = t + f64::from(k) * h;
             integrators::step(
                 integrator,
-                &mut equation,
+                &mut Carried(&self.flow),
                 (time, h),
                 (&mut self.x, &mut []),
                 &mut columns,
@@ -149,8 +248,10 @@ impl System for Tracers {
             )?;
             self.memory.ready = true;
             report.stepped(h);
+            self.deliver(&mut unborn, if k + 1 == n { end } else { time + h }, end)?;
         }
-        self.time = t + dt;
+        self.bury(end, dt)?;
+        self.time = end;
         Ok(report)
     }
 
@@ -171,11 +272,14 @@ impl System for Tracers {
                 };
                 out.push(Column { object: object.name.clone(), name: (*name).into(), unit, width: 3, data: Data::from(rows.concat()) });
             }
+            if let Some(stream) = object.stream {
+                self.pool.write(stream, &object.name, &[], out);
+            }
         }
     }
 
     fn topology(&self, out: &mut Vec<Column>) {
-        for object in &self.objects {
+        for object in self.objects.iter().filter(|o| o.stream.is_none_or(|s| !self.pool.emitter(s).has_radii())) {
             out.push(Column {
                 object: object.name.clone(),
                 name: "radius".into(),
@@ -217,22 +321,31 @@ impl System for Tracers {
     }
 
     fn save(&self, archive: &mut Archive) {
+        if !self.pool.is_empty() {
+            self.pool.save(archive);
+        }
         archive.push_rows("x", &self.x);
         for column in &self.memory.columns {
             archive.push_rows("memory", column);
         }
         let ready = f64::from(u8::from(self.memory.ready));
-        archive.push("numbers", Part::Numbers(vec![ready, self.memory.next_step, self.memory.last_error, self.time]));
+        archive.push("numbers", Part::Numbers(vec![ready, self.memory.next_step, self.memory.last_error, self.time, self.size]));
     }
 
     fn restore(&mut self, archive: &mut Archive) -> Option<()> {
+        if !self.pool.is_empty() {
+            self.pool.restore(archive)?;
+            let rows = self.pool.end();
+            owned(&mut self.x, &mut self.memory).rows.into_iter().for_each(|c| c.resize(rows, ZERO));
+            self.count_rows();
+        }
         archive.rows("x", &mut self.x)?;
         for column in &mut self.memory.columns {
             archive.rows("memory", column)?;
         }
         let numbers = archive.numbers("numbers")?;
-        let [ready, next_step, last_error, time] = numbers[..] else { return None };
-        self.time = time;
+        let [ready, next_step, last_error, time, size] = numbers[..] else { return None };
+        (self.time, self.size) = (time, size);
         (self.memory.ready, self.memory.next_step, self.memory.last_error) = (ready == 1.0, next_step, last_error);
         Some(())
     }

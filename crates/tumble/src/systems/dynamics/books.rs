@@ -155,7 +155,7 @@ impl Dynamics {
                 out.push(Column { object: object.name.clone(), name: (*name).into(), unit, width, data: Data::from(data) });
             }
             if let Some(stream) = object.stream {
-                self.write_life(stream, &object.name, out);
+                self.pool.write(stream, &object.name, &self.laws.masses.mass, out);
             }
         }
     }
@@ -180,7 +180,7 @@ impl Dynamics {
                 continue;
             }
             add("mass", "kg", 1, Data::from(self.laws.masses.mass[object.points.clone()].to_vec()));
-            let pinned = object.points.clone().filter(|i| self.laws.masses.inverse[*i] == 0.0).map(|i| (i - object.points.start) as u32);
+            let pinned = object.points.clone().filter(|i| self.state.x[*i][3] == 0.0).map(|i| (i - object.points.start) as u32);
             add("pinned", "1", 1, Data::U32(pinned.collect()));
             add("triangles", "1", 3, Data::U32(object.triangles.concat()));
             add("links", "1", 2, Data::U32(object.link_ends.concat()));
@@ -253,7 +253,7 @@ impl Dynamics {
     fn noise(&self) -> f64 {
         let (x, grip) = (&self.state.x, &self.laws.grip);
         let rounding = |i: usize| f64::from(Real::EPSILON) * xyz64(x[i]).norm();
-        1e3 * sum(x.len(), |range| range.map(|i| f64::from(grip[i]) * rounding(i) * rounding(i)).sum())
+        1e3 * sum(grip.len(), |range| range.map(|i| f64::from(grip[i]) * rounding(i) * rounding(i)).sum())
     }
 
     /// Takes the scale of the energy from the books of a good frame. Energy that came from nowhere does not count, or a slow

@@ -136,6 +136,11 @@ impl Parts {
         self.emitters.push(emitter);
     }
 
+    /// Its emitters, for a system that needs nothing else.
+    pub fn take_emitters(&mut self) -> Vec<Emitter> {
+        std::mem::take(&mut self.emitters)
+    }
+
     /// The emitter of that name, counted from the first.
     pub fn stream(&self, name: &str) -> Option<usize> {
         self.emitters.iter().position(|e| e.words().name == name)
@@ -304,13 +309,12 @@ impl Parts {
             state.x.push([x.x as Real, x.y as Real, x.z as Real, w as Real]);
             state.v.push(if *pinned { [0.0; 4] } else { [v.x as Real, v.y as Real, v.z as Real, 0.0] });
             masses.mass.push(*mass as Real);
-            masses.inverse.push(w as Real);
         }
         for (q, inertia, pinned) in &self.frames {
             state.x.push(q.map(|q| q as Real));
             state.v.push([0.0; 4]);
             masses.mass.push(*inertia as Real);
-            masses.inverse.push(if *pinned { 0.0 } else { (1.0 / inertia) as Real });
+            masses.inverse_inertia.push(if *pinned { 0.0 } else { (1.0 / inertia) as Real });
         }
         if !self.charges.is_empty() || self.emitters.iter().any(|e| e.words().charge != 0.0) {
             masses.charge = vec![0.0; rows];

@@ -17,6 +17,8 @@ use tumble_interface::scene::{Hessian, Linear as Method, Solver};
 #[derive(Default)]
 pub struct Implicit {
     pub newton: newton::Workspace,
+    /// 1/mass of every row, 0 for what is held.
+    pub weights: Vec<Real>,
     pcg: pcg::Workspace,
     cholesky: Cholesky,
     /// Per row: mass, forces on each mass by itself and contact.
@@ -89,7 +91,14 @@ impl Implicit {
             }
             let touching = if colliders.is_empty() { start } else { end.min(masses.points) };
             for i in start..touching {
-                for touch in Penalty::of(colliders, (t - gh, t), contact::stiffness(masses.mass[i], grip[i], gh), x[i], v[i], start_x[i]) {
+                for touch in Penalty::of(
+                    colliders,
+                    (t - gh, t),
+                    contact::stiffness(masses.mass[i], grip.get(i).copied().unwrap_or(0.0), gh),
+                    x[i],
+                    v[i],
+                    start_x[i],
+                ) {
                     add_block(&mut local[i - start], touch.matrix(gh), 1.0);
                 }
             }
@@ -106,17 +115,16 @@ impl Implicit {
                 .map(|i| {
                     // A coordinate is off by 0.2 units in its last place on average, and so are its neighbours'.
                     let force = |c: usize| 0.3 * f64::from(Real::EPSILON) * f64::from(diagonal[i][c]) * f64::from(x[i][c]);
-                    f64::from(masses.inverse[i]) * (0..3).map(|c| force(c) * force(c)).sum::<f64>()
+                    f64::from(masses.inverse(i, x)) * (0..3).map(|c| force(c) * force(c)).sum::<f64>()
                 })
                 .sum()
         });
         let inertia = 1.0 / (gh * gh);
-        let all = self.local.iter_mut().zip(&mut self.inverse).zip(masses.mass.iter().zip(&masses.inverse));
-        for ((local, diagonal), (m, w)) in all {
+        for (i, ((local, diagonal), m)) in self.local.iter_mut().zip(&mut self.inverse).zip(&masses.mass).enumerate() {
             let m = (f64::from(*m) * inertia) as Real;
             add_block(local, [m, m, m, 0.0, 0.0, 0.0], 1.0);
             add_block(diagonal, [m, m, m, 0.0, 0.0, 0.0], 1.0);
-            *diagonal = if *w > 0.0 { inverse(diagonal) } else { [0.0; 6] };
+            *diagonal = if masses.inverse(i, x) > 0.0 { inverse(diagonal) } else { [0.0; 6] };
         }
         self.local_columns.set(&self.local);
         self.inverse_columns.set(&self.inverse);
@@ -125,7 +133,7 @@ impl Implicit {
 
     fn solve(&mut self, laws: &mut Laws, x: &[Row], rhs: &[Row], out: &mut [Row], settings: &Solver) -> Linear {
         if settings.linear == Method::Cholesky {
-            let pinned = |i: usize| laws.masses.inverse[i] == 0.0;
+            let pinned = |i: usize| laws.masses.inverse(i, x) == 0.0;
             let mut assembly = Assembly::new(x.len());
             for (i, b) in self.local.iter().enumerate() {
                 let [xx, yy, zz, xy, yz, zx] = if pinned(i) { [1.0, 1.0, 1.0, 0.0, 0.0, 0.0] } else { b.map(f64::from) };
@@ -158,7 +166,7 @@ fn add_block(to: &mut Block, b: Block, c: Real) {
 
 impl Stiff for Laws {
     fn inverse_mass(&self) -> &[Real] {
-        &self.masses.inverse
+        &self.implicit.weights
     }
 
     fn force(&mut self, t: f64, x: &[Row], v: &[Row], gh: f64, out: &mut [Row]) -> Result<(), StepError> {
@@ -170,10 +178,15 @@ impl Stiff for Laws {
         chunks(out, |start, out| {
             for (k, f) in out.iter_mut().enumerate() {
                 let i = start + k;
-                if i < masses.points && masses.inverse[i] > 0.0 {
-                    for touch in
-                        Penalty::of(colliders, (t - gh, t), contact::stiffness(masses.mass[i], grip[i], gh), x[i], v[i], start_x[i])
-                    {
+                if i < masses.points && x[i][3] > 0.0 {
+                    for touch in Penalty::of(
+                        colliders,
+                        (t - gh, t),
+                        contact::stiffness(masses.mass[i], grip.get(i).copied().unwrap_or(0.0), gh),
+                        x[i],
+                        v[i],
+                        start_x[i],
+                    ) {
                         let push = touch.force(x[i]);
                         *f = [f[0] + push.x as Real, f[1] + push.y as Real, f[2] + push.z as Real, 0.0];
                     }

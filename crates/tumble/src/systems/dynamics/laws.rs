@@ -42,7 +42,7 @@ pub struct Laws {
     pub colliders: Arc<Vec<Collider>>,
     /// Whether implicit stages see the solids as penalties.
     pub penalty: bool,
-    /// Stiffness with which the elements hold each row at the start [N/m].
+    /// Stiffness with which the elements hold each row at the start [N/m]; emitted particles have none.
     pub grip: Vec<Real>,
     /// Positions at the start of the implicit stage.
     pub start: Vec<Row>,
@@ -109,11 +109,11 @@ impl Laws {
     /// Turns the forces on the rows from `start` on into accelerations.
     fn accelerate(&self, masses: &Masses, start: usize, x: &[Row], out: &mut [Row]) {
         let [gx, gy, gz] = self.gravity.map(|g| g as Real);
-        let inverse = &masses.inverse[start..start + out.len()];
-        let (points, frames) = out.split_at_mut(masses.points.saturating_sub(start).min(inverse.len()));
+        let (points, frames) = out.split_at_mut(masses.points.saturating_sub(start).min(x.len()));
         let (x_points, x_frames) = x.split_at(points.len());
-        rows::each(points, &inverse[..x_points.len()], x_points, [gx, gy, gz, 0.0], Weigh);
-        rows::each(frames, &inverse[x_points.len()..], x_frames, ZERO, Weigh);
+        rows::each_by_last(points, x_points, [gx, gy, gz, 0.0], Weigh);
+        let first = start + x_points.len() - masses.points.min(start + x_points.len());
+        rows::each(frames, &masses.inverse_inertia[first..first + x_frames.len()], x_frames, ZERO, Weigh);
     }
 
     /// Forces of everything but contact [N, N m].
@@ -175,6 +175,9 @@ impl Equation for Laws {
             self.start.clear();
             self.start.extend_from_slice(x);
         }
+        let masses = &self.masses;
+        self.implicit.weights.clear();
+        self.implicit.weights.extend((0..x.len()).map(|i| masses.inverse(i, x)));
         let mut work = std::mem::take(&mut self.implicit.newton);
         let solver = self.solver.clone();
         let result = newton::solve(self, stage, x, v, &solver, &mut work, report);

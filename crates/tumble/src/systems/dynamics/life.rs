@@ -11,8 +11,8 @@ use crate::math::{Real, Row, Vec3, ZERO, axpy, xyz64};
 use crate::pool::{Birth, Columns, Parent, Pool};
 use crate::state::Masses;
 use rayon::prelude::*;
+use tumble_interface::StepError;
 use tumble_interface::engine::StepReport;
-use tumble_interface::{Column, Data, StepError};
 
 /// Newborn of one emitter at a later time.
 struct Grown {
@@ -34,12 +34,7 @@ impl Dynamics {
     }
 
     fn full(&self, s: usize, t: f64) -> StepError {
-        let words = self.pool.emitter(s).words();
-        let what = match words.most {
-            Some(most) => format!("emitter \"{}\" is full: {most} particles live; raise most, or set when_full = \"wait\"", words.name),
-            None => format!("emitter \"{}\" has given out all of its 4294967295 ids", words.name),
-        };
-        StepError::Capacity { system: self.name.clone(), time: t, what }
+        StepError::Capacity { system: self.name.clone(), time: t, what: self.pool.emitter(s).full() }
     }
 
     /// Takes those born by the time `until`, where a sub-step of length h [s] ends, into the system. The interval ends at
@@ -90,7 +85,7 @@ impl Dynamics {
         let masses = weigh(&self.pool, s, births.iter().map(|b| b.id), !self.laws.masses.charge.is_empty());
         let object = self.objects.iter().position(|o| o.stream == Some(s));
         let row = |p: Vec3<f64>, w: Real| [p.x as Real, p.y as Real, p.z as Real, w];
-        let mut x: Vec<Row> = births.iter().zip(&masses.inverse).map(|(b, w)| row(b.x, *w)).collect();
+        let mut x: Vec<Row> = births.iter().map(|b| row(b.x, (1.0 / self.pool.emitter(s).mass(b.id)) as Real)).collect();
         let mut v: Vec<Row> = births.iter().map(|b| row(b.v, 0.0)).collect();
         let (laws, colliders, resting) = (&self.laws, &self.laws.colliders[..], self.resting_speed(h));
         let touch = |t: f64, h: f64, before: (Row, Row), x: &mut Row, v: &mut Row| {
@@ -154,7 +149,6 @@ impl Dynamics {
         let charged = !self.laws.masses.charge.is_empty();
         let masses = weigh(&self.pool, s, births.iter().map(|b| b.id), charged);
         self.laws.masses.mass[rows.clone()].copy_from_slice(&masses.mass);
-        self.laws.masses.inverse[rows.clone()].copy_from_slice(&masses.inverse);
         if charged {
             self.laws.masses.charge[rows.clone()].copy_from_slice(&masses.charge);
         }
@@ -206,7 +200,6 @@ impl Dynamics {
     fn count_rows(&mut self) {
         let rows = self.pool.end();
         self.laws.masses.points = rows;
-        self.laws.grip.resize(rows, 0.0);
         self.memory.ready = false;
         for object in &mut self.objects {
             if let Some(s) = object.stream {
@@ -234,37 +227,15 @@ impl Dynamics {
         for s in 0..self.pool.len() {
             let masses = weigh(&self.pool, s, self.pool.ids(s).iter().copied(), charged);
             let rows = self.pool.rows(s);
-            for (x, w) in self.state.x[rows.clone()].iter_mut().zip(&masses.inverse) {
-                x[3] = *w;
+            for (x, id) in self.state.x[rows.clone()].iter_mut().zip(self.pool.ids(s)) {
+                x[3] = (1.0 / self.pool.emitter(s).mass(*id)) as Real;
             }
             self.laws.masses.mass[rows.clone()].copy_from_slice(&masses.mass);
-            self.laws.masses.inverse[rows.clone()].copy_from_slice(&masses.inverse);
             if charged {
                 self.laws.masses.charge[rows].copy_from_slice(&masses.charge);
             }
         }
         self.count_rows();
-    }
-
-    /// The columns that only emitted particles have.
-    pub(super) fn write_life(&self, s: usize, object: &str, out: &mut Vec<Column>) {
-        let (ids, ages, emitter) = (self.pool.ids(s), self.pool.ages(s), self.pool.emitter(s));
-        let mut add = |name: &str, unit, width, data| out.push(Column { object: object.into(), name: name.into(), unit, width, data });
-        add("id", "1", 1, Data::U32(ids.to_vec()));
-        add("age", "s", 1, Data::from(ages.to_vec()));
-        if emitter.has_radii() {
-            add("radius", "m", 1, Data::from(ids.iter().map(|id| emitter.radius(*id) as Real).collect::<Vec<Real>>()));
-        }
-        if emitter.has_masses() {
-            add("mass", "kg", 1, Data::from(self.laws.masses.mass[self.pool.rows(s)].to_vec()));
-        }
-        if emitter.has_colors() {
-            let colors = ids.iter().zip(ages).flat_map(|(id, age)| emitter.color(*id, f64::from(*age)).unwrap_or_default());
-            add("color", "1", 3, Data::from(colors.map(|c| c as Real).collect::<Vec<Real>>()));
-        }
-        for (name, _) in emitter.columns() {
-            add(name, "1", 1, Data::from(self.pool.column(s, name).unwrap_or_default().to_vec()));
-        }
     }
 }
 
@@ -274,7 +245,7 @@ fn weigh(pool: &Pool, s: usize, ids: impl Iterator<Item = u32>, charged: bool) -
     let mass: Vec<f64> = ids.map(|id| emitter.mass(id)).collect();
     Masses {
         mass: mass.iter().map(|m| *m as Real).collect(),
-        inverse: mass.iter().map(|m| (1.0 / m) as Real).collect(),
+        inverse_inertia: Vec::new(),
         charge: if charged { vec![emitter.words().charge as Real; mass.len()] } else { Vec::new() },
         points: mass.len(),
     }
@@ -282,7 +253,7 @@ fn weigh(pool: &Pool, s: usize, ids: impl Iterator<Item = u32>, charged: bool) -
 
 /// The columns whose rows a pool moves.
 fn owned<'a>(x: &'a mut Vec<Row>, v: &'a mut Vec<Row>, masses: &'a mut Masses, memory: &'a mut Memory) -> Columns<'a> {
-    let mut numbers = vec![&mut masses.mass, &mut masses.inverse];
+    let mut numbers = vec![&mut masses.mass];
     if !masses.charge.is_empty() {
         numbers.push(&mut masses.charge);
     }

@@ -151,7 +151,7 @@ impl Dynamics {
     }
 
     fn push(&mut self, i: usize, impulse: Vec3<f64>) {
-        let w = f64::from(self.laws.masses.inverse[i]);
+        let w = f64::from(self.laws.masses.inverse(i, &self.state.x));
         let dv = impulse * w;
         self.state.v[i] = axpy(self.state.v[i], 1.0, row(Vec3 { x: dv.x as Real, y: dv.y as Real, z: dv.z as Real }, 0.0));
         self.memory.ready = false;
@@ -214,7 +214,7 @@ impl Dynamics {
         if !self.laws.colliders.is_empty() {
             let step = contact::Step { t, h, resting: self.resting_speed(h) };
             let penalty = self.laws.penalty && self.user.is_none();
-            let (points, inverse) = (self.laws.masses.points, &self.laws.masses.inverse);
+            let points = self.laws.masses.points;
             let (colliders, before, before_v) = (&self.laws.colliders[..], &self.before, &self.before_v);
             let touched: Vec<bool> = self.state.x[..points]
                 .par_chunks_mut(CHUNK)
@@ -224,7 +224,7 @@ impl Dynamics {
                     let mut any = false;
                     for (k, (x, v)) in x.iter_mut().zip(v).enumerate() {
                         let i = c * CHUNK + k;
-                        if inverse[i] > 0.0 {
+                        if x[3] > 0.0 {
                             any |= if penalty {
                                 contact::bounce(colliders, &step, (before[i], before_v[i]), x, v)
                             } else {
@@ -265,7 +265,7 @@ impl Dynamics {
         };
         user.step(t, h, &mut x, &mut v, &mut acceleration).map_err(StepError::User)?;
         for i in 0..n {
-            if self.laws.masses.inverse[i] > 0.0 {
+            if self.state.x[i][3] > 0.0 {
                 let take = |from: &[f64], w: Real| [from[3 * i] as Real, from[3 * i + 1] as Real, from[3 * i + 2] as Real, w];
                 self.state.x[i] = take(&x, self.state.x[i][3]);
                 self.state.v[i] = take(&v, 0.0);
@@ -298,7 +298,6 @@ impl Dynamics {
                 let start = c * BLOCK;
                 let mut motion = Local { laws, masses: &laws.masses, start, newborn: None };
                 let points = motion.kinematics().points;
-                let inverse = &laws.masses.inverse[start..start + x.len()];
                 let (mut ready, mut before, mut before_v) = (was_ready, Vec::new(), Vec::new());
                 for k in 0..substeps {
                     if k % 64 == 63 && !go_on() {
@@ -316,7 +315,7 @@ impl Dynamics {
                     let step = contact::Step { t: time, h, resting };
                     for i in 0..before.len().min(points) {
                         let was = (before[i], before_v[i]);
-                        if inverse[i] > 0.0 && contact::resolve(colliders, &step, was, &mut x[i], &mut v[i]) {
+                        if x[i][3] > 0.0 && contact::resolve(colliders, &step, was, &mut x[i], &mut v[i]) {
                             ready = false;
                         }
                     }
@@ -522,7 +521,7 @@ impl System for Dynamics {
         }
         for (i, value) in points.zip(values.chunks_exact(3)) {
             // What is pinned stays where it is: a velocity would carry it away.
-            if velocity && self.laws.masses.inverse[i] == 0.0 {
+            if velocity && self.state.x[i][3] == 0.0 {
                 continue;
             }
             let rows = if velocity { &mut self.state.v } else { &mut self.state.x };

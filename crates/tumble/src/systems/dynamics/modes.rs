@@ -58,7 +58,7 @@ impl Dynamics {
     /// y = M^-1/2 (stiffness K + damping D) M^-1/2 u.
     fn apply(&mut self, u: &[Row], weights: (f64, f64)) -> Vec<Row> {
         let (x, masses) = (&self.state.x, &self.laws.masses);
-        let root = |i: usize| masses.inverse[i].sqrt();
+        let root = |i: usize| masses.inverse(i, x).sqrt();
         let scaled: Vec<Row> = u.iter().enumerate().map(|(i, u)| scale(*u, root(i))).collect();
         let mut out = vec![ZERO; u.len()];
         for batch in &mut self.laws.batches {
@@ -106,7 +106,7 @@ impl Dynamics {
         self.prepare((stiffness, damping));
         let n = self.state.x.len();
         let start = || -> Vec<Row> {
-            let moves = |i: usize| if self.laws.masses.inverse[i] > 0.0 { 1.0 } else { 0.0 };
+            let moves = |i: usize| if self.laws.masses.inverse(i, &self.state.x) > 0.0 { 1.0 } else { 0.0 };
             // A fixed start without symmetry: fractional parts of multiples of irrational numbers.
             let part = |i: usize, a: f64| ((i as f64 + 1.0) * a).fract() - 0.5;
             let mut q: Vec<Row> = (0..n)
