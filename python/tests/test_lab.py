@@ -12,7 +12,7 @@ import pytest
 from matplotlib.image import imread
 
 from tumble import Scene, SceneError
-from tumble.lab import exact, findings, integrators, patterns, structures
+from tumble.lab import exact, findings, flocks, integrators, patterns, structures
 from tumble.lab.cells import Purse
 from tumble.lab.limits import Found, largest_steps, stiffest_mode
 from tumble.lab.measure import Results
@@ -246,6 +246,134 @@ def test_page_of_tracers(tmp_path: Path) -> None:
     text = whole(path)
     for scheme in SCHEMES:
         assert (scheme.word in text) != scheme.needs_velocities, scheme.word
+
+
+def birds(**flock: Any) -> Tree:
+    return {
+        "version": 1,
+        "title": "Birds",
+        "seed": 4,
+        "time": {"fps": 24, "frames": 240},
+        "world": {"gravity": [0, 0, 0]},
+        "particles": [
+            {"name": "birds", "cloud": {"count": 40, "size": [4, 4, 4], "speed": 3}, "velocity": [[3, 0, 0]]},
+            {"name": "hawk", "position": [[-8, 0, 0]], "velocity": [[6, 0, 0]]},
+        ],
+        "force": [
+            {
+                "kind": "flock",
+                "radius": 3,
+                "cohesion": 1.5,
+                "alignment": 2,
+                "separation": 6,
+                "spacing": 0.9,
+                "speed": 5,
+                "propulsion": 1,
+                "max_acceleration": 25,
+                "goal": [{"point": [0, 0, 0], "strength": 4}],
+                "predators": ["hawk"],
+                "fear": 40,
+                "fear_radius": 4,
+                "chase": 8,
+                "predator_speed": 6.5,
+            }
+            | flock
+        ],
+    }
+
+
+def test_order_spacing_and_speed_of_a_flock() -> None:
+    x = np.array([[0, 0, 0], [2, 0, 0], [0, 0, 7.0]])
+    v = np.array([[3, 0, 0], [0, 4, 0], [0, 0, 0.0]])
+    # Headings are unit vectors along x and y, and nothing; nearest neighbours are 2, 2 and 7 away.
+    assert flocks.observe(x, v) == pytest.approx([math.sqrt(2) / 3, 11 / 3, 7 / 3])
+
+
+def test_a_flock_is_compared_as_long_as_paths_stay_close() -> None:
+    words = ["forward_euler", "heun", "verlet", "dormand_prince"]
+    results = studied(birds(), integrators=words, steps=[0.04, 0.02, 0.01, 0.005, 0.0025], budget=30.0)
+    tested = results.subject
+    assert tested.flock
+    assert results.reference is not None
+    assert "rk4" in results.reference.how
+    # Kinks let errors fall a little unevenly: measured 1.00, 2.0 to 2.3, 2.0.
+    for word in words[:3]:
+        assert abs(findings.order(results, BY_WORD[word]) - BY_WORD[word].order) < 0.45, word
+    # Another scheme and another disturbance grow about tenfold, too.
+    assert results.horizon is not None
+    assert 0.5 < results.horizon < tested.duration
+    one, other = (tested.world(BY_WORD["heun"], results.horizon, 1, 400) for _ in range(2))
+    push = 1e-8 * np.cos(np.arange(tested.start.size)).reshape(tested.start.shape)
+    tested.write(other, "position", tested.start + push)
+    one.step()
+    other.step()
+    growth = np.linalg.norm(tested.positions(other) - tested.positions(one)) / np.linalg.norm(push)
+    assert 2 < growth < 50
+
+
+def test_page_of_a_flock(tmp_path: Path) -> None:
+    words = ["forward_euler", "verlet", "implicit_midpoint", "dormand_prince"]
+    path = integrators.page(Scene(birds()), tmp_path, integrators=words, steps=[0.04, 0.01], budget=12.0)
+    text = whole(path)
+    assert "a step that is too large" in text
+    assert "Energy" not in text
+    assert "10 times as far apart" in text
+    rows = [r for r in table(path) if r["experiment"] == "observed"]
+    steps = sorted({float(r["step"]) for r in rows})
+    assert steps[1] / steps[0] == pytest.approx(8.0)
+
+    def late(word: str, step: float) -> dict[str, float]:
+        mine = [r for r in rows if r["integrator"] == word and float(r["step"]) == step]
+        return {k: float(np.mean([float(r[k]) for r in mine[len(mine) // 2 :]])) for k in flocks.NAMES}
+
+    truth = late("truth", steps[0])
+    assert 0.2 < truth["polarization"] <= 1
+    assert 0.3 < truth["distance"] < 1.5
+    # Cruising speed is 5 m/s, the goal and the hawk make it less even.
+    assert 3 < truth["speed"] < 7
+    for word in words[:3]:
+        assert late(word, steps[0])["speed"] == pytest.approx(truth["speed"], rel=0.15), word
+    # A step of 2.4 over the highest rate is beyond Verlet's limit of 2: neighbours are thrown apart.
+    assert late("verlet", steps[1])["distance"] > 1.3 * truth["distance"]
+
+
+def test_large_flocks_are_thinned_at_the_same_density() -> None:
+    tree = birds()
+    tree["particles"][0]["cloud"] |= {"count": 800}
+    tested = subject(Scene(tree))
+    assert len(tested.start) == 101
+    assert np.abs(tested.start[:100]).max() == pytest.approx(1.0, abs=0.05)
+    assert any("100 take part" in note for note in tested.notes)
+
+
+def test_a_map_has_no_integrators_to_compare() -> None:
+    tree = {
+        "version": 1,
+        "dimension": 2,
+        "system": [{"method": "vicsek", "vicsek": {"side": 3, "radius": 1, "speed": 0.1, "noise": 1}}],
+        "particles": [{"name": "p", "cloud": {"count": 9, "size": [3, 0, 3]}}],
+    }
+    with pytest.raises(SceneError, match="a map"):
+        subject(Scene(tree))
+
+
+def test_molecules_show_the_orders_of_schemes() -> None:
+    tree = {
+        "version": 1,
+        "dimension": 2,
+        "world": {"gravity": [0, 0, 0]},
+        "time": {"fps": 24, "frames": 240},
+        "particles": [{"name": "gas", "position": [[0.42 * i, 0, 0.4 * j] for i in range(5) for j in range(5)]}],
+        "force": [{"kind": "lennard_jones", "epsilon": 1, "sigma": 0.25, "cutoff": 0.9}],
+    }
+    words = ["forward_euler", "verlet"]
+    results = studied(tree, integrators=words, steps=[2e-3, 1e-3, 5e-4, 2.5e-4], budget=10.0)
+    assert results.horizon is not None
+    assert results.horizon < results.subject.duration
+    # The prediction follows the gas as it condenses: at the start it is far from its equilibrium.
+    assert results.subject.rate > 10
+    for word in words:
+        assert findings.order(results, BY_WORD[word]) == pytest.approx(BY_WORD[word].order, abs=0.25), word
 
 
 def test_page_of_contact_with_a_single_adaptive_integrator(tmp_path: Path) -> None:

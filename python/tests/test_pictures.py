@@ -290,6 +290,23 @@ def test_particles_with_a_trail_show_where_they_have_been() -> None:
         np.testing.assert_allclose(way.points[:known, 0], [0.1 * k for k in range(i - known + 1, i + 1)])
 
 
+def test_a_trail_does_not_cross_the_square_where_a_particle_leaves_it() -> None:
+    run = fake_run.FakeRun(
+        fake_run.scene(
+            particles=[{"name": "p", "trail": 0.4}],
+            system=[
+                {"name": "main", "method": "vicsek", "vicsek": {"side": 2.0, "radius": 1.0, "speed": 1, "noise": 0}}
+            ],
+        ),
+        {"p": {"radius": np.array([0.1])}},
+        # The first leaves at 1 before frame 3; the second stays.
+        lambda t: {"p": {"position": np.array([[(t + 1.75) % 2 - 1, 0.0, 0.0], [0.0, t, 0.0]])}},
+    )
+    way = next(t for t in Stage(run).things(4) if isinstance(t, Tubes))
+    assert way.counts.tolist() == [3, 2, 5]
+    np.testing.assert_allclose(way.points[:5, 0], [0.75, 0.85, 0.95, -0.95, -0.85])
+
+
 def test_anchors_are_drawn_between_their_masses() -> None:
     anchor = {"name": "a", "between": ["p 1", "q 0"]}
     run = fake_run.FakeRun(

@@ -224,3 +224,35 @@ fn order_falls_with_noise_as_in_vicsek() {
         assert!((average - published).abs() < 3.0 * scatter + 0.003 && scatter < 0.03, "{noise}: {average} {published} {scatter}");
     }
 }
+
+/// Those who are alone err to both sides alike, by no more than half the noise, and start where the scene says.
+#[test]
+fn errors_of_vicseks_model_are_even() {
+    let n = 2000;
+    let mut sim = simulation(&format!(
+        "dimension = 2\nplane = \"xy\"\ntime.fps = 1\n[[system]]\nmethod = \"vicsek\"\n\
+         vicsek = {{ side = 100, radius = 1e-6, speed = 2, noise = 1 }}\n\
+         [[particles]]\nname = \"p\"\ncloud = {{ count = {n}, size = [100, 100, 0] }}\nvelocity = [[3, 4, 0]]\n\
+         [[particles]]\nname = \"q\"\nposition = [[10, -20, 0], [60, 0, 0]]\n"
+    ));
+    // The second comes in at the other side.
+    for (x, exact) in positions(&sim, "q").iter().zip([vector(10.0, -20.0, 0.0), vector(-40.0, 0.0, 0.0)]) {
+        assert!((*x - exact).norm() < 1e-12);
+    }
+    let (x, v) = (positions(&sim, "p"), velocities(&sim, "p"));
+    let mean = x.iter().fold(Vector::default(), |sum, x| sum + *x) * (1.0 / f64::from(n));
+    // Uniform in the square: 100/sqrt(12 n) = 0.65 m; four of them.
+    assert!(mean.norm() < 2.6 && x.iter().all(|x| x.x.abs() <= 50.0 && x.y.abs() <= 50.0 && x.z == 0.0));
+    assert!(v.iter().all(|v| (*v - vector(1.2, 1.6, 0.0)).norm() < 1e-14));
+    step(&mut sim);
+    let turns: Vec<f64> = velocities(&sim, "p").iter().map(|v| (1.2 * v.y - 1.6 * v.x).atan2(1.2 * v.x + 1.6 * v.y)).collect();
+    let mean = turns.iter().sum::<f64>() / f64::from(n);
+    let spread = (turns.iter().map(|t| t * t).sum::<f64>() / f64::from(n)).sqrt();
+    println!("errors: mean {mean:.4}, spread {spread:.4}, exact 0 and {:.4}", 1.0 / 12.0_f64.sqrt());
+    // Uniform from -1/2 to 1/2: the mean is known to 0.289/sqrt(n) = 0.0065, the spread to 0.0029; four of each.
+    assert!(mean.abs() < 0.026 && (spread - 1.0 / 12.0_f64.sqrt()).abs() < 0.012);
+    assert!(turns.iter().all(|t| t.abs() <= 0.5 + 1e-12));
+    let end = positions(&sim, "p");
+    let moved: Vec<f64> = end.iter().zip(&x).map(|(after, before)| (*after - *before).norm()).filter(|d| *d < 50.0).collect();
+    assert!(moved.len() > 1900 && moved.iter().all(|d| (d - 2.0).abs() < 1e-12));
+}

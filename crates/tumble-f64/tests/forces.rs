@@ -129,6 +129,23 @@ fn charges_turn_with_the_gyro_frequency_on_the_gyro_radius() {
     }
 }
 
+/// A field that grows as 1 + t/2, read from formulas of the time, and of the place, too.
+#[test]
+fn charges_turn_in_fields_that_are_formulas() {
+    let (along, across) = (vector(0.0, 0.0, 0.7), vector(0.0, 1.2, 0.0));
+    let force = |field: &str| format!("[[force]]\nkind = \"magnetic\"\nfield = {field}");
+    let time = 3.0;
+    // v turns by the integral of -q B/m = 0.6 (1 + t/2) about z, by the right hand.
+    let (sin, cos) = (TURN * (time + 0.25 * time * time)).sin_cos();
+    let exact = along + across * cos + vector(-1.2, 0.0, 0.0) * sin;
+    for field in ["[\"0\", \"0\", \"1.5*(1 + t/2)\"]", "[\"0\", \"0\", \"1.5*(1 + t/2) + 0*x\"]"] {
+        let (_, v) = turning(&force(field), "rk4", 600, time, along + across);
+        println!("{field}: off by {:.1e}", (v - exact).norm());
+        // Order 4 with 600 steps of 0.005 s: h^4 w^5 t/120 = 1e-10 (w up to 1.5/s). Measured 4e-11.
+        assert!((v - exact).norm() < 3e-10);
+    }
+}
+
 #[test]
 fn what_schemes_do_to_the_energy_in_a_magnetic_field() {
     // Five turns with 60 steps each: the speed at the end over that at the start.

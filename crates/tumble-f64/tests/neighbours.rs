@@ -147,6 +147,27 @@ fn a_pair_of_molecules_swings_at_its_frequency() {
     }
 }
 
+/// At its cutoff a smooth force ends as E''(r_c) (r - r_c), the plain one with E'(r_c).
+#[test]
+fn a_smooth_force_ends_with_zero() {
+    let (epsilon, sigma, cutoff) = (2.0_f64, 0.12_f64, 0.3_f64);
+    let s6 = (sigma / cutoff).powi(6);
+    let slope = 24.0 * epsilon * (s6 - 2.0 * s6 * s6) / cutoff;
+    let bend = 24.0 * epsilon * (26.0 * s6 * s6 - 7.0 * s6) / (cutoff * cutoff);
+    let before = 1e-4 * cutoff;
+    let pull = |smooth: bool, r: f64| {
+        let law = format!("kind = \"lennard_jones\"\nepsilon = {epsilon}\nsigma = {sigma}\ncutoff = {cutoff}\nsmooth = {smooth}");
+        forces(&[Vector::default(), vector(r, 0.0, 0.0)], &[Vector::default(); 2], &[1.0; 2], &law)[0].x
+    };
+    let (smooth, plain) = (pull(true, cutoff - before), pull(false, cutoff - before));
+    println!("smooth {:.5}, plain {:.5} of what they should be", smooth / (-bend * before), plain / slope);
+    // The next term of the series is E''' before²/2 with E'''/E'' about -8/r_c: 4e-4 of the first, and 7e-4 of E'.
+    assert!((smooth / (-bend * before) - 1.0).abs() < 1e-3);
+    assert!((plain / slope - 1.0).abs() < 1e-3);
+    assert!(slope.abs() > 100.0 * (bend * before).abs());
+    assert_eq!([pull(true, cutoff + before), pull(false, cutoff + before)], [0.0, 0.0]);
+}
+
 #[test]
 fn what_is_in_one_place_does_not_push_itself() {
     let x = [vector(1.0, 2.0, 3.0), vector(1.0, 2.0, 3.0), vector(1.0, 2.0, 3.25)];

@@ -49,6 +49,8 @@ fn scenes() -> Vec<(&'static str, String, usize)> {
            shape.capsule = { from = [-1, 0, 0.5], to = [1, 0, 0.5], radius = 0.2 }\n\
            [[collider]]\nname = \"room\"\ninside = true\nrestitution = 0.8\nmotion.velocity = [3, 0, 0]\nshape.box = { center = [0, 0, 1], size = [2.5, 2.5, 2.5] }\n";
     tracers += "]\n";
+    let vicsek = "dimension = 2\n[[system]]\nmethod = \"vicsek\"\nsubsteps = 3\nvicsek = { side = 20, radius = 1, speed = 1, noise = 0.5 }\n\
+                  [[particles]]\nname = \"p\"\ncloud = { count = 9000, size = [20, 0, 20] }\n";
     let rod = "[[system]]\nintegrator = \"SCHEME\"\nsubsteps = N\n[[rope]]\nname = \"rod\"\nfrom = [0, 0, 0]\nto = [0.6, 0.2, 0.4]\nsegments = 60\npin = [\"start\"]\n\
                rod = { stretch = 100, bend = 1e-3, twist = 1e-3, inertia = 1e-4, damping = 1e-4 }\n";
     let rod = |scheme, n| rod.replace("SCHEME", scheme).replace("= N", n);
@@ -88,6 +90,7 @@ fn scenes() -> Vec<(&'static str, String, usize)> {
         ("jelly", jelly.to_string(), 4),
         ("dust", dust, 20),
         ("tracers", tracers, 20),
+        ("vicsek", vicsek.to_string(), 20),
         ("spray", spray.to_string(), 20),
         ("swarm", swarm.to_string(), 16),
         ("rope, cholesky", rope.to_string(), 20),
@@ -227,7 +230,8 @@ fn after_an_error_the_state_is_that_of_the_last_good_frame() {
 #[test]
 fn an_abandoned_step_leaves_no_trace() {
     use std::sync::atomic::{AtomicU32, Ordering};
-    for (name, text, _) in scenes().into_iter().filter(|(name, _, _)| ["sheet, verlet", "rod, explicit", "dust", "tracers"].contains(name))
+    for (name, text, _) in
+        scenes().into_iter().filter(|(name, _, _)| ["sheet, verlet", "rod, explicit", "dust", "tracers", "vicsek"].contains(name))
     {
         let mut sim = simulation(&text);
         run(&mut sim, 1);

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from tumble._engine import Scene, SceneError
-from tumble.lab import figures, findings, measure
+from tumble.lab import figures, findings, flocks, measure
 from tumble.lab.cells import STOPPED, Cell, Purse
 from tumble.lab.findings import Cost, number, seconds
 from tumble.lab.limits import largest_steps
@@ -41,14 +41,17 @@ def page(
     left out, and the page says so. Raises SceneError, ExportError, ValueError for an unknown integrator.
     """
     results = study(scene, steps, integrators, duration, progress, budget)
-    sections = [_energy_section(results), _accuracy_section(results), _limits_section(results), _table_section(results)]
+    over_time = [flocks.section(results, o) for o in results.observed] or [_energy_section(results)]
+    # No energy tells when the step of a flock is too long.
+    limits = [] if results.subject.flock else [_limits_section(results)]
+    sections = [*over_time, _accuracy_section(results), *limits, _table_section(results)]
     title = str(results.subject.tree["title"]) or "A scene"
     return write(
         Path(folder),
         "integrators",
         f"{title}: every integrator",
         _lead(results),
-        findings.headlines(results),
+        findings.headlines(results) + flocks.headlines(results),
         sections,
         _notes(results),
         _rows(results),
@@ -67,7 +70,10 @@ def study(
     """The measurements of a page."""
     tested = subject(scene)
     results = Results(tested, chosen(list(integrators) if integrators else None, tested.tracers))
-    results.duration = duration or measure.default_duration(tested)
+    given = duration
+    if tested.crowded and duration is None:
+        given = results.horizon = measure.horizon(tested, Purse(0.1 * budget))
+    results.duration = given or measure.default_duration(tested)
     ladder = [float(h) for h in steps] if steps is not None else measure.default_steps(tested, results.duration)
     adaptive = sum(s.adaptive for s in results.schemes)
     fixed = len(results.schemes) - adaptive
@@ -94,7 +100,10 @@ def study(
         Purse(0.35 * budget),
         tick,
     )
-    measure.energy(results, 1e-3 * size, Purse(0.1 * budget), tick)
+    if tested.flock:
+        results.observed = flocks.follow(results, Purse(0.4 * budget), tick)
+    else:
+        measure.energy(results, 1e-3 * size, Purse(0.1 * budget), tick)
     results.found = largest_steps(tested, results.schemes, Purse(0.4 * budget), tick)
     if progress is not None:
         progress(total, total)
@@ -118,6 +127,8 @@ def _lead(results: Results) -> str:
             mode += f" and is damped at {number(tested.damping)}/s"
         if tested.culprit:
             mode += f", most of it in “{escape(tested.culprit[0])}”, particle {tested.culprit[1]}"
+    elif tested.flock:
+        mode = f"the fastest urge answers at {number(tested.rate)}/s"
     else:
         mode = "no springs, so nothing limits the step but accuracy"
     return f"{what}, in double precision; {mode}. Errors are taken over {seconds(results.duration)}."
@@ -255,6 +266,15 @@ def _story(results: Results, cell: Cell | None) -> str:
 def _notes(results: Results) -> list[str]:
     notes = list(results.subject.notes)
     truth = results.reference
+    if results.horizon is not None:
+        notes.append(
+            f"Two runs that begin a little apart are {measure.APART:.0f} times as far apart after {seconds(results.horizon)}. "
+            "Errors are compared no longer than that: beyond it they would tell of chaos, not of schemes."
+        )
+    if results.subject.crowded:
+        notes.append(
+            "Forces that end at a radius or heed the nearest few have kinks: an order above 2 need not be seen."
+        )
     if truth is None:
         notes.append("No reference: the runs that should have served as one did not agree, broke, or took too long.")
     else:
@@ -328,6 +348,7 @@ def _rows(results: Results) -> Iterator[dict[str, Any]]:
             **_priced("survive", findings.to_survive(results, scheme)),
             **_priced("one_percent", cost),
         }
+    yield from flocks.rows(results)
     for word, (times, values) in results.traces.items():
         for t, value in zip(times, values, strict=True):
             row: dict[str, Any] = {"experiment": "trace", "integrator": word, "time": t}

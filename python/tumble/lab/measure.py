@@ -1,16 +1,21 @@
 """The experiments on integrators: error over the step, energy over time."""
 
+import time
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
+from typing import TYPE_CHECKING
 
 import numpy as np
 
-from tumble._engine import World
+from tumble._engine import StepError, World
 from tumble.lab.cells import BLEW_UP, SKIPPED, SURVIVED, Cell, Purse, run
 from tumble.lab.exact import Floats
 from tumble.lab.limits import Found
 from tumble.lab.schemes import BY_WORD, Scheme
 from tumble.lab.subject import GROWTH, Subject, rms
+
+if TYPE_CHECKING:
+    from tumble.lab.flocks import Observed
 
 SAMPLES = 8
 """Times at which positions are compared."""
@@ -36,6 +41,8 @@ class Results:
     subject: Subject
     schemes: list[Scheme]
     duration: float = 0.0
+    horizon: float | None = None
+    """Time after which runs that began close are far apart [s], if that is what limits `duration`."""
     reference: Reference | None = None
     accuracy: list[Cell] = field(default_factory=list)
     common_step: float = 0.0
@@ -43,6 +50,8 @@ class Results:
     """Times [s], and energies over the true ones (of tracers: the path of one)."""
     energy_cells: dict[str, Cell] = field(default_factory=dict)
     true_path: Floats | None = None
+    observed: list["Observed"] = field(default_factory=list)
+    """Of flocks."""
     found: dict[str, Found] = field(default_factory=dict)
     notes: list[str] = field(default_factory=list)
 
@@ -54,6 +63,43 @@ def default_duration(subject: Subject) -> float:
     """The scene's length, at most about 60 periods of its stiffest mode; not a whole number, so that samples see all
     phases."""
     return min(subject.duration, 2 * np.pi * 57.9 / subject.rate) if subject.rate > 0 else subject.duration
+
+
+APART = 10.0
+"""Growth of a small disturbance beyond which positions of many that push each other say nothing about a scheme."""
+
+
+def horizon(subject: Subject, purse: Purse) -> float | None:
+    """The time within which two runs that begin 1e-8 of the size apart have come ten times as far apart; None if they
+    do not within the default duration."""
+    duration = default_duration(subject)
+    parts = 64
+    interval = duration / parts
+    n = max(1, round(interval * subject.rate / 0.2)) if subject.rate > 0 else 4
+    worlds = [subject.world(BY_WORD["rk4"], interval, parts, n) for _ in range(2)]
+    noise = np.random.default_rng(1).standard_normal(subject.start.shape)
+    noise[:, np.ptp(subject.start, axis=0) == 0] = 0.0
+    noise *= 1e-8 * subject.extent / rms(noise)
+    subject.write(worlds[1], "position", subject.start + noise)
+    first = rms(noise)
+    begin = time.perf_counter()
+    for k in range(parts):
+        try:
+            for world in worlds:
+                world.step()
+        except StepError:
+            return interval * k or interval
+        subject.consider(worlds[0])
+        spent = time.perf_counter() - begin
+        if rms(subject.positions(worlds[1]) - subject.positions(worlds[0])) > APART * first:
+            purse.left -= spent
+            return interval * (k + 1)
+        if spent > purse.left:
+            subject.notes.append("There was no time to see how soon paths drift apart over the whole length.")
+            purse.left = 0.0
+            return interval * (k + 1)
+    purse.left -= time.perf_counter() - begin
+    return None
 
 
 def default_steps(subject: Subject, duration: float) -> list[float]:
@@ -71,7 +117,7 @@ def reference(subject: Subject, duration: float, finest: float, purse: Purse) ->
         size = max(rms(x - subject.start) for x in exact)
         return Reference("the exact solution", exact, size, 1e-13)
     # Contact and breaking happen at the end of a step: there only a short step is accurate, whatever the tolerance.
-    if not subject.discontinuous:
+    if not subject.discontinuous and not subject.flock:
         for tolerance in (1e-12 * subject.extent, 1e-9 * subject.extent, 1e-6 * subject.extent):
             loose, sharp = (
                 _positions(subject, "dormand_prince", interval, 1, t, purse, purse.left / 3)

@@ -5,13 +5,16 @@ from typing import Any
 
 import numpy as np
 
-from tumble._engine import Scene, World
+from tumble._engine import Scene, SceneError, World
 from tumble.lab import exact
 from tumble.lab.exact import Floats, Linear, Tree
 from tumble.lab.schemes import BY_WORD, Scheme
 
 GROWTH = 1000.0
 """Growth of the energy that counts as a blow-up."""
+
+CROWD = 100
+"""Birds of a cloud that take part."""
 
 PERIODS = 100.0
 """Periods of the stiffest mode within which it counts."""
@@ -64,6 +67,21 @@ class Subject:
         return self.coupled or bool(self.tree["collider"]) or any(law.get("break_strain") for law in laws)
 
     @property
+    def flock(self) -> bool:
+        """Whether it steers, which no energy drives and no energy tells about."""
+        return not self.tracers and any(force["kind"] == "flock" for force in self.tree["force"])
+
+    @property
+    def crowded(self) -> bool:
+        """Whether many push each other at short range: paths that begin close do not stay so."""
+        kinds = {"flock", "lennard_jones", "repulsion", "cohesion"}
+        return not self.tracers and any(force["kind"] in kinds for force in self.tree["force"])
+
+    def consider(self, world: World) -> None:
+        """Lets the state that a run has come to count for the limits, too."""
+        _mass_limits(self, [s for s in world.stability() if float(s["frequency"]) > self.frequency])
+
+    @property
     def coupled(self) -> bool:
         """Whether its systems pull on each other."""
         return len(self.tree["system"]) > 1 and bool(self.tree["anchor"])
@@ -77,7 +95,7 @@ class Subject:
         springs = any(thing["spring"] for thing in self.tree["particles"])
         hold = {"drag", "lennard_jones", "repulsion", "cohesion", "viscosity"}
         forces = any(force["kind"] in hold for force in self.tree["force"])
-        return self.rate > 0 and bool(things or springs or forces)
+        return self.rate > 0 and not self.flock and bool(things or springs or forces)
 
     def world(
         self, scheme: Scheme, interval: float, frames: int, substeps: int | None = None, tolerance: float | None = None
@@ -161,9 +179,11 @@ def subject(scene: Scene) -> Subject:
         system.setdefault("method", "dynamics")
         system["adaptive"] = dict(system.get("adaptive") or {})
     methods = {system["method"] for system in tree["system"]}
-    tracers = methods == {"tracers"}
-    notes = []
-    if len(methods) > 1:
+    if methods == {"vicsek"}:
+        raise SceneError("the model of Vicsek is a map and has no integrator; there is nothing to compare")
+    tracers = "tracers" in methods and "dynamics" not in methods
+    notes = _thin(tree)
+    if {"tracers", "dynamics"} <= methods:
         notes.append("Tracers move as the scene says; what is compared here are the masses.")
     if any(system.get("clamp") for system in tree["system"]):
         notes.append("The position clamp goes with modified_euler and verlet only; the others run without it.")
@@ -180,12 +200,31 @@ def subject(scene: Scene) -> Subject:
     return bare
 
 
+def _thin(tree: Tree) -> list[str]:
+    """Leaves of the clouds of a flock no more than CROWD, at the same density: what is to be seen of integrators few birds
+    show as well as many."""
+    if not any(force["kind"] == "flock" for force in tree["force"]):
+        return []
+    notes = []
+    for thing in tree["particles"]:
+        cloud = thing.get("cloud")
+        if not cloud or cloud["count"] <= CROWD:
+            continue
+        across = sum(size > 0 for size in cloud["size"])
+        factor = (CROWD / cloud["count"]) ** (1.0 / max(1, across))
+        notes.append(f"Of the {cloud['count']} particles of “{thing['name']}” {CROWD} take part, at the same density.")
+        thing["cloud"] = {**cloud, "count": CROWD, "size": [factor * size for size in cloud["size"]]}
+        for key in ("mass", "velocity", "charge"):
+            thing[key] = thing[key][:CROWD]
+    return notes
+
+
 def _mass_limits(subject: Subject, systems: list[dict[str, Any]]) -> None:
     if not systems:
         return
     stiffest = max(systems, key=lambda s: float(s["frequency"]))
     subject.frequency, subject.damping = float(stiffest["frequency"]), float(stiffest["damping"])
-    subject.rate = max(max(float(s["frequency"]), float(s["damping_max"])) for s in systems)
+    subject.rate = max(subject.rate, *(max(float(s["frequency"]), float(s["damping_max"])) for s in systems))
     culprit = stiffest["culprit"]
     subject.culprit = (str(culprit[0]), int(culprit[1])) if culprit else None
     for system in systems:

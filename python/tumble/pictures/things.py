@@ -68,6 +68,8 @@ class Object:
     """Radius in pictures [m], of points and curves."""
     trail: float = 0.0
     """How much of the way behind points is drawn [s]."""
+    leap: float = float("inf")
+    """A step farther than this [m] is none: the point has left a square that repeats itself on the other side."""
     triangles: Indices = field(default_factory=lambda: np.zeros((0, 3), dtype=np.int64))
     links: Indices = field(default_factory=lambda: np.zeros((0, 2), dtype=np.int64))
     curve: Indices = field(default_factory=lambda: np.zeros(0, dtype=np.int64))
@@ -196,6 +198,7 @@ def objects(run: Recording) -> list[Object]:
                 color=color,
                 radius=float(np.ravel(columns["radius"])[0]) if len(columns.get("radius", ())) else 0.01,
                 trail=float(entry.get("trail", 0.0)),
+                leap=_leap(run.scene, entry),
                 triangles=_indices(columns, "triangles", 3),
                 links=_indices(columns, "links", 2),
                 curve=_indices(columns, "curve", 1).ravel(),
@@ -336,8 +339,12 @@ class Stage:
             return None
         way = np.stack([self._ways[thing.name, k] for k in frames], axis=1)
         shade = (thing.color[0] * 0.6, thing.color[1] * 0.6, thing.color[2] * 0.6)
-        counts = np.full(len(way), len(frames))
-        return Tubes(f"{thing.name} trail", way.reshape(-1, 3), counts, max(0.3 * thing.radius, thinnest), shade)
+        # Each way in pieces: the last of a piece is the last of all, or leaps.
+        last = np.ones(way.shape[:2], dtype=bool)
+        last[:, :-1] = np.linalg.norm(np.diff(way, axis=1), axis=2) > thing.leap
+        counts = np.diff(np.flatnonzero(last), prepend=-1)
+        way, counts = way.reshape(-1, 3)[np.repeat(counts > 1, counts)], counts[counts > 1]
+        return Tubes(f"{thing.name} trail", way, counts, max(0.3 * thing.radius, thinnest), shade)
 
     def _moving(self, thing: Object, columns: Columns, thinnest: float) -> list[Thing]:
         x = positions(columns, thing)
@@ -409,7 +416,17 @@ def _piece(thing: Object, before: Columns, after: Columns) -> tuple[Floats, Floa
     if old is not None and new is not None:
         _, k, m = np.intersect1d(old, new, assume_unique=True, return_indices=True)
         x, y, shade = x[k], y[m], shade[m]
+    near = ~(np.linalg.norm(y - x, axis=1) > thing.leap)
+    x, y, shade = x[near], y[near], shade[near]
     return np.stack([x, y], axis=1), shade
+
+
+def _leap(scene: Mapping[str, Any], entry: Mapping[str, Any]) -> float:
+    """Half the side of the square that an object moves in, if it repeats itself."""
+    named = entry.get("system")
+    systems = [s for s in scene.get("system") or [] if named in (None, s.get("name", "main"))]
+    words = systems[0].get("vicsek") if systems else None
+    return float(words["side"]) / 2 if words else float("inf")
 
 
 def _ends(between: list[str]) -> list[tuple[str, int]]:

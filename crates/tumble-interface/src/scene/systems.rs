@@ -36,6 +36,9 @@ pub struct System {
     /// Settings of the implicit integrators.
     #[serde(default)]
     pub solver: Solver,
+    /// The numbers of the `vicsek` method, which needs them.
+    #[serde(default)]
+    pub vicsek: Option<Vicsek>,
 }
 
 impl Default for System {
@@ -49,6 +52,7 @@ impl Default for System {
             adaptive: Adaptive::default(),
             clamp: None,
             solver: Solver::default(),
+            vicsek: None,
         }
     }
 }
@@ -66,6 +70,38 @@ pub enum Method {
     Dynamics,
     /// Massless particles carried by velocity fields: x' = u(x, t).
     Tracers,
+    /// The model of Vicsek: particles of constant speed that take the mean direction of all within a radius, and err. A map:
+    /// each sub-step is one step of it (one an exchange without `substeps` and `step`), and there is no integrator.
+    Vicsek,
+}
+
+impl Method {
+    /// The word in the scene.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Dynamics => "dynamics",
+            Self::Tracers => "tracers",
+            Self::Vicsek => "vicsek",
+        }
+    }
+}
+
+/// The model of Vicsek, in a square around the origin that repeats itself. Needs `dimension = 2`.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Vicsek {
+    /// Side of the square. Who leaves it comes in at the other side.
+    #[schemars(extend("x-unit" = "m", "exclusiveMinimum" = 0.0))]
+    pub side: f64,
+    /// Distance within which directions are averaged, at most half the side.
+    #[schemars(extend("x-unit" = "m", "exclusiveMinimum" = 0.0))]
+    pub radius: f64,
+    /// Speed of all. Velocities of the particles give directions; without them directions are random.
+    #[schemars(range(min = 0.0), extend("x-unit" = "m/s"))]
+    pub speed: f64,
+    /// Width of the interval of errors around the mean direction; 2 pi leaves nothing but chance.
+    #[schemars(range(min = 0.0), extend("x-unit" = "rad"))]
+    pub noise: f64,
 }
 
 /// A scheme for y' = f(y, t).

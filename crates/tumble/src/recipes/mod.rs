@@ -19,7 +19,7 @@ pub use block::block;
 pub use emitter::emitter;
 pub use galaxy::galaxy;
 pub use net::net;
-pub use particles::{Tracer, draw_cloud, particles, tracers};
+pub use particles::{Tracer, draw_cloud, particles, tracers, walkers};
 pub use rope::rope;
 pub use scenery::{animated, placed, scenery, solid};
 pub use sheet::sheet;

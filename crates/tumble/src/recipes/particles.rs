@@ -142,3 +142,24 @@ pub fn tracers(thing: &Particles, wrong: &mut impl FnMut(String, &str)) -> Trace
     refuse("spring", !thing.spring.is_empty());
     Tracer { x: thing.position.iter().map(|x| Vector::from(*x)).collect() }
 }
+
+/// Positions and velocities of an object that moves by the model of Vicsek; what only masses can have is wrong.
+pub fn walkers(thing: &Particles, wrong: &mut impl FnMut(String, &str)) -> Vec<[Vector; 2]> {
+    let n = thing.position.len();
+    let given = [
+        ("mass", thing.mass != [1.0]),
+        ("charge", !thing.charge.is_empty()),
+        ("pin", !thing.pin.is_empty()),
+        ("spring", !thing.spring.is_empty()),
+    ];
+    for (key, _) in given.into_iter().filter(|(_, given)| *given) {
+        let message = "particles of a vicsek system have a direction and no mass; leave it out, or use a dynamics system";
+        wrong(format!("particles \"{}\".{key}", thing.name), message);
+    }
+    if !matches!(thing.velocity.len(), 0 | 1) && thing.velocity.len() != n {
+        let message = format!("{} velocities for {n} positions, expected none, one, or {n}", thing.velocity.len());
+        wrong(format!("particles \"{}\".velocity", thing.name), &message);
+    }
+    let velocity = |i: usize| thing.velocity.get(i).or(thing.velocity.first()).copied().unwrap_or_default();
+    thing.position.iter().enumerate().map(|(i, x)| [Vector::from(*x), Vector::from(velocity(i))]).collect()
+}

@@ -13,10 +13,13 @@ use crate::state::Object;
 use crate::system::System;
 use crate::systems::dynamics::{Dynamics, Parts, Settings, SpringPart, Stepping, Tether};
 use crate::systems::tracers::{self, Tracers};
+use crate::systems::vicsek::Swarm;
 use crate::world::World;
 use std::borrow::Cow;
 use std::sync::Arc;
-use tumble_interface::scene::{Anchor, Bits, Emitter, Force as Words, MeshFile, Method, Particles, Plane, Scene, Shape, System as Plan};
+use tumble_interface::scene::{
+    Anchor, Bits, Emitter, Force as Words, MeshFile, Method, Particles, Plane, Scene, Shape, System as Plan, Vicsek,
+};
 use tumble_interface::{Column, Data, Issue, Mesh, SceneError};
 
 /// A world, the surfaces of its colliders, and what is doubtful about it.
@@ -81,6 +84,10 @@ pub fn build(scene: &Scene, assets: &Assets) -> Result<Built, SceneError> {
             systems.push(Box::new(carried(scene, &plans, index, dt, parts.take_emitters())?));
             continue;
         }
+        if let (Method::Vicsek, Some(words)) = (plan.method, &plan.vicsek) {
+            systems.push(Box::new(swarm(scene, &plans, index, words)));
+            continue;
+        }
         let settings = Settings {
             name: plan.name.clone(),
             index,
@@ -138,7 +145,8 @@ fn unused(scene: &Scene, plans: &[Plan]) -> Vec<String> {
     if !methods.contains(&Method::Dynamics) {
         for (words, given) in [("forces", !scene.force.is_empty()), ("colliders", !scene.collider.is_empty())] {
             if given {
-                warnings.push(format!("all objects are tracers, which feel no {words}"));
+                let kind = if methods.contains(&Method::Tracers) { "tracers" } else { "in a vicsek system" };
+                warnings.push(format!("all objects are {kind}, which feel no {words}"));
             }
         }
     }
@@ -209,12 +217,13 @@ fn fill(scene: &Scene, plans: &[Plan], assets: &Assets, issues: &mut Vec<Issue>)
         }
     };
     for thing in &scene.particles {
-        let tracers = place(plans, "particles", thing.system.as_deref()).is_some_and(|i| plans[i].method == Method::Tracers);
+        let method = place(plans, "particles", thing.system.as_deref()).map_or(Method::Dynamics, |i| plans[i].method);
         at("particles", &thing.system, &mut |site| {
-            if tracers {
-                recipes::tracers(thing, &mut |path, message| site.issues.push(Issue::new(path, message)));
-            } else {
-                recipes::particles(site, thing);
+            let mut wrong = |path, message: &str| site.issues.push(Issue::new(path, message));
+            match method {
+                Method::Tracers => drop(recipes::tracers(thing, &mut wrong)),
+                Method::Vicsek => drop(recipes::walkers(thing, &mut wrong)),
+                Method::Dynamics => recipes::particles(site, thing),
             }
         });
     }
@@ -310,6 +319,17 @@ fn carried(scene: &Scene, plans: &[Plan], index: usize, interval: f64, emitters:
     let mut tracers = Tracers::new(settings, flow, &x, all, emitters);
     tracers.begin_life(interval).map_err(|e| SceneError::one(format!("system \"{}\"", plan.name), e.to_string()))?;
     Ok(tracers)
+}
+
+fn swarm(scene: &Scene, plans: &[Plan], index: usize, words: &Vicsek) -> Swarm {
+    let (mut points, mut all) = (Vec::new(), Vec::new());
+    for thing in scene.particles.iter().filter(|t| place(plans, "particles", t.system.as_deref()) == Some(index)) {
+        let first = points.len();
+        points.extend(recipes::walkers(thing, &mut |_, _| {}));
+        all.push(Object { name: thing.name.clone(), points: first..points.len(), radius: thing.radius, ..Object::default() });
+    }
+    let plane = if scene.plane == Plane::Xz { [0, 2] } else { [0, 1] };
+    Swarm::new(&plans[index], words, scene.seed, plane, &points, all)
 }
 
 /// An anchor whose ends have been found: system and point of each.

@@ -46,6 +46,9 @@ pub fn check(scene: &Scene, systems: &[System]) -> Vec<Issue> {
             wrong(format!("{path}.name"), "another system has this name; names must differ".into());
         }
         check_system(system, &path, &mut wrong);
+        if system.method == Method::Vicsek && scene.dimension != 2 {
+            wrong("dimension".into(), format!("{}, but system \"{}\" moves in a plane; set dimension = 2", scene.dimension, system.name));
+        }
         let interval = scene.frame_time() / f64::from(scene.time.exchanges);
         if let Some(step) = system.step.filter(|step| interval / step > MOST_SUBSTEPS) {
             wrong(
@@ -79,9 +82,10 @@ pub fn check(scene: &Scene, systems: &[System]) -> Vec<Issue> {
                 let list = known().collect::<Vec<_>>().join(", ");
                 wrong(format!("{kind} \"{name}\".system"), format!("there is no system \"{given}\"{hint} (systems: {list})"));
             }
-            (Some(given), None) => {
-                wrong(format!("{kind} \"{name}\".system"), format!("system \"{given}\" moves tracers; this needs a dynamics system"))
-            }
+            (Some(given), None) => wrong(
+                format!("{kind} \"{name}\".system"),
+                format!("system \"{given}\" moves particles without mass; this needs a dynamics system"),
+            ),
             (None, None) => {
                 wrong(format!("{kind} \"{name}\".system"), "no system can move it: add a [[system]] with method = \"dynamics\"".into())
             }
@@ -95,8 +99,10 @@ pub fn check(scene: &Scene, systems: &[System]) -> Vec<Issue> {
             if !objects.iter().any(|(_, name, _)| name == on) {
                 let hint = suggestion(on, objects.iter().map(|o| o.1));
                 wrong(format!("force[{i}].{key}"), format!("there is no object \"{on}\"{hint}"));
-            } else if objects.iter().any(|(kind, name, system)| name == on && tracers(systems, kind, *system)) {
-                wrong(format!("force[{i}].{key}"), format!("\"{on}\" are tracers, which feel no force; put them into a dynamics system"));
+            } else if let Some(what) =
+                objects.iter().find(|(_, name, _)| name == on).and_then(|(kind, _, system)| massless(systems, kind, *system))
+            {
+                wrong(format!("force[{i}].{key}"), format!("\"{on}\" are {what}, which feel no force; put them into a dynamics system"));
             }
         }
         if let Force::Flock { predators, on: Some(on), .. } = force
@@ -132,8 +138,13 @@ pub fn place(systems: &[System], kind: &str, named: Option<&str>) -> Option<usiz
     systems.iter().position(|s| can(s) && named.is_none_or(|name| s.name == name))
 }
 
-fn tracers(systems: &[System], kind: &str, named: Option<&str>) -> bool {
-    place(systems, kind, named).is_some_and(|i| systems[i].method == Method::Tracers)
+/// What an object is, if it is nothing that forces move.
+fn massless(systems: &[System], kind: &str, named: Option<&str>) -> Option<&'static str> {
+    match systems[place(systems, kind, named)?].method {
+        Method::Dynamics => None,
+        Method::Tracers => Some("tracers"),
+        Method::Vicsek => Some("particles of a vicsek system"),
+    }
 }
 
 /// The objects that a force names beside its targets, with the word for them.
@@ -161,7 +172,24 @@ fn check_system(system: &System, path: &str, wrong: &mut impl FnMut(String, Stri
         let message = format!("{} needs velocities, and tracers have none; expected one of {}", integrator.name(), known.join(", "));
         wrong(format!("{path}.integrator"), message);
     }
-    if system.clamp.is_some() && (system.method == Method::Tracers || !matches!(integrator, Integrator::ModifiedEuler | Integrator::Verlet))
+    if system.method == Method::Vicsek && integrator != Integrator::default() {
+        wrong(format!("{path}.integrator"), "the model of Vicsek is a map and has no integrator; leave it out".into());
+    }
+    match (&system.vicsek, system.method) {
+        (None, Method::Vicsek) => wrong(format!("{path}.vicsek"), "missing, expected side, radius, speed and noise".into()),
+        (Some(words), Method::Vicsek) if 2.0 * words.radius > words.side => {
+            wrong(format!("{path}.vicsek.radius"), format!("{} m, expected at most half the side, {} m", words.radius, 0.5 * words.side));
+        }
+        (Some(_), Method::Dynamics | Method::Tracers) => {
+            wrong(
+                format!("{path}.vicsek"),
+                format!("given with method \"{}\"; leave it out, or set method = \"vicsek\"", system.method.name()),
+            );
+        }
+        _ => {}
+    }
+    if system.clamp.is_some()
+        && (system.method != Method::Dynamics || !matches!(integrator, Integrator::ModifiedEuler | Integrator::Verlet))
     {
         wrong(format!("{path}.clamp"), "the position clamp goes with modified_euler or verlet".into());
     }

@@ -151,14 +151,14 @@ impl Engine for Simulation {
     fn add_force(&mut self, system: &str, force: Box<dyn UserForce>) -> Result<(), SceneError> {
         match self.world.system(system).map(|s| s.add_force(force)) {
             Some(true) => Ok(()),
-            _ => Err(self.system_error(system, "it moves tracers, which feel no force")),
+            _ => Err(self.system_error(system, "it moves particles without mass, which feel no force")),
         }
     }
 
     fn replace_integrator(&mut self, system: &str, integrator: Box<dyn UserIntegrator>) -> Result<(), SceneError> {
         match self.world.system(system).map(|s| s.replace_integrator(integrator)) {
             Some(true) => Ok(()),
-            _ => Err(self.system_error(system, "it moves tracers, which have no velocities to integrate")),
+            _ => Err(self.system_error(system, "it moves particles without mass, which have no velocities to integrate")),
         }
     }
 
