@@ -334,6 +334,78 @@ fn a_flow_carries_what_is_born_in_it() {
     }
 }
 
+/// Drag of 200/s in an exchange interval of 1/24 s: children, and the newborn of an implicit scheme, are slowed down and not thrown.
+#[test]
+fn strong_drag_throws_no_newborn() {
+    for name in ["verlet", "implicit_euler"] {
+        let steps = if name == "verlet" { "substeps = 20" } else { "substeps = 1" };
+        let text = format!(
+            "world.gravity = [0, 0, 0]\n[[system]]\nintegrator = \"{name}\"\n{steps}\n[[force]]\nkind = \"drag\"\nrate = 200\n\
+             [[emitter]]\nname = \"p\"\nrate = 48\nvelocity = [5, 0, 0]\nlifetime = 0.11\nfrom.point = {{}}\n\
+             [[emitter]]\nname = \"q\"\nrate = 100\nburst = [{{ count = 1 }}]\nvelocity = [0, 5, 0]\nfrom.particles.of = \"p\"\n"
+        );
+        let mut sim = simulation(&text);
+        run(&mut sim, 12);
+        let (p, q) = (by_id(&sim, "p"), by_id(&sim, "q"));
+        assert!(p.len() >= 4 && q.len() > 20);
+        // All go 5/200 = 25 mm in all; the midpoint rule is off by 10 % of that with half the rate a piece.
+        assert!(p.iter().all(|(_, x, v, _)| x.norm() < 0.03 && v.norm() <= 5.0), "{name}: {p:?}");
+        assert!(q.iter().all(|(_, x, v, _)| (x.y - 0.025 * (1.0 - v.y / 5.0)).abs() < 0.004 && v.norm() <= 5.0), "{name}");
+    }
+}
+
+/// Three generations: grandchildren are born of children that were born in the same interval, too.
+#[test]
+fn grandchildren_are_counted() {
+    let text = format!(
+        "world.gravity = [0, 0, 0]\n{}[[emitter]]\nname = \"a\"\nrate = 10\nlifetime = 0.5\nfrom.point = {{}}\n\
+         [[emitter]]\nname = \"b\"\nrate = 20\nlifetime = 0.25\nfrom.particles.of = \"a\"\n\
+         [[emitter]]\nname = \"c\"\nrate = 40\nfrom.particles.of = \"b\"\n",
+        scheme("verlet")
+    );
+    let mut sim = simulation(&text);
+    run(&mut sim, 48);
+    // a: born at k/10; b: at k/10 + j/20, j = 1..10; c: at k/10 + j/20 + i/40, i = 1..10; up to 2 s.
+    let mut expected = 0;
+    for k in 1..=20 {
+        for j in 1..=10 {
+            expected += (1..=10).filter(|i| 4 * k + 2 * j + i <= 80).count();
+        }
+    }
+    let mut ids = ids(&sim, "c");
+    assert_eq!(ids.len(), expected);
+    ids.sort_unstable();
+    assert!(ids.iter().enumerate().all(|(i, id)| i as u32 == *id));
+}
+
+/// The guard against explosions is awake beside an emitter, and does not take births for one.
+#[test]
+fn explosions_are_seen_beside_an_emitter() {
+    let text = "[[system]]\nintegrator = \"midpoint\"\nsubsteps = 8\n\
+                [[rope]]\nname = \"r\"\nfrom = [0, 0, 1]\nto = [1, 0, 1]\nsegments = 6\npin = [\"start\"]\nlinks = { structural = 50 }\n\
+                [[emitter]]\nname = \"e\"\nrate = 1\nfrom.point = {}\n";
+    let mut sim = simulation(text);
+    let failed = (0..20).find_map(|_| sim.step(&|| true).err());
+    assert!(matches!(&failed, Some(StepError::Exploded(b)) if b.object == "r" && b.time < 0.7), "{failed:?}");
+    let text = "[[emitter]]\nname = \"one\"\nburst = [{ count = 1 }]\nfrom.point = {}\n\
+                [[emitter]]\nname = \"many\"\nburst = [{ time = 1, count = 5000 }]\nspeed = 50\ncone = 180\nlifetime = 0.5\nfrom.point = {}\n";
+    let mut sim = simulation(text);
+    run(&mut sim, 60);
+}
+
+/// A force that is not finite ends the run under implicit schemes, too, with the name of the mass.
+#[test]
+fn forces_that_are_no_numbers_end_every_scheme() {
+    for name in ["rk4", "implicit_euler", "implicit_midpoint", "bdf2"] {
+        let text = format!(
+            "world.gravity = [0, 0, 0]\n{}[[particles]]\nname = \"p\"\nposition = [[1, 0, 0], [0, 0, 0]]\n[[force]]\nkind = \"acceleration\"\nvalue = [\"sqrt(x - 0.5)\", 1, 0]\n",
+            scheme(name)
+        );
+        let error = simulation(&text).step(&|| true).unwrap_err();
+        assert!(matches!(&error, StepError::NotFinite(b) if b.object == "p" && b.index == 1), "{name}: {error}");
+    }
+}
+
 #[test]
 fn emitters_that_cannot_work_are_refused() {
     let refused = |words: &str| {
@@ -362,12 +434,14 @@ fn emitters_that_cannot_work_are_refused() {
         ("rate = 1\nfrom.point = {}\ncolor_end = [0, 0, 0]", "color_to and color_end need a color"),
         (
             "rate = 1\nfrom.point = {}\ncolumns = { id = { from = 1 } }",
-            "columns.id: expected a name without slash that is none of position",
+            "columns.id: expected a name of letters, digits and _ that is none of position",
         ),
         ("rate = 1\nfrom.point = {}\ncolumns = { a = { from = 1, to = 0 } }", "columns.a.to: 0, expected >= 1"),
         ("rate = 1\nfrom.point = {}\nwhen_full = \"error\"", "when_full: it never is full; set most"),
         ("rate = \"1/(t - t)\"\nfrom.point = {}", "rate: "),
         ("rate = -1\nfrom.point = {}", "rate: -1, expected >= 0"),
+        ("rate = 1e12\nlifetime = 1e-9\nfrom.point = {}", "GiB, the limit is 8 GiB"),
+        ("rate = 1\nfrom.point = {}\ncolumns = { x = { from = 1 } }", "columns.x: expected a name of letters"),
         ("burst = [{ time = 1, count = 1 }]\nfrom.particles.of = \"p\"", "burst[0].time: children are born when the parent dies"),
     ] {
         let message = refused(words);

@@ -106,15 +106,15 @@ impl Archive {
         }
     }
 
-    /// Room for a table, in the memory of the old one.
-    fn table(&mut self, name: &str, width: usize, rows: usize) -> &mut [Real] {
+    /// A table to fill, in the memory of the old one; new memory has room for `room` rows.
+    fn table(&mut self, name: &str, width: usize, rows: usize, room: usize) -> &mut [Real] {
         let old = match self.parts.get_mut(self.next) {
             Some((old, Part::Table(_, into))) if old == name => std::mem::take(into),
             _ => Vec::new(),
         };
         let mut numbers = old;
         if numbers.capacity() < width * rows {
-            numbers = Vec::with_capacity(width * rows);
+            numbers = Vec::with_capacity(width * rows.max(room));
         }
         numbers.resize(width * rows, 0.0);
         self.push(name, Part::Table(width, numbers));
@@ -124,9 +124,9 @@ impl Archive {
         }
     }
 
-    /// Writes the first three numbers of each row.
-    pub fn push_points(&mut self, name: &str, rows: &[Row]) {
-        let into = self.table(name, 3, rows.len());
+    /// Writes the first three numbers of each row. There may be as many as `room` later.
+    pub fn push_points(&mut self, name: &str, rows: &[Row], room: usize) {
+        let into = self.table(name, 3, rows.len(), room);
         into.par_chunks_mut(3 * CHUNK).zip(rows.par_chunks(CHUNK)).for_each(|(into, rows)| {
             for (into, row) in into.chunks_exact_mut(3).zip(rows) {
                 into.copy_from_slice(&row[..3]);
@@ -134,15 +134,20 @@ impl Archive {
         });
     }
 
-    /// Writes a column of numbers.
-    pub fn push_numbers(&mut self, name: &str, numbers: &[Real]) {
-        self.table(name, 1, numbers.len()).copy_from_slice(numbers);
+    /// Writes a column of numbers, with the room that it has.
+    #[allow(clippy::ptr_arg)] // for its capacity
+    pub fn push_numbers(&mut self, name: &str, numbers: &Vec<Real>) {
+        self.table(name, 1, numbers.len(), numbers.capacity()).copy_from_slice(numbers);
     }
 
-    /// Writes a column of indices.
-    pub fn push_indices(&mut self, name: &str, indices: &[u32]) {
+    /// Writes a column of indices, with the room that it has.
+    #[allow(clippy::ptr_arg)] // for its capacity
+    pub fn push_indices(&mut self, name: &str, indices: &Vec<u32>) {
         match self.parts.get_mut(self.next) {
             Some((old, Part::Indices(into))) if old == name => {
+                if into.capacity() < indices.len() {
+                    *into = Vec::with_capacity(indices.capacity());
+                }
                 indices.clone_into(into);
                 self.next += 1;
             }

@@ -54,11 +54,15 @@ impl Collider {
         self.motion.as_ref().map(|m| m.at(t))
     }
 
+    fn near(&self, local: Vector, t: f64, within: f64) -> (f64, Vector, Vector) {
+        if self.inside { self.shape.near_walls(local, t, within) } else { self.shape.near(local, t, within) }
+    }
+
     /// The contact of a mass at p at time t, if it is closer than the thickness.
     pub fn touch(&self, p: Vector, t: f64) -> Option<Touch> {
         let place = self.at(t);
         let local = place.map_or(p, |(pose, _)| pose.back(p));
-        let (distance, normal, moves) = self.shape.near(local, t, self.thickness);
+        let (distance, normal, moves) = self.near(local, t, self.thickness);
         let (distance, normal) = if self.inside { (-distance, -normal) } else { (distance, normal) };
         let depth = self.thickness - distance;
         if depth <= 0.0 || normal.norm_sq() == 0.0 {
@@ -75,7 +79,7 @@ impl Collider {
     /// lower bound beyond `within` [m].
     pub fn distance(&self, p: Vector, t: f64, within: f64) -> (f64, Vector) {
         let place = self.at(t);
-        let (distance, normal, _) = self.shape.near(place.map_or(p, |(pose, _)| pose.back(p)), t, within);
+        let (distance, normal, _) = self.near(place.map_or(p, |(pose, _)| pose.back(p)), t, within);
         let normal = place.map_or(normal, |(pose, _)| pose.turn.turn(normal));
         if self.inside { (-distance, -normal) } else { (distance, normal) }
     }
@@ -104,7 +108,10 @@ impl Collider {
             return Some(Impact { part, normal, velocity: moves + self.belt });
         };
         // Straight in the frame of the solid, piece by piece: the pieces join, so that nothing slips through.
-        let pieces = (twist.angular.norm() * (t1 - t0) / TURN).ceil().clamp(1.0, PIECES);
+        let spin = |t: f64| self.at(t).map_or(0.0, |(_, twist)| twist.angular.norm());
+        // Keyframes begin and end with less than they have between.
+        let fastest = twist.angular.norm().max(spin(0.5 * (t0 + t1))).max(spin(t1));
+        let pieces = (fastest * (t1 - t0) / TURN).ceil().clamp(1.0, PIECES);
         let mut a = start.back(from);
         let mut before = t0;
         for k in 0..pieces as usize {

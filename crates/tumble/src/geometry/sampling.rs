@@ -90,8 +90,9 @@ impl Sampler {
                 }
             }
         }
-        let any_inside = |cell: &Vector| bvh.signed_distance(*cell) < 0.0;
-        cells.iter().any(any_inside).then(|| Self::Volume(Box::new(bvh), cells, edge))
+        let corner = |i: u32| Vector::from(mesh.vertices[i as usize]);
+        let volume: f64 = mesh.triangles.iter().map(|t| corner(t[0]).dot(corner(t[1]).cross(corner(t[2])))).sum();
+        (volume > 0.0 && !cells.is_empty()).then(|| Self::Volume(Box::new(bvh), cells, edge))
     }
 
     /// A point and the normal there, zero where there is none. `draw(k)` gives the k-th four uniform numbers in [0, 1).
@@ -186,6 +187,11 @@ mod tests {
         let faces = many(&Sampler::surface(&mesh).unwrap());
         assert!((mean(&faces, |p| f64::from(p.z.abs() > 1.5 - 1e-9)) - 2.0 / 11.0).abs() < 0.012);
         assert!((mean(&faces, |p| f64::from(p.x.abs() > 0.5 - 1e-9)) - 6.0 / 11.0).abs() < 0.015);
+        // A plate far thinner than a cell.
+        let plate = surface::cuboid(Vector::default(), [0.5, 0.5, 0.005].into(), Quat { v: Vector::default(), w: 1.0 });
+        let inside = Sampler::volume(&plate).unwrap();
+        let random = Random::new(1, "plate");
+        assert!((0..200).all(|id| inside.sample(&|k| random.uniform(id, 0, k)).0.z.abs() < 0.005));
         // A ball as a mesh: all inside, an eighth within half the radius.
         let volume = many(&Sampler::volume(&surface::sphere(3, Vector::default(), 1.0)).unwrap());
         assert!(volume.iter().all(|(p, _)| p.norm() < 1.0));

@@ -96,6 +96,18 @@ impl Shape {
         (d, n, Vector::default())
     }
 
+    /// The same for what is to stay in: beyond the edge of a box the nearest wall counts, and not the edge, so that every wall pushes
+    /// along its own normal.
+    pub fn near_walls(&self, p: Vector, t: f64, within: f64) -> Near {
+        let Self::Box { center, half, turn } = self else { return self.near(p, t, within) };
+        let (p, half): ([f64; 3], [f64; 3]) = (turn.conj().turn(p - *center).into(), (*half).into());
+        let q: [f64; 3] = std::array::from_fn(|a| p[a].abs() - half[a]);
+        let axis = if q[0] >= q[1] && q[0] >= q[2] { 0 } else { 1 + usize::from(q[2] > q[1]) };
+        let mut n = [0.0; 3];
+        n[axis] = if p[axis] < 0.0 { -1.0 } else { 1.0 };
+        (q[axis], turn.turn(n.into()), Vector::default())
+    }
+
     /// Where a mass that goes straight from a to b while time goes from t0 to t1 first comes within `thickness` of the
     /// surface from outside (from within, if `inside`): part of the way, normal towards the mass, velocity of the surface.
     ///
@@ -129,7 +141,8 @@ impl Shape {
     fn sweep_convex(&self, a: Vector, d: Vector, thickness: f64, inside: bool, slack: f64) -> Option<(f64, Vector)> {
         let side = if inside { -1.0 } else { 1.0 };
         let at = |s: f64| {
-            let (distance, n, _) = self.near(a + d * s, 0.0, f64::INFINITY);
+            let p = a + d * s;
+            let (distance, n, _) = if inside { self.near_walls(p, 0.0, f64::INFINITY) } else { self.near(p, 0.0, f64::INFINITY) };
             (side * distance - thickness, n * side)
         };
         let round = 1e-13 * (1.0 + a.norm() + d.norm());
@@ -150,9 +163,11 @@ impl Shape {
                 if s <= 0.0 {
                     return start();
                 }
+                let wall = n;
                 (g, n) = at(s);
                 if g >= -round {
-                    return Some((s, n));
+                    // In a corner of a room the other wall is as near, and not the one that was met.
+                    return Some((s, if matches!(self, Self::Box { .. }) { wall } else { n }));
                 }
             }
             return Some((s, n));

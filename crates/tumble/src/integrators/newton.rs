@@ -70,6 +70,16 @@ pub fn solve(
 
     follow(kinematics, stage, v, x);
     let mut size = evaluate(equation, stage, x, v, residual)?;
+    if !size.is_finite() {
+        // No direction leads on from here: whose force is not finite gets a velocity that is not, and is found by it.
+        let bad = |row: &Row| !row[..3].iter().all(|f| f.is_finite());
+        let lost = residual.iter().any(bad);
+        for (v, _) in v.iter_mut().zip(&*residual).filter(|(_, r)| !lost || bad(r)) {
+            *v = [Real::NAN, Real::NAN, Real::NAN, 0.0];
+        }
+        follow(kinematics, stage, v, x);
+        return Ok(());
+    }
     let first = size;
     let mut converged = size == 0.0;
     let limit = if settings.linearized { 1 } else { settings.newton_iterations };

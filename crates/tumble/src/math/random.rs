@@ -25,6 +25,20 @@ impl Random {
         philox([id as u32, (id >> 32) as u32, step, purpose], self.key)
     }
 
+    /// One number, uniform in [0, 1), for a particle: a tenth of the work of [`Random::uniform`], for what is asked again and again.
+    /// Two rounds of a hash that mixes every bit, [steele2014].
+    #[inline]
+    pub fn quick(&self, id: u32, purpose: u32) -> f64 {
+        let mix = |mut x: u64| {
+            x = (x ^ (x >> 30)).wrapping_mul(0xBF58_476D_1CE4_E5B9);
+            x = (x ^ (x >> 27)).wrapping_mul(0x94D0_49BB_1331_11EB);
+            x ^ (x >> 31)
+        };
+        let key =
+            (u64::from(self.key[0]) << 32 | u64::from(self.key[1])).wrapping_add(u64::from(purpose).wrapping_mul(0x9E37_79B9_7F4A_7C15));
+        (mix(mix(key) ^ u64::from(id)) >> 32) as f64 / 4294967296.0
+    }
+
     /// Four numbers, uniform in [0, 1), with 32 random bits each.
     pub fn uniform(&self, id: u64, step: u32, purpose: u32) -> [f64; 4] {
         self.words(id, step, purpose).map(|word| f64::from(word) / 4294967296.0)
@@ -57,6 +71,22 @@ mod tests {
         assert_eq!(philox([u32::MAX; 4], [u32::MAX; 2]), [0x408f_276d, 0x41c8_3b0e, 0xa20b_c7c6, 0x6d54_51fd]);
         let digits_of_pi = philox([0x243f_6a88, 0x85a3_08d3, 0x1319_8a2e, 0x0370_7344], [0xa409_3822, 0x299f_31d0]);
         assert_eq!(digits_of_pi, [0xd16c_fe09, 0x94fd_cceb, 0x5001_e420, 0x2412_6ea1]);
+    }
+
+    /// Evenness, and no correlation of neighbours, of keys, of purposes: standard deviations are 0.0006 of the mean and 0.005 of
+    /// correlations.
+    #[test]
+    fn quick_numbers_are_uniform_and_independent() {
+        let (a, b) = (Random::new(7, "snow"), Random::new(8, "snow"));
+        let n = 200_000;
+        let mean = |f: &dyn Fn(u32) -> f64| (0..n).map(f).sum::<f64>() / f64::from(n);
+        assert!((mean(&|i| a.quick(i, 0)) - 0.5).abs() < 0.0026);
+        assert!((mean(&|i| a.quick(i, 0).powi(2)) - 1.0 / 3.0).abs() < 0.0027);
+        let with = |f: &dyn Fn(u32) -> f64| 12.0 * mean(&|i| (a.quick(i, 0) - 0.5) * (f(i) - 0.5));
+        assert!(with(&|i| a.quick(i + 1, 0)).abs() < 0.01);
+        assert!(with(&|i| b.quick(i, 0)).abs() < 0.01);
+        assert!(with(&|i| a.quick(i, 1)).abs() < 0.01);
+        assert!((with(&|i| a.quick(i, 0)) - 1.0).abs() < 0.01);
     }
 
     #[test]

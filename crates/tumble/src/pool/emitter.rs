@@ -2,19 +2,22 @@
 //! with is a function of the scene's seed, the emitter's name and the particle's id, so that nothing of it needs storing.
 
 use crate::geometry::{Collider, Sampler, Vector, sampling};
-use crate::math::{Random, Row, Signal, VectorSignal, xyz64};
+use crate::math::{Random, Real, Row, Signal, VectorSignal, xyz64};
 use rayon::prelude::*;
 use tumble_interface::scene::{Between, Emitter as Words, WhenFull};
 
-/// What random numbers are drawn for: the moment of birth, mass, radius and colour; the direction, speed and lifetime;
-/// users' columns; the place.
+/// What random numbers are drawn for: the moment of birth, mass, radius and colour; the direction and speed; users' columns; the
+/// place. The lifetime has a quick number of its own.
 const MOMENT: u32 = 0;
 const MOTION: u32 = 1;
+const LIFETIME: u32 = 0;
 const COLUMNS: u32 = 2;
 const PLACE: u32 = 1 << 16;
 
 /// Part of a particle by which a count may be off by rounding.
 const ROUNDING: f64 = 1e-6;
+/// The same for children, whose moments go by ages in the engine's scalar.
+const BY_AGE: f64 = 1e-3;
 
 /// Where an emitter's particles come from.
 pub enum Origin {
@@ -118,6 +121,24 @@ impl Emitter {
         }
     }
 
+    /// About how many will live at once.
+    pub fn expected(&self) -> usize {
+        let rate = if self.course.rate.is_constant() { self.course.rate.value(0.0) } else { 0.0 };
+        let life = self.words.lifetime.unwrap_or(0.0) * (1.0 + self.words.lifetime_spread);
+        let bursts: f64 = self.words.burst.iter().map(|b| f64::from(b.count)).sum();
+        (1.05 * rate * life + bursts).min(4e9) as usize
+    }
+
+    /// Whether the oldest make room where it is full.
+    pub fn replaces(&self) -> bool {
+        self.words.when_full == WhenFull::ReplaceOldest
+    }
+
+    /// Whether the living bear children.
+    pub fn has_rate(&self) -> bool {
+        !self.course.rate.is_constant() || self.course.rate.value(0.0) > 0.0
+    }
+
     /// Users' columns and their ranges.
     pub fn columns(&self) -> impl Iterator<Item = (&String, &Between)> {
         self.words.columns.iter()
@@ -164,7 +185,7 @@ impl Emitter {
     /// Age at which it dies [s].
     pub fn lifetime(&self, id: u32) -> f64 {
         let Some(lifetime) = self.words.lifetime else { return f64::INFINITY };
-        spread(lifetime, self.words.lifetime_spread, || self.draw(id, MOTION)[3])
+        spread(lifetime, self.words.lifetime_spread, || self.random.quick(id, LIFETIME))
     }
 
     /// Colour at an age [s]; `None` if the emitter has none, or one for all.
@@ -189,8 +210,10 @@ impl Emitter {
         self.words.lifetime.is_none() && self.kill.is_empty()
     }
 
-    /// Whether a particle is to die at time t [s].
-    pub fn dies(&self, t: f64, (id, age): (u32, f64), (x, v): (Row, Row), near: &Near<'_>) -> bool {
+    /// Whether a particle is to die at time t, where an interval of length dt [s] ends.
+    pub fn dies(&self, (t, dt): (f64, f64), (id, age): (u32, f64), (x, v): (Row, Row), near: &Near<'_>) -> bool {
+        // What a sum of intervals may have lost by rounding.
+        let age = age + (age * age / dt * f64::from(Real::EPSILON)).min(0.25 * dt);
         let youngest = self.words.lifetime.unwrap_or(f64::INFINITY) * (1.0 - self.words.lifetime_spread);
         if age >= youngest && age >= self.lifetime(id) {
             return true;
@@ -224,7 +247,11 @@ impl Emitter {
     pub fn births(&self, (t, dt): (f64, f64), (before, after): (f64, f64), next: u64, room: Room) -> Option<Vec<Birth>> {
         let Origin::Place(place) = &self.from else { return Some(Vec::new()) };
         let first = (before + ROUNDING).floor();
-        let count = ((after + ROUNDING).floor() - first) as usize;
+        let count = (after + ROUNDING).floor() - first;
+        if !(next as f64 + count <= f64::from(u32::MAX)) {
+            return None;
+        }
+        let count = count as usize;
         let jitter = self.words.jitter;
         // Moments within the interval, from 0 to 1; where the rate begins or ends within it, the flow says when.
         let (begin, end) = (self.words.start.clamp(t, t + dt), self.words.end.unwrap_or(f64::INFINITY).clamp(t, t + dt));
@@ -267,8 +294,8 @@ impl Emitter {
         };
         let mut due = Vec::new();
         for (i, parent) in living.iter().enumerate() {
-            let first = (parent.before.max(0.0) * rate + ROUNDING).floor() + 1.0;
-            let last = (parent.age * rate + ROUNDING).floor();
+            let first = (parent.before.max(0.0) * rate + BY_AGE).floor() + 1.0;
+            let last = (parent.age * rate + BY_AGE).floor();
             let count = (last - first + 1.0).max(0.0) as u64;
             due.extend((0..count).map(|k| (i, first + k as f64)).filter(|(_, k)| within(parent, *k)));
         }

@@ -40,6 +40,30 @@ pub struct Pool {
     columns: Vec<(String, Vec<Real>)>,
 }
 
+/// How columns change when rows come or go.
+struct Arrange<'a> {
+    /// Particles to keep room for.
+    room: usize,
+    /// Rows to move, in order: from and to.
+    moves: &'a [(usize, usize)],
+}
+
+impl Arrange<'_> {
+    /// A column that begins with row `first` has so many rows afterwards.
+    fn apply<T: Copy + Default>(&self, column: &mut Vec<T>, rows: usize, first: usize) {
+        if rows > column.len() {
+            if rows > column.capacity() {
+                column.reserve_exact(self.room.max(rows) - column.len());
+            }
+            column.resize(rows, T::default());
+        }
+        for (from, to) in self.moves {
+            column[to - first] = column[from - first];
+        }
+        column.truncate(rows);
+    }
+}
+
 /// The columns that move with the rows of a pool.
 pub struct Columns<'a> {
     /// Columns of rows.
@@ -107,14 +131,6 @@ impl Pool {
         Some(&column[rows.start - self.first..rows.end - self.first])
     }
 
-    /// The same, to write.
-    pub fn column_mut(&mut self, s: usize, name: &str) -> Option<&mut [Real]> {
-        self.column(s, name)?;
-        let (rows, first) = (self.rows(s), self.first);
-        let (_, column) = self.columns.iter_mut().find(|(known, _)| known == name)?;
-        Some(&mut column[rows.start - first..rows.end - first])
-    }
-
     /// Everyone grows older by dt [s].
     pub fn grow_older(&mut self, dt: f64) {
         let dt = dt as Real;
@@ -132,21 +148,23 @@ impl Pool {
         Some(births)
     }
 
-    /// Those whom an emitter bears when its parents die.
-    pub fn orphans(&mut self, s: usize, parents: &[Parent]) -> Option<Vec<Birth>> {
-        let Stream { emitter, len, next, .. } = &mut self.streams[s];
-        let births = emitter.orphans(parents, *next, emitter.room(*len)?)?;
-        *next += births.len() as u64;
-        Some(births)
-    }
-
-    /// Those whom an emitter bears in the dt [s] before t, while its parents live.
-    pub fn children(&mut self, s: usize, t: f64, dt: f64, x: &[Row], v: &[Row]) -> Option<Vec<Birth>> {
+    /// Those whom an emitter bears, in an interval of length dt that ends at t [s], while its parents live and when they die; of the
+    /// parents, `dead` are to leave.
+    pub fn descendants(&mut self, s: usize, (t, dt): (f64, f64), dead: &[u32], x: &[Row], v: &[Row]) -> Option<Vec<Birth>> {
         let Some(parent) = self.parent(s) else { return Some(Vec::new()) };
-        let parents: Vec<Parent> = (0..self.streams[parent].len).map(|k| self.until_death(parent, k, (t, dt), x, v)).collect();
+        let mut births = Vec::new();
+        if self.streams[s].emitter.has_rate() {
+            let of = |k: usize| self.until_death(parent, k, (t, dt), x, v);
+            let parents: Vec<Parent> = (0..self.streams[parent].len).into_par_iter().with_min_len(TASK).map(of).collect();
+            let Stream { emitter, len, next, .. } = &mut self.streams[s];
+            births = emitter.children(&parents, *next, emitter.room(*len)?)?;
+            *next += births.len() as u64;
+        }
+        let parents = self.mourn(parent, dead, (t, dt), x, v);
         let Stream { emitter, len, next, .. } = &mut self.streams[s];
-        let births = emitter.children(&parents, *next, emitter.room(*len)?)?;
-        *next += births.len() as u64;
+        let orphans = emitter.orphans(&parents, *next, emitter.room(*len + births.len())?)?;
+        *next += orphans.len() as u64;
+        births.extend(orphans);
         Some(births)
     }
 
@@ -211,32 +229,27 @@ impl Pool {
 
     /// Moves rows and cuts or lengthens every column; room is made before, and taken away after.
     fn resize(&mut self, total: usize, owned: Columns<'_>, moves: &[(usize, usize)]) {
-        fn arrange<T: Copy + Default>(column: &mut Vec<T>, rows: usize, first: usize, moves: &[(usize, usize)]) {
-            if rows > column.len() {
-                column.resize(rows, T::default());
-            }
-            for (from, to) in moves {
-                column[to - first] = column[from - first];
-            }
-            column.truncate(rows);
-        }
+        // Room for as many as are expected, and headroom beyond: memory that is not touched costs nothing.
+        let expected: usize = self.streams.iter().map(|s| s.emitter.expected().min(s.emitter.most().unwrap_or(usize::MAX))).sum();
+        let room = self.first + expected.min(1 << 30).max(total + total / 2);
+        let arrange = Arrange { room, moves };
         let first = self.first;
         for column in owned.rows {
-            arrange(column, first + total, 0, moves);
+            arrange.apply(column, first + total, 0);
         }
         for column in owned.numbers {
-            arrange(column, first + total, 0, moves);
+            arrange.apply(column, first + total, 0);
         }
-        arrange(&mut self.id, total, first, moves);
-        arrange(&mut self.age, total, first, moves);
+        arrange.apply(&mut self.id, total, first);
+        arrange.apply(&mut self.age, total, first);
         for (_, column) in &mut self.columns {
-            arrange(column, total, first, moves);
+            arrange.apply(column, total, first);
         }
     }
 
-    /// Who of an emitter is to die at time t [s], counted from its first row, in order. x and v are all rows of the system; `near` tells
+    /// Who of an emitter is to die at time t, where an interval of length dt [s] ends, counted from its first row, in order. x and v are all rows of the system; `near` tells
     /// whether a point is near a collider.
-    pub fn dead(&self, s: usize, t: f64, x: &[Row], v: &[Row], near: &Near<'_>) -> Vec<u32> {
+    pub fn dead(&self, s: usize, t: (f64, f64), x: &[Row], v: &[Row], near: &Near<'_>) -> Vec<u32> {
         let (rows, emitter) = (self.rows(s), &self.streams[s].emitter);
         if emitter.is_immortal() {
             return Vec::new();
@@ -252,7 +265,7 @@ impl Pool {
         let stream = &self.streams[s];
         let most = stream.emitter.most().unwrap_or(usize::MAX);
         let over = (stream.len + newborn).saturating_sub(most).min(stream.len);
-        if over == 0 {
+        if over == 0 || !stream.emitter.replaces() {
             return Vec::new();
         }
         let (ids, ages) = (self.ids(s), self.ages(s));
@@ -279,7 +292,7 @@ impl Pool {
     }
 
     /// The dead as parents of others, in the order of their death, where an interval (t, dt) ends.
-    pub fn mourn(&self, s: usize, dead: &[u32], interval: (f64, f64), x: &[Row], v: &[Row]) -> Vec<Parent> {
+    fn mourn(&self, s: usize, dead: &[u32], interval: (f64, f64), x: &[Row], v: &[Row]) -> Vec<Parent> {
         let of = |k: &u32| (self.until_death(s, *k as usize, interval, x, v), self.ids(s)[*k as usize]);
         let mut all: Vec<(Parent, u32)> = dead.iter().map(of).collect();
         all.sort_by(|(a, i), (b, j)| a.time.total_cmp(&b.time).then(i.cmp(j)));

@@ -8,8 +8,28 @@ use crate::pool::{Course, Emitter, Kill, Origin};
 use tumble_interface::Mesh;
 use tumble_interface::scene::{Collider, Emitter as Words, Kill as Rule, MeshFile, Shape as Solid, Source};
 
-/// Columns that every emitted particle may have.
-const TAKEN: [&str; 7] = ["position", "velocity", "id", "age", "radius", "mass", "color"];
+/// Names that frames and files need for themselves.
+const TAKEN: [&str; 19] = [
+    "position",
+    "velocity",
+    "id",
+    "age",
+    "radius",
+    "mass",
+    "color",
+    "orientation",
+    "turn",
+    "translation",
+    "first",
+    "x",
+    "y",
+    "z",
+    "vx",
+    "vy",
+    "vz",
+    "red",
+    "green",
+];
 
 /// Adds an emitter. `mesh` finds the mesh of a file; `flat` is the axis that is missing in two dimensions, and `tracers` whether
 /// the particles go with the flow.
@@ -41,6 +61,9 @@ pub fn emitter<'a>(
         (".mass", words.mass != 1.0 || words.mass_spread != 0.0),
         (".charge", words.charge != 0.0),
     ];
+    if tracers && words.kill.iter().any(|rule| matches!(rule, Rule::NearCollider(_))) {
+        wrong(".kill", "tracers see no colliders; use inside or outside");
+    }
     for (key, _) in given.iter().filter(|(_, given)| tracers && *given) {
         wrong(key, "tracers have no mass and go with the flow; leave it out, or use a dynamics system");
     }
@@ -59,8 +82,10 @@ pub fn emitter<'a>(
     if words.most.is_none() && words.when_full != Default::default() {
         wrong(".when_full", "it never is full; set most");
     }
-    if let Some(name) = words.columns.keys().find(|name| TAKEN.contains(&name.as_str()) || name.is_empty() || name.contains('/')) {
-        wrong(&format!(".columns.{name}"), &format!("expected a name without slash that is none of {}", TAKEN.join(", ")));
+    if let Some(name) = words.columns.keys().find(|name| {
+        TAKEN.contains(&name.as_str()) || name.is_empty() || *name == "blue" || !name.chars().all(|c| c.is_ascii_alphanumeric() || c == '_')
+    }) {
+        wrong(&format!(".columns.{name}"), &format!("expected a name of letters, digits and _ that is none of {}", TAKEN.join(", ")));
     }
     if let Some((name, b)) = words.columns.iter().find(|(_, b)| b.to.is_some_and(|to| to < b.from)) {
         wrong(&format!(".columns.{name}.to"), &format!("{}, expected >= {}", b.to.unwrap_or_default(), b.from));

@@ -134,7 +134,11 @@ pub fn check(scene: &Scene, systems: &[System]) -> Vec<Issue> {
 
 /// The system that moves an object of this kind: the one it names, else the first that can.
 pub fn place(systems: &[System], kind: &str, named: Option<&str>) -> Option<usize> {
-    let can = |s: &System| s.method == Method::Dynamics || matches!(kind, "particles" | "emitter");
+    let can = |s: &System| match s.method {
+        Method::Dynamics => true,
+        Method::Tracers => matches!(kind, "particles" | "emitter"),
+        Method::Vicsek => kind == "particles",
+    };
     systems.iter().position(|s| can(s) && named.is_none_or(|name| s.name == name))
 }
 

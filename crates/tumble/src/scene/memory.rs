@@ -88,8 +88,10 @@ fn alive(scene: &Scene) -> Vec<f64> {
             _ => (rate_of(thing), burst),
         };
         births.push((rate, bursts));
+        // All that are born in an exchange interval stand in a list before they live, however short.
+        let interval = scene.frame_time() / f64::from(scene.time.exchanges);
         let life = thing.lifetime.map_or(duration, |l| (l * (1.0 + thing.lifetime_spread)).min(duration));
-        counts.push((rate * life + bursts).min(thing.most.map_or(f64::INFINITY, f64::from)));
+        counts.push((rate * life + bursts).min(thing.most.map_or(f64::INFINITY, f64::from)) + rate * interval);
     }
     counts
 }

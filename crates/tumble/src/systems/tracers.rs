@@ -105,28 +105,20 @@ impl Tracers {
     /// At the time t, where an interval of length dt [s] ends: the dead leave, and children of the dead and of the living come.
     fn bury(&mut self, t: f64, dt: f64) -> Result<(), StepError> {
         let n = self.pool.len();
-        if n == 0 {
-            return Ok(());
-        }
-        let mut v = vec![ZERO; self.x.len()];
-        self.flow.velocities(t, &self.x, &mut v);
-        let mut born: Vec<Vec<Birth>> = Vec::with_capacity(n);
+        let mut born: Vec<Vec<Birth>> = vec![Vec::new(); n];
         for s in 0..n {
-            born.push(self.pool.children(s, t, dt, &self.x, &v).ok_or_else(|| self.full(s, t))?);
-        }
-        for s in 0..n {
-            let dead = self.pool.dead(s, t, &self.x, &v, &|_, _| false);
-            let parents = self.pool.mourn(s, &dead, (t, dt), &self.x, &v);
-            for child in (0..n).filter(|child| self.pool.parent(*child) == Some(s)).collect::<Vec<_>>() {
-                born[child].extend(self.pool.orphans(child, &parents).ok_or_else(|| self.full(child, t))?);
+            let births = std::mem::take(&mut born[s]);
+            self.settle(s, &births, t, t);
+            let mut v = vec![ZERO; self.x.len()];
+            let (flow, x) = (&self.flow, &self.x);
+            chunks(&mut v, |start, v| flow.velocities(t, &x[start..start + v.len()], v));
+            let dead = self.pool.dead(s, (t, dt), &self.x, &v, &|_, _| false);
+            for child in (s + 1..n).filter(|child| self.pool.parent(*child) == Some(s)).collect::<Vec<_>>() {
+                let births = self.pool.descendants(child, (t, dt), &dead, &self.x, &v);
+                born[child] = births.ok_or_else(|| self.full(child, t))?;
             }
-            let mut columns = owned(&mut self.x, &mut self.memory);
-            columns.rows.push(&mut v);
-            self.pool.remove(s, &dead, columns);
-        }
-        self.count_rows();
-        for (s, births) in born.iter().enumerate() {
-            self.settle(s, births, t, t);
+            self.pool.remove(s, &dead, owned(&mut self.x, &mut self.memory));
+            self.count_rows();
         }
         Ok(())
     }

@@ -249,7 +249,7 @@ impl System for Swarm {
     fn save(&self, archive: &mut Archive) {
         archive.push_rows("x", &self.model.x);
         archive.push("theta", Part::Numbers(self.model.theta.clone()));
-        archive.push_indices("step", &[self.model.step]);
+        archive.push_indices("step", &vec![self.model.step]);
     }
 
     fn restore(&mut self, archive: &mut Archive) -> Option<()> {

@@ -30,9 +30,16 @@ impl Scale {
         scale
     }
 
-    /// Energy [J] that came from outside, and is a scale from now on.
-    pub fn add(&mut self, energy: f64) {
-        self.size += energy;
+    /// Masses come with kinetic energy and potential energy in gravity [J], and are a scale from now on; or go, with a sign.
+    pub fn count(&mut self, sign: f64, kinetic: f64, potential: f64) {
+        self.start += sign * (kinetic + potential);
+        self.external += sign * potential;
+        self.size += (sign * (kinetic + potential.abs())).max(0.0);
+    }
+
+    /// Forgets a tenth.
+    fn fade(&mut self) {
+        self.size *= 0.9;
     }
 
     /// Is at least as large as another scale.
@@ -260,10 +267,14 @@ impl Dynamics {
     /// explosion would carry its scale along; where others push, nobody knows where energy came from.
     pub(super) fn rescale(&mut self, books: &Ledger) {
         let drives = self.laws.colliders.iter().any(|c| c.moves()) || self.laws.batches.iter().any(|b| b.drives().is_some());
-        let driven = self.pushed || drives || !self.laws.user.is_empty() || !self.pool.is_empty();
+        let driven = self.pushed || drives || !self.laws.user.is_empty();
         let gain = if driven { 0.0 } else { (books.energy() - self.scale.start).max(0.0) };
         let external = (books.external - self.scale.external).abs();
         let energy = books.kinetic.max(books.elastic).max(external) - gain;
+        if !self.pool.is_empty() {
+            // What has left is no scale for what is there.
+            self.scale.fade();
+        }
         if energy > self.scale.size {
             self.scale.widen(energy, self.noise());
         }

@@ -420,6 +420,7 @@ impl Parts {
             integrator: settings.integrator,
             stepping: settings.stepping,
             automatic: 0,
+            measured: 0,
             adaptive: settings.adaptive.clone(),
             state,
             laws,

@@ -42,22 +42,19 @@ impl Step {
 pub fn resolve(colliders: &[Collider], step: &Step, before: (Row, Row), x: &mut Row, v: &mut Row) -> bool {
     let mut touched = meet(colliders, step, before, x, v);
     for collider in colliders {
-        let (position, velocity) = (xyz64(*x), xyz64(*v));
-        let Some(Touch { depth, normal, velocity: surface }) = collider.touch(position, step.end()) else { continue };
-        touched = true;
-        let way = position - xyz64(before.0) - surface * step.h;
-        let along = way - normal * way.dot(normal);
-        let back = (collider.friction * depth).min(along.norm());
-        let mut position = position + normal * depth - along.normalized() * back;
-        if collider.inside {
-            // A container bends towards what goes along its wall, and has corners.
-            for _ in 0..3 {
-                position = collider.touch(position, step.end()).map_or(position, |t| position + t.normal * t.depth);
-            }
+        // A container bends towards what goes along its wall, and has corners where three walls meet.
+        for _ in 0..if collider.inside { 3 } else { 1 } {
+            let (position, velocity) = (xyz64(*x), xyz64(*v));
+            let Some(Touch { depth, normal, velocity: surface }) = collider.touch(position, step.end()) else { break };
+            touched = true;
+            let way = position - xyz64(before.0) - surface * step.h;
+            let along = way - normal * way.dot(normal);
+            let back = (collider.friction * depth).min(along.norm());
+            let position = position + normal * depth - along.normalized() * back;
+            let velocity = rebound(collider, velocity - surface, normal, step.resting) + surface;
+            *x = row(real(position), x[3]);
+            *v = row(real(velocity), 0.0);
         }
-        let velocity = rebound(collider, velocity - surface, normal, step.resting) + surface;
-        *x = row(real(position), x[3]);
-        *v = row(real(velocity), 0.0);
     }
     touched
 }

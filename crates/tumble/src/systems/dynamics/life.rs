@@ -1,18 +1,22 @@
 //! Birth and death within a system: create new particles, compute forces, update, remove the dead.
 //!
 //! A particle is born at its own moment: it takes one step of its own length to the end of the sub-step that it is born in, by
-//! the midpoint rule, under the forces on single masses; from there on it goes with all others. The dead leave when the
+//! the midpoint rule (more where that is too long a step for the forces), under the forces on single masses; from there on it goes with all others. The dead leave when the
 //! exchange interval ends, and who is born of them is born where and when they died.              (particles.11)
 
 use super::laws::Local;
 use super::{BLOCK, Dynamics, contact};
+use crate::forces::One;
 use crate::integrators::{self, Equation, Memory, Scratch};
 use crate::math::{Real, Row, Vec3, ZERO, axpy, xyz64};
-use crate::pool::{Birth, Columns, Parent, Pool};
+use crate::pool::{Birth, Columns, Pool};
 use crate::state::Masses;
 use rayon::prelude::*;
 use tumble_interface::StepError;
 use tumble_interface::engine::StepReport;
+
+/// Pieces that the first step of a life is cut into at most.
+const PIECES: f64 = 1000.0;
 
 /// Newborn of one emitter at a later time.
 struct Grown {
@@ -92,6 +96,7 @@ impl Dynamics {
             let step = contact::Step { t, h, resting };
             !colliders.is_empty() && h > 0.0 && contact::resolve(colliders, &step, before, x, v)
         };
+        let rate = self.stiffness_of(object, births, &masses);
         let scheme = if self.integrator.is_implicit() || self.integrator.is_adaptive() {
             tumble_interface::scene::Integrator::Midpoint
         } else {
@@ -101,18 +106,26 @@ impl Dynamics {
             let mut motion = Local { laws, masses: &masses, start, newborn: object };
             let n = x.len();
             let (mut a, mut xm, mut vm) = (vec![ZERO; n], x.to_vec(), v.to_vec());
-            motion.rate(until - h, x, v, &mut a)?;
-            let tau = |i: usize| (until - births[i].time).clamp(0.0, h) as Real;
-            for i in 0..n {
-                xm[i] = axpy(x[i], 0.5 * tau(i), v[i]);
-                vm[i] = axpy(v[i], 0.5 * tau(i), a[i]);
-            }
-            motion.rate(until - 0.5 * h, &xm, &vm, &mut a)?;
-            for i in 0..n {
-                let before = (x[i], v[i]);
-                x[i] = axpy(x[i], tau(i), vm[i]);
-                v[i] = axpy(v[i], tau(i), a[i]);
-                touch(until - f64::from(tau(i)), f64::from(tau(i)), before, &mut x[i], &mut v[i]);
+            let span = |i: usize| (until - births[i].time).max(0.0);
+            let longest = (0..n).map(span).fold(0.0, f64::max);
+            let pieces = (longest / h * (1.0 - 1e-9)).max(2.0 * longest * rate).ceil().clamp(1.0, PIECES);
+            let tau = |i: usize| (span(i) / pieces) as Real;
+            for k in 0..pieces as usize {
+                // The time of the one who goes the longest way; all end at the same.
+                let time = until - longest * (1.0 - k as f64 / pieces);
+                motion.rate(time, x, v, &mut a)?;
+                for i in 0..n {
+                    xm[i] = axpy(x[i], 0.5 * tau(i), v[i]);
+                    vm[i] = axpy(v[i], 0.5 * tau(i), a[i]);
+                }
+                motion.rate(time + 0.5 * longest / pieces, &xm, &vm, &mut a)?;
+                for i in 0..n {
+                    let before = (x[i], v[i]);
+                    x[i] = axpy(x[i], tau(i), vm[i]);
+                    v[i] = axpy(v[i], tau(i), a[i]);
+                    let start = until - span(i) * (1.0 - k as f64 / pieces);
+                    touch(start, f64::from(tau(i)), before, &mut x[i], &mut v[i]);
+                }
             }
             let mut memory = Memory::new(scheme, n);
             let (mut ready, mut scratch) = (false, Scratch::default());
@@ -135,9 +148,22 @@ impl Dynamics {
         Ok(Grown { x, v })
     }
 
+    /// How fast the forces on single masses change the motion of the first of some newborn [1/s]: steps of half of its inverse are
+    /// stable and accurate.
+    fn stiffness_of(&self, object: Option<usize>, births: &[Birth], masses: &Masses) -> f64 {
+        let (Some(object), Some(birth)) = (object, births.first()) else { return 0.0 };
+        let one =
+            One { mass: f64::from(masses.mass[0]), charge: masses.charge.first().map_or(0.0, |q| f64::from(*q)), x: birth.x, v: birth.v };
+        let acting = self.laws.forces.iter().filter(|f| f.objects.contains(&object));
+        let largest = |b: [Real; 6]| b.iter().map(|b| f64::from(b.abs())).fold(0.0, f64::max) / one.mass;
+        acting.map(|f| f.law.matrix(birth.time, &one)).map(|(k, d)| largest(k).sqrt() + largest(d)).sum()
+    }
+
     /// Gives the newborn of an emitter their rows; their ages will be right at the time `end`.
     fn settle(&mut self, s: usize, births: &[Birth], grown: Grown, end: f64) {
         let surplus = self.pool.surplus(s, births.len());
+        let start = self.pool.rows(s).start;
+        self.count_energy(-1.0, surplus.iter().map(|k| start + *k as usize));
         self.pool.remove(s, &surplus, owned(&mut self.state.x, &mut self.state.v, &mut self.laws.masses, &mut self.memory));
         // Where even the newborn are too many, the last of them live.
         let most = self.pool.emitter(s).most().unwrap_or(usize::MAX);
@@ -152,48 +178,48 @@ impl Dynamics {
         if charged {
             self.laws.masses.charge[rows.clone()].copy_from_slice(&masses.charge);
         }
-        // What they bring with them is a scale of energy.
-        let gravity = Vec3::from(self.laws.gravity);
-        let energy = |i: usize| {
-            let (x, v) = (xyz64(self.state.x[i]), xyz64(self.state.v[i]));
-            f64::from(self.laws.masses.mass[i]) * (0.5 * v.norm_sq() + gravity.dot(x).abs())
-        };
-        let brought = rows.map(energy).sum();
-        self.scale.add(brought);
+        self.count_energy(1.0, rows);
         self.count_rows();
     }
 
-    /// At the time t, where an interval of length dt [s] ends: the dead leave, and children of the dead and of the living
-    /// come.
-    pub(super) fn bury(&mut self, t: f64, dt: f64) -> Result<(), StepError> {
+    /// At the time t, where an interval of length dt [s] ends: the dead leave, and children of the dead and of the living come.
+    /// Parents stand before their children, so that who is born here may bear, and die, here.
+    pub(super) fn bury(&mut self, t: f64, dt: f64, h: f64) -> Result<(), StepError> {
         let n = self.pool.len();
-        let mut mourned: Vec<Vec<Parent>> = Vec::with_capacity(n);
-        let mut children: Vec<Vec<Birth>> = Vec::with_capacity(n);
+        let mut born: Vec<Vec<Birth>> = vec![Vec::new(); n];
         for s in 0..n {
-            children.push(self.pool.children(s, t, dt, &self.state.x, &self.state.v).ok_or_else(|| self.full(s, t))?);
-        }
-        for s in 0..n {
+            let births = std::mem::take(&mut born[s]);
+            if !births.is_empty() {
+                let grown = self.grow(s, &births, (t, h, 0))?;
+                self.settle(s, &births, grown, t);
+            }
             let colliders = &self.laws.colliders;
             let near = |p: Vec3<f64>, distance: f64| colliders.iter().any(|c| c.distance(p, t, distance).0 < distance);
-            let dead = self.pool.dead(s, t, &self.state.x, &self.state.v, &near);
-            let is_parent = (0..n).any(|child| self.pool.parent(child) == Some(s));
-            mourned.push(if is_parent { self.pool.mourn(s, &dead, (t, dt), &self.state.x, &self.state.v) } else { Vec::new() });
+            let dead = self.pool.dead(s, (t, dt), &self.state.x, &self.state.v, &near);
+            for child in (s + 1..n).filter(|child| self.pool.parent(*child) == Some(s)).collect::<Vec<_>>() {
+                let births = self.pool.descendants(child, (t, dt), &dead, &self.state.x, &self.state.v);
+                born[child] = births.ok_or_else(|| self.full(child, t))?;
+            }
             if !dead.is_empty() {
+                let start = self.pool.rows(s).start;
+                self.count_energy(-1.0, dead.iter().map(|k| start + *k as usize));
                 self.pool.remove(s, &dead, owned(&mut self.state.x, &mut self.state.v, &mut self.laws.masses, &mut self.memory));
                 self.count_rows();
             }
         }
-        for s in 0..n {
-            let mut births = std::mem::take(&mut children[s]);
-            if let Some(parent) = self.pool.parent(s) {
-                births.extend(self.pool.orphans(s, &mourned[parent]).ok_or_else(|| self.full(s, t))?);
-            }
-            if !births.is_empty() {
-                let grown = self.grow(s, &births, (t, dt, 0))?;
-                self.settle(s, &births, grown, t);
-            }
-        }
         Ok(())
+    }
+
+    /// The energy that masses bring with them, or take away.
+    fn count_energy(&mut self, sign: f64, rows: impl Iterator<Item = usize>) {
+        let gravity = Vec3::from(self.laws.gravity);
+        let (mut kinetic, mut potential) = (0.0, 0.0);
+        for i in rows {
+            let (mass, x, v) = (f64::from(self.laws.masses.mass[i]), xyz64(self.state.x[i]), xyz64(self.state.v[i]));
+            kinetic += 0.5 * mass * v.norm_sq();
+            potential -= mass * gravity.dot(x);
+        }
+        self.scale.count(sign, kinetic, potential);
     }
 
     /// Tells everything that counts rows how many there are now.

@@ -50,6 +50,8 @@ pub struct Dynamics {
     stepping: Stepping,
     /// Sub-steps that automatic stepping has chosen; 0 before the first interval.
     automatic: u32,
+    /// Rows when it chose them.
+    measured: usize,
     adaptive: Adaptive,
     state: State,
     laws: Laws,
@@ -113,13 +115,14 @@ impl Dynamics {
         match self.stepping {
             Stepping::Substeps(n) => f64::from(n),
             Stepping::Step(step) => integrators::equal_steps(dt, step),
-            Stepping::Automatic if self.automatic > 0 => f64::from(self.automatic),
+            // A crowd that has grown may have another limit.
+            Stepping::Automatic if self.automatic > 0 && self.state.x.len() <= 2 * self.measured => f64::from(self.automatic),
             Stepping::Automatic => {
                 let limit = if self.integrator.is_implicit() { f64::INFINITY } else { self.limit() };
                 let n = if limit > 0.0 { (dt / (0.7 * limit)).ceil().max(1.0) } else { 1.0 };
                 // What has no masses yet has no limit to keep to later.
                 if n <= MOST_SUBSTEPS && !self.state.x.is_empty() {
-                    self.automatic = n as u32;
+                    (self.automatic, self.measured) = (n as u32, self.state.x.len());
                 }
                 n
             }
@@ -352,7 +355,7 @@ impl System for Dynamics {
         let end = t + dt;
         let mut unborn = self.conceive(t, dt)?;
         if self.integrator.is_adaptive() && self.user.is_none() {
-            let mut done = 0.0;
+            let (mut done, mut last) = (0.0, dt);
             while done < dt && go_on() {
                 self.remember();
                 let (begun, left) = (done, dt - done);
@@ -376,9 +379,10 @@ impl System for Dynamics {
                 self.pull_tethers(h, exchange);
                 self.after(t + begun, h, &mut report);
                 self.deliver(&mut unborn, t + done, h, end)?;
+                last = h;
                 self.look(t + done)?;
             }
-            self.bury(end, dt)?;
+            self.bury(end, dt, last)?;
             return Ok(report);
         }
         let substeps = self.substeps(dt);
@@ -395,7 +399,7 @@ impl System for Dynamics {
         if each {
             self.advance_local(t, h, substeps, go_on).map_err(|e| e.in_system(&self.name))?;
             self.deliver_grown(unborn, (t, h, substeps))?;
-            self.bury(end, dt)?;
+            self.bury(end, dt, h)?;
             report.steps = u64::from(substeps);
             report.step_range = Some((h, h));
             return Ok(report);
@@ -410,7 +414,7 @@ impl System for Dynamics {
             self.deliver(&mut unborn, if k + 1 == substeps { end } else { time + h }, h, end)?;
             self.look(time + h)?;
         }
-        self.bury(end, dt)?;
+        self.bury(end, dt, h)?;
         Ok(report)
     }
 
@@ -456,14 +460,15 @@ impl System for Dynamics {
             self.pool.save(archive);
         }
         let points = self.laws.masses.points;
-        archive.push_points("x", &self.state.x[..points]);
+        archive.push_points("x", &self.state.x[..points], self.state.x.capacity());
         archive.push_rows("turn", &self.state.x[points..]);
-        archive.push_points("v", &self.state.v);
+        archive.push_points("v", &self.state.v, self.state.v.capacity());
         for column in &self.memory.columns {
             archive.push_rows("memory", column);
         }
         let ready = f64::from(u8::from(self.memory.ready));
-        let numbers = vec![ready, self.memory.next_step, self.memory.last_error, f64::from(self.automatic), self.broken as f64];
+        let numbers =
+            vec![ready, self.memory.next_step, self.memory.last_error, f64::from(self.automatic), self.measured as f64, self.broken as f64];
         archive.push("numbers", Part::Numbers(numbers.into_iter().chain(self.scale.numbers()).collect()));
         for batch in &self.laws.batches {
             archive.push("broken", Part::Indices(batch.broken()));
@@ -483,9 +488,9 @@ impl System for Dynamics {
             archive.rows("memory", column)?;
         }
         let numbers = archive.numbers("numbers")?;
-        let [ready, next_step, last_error, automatic, broken, scale @ ..] = &numbers[..] else { return None };
+        let [ready, next_step, last_error, automatic, measured, broken, scale @ ..] = &numbers[..] else { return None };
         (self.memory.ready, self.memory.next_step, self.memory.last_error) = (*ready == 1.0, *next_step, *last_error);
-        self.automatic = *automatic as u32;
+        (self.automatic, self.measured) = (*automatic as u32, *measured as usize);
         self.broken = *broken as u64;
         self.scale = books::Scale::from_numbers(scale)?;
         for batch in &mut self.laws.batches {
