@@ -248,7 +248,7 @@ impl Emitter {
         let Origin::Place(place) = &self.from else { return Some(Vec::new()) };
         let first = (before + ROUNDING).floor();
         let count = (after + ROUNDING).floor() - first;
-        if !(next as f64 + count <= f64::from(u32::MAX)) {
+        if count.is_nan() || next as f64 + count > f64::from(u32::MAX) {
             return None;
         }
         let count = count as usize;
