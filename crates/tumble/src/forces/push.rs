@@ -2,7 +2,7 @@
 
 use super::{Group, One};
 use crate::elements::Block;
-use crate::math::simd::{Kernel, Width, count, dispatch, packs};
+use crate::math::simd::{Kernel, Width, dispatch, packs};
 use crate::math::{Dual, Lane, Real, Row, Vec3};
 
 /// The force on one mass, given its weight (the mass [kg], or the charge [C] for forces on charges).
@@ -27,13 +27,7 @@ impl<P: Push> Kernel for Pushed<'_, P> {
             let [x, y, z, _] = w.rows(self.x, i);
             let [vx, vy, vz, _] = w.rows(self.v, i);
             let push = self.law.at(w.load(&self.weight[i..]), Vec3 { x, y, z }, Vec3 { x: vx, y: vy, z: vz });
-            // Rows are added as rows: turning the forces into lanes and back would cost more than a light law.
-            let mut rows = [[0.0; 4]; 16];
-            w.scatter([push.x, push.y, push.z, w.splat(0.0)], &mut rows, 0, 1);
-            let force = self.force[i..i + count(w)].as_flattened_mut();
-            for (f, r) in force.iter_mut().zip(rows.as_flattened()) {
-                *f += r;
-            }
+            w.add_to_rows([push.x, push.y, push.z, w.splat(0.0)], self.force, i);
         });
     }
 }

@@ -54,8 +54,10 @@ pub trait Width: Copy + Send + Sync {
     unsafe fn gather(self, rows: &[Row], index: &[u32]) -> [Self::L; 4];
     /// Stores N rows at `start`, `start + stride`, ...
     fn scatter(self, v: [Self::L; 4], rows: &mut [Row], start: usize, stride: usize);
-    /// Loads N consecutive rows from `start`.
+    /// Loads N consecutive rows from `start` and transposes them.
     fn rows(self, rows: &[Row], start: usize) -> [Self::L; 4];
+    /// Adds to N consecutive rows from `start`.
+    fn add_to_rows(self, v: [Self::L; 4], rows: &mut [Row], start: usize);
     /// For N consecutive numbers of a column of rows, the first of them number `at`: the number of each one's row.
     fn spread(self, of_rows: &[Real], at: usize) -> Self::L;
     /// The number whose bits are `GUESS` less half the bits of x > 0: some 2/3 of 1/sqrt(x), to 3.5 %.
@@ -137,6 +139,12 @@ impl Width for Scalar {
     #[inline(always)]
     fn rows(self, rows: &[Row], start: usize) -> [Real; 4] {
         rows[start]
+    }
+    #[inline(always)]
+    fn add_to_rows(self, v: [Real; 4], rows: &mut [Row], start: usize) {
+        for i in 0..4 {
+            rows[start][i] += v[i];
+        }
     }
     #[inline(always)]
     fn spread(self, of_rows: &[Real], at: usize) -> Real {
@@ -366,6 +374,14 @@ mod x86 {
                 }
                 #[inline(always)]
                 fn scatter(self, v: [Self::L; 4], rows: &mut [Row], start: usize, stride: usize) {
+                    if stride == 1 {
+                        let run = self.untranspose_run(v);
+                        let to = rows[start..start + $n].as_flattened_mut();
+                        for i in 0..4 {
+                            self.store(run[i], &mut to[i * $n..]);
+                        }
+                        return;
+                    }
                     let untransposed = self.untranspose(v);
                     assert!(start + ($n - 1) * stride < rows.len());
                     for i in 0..$n {
@@ -374,12 +390,21 @@ mod x86 {
                 }
                 #[inline(always)]
                 fn rows(self, rows: &[Row], start: usize) -> [Self::L; 4] {
-                    let rows = &rows[start..start + $n];
-                    let mut picked = [[0.0; 4]; $n];
-                    for i in 0..$n {
-                        picked[i] = rows[i];
+                    let from = rows[start..start + $n].as_flattened();
+                    let mut run = [self.splat(0.0); 4];
+                    for i in 0..4 {
+                        run[i] = self.load(&from[i * $n..]);
                     }
-                    self.transpose(picked)
+                    self.transpose_run(run)
+                }
+                #[inline(always)]
+                fn add_to_rows(self, v: [Self::L; 4], rows: &mut [Row], start: usize) {
+                    let run = self.untranspose_run(v);
+                    let to = rows[start..start + $n].as_flattened_mut();
+                    for i in 0..4 {
+                        let here = &mut to[i * $n..];
+                        self.store(self.load(here) + run[i], here);
+                    }
                 }
                 #[inline(always)]
                 fn spread(self, of_rows: &[Real], at: usize) -> Self::L {
@@ -404,7 +429,7 @@ mod x86 {
         };
     }
 
-    /// Rows of four numbers to four registers and back.
+    /// Rows of four numbers to four registers with x, y, z and w and back; consecutive rows fill four registers, too.
     trait Transpose: Simd {
         type Rows;
         type OfRows;
@@ -412,6 +437,8 @@ mod x86 {
         fn each_four_times(self, numbers: Self::OfRows) -> Pack<Self>;
         fn transpose(self, rows: Self::Rows) -> [Pack<Self>; 4];
         fn untranspose(self, v: [Pack<Self>; 4]) -> Self::Rows;
+        fn transpose_run(self, run: [Pack<Self>; 4]) -> [Pack<Self>; 4];
+        fn untranspose_run(self, v: [Pack<Self>; 4]) -> [Pack<Self>; 4];
     }
 
     macro_rules! four_packs {
@@ -482,7 +509,28 @@ mod x86 {
                 }
                 rows
             }
+            #[inline(always)]
+            fn transpose_run(self, [a, b, c, d]: [Pack<Self>; 4]) -> [Pack<Self>; 4] {
+                let s = self.avx;
+                let (a, b, c, d) = (cast(a.v), cast(b.v), cast(c.v), cast(d.v));
+                let (low, high) = (s._mm256_permute2f128_ps::<0x20>(a, c), s._mm256_permute2f128_ps::<0x31>(a, c));
+                let p = [low, high, s._mm256_permute2f128_ps::<0x20>(b, d), s._mm256_permute2f128_ps::<0x31>(b, d)];
+                let [x, y, z, w] = four_by_four!(s, _mm256_unpacklo_ps, _mm256_unpackhi_ps, _mm256_shuffle_ps, [p[0], p[1], p[2], p[3]]);
+                four_packs!(self, [x, y, z, w])
+            }
+            #[inline(always)]
+            fn untranspose_run(self, [x, y, z, w]: [Pack<Self>; 4]) -> [Pack<Self>; 4] {
+                let s = self.avx;
+                let (x, y, z, w) = (cast(x.v), cast(y.v), cast(z.v), cast(w.v));
+                let p = four_by_four!(s, _mm256_unpacklo_ps, _mm256_unpackhi_ps, _mm256_shuffle_ps, [x, y, z, w]);
+                let low = [s._mm256_permute2f128_ps::<0x20>(p[0], p[1]), s._mm256_permute2f128_ps::<0x20>(p[2], p[3])];
+                let high = [s._mm256_permute2f128_ps::<0x31>(p[0], p[1]), s._mm256_permute2f128_ps::<0x31>(p[2], p[3])];
+                four_packs!(self, [low[0], low[1], high[0], high[1]])
+            }
         }
+
+        /// Numbers of four registers of four rows each, transposed inside their 128-bit parts: where each row's is; its own inverse.
+        const CROSSED: [i32; 16] = [0, 4, 8, 12, 1, 5, 9, 13, 2, 6, 10, 14, 3, 7, 11, 15];
 
         impl Transpose for V4 {
             type Rows = [Row; 16];
@@ -520,13 +568,33 @@ mod x86 {
                 }
                 rows
             }
+            #[inline(always)]
+            fn transpose_run(self, [a, b, c, d]: [Pack<Self>; 4]) -> [Pack<Self>; 4] {
+                let s = self.avx512f;
+                let (a, b, c, d) = (cast(a.v), cast(b.v), cast(c.v), cast(d.v));
+                let mut p = four_by_four!(s, _mm512_unpacklo_ps, _mm512_unpackhi_ps, _mm512_shuffle_ps, [a, b, c, d]);
+                for i in 0..4 {
+                    p[i] = s._mm512_permutexvar_ps(cast(CROSSED), p[i]);
+                }
+                four_packs!(self, [p[0], p[1], p[2], p[3]])
+            }
+            #[inline(always)]
+            fn untranspose_run(self, v: [Pack<Self>; 4]) -> [Pack<Self>; 4] {
+                let s = self.avx512f;
+                let mut p = [cast(v[0].v); 4];
+                for i in 0..4 {
+                    p[i] = s._mm512_permutexvar_ps(cast(CROSSED), cast(v[i].v));
+                }
+                let [a, b, c, d] = four_by_four!(s, _mm512_unpacklo_ps, _mm512_unpackhi_ps, _mm512_shuffle_ps, [p[0], p[1], p[2], p[3]]);
+                four_packs!(self, [a, b, c, d])
+            }
         }
     }
 
     #[cfg(feature = "double")]
     mod double {
         use super::*;
-        use std::arch::x86_64::__m256d;
+        use std::arch::x86_64::{__m256d, __m512d};
 
         /// GUESS - bits/2.
         #[inline(always)]
@@ -580,6 +648,15 @@ mod x86 {
                 let [a, b, c, d] = four_by_four(self.avx, cast(x.v), cast(y.v), cast(z.v), cast(w.v));
                 [cast(a), cast(b), cast(c), cast(d)]
             }
+            #[inline(always)]
+            fn transpose_run(self, run: [Pack<Self>; 4]) -> [Pack<Self>; 4] {
+                self.transpose(cast([run[0].v, run[1].v, run[2].v, run[3].v]))
+            }
+            #[inline(always)]
+            fn untranspose_run(self, v: [Pack<Self>; 4]) -> [Pack<Self>; 4] {
+                let [a, b, c, d]: [__m256d; 4] = cast(self.untranspose(v));
+                four_packs!(self, [a, b, c, d])
+            }
         }
 
         impl Transpose for V4 {
@@ -614,6 +691,15 @@ mod x86 {
                     rows[4 + i] = cast(b[i]);
                 }
                 rows
+            }
+            #[inline(always)]
+            fn transpose_run(self, run: [Pack<Self>; 4]) -> [Pack<Self>; 4] {
+                self.transpose(cast([run[0].v, run[1].v, run[2].v, run[3].v]))
+            }
+            #[inline(always)]
+            fn untranspose_run(self, v: [Pack<Self>; 4]) -> [Pack<Self>; 4] {
+                let [a, b, c, d]: [__m512d; 4] = cast(self.untranspose(v));
+                four_packs!(self, [a, b, c, d])
             }
         }
     }
