@@ -193,8 +193,9 @@ const STAIRS: [Real; 2 * LANES] = {
     stairs
 };
 
-/// Some masses side by side, and the sums over what pulls them.
+/// Some masses side by side, and the sums over what pulls them; no register of them lies on two lines of the cache.
 #[derive(Clone, Copy, Default)]
+#[repr(align(64))]
 struct Pack {
     x: [[Real; LANES]; 3],
     /// b.

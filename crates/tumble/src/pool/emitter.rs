@@ -18,6 +18,8 @@ const PLACE: u32 = 1 << 16;
 const ROUNDING: f64 = 1e-6;
 /// The same for children, whose moments go by ages in the engine's scalar.
 const BY_AGE: f64 = 1e-3;
+/// Of an interval: what ages may have lost by rounding, at most.
+const SLACK: f64 = 0.25;
 
 /// Where an emitter's particles come from.
 pub enum Origin {
@@ -210,12 +212,22 @@ impl Emitter {
         self.words.lifetime.is_none() && self.kill.is_empty()
     }
 
+    /// The age [s] below which no one dies, intervals being dt [s] long.
+    pub fn safe_until(&self, dt: f64) -> f64 {
+        if self.kill.is_empty() { self.youngest() - SLACK * dt } else { f64::NEG_INFINITY }
+    }
+
+    /// The age at which the first may die, if no rule kills them before.
+    fn youngest(&self) -> f64 {
+        self.words.lifetime.unwrap_or(f64::INFINITY) * (1.0 - self.words.lifetime_spread)
+    }
+
     /// Whether a particle is to die at time t, where an interval of length dt [s] ends.
+    #[inline]
     pub fn dies(&self, (t, dt): (f64, f64), (id, age): (u32, f64), (x, v): (Row, Row), near: &Near<'_>) -> bool {
         // What a sum of intervals may have lost by rounding.
-        let age = age + (age * age / dt * f64::from(Real::EPSILON)).min(0.25 * dt);
-        let youngest = self.words.lifetime.unwrap_or(f64::INFINITY) * (1.0 - self.words.lifetime_spread);
-        if age >= youngest && age >= self.lifetime(id) {
+        let age = age + (age * age * (f64::from(Real::EPSILON) / dt)).min(SLACK * dt);
+        if age >= self.youngest() && age >= self.lifetime(id) {
             return true;
         }
         self.kill.iter().any(|rule| match rule {

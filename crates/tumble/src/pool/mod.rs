@@ -247,8 +247,8 @@ impl Pool {
         }
     }
 
-    /// Who of an emitter is to die at time t, where an interval of length dt [s] ends, counted from its first row, in order. x and v are all rows of the system; `near` tells
-    /// whether a point is near a collider.
+    /// Who of an emitter is to die at time t, where an interval of length dt [s] ends, counted from its first row, in order. x and
+    /// v are all rows of the system; `near` tells whether a point is near a collider.
     pub fn dead(&self, s: usize, t: (f64, f64), x: &[Row], v: &[Row], near: &Near<'_>) -> Vec<u32> {
         let (rows, emitter) = (self.rows(s), &self.streams[s].emitter);
         if emitter.is_immortal() {
@@ -256,8 +256,13 @@ impl Pool {
         }
         let (x, v, ids, ages) = (&x[rows.clone()], &v[rows], self.ids(s), self.ages(s));
         let tasks: Vec<Range<usize>> = (0..x.len()).step_by(TASK).map(|a| a..(a + TASK).min(x.len())).collect();
-        let dies = |i: &usize| emitter.dies(t, (ids[*i], f64::from(ages[*i])), (x[*i], v[*i]), near);
-        tasks.into_par_iter().flat_map_iter(|task| task.filter(dies).map(|i| i as u32)).collect()
+        let safe = emitter.safe_until(t.1);
+        let dies = |i: usize| emitter.dies(t, (ids[i], f64::from(ages[i])), (x[i], v[i]), near);
+        let among = |task: Range<usize>| -> Vec<u32> {
+            let old = ages[task.clone()].iter().zip(task).filter(|(age, _)| f64::from(**age) >= safe);
+            old.filter(|(_, i)| dies(*i)).map(|(_, i)| i as u32).collect()
+        };
+        tasks.into_par_iter().flat_map_iter(among).collect()
     }
 
     /// The oldest of an emitter that has to make room for the newborn, if it may.
