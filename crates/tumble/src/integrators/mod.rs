@@ -144,6 +144,17 @@ pub fn equal_steps(dt: f64, step: f64) -> f64 {
     (dt / step * (1.0 - 1e-9)).ceil().max(1.0)
 }
 
+/// By what part of a step the velocities of a scheme lag behind its positions: under a constant acceleration a it moves by
+/// x_t+h = x_t + h (v_t + v_t+h)/2 + lead h² a, as if at the velocity v + lead h a.                (contact.14)
+pub fn lead(scheme: Integrator) -> f64 {
+    match scheme {
+        Integrator::SymplecticEuler | Integrator::ImplicitEuler => 0.5,
+        Integrator::ForwardEuler => -0.5,
+        Integrator::AdaptiveEuler => -0.25,
+        _ => 0.0,
+    }
+}
+
 /// One step of a scheme with a fixed step: x and v from t to t + h. `memory` are the scheme's columns for these rows,
 /// `ready` whether they belong to (x, v); afterwards they do.
 pub fn step(

@@ -92,8 +92,8 @@ impl Dynamics {
         let mut x: Vec<Row> = births.iter().map(|b| row(b.x, (1.0 / self.pool.emitter(s).mass(b.id)) as Real)).collect();
         let mut v: Vec<Row> = births.iter().map(|b| row(b.v, 0.0)).collect();
         let (laws, colliders, resting) = (&self.laws, &self.laws.colliders[..], self.resting_speed(h));
-        let touch = |t: f64, h: f64, before: (Row, Row), x: &mut Row, v: &mut Row| {
-            let step = contact::Step { t, h, resting };
+        let touch = |t: f64, h: f64, lead: f64, before: (Row, Row), x: &mut Row, v: &mut Row| {
+            let step = contact::Step { t, h, resting, lead };
             !colliders.is_empty() && h > 0.0 && contact::resolve(colliders, &step, before, x, v)
         };
         let rate = self.stiffness_of(object, births, &masses);
@@ -124,7 +124,7 @@ impl Dynamics {
                     x[i] = axpy(x[i], tau(i), vm[i]);
                     v[i] = axpy(v[i], tau(i), a[i]);
                     let start = until - span(i) * (1.0 - k as f64 / pieces);
-                    touch(start, f64::from(tau(i)), before, &mut x[i], &mut v[i]);
+                    touch(start, f64::from(tau(i)), 0.0, before, &mut x[i], &mut v[i]);
                 }
             }
             let mut memory = Memory::new(scheme, n);
@@ -137,7 +137,7 @@ impl Dynamics {
                 integrators::step(scheme, &mut motion, (time, h), (&mut *x, &mut *v), &mut columns, ready, &mut scratch, &mut report)?;
                 ready = true;
                 for i in 0..n {
-                    ready &= !touch(time, h, before[i], &mut x[i], &mut v[i]);
+                    ready &= !touch(time, h, integrators::lead(scheme), before[i], &mut x[i], &mut v[i]);
                 }
             }
             Ok(())

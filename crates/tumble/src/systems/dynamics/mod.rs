@@ -215,7 +215,9 @@ impl Dynamics {
             }
         }
         if !self.laws.colliders.is_empty() {
-            let step = contact::Step { t, h, resting: self.resting_speed(h) };
+            // Users' schemes are unknown, and what the penalty pushes has no constant acceleration.
+            let lead = if self.user.is_some() || self.laws.penalty { 0.0 } else { integrators::lead(self.integrator) };
+            let step = contact::Step { t, h, resting: self.resting_speed(h), lead };
             let penalty = self.laws.penalty && self.user.is_none();
             let points = self.laws.masses.points;
             let (colliders, before, before_v) = (&self.laws.colliders[..], &self.before, &self.before_v);
@@ -281,6 +283,7 @@ impl Dynamics {
     /// once an interval, and the scratch of any scheme stays in the first cache.
     fn advance_local(&mut self, t: f64, h: f64, substeps: u32, go_on: &(dyn Fn() -> bool + Sync)) -> Result<(), StepError> {
         let (scheme, resting) = (self.integrator, self.resting_speed(h));
+        let lead = integrators::lead(scheme);
         let (laws, colliders, state) = (&self.laws, &self.laws.colliders[..], &mut self.state);
         let mut memory: Vec<Vec<&mut [Row]>> = Vec::new();
         memory.resize_with(state.x.len().div_ceil(BLOCK), Vec::new);
@@ -315,7 +318,7 @@ impl Dynamics {
                     let time = t + f64::from(k) * h;
                     integrators::step(scheme, &mut motion, (time, h), (x, v), &mut memory, ready, scratch, &mut StepReport::default())?;
                     ready = true;
-                    let step = contact::Step { t: time, h, resting };
+                    let step = contact::Step { t: time, h, resting, lead };
                     for i in 0..before.len().min(points) {
                         let was = (before[i], before_v[i]);
                         if x[i][3] > 0.0 && contact::resolve(colliders, &step, was, &mut x[i], &mut v[i]) {
