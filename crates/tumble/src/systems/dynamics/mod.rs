@@ -13,7 +13,7 @@ pub use build::{Parts, Settings, SpringPart};
 
 use crate::elements::{Batch, Elements, Limit, Linear};
 use crate::exchange::{Exchange, Port};
-use crate::integrators::{self, Equation, Memory, Scratch, adaptive_step};
+use crate::integrators::{self, Equation, Memory, Scratch, Step, adaptive_step};
 use crate::math::parallel::{CHUNK, sum};
 use crate::math::{Real, Row, Vec3, ZERO, axpy, row, sub, xyz64};
 use crate::pool::Pool;
@@ -167,9 +167,9 @@ impl Dynamics {
         let result = match &mut user {
             Some(user) => self.user_step(user.as_mut(), t, h),
             None => {
-                let y = (&mut self.state.x[..], &mut self.state.v[..]);
-                let mut columns: Vec<&mut [Row]> = self.memory.columns.iter_mut().map(|c| &mut c[..]).collect();
-                integrators::step(self.integrator, &mut self.laws, (t, h), y, &mut columns, self.memory.ready, &mut self.scratch, report)
+                let (equation, x, v, ready) = (&mut self.laws, &mut self.state.x, &mut self.state.v, self.memory.ready);
+                let (memory, scratch) = (&mut self.memory.slices(), &mut self.scratch);
+                integrators::step(self.integrator, Step { equation, t, h, x, v, memory, ready, scratch, report })
             }
         };
         self.user = user;
@@ -315,10 +315,10 @@ impl Dynamics {
                         before_v.clear();
                         before_v.extend_from_slice(v);
                     }
-                    let time = t + f64::from(k) * h;
-                    integrators::step(scheme, &mut motion, (time, h), (x, v), &mut memory, ready, scratch, &mut StepReport::default())?;
+                    let (t, equation, memory, report) = (t + f64::from(k) * h, &mut motion, &mut memory, &mut StepReport::default());
+                    integrators::step(scheme, Step { equation, t, h, x, v, memory, ready, scratch, report })?;
                     ready = true;
-                    let step = contact::Step { t: time, h, resting, lead };
+                    let step = contact::Step { t, h, resting, lead };
                     for i in 0..before.len().min(points) {
                         let was = (before[i], before_v[i]);
                         if x[i][3] > 0.0 && contact::resolve(colliders, &step, was, &mut x[i], &mut v[i]) {
@@ -356,7 +356,7 @@ impl System for Dynamics {
     fn advance(&mut self, t: f64, dt: f64, exchange: &mut Exchange, go_on: &(dyn Fn() -> bool + Sync)) -> Result<StepReport, StepError> {
         let mut report = StepReport::default();
         let end = t + dt;
-        let mut unborn = self.conceive(t, dt)?;
+        let mut unborn = self.pool.conceive(&self.name, t, dt)?;
         if self.integrator.is_adaptive() && self.user.is_none() {
             let (mut done, mut last) = (0.0, dt);
             while done < dt && go_on() {
