@@ -75,7 +75,8 @@ fn a_sampled_disk_pulls_as_freemans_does() {
         let (mean, scatter) = pull_on_ring(inner, outer, 0.02);
         let (mean, noise) = (mean * f64::from(count) / exact, scatter / (n as f64).sqrt() * f64::from(count) / exact);
         println!("{inner} < R < {outer}: {count} stars, {:.4} of Freeman's, expected {mean:.4} +- {noise:.4}", pull / exact);
-        // Softening takes 3 % of the pull inside and 0.3 % outside, sampling adds noise: 3.2 % inside, 0.6 % outside.
+        // Softening takes 3 % of the pull inside and 0.3 % outside, sampling adds noise: 3.2 % inside, 0.6 % outside. Measured: within 1.9
+        // times the noise.
         assert!(count > 200 && (pull / exact - 1.0).abs() < 0.09);
         assert!((pull / exact - mean).abs() < 2.0 * noise);
         ratios.push(pull / exact);
