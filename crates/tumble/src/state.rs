@@ -2,6 +2,7 @@
 
 use crate::math::{Real, Row};
 use std::ops::Range;
+use tumble_interface::{Column, Data};
 
 /// What moves: points, then frames.
 #[derive(Debug, Clone, Default)]
@@ -54,4 +55,16 @@ pub struct Object {
     pub stream: Option<usize>,
     /// Radius in pictures [m]; 0 for a surface.
     pub radius: f64,
+}
+
+impl Object {
+    /// A column of its own.
+    pub fn column(&self, name: &str, unit: &'static str, width: usize, data: Data) -> Column {
+        Column { object: self.name.clone(), name: name.into(), unit, width, data }
+    }
+
+    /// Its radius as a column.
+    pub fn one_radius(&self) -> Column {
+        self.column("radius", "m", 1, Data::F64(vec![self.radius]))
+    }
 }

@@ -1,46 +1,29 @@
 //! Implicit schemes. Each is one or more stages x = x* + gh v, v = v* + gh a(t, x, v), which the equation solves.
 
-use super::{Equation, Scratch, Stage};
-use crate::math::{Quat, Real, Row, axpy, scale, sub};
+use super::{Stage, Step};
+use crate::math::{Quat, Real, axpy, scale, sub};
 use tumble_interface::StepError;
-use tumble_interface::engine::StepReport;
 
 /// x += h v_t+h,  v_t+h = v + h a(t+h).  Order 1, damps, stable for every h.        (integrators.10)
-pub(super) fn euler(
-    equation: &mut dyn Equation,
-    t: f64,
-    h: f64,
-    x: &mut [Row],
-    v: &mut [Row],
-    scratch: &mut Scratch,
-    report: &mut StepReport,
-) -> Result<(), StepError> {
+///
+/// Leaves x and v as they were in the first two columns of the scratch.
+pub(super) fn euler(Step { equation, t, h, x, v, scratch, report, .. }: &mut Step<'_, '_>) -> Result<(), StepError> {
     let [x0, v0] = scratch.take(x.len());
     x0.copy_from_slice(x);
     v0[..v.len()].copy_from_slice(v);
-    equation.solve(&Stage { t: t + h, gh: h, x: x0, v: &v0[..v.len()] }, x, v, report)
+    equation.solve(&Stage { t: *t + *h, gh: *h, x: x0, v: &v0[..v.len()] }, x, v, report)
 }
 
 /// Implicit Euler over h/2 to the midpoint, then the same movement again.            (integrators.11)
 ///
 /// Order 2; keeps quadratic invariants such as angular momentum; does not damp.
-pub(super) fn midpoint(
-    equation: &mut dyn Equation,
-    t: f64,
-    h: f64,
-    x: &mut [Row],
-    v: &mut [Row],
-    scratch: &mut Scratch,
-    report: &mut StepReport,
-) -> Result<(), StepError> {
-    let [x0, v0] = scratch.take(x.len());
-    x0.copy_from_slice(x);
-    v0[..v.len()].copy_from_slice(v);
-    let half = h / 2.0;
-    equation.solve(&Stage { t: t + half, gh: half, x: x0, v: &v0[..v.len()] }, x, v, report)?;
-    let kinematics = equation.kinematics();
+pub(super) fn midpoint(mut step: Step<'_, '_>) -> Result<(), StepError> {
+    step.h /= 2.0;
+    euler(&mut step)?;
+    let Step { equation, h, x, v, scratch, .. } = step;
+    let (kinematics, [x0, v0]) = (equation.kinematics(), scratch.take(x.len()));
     for i in 0..x.len() {
-        x[i] = if i < kinematics.points { sub(scale(x[i], 2.0), x0[i]) } else { kinematics.moved(i, x[i], v[i], half as Real) };
+        x[i] = if i < kinematics.points { sub(scale(x[i], 2.0), x0[i]) } else { kinematics.moved(i, x[i], v[i], h as Real) };
     }
     for (v, v0) in v.iter_mut().zip(v0) {
         *v = sub(scale(*v, 2.0), *v0);
@@ -51,17 +34,7 @@ pub(super) fn midpoint(
 /// y_t+h = 4/3 y_t - 1/3 y_t-h + 2/3 h f(t+h).                                       (integrators.12)
 ///
 /// Order 2, damps high frequencies only; starts with implicit Euler. Memory: x_t-h and v_t-h.
-pub(super) fn bdf2(
-    equation: &mut dyn Equation,
-    t: f64,
-    h: f64,
-    x: &mut [Row],
-    v: &mut [Row],
-    memory: &mut [&mut [Row]],
-    ready: bool,
-    scratch: &mut Scratch,
-    report: &mut StepReport,
-) -> Result<(), StepError> {
+pub(super) fn bdf2(Step { equation, t, h, x, v, memory, ready, scratch, report }: Step<'_, '_>) -> Result<(), StepError> {
     let [x1, v1] = memory else { return Ok(()) };
     let [x0, v0] = scratch.take(x.len());
     let kinematics = equation.kinematics();

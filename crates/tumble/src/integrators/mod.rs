@@ -108,6 +108,11 @@ impl Memory {
         };
         Self { columns: vec![vec![ZERO; n]; count], ..Self::default() }
     }
+
+    /// The columns.
+    pub fn slices(&mut self) -> Vec<&mut [Row]> {
+        self.columns.iter_mut().map(|c| &mut c[..]).collect()
+    }
 }
 
 /// Rows for one step, kept between steps to save allocations.
@@ -144,26 +149,49 @@ pub fn equal_steps(dt: f64, step: f64) -> f64 {
     (dt / step * (1.0 - 1e-9)).ceil().max(1.0)
 }
 
-/// One step of a scheme with a fixed step: x and v from t to t + h. `memory` are the scheme's columns for these rows,
-/// `ready` whether they belong to (x, v); afterwards they do.
-pub fn step(
-    scheme: Integrator,
-    equation: &mut dyn Equation,
-    (t, h): (f64, f64),
-    (x, v): (&mut [Row], &mut [Row]),
-    memory: &mut [&mut [Row]],
-    ready: bool,
-    scratch: &mut Scratch,
-    report: &mut StepReport,
-) -> Result<(), StepError> {
+/// By what part of a step the velocities of a scheme lag behind its positions: under a constant acceleration a it moves by
+/// x_t+h = x_t + h (v_t + v_t+h)/2 + lead h² a, as if at the velocity v + lead h a.                (contact.14)
+pub fn lead(scheme: Integrator) -> f64 {
     match scheme {
-        Integrator::SymplecticEuler => split::symplectic_euler(equation, t, h, x, v, scratch),
-        Integrator::ModifiedEuler => split::modified_euler(equation, t, h, x, v, scratch),
-        Integrator::Verlet => split::verlet(equation, t, h, x, v, memory, ready, scratch),
-        Integrator::VelocityVerlet => split::velocity_verlet(equation, t, h, x, v, memory, ready, scratch),
-        Integrator::ImplicitEuler => implicit::euler(equation, t, h, x, v, scratch, report),
-        Integrator::ImplicitMidpoint => implicit::midpoint(equation, t, h, x, v, scratch, report),
-        Integrator::Bdf2 => implicit::bdf2(equation, t, h, x, v, memory, ready, scratch, report),
-        explicit => runge_kutta::step(tableau(explicit), equation, t, h, x, v, scratch),
+        Integrator::SymplecticEuler | Integrator::ImplicitEuler => 0.5,
+        Integrator::ForwardEuler => -0.5,
+        Integrator::AdaptiveEuler => -0.25,
+        _ => 0.0,
+    }
+}
+
+/// A step of a scheme with a fixed step: x and v from t to t + h.
+pub struct Step<'a, 'm> {
+    /// What moves.
+    pub equation: &'a mut dyn Equation,
+    /// Its start [s].
+    pub t: f64,
+    /// Its length [s].
+    pub h: f64,
+    /// Points and frames.
+    pub x: &'a mut [Row],
+    /// Their velocities.
+    pub v: &'a mut [Row],
+    /// The scheme's columns for these rows.
+    pub memory: &'a mut [&'m mut [Row]],
+    /// Whether they belong to (x, v); afterwards they do.
+    pub ready: bool,
+    /// Rows for one step.
+    pub scratch: &'a mut Scratch,
+    /// What is reported of it.
+    pub report: &'a mut StepReport,
+}
+
+/// Takes a step.
+pub fn step(scheme: Integrator, mut step: Step<'_, '_>) -> Result<(), StepError> {
+    match scheme {
+        Integrator::SymplecticEuler => split::symplectic_euler(step),
+        Integrator::ModifiedEuler => split::modified_euler(step),
+        Integrator::Verlet => split::verlet(step),
+        Integrator::VelocityVerlet => split::velocity_verlet(step),
+        Integrator::ImplicitEuler => implicit::euler(&mut step),
+        Integrator::ImplicitMidpoint => implicit::midpoint(step),
+        Integrator::Bdf2 => implicit::bdf2(step),
+        explicit => runge_kutta::step(tableau(explicit), step),
     }
 }

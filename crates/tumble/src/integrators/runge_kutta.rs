@@ -4,7 +4,7 @@
 //!
 //! Source: [hairer1993], II.1; Dormand-Prince: [dormand1980].
 
-use super::{Equation, Scratch};
+use super::{Equation, Step};
 use crate::math::parallel::chunks;
 use crate::math::{Real, Row, axpy};
 use tumble_interface::StepError;
@@ -65,15 +65,7 @@ pub fn tableau(scheme: Integrator) -> &'static Tableau {
 pub(super) const COLUMNS: usize = 2 + 2 * 7 + 2;
 
 /// One step in place.
-pub(super) fn step(
-    tableau: &Tableau,
-    equation: &mut dyn Equation,
-    t: f64,
-    h: f64,
-    x: &mut [Row],
-    v: &mut [Row],
-    scratch: &mut Scratch,
-) -> Result<(), StepError> {
+pub(super) fn step(tableau: &Tableau, Step { equation, t, h, x, v, scratch, .. }: Step<'_, '_>) -> Result<(), StepError> {
     let mut columns: [&mut [Row]; COLUMNS] = scratch.take_some(x.len(), 2 + 2 * tableau.b.len());
     stages(tableau, equation, t, h, x, v, &mut columns, 0)?;
     finish(tableau, equation, h, x, v, &columns);

@@ -2,7 +2,7 @@
 //!
 //! Verified against their closed recurrences on the oscillator and their orders on Kepler's problem.
 
-use super::{Equation, Scratch};
+use super::Step;
 use crate::math::parallel::{chunks, chunks2};
 use crate::math::{Real, Row, add, axpy, rows, scale, sub};
 use tumble_interface::StepError;
@@ -10,45 +10,31 @@ use tumble_interface::StepError;
 /// v += h a(t, x, v), then x += h v.                                   (integrators.2)
 ///
 /// Order 1. Symplectic for a(x): energy oscillates and does not drift for w h < 2.
-pub(super) fn symplectic_euler(
-    equation: &mut dyn Equation,
-    t: f64,
-    h: f64,
-    x: &mut [Row],
-    v: &mut [Row],
-    scratch: &mut Scratch,
-) -> Result<(), StepError> {
-    let [a] = scratch.take(x.len());
-    equation.rate(t, x, v, a)?;
-    let (kinematics, h, a) = (equation.kinematics(), h as Real, &*a);
-    chunks2(x, v, |start, x, v| {
-        rows::axpy(v, h, &a[start..start + v.len()]);
-        kinematics.drift(start, x, v, h);
-    });
-    Ok(())
+pub(super) fn symplectic_euler(step: Step<'_, '_>) -> Result<(), StepError> {
+    euler(step, 1.0)
 }
 
 /// x += h/2 (v_t + v_t+h),   v_t+h = v + h a(t, x, v).                 (integrators.3)
 ///
 /// The lecture's modified Euler. Order 1, because the rate is taken once, at the start: the quadratic form
 /// x² - (w h/2) x v/w + (v/w)² of the oscillator grows by exactly 1 + w²h²/2 a step.
-pub(super) fn modified_euler(
-    equation: &mut dyn Equation,
-    t: f64,
-    h: f64,
-    x: &mut [Row],
-    v: &mut [Row],
-    scratch: &mut Scratch,
-) -> Result<(), StepError> {
+pub(super) fn modified_euler(step: Step<'_, '_>) -> Result<(), StepError> {
+    // After half a kick the velocity is the mean of the two.
+    euler(step, 0.5)
+}
+
+/// A part of the kick before the positions move, and the rest after it.
+fn euler(Step { equation, t, h, x, v, scratch, .. }: Step<'_, '_>, early: Real) -> Result<(), StepError> {
     let [a] = scratch.take(x.len());
     equation.rate(t, x, v, a)?;
     let (kinematics, h, a) = (equation.kinematics(), h as Real, &*a);
     chunks2(x, v, |start, x, v| {
-        // After half a kick the velocity is the mean of the two.
         let a = &a[start..start + v.len()];
-        rows::axpy(v, h / 2.0, a);
+        rows::axpy(v, early * h, a);
         kinematics.drift(start, x, v, h);
-        rows::axpy(v, h / 2.0, a);
+        if early < 1.0 {
+            rows::axpy(v, (1.0 - early) * h, a);
+        }
     });
     Ok(())
 }
@@ -56,16 +42,7 @@ pub(super) fn modified_euler(
 /// Stoermer's form: x_t+h = 2 x_t - x_t-h + h² a_t,   v_t = (x_t - x_t-h)/h + h/2 a_t.        (integrators.6)
 ///
 /// Order 2, symplectic, w h < 2. Memory: x_t-h and a_t. Frames, which have no differences, take the velocity form.
-pub(super) fn verlet(
-    equation: &mut dyn Equation,
-    t: f64,
-    h: f64,
-    x: &mut [Row],
-    v: &mut [Row],
-    memory: &mut [&mut [Row]],
-    ready: bool,
-    scratch: &mut Scratch,
-) -> Result<(), StepError> {
+pub(super) fn verlet(Step { equation, t, h, x, v, memory, ready, scratch, .. }: Step<'_, '_>) -> Result<(), StepError> {
     let [before, a] = memory else { return Ok(()) };
     let kinematics = equation.kinematics();
     let [guess] = scratch.take(x.len());
@@ -115,16 +92,7 @@ pub(super) fn verlet(
 /// v += h/2 a_t,  x += h v,  v += h/2 a_t+h.                           (integrators.7)
 ///
 /// Order 2, symplectic, w h < 2. Memory: a_t, which the next step uses again.
-pub(super) fn velocity_verlet(
-    equation: &mut dyn Equation,
-    t: f64,
-    h: f64,
-    x: &mut [Row],
-    v: &mut [Row],
-    memory: &mut [&mut [Row]],
-    ready: bool,
-    scratch: &mut Scratch,
-) -> Result<(), StepError> {
+pub(super) fn velocity_verlet(Step { equation, t, h, x, v, memory, ready, scratch, .. }: Step<'_, '_>) -> Result<(), StepError> {
     let [a] = memory else { return Ok(()) };
     let kinematics = equation.kinematics();
     let [guess] = scratch.take(x.len());

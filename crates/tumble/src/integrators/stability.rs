@@ -4,6 +4,7 @@
 //! Tested against the schemes themselves, step by step, and against the closed limits.
 
 use super::{DORMAND_PRINCE, Tableau, tableau};
+use crate::math::bisect;
 use crate::math::functions::{ln, pow};
 use tumble_interface::engine::BLOW_UP;
 use tumble_interface::scene::Integrator;
@@ -156,16 +157,7 @@ fn first_failure(rate: f64, from: i32, fine: &impl Fn(f64) -> bool) -> f64 {
     if k == 16 * from {
         return 0.0;
     }
-    let (mut low, mut high) = (at(k - 1), at(k));
-    for _ in 0..50 {
-        let middle = 0.5 * (low + high);
-        if fine(middle) {
-            low = middle;
-        } else {
-            high = middle;
-        }
-    }
-    low
+    bisect((at(k - 1), at(k)), 50, fine).0
 }
 
 #[cfg(test)]

@@ -87,6 +87,15 @@ pub fn dot(a: Row, b: Row) -> f64 {
     (p(0) + p(1)) + (p(2) + p(3))
 }
 
+/// Halves an interval so many times, keeping the upper half where `is_above(middle)` says that what is sought lies there.
+pub fn bisect((mut low, mut high): (f64, f64), times: u32, is_above: impl Fn(f64) -> bool) -> (f64, f64) {
+    for _ in 0..times {
+        let middle = 0.5 * (low + high);
+        if is_above(middle) { low = middle } else { high = middle }
+    }
+    (low, high)
+}
+
 /// Whether all four numbers are finite.
 #[inline(always)]
 pub fn is_finite(a: Row) -> bool {

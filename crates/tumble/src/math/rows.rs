@@ -9,15 +9,16 @@ pub trait Each {
     fn at<L: Lane>(&self, of_row: L, a: L, constant: L, out: L) -> L;
 }
 
-struct All<'a, F> {
+struct All<'a, F, const BY_LAST: bool> {
     out: &'a mut [Row],
+    /// None if the last numbers of `a` belong to the whole rows.
     of_rows: &'a [Real],
     a: &'a [Row],
     constant: Row,
     each: F,
 }
 
-impl<F: Each> Kernel for All<'_, F> {
+impl<F: Each, const BY_LAST: bool> Kernel for All<'_, F, BY_LAST> {
     type Output = ();
     #[inline(always)]
     fn run<W: Width>(self, w: W) {
@@ -28,7 +29,16 @@ impl<F: Each> Kernel for All<'_, F> {
         }
         packs!(W, w, (0..out.len()), |e| {
             let here = &mut out[e..];
-            let new = self.each.at(w.spread(self.of_rows, e), w.load(&a[e..]), w.load(&pattern[e % 4..]), w.load(here));
+            let of_row = if BY_LAST {
+                let mut last = [0.0; 4];
+                for i in 0..count(w).div_ceil(4) {
+                    last[i] = self.a[e / 4 + i][3];
+                }
+                w.spread(&last, e % 4)
+            } else {
+                w.spread(self.of_rows, e)
+            };
+            let new = self.each.at(of_row, w.load(&a[e..]), w.load(&pattern[e % 4..]), w.load(here));
             w.store(new, here);
         });
     }
@@ -38,58 +48,32 @@ impl<F: Each> Kernel for All<'_, F> {
 #[inline]
 pub fn each(out: &mut [Row], of_rows: &[Real], a: &[Row], constant: Row, each: impl Each) {
     assert!(of_rows.len() == out.len() && a.len() == out.len());
-    dispatch(All { out, of_rows, a, constant, each });
-}
-
-struct AllByLast<'a, F> {
-    out: &'a mut [Row],
-    a: &'a [Row],
-    constant: Row,
-    each: F,
-}
-
-impl<F: Each> Kernel for AllByLast<'_, F> {
-    type Output = ();
-    #[inline(always)]
-    fn run<W: Width>(self, w: W) {
-        let out = self.out.as_flattened_mut();
-        let mut pattern = [0.0; 16];
-        for i in 0..16 {
-            pattern[i] = self.constant[i % 4];
-        }
-        packs!(W, w, (0..out.len()), |e| {
-            let here = &mut out[e..];
-            let mut last = [0.0; 4];
-            for i in 0..count(w).div_ceil(4) {
-                last[i] = self.a[e / 4 + i][3];
-            }
-            let new = self.each.at(w.spread(&last, e % 4), w.load(&self.a.as_flattened()[e..]), w.load(&pattern[e % 4..]), w.load(here));
-            w.store(new, here);
-        });
-    }
+    dispatch(All::<_, false> { out, of_rows, a, constant, each });
 }
 
 /// The same where the last number of each row of `a` is the one that belongs to the whole row.
 #[inline]
 pub fn each_by_last(out: &mut [Row], a: &[Row], constant: Row, each: impl Each) {
     assert!(a.len() == out.len());
-    dispatch(AllByLast { out, a, constant, each });
+    dispatch(All::<_, true> { out, of_rows: &[], a, constant, each });
 }
 
-struct Axpy<'a> {
+/// y + c x, or x + c y.
+struct Axpy<'a, const SCALES_Y: bool> {
     y: &'a mut [Row],
     c: Real,
     x: &'a [Row],
 }
 
-impl Kernel for Axpy<'_> {
+impl<const SCALES_Y: bool> Kernel for Axpy<'_, SCALES_Y> {
     type Output = ();
     #[inline(always)]
     fn run<W: Width>(self, w: W) {
         let (y, x) = (self.y.as_flattened_mut(), self.x.as_flattened());
         packs!(W, w, (0..y.len()), |e| {
             let here = &mut y[e..];
-            let new = w.load(here) + w.splat(self.c) * w.load(&x[e..]);
+            let (y, x) = (w.load(here), w.load(&x[e..]));
+            let new = if SCALES_Y { x + w.splat(self.c) * y } else { y + w.splat(self.c) * x };
             w.store(new, here);
         });
     }
@@ -99,33 +83,14 @@ impl Kernel for Axpy<'_> {
 #[inline]
 pub fn axpy(y: &mut [Row], c: Real, x: &[Row]) {
     assert_eq!(x.len(), y.len());
-    dispatch(Axpy { y, c, x });
-}
-
-struct Xpby<'a> {
-    y: &'a mut [Row],
-    c: Real,
-    x: &'a [Row],
-}
-
-impl Kernel for Xpby<'_> {
-    type Output = ();
-    #[inline(always)]
-    fn run<W: Width>(self, w: W) {
-        let (y, x) = (self.y.as_flattened_mut(), self.x.as_flattened());
-        packs!(W, w, (0..y.len()), |e| {
-            let here = &mut y[e..];
-            let new = w.load(&x[e..]) + w.splat(self.c) * w.load(here);
-            w.store(new, here);
-        });
-    }
+    dispatch(Axpy::<false> { y, c, x });
 }
 
 /// y = x + c y.
 #[inline]
 pub fn xpby(y: &mut [Row], c: Real, x: &[Row]) {
     assert_eq!(x.len(), y.len());
-    dispatch(Xpby { y, c, x });
+    dispatch(Axpy::<true> { y, c, x });
 }
 
 /// Numbers whose products are added in the engine's scalar before they join sums in double precision: converting each
@@ -204,13 +169,13 @@ mod tests {
         let constant = [1.0, 2.0, 3.0, 4.0];
         for level in Level::available() {
             let mut out = b.clone();
-            dispatch_at(level, All { out: &mut out, of_rows: &of_rows, a: &a, constant, each: Sum3 });
+            dispatch_at(level, All::<_, false> { out: &mut out, of_rows: &of_rows, a: &a, constant, each: Sum3 });
             let mut last = b.clone();
-            dispatch_at(level, AllByLast { out: &mut last, a: &a, constant, each: Sum3 });
+            dispatch_at(level, All::<_, true> { out: &mut last, of_rows: &[], a: &a, constant, each: Sum3 });
             let mut y = b.clone();
-            dispatch_at(level, Axpy { y: &mut y, c: 0.37, x: &a });
+            dispatch_at(level, Axpy::<false> { y: &mut y, c: 0.37, x: &a });
             let mut z = b.clone();
-            dispatch_at(level, Xpby { y: &mut z, c: 0.37, x: &a });
+            dispatch_at(level, Axpy::<true> { y: &mut z, c: 0.37, x: &a });
             for i in 0..77 {
                 for c in 0..4 {
                     assert_eq!(out[i][c], of_rows[i] * a[i][c] + constant[c] * (0.1 as Real) + b[i][c], "{level:?}");

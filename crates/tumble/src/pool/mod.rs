@@ -7,10 +7,11 @@ mod emitter;
 pub use emitter::{Birth, Course, Emitter, Kill, Near, Origin, Parent};
 
 use crate::math::{Real, Row, xyz64};
+use crate::state::Object;
 use crate::system::{Archive, Part};
 use rayon::prelude::*;
 use std::ops::Range;
-use tumble_interface::{Column, Data};
+use tumble_interface::{Column, Data, StepError};
 
 /// Rows per task when looking for the dead.
 const TASK: usize = 16_384;
@@ -62,6 +63,12 @@ impl Arrange<'_> {
         }
         column.truncate(rows);
     }
+}
+
+/// Takes from the unborn, who stand in the order of their birth, those born by the time `until`; all of them at the `end`.
+pub fn due(unborn: &mut Vec<Birth>, until: f64, end: f64) -> Vec<Birth> {
+    let due = if until >= end { unborn.len() } else { unborn.partition_point(|b| b.time <= until) };
+    unborn.drain(..due).collect()
 }
 
 /// The columns that move with the rows of a pool.
@@ -131,15 +138,20 @@ impl Pool {
         Some(&column[rows.start - self.first..rows.end - self.first])
     }
 
-    /// Everyone grows older by dt [s].
-    pub fn grow_older(&mut self, dt: f64) {
-        let dt = dt as Real;
-        self.age.par_chunks_mut(TASK).for_each(|ages| ages.iter_mut().for_each(|age| *age += dt));
+    /// Everyone grows older by dt [s]; tells who of each emitter will be born in (t, t + dt] by itself, in the order of their
+    /// birth. `system` is the name of the pool's.
+    pub fn conceive(&mut self, system: &str, t: f64, dt: f64) -> Result<Vec<Vec<Birth>>, StepError> {
+        let older = dt as Real;
+        self.age.par_chunks_mut(TASK).for_each(|ages| ages.iter_mut().for_each(|age| *age += older));
+        (0..self.len()).map(|s| self.births(s, t, dt).ok_or_else(|| self.full(s, system, t))).collect()
     }
 
-    /// Those whom an emitter bears in (t, t + dt] by itself, in the order of their birth. `None` if it is full and may not
-    /// be, or has used up its ids.
-    pub fn births(&mut self, s: usize, t: f64, dt: f64) -> Option<Vec<Birth>> {
+    fn full(&self, s: usize, system: &str, time: f64) -> StepError {
+        StepError::Capacity { system: system.into(), time, what: self.emitter(s).full() }
+    }
+
+    /// `None` if the emitter is full and may not be, or has used up its ids.
+    fn births(&mut self, s: usize, t: f64, dt: f64) -> Option<Vec<Birth>> {
         let Stream { emitter, len, next, flow } = &mut self.streams[s];
         let before = *flow;
         *flow = emitter.flow(before, t, dt);
@@ -148,10 +160,22 @@ impl Pool {
         Some(births)
     }
 
-    /// Those whom an emitter bears, in an interval of length dt that ends at t [s], while its parents live and when they die; of the
-    /// parents, `dead` are to leave.
-    pub fn descendants(&mut self, s: usize, (t, dt): (f64, f64), dead: &[u32], x: &[Row], v: &[Row]) -> Option<Vec<Birth>> {
-        let Some(parent) = self.parent(s) else { return Some(Vec::new()) };
+    /// Children, by emitter, of the particles of emitter `parent`, in an interval of length dt that ends at t [s], while these live and
+    /// when they die: `dead` are to leave. `system` is the name of the pool's.
+    pub fn descendants(
+        &mut self,
+        parent: usize,
+        system: &str,
+        (t, dt): (f64, f64),
+        dead: &[u32],
+        (x, v): (&[Row], &[Row]),
+    ) -> Result<Vec<(usize, Vec<Birth>)>, StepError> {
+        let children: Vec<usize> = (parent + 1..self.len()).filter(|child| self.parent(*child) == Some(parent)).collect();
+        let born = |s: usize| Ok((s, self.children(s, parent, (t, dt), dead, x, v).ok_or_else(|| self.full(s, system, t))?));
+        children.into_iter().map(born).collect()
+    }
+
+    fn children(&mut self, s: usize, parent: usize, (t, dt): (f64, f64), dead: &[u32], x: &[Row], v: &[Row]) -> Option<Vec<Birth>> {
         let mut births = Vec::new();
         if self.streams[s].emitter.has_rate() {
             let of = |k: usize| self.until_death(parent, k, (t, dt), x, v);
@@ -168,8 +192,17 @@ impl Pool {
         Some(births)
     }
 
+    /// Tells the objects that are made of emitted particles which rows they have now.
+    pub fn place(&self, objects: &mut [Object]) {
+        for object in objects {
+            if let Some(s) = object.stream {
+                object.points = self.rows(s);
+            }
+        }
+    }
+
     /// The emitter of the parents of an emitter.
-    pub fn parent(&self, s: usize) -> Option<usize> {
+    fn parent(&self, s: usize) -> Option<usize> {
         match self.streams[s].emitter.from {
             Origin::Particles(parent) => Some(parent),
             Origin::Place(_) => None,

@@ -3,9 +3,9 @@
 use super::Site;
 use super::pins::{Pinnable, pinned};
 use crate::geometry::Vector;
-use crate::math::Quat;
 use crate::math::functions::{cos, sin};
 use crate::math::rotation::from_z_to;
+use crate::math::{Quat, bisect};
 use tumble_interface::scene::{Link, LinkSettings, Links, Rod, Rope};
 
 /// Adds the masses, and links or rod elements.
@@ -131,11 +131,7 @@ fn course(from: Vector, to: Vector, length: f64, n: u32, up: Vector) -> Vec<Vect
     let along = if c > 0.0 { chord.normalized() } else { any_across(up) };
     let across = up - along * up.dot(along);
     let down = -(if across.norm() > 1e-6 { across.normalized() } else { any_across(along) });
-    let (mut low, mut high) = (0.0, std::f64::consts::PI);
-    for _ in 0..100 {
-        let phi = 0.5 * (low + high);
-        if sin(phi) / (count * sin(phi / count)) > c / length { low = phi } else { high = phi }
-    }
+    let (low, high) = bisect((0.0, std::f64::consts::PI), 100, |phi| sin(phi) / (count * sin(phi / count)) > c / length);
     let phi = 0.5 * (low + high);
     let radius = length / (2.0 * count * sin(phi / count));
     let middle = from + chord * 0.5;

@@ -1,5 +1,6 @@
 //! How a rope hangs: between two supports, or straight down.
 
+use crate::math::bisect;
 use crate::math::functions::{asinh, cosh, ln, sinh};
 
 /// A rope that cannot stretch, from (0, 0) to (span, rise) in a vertical plane.
@@ -24,14 +25,11 @@ impl Catenary {
         }
         // sqrt(L² - rise²) = 2 a sinh(d/2a), which is (catenary.3) for level supports: with u = d/2a, sinh(u)/u = s.
         let s = (length * length - rise * rise).sqrt() / span;
-        let (mut low, mut high) = (0.0, 1.0);
+        let mut high = 1.0;
         while sinh(high) / high < s {
             high *= 2.0;
         }
-        for _ in 0..200 {
-            let u = 0.5 * (low + high);
-            if sinh(u) / u < s { low = u } else { high = u }
-        }
+        let (low, high) = bisect((0.0, high), 200, |u| sinh(u) / u < s);
         let a = span / (low + high);
         // tanh((x1 + x2)/2a) = rise/length for the two supports as seen from the lowest point.
         let middle = a * 0.5 * ln((length + rise) / (length - rise));

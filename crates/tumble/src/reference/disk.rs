@@ -1,5 +1,6 @@
 //! A thin disk of exponential density under its own gravitation: [freeman1970].
 
+use crate::math::bisect;
 use crate::math::functions::{cosh, exp};
 use std::f64::consts::PI;
 
@@ -26,12 +27,7 @@ impl Disk {
 
     /// The radius [m] that encloses a part of the mass, below 1.
     pub fn radius(&self, part: f64) -> f64 {
-        let (mut low, mut high) = (0.0, 50.0 * self.length);
-        for _ in 0..60 {
-            let middle = 0.5 * (low + high);
-            if self.enclosed(middle) < part { low = middle } else { high = middle }
-        }
-        low
+        bisect((0.0, 50.0 * self.length), 60, |middle| self.enclosed(middle) < part).0
     }
 
     /// The square of the speed on a circle [m²/s²].                      (orbits.18)

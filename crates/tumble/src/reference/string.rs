@@ -1,5 +1,6 @@
 //! Frequencies of strings, of beads on a string, and of a chain that hangs from one end.
 
+use crate::math::bisect;
 use crate::math::functions::{cos, sin};
 use std::f64::consts::PI;
 
@@ -82,12 +83,9 @@ fn bessel(x: f64) -> f64 {
 
 /// The n-th positive zero of J0, which lies between (n - 1/2) pi and n pi.
 fn bessel_zero(n: u32) -> f64 {
-    let (mut low, mut high) = ((f64::from(n) - 0.5) * PI, f64::from(n) * PI);
+    let (low, high) = ((f64::from(n) - 0.5) * PI, f64::from(n) * PI);
     let sign = bessel(low);
-    for _ in 0..60 {
-        let middle = 0.5 * (low + high);
-        if bessel(middle) * sign > 0.0 { low = middle } else { high = middle }
-    }
+    let (low, high) = bisect((low, high), 60, |middle| bessel(middle) * sign > 0.0);
     0.5 * (low + high)
 }
 

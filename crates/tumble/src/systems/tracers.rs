@@ -2,10 +2,10 @@
 
 use crate::exchange::Exchange;
 use crate::forces::Flow;
-use crate::integrators::{self, Equation, Kinematics, Memory, Scratch, Stage, adaptive_step};
+use crate::integrators::{self, Equation, Kinematics, Memory, Scratch, Stage, Step, adaptive_step};
 use crate::math::parallel::chunks;
 use crate::math::{Real, Row, Vec3, ZERO, is_finite, xyz64};
-use crate::pool::{Birth, Columns, Emitter, Pool};
+use crate::pool::{Birth, Columns, Emitter, Pool, due};
 use crate::state::Object;
 use crate::system::{Archive, Part, System};
 use tumble_interface::engine::{Ledger, Stability, StepReport};
@@ -56,28 +56,16 @@ impl Tracers {
 
     /// Those who are there at the start; an exchange interval has the length dt [s].
     pub fn begin_life(&mut self, dt: f64) -> Result<(), StepError> {
-        let mut unborn = self.conceive(-dt, dt)?;
-        self.deliver(&mut unborn, 0.0, 0.0)
-    }
-
-    /// Everyone grows older; tells who of each emitter will be born in the interval, in the order of their birth.
-    fn conceive(&mut self, t: f64, dt: f64) -> Result<Vec<Vec<Birth>>, StepError> {
-        self.pool.grow_older(dt);
-        (0..self.pool.len()).map(|s| self.pool.births(s, t, dt).ok_or_else(|| self.full(s, t))).collect()
-    }
-
-    fn full(&self, s: usize, t: f64) -> StepError {
-        StepError::Capacity { system: self.settings.name.clone(), time: t, what: self.pool.emitter(s).full() }
+        let mut unborn = self.pool.conceive(&self.settings.name, -dt, dt)?;
+        self.deliver(&mut unborn, 0.0, 0.0);
+        Ok(())
     }
 
     /// Takes those born by the time `until`, to which a step of Runge and Kutta's carries them from their birth. The interval ends at `end`.
-    fn deliver(&mut self, unborn: &mut [Vec<Birth>], until: f64, end: f64) -> Result<(), StepError> {
+    fn deliver(&mut self, unborn: &mut [Vec<Birth>], until: f64, end: f64) {
         for (s, unborn) in unborn.iter_mut().enumerate() {
-            let due = if until >= end { unborn.len() } else { unborn.partition_point(|b| b.time <= until) };
-            let births: Vec<Birth> = unborn.drain(..due).collect();
-            self.settle(s, &births, until, end);
+            self.settle(s, &due(unborn, until, end), until, end);
         }
-        Ok(())
     }
 
     fn settle(&mut self, s: usize, births: &[Birth], until: f64, end: f64) {
@@ -113,9 +101,8 @@ impl Tracers {
             let (flow, x) = (&self.flow, &self.x);
             chunks(&mut v, |start, v| flow.velocities(t, &x[start..start + v.len()], v));
             let dead = self.pool.dead(s, (t, dt), &self.x, &v, &|_, _| false);
-            for child in (s + 1..n).filter(|child| self.pool.parent(*child) == Some(s)).collect::<Vec<_>>() {
-                let births = self.pool.descendants(child, (t, dt), &dead, &self.x, &v);
-                born[child] = births.ok_or_else(|| self.full(child, t))?;
+            for (child, births) in self.pool.descendants(s, &self.settings.name, (t, dt), &dead, (&self.x, &v))? {
+                born[child] = births;
             }
             self.pool.remove(s, &dead, owned(&mut self.x, &mut self.memory));
             self.count_rows();
@@ -126,11 +113,7 @@ impl Tracers {
     /// Tells everything that counts rows how many there are now.
     fn count_rows(&mut self) {
         self.memory.ready = false;
-        for object in &mut self.objects {
-            if let Some(s) = object.stream {
-                object.points = self.pool.rows(s);
-            }
-        }
+        self.pool.place(&mut self.objects);
     }
 }
 
@@ -193,7 +176,7 @@ impl System for Tracers {
     fn advance(&mut self, t: f64, dt: f64, _exchange: &mut Exchange, go_on: &(dyn Fn() -> bool + Sync)) -> Result<StepReport, StepError> {
         let mut report = StepReport::default();
         let (integrator, end) = (self.settings.integrator, t + dt);
-        let mut unborn = self.conceive(t, dt)?;
+        let mut unborn = self.pool.conceive(&self.settings.name, t, dt)?;
         if integrator.is_adaptive() {
             let mut done = 0.0;
             while done < dt && go_on() {
@@ -213,7 +196,7 @@ impl System for Tracers {
                 .map_err(|e| e.in_system(&self.settings.name))?;
                 done = if h == left { dt } else { done + h };
                 report.stepped(h);
-                self.deliver(&mut unborn, if done == dt { end } else { t + done }, end)?;
+                self.deliver(&mut unborn, if done == dt { end } else { t + done }, end);
             }
             self.bury(end, dt)?;
             self.time = end;
@@ -226,21 +209,13 @@ impl System for Tracers {
             if !go_on() {
                 break;
             }
-            let mut columns: Vec<&mut [Row]> = self.memory.columns.iter_mut().map(|c| &mut c[..]).collect();
-            let time = t + f64::from(k) * h;
-            integrators::step(
-                integrator,
-                &mut Carried(&self.flow),
-                (time, h),
-                (&mut self.x, &mut []),
-                &mut columns,
-                self.memory.ready,
-                &mut self.scratch,
-                &mut report,
-            )?;
+            let (time, ready, memory) = (t + f64::from(k) * h, self.memory.ready, &mut self.memory.slices());
+            let (equation, x, v) = (&mut Carried(&self.flow), &mut self.x, &mut []);
+            let (scratch, report) = (&mut self.scratch, &mut report);
+            integrators::step(integrator, Step { equation, t: time, h, x, v, memory, ready, scratch, report })?;
             self.memory.ready = true;
             report.stepped(h);
-            self.deliver(&mut unborn, if k + 1 == n { end } else { time + h }, end)?;
+            self.deliver(&mut unborn, if k + 1 == n { end } else { time + h }, end);
         }
         self.bury(end, dt)?;
         self.time = end;
@@ -262,7 +237,7 @@ impl System for Tracers {
                     }),
                     _ => continue,
                 };
-                out.push(Column { object: object.name.clone(), name: (*name).into(), unit, width: 3, data: Data::from(rows.concat()) });
+                out.push(object.column(name, unit, 3, Data::from(rows.concat())));
             }
             if let Some(stream) = object.stream {
                 self.pool.write(stream, &object.name, &[], out);
@@ -272,13 +247,7 @@ impl System for Tracers {
 
     fn topology(&self, out: &mut Vec<Column>) {
         for object in self.objects.iter().filter(|o| o.stream.is_none_or(|s| !self.pool.emitter(s).has_radii())) {
-            out.push(Column {
-                object: object.name.clone(),
-                name: "radius".into(),
-                unit: "m",
-                width: 1,
-                data: Data::F64(vec![object.radius]),
-            });
+            out.push(object.one_radius());
         }
     }
 

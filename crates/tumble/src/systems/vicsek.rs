@@ -214,21 +214,13 @@ impl System for Swarm {
                     }),
                     _ => continue,
                 };
-                out.push(Column { object: object.name.clone(), name: (*name).into(), unit, width: 3, data: Data::from(rows.concat()) });
+                out.push(object.column(name, unit, 3, Data::from(rows.concat())));
             }
         }
     }
 
     fn topology(&self, out: &mut Vec<Column>) {
-        for object in &self.objects {
-            out.push(Column {
-                object: object.name.clone(),
-                name: "radius".into(),
-                unit: "m",
-                width: 1,
-                data: Data::F64(vec![object.radius]),
-            });
-        }
+        out.extend(self.objects.iter().map(Object::one_radius));
     }
 
     fn ledger(&self, t: f64) -> Ledger {

@@ -159,7 +159,7 @@ impl Dynamics {
                     "link_strain" if !object.links.is_empty() => ("1", 1, self.link_strain(object)),
                     _ => continue,
                 };
-                out.push(Column { object: object.name.clone(), name: (*name).into(), unit, width, data: Data::from(data) });
+                out.push(object.column(name, unit, width, Data::from(data)));
             }
             if let Some(stream) = object.stream {
                 self.pool.write(stream, &object.name, &self.laws.masses.mass, out);
@@ -177,7 +177,7 @@ impl Dynamics {
         for object in &self.objects {
             let mut add = |name: &str, unit, width, data: Data| {
                 if !data.is_empty() {
-                    out.push(Column { object: object.name.clone(), name: name.into(), unit, width, data });
+                    out.push(object.column(name, unit, width, data));
                 }
             };
             if let Some(stream) = object.stream {

@@ -25,6 +25,8 @@ pub struct Step {
     pub h: f64,
     /// Speed of approach below which nothing bounces [m/s]: what gravity gives in two steps.
     pub resting: f64,
+    /// Of the scheme: the velocity of the path is v + lead h a.                                    (contact.14)
+    pub lead: f64,
 }
 
 impl Step {
@@ -40,7 +42,9 @@ impl Step {
 /// way made along the surface as much is taken back as friction allows, mu times the depth. Velocity: v_n -> -e v_n, and
 /// v_t loses at most mu times the change of v_n, all relative to the surface.      (contact.2, contact.3)
 pub fn resolve(colliders: &[Collider], step: &Step, before: (Row, Row), x: &mut Row, v: &mut Row) -> bool {
-    let mut touched = meet(colliders, step, before, x, v);
+    let pull = (xyz64(*v) - xyz64(before.1)) * (1.0 / step.h);
+    let ahead = pull * (step.lead * step.h);
+    let mut touched = meet(colliders, step, before, (pull, ahead), x, v);
     for collider in colliders {
         // A container bends towards what goes along its wall, and has corners where three walls meet.
         for _ in 0..if collider.inside { 3 } else { 1 } {
@@ -51,7 +55,7 @@ pub fn resolve(colliders: &[Collider], step: &Step, before: (Row, Row), x: &mut 
             let along = way - normal * way.dot(normal);
             let back = (collider.friction * depth).min(along.norm());
             let position = position + normal * depth - along.normalized() * back;
-            let velocity = rebound(collider, velocity - surface, normal, step.resting) + surface;
+            let velocity = rebound(collider, velocity - surface, ahead, normal, step.resting) + surface;
             *x = row(real(position), x[3]);
             *v = row(real(velocity), 0.0);
         }
@@ -59,11 +63,11 @@ pub fn resolve(colliders: &[Collider], step: &Step, before: (Row, Row), x: &mut 
     touched
 }
 
-/// The velocity after an impact, relative to the surface.                                          (contact.3)
-fn rebound(collider: &Collider, velocity: Vector, normal: Vector, resting: f64) -> Vector {
-    let approach = velocity.dot(normal);
+/// The velocity after an impact, relative to the surface; that of the path is `ahead` of it.      (contact.3, contact.14)
+fn rebound(collider: &Collider, velocity: Vector, ahead: Vector, normal: Vector, resting: f64) -> Vector {
+    let (approach, ahead, e) = (velocity.dot(normal), ahead.dot(normal), collider.restitution);
     let slide = velocity - normal * approach;
-    let bounce = if approach < -resting { -collider.restitution * approach } else { 0.0 };
+    let bounce = if e > 0.0 && approach < -resting { -e * (approach + ahead) - ahead } else { 0.0 };
     let after = approach.max(bounce);
     slide - limited(slide, collider.friction * (after - approach)) + normal * after
 }
@@ -73,12 +77,12 @@ fn limited(v: Vector, most: f64) -> Vector {
     v.normalized() * most.min(v.norm())
 }
 
-/// Follows a mass through its step from impact to impact, under the acceleration that the step has found; says whether
-/// there was one. Slow contact that ends in touch is left to the pass at the end.                  (contact.12)
-fn meet(colliders: &[Collider], step: &Step, before: (Row, Row), x: &mut Row, v: &mut Row) -> bool {
+/// Follows a mass through its step from impact to impact, under the acceleration `pull` that the step has found; says whether
+/// there was one. The velocity of its path is `ahead` of its own. Slow contact that ends in touch is left to the pass at the
+/// end.                                                                               (contact.12, contact.14)
+fn meet(colliders: &[Collider], step: &Step, before: (Row, Row), (pull, ahead): (Vector, Vector), x: &mut Row, v: &mut Row) -> bool {
     let (mut from, mut to) = (xyz64(before.0), xyz64(*x));
     let (mut start, mut end) = (xyz64(before.1), xyz64(*v));
-    let pull = (end - start) * (1.0 / step.h);
     let mut gone = 0.0;
     let mut touched = false;
     for bounce in 0..BOUNCES {
@@ -100,9 +104,9 @@ fn meet(colliders: &[Collider], step: &Step, before: (Row, Row), x: &mut Row, v:
         let s = on_parabola(hit.part, ((to - from) - surface * left).dot(n), bend.dot(n));
         from = from + (to - from) * s - bend * (s * (1.0 - s));
         gone += left * s;
-        start = rebound(collider, start + pull * (left * s) - surface, n, step.resting);
+        start = rebound(collider, start + pull * (left * s) - surface, ahead, n, step.resting);
         let rest = step.h - gone;
-        let (press, lift) = (pull.dot(n), start.dot(n));
+        let (press, lift) = (pull.dot(n), start.dot(n) + ahead.dot(n).min(0.0));
         if lift <= 0.01 * step.resting && press < 0.0 {
             // It stays on the surface, which takes what presses, and rubs.
             let free = start + (pull - n * press) * rest;
@@ -112,7 +116,7 @@ fn meet(colliders: &[Collider], step: &Step, before: (Row, Row), x: &mut Row, v:
             (start, end) = (start + surface, after + surface);
         } else {
             start = start + surface;
-            to = from + start * rest + pull * (0.5 * rest * rest);
+            to = from + (start + ahead) * rest + pull * (0.5 * rest * rest);
             end = start + pull * rest;
         }
         if bounce + 1 == BOUNCES || rest <= 0.0 {

@@ -73,43 +73,32 @@ impl Implicit {
         let n = x.len();
         self.local.resize(n, [0.0; 6]);
         self.inverse.resize(n, [0.0; 6]);
-        let Laws { batches, forces, masses, colliders, penalty, grip, start: start_x, .. } = laws;
-        let colliders = if *penalty { &colliders[..] } else { &[] };
-        let (masses, grip, start_x) = (&*masses, &grip[..], &start_x[..]);
+        let (all, masses) = (&*laws, &laws.masses);
         let group = Group::new(masses, 0, x, v);
         // The stiffness of everything, without mass.
-        let forces = &*forces;
         chunks(&mut self.local, |start, local| {
             let end = start + local.len();
             local.fill([0.0; 6]);
-            for Acting { law, ranges, .. } in forces {
+            for Acting { law, ranges, .. } in &all.forces {
                 for i in ranges.iter().flat_map(|r| r.start.max(start)..r.end.min(end)) {
                     let (k, d) = law.matrix(t, &group.one(i));
                     add_block(&mut local[i - start], k, 1.0);
                     add_block(&mut local[i - start], d, (1.0 / gh) as Real);
                 }
             }
-            let touching = if colliders.is_empty() { start } else { end.min(masses.points) };
-            for i in start..touching {
-                for touch in Penalty::of(
-                    colliders,
-                    (t - gh, t),
-                    contact::stiffness(masses.mass[i], grip.get(i).copied().unwrap_or(0.0), gh),
-                    x[i],
-                    v[i],
-                    start_x[i],
-                ) {
+            for i in start..if all.touches() { end.min(masses.points) } else { start } {
+                for touch in all.penalties(i, t, gh, x[i], v[i]) {
                     add_block(&mut local[i - start], touch.matrix(gh), 1.0);
                 }
             }
         });
         self.inverse.copy_from_slice(&self.local);
         let weights = Weights { stiffness: 1.0, damping: (1.0 / gh) as Real, hessian };
-        for batch in batches {
+        for batch in &mut laws.batches {
             batch.linearize(x, weights);
             batch.add_diagonal(x, &mut self.inverse);
         }
-        let diagonal = &self.inverse;
+        let (diagonal, masses) = (&self.inverse, &laws.masses);
         let noise = sum(n, |range| {
             range
                 .map(|i| {
@@ -164,6 +153,19 @@ fn add_block(to: &mut Block, b: Block, c: Real) {
     }
 }
 
+impl Laws {
+    /// Whether implicit stages see solids.
+    fn touches(&self) -> bool {
+        self.penalty && !self.colliders.is_empty()
+    }
+
+    /// The contacts of mass i, at x with velocity v, in an implicit stage of length gh that ends at t.
+    fn penalties(&self, i: usize, t: f64, gh: f64, x: Row, v: Row) -> impl Iterator<Item = Penalty> {
+        let stiffness = contact::stiffness(self.masses.mass[i], self.grip.get(i).copied().unwrap_or(0.0), gh);
+        Penalty::of(&self.colliders, (t - gh, t), stiffness, x, v, self.start[i])
+    }
+}
+
 impl Stiff for Laws {
     fn inverse_mass(&self) -> &[Real] {
         &self.implicit.weights
@@ -171,22 +173,15 @@ impl Stiff for Laws {
 
     fn force(&mut self, t: f64, x: &[Row], v: &[Row], gh: f64, out: &mut [Row]) -> Result<(), StepError> {
         self.forces(t, x, v, out)?;
-        if self.colliders.is_empty() || !self.penalty {
+        if !self.touches() {
             return Ok(());
         }
-        let (colliders, masses, grip, start_x) = (&self.colliders[..], &self.masses, &self.grip[..], &self.start[..]);
+        let laws = &*self;
         chunks(out, |start, out| {
             for (k, f) in out.iter_mut().enumerate() {
                 let i = start + k;
-                if i < masses.points && x[i][3] > 0.0 {
-                    for touch in Penalty::of(
-                        colliders,
-                        (t - gh, t),
-                        contact::stiffness(masses.mass[i], grip.get(i).copied().unwrap_or(0.0), gh),
-                        x[i],
-                        v[i],
-                        start_x[i],
-                    ) {
+                if i < laws.masses.points && x[i][3] > 0.0 {
+                    for touch in laws.penalties(i, t, gh, x[i], v[i]) {
                         let push = touch.force(x[i]);
                         *f = [f[0] + push.x as Real, f[1] + push.y as Real, f[2] + push.z as Real, 0.0];
                     }

@@ -7,9 +7,9 @@
 use super::laws::Local;
 use super::{BLOCK, Dynamics, contact};
 use crate::forces::One;
-use crate::integrators::{self, Equation, Memory, Scratch};
+use crate::integrators::{self, Equation, Memory, Scratch, Step};
 use crate::math::{Real, Row, Vec3, ZERO, axpy, xyz64};
-use crate::pool::{Birth, Columns, Pool};
+use crate::pool::{Birth, Columns, Pool, due};
 use crate::state::Masses;
 use rayon::prelude::*;
 use tumble_interface::StepError;
@@ -27,27 +27,16 @@ struct Grown {
 impl Dynamics {
     /// Those who are there at the start.
     pub(super) fn begin_life(&mut self, dt: f64) -> Result<(), StepError> {
-        let mut unborn = self.conceive(-dt, dt)?;
+        let mut unborn = self.pool.conceive(&self.name, -dt, dt)?;
         self.deliver(&mut unborn, 0.0, dt, 0.0)
-    }
-
-    /// Everyone grows older by the interval; tells who of each emitter will be born in it, in the order of their birth.
-    pub(super) fn conceive(&mut self, t: f64, dt: f64) -> Result<Vec<Vec<Birth>>, StepError> {
-        self.pool.grow_older(dt);
-        (0..self.pool.len()).map(|s| self.pool.births(s, t, dt).ok_or_else(|| self.full(s, t))).collect()
-    }
-
-    fn full(&self, s: usize, t: f64) -> StepError {
-        StepError::Capacity { system: self.name.clone(), time: t, what: self.pool.emitter(s).full() }
     }
 
     /// Takes those born by the time `until`, where a sub-step of length h [s] ends, into the system. The interval ends at
     /// `end`.
     pub(super) fn deliver(&mut self, unborn: &mut [Vec<Birth>], until: f64, h: f64, end: f64) -> Result<(), StepError> {
         for (s, unborn) in unborn.iter_mut().enumerate() {
-            let due = if until >= end { unborn.len() } else { unborn.partition_point(|b| b.time <= until) };
-            if due > 0 {
-                let births: Vec<Birth> = unborn.drain(..due).collect();
+            let births = due(unborn, until, end);
+            if !births.is_empty() {
                 let grown = self.grow(s, &births, (until, h, 0))?;
                 self.settle(s, &births, grown, end);
             }
@@ -92,8 +81,8 @@ impl Dynamics {
         let mut x: Vec<Row> = births.iter().map(|b| row(b.x, (1.0 / self.pool.emitter(s).mass(b.id)) as Real)).collect();
         let mut v: Vec<Row> = births.iter().map(|b| row(b.v, 0.0)).collect();
         let (laws, colliders, resting) = (&self.laws, &self.laws.colliders[..], self.resting_speed(h));
-        let touch = |t: f64, h: f64, before: (Row, Row), x: &mut Row, v: &mut Row| {
-            let step = contact::Step { t, h, resting };
+        let touch = |t: f64, h: f64, lead: f64, before: (Row, Row), x: &mut Row, v: &mut Row| {
+            let step = contact::Step { t, h, resting, lead };
             !colliders.is_empty() && h > 0.0 && contact::resolve(colliders, &step, before, x, v)
         };
         let rate = self.stiffness_of(object, births, &masses);
@@ -124,20 +113,19 @@ impl Dynamics {
                     x[i] = axpy(x[i], tau(i), vm[i]);
                     v[i] = axpy(v[i], tau(i), a[i]);
                     let start = until - span(i) * (1.0 - k as f64 / pieces);
-                    touch(start, f64::from(tau(i)), before, &mut x[i], &mut v[i]);
+                    touch(start, f64::from(tau(i)), 0.0, before, &mut x[i], &mut v[i]);
                 }
             }
             let mut memory = Memory::new(scheme, n);
             let (mut ready, mut scratch) = (false, Scratch::default());
             for k in 0..more {
                 let before: Vec<(Row, Row)> = x.iter().copied().zip(v.iter().copied()).collect();
-                let mut columns: Vec<&mut [Row]> = memory.columns.iter_mut().map(|c| &mut c[..]).collect();
-                let time = until + f64::from(k) * h;
-                let mut report = StepReport::default();
-                integrators::step(scheme, &mut motion, (time, h), (&mut *x, &mut *v), &mut columns, ready, &mut scratch, &mut report)?;
+                let (t, equation, memory) = (until + f64::from(k) * h, &mut motion, &mut memory.slices());
+                let (scratch, report) = (&mut scratch, &mut StepReport::default());
+                integrators::step(scheme, Step { equation, t, h, x, v, memory, ready, scratch, report })?;
                 ready = true;
                 for i in 0..n {
-                    ready &= !touch(time, h, before[i], &mut x[i], &mut v[i]);
+                    ready &= !touch(t, h, integrators::lead(scheme), before[i], &mut x[i], &mut v[i]);
                 }
             }
             Ok(())
@@ -196,9 +184,8 @@ impl Dynamics {
             let colliders = &self.laws.colliders;
             let near = |p: Vec3<f64>, distance: f64| colliders.iter().any(|c| c.distance(p, t, distance).0 < distance);
             let dead = self.pool.dead(s, (t, dt), &self.state.x, &self.state.v, &near);
-            for child in (s + 1..n).filter(|child| self.pool.parent(*child) == Some(s)).collect::<Vec<_>>() {
-                let births = self.pool.descendants(child, (t, dt), &dead, &self.state.x, &self.state.v);
-                born[child] = births.ok_or_else(|| self.full(child, t))?;
+            for (child, births) in self.pool.descendants(s, &self.name, (t, dt), &dead, (&self.state.x, &self.state.v))? {
+                born[child] = births;
             }
             if !dead.is_empty() {
                 let start = self.pool.rows(s).start;
@@ -227,11 +214,7 @@ impl Dynamics {
         let rows = self.pool.end();
         self.laws.masses.points = rows;
         self.memory.ready = false;
-        for object in &mut self.objects {
-            if let Some(s) = object.stream {
-                object.points = self.pool.rows(s);
-            }
-        }
+        self.pool.place(&mut self.objects);
         for force in &mut self.laws.forces {
             for (range, object) in force.ranges.iter_mut().zip(&force.objects) {
                 *range = self.objects[*object].points.clone();

@@ -13,7 +13,7 @@ pub use build::{Parts, Settings, SpringPart};
 
 use crate::elements::{Batch, Elements, Limit, Linear};
 use crate::exchange::{Exchange, Port};
-use crate::integrators::{self, Equation, Memory, Scratch, adaptive_step};
+use crate::integrators::{self, Equation, Memory, Scratch, Step, adaptive_step};
 use crate::math::parallel::{CHUNK, sum};
 use crate::math::{Real, Row, Vec3, ZERO, axpy, row, sub, xyz64};
 use crate::pool::Pool;
@@ -167,9 +167,9 @@ impl Dynamics {
         let result = match &mut user {
             Some(user) => self.user_step(user.as_mut(), t, h),
             None => {
-                let y = (&mut self.state.x[..], &mut self.state.v[..]);
-                let mut columns: Vec<&mut [Row]> = self.memory.columns.iter_mut().map(|c| &mut c[..]).collect();
-                integrators::step(self.integrator, &mut self.laws, (t, h), y, &mut columns, self.memory.ready, &mut self.scratch, report)
+                let (equation, x, v, ready) = (&mut self.laws, &mut self.state.x, &mut self.state.v, self.memory.ready);
+                let (memory, scratch) = (&mut self.memory.slices(), &mut self.scratch);
+                integrators::step(self.integrator, Step { equation, t, h, x, v, memory, ready, scratch, report })
             }
         };
         self.user = user;
@@ -215,7 +215,9 @@ impl Dynamics {
             }
         }
         if !self.laws.colliders.is_empty() {
-            let step = contact::Step { t, h, resting: self.resting_speed(h) };
+            // Users' schemes are unknown, and what the penalty pushes has no constant acceleration.
+            let lead = if self.user.is_some() || self.laws.penalty { 0.0 } else { integrators::lead(self.integrator) };
+            let step = contact::Step { t, h, resting: self.resting_speed(h), lead };
             let penalty = self.laws.penalty && self.user.is_none();
             let points = self.laws.masses.points;
             let (colliders, before, before_v) = (&self.laws.colliders[..], &self.before, &self.before_v);
@@ -281,6 +283,7 @@ impl Dynamics {
     /// once an interval, and the scratch of any scheme stays in the first cache.
     fn advance_local(&mut self, t: f64, h: f64, substeps: u32, go_on: &(dyn Fn() -> bool + Sync)) -> Result<(), StepError> {
         let (scheme, resting) = (self.integrator, self.resting_speed(h));
+        let lead = integrators::lead(scheme);
         let (laws, colliders, state) = (&self.laws, &self.laws.colliders[..], &mut self.state);
         let mut memory: Vec<Vec<&mut [Row]>> = Vec::new();
         memory.resize_with(state.x.len().div_ceil(BLOCK), Vec::new);
@@ -312,10 +315,10 @@ impl Dynamics {
                         before_v.clear();
                         before_v.extend_from_slice(v);
                     }
-                    let time = t + f64::from(k) * h;
-                    integrators::step(scheme, &mut motion, (time, h), (x, v), &mut memory, ready, scratch, &mut StepReport::default())?;
+                    let (t, equation, memory, report) = (t + f64::from(k) * h, &mut motion, &mut memory, &mut StepReport::default());
+                    integrators::step(scheme, Step { equation, t, h, x, v, memory, ready, scratch, report })?;
                     ready = true;
-                    let step = contact::Step { t: time, h, resting };
+                    let step = contact::Step { t, h, resting, lead };
                     for i in 0..before.len().min(points) {
                         let was = (before[i], before_v[i]);
                         if x[i][3] > 0.0 && contact::resolve(colliders, &step, was, &mut x[i], &mut v[i]) {
@@ -353,7 +356,7 @@ impl System for Dynamics {
     fn advance(&mut self, t: f64, dt: f64, exchange: &mut Exchange, go_on: &(dyn Fn() -> bool + Sync)) -> Result<StepReport, StepError> {
         let mut report = StepReport::default();
         let end = t + dt;
-        let mut unborn = self.conceive(t, dt)?;
+        let mut unborn = self.pool.conceive(&self.name, t, dt)?;
         if self.integrator.is_adaptive() && self.user.is_none() {
             let (mut done, mut last) = (0.0, dt);
             while done < dt && go_on() {

@@ -6,7 +6,7 @@ use crate::elements::Weights;
 use crate::forces::Group;
 use crate::integrators::stability::Mode;
 use crate::math::parallel::chunks;
-use crate::math::{Real, Row, ZERO, dot, scale};
+use crate::math::{Real, Row, ZERO, bisect, dot, scale};
 use tumble_interface::scene::Hessian;
 
 /// Lanczos steps; the largest eigenvalue of a sheet is then within 1e-3 of its limit.
@@ -173,8 +173,8 @@ fn inner(a: &[Row], b: &[Row]) -> f64 {
 fn tridiagonal_largest(alpha: &[f64], beta: &[f64]) -> (f64, Vec<f64>) {
     let n = alpha.len();
     let radius = |i: usize| if i < beta.len() { beta[i].abs() } else { 0.0 } + if i > 0 { beta[i - 1].abs() } else { 0.0 };
-    let mut high = (0..n).map(|i| alpha[i] + radius(i)).fold(f64::NEG_INFINITY, f64::max);
-    let mut low = (0..n).map(|i| alpha[i] - radius(i)).fold(f64::INFINITY, f64::min);
+    let high = (0..n).map(|i| alpha[i] + radius(i)).fold(f64::NEG_INFINITY, f64::max);
+    let low = (0..n).map(|i| alpha[i] - radius(i)).fold(f64::INFINITY, f64::min);
     let below_all = |x: f64| {
         // Whether every eigenvalue is below x: all pivots of T - x are negative.
         let mut pivot = alpha[0] - x;
@@ -186,14 +186,7 @@ fn tridiagonal_largest(alpha: &[f64], beta: &[f64]) -> (f64, Vec<f64>) {
         }
         pivot < 0.0
     };
-    for _ in 0..100 {
-        let middle = 0.5 * (low + high);
-        if below_all(middle) {
-            high = middle;
-        } else {
-            low = middle;
-        }
-    }
+    let (_, high) = bisect((low, high), 100, |middle| !below_all(middle));
     // Inverse iteration just above the eigenvalue, by elimination of the definite tridiagonal matrix.
     let shift = high + 1e-9 * (1.0 + high.abs());
     let mut s = vec![1.0; n];
