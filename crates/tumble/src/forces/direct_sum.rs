@@ -3,7 +3,7 @@
 use crate::elements::{Batch, Block, Weights};
 use crate::math::parallel::chunks;
 use crate::math::roots::{cube_unit, inverse_cube, inverse_root, root_unit};
-use crate::math::simd::{Kernel, Scalar, Width, count, dispatch, packs};
+use crate::math::simd::{Kernel, Width, count, dispatch, packs};
 use crate::math::{Lane, Real, Row, Vec3, xyz64};
 use crate::state::Masses;
 use rayon::prelude::*;
@@ -74,8 +74,8 @@ impl Columns {
 }
 
 /// Masses that pull, block by block: partial sums keep single precision exact enough for a million of them, and a block with its
-/// sums stays in the first cache.
-const BLOCK: usize = 512;
+/// sums, 28 KB, stays in the first cache.
+const BLOCK: usize = if cfg!(feature = "double") { 512 } else { 1024 };
 /// Strips that masses are cut into at most: enough to share out, few enough for what each pair of them sums up.
 const STRIPS: usize = 32;
 
@@ -178,6 +178,16 @@ fn without(ranges: &[Range<usize>], rows: &[u32]) -> Vec<Range<usize>> {
     rest
 }
 
+/// |d|² + s².
+#[inline(always)]
+fn squared<W: Width, const NATIVE: bool>(w: W, d: Vec3<W::L>, softening: W::L) -> W::L {
+    if NATIVE {
+        w.fused(d.x, d.x, w.fused(d.y, d.y, w.fused(d.z, d.z, softening)))
+    } else {
+        d.x * d.x + (d.y * d.y + (d.z * d.z + softening))
+    }
+}
+
 /// Sources that meet a pack at once: their roots hide each other's delays.
 const AT_ONCE: usize = 2;
 /// Lanes that a sum over masses has, whatever the width of the registers.
@@ -201,6 +211,19 @@ struct Pack {
     /// b.
     source: [Real; LANES],
     sum: [[Real; LANES]; 3],
+}
+
+/// The sum of the lanes, halves upon halves.
+#[inline(always)]
+fn total(mut lanes: [Real; LANES]) -> Real {
+    let mut half = LANES / 2;
+    while half > 0 {
+        for i in 0..half {
+            lanes[i] += lanes[i + half];
+        }
+        half /= 2;
+    }
+    lanes[0]
 }
 
 /// The pulls of every mass of a strip on every mass of another, or on those behind it in the same: each pair is evaluated
@@ -238,11 +261,7 @@ impl<const NATIVE: bool, const POINTS: bool> Tile<'_, NATIVE, POINTS> {
         let mut sum = Vec3 { x: load(&pack.sum[0]), y: load(&pack.sum[1]), z: load(&pack.sum[2]) };
         for b in 0..B {
             let d = sources.x[b] - here;
-            let r_sq = if NATIVE {
-                w.fused(d.x, d.x, w.fused(d.y, d.y, w.fused(d.z, d.z, softening)))
-            } else {
-                d.x * d.x + (d.y * d.y + (d.z * d.z + softening))
-            };
+            let r_sq = squared::<_, NATIVE>(w, d, softening);
             let one = match masks {
                 Some(lanes) => w.load(&STAIRS[LANES - lanes[b] + k * W::N..]),
                 None => w.splat(1.0),
@@ -306,11 +325,7 @@ impl<const NATIVE: bool, const POINTS: bool> Tile<'_, NATIVE, POINTS> {
                     let sum = sources.sum[b][k];
                     w.store([sum.x, sum.y, sum.z][c], &mut lanes[k * W::N..]);
                 }
-                let mut total = 0.0;
-                for lane in lanes {
-                    total += lane;
-                }
-                self.out[1][c][j + b - self.strips[1].start] -= total;
+                self.out[1][c][j + b - self.strips[1].start] -= total(lanes);
             }
         }
     }
@@ -363,13 +378,13 @@ impl<const NATIVE: bool, const POINTS: bool> Kernel for Tile<'_, NATIVE, POINTS>
 
 /// The sum of a_i b_j/sqrt(|d|² + s²) over i in a range and all j that are not before it: those inside once, themselves
 /// included where s is not zero, those behind it twice.
-struct Potential<'a> {
+struct Potential<'a, const NATIVE: bool, const POINTS: bool> {
     law: &'a DirectSum,
     positions: &'a Columns,
     range: Range<usize>,
 }
 
-impl Kernel for Potential<'_> {
+impl<const NATIVE: bool, const POINTS: bool> Kernel for Potential<'_, NATIVE, POINTS> {
     type Output = f64;
     #[allow(clippy::assign_op_pattern)] // lanes have no +=
     #[inline(always)]
@@ -377,10 +392,9 @@ impl Kernel for Potential<'_> {
         let law = self.law;
         let [x, y, z] = &self.positions.0;
         let n = law.source.len();
-        let points = law.softening_sq() < POINT;
         let mut total = 0.0;
         packs!(W, w, self.range, |i| {
-            let softening = w.splat(if points { 0.0 } else { law.softening_sq() });
+            let softening = w.splat(if POINTS { 0.0 } else { law.softening_sq() });
             let here = self.positions.load(w, i);
             let zero = w.splat(0.0);
             let mut sum = [0.0_f64; 16];
@@ -390,8 +404,12 @@ impl Kernel for Potential<'_> {
                 let mut part = zero;
                 for ((x, y), (z, source)) in x[from..to].iter().zip(&y[from..to]).zip(z[from..to].iter().zip(&law.source[from..to])) {
                     let d = Vec3 { x: w.splat(*x), y: w.splat(*y), z: w.splat(*z) } - here;
-                    let r_sq = d.x * d.x + (d.y * d.y + (d.z * d.z + softening));
-                    part = part + w.splat(*source) * r_sq.positive(inverse_root(w, r_sq), zero);
+                    let r_sq = squared::<_, NATIVE>(w, d, softening);
+                    let mut inverse = inverse_root::<_, NATIVE>(w, r_sq);
+                    if POINTS {
+                        inverse = r_sq.positive(inverse, zero);
+                    }
+                    part = part + w.splat(*source) * inverse;
                 }
                 let mut each = [0.0; 16];
                 w.store(part, &mut each);
@@ -404,7 +422,7 @@ impl Kernel for Potential<'_> {
                 total += sum[k] * f64::from(law.own[i + k]);
             }
         });
-        total * root_unit()
+        total * root_unit::<W, NATIVE>(w)
     }
 }
 
@@ -440,6 +458,10 @@ impl Kernel for Product<'_> {
 }
 
 impl DirectSum {
+    fn potential<const NATIVE: bool, const POINTS: bool>(&self, positions: &Columns) -> f64 {
+        tasks(self.len(), |range| dispatch(Potential::<NATIVE, POINTS> { law: self, positions, range })).into_iter().sum()
+    }
+
     /// Finds all forces. The masses are cut into strips; each pair of strips sums for itself, and then the sums are added in their
     /// order.
     fn pull<const NATIVE: bool, const POINTS: bool>(&mut self) {
@@ -512,8 +534,13 @@ impl Batch for DirectSum {
     fn energy(&self, x: &[Row]) -> f64 {
         let mut positions = Columns::default();
         positions.fill(&self.ranges, x);
-        let pairs: f64 = tasks(self.len(), |range| dispatch(Potential { law: self, positions: &positions, range })).into_iter().sum();
-        let own = if self.softening_sq() < POINT { 0.0 } else { f64::from(inverse_root(Scalar, self.softening_sq())) * root_unit() };
+        let pairs: f64 = match (self.native, self.softening_sq() < POINT) {
+            (false, false) => self.potential::<false, false>(&positions),
+            (false, true) => self.potential::<false, true>(&positions),
+            (true, false) => self.potential::<true, false>(&positions),
+            (true, true) => self.potential::<true, true>(&positions),
+        };
+        let own = if self.softening_sq() < POINT { 0.0 } else { 1.0 / f64::from(self.softening_sq()).sqrt() };
         let selves: f64 = self.source.iter().zip(&self.own).map(|(b, a)| f64::from(*b) * f64::from(*a) * own).sum();
         -0.5 * (pairs - selves)
     }
@@ -644,7 +671,12 @@ mod tests {
                     dispatch_at(level, Tile::<false, true> { law: &law, strips, out });
                 }
                 dispatch_at(level, Product { law: &law, first: 13, out: &mut product });
-                let potential = dispatch_at(level, Potential { law: &law, positions: &law.positions, range: 13..58 });
+                let (positions, range) = (&law.positions, 13..58);
+                let potential = if softening > 0.0 {
+                    dispatch_at(level, Potential::<false, false> { law: &law, positions, range })
+                } else {
+                    dispatch_at(level, Potential::<false, true> { law: &law, positions, range })
+                };
                 (sums, product, potential.to_bits())
             };
             let one = all(Level::Scalar);

@@ -69,16 +69,23 @@ pub fn cube_unit<W: Width, const NATIVE: bool>(_w: W) -> f64 {
     15.0 / 8.0 / (T * T * T * T.sqrt())
 }
 
-/// x^(-1/2) for x > 0, in units of [`root_unit`].
+/// x^(-1/2) for x > 0, in units of [`root_unit`]; `NATIVE` as above.
 #[inline(always)]
-pub fn inverse_root<W: Width>(w: W, x: W::L) -> W::L {
-    let (y, t) = steps::<W, false>(w, x);
-    y * parabola::<W, false>(w, t, 5.0 / 3.0 * T, T * T * (5.0 - 25.0 / 9.0))
+pub fn inverse_root<W: Width, const NATIVE: bool>(w: W, x: W::L) -> W::L {
+    if NATIVE && W::ESTIMATES {
+        // (1 - e)^(-1/2) = 1 + 1/2 e + 3/8 e² + 5/16 e³, in single precision to the first power.
+        let y = w.estimate(x);
+        let e = w.fused(-x, y * y, w.splat(1.0));
+        let p = if cfg!(feature = "double") { w.fused(e, w.fused(e, w.splat(0.3125), w.splat(0.375)), w.splat(0.5)) } else { w.splat(0.5) };
+        return w.fused(y * e, p, y);
+    }
+    let (y, t) = steps::<W, NATIVE>(w, x);
+    y * parabola::<W, NATIVE>(w, t, 5.0 / 3.0 * T, T * T * (5.0 - 25.0 / 9.0))
 }
 
 /// What a sum over [`inverse_root`] is multiplied with.
-pub fn root_unit() -> f64 {
-    3.0 / 8.0 / (T * T * T.sqrt())
+pub fn root_unit<W: Width, const NATIVE: bool>(_w: W) -> f64 {
+    if NATIVE && W::ESTIMATES { 1.0 } else { 3.0 / 8.0 / (T * T * T.sqrt()) }
 }
 
 #[cfg(test)]
@@ -99,8 +106,8 @@ mod tests {
                 let exact = f64::from(x);
                 w.store(inverse_cube::<W, NATIVE>(w, w.splat(x), w.splat(1.0)), &mut all);
                 cube = cube.max((f64::from(all[0]) * cube_unit::<W, NATIVE>(w) * (exact * exact.sqrt()) - 1.0).abs());
-                w.store(inverse_root(w, w.splat(x)), &mut all);
-                root = root.max((f64::from(all[0]) * root_unit() * exact.sqrt() - 1.0).abs());
+                w.store(inverse_root::<W, NATIVE>(w, w.splat(x)), &mut all);
+                root = root.max((f64::from(all[0]) * root_unit::<W, NATIVE>(w) * exact.sqrt() - 1.0).abs());
             }
             (cube, root)
         }
