@@ -92,6 +92,8 @@ fn scenes() -> Vec<(&'static str, String, usize)> {
         ("tracers", tracers, 20),
         ("vicsek", vicsek.to_string(), 20),
         ("spray", spray.to_string(), 20),
+        ("spray, implicit", spray.replace("velocity_verlet", "implicit_midpoint"), 8),
+        ("spray, adaptive", spray.replace("velocity_verlet\"\nsubsteps = 3", "dormand_prince\"\nadaptive.tolerance = 1e-4"), 8),
         ("swarm", swarm.to_string(), 16),
         ("rope, cholesky", rope.to_string(), 20),
     ]

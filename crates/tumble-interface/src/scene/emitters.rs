@@ -150,7 +150,7 @@ pub enum Source {
         #[schemars(extend("x-unit" = "m", "exclusiveMinimum" = 0.0))]
         radius: f64,
     },
-    /// A ball, evenly over its volume, or its surface.
+    /// A ball, evenly over its volume, or its surface; in a scene of dimension 2 its points are put onto the plane.
     Sphere {
         /// Its centre.
         #[serde(default)]

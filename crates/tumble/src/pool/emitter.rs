@@ -104,6 +104,7 @@ fn spread(c: f64, spread: f64, u: impl FnOnce() -> f64) -> f64 {
 impl Emitter {
     /// An emitter of a scene, with what its words stand for.
     pub fn new(words: Words, course: Course, seed: u32, from: Origin, kill: Vec<Kill>, up: Vector, flat: Option<usize>) -> Self {
+        let words = Words { direction: words.direction.map(|d| Vector::from(d).tamed().into()), ..words };
         Self { random: Random::new(seed, &words.name), words, course, from, kill, up, flat }
     }
 
@@ -232,15 +233,12 @@ impl Emitter {
     }
 
     /// Particles that the rate has made by the time t + dt [s], a real number, if it was `before` at t. A constant rate is
-    /// taken from the start, a changing one by Simpson's rule.
+    /// taken from the start.
     pub fn flow(&self, before: f64, t: f64, dt: f64) -> f64 {
         let (start, end) = (self.words.start, self.words.end.unwrap_or(f64::INFINITY));
         let (a, b) = (t.clamp(start, end), (t + dt).clamp(start, end));
-        let rate = |t: f64| self.course.rate.value(t).max(0.0);
-        if self.course.rate.is_constant() {
-            return rate(t) * (b - start);
-        }
-        before + (b - a) / 6.0 * (rate(a) + 4.0 * rate(0.5 * (a + b)) + rate(b))
+        let rate = &self.course.rate;
+        if rate.is_constant() { rate.integral(start, b) } else { before + rate.integral(a, b).max(0.0) }
     }
 
     /// Those born in (t, t + dt] [s] while the flow goes from `before` to `after`, ids from `next` on.
@@ -274,6 +272,17 @@ impl Emitter {
             let (shift, motion) = self.source(moments[k]);
             Birth { time: moments[k], x: x + shift, v: self.velocity(moments[k], id, normal, motion), id }
         })
+    }
+
+    /// When and where one of n may be born before the end of the run [s], to look at beforehand.
+    pub fn trial(&self, k: usize, n: usize, end: f64) -> Option<(f64, Vector)> {
+        let Origin::Place(place) = &self.from else { return None };
+        let (start, bursts) = (self.words.start, &self.words.burst);
+        let by_rate = start + (self.words.end.unwrap_or(end).min(end) - start).max(0.0) * k as f64 / n as f64;
+        let by_burst = bursts.get(k / 2 % bursts.len().max(1)).filter(|b| b.count > 0).map(|b| b.time);
+        let t = if k % 2 == 1 && by_burst.is_some() || self.course.rate.value(by_rate) <= 0.0 { by_burst? } else { by_rate };
+        let x = place.sample(&|c| self.draw(k as u32, PLACE + c)).0 + self.course.path.value(t);
+        Some((t, self.flat.map_or(x, |axis| flattened(x, axis, false)))).filter(|_| t <= end)
     }
 
     /// Those born of the dead.
@@ -322,11 +331,9 @@ impl Emitter {
         Some((0..count).into_par_iter().with_min_len(256).map(one).collect())
     }
 
-    /// Where the source is at a time, and how fast it moves: by central differences.
+    /// Where the source is at a time, and how fast it moves.
     fn source(&self, t: f64) -> (Vector, Vector) {
-        const STEP: f64 = 1e-4;
-        let path = &self.course.path;
-        (path.value(t), (path.value(t + STEP) - path.value(t - STEP)) * (0.5 / STEP))
+        (self.course.path.value(t), self.course.path.velocity(t))
     }
 
     /// The velocity of one born at time t where the source has this normal and moves with this velocity.

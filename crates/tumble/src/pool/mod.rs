@@ -111,6 +111,11 @@ impl Pool {
         self.first + self.id.len()
     }
 
+    /// Id of the particle in a row, if it is one of a pool's.
+    pub fn id_of(&self, row: usize) -> Option<u32> {
+        self.id.get(row.checked_sub(self.first)?).copied()
+    }
+
     /// Ids of the rows of an emitter.
     pub fn ids(&self, s: usize) -> &[u32] {
         let rows = self.rows(s);

@@ -6,6 +6,7 @@ use crate::geometry::{Sampler, Vector};
 use crate::math::rotation::{from_degrees, from_z_to};
 use crate::pool::{Course, Emitter, Kill, Origin};
 use tumble_interface::Mesh;
+use tumble_interface::check::plain;
 use tumble_interface::scene::{Collider, Emitter as Words, Kill as Rule, MeshFile, Shape as Solid, Source};
 
 /// Names that frames and files need for themselves.
@@ -73,6 +74,9 @@ pub fn emitter<'a>(
     if words.direction == Some([0.0; 3]) {
         wrong(".direction", "[0, 0, 0], expected a direction");
     }
+    if words.lifetime.is_none() && words.lifetime_spread != 0.0 {
+        wrong(".lifetime_spread", &format!("{}, but there is no lifetime to spread; set lifetime", words.lifetime_spread));
+    }
     if words.color.is_none() && (words.color_to.is_some() || words.color_end.is_some()) {
         wrong(".color", "color_to and color_end need a color to start from");
     }
@@ -88,7 +92,7 @@ pub fn emitter<'a>(
         wrong(&format!(".columns.{name}"), &format!("expected a name of letters, digits and _ that is none of {}", TAKEN.join(", ")));
     }
     if let Some((name, b)) = words.columns.iter().find(|(_, b)| b.to.is_some_and(|to| to < b.from)) {
-        wrong(&format!(".columns.{name}.to"), &format!("{}, expected >= {}", b.to.unwrap_or_default(), b.from));
+        wrong(&format!(".columns.{name}.to"), &format!("{}, expected >= {}", plain(b.to.unwrap_or_default()), plain(b.from)));
     }
     let vector = |v: &[f64; 3]| Vector::from(*v);
     let mut sampled = |key: &str, file: &MeshFile, sampler: fn(&Mesh) -> Option<Sampler>, nothing: &str| match mesh(file) {
@@ -117,7 +121,7 @@ pub fn emitter<'a>(
             wrong(".from.disk.normal", "[0, 0, 0], expected a direction");
             None
         }
-        Source::Disk { center, normal, radius } => Some(Sampler::Disk(vector(center), from_z_to(vector(normal)), *radius)),
+        Source::Disk { center, normal, radius } => Some(Sampler::Disk(vector(center), from_z_to(vector(normal).tamed()), *radius)),
         Source::Sphere { center, radius, surface } => Some(Sampler::Ball(vector(center), *radius, *surface)),
         Source::Box { center, size, rotate } => Some(Sampler::Box(vector(center), vector(size), from_degrees(*rotate))),
         Source::MeshSurface(file) => sampled(".from.mesh_surface", file, Sampler::surface, "the mesh has no triangle with an area"),

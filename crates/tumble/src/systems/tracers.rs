@@ -297,6 +297,7 @@ impl System for Tracers {
             object: object.map_or(String::new(), |o| o.name.clone()),
             column: "position".into(),
             index: object.map_or(i, |o| i - o.points.start),
+            id: self.pool.id_of(i),
             time: t,
             integrator: self.settings.integrator.name().into(),
             step: 0.0,
