@@ -7,6 +7,7 @@ mod common;
 use common::*;
 use std::collections::HashSet;
 use tumble_f64::scene::Simulation;
+use tumble_interface::scene::Integrator;
 use tumble_interface::{Data, Engine, Scene, StepError};
 
 const RATE: &str = "time.fps = 24\n[[system]]\nintegrator = \"SCHEME\"\nsubsteps = 3\n";
@@ -442,7 +443,10 @@ fn emitters_that_cannot_work_are_refused() {
         ("rate = -1\nfrom.point = {}", "rate: -1, expected >= 0"),
         ("rate = 1e12\nlifetime = 1e-9\nfrom.point = {}", "GiB, the limit is 8 GiB"),
         ("rate = 1\nfrom.point = {}\ncolumns = { x = { from = 1 } }", "columns.x: expected a name of letters"),
-        ("burst = [{ time = 1, count = 1 }]\nfrom.particles.of = \"p\"", "burst[0].time: children are born when the parent dies"),
+        (
+            "burst = [{ time = 1, count = 1 }]\nfrom.particles.of = \"p\"",
+            "burst[0].time: children are born when the parent dies or bounces",
+        ),
         ("rate = 1\nfrom.point = {}\nlifetime_spread = 0.5", "lifetime_spread: 0.5, but there is no lifetime to spread; set lifetime"),
         ("rate = 1\nfrom.point = {}\ncolumns = { h = 5 }", "columns.h: 5, expected a table { from = ... }"),
         (
@@ -454,6 +458,15 @@ fn emitters_that_cannot_work_are_refused() {
             "rate = 1\nfrom.point = {}\n[[force]]\nkind = \"flock\"\nradius = 1\ngoal = [3]",
             "goal[0]: 3, expected a table { point = ..., strength = ... }",
         ),
+        (
+            "rate = 1\nfrom.point = {}\n[[emitter]]\nname = \"q\"\nburst = [{ count = 1 }]\nfrom.particles = { of = \"p\", cause = [\"lifetime\"] }",
+            "emitter \"q\".from.particles.cause[0]: nothing of \"p\" dies of that",
+        ),
+        (
+            "burst = [{ count = 1 }]\nfrom.particles = { of = \"p\", at = \"bounce\", cause = [\"lifetime\"] }",
+            "from.particles.cause: a bounce is no death; leave it out",
+        ),
+        ("rate = 1\nfrom.particles = { of = \"p\", at = \"bounce\" }", "burst: missing: at and cause say when a burst is born"),
         ("rate = \"1 + sin\"\nfrom.point = {}", "rate: \"1 + sin\": \"sin\" is a function; write sin(...)"),
         ("rate = -1e300\nfrom.point = {}", "rate: -1e300, expected >= 0"),
         ("rate.keys = [[0, 1], [0.02, -5], [0.03, 1]]\nfrom.point = {}", "rate: -5 at t = 0.02 s, expected >= 0"),
@@ -544,6 +557,8 @@ fn colliders_that_are_missing_are_told() {
     let flock = "[[particles]]\nname = \"q\"\nposition = [[0, 0, 0]]\n[[force]]\nkind = \"flock\"\nradius = 1\navoidance = 3\n";
     assert_eq!(warnings(flock), ["force[0].avoidance: there is no collider to shun; add one, or leave it out"]);
     let floor = "[[collider]]\nname = \"floor\"\nshape.floor.height = -9\n";
+    let splash = "[[emitter]]\nname = \"p\"\nrate = 9\nfrom.point = {}\n[[emitter]]\nname = \"q\"\nburst = [{ count = 1 }]\nfrom.particles = { of = \"p\", at = \"bounce\" }\n";
+    assert_eq!(warnings(splash), ["emitter \"q\".from.particles.at: there is no collider to bounce off; add one"]);
     assert!(warnings(&format!("{emitter}{floor}")).is_empty() && warnings(&format!("{flock}{floor}")).is_empty());
 }
 
@@ -655,5 +670,128 @@ fn a_clamp_leaves_particles_alone() {
         // Verlet is exact under gravity, up to its first step.
         let exact = vector(p.3, 0.0, 3.0 * p.3 - 4.9 * p.3 * p.3);
         assert!(p.0 == q.0 && (p.1 - q.1).norm() < 1e-12 && (p.1 - exact).norm() < 1e-9, "{p:?} {q:?} {exact:?}");
+    }
+}
+
+/// The oldest of 33 dies as another is born, after 33/240 s, and bears a child then and there, however the system is stepped.
+#[test]
+fn those_who_are_replaced_bear_children() {
+    let emitters = |velocity: &str| {
+        format!(
+            "[[emitter]]\nname = \"p\"\nrate = 240\n{velocity}\nlifetime = 10\nmost = 33\nwhen_full = \"replace_oldest\"\nfrom.point = {{}}\n\
+             [[emitter]]\nname = \"heir\"\nburst = [{{ count = 1 }}]\nfrom.particles = {{ of = \"p\", cause = [\"replaced\"] }}\n\
+             [[emitter]]\nname = \"any\"\nburst = [{{ count = 2 }}]\nfrom.particles.of = \"p\"\n\
+             [[emitter]]\nname = \"none\"\nburst = [{{ count = 1 }}]\nfrom.particles = {{ of = \"p\", cause = [\"lifetime\"] }}\n\
+             [[emitter]]\nname = \"trace\"\nrate = 240\nfrom.particles.of = \"p\"\n"
+        )
+    };
+    for name in ["verlet", "implicit_midpoint", "tracers"] {
+        let text = if name == "tracers" {
+            let field = "[[system]]\nmethod = \"tracers\"\nintegrator = \"rk4\"\nsubsteps = 3\n[[field]]\nkind = \"uniform\"\nvelocity = [2, 0, 0]\n";
+            format!("time.fps = 24\n{field}{}", emitters(""))
+        } else {
+            format!("world.gravity = [0, 0, 0]\n{}{}", scheme(name), emitters("velocity = [2, 0, 0]"))
+        };
+        let mut sim = simulation(&text);
+        run(&mut sim, 10);
+        let drift = if name == "tracers" { 2.0 } else { 0.0 };
+        assert_eq!((ids(&sim, "p").len(), ids(&sim, "any").len(), ids(&sim, "none").len()), (33, 2 * 67, 0), "{name}");
+        let heirs = by_id(&sim, "heir");
+        assert_eq!(heirs.len(), 67, "{name}");
+        for (id, x, _, age) in heirs {
+            let death = f64::from(id + 34) / 240.0;
+            assert!((age - (10.0 / 24.0 - death)).abs() < 1e-12, "{name}, {id}: {age}");
+            assert!((x - vector(0.275 + drift * age, 0.0, 0.0)).norm() < 1e-12, "{name}, {id}: {x:?}");
+        }
+        // Each leaves a trace at every 240th of a second until it is replaced: 33 (the last at its death) of 67, and 0 to 32 of the
+        // others.
+        let traces = ids(&sim, "trace").len();
+        assert_eq!(traces, 33 * 67 + 33 * 32 / 2, "{name}");
+    }
+}
+
+/// Those faster than 0.25 m in 11 frames leave the ball before their lifetime of 12 frames ends.
+#[test]
+fn children_heed_what_their_parents_died_of() {
+    let child = |name: &str, cause: &str| {
+        format!("[[emitter]]\nname = \"{name}\"\nburst = [{{ count = 1 }}]\nfrom.particles = {{ of = \"p\", cause = [{cause}] }}\n")
+    };
+    let text = format!(
+        "world.gravity = [0, 0, 0]\n{}[[emitter]]\nname = \"p\"\nburst = [{{ count = 300 }}]\nspeed = 1\nspeed_spread = 1\ncone = 180\nlifetime = 0.5\n\
+         kill = [{{ faster_than = 5 }}, {{ outside.sphere.radius = 0.25 }}]\nfrom.point = {{}}\n{}{}{}{}",
+        scheme("verlet"),
+        child("old", "\"lifetime\""),
+        child("out", "\"outside\", \"faster_than\""),
+        child("fast", "\"faster_than\""),
+        child("all", "")
+    );
+    let mut sim = simulation(&text);
+    let out = velocities(&sim, "p").iter().filter(|v| v.norm() * 11.0 / 24.0 > 0.25).count();
+    run(&mut sim, 13);
+    let count = |name: &str| ids(&sim, name).len();
+    assert!(out > 150 && out < 280, "{out}");
+    assert_eq!((count("p"), count("old"), count("out"), count("fast"), count("all")), (0, 300 - out, out, 0, 300));
+}
+
+/// A mass that falls from 1 m meets the floor after sqrt(2/g) and leaves with half its speed; its next way takes as long.
+#[test]
+fn splashes_are_born_where_and_when_drops_bounce() {
+    let text = |system: &str, restitution: f64| {
+        format!(
+            "time.fps = 24\n[[system]]\n{system}\n[[emitter]]\nname = \"drop\"\nburst = [{{ count = 1 }}, {{ time = 0.3, count = 2 }}]\nfrom.point.at = [0, 0, 1]\n\
+             [[emitter]]\nname = \"splash\"\nburst = [{{ count = 3 }}]\nspeed = 1\nfrom.particles = {{ of = \"drop\", at = \"bounce\" }}\n\
+             [[emitter]]\nname = \"shadow\"\nburst = [{{ count = 1 }}]\ninherit = 1\nfrom.particles = {{ of = \"drop\", at = \"bounce\" }}\n\
+             [[collider]]\nname = \"floor\"\nrestitution = {restitution}\nshape.floor.height = 0\n"
+        )
+    };
+    let fall = (2.0_f64 / 9.8).sqrt();
+    for system in ["integrator = \"verlet\"\nsubsteps = 4", "integrator = \"dormand_prince\"", "integrator = \"rk4\"\nsubsteps = 7"] {
+        let mut sim = simulation(&text(system, 0.5));
+        run(&mut sim, 14);
+        assert_eq!(ids(&sim, "splash").len(), 3, "{system}");
+        for (_, x, v, age) in by_id(&sim, "splash") {
+            // Measured: 3e-15 s; off the floor at 1 m/s.
+            assert!((age - (14.0 / 24.0 - fall)).abs() < 1e-9, "{system}: {age}");
+            assert!((x.z - (age - 4.9 * age * age)).abs() < 1e-9 && (v.z - (1.0 - 9.8 * age)).abs() < 1e-9, "{system}: {x:?} {v:?}");
+        }
+        // With all of its velocity a child goes where its parent goes.
+        let (drop, shadow) = (by_id(&sim, "drop")[0], by_id(&sim, "shadow")[0]);
+        assert!((drop.1 - shadow.1).norm() < 1e-9 && (drop.2 - shadow.2).norm() < 1e-9 && drop.1.z > 0.1, "{system}: {drop:?} {shadow:?}");
+        // The two others by 0.3 s + fall, the first again by 2 fall.
+        run(&mut sim, 8);
+        assert_eq!(ids(&sim, "splash").len(), 3 * 4, "{system}");
+    }
+    // What stays on the floor has met it once, under every scheme; one that sees the impact at the end of its step only is late by that.
+    for integrator in Integrator::ALL {
+        let steps = if integrator.is_adaptive() { "" } else { "substeps = 10" };
+        let mut sim = simulation(&text(&format!("integrator = \"{}\"\n{steps}", integrator.name()), 0.0));
+        run(&mut sim, 40);
+        let all = by_id(&sim, "splash");
+        assert_eq!(all.len(), 3 * 3, "{}", integrator.name());
+        for (id, _, _, age) in all {
+            let late = 40.0 / 24.0 - age - fall - if id < 3 { 0.0 } else { 0.3 };
+            assert!(late > -2.0 / 240.0 && late < 2.0 / 240.0, "{}, {id}: {late}", integrator.name());
+        }
+    }
+}
+
+/// Many meet the floor in the first step of their life, 4 ms after their birth; none that lives for 2 ms only.
+#[test]
+fn newborn_splash_and_the_dead_do_not() {
+    let splashes = |integrator: &str, lifetime: f64| {
+        let text = format!(
+            "{}[[emitter]]\nname = \"drop\"\nrate = 50\njitter = 1\nvelocity = [0, 0, -5]\nlifetime = {lifetime}\nfrom.point.at = [0, 0, 0.02]\n\
+             [[emitter]]\nname = \"splash\"\nburst = [{{ count = 1 }}]\nspeed = 1\nfrom.particles = {{ of = \"drop\", at = \"bounce\" }}\n\
+             [[collider]]\nname = \"floor\"\nshape.floor.height = 0\n",
+            scheme(integrator)
+        );
+        let mut sim = simulation(&text);
+        run(&mut sim, 24);
+        (ids(&sim, "splash").len(), positions(&sim, "drop").iter().filter(|x| x.z < 1e-3).count())
+    };
+    for integrator in ["verlet", "implicit_midpoint"] {
+        let (splashes_of_all, landed) = splashes(integrator, 9.0);
+        assert!(splashes_of_all == landed && landed > 45, "{integrator}: {splashes_of_all} {landed}");
+        assert_eq!(splashes(integrator, 0.002).0, 0, "{integrator}");
     }
 }

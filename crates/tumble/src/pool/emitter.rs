@@ -4,7 +4,7 @@
 use crate::geometry::{Collider, Sampler, Vector, sampling};
 use crate::math::{Random, Real, Row, Signal, VectorSignal, xyz64};
 use rayon::prelude::*;
-use tumble_interface::scene::{Between, Emitter as Words, WhenFull};
+use tumble_interface::scene::{Between, Cause, Emitter as Words, Event, Source, WhenFull};
 
 /// What random numbers are drawn for: the moment of birth, mass, radius and colour; the direction and speed; users' columns; the
 /// place. The lifetime has a quick number of its own.
@@ -90,6 +90,8 @@ pub struct Parent {
     pub x: Vector,
     /// Velocity [m/s].
     pub v: Vector,
+    /// Direction that counts as out of it: that of its velocity, or off what it bounces from.
+    pub normal: Vector,
     /// Age [s].
     pub age: f64,
     /// Age when the exchange interval began [s]; negative for one born in it.
@@ -211,20 +213,32 @@ impl Emitter {
         self.words.lifetime.is_none() && self.kill.is_empty()
     }
 
-    /// Whether a particle is to die at time t, where an interval of length dt [s] ends.
-    pub fn dies(&self, (t, dt): (f64, f64), (id, age): (u32, f64), (x, v): (Row, Row), near: &Near<'_>) -> bool {
+    /// Whether what happens to a parent makes a burst: a death of this cause, or else a bounce.
+    pub fn is_stirred_by(&self, death: Option<Cause>) -> bool {
+        match (&self.words.from, death) {
+            (Source::Particles { at: Event::Death, cause, .. }, Some(death)) => cause.is_empty() || cause.contains(&death),
+            (Source::Particles { at, .. }, None) => *at == Event::Bounce,
+            _ => false,
+        }
+    }
+
+    /// What a particle is to die of at time t, where an interval of length dt [s] ends; `None` if it lives on.
+    pub fn dies(&self, (t, dt): (f64, f64), (id, age): (u32, f64), (x, v): (Row, Row), near: &Near<'_>) -> Option<Cause> {
         // What a sum of intervals may have lost by rounding.
         let age = age + (age * age / dt * f64::from(Real::EPSILON)).min(0.25 * dt);
         let youngest = self.words.lifetime.unwrap_or(f64::INFINITY) * (1.0 - self.words.lifetime_spread);
         if age >= youngest && age >= self.lifetime(id) {
-            return true;
+            return Some(Cause::Lifetime);
         }
-        self.kill.iter().any(|rule| match rule {
-            Kill::Inside(solid) => solid.distance(xyz64(x), t, 0.0).0 < 0.0,
-            Kill::Outside(solid) => solid.distance(xyz64(x), t, 0.0).0 > 0.0,
-            Kill::NearCollider(distance) => near(xyz64(x), *distance),
-            Kill::SlowerThan(speed) => xyz64(v).norm_sq() < speed * speed,
-            Kill::FasterThan(speed) => xyz64(v).norm_sq() > speed * speed,
+        self.kill.iter().find_map(|rule| {
+            let (holds, cause) = match rule {
+                Kill::Inside(solid) => (solid.distance(xyz64(x), t, 0.0).0 < 0.0, Cause::Inside),
+                Kill::Outside(solid) => (solid.distance(xyz64(x), t, 0.0).0 > 0.0, Cause::Outside),
+                Kill::NearCollider(distance) => (near(xyz64(x), *distance), Cause::NearCollider),
+                Kill::SlowerThan(speed) => (xyz64(v).norm_sq() < speed * speed, Cause::SlowerThan),
+                Kill::FasterThan(speed) => (xyz64(v).norm_sq() > speed * speed, Cause::FasterThan),
+            };
+            holds.then_some(cause)
         })
     }
 
@@ -285,12 +299,12 @@ impl Emitter {
         Some((t, self.flat.map_or(x, |axis| flattened(x, axis, false)))).filter(|_| t <= end)
     }
 
-    /// Those born of the dead.
-    pub fn orphans(&self, dead: &[Parent], next: u64, room: Room) -> Option<Vec<Birth>> {
+    /// Those born at once of parents that died or bounced.
+    pub fn bursts(&self, of: &[Parent], next: u64, room: Room) -> Option<Vec<Birth>> {
         let each: usize = self.words.burst.iter().map(|b| b.count as usize).sum();
-        self.bear(next, room.take(dead.len() * each)?, |k, id| {
-            let parent = dead[k / each];
-            Birth { time: parent.time, x: parent.x, v: self.velocity(parent.time, id, parent.v, parent.v), id }
+        self.bear(next, room.take(of.len() * each)?, |k, id| {
+            let parent = of[k / each];
+            Birth { time: parent.time, x: parent.x, v: self.velocity(parent.time, id, parent.normal, parent.v), id }
         })
     }
 

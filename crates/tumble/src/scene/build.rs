@@ -19,7 +19,7 @@ use std::borrow::Cow;
 use std::sync::Arc;
 use tumble_interface::check::plain;
 use tumble_interface::scene::{
-    Anchor, Bits, Emitter, Force as Words, Kill, MeshFile, Method, Particles, Plane, Scene, Shape, System as Plan, Vicsek,
+    Anchor, Bits, Emitter, Event, Force as Words, Kill, MeshFile, Method, Particles, Plane, Scene, Shape, Source, System as Plan, Vicsek,
 };
 use tumble_interface::{Column, Data, Issue, Mesh, SceneError};
 
@@ -199,6 +199,12 @@ fn unused(scene: &Scene, plans: &[Plan]) -> Vec<String> {
             if let Some(i) = emitter.kill.iter().position(|rule| matches!(rule, Kill::NearCollider(_))) {
                 let name = &emitter.name;
                 warnings.push(format!("emitter \"{name}\".kill[{i}]: near_collider, but there is no collider; add one, or leave it out"));
+            }
+        }
+        for emitter in &scene.emitter {
+            if matches!(&emitter.from, Source::Particles { at: Event::Bounce, .. }) {
+                let name = &emitter.name;
+                warnings.push(format!("emitter \"{name}\".from.particles.at: there is no collider to bounce off; add one"));
             }
         }
         for (i, _) in scene.force.iter().enumerate().filter(|(_, f)| matches!(f, Words::Flock { avoidance, .. } if *avoidance > 0.0)) {

@@ -84,7 +84,12 @@ impl Tracers {
         if births.is_empty() {
             return;
         }
-        let surplus = self.pool.surplus(s, births.len());
+        let (flow, x) = (&self.flow, &self.x);
+        let velocity = |row: usize| {
+            let u = flow.at(until, xyz64(x[row]));
+            [u.x as Real, u.y as Real, u.z as Real, 0.0]
+        };
+        let surplus = self.pool.surplus(s, births, (until, end), x, &velocity);
         self.pool.remove(s, &surplus, owned(&mut self.x, &mut self.memory));
         let births = &births[births.len().saturating_sub(self.pool.emitter(s).most().unwrap_or(usize::MAX))..];
         let rows = self.pool.insert(s, births, end, owned(&mut self.x, &mut self.memory));
@@ -114,12 +119,14 @@ impl Tracers {
             chunks(&mut v, |start, v| flow.velocities(t, &x[start..start + v.len()], v));
             let dead = self.pool.dead(s, (t, dt), &self.x, &v, &|_, _| false);
             for child in (s + 1..n).filter(|child| self.pool.parent(*child) == Some(s)).collect::<Vec<_>>() {
-                let births = self.pool.descendants(child, (t, dt), &dead, &self.x, &v);
+                let births = self.pool.descendants(child, t, &dead, &self.x, &v);
                 born[child] = births.ok_or_else(|| self.full(child, t))?;
             }
+            let dead: Vec<u32> = dead.into_iter().map(|(k, _)| k).collect();
             self.pool.remove(s, &dead, owned(&mut self.x, &mut self.memory));
             self.count_rows();
         }
+        self.pool.calm();
         Ok(())
     }
 
