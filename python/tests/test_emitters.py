@@ -37,3 +37,16 @@ def test_no_child_is_born_twice_or_forgotten() -> None:
     places = np.sort(there.frame["q"]["position"][:, 0])
     # Child k is left at the parent's age k/24; a distance of 20 m in single precision is told to 2e-6 m.
     assert np.allclose(places, 2.0 * np.arange(1, 241) / 24, atol=1e-4)
+
+
+def test_what_breaks_is_named_by_its_id() -> None:
+    # Born at 24 a second, alive for 6 frames: the first to pass x = 1 is by then not the first row.
+    source = {"name": "p", "from": {"point": {}}, "rate": 24, "lifetime": 0.25, "velocity": ["4*t", 0, 0]}
+    scene = world(24, source).scene.to_dict()
+    scene["force"] = [{"kind": "acceleration", "value": ["0*sqrt(1 - x)", 0, 0]}]
+    with pytest.raises(tumble.StepError, match=r'in emitter "p", the particle with id \d+\.') as failure:
+        tumble.World(scene).step(100)
+    report = failure.value.report
+    assert f"id {report['id']}." in str(failure.value)
+    assert report["id"] > 20
+    assert report["index"] < 7

@@ -7,6 +7,7 @@ mod common;
 use common::*;
 use std::collections::HashSet;
 use tumble_f64::scene::Simulation;
+use tumble_interface::scene::Integrator;
 use tumble_interface::{Data, Engine, Scene, StepError};
 
 const RATE: &str = "time.fps = 24\n[[system]]\nintegrator = \"SCHEME\"\nsubsteps = 3\n";
@@ -442,9 +443,355 @@ fn emitters_that_cannot_work_are_refused() {
         ("rate = -1\nfrom.point = {}", "rate: -1, expected >= 0"),
         ("rate = 1e12\nlifetime = 1e-9\nfrom.point = {}", "GiB, the limit is 8 GiB"),
         ("rate = 1\nfrom.point = {}\ncolumns = { x = { from = 1 } }", "columns.x: expected a name of letters"),
-        ("burst = [{ time = 1, count = 1 }]\nfrom.particles.of = \"p\"", "burst[0].time: children are born when the parent dies"),
+        (
+            "burst = [{ time = 1, count = 1 }]\nfrom.particles.of = \"p\"",
+            "burst[0].time: children are born when the parent dies or bounces",
+        ),
+        ("rate = 1\nfrom.point = {}\nlifetime_spread = 0.5", "lifetime_spread: 0.5, but there is no lifetime to spread; set lifetime"),
+        ("rate = 1\nfrom.point = {}\ncolumns = { h = 5 }", "columns.h: 5, expected a table { from = ... }"),
+        (
+            "rate = 1\nfrom.point = {}\nkill = \"floor\"",
+            "kill: \"floor\", expected a list, each a table with one of the keys inside, outside, ",
+        ),
+        ("rate = 1\nfrom.point = {}\nkill = [\"floor\"]", "kill[0]: \"floor\", expected a table with one of the keys inside, outside, "),
+        (
+            "rate = 1\nfrom.point = {}\n[[force]]\nkind = \"flock\"\nradius = 1\ngoal = [3]",
+            "goal[0]: 3, expected a table { point = ..., strength = ... }",
+        ),
+        (
+            "rate = 1\nfrom.point = {}\n[[emitter]]\nname = \"q\"\nburst = [{ count = 1 }]\nfrom.particles = { of = \"p\", cause = [\"lifetime\"] }",
+            "emitter \"q\".from.particles.cause[0]: nothing of \"p\" dies of that",
+        ),
+        (
+            "burst = [{ count = 1 }]\nfrom.particles = { of = \"p\", at = \"bounce\", cause = [\"lifetime\"] }",
+            "from.particles.cause: a bounce is no death; leave it out",
+        ),
+        ("rate = 1\nfrom.particles = { of = \"p\", at = \"bounce\" }", "burst: missing: at and cause say when a burst is born"),
+        ("rate = \"1 + sin\"\nfrom.point = {}", "rate: \"1 + sin\": \"sin\" is a function; write sin(...)"),
+        ("rate = -1e300\nfrom.point = {}", "rate: -1e300, expected >= 0"),
+        ("rate.keys = [[0, 1], [0.02, -5], [0.03, 1]]\nfrom.point = {}", "rate: -5 at t = 0.02 s, expected >= 0"),
+        ("rate = 1\nvelocity = [1e300, 0, 0]\nfrom.point = {}", "velocity: [1e300, 0, 0], expected a length below 1e154"),
+        ("rate = 1\nfrom.point = {}\ncolumns = { a = { from = 2e200, to = 1e200 } }", "columns.a.to: 1e200, expected >= 2e200"),
+        (
+            "rate = 1\nfrom.point = {}\n[[particles]]\nname = \"q\"\nposition = [[0, 0, 0]]\n[[anchor]]\nname = \"a\"\nstiffness = 1\nbetween = [\"q 0\", \"p 0\"]",
+            "between[1]: the particles of emitter \"p\" come and go; an anchor needs a mass that stays",
+        ),
     ] {
         let message = refused(words);
         assert!(message.contains(told), "{words}: {message}");
+    }
+}
+
+/// In two dimensions nothing is put onto the plane in silence.
+#[test]
+fn emitters_keep_to_the_plane() {
+    let scene = |words: &str, more: &str| {
+        let text = format!("version = 1\ndimension = 2\n[[emitter]]\nname = \"p\"\nrate = 1\n{words}\n{more}");
+        Simulation::new(Scene::from_toml(&text).unwrap_or_else(|e| panic!("{e}\n{text}")), Default::default())
+    };
+    for words in [
+        "from.point.at = [1, 0, 2]\nvelocity = [1, 0, \"t\"]",
+        "from.disk = { radius = 1, normal = [0, 1, 0] }",
+        "from.disk = { radius = 1 }\nspeed = 1",
+        "from.disk = { radius = 1, normal = [0, 1, 0] }\nspeed = 1\ndirection = [1, 0, 0]",
+        "from.box = { size = [1, 0, 1], rotate = [0, 30, 0] }",
+        "from.sphere.radius = 1",
+    ] {
+        assert!(scene(words, "").is_ok(), "{words}");
+    }
+    for (words, told) in [
+        ("from.point.at = [0, 1, 0]", "emitter \"p\".from.point.at: y = 1, expected 0 in a scene of dimension 2"),
+        ("from.curve.points = [[0, 0, 0], [1, 1e30, 0]]", "from.curve.points[1]: y = 1e30, expected 0"),
+        ("from.disk = { radius = 1, normal = [1, 2, 0] }", "from.disk.normal: y = 2, expected 0"),
+        ("from.disk = { radius = 1, normal = [0, 1, 0] }\nspeed = 1", "direction: missing: the normal of the disk points out of the plane"),
+        ("from.box.size = [1, 1, 1]", "from.box.size: y = 1, expected 0"),
+        ("from.box = { size = [1, 0, 1], rotate = [30, 0, 0] }", "from.box.rotate: [30.0, 0.0, 0.0], expected a turn about y"),
+        ("from.point = {}\nvelocity = [0, \"t - 1\", 0]", "velocity: y = -1, expected 0"),
+        ("from.point = {}\npath.keys = [[0, 0, 0, 0], [1, 0, 1, 0]]", "path: y = "),
+        ("from.point = {}\nspeed = 1\ndirection = [0, 1, 0]", "direction: y = 1, expected 0"),
+        ("from.mesh_surface.path = \"x.obj\"", "from: a mesh does not fit into a plane"),
+    ] {
+        let message = scene(words, "").err().unwrap_or_else(|| panic!("{words} was taken")).to_string();
+        assert!(message.contains(told), "{words}: {message}");
+    }
+    let goal =
+        "[[force]]\nkind = \"flock\"\nradius = 1\ngoal = [{ point = [0, 0, 1], strength = 1 }, { point = [0, 3, 1], strength = 1 }]\n";
+    let message = scene("from.point = {}", goal).err().unwrap().to_string();
+    assert!(message.contains("force[0].goal[1].point: y = 3, expected 0"), "{message}");
+}
+
+/// What starts in a solid is told with its name and that of the solid; what is pinned there, or touches it, is not.
+#[test]
+fn what_starts_inside_a_collider_is_told() {
+    let warnings = |things: &str| {
+        let ball = "[[collider]]\nname = \"ball\"\nthickness = 0.05\nshape.sphere = { center = [3, 0, 0], radius = 1 }\n";
+        simulation(&format!("{things}\n{ball}")).warnings().to_vec()
+    };
+    let told = |name: &str, when: &str, deep: &str| {
+        vec![format!(
+            "masses of \"{name}\" start{when} up to {deep} m inside collider \"ball\", and will be thrown out of it; move one of them"
+        )]
+    };
+    let particles = "[[particles]]\nname = \"q\"\nposition = [[0, 0, 0], [2.25, 0, 0]]\n";
+    assert_eq!(warnings(particles), told("q", "", "0.25"));
+    assert!(warnings(&format!("{particles}pin = [\"vertex 1\"]")).is_empty());
+    let emitter = |words: &str| format!("[[emitter]]\nname = \"p\"\n{words}");
+    assert!(warnings(&emitter("rate = 9\nfrom.point = {}")).is_empty());
+    assert_eq!(warnings(&emitter("rate = 9\nfrom.point.at = [3, 0, 0.5]")), told("p", "", "0.5"));
+    // On the surface, outward.
+    assert!(warnings(&emitter("rate = 9\nfrom.sphere = { center = [3, 0, 0], radius = 1, surface = true }")).is_empty());
+    // A burst where the path has led: at t = 2 s, 0.6 m deep.
+    let burst = "burst = [{ time = 2, count = 3 }]\npath.keys = [[0, 0, 0, 0], [2, 2.6, 0, 0]]\nfrom.point = {}";
+    assert_eq!(warnings(&emitter(burst)), told("p", " at t = 2 s", "0.6"));
+    // A rate along the same path ends before it is there, or not.
+    let along = |end: f64| emitter(&format!("rate = 100\nend = {end}\npath.keys = [[0, 0, 0, 0], [2, 2.6, 0, 0]]\nfrom.point = {{}}"));
+    assert!(warnings(&along(1.5)).is_empty());
+    assert_eq!(warnings(&along(2.5)).len(), 1);
+}
+
+#[test]
+fn colliders_that_are_missing_are_told() {
+    let warnings = |text: &str| simulation(text).warnings().to_vec();
+    let emitter = "[[emitter]]\nname = \"p\"\nrate = 9\nkill = [{ slower_than = 1 }, { near_collider = 0.1 }]\nfrom.point = {}\n";
+    assert_eq!(warnings(emitter), ["emitter \"p\".kill[1]: near_collider, but there is no collider; add one, or leave it out"]);
+    let flock = "[[particles]]\nname = \"q\"\nposition = [[0, 0, 0]]\n[[force]]\nkind = \"flock\"\nradius = 1\navoidance = 3\n";
+    assert_eq!(warnings(flock), ["force[0].avoidance: there is no collider to shun; add one, or leave it out"]);
+    let floor = "[[collider]]\nname = \"floor\"\nshape.floor.height = -9\n";
+    let splash = "[[emitter]]\nname = \"p\"\nrate = 9\nfrom.point = {}\n[[emitter]]\nname = \"q\"\nburst = [{ count = 1 }]\nfrom.particles = { of = \"p\", at = \"bounce\" }\n";
+    assert_eq!(warnings(splash), ["emitter \"q\".from.particles.at: there is no collider to bounce off; add one"]);
+    assert!(warnings(&format!("{emitter}{floor}")).is_empty() && warnings(&format!("{flock}{floor}")).is_empty());
+}
+
+/// A source that jumps between places has no velocity to give.
+#[test]
+fn a_path_of_steps_gives_no_velocity() {
+    let text = format!(
+        "world.gravity = [0, 0, 0]\n{}[[emitter]]\nname = \"p\"\nrate = 240\ninherit = 1\nfrom.point = {{}}\n\
+         path = {{ interpolation = \"step\", keys = [[0, 0, 0, 0], [0.1, 3, 0, 0], [0.25, 0, 5, 0]] }}\n",
+        scheme("verlet")
+    );
+    let mut sim = simulation(&text);
+    run(&mut sim, 12);
+    let all = by_id(&sim, "p");
+    assert_eq!(all.len(), 120);
+    for (id, x, v, _) in all {
+        // A key holds from its time on; births at the times of keys may round to either side.
+        let t = f64::from(id + 1) / 240.0;
+        let place = if t < 0.1 {
+            vector(0.0, 0.0, 0.0)
+        } else if t < 0.25 {
+            vector(3.0, 0.0, 0.0)
+        } else {
+            vector(0.0, 5.0, 0.0)
+        };
+        assert!(v.norm() == 0.0 && (x == place || (t - 0.1).abs() < 1e-9 || (t - 0.25).abs() < 1e-9), "{id}: {x:?} {v:?}");
+    }
+}
+
+/// Directions of any length are the same direction.
+#[test]
+fn the_length_of_a_direction_is_of_no_account() {
+    let run_with = |length: f64| {
+        let text = format!(
+            "{}[[emitter]]\nname = \"p\"\nrate = 100\nspeed = 2\ncone = 20\ndirection = [{length:e}, 0, 0]\n\
+             from.disk = {{ radius = 0.1, normal = [0, {length:e}, 0] }}\nkill = [{{ inside.plane = {{ point = [1, 0, 0], normal = [-{length:e}, 0, 0] }} }}]\n\
+             [[collider]]\nname = \"wall\"\nrestitution = 0.5\nshape.plane = {{ point = [0, 0, -0.1], normal = [0, 0, {length:e}] }}\n\
+             [[force]]\nkind = \"vortex\"\naxis = [0, 0, {length:e}]\ncenter = [1, 0, 0]\nswirl = 3\ncore = 0.5\n",
+            scheme("verlet")
+        );
+        let mut sim = simulation(&text);
+        run(&mut sim, 24);
+        by_id(&sim, "p")
+    };
+    let ordinary = run_with(1.0);
+    // They leave to the right, bounce off the floor, and go at the wall.
+    assert!(ordinary.len() > 20 && ordinary.len() < 90, "{}", ordinary.len());
+    assert!(ordinary.iter().all(|p| p.1.x < 1.0 && p.1.z > -0.1001) && ordinary.iter().any(|p| p.2.z > 0.3));
+    for length in [1e-170, 1e160, 1e300] {
+        assert!(run_with(length) == ordinary, "{length:e}");
+    }
+}
+
+/// Nobody goes beyond x = 0.5. Particles born at t_b = k/24 go there at t_b m/s and live for 11 frames: k 11/24² > 0.5 first for
+/// k = 27, with id 26, one of a dozen that live then.
+#[test]
+fn what_breaks_is_named_by_its_id() {
+    let text = format!(
+        "world.gravity = [0, 0, 0]\n{}[[emitter]]\nname = \"p\"\nrate = 24\nlifetime = 0.45\nvelocity = [\"t\", 0, 0]\nfrom.point = {{}}\n\
+         [[force]]\nkind = \"acceleration\"\nvalue = [\"0*sqrt(0.5 - x)\", 0, 0]\n",
+        scheme("verlet")
+    );
+    let mut sim = simulation(&text);
+    let error = (0..100).find_map(|_| sim.step(&|| true).err()).unwrap();
+    assert!(matches!(&error, StepError::NotFinite(b) if b.id == Some(26) && b.index < 13), "{error:?}");
+    assert!(error.to_string().contains("in emitter \"p\", the particle with id 26."), "{error}");
+}
+
+/// A triangle of 150 (0.9 - 0.1) s, with corners within frames: N(t) by hand.
+#[test]
+fn a_rate_of_keys_is_counted_exactly() {
+    for fps in [2.0, 24.0, 100.0] {
+        let text = format!(
+            "time.fps = {fps}\n[[system]]\nsubsteps = 1\nintegrator = \"verlet\"\n[[emitter]]\nname = \"p\"\nrate.keys = [[0.1, 0], [0.33, 30_000], [0.9, 0]]\nfrom.point = {{}}\n"
+        );
+        let mut sim = simulation(&text);
+        for frame in 1..=(fps as u32) {
+            step(&mut sim);
+            let t = f64::from(frame) / fps;
+            let (up, down) = ((t - 0.1).clamp(0.0, 0.23), (0.9 - t).clamp(0.0, 0.57));
+            let exact = if t < 0.33 { 15_000.0 / 0.23 * up * up } else { 12_000.0 - 15_000.0 / 0.57 * down * down };
+            assert_eq!(ids(&sim, "p").len() as f64, (exact + 1e-6).floor(), "{fps} frames a second, t = {t}");
+        }
+    }
+}
+
+/// The clamp holds the links of a rope to 1.1 of their length and leaves the particles of the same system alone: on their parabolas,
+/// as Verlet makes them, without a clamp and with one.
+#[test]
+fn a_clamp_leaves_particles_alone() {
+    let particles = |clamp: &str| {
+        let text = format!(
+            "time.fps = 24\n[[system]]\nintegrator = \"verlet\"\nsubsteps = 20\n{clamp}\n\
+             [[rope]]\nname = \"rope\"\nfrom = [0, 0, 0]\nto = [1, 0, 0]\nsegments = 10\nlinks = {{ structural = 3 }}\npin = [\"start\"]\n\
+             [[emitter]]\nname = \"p\"\nrate = 100\nlifetime = 0.4\nvelocity = [1, 0, 3]\nfrom.point = {{}}\n"
+        );
+        let mut sim = simulation(&text);
+        run(&mut sim, 24);
+        let rope = positions(&sim, "rope");
+        let longest = rope.windows(2).map(|x| (x[1] - x[0]).norm()).fold(0.0, f64::max) / 0.1;
+        (by_id(&sim, "p"), longest)
+    };
+    let (held, longest) = particles("clamp = 1.1");
+    let (free, loose) = particles("");
+    assert_eq!(held.len(), 40);
+    // Measured: 1.35 and 1.10.
+    assert!(loose > 1.3 && longest < 1.1001 && longest > 1.05, "{loose} {longest}");
+    for (p, q) in held.iter().zip(&free) {
+        // Verlet is exact under gravity, up to its first step.
+        let exact = vector(p.3, 0.0, 3.0 * p.3 - 4.9 * p.3 * p.3);
+        assert!(p.0 == q.0 && (p.1 - q.1).norm() < 1e-12 && (p.1 - exact).norm() < 1e-9, "{p:?} {q:?} {exact:?}");
+    }
+}
+
+/// The oldest of 33 dies as another is born, after 33/240 s, and bears a child then and there, however the system is stepped.
+#[test]
+fn those_who_are_replaced_bear_children() {
+    let emitters = |velocity: &str| {
+        format!(
+            "[[emitter]]\nname = \"p\"\nrate = 240\n{velocity}\nlifetime = 10\nmost = 33\nwhen_full = \"replace_oldest\"\nfrom.point = {{}}\n\
+             [[emitter]]\nname = \"heir\"\nburst = [{{ count = 1 }}]\nfrom.particles = {{ of = \"p\", cause = [\"replaced\"] }}\n\
+             [[emitter]]\nname = \"any\"\nburst = [{{ count = 2 }}]\nfrom.particles.of = \"p\"\n\
+             [[emitter]]\nname = \"none\"\nburst = [{{ count = 1 }}]\nfrom.particles = {{ of = \"p\", cause = [\"lifetime\"] }}\n\
+             [[emitter]]\nname = \"trace\"\nrate = 240\nfrom.particles.of = \"p\"\n"
+        )
+    };
+    for name in ["verlet", "implicit_midpoint", "tracers"] {
+        let text = if name == "tracers" {
+            let field = "[[system]]\nmethod = \"tracers\"\nintegrator = \"rk4\"\nsubsteps = 3\n[[field]]\nkind = \"uniform\"\nvelocity = [2, 0, 0]\n";
+            format!("time.fps = 24\n{field}{}", emitters(""))
+        } else {
+            format!("world.gravity = [0, 0, 0]\n{}{}", scheme(name), emitters("velocity = [2, 0, 0]"))
+        };
+        let mut sim = simulation(&text);
+        run(&mut sim, 10);
+        let drift = if name == "tracers" { 2.0 } else { 0.0 };
+        assert_eq!((ids(&sim, "p").len(), ids(&sim, "any").len(), ids(&sim, "none").len()), (33, 2 * 67, 0), "{name}");
+        let heirs = by_id(&sim, "heir");
+        assert_eq!(heirs.len(), 67, "{name}");
+        for (id, x, _, age) in heirs {
+            let death = f64::from(id + 34) / 240.0;
+            assert!((age - (10.0 / 24.0 - death)).abs() < 1e-12, "{name}, {id}: {age}");
+            assert!((x - vector(0.275 + drift * age, 0.0, 0.0)).norm() < 1e-12, "{name}, {id}: {x:?}");
+        }
+        // Each leaves a trace at every 240th of a second until it is replaced: 33 (the last at its death) of 67, and 0 to 32 of the
+        // others.
+        let traces = ids(&sim, "trace").len();
+        assert_eq!(traces, 33 * 67 + 33 * 32 / 2, "{name}");
+    }
+}
+
+/// Those faster than 0.25 m in 11 frames leave the ball before their lifetime of 12 frames ends.
+#[test]
+fn children_heed_what_their_parents_died_of() {
+    let child = |name: &str, cause: &str| {
+        format!("[[emitter]]\nname = \"{name}\"\nburst = [{{ count = 1 }}]\nfrom.particles = {{ of = \"p\", cause = [{cause}] }}\n")
+    };
+    let text = format!(
+        "world.gravity = [0, 0, 0]\n{}[[emitter]]\nname = \"p\"\nburst = [{{ count = 300 }}]\nspeed = 1\nspeed_spread = 1\ncone = 180\nlifetime = 0.5\n\
+         kill = [{{ faster_than = 5 }}, {{ outside.sphere.radius = 0.25 }}]\nfrom.point = {{}}\n{}{}{}{}",
+        scheme("verlet"),
+        child("old", "\"lifetime\""),
+        child("out", "\"outside\", \"faster_than\""),
+        child("fast", "\"faster_than\""),
+        child("all", "")
+    );
+    let mut sim = simulation(&text);
+    let out = velocities(&sim, "p").iter().filter(|v| v.norm() * 11.0 / 24.0 > 0.25).count();
+    run(&mut sim, 13);
+    let count = |name: &str| ids(&sim, name).len();
+    assert!(out > 150 && out < 280, "{out}");
+    assert_eq!((count("p"), count("old"), count("out"), count("fast"), count("all")), (0, 300 - out, out, 0, 300));
+}
+
+/// A mass that falls from 1 m meets the floor after sqrt(2/g) and leaves with half its speed; its next way takes as long.
+#[test]
+fn splashes_are_born_where_and_when_drops_bounce() {
+    let text = |system: &str, restitution: f64| {
+        format!(
+            "time.fps = 24\n[[system]]\n{system}\n[[emitter]]\nname = \"drop\"\nburst = [{{ count = 1 }}, {{ time = 0.3, count = 2 }}]\nfrom.point.at = [0, 0, 1]\n\
+             [[emitter]]\nname = \"splash\"\nburst = [{{ count = 3 }}]\nspeed = 1\nfrom.particles = {{ of = \"drop\", at = \"bounce\" }}\n\
+             [[emitter]]\nname = \"shadow\"\nburst = [{{ count = 1 }}]\ninherit = 1\nfrom.particles = {{ of = \"drop\", at = \"bounce\" }}\n\
+             [[collider]]\nname = \"floor\"\nrestitution = {restitution}\nshape.floor.height = 0\n"
+        )
+    };
+    let fall = (2.0_f64 / 9.8).sqrt();
+    for system in ["integrator = \"verlet\"\nsubsteps = 4", "integrator = \"dormand_prince\"", "integrator = \"rk4\"\nsubsteps = 7"] {
+        let mut sim = simulation(&text(system, 0.5));
+        run(&mut sim, 14);
+        assert_eq!(ids(&sim, "splash").len(), 3, "{system}");
+        for (_, x, v, age) in by_id(&sim, "splash") {
+            // Measured: 3e-15 s; off the floor at 1 m/s.
+            assert!((age - (14.0 / 24.0 - fall)).abs() < 1e-9, "{system}: {age}");
+            assert!((x.z - (age - 4.9 * age * age)).abs() < 1e-9 && (v.z - (1.0 - 9.8 * age)).abs() < 1e-9, "{system}: {x:?} {v:?}");
+        }
+        // With all of its velocity a child goes where its parent goes.
+        let (drop, shadow) = (by_id(&sim, "drop")[0], by_id(&sim, "shadow")[0]);
+        assert!((drop.1 - shadow.1).norm() < 1e-9 && (drop.2 - shadow.2).norm() < 1e-9 && drop.1.z > 0.1, "{system}: {drop:?} {shadow:?}");
+        // The two others by 0.3 s + fall, the first again by 2 fall.
+        run(&mut sim, 8);
+        assert_eq!(ids(&sim, "splash").len(), 3 * 4, "{system}");
+    }
+    // What stays on the floor has met it once, under every scheme; one that sees the impact at the end of its step only is late by that.
+    for integrator in Integrator::ALL {
+        let steps = if integrator.is_adaptive() { "" } else { "substeps = 10" };
+        let mut sim = simulation(&text(&format!("integrator = \"{}\"\n{steps}", integrator.name()), 0.0));
+        run(&mut sim, 40);
+        let all = by_id(&sim, "splash");
+        assert_eq!(all.len(), 3 * 3, "{}", integrator.name());
+        for (id, _, _, age) in all {
+            let late = 40.0 / 24.0 - age - fall - if id < 3 { 0.0 } else { 0.3 };
+            assert!(late > -2.0 / 240.0 && late < 2.0 / 240.0, "{}, {id}: {late}", integrator.name());
+        }
+    }
+}
+
+/// Many meet the floor in the first step of their life, 4 ms after their birth; none that lives for 2 ms only.
+#[test]
+fn newborn_splash_and_the_dead_do_not() {
+    let splashes = |integrator: &str, lifetime: f64| {
+        let text = format!(
+            "{}[[emitter]]\nname = \"drop\"\nrate = 50\njitter = 1\nvelocity = [0, 0, -5]\nlifetime = {lifetime}\nfrom.point.at = [0, 0, 0.02]\n\
+             [[emitter]]\nname = \"splash\"\nburst = [{{ count = 1 }}]\nspeed = 1\nfrom.particles = {{ of = \"drop\", at = \"bounce\" }}\n\
+             [[collider]]\nname = \"floor\"\nshape.floor.height = 0\n",
+            scheme(integrator)
+        );
+        let mut sim = simulation(&text);
+        run(&mut sim, 24);
+        (ids(&sim, "splash").len(), positions(&sim, "drop").iter().filter(|x| x.z < 1e-3).count())
+    };
+    for integrator in ["verlet", "implicit_midpoint"] {
+        let (splashes_of_all, landed) = splashes(integrator, 9.0);
+        assert!(splashes_of_all == landed && landed > 45, "{integrator}: {splashes_of_all} {landed}");
+        assert_eq!(splashes(integrator, 0.002).0, 0, "{integrator}");
     }
 }

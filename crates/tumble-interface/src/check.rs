@@ -82,7 +82,13 @@ impl<'a> Checker<'a> {
     }
 
     fn visit_table(&mut self, node: &Node, entries: &[(String, Node)], schema: &'a Schema, path: &str) {
-        let Some(properties) = schema["properties"].as_object() else { return };
+        let Some(properties) = schema["properties"].as_object() else {
+            // Keys of the author's own, all alike.
+            if schema["additionalProperties"].is_object() {
+                entries.iter().for_each(|(key, value)| self.visit(value, &schema["additionalProperties"], &join(path, key), None));
+            }
+            return;
+        };
         for (key, value) in entries {
             let below = join(path, key);
             match properties.get(key) {
@@ -95,7 +101,7 @@ impl<'a> Checker<'a> {
                 }
             }
         }
-        for key in schema["required"].as_array().into_iter().flatten().filter_map(Schema::as_str) {
+        for key in required(schema) {
             if !entries.iter().any(|(k, _)| k == key) {
                 let expected = self.describe(&properties[key], properties[key]["x-unit"].as_str());
                 self.report(node, &join(path, key), format!("missing, expected {expected}"));
@@ -149,9 +155,8 @@ impl<'a> Checker<'a> {
             };
         }
         if fitting.is_empty() {
-            let expected: Vec<String> =
-                branches.iter().filter(|b| self.resolve(b)["type"] != "null").map(|b| self.describe(b, unit)).collect();
-            return self.report(node, path, format!("{}, expected {}", show(node, unit), expected.join(" or ")));
+            let expected = self.alternatives(branches, unit);
+            return self.report(node, path, format!("{}, expected {expected}", show(node, unit)));
         }
         // Several lists: report the complaints of the alternative with the fewest.
         let attempts = fitting.iter().map(|i| {
@@ -166,12 +171,7 @@ impl<'a> Checker<'a> {
     fn describe(&self, schema: &'a Schema, unit: Option<&str>) -> String {
         let schema = self.resolve(schema);
         if let Some(branches) = schema["oneOf"].as_array().or(schema["anyOf"].as_array()) {
-            let parts: Vec<String> = branches
-                .iter()
-                .filter(|b| self.resolve(b)["type"] != "null")
-                .map(|b| self.describe(b, b["x-unit"].as_str().or(unit)))
-                .collect();
-            return parts.join(" or ");
+            return self.alternatives(branches, unit);
         }
         let words = words(schema);
         if !words.is_empty() {
@@ -194,9 +194,36 @@ impl<'a> Checker<'a> {
                     _ => format!("a list, each {of}"),
                 }
             }
-            Some("object") => schema["x-meaning"].as_str().unwrap_or("a table").to_string(),
+            Some("object") => match (schema["x-meaning"].as_str(), &required(schema)[..]) {
+                (Some(meaning), _) => meaning.to_string(),
+                (None, []) => "a table".to_string(),
+                (None, keys) => format!("a table {{ {} }}", keys.iter().map(|k| format!("{k} = ...")).collect::<Vec<_>>().join(", ")),
+            },
             _ => "another value".to_string(),
         }
+    }
+
+    /// What any of some schemas accepts, in words; tables that differ in their only key, or in their kind, are one.
+    fn alternatives(&self, branches: &'a [Schema], unit: Option<&str>) -> String {
+        let (mut parts, mut keys, mut kinds) = (Vec::new(), Vec::new(), Vec::new());
+        for branch in branches {
+            let schema = self.resolve(branch);
+            match (schema["properties"]["kind"]["const"].as_str(), &required(schema)[..]) {
+                _ if schema["type"] == "null" => {}
+                (Some(kind), _) => kinds.push(kind),
+                (None, [key]) if schema["properties"].as_object().is_some_and(|p| p.len() == 1) => keys.push(*key),
+                _ => parts.push(self.describe(branch, branch["x-unit"].as_str().or(unit))),
+            }
+        }
+        match keys[..] {
+            [] => {}
+            [key] => parts.push(format!("a table {{ {key} = ... }}")),
+            _ => parts.push(format!("a table with one of the keys {}", keys.join(", "))),
+        }
+        if !kinds.is_empty() {
+            parts.push(format!("a table whose kind is one of {}", kinds.join(", ")));
+        }
+        parts.join(" or ")
     }
 }
 
@@ -211,6 +238,11 @@ fn item_path(path: &str, i: usize, item: &Node) -> String {
         Some(name) => format!("{path} \"{name}\""),
         None => format!("{path}[{i}]"),
     }
+}
+
+/// The keys that a table must have.
+fn required(schema: &Schema) -> Vec<&str> {
+    schema["required"].as_array().into_iter().flatten().filter_map(Schema::as_str).collect()
 }
 
 fn types(schema: &Schema) -> Vec<&str> {
@@ -265,7 +297,8 @@ fn range(schema: &Schema, unit: Option<&str>) -> String {
     }
 }
 
-fn plain(x: f64) -> String {
+/// A number for people: in scientific form where it has too many digits.
+pub fn plain(x: f64) -> String {
     if x != 0.0 && (x.abs() >= 1e7 || x.abs() < 1e-4) { format!("{x:e}") } else { format!("{x}") }
 }
 

@@ -124,6 +124,8 @@ pub struct Breakdown {
     pub column: String,
     /// Index of the particle within its object.
     pub index: usize,
+    /// Id of the particle, if an emitter has made it: its index says nothing.
+    pub id: Option<u32>,
     /// Simulated time [s].
     pub time: f64,
     /// Integrator in use.
@@ -138,9 +140,12 @@ pub struct Breakdown {
 
 impl fmt::Display for Breakdown {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let Self { system, object, column, index, time, integrator, step, stable_step, .. } = self;
+        let Self { system, object, column, index, id, time, integrator, step, stable_step, .. } = self;
         write!(f, "system \"{system}\" ({integrator}, step {step:.3e} s) at t = {} s: ", short(*time))?;
-        write!(f, "first bad {column} in \"{object}\", particle {index}. ")?;
+        match id {
+            Some(id) => write!(f, "first bad {column} in emitter \"{object}\", the particle with id {id}. ")?,
+            None => write!(f, "first bad {column} in \"{object}\", particle {index}. ")?,
+        }
         if *stable_step == 0.0 {
             write!(f, "{integrator} has no stable step for this system")
         } else if stable_step.is_finite() {

@@ -93,7 +93,7 @@ fn wrong_types_say_what_was_expected() {
         "line 2: time: 3, expected a table",
         "line 5: sheet \"a\".size: \"big\", expected a list of 2, each a number > 0 m",
         "line 6: sheet \"a\".resolution[0]: 4.5, expected a whole number >= 2 and <= 1e9",
-        "line 7: sheet \"a\".pin[0]: 3, expected a string or a table",
+        "line 7: sheet \"a\".pin[0]: 3, expected a string or a table { center = ..., radius = ... }",
         "line 10: rope \"r\".from: a list of 2, expected a list of 3, each a number in m",
     ];
     assert_eq!(found, expected);

@@ -45,6 +45,7 @@ pub fn step_error(py: Python<'_>, error: &tumble_interface::StepError) -> PyErr 
             report.set_item("object", &b.object)?;
             report.set_item("column", &b.column)?;
             report.set_item("index", b.index)?;
+            report.set_item("id", b.id)?;
             report.set_item("time", b.time)?;
             report.set_item("integrator", &b.integrator)?;
             report.set_item("step", b.step)?;

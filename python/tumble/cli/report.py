@@ -91,9 +91,11 @@ def _place(report: Mapping[str, Any]) -> list[str]:
         limit = (
             f"{seconds(stable)} by estimate, damping included; the step used is {report['step'] / stable:.3g} x that"
         )
+    number = report.get("id")
+    whose = f"particle {report['index']}" if number is None else f"the particle with id {number}"
     lines = [
         f'  system       "{report["system"]}", {integrator}',
-        f'  first bad    {report["column"]} of particle {report["index"]} of "{report["object"]}"',
+        f'  first bad    {report["column"]} of {whose} of "{report["object"]}"',
         f"  step used    {seconds(report['step'])}",
         f"  stable step  {limit}",
     ]

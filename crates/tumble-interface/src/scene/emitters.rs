@@ -21,7 +21,7 @@ pub struct Emitter {
     #[serde(default = "nothing")]
     #[schemars(extend("x-unit" = "1/s"))]
     pub rate: Animated,
-    /// Particles born at once; from other particles, `count` children of each when it dies.
+    /// Particles born at once; from other particles, `count` children of each when it dies, or bounces.
     #[serde(default)]
     pub burst: Vec<Burst>,
     /// When the rate begins.
@@ -150,7 +150,7 @@ pub enum Source {
         #[schemars(extend("x-unit" = "m", "exclusiveMinimum" = 0.0))]
         radius: f64,
     },
-    /// A ball, evenly over its volume, or its surface.
+    /// A ball, evenly over its volume, or its surface; in a scene of dimension 2 its points are put onto the plane.
     Sphere {
         /// Its centre.
         #[serde(default)]
@@ -181,18 +181,56 @@ pub enum Source {
     MeshSurface(MeshFile),
     /// The inside of a closed mesh, evenly over its volume.
     MeshVolume(MeshFile),
-    /// Other emitted particles: `rate` makes children while the parent lives, `burst` when it dies.
+    /// Other emitted particles: `rate` makes children while the parent lives, `burst` when it dies, or each time it bounces.
     Particles {
         /// Name of the emitter of the parents.
         of: String,
+        /// What makes a `burst`.
+        #[serde(default)]
+        at: Event,
+        /// Deaths that make one; without any, all do.
+        #[serde(default)]
+        cause: Vec<Cause>,
     },
+}
+
+/// What in the life of a parent makes a burst of children.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum Event {
+    /// Its death; children fly on as it did, unless they have a direction.
+    #[default]
+    Death,
+    /// Each impact on a collider that is faster than what gravity gives in two steps: a splash. Children fly off the surface,
+    /// unless they have a direction.
+    Bounce,
+}
+
+/// What a particle dies of.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum Cause {
+    /// Its age.
+    Lifetime,
+    /// The rule `inside`.
+    Inside,
+    /// The rule `outside`.
+    Outside,
+    /// The rule `near_collider`.
+    NearCollider,
+    /// The rule `slower_than`.
+    SlowerThan,
+    /// The rule `faster_than`.
+    FasterThan,
+    /// It was the oldest, and made room where `when_full` is `replace_oldest`.
+    Replaced,
 }
 
 /// Particles born at once.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Burst {
-    /// When; not for children, which are born when the parent dies.
+    /// When; not for children, which are born when the parent dies or bounces.
     #[serde(default)]
     #[schemars(range(min = 0.0), extend("x-unit" = "s"))]
     pub time: f64,
@@ -234,7 +272,7 @@ pub enum WhenFull {
     /// No more are born until some have died.
     #[default]
     Wait,
-    /// The oldest die.
+    /// The oldest die as others are born, and may bear children as they do.
     ReplaceOldest,
     /// The run ends with an error.
     Error,

@@ -10,7 +10,7 @@ mod structures;
 mod systems;
 
 pub use animated::{Animated, AnimatedVector, Component, Interpolation, Keys, VectorKeys};
-pub use emitters::{Between, Burst, Emitter, Kill, Source, WhenFull};
+pub use emitters::{Between, Burst, Cause, Emitter, Event, Kill, Source, WhenFull};
 pub use forces::{Anchor, Field, Force, Goal};
 pub use output::{Camera, Expect, Look, Output, Probe};
 pub use shapes::{Collider, MeshFile, MeshFrame, MeshFrames, MeshRef, Motion, Pace, Pose, Shape};

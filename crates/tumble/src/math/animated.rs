@@ -2,6 +2,7 @@
 
 use super::formula::{Formula, Of};
 use super::{Row, Vec3};
+use tumble_interface::check::plain;
 use tumble_interface::scene::{Animated, AnimatedVector, Component, Interpolation};
 
 /// A number as a function of time.
@@ -40,6 +41,25 @@ impl Signal {
     pub fn is_constant(&self) -> bool {
         matches!(self, Self::Constant(_))
     }
+
+    /// The times of its keys [s].
+    pub fn key_times(&self) -> &[f64] {
+        if let Self::Keys(curve) = self { &curve.times } else { &[] }
+    }
+
+    /// Its integral from a to b [s]: exact for keyframes, for a formula by Simpson's rule.
+    pub fn integral(&self, a: f64, b: f64) -> f64 {
+        match self {
+            Self::Constant(value) => value * (b - a),
+            Self::Formula(_) => simpson(a, b, |t| self.value(t)),
+            Self::Keys(curve) => curve.integral(a, b)[0],
+        }
+    }
+}
+
+/// Simpson's rule, exact for cubics.
+fn simpson(a: f64, b: f64, f: impl Fn(f64) -> f64) -> f64 {
+    (b - a) / 6.0 * (f(a) + 4.0 * f(0.5 * (a + b)) + f(b))
 }
 
 impl From<f64> for Signal {
@@ -103,6 +123,17 @@ impl VectorSignal {
         false
     }
 
+    /// How fast it changes at a time, where it is a function of time alone: by central differences, but keys that it jumps
+    /// between are no motion.
+    pub fn velocity(&self, t: f64) -> Vec3<f64> {
+        const STEP: f64 = 1e-4;
+        match self {
+            Self::Constant(_) => [0.0; 3].into(),
+            Self::Keys(curve) if curve.interpolation == Interpolation::Step => [0.0; 3].into(),
+            _ => (self.value(t + STEP) - self.value(t - STEP)) * (0.5 / STEP),
+        }
+    }
+
     /// Whether it is the same for all masses.
     pub fn is_uniform(&self) -> bool {
         !matches!(self, Self::Formula(formula) if formula.varies())
@@ -137,7 +168,12 @@ impl<const N: usize> Curve<N> {
     /// A curve through keys in ascending order of time.
     pub fn new(keys: Vec<(f64, [f64; N])>, interpolation: Interpolation) -> Result<Self, String> {
         if let Some(i) = keys.windows(2).position(|pair| pair[0].0 >= pair[1].0) {
-            return Err(format!("key {} at t = {} s is not later than the one before it, at {} s", i + 1, keys[i + 1].0, keys[i].0));
+            return Err(format!(
+                "key {} at t = {} s is not later than the one before it, at {} s",
+                i + 1,
+                plain(keys[i + 1].0),
+                plain(keys[i].0)
+            ));
         }
         let (times, values): (Vec<f64>, Vec<[f64; N]>) = keys.into_iter().unzip();
         let difference = |i: usize, c: usize| (values[i + 1][c] - values[i][c]) / (times[i + 1] - times[i]);
@@ -151,6 +187,22 @@ impl<const N: usize> Curve<N> {
         };
         let slopes = (0..values.len()).map(|i| std::array::from_fn(|c| slope(i, c))).collect();
         Ok(Self { times, values, slopes, interpolation })
+    }
+
+    /// The integral from a to b [s], piece by piece, each of which is a polynomial that Simpson's rule takes exactly.
+    pub fn integral(&self, a: f64, b: f64) -> [f64; N] {
+        let inner = self.times.iter().copied().filter(|key| *key > a && *key < b);
+        let (mut sum, mut from) = ([0.0; N], a);
+        for to in inner.chain([b]) {
+            for (c, sum) in sum.iter_mut().enumerate() {
+                *sum += match self.interpolation {
+                    Interpolation::Step => (to - from) * self.value(from)[c],
+                    _ => simpson(from, to, |t| self.value(t)[c]),
+                };
+            }
+            from = to;
+        }
+        sum
     }
 
     /// The numbers at a time [s].
@@ -184,6 +236,25 @@ impl<const N: usize> Curve<N> {
 mod tests {
     use super::*;
     use tumble_interface::scene::{Keys, VectorKeys};
+
+    /// Integrals by hand: keys 0 at 1 s, 2 at 2 s, 0 at 4 s hold a triangle of 3; with slope 0 at all of them a smooth curve
+    /// is symmetric about the middle of each piece and holds the same; steps hold 0 and 2*2.
+    #[test]
+    fn keys_are_integrated_exactly() {
+        let keys = |interpolation| Keys { keys: vec![[1.0, 0.0], [2.0, 2.0], [4.0, 0.0]], interpolation };
+        for (interpolation, parts) in [
+            (Interpolation::Linear, [0.25, 3.0, 0.5]),
+            // 2 (s³ - s⁴/2) up to s = 1/2; the second piece is its mirror image, twice as wide.
+            (Interpolation::Smooth, [0.1875, 3.0, 0.375]),
+            (Interpolation::Step, [0.0, 4.0, 2.0]),
+        ] {
+            let signal = Signal::new(&Animated::Keys(keys(interpolation))).unwrap();
+            let found = [signal.integral(0.0, 1.5), signal.integral(0.0, 9.0), signal.integral(3.0, 5.0)];
+            for (found, exact) in found.into_iter().zip(parts) {
+                assert!((found - exact).abs() < 1e-14, "{interpolation:?}: {found} {exact}");
+            }
+        }
+    }
 
     #[test]
     fn keys_hold_outside_and_join_inside() {

@@ -66,6 +66,14 @@ impl<L: Lane> Neg for Vec3<L> {
     }
 }
 
+impl Vec3<f64> {
+    /// A vector of the same direction whose square is a number: itself, unless it is extremely long or short.
+    pub fn tamed(self) -> Self {
+        let largest = self.x.abs().max(self.y.abs()).max(self.z.abs());
+        if (1e-150..1e150).contains(&largest) || largest == 0.0 { self } else { vec3(self.x / largest, self.y / largest, self.z / largest) }
+    }
+}
+
 impl<L: Lane> Vec3<L> {
     /// Inner product.
     #[inline(always)]

@@ -4,7 +4,7 @@
 use crate::geometry::{Collider, Sampler, Vector, sampling};
 use crate::math::{Random, Real, Row, Signal, VectorSignal, xyz64};
 use rayon::prelude::*;
-use tumble_interface::scene::{Between, Emitter as Words, WhenFull};
+use tumble_interface::scene::{Between, Cause, Emitter as Words, Event, Source, WhenFull};
 
 /// What random numbers are drawn for: the moment of birth, mass, radius and colour; the direction and speed; users' columns; the
 /// place. The lifetime has a quick number of its own.
@@ -92,6 +92,8 @@ pub struct Parent {
     pub x: Vector,
     /// Velocity [m/s].
     pub v: Vector,
+    /// Direction that counts as out of it: that of its velocity, or off what it bounces from.
+    pub normal: Vector,
     /// Age [s].
     pub age: f64,
     /// Age when the exchange interval began [s]; negative for one born in it.
@@ -106,6 +108,7 @@ fn spread(c: f64, spread: f64, u: impl FnOnce() -> f64) -> f64 {
 impl Emitter {
     /// An emitter of a scene, with what its words stand for.
     pub fn new(words: Words, course: Course, seed: u32, from: Origin, kill: Vec<Kill>, up: Vector, flat: Option<usize>) -> Self {
+        let words = Words { direction: words.direction.map(|d| Vector::from(d).tamed().into()), ..words };
         Self { random: Random::new(seed, &words.name), words, course, from, kill, up, flat }
     }
 
@@ -222,20 +225,32 @@ impl Emitter {
         self.words.lifetime.unwrap_or(f64::INFINITY) * (1.0 - self.words.lifetime_spread)
     }
 
-    /// Whether a particle is to die at time t, where an interval of length dt [s] ends.
+    /// Whether what happens to a parent makes a burst: a death of this cause, or else a bounce.
+    pub fn is_stirred_by(&self, death: Option<Cause>) -> bool {
+        match (&self.words.from, death) {
+            (Source::Particles { at: Event::Death, cause, .. }, Some(death)) => cause.is_empty() || cause.contains(&death),
+            (Source::Particles { at, .. }, None) => *at == Event::Bounce,
+            _ => false,
+        }
+    }
+
+    /// What a particle is to die of at time t, where an interval of length dt [s] ends; `None` if it lives on.
     #[inline]
-    pub fn dies(&self, (t, dt): (f64, f64), (id, age): (u32, f64), (x, v): (Row, Row), near: &Near<'_>) -> bool {
+    pub fn dies(&self, (t, dt): (f64, f64), (id, age): (u32, f64), (x, v): (Row, Row), near: &Near<'_>) -> Option<Cause> {
         // What a sum of intervals may have lost by rounding.
         let age = age + (age * age * (f64::from(Real::EPSILON) / dt)).min(SLACK * dt);
         if age >= self.youngest() && age >= self.lifetime(id) {
-            return true;
+            return Some(Cause::Lifetime);
         }
-        self.kill.iter().any(|rule| match rule {
-            Kill::Inside(solid) => solid.distance(xyz64(x), t, 0.0).0 < 0.0,
-            Kill::Outside(solid) => solid.distance(xyz64(x), t, 0.0).0 > 0.0,
-            Kill::NearCollider(distance) => near(xyz64(x), *distance),
-            Kill::SlowerThan(speed) => xyz64(v).norm_sq() < speed * speed,
-            Kill::FasterThan(speed) => xyz64(v).norm_sq() > speed * speed,
+        self.kill.iter().find_map(|rule| {
+            let (holds, cause) = match rule {
+                Kill::Inside(solid) => (solid.distance(xyz64(x), t, 0.0).0 < 0.0, Cause::Inside),
+                Kill::Outside(solid) => (solid.distance(xyz64(x), t, 0.0).0 > 0.0, Cause::Outside),
+                Kill::NearCollider(distance) => (near(xyz64(x), *distance), Cause::NearCollider),
+                Kill::SlowerThan(speed) => (xyz64(v).norm_sq() < speed * speed, Cause::SlowerThan),
+                Kill::FasterThan(speed) => (xyz64(v).norm_sq() > speed * speed, Cause::FasterThan),
+            };
+            holds.then_some(cause)
         })
     }
 
@@ -244,15 +259,12 @@ impl Emitter {
     }
 
     /// Particles that the rate has made by the time t + dt [s], a real number, if it was `before` at t. A constant rate is
-    /// taken from the start, a changing one by Simpson's rule.
+    /// taken from the start.
     pub fn flow(&self, before: f64, t: f64, dt: f64) -> f64 {
         let (start, end) = (self.words.start, self.words.end.unwrap_or(f64::INFINITY));
         let (a, b) = (t.clamp(start, end), (t + dt).clamp(start, end));
-        let rate = |t: f64| self.course.rate.value(t).max(0.0);
-        if self.course.rate.is_constant() {
-            return rate(t) * (b - start);
-        }
-        before + (b - a) / 6.0 * (rate(a) + 4.0 * rate(0.5 * (a + b)) + rate(b))
+        let rate = &self.course.rate;
+        if rate.is_constant() { rate.integral(start, b) } else { before + rate.integral(a, b).max(0.0) }
     }
 
     /// Those born in (t, t + dt] [s] while the flow goes from `before` to `after`, ids from `next` on.
@@ -288,12 +300,23 @@ impl Emitter {
         })
     }
 
-    /// Those born of the dead.
-    pub fn orphans(&self, dead: &[Parent], next: u64, room: Room) -> Option<Vec<Birth>> {
+    /// When and where one of n may be born before the end of the run [s], to look at beforehand.
+    pub fn trial(&self, k: usize, n: usize, end: f64) -> Option<(f64, Vector)> {
+        let Origin::Place(place) = &self.from else { return None };
+        let (start, bursts) = (self.words.start, &self.words.burst);
+        let by_rate = start + (self.words.end.unwrap_or(end).min(end) - start).max(0.0) * k as f64 / n as f64;
+        let by_burst = bursts.get(k / 2 % bursts.len().max(1)).filter(|b| b.count > 0).map(|b| b.time);
+        let t = if k % 2 == 1 && by_burst.is_some() || self.course.rate.value(by_rate) <= 0.0 { by_burst? } else { by_rate };
+        let x = place.sample(&|c| self.draw(k as u32, PLACE + c)).0 + self.course.path.value(t);
+        Some((t, self.flat.map_or(x, |axis| flattened(x, axis, false)))).filter(|_| t <= end)
+    }
+
+    /// Those born at once of parents that died or bounced.
+    pub fn bursts(&self, of: &[Parent], next: u64, room: Room) -> Option<Vec<Birth>> {
         let each: usize = self.words.burst.iter().map(|b| b.count as usize).sum();
-        self.bear(next, room.take(dead.len() * each)?, |k, id| {
-            let parent = dead[k / each];
-            Birth { time: parent.time, x: parent.x, v: self.velocity(parent.time, id, parent.v, parent.v), id }
+        self.bear(next, room.take(of.len() * each)?, |k, id| {
+            let parent = of[k / each];
+            Birth { time: parent.time, x: parent.x, v: self.velocity(parent.time, id, parent.normal, parent.v), id }
         })
     }
 
@@ -334,11 +357,9 @@ impl Emitter {
         Some((0..count).into_par_iter().with_min_len(256).map(one).collect())
     }
 
-    /// Where the source is at a time, and how fast it moves: by central differences.
+    /// Where the source is at a time, and how fast it moves.
     fn source(&self, t: f64) -> (Vector, Vector) {
-        const STEP: f64 = 1e-4;
-        let path = &self.course.path;
-        (path.value(t), (path.value(t + STEP) - path.value(t - STEP)) * (0.5 / STEP))
+        (self.course.path.value(t), self.course.path.velocity(t))
     }
 
     /// The velocity of one born at time t where the source has this normal and moves with this velocity.

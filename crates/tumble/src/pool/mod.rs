@@ -6,11 +6,13 @@ mod emitter;
 
 pub use emitter::{Birth, Course, Emitter, Kill, Near, Origin, Parent};
 
+use crate::geometry::Vector;
 use crate::math::{Real, Row, xyz64};
 use crate::state::Object;
 use crate::system::{Archive, Part};
 use rayon::prelude::*;
 use std::ops::Range;
+use tumble_interface::scene::Cause;
 use tumble_interface::{Column, Data, StepError};
 
 /// Rows per task when looking for the dead.
@@ -27,6 +29,27 @@ struct Stream {
     flow: f64,
 }
 
+/// A particle that met a solid.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Hit {
+    /// When [s].
+    pub time: f64,
+    /// Where [m].
+    pub x: Vector,
+    /// How fast it leaves [m/s].
+    pub v: Vector,
+    /// Out of the solid.
+    pub normal: Vector,
+}
+
+/// A particle of a stream that bears a burst before its interval ends: one that made room for a newborn, or bounced.
+struct Stirred {
+    stream: usize,
+    id: u32,
+    death: Option<Cause>,
+    parent: Parent,
+}
+
 /// The particles of all emitters of a system.
 #[derive(Default)]
 pub struct Pool {
@@ -39,6 +62,10 @@ pub struct Pool {
     age: Vec<Real>,
     /// Users' numbers, by name: one for each row, 0 where its stream has none.
     columns: Vec<(String, Vec<Real>)>,
+    /// Length of the current exchange interval [s].
+    interval: f64,
+    /// Parents that made room or bounced in it.
+    stirred: Vec<Stirred>,
 }
 
 /// How columns change when rows come or go.
@@ -118,6 +145,11 @@ impl Pool {
         self.first + self.id.len()
     }
 
+    /// Id of the particle in a row, if it is one of a pool's.
+    pub fn id_of(&self, row: usize) -> Option<u32> {
+        self.id.get(row.checked_sub(self.first)?).copied()
+    }
+
     /// Ids of the rows of an emitter.
     pub fn ids(&self, s: usize) -> &[u32] {
         let rows = self.rows(s);
@@ -141,6 +173,7 @@ impl Pool {
     /// Everyone grows older by dt [s]; tells who of each emitter will be born in (t, t + dt] by itself, in the order of their
     /// birth. `system` is the name of the pool's.
     pub fn conceive(&mut self, system: &str, t: f64, dt: f64) -> Result<Vec<Vec<Birth>>, StepError> {
+        self.interval = dt;
         let older = dt as Real;
         self.age.par_chunks_mut(TASK).for_each(|ages| ages.iter_mut().for_each(|age| *age += older));
         (0..self.len()).map(|s| self.births(s, t, dt).ok_or_else(|| self.full(s, system, t))).collect()
@@ -160,35 +193,37 @@ impl Pool {
         Some(births)
     }
 
-    /// Children, by emitter, of the particles of emitter `parent`, in an interval of length dt that ends at t [s], while these live and
-    /// when they die: `dead` are to leave. `system` is the name of the pool's.
+    /// Children, by emitter, of the particles of emitter `parent`, in an interval that ends at t [s], while these live and when they die
+    /// or bounce: `dead` are to leave. `system` is the name of the pool's.
     pub fn descendants(
         &mut self,
         parent: usize,
         system: &str,
-        (t, dt): (f64, f64),
-        dead: &[u32],
+        t: f64,
+        dead: &[(u32, Cause)],
         (x, v): (&[Row], &[Row]),
     ) -> Result<Vec<(usize, Vec<Birth>)>, StepError> {
         let children: Vec<usize> = (parent + 1..self.len()).filter(|child| self.parent(*child) == Some(parent)).collect();
-        let born = |s: usize| Ok((s, self.children(s, parent, (t, dt), dead, x, v).ok_or_else(|| self.full(s, system, t))?));
+        let born = |s: usize| Ok((s, self.children(s, parent, t, dead, x, v).ok_or_else(|| self.full(s, system, t))?));
         children.into_iter().map(born).collect()
     }
 
-    fn children(&mut self, s: usize, parent: usize, (t, dt): (f64, f64), dead: &[u32], x: &[Row], v: &[Row]) -> Option<Vec<Birth>> {
+    fn children(&mut self, s: usize, parent: usize, t: f64, dead: &[(u32, Cause)], x: &[Row], v: &[Row]) -> Option<Vec<Birth>> {
         let mut births = Vec::new();
         if self.streams[s].emitter.has_rate() {
-            let of = |k: usize| self.until_death(parent, k, (t, dt), x, v);
-            let parents: Vec<Parent> = (0..self.streams[parent].len).into_par_iter().with_min_len(TASK).map(of).collect();
+            let of =
+                |k: usize| self.until(parent, k, f64::INFINITY, (t, t), x[self.rows(parent).start + k], v[self.rows(parent).start + k]);
+            let mut parents: Vec<Parent> = (0..self.streams[parent].len).into_par_iter().with_min_len(TASK).map(of).collect();
+            parents.extend(self.stirred.iter().filter(|e| e.stream == parent && e.death.is_some()).map(|e| e.parent));
             let Stream { emitter, len, next, .. } = &mut self.streams[s];
             births = emitter.children(&parents, *next, emitter.room(*len)?)?;
             *next += births.len() as u64;
         }
-        let parents = self.mourn(parent, dead, (t, dt), x, v);
+        let parents = self.bearing(s, parent, t, dead, x, v);
         let Stream { emitter, len, next, .. } = &mut self.streams[s];
-        let orphans = emitter.orphans(&parents, *next, emitter.room(*len + births.len())?)?;
-        *next += orphans.len() as u64;
-        births.extend(orphans);
+        let bursts = emitter.bursts(&parents, *next, emitter.room(*len + births.len())?)?;
+        *next += bursts.len() as u64;
+        births.extend(bursts);
         Some(births)
     }
 
@@ -222,7 +257,7 @@ impl Pool {
         let start = self.rows(s).end;
         self.resize(total + k, owned, &moves);
         self.streams[s].len += k;
-        let Self { first, streams, id, age, columns } = self;
+        let Self { first, streams, id, age, columns, .. } = self;
         let emitter = &streams[s].emitter;
         for (i, birth) in births.iter().enumerate() {
             let row = start + i - *first;
@@ -280,9 +315,9 @@ impl Pool {
         }
     }
 
-    /// Who of an emitter is to die at time t, where an interval of length dt [s] ends, counted from its first row, in order. x and
-    /// v are all rows of the system; `near` tells whether a point is near a collider.
-    pub fn dead(&self, s: usize, t: (f64, f64), x: &[Row], v: &[Row], near: &Near<'_>) -> Vec<u32> {
+    /// Who of an emitter is to die, and of what, at time t, where an interval of length dt [s] ends, counted from its first row, in
+    /// order. x and v are all rows of the system; `near` tells whether a point is near a collider.
+    pub fn dead(&self, s: usize, t: (f64, f64), x: &[Row], v: &[Row], near: &Near<'_>) -> Vec<(u32, Cause)> {
         let (rows, emitter) = (self.rows(s), &self.streams[s].emitter);
         if emitter.is_immortal() {
             return Vec::new();
@@ -290,19 +325,20 @@ impl Pool {
         let (x, v, ids, ages) = (&x[rows.clone()], &v[rows], self.ids(s), self.ages(s));
         let tasks: Vec<Range<usize>> = (0..x.len()).step_by(TASK).map(|a| a..(a + TASK).min(x.len())).collect();
         let safe = emitter.safe_until(t.1);
-        let dies = |i: usize| emitter.dies(t, (ids[i], f64::from(ages[i])), (x[i], v[i]), near);
-        let among = |task: Range<usize>| -> Vec<u32> {
+        let dies = |i: usize| Some((i as u32, emitter.dies(t, (ids[i], f64::from(ages[i])), (x[i], v[i]), near)?));
+        let among = |task: Range<usize>| -> Vec<(u32, Cause)> {
             let old = ages[task.clone()].iter().zip(task).filter(|(age, _)| f64::from(**age) >= safe);
-            old.filter(|(_, i)| dies(*i)).map(|(_, i)| i as u32).collect()
+            old.filter_map(|(_, i)| dies(i)).collect()
         };
         tasks.into_par_iter().flat_map_iter(among).collect()
     }
 
-    /// The oldest of an emitter that has to make room for the newborn, if it may.
-    pub fn surplus(&self, s: usize, newborn: usize) -> Vec<u32> {
+    /// The oldest of an emitter that have to make room for the newborn, if they may: each dies as the one is born that takes its
+    /// room. The rows of x and v are as at the time `now` of an interval that ends at `end`.
+    pub fn surplus(&mut self, s: usize, births: &[Birth], times: (f64, f64), x: &[Row], v: &dyn Fn(usize) -> Row) -> Vec<u32> {
         let stream = &self.streams[s];
         let most = stream.emitter.most().unwrap_or(usize::MAX);
-        let over = (stream.len + newborn).saturating_sub(most).min(stream.len);
+        let over = (stream.len + births.len()).saturating_sub(most).min(stream.len);
         if over == 0 || !stream.emitter.replaces() {
             return Vec::new();
         }
@@ -316,23 +352,72 @@ impl Pool {
             all.select_nth_unstable_by(over - 1, older);
             all.truncate(over);
         }
+        if (0..self.len()).any(|child| self.parent(child) == Some(s)) {
+            all.sort_unstable_by(older);
+            let (room, start) = (most - stream.len, self.rows(s).start);
+            let stirred = all.iter().zip(&births[room..]).map(|(k, birth)| {
+                let (k, row) = (*k as usize, start + *k as usize);
+                let parent = self.until(s, k, birth.time, times, x[row], v(row));
+                Stirred { stream: s, id: ids[k], death: Some(Cause::Replaced), parent }
+            });
+            let stirred: Vec<Stirred> = stirred.collect();
+            self.stirred.extend(stirred);
+        }
         all.sort_unstable();
         all
     }
 
-    /// A particle of an emitter as a parent of others: as it is at the end t of an interval of length dt [s], or as it was when it
-    /// died.
-    fn until_death(&self, s: usize, k: usize, (t, dt): (f64, f64), x: &[Row], v: &[Row]) -> Parent {
-        let (row, age) = (self.rows(s).start + k, f64::from(self.ages(s)[k]));
-        let late = (age - self.streams[s].emitter.lifetime(self.ids(s)[k])).max(0.0);
-        let v = xyz64(v[row]);
-        Parent { time: t - late, x: xyz64(x[row]) - v * late, v, age: age - late, before: age - dt }
+    /// Whether the bounces of an emitter's particles bear others.
+    pub fn heeds_hits(&self, s: usize) -> bool {
+        (0..self.len()).any(|child| self.parent(child) == Some(s) && self.emitter(child).is_stirred_by(None))
     }
 
-    /// The dead as parents of others, in the order of their death, where an interval (t, dt) ends.
-    fn mourn(&self, s: usize, dead: &[u32], interval: (f64, f64), x: &[Row], v: &[Row]) -> Vec<Parent> {
-        let of = |k: &u32| (self.until_death(s, *k as usize, interval, x, v), self.ids(s)[*k as usize]);
-        let mut all: Vec<(Parent, u32)> = dead.iter().map(of).collect();
+    /// The rows of particles whose bounces bear others.
+    pub fn heeded(&self) -> Vec<Range<usize>> {
+        (0..self.len()).filter(|s| self.heeds_hits(*s)).map(|s| self.rows(s)).collect()
+    }
+
+    /// A particle in a row has met a solid.
+    pub fn note_row(&mut self, row: usize, hit: Hit) {
+        if let Some(s) = (0..self.len()).find(|s| self.rows(*s).contains(&row)) {
+            let k = row - self.first;
+            self.note(s, self.id[k], f64::from(self.age[k]), hit);
+        }
+    }
+
+    /// A particle of an emitter, which will have this age [s] when the interval ends, has met a solid.
+    pub fn note(&mut self, s: usize, id: u32, age: f64, hit: Hit) {
+        let Hit { time, x, v, normal } = hit;
+        self.stirred.push(Stirred { stream: s, id, death: None, parent: Parent { time, x, v, normal, age, before: 0.0 } });
+    }
+
+    /// The interval is over: everyone has borne.
+    pub fn calm(&mut self) {
+        self.stirred.clear();
+    }
+
+    /// Particle k of an emitter as a parent of others, with its row of x and v at the time `now` of an interval that ends at `end`:
+    /// as it is then, or as it was when it died, at the latest at the time `last`.
+    fn until(&self, s: usize, k: usize, last: f64, (now, end): (f64, f64), x: Row, v: Row) -> Parent {
+        let age = f64::from(self.ages(s)[k]);
+        let late = (age - self.streams[s].emitter.lifetime(self.ids(s)[k])).max(end - last).max(0.0);
+        let v = xyz64(v);
+        let ago = (late - (end - now)).max(0.0);
+        Parent { time: end - late, x: xyz64(x) - v * ago, v, normal: v, age: age - late, before: age - self.interval }
+    }
+
+    /// Parents that bear bursts of an emitter, in the order of their death or bounce, where an interval ends at t.
+    fn bearing(&self, child: usize, s: usize, t: f64, dead: &[(u32, Cause)], x: &[Row], v: &[Row]) -> Vec<Parent> {
+        let (emitter, start) = (&self.streams[child].emitter, self.rows(s).start);
+        let of = |(k, _): &(u32, Cause)| {
+            let (k, row) = (*k as usize, start + *k as usize);
+            (self.until(s, k, f64::INFINITY, (t, t), x[row], v[row]), self.ids(s)[k])
+        };
+        let died = dead.iter().filter(|(_, cause)| emitter.is_stirred_by(Some(*cause))).map(of);
+        // Whoever had died before it met the solid met none.
+        let lived = |e: &&Stirred| e.death.is_some() || e.parent.age - (t - e.parent.time) <= self.streams[s].emitter.lifetime(e.id);
+        let stirred = self.stirred.iter().filter(|e| e.stream == s && emitter.is_stirred_by(e.death)).filter(lived);
+        let mut all: Vec<(Parent, u32)> = died.chain(stirred.map(|e| (e.parent, e.id))).collect();
         all.sort_by(|(a, i), (b, j)| a.time.total_cmp(&b.time).then(i.cmp(j)));
         all.into_iter().map(|(parent, _)| parent).collect()
     }
@@ -379,6 +464,7 @@ impl Pool {
             (stream.len, stream.next, stream.flow) = (counts[0] as usize, counts[1] as u64, counts[2]);
         }
         let total = self.streams.iter().map(|s| s.len).sum::<usize>();
+        self.stirred.clear();
         self.id = archive.indices("id")?;
         archive.column("age", &mut self.age)?;
         let mut fits = self.id.len() == total && self.age.len() == total;

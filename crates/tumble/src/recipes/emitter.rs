@@ -6,7 +6,8 @@ use crate::geometry::{Sampler, Vector};
 use crate::math::rotation::{from_degrees, from_z_to};
 use crate::pool::{Course, Emitter, Kill, Origin};
 use tumble_interface::Mesh;
-use tumble_interface::scene::{Collider, Emitter as Words, Kill as Rule, MeshFile, Shape as Solid, Source};
+use tumble_interface::check::plain;
+use tumble_interface::scene::{Cause, Collider, Emitter as Words, Event, Kill as Rule, MeshFile, Shape as Solid, Source, WhenFull};
 
 /// Names that frames and files need for themselves.
 const TAKEN: [&str; 19] = [
@@ -47,13 +48,35 @@ pub fn emitter<'a>(
         wrong("", "it makes no particles; give it a rate, or a burst with a count");
     }
     if let (true, Some(i)) = (children, words.burst.iter().position(|b| b.time != 0.0)) {
-        wrong(&format!(".burst[{i}].time"), "children are born when the parent dies; leave it out");
+        wrong(&format!(".burst[{i}].time"), "children are born when the parent dies or bounces; leave it out");
     }
     if children && !course.rate.is_constant() {
         wrong(".rate", "the rate of children goes by the age of each parent and is constant");
     }
     if children && words.path.constant() != Some([0.0; 3]) {
         wrong(".path", "children are born where their parents are; leave it out");
+    }
+    if let Source::Particles { of, at, cause } = &words.from {
+        let parent = site.parts.emitters().find(|e| e.words().name == *of).map(|e| e.words());
+        let dies = |cause: &Cause| {
+            parent.is_none_or(|p| match cause {
+                Cause::Lifetime => p.lifetime.is_some(),
+                Cause::Replaced => p.when_full == WhenFull::ReplaceOldest,
+                _ => p.kill.iter().any(|rule| cause_of(rule) == *cause),
+            })
+        };
+        let key = |key: &str| format!(".from.particles.{key}");
+        if *at == Event::Bounce && tracers {
+            wrong(&key("at"), "tracers meet no colliders; leave it out, or use a dynamics system");
+        }
+        if *at == Event::Bounce && !cause.is_empty() {
+            wrong(&key("cause"), "a bounce is no death; leave it out");
+        } else if let Some(i) = cause.iter().position(|c| !dies(c)) {
+            wrong(&key(&format!("cause[{i}]")), &format!("nothing of \"{of}\" dies of that; give it such a rule, or leave it out"));
+        }
+        if (*at != Event::Death || !cause.is_empty()) && words.burst.iter().all(|b| b.count == 0) {
+            wrong(".burst", "missing: at and cause say when a burst is born; give one with a count");
+        }
     }
     let given = [
         (".velocity", words.velocity.constant() != Some([0.0; 3])),
@@ -73,6 +96,9 @@ pub fn emitter<'a>(
     if words.direction == Some([0.0; 3]) {
         wrong(".direction", "[0, 0, 0], expected a direction");
     }
+    if words.lifetime.is_none() && words.lifetime_spread != 0.0 {
+        wrong(".lifetime_spread", &format!("{}, but there is no lifetime to spread; set lifetime", words.lifetime_spread));
+    }
     if words.color.is_none() && (words.color_to.is_some() || words.color_end.is_some()) {
         wrong(".color", "color_to and color_end need a color to start from");
     }
@@ -88,7 +114,7 @@ pub fn emitter<'a>(
         wrong(&format!(".columns.{name}"), &format!("expected a name of letters, digits and _ that is none of {}", TAKEN.join(", ")));
     }
     if let Some((name, b)) = words.columns.iter().find(|(_, b)| b.to.is_some_and(|to| to < b.from)) {
-        wrong(&format!(".columns.{name}.to"), &format!("{}, expected >= {}", b.to.unwrap_or_default(), b.from));
+        wrong(&format!(".columns.{name}.to"), &format!("{}, expected >= {}", plain(b.to.unwrap_or_default()), plain(b.from)));
     }
     let vector = |v: &[f64; 3]| Vector::from(*v);
     let mut sampled = |key: &str, file: &MeshFile, sampler: fn(&Mesh) -> Option<Sampler>, nothing: &str| match mesh(file) {
@@ -117,7 +143,7 @@ pub fn emitter<'a>(
             wrong(".from.disk.normal", "[0, 0, 0], expected a direction");
             None
         }
-        Source::Disk { center, normal, radius } => Some(Sampler::Disk(vector(center), from_z_to(vector(normal)), *radius)),
+        Source::Disk { center, normal, radius } => Some(Sampler::Disk(vector(center), from_z_to(vector(normal).tamed()), *radius)),
         Source::Sphere { center, radius, surface } => Some(Sampler::Ball(vector(center), *radius, *surface)),
         Source::Box { center, size, rotate } => Some(Sampler::Box(vector(center), vector(size), from_degrees(*rotate))),
         Source::MeshSurface(file) => sampled(".from.mesh_surface", file, Sampler::surface, "the mesh has no triangle with an area"),
@@ -160,7 +186,7 @@ pub fn emitter<'a>(
         });
     }
     let parent = match &words.from {
-        Source::Particles { of } => {
+        Source::Particles { of, .. } => {
             let parent = site.parts.stream(of);
             if parent.is_none() {
                 let message = format!("\"{of}\" is no emitter of the same system that stands before this one");
@@ -172,6 +198,17 @@ pub fn emitter<'a>(
     };
     if let Some(origin) = place.map(Origin::Place).or(parent) {
         site.parts.emitter(Emitter::new(words.clone(), course, seed, origin, kill, site.up, flat));
+    }
+}
+
+/// What those die of whom a rule kills.
+fn cause_of(rule: &Rule) -> Cause {
+    match rule {
+        Rule::Inside(_) => Cause::Inside,
+        Rule::Outside(_) => Cause::Outside,
+        Rule::NearCollider(_) => Cause::NearCollider,
+        Rule::SlowerThan(_) => Cause::SlowerThan,
+        Rule::FasterThan(_) => Cause::FasterThan,
     }
 }
 

@@ -44,10 +44,10 @@ pub fn solid(thing: &Thing, meshes: &[Mesh]) -> Result<Collider, Wrong> {
         }
         Words::Plane { point, normal } => {
             let normal = Vector::from(*normal);
-            if normal.norm() == 0.0 {
+            if normal == Vector::default() {
                 return wrong(".shape.plane.normal", "[0, 0, 0] has no direction".into());
             }
-            let normal = normal.normalized();
+            let normal = normal.tamed().normalized();
             Shape::Plane { normal, offset: normal.dot(Vector::from(*point)) }
         }
         Words::Floor { height } => Shape::Plane { normal: [0.0, 0.0, 1.0].into(), offset: *height },
@@ -152,7 +152,7 @@ pub fn scenery(thing: &Thing, meshes: &[Mesh]) -> Mesh {
     match &thing.shape {
         Words::Sphere { center, radius } => surface::sphere(4, (*center).into(), *radius),
         Words::Box { center, size, rotate } => surface::cuboid((*center).into(), Vector::from(*size) * 0.5, from_degrees(*rotate)),
-        Words::Plane { point, normal } => surface::square((*point).into(), Vector::from(*normal).normalized(), PLANE),
+        Words::Plane { point, normal } => surface::square((*point).into(), Vector::from(*normal).tamed().normalized(), PLANE),
         Words::Floor { height } => surface::square([0.0, 0.0, *height].into(), [0.0, 0.0, 1.0].into(), PLANE),
         Words::Capsule { from, to, radius } => surface::capsule((*from).into(), (*to).into(), *radius),
         Words::Mesh(_) | Words::AnimatedMesh(_) => meshes.first().cloned().unwrap_or_default(),

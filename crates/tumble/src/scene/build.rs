@@ -2,11 +2,11 @@
 
 use super::Assets;
 use super::checks::{check, objects, others, place};
-use super::laws::Reader;
+use super::laws::{Reader, flat};
 use super::memory::memory;
 use crate::exchange::Exchange;
 use crate::geometry::{Collider, Vector};
-use crate::math::formula::Of;
+use crate::math::parallel::fold;
 use crate::pool::{Course, Emitter as Emission};
 use crate::recipes::{self, Site};
 use crate::state::Object;
@@ -17,10 +17,14 @@ use crate::systems::vicsek::Swarm;
 use crate::world::World;
 use std::borrow::Cow;
 use std::sync::Arc;
+use tumble_interface::check::plain;
 use tumble_interface::scene::{
-    Anchor, Bits, Emitter, Force as Words, MeshFile, Method, Particles, Plane, Scene, Shape, System as Plan, Vicsek,
+    Anchor, Bits, Emitter, Event, Force as Words, Kill, MeshFile, Method, Particles, Plane, Scene, Shape, Source, System as Plan, Vicsek,
 };
 use tumble_interface::{Column, Data, Issue, Mesh, SceneError};
+
+/// Births that are looked at before a run.
+const TRIALS: usize = 64;
 
 /// A world, the surfaces of its colliders, and what is doubtful about it.
 pub struct Built {
@@ -101,17 +105,48 @@ pub fn build(scene: &Scene, assets: &Assets) -> Result<Built, SceneError> {
             native: scene.bits == Bits::Native,
             colliders: colliders.clone(),
         };
+        warnings.extend(buried(scene, &parts, &colliders));
         let mut system = parts.build(settings).map_err(|e| placed(scene, e))?;
         anchors.iter().for_each(|anchor| hang(&mut system, index, anchor, dt, &mut exchange, &mut warnings));
         systems.push(Box::new(system));
     }
     let world = World::new(systems, exchange, scene.frame_time(), scene.time.exchanges);
-    let (books, thickest) = (world.ledger(), scene.collider.iter().map(|c| c.thickness).fold(0.0, f64::max));
-    if books.penetration > thickest {
-        let deep = books.penetration - thickest;
-        warnings.push(format!("masses start up to {deep:.3} m inside a collider, and will be thrown out of it; move one of them"));
-    }
     Ok(Built { world, scenery, colliders, warnings })
+}
+
+/// What starts inside a collider.
+fn buried(scene: &Scene, parts: &Parts, colliders: &[Collider]) -> Vec<String> {
+    type Start = (f64, Vector);
+    let deeper = |a: (f64, f64, usize), b: (f64, f64, usize)| if b.0 > a.0 { b } else { a };
+    let deepest = |start: &(dyn Fn(usize) -> Option<Start> + Sync), n: usize, spare: f64| {
+        let one = |i: usize| {
+            let (t, x) = start(i)?;
+            let depth = |(k, c): (usize, &Collider)| Some((c.touch(x, t)?.depth - c.thickness, t, k));
+            colliders.iter().enumerate().filter_map(depth).filter(|found| found.0 > spare).reduce(deeper)
+        };
+        fold(n, |range| range.filter_map(one).reduce(deeper)).into_iter().flatten().reduce(deeper)
+    };
+    let end = scene.frame_time() * f64::from(scene.time.frames);
+    let masses = parts.ranges().map(|(name, range)| {
+        let free = |i: usize| (parts.inverse_mass(i as u32) > 0.0).then(|| (0.0, parts.position(i as u32)));
+        (name, deepest(&|i| free(range.start + i), range.len(), 1e-6))
+    });
+    // A source may touch a surface: particles are not deep in it before they are all in it.
+    let sources = parts.emitters().map(|e| (e.words().name.as_str(), deepest(&|k| e.trial(k, TRIALS, end), TRIALS, e.words().radius)));
+    let told = |(name, found): (&str, Option<(f64, f64, usize)>)| {
+        let (deep, t, k) = found?;
+        let (deep, solid) = (short(deep), &scene.collider[k].name);
+        let when = if t > 0.0 { format!(" at t = {} s", short(t)) } else { String::new() };
+        Some(format!(
+            "masses of \"{name}\" start{when} up to {deep} m inside collider \"{solid}\", and will be thrown out of it; move one of them"
+        ))
+    };
+    masses.chain(sources).filter_map(told).collect()
+}
+
+/// A number with three digits.
+fn short(x: f64) -> String {
+    plain(format!("{x:.2e}").parse().unwrap_or(x))
 }
 
 /// The scene with the masses of its clouds drawn.
@@ -157,6 +192,23 @@ fn unused(scene: &Scene, plans: &[Plan]) -> Vec<String> {
         let any = scene.particles.iter().any(charged) || scene.emitter.iter().any(emitted);
         if matches!(force, Words::Magnetic { .. } | Words::Electric { .. } | Words::Electrostatics { .. }) && !any {
             warnings.push(format!("force[{i}]: nothing in its reach has a charge; give particles a charge"));
+        }
+    }
+    if scene.collider.is_empty() {
+        for emitter in &scene.emitter {
+            if let Some(i) = emitter.kill.iter().position(|rule| matches!(rule, Kill::NearCollider(_))) {
+                let name = &emitter.name;
+                warnings.push(format!("emitter \"{name}\".kill[{i}]: near_collider, but there is no collider; add one, or leave it out"));
+            }
+        }
+        for emitter in &scene.emitter {
+            if matches!(&emitter.from, Source::Particles { at: Event::Bounce, .. }) {
+                let name = &emitter.name;
+                warnings.push(format!("emitter \"{name}\".from.particles.at: there is no collider to bounce off; add one"));
+            }
+        }
+        for (i, _) in scene.force.iter().enumerate().filter(|(_, f)| matches!(f, Words::Flock { avoidance, .. } if *avoidance > 0.0)) {
+            warnings.push(format!("force[{i}].avoidance: there is no collider to shun; add one, or leave it out"));
         }
     }
     if let Some(last) = scene.output.stills.iter().find(|i| **i > scene.time.frames) {
@@ -227,7 +279,7 @@ fn fill(scene: &Scene, plans: &[Plan], assets: &Assets, issues: &mut Vec<Issue>)
             }
         });
     }
-    let flat = (scene.dimension == 2).then_some(if scene.plane == Plane::Xz { 1 } else { 2 });
+    let flat = flat(scene);
     for thing in &scene.emitter {
         let mesh = |file: &MeshFile| assets.get(&file.path);
         let at_path = |key: &str| format!("emitter \"{}\".{key}", thing.name);
@@ -235,8 +287,8 @@ fn fill(scene: &Scene, plans: &[Plan], assets: &Assets, issues: &mut Vec<Issue>)
             let mut reader = Reader::new(scene, site.issues);
             let course = Course {
                 rate: reader.signal(&at_path("rate"), &thing.rate, 0.0),
-                velocity: reader.vector(&at_path("velocity"), &thing.velocity, Of::Time),
-                path: reader.vector(&at_path("path"), &thing.path, Of::Time),
+                velocity: reader.in_plane(&at_path("velocity"), &thing.velocity),
+                path: reader.in_plane(&at_path("path"), &thing.path),
             };
             let tracers = place(plans, "emitter", thing.system.as_deref()).is_some_and(|i| plans[i].method == Method::Tracers);
             recipes::emitter(site, thing, course, (scene.seed, flat, tracers), &mesh);
@@ -362,6 +414,10 @@ fn link(scene: &Scene, plans: &[Plan], anchor: &Anchor, parts: &[Parts], issues:
             wrong(format!("\"{name}\" has no masses to pull"));
             return None;
         };
+        if kind == "emitter" {
+            wrong(format!("the particles of emitter \"{name}\" come and go; an anchor needs a mass that stays"));
+            return None;
+        }
         if index >= range.len() {
             wrong(format!("there is no mass {index} in \"{name}\"; the last one is {}", range.len().saturating_sub(1)));
             return None;

@@ -1,10 +1,11 @@
 //! What the schema cannot say: things that depend on several values together.
 
+use super::laws::off_plane;
 use crate::systems::dynamics::MOST_SUBSTEPS;
 use std::collections::HashSet;
 use tumble_interface::Issue;
 use tumble_interface::check::suggestion;
-use tumble_interface::scene::{Force, Integrator, Method, Plane, Scene, Shape, System};
+use tumble_interface::scene::{Force, Integrator, Method, Plane, Scene, Shape, Source, System};
 
 /// Column names that a frame may hold.
 pub const COLUMNS: [&str; 5] = ["position", "velocity", "orientation", "angular_velocity", "link_strain"];
@@ -205,25 +206,64 @@ fn check_plane(scene: &Scene, wrong: &mut impl FnMut(String, String)) {
     for thing in &scene.particles {
         for (key, p) in thing.cloud.iter().flat_map(|c| [("center", c.center), ("size", c.size)]) {
             if p[axis] != 0.0 {
-                wrong(
-                    format!("particles \"{}\".cloud.{key}", thing.name),
-                    format!("{name} = {}, expected 0 in a scene of dimension 2", p[axis]),
-                );
+                wrong(format!("particles \"{}\".cloud.{key}", thing.name), off_plane(axis, p[axis]));
             }
         }
         for (key, list) in [("position", &thing.position), ("velocity", &thing.velocity)] {
             if let Some(i) = list.iter().position(|p| p[axis] != 0.0) {
-                wrong(
-                    format!("particles \"{}\".{key}[{i}]", thing.name),
-                    format!("{name} = {}, expected 0 in a scene of dimension 2", list[i][axis]),
-                );
+                wrong(format!("particles \"{}\".{key}[{i}]", thing.name), off_plane(axis, list[i][axis]));
+            }
+        }
+    }
+    for thing in &scene.emitter {
+        let mut flat = |key: &str, p: &[f64; 3]| {
+            if p[axis] != 0.0 {
+                wrong(format!("emitter \"{}\".{key}", thing.name), off_plane(axis, p[axis]));
+            }
+        };
+        if let Some(direction) = &thing.direction {
+            flat("direction", direction);
+        }
+        match &thing.from {
+            Source::Point { at } => flat("from.point.at", at),
+            Source::Curve { points } => points.iter().enumerate().for_each(|(i, p)| flat(&format!("from.curve.points[{i}]"), p)),
+            Source::Disk { center, normal, .. } => {
+                flat("from.disk.center", center);
+                // A disk in the plane, or a line.
+                if (0..3).any(|a| a != axis && normal[a] != 0.0) {
+                    flat("from.disk.normal", normal);
+                } else if thing.direction.is_none() && thing.speed != 0.0 {
+                    let message = "missing: the normal of the disk points out of the plane of a scene of dimension 2";
+                    wrong(format!("emitter \"{}\".direction", thing.name), message.into());
+                }
+            }
+            Source::Sphere { center, .. } => flat("from.sphere.center", center),
+            Source::Box { center, size, rotate } => {
+                flat("from.box.center", center);
+                flat("from.box.size", size);
+                if (0..3).any(|a| a != axis && rotate[a] != 0.0) {
+                    let message = format!("{rotate:?}, expected a turn about {name} in a scene of dimension 2");
+                    wrong(format!("emitter \"{}\".from.box.rotate", thing.name), message);
+                }
+            }
+            Source::MeshSurface(_) | Source::MeshVolume(_) => {
+                let message = "a mesh does not fit into a plane; use another source, or dimension = 3";
+                wrong(format!("emitter \"{}\".from", thing.name), message.into());
+            }
+            Source::Particles { .. } => {}
+        }
+    }
+    for (i, force) in scene.force.iter().enumerate() {
+        if let Force::Flock { goal, .. } = force {
+            for (k, goal) in goal.iter().enumerate().filter(|(_, g)| g.point[axis] != 0.0) {
+                wrong(format!("force[{i}].goal[{k}].point"), off_plane(axis, goal.point[axis]));
             }
         }
     }
     for thing in &scene.rope {
         for (key, p) in [("from", thing.from), ("to", thing.to)] {
             if p[axis] != 0.0 {
-                wrong(format!("rope \"{}\".{key}", thing.name), format!("{name} = {}, expected 0 in a scene of dimension 2", p[axis]));
+                wrong(format!("rope \"{}\".{key}", thing.name), off_plane(axis, p[axis]));
             }
         }
     }

@@ -6,6 +6,7 @@ use crate::forces::{
 use crate::math::formula::Of;
 use crate::math::{Signal, Vec3, VectorSignal};
 use tumble_interface::Issue;
+use tumble_interface::check::plain;
 use tumble_interface::scene::{Animated, AnimatedVector, Field, Force as Words, Plane, Scene};
 
 /// Times at which a value that changes is tried, at most.
@@ -36,11 +37,12 @@ impl<'a> Reader<'a> {
             Err(message) => return self.wrong(path, message).into(),
         };
         let tried = if signal.is_constant() { &self.times[..1] } else { &self.times[..] };
-        let bad = tried.iter().map(|t| (*t, signal.value(*t))).find(|(_, value)| !value.is_finite() || *value < least);
+        let tried = tried.iter().chain(signal.key_times());
+        let bad = tried.map(|t| (*t, signal.value(*t))).find(|(_, value)| !value.is_finite() || *value < least);
         if let Some((t, value)) = bad {
             let expected = if least.is_finite() { format!(">= {least}") } else { "a finite number".into() };
-            let at = if signal.is_constant() { String::new() } else { format!(" at t = {t} s") };
-            self.wrong(path, format!("{value}{at}, expected {expected}"));
+            let at = if signal.is_constant() { String::new() } else { format!(" at t = {} s", plain(t)) };
+            self.wrong(path, format!("{}{at}, expected {expected}", plain(value)));
         }
         signal
     }
@@ -57,7 +59,22 @@ impl<'a> Reader<'a> {
         if signal.is_uniform() {
             let bad = self.times.iter().map(|t| (*t, signal.value(*t))).find(|(_, v)| !v.norm_sq().is_finite());
             if let Some((t, v)) = bad {
-                self.wrong(path, format!("[{}, {}, {}] at t = {t} s, expected finite numbers", v.x, v.y, v.z));
+                let finite = [v.x, v.y, v.z].iter().all(|c| c.is_finite());
+                let expected = if finite { "a length below 1e154" } else { "finite numbers" };
+                let at = if signal.is_constant() { String::new() } else { format!(" at t = {} s", plain(t)) };
+                self.wrong(path, format!("[{}, {}, {}]{at}, expected {expected}", plain(v.x), plain(v.y), plain(v.z)));
+            }
+        }
+        signal
+    }
+
+    /// A vector of time alone, which must lie in the plane of a scene of dimension 2.
+    pub fn in_plane(&mut self, path: &str, words: &AnimatedVector) -> VectorSignal {
+        let signal = self.vector(path, words, Of::Time);
+        if let Some(axis) = self.flat {
+            let bad = self.times.iter().map(|t| <[f64; 3]>::from(signal.value(*t))[axis]).find(|c| *c != 0.0);
+            if let Some(c) = bad {
+                self.wrong(path, off_plane(axis, c));
             }
         }
         signal
@@ -68,7 +85,7 @@ impl<'a> Reader<'a> {
             self.wrong(path, "[0, 0, 0], expected a direction".into());
             return [0.0, 0.0, 1.0].into();
         }
-        Vec3::from(axis).normalized()
+        Vec3::from(axis).tamed().normalized()
     }
 
     fn wrong(&mut self, path: &str, message: String) -> f64 {
@@ -169,7 +186,12 @@ impl<'a> Reader<'a> {
     }
 }
 
+/// What is wrong with a vector that has this component along the axis that is missing.
+pub fn off_plane(axis: usize, component: f64) -> String {
+    format!("{} = {}, expected 0 in a scene of dimension 2", ["x", "y", "z"][axis], plain(component))
+}
+
 /// The axis across the plane of a scene of dimension 2.
-fn flat(scene: &Scene) -> Option<usize> {
+pub fn flat(scene: &Scene) -> Option<usize> {
     (scene.dimension == 2).then(|| if scene.plane == Plane::Xz { 1 } else { 2 })
 }

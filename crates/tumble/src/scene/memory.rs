@@ -77,7 +77,7 @@ fn alive(scene: &Scene) -> Vec<f64> {
     for thing in &scene.emitter {
         let burst: f64 = thing.burst.iter().map(|b| f64::from(b.count)).sum();
         let (rate, bursts) = match &thing.from {
-            Source::Particles { of } => {
+            Source::Particles { of, .. } => {
                 let parent = scene.emitter.iter().zip(&births).find(|(parent, _)| parent.name == *of);
                 let each = |parent: f64| rate_of(thing) * parent + burst;
                 parent.map_or((0.0, 0.0), |(p, (rate, bursts))| {

@@ -72,7 +72,12 @@ impl Tracers {
         if births.is_empty() {
             return;
         }
-        let surplus = self.pool.surplus(s, births.len());
+        let (flow, x) = (&self.flow, &self.x);
+        let velocity = |row: usize| {
+            let u = flow.at(until, xyz64(x[row]));
+            [u.x as Real, u.y as Real, u.z as Real, 0.0]
+        };
+        let surplus = self.pool.surplus(s, births, (until, end), x, &velocity);
         self.pool.remove(s, &surplus, owned(&mut self.x, &mut self.memory));
         let births = &births[births.len().saturating_sub(self.pool.emitter(s).most().unwrap_or(usize::MAX))..];
         let rows = self.pool.insert(s, births, end, owned(&mut self.x, &mut self.memory));
@@ -101,12 +106,14 @@ impl Tracers {
             let (flow, x) = (&self.flow, &self.x);
             chunks(&mut v, |start, v| flow.velocities(t, &x[start..start + v.len()], v));
             let dead = self.pool.dead(s, (t, dt), &self.x, &v, &|_, _| false);
-            for (child, births) in self.pool.descendants(s, &self.settings.name, (t, dt), &dead, (&self.x, &v))? {
+            for (child, births) in self.pool.descendants(s, &self.settings.name, t, &dead, (&self.x, &v))? {
                 born[child] = births;
             }
+            let dead: Vec<u32> = dead.into_iter().map(|(k, _)| k).collect();
             self.pool.remove(s, &dead, owned(&mut self.x, &mut self.memory));
             self.count_rows();
         }
+        self.pool.calm();
         Ok(())
     }
 
@@ -266,6 +273,7 @@ impl System for Tracers {
             object: object.map_or(String::new(), |o| o.name.clone()),
             column: "position".into(),
             index: object.map_or(i, |o| i - o.points.start),
+            id: self.pool.id_of(i),
             time: t,
             integrator: self.settings.integrator.name().into(),
             step: 0.0,

@@ -133,6 +133,9 @@ impl Formula {
                 if let Some((_, value)) = CONSTANTS.iter().find(|(n, _)| n == name) {
                     return constant(*value, code);
                 }
+                if FUNCTIONS.iter().any(|(function, _)| function == name) {
+                    return Err(format!("\"{name}\" is a function; write {name}(...)"));
+                }
                 let Some(index) = VARIABLES[..of as usize].iter().position(|v| v == name) else {
                     return Err(unknown(name, of));
                 };

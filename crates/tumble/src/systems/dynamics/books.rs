@@ -305,6 +305,7 @@ impl Dynamics {
             object,
             column: column.into(),
             index,
+            id: self.pool.id_of(i),
             time: t,
             integrator: self.integrator.name().into(),
             step: 0.0,

@@ -141,6 +141,11 @@ impl Parts {
         std::mem::take(&mut self.emitters)
     }
 
+    /// Its emitters.
+    pub fn emitters(&self) -> impl Iterator<Item = &Emitter> {
+        self.emitters.iter()
+    }
+
     /// The emitter of that name, counted from the first.
     pub fn stream(&self, name: &str) -> Option<usize> {
         self.emitters.iter().position(|e| e.words().name == name)

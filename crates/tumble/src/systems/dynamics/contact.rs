@@ -5,6 +5,7 @@
 use crate::elements::{Block, Linear, PointPlane, forces};
 use crate::geometry::{Collider, Impact, Touch, Vector};
 use crate::math::{Real, Row, row, xyz64};
+use crate::pool::Hit;
 
 /// Penalty stiffness over m/h²: a resting mass sinks in by g h²/30, 0.006 mm at 240 steps a second.
 const PENALTY: f64 = 30.0;
@@ -27,6 +28,8 @@ pub struct Step {
     pub resting: f64,
     /// Of the scheme: the velocity of the path is v + lead h a.                                    (contact.14)
     pub lead: f64,
+    /// Whether anybody heeds who hits what.
+    pub heeded: bool,
 }
 
 impl Step {
@@ -40,11 +43,12 @@ impl Step {
 ///
 /// First what it met on its way, impact by impact; then, where it ended too deep, position: out along the normal; of the
 /// way made along the surface as much is taken back as friction allows, mu times the depth. Velocity: v_n -> -e v_n, and
-/// v_t loses at most mu times the change of v_n, all relative to the surface.      (contact.2, contact.3)
-pub fn resolve(colliders: &[Collider], step: &Step, before: (Row, Row), x: &mut Row, v: &mut Row) -> bool {
+/// v_t loses at most mu times the change of v_n, all relative to the surface. `hits` is told what it hits faster than
+/// `resting`.                                                                        (contact.2, contact.3)
+pub fn resolve(colliders: &[Collider], step: &Step, before: (Row, Row), x: &mut Row, v: &mut Row, mut hits: impl FnMut(Hit)) -> bool {
     let pull = (xyz64(*v) - xyz64(before.1)) * (1.0 / step.h);
     let ahead = pull * (step.lead * step.h);
-    let mut touched = meet(colliders, step, before, (pull, ahead), x, v);
+    let mut touched = meet(colliders, step, before, (pull, ahead), x, v, &mut hits);
     for collider in colliders {
         // A container bends towards what goes along its wall, and has corners where three walls meet.
         for _ in 0..if collider.inside { 3 } else { 1 } {
@@ -55,7 +59,11 @@ pub fn resolve(colliders: &[Collider], step: &Step, before: (Row, Row), x: &mut 
             let along = way - normal * way.dot(normal);
             let back = (collider.friction * depth).min(along.norm());
             let position = position + normal * depth - along.normalized() * back;
+            let approach = (velocity - surface).dot(normal);
             let velocity = rebound(collider, velocity - surface, ahead, normal, step.resting) + surface;
+            if step.heeded && approach < -step.resting {
+                hits(Hit { time: step.end(), x: position, v: velocity, normal });
+            }
             *x = row(real(position), x[3]);
             *v = row(real(velocity), 0.0);
         }
@@ -80,7 +88,15 @@ fn limited(v: Vector, most: f64) -> Vector {
 /// Follows a mass through its step from impact to impact, under the acceleration `pull` that the step has found; says whether
 /// there was one. The velocity of its path is `ahead` of its own. Slow contact that ends in touch is left to the pass at the
 /// end.                                                                               (contact.12, contact.14)
-fn meet(colliders: &[Collider], step: &Step, before: (Row, Row), (pull, ahead): (Vector, Vector), x: &mut Row, v: &mut Row) -> bool {
+fn meet(
+    colliders: &[Collider],
+    step: &Step,
+    before: (Row, Row),
+    (pull, ahead): (Vector, Vector),
+    x: &mut Row,
+    v: &mut Row,
+    hits: &mut impl FnMut(Hit),
+) -> bool {
     let (mut from, mut to) = (xyz64(before.0), xyz64(*x));
     let (mut start, mut end) = (xyz64(before.1), xyz64(*v));
     let mut gone = 0.0;
@@ -104,7 +120,11 @@ fn meet(colliders: &[Collider], step: &Step, before: (Row, Row), (pull, ahead): 
         let s = on_parabola(hit.part, ((to - from) - surface * left).dot(n), bend.dot(n));
         from = from + (to - from) * s - bend * (s * (1.0 - s));
         gone += left * s;
-        start = rebound(collider, start + pull * (left * s) - surface, ahead, n, step.resting);
+        let arriving = start + pull * (left * s) - surface;
+        start = rebound(collider, arriving, ahead, n, step.resting);
+        if step.heeded && arriving.dot(n) < -step.resting {
+            hits(Hit { time: step.t + gone, x: from, v: start + surface, normal: n });
+        }
         let rest = step.h - gone;
         let (press, lift) = (pull.dot(n), start.dot(n) + ahead.dot(n).min(0.0));
         if lift <= 0.01 * step.resting && press < 0.0 {
@@ -150,31 +170,36 @@ fn on_parabola(part: f64, fall: f64, bend: f64) -> f64 {
 
 /// After an implicit step: a mass that came in faster than `resting` leaves with e times its speed. One that the penalty
 /// could not hold, deeper than gravity takes it in two steps or beyond the solid, is caught on its way.
-pub fn bounce(colliders: &[Collider], step: &Step, before: (Row, Row), x: &mut Row, v: &mut Row) -> bool {
+pub fn bounce(colliders: &[Collider], step: &Step, before: (Row, Row), x: &mut Row, v: &mut Row, mut hits: impl FnMut(Hit)) -> bool {
     let (from, to) = (xyz64(before.0), xyz64(*x));
+    // What the penalty slows down over some steps is one impact.
+    let fresh = |collider: &Collider| step.heeded && collider.touch(from, step.t).is_none();
     for collider in colliders {
         let deep = collider.touch(to, step.end());
         if deep.is_some_and(|t| t.depth > collider.thickness + step.resting * step.h && t.depth < -2.0 * step.h * approach(&t, before.1)) {
             // As if nothing had held it.
             *v = before.1;
             *x = row(real(from + xyz64(*v) * step.h), x[3]);
-            return resolve(colliders, step, before, x, v);
+            return resolve(colliders, &Step { heeded: fresh(collider), ..*step }, before, x, v, hits);
         }
         if let Some(hit) = collider.sweep(from, to, step.t, step.end())
             && !deep.is_some_and(|t| t.normal.dot(hit.normal) > 0.0)
         {
-            return resolve(colliders, step, before, x, v);
+            return resolve(colliders, &Step { heeded: fresh(collider), ..*step }, before, x, v, hits);
         }
     }
     let mut touched = false;
-    for collider in colliders.iter().filter(|c| c.restitution > 0.0) {
+    for collider in colliders.iter().filter(|c| c.restitution > 0.0 || step.heeded) {
         let Some(touch) = collider.touch(xyz64(*x), step.end()) else { continue };
         let approach = approach(&touch, before.1);
         let (normal, velocity) = (touch.normal, xyz64(*v));
         let wanted = touch.velocity.dot(normal) - collider.restitution * approach;
-        if approach < -step.resting && velocity.dot(normal) < wanted {
+        if collider.restitution > 0.0 && approach < -step.resting && velocity.dot(normal) < wanted {
             *v = row(real(velocity + normal * (wanted - velocity.dot(normal))), 0.0);
             touched = true;
+        }
+        if approach < -step.resting && fresh(collider) {
+            hits(Hit { time: step.end(), x: to, v: xyz64(*v), normal });
         }
     }
     touched

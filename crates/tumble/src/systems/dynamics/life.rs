@@ -9,7 +9,7 @@ use super::{BLOCK, Dynamics, contact};
 use crate::forces::One;
 use crate::integrators::{self, Equation, Memory, Scratch, Step};
 use crate::math::{Real, Row, Vec3, ZERO, axpy, xyz64};
-use crate::pool::{Birth, Columns, Pool, due};
+use crate::pool::{Birth, Columns, Hit, Pool, due};
 use crate::state::Masses;
 use rayon::prelude::*;
 use tumble_interface::StepError;
@@ -22,6 +22,8 @@ const PIECES: f64 = 1000.0;
 struct Grown {
     x: Vec<Row>,
     v: Vec<Row>,
+    /// Solids that they met, with the place of each in the list of births.
+    hits: Vec<(usize, Hit)>,
 }
 
 impl Dynamics {
@@ -38,7 +40,7 @@ impl Dynamics {
             let births = due(unborn, until, end);
             if !births.is_empty() {
                 let grown = self.grow(s, &births, (until, h, 0))?;
-                self.settle(s, &births, grown, end);
+                self.settle(s, &births, grown, (until, end));
             }
         }
         Ok(())
@@ -61,13 +63,14 @@ impl Dynamics {
                         Some(all) => {
                             all.x.extend(grown.x);
                             all.v.extend(grown.v);
+                            all.hits.extend(grown.hits.into_iter().map(|(i, hit)| (first + i, hit)));
                         }
                     }
                     first = last;
                 }
             }
             if let Some(grown) = all {
-                self.settle(s, &births, grown, end);
+                self.settle(s, &births, grown, (end, end));
             }
         }
         Ok(())
@@ -81,9 +84,10 @@ impl Dynamics {
         let mut x: Vec<Row> = births.iter().map(|b| row(b.x, (1.0 / self.pool.emitter(s).mass(b.id)) as Real)).collect();
         let mut v: Vec<Row> = births.iter().map(|b| row(b.v, 0.0)).collect();
         let (laws, colliders, resting) = (&self.laws, &self.laws.colliders[..], self.resting_speed(h));
-        let touch = |t: f64, h: f64, lead: f64, before: (Row, Row), x: &mut Row, v: &mut Row| {
-            let step = contact::Step { t, h, resting, lead };
-            !colliders.is_empty() && h > 0.0 && contact::resolve(colliders, &step, before, x, v)
+        let heeded = self.pool.heeds_hits(s);
+        let touch = |t: f64, h: f64, lead: f64, before: (Row, Row), x: &mut Row, v: &mut Row, hits: &mut dyn FnMut(Hit)| {
+            let step = contact::Step { t, h, resting, lead, heeded };
+            !colliders.is_empty() && h > 0.0 && contact::resolve(colliders, &step, before, x, v, hits)
         };
         let rate = self.stiffness_of(object, births, &masses);
         let scheme = if self.integrator.is_implicit() || self.integrator.is_adaptive() {
@@ -91,7 +95,8 @@ impl Dynamics {
         } else {
             self.integrator
         };
-        let one = |start: usize, births: &[Birth], x: &mut [Row], v: &mut [Row]| -> Result<(), StepError> {
+        let one = |start: usize, births: &[Birth], x: &mut [Row], v: &mut [Row]| -> Result<Vec<(usize, Hit)>, StepError> {
+            let mut hits = Vec::new();
             let mut motion = Local { laws, masses: &masses, start, newborn: object };
             let n = x.len();
             let (mut a, mut xm, mut vm) = (vec![ZERO; n], x.to_vec(), v.to_vec());
@@ -112,8 +117,8 @@ impl Dynamics {
                     let before = (x[i], v[i]);
                     x[i] = axpy(x[i], tau(i), vm[i]);
                     v[i] = axpy(v[i], tau(i), a[i]);
-                    let start = until - span(i) * (1.0 - k as f64 / pieces);
-                    touch(start, f64::from(tau(i)), 0.0, before, &mut x[i], &mut v[i]);
+                    let begun = until - span(i) * (1.0 - k as f64 / pieces);
+                    touch(begun, f64::from(tau(i)), 0.0, before, &mut x[i], &mut v[i], &mut |hit| hits.push((start + i, hit)));
                 }
             }
             let mut memory = Memory::new(scheme, n);
@@ -125,15 +130,16 @@ impl Dynamics {
                 integrators::step(scheme, Step { equation, t, h, x, v, memory, ready, scratch, report })?;
                 ready = true;
                 for i in 0..n {
-                    ready &= !touch(t, h, integrators::lead(scheme), before[i], &mut x[i], &mut v[i]);
+                    ready &=
+                        !touch(t, h, integrators::lead(scheme), before[i], &mut x[i], &mut v[i], &mut |hit| hits.push((start + i, hit)));
                 }
             }
-            Ok(())
+            Ok(hits)
         };
         let blocks = x.par_chunks_mut(BLOCK).zip(v.par_chunks_mut(BLOCK)).zip(births.par_chunks(BLOCK)).enumerate();
-        let done: Vec<Result<(), StepError>> = blocks.map(|(c, ((x, v), births))| one(c * BLOCK, births, x, v)).collect();
-        done.into_iter().collect::<Result<(), StepError>>()?;
-        Ok(Grown { x, v })
+        let done: Vec<Result<Vec<_>, StepError>> = blocks.map(|(c, ((x, v), births))| one(c * BLOCK, births, x, v)).collect();
+        let hits = done.into_iter().collect::<Result<Vec<_>, StepError>>()?.concat();
+        Ok(Grown { x, v, hits })
     }
 
     /// How fast the forces on single masses change the motion of the first of some newborn [1/s]: steps of half of its inverse are
@@ -147,15 +153,19 @@ impl Dynamics {
         acting.map(|f| f.law.matrix(birth.time, &one)).map(|(k, d)| largest(k).sqrt() + largest(d)).sum()
     }
 
-    /// Gives the newborn of an emitter their rows; their ages will be right at the time `end`.
-    fn settle(&mut self, s: usize, births: &[Birth], grown: Grown, end: f64) {
-        let surplus = self.pool.surplus(s, births.len());
+    /// Gives the newborn of an emitter their rows at the time `now`; their ages will be right at the time `end`.
+    fn settle(&mut self, s: usize, births: &[Birth], grown: Grown, (now, end): (f64, f64)) {
+        let v = |row: usize| self.state.v[row];
+        let surplus = self.pool.surplus(s, births, (now, end), &self.state.x, &v);
         let start = self.pool.rows(s).start;
         self.count_energy(-1.0, surplus.iter().map(|k| start + *k as usize));
         self.pool.remove(s, &surplus, owned(&mut self.state.x, &mut self.state.v, &mut self.laws.masses, &mut self.memory));
         // Where even the newborn are too many, the last of them live.
         let most = self.pool.emitter(s).most().unwrap_or(usize::MAX);
         let skip = births.len().saturating_sub(most);
+        for (i, hit) in grown.hits {
+            self.pool.note(s, births[i].id, end - births[i].time, hit);
+        }
         let births = &births[skip..];
         let rows = self.pool.insert(s, births, end, owned(&mut self.state.x, &mut self.state.v, &mut self.laws.masses, &mut self.memory));
         self.state.x[rows.clone()].copy_from_slice(&grown.x[skip..]);
@@ -179,14 +189,15 @@ impl Dynamics {
             let births = std::mem::take(&mut born[s]);
             if !births.is_empty() {
                 let grown = self.grow(s, &births, (t, h, 0))?;
-                self.settle(s, &births, grown, t);
+                self.settle(s, &births, grown, (t, t));
             }
             let colliders = &self.laws.colliders;
             let near = |p: Vec3<f64>, distance: f64| colliders.iter().any(|c| c.distance(p, t, distance).0 < distance);
             let dead = self.pool.dead(s, (t, dt), &self.state.x, &self.state.v, &near);
-            for (child, births) in self.pool.descendants(s, &self.name, (t, dt), &dead, (&self.state.x, &self.state.v))? {
+            for (child, births) in self.pool.descendants(s, &self.name, t, &dead, (&self.state.x, &self.state.v))? {
                 born[child] = births;
             }
+            let dead: Vec<u32> = dead.into_iter().map(|(k, _)| k).collect();
             if !dead.is_empty() {
                 let start = self.pool.rows(s).start;
                 self.count_energy(-1.0, dead.iter().map(|k| start + *k as usize));
@@ -194,6 +205,7 @@ impl Dynamics {
                 self.count_rows();
             }
         }
+        self.pool.calm();
         Ok(())
     }
 

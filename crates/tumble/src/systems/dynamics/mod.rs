@@ -16,7 +16,7 @@ use crate::exchange::{Exchange, Port};
 use crate::integrators::{self, Equation, Memory, Scratch, Step, adaptive_step};
 use crate::math::parallel::{CHUNK, sum};
 use crate::math::{Real, Row, Vec3, ZERO, axpy, row, sub, xyz64};
-use crate::pool::Pool;
+use crate::pool::{Hit, Pool};
 use crate::state::{Object, State};
 use crate::system::{Archive, Part, System};
 use laws::{Laws, Local, flat};
@@ -215,33 +215,37 @@ impl Dynamics {
             }
         }
         if !self.laws.colliders.is_empty() {
+            let heeded = self.pool.heeded();
             // Users' schemes are unknown, and what the penalty pushes has no constant acceleration.
             let lead = if self.user.is_some() || self.laws.penalty { 0.0 } else { integrators::lead(self.integrator) };
-            let step = contact::Step { t, h, resting: self.resting_speed(h), lead };
+            let step = contact::Step { t, h, resting: self.resting_speed(h), lead, heeded: false };
             let penalty = self.laws.penalty && self.user.is_none();
             let points = self.laws.masses.points;
             let (colliders, before, before_v) = (&self.laws.colliders[..], &self.before, &self.before_v);
-            let touched: Vec<bool> = self.state.x[..points]
+            let touched: Vec<(bool, Vec<(usize, Hit)>)> = self.state.x[..points]
                 .par_chunks_mut(CHUNK)
                 .zip(self.state.v[..points].par_chunks_mut(CHUNK))
                 .enumerate()
                 .map(|(c, (x, v))| {
-                    let mut any = false;
+                    let (mut any, mut hits) = (false, Vec::new());
                     for (k, (x, v)) in x.iter_mut().zip(v).enumerate() {
                         let i = c * CHUNK + k;
+                        let step = contact::Step { heeded: heeded.iter().any(|rows| rows.contains(&i)), ..step };
                         if x[3] > 0.0 {
+                            let (was, told) = ((before[i], before_v[i]), |hit| hits.push((i, hit)));
                             any |= if penalty {
-                                contact::bounce(colliders, &step, (before[i], before_v[i]), x, v)
+                                contact::bounce(colliders, &step, was, x, v, told)
                             } else {
-                                contact::resolve(colliders, &step, (before[i], before_v[i]), x, v)
+                                contact::resolve(colliders, &step, was, x, v, told)
                             };
                         }
                     }
-                    any
+                    (any, hits)
                 })
                 .collect();
-            if touched.contains(&true) {
-                self.memory.ready = false;
+            for (any, hits) in touched {
+                self.memory.ready &= !any;
+                hits.into_iter().for_each(|(row, hit)| self.pool.note_row(row, hit));
             }
         }
         let broken: u64 = self.laws.batches.iter_mut().map(|b| b.break_links(&self.state.x)).sum();
@@ -293,7 +297,8 @@ impl Dynamics {
             }
         }
         let was_ready = self.memory.ready;
-        let results: Vec<Result<bool, StepError>> = state
+        let heeded = self.pool.heeded();
+        let results: Vec<Result<(bool, Vec<(usize, Hit)>), StepError>> = state
             .x
             .par_chunks_mut(BLOCK)
             .zip(state.v.par_chunks_mut(BLOCK))
@@ -304,10 +309,10 @@ impl Dynamics {
                 let start = c * BLOCK;
                 let mut motion = Local { laws, masses: &laws.masses, start, newborn: None };
                 let points = motion.kinematics().points;
-                let (mut ready, mut before, mut before_v) = (was_ready, Vec::new(), Vec::new());
+                let (mut ready, mut before, mut before_v, mut hits) = (was_ready, Vec::new(), Vec::new(), Vec::new());
                 for k in 0..substeps {
                     if k % 64 == 63 && !go_on() {
-                        return Ok(false);
+                        return Ok((false, hits));
                     }
                     if !colliders.is_empty() {
                         before.clear();
@@ -318,20 +323,22 @@ impl Dynamics {
                     let (t, equation, memory, report) = (t + f64::from(k) * h, &mut motion, &mut memory, &mut StepReport::default());
                     integrators::step(scheme, Step { equation, t, h, x, v, memory, ready, scratch, report })?;
                     ready = true;
-                    let step = contact::Step { t, h, resting, lead };
                     for i in 0..before.len().min(points) {
-                        let was = (before[i], before_v[i]);
-                        if x[i][3] > 0.0 && contact::resolve(colliders, &step, was, &mut x[i], &mut v[i]) {
+                        let step = contact::Step { t, h, resting, lead, heeded: heeded.iter().any(|rows| rows.contains(&(start + i))) };
+                        let (was, told) = ((before[i], before_v[i]), |hit| hits.push((start + i, hit)));
+                        if x[i][3] > 0.0 && contact::resolve(colliders, &step, was, &mut x[i], &mut v[i], told) {
                             ready = false;
                         }
                     }
                 }
-                Ok(ready)
+                Ok((ready, hits))
             })
             .collect();
         self.memory.ready = true;
         for result in results {
-            self.memory.ready &= result?;
+            let (ready, hits) = result?;
+            self.memory.ready &= ready;
+            hits.into_iter().for_each(|(row, hit)| self.pool.note_row(row, hit));
         }
         Ok(())
     }
