@@ -62,7 +62,9 @@ fn scenes() -> Vec<(&'static str, String, usize)> {
                  columns = { heat = { from = 1, to = 2 } }\nkill = [{ near_collider = 0.001 }]\n\
                  [[emitter]]\nname = \"mist\"\nburst = [{ count = 2 }]\nspeed = 1\ncone = 180\ninherit = 0.5\nlifetime = 0.1\nfrom.particles.of = \"spray\"\n\
                  [[collider]]\nname = \"floor\"\nshape.floor.height = -0.2\n";
-    let splashing = spray.replace("speed = 3", "speed = -3").replace("kill = [{ near_collider = 0.001 }]", "most = 9000\nwhen_full = \"replace_oldest\"")
+    let splashing = spray
+        .replace("speed = 3", "speed = -3")
+        .replace("kill = [{ near_collider = 0.001 }]", "most = 9000\nwhen_full = \"replace_oldest\"")
         + "[[emitter]]\nname = \"splash\"\nburst = [{ count = 2 }]\nspeed = 1\ncone = 60\nlifetime = 0.1\nfrom.particles = { of = \"spray\", at = \"bounce\" }\n";
     let swarm = "world.gravity = [0, 0, 0]\n[[system]]\nintegrator = \"rk4\"\nsubsteps = 2\n[[force]]\nkind = \"gravitation\"\nconstant = 1e-4\nsoftening = 0.05\n\
                  [[emitter]]\nname = \"swarm\"\nrate = 1500\nspeed = 0.3\ncone = 180\nlifetime = 0.5\nlifetime_spread = 0.3\nfrom.sphere.radius = 0.3\n\

@@ -22,10 +22,11 @@ pub enum Attractor {
 /// f_i = a_i sum over j of b_j d/(|d|² + s²)^(3/2),   d = x_j - x_i           (orbits.11, orbits.14)
 ///
 /// Gravitation: a = m, b = G m. Electrostatics: a = q, b = -k q.   s [m]: the softening length, 0 for points.
-/// Degenerate: two masses in one place have no direction and no force. In single precision distances between 1e-12 m and 1e12 m
-/// are told apart.
-/// N(N - 1)/2 pairs: each is evaluated once, and what it gives to its ends are opposites up to the rounding of products. In
-/// single precision a term is right to 3e-7.
+/// Degenerate: two masses in one place have no direction and no force. In single precision equal masses pull each other at
+/// distances between 1e-12 m and 1e12 m; of masses that differ by a factor of 1e12, the largest from 3e-9 m on and the smallest up to
+/// 4e8 m.
+/// N(N - 1)/2 pairs: each is evaluated once, and what it gives to its ends are exact opposites. In single precision a term is
+/// right to 3e-7.
 ///
 /// The kernels take targets and sources apart, as columns: a tree would hand them the cells and masses that a group of
 /// targets has to see, and nothing else would change.
@@ -42,6 +43,9 @@ pub struct DirectSum {
     own: Vec<Real>,
     /// b.
     source: Vec<Real>,
+    /// a in units of `scale`, so that products of two are far from the ends of the range of numbers.
+    weight: Vec<Real>,
+    scale: f64,
     /// Forces on the masses; scratch of their sums.
     forces: Vec<[Real; 3]>,
     sums: Vec<Real>,
@@ -82,6 +86,9 @@ const STRIPS: usize = 32;
 /// Softening lengths whose square is less are none: the cube of their inverse would not be finite.
 const POINT: Real = if cfg!(feature = "double") { 1e-200 } else { 1e-24 };
 
+/// Weights at most, where they differ by more than its square.
+const LARGEST: f64 = 1e6;
+
 impl DirectSum {
     /// The direct sum among the rows of these ranges, which do not overlap; halos among them (rows with radii) are left out.
     pub fn new(
@@ -100,6 +107,8 @@ impl DirectSum {
             ranges: Vec::new(),
             own: Vec::new(),
             source: Vec::new(),
+            weight: Vec::new(),
+            scale: 1.0,
             forces: Vec::new(),
             sums: Vec::new(),
             positions: Columns::default(),
@@ -113,8 +122,8 @@ impl DirectSum {
     /// Goes over to other rows, or to other masses and charges of the same.
     fn take(&mut self, ranges: Vec<Range<usize>>, masses: &Masses) {
         let (column, constant) = match self.attractor {
-            Attractor::Mass(constant) => (&masses.mass, constant),
-            Attractor::Charge(constant) => (&masses.charge, constant),
+            Attractor::Mass(_) => (&masses.mass, self.constant()),
+            Attractor::Charge(_) => (&masses.charge, self.constant()),
         };
         self.ranges.clear();
         self.own.clear();
@@ -129,6 +138,18 @@ impl DirectSum {
         }
         self.source.clear();
         self.source.extend(self.own.iter().map(|own| (constant * f64::from(*own)) as Real));
+        let sizes = || self.own.iter().map(|own| f64::from(own.abs())).filter(|own| *own > 0.0);
+        let (least, largest) = (sizes().fold(f64::INFINITY, f64::min), sizes().fold(0.0, f64::max));
+        self.scale = if largest > 0.0 { (least * largest).sqrt().max(largest / LARGEST) } else { 1.0 };
+        self.weight.clear();
+        self.weight.extend(self.own.iter().map(|own| (f64::from(*own) / self.scale) as Real));
+    }
+
+    /// b/a.
+    fn constant(&self) -> f64 {
+        match self.attractor {
+            Attractor::Mass(constant) | Attractor::Charge(constant) => constant,
+        }
     }
 
     /// The square of the softening length.
@@ -208,8 +229,7 @@ const STAIRS: [Real; 2 * LANES] = {
 #[repr(align(64))]
 struct Pack {
     x: [[Real; LANES]; 3],
-    /// b.
-    source: [Real; LANES],
+    weight: [Real; LANES],
     sum: [[Real; LANES]; 3],
 }
 
@@ -232,14 +252,14 @@ struct Tile<'a, const NATIVE: bool, const POINTS: bool> {
     law: &'a DirectSum,
     /// The strips: the same, or one behind the other.
     strips: [Range<usize>; 2],
-    /// Sums over b d/(|d|² + s²)^(3/2): three columns for the masses of each strip.
+    /// Forces in units of the weights: three columns for the masses of each strip.
     out: [[&'a mut [Real]; 3]; 2],
 }
 
 /// Sources at hand, and the sums over what pulls them, lane by lane.
 struct Sources<L, const B: usize> {
     x: [Vec3<L>; B],
-    source: [L; B],
+    weight: [L; B],
     sum: [[Vec3<L>; LANES]; B],
 }
 
@@ -257,33 +277,28 @@ impl<const NATIVE: bool, const POINTS: bool> Tile<'_, NATIVE, POINTS> {
     ) {
         let load = |lanes: &[Real; LANES]| w.load(&lanes[k * W::N..]);
         let here = Vec3 { x: load(&pack.x[0]), y: load(&pack.x[1]), z: load(&pack.x[2]) };
-        let source = load(&pack.source);
+        let weight = load(&pack.weight);
         let mut sum = Vec3 { x: load(&pack.sum[0]), y: load(&pack.sum[1]), z: load(&pack.sum[2]) };
         for b in 0..B {
             let d = sources.x[b] - here;
             let r_sq = squared::<_, NATIVE>(w, d, softening);
-            let one = match masks {
-                Some(lanes) => w.load(&STAIRS[LANES - lanes[b] + k * W::N..]),
-                None => w.splat(1.0),
-            };
+            let mut both = sources.weight[b] * weight;
+            if let Some(lanes) = masks {
+                both = both * w.load(&STAIRS[LANES - lanes[b] + k * W::N..]);
+            }
             let mut pull = if cfg!(feature = "double") && !NATIVE && b % 2 == 1 {
                 let unit = w.splat((1.0 / cube_unit::<W, NATIVE>(w)) as Real);
-                one * (unit / (r_sq * r_sq.sqrt()))
+                both * (unit / (r_sq * r_sq.sqrt()))
             } else {
-                inverse_cube::<W, NATIVE>(w, r_sq, one)
+                inverse_cube::<W, NATIVE>(w, r_sq, both)
             };
             if POINTS {
                 pull = r_sq.positive(pull, w.splat(0.0));
             }
-            let (onto, back) = (pull * sources.source[b], pull * source);
-            let r = sources.sum[b][k];
-            if NATIVE {
-                sum = Vec3 { x: w.fused(d.x, onto, sum.x), y: w.fused(d.y, onto, sum.y), z: w.fused(d.z, onto, sum.z) };
-                sources.sum[b][k] = Vec3 { x: w.fused(d.x, back, r.x), y: w.fused(d.y, back, r.y), z: w.fused(d.z, back, r.z) };
-            } else {
-                sum = sum + d * onto;
-                sources.sum[b][k] = r + d * back;
-            }
+            // Additions are free beside multiplications, which other parts of the machine do.
+            let force = d * pull;
+            sum = sum + force;
+            sources.sum[b][k] = sources.sum[b][k] + force;
         }
         w.store(sum.x, &mut pack.sum[0][k * W::N..]);
         w.store(sum.y, &mut pack.sum[1][k * W::N..]);
@@ -298,11 +313,11 @@ impl<const NATIVE: bool, const POINTS: bool> Tile<'_, NATIVE, POINTS> {
         let zero = w.splat(0.0);
         let nothing = Vec3 { x: zero, y: zero, z: zero };
         let softening = w.splat(if POINTS { 0.0 } else { law.softening_sq() });
-        let mut sources = Sources { x: [nothing; B], source: [zero; B], sum: [[nothing; LANES]; B] };
+        let mut sources = Sources { x: [nothing; B], weight: [zero; B], sum: [[nothing; LANES]; B] };
         for b in 0..B {
             let x = law.positions.at(j + b);
             sources.x[b] = Vec3 { x: w.splat(x.x), y: w.splat(x.y), z: w.splat(x.z) };
-            sources.source[b] = w.splat(law.source[j + b]);
+            sources.weight[b] = w.splat(law.weight[j + b]);
         }
         for pack in &mut near[..packs] {
             for k in 0..LANES / W::N {
@@ -346,7 +361,7 @@ impl<const NATIVE: bool, const POINTS: bool> Kernel for Tile<'_, NATIVE, POINTS>
                 let (pack, lane) = (&mut near[i / LANES], i % LANES);
                 let here = if i < n { law.positions.at(first + i) } else { Vec3::default() };
                 (pack.x[0][lane], pack.x[1][lane], pack.x[2][lane]) = (here.x, here.y, here.z);
-                pack.source[lane] = if i < n { law.source[first + i] } else { 0.0 };
+                pack.weight[lane] = if i < n { law.weight[first + i] } else { 0.0 };
             }
             let mut from = if same { first } else { self.strips[1].start };
             while from < self.strips[1].end {
@@ -457,6 +472,44 @@ impl Kernel for Product<'_> {
     }
 }
 
+/// Adds the blocks on the diagonal of some of the masses.
+struct Diagonal<'a> {
+    law: &'a DirectSum,
+    first: usize,
+    blocks: &'a mut [Block],
+}
+
+impl Kernel for Diagonal<'_> {
+    type Output = ();
+    #[inline(always)]
+    fn run<W: Width>(self, w: W) {
+        let law = self.law;
+        packs!(W, w, (0..self.blocks.len()), |i| {
+            let here = law.positions.load(w, self.first + i);
+            let own = w.load(&law.own[self.first + i..]) * w.splat(law.weights.stiffness);
+            let mut sums = [w.splat(0.0); 6];
+            for j in 0..law.source.len() {
+                let x = law.positions.at(j);
+                let d = Vec3 { x: w.splat(x.x), y: w.splat(x.y), z: w.splat(x.z) } - here;
+                let c = own * w.splat(law.source[j]);
+                let (s3, q) = law.matrix(d, c);
+                let terms =
+                    [s3 - q * d.x * d.x, s3 - q * d.y * d.y, s3 - q * d.z * d.z, -(q * d.x * d.y), -(q * d.y * d.z), -(q * d.z * d.x)];
+                for a in 0..6 {
+                    sums[a] = sums[a] + c * terms[a];
+                }
+            }
+            let mut lanes = [0.0; 16];
+            for a in 0..6 {
+                w.store(sums[a], &mut lanes);
+                for k in 0..count(w) {
+                    self.blocks[i + k][a] += lanes[k];
+                }
+            }
+        });
+    }
+}
+
 impl DirectSum {
     fn potential<const NATIVE: bool, const POINTS: bool>(&self, positions: &Columns) -> f64 {
         tasks(self.len(), |range| dispatch(Potential::<NATIVE, POINTS> { law: self, positions, range })).into_iter().sum()
@@ -482,7 +535,7 @@ impl DirectSum {
             let out = [three(), three()];
             dispatch(Tile::<NATIVE, POINTS> { law, strips: [strip(*a), strip(*b)], out });
         });
-        let unit = dispatch(Unit::<NATIVE>) as Real;
+        let unit = law.constant() * law.scale * law.scale * dispatch(Unit::<NATIVE>);
         chunks(&mut forces, |start, forces| {
             forces.fill([0.0; 3]);
             for (sums, (a, b)) in sums.chunks_exact(6 * size).zip(&pairs) {
@@ -497,10 +550,8 @@ impl DirectSum {
                     }
                 }
             }
-            for (force, own) in forces.iter_mut().zip(&law.own[start..]) {
-                for f in force {
-                    *f *= own * unit;
-                }
+            for f in forces.as_flattened_mut() {
+                *f = (f64::from(*f) * unit) as Real;
             }
         });
         (self.sums, self.forces) = (sums, forces);
@@ -592,19 +643,7 @@ impl Batch for DirectSum {
         let law = &*self;
         chunks(blocks, |start, blocks| {
             law.among(start, blocks, |first, blocks| {
-                for (k, block) in blocks.iter_mut().enumerate() {
-                    let (here, own) = (law.positions.at(first + k), law.own[first + k] * law.weights.stiffness);
-                    for j in 0..law.source.len() {
-                        let d = law.positions.at(j) - here;
-                        let c = own * law.source[j];
-                        let (s3, q) = law.matrix(d, c);
-                        let terms =
-                            [s3 - q * d.x * d.x, s3 - q * d.y * d.y, s3 - q * d.z * d.z, -q * d.x * d.y, -q * d.y * d.z, -q * d.z * d.x];
-                        for a in 0..6 {
-                            block[a] += c * terms[a];
-                        }
-                    }
-                }
+                blocks.par_chunks_mut(TASK).enumerate().for_each(|(k, blocks)| dispatch(Diagonal { law, first: first + k * TASK, blocks }));
             });
         });
     }
@@ -709,6 +748,27 @@ mod tests {
                 let off = (xyz64(force[i]) - exact).norm();
                 assert!(off <= 8.0 * f64::from(Real::EPSILON) * size, "{n} {i}: {off:e} of {size:e}");
             }
+        }
+    }
+
+    /// The sun, the earth, the moon and a boulder near them, in SI units.
+    #[test]
+    fn masses_of_all_sizes_pull() {
+        const G: f64 = 6.67428e-11;
+        let x = [[0.0; 4], [1.5e11, 0.0, 0.0, 0.0], [1.5e11, 3.8e8, 0.0, 0.0], [1.5e11, 1e7, 2e7, 0.0]];
+        let masses = Masses { mass: vec![2e30, 6e24, 7e22, 1e15], ..Masses::default() };
+        let mut law = DirectSum::new(Attractor::Mass(G), 0.0, false, &[], vec![0..4], &masses);
+        let mut force = vec![[0.0; 4]; 4];
+        law.begin_forces(0.0, &x, &x);
+        law.add_forces(&x, &x, 0, &mut force);
+        for i in 0..4 {
+            let pull = |j: usize| {
+                let d = xyz64(x[j]) - xyz64(x[i]);
+                d * (G * f64::from(masses.mass[i]) * f64::from(masses.mass[j]) / d.norm().powi(3))
+            };
+            let exact = (0..4).filter(|j| *j != i).map(pull).fold(Vec3::default(), |a, b| a + b);
+            let off = (xyz64(force[i]) - exact).norm() / exact.norm();
+            assert!(off < 8.0 * f64::from(Real::EPSILON), "{i}: {off:e}");
         }
     }
 
