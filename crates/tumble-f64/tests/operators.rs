@@ -2,7 +2,8 @@
 
 use std::f64::consts::PI;
 use tumble_f64::operators::{
-    average, curl, diffuse, diffuse_step, diffusion_limit, directional, divergence, gradient, laplacian, vector_laplacian,
+    Interpolation, average, curl, diffuse, diffuse_step, diffusion_limit, directional, divergence, gradient, laplacian, sample,
+    vector_laplacian,
 };
 use tumble_f64::state::{Field, Grid, GridError, Place, Side, Vectors};
 
@@ -437,4 +438,110 @@ fn diffusion_ends_at_a_straight_line_between_its_walls() {
     let mut one = u.parts[1].clone();
     laplacian(&u.parts[1], &mut one).unwrap();
     assert_eq!(out.parts[1], one);
+}
+
+const KINDS: [Interpolation; 3] = [Interpolation::Linear, Interpolation::Cubic, Interpolation::MonotoneCubic];
+const PLACES: [Place; 6] = [Place::Cell, Place::Face(0), Place::Face(1), Place::Edge(0), Place::Edge(2), Place::Node];
+
+/// Points without a pattern, well inside or anywhere in the box.
+fn scattered(g: &Grid, margin: f64) -> Vec<[f64; 3]> {
+    let turn = |i: usize, step: f64| (0.5 + step * i as f64).fract();
+    let one = |i: usize, a: usize, step: f64| {
+        let size = g.dx * g.n[a] as f64;
+        g.origin[a] + size * (margin + (1.0 - 2.0 * margin) * turn(i, step))
+    };
+    (0..2000).map(|i| [one(i, 0, 0.754_877_666), one(i, 1, 0.569_840_296), one(i, 2, 0.618_033_989)]).collect()
+}
+
+#[test]
+fn interpolation_has_its_order_from_every_place() {
+    for (how, order) in KINDS.into_iter().zip([2.0, 3.0, 3.0]) {
+        for place in PLACES {
+            let found = orders(16, |g| {
+                let w = Wave(g);
+                // Without extrema for the monotone cubic, whose limits then do not act.
+                let steep = |x: [f64; 3]| g.axes().map(|a| (Wave::K[a] * x[a]).exp()).product::<f64>();
+                let value = |x: [f64; 3]| if how == Interpolation::MonotoneCubic { steep(x) } else { w.value(x) };
+                let Ok(f) = Field::of(g, place, "", value) else { return 1.0 };
+                let points = scattered(&g, 0.2);
+                let values = sample(&f, &points, how).unwrap();
+                values.iter().zip(&points).map(|(v, x)| (v - value(*x)).abs()).sum::<f64>() / points.len() as f64
+            });
+            let found: Vec<f64> = found.into_iter().filter(|o| *o != 0.0).collect();
+            assert!(found.len() >= 2);
+            // Measured: 1.99 to 2.02; 3.09 to 3.14; 2.97 to 3.02.
+            all_near(&found, order, if how == Interpolation::Linear { 0.1 } else { 0.2 });
+        }
+    }
+    // Halfway between two equal values the monotone cubic is flat: second order, in closed form.
+    for n in [8, 16] {
+        let g = Grid::new([n, 1, 1], 1.0 / n as f64, [0.0; 3]).unwrap().flat(2).unwrap().periodic([true, true, false]);
+        let f = Field::of(g, Place::Cell, "", |x| (2.0 * PI * x[0]).cos()).unwrap();
+        let top = sample(&f, &[[0.0; 3]], Interpolation::MonotoneCubic).unwrap()[0];
+        assert!((top - (PI / n as f64).cos()).abs() < 1e-14, "{top}");
+    }
+}
+
+#[test]
+fn interpolation_is_exact_on_polynomials_and_at_points() {
+    for g in grids(9) {
+        let on = |a: usize| if g.flat == Some(a) { 0.0 } else { 1.0 };
+        let bilinear = |x: [f64; 3]| (1.0 + 2.0 * on(0) * x[0]) * (0.3 - on(1) * x[1]) * (2.0 + 0.5 * on(2) * x[2]);
+        let parabola = |x: [f64; 3]| bilinear(x) + 0.7 * on(0) * x[0] * x[0] - on(1) * x[1] * x[1] * (1.0 + on(2) * x[2] * x[2]);
+        for place in PLACES.into_iter().filter(|p| g.place(*p).is_ok()) {
+            let worst = |how: Interpolation, value: &dyn Fn([f64; 3]) -> f64| {
+                let f = Field::of(g, place, "", value).unwrap();
+                let points = scattered(&g, 0.25);
+                let values = sample(&f, &points, how).unwrap();
+                values.iter().zip(&points).fold(0.0_f64, |m, (v, x)| m.max((v - value(*x)).abs()))
+            };
+            assert!(worst(Interpolation::Linear, &bilinear) < 1e-14);
+            assert!(worst(Interpolation::Cubic, &parabola) < 1e-14);
+            assert!(worst(Interpolation::Linear, &parabola) > 1e-3);
+            let f = noisy(g, place, 3);
+            let points: Vec<[f64; 3]> = f.each().map(|at| g.point(f.place, at)).collect();
+            for how in KINDS {
+                let off = sample(&f, &points, how).unwrap().iter().zip(f.values()).fold(0.0_f64, |m, (a, b)| m.max((a - b).abs()));
+                assert!(off < 1e-13, "{place} {how:?} {off}");
+            }
+        }
+    }
+}
+
+#[test]
+fn samples_see_what_is_beyond_the_walls() {
+    let g = Grid::new([5, 6, 4], 0.1, [0.0; 3]).unwrap();
+    let f = noisy(g, Place::Cell, 4);
+    let at = |f: &Field, x: [f64; 3]| KINDS.map(|how| sample(f, &[x], how).unwrap()[0]);
+    // Row (2, 3) along x, at its lower wall and beyond.
+    let row = |x: f64| [x, 0.35, 0.15];
+    for beyond in [0.0, -0.3, f64::NEG_INFINITY, f64::NAN] {
+        assert!(at(&f.clone().sides(Side::Value(7.0)), row(beyond)).iter().all(|v| (v - 7.0).abs() < 1e-12));
+        assert!((at(&f, row(beyond))[0] - f.value([0, 3, 1])).abs() < 1e-14);
+    }
+    let half = 0.5 * (7.0 + f.value([4, 3, 1]));
+    assert!((at(&f.clone().sides(Side::Value(7.0)), row(0.475))[0] - half).abs() < 1e-12);
+    assert!((at(&f.clone().sides(Side::Slope(2.0)), row(0.5))[0] - (f.value([4, 3, 1]) + 0.1)).abs() < 1e-12);
+    assert!((at(&f.clone().sides(Side::Ghost(3.0)), row(0.5))[0] - 0.5 * (f.value([4, 3, 1]) + 3.0)).abs() < 1e-12);
+    // Periods.
+    let g = g.periodic([true; 3]);
+    for place in PLACES {
+        let f = noisy(g, place, 5);
+        for x in scattered(&g, 0.0).into_iter().take(200) {
+            let moved = [x[0] + 0.5, x[1] - 1.2, x[2] + 0.8];
+            assert!(at(&f, x).iter().zip(at(&f, moved)).all(|(a, b)| (a - b).abs() < 1e-12));
+        }
+    }
+    // Monotone: within the corners of the cell.
+    let f = noisy(g, Place::Node, 6);
+    let (mut outside, points) = (0, scattered(&g, 0.0));
+    for x in points {
+        let cell = |a: usize| (x[a] / g.dx).floor() as usize;
+        let corners: Vec<f64> = (0..8).map(|c| f.value(std::array::from_fn(|a| (cell(a) + (c >> a & 1)) % g.n[a]))).collect();
+        let (low, high) = corners.iter().fold((f64::MAX, f64::MIN), |(l, h), v| (l.min(*v), h.max(*v)));
+        let [_, cubic, monotone] = at(&f, x);
+        assert!(low <= monotone && monotone <= high);
+        outside += usize::from(cubic < low || cubic > high);
+    }
+    assert!(outside > 10);
 }

@@ -4,9 +4,13 @@
 //! results. Sums have a fixed order and every row is worked out for itself: the same bits on any number of threads and any width
 //! of registers.
 
+pub mod advect;
 pub mod differences;
 pub mod diffuse;
+pub mod sample;
 mod stencil;
 
+pub use advect::{Advection, Scratch, Trace, advect, advect_vectors};
 pub use differences::{average, curl, directional, divergence, gradient, laplacian, vector_laplacian};
 pub use diffuse::{diffuse, diffuse_step, diffusion_limit};
+pub use sample::{Interpolation, sample};

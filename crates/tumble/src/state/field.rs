@@ -113,6 +113,9 @@ impl Field {
         if self.place != expected {
             return Err(GridError::Mixed { what, expected, found: self.place });
         }
+        if self.data.len() != grid.lattice().len() {
+            return Err(GridError::Count { place: self.place, points: self.points(), found: self.data.len() });
+        }
         Ok(())
     }
 }

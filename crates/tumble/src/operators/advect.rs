@@ -1,0 +1,357 @@
+//! Semi-Lagrangian advection: the value at a point is the one that was where its fluid came from (grids.15 to 20).
+//!
+//! ```text
+//!   advect        for each row:  trace the path back through u;  read the fields where it ends
+//!     corrected   for each row:  trace forward;  read what was carried;  add half of what the way there and back changed
+//! ```
+//!
+//! Stable at any step. Paths stay within walls and wrap where the grid is periodic. Positions are displacements from the row's own
+//! points: a shift by whole cells changes no bit. Source: [stam1999], [selle2008]; tests: crates/tumble-f64/tests/advection.rs.
+
+use super::sample::{Interpolation, Lot, SEGMENT, Spots, Start, View, locate, read};
+use super::stencil::{each_row, each_row_of};
+use crate::math::simd::{Kernel, Width, dispatch};
+use crate::math::{Lane, Real, functions};
+use crate::state::{Field, Grid, GridError, Vectors};
+
+/// How a path is traced.                                                    (grids.16)
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum Trace {
+    /// One velocity, that at the start.
+    Euler,
+    /// The velocity in the middle.
+    #[default]
+    Rk2,
+    /// Three velocities.
+    Rk3,
+}
+
+/// How fields are carried.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Advection {
+    /// The path.
+    pub trace: Trace,
+    /// Pieces that the path is cut into, at least 1.
+    pub substeps: usize,
+    /// Values between points.
+    pub interpolation: Interpolation,
+    /// MacCormack's correction, limited.                                     (grids.18, grids.19)
+    pub corrected: bool,
+    /// Vectors turn with the fluid.                                           (grids.20)
+    pub turning: bool,
+}
+
+impl Default for Advection {
+    fn default() -> Self {
+        Self { trace: Trace::Rk2, substeps: 1, interpolation: Interpolation::Linear, corrected: false, turning: false }
+    }
+}
+
+/// Fields of a correction, kept between steps.
+#[derive(Debug, Clone, Default)]
+pub struct Scratch {
+    fields: Vec<Field>,
+}
+
+impl Scratch {
+    /// `count` fields like this one; their numbers are anything.
+    fn like(&mut self, f: &Field, count: usize) -> Result<&mut [Field], GridError> {
+        self.fields.retain(|s| s.data.len() == f.data.len());
+        while self.fields.len() < count {
+            self.fields.push(Field::new(f.grid, f.place, f.unit.clone())?);
+        }
+        for s in &mut self.fields[..count] {
+            (s.grid, s.place, s.sides) = (f.grid, f.place, f.sides);
+        }
+        Ok(&mut self.fields[..count])
+    }
+}
+
+/// Displacements of a segment [cells].
+type Ways = [Lot<Real>; 3];
+
+/// The velocity, ready to be traced through.
+struct Flow<'a> {
+    grid: Grid,
+    views: Vec<(usize, View<'a>)>,
+    trace: Trace,
+    substeps: usize,
+    /// Cells per velocity in a sub-step.
+    step: f64,
+}
+
+struct Move<'a> {
+    to: &'a mut Ways,
+    from: Option<&'a Ways>,
+    k: [(&'a Ways, Real); 3],
+    axes: [bool; 3],
+    count: usize,
+}
+
+impl Kernel for Move<'_> {
+    type Output = ();
+    #[inline(always)]
+    fn run<W: Width>(self, w: W) {
+        let Self { to, from, k, axes, count } = self;
+        for a in 0..3 {
+            if !axes[a] {
+                continue;
+            }
+            let mut e = 0;
+            while e < count {
+                let mut sum = w.load(&k[0].0[a][e..]) * w.splat(k[0].1);
+                if k[1].1 != 0.0 {
+                    sum = sum + w.load(&k[1].0[a][e..]) * w.splat(k[1].1) + w.load(&k[2].0[a][e..]) * w.splat(k[2].1);
+                }
+                let new = match from {
+                    Some(from) => w.load(&from[a][e..]) - sum,
+                    None => w.load(&to[a][e..]) - sum,
+                };
+                w.store(new, &mut to[a][e..]);
+                e += W::N;
+            }
+        }
+    }
+}
+
+struct Hold<'a> {
+    d: &'a mut Lot<Real>,
+    /// The first point and, along x, the next ones, from the lower wall; the upper wall.
+    first: Real,
+    along: bool,
+    wall: Real,
+    count: usize,
+}
+
+impl Kernel for Hold<'_> {
+    type Output = ();
+    /// Moves to the walls what is beyond them.
+    #[inline(always)]
+    fn run<W: Width>(self, w: W) {
+        const COUNT: [Real; 16] = [0.0, 1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0, 8.0, 9.0, 10.0, 11.0, 12.0, 13.0, 14.0, 15.0];
+        let mut e = 0;
+        while e < self.count {
+            let mut x = w.splat(self.first);
+            if self.along {
+                x = x + w.load(&COUNT[e % 16..]) + w.splat((e / 16 * 16) as Real);
+            }
+            let (low, high, d) = (-x, w.splat(self.wall) - x, w.load(&self.d[e..]));
+            let d = (d - low).positive(d, low);
+            w.store((high - d).positive(d, high), &mut self.d[e..]);
+            e += W::N;
+        }
+    }
+}
+
+impl<'a> Flow<'a> {
+    fn new(u: &'a Vectors, h: f64, how: &Advection) -> Result<Self, GridError> {
+        let grid = u.on_faces("velocity of an advection")?;
+        let views = grid.axes().zip(&u.parts).map(|(a, f)| (a, View::new(f, Interpolation::Linear))).collect();
+        let substeps = how.substeps.max(1);
+        Ok(Self { grid, views, trace: how.trace, substeps, step: h / substeps as f64 / grid.dx })
+    }
+
+    /// The velocity at displaced points.
+    fn at(&self, start: Start, d: &Ways, count: usize, spots: &mut Spots, out: &mut Ways) {
+        for (a, view) in &self.views {
+            locate(view, start, d, count, spots);
+            read(view, spots, count, &mut out[*a], None);
+        }
+    }
+
+    /// The displacements to where the fluid at the points was; `sign` -1: to where it will be.
+    fn trace(&self, start: Start, count: usize, sign: f64, d: &mut Ways, middle: Option<&mut Ways>) {
+        let axes: [bool; 3] = std::array::from_fn(|a| self.grid.flat != Some(a));
+        let mut spots = Spots::new();
+        let (mut p, mut k1, mut k2, mut k3) = ([[0.0; SEGMENT]; 3], [[0.0; SEGMENT]; 3], [[0.0; SEGMENT]; 3], [[0.0; SEGMENT]; 3]);
+        *d = [[0.0; SEGMENT]; 3];
+        let h = self.step * sign;
+        let move_by = |to: &mut Ways, from: Option<&Ways>, k: &Ways, c: f64| {
+            dispatch(Move { to, from, k: [(k, c as Real), (k, 0.0), (k, 0.0)], axes, count });
+        };
+        for _ in 0..self.substeps {
+            let from = &*d;
+            self.at(start, from, count, &mut spots, &mut k1);
+            match self.trace {
+                Trace::Euler => move_by(d, None, &k1, h),
+                Trace::Rk2 => {
+                    move_by(&mut p, Some(d), &k1, 0.5 * h);
+                    self.at(start, &p, count, &mut spots, &mut k2);
+                    move_by(d, None, &k2, h);
+                }
+                Trace::Rk3 => {
+                    move_by(&mut p, Some(d), &k1, 0.5 * h);
+                    self.at(start, &p, count, &mut spots, &mut k2);
+                    move_by(&mut p, Some(d), &k2, 0.75 * h);
+                    self.at(start, &p, count, &mut spots, &mut k3);
+                    let [a, b, c] = [2.0, 3.0, 4.0].map(|c| (c / 9.0 * h) as Real);
+                    dispatch(Move { to: d, from: None, k: [(&k1, a), (&k2, b), (&k3, c)], axes, count });
+                }
+            }
+            for a in (0..3).filter(|a| axes[*a] && !self.grid.periodic[*a]) {
+                let first = (start.at[a] as f64 + start.offset[a]) as Real;
+                dispatch(Hold { d: &mut d[a], first, along: a == 0, wall: self.grid.n[a] as Real, count });
+            }
+        }
+        if let Some(middle) = middle {
+            for a in 0..3 {
+                for e in 0..count {
+                    middle[a][e] = (0.5 as Real) * d[a][e];
+                }
+            }
+        }
+    }
+}
+
+/// Carries fields that stand at one place by the flow u for h seconds: `out` is what `fields` become. They share their paths.
+pub fn advect(
+    fields: &[&Field],
+    u: &Vectors,
+    h: f64,
+    how: &Advection,
+    out: &mut [&mut Field],
+    scratch: &mut Scratch,
+) -> Result<(), GridError> {
+    let flow = Flow::new(u, h, how)?;
+    let Some(first) = fields.first() else { return Ok(()) };
+    if fields.len() != out.len() {
+        return Err(GridError::Grids { what: "advection" });
+    }
+    for (f, out) in fields.iter().zip(out.iter()) {
+        f.expect(&flow.grid, first.place, "advected field")?;
+        out.expect(&flow.grid, first.place, "advection")?;
+    }
+    let offset = flow.grid.offset(first.place);
+    let views: Vec<View> = fields.iter().map(|f| View::new(f, how.interpolation)).collect();
+    if !how.corrected {
+        each_row_of(out, |j, k, rows| carry(&flow, &views, Start { at: [0, j, k], offset }, rows, &mut []));
+        return Ok(());
+    }
+    let count = fields.len();
+    // Carried, least and greatest corner of every field.
+    let kept = scratch.like(first, 3 * count)?;
+    for (i, f) in fields.iter().enumerate() {
+        kept[i].sides = f.sides;
+    }
+    let mut all: Vec<&mut Field> = kept.iter_mut().collect();
+    each_row_of(&mut all, |j, k, rows| {
+        let (carried, bounds) = rows.split_at_mut(count);
+        carry(&flow, &views, Start { at: [0, j, k], offset }, carried, bounds);
+    });
+    let (carried, bounds) = kept.split_at(count);
+    let back: Vec<View> = carried.iter().map(|f| View::new(f, how.interpolation)).collect();
+    each_row_of(out, |j, k, rows| {
+        let (mut d, mut spots, mut values) = ([[0.0; SEGMENT]; 3], Spots::new(), [0.0; SEGMENT]);
+        let n = rows.first().map_or(0, |row| row.len());
+        for i in (0..n).step_by(SEGMENT) {
+            let (start, len) = (Start { at: [i, j, k], offset }, SEGMENT.min(n - i));
+            flow.trace(start, len, -1.0, &mut d, None);
+            for (c, row) in rows.iter_mut().enumerate() {
+                locate(&back[c], start, &d, len, &mut spots);
+                read(&back[c], &spots, len, &mut values, None);
+                let at = carried[c].index([i, j, k]);
+                let part = |f: &'_ Field| -> Lot<Real> {
+                    let mut lot = [0.0; SEGMENT];
+                    lot[..len].copy_from_slice(&f.data[at..at + len]);
+                    lot
+                };
+                let (there, low, high) = (part(&carried[c]), part(&bounds[c]), part(&bounds[count + c]));
+                let from = part(fields[c]);
+                for e in 0..len {
+                    let new = there[e] + (0.5 as Real) * (from[e] - values[e]);
+                    // Not `clamp`, which fails where the bounds are not numbers.
+                    row[i + e] = if new < low[e] {
+                        low[e]
+                    } else if new > high[e] {
+                        high[e]
+                    } else {
+                        new
+                    };
+                }
+            }
+        }
+    });
+    Ok(())
+}
+
+/// One way: fills a row of each field, and its bounds (all least corners, then all greatest) if there are rows for them.
+fn carry(flow: &Flow, views: &[View], start: Start, rows: &mut [&mut [Real]], bounds: &mut [&mut [Real]]) {
+    let (mut d, mut spots, mut values) = ([[0.0; SEGMENT]; 3], Spots::new(), [0.0; SEGMENT]);
+    let mut corners = [[0.0; SEGMENT]; 2];
+    let n = rows.first().map_or(0, |row| row.len());
+    for i in (0..n).step_by(SEGMENT) {
+        let (start, len) = (Start { at: [i, start.at[1], start.at[2]], ..start }, SEGMENT.min(n - i));
+        flow.trace(start, len, 1.0, &mut d, None);
+        for (c, row) in rows.iter_mut().enumerate() {
+            locate(&views[c], start, &d, len, &mut spots);
+            let wanted = if bounds.is_empty() { None } else { Some(&mut corners) };
+            read(&views[c], &spots, len, &mut values, wanted);
+            row[i..i + len].copy_from_slice(&values[..len]);
+            if !bounds.is_empty() {
+                bounds[c][i..i + len].copy_from_slice(&corners[0][..len]);
+                bounds[views.len() + c][i..i + len].copy_from_slice(&corners[1][..len]);
+            }
+        }
+    }
+}
+
+/// Carries vectors on faces, component by component or, if `turning`, turned with the fluid as a whole; then they are not corrected.
+pub fn advect_vectors(
+    vectors: &Vectors,
+    u: &Vectors,
+    h: f64,
+    how: &Advection,
+    out: &mut Vectors,
+    scratch: &mut Scratch,
+) -> Result<(), GridError> {
+    let grid = vectors.on_faces("advected vectors")?;
+    out.check(&grid, grid.axes().map(crate::state::Place::Face).collect(), "advection of vectors")?;
+    if !how.turning {
+        return vectors.parts.iter().zip(&mut out.parts).try_for_each(|(f, out)| advect(&[f], u, h, how, &mut [out], scratch));
+    }
+    let flow = Flow::new(u, h, how)?;
+    if flow.grid != grid {
+        return Err(GridError::Grids { what: "advected vectors" });
+    }
+    let mut turn = Vectors::edges(grid, "1/s")?;
+    super::curl(u, &mut turn)?;
+    let spin: Vec<(usize, View)> = (0..3).filter_map(|a| turn.part(a).map(|f| (a, View::new(f, Interpolation::Linear)))).collect();
+    let views: Vec<(usize, View)> = grid.axes().zip(&vectors.parts).map(|(a, f)| (a, View::new(f, how.interpolation))).collect();
+    for (axis, part) in grid.axes().zip(&mut out.parts) {
+        let offset = grid.offset(part.place);
+        each_row(part, |j, k, row| {
+            let (mut d, mut middle, mut spots) = ([[0.0; SEGMENT]; 3], [[0.0; SEGMENT]; 3], Spots::new());
+            let (mut v, mut w) = ([[0.0; SEGMENT]; 3], [[0.0; SEGMENT]; 3]);
+            for i in (0..row.len()).step_by(SEGMENT) {
+                let (start, len) = (Start { at: [i, j, k], offset }, SEGMENT.min(row.len() - i));
+                flow.trace(start, len, 1.0, &mut d, Some(&mut middle));
+                for (a, view) in &views {
+                    locate(view, start, &d, len, &mut spots);
+                    read(view, &spots, len, &mut v[*a], None);
+                }
+                for (a, view) in &spin {
+                    locate(view, start, &middle, len, &mut spots);
+                    read(view, &spots, len, &mut w[*a], None);
+                }
+                for e in 0..len {
+                    let at = |lots: &Ways| [0, 1, 2].map(|a| f64::from(lots[a][e]));
+                    row[i + e] = turned(at(&v), at(&w).map(|w| 0.5 * h * w))[axis] as Real;
+                }
+            }
+        });
+    }
+    Ok(())
+}
+
+/// v turned by the rotation vector r: Rodrigues' formula.                          (grids.20)
+fn turned(v: [f64; 3], r: [f64; 3]) -> [f64; 3] {
+    let angle = (r[0] * r[0] + r[1] * r[1] + r[2] * r[2]).sqrt();
+    if !(angle.is_finite() && angle > 0.0) {
+        return v;
+    }
+    let n = r.map(|r| r / angle);
+    let (s, c) = (functions::sin(angle), functions::cos(angle));
+    let along = (n[0] * v[0] + n[1] * v[1] + n[2] * v[2]) * (1.0 - c);
+    let cross = |a: usize| n[(a + 1) % 3] * v[(a + 2) % 3] - n[(a + 2) % 3] * v[(a + 1) % 3];
+    std::array::from_fn(|a| c * v[a] + s * cross(a) + along * n[a])
+}
