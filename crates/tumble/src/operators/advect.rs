@@ -8,9 +8,9 @@
 //! Stable at any step. Paths stay within walls and wrap where the grid is periodic. Positions are displacements from the row's own
 //! points: a shift by whole cells changes no bit. Source: [stam1999], [selle2008]; tests: crates/tumble-f64/tests/advection.rs.
 
-use super::sample::{Interpolation, Lot, SEGMENT, Spots, Start, View, locate, read};
-use super::stencil::{each_row, each_row_of};
-use crate::math::simd::{Kernel, Width, dispatch};
+use super::sample::{Interpolation, Lot, SEGMENT, Spots, Start, View, locate, read, read_still};
+use super::stencil::{each_row, each_row_with};
+use crate::math::simd::{Kernel, Width, dispatch, packs};
 use crate::math::{Lane, Real, functions};
 use crate::state::{Field, Grid, GridError, Vectors};
 
@@ -151,41 +151,47 @@ impl<'a> Flow<'a> {
         Ok(Self { grid, views, trace: how.trace, substeps, step: h / substeps as f64 / grid.dx })
     }
 
-    /// The velocity at displaced points.
-    fn at(&self, start: Start, d: &Ways, count: usize, spots: &mut Spots, out: &mut Ways) {
+    /// The velocity at displaced points; not displaced where there is no `d`.
+    fn at(&self, start: Start, d: Option<&Ways>, count: usize, spots: &mut Spots, out: &mut Ways) {
         for (a, view) in &self.views {
+            let Some(d) = d else {
+                read_still(view, start, count, spots, &mut out[*a]);
+                continue;
+            };
             locate(view, start, d, count, spots);
             read(view, spots, count, &mut out[*a], None);
         }
     }
 
-    /// The displacements to where the fluid at the points was; `sign` -1: to where it will be.
-    fn trace(&self, start: Start, count: usize, sign: f64, d: &mut Ways, middle: Option<&mut Ways>) {
+    /// Leaves in `work.d` the displacements to where the fluid at the points was; `sign` -1: to where it will be.
+    fn trace(&self, start: Start, count: usize, sign: f64, work: &mut Work) {
         let axes: [bool; 3] = std::array::from_fn(|a| self.grid.flat != Some(a));
-        let mut spots = Spots::new();
-        let (mut p, mut k1, mut k2, mut k3) = ([[0.0; SEGMENT]; 3], [[0.0; SEGMENT]; 3], [[0.0; SEGMENT]; 3], [[0.0; SEGMENT]; 3]);
-        *d = [[0.0; SEGMENT]; 3];
+        let Work { d, p, k1, k2, k3, spots, .. } = work;
         let h = self.step * sign;
         let move_by = |to: &mut Ways, from: Option<&Ways>, k: &Ways, c: f64| {
             dispatch(Move { to, from, k: [(k, c as Real), (k, 0.0), (k, 0.0)], axes, count });
         };
-        for _ in 0..self.substeps {
-            let from = &*d;
-            self.at(start, from, count, &mut spots, &mut k1);
+        for piece in 0..self.substeps {
+            if piece == 0 {
+                *d = [[0.0; SEGMENT]; 3];
+                self.at(start, None, count, spots, k1);
+            } else {
+                self.at(start, Some(d), count, spots, k1);
+            }
             match self.trace {
-                Trace::Euler => move_by(d, None, &k1, h),
+                Trace::Euler => move_by(d, None, k1, h),
                 Trace::Rk2 => {
-                    move_by(&mut p, Some(d), &k1, 0.5 * h);
-                    self.at(start, &p, count, &mut spots, &mut k2);
-                    move_by(d, None, &k2, h);
+                    move_by(p, Some(d), k1, 0.5 * h);
+                    self.at(start, Some(p), count, spots, k2);
+                    move_by(d, None, k2, h);
                 }
                 Trace::Rk3 => {
-                    move_by(&mut p, Some(d), &k1, 0.5 * h);
-                    self.at(start, &p, count, &mut spots, &mut k2);
-                    move_by(&mut p, Some(d), &k2, 0.75 * h);
-                    self.at(start, &p, count, &mut spots, &mut k3);
+                    move_by(p, Some(d), k1, 0.5 * h);
+                    self.at(start, Some(p), count, spots, k2);
+                    move_by(p, Some(d), k2, 0.75 * h);
+                    self.at(start, Some(p), count, spots, k3);
                     let [a, b, c] = [2.0, 3.0, 4.0].map(|c| (c / 9.0 * h) as Real);
-                    dispatch(Move { to: d, from: None, k: [(&k1, a), (&k2, b), (&k3, c)], axes, count });
+                    dispatch(Move { to: d, from: None, k: [(k1, a), (k2, b), (k3, c)], axes, count });
                 }
             }
             for a in (0..3).filter(|a| axes[*a] && !self.grid.periodic[*a]) {
@@ -193,13 +199,26 @@ impl<'a> Flow<'a> {
                 dispatch(Hold { d: &mut d[a], first, along: a == 0, wall: self.grid.n[a] as Real, count });
             }
         }
-        if let Some(middle) = middle {
-            for a in 0..3 {
-                for e in 0..count {
-                    middle[a][e] = (0.5 as Real) * d[a][e];
-                }
-            }
-        }
+    }
+}
+
+/// What a task works with.
+struct Work {
+    d: Ways,
+    p: Ways,
+    k1: Ways,
+    k2: Ways,
+    k3: Ways,
+    spots: Spots,
+    values: Lot<Real>,
+    corners: [Lot<Real>; 2],
+}
+
+impl Work {
+    fn new() -> Self {
+        let none = [[0.0; SEGMENT]; 3];
+        let (values, corners) = ([0.0; SEGMENT], [[0.0; SEGMENT]; 2]);
+        Self { d: none, p: none, k1: none, k2: none, k3: none, spots: Spots::new(), values, corners }
     }
 }
 
@@ -215,7 +234,7 @@ pub fn advect(
     let flow = Flow::new(u, h, how)?;
     let Some(first) = fields.first() else { return Ok(()) };
     if fields.len() != out.len() {
-        return Err(GridError::Grids { what: "advection" });
+        return Err(GridError::Components { what: "advection", expected: fields.len(), found: out.len() });
     }
     for (f, out) in fields.iter().zip(out.iter()) {
         f.expect(&flow.grid, first.place, "advected field")?;
@@ -224,7 +243,7 @@ pub fn advect(
     let offset = flow.grid.offset(first.place);
     let views: Vec<View> = fields.iter().map(|f| View::new(f, how.interpolation)).collect();
     if !how.corrected {
-        each_row_of(out, |j, k, rows| carry(&flow, &views, Start { at: [0, j, k], offset }, rows, &mut []));
+        each_row_with(out, Work::new, |work, j, k, rows| carry(&flow, &views, Start { at: [0, j, k], offset }, rows, &mut [], work));
         return Ok(());
     }
     let count = fields.len();
@@ -234,62 +253,71 @@ pub fn advect(
         kept[i].sides = f.sides;
     }
     let mut all: Vec<&mut Field> = kept.iter_mut().collect();
-    each_row_of(&mut all, |j, k, rows| {
+    each_row_with(&mut all, Work::new, |work, j, k, rows| {
         let (carried, bounds) = rows.split_at_mut(count);
-        carry(&flow, &views, Start { at: [0, j, k], offset }, carried, bounds);
+        carry(&flow, &views, Start { at: [0, j, k], offset }, carried, bounds, work);
     });
     let (carried, bounds) = kept.split_at(count);
     let back: Vec<View> = carried.iter().map(|f| View::new(f, how.interpolation)).collect();
-    each_row_of(out, |j, k, rows| {
-        let (mut d, mut spots, mut values) = ([[0.0; SEGMENT]; 3], Spots::new(), [0.0; SEGMENT]);
+    each_row_with(out, Work::new, |work, j, k, rows| {
         let n = rows.first().map_or(0, |row| row.len());
         for i in (0..n).step_by(SEGMENT) {
             let (start, len) = (Start { at: [i, j, k], offset }, SEGMENT.min(n - i));
-            flow.trace(start, len, -1.0, &mut d, None);
+            flow.trace(start, len, -1.0, work);
             for (c, row) in rows.iter_mut().enumerate() {
-                locate(&back[c], start, &d, len, &mut spots);
-                read(&back[c], &spots, len, &mut values, None);
-                let at = carried[c].index([i, j, k]);
-                let part = |f: &'_ Field| -> Lot<Real> {
-                    let mut lot = [0.0; SEGMENT];
-                    lot[..len].copy_from_slice(&f.data[at..at + len]);
-                    lot
-                };
-                let (there, low, high) = (part(&carried[c]), part(&bounds[c]), part(&bounds[count + c]));
-                let from = part(fields[c]);
-                for e in 0..len {
-                    let new = there[e] + (0.5 as Real) * (from[e] - values[e]);
-                    // Not `clamp`, which fails where the bounds are not numbers.
-                    row[i + e] = if new < low[e] {
-                        low[e]
-                    } else if new > high[e] {
-                        high[e]
-                    } else {
-                        new
-                    };
+                if c == 0 || !back[c].is_like(&back[c - 1]) {
+                    locate(&back[c], start, &work.d, len, &mut work.spots);
                 }
+                read(&back[c], &work.spots, len, &mut work.values, None);
+                let at = carried[c].index([i, j, k]);
+                let (from, there) = (&fields[c].data[at..at + len], &carried[c].data[at..at + len]);
+                let bounds = [&bounds[c].data[at..at + len], &bounds[count + c].data[at..at + len]];
+                dispatch(Correct { out: &mut row[i..i + len], from, there, back: &work.values, bounds });
             }
         }
     });
     Ok(())
 }
 
+struct Correct<'a> {
+    out: &'a mut [Real],
+    from: &'a [Real],
+    there: &'a [Real],
+    back: &'a [Real],
+    bounds: [&'a [Real]; 2],
+}
+
+impl Kernel for Correct<'_> {
+    type Output = ();
+    /// (grids.18, grids.19)
+    #[inline(always)]
+    fn run<W: Width>(self, w: W) {
+        let Self { out, from, there, back, bounds } = self;
+        packs!(W, w, (0..out.len()), |e| {
+            let new = w.load(&there[e..]) + w.splat(0.5) * (w.load(&from[e..]) - w.load(&back[e..]));
+            let (low, high) = (w.load(&bounds[0][e..]), w.load(&bounds[1][e..]));
+            let new = (new - low).positive(new, low);
+            w.store((high - new).positive(new, high), &mut out[e..]);
+        });
+    }
+}
+
 /// One way: fills a row of each field, and its bounds (all least corners, then all greatest) if there are rows for them.
-fn carry(flow: &Flow, views: &[View], start: Start, rows: &mut [&mut [Real]], bounds: &mut [&mut [Real]]) {
-    let (mut d, mut spots, mut values) = ([[0.0; SEGMENT]; 3], Spots::new(), [0.0; SEGMENT]);
-    let mut corners = [[0.0; SEGMENT]; 2];
+fn carry(flow: &Flow, views: &[View], start: Start, rows: &mut [&mut [Real]], bounds: &mut [&mut [Real]], work: &mut Work) {
     let n = rows.first().map_or(0, |row| row.len());
     for i in (0..n).step_by(SEGMENT) {
         let (start, len) = (Start { at: [i, start.at[1], start.at[2]], ..start }, SEGMENT.min(n - i));
-        flow.trace(start, len, 1.0, &mut d, None);
+        flow.trace(start, len, 1.0, work);
         for (c, row) in rows.iter_mut().enumerate() {
-            locate(&views[c], start, &d, len, &mut spots);
-            let wanted = if bounds.is_empty() { None } else { Some(&mut corners) };
-            read(&views[c], &spots, len, &mut values, wanted);
-            row[i..i + len].copy_from_slice(&values[..len]);
+            if c == 0 || !views[c].is_like(&views[c - 1]) {
+                locate(&views[c], start, &work.d, len, &mut work.spots);
+            }
+            let wanted = if bounds.is_empty() { None } else { Some(&mut work.corners) };
+            read(&views[c], &work.spots, len, &mut work.values, wanted);
+            row[i..i + len].copy_from_slice(&work.values[..len]);
             if !bounds.is_empty() {
-                bounds[c][i..i + len].copy_from_slice(&corners[0][..len]);
-                bounds[views.len() + c][i..i + len].copy_from_slice(&corners[1][..len]);
+                bounds[c][i..i + len].copy_from_slice(&work.corners[0][..len]);
+                bounds[views.len() + c][i..i + len].copy_from_slice(&work.corners[1][..len]);
             }
         }
     }
@@ -320,18 +348,22 @@ pub fn advect_vectors(
     for (axis, part) in grid.axes().zip(&mut out.parts) {
         let offset = grid.offset(part.place);
         each_row(part, |j, k, row| {
-            let (mut d, mut middle, mut spots) = ([[0.0; SEGMENT]; 3], [[0.0; SEGMENT]; 3], Spots::new());
+            let mut work = Work::new();
             let (mut v, mut w) = ([[0.0; SEGMENT]; 3], [[0.0; SEGMENT]; 3]);
             for i in (0..row.len()).step_by(SEGMENT) {
                 let (start, len) = (Start { at: [i, j, k], offset }, SEGMENT.min(row.len() - i));
-                flow.trace(start, len, 1.0, &mut d, Some(&mut middle));
+                flow.trace(start, len, 1.0, &mut work);
+                let Work { d, p: middle, spots, .. } = &mut work;
+                for (middle, d) in middle.as_flattened_mut().iter_mut().zip(d.as_flattened()) {
+                    *middle = 0.5 * *d;
+                }
                 for (a, view) in &views {
-                    locate(view, start, &d, len, &mut spots);
-                    read(view, &spots, len, &mut v[*a], None);
+                    locate(view, start, d, len, spots);
+                    read(view, spots, len, &mut v[*a], None);
                 }
                 for (a, view) in &spin {
-                    locate(view, start, &middle, len, &mut spots);
-                    read(view, &spots, len, &mut w[*a], None);
+                    locate(view, start, middle, len, spots);
+                    read(view, spots, len, &mut w[*a], None);
                 }
                 for e in 0..len {
                     let at = |lots: &Ways| [0, 1, 2].map(|a| f64::from(lots[a][e]));

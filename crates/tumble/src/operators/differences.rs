@@ -66,7 +66,7 @@ pub fn laplacian(f: &Field, out: &mut Field) -> Result<(), GridError> {
 /// The Laplacian of each component of vectors: what viscosity multiplies.                              (grids.6)
 pub fn vector_laplacian(u: &Vectors, out: &mut Vectors) -> Result<(), GridError> {
     if u.parts.len() != out.parts.len() {
-        return Err(GridError::Grids { what: "Laplacian of vectors" });
+        return Err(GridError::Components { what: "Laplacian of vectors", expected: u.parts.len(), found: out.parts.len() });
     }
     u.parts.iter().zip(&mut out.parts).try_for_each(|(f, out)| laplacian(f, out))
 }

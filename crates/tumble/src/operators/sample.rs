@@ -32,7 +32,7 @@ pub(super) type Lot<T> = [T; SEGMENT];
 /// Displacements beyond this many cells are cut, so that all whole numbers are exact.
 const FAR: f64 = 1_048_576.0;
 
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone, Copy, PartialEq)]
 struct Axis {
     /// Where positions must lie, counted from the first point in cells.
     low: Real,
@@ -58,6 +58,11 @@ pub(super) struct View<'a> {
 }
 
 impl<'a> View<'a> {
+    /// Whether the same spots serve for both.
+    pub(super) fn is_like(&self, other: &Self) -> bool {
+        self.first == other.first && self.axes == other.axes && self.there == other.there
+    }
+
     /// Reads the field in place if it needs nothing from beyond its walls, else a copy with ghosts.
     pub fn new(f: &'a Field, how: Interpolation) -> Self {
         let (grid, points, l) = (f.grid, f.points(), f.grid.lattice());
@@ -227,6 +232,119 @@ impl Kernel for Locate<'_, '_> {
 #[inline]
 pub(super) fn locate(view: &View, start: Start, d: &[Lot<Real>; 3], count: usize, spots: &mut Spots) {
     dispatch(Locate { view, start, d, count, spots });
+}
+
+/// Where one position on an axis is: its point and the way to the next one, as `Locate` finds them.
+fn spot(axis: &Axis, i: Real, shift: Real) -> (Real, Real) {
+    if axis.period > 0.0 {
+        let cell = shift.floor() + i;
+        return (cell - (cell / axis.period).floor() * axis.period, shift - shift.floor());
+    }
+    let s = shift.max(axis.low - i).min(axis.high - i);
+    let floor = s.floor().min(axis.last - i);
+    (floor + i, s - floor)
+}
+
+struct Still<'a, 'b> {
+    view: &'a View<'b>,
+    /// The number of the lower corner of the first point's cell.
+    index: usize,
+    t: [Real; 3],
+    out: &'a mut [Real],
+}
+
+impl Still<'_, '_> {
+    /// Whole packs, then numbers one by one.
+    #[inline(always)]
+    fn packs<const X: bool, const Y: bool, const Z: bool, W: Width>(self, w: W) {
+        let Self { view, index, t, out } = self;
+        let (sy, sz) = (view.axes[1].stride as usize, view.axes[2].stride as usize);
+        let (ny, nz) = (1 + usize::from(Y), 1 + usize::from(Z));
+        let [tx, ty, tz] = [w.splat(t[0]), w.splat(t[1]), w.splat(t[2])];
+        let n = out.len();
+        let last = (ny - 1) * sy + (nz - 1) * sz + usize::from(X);
+        let data = &view.data[index..index + n + last];
+        let mut e = 0;
+        while e + W::N <= n {
+            let mut planes = [w.splat(0.0); 2];
+            for z in 0..nz {
+                let mut rows = [w.splat(0.0); 2];
+                for y in 0..ny {
+                    let at = e + y * sy + z * sz;
+                    let a = w.load(&data[at..]);
+                    rows[y] = if X { line(a, w.load(&data[at + 1..]), tx) } else { a };
+                }
+                planes[z] = if Y { line(rows[0], rows[1], ty) } else { rows[0] };
+            }
+            w.store(if Z { line(planes[0], planes[1], tz) } else { planes[0] }, &mut out[e..]);
+            e += W::N;
+        }
+    }
+}
+
+impl Kernel for Still<'_, '_> {
+    type Output = ();
+    #[inline(always)]
+    fn run<W: Width>(self, w: W) {
+        // Weights of 0 need no second number.
+        let with = |a: usize| self.view.there[a] && self.t[a] != 0.0;
+        match [with(0), with(1), with(2)] {
+            [true, true, true] => self.packs::<true, true, true, W>(w),
+            [true, true, false] => self.packs::<true, true, false, W>(w),
+            [true, false, true] => self.packs::<true, false, true, W>(w),
+            [true, false, false] => self.packs::<true, false, false, W>(w),
+            [false, true, true] => self.packs::<false, true, true, W>(w),
+            [false, true, false] => self.packs::<false, true, false, W>(w),
+            [false, false, true] => self.packs::<false, false, true, W>(w),
+            [false, false, false] => self.packs::<false, false, false, W>(w),
+        }
+    }
+}
+
+/// The values, linear, at consecutive points themselves: all weights are 0 or a half, and rows are read as they lie.
+pub(super) fn read_still(view: &View, start: Start, count: usize, spots: &mut Spots, out: &mut Lot<Real>) {
+    let shift: [Real; 3] = std::array::from_fn(|a| (start.offset[a] - view.axes[a].offset) as Real);
+    let x = view.axes[0];
+    let (mut index, mut t) = (view.first as isize, [0.0; 3]);
+    for a in (1..3).filter(|a| view.there[*a]) {
+        let (cell, weight) = spot(&view.axes[a], start.at[a] as Real, shift[a]);
+        index += cell as isize * view.axes[a].stride as isize;
+        t[a] = weight;
+    }
+    // The points whose weight along x is the same: not those that a wall moves.
+    let (mut from, mut to) = (0, count);
+    if view.there[0] {
+        let i = start.at[0] as Real;
+        let below = shift[0].floor();
+        t[0] = shift[0] - below;
+        index += i as isize + below as isize;
+        if x.period == 0.0 {
+            while from < to && i + from as Real + shift[0] < x.low {
+                from += 16;
+            }
+            while to > from && (i + (to - 1) as Real + shift[0] > x.high || i + (to - 1) as Real + below > x.last) {
+                to -= 1;
+            }
+        }
+    }
+    to = from + to.saturating_sub(from) / 16 * 16;
+    let mut rest = |from: usize, to: usize, out: &mut Lot<Real>| {
+        let (still, mut lot) = ([[0.0; SEGMENT]; 3], [0.0; SEGMENT]);
+        let start = Start { at: [start.at[0] + from, start.at[1], start.at[2]], ..start };
+        locate(view, start, &still, to - from, spots);
+        read(view, spots, to - from, &mut lot, None);
+        out[from..to].copy_from_slice(&lot[..to - from]);
+    };
+    if from > 0 {
+        rest(0, from.min(count), out);
+    }
+    if to > from {
+        let index = (index + from as isize) as usize;
+        dispatch(Still { view, index, t, out: &mut out[from..to] });
+    }
+    if to.max(from) < count {
+        rest(to.max(from), count, out);
+    }
 }
 
 struct Read<'a, 'b> {

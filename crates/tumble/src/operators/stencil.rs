@@ -74,6 +74,15 @@ pub fn each_row(out: &mut Field, work: impl Fn(usize, usize, &mut [Real]) + Sync
 
 /// The same for several fields at the same place at once.
 pub fn each_row_of(out: &mut [&mut Field], work: impl Fn(usize, usize, &mut [&mut [Real]]) + Sync) {
+    each_row_with(out, || (), |(), j, k, rows| work(j, k, rows));
+}
+
+/// The same with something to work with that is made once for each task.
+pub fn each_row_with<T>(
+    out: &mut [&mut Field],
+    make: impl Fn() -> T + Sync,
+    work: impl Fn(&mut T, usize, usize, &mut [&mut [Real]]) + Sync,
+) {
     let Some(first) = out.first() else { return };
     let ([px, py, pz], l) = (first.points(), first.grid.lattice());
     let (row, rows, start) = (l.stride[1], l.n[1] + 2, l.at(0, 0, 0) - l.stride[1] - l.stride[2]);
@@ -88,13 +97,14 @@ pub fn each_row_of(out: &mut [&mut Field], work: impl Fn(usize, usize, &mut [&mu
         }
     }
     let body = |t: usize, mut chunks: Vec<&mut [Real]>| {
+        let mut with = make();
         for r in 0..task {
             let (k, j) = ((t * task + r) / rows, (t * task + r) % rows);
             if !(1..=pz).contains(&k) || !(1..=py).contains(&j) {
                 continue;
             }
             let mut here: Vec<&mut [Real]> = chunks.iter_mut().map(|c| &mut c[r * row..r * row + px]).collect();
-            work(j - 1, k - 1, &mut here);
+            work(&mut with, j - 1, k - 1, &mut here);
         }
     };
     if tasks.len() <= 2 {

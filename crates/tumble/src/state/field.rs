@@ -168,7 +168,7 @@ impl Vectors {
     /// An error unless they are the components at these places of the grid.
     pub fn check(&self, grid: &Grid, places: Vec<Place>, what: &'static str) -> Result<(), GridError> {
         if self.parts.len() != places.len() {
-            return Err(GridError::Grids { what });
+            return Err(GridError::Components { what, expected: places.len(), found: self.parts.len() });
         }
         self.parts.iter().zip(places).try_for_each(|(part, place)| part.expect(grid, place, what))
     }

@@ -194,6 +194,15 @@ pub enum GridError {
         /// Which field of which operator.
         what: &'static str,
     },
+    /// Too few or too many components.
+    Components {
+        /// Which vectors of which operator.
+        what: &'static str,
+        /// How many they must have.
+        expected: usize,
+        /// How many they have.
+        found: usize,
+    },
     /// Numbers that do not fill a place.
     Count {
         /// The place.
@@ -232,6 +241,9 @@ impl fmt::Display for GridError {
                 write!(f, "{what}: values at \"{found}\", expected \"{expected}\"; interpolate them there, or take another operator")
             }
             Self::Grids { what } => write!(f, "{what}: fields of two different grids; interpolate one to the points of the other"),
+            Self::Components { what, expected, found } => {
+                write!(f, "{what}: {found} components, expected {expected}: one field for each axis, in their order")
+            }
             Self::Count { place, points: [x, y, z], found } => {
                 write!(f, "{found} values, expected {x} x {y} x {z} = {} at \"{place}\"", x * y * z)
             }
