@@ -53,8 +53,10 @@ def test_the_verbs_are_those_of_calculus() -> None:
         assert [s.unit for s in slope] == ["K/m"] * len(axes)
         assert np.allclose(slope[0].array[1:-1], 3) and np.allclose(slope[1].array[:, 1:-1], -2)
         assert np.all(slope[0].array[0] == 0), "closed walls"
-        u = [grid.field(lambda *x, c=c: x[c] ** 2 * (1 + x[1 - c]) if c < 2 else 0 * x[c], f"face {a}", "m/s")
-             for c, a in enumerate(axes)]
+        u = [
+            grid.field(lambda *x, c=c: x[c] ** 2 * (1 + x[1 - c]) if c < 2 else 0 * x[c], f"face {a}", "m/s")
+            for c, a in enumerate(axes)
+        ]
         x = grid.points("cell")
         # The difference of a square is exact in the middle.
         assert np.allclose(divergence(u).array, 2 * x[0] * (1 + x[1]) + 2 * x[1] * (1 + x[0]))
@@ -74,7 +76,9 @@ def test_the_verbs_are_those_of_calculus() -> None:
         x = grid.points("cell")
         mean = (x[0] ** 2 + grid.spacing**2 / 4) * (1 + x[1])
         assert np.allclose(along.array[1:-1], (mean * 2 * x[0])[1:-1])
-        assert np.allclose(average(f, "node").array[inner], grid.field(lambda *x: 3 * x[0] - 2 * x[1], "node").array[inner])
+        assert np.allclose(
+            average(f, "node").array[inner], grid.field(lambda *x: 3 * x[0] - 2 * x[1], "node").array[inner]
+        )
         assert [p.place for p in laplacian(u)] == [p.place for p in u]
 
 

@@ -5,9 +5,9 @@ heat = grid.field(lambda x, y: x * y, "cell", unit="K")
 slope_x, slope_y = gradient(heat)
 slope_x.array, slope_x.place
 
-A field knows its place: "cell", "face x", "edge x" (or y, z) or "node"; mixing places raises TumbleError. Vectors are the fields of
-their components, on faces or on edges. Results lie between closed walls; advect and diffuse keep the sides of what they are given.
-Theory: docs/theory/grids.md. All in double precision.
+A field knows its place: "cell", "face x", "edge x" (or y, z) or "node"; mixing places raises TumbleError. Vectors are the
+fields of their components, on faces or on edges. Results lie between closed walls; advect and diffuse keep the sides of what
+they are given. Theory: docs/theory/grids.md. All in double precision.
 """
 
 from tumble._engine import (
