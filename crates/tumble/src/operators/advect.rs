@@ -8,7 +8,7 @@
 //! Stable at any step. Paths stay within walls and wrap where the grid is periodic. Positions are displacements from the row's own
 //! points: a shift by whole cells changes no bit. Source: [stam1999], [selle2008]; tests: crates/tumble-f64/tests/advection.rs.
 
-use super::sample::{Interpolation, Lot, SEGMENT, Spots, Start, View, locate, read, read_still};
+use super::sample::{COUNT, Interpolation, Lot, SEGMENT, Spots, Start, View, locate, read, read_still};
 use super::stencil::{each_row, each_row_with};
 use crate::math::simd::{Kernel, Width, dispatch, packs};
 use crate::math::{Lane, Real, functions};
@@ -35,7 +35,7 @@ pub struct Advection {
     pub substeps: usize,
     /// Values between points.
     pub interpolation: Interpolation,
-    /// MacCormack's correction, limited.                                     (grids.18, grids.19)
+    /// MacCormack's correction, limited; not of vectors that turn.                                     (grids.18, grids.19)
     pub corrected: bool,
     /// Vectors turn with the fluid.                                           (grids.20)
     pub turning: bool,
@@ -128,7 +128,6 @@ impl Kernel for Hold<'_> {
     /// Moves to the walls what is beyond them.
     #[inline(always)]
     fn run<W: Width>(self, w: W) {
-        const COUNT: [Real; 16] = [0.0, 1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0, 8.0, 9.0, 10.0, 11.0, 12.0, 13.0, 14.0, 15.0];
         let mut e = 0;
         while e < self.count {
             let mut x = w.splat(self.first);
@@ -386,4 +385,50 @@ fn turned(v: [f64; 3], r: [f64; 3]) -> [f64; 3] {
     let along = (n[0] * v[0] + n[1] * v[1] + n[2] * v[2]) * (1.0 - c);
     let cross = |a: usize| n[(a + 1) % 3] * v[(a + 2) % 3] - n[(a + 2) % 3] * v[(a + 1) % 3];
     std::array::from_fn(|a| c * v[a] + s * cross(a) + along * n[a])
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::state::Place;
+
+    /// Numbers without a pattern.
+    fn noisy(grid: Grid, place: Place, seed: u32) -> Field {
+        let hash = |x: [f64; 3]| (x[0] * 12.9898 + x[1] * 78.233 + x[2] * 37.719 + f64::from(seed)).sin() * 43758.5453;
+        Field::of(grid, place, "", |x| hash(x) - hash(x).floor() - 0.5).unwrap()
+    }
+
+    fn shifted(f: &Field, by: [isize; 3]) -> Field {
+        let mut out = f.clone();
+        for at in f.each() {
+            let to = std::array::from_fn(|a| (at[a] as isize + by[a]).rem_euclid(f.grid.n[a] as isize) as usize);
+            let i = out.index(to);
+            out.data[i] = f.value(at);
+        }
+        out
+    }
+
+    /// In the engine's own precision; more in crates/tumble-f64/tests/advection.rs.
+    #[test]
+    fn whole_cells_are_carried_and_noticed_exactly() {
+        let g = Grid::new([37, 7, 6], 0.25, [0.0; 3]).unwrap().periodic([true; 3]);
+        let (f, by, h) = (noisy(g, Place::Cell, 1), [-3, 2, 1], 0.5);
+        let even = Vectors::of(g, "m/s", |_| by.map(|c: isize| c as f64 * g.dx / h)).unwrap();
+        let uneven = Vectors { parts: (0..3).map(|a| noisy(g, Place::Face(a), 2 + a as u32)).collect() };
+        let moved = Vectors { parts: uneven.parts.iter().map(|p| shifted(p, by)).collect() };
+        for interpolation in [Interpolation::Linear, Interpolation::MonotoneCubic] {
+            for corrected in [false, true] {
+                let how = Advection { interpolation, corrected, ..Advection::default() };
+                let go = |f: &Field, u: &Vectors| {
+                    let mut out = f.clone();
+                    advect(&[f], u, h, &how, &mut [&mut out], &mut Scratch::default()).unwrap();
+                    out
+                };
+                assert_eq!(go(&f, &even).values(), shifted(&f, by).values());
+                let (here, there) = (go(&f, &uneven), go(&shifted(&f, by), &moved));
+                assert_ne!(here.values(), f.values());
+                assert_eq!(shifted(&here, by).values(), there.values());
+            }
+        }
+    }
 }
