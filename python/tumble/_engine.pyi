@@ -2,7 +2,7 @@
 
 import os
 from collections.abc import Callable, Mapping, Sequence
-from typing import Any
+from typing import Any, Literal, overload
 
 import numpy as np
 import numpy.typing as npt
@@ -153,3 +153,129 @@ class World:
 
 def load_mesh(path: Path) -> tuple[npt.NDArray[np.float64], npt.NDArray[np.uint32]]:
     """Vertices [file units] n x 3 and triangles m x 3 of an OBJ, PLY, STL or GLB file. Raises SceneError."""
+
+Side = Literal["closed"] | tuple[Literal["slope", "value", "ghost"], float]
+"""Beyond a wall: no slope, a slope along the outward normal, a value at the wall, a value at the points beyond."""
+
+Vectors = Sequence[Field]
+"""The components, in the order of axes, each on the faces of its axis or on the edges along it."""
+
+class Grid:
+    """A box of cubic cells, with two numbers of cells in a plane, with three in space. Lengths in metres."""
+
+    def __init__(
+        self,
+        cells: Sequence[int],
+        spacing: float,
+        origin: Sequence[float] | None = None,
+        plane: Literal["xy", "xz", "yz"] = "xy",
+        periodic: str = "",
+    ) -> None:
+        """`periodic` names axes, as in "xy". Raises TumbleError."""
+
+    @property
+    def cells(self) -> tuple[int, ...]:
+        """Cells along each axis."""
+
+    @property
+    def spacing(self) -> float:
+        """Length of a cell's sides [m]."""
+
+    def shape(self, place: str = "cell") -> tuple[int, ...]:
+        """How many points a place has along each axis: the shape of its arrays."""
+
+    def points(self, place: str = "cell") -> tuple[npt.NDArray[np.float64], ...]:
+        """The coordinates [m] of the points of a place: one array for each axis."""
+
+    def field(
+        self,
+        values: npt.ArrayLike | Callable[..., npt.ArrayLike],
+        place: str = "cell",
+        unit: str = "",
+        sides: Side | Mapping[str, Side] | None = None,
+    ) -> Field:
+        """A field from an array, a number or a function of the coordinates. `sides`: what is beyond the walls, one for all
+        or a dict: "x" both sides, "x-" the lower, "x+" the upper. Raises TumbleError."""
+
+class Field:
+    """Numbers at one place of a grid."""
+
+    @property
+    def array(self) -> npt.NDArray[np.float64]:
+        """The numbers; the first index is that of the first axis."""
+
+    @property
+    def place(self) -> str:
+        """ "cell", "face x", "edge x" (or y, z) or "node"."""
+
+    @property
+    def unit(self) -> str:
+        """SI unit."""
+
+    @property
+    def grid(self) -> Grid:
+        """Its grid."""
+
+def gradient(field: Field) -> tuple[Field, ...]:
+    """The gradient of a field of cells, on faces."""
+
+def divergence(vectors: Vectors) -> Field:
+    """The divergence of vectors on faces, at cells."""
+
+@overload
+def curl(vectors: Field) -> tuple[Field, ...]: ...
+@overload
+def curl(vectors: Vectors) -> Any:
+    """The curl of vectors on faces, on edges (in the plane: one field at nodes), or the other way."""
+
+@overload
+def laplacian(field: Field) -> Field: ...
+@overload
+def laplacian(field: Vectors) -> tuple[Field, ...]:
+    """The Laplacian of a field or of each component of vectors, at its own place."""
+
+def directional(velocity: Vectors, field: Field) -> Field:
+    """The directional derivative: velocity . grad field, at the place of the field."""
+
+def average(field: Field, place: str) -> Field:
+    """The field at another place: the mean of the nearest points there."""
+
+def sample(
+    field: Field, points: npt.ArrayLike, interpolation: Literal["linear", "cubic", "monotone"] = "linear"
+) -> npt.NDArray[np.float64]:
+    """The values at points, n x 2 or n x 3 [m]."""
+
+@overload
+def advect(
+    field: Field,
+    velocity: Vectors,
+    h: float,
+    trace: Literal["euler", "rk2", "rk3"] = "rk2",
+    substeps: int = 1,
+    interpolation: Literal["linear", "cubic", "monotone"] = "linear",
+    corrected: bool = False,
+    turning: bool = False,
+) -> Field: ...
+@overload
+def advect(
+    field: Vectors,
+    velocity: Vectors,
+    h: float,
+    trace: Literal["euler", "rk2", "rk3"] = "rk2",
+    substeps: int = 1,
+    interpolation: Literal["linear", "cubic", "monotone"] = "linear",
+    corrected: bool = False,
+    turning: bool = False,
+) -> tuple[Field, ...]:
+    """What a field, or vectors on faces, become when a velocity carries them for h seconds. `trace` is how paths are followed,
+    in `substeps` pieces; `corrected` adds MacCormack's correction, limited; `turning` turns vectors with the fluid."""
+
+@overload
+def diffuse(field: Field, kappa: float, duration: float) -> Field: ...
+@overload
+def diffuse(field: Vectors, kappa: float, duration: float) -> tuple[Field, ...]:
+    """What a field, or each component of vectors, becomes when it diffuses for a duration [s] with kappa [m²/s], in as many
+    explicit steps as it takes."""
+
+def diffusion_limit(grid: Grid, kappa: float) -> float:
+    """The largest explicit step of diffusion [s] that does not grow."""

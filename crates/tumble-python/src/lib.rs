@@ -2,6 +2,7 @@
 
 mod arrays;
 mod errors;
+mod fields;
 mod scene;
 mod user;
 mod world;
@@ -13,6 +14,10 @@ mod _engine {
     use super::{PyResult, errors};
     use pyo3::prelude::{Bound, PyModule, PyModuleMethods};
 
+    #[pymodule_export]
+    use super::fields::{
+        Field, Grid, advect, average, curl, diffuse, diffusion_limit, directional, divergence, gradient, laplacian, sample,
+    };
     #[pymodule_export]
     use super::scene::{Scene, load_mesh};
     #[pymodule_export]

@@ -2,7 +2,7 @@
 //!
 //! A [`Scene`](tumble_interface::Scene) goes in, [`Frame`](tumble_interface::Frame)s come out; between them stands a
 //! [`Simulation`](scene::Simulation). No files, no clock, no GPU here. Layers, each importing only those before it (`tests/layers.rs`
-//! enforces it): math, geometry, linalg, reference, state, elements, forces, integrators, exchange, system, pool, systems,
+//! enforces it): math, geometry, linalg, reference, state, operators, elements, forces, integrators, exchange, system, pool, systems,
 //! world, recipes, scene.
 
 // One source for two scalars: what converts in one engine is idle in the other.
@@ -15,6 +15,7 @@ pub mod geometry;
 pub mod integrators;
 pub mod linalg;
 pub mod math;
+pub mod operators;
 pub mod pool;
 pub mod recipes;
 pub mod reference;

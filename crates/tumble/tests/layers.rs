@@ -11,12 +11,13 @@ fn source() -> PathBuf {
 }
 
 /// The modules of the engine, the lowest first: each imports only those before it.
-const LAYERS: [&str; 15] = [
+const LAYERS: [&str; 16] = [
     "math",
     "geometry",
     "linalg",
     "reference",
     "state",
+    "operators",
     "elements",
     "forces",
     "integrators",

@@ -21,6 +21,7 @@ def lab() -> None:
     Examples:
       tumble lab integrators integrators/spiral
       tumble lab structures
+      tumble lab operators
     """
 
 
@@ -88,3 +89,16 @@ def structures(out: OutOption = None) -> None:
     with Progress("lab") as progress:
         written = page(out or find.OUT / "lab" / "structures", progress=progress)
     say(written)
+
+
+@app.command()
+def operators(out: OutOption = None) -> None:
+    """Show each operator on a grid, and why velocities stand on faces.
+
+    \b
+    Example:
+      tumble lab operators
+    """
+    from tumble.lab.operators import page
+
+    say(page(out or find.OUT / "lab" / "operators"))

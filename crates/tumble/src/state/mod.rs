@@ -1,4 +1,10 @@
-//! L2: the columns of a system of masses. Data only.
+//! L2: the columns of a system of masses; grids and the fields on them. Data only.
+
+mod field;
+mod grid;
+
+pub use field::{Field, Side, Sides, Vectors};
+pub use grid::{Grid, GridError, Place};
 
 use crate::math::{Real, Row};
 use std::ops::Range;

@@ -1,0 +1,16 @@
+//! L3: the verbs on grids. One code for two and three dimensions: what a plane does not have is left out of sums over axes.
+//!
+//! Fields know their places and what is beyond their walls; an operator refuses fields at other places. The caller owns the
+//! results. Sums have a fixed order and every row is worked out for itself: the same bits on any number of threads and any width
+//! of registers.
+
+pub mod advect;
+pub mod differences;
+pub mod diffuse;
+pub mod sample;
+mod stencil;
+
+pub use advect::{Advection, Scratch, Trace, advect, advect_vectors};
+pub use differences::{average, curl, directional, divergence, gradient, laplacian, vector_laplacian};
+pub use diffuse::{diffuse, diffuse_step, diffusion_limit};
+pub use sample::{Interpolation, sample};

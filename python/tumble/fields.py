@@ -1,0 +1,41 @@
+"""Fields on grids and the verbs on them, for learning and for checking: what fluids and heat are computed with.
+
+grid = Grid((64, 64), spacing=1 / 64)
+heat = grid.field(lambda x, y: x * y, "cell", unit="K")
+slope_x, slope_y = gradient(heat)
+slope_x.array, slope_x.place
+
+A field knows its place: "cell", "face x", "edge x" (or y, z) or "node"; mixing places raises TumbleError. Vectors are the
+fields of their components, on faces or on edges. Results lie between closed walls; advect and diffuse keep the sides of what
+they are given. Theory: docs/theory/grids.md. All in double precision.
+"""
+
+from tumble._engine import (
+    Field,
+    Grid,
+    advect,
+    average,
+    curl,
+    diffuse,
+    diffusion_limit,
+    directional,
+    divergence,
+    gradient,
+    laplacian,
+    sample,
+)
+
+__all__ = [
+    "Field",
+    "Grid",
+    "advect",
+    "average",
+    "curl",
+    "diffuse",
+    "diffusion_limit",
+    "directional",
+    "divergence",
+    "gradient",
+    "laplacian",
+    "sample",
+]
