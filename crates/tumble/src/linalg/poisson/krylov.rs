@@ -4,11 +4,11 @@
 
 use super::Solver;
 use super::faces::Weight;
-use super::level::{Finish, Grid, Pass, Product, Ring, Rows, Tile, add, dot, largest, run, sweep};
+use super::level::{Grid, Pass, Product, Ring, Rows, Tile, add, dot, largest, run, sweep};
 use super::multigrid;
-use super::report::{Info, Params, Target};
+use super::report::{Info, Params};
 use crate::math::Real;
-use crate::math::simd::Width;
+use crate::math::simd::{Level as Registers, Width};
 
 /// What stands in front of the residual.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -81,6 +81,28 @@ pub(super) fn cycles<T: Weight>(solver: &mut Solver<T>, x: &mut [Real], params: 
     info
 }
 
+/// One solution by a direct method, which replaces a right-hand side by it; what is left is evaluated.
+pub(super) fn direct<T: Weight>(
+    solver: &mut Solver<T>,
+    x: &mut [Real],
+    params: &Params,
+    solve: impl FnOnce(&Grid<T>, &mut [Real], Registers),
+) -> Info {
+    let mut info = Info::default();
+    let [start, most] = solver.norms();
+    info.begin(start, most, params.target);
+    if !info.converged {
+        let mut q = std::mem::take(&mut solver.q);
+        q.clear();
+        q.extend_from_slice(&solver.fine.b);
+        solve(&solver.fine, &mut q, solver.registers);
+        let [rr, _, most] = step(solver, 1.0, &q, x);
+        info.add(rr, start, most, params.target);
+        solver.q = q;
+    }
+    info
+}
+
 /// x += a p, b -= a A p; returns b.b and its largest magnitude.
 fn step<T: Weight>(solver: &mut Solver<T>, a: Real, p: &[Real], x: &mut [Real]) -> [f64; 3] {
     let mut r = std::mem::take(&mut solver.fine.b);
@@ -105,7 +127,7 @@ impl<T: Weight> Solver<T> {
                 let [rr, sum, _] = run(self.fine.lattice.n, self.registers, &Norms { grid: &self.fine });
                 [rr, sum]
             }
-            Before::Incomplete => [0.0; 2],
+            Before::Incomplete => self.incomplete.as_ref().map_or([0.0; 2], |factors| factors.solve(&mut self.fine)),
             Before::Multigrid => multigrid::cycle(&mut self.fine, &mut self.coarse, &self.coarsest, self.registers),
         }
     }

@@ -9,8 +9,11 @@
 //!
 //! Verified by `crates/tumble-f64/tests/pressure.rs`.
 
+mod cosine;
 mod faces;
+mod incomplete;
 mod krylov;
+mod ladder;
 mod level;
 mod multigrid;
 mod pockets;
@@ -21,6 +24,9 @@ pub use report::{Excess, Fault, Info, Method, Params, Target};
 
 use crate::math::simd::Level as Registers;
 use crate::math::{Lattice, Real};
+use cosine::Cosine;
+use incomplete::Factors;
+use krylov::Before;
 use level::Grid;
 use multigrid::{Coarsest, FEW};
 use pockets::Pockets;
@@ -45,6 +51,10 @@ pub struct Solver<T> {
     coarse: Vec<Grid<Real>>,
     coarsest: Coarsest,
     pockets: Pockets,
+    sides: [[Side; 2]; 3],
+    /// Made when first asked for.
+    incomplete: Option<Factors>,
+    cosine: Option<Cosine>,
     p: Vec<Real>,
     q: Vec<Real>,
     registers: Registers,
@@ -112,7 +122,18 @@ impl<T: Weight> Solver<T> {
             coarse.push(multigrid::coarser(last));
         }
         let coarsest = coarse.last().map_or_else(|| Coarsest::new(&fine), Coarsest::new);
-        Ok(Self { fine, coarse, coarsest, pockets, p: Vec::new(), q: Vec::new(), registers: Registers::Avx512 })
+        Ok(Self {
+            fine,
+            coarse,
+            coarsest,
+            pockets,
+            sides,
+            incomplete: None,
+            cosine: None,
+            p: Vec::new(),
+            q: Vec::new(),
+            registers: Registers::Avx512,
+        })
     }
 
     /// The layout of its columns.
@@ -148,10 +169,26 @@ impl<T: Weight> Solver<T> {
     fn solve_loaded(&mut self, q: &mut [Real], params: &Params) -> Result<Info, Fault> {
         q.fill(0.0);
         let mut info = match params.method {
-            Method::ConjugateGradients => krylov::solve(self, krylov::Before::Nothing, q, params),
+            Method::Jacobi | Method::GaussSeidel | Method::Sor => ladder::relax(self, q, params)?,
+            Method::ConjugateGradients => krylov::solve(self, Before::Nothing, q, params),
+            Method::IncompleteCholesky | Method::ModifiedIncompleteCholesky => {
+                let modified = params.method == Method::ModifiedIncompleteCholesky;
+                if self.incomplete.as_ref().is_none_or(|factors| factors.modified != modified) {
+                    self.incomplete = Some(Factors::new(&self.fine, modified));
+                }
+                krylov::solve(self, Before::Incomplete, q, params)
+            }
             Method::Multigrid => krylov::cycles(self, q, params),
-            Method::MultigridGradients => krylov::solve(self, krylov::Before::Multigrid, q, params),
-            _ => return Err(Fault::Method { method: params.method, because: "not yet".to_string() }),
+            Method::MultigridGradients => krylov::solve(self, Before::Multigrid, q, params),
+            Method::Cosine => {
+                let cosine = match self.cosine.take() {
+                    Some(cosine) => cosine,
+                    None => Cosine::new(&self.fine).map_err(|because| Fault::Method { method: params.method, because })?,
+                };
+                let info = krylov::direct(self, q, params, |grid, column, registers| cosine.solve(grid, column, registers));
+                self.cosine = Some(cosine);
+                info
+            }
         };
         info.pockets = self.pockets();
         self.pockets.clear(&self.fine, q);

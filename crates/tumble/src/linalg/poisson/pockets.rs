@@ -228,21 +228,6 @@ impl Pockets {
         }
         mean
     }
-
-    /// Takes the mean from each floating component.
-    pub fn remove_means(&self, column: &mut [Real]) {
-        let mut totals = vec![0.0; self.components.len()];
-        for run in &self.runs {
-            totals[run.component] += sums(run.of(column))[0];
-        }
-        for run in &self.runs {
-            let component = self.components[run.component];
-            if !component.held {
-                let mean = (totals[run.component] / component.cells as f64) as Real;
-                column[run.at..run.at + run.cells].iter_mut().for_each(|x| *x -= mean);
-            }
-        }
-    }
 }
 
 /// The sum and that of magnitudes, sixteen side by side.
