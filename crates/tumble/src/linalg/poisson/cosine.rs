@@ -463,8 +463,8 @@ mod tests {
                     y += number(i, 0) * angle.sin() + number(i, 1) * angle.cos();
                 }
                 let far = (x - f64::from(re[k][5])).abs().max((y - f64::from(im[k][5])).abs());
-                // Measured 6e-5 in single precision, 1e-13 in double, at n = 60 and sums of some 100.
-                assert!(far < 2e3 * f64::from(Real::EPSILON), "{n} {k} {far:e}");
+                // Measured 2e-5 in single precision, 5e-13 in double (whose sum of the definition is no better), for sums up to 280.
+                assert!(far < 8e3 * f64::from(Real::EPSILON), "{n} {k} {far:e}");
             }
         }
         assert!(Axis::new(14).is_none());

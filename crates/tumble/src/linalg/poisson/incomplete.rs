@@ -51,8 +51,8 @@ impl Factors {
         Self { inverse, modified }
     }
 
-    /// y = what the factors make of b, forward and back; returns b.y and the sum of y.
-    pub fn solve<T: Weight>(&self, grid: &mut Grid<T>) -> [f64; 2] {
+    /// y = what the factors make of b, forward and back; returns b.y, the sum of y and that of b.
+    pub fn solve<T: Weight>(&self, grid: &mut Grid<T>) -> [f64; 3] {
         let ([n0, n1, n2], [_, row, plane]) = (grid.lattice.n, grid.lattice.stride);
         let mut y = std::mem::take(&mut grid.y);
         let value = |axis: usize, at: usize| grid.w[axis][at].value();
@@ -76,7 +76,7 @@ impl Factors {
                 }
             }
         }
-        let mut sums = [0.0; 2];
+        let mut sums = [0.0; 3];
         for k in (0..n2).rev() {
             for j in (0..n1).rev() {
                 let at = grid.lattice.at(0, j, k);
@@ -96,6 +96,7 @@ impl Factors {
                     y[i] = last;
                     sums[0] += f64::from(grid.b[i]) * f64::from(last);
                     sums[1] += f64::from(last);
+                    sums[2] += f64::from(grid.b[i]);
                 }
             }
         }

@@ -33,8 +33,8 @@ pub(super) fn solve<T: Weight>(solver: &mut Solver<T>, before: Before, x: &mut [
     let mut old = f64::INFINITY;
     info.begin(start, most, params.target);
     while !info.converged && info.iterations < params.iterations {
-        let [rz, sum] = solver.precondition(before);
-        let mean = solver.centre(before, sum);
+        let [rz, mean] = solver.precondition(before);
+        let mean = mean as Real;
         let beta = (rz / old) as Real;
         old = rz;
         let grid = &solver.fine;
@@ -46,7 +46,7 @@ pub(super) fn solve<T: Weight>(solver: &mut Solver<T>, before: Before, x: &mut [
         if !(rz > 0.0 && curvature > 0.0) {
             break;
         }
-        let [rr, _, most] = step(solver, (rz / curvature) as Real, &p, x);
+        let [rr, _, _, most] = step(solver, (rz / curvature) as Real, &p, x);
         info.add(rr, start, most, params.target);
         if !rr.is_finite() {
             break;
@@ -67,14 +67,14 @@ pub(super) fn cycles<T: Weight>(solver: &mut Solver<T>, x: &mut [Real], params: 
     let [start, most] = solver.norms();
     info.begin(start, most, params.target);
     while !info.converged && info.iterations < params.iterations {
-        let [rz, sum] = solver.precondition(Before::Multigrid);
-        let mean = solver.centre(Before::Multigrid, sum);
+        let [rz, mean] = solver.precondition(Before::Multigrid);
+        let mean = mean as Real;
         let grid = &solver.fine;
         let [curvature, ..] = run(n, registers, &Direction { grid, z: &grid.y, mean, p: &grid.y, beta: 0.0, q: Rows::of(&mut q) });
         if !(rz > 0.0 && curvature > 0.0) {
             break;
         }
-        let [rr, _, most] = step(solver, (rz / curvature) as Real, &q, x);
+        let [rr, _, _, most] = step(solver, (rz / curvature) as Real, &q, x);
         info.add(rr, start, most, params.target);
     }
     solver.q = q;
@@ -96,7 +96,7 @@ pub(super) fn direct<T: Weight>(
         q.clear();
         q.extend_from_slice(&solver.fine.b);
         solve(&solver.fine, &mut q, solver.registers);
-        let [rr, _, most] = step(solver, 1.0, &q, x);
+        let [rr, _, _, most] = step(solver, 1.0, &q, x);
         info.add(rr, start, most, params.target);
         solver.q = q;
     }
@@ -104,7 +104,7 @@ pub(super) fn direct<T: Weight>(
 }
 
 /// x += a p, b -= a A p; returns b.b and its largest magnitude.
-fn step<T: Weight>(solver: &mut Solver<T>, a: Real, p: &[Real], x: &mut [Real]) -> [f64; 3] {
+fn step<T: Weight>(solver: &mut Solver<T>, a: Real, p: &[Real], x: &mut [Real]) -> [f64; 4] {
     let mut r = std::mem::take(&mut solver.fine.b);
     let grid = &solver.fine;
     let sums = run(grid.lattice.n, solver.registers, &Step { grid, a, p, x: Rows::of(x), r: Rows::of(&mut r) });
@@ -116,27 +116,19 @@ impl<T: Weight> Solver<T> {
     /// The squared norm of the right-hand side and its largest magnitude.
     pub(super) fn norms(&mut self) -> [f64; 2] {
         let grid = &self.fine;
-        let [bb, _, most] = run(grid.lattice.n, self.registers, &Norms { grid });
+        let [bb, _, _, most] = run(grid.lattice.n, self.registers, &Norms { grid });
         [bb, most]
     }
 
-    /// z from r, in the fine grid's y; returns r.z and the sum of z.
-    fn precondition(&mut self, before: Before) -> [f64; 2] {
-        match before {
-            Before::Nothing => {
-                let [rr, sum, _] = run(self.fine.lattice.n, self.registers, &Norms { grid: &self.fine });
-                [rr, sum]
-            }
-            Before::Incomplete => self.incomplete.as_ref().map_or([0.0; 2], |factors| factors.solve(&mut self.fine)),
+    /// z from r, in the fine grid's y; returns r.z without the means of floating components, and the mean that is to be taken from
+    /// every cell of z.
+    pub(super) fn precondition(&mut self, before: Before) -> [f64; 2] {
+        let sums = match before {
+            Before::Nothing => return [self.norms()[0], 0.0],
+            Before::Incomplete => self.incomplete.as_ref().map_or([0.0; 3], |factors| factors.solve(&mut self.fine)),
             Before::Multigrid => multigrid::cycle(&mut self.fine, &mut self.coarse, &self.coarsest, self.registers),
-        }
-    }
-
-    /// The mean of z over the largest component, which the next pass takes from every cell; pockets are shifted so that what they
-    /// then lack is their own.
-    fn centre(&mut self, before: Before, sum: f64) -> Real {
-        let z = if before == Before::Nothing { &mut self.fine.b } else { &mut self.fine.y };
-        if before == Before::Nothing { 0.0 } else { self.pockets.centre(z, sum) as Real }
+        };
+        self.pockets.centre(&mut self.fine.y, &self.fine.b, sums)
     }
 }
 
@@ -156,7 +148,7 @@ impl<T: Weight> Pass for Direction<'_, T> {
     }
 
     #[inline(always)]
-    fn tile<W: Width>(&self, w: W, tile: Tile, scratch: &mut [Real]) -> [f64; 3] {
+    fn tile<W: Width>(&self, w: W, tile: Tile, scratch: &mut [Real]) -> [f64; 4] {
         let (grid, width) = (self.grid, self.grid.width);
         let (mut ring, rest) = Ring::new(grid, tile, scratch);
         let product = &mut rest[..width];
@@ -184,7 +176,7 @@ impl<T: Weight> Pass for Direction<'_, T> {
                 unsafe { self.q.take(at, width) }.copy_from_slice(near.own());
             }
         }
-        [curvature, 0.0, 0.0]
+        [curvature, 0.0, 0.0, 0.0]
     }
 }
 
@@ -219,7 +211,7 @@ impl<T: Weight> Pass for Step<'_, T> {
     }
 
     #[inline(always)]
-    fn tile<W: Width>(&self, w: W, tile: Tile, scratch: &mut [Real]) -> [f64; 3] {
+    fn tile<W: Width>(&self, w: W, tile: Tile, scratch: &mut [Real]) -> [f64; 4] {
         let (grid, width) = (self.grid, self.grid.width);
         let (own, rest) = scratch.split_at_mut(width + 2);
         let product = &mut rest[..width];
@@ -239,7 +231,7 @@ impl<T: Weight> Pass for Step<'_, T> {
                 most = if here > most { here } else { most };
             }
         }
-        [rr, 0.0, most]
+        [rr, 0.0, 0.0, most]
     }
 }
 
@@ -254,7 +246,7 @@ impl<T: Weight> Pass for Norms<'_, T> {
     }
 
     #[inline(always)]
-    fn tile<W: Width>(&self, w: W, tile: Tile, _scratch: &mut [Real]) -> [f64; 3] {
+    fn tile<W: Width>(&self, w: W, tile: Tile, _scratch: &mut [Real]) -> [f64; 4] {
         let grid = self.grid;
         let (mut bb, mut most) = (0.0, 0.0);
         for k in tile.k[0]..tile.k[1] {
@@ -265,6 +257,6 @@ impl<T: Weight> Pass for Norms<'_, T> {
                 most = if here > most { here } else { most };
             }
         }
-        [bb, 0.0, most]
+        [bb, 0.0, 0.0, most]
     }
 }

@@ -64,7 +64,7 @@ pub(super) fn relax<T: Weight>(solver: &mut Solver<T>, x: &mut [Real], params: &
         };
         // What is left by the sweeps so far is known when the next one begins.
         let colours = params.method != Method::Jacobi;
-        let [rr, _, most] = half(x, &mut other, colours.then_some(0), true);
+        let [rr, _, _, most] = half(x, &mut other, colours.then_some(0), true);
         if start == 0.0 {
             start = rr;
             info.begin(start, most, params.target);
@@ -110,7 +110,7 @@ impl<T: Weight> Pass for Half<'_, T> {
     }
 
     #[inline(always)]
-    fn tile<W: Width>(&self, w: W, tile: Tile, scratch: &mut [Real]) -> [f64; 3] {
+    fn tile<W: Width>(&self, w: W, tile: Tile, scratch: &mut [Real]) -> [f64; 4] {
         let (grid, width) = (self.grid, self.grid.width);
         let (own, rest) = scratch.split_at_mut(width + 2);
         let left = &mut rest[..width];
@@ -141,6 +141,6 @@ impl<T: Weight> Pass for Half<'_, T> {
                 grid.end(out);
             }
         }
-        [rr, 0.0, most]
+        [rr, 0.0, 0.0, most]
     }
 }

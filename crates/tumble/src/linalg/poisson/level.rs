@@ -138,11 +138,12 @@ impl<T: Weight> Grid<T> {
         [padded[0], padded[n + 1]] = ends;
     }
 
-    /// Sets what a row holds behind its last cell to zero: an open or joined side makes a cell of the first ghost.
+    /// Sets what a row holds behind its last cell to zero: an open or joined side gives the first number there, and the last one,
+    /// whose upper face is the lower one of the next row, a face and a value.
     #[inline(always)]
     pub fn end(&self, row: &mut [Real]) {
-        if let Some(ghost) = row.get_mut(self.lattice.n[0]) {
-            *ghost = 0.0;
+        if self.ends {
+            row[self.lattice.n[0]..].fill(0.0);
         }
     }
 
@@ -423,7 +424,7 @@ impl Tile {
 /// A pass over a tile: what it adds up.
 pub(super) trait Pass: Sync {
     /// Does the work on a tile with scratch of at least `scratch` numbers, whose content means nothing.
-    fn tile<W: Width>(&self, w: W, tile: Tile, scratch: &mut [Real]) -> [f64; 3];
+    fn tile<W: Width>(&self, w: W, tile: Tile, scratch: &mut [Real]) -> [f64; 4];
     /// Numbers of scratch.
     fn scratch(&self) -> usize;
 }
@@ -435,9 +436,9 @@ struct OnTile<'a, P> {
 }
 
 impl<P: Pass> Kernel for OnTile<'_, P> {
-    type Output = [f64; 3];
+    type Output = [f64; 4];
     #[inline(always)]
-    fn run<W: Width>(self, w: W) -> [f64; 3] {
+    fn run<W: Width>(self, w: W) -> [f64; 4] {
         self.pass.tile(w, self.tile, self.scratch)
     }
 }
@@ -446,9 +447,9 @@ thread_local! {
     static SCRATCH: RefCell<Vec<Real>> = const { RefCell::new(Vec::new()) };
 }
 
-/// Runs a pass over all tiles of a grid. The first two of what tiles return are added in the order of tiles, of the third the
+/// Runs a pass over all tiles of a grid. The first three of what tiles return are added in the order of tiles, of the fourth the
 /// largest is taken.
-pub(super) fn run<P: Pass>(n: [usize; 3], registers: Registers, pass: &P) -> [f64; 3] {
+pub(super) fn run<P: Pass>(n: [usize; 3], registers: Registers, pass: &P) -> [f64; 4] {
     let tiles = Tile::all(n);
     let one = |tile: &Tile| {
         SCRATCH.with_borrow_mut(|scratch| {
@@ -458,12 +459,15 @@ pub(super) fn run<P: Pass>(n: [usize; 3], registers: Registers, pass: &P) -> [f6
             dispatch_at(registers, OnTile { pass, tile: *tile, scratch })
         })
     };
-    let parts: Vec<[f64; 3]> = if tiles.len() < 2 || n.iter().product::<usize>() < SERIAL {
+    let parts: Vec<[f64; 4]> = if tiles.len() < 2 || n.iter().product::<usize>() < SERIAL {
         tiles.iter().map(one).collect()
     } else {
         tiles.par_iter().with_max_len(1).map(one).collect()
     };
-    parts.iter().fold([0.0; 3], |all, part| [all[0] + part[0], all[1] + part[1], if part[2] > all[2] { part[2] } else { all[2] }])
+    parts.iter().fold([0.0; 4], |all, part| {
+        let most = if part[3] > all[3] { part[3] } else { all[3] };
+        [all[0] + part[0], all[1] + part[1], all[2] + part[2], most]
+    })
 }
 
 /// Three planes of the rows of a tile and two around it, for a stage of a pass that the next stage reads.

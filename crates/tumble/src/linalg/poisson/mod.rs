@@ -18,6 +18,8 @@ mod level;
 mod multigrid;
 mod pockets;
 mod report;
+#[cfg(test)]
+mod tests;
 
 pub use faces::{Weight, byte};
 pub use report::{Excess, Fault, Info, Method, Params, Target};

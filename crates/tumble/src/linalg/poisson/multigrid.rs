@@ -76,8 +76,8 @@ pub(super) fn coarser<T: Weight>(fine: &Grid<T>) -> Grid<Real> {
     Grid::new(lattice, fine.periodic, w, extra)
 }
 
-/// y ~ A^-1 b on a grid and all coarser ones; returns b.y and the sum of y.
-pub(super) fn cycle<T: Weight>(grid: &mut Grid<T>, coarser: &mut [Grid<Real>], coarsest: &Coarsest, registers: Registers) -> [f64; 2] {
+/// y ~ A^-1 b on a grid and all coarser ones; returns b.y, the sum of y and that of b.
+pub(super) fn cycle<T: Weight>(grid: &mut Grid<T>, coarser: &mut [Grid<Real>], coarsest: &Coarsest, registers: Registers) -> [f64; 3] {
     let Some((next, rest)) = coarser.split_first_mut() else { return coarsest.solve(grid) };
     let n = grid.lattice.n;
     let (mut x, mut b) = (std::mem::take(&mut grid.x), std::mem::take(&mut next.b));
@@ -85,9 +85,9 @@ pub(super) fn cycle<T: Weight>(grid: &mut Grid<T>, coarser: &mut [Grid<Real>], c
     (grid.x, next.b) = (x, b);
     cycle(next, rest, coarsest, registers);
     let mut y = std::mem::take(&mut grid.y);
-    let [by, sum, _] = run(n, registers, &Up { grid, next, y: Rows::of(&mut y) });
+    let [by, of_y, of_b, _] = run(n, registers, &Up { grid, next, y: Rows::of(&mut y) });
     grid.y = y;
-    [by, sum]
+    [by, of_y, of_b]
 }
 
 /// Two sweeps from zero, and what is left to the coarser grid.
@@ -105,7 +105,7 @@ impl<T: Weight> Pass for Down<'_, T> {
     }
 
     #[inline(always)]
-    fn tile<W: Width>(&self, w: W, tile: Tile, scratch: &mut [Real]) -> [f64; 3] {
+    fn tile<W: Width>(&self, w: W, tile: Tile, scratch: &mut [Real]) -> [f64; 4] {
         let (grid, width) = (self.grid, self.grid.width);
         let n = grid.lattice.n;
         let (half, factor) = halved(n);
@@ -163,7 +163,7 @@ impl<T: Weight> Pass for Down<'_, T> {
                 }
             }
         }
-        [0.0; 3]
+        [0.0; 4]
     }
 }
 
@@ -194,14 +194,14 @@ impl<T: Weight> Pass for Up<'_, T> {
     }
 
     #[inline(always)]
-    fn tile<W: Width>(&self, w: W, tile: Tile, scratch: &mut [Real]) -> [f64; 3] {
+    fn tile<W: Width>(&self, w: W, tile: Tile, scratch: &mut [Real]) -> [f64; 4] {
         let (grid, width) = (self.grid, self.grid.width);
         let n = grid.lattice.n;
         let (half, _) = halved(n);
         let weights = sweeps();
         let (mut first, rest) = Ring::new(grid, tile, scratch);
         let (mut second, _) = Ring::new(grid, tile, rest);
-        let (mut by, mut total) = (0.0, 0.0);
+        let (mut by, mut of_y, mut of_b) = (0.0, 0.0, 0.0);
         for k in tile.k[0] - 2..tile.k[1] + 2 {
             if tile.has(grid, k) {
                 for j in tile.rows(grid, 2) {
@@ -237,10 +237,11 @@ impl<T: Weight> Pass for Up<'_, T> {
                 sweep(w, &grid.faces(at), &second.near(grid, j, k), b, y, Relax(weights[0]));
                 grid.end(y);
                 by += dot(w, y, b);
-                total += sum(w, y);
+                of_y += sum(w, y);
+                of_b += sum(w, b);
             }
         }
-        [by, total, 0.0]
+        [by, of_y, of_b, 0.0]
     }
 }
 
@@ -334,8 +335,8 @@ impl Coarsest {
         Self { cells: all.iter().map(|(at, _)| *at).collect(), component, floating, factor: cholesky(matrix, m) }
     }
 
-    /// y = A^-1 b without the constants of floating components; returns b.y and the sum of y.
-    fn solve<T: Weight>(&self, grid: &mut Grid<T>) -> [f64; 2] {
+    /// y = A^-1 b without the constants of floating components; returns b.y, the sum of y and that of b.
+    fn solve<T: Weight>(&self, grid: &mut Grid<T>) -> [f64; 3] {
         let m = self.cells.len();
         let mut y: Vec<f64> = self.cells.iter().map(|at| f64::from(grid.b[*at])).collect();
         self.centre(&mut y);
@@ -350,11 +351,12 @@ impl Coarsest {
             }
         }
         self.centre(&mut y);
-        let mut sums = [0.0; 2];
+        let mut sums = [0.0; 3];
         for (at, y) in self.cells.iter().zip(&y) {
             grid.y[*at] = *y as Real;
             sums[0] += f64::from(grid.b[*at]) * y;
             sums[1] += y;
+            sums[2] += f64::from(grid.b[*at]);
         }
         sums
     }

@@ -210,23 +210,32 @@ impl Pockets {
         self.gaps(grid, |from, to| column[from..to].fill(0.0));
     }
 
-    /// The mean of z over the largest component, given its sum over all cells; others are shifted so that each of them has lost its
+    /// The product of r and z without their means over floating components, given the one with them, the sum of z and that of r
+    /// over all cells; and the mean of z over the largest component. Other components are shifted so that each of them has lost its
     /// own mean when that of the largest is taken from all cells.
-    pub fn centre(&self, z: &mut [Real], sum: f64) -> f64 {
-        let Some(main) = self.components.get(self.main) else { return 0.0 };
-        let mut totals = vec![0.0; self.components.len()];
+    ///
+    /// Rounding gives r a mean, and nothing bounds that of z: their product would spoil the lengths of steps.
+    pub fn centre(&self, z: &mut [Real], r: &[Real], [mut product, of_z, of_r]: [f64; 3]) -> [f64; 2] {
+        let mut totals = vec![[0.0; 2]; self.components.len()];
+        let Some(main) = totals.get_mut(self.main) else { return [product, 0.0] };
+        *main = [of_z, of_r];
         for run in &self.others {
-            totals[run.component] += sums(run.of(z))[0];
+            let part = [sums(run.of(z))[0], sums(run.of(r))[0]];
+            for i in 0..2 {
+                totals[run.component][i] += part[i];
+                totals[self.main][i] -= part[i];
+            }
         }
-        let rest = sum - totals.iter().sum::<f64>();
-        let mean = if main.held { 0.0 } else { rest / main.cells as f64 };
-        let means: Vec<f64> =
-            totals.iter().zip(&self.components).map(|(total, c)| if c.held { 0.0 } else { total / c.cells as f64 }).collect();
+        let mean = |[of_z, _]: [f64; 2], c: &Component| if c.held { 0.0 } else { of_z / c.cells as f64 };
+        let means: Vec<f64> = totals.iter().zip(&self.components).map(|(total, c)| mean(*total, c)).collect();
+        for (mean, [_, of_r]) in means.iter().zip(&totals) {
+            product -= mean * of_r;
+        }
         for run in &self.others {
-            let shift = (mean - means[run.component]) as Real;
+            let shift = (means[self.main] - means[run.component]) as Real;
             z[run.at..run.at + run.cells].iter_mut().for_each(|z| *z += shift);
         }
-        mean
+        [product, means[self.main]]
     }
 }
 
