@@ -29,8 +29,8 @@ struct Axis {
 impl Axis {
     fn new(n: usize) -> Option<Self> {
         let (mut radices, mut rest) = (Vec::new(), n);
-        for radix in [4, 2, 3, 5] {
-            while rest % radix == 0 {
+        for radix in [4, 2, 3, 5_usize] {
+            while rest.is_multiple_of(radix) {
                 radices.push(radix);
                 rest /= radix;
             }

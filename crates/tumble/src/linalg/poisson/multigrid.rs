@@ -9,7 +9,7 @@
 //! [braess1995] for constant transfers and their scaling.
 
 use super::faces::Weight;
-use super::level::{Grid, LANES, Pass, Relax, Residual, Ring, Rows, Tile, dot, run, scale, sum, sweep};
+use super::level::{Grid, Pass, Relax, Residual, Ring, Rows, Tile, dot, run, scale, sum, sweep};
 use crate::math::simd::{Level as Registers, Width};
 use crate::math::{Lattice, Real};
 
@@ -35,7 +35,9 @@ pub(super) fn coarser<T: Weight>(fine: &Grid<T>) -> Grid<Real> {
     let lattice = Lattice::new(n.map(|n| n.div_ceil(2)));
     let children = |axis: usize, i: usize| if half[axis] { 2 * i..(2 * i + 2).min(n[axis]) } else { i..i + 1 };
     let mut w = [(); 3].map(|()| vec![0.0; lattice.len()]);
-    for axis in 0..3 {
+    // A single cell that is joined to itself is closed.
+    let periodic = [0, 1, 2].map(|axis| fine.periodic[axis] && lattice.n[axis] > 1);
+    for axis in (0..3).filter(|a| periodic[*a] || !fine.periodic[*a]) {
         // Along its own axis a face is that of the first child, or the upper side of the box.
         let faces = |a: usize, i: usize| {
             if a == axis {
@@ -73,7 +75,7 @@ pub(super) fn coarser<T: Weight>(fine: &Grid<T>) -> Grid<Real> {
         });
         sums
     });
-    Grid::new(lattice, fine.periodic, w, extra)
+    Grid::new(lattice, periodic, w, extra)
 }
 
 /// y ~ A^-1 b on a grid and all coarser ones; returns b.y, the sum of y and that of b.
@@ -147,7 +149,7 @@ impl<T: Weight> Pass for Down<'_, T> {
                 let (cj, ck) = (if half[1] { j / 2 } else { j }, if half[2] { k / 2 } else { k });
                 let from = (cj - if half[1] { tile.j[0] as usize / 2 } else { tile.j[0] as usize }) * width;
                 let sums = &mut sums[from..from + width];
-                let starts = |i: usize, axis: usize| !half[axis] || i % 2 == 0;
+                let starts = |i: usize, axis: usize| !half[axis] || i.is_multiple_of(2);
                 let ends = |i: usize, axis: usize| !half[axis] || i % 2 == 1 || i + 1 == n[axis];
                 if starts(j, 1) && starts(k, 2) {
                     sums.copy_from_slice(left);
@@ -391,6 +393,3 @@ fn cholesky(mut a: Vec<f64>, m: usize) -> Vec<f64> {
     }
     a
 }
-
-/// The numbers of a block fit a row of any grid.
-const _: () = assert!(LANES % 2 == 0);

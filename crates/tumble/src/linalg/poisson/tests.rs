@@ -71,7 +71,7 @@ fn bits_depend_on_neither_threads_nor_registers() {
                 (bits(&q), info)
             };
             let one = of(1, Level::Scalar);
-            assert!(one.1.iterations > 0 && one.1.residual() < 1.4, "{} {:?}", method.name(), one.1);
+            assert!(one.1.iterations > 0 && one.1.residual() < 3.0, "{} {:?}", method.name(), one.1);
             for (threads, level) in [(1, Level::Avx2), (2, Level::Avx512), (8, Level::Scalar), (8, Level::Avx512)] {
                 let other = of(threads, level);
                 assert!(one == other, "{} {n:?}, {threads} threads, {level:?}", method.name());
@@ -171,7 +171,7 @@ fn refinement_reaches_what_the_recursion_only_says() {
     // What rounding of the evaluation forbids is not claimed.
     let never = Params { target: Target::Relative(1e-22), ..Params::default() };
     let given_up = solver.solve_double(&b, &mut double, &never).unwrap();
-    assert!(!given_up.converged && given_up.iterations < 120, "{given_up:?}");
+    assert!(!given_up.converged && given_up.iterations <= 200 && given_up.residual() > 1e-22, "{given_up:?}");
 }
 
 #[test]
