@@ -24,6 +24,7 @@ mod tests;
 pub use faces::{Weight, byte};
 pub use report::{Excess, Fault, Info, Method, Params, Target};
 
+use crate::math::parallel::chunks;
 use crate::math::simd::Level as Registers;
 use crate::math::{Lattice, Real};
 use cosine::Cosine;
@@ -267,9 +268,7 @@ impl<T: Weight> Solver<T> {
         q.fill(0.0);
         let (mut left, mut correction) = (b.to_vec(), vec![0.0; expected]);
         self.refine(&mut left, &mut correction, params, |solver, correction, left| {
-            for (q, c) in q.iter_mut().zip(correction) {
-                *q += f64::from(*c);
-            }
+            chunks(q, |start, q| q.iter_mut().zip(&correction[start..]).for_each(|(q, c)| *q += f64::from(*c)));
             solver.residual(b, q, left);
         })
     }
@@ -278,29 +277,45 @@ impl<T: Weight> Solver<T> {
     pub fn residual(&self, b: &[Real], q: &[f64], out: &mut [Real]) {
         let grid = &self.fine;
         let (n, stride) = (grid.lattice.n, grid.lattice.stride);
+        let zeros = vec![0.0; n[0]];
+        // A row, or what lies beyond an open side; a wall lets nothing of it through.
+        let row = |j: isize, k: isize| {
+            let inside = |i: isize, axis: usize| grid.periodic[axis] || (0..n[axis] as isize).contains(&i);
+            if inside(j, 1) && inside(k, 2) {
+                let at = grid.start(j, k);
+                &q[at..at + n[0]]
+            } else {
+                &zeros[..]
+            }
+        };
         let first = grid.lattice.at(0, 0, 0);
-        out[first..first + stride[2] * n[2]].par_chunks_mut(stride[2]).enumerate().for_each(|(k, plane)| {
-            for j in 0..n[1] {
-                let row = |j: isize, k: isize| grid.start(j, k);
-                let (j, k) = (j as isize, k as isize);
-                let at = row(j, k);
-                let near = [row(j, k), row(j, k), row(j - 1, k), row(j + 1, k), row(j, k - 1), row(j, k + 1)];
-                for i in 0..n[0] {
-                    let q_at = |face: usize, other: isize| {
-                        let other = if grid.periodic[0] { other.rem_euclid(n[0] as isize) } else { other };
-                        let inside = (0..n[0] as isize).contains(&other);
-                        if inside { q[(near[face] as isize + other) as usize] } else { 0.0 }
-                    };
-                    let w = |axis: usize, up: bool| f64::from(grid.w[axis][at + i + if up { stride[axis] } else { 0 }].value());
-                    let i0 = i as isize;
-                    let others = [q_at(0, i0 - 1), q_at(1, i0 + 1), q_at(2, i0), q_at(3, i0), q_at(4, i0), q_at(5, i0)];
-                    let here = q[at + i];
-                    let mut product = grid.extra.as_ref().map_or(0.0, |e| f64::from(e[at + i])) * here;
-                    for face in 0..6 {
-                        product += w(face / 2, face % 2 == 1) * (here - others[face]);
-                    }
-                    plane[at + i - first - k as usize * stride[2]] = (f64::from(b[at + i]) - product) as Real;
+        out[first..first + stride[2] * n[2]].par_chunks_mut(stride[1]).enumerate().for_each(|(line, out)| {
+            let (j, k) = (line % (n[1] + 2), line / (n[1] + 2));
+            if j >= n[1] {
+                return;
+            }
+            let at = grid.lattice.at(0, j, k);
+            let (j, k) = (j as isize, k as isize);
+            let here = row(j, k);
+            let beside = [row(j - 1, k), row(j + 1, k), row(j, k - 1), row(j, k + 1)];
+            let of = |axis: usize, up: usize| &grid.w[axis][at + up..at + up + n[0]];
+            let w = [of(0, 0), of(0, 1), of(1, 0), of(1, stride[1]), of(2, 0), of(2, stride[2])];
+            let ends = if grid.periodic[0] { [here[n[0] - 1], here[0]] } else { [0.0; 2] };
+            let mut one = |i: usize, x: [f64; 2]| {
+                let others = [x[0], x[1], beside[0][i], beside[1][i], beside[2][i], beside[3][i]];
+                let mut product = grid.extra.as_ref().map_or(0.0, |extra| f64::from(extra[at + i])) * here[i];
+                for face in 0..6 {
+                    product += f64::from(w[face][i].value()) * (here[i] - others[face]);
                 }
+                out[i] = (f64::from(b[at + i]) - product) as Real;
+            };
+            for i in 1..n[0].saturating_sub(1) {
+                one(i, [here[i - 1], here[i + 1]]);
+            }
+            let next = |i: usize| here.get(i).copied().unwrap_or(ends[1]);
+            one(0, [ends[0], next(1)]);
+            if n[0] > 1 {
+                one(n[0] - 1, [here[n[0] - 2], ends[1]]);
             }
         });
     }
