@@ -54,7 +54,7 @@ impl Axis {
     /// Where place i goes: even ones forward, odd ones back.
     #[inline(always)]
     fn place(&self, i: usize) -> usize {
-        if i % 2 == 0 { i / 2 } else { self.n - 1 - i / 2 }
+        if i.is_multiple_of(2) { i / 2 } else { self.n - 1 - i / 2 }
     }
 }
 
