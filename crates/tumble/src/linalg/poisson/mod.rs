@@ -245,7 +245,7 @@ impl<T: Weight> Solver<T> {
             }
             info.converged = match params.target {
                 Target::Relative(r) => residual <= r,
-                Target::Largest(m) => most <= m,
+                Target::Largest(m) => most <= m && after.is_finite(),
             };
             // Round-off of the evaluation itself: no solve makes it smaller.
             if after.is_nan() || part.iterations == 0 || after > 0.25 * now {
