@@ -3,3 +3,4 @@
 pub mod blocks;
 pub mod cholesky;
 pub mod pcg;
+pub mod poisson;

@@ -1,0 +1,329 @@
+//! The pressure equation on a staggered grid, and the ladder of its solvers.
+//!
+//!   sum over faces of w_f (q_i - q_other) + d_i q_i = b_i                                               (pressure.2)
+//!
+//! q [m²/s] is the step's length times pressure over density, b = -dx D u [m²/s] with D u the sum of what flows out through the
+//! faces, weighted with their open fractions w [1]. Cells are those of a [`Lattice`]; walls have weight zero, sides are closed, open
+//! (q = 0 on the side) or joined. Two dimensions are one cell along an axis. Everything has the same bits on any number of threads
+//! and any width of registers.
+//!
+//! Verified by `crates/tumble-f64/tests/pressure.rs`.
+
+mod cosine;
+mod faces;
+mod incomplete;
+mod krylov;
+mod ladder;
+mod level;
+mod multigrid;
+mod pockets;
+mod report;
+#[cfg(test)]
+mod tests;
+
+pub use faces::{Weight, byte};
+pub use report::{Excess, Fault, Info, Method, Params, Target};
+
+use crate::math::parallel::chunks;
+use crate::math::simd::Level as Registers;
+use crate::math::{Lattice, Real};
+use cosine::Cosine;
+use incomplete::Factors;
+use krylov::Before;
+use level::Grid;
+use multigrid::{Coarsest, FEW};
+use pockets::Pockets;
+use rayon::prelude::*;
+
+/// What lies beyond a side of the box.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum Side {
+    /// A wall: nothing passes.
+    #[default]
+    Closed,
+    /// Pressure zero on the side itself, half a cell from the centres.
+    Open,
+    /// The other side of the axis, which must say the same.
+    Periodic,
+}
+
+/// A pressure system with everything that depends on geometry alone, made once for many solves.
+#[derive(Debug)]
+pub struct Solver<T> {
+    fine: Grid<T>,
+    coarse: Vec<Grid<Real>>,
+    coarsest: Coarsest,
+    pockets: Pockets,
+    sides: [[Side; 2]; 3],
+    /// Made when first asked for.
+    incomplete: Option<Factors>,
+    cosine: Option<Cosine>,
+    p: Vec<Real>,
+    q: Vec<Real>,
+    registers: Registers,
+}
+
+impl<T: Weight> Solver<T> {
+    /// From the weights of the lower faces of all cells, each column of the lattice's length; upper sides are faces n. Weights on
+    /// closed sides, and on the upper one of two that are joined, do not matter. `extra` [1] is added to the diagonal: a
+    /// reaction, an implicit step (dx²/(nu dt)), or a free surface (w/theta of the faces to air, whose own weight is then closed).
+    pub fn new(lattice: Lattice, sides: [[Side; 2]; 3], weights: [&[T]; 3], extra: Option<&[Real]>) -> Result<Self, Fault> {
+        let n = lattice.n;
+        if lattice.is_empty() {
+            return Err(Fault::Shape { expected: 1, given: 0 });
+        }
+        for column in weights.iter().map(|w| w.len()).chain(extra.map(<[Real]>::len)) {
+            if column != lattice.len() {
+                return Err(Fault::Shape { expected: lattice.len(), given: column });
+            }
+        }
+        for axis in 0..3 {
+            if (sides[axis][0] == Side::Periodic) != (sides[axis][1] == Side::Periodic) {
+                return Err(Fault::Sides { axis });
+            }
+        }
+        // A single cell that is joined to itself is closed.
+        let periodic = [0, 1, 2].map(|axis| sides[axis][0] == Side::Periodic && n[axis] > 1);
+        let mut w = [(); 3].map(|()| vec![T::CLOSED; lattice.len()]);
+        for axis in 0..3 {
+            let up = |a: usize| n[a] + usize::from(a == axis);
+            for k in 0..up(2) {
+                for j in 0..up(1) {
+                    for i in 0..up(0) {
+                        let cell = [i, j, k];
+                        let at = lattice.at(i, j, k);
+                        let given = weights[axis][at];
+                        let side = match cell[axis] {
+                            0 => Some(sides[axis][0]),
+                            c if c == n[axis] => Some(sides[axis][1]),
+                            _ => None,
+                        };
+                        let weight = match side {
+                            None => given,
+                            Some(Side::Open) => given,
+                            Some(Side::Periodic) if periodic[axis] => {
+                                weights[axis][at - if cell[axis] == 0 { 0 } else { n[axis] * lattice.stride[axis] }]
+                            }
+                            _ => continue,
+                        };
+                        if !weight.valid() {
+                            return Err(Fault::Weight { axis, cell });
+                        }
+                        w[axis][at] = if side == Some(Side::Open) { weight.doubled() } else { weight };
+                    }
+                }
+            }
+        }
+        let fine = Grid::new(lattice, periodic, w, extra.map(<[Real]>::to_vec));
+        let pockets = Pockets::new(&fine);
+        let mut coarse = Vec::<Grid<Real>>::new();
+        let few = |n: [usize; 3]| n.iter().all(|n| *n <= FEW);
+        if !few(n) {
+            coarse.push(multigrid::coarser(&fine));
+        }
+        while let Some(last) = coarse.last().filter(|last| !few(last.lattice.n)) {
+            coarse.push(multigrid::coarser(last));
+        }
+        let coarsest = coarse.last().map_or_else(|| Coarsest::new(&fine), Coarsest::new);
+        Ok(Self {
+            fine,
+            coarse,
+            coarsest,
+            pockets,
+            sides,
+            incomplete: None,
+            cosine: None,
+            p: Vec::new(),
+            q: Vec::new(),
+            registers: Registers::Avx512,
+        })
+    }
+
+    /// The layout of its columns.
+    pub fn lattice(&self) -> Lattice {
+        self.fine.lattice
+    }
+
+    /// Components of cells that no open face joins to the largest one.
+    pub fn pockets(&self) -> usize {
+        self.pockets.count()
+    }
+
+    /// Uses registers no wider than that; the bits stay the same, which tests show.
+    pub fn with_registers(mut self, registers: Registers) -> Self {
+        self.registers = registers;
+        self
+    }
+
+    /// Solves for q from zero; both columns have the lattice's length. In cells without an open face q is zero, and its mean over
+    /// every component that no open side holds is whatever the method leaves.
+    pub fn solve(&mut self, b: &[Real], q: &mut [Real], params: &Params) -> Result<Info, Fault> {
+        let expected = self.fine.lattice.len();
+        for given in [b.len(), q.len()] {
+            if given != expected {
+                return Err(Fault::Shape { expected, given });
+            }
+        }
+        self.pockets.load(&mut self.fine, b, params.excess)?;
+        self.solve_loaded(q, params)
+    }
+
+    /// The same with the right-hand side in place.
+    fn solve_loaded(&mut self, q: &mut [Real], params: &Params) -> Result<Info, Fault> {
+        q.fill(0.0);
+        let mut info = match params.method {
+            Method::Jacobi | Method::GaussSeidel | Method::Sor => ladder::relax(self, q, params)?,
+            Method::ConjugateGradients => krylov::solve(self, Before::Nothing, q, params),
+            Method::IncompleteCholesky | Method::ModifiedIncompleteCholesky => {
+                let modified = params.method == Method::ModifiedIncompleteCholesky;
+                if self.incomplete.as_ref().is_none_or(|factors| factors.modified != modified) {
+                    self.incomplete = Some(Factors::new(&self.fine, modified));
+                }
+                krylov::solve(self, Before::Incomplete, q, params)
+            }
+            Method::Multigrid => krylov::cycles(self, q, params),
+            Method::MultigridGradients => krylov::solve(self, Before::Multigrid, q, params),
+            Method::Cosine => {
+                let cosine = match self.cosine.take() {
+                    Some(cosine) => cosine,
+                    None => Cosine::new(&self.fine).map_err(|because| Fault::Method { method: params.method, because })?,
+                };
+                let info = krylov::direct(self, q, params, |grid, column, registers| cosine.solve(grid, column, registers));
+                self.cosine = Some(cosine);
+                info
+            }
+        };
+        info.pockets = self.pockets();
+        self.pockets.clear(&self.fine, q);
+        Ok(info)
+    }
+
+    /// Solves until what is left, as the caller evaluates it, meets the target: in single precision the residual that an iteration
+    /// carries along says less and less about the true one. `evaluate(solver, correction, b)` adds the correction to the unknowns, or
+    /// takes its gradient from the velocity, and writes the right-hand side that is then left to `b`.           (pressure.12)
+    pub fn refine(
+        &mut self,
+        b: &mut [Real],
+        correction: &mut [Real],
+        params: &Params,
+        mut evaluate: impl FnMut(&Self, &[Real], &mut [Real]),
+    ) -> Result<Info, Fault> {
+        let expected = self.fine.lattice.len();
+        for given in [b.len(), correction.len()] {
+            if given != expected {
+                return Err(Fault::Shape { expected, given });
+            }
+        }
+        let mut info = Info { pockets: self.pockets(), ..Info::default() };
+        self.pockets.load(&mut self.fine, b, params.excess)?;
+        let [start, most] = self.norms();
+        info.begin(start, most, params.target);
+        let (mut now, mut largest) = (start, most);
+        while !info.converged && info.iterations < params.iterations {
+            let wanted = match params.target {
+                Target::Relative(r) => r * (start / now).sqrt(),
+                Target::Largest(m) => m / largest,
+            };
+            let inner = Params {
+                target: Target::Relative((0.9 * wanted).max(TRUSTED)),
+                iterations: params.iterations - info.iterations,
+                ..*params
+            };
+            let part = self.solve_loaded(correction, &inner)?;
+            evaluate(self, correction, b);
+            // What rounding adds to a mean is no fault of the caller's.
+            self.pockets.load(&mut self.fine, b, Excess::Remove)?;
+            let [after, most] = self.norms();
+            let scale = (now / start).sqrt();
+            info.residuals.extend(part.residuals.iter().map(|r| r * scale));
+            info.iterations += part.iterations;
+            info.refinements += 1;
+            info.largest = most;
+            let residual = (after / start).sqrt();
+            if let Some(last) = info.residuals.last_mut() {
+                *last = residual;
+            }
+            info.converged = match params.target {
+                Target::Relative(r) => residual <= r,
+                Target::Largest(m) => most <= m && after.is_finite(),
+            };
+            // Round-off of the evaluation itself: no solve makes it smaller.
+            if after.is_nan() || part.iterations == 0 || after > 0.25 * now {
+                break;
+            }
+            (now, largest) = (after, most);
+        }
+        Ok(info)
+    }
+
+    /// Solves for q in double precision, by refinement: each residual is evaluated in double, each correction solved for in the
+    /// engine's precision.
+    pub fn solve_double(&mut self, b: &[Real], q: &mut [f64], params: &Params) -> Result<Info, Fault> {
+        let expected = self.fine.lattice.len();
+        for given in [b.len(), q.len()] {
+            if given != expected {
+                return Err(Fault::Shape { expected, given });
+            }
+        }
+        q.fill(0.0);
+        let (mut left, mut correction) = (b.to_vec(), vec![0.0; expected]);
+        self.refine(&mut left, &mut correction, params, |solver, correction, left| {
+            chunks(q, |start, q| q.iter_mut().zip(&correction[start..]).for_each(|(q, c)| *q += f64::from(*c)));
+            solver.residual(b, q, left);
+        })
+    }
+
+    /// out = b - A q, evaluated in double precision.
+    pub fn residual(&self, b: &[Real], q: &[f64], out: &mut [Real]) {
+        let grid = &self.fine;
+        let (n, stride) = (grid.lattice.n, grid.lattice.stride);
+        let zeros = vec![0.0; n[0]];
+        // A row, or what lies beyond an open side; a wall lets nothing of it through.
+        let row = |j: isize, k: isize| {
+            let inside = |i: isize, axis: usize| grid.periodic[axis] || (0..n[axis] as isize).contains(&i);
+            if inside(j, 1) && inside(k, 2) {
+                let at = grid.start(j, k);
+                &q[at..at + n[0]]
+            } else {
+                &zeros[..]
+            }
+        };
+        let first = grid.lattice.at(0, 0, 0);
+        out[first..first + stride[2] * n[2]].par_chunks_mut(stride[1]).enumerate().for_each(|(line, out)| {
+            let (j, k) = (line % (n[1] + 2), line / (n[1] + 2));
+            if j >= n[1] {
+                return;
+            }
+            let at = grid.lattice.at(0, j, k);
+            let (j, k) = (j as isize, k as isize);
+            let here = row(j, k);
+            let beside = [row(j - 1, k), row(j + 1, k), row(j, k - 1), row(j, k + 1)];
+            let of = |axis: usize, up: usize| &grid.w[axis][at + up..at + up + n[0]];
+            let w = [of(0, 0), of(0, 1), of(1, 0), of(1, stride[1]), of(2, 0), of(2, stride[2])];
+            let ends = if grid.periodic[0] { [here[n[0] - 1], here[0]] } else { [0.0; 2] };
+            let mut one = |i: usize, x: [f64; 2]| {
+                let others = [x[0], x[1], beside[0][i], beside[1][i], beside[2][i], beside[3][i]];
+                let mut product = grid.extra.as_ref().map_or(0.0, |extra| f64::from(extra[at + i])) * here[i];
+                for face in 0..6 {
+                    product += f64::from(w[face][i].value()) * (here[i] - others[face]);
+                }
+                out[i] = (f64::from(b[at + i]) - product) as Real;
+            };
+            for i in 1..n[0].saturating_sub(1) {
+                one(i, [here[i - 1], here[i + 1]]);
+            }
+            let next = |i: usize| here.get(i).copied().unwrap_or(ends[1]);
+            one(0, [ends[0], next(1)]);
+            if n[0] > 1 {
+                one(n[0] - 1, [here[n[0] - 2], ends[1]]);
+            }
+        });
+    }
+}
+
+/// The reduction up to which the residual of an iteration agrees with the true one.
+#[cfg(not(feature = "double"))]
+const TRUSTED: f64 = 1e-3;
+/// The reduction up to which the residual of an iteration agrees with the true one.
+#[cfg(feature = "double")]
+const TRUSTED: f64 = 1e-9;
