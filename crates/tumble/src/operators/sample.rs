@@ -562,4 +562,30 @@ mod tests {
         }
         assert!(read_something > 1.0);
     }
+
+    #[test]
+    fn rows_that_are_not_displaced_are_read_as_all_others() {
+        let space = Grid::new([37, 5, 4], 0.1, [0.0; 3]).unwrap();
+        let plane = Grid::new([37, 1, 6], 0.1, [0.0; 3]).unwrap().flat(1).unwrap();
+        let mut rows = 0;
+        for grid in [space, space.periodic([true; 3]), plane, plane.periodic([true; 3])] {
+            for (from, to) in [Place::Cell, Place::Face(0), Place::Face(2), Place::Node]
+                .into_iter()
+                .flat_map(|a| [Place::Cell, Place::Face(0), Place::Face(2), Place::Node].map(|b| (a, b)))
+            {
+                let f = Field::of(grid, from, "", |x| (31.0 * x[0]).sin() + (27.0 * x[1]).cos() * (40.0 * x[2]).sin()).unwrap();
+                let (view, points) = (View::new(&f, Interpolation::Linear), grid.points(to));
+                for (j, k) in (0..points[1]).flat_map(|j| (0..points[2]).map(move |k| (j, k))) {
+                    let start = Start { at: [0, j, k], offset: grid.offset(to) };
+                    let (mut spots, mut still, mut all) = (Spots::new(), [0.0; SEGMENT], [0.0; SEGMENT]);
+                    read_still(&view, start, points[0], &mut spots, &mut still);
+                    locate(&view, start, &[[0.0; SEGMENT]; 3], points[0], &mut spots);
+                    read(&view, &spots, points[0], &mut all, None);
+                    assert_eq!(still[..points[0]], all[..points[0]], "{from} {to} {j} {k}");
+                    rows += 1;
+                }
+            }
+        }
+        assert!(rows > 500);
+    }
 }

@@ -272,6 +272,10 @@ pub fn second(out: &mut Field, f: &Field, keep: bool, scale: f64) {
     let others: Vec<usize> = f.grid.axes().filter(|a| *a != 0).collect();
     let axes = (f.grid.flat != Some(0), others.len());
     let scale = scale as Real;
+    let (points, lattice) = (f.points(), f.grid.lattice());
+    let inside = |j: isize, k: isize| (0..points[1] as isize).contains(&j) && (0..points[2] as isize).contains(&k);
+    // Where the neighbours of the first and of the last point along x come from.
+    let ends = [reach(f, 0, -1), reach(f, 0, points[0] as isize)];
     each_row(out, |j, k, row| {
         let (j, k) = (j as isize, k as isize);
         let mut scratch: [Vec<Real>; 5] = Default::default();
@@ -282,15 +286,22 @@ pub fn second(out: &mut Field, f: &Field, keep: bool, scale: f64) {
             let Some(axis) = others.get(s / 2) else { break };
             let m = 2 * (s % 2) as isize - 1;
             let (j, k) = if *axis == 1 { (j + m, k) } else { (j, k + m) };
-            rows[s / 2][s % 2] = fetch(f, j, k, made);
+            rows[s / 2][s % 2] = if inside(j, k) {
+                let start = lattice.at(0, j as usize, k as usize);
+                &f.data[start..start + points[0]]
+            } else {
+                fetch(f, j, k, made)
+            };
         }
         let n = row.len();
         if !axes.0 {
             return dispatch(Curvature { out: row, c, rows, axes, keep, scale });
         }
         for i in [0, n - 1] {
-            let x = i as isize;
-            let three = [ghosted(f, [x - 1, j, k]), c[i], ghosted(f, [x + 1, j, k])];
+            let end = |r: Reach| r.ghost.map_or(c[r.from], |(a, b)| a + b * c[r.from]);
+            let low = if i == 0 { end(ends[0]) } else { c[i - 1] };
+            let high = if i + 1 == n { end(ends[1]) } else { c[i + 1] };
+            let three = [low, c[i], high];
             let one = |r: [&'_ [Real]; 2]| -> [Real; 2] { [r[0][i], r[1][i]] };
             let [a, b] = [one(rows[0]), one(rows[1])];
             let rows = [[&a[..1], &a[1..]], [&b[..1], &b[1..]]];
