@@ -481,6 +481,7 @@ struct Diagonal<'a> {
 
 impl Kernel for Diagonal<'_> {
     type Output = ();
+    #[allow(clippy::assign_op_pattern)] // lanes have no +=
     #[inline(always)]
     fn run<W: Width>(self, w: W) {
         let law = self.law;
