@@ -25,6 +25,7 @@ TARGETS = {
     ("emission", "update"): (1.0, "at most"),
     ("fountain, memory", "80 bytes"): (1.0, "at most"),
     ("flock", "numba"): (4.0, "at least"),
+    ("flock", "taichi"): (4.0, "at least"),
     ("direct sum, single, portable", "numba"): (0.6, "at least"),
     ("direct sum, single, native", "numba"): (1.3, "at least"),
     ("direct sum, double, portable", "numba"): (1.0, "at least"),

@@ -1,7 +1,7 @@
 """A flock of 100,000 with 25 neighbours each, found anew at each step: time of a step.
 
-All steer by the same law (flocks.1) in single precision. numba sorts by cell, as tumble does, and may fuse multiplications with
-additions; tumble's bits are the same on every machine."""
+All steer by the same law (flocks.1) in single precision. numba and taichi sort by cell, as tumble does, and may fuse
+multiplications with additions; tumble's bits are the same on every machine."""
 
 import numpy as np
 from common import THREADS, median, show
@@ -157,6 +157,88 @@ def bench_numba(x0, v0):
     return median(steps) / STEPS, velocity
 
 
+def bench_taichi(x0, v0):
+    import taichi as ti
+
+    ti.init(arch=ti.cpu, cpu_max_num_threads=THREADS, default_fp=ti.f32, offline_cache=False, log_level=ti.ERROR)
+    n = len(x0)
+    low = x0.min(0) - np.float32(1.5)
+    nx, ny, nz = (int(k) for k in np.ceil((x0.max(0) + np.float32(1.5) - low) / RADIUS))
+    x, v, a, sx, sv = (ti.Vector.field(3, ti.f32, n) for _ in range(5))
+    order, cell, first = ti.field(ti.i32, n), ti.field(ti.i32, n), ti.field(ti.i32, nx * ny * nz + 2)
+    corner, shape = ti.Vector(low.tolist()), ti.Vector([nx, ny, nz])
+
+    @ti.kernel
+    def sort():
+        for c in first:
+            first[c] = 0
+        for i in x:
+            at = ti.math.clamp(ti.cast((x[i] - corner) / RADIUS, ti.i32), 0, shape - 1)
+            cell[i] = (at[2] * ny + at[1]) * nx + at[0]
+        ti.loop_config(serialize=True)
+        for i in range(n):
+            first[cell[i] + 1] += 1
+        ti.loop_config(serialize=True)
+        for c in range(nx * ny * nz):
+            first[c + 1] += first[c]
+        ti.loop_config(serialize=True)
+        for k in range(n):
+            i = n - 1 - k
+            first[cell[i] + 1] -= 1
+            order[first[cell[i] + 1]] = i
+        for p in sx:
+            sx[p] = x[order[p]]
+            sv[p] = v[order[p]]
+
+    @ti.kernel
+    def steer():
+        for p in sx:
+            i = order[p]
+            cx, cy, cz = cell[i] % nx, cell[i] // nx % ny, cell[i] // (nx * ny)
+            here, velocity = sx[p], sv[p]
+            total = 0.0
+            m, u, apart = ti.Vector([0.0, 0.0, 0.0]), ti.Vector([0.0, 0.0, 0.0]), ti.Vector([0.0, 0.0, 0.0])
+            for z in range(ti.max(cz - 1, 0), ti.min(cz + 2, nz)):
+                for y in range(ti.max(cy - 1, 0), ti.min(cy + 2, ny)):
+                    base = (z * ny + y) * nx
+                    begin, end = first[base + ti.max(cx - 1, 0) + 1], first[base + ti.min(cx + 1, nx - 1) + 2]
+                    for q in range(begin, end):
+                        d = sx[q] - here
+                        r_sq = d.dot(d)
+                        if 0.0 < r_sq < RADIUS * RADIUS:
+                            t = 1.0 - r_sq * (1 / RADIUS**2)
+                            w = t * t
+                            total += w
+                            m += w * d
+                            u += w * (sv[q] - velocity)
+                            e_sq = r_sq * (1 / SPACING**2)
+                            if e_sq < 1.0:
+                                t = 1.0 - e_sq
+                                apart -= t * t / (e_sq + 0.01) * (1 / SPACING) * d
+            drive = PROPULSION * (1.0 - velocity.dot(velocity) * (1 / SPEED**2))
+            a[i] = (COHESION * m + ALIGNMENT * u) / (total + 0.01) + SEPARATION * apart + drive * velocity
+
+    @ti.kernel
+    def move():
+        for i in x:
+            v[i] += H * a[i]
+            x[i] += H * v[i]
+
+    x.from_numpy(x0)
+    v.from_numpy(v0)
+
+    def steps():
+        for _ in range(STEPS):
+            sort()
+            steer()
+            move()
+        ti.sync()
+
+    steps()
+    velocity = v.to_numpy()
+    return median(steps) / STEPS, velocity
+
+
 def main():
     small = check_tumble(*start(2000))
     x, v = start(N)
@@ -164,9 +246,10 @@ def main():
     show(
         "flock", "tumble", seconds, "s", f"{N} boids a step; accelerations of 2000 differ from all pairs by {small:.1e}"
     )
-    seconds, other = bench_numba(x, v)
-    off = np.abs(velocity - other).max() / np.abs(other).max()
-    show("flock", "numba", seconds, "s", f"fused, velocities differ by {off:.1e}")
+    for who, bench in [("numba", bench_numba), ("taichi", bench_taichi)]:
+        seconds, other = bench(x, v)
+        off = np.abs(velocity - other).max() / np.abs(other).max()
+        show("flock", who, seconds, "s", f"fused, velocities differ by {off:.1e}")
 
 
 main()
