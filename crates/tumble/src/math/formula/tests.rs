@@ -52,7 +52,7 @@ fn faults_are_named() {
         ("1e999", "too large"),
         ("sin(1, 2)", "sin of 2 values, expected one"),
         ("max(1)", "max of 1 values, expected two or more"),
-        ("sin", "unknown name \"sin\""),
+        ("sin", "\"sin\" is a function; write sin(...)"),
         ("x(2)", "\"x\" is no function"),
         ("(x", "a \"(\" that is never closed"),
         ("x)", "a \")\" that closes nothing"),
