@@ -1,0 +1,453 @@
+//! Registers as lanes. A kernel is written once over [`Width`]; [`dispatch`] runs it on the widest registers
+//! of the machine. Every width computes the same bits: each lane does the same correctly rounded operations.
+//!
+//! Rows of four numbers are loaded as whole registers and transposed, which beats gather instructions by 1.8x.
+//! In kernels use `for` loops and `#[inline(always)]` functions only: closures and `array::map` become calls
+//! compiled without the wide registers.
+
+#[cfg(target_arch = "x86_64")]
+mod x86;
+
+#[cfg(not(feature = "double"))]
+use super::lane::{RSQRT, newton_rsqrt};
+use super::{Lane, Real, Row};
+use pulp::Simd;
+use std::ops::{Add, Div, Mul, Neg, Sub};
+
+/// Indices into rows 0..rows, checked at construction, so that kernels may load without checks.
+#[derive(Debug, Clone, Default, PartialEq, Eq)]
+pub struct Index {
+    index: Vec<u32>,
+    rows: usize,
+}
+
+impl Index {
+    /// Wraps indices; `None` if one is not below `rows`.
+    pub fn new(index: Vec<u32>, rows: usize) -> Option<Self> {
+        index.iter().all(|i| (*i as usize) < rows).then_some(Self { index, rows })
+    }
+
+    /// The indices.
+    pub fn get(&self) -> &[u32] {
+        &self.index
+    }
+
+    /// How many rows they index at least.
+    pub fn rows(&self) -> usize {
+        self.rows
+    }
+}
+
+/// A set of registers that hold N numbers each.
+pub trait Width: Copy + Send + Sync {
+    /// N numbers.
+    type L: Lane;
+    /// Count of numbers.
+    const N: usize;
+    /// The constant `c`.
+    fn splat(self, c: Real) -> Self::L;
+    /// Loads `from[..N]`.
+    fn load(self, from: &[Real]) -> Self::L;
+    /// Stores to `to[..N]`.
+    fn store(self, v: Self::L, to: &mut [Real]);
+    /// Loads the rows `index[..N]` and transposes them: four registers with x, y, z and w of N rows.
+    ///
+    /// # Safety
+    /// Every index is below `rows.len()`.
+    unsafe fn gather(self, rows: &[Row], index: &[u32]) -> [Self::L; 4];
+    /// Loads `from[i]` and `from[i + 1]` for `index[..N]`.
+    ///
+    /// # Safety
+    /// Every index is at least 0 and below `from.len() - 1`.
+    unsafe fn pairs(self, from: &[Real], index: &[i32]) -> [Self::L; 2];
+    /// Loads `from[i..i + 4]` for `index[..N]`.
+    ///
+    /// # Safety
+    /// Every index is at least 0 and below `from.len() - 3`.
+    unsafe fn quads(self, from: &[Real], index: &[i32]) -> [Self::L; 4];
+    /// The largest whole number not above x.
+    fn floor(self, x: Self::L) -> Self::L;
+    /// Stores whole numbers below 2^31 to `to[..N]`.
+    fn whole(self, x: Self::L, to: &mut [i32]);
+    /// Stores N rows at `start`, `start + stride`, ...
+    fn scatter(self, v: [Self::L; 4], rows: &mut [Row], start: usize, stride: usize);
+    /// Loads N consecutive rows from `start` and transposes them.
+    fn rows(self, rows: &[Row], start: usize) -> [Self::L; 4];
+    /// Adds to N consecutive rows from `start`.
+    fn add_to_rows(self, v: [Self::L; 4], rows: &mut [Row], start: usize);
+    /// For N consecutive numbers of a column of rows, the first of them number `at`: the number of each one's row.
+    fn spread(self, of_rows: &[Real], at: usize) -> Self::L;
+    /// The number whose bits are `GUESS` less half the bits of x > 0: some 2/3 of 1/sqrt(x), to 3.5 %.
+    fn guess(self, x: Self::L) -> Self::L;
+    /// a b + c, rounded once where the machine can: not the same bits everywhere.
+    fn fused(self, a: Self::L, b: Self::L, c: Self::L) -> Self::L;
+    /// Whether there is `estimate`.
+    const ESTIMATES: bool;
+    /// 1/sqrt(x) to 2^-14 by an instruction whose bits differ between makers of machines.
+    fn estimate(self, x: Self::L) -> Self::L;
+}
+
+/// What `guess` starts from.                                          (orbits.15)
+#[cfg(not(feature = "double"))]
+pub const GUESS: u32 = 0x5ef2_c6a6;
+/// What `guess` starts from.                                          (orbits.15)
+#[cfg(feature = "double")]
+pub const GUESS: u64 = 0x5fde_58d4_c7b5_3800;
+
+/// How many numbers the registers of `w` hold; in the body of `packs!`, where `W` is the widest of two.
+#[inline(always)]
+pub fn count<W: Width>(_w: W) -> usize {
+    W::N
+}
+
+/// Runs `$body` with `$w` and the first number `$e` of each pack of `$range`, then one by one.
+macro_rules! packs {
+    ($width:ident, $w:ident, $range:expr, |$e:ident| $body:expr) => {{
+        let mut $e = $range.start;
+        while $e + $width::N <= $range.end {
+            $body;
+            $e += $width::N;
+        }
+        let $w = $crate::math::simd::Scalar;
+        while $e < $range.end {
+            $body;
+            $e += 1;
+        }
+    }};
+}
+pub(crate) use packs;
+
+/// A kernel, generic over the register width.
+pub trait Kernel {
+    /// What it returns.
+    type Output;
+    /// Does the work.
+    fn run<W: Width>(self, w: W) -> Self::Output;
+}
+
+/// One number at a time.
+#[derive(Debug, Clone, Copy)]
+pub struct Scalar;
+
+impl Width for Scalar {
+    type L = Real;
+    const N: usize = 1;
+    #[inline(always)]
+    fn splat(self, c: Real) -> Real {
+        c
+    }
+    #[inline(always)]
+    fn load(self, from: &[Real]) -> Real {
+        from[0]
+    }
+    #[inline(always)]
+    fn store(self, v: Real, to: &mut [Real]) {
+        to[0] = v;
+    }
+    #[inline(always)]
+    unsafe fn gather(self, rows: &[Row], index: &[u32]) -> [Real; 4] {
+        // SAFETY: the caller has checked the index.
+        unsafe { *rows.get_unchecked(index[0] as usize) }
+    }
+    #[inline(always)]
+    unsafe fn pairs(self, from: &[Real], index: &[i32]) -> [Real; 2] {
+        let i = index[0] as usize;
+        // SAFETY: the caller has checked the index.
+        unsafe { [*from.get_unchecked(i), *from.get_unchecked(i + 1)] }
+    }
+    #[inline(always)]
+    unsafe fn quads(self, from: &[Real], index: &[i32]) -> [Real; 4] {
+        let i = index[0] as usize;
+        // SAFETY: the caller has checked the index.
+        unsafe { *from.get_unchecked(i..i + 4).as_ptr().cast::<[Real; 4]>() }
+    }
+    #[inline(always)]
+    fn floor(self, x: Real) -> Real {
+        x.floor()
+    }
+    #[inline(always)]
+    fn whole(self, x: Real, to: &mut [i32]) {
+        to[0] = x as i32;
+    }
+    #[inline(always)]
+    fn scatter(self, v: [Real; 4], rows: &mut [Row], start: usize, _stride: usize) {
+        rows[start] = v;
+    }
+    #[inline(always)]
+    fn rows(self, rows: &[Row], start: usize) -> [Real; 4] {
+        rows[start]
+    }
+    #[inline(always)]
+    fn add_to_rows(self, v: [Real; 4], rows: &mut [Row], start: usize) {
+        for i in 0..4 {
+            rows[start][i] += v[i];
+        }
+    }
+    #[inline(always)]
+    fn spread(self, of_rows: &[Real], at: usize) -> Real {
+        of_rows[at / 4]
+    }
+    #[inline(always)]
+    fn guess(self, x: Real) -> Real {
+        Real::from_bits(GUESS.wrapping_sub(x.to_bits() >> 1))
+    }
+    #[inline(always)]
+    fn fused(self, a: Real, b: Real, c: Real) -> Real {
+        a * b + c
+    }
+    const ESTIMATES: bool = false;
+    #[inline(always)]
+    fn estimate(self, x: Real) -> Real {
+        self.guess(x)
+    }
+}
+
+#[cfg(not(feature = "double"))]
+type Register<S> = <S as Simd>::f32s;
+#[cfg(feature = "double")]
+type Register<S> = <S as Simd>::f64s;
+
+/// A register with arithmetic operators.
+#[derive(Clone, Copy)]
+pub struct Pack<S: Simd> {
+    simd: S,
+    v: Register<S>,
+}
+
+macro_rules! operations {
+    ($splat:ident, $add:ident, $sub:ident, $mul:ident, $div:ident, $neg:ident, $sqrt:ident, $greater:ident, $select:ident) => {
+        impl<S: Simd> Add for Pack<S> {
+            type Output = Self;
+            #[inline(always)]
+            fn add(self, b: Self) -> Self {
+                Self { simd: self.simd, v: self.simd.$add(self.v, b.v) }
+            }
+        }
+        impl<S: Simd> Sub for Pack<S> {
+            type Output = Self;
+            #[inline(always)]
+            fn sub(self, b: Self) -> Self {
+                Self { simd: self.simd, v: self.simd.$sub(self.v, b.v) }
+            }
+        }
+        impl<S: Simd> Mul for Pack<S> {
+            type Output = Self;
+            #[inline(always)]
+            fn mul(self, b: Self) -> Self {
+                Self { simd: self.simd, v: self.simd.$mul(self.v, b.v) }
+            }
+        }
+        impl<S: Simd> Div for Pack<S> {
+            type Output = Self;
+            #[inline(always)]
+            fn div(self, b: Self) -> Self {
+                Self { simd: self.simd, v: self.simd.$div(self.v, b.v) }
+            }
+        }
+        impl<S: Simd> Neg for Pack<S> {
+            type Output = Self;
+            #[inline(always)]
+            fn neg(self) -> Self {
+                Self { simd: self.simd, v: self.simd.$neg(self.v) }
+            }
+        }
+        impl<S: Simd> Lane for Pack<S> {
+            #[inline(always)]
+            fn like(self, c: f64) -> Self {
+                Self { simd: self.simd, v: self.simd.$splat(c as Real) }
+            }
+            #[inline(always)]
+            fn sqrt(self) -> Self {
+                Self { simd: self.simd, v: self.simd.$sqrt(self.v) }
+            }
+            #[cfg(not(feature = "double"))]
+            #[inline(always)]
+            fn rsqrt(self) -> Self {
+                let s = self.simd;
+                let half = s.wrapping_dyn_shr_u32s(s.transmute_u32s_f32s(self.v), s.splat_u32s(1));
+                let guess = s.transmute_f32s_u32s(s.sub_u32s(s.splat_u32s(RSQRT), half));
+                newton_rsqrt(self, Self { simd: s, v: guess })
+            }
+            #[cfg(feature = "double")]
+            #[inline(always)]
+            fn rsqrt(self) -> Self {
+                self.like(1.0) / self.sqrt()
+            }
+            #[inline(always)]
+            fn positive(self, then: Self, other: Self) -> Self {
+                let mask = self.simd.$greater(self.v, self.simd.$splat(0.0));
+                Self { simd: self.simd, v: self.simd.$select(mask, then.v, other.v) }
+            }
+        }
+    };
+}
+
+#[cfg(not(feature = "double"))]
+operations!(splat_f32s, add_f32s, sub_f32s, mul_f32s, div_f32s, neg_f32s, sqrt_f32s, greater_than_f32s, select_f32s);
+#[cfg(feature = "double")]
+operations!(splat_f64s, add_f64s, sub_f64s, mul_f64s, div_f64s, neg_f64s, sqrt_f64s, greater_than_f64s, select_f64s);
+
+/// The instruction sets that a kernel can be run on, for tests that compare their bits.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Level {
+    /// One number at a time.
+    Scalar,
+    /// AVX2: 256-bit registers.
+    Avx2,
+    /// AVX-512: 512-bit registers.
+    Avx512,
+}
+
+impl Level {
+    /// The levels that this machine has.
+    pub fn available() -> Vec<Level> {
+        #[cfg(target_arch = "x86_64")]
+        let wide = [(Self::Avx2, x86::avx2().is_some()), (Self::Avx512, x86::avx512().is_some())];
+        #[cfg(not(target_arch = "x86_64"))]
+        let wide = [];
+        std::iter::once(Self::Scalar).chain(wide.into_iter().filter(|(_, has)| *has).map(|(level, _)| level)).collect()
+    }
+}
+
+impl Level {
+    /// Its name in manifests.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Scalar => "scalar",
+            Self::Avx2 => "avx2",
+            Self::Avx512 => "avx512",
+        }
+    }
+}
+
+/// Runs a kernel on the widest registers of this machine.
+#[inline]
+pub fn dispatch<K: Kernel>(kernel: K) -> K::Output {
+    dispatch_at(Level::Avx512, kernel)
+}
+
+/// Runs a kernel on registers no wider than `level`.
+#[inline]
+pub fn dispatch_at<K: Kernel>(level: Level, kernel: K) -> K::Output {
+    #[cfg(target_arch = "x86_64")]
+    {
+        if let (Level::Avx512, Some(simd)) = (level, x86::avx512()) {
+            return Simd::vectorize(simd, x86::InAvx512 { kernel, simd });
+        }
+        if let (Level::Avx2 | Level::Avx512, Some(simd)) = (level, x86::avx2()) {
+            return Simd::vectorize(simd, x86::InAvx2 { kernel, simd });
+        }
+    }
+    let _ = level;
+    kernel.run(Scalar)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    struct Norms<'a> {
+        rows: &'a [Row],
+        index: &'a Index,
+        out: &'a mut [Real],
+        moved: &'a mut [Row],
+    }
+
+    impl Kernel for Norms<'_> {
+        type Output = usize;
+        #[inline(always)]
+        fn run<W: Width>(self, w: W) -> usize {
+            let full = self.index.get().len() / W::N * W::N;
+            for start in (0..full).step_by(W::N) {
+                // SAFETY: Index::new has checked it.
+                let [x, y, z, q] = unsafe { w.gather(self.rows, &self.index.get()[start..]) };
+                let n = (x * x + y * y + z * z).sqrt() / (q + q.like(2.0));
+                w.store(x.positive(n, -n), &mut self.out[start..]);
+                w.scatter([y, x, q, z], self.moved, 2 * start, 2);
+            }
+            W::N
+        }
+    }
+
+    #[test]
+    fn every_width_gathers_computes_and_scatters_the_same_bits() {
+        let n = 64;
+        let rows: Vec<Row> = (0..n).map(|i| [i as Real - 20.3, 0.1 * i as Real, (i * i % 7) as Real, 1.0 / (1.0 + i as Real)]).collect();
+        let index = Index::new((0..n as u32).map(|i| i * 37 % 64).collect(), n).unwrap();
+        let run = |level| {
+            let (mut out, mut moved) = (vec![0.0; n], vec![[0.0; 4]; 2 * n]);
+            let width = dispatch_at(level, Norms { rows: &rows, index: &index, out: &mut out, moved: &mut moved });
+            (width, out, moved)
+        };
+        let (one, out, moved) = run(Level::Scalar);
+        assert_eq!(one, 1);
+        assert_eq!(
+            moved[2 * 5],
+            [
+                rows[index.get()[5] as usize][1],
+                rows[index.get()[5] as usize][0],
+                rows[index.get()[5] as usize][3],
+                rows[index.get()[5] as usize][2]
+            ]
+        );
+        let mut widths = vec![one];
+        for level in Level::available() {
+            let (width, o, m) = run(level);
+            widths.push(width);
+            assert!(out.iter().zip(&o).all(|(a, b)| a.to_bits() == b.to_bits()), "{level:?}");
+            assert_eq!(moved, m, "{level:?}");
+        }
+        assert!(widths.windows(2).all(|w| w[0] <= w[1]), "{widths:?}");
+    }
+
+    struct Picks<'a> {
+        from: &'a [Real],
+        index: &'a [i32],
+        x: &'a [Real],
+        out: &'a mut Vec<Real>,
+    }
+
+    impl Kernel for Picks<'_> {
+        type Output = ();
+        #[inline(always)]
+        fn run<W: Width>(self, w: W) {
+            let mut found = vec![[0.0; 16]; 8];
+            for start in (0..64).step_by(W::N) {
+                // SAFETY: the indices are below 61 of 64.
+                let (two, four) = unsafe { (w.pairs(self.from, &self.index[start..]), w.quads(self.from, &self.index[start..])) };
+                let floor = w.floor(w.load(&self.x[start..]));
+                let mut whole = [0; 16];
+                w.whole(floor, &mut whole);
+                for (out, v) in found.iter_mut().zip([two[0], two[1], four[0], four[1], four[2], four[3], floor]) {
+                    w.store(v, out);
+                }
+                for l in 0..W::N {
+                    self.out.extend(found[..7].iter().map(|lanes| lanes[l]));
+                    self.out.push(whole[l] as Real);
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn every_width_picks_neighbours_and_whole_numbers() {
+        let from: Vec<Real> = (0..64).map(|i| 0.37 * i as Real - 7.0).collect();
+        let index: Vec<i32> = (0..64).map(|i| i * 29 % 61).collect();
+        let x: Vec<Real> = (0..64).map(|i| (i as Real - 31.0) * 0.25).collect();
+        for level in Level::available() {
+            let mut out = Vec::new();
+            dispatch_at(level, Picks { from: &from, index: &index, x: &x, out: &mut out });
+            for i in 0..64 {
+                let (at, floor) = (index[i] as usize, x[i].floor());
+                let wanted = [from[at], from[at + 1], from[at], from[at + 1], from[at + 2], from[at + 3], floor, floor];
+                assert_eq!(out[8 * i..8 * i + 8], wanted, "{level:?}");
+            }
+        }
+    }
+
+    #[test]
+    fn an_index_beyond_the_rows_is_refused() {
+        assert!(Index::new(vec![0, 3], 3).is_none());
+        assert!(Index::new(vec![0, 2], 3).is_some());
+    }
+}
