@@ -45,7 +45,7 @@ impl From<Vec<u32>> for Data {
     }
 }
 
-/// A table column of an object: `position` [m], n x 3.
+/// A column of an object: of a table, as `position` [m], n x 3, or of a grid, as `density` [kg/m³] on all of its cells.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Column {
     /// Object it belongs to.
@@ -56,6 +56,8 @@ pub struct Column {
     pub unit: &'static str,
     /// Numbers per row; the number of rows is `data.len() / width`.
     pub width: usize,
+    /// Points along each axis of the grid on which the rows lie, the first axis fastest; two in a plane, none in a table.
+    pub points: Vec<usize>,
     /// Row after row.
     pub data: Data,
 }

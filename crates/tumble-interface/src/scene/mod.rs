@@ -4,6 +4,7 @@
 mod animated;
 mod emitters;
 mod forces;
+mod grids;
 mod output;
 mod shapes;
 mod structures;
@@ -12,6 +13,7 @@ mod systems;
 pub use animated::{Animated, AnimatedVector, Component, Interpolation, Keys, VectorKeys};
 pub use emitters::{Between, Burst, Cause, Emitter, Event, Kill, Source, WhenFull};
 pub use forces::{Anchor, Field, Force, Goal};
+pub use grids::GridBox;
 pub use output::{Camera, Expect, Look, Output, Probe};
 pub use shapes::{Collider, MeshFile, MeshFrame, MeshFrames, MeshRef, Motion, Pace, Pose, Shape};
 pub use structures::{

@@ -425,7 +425,9 @@ impl Pool {
     /// The columns that only emitted particles have. `mass` are the masses of all rows, where there are any.
     pub fn write(&self, s: usize, object: &str, mass: &[Real], out: &mut Vec<Column>) {
         let (ids, ages, emitter) = (self.ids(s), self.ages(s), self.emitter(s));
-        let mut add = |name: &str, unit, width, data| out.push(Column { object: object.into(), name: name.into(), unit, width, data });
+        let mut add = |name: &str, unit, width, data| {
+            out.push(Column { object: object.into(), name: name.into(), unit, width, points: Vec::new(), data })
+        };
         add("id", "1", 1, Data::U32(ids.to_vec()));
         add("age", "s", 1, Data::from(ages.to_vec()));
         if emitter.has_radii() {

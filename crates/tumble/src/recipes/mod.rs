@@ -7,6 +7,7 @@
 mod block;
 mod emitter;
 mod galaxy;
+mod grid;
 mod lattice;
 mod net;
 mod particles;
@@ -18,6 +19,7 @@ mod sheet;
 pub use block::block;
 pub use emitter::emitter;
 pub use galaxy::galaxy;
+pub use grid::grid;
 pub use net::net;
 pub use particles::{Tracer, draw_cloud, particles, tracers, walkers};
 pub use rope::rope;

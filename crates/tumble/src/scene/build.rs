@@ -252,7 +252,9 @@ fn solids(scene: &Scene, assets: &Assets, issues: &mut Vec<Issue>) -> (Vec<Colli
             Err((key, message)) => issues.push(Issue::new(format!("collider \"{}\"{key}", thing.name), message)),
         }
         let surface = recipes::scenery(thing, &meshes);
-        let mut add = |name: &str, unit, data| scenery.push(Column { object: thing.name.clone(), name: name.into(), unit, width: 3, data });
+        let mut add = |name: &str, unit, data| {
+            scenery.push(Column { object: thing.name.clone(), name: name.into(), unit, width: 3, points: Vec::new(), data })
+        };
         add("position", "m", Data::F64(surface.vertices.concat()));
         add("triangles", "1", Data::U32(surface.triangles.concat()));
     }

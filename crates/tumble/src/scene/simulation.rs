@@ -48,7 +48,7 @@ impl Simulation {
         let time = self.world.time();
         for (thing, collider) in self.scene.collider.iter().zip(self.colliders.iter()) {
             let mut add = |name: &str, unit, width, data: Vec<f64>| {
-                out.push(Column { object: thing.name.clone(), name: name.into(), unit, width, data: data.into() });
+                out.push(Column { object: thing.name.clone(), name: name.into(), unit, width, points: Vec::new(), data: data.into() });
             };
             if let Shape::Animated { facets, .. } = &collider.shape {
                 add("position", "m", 3, facets.vertices(time).concat());

@@ -66,7 +66,7 @@ pub struct Object {
 impl Object {
     /// A column of its own.
     pub fn column(&self, name: &str, unit: &'static str, width: usize, data: Data) -> Column {
-        Column { object: self.name.clone(), name: name.into(), unit, width, data }
+        Column { object: self.name.clone(), name: name.into(), unit, width, points: Vec::new(), data }
     }
 
     /// Its radius as a column.

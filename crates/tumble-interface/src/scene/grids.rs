@@ -1,0 +1,21 @@
+//! Boxes of cells, for the methods that work on grids.
+
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+/// A box of cubic cells.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct GridBox {
+    /// Lengths of its sides; in a scene of two dimensions the one across the plane does not matter. Each is rounded to whole
+    /// cells.
+    #[schemars(inner(extend("x-unit" = "m", "exclusiveMinimum" = 0.0)))]
+    pub size: [f64; 3],
+    /// Its middle.
+    #[serde(default)]
+    #[schemars(extend("x-unit" = "m"))]
+    pub center: [f64; 3],
+    /// Cells along its longest side.
+    #[schemars(range(min = 1, max = 1_048_576))]
+    pub resolution: u32,
+}
