@@ -9,7 +9,7 @@ use serde::{Deserialize, Serialize};
 pub struct GridBox {
     /// Lengths of its sides; in a scene of two dimensions the one across the plane does not matter. Each is rounded to whole
     /// cells.
-    #[schemars(inner(extend("x-unit" = "m", "exclusiveMinimum" = 0.0)))]
+    #[schemars(inner(range(min = 1e-9)), extend("x-unit" = "m"))]
     pub size: [f64; 3],
     /// Its middle.
     #[serde(default)]
