@@ -286,7 +286,7 @@ impl<const NATIVE: bool, const POINTS: bool> Tile<'_, NATIVE, POINTS> {
             if let Some(lanes) = masks {
                 both = both * w.load(&STAIRS[LANES - lanes[b] + k * W::N..]);
             }
-            let mut pull = if cfg!(feature = "double") && !NATIVE && b % 2 == 1 {
+            let mut pull = if cfg!(feature = "double") && b % 2 == 1 {
                 let unit = w.splat((1.0 / cube_unit::<W, NATIVE>(w)) as Real);
                 both * (unit / (r_sq * r_sq.sqrt()))
             } else {

@@ -76,13 +76,14 @@ pub struct Flock {
     /// Time of the forces [s].
     time: f64,
     grid: Neighbours,
-    x: Vec<Row>,
-    v: Vec<Row>,
+    /// Positions and velocities of prey that do not lie side by side.
+    copies: [Vec<Row>; 2],
     hunters: [Vec<Row>; 2],
     numbers: Vec<[Real; 6]>,
     seeing: Vec<[Real; 10]>,
     sums: Vec<[Real; 10]>,
-    forces: Vec<Row>,
+    /// Accelerations, place by place [m/s²].
+    urges: Vec<Row>,
     chases: Vec<Row>,
     weights: Weights,
 }
@@ -101,8 +102,15 @@ impl Meet<6, 10> for Around {
         let one = r_sq.like(1.0);
         let q = (one - r_sq * r_sq.like(self.radius_sq_inverse)).above_zero();
         let w = r_sq.positive(q * q, r_sq.zero());
-        let v = Vec3 { x: there[3] - here[3], y: there[4] - here[4], z: there[5] - here[5] };
-        add(sum, d, v, w, apart(r_sq, self.spacing_inverse))
+        heed(sum, d, Vec3 { x: there[3] - here[3], y: there[4] - here[4], z: there[5] - here[5] }, w)
+    }
+    fn close(&self) -> f64 {
+        1.0 / self.spacing_inverse
+    }
+    #[inline(always)]
+    fn meet_close<L: Lane>(&self, here: [L; 6], there: [L; 6], sum: [L; 10]) -> [L; 10] {
+        let d = Vec3 { x: there[0] - here[0], y: there[1] - here[1], z: there[2] - here[2] };
+        shun(sum, d, apart(d.norm_sq(), self.spacing_inverse))
     }
 }
 
@@ -120,16 +128,31 @@ impl Meet<10, 10> for InView {
     fn meet<L: Lane>(&self, here: [L; 10], there: [L; 10], sum: [L; 10]) -> [L; 10] {
         let d = Vec3 { x: there[0] - here[0], y: there[1] - here[1], z: there[2] - here[2] };
         let r_sq = d.norm_sq();
+        let q = (r_sq.like(1.0) - r_sq * here[9]).above_zero();
+        let w = r_sq.positive(q * q * self.seen(here, d), r_sq.zero());
+        heed(sum, d, Vec3 { x: there[3] - here[3], y: there[4] - here[4], z: there[5] - here[5] }, w)
+    }
+    fn close(&self) -> f64 {
+        1.0 / self.spacing_inverse
+    }
+    #[inline(always)]
+    fn meet_close<L: Lane>(&self, here: [L; 10], there: [L; 10], sum: [L; 10]) -> [L; 10] {
+        let d = Vec3 { x: there[0] - here[0], y: there[1] - here[1], z: there[2] - here[2] };
+        shun(sum, d, apart(d.norm_sq(), self.spacing_inverse) * self.seen(here, d))
+    }
+}
+
+impl InView {
+    /// How much in view something at d is: from 0 to 1.
+    #[inline(always)]
+    fn seen<L: Lane>(&self, here: [L; 10], d: Vec3<L>) -> L {
+        let r_sq = d.norm_sq();
         let one = r_sq.like(1.0);
-        let q = (one - r_sq * here[9]).above_zero();
         let ahead = d.dot(Vec3 { x: here[6], y: here[7], z: here[8] });
-        // The cosine, and how far it is beyond the rim: from 0 to 1.
         let cosine = r_sq.positive(ahead * r_sq.rsqrt(), one);
+        // How far it is beyond the rim.
         let seen = ((cosine - r_sq.like(self.view)) * r_sq.like(1.0 / RIM)).above_zero();
-        let seen = (one - seen).positive(seen, one);
-        let w = r_sq.positive(q * q * seen, r_sq.zero());
-        let v = Vec3 { x: there[3] - here[3], y: there[4] - here[4], z: there[5] - here[5] };
-        add(sum, d, v, w, apart(r_sq, self.spacing_inverse) * seen)
+        (one - seen).positive(seen, one)
     }
 }
 
@@ -141,20 +164,18 @@ fn apart<L: Lane>(r_sq: L, spacing_inverse: f64) -> L {
     q * q * e_sq.like(spacing_inverse) / (e_sq + e_sq.like(0.01))
 }
 
+/// Adds a neighbour of weight w to the means.
 #[inline(always)]
-fn add<L: Lane>(sum: [L; 10], d: Vec3<L>, v: Vec3<L>, w: L, s: L) -> [L; 10] {
-    [
-        sum[0] + w,
-        sum[1] + d.x * w,
-        sum[2] + d.y * w,
-        sum[3] + d.z * w,
-        sum[4] + v.x * w,
-        sum[5] + v.y * w,
-        sum[6] + v.z * w,
-        sum[7] + d.x * s,
-        sum[8] + d.y * s,
-        sum[9] + d.z * s,
-    ]
+fn heed<L: Lane>(sum: [L; 10], d: Vec3<L>, v: Vec3<L>, w: L) -> [L; 10] {
+    let [total, x, y, z, vx, vy, vz, ..] = sum;
+    [total + w, x + d.x * w, y + d.y * w, z + d.z * w, vx + v.x * w, vy + v.y * w, vz + v.z * w, sum[7], sum[8], sum[9]]
+}
+
+/// Adds one that is too close.
+#[inline(always)]
+fn shun<L: Lane>(sum: [L; 10], d: Vec3<L>, s: L) -> [L; 10] {
+    let [.., x, y, z] = sum;
+    [sum[0], sum[1], sum[2], sum[3], sum[4], sum[5], sum[6], x + d.x * s, y + d.y * s, z + d.z * s]
 }
 
 /// a/sqrt(1 + |a|²/limit²): as a where it is small, never longer than the limit.                    (flocks.5)
@@ -185,13 +206,12 @@ impl Flock {
             predator_mass: Vec::new(),
             colliders,
             time: 0.0,
-            x: Vec::new(),
-            v: Vec::new(),
+            copies: Default::default(),
             hunters: Default::default(),
             numbers: Vec::new(),
             seeing: Vec::new(),
             sums: Vec::new(),
-            forces: Vec::new(),
+            urges: Vec::new(),
             chases: Vec::new(),
             weights: Weights { stiffness: 1.0, damping: 0.0, hessian: Hessian::Definite },
         };
@@ -227,8 +247,8 @@ impl Flock {
     }
 
     /// The sums over neighbours, place by place.
-    fn meet(&mut self) {
-        let (x, v) = (&self.x, &self.v);
+    fn meet(&mut self, x: &[Row], v: &[Row]) {
+        self.grid.rebuild(x);
         self.grid.sorted(|i| [x[i][0], x[i][1], x[i][2], v[i][0], v[i][1], v[i][2]], &mut self.numbers);
         let (h, mut sums) = (&self.habits, std::mem::take(&mut self.sums));
         let spacing_inverse = if h.spacing > 0.0 { 1.0 / h.spacing.min(h.radius) } else { 1.0 / h.radius };
@@ -253,11 +273,11 @@ impl Flock {
         self.sums = sums;
     }
 
-    /// The acceleration of prey number i [m/s²].
-    fn steer(&self, i: usize) -> Vector {
-        let Some(place) = self.grid.place(i) else { return Vector::default() };
+    /// The acceleration of the prey at a place [m/s²].
+    fn steer(&self, place: usize) -> Vector {
         let (h, s) = (&self.habits, self.sums[place].map(f64::from));
-        let (x, v) = (xyz64(self.x[i]), xyz64(self.v[i]));
+        let [x, y, z, vx, vy, vz] = self.numbers[place].map(f64::from);
+        let (x, v) = (Vector { x, y, z }, Vector { x: vx, y: vy, z: vz });
         let of = |k: usize| Vector { x: s[k], y: s[k + 1], z: s[k + 2] };
         let mut a = cruise(v, h.speed, h.propulsion) - of(7) * h.separation;
         if s[0] > 0.0 {
@@ -297,8 +317,8 @@ impl Flock {
         }
         let soft = h.radius * h.radius;
         let (mut total, mut mean) = (0.0, Vector::default());
-        for (_, prey) in self.x.iter().enumerate().filter(|(i, _)| self.grid.place(*i).is_some()) {
-            let d = xyz64(*prey) - x;
+        for [px, py, pz, ..] in self.numbers.iter().map(|numbers| numbers.map(f64::from)) {
+            let d = Vector { x: px, y: py, z: pz } - x;
             let near = 1.0 / (d.norm_sq() + soft);
             let w = near * near;
             (total, mean) = (total + w, mean + d * w);
@@ -352,21 +372,21 @@ impl Batch for Flock {
 
     fn begin_forces(&mut self, t: f64, x: &[Row], v: &[Row]) {
         self.time = t;
-        self.prey.gather(x, &mut self.x);
-        self.prey.gather(v, &mut self.v);
+        let mut copies = std::mem::take(&mut self.copies);
+        let [of_x, of_v] = &mut copies;
+        self.meet(self.prey.pick(x, of_x), self.prey.pick(v, of_v));
+        self.copies = copies;
         self.predators.gather(x, &mut self.hunters[0]);
         self.predators.gather(v, &mut self.hunters[1]);
-        self.grid.rebuild(&self.x);
-        self.meet();
-        let mut forces = std::mem::take(&mut self.forces);
-        forces.resize(self.prey.len(), [0.0; 4]);
-        chunks(&mut forces, |start, forces| {
-            for (k, force) in forces.iter_mut().enumerate() {
-                let a = self.steer(start + k) * f64::from(self.mass[start + k]);
-                *force = [a.x as Real, a.y as Real, a.z as Real, 0.0];
+        let mut urges = std::mem::take(&mut self.urges);
+        urges.resize(self.grid.len(), [0.0; 4]);
+        chunks(&mut urges, |start, urges| {
+            for (k, urge) in urges.iter_mut().enumerate() {
+                let a = self.steer(start + k);
+                *urge = [a.x as Real, a.y as Real, a.z as Real, 0.0];
             }
         });
-        self.forces = forces;
+        self.urges = urges;
         let chase = |k: usize| {
             let a = self.hunt(k) * f64::from(self.predator_mass[k]);
             [a.x as Real, a.y as Real, a.z as Real, 0.0]
@@ -375,7 +395,11 @@ impl Batch for Flock {
     }
 
     fn add_forces(&self, _x: &[Row], _v: &[Row], start: usize, force: &mut [Row]) {
-        self.prey.among(start, force, |i, f| *f = crate::math::add(*f, self.forces[i]));
+        self.prey.among(start, force, |i, f| {
+            if let Some(place) = self.grid.place(i) {
+                *f = crate::math::axpy(*f, self.mass[i], self.urges[place]);
+            }
+        });
         self.predators.among(start, force, |i, f| *f = crate::math::add(*f, self.chases[i]));
     }
 

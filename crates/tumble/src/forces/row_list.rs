@@ -66,6 +66,18 @@ impl Rows {
         self.0.iter().for_each(|p| out.extend_from_slice(&column[p.range.clone()]));
     }
 
+    /// The rows of a column: where they lie if they lie side by side, else copied to `out`.
+    pub fn pick<'a>(&self, column: &'a [Row], out: &'a mut Vec<Row>) -> &'a [Row] {
+        match &self.0[..] {
+            [] => &[],
+            [part] => &column[part.range.clone()],
+            _ => {
+                self.gather(column, out);
+                out
+            }
+        }
+    }
+
     /// Calls `f(number, its place in out)` for those among the rows from `start` on.
     pub fn among<T>(&self, start: usize, out: &mut [T], mut f: impl FnMut(usize, &mut T)) {
         for Part { range, first, .. } in &self.0 {

@@ -9,16 +9,25 @@
 //!
 //! Source: sorting by cell is [green2010].
 
-use crate::math::parallel::{CHUNK, chunks, fold};
+use crate::math::parallel::{CHUNK, chunks};
 use crate::math::simd::{Kernel, Level, Width, dispatch_at};
 use crate::math::{Lane, Real, Row};
 use rayon::prelude::*;
 
 /// What a point adds up over its neighbours: N numbers of each point, the first three its place, make M sums.
 pub trait Meet<const N: usize, const M: usize>: Sync {
-    /// The sums of `here`, with what `there` adds to them. It is called for all points in cells that touch, the point itself
-    /// included; beyond the reach it must add zeros.
+    /// The sums of `here`, with what `there` adds to them. It is called for many points beyond the reach, too, and for the point
+    /// itself; there it must add zeros.
     fn meet<L: Lane>(&self, here: [L; N], there: [L; N], sum: [L; M]) -> [L; M];
+    /// A shorter reach [m] below which `meet_close` adds more, to sums of its own; 0 for none.
+    fn close(&self) -> f64 {
+        0.0
+    }
+    /// The same for points closer than that.
+    #[inline(always)]
+    fn meet_close<L: Lane>(&self, _here: [L; N], _there: [L; N], sum: [L; M]) -> [L; M] {
+        sum
+    }
 }
 
 /// Points sorted by cell.
@@ -48,6 +57,9 @@ struct Tile {
     places: [u32; 2],
     cells: [u128; 2],
 }
+
+/// How many points have a cell, and the lowest and the highest number of these along each axis.
+type Bounds = (usize, [u64; 3], [u64; 3]);
 
 /// The place of a point that has none.
 const NOWHERE: u32 = u32::MAX;
@@ -96,8 +108,9 @@ impl Neighbours {
         self.sides.map(|sides| sides.map(|s| (s / width).floor().clamp(1.0, MIDDLE) as u64))
     }
 
-    /// The cell of a point; `None` if it is not finite.
-    fn cell(&self, x: &Row, counts: Option<[u64; 3]>) -> Option<u128> {
+    /// The cell of a point; `None` if it is not finite. `cells` is how many there are in a metre.
+    #[inline(always)]
+    fn cell(&self, x: &Row, cells: f64, counts: Option<[u64; 3]>) -> Option<[u64; 3]> {
         let mut cell = [0; 3];
         for a in 0..3 {
             let x = f64::from(x[a]);
@@ -109,82 +122,94 @@ impl Neighbours {
                     let turns = x / sides[a];
                     1 + (((turns - turns.floor()) * counts[a] as f64) as u64).min(counts[a] - 1)
                 }
-                // Beyond two million million cells all is one.
-                _ => (MIDDLE + (x / self.width()).floor().clamp(2.0 - MIDDLE, MIDDLE - 2.0)) as u64,
+                _ => {
+                    // Beyond two million million cells all is one. The floor by hand: `floor` is a call.
+                    let at = (x * cells).clamp(2.0 - MIDDLE, MIDDLE - 2.0);
+                    let whole = at as i64;
+                    (MIDDLE as i64 + whole - i64::from(at < whole as f64)) as u64
+                }
             };
         }
-        Some(key(cell))
+        Some(cell)
     }
 
     /// Sorts these points.
     pub fn rebuild(&mut self, x: &[Row]) {
         let counts = self.counts();
-        let mut keys = std::mem::take(&mut self.keys);
-        keys.clear();
-        keys.resize(x.len(), u128::MAX);
-        chunks(&mut keys, |start, keys| {
-            for (key, x) in keys.iter_mut().zip(&x[start..]) {
-                *key = self.cell(x, counts).unwrap_or(u128::MAX);
-            }
-        });
-        self.keys = keys;
-        self.sort();
+        let bounds = self.number(x, counts);
         self.place.clear();
         self.place.resize(x.len(), NOWHERE);
-        self.cells.clear();
+        self.order.clear();
         self.start.clear();
-        let mut last = u128::MAX;
-        for (place, i) in self.order.iter().enumerate() {
-            self.place[*i as usize] = place as u32;
-            let key = self.keys[*i as usize];
-            if key != last {
-                self.cells.push(key);
-                self.start.push(place as u32);
-                last = key;
-            }
-        }
+        self.sort(bounds);
+        self.cells.clear();
+        self.cells.extend(self.start.iter().map(|first| self.keys[self.order[*first as usize] as usize]));
         self.start.push(self.order.len() as u32);
         self.lay_tiles();
         self.find_runs(counts);
     }
 
-    /// Puts the points into the order of their cells: by counting where the cells lie close enough, else by comparing.
-    fn sort(&mut self) {
-        let keys = &self.keys;
-        let bounds = fold(keys.len(), |range| {
-            let (mut low, mut high) = ([u64::MAX; 3], [0; 3]);
-            for key in keys[range].iter().filter(|k| **k != u128::MAX) {
-                for a in 0..3 {
-                    let c = axis(*key, a as u32);
-                    (low[a], high[a]) = (low[a].min(c), high[a].max(c));
+    /// Finds the cell of each point.
+    fn number(&mut self, x: &[Row], counts: Option<[u64; 3]>) -> Bounds {
+        let cells = 1.0 / self.width();
+        let mut keys = std::mem::take(&mut self.keys);
+        keys.resize(x.len(), u128::MAX);
+        let nothing = (0, [u64::MAX; 3], [0; 3]);
+        let of_chunks: Vec<Bounds> = (keys.par_chunks_mut(CHUNK).zip(x.par_chunks(CHUNK)))
+            .map(|(keys, x)| {
+                let (mut found, mut low, mut high) = nothing;
+                for (k, x) in keys.iter_mut().zip(x) {
+                    *k = u128::MAX;
+                    if let Some(cell) = self.cell(x, cells, counts) {
+                        found += 1;
+                        for a in 0..3 {
+                            (low[a], high[a]) = (low[a].min(cell[a]), high[a].max(cell[a]));
+                        }
+                        *k = key(cell);
+                    }
                 }
-            }
-            (low, high)
-        });
-        let (mut low, mut high) = ([u64::MAX; 3], [0; 3]);
-        for (l, h) in bounds {
-            for a in 0..3 {
-                (low[a], high[a]) = (low[a].min(l[a]), high[a].max(h[a]));
-            }
-        }
-        self.order.clear();
-        if low[0] == u64::MAX {
+                (found, low, high)
+            })
+            .collect();
+        self.keys = keys;
+        of_chunks.into_iter().fold(nothing, |all, one| {
+            (all.0 + one.0, std::array::from_fn(|a| all.1[a].min(one.1[a])), std::array::from_fn(|a| all.2[a].max(one.2[a])))
+        })
+    }
+
+    /// Puts the points into the order of their cells, by counting where the cells lie close enough, else by comparing; finds the
+    /// first place of each cell.
+    fn sort(&mut self, (found, low, high): Bounds) {
+        if found == 0 {
             return;
         }
+        let keys = &self.keys;
         let bits: [u32; 3] = std::array::from_fn(|a| 64 - (high[a] - low[a]).leading_zeros());
         let total: u32 = bits.iter().sum();
         if total > 32 {
             self.order.extend((0..keys.len() as u32).filter(|i| keys[*i as usize] != u128::MAX));
             self.order.par_sort_unstable_by_key(|i| (keys[*i as usize], *i));
+            let mut last = u128::MAX;
+            for (place, i) in self.order.iter().enumerate() {
+                self.place[*i as usize] = place as u32;
+                if keys[*i as usize] != last {
+                    last = keys[*i as usize];
+                    self.start.push(place as u32);
+                }
+            }
             return;
         }
         let [from, to] = &mut self.pairs;
-        from.clear();
-        from.extend(keys.iter().enumerate().filter(|(_, k)| **k != u128::MAX).map(|(i, key)| {
-            let [x, y, z]: [u64; 3] = std::array::from_fn(|a| axis(*key, a as u32) - low[a]);
-            (((z << bits[1] | y) << bits[0]) | x) << 32 | i as u64
-        }));
-        to.clear();
+        from.resize(keys.len(), 0);
+        chunks(from, |start, from| {
+            for (k, (pair, key)) in from.iter_mut().zip(&keys[start..]).enumerate() {
+                let [x, y, z]: [u64; 3] = std::array::from_fn(|a| axis(*key, a as u32).wrapping_sub(low[a]));
+                *pair = (((z << bits[1] | y) << bits[0]) | x) << 32 | (start + k) as u64;
+            }
+        });
+        if found < keys.len() {
+            from.retain(|pair| keys[*pair as u32 as usize] != u128::MAX);
+        }
         to.resize(from.len(), 0);
         // Least significant digits first; each pass keeps the order of equals.
         const DIGIT: u32 = 11;
@@ -205,7 +230,15 @@ impl Neighbours {
             std::mem::swap(from, to);
             shift += DIGIT;
         }
-        self.order.extend(from.iter().map(|pair| *pair as u32));
+        let mut last = u64::MAX;
+        for (place, pair) in from.iter().enumerate() {
+            self.order.push(*pair as u32);
+            self.place[*pair as u32 as usize] = place as u32;
+            if pair >> 32 != last {
+                last = pair >> 32;
+                self.start.push(place as u32);
+            }
+        }
     }
 
     /// Cuts the places into tiles, none of which leaves a line of cells along x.
@@ -340,7 +373,9 @@ impl Neighbours {
     ) {
         out.resize(self.len(), [0.0; M]);
         debug_assert_eq!(numbers.len(), self.len());
-        self.by_tasks(out, |tiles, runs, out| dispatch_at(level, Sum { law, numbers, tiles, runs, out }));
+        // In a box that repeats itself the law finds the nearest images, and all are shown to it.
+        let reach = if self.sides.is_some() { f64::INFINITY } else { self.width() };
+        self.by_tasks(out, |tiles, runs, out| dispatch_at(level, Sum { law, reach, numbers, tiles, runs, out }));
     }
 
     /// `f(place, candidates, its part of out)` for every place, where the candidates are runs of places.
@@ -379,12 +414,44 @@ const LINE_BACK: u128 = (1 << BITS) + (1 << (2 * BITS));
 
 /// Sums over the neighbours of some tiles. The points of a tile lie side by side in a register, their neighbours come one by one:
 /// each sum is added up in the order of places, whatever the width of the register and whoever shares it.    (neighbours.3)
+/// Whoever no point of the tile reaches is passed over: less than half of all in the cells remain.
 struct Sum<'a, T, const N: usize, const M: usize> {
     law: &'a T,
+    reach: f64,
     numbers: &'a [[Real; N]],
     tiles: &'a [Tile],
     runs: &'a [[u32; 2]],
     out: &'a mut [[Real; M]],
+}
+
+/// Neighbours that are listed before they are met.
+const LIST: usize = 256;
+
+/// Places below `numbers.len()`.
+struct List {
+    places: [u32; LIST],
+    count: usize,
+}
+
+impl List {
+    #[inline(always)]
+    fn new() -> Self {
+        Self { places: [0; LIST], count: 0 }
+    }
+
+    /// Adds a place if it is `near`; there is room for it. Without a branch, which could not be foreseen.
+    #[inline(always)]
+    fn add(&mut self, place: u32, near: bool) {
+        self.places[self.count % LIST] = place;
+        self.count += usize::from(near);
+    }
+
+    /// Takes all.
+    #[inline(always)]
+    fn take(&mut self) -> &[u32] {
+        let count = std::mem::take(&mut self.count);
+        &self.places[..count]
+    }
 }
 
 impl<T: Meet<N, M>, const N: usize, const M: usize> Kernel for Sum<'_, T, N, M> {
@@ -393,6 +460,10 @@ impl<T: Meet<N, M>, const N: usize, const M: usize> Kernel for Sum<'_, T, N, M> 
     fn run<W: Width>(self, w: W) {
         let Some(base) = self.tiles.first().map(|t| t.places[0] as usize) else { return };
         let each = self.runs.len() / self.tiles.len();
+        // A little more, so that rounding hides no neighbour.
+        let square = |reach: f64| w.splat(((1.0 + 1e-5) * reach * reach).min(f64::from(Real::MAX)) as Real);
+        let (far, close) = (square(self.reach), square(self.law.close()));
+        let (mut near, mut nearer) = (List::new(), List::new());
         for (tile, runs) in self.tiles.iter().zip(self.runs.chunks_exact(each)) {
             let (mut first, end) = (tile.places[0] as usize, tile.places[1] as usize);
             while first < end {
@@ -409,13 +480,31 @@ impl<T: Meet<N, M>, const N: usize, const M: usize> Kernel for Sum<'_, T, N, M> 
                     here[c] = w.load(&columns[c]);
                 }
                 let mut sum = [w.splat(0.0); M];
-                for [a, b] in runs {
-                    for numbers in &self.numbers[*a as usize..*b as usize] {
-                        let mut there = [w.splat(0.0); N];
-                        for c in 0..N {
-                            there[c] = w.splat(numbers[c]);
+                for (line, [a, b]) in runs.iter().enumerate() {
+                    let (mut place, end) = (*a, *b);
+                    loop {
+                        let stop = end.min(place + (LIST - near.count) as u32);
+                        for place in place..stop {
+                            let there = &self.numbers[place as usize];
+                            let (x, y, z) = (w.splat(there[0]) - here[0], w.splat(there[1]) - here[1], w.splat(there[2]) - here[2]);
+                            let r_sq = x * x + y * y + z * z;
+                            near.add(place, (far - r_sq).any_positive());
+                            if self.law.close() > 0.0 {
+                                nearer.add(place, (close - r_sq).any_positive());
+                            }
                         }
-                        sum = self.law.meet(here, there, sum);
+                        place = stop;
+                        if near.count == LIST || (place == end && line + 1 == runs.len()) {
+                            for place in near.take() {
+                                sum = self.law.meet(here, splat(w, &self.numbers[*place as usize]), sum);
+                            }
+                            for place in nearer.take() {
+                                sum = self.law.meet_close(here, splat(w, &self.numbers[*place as usize]), sum);
+                            }
+                        }
+                        if place == end {
+                            break;
+                        }
                     }
                 }
                 let mut sums = [[0.0; TILE]; M];
@@ -431,6 +520,15 @@ impl<T: Meet<N, M>, const N: usize, const M: usize> Kernel for Sum<'_, T, N, M> 
             }
         }
     }
+}
+
+#[inline(always)]
+fn splat<W: Width, const N: usize>(w: W, numbers: &[Real; N]) -> [W::L; N] {
+    let mut all = [w.splat(0.0); N];
+    for c in 0..N {
+        all[c] = w.splat(numbers[c]);
+    }
+    all
 }
 
 #[cfg(test)]

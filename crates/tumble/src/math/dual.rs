@@ -75,6 +75,10 @@ impl<L: Lane> Lane for Dual<L> {
     fn positive(self, then: Self, other: Self) -> Self {
         Self { re: self.re.positive(then.re, other.re), slope: self.re.positive(then.slope, other.slope) }
     }
+    #[inline(always)]
+    fn any_positive(self) -> bool {
+        self.re.any_positive()
+    }
 }
 
 impl<L: Lane> Dual<L> {

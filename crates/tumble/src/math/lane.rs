@@ -11,8 +11,10 @@ pub trait Lane: Copy + Add<Output = Self> + Sub<Output = Self> + Mul<Output = Se
     /// 1/sqrt(self) for self > 0, to two units in the last place, with the same bits on every machine. In single precision
     /// it is faster than a root and a division.
     fn rsqrt(self) -> Self;
-    /// `then` where self > 0, `other` elsewhere: the only branch that a kernel may have.
+    /// `then` where self > 0, `other` elsewhere: the only branch by which results may differ.
     fn positive(self, then: Self, other: Self) -> Self;
+    /// Whether self > 0 anywhere: to leave out what would add nothing, so that the bits do not depend on the width.
+    fn any_positive(self) -> bool;
     /// Zero in the shape of `self`.
     #[inline(always)]
     fn zero(self) -> Self {
@@ -54,6 +56,10 @@ impl Lane for f32 {
     fn positive(self, then: Self, other: Self) -> Self {
         if self > 0.0 { then } else { other }
     }
+    #[inline(always)]
+    fn any_positive(self) -> bool {
+        self > 0.0
+    }
 }
 
 impl Lane for f64 {
@@ -72,6 +78,10 @@ impl Lane for f64 {
     #[inline(always)]
     fn positive(self, then: Self, other: Self) -> Self {
         if self > 0.0 { then } else { other }
+    }
+    #[inline(always)]
+    fn any_positive(self) -> bool {
+        self > 0.0
     }
 }
 

@@ -207,6 +207,17 @@ type Register<S> = <S as Simd>::f32s;
 #[cfg(feature = "double")]
 type Register<S> = <S as Simd>::f64s;
 
+#[cfg(not(feature = "double"))]
+type Mask<S> = <S as Simd>::m32s;
+#[cfg(feature = "double")]
+type Mask<S> = <S as Simd>::m64s;
+
+/// What the registers of an instruction set can do beyond pulp.
+pub trait Registers: Simd {
+    /// Whether any lane of a mask is set.
+    fn any(self, mask: Mask<Self>) -> bool;
+}
+
 /// A register with arithmetic operators.
 #[derive(Clone, Copy)]
 pub struct Pack<S: Simd> {
@@ -251,7 +262,7 @@ macro_rules! operations {
                 Self { simd: self.simd, v: self.simd.$neg(self.v) }
             }
         }
-        impl<S: Simd> Lane for Pack<S> {
+        impl<S: Registers> Lane for Pack<S> {
             #[inline(always)]
             fn like(self, c: f64) -> Self {
                 Self { simd: self.simd, v: self.simd.$splat(c as Real) }
@@ -277,6 +288,10 @@ macro_rules! operations {
             fn positive(self, then: Self, other: Self) -> Self {
                 let mask = self.simd.$greater(self.v, self.simd.$splat(0.0));
                 Self { simd: self.simd, v: self.simd.$select(mask, then.v, other.v) }
+            }
+            #[inline(always)]
+            fn any_positive(self) -> bool {
+                self.simd.any(self.simd.$greater(self.v, self.simd.$splat(0.0)))
             }
         }
     };

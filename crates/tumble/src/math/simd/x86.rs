@@ -1,6 +1,6 @@
 //! The registers of AVX2 and AVX-512.
 
-use super::{GUESS, Kernel, Pack, Real, Row, Width};
+use super::{GUESS, Kernel, Mask, Pack, Real, Registers, Row, Width};
 use pulp::x86::{V3, V4};
 use pulp::{Simd, WithSimd, cast};
 
@@ -32,6 +32,20 @@ macro_rules! entry {
 }
 entry!(InAvx2, V3);
 entry!(InAvx512, V4);
+
+impl Registers for V3 {
+    #[inline(always)]
+    fn any(self, mask: Mask<Self>) -> bool {
+        self.avx._mm256_movemask_ps(cast(mask)) != 0
+    }
+}
+
+impl Registers for V4 {
+    #[inline(always)]
+    fn any(self, mask: Mask<Self>) -> bool {
+        mask.0 != 0
+    }
+}
 
 /// Everything that does not depend on how rows are transposed.
 macro_rules! width {
