@@ -8,7 +8,7 @@ use super::level::{Grid, Pass, Product, Ring, Rows, Tile, add, dot, largest, run
 use super::multigrid;
 use super::report::{Info, Params};
 use crate::math::Real;
-use crate::math::simd::{Level as Registers, Width};
+use crate::math::simd::{Level as Registers, Width, ask};
 
 /// What stands in front of the residual.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -26,8 +26,8 @@ pub(super) fn solve<T: Weight>(solver: &mut Solver<T>, before: Before, x: &mut [
     let n = solver.fine.lattice.n;
     let registers = solver.registers;
     let [mut p, mut q] = [std::mem::take(&mut solver.p), std::mem::take(&mut solver.q)];
-    p.resize(x.len(), 0.0);
-    q.resize(x.len(), 0.0);
+    p.reserve(x.len());
+    q.reserve(x.len());
     let mut info = Info::default();
     let [start, most] = solver.norms();
     let mut old = f64::INFINITY;
@@ -62,7 +62,7 @@ pub(super) fn cycles<T: Weight>(solver: &mut Solver<T>, x: &mut [Real], params: 
     let n = solver.fine.lattice.n;
     let registers = solver.registers;
     let mut q = std::mem::take(&mut solver.q);
-    q.resize(x.len(), 0.0);
+    q.reserve(x.len());
     let mut info = Info::default();
     let [start, most] = solver.norms();
     info.begin(start, most, params.target);
@@ -93,8 +93,8 @@ pub(super) fn direct<T: Weight>(
     info.begin(start, most, params.target);
     if !info.converged {
         let mut q = std::mem::take(&mut solver.q);
-        q.clear();
-        q.extend_from_slice(&solver.fine.b);
+        q.reserve(x.len());
+        q.copy_from_slice(&solver.fine.b);
         solve(&solver.fine, &mut q, solver.registers);
         let [rr, _, _, most] = step(solver, 1.0, &q, x);
         info.add(rr, start, most, params.target);
@@ -155,7 +155,12 @@ impl<T: Weight> Pass for Direction<'_, T> {
         let mut curvature = 0.0;
         for k in tile.k[0] - 1..tile.k[1] + 1 {
             if tile.has(grid, k) {
-                for j in tile.rows(grid, 1) {
+                let rows = tile.rows(grid, 1);
+                for j in rows.clone() {
+                    let [aj, ak] = tile.ahead(grid, &rows, j, k);
+                    let ahead = grid.start(aj, ak);
+                    ask(grid.row(self.z, ahead));
+                    ask(grid.row(self.p, ahead));
                     let at = grid.start(j, k);
                     let row = ring.padded(j, k);
                     self.combine(w, at, &mut row[1..=width]);
@@ -166,7 +171,10 @@ impl<T: Weight> Pass for Direction<'_, T> {
             if k < tile.k[0] {
                 continue;
             }
-            for j in tile.rows(grid, 0) {
+            let rows = tile.rows(grid, 0);
+            for j in rows.clone() {
+                let [aj, ak] = tile.ahead(grid, &rows, j, k);
+                self.q.ask(grid.start(aj, ak), width);
                 let at = grid.start(j, k);
                 let near = ring.near(grid, j, k);
                 sweep(w, &grid.faces(at), &near, near.own(), product, Product);
@@ -217,7 +225,13 @@ impl<T: Weight> Pass for Step<'_, T> {
         let product = &mut rest[..width];
         let (mut rr, mut most) = (0.0, 0.0);
         for k in tile.k[0]..tile.k[1] {
-            for j in tile.rows(grid, 0) {
+            let rows = tile.rows(grid, 0);
+            for j in rows.clone() {
+                let [aj, ak] = tile.ahead(grid, &rows, j, k);
+                let ahead = grid.start(aj, ak);
+                ask(grid.row(self.p, grid.start(aj, ak + 1)));
+                self.x.ask(ahead, width);
+                self.r.ask(ahead, width);
                 let at = grid.start(j, k);
                 let near = grid.near(self.p, j, k, own);
                 sweep(w, &grid.faces(at), &near, near.own(), product, Product);

@@ -9,6 +9,7 @@
 //!
 //! Verified by `crates/tumble-f64/tests/pressure.rs`.
 
+mod column;
 mod cosine;
 mod faces;
 mod incomplete;
@@ -27,6 +28,7 @@ pub use report::{Excess, Fault, Info, Method, Params, Target};
 use crate::math::parallel::chunks;
 use crate::math::simd::Level as Registers;
 use crate::math::{Lattice, Real};
+use column::Column;
 use cosine::Cosine;
 use incomplete::Factors;
 use krylov::Before;
@@ -58,8 +60,8 @@ pub struct Solver<T> {
     /// Made when first asked for.
     incomplete: Option<Factors>,
     cosine: Option<Cosine>,
-    p: Vec<Real>,
-    q: Vec<Real>,
+    p: Column,
+    q: Column,
     registers: Registers,
 }
 
@@ -133,8 +135,8 @@ impl<T: Weight> Solver<T> {
             sides,
             incomplete: None,
             cosine: None,
-            p: Vec::new(),
-            q: Vec::new(),
+            p: Column::new(),
+            q: Column::new(),
             registers: Registers::Avx512,
         })
     }

@@ -10,7 +10,7 @@
 
 use super::faces::Weight;
 use super::level::{Grid, Pass, Relax, Residual, Ring, Rows, Tile, dot, run, scale, sum, sweep};
-use crate::math::simd::{Level as Registers, Width};
+use crate::math::simd::{Level as Registers, Width, ask};
 use crate::math::{Lattice, Real};
 
 /// The part of the spectrum that the smoother damps: from 2/ALPHA to 2, where the spectrum of D^-1 A ends.
@@ -117,7 +117,10 @@ impl<T: Weight> Pass for Down<'_, T> {
         let (left, sums) = rest.split_at_mut(width);
         for k in tile.k[0] - 2..tile.k[1] + 2 {
             if tile.has(grid, k) {
-                for j in tile.rows(grid, 2) {
+                let rows = tile.rows(grid, 2);
+                for j in rows.clone() {
+                    let [aj, ak] = tile.ahead(grid, &rows, j, k);
+                    ask(grid.row(&grid.b, grid.start(aj, ak)));
                     let at = grid.start(j, k);
                     let row = first.padded(j, k);
                     scale(w, &grid.faces(at), weights[0], grid.row(&grid.b, at), &mut row[1..=width]);
@@ -137,7 +140,10 @@ impl<T: Weight> Pass for Down<'_, T> {
             if k < tile.k[0] {
                 continue;
             }
-            for j in tile.rows(grid, 0) {
+            let rows = tile.rows(grid, 0);
+            for j in rows.clone() {
+                let [aj, ak] = tile.ahead(grid, &rows, j, k);
+                self.x.ask(grid.start(aj, ak), width);
                 let at = grid.start(j, k);
                 let near = second.near(grid, j, k);
                 // SAFETY: a row of this tile.
@@ -206,7 +212,12 @@ impl<T: Weight> Pass for Up<'_, T> {
         let (mut by, mut of_y, mut of_b) = (0.0, 0.0, 0.0);
         for k in tile.k[0] - 2..tile.k[1] + 2 {
             if tile.has(grid, k) {
-                for j in tile.rows(grid, 2) {
+                let rows = tile.rows(grid, 2);
+                for j in rows.clone() {
+                    let [aj, ak] = tile.ahead(grid, &rows, j, k);
+                    let ahead = grid.start(aj, ak);
+                    ask(grid.row(&grid.x, ahead));
+                    ask(grid.row(&grid.b, ahead));
                     let row = first.padded(j, k);
                     let of = |i: isize, axis: usize| {
                         let i = i.rem_euclid(n[axis] as isize) as usize;
@@ -231,7 +242,10 @@ impl<T: Weight> Pass for Up<'_, T> {
             if k < tile.k[0] {
                 continue;
             }
-            for j in tile.rows(grid, 0) {
+            let rows = tile.rows(grid, 0);
+            for j in rows.clone() {
+                let [aj, ak] = tile.ahead(grid, &rows, j, k);
+                self.y.ask(grid.start(aj, ak), width);
                 let at = grid.start(j, k);
                 let b = grid.row(&grid.b, at);
                 // SAFETY: a row of this tile.
