@@ -154,7 +154,7 @@ impl<'a> Flow<'a> {
     fn at(&self, start: Start, d: Option<&Ways>, count: usize, spots: &mut Spots, out: &mut Ways) {
         for (a, view) in &self.views {
             let Some(d) = d else {
-                read_still(view, start, count, spots, &mut out[*a]);
+                read_still(view, start, count, &mut out[*a]);
                 continue;
             };
             locate(view, start, d, count, spots);
