@@ -483,6 +483,24 @@ fn interpolation_has_its_order_from_every_place() {
 }
 
 #[test]
+fn monotone_slopes_are_at_most_three_times_the_difference() {
+    let g = Grid::new([4, 3, 1], 0.5, [0.0; 3]).unwrap().flat(2).unwrap();
+    for sign in [1.0, -1.0] {
+        let mut f = Field::new(g, Place::Cell, "").unwrap();
+        for at in f.each() {
+            let i = f.index(at);
+            f.data[i] = sign * [-10.0, 0.0, 1.0, 11.0][at[0]];
+        }
+        for t in [0.125, 0.25, 0.5, 0.625] {
+            let found = sample(&f, &[[0.5 * (1.5 + t), 0.75, 0.0]], Interpolation::MonotoneCubic).unwrap()[0];
+            // Hermite's cubic from 0 to 1 whose slopes, 5.5 without a limit, are 3 at both ends. A limit of 2 or 4 is 0.09 off.
+            let wanted = sign * t * (3.0 + t * (4.0 * t - 6.0));
+            assert!((found - wanted).abs() < 1e-15, "{t}: {found} {wanted}");
+        }
+    }
+}
+
+#[test]
 fn interpolation_is_exact_on_polynomials_and_at_points() {
     for g in grids(9) {
         let on = |a: usize| if g.flat == Some(a) { 0.0 } else { 1.0 };

@@ -204,9 +204,8 @@ impl Kernel for Locate<'_, '_> {
                     let floor = w.floor(s);
                     t = s - floor;
                     let b = floor + i;
-                    // The quotient may be off by one where it is nearly whole.
+                    // The quotient may be one too small where it is whole; b is too small for it to be one too large.
                     let b = b - w.floor(b * inverse) * period;
-                    let b = (-b).positive(b + period, b);
                     cell = (period - b).positive(b, b - period);
                 } else {
                     let (low, high, last) = (w.splat(axis.low), w.splat(axis.high), w.splat(axis.last));
