@@ -100,6 +100,8 @@ def pyamg_case(w, b, fluid):
         rows += [i, j, i, j]
         columns += [j, i, i, j]
         values += [-v, -v, v, v]
+    # One cell is held, because a preconditioner of a matrix with a constant to spare turns indefinite.
+    rows, columns, values = [*rows, [0]], [*columns, [0]], [*values, [1.0]]
     m = int(fluid.sum())
     matrix = sparse.csr_matrix((np.concatenate(values), (np.concatenate(rows), np.concatenate(columns))), (m, m))
     start = time.perf_counter()

@@ -1,5 +1,8 @@
 //! The verbs on grids: their orders, their identities, what lies beyond walls, interpolation and diffusion.
 
+mod common;
+
+use common::{noise, noisy};
 use std::f64::consts::PI;
 use tumble_f64::operators::{
     Interpolation, average, curl, diffuse, diffuse_step, diffusion_limit, directional, divergence, gradient, laplacian, sample,
@@ -212,24 +215,6 @@ fn polynomials_are_differentiated_exactly_up_to_the_walls() {
             assert!(error(part, 1, |_| exact) < 1e-13, "{c}");
         }
     }
-}
-
-/// Numbers without any pattern.
-fn noise(f: &mut Field, seed: u64) {
-    let mut s = seed.wrapping_mul(0x9e37_79b9_7f4a_7c15) | 1;
-    for at in f.each() {
-        s ^= s << 13;
-        s ^= s >> 7;
-        s ^= s << 17;
-        let i = f.index(at);
-        f.data[i] = (s >> 11) as f64 / (1_u64 << 53) as f64 - 0.5;
-    }
-}
-
-fn noisy(grid: Grid, place: Place, seed: u64) -> Field {
-    let mut f = Field::new(grid, place, "").unwrap();
-    noise(&mut f, seed);
-    f
 }
 
 fn noisy_faces(grid: Grid, seed: u64) -> Vectors {

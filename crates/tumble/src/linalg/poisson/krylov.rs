@@ -4,7 +4,7 @@
 
 use super::Solver;
 use super::faces::Weight;
-use super::level::{Grid, Pass, Product, Ring, Rows, Tile, add, dot, largest, run, sweep};
+use super::level::{Grid, Norm, Pass, Product, Ring, Rows, Tile, add, dot, run, sweep};
 use super::multigrid;
 use super::report::{Info, Params};
 use crate::math::Real;
@@ -155,10 +155,7 @@ impl<T: Weight> Pass for Direction<'_, T> {
         let mut curvature = 0.0;
         for k in tile.k[0] - 1..tile.k[1] + 1 {
             if tile.has(grid, k) {
-                let rows = tile.rows(grid, 1);
-                for j in rows.clone() {
-                    let [aj, ak] = tile.ahead(grid, &rows, j, k);
-                    let ahead = grid.start(aj, ak);
+                for (j, ahead) in tile.rows_ahead(grid, 1, k) {
                     ask(grid.row(self.z, ahead));
                     ask(grid.row(self.p, ahead));
                     let at = grid.start(j, k);
@@ -171,10 +168,8 @@ impl<T: Weight> Pass for Direction<'_, T> {
             if k < tile.k[0] {
                 continue;
             }
-            let rows = tile.rows(grid, 0);
-            for j in rows.clone() {
-                let [aj, ak] = tile.ahead(grid, &rows, j, k);
-                self.q.ask(grid.start(aj, ak), width);
+            for (j, ahead) in tile.rows_ahead(grid, 0, k) {
+                self.q.ask(ahead, width);
                 let at = grid.start(j, k);
                 let near = ring.near(grid, j, k);
                 sweep(w, &grid.faces(at), &near, near.own(), product, Product);
@@ -223,13 +218,10 @@ impl<T: Weight> Pass for Step<'_, T> {
         let (grid, width) = (self.grid, self.grid.width);
         let (own, rest) = scratch.split_at_mut(width + 2);
         let product = &mut rest[..width];
-        let (mut rr, mut most) = (0.0, 0.0);
+        let mut norm = Norm::default();
         for k in tile.k[0]..tile.k[1] {
-            let rows = tile.rows(grid, 0);
-            for j in rows.clone() {
-                let [aj, ak] = tile.ahead(grid, &rows, j, k);
-                let ahead = grid.start(aj, ak);
-                ask(grid.row(self.p, grid.start(aj, ak + 1)));
+            for (j, ahead) in tile.rows_ahead(grid, 0, k) {
+                ask(grid.row(self.p, ahead + grid.lattice.stride[2]));
                 self.x.ask(ahead, width);
                 self.r.ask(ahead, width);
                 let at = grid.start(j, k);
@@ -240,12 +232,10 @@ impl<T: Weight> Pass for Step<'_, T> {
                 let (x, r) = unsafe { (self.x.take(at, width), self.r.take(at, width)) };
                 add(w, x, self.a, near.own());
                 add(w, r, -self.a, product);
-                rr += dot(w, r, r);
-                let here = largest(w, r);
-                most = if here > most { here } else { most };
+                norm.add(w, r);
             }
         }
-        [rr, 0.0, 0.0, most]
+        norm.sums()
     }
 }
 
@@ -262,15 +252,12 @@ impl<T: Weight> Pass for Norms<'_, T> {
     #[inline(always)]
     fn tile<W: Width>(&self, w: W, tile: Tile, _scratch: &mut [Real]) -> [f64; 4] {
         let grid = self.grid;
-        let (mut bb, mut most) = (0.0, 0.0);
+        let mut norm = Norm::default();
         for k in tile.k[0]..tile.k[1] {
             for j in tile.rows(grid, 0) {
-                let b = grid.row(&grid.b, grid.start(j, k));
-                bb += dot(w, b, b);
-                let here = largest(w, b);
-                most = if here > most { here } else { most };
+                norm.add(w, grid.row(&grid.b, grid.start(j, k)));
             }
         }
-        [bb, 0.0, 0.0, most]
+        norm.sums()
     }
 }

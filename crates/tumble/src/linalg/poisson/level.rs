@@ -401,7 +401,7 @@ pub(super) fn sum<W: Width>(w: W, a: &[Real]) -> f64 {
 
 /// The largest magnitude of a row; a NaN stays one in the sums of squares.
 #[inline(always)]
-pub(super) fn largest<W: Width>(w: W, a: &[Real]) -> f64 {
+fn largest<W: Width>(w: W, a: &[Real]) -> f64 {
     let a = blocks(a);
     let mut most = [w.splat(0.0); LANES];
     for e in 0..a.len() {
@@ -420,6 +420,29 @@ pub(super) fn largest<W: Width>(w: W, a: &[Real]) -> f64 {
         of_all = if lane > of_all { lane } else { of_all };
     }
     f64::from(of_all)
+}
+
+/// The squared norm of rows and their largest magnitude.
+#[derive(Default)]
+pub(super) struct Norm {
+    squares: f64,
+    most: f64,
+}
+
+impl Norm {
+    /// Adds a row.
+    #[inline(always)]
+    pub fn add<W: Width>(&mut self, w: W, row: &[Real]) {
+        self.squares += dot(w, row, row);
+        let here = largest(w, row);
+        self.most = if here > self.most { here } else { self.most };
+    }
+
+    /// What a pass returns.
+    #[inline(always)]
+    pub fn sums(&self) -> [f64; 4] {
+        [self.squares, 0.0, 0.0, self.most]
+    }
 }
 
 #[inline(always)]
@@ -486,17 +509,20 @@ impl Tile {
         }
     }
 
-    /// The row that is worked on some rows after row j of plane k.
+    /// Its rows in plane k and `more` around them, each with the start of the one that is worked on some rows later.
     #[inline(always)]
-    pub fn ahead<T>(&self, grid: &Grid<T>, rows: &std::ops::Range<isize>, j: isize, k: isize) -> [isize; 2] {
-        let later = j + AHEAD;
-        if later < rows.end {
-            [later, k]
-        } else if self.has(grid, k + 1) {
-            [(later - (rows.end - rows.start)).max(rows.start), k + 1]
-        } else {
-            [j, k]
-        }
+    pub fn rows_ahead<T: Weight>(&self, grid: &Grid<T>, more: isize, k: isize) -> impl Iterator<Item = (isize, usize)> {
+        let rows = self.rows(grid, more);
+        let (first, count, next) = (rows.start, rows.end - rows.start, self.has(grid, k + 1));
+        rows.map(move |j| {
+            let later = j + AHEAD;
+            let (aj, ak) = match later < first + count {
+                true => (later, k),
+                false if next => ((later - count).max(first), k + 1),
+                false => (j, k),
+            };
+            (j, grid.start(aj, ak))
+        })
     }
 
     /// Whether the grid has a plane k.
