@@ -27,7 +27,9 @@ TARGETS = {
     ("flock", "numba"): (4.0, "at least"),
     ("flock", "taichi"): (4.0, "at least"),
     **{(f"pressure {n}, {kind}", "pyamg"): (40.0, "at least") for n in (128, 256) for kind in ("random", "plume")},
-    **{(f"pressure {n}, {kind}", "10 iterations"): (1.0, "at most") for n in (128, 256) for kind in ("random", "plume")},
+    **{
+        (f"pressure {n}, {kind}", "10 iterations"): (1.0, "at most") for n in (128, 256) for kind in ("random", "plume")
+    },
     **{(f"box {n}", "scipy.fft"): (1.0, "at least") for n in (128, 256)},
     ("direct sum, single, portable", "numba"): (0.6, "at least"),
     ("direct sum, single, native", "numba"): (1.3, "at least"),

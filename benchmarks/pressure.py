@@ -1,9 +1,9 @@
-"""The pressure equation to a relative residual of 1e-5: around a solid sphere with cut cells against pyamg with conjugate gradients,
-and in a plain box against scipy's cosine transform.
+"""The pressure equation to a relative residual of 1e-5: around a solid sphere with cut cells against pyamg with conjugate
+gradients, and in a plain box against scipy's cosine transform.
 
-Every residual is evaluated here, in double precision, with the weights that the engine uses. Ours include the pass of refinement
-in double precision that smooth right-hand sides need. With TUMBLE_BENCH_LARGE=1, pyamg solves 256³ cells, too, which takes minutes
-and 10 GiB; else its time at 256³ is the one that was measured once, on another machine of two cores.
+Every residual is evaluated here, in double precision, with the weights that the engine uses. Ours include the refinement in
+double precision that smooth right-hand sides need. With TUMBLE_BENCH_LARGE=1, pyamg solves 256³ cells, too, which takes
+minutes and 10 GiB; else its time at 256³ is the one that was measured once, on another machine of two cores.
 """
 
 import json
@@ -18,7 +18,7 @@ from common import THREADS, median, show
 
 ROOT = Path(__file__).parent.parent
 TOLERANCE = 1e-5
-# Bytes that a cell moves in an iteration: four passes over three columns or so, weights of cut cells and coarser grids not counted.
+# Bytes that a cell moves in an iteration, in four passes over memory.
 BYTES = 69
 QUOTED = 52.0
 
@@ -29,7 +29,11 @@ def weights(n, sphere):
     for axis in range(3):
         z, y, x = np.meshgrid(*[np.arange(n) + (0.0 if a == axis else 0.5) for a in (2, 1, 0)], indexing="ij")
         far = np.sqrt((x - 0.45 * n) ** 2 + (y - 0.5 * n) ** 2 + (z - 0.55 * n) ** 2) - 0.2 * n
-        w = np.floor(np.clip(0.5 + far, 0, 1) * 127 + 0.5).astype(np.uint8) if sphere else np.full((n, n, n), 127, np.uint8)
+        w = (
+            np.floor(np.clip(0.5 + far, 0, 1) * 127 + 0.5).astype(np.uint8)
+            if sphere
+            else np.full((n, n, n), 127, np.uint8)
+        )
         w[tuple(0 if a == axis else slice(None) for a in (2, 1, 0))] = 0
         found.append(w)
     return found
@@ -41,7 +45,9 @@ def product(w, q):
     for axis, lower in enumerate(w):
         of = 2 - axis
         flow = np.diff(q, axis=of) * (np.delete(lower, 0, of) / 127.0)
-        first, last = [tuple(s if a == of else slice(None) for a in range(3)) for s in (slice(None, -1), slice(1, None))]
+        first, last = [
+            tuple(s if a == of else slice(None) for a in range(3)) for s in (slice(None, -1), slice(1, None))
+        ]
         out[first] -= flow
         out[last] += flow
     return out
@@ -160,8 +166,11 @@ def main():
             b, fluid = right(w, kind)
             info, q = ours(w, b, "CG with multigrid", "refined")
             part = BYTES * n**3 * info["iterations"] / info["seconds"] / bandwidth
-            check = f"{info['iterations']} iterations, {info['refinements']} refinements, residual {residual(w, q, b, fluid):.1e}, "
-            show(case, "tumble", info["seconds"], "s", check + f"set-up {info['set_up']:.3f} s, {part:.2f} of the triad")
+            check = f"{info['iterations']} iterations, {info['refinements']} refinements, "
+            check += f"residual {residual(w, q, b, fluid):.1e}, "
+            show(
+                case, "tumble", info["seconds"], "s", check + f"set-up {info['set_up']:.3f} s, {part:.2f} of the triad"
+            )
             show(case, "10 iterations", 10.0 * info["seconds"] / info["iterations"], "s", "what ten of them would take")
             if n == 128 or os.environ.get("TUMBLE_BENCH_LARGE"):
                 set_up, seconds, steps, q = pyamg_case(w, b, fluid)
@@ -174,7 +183,9 @@ def main():
         info, q = ours(w, b, "cosine transform", "once")
         show(f"box {n}", "tumble", info["seconds"], "s", f"residual {residual(w, q, b, fluid):.1e}")
         solve = cosine_case(b)
-        show(f"box {n}", "scipy.fft", median(solve), "s", f"residual {residual(w, solve().astype(float), b, fluid):.1e}")
+        show(
+            f"box {n}", "scipy.fft", median(solve), "s", f"residual {residual(w, solve().astype(float), b, fluid):.1e}"
+        )
 
 
 main()

@@ -518,7 +518,7 @@ impl Tile {
             let later = j + AHEAD;
             let (aj, ak) = match later < first + count {
                 true => (later, k),
-                false if next => ((later - count).max(first), k + 1),
+                false if next => ((later - count).clamp(first, first + count - 1), k + 1),
                 false => (j, k),
             };
             (j, grid.start(aj, ak))
