@@ -11,9 +11,9 @@ from pathlib import Path
 HERE = Path(__file__).parent
 ROOT = HERE.parent
 VENV = ROOT / ".venv-bench"
-PEERS = ["numba", "scipy", "taichi"]
+PEERS = ["numba", "pyamg", "scipy", "taichi"]
 OURS = ["numpy", "typer", "rich"]
-CASES = ["start", "springs", "implicit", "particles", "emission", "gravitation", "flock"]
+CASES = ["start", "springs", "implicit", "particles", "emission", "gravitation", "flock", "pressure"]
 # What is aimed at: (case, ours, theirs, at least this ratio), or at most for costs.
 TARGETS = {
     ("springs", "taichi"): (5.0, "at least"),
@@ -26,6 +26,11 @@ TARGETS = {
     ("fountain, memory", "80 bytes"): (1.0, "at most"),
     ("flock", "numba"): (4.0, "at least"),
     ("flock", "taichi"): (4.0, "at least"),
+    **{(f"pressure {n}, {kind}", "pyamg"): (40.0, "at least") for n in (128, 256) for kind in ("random", "plume")},
+    **{
+        (f"pressure {n}, {kind}", "10 iterations"): (1.0, "at most") for n in (128, 256) for kind in ("random", "plume")
+    },
+    **{(f"box {n}", "scipy.fft"): (1.0, "at least") for n in (128, 256)},
     ("direct sum, single, portable", "numba"): (0.6, "at least"),
     ("direct sum, single, native", "numba"): (1.3, "at least"),
     ("direct sum, double, portable", "numba"): (1.0, "at least"),

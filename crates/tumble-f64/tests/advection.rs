@@ -1,24 +1,14 @@
 //! Advection: exact shifts, orders of paths, damping against its closed form, Zalesak's disk, limits, bits.
 
+mod common;
+
+use common::noisy;
 use std::f64::consts::PI;
 use tumble_f64::operators::{Advection, Interpolation, Scratch, Trace, advect, advect_vectors, sample};
 use tumble_f64::state::{Field, Grid, GridError, Place, Vectors};
 
 const TRACES: [Trace; 3] = [Trace::Euler, Trace::Rk2, Trace::Rk3];
 const KINDS: [Interpolation; 3] = [Interpolation::Linear, Interpolation::Cubic, Interpolation::MonotoneCubic];
-
-fn noisy(grid: Grid, place: Place, seed: u64) -> Field {
-    let mut f = Field::new(grid, place, "").unwrap();
-    let mut s = seed.wrapping_mul(0x9e37_79b9_7f4a_7c15) | 1;
-    for at in f.each() {
-        s ^= s << 13;
-        s ^= s >> 7;
-        s ^= s << 17;
-        let i = f.index(at);
-        f.data[i] = (s >> 11) as f64 / (1_u64 << 53) as f64 - 0.5;
-    }
-    f
-}
 
 fn carried(f: &Field, u: &Vectors, h: f64, how: &Advection) -> Field {
     let mut out = Field { sides: f.sides, ..Field::new(f.grid, f.place, f.unit.clone()).unwrap() };

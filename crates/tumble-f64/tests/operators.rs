@@ -1,5 +1,8 @@
 //! The verbs on grids: their orders, their identities, what lies beyond walls, interpolation and diffusion.
 
+mod common;
+
+use common::{noise, noisy};
 use std::f64::consts::PI;
 use tumble_f64::operators::{
     Interpolation, average, curl, diffuse, diffuse_step, diffusion_limit, directional, divergence, gradient, laplacian, sample,
@@ -212,24 +215,6 @@ fn polynomials_are_differentiated_exactly_up_to_the_walls() {
             assert!(error(part, 1, |_| exact) < 1e-13, "{c}");
         }
     }
-}
-
-/// Numbers without any pattern.
-fn noise(f: &mut Field, seed: u64) {
-    let mut s = seed.wrapping_mul(0x9e37_79b9_7f4a_7c15) | 1;
-    for at in f.each() {
-        s ^= s << 13;
-        s ^= s >> 7;
-        s ^= s << 17;
-        let i = f.index(at);
-        f.data[i] = (s >> 11) as f64 / (1_u64 << 53) as f64 - 0.5;
-    }
-}
-
-fn noisy(grid: Grid, place: Place, seed: u64) -> Field {
-    let mut f = Field::new(grid, place, "").unwrap();
-    noise(&mut f, seed);
-    f
 }
 
 fn noisy_faces(grid: Grid, seed: u64) -> Vectors {
@@ -479,6 +464,24 @@ fn interpolation_has_its_order_from_every_place() {
         let f = Field::of(g, Place::Cell, "", |x| (2.0 * PI * x[0]).cos()).unwrap();
         let top = sample(&f, &[[0.0; 3]], Interpolation::MonotoneCubic).unwrap()[0];
         assert!((top - (PI / n as f64).cos()).abs() < 1e-14, "{top}");
+    }
+}
+
+#[test]
+fn monotone_slopes_are_at_most_three_times_the_difference() {
+    let g = Grid::new([4, 3, 1], 0.5, [0.0; 3]).unwrap().flat(2).unwrap();
+    for sign in [1.0, -1.0] {
+        let mut f = Field::new(g, Place::Cell, "").unwrap();
+        for at in f.each() {
+            let i = f.index(at);
+            f.data[i] = sign * [-10.0, 0.0, 1.0, 11.0][at[0]];
+        }
+        for t in [0.125, 0.25, 0.5, 0.625] {
+            let found = sample(&f, &[[0.5 * (1.5 + t), 0.75, 0.0]], Interpolation::MonotoneCubic).unwrap()[0];
+            // Hermite's cubic from 0 to 1 whose slopes, 5.5 without a limit, are 3 at both ends. A limit of 2 or 4 is 0.09 off.
+            let wanted = sign * t * (3.0 + t * (4.0 * t - 6.0));
+            assert!((found - wanted).abs() < 1e-15, "{t}: {found} {wanted}");
+        }
     }
 }
 

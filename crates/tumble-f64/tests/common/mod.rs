@@ -3,6 +3,7 @@
 #![allow(dead_code)] // every test is a crate of its own and uses a part of this
 
 use tumble_f64::scene::Simulation;
+use tumble_f64::state::{Field, Grid, Place};
 use tumble_interface::engine::StepReport;
 use tumble_interface::scene::Integrator;
 use tumble_interface::{Data, Engine, Scene};
@@ -121,4 +122,23 @@ impl Numbers {
     pub fn vector(&mut self) -> Vector {
         [self.next(), self.next(), self.next()].into()
     }
+}
+
+/// Numbers without any pattern, from -0.5 to 0.5.
+pub fn noise(f: &mut Field, seed: u64) {
+    let mut s = seed.wrapping_mul(0x9e37_79b9_7f4a_7c15) | 1;
+    for at in f.each() {
+        s ^= s << 13;
+        s ^= s >> 7;
+        s ^= s << 17;
+        let i = f.index(at);
+        f.data[i] = (s >> 11) as f64 / (1_u64 << 53) as f64 - 0.5;
+    }
+}
+
+/// A field of them.
+pub fn noisy(grid: Grid, place: Place, seed: u64) -> Field {
+    let mut f = Field::new(grid, place, "").unwrap();
+    noise(&mut f, seed);
+    f
 }

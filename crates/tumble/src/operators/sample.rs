@@ -5,7 +5,7 @@
 //! box are moved to its wall, or wrapped; what is not a number goes to the lower wall. Tests: crates/tumble-f64/tests/operators.rs.
 
 use super::stencil::{ghosted, reach};
-use crate::math::simd::{Kernel, Width, dispatch};
+use crate::math::simd::{Kernel, Scalar, Width, ask, dispatch};
 use crate::math::{Lane, Real};
 use crate::state::{Field, Grid, GridError, Side};
 use rayon::prelude::*;
@@ -181,20 +181,16 @@ impl Kernel for Locate<'_, '_> {
     #[inline(always)]
     fn run<W: Width>(self, w: W) {
         let Self { view, start, d, count, spots } = self;
-        let mut whole = [0_i32; SEGMENT];
-        spots.index[..count.next_multiple_of(16)].fill(view.first);
-        for a in 0..3 {
-            if !view.there[a] {
-                continue;
-            }
-            let axis = view.axes[a];
-            let (low, high, last) = (w.splat(axis.low), w.splat(axis.high), w.splat(axis.last));
-            let shift = w.splat((start.offset[a] - axis.offset) as Real);
-            let period = w.splat(axis.period);
-            let inverse = w.splat(if axis.period > 0.0 { 1.0 / axis.period } else { 0.0 });
-            let far = w.splat(FAR as Real);
-            let mut e = 0;
-            while e < count {
+        let far = w.splat(FAR as Real);
+        let mut e = 0;
+        while e < count {
+            let mut index = [view.first; 16];
+            for a in 0..3 {
+                if !view.there[a] {
+                    continue;
+                }
+                let axis = &view.axes[a];
+                let shift = w.splat((start.offset[a] - axis.offset) as Real);
                 let i = if a == 0 {
                     w.load(&COUNT[e % 16..]) + w.splat((start.at[0] + e / 16 * 16) as Real)
                 } else {
@@ -203,27 +199,30 @@ impl Kernel for Locate<'_, '_> {
                 let s = w.load(&d[a][e..]) + shift;
                 let (t, cell);
                 if axis.period > 0.0 {
+                    let (period, inverse) = (w.splat(axis.period), w.splat(1.0 / axis.period));
                     let s = between(s, -far, far);
                     let floor = w.floor(s);
                     t = s - floor;
                     let b = floor + i;
-                    // The quotient may be off by one where it is nearly whole.
+                    // The quotient may be one too small where it is whole; b is too small for it to be one too large.
                     let b = b - w.floor(b * inverse) * period;
-                    let b = (-b).positive(b + period, b);
                     cell = (period - b).positive(b, b - period);
                 } else {
+                    let (low, high, last) = (w.splat(axis.low), w.splat(axis.high), w.splat(axis.last));
                     let s = between(s, low - i, high - i);
                     let floor = least(w.floor(s), last - i);
                     t = s - floor;
                     cell = most(floor + i, low - w.splat(0.5));
                 }
                 w.store(t, &mut spots.t[a][e..]);
-                w.whole(cell, &mut whole[e..]);
-                e += W::N;
+                let mut whole = [0; 16];
+                w.whole(cell, &mut whole);
+                for l in 0..W::N {
+                    index[l] += whole[l] * axis.stride;
+                }
             }
-            for e in 0..count.next_multiple_of(16) {
-                spots.index[e] += whole[e] * axis.stride;
-            }
+            spots.index[e..e + W::N].copy_from_slice(&index[..W::N]);
+            e += W::N;
         }
     }
 }
@@ -254,23 +253,26 @@ struct Still<'a, 'b> {
 }
 
 impl Still<'_, '_> {
-    /// Whole packs, then numbers one by one.
+    /// Whole packs; the last one may take numbers of the one before it once more. Fewer numbers than a pack one by one.
     #[inline(always)]
     fn packs<const X: bool, const Y: bool, const Z: bool, W: Width>(self, w: W) {
         let Self { view, index, t, out } = self;
         let (sy, sz) = (view.axes[1].stride as usize, view.axes[2].stride as usize);
         let (ny, nz) = (1 + usize::from(Y), 1 + usize::from(Z));
         let [tx, ty, tz] = [w.splat(t[0]), w.splat(t[1]), w.splat(t[2])];
+        let ahead = AHEAD as usize * sy;
         let n = out.len();
         let last = (ny - 1) * sy + (nz - 1) * sz + usize::from(X);
         let data = &view.data[index..index + n + last];
         let mut e = 0;
-        while e + W::N <= n {
+        while e < n {
+            e = e.min(n - W::N);
             let mut planes = [w.splat(0.0); 2];
             for z in 0..nz {
                 let mut rows = [w.splat(0.0); 2];
                 for y in 0..ny {
                     let at = e + y * sy + z * sz;
+                    ask(view.data.get(index + at + ahead..index + at + ahead + 1).unwrap_or(&[]));
                     let a = w.load(&data[at..]);
                     rows[y] = if X { line(a, w.load(&data[at + 1..]), tx) } else { a };
                 }
@@ -302,7 +304,7 @@ impl Kernel for Still<'_, '_> {
 }
 
 /// The values, linear, at consecutive points themselves: all weights are 0 or a half, and rows are read as they lie.
-pub(super) fn read_still(view: &View, start: Start, count: usize, spots: &mut Spots, out: &mut Lot<Real>) {
+pub(super) fn read_still(view: &View, start: Start, count: usize, out: &mut Lot<Real>) {
     let shift: [Real; 3] = std::array::from_fn(|a| (start.offset[a] - view.axes[a].offset) as Real);
     let x = view.axes[0];
     let (mut index, mut t) = (view.first as isize, [0.0; 3]);
@@ -311,6 +313,7 @@ pub(super) fn read_still(view: &View, start: Start, count: usize, spots: &mut Sp
         index += cell as isize * view.axes[a].stride as isize;
         t[a] = weight;
     }
+    let rows = index;
     // The points whose weight along x is the same: not those that a wall moves.
     let (mut from, mut to) = (0, count);
     if view.there[0] {
@@ -320,30 +323,25 @@ pub(super) fn read_still(view: &View, start: Start, count: usize, spots: &mut Sp
         index += i as isize + below as isize;
         if x.period == 0.0 {
             while from < to && i + from as Real + shift[0] < x.low {
-                from += 16;
+                from += 1;
             }
             while to > from && (i + (to - 1) as Real + shift[0] > x.high || i + (to - 1) as Real + below > x.last) {
                 to -= 1;
             }
         }
     }
-    to = from + to.saturating_sub(from) / 16 * 16;
-    let mut rest = |from: usize, to: usize, out: &mut Lot<Real>| {
-        let (still, mut lot) = ([[0.0; SEGMENT]; 3], [0.0; SEGMENT]);
-        let start = Start { at: [start.at[0] + from, start.at[1], start.at[2]], ..start };
-        locate(view, start, &still, to - from, spots);
-        read(view, spots, to - from, &mut lot, None);
-        out[from..to].copy_from_slice(&lot[..to - from]);
-    };
-    if from > 0 {
-        rest(0, from.min(count), out);
+    for e in (0..from).chain(to..count) {
+        let (cell, weight) = spot(&x, (start.at[0] + e) as Real, shift[0]);
+        let (index, t) = ((rows + cell as isize) as usize, [weight, t[1], t[2]]);
+        Still { view, index, t, out: &mut out[e..=e] }.run(Scalar);
     }
     if to > from {
-        let index = (index + from as isize) as usize;
-        dispatch(Still { view, index, t, out: &mut out[from..to] });
-    }
-    if to.max(from) < count {
-        rest(to.max(from), count, out);
+        let (index, out) = ((index + from as isize) as usize, &mut out[from..to]);
+        if out.len() < 16 {
+            Still { view, index, t, out }.run(Scalar);
+        } else {
+            dispatch(Still { view, index, t, out });
+        }
     }
 }
 
@@ -375,6 +373,9 @@ fn curve<L: Lane>(p: [L; 4], t: L, monotone: L) -> L {
     monotone.positive(between(value, least(p[1], p[2]), most(p[1], p[2])), value)
 }
 
+/// How many rows earlier memory is asked for a row.
+const AHEAD: i32 = 3;
+
 impl Read<'_, '_> {
     #[inline(always)]
     fn linear<const X: bool, const Y: bool, const Z: bool, W: Width>(self, w: W) {
@@ -385,6 +386,16 @@ impl Read<'_, '_> {
         while e < count {
             let mut index = [0_i32; 16];
             index[..W::N].copy_from_slice(&spots.index[e..e + W::N]);
+            let first = index[0];
+            let mut off = 0;
+            for l in 0..W::N {
+                off |= (index[l] - l as i32) ^ first;
+            }
+            // What the next rows need, if their paths are like these.
+            for z in 0..nz as i32 {
+                let next = first + AHEAD * view.axes[1].stride + z * view.axes[2].stride;
+                ask(view.data.get(next as usize..next as usize + 1).unwrap_or(&[]));
+            }
             let (tx, ty, tz) = (w.load(&spots.t[0][e..]), w.load(&spots.t[1][e..]), w.load(&spots.t[2][e..]));
             let mut planes = [zero; 2];
             let (mut low, mut high) = (zero, zero);
@@ -392,12 +403,18 @@ impl Read<'_, '_> {
                 let mut rows = [zero; 2];
                 for y in 0..ny {
                     let step = y as i32 * view.axes[1].stride + z as i32 * view.axes[2].stride;
-                    let mut at = [0_i32; 16];
-                    for l in 0..W::N {
-                        at[l] = index[l] + step;
-                    }
-                    // SAFETY: `locate` found a cell whose corners are all inside.
-                    let [a, b] = unsafe { w.pairs(&view.data, &at) };
+                    // Paths that are alike lead to numbers that lie side by side.
+                    let [a, b] = if off == 0 {
+                        let numbers = &view.data[(first + step) as usize..];
+                        [w.load(numbers), w.load(&numbers[1..])]
+                    } else {
+                        let mut at = [0_i32; 16];
+                        for l in 0..W::N {
+                            at[l] = index[l] + step;
+                        }
+                        // SAFETY: `locate` found a cell whose corners are all inside.
+                        unsafe { w.pairs(&view.data, &at) }
+                    };
                     rows[y] = if X { line(a, b, tx) } else { a };
                     if bounds.is_some() {
                         let (l, h) = if X { (least(a, b), most(a, b)) } else { (a, a) };
@@ -578,7 +595,7 @@ mod tests {
                 for (j, k) in (0..points[1]).flat_map(|j| (0..points[2]).map(move |k| (j, k))) {
                     let start = Start { at: [0, j, k], offset: grid.offset(to) };
                     let (mut spots, mut still, mut all) = (Spots::new(), [0.0; SEGMENT], [0.0; SEGMENT]);
-                    read_still(&view, start, points[0], &mut spots, &mut still);
+                    read_still(&view, start, points[0], &mut still);
                     locate(&view, start, &[[0.0; SEGMENT]; 3], points[0], &mut spots);
                     read(&view, &spots, points[0], &mut all, None);
                     assert_eq!(still[..points[0]], all[..points[0]], "{from} {to} {j} {k}");

@@ -4,6 +4,7 @@
 //! two real lines make one complex line. Sixteen such pairs stand side by side in registers, so that the transform is written as for
 //! one, and every width has the same bits. The Fourier transform sorts itself (Stockham), with radices 4, 2, 3, 5.
 
+use super::column::Column;
 use super::faces::Weight;
 use super::level::{Block, Grid, LANES, Rows};
 use crate::math::functions::{cos, sin};
@@ -68,7 +69,7 @@ pub(super) struct Cosine {
 }
 
 thread_local! {
-    static LINES: RefCell<Vec<Block>> = const { RefCell::new(Vec::new()) };
+    static LINES: RefCell<Column> = const { RefCell::new(Column::new()) };
 }
 
 /// Lines of a task: sixteen in the real part, sixteen in the imaginary one.
@@ -110,9 +111,8 @@ impl Cosine {
         let group = |axis: usize, first: usize, other: usize, kind: Kind| {
             let longest = n.iter().max().copied().unwrap_or(1);
             LINES.with_borrow_mut(|scratch| {
-                if scratch.len() < 4 * longest {
-                    scratch.resize(4 * longest, [0.0; LANES]);
-                }
+                scratch.reserve(4 * longest * LANES);
+                let scratch = scratch.as_chunks_mut().0;
                 dispatch_at(
                     registers,
                     Lines { cosine: self, lattice: grid.lattice, width: grid.width, rows: &rows, axis, first, other, kind, scratch },

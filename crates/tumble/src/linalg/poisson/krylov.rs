@@ -4,11 +4,11 @@
 
 use super::Solver;
 use super::faces::Weight;
-use super::level::{Grid, Pass, Product, Ring, Rows, Tile, add, dot, largest, run, sweep};
+use super::level::{Grid, Norm, Pass, Product, Ring, Rows, Tile, add, dot, run, sweep};
 use super::multigrid;
 use super::report::{Info, Params};
 use crate::math::Real;
-use crate::math::simd::{Level as Registers, Width};
+use crate::math::simd::{Level as Registers, Width, ask};
 
 /// What stands in front of the residual.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -26,8 +26,8 @@ pub(super) fn solve<T: Weight>(solver: &mut Solver<T>, before: Before, x: &mut [
     let n = solver.fine.lattice.n;
     let registers = solver.registers;
     let [mut p, mut q] = [std::mem::take(&mut solver.p), std::mem::take(&mut solver.q)];
-    p.resize(x.len(), 0.0);
-    q.resize(x.len(), 0.0);
+    p.reserve(x.len());
+    q.reserve(x.len());
     let mut info = Info::default();
     let [start, most] = solver.norms();
     let mut old = f64::INFINITY;
@@ -62,7 +62,7 @@ pub(super) fn cycles<T: Weight>(solver: &mut Solver<T>, x: &mut [Real], params: 
     let n = solver.fine.lattice.n;
     let registers = solver.registers;
     let mut q = std::mem::take(&mut solver.q);
-    q.resize(x.len(), 0.0);
+    q.reserve(x.len());
     let mut info = Info::default();
     let [start, most] = solver.norms();
     info.begin(start, most, params.target);
@@ -93,8 +93,8 @@ pub(super) fn direct<T: Weight>(
     info.begin(start, most, params.target);
     if !info.converged {
         let mut q = std::mem::take(&mut solver.q);
-        q.clear();
-        q.extend_from_slice(&solver.fine.b);
+        q.reserve(x.len());
+        q.copy_from_slice(&solver.fine.b);
         solve(&solver.fine, &mut q, solver.registers);
         let [rr, _, _, most] = step(solver, 1.0, &q, x);
         info.add(rr, start, most, params.target);
@@ -155,7 +155,9 @@ impl<T: Weight> Pass for Direction<'_, T> {
         let mut curvature = 0.0;
         for k in tile.k[0] - 1..tile.k[1] + 1 {
             if tile.has(grid, k) {
-                for j in tile.rows(grid, 1) {
+                for (j, ahead) in tile.rows_ahead(grid, 1, k) {
+                    ask(grid.row(self.z, ahead));
+                    ask(grid.row(self.p, ahead));
                     let at = grid.start(j, k);
                     let row = ring.padded(j, k);
                     self.combine(w, at, &mut row[1..=width]);
@@ -166,7 +168,8 @@ impl<T: Weight> Pass for Direction<'_, T> {
             if k < tile.k[0] {
                 continue;
             }
-            for j in tile.rows(grid, 0) {
+            for (j, ahead) in tile.rows_ahead(grid, 0, k) {
+                self.q.ask(ahead, width);
                 let at = grid.start(j, k);
                 let near = ring.near(grid, j, k);
                 sweep(w, &grid.faces(at), &near, near.own(), product, Product);
@@ -215,9 +218,12 @@ impl<T: Weight> Pass for Step<'_, T> {
         let (grid, width) = (self.grid, self.grid.width);
         let (own, rest) = scratch.split_at_mut(width + 2);
         let product = &mut rest[..width];
-        let (mut rr, mut most) = (0.0, 0.0);
+        let mut norm = Norm::default();
         for k in tile.k[0]..tile.k[1] {
-            for j in tile.rows(grid, 0) {
+            for (j, ahead) in tile.rows_ahead(grid, 0, k) {
+                ask(grid.row(self.p, ahead + grid.lattice.stride[2]));
+                self.x.ask(ahead, width);
+                self.r.ask(ahead, width);
                 let at = grid.start(j, k);
                 let near = grid.near(self.p, j, k, own);
                 sweep(w, &grid.faces(at), &near, near.own(), product, Product);
@@ -226,12 +232,10 @@ impl<T: Weight> Pass for Step<'_, T> {
                 let (x, r) = unsafe { (self.x.take(at, width), self.r.take(at, width)) };
                 add(w, x, self.a, near.own());
                 add(w, r, -self.a, product);
-                rr += dot(w, r, r);
-                let here = largest(w, r);
-                most = if here > most { here } else { most };
+                norm.add(w, r);
             }
         }
-        [rr, 0.0, 0.0, most]
+        norm.sums()
     }
 }
 
@@ -248,15 +252,12 @@ impl<T: Weight> Pass for Norms<'_, T> {
     #[inline(always)]
     fn tile<W: Width>(&self, w: W, tile: Tile, _scratch: &mut [Real]) -> [f64; 4] {
         let grid = self.grid;
-        let (mut bb, mut most) = (0.0, 0.0);
+        let mut norm = Norm::default();
         for k in tile.k[0]..tile.k[1] {
             for j in tile.rows(grid, 0) {
-                let b = grid.row(&grid.b, grid.start(j, k));
-                bb += dot(w, b, b);
-                let here = largest(w, b);
-                most = if here > most { here } else { most };
+                norm.add(w, grid.row(&grid.b, grid.start(j, k)));
             }
         }
-        [bb, 0.0, 0.0, most]
+        norm.sums()
     }
 }

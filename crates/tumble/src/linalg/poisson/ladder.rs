@@ -6,7 +6,7 @@
 //! Source: [young1971] for the factor of successive over-relaxation.
 
 use super::faces::Weight;
-use super::level::{Block, Finish, Grid, LANES, Pass, Relax, Residual, Rows, Tile, dot, largest, run, sweep};
+use super::level::{Block, Finish, Grid, LANES, Norm, Pass, Relax, Residual, Rows, Tile, run, sweep};
 use super::report::{Fault, Info, Method, Params};
 use super::{Side, Solver};
 use crate::math::Real;
@@ -54,7 +54,7 @@ pub(super) fn relax<T: Weight>(solver: &mut Solver<T>, x: &mut [Real], params: &
         _ => 1.0,
     } as Real;
     let mut other = std::mem::take(&mut solver.p);
-    other.resize(x.len(), 0.0);
+    other.reserve(x.len());
     let (grid, registers) = (&solver.fine, solver.registers);
     let mut info = Info::default();
     let mut start = 0.0;
@@ -114,7 +114,7 @@ impl<T: Weight> Pass for Half<'_, T> {
         let (grid, width) = (self.grid, self.grid.width);
         let (own, rest) = scratch.split_at_mut(width + 2);
         let left = &mut rest[..width];
-        let (mut rr, mut most) = (0.0, 0.0);
+        let mut norm = Norm::default();
         for k in tile.k[0]..tile.k[1] {
             for j in tile.rows(grid, 0) {
                 let at = grid.start(j, k);
@@ -122,9 +122,7 @@ impl<T: Weight> Pass for Half<'_, T> {
                 if self.norms {
                     sweep(w, &faces, &near, b, left, Residual);
                     grid.end(left);
-                    rr += dot(w, left, left);
-                    let here = largest(w, left);
-                    most = if here > most { here } else { most };
+                    norm.add(w, left);
                 }
                 // SAFETY: a row of this tile.
                 let out = unsafe { self.out.take(at, width) };
@@ -141,6 +139,6 @@ impl<T: Weight> Pass for Half<'_, T> {
                 grid.end(out);
             }
         }
-        [rr, 0.0, 0.0, most]
+        norm.sums()
     }
 }

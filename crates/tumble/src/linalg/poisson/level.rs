@@ -1,11 +1,12 @@
 //! One grid of the pressure system: its matrix row by row, and the tiles that passes over it are cut into.
 //!
 //! Rows are worked on in blocks of 16 cells, pads included: what lies in a pad has no open face and does nothing. A block whose
-//! faces are all open needs no weights, and gives the same bits as the one that reads them. Tiles have a fixed shape and compute
+//! faces are all open, but perhaps for a wall at its ends, needs no weights, and gives the same bits as the one that reads them. Tiles have a fixed shape and compute
 //! the rows around them anew, so that neither the number of threads nor the width of registers shows in a result.
 
+use super::column::Column;
 use super::faces::Weight;
-use crate::math::simd::{Kernel, Level as Registers, Width, dispatch_at};
+use crate::math::simd::{Kernel, Level as Registers, Width, ask, dispatch_at};
 use crate::math::{Lane, Lattice, Real};
 use rayon::prelude::*;
 use std::cell::RefCell;
@@ -32,22 +33,53 @@ pub(super) struct Grid<T> {
     pub w: [Vec<T>; 3],
     /// What is added to the diagonal, if anything is.
     pub extra: Option<Vec<Real>>,
-    /// For every block whether all its faces along x, y, and z unless the grid is flat, are open, and nothing is added.
-    pub plain: Vec<bool>,
+    /// What every block is.
+    pub kinds: Vec<Kind>,
+    edges: [Edge; 4],
     /// One cell along z, whose faces across it are closed.
     pub flat: bool,
     /// Whether a row needs ghosts at its ends: its ends are joined, or open.
     pub ends: bool,
     /// Right-hand side, or what is left of it.
-    pub b: Vec<Real>,
+    pub b: Column,
     /// Before the correction from the coarser grid.
-    pub x: Vec<Real>,
+    pub x: Column,
     /// The result of a cycle.
-    pub y: Vec<Real>,
+    pub y: Column,
     /// Numbers of a row in blocks.
     pub width: usize,
     /// A row of zeros.
-    zeros: Vec<Real>,
+    zeros: Column,
+}
+
+/// Which faces of a block along x, y, and z unless the grid is flat, are open.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Kind {
+    /// Any of them, or something is added to the diagonal.
+    Mixed,
+    /// All.
+    Open,
+    /// All but the first along x, the last one, or both.
+    Walls([bool; 2]),
+}
+
+/// What stands for the weights of a block with walls at its ends.
+#[derive(Debug, Clone, Copy)]
+struct Edge {
+    lower: Block,
+    upper: Block,
+    diagonal: Block,
+    inverse: Block,
+}
+
+impl Edge {
+    fn new(walls: [bool; 2], open: Real) -> Self {
+        let (mut lower, mut upper) = ([1.0; LANES], [1.0; LANES]);
+        lower[0] = if walls[0] { 0.0 } else { 1.0 };
+        upper[LANES - 1] = if walls[1] { 0.0 } else { 1.0 };
+        let diagonal = std::array::from_fn(|i| (open - 2.0) + lower[i] + upper[i]);
+        Self { lower, upper, diagonal, inverse: diagonal.map(|d| 1.0 / d) }
+    }
 }
 
 impl<T: Weight> Grid<T> {
@@ -55,31 +87,54 @@ impl<T: Weight> Grid<T> {
     pub fn new(lattice: Lattice, periodic: [bool; 3], w: [Vec<T>; 3], extra: Option<Vec<Real>>) -> Self {
         let [n0, n1, n2] = lattice.n;
         let width = n0.next_multiple_of(LANES);
-        let column = || vec![0.0; lattice.len()];
+        let column = || Column::zeros(lattice.len());
         let is = |axis: usize, c: T, range: std::ops::Range<usize>| w[axis][range].iter().all(|w| *w == c);
         let mut ends = periodic[0];
         let flat = n2 == 1 && (0..n1).all(|j| [0, 1].iter().all(|k| is(2, T::CLOSED, lattice.at(0, j, *k)..lattice.at(n0, j, *k))));
         let z = if flat { T::CLOSED } else { T::OPEN };
-        let mut plain = Vec::with_capacity(width / LANES * n1 * n2);
+        let mut kinds = Vec::with_capacity(width / LANES * n1 * n2);
         for k in 0..n2 {
             for j in 0..n1 {
                 ends |= w[0][lattice.at(0, j, k)] != T::CLOSED || w[0][lattice.at(n0, j, k)] != T::CLOSED;
                 for e in (0..width).step_by(LANES) {
                     let at = lattice.at(e, j, k);
                     let here = |up: usize| at + up..at + up + LANES;
-                    plain.push(
-                        e + LANES <= n0
-                            && is(0, T::OPEN, at..at + LANES + 1)
-                            && is(1, T::OPEN, here(0))
-                            && is(1, T::OPEN, here(lattice.stride[1]))
-                            && is(2, z, here(0))
-                            && is(2, z, here(lattice.stride[2]))
-                            && extra.as_ref().is_none_or(|d| d[here(0)].iter().all(|d| *d == 0.0)),
-                    );
+                    let side = |w: T| [T::OPEN, T::CLOSED].contains(&w);
+                    let walls = [0, LANES].map(|up| w[0][at + up] == T::CLOSED);
+                    let open = e + LANES <= n0
+                        && side(w[0][at])
+                        && side(w[0][at + LANES])
+                        && is(0, T::OPEN, at + 1..at + LANES)
+                        && is(1, T::OPEN, here(0))
+                        && is(1, T::OPEN, here(lattice.stride[1]))
+                        && is(2, z, here(0))
+                        && is(2, z, here(lattice.stride[2]))
+                        && extra.as_ref().is_none_or(|d| d[here(0)].iter().all(|d| *d == 0.0));
+                    kinds.push(match (open, walls) {
+                        (false, _) => Kind::Mixed,
+                        (true, [false, false]) => Kind::Open,
+                        (true, walls) => Kind::Walls(walls),
+                    });
                 }
             }
         }
-        Self { lattice, periodic, w, extra, plain, flat, ends, b: column(), x: column(), y: column(), width, zeros: vec![0.0; width] }
+        let open = if flat { 4.0 } else { 6.0 };
+        let edges = [[false, false], [true, false], [false, true], [true, true]].map(|walls| Edge::new(walls, open));
+        Self {
+            lattice,
+            periodic,
+            w,
+            extra,
+            kinds,
+            edges,
+            flat,
+            ends,
+            b: column(),
+            x: column(),
+            y: column(),
+            width,
+            zeros: Column::zeros(width),
+        }
     }
 
     /// The number of the first cell of row (j, k), which may lie one row outside; sides that are joined continue for ever.
@@ -104,7 +159,8 @@ impl<T: Weight> Grid<T> {
         Faces {
             w: [[of(0, 0), of(0, 1)], [of(1, 0), of(1, row)], [of(2, 0), of(2, plane)]],
             extra: self.extra.as_ref().map(|d| blocks(&d[at..at + self.width])),
-            plain: &self.plain[number..number + count],
+            kinds: &self.kinds[number..number + count],
+            edges: &self.edges,
             flat: self.flat,
         }
     }
@@ -161,7 +217,8 @@ impl<T: Weight> Grid<T> {
 pub(super) struct Faces<'a, T> {
     w: [[&'a [[T; LANES]]; 2]; 3],
     extra: Option<&'a [Block]>,
-    plain: &'a [bool],
+    kinds: &'a [Kind],
+    edges: &'a [Edge; 4],
     flat: bool,
 }
 
@@ -170,6 +227,13 @@ pub(super) struct Near<'a> {
     padded: &'a [Real],
     y: [&'a [Real]; 2],
     z: [&'a [Real]; 2],
+}
+
+impl<T> Faces<'_, T> {
+    #[inline(always)]
+    fn edge(&self, [lower, upper]: [bool; 2]) -> &Edge {
+        &self.edges[usize::from(lower) + 2 * usize::from(upper)]
+    }
 }
 
 impl<'a> Near<'a> {
@@ -234,29 +298,32 @@ pub(super) fn sweep<W: Width, T: Weight, F: Finish>(w: W, faces: &Faces<T>, near
     let of = |row| &blocks(row)[..n];
     let (b, xm, v, xp) = (of(b), of(near.padded), of(&near.padded[1..]), of(&near.padded[2..]));
     let (ym, yp, zm, zp) = (of(near.y[0]), of(near.y[1]), of(near.z[0]), of(near.z[1]));
-    let plain = &faces.plain[..n];
+    let kinds = &faces.kinds[..n];
     let diagonal: Real = if faces.flat { 4.0 } else { 6.0 };
     let (d, inverse) = (w.splat(diagonal), w.splat(1.0 / diagonal));
     for e in 0..n {
-        if plain[e] {
-            for part in 0..LANES / W::N {
-                let i = part * W::N;
-                let v = w.load(&v[e][i..]);
-                let s = (w.load(&xm[e][i..]) + w.load(&xp[e][i..])) + (w.load(&ym[e][i..]) + w.load(&yp[e][i..]));
-                let s = s + if faces.flat { w.splat(0.0) } else { w.load(&zm[e][i..]) + w.load(&zp[e][i..]) };
-                w.store(finish.at(w, i, d * v - s, inverse, v, w.load(&b[e][i..])), &mut out[e][i..]);
-            }
-        } else {
-            for part in 0..LANES / W::N {
-                let i = part * W::N;
-                let [[x0, x1], [y0, y1], [z0, z1]] = weights(w, faces, e, i);
-                let v = w.load(&v[e][i..]);
-                let s = (x0 * w.load(&xm[e][i..]) + x1 * w.load(&xp[e][i..])) + (y0 * w.load(&ym[e][i..]) + y1 * w.load(&yp[e][i..]));
-                let s = s + (z0 * w.load(&zm[e][i..]) + z1 * w.load(&zp[e][i..]));
-                let d = diagonal_of(w, faces, e, i, [[x0, x1], [y0, y1], [z0, z1]]);
-                let inverse = d.positive(d.like(1.0) / d, d.zero());
-                w.store(finish.at(w, i, d * v - s, inverse, v, w.load(&b[e][i..])), &mut out[e][i..]);
-            }
+        for part in 0..LANES / W::N {
+            let i = part * W::N;
+            let (v, b) = (w.load(&v[e][i..]), w.load(&b[e][i..]));
+            let (xm, xp) = (w.load(&xm[e][i..]), w.load(&xp[e][i..]));
+            let (ym, yp) = (w.load(&ym[e][i..]), w.load(&yp[e][i..]));
+            let (zm, zp) = (w.load(&zm[e][i..]), w.load(&zp[e][i..]));
+            let of_z = if faces.flat { w.splat(0.0) } else { zm + zp };
+            let new = match kinds[e] {
+                Kind::Open => finish.at(w, i, d * v - (((xm + xp) + (ym + yp)) + of_z), inverse, v, b),
+                Kind::Walls(walls) => {
+                    let edge = faces.edge(walls);
+                    let s = ((w.load(&edge.lower[i..]) * xm + w.load(&edge.upper[i..]) * xp) + (ym + yp)) + of_z;
+                    finish.at(w, i, w.load(&edge.diagonal[i..]) * v - s, w.load(&edge.inverse[i..]), v, b)
+                }
+                Kind::Mixed => {
+                    let [[x0, x1], [y0, y1], [z0, z1]] = weights(w, faces, e, i);
+                    let s = ((x0 * xm + x1 * xp) + (y0 * ym + y1 * yp)) + (z0 * zm + z1 * zp);
+                    let d = diagonal_of(w, faces, e, i, [[x0, x1], [y0, y1], [z0, z1]]);
+                    finish.at(w, i, d * v - s, d.positive(d.like(1.0) / d, d.zero()), v, b)
+                }
+            };
+            w.store(new, &mut out[e][i..]);
         }
     }
 }
@@ -286,16 +353,18 @@ pub(super) fn scale<W: Width, T: Weight>(w: W, faces: &Faces<T>, c: Real, b: &[R
     let (out, b) = (out.as_chunks_mut::<LANES>().0, blocks(b));
     let zero = w.splat(0.0);
     let n = out.len();
-    let (b, plain) = (&b[..n], &faces.plain[..n]);
+    let (b, kinds) = (&b[..n], &faces.kinds[..n]);
     let sixth = w.splat(1.0 / if faces.flat { 4.0 } else { 6.0 });
     for e in 0..n {
         for part in 0..LANES / W::N {
             let i = part * W::N;
-            let inverse = if plain[e] {
-                sixth
-            } else {
-                let d = diagonal_of(w, faces, e, i, weights(w, faces, e, i));
-                d.positive(d.like(1.0) / d, d.zero())
+            let inverse = match kinds[e] {
+                Kind::Open => sixth,
+                Kind::Walls(walls) => w.load(&faces.edge(walls).inverse[i..]),
+                Kind::Mixed => {
+                    let d = diagonal_of(w, faces, e, i, weights(w, faces, e, i));
+                    d.positive(d.like(1.0) / d, d.zero())
+                }
             };
             w.store(Scaled(c).at(w, i, zero, inverse, zero, w.load(&b[e][i..])), &mut out[e][i..]);
         }
@@ -332,7 +401,7 @@ pub(super) fn sum<W: Width>(w: W, a: &[Real]) -> f64 {
 
 /// The largest magnitude of a row; a NaN stays one in the sums of squares.
 #[inline(always)]
-pub(super) fn largest<W: Width>(w: W, a: &[Real]) -> f64 {
+fn largest<W: Width>(w: W, a: &[Real]) -> f64 {
     let a = blocks(a);
     let mut most = [w.splat(0.0); LANES];
     for e in 0..a.len() {
@@ -351,6 +420,29 @@ pub(super) fn largest<W: Width>(w: W, a: &[Real]) -> f64 {
         of_all = if lane > of_all { lane } else { of_all };
     }
     f64::from(of_all)
+}
+
+/// The squared norm of rows and their largest magnitude.
+#[derive(Default)]
+pub(super) struct Norm {
+    squares: f64,
+    most: f64,
+}
+
+impl Norm {
+    /// Adds a row.
+    #[inline(always)]
+    pub fn add<W: Width>(&mut self, w: W, row: &[Real]) {
+        self.squares += dot(w, row, row);
+        let here = largest(w, row);
+        self.most = if here > self.most { here } else { self.most };
+    }
+
+    /// What a pass returns.
+    #[inline(always)]
+    pub fn sums(&self) -> [f64; 4] {
+        [self.squares, 0.0, 0.0, self.most]
+    }
 }
 
 #[inline(always)]
@@ -392,6 +484,9 @@ pub(super) struct Tile {
 /// a pass keeps fit into the caches of one core.
 const SHAPE: [usize; 2] = [64, 16];
 
+/// How many rows earlier memory is asked for a row.
+const AHEAD: isize = 4;
+
 /// Cells up to which threads would cost more than they save.
 const SERIAL: usize = 20_000;
 
@@ -412,6 +507,22 @@ impl Tile {
         } else {
             (self.j[0] - more).max(0)..(self.j[1] + more).min(grid.lattice.n[1] as isize)
         }
+    }
+
+    /// Its rows in plane k and `more` around them, each with the start of the one that is worked on some rows later.
+    #[inline(always)]
+    pub fn rows_ahead<T: Weight>(&self, grid: &Grid<T>, more: isize, k: isize) -> impl Iterator<Item = (isize, usize)> {
+        let rows = self.rows(grid, more);
+        let (first, count, next) = (rows.start, rows.end - rows.start, self.has(grid, k + 1));
+        rows.map(move |j| {
+            let later = j + AHEAD;
+            let (aj, ak) = match later < first + count {
+                true => (later, k),
+                false if next => ((later - count).clamp(first, first + count - 1), k + 1),
+                false => (j, k),
+            };
+            (j, grid.start(aj, ak))
+        })
     }
 
     /// Whether the grid has a plane k.
@@ -444,7 +555,7 @@ impl<P: Pass> Kernel for OnTile<'_, P> {
 }
 
 thread_local! {
-    static SCRATCH: RefCell<Vec<Real>> = const { RefCell::new(Vec::new()) };
+    static SCRATCH: RefCell<Column> = const { RefCell::new(Column::new()) };
 }
 
 /// Runs a pass over all tiles of a grid. The first three of what tiles return are added in the order of tiles, of the fourth the
@@ -453,9 +564,7 @@ pub(super) fn run<P: Pass>(n: [usize; 3], registers: Registers, pass: &P) -> [f6
     let tiles = Tile::all(n);
     let one = |tile: &Tile| {
         SCRATCH.with_borrow_mut(|scratch| {
-            if scratch.len() < pass.scratch() {
-                scratch.resize(pass.scratch(), 0.0);
-            }
+            scratch.reserve(pass.scratch());
             dispatch_at(registers, OnTile { pass, tile: *tile, scratch })
         })
     };
@@ -536,6 +645,14 @@ impl<'a> Rows<'a> {
     /// Of a column.
     pub fn of(column: &'a mut [Real]) -> Self {
         Self { start: column.as_mut_ptr(), len: column.len(), life: PhantomData }
+    }
+
+    /// Asks memory for `count` numbers from `at` on.
+    #[inline(always)]
+    pub fn ask(&self, at: usize, count: usize) {
+        assert!(at + count <= self.len);
+        // SAFETY: inside the column; nothing is read.
+        ask(unsafe { std::slice::from_raw_parts(self.start.add(at), count) });
     }
 
     /// `count` numbers from `at` on.

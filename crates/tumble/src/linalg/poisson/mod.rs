@@ -9,6 +9,7 @@
 //!
 //! Verified by `crates/tumble-f64/tests/pressure.rs`.
 
+mod column;
 mod cosine;
 mod faces;
 mod incomplete;
@@ -25,8 +26,9 @@ pub use faces::{Weight, byte};
 pub use report::{Excess, Fault, Info, Method, Params, Target};
 
 use crate::math::parallel::chunks;
-use crate::math::simd::Level as Registers;
+use crate::math::simd::{Kernel, Level as Registers, Width, dispatch};
 use crate::math::{Lattice, Real};
+use column::Column;
 use cosine::Cosine;
 use incomplete::Factors;
 use krylov::Before;
@@ -58,8 +60,8 @@ pub struct Solver<T> {
     /// Made when first asked for.
     incomplete: Option<Factors>,
     cosine: Option<Cosine>,
-    p: Vec<Real>,
-    q: Vec<Real>,
+    p: Column,
+    q: Column,
     registers: Registers,
 }
 
@@ -133,8 +135,8 @@ impl<T: Weight> Solver<T> {
             sides,
             incomplete: None,
             cosine: None,
-            p: Vec::new(),
-            q: Vec::new(),
+            p: Column::new(),
+            q: Column::new(),
             registers: Registers::Avx512,
         })
     }
@@ -289,35 +291,65 @@ impl<T: Weight> Solver<T> {
             }
         };
         let first = grid.lattice.at(0, 0, 0);
-        out[first..first + stride[2] * n[2]].par_chunks_mut(stride[1]).enumerate().for_each(|(line, out)| {
-            let (j, k) = (line % (n[1] + 2), line / (n[1] + 2));
-            if j >= n[1] {
-                return;
-            }
-            let at = grid.lattice.at(0, j, k);
-            let (j, k) = (j as isize, k as isize);
-            let here = row(j, k);
-            let beside = [row(j - 1, k), row(j + 1, k), row(j, k - 1), row(j, k + 1)];
-            let of = |axis: usize, up: usize| &grid.w[axis][at + up..at + up + n[0]];
-            let w = [of(0, 0), of(0, 1), of(1, 0), of(1, stride[1]), of(2, 0), of(2, stride[2])];
-            let ends = if grid.periodic[0] { [here[n[0] - 1], here[0]] } else { [0.0; 2] };
-            let mut one = |i: usize, x: [f64; 2]| {
-                let others = [x[0], x[1], beside[0][i], beside[1][i], beside[2][i], beside[3][i]];
-                let mut product = grid.extra.as_ref().map_or(0.0, |extra| f64::from(extra[at + i])) * here[i];
-                for face in 0..6 {
-                    product += f64::from(w[face][i].value()) * (here[i] - others[face]);
+        let rows = out[first..first + stride[2] * n[2]].par_chunks_mut(stride[1]).enumerate();
+        rows.for_each_init(
+            || vec![0.0; n[0] + 2],
+            |padded, (line, out)| {
+                let (j, k) = (line % (n[1] + 2), line / (n[1] + 2));
+                if j >= n[1] {
+                    return;
                 }
-                out[i] = (f64::from(b[at + i]) - product) as Real;
-            };
-            for i in 1..n[0].saturating_sub(1) {
-                one(i, [here[i - 1], here[i + 1]]);
-            }
-            let next = |i: usize| here.get(i).copied().unwrap_or(ends[1]);
-            one(0, [ends[0], next(1)]);
-            if n[0] > 1 {
-                one(n[0] - 1, [here[n[0] - 2], ends[1]]);
-            }
-        });
+                let at = grid.lattice.at(0, j, k);
+                let (j, k) = (j as isize, k as isize);
+                let here = row(j, k);
+                padded[1..=n[0]].copy_from_slice(here);
+                [padded[0], padded[n[0] + 1]] = if grid.periodic[0] { [here[n[0] - 1], here[0]] } else { [0.0; 2] };
+                let of = |axis: usize, up: usize| &grid.w[axis][at + up..at + up + n[0]];
+                dispatch(Left {
+                    out: &mut out[..n[0]],
+                    b: &b[at..],
+                    here,
+                    extra: grid.extra.as_ref().map(|extra| &extra[at..at + n[0]]),
+                    others: [&padded[..], &padded[2..], row(j - 1, k), row(j + 1, k), row(j, k - 1), row(j, k + 1)],
+                    w: [of(0, 0), of(0, 1), of(1, 0), of(1, stride[1]), of(2, 0), of(2, stride[2])],
+                });
+            },
+        );
+    }
+}
+
+/// What is left of a row, in double precision.
+struct Left<'a, T> {
+    out: &'a mut [Real],
+    b: &'a [Real],
+    here: &'a [f64],
+    extra: Option<&'a [Real]>,
+    others: [&'a [f64]; 6],
+    w: [&'a [T]; 6],
+}
+
+impl<T: Weight> Kernel for Left<'_, T> {
+    type Output = ();
+    #[inline(always)]
+    fn run<W: Width>(self, _: W) {
+        left(self.out, self.b, self.here, self.extra, self.others, self.w);
+    }
+}
+
+/// The output is a parameter: the compiler then knows that it overlaps nothing.
+#[inline(always)]
+fn left<T: Weight>(out: &mut [Real], b: &[Real], here: &[f64], extra: Option<&[Real]>, others: [&[f64]; 6], w: [&[T]; 6]) {
+    let n = out.len();
+    let (b, here) = (&b[..n], &here[..n]);
+    let [x0, x1, y0, y1, z0, z1] = others.map(|o| &o[..n]);
+    let [a0, a1, b0, b1, c0, c1] = w.map(|w| &w[..n]);
+    let flow = |w: T, here: f64, other: f64| f64::from(w.value()) * (here - other);
+    for i in 0..n {
+        let v = here[i];
+        let product = extra.map_or(0.0, |extra| f64::from(extra[i]) * v);
+        let product = product + flow(a0[i], v, x0[i]) + flow(a1[i], v, x1[i]) + flow(b0[i], v, y0[i]);
+        let product = product + flow(b1[i], v, y1[i]) + flow(c0[i], v, z0[i]) + flow(c1[i], v, z1[i]);
+        out[i] = (f64::from(b[i]) - product) as Real;
     }
 }
 

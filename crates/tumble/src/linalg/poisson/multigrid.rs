@@ -10,7 +10,7 @@
 
 use super::faces::Weight;
 use super::level::{Grid, Pass, Relax, Residual, Ring, Rows, Tile, dot, run, scale, sum, sweep};
-use crate::math::simd::{Level as Registers, Width};
+use crate::math::simd::{Level as Registers, Width, ask};
 use crate::math::{Lattice, Real};
 
 /// The part of the spectrum that the smoother damps: from 2/ALPHA to 2, where the spectrum of D^-1 A ends.
@@ -92,6 +92,19 @@ pub(super) fn cycle<T: Weight>(grid: &mut Grid<T>, coarser: &mut [Grid<Real>], c
     [by, of_y, of_b]
 }
 
+/// A sweep over plane k, as far as a sweep over the tile needs it.
+#[inline(always)]
+fn relax<W: Width, T: Weight>(w: W, grid: &Grid<T>, tile: Tile, k: isize, from: &Ring, to: &mut Ring, weight: Real) {
+    if k >= tile.k[0] - 1 && tile.has(grid, k) {
+        for j in tile.rows(grid, 1) {
+            let at = grid.start(j, k);
+            let row = to.padded(j, k);
+            sweep(w, &grid.faces(at), &from.near(grid, j, k), grid.row(&grid.b, at), &mut row[1..=grid.width], Relax(weight));
+            grid.close(row);
+        }
+    }
+}
+
 /// Two sweeps from zero, and what is left to the coarser grid.
 struct Down<'a, T> {
     grid: &'a Grid<T>,
@@ -117,7 +130,8 @@ impl<T: Weight> Pass for Down<'_, T> {
         let (left, sums) = rest.split_at_mut(width);
         for k in tile.k[0] - 2..tile.k[1] + 2 {
             if tile.has(grid, k) {
-                for j in tile.rows(grid, 2) {
+                for (j, ahead) in tile.rows_ahead(grid, 2, k) {
+                    ask(grid.row(&grid.b, ahead));
                     let at = grid.start(j, k);
                     let row = first.padded(j, k);
                     scale(w, &grid.faces(at), weights[0], grid.row(&grid.b, at), &mut row[1..=width]);
@@ -125,19 +139,13 @@ impl<T: Weight> Pass for Down<'_, T> {
                 }
             }
             let k = k - 1;
-            if k >= tile.k[0] - 1 && tile.has(grid, k) {
-                for j in tile.rows(grid, 1) {
-                    let at = grid.start(j, k);
-                    let row = second.padded(j, k);
-                    sweep(w, &grid.faces(at), &first.near(grid, j, k), grid.row(&grid.b, at), &mut row[1..=width], Relax(weights[1]));
-                    grid.close(row);
-                }
-            }
+            relax(w, grid, tile, k, &first, &mut second, weights[1]);
             let k = k - 1;
             if k < tile.k[0] {
                 continue;
             }
-            for j in tile.rows(grid, 0) {
+            for (j, ahead) in tile.rows_ahead(grid, 0, k) {
+                self.x.ask(ahead, width);
                 let at = grid.start(j, k);
                 let near = second.near(grid, j, k);
                 // SAFETY: a row of this tile.
@@ -206,7 +214,9 @@ impl<T: Weight> Pass for Up<'_, T> {
         let (mut by, mut of_y, mut of_b) = (0.0, 0.0, 0.0);
         for k in tile.k[0] - 2..tile.k[1] + 2 {
             if tile.has(grid, k) {
-                for j in tile.rows(grid, 2) {
+                for (j, ahead) in tile.rows_ahead(grid, 2, k) {
+                    ask(grid.row(&grid.x, ahead));
+                    ask(grid.row(&grid.b, ahead));
                     let row = first.padded(j, k);
                     let of = |i: isize, axis: usize| {
                         let i = i.rem_euclid(n[axis] as isize) as usize;
@@ -219,19 +229,13 @@ impl<T: Weight> Pass for Up<'_, T> {
                 }
             }
             let k = k - 1;
-            if k >= tile.k[0] - 1 && tile.has(grid, k) {
-                for j in tile.rows(grid, 1) {
-                    let at = grid.start(j, k);
-                    let row = second.padded(j, k);
-                    sweep(w, &grid.faces(at), &first.near(grid, j, k), grid.row(&grid.b, at), &mut row[1..=width], Relax(weights[1]));
-                    grid.close(row);
-                }
-            }
+            relax(w, grid, tile, k, &first, &mut second, weights[1]);
             let k = k - 1;
             if k < tile.k[0] {
                 continue;
             }
-            for j in tile.rows(grid, 0) {
+            for (j, ahead) in tile.rows_ahead(grid, 0, k) {
+                self.y.ask(ahead, width);
                 let at = grid.start(j, k);
                 let b = grid.row(&grid.b, at);
                 // SAFETY: a row of this tile.
