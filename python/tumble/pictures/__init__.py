@@ -17,11 +17,11 @@ import numpy as np
 import numpy.typing as npt
 
 from tumble._engine import ExportError
-from tumble.pictures import framing, splats
+from tumble.pictures import framing, splats, volumes
 from tumble.pictures.framing import Camera
 from tumble.pictures.pyvista_ import headless
 from tumble.pictures.surfaces import Floats, unit
-from tumble.pictures.things import Cloud, Ground, Mesh, Recording, Stage, Thing, placed
+from tumble.pictures.things import Cloud, Ground, Image, Mesh, Recording, Smoke, Stage, Thing, placed
 from tumble.style import GROUND, SOLID, display, linear
 
 __all__ = ["RENDERERS", "Studio", "picture", "render", "renderers", "resolve"]
@@ -120,6 +120,7 @@ class Studio:
             any("id" in columns for columns in self.run.frame(0).values())
             and any(s.get("method") == "dynamics" for s in self.run.scene.get("system", ()))
         )
+        weighs = weighs or any(o.grid is not None for o in self.stage.objects)
         if self.stage.flat or self.stage.night or not gravity[2] < 0 or not weighs:
             return []
         low, high = points().min(axis=0), points().max(axis=0)
@@ -143,11 +144,13 @@ class Studio:
 
 
 def render(renderer: str, things: list[Thing], camera: Camera, samples: int = SAMPLES, night: bool = False) -> Picture:
-    """Draws things with one of the renderers, and clouds over them. Raises ExportError if it fails."""
+    """Draws things with one of the renderers, and clouds, images and smoke over them. Raises ExportError if it fails."""
     clouds = [t for t in things if isinstance(t, Cloud)]
-    if not clouds and not night:
+    smoke = [t for t in things if isinstance(t, Smoke)]
+    images = [t for t in things if isinstance(t, Image)]
+    if not (clouds or smoke or images or night):
         return _drawn(renderer, things, camera, samples)
-    scenery: list[Thing] = [t for t in things if not isinstance(t, Cloud)]
+    scenery: list[Thing] = [t for t in things if not isinstance(t, Cloud | Smoke | Image)]
     # By night nothing at all is dark, and drawn at once.
     light, depth = (None, np.full(camera.size[::-1], np.inf))
     if scenery or not night:
@@ -157,9 +160,11 @@ def render(renderer: str, things: list[Thing], camera: Camera, samples: int = SA
             shown = splats.glow(light, depth, scenery, clouds, camera)
         else:
             assert light is not None
-            shown = splats.discs(light, depth, clouds, camera)
+            shown = splats.discs(light, depth, clouds, camera) if clouds else light
+        shown = volumes.images(shown, depth, images, camera)
+        shown = volumes.smoke(shown, depth, smoke, camera, night)
     except (MemoryError, ValueError) as error:
-        raise ExportError(f"particles cannot be drawn: {error}") from error
+        raise ExportError(f"particles and smoke cannot be drawn: {error}") from error
     return np.round(255 * display(shown)).astype(np.uint8)
 
 
