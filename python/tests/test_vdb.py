@@ -31,7 +31,9 @@ def oracle() -> None:
         (pytest.fail if Path("/usr/bin/apt-get").exists() else pytest.skip)(f"OpenVDB is missing: {cure}")
 
 
-def read(data: bytes, folder: Path, low: tuple[int, ...] = LOW, size: tuple[int, ...] = SIZE) -> dict[str, dict[str, Any]]:
+def read(
+    data: bytes, folder: Path, low: tuple[int, ...] = LOW, size: tuple[int, ...] = SIZE
+) -> dict[str, dict[str, Any]]:
     """Grid -> what OpenVDB says of it."""
     file, out = folder / "test.vdb", folder / "read.npz"
     file.write_bytes(data)
@@ -49,7 +51,14 @@ def read(data: bytes, folder: Path, low: tuple[int, ...] = LOW, size: tuple[int,
 def volume(values: np.ndarray, **words: Any) -> dict[str, Any]:
     """The words of `write_vdb` for an array of the shape (nx, ny, nz) or (nx, ny, nz, 3)."""
     flat = np.ascontiguousarray(np.moveaxis(values, (0, 2), (2, 0)), dtype=np.float32).ravel()
-    known = {"name": "g", "unit": "K", "class": "unknown", "corner": [0, 0, 0], "spacing": 0.25, "origin": [1.0, 2.0, 3.0]}
+    known = {
+        "name": "g",
+        "unit": "K",
+        "class": "unknown",
+        "corner": [0, 0, 0],
+        "spacing": 0.25,
+        "origin": [1.0, 2.0, 3.0],
+    }
     known |= {"background": 0.0, "tolerance": 0.0, "half": False, "values": flat}
     return known | {"width": 1 if values.ndim == 3 else 3, "points": list(values.shape[:3])} | words
 

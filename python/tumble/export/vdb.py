@@ -103,9 +103,7 @@ def fields(grid: Box, table: Mapping[str, npt.NDArray[Any]]) -> dict[str, int]:
     return found
 
 
-def _volume(
-    grid: Box, name: str, array: npt.NDArray[Any], what: str, half: bool, tolerance: float
-) -> dict[str, Any]:
+def _volume(grid: Box, name: str, array: npt.NDArray[Any], what: str, half: bool, tolerance: float) -> dict[str, Any]:
     values = np.ascontiguousarray(np.moveaxis(array, (0, 2), (2, 0)), dtype=np.float32)
     background = np.float32(np.median(values)) if name == "temperature" else np.float32(0)
     with np.errstate(invalid="ignore"):

@@ -193,10 +193,10 @@ SHOWN = ("density", "fuel", "temperature", "vorticity", "speed", "pressure", "di
 LOOKED_AT = 9
 """Frames at which the range of what lies on a grid is taken, at most."""
 
-SMOKE: Rgb = (0.80, 0.80, 0.80)
+SMOKE: Rgb = (0.52, 0.53, 0.56)
 """Colour of smoke that has none of its own."""
 
-THICK = 14.0
+THICK = 40.0
 """Optical depth of the thickest smoke of a run across its whole box, the mean of its sides."""
 
 DYE = 3.0
@@ -374,7 +374,7 @@ class Stage:
             else:
                 drawn.append(_image(thing, grid, name, share))
         if grid.flat < 3:
-            corners = grid.corners[[0, 1, 3, 2] if grid.flat == 2 else [0, 1, 5, 4] if grid.flat == 1 else [0, 2, 3, 1]]
+            corners = grid.corners[[[0, 1, 3, 2], [0, 1, 5, 4], [0, 2, 6, 4]][grid.flat]]
             line = np.stack([corners, np.roll(corners, -1, axis=0)], axis=1).reshape(-1, 3)
             drawn.append(Tubes(f"{thing.name} edges", line, np.full(4, 2), max(thinnest, 1e-9), SOLID))
         return drawn

@@ -43,7 +43,9 @@ def smoke(light: Floats, depth: Floats, clouds: list[Smoke], camera: Camera, nig
     if not night:
         for cloud in clouds:
             shown = shown * _shadow(cloud, depth, camera)[..., None]
-    away = [float(np.linalg.norm(c.low + 0.5 * c.spacing * np.array(c.extinction.shape) - camera.position)) for c in clouds]
+    away = [
+        float(np.linalg.norm(c.low + 0.5 * c.spacing * np.array(c.extinction.shape) - camera.position)) for c in clouds
+    ]
     for k in np.argsort(away)[::-1].tolist():
         shown = _smoke(shown, depth, clouds[k], camera, DIM if night else 1.0)
     return shown
@@ -146,7 +148,13 @@ def _smoke(light: Floats, depth: Floats, cloud: Smoke, camera: Camera, bright: f
     for k in slices:
         a, b, z = at_u + k * by_u, at_v + k * by_v, away + k * farther
         some = np.flatnonzero(
-            (a > 0) & (a < rows - 1) & (b > 0) & (b < columns - 1) & (left > LEFT) & (z > NEAR) & (z - stop < np.abs(farther))
+            (a > 0)
+            & (a < rows - 1)
+            & (b > 0)
+            & (b < columns - 1)
+            & (left > LEFT)
+            & (z > NEAR)
+            & (z - stop < np.abs(farther))
         )
         if not len(some):
             continue
@@ -167,9 +175,9 @@ def _smoke(light: Floats, depth: Floats, cloud: Smoke, camera: Camera, bright: f
             cells = glow[k].reshape(-1, 3)
             shine = ((1 - a) * (1 - b))[:, None] * cells[corner] + ((1 - a) * b)[:, None] * cells[corner + 1]
             shine += (a * (1 - b))[:, None] * cells[corner + columns] + (a * b)[:, None] * cells[corner + columns + 1]
-            shining[some] += (left[some] * length * np.where(thick > 1e-4, (1 - through) / np.maximum(thick, 1e-4), 1.0))[
-                :, None
-            ] * shine
+            shining[some] += (
+                left[some] * length * np.where(thick > 1e-4, (1 - through) / np.maximum(thick, 1e-4), 1.0)
+            )[:, None] * shine
         left[some] *= through
     out = light.reshape(-1, 3).copy()
     out[pixels] = out[pixels] * left[:, None] + scattered[:, None] * np.array(cloud.color) + shining
