@@ -35,7 +35,7 @@ def test_files_hold_the_frames(tmp_path: Path) -> None:
         assert words["density"] == ["fog volume", "float", "kg/m³"]
         assert words["velocity"] == ["unknown", "vec3s", "m/s"]
         first = np.array([-0.5, -0.5, 0.0]) + 0.5 / 12
-        np.testing.assert_allclose(got["density"]["places"][:2], [first, first + [1 / 12, 0, 0]], atol=1e-7)
+        np.testing.assert_allclose(got["density"]["places"][:2], [first, first + np.array([1 / 12, 0, 0])], atol=1e-7)
         assert got["temperature"]["background"] == np.median(table["temperature"])
 
 

@@ -134,7 +134,7 @@ def shown(grid: Box, table: Table, name: str) -> Array:
 
 
 def _speed(velocity: Array) -> Floats:
-    return np.linalg.norm(velocity.astype(float), axis=-1)
+    return np.asarray(np.linalg.norm(velocity.astype(float), axis=-1))
 
 
 def _curl(grid: Box, velocity: Array) -> Floats:

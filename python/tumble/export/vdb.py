@@ -52,9 +52,9 @@ def write(
             if stem in files.values() and frame.isdigit() and old.name not in wanted:
                 old.unlink()
     for i in range(run.n_frames):
-        frame = run.frame(i)
+        tables = run.frame(i)
         for name, grid in boxes.items():
-            write_whole(goal / path(files[name], i), encode(grid, frame.get(name, {}), half, zip, tolerance))
+            write_whole(goal / path(files[name], i), encode(grid, tables.get(name, {}), half, zip, tolerance))
         if progress is not None:
             progress(i + 1, run.n_frames)
     return goal

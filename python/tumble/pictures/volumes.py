@@ -115,7 +115,7 @@ def _smoke(light: Floats, depth: Floats, cloud: Smoke, camera: Camera, bright: f
     shade = np.float32(bright * KEY) * ((1 - SPREAD) * key + SPREAD * np.sqrt(np.sqrt(key)))
     shade += np.float32(bright * AMBIENT) * (0.35 + 0.65 * np.sqrt(sky))
     rays, start = sights(camera)
-    right, up, forward = camera.axes
+    forward = camera.axes[2]
     axis = int(np.argmax(np.abs(forward)))
     u, v = (a for a in range(3) if a != axis)
     # One number for both: the real part takes light away, the imaginary one scatters it.
