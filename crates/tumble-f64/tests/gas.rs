@@ -176,7 +176,8 @@ fn a_frame_is_free_of_divergence_in_both_orders_and_with_every_solver() {
         assert_eq!(report.unconverged, 0, "{words}");
         let asked = if words.contains("1e-6") { 1e-6 } else { 1e-10 };
         assert!(report.residual <= asked && report.residual > 0.0, "{words}: {:e}", report.residual);
-        let fastest = ["velocity_x", "velocity_y", "velocity_z"].map(|name| largest(&grid(&sim, "air", name).0)).into_iter().fold(0.0, f64::max);
+        let fastest =
+            ["velocity_x", "velocity_y", "velocity_z"].map(|name| largest(&grid(&sim, "air", name).0)).into_iter().fold(0.0, f64::max);
         let left = largest(&grid(&sim, "air", "divergence").0) / 24.0 * 1.5 / fastest;
         // The tolerance is over the velocity before the projection, which is a little faster.
         assert!(fastest > 0.1 && left < 3.0 * asked, "{words}: {left:e} at {fastest} m/s");
@@ -197,7 +198,9 @@ fn smoke_is_neither_made_nor_lost_but_by_advection() {
     assert!((books.mass / before - 1.0).abs() < 0.03 && books.mass != before, "{}", books.mass / before - 1.0);
     assert!(books.speed > 0.5 && books.speed < 3.0, "{}", books.speed);
     // A fluid at rest loses none.
-    let mut still = simulation("time = { fps = 24, frames = 5 }\nworld = { gravity = [0, 0, 0] }\n[[gas]]\nname = \"air\"\nbox = { size = [1, 1, 1], resolution = 12 }\nsmoke = { initial = \"1 + x\" }\n");
+    let mut still = simulation(
+        "time = { fps = 24, frames = 5 }\nworld = { gravity = [0, 0, 0] }\n[[gas]]\nname = \"air\"\nbox = { size = [1, 1, 1], resolution = 12 }\nsmoke = { initial = \"1 + x\" }\n",
+    );
     let before = still.ledger().mass;
     run(&mut still, 5);
     assert_eq!(still.ledger().mass, before);
@@ -225,7 +228,17 @@ end = 1.0
     run(&mut sim, 10);
     // M' = 3 0.4³ - M/2 from 0.45 to 1 s; fading comes first in each step of 0.1 s, so that what is born in a step fades from the next on.
     let rate = 3.0 * 0.4_f64.powi(3);
-    let exact = (0..10).fold(0.0, |m, i| m * (-0.05_f64).exp() + rate * if i < 4 { 0.0 } else if i == 4 { 0.05 } else { 0.1 });
+    let exact = (0..10).fold(0.0, |m, i| {
+        m * (-0.05_f64).exp()
+            + rate
+                * if i < 4 {
+                    0.0
+                } else if i == 4 {
+                    0.05
+                } else {
+                    0.1
+                }
+    });
     assert!((sim.ledger().mass / exact - 1.0).abs() < 1e-9, "{} {exact}", sim.ledger().mass);
     let (t, _) = grid(&sim, "air", "temperature");
     assert!((t[7] - 300.0 - 10.0 * (-2.0_f64).exp()).abs() < 1e-9, "{}", t[7]);
@@ -293,8 +306,19 @@ courant = 0.5
     run(&mut sim, 30);
     // The converged column of the table of Ghia, Ghia and Shin: u on x = 0.5 at these heights.
     let table = [
-        (0.9766, 0.84348), (0.9688, 0.79161), (0.9609, 0.74071), (0.9531, 0.69118), (0.8516, 0.23645), (0.7344, 0.00415), (0.6172, -0.13881),
-        (0.5, -0.20915), (0.4531, -0.21398), (0.2812, -0.15765), (0.1719, -0.10173), (0.1016, -0.06441), (0.0703, -0.04663),
+        (0.9766, 0.84348),
+        (0.9688, 0.79161),
+        (0.9609, 0.74071),
+        (0.9531, 0.69118),
+        (0.8516, 0.23645),
+        (0.7344, 0.00415),
+        (0.6172, -0.13881),
+        (0.5, -0.20915),
+        (0.4531, -0.21398),
+        (0.2812, -0.15765),
+        (0.1719, -0.10173),
+        (0.1016, -0.06441),
+        (0.0703, -0.04663),
     ];
     let (u, points) = grid(&sim, "fluid", "velocity_x");
     let line: Vec<f64> = (0..64).map(|j| u[j * points[0] + 32]).collect();

@@ -19,7 +19,10 @@ def render(
     ] = None,
     as_film: Annotated[bool, typer.Option("--film", help="Draw all frames into an .mp4.")] = False,
     renderer: Annotated[
-        str, typer.Option(metavar="NAME", help="What draws; `auto` takes the best that is here; `mitsuba-smoke` traces smoke, too.")
+        str,
+        typer.Option(
+            metavar="NAME", help="What draws; `auto` takes the best that is here; `mitsuba-smoke` traces smoke, too."
+        ),
     ] = "auto",
     every: Annotated[int, typer.Option(min=1, metavar="N", help="Only every Nth frame of the film.")] = 1,
     size: Annotated[str | None, typer.Option(metavar="WxH", help="Pixels, instead of the scene's.")] = None,
