@@ -181,3 +181,64 @@ def fountain(color: bool = True, radius: bool = True, frames: int = 6) -> FakeRu
     words = scene(emitter=[{"name": "spray", "color": BLUE}])
     static: Columns = {"spray": {} if radius else {"radius": np.array([0.02])}}
     return FakeRun(words, static, columns, n_frames=frames)
+
+
+def on_grid(cells: tuple[int, ...], flat: int, spacing: float, origin: tuple[float, float, float]) -> dict[str, Array]:
+    """What does not change of an object on a grid."""
+    return {
+        "grid_cells": np.array(cells, dtype=np.uint32),
+        "grid_spacing": np.array([spacing], dtype=np.float32),
+        "grid_origin": np.array(origin),
+        "grid_flat": np.array([flat], dtype=np.uint32),
+    }
+
+
+def middles(cells: tuple[int, ...], spacing: float, corner: tuple[float, ...]) -> list[Array]:
+    """Coordinates of the middles of cells."""
+    axes = [c + spacing * (np.arange(n) + 0.5) for n, c in zip(cells, corner, strict=True)]
+    return np.meshgrid(*axes, indexing="ij")
+
+
+def plume(n: int = 48, **words: Any) -> FakeRun:
+    """Smoke that rises from the floor of a box, turning; warm where it is."""
+    cells, spacing, corner = (n, n, 2 * n), 1.0 / n, (-0.5, -0.5, 0.0)
+    x, y, z = middles(cells, spacing, corner)
+
+    def columns(t: float) -> Columns:
+        top = 0.5 + 2.0 * t
+        r = 0.07 + 0.1 * z
+        cx, cy = 0.06 * np.sin(7 * z - 9 * t), 0.06 * np.cos(7 * z - 9 * t)
+        a, b = (x - cx) / r, (y - cy) / r
+        wave = 0.5 + 0.5 * np.sin(25 * x + 9 * t) * np.sin(25 * y) * np.sin(21 * z - 30 * t)
+        density = np.exp(-(a**2) - b**2) * wave / (1 + np.exp((z - top) / 0.05))
+        velocity = np.stack([-3 * (y - cy), 3 * (x - cx), 1 + 0 * x], axis=-1) * np.exp(-(a**2) - b**2)[..., None]
+        smoke = {
+            "density": density.astype(np.float32).T.copy().T,
+            "temperature": (293 + 80 * density).astype(np.float32),
+            "pressure": (40 * (z - 1) * np.exp(-(a**2) - b**2)).astype(np.float32),
+            "velocity": velocity.astype(np.float32),
+        }
+        return {"smoke": smoke}
+
+    return FakeRun(scene(**words), {"smoke": on_grid(cells, 3, spacing, corner)}, columns)
+
+
+def ink(plane: str = "xz", n: int = 64, **words: Any) -> FakeRun:
+    """A dye in a plane, turned by a vortex."""
+    flat = 2 if plane == "xy" else 1
+    cells, spacing = (2 * n, n), 1.0 / n
+    corner = (-1.0, 0.2)
+    x, y = middles(cells, spacing, corner)
+    low = np.insert(np.array(corner), flat, -0.5 * spacing)
+
+    def columns(t: float) -> Columns:
+        r = np.hypot(x + 0.1, y - 0.7)
+        angle = np.arctan2(y - 0.7, x + 0.1) - 10 * t * np.exp(-8 * r**2)
+        density = np.clip(np.sin(3 * angle) * 4, 0, 1) * np.exp(-((r / 0.4) ** 4))
+        turning = 10 * np.exp(-8 * r**2)
+        velocity = np.stack([-turning * (y - 0.7), turning * (x + 0.1)], axis=-1)
+        own = {"density": density, "velocity": velocity, "pressure": -turning, "temperature": 300 + 20 * density}
+        return {"dye": {k: v.astype(np.float32) for k, v in own.items()}}
+
+    still = {"dye": on_grid(cells, flat, spacing, (float(low[0]), float(low[1]), float(low[2])))}
+    return FakeRun(scene(dimension=2, plane=plane, **words), still, columns)

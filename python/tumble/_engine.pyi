@@ -151,6 +151,11 @@ class World:
     def write(self, object: str, column: str, values: npt.ArrayLike) -> None:
         """Sets position [m] or velocity [m/s], n x 3, of an object. Raises SceneError."""
 
+def write_vdb(volumes: Sequence[Mapping[str, Any]], zip: bool) -> bytes:
+    """The bytes of a VDB file. Each volume is a dict: name, unit, class ("unknown", "fog volume" or "staggered"), values
+    (float32, x fastest, those of a vector together), width, points, corner, spacing [m], origin [m], background, tolerance,
+    half. Raises ExportError."""
+
 def load_mesh(path: Path) -> tuple[npt.NDArray[np.float64], npt.NDArray[np.uint32]]:
     """Vertices [file units] n x 3 and triangles m x 3 of an OBJ, PLY, STL or GLB file. Raises SceneError."""
 

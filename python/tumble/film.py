@@ -117,7 +117,7 @@ def _draw(renderer: str, things: list[Thing], camera: Camera, night: bool) -> Pi
 def _worker(renderer: str) -> None:
     """Makes a process use a single core, as there is one for each, and leaves Ctrl-C to the main process."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
-    if renderer == "mitsuba":
+    if renderer.startswith("mitsuba"):
         import drjit
 
         drjit.set_thread_count(1)

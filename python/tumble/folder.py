@@ -46,6 +46,7 @@ _WRITTEN = """
 static.npz columns.json ledger.csv trials.csv frames/*.npz checkpoints/*.safetensors
 film.mp4 .film.mp4.part energy.png ledger.png stills/*.png columns.npz
 scene.usda usd/frame.*.usdc usd/manifest.usda usd/objects.usdc ply/*.ply
+volumes/*.vdb slices/*.png
 run.json
 """
 """What a run writes and --force deletes: the manifest last, because a folder without it is not taken for a run."""
@@ -94,7 +95,7 @@ class RunFolder:
             for pattern in _WRITTEN.split():
                 for file in [*self.path.glob(pattern), *self.path.glob(pattern + ".tmp")]:
                     file.unlink()
-            for folder in ("frames", "checkpoints", "stills", "usd", "ply"):
+            for folder in ("frames", "checkpoints", "stills", "usd", "ply", "volumes", "slices"):
                 with suppress(OSError):
                     (self.path / folder).rmdir()
 

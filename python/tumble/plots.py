@@ -58,18 +58,18 @@ def energy(run: Recording, path: str | os.PathLike[str]) -> Path:
     t = _column(run, "time")
     parts = {name: _column(run, name) for name in ENERGIES}
     total = np.sum(list(parts.values()), axis=0)
-    with _settings():
+    with settings():
         figure, (upper, lower) = _figure([3.0, 1.0])
         curves = [(name, parts[name], color) for name, color in ENERGIES.items() if np.any(parts[name] != 0)]
         _draw(upper, 3.0, t, [*curves, ("total", total, INK)])
         upper.set_ylabel("energy [J]")
-        upper.set_title(_title(run, "energy"))
+        upper.set_title(figure_title(run, "energy"))
         drift = energy_changes({**parts, "energy": total})
         lower.axhline(0.0, color=FAINT, linewidth=0.8)
         lower.plot(t, drift, color=INK, linewidth=1.3)
         lower.set_ylabel("drift /\nlargest")
         lower.set_xlabel("time [s]")
-        return _save(figure, path)
+        return save(figure, path)
 
 
 def ledger(run: Recording, columns: str | Sequence[str], path: str | os.PathLike[str]) -> Path:
@@ -83,16 +83,16 @@ def ledger(run: Recording, columns: str | Sequence[str], path: str | os.PathLike
     for name in names:
         groups.setdefault(unit(name), []).append(name)
     t = _column(run, "time")
-    with _settings():
+    with settings():
         share = 2.0 if len(groups) == 1 else 1.0
         figure, axes = _figure([share] * len(groups))
         for ax, (symbol, members) in zip(axes, groups.items(), strict=True):
             curves = [(n, _column(run, n), PALETTE[k % len(PALETTE)]) for k, n in enumerate(members)]
             _draw(ax, share, t, curves)
             ax.set_ylabel(_label(members, symbol))
-        axes[0].set_title(_title(run, ""))
+        axes[0].set_title(figure_title(run, ""))
         axes[-1].set_xlabel("time [s]")
-        return _save(figure, path)
+        return save(figure, path)
 
 
 def unit(column: str) -> str:
@@ -122,14 +122,15 @@ def _label(names: Sequence[str], symbol: str) -> str:
     return f"{words} [{symbol}]".strip() if symbol else words
 
 
-def _title(run: Recording, subject: str) -> str:
+def figure_title(run: Recording, subject: str, width: int = 72) -> str:
     """The title of the scene and the subject, on as many lines as the figure is wide for."""
     title = str(run.scene.get("title") or "")
-    return textwrap.fill(f"{title}: {subject}" if title and subject else title or subject, 72)
+    return textwrap.fill(f"{title}: {subject}" if title and subject else title or subject, width)
 
 
 @contextlib.contextmanager
-def _settings() -> Iterator[None]:
+def settings() -> Iterator[None]:
+    """Matplotlib as `style.RC` has it."""
     import matplotlib
 
     settings: Any = RC
@@ -179,14 +180,15 @@ def _apart(wanted: Sequence[float], gap: float) -> list[float]:
     return places
 
 
-def _save(figure: "Figure", path: str | os.PathLike[str]) -> Path:
-    """Writes a figure under a temporary name, then renames it. The ending of the name says the format."""
+def save(figure: "Figure", path: str | os.PathLike[str], **words: Any) -> Path:
+    """Writes a figure under a temporary name, then renames it. The ending of the name says the format; `words` are those
+    of `savefig`."""
     goal = Path(path)
     unfinished = goal.with_name(f".{goal.stem}.part{goal.suffix or '.png'}")
     try:
         with writing(goal):
             goal.parent.mkdir(parents=True, exist_ok=True)
-            figure.savefig(unfinished)
+            figure.savefig(unfinished, **words)
             unfinished.replace(goal)
     except ValueError as error:
         raise ExportError(f"{goal}: cannot be written: {error}") from error

@@ -26,6 +26,19 @@ SOLID: Rgb = (0.42, 0.41, 0.39)
 GROUND: Rgb = (0.82, 0.82, 0.82)
 """Floors and planes that have no colour of their own."""
 
+COLORS = {
+    "density": "cividis",
+    "fuel": "cividis",
+    "temperature": "inferno",
+    "vorticity": "RdBu_r",
+    "pressure": "PuOr_r",
+    "divergence": "PRGn",
+    "velocity_x": "RdBu_r",
+    "velocity_y": "RdBu_r",
+    "velocity_z": "RdBu_r",
+}
+"""Matplotlib's maps of colours for what lies on grids; all others in "viridis"."""
+
 RC: dict[str, Any] = {
     "figure.facecolor": PAPER,
     "figure.dpi": 150,

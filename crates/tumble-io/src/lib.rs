@@ -1,6 +1,7 @@
-//! Bytes of a mesh file in, a [`Mesh`] out. Nothing here opens a file, so the browser uses it too.
+//! Bytes of a mesh file in, a [`Mesh`] out; and volumes in, bytes of a VDB file out ([`vdb`]). Nothing here opens a file, so
+//! the browser uses it too.
 //!
-//! What is common to all formats: coordinates are taken as they stand in the file (no axis is turned, no unit
+//! What is common to all formats of meshes: coordinates are taken as they stand in the file (no axis is turned, no unit
 //! converted); a polygon becomes the fan of triangles around its first corner, which is right for convex ones; objects,
 //! groups and materials are merged; normals, colours and textures are dropped; vertices that no triangle uses are
 //! dropped, the others keep their order. Any bytes give a mesh or a one-line message that names the cure, never a panic;
@@ -12,8 +13,11 @@ mod glb;
 mod obj;
 mod ply;
 mod stl;
+mod vdb;
 
 use tumble_interface::Mesh;
+
+pub use vdb::{Class, Volume, vdb};
 
 /// A mesh file format.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]

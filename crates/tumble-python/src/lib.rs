@@ -5,6 +5,7 @@ mod errors;
 mod fields;
 mod scene;
 mod user;
+mod vdb;
 mod world;
 
 use pyo3::prelude::*;
@@ -20,6 +21,8 @@ mod _engine {
     };
     #[pymodule_export]
     use super::scene::{Scene, load_mesh};
+    #[pymodule_export]
+    use super::vdb::write_vdb;
     #[pymodule_export]
     use super::world::World;
 

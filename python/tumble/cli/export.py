@@ -21,6 +21,12 @@ def export(
         bool, typer.Option("--npz", help="columns.npz: every column of all frames, frames x rows x width.")
     ] = False,
     ply: Annotated[bool, typer.Option("--ply", help="ply/NAME.FRAME.ply: the particles of each frame.")] = False,
+    vdb: Annotated[
+        bool,
+        typer.Option("--vdb", help="volumes/NAME.FRAME.vdb: what lies on grids, as OpenVDB; --usd refers to them."),
+    ] = False,
+    half: Annotated[bool, typer.Option("--half", help="VDB in half precision.")] = False,
+    zip: Annotated[bool, typer.Option("--zip", help="VDB packed, but for densities.")] = False,
     out: Annotated[
         Path | None, typer.Option(metavar="DIR", help="Folder to write into.", show_default="that of the run")
     ] = None,
@@ -32,16 +38,24 @@ def export(
       tumble export out/sheet-on-bunny --usd
       tumble export out/sheet-on-bunny --npz --out results
       tumble export out/fountain --ply
+      tumble export out/plume --vdb --half
     """
-    if not (usd or npz or ply):
-        raise typer.BadParameter("choose at least one format: --usd, --npz, --ply")
+    if not (usd or npz or ply or vdb):
+        raise typer.BadParameter("choose at least one format: --usd, --npz, --ply, --vdb")
+    if (half or zip) and not vdb:
+        raise typer.BadParameter("--half and --zip say how to write --vdb")
     found = find.run(run)
     folder = out or found.folder
+    if vdb:
+        from tumble.export.vdb import write as write_vdb
+
+        with Progress("vdb") as progress:
+            say(write_vdb(found, folder, progress, half, zip))
     if usd:
         from tumble.export.usd import write
 
         with Progress("usd") as progress:
-            say(write(found, folder, progress=progress))
+            say(write(found, folder, progress, volumes=not vdb))
     if npz:
         with Progress("npz") as progress:
             say(stack(found, folder, progress))

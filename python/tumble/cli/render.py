@@ -19,7 +19,10 @@ def render(
     ] = None,
     as_film: Annotated[bool, typer.Option("--film", help="Draw all frames into an .mp4.")] = False,
     renderer: Annotated[
-        str, typer.Option(metavar="NAME", help="What draws; `auto` takes the best that is here.")
+        str,
+        typer.Option(
+            metavar="NAME", help="What draws; `auto` takes the best that is here; `mitsuba-smoke` traces smoke, too."
+        ),
     ] = "auto",
     every: Annotated[int, typer.Option(min=1, metavar="N", help="Only every Nth frame of the film.")] = 1,
     size: Annotated[str | None, typer.Option(metavar="WxH", help="Pixels, instead of the scene's.")] = None,
@@ -58,9 +61,9 @@ def render(
 
 def look_for(renderer: str) -> None:
     """Refuses the name of no renderer. (One that does not work on this machine says so when it is to draw.)"""
-    from tumble.pictures import RENDERERS
+    from tumble.pictures import RENDERERS, TRACED
 
-    known = ["auto", *RENDERERS]
+    known = ["auto", *RENDERERS, TRACED]
     if renderer not in known:
         text = f"no renderer {renderer!r}{find.near(renderer, known) or '; there are ' + ', '.join(known)}"
         raise typer.BadParameter(text, param_hint="--renderer")

@@ -26,6 +26,7 @@ def run(
     film: Annotated[bool | None, typer.Option(help="Write film.mp4.", show_default="as the scene says")] = None,
     usd: Annotated[bool | None, typer.Option(help="Write scene.usda.", show_default="as the scene says")] = None,
     ply: Annotated[bool | None, typer.Option(help="Write ply/.", show_default="as the scene says")] = None,
+    vdb: Annotated[bool | None, typer.Option(help="Write volumes/.", show_default="as the scene says")] = None,
     plot: Annotated[bool | None, typer.Option(help="Write energy.png.", show_default="as the scene says")] = None,
     stills: Annotated[bool, typer.Option(help="Write the stills that the scene asks for.")] = True,
     renderer: Annotated[str, typer.Option(metavar="NAME", help="What draws film and stills.")] = "auto",
@@ -60,20 +61,22 @@ def run(
         "film": wanted["film"] if film is None else film,
         "usd": wanted["usd"] if usd is None else usd,
         "ply": wanted["ply"] if ply is None else ply,
+        "vdb": wanted["vdb"] if vdb is None else vdb,
         "plot": wanted["plot"] if plot is None else plot,
     }
     frames_to_draw = wanted["stills"] if stills else []
+    flags = {"film": film, "usd": usd, "ply": ply, "vdb": vdb, "plot": plot, "stills": None if stills else False}
     if renderer != "auto" and (asked["film"] or frames_to_draw):
         resolve(renderer)  # Says now, rather than after the simulation, if it does not work here.
     try:
         with find.naming(find.scene_file(scene), folder), Progress("simulate") as progress:
             done = simulate(checked, folder, resume=resume, threads=threads, progress=progress, overwrite=force)
     except StepError as error:
-        again = [*(["--out", str(out)] if out else []), *_flags(film, usd, ply, plot, stills, renderer)]
+        again = [*(["--out", str(out)] if out else []), *_flags(flags, renderer)]
         print(report.failure(Run(folder), error, scene, overrides, again), file=sys.stderr)
         raise typer.Exit(1) from None
     except KeyboardInterrupt:
-        again = [*(["--out", str(out)] if out else []), "--resume", *_flags(film, usd, ply, plot, stills, renderer)]
+        again = [*(["--out", str(out)] if out else []), "--resume", *_flags(flags, renderer)]
         _say_what_is_kept(folder, find.command("run", scene, overrides, *again))
         raise typer.Exit(130) from None
 
@@ -96,11 +99,8 @@ def run(
         raise typer.Exit(1)
 
 
-def _flags(
-    film: bool | None, usd: bool | None, ply: bool | None, plot: bool | None, stills: bool, renderer: str
-) -> list[str]:
+def _flags(asked: dict[str, bool | None], renderer: str) -> list[str]:
     """The options on results, as they were given."""
-    asked = {"film": film, "usd": usd, "ply": ply, "plot": plot, "stills": None if stills else False}
     flags = [f"--{'' if wanted else 'no-'}{name}" for name, wanted in asked.items() if wanted is not None]
     return [*flags, *(["--renderer", renderer] if renderer != "auto" else [])]
 
@@ -127,7 +127,13 @@ def _write_results(run: "Run", asked: dict[str, bool], stills: list[int], render
         from tumble.export.usd import write
 
         with Progress("usd") as progress:
-            write(run, run.folder, progress=progress)
+            write(run, run.folder, progress, volumes=not asked["vdb"])
+
+    def vdb() -> None:
+        from tumble.export.vdb import write
+
+        with Progress("vdb") as progress:
+            write(run, run.folder, progress)
 
     def ply() -> None:
         from tumble.export.ply import write
@@ -153,7 +159,7 @@ def _write_results(run: "Run", asked: dict[str, bool], stills: list[int], render
         if late := [str(i) for i in stills if i >= run.n_frames]:
             warn(f"no still of frame {', '.join(late)}: the last frame is {run.n_frames - 1}")
 
-    tasks = {"plot": plot, "usd": usd, "ply": ply, "film": draw_film, "stills": draw_stills}
+    tasks = {"plot": plot, "vdb": vdb, "usd": usd, "ply": ply, "film": draw_film, "stills": draw_stills}
     for name, task in tasks.items():
         if asked.get(name, True):
             try:

@@ -14,11 +14,10 @@ import numpy as np
 import numpy.typing as npt
 
 from tumble._engine import ExportError
+from tumble.export import DIGITS, file_names
 from tumble.folder import write_whole, writing
 from tumble.pictures.things import Object, Recording, colors, objects, positions, radii
 from tumble.style import display
-
-DIGITS = 6
 
 TYPES = {"<f4": "float", "<u4": "uint", "|u1": "uchar"}
 """Types of the format."""
@@ -33,7 +32,7 @@ def write(run: Recording, folder: str | PathLike[str], progress: Callable[[int, 
     if not clouds or run.n_frames < 1:
         raise ExportError("the run has no particles to write as PLY")
     goal = Path(folder) / "ply"
-    names = _names([o.name for o in clouds])
+    names = file_names([o.name for o in clouds])
     digits = max(DIGITS, len(str(run.n_frames - 1)))
     with writing(goal):
         goal.mkdir(parents=True, exist_ok=True)
@@ -75,13 +74,3 @@ def encode(thing: Object, columns: Mapping[str, Mapping[str, npt.NDArray[Any]]])
 def _word(name: str) -> str:
     """A name that the format can hold."""
     return re.sub(r"[^!-~]", "_", name)
-
-
-def _names(names: list[str]) -> dict[str, str]:
-    """Names of objects as names of files, which stay apart."""
-    found: dict[str, str] = {}
-    for name in names:
-        stem = re.sub(r"[^\w-]", "_", name)
-        free = next(s for s in (stem, *(f"{stem}_{k}" for k in range(2, 1_000_000))) if s not in found.values())
-        found[name] = free
-    return found

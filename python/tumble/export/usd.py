@@ -2,6 +2,7 @@
 
     scene.usda              camera, lights, frame rate; refers to objects.usdc; names the frames as value clips
     usd/objects.usdc        what does not change: topology, ids, widths, colours, colliders; points at the start
+    volumes/NAME.FRAME.vdb  what lies on grids; Volume prims in objects.usdc name the files of all frames
     usd/manifest.usda       which attributes the frames hold
     usd/frame.000000.usdc   points, velocities, normals and extents of a frame, at time code 0; and so on; of particles
                             that come and go also ids, widths, colours and all other numbers that they have
@@ -15,6 +16,8 @@ program that reads USD in another way may see the start only, which is in object
 The clips must be stronger than the points at the start, and defaults beside clips are stronger than these: that is
 why objects.usdc is referenced and not a sub-layer.
 
+Volumes name a file for each frame, which is so little that it stands beside what does not change.
+
 Of particles that come and go, a row can be another particle in the next frame: between frames they are where their
 velocities take them (`UsdGeom.PointBased.ComputePointsAtTime`), not between equal rows.
 """
@@ -22,7 +25,7 @@ velocities take them (`UsdGeom.PointBased.ComputePointsAtTime`), not between equ
 import contextlib
 import os
 import re
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -31,6 +34,7 @@ import numpy as np
 import numpy.typing as npt
 
 from tumble._engine import ExportError
+from tumble.export import DIGITS, vdb
 from tumble.folder import writing
 from tumble.pictures.framing import camera
 from tumble.pictures.look import key_light
@@ -43,8 +47,6 @@ SENSOR = 0.36
 
 SPRING = 0.25
 """Radius of springs over the radius of the masses that they join."""
-
-DIGITS = 6
 
 KNOWN = ("position", "velocity", "id", "radius", "color")
 """Columns that become something else than a primvar of their name."""
@@ -60,7 +62,7 @@ class Part:
     path: str
     title: str
     kind: str
-    """Points, Mesh or BasisCurves."""
+    """Points, Mesh, BasisCurves or Volume."""
     order: npt.NDArray[np.int64] | None = None
     """Masses in the order of the points; without it, all masses in theirs."""
     counts: npt.NDArray[np.int64] | None = None
@@ -70,10 +72,15 @@ class Part:
     """What `surfaces.split` says of a solid that has sharp edges."""
 
 
-def write(run: Recording, folder: str | os.PathLike[str], progress: Callable[[int, int], None] | None = None) -> Path:
-    """Writes scene.usda and usd/ into a folder and returns the path of scene.usda, which is written last.
-    `progress(done, total)` is called after each frame. Positions are single precision, bit for bit those of a run in
-    single precision. Raises ExportError."""
+def write(
+    run: Recording,
+    folder: str | os.PathLike[str],
+    progress: Callable[[int, int], None] | None = None,
+    volumes: bool = True,
+) -> Path:
+    """Writes scene.usda and usd/ into a folder and returns the path of scene.usda, which is written last; also volumes/,
+    if anything lies on a grid, unless told that it is there. `progress(done, total)` is called after each frame.
+    Positions are single precision, bit for bit those of a run in single precision. Raises ExportError."""
     if run.n_frames < 1:
         raise ExportError("the run has no frames")
     goal = Path(folder)
@@ -81,6 +88,8 @@ def write(run: Recording, folder: str | os.PathLike[str], progress: Callable[[in
     start = run.frame(0)
     parts = _parts(objects(run), start)
     digits = max(DIGITS, len(str(run.n_frames - 1)))
+    if volumes and vdb.grids(run):
+        vdb.write(run, goal)
     with _writing(goal / "scene.usda"):
         layers.mkdir(parents=True, exist_ok=True)
         for old in layers.glob("frame.*.usdc"):
@@ -92,7 +101,7 @@ def write(run: Recording, folder: str | os.PathLike[str], progress: Callable[[in
             if progress is not None:
                 progress(i + 1, run.n_frames)
         _save(_manifest(parts, start), layers / "manifest.usda")
-        _save(_objects(parts, start), layers / "objects.usdc")
+        _save(_objects(run, parts, start), layers / "objects.usdc")
         scene = goal / "scene.usda"
         _save(_scene(run, "#" * digits), scene)
     return scene
@@ -125,6 +134,8 @@ def _parts(found: list[Object], start: Columns) -> list[Part]:
     for thing in found:
         if thing.kind == "points":
             parts.append(Part(thing, path(thing.name), thing.name, "Points", radius=thing.radius))
+        elif thing.kind == "grid":
+            parts.append(Part(thing, path(thing.name), thing.name, "Volume"))
         elif thing.kind == "curve":
             counts = np.array([len(thing.curve)])
             where = path(thing.name)
@@ -151,7 +162,8 @@ def _places(thing: Object, columns: Columns) -> npt.NDArray[np.float64]:
 
 def _deforms(part: Part, columns: Columns) -> bool:
     """Whether its points differ from frame to frame."""
-    return part.thing.position is None or "position" in columns.get(part.thing.name, {})
+    own = columns.get(part.thing.name, {})
+    return part.kind != "Volume" and (part.thing.position is None or "position" in own)
 
 
 def _placement(part: Part, columns: Columns) -> list[tuple[str, str, Any]]:
@@ -254,18 +266,23 @@ def _manifest(parts: list[Part], start: Columns) -> Any:
     return layer
 
 
-def _objects(parts: list[Part], start: Columns) -> Any:
+def _objects(run: Recording, parts: list[Part], start: Columns) -> Any:
     """What does not change, and the start."""
     from pxr import Gf, Sdf, Usd, UsdGeom, UsdShade, Vt
 
     layer = Sdf.Layer.CreateAnonymous(".usdc")
     stage = Usd.Stage.Open(layer)
     _units(stage)
+    stage.SetTimeCodesPerSecond(_rate(run))
     stage.SetDefaultPrim(UsdGeom.Xform.Define(stage, ROOT).GetPrim())
     UsdGeom.Scope.Define(stage, f"{ROOT}/looks")
+    files = vdb.paths(run)
     for part in parts:
         prim = stage.DefinePrim(part.path, part.kind)
         prim.SetDisplayName(part.title)
+        if part.kind == "Volume":
+            _volume(stage, part, files[part.thing.name], run, start.get(part.thing.name, {}))
+            continue
         for name, kind, values in _values(part, start):
             attribute = prim.CreateAttribute(name, Sdf.ValueTypeNames.Find(kind), False)
             attribute.Set(_array(values))
@@ -323,6 +340,32 @@ def _objects(parts: list[Part], start: Columns) -> Any:
     return layer
 
 
+def _volume(stage: Any, part: Part, stem: str, run: Recording, table: Mapping[str, Any]) -> None:
+    """A volume with a field for each grid of its files."""
+    from pxr import Gf, Sdf, Usd, UsdGeom, UsdVol, Vt
+
+    grid = part.thing.grid
+    assert grid is not None
+    volume = UsdVol.Volume(stage.GetPrimAtPath(part.path))
+    low, high = grid.origin, grid.origin + grid.size
+    volume.CreateExtentAttr(Vt.Vec3fArray([Gf.Vec3f(*low.tolist()), Gf.Vec3f(*high.tolist())]))
+    UsdGeom.Gprim(volume).CreateDisplayColorAttr([Gf.Vec3f(*part.thing.color)])
+    for name, width in vdb.fields(grid, table).items():
+        field = UsdVol.OpenVDBAsset.Define(stage, f"{part.path}/{_identifier(name)}")
+        volume.CreateFieldRelationship(_identifier(name), field.GetPath())
+        field.CreateFieldNameAttr(name)
+        field.CreateFieldDataTypeAttr("float" if width == 1 else "float3")
+        field.CreateVectorDataRoleHintAttr("None" if width == 1 else "Vector")
+        if name in vdb.FOG:
+            field.CreateFieldClassAttr("fogVolume")
+        elif width == 3 and (name.endswith("_faces") or "velocity" not in table):
+            field.CreateFieldClassAttr("staggered")
+        file = field.CreateFilePathAttr()
+        file.Set(Sdf.AssetPath(f"../volumes/{vdb.path(stem, 0)}"))
+        for i in range(run.n_frames):
+            file.Set(Sdf.AssetPath(f"../volumes/{vdb.path(stem, i)}"), Usd.TimeCode(i))
+
+
 def _scene(run: Recording, hashes: str) -> Any:
     """The root: frame rate, camera, lights, and where the rest is."""
     from pxr import Gf, Sdf, Usd, UsdGeom, UsdLux
@@ -330,7 +373,7 @@ def _scene(run: Recording, hashes: str) -> Any:
     layer = Sdf.Layer.CreateAnonymous(".usda")
     stage = Usd.Stage.Open(layer)
     _units(stage)
-    rate = float(run.scene.get("time", {}).get("fps", 24.0))
+    rate = _rate(run)
     stage.SetTimeCodesPerSecond(rate)
     stage.SetFramesPerSecond(rate)
     stage.SetStartTimeCode(0)
@@ -380,6 +423,11 @@ def _scene(run: Recording, hashes: str) -> Any:
     }
     spec.SetInfo("clips", {"default": clips})
     return layer
+
+
+def _rate(run: Recording) -> float:
+    """Frames, and so time codes, a second: a layer that says otherwise is stretched."""
+    return float(run.scene.get("time", {}).get("fps", 24.0))
 
 
 def _units(stage: Any) -> None:

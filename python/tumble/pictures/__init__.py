@@ -1,7 +1,8 @@
 """Pictures of a run: `picture(run, i)`.
 
 Three renderers draw the same things from the same camera: `mitsuba` (path tracing, the finest), `pyvista`
-(rasterization, quick) and `matplotlib` (always there). "auto" takes the finest that works on this machine.
+(rasterization, quick) and `matplotlib` (always there). "auto" takes the finest that works on this machine. Clouds, smoke and
+images are painted over what they draw, but for `mitsuba-smoke`, which traces smoke as well, and takes its time.
 """
 
 import functools
@@ -17,20 +18,23 @@ import numpy as np
 import numpy.typing as npt
 
 from tumble._engine import ExportError
-from tumble.pictures import framing, splats
+from tumble.pictures import framing, splats, volumes
 from tumble.pictures.framing import Camera
 from tumble.pictures.pyvista_ import headless
 from tumble.pictures.surfaces import Floats, unit
-from tumble.pictures.things import Cloud, Ground, Mesh, Recording, Stage, Thing, placed
+from tumble.pictures.things import Body, Cloud, Ground, Image, Mesh, Recording, Smoke, Stage, Thing, placed
 from tumble.style import GROUND, SOLID, display, linear
 
-__all__ = ["RENDERERS", "Studio", "picture", "render", "renderers", "resolve"]
+__all__ = ["RENDERERS", "TRACED", "Studio", "picture", "render", "renderers", "resolve"]
 
 Picture = npt.NDArray[np.uint8]
 """Height x width x 3."""
 
 RENDERERS = ("mitsuba", "pyvista", "matplotlib")
 """The finest first."""
+
+TRACED = "mitsuba-smoke"
+"""Mitsuba for smoke, too."""
 
 PROBES = {
     "mitsuba": "import mitsuba; mitsuba.set_variant('scalar_rgb')",
@@ -58,9 +62,9 @@ def resolve(renderer: str = "auto") -> str:
     """The renderer that "auto" stands for; any other name as it is. Raises ExportError if it does not work here."""
     if renderer == "auto":
         return next(name for name in RENDERERS if _works(name))
-    if renderer not in RENDERERS:
-        raise ExportError(f'no renderer "{renderer}"; there are: auto, {", ".join(RENDERERS)}')
-    if not _works(renderer):
+    if renderer not in (*RENDERERS, TRACED):
+        raise ExportError(f'no renderer "{renderer}"; there are: auto, {", ".join((*RENDERERS, TRACED))}')
+    if not _works("mitsuba" if renderer == TRACED else renderer):
         cure = "pip install 'tumble[pictures]'"
         if renderer == "pyvista" and importlib.util.find_spec("pyvista"):
             cure = "it needs OpenGL: on Debian, apt install libegl1 libgl1-mesa-dri"
@@ -120,6 +124,7 @@ class Studio:
             any("id" in columns for columns in self.run.frame(0).values())
             and any(s.get("method") == "dynamics" for s in self.run.scene.get("system", ()))
         )
+        weighs = weighs or any(o.grid is not None for o in self.stage.objects)
         if self.stage.flat or self.stage.night or not gravity[2] < 0 or not weighs:
             return []
         low, high = points().min(axis=0), points().max(axis=0)
@@ -143,11 +148,13 @@ class Studio:
 
 
 def render(renderer: str, things: list[Thing], camera: Camera, samples: int = SAMPLES, night: bool = False) -> Picture:
-    """Draws things with one of the renderers, and clouds over them. Raises ExportError if it fails."""
+    """Draws things with one of the renderers, and clouds, images and smoke over them. Raises ExportError if it fails."""
     clouds = [t for t in things if isinstance(t, Cloud)]
-    if not clouds and not night:
+    smoke = [t for t in things if isinstance(t, Smoke)] if renderer != TRACED else []
+    images = [t for t in things if isinstance(t, Image)]
+    if not (clouds or smoke or images or night):
         return _drawn(renderer, things, camera, samples)
-    scenery: list[Thing] = [t for t in things if not isinstance(t, Cloud)]
+    scenery: list[Thing] = [t for t in things if isinstance(t, Body | Ground) or (isinstance(t, Smoke) and not smoke)]
     # By night nothing at all is dark, and drawn at once.
     light, depth = (None, np.full(camera.size[::-1], np.inf))
     if scenery or not night:
@@ -157,9 +164,11 @@ def render(renderer: str, things: list[Thing], camera: Camera, samples: int = SA
             shown = splats.glow(light, depth, scenery, clouds, camera)
         else:
             assert light is not None
-            shown = splats.discs(light, depth, clouds, camera)
+            shown = splats.discs(light, depth, clouds, camera) if clouds else light
+        shown = volumes.images(shown, depth, images, camera)
+        shown = volumes.smoke(shown, depth, smoke, camera, night)
     except (MemoryError, ValueError) as error:
-        raise ExportError(f"particles cannot be drawn: {error}") from error
+        raise ExportError(f"particles and smoke cannot be drawn: {error}") from error
     return np.round(255 * display(shown)).astype(np.uint8)
 
 
@@ -178,7 +187,7 @@ def _scenery(renderer: str, things: list[Thing], camera: Camera, samples: int) -
 
 def _drawn(renderer: str, things: list[Thing], camera: Camera, samples: int) -> Picture:
     try:
-        if renderer == "mitsuba":
+        if renderer in ("mitsuba", TRACED):
             from tumble.pictures import mitsuba_
 
             return mitsuba_.draw(things, camera, samples)

@@ -214,6 +214,7 @@ def outline(run: Recording) -> Floats:
         room = np.linalg.norm(high - low)
         bodies = [np.clip(b, low - room, high + room) for b in bodies]
     parts += [b[np.argmax(b @ DIRECTIONS.T, axis=0)] for b in bodies]
+    parts += [o.grid.corners for o in found if o.grid is not None]
     extent = np.concatenate(parts) if parts else np.zeros((1, 3))
     if np.ptp(extent, axis=0).max() == 0:
         extent = extent[:1] + 0.5 * DIRECTIONS

@@ -17,7 +17,7 @@ from tumble.pictures.denoise import denoise
 from tumble.pictures.framing import Camera
 from tumble.pictures.look import FADE, background, fading, key_light, soften
 from tumble.pictures.surfaces import Floats, Indices, balls, joined, turned, unit
-from tumble.pictures.things import Body, Ground, Mesh, Spheres, Thing, Tubes, as_triangles
+from tumble.pictures.things import Body, Ground, Mesh, Smoke, Spheres, Thing, Tubes, as_triangles
 from tumble.style import Rgb, display
 
 MANY = 20_000
@@ -35,6 +35,7 @@ KEY_SIZE = 0.2
 KEY_DISTANCE = 1000.0
 
 PATHS = {"type": "path", "max_depth": 5, "hide_emitters": True}
+THROUGH_SMOKE = {"type": "volpath", "max_depth": 24, "rr_depth": 12, "hide_emitters": True}
 COVER = {"type": "depth"}
 GUIDES = {"type": "aov", "aovs": "normal:sh_normal,place:position"}
 
@@ -53,7 +54,8 @@ def draw(things: list[Thing], camera: Camera, samples: int) -> Picture:
     bodies = [t for t in things if isinstance(t, Body)]
     with tempfile.TemporaryDirectory() as folder:
         shapes = _shapes(mi, bodies, camera, Path(folder))
-        light = _render(mi, camera, samples, PATHS, shapes | floors)
+        smoke = {f"smoke {k}": _smoke(mi, t) for k, t in enumerate(things) if isinstance(t, Smoke)}
+        light = _render(mi, camera, samples, THROUGH_SMOKE if smoke else PATHS, shapes | floors | smoke)
         cover = _render(mi, camera, samples, COVER, shapes)[..., 3:] if grounds else None
     guides = _render(mi, camera, 1, GUIDES, _proxies(mi, bodies) | floors)
     shown = light[..., :3] + (1 - light[..., 3:]) * background(camera.size)
@@ -148,6 +150,26 @@ def _shapes(mi: Any, bodies: list[Body], camera: Camera, folder: Path) -> dict[s
             found = {"": _mesh(mi, *turned(thing.vertices, thing.triangles, thing.normals, camera.eye), look)}
         shapes |= {f"{k} {name}": shape for name, shape in found.items()}
     return shapes
+
+
+def _smoke(mi: Any, thing: Smoke) -> dict[str, Any]:
+    """A box without a surface, and in it what takes light away and scatters the same share of it everywhere."""
+    n = np.array(thing.extinction.shape)
+    place = mi.ScalarTransform4f().translate(thing.low.tolist()).scale((thing.spacing * n).tolist())
+    # The plugin's order: z slowest.
+    numbers = np.ascontiguousarray(np.transpose(thing.extinction, (2, 1, 0))[..., None], dtype=np.float32)
+    grid = {"type": "gridvolume", "grid": mi.VolumeGrid(numbers), "to_world": place, "filter_type": "trilinear"}
+    return {
+        "type": "cube",
+        "to_world": place @ mi.ScalarTransform4f().translate([0.5, 0.5, 0.5]).scale([0.5, 0.5, 0.5]),
+        "bsdf": {"type": "null"},
+        "interior": {
+            "type": "heterogeneous",
+            "sigma_t": grid,
+            "albedo": {"type": "rgb", "value": np.clip(thing.color, 0.0, 0.999).tolist()},
+            "scale": 1.0,
+        },
+    }
 
 
 def _proxies(mi: Any, bodies: list[Body]) -> dict[str, Any]:

@@ -66,7 +66,7 @@ def depths(things: list[Thing], camera: Camera) -> Floats:
                 away = np.sum((thing.point - start) * thing.normal, axis=-1) / (rays @ thing.normal)
             away = away.ravel()
             found = np.where(away > NEAR, np.minimum(found, away), found)
-        elif not isinstance(thing, Cloud):
+        elif isinstance(thing, Body):
             _hide(found, thing, camera)
     return found.reshape(height, width)
 
@@ -117,7 +117,7 @@ def _hide(found: Floats, thing: Body, camera: Camera) -> None:
 def discs(light: Floats, depth: Floats, clouds: list[Cloud], camera: Camera) -> Floats:
     """A picture in linear light, height x width x 3, with clouds of lit balls added."""
     x, r, color = (np.concatenate([getattr(c, name) for c in clouds]) for name in ("centers", "radii", "colors"))
-    shade = _Shade(x, r, camera)
+    shade = Shade(x, r, camera)
     shown = light * shade.on(depth, camera)[..., None]
     shown = _ways(shown, depth, clouds, camera)
     width, height = camera.size
@@ -221,16 +221,18 @@ def _nearest(at: Floats, size: Floats, r: Floats, depth: Floats, split: int) -> 
     return found
 
 
-class _Shade:
+class Shade:
     """How much key light gets through a cloud to any place: layers of a map across the light, each with all that is
     nearer to the light."""
 
-    def __init__(self, x: Floats, r: Floats, camera: Camera) -> None:
+    def __init__(self, x: Floats, r: Floats, camera: Camera, amount: Floats | None = None) -> None:
+        """`amount` is the area that each particle takes from the light, without it that of a ball."""
         self.light = key_light(camera)
         self.a = unit(np.cross(self.light, np.eye(3)[np.argmin(np.abs(self.light))]))
         self.b = np.cross(self.light, self.a)
         near = np.isfinite(x).all(axis=1) & (np.linalg.norm(x - camera.target, axis=1) < 3 * camera.width)
         x, r = x[near], r[near]
+        area = np.pi * r * r if amount is None else amount[near]
         self.empty = not len(x) or camera.parallel  # Seen head-on, nothing is below anything else.
         if self.empty:
             return
@@ -245,12 +247,12 @@ class _Shade:
         column, row = ((place[:, :2] - self.middle) / cell + 0.5 * CELLS - 0.5).T
         layer = np.clip((place[:, 2] - self.low) / self.thick, 0, LAYERS - 1).astype(int)
         caught = np.zeros(LAYERS * CELLS * CELLS)
-        amount = np.minimum(np.pi * r * r / cell**2, 4.0)
+        taken = np.minimum(area / cell**2, 4.0)
         i, j = np.floor(row).astype(int), np.floor(column).astype(int)
         s, t = row - i, column - j
         for di, dj, w in ((0, 0, (1 - s) * (1 - t)), (0, 1, (1 - s) * t), (1, 0, s * (1 - t)), (1, 1, s * t)):
             k = np.clip(i + di, 0, CELLS - 1) * CELLS + np.clip(j + dj, 0, CELLS - 1)
-            caught += np.bincount(layer * CELLS * CELLS + k, amount * w, len(caught))
+            caught += np.bincount(layer * CELLS * CELLS + k, taken * w, len(caught))
         layers = caught.reshape(LAYERS, CELLS, CELLS)
         wide = max(1, round(float(np.median(r)) / cell))
         for axis in (1, 2):

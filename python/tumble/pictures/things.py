@@ -1,6 +1,7 @@
 """What there is to see in a run: its objects, and for each frame meshes, spheres, tubes and grounds with colours.
 
-Renderers draw these four and know nothing of scenes. Particles become spheres (and tubes for their springs and the way
+Renderers draw these four and know nothing of scenes. What lies on grids becomes smoke, or in a plane an image, which
+`volumes` paints over the picture. Particles become spheres (and tubes for their springs and the way
 behind them), or, where there are many or they come and go, a cloud, which `splats` paints over the picture; ropes and
 anchors become tubes, sheets, blocks and nets meshes, colliders meshes, floors and planes grounds. Torn links show: a
 triangle or a piece of rope across a link that broke is left out (this needs `link_strain` among the scene's output
@@ -15,9 +16,11 @@ from typing import Any, Literal, Protocol
 import numpy as np
 import numpy.typing as npt
 
+from tumble import grids
 from tumble._engine import ExportError
+from tumble.grids import Box
 from tumble.pictures.surfaces import Floats, Indices, balls, normals, outward, split, tubes
-from tumble.style import GROUND, PALETTE, SOLID, Rgb, rgb
+from tumble.style import COLORS, GROUND, PALETTE, SOLID, Rgb, linear, rgb
 
 Array = npt.NDArray[Any]
 Columns = Mapping[str, Mapping[str, Array]]
@@ -54,7 +57,7 @@ class Recording(Protocol):
         """Time of a frame [s]."""
 
 
-Kind = Literal["points", "curve", "sheet", "block", "solid", "ground"]
+Kind = Literal["points", "curve", "sheet", "block", "solid", "ground", "grid"]
 
 
 @dataclass(frozen=True)
@@ -79,6 +82,8 @@ class Object:
     """A point and the unit normal of a ground."""
     container: bool = False
     """Whether masses are inside, so that it is drawn as its edges."""
+    grid: Box | None = None
+    """Where its numbers lie, if it is on a grid."""
 
 
 @dataclass(frozen=True)
@@ -142,14 +147,60 @@ class Cloud:
     """1 for pieces that end now, 0 for those that are as old as the trail is long."""
 
 
+@dataclass(frozen=True)
+class Smoke:
+    """What takes light away and scatters or sends out some, on a grid of cubic cells."""
+
+    name: str
+    low: Floats
+    """Lowest corner."""
+    spacing: float
+    extinction: npt.NDArray[np.float32]
+    """Share of the light that is taken away, over a length; nx x ny x nz."""
+    color: Rgb
+    """Share of that which is scattered."""
+    emission: npt.NDArray[np.float32] | None = None
+    """Light that is sent out over a length, nx x ny x nz x 3."""
+
+
+@dataclass(frozen=True)
+class Image:
+    """A picture in a plane."""
+
+    name: str
+    corner: Floats
+    across: Floats
+    """Its lower side, and its left one."""
+    up: Floats
+    light: Floats
+    """Colours, n x m x 3: n across, m up."""
+    cover: Floats
+    """How much it hides, n x m."""
+
+
 Body = Mesh | Spheres | Tubes
-Thing = Body | Ground | Cloud
+Thing = Body | Ground | Cloud | Smoke | Image
 
 MANY = 2_000
 """An object of more particles than these is drawn as a cloud."""
 
 FINER = 0.6
 """Particles of clouds may be this much thinner than the thinnest."""
+
+SHOWN = ("density", "fuel", "temperature", "vorticity", "speed", "pressure", "divergence")
+"""What is shown of an object on a grid: the first of these that is in the frames and not the same everywhere."""
+
+LOOKED_AT = 9
+"""Frames at which the range of what lies on a grid is taken, at most."""
+
+SMOKE: Rgb = (0.52, 0.53, 0.56)
+"""Colour of smoke that has none of its own."""
+
+THICK = 40.0
+"""Optical depth of the thickest smoke of a run across its whole box, the mean of its sides."""
+
+DYE = 3.0
+"""Optical depth of the thickest dye in a plane."""
 
 FEW = 200
 """An object of fewer masses than these is drawn at least three times as thick as the thinnest."""
@@ -173,7 +224,8 @@ def objects(run: Recording) -> list[Object]:
     start = run.frame(0) if run.n_frames else {}
     for name, columns in {**{n: {} for n in start if n not in run.static}, **run.static}.items():
         section, entry = words.get(name, ("", {}))
-        solid = section == "collider" or "position" in columns
+        grid = grids.box(columns)
+        solid = grid is None and (section == "collider" or "position" in columns)
         plane = _plane(entry.get("shape")) if solid else None
         color: Rgb
         if entry.get("color") is not None:
@@ -181,11 +233,15 @@ def objects(run: Recording) -> list[Object]:
             color = (r, g, b)
         elif solid:
             color = SOLID if plane is None else GROUND
+        elif grid is not None and grid.flat == 3:
+            color = SMOKE
         else:
             color = rgb(PALETTE[colors % len(PALETTE)])
             colors += 1
         kind: Kind = "points"
-        if solid:
+        if grid is not None:
+            kind = "grid"
+        elif solid:
             kind = "solid" if plane is None else "ground"
         elif len(columns.get("triangles", ())):
             kind = "block" if section == "block" else "sheet"
@@ -205,14 +261,15 @@ def objects(run: Recording) -> list[Object]:
                 position=np.asarray(columns["position"], dtype=float).reshape(-1, 3) if "position" in columns else None,
                 plane=plane,
                 container=bool(entry.get("inside", False)),
+                grid=grid,
             )
         )
     return found
 
 
 def moving(found: list[Object]) -> list[Object]:
-    """Those that are in the frames."""
-    return [o for o in found if o.kind not in ("solid", "ground")]
+    """Those whose positions are in the frames."""
+    return [o for o in found if o.kind not in ("solid", "ground", "grid")]
 
 
 def positions(columns: Columns, thing: Object) -> Floats:
@@ -267,6 +324,7 @@ class Stage:
         self.night = run.scene.get("camera", {}).get("look") == "night"
         self._ways: dict[tuple[str, int], Floats] = {}
         self._pieces: dict[tuple[str, int], tuple[Floats, Floats]] = {}
+        self._ranges: dict[str, tuple[str, float, float] | None] = {}
 
     def things(self, i: int, thinnest: float = 0.0) -> list[Thing]:
         """What is to be drawn of frame i. Nothing is thinner than the radius `thinnest` [m]."""
@@ -277,6 +335,8 @@ class Stage:
                 point, normal = thing.plane
                 tip = carried(thing, columns, np.stack([point, point + normal]))
                 drawn.append(Ground(thing.name, tip[0], tip[1] - tip[0], thing.color))
+            elif thing.grid is not None:
+                drawn += self._on_grid(thing, thing.grid, columns, thinnest)
             elif thing.kind == "solid":
                 if thing.position is not None and len(thing.triangles):
                     x = carried(thing, columns, thing.position)
@@ -296,6 +356,54 @@ class Stage:
             counts = np.full(len(self._anchors), 2)
             drawn.append(Tubes("anchors", np.array(ends), counts, max(0.004, thinnest), SOLID))
         return drawn
+
+    def _on_grid(self, thing: Object, grid: Box, columns: Columns, thinnest: float) -> list[Thing]:
+        """Smoke; in a plane an image and a line around it."""
+        if thing.name not in self._ranges:
+            self._ranges[thing.name] = self._range(thing, grid)
+        drawn: list[Thing] = []
+        found = self._ranges[thing.name]
+        if found is not None:
+            name, low, high = found
+            values = _one_number(grid, columns.get(thing.name, {}), name)
+            # As a share of what there is in the whole run.
+            share = np.nan_to_num((values - low) / (high - low), nan=1.0, posinf=1.0, neginf=0.0)
+            if grid.flat == 3:
+                thick = np.clip(share, 0.0, None) * (THICK / float(grid.size.mean()))
+                drawn.append(Smoke(thing.name, grid.origin, grid.spacing, thick.astype(np.float32), thing.color))
+            else:
+                drawn.append(_image(thing, grid, name, share))
+        if grid.flat < 3:
+            corners = grid.corners[[[0, 1, 3, 2], [0, 1, 5, 4], [0, 2, 6, 4]][grid.flat]]
+            line = np.stack([corners, np.roll(corners, -1, axis=0)], axis=1).reshape(-1, 3)
+            drawn.append(Tubes(f"{thing.name} edges", line, np.full(4, 2), max(thinnest, 1e-9), SOLID))
+        return drawn
+
+    def _range(self, thing: Object, grid: Box) -> tuple[str, float, float] | None:
+        """What is shown of an object on a grid, from where to where; nothing if there is nothing to see."""
+        looks = np.unique(np.linspace(0, self.run.n_frames - 1, LOOKED_AT).astype(int)).tolist()
+        tables = [self.run.frame(i).get(thing.name, {}) for i in looks]
+        for name in SHOWN:
+            try:
+                values = [_one_number(grid, table, name) for table in tables]
+            except ExportError:
+                continue
+            finite = [v[np.isfinite(v)] for v in values]
+            low = min((float(v.min()) for v in finite if v.size), default=0.0)
+            high = max((float(v.max()) for v in finite if v.size), default=0.0)
+            if not high > low:
+                continue
+            if name in ("density", "fuel"):
+                return name, 0.0, high
+            if name in SIGNED:
+                # A few cells beside walls are far off the rest.
+                most = max((float(np.quantile(np.abs(v), 0.998)) for v in finite if v.size), default=0.0) or high
+                return name, 0.0 if grid.flat == 3 else -most, most
+            if name == "temperature" and grid.flat == 3:
+                low = float(np.median(np.concatenate([v.ravel() for v in finite])))
+                return (name, low, high) if high > low else None
+            return name, low, high
+        return None
 
     def _is_cloud(self, thing: Object, columns: Columns) -> bool:
         """Whether an object is drawn by `splats`."""
@@ -409,6 +517,34 @@ class Stage:
         return np.ravel(np.isnan(strain) & ~np.isnan(start))
 
 
+SIGNED = ("vorticity", "pressure", "divergence")
+"""Shown around zero."""
+
+
+def _one_number(grid: Box, table: Mapping[str, Array], name: str) -> Floats:
+    """A column with one number for each cell: lengths of vectors, and in space, where colours cannot say it, no signs."""
+    values = grids.shown(grid, table, name).astype(float)
+    if values.ndim == 4:
+        return np.asarray(np.linalg.norm(values, axis=-1))
+    return np.asarray(np.abs(values) if grid.flat == 3 and name in SIGNED else values)
+
+
+def _image(thing: Object, grid: Box, name: str, share: Floats) -> Image:
+    """What lies in a plane: dye in the object's colour, all else in a map of colours."""
+    import matplotlib
+
+    a, b = grid.axes
+    share = np.squeeze(share, axis=grid.flat)
+    corner, sides = grid.corners[0], np.diag(grid.size)
+    if name in ("density", "fuel"):
+        cover = 1 - np.exp(-DYE * np.clip(share, 0.0, None))
+        light = np.broadcast_to(np.array(thing.color), (*share.shape, 3))
+    else:
+        cover = np.ones(share.shape)
+        light = linear(matplotlib.colormaps[COLORS.get(name, "viridis")](share)[..., :3])
+    return Image(thing.name, corner, sides[a], sides[b], np.asarray(light, dtype=float), cover)
+
+
 def _piece(thing: Object, before: Columns, after: Columns) -> tuple[Floats, Floats]:
     """The ways of particles from one frame to the next, m x 2 x 3, and their colours; of those that are in both."""
     x, y, shade = positions(before, thing), positions(after, thing), colors(after, thing)
@@ -490,6 +626,13 @@ def placed(things: list[Thing], origin: Floats, scale: float) -> list[Thing]:
         elif isinstance(t, Cloud):
             ways = (t.ways - origin) / scale
             out.append(replace(t, centers=(t.centers - origin) / scale, radii=t.radii / scale, ways=ways))
+        elif isinstance(t, Smoke):
+            glow = None if t.emission is None else t.emission * np.float32(scale)
+            thick = t.extinction * np.float32(scale)
+            low = (t.low - origin) / scale
+            out.append(replace(t, low=low, spacing=t.spacing / scale, extinction=thick, emission=glow))
+        elif isinstance(t, Image):
+            out.append(replace(t, corner=(t.corner - origin) / scale, across=t.across / scale, up=t.up / scale))
         else:
             out.append(replace(t, point=(t.point - origin) / scale))
     return out

@@ -4,6 +4,7 @@
 mod animated;
 mod emitters;
 mod forces;
+mod gas;
 mod grids;
 mod output;
 mod shapes;
@@ -13,6 +14,10 @@ mod systems;
 pub use animated::{Animated, AnimatedVector, Component, Interpolation, Keys, VectorKeys};
 pub use emitters::{Between, Burst, Cause, Emitter, Event, Kill, Source, WhenFull};
 pub use forces::{Anchor, Field, Force, Goal};
+pub use gas::{
+    Advections, Carriage, ExcessFlow, Gas, GasSide, GasSides, GasSource, GridInterpolation, Order, PathTrace, Pressure, PressureMethod,
+    Smoke, Temperature, Viscous,
+};
 pub use grids::GridBox;
 pub use output::{Camera, Expect, Look, Output, Probe};
 pub use shapes::{Collider, MeshFile, MeshFrame, MeshFrames, MeshRef, Motion, Pace, Pose, Shape};
@@ -84,6 +89,9 @@ pub struct Scene {
     /// Stars, placed at random and set going so that they hold together; needs a force of gravitation.
     #[serde(default)]
     pub galaxy: Vec<Galaxy>,
+    /// Fluids that fill a box, moved by systems of method `gas`.
+    #[serde(default)]
+    pub gas: Vec<Gas>,
     /// Forces on the masses of `dynamics` systems.
     #[serde(default)]
     pub force: Vec<Force>,

@@ -15,6 +15,8 @@ pub struct Output {
     pub usd: bool,
     /// Write `ply/`: the particles of each object at each frame.
     pub ply: bool,
+    /// Write `volumes/`: what lies on the grid of each object, at each frame.
+    pub vdb: bool,
     /// Write `energy.png`.
     pub plot: bool,
     /// Frames of which to write a still picture.
@@ -31,6 +33,7 @@ impl Default for Output {
             film: false,
             usd: false,
             ply: false,
+            vdb: false,
             plot: true,
             stills: Vec::new(),
             checkpoint: 10,

@@ -73,6 +73,8 @@ pub enum Method {
     /// The model of Vicsek: particles of constant speed that take the mean direction of all within a radius, and err. A map:
     /// each sub-step is one step of it (one an exchange without `substeps` and `step`), and there is no integrator.
     Vicsek,
+    /// Stable Fluids: incompressible fluids that fill boxes of cells, `[[gas]]`. There is no integrator.
+    Gas,
 }
 
 impl Method {
@@ -82,6 +84,7 @@ impl Method {
             Self::Dynamics => "dynamics",
             Self::Tracers => "tracers",
             Self::Vicsek => "vicsek",
+            Self::Gas => "gas",
         }
     }
 }

@@ -17,7 +17,7 @@ mod scenery;
 mod sheet;
 
 pub use block::block;
-pub use emitter::emitter;
+pub use emitter::{emitter, region};
 pub use galaxy::galaxy;
 pub use grid::grid;
 pub use net::net;

@@ -2,6 +2,7 @@
 
 use super::Assets;
 use super::checks::{check, objects, others, place};
+use super::gas::gas;
 use super::laws::{Reader, flat};
 use super::memory::memory;
 use crate::exchange::Exchange;
@@ -34,9 +35,14 @@ pub struct Built {
     pub warnings: Vec<String>,
 }
 
-/// The systems of a scene, or the default one.
+/// The systems of a scene, or the default ones.
 pub fn plans(scene: &Scene) -> Vec<Plan> {
-    if scene.system.is_empty() { vec![Plan::default()] } else { scene.system.clone() }
+    if !scene.system.is_empty() {
+        return scene.system.clone();
+    }
+    let masses = objects(scene).iter().any(|(kind, ..)| *kind != "gas") || scene.gas.is_empty();
+    let gas = (!scene.gas.is_empty()).then(|| Plan { name: "gas".into(), method: Method::Gas, ..Plan::default() });
+    masses.then(Plan::default).into_iter().chain(gas).collect()
 }
 
 /// Builds the scene, or tells everything that is wrong with it.
@@ -90,6 +96,10 @@ pub fn build(scene: &Scene, assets: &Assets) -> Result<Built, SceneError> {
         }
         if let (Method::Vicsek, Some(words)) = (plan.method, &plan.vicsek) {
             systems.push(Box::new(swarm(scene, &plans, index, words)));
+            continue;
+        }
+        if plan.method == Method::Gas {
+            systems.push(Box::new(gas(scene, &plans, index, gravity)?));
             continue;
         }
         let settings = Settings {
@@ -277,7 +287,7 @@ fn fill(scene: &Scene, plans: &[Plan], assets: &Assets, issues: &mut Vec<Issue>)
             match method {
                 Method::Tracers => drop(recipes::tracers(thing, &mut wrong)),
                 Method::Vicsek => drop(recipes::walkers(thing, &mut wrong)),
-                Method::Dynamics => recipes::particles(site, thing),
+                Method::Dynamics | Method::Gas => recipes::particles(site, thing),
             }
         });
     }

@@ -8,7 +8,21 @@ use tumble_interface::check::suggestion;
 use tumble_interface::scene::{Force, Integrator, Method, Plane, Scene, Shape, Source, System};
 
 /// Column names that a frame may hold.
-pub const COLUMNS: [&str; 5] = ["position", "velocity", "orientation", "angular_velocity", "link_strain"];
+pub const COLUMNS: [&str; 13] = [
+    "position",
+    "velocity",
+    "orientation",
+    "angular_velocity",
+    "link_strain",
+    "density",
+    "temperature",
+    "pressure",
+    "vorticity",
+    "divergence",
+    "velocity_x",
+    "velocity_y",
+    "velocity_z",
+];
 
 /// Names of objects, with the kind of each.
 pub fn objects(scene: &Scene) -> Vec<(&'static str, &str, Option<&str>)> {
@@ -19,7 +33,8 @@ pub fn objects(scene: &Scene) -> Vec<(&'static str, &str, Option<&str>)> {
     let nets = scene.net.iter().map(|o| ("net", o.name.as_str(), o.system.as_deref()));
     let emitters = scene.emitter.iter().map(|o| ("emitter", o.name.as_str(), o.system.as_deref()));
     let galaxies = scene.galaxy.iter().map(|o| ("galaxy", o.name.as_str(), o.system.as_deref()));
-    particles.chain(emitters).chain(ropes).chain(sheets).chain(blocks).chain(nets).chain(galaxies).collect()
+    let gases = scene.gas.iter().map(|o| ("gas", o.name.as_str(), o.system.as_deref()));
+    particles.chain(emitters).chain(ropes).chain(sheets).chain(blocks).chain(nets).chain(galaxies).chain(gases).collect()
 }
 
 /// Everything wrong that can be seen before anything is built; `systems` are those of the scene, or the default one.
@@ -28,7 +43,7 @@ pub fn check(scene: &Scene, systems: &[System]) -> Vec<Issue> {
     let mut wrong = |path: String, message: String| issues.push(Issue::new(path, message));
     let objects = objects(scene);
     if objects.is_empty() {
-        wrong(String::new(), "nothing to simulate: add particles, an emitter, a rope, a sheet, a block, a net or a galaxy".into());
+        wrong(String::new(), "nothing to simulate: add particles, an emitter, a rope, a sheet, a block, a net, a galaxy or a gas".into());
     }
     let colliders = scene.collider.iter().map(|c| ("collider", c.name.as_str()));
     let mut names = HashSet::new();
@@ -83,6 +98,10 @@ pub fn check(scene: &Scene, systems: &[System]) -> Vec<Issue> {
                 let list = known().collect::<Vec<_>>().join(", ");
                 wrong(format!("{kind} \"{name}\".system"), format!("there is no system \"{given}\"{hint} (systems: {list})"));
             }
+            (given, None) if *kind == "gas" => {
+                let given = given.map_or_else(|| "no system".into(), |s| format!("system \"{s}\", which"));
+                wrong(format!("gas \"{name}\".system"), format!("{given} moves no fluid; add a [[system]] with method = \"gas\""));
+            }
             (Some(given), None) => wrong(
                 format!("{kind} \"{name}\".system"),
                 format!("system \"{given}\" moves particles without mass; this needs a dynamics system"),
@@ -136,7 +155,8 @@ pub fn check(scene: &Scene, systems: &[System]) -> Vec<Issue> {
 /// The system that moves an object of this kind: the one it names, else the first that can.
 pub fn place(systems: &[System], kind: &str, named: Option<&str>) -> Option<usize> {
     let can = |s: &System| match s.method {
-        Method::Dynamics => true,
+        Method::Dynamics => kind != "gas",
+        Method::Gas => kind == "gas",
         Method::Tracers => matches!(kind, "particles" | "emitter"),
         Method::Vicsek => kind == "particles",
     };
@@ -149,6 +169,7 @@ fn massless(systems: &[System], kind: &str, named: Option<&str>) -> Option<&'sta
         Method::Dynamics => None,
         Method::Tracers => Some("tracers"),
         Method::Vicsek => Some("particles of a vicsek system"),
+        Method::Gas => Some("cells of a fluid"),
     }
 }
 
@@ -180,12 +201,15 @@ fn check_system(system: &System, path: &str, wrong: &mut impl FnMut(String, Stri
     if system.method == Method::Vicsek && integrator != Integrator::default() {
         wrong(format!("{path}.integrator"), "the model of Vicsek is a map and has no integrator; leave it out".into());
     }
+    if system.method == Method::Gas && integrator != Integrator::default() {
+        wrong(format!("{path}.integrator"), "Stable Fluids have no integrator; leave it out".into());
+    }
     match (&system.vicsek, system.method) {
         (None, Method::Vicsek) => wrong(format!("{path}.vicsek"), "missing, expected side, radius, speed and noise".into()),
         (Some(words), Method::Vicsek) if 2.0 * words.radius > words.side => {
             wrong(format!("{path}.vicsek.radius"), format!("{} m, expected at most half the side, {} m", words.radius, 0.5 * words.side));
         }
-        (Some(_), Method::Dynamics | Method::Tracers) => {
+        (Some(_), Method::Dynamics | Method::Tracers | Method::Gas) => {
             wrong(
                 format!("{path}.vicsek"),
                 format!("given with method \"{}\"; leave it out, or set method = \"vicsek\"", system.method.name()),
