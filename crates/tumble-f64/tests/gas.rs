@@ -118,7 +118,12 @@ fn poiseuille_and_couette_reach_their_profiles() {
         // its chord, not its arc, which adds a dx²/(8 nu) everywhere: 1.2207e-4, to what 60 s leave of the start.
         let offset = 0.05 * dx * dx / (8.0 * 0.05);
         let error = u.iter().enumerate().map(|(i, u)| (u - 0.05 * z(i) * (1.0 - z(i)) / 0.1 - offset).abs()).fold(0.0, f64::max);
-        assert!(error < 1e-11, "{viscous}: {error:e}"); // 1e-13
+        if viscous == "explicit" {
+            // Half the acceleration of a step is still there when a frame is taken: h a/2 = 6.25e-3, measured 6.37e-3.
+            assert!(error > 0.9 * 6.25e-3 && error < 1.1 * 6.25e-3, "{error:e}");
+            continue;
+        }
+        assert!(error < 1e-11, "{error:e}"); // 1e-13
         assert!((largest(&u) - 0.125).abs() < 1e-3);
     }
     let sim = channel("sides = { x = [\"periodic\", \"periodic\"], z = [\"no_slip\", { wall = { velocity = [0.3, 0, 0] } }] }", 60);
@@ -176,11 +181,13 @@ fn a_frame_is_free_of_divergence_in_both_orders_and_with_every_solver() {
         assert_eq!(report.unconverged, 0, "{words}");
         let asked = if words.contains("1e-6") { 1e-6 } else { 1e-10 };
         assert!(report.residual <= asked && report.residual > 0.0, "{words}: {:e}", report.residual);
-        let fastest = ["velocity_x", "velocity_y", "velocity_z"].map(|name| largest(&grid(&sim, "air", name).0)).into_iter().fold(0.0, f64::max);
+        let fastest =
+            ["velocity_x", "velocity_y", "velocity_z"].map(|name| largest(&grid(&sim, "air", name).0)).into_iter().fold(0.0, f64::max);
         let left = largest(&grid(&sim, "air", "divergence").0) / 24.0 * 1.5 / fastest;
         // The tolerance is over the velocity before the projection, which is a little faster.
         assert!(fastest > 0.1 && left < 3.0 * asked, "{words}: {left:e} at {fastest} m/s");
-        assert!(!report.pressure.is_empty() && report.pressure.iter().all(|r| *r < 2.0));
+        // Over-relaxation may grow before it falls.
+        assert!(report.pressure.last().is_some_and(|r| *r < 1e-3), "{words}: {:?}", report.pressure.last());
     }
 }
 
@@ -188,8 +195,8 @@ fn a_frame_is_free_of_divergence_in_both_orders_and_with_every_solver() {
 fn smoke_is_neither_made_nor_lost_but_by_advection() {
     let mut sim = simulation(PLUME);
     let before = sim.ledger().mass;
-    // Twice the integral over the ball: 4 pi int r² s(r) dr = 0.0424 with a smooth step.
-    assert!((before - 0.0424).abs() < 1e-3, "{before}");
+    // 4 pi int r² s(r) dr over the ball, by quadrature: 0.038453.
+    assert!((before - 0.038453).abs() < 2e-4, "{before}"); // 0.038529
     run(&mut sim, 20);
     let books = sim.ledger();
     println!("mass {before} -> {}, speed {}, kinetic {}", books.mass, books.speed, books.kinetic);
@@ -197,7 +204,9 @@ fn smoke_is_neither_made_nor_lost_but_by_advection() {
     assert!((books.mass / before - 1.0).abs() < 0.03 && books.mass != before, "{}", books.mass / before - 1.0);
     assert!(books.speed > 0.5 && books.speed < 3.0, "{}", books.speed);
     // A fluid at rest loses none.
-    let mut still = simulation("time = { fps = 24, frames = 5 }\nworld = { gravity = [0, 0, 0] }\n[[gas]]\nname = \"air\"\nbox = { size = [1, 1, 1], resolution = 12 }\nsmoke = { initial = \"1 + x\" }\n");
+    let mut still = simulation(
+        "time = { fps = 24, frames = 5 }\nworld = { gravity = [0, 0, 0] }\n[[gas]]\nname = \"air\"\nbox = { size = [1, 1, 1], resolution = 12 }\nsmoke = { initial = \"1 + x\" }\n",
+    );
     let before = still.ledger().mass;
     run(&mut still, 5);
     assert_eq!(still.ledger().mass, before);
@@ -225,7 +234,17 @@ end = 1.0
     run(&mut sim, 10);
     // M' = 3 0.4³ - M/2 from 0.45 to 1 s; fading comes first in each step of 0.1 s, so that what is born in a step fades from the next on.
     let rate = 3.0 * 0.4_f64.powi(3);
-    let exact = (0..10).fold(0.0, |m, i| m * (-0.05_f64).exp() + rate * if i < 4 { 0.0 } else if i == 4 { 0.05 } else { 0.1 });
+    let exact = (0..10).fold(0.0, |m, i| {
+        m * (-0.05_f64).exp()
+            + rate
+                * if i < 4 {
+                    0.0
+                } else if i == 4 {
+                    0.05
+                } else {
+                    0.1
+                }
+    });
     assert!((sim.ledger().mass / exact - 1.0).abs() < 1e-9, "{} {exact}", sim.ledger().mass);
     let (t, _) = grid(&sim, "air", "temperature");
     assert!((t[7] - 300.0 - 10.0 * (-2.0_f64).exp()).abs() < 1e-9, "{}", t[7]);
@@ -264,14 +283,19 @@ density = 1
 
 #[test]
 fn a_broken_number_is_told_with_its_cell() {
-    let mut sim = simulation(PLUME);
     let n = 16 * 16 * 24;
     let mut t = vec![300.0; n];
-    t[16 * 16 * 3 + 16 * 2 + 1] = 1e200;
-    sim.write("air", "temperature", &t).unwrap();
-    let error = sim.step(&|| true).unwrap_err().to_string();
-    println!("{error}");
-    assert!(error.contains("system \"gas\"") && error.contains("air"), "{error}");
+    t[16 * 16 * 3 + 16 * 2 + 1] = 1e308;
+    // Of steps by the Courant number there would be too many; a given one breaks in the cell.
+    for (system, told) in [("", "sub-steps"), ("[[system]]\nname = \"gas\"\nmethod = \"gas\"\nsubsteps = 1\n", "first bad")] {
+        let mut sim = simulation(&format!("{PLUME}{system}"));
+        let hash = sim.hash();
+        sim.write("air", "temperature", &t).unwrap();
+        assert_ne!(sim.hash(), hash);
+        let error = sim.step(&|| true).unwrap_err().to_string();
+        println!("{error}");
+        assert!(error.contains("system \"gas\"") && error.contains("\"air\"") && error.contains(told), "{error}");
+    }
 }
 
 #[test]
@@ -293,8 +317,19 @@ courant = 0.5
     run(&mut sim, 30);
     // The converged column of the table of Ghia, Ghia and Shin: u on x = 0.5 at these heights.
     let table = [
-        (0.9766, 0.84348), (0.9688, 0.79161), (0.9609, 0.74071), (0.9531, 0.69118), (0.8516, 0.23645), (0.7344, 0.00415), (0.6172, -0.13881),
-        (0.5, -0.20915), (0.4531, -0.21398), (0.2812, -0.15765), (0.1719, -0.10173), (0.1016, -0.06441), (0.0703, -0.04663),
+        (0.9766, 0.84348),
+        (0.9688, 0.79161),
+        (0.9609, 0.74071),
+        (0.9531, 0.69118),
+        (0.8516, 0.23645),
+        (0.7344, 0.00415),
+        (0.6172, -0.13881),
+        (0.5, -0.20915),
+        (0.4531, -0.21398),
+        (0.2812, -0.15765),
+        (0.1719, -0.10173),
+        (0.1016, -0.06441),
+        (0.0703, -0.04663),
     ];
     let (u, points) = grid(&sim, "fluid", "velocity_x");
     let line: Vec<f64> = (0..64).map(|j| u[j * points[0] + 32]).collect();
@@ -309,5 +344,6 @@ courant = 0.5
     step(&mut sim);
     println!("cavity: {worst:.4}, kinetic {before} -> {}", sim.ledger().kinetic);
     assert!((sim.ledger().kinetic / before - 1.0).abs() < 1e-4);
-    assert!(worst < 0.02, "{worst}");
+    // The goal is 2 % of the lid's speed; measured 0.40 %.
+    assert!(worst < 0.006, "{worst}");
 }
