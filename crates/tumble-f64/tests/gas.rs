@@ -195,13 +195,14 @@ fn a_frame_is_free_of_divergence_in_both_orders_and_with_every_solver() {
 fn smoke_is_neither_made_nor_lost_but_by_advection() {
     let mut sim = simulation(PLUME);
     let before = sim.ledger().mass;
-    // 4 pi int r² s(r) dr over the ball, by quadrature: 0.038453.
-    assert!((before - 0.038453).abs() < 2e-4, "{before}"); // 0.038529
+    // 4 pi int r² s(r) dr over the ball, by quadrature: 0.038537.
+    assert!((before - 0.038537).abs() < 5e-5, "{before}"); // 0.038529
     run(&mut sim, 20);
     let books = sim.ledger();
     println!("mass {before} -> {}, speed {}, kinetic {}", books.mass, books.speed, books.kinetic);
-    // Semi-Lagrangian advection conserves no sums: what 20 frames change.
-    assert!((books.mass / before - 1.0).abs() < 0.03 && books.mass != before, "{}", books.mass / before - 1.0);
+    // Semi-Lagrangian advection conserves no sums: 20 frames of a puff of 10 cells at two cells a step lose 8.0 %.
+    let lost = 1.0 - books.mass / before;
+    assert!(lost.abs() < 0.09 && lost != 0.0, "{lost}");
     assert!(books.speed > 0.5 && books.speed < 3.0, "{}", books.speed);
     // A fluid at rest loses none.
     let mut still = simulation(
@@ -283,19 +284,21 @@ density = 1
 
 #[test]
 fn a_broken_number_is_told_with_its_cell() {
-    let n = 16 * 16 * 24;
-    let mut t = vec![300.0; n];
-    t[16 * 16 * 3 + 16 * 2 + 1] = 1e308;
-    // Of steps by the Courant number there would be too many; a given one breaks in the cell.
-    for (system, told) in [("", "sub-steps"), ("[[system]]\nname = \"gas\"\nmethod = \"gas\"\nsubsteps = 1\n", "first bad")] {
-        let mut sim = simulation(&format!("{PLUME}{system}"));
-        let hash = sim.hash();
-        sim.write("air", "temperature", &t).unwrap();
-        assert_ne!(sim.hash(), hash);
-        let error = sim.step(&|| true).unwrap_err().to_string();
-        println!("{error}");
-        assert!(error.contains("system \"gas\"") && error.contains("\"air\"") && error.contains(told), "{error}");
-    }
+    // A root of negative numbers at low x, from the second frame on.
+    let mut sim = simulation(&format!("{PLUME}acceleration = [\"step(1/24, t)*sqrt(x)\", 0, 0]\n"));
+    step(&mut sim);
+    let hash = sim.hash();
+    let error = sim.step(&|| true).unwrap_err().to_string();
+    println!("{error}");
+    // Not at the wall, where the velocity is given.
+    assert!(error.contains("first bad velocity in \"air\", cell [1, 0, 0] at [-0.4375, -0.46875, 0.03125] m"), "{error}");
+    assert_eq!(sim.hash(), hash);
+    // Too fast for any number of sub-steps.
+    let mut t = vec![300.0; 16 * 16 * 24];
+    t[16 * 16 * 3 + 16 * 2 + 1] = 1e200;
+    sim.write("air", "temperature", &t).unwrap();
+    let error = sim.step(&|| true).unwrap_err().to_string();
+    assert!(error.contains("\"air\"") && error.contains("sub-steps; raise courant"), "{error}");
 }
 
 #[test]
