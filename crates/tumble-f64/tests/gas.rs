@@ -118,7 +118,12 @@ fn poiseuille_and_couette_reach_their_profiles() {
         // its chord, not its arc, which adds a dx²/(8 nu) everywhere: 1.2207e-4, to what 60 s leave of the start.
         let offset = 0.05 * dx * dx / (8.0 * 0.05);
         let error = u.iter().enumerate().map(|(i, u)| (u - 0.05 * z(i) * (1.0 - z(i)) / 0.1 - offset).abs()).fold(0.0, f64::max);
-        assert!(error < 1e-11, "{viscous}: {error:e}"); // 1e-13
+        if viscous == "explicit" {
+            // Half the acceleration of a step is still there when a frame is taken: h a/2 = 6.25e-3, measured 6.37e-3.
+            assert!(error > 0.9 * 6.25e-3 && error < 1.1 * 6.25e-3, "{error:e}");
+            continue;
+        }
+        assert!(error < 1e-11, "{error:e}"); // 1e-13
         assert!((largest(&u) - 0.125).abs() < 1e-3);
     }
     let sim = channel("sides = { x = [\"periodic\", \"periodic\"], z = [\"no_slip\", { wall = { velocity = [0.3, 0, 0] } }] }", 60);
@@ -181,7 +186,8 @@ fn a_frame_is_free_of_divergence_in_both_orders_and_with_every_solver() {
         let left = largest(&grid(&sim, "air", "divergence").0) / 24.0 * 1.5 / fastest;
         // The tolerance is over the velocity before the projection, which is a little faster.
         assert!(fastest > 0.1 && left < 3.0 * asked, "{words}: {left:e} at {fastest} m/s");
-        assert!(!report.pressure.is_empty() && report.pressure.iter().all(|r| *r < 2.0));
+        // Over-relaxation may grow before it falls.
+        assert!(report.pressure.last().is_some_and(|r| *r < 1e-3), "{words}: {:?}", report.pressure.last());
     }
 }
 
@@ -189,13 +195,14 @@ fn a_frame_is_free_of_divergence_in_both_orders_and_with_every_solver() {
 fn smoke_is_neither_made_nor_lost_but_by_advection() {
     let mut sim = simulation(PLUME);
     let before = sim.ledger().mass;
-    // Twice the integral over the ball: 4 pi int r² s(r) dr = 0.0424 with a smooth step.
-    assert!((before - 0.0424).abs() < 1e-3, "{before}");
+    // 4 pi int r² s(r) dr over the ball, by quadrature: 0.038537.
+    assert!((before - 0.038537).abs() < 5e-5, "{before}"); // 0.038529
     run(&mut sim, 20);
     let books = sim.ledger();
     println!("mass {before} -> {}, speed {}, kinetic {}", books.mass, books.speed, books.kinetic);
-    // Semi-Lagrangian advection conserves no sums: what 20 frames change.
-    assert!((books.mass / before - 1.0).abs() < 0.03 && books.mass != before, "{}", books.mass / before - 1.0);
+    // Semi-Lagrangian advection conserves no sums: 20 frames of a puff of 10 cells at two cells a step lose 8.0 %.
+    let lost = 1.0 - books.mass / before;
+    assert!(lost.abs() < 0.09 && lost != 0.0, "{lost}");
     assert!(books.speed > 0.5 && books.speed < 3.0, "{}", books.speed);
     // A fluid at rest loses none.
     let mut still = simulation(
@@ -277,14 +284,21 @@ density = 1
 
 #[test]
 fn a_broken_number_is_told_with_its_cell() {
-    let mut sim = simulation(PLUME);
-    let n = 16 * 16 * 24;
-    let mut t = vec![300.0; n];
+    // A root of negative numbers at low x, from the second frame on.
+    let mut sim = simulation(&format!("{PLUME}acceleration = [\"step(1/24, t)*sqrt(x)\", 0, 0]\n"));
+    step(&mut sim);
+    let hash = sim.hash();
+    let error = sim.step(&|| true).unwrap_err().to_string();
+    println!("{error}");
+    // Not at the wall, where the velocity is given.
+    assert!(error.contains("first bad velocity in \"air\", cell [1, 0, 0] at [-0.4375, -0.46875, 0.03125] m"), "{error}");
+    assert_eq!(sim.hash(), hash);
+    // Too fast for any number of sub-steps.
+    let mut t = vec![300.0; 16 * 16 * 24];
     t[16 * 16 * 3 + 16 * 2 + 1] = 1e200;
     sim.write("air", "temperature", &t).unwrap();
     let error = sim.step(&|| true).unwrap_err().to_string();
-    println!("{error}");
-    assert!(error.contains("system \"gas\"") && error.contains("air"), "{error}");
+    assert!(error.contains("\"air\"") && error.contains("sub-steps; raise courant"), "{error}");
 }
 
 #[test]
@@ -333,5 +347,6 @@ courant = 0.5
     step(&mut sim);
     println!("cavity: {worst:.4}, kinetic {before} -> {}", sim.ledger().kinetic);
     assert!((sim.ledger().kinetic / before - 1.0).abs() < 1e-4);
-    assert!(worst < 0.02, "{worst}");
+    // The goal is 2 % of the lid's speed; measured 0.40 %.
+    assert!(worst < 0.006, "{worst}");
 }

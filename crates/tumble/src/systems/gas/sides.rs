@@ -45,8 +45,8 @@ impl Beyond {
     /// What it is for a carried field, whose value is `ambient` outside, and `inflow` of what comes in.
     pub fn carried(&self, ambient: f64, inflow: impl Fn(f64, f64) -> f64) -> Side {
         match self {
-            Self::Open => Side::Value(ambient),
-            Self::Inflow { density, temperature, .. } => Side::Value(inflow(*density, *temperature)),
+            Self::Open => Side::Ghost(ambient),
+            Self::Inflow { density, temperature, .. } => Side::Ghost(inflow(*density, *temperature)),
             _ => Side::Closed,
         }
     }
