@@ -8,7 +8,22 @@ use tumble_interface::check::suggestion;
 use tumble_interface::scene::{Force, Integrator, Method, Plane, Scene, Shape, Source, System};
 
 /// Column names that a frame may hold.
-pub const COLUMNS: [&str; 5] = ["position", "velocity", "orientation", "angular_velocity", "link_strain"];
+pub const COLUMNS: [&str; 14] = [
+    "position",
+    "velocity",
+    "orientation",
+    "angular_velocity",
+    "link_strain",
+    "temperature",
+    "flux",
+    "density",
+    "pressure",
+    "vorticity",
+    "divergence",
+    "velocity_x",
+    "velocity_y",
+    "velocity_z",
+];
 
 /// Names of objects, with the kind of each.
 pub fn objects(scene: &Scene) -> Vec<(&'static str, &str, Option<&str>)> {
@@ -19,7 +34,9 @@ pub fn objects(scene: &Scene) -> Vec<(&'static str, &str, Option<&str>)> {
     let nets = scene.net.iter().map(|o| ("net", o.name.as_str(), o.system.as_deref()));
     let emitters = scene.emitter.iter().map(|o| ("emitter", o.name.as_str(), o.system.as_deref()));
     let galaxies = scene.galaxy.iter().map(|o| ("galaxy", o.name.as_str(), o.system.as_deref()));
-    particles.chain(emitters).chain(ropes).chain(sheets).chain(blocks).chain(nets).chain(galaxies).collect()
+    let bodies = scene.heat.iter().map(|o| ("heat", o.name.as_str(), o.system.as_deref()));
+    let gases = scene.compressible.iter().map(|o| ("compressible", o.name.as_str(), o.system.as_deref()));
+    particles.chain(emitters).chain(ropes).chain(sheets).chain(blocks).chain(nets).chain(galaxies).chain(bodies).chain(gases).collect()
 }
 
 /// Everything wrong that can be seen before anything is built; `systems` are those of the scene, or the default one.
@@ -28,7 +45,10 @@ pub fn check(scene: &Scene, systems: &[System]) -> Vec<Issue> {
     let mut wrong = |path: String, message: String| issues.push(Issue::new(path, message));
     let objects = objects(scene);
     if objects.is_empty() {
-        wrong(String::new(), "nothing to simulate: add particles, an emitter, a rope, a sheet, a block, a net or a galaxy".into());
+        wrong(
+            String::new(),
+            "nothing to simulate: add particles, an emitter, a rope, a sheet, a block, a net, a galaxy, heat or a compressible gas".into(),
+        );
     }
     let colliders = scene.collider.iter().map(|c| ("collider", c.name.as_str()));
     let mut names = HashSet::new();
@@ -85,10 +105,15 @@ pub fn check(scene: &Scene, systems: &[System]) -> Vec<Issue> {
             }
             (Some(given), None) => wrong(
                 format!("{kind} \"{name}\".system"),
-                format!("system \"{given}\" moves particles without mass; this needs a dynamics system"),
+                if matches!(*kind, "heat" | "compressible") {
+                    format!("system \"{given}\" has another method; this needs a system with method = \"{kind}\"")
+                } else {
+                    format!("system \"{given}\" moves particles without mass; this needs a dynamics system")
+                },
             ),
             (None, None) => {
-                wrong(format!("{kind} \"{name}\".system"), "no system can move it: add a [[system]] with method = \"dynamics\"".into())
+                let method = if matches!(*kind, "heat" | "compressible") { kind } else { "dynamics" };
+                wrong(format!("{kind} \"{name}\".system"), format!("no system can move it: add a [[system]] with method = \"{method}\""));
             }
             _ => {}
         }
@@ -136,7 +161,8 @@ pub fn check(scene: &Scene, systems: &[System]) -> Vec<Issue> {
 /// The system that moves an object of this kind: the one it names, else the first that can.
 pub fn place(systems: &[System], kind: &str, named: Option<&str>) -> Option<usize> {
     let can = |s: &System| match s.method {
-        Method::Dynamics => true,
+        Method::Dynamics => !matches!(kind, "heat" | "compressible"),
+        Method::Heat | Method::Compressible => kind == s.method.name(),
         Method::Tracers => matches!(kind, "particles" | "emitter"),
         Method::Vicsek => kind == "particles",
     };
@@ -149,6 +175,8 @@ fn massless(systems: &[System], kind: &str, named: Option<&str>) -> Option<&'sta
         Method::Dynamics => None,
         Method::Tracers => Some("tracers"),
         Method::Vicsek => Some("particles of a vicsek system"),
+        Method::Heat => Some("bodies on grids"),
+        Method::Compressible => Some("gases on grids"),
     }
 }
 
@@ -180,12 +208,21 @@ fn check_system(system: &System, path: &str, wrong: &mut impl FnMut(String, Stri
     if system.method == Method::Vicsek && integrator != Integrator::default() {
         wrong(format!("{path}.integrator"), "the model of Vicsek is a map and has no integrator; leave it out".into());
     }
+    if system.method == Method::Heat && integrator != Integrator::default() {
+        wrong(
+            format!("{path}.integrator"),
+            "each [[heat]] body has a scheme of its own, and the system no integrator; leave it out".into(),
+        );
+    }
+    if system.method == Method::Compressible && integrator != Integrator::default() {
+        wrong(format!("{path}.integrator"), "a compressible gas is stepped by symplectic_euler; leave it out".into());
+    }
     match (&system.vicsek, system.method) {
         (None, Method::Vicsek) => wrong(format!("{path}.vicsek"), "missing, expected side, radius, speed and noise".into()),
         (Some(words), Method::Vicsek) if 2.0 * words.radius > words.side => {
             wrong(format!("{path}.vicsek.radius"), format!("{} m, expected at most half the side, {} m", words.radius, 0.5 * words.side));
         }
-        (Some(_), Method::Dynamics | Method::Tracers) => {
+        (Some(_), method) if method != Method::Vicsek => {
             wrong(
                 format!("{path}.vicsek"),
                 format!("given with method \"{}\"; leave it out, or set method = \"vicsek\"", system.method.name()),

@@ -1,5 +1,7 @@
 //! L5: the numerical methods. None imports another.
 
+pub mod compressible;
 pub mod dynamics;
+pub mod heat;
 pub mod tracers;
 pub mod vicsek;
