@@ -43,6 +43,10 @@ pub struct StepReport {
     pub clamped: f64,
     /// Steps tried by adaptive integrators, in order.
     pub trials: Vec<Trial>,
+    /// Cells that the fastest fluid on a grid passed in a sub-step, at most.
+    pub courant: f64,
+    /// Residuals of the last pressure solve after each iteration, relative to its start.
+    pub pressure: Vec<f64>,
 }
 
 impl StepReport {
@@ -67,6 +71,10 @@ impl StepReport {
         self.broken += other.broken;
         self.clamped += other.clamped;
         self.trials.extend_from_slice(&other.trials);
+        self.courant = self.courant.max(other.courant);
+        if !other.pressure.is_empty() {
+            self.pressure.clone_from(&other.pressure);
+        }
     }
 }
 

@@ -126,6 +126,8 @@ pub struct Breakdown {
     pub index: usize,
     /// Id of the particle, if an emitter has made it: its index says nothing.
     pub id: Option<u32>,
+    /// Cell and its middle [m], if it broke on a grid.
+    pub cell: Option<([usize; 3], [f64; 3])>,
     /// Simulated time [s].
     pub time: f64,
     /// Integrator in use.
@@ -141,6 +143,15 @@ pub struct Breakdown {
 impl fmt::Display for Breakdown {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let Self { system, object, column, index, id, time, integrator, step, stable_step, .. } = self;
+        if let Some((cell, place)) = self.cell {
+            let place = place.map(short);
+            return write!(
+                f,
+                "system \"{system}\" at t = {} s: first bad {column} in \"{object}\", cell {cell:?} at {place:?} m. Take smaller sub-steps, or \
+                 look at sources and formulas there",
+                short(*time)
+            );
+        }
         write!(f, "system \"{system}\" ({integrator}, step {step:.3e} s) at t = {} s: ", short(*time))?;
         match id {
             Some(id) => write!(f, "first bad {column} in emitter \"{object}\", the particle with id {id}. ")?,

@@ -5,6 +5,7 @@ mod animated;
 mod compressible;
 mod emitters;
 mod forces;
+mod gas;
 mod grids;
 mod heat;
 mod output;
@@ -16,6 +17,10 @@ pub use animated::{Animated, AnimatedVector, Component, Interpolation, Keys, Vec
 pub use compressible::Compressible;
 pub use emitters::{Between, Burst, Cause, Emitter, Event, Kill, Source, WhenFull};
 pub use forces::{Anchor, Field, Force, Goal};
+pub use gas::{
+    Advections, Carriage, ExcessFlow, Gas, GasSide, GasSides, GasSource, GridInterpolation, Order, PathTrace, Pressure, PressureMethod,
+    Smoke, Temperature, Viscous,
+};
 pub use grids::GridBox;
 pub use heat::{Heat, HeatRegion, HeatScheme, HeatSide, HeatSides, HeatSource};
 pub use output::{Camera, Expect, Look, Output, Probe};
@@ -94,6 +99,9 @@ pub struct Scene {
     /// Gases that sound runs through.
     #[serde(default)]
     pub compressible: Vec<Compressible>,
+    /// Fluids that fill a box, moved by systems of method `gas`.
+    #[serde(default)]
+    pub gas: Vec<Gas>,
     /// Forces on the masses of `dynamics` systems.
     #[serde(default)]
     pub force: Vec<Force>,

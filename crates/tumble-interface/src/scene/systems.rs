@@ -77,6 +77,8 @@ pub enum Method {
     Heat,
     /// A gas whose pressure follows from its density, stepped explicitly by `symplectic_euler`: sound limits the step.
     Compressible,
+    /// Stable Fluids: incompressible fluids that fill boxes of cells, `[[gas]]`. There is no integrator.
+    Gas,
 }
 
 impl Method {
@@ -88,6 +90,7 @@ impl Method {
             Self::Vicsek => "vicsek",
             Self::Heat => "heat",
             Self::Compressible => "compressible",
+            Self::Gas => "gas",
         }
     }
 }

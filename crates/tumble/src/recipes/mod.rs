@@ -21,7 +21,7 @@ mod sheet;
 
 pub use block::block;
 pub use compressible::compressible;
-pub use emitter::emitter;
+pub use emitter::{emitter, region};
 pub use galaxy::galaxy;
 pub use grid::grid;
 pub use heat::heat;

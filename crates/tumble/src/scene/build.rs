@@ -2,6 +2,7 @@
 
 use super::Assets;
 use super::checks::{check, objects, others, place};
+use super::gas::gas;
 use super::laws::{Reader, flat};
 use super::memory::memory;
 use crate::exchange::Exchange;
@@ -37,13 +38,17 @@ pub struct Built {
     pub warnings: Vec<String>,
 }
 
-/// The systems of a scene, or the default one.
+/// The systems of a scene, or the default ones.
 pub fn plans(scene: &Scene) -> Vec<Plan> {
     if !scene.system.is_empty() {
         return scene.system.clone();
     }
     // Each method on grids has a system of its own; all other objects are in one of dynamics.
-    let mut methods = vec![(Method::Heat, scene.heat.len()), (Method::Compressible, scene.compressible.len())];
+    let mut methods = vec![
+        (Method::Gas, scene.gas.len()),
+        (Method::Heat, scene.heat.len()),
+        (Method::Compressible, scene.compressible.len()),
+    ];
     methods.retain(|(_, count)| *count > 0);
     let others = objects(scene).len() - methods.iter().map(|(_, count)| count).sum::<usize>();
     let plain = (others > 0 || methods.is_empty()).then(Plan::default);
@@ -110,6 +115,10 @@ pub fn build(scene: &Scene, assets: &Assets) -> Result<Built, SceneError> {
         }
         if plan.method == Method::Compressible {
             systems.push(Box::new(loud(scene, &plans, index)?));
+            continue;
+        }
+        if plan.method == Method::Gas {
+            systems.push(Box::new(gas(scene, &plans, index, gravity)?));
             continue;
         }
         let settings = Settings {
@@ -305,7 +314,7 @@ fn fill(scene: &Scene, plans: &[Plan], assets: &Assets, issues: &mut Vec<Issue>)
                 Method::Tracers => drop(recipes::tracers(thing, &mut wrong)),
                 Method::Vicsek => drop(recipes::walkers(thing, &mut wrong)),
                 // None is placed in a system on grids.
-                Method::Dynamics | Method::Heat | Method::Compressible => recipes::particles(site, thing),
+                Method::Dynamics | Method::Heat | Method::Compressible | Method::Gas => recipes::particles(site, thing),
             }
         });
     }

@@ -14,9 +14,9 @@ pub const COLUMNS: [&str; 14] = [
     "orientation",
     "angular_velocity",
     "link_strain",
+    "density",
     "temperature",
     "flux",
-    "density",
     "pressure",
     "vorticity",
     "divergence",
@@ -34,9 +34,11 @@ pub fn objects(scene: &Scene) -> Vec<(&'static str, &str, Option<&str>)> {
     let nets = scene.net.iter().map(|o| ("net", o.name.as_str(), o.system.as_deref()));
     let emitters = scene.emitter.iter().map(|o| ("emitter", o.name.as_str(), o.system.as_deref()));
     let galaxies = scene.galaxy.iter().map(|o| ("galaxy", o.name.as_str(), o.system.as_deref()));
+    let gases = scene.gas.iter().map(|o| ("gas", o.name.as_str(), o.system.as_deref()));
     let bodies = scene.heat.iter().map(|o| ("heat", o.name.as_str(), o.system.as_deref()));
-    let gases = scene.compressible.iter().map(|o| ("compressible", o.name.as_str(), o.system.as_deref()));
-    particles.chain(emitters).chain(ropes).chain(sheets).chain(blocks).chain(nets).chain(galaxies).chain(bodies).chain(gases).collect()
+    let sounding = scene.compressible.iter().map(|o| ("compressible", o.name.as_str(), o.system.as_deref()));
+    let things = particles.chain(emitters).chain(ropes).chain(sheets).chain(blocks).chain(nets).chain(galaxies);
+    things.chain(gases).chain(bodies).chain(sounding).collect()
 }
 
 /// Everything wrong that can be seen before anything is built; `systems` are those of the scene, or the default one.
@@ -45,10 +47,9 @@ pub fn check(scene: &Scene, systems: &[System]) -> Vec<Issue> {
     let mut wrong = |path: String, message: String| issues.push(Issue::new(path, message));
     let objects = objects(scene);
     if objects.is_empty() {
-        wrong(
-            String::new(),
-            "nothing to simulate: add particles, an emitter, a rope, a sheet, a block, a net, a galaxy, heat or a compressible gas".into(),
-        );
+        let message = "nothing to simulate: add particles, an emitter, a rope, a sheet, a block, a net, a galaxy, a gas, heat or a \
+                       compressible gas";
+        wrong(String::new(), message.into());
     }
     let colliders = scene.collider.iter().map(|c| ("collider", c.name.as_str()));
     let mut names = HashSet::new();
@@ -102,6 +103,10 @@ pub fn check(scene: &Scene, systems: &[System]) -> Vec<Issue> {
                 let hint = suggestion(given, known());
                 let list = known().collect::<Vec<_>>().join(", ");
                 wrong(format!("{kind} \"{name}\".system"), format!("there is no system \"{given}\"{hint} (systems: {list})"));
+            }
+            (given, None) if *kind == "gas" => {
+                let given = given.map_or_else(|| "no system".into(), |s| format!("system \"{s}\", which"));
+                wrong(format!("gas \"{name}\".system"), format!("{given} moves no fluid; add a [[system]] with method = \"gas\""));
             }
             (Some(given), None) => wrong(
                 format!("{kind} \"{name}\".system"),
@@ -161,8 +166,8 @@ pub fn check(scene: &Scene, systems: &[System]) -> Vec<Issue> {
 /// The system that moves an object of this kind: the one it names, else the first that can.
 pub fn place(systems: &[System], kind: &str, named: Option<&str>) -> Option<usize> {
     let can = |s: &System| match s.method {
-        Method::Dynamics => !matches!(kind, "heat" | "compressible"),
-        Method::Heat | Method::Compressible => kind == s.method.name(),
+        Method::Dynamics => !matches!(kind, "gas" | "heat" | "compressible"),
+        Method::Gas | Method::Heat | Method::Compressible => kind == s.method.name(),
         Method::Tracers => matches!(kind, "particles" | "emitter"),
         Method::Vicsek => kind == "particles",
     };
@@ -177,6 +182,7 @@ fn massless(systems: &[System], kind: &str, named: Option<&str>) -> Option<&'sta
         Method::Vicsek => Some("particles of a vicsek system"),
         Method::Heat => Some("bodies on grids"),
         Method::Compressible => Some("gases on grids"),
+        Method::Gas => Some("cells of a fluid"),
     }
 }
 
@@ -216,6 +222,9 @@ fn check_system(system: &System, path: &str, wrong: &mut impl FnMut(String, Stri
     }
     if system.method == Method::Compressible && integrator != Integrator::default() {
         wrong(format!("{path}.integrator"), "a compressible gas is stepped by symplectic_euler; leave it out".into());
+    }
+    if system.method == Method::Gas && integrator != Integrator::default() {
+        wrong(format!("{path}.integrator"), "Stable Fluids have no integrator; leave it out".into());
     }
     match (&system.vicsek, system.method) {
         (None, Method::Vicsek) => wrong(format!("{path}.vicsek"), "missing, expected side, radius, speed and noise".into()),

@@ -3,6 +3,7 @@
 mod build;
 mod checks;
 mod cures;
+mod gas;
 mod laws;
 mod memory;
 mod simulation;

@@ -2,6 +2,7 @@
 
 pub mod compressible;
 pub mod dynamics;
+pub mod gas;
 pub mod heat;
 pub mod tracers;
 pub mod vicsek;

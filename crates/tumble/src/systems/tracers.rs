@@ -274,6 +274,7 @@ impl System for Tracers {
             column: "position".into(),
             index: object.map_or(i, |o| i - o.points.start),
             id: self.pool.id_of(i),
+            cell: None,
             time: t,
             integrator: self.settings.integrator.name().into(),
             step: 0.0,

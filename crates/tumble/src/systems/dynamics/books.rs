@@ -307,6 +307,7 @@ impl Dynamics {
             column: column.into(),
             index,
             id: self.pool.id_of(i),
+            cell: None,
             time: t,
             integrator: self.integrator.name().into(),
             step: 0.0,

@@ -1,0 +1,340 @@
+//! From the words of a fluid to the fluid.
+
+use super::checks::place;
+use super::laws::{Reader, flat, off_plane};
+use crate::linalg::poisson::{Excess, Method as Solve, Params, Target};
+use crate::math::formula::{Formula, Of};
+use crate::math::{Vec3, VectorSignal};
+use crate::operators::{Advection, Interpolation, Trace};
+use crate::recipes;
+use crate::state::{Field, Grid, Place, Vectors};
+use crate::systems::gas::{Beyond, Fluid, Gas, Settings, Source};
+use tumble_interface::check::plain;
+use tumble_interface::scene::{
+    Carriage, Component, ExcessFlow, Gas as Words, GasSide, GridInterpolation, PathTrace, PressureMethod, Scene, Shape, System as Plan,
+};
+use tumble_interface::{Issue, SceneError};
+
+/// Largest |div u| dx over the fastest velocity.
+#[cfg(not(feature = "double"))]
+const TOLERANCE: f64 = 1e-5;
+/// Largest |div u| dx over the fastest velocity.
+#[cfg(feature = "double")]
+const TOLERANCE: f64 = 1e-10;
+
+/// A number of places and nothing else, or what is wrong with it.
+fn scalar(words: &Component) -> Result<Formula, String> {
+    match words {
+        Component::Value(value) => Ok(Formula::constant(*value)),
+        Component::Formula(text) => Formula::new(text, 1, Of::Place),
+    }
+}
+
+fn method(words: PressureMethod) -> Solve {
+    match words {
+        PressureMethod::Jacobi => Solve::Jacobi,
+        PressureMethod::GaussSeidel => Solve::GaussSeidel,
+        PressureMethod::Sor => Solve::Sor,
+        PressureMethod::ConjugateGradients => Solve::ConjugateGradients,
+        PressureMethod::IncompleteCholesky => Solve::IncompleteCholesky,
+        PressureMethod::ModifiedIncompleteCholesky => Solve::ModifiedIncompleteCholesky,
+        PressureMethod::Multigrid => Solve::Multigrid,
+        PressureMethod::MultigridGradients => Solve::MultigridGradients,
+        PressureMethod::Cosine => Solve::Cosine,
+    }
+}
+
+fn carriage(words: &Carriage, corrected: bool) -> Advection {
+    Advection {
+        trace: match words.trace {
+            PathTrace::Euler => Trace::Euler,
+            PathTrace::Rk2 => Trace::Rk2,
+            PathTrace::Rk3 => Trace::Rk3,
+        },
+        substeps: words.pieces.unwrap_or(1) as usize,
+        interpolation: match words.interpolation {
+            GridInterpolation::Linear => Interpolation::Linear,
+            GridInterpolation::Cubic => Interpolation::Cubic,
+            GridInterpolation::MonotoneCubic => Interpolation::MonotoneCubic,
+        },
+        corrected: words.corrected.unwrap_or(corrected),
+        turning: words.turning,
+    }
+}
+
+/// Reads the words of one fluid; everything wrong goes to the reader.
+struct Read<'a, 'b> {
+    words: &'a Words,
+    path: String,
+    reader: Reader<'b>,
+    flat: Option<usize>,
+}
+
+impl Read<'_, '_> {
+    fn wrong(&mut self, key: &str, message: impl Into<String>) {
+        let issue = Issue::new(format!("{}{key}", self.path), message);
+        if !self.reader.issues.contains(&issue) {
+            self.reader.issues.push(issue);
+        }
+    }
+
+    /// A vector that may depend on the place; one without place must lie in the plane.
+    fn vector(&mut self, key: &str, words: &tumble_interface::scene::AnimatedVector, of: Of) -> VectorSignal {
+        let path = format!("{}{key}", self.path);
+        let signal = self.reader.vector(&path, words, of);
+        if let Some(axis) = self.flat
+            && signal.is_constant()
+        {
+            let across = <[f64; 3]>::from(signal.value(0.0))[axis];
+            if across != 0.0 {
+                self.wrong(key, off_plane(axis, across));
+            }
+        }
+        signal
+    }
+
+    fn sides(&mut self, ambient: f64) -> [[Beyond; 2]; 3] {
+        let words = self.words;
+        let mut sides: [[Beyond; 2]; 3] = Default::default();
+        for (axis, (name, given)) in [("x", &words.sides.x), ("y", &words.sides.y), ("z", &words.sides.z)].into_iter().enumerate() {
+            if self.flat == Some(axis) {
+                if *given != <[GasSide; 2]>::default() {
+                    self.wrong(&format!(".sides.{name}"), "given for the axis across the plane of the scene; leave it out");
+                }
+                continue;
+            }
+            if (given[0] == GasSide::Periodic) != (given[1] == GasSide::Periodic) {
+                self.wrong(&format!(".sides.{name}"), "only one side is periodic; make both periodic, or none");
+            }
+            for end in 0..2 {
+                let key = format!(".sides.{name}[{end}]");
+                sides[axis][end] = match &given[end] {
+                    GasSide::FreeSlip => Beyond::FreeSlip,
+                    GasSide::NoSlip => Beyond::NoSlip([0.0; 3].into()),
+                    GasSide::Open => Beyond::Open,
+                    GasSide::Periodic => Beyond::Periodic,
+                    GasSide::Wall { velocity } => {
+                        let velocity = self.vector(&format!("{key}.wall.velocity"), velocity, Of::Time);
+                        let across = <[f64; 3]>::from(velocity.value(0.0))[axis];
+                        if across != 0.0 {
+                            let message =
+                                format!("{} m/s across the wall, expected 0: a wall of the box moves only along itself", plain(across));
+                            self.wrong(&format!("{key}.wall.velocity"), message);
+                        }
+                        Beyond::NoSlip(velocity)
+                    }
+                    GasSide::Inflow { velocity, density, temperature } => Beyond::Inflow {
+                        velocity: self.vector(&format!("{key}.inflow.velocity"), velocity, Of::Place),
+                        density: *density,
+                        temperature: temperature.unwrap_or(ambient),
+                    },
+                };
+            }
+        }
+        sides
+    }
+
+    fn sources(&mut self, grid: &Grid) -> Vec<Source> {
+        let mut sources = Vec::new();
+        for (i, words) in self.words.source.iter().enumerate() {
+            let key = |key: &str| format!(".source[{i}].{key}");
+            if matches!(words.shape, Shape::Mesh(_) | Shape::AnimatedMesh(_)) {
+                self.wrong(&key("shape"), "a mesh, expected sphere, box, plane, floor or capsule");
+                continue;
+            }
+            let region = match recipes::region(&words.shape) {
+                Ok(region) => region,
+                Err((at, message)) => {
+                    self.wrong(&key(&format!("shape{at}")), message);
+                    continue;
+                }
+            };
+            let velocity = words.velocity.as_ref().map(|v| self.vector(&key("velocity"), v, Of::Time));
+            for (word, given, there) in [
+                ("smoke", words.smoke != 0.0 || words.density.is_some(), self.words.smoke.is_some()),
+                ("temperature", words.heating != 0.0 || words.temperature.is_some(), self.words.temperature.is_some()),
+            ] {
+                if given && !there {
+                    self.wrong(&format!(".{word}"), format!("missing, but source {i} gives it; add {word} = {{}}"));
+                }
+            }
+            let source = Source {
+                smoke: words.smoke,
+                density: words.density,
+                temperature: words.temperature,
+                heating: words.heating,
+                velocity,
+                times: [words.start, words.end.unwrap_or(f64::INFINITY)],
+                ..Source::default()
+            }
+            .covering(&region, grid);
+            if source.is_empty() {
+                self.wrong(&key("shape"), "it covers no cell; move it into the box, or make it as large as a cell");
+            }
+            sources.push(source);
+        }
+        sources
+    }
+
+    /// A field of cells from a formula of the place.
+    fn cells(&mut self, key: &str, words: &Component, grid: &Grid, unit: &'static str, least: f64) -> Option<Field> {
+        let formula = match scalar(words) {
+            Ok(formula) => formula,
+            Err(message) => {
+                self.wrong(key, message);
+                return None;
+            }
+        };
+        let value = |x: [f64; 3]| formula.at(0.0, Vec3::from(x), [0.0; 3].into())[0];
+        let field = Field::of(*grid, Place::Cell, unit, value).ok()?;
+        let bad = field.each().find(|at| {
+            let value = f64::from(field.value(*at));
+            !(value.is_finite() && value >= least)
+        });
+        if let Some(at) = bad {
+            let value = f64::from(field.value(at));
+            let place = grid.point(Place::Cell, at);
+            self.wrong(key, format!("{} {unit} at {place:?} m, expected a number >= {least}", plain(value)));
+            return None;
+        }
+        Some(field)
+    }
+
+    /// More comes in than goes out, and no side lets it.
+    fn check_flow(&mut self, sides: &[[Beyond; 2]; 3], u: &Vectors) {
+        let closed = sides.iter().flatten().all(|side| !matches!(side, Beyond::Open));
+        let inflow = sides.iter().flatten().any(|side| matches!(side, Beyond::Inflow { .. }));
+        if !closed || !inflow || self.words.pressure.excess == ExcessFlow::Remove {
+            return;
+        }
+        let (mut net, mut all) = (0.0, 0.0_f64);
+        for (axis, part) in u.parts.iter().filter_map(|p| if let Place::Face(a) = p.place { Some((a, p)) } else { None }) {
+            for at in part.each().filter(|at| !part.grid.periodic[axis] && (at[axis] == 0 || at[axis] == part.grid.n[axis])) {
+                let into = f64::from(part.value(at)) * if at[axis] == 0 { 1.0 } else { -1.0 };
+                net += into;
+                all += into.abs();
+            }
+        }
+        if net.abs() > 1e-6 * all {
+            let message = format!(
+                "{:.3} of the inflow has no way out; open a side, let as much flow out, or set pressure.excess = \"remove\"",
+                net.abs() / all
+            );
+            self.wrong(".sides", message);
+        }
+    }
+
+    fn fluid(mut self, gravity: [f64; 3]) -> Option<Fluid> {
+        let words = self.words;
+        let before = self.reader.issues.len();
+        let periodic = [&words.sides.x, &words.sides.y, &words.sides.z].map(|s| s[0] == GasSide::Periodic);
+        let grid = match recipes::grid(&words.cells, self.flat, periodic) {
+            Ok(grid) => grid,
+            Err(error) => {
+                self.wrong(".box", error.to_string());
+                return None;
+            }
+        };
+        let warmth = words.temperature.clone().unwrap_or_default();
+        let smoke = words.smoke.clone().unwrap_or_default();
+        let sides = self.sides(warmth.ambient);
+        let sources = self.sources(&grid);
+        let velocity = self.vector(".velocity", &words.velocity, Of::Place);
+        let acceleration = self.vector(".acceleration", &words.acceleration, Of::Place);
+        let density = words.smoke.as_ref().and_then(|s| self.cells(".smoke.initial", &s.initial, &grid, "kg/m³", 0.0));
+        let ambient = Component::Value(warmth.ambient);
+        let initial = warmth.initial.as_ref().unwrap_or(&ambient);
+        let temperature = words.temperature.as_ref().and_then(|_| self.cells(".temperature.initial", initial, &grid, "K", 0.0));
+        let still = [0.0; 3].into();
+        let mut u = Vectors::of(grid, "m/s", |x| velocity.at(0.0, Vec3::from(x), still).into()).ok()?;
+        if u.parts.iter().any(|p| p.each().any(|at| !p.value(at).is_finite())) {
+            self.wrong(".velocity", "not a finite number everywhere in the box");
+        }
+        crate::systems::gas::hold(&mut u, &sides, 0.0);
+        self.check_flow(&sides, &u);
+        if words.advection.scalars.turning {
+            self.wrong(".advection.scalars.turning", "true, expected false: numbers have no direction");
+        }
+        if words.advection.velocity.turning && words.advection.velocity.corrected == Some(true) {
+            self.wrong(".advection.velocity.corrected", "given with turning, which has no correction; leave out one of them");
+        }
+        if self.reader.issues.len() > before {
+            return None;
+        }
+        let pressure = &words.pressure;
+        let settings = Settings {
+            density: words.fluid_density,
+            viscosity: words.viscosity.unwrap_or(0.0),
+            viscous: words.viscous,
+            sides,
+            gravity,
+            acceleration,
+            diffusivity: [smoke.diffusivity, warmth.diffusivity],
+            dissipation: smoke.dissipation,
+            weight: smoke.weight,
+            ambient: warmth.ambient,
+            cooling: warmth.cooling,
+            expansion: warmth.expansion.unwrap_or(1.0 / warmth.ambient),
+            sources,
+            confinement: words.confinement,
+            order: words.order,
+            velocity: carriage(&words.advection.velocity, false),
+            scalars: carriage(&words.advection.scalars, true),
+            pressure: Params {
+                method: method(pressure.method),
+                target: Target::Relative(0.0),
+                iterations: pressure.iterations as usize,
+                excess: if pressure.excess == ExcessFlow::Error { Excess::Refuse } else { Excess::Remove },
+            },
+            tolerance: pressure.tolerance.unwrap_or(TOLERANCE),
+            on_failure: pressure.on_failure,
+            courant: words.courant,
+        };
+        match Fluid::new(words.name.clone(), settings, u, density, temperature) {
+            Ok(fluid) => Some(fluid),
+            Err(failure) => {
+                self.wrong("", failure.to_string());
+                None
+            }
+        }
+    }
+}
+
+/// The system of the fluids that it moves, or what is wrong with them.
+pub fn gas(scene: &Scene, plans: &[Plan], index: usize, gravity: [f64; 3]) -> Result<Gas, SceneError> {
+    let (mut issues, mut fluids) = (Vec::new(), Vec::new());
+    for words in scene.gas.iter().filter(|g| place(plans, "gas", g.system.as_deref()) == Some(index)) {
+        let reader = Reader::new(scene, &mut issues);
+        let path = format!("gas \"{}\"", words.name);
+        fluids.extend(Read { words, path, reader, flat: flat(scene) }.fluid(gravity));
+    }
+    if issues.is_empty() {
+        let plan = &plans[index];
+        return Ok(Gas::new(plan.name.clone(), plan.substeps, plan.step, fluids));
+    }
+    Err(SceneError { issues })
+}
+
+/// Bytes for a cell of a fluid: velocities, what is carried, and what steps and solvers need; a snapshot of the state.
+pub fn bytes(words: &Words, flat: Option<usize>) -> f64 {
+    let real = std::mem::size_of::<crate::math::Real>() as f64;
+    let cells = recipes::grid(&words.cells, flat, [false; 3]).map_or_else(
+        |_| {
+            let long = (0..3).filter(|a| flat != Some(*a)).map(|a| words.cells.size[a]).fold(0.0, f64::max);
+            let count =
+                |a: usize| if flat == Some(a) { 1.0 } else { (words.cells.size[a] / long * f64::from(words.cells.resolution)).max(1.0) };
+            (0..3).map(count).product()
+        },
+        |grid| grid.lattice().len() as f64,
+    );
+    let axes = if flat.is_some() { 2.0 } else { 3.0 };
+    let carried = f64::from(u8::from(words.smoke.is_some())) + f64::from(u8::from(words.temperature.is_some()));
+    let corrected = words.advection.scalars.corrected.unwrap_or(true);
+    let scratch = if corrected { 3.0 * carried } else { 0.0 }.max(if words.advection.velocity.corrected == Some(true) { 3.0 } else { 0.0 });
+    let conjugates = if words.viscosity.unwrap_or(0.0) > 0.0 { 3.0 } else { 0.0 };
+    let confined = if words.confinement > 0.0 { 8.0 } else { 0.0 };
+    // Two of each state and one in the snapshot; pressure, its snapshot, right-hand side twice, unknown; five of the solver with its
+    // weights and coarse grids.
+    let numbers = 3.0 * (axes + carried) + 5.0 + 6.5 + scratch + conjugates + confined;
+    cells * numbers * real
+}

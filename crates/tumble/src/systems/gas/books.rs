@@ -1,0 +1,193 @@
+//! What leaves a fluid: columns, books, snapshots; and what has broken.
+
+use super::fluid::Fluid;
+use super::rows::{self, sum};
+use crate::math::Real;
+use crate::operators::{average, curl, divergence};
+use crate::state::{Field, GridError, Place, Vectors};
+use crate::system::Archive;
+use tumble_interface::engine::Ledger;
+use tumble_interface::error::Breakdown;
+use tumble_interface::{Column, Data, StepError};
+
+const FACES: [&str; 3] = ["velocity_x", "velocity_y", "velocity_z"];
+
+impl Fluid {
+    fn column(&self, name: &str, unit: &'static str, fields: &[Field]) -> Column {
+        let points = fields.first().map_or([0; 3], Field::points);
+        let lists: Vec<Vec<Real>> = fields.iter().map(Field::values).collect();
+        let data: Vec<Real> = match &lists[..] {
+            [one] => one.clone(),
+            _ => (0..points.iter().product()).flat_map(|i| lists.iter().map(move |list| list[i])).collect(),
+        };
+        let points = self.grid().axes().map(|a| points[a]).collect();
+        Column { object: self.name.clone(), name: name.into(), unit, width: fields.len(), points, data: Data::from(data) }
+    }
+
+    /// The named columns that it has.
+    pub fn columns(&self, names: &[&str], out: &mut Vec<Column>) {
+        // Only fields of another grid could fail here.
+        out.extend(names.iter().filter_map(|name| self.named(name).ok().flatten()));
+    }
+
+    fn named(&self, name: &str) -> Result<Option<Column>, GridError> {
+        let one = |unit: &'static str, field: &Field| Some(self.column(name, unit, std::slice::from_ref(field)));
+        Ok(match name {
+            "density" => self.smoke.as_ref().and_then(|c| one("kg/m³", &c.field)),
+            "temperature" => self.temperature.as_ref().and_then(|c| one("K", &c.field)),
+            "pressure" => one("Pa", &self.pressure),
+            "velocity" => Some(self.column(name, "m/s", &self.at_cells(&self.u)?)),
+            "vorticity" => {
+                let mut spin = Vectors::edges(self.grid(), "1/s")?;
+                curl(&self.u, &mut spin)?;
+                Some(self.column(name, "1/s", &self.at_cells(&spin)?))
+            }
+            "divergence" => {
+                let mut field = Field::new(self.grid(), Place::Cell, "1/s")?;
+                divergence(&self.u, &mut field)?;
+                one("1/s", &field)
+            }
+            _ => FACES.iter().position(|face| *face == name).and_then(|axis| one("m/s", self.u.part(axis)?)),
+        })
+    }
+
+    fn at_cells(&self, vectors: &Vectors) -> Result<Vec<Field>, GridError> {
+        vectors.parts.iter().map(|part| average(part, Place::Cell)).collect()
+    }
+
+    /// Where its grid is.
+    pub fn topology(&self, out: &mut Vec<Column>) {
+        let grid = self.grid();
+        let mut add = |name: &str, unit, data: Data| {
+            out.push(Column { object: self.name.clone(), name: name.into(), unit, width: 1, points: Vec::new(), data });
+        };
+        add("grid_cells", "1", Data::U32(grid.axes().map(|a| grid.n[a] as u32).collect()));
+        add("grid_spacing", "m", Data::F64(vec![grid.dx]));
+        add("grid_origin", "m", Data::F64(grid.origin.to_vec()));
+        add("grid_flat", "1", Data::U32(vec![grid.flat.unwrap_or(3) as u32]));
+    }
+
+    /// The volume of a cell [m³]; in the plane, of one metre across it.
+    fn volume(&self) -> f64 {
+        let grid = self.grid();
+        (0..grid.dimension()).fold(1.0, |v, _| v * grid.dx)
+    }
+
+    /// Mass of the smoke [kg].
+    fn smoke_mass(&self) -> f64 {
+        let total = |f: &Field| sum(f, |at, n| f.data[at..at + n].iter().map(|x| f64::from(*x)).sum());
+        self.smoke.as_ref().map_or(0.0, |c| self.volume() * total(&c.field))
+    }
+
+    /// Speed of the fastest cell [m/s].
+    pub fn speed(&self) -> f64 {
+        let Ok(cells) = self.at_cells(&self.u) else { return 0.0 };
+        let Some(first) = cells.first() else { return 0.0 };
+        let sq = |i: usize| cells.iter().map(|f| f64::from(f.data[i]) * f64::from(f.data[i])).sum::<f64>();
+        rows::largest(first, |at, n| (at..at + n).map(sq).fold(0.0, rows::worse)).sqrt()
+    }
+
+    /// Adds its mass of smoke, and momentum, kinetic energy and speed of the fluid. A face on a side of the box counts half.
+    pub fn count(&self, books: &mut Ledger) {
+        let grid = self.grid();
+        let mass = self.volume() * self.settings.density;
+        books.mass += self.smoke_mass();
+        for part in &self.u.parts {
+            let Place::Face(axis) = part.place else { continue };
+            let half = |along: usize| !grid.periodic[axis] && (along == 0 || along == grid.n[axis]);
+            let lattice = grid.lattice();
+            let share = |start: usize, i: usize| {
+                let along = match axis {
+                    0 => i,
+                    1 => (start - lattice.at(0, 0, 0)) % lattice.stride[2] / lattice.stride[1],
+                    _ => (start - lattice.at(0, 0, 0)) / lattice.stride[2],
+                };
+                if half(along) { 0.5 } else { 1.0 }
+            };
+            let weighed = |power: i32| {
+                sum(part, |at, n| {
+                    let one = |(i, u): (usize, &Real)| {
+                        let u = f64::from(*u);
+                        share(at, i) * if power == 2 { u * u } else { u }
+                    };
+                    part.data[at..at + n].iter().enumerate().map(one).sum()
+                })
+            };
+            books.momentum[axis] += mass * weighed(1);
+            books.kinetic += 0.5 * mass * weighed(2);
+        }
+        books.speed = books.speed.max(self.speed());
+    }
+
+    /// The first number that is not finite.
+    pub fn broken(&self, system: &str, t: f64) -> Option<StepError> {
+        let carried = [("density", &self.smoke), ("temperature", &self.temperature)];
+        let scalars = carried.into_iter().filter_map(|(name, c)| Some((name, &c.as_ref()?.field)));
+        let all = self.u.parts.iter().map(|part| ("velocity", part)).chain(scalars);
+        for (name, field) in all {
+            // Adding up finds any of them; only then is it looked for.
+            if sum(field, |at, n| field.data[at..at + n].iter().map(|x| f64::from(*x) * 0.0).sum()) == 0.0 {
+                continue;
+            }
+            let cell = field.each().find(|at| !field.value(*at).is_finite())?;
+            let [x, y, _] = field.points();
+            return Some(StepError::NotFinite(Box::new(Breakdown {
+                system: system.into(),
+                object: self.name.clone(),
+                column: name.into(),
+                index: cell[0] + x * (cell[1] + y * cell[2]),
+                id: None,
+                cell: Some((cell, self.grid().point(field.place, cell))),
+                time: t,
+                integrator: String::new(),
+                step: 0.0,
+                stable_step: f64::INFINITY,
+                energy_ratio: None,
+            })));
+        }
+        None
+    }
+
+    fn kept(&self) -> Vec<(&'static str, &Vec<Real>)> {
+        let mut all: Vec<(&'static str, &Vec<Real>)> = self.u.parts.iter().map(|part| ("u", &part.data)).collect();
+        all.extend(self.smoke.iter().map(|c| ("smoke", &c.field.data)));
+        all.extend(self.temperature.iter().map(|c| ("temperature", &c.field.data)));
+        all.push(("pressure", &self.pressure.data));
+        all
+    }
+
+    /// Writes everything that the next step depends on.
+    pub fn save(&self, archive: &mut Archive) {
+        self.kept().into_iter().for_each(|(name, data)| archive.push_numbers(name, data));
+    }
+
+    /// Reads it back.
+    pub fn restore(&mut self, archive: &mut Archive) -> Option<()> {
+        let length = self.grid().lattice().len();
+        let mut read = |name: &str, into: &mut Vec<Real>| {
+            archive.column(name, into)?;
+            let fits = into.len() == length;
+            // A field has its length whatever comes.
+            into.resize(length, 0.0);
+            fits.then_some(())
+        };
+        self.u.parts.iter_mut().try_for_each(|part| read("u", &mut part.data))?;
+        self.smoke.iter_mut().try_for_each(|c| read("smoke", &mut c.field.data))?;
+        self.temperature.iter_mut().try_for_each(|c| read("temperature", &mut c.field.data))?;
+        read("pressure", &mut self.pressure.data)
+    }
+
+    /// Sets a column, in the order in which it leaves; `false` if there is none of that name and length.
+    pub fn write(&mut self, column: &str, values: &[f64]) -> bool {
+        let values: Vec<Real> = values.iter().map(|x| *x as Real).collect();
+        let field = match column {
+            "density" => self.smoke.as_mut().map(|c| &mut c.field),
+            "temperature" => self.temperature.as_mut().map(|c| &mut c.field),
+            _ => {
+                let axis = FACES.iter().position(|face| *face == column);
+                self.u.parts.iter_mut().find(|part| axis.is_some_and(|a| part.place == Place::Face(a)))
+            }
+        };
+        field.is_some_and(|field| field.set(&values).is_ok())
+    }
+}

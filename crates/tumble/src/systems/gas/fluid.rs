@@ -1,0 +1,292 @@
+//! A fluid in a box: its state, and the step that the lecture draws.
+
+use super::forces::Source;
+use super::rows::{magnitude, worse};
+use super::sides::{Beyond, hold};
+use super::viscosity::Conjugates;
+use crate::linalg::poisson::{Fault, Params, Solver, Weight};
+use crate::math::{Real, VectorSignal};
+use crate::operators::{Advection, Scratch, advect, advect_vectors};
+use crate::state::{Field, Grid, GridError, Place, Side, Vectors};
+use tumble_interface::StepError;
+use tumble_interface::engine::StepReport;
+use tumble_interface::scene::{OnFailure, Order, Viscous};
+
+/// What does not change of a fluid.
+pub struct Settings {
+    /// Density [kg/m³].
+    pub density: f64,
+    /// Dynamic viscosity [Pa s].
+    pub viscosity: f64,
+    /// How it is stepped.
+    pub viscous: Viscous,
+    /// The lower and the upper side of each axis.
+    pub sides: [[Beyond; 2]; 3],
+    /// Gravity [m/s²], in the plane.
+    pub gravity: [f64; 3],
+    /// Acceleration [m/s²] by time and place.
+    pub acceleration: VectorSignal,
+    /// Diffusivity of smoke and of warmth [m²/s].
+    pub diffusivity: [f64; 2],
+    /// Rate at which smoke vanishes [1/s].
+    pub dissipation: f64,
+    /// Share of its weight that smoke has.
+    pub weight: f64,
+    /// Temperature without buoyancy [K].
+    pub ambient: f64,
+    /// Rate at which differences of temperature vanish [1/s].
+    pub cooling: f64,
+    /// Growth of a volume with temperature [1/K].
+    pub expansion: f64,
+    /// Where smoke, warmth and velocity come from.
+    pub sources: Vec<Source>,
+    /// Vorticity confinement [1].
+    pub confinement: f64,
+    /// Where a step begins.
+    pub order: Order,
+    /// How the velocity is carried.
+    pub velocity: Advection,
+    /// How smoke and warmth are carried.
+    pub scalars: Advection,
+    /// The pressure solver; its target is the tolerance.
+    pub pressure: Params,
+    /// Largest |div u| dx over the fastest velocity.
+    pub tolerance: f64,
+    /// What to do where it is not met.
+    pub on_failure: OnFailure,
+    /// Cells that the fastest fluid passes in a sub-step.
+    pub courant: f64,
+}
+
+/// A field that is carried, and where it is carried to.
+pub struct Carried {
+    /// Its values at cells.
+    pub field: Field,
+    /// Of anything.
+    pub(super) next: Field,
+}
+
+impl Carried {
+    /// From values at cells.
+    pub fn new(field: Field) -> Self {
+        Self { next: field.clone(), field }
+    }
+
+    /// The same with its sides set.
+    pub fn beyond(mut self, sides: &[[Beyond; 2]; 3], ambient: f64, inflow: impl Fn(f64, f64) -> f64 + Copy) -> Self {
+        self.field.sides = sides.each_ref().map(|ends| ends.each_ref().map(|side| side.carried(ambient, inflow)));
+        self.next.sides = self.field.sides;
+        self
+    }
+}
+
+/// A fluid in a box.
+pub struct Fluid {
+    /// Name of the object.
+    pub name: String,
+    /// What does not change.
+    pub settings: Settings,
+    /// Velocity on faces [m/s].
+    pub u: Vectors,
+    /// Density of smoke at cells [kg/m³].
+    pub smoke: Option<Carried>,
+    /// Temperature at cells [K].
+    pub temperature: Option<Carried>,
+    /// Pressure of the last projection at cells [Pa].
+    pub pressure: Field,
+    pub(super) solver: Solver<u8>,
+    /// Of anything: velocities, right-hand side and unknown of the pressure, and what operators need.
+    pub(super) next: Vectors,
+    pub(super) b: Field,
+    pub(super) left: Vec<Real>,
+    pub(super) q: Vec<Real>,
+    pub(super) conjugates: Conjugates,
+    scratch: Scratch,
+}
+
+/// What stops a step.
+#[derive(Debug)]
+pub enum Failure {
+    /// Fields that do not fit: no scene reaches this.
+    Grid(GridError),
+    /// The pressure cannot be found.
+    Pressure(Fault),
+    /// The pressure was not found well enough.
+    Unconverged {
+        /// Iterations made.
+        iterations: usize,
+        /// |div u| dx over the fastest velocity.
+        reached: f64,
+        /// What was asked for.
+        asked: f64,
+    },
+}
+
+impl From<GridError> for Failure {
+    fn from(error: GridError) -> Self {
+        Self::Grid(error)
+    }
+}
+
+impl std::fmt::Display for Failure {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        match self {
+            Self::Grid(error) => error.fmt(f),
+            Self::Pressure(fault) => fault.fmt(f),
+            Self::Unconverged { iterations, reached, asked } => write!(
+                f,
+                "the pressure solver stopped after {iterations} iterations at |div u| dx/|u| = {reached:.2e}, asked for {asked:.2e}; raise \
+                 pressure.iterations or pressure.tolerance, or set pressure.on_failure = \"warn\""
+            ),
+        }
+    }
+}
+
+/// A failure and the fluid that it happened to.
+#[derive(Debug)]
+pub struct Failed {
+    failure: Failure,
+    fluid: String,
+    /// What is no finite number, if anything.
+    broken: Option<StepError>,
+}
+
+impl Failed {
+    /// The error of a step of the system at time t [s].
+    pub fn within(self, system: &str, t: f64) -> StepError {
+        if let Some(StepError::NotFinite(mut breakdown)) = self.broken {
+            breakdown.system = system.into();
+            breakdown.time = t;
+            return StepError::NotFinite(breakdown);
+        }
+        StepError::Capacity { system: system.into(), time: t, what: format!("gas \"{}\": {}", self.fluid, self.failure) }
+    }
+}
+
+impl Fluid {
+    /// A fluid with this velocity; `smoke` and `temperature` are carried if given. The velocity is projected.
+    pub fn new(name: String, settings: Settings, u: Vectors, smoke: Option<Field>, temperature: Option<Field>) -> Result<Self, Failure> {
+        let grid = u.on_faces("velocity of a fluid")?;
+        let lattice = grid.lattice();
+        let open = vec![u8::OPEN; lattice.len()];
+        let pressure_sides = settings.sides.each_ref().map(|ends| ends.each_ref().map(Beyond::pressure));
+        let solver = Solver::new(lattice, pressure_sides, [&open, &open, &open], None).map_err(Failure::Pressure)?;
+        let sides = &settings.sides;
+        let smoke = smoke.map(|f| Carried::new(f).beyond(sides, 0.0, |density, _| density));
+        let temperature = temperature.map(|f| Carried::new(f).beyond(sides, settings.ambient, |_, temperature| temperature));
+        // Only a viscous fluid needs them.
+        let spare = || if settings.viscosity > 0.0 { Field::new(grid, Place::Cell, "") } else { Ok(nothing(grid)) };
+        let mut pressure = Field::new(grid, Place::Cell, "Pa")?;
+        for (axis, end) in (0..3).flat_map(|a| [(a, 0), (a, 1)]) {
+            if matches!(sides[axis][end], Beyond::Open) {
+                pressure.sides[axis][end] = Side::Value(0.0);
+            }
+        }
+        let conjugates = [spare()?, spare()?, spare()?];
+        let mut fluid = Self {
+            name,
+            next: u.clone(),
+            u,
+            smoke,
+            temperature,
+            pressure,
+            solver,
+            b: Field::new(grid, Place::Cell, "m²/s")?,
+            left: vec![0.0; lattice.len()],
+            q: vec![0.0; lattice.len()],
+            conjugates,
+            scratch: Scratch::default(),
+            settings,
+        };
+        hold(&mut fluid.u, &fluid.settings.sides, 0.0);
+        fluid.projection(0.0, 1.0, &mut StepReport::default())?;
+        fluid.pressure.data.fill(0.0);
+        Ok(fluid)
+    }
+
+    /// Its cells.
+    pub fn grid(&self) -> Grid {
+        self.b.grid
+    }
+
+    /// One step from t to t + h [s].
+    pub fn step(&mut self, t: f64, h: f64, report: &mut StepReport) -> Result<(), Failed> {
+        report.courant = worse(report.courant, self.fastest() * h / self.grid().dx);
+        let parts = match self.settings.order {
+            Order::ProjectLast => self
+                .advection(t, h)
+                .and_then(|()| self.forces(t, h))
+                .and_then(|()| self.viscosity(t, h, report))
+                .and_then(|()| self.projection(t + h, h, report)),
+            Order::AdvectLast => self
+                .forces(t, h)
+                .and_then(|()| self.viscosity(t, h, report))
+                .and_then(|()| self.projection(t + h, h, report))
+                .and_then(|()| self.advection(t, h)),
+        };
+        parts.map_err(|failure| self.failed(failure))
+    }
+
+    /// What has to be done before a frame is taken.
+    pub fn finish(&mut self, t: f64, report: &mut StepReport) -> Result<(), Failed> {
+        if self.settings.order == Order::ProjectLast {
+            return Ok(());
+        }
+        // The pressure of a frame is that of its last step, not what little this one adds.
+        let pressure = self.pressure.data.clone();
+        let done = self.projection(t, 1.0, report);
+        self.pressure.data = pressure;
+        done.map_err(|failure| self.failed(failure))
+    }
+
+    fn failed(&self, failure: Failure) -> Failed {
+        Failed { broken: self.broken("", 0.0), failure, fluid: self.name.clone() }
+    }
+
+    /// Everything goes with the fluid for h seconds from t on.                                             (gas.5)
+    pub fn advection(&mut self, t: f64, h: f64) -> Result<(), Failure> {
+        hold(&mut self.u, &self.settings.sides, t);
+        let Self { u, next, smoke, temperature, settings, scratch, .. } = self;
+        let carried: Vec<&mut Carried> = smoke.iter_mut().chain(temperature.iter_mut()).collect();
+        let (from, mut to): (Vec<&Field>, Vec<&mut Field>) = carried.into_iter().map(|c| (&c.field, &mut c.next)).unzip();
+        advect(&from, u, h, &settings.scalars, &mut to, scratch)?;
+        for carried in smoke.iter_mut().chain(temperature.iter_mut()) {
+            std::mem::swap(&mut carried.field.data, &mut carried.next.data);
+        }
+        advect_vectors(u, u, h, &settings.velocity, next, scratch)?;
+        for (part, next) in u.parts.iter_mut().zip(&mut next.parts) {
+            std::mem::swap(&mut part.data, &mut next.data);
+        }
+        hold(u, &settings.sides, t + h);
+        Ok(())
+    }
+
+    /// The largest component of the velocity on any face [m/s].
+    pub fn fastest(&self) -> f64 {
+        self.u.parts.iter().map(magnitude).fold(0.0, worse)
+    }
+
+    /// The largest step [s] of the Courant number, within `left` [s]: forces speed the fluid up on the way.
+    pub fn courant_step(&self, left: f64) -> f64 {
+        let settings = &self.settings;
+        let most = |f: &Option<Carried>, around: f64| {
+            f.as_ref().map_or(0.0, |c| {
+                let far = |x: &Real| (f64::from(*x) - around).abs();
+                super::rows::largest(&c.field, |at, n| c.field.data[at..at + n].iter().map(far).fold(0.0, worse))
+            })
+        };
+        let g = settings.gravity.iter().map(|g| g * g).sum::<f64>().sqrt();
+        let buoyancy = most(&self.smoke, 0.0) * (settings.weight / settings.density).abs()
+            + most(&self.temperature, settings.ambient) * settings.expansion.abs();
+        let speed = self.fastest();
+        // v h + a h² = way
+        let (way, a) = (settings.courant * self.grid().dx, g * buoyancy);
+        let h = if speed > 0.0 || a > 0.0 { 2.0 * way / (speed + (speed * speed + 4.0 * a * way).sqrt()) } else { left };
+        h.min(left)
+    }
+}
+
+/// A field without numbers.
+fn nothing(grid: Grid) -> Field {
+    Field { grid, place: Place::Cell, sides: Default::default(), unit: "".into(), data: Vec::new() }
+}

@@ -1,0 +1,177 @@
+//! What pushes the fluid, and what feeds it: buoyancy, given accelerations, confinement, sources, and what fades.
+
+use super::confinement::confine;
+use super::fluid::{Carried, Failure, Fluid};
+use super::rows::{Face, runs};
+use crate::geometry::Collider;
+use crate::math::{Real, Row, VectorSignal, functions};
+use crate::operators::each_row;
+use crate::state::{Field, Grid, Place};
+
+/// A region that gives smoke, warmth and velocity to the fluid in it.
+#[derive(Debug, Clone, Default)]
+pub struct Source {
+    /// Smoke given off [kg/(m³ s)].
+    pub smoke: f64,
+    /// Smoke held [kg/m³].
+    pub density: Option<f64>,
+    /// Temperature held [K].
+    pub temperature: Option<f64>,
+    /// Warming [K/s].
+    pub heating: f64,
+    /// Velocity given [m/s].
+    pub velocity: Option<VectorSignal>,
+    /// When it works [s].
+    pub times: [f64; 2],
+    /// Which points it covers, and how much of each: those of cells, then those of the faces of each axis.
+    pub covers: Vec<Cover>,
+}
+
+/// Points of one place, and the share of each that is covered.
+#[derive(Debug, Clone)]
+pub struct Cover {
+    place: Place,
+    points: Vec<(usize, Real)>,
+}
+
+impl Source {
+    /// The same where a region covers the points of a grid: wholly half a cell inside, not at all half a cell outside.
+    pub fn covering(mut self, region: &Collider, grid: &Grid) -> Self {
+        let places = std::iter::once(Place::Cell).chain(grid.axes().map(Place::Face));
+        self.covers = places
+            .map(|place| {
+                let [x, y, z] = grid.points(place);
+                let all = (0..z).flat_map(|k| (0..y).flat_map(move |j| (0..x).map(move |i| [i, j, k])));
+                let share = |at: [usize; 3]| (0.5 - region.distance(grid.point(place, at).into(), 0.0, grid.dx).0 / grid.dx).min(1.0);
+                let lattice = grid.lattice();
+                let points = all.map(|at| (lattice.at(at[0], at[1], at[2]), share(at) as Real)).filter(|(_, share)| *share > 0.0);
+                Cover { place, points: points.collect() }
+            })
+            .collect();
+        self
+    }
+
+    /// Whether it covers no point.
+    pub fn is_empty(&self) -> bool {
+        self.covers.iter().all(|cover| cover.points.is_empty())
+    }
+
+    fn cover(&self, place: Place) -> &[(usize, Real)] {
+        self.covers.iter().find(|c| c.place == place).map_or(&[], |c| &c.points)
+    }
+}
+
+/// Moves values towards one, by the share that is covered.
+fn pull(data: &mut [Real], points: &[(usize, Real)], to: f64) {
+    points.iter().for_each(|(at, share)| data[*at] += share * (to as Real - data[*at]));
+}
+
+fn feed(data: &mut [Real], points: &[(usize, Real)], amount: f64) {
+    points.iter().for_each(|(at, share)| data[*at] += share * amount as Real);
+}
+
+/// f -> ambient + factor (f - ambient)
+fn fade(carried: &mut Carried, ambient: f64, factor: f64) {
+    let (ambient, factor) = (ambient as Real, factor as Real);
+    each_row(&mut carried.field, |_, _, row| row.iter_mut().for_each(|f| *f = ambient + factor * (*f - ambient)));
+}
+
+/// u += scale (mean of the two cells beside each face - around)
+fn push_by(part: &mut Field, axis: usize, cells: &Field, scale: f64, around: f64) {
+    let (half, around) = ((0.5 * scale) as Real, around as Real);
+    let grid = part.grid;
+    each_row(part, |j, k, row| {
+        runs(&grid, axis, j, k, row, |run, face| {
+            let n = run.len();
+            let (low, high) = match face {
+                Face::Between(low, high) => (low, high),
+                Face::Lower(cell) | Face::Upper(cell) => (cell, cell),
+            };
+            let (low, high) = (&cells.data[low..low + n], &cells.data[high..high + n]);
+            for i in 0..n {
+                run[i] += half * ((low[i] - around) + (high[i] - around));
+            }
+        });
+    });
+}
+
+impl Fluid {
+    /// Sources, fading, and everything that pushes, for h seconds from t on.                                  (gas.2)
+    pub fn forces(&mut self, t: f64, h: f64) -> Result<(), Failure> {
+        self.feed(t, h);
+        self.push(t, h)
+    }
+
+    fn feed(&mut self, t: f64, h: f64) {
+        let settings = &self.settings;
+        if let Some(smoke) = &mut self.smoke
+            && settings.dissipation > 0.0
+        {
+            fade(smoke, 0.0, functions::exp(-settings.dissipation * h));
+        }
+        if let Some(warmth) = &mut self.temperature
+            && settings.cooling > 0.0
+        {
+            fade(warmth, settings.ambient, functions::exp(-settings.cooling * h));
+        }
+        for source in &settings.sources {
+            let time = (t + h).min(source.times[1]) - t.max(source.times[0]);
+            if time <= 0.0 {
+                continue;
+            }
+            let cells = source.cover(Place::Cell);
+            if let Some(smoke) = &mut self.smoke {
+                feed(&mut smoke.field.data, cells, time * source.smoke);
+                source.density.iter().for_each(|density| pull(&mut smoke.field.data, cells, *density));
+            }
+            if let Some(warmth) = &mut self.temperature {
+                feed(&mut warmth.field.data, cells, time * source.heating);
+                source.temperature.iter().for_each(|temperature| pull(&mut warmth.field.data, cells, *temperature));
+            }
+            if let Some(velocity) = &source.velocity {
+                let v = <[f64; 3]>::from(velocity.value(t + h));
+                for part in &mut self.u.parts {
+                    let Place::Face(axis) = part.place else { continue };
+                    pull(&mut part.data, source.cover(part.place), v[axis]);
+                }
+            }
+        }
+    }
+
+    /// Accelerations: given ones, and g (s weight/rho - beta (T - T0)).                                  (gas.2)
+    fn push(&mut self, t: f64, h: f64) -> Result<(), Failure> {
+        let settings = &self.settings;
+        let constant = if settings.acceleration.is_uniform() { settings.acceleration.value(t) } else { [0.0; 3].into() };
+        let constant = <[f64; 3]>::from(constant);
+        for part in &mut self.u.parts {
+            let Place::Face(axis) = part.place else { continue };
+            let g = settings.gravity[axis];
+            if let Some(smoke) = &self.smoke
+                && g * settings.weight != 0.0
+            {
+                push_by(part, axis, &smoke.field, h * g * settings.weight / settings.density, 0.0);
+            }
+            if let Some(warmth) = &self.temperature
+                && g * settings.expansion != 0.0
+            {
+                push_by(part, axis, &warmth.field, -h * g * settings.expansion, settings.ambient);
+            }
+            if constant[axis] != 0.0 {
+                let add = (h * constant[axis]) as Real;
+                each_row(part, |_, _, row| row.iter_mut().for_each(|u| *u += add));
+            }
+            if !settings.acceleration.is_uniform() {
+                let (grid, place) = (part.grid, part.place);
+                each_row(part, |j, k, row| {
+                    let at = |i: usize| grid.point(place, [i, j, k]).map(|x| x as Real);
+                    let x: Vec<Row> = (0..row.len()).map(at).map(|[x, y, z]| [x, y, z, 0.0]).collect();
+                    settings.acceleration.rows(t, &x, &x, |i, a| row[i] += (h * <[f64; 3]>::from(a)[axis]) as Real);
+                });
+            }
+        }
+        if settings.confinement > 0.0 {
+            confine(&mut self.u, settings.confinement, h)?;
+        }
+        Ok(())
+    }
+}

@@ -1,0 +1,97 @@
+//! The projection: takes from a velocity the gradient that makes it free of divergence.               (gas.4, pressure.1)
+
+use super::fluid::{Failure, Fluid};
+use super::rows::{self, Face, runs};
+use crate::linalg::poisson::{Params, Target};
+use crate::math::Real;
+use crate::math::parallel::chunks;
+use crate::operators::each_row;
+use crate::state::{Field, Vectors};
+use tumble_interface::engine::StepReport;
+use tumble_interface::scene::OnFailure;
+
+/// b = -dx D u = -dx² div u at the cells.                                             (pressure.2)
+pub fn right_side(u: &Vectors, b: &mut Field) {
+    let grid = b.grid;
+    let lattice = grid.lattice();
+    let dx = grid.dx as Real;
+    each_row(b, |j, k, row| {
+        let at = lattice.at(0, j, k);
+        let n = row.len();
+        row.fill(0.0);
+        for (axis, part) in grid.axes().zip(&u.parts) {
+            let (cell, stride) = ([0, j, k], lattice.stride[axis]);
+            let wraps = |i: usize| grid.periodic[axis] && i + 1 == grid.n[axis];
+            let low = &part.data[at..];
+            if axis == 0 {
+                let high = &part.data[at + 1..];
+                for i in 0..n {
+                    row[i] += dx * (low[i] - if wraps(i) { low[0] } else { high[i] });
+                }
+            } else {
+                let high = if wraps(cell[axis]) { &part.data[at - (grid.n[axis] - 1) * stride..] } else { &part.data[at + stride..] };
+                for i in 0..n {
+                    row[i] += dx * (low[i] - high[i]);
+                }
+            }
+        }
+    });
+}
+
+/// u -= grad q, on the sides of the box only where they are open.                      (pressure.1)
+fn subtract_gradient(u: &mut Vectors, q: &[Real], open: [[bool; 2]; 3]) {
+    for part in &mut u.parts {
+        let crate::state::Place::Face(axis) = part.place else { continue };
+        let scale = (1.0 / part.grid.dx) as Real;
+        let grid = part.grid;
+        each_row(part, |j, k, row| {
+            runs(&grid, axis, j, k, row, |run, face| match face {
+                Face::Between(low, high) => {
+                    let n = run.len();
+                    let (low, high) = (&q[low..low + n], &q[high..high + n]);
+                    for i in 0..n {
+                        run[i] -= scale * (high[i] - low[i]);
+                    }
+                }
+                Face::Lower(cell) if open[axis][0] => run.iter_mut().zip(&q[cell..]).for_each(|(u, q)| *u -= 2.0 * scale * q),
+                Face::Upper(cell) if open[axis][1] => run.iter_mut().zip(&q[cell..]).for_each(|(u, q)| *u += 2.0 * scale * q),
+                Face::Lower(_) | Face::Upper(_) => {}
+            });
+        });
+    }
+}
+
+impl Fluid {
+    /// Makes the velocity at time t free of divergence; h [s] only scales the pressure that it takes.          (gas.4)
+    pub fn projection(&mut self, t: f64, h: f64, report: &mut StepReport) -> Result<(), Failure> {
+        super::sides::hold(&mut self.u, &self.settings.sides, t);
+        let fastest = self.fastest();
+        let Self { u, b, left, q, pressure, settings, solver, .. } = self;
+        right_side(u, b);
+        let dx = b.grid.dx;
+        let asked = settings.tolerance * dx * fastest;
+        let params = Params { target: Target::Largest(asked), ..settings.pressure };
+        let open = settings.sides.each_ref().map(|sides| sides.each_ref().map(|s| matches!(s, super::Beyond::Open)));
+        pressure.data.fill(0.0);
+        let to_pressure = (settings.density / h) as Real;
+        left.copy_from_slice(&b.data);
+        let info = solver.refine(left, q, &params, |_, q, left| {
+            subtract_gradient(u, q, open);
+            chunks(&mut pressure.data, |start, p| p.iter_mut().zip(&q[start..]).for_each(|(p, q)| *p += to_pressure * q));
+            right_side(u, b);
+            left.copy_from_slice(&b.data);
+        });
+        let info = info.map_err(Failure::Pressure)?;
+        report.linear += info.iterations as u64;
+        report.pressure = info.residuals;
+        let reached = if fastest > 0.0 { info.largest / (dx * fastest) } else { 0.0 };
+        report.residual = rows::worse(report.residual, reached);
+        if !info.converged {
+            if settings.on_failure == OnFailure::Error {
+                return Err(Failure::Unconverged { iterations: info.iterations, reached, asked: settings.tolerance });
+            }
+            report.unconverged += 1;
+        }
+        Ok(())
+    }
+}

@@ -1,0 +1,108 @@
+//! What the sides of a box mean for velocities, pressure and what is carried.
+
+use crate::linalg::poisson;
+use crate::math::{Real, Vec3, VectorSignal};
+use crate::state::{Field, Place, Side, Vectors};
+
+/// What is beyond a side.
+#[derive(Debug, Clone, Default)]
+pub enum Beyond {
+    /// A wall along which the fluid slips.
+    #[default]
+    FreeSlip,
+    /// A wall to which the fluid sticks, with its velocity [m/s] along itself.
+    NoSlip(VectorSignal),
+    /// Pressure zero.
+    Open,
+    /// The opposite side.
+    Periodic,
+    /// A given velocity [m/s], which may depend on the place.
+    Inflow {
+        /// The velocity.
+        velocity: VectorSignal,
+        /// Of the smoke [kg/m³].
+        density: f64,
+        /// Of the fluid [K].
+        temperature: f64,
+    },
+}
+
+impl Beyond {
+    /// What it is for the pressure.
+    pub fn pressure(&self) -> poisson::Side {
+        match self {
+            Self::Open => poisson::Side::Open,
+            Self::Periodic => poisson::Side::Periodic,
+            _ => poisson::Side::Closed,
+        }
+    }
+
+    /// Whether the velocity across it is given.
+    pub fn is_held(&self) -> bool {
+        !matches!(self, Self::Open | Self::Periodic)
+    }
+
+    /// What it is for a carried field, whose value is `ambient` outside, and `inflow` of what comes in.
+    pub fn carried(&self, ambient: f64, inflow: impl Fn(f64, f64) -> f64) -> Side {
+        match self {
+            Self::Open => Side::Value(ambient),
+            Self::Inflow { density, temperature, .. } => Side::Value(inflow(*density, *temperature)),
+            _ => Side::Closed,
+        }
+    }
+
+    /// What it is for the component of the velocity along an axis, at the middle of the side.
+    fn component(&self, t: f64, middle: Vec3<f64>, axis: usize) -> Side {
+        let part = |v: &VectorSignal| <[f64; 3]>::from(v.at(t, middle, [0.0; 3].into()))[axis];
+        match self {
+            Self::FreeSlip | Self::Open | Self::Periodic => Side::Closed,
+            Self::NoSlip(velocity) | Self::Inflow { velocity, .. } => Side::Value(part(velocity)),
+        }
+    }
+
+    /// The velocity across the side at a place [m/s].
+    fn across(&self, t: f64, x: [f64; 3], axis: usize) -> f64 {
+        match self {
+            Self::Inflow { velocity, .. } => <[f64; 3]>::from(velocity.at(t, x.into(), [0.0; 3].into()))[axis],
+            _ => 0.0,
+        }
+    }
+}
+
+/// Sets the velocity on the sides of the box, and what lies beyond them, for time t [s].
+pub fn hold(u: &mut Vectors, beyond: &[[Beyond; 2]; 3], t: f64) {
+    for part in &mut u.parts {
+        let Place::Face(own) = part.place else { continue };
+        let grid = part.grid;
+        for axis in grid.axes().filter(|a| !grid.periodic[*a]) {
+            for end in 0..2 {
+                let side = &beyond[axis][end];
+                let middle = std::array::from_fn(|a| {
+                    let way = if a == axis { end as f64 } else { 0.5 };
+                    grid.origin[a] + if grid.flat == Some(a) { 0.0 } else { way * grid.n[a] as f64 * grid.dx }
+                });
+                part.sides[axis][end] = side.component(t, Vec3::from(middle), own);
+                if axis == own && side.is_held() {
+                    part.sides[axis][end] = Side::Value(side.across(t, middle, own));
+                    set_wall(part, axis, end * grid.n[axis], |x| side.across(t, x, own));
+                }
+            }
+        }
+    }
+}
+
+/// Sets a plane of faces across their axis.
+pub fn set_wall(part: &mut Field, axis: usize, index: usize, value: impl Fn([f64; 3]) -> f64) {
+    let mut points = part.points();
+    points[axis] = 1;
+    for k in 0..points[2] {
+        for j in 0..points[1] {
+            for i in 0..points[0] {
+                let mut at = [i, j, k];
+                at[axis] = index;
+                let n = part.index(at);
+                part.data[n] = value(part.grid.point(part.place, at)) as Real;
+            }
+        }
+    }
+}
