@@ -326,13 +326,13 @@ fn heat_stored_is_heat_that_came_in() {
         0.05,
         "",
         3,
-        "box = { size = [1, 0.7, 0.6], resolution = 20 }\nconductivity = 1\ndensity = 3\nheat_capacity = 2\n\
+        "box = { size = [1, 0.75, 0.6], resolution = 20 }\nconductivity = 1\ndensity = 3\nheat_capacity = 2\n\
         scheme = \"spectral\"\ntemperature = \"300 + 20*x\"\nsource = [{ power = \"9*t\", profile = \"x^2\" }]",
     );
     run(&mut sim, 20);
     let books = sim.ledger();
-    // The integral of 9 t is 4.5; the mean of x² over the box 0.42 m³ is 1/12 less that of a cell, dx²/12.
-    let exact = 4.5 * 0.42 * (1.0 - 0.0025) / 12.0;
+    // The integral of 9 t is 4.5; the mean of x² over the box of 0.45 m³ is 1/12 less that of a cell, dx²/12.
+    let exact = 4.5 * 0.45 * (1.0 - 0.0025) / 12.0;
     assert!((books.heat / exact - 1.0).abs() < 1e-9 && (books.heat_in / exact - 1.0).abs() < 1e-9, "{books:?} {exact}");
 }
 
@@ -372,7 +372,7 @@ fn fluxes_of_the_exchange_sum_up_to_the_ledger() {
 
 #[test]
 fn bits_are_those_of_any_number_of_threads_and_of_a_restored_run() {
-    let spectral = "box = { size = [1, 0.7, 0.6], resolution = 20 }\nconductivity = 1\ndensity = 3\nheat_capacity = 2\n\
+    let spectral = "box = { size = [1, 0.75, 0.6], resolution = 20 }\nconductivity = 1\ndensity = 3\nheat_capacity = 2\n\
         scheme = \"spectral\"\ntemperature = \"300 + 20*x\"\nsource = [{ power = \"9*t\", profile = \"x^2\" }]";
     for scheme in SCHEMES {
         let words = if scheme == "spectral" { spectral.to_string() } else { format!("scheme = \"{scheme}\"\n{EVERYTHING}") };

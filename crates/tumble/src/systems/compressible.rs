@@ -200,17 +200,16 @@ impl Gas {
         books
     }
 
-    /// What has broken: the column and the index of a cell.
-    fn fault(&self) -> Option<(&'static str, usize, Option<f64>)> {
+    /// What has broken: the column, the cell, and the growth of the energy.
+    fn fault(&self) -> Option<(&'static str, [usize; 3], Option<f64>)> {
         let points = self.density.points();
-        let number = |at: [usize; 3]| at[0] + points[0] * (at[1] + points[1] * at[2]);
         let good = |rho: Real| rho.is_finite() && rho > 0.0;
         if let Some(at) = self.density.each().find(|at| !good(self.density.value(*at))) {
-            return Some(("density", number(at), None));
+            return Some(("density", at, None));
         }
         for part in &self.velocity.parts {
             if let Some(at) = part.each().find(|at| !part.value(*at).is_finite()) {
-                return Some(("velocity", number(std::array::from_fn(|a| at[a].min(points[a] - 1))), None));
+                return Some(("velocity", std::array::from_fn(|a| at[a].min(points[a] - 1)), None));
             }
         }
         let books = self.books(0.0);
@@ -223,7 +222,7 @@ impl Gas {
                     (worst, most) = (at, off);
                 }
             }
-            return Some(("density", number(worst), Some(ratio)));
+            return Some(("density", worst, Some(ratio)));
         }
         None
     }
@@ -274,13 +273,15 @@ impl Compressible {
 
     fn broken(&self, t: f64, h: f64) -> Option<StepError> {
         self.gases.iter().find_map(|gas| {
-            let (column, index, energy_ratio) = gas.fault()?;
+            let (column, cell, energy_ratio) = gas.fault()?;
+            let points = gas.density.points();
             let about = Box::new(Breakdown {
                 system: self.settings.name.clone(),
                 object: gas.name.clone(),
                 column: column.into(),
-                index,
+                index: cell[0] + points[0] * (cell[1] + points[1] * cell[2]),
                 id: None,
+                cell: Some((cell, gas.grid().point(Place::Cell, cell))),
                 time: t,
                 integrator: Integrator::SymplecticEuler.name().into(),
                 step: h,
