@@ -1,8 +1,8 @@
 """Heat on 512³ cells of an insulated box in single precision, explicit steps at half the limit: 8 B of a cell and step.
 
-All peers take the same steps of the same field; what is left of its slowest mode is compared with the decay of (heat.7). numba and
-devito, where it is installed, may fuse multiplications with additions; tumble's bits are the same on every machine. The triad is
-a = b + s c by numba on columns of the same length, counted as 12 B a number."""
+All peers take the same steps of the same field; what is left of its slowest mode is compared with its decay (grids.10). numba
+and devito, where it is installed, may fuse multiplications with additions; tumble's bits are the same on every machine. The
+triad is a = b + s c by numba on columns of the same length, counted as 12 B a number."""
 
 import sys
 
