@@ -118,7 +118,7 @@ class Swirl:
 def swirls() -> list[Swirl]:
     """The bad solver at 0.9 of its largest step, Stable Fluids at a hundred times that."""
     velocity = ["sin(pi*x)*cos(pi*y)", "-cos(pi*x)*sin(pi*y)", 0]
-    box = {"size": [1, 1, 0], "center": [0.5, 0.5, 0], "resolution": CELLS}
+    box = {"size": [1, 1, 1], "center": [0.5, 0.5, 0], "resolution": CELLS}
     largest = 1.0 / CELLS / (SOUND * np.sqrt(2.0) + 2.0)
     objects: dict[str, dict[str, Any]] = {
         "compressible": {"sound_speed": SOUND, "density": 1.2},
