@@ -203,7 +203,7 @@ def _limits(figure: FigureBase, cases: list[Case]) -> None:
     axes.barh(rows - 0.2, [1e6 * c.predicted for c in cases], 0.38, color=PALETTE[0], label="predicted")
     axes.barh(rows + 0.2, [1e6 * c.measured for c in cases], 0.38, color=PALETTE[1], label="measured")
     for row, case in zip(rows, cases, strict=True):
-        axes.text(0, row, f" {case.measured / case.predicted:.3f}", va="center", color=INK, fontsize=8)
+        axes.text(0, float(row), f" {case.measured / case.predicted:.3f}", va="center", color=INK, fontsize=8)
     axes.set_yticks(rows, [case.name for case in cases])
     axes.invert_yaxis()
     axes.set_xlabel("largest step [µs]")
