@@ -122,7 +122,8 @@ fn stays(n: [usize; 3], flow: [f64; 3], viscosity: f64, part: f64) -> (f64, bool
 fn the_largest_step_is_the_predicted_one_in_one_two_and_three_dimensions() {
     for d in 1..=3 {
         let n: [usize; 3] = std::array::from_fn(|a| if a < d { 8 } else { 1 });
-        for (flow, viscosity) in [([0.0; 3], 0.0), ([1.0, 0.0, 0.0], 0.0), ([-0.8, 0.7, 0.6], 0.0), ([0.0; 3], 0.2), ([1.0, 0.5, 0.0], 0.1)] {
+        for (flow, viscosity) in [([0.0; 3], 0.0), ([1.0, 0.0, 0.0], 0.0), ([-0.8, 0.7, 0.6], 0.0), ([0.0; 3], 0.2), ([1.0, 0.5, 0.0], 0.1)]
+        {
             let flow = std::array::from_fn(|a| if a < d { flow[a] } else { 0.0 });
             // The largest part of the predicted step at which nothing grows.
             let (mut low, mut high) = (0.5, 1.5);

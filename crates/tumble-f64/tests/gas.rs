@@ -108,10 +108,7 @@ fn poiseuille_and_couette_reach_their_profiles() {
     let z = |i: usize| ((i / points[0]) as f64 + 0.5) / 32.0;
     let error = u.iter().enumerate().map(|(i, u)| (u - 0.05 * z(i) * (1.0 - z(i)) / (2.0 * 0.05)).abs()).fold(0.0, f64::max);
     println!("poiseuille {error:e} of {}", largest(&u));
-    let sim = channel(
-        "sides = { x = [\"periodic\", \"periodic\"], z = [\"no_slip\", { wall = { velocity = [0.3, 0, 0] } }] }",
-        60,
-    );
+    let sim = channel("sides = { x = [\"periodic\", \"periodic\"], z = [\"no_slip\", { wall = { velocity = [0.3, 0, 0] } }] }", 60);
     let (u, _) = grid(&sim, "air", "velocity_x");
     let error = u.iter().enumerate().map(|(i, u)| (u - 0.3 * z(i)).abs()).fold(0.0, f64::max);
     println!("couette {error:e}");

@@ -44,11 +44,8 @@ pub fn plans(scene: &Scene) -> Vec<Plan> {
         return scene.system.clone();
     }
     // Each method on grids has a system of its own; all other objects are in one of dynamics.
-    let mut methods = vec![
-        (Method::Gas, scene.gas.len()),
-        (Method::Heat, scene.heat.len()),
-        (Method::Compressible, scene.compressible.len()),
-    ];
+    let mut methods =
+        vec![(Method::Gas, scene.gas.len()), (Method::Heat, scene.heat.len()), (Method::Compressible, scene.compressible.len())];
     methods.retain(|(_, count)| *count > 0);
     let others = objects(scene).len() - methods.iter().map(|(_, count)| count).sum::<usize>();
     let plain = (others > 0 || methods.is_empty()).then(Plan::default);
