@@ -13,7 +13,7 @@ ROOT = HERE.parent
 VENV = ROOT / ".venv-bench"
 PEERS = ["numba", "pyamg", "scipy", "taichi"]
 OURS = ["numpy", "typer", "rich"]
-CASES = ["start", "springs", "implicit", "particles", "emission", "gravitation", "flock", "pressure"]
+CASES = ["start", "springs", "implicit", "particles", "emission", "gravitation", "flock", "pressure", "heat"]
 # What is aimed at: (case, ours, theirs, at least this ratio), or at most for costs.
 TARGETS = {
     ("springs", "taichi"): (5.0, "at least"),
@@ -31,6 +31,8 @@ TARGETS = {
         (f"pressure {n}, {kind}", "10 iterations"): (1.0, "at most") for n in (128, 256) for kind in ("random", "plume")
     },
     **{(f"box {n}", "scipy.fft"): (1.0, "at least") for n in (128, 256)},
+    ("heat", "numba"): (1.0, "at least"),
+    ("heat", "devito"): (1.0, "at least"),
     ("direct sum, single, portable", "numba"): (0.6, "at least"),
     ("direct sum, single, native", "numba"): (1.3, "at least"),
     ("direct sum, double, portable", "numba"): (1.0, "at least"),

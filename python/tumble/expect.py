@@ -41,6 +41,8 @@ _UNITS = {
     "max_energy_drift": "",
     "max_energy_growth": "",
     "max_final_kinetic": "J",
+    "max_mass_error": "",
+    "max_heat_error": "",
     "broken_links": "",
 }
 
@@ -61,6 +63,21 @@ def energy_changes(ledger: Mapping[str, npt.NDArray[Any]]) -> Curve:
     return relative
 
 
+def mass_error(ledger: Mapping[str, npt.NDArray[Any]]) -> Curve:
+    """|m - m_0| over m_0."""
+    mass = ledger["mass"]
+    error: Curve = np.abs(mass - mass[:1]) / max(float(np.abs(mass[0])), 1e-300)
+    return error
+
+
+def heat_error(ledger: Mapping[str, npt.NDArray[Any]]) -> Curve:
+    """|heat gained - heat that came in| over the largest of both in any frame so far."""
+    gained, came = ledger["heat"], ledger["heat_in"]
+    scale = np.maximum.accumulate(np.maximum(np.abs(gained), np.abs(came)))
+    error: Curve = np.divide(np.abs(gained - came), scale, out=np.zeros_like(gained), where=scale != 0.0)
+    return error
+
+
 def check(run: "Run") -> list[Broken]:
     """The expectations that a finished run broke, in the order of the table."""
     expect = run.scene.get("expect", {})
@@ -73,6 +90,8 @@ def check(run: "Run") -> list[Broken]:
         "max_speed": ledger["speed"],
         "max_energy_drift": np.abs(energy_changes(ledger)),
         "max_energy_growth": energy_changes(ledger),
+        "max_mass_error": mass_error(ledger),
+        "max_heat_error": heat_error(ledger),
     }
     broken = [_over(name, curve, expect[name]) for name, curve in curves.items() if expect.get(name) is not None]
     return [b for b in [*broken, *_at_the_end(run, expect)] if b is not None]
@@ -123,11 +142,17 @@ def probes(world: World, scene: Mapping[str, Any]) -> list[list[float]]:
     """The values that the scene's probes look at, now; of particles that come and go, `index` is the id, and of one
     that is not there nan. Raises SceneError where there is nothing to look at."""
     found, issues = [], []
+    topology = world.topology
     for i, probe in enumerate(scene.get("expect", {}).get("probe", ())):
         column, name, index = probe["column"], probe["object"], probe["index"]
         table = world.columns(column, "id") if column != "id" else world.columns("id")
         table = {name: columns for name, columns in table.items() if column in columns}
         path = f"expect.probe[{i}]"
+        if name in table and (axes := len(topology.get(name, {}).get("grid_cells", ()))):
+            # The rows of a grid, its first axis fastest.
+            on_grid = table[name][column]
+            width = on_grid.shape[axes:]
+            table[name] = {column: on_grid.reshape((-1, *width), order="F")}
         if name not in table:
             known = ", ".join(f'"{n}"' for n in table) or "none"
             issues.append(f'{path}: no object "{name}" has a column "{column}"; those that have one: {known}')

@@ -105,6 +105,10 @@ pub struct Ledger {
     pub contacts: u64,
     /// Links broken so far.
     pub broken: u64,
+    /// Heat in bodies, above that at the start [J]; in a plane for a metre across it.
+    pub heat: f64,
+    /// Heat that has come in through surfaces and from sources [J].
+    pub heat_in: f64,
 }
 
 impl Ledger {

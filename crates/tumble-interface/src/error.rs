@@ -145,12 +145,11 @@ impl fmt::Display for Breakdown {
         let Self { system, object, column, index, id, time, integrator, step, stable_step, .. } = self;
         if let Some((cell, place)) = self.cell {
             let place = place.map(short);
-            return write!(
-                f,
-                "system \"{system}\" at t = {} s: first bad {column} in \"{object}\", cell {cell:?} at {place:?} m. Take smaller sub-steps, or \
-                 look at sources and formulas there",
-                short(*time)
-            );
+            write!(f, "system \"{system}\" at t = {} s: first bad {column} in \"{object}\", cell {cell:?} at {place:?} m", short(*time))?;
+            if *stable_step > 0.0 && stable_step.is_finite() {
+                write!(f, ", with steps of {step:.3e} s by {integrator}, the largest stable of which is {stable_step:.3e} s")?;
+            }
+            return write!(f, ". Take smaller sub-steps, or look at sources and formulas there");
         }
         write!(f, "system \"{system}\" ({integrator}, step {step:.3e} s) at t = {} s: ", short(*time))?;
         match id {

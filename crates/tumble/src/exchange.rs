@@ -1,5 +1,6 @@
 //! L4: all that systems say to each other. A system posts impulses to ports of others and reads the state that they
-//! have published; it never sees another system.
+//! have published; it never sees another system. What passes through a surface of one, heat, say, is a flux that all
+//! others may read.
 //!
 //! The world delivers an impulse to a system on the system's own next turn, before it advances: absorbing them after
 //! everyone has advanced would conserve momentum too, and multiply the energy (see `docs/theory/coupling.md`).
@@ -22,11 +23,25 @@ pub struct PortState {
     pub time: f64,
 }
 
+/// What has passed through a surface of a system.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct Flux {
+    /// System that it has entered.
+    pub system: usize,
+    /// Object and surface: `plate x_low`.
+    pub name: String,
+    /// Heat that has entered, in all [J].
+    pub heat: f64,
+    /// Mass that has entered, in all [kg].
+    pub mass: f64,
+}
+
 /// Ports and mail.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Exchange {
     ports: Vec<PortState>,
     mail: Vec<(Port, Vector)>,
+    fluxes: Vec<Flux>,
     /// Sum of all impulses ever posted and ever delivered [N s].
     pub posted: Vector,
     /// Sum of all impulses ever delivered [N s].
@@ -66,7 +81,24 @@ impl Exchange {
         mine.into_iter().map(|(port, impulse)| (self.ports[port].owner.1, impulse)).collect()
     }
 
-    /// Everything as numbers, for a snapshot: ports in order, then the mail.
+    /// Announces a surface; returns its place among the fluxes.
+    pub fn surface(&mut self, system: usize, name: String) -> usize {
+        self.fluxes.push(Flux { system, name, ..Flux::default() });
+        self.fluxes.len() - 1
+    }
+
+    /// Heat [J] and mass [kg] have entered through a surface.
+    pub fn enter(&mut self, surface: usize, heat: f64, mass: f64) {
+        let flux = &mut self.fluxes[surface];
+        (flux.heat, flux.mass) = (flux.heat + heat, flux.mass + mass);
+    }
+
+    /// What has passed through all surfaces.
+    pub fn fluxes(&self) -> &[Flux] {
+        &self.fluxes
+    }
+
+    /// Everything as numbers, for a snapshot: ports in order, fluxes, then the mail.
     pub fn save(&self) -> Vec<f64> {
         let v = |v: Vector| <[f64; 3]>::from(v);
         let mut out = vec![self.ports.len() as f64];
@@ -74,6 +106,7 @@ impl Exchange {
             out.extend(v(p.position).into_iter().chain(v(p.velocity)).chain([p.time]));
         }
         out.extend(v(self.posted).into_iter().chain(v(self.delivered)));
+        out.extend(self.fluxes.iter().flat_map(|flux| [flux.heat, flux.mass]));
         for (port, impulse) in &self.mail {
             out.push(*port as f64);
             out.extend(v(*impulse));
@@ -85,12 +118,14 @@ impl Exchange {
     pub fn restore(&mut self, numbers: &[f64]) -> Option<()> {
         let (count, rest) = numbers.split_first()?;
         let n = self.ports.len();
-        if *count as usize != n || rest.len() < 7 * n + 6 || !(rest.len() - 7 * n - 6).is_multiple_of(4) {
+        let fixed = 7 * n + 6 + 2 * self.fluxes.len();
+        if *count as usize != n || rest.len() < fixed || !(rest.len() - fixed).is_multiple_of(4) {
             return None;
         }
         let v = |s: &[f64]| Vector { x: s[0], y: s[1], z: s[2] };
         let (ports, rest) = rest.split_at(7 * n);
-        let (sums, mail) = rest.split_at(6);
+        let (sums, rest) = rest.split_at(6);
+        let (fluxes, mail) = rest.split_at(2 * self.fluxes.len());
         if mail.chunks_exact(4).any(|m| !(m[0] >= 0.0 && m[0] < n as f64)) {
             return None;
         }
@@ -98,6 +133,9 @@ impl Exchange {
             (port.position, port.velocity, port.time) = (v(&s[..3]), v(&s[3..6]), s[6]);
         }
         (self.posted, self.delivered) = (v(&sums[..3]), v(&sums[3..]));
+        for (flux, s) in self.fluxes.iter_mut().zip(fluxes.chunks_exact(2)) {
+            (flux.heat, flux.mass) = (s[0], s[1]);
+        }
         self.mail = mail.chunks_exact(4).map(|m| (m[0] as usize, v(&m[1..]))).collect();
         Some(())
     }
@@ -111,11 +149,16 @@ mod tests {
     fn every_impulse_is_delivered_once_to_its_system() {
         let mut exchange = Exchange::default();
         let (a, b) = (exchange.open(0, 5), exchange.open(1, 7));
+        let surface = exchange.surface(1, "plate x_low".into());
+        exchange.enter(surface, 3.0, 0.5);
+        exchange.enter(surface, -1.0, 0.5);
+        assert_eq!((exchange.fluxes()[0].heat, exchange.fluxes()[0].mass), (2.0, 1.0));
         exchange.post(a, [1.0, 0.0, 0.0].into());
         exchange.post(b, [0.0, 2.0, 0.0].into());
         exchange.post(b, [0.0, 0.0, 3.0].into());
         let mut copy = exchange.clone();
         copy.take(0);
+        copy.enter(surface, 9.0, 9.0);
         assert!(copy.restore(&exchange.save()).is_some() && copy == exchange);
         assert!(copy.restore(&exchange.save()[1..]).is_none());
         assert_eq!(exchange.take(1), vec![(7, [0.0, 2.0, 0.0].into()), (7, [0.0, 0.0, 3.0].into())]);

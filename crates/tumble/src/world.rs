@@ -216,6 +216,8 @@ impl World {
             total.speed = total.speed.max(books.speed);
             total.contacts += books.contacts;
             total.broken += books.broken;
+            total.heat += books.heat;
+            total.heat_in += books.heat_in;
         }
         total
     }

@@ -22,6 +22,7 @@ def lab() -> None:
       tumble lab integrators integrators/spiral
       tumble lab structures
       tumble lab operators
+      tumble lab compressible
     """
 
 
@@ -102,3 +103,16 @@ def operators(out: OutOption = None) -> None:
     from tumble.lab.operators import page
 
     say(page(out or find.OUT / "lab" / "operators"))
+
+
+@app.command()
+def compressible(out: OutOption = None) -> None:
+    """Show the largest step of the bad solver, and Stable Fluids at a hundred times that.
+
+    \b
+    Example:
+      tumble lab compressible
+    """
+    from tumble.lab.compressible import page
+
+    say(page(out or find.OUT / "lab" / "compressible"))

@@ -2,16 +2,19 @@
 //! schema; JSON Schema, the reference page and the Python stubs are generated from them.
 
 mod animated;
+mod compressible;
 mod emitters;
 mod forces;
 mod gas;
 mod grids;
+mod heat;
 mod output;
 mod shapes;
 mod structures;
 mod systems;
 
 pub use animated::{Animated, AnimatedVector, Component, Interpolation, Keys, VectorKeys};
+pub use compressible::Compressible;
 pub use emitters::{Between, Burst, Cause, Emitter, Event, Kill, Source, WhenFull};
 pub use forces::{Anchor, Field, Force, Goal};
 pub use gas::{
@@ -19,6 +22,7 @@ pub use gas::{
     Smoke, Temperature, Viscous,
 };
 pub use grids::GridBox;
+pub use heat::{Heat, HeatRegion, HeatScheme, HeatSide, HeatSides, HeatSource};
 pub use output::{Camera, Expect, Look, Output, Probe};
 pub use shapes::{Collider, MeshFile, MeshFrame, MeshFrames, MeshRef, Motion, Pace, Pose, Shape};
 pub use structures::{
@@ -89,6 +93,12 @@ pub struct Scene {
     /// Stars, placed at random and set going so that they hold together; needs a force of gravitation.
     #[serde(default)]
     pub galaxy: Vec<Galaxy>,
+    /// Bodies that conduct heat.
+    #[serde(default)]
+    pub heat: Vec<Heat>,
+    /// Gases that sound runs through.
+    #[serde(default)]
+    pub compressible: Vec<Compressible>,
     /// Fluids that fill a box, moved by systems of method `gas`.
     #[serde(default)]
     pub gas: Vec<Gas>,

@@ -100,13 +100,19 @@ pub struct Expect {
     /// Kinetic energy at the last frame.
     #[schemars(range(min = 0.0), extend("x-unit" = "J"))]
     pub max_final_kinetic: Option<f64>,
+    /// |m - m_0| over the mass at the start.
+    #[schemars(range(min = 0.0), extend("x-unit" = "1"))]
+    pub max_mass_error: Option<f64>,
+    /// Heat that bodies have gained less heat that came in, over the largest of both so far.
+    #[schemars(range(min = 0.0), extend("x-unit" = "1"))]
+    pub max_heat_error: Option<f64>,
     /// Links that have broken by the last frame.
     pub broken_links: Option<u32>,
     /// Values of single masses at the last frame.
     pub probe: Vec<Probe>,
 }
 
-/// A value of one mass at the last frame.
+/// A value of one mass or cell at the last frame.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Probe {
@@ -115,9 +121,9 @@ pub struct Probe {
     /// Column of the frame.
     #[serde(default = "position")]
     pub column: String,
-    /// Index of the mass within the object.
+    /// Index of the mass within the object, or of the cell within its grid, the first axis fastest.
     pub index: u32,
-    /// The value expected.
+    /// The value expected; of a single number the first counts.
     pub value: [f64; 3],
     /// How far off it may be, as a distance.
     #[schemars(extend("exclusiveMinimum" = 0.0))]

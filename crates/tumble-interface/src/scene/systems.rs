@@ -73,6 +73,10 @@ pub enum Method {
     /// The model of Vicsek: particles of constant speed that take the mean direction of all within a radius, and err. A map:
     /// each sub-step is one step of it (one an exchange without `substeps` and `step`), and there is no integrator.
     Vicsek,
+    /// Heat in bodies on grids; each body says how it is stepped, and there is no integrator.
+    Heat,
+    /// A gas whose pressure follows from its density, stepped explicitly by `symplectic_euler`: sound limits the step.
+    Compressible,
     /// Stable Fluids: incompressible fluids that fill boxes of cells, `[[gas]]`. There is no integrator.
     Gas,
 }
@@ -84,6 +88,8 @@ impl Method {
             Self::Dynamics => "dynamics",
             Self::Tracers => "tracers",
             Self::Vicsek => "vicsek",
+            Self::Heat => "heat",
+            Self::Compressible => "compressible",
             Self::Gas => "gas",
         }
     }

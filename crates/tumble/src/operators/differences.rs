@@ -8,7 +8,8 @@
 //!    w--- v ---w        Source: [harlow1965], [lipnikov2014]; tests: crates/tumble-f64/tests/operators.rs
 //! ```
 
-use super::stencil::{Kind, Term, combine, each_row, second};
+use super::stencil::{Kind, Term, combine, each_row, fetch, ghosted, second};
+use crate::math::Real;
 use crate::state::{Field, GridError, Place, Vectors};
 
 /// The gradient of a field of cells on faces, (c_i - c_{i-1})/dx. On a wall its sides decide: closed, it is 0.   (grids.3)
@@ -102,6 +103,39 @@ pub fn directional(u: &Vectors, f: &Field, out: &mut Field) -> Result<(), GridEr
             let at = slope.index([0, j, k]);
             for (i, out) in row.iter_mut().enumerate() {
                 *out += speed.data[at + i] * slope.data[at + i];
+            }
+        });
+    }
+    Ok(())
+}
+
+/// The directional derivative u . grad f with each difference taken from where the flow comes: of first order, and it damps.
+/// Steps up to dx over the sum of |u_a| are stable.                                                (compressible.3)
+pub fn upwind(u: &Vectors, f: &Field, out: &mut Field) -> Result<(), GridError> {
+    let grid = u.on_faces("velocity of an upwind derivative")?;
+    f.expect(&grid, f.place, "field of an upwind derivative")?;
+    out.expect(&grid, f.place, "upwind derivative")?;
+    out.data.fill(0.0);
+    let scale = (1.0 / grid.dx) as Real;
+    for (axis, part) in grid.axes().zip(&u.parts) {
+        let speed = average(part, f.place)?;
+        each_row(out, |j, k, row| {
+            let (j, k) = (j as isize, k as isize);
+            let (mut below, mut above, mut own) = (Vec::new(), Vec::new(), Vec::new());
+            let at = |m: isize| if axis == 1 { (j + m, k) } else { (j, k + m) };
+            let c = fetch(f, j, k, &mut own);
+            let (low, high) =
+                if axis == 0 { (c, c) } else { (fetch(f, at(-1).0, at(-1).1, &mut below), fetch(f, at(1).0, at(1).1, &mut above)) };
+            let start = speed.index([0, j as usize, k as usize]);
+            let n = row.len();
+            for i in 0..n {
+                let (a, b) = match axis {
+                    0 if i == 0 || i + 1 == n => (ghosted(f, [i as isize - 1, j, k]), ghosted(f, [i as isize + 1, j, k])),
+                    0 => (c[i - 1], c[i + 1]),
+                    _ => (low[i], high[i]),
+                };
+                let s = speed.data[start + i];
+                row[i] += scale * s * if s > 0.0 { c[i] - a } else { b - c[i] };
             }
         });
     }

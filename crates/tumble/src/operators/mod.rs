@@ -11,7 +11,7 @@ pub mod sample;
 mod stencil;
 
 pub use advect::{Advection, Scratch, Trace, advect, advect_vectors};
-pub use differences::{average, curl, directional, divergence, gradient, laplacian, vector_laplacian};
+pub use differences::{average, curl, directional, divergence, gradient, laplacian, upwind, vector_laplacian};
 pub use diffuse::{diffuse, diffuse_step, diffusion_limit};
 pub use sample::{Interpolation, sample};
 pub use stencil::each_row;

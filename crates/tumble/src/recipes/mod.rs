@@ -5,21 +5,26 @@
 //! once.                                                               (springs.8)
 
 mod block;
+mod compressible;
 mod emitter;
 mod galaxy;
 mod grid;
+mod heat;
 mod lattice;
 mod net;
 mod particles;
 mod pins;
+mod places;
 mod rope;
 mod scenery;
 mod sheet;
 
 pub use block::block;
+pub use compressible::compressible;
 pub use emitter::{emitter, region};
 pub use galaxy::galaxy;
 pub use grid::grid;
+pub use heat::heat;
 pub use net::net;
 pub use particles::{Tracer, draw_cloud, particles, tracers, walkers};
 pub use rope::rope;

@@ -12,7 +12,9 @@ use crate::pool::{Course, Emitter as Emission};
 use crate::recipes::{self, Site};
 use crate::state::Object;
 use crate::system::System;
-use crate::systems::dynamics::{Dynamics, Parts, Settings, SpringPart, Stepping, Tether};
+use crate::systems::compressible::{self, Compressible as Loud};
+use crate::systems::dynamics::{Dynamics, MOST_SUBSTEPS, Parts, Settings, SpringPart, Stepping, Tether};
+use crate::systems::heat::{self, Heat as Warm};
 use crate::systems::tracers::{self, Tracers};
 use crate::systems::vicsek::Swarm;
 use crate::world::World;
@@ -20,7 +22,8 @@ use std::borrow::Cow;
 use std::sync::Arc;
 use tumble_interface::check::plain;
 use tumble_interface::scene::{
-    Anchor, Bits, Emitter, Event, Force as Words, Kill, MeshFile, Method, Particles, Plane, Scene, Shape, Source, System as Plan, Vicsek,
+    Anchor, Animated, Bits, Emitter, Event, Force as Words, Kill, MeshFile, Method, Particles, Plane, Scene, Shape, Source, System as Plan,
+    Vicsek,
 };
 use tumble_interface::{Column, Data, Issue, Mesh, SceneError};
 
@@ -40,9 +43,14 @@ pub fn plans(scene: &Scene) -> Vec<Plan> {
     if !scene.system.is_empty() {
         return scene.system.clone();
     }
-    let masses = objects(scene).iter().any(|(kind, ..)| *kind != "gas") || scene.gas.is_empty();
-    let gas = (!scene.gas.is_empty()).then(|| Plan { name: "gas".into(), method: Method::Gas, ..Plan::default() });
-    masses.then(Plan::default).into_iter().chain(gas).collect()
+    // Each method on grids has a system of its own; all other objects are in one of dynamics.
+    let mut methods =
+        vec![(Method::Gas, scene.gas.len()), (Method::Heat, scene.heat.len()), (Method::Compressible, scene.compressible.len())];
+    methods.retain(|(_, count)| *count > 0);
+    let others = objects(scene).len() - methods.iter().map(|(_, count)| count).sum::<usize>();
+    let plain = (others > 0 || methods.is_empty()).then(Plan::default);
+    let own = |(method, _): (Method, usize)| Plan { name: method.name().into(), method, ..Plan::default() };
+    plain.into_iter().chain(methods.into_iter().map(own)).collect()
 }
 
 /// Builds the scene, or tells everything that is wrong with it.
@@ -96,6 +104,14 @@ pub fn build(scene: &Scene, assets: &Assets) -> Result<Built, SceneError> {
         }
         if let (Method::Vicsek, Some(words)) = (plan.method, &plan.vicsek) {
             systems.push(Box::new(swarm(scene, &plans, index, words)));
+            continue;
+        }
+        if plan.method == Method::Heat {
+            systems.push(Box::new(warm(scene, &plans, index, dt, &mut exchange)?));
+            continue;
+        }
+        if plan.method == Method::Compressible {
+            systems.push(Box::new(loud(scene, &plans, index)?));
             continue;
         }
         if plan.method == Method::Gas {
@@ -188,9 +204,16 @@ fn unused(scene: &Scene, plans: &[Plan]) -> Vec<String> {
         warnings.push("no object is moved by a system of tracers, so that nothing follows the fields".into());
     }
     if !methods.contains(&Method::Dynamics) {
+        let on_grids = |m: &Method| matches!(m, Method::Heat | Method::Compressible);
         for (words, given) in [("forces", !scene.force.is_empty()), ("colliders", !scene.collider.is_empty())] {
             if given {
-                let kind = if methods.contains(&Method::Tracers) { "tracers" } else { "in a vicsek system" };
+                let kind = if methods.contains(&Method::Tracers) {
+                    "tracers"
+                } else if methods.iter().all(on_grids) {
+                    "on grids"
+                } else {
+                    "in a vicsek system"
+                };
                 warnings.push(format!("all objects are {kind}, which feel no {words}"));
             }
         }
@@ -287,7 +310,8 @@ fn fill(scene: &Scene, plans: &[Plan], assets: &Assets, issues: &mut Vec<Issue>)
             match method {
                 Method::Tracers => drop(recipes::tracers(thing, &mut wrong)),
                 Method::Vicsek => drop(recipes::walkers(thing, &mut wrong)),
-                Method::Dynamics | Method::Gas => recipes::particles(site, thing),
+                // None is placed in a system on grids.
+                Method::Dynamics | Method::Heat | Method::Compressible | Method::Gas => recipes::particles(site, thing),
             }
         });
     }
@@ -394,6 +418,60 @@ fn swarm(scene: &Scene, plans: &[Plan], index: usize, words: &Vicsek) -> Swarm {
     }
     let plane = if scene.plane == Plane::Xz { [0, 2] } else { [0, 1] };
     Swarm::new(&plans[index], words, scene.seed, plane, &points, all)
+}
+
+/// The bodies of a system of heat.
+fn warm(scene: &Scene, plans: &[Plan], index: usize, interval: f64, exchange: &mut Exchange) -> Result<Warm, SceneError> {
+    let (plan, mut issues, mut bodies) = (&plans[index], Vec::new(), Vec::new());
+    for words in scene.heat.iter().filter(|o| place(plans, "heat", o.system.as_deref()) == Some(index)) {
+        let path = format!("heat \"{}\"", words.name);
+        let (mut unread, mut faults) = (Vec::new(), Vec::new());
+        let mut reader = Reader::new(scene, &mut unread);
+        let mut signal = |key: &str, value: &Animated| reader.signal(&format!("{path}{key}"), value, f64::NEG_INFINITY);
+        let body = recipes::heat(words, flat(scene), &mut signal, &mut |key, message| faults.push((key.to_string(), message)));
+        issues.extend(unread);
+        issues.extend(faults.into_iter().map(|(key, message)| Issue::new(format!("{path}{key}"), message)));
+        let Some(body) = body else { continue };
+        let step = plan.substeps.map(|n| interval / f64::from(n)).or(plan.step.map(|step| step.min(interval)));
+        let limit = body.limit();
+        if let Some(h) = step.filter(|h| *h > limit * (1.0 + 1e-9)) {
+            let key = if plan.substeps.is_some() { "substeps" } else { "step" };
+            let message = format!(
+                "steps of {} s, but explicit diffusion in \"{}\" grows beyond {} s: leave out {key} to have as many as it needs, \
+                 or set scheme = \"implicit\"",
+                short(h),
+                words.name,
+                short(limit)
+            );
+            issues.push(Issue::new(format!("system \"{}\".{key}", plan.name), message));
+        }
+        let needed = interval / (heat::SAFE * limit);
+        if step.is_none() && needed > MOST_SUBSTEPS {
+            let message = format!("an interval would take {needed:.0e} explicit steps; set scheme = \"implicit\", or lower the resolution");
+            issues.push(Issue::new(format!("{path}.scheme"), message));
+        }
+        bodies.push(body);
+    }
+    if !issues.is_empty() {
+        return Err(SceneError { issues });
+    }
+    let settings = heat::Settings { name: plan.name.clone(), index, substeps: plan.substeps, step: plan.step };
+    Ok(Warm::new(settings, bodies, exchange))
+}
+
+/// The gases of a compressible system.
+fn loud(scene: &Scene, plans: &[Plan], index: usize) -> Result<Loud, SceneError> {
+    let (plan, mut issues, mut gases) = (&plans[index], Vec::new(), Vec::new());
+    for words in scene.compressible.iter().filter(|o| place(plans, "compressible", o.system.as_deref()) == Some(index)) {
+        let path = format!("compressible \"{}\"", words.name);
+        let mut wrong = |key: &str, message: String| issues.push(Issue::new(format!("{path}{key}"), message));
+        gases.extend(recipes::compressible(words, flat(scene), gravity(scene), &mut wrong));
+    }
+    if !issues.is_empty() {
+        return Err(SceneError { issues });
+    }
+    let settings = compressible::Settings { name: plan.name.clone(), substeps: plan.substeps, step: plan.step };
+    Ok(Loud::new(settings, gases))
 }
 
 /// An anchor whose ends have been found: system and point of each.

@@ -8,7 +8,7 @@ use tumble_interface::check::suggestion;
 use tumble_interface::scene::{Force, Integrator, Method, Plane, Scene, Shape, Source, System};
 
 /// Column names that a frame may hold.
-pub const COLUMNS: [&str; 13] = [
+pub const COLUMNS: [&str; 14] = [
     "position",
     "velocity",
     "orientation",
@@ -16,6 +16,7 @@ pub const COLUMNS: [&str; 13] = [
     "link_strain",
     "density",
     "temperature",
+    "flux",
     "pressure",
     "vorticity",
     "divergence",
@@ -34,7 +35,10 @@ pub fn objects(scene: &Scene) -> Vec<(&'static str, &str, Option<&str>)> {
     let emitters = scene.emitter.iter().map(|o| ("emitter", o.name.as_str(), o.system.as_deref()));
     let galaxies = scene.galaxy.iter().map(|o| ("galaxy", o.name.as_str(), o.system.as_deref()));
     let gases = scene.gas.iter().map(|o| ("gas", o.name.as_str(), o.system.as_deref()));
-    particles.chain(emitters).chain(ropes).chain(sheets).chain(blocks).chain(nets).chain(galaxies).chain(gases).collect()
+    let bodies = scene.heat.iter().map(|o| ("heat", o.name.as_str(), o.system.as_deref()));
+    let sounding = scene.compressible.iter().map(|o| ("compressible", o.name.as_str(), o.system.as_deref()));
+    let things = particles.chain(emitters).chain(ropes).chain(sheets).chain(blocks).chain(nets).chain(galaxies);
+    things.chain(gases).chain(bodies).chain(sounding).collect()
 }
 
 /// Everything wrong that can be seen before anything is built; `systems` are those of the scene, or the default one.
@@ -43,7 +47,9 @@ pub fn check(scene: &Scene, systems: &[System]) -> Vec<Issue> {
     let mut wrong = |path: String, message: String| issues.push(Issue::new(path, message));
     let objects = objects(scene);
     if objects.is_empty() {
-        wrong(String::new(), "nothing to simulate: add particles, an emitter, a rope, a sheet, a block, a net, a galaxy or a gas".into());
+        let message = "nothing to simulate: add particles, an emitter, a rope, a sheet, a block, a net, a galaxy, a gas, heat or a \
+                       compressible gas";
+        wrong(String::new(), message.into());
     }
     let colliders = scene.collider.iter().map(|c| ("collider", c.name.as_str()));
     let mut names = HashSet::new();
@@ -104,10 +110,15 @@ pub fn check(scene: &Scene, systems: &[System]) -> Vec<Issue> {
             }
             (Some(given), None) => wrong(
                 format!("{kind} \"{name}\".system"),
-                format!("system \"{given}\" moves particles without mass; this needs a dynamics system"),
+                if matches!(*kind, "heat" | "compressible") {
+                    format!("system \"{given}\" has another method; this needs a system with method = \"{kind}\"")
+                } else {
+                    format!("system \"{given}\" moves particles without mass; this needs a dynamics system")
+                },
             ),
             (None, None) => {
-                wrong(format!("{kind} \"{name}\".system"), "no system can move it: add a [[system]] with method = \"dynamics\"".into())
+                let method = if matches!(*kind, "heat" | "compressible") { kind } else { "dynamics" };
+                wrong(format!("{kind} \"{name}\".system"), format!("no system can move it: add a [[system]] with method = \"{method}\""));
             }
             _ => {}
         }
@@ -155,8 +166,8 @@ pub fn check(scene: &Scene, systems: &[System]) -> Vec<Issue> {
 /// The system that moves an object of this kind: the one it names, else the first that can.
 pub fn place(systems: &[System], kind: &str, named: Option<&str>) -> Option<usize> {
     let can = |s: &System| match s.method {
-        Method::Dynamics => kind != "gas",
-        Method::Gas => kind == "gas",
+        Method::Dynamics => !matches!(kind, "gas" | "heat" | "compressible"),
+        Method::Gas | Method::Heat | Method::Compressible => kind == s.method.name(),
         Method::Tracers => matches!(kind, "particles" | "emitter"),
         Method::Vicsek => kind == "particles",
     };
@@ -169,6 +180,8 @@ fn massless(systems: &[System], kind: &str, named: Option<&str>) -> Option<&'sta
         Method::Dynamics => None,
         Method::Tracers => Some("tracers"),
         Method::Vicsek => Some("particles of a vicsek system"),
+        Method::Heat => Some("bodies on grids"),
+        Method::Compressible => Some("gases on grids"),
         Method::Gas => Some("cells of a fluid"),
     }
 }
@@ -201,6 +214,15 @@ fn check_system(system: &System, path: &str, wrong: &mut impl FnMut(String, Stri
     if system.method == Method::Vicsek && integrator != Integrator::default() {
         wrong(format!("{path}.integrator"), "the model of Vicsek is a map and has no integrator; leave it out".into());
     }
+    if system.method == Method::Heat && integrator != Integrator::default() {
+        wrong(
+            format!("{path}.integrator"),
+            "each [[heat]] body has a scheme of its own, and the system no integrator; leave it out".into(),
+        );
+    }
+    if system.method == Method::Compressible && integrator != Integrator::default() {
+        wrong(format!("{path}.integrator"), "a compressible gas is stepped by symplectic_euler; leave it out".into());
+    }
     if system.method == Method::Gas && integrator != Integrator::default() {
         wrong(format!("{path}.integrator"), "Stable Fluids have no integrator; leave it out".into());
     }
@@ -209,7 +231,7 @@ fn check_system(system: &System, path: &str, wrong: &mut impl FnMut(String, Stri
         (Some(words), Method::Vicsek) if 2.0 * words.radius > words.side => {
             wrong(format!("{path}.vicsek.radius"), format!("{} m, expected at most half the side, {} m", words.radius, 0.5 * words.side));
         }
-        (Some(_), Method::Dynamics | Method::Tracers | Method::Gas) => {
+        (Some(_), method) if method != Method::Vicsek => {
             wrong(
                 format!("{path}.vicsek"),
                 format!("given with method \"{}\"; leave it out, or set method = \"vicsek\"", system.method.name()),

@@ -4,7 +4,7 @@ use super::Assets;
 use crate::geometry::GridSdf;
 use crate::math::Signal;
 use tumble_interface::Scene;
-use tumble_interface::scene::{Diagonals, Emitter, Shape, Source};
+use tumble_interface::scene::{Diagonals, Emitter, GridBox, HeatScheme, Shape, Source};
 
 /// Bytes for a mass: its rows in state, scratch, snapshot and history, in double precision.
 const MASS: f64 = 1200.0;
@@ -14,6 +14,12 @@ const BORN: f64 = 400.0;
 const LINK: f64 = 260.0;
 /// Bytes for a tetrahedron with its two or three laws.
 const TETRAHEDRON: f64 = 1400.0;
+
+/// Bytes for a cell of a body that conducts heat: temperatures twice and in the snapshot; materials; multigrid of implicit schemes;
+/// in double precision.
+const WARM: [f64; 3] = [24.0, 48.0, 160.0];
+/// Bytes for a cell of a compressible gas: density and three components of velocity, twice and in the snapshot.
+const SOUND: f64 = 100.0;
 
 /// An upper estimate of the bytes that the scene's objects and colliders need.
 pub fn memory(scene: &Scene, assets: &Assets) -> f64 {
@@ -27,6 +33,18 @@ pub fn memory(scene: &Scene, assets: &Assets) -> f64 {
         bytes += count * (BORN + 32.0 * thing.columns.len() as f64);
     }
     bytes += scene.galaxy.iter().map(|thing| f64::from(thing.stars) * MASS).sum::<f64>();
+    let flat = super::laws::flat(scene);
+    let cells = |words: &GridBox| {
+        let long = (0..3).filter(|a| flat != Some(*a)).map(|a| words.size[a]).fold(0.0, f64::max);
+        let along = |a: usize| if flat == Some(a) { 3.0 } else { (words.size[a] / long * f64::from(words.resolution)).round() + 2.0 };
+        along(0) * along(1) * along(2)
+    };
+    for thing in &scene.heat {
+        let implicit = matches!(thing.scheme, HeatScheme::Implicit | HeatScheme::Trapezoid);
+        let own = WARM[0] + if thing.region.is_empty() { 0.0 } else { WARM[1] } + if implicit { WARM[2] } else { 0.0 };
+        bytes += cells(&thing.grid) * (own + 16.0 * thing.source.len() as f64);
+    }
+    bytes += scene.compressible.iter().map(|thing| cells(&thing.grid) * SOUND).sum::<f64>();
     for thing in &scene.rope {
         let links = if thing.rod.is_some() { 6.0 } else { 2.0 };
         bytes += (f64::from(thing.segments) + 1.0) * (2.0 * MASS + links * LINK);

@@ -2,6 +2,7 @@
 
 use crate::math::Lattice;
 use std::fmt;
+use tumble_interface::{Column, Data};
 
 /// A box of cubic cells. A plane is a grid one cell thick, along whose flat axis nothing is differentiated or interpolated.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -111,6 +112,17 @@ impl Grid {
     /// The first point of a place from the lowest corner, in cells.
     pub fn offset(&self, place: Place) -> [f64; 3] {
         std::array::from_fn(|a| if self.on_walls(place, a) { 0.0 } else { 0.5 })
+    }
+
+    /// What pictures and files need to know about the grid of an object.
+    pub fn columns(&self, object: &str) -> Vec<Column> {
+        let column = |name: &str, unit, data| Column { object: object.into(), name: name.into(), unit, width: 1, points: Vec::new(), data };
+        vec![
+            column("grid_cells", "1", Data::U32(self.axes().map(|a| self.n[a] as u32).collect())),
+            column("grid_spacing", "m", Data::F64(vec![self.dx])),
+            column("grid_origin", "m", Data::F64(self.origin.to_vec())),
+            column("grid_flat", "1", Data::U32(vec![self.flat.unwrap_or(3) as u32])),
+        ]
     }
 
     /// Point (i, j, k) of a place [m].

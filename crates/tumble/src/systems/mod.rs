@@ -1,6 +1,8 @@
 //! L5: the numerical methods. None imports another.
 
+pub mod compressible;
 pub mod dynamics;
 pub mod gas;
+pub mod heat;
 pub mod tracers;
 pub mod vicsek;

@@ -7,7 +7,7 @@
 use super::column::Column;
 use super::faces::Weight;
 use super::level::{Block, Grid, LANES, Rows};
-use crate::math::functions::{cos, sin};
+use crate::math::functions::{cos, exp, sin};
 use crate::math::simd::{Kernel, Level as Registers, Width, dispatch_at};
 use crate::math::{Lane, Lattice, Real};
 use rayon::prelude::*;
@@ -105,18 +105,21 @@ impl Cosine {
 
     /// column = A^-1 column without its mean.
     pub fn solve<T: Weight>(&self, grid: &Grid<T>, column: &mut [Real], registers: Registers) {
-        let n = grid.lattice.n;
+        self.transform(grid.lattice, column, &Scale::Inverse, registers);
+    }
+
+    /// There, each mode times its factor, and back.
+    fn transform(&self, lattice: Lattice, column: &mut [Real], scale: &Scale, registers: Registers) {
+        let n = lattice.n;
         let rows = Rows::of(column);
-        let pairs = grid.width.div_ceil(GROUP);
+        let width = n[0].next_multiple_of(LANES);
+        let pairs = width.div_ceil(GROUP);
         let group = |axis: usize, first: usize, other: usize, kind: Kind| {
             let longest = n.iter().max().copied().unwrap_or(1);
             LINES.with_borrow_mut(|scratch| {
                 scratch.reserve(4 * longest * LANES);
                 let scratch = scratch.as_chunks_mut().0;
-                dispatch_at(
-                    registers,
-                    Lines { cosine: self, lattice: grid.lattice, width: grid.width, rows: &rows, axis, first, other, kind, scratch },
-                );
+                dispatch_at(registers, Lines { cosine: self, lattice, width, rows: &rows, axis, first, other, kind, scale, scratch });
             });
         };
         (0..n[2]).into_par_iter().for_each(|k| {
@@ -131,6 +134,67 @@ impl Cosine {
             (0..n[1].div_ceil(GROUP)).into_par_iter().for_each(|g| group(0, g * GROUP, k, Kind::Back));
         });
     }
+}
+
+/// What the modes are multiplied by.
+#[derive(Debug, Clone)]
+enum Scale {
+    /// One over the eigenvalue; 0 for the mean.
+    Inverse,
+    /// One factor for each axis.
+    Factors([Vec<Real>; 3]),
+    /// With z = `length` and f, g = 1 - f for each axis: (1 - f_x f_y f_z)/e of the mode's e = e_x + e_y + e_z, and z for e = 0.
+    Gains {
+        /// The factors f of each axis.
+        factors: [Vec<Real>; 3],
+        /// 1 - f.
+        losses: [Vec<Real>; 3],
+        /// e of each axis.
+        squares: [Vec<Real>; 3],
+        /// z.
+        length: Real,
+    },
+}
+
+/// Cosine series in a closed box: diffusion for any time, exactly.                                             (heat.9)
+#[derive(Debug, Clone)]
+pub struct Series {
+    cosine: Cosine,
+    lattice: Lattice,
+    decay: Scale,
+    gain: Scale,
+}
+
+impl Series {
+    /// For steps of z = kappa h/dx² [1], or the axis whose count of cells is no product of 2, 3 and 5.
+    pub fn new(lattice: Lattice, z: f64) -> Result<Self, usize> {
+        let mut axes = Vec::new();
+        for a in 0..3 {
+            axes.push(Axis::new(lattice.n[a]).ok_or(a)?);
+        }
+        let [x, y, w] = <[Axis; 3]>::try_from(axes).map_err(|_| 0_usize)?;
+        let of = |f: &dyn Fn(f64) -> f64| -> [Vec<Real>; 3] {
+            std::array::from_fn(|a| (0..lattice.n[a]).map(|k| f((PI * k as f64 / lattice.n[a] as f64).powi(2)) as Real).collect())
+        };
+        let factors = of(&|e| exp(-z * e));
+        let gain = Scale::Gains { factors: factors.clone(), losses: of(&|e| loss(z * e)), squares: of(&|e| e), length: z as Real };
+        Ok(Self { cosine: Cosine { axes: [x, y, w] }, lattice, decay: Scale::Factors(factors), gain })
+    }
+
+    /// What a column has become after the step.
+    pub fn decay(&self, column: &mut [Real]) {
+        self.cosine.transform(self.lattice, column, &self.decay, Registers::Avx512);
+    }
+
+    /// From a source that stays the same during the step to what it has added at the end, in units of dx²/kappa.
+    pub fn gain(&self, column: &mut [Real]) {
+        self.cosine.transform(self.lattice, column, &self.gain, Registers::Avx512);
+    }
+}
+
+/// 1 - exp(-x), to all digits.
+fn loss(x: f64) -> f64 {
+    if x < 1e-3 { x * (1.0 - x / 2.0 * (1.0 - x / 3.0 * (1.0 - x / 4.0 * (1.0 - x / 5.0)))) } else { 1.0 - exp(-x) }
 }
 
 /// What is done along an axis.
@@ -152,6 +216,7 @@ struct Lines<'a> {
     first: usize,
     other: usize,
     kind: Kind,
+    scale: &'a Scale,
     scratch: &'a mut [Block],
 }
 
@@ -269,11 +334,24 @@ impl Lines<'_> {
         if self.axis == 1 { self.lattice.at(self.first, i, self.other) } else { self.lattice.at(self.first, self.other, i) }
     }
 
-    /// Divides by the eigenvalues, and by the lengths of the three axes, which the way back multiplies with.
+    /// Multiplies each mode as `scale` says, and divides by the lengths of the three axes, which the way back multiplies with.
     #[inline(always)]
     fn divide<W: Width>(&self, w: W, axis: &Axis, [re, im]: Complex) {
         let [x, y, _] = &self.cosine.axes;
         let scale = w.splat((self.lattice.cells() as f64).recip() as Real);
+        match self.scale {
+            Scale::Inverse => {}
+            Scale::Factors(factors) => {
+                return self.multiply(w, [re, im], &mut |i, k| factors[0][i] * (factors[1][self.other] * factors[2][k]));
+            }
+            Scale::Gains { factors: [fx, fy, _], losses: [gx, gy, gz], squares: [ex, ey, ez], length } => {
+                let j = self.other;
+                return self.multiply(w, [re, im], &mut |i, k| {
+                    let (lost, e) = (gx[i] + fx[i] * (gy[j] + fy[j] * gz[k]), ex[i] + (ey[j] + ez[k]));
+                    if e > 0.0 { lost / e } else { *length }
+                });
+            }
+        }
         for (part, numbers) in [(0, re), (1, im)] {
             let mut of_x = [1.0; LANES];
             for lane in 0..LANES {
@@ -288,6 +366,29 @@ impl Lines<'_> {
                     let e = w.load(&of_x[i..]) + of_yz;
                     let v = w.load(&numbers[k][i..]);
                     w.store(e.positive(scale * v / e, v.zero()), &mut numbers[k][i..]);
+                }
+            }
+        }
+    }
+}
+
+impl Lines<'_> {
+    /// Multiplies mode (i, other, k) by a factor, and divides by the lengths of the axes.
+    #[inline(always)]
+    fn multiply<W: Width>(&self, w: W, [re, im]: Complex, factor: &mut impl FnMut(usize, usize) -> Real) {
+        let scale = (self.lattice.cells() as f64).recip() as Real;
+        for (part, numbers) in [(0, re), (1, im)] {
+            for k in 0..numbers.len() {
+                let mut factors = [0.0; LANES];
+                for lane in 0..LANES {
+                    let i = self.first + part * LANES + lane;
+                    if i < self.lattice.n[0] {
+                        factors[lane] = scale * factor(i, k);
+                    }
+                }
+                for p in 0..LANES / W::N {
+                    let i = p * W::N;
+                    w.store(w.load(&factors[i..]) * w.load(&numbers[k][i..]), &mut numbers[k][i..]);
                 }
             }
         }

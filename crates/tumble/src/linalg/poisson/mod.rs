@@ -22,6 +22,7 @@ mod report;
 #[cfg(test)]
 mod tests;
 
+pub use cosine::Series;
 pub use faces::{Weight, byte};
 pub use report::{Excess, Fault, Info, Method, Params, Target};
 

@@ -234,6 +234,7 @@ impl Dynamics {
             speed: total.speed_sq.sqrt(),
             contacts: if touching { sum(n, |range| range.filter(|i| depths(*i).next().is_some()).count() as f64) as u64 } else { 0 },
             broken: self.broken,
+            ..Ledger::default()
         }
     }
 

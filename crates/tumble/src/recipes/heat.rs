@@ -1,0 +1,170 @@
+//! Bodies that conduct heat: words to materials, boundaries and sources.
+
+use super::places::{Map, fill, middle};
+use super::{grid, solid};
+use crate::geometry::{Shape, Vector};
+use crate::math::{Real, Signal};
+use crate::state::{Field, Place};
+use crate::systems::heat::{Body, Boundary, Material, Plan, Source};
+use rayon::prelude::*;
+use tumble_interface::scene::{Animated, Collider, Component, Heat, HeatScheme, HeatSide, Shape as Words};
+
+/// A solid without a mesh.
+fn shape(words: &Words) -> Result<Shape, String> {
+    if matches!(words, Words::Mesh(_) | Words::AnimatedMesh(_)) {
+        return Err("a mesh, expected a sphere, box, plane, floor or capsule".into());
+    }
+    let thing = Collider {
+        name: String::new(),
+        shape: words.clone(),
+        thickness: 0.0,
+        friction: 0.0,
+        restitution: 0.0,
+        inside: false,
+        belt: [0.0; 3],
+        motion: None,
+        color: None,
+    };
+    solid(&thing, &[]).map(|solid| solid.shape).map_err(|(_, message)| message)
+}
+
+fn contains(shape: &Shape, x: [f64; 3]) -> bool {
+    shape.near(Vector::from(x), 0.0, f64::INFINITY).0 < 0.0
+}
+
+/// A body, or what is wrong with it: `wrong(key, message)`. `signal` reads values that change in time, `flat` is the axis across
+/// the plane of a scene of two dimensions.
+pub fn heat(
+    words: &Heat,
+    flat: Option<usize>,
+    signal: &mut dyn FnMut(&str, &Animated) -> Signal,
+    wrong: &mut dyn FnMut(&str, String),
+) -> Option<Body> {
+    let mut fine = true;
+    let mut fault = |key: &str, message: String| {
+        fine = false;
+        wrong(key, message);
+    };
+    let grid = grid(&words.grid, flat, words.periodic).map_err(|e| fault(".box", e.to_string())).ok()?;
+    let mut boundaries = Vec::new();
+    let mut boundary = |key: &str, name: &str, side: &HeatSide, fault: &mut dyn FnMut(&str, String)| -> Option<usize> {
+        match (&side.temperature, side.coefficient, &side.flux) {
+            (None, None, None) => return None,
+            (None, Some(_), _) => {
+                fault(&format!("{key}.coefficient"), "given without a temperature of what flows along it; add one".into())
+            }
+            (Some(_), None, Some(_)) => {
+                fault(&format!("{key}.flux"), "given beside the temperature of the surface; leave out one, or add a coefficient".into());
+            }
+            _ => {}
+        }
+        let temperature = side.temperature.as_ref().map(|t| signal(&format!("{key}.temperature"), t));
+        let flux = side.flux.as_ref().map(|q| signal(&format!("{key}.flux"), q));
+        boundaries.push(Boundary { name: name.into(), temperature, coefficient: side.coefficient, flux });
+        Some(boundaries.len() - 1)
+    };
+    let mut sides = [[None; 2]; 3];
+    for (i, (name, side)) in words.sides.all().into_iter().enumerate() {
+        let (Some(side), axis) = (side, i / 2) else { continue };
+        let key = format!(".sides.{name}");
+        if flat == Some(axis) {
+            fault(&key, "a scene of dimension 2 has no such side; leave it out".into());
+        } else if words.periodic[axis] {
+            fault(&key, "the axis is periodic and has no sides; leave out one of both".into());
+        } else {
+            sides[axis][i % 2] = boundary(&key, name, side, &mut fault);
+        }
+    }
+    let capacity = words.density * words.heat_capacity;
+    let mut materials = vec![Material { conductivity: words.conductivity, capacity, hole: None }];
+    let mut regions = Vec::new();
+    let start = |key: &str, map: &Component, fault: &mut dyn FnMut(&str, String)| {
+        Map::new(map).map_err(|message| fault(key, message)).unwrap_or(Map::Value(0.0))
+    };
+    let own = start(".temperature", &words.temperature, &mut fault);
+    for (i, region) in words.region.iter().enumerate() {
+        let key = format!(".region[{i}]");
+        let hole = region.hole.as_ref().map(|side| boundary(&format!("{key}.hole"), &format!("region[{i}]"), side, &mut fault));
+        // An insulated hole is one without a boundary.
+        let hole = hole.map(|of| of.unwrap_or(usize::MAX));
+        materials.push(Material {
+            conductivity: region.conductivity.unwrap_or(words.conductivity),
+            capacity: region.density.unwrap_or(words.density) * region.heat_capacity.unwrap_or(words.heat_capacity),
+            hole,
+        });
+        let map = region.temperature.as_ref().map(|map| start(&format!("{key}.temperature"), map, &mut fault));
+        match shape(&region.shape) {
+            Ok(shape) => regions.push((shape, map)),
+            Err(message) => fault(&format!("{key}.shape"), message),
+        }
+    }
+    let mut sources = Vec::new();
+    for (i, source) in words.source.iter().enumerate() {
+        let key = format!(".source[{i}]");
+        let power = signal(&format!("{key}.power"), &source.power);
+        let profile = Map::new(&source.profile).map_err(|message| fault(&format!("{key}.profile"), message)).unwrap_or(Map::Value(0.0));
+        let within = source.shape.as_ref().map(|words| shape(words).map_err(|message| fault(&format!("{key}.shape"), message)).ok());
+        let plain = within.is_none() && matches!(profile, Map::Value(1.0));
+        let profile = (!plain).then(|| {
+            let mut column = vec![0.0; grid.lattice().len()];
+            fill(&grid, &mut column, |at| {
+                let x = middle(&grid, at);
+                let inside = within.as_ref().is_none_or(|shape| shape.as_ref().is_some_and(|shape| contains(shape, x)));
+                if inside { profile.at(x) } else { 0.0 }
+            });
+            column
+        });
+        if profile.iter().flatten().any(|p| !p.is_finite()) {
+            fault(&format!("{key}.profile"), "not a finite number everywhere in the box".into());
+        }
+        sources.push(Source { power, profile });
+    }
+    if words.scheme == HeatScheme::Spectral {
+        let insulated = sides.iter().flatten().all(Option::is_none) && !words.periodic.contains(&true);
+        if !insulated || !words.region.is_empty() {
+            fault(
+                ".scheme",
+                "\"spectral\" is for insulated boxes of one material; take \"trapezoid\", or leave out sides, periodic and region".into(),
+            );
+        }
+        let product = |mut n: usize| {
+            for p in [2, 3, 5] {
+                while n.is_multiple_of(p) {
+                    n /= p;
+                }
+            }
+            n == 1
+        };
+        if let Some(a) = grid.axes().find(|a| !product(grid.n[*a])) {
+            let message =
+                format!("{} cells along {}, expected a product of 2, 3 and 5 for scheme \"spectral\"", grid.n[a], ["x", "y", "z"][a]);
+            fault(".box.resolution", message);
+        }
+    }
+    if !fine {
+        return None;
+    }
+    let number = |x: [f64; 3]| regions.iter().rposition(|(shape, _)| contains(shape, x)).map_or(0, |i| i + 1);
+    let mut material: Vec<u16> = Vec::new();
+    if !regions.is_empty() {
+        let all: Vec<[usize; 3]> = Field::new(grid, Place::Cell, "").map(|f| f.each().collect()).unwrap_or_default();
+        material = all.par_iter().map(|at| number(middle(&grid, *at)) as u16).collect();
+    }
+    let reference = own.at(std::array::from_fn(|a| grid.origin[a] + 0.5 * grid.dx * if flat == Some(a) { 0.0 } else { grid.n[a] as f64 }));
+    let reference = if reference.is_finite() { reference } else { 0.0 };
+    let mut t = Field::new(grid, Place::Cell, "K").ok()?;
+    if !(matches!(own, Map::Value(_)) && regions.iter().all(|(_, map)| map.is_none())) {
+        fill(&grid, &mut t.data, |at| {
+            let x = middle(&grid, at);
+            let other = regions.iter().rev().find(|(shape, _)| contains(shape, x)).and_then(|(_, map)| map.as_ref());
+            other.unwrap_or(&own).at(x) - reference
+        });
+        if let Some(at) = t.each().find(|at| !t.value(*at).is_finite()) {
+            wrong(".temperature", format!("not a finite number at {:?} m", middle(&grid, at)));
+            return None;
+        }
+    }
+    let tolerance = words.tolerance.unwrap_or(if size_of::<Real>() == 4 { 1e-5 } else { 1e-11 });
+    let plan = Plan { name: words.name.clone(), grid, scheme: words.scheme, materials, material, boundaries, sides, sources, tolerance };
+    Body::new(plan, t, reference).map_err(|e| wrong(".box", e.to_string())).ok()
+}

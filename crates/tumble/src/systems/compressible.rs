@@ -1,0 +1,443 @@
+//! The bad solver: a gas whose pressure follows from its density, all explicit.
+//!
+//! ```text
+//!   p = c² (rho - rho0)                                                                      (compressible.1)
+//!   u' = u + h (g - (u . grad) u + (mu lap u - grad p)/rho)                                   (compressible.2)
+//!   rho' = rho - h div(rho u')                                                                (compressible.4)
+//! ```
+//!
+//! Sound limits the step: c h sqrt(d)/dx <= 1 at rest, (compressible.5) in general. Verified by crates/tumble-f64/tests/compressible.rs.
+
+use crate::exchange::Exchange;
+use crate::integrators::equal_steps;
+use crate::math::Real;
+use crate::math::functions::ln;
+use crate::operators::{average, curl, divergence, gradient, upwind, vector_laplacian};
+use crate::state::{Field, Grid, GridError, Place, Side, Vectors};
+use crate::system::{Archive, System};
+use tumble_interface::engine::{BLOW_UP, Ledger, Limit, Stability, StepReport};
+use tumble_interface::error::Breakdown;
+use tumble_interface::scene::Integrator;
+use tumble_interface::{Column, Data, StepError};
+
+/// Part of the longest stable step that is taken where the scene names none.
+pub const SAFE: f64 = 0.7;
+
+/// What a gas is.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Fluid {
+    /// Speed of sound [m/s].
+    pub sound_speed: f64,
+    /// Density without pressure [kg/m³].
+    pub density: f64,
+    /// Dynamic viscosity [Pa s].
+    pub viscosity: f64,
+    /// Acceleration [m/s²].
+    pub gravity: [f64; 3],
+}
+
+/// A gas in a box with walls or joined sides.
+#[derive(Debug, Clone)]
+pub struct Gas {
+    name: String,
+    fluid: Fluid,
+    /// Density [kg/m³] at cells.
+    pub density: Field,
+    /// Velocity [m/s] on faces.
+    pub velocity: Vectors,
+    pressure: Field,
+    slope: Vectors,
+    friction: Vectors,
+    carried: Field,
+    /// Energy against which growth is measured [J].
+    scale: f64,
+}
+
+impl Gas {
+    /// A gas; velocities across walls are set to zero.
+    pub fn new(name: String, fluid: Fluid, density: Field, mut velocity: Vectors) -> Result<Self, GridError> {
+        let grid = velocity.on_faces("velocity of a gas")?;
+        density.expect(&grid, Place::Cell, "density of a gas")?;
+        for (axis, part) in grid.axes().zip(&mut velocity.parts) {
+            // Walls stop what goes through them and let slide what goes along them.
+            part.sides[axis] = [Side::Value(0.0); 2];
+        }
+        let mut gas = Self {
+            name,
+            fluid,
+            pressure: Field::new(grid, Place::Cell, "Pa")?,
+            slope: Vectors::faces(grid, "Pa/m")?,
+            friction: Vectors::faces(grid, "1/(m s)")?,
+            carried: Field::new(grid, Place::Cell, "kg/(m³ s)")?,
+            density,
+            velocity,
+            scale: 0.0,
+        };
+        gas.hold_walls();
+        Ok(gas)
+    }
+
+    /// The grid.
+    pub fn grid(&self) -> Grid {
+        self.density.grid
+    }
+
+    /// Nothing goes through walls.
+    fn hold_walls(&mut self) {
+        let grid = self.grid();
+        for (axis, part) in grid.axes().zip(&mut self.velocity.parts).filter(|(axis, _)| !grid.periodic[*axis]) {
+            for at in part.each().filter(|at| at[axis] == 0 || at[axis] == grid.n[axis]) {
+                let i = part.index(at);
+                part.data[i] = 0.0;
+            }
+        }
+    }
+
+    fn find_pressure(&mut self) {
+        let (c2, rho0) = ((self.fluid.sound_speed * self.fluid.sound_speed) as Real, self.fluid.density as Real);
+        for (p, rho) in self.pressure.data.iter_mut().zip(&self.density.data) {
+            *p = c2 * (*rho - rho0);
+        }
+    }
+
+    /// One step h [s], of whatever length.
+    pub fn step(&mut self, h: f64) -> Result<(), GridError> {
+        let grid = self.grid();
+        self.find_pressure();
+        gradient(&self.pressure, &mut self.slope)?;
+        if self.fluid.viscosity > 0.0 {
+            vector_laplacian(&self.velocity, &mut self.friction)?;
+        }
+        let (mu, step) = (self.fluid.viscosity as Real, h as Real);
+        let mut after = Vec::new();
+        for (c, axis) in grid.axes().enumerate() {
+            let part = &self.velocity.parts[c];
+            let mut carried = Field::new(grid, part.place, "m/s²")?;
+            upwind(&self.velocity, part, &mut carried)?;
+            let rho = average(&self.density, part.place)?;
+            let g = self.fluid.gravity[axis] as Real;
+            let mut data = part.data.clone();
+            for (i, u) in data.iter_mut().enumerate().filter(|(i, _)| rho.data[*i] > 0.0) {
+                let force = mu * self.friction.parts[c].data[i] - self.slope.parts[c].data[i];
+                *u += step * (g - carried.data[i] + force / rho.data[i]);
+            }
+            after.push(data);
+        }
+        for (part, data) in self.velocity.parts.iter_mut().zip(after) {
+            part.data = data;
+        }
+        self.hold_walls();
+        // Mass per area and time, with the density of where it comes from.
+        for (c, axis) in grid.axes().enumerate() {
+            let (u, flow, rho) = (&self.velocity.parts[c], &mut self.slope.parts[c], &self.density);
+            for at in u.each() {
+                let i = u.index(at);
+                let speed = u.data[i];
+                let mut from = at;
+                if speed > 0.0 {
+                    from[axis] = if at[axis] > 0 { at[axis] - 1 } else { grid.n[axis] - 1 };
+                } else if at[axis] == grid.n[axis] {
+                    from[axis] = grid.n[axis] - 1;
+                }
+                flow.data[i] = if speed == 0.0 { 0.0 } else { speed * rho.value(from) };
+            }
+        }
+        divergence(&self.slope, &mut self.carried)?;
+        for at in self.carried.each() {
+            let i = self.carried.index(at);
+            self.density.data[i] -= step * self.carried.data[i];
+        }
+        Ok(())
+    }
+
+    /// The largest |u| of each axis [m/s]; a NaN wins.
+    fn speeds(&self) -> Vec<f64> {
+        let worse = |a: f64, b: f64| if a >= b || a.is_nan() { a } else { b };
+        self.velocity.parts.iter().map(|part| part.each().map(|at| f64::from(part.value(at).abs())).fold(0.0, worse)).collect()
+    }
+
+    /// The longest step [s] that does not grow, now.                                            (compressible.5)
+    pub fn limit(&self) -> f64 {
+        let grid = self.grid();
+        let d = grid.axes().filter(|a| grid.n[*a] > 1).count() as f64;
+        let least = self.density.each().map(|at| f64::from(self.density.value(at))).fold(self.fluid.density, f64::min);
+        let sound = self.fluid.sound_speed * d.sqrt() / grid.dx;
+        let flow = self.speeds().iter().sum::<f64>() / grid.dx;
+        let friction = 2.0 * d * self.fluid.viscosity / least.max(f64::MIN_POSITIVE) / (grid.dx * grid.dx);
+        // The smallest root of (sound h)² = (1 - flow h)(1 - flow h - friction h).
+        let (a, b) = (sound * sound - flow * (flow + friction), 2.0 * flow + friction);
+        2.0 / (b + (b * b + 4.0 * a).max(0.0).sqrt())
+    }
+
+    /// Mass, momentum, kinetic energy and that of pressure; in a plane for a metre across it.
+    fn books(&self, t: f64) -> Ledger {
+        let grid = self.grid();
+        let volume = grid.dx.powi(grid.dimension() as i32);
+        let (c2, rho0) = (self.fluid.sound_speed * self.fluid.sound_speed, self.fluid.density);
+        let mut books = Ledger { time: t, ..Ledger::default() };
+        for at in self.density.each() {
+            let rho = f64::from(self.density.value(at));
+            books.mass += volume * rho;
+            books.elastic += volume * c2 * (rho * ln(rho / rho0) - (rho - rho0));
+            books.external -= volume * rho * (0..3).map(|a| self.fluid.gravity[a] * grid.point(Place::Cell, at)[a]).sum::<f64>();
+        }
+        for (axis, part) in grid.axes().zip(&self.velocity.parts) {
+            for at in part.each() {
+                // Faces on walls stand still; all others lie between two cells.
+                let mut below = at;
+                below[axis] = if at[axis] > 0 { at[axis] - 1 } else { grid.n[axis] - 1 };
+                let mut above = at;
+                above[axis] = at[axis].min(grid.n[axis] - 1);
+                let u = f64::from(part.value(at));
+                if u != 0.0 {
+                    let mass = 0.5 * volume * f64::from(self.density.value(below) + self.density.value(above));
+                    books.momentum[axis] += mass * u;
+                    books.kinetic += 0.5 * mass * u * u;
+                }
+            }
+        }
+        books.speed = self.speeds().iter().map(|s| s * s).sum::<f64>().sqrt();
+        books
+    }
+
+    /// What has broken: the column, the cell, and the growth of the energy.
+    fn fault(&self) -> Option<(&'static str, [usize; 3], Option<f64>)> {
+        let points = self.density.points();
+        let good = |rho: Real| rho.is_finite() && rho > 0.0;
+        if let Some(at) = self.density.each().find(|at| !good(self.density.value(*at))) {
+            return Some(("density", at, None));
+        }
+        for part in &self.velocity.parts {
+            if let Some(at) = part.each().find(|at| !part.value(*at).is_finite()) {
+                return Some(("velocity", std::array::from_fn(|a| at[a].min(points[a] - 1)), None));
+            }
+        }
+        let books = self.books(0.0);
+        let ratio = (books.kinetic + books.elastic) / self.scale;
+        if self.scale > 0.0 && ratio > BLOW_UP {
+            let (mut worst, mut most) = ([0; 3], 0.0);
+            for at in self.density.each() {
+                let off = (f64::from(self.density.value(at)) - self.fluid.density).abs();
+                if off > most {
+                    (worst, most) = (at, off);
+                }
+            }
+            return Some(("density", worst, Some(ratio)));
+        }
+        None
+    }
+}
+
+/// How the system steps.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct Settings {
+    /// Name in the scene.
+    pub name: String,
+    /// Sub-steps of an interval.
+    pub substeps: Option<u32>,
+    /// Longest sub-step [s].
+    pub step: Option<f64>,
+}
+
+/// Gases that sound runs through.
+pub struct Compressible {
+    settings: Settings,
+    gases: Vec<Gas>,
+    watched: bool,
+}
+
+impl Compressible {
+    /// A system of gases.
+    pub fn new(settings: Settings, mut gases: Vec<Gas>) -> Self {
+        for gas in &mut gases {
+            let books = gas.books(0.0);
+            // Gravity may set all of it going: as much as the fall of its mass through the box.
+            let grid = gas.grid();
+            let fall = books.mass * (0..3).map(|a| gas.fluid.gravity[a].abs() * grid.n[a] as f64 * grid.dx).sum::<f64>();
+            gas.scale = books.kinetic + books.elastic + fall;
+        }
+        Self { settings, gases, watched: false }
+    }
+
+    fn limit(&self) -> f64 {
+        self.gases.iter().map(Gas::limit).fold(f64::INFINITY, f64::min)
+    }
+
+    fn steps(&self, dt: f64) -> f64 {
+        match (self.settings.substeps, self.settings.step) {
+            (Some(n), _) => f64::from(n),
+            (None, Some(step)) => equal_steps(dt, step),
+            (None, None) => equal_steps(dt, SAFE * self.limit()),
+        }
+    }
+
+    fn broken(&self, t: f64, h: f64) -> Option<StepError> {
+        self.gases.iter().find_map(|gas| {
+            let (column, cell, energy_ratio) = gas.fault()?;
+            let points = gas.density.points();
+            let about = Box::new(Breakdown {
+                system: self.settings.name.clone(),
+                object: gas.name.clone(),
+                column: column.into(),
+                index: cell[0] + points[0] * (cell[1] + points[1] * cell[2]),
+                id: None,
+                cell: Some((cell, gas.grid().point(Place::Cell, cell))),
+                time: t,
+                integrator: Integrator::SymplecticEuler.name().into(),
+                step: h,
+                stable_step: gas.limit(),
+                energy_ratio,
+            });
+            Some(if energy_ratio.is_some() { StepError::Exploded(about) } else { StepError::NotFinite(about) })
+        })
+    }
+}
+
+impl System for Compressible {
+    fn name(&self) -> &str {
+        &self.settings.name
+    }
+
+    fn absorb(&mut self, _exchange: &mut Exchange) {}
+
+    fn advance(&mut self, t: f64, dt: f64, _exchange: &mut Exchange, go_on: &(dyn Fn() -> bool + Sync)) -> Result<StepReport, StepError> {
+        let mut report = StepReport::default();
+        let n = self.steps(dt);
+        if !(n <= 1e7) {
+            return Err(StepError::StepTooSmall { system: self.settings.name.clone(), time: t, step: dt / n });
+        }
+        let h = dt / n;
+        for i in 0..n as u64 {
+            if !go_on() {
+                break;
+            }
+            for gas in &mut self.gases {
+                gas.step(h).map_err(|e| StepError::User(e.to_string()))?;
+            }
+            report.stepped(h);
+            if self.watched
+                && let Some(error) = self.broken(t + (i + 1) as f64 * h, h)
+            {
+                return Err(error);
+            }
+        }
+        Ok(report)
+    }
+
+    fn publish(&self, _t: f64, _exchange: &mut Exchange) {}
+
+    fn columns(&self, names: &[&str], out: &mut Vec<Column>) {
+        for gas in &self.gases {
+            let grid = gas.grid();
+            for name in names {
+                let found: Result<Option<(&'static str, Vec<Field>)>, GridError> = (|| {
+                    Ok(Some(match *name {
+                        "density" => ("kg/m³", vec![gas.density.clone()]),
+                        "pressure" => {
+                            let mut gas = gas.clone();
+                            gas.find_pressure();
+                            ("Pa", vec![gas.pressure])
+                        }
+                        "velocity" => {
+                            let parts = gas.velocity.parts.iter().map(|part| average(part, Place::Cell));
+                            ("m/s", parts.collect::<Result<_, _>>()?)
+                        }
+                        "velocity_x" | "velocity_y" | "velocity_z" => {
+                            let axis = ["velocity_x", "velocity_y", "velocity_z"].iter().position(|n| n == name).unwrap_or(0);
+                            let Some(part) = gas.velocity.part(axis) else { return Ok(None) };
+                            ("m/s", vec![part.clone()])
+                        }
+                        "vorticity" => {
+                            let mut turn = Vectors::edges(grid, "1/s")?;
+                            curl(&gas.velocity, &mut turn)?;
+                            ("1/s", turn.parts.iter().map(|part| average(part, Place::Cell)).collect::<Result<_, _>>()?)
+                        }
+                        "divergence" => {
+                            let mut sum = Field::new(grid, Place::Cell, "1/s")?;
+                            divergence(&gas.velocity, &mut sum)?;
+                            ("1/s", vec![sum])
+                        }
+                        _ => return Ok(None),
+                    }))
+                })();
+                let Ok(Some((unit, parts))) = found else { continue };
+                let Some(first) = parts.first() else { continue };
+                let points = first.points();
+                let data: Vec<Real> = first.each().flat_map(|at| parts.iter().map(move |part| part.value(at))).collect();
+                let points = grid.axes().map(|a| points[a]).collect();
+                let name = (*name).to_string();
+                out.push(Column { object: gas.name.clone(), name, unit, width: parts.len(), points, data: Data::from(data) });
+            }
+        }
+    }
+
+    fn topology(&self, out: &mut Vec<Column>) {
+        for gas in &self.gases {
+            out.extend(gas.grid().columns(&gas.name));
+        }
+    }
+
+    fn ledger(&self, t: f64) -> Ledger {
+        let mut total = Ledger { time: t, ..Ledger::default() };
+        for books in self.gases.iter().map(|gas| gas.books(t)) {
+            total.mass += books.mass;
+            (0..3).for_each(|a| total.momentum[a] += books.momentum[a]);
+            total.kinetic += books.kinetic;
+            total.elastic += books.elastic;
+            total.external += books.external;
+            total.speed = total.speed.max(books.speed);
+        }
+        total
+    }
+
+    fn breakdown(&mut self, t: f64) -> Option<StepError> {
+        self.broken(t, 0.0)
+    }
+
+    fn watch(&mut self, on: bool) {
+        self.watched = on;
+    }
+
+    fn stability(&mut self, dt: f64) -> Option<Stability> {
+        let stiffest = self.gases.iter().min_by(|a, b| a.limit().total_cmp(&b.limit()))?;
+        let (grid, stable) = (stiffest.grid(), stiffest.limit());
+        let d = grid.axes().filter(|a| grid.n[*a] > 1).count() as f64;
+        let damping = 4.0 * d * stiffest.fluid.viscosity / stiffest.fluid.density / (grid.dx * grid.dx);
+        Some(Stability {
+            system: self.settings.name.clone(),
+            integrator: Integrator::SymplecticEuler,
+            step: dt / self.steps(dt),
+            frequency: 2.0 * stiffest.fluid.sound_speed * d.sqrt() / grid.dx,
+            damping,
+            damping_max: damping,
+            culprit: None,
+            limits: vec![Limit { integrator: Integrator::SymplecticEuler, stable, usable: stable }],
+        })
+    }
+
+    fn save(&self, archive: &mut Archive) {
+        for gas in &self.gases {
+            archive.push_numbers("density", &gas.density.data);
+            gas.velocity.parts.iter().for_each(|part| archive.push_numbers("velocity", &part.data));
+        }
+    }
+
+    fn restore(&mut self, archive: &mut Archive) -> Option<()> {
+        for gas in &mut self.gases {
+            let fields = std::iter::once(("density", &mut gas.density)).chain(gas.velocity.parts.iter_mut().map(|part| ("velocity", part)));
+            for (name, field) in fields {
+                let mut data = Vec::new();
+                archive.column(name, &mut data)?;
+                (data.len() == field.data.len()).then_some(())?;
+                field.data = data;
+            }
+        }
+        Some(())
+    }
+
+    fn write(&mut self, object: &str, column: &str, values: &[f64]) -> Option<bool> {
+        let gas = self.gases.iter_mut().find(|gas| gas.name == object)?;
+        let values: Vec<Real> = values.iter().map(|v| *v as Real).collect();
+        Some(column == "density" && gas.density.set(&values).is_ok())
+    }
+}
