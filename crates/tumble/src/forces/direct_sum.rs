@@ -264,8 +264,15 @@ struct Sources<L, const B: usize> {
 }
 
 impl<const NATIVE: bool, const POINTS: bool> Tile<'_, NATIVE, POINTS> {
-    /// B sources meet part k of a pack. In double precision a root and a division take as long as the steps
-    /// of `inverse_cube`, in another part of the machine: every other source takes them.
+    /// Which of the sources at once meet the first, second, third and fourth of four packs by a root and a division, a bit for
+    /// each: in double precision these take as long as two steps of `inverse_cube`, in another part of the machine, and keep it busy.
+    const ROOTS: [usize; 4] = match (cfg!(feature = "double"), NATIVE) {
+        (false, _) => [0; 4],
+        (true, false) => [0b10; 4],
+        (true, true) => [0b10, 0b01, 0b10, 0],
+    };
+
+    /// B sources meet part k of a pack; those with a bit in `roots` by a root and a division.
     #[inline(always)]
     fn meet<W: Width, const B: usize>(
         w: W,
@@ -273,6 +280,7 @@ impl<const NATIVE: bool, const POINTS: bool> Tile<'_, NATIVE, POINTS> {
         pack: &mut Pack,
         k: usize,
         softening: W::L,
+        roots: usize,
         masks: Option<[usize; B]>,
     ) {
         let load = |lanes: &[Real; LANES]| w.load(&lanes[k * W::N..]);
@@ -286,7 +294,7 @@ impl<const NATIVE: bool, const POINTS: bool> Tile<'_, NATIVE, POINTS> {
             if let Some(lanes) = masks {
                 both = both * w.load(&STAIRS[LANES - lanes[b] + k * W::N..]);
             }
-            let mut pull = if cfg!(feature = "double") && b % 2 == 1 {
+            let mut pull = if roots >> b & 1 == 1 {
                 let unit = w.splat((1.0 / cube_unit::<W, NATIVE>(w)) as Real);
                 both * (unit / (r_sq * r_sq.sqrt()))
             } else {
@@ -319,9 +327,17 @@ impl<const NATIVE: bool, const POINTS: bool> Tile<'_, NATIVE, POINTS> {
             sources.x[b] = Vec3 { x: w.splat(x.x), y: w.splat(x.y), z: w.splat(x.z) };
             sources.weight[b] = w.splat(law.weight[j + b]);
         }
-        for pack in &mut near[..packs] {
+        let (fours, rest) = near[..packs].as_chunks_mut::<4>();
+        for four in fours {
+            for (pack, roots) in four.iter_mut().zip(Self::ROOTS) {
+                for k in 0..LANES / W::N {
+                    Self::meet(w, &mut sources, pack, k, softening, roots, None);
+                }
+            }
+        }
+        for (pack, roots) in rest.iter_mut().zip(Self::ROOTS) {
             for k in 0..LANES / W::N {
-                Self::meet(w, &mut sources, pack, k, softening, None);
+                Self::meet(w, &mut sources, pack, k, softening, roots, None);
             }
         }
         if among {
@@ -330,7 +346,7 @@ impl<const NATIVE: bool, const POINTS: bool> Tile<'_, NATIVE, POINTS> {
                 lanes[b] = (j + b - self.strips[1].start) % BLOCK - packs * LANES;
             }
             for k in 0..LANES / W::N {
-                Self::meet(w, &mut sources, &mut near[packs], k, softening, Some(lanes));
+                Self::meet(w, &mut sources, &mut near[packs], k, softening, Self::ROOTS[0], Some(lanes));
             }
         }
         for b in 0..B {

@@ -49,7 +49,7 @@ pub fn inverse_cube<W: Width, const NATIVE: bool>(w: W, x: W::L, weight: W::L) -
             // (1 - e)^(-3/2) = 1 + 3/2 e + 15/8 e² + 35/16 e³ + 315/128 e⁴, the last by its best parabola over |e| < 2^-13.
             let e = w.fused(-x, y_sq, w.splat(1.0));
             let p = w.fused(e, w.splat(35.0 / 16.0), w.splat((15.0 / 8.0 + 315.0 / 128.0 / 67_108_864.0) as Real));
-            let p = w.fused(e * e, p, w.fused(e, w.splat(1.5), w.splat(1.0)));
+            let p = w.fused(e, w.fused(e, p, w.splat(1.5)), w.splat(1.0));
             ((weight * y) * y_sq) * p
         } else {
             // 1 + 3/2 e = 3/2 (5/3 - x y²): 2.8e-8.
