@@ -99,6 +99,7 @@ impl Fluid {
     /// Sources, fading, and everything that pushes, for h seconds from t on.                                  (gas.2)
     pub fn forces(&mut self, t: f64, h: f64) -> Result<(), Failure> {
         self.feed(t, h);
+        self.clear();
         self.push(t, h)
     }
 
