@@ -37,7 +37,6 @@ name = "air"
 box = {{ size = [1, 1, 1], center = [0, 0, 0.5], resolution = 24 }}
 temperature = {{ ambient = 300, initial = "300 + 20*z" }}
 smoke = {{ initial = "1" }}
-viscosity = 1e-3
 solids = "{solids}"
 {BALL}"#
         ));
@@ -80,8 +79,8 @@ fn a_ball_in_a_weighing_fluid_has_the_buoyancy_of_its_volume() {
     let errors: Vec<f64> = [12, 24, 48].map(|n| (archimedes(n) / exact - 1.0).abs()).to_vec();
     println!("errors {}", show(&errors));
     // Polygons in the sphere: second order, but the byte of a face rounds to 1/254.
-    assert!(errors[2] < 4e-3, "{errors:?}");
-    assert!(errors[2] < 0.25 * errors[0], "{errors:?}");
+    // 4.9e-2, 8.3e-3, 1.9e-3.
+    assert!(errors[2] < 2.5e-3 && errors[2] < errors[0] / 10.0, "{errors:?}");
 }
 
 #[test]
@@ -109,13 +108,14 @@ acceleration = [3, 0, 0]
     let given = 2.0 * 3.0 * h * volume;
     let has = sim.ledger().momentum[0];
     println!("given {given} has {has} ball {}", force[0] * h);
-    assert!(force[0] > 0.3, "{force:?}");
+    // What a free ball in a stream that is pushed feels is its added mass times the push, 0.5 2 V 3 = 0.196 N; walls are near.
+    assert!(force[0] > 0.15 && force[0] < 0.2, "{force:?}");
     assert!((has + force[0] * h - given).abs() < 1e-9 * given, "{has} + {} is not {given}", force[0] * h);
 }
 
 /// Largest and mean error of the flow around a cylinder of radius 0.3 m over its speed far away, and the speed at the equator.
 fn cylinder(n: usize, drift: f64) -> (f64, f64, f64, Vec<f64>) {
-    let r2 = "((x - 0.01*0)^2 + z^2)";
+    let r2 = "(x^2 + z^2)";
     let u = format!("1 - 0.09*(x^2 - z^2)/{r2}^2 - {drift}");
     let w = format!("-2*0.09*x*z/{r2}^2");
     let side = format!("{{ inflow = {{ velocity = [\"{u}\", 0, \"{w}\"] }} }}");
@@ -131,7 +131,7 @@ velocity = [{0}, 0, 0]
 pressure.excess = "remove"
 [[collider]]
 name = "pillar"
-shape.capsule = {{ from = [0, -5, 0], to = [0, 5, 0], radius = 0.3 }}
+shape.sphere.radius = 0.3
 motion.velocity = [{1}, 0, 0]
 "#,
         1.0 - drift,
@@ -175,10 +175,12 @@ fn a_cylinder_is_passed_as_in_potential_flow() {
     for (name, errors) in [("largest", &largest), ("mean", &mean), ("equator", &equator)] {
         println!("{name}: errors {} orders {}", show(errors), show(&orders(errors)));
     }
-    // Velocities at cut faces are of first order, their mean of second.
-    assert!(largest[3] < 0.1 && largest[3] < 0.3 * largest[0], "{largest:?}");
-    assert!(mean[3] < 2e-3 && mean[3] < mean[0] / 16.0, "{mean:?}");
-    assert!(equator[3] < 0.02, "{equator:?}");
+    // Velocities at cut faces are of first order (9.6e-3 at 77 cells a diameter), their mean of second (2.4e-5), 2 U at the equator
+    // to 3.5e-3.
+    assert!(largest[3] < 0.012 && largest[3] < 0.4 * largest[0], "{largest:?}");
+    let order = (mean[0] / mean[3]).log2() / 3.0;
+    assert!(order > 1.7 && order < 2.2 && mean[3] < 3e-5, "{mean:?}");
+    assert!(equator[3] < 5e-3 && equator[3] < equator[0] / 16.0, "{equator:?}");
 }
 
 #[test]
@@ -189,6 +191,85 @@ fn a_solid_that_moves_pushes_as_a_stream_that_meets_it() {
     assert_eq!(resting.len(), moving.len());
     println!("{worst:e}, {equator} {moved}");
     assert!(worst < 1e-8, "{worst:e}");
+}
+
+/// Error of the profile between two walls that lie anywhere between the rows of a grid, over its largest speed.
+fn channel(n: usize, extra: &str, exact: impl Fn(f64) -> f64) -> f64 {
+    let mut sim = simulation(&format!(
+        r#"
+dimension = 2
+time = {{ fps = 1, frames = 60 }}
+[[system]]
+method = "gas"
+substeps = 4
+[[gas]]
+name = "air"
+box = {{ size = [0.25, 1, 1], center = [0, 0, 0.5], resolution = {n} }}
+sides = {{ x = ["periodic", "periodic"] }}
+fluid_density = 2.0
+viscosity = 0.1
+solids = "no_slip"
+{extra}
+"#
+    ));
+    run(&mut sim, 60);
+    let (u, points) = grid(&sim, "air", "velocity_x");
+    let z = |i: usize| ((i / points[0]) as f64 + 0.5) / n as f64;
+    let inside: Vec<usize> = (0..u.len()).filter(|i| z(*i) > 0.13 && z(*i) < 0.88).collect();
+    let scale = inside.iter().map(|i| exact(z(*i)).abs()).fold(0.0, f64::max);
+    inside.iter().map(|i| (u[*i] - exact(z(*i))).abs()).fold(0.0, f64::max) / scale
+}
+
+#[test]
+fn walls_between_the_rows_of_a_grid_stand_where_they_are() {
+    let walls = |belt: f64| {
+        format!(
+            "[[collider]]\nname = \"floor\"\nshape.floor.height = 0.13\n\
+             [[collider]]\nname = \"roof\"\nshape.plane = {{ point = [0, 0, 0.88], normal = [0, 0, -1] }}\nbelt = [{belt}, 0, 0]\n"
+        )
+    };
+    // Straight profiles are their own images.
+    let couette = channel(32, &walls(0.3), |z| 0.3 * (z - 0.13) / 0.75);
+    // Parabolas are not: second order.
+    let pushed = format!("acceleration = [0.05, 0, 0]\n{}", walls(0.0));
+    let poiseuille: Vec<f64> = [16, 32, 64].map(|n| channel(n, &pushed, |z| 0.05 * (z - 0.13) * (0.88 - z) / 0.1)).to_vec();
+    println!("couette {couette:e} poiseuille {} orders {}", show(&poiseuille), show(&orders(&poiseuille)));
+    assert!(couette < 1e-6, "{couette:e}");
+    assert!(poiseuille[2] < 0.005 && poiseuille[2] < poiseuille[0] / 8.0, "{poiseuille:?}");
+}
+
+#[test]
+fn a_stream_brings_nothing_out_of_a_ball() {
+    let mut sim = simulation(&format!(
+        r#"
+time = {{ fps = 24, frames = 10 }}
+[[gas]]
+name = "air"
+box = {{ size = [1, 1, 1], center = [0, 0, 0.5], resolution = 24 }}
+sides = {{ x = ["periodic", "periodic"] }}
+velocity = [1, 0, 0]
+smoke = {{ initial = 1, weight = 0 }}
+temperature = {{ ambient = 300, initial = 350, expansion = 0 }}
+courant = 1
+{BALL}"#
+    ));
+    run(&mut sim, 10);
+    let (smoke, p) = grid(&sim, "air", "density");
+    let (warmth, _) = grid(&sim, "air", "temperature");
+    let mut empty = 0;
+    for (i, smoke) in smoke.iter().enumerate() {
+        let x = [i % p[0], i / p[0] % p[1], i / p[0] / p[1]].map(|i| (i as f64 + 0.5) / 24.0);
+        let r = (x[0] - 0.513).hypot(x[1] - 0.507).hypot(x[2] - 0.511);
+        if *smoke == 0.0 && warmth[i] == 300.0 {
+            assert!(r < 0.25, "{x:?}");
+            empty += 1;
+        } else {
+            assert!(r > 0.25 - 1.0 / 24.0 && (smoke - 1.0).abs() < 1e-9 && (warmth[i] - 350.0).abs() < 1e-6, "{x:?} {smoke} {}", warmth[i]);
+        }
+    }
+    // The ball has 905 cells.
+    assert!(empty > 450 && empty < 905, "{empty}");
+    assert!(sim.ledger().momentum[0] > 0.5, "{:?}", sim.ledger().momentum);
 }
 
 /// Error of the speed around a sphere.
@@ -227,7 +308,7 @@ shape.sphere.radius = 0.3
         }
     }
     // The four rows beside the axis, extrapolated to the surface at their distance from it.
-    let first = (0..p[2]).find(|k| x(*k, 0.5).hypot(0.5 * dx) > 0.3).unwrap();
+    let first = (p[2] / 2..p[2]).find(|k| x(*k, 0.5).hypot(0.5 * dx) > 0.3).unwrap();
     let at = |k: usize| u[p[0] / 2 + p[0] * (p[1] / 2 + p[1] * k)];
     let r = |k: usize| x(k, 0.5).hypot(0.5 * dx);
     let equator = at(first) + (at(first + 1) - at(first)) * (0.3 - r(first)) / (r(first + 1) - r(first));
@@ -238,8 +319,10 @@ shape.sphere.radius = 0.3
 fn a_sphere_is_passed_as_in_potential_flow() {
     let all: Vec<_> = [16, 32, 64].map(sphere).to_vec();
     println!("{all:?}");
-    assert!((all[2].1 - 1.5).abs() < 0.03, "{all:?}");
-    assert!(all[2].0 < all[0].0 / 8.0, "{all:?}");
+    // 1.404, 1.473, 1.480 at the equator; 25 cells a diameter at the finest, of order 1.9 in the mean.
+    assert!((all[2].1 - 1.5).abs() < 0.025, "{all:?}");
+    let order = (all[0].0 / all[2].0).log2() / 2.0;
+    assert!(order > 1.7 && order < 2.2, "{all:?}");
 }
 
 #[test]
@@ -290,4 +373,44 @@ motion = { velocity = [0.9, 0, 0], spin = [0, 0, 4] }
     assert_eq!(grid(&back, "air", "divergence"), grid(&other, "air", "divergence"));
     run(&mut back, 5);
     assert_eq!(back.hash(), sim.hash());
+}
+
+#[test]
+#[ignore = "a minute or two; make validate"]
+fn the_vortex_street_has_its_strouhal_number() {
+    // 20 cells a diameter, 5 % blocked.
+    let mut sim = simulation(
+        r#"
+dimension = 2
+time = { fps = 4, frames = 480 }
+[[gas]]
+name = "stream"
+box = { size = [30, 1, 20], center = [7, 0, 0], resolution = 600 }
+sides = { x = [{ inflow = { velocity = [1, 0, 0] } }, "open"] }
+fluid_density = 1
+viscosity = 0.01
+solids = "no_slip"
+velocity = [1, 0, "0.3*exp(-(x - 1.5)^2 - z^2)"]
+advection = { velocity = { corrected = true } }
+courant = 1
+[[collider]]
+name = "cylinder"
+shape.sphere.radius = 0.5
+"#,
+    );
+    let mut lift = Vec::new();
+    for frame in 1..=480 {
+        step(&mut sim);
+        if frame > 240 {
+            lift.push(grid(&sim, "cylinder", "force").0[2]);
+        }
+    }
+    let crossings: Vec<f64> = (1..lift.len())
+        .filter(|i| lift[i - 1] < 0.0 && lift[*i] >= 0.0)
+        .map(|i| 0.25 * (i as f64 - lift[i] / (lift[i] - lift[i - 1])))
+        .collect();
+    let turns = (crossings.len() - 1) as f64;
+    let strouhal = turns / (crossings[crossings.len() - 1] - crossings[0]);
+    println!("Strouhal number {strouhal:.4} over {turns} turns, lift up to {:.3}", largest(&lift));
+    assert!(turns >= 6.0 && (strouhal / 0.165 - 1.0).abs() < 0.05, "{strouhal}");
 }

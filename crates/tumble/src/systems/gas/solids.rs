@@ -6,7 +6,7 @@
 //! velocity is that of the image in it, with its part across (free slip) or all of it (no slip) reversed as seen from the solid,
 //! and what is carried is that of the image (gas.11).
 //!
-//! Degenerate: bodies thinner than a cell leak; a solid that leaves the box of a periodic axis does not come back on the other side.
+//! Source: [ng2009]. Degenerate: bodies thinner than a cell leak; a solid that leaves the box of a periodic axis does not come back on the other side.
 //! Tests: crates/tumble-f64/tests/solids.rs.
 
 use super::rows::{Face, beside};
