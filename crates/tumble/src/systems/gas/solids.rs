@@ -6,7 +6,8 @@
 //! velocity is that of the image in it, with its part across (free slip) or all of it (no slip) reversed as seen from the solid,
 //! and what is carried is that of the image (gas.11).
 //!
-//! Source: [ng2009]. Degenerate: bodies thinner than a cell leak; a solid that leaves the box of a periodic axis does not come back on the other side.
+//! Source: [ng2009]. Degenerate: bodies thinner than a cell leak; a solid that leaves a periodic box does not come back on the other
+//! side.
 //! Tests: crates/tumble-f64/tests/solids.rs.
 
 use super::rows::{Face, beside};
@@ -87,6 +88,8 @@ pub struct Solids {
     cuts: Vec<Cut>,
     closed: [Vec<(u32, Real)>; 3],
     ghosts: Vec<Ghost>,
+    /// What they were before the forces.
+    kept: Vec<Real>,
     dead: Vec<(u32, u32)>,
     shades: Vec<(u32, Spot)>,
     pushes: Vec<Push>,
@@ -151,6 +154,7 @@ impl Solids {
             cuts: Vec::new(),
             closed: Default::default(),
             ghosts: Vec::new(),
+            kept: Vec::new(),
             dead: Vec::new(),
             shades: Vec::new(),
             pushes: Vec::new(),
@@ -507,6 +511,26 @@ impl Solids {
                 if let Some(index) = axes.iter().position(|a| *a == ghost.axis) {
                     u.parts[index].data[ghost.at as usize] = value;
                 }
+            }
+        }
+    }
+
+    /// The same, kept for [`Solids::recall`]: forces move the fluid by h a before viscosity balances them, and images of that would
+    /// slip.
+    pub fn keep(&mut self, u: &mut Vectors) {
+        self.extend(u);
+        let axes: [Option<usize>; 3] = std::array::from_fn(|axis| self.grid.axes().position(|a| a == axis));
+        let value = |ghost: &Ghost| axes[ghost.axis].map_or(0.0, |index| u.parts[index].data[ghost.at as usize]);
+        self.kept.clear();
+        self.kept.extend(self.ghosts.iter().map(value));
+    }
+
+    /// Gives closed faces near the surface what was kept.
+    pub fn recall(&self, u: &mut Vectors) {
+        let axes: [Option<usize>; 3] = std::array::from_fn(|axis| self.grid.axes().position(|a| a == axis));
+        for (ghost, value) in self.ghosts.iter().zip(&self.kept) {
+            if let Some(index) = axes[ghost.axis] {
+                u.parts[index].data[ghost.at as usize] = *value;
             }
         }
     }

@@ -105,7 +105,7 @@ impl Fluid {
         }
         super::sides::hold(&mut self.u, &self.settings.sides, t + h);
         if let Some(solids) = &self.solids {
-            solids.extend(&mut self.u);
+            solids.recall(&mut self.u);
         }
         for axis in 0..self.u.parts.len() {
             let part = &mut self.u.parts[axis];
