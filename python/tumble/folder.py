@@ -33,7 +33,7 @@ LEDGER = [
     "angular_momentum_x", "angular_momentum_y", "angular_momentum_z",
     "kinetic", "elastic", "external", "energy",
     "stretch", "penetration", "speed", "contacts", "broken", "heat", "heat_in",
-    "steps", "rejected", "newton", "linear", "residual", "unconverged", "clamped",
+    "steps", "rejected", "newton", "linear", "residual", "unconverged", "clamped", "courant",
     "smallest_step", "largest_step", "seconds", "hash",
 ]
 # fmt: on

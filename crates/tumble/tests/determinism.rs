@@ -59,6 +59,9 @@ fn scenes() -> Vec<(&'static str, String, usize)> {
     let plume = "[[gas]]\nname = \"air\"\nbox = { size = [1, 1, 1.5], resolution = 33 }\nsides = { x = [\"periodic\", \"periodic\"], z = [\"no_slip\", \"open\"] }\n\
                  smoke = { initial = \"smoothstep(0.4, 0.2, hypot(x, y, z))\" }\ntemperature = { ambient = 300 }\nviscosity = 1e-3\nconfinement = 0.2\ncourant = 2\n\
                  advection.velocity.corrected = true\n[[gas.source]]\nshape = { sphere = { center = [0.1, 0, -0.3], radius = 0.25 } }\ntemperature = 400\n";
+    let stirring = plume.replace("viscosity", "solids = \"no_slip\"\nviscosity")
+        + "[[collider]]\nname = \"ball\"\nmotion = { velocity = [0.5, 0.2, 0.7], spin = [0, 5, 0] }\nshape.sphere = { center = [-0.2, 0.1, 0], radius = 0.17 }\n\
+           [[collider]]\nname = \"floor\"\nshape.floor.height = -0.7\n";
     let rope = "[[system]]\nintegrator = \"bdf2\"\nsolver.linear = \"cholesky\"\n[[rope]]\nname = \"rope\"\nfrom = [0, 0, 0]\nto = [1, 0, 0]\nlength = 1.2\nsegments = 40\npin = [\"start\", \"end\"]\n";
     let spray = "[[system]]\nintegrator = \"velocity_verlet\"\nsubsteps = 3\n[[force]]\nkind = \"drag\"\nrate = 0.3\n\
                  [[emitter]]\nname = \"spray\"\nrate = 60000\njitter = 1\nspeed = 3\ncone = 20\nlifetime = 0.4\nlifetime_spread = 0.5\nmass_spread = 0.3\nfrom.disk.radius = 0.1\n\
@@ -105,6 +108,7 @@ fn scenes() -> Vec<(&'static str, String, usize)> {
         ("swarm", swarm.to_string(), 16),
         ("rope, cholesky", rope.to_string(), 20),
         ("plume", plume.to_string(), 4),
+        ("plume, stirred", stirring, 4),
     ]
 }
 

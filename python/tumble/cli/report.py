@@ -32,11 +32,24 @@ def summary(run: "Run") -> str:
             f"  {counted(unconverged, 'step')} stopped before Newton's method converged, at a residual of up to {worst:.1e} of "
             "the first: raise solver.newton_iterations, or take a smaller step"
         )
+    lines += _too_fast(run.scene, float(ledger["courant"].max()))
     lines += [f"  {run.folder / name}" for name in _RESULTS if (run.folder / name).exists()]
     if asked := expect.count(run.scene):
         kept = asked - len(run.manifest["expectations"])
         lines.append(f"  expectations: {kept} of {asked} kept")
     return "\n".join(lines)
+
+
+def _too_fast(scene: Mapping[str, Any], reached: float) -> list[str]:
+    """A warning if steps that were given let a fluid pass far more cells than its Courant number."""
+    given = any(s["method"] == "gas" and (s.get("substeps") or s.get("step")) for s in scene["system"])
+    asked = max((float(gas["courant"]) for gas in scene.get("gas", [])), default=math.inf)
+    if not given or reached <= 2.0 * asked:
+        return []
+    return [
+        f"  the fluid passed up to {reached:.3g} cells in a step, courant is {asked:.3g}: such steps smear; take more substeps, or leave "
+        "substeps and step out"
+    ]
 
 
 def failure(run: "Run", error: "StepError", scene: str, overrides: Sequence[str], again: Sequence[str] = ()) -> str:

@@ -47,6 +47,9 @@ pub struct Gas {
     /// Where smoke, warmth and velocity come from.
     #[serde(default)]
     pub source: Vec<GasSource>,
+    /// What the fluid does at colliders: each fills what it covers of the box.
+    #[serde(default)]
+    pub solids: Solid,
     /// Vorticity confinement: gives small eddies back what advection takes from them.
     #[serde(default)]
     #[schemars(range(min = 0.0), extend("x-unit" = "1"))]
@@ -123,6 +126,17 @@ pub enum GasSide {
         #[schemars(range(min = 0.0), extend("x-unit" = "K"))]
         temperature: Option<f64>,
     },
+}
+
+/// What a fluid does at the surface of a collider.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum Solid {
+    /// It slips along the surface.
+    #[default]
+    FreeSlip,
+    /// It sticks to the surface.
+    NoSlip,
 }
 
 /// How viscosity is stepped.

@@ -84,6 +84,18 @@ impl Collider {
         if self.inside { (-distance, -normal) } else { (distance, normal) }
     }
 
+    /// The same with the velocity of the surface [m/s]; a shell is as thick as its thickness.
+    pub fn surface(&self, p: Vector, t: f64, within: f64) -> (f64, Vector, Vector) {
+        let place = self.at(t);
+        let thick =
+            if let Shape::Mesh { shell: true, .. } | Shape::Animated { shell: true, .. } = self.shape { self.thickness } else { 0.0 };
+        let (distance, normal, moves) = self.near(place.map_or(p, |(pose, _)| pose.back(p)), t, within + thick);
+        let slide = moves + self.belt;
+        let (normal, velocity) =
+            place.map_or((normal, slide), |(pose, twist)| (pose.turn.turn(normal), twist.at(p) + pose.turn.turn(slide)));
+        if self.inside { (-distance, -normal, velocity) } else { (distance - thick, normal, velocity) }
+    }
+
     /// Where a mass first meets the solid that goes straight from `from` at time t0 to `to` at t1. One that starts in
     /// touch meets it at once if it goes in; one that starts deeper is no matter of a way.
     pub fn sweep(&self, from: Vector, to: Vector, t0: f64, t1: f64) -> Option<Impact> {

@@ -115,7 +115,7 @@ pub fn build(scene: &Scene, assets: &Assets) -> Result<Built, SceneError> {
             continue;
         }
         if plan.method == Method::Gas {
-            systems.push(Box::new(gas(scene, &plans, index, gravity)?));
+            systems.push(Box::new(gas(scene, &plans, index, gravity, &colliders)?));
             continue;
         }
         let settings = Settings {
@@ -205,7 +205,8 @@ fn unused(scene: &Scene, plans: &[Plan]) -> Vec<String> {
     }
     if !methods.contains(&Method::Dynamics) {
         let on_grids = |m: &Method| matches!(m, Method::Heat | Method::Compressible);
-        for (words, given) in [("forces", !scene.force.is_empty()), ("colliders", !scene.collider.is_empty())] {
+        let solids = !scene.collider.is_empty() && !methods.contains(&Method::Gas);
+        for (words, given) in [("forces", !scene.force.is_empty()), ("colliders", solids)] {
             if given {
                 let kind = if methods.contains(&Method::Tracers) {
                     "tracers"

@@ -8,7 +8,7 @@ use tumble_interface::check::suggestion;
 use tumble_interface::scene::{Force, Integrator, Method, Plane, Scene, Shape, Source, System};
 
 /// Column names that a frame may hold.
-pub const COLUMNS: [&str; 14] = [
+pub const COLUMNS: [&str; 15] = [
     "position",
     "velocity",
     "orientation",
@@ -23,6 +23,7 @@ pub const COLUMNS: [&str; 14] = [
     "velocity_x",
     "velocity_y",
     "velocity_z",
+    "force",
 ];
 
 /// Names of objects, with the kind of each.

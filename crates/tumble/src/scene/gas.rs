@@ -2,16 +2,19 @@
 
 use super::checks::place;
 use super::laws::{Reader, flat, off_plane};
+use crate::geometry::Collider;
 use crate::linalg::poisson::{Excess, Method as Solve, Params, Target};
 use crate::math::formula::{Formula, Of};
 use crate::math::{Vec3, VectorSignal};
 use crate::operators::{Advection, Interpolation, Trace};
 use crate::recipes;
 use crate::state::{Field, Grid, Place, Vectors};
-use crate::systems::gas::{Beyond, Fluid, Gas, Settings, Source};
+use crate::systems::gas::{Beyond, Fluid, Gas, Settings, Solids, Source};
+use std::sync::Arc;
 use tumble_interface::check::plain;
 use tumble_interface::scene::{
-    Carriage, Component, ExcessFlow, Gas as Words, GasSide, GridInterpolation, PathTrace, PressureMethod, Scene, Shape, System as Plan,
+    Carriage, Component, ExcessFlow, Gas as Words, GasSide, GridInterpolation, PathTrace, PressureMethod, Scene, Shape, Solid,
+    System as Plan,
 };
 use tumble_interface::{Issue, SceneError};
 
@@ -68,6 +71,8 @@ struct Read<'a, 'b> {
     path: String,
     reader: Reader<'b>,
     flat: Option<usize>,
+    solids: &'a Arc<Vec<Collider>>,
+    names: Vec<String>,
 }
 
 impl Read<'_, '_> {
@@ -261,6 +266,21 @@ impl Read<'_, '_> {
         if self.reader.issues.len() > before {
             return None;
         }
+        let stick = words.solids == Solid::NoSlip;
+        let mut solids = Solids::new(self.solids.clone(), std::mem::take(&mut self.names), stick, grid, &sides);
+        solids.place(0.0);
+        if solids.fills() {
+            self.wrong(".box", "colliders fill all of it; move them, or the box");
+            return None;
+        }
+        let moves = solids.moves();
+        // Those that are not here, and never come, cost nothing.
+        let solids = (moves || !solids.is_empty()).then_some(solids);
+        let cosine = words.pressure.method == PressureMethod::Cosine;
+        if cosine && solids.is_some() {
+            self.wrong(".pressure.method", "cosine, which knows no colliders; take multigrid_gradients");
+            return None;
+        }
         let pressure = &words.pressure;
         let settings = Settings {
             density: words.fluid_density,
@@ -290,7 +310,7 @@ impl Read<'_, '_> {
             on_failure: pressure.on_failure,
             courant: words.courant,
         };
-        match Fluid::new(words.name.clone(), settings, u, density, temperature) {
+        match Fluid::new(words.name.clone(), settings, solids, u, [density, temperature]) {
             Ok(fluid) => Some(fluid),
             Err(failure) => {
                 self.wrong("", failure.to_string());
@@ -301,12 +321,13 @@ impl Read<'_, '_> {
 }
 
 /// The system of the fluids that it moves, or what is wrong with them.
-pub fn gas(scene: &Scene, plans: &[Plan], index: usize, gravity: [f64; 3]) -> Result<Gas, SceneError> {
+pub fn gas(scene: &Scene, plans: &[Plan], index: usize, gravity: [f64; 3], solids: &Arc<Vec<Collider>>) -> Result<Gas, SceneError> {
     let (mut issues, mut fluids) = (Vec::new(), Vec::new());
     for words in scene.gas.iter().filter(|g| place(plans, "gas", g.system.as_deref()) == Some(index)) {
         let reader = Reader::new(scene, &mut issues);
         let path = format!("gas \"{}\"", words.name);
-        fluids.extend(Read { words, path, reader, flat: flat(scene) }.fluid(gravity));
+        let names = scene.collider.iter().map(|c| c.name.clone()).collect();
+        fluids.extend(Read { words, path, reader, flat: flat(scene), solids, names }.fluid(gravity));
     }
     if issues.is_empty() {
         let plan = &plans[index];
@@ -316,7 +337,7 @@ pub fn gas(scene: &Scene, plans: &[Plan], index: usize, gravity: [f64; 3]) -> Re
 }
 
 /// Bytes for a cell of a fluid: velocities, what is carried, and what steps and solvers need; a snapshot of the state.
-pub fn bytes(words: &Words, flat: Option<usize>) -> f64 {
+pub fn bytes(words: &Words, flat: Option<usize>, solids: bool) -> f64 {
     let real = std::mem::size_of::<crate::math::Real>() as f64;
     let cells = recipes::grid(&words.cells, flat, [false; 3]).map_or_else(
         |_| {
@@ -335,6 +356,8 @@ pub fn bytes(words: &Words, flat: Option<usize>) -> f64 {
     let confined = if words.confinement > 0.0 { 8.0 } else { 0.0 };
     // Two of each state and one in the snapshot; pressure, its snapshot, right-hand side twice, unknown; five of the solver with its
     // weights and coarse grids.
-    let numbers = 3.0 * (axes + carried) + 5.0 + 6.5 + scratch + conjugates + confined;
+    // Distances and open shares; what is listed is near surfaces, but for closed faces.
+    let solid = if solids { 4.0 } else { 0.0 };
+    let numbers = 3.0 * (axes + carried) + 5.0 + 6.5 + scratch + conjugates + confined + solid;
     cells * numbers * real
 }

@@ -63,7 +63,7 @@ pub fn memory(scene: &Scene, assets: &Assets) -> f64 {
     for mesh in scene.net.iter().filter_map(|thing| assets.get(&thing.mesh.path)) {
         bytes += mesh.vertices.len() as f64 * (MASS + 15.0 * LINK);
     }
-    bytes += scene.gas.iter().map(|thing| super::gas::bytes(thing, super::laws::flat(scene))).sum::<f64>();
+    bytes += scene.gas.iter().map(|thing| super::gas::bytes(thing, super::laws::flat(scene), !scene.collider.is_empty())).sum::<f64>();
     for thing in &scene.collider {
         if let Shape::Mesh(file) = &thing.shape
             && let Some((low, high)) = assets.get(&file.path).and_then(|mesh| mesh.bounds())

@@ -1,11 +1,14 @@
 //! What leaves a fluid: columns, books, snapshots; and what has broken.
 
 use super::fluid::Fluid;
+use super::projection::around;
 use super::rows::{self, sum};
+use super::solids::Solids;
+use crate::linalg::poisson::Weight;
 use crate::math::Real;
 use crate::operators::{average, curl, divergence};
 use crate::state::{Field, GridError, Place, Vectors};
-use crate::system::Archive;
+use crate::system::{Archive, Part};
 use tumble_interface::engine::Ledger;
 use tumble_interface::error::Breakdown;
 use tumble_interface::{Column, Data, StepError};
@@ -44,7 +47,13 @@ impl Fluid {
             }
             "divergence" => {
                 let mut field = Field::new(self.grid(), Place::Cell, "1/s")?;
-                divergence(&self.u, &mut field)?;
+                if let Some(solids) = &self.solids {
+                    let scale = (-1.0 / (field.grid.dx * field.grid.dx)) as Real;
+                    around(&self.u, Some(solids), &mut field);
+                    field.data.iter_mut().for_each(|x| *x *= scale);
+                } else {
+                    divergence(&self.u, &mut field)?;
+                }
                 one("1/s", &field)
             }
             _ => FACES.iter().position(|face| *face == name).and_then(|axis| one("m/s", self.u.part(axis)?)),
@@ -53,6 +62,12 @@ impl Fluid {
 
     fn at_cells(&self, vectors: &Vectors) -> Result<Vec<Field>, GridError> {
         vectors.parts.iter().map(|part| average(part, Place::Cell)).collect()
+    }
+
+    /// The force of the last pressure on every solid [N].
+    pub fn forces_on(&self) -> Vec<(&str, [f64; 3])> {
+        let Some(solids) = &self.solids else { return Vec::new() };
+        solids.names.iter().map(String::as_str).zip(solids.forces(&self.pressure)).collect()
     }
 
     /// Where its grid is.
@@ -87,7 +102,8 @@ impl Fluid {
         rows::largest(first, |at, n| (at..at + n).map(sq).fold(0.0, rows::worse)).sqrt()
     }
 
-    /// Adds its mass of smoke, and momentum, kinetic energy and speed of the fluid. A face on a side of the box counts half.
+    /// Adds its mass of smoke, and momentum, kinetic energy and speed of the fluid. A face on a side of the box counts half, one that
+    /// is open in part by its share.
     pub fn count(&self, books: &mut Ledger) {
         let grid = self.grid();
         let mass = self.volume() * self.settings.density;
@@ -102,7 +118,8 @@ impl Fluid {
                     1 => (start - lattice.at(0, 0, 0)) % lattice.stride[2] / lattice.stride[1],
                     _ => (start - lattice.at(0, 0, 0)) / lattice.stride[2],
                 };
-                if half(along) { 0.5 } else { 1.0 }
+                let open = self.solids.as_ref().map_or(1.0, |solids| f64::from(solids.open[axis][start + i].value()));
+                if half(along) { 0.5 * open } else { open }
             };
             let weighed = |power: i32| {
                 sum(part, |at, n| {
@@ -159,6 +176,9 @@ impl Fluid {
     /// Writes everything that the next step depends on.
     pub fn save(&self, archive: &mut Archive) {
         self.kept().into_iter().for_each(|(name, data)| archive.push_numbers(name, data));
+        if let Some(solids) = self.solids.as_ref().filter(|solids| solids.moves()) {
+            archive.push("solids", Part::Numbers(vec![solids.time]));
+        }
     }
 
     /// Reads it back.
@@ -174,7 +194,12 @@ impl Fluid {
         self.u.parts.iter_mut().try_for_each(|part| read("u", &mut part.data))?;
         self.smoke.iter_mut().try_for_each(|c| read("smoke", &mut c.field.data))?;
         self.temperature.iter_mut().try_for_each(|c| read("temperature", &mut c.field.data))?;
-        read("pressure", &mut self.pressure.data)
+        read("pressure", &mut self.pressure.data)?;
+        if self.solids.as_ref().is_some_and(Solids::moves) {
+            let time = *archive.numbers("solids")?.first()?;
+            self.settle(time).ok()?;
+        }
+        Some(())
     }
 
     /// Sets a column, in the order in which it leaves; `false` if there is none of that name and length.

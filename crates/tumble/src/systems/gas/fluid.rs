@@ -3,6 +3,7 @@
 use super::forces::Source;
 use super::rows::{magnitude, worse};
 use super::sides::{Beyond, hold};
+use super::solids::Solids;
 use super::viscosity::Conjugates;
 use crate::linalg::poisson::{Fault, Params, Solver, Weight};
 use crate::math::{Real, VectorSignal};
@@ -95,6 +96,7 @@ pub struct Fluid {
     /// Pressure of the last projection at cells [Pa].
     pub pressure: Field,
     pub(super) solver: Solver<u8>,
+    pub(super) solids: Option<Solids>,
     /// Of anything: velocities, right-hand side and unknown of the pressure, and what operators need.
     pub(super) next: Vectors,
     pub(super) b: Field,
@@ -164,13 +166,17 @@ impl Failed {
 }
 
 impl Fluid {
-    /// A fluid with this velocity; `smoke` and `temperature` are carried if given. The velocity is projected.
-    pub fn new(name: String, settings: Settings, u: Vectors, smoke: Option<Field>, temperature: Option<Field>) -> Result<Self, Failure> {
+    /// A fluid with this velocity around these solids; `smoke` and `temperature` are carried if given. The velocity is projected.
+    pub fn new(
+        name: String,
+        settings: Settings,
+        solids: Option<Solids>,
+        u: Vectors,
+        [smoke, temperature]: [Option<Field>; 2],
+    ) -> Result<Self, Failure> {
         let grid = u.on_faces("velocity of a fluid")?;
         let lattice = grid.lattice();
-        let open = vec![u8::OPEN; lattice.len()];
-        let pressure_sides = settings.sides.each_ref().map(|ends| ends.each_ref().map(Beyond::pressure));
-        let solver = Solver::new(lattice, pressure_sides, [&open, &open, &open], None).map_err(Failure::Pressure)?;
+        let solver = solver(grid, &settings, solids.as_ref())?;
         let sides = &settings.sides;
         let smoke = smoke.map(|f| Carried::new(f).beyond(sides, 0.0, |density, _| density));
         let temperature = temperature.map(|f| Carried::new(f).beyond(sides, settings.ambient, |_, temperature| temperature));
@@ -191,6 +197,7 @@ impl Fluid {
             temperature,
             pressure,
             solver,
+            solids,
             b: Field::new(grid, Place::Cell, "m²/s")?,
             left: vec![0.0; lattice.len()],
             q: vec![0.0; lattice.len()],
@@ -199,6 +206,7 @@ impl Fluid {
             settings,
         };
         hold(&mut fluid.u, &fluid.settings.sides, 0.0);
+        fluid.clear();
         fluid.projection(0.0, 1.0, &mut StepReport::default())?;
         fluid.pressure.data.fill(0.0);
         Ok(fluid)
@@ -209,12 +217,13 @@ impl Fluid {
         self.b.grid
     }
 
-    /// One step from t to t + h [s].
-    pub fn step(&mut self, t: f64, h: f64, report: &mut StepReport) -> Result<(), Failed> {
+    /// One step of h seconds from t to `end` [s].
+    pub fn step(&mut self, t: f64, h: f64, end: f64, report: &mut StepReport) -> Result<(), Failed> {
         report.courant = worse(report.courant, self.fastest() * h / self.grid().dx);
         let parts = match self.settings.order {
             Order::ProjectLast => self
                 .advection(t, h)
+                .and_then(|()| self.settle(end))
                 .and_then(|()| self.forces(t, h))
                 .and_then(|()| self.viscosity(t, h, report))
                 .and_then(|()| self.projection(t + h, h, report)),
@@ -222,7 +231,8 @@ impl Fluid {
                 .forces(t, h)
                 .and_then(|()| self.viscosity(t, h, report))
                 .and_then(|()| self.projection(t + h, h, report))
-                .and_then(|()| self.advection(t, h)),
+                .and_then(|()| self.advection(t, h))
+                .and_then(|()| self.settle(end)),
         };
         parts.map_err(|failure| self.failed(failure))
     }
@@ -239,13 +249,36 @@ impl Fluid {
         done.map_err(|failure| self.failed(failure))
     }
 
+    /// Moves the solids to where they are at time t, and takes what is carried out of them.
+    pub(super) fn settle(&mut self, t: f64) -> Result<(), Failure> {
+        let Some(solids) = &mut self.solids else { return Ok(()) };
+        if solids.moves() && solids.time != t {
+            solids.place(t);
+            self.solver = solver(self.b.grid, &self.settings, Some(solids))?;
+        }
+        self.clear();
+        Ok(())
+    }
+
+    /// Takes what is carried out of the solids.
+    pub(super) fn clear(&mut self) {
+        let Some(solids) = &self.solids else { return };
+        self.smoke.iter_mut().for_each(|smoke| solids.clear(&mut smoke.field.data, 0.0));
+        self.temperature.iter_mut().for_each(|warmth| solids.clear(&mut warmth.field.data, self.settings.ambient));
+    }
+
     fn failed(&self, failure: Failure) -> Failed {
         Failed { broken: self.broken("", 0.0), failure, fluid: self.name.clone() }
     }
 
     /// Everything goes with the fluid for h seconds from t on.                                             (gas.5)
     pub fn advection(&mut self, t: f64, h: f64) -> Result<(), Failure> {
+        self.settle(t)?;
         hold(&mut self.u, &self.settings.sides, t);
+        if let Some(solids) = &self.solids {
+            solids.extend(&mut self.u);
+            self.smoke.iter_mut().chain(&mut self.temperature).for_each(|carried| solids.shade(&mut carried.field));
+        }
         let Self { u, next, smoke, temperature, settings, scratch, .. } = self;
         let carried: Vec<&mut Carried> = smoke.iter_mut().chain(temperature.iter_mut()).collect();
         let (from, mut to): (Vec<&Field>, Vec<&mut Field>) = carried.into_iter().map(|c| (&c.field, &mut c.next)).unzip();
@@ -284,6 +317,20 @@ impl Fluid {
         let h = if speed > 0.0 || a > 0.0 { 2.0 * way / (speed + (speed * speed + 4.0 * a * way).sqrt()) } else { left };
         h.min(left)
     }
+}
+
+/// The pressure solver around solids.
+fn solver(grid: Grid, settings: &Settings, solids: Option<&Solids>) -> Result<Solver<u8>, Failure> {
+    let lattice = grid.lattice();
+    let sides = settings.sides.each_ref().map(|ends| ends.each_ref().map(Beyond::pressure));
+    let solver = match solids {
+        Some(solids) => Solver::new(lattice, sides, solids.open.each_ref().map(Vec::as_slice), None),
+        None => {
+            let open = vec![u8::OPEN; lattice.len()];
+            Solver::new(lattice, sides, [&open, &open, &open], None)
+        }
+    };
+    solver.map_err(Failure::Pressure)
 }
 
 /// A field without numbers.

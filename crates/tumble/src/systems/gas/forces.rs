@@ -99,6 +99,10 @@ impl Fluid {
     /// Sources, fading, and everything that pushes, for h seconds from t on.                                  (gas.2)
     pub fn forces(&mut self, t: f64, h: f64) -> Result<(), Failure> {
         self.feed(t, h);
+        self.clear();
+        if let Some(solids) = self.solids.as_mut().filter(|_| self.settings.viscosity > 0.0) {
+            solids.keep(&mut self.u);
+        }
         self.push(t, h)
     }
 

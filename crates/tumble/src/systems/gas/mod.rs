@@ -14,17 +14,19 @@ mod forces;
 mod projection;
 mod rows;
 mod sides;
+mod solids;
 mod viscosity;
 
 pub use fluid::{Carried, Failed, Failure, Fluid, Settings};
 pub use forces::{Cover, Source};
 pub use sides::{Beyond, hold};
+pub use solids::Solids;
 
 use crate::exchange::Exchange;
 use crate::integrators::equal_steps;
 use crate::system::{Archive, System};
 use tumble_interface::engine::{Ledger, Stability, StepReport};
-use tumble_interface::{Column, StepError};
+use tumble_interface::{Column, Data, StepError};
 
 /// Sub-steps of an exchange interval at most.
 const MOST_STEPS: f64 = 1e6;
@@ -42,6 +44,26 @@ impl Gas {
     /// A system of these fluids; `substeps` of an interval, a largest `step` [s], or steps by the Courant number of each.
     pub fn new(name: String, substeps: Option<u32>, step: Option<f64>, fluids: Vec<Fluid>) -> Self {
         Self { name, substeps, step, fluids, watched: false }
+    }
+
+    /// The force of the pressure on every solid, of all fluids together.
+    fn forces(&self) -> Vec<Column> {
+        let mut all: Vec<(&str, [f64; 3])> = Vec::new();
+        for (name, force) in self.fluids.iter().flat_map(Fluid::forces_on) {
+            match all.iter_mut().find(|(other, _)| *other == name) {
+                Some((_, sum)) => (0..3).for_each(|a| sum[a] += force[a]),
+                None => all.push((name, force)),
+            }
+        }
+        let column = |(name, force): (&str, [f64; 3])| Column {
+            object: name.into(),
+            name: "force".into(),
+            unit: "N",
+            width: 3,
+            points: Vec::new(),
+            data: Data::F64(force.to_vec()),
+        };
+        all.into_iter().map(column).collect()
     }
 
     /// The next sub-step [s] with this much of an interval dt left.
@@ -82,7 +104,7 @@ impl System for Gas {
                 }
                 let h = self.next_step(&self.fluids[f], t + done, dt, dt - done)?;
                 let fluid = &mut self.fluids[f];
-                fluid.step(t + done, h, &mut report).map_err(|e| e.within(&self.name, t + done + h))?;
+                fluid.step(t + done, h, t + (done + h), &mut report).map_err(|e| e.within(&self.name, t + done + h))?;
                 done += h;
                 report.stepped(h);
                 if self.watched
@@ -100,6 +122,9 @@ impl System for Gas {
 
     fn columns(&self, names: &[&str], out: &mut Vec<Column>) {
         self.fluids.iter().for_each(|fluid| fluid.columns(names, out));
+        if names.contains(&"force") {
+            out.extend(self.forces());
+        }
     }
 
     fn topology(&self, out: &mut Vec<Column>) {

@@ -2,7 +2,8 @@
 
 use super::fluid::{Failure, Fluid};
 use super::rows::{self, Face, runs};
-use crate::linalg::poisson::{Params, Target};
+use super::solids::Solids;
+use crate::linalg::poisson::{Excess, Params, Target};
 use crate::math::Real;
 use crate::math::parallel::chunks;
 use crate::operators::each_row;
@@ -38,6 +39,12 @@ pub fn right_side(u: &Vectors, b: &mut Field) {
     });
 }
 
+/// The same around solids.                                                             (gas.10)
+pub fn around(u: &Vectors, solids: Option<&Solids>, b: &mut Field) {
+    right_side(u, b);
+    solids.iter().for_each(|solids| solids.correct(u, b));
+}
+
 /// u -= grad q, on the sides of the box only where they are open.                      (pressure.1)
 fn subtract_gradient(u: &mut Vectors, q: &[Real], open: [[bool; 2]; 3]) {
     for part in &mut u.parts {
@@ -65,20 +72,28 @@ impl Fluid {
     /// Makes the velocity at time t free of divergence; h [s] only scales the pressure that it takes.          (gas.4)
     pub fn projection(&mut self, t: f64, h: f64, report: &mut StepReport) -> Result<(), Failure> {
         super::sides::hold(&mut self.u, &self.settings.sides, t);
+        if let Some(solids) = &self.solids {
+            solids.close(&mut self.u);
+        }
         let fastest = self.fastest();
-        let Self { u, b, left, q, pressure, settings, solver, .. } = self;
-        right_side(u, b);
+        let Self { u, b, left, q, pressure, settings, solver, solids, .. } = self;
+        around(u, solids.as_ref(), b);
         let dx = b.grid.dx;
         let asked = settings.tolerance * dx * fastest;
-        let params = Params { target: Target::Largest(asked), ..settings.pressure };
+        let mut params = Params { target: Target::Largest(asked), ..settings.pressure };
+        if solids.as_ref().is_some_and(Solids::moves) {
+            // Walls that come closer press out what no pressure can hold.
+            params.excess = Excess::Remove;
+        }
         let open = settings.sides.each_ref().map(|sides| sides.each_ref().map(|s| matches!(s, super::Beyond::Open)));
         pressure.data.fill(0.0);
         let to_pressure = (settings.density / h) as Real;
         left.copy_from_slice(&b.data);
         let info = solver.refine(left, q, &params, |_, q, left| {
             subtract_gradient(u, q, open);
+            solids.iter().for_each(|solids| solids.close(u));
             chunks(&mut pressure.data, |start, p| p.iter_mut().zip(&q[start..]).for_each(|(p, q)| *p += to_pressure * q));
-            right_side(u, b);
+            around(u, solids.as_ref(), b);
             left.copy_from_slice(&b.data);
         });
         let info = info.map_err(Failure::Pressure)?;

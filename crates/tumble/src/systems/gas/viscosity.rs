@@ -7,6 +7,7 @@
 
 use super::fluid::{Failure, Fluid};
 use super::rows::dot;
+use super::solids::Solids;
 use crate::math::Real;
 use crate::operators::{diffuse, each_row, laplacian};
 use crate::state::{Field, Place, Side};
@@ -45,7 +46,7 @@ fn free(part: &mut Field) {
 pub type Conjugates = [Field; 3];
 
 /// Solves (1 - c lap) x = b from x = b; returns iterations and whether it converged.
-fn implicit(x: &mut Field, c: f64, scratch: &mut Conjugates) -> Result<(usize, bool), Failure> {
+fn implicit(x: &mut Field, c: f64, solids: Option<&Solids>, scratch: &mut Conjugates) -> Result<(usize, bool), Failure> {
     let [r, p, product] = scratch;
     for field in [&mut *r, &mut *p, &mut *product] {
         (field.grid, field.place) = (x.grid, x.place);
@@ -53,6 +54,10 @@ fn implicit(x: &mut Field, c: f64, scratch: &mut Conjugates) -> Result<(usize, b
         field.sides = x.sides.map(|ends| ends.map(|side| if let Side::Value(_) = side { Side::Value(0.0) } else { Side::Closed }));
     }
     laplacian(x, product)?;
+    let free = |part: &mut Field| {
+        free(part);
+        solids.iter().for_each(|solids| solids.free(part));
+    };
     blend(r, 0.0, product, c);
     free(r);
     blend(p, 0.0, r, 1.0);
@@ -87,20 +92,27 @@ impl Fluid {
             if let Some(carried) = carried
                 && diffusivity > 0.0
             {
+                if let Some(solids) = &self.solids {
+                    solids.shade(&mut carried.field);
+                }
                 diffuse(&mut carried.field, diffusivity, h, &mut carried.next)?;
             }
         }
+        self.clear();
         let nu = self.settings.viscosity / self.settings.density;
         if nu == 0.0 {
             return Ok(());
         }
         super::sides::hold(&mut self.u, &self.settings.sides, t + h);
+        if let Some(solids) = &self.solids {
+            solids.recall(&mut self.u);
+        }
         for axis in 0..self.u.parts.len() {
             let part = &mut self.u.parts[axis];
             match self.settings.viscous {
                 Viscous::Explicit => drop(diffuse(part, nu, h, &mut self.next.parts[axis])?),
                 Viscous::Implicit => {
-                    let (iterations, converged) = implicit(part, h * nu, &mut self.conjugates)?;
+                    let (iterations, converged) = implicit(part, h * nu, self.solids.as_ref(), &mut self.conjugates)?;
                     report.linear += iterations as u64;
                     report.unconverged += u64::from(!converged);
                 }

@@ -1,0 +1,66 @@
+"""Gases in the engine's own, single precision."""
+
+import copy
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from tumble import World
+from tumble.cli.report import summary
+from tumble.run import simulate
+
+Tree = dict[str, Any]
+
+PLUME: Tree = {
+    "version": 1,
+    "time": {"fps": 24, "frames": 8},
+    "gas": [
+        {
+            "name": "air",
+            "box": {"size": [1, 1, 1.5], "center": [0, 0, 0.75], "resolution": 48},
+            "sides": {"z": ["no_slip", "open"]},
+            "smoke": {"weight": 0},
+            "temperature": {"ambient": 300},
+            "source": [{"shape": {"sphere": {"center": [0.01, 0, 0.2], "radius": 0.15}}, "density": 1, "temperature": 400}],
+        }
+    ],
+    "output": {"plot": False, "columns": ["density", "velocity_x", "velocity_y", "velocity_z", "divergence"]},
+}
+BALL: Tree = {
+    "name": "ball",
+    "shape": {"sphere": {"center": [0.02, 0.01, 0.7], "radius": 0.2}},
+    "motion": {"velocity": [0.3, 0, 0], "spin": [0, 1, 0]},
+}
+
+
+@pytest.mark.parametrize("colliders", [[], [BALL]])
+def test_a_frame_in_single_precision_is_free_of_divergence(colliders: list[Tree]) -> None:
+    world = World({**copy.deepcopy(PLUME), "collider": colliders})
+    for _ in range(8):
+        report = world.step()
+        assert report["unconverged"] == 0
+        assert 0 < report["residual"] <= 1e-5
+    frame = world.frame["air"]
+    fastest = max(np.abs(frame[f"velocity_{a}"]).max() for a in "xyz")
+    left = np.abs(frame["divergence"]).max() * 1.5 / 48 / fastest
+    assert fastest > 0.3
+    # The tolerance is over the velocity before the projection.
+    assert 0 < left < 1.5e-5
+    # Smoke is never less than none, nor more than its source holds, but for rounding.
+    assert frame["density"].min() >= -1e-6
+    assert 0.9 < frame["density"].max() <= 1 + 1e-6
+
+
+def test_steps_that_are_far_too_long_are_told_once(tmp_path: Path) -> None:
+    scene = copy.deepcopy(PLUME)
+    scene["gas"][0]["velocity"] = [0, 0, 0]
+    scene["gas"][0]["acceleration"] = ["60*sin(pi*z/1.5)", 0, 0]
+    scene["gas"][0]["courant"] = 0.5
+    free = simulate(scene, tmp_path / "free")
+    assert "cells in a step" not in summary(free)
+    assert 0 < free.ledger["courant"].max() < 1
+    held = simulate({**scene, "system": [{"method": "gas", "substeps": 1}]}, tmp_path / "held")
+    assert summary(held).count("cells in a step") == 1
+    assert held.ledger["courant"].max() > 1
