@@ -46,6 +46,8 @@ class Case:
 CASES = (
     *((d, (0.0,) * d, 0.0) for d in (1, 2, 3)),
     (1, (150.0,), 0.0),
+    (1, (500.0,), 0.0),
+    (2, (100.0, 0.0), 0.0),
     (2, (100.0, -80.0), 0.0),
     (3, (60.0, 50.0, -40.0), 0.0),
     (2, (0.0, 0.0), 8.0),
@@ -156,8 +158,9 @@ def page(folder: Path) -> Path:
     sections = [
         Section(
             "The largest step",
-            f"<p>Noise of 10⁻⁹ in air ({SOUND:g} m/s) on cells of 1/8 m. Sound, the flow and friction limit the step together "
-            "(compressible.5); at rest the limit is c h √d/Δx = 1. Measured: the longest step at which the noise stays below "
+            f"<p>Noise of 10⁻⁹ in air ({SOUND:g} m/s) on cells of 1/8 m. Predicted: the first step at "
+            "which one of all waves grows, by its matrix (compressible.8); at rest that is c h √d/Δx = 1, and a flow, which damps "
+            "sound, allows longer steps up to its own limit. Measured: the longest step at which the noise stays below "
             "a hundred times itself for 300 steps.</p>",
             partial(_limits, cases=cases),
             4.0,
