@@ -61,7 +61,13 @@ def bench_tumble():
     frames = median(lambda: world.step(), 3)
     t = world.columns("temperature")["b"]["temperature"]
     report("tumble", (frames - frame) / STEPS, left(t.mean((0, 1), dtype=float), 4 * (STEPS + 1)))
-    show("heat, frames", "tumble", 8.0 * N**3 * (STEPS + 1) / frames / 1e9, "GB/s", f"{STEPS + 1} steps and all that ends a frame")
+    show(
+        "heat, frames",
+        "tumble",
+        8.0 * N**3 * (STEPS + 1) / frames / 1e9,
+        "GB/s",
+        f"{STEPS + 1} steps and all that ends a frame",
+    )
 
 
 def bench_numba():

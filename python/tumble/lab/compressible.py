@@ -179,7 +179,7 @@ def page(folder: Path) -> Path:
     points = [
         f"Measured largest steps are within {100 * worst:.1f} % of the predicted ones.",
         *(
-            f"{s.name[0].upper()}{s.name[1:]}: {s.steps} steps of {1e6 * s.step:.3g} µs, {100 * part:.1f} % of the energy lost."
+            f"{s.name[0].upper()}{s.name[1:]}: {s.steps} steps of {1e6 * s.step:.4g} µs, {100 * part:.1f} % of the energy lost."
             for s, part in zip(both, lost, strict=True)
         ),
     ]
@@ -206,7 +206,8 @@ def _limits(figure: FigureBase, cases: list[Case]) -> None:
     axes.barh(rows - 0.2, [1e6 * c.predicted for c in cases], 0.38, color=PALETTE[0], label="predicted")
     axes.barh(rows + 0.2, [1e6 * c.measured for c in cases], 0.38, color=PALETTE[1], label="measured")
     for row, case in zip(rows, cases, strict=True):
-        axes.text(0, float(row), f" {case.measured / case.predicted:.3f}", va="center", color=INK, fontsize=8)
+        end = 1e6 * max(case.measured, case.predicted)
+        axes.text(end, float(row), f" {case.measured / case.predicted:.3f}", va="center", color=INK, fontsize=8)
     axes.set_yticks(rows, [case.name for case in cases])
     axes.invert_yaxis()
     axes.set_xlabel("largest step [µs]")
@@ -218,7 +219,7 @@ def _swirls(figure: FigureBase, both: list[Swirl]) -> None:
     for i, swirl in enumerate(both):
         axes = figure.add_subplot(places[0, i])
         image = axes.imshow(swirl.speed.T, origin="lower", vmin=0.0, vmax=1.0, cmap="Blues", interpolation="nearest")
-        axes.set_title(f"{swirl.name}: {swirl.steps} steps of {1e6 * swirl.step:.3g} µs")
+        axes.set_title(f"{swirl.name}: {swirl.steps} steps of {1e6 * swirl.step:.4g} µs")
         axes.set_xticks([])
         axes.set_yticks([])
         axes.grid(False)
