@@ -53,7 +53,7 @@ def tumble_world(steps):
 
 
 def bench_tumble():
-    # A frame ends with a snapshot and a look at all cells, which belong to no step: the difference of two lengths is steps alone.
+    # A frame ends with a snapshot and a look at all cells, which belong to no step: two lengths differ by steps alone.
     world = tumble_world(1)
     frame = median(lambda: world.step(), 3)
     del world
