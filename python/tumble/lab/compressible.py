@@ -159,8 +159,8 @@ def page(folder: Path) -> Path:
         Section(
             "The largest step",
             f"<p>Noise of 10⁻⁹ in air ({SOUND:g} m/s) on cells of 1/8 m. Predicted: the first step at which "
-            "one of all waves grows, by its matrix (compressible.8); at rest that is c h √d/Δx = 1, and a flow, which damps sound, "
-            "allows longer steps up to its own limit. Measured: the longest step at which the noise stays below "
+            "one of all waves grows, by its matrix (compressible.8); at rest that is c h √d/Δx = 1, and a flow, which damps "
+            "sound, allows longer steps up to its own limit. Measured: the longest step at which the noise stays below "
             "a hundred times itself for 300 steps.</p>",
             partial(_limits, cases=cases),
             4.0,
