@@ -31,15 +31,16 @@ def report(who, seconds, part):
     show("heat", who, 8.0 * N**3 / seconds / 1e9, "GB/s", f"mode off by {part - 1.0:.1e}")
 
 
-def bench_tumble():
+def tumble_world(steps):
+    """A world whose frames take so many steps."""
     import tumble
 
     dx = 1.0 / N
-    world = tumble.World(
+    return tumble.World(
         {
             "version": 1,
-            "time": {"fps": 1.0 / (STEPS * Z * dx * dx)},
-            "system": [{"name": "s", "method": "heat", "substeps": STEPS}],
+            "time": {"fps": 1.0 / (steps * Z * dx * dx)},
+            "system": [{"name": "s", "method": "heat", "substeps": steps}],
             "heat": [
                 {
                     "name": "b", "box": {"size": [1, 1, 1], "center": [0.5, 0.5, 0.5], "resolution": N},
@@ -49,10 +50,24 @@ def bench_tumble():
         },
         threads=THREADS,
     )  # fmt: skip
-    # A frame ends with a snapshot and a look at all cells, which belong to no step: two lengths of frames tell them apart.
-    seconds = median(lambda: world.step(), 3) / STEPS
+
+
+def bench_tumble():
+    # A frame ends with a snapshot and a look at all cells, which belong to no step: two lengths differ by steps alone.
+    world = tumble_world(1)
+    frame = median(lambda: world.step(), 3)
+    del world
+    world = tumble_world(STEPS + 1)
+    frames = median(lambda: world.step(), 3)
     t = world.columns("temperature")["b"]["temperature"]
-    report("tumble", seconds, left(t.mean((0, 1), dtype=float), 4 * STEPS))
+    report("tumble", (frames - frame) / STEPS, left(t.mean((0, 1), dtype=float), 4 * (STEPS + 1)))
+    show(
+        "heat, frames",
+        "tumble",
+        8.0 * N**3 * (STEPS + 1) / frames / 1e9,
+        "GB/s",
+        f"{STEPS + 1} steps and all that ends a frame",
+    )
 
 
 def bench_numba():
@@ -103,7 +118,7 @@ def bench_devito():
     configuration["language"] = "openmp" if THREADS > 1 else "C"
     # Walls by mirrored points beyond them, set before each step.
     grid = Grid((N, N, N), dtype=np.float32, extent=(N - 1.0,) * 3)
-    u = TimeFunction("u", grid, space_order=2)
+    u = TimeFunction(name="u", grid=grid, space_order=2)
     u.data[:] = mode()[:, None, None]
     halo = u.data_with_halo
     halo[:, 0], halo[:, -1] = halo[:, 1], halo[:, -2]

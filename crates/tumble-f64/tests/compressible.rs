@@ -48,12 +48,13 @@ fn sound_stands_in_a_tube_with_its_frequency() {
     // Half a step of velocity against density: the wave goes through zero h/2 late in these units, an order 1 of the start.
     let phases: Vec<f64> = errors.iter().map(|e| e / (2.0 * PI * 5.25)).collect();
     println!("{phases:?}");
-    // c h/dx = 2/4 at every n; measured below.
-    assert!(phases[2].abs() < 2e-3, "{phases:?}");
+    // c h/dx = 2/4 at every n; measured -2.8e-4, -4.4e-4, -3.0e-4.
+    assert!(phases[2].abs() < 1e-3, "{phases:?}");
     // After whole periods the phase enters squared and only what is damped or blown up shows: nothing is.
     let left = tube(32, 32 * 20, 5.0);
     println!("left {left:.6}");
-    assert!((left - 1.0).abs() < 0.01, "{left}");
+    // Measured 1.000187.
+    assert!((left - 1.0).abs() < 1e-3, "{left}");
 }
 
 #[test]
@@ -122,8 +123,9 @@ fn stays(n: [usize; 3], flow: [f64; 3], viscosity: f64, part: f64) -> (f64, bool
 fn the_largest_step_is_the_predicted_one_in_one_two_and_three_dimensions() {
     for d in 1..=3 {
         let n: [usize; 3] = std::array::from_fn(|a| if a < d { 8 } else { 1 });
-        for (flow, viscosity) in [([0.0; 3], 0.0), ([1.0, 0.0, 0.0], 0.0), ([-0.8, 0.7, 0.6], 0.0), ([0.0; 3], 0.2), ([1.0, 0.5, 0.0], 0.1)]
-        {
+        let flows = [([0.0; 3], 0.0), ([1.0, 0.0, 0.0], 0.0), ([-0.8, 0.7, 0.6], 0.0), ([0.0; 3], 0.2), ([1.0, 0.5, 0.0], 0.1)];
+        // Faster than sound, too.
+        for (flow, viscosity) in flows.into_iter().chain([([5.0, 0.0, 0.0], 0.0)]) {
             let flow = std::array::from_fn(|a| if a < d { flow[a] } else { 0.0 });
             // The largest part of the predicted step at which nothing grows.
             let (mut low, mut high) = (0.5, 1.5);
@@ -136,8 +138,56 @@ fn the_largest_step_is_the_predicted_one_in_one_two_and_three_dimensions() {
             if flow == [0.0; 3] && viscosity == 0.0 {
                 assert!((C * limit * (d as f64).sqrt() / 0.1 - 1.0).abs() < 1e-12, "{limit}");
             }
-            assert!((low - 1.0).abs() < 0.1, "{d} {flow:?} {viscosity}: {low}");
+            // Measured 1.000 to 1.008: what grows by less than 100 in 400 steps does not show.
+            assert!((low - 1.0).abs() < 0.02, "{d} {flow:?} {viscosity}: {low}");
         }
+    }
+}
+
+#[test]
+fn where_some_air_rests_the_limit_is_that_of_rest() {
+    // What a flow damps allows longer steps, but only where it flows.
+    let grid = Grid::new([16, 16, 1], 0.1, [0.0; 3]).unwrap();
+    let rho = Field::of(grid, Place::Cell, "kg/m³", |_| 1.2).unwrap();
+    let u = Vectors::of(grid, "m/s", |x| [x[1].sin(), 0.0, 0.0]).unwrap();
+    let gas = Gas::new("g".into(), Fluid { sound_speed: C, density: 1.2, viscosity: 0.0, gravity: [0.0; 3] }, rho, u).unwrap();
+    assert!((C * gas.limit() * 2.0_f64.sqrt() / 0.1 - 1.0).abs() < 1e-12, "{}", gas.limit());
+}
+
+#[test]
+fn no_wave_grows_at_the_predicted_step_and_one_does_beyond() {
+    use tumble_f64::systems::compressible::Rates;
+    // Waves one by one, by the matrix of a step on (u, rho c/rho0): the carried and what sound makes of it, in complex numbers.
+    let times = |a: [f64; 2], b: [f64; 2]| [a[0] * b[0] - a[1] * b[1], a[0] * b[1] + a[1] * b[0]];
+    let plus = |a: [f64; 2], b: [f64; 2]| [a[0] + b[0], a[1] + b[1]];
+    for (d, flow, friction) in [(1, 0.4, 0.0), (2, 0.0, 0.1), (2, 0.3, 0.0), (2, 0.9, 0.2), (3, 0.2, 0.05), (3, 3.0, 0.0)] {
+        let flow = std::array::from_fn(|a| if a < d { flow / (1.0 + a as f64) } else { 0.0 });
+        let waves = std::array::from_fn(|a| if a < d { 12 } else { 1 });
+        let limit = Rates { sound: 1.0, friction, flow, waves }.limit();
+        let growth = |h: f64| {
+            let mut most = 0.0_f64;
+            for number in 0..12_usize.pow(d as u32) {
+                let phase: [f64; 3] =
+                    std::array::from_fn(|a| if a < d { (number / 12_usize.pow(a as u32) % 12) as f64 * PI / 6.0 } else { 0.0 });
+                let mut carried = [1.0, 0.0];
+                (0..3).for_each(|a| carried = plus(carried, [h * flow[a] * (phase[a].cos() - 1.0), -h * flow[a] * phase[a].sin()]));
+                let s = 2.0 * h * phase.iter().map(|p| (p / 2.0).sin().powi(2)).sum::<f64>().sqrt();
+                let kept = 1.0 - friction / h * s * s;
+                // From a start that holds both waves.
+                let (mut u, mut rho) = ([1.0, 0.3], [-0.2, 0.7]);
+                for _ in 0..2000 {
+                    u = times(carried, plus([kept * u[0], kept * u[1]], [s * rho[1], -s * rho[0]]));
+                    rho = plus(times(carried, rho), [s * u[1], -s * u[0]]);
+                }
+                let size = |a: [f64; 2]| a[0].hypot(a[1]);
+                most = most.max(size(u).max(size(rho)));
+            }
+            most
+        };
+        let (within, beyond) = (growth(0.999 * limit), growth(1.02 * limit));
+        println!("{d}D: {limit:.4}: {within:.2e}, beyond {beyond:.2e}");
+        // Measured 1.04, the start itself, and 1e34 to 1e185.
+        assert!(within < 2.0 && !(beyond < 1e6), "{d} {flow:?} {friction}: {within:e} {beyond:e}");
     }
 }
 

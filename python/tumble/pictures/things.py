@@ -190,6 +190,9 @@ FINER = 0.6
 SHOWN = ("density", "fuel", "temperature", "vorticity", "speed", "pressure", "divergence")
 """What is shown of an object on a grid: the first of these that is in the frames and not the same everywhere."""
 
+DENSE = 0.5
+"""A density that is nowhere less than this part of its largest is that of the fluid itself, not of smoke in it."""
+
 LOOKED_AT = 9
 """Frames at which the range of what lies on a grid is taken, at most."""
 
@@ -372,7 +375,7 @@ class Stage:
                 thick = np.clip(share, 0.0, None) * (THICK / float(grid.size.mean()))
                 drawn.append(Smoke(thing.name, grid.origin, grid.spacing, thick.astype(np.float32), thing.color))
             else:
-                drawn.append(_image(thing, grid, name, share))
+                drawn.append(_image(thing, grid, name, share, name in ("density", "fuel") and low == 0.0))
         if grid.flat < 3:
             corners = grid.corners[[[0, 1, 3, 2], [0, 1, 5, 4], [0, 2, 6, 4]][grid.flat]]
             line = np.stack([corners, np.roll(corners, -1, axis=0)], axis=1).reshape(-1, 3)
@@ -393,7 +396,7 @@ class Stage:
             high = max((float(v.max()) for v in finite if v.size), default=0.0)
             if not high > low:
                 continue
-            if name in ("density", "fuel"):
+            if name in ("density", "fuel") and low < DENSE * high:
                 return name, 0.0, high
             if name in SIGNED:
                 # A few cells beside walls are far off the rest.
@@ -529,14 +532,14 @@ def _one_number(grid: Box, table: Mapping[str, Array], name: str) -> Floats:
     return np.asarray(np.abs(values) if grid.flat == 3 and name in SIGNED else values)
 
 
-def _image(thing: Object, grid: Box, name: str, share: Floats) -> Image:
+def _image(thing: Object, grid: Box, name: str, share: Floats, dye: bool) -> Image:
     """What lies in a plane: dye in the object's colour, all else in a map of colours."""
     import matplotlib
 
     a, b = grid.axes
     share = np.squeeze(share, axis=grid.flat)
     corner, sides = grid.corners[0], np.diag(grid.size)
-    if name in ("density", "fuel"):
+    if dye:
         cover = 1 - np.exp(-DYE * np.clip(share, 0.0, None))
         light = np.broadcast_to(np.array(thing.color), (*share.shape, 3))
     else:

@@ -7,7 +7,9 @@ use serde::{Deserialize, Serialize};
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct Output {
-    /// Columns of the frames: `position`, `velocity`, `orientation`, `angular_velocity`, `link_strain`.
+    /// Columns of the frames, of each object that has them. Of particles: `position`, `velocity`, `orientation`, `angular_velocity`,
+    /// `link_strain`; of grids: `density`, `temperature`, `flux`, `pressure`, `velocity`, `vorticity`, `divergence`, and on faces
+    /// `velocity_x`, `velocity_y`, `velocity_z`.
     pub columns: Vec<String>,
     /// Write `film.mp4`.
     pub film: bool,
@@ -29,7 +31,7 @@ pub struct Output {
 impl Default for Output {
     fn default() -> Self {
         Self {
-            columns: vec!["position".into(), "velocity".into()],
+            columns: ["position", "velocity", "density", "temperature"].map(String::from).into(),
             film: false,
             usd: false,
             ply: false,

@@ -2,16 +2,17 @@
 //!
 //! ```text
 //!   p = c² (rho - rho0)                                                                      (compressible.1)
-//!   u' = u + h (g - (u . grad) u + (mu lap u - grad p)/rho)                                   (compressible.2)
+//!   u* = u + h (g + (mu lap u - grad p)/rho),   u' = u* - h (u* . grad) u*                     (compressible.2)
 //!   rho' = rho - h div(rho u')                                                                (compressible.4)
 //! ```
 //!
-//! Sound limits the step: c h sqrt(d)/dx <= 1 at rest, (compressible.5) in general. Verified by crates/tumble-f64/tests/compressible.rs.
+//! Sound limits the step, c h sqrt(d)/dx <= 1 (compressible.6), and so do flow and friction: (compressible.5), (compressible.8).
+//! Verified by crates/tumble-f64/tests/compressible.rs.
 
 use crate::exchange::Exchange;
 use crate::integrators::equal_steps;
-use crate::math::Real;
-use crate::math::functions::ln;
+use crate::math::functions::{cos, ln, sin};
+use crate::math::{Real, bisect};
 use crate::operators::{average, curl, divergence, gradient, upwind, vector_laplacian};
 use crate::state::{Field, Grid, GridError, Place, Side, Vectors};
 use crate::system::{Archive, System};
@@ -34,6 +35,76 @@ pub struct Fluid {
     pub viscosity: f64,
     /// Acceleration [m/s²].
     pub gravity: [f64; 3],
+}
+
+/// What limits the steps of a uniform flow of such a gas [1/s].
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Rates {
+    /// c/dx.
+    pub sound: f64,
+    /// mu/(rho dx²).
+    pub friction: f64,
+    /// |u|/dx of each axis.
+    pub flow: [f64; 3],
+    /// Wave numbers that are looked at along each axis, 2 pi i/(waves dx); 1 where nothing changes.
+    pub waves: [usize; 3],
+}
+
+impl Rates {
+    /// The factor by which the wave with the phases q dx grows most in a step h [s].                    (compressible.8)
+    fn growth(&self, h: f64, phases: [&Phase; 3]) -> f64 {
+        let (mut real, mut imaginary, mut squares) = (1.0, 0.0, 0.0);
+        for (phase, flow) in phases.iter().zip(&self.flow) {
+            real -= h * flow * (1.0 - phase.cos);
+            imaginary -= h * flow * phase.sin;
+            squares += 0.5 * (1.0 - phase.cos);
+        }
+        let carried = (real * real + imaginary * imaginary).sqrt();
+        let kept = 1.0 - 4.0 * h * self.friction * squares;
+        // Roots of z² - 2 trace z + kept; velocities across the wave are multiplied by `kept` alone.
+        let trace = 0.5 * (1.0 + kept) - 2.0 * h * h * self.sound * self.sound * squares;
+        let under = trace * trace - kept;
+        carried * if under > 0.0 { trace.abs() + under.sqrt() } else { kept.abs().sqrt() }.max(kept.abs())
+    }
+
+    /// The longest step at which no wave grows [s].                                                     (compressible.5)
+    pub fn limit(&self) -> f64 {
+        let d = self.waves.iter().filter(|n| **n > 1).count() as f64;
+        let (sound, friction) = (self.sound * d.sqrt(), 2.0 * d * self.friction);
+        let flow: f64 = self.flow.iter().sum();
+        let carried = 1.0 / flow;
+        // At rest: the positive root of (sound h)² + friction h = 1.
+        let rest = 2.0 / (friction + (friction * friction + 4.0 * sound * sound).sqrt());
+        if !(flow > 0.0 && rest < carried) {
+            return if flow > 0.0 { carried } else { rest };
+        }
+        // The flow damps, and so allows longer steps.
+        let [x, y, z] = self.waves.map(|n| (0..n).map(|i| Phase::new(i, n)).collect::<Vec<_>>());
+        let grows = |h: f64, wave: [&Phase; 3]| self.growth(h, wave) > 1.0 + 1e-9;
+        let fine = |h: f64| !x.iter().any(|x| y.iter().any(|y| z.iter().any(|z| grows(h, [x, y, z]))));
+        let mut low = rest;
+        while low < carried {
+            let high = (1.02 * low).min(carried);
+            if !fine(high) {
+                return bisect((low, high), 10, &fine).0;
+            }
+            low = high;
+        }
+        carried
+    }
+}
+
+/// The phase of a wave between two cells.
+struct Phase {
+    sin: f64,
+    cos: f64,
+}
+
+impl Phase {
+    fn new(i: usize, n: usize) -> Self {
+        let angle = 2.0 * std::f64::consts::PI * i as f64 / n as f64;
+        Self { sin: sin(angle), cos: cos(angle) }
+    }
 }
 
 /// A gas in a box with walls or joined sides.
@@ -109,22 +180,31 @@ impl Gas {
             vector_laplacian(&self.velocity, &mut self.friction)?;
         }
         let (mu, step) = (self.fluid.viscosity as Real, h as Real);
-        let mut after = Vec::new();
         for (c, axis) in grid.axes().enumerate() {
-            let part = &self.velocity.parts[c];
-            let mut carried = Field::new(grid, part.place, "m/s²")?;
-            upwind(&self.velocity, part, &mut carried)?;
+            let part = &mut self.velocity.parts[c];
             let rho = average(&self.density, part.place)?;
             let g = self.fluid.gravity[axis] as Real;
-            let mut data = part.data.clone();
-            for (i, u) in data.iter_mut().enumerate().filter(|(i, _)| rho.data[*i] > 0.0) {
+            for (i, u) in part.data.iter_mut().enumerate().filter(|(i, _)| rho.data[*i] > 0.0) {
                 let force = mu * self.friction.parts[c].data[i] - self.slope.parts[c].data[i];
-                *u += step * (g - carried.data[i] + force / rho.data[i]);
+                *u += step * (g + force / rho.data[i]);
             }
-            after.push(data);
         }
-        for (part, data) in self.velocity.parts.iter_mut().zip(after) {
-            part.data = data;
+        self.hold_walls();
+        // What has been pushed is carried, not what was before: sound that a flow carries would grow.
+        let carried: Result<Vec<Field>, GridError> = self
+            .velocity
+            .parts
+            .iter()
+            .map(|part| {
+                let mut carried = Field::new(grid, part.place, "m/s²")?;
+                upwind(&self.velocity, part, &mut carried)?;
+                Ok(carried)
+            })
+            .collect();
+        for (part, carried) in self.velocity.parts.iter_mut().zip(carried?) {
+            for (u, carried) in part.data.iter_mut().zip(&carried.data) {
+                *u -= step * carried;
+            }
         }
         self.hold_walls();
         // Mass per area and time, with the density of where it comes from.
@@ -150,23 +230,33 @@ impl Gas {
         Ok(())
     }
 
-    /// The largest |u| of each axis [m/s]; a NaN wins.
-    fn speeds(&self) -> Vec<f64> {
+    /// The smallest and the largest |u| of each axis [m/s]; a NaN is the largest.
+    fn speeds(&self) -> Vec<[f64; 2]> {
         let worse = |a: f64, b: f64| if a >= b || a.is_nan() { a } else { b };
-        self.velocity.parts.iter().map(|part| part.each().map(|at| f64::from(part.value(at).abs())).fold(0.0, worse)).collect()
+        let both = |[least, most]: [f64; 2], u: f64| [least.min(u), worse(most, u)];
+        let each = |part: &Field| part.each().map(|at| f64::from(part.value(at).abs())).fold([f64::INFINITY, 0.0], both);
+        self.velocity.parts.iter().map(each).collect()
     }
 
-    /// The longest step [s] that does not grow, now.                                            (compressible.5)
+    /// The longest step [s] that does not grow, now: that of the fastest flow or that of the slowest.
     pub fn limit(&self) -> f64 {
-        let grid = self.grid();
-        let d = grid.axes().filter(|a| grid.n[*a] > 1).count() as f64;
+        let (grid, speeds) = (self.grid(), self.speeds());
         let least = self.density.each().map(|at| f64::from(self.density.value(at))).fold(self.fluid.density, f64::min);
-        let sound = self.fluid.sound_speed * d.sqrt() / grid.dx;
-        let flow = self.speeds().iter().sum::<f64>() / grid.dx;
-        let friction = 2.0 * d * self.fluid.viscosity / least.max(f64::MIN_POSITIVE) / (grid.dx * grid.dx);
-        // The smallest root of (sound h)² = (1 - flow h)(1 - flow h - friction h).
-        let (a, b) = (sound * sound - flow * (flow + friction), 2.0 * flow + friction);
-        2.0 / (b + (b * b + 4.0 * a).max(0.0).sqrt())
+        let of = |which: usize| {
+            let mut rates = Rates {
+                sound: self.fluid.sound_speed / grid.dx,
+                friction: self.fluid.viscosity / least.max(f64::MIN_POSITIVE) / (grid.dx * grid.dx),
+                flow: [0.0; 3],
+                waves: [1; 3],
+            };
+            for (axis, speed) in grid.axes().zip(&speeds).filter(|(axis, _)| grid.n[*axis] > 1) {
+                rates.flow[axis] = speed[which] / grid.dx;
+                // A longer wave grows less, and 16 along an axis are close enough to each other.
+                rates.waves[axis] = grid.n[axis].next_multiple_of(2).min(16);
+            }
+            rates.limit()
+        };
+        of(0).min(of(1))
     }
 
     /// Mass, momentum, kinetic energy and that of pressure; in a plane for a metre across it.
@@ -196,7 +286,7 @@ impl Gas {
                 }
             }
         }
-        books.speed = self.speeds().iter().map(|s| s * s).sum::<f64>().sqrt();
+        books.speed = self.speeds().iter().map(|s| s[1] * s[1]).sum::<f64>().sqrt();
         books
     }
 
