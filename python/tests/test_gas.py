@@ -23,7 +23,9 @@ PLUME: Tree = {
             "sides": {"z": ["no_slip", "open"]},
             "smoke": {"weight": 0},
             "temperature": {"ambient": 300},
-            "source": [{"shape": {"sphere": {"center": [0.01, 0, 0.2], "radius": 0.15}}, "density": 1, "temperature": 400}],
+            "source": [
+                {"shape": {"sphere": {"center": [0.01, 0, 0.2], "radius": 0.15}}, "density": 1, "temperature": 400}
+            ],
         }
     ],
     "output": {"plot": False, "columns": ["density", "velocity_x", "velocity_y", "velocity_z", "divergence"]},

@@ -47,8 +47,8 @@ def _too_fast(scene: Mapping[str, Any], reached: float) -> list[str]:
     if not given or reached <= 2.0 * asked:
         return []
     return [
-        f"  the fluid passed up to {reached:.3g} cells in a step, courant is {asked:.3g}: such steps smear; take more substeps, or leave "
-        "substeps and step out"
+        f"  the fluid passed up to {reached:.3g} cells in a step, courant is {asked:.3g}: such steps smear; take more "
+        "substeps, or leave substeps and step out"
     ]
 
 

@@ -206,7 +206,11 @@ impl Solids {
         let n = self.grid.n;
         let planes: Vec<Found> = (0..=n[2]).into_par_iter().map(|k| self.search(k, t)).collect();
         let Self { cuts, closed, ghosts, dead, shades, pushes, .. } = self;
-        (cuts.clear(), ghosts.clear(), dead.clear(), shades.clear(), pushes.clear());
+        cuts.clear();
+        ghosts.clear();
+        dead.clear();
+        shades.clear();
+        pushes.clear();
         closed.iter_mut().for_each(Vec::clear);
         for mut plane in planes {
             cuts.append(&mut plane.cuts);
