@@ -112,7 +112,7 @@ fn stays(n: [usize; 3], flow: [f64; 3], viscosity: f64, part: f64) -> (f64, bool
     let before = size(&gas);
     for _ in 0..400 {
         gas.step(part * limit).unwrap();
-        if !(size(&gas) < 100.0 * before) {
+        if size(&gas).is_nan() || size(&gas) >= 100.0 * before {
             return (limit, false);
         }
     }
@@ -187,7 +187,7 @@ fn no_wave_grows_at_the_predicted_step_and_one_does_beyond() {
         let (within, beyond) = (growth(0.999 * limit), growth(1.02 * limit));
         println!("{d}D: {limit:.4}: {within:.2e}, beyond {beyond:.2e}");
         // Measured 1.04, the start itself, and 1e34 to 1e185.
-        assert!(within < 2.0 && !(beyond < 1e6), "{d} {flow:?} {friction}: {within:e} {beyond:e}");
+        assert!(within < 2.0 && (beyond >= 1e6 || beyond.is_nan()), "{d} {flow:?} {friction}: {within:e} {beyond:e}");
     }
 }
 

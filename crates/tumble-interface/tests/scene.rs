@@ -129,8 +129,20 @@ fn the_schema_gives_every_number_a_unit() {
     let mut missing = Vec::new();
     visit(&Scene::schema(), "", &mut missing);
     // Directions have no unit, colours, probes and users' columns neither: pure numbers, or the unit of what is probed.
-    let known =
-        ["normal", "axis", "direction", "color", "value", "tolerance", "Between", "kind", "Shape.oneOf", "Source.oneOf", "Kill.oneOf", "GasSide.oneOf"];
+    let known = [
+        "normal",
+        "axis",
+        "direction",
+        "color",
+        "value",
+        "tolerance",
+        "Between",
+        "kind",
+        "Shape.oneOf",
+        "Source.oneOf",
+        "Kill.oneOf",
+        "GasSide.oneOf",
+    ];
     missing.retain(|m| !known.iter().any(|w| m.contains(w)));
     assert!(missing.is_empty(), "{missing:#?}");
 }

@@ -86,7 +86,7 @@ impl Rates {
         while low < carried {
             let high = (1.02 * low).min(carried);
             if !fine(high) {
-                return bisect((low, high), 10, &fine).0;
+                return bisect((low, high), 10, fine).0;
             }
             low = high;
         }
@@ -393,7 +393,7 @@ impl System for Compressible {
     fn advance(&mut self, t: f64, dt: f64, _exchange: &mut Exchange, go_on: &(dyn Fn() -> bool + Sync)) -> Result<StepReport, StepError> {
         let mut report = StepReport::default();
         let n = self.steps(dt);
-        if !(n <= 1e7) {
+        if n.is_nan() || n > 1e7 {
             return Err(StepError::StepTooSmall { system: self.settings.name.clone(), time: t, step: dt / n });
         }
         let h = dt / n;
