@@ -218,7 +218,7 @@ impl Fluid {
     }
 
     /// One step of h seconds from t to `end` [s].
-    pub fn step(&mut self, t: f64, h: f64, end: f64, report: &mut StepReport) -> Result<(), Failed> {
+    pub fn step(&mut self, t: f64, h: f64, end: f64, report: &mut StepReport) -> Result<(), Box<Failed>> {
         report.courant = worse(report.courant, self.fastest() * h / self.grid().dx);
         let parts = match self.settings.order {
             Order::ProjectLast => self
@@ -238,7 +238,7 @@ impl Fluid {
     }
 
     /// What has to be done before a frame is taken.
-    pub fn finish(&mut self, t: f64, report: &mut StepReport) -> Result<(), Failed> {
+    pub fn finish(&mut self, t: f64, report: &mut StepReport) -> Result<(), Box<Failed>> {
         if self.settings.order == Order::ProjectLast {
             return Ok(());
         }
@@ -267,8 +267,8 @@ impl Fluid {
         self.temperature.iter_mut().for_each(|warmth| solids.clear(&mut warmth.field.data, self.settings.ambient));
     }
 
-    fn failed(&self, failure: Failure) -> Failed {
-        Failed { broken: self.broken("", 0.0), failure, fluid: self.name.clone() }
+    fn failed(&self, failure: Failure) -> Box<Failed> {
+        Box::new(Failed { broken: self.broken("", 0.0), failure, fluid: self.name.clone() })
     }
 
     /// Everything goes with the fluid for h seconds from t on.                                             (gas.5)

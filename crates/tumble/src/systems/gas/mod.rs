@@ -68,7 +68,7 @@ impl Gas {
 
     /// The next sub-step [s] with this much of an interval dt left.
     fn next_step(&self, fluid: &Fluid, t: f64, dt: f64, left: f64) -> Result<f64, StepError> {
-        if let Some(n) = self.substeps.map(f64::from).or(self.step.map(|step| equal_steps(dt, step) as f64)) {
+        if let Some(n) = self.substeps.map(f64::from).or(self.step.map(|step| equal_steps(dt, step))) {
             return Ok(dt / n);
         }
         let n = (left / fluid.courant_step(left)).ceil().max(1.0);
