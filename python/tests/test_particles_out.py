@@ -71,6 +71,7 @@ class Emitting:
 
     def __init__(self, i: int) -> None:
         self.table = fake_run.fountain().frame(i)["spray"]
+        self.topology: fake_run.Columns = {"spray": {}}
 
     def columns(self, *names: str) -> fake_run.Columns:
         return {"spray": {n: self.table[n] for n in names if n in self.table}, "other": {}}

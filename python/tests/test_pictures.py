@@ -554,7 +554,7 @@ def test_plots_are_pictures(tmp_path: Path) -> None:
 
 def test_the_total_energy_and_its_drift(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     figures: list[Any] = []
-    monkeypatch.setattr(tumble.plots, "_save", lambda figure, path: figures.append(figure))
+    monkeypatch.setattr(tumble.plots, "save", lambda figure, path: figures.append(figure))
     run = fake_run.studio()
     energy(run, "energy.png")
     upper, lower = figures[0].axes
@@ -569,7 +569,7 @@ def test_the_total_energy_and_its_drift(tmp_path: Path, monkeypatch: pytest.Monk
 
 def test_a_vector_stands_for_its_columns(monkeypatch: pytest.MonkeyPatch) -> None:
     figures: list[Any] = []
-    monkeypatch.setattr(tumble.plots, "_save", lambda figure, path: figures.append(figure))
+    monkeypatch.setattr(tumble.plots, "save", lambda figure, path: figures.append(figure))
     ledger(fake_run.studio(), ["momentum", "speed", "kinetic", "elastic", "contacts", "stretch"], "x.png")
     labels = ["momentum [kg m/s]", "speed [m/s]", "[J]", "contacts", "stretch [1]"]
     assert [ax.get_ylabel() for ax in figures[0].axes] == labels
