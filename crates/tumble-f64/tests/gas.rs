@@ -4,24 +4,10 @@ extern crate tumble_f64 as tumble;
 
 mod common;
 
-use common::{orders, run, show, simulation, step};
+use common::{grid, largest, orders, run, show, simulation, step};
 use std::f64::consts::PI;
 use tumble_f64::scene::Simulation;
-use tumble_interface::{Data, Engine};
-
-/// A column of a grid, and its points along each axis.
-fn grid(sim: &Simulation, object: &str, name: &str) -> (Vec<f64>, Vec<usize>) {
-    let frame = sim.frame(&[name]);
-    let column = frame.column(object, name).unwrap_or_else(|| panic!("no {name} of {object}"));
-    match &column.data {
-        Data::F64(numbers) => (numbers.clone(), column.points.clone()),
-        other => panic!("{object}.{name} is {other:?}"),
-    }
-}
-
-fn largest(numbers: &[f64]) -> f64 {
-    numbers.iter().fold(0.0, |most, x| x.abs().max(most))
-}
+use tumble_interface::Engine;
 
 /// Root mean square of the differences.
 fn rms(a: &[f64], b: impl Fn(usize) -> f64) -> f64 {

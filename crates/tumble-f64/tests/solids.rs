@@ -4,24 +4,9 @@ extern crate tumble_f64 as tumble;
 
 mod common;
 
-use common::{orders, run, show, simulation, step};
+use common::{grid, largest, orders, run, show, simulation, step};
 use std::f64::consts::PI;
-use tumble_f64::scene::Simulation;
-use tumble_interface::{Data, Engine};
-
-/// A column, and its points along each axis.
-fn grid(sim: &Simulation, object: &str, name: &str) -> (Vec<f64>, Vec<usize>) {
-    let frame = sim.frame(&[name]);
-    let column = frame.column(object, name).unwrap_or_else(|| panic!("no {name} of {object}"));
-    match &column.data {
-        Data::F64(numbers) => (numbers.clone(), column.points.clone()),
-        other => panic!("{object}.{name} is {other:?}"),
-    }
-}
-
-fn largest(numbers: &[f64]) -> f64 {
-    numbers.iter().fold(0.0, |most, x| x.abs().max(most))
-}
+use tumble_interface::Engine;
 
 const BALL: &str = "[[collider]]\nname = \"ball\"\nshape.sphere = { center = [0.013, 0.007, 0.511], radius = 0.25 }\n";
 

@@ -42,6 +42,21 @@ pub fn column(sim: &Simulation, object: &str, name: &str) -> Vec<Vector> {
     }
 }
 
+/// A column of a grid, and its points along each axis.
+pub fn grid(sim: &Simulation, object: &str, name: &str) -> (Vec<f64>, Vec<usize>) {
+    let frame = sim.frame(&[name]);
+    let column = frame.column(object, name).unwrap_or_else(|| panic!("no {name} of {object}"));
+    match &column.data {
+        Data::F64(numbers) => (numbers.clone(), column.points.clone()),
+        other => panic!("{object}.{name} is {other:?}"),
+    }
+}
+
+/// The largest magnitude.
+pub fn largest(numbers: &[f64]) -> f64 {
+    numbers.iter().fold(0.0, |most, x| x.abs().max(most))
+}
+
 /// Positions [m].
 pub fn positions(sim: &Simulation, object: &str) -> Vec<Vector> {
     column(sim, object, "position")
