@@ -19,8 +19,46 @@ pub struct PortState {
     pub position: Vector,
     /// Velocity [m/s].
     pub velocity: Vector,
+    /// Acceleration by all that its own system does to it [m/s²], where [`Exchange::open_body`] asked for it.
+    pub acceleration: Vector,
+    /// 1/mass [1/kg], 0 for what is held.
+    pub inverse_mass: f64,
     /// Time at which they hold [s].
     pub time: f64,
+}
+
+impl PortState {
+    /// How much faster it goes after an impulse [N s]: another system may solve for both together.
+    pub fn response(&self, impulse: Vector) -> Vector {
+        impulse * self.inverse_mass
+    }
+
+    fn numbers(&self) -> [f64; PORT] {
+        let [x, v, a] = [self.position, self.velocity, self.acceleration].map(<[f64; 3]>::from);
+        [x[0], x[1], x[2], v[0], v[1], v[2], a[0], a[1], a[2], self.inverse_mass, self.time]
+    }
+}
+
+/// Numbers of a port in a snapshot.
+const PORT: usize = 11;
+
+/// An impulse on its way.
+#[derive(Debug, Clone, Copy, PartialEq)]
+struct Letter {
+    port: Port,
+    impulse: Vector,
+    steady: bool,
+}
+
+/// An impulse that has arrived.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Push {
+    /// The row that it pushes.
+    pub row: usize,
+    /// The impulse [N s].
+    pub impulse: Vector,
+    /// Whether it is that of a constant force over the interval to come, and not a kick before it.
+    pub steady: bool,
 }
 
 /// What has passed through a surface of a system.
@@ -40,7 +78,9 @@ pub struct Flux {
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Exchange {
     ports: Vec<PortState>,
-    mail: Vec<(Port, Vector)>,
+    /// Ports whose acceleration is asked for.
+    bodies: Vec<Port>,
+    mail: Vec<Letter>,
     fluxes: Vec<Flux>,
     /// Sum of all impulses ever posted and ever delivered [N s].
     pub posted: Vector,
@@ -55,6 +95,18 @@ impl Exchange {
         self.ports.len() - 1
     }
 
+    /// Makes a row of a system a port that tells its acceleration.
+    pub fn open_body(&mut self, system: usize, row: usize) -> Port {
+        let port = self.open(system, row);
+        self.bodies.push(port);
+        port
+    }
+
+    /// Whether a port of this system tells its acceleration.
+    pub fn has_body(&self, system: usize) -> bool {
+        self.bodies.iter().any(|port| self.ports[*port].owner.0 == system)
+    }
+
     /// The state of a port.
     pub fn port(&self, port: Port) -> PortState {
         self.ports[port]
@@ -65,20 +117,30 @@ impl Exchange {
         self.ports.iter_mut().filter(move |p| p.owner.0 == system)
     }
 
-    /// Posts an impulse [N s] to a port.
+    /// Posts an impulse [N s] to a port: a kick before it moves on.
     pub fn post(&mut self, port: Port, impulse: Vector) {
-        self.posted = self.posted + impulse;
-        self.mail.push((port, impulse));
+        self.send(Letter { port, impulse, steady: false });
     }
 
-    /// Takes the mail of a system, as rows and impulses, in the order in which it was posted.
-    pub fn take(&mut self, system: usize) -> Vec<(usize, Vector)> {
-        let (mine, others) = self.mail.drain(..).partition::<Vec<_>, _>(|(port, _)| self.ports[*port].owner.0 == system);
+    /// Posts an impulse [N s] to a port: that of a constant force while it moves through its next interval. What balances another
+    /// constant force has to come so: as a kick it would move what rests.                                       (coupling.6)
+    pub fn lean(&mut self, port: Port, impulse: Vector) {
+        self.send(Letter { port, impulse, steady: true });
+    }
+
+    fn send(&mut self, letter: Letter) {
+        self.posted = self.posted + letter.impulse;
+        self.mail.push(letter);
+    }
+
+    /// Takes the mail of a system, in the order in which it was posted.
+    pub fn take(&mut self, system: usize) -> Vec<Push> {
+        let (mine, others) = self.mail.drain(..).partition::<Vec<_>, _>(|letter| self.ports[letter.port].owner.0 == system);
         self.mail = others;
-        for (_, impulse) in &mine {
-            self.delivered = self.delivered + *impulse;
+        for letter in &mine {
+            self.delivered = self.delivered + letter.impulse;
         }
-        mine.into_iter().map(|(port, impulse)| (self.ports[port].owner.1, impulse)).collect()
+        mine.into_iter().map(|l| Push { row: self.ports[l.port].owner.1, impulse: l.impulse, steady: l.steady }).collect()
     }
 
     /// Announces a surface; returns its place among the fluxes.
@@ -102,14 +164,11 @@ impl Exchange {
     pub fn save(&self) -> Vec<f64> {
         let v = |v: Vector| <[f64; 3]>::from(v);
         let mut out = vec![self.ports.len() as f64];
-        for p in &self.ports {
-            out.extend(v(p.position).into_iter().chain(v(p.velocity)).chain([p.time]));
-        }
+        out.extend(self.ports.iter().flat_map(PortState::numbers));
         out.extend(v(self.posted).into_iter().chain(v(self.delivered)));
         out.extend(self.fluxes.iter().flat_map(|flux| [flux.heat, flux.mass]));
-        for (port, impulse) in &self.mail {
-            out.push(*port as f64);
-            out.extend(v(*impulse));
+        for letter in &self.mail {
+            out.extend([letter.port as f64, f64::from(u8::from(letter.steady))].into_iter().chain(v(letter.impulse)));
         }
         out
     }
@@ -118,25 +177,26 @@ impl Exchange {
     pub fn restore(&mut self, numbers: &[f64]) -> Option<()> {
         let (count, rest) = numbers.split_first()?;
         let n = self.ports.len();
-        let fixed = 7 * n + 6 + 2 * self.fluxes.len();
-        if *count as usize != n || rest.len() < fixed || !(rest.len() - fixed).is_multiple_of(4) {
+        let fixed = PORT * n + 6 + 2 * self.fluxes.len();
+        if *count as usize != n || rest.len() < fixed || !(rest.len() - fixed).is_multiple_of(5) {
             return None;
         }
         let v = |s: &[f64]| Vector { x: s[0], y: s[1], z: s[2] };
-        let (ports, rest) = rest.split_at(7 * n);
+        let (ports, rest) = rest.split_at(PORT * n);
         let (sums, rest) = rest.split_at(6);
         let (fluxes, mail) = rest.split_at(2 * self.fluxes.len());
-        if mail.chunks_exact(4).any(|m| !(m[0] >= 0.0 && m[0] < n as f64)) {
+        if mail.chunks_exact(5).any(|m| !(m[0] >= 0.0 && m[0] < n as f64)) {
             return None;
         }
-        for (port, s) in self.ports.iter_mut().zip(ports.chunks_exact(7)) {
-            (port.position, port.velocity, port.time) = (v(&s[..3]), v(&s[3..6]), s[6]);
+        for (port, s) in self.ports.iter_mut().zip(ports.chunks_exact(PORT)) {
+            (port.position, port.velocity, port.acceleration) = (v(&s[..3]), v(&s[3..6]), v(&s[6..9]));
+            (port.inverse_mass, port.time) = (s[9], s[10]);
         }
         (self.posted, self.delivered) = (v(&sums[..3]), v(&sums[3..]));
         for (flux, s) in self.fluxes.iter_mut().zip(fluxes.chunks_exact(2)) {
             (flux.heat, flux.mass) = (s[0], s[1]);
         }
-        self.mail = mail.chunks_exact(4).map(|m| (m[0] as usize, v(&m[1..]))).collect();
+        self.mail = mail.chunks_exact(5).map(|m| Letter { port: m[0] as usize, steady: m[1] == 1.0, impulse: v(&m[2..]) }).collect();
         Some(())
     }
 }
@@ -155,15 +215,16 @@ mod tests {
         assert_eq!((exchange.fluxes()[0].heat, exchange.fluxes()[0].mass), (2.0, 1.0));
         exchange.post(a, [1.0, 0.0, 0.0].into());
         exchange.post(b, [0.0, 2.0, 0.0].into());
-        exchange.post(b, [0.0, 0.0, 3.0].into());
+        exchange.lean(b, [0.0, 0.0, 3.0].into());
         let mut copy = exchange.clone();
         copy.take(0);
         copy.enter(surface, 9.0, 9.0);
         assert!(copy.restore(&exchange.save()).is_some() && copy == exchange);
         assert!(copy.restore(&exchange.save()[1..]).is_none());
-        assert_eq!(exchange.take(1), vec![(7, [0.0, 2.0, 0.0].into()), (7, [0.0, 0.0, 3.0].into())]);
+        let push = |row, impulse: [f64; 3], steady| Push { row, impulse: impulse.into(), steady };
+        assert_eq!(exchange.take(1), vec![push(7, [0.0, 2.0, 0.0], false), push(7, [0.0, 0.0, 3.0], true)]);
         assert_eq!(exchange.take(1), vec![]);
-        assert_eq!(exchange.take(0), vec![(5, [1.0, 0.0, 0.0].into())]);
+        assert_eq!(exchange.take(0), vec![push(5, [1.0, 0.0, 0.0], false)]);
         assert_eq!(exchange.posted, exchange.delivered);
     }
 }

@@ -20,7 +20,7 @@ pub trait System: Send + Sync {
     fn advance(&mut self, t: f64, dt: f64, exchange: &mut Exchange, go_on: &(dyn Fn() -> bool + Sync)) -> Result<StepReport, StepError>;
 
     /// Publishes its state at its new time t [s].
-    fn publish(&self, t: f64, exchange: &mut Exchange);
+    fn publish(&mut self, t: f64, exchange: &mut Exchange);
 
     /// The named columns of its objects.
     fn columns(&self, names: &[&str], out: &mut Vec<Column>);

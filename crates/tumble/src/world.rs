@@ -27,7 +27,7 @@ impl World {
     pub fn new(systems: Vec<Box<dyn System>>, exchange: Exchange, frame_time: f64, exchanges: u32) -> Self {
         let dt = frame_time / f64::from(exchanges);
         let mut world = Self { systems, exchange, dt, exchanges, frame: 0, good: Archive::default() };
-        for system in &world.systems {
+        for system in &mut world.systems {
             system.publish(0.0, &mut world.exchange);
         }
         world.keep();
@@ -242,7 +242,7 @@ impl World {
     pub fn write(&mut self, object: &str, column: &str, values: &[f64]) -> Option<bool> {
         let done = self.systems.iter_mut().find_map(|s| s.write(object, column, values))?;
         let time = self.time();
-        self.systems.iter().for_each(|s| s.publish(time, &mut self.exchange));
+        self.systems.iter_mut().for_each(|s| s.publish(time, &mut self.exchange));
         self.keep();
         Some(done)
     }

@@ -50,6 +50,10 @@ pub struct Gas {
     /// What the fluid does at colliders: each fills what it covers of the box.
     #[serde(default)]
     pub solids: Solid,
+    /// Objects of [[particles]] in a system of dynamics whose masses are balls of their radius (in the plane: disks, a metre thick)
+    /// that the fluid moves and that move it.
+    #[serde(default)]
+    pub bodies: Vec<String>,
     /// Vorticity confinement: gives small eddies back what advection takes from them.
     #[serde(default)]
     #[schemars(range(min = 0.0), extend("x-unit" = "1"))]

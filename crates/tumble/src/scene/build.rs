@@ -2,6 +2,7 @@
 
 use super::Assets;
 use super::checks::{check, objects, others, place};
+use super::coupling;
 use super::gas::gas;
 use super::laws::{Reader, flat};
 use super::memory::memory;
@@ -13,7 +14,7 @@ use crate::recipes::{self, Site};
 use crate::state::Object;
 use crate::system::System;
 use crate::systems::compressible::{self, Compressible as Loud};
-use crate::systems::dynamics::{Dynamics, MOST_SUBSTEPS, Parts, Settings, SpringPart, Stepping, Tether};
+use crate::systems::dynamics::{MOST_SUBSTEPS, Parts, Settings, SpringPart, Stepping};
 use crate::systems::heat::{self, Heat as Warm};
 use crate::systems::tracers::{self, Tracers};
 use crate::systems::vicsek::Swarm;
@@ -22,8 +23,7 @@ use std::borrow::Cow;
 use std::sync::Arc;
 use tumble_interface::check::plain;
 use tumble_interface::scene::{
-    Anchor, Animated, Bits, Emitter, Event, Force as Words, Kill, MeshFile, Method, Particles, Plane, Scene, Shape, Source, System as Plan,
-    Vicsek,
+    Animated, Bits, Emitter, Event, Force as Words, Kill, MeshFile, Method, Particles, Plane, Scene, Shape, Source, System as Plan, Vicsek,
 };
 use tumble_interface::{Column, Data, Issue, Mesh, SceneError};
 
@@ -50,7 +50,10 @@ pub fn plans(scene: &Scene) -> Vec<Plan> {
     let others = objects(scene).len() - methods.iter().map(|(_, count)| count).sum::<usize>();
     let plain = (others > 0 || methods.is_empty()).then(Plan::default);
     let own = |(method, _): (Method, usize)| Plan { name: method.name().into(), method, ..Plan::default() };
-    plain.into_iter().chain(methods.into_iter().map(own)).collect()
+    let own = methods.into_iter().map(own);
+    // What a fluid moves comes after it.
+    let moved = scene.gas.iter().any(|gas| !gas.bodies.is_empty());
+    if moved { own.chain(plain).collect() } else { plain.into_iter().chain(own).collect() }
 }
 
 /// Builds the scene, or tells everything that is wrong with it.
@@ -70,7 +73,8 @@ pub fn build(scene: &Scene, assets: &Assets) -> Result<Built, SceneError> {
     let mut warnings = unused(scene, &plans);
     let (colliders, scenery) = solids(scene, assets, &mut issues);
     let mut parts = fill(scene, &plans, assets, &mut issues);
-    let anchors: Vec<Link> = scene.anchor.iter().filter_map(|anchor| link(scene, &plans, anchor, &parts, &mut issues)).collect();
+    let anchors: Vec<coupling::Link> =
+        scene.anchor.iter().filter_map(|anchor| coupling::link(scene, &plans, anchor, &parts, &mut issues)).collect();
     for anchor in &anchors {
         if let [(s, a), (t, b)] = anchor.ends
             && s == t
@@ -89,10 +93,12 @@ pub fn build(scene: &Scene, assets: &Assets) -> Result<Built, SceneError> {
         }
     }
     act(scene, &mut parts, &mut issues);
+    let mut exchange = Exchange::default();
+    let mut of_gas = |words| coupling::bodies(scene, &plans, words, &parts, &mut exchange, &mut issues);
+    let mut bodies: Vec<_> = scene.gas.iter().map(&mut of_gas).collect();
     if !issues.is_empty() {
         return Err(SceneError { issues });
     }
-    let mut exchange = Exchange::default();
     let colliders = Arc::new(colliders);
     let gravity = gravity(scene);
     let dt = scene.frame_time() / f64::from(scene.time.exchanges);
@@ -115,7 +121,7 @@ pub fn build(scene: &Scene, assets: &Assets) -> Result<Built, SceneError> {
             continue;
         }
         if plan.method == Method::Gas {
-            systems.push(Box::new(gas(scene, &plans, index, gravity, &colliders)?));
+            systems.push(Box::new(gas(scene, &plans, index, gravity, &colliders, &mut bodies)?));
             continue;
         }
         let settings = Settings {
@@ -133,7 +139,7 @@ pub fn build(scene: &Scene, assets: &Assets) -> Result<Built, SceneError> {
         };
         warnings.extend(buried(scene, &parts, &colliders));
         let mut system = parts.build(settings).map_err(|e| placed(scene, e))?;
-        anchors.iter().for_each(|anchor| hang(&mut system, index, anchor, dt, &mut exchange, &mut warnings));
+        anchors.iter().for_each(|anchor| coupling::hang(&mut system, index, anchor, dt, &mut exchange, &mut warnings));
         systems.push(Box::new(system));
     }
     let world = World::new(systems, exchange, scene.frame_time(), scene.time.exchanges);
@@ -473,80 +479,4 @@ fn loud(scene: &Scene, plans: &[Plan], index: usize) -> Result<Loud, SceneError>
     }
     let settings = compressible::Settings { name: plan.name.clone(), substeps: plan.substeps, step: plan.step };
     Ok(Loud::new(settings, gases))
-}
-
-/// An anchor whose ends have been found: system and point of each.
-struct Link {
-    name: String,
-    ends: [(usize, u32); 2],
-    stiffness: f64,
-    damping: f64,
-    rest_length: f64,
-    /// 1/m1 + 1/m2 [1/kg].
-    inverse_mass: f64,
-}
-
-fn link(scene: &Scene, plans: &[Plan], anchor: &Anchor, parts: &[Parts], issues: &mut Vec<Issue>) -> Option<Link> {
-    let mut end = |k: usize| -> Option<(usize, u32, Vector, f64)> {
-        let path = format!("anchor \"{}\".between[{k}]", anchor.name);
-        let words = &anchor.between[k];
-        let mut wrong = |message: String| issues.push(Issue::new(path.clone(), message));
-        let Some((name, index)) = words.rsplit_once(' ').and_then(|(n, i)| Some((n.trim(), i.parse::<usize>().ok()?))) else {
-            wrong(format!("\"{words}\", expected an object and an index: \"flag 3\""));
-            return None;
-        };
-        let Some((kind, _, system)) = objects(scene).into_iter().find(|(_, n, _)| *n == name) else {
-            let hint = tumble_interface::check::suggestion(name, objects(scene).iter().map(|o| o.1));
-            wrong(format!("there is no object \"{name}\"{hint}"));
-            return None;
-        };
-        let s = place(plans, kind, system)?;
-        let Some(range) = parts[s].ranges().find(|(n, _)| *n == name).map(|(_, r)| r) else {
-            wrong(format!("\"{name}\" has no masses to pull"));
-            return None;
-        };
-        if kind == "emitter" {
-            wrong(format!("the particles of emitter \"{name}\" come and go; an anchor needs a mass that stays"));
-            return None;
-        }
-        if index >= range.len() {
-            wrong(format!("there is no mass {index} in \"{name}\"; the last one is {}", range.len().saturating_sub(1)));
-            return None;
-        }
-        let i = (range.start + index) as u32;
-        Some((s, i, parts[s].position(i), parts[s].inverse_mass(i)))
-    };
-    let (a, b) = (end(0), end(1));
-    let (a, b) = (a?, b?);
-    Some(Link {
-        name: anchor.name.clone(),
-        ends: [(a.0, a.1), (b.0, b.1)],
-        stiffness: anchor.stiffness,
-        damping: anchor.damping,
-        rest_length: anchor.rest_length.unwrap_or((a.2 - b.2).norm()),
-        inverse_mass: a.3 + b.3,
-    })
-}
-
-/// Between systems the one of the first end owns the spring; the other gives a port.
-fn hang(system: &mut Dynamics, index: usize, anchor: &Link, dt: f64, exchange: &mut Exchange, warnings: &mut Vec<String>) {
-    let [(s, a), (t, b)] = anchor.ends;
-    if s != t && t == index {
-        system.expect_pushes();
-    }
-    if s == t || s != index {
-        return;
-    }
-    let port = exchange.open(t, b as usize);
-    system.tether(Tether { row: a as usize, port, stiffness: anchor.stiffness, damping: anchor.damping, rest_length: anchor.rest_length });
-    let turn = dt * (anchor.stiffness * anchor.inverse_mass).sqrt();
-    let damp = dt * anchor.damping * anchor.inverse_mass;
-    if turn > 0.5 || damp > 0.5 {
-        let times = (2.0 * turn.max(damp)).ceil();
-        warnings.push(format!(
-            "anchor \"{}\": omega dt = {turn:.2}, c dt/m = {damp:.2}; systems exchange impulses explicitly, which needs both below 0.5: \
-             raise time.exchanges {times} times, or put both objects into one system",
-            anchor.name
-        ));
-    }
 }

@@ -9,7 +9,7 @@ use crate::math::{Vec3, VectorSignal};
 use crate::operators::{Advection, Interpolation, Trace};
 use crate::recipes;
 use crate::state::{Field, Grid, Place, Vectors};
-use crate::systems::gas::{Beyond, Fluid, Gas, Settings, Solids, Source};
+use crate::systems::gas::{Beyond, Body, Fluid, Gas, Settings, Solids, Source};
 use std::sync::Arc;
 use tumble_interface::check::plain;
 use tumble_interface::scene::{
@@ -24,6 +24,9 @@ const TOLERANCE: f64 = 1e-5;
 /// Largest |div u| dx over the fastest velocity.
 #[cfg(feature = "double")]
 const TOLERANCE: f64 = 1e-10;
+
+/// Radius of a ball in cells at least: what is smaller may close no face.
+const LEAST_RADIUS: f64 = 1.5;
 
 /// A number of places and nothing else, or what is wrong with it.
 fn scalar(words: &Component) -> Result<Formula, String> {
@@ -73,6 +76,7 @@ struct Read<'a, 'b> {
     flat: Option<usize>,
     solids: &'a Arc<Vec<Collider>>,
     names: Vec<String>,
+    bodies: Vec<Body>,
 }
 
 impl Read<'_, '_> {
@@ -229,6 +233,22 @@ impl Read<'_, '_> {
         }
     }
 
+    /// The balls that it moves; each must cover some cells.
+    fn bodies(&mut self, grid: &Grid) -> Vec<Body> {
+        let bodies = std::mem::take(&mut self.bodies);
+        let least = LEAST_RADIUS * grid.dx;
+        for body in bodies.iter().filter(|body| body.radius < least) {
+            let message = format!(
+                "a ball of \"{}\" has a radius of {} m, expected >= {LEAST_RADIUS} cells = {} m; raise box.resolution or the radius",
+                body.name,
+                plain(body.radius),
+                plain(least)
+            );
+            self.wrong(".bodies", message);
+        }
+        bodies
+    }
+
     fn fluid(mut self, gravity: [f64; 3]) -> Option<Fluid> {
         let words = self.words;
         let before = self.reader.issues.len();
@@ -267,7 +287,7 @@ impl Read<'_, '_> {
             return None;
         }
         let stick = words.solids == Solid::NoSlip;
-        let mut solids = Solids::new(self.solids.clone(), std::mem::take(&mut self.names), stick, grid, &sides);
+        let mut solids = Solids::new(self.solids.clone(), std::mem::take(&mut self.names), self.bodies(&grid), stick, grid, &sides);
         solids.place(0.0);
         if solids.fills() {
             self.wrong(".box", "colliders fill all of it; move them, or the box");
@@ -279,6 +299,14 @@ impl Read<'_, '_> {
         let cosine = words.pressure.method == PressureMethod::Cosine;
         if cosine && solids.is_some() {
             self.wrong(".pressure.method", "cosine, which knows no colliders; take multigrid_gradients");
+            return None;
+        }
+        if !words.bodies.is_empty() && !method(words.pressure.method).is_gradients() {
+            let message = format!(
+                "{}, expected a method of gradients: balls that move are solved for together with the pressure",
+                method(words.pressure.method).name()
+            );
+            self.wrong(".pressure.method", message);
             return None;
         }
         let pressure = &words.pressure;
@@ -321,13 +349,22 @@ impl Read<'_, '_> {
 }
 
 /// The system of the fluids that it moves, or what is wrong with them.
-pub fn gas(scene: &Scene, plans: &[Plan], index: usize, gravity: [f64; 3], solids: &Arc<Vec<Collider>>) -> Result<Gas, SceneError> {
+/// `bodies` are the balls that each fluid of the scene moves.
+pub fn gas(
+    scene: &Scene,
+    plans: &[Plan],
+    index: usize,
+    gravity: [f64; 3],
+    solids: &Arc<Vec<Collider>>,
+    bodies: &mut [Vec<Body>],
+) -> Result<Gas, SceneError> {
     let (mut issues, mut fluids) = (Vec::new(), Vec::new());
-    for words in scene.gas.iter().filter(|g| place(plans, "gas", g.system.as_deref()) == Some(index)) {
+    let here = |g: &Words| place(plans, "gas", g.system.as_deref()) == Some(index);
+    for (words, bodies) in scene.gas.iter().zip(bodies).filter(|(words, _)| here(words)) {
         let reader = Reader::new(scene, &mut issues);
         let path = format!("gas \"{}\"", words.name);
         let names = scene.collider.iter().map(|c| c.name.clone()).collect();
-        fluids.extend(Read { words, path, reader, flat: flat(scene), solids, names }.fluid(gravity));
+        fluids.extend(Read { words, path, reader, flat: flat(scene), solids, names, bodies: std::mem::take(bodies) }.fluid(gravity));
     }
     if issues.is_empty() {
         let plan = &plans[index];

@@ -2,6 +2,7 @@
 
 mod build;
 mod checks;
+mod coupling;
 mod cures;
 mod gas;
 mod laws;

@@ -414,7 +414,7 @@ impl System for Compressible {
         Ok(report)
     }
 
-    fn publish(&self, _t: f64, _exchange: &mut Exchange) {}
+    fn publish(&mut self, _t: f64, _exchange: &mut Exchange) {}
 
     fn columns(&self, names: &[&str], out: &mut Vec<Column>) {
         for gas in &self.gases {

@@ -229,7 +229,7 @@ impl System for Tracers {
         Ok(report)
     }
 
-    fn publish(&self, _t: f64, _exchange: &mut Exchange) {}
+    fn publish(&mut self, _t: f64, _exchange: &mut Exchange) {}
 
     fn columns(&self, names: &[&str], out: &mut Vec<Column>) {
         for object in &self.objects {

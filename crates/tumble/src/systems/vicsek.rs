@@ -196,7 +196,7 @@ impl System for Swarm {
         Ok(report)
     }
 
-    fn publish(&self, _t: f64, _exchange: &mut Exchange) {}
+    fn publish(&mut self, _t: f64, _exchange: &mut Exchange) {}
 
     fn columns(&self, names: &[&str], out: &mut Vec<Column>) {
         let half = 0.5 * self.model.side;

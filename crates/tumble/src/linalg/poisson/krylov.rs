@@ -43,6 +43,7 @@ pub(super) fn solve<T: Weight>(solver: &mut Solver<T>, before: Before, x: &mut [
         let before = if info.iterations == 0 { z } else { &p };
         let [curvature, ..] = run(n, registers, &Direction { grid, z, mean, p: before, beta, q: Rows::of(&mut q) });
         std::mem::swap(&mut p, &mut q);
+        let curvature = curvature + solver.joined_curvature(&p);
         if !(rz > 0.0 && curvature > 0.0) {
             break;
         }
@@ -105,6 +106,7 @@ pub(super) fn direct<T: Weight>(
 
 /// x += a p, b -= a A p; returns b.b and its largest magnitude.
 fn step<T: Weight>(solver: &mut Solver<T>, a: Real, p: &[Real], x: &mut [Real]) -> [f64; 4] {
+    solver.joined_step(a, p);
     let mut r = std::mem::take(&mut solver.fine.b);
     let grid = &solver.fine;
     let sums = run(grid.lattice.n, solver.registers, &Step { grid, a, p, x: Rows::of(x), r: Rows::of(&mut r) });

@@ -13,6 +13,7 @@ mod column;
 mod cosine;
 mod faces;
 mod incomplete;
+mod joined;
 mod krylov;
 mod ladder;
 mod level;
@@ -24,6 +25,7 @@ mod tests;
 
 pub use cosine::Series;
 pub use faces::{Weight, byte};
+pub use joined::Joint;
 pub use report::{Excess, Fault, Info, Method, Params, Target};
 
 use crate::math::parallel::chunks;
@@ -57,6 +59,7 @@ pub struct Solver<T> {
     coarse: Vec<Grid<Real>>,
     coarsest: Coarsest,
     pockets: Pockets,
+    joints: Vec<Joint>,
     sides: [[Side; 2]; 3],
     /// Made when first asked for.
     incomplete: Option<Factors>,
@@ -133,6 +136,7 @@ impl<T: Weight> Solver<T> {
             coarse,
             coarsest,
             pockets,
+            joints: Vec::new(),
             sides,
             incomplete: None,
             cosine: None,
@@ -173,6 +177,7 @@ impl<T: Weight> Solver<T> {
 
     /// The same with the right-hand side in place.
     fn solve_loaded(&mut self, q: &mut [Real], params: &Params) -> Result<Info, Fault> {
+        self.check_joints(params)?;
         q.fill(0.0);
         let mut info = match params.method {
             Method::Jacobi | Method::GaussSeidel | Method::Sor => ladder::relax(self, q, params)?,
@@ -316,6 +321,7 @@ impl<T: Weight> Solver<T> {
                 });
             },
         );
+        self.joined_residual(q, out);
     }
 }
 

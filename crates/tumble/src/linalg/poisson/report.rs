@@ -39,6 +39,11 @@ impl Method {
         Self::Cosine,
     ];
 
+    /// Whether it goes along conjugate gradients.
+    pub fn is_gradients(self) -> bool {
+        matches!(self, Self::ConjugateGradients | Self::IncompleteCholesky | Self::ModifiedIncompleteCholesky | Self::MultigridGradients)
+    }
+
     /// Its name in messages.
     pub fn name(self) -> &'static str {
         match self {

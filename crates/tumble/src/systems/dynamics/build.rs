@@ -207,6 +207,11 @@ impl Parts {
         self.points[point as usize].0
     }
 
+    /// Velocity of a point at the start [m/s].
+    pub fn velocity(&self, point: u32) -> Vec3<f64> {
+        self.points[point as usize].1
+    }
+
     /// Inverse mass of a point [1/kg], 0 if it is held.
     pub fn inverse_mass(&self, point: u32) -> f64 {
         let (_, _, mass, pinned) = self.points[point as usize];

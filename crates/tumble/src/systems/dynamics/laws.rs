@@ -3,7 +3,7 @@
 use super::implicit::Implicit;
 use crate::elements::Batch;
 use crate::forces::{Force, Group};
-use crate::geometry::Collider;
+use crate::geometry::{Collider, Vector};
 use crate::integrators::{Equation, Kinematics, Stage, newton};
 use crate::math::parallel::{chunks, sum};
 use crate::math::rows::{self, Each};
@@ -34,6 +34,8 @@ pub struct Laws {
     pub forces: Vec<Acting>,
     /// Forces written by users.
     pub user: Vec<Box<dyn UserForce>>,
+    /// Forces of other systems [N] on rows, in their order, constant over an interval.
+    pub steady: Vec<(usize, Vector)>,
     /// Gravity on points [m/s²].
     pub gravity: [f64; 3],
     /// What each row weighs.
@@ -95,6 +97,10 @@ impl Laws {
     /// Adds the forces on each mass by itself, gravity left out, to the rows from `start` on.
     fn add_local(&self, t: f64, start: usize, x: &[Row], v: &[Row], force: &mut [Row]) {
         let (end, group) = (start + x.len(), Group::new(&self.masses, start, x, v));
+        let first = self.steady.partition_point(|(row, _)| *row < start);
+        for (row, push) in self.steady[first..].iter().take_while(|(row, _)| *row < end) {
+            force[row - start] = add(force[row - start], [push.x as Real, push.y as Real, push.z as Real, 0.0]);
+        }
         for Acting { law, ranges, .. } in &self.forces {
             for range in ranges {
                 let (a, b) = (range.start.max(start), range.end.min(end));

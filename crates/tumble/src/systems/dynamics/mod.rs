@@ -13,6 +13,7 @@ pub use build::{Parts, Settings, SpringPart};
 
 use crate::elements::{Batch, Elements, Limit, Linear};
 use crate::exchange::{Exchange, Port};
+use crate::geometry::Vector;
 use crate::integrators::{self, Equation, Memory, Scratch, Step, adaptive_step};
 use crate::math::parallel::{CHUNK, sum};
 use crate::math::{Real, Row, Vec3, ZERO, axpy, row, sub, xyz64};
@@ -343,24 +344,25 @@ impl Dynamics {
         Ok(())
     }
 
-    /// While watched: the first breakdown as an error.
-    fn look(&self, t: f64) -> Result<(), StepError> {
-        if self.watched { self.checked_books(t).map(|_| ()) } else { Ok(()) }
-    }
-}
-
-impl System for Dynamics {
-    fn name(&self) -> &str {
-        &self.name
-    }
-
-    fn absorb(&mut self, exchange: &mut Exchange) {
-        for (row, impulse) in exchange.take(self.index) {
-            self.push(row, impulse);
+    /// What a constant force over the next interval gives in all [N s].
+    fn lean(&mut self, row: usize, impulse: Vector) {
+        let steady = &mut self.laws.steady;
+        match steady.binary_search_by_key(&row, |(row, _)| *row) {
+            Ok(at) => steady[at].1 = steady[at].1 + impulse,
+            Err(at) => steady.insert(at, (row, impulse)),
         }
+        self.memory.ready = false;
     }
 
-    fn advance(&mut self, t: f64, dt: f64, exchange: &mut Exchange, go_on: &(dyn Fn() -> bool + Sync)) -> Result<StepReport, StepError> {
+    /// Accelerations now [m/s²]; none where a user's force fails, which the next step tells.
+    fn rates(&mut self, t: f64) -> Vec<Row> {
+        let mut out = vec![ZERO; self.state.x.len()];
+        let done = self.laws.rate(t, &self.state.x, &self.state.v, &mut out);
+        done.map_or(Vec::new(), |()| out)
+    }
+
+    /// All sub-steps of an interval.
+    fn intervals(&mut self, t: f64, dt: f64, exchange: &mut Exchange, go_on: &(dyn Fn() -> bool + Sync)) -> Result<StepReport, StepError> {
         let mut report = StepReport::default();
         let end = t + dt;
         let mut unborn = self.pool.conceive(&self.name, t, dt)?;
@@ -428,10 +430,43 @@ impl System for Dynamics {
         Ok(report)
     }
 
-    fn publish(&self, t: f64, exchange: &mut Exchange) {
+    /// While watched: the first breakdown as an error.
+    fn look(&self, t: f64) -> Result<(), StepError> {
+        if self.watched { self.checked_books(t).map(|_| ()) } else { Ok(()) }
+    }
+}
+
+impl System for Dynamics {
+    fn name(&self) -> &str {
+        &self.name
+    }
+
+    fn absorb(&mut self, exchange: &mut Exchange) {
+        for push in exchange.take(self.index) {
+            if push.steady {
+                self.lean(push.row, push.impulse);
+            } else {
+                self.push(push.row, push.impulse);
+            }
+        }
+    }
+
+    fn advance(&mut self, t: f64, dt: f64, exchange: &mut Exchange, go_on: &(dyn Fn() -> bool + Sync)) -> Result<StepReport, StepError> {
+        // Impulses until here.
+        self.laws.steady.iter_mut().for_each(|(_, force)| *force = *force * (1.0 / dt));
+        let report = self.intervals(t, dt, exchange, go_on);
+        self.memory.ready &= self.laws.steady.is_empty();
+        self.laws.steady.clear();
+        report
+    }
+
+    fn publish(&mut self, t: f64, exchange: &mut Exchange) {
+        let rates = if exchange.has_body(self.index) { self.rates(t) } else { Vec::new() };
         for port in exchange.ports_of(self.index) {
             let i = port.owner.1;
             (port.position, port.velocity, port.time) = (xyz64(self.state.x[i]), xyz64(self.state.v[i]), t);
+            port.acceleration = rates.get(i).map_or(Vector::default(), |a| xyz64(*a));
+            port.inverse_mass = f64::from(self.laws.masses.inverse(i, &self.state.x));
         }
     }
 

@@ -67,7 +67,8 @@ impl Fluid {
     /// The force of the last pressure on every solid [N].
     pub fn forces_on(&self) -> Vec<(&str, [f64; 3])> {
         let Some(solids) = &self.solids else { return Vec::new() };
-        solids.names.iter().map(String::as_str).zip(solids.forces(&self.pressure)).collect()
+        let bodies = solids.bodies.iter().map(|body| &body.name);
+        solids.names.iter().chain(bodies).map(String::as_str).zip(solids.forces(&self.pressure)).collect()
     }
 
     /// Where its grid is.
@@ -177,7 +178,8 @@ impl Fluid {
     pub fn save(&self, archive: &mut Archive) {
         self.kept().into_iter().for_each(|(name, data)| archive.push_numbers(name, data));
         if let Some(solids) = self.solids.as_ref().filter(|solids| solids.moves()) {
-            archive.push("solids", Part::Numbers(vec![solids.time]));
+            let bodies = solids.bodies.iter().flat_map(|body| [body.position, body.velocity]).flat_map(<[f64; 3]>::from);
+            archive.push("solids", Part::Numbers(std::iter::once(solids.time).chain(bodies).collect()));
         }
     }
 
@@ -196,8 +198,9 @@ impl Fluid {
         self.temperature.iter_mut().try_for_each(|c| read("temperature", &mut c.field.data))?;
         read("pressure", &mut self.pressure.data)?;
         if self.solids.as_ref().is_some_and(Solids::moves) {
-            let time = *archive.numbers("solids")?.first()?;
-            self.settle(time).ok()?;
+            let numbers = archive.numbers("solids")?;
+            let (time, bodies) = numbers.split_first()?;
+            self.put(*time, bodies)?;
         }
         Some(())
     }

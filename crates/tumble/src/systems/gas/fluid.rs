@@ -1,10 +1,12 @@
 //! A fluid in a box: its state, and the step that the lecture draws.
 
+use super::bodies::Body;
 use super::forces::Source;
 use super::rows::{magnitude, worse};
 use super::sides::{Beyond, hold};
 use super::solids::Solids;
 use super::viscosity::Conjugates;
+use crate::geometry::Vector;
 use crate::linalg::poisson::{Fault, Params, Solver, Weight};
 use crate::math::{Real, VectorSignal};
 use crate::operators::{Advection, Scratch, advect, advect_vectors};
@@ -176,6 +178,9 @@ impl Fluid {
     ) -> Result<Self, Failure> {
         let grid = u.on_faces("velocity of a fluid")?;
         let lattice = grid.lattice();
+        let mut solids = solids;
+        // At the start bodies have the velocity that they are given.
+        let masses: Vec<f64> = solids.iter_mut().flat_map(|s| &mut s.bodies).map(|body| std::mem::take(&mut body.inverse_mass)).collect();
         let solver = solver(grid, &settings, solids.as_ref())?;
         let sides = &settings.sides;
         let smoke = smoke.map(|f| Carried::new(f).beyond(sides, 0.0, |density, _| density));
@@ -208,6 +213,8 @@ impl Fluid {
         hold(&mut fluid.u, &fluid.settings.sides, 0.0);
         fluid.clear();
         fluid.projection(0.0, 1.0, &mut StepReport::default())?;
+        fluid.bodies().iter_mut().zip(masses).for_each(|(body, mass)| body.inverse_mass = mass);
+        fluid.join();
         fluid.pressure.data.fill(0.0);
         Ok(fluid)
     }
@@ -253,11 +260,29 @@ impl Fluid {
     pub(super) fn settle(&mut self, t: f64) -> Result<(), Failure> {
         let Some(solids) = &mut self.solids else { return Ok(()) };
         if solids.moves() && solids.time != t {
+            let h = t - solids.time;
+            solids.bodies.iter_mut().for_each(|body| body.position = body.position + body.velocity * h);
             solids.place(t);
             self.solver = solver(self.b.grid, &self.settings, Some(solids))?;
         }
         self.clear();
         Ok(())
+    }
+
+    /// Puts the solids where they were at time t: position and velocity of each body.
+    pub(super) fn put(&mut self, t: f64, bodies: &[f64]) -> Option<()> {
+        let solids = self.solids.as_mut()?;
+        if bodies.len() != 6 * solids.bodies.len() {
+            return None;
+        }
+        let v = |s: &[f64]| Vector { x: s[0], y: s[1], z: s[2] };
+        for (body, s) in solids.bodies.iter_mut().zip(bodies.chunks_exact(6)) {
+            (body.position, body.velocity) = (v(&s[..3]), v(&s[3..]));
+        }
+        solids.place(t);
+        self.solver = solver(self.b.grid, &self.settings, Some(solids)).ok()?;
+        self.clear();
+        Some(())
     }
 
     /// Takes what is carried out of the solids.
@@ -294,9 +319,22 @@ impl Fluid {
         Ok(())
     }
 
-    /// The largest component of the velocity on any face [m/s].
+    /// Makes its bodies a part of the pressure's matrix.
+    fn join(&mut self) {
+        if let Some(solids) = &self.solids {
+            self.solver.join(solids.joints(self.settings.density));
+        }
+    }
+
+    /// Solids that it moves.
+    pub fn bodies(&mut self) -> &mut [Body] {
+        self.solids.as_mut().map_or(&mut [], |solids| &mut solids.bodies)
+    }
+
+    /// The largest component of the velocity on any face [m/s]; bodies count by their speed.
     pub fn fastest(&self) -> f64 {
-        self.u.parts.iter().map(magnitude).fold(0.0, worse)
+        let bodies = self.solids.as_ref().map_or(0.0, Solids::fastest);
+        self.u.parts.iter().map(magnitude).fold(bodies, worse)
     }
 
     /// The largest step [s] of the Courant number, within `left` [s]: forces speed the fluid up on the way.
@@ -324,7 +362,10 @@ fn solver(grid: Grid, settings: &Settings, solids: Option<&Solids>) -> Result<So
     let lattice = grid.lattice();
     let sides = settings.sides.each_ref().map(|ends| ends.each_ref().map(Beyond::pressure));
     let solver = match solids {
-        Some(solids) => Solver::new(lattice, sides, solids.open.each_ref().map(Vec::as_slice), None),
+        Some(solids) => Solver::new(lattice, sides, solids.open.each_ref().map(Vec::as_slice), None).map(|mut solver| {
+            solver.join(solids.joints(settings.density));
+            solver
+        }),
         None => {
             let open = vec![u8::OPEN; lattice.len()];
             Solver::new(lattice, sides, [&open, &open, &open], None)

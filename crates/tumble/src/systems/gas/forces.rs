@@ -100,6 +100,11 @@ impl Fluid {
     pub fn forces(&mut self, t: f64, h: f64) -> Result<(), Failure> {
         self.feed(t, h);
         self.clear();
+        if let Some(solids) = &mut self.solids {
+            let settings = &self.settings;
+            solids.bodies.iter_mut().for_each(|body| body.fall(h, settings.gravity, settings.density, &self.b.grid));
+            solids.follow();
+        }
         if let Some(solids) = self.solids.as_mut().filter(|_| self.settings.viscosity > 0.0) {
             solids.keep(&mut self.u);
         }

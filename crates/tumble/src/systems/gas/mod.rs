@@ -7,6 +7,7 @@
 //! Source: [stam1999]; tests: crates/tumble-f64/tests/gas.rs; limits: large steps damp (grids.17), and the split is of first order
 //! in the step.
 
+mod bodies;
 mod books;
 mod confinement;
 mod fluid;
@@ -17,6 +18,7 @@ mod sides;
 mod solids;
 mod viscosity;
 
+pub use bodies::Body;
 pub use fluid::{Carried, Failed, Failure, Fluid, Settings};
 pub use forces::{Cover, Source};
 pub use sides::{Beyond, hold};
@@ -94,9 +96,10 @@ impl System for Gas {
 
     fn absorb(&mut self, _exchange: &mut Exchange) {}
 
-    fn advance(&mut self, t: f64, dt: f64, _exchange: &mut Exchange, go_on: &(dyn Fn() -> bool + Sync)) -> Result<StepReport, StepError> {
+    fn advance(&mut self, t: f64, dt: f64, exchange: &mut Exchange, go_on: &(dyn Fn() -> bool + Sync)) -> Result<StepReport, StepError> {
         let mut report = StepReport::default();
         for f in 0..self.fluids.len() {
+            self.fluids[f].bodies().iter_mut().for_each(|body| body.listen(exchange));
             let mut done = 0.0;
             while dt - done > 1e-9 * dt {
                 if !go_on() {
@@ -114,11 +117,12 @@ impl System for Gas {
                 }
             }
             self.fluids[f].finish(t + dt, &mut report).map_err(|e| e.within(&self.name, t + dt))?;
+            self.fluids[f].bodies().iter_mut().for_each(|body| body.tell(exchange));
         }
         Ok(report)
     }
 
-    fn publish(&self, _t: f64, _exchange: &mut Exchange) {}
+    fn publish(&mut self, _t: f64, _exchange: &mut Exchange) {}
 
     fn columns(&self, names: &[&str], out: &mut Vec<Column>) {
         self.fluids.iter().for_each(|fluid| fluid.columns(names, out));

@@ -77,6 +77,7 @@ impl Fluid {
         }
         let fastest = self.fastest();
         let Self { u, b, left, q, pressure, settings, solver, solids, .. } = self;
+        let mass = settings.density * solids.as_ref().map_or(0.0, Solids::area);
         around(u, solids.as_ref(), b);
         let dx = b.grid.dx;
         let asked = settings.tolerance * dx * fastest;
@@ -91,7 +92,11 @@ impl Fluid {
         left.copy_from_slice(&b.data);
         let info = solver.refine(left, q, &params, |_, q, left| {
             subtract_gradient(u, q, open);
-            solids.iter().for_each(|solids| solids.close(u));
+            if let Some(solids) = solids {
+                solids.bodies.iter_mut().for_each(|body| body.yield_to(q, mass));
+                solids.follow();
+                solids.close(u);
+            }
             chunks(&mut pressure.data, |start, p| p.iter_mut().zip(&q[start..]).for_each(|(p, q)| *p += to_pressure * q));
             around(u, solids.as_ref(), b);
             left.copy_from_slice(&b.data);

@@ -10,10 +10,11 @@
 //! side.
 //! Tests: crates/tumble-f64/tests/solids.rs.
 
+use super::bodies::Body;
 use super::rows::{Face, beside};
 use super::sides::Beyond;
 use crate::geometry::{Collider, Vector};
-use crate::linalg::poisson::{Weight, byte};
+use crate::linalg::poisson::{Joint, Weight, byte};
 use crate::math::Real;
 use crate::state::{Field, Grid, Place, Vectors};
 use rayon::prelude::*;
@@ -34,6 +35,14 @@ struct Cut {
     at: u32,
     cells: [u32; 2],
     shut: Real,
+    solid: u32,
+    velocity: Real,
+}
+
+/// A face that no fluid passes.
+struct Closed {
+    at: u32,
+    solid: u32,
     velocity: Real,
 }
 
@@ -50,25 +59,18 @@ struct Ghost {
     at: u32,
     image: [Spot; 3],
     normal: [Real; 3],
-    velocity: [Real; 3],
-}
-
-/// A cell whose pressure pushes a solid.
-struct Push {
-    at: u32,
     solid: u32,
-    area: [Real; 3],
+    velocity: [Real; 3],
 }
 
 /// What one plane of cells or faces has.
 #[derive(Default)]
 struct Found {
     cuts: Vec<Cut>,
-    closed: Vec<(u32, Real)>,
+    closed: [Vec<Closed>; 3],
     ghosts: Vec<Ghost>,
     dead: Vec<(u32, u32)>,
     shades: Vec<(u32, Spot)>,
-    pushes: Vec<Push>,
 }
 
 /// Solids in the box of a fluid.
@@ -76,6 +78,8 @@ pub struct Solids {
     colliders: Arc<Vec<Collider>>,
     /// Their names.
     pub names: Vec<String>,
+    /// Solids that the fluid moves, counted after the colliders.
+    pub bodies: Vec<Body>,
     stick: bool,
     grid: Grid,
     /// Sides of the box that are held.
@@ -86,13 +90,19 @@ pub struct Solids {
     /// Open shares of the lower faces of all cells.
     pub(super) open: [Vec<u8>; 3],
     cuts: Vec<Cut>,
-    closed: [Vec<(u32, Real)>; 3],
+    closed: [Vec<Closed>; 3],
     ghosts: Vec<Ghost>,
     /// What they were before the forces.
     kept: Vec<Real>,
     dead: Vec<(u32, u32)>,
     shades: Vec<(u32, Spot)>,
-    pushes: Vec<Push>,
+}
+
+impl Cut {
+    /// Cells whose pressure pushes the solid along the axis, and by which share of a face.
+    fn pushes(&self) -> impl Iterator<Item = (u32, Real)> {
+        [(self.cells[0], self.shut), (self.cells[1], -self.shut)].into_iter().filter(|(cell, _)| *cell != NONE)
+    }
 }
 
 /// The open share of the edge between two distances.
@@ -138,13 +148,21 @@ fn share(d: [f64; 4]) -> f64 {
 }
 
 impl Solids {
-    /// These colliders in a box; fluid sticks to them or slips along them.
-    pub fn new(colliders: Arc<Vec<Collider>>, names: Vec<String>, stick: bool, grid: Grid, sides: &[[Beyond; 2]; 3]) -> Self {
+    /// These colliders and bodies in a box; fluid sticks to them or slips along them.
+    pub fn new(
+        colliders: Arc<Vec<Collider>>,
+        names: Vec<String>,
+        bodies: Vec<Body>,
+        stick: bool,
+        grid: Grid,
+        sides: &[[Beyond; 2]; 3],
+    ) -> Self {
         let len = grid.lattice().len();
         let held = std::array::from_fn(|a| [0, 1].map(|end| grid.flat == Some(a) || sides[a][end].is_held()));
         Self {
             colliders,
             names,
+            bodies,
             stick,
             grid,
             held,
@@ -157,13 +175,12 @@ impl Solids {
             kept: Vec::new(),
             dead: Vec::new(),
             shades: Vec::new(),
-            pushes: Vec::new(),
         }
     }
 
     /// Whether any of them moves.
     pub fn moves(&self) -> bool {
-        self.colliders.iter().any(Collider::moves)
+        !self.bodies.is_empty() || self.colliders.iter().any(Collider::moves)
     }
 
     /// Whether they leave the fluid alone.
@@ -195,6 +212,12 @@ impl Solids {
                 best = (i, d, n, v);
             }
         }
+        for (i, body) in self.bodies.iter().enumerate() {
+            let (d, n) = body.near(x, self.grid.flat);
+            if d < best.1 {
+                best = (self.colliders.len() + i, d, n, body.velocity);
+            }
+        }
         best
     }
 
@@ -205,24 +228,57 @@ impl Solids {
         self.weigh();
         let n = self.grid.n;
         let planes: Vec<Found> = (0..=n[2]).into_par_iter().map(|k| self.search(k, t)).collect();
-        let Self { cuts, closed, ghosts, dead, shades, pushes, .. } = self;
+        let Self { cuts, closed, ghosts, dead, shades, .. } = self;
         cuts.clear();
         ghosts.clear();
         dead.clear();
         shades.clear();
-        pushes.clear();
         closed.iter_mut().for_each(Vec::clear);
         for mut plane in planes {
             cuts.append(&mut plane.cuts);
             ghosts.append(&mut plane.ghosts);
             dead.append(&mut plane.dead);
             shades.append(&mut plane.shades);
-            pushes.append(&mut plane.pushes);
-            for (index, v) in plane.closed {
-                // The axis is in the two upper bits.
-                closed[(index >> 30) as usize].push((index & (NONE >> 2), v));
-            }
+            closed.iter_mut().zip(&mut plane.closed).for_each(|(all, more)| all.append(more));
         }
+        self.list_faces();
+    }
+
+    /// Lists the faces of each body.
+    fn list_faces(&mut self) {
+        let first = self.colliders.len();
+        self.bodies.iter_mut().flat_map(|body| &mut body.faces).for_each(Vec::clear);
+        for cut in &self.cuts {
+            let Some(body) = (cut.solid as usize).checked_sub(first).and_then(|i| self.bodies.get_mut(i)) else { continue };
+            body.faces[cut.axis].extend(cut.pushes());
+        }
+    }
+
+    /// Gives the faces of bodies their velocities.
+    pub fn follow(&mut self) {
+        let first = self.colliders.len();
+        let bodies = &self.bodies;
+        let of = |solid: u32| (solid as usize).checked_sub(first).and_then(|i| bodies.get(i)).map(|body| <[f64; 3]>::from(body.velocity));
+        for cut in &mut self.cuts {
+            of(cut.solid).iter().for_each(|v| cut.velocity = v[cut.axis] as Real);
+        }
+        for (axis, closed) in self.closed.iter_mut().enumerate() {
+            closed.iter_mut().for_each(|face| of(face.solid).iter().for_each(|v| face.velocity = v[axis] as Real));
+        }
+        for ghost in &mut self.ghosts {
+            of(ghost.solid).iter().for_each(|v| ghost.velocity = v.map(|v| v as Real));
+        }
+    }
+
+    /// What bodies add to the matrix of the pressure; `density` is that of the fluid [kg/m³].
+    pub fn joints(&self, density: f64) -> Vec<Joint> {
+        let mass = (0..self.grid.dimension()).fold(density, |m, _| m * self.grid.dx);
+        self.bodies.iter().flat_map(|body| body.joints(mass)).collect()
+    }
+
+    /// The speed of the fastest body [m/s].
+    pub fn fastest(&self) -> f64 {
+        self.bodies.iter().map(|body| body.velocity.norm()).fold(0.0, f64::max)
     }
 
     /// Signed distances at the nodes. Where all of a block is farther from the surface than its own size, one of them does for it.
@@ -358,24 +414,18 @@ impl Solids {
             for i in 0..grid.n[0] {
                 let cell = [i, j, k];
                 let at = l.at(i, j, k);
-                let mut area = [0.0; 3];
                 let mut cut = false;
                 for axis in grid.axes() {
                     let mut upper = cell;
                     upper[axis] += 1;
                     let w = [cell, upper].map(|face| self.open[axis][self.face(axis, face)]);
                     cut |= w != [u8::OPEN; 2];
-                    area[axis] = w[0].value() - w[1].value();
                 }
                 if !cut {
                     continue;
                 }
                 let x = self.point(Place::Cell, cell);
                 if self.alive(cell) {
-                    if area != [0.0; 3] {
-                        let solid = self.nearest(x, t, 4.0 * grid.dx).0 as u32;
-                        found.pushes.push(Push { at: at as u32, solid, area });
-                    }
                     continue;
                 }
                 match found.dead.last_mut() {
@@ -415,25 +465,25 @@ impl Solids {
         let near = self.depth(Place::Face(axis), number as usize) < (DEPTH + 1.0) * grid.dx;
         if !near {
             // What is deep does nothing but fill pictures.
-            found.closed.push((number | (axis as u32) << 30, 0.0));
+            found.closed[axis].push(Closed { at: number, solid: NONE, velocity: 0.0 });
             return;
         }
         let x = self.point(Place::Face(axis), at);
-        let (_, d, normal, v) = self.nearest(x, t, 4.0 * grid.dx);
-        let v: [f64; 3] = v.into();
+        let (solid, d, normal, v) = self.nearest(x, t, 4.0 * grid.dx);
+        let (solid, v): (u32, [f64; 3]) = (solid as u32, v.into());
         if cells != [NONE; 2] {
             let shut = 1.0 - open.value();
-            found.cuts.push(Cut { axis, at: number, cells, shut, velocity: v[axis] as Real });
+            found.cuts.push(Cut { axis, at: number, cells, shut, solid, velocity: v[axis] as Real });
         }
         if open > 0 {
             return;
         }
-        found.closed.push((number | (axis as u32) << 30, v[axis] as Real));
+        found.closed[axis].push(Closed { at: number, solid, velocity: v[axis] as Real });
         if let Some((image, normal)) = self.image(x, d, normal) {
             let mut spots = [Spot::default(); 3];
             grid.axes().for_each(|a| spots[a] = self.spot(Place::Face(a), image));
             let velocity = v.map(|v| v as Real);
-            found.ghosts.push(Ghost { axis, at: number, image: spots, normal: normal.map(|n| n as Real), velocity });
+            found.ghosts.push(Ghost { axis, at: number, image: spots, normal: normal.map(|n| n as Real), solid, velocity });
         }
     }
 
@@ -486,14 +536,14 @@ impl Solids {
     pub fn close(&self, u: &mut Vectors) {
         for part in &mut u.parts {
             let Place::Face(axis) = part.place else { continue };
-            self.closed[axis].iter().for_each(|(at, v)| part.data[*at as usize] = *v);
+            self.closed[axis].iter().for_each(|face| part.data[face.at as usize] = face.velocity);
         }
     }
 
     /// Sets a direction to zero where the velocity is given.
     pub fn free(&self, part: &mut Field) {
         let Place::Face(axis) = part.place else { return };
-        self.closed[axis].iter().for_each(|(at, _)| part.data[*at as usize] = 0.0);
+        self.closed[axis].iter().for_each(|face| part.data[face.at as usize] = 0.0);
     }
 
     /// Gives closed faces near the surface what their images say.                               (gas.11)
@@ -567,14 +617,17 @@ impl Solids {
         self.clear(&mut b.data, 0.0);
     }
 
-    /// The force of a pressure on each of them [N]; in the plane, of one metre across it.         (gas.12)
+    /// The area of a face [m²]; in the plane, of one metre across it.
+    pub fn area(&self) -> f64 {
+        (1..self.grid.dimension()).fold(1.0, |a, _| a * self.grid.dx)
+    }
+
+    /// The force of a pressure on each of them [N], colliders then bodies; in the plane, of one metre across it.         (gas.12)
     pub fn forces(&self, pressure: &Field) -> Vec<[f64; 3]> {
-        let mut all = vec![[0.0; 3]; self.colliders.len()];
-        let area = (1..self.grid.dimension()).fold(1.0, |a, _| a * self.grid.dx);
-        for push in &self.pushes {
-            let p = area * f64::from(pressure.data[push.at as usize]);
-            let force = &mut all[push.solid as usize];
-            (0..3).for_each(|a| force[a] += p * f64::from(push.area[a]));
+        let mut all = vec![[0.0; 3]; self.colliders.len() + self.bodies.len()];
+        for cut in &self.cuts {
+            let p: f64 = cut.pushes().map(|(cell, share)| f64::from(share) * f64::from(pressure.data[cell as usize])).sum();
+            all[cut.solid as usize][cut.axis] += self.area() * p;
         }
         all
     }

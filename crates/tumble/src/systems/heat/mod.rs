@@ -143,7 +143,7 @@ impl System for Heat {
         Ok(report)
     }
 
-    fn publish(&self, _t: f64, _exchange: &mut Exchange) {}
+    fn publish(&mut self, _t: f64, _exchange: &mut Exchange) {}
 
     fn columns(&self, names: &[&str], out: &mut Vec<Column>) {
         for body in &self.bodies {
