@@ -54,6 +54,9 @@ pub struct Gas {
     /// that the fluid moves and that move it.
     #[serde(default)]
     pub bodies: Vec<String>,
+    /// Objects that hang in the fluid: cloth and other surfaces, in the plane curves.
+    #[serde(default)]
+    pub sheet: Vec<GasSheet>,
     /// Vorticity confinement: gives small eddies back what advection takes from them.
     #[serde(default)]
     #[schemars(range(min = 0.0), extend("x-unit" = "1"))]
@@ -83,6 +86,31 @@ fn five() -> f64 {
 
 fn still() -> AnimatedVector {
     [0.0; 3].into()
+}
+
+/// A surface of masses that lets the fluid through, against a resistance: it is blown along, and the fluid is held back.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct GasSheet {
+    /// The object, in a system of dynamics.
+    pub object: String,
+    /// Loss of pressure across it, over half the density times the square of the speed through it. A net has 1, a dense fabric 100; what
+    /// is above 2 over the Courant number of a sub-step acts like that.
+    #[serde(default = "ten")]
+    #[schemars(range(min = 0.0), extend("x-unit" = "1"))]
+    pub resistance: f64,
+    /// Friction along it, both faces together, over half the density times the square of the speed.
+    #[serde(default = "hundredth")]
+    #[schemars(range(min = 0.0), extend("x-unit" = "1"))]
+    pub friction: f64,
+}
+
+fn ten() -> f64 {
+    10.0
+}
+
+fn hundredth() -> f64 {
+    0.01
 }
 
 /// The lower and the upper side of each axis; both or none are periodic.

@@ -52,7 +52,7 @@ pub fn plans(scene: &Scene) -> Vec<Plan> {
     let own = |(method, _): (Method, usize)| Plan { name: method.name().into(), method, ..Plan::default() };
     let own = methods.into_iter().map(own);
     // What a fluid moves comes after it.
-    let moved = scene.gas.iter().any(|gas| !gas.bodies.is_empty());
+    let moved = scene.gas.iter().any(|gas| !gas.bodies.is_empty() || !gas.sheet.is_empty());
     if moved { own.chain(plain).collect() } else { plain.into_iter().chain(own).collect() }
 }
 
@@ -94,8 +94,8 @@ pub fn build(scene: &Scene, assets: &Assets) -> Result<Built, SceneError> {
     }
     act(scene, &mut parts, &mut issues);
     let mut exchange = Exchange::default();
-    let mut of_gas = |words| coupling::bodies(scene, &plans, words, &parts, &mut exchange, &mut issues);
-    let mut bodies: Vec<_> = scene.gas.iter().map(&mut of_gas).collect();
+    let mut of_gas = |words| coupling::moved(scene, &plans, words, &parts, &mut exchange, &mut issues);
+    let mut moved: Vec<_> = scene.gas.iter().map(&mut of_gas).collect();
     if !issues.is_empty() {
         return Err(SceneError { issues });
     }
@@ -121,7 +121,7 @@ pub fn build(scene: &Scene, assets: &Assets) -> Result<Built, SceneError> {
             continue;
         }
         if plan.method == Method::Gas {
-            systems.push(Box::new(gas(scene, &plans, index, gravity, &colliders, &mut bodies)?));
+            systems.push(Box::new(gas(scene, &plans, index, gravity, &colliders, &mut moved)?));
             continue;
         }
         let settings = Settings {

@@ -4,7 +4,7 @@ use super::checks::{objects, place};
 use crate::exchange::Exchange;
 use crate::geometry::Vector;
 use crate::systems::dynamics::{Dynamics, Parts, Tether};
-use crate::systems::gas::Body;
+use crate::systems::gas::{Body, Sheet};
 use tumble_interface::Issue;
 use tumble_interface::check::suggestion;
 use tumble_interface::scene::{Anchor, Gas, Method, Scene, System as Plan};
@@ -12,9 +12,12 @@ use tumble_interface::scene::{Anchor, Gas, Method, Scene, System as Plan};
 /// Balls that one fluid moves at most.
 const MOST_BODIES: usize = 256;
 
-/// The masses that a fluid moves, as balls.
-pub fn bodies(scene: &Scene, plans: &[Plan], words: &Gas, parts: &[Parts], exchange: &mut Exchange, issues: &mut Vec<Issue>) -> Vec<Body> {
-    let mut bodies = Vec::new();
+/// What a fluid moves.
+pub type Moved = (Vec<Body>, Vec<Sheet>);
+
+/// The balls and sheets that a fluid moves.
+pub fn moved(scene: &Scene, plans: &[Plan], words: &Gas, parts: &[Parts], exchange: &mut Exchange, issues: &mut Vec<Issue>) -> Moved {
+    let (mut bodies, mut sheets) = (Vec::new(), Vec::new());
     for (i, name) in words.bodies.iter().enumerate() {
         let mut wrong = |message: String| issues.push(Issue::new(format!("gas \"{}\".bodies[{i}]", words.name), message));
         let Some(system) = moved_by(scene, plans, words, name, &mut wrong) else { continue };
@@ -35,7 +38,22 @@ pub fn bodies(scene: &Scene, plans: &[Plan], words: &Gas, parts: &[Parts], excha
             bodies.push(body);
         }
     }
-    bodies
+    for (i, sheet) in words.sheet.iter().enumerate() {
+        let name = &sheet.object;
+        let mut wrong = |message: String| issues.push(Issue::new(format!("gas \"{}\".sheet[{i}].object", words.name), message));
+        let Some(system) = moved_by(scene, plans, words, name, &mut wrong) else { continue };
+        let Some(object) = parts[system].named(name) else { continue };
+        let curve = object.curve.windows(2).map(|ends| [ends[0], ends[1]]).collect();
+        let (triangles, pieces) = if scene.dimension == 2 { (Vec::new(), curve) } else { (object.triangles.clone(), Vec::new()) };
+        if triangles.is_empty() && pieces.is_empty() {
+            let what = if scene.dimension == 2 { "curve, which a sheet in the plane is" } else { "surface of triangles" };
+            wrong(format!("\"{name}\" has no {what}"));
+            continue;
+        }
+        let ports = object.points.clone().map(|row| exchange.open(system, row)).collect();
+        sheets.push(Sheet::new(name.clone(), ports, triangles, pieces, [sheet.resistance, sheet.friction]));
+    }
+    (bodies, sheets)
 }
 
 /// The system of an object that a fluid is to move.

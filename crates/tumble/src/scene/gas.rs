@@ -1,6 +1,7 @@
 //! From the words of a fluid to the fluid.
 
 use super::checks::place;
+use super::coupling::Moved;
 use super::laws::{Reader, flat, off_plane};
 use crate::geometry::Collider;
 use crate::linalg::poisson::{Excess, Method as Solve, Params, Target};
@@ -9,7 +10,7 @@ use crate::math::{Vec3, VectorSignal};
 use crate::operators::{Advection, Interpolation, Trace};
 use crate::recipes;
 use crate::state::{Field, Grid, Place, Vectors};
-use crate::systems::gas::{Beyond, Body, Fluid, Gas, Settings, Solids, Source};
+use crate::systems::gas::{Beyond, Body, Fluid, Gas, Settings, Sheet, Solids, Source};
 use std::sync::Arc;
 use tumble_interface::check::plain;
 use tumble_interface::scene::{
@@ -77,6 +78,7 @@ struct Read<'a, 'b> {
     solids: &'a Arc<Vec<Collider>>,
     names: Vec<String>,
     bodies: Vec<Body>,
+    sheets: Vec<Sheet>,
 }
 
 impl Read<'_, '_> {
@@ -339,7 +341,10 @@ impl Read<'_, '_> {
             courant: words.courant,
         };
         match Fluid::new(words.name.clone(), settings, solids, u, [density, temperature]) {
-            Ok(fluid) => Some(fluid),
+            Ok(mut fluid) => {
+                fluid.sheets = self.sheets;
+                Some(fluid)
+            }
             Err(failure) => {
                 self.wrong("", failure.to_string());
                 None
@@ -349,22 +354,23 @@ impl Read<'_, '_> {
 }
 
 /// The system of the fluids that it moves, or what is wrong with them.
-/// `bodies` are the balls that each fluid of the scene moves.
+/// `moved` is what each fluid of the scene moves.
 pub fn gas(
     scene: &Scene,
     plans: &[Plan],
     index: usize,
     gravity: [f64; 3],
     solids: &Arc<Vec<Collider>>,
-    bodies: &mut [Vec<Body>],
+    moved: &mut [Moved],
 ) -> Result<Gas, SceneError> {
     let (mut issues, mut fluids) = (Vec::new(), Vec::new());
     let here = |g: &Words| place(plans, "gas", g.system.as_deref()) == Some(index);
-    for (words, bodies) in scene.gas.iter().zip(bodies).filter(|(words, _)| here(words)) {
+    for (words, moved) in scene.gas.iter().zip(moved).filter(|(words, _)| here(words)) {
         let reader = Reader::new(scene, &mut issues);
+        let (bodies, sheets) = std::mem::take(moved);
         let path = format!("gas \"{}\"", words.name);
         let names = scene.collider.iter().map(|c| c.name.clone()).collect();
-        fluids.extend(Read { words, path, reader, flat: flat(scene), solids, names, bodies: std::mem::take(bodies) }.fluid(gravity));
+        fluids.extend(Read { words, path, reader, flat: flat(scene), solids, names, bodies, sheets }.fluid(gravity));
     }
     if issues.is_empty() {
         let plan = &plans[index];

@@ -202,6 +202,11 @@ impl Parts {
         self.frames[frame as usize].2 = true;
     }
 
+    /// An object, its rows counted as now: all of them.
+    pub fn named(&self, name: &str) -> Option<&Object> {
+        self.objects.iter().map(|draft| &draft.object).find(|object| object.name == name)
+    }
+
     /// Position of a point [m].
     pub fn position(&self, point: u32) -> Vec3<f64> {
         self.points[point as usize].0

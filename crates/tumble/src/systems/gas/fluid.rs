@@ -3,9 +3,11 @@
 use super::bodies::Body;
 use super::forces::Source;
 use super::rows::{magnitude, worse};
+use super::sheets::Sheet;
 use super::sides::{Beyond, hold};
 use super::solids::Solids;
 use super::viscosity::Conjugates;
+use crate::exchange::Exchange;
 use crate::geometry::Vector;
 use crate::linalg::poisson::{Fault, Params, Solver, Weight};
 use crate::math::{Real, VectorSignal};
@@ -99,6 +101,8 @@ pub struct Fluid {
     pub pressure: Field,
     pub(super) solver: Solver<u8>,
     pub(super) solids: Option<Solids>,
+    /// What hangs in it.
+    pub sheets: Vec<Sheet>,
     /// Of anything: velocities, right-hand side and unknown of the pressure, and what operators need.
     pub(super) next: Vectors,
     pub(super) b: Field,
@@ -203,6 +207,7 @@ impl Fluid {
             pressure,
             solver,
             solids,
+            sheets: Vec::new(),
             b: Field::new(grid, Place::Cell, "m²/s")?,
             left: vec![0.0; lattice.len()],
             q: vec![0.0; lattice.len()],
@@ -326,8 +331,20 @@ impl Fluid {
         }
     }
 
+    /// Takes the state of what it moves.
+    pub fn listen(&mut self, exchange: &Exchange) {
+        self.bodies().iter_mut().for_each(|body| body.listen(exchange));
+        self.sheets.iter_mut().for_each(|sheet| sheet.listen(exchange));
+    }
+
+    /// Gives what it moves what it has got.
+    pub fn tell(&mut self, exchange: &mut Exchange) {
+        self.bodies().iter_mut().for_each(|body| body.tell(exchange));
+        self.sheets.iter_mut().for_each(|sheet| sheet.tell(exchange));
+    }
+
     /// Solids that it moves.
-    pub fn bodies(&mut self) -> &mut [Body] {
+    fn bodies(&mut self) -> &mut [Body] {
         self.solids.as_mut().map_or(&mut [], |solids| &mut solids.bodies)
     }
 

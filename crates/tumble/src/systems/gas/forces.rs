@@ -108,7 +108,11 @@ impl Fluid {
         if let Some(solids) = self.solids.as_mut().filter(|_| self.settings.viscosity > 0.0) {
             solids.keep(&mut self.u);
         }
-        self.push(t, h)
+        self.push(t, h)?;
+        let grid = self.b.grid;
+        let Self { sheets, u, settings, .. } = self;
+        sheets.iter_mut().for_each(|sheet| sheet.trade(u, &grid, settings.density, h));
+        Ok(())
     }
 
     fn feed(&mut self, t: f64, h: f64) {

@@ -14,13 +14,16 @@ mod fluid;
 mod forces;
 mod projection;
 mod rows;
+mod sheets;
 mod sides;
 mod solids;
+mod spots;
 mod viscosity;
 
 pub use bodies::Body;
 pub use fluid::{Carried, Failed, Failure, Fluid, Settings};
 pub use forces::{Cover, Source};
+pub use sheets::Sheet;
 pub use sides::{Beyond, hold};
 pub use solids::Solids;
 
@@ -99,7 +102,7 @@ impl System for Gas {
     fn advance(&mut self, t: f64, dt: f64, exchange: &mut Exchange, go_on: &(dyn Fn() -> bool + Sync)) -> Result<StepReport, StepError> {
         let mut report = StepReport::default();
         for f in 0..self.fluids.len() {
-            self.fluids[f].bodies().iter_mut().for_each(|body| body.listen(exchange));
+            self.fluids[f].listen(exchange);
             let mut done = 0.0;
             while dt - done > 1e-9 * dt {
                 if !go_on() {
@@ -117,7 +120,7 @@ impl System for Gas {
                 }
             }
             self.fluids[f].finish(t + dt, &mut report).map_err(|e| e.within(&self.name, t + dt))?;
-            self.fluids[f].bodies().iter_mut().for_each(|body| body.tell(exchange));
+            self.fluids[f].tell(exchange);
         }
         Ok(report)
     }

@@ -13,6 +13,7 @@
 use super::bodies::Body;
 use super::rows::{Face, beside};
 use super::sides::Beyond;
+use super::spots::Spot;
 use crate::geometry::{Collider, Vector};
 use crate::linalg::poisson::{Joint, Weight, byte};
 use crate::math::Real;
@@ -44,13 +45,6 @@ struct Closed {
     at: u32,
     solid: u32,
     velocity: Real,
-}
-
-/// Where a value between points is read.
-#[derive(Clone, Copy, Default)]
-struct Spot {
-    at: u32,
-    t: [Real; 3],
 }
 
 /// A closed face near the surface.
@@ -504,32 +498,11 @@ impl Solids {
     }
 
     fn spot(&self, place: Place, x: Vector) -> Spot {
-        let (grid, x): (_, [f64; 3]) = (self.grid, x.into());
-        let (offset, points) = (grid.offset(place), grid.points(place));
-        let (mut base, mut t) = ([0; 3], [0.0; 3]);
-        for a in grid.axes().filter(|a| points[*a] > 1) {
-            let s = ((x[a] - grid.origin[a]) / grid.dx - offset[a]).clamp(0.0, (points[a] - 1) as f64);
-            base[a] = (s as usize).min(points[a] - 2);
-            t[a] = (s - base[a] as f64) as Real;
-        }
-        Spot { at: grid.lattice().at(base[0], base[1], base[2]) as u32, t }
+        Spot::new(&self.grid, place, x)
     }
 
     fn read(&self, data: &[Real], spot: &Spot) -> Real {
-        let s = self.grid.lattice().stride;
-        let mut sum = 0.0;
-        for corner in 0..8 {
-            let (mut weight, mut at) = (1.0, spot.at as usize);
-            for a in 0..3 {
-                let up = corner >> a & 1 == 1;
-                weight *= if up { spot.t[a] } else { 1.0 - spot.t[a] };
-                at += if up { s[a] } else { 0 };
-            }
-            if weight != 0.0 {
-                sum += weight * data[at];
-            }
-        }
-        sum
+        spot.read(self.grid.lattice().stride, data)
     }
 
     /// Gives closed faces the velocity of their solid.
