@@ -1,6 +1,6 @@
 //! What joins many cells at once: a rigid thing that yields to the pressure around it.
 //!
-//!   A + sum over joints of weight j jᵀ                                                              (pressure.13)
+//!   A + sum over joints of weight j jᵀ                                                              (pressure.20)
 //!
 //! Each adds one eigenvalue that no preconditioner of A sees, and so about one iteration to conjugate gradients, however light the
 //! thing is.
