@@ -64,11 +64,18 @@ impl Fluid {
         vectors.parts.iter().map(|part| average(part, Place::Cell)).collect()
     }
 
-    /// The force of the last pressure on every solid [N].
-    pub fn forces_on(&self) -> Vec<(&str, [f64; 3])> {
+    /// The force of the last pressure on every solid [N], three numbers for a collider and for each ball of an object.
+    pub fn forces_on(&self) -> Vec<(&str, Vec<f64>)> {
         let Some(solids) = &self.solids else { return Vec::new() };
         let bodies = solids.bodies.iter().map(|body| &body.name);
-        solids.names.iter().chain(bodies).map(String::as_str).zip(solids.forces(&self.pressure)).collect()
+        let mut all: Vec<(&str, Vec<f64>)> = Vec::new();
+        for (name, force) in solids.names.iter().chain(bodies).zip(solids.forces(&self.pressure)) {
+            match all.last_mut().filter(|(last, _)| last == name) {
+                Some((_, forces)) => forces.extend(force),
+                None => all.push((name, force.to_vec())),
+            }
+        }
+        all
     }
 
     /// Where its grid is.

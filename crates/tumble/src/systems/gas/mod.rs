@@ -53,20 +53,20 @@ impl Gas {
 
     /// The force of the pressure on every solid, of all fluids together.
     fn forces(&self) -> Vec<Column> {
-        let mut all: Vec<(&str, [f64; 3])> = Vec::new();
-        for (name, force) in self.fluids.iter().flat_map(Fluid::forces_on) {
+        let mut all: Vec<(&str, Vec<f64>)> = Vec::new();
+        for (name, forces) in self.fluids.iter().flat_map(Fluid::forces_on) {
             match all.iter_mut().find(|(other, _)| *other == name) {
-                Some((_, sum)) => (0..3).for_each(|a| sum[a] += force[a]),
-                None => all.push((name, force)),
+                Some((_, sums)) => sums.iter_mut().zip(forces).for_each(|(sum, force)| *sum += force),
+                None => all.push((name, forces)),
             }
         }
-        let column = |(name, force): (&str, [f64; 3])| Column {
+        let column = |(name, forces): (&str, Vec<f64>)| Column {
             object: name.into(),
             name: "force".into(),
             unit: "N",
             width: 3,
             points: Vec::new(),
-            data: Data::F64(force.to_vec()),
+            data: Data::F64(forces),
         };
         all.into_iter().map(column).collect()
     }
