@@ -172,6 +172,12 @@ def test_the_first_change_that_gains_no_energy_is_recommended() -> None:
 # Checking
 
 
+@pytest.mark.parametrize("scene", ["contact/moving", "gas/bunny", "gas/ball_in_a_tank"])
+def test_check_lists_what_ships_with_moving_colliders_and_fluids(scene: str, tumble: Command) -> None:
+    answer = tumble("check", scene)
+    assert answer.code == 0 and f"fine: tumble run {scene}" in answer.out
+
+
 def test_check_is_fine_with_a_good_step(spring: Tree, scene_file: SceneFile, tumble: Command) -> None:
     answer = tumble("check", scene_file(spring))
     assert answer.code == 0

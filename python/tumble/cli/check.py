@@ -70,7 +70,7 @@ def _contents(scene: "Scene", world: "World") -> str:
     topology, positions = world.topology, world.columns("position")
     for name, table in topology.items():
         parts = [counted(len(table[key]), word) for key, word in words.items() if key in table]
-        if name in positions and "mass" not in table:
+        if "position" in positions.get(name, {}) and "mass" not in table and name not in solid:
             parts.insert(0, counted(len(positions[name]["position"]), "tracer"))
         lines.append(f'{"collider" if name in solid else "object":10} "{name}": {", ".join(parts) or "no mesh"}')
     for anchor in tree["anchor"]:

@@ -96,9 +96,8 @@ impl Engine for Simulation {
 
     fn frame(&self, columns: &[&str]) -> Frame {
         let mut all = self.world.columns(columns);
-        if columns.contains(&"position") {
-            self.places(&mut all);
-        }
+        // Whatever is asked for: a picture of anything has to show them where they are.
+        self.places(&mut all);
         Frame { time: self.world.time(), index: self.world.frame_index(), columns: all }
     }
 

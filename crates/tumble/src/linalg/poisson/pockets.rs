@@ -105,6 +105,27 @@ impl Pockets {
         out
     }
 
+    /// Floating components and the means over each of what has these entries, where they are not zero but for rounding.
+    pub fn means(&self, entries: &[(u32, Real)]) -> Vec<(usize, f64)> {
+        let mut sums: Vec<(usize, [f64; 2])> = Vec::new();
+        for (at, entry) in entries {
+            let run = self.runs.partition_point(|run| run.at <= *at as usize);
+            let Some(run) = run.checked_sub(1).map(|i| self.runs[i]).filter(|run| (*at as usize) < run.at + run.cells) else { continue };
+            let entry = f64::from(*entry);
+            match sums.iter_mut().find(|(component, _)| *component == run.component) {
+                Some((_, sum)) => *sum = [sum[0] + entry, sum[1] + entry.abs()],
+                None => sums.push((run.component, [entry, entry.abs()])),
+            }
+        }
+        sums.retain(|(component, [sum, size])| !self.components[*component].held && sum.abs() > 64.0 * f64::from(Real::EPSILON) * size);
+        sums.into_iter().map(|(component, [sum, _])| (component, sum / self.components[component].cells as f64)).collect()
+    }
+
+    /// The numbers of the cells of a component.
+    pub fn numbers(&self, component: usize) -> impl Iterator<Item = usize> + '_ {
+        self.runs.iter().filter(move |run| run.component == component).flat_map(|run| run.at..run.at + run.cells)
+    }
+
     /// How many there are beside the largest.
     pub fn count(&self) -> usize {
         self.components.len().saturating_sub(1)

@@ -219,3 +219,65 @@ fn refinement_works_on_velocities() {
     println!("{before} to {after}: {info:?}");
     assert!(before > 1.0 && info.converged && f64::from(after) <= 1.2 * most && info.refinements <= 4);
 }
+
+#[test]
+fn joints_are_a_part_of_the_matrix_and_cost_few_iterations() {
+    for sides in [CLOSED, MIXED] {
+        let n = [26, 22, 24];
+        let mut solver = around_a_sphere::<u8>(n, sides, |w| w);
+        let lattice = solver.lattice();
+        let mut b = column(lattice, |[i, j, k]| ((i * 7 + j * 3 + k * 5) % 11) as f64 - 5.0);
+        let plain = solver.fine.clone();
+        each(lattice, |_, at| {
+            if (0..3).all(|a| plain.w[a][at] == 0 && plain.w[a][at + lattice.stride[a]] == 0) {
+                b[at] = 0.0;
+            }
+        });
+        // Two things whose faces do not add up to nothing, a ball of two cells a radius and a hundredth of the density, and a heavier one.
+        let cells = |seed: u32| -> Vec<(u32, Real)> {
+            let random = Random::new(seed, "joint");
+            let at = |i: u32| lattice.at(1 + (i as usize * 5) % 24, 1 + i as usize % 4, 1 + (i as usize * 7) % 22) as u32;
+            (0..60).map(|i| (at(i), (random.quick(i, 0) + 0.1) as Real)).collect()
+        };
+        let joints = [Joint::new(cells(1), 10.0), Joint::new(cells(2), 0.5)];
+        let params = |method| Params { method, target: Target::Relative(1e-5), iterations: 400, excess: Excess::Remove };
+        for method in Method::ALL.into_iter().filter(|method| method.is_gradients()) {
+            let mut q = vec![0.0; lattice.len()];
+            solver.join(Vec::new());
+            let before = solver.solve_double(&b, &mut q, &params(method)).unwrap().iterations;
+            solver.join(joints.to_vec());
+            let info = solver.solve_double(&b, &mut q, &params(method)).unwrap();
+            // Many iterations forget in single precision which directions they have had.
+            let most = before + (before / 2).max(10);
+            assert!(info.converged && info.iterations <= most, "{method:?}: {before} {}", info.iterations);
+            // b - A q - sum of w j (j.q), cell by cell, and what no q can balance taken off.
+            solver.join(Vec::new());
+            let mut left = vec![0.0; lattice.len()];
+            solver.residual(&b, &q, &mut left);
+            let mut left: Vec<f64> = left.iter().map(|x| f64::from(*x)).collect();
+            let mut alive = Vec::new();
+            each(lattice, |_, at| alive.extend((0..3).any(|a| plain.w[a][at] > 0 || plain.w[a][at + lattice.stride[a]] > 0).then_some(at)));
+            for joint in &joints {
+                let mut j = vec![0.0; lattice.len()];
+                joint.cells.iter().for_each(|(at, entry)| j[*at as usize] += f64::from(*entry));
+                if sides == CLOSED {
+                    let mean = alive.iter().map(|at| j[*at]).sum::<f64>() / alive.len() as f64;
+                    alive.iter().for_each(|at| j[*at] -= mean);
+                }
+                let product: f64 = alive.iter().map(|at| j[*at] * q[*at]).sum();
+                alive.iter().for_each(|at| left[*at] -= joint.weight * product * j[*at]);
+            }
+            if sides == CLOSED {
+                let mean = alive.iter().map(|at| left[*at]).sum::<f64>() / alive.len() as f64;
+                alive.iter().for_each(|at| left[*at] -= mean);
+            }
+            let norm = |v: &dyn Fn(usize) -> f64| alive.iter().map(|at| v(*at) * v(*at)).sum::<f64>().sqrt();
+            let residual = norm(&|at| left[at]) / norm(&|at| f64::from(b[at]));
+            assert!(residual < 3e-5, "{method:?}: {residual:e}");
+        }
+        solver.join(joints.to_vec());
+        let mut q = vec![0.0; lattice.len()];
+        let refused = solver.solve(&b, &mut q, &params(Method::Sor));
+        assert!(matches!(refused, Err(Fault::Method { method: Method::Sor, .. })), "{refused:?}");
+    }
+}

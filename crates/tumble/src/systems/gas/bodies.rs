@@ -107,19 +107,13 @@ impl Body {
 
     /// Its part of the matrix of the pressure, a row for each axis; `mass` is that of the fluid in a cell [kg].
     pub(super) fn joints(&self, mass: f64) -> impl Iterator<Item = Joint> + '_ {
-        self.faces.iter().map(move |cells| Joint { cells: cells.clone(), weight: mass * self.inverse_mass })
+        self.faces.iter().map(move |cells| Joint::new(cells.clone(), mass * self.inverse_mass))
     }
 
-    /// Takes the impulse of a pressure q [m²/s]; `mass` is rho dx^(d-1) [kg/m].
-    pub(super) fn yield_to(&mut self, q: &[Real], mass: f64) {
-        if self.inverse_mass > 0.0 {
-            let sums: [f64; 3] = std::array::from_fn(|a| product(&self.faces[a], q));
-            self.push(Vector::from(sums) * mass);
+    /// Takes the impulse of a pressure, from j . q of its rows [m²/s]; `mass` is rho dx^(d-1) [kg/m].
+    pub(super) fn yield_to(&mut self, products: &[f64], mass: f64) {
+        if let ([x, y, z], true) = (products, self.inverse_mass > 0.0) {
+            self.push(Vector::from([*x, *y, *z]) * mass);
         }
     }
-}
-
-/// j . q
-pub(super) fn product(faces: &[(u32, Real)], q: &[Real]) -> f64 {
-    faces.iter().map(|(at, j)| f64::from(*j) * f64::from(q[*at as usize])).sum()
 }

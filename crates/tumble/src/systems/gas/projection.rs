@@ -90,10 +90,11 @@ impl Fluid {
         pressure.data.fill(0.0);
         let to_pressure = (settings.density / h) as Real;
         left.copy_from_slice(&b.data);
-        let info = solver.refine(left, q, &params, |_, q, left| {
+        let info = solver.refine(left, q, &params, |solver, q, left| {
             subtract_gradient(u, q, open);
             if let Some(solids) = solids {
-                solids.bodies.iter_mut().for_each(|body| body.yield_to(q, mass));
+                let products = solver.yielded(q);
+                solids.bodies.iter_mut().zip(products.chunks(3)).for_each(|(body, products)| body.yield_to(products, mass));
                 solids.follow();
                 solids.close(u);
             }
