@@ -14,7 +14,7 @@ import time
 from pathlib import Path
 
 import numpy as np
-from common import THREADS, median, show
+from common import THREADS, median, show, triad
 
 ROOT = Path(__file__).parent.parent
 TOLERANCE = 1e-5
@@ -138,21 +138,6 @@ def cosine_case(b):
         return idctn(f, workers=THREADS, overwrite_x=True)
 
     return solve
-
-
-def triad():
-    """Bytes a second."""
-    import numba
-
-    numba.set_num_threads(THREADS)
-
-    @numba.njit(parallel=True, fastmath=True)
-    def run(a, b, c):
-        for i in numba.prange(len(a)):
-            a[i] = b[i] + 3.0 * c[i]
-
-    a, b, c = (np.ones(20_000_000) for _ in range(3))
-    return 24 * len(a) / median(lambda: run(a, b, c))
 
 
 def main():

@@ -156,7 +156,7 @@ def write_vdb(volumes: Sequence[Mapping[str, Any]], zip: bool) -> bytes:
     (float32, x fastest, those of a vector together), width, points, corner, spacing [m], origin [m], background, tolerance,
     half. Raises ExportError."""
 
-def load_mesh(path: Path) -> tuple[npt.Array, npt.NDArray[np.uint32]]:
+def load_mesh(path: Path) -> tuple[npt.NDArray[np.float64], npt.NDArray[np.uint32]]:
     """Vertices [file units] n x 3 and triangles m x 3 of an OBJ, PLY, STL or GLB file. Raises SceneError."""
 
 Side = Literal["closed"] | tuple[Literal["slope", "value", "ghost"], float]
@@ -189,7 +189,7 @@ class Grid:
     def shape(self, place: str = "cell") -> tuple[int, ...]:
         """How many points a place has along each axis: the shape of its arrays."""
 
-    def points(self, place: str = "cell") -> tuple[npt.Array, ...]:
+    def points(self, place: str = "cell") -> tuple[npt.NDArray[np.float64], ...]:
         """The coordinates [m] of the points of a place: one array for each axis."""
 
     def field(
@@ -206,7 +206,7 @@ class Field:
     """Numbers at one place of a grid."""
 
     @property
-    def array(self) -> npt.Array:
+    def array(self) -> npt.NDArray[np.float64]:
         """The numbers; the first index is that of the first axis."""
 
     @property
@@ -247,7 +247,7 @@ def average(field: Field, place: str) -> Field:
 
 def sample(
     field: Field, points: npt.ArrayLike, interpolation: Literal["linear", "cubic", "monotone"] = "linear"
-) -> npt.Array:
+) -> npt.NDArray[np.float64]:
     """The values at points, n x 2 or n x 3 [m]."""
 
 @overload
