@@ -75,7 +75,7 @@ def tumble_world(n, steps=STEPS, **other):
         "time": {"fps": 1.0 / (steps * H)},
         "world": {"memory_limit": 16},
         "system": [{"name": "s", "method": "gas", "substeps": steps}],
-        "gas": [words(n) | other],
+        "gas": [{k: v for k, v in (words(n) | other).items() if v is not None}],
     }
     return tumble.World(scene, threads=THREADS)
 
@@ -395,8 +395,8 @@ def bench_stages(n, bandwidth):
             "u thrice, smoke and warmth there and back",
         ),
     ):
-        share = moved * n**3 / cost / bandwidth
-        show(f"smoke {n}, {part}", "tumble", cost, "s", f"{moved:.0f} B a cell, {share:.2f} of the triad: {check}")
+        share = f"{moved * n**3 / cost / bandwidth:.2f} of the triad" if cost > 0.02 * whole else "too little to tell"
+        show(f"smoke {n}, {part}", "tumble", cost, "s", f"{moved:.0f} B a cell, {share}: {check}")
 
 
 def main():
@@ -420,4 +420,5 @@ def main():
         show("smoke, a cell", "tumble at 128³", costs[128], "s", "")
 
 
-main()
+if __name__ == "__main__":
+    main()

@@ -547,7 +547,7 @@ fn the_history_tells_what_was_left_when() {
 #[test]
 fn the_largest_residual_is_met_even_when_it_lags_behind_the_mean() {
     // Each part of a refinement aims at a mean: where the largest is still above its target, another one must follow.
-    let n = 32;
+    let n = 20;
     let lattice = Lattice::new([n; 3]);
     let w = cut(lattice, sphere(n));
     let alive = alive(lattice, &w);
