@@ -11,9 +11,9 @@ from pathlib import Path
 HERE = Path(__file__).parent
 ROOT = HERE.parent
 VENV = ROOT / ".venv-bench"
-PEERS = ["numba", "pyamg", "scipy", "taichi"]
+PEERS = ["devito", "jax", "numba", "phiflow", "pyamg", "scipy", "taichi"]
 OURS = ["numpy", "typer", "rich"]
-CASES = ["start", "springs", "implicit", "particles", "emission", "gravitation", "flock", "pressure", "heat"]
+CASES = ["start", "springs", "implicit", "particles", "emission", "gravitation", "flock", "pressure", "smoke", "heat"]
 # What is aimed at: (case, ours, theirs, at least this ratio), or at most for costs.
 TARGETS = {
     ("springs", "taichi"): (5.0, "at least"),
@@ -31,6 +31,10 @@ TARGETS = {
         (f"pressure {n}, {kind}", "10 iterations"): (1.0, "at most") for n in (128, 256) for kind in ("random", "plume")
     },
     **{(f"box {n}", "scipy.fft"): (1.0, "at least") for n in (128, 256)},
+    ("smoke 128", "taichi"): (20.0, "at least"),
+    ("smoke 64", "phiflow"): (10.0, "at least"),
+    ("smoke, a cell", "tumble at 128³"): (2.0, "at most"),
+    ("smoke, memory", "80 bytes"): (1.0, "at most"),
     ("heat", "numba"): (1.0, "at least"),
     ("heat", "devito"): (1.0, "at least"),
     ("direct sum, single, portable", "numba"): (0.6, "at least"),
@@ -45,12 +49,12 @@ TARGETS = {
 def set_up() -> Path:
     """A virtual environment with tumble, as built by make setup, and the peers."""
     python = VENV / "bin" / "python"
-    marker = VENV / ".ready"
-    if not marker.exists():
+    marker, wanted = VENV / ".ready", " ".join([*OURS, *PEERS])
+    if not marker.exists() or marker.read_text() != wanted:
         print("installing the peers into .venv-bench ...", flush=True)
         subprocess.run([sys.executable, "-m", "venv", VENV], check=True)
         subprocess.run([python, "-m", "pip", "install", "--quiet", *OURS, *PEERS], check=True)
-        marker.touch()
+        marker.write_text(wanted)
     return python
 
 

@@ -26,3 +26,19 @@ def show(case: str, who: str, value: float, unit: str, check: str) -> None:
         json.dumps({"case": case, "who": who, "threads": THREADS, "value": value, "unit": unit, "check": check}),
         flush=True,
     )
+
+
+def triad() -> float:
+    """Bytes a second of a = b + s c, without non-temporal stores."""
+    import numba
+    import numpy as np
+
+    numba.set_num_threads(THREADS)
+
+    @numba.njit(parallel=True, fastmath=True)
+    def run(a, b, c):  # type: ignore[no-untyped-def]
+        for i in numba.prange(len(a)):
+            a[i] = b[i] + 3.0 * c[i]
+
+    a, b, c = (np.ones(20_000_000) for _ in range(3))
+    return 24 * len(a) / median(lambda: run(a, b, c))

@@ -16,6 +16,7 @@ from tumble.fields import (
     divergence,
     gradient,
     laplacian,
+    project,
     sample,
 )
 
@@ -134,3 +135,111 @@ def test_errors_name_the_place_and_the_cure() -> None:
             bad()
         for word in words:
             assert word in str(error.value), f"{word!r} is not in {error.value}"
+
+
+def around_a_ball(n: int = 16) -> tuple[Grid, tuple[Field, ...]]:
+    """A cube, and which shares of its faces a ball leaves open."""
+    grid = Grid((n, n, n), 0.25)
+    shares = []
+    for place in ("face x", "face y", "face z"):
+        x = [c / 0.25 / n for c in grid.points(place)]
+        far = np.sqrt((x[0] - 0.45) ** 2 + (x[1] - 0.5) ** 2 + (x[2] - 0.55) ** 2) - 0.25
+        shares.append(grid.field(np.floor(np.clip(0.5 + far * n, 0, 1) * 127 + 0.5) / 127, place))
+    return grid, tuple(shares)
+
+
+def inner(a: tuple[Field, ...], b: tuple[Field, ...], shares: tuple[Field, ...]) -> float:
+    """In the metric of the masses that faces stand for; walls have none."""
+    total = 0.0
+    for axis, (f, g, w) in enumerate(zip(a, b, shares, strict=True)):
+        inside = tuple(slice(1, -1) if k == axis else slice(None) for k in range(3))
+        total += float((w.array * f.array * g.array)[inside].sum())
+    return total
+
+
+def flow(grid: Grid, u: tuple[Field, ...], shares: tuple[Field, ...]) -> np.ndarray:
+    """The divergence of what passes through the open parts, times dx."""
+    return sum(np.diff(f.array * w.array, axis=axis) for axis, (f, w) in enumerate(zip(u, shares, strict=True)))  # type: ignore[return-value]
+
+
+def test_the_projection_of_velocities_is_the_nearest_in_the_metric_of_masses() -> None:
+    grid, shares = around_a_ball()
+    noise = np.random.default_rng(8)
+    places = ("face x", "face y", "face z")
+
+    def some() -> tuple[Field, ...]:
+        return tuple(grid.field(noise.uniform(-1, 1, grid.shape(p)), p, "m/s") for p in places)
+
+    a, b = some(), some()
+    pa, pb = (project(u, shares, tolerance=1e-11) for u in (a, b))
+    assert pa.converged and pa.iterations < 30 and pa.pockets == 0
+    assert np.abs(flow(grid, pa.velocity, shares)).max() < 2e-11  # by an evaluation of our own
+    assert np.abs(flow(grid, a, shares)).max() > 1
+    assert pa.residuals[0] > 1 and pa.residuals[-1] < 1e-11 and len(pa.times) == pa.iterations + 1
+    # Walls and solids are at rest.
+    assert all(np.all(u.array[w.array == 0] == 0) for u, w in zip(pa.velocity, shares, strict=True))
+    assert np.all(pa.velocity[0].array[0] == 0) and np.all(pa.velocity[2].array[:, :, -1] == 0)
+    size = inner(a, a, shares)
+    # Once is enough.
+    again = project(pa.velocity, shares, tolerance=1e-13)
+    change = [grid.field(u.array - v.array, u.place) for u, v in zip(pa.velocity, again.velocity, strict=True)]
+    assert inner(tuple(change), tuple(change), shares) < 1e-20 * size
+    # Symmetric: <a, P b> = <P a, b>; both are no small number.
+    left, right = inner(a, pb.velocity, shares), inner(pa.velocity, b, shares)
+    assert abs(left - right) < 1e-9 * size and abs(left) > 1e-3 * size
+    # The change is orthogonal to all that has no divergence, so that nothing else is as near.
+    change = [grid.field(u.array - v.array, u.place) for u, v in zip(a, pa.velocity, strict=True)]
+    assert abs(inner(tuple(change), pb.velocity, shares)) < 1e-9 * size
+    kept, lost = inner(pa.velocity, pa.velocity, shares), inner(tuple(change), tuple(change), shares)
+    assert abs(size - kept - lost) < 1e-9 * size and 0.5 * size < kept < 0.8 * size  # 2/3: two of three directions
+    # What is taken is the gradient of the potential.
+    slope = gradient(pa.potential)
+    open_ = shares[1].array > 0
+    open_[:, 0] = open_[:, -1] = False
+    assert np.allclose(change[1].array[open_], slope[1].array[open_], atol=1e-12)
+
+
+def test_every_method_projects_to_the_same_velocity() -> None:
+    grid, shares = around_a_ball()
+    noise = np.random.default_rng(9)
+    u = tuple(grid.field(noise.uniform(-1, 1, grid.shape(p)), p, "m/s") for p in ("face x", "face y", "face z"))
+    best = project(u, shares, tolerance=1e-10).velocity
+    for method in (
+        "jacobi",
+        "gauss_seidel",
+        "sor",
+        "conjugate_gradients",
+        "incomplete_cholesky",
+        "modified_incomplete_cholesky",
+        "multigrid",
+    ):
+        for precision, tolerance in (("double", 1e-8), ("single", 1e-5)):
+            found = project(u, shares, method, tolerance, 20_000, precision)  # type: ignore[arg-type]
+            assert found.converged and found.residuals[-1] <= tolerance, (method, precision, found)
+            off = max(np.abs(f.array - g.array).max() for f, g in zip(found.velocity, best, strict=True))
+            # Smooth errors of the velocity are up to n/pi times the divergence.
+            assert off < 20 * tolerance, (method, precision, off)
+    box = project(u, method="cosine")
+    assert box.iterations == 1 and box.residuals[-1] < 1e-12
+    around = Grid((8, 6), 0.5, periodic="x")
+    v = (around.field(noise.random((8, 6)), "face x", "m/s"), around.field(noise.random((8, 7)), "face y", "m/s"))
+    turned = project(v, tolerance=1e-10).velocity
+    assert np.abs(divergence(turned).array).max() < 1e-9
+    assert np.abs(turned[0].array.mean() - v[0].array.mean()) < 1e-12  # a uniform stream has no divergence
+
+
+def test_what_cannot_be_projected_is_told() -> None:
+    grid, shares = around_a_ball(8)
+    u = tuple(grid.field(1.0, p) for p in ("face x", "face y", "face z"))
+    for wrong, text in [
+        (lambda: project(u, method="magic"), "expected one of"),  # type: ignore[arg-type]
+        (lambda: project(u, shares, "cosine"), "cosine transform cannot solve this"),
+        (lambda: project(u, tolerance=0.0), "expected a tolerance > 0"),
+        (lambda: project(u, precision="half"), "precision"),  # type: ignore[arg-type]
+        (lambda: project(u[:2]), "velocity"),
+        (lambda: project(u, tuple(grid.field(2.0, f.place) for f in u)), "expected 0 to 1"),
+        (lambda: project(tuple(grid.field(0.0, f.place) for f in u)), "something finite that moves"),
+        (lambda: project(tuple(grid.field(np.nan, f.place) for f in u)), "finite"),
+    ]:
+        with pytest.raises(TumbleError, match=text):
+            wrong()

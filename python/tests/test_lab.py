@@ -12,7 +12,7 @@ import pytest
 from matplotlib.image import imread
 
 from tumble import Scene, SceneError
-from tumble.lab import exact, findings, flocks, integrators, patterns, structures
+from tumble.lab import exact, findings, flocks, integrators, patterns, pressure, structures
 from tumble.lab.cells import Purse
 from tumble.lab.limits import Found, largest_steps, stiffest_mode
 from tumble.lab.measure import Results
@@ -489,6 +489,112 @@ def test_page_of_structures(tmp_path: Path) -> None:
     rows = table(path)
     shear = [r for r in rows if r["deformation"] == "shear +" and r["structure"] == "sheet"]
     assert [r["resists"] for r in shear] == ["no", "yes", "yes", "yes", "yes"]
+
+
+@pytest.fixture(scope="module")
+def ladder(tmp_path_factory: pytest.TempPathFactory) -> tuple[pressure.Study, Path]:
+    """All rungs on 24³ cells, and their page."""
+    told: list[tuple[int, int]] = []
+    kept: list[pressure.Study] = []
+    taken = pressure.lessons
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(pressure, "lessons", lambda seen: kept.append(seen) or taken(seen))
+        path = pressure.page(
+            tmp_path_factory.mktemp("lab"), 24, progress=lambda done, total: told.append((done, total))
+        )
+    assert told[-1][0] == told[-1][1] and all(a[0] <= b[0] for a, b in pairwise(told))
+    return kept[0], path
+
+
+def test_every_rung_of_the_ladder_is_higher_than_the_one_below(ladder: tuple[pressure.Study, Path]) -> None:
+    seen, _ = ladder
+    order = [
+        "jacobi",
+        "gauss_seidel",
+        "sor",
+        "incomplete_cholesky",
+        "modified_incomplete_cholesky",
+        "multigrid_gradients",
+    ]
+    for name in pressure.NAMES:
+        its = {r.rung.word: r.at(1e-5) for r in seen.runs[name]}
+        assert all(its[word] is not None for word in its if word != "cosine"), (name, its)
+        assert all(its[a] > its[b] for a, b in pairwise(order)), (name, its)
+        assert its["conjugate_gradients"] > its["incomplete_cholesky"]
+        # Multigrid is the last by far, and conjugate gradients make it no worse. 5 to 7 of them.
+        assert 3 <= its["multigrid_gradients"] <= its["multigrid"] <= 9 < its["modified_incomplete_cholesky"] / 2, (
+            name,
+            its,
+        )
+        found = [r.found for r in seen.runs[name] if r.found is not None]
+        assert all(f.pockets == (2 if name == "two sealed pockets" else 0) for f in found)
+        assert all(np.all(np.diff(f.times) > 0) and len(f.times) == len(f.residuals) for f in found)
+    assert seen.of("a plain box", "cosine").at(1e-12) == 1
+    for name in pressure.NAMES[1:]:
+        assert "cosine transform cannot solve this" in seen.of(name, "cosine").refused
+
+
+def test_rates_of_the_ladder_are_those_of_theory(ladder: tuple[pressure.Study, Path]) -> None:
+    seen, _ = ladder
+    for n, runs in seen.sizes.items():
+        theory = pressure.Theory(n)
+        by_word = {r.rung.word: r for r in runs}
+        for word, near in [("jacobi", 0.01), ("gauss_seidel", 0.01)]:
+            ratio = np.log(by_word[word].factor) / np.log(theory.factor(word))  # type: ignore[arg-type]
+            # The first order of what walls do to D is in it, the second, of size 1/n², is not: 1.001 to 1.003 at 12 and 24.
+            assert n < 12 or abs(ratio - 1.0) < near, (n, word, ratio)
+    # Over-relaxation: omega - 1 for the whole spectrum, but with a Jordan block on top of it.
+    sor = np.log(seen.of("a plain box", "sor").factor) / np.log(pressure.Theory(24).factor("sor"))
+    assert 0.8 < sor < 1.2, sor
+    # The bound of conjugate gradients is one: they do better, for they find single eigenvalues.
+    plain = seen.of("a plain box", "conjugate_gradients").factor
+    assert 0.5 < plain < pressure.Theory(24).factor("conjugate_gradients")
+    # From 12 to 24 cells: not far from the slopes of large boxes.
+    for rung in pressure.RUNGS[:-1]:
+        assert rung.growth is not None
+        assert abs(seen.growth(rung.word) - rung.growth) < 0.4, (rung.word, seen.growth(rung.word))
+
+
+def test_theory_of_the_ladder_against_a_dense_matrix() -> None:
+    n = 5
+    one = 2.0 * np.eye(n) - np.eye(n, k=1) - np.eye(n, k=-1)
+    one[0, 0] = one[-1, -1] = 1.0
+    eye = np.eye(n)
+    a = sum(np.kron(np.kron(x, y), z) for x, y, z in [(one, eye, eye), (eye, one, eye), (eye, eye, one)])
+    values = np.linalg.eigvalsh(a)
+    assert pressure.Theory(n).condition == pytest.approx(values[-1] / values[1], rel=1e-12)
+    scale = 1.0 / np.sqrt(np.diag(a))
+    least = np.linalg.eigvalsh(a * scale[:, None] * scale)[1]
+    # To first order in 1/n: 3 % at 5 cells.
+    assert pressure.Theory(n).smoothest == pytest.approx(least, rel=0.05)
+
+
+def test_page_of_the_ladder(ladder: tuple[pressure.Study, Path]) -> None:
+    seen, path = ladder
+    text = whole(path)
+    for rung in pressure.RUNGS:
+        assert rung.title in text
+    for name in pressure.NAMES:
+        assert name in text
+    rows = {(r["system"], r["cells"], r["method"]): r for r in table(path)}
+    assert len(rows) == 5 * 9
+    a, b = (seen.of("a plain box", word).at(1e-5) for word in ("jacobi", "multigrid_gradients"))
+    assert rows["a plain box", "24", "jacobi"]["iterations_to_1e-05"] == str(a)
+    lessons = pressure.lessons(seen)
+    assert f"conjugate gradients with multigrid {b} and" in lessons[0]
+    assert sum("cannot with a ball in it or two sealed pockets" in line for line in lessons) == 1
+    assert "Not done" not in text
+
+
+def test_a_rung_that_takes_too_long_is_stopped_and_told(ladder: tuple[pressure.Study, Path]) -> None:
+    seen, _ = ladder
+    slow = pressure.run(pressure.case("a plain box", 24), pressure.BY_WORD["jacobi"], iterations=30)
+    assert slow.at(1e-5) is None and slow.time(1e-5) is None and slow.at(1e-1) is not None
+    runs = {name: [slow if r.rung.word == "jacobi" else r for r in runs] for name, runs in seen.runs.items()}
+    cut = pressure.Study(24, "double", runs, {**seen.sizes, 24: runs["a plain box"]}, seen.glances)
+    lines = pressure.lessons(cut)
+    assert any("Not done in the time allowed" in line and "Jacobi (a plain box)" in line for line in lines)
+    assert math.isnan(cut.growth("jacobi")) and not any("Jacobi 4" in line for line in lines)
 
 
 def whole(path: Path) -> str:

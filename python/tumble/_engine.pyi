@@ -284,3 +284,59 @@ def diffuse(field: Vectors, kappa: float, duration: float) -> tuple[Field, ...]:
 
 def diffusion_limit(grid: Grid, kappa: float) -> float:
     """The largest explicit step of diffusion [s] that does not grow."""
+
+class Projection:
+    """A velocity without divergence, the nearest to the given one, and how it was found."""
+
+    @property
+    def velocity(self) -> tuple[Field, ...]:
+        """The velocity that is left, on faces."""
+
+    @property
+    def potential(self) -> Field:
+        """Whose gradient was taken: the step times the pressure over the density [m²/s]."""
+
+    @property
+    def residuals(self) -> Array:
+        """The largest |div u| dx over the largest |u| before the projection: at the start, and after each iteration."""
+
+    @property
+    def times(self) -> Array:
+        """When that was [s], from the start of the solution."""
+
+    @property
+    def set_up(self) -> float:
+        """Time [s] for all that depends on the grid and its solids alone."""
+
+    @property
+    def iterations(self) -> int: ...
+    @property
+    def refinements(self) -> int:
+        """How often what was left was evaluated anew and solved for."""
+
+    @property
+    def converged(self) -> bool: ...
+    @property
+    def pockets(self) -> int:
+        """Spaces that no open face joins to the largest one."""
+
+def project(
+    velocity: Vectors,
+    open: Vectors | None = None,
+    method: Literal[
+        "jacobi",
+        "gauss_seidel",
+        "sor",
+        "conjugate_gradients",
+        "incomplete_cholesky",
+        "modified_incomplete_cholesky",
+        "multigrid",
+        "multigrid_gradients",
+        "cosine",
+    ] = "multigrid_gradients",
+    tolerance: float = 1e-5,
+    iterations: int = 1000,
+    precision: Literal["single", "double"] = "double",
+) -> Projection:
+    """The velocity without divergence that is nearest to a given one, on faces between walls at rest; `open` are the shares of
+    faces that no solid covers, in steps of 1/127. Stops at the tolerance on max |div u| dx/max |u|. Raises TumbleError."""

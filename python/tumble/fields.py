@@ -7,12 +7,14 @@ slope_x.array, slope_x.place
 
 A field knows its place: "cell", "face x", "edge x" (or y, z) or "node"; mixing places raises TumbleError. Vectors are the
 fields of their components, on faces or on edges. Results lie between closed walls; advect and diffuse keep the sides of what
-they are given. Theory: docs/theory/grids.md. All in double precision.
+they are given. project takes from a velocity what makes it diverge, by any solver of the ladder, and tells how that went.
+Theory: docs/theory/grids.md, docs/theory/pressure.md. All in double precision, by choice but project.
 """
 
 from tumble._engine import (
     Field,
     Grid,
+    Projection,
     advect,
     average,
     curl,
@@ -22,12 +24,14 @@ from tumble._engine import (
     divergence,
     gradient,
     laplacian,
+    project,
     sample,
 )
 
 __all__ = [
     "Field",
     "Grid",
+    "Projection",
     "advect",
     "average",
     "curl",
@@ -37,5 +41,6 @@ __all__ = [
     "divergence",
     "gradient",
     "laplacian",
+    "project",
     "sample",
 ]

@@ -344,7 +344,7 @@ fn a_broken_number_is_told_with_its_cell() {
 }
 
 /// The cavity under a lid that moves at 1 m/s, at Reynolds number 1/viscosity.
-fn cavity(n: usize, viscosity: f64, courant: f64) -> Simulation {
+fn cavity(n: usize, viscosity: f64, courant: f64, tolerance: f64) -> Simulation {
     simulation(&format!(
         r#"
 dimension = 2
@@ -357,6 +357,7 @@ fluid_density = 1
 viscosity = {viscosity}
 advection = {{ velocity = {{ interpolation = "cubic" }} }}
 courant = {courant}
+pressure = {{ tolerance = {tolerance:e} }}
 "#
     ))
 }
@@ -398,7 +399,7 @@ const LID: [(f64, [f64; 3]); 15] = [
 
 #[test]
 fn the_cavity_of_ghia_at_re_100() {
-    let mut sim = cavity(64, 0.01, 0.5);
+    let mut sim = cavity(64, 0.01, 0.5, 1e-10);
     run(&mut sim, 30);
     let worst = off_line(&sim, "velocity_x", &LID.map(|(z, u)| (z, u[0])));
     let before = sim.ledger().kinetic;
@@ -430,23 +431,29 @@ fn the_cavity_of_ghia_at_128_squared() {
         (0.0703, [0.10360, 0.29629]),
         (0.0625, [0.09481, 0.28070]),
     ];
-    // Semi-Lagrangian with cubic interpolation and RK2, implicit viscosity, half a cell a step.
-    for (i, (re, frames)) in [(100.0, 30), (400.0, 40), (1000.0, 60)].into_iter().enumerate() {
-        let mut sim = cavity(128, 1.0 / re, 0.5);
-        run(&mut sim, frames - 1);
+    // Semi-Lagrangian with cubic interpolation and RK2, implicit viscosity, a quarter of a cell a step: where the flow has settled,
+    // what is left is of first order in the step (half a cell: 1.97 % and 2.42 % at Re 1000; two cells: 4.7 % and 5.2 %), and no
+    // better with MacCormack's correction (1.49 % and 1.92 %). Steps of a cell settle it first, which is four times as fast.
+    for (i, (re, fast, slow)) in [(100.0, 20, 10), (400.0, 30, 20), (1000.0, 40, 25)].into_iter().enumerate() {
+        let mut first = cavity(128, 1.0 / re, 1.0, 1e-6);
+        run(&mut first, fast);
+        let mut sim = cavity(128, 1.0 / re, 0.25, 1e-6);
+        for face in ["velocity_x", "velocity_z"] {
+            sim.write("fluid", face, &grid(&first, "fluid", face).0).unwrap();
+        }
+        run(&mut sim, slow - 1);
         let before = sim.ledger().kinetic;
         step(&mut sim);
         let change = sim.ledger().kinetic / before - 1.0;
         let u = off_line(&sim, "velocity_x", &LID.map(|(z, u)| (z, u[i])));
         let of_w = if i == 1 { 0.0 } else { off_line(&sim, "velocity_z", &w.map(|(x, w)| (x, w[i / 2]))) };
         println!(
-            "cavity at Re {re}: u off by {:.2} %, w by {:.2} % of the lid's speed, energy still grows by {change:.1e} in 1 s",
+            "cavity, 128², Re {re}, semi-Lagrangian cubic, 0.25 cells a step: u off by {:.2} %, w by {:.2} % of the lid's speed (aim: 2 %); \
+             energy grows by {change:.1e} in the last second",
             100.0 * u,
             100.0 * of_w
         );
         assert!(change.abs() < 1e-3, "{re} {change}");
-        // Measured at Re 100: 0.12 % and 0.15 %. In single precision at Re 1000: 1.96 % and 2.41 %, so that w misses the goal of 2 %;
-        // with two cells a step they are 4.7 % and 5.2 %.
-        assert!(u < 0.02 && of_w < if re < 1000.0 { 0.02 } else { 0.025 }, "{re} {u} {of_w}");
+        assert!(u < 0.02 && of_w < 0.02, "{re} {u} {of_w}");
     }
 }

@@ -505,3 +505,64 @@ fn what_cannot_be_solved_says_so() {
     let refuse = Params { excess: Excess::Refuse, ..Params::default() };
     assert!(matches!(solid.solve(&random(lattice), &mut q, &refuse), Err(Fault::Excess { cells: 1, .. })));
 }
+
+#[test]
+fn the_history_tells_what_was_left_when() {
+    // A clock that goes on by a second whenever it is read.
+    use std::sync::atomic::{AtomicU32, Ordering};
+    static READ: AtomicU32 = AtomicU32::new(0);
+    let n = 16;
+    let lattice = Lattice::new([n; 3]);
+    let w = cut(lattice, sphere(n));
+    let alive = alive(lattice, &w);
+    let mut b = random(lattice);
+    b.iter_mut().zip(&alive).for_each(|(b, alive)| *b *= alive);
+    let mean = b.iter().sum::<f64>() / alive.iter().sum::<f64>();
+    b.iter_mut().zip(&alive).for_each(|(b, alive)| *b -= mean * alive);
+    for method in Method::ALL.into_iter().filter(|m| *m != Method::Cosine) {
+        let made = Solver::new(lattice, [CLOSED; 3], [&w[0], &w[1], &w[2]], None).unwrap();
+        let mut solver = made.with_clock(|| f64::from(READ.fetch_add(1, Ordering::Relaxed)));
+        let mut q = vec![0.0; b.len()];
+        // Beyond what one part of a refinement is trusted with, 1e-9.
+        let info = solver.solve_double(&b, &mut q, &params(method, 1e-10)).unwrap();
+        assert!(info.converged && info.refinements > 0, "{} {info:?}", method.name());
+        assert_eq!([info.history.len(), info.times.len()], [info.iterations + 1; 2], "{}", method.name());
+        assert!(info.times.windows(2).all(|t| t[1] > t[0]), "{}", method.name());
+        let largest = |r: &[f64]| r.iter().fold(0.0_f64, |most, r| most.max(r.abs()));
+        assert!((info.history[0] - largest(&b)).abs() < 1e-15);
+        // By another evaluation.
+        let mut left = vec![0.0; b.len()];
+        solver.residual(&b, &q, &mut left);
+        let last = info.history[info.iterations];
+        assert_eq!(last, info.largest);
+        assert!((last / largest(&left) - 1.0).abs() < 0.02, "{} {last:e} {:e}", method.name(), largest(&left));
+        // Largest and root mean square stay within what 3504 cells allow, and fall together.
+        for (largest, r) in info.history[1..].iter().zip(&info.residuals) {
+            let ratio = largest / info.history[0] / r;
+            assert!(ratio > 0.3 && ratio < 40.0, "{} {ratio}", method.name());
+        }
+    }
+}
+
+#[test]
+fn the_largest_residual_is_met_even_when_it_lags_behind_the_mean() {
+    // Each part of a refinement aims at a mean: where the largest is still above its target, another one must follow.
+    let n = 20;
+    let lattice = Lattice::new([n; 3]);
+    let w = cut(lattice, sphere(n));
+    let alive = alive(lattice, &w);
+    let mut b = smooth(lattice);
+    let mean = b.iter().zip(&alive).map(|(b, alive)| b * alive).sum::<f64>() / alive.iter().sum::<f64>();
+    b.iter_mut().zip(&alive).for_each(|(b, alive)| *b = (*b - mean) * alive);
+    let largest = b.iter().fold(0.0_f64, |most, r| most.max(r.abs()));
+    for method in Method::ALL.into_iter().filter(|m| *m != Method::Cosine) {
+        let mut solver = Solver::new(lattice, [CLOSED; 3], [&w[0], &w[1], &w[2]], None).unwrap();
+        for exponent in 6..18 {
+            let target = largest * 10.0_f64.powf(-0.5 * f64::from(exponent));
+            let mut q = vec![0.0; b.len()];
+            let asked = Params { target: Target::Largest(target), ..params(method, 0.0) };
+            let info = solver.solve_double(&b, &mut q, &asked).unwrap();
+            assert!(info.converged && info.largest <= target, "{} {target:e} {info:?}", method.name());
+        }
+    }
+}

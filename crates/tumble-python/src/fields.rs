@@ -10,11 +10,11 @@ use tumble_f64::state::{self, GridError, Place, Side, Sides, Vectors};
 
 type Any<'py> = Bound<'py, PyAny>;
 
-fn wrong(text: impl std::fmt::Display) -> PyErr {
+pub fn wrong(text: impl std::fmt::Display) -> PyErr {
     TumbleError::new_err(text.to_string())
 }
 
-fn checked<T>(result: Result<T, GridError>) -> PyResult<T> {
+pub fn checked<T>(result: Result<T, GridError>) -> PyResult<T> {
     result.map_err(wrong)
 }
 
@@ -195,7 +195,7 @@ fn all_sides(grid: &state::Grid, value: &Any) -> PyResult<Sides> {
 #[pyclass(frozen, skip_from_py_object, module = "tumble.fields")]
 #[derive(Clone)]
 pub struct Field {
-    field: state::Field,
+    pub(crate) field: state::Field,
 }
 
 #[pymethods]
@@ -232,7 +232,7 @@ impl Field {
 }
 
 /// A field, or a sequence of the components of vectors.
-fn parts(value: &Any, what: &str) -> PyResult<Vectors> {
+pub fn parts(value: &Any, what: &str) -> PyResult<Vectors> {
     if let Ok(one) = value.cast::<Field>() {
         return Ok(Vectors { parts: vec![one.get().field.clone()] });
     }

@@ -3,6 +3,7 @@
 mod arrays;
 mod errors;
 mod fields;
+mod projection;
 mod scene;
 mod user;
 mod vdb;
@@ -19,6 +20,8 @@ mod _engine {
     use super::fields::{
         Field, Grid, advect, average, curl, diffuse, diffusion_limit, directional, divergence, gradient, laplacian, sample,
     };
+    #[pymodule_export]
+    use super::projection::{Projection, project};
     #[pymodule_export]
     use super::scene::{Scene, load_mesh};
     #[pymodule_export]

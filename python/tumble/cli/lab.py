@@ -23,6 +23,7 @@ def lab() -> None:
       tumble lab structures
       tumble lab operators
       tumble lab compressible
+      tumble lab pressure
     """
 
 
@@ -116,3 +117,28 @@ def compressible(out: OutOption = None) -> None:
     from tumble.lab.compressible import page
 
     say(page(out or find.OUT / "lab" / "compressible"))
+
+
+@app.command()
+def pressure(
+    cells: Annotated[int, typer.Option(metavar="N", min=16, max=256, help="Along a side of the cube.")] = 48,
+    single: Annotated[bool, typer.Option("--single", help="In single precision, as scenes are run.")] = False,
+    budget: Annotated[float, typer.Option(metavar="S", help="Time after which a method is stopped [s].")] = 20.0,
+    out: OutOption = None,
+) -> None:
+    """Climb the ladder of pressure solvers: what each leaves, over time and over iterations.
+
+    \b
+    Examples:
+      tumble lab pressure
+      tumble lab pressure --cells 96 --budget 60
+    """
+    if not 0 < budget < float("inf"):
+        raise typer.BadParameter("expected > 0 s", param_hint="--budget")
+    from tumble.lab.pressure import page
+
+    with Progress("lab") as progress:
+        written = page(
+            out or find.OUT / "lab" / "pressure", cells, budget, "single" if single else "double", progress=progress
+        )
+    say(written)

@@ -28,7 +28,7 @@ pub(super) fn solve<T: Weight>(solver: &mut Solver<T>, before: Before, x: &mut [
     let [mut p, mut q] = [std::mem::take(&mut solver.p), std::mem::take(&mut solver.q)];
     p.reserve(x.len());
     q.reserve(x.len());
-    let mut info = Info::default();
+    let mut info = Info::by(solver.clock);
     let [start, most] = solver.norms();
     let mut old = f64::INFINITY;
     info.begin(start, most, params.target);
@@ -64,7 +64,7 @@ pub(super) fn cycles<T: Weight>(solver: &mut Solver<T>, x: &mut [Real], params: 
     let registers = solver.registers;
     let mut q = std::mem::take(&mut solver.q);
     q.reserve(x.len());
-    let mut info = Info::default();
+    let mut info = Info::by(solver.clock);
     let [start, most] = solver.norms();
     info.begin(start, most, params.target);
     while !info.converged && info.iterations < params.iterations {
@@ -89,7 +89,7 @@ pub(super) fn direct<T: Weight>(
     params: &Params,
     solve: impl FnOnce(&Grid<T>, &mut [Real], Registers),
 ) -> Info {
-    let mut info = Info::default();
+    let mut info = Info::by(solver.clock);
     let [start, most] = solver.norms();
     info.begin(start, most, params.target);
     if !info.converged {

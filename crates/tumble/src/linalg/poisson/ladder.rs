@@ -56,7 +56,7 @@ pub(super) fn relax<T: Weight>(solver: &mut Solver<T>, x: &mut [Real], params: &
     let mut other = std::mem::take(&mut solver.p);
     other.reserve(x.len());
     let (grid, registers) = (&solver.fine, solver.registers);
-    let mut info = Info::default();
+    let mut info = Info::by(solver.clock);
     let mut start = 0.0;
     loop {
         let half = |x: &[Real], out: &mut [Real], colour: Option<usize>, norms: bool| {

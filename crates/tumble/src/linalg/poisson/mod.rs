@@ -67,6 +67,7 @@ pub struct Solver<T> {
     p: Column,
     q: Column,
     registers: Registers,
+    clock: report::Clock,
 }
 
 impl<T: Weight> Solver<T> {
@@ -143,6 +144,7 @@ impl<T: Weight> Solver<T> {
             p: Column::new(),
             q: Column::new(),
             registers: Registers::Avx512,
+            clock: report::Clock::default(),
         })
     }
 
@@ -159,6 +161,12 @@ impl<T: Weight> Solver<T> {
     /// Uses registers no wider than that; the bits stay the same, which tests show.
     pub fn with_registers(mut self, registers: Registers) -> Self {
         self.registers = registers;
+        self
+    }
+
+    /// Tells the time [s] of every iteration by that.
+    pub fn with_clock(mut self, now: fn() -> f64) -> Self {
+        self.clock = report::Clock(Some(now));
         self
     }
 
@@ -222,7 +230,7 @@ impl<T: Weight> Solver<T> {
                 return Err(Fault::Shape { expected, given });
             }
         }
-        let mut info = Info { pockets: self.pockets(), ..Info::default() };
+        let mut info = Info { pockets: self.pockets(), ..Info::by(self.clock) };
         self.pockets.load(&mut self.fine, b, params.excess)?;
         let [start, most] = self.norms();
         info.begin(start, most, params.target);
@@ -233,7 +241,8 @@ impl<T: Weight> Solver<T> {
                 Target::Largest(m) => m / largest,
             };
             let inner = Params {
-                target: Target::Relative((0.9 * wanted).max(TRUSTED)),
+                // At least a part that stands out from rounding, should the largest be just above the target.
+                target: Target::Relative((0.9 * wanted).clamp(TRUSTED, 0.4)),
                 iterations: params.iterations - info.iterations,
                 ..*params
             };
@@ -244,12 +253,17 @@ impl<T: Weight> Solver<T> {
             let [after, most] = self.norms();
             let scale = (now / start).sqrt();
             info.residuals.extend(part.residuals.iter().map(|r| r * scale));
+            // Each part repeats what the one before left.
+            info.history.extend(part.history.iter().skip(1));
+            info.times.extend(part.times.iter().skip(1));
             info.iterations += part.iterations;
             info.refinements += 1;
             info.largest = most;
             let residual = (after / start).sqrt();
-            if let Some(last) = info.residuals.last_mut() {
-                *last = residual;
+            let evaluated = [(&mut info.residuals, residual), (&mut info.history, most)];
+            evaluated.into_iter().filter_map(|(all, new)| Some((all.last_mut()?, new))).for_each(|(last, new)| *last = new);
+            if let (Some(last), Some(now)) = (info.times.last_mut(), self.clock.0) {
+                *last = now();
             }
             info.converged = match params.target {
                 Target::Relative(r) => residual <= r,

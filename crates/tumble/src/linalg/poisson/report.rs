@@ -104,6 +104,10 @@ pub struct Info {
     pub iterations: usize,
     /// |b - A x| over |b| after each iteration; before the first it is 1. By recursion, or, after each refinement, as evaluated.
     pub residuals: Vec<f64>,
+    /// The largest |b - A x| of a cell, in the unit of b: before the first iteration, and after each.
+    pub history: Vec<f64>,
+    /// When that was [s], by the clock of [`super::Solver::with_clock`]; empty without one.
+    pub times: Vec<f64>,
     /// The largest |b - A x| of a cell at the end, in the unit of b.
     pub largest: f64,
     /// Whether the target is met.
@@ -112,19 +116,41 @@ pub struct Info {
     pub pockets: usize,
     /// How often what is left was evaluated anew and solved for.
     pub refinements: usize,
+    pub(super) clock: Clock,
+}
+
+/// What tells the time [s]: the engine has no clock of its own. All are equal.
+#[derive(Debug, Clone, Copy, Default)]
+pub(super) struct Clock(pub Option<fn() -> f64>);
+
+impl PartialEq for Clock {
+    fn eq(&self, _: &Self) -> bool {
+        true
+    }
 }
 
 impl Info {
+    /// Nothing done yet, by that clock.
+    pub(super) fn by(clock: Clock) -> Self {
+        Self { clock, ..Self::default() }
+    }
+
+    fn mark(&mut self, largest: f64) {
+        self.largest = largest;
+        self.history.push(largest);
+        self.times.extend(self.clock.0.map(|now| now()));
+    }
+
     /// Before the first iteration.
     pub(super) fn begin(&mut self, squared: f64, largest: f64, target: Target) {
-        self.largest = largest;
+        self.mark(largest);
         self.converged = squared == 0.0 || matches!(target, Target::Largest(most) if largest <= most);
     }
 
     /// After an iteration: the squared norm of what is left, that of the right-hand side.
     pub(super) fn add(&mut self, squared: f64, start: f64, largest: f64, target: Target) {
         self.iterations += 1;
-        self.largest = largest;
+        self.mark(largest);
         let residual = (squared / start).sqrt();
         self.residuals.push(residual);
         self.converged = match target {
