@@ -19,6 +19,7 @@ import numpy.typing as npt
 from tumble import grids
 from tumble._engine import ExportError
 from tumble.grids import Box
+from tumble.pictures.blackbody import glow
 from tumble.pictures.surfaces import Floats, Indices, balls, normals, outward, split, tubes
 from tumble.style import COLORS, GROUND, PALETTE, SOLID, Rgb, linear, rgb
 
@@ -161,6 +162,8 @@ class Smoke:
     """Share of that which is scattered."""
     emission: npt.NDArray[np.float32] | None = None
     """Light that is sent out over a length, nx x ny x nz x 3."""
+    film: bool = False
+    """Whether that light is seen as on film, on which every colour saturates by itself."""
 
 
 @dataclass(frozen=True)
@@ -198,6 +201,12 @@ LOOKED_AT = 9
 
 SMOKE: Rgb = (0.52, 0.53, 0.56)
 """Colour of smoke that has none of its own."""
+
+GLOWING = 1000.0
+"""A gas that gets hotter than this [K] in a run is seen to glow."""
+
+EXPOSURE = 12.0
+"""Light of soot at the highest temperature of a run that hides all behind it; 1 is nearly white."""
 
 THICK = 40.0
 """Optical depth of the thickest smoke of a run across its whole box, the mean of its sides."""
@@ -328,6 +337,7 @@ class Stage:
         self._ways: dict[tuple[str, int], Floats] = {}
         self._pieces: dict[tuple[str, int], tuple[Floats, Floats]] = {}
         self._ranges: dict[str, tuple[str, float, float] | None] = {}
+        self._hottest: dict[str, float] = {}
 
     def things(self, i: int, thinnest: float = 0.0) -> list[Thing]:
         """What is to be drawn of frame i. Nothing is thinner than the radius `thinnest` [m]."""
@@ -373,7 +383,9 @@ class Stage:
             share = np.nan_to_num((values - low) / (high - low), nan=1.0, posinf=1.0, neginf=0.0)
             if grid.flat == 3:
                 thick = np.clip(share, 0.0, None) * (THICK / float(grid.size.mean()))
-                drawn.append(Smoke(thing.name, grid.origin, grid.spacing, thick.astype(np.float32), thing.color))
+                thick = thick.astype(np.float32)
+                glow = self._glow(thing, grid, columns, thick)
+                drawn.append(Smoke(thing.name, grid.origin, grid.spacing, thick, thing.color, glow, glow is not None))
             else:
                 drawn.append(_image(thing, grid, name, share, name in ("density", "fuel") and low == 0.0))
         if grid.flat < 3:
@@ -381,6 +393,21 @@ class Stage:
             line = np.stack([corners, np.roll(corners, -1, axis=0)], axis=1).reshape(-1, 3)
             drawn.append(Tubes(f"{thing.name} edges", line, np.full(4, 2), max(thinnest, 1e-9), SOLID))
         return drawn
+
+    def _glow(
+        self, thing: Object, grid: Box, columns: Columns, thick: npt.NDArray[np.float32]
+    ) -> npt.NDArray[np.float32] | None:
+        """Light of a hot gas: that of a black body, as much as it takes away (Kirchhoff's law)."""
+        if "temperature" not in columns.get(thing.name, {}):
+            return None
+        if thing.name not in self._hottest:
+            looks = np.unique(np.linspace(0, self.run.n_frames - 1, LOOKED_AT).astype(int)).tolist()
+            most = [self.run.frame(i).get(thing.name, {}).get("temperature", np.zeros(1)).max() for i in looks]
+            self._hottest[thing.name] = float(np.nan_to_num(np.max(most)))
+        if self._hottest[thing.name] < GLOWING:
+            return None
+        values = _one_number(grid, columns[thing.name], "temperature").astype(np.float32)
+        return EXPOSURE * thick[..., None] * glow(values, self._hottest[thing.name])
 
     def _range(self, thing: Object, grid: Box) -> tuple[str, float, float] | None:
         """What is shown of an object on a grid, from where to where; nothing if there is nothing to see."""

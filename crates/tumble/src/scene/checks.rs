@@ -8,7 +8,7 @@ use tumble_interface::check::suggestion;
 use tumble_interface::scene::{Force, Integrator, Method, Plane, Scene, Shape, Source, System};
 
 /// Column names that a frame may hold.
-pub const COLUMNS: [&str; 15] = [
+pub const COLUMNS: [&str; 16] = [
     "position",
     "velocity",
     "orientation",
@@ -16,6 +16,7 @@ pub const COLUMNS: [&str; 15] = [
     "link_strain",
     "density",
     "temperature",
+    "fuel",
     "flux",
     "pressure",
     "vorticity",

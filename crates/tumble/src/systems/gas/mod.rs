@@ -9,6 +9,7 @@
 
 mod books;
 mod confinement;
+mod fire;
 mod fluid;
 mod forces;
 mod projection;
@@ -17,6 +18,7 @@ mod sides;
 mod solids;
 mod viscosity;
 
+pub use fire::{Fire, Flame};
 pub use fluid::{Carried, Failed, Failure, Fluid, Settings};
 pub use forces::{Cover, Source};
 pub use sides::{Beyond, hold};

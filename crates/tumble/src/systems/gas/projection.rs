@@ -39,9 +39,16 @@ pub fn right_side(u: &Vectors, b: &mut Field) {
     });
 }
 
-/// The same around solids.                                                             (gas.10)
-pub fn around(u: &Vectors, solids: Option<&Solids>, b: &mut Field) {
+/// The same around solids, where the divergence is to be S.                              (gas.10, fire.3)
+pub fn around(u: &Vectors, solids: Option<&Solids>, swelling: Option<&Field>, b: &mut Field) {
     right_side(u, b);
+    if let Some(swelling) = swelling {
+        let scale = (b.grid.dx * b.grid.dx) as Real;
+        each_row(b, |j, k, row| {
+            let at = swelling.index([0, j, k]);
+            row.iter_mut().zip(&swelling.data[at..]).for_each(|(b, s)| *b += scale * s);
+        });
+    }
     solids.iter().for_each(|solids| solids.correct(u, b));
 }
 
@@ -69,16 +76,21 @@ fn subtract_gradient(u: &mut Vectors, q: &[Real], open: [[bool; 2]; 3]) {
 }
 
 impl Fluid {
-    /// Makes the velocity at time t free of divergence; h [s] only scales the pressure that it takes.          (gas.4)
+    /// Makes the velocity at time t free of divergence, but for what fire swells; h [s] only scales the pressure that it takes.          (gas.4)
     pub fn projection(&mut self, t: f64, h: f64, report: &mut StepReport) -> Result<(), Failure> {
         super::sides::hold(&mut self.u, &self.settings.sides, t);
         if let Some(solids) = &self.solids {
             solids.close(&mut self.u);
         }
-        let fastest = self.fastest();
-        let Self { u, b, left, q, pressure, settings, solver, solids, .. } = self;
-        around(u, solids.as_ref(), b);
+        let mut fastest = self.fastest();
+        let Self { u, b, left, q, pressure, settings, solver, solids, flame, .. } = self;
+        let swelling = flame.as_ref().filter(|flame| flame.fire.expansion > 0.0).map(|flame| &flame.swelling);
+        around(u, solids.as_ref(), swelling, b);
         let dx = b.grid.dx;
+        if let Some(swelling) = swelling {
+            // A fluid at rest is moved by nothing else.
+            fastest = rows::worse(fastest, dx * rows::magnitude(swelling));
+        }
         let asked = settings.tolerance * dx * fastest;
         let mut params = Params { target: Target::Largest(asked), ..settings.pressure };
         if solids.as_ref().is_some_and(Solids::moves) {
@@ -93,7 +105,7 @@ impl Fluid {
             subtract_gradient(u, q, open);
             solids.iter().for_each(|solids| solids.close(u));
             chunks(&mut pressure.data, |start, p| p.iter_mut().zip(&q[start..]).for_each(|(p, q)| *p += to_pressure * q));
-            around(u, solids.as_ref(), b);
+            around(u, solids.as_ref(), swelling, b);
             left.copy_from_slice(&b.data);
         });
         let info = info.map_err(Failure::Pressure)?;
