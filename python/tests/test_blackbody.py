@@ -60,10 +60,33 @@ def test_film_is_linear_in_the_dark_and_white_in_the_light() -> None:
     assert red[0] > 0.5 > 3 * red[1] and yellow[1] > 0.95 > 2 * yellow[2] and white.min() > 0.99
 
 
+def test_light_of_a_glowing_block_is_kirchhoffs() -> None:
+    """B (1 - exp(-tau)) of each colour, and then on film; between cells ln B is linear, so that exp(k x) stays one."""
+    from tumble.pictures.framing import Camera
+
+    n, tau = 20, 1.5
+    y = np.eye(3)[1]
+    view = Camera(-y, np.zeros(3), np.eye(3)[2], 0.8, (64, 48), True)
+    extinction = np.full((n, n, n), tau / 0.4, dtype=np.float32)
+    source = np.broadcast_to(np.array([0.3, 0.2, 0.1], dtype=np.float32), (n, n, n, 3))
+    dark, depth = np.zeros((48, 64, 3)), np.full((48, 64), np.inf)
+    cube = Smoke("", np.full(3, -0.2), 0.4 / n, extinction, (0.0, 0.0, 0.0), glow=source)
+    got = volumes.smoke(dark, depth, [cube], view)[24, 32]
+    expected = volumes.developed(np.array([0.3, 0.2, 0.1]) * (1 - np.exp(-tau)))
+    np.testing.assert_allclose(got, expected, rtol=2e-4)
+    # Along the ray, with s = tau/0.4: int s exp(-s x) exp(-k x) dx = s/(s + k) (1 - exp(-(s + k) 0.4)).
+    s, k = tau / 0.4, 4.0
+    fall = np.exp(-k * 0.4 / n * (np.arange(n) + 0.5)).astype(np.float32)
+    slanted = Smoke("", cube.low, cube.spacing, extinction, cube.color, glow=source * fall[None, :, None, None])
+    got = volumes.smoke(dark, depth, [slanted], view)[24, 32]
+    light = np.array([0.3, 0.2, 0.1]) * s / (s + k) * (1 - np.exp(-(s + k) * 0.4))
+    np.testing.assert_allclose(got, volumes.developed(light), rtol=2e-3)
+
+
 def test_a_hot_gas_glows_and_a_cold_one_does_not() -> None:
     run = fake_run.plume(12)
     cold = next(t for t in Studio(run, "matplotlib").things(4) if isinstance(t, Smoke))
-    assert cold.emission is None and not cold.film
+    assert cold.glow is None and cold.emission is None
     before = run.frame
 
     def hotter(i: int) -> dict[str, dict[str, np.ndarray]]:
@@ -76,13 +99,14 @@ def test_a_hot_gas_glows_and_a_cold_one_does_not() -> None:
     run.frame = hotter  # type: ignore[method-assign]
     studio = Studio(run, "matplotlib")
     hot = next(t for t in studio.things(4) if isinstance(t, Smoke))
-    assert hot.film and hot.emission is not None
+    assert hot.glow is not None
     # Kirchhoff: the light of a cell over what it takes away is that of a black body.
-    i = np.unravel_index(np.argmax(hot.emission[..., 0]), hot.extinction.shape)
+    i = np.unravel_index(np.argmax(hot.glow[..., 0]), hot.extinction.shape)
     t = hotter(4)[hot.name]["temperature"][i]
     from tumble.pictures import things
 
     expected = things.EXPOSURE * blackbody.colors(t)[0] / blackbody.colors(1800.0).max()
-    assert hot.emission[i][0] / hot.extinction[i] == pytest.approx(expected, rel=1e-2)
-    shown = studio.picture(4).astype(int)
+    assert hot.glow[i][0] == pytest.approx(expected, rel=1e-2)
+    run.scene = {**run.scene, "camera": {**run.scene.get("camera", {}), "look": "night"}}
+    shown = Studio(run, "matplotlib").picture(4).astype(int)
     assert (shown[..., 0] - shown[..., 2]).max() > 60

@@ -130,8 +130,13 @@ impl World {
         archive.rewind();
         let [frame] = archive.numbers("world")?[..] else { return None };
         self.frame = frame as u64;
-        self.exchange.restore(&archive.numbers("exchange")?)?;
-        self.systems.iter_mut().try_for_each(|s| s.restore(archive))
+        let posted = archive.numbers("exchange")?;
+        self.systems.iter_mut().try_for_each(|s| s.restore(archive))?;
+        if self.exchange.is_heard() {
+            let time = self.time();
+            self.systems.iter().for_each(|s| s.publish(time, &mut self.exchange));
+        }
+        self.exchange.restore(&posted)
     }
 
     /// Hash of everything that the next step depends on.

@@ -162,8 +162,8 @@ class Smoke:
     """Share of that which is scattered."""
     emission: npt.NDArray[np.float32] | None = None
     """Light that is sent out over a length, nx x ny x nz x 3."""
-    film: bool = False
-    """Whether that light is seen as on film, on which every colour saturates by itself."""
+    glow: npt.NDArray[np.float32] | None = None
+    """Light of what hides all behind it, nx x ny x nz x 3, seen as on film. Between cells it changes by powers."""
 
 
 @dataclass(frozen=True)
@@ -205,8 +205,11 @@ SMOKE: Rgb = (0.52, 0.53, 0.56)
 GLOWING = 1000.0
 """A gas that gets hotter than this [K] in a run is seen to glow."""
 
-EXPOSURE = 12.0
+EXPOSURE = 60.0
 """Light of soot at the highest temperature of a run that hides all behind it; 1 is nearly white."""
+
+BURNING = 0.3
+"""Optical depth of a gas that glows, over that of one that does not: flames are seen through."""
 
 THICK = 40.0
 """Optical depth of the thickest smoke of a run across its whole box, the mean of its sides."""
@@ -383,9 +386,9 @@ class Stage:
             share = np.nan_to_num((values - low) / (high - low), nan=1.0, posinf=1.0, neginf=0.0)
             if grid.flat == 3:
                 thick = np.clip(share, 0.0, None) * (THICK / float(grid.size.mean()))
-                thick = thick.astype(np.float32)
-                glow = self._glow(thing, grid, columns, thick)
-                drawn.append(Smoke(thing.name, grid.origin, grid.spacing, thick, thing.color, glow, glow is not None))
+                glow = self._glow(thing, grid, columns)
+                thick = (thick * (1.0 if glow is None else BURNING)).astype(np.float32)
+                drawn.append(Smoke(thing.name, grid.origin, grid.spacing, thick, thing.color, glow=glow))
             else:
                 drawn.append(_image(thing, grid, name, share, name in ("density", "fuel") and low == 0.0))
         if grid.flat < 3:
@@ -394,10 +397,8 @@ class Stage:
             drawn.append(Tubes(f"{thing.name} edges", line, np.full(4, 2), max(thinnest, 1e-9), SOLID))
         return drawn
 
-    def _glow(
-        self, thing: Object, grid: Box, columns: Columns, thick: npt.NDArray[np.float32]
-    ) -> npt.NDArray[np.float32] | None:
-        """Light of a hot gas: that of a black body, as much as it takes away (Kirchhoff's law)."""
+    def _glow(self, thing: Object, grid: Box, columns: Columns) -> npt.NDArray[np.float32] | None:
+        """Light of a hot gas: that of a black body, of which it sends out the share that it takes away (Kirchhoff's law)."""
         if "temperature" not in columns.get(thing.name, {}):
             return None
         if thing.name not in self._hottest:
@@ -407,7 +408,7 @@ class Stage:
         if self._hottest[thing.name] < GLOWING:
             return None
         values = _one_number(grid, columns[thing.name], "temperature").astype(np.float32)
-        return EXPOSURE * thick[..., None] * glow(values, self._hottest[thing.name])
+        return EXPOSURE * glow(values, self._hottest[thing.name])
 
     def _range(self, thing: Object, grid: Box) -> tuple[str, float, float] | None:
         """What is shown of an object on a grid, from where to where; nothing if there is nothing to see."""

@@ -23,6 +23,9 @@ pub struct Gas {
     #[serde(default = "air")]
     #[schemars(extend("x-unit" = "kg/m³", "exclusiveMinimum" = 0.0))]
     pub fluid_density: f64,
+    /// What differences of density do.
+    #[serde(default)]
+    pub densities: Densities,
     /// Dynamic viscosity; without it, none but that of the advection.
     #[serde(default)]
     #[schemars(range(min = 0.0), extend("x-unit" = "Pa s"))]
@@ -144,6 +147,17 @@ pub enum Solid {
     FreeSlip,
     /// It sticks to the surface.
     NoSlip,
+}
+
+/// What differences of density do. Density is fluid_density/(1 + temperature.expansion (T - ambient)) + smoke.weight times smoke.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum Densities {
+    /// They push, but have no inertia: for small ones.
+    #[default]
+    Boussinesq,
+    /// They push and have inertia; every step has a pressure equation of its own.
+    Variable,
 }
 
 /// How viscosity is stepped.

@@ -13,7 +13,7 @@ use crate::systems::gas::{Beyond, Fire, Fluid, Gas, Settings, Solids, Source};
 use std::sync::Arc;
 use tumble_interface::check::plain;
 use tumble_interface::scene::{
-    Carriage, Component, ExcessFlow, Gas as Words, GasSide, GridInterpolation, PathTrace, PressureMethod, Scene, Shape, Solid,
+    Carriage, Component, Densities, ExcessFlow, Gas as Words, GasSide, GridInterpolation, PathTrace, PressureMethod, Scene, Shape, Solid,
     System as Plan, Temperature,
 };
 use tumble_interface::{Issue, SceneError};
@@ -314,6 +314,10 @@ impl Read<'_, '_> {
             self.wrong(".pressure.method", "cosine, which knows no colliders; take multigrid_gradients");
             return None;
         }
+        if cosine && words.densities == Densities::Variable {
+            self.wrong(".pressure.method", "cosine, which knows one density alone; take multigrid_gradients");
+            return None;
+        }
         let pressure = &words.pressure;
         let settings = Settings {
             density: words.fluid_density,
@@ -330,6 +334,7 @@ impl Read<'_, '_> {
             radiation: warmth.radiation,
             specific_heat: warmth.specific_heat,
             expansion: warmth.expansion.unwrap_or(1.0 / warmth.ambient),
+            variable: words.densities == Densities::Variable,
             fire,
             sources,
             confinement: words.confinement,
@@ -396,7 +401,9 @@ pub fn bytes(words: &Words, flat: Option<usize>, solids: bool) -> f64 {
     // weights and coarse grids.
     // Distances and open shares; what is listed is near surfaces, but for closed faces.
     let solid = if solids { 4.0 } else { 0.0 };
+    // Densities at cells and faces; weights, and a solver with coarse grids that has numbers for them.
+    let varied = if words.densities == Densities::Variable { 1.0 + axes + 3.0 + 14.0 } else { 0.0 };
     let swelling = f64::from(u8::from(words.fire.is_some()));
-    let numbers = 3.0 * (axes + carried) + swelling + 5.0 + 6.5 + scratch + conjugates + confined + solid;
+    let numbers = 3.0 * (axes + carried) + swelling + varied + 5.0 + 6.5 + scratch + conjugates + confined + solid;
     cells * numbers * real
 }

@@ -116,8 +116,9 @@ impl Fluid {
             books.heat += capacity * (self.excess() - start);
             books.heat_in += capacity * came;
         }
-        for part in &self.u.parts {
+        for (index, part) in self.u.parts.iter().enumerate() {
             let Place::Face(axis) = part.place else { continue };
+            let light = self.densities.as_ref().and_then(|densities| densities.light.parts.get(index));
             let half = |along: usize| !grid.periodic[axis] && (along == 0 || along == grid.n[axis]);
             let lattice = grid.lattice();
             let share = |start: usize, i: usize| {
@@ -127,7 +128,8 @@ impl Fluid {
                     _ => (start - lattice.at(0, 0, 0)) / lattice.stride[2],
                 };
                 let open = self.solids.as_ref().map_or(1.0, |solids| f64::from(solids.open[axis][start + i].value()));
-                if half(along) { 0.5 * open } else { open }
+                let heavy = light.map_or(open, |light| open / f64::from(light.data[start + i]));
+                if half(along) { 0.5 * heavy } else { heavy }
             };
             let weighed = |power: i32| {
                 sum(part, |at, n| {
@@ -213,6 +215,7 @@ impl Fluid {
             let [start, came] = archive.numbers("burnt")?[..] else { return None };
             flame.books = [start, came];
         }
+        self.weigh();
         if self.solids.as_ref().is_some_and(Solids::moves) {
             let time = *archive.numbers("solids")?.first()?;
             self.settle(time).ok()?;
@@ -232,6 +235,8 @@ impl Fluid {
                 self.u.parts.iter_mut().find(|part| axis.is_some_and(|a| part.place == Place::Face(a)))
             }
         };
-        field.is_some_and(|field| field.set(&values).is_ok())
+        let fits = field.is_some_and(|field| field.set(&values).is_ok());
+        self.weigh();
+        fits
     }
 }

@@ -1,5 +1,6 @@
 //! A fluid in a box: its state, and the step that the lecture draws.
 
+use super::densities::Densities;
 use super::fire::{Fire, Flame};
 use super::forces::Source;
 use super::rows::{magnitude, worse};
@@ -44,6 +45,8 @@ pub struct Settings {
     pub specific_heat: f64,
     /// Growth of a volume with temperature [1/K].
     pub expansion: f64,
+    /// Whether differences of density have inertia.
+    pub variable: bool,
     /// How fuel burns.
     pub fire: Option<Fire>,
     /// Where smoke, warmth and velocity come from.
@@ -104,6 +107,8 @@ pub struct Fluid {
     pub flame: Option<Flame>,
     /// Pressure of the last projection at cells [Pa].
     pub pressure: Field,
+    /// Where densities vary.
+    pub(super) densities: Option<Densities>,
     pub(super) solver: Solver<u8>,
     pub(super) solids: Option<Solids>,
     /// Of anything: velocities, right-hand side and unknown of the pressure, and what operators need.
@@ -213,6 +218,7 @@ impl Fluid {
             temperature,
             flame,
             pressure,
+            densities: if settings.variable { Some(Densities::new(grid)?) } else { None },
             solver,
             solids,
             b: Field::new(grid, Place::Cell, "m²/s")?,
@@ -283,6 +289,13 @@ impl Fluid {
         self.smoke.iter_mut().for_each(|smoke| solids.clear(&mut smoke.field.data, 0.0));
         self.temperature.iter_mut().for_each(|warmth| solids.clear(&mut warmth.field.data, self.settings.ambient));
         self.flame.iter_mut().for_each(|flame| solids.clear(&mut flame.fuel.field.data, 0.0));
+    }
+
+    /// Takes the densities from what is carried.
+    pub(super) fn weigh(&mut self) {
+        if let Some(densities) = &mut self.densities {
+            densities.measure(&self.settings, self.smoke.as_ref(), self.temperature.as_ref());
+        }
     }
 
     fn failed(&self, failure: Failure) -> Box<Failed> {

@@ -174,20 +174,28 @@ impl Fluid {
         }
     }
 
-    /// Accelerations: given ones, and g (s weight/rho - beta (T - T0)).                                  (gas.2)
+    /// Accelerations: given ones, and g (s weight/rho - beta (T - T0)).                                  (gas.2, gas.13)
     fn push(&mut self, t: f64, h: f64) -> Result<(), Failure> {
+        self.weigh();
         let settings = &self.settings;
+        if let Some(densities) = &self.densities {
+            densities.push(&mut self.u, settings.gravity, h);
+        }
+        // Boussinesq's have none of their own.
+        let light = self.densities.is_none();
         let constant = if settings.acceleration.is_uniform() { settings.acceleration.value(t) } else { [0.0; 3].into() };
         let constant = <[f64; 3]>::from(constant);
         for part in &mut self.u.parts {
             let Place::Face(axis) = part.place else { continue };
             let g = settings.gravity[axis];
             if let Some(smoke) = &self.smoke
+                && light
                 && g * settings.weight != 0.0
             {
                 push_by(part, axis, &smoke.field, h * g * settings.weight / settings.density, 0.0);
             }
             if let Some(warmth) = &self.temperature
+                && light
                 && g * settings.expansion != 0.0
             {
                 push_by(part, axis, &warmth.field, -h * g * settings.expansion, settings.ambient);

@@ -9,6 +9,7 @@
 
 mod books;
 mod confinement;
+mod densities;
 mod fire;
 mod fluid;
 mod forces;
@@ -120,7 +121,9 @@ impl System for Gas {
         Ok(report)
     }
 
-    fn publish(&self, _t: f64, _exchange: &mut Exchange) {}
+    fn publish(&self, t: f64, exchange: &mut Exchange) {
+        self.fluids.iter().for_each(|fluid| exchange.blow(&fluid.name, t, &fluid.u));
+    }
 
     fn columns(&self, names: &[&str], out: &mut Vec<Column>) {
         self.fluids.iter().for_each(|fluid| fluid.columns(names, out));

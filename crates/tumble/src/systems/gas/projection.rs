@@ -3,7 +3,7 @@
 use super::fluid::{Failure, Fluid};
 use super::rows::{self, Face, runs};
 use super::solids::Solids;
-use crate::linalg::poisson::{Excess, Params, Target};
+use crate::linalg::poisson::{Excess, Params, Solver, Target};
 use crate::math::Real;
 use crate::math::parallel::chunks;
 use crate::operators::each_row;
@@ -52,13 +52,33 @@ pub fn around(u: &Vectors, solids: Option<&Solids>, swelling: Option<&Field>, b:
     solids.iter().for_each(|solids| solids.correct(u, b));
 }
 
-/// u -= grad q, on the sides of the box only where they are open.                      (pressure.1)
-fn subtract_gradient(u: &mut Vectors, q: &[Real], open: [[bool; 2]; 3]) {
-    for part in &mut u.parts {
+/// u -= rho_0/rho_f grad q, on the sides of the box only where they are open.                      (pressure.1, gas.13)
+fn subtract_gradient(u: &mut Vectors, q: &[Real], open: [[bool; 2]; 3], light: Option<&Vectors>) {
+    for (index, part) in u.parts.iter_mut().enumerate() {
+        let light = light.and_then(|light| light.parts.get(index));
         let crate::state::Place::Face(axis) = part.place else { continue };
         let scale = (1.0 / part.grid.dx) as Real;
         let grid = part.grid;
+        let lattice = grid.lattice();
         each_row(part, |j, k, row| {
+            if let Some(light) = light {
+                let at = lattice.at(0, j, k);
+                let mut done = 0;
+                return runs(&grid, axis, j, k, row, |run, face| {
+                    let light = &light.data[at + done..][..run.len()];
+                    done += run.len();
+                    let (low, high, scale) = match face {
+                        Face::Between(low, high) => (Some(low), Some(high), scale),
+                        Face::Lower(cell) if open[axis][0] => (None, Some(cell), 2.0 * scale),
+                        Face::Upper(cell) if open[axis][1] => (Some(cell), None, 2.0 * scale),
+                        Face::Lower(_) | Face::Upper(_) => return,
+                    };
+                    let q = |cell: Option<usize>, i: usize| cell.map_or(0.0, |cell| q[cell + i]);
+                    for i in 0..run.len() {
+                        run[i] -= scale * light[i] * (q(high, i) - q(low, i));
+                    }
+                });
+            }
             runs(&grid, axis, j, k, row, |run, face| match face {
                 Face::Between(low, high) => {
                     let n = run.len();
@@ -79,11 +99,12 @@ impl Fluid {
     /// Makes the velocity at time t free of divergence, but for what fire swells; h [s] only scales the pressure that it takes.          (gas.4)
     pub fn projection(&mut self, t: f64, h: f64, report: &mut StepReport) -> Result<(), Failure> {
         super::sides::hold(&mut self.u, &self.settings.sides, t);
+        self.weigh();
         if let Some(solids) = &self.solids {
             solids.close(&mut self.u);
         }
         let mut fastest = self.fastest();
-        let Self { u, b, left, q, pressure, settings, solver, solids, flame, .. } = self;
+        let Self { u, b, left, q, pressure, settings, solver, solids, flame, densities, .. } = self;
         let swelling = flame.as_ref().filter(|flame| flame.fire.expansion > 0.0).map(|flame| &flame.swelling);
         around(u, solids.as_ref(), swelling, b);
         let dx = b.grid.dx;
@@ -101,13 +122,25 @@ impl Fluid {
         pressure.data.fill(0.0);
         let to_pressure = (settings.density / h) as Real;
         left.copy_from_slice(&b.data);
-        let info = solver.refine(left, q, &params, |_, q, left| {
-            subtract_gradient(u, q, open);
+        let densities = densities.as_ref();
+        let light = densities.map(|densities| &densities.light);
+        let mut take = |q: &[Real], left: &mut [Real]| {
+            subtract_gradient(u, q, open, light);
             solids.iter().for_each(|solids| solids.close(u));
             chunks(&mut pressure.data, |start, p| p.iter_mut().zip(&q[start..]).for_each(|(p, q)| *p += to_pressure * q));
             around(u, solids.as_ref(), swelling, b);
             left.copy_from_slice(&b.data);
-        });
+        };
+        let info = match densities {
+            None => solver.refine(left, q, &params, |_, q, left| take(q, left)),
+            Some(densities) => {
+                // Another equation in every step.
+                let weights = densities.weights(solids.as_ref().map(|solids| &solids.open));
+                let sides = settings.sides.each_ref().map(|ends| ends.each_ref().map(super::Beyond::pressure));
+                Solver::new(solver.lattice(), sides, weights.each_ref().map(Vec::as_slice), None)
+                    .and_then(|mut solver| solver.refine(left, q, &params, |_, q, left| take(q, left)))
+            }
+        };
         let info = info.map_err(Failure::Pressure)?;
         report.linear += info.iterations as u64;
         report.pressure = info.residuals;
