@@ -71,7 +71,7 @@ def chromaticity(temperature: npt.ArrayLike) -> Floats:
 
 def colors(temperature: npt.ArrayLike) -> Floats:
     """Linear sRGB of black bodies, no part less than none [W/(m² sr)]; n x 3."""
-    return np.maximum(seen(temperature) @ TO_SRGB.T, 0.0)
+    return np.asarray(np.maximum(seen(temperature) @ TO_SRGB.T, 0.0))
 
 
 def glow(temperature: npt.NDArray[np.float32], white: float) -> npt.NDArray[np.float32]:

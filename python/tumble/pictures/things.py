@@ -385,9 +385,9 @@ class Stage:
             # As a share of what there is in the whole run.
             share = np.nan_to_num((values - low) / (high - low), nan=1.0, posinf=1.0, neginf=0.0)
             if grid.flat == 3:
-                thick = np.clip(share, 0.0, None) * (THICK / float(grid.size.mean()))
                 glow = self._glow(thing, grid, columns)
-                thick = (thick * (1.0 if glow is None else BURNING)).astype(np.float32)
+                most = THICK * (1.0 if glow is None else BURNING) / float(grid.size.mean())
+                thick = (np.clip(share, 0.0, None) * most).astype(np.float32)
                 drawn.append(Smoke(thing.name, grid.origin, grid.spacing, thick, thing.color, glow=glow))
             else:
                 drawn.append(_image(thing, grid, name, share, name in ("density", "fuel") and low == 0.0))
