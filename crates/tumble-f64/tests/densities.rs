@@ -82,7 +82,7 @@ fn a_wave_between_layers_has_its_period() {
         let off = [32, 64].map(|n| wave(densities, n) / exact - 1.0);
         println!("{densities}: off by {off:?} of {exact} rad/s");
         // Carrying smears the sheet of vortices between the layers to a layer, which is slower: of first order or less. Variable:
-        // -5.9 % and -4.4 %.
+        // -5.9 % and -4.4 %, Boussinesq -6.2 % and -4.7 %.
         assert!(off[0].abs() < 0.075 && off[1].abs() < 0.85 * off[0].abs(), "{densities}: {off:?}");
     }
 }
@@ -115,8 +115,9 @@ smoke = {{ initial = "2*clamp(0.5 + {n}*(1 + 0.004*cos(pi*x) - z), 0, 1)" }}
             rate / (atwood * 9.8 * PI * PI.tanh()) - 1.0
         });
         println!("{densities}: w² off by {off:?}");
-        // The interface is a cell thick: k dx A at first order where densities have inertia.
-        assert!(off[0].abs() < 0.05 && off[1].abs() < 0.6 * off[0].abs(), "{densities}: {off:?}");
+        // The interface is a cell thick, of first order where its density has inertia: -1.37 % and -0.70 %; 0.19 % and 0.05 %.
+        let (worst, order) = if densities == "variable" { (0.018, 1.0) } else { (0.0025, 2.0) };
+        assert!(off[0].abs() < worst && ((off[0] / off[1]).log2() - order).abs() < 0.15, "{densities}: {off:?}");
     }
 }
 
@@ -146,11 +147,11 @@ viscosity = 1e-4
 
 #[test]
 fn the_pressure_converges_with_densities_one_to_ten() {
-    // Blobs of a few cells everywhere, and a ball at rest or moving.
+    // Blobs of a few cells everywhere, and a ball at rest or moving. 10.3, 10.4 and 10.5 iterations a step.
     for (name, collider, most) in [
-        ("free", "", 40.0),
-        ("ball", "[[collider]]\nname = \"ball\"\nshape = { sphere = { radius = 0.2 } }", 40.0),
-        ("moving", "[[collider]]\nname = \"ball\"\nshape = { sphere = { radius = 0.2 } }\nmotion = { velocity = [0.5, 0, 0.2] }", 40.0),
+        ("free", "", 13.0),
+        ("ball", "[[collider]]\nname = \"ball\"\nshape = { sphere = { radius = 0.2 } }", 13.0),
+        ("moving", "[[collider]]\nname = \"ball\"\nshape = { sphere = { radius = 0.2 } }\nmotion = { velocity = [0.5, 0, 0.2] }", 13.0),
     ] {
         let mut sim = simulation(&format!(
             r#"
