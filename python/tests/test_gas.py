@@ -7,8 +7,9 @@ from typing import Any
 import numpy as np
 import pytest
 
-from tumble import World
+from tumble import World, grids
 from tumble.cli.report import summary
+from tumble.export import vdb
 from tumble.run import simulate
 
 Tree = dict[str, Any]
@@ -66,3 +67,42 @@ def test_steps_that_are_far_too_long_are_told_once(tmp_path: Path) -> None:
     held = simulate({**scene, "system": [{"method": "gas", "substeps": 1}]}, tmp_path / "held")
     assert summary(held).count("cells in a step") == 1
     assert held.ledger["courant"].max() > 1
+
+
+FIRE: Tree = {
+    "version": 1,
+    "time": {"fps": 30, "frames": 6},
+    "gas": [
+        {
+            "name": "fire",
+            "box": {"size": [1, 1, 1.5], "center": [0, 0, 0.75], "resolution": 36},
+            "sides": {"x": ["open", "open"], "z": ["no_slip", "open"]},
+            "smoke": {"weight": 0},
+            "temperature": {"radiation": 1000},
+            "fire": {"soot": 0.1, "expansion": 10},
+            "source": [
+                {"shape": {"sphere": {"center": [0, 0, 0.1], "radius": 0.2}}, "fuel_density": 0.05, "temperature": 900}
+            ],
+        }
+    ],
+    "output": {"plot": False, "columns": ["density", "temperature", "fuel"]},
+}
+
+
+@pytest.mark.parametrize("densities", ["boussinesq", "variable"])
+def test_a_fire_in_single_precision(densities: str, tmp_path: Path) -> None:
+    scene = copy.deepcopy(FIRE)
+    scene["gas"][0]["densities"] = densities
+    run = simulate(scene, tmp_path / "run")
+    assert run.ledger["unconverged"].max() == 0
+    assert 0 < run.ledger["residual"].max() <= 1e-5
+    table = run.frame(6)["fire"]
+    # 0.05 kg/m³ of 4.5e7 J/kg warm 1.2 kg/m³ of 1005 J/(kg K) by 1866 K if it all burns at once; expansion thins it.
+    assert 1200 < table["temperature"].max() < 900 + 1866
+    # It is as hot as that only where something has burnt, and soot is there.
+    hot = table["temperature"] > 1000
+    assert hot.sum() > 20 and table["density"][hot].min() > 0
+    assert 0 < table["fuel"].max() <= 0.05
+    grid = grids.box(run.static["fire"])
+    assert grid is not None
+    assert vdb.fields(grid, table) == {"density": 1, "temperature": 1, "fuel": 1}

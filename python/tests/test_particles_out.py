@@ -199,6 +199,35 @@ def test_usd_holds_every_frame(tmp_path: Path) -> None:
         assert UsdGeom.PrimvarsAPI(prim).GetPrimvar(name).GetInterpolation() == "vertex"
 
 
+def test_usd_has_trails_as_curves_by_id(tmp_path: Path) -> None:
+    from pxr import UsdGeom
+
+    run = fake_run.fountain()
+    run.scene["emitter"][0]["trail"] = 2.5 / fake_run.FPS
+    stage = read_usd(run, tmp_path)
+    curves = UsdGeom.BasisCurves(stage.GetPrimAtPath("/scene/spray_trail"))
+    assert curves.GetTypeAttr().Get() == "linear"
+    longest = 0
+    for i in range(run.n_frames):
+        tables = [run.frame(k)["spray"] for k in range(max(0, i - 2), i + 1)]
+        expected, counts = [], []
+        for number in tables[-1]["id"]:
+            way: list[np.ndarray] = []
+            for table in tables[::-1]:
+                (row,) = np.nonzero(table["id"] == number)
+                if not len(row):
+                    break
+                way.insert(0, table["position"][row[0]])
+            if len(way) > 1:
+                expected += way
+                counts.append(len(way))
+        np.testing.assert_array_equal(np.array(curves.GetCurveVertexCountsAttr().Get(i)), counts)
+        points = np.array(curves.GetPointsAttr().Get(i)).reshape(-1, 3)
+        np.testing.assert_allclose(points, np.array(expected).reshape(-1, 3), atol=1e-6)
+        longest = max([longest, *counts])
+    assert longest == 3
+
+
 def test_usd_between_frames_particles_go_on_with_their_velocities(tmp_path: Path) -> None:
     from pxr import UsdGeom
 

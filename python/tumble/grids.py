@@ -20,7 +20,7 @@ Table = Mapping[str, Array]
 # fmt: off
 UNITS = {
     "density": "kg/m³", "temperature": "K", "pressure": "Pa", "velocity": "m/s", "speed": "m/s", "vorticity": "1/s",
-    "divergence": "1/s", "fuel": "1", "flux": "W/m²", "residual": "1/s",
+    "divergence": "1/s", "fuel": "kg/m³", "flux": "W/m²", "residual": "1/s",
     "velocity_x": "m/s", "velocity_y": "m/s", "velocity_z": "m/s",
 }
 # fmt: on

@@ -6,6 +6,8 @@
 //! everyone has advanced would conserve momentum too, and multiply the energy (see `docs/theory/coupling.md`).
 
 use crate::geometry::Vector;
+use crate::state::Vectors;
+use std::sync::Arc;
 
 /// A mass that another system may push: its place in the list of ports.
 pub type Port = usize;
@@ -74,6 +76,13 @@ pub struct Flux {
     pub mass: f64,
 }
 
+/// Velocities that a fluid has published, of the last two times [s]. They are in no snapshot: the fluid publishes them anew.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct Wind {
+    fluid: String,
+    states: Vec<(f64, Arc<Vectors>)>,
+}
+
 /// Ports and mail.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Exchange {
@@ -82,6 +91,7 @@ pub struct Exchange {
     bodies: Vec<Port>,
     mail: Vec<Letter>,
     fluxes: Vec<Flux>,
+    winds: Vec<Wind>,
     /// Sum of all impulses ever posted and ever delivered [N s].
     pub posted: Vector,
     /// Sum of all impulses ever delivered [N s].
@@ -158,6 +168,33 @@ impl Exchange {
     /// What has passed through all surfaces.
     pub fn fluxes(&self) -> &[Flux] {
         &self.fluxes
+    }
+
+    /// Asks a fluid for its velocities.
+    pub fn listen(&mut self, fluid: &str) {
+        if self.winds.iter().all(|wind| wind.fluid != fluid) {
+            self.winds.push(Wind { fluid: fluid.into(), states: Vec::new() });
+        }
+    }
+
+    /// Whether anybody wants to know the velocities of fluids.
+    pub fn is_heard(&self) -> bool {
+        !self.winds.is_empty()
+    }
+
+    /// The velocities of a fluid on faces [m/s] at time t [s], if anybody wants to know.
+    pub fn blow(&mut self, fluid: &str, t: f64, u: &Vectors) {
+        if let Some(wind) = self.winds.iter_mut().find(|wind| wind.fluid == fluid) {
+            wind.states.retain(|(time, _)| *time < t);
+            wind.states.push((t, Arc::new(u.clone())));
+            let old = wind.states.len().saturating_sub(2);
+            wind.states.drain(..old);
+        }
+    }
+
+    /// What a fluid has published.
+    pub fn wind(&self, fluid: &str) -> &[(f64, Arc<Vectors>)] {
+        self.winds.iter().find(|wind| wind.fluid == fluid).map_or(&[], |wind| &wind.states)
     }
 
     /// Everything as numbers, for a snapshot: ports in order, fluxes, then the mail.

@@ -130,8 +130,15 @@ impl World {
         archive.rewind();
         let [frame] = archive.numbers("world")?[..] else { return None };
         self.frame = frame as u64;
-        self.exchange.restore(&archive.numbers("exchange")?)?;
-        self.systems.iter_mut().try_for_each(|s| s.restore(archive))
+        let posted = archive.numbers("exchange")?;
+        self.systems.iter_mut().try_for_each(|s| s.restore(archive))?;
+        if self.exchange.is_heard() {
+            // As it was when the interval before ended, to the bit.
+            let done = self.frame * u64::from(self.exchanges);
+            let time = done.checked_sub(1).map_or(0.0, |before| before as f64 * self.dt + self.dt);
+            self.systems.iter_mut().for_each(|s| s.publish(time, &mut self.exchange));
+        }
+        self.exchange.restore(&posted)
     }
 
     /// Hash of everything that the next step depends on.

@@ -62,6 +62,12 @@ fn scenes() -> Vec<(&'static str, String, usize)> {
     let stirring = plume.replace("viscosity", "solids = \"no_slip\"\nviscosity")
         + "[[collider]]\nname = \"ball\"\nmotion = { velocity = [0.5, 0.2, 0.7], spin = [0, 5, 0] }\nshape.sphere = { center = [-0.2, 0.1, 0], radius = 0.17 }\n\
            [[collider]]\nname = \"floor\"\nshape.floor.height = -0.7\n";
+    let fire = stirring
+        .replace("[[gas]]", "[[system]]\nname = \"air\"\nmethod = \"gas\"\n[[system]]\nname = \"dust\"\nmethod = \"tracers\"\nintegrator = \"heun\"\n[[gas]]")
+        .replace("viscosity = 1e-3", "densities = \"variable\"\nfire = { ignition = 350, burn_time = 0.1, soot = 0.1, heat = 1e7, expansion = 30 }\nviscosity = 1e-3")
+        .replace("{ ambient = 300 }", "{ ambient = 300, radiation = 1000 }")
+        .replace("temperature = 400", "temperature = 600\nfuel_density = 0.03")
+        + "[[field]]\nkind = \"gas\"\nof = \"air\"\n[[emitter]]\nname = \"dust\"\nsystem = \"dust\"\nrate = 40000\nlifetime = 0.4\nfrom.sphere = { center = [0.1, 0, -0.3], radius = 0.3 }\n";
     let rope = "[[system]]\nintegrator = \"bdf2\"\nsolver.linear = \"cholesky\"\n[[rope]]\nname = \"rope\"\nfrom = [0, 0, 0]\nto = [1, 0, 0]\nlength = 1.2\nsegments = 40\npin = [\"start\", \"end\"]\n";
     let spray = "[[system]]\nintegrator = \"velocity_verlet\"\nsubsteps = 3\n[[force]]\nkind = \"drag\"\nrate = 0.3\n\
                  [[emitter]]\nname = \"spray\"\nrate = 60000\njitter = 1\nspeed = 3\ncone = 20\nlifetime = 0.4\nlifetime_spread = 0.5\nmass_spread = 0.3\nfrom.disk.radius = 0.1\n\
@@ -83,6 +89,7 @@ fn scenes() -> Vec<(&'static str, String, usize)> {
                  [[particles]]\nname = \"three\"\nposition = [[1, 0, 0], [0, 1, 0], [0, 0, 1]]\n";
     vec![
         ("smoke", smoke.to_string(), 16),
+        ("fire", fire, 6),
         ("dust, stirred", stirred, 8),
         ("stars", stars.to_string(), 3),
         ("stars, native", format!("bits = \"native\"\n{stars}"), 3),

@@ -45,13 +45,16 @@ ROOT = "/scene"
 SENSOR = 0.36
 """Width of the camera's sensor [tenth of a metre], the unit that USD takes for lenses."""
 
+TRAIL = 0.3
+"""Radius of trails over the radius of the points that leave them."""
+
 SPRING = 0.25
 """Radius of springs over the radius of the masses that they join."""
 
 KNOWN = ("position", "velocity", "id", "radius", "color")
 """Columns that become something else than a primvar of their name."""
 
-Numbers = npt.NDArray[np.float32] | npt.NDArray[np.int64]
+Numbers = npt.NDArray[np.float32] | npt.NDArray[np.int64] | npt.NDArray[np.int32]
 
 
 @dataclass(frozen=True)
@@ -70,6 +73,54 @@ class Part:
     radius: float = 0.0
     cut: tuple[npt.NDArray[np.int64], npt.NDArray[np.int64]] | None = None
     """What `surfaces.split` says of a solid that has sharp edges."""
+    trail: bool = False
+    """Whether its curves are the ways of points, as long as `Object.trail` says."""
+
+
+Ways = dict[str, tuple[npt.NDArray[np.float32], npt.NDArray[np.int32]]]
+"""Object -> points of the ways behind its points, and how many each has."""
+
+
+class History:
+    """The last frames of points that leave trails."""
+
+    def __init__(self, things: list[Object]) -> None:
+        self.things = [t for t in things if t.kind == "points" and t.trail > 0.0]
+        self.past: dict[str, list[tuple[float, npt.NDArray[np.int64], npt.NDArray[np.float64]]]] = {}
+
+    def ways(self, time: float, columns: Columns) -> Ways:
+        """The ways up to a time [s] that is later than all before."""
+        found: Ways = {}
+        for thing in self.things:
+            x = positions(columns, thing)
+            ids = np.asarray(columns.get(thing.name, {}).get("id", np.arange(len(x))), dtype=np.int64)
+            past = [p for p in self.past.get(thing.name, []) if p[0] >= time - thing.trail - 1e-9]
+            self.past[thing.name] = past = [*past, (time, ids, x)]
+            found[thing.name] = _way(past, thing.leap)
+        return found
+
+
+def _way(
+    past: list[tuple[float, npt.NDArray[np.int64], npt.NDArray[np.float64]]], leap: float
+) -> tuple[npt.NDArray[np.float32], npt.NDArray[np.int32]]:
+    """Points of ways, each from its oldest to where it is now, and how many each has; two at least."""
+    _, ids, x = past[-1]
+    way, there = [x], [np.ones(len(ids), dtype=bool)]
+    for _, old, before in reversed(past[:-1]):
+        order = np.argsort(old)
+        at = np.minimum(np.searchsorted(old[order], ids), max(len(old) - 1, 0))
+        if not len(old):
+            break
+        at = order[at]
+        known = there[-1] & (old[at] == ids)
+        known &= np.linalg.norm(before[at] - way[-1], axis=1) <= leap
+        way.append(before[at])
+        there.append(known)
+    mask = np.stack(there[::-1], axis=1)
+    mask &= mask.sum(axis=1, keepdims=True) > 1
+    points = np.stack(way[::-1], axis=1)[mask]
+    counts = mask.sum(axis=1)
+    return points.astype(np.float32), counts[counts > 0].astype(np.int32)
 
 
 def write(
@@ -86,7 +137,9 @@ def write(
     goal = Path(folder)
     layers = goal / "usd"
     start = run.frame(0)
-    parts = _parts(objects(run), start)
+    things = objects(run)
+    parts, history = _parts(things, start), History(things)
+    beginning = history.ways(run.time(0), start)
     digits = max(DIGITS, len(str(run.n_frames - 1)))
     if volumes and vdb.grids(run):
         vdb.write(run, goal)
@@ -97,11 +150,12 @@ def write(
                 old.unlink()
         for i in range(run.n_frames):
             columns = start if i == 0 else run.frame(i)
-            _save(_frame(parts, columns, i), layers / f"frame.{i:0{digits}d}.usdc")
+            ways = beginning if i == 0 else history.ways(run.time(i), columns)
+            _save(_frame(parts, columns, ways, i), layers / f"frame.{i:0{digits}d}.usdc")
             if progress is not None:
                 progress(i + 1, run.n_frames)
-        _save(_manifest(parts, start), layers / "manifest.usda")
-        _save(_objects(run, parts, start), layers / "objects.usdc")
+        _save(_manifest(parts, start, beginning), layers / "manifest.usda")
+        _save(_objects(run, parts, start, beginning), layers / "objects.usdc")
         scene = goal / "scene.usda"
         _save(_scene(run, "#" * digits), scene)
     return scene
@@ -143,6 +197,10 @@ def _parts(found: list[Object], start: Columns) -> list[Part]:
         elif len(thing.triangles):
             cut = None if thing.kind == "sheet" else split(_places(thing, start), thing.triangles)
             parts.append(Part(thing, path(thing.name), thing.name, "Mesh", cut=cut))
+    for thing in found:
+        if thing.kind == "points" and thing.trail > 0.0:
+            title = f"{thing.name} trail"
+            parts.append(Part(thing, path(title), title, "BasisCurves", radius=TRAIL * thing.radius, trail=True))
     for thing in found:
         if thing.kind == "points" and len(thing.links):
             title = f"{thing.name} springs"
@@ -187,13 +245,21 @@ def _array(values: Numbers) -> Any:
     """Numbers as the library wants them."""
     from pxr import Vt
 
+    if values.dtype == np.int32:
+        return Vt.IntArray.FromNumpy(values)
     if values.dtype == np.int64:
         return Vt.Int64Array.FromNumpy(values)
     return Vt.Vec3fArray.FromNumpy(values) if values.ndim == 2 else Vt.FloatArray.FromNumpy(values)
 
 
-def _values(part: Part, columns: Columns) -> Iterator[tuple[str, str, Numbers]]:
+def _values(part: Part, columns: Columns, ways: Ways) -> Iterator[tuple[str, str, Numbers]]:
     """What a frame says of a part: attribute, type and values."""
+    if part.trail:
+        points, counts = ways[part.thing.name]
+        yield "points", "point3f[]", points
+        yield "curveVertexCounts", "int[]", counts
+        yield "extent", "float3[]", _extent(points, np.float32(part.radius))
+        return
     x = _places(part.thing, columns)
     v = columns.get(part.thing.name, {}).get("velocity")
     chosen = slice(None) if part.order is None else part.order
@@ -218,11 +284,15 @@ def _values(part: Part, columns: Columns) -> Iterator[tuple[str, str, Numbers]]:
         for name, numbers in table.items():
             if name not in KNOWN and np.shape(numbers) == (len(points),):
                 yield f"primvars:{_identifier(name)}", "float[]", np.ascontiguousarray(numbers, dtype=np.float32)
+    if len(points) or varying:
+        yield "extent", "float3[]", _extent(points, radius)
+
+
+def _extent(points: npt.NDArray[np.float32], radius: Any) -> npt.NDArray[np.float32]:
     if len(points):
-        yield "extent", "float3[]", np.stack([(points - radius).min(axis=0), (points + radius).max(axis=0)])
-    elif varying:
-        most = np.finfo(np.float32).max
-        yield "extent", "float3[]", np.array([[most] * 3, [-most] * 3], dtype=np.float32)  # The empty range.
+        return np.stack([(points - radius).min(axis=0), (points + radius).max(axis=0)])
+    most = np.finfo(np.float32).max
+    return np.array([[most] * 3, [-most] * 3], dtype=np.float32)  # The empty range.
 
 
 def _identifier(name: str) -> str:
@@ -231,7 +301,7 @@ def _identifier(name: str) -> str:
     return str(Tf.MakeValidIdentifier(name))
 
 
-def _frame(parts: list[Part], columns: Columns, i: int) -> Any:
+def _frame(parts: list[Part], columns: Columns, ways: Ways, i: int) -> Any:
     """The layer of a frame."""
     from pxr import Sdf
 
@@ -245,20 +315,20 @@ def _frame(parts: list[Part], columns: Columns, i: int) -> Any:
                 attribute = Sdf.AttributeSpec(prim, name, Sdf.ValueTypeNames.Find(kind))
                 layer.SetTimeSample(attribute.path, float(i), value)
             if _deforms(part, columns):
-                for name, kind, values in _values(part, columns):
+                for name, kind, values in _values(part, columns, ways):
                     attribute = Sdf.AttributeSpec(prim, name, Sdf.ValueTypeNames.Find(kind))
                     layer.SetTimeSample(attribute.path, float(i), _array(values))
     return layer
 
 
-def _manifest(parts: list[Part], start: Columns) -> Any:
+def _manifest(parts: list[Part], start: Columns, ways: Ways) -> Any:
     from pxr import Sdf
 
     layer = Sdf.Layer.CreateAnonymous(".usda")
     for part in parts:
         named = [(name, kind) for name, kind, _ in _placement(part, start)]
         if _deforms(part, start):
-            named += [(name, kind) for name, kind, _ in _values(part, start)]
+            named += [(name, kind) for name, kind, _ in _values(part, start, ways)]
         if named:
             prim = Sdf.CreatePrimInLayer(layer, part.path)
             for name, kind in named:
@@ -266,7 +336,7 @@ def _manifest(parts: list[Part], start: Columns) -> Any:
     return layer
 
 
-def _objects(run: Recording, parts: list[Part], start: Columns) -> Any:
+def _objects(run: Recording, parts: list[Part], start: Columns, ways: Ways) -> Any:
     """What does not change, and the start."""
     from pxr import Gf, Sdf, Usd, UsdGeom, UsdShade, Vt
 
@@ -283,7 +353,7 @@ def _objects(run: Recording, parts: list[Part], start: Columns) -> Any:
         if part.kind == "Volume":
             _volume(stage, part, files[part.thing.name], run, start.get(part.thing.name, {}))
             continue
-        for name, kind, values in _values(part, start):
+        for name, kind, values in _values(part, start, ways):
             attribute = prim.CreateAttribute(name, Sdf.ValueTypeNames.Find(kind), False)
             attribute.Set(_array(values))
             if name.startswith("primvars:"):
@@ -311,10 +381,14 @@ def _objects(run: Recording, parts: list[Part], start: Columns) -> Any:
             curves = UsdGeom.BasisCurves(prim)
             curves.CreateTypeAttr(UsdGeom.Tokens.linear)
             curves.CreateWrapAttr(UsdGeom.Tokens.nonperiodic)
-            assert part.counts is not None
-            curves.CreateCurveVertexCountsAttr(Vt.IntArray.FromNumpy(part.counts.astype(np.int32)))
-            curves.CreateWidthsAttr(Vt.FloatArray(n, 2 * part.radius))
-            curves.SetWidthsInterpolation(UsdGeom.Tokens.vertex)
+            if part.trail:
+                curves.CreateWidthsAttr(Vt.FloatArray(1, 2 * part.radius))
+                curves.SetWidthsInterpolation(UsdGeom.Tokens.constant)
+            else:
+                assert part.counts is not None
+                curves.CreateCurveVertexCountsAttr(Vt.IntArray.FromNumpy(part.counts.astype(np.int32)))
+                curves.CreateWidthsAttr(Vt.FloatArray(n, 2 * part.radius))
+                curves.SetWidthsInterpolation(UsdGeom.Tokens.vertex)
         else:
             mesh = UsdGeom.Mesh(prim)
             triangles = part.thing.triangles.astype(np.int32)

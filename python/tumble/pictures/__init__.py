@@ -161,11 +161,12 @@ def render(renderer: str, things: list[Thing], camera: Camera, samples: int = SA
         light, depth = _scenery(renderer, scenery, camera, samples)
     try:
         if night:
-            shown = splats.glow(light, depth, scenery, clouds, camera)
+            shown = volumes.images(splats.glow(light, depth, scenery, clouds, camera), depth, images, camera)
         else:
             assert light is not None
-            shown = splats.discs(light, depth, clouds, camera) if clouds else light
-        shown = volumes.images(shown, depth, images, camera)
+            # Particles in a plane lie on it.
+            shown = volumes.images(light, depth, images, camera)
+            shown = splats.discs(shown, depth, clouds, camera) if clouds else shown
         shown = volumes.smoke(shown, depth, smoke, camera, night)
     except (MemoryError, ValueError) as error:
         raise ExportError(f"particles and smoke cannot be drawn: {error}") from error

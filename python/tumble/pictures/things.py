@@ -19,6 +19,7 @@ import numpy.typing as npt
 from tumble import grids
 from tumble._engine import ExportError
 from tumble.grids import Box
+from tumble.pictures.blackbody import glow
 from tumble.pictures.surfaces import Floats, Indices, balls, normals, outward, split, tubes
 from tumble.style import COLORS, GROUND, PALETTE, SOLID, Rgb, linear, rgb
 
@@ -161,6 +162,8 @@ class Smoke:
     """Share of that which is scattered."""
     emission: npt.NDArray[np.float32] | None = None
     """Light that is sent out over a length, nx x ny x nz x 3."""
+    glow: npt.NDArray[np.float32] | None = None
+    """Light of what hides all behind it, nx x ny x nz x 3, seen as on film. Between cells it changes by powers."""
 
 
 @dataclass(frozen=True)
@@ -198,6 +201,15 @@ LOOKED_AT = 9
 
 SMOKE: Rgb = (0.52, 0.53, 0.56)
 """Colour of smoke that has none of its own."""
+
+GLOWING = 1000.0
+"""A gas that gets hotter than this [K] in a run is seen to glow."""
+
+EXPOSURE = 60.0
+"""Light of soot at the highest temperature of a run that hides all behind it; 1 is nearly white."""
+
+BURNING = 0.3
+"""Optical depth of a gas that glows, over that of one that does not: flames are seen through."""
 
 THICK = 40.0
 """Optical depth of the thickest smoke of a run across its whole box, the mean of its sides."""
@@ -328,6 +340,7 @@ class Stage:
         self._ways: dict[tuple[str, int], Floats] = {}
         self._pieces: dict[tuple[str, int], tuple[Floats, Floats]] = {}
         self._ranges: dict[str, tuple[str, float, float] | None] = {}
+        self._hottest: dict[str, float] = {}
 
     def things(self, i: int, thinnest: float = 0.0) -> list[Thing]:
         """What is to be drawn of frame i. Nothing is thinner than the radius `thinnest` [m]."""
@@ -372,8 +385,10 @@ class Stage:
             # As a share of what there is in the whole run.
             share = np.nan_to_num((values - low) / (high - low), nan=1.0, posinf=1.0, neginf=0.0)
             if grid.flat == 3:
-                thick = np.clip(share, 0.0, None) * (THICK / float(grid.size.mean()))
-                drawn.append(Smoke(thing.name, grid.origin, grid.spacing, thick.astype(np.float32), thing.color))
+                glow = self._glow(thing, grid, columns)
+                most = THICK * (1.0 if glow is None else BURNING) / float(grid.size.mean())
+                thick = (np.clip(share, 0.0, None) * most).astype(np.float32)
+                drawn.append(Smoke(thing.name, grid.origin, grid.spacing, thick, thing.color, glow=glow))
             else:
                 drawn.append(_image(thing, grid, name, share, name in ("density", "fuel") and low == 0.0))
         if grid.flat < 3:
@@ -381,6 +396,19 @@ class Stage:
             line = np.stack([corners, np.roll(corners, -1, axis=0)], axis=1).reshape(-1, 3)
             drawn.append(Tubes(f"{thing.name} edges", line, np.full(4, 2), max(thinnest, 1e-9), SOLID))
         return drawn
+
+    def _glow(self, thing: Object, grid: Box, columns: Columns) -> npt.NDArray[np.float32] | None:
+        """Light of a hot gas: that of a black body, of which it sends out the share that it takes away (Kirchhoff's law)."""
+        if "temperature" not in columns.get(thing.name, {}):
+            return None
+        if thing.name not in self._hottest:
+            looks = np.unique(np.linspace(0, self.run.n_frames - 1, LOOKED_AT).astype(int)).tolist()
+            most = [self.run.frame(i).get(thing.name, {}).get("temperature", np.zeros(1)).max() for i in looks]
+            self._hottest[thing.name] = float(np.nan_to_num(np.max(most)))
+        if self._hottest[thing.name] < GLOWING:
+            return None
+        values = _one_number(grid, columns[thing.name], "temperature").astype(np.float32)
+        return EXPOSURE * glow(values, self._hottest[thing.name])
 
     def _range(self, thing: Object, grid: Box) -> tuple[str, float, float] | None:
         """What is shown of an object on a grid, from where to where; nothing if there is nothing to see."""

@@ -38,6 +38,9 @@ THIN = 0.15
 LEFT = 0.004
 """Rays that have less of their light left end."""
 
+CROSSTALK = 0.02
+"""Share of the other colours' light that each layer of film sees: what is very bright turns white."""
+
 COARSE = 48
 """Blocks of cells along each axis in the shadow on other things."""
 
@@ -130,8 +133,12 @@ def _smoke(light: Floats, depth: Floats, cloud: Smoke, camera: Camera, bright: f
     if cloud.emission is not None:
         glow = np.moveaxis(cloud.emission[part], (axis, u, v), (0, 1, 2)).astype(np.float32)
         glow = np.pad(glow, ((0, 0), (1, 1), (1, 1), (0, 0)))
+    powers = None
+    if cloud.glow is not None:
+        powers = np.log(np.maximum(np.moveaxis(cloud.glow[part], (axis, u, v), (0, 1, 2)), 1e-12)).astype(np.float32)
+        powers = np.pad(powers, ((0, 0), (1, 1), (1, 1), (0, 0)), mode="edge")
     n, rows, columns = both.shape
-    parts = 2 if float(extinction.max()) * cloud.spacing > THIN else 1
+    parts = 2 if powers is not None or float(extinction.max()) * cloud.spacing > THIN else 1
     # In the middles of the parts, in slices.
     slices = (np.arange(parts * n) + 0.5) / parts - 0.5
     if forward[axis] < 0:
@@ -187,10 +194,23 @@ def _smoke(light: Floats, depth: Floats, cloud: Smoke, camera: Camera, bright: f
             shining[some] += (
                 left[some] * length * np.where(thick > 1e-4, (1 - through) / np.maximum(thick, 1e-4), 1.0)
             )[:, None] * shine
+        if powers is not None:
+            cells = _between(powers, k).reshape(-1, 3)
+            shine = ((1 - a) * (1 - b))[:, None] * cells[corner] + ((1 - a) * b)[:, None] * cells[corner + 1]
+            shine += (a * (1 - b))[:, None] * cells[corner + columns] + (a * b)[:, None] * cells[corner + columns + 1]
+            shining[some] += (left[some] * (1 - through))[:, None] * np.exp(shine)
         left[some] *= through
+    if cloud.glow is not None:
+        shining = developed(shining)
     out = light.reshape(-1, 3).copy()
     out[pixels] = out[pixels] * left[:, None] + scattered[:, None] * np.array(cloud.color) + shining
     return out.reshape(light.shape)
+
+
+def developed(light: Array) -> Array:
+    """Light as on film: each of three layers saturates by itself."""
+    sum_ = light.sum(axis=-1, keepdims=True)
+    return np.asarray(1 - np.exp(-((1 - 3 * CROSSTALK) * light + CROSSTALK * sum_)))
 
 
 def _between(slices: npt.NDArray[Any], k: float) -> npt.NDArray[Any]:

@@ -369,6 +369,11 @@ pub struct Goal {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(tag = "kind", rename_all = "snake_case", deny_unknown_fields)]
 pub enum Field {
+    /// The velocity of a gas: its particles go with it.
+    Gas {
+        /// Name of the gas.
+        of: String,
+    },
     /// The same velocity everywhere.
     Uniform {
         /// The velocity; may change in time.

@@ -23,6 +23,9 @@ pub struct Gas {
     #[serde(default = "air")]
     #[schemars(extend("x-unit" = "kg/m³", "exclusiveMinimum" = 0.0))]
     pub fluid_density: f64,
+    /// What differences of density do.
+    #[serde(default)]
+    pub densities: Densities,
     /// Dynamic viscosity; without it, none but that of the advection.
     #[serde(default)]
     #[schemars(range(min = 0.0), extend("x-unit" = "Pa s"))]
@@ -44,7 +47,10 @@ pub struct Gas {
     /// Warmth that the fluid carries, column `temperature`.
     #[serde(default)]
     pub temperature: Option<Temperature>,
-    /// Where smoke, warmth and velocity come from.
+    /// Fuel that the fluid carries and that burns where it is hot, column `fuel`; needs `temperature`.
+    #[serde(default)]
+    pub fire: Option<Fire>,
+    /// Where smoke, warmth, fuel and velocity come from.
     #[serde(default)]
     pub source: Vec<GasSource>,
     /// What the fluid does at colliders: each fills what it covers of the box.
@@ -153,6 +159,10 @@ pub enum GasSide {
         #[serde(default)]
         #[schemars(range(min = 0.0), extend("x-unit" = "kg/m³"))]
         density: f64,
+        /// Density of the fuel that comes in.
+        #[serde(default)]
+        #[schemars(range(min = 0.0), extend("x-unit" = "kg/m³"))]
+        fuel: f64,
         /// Temperature of what comes in; without it, the ambient one.
         #[serde(default)]
         #[schemars(range(min = 0.0), extend("x-unit" = "K"))]
@@ -169,6 +179,17 @@ pub enum Solid {
     FreeSlip,
     /// It sticks to the surface.
     NoSlip,
+}
+
+/// What differences of density do. Density is fluid_density/(1 + temperature.expansion (T - ambient)) + smoke.weight times smoke.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum Densities {
+    /// They push, but have no inertia: for small ones.
+    #[default]
+    Boussinesq,
+    /// They push and have inertia; every step has a pressure equation of its own.
+    Variable,
 }
 
 /// How viscosity is stepped.
@@ -219,9 +240,15 @@ pub struct Temperature {
     /// How fast it falls back to the ambient one: the difference falls as exp(-rate t).
     #[schemars(range(min = 0.0), extend("x-unit" = "1/s"))]
     pub cooling: f64,
+    /// How fast heat radiates away where the fluid is 1000 K above the ambient temperature; by the fourth power of the difference.
+    #[schemars(range(min = 0.0), extend("x-unit" = "K/s"))]
+    pub radiation: f64,
     /// How fast it spreads by itself.
     #[schemars(range(min = 0.0), extend("x-unit" = "m²/s"))]
     pub diffusivity: f64,
+    /// Heat capacity of the fluid.
+    #[schemars(extend("x-unit" = "J/(kg K)", "exclusiveMinimum" = 0.0))]
+    pub specific_heat: f64,
     /// Share by which a volume grows per kelvin; without it, that of an ideal gas, 1/ambient.
     #[schemars(extend("x-unit" = "1/K"))]
     pub expansion: Option<f64>,
@@ -229,11 +256,42 @@ pub struct Temperature {
 
 impl Default for Temperature {
     fn default() -> Self {
-        Self { ambient: 293.15, initial: None, cooling: 0.0, diffusivity: 0.0, expansion: None }
+        Self { ambient: 293.15, initial: None, cooling: 0.0, radiation: 0.0, diffusivity: 0.0, specific_heat: 1005.0, expansion: None }
     }
 }
 
-/// A region that gives smoke, warmth and velocity to the fluid in it.
+/// Fuel that a fluid carries. Where it is hot enough it burns: a share exp(-t/burn_time) is left after a time t.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields, default)]
+pub struct Fire {
+    /// Density of the fuel at the start, a number or a formula of x, y, z.
+    #[schemars(extend("x-unit" = "kg/m³"))]
+    pub initial: Component,
+    /// Temperature above which it burns.
+    #[schemars(range(min = 0.0), extend("x-unit" = "K"))]
+    pub ignition: f64,
+    /// Time in which it burns down to 1/e of itself.
+    #[schemars(extend("x-unit" = "s", "exclusiveMinimum" = 0.0))]
+    pub burn_time: f64,
+    /// Heat that it gives off: the fluid warms by fuel heat/(fluid_density specific_heat).
+    #[schemars(range(min = 0.0), extend("x-unit" = "J/kg"))]
+    pub heat: f64,
+    /// Share of it that becomes smoke; needs `smoke`.
+    #[schemars(range(min = 0.0), extend("x-unit" = "1"))]
+    pub soot: f64,
+    /// Volume by which the fluid grows: div u = expansion fuel/burn_time. The box needs an open side, or
+    /// pressure.excess = "remove".
+    #[schemars(range(min = 0.0), extend("x-unit" = "m³/kg"))]
+    pub expansion: f64,
+}
+
+impl Default for Fire {
+    fn default() -> Self {
+        Self { initial: Component::Value(0.0), ignition: 600.0, burn_time: 0.3, heat: 4.5e7, soot: 0.0, expansion: 0.0 }
+    }
+}
+
+/// A region that gives smoke, warmth, fuel and velocity to the fluid in it.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct GasSource {
@@ -255,6 +313,14 @@ pub struct GasSource {
     #[serde(default)]
     #[schemars(extend("x-unit" = "K/s"))]
     pub heating: f64,
+    /// Fuel that it gives off.
+    #[serde(default)]
+    #[schemars(range(min = 0.0), extend("x-unit" = "kg/(m³ s)"))]
+    pub fuel: f64,
+    /// Fuel density that it holds there.
+    #[serde(default)]
+    #[schemars(range(min = 0.0), extend("x-unit" = "kg/m³"))]
+    pub fuel_density: Option<f64>,
     /// Velocity that it gives the fluid there, before the projection.
     #[serde(default)]
     #[schemars(extend("x-unit" = "m/s"))]

@@ -18,8 +18,8 @@ pub use compressible::Compressible;
 pub use emitters::{Between, Burst, Cause, Emitter, Event, Kill, Source, WhenFull};
 pub use forces::{Anchor, Field, Force, Goal};
 pub use gas::{
-    Advections, Carriage, ExcessFlow, Gas, GasSide, GasSides, GasSource, GridInterpolation, Order, PathTrace, Pressure, PressureMethod,
-    Smoke, Solid, Temperature, Viscous,
+    Advections, Carriage, Densities, ExcessFlow, Fire, Gas, GasSide, GasSides, GasSource, GridInterpolation, Order, PathTrace, Pressure,
+    PressureMethod, Smoke, Solid, Temperature, Viscous,
 };
 pub use grids::GridBox;
 pub use heat::{Heat, HeatRegion, HeatScheme, HeatSide, HeatSides, HeatSource};

@@ -1,5 +1,6 @@
 //! Velocity fields u(x, t): they carry tracers, and are the air of winds.
 
+use super::on_grid::OnGrid;
 use super::turbulence::Turbulence;
 use super::vortex::Vortex;
 use crate::math::{Dual, Lane, Real, Row, Signal, Vec3, VectorSignal, ZERO, add, row, xyz, xyz64};
@@ -31,6 +32,8 @@ pub enum Current {
     Turbulence(Turbulence),
     /// A formula of t and x.
     Formula(VectorSignal),
+    /// That of a fluid.
+    OnGrid(OnGrid),
 }
 
 /// A sum of velocity fields; the linear ones are
@@ -108,6 +111,7 @@ impl Current {
             Self::Sink { center, rate } => add_steady(&Falling(*center, rate.value(t)), x, u),
             Self::Vortex(vortex) => add_steady(&vortex.now(t), x, u),
             Self::Turbulence(noise) => u.iter_mut().zip(x).for_each(|(u, x)| *u = add(*u, narrow(noise.value(t, xyz64(*x))))),
+            Self::OnGrid(fluid) => u.iter_mut().zip(x).for_each(|(u, x)| *u = add(*u, narrow(fluid.at(t, xyz64(*x))))),
             Self::Formula(velocity) => {
                 if !velocity.rows(t, x, x, |i, value| u[i] = add(u[i], narrow(value))) {
                     let here = narrow(velocity.value(t));
@@ -124,6 +128,7 @@ impl Current {
             Self::Sink { center, rate } => Falling(*center, rate.value(t)).at(x),
             Self::Vortex(vortex) => vortex.now(t).value(x),
             Self::Turbulence(noise) => noise.value(t, x),
+            Self::OnGrid(fluid) => fluid.at(t, x),
         }
     }
 
@@ -135,12 +140,18 @@ impl Current {
             Self::Sink { center, rate } => slopes(&Falling(*center, rate.value(t)), x),
             Self::Vortex(vortex) => slopes(&vortex.now(t), x),
             Self::Turbulence(noise) => differences(|x| noise.value(t, x), x, 6e-6 * noise.scale),
+            Self::OnGrid(fluid) => differences(|x| fluid.at(t, x), x, fluid.small()),
             Self::Formula(_) => differences(|x| self.at(t, x), x, super::push::near(x.norm())),
         }
     }
 }
 
 impl Flow {
+    /// The fluids among them.
+    pub fn fluids(&mut self) -> impl Iterator<Item = &mut OnGrid> {
+        self.fields.iter_mut().filter_map(|field| if let Current::OnGrid(fluid) = field { Some(fluid) } else { None })
+    }
+
     /// u [m/s] at every row, in place of what `u` holds.
     pub fn velocities(&self, t: f64, x: &[Row], u: &mut [Row]) {
         u.fill(ZERO);

@@ -14,4 +14,4 @@ pub use advect::{Advection, Scratch, Trace, advect, advect_vectors};
 pub use differences::{average, curl, directional, divergence, gradient, laplacian, upwind, vector_laplacian};
 pub use diffuse::{diffuse, diffuse_step, diffusion_limit};
 pub use sample::{Interpolation, sample};
-pub use stencil::each_row;
+pub use stencil::{each_row, each_row_of, ghosted};

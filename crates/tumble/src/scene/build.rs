@@ -23,7 +23,8 @@ use std::borrow::Cow;
 use std::sync::Arc;
 use tumble_interface::check::plain;
 use tumble_interface::scene::{
-    Animated, Bits, Emitter, Event, Force as Words, Kill, MeshFile, Method, Particles, Plane, Scene, Shape, Source, System as Plan, Vicsek,
+    Animated, Bits, Emitter, Event, Field as Stream, Force as Words, Kill, MeshFile, Method, Particles, Plane, Scene, Shape, Source,
+    System as Plan, Vicsek,
 };
 use tumble_interface::{Column, Data, Issue, Mesh, SceneError};
 
@@ -36,6 +37,11 @@ pub struct Built {
     pub scenery: Vec<Column>,
     pub colliders: Arc<Vec<Collider>>,
     pub warnings: Vec<String>,
+}
+
+/// Names of the fluids that carry tracers.
+fn fluids(scene: &Scene) -> impl Iterator<Item = &String> {
+    scene.field.iter().filter_map(|field| if let Stream::Gas { of } = field { Some(of) } else { None })
 }
 
 /// The systems of a scene, or the default ones.
@@ -105,6 +111,16 @@ pub fn build(scene: &Scene, assets: &Assets) -> Result<Built, SceneError> {
     let mut systems: Vec<Box<dyn System>> = Vec::new();
     for (index, (plan, mut parts)) in plans.iter().zip(parts).enumerate() {
         if plan.method == Method::Tracers {
+            for of in fluids(scene) {
+                exchange.listen(of);
+                let later = scene.gas.iter().find(|gas| gas.name == *of).and_then(|gas| place(&plans, "gas", gas.system.as_deref()));
+                if let Some(later) = later.filter(|later| *later > index) {
+                    let (own, other) = (&plan.name, &plans[later].name);
+                    warnings.push(format!(
+                        "system \"{own}\" comes before \"{other}\", whose gas carries it, and sees it as it was at the beginning of each exchange; put it behind"
+                    ));
+                }
+            }
             systems.push(Box::new(carried(scene, &plans, index, dt, parts.take_emitters())?));
             continue;
         }

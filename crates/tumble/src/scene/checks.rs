@@ -5,10 +5,10 @@ use crate::systems::dynamics::MOST_SUBSTEPS;
 use std::collections::HashSet;
 use tumble_interface::Issue;
 use tumble_interface::check::suggestion;
-use tumble_interface::scene::{Force, Integrator, Method, Plane, Scene, Shape, Source, System};
+use tumble_interface::scene::{Field, Force, Integrator, Method, Plane, Scene, Shape, Source, System};
 
 /// Column names that a frame may hold.
-pub const COLUMNS: [&str; 15] = [
+pub const COLUMNS: [&str; 16] = [
     "position",
     "velocity",
     "orientation",
@@ -16,6 +16,7 @@ pub const COLUMNS: [&str; 15] = [
     "link_strain",
     "density",
     "temperature",
+    "fuel",
     "flux",
     "pressure",
     "vorticity",
@@ -141,6 +142,14 @@ pub fn check(scene: &Scene, systems: &[System]) -> Vec<Issue> {
             && let Some(both) = predators.iter().find(|p| on.contains(p))
         {
             wrong(format!("force[{i}].predators"), format!("\"{both}\" is in `on`, too; a predator is no prey of its own"));
+        }
+    }
+    for (i, field) in scene.field.iter().enumerate() {
+        if let Field::Gas { of } = field
+            && !scene.gas.iter().any(|gas| gas.name == *of)
+        {
+            let hint = suggestion(of, scene.gas.iter().map(|gas| gas.name.as_str()));
+            wrong(format!("field[{i}].of"), format!("there is no gas \"{of}\"{hint}"));
         }
     }
     for (i, column) in scene.output.columns.iter().enumerate() {

@@ -10,12 +10,12 @@ use crate::math::{Vec3, VectorSignal};
 use crate::operators::{Advection, Interpolation, Trace};
 use crate::recipes;
 use crate::state::{Field, Grid, Place, Vectors};
-use crate::systems::gas::{Beyond, Body, Fluid, Gas, Settings, Sheet, Solids, Source};
+use crate::systems::gas::{Beyond, Body, Fire, Fluid, Gas, Settings, Sheet, Solids, Source};
 use std::sync::Arc;
 use tumble_interface::check::plain;
 use tumble_interface::scene::{
-    Carriage, Component, ExcessFlow, Gas as Words, GasSide, GridInterpolation, PathTrace, PressureMethod, Scene, Shape, Solid,
-    System as Plan,
+    Carriage, Component, Densities, ExcessFlow, Gas as Words, GasSide, GridInterpolation, PathTrace, PressureMethod, Scene, Shape, Solid,
+    System as Plan, Temperature,
 };
 use tumble_interface::{Issue, SceneError};
 
@@ -134,9 +134,10 @@ impl Read<'_, '_> {
                         }
                         Beyond::NoSlip(velocity)
                     }
-                    GasSide::Inflow { velocity, density, temperature } => Beyond::Inflow {
+                    GasSide::Inflow { velocity, density, fuel, temperature } => Beyond::Inflow {
                         velocity: self.vector(&format!("{key}.inflow.velocity"), velocity, Of::Place),
                         density: *density,
+                        fuel: *fuel,
                         temperature: temperature.unwrap_or(ambient),
                     },
                 };
@@ -163,6 +164,7 @@ impl Read<'_, '_> {
             let velocity = words.velocity.as_ref().map(|v| self.vector(&key("velocity"), v, Of::Time));
             for (word, given, there) in [
                 ("smoke", words.smoke != 0.0 || words.density.is_some(), self.words.smoke.is_some()),
+                ("fire", words.fuel != 0.0 || words.fuel_density.is_some(), self.words.fire.is_some()),
                 ("temperature", words.heating != 0.0 || words.temperature.is_some(), self.words.temperature.is_some()),
             ] {
                 if given && !there {
@@ -174,6 +176,8 @@ impl Read<'_, '_> {
                 density: words.density,
                 temperature: words.temperature,
                 heating: words.heating,
+                fuel: words.fuel,
+                fuel_density: words.fuel_density,
                 velocity,
                 times: [words.start, words.end.unwrap_or(f64::INFINITY)],
                 ..Source::default()
@@ -251,6 +255,33 @@ impl Read<'_, '_> {
         bodies
     }
 
+    /// How fuel burns.
+    fn fire(&mut self, warmth: &Temperature, sides: &[[Beyond; 2]; 3]) -> Option<Fire> {
+        let words = self.words;
+        let fire = words.fire.as_ref()?;
+        if words.temperature.is_none() {
+            self.wrong(".temperature", "missing, but fire needs it; add temperature = {}");
+        }
+        if fire.soot > 0.0 && words.smoke.is_none() {
+            self.wrong(".smoke", "missing, but fire.soot becomes smoke; add smoke = {}");
+        }
+        let closed = sides.iter().flatten().all(|side| !matches!(side, Beyond::Open));
+        if closed && fire.expansion > 0.0 && words.pressure.excess == ExcessFlow::Error {
+            let message = format!(
+                "{} m³/kg, but no side is open for what burns to expand through; open a side, set it to 0, or set pressure.excess = \"remove\"",
+                plain(fire.expansion)
+            );
+            self.wrong(".fire.expansion", message);
+        }
+        Some(Fire {
+            ignition: fire.ignition,
+            burn_time: fire.burn_time,
+            warming: fire.heat / (words.fluid_density * warmth.specific_heat),
+            soot: fire.soot,
+            expansion: fire.expansion,
+        })
+    }
+
     fn fluid(mut self, gravity: [f64; 3]) -> Option<Fluid> {
         let words = self.words;
         let before = self.reader.issues.len();
@@ -272,6 +303,8 @@ impl Read<'_, '_> {
         let ambient = Component::Value(warmth.ambient);
         let initial = warmth.initial.as_ref().unwrap_or(&ambient);
         let temperature = words.temperature.as_ref().and_then(|_| self.cells(".temperature.initial", initial, &grid, "K", 0.0));
+        let fuel = words.fire.as_ref().and_then(|fire| self.cells(".fire.initial", &fire.initial, &grid, "kg/m³", 0.0));
+        let fire = self.fire(&warmth, &sides);
         let still = [0.0; 3].into();
         let mut u = Vectors::of(grid, "m/s", |x| velocity.at(0.0, Vec3::from(x), still).into()).ok()?;
         if u.parts.iter().any(|p| p.each().any(|at| !p.value(at).is_finite())) {
@@ -311,6 +344,10 @@ impl Read<'_, '_> {
             self.wrong(".pressure.method", message);
             return None;
         }
+        if cosine && words.densities == Densities::Variable {
+            self.wrong(".pressure.method", "cosine, which knows one density alone; take multigrid_gradients");
+            return None;
+        }
         let pressure = &words.pressure;
         let settings = Settings {
             density: words.fluid_density,
@@ -324,7 +361,11 @@ impl Read<'_, '_> {
             weight: smoke.weight,
             ambient: warmth.ambient,
             cooling: warmth.cooling,
+            radiation: warmth.radiation,
+            specific_heat: warmth.specific_heat,
             expansion: warmth.expansion.unwrap_or(1.0 / warmth.ambient),
+            variable: words.densities == Densities::Variable,
+            fire,
             sources,
             confinement: words.confinement,
             order: words.order,
@@ -340,7 +381,7 @@ impl Read<'_, '_> {
             on_failure: pressure.on_failure,
             courant: words.courant,
         };
-        match Fluid::new(words.name.clone(), settings, solids, u, [density, temperature]) {
+        match Fluid::new(words.name.clone(), settings, solids, u, [density, temperature, fuel]) {
             Ok(mut fluid) => {
                 fluid.sheets = self.sheets;
                 Some(fluid)
@@ -392,7 +433,9 @@ pub fn bytes(words: &Words, flat: Option<usize>, solids: bool) -> f64 {
         |grid| grid.lattice().len() as f64,
     );
     let axes = if flat.is_some() { 2.0 } else { 3.0 };
-    let carried = f64::from(u8::from(words.smoke.is_some())) + f64::from(u8::from(words.temperature.is_some()));
+    let carried = f64::from(u8::from(words.smoke.is_some()))
+        + f64::from(u8::from(words.temperature.is_some()))
+        + f64::from(u8::from(words.fire.is_some()));
     let corrected = words.advection.scalars.corrected.unwrap_or(true);
     let scratch = if corrected { 3.0 * carried } else { 0.0 }.max(if words.advection.velocity.corrected == Some(true) { 3.0 } else { 0.0 });
     let conjugates = if words.viscosity.unwrap_or(0.0) > 0.0 { 3.0 } else { 0.0 };
@@ -401,6 +444,9 @@ pub fn bytes(words: &Words, flat: Option<usize>, solids: bool) -> f64 {
     // weights and coarse grids.
     // Distances and open shares; what is listed is near surfaces, but for closed faces.
     let solid = if solids { 4.0 } else { 0.0 };
-    let numbers = 3.0 * (axes + carried) + 5.0 + 6.5 + scratch + conjugates + confined + solid;
+    // Densities at cells and faces; weights, and a solver with coarse grids that has numbers for them.
+    let varied = if words.densities == Densities::Variable { 1.0 + axes + 3.0 + 14.0 } else { 0.0 };
+    let swelling = f64::from(u8::from(words.fire.is_some()));
+    let numbers = 3.0 * (axes + carried) + swelling + varied + 5.0 + 6.5 + scratch + conjugates + confined + solid;
     cells * numbers * real
 }

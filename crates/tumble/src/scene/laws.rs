@@ -1,7 +1,7 @@
 //! From the words of forces and fields to laws: formulas are read, and what is wrong with them is told.
 
 use crate::forces::{
-    Acceleration, Attraction, Current, Drag, Electric, Flow, Force, InPlane, Magnetic, Propulsion, Turbulence, Vortex, Wind,
+    Acceleration, Attraction, Current, Drag, Electric, Flow, Force, InPlane, Magnetic, OnGrid, Propulsion, Turbulence, Vortex, Wind,
 };
 use crate::math::formula::Of;
 use crate::math::{Signal, Vec3, VectorSignal};
@@ -180,6 +180,12 @@ impl<'a> Reader<'a> {
             }
             Field::Turbulence { strength, scale, octaves, roughness, rate, seed } => {
                 Current::Turbulence(self.turbulence(path, strength, [*scale, *roughness, *rate], *octaves, *seed))
+            }
+            Field::Gas { of } => {
+                if !path.starts_with("field[") {
+                    self.issues.push(Issue::new(path, "a gas, which carries tracers alone; take another kind of field"));
+                }
+                Current::OnGrid(OnGrid { fluid: of.clone(), states: Vec::new() })
             }
             Field::Formula { velocity } => Current::Formula(self.vector(&at("velocity"), velocity, Of::Place)),
         }

@@ -178,7 +178,9 @@ impl System for Tracers {
         &self.settings.name
     }
 
-    fn absorb(&mut self, _exchange: &mut Exchange) {}
+    fn absorb(&mut self, exchange: &mut Exchange) {
+        self.flow.fluids().for_each(|fluid| fluid.states = exchange.wind(&fluid.fluid).to_vec());
+    }
 
     fn advance(&mut self, t: f64, dt: f64, _exchange: &mut Exchange, go_on: &(dyn Fn() -> bool + Sync)) -> Result<StepReport, StepError> {
         let mut report = StepReport::default();

@@ -38,6 +38,7 @@ impl Fluid {
         Ok(match name {
             "density" => self.smoke.as_ref().and_then(|c| one("kg/m³", &c.field)),
             "temperature" => self.temperature.as_ref().and_then(|c| one("K", &c.field)),
+            "fuel" => self.flame.as_ref().and_then(|flame| one("kg/m³", &flame.fuel.field)),
             "pressure" => one("Pa", &self.pressure),
             "velocity" => Some(self.column(name, "m/s", &self.at_cells(&self.u)?)),
             "vorticity" => {
@@ -49,7 +50,7 @@ impl Fluid {
                 let mut field = Field::new(self.grid(), Place::Cell, "1/s")?;
                 if let Some(solids) = &self.solids {
                     let scale = (-1.0 / (field.grid.dx * field.grid.dx)) as Real;
-                    around(&self.u, Some(solids), &mut field);
+                    around(&self.u, Some(solids), None, &mut field);
                     field.data.iter_mut().for_each(|x| *x *= scale);
                 } else {
                     divergence(&self.u, &mut field)?;
@@ -96,10 +97,11 @@ impl Fluid {
         (0..grid.dimension()).fold(1.0, |v, _| v * grid.dx)
     }
 
-    /// Mass of the smoke [kg].
-    fn smoke_mass(&self) -> f64 {
+    /// Mass of smoke and fuel [kg].
+    fn carried_mass(&self) -> f64 {
         let total = |f: &Field| sum(f, |at, n| f.data[at..at + n].iter().map(|x| f64::from(*x)).sum());
-        self.smoke.as_ref().map_or(0.0, |c| self.volume() * total(&c.field))
+        let fuel = self.flame.iter().map(|flame| &flame.fuel);
+        self.smoke.iter().chain(fuel).fold(0.0, |mass, c| mass + self.volume() * total(&c.field))
     }
 
     /// Speed of the fastest cell [m/s].
@@ -110,14 +112,21 @@ impl Fluid {
         rows::largest(first, |at, n| (at..at + n).map(sq).fold(0.0, rows::worse)).sqrt()
     }
 
-    /// Adds its mass of smoke, and momentum, kinetic energy and speed of the fluid. A face on a side of the box counts half, one that
+    /// Adds its mass of smoke and fuel, momentum, kinetic energy and speed of the fluid, and the heat of one that burns. A face on a side of the box counts half, one that
     /// is open in part by its share.
     pub fn count(&self, books: &mut Ledger) {
         let grid = self.grid();
         let mass = self.volume() * self.settings.density;
-        books.mass += self.smoke_mass();
-        for part in &self.u.parts {
+        books.mass += self.carried_mass();
+        if let Some(flame) = &self.flame {
+            let capacity = mass * self.settings.specific_heat;
+            let [start, came] = flame.books;
+            books.heat += capacity * (self.excess() - start);
+            books.heat_in += capacity * came;
+        }
+        for (index, part) in self.u.parts.iter().enumerate() {
             let Place::Face(axis) = part.place else { continue };
+            let light = self.densities.as_ref().and_then(|densities| densities.light.parts.get(index));
             let half = |along: usize| !grid.periodic[axis] && (along == 0 || along == grid.n[axis]);
             let lattice = grid.lattice();
             let share = |start: usize, i: usize| {
@@ -127,7 +136,8 @@ impl Fluid {
                     _ => (start - lattice.at(0, 0, 0)) / lattice.stride[2],
                 };
                 let open = self.solids.as_ref().map_or(1.0, |solids| f64::from(solids.open[axis][start + i].value()));
-                if half(along) { 0.5 * open } else { open }
+                let heavy = light.map_or(open, |light| open / f64::from(light.data[start + i]));
+                if half(along) { 0.5 * heavy } else { heavy }
             };
             let weighed = |power: i32| {
                 sum(part, |at, n| {
@@ -147,7 +157,8 @@ impl Fluid {
     /// The first number that is not finite.
     pub fn broken(&self, system: &str, t: f64) -> Option<StepError> {
         let carried = [("density", &self.smoke), ("temperature", &self.temperature)];
-        let scalars = carried.into_iter().filter_map(|(name, c)| Some((name, &c.as_ref()?.field)));
+        let fuel = self.flame.iter().map(|flame| ("fuel", &flame.fuel.field));
+        let scalars = carried.into_iter().filter_map(|(name, c)| Some((name, &c.as_ref()?.field))).chain(fuel);
         let all = self.u.parts.iter().map(|part| ("velocity", part)).chain(scalars);
         for (name, field) in all {
             // Adding up finds any of them; only then is it looked for.
@@ -177,6 +188,7 @@ impl Fluid {
         let mut all: Vec<(&'static str, &Vec<Real>)> = self.u.parts.iter().map(|part| ("u", &part.data)).collect();
         all.extend(self.smoke.iter().map(|c| ("smoke", &c.field.data)));
         all.extend(self.temperature.iter().map(|c| ("temperature", &c.field.data)));
+        all.extend(self.flame.iter().map(|flame| ("fuel", &flame.fuel.field.data)));
         all.push(("pressure", &self.pressure.data));
         all
     }
@@ -184,6 +196,9 @@ impl Fluid {
     /// Writes everything that the next step depends on.
     pub fn save(&self, archive: &mut Archive) {
         self.kept().into_iter().for_each(|(name, data)| archive.push_numbers(name, data));
+        if let Some(flame) = &self.flame {
+            archive.push("burnt", Part::Numbers(flame.books.to_vec()));
+        }
         if let Some(solids) = self.solids.as_ref().filter(|solids| solids.moves()) {
             let bodies = solids.bodies.iter().flat_map(|body| [body.position, body.velocity]).flat_map(<[f64; 3]>::from);
             archive.push("solids", Part::Numbers(std::iter::once(solids.time).chain(bodies).collect()));
@@ -203,7 +218,13 @@ impl Fluid {
         self.u.parts.iter_mut().try_for_each(|part| read("u", &mut part.data))?;
         self.smoke.iter_mut().try_for_each(|c| read("smoke", &mut c.field.data))?;
         self.temperature.iter_mut().try_for_each(|c| read("temperature", &mut c.field.data))?;
+        self.flame.iter_mut().try_for_each(|flame| read("fuel", &mut flame.fuel.field.data))?;
         read("pressure", &mut self.pressure.data)?;
+        if let Some(flame) = &mut self.flame {
+            let [start, came] = archive.numbers("burnt")?[..] else { return None };
+            flame.books = [start, came];
+        }
+        self.weigh();
         if self.solids.as_ref().is_some_and(Solids::moves) {
             let numbers = archive.numbers("solids")?;
             let (time, bodies) = numbers.split_first()?;
@@ -218,11 +239,14 @@ impl Fluid {
         let field = match column {
             "density" => self.smoke.as_mut().map(|c| &mut c.field),
             "temperature" => self.temperature.as_mut().map(|c| &mut c.field),
+            "fuel" => self.flame.as_mut().map(|flame| &mut flame.fuel.field),
             _ => {
                 let axis = FACES.iter().position(|face| *face == column);
                 self.u.parts.iter_mut().find(|part| axis.is_some_and(|a| part.place == Place::Face(a)))
             }
         };
-        field.is_some_and(|field| field.set(&values).is_ok())
+        let fits = field.is_some_and(|field| field.set(&values).is_ok());
+        self.weigh();
+        fits
     }
 }

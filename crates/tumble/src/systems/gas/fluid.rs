@@ -1,6 +1,8 @@
 //! A fluid in a box: its state, and the step that the lecture draws.
 
 use super::bodies::Body;
+use super::densities::Densities;
+use super::fire::{Fire, Flame};
 use super::forces::Source;
 use super::rows::{magnitude, worse};
 use super::sheets::Sheet;
@@ -41,8 +43,16 @@ pub struct Settings {
     pub ambient: f64,
     /// Rate at which differences of temperature vanish [1/s].
     pub cooling: f64,
+    /// Radiation where the fluid is 1000 K above ambient [K/s].
+    pub radiation: f64,
+    /// Heat capacity [J/(kg K)].
+    pub specific_heat: f64,
     /// Growth of a volume with temperature [1/K].
     pub expansion: f64,
+    /// Whether differences of density have inertia.
+    pub variable: bool,
+    /// How fuel burns.
+    pub fire: Option<Fire>,
     /// Where smoke, warmth and velocity come from.
     pub sources: Vec<Source>,
     /// Vorticity confinement [1].
@@ -78,7 +88,7 @@ impl Carried {
     }
 
     /// The same with its sides set.
-    pub fn beyond(mut self, sides: &[[Beyond; 2]; 3], ambient: f64, inflow: impl Fn(f64, f64) -> f64 + Copy) -> Self {
+    pub fn beyond(mut self, sides: &[[Beyond; 2]; 3], ambient: f64, inflow: impl Fn([f64; 3]) -> f64 + Copy) -> Self {
         self.field.sides = sides.each_ref().map(|ends| ends.each_ref().map(|side| side.carried(ambient, inflow)));
         self.next.sides = self.field.sides;
         self
@@ -97,8 +107,12 @@ pub struct Fluid {
     pub smoke: Option<Carried>,
     /// Temperature at cells [K].
     pub temperature: Option<Carried>,
+    /// Fuel that burns.
+    pub flame: Option<Flame>,
     /// Pressure of the last projection at cells [Pa].
     pub pressure: Field,
+    /// Where densities vary.
+    pub(super) densities: Option<Densities>,
     pub(super) solver: Solver<u8>,
     pub(super) solids: Option<Solids>,
     /// What hangs in it.
@@ -172,13 +186,13 @@ impl Failed {
 }
 
 impl Fluid {
-    /// A fluid with this velocity around these solids; `smoke` and `temperature` are carried if given. The velocity is projected.
+    /// A fluid with this velocity around these solids; `smoke`, `temperature` and `fuel` are carried if given. The velocity is projected.
     pub fn new(
         name: String,
         settings: Settings,
         solids: Option<Solids>,
         u: Vectors,
-        [smoke, temperature]: [Option<Field>; 2],
+        [smoke, temperature, fuel]: [Option<Field>; 3],
     ) -> Result<Self, Failure> {
         let grid = u.on_faces("velocity of a fluid")?;
         let lattice = grid.lattice();
@@ -187,8 +201,15 @@ impl Fluid {
         let masses: Vec<f64> = solids.iter_mut().flat_map(|s| &mut s.bodies).map(|body| std::mem::take(&mut body.inverse_mass)).collect();
         let solver = solver(grid, &settings, solids.as_ref())?;
         let sides = &settings.sides;
-        let smoke = smoke.map(|f| Carried::new(f).beyond(sides, 0.0, |density, _| density));
-        let temperature = temperature.map(|f| Carried::new(f).beyond(sides, settings.ambient, |_, temperature| temperature));
+        let smoke = smoke.map(|f| Carried::new(f).beyond(sides, 0.0, |[density, _, _]| density));
+        let temperature = temperature.map(|f| Carried::new(f).beyond(sides, settings.ambient, |[_, temperature, _]| temperature));
+        let flame = match (settings.fire, fuel) {
+            (Some(fire), Some(fuel)) => {
+                let fuel = Carried::new(fuel).beyond(sides, 0.0, |[_, _, fuel]| fuel);
+                Some(Flame::new(fire, fuel, grid, temperature.as_ref(), settings.ambient)?)
+            }
+            _ => None,
+        };
         // Only a viscous fluid needs them.
         let spare = || if settings.viscosity > 0.0 { Field::new(grid, Place::Cell, "") } else { Ok(nothing(grid)) };
         let mut pressure = Field::new(grid, Place::Cell, "Pa")?;
@@ -204,7 +225,9 @@ impl Fluid {
             u,
             smoke,
             temperature,
+            flame,
             pressure,
+            densities: if settings.variable { Some(Densities::new(grid)?) } else { None },
             solver,
             solids,
             sheets: Vec::new(),
@@ -295,6 +318,14 @@ impl Fluid {
         let Some(solids) = &self.solids else { return };
         self.smoke.iter_mut().for_each(|smoke| solids.clear(&mut smoke.field.data, 0.0));
         self.temperature.iter_mut().for_each(|warmth| solids.clear(&mut warmth.field.data, self.settings.ambient));
+        self.flame.iter_mut().for_each(|flame| solids.clear(&mut flame.fuel.field.data, 0.0));
+    }
+
+    /// Takes the densities from what is carried.
+    pub(super) fn weigh(&mut self) {
+        if let Some(densities) = &mut self.densities {
+            densities.measure(&self.settings, self.smoke.as_ref(), self.temperature.as_ref());
+        }
     }
 
     fn failed(&self, failure: Failure) -> Box<Failed> {
@@ -307,13 +338,16 @@ impl Fluid {
         hold(&mut self.u, &self.settings.sides, t);
         if let Some(solids) = &self.solids {
             solids.extend(&mut self.u);
-            self.smoke.iter_mut().chain(&mut self.temperature).for_each(|carried| solids.shade(&mut carried.field));
+            let fuel = self.flame.iter_mut().map(|flame| &mut flame.fuel);
+            self.smoke.iter_mut().chain(&mut self.temperature).chain(fuel).for_each(|carried| solids.shade(&mut carried.field));
         }
-        let Self { u, next, smoke, temperature, settings, scratch, .. } = self;
-        let carried: Vec<&mut Carried> = smoke.iter_mut().chain(temperature.iter_mut()).collect();
+        let Self { u, next, smoke, temperature, flame, settings, scratch, .. } = self;
+        let fuel = flame.iter_mut().map(|flame| &mut flame.fuel);
+        let carried: Vec<&mut Carried> = smoke.iter_mut().chain(temperature.iter_mut()).chain(fuel).collect();
         let (from, mut to): (Vec<&Field>, Vec<&mut Field>) = carried.into_iter().map(|c| (&c.field, &mut c.next)).unzip();
         advect(&from, u, h, &settings.scalars, &mut to, scratch)?;
-        for carried in smoke.iter_mut().chain(temperature.iter_mut()) {
+        let fuel = flame.iter_mut().map(|flame| &mut flame.fuel);
+        for carried in smoke.iter_mut().chain(temperature.iter_mut()).chain(fuel) {
             std::mem::swap(&mut carried.field.data, &mut carried.next.data);
         }
         advect_vectors(u, u, h, &settings.velocity, next, scratch)?;

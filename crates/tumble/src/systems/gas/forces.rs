@@ -1,6 +1,7 @@
 //! What pushes the fluid, and what feeds it: buoyancy, given accelerations, confinement, sources, and what fades.
 
 use super::confinement::confine;
+use super::fire::{excess, radiate};
 use super::fluid::{Carried, Failure, Fluid};
 use super::rows::{Face, runs};
 use crate::geometry::Collider;
@@ -19,6 +20,10 @@ pub struct Source {
     pub temperature: Option<f64>,
     /// Warming [K/s].
     pub heating: f64,
+    /// Fuel given off [kg/(m³ s)].
+    pub fuel: f64,
+    /// Fuel held [kg/m³].
+    pub fuel_density: Option<f64>,
     /// Velocity given [m/s].
     pub velocity: Option<VectorSignal>,
     /// When it works [s].
@@ -98,8 +103,12 @@ fn push_by(part: &mut Field, axis: usize, cells: &Field, scale: f64, around: f64
 impl Fluid {
     /// Sources, fading, and everything that pushes, for h seconds from t on.                                  (gas.2)
     pub fn forces(&mut self, t: f64, h: f64) -> Result<(), Failure> {
+        let before = self.excess();
         self.feed(t, h);
         self.clear();
+        self.burn(h);
+        let gained = self.excess() - before;
+        self.flame.iter_mut().for_each(|flame| flame.books[1] += gained);
         if let Some(solids) = &mut self.solids {
             let settings = &self.settings;
             solids.bodies.iter_mut().for_each(|body| body.fall(h, settings.gravity, settings.density, &self.b.grid));
@@ -127,6 +136,11 @@ impl Fluid {
         {
             fade(warmth, settings.ambient, functions::exp(-settings.cooling * h));
         }
+        if let Some(warmth) = &mut self.temperature
+            && settings.radiation > 0.0
+        {
+            radiate(&mut warmth.field, settings.ambient, settings.radiation, h);
+        }
         for source in &settings.sources {
             let time = (t + h).min(source.times[1]) - t.max(source.times[0]);
             if time <= 0.0 {
@@ -141,6 +155,10 @@ impl Fluid {
                 feed(&mut warmth.field.data, cells, time * source.heating);
                 source.temperature.iter().for_each(|temperature| pull(&mut warmth.field.data, cells, *temperature));
             }
+            if let Some(flame) = &mut self.flame {
+                feed(&mut flame.fuel.field.data, cells, time * source.fuel);
+                source.fuel_density.iter().for_each(|fuel| pull(&mut flame.fuel.field.data, cells, *fuel));
+            }
             if let Some(velocity) = &source.velocity {
                 let v = <[f64; 3]>::from(velocity.value(t + h));
                 for part in &mut self.u.parts {
@@ -151,20 +169,42 @@ impl Fluid {
         }
     }
 
-    /// Accelerations: given ones, and g (s weight/rho - beta (T - T0)).                                  (gas.2)
+    /// The sum of T - T0, where there is a fire to keep books of [K].
+    pub(super) fn excess(&self) -> f64 {
+        let warmth = self.temperature.as_ref().filter(|_| self.flame.is_some());
+        warmth.map_or(0.0, |warmth| excess(&warmth.field, self.settings.ambient))
+    }
+
+    /// What is hot enough burns.                                                                      (fire.1)
+    fn burn(&mut self, h: f64) {
+        let ambient = self.settings.ambient;
+        if let (Some(flame), Some(warmth)) = (&mut self.flame, &mut self.temperature) {
+            flame.burn(warmth, self.smoke.as_mut(), ambient, h);
+        }
+    }
+
+    /// Accelerations: given ones, and g (s weight/rho - beta (T - T0)).                                  (gas.2, gas.13)
     fn push(&mut self, t: f64, h: f64) -> Result<(), Failure> {
+        self.weigh();
         let settings = &self.settings;
+        if let Some(densities) = &self.densities {
+            densities.push(&mut self.u, settings.gravity, h);
+        }
+        // Boussinesq's have none of their own.
+        let light = self.densities.is_none();
         let constant = if settings.acceleration.is_uniform() { settings.acceleration.value(t) } else { [0.0; 3].into() };
         let constant = <[f64; 3]>::from(constant);
         for part in &mut self.u.parts {
             let Place::Face(axis) = part.place else { continue };
             let g = settings.gravity[axis];
             if let Some(smoke) = &self.smoke
+                && light
                 && g * settings.weight != 0.0
             {
                 push_by(part, axis, &smoke.field, h * g * settings.weight / settings.density, 0.0);
             }
             if let Some(warmth) = &self.temperature
+                && light
                 && g * settings.expansion != 0.0
             {
                 push_by(part, axis, &warmth.field, -h * g * settings.expansion, settings.ambient);

@@ -10,6 +10,8 @@
 mod bodies;
 mod books;
 mod confinement;
+mod densities;
+mod fire;
 mod fluid;
 mod forces;
 mod projection;
@@ -21,6 +23,7 @@ mod spots;
 mod viscosity;
 
 pub use bodies::Body;
+pub use fire::{Fire, Flame};
 pub use fluid::{Carried, Failed, Failure, Fluid, Settings};
 pub use forces::{Cover, Source};
 pub use sheets::Sheet;
@@ -125,7 +128,9 @@ impl System for Gas {
         Ok(report)
     }
 
-    fn publish(&mut self, _t: f64, _exchange: &mut Exchange) {}
+    fn publish(&mut self, t: f64, exchange: &mut Exchange) {
+        self.fluids.iter().for_each(|fluid| exchange.blow(&fluid.name, t, &fluid.u));
+    }
 
     fn columns(&self, names: &[&str], out: &mut Vec<Column>) {
         self.fluids.iter().for_each(|fluid| fluid.columns(names, out));

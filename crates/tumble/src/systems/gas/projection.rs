@@ -3,7 +3,7 @@
 use super::fluid::{Failure, Fluid};
 use super::rows::{self, Face, runs};
 use super::solids::Solids;
-use crate::linalg::poisson::{Excess, Params, Target};
+use crate::linalg::poisson::{Excess, Params, Solver, Target};
 use crate::math::Real;
 use crate::math::parallel::chunks;
 use crate::operators::each_row;
@@ -39,19 +39,46 @@ pub fn right_side(u: &Vectors, b: &mut Field) {
     });
 }
 
-/// The same around solids.                                                             (gas.10)
-pub fn around(u: &Vectors, solids: Option<&Solids>, b: &mut Field) {
+/// The same around solids, where the divergence is to be S.                              (gas.10, fire.3)
+pub fn around(u: &Vectors, solids: Option<&Solids>, swelling: Option<&Field>, b: &mut Field) {
     right_side(u, b);
+    if let Some(swelling) = swelling {
+        let scale = (b.grid.dx * b.grid.dx) as Real;
+        each_row(b, |j, k, row| {
+            let at = swelling.index([0, j, k]);
+            row.iter_mut().zip(&swelling.data[at..]).for_each(|(b, s)| *b += scale * s);
+        });
+    }
     solids.iter().for_each(|solids| solids.correct(u, b));
 }
 
-/// u -= grad q, on the sides of the box only where they are open.                      (pressure.1)
-fn subtract_gradient(u: &mut Vectors, q: &[Real], open: [[bool; 2]; 3]) {
-    for part in &mut u.parts {
+/// u -= rho_0/rho_f grad q, on the sides of the box only where they are open.                      (pressure.1, gas.13)
+fn subtract_gradient(u: &mut Vectors, q: &[Real], open: [[bool; 2]; 3], light: Option<&Vectors>) {
+    for (index, part) in u.parts.iter_mut().enumerate() {
+        let light = light.and_then(|light| light.parts.get(index));
         let crate::state::Place::Face(axis) = part.place else { continue };
         let scale = (1.0 / part.grid.dx) as Real;
         let grid = part.grid;
+        let lattice = grid.lattice();
         each_row(part, |j, k, row| {
+            if let Some(light) = light {
+                let at = lattice.at(0, j, k);
+                let mut done = 0;
+                return runs(&grid, axis, j, k, row, |run, face| {
+                    let light = &light.data[at + done..][..run.len()];
+                    done += run.len();
+                    let (low, high, scale) = match face {
+                        Face::Between(low, high) => (Some(low), Some(high), scale),
+                        Face::Lower(cell) if open[axis][0] => (None, Some(cell), 2.0 * scale),
+                        Face::Upper(cell) if open[axis][1] => (Some(cell), None, 2.0 * scale),
+                        Face::Lower(_) | Face::Upper(_) => return,
+                    };
+                    let q = |cell: Option<usize>, i: usize| cell.map_or(0.0, |cell| q[cell + i]);
+                    for i in 0..run.len() {
+                        run[i] -= scale * light[i] * (q(high, i) - q(low, i));
+                    }
+                });
+            }
             runs(&grid, axis, j, k, row, |run, face| match face {
                 Face::Between(low, high) => {
                     let n = run.len();
@@ -69,17 +96,23 @@ fn subtract_gradient(u: &mut Vectors, q: &[Real], open: [[bool; 2]; 3]) {
 }
 
 impl Fluid {
-    /// Makes the velocity at time t free of divergence; h [s] only scales the pressure that it takes.          (gas.4)
+    /// Makes the velocity at time t free of divergence, but for what fire swells; h [s] only scales the pressure that it takes.          (gas.4)
     pub fn projection(&mut self, t: f64, h: f64, report: &mut StepReport) -> Result<(), Failure> {
         super::sides::hold(&mut self.u, &self.settings.sides, t);
+        self.weigh();
         if let Some(solids) = &self.solids {
             solids.close(&mut self.u);
         }
-        let fastest = self.fastest();
-        let Self { u, b, left, q, pressure, settings, solver, solids, .. } = self;
+        let mut fastest = self.fastest();
+        let Self { u, b, left, q, pressure, settings, solver, solids, flame, densities, .. } = self;
+        let swelling = flame.as_ref().filter(|flame| flame.fire.expansion > 0.0).map(|flame| &flame.swelling);
         let mass = settings.density * solids.as_ref().map_or(0.0, Solids::area);
-        around(u, solids.as_ref(), b);
+        around(u, solids.as_ref(), swelling, b);
         let dx = b.grid.dx;
+        if let Some(swelling) = swelling {
+            // A fluid at rest is moved by nothing else.
+            fastest = rows::worse(fastest, dx * rows::magnitude(swelling));
+        }
         let asked = settings.tolerance * dx * fastest;
         let mut params = Params { target: Target::Largest(asked), ..settings.pressure };
         if solids.as_ref().is_some_and(Solids::moves) {
@@ -90,18 +123,32 @@ impl Fluid {
         pressure.data.fill(0.0);
         let to_pressure = (settings.density / h) as Real;
         left.copy_from_slice(&b.data);
-        let info = solver.refine(left, q, &params, |solver, q, left| {
-            subtract_gradient(u, q, open);
+        let densities = densities.as_ref();
+        let light = densities.map(|densities| &densities.light);
+        // Another equation in every step.
+        let varying = densities.map(|densities| {
+            let weights = densities.weights(solids.as_ref().map(|solids| &solids.open));
+            let sides = settings.sides.each_ref().map(|ends| ends.each_ref().map(super::Beyond::pressure));
+            let mut solver = Solver::new(solver.lattice(), sides, weights.each_ref().map(Vec::as_slice), None)?;
+            solver.join(solids.as_ref().map_or(Vec::new(), |solids| solids.joints(settings.density)));
+            Ok(solver)
+        });
+        let mut varying = varying.transpose().map_err(Failure::Pressure)?;
+        let mut take = |yielded: &[f64], q: &[Real], left: &mut [Real]| {
+            subtract_gradient(u, q, open, light);
             if let Some(solids) = solids {
-                let products = solver.yielded(q);
-                solids.bodies.iter_mut().zip(products.chunks(3)).for_each(|(body, products)| body.yield_to(products, mass));
+                solids.bodies.iter_mut().zip(yielded.chunks(3)).for_each(|(body, products)| body.yield_to(products, mass));
                 solids.follow();
                 solids.close(u);
             }
             chunks(&mut pressure.data, |start, p| p.iter_mut().zip(&q[start..]).for_each(|(p, q)| *p += to_pressure * q));
-            around(u, solids.as_ref(), b);
+            around(u, solids.as_ref(), swelling, b);
             left.copy_from_slice(&b.data);
-        });
+        };
+        let info = match &mut varying {
+            None => solver.refine(left, q, &params, |solver, q, left| take(&solver.yielded(q), q, left)),
+            Some(solver) => solver.refine(left, q, &params, |solver, q, left| take(&solver.yielded(q), q, left)),
+        };
         let info = info.map_err(Failure::Pressure)?;
         report.linear += info.iterations as u64;
         report.pressure = info.residuals;

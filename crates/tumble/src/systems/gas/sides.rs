@@ -24,6 +24,8 @@ pub enum Beyond {
         density: f64,
         /// Of the fluid [K].
         temperature: f64,
+        /// Of the fuel [kg/m³].
+        fuel: f64,
     },
 }
 
@@ -42,11 +44,11 @@ impl Beyond {
         !matches!(self, Self::Open | Self::Periodic)
     }
 
-    /// What it is for a carried field, whose value is `ambient` outside, and `inflow` of what comes in.
-    pub fn carried(&self, ambient: f64, inflow: impl Fn(f64, f64) -> f64) -> Side {
+    /// What it is for a carried field, whose value is `ambient` outside, and `inflow` of density, temperature and fuel of what comes in.
+    pub fn carried(&self, ambient: f64, inflow: impl Fn([f64; 3]) -> f64) -> Side {
         match self {
             Self::Open => Side::Ghost(ambient),
-            Self::Inflow { density, temperature, .. } => Side::Ghost(inflow(*density, *temperature)),
+            Self::Inflow { density, temperature, fuel, .. } => Side::Ghost(inflow([*density, *temperature, *fuel])),
             _ => Side::Closed,
         }
     }
