@@ -1,6 +1,6 @@
 //! What joins many cells at once: a rigid thing that yields to the pressure around it.
 //!
-//!   A + sum over joints of weight j jᵀ                                                              (pressure.20)
+//!   A + sum over joints of weight j jᵀ                                                              (pressure.15)
 //!
 //! Each adds one eigenvalue that no preconditioner of A sees, and so about one iteration to conjugate gradients, however light the
 //! thing is. Of a j whose sum over a floating component is not zero (a thing that leans on a wall) the mean is taken, as it is of

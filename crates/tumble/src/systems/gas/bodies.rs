@@ -1,10 +1,10 @@
 //! Balls that the fluid moves: masses of other systems, solved for together with the pressure.
 //!
-//!   V' = V + h a + P/m,   P = rho dx^(d-1) jᵀ q                                                      (gas.20)
+//!   V' = V + h a + P/m,   P = rho dx^(d-1) jᵀ q                                                      (gas.16)
 //!
 //! j has the closed share of each face beside the ball, + where the fluid is on its lower side. The same j carries V' into the
 //! divergence, so that momentum passes over without loss, and what the fluid's mass adds to that of the ball is in the matrix: no
-//! ball is too light. The weight of the displaced fluid, which the pressure of the fluid does not have, is added.    (gas.21)
+//! ball is too light. The weight of the displaced fluid, which the pressure of the fluid does not have, is added.    (gas.17)
 //!
 //! Limits: no torque and no skin friction comes back; a ball is a mass without spin.
 //! Tests: crates/tumble-f64/tests/bodies.rs.
@@ -96,7 +96,7 @@ impl Body {
         self.velocity = self.velocity + impulse * self.inverse_mass;
     }
 
-    /// What is not the pressure's, for h seconds: other forces, and the weight of the fluid that it displaces.      (gas.21)
+    /// What is not the pressure's, for h seconds: other forces, and the weight of the fluid that it displaces.      (gas.17)
     pub(super) fn fall(&mut self, h: f64, gravity: [f64; 3], density: f64, grid: &Grid) {
         if self.inverse_mass == 0.0 {
             return;

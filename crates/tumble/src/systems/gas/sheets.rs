@@ -1,6 +1,6 @@
 //! Sheets that hang in the fluid: cloth, and curves in the plane. They let fluid through, against a resistance.
 //!
-//!   p_before - p_behind = K rho/2 |w_n| w_n,   friction c rho/2 |w_t| w_t,   w = u - v                (gas.22)
+//!   p_before - p_behind = K rho/2 |w_n| w_n,   friction c rho/2 |w_t| w_t,   w = u - v                (gas.18)
 //!
 //! for each mass of the sheet with its share of the area. An exchange is that of two bodies, the mass and the fluid in the cells around
 //! it, that end a step with the w of the implicit law: it takes energy from them, whatever the step, and no momentum.
@@ -83,7 +83,7 @@ impl Sheet {
         }
     }
 
-    /// Exchanges momentum with a fluid of this density [kg/m³] for h seconds, mass by mass.                    (gas.22)
+    /// Exchanges momentum with a fluid of this density [kg/m³] for h seconds, mass by mass.                    (gas.18)
     pub(super) fn trade(&mut self, u: &mut Vectors, grid: &Grid, density: f64, h: f64) {
         self.share_areas(grid.flat);
         let stride = grid.lattice().stride;
