@@ -187,6 +187,21 @@ mass = [0.001, 0.3]
 }
 
 #[test]
+fn a_ball_moves_on_in_every_sub_step_of_the_fluid() {
+    // So heavy that it goes its way, 0.3 m in one frame; what it covers at the end has no smoke.
+    let text = cavity(20, false, 1e9, [8, 1], "time = { fps = 24, frames = 1 }\n[world]\ngravity = [0, 0, 0]", "");
+    let text = text
+        .replace("bodies =", "smoke = { initial = \"1\" }\nbodies =")
+        .replace("radius = 0.25\n", "radius = 0.25\nvelocity = [[7.2, 0, 0]]\n");
+    let mut sim = simulation(&text);
+    step(&mut sim);
+    assert!((column(&sim, "ball", "position")[0].x - 0.313).abs() < 1e-6);
+    let (smoke, n) = common::grid(&sim, "water", "density");
+    let at = |x: f64| smoke[((x / 0.0625).floor() as i64 + 10) as usize + n[0] * (10 + n[1] * 10)];
+    assert!(at(0.313) == 0.0 && at(0.45) == 0.0 && at(-0.1) > 0.0 && at(-0.2) > 0.0, "{} {} {}", at(0.313), at(0.45), at(-0.1));
+}
+
+#[test]
 fn a_restored_ball_goes_on_with_the_same_bits() {
     let text = cavity(16, false, 0.3, [2, 1], "time = { fps = 24, frames = 5 }", "");
     let mut sim = simulation(&text);

@@ -78,6 +78,18 @@ fn a_free_net_and_the_fluid_come_to_one_velocity() {
 }
 
 #[test]
+fn a_light_net_goes_no_faster_than_the_fluid_that_takes_it_along() {
+    // Twenty sub-steps of the fluid before the net's system hears of it.
+    let text = tube(20, 1, 10.0, "")
+        .replace("density = 3", "density = 0.02")
+        .replace("[[gas]]", "[[system]]\nname = \"wind\"\nmethod = \"gas\"\nsubsteps = 20\n[[system]]\n[[gas]]");
+    let mut sim = simulation(&text);
+    step(&mut sim);
+    let net = column(&sim, "net", "velocity")[8].x;
+    assert!(net > 0.8 * speed(&sim) && net < speed(&sim), "{net} {}", speed(&sim));
+}
+
+#[test]
 fn a_stream_passes_a_screen_as_in_taylors_theory() {
     // u = U/(1 + K/4) in an unbounded stream [taylor1944]; the screen takes a twentieth of the height, and has eight cells.
     for (k, bound) in [(1.0, 0.03), (2.0, 0.08)] {
