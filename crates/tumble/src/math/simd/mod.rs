@@ -131,6 +131,20 @@ pub fn ask(numbers: &[Real]) {
     let _ = numbers;
 }
 
+/// Asks memory for `count` rows, `at` rows behind the end of these: long columns are worked through part by part, and the next part
+/// lies behind this one. Memory is then read while registers are busy, not between the passes over a part.
+#[inline(always)]
+pub fn ask_behind(rows: &[Row], at: usize, count: usize) {
+    #[cfg(target_arch = "x86_64")]
+    for row in (0..count).step_by(64 / size_of::<Row>()) {
+        use std::arch::x86_64::{_MM_HINT_T0, _mm_prefetch};
+        // SAFETY: no address is wrong.
+        unsafe { _mm_prefetch::<_MM_HINT_T0>(rows.as_ptr_range().end.wrapping_add(at + row).cast()) };
+    }
+    #[cfg(not(target_arch = "x86_64"))]
+    let _ = (rows, at, count);
+}
+
 /// A kernel, generic over the register width.
 pub trait Kernel {
     /// What it returns.
