@@ -254,7 +254,7 @@ pub struct Pack<S: Simd> {
 }
 
 macro_rules! operations {
-    ($splat:ident, $add:ident, $sub:ident, $mul:ident, $div:ident, $neg:ident, $sqrt:ident, $greater:ident, $select:ident) => {
+    ($splat:ident, $add:ident, $sub:ident, $mul:ident, $div:ident, $neg:ident, $sqrt:ident, $max:ident, $greater:ident, $select:ident) => {
         impl<S: Simd> Add for Pack<S> {
             type Output = Self;
             #[inline(always)]
@@ -318,6 +318,11 @@ macro_rules! operations {
                 Self { simd: self.simd, v: self.simd.$select(mask, then.v, other.v) }
             }
             #[inline(always)]
+            fn above_zero(self) -> Self {
+                // One instruction, which takes the second where the first is not larger: zero, for NaN and -0, too.
+                Self { simd: self.simd, v: self.simd.$max(self.v, self.simd.$splat(0.0)) }
+            }
+            #[inline(always)]
             fn any_positive(self) -> bool {
                 self.simd.any(self.simd.$greater(self.v, self.simd.$splat(0.0)))
             }
@@ -326,9 +331,9 @@ macro_rules! operations {
 }
 
 #[cfg(not(feature = "double"))]
-operations!(splat_f32s, add_f32s, sub_f32s, mul_f32s, div_f32s, neg_f32s, sqrt_f32s, greater_than_f32s, select_f32s);
+operations!(splat_f32s, add_f32s, sub_f32s, mul_f32s, div_f32s, neg_f32s, sqrt_f32s, max_f32s, greater_than_f32s, select_f32s);
 #[cfg(feature = "double")]
-operations!(splat_f64s, add_f64s, sub_f64s, mul_f64s, div_f64s, neg_f64s, sqrt_f64s, greater_than_f64s, select_f64s);
+operations!(splat_f64s, add_f64s, sub_f64s, mul_f64s, div_f64s, neg_f64s, sqrt_f64s, max_f64s, greater_than_f64s, select_f64s);
 
 /// The instruction sets that a kernel can be run on, for tests that compare their bits.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
