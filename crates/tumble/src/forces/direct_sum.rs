@@ -350,9 +350,11 @@ impl<const NATIVE: bool, const POINTS: bool> Tile<'_, NATIVE, POINTS> {
             if k > 0 {
                 begun = Self::begin(w, &sources, &near[last], k, softening);
             }
-            for b in 0..if among { B } else { 0 } {
-                let lanes = (j + b - self.strips[1].start) % BLOCK - last * LANES;
-                begun.both[b] = begun.both[b] * w.load(&STAIRS[LANES - lanes + k * W::N..]);
+            if among {
+                for b in 0..B {
+                    let lanes = (j + b - self.strips[1].start) % BLOCK - last * LANES;
+                    begun.both[b] = begun.both[b] * w.load(&STAIRS[LANES - lanes + k * W::N..]);
+                }
             }
             Self::finish(w, &mut sources, &mut near[last], k, begun);
         }

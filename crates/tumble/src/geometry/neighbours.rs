@@ -156,10 +156,9 @@ impl Neighbours {
         if let Some(counts) = counts {
             return [[1; 3], counts];
         }
-        let (mut low, mut high) = (ZERO, ZERO);
         let corners = fold(x.len(), |range| {
             let mut corners: Option<[Row; 2]> = None;
-            for x in x[range].iter().filter(|x| (x[0] - x[0]) + (x[1] - x[1]) + (x[2] - x[2]) == 0.0) {
+            for x in x[range].iter().filter(|x| x[..3].iter().all(|c| c.is_finite())) {
                 let [low, high] = corners.get_or_insert([*x; 2]);
                 for a in 0..4 {
                     low[a] = if x[a] < low[a] { x[a] } else { low[a] };
@@ -168,13 +167,11 @@ impl Neighbours {
             }
             corners
         });
-        for (k, corners) in corners.into_iter().flatten().enumerate() {
-            for a in 0..3 {
-                low[a] = if k == 0 { corners[0][a] } else { low[a].min(corners[0][a]) };
-                high[a] = if k == 0 { corners[1][a] } else { high[a].max(corners[1][a]) };
-            }
-        }
-        [low, high].map(|x| self.cell(&x, 1.0 / self.width(), None).unwrap_or_default())
+        let all = corners
+            .into_iter()
+            .flatten()
+            .reduce(|[low, high], [l, h]| [std::array::from_fn(|a| low[a].min(l[a])), std::array::from_fn(|a| high[a].max(h[a]))]);
+        all.unwrap_or([ZERO; 2]).map(|x| self.cell(&x, 1.0 / self.width(), None).unwrap_or_default())
     }
 
     /// Puts the points into the order of their cells where these lie close enough for short numbers, digit by digit, the least
