@@ -2,7 +2,7 @@
 
 use crate::elements::{Batch, Block, Weights};
 use crate::math::parallel::chunks;
-use crate::math::roots::{cube_unit, inverse_cube, inverse_root, root_unit};
+use crate::math::roots::{cube_unit, first_guess, inverse_cube, inverse_root, root_unit};
 use crate::math::simd::{Kernel, Width, count, dispatch, packs};
 use crate::math::{Lane, Real, Row, Vec3, xyz64};
 use crate::state::Masses;
@@ -263,48 +263,56 @@ struct Sources<L, const B: usize> {
     sum: [[Vec3<L>; LANES]; B],
 }
 
-impl<const NATIVE: bool, const POINTS: bool> Tile<'_, NATIVE, POINTS> {
-    /// Which of the sources at once meet the first, second, third and fourth of four packs by a root and a division, a bit for
-    /// each: in double precision these take as long as two steps of `inverse_cube`, in another part of the machine, and keep it busy.
-    const ROOTS: [usize; 4] = match (cfg!(feature = "double"), NATIVE) {
-        (false, _) => [0; 4],
-        (true, false) => [0b10; 4],
-        (true, true) => [0b10, 0b01, 0b10, 0],
-    };
+/// Meetings of a part of a pack with B sources, begun: their squared distances, and where their roots start from.
+#[derive(Clone, Copy)]
+struct Begun<L, const B: usize> {
+    r_sq: [L; B],
+    guess: [L; B],
+    both: [L; B],
+}
 
-    /// B sources meet part k of a pack; those with a bit in `roots` by a root and a division.
+impl<const NATIVE: bool, const POINTS: bool> Tile<'_, NATIVE, POINTS> {
+    /// Which of the sources at once meet the packs by a root and a division, a bit for each: in double precision without estimates
+    /// these take as long as two steps of `inverse_cube`, in another part of the machine, and keep it busy.
+    const ROOTS: usize = if cfg!(feature = "double") && !NATIVE { 0b10 } else { 0 };
+
     #[inline(always)]
-    fn meet<W: Width, const B: usize>(
-        w: W,
-        sources: &mut Sources<W::L, B>,
-        pack: &mut Pack,
-        k: usize,
-        softening: W::L,
-        roots: usize,
-        masks: Option<[usize; B]>,
-    ) {
+    fn way<W: Width>(w: W, source: Vec3<W::L>, pack: &Pack, k: usize) -> Vec3<W::L> {
         let load = |lanes: &[Real; LANES]| w.load(&lanes[k * W::N..]);
-        let here = Vec3 { x: load(&pack.x[0]), y: load(&pack.x[1]), z: load(&pack.x[2]) };
-        let weight = load(&pack.weight);
+        source - Vec3 { x: load(&pack.x[0]), y: load(&pack.x[1]), z: load(&pack.x[2]) }
+    }
+
+    /// B sources come near part k of a pack.
+    #[inline(always)]
+    fn begin<W: Width, const B: usize>(w: W, sources: &Sources<W::L, B>, pack: &Pack, k: usize, softening: W::L) -> Begun<W::L, B> {
+        let weight = w.load(&pack.weight[k * W::N..]);
+        let mut begun = Begun { r_sq: [softening; B], guess: [softening; B], both: [softening; B] };
+        for b in 0..B {
+            begun.r_sq[b] = squared::<_, NATIVE>(w, Self::way(w, sources.x[b], pack, k), softening);
+            begun.both[b] = sources.weight[b] * weight;
+            begun.guess[b] = if Self::ROOTS >> b & 1 == 1 { begun.r_sq[b].sqrt() } else { first_guess::<W, NATIVE>(w, begun.r_sq[b]) };
+        }
+        begun
+    }
+
+    /// They pull it, and it them. The ways are found anew, which costs less than to keep them.
+    #[inline(always)]
+    fn finish<W: Width, const B: usize>(w: W, sources: &mut Sources<W::L, B>, pack: &mut Pack, k: usize, begun: Begun<W::L, B>) {
+        let load = |lanes: &[Real; LANES]| w.load(&lanes[k * W::N..]);
         let mut sum = Vec3 { x: load(&pack.sum[0]), y: load(&pack.sum[1]), z: load(&pack.sum[2]) };
         for b in 0..B {
-            let d = sources.x[b] - here;
-            let r_sq = squared::<_, NATIVE>(w, d, softening);
-            let mut both = sources.weight[b] * weight;
-            if let Some(lanes) = masks {
-                both = both * w.load(&STAIRS[LANES - lanes[b] + k * W::N..]);
-            }
-            let mut pull = if roots >> b & 1 == 1 {
+            let (r_sq, guess, both) = (begun.r_sq[b], begun.guess[b], begun.both[b]);
+            let mut pull = if Self::ROOTS >> b & 1 == 1 {
                 let unit = w.splat((1.0 / cube_unit::<W, NATIVE>(w)) as Real);
-                both * (unit / (r_sq * r_sq.sqrt()))
+                both * (unit / (r_sq * guess))
             } else {
-                inverse_cube::<W, NATIVE>(w, r_sq, both)
+                inverse_cube::<W, NATIVE>(w, r_sq, guess, both)
             };
             if POINTS {
                 pull = r_sq.positive(pull, w.splat(0.0));
             }
             // Additions are free beside multiplications, which other parts of the machine do.
-            let force = d * pull;
+            let force = Self::way(w, sources.x[b], pack, k) * pull;
             sum = sum + force;
             sources.sum[b][k] = sources.sum[b][k] + force;
         }
@@ -327,27 +335,28 @@ impl<const NATIVE: bool, const POINTS: bool> Tile<'_, NATIVE, POINTS> {
             sources.x[b] = Vec3 { x: w.splat(x.x), y: w.splat(x.y), z: w.splat(x.z) };
             sources.weight[b] = w.splat(law.weight[j + b]);
         }
-        let (fours, rest) = near[..packs].as_chunks_mut::<4>();
-        for four in fours {
-            for (pack, roots) in four.iter_mut().zip(Self::ROOTS) {
-                for k in 0..LANES / W::N {
-                    Self::meet(w, &mut sources, pack, k, softening, roots, None);
+        // Each part is begun before the one ahead of it is finished: what has to wait for roots then waits beside other work.
+        let (parts, last) = (LANES / W::N, if among { packs } else { packs - 1 });
+        let mut begun = Self::begin(w, &sources, &near[0], 0, softening);
+        for i in 0..last {
+            for k in 0..parts {
+                let (pack, part) = if k + 1 < parts { (i, k + 1) } else { (i + 1, 0) };
+                let next = Self::begin(w, &sources, &near[pack], part, softening);
+                Self::finish(w, &mut sources, &mut near[i], k, begun);
+                begun = next;
+            }
+        }
+        for k in 0..parts {
+            if k > 0 {
+                begun = Self::begin(w, &sources, &near[last], k, softening);
+            }
+            if among {
+                for b in 0..B {
+                    let lanes = (j + b - self.strips[1].start) % BLOCK - last * LANES;
+                    begun.both[b] = begun.both[b] * w.load(&STAIRS[LANES - lanes + k * W::N..]);
                 }
             }
-        }
-        for (pack, roots) in rest.iter_mut().zip(Self::ROOTS) {
-            for k in 0..LANES / W::N {
-                Self::meet(w, &mut sources, pack, k, softening, roots, None);
-            }
-        }
-        if among {
-            let mut lanes = [0; B];
-            for b in 0..B {
-                lanes[b] = (j + b - self.strips[1].start) % BLOCK - packs * LANES;
-            }
-            for k in 0..LANES / W::N {
-                Self::meet(w, &mut sources, &mut near[packs], k, softening, Self::ROOTS[0], Some(lanes));
-            }
+            Self::finish(w, &mut sources, &mut near[last], k, begun);
         }
         for b in 0..B {
             for c in 0..3 {

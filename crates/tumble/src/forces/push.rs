@@ -2,7 +2,7 @@
 
 use super::{Group, One};
 use crate::elements::Block;
-use crate::math::simd::{Kernel, Width, dispatch, packs};
+use crate::math::simd::{Kernel, Width, ask_behind, count, dispatch, packs};
 use crate::math::{Dual, Lane, Real, Row, Vec3};
 
 /// The force on one mass, given its weight (the mass [kg], or the charge [C] for forces on charges).
@@ -24,6 +24,8 @@ impl<P: Push> Kernel for Pushed<'_, P> {
     #[inline(always)]
     fn run<W: Width>(self, w: W) {
         packs!(W, w, (0..self.force.len()), |i| {
+            ask_behind(self.x, i, count(w));
+            ask_behind(self.v, i, count(w));
             let [x, y, z, _] = w.rows(self.x, i);
             let [vx, vy, vz, _] = w.rows(self.v, i);
             let push = self.law.at(w.load(&self.weight[i..]), Vec3 { x, y, z }, Vec3 { x: vx, y: vy, z: vz });

@@ -9,10 +9,11 @@
 //!
 //! Source: sorting by cell is [green2010].
 
-use crate::math::parallel::{CHUNK, chunks};
+use crate::math::parallel::{CHUNK, chunk_sum, chunks, fold};
 use crate::math::simd::{Kernel, Level, Width, dispatch_at};
-use crate::math::{Lane, Real, Row};
+use crate::math::{Lane, Real, Row, ZERO};
 use rayon::prelude::*;
+use std::sync::atomic::{AtomicU32, AtomicU64, Ordering::Relaxed};
 
 /// What a point adds up over its neighbours: N numbers of each point, the first three its place, make M sums.
 pub trait Meet<const N: usize, const M: usize>: Sync {
@@ -31,7 +32,7 @@ pub trait Meet<const N: usize, const M: usize>: Sync {
 }
 
 /// Points sorted by cell.
-#[derive(Debug, Default, Clone)]
+#[derive(Debug, Default)]
 pub struct Neighbours {
     reach: f64,
     /// Sides of a periodic box that starts at the origin [m].
@@ -39,7 +40,7 @@ pub struct Neighbours {
     /// The point at each place. Points that are not finite have none.
     order: Vec<u32>,
     /// The place of each point, or NOWHERE.
-    place: Vec<u32>,
+    place: Vec<AtomicU32>,
     /// Cells that hold points, in order, and the first place of each; one more for the end.
     cells: Vec<u128>,
     start: Vec<u32>,
@@ -47,8 +48,9 @@ pub struct Neighbours {
     tiles: Vec<Tile>,
     /// Runs of places with all neighbours of a tile, LINES or 2 LINES for each.
     runs: Vec<[u32; 2]>,
-    keys: Vec<u128>,
-    pairs: [Vec<u64>; 2],
+    /// Short numbers of cells with their points, before and after a pass of the sort. Atomic, because many threads write to places
+    /// of their own, which no slices could tell apart.
+    pairs: [Vec<AtomicU64>; 2],
 }
 
 /// Places of up to TILE points, and the cells of the first and the last of them.
@@ -57,9 +59,6 @@ struct Tile {
     places: [u32; 2],
     cells: [u128; 2],
 }
-
-/// How many points have a cell, and the lowest and the highest number of these along each axis.
-type Bounds = (usize, [u64; 3], [u64; 3]);
 
 /// The place of a point that has none.
 const NOWHERE: u32 = u32::MAX;
@@ -71,6 +70,8 @@ const LINES: usize = 9;
 const TASK: usize = 64;
 /// Empty cells in a line that end a tile.
 const GAP: u128 = 8;
+/// Bits that a pass of the sort looks at, at most.
+const DIGIT: u32 = 8;
 /// Bits of a cell's number along an axis.
 const BITS: u32 = 42;
 /// The cell at the origin; those at 0 and at twice this stay empty.
@@ -136,109 +137,138 @@ impl Neighbours {
     /// Sorts these points.
     pub fn rebuild(&mut self, x: &[Row]) {
         let counts = self.counts();
-        let bounds = self.number(x, counts);
         self.place.clear();
-        self.place.resize(x.len(), NOWHERE);
+        self.place.resize_with(x.len(), || AtomicU32::new(NOWHERE));
         self.order.clear();
-        self.start.clear();
-        self.sort(bounds);
-        self.cells.clear();
-        self.cells.extend(self.start.iter().map(|first| self.keys[self.order[*first as usize] as usize]));
-        self.start.push(self.order.len() as u32);
+        let bounds = self.bounds(x, counts);
+        let bits: [u32; 3] = std::array::from_fn(|a| 64 - bounds[1][a].wrapping_sub(bounds[0][a]).leading_zeros());
+        if bits.iter().sum::<u32>() <= 32 {
+            self.sort_by_counting(x, counts, bounds[0], bits);
+        } else {
+            self.sort_by_comparing(x, counts);
+        }
         self.lay_tiles();
         self.find_runs(counts);
     }
 
-    /// Finds the cell of each point.
-    fn number(&mut self, x: &[Row], counts: Option<[u64; 3]>) -> Bounds {
-        let cells = 1.0 / self.width();
-        let mut keys = std::mem::take(&mut self.keys);
-        keys.resize(x.len(), u128::MAX);
-        let nothing = (0, [u64::MAX; 3], [0; 3]);
-        let of_chunks: Vec<Bounds> = (keys.par_chunks_mut(CHUNK).zip(x.par_chunks(CHUNK)))
-            .map(|(keys, x)| {
-                let (mut found, mut low, mut high) = nothing;
-                for (k, x) in keys.iter_mut().zip(x) {
-                    *k = u128::MAX;
-                    if let Some(cell) = self.cell(x, cells, counts) {
-                        found += 1;
-                        for a in 0..3 {
-                            (low[a], high[a]) = (low[a].min(cell[a]), high[a].max(cell[a]));
-                        }
-                        *k = key(cell);
-                    }
+    /// The lowest and the highest number of a cell along each axis. Rounding keeps the order of points, and so do cells.
+    fn bounds(&self, x: &[Row], counts: Option<[u64; 3]>) -> [[u64; 3]; 2] {
+        if let Some(counts) = counts {
+            return [[1; 3], counts];
+        }
+        let corners = fold(x.len(), |range| {
+            let mut corners: Option<[Row; 2]> = None;
+            for x in x[range].iter().filter(|x| x[..3].iter().all(|c| c.is_finite())) {
+                let [low, high] = corners.get_or_insert([*x; 2]);
+                for a in 0..4 {
+                    low[a] = if x[a] < low[a] { x[a] } else { low[a] };
+                    high[a] = if x[a] > high[a] { x[a] } else { high[a] };
                 }
-                (found, low, high)
-            })
-            .collect();
-        self.keys = keys;
-        of_chunks.into_iter().fold(nothing, |all, one| {
-            (all.0 + one.0, std::array::from_fn(|a| all.1[a].min(one.1[a])), std::array::from_fn(|a| all.2[a].max(one.2[a])))
-        })
+            }
+            corners
+        });
+        let all = corners
+            .into_iter()
+            .flatten()
+            .reduce(|[low, high], [l, h]| [std::array::from_fn(|a| low[a].min(l[a])), std::array::from_fn(|a| high[a].max(h[a]))]);
+        all.unwrap_or([ZERO; 2]).map(|x| self.cell(&x, 1.0 / self.width(), None).unwrap_or_default())
     }
 
-    /// Puts the points into the order of their cells, by counting where the cells lie close enough, else by comparing; finds the
-    /// first place of each cell.
-    fn sort(&mut self, (found, low, high): Bounds) {
-        if found == 0 {
-            return;
-        }
-        let keys = &self.keys;
-        let bits: [u32; 3] = std::array::from_fn(|a| 64 - (high[a] - low[a]).leading_zeros());
-        let total: u32 = bits.iter().sum();
-        if total > 32 {
-            self.order.extend((0..keys.len() as u32).filter(|i| keys[*i as usize] != u128::MAX));
-            self.order.par_sort_unstable_by_key(|i| (keys[*i as usize], *i));
-            let mut last = u128::MAX;
-            for (place, i) in self.order.iter().enumerate() {
-                self.place[*i as usize] = place as u32;
-                if keys[*i as usize] != last {
-                    last = keys[*i as usize];
-                    self.start.push(place as u32);
-                }
+    /// Puts the points into the order of their cells where these lie close enough for short numbers, digit by digit, the least
+    /// significant first. Each chunk of points counts and moves its own, and no two come to the same place.
+    fn sort_by_counting(&mut self, x: &[Row], counts: Option<[u64; 3]>, low: [u64; 3], bits: [u32; 3]) {
+        let cells = 1.0 / self.width();
+        let mut pairs = std::mem::take(&mut self.pairs);
+        let [from, to] = &mut pairs;
+        from.resize_with(x.len(), Default::default);
+        let found = chunk_sum(from, |start, from| {
+            let mut found = 0;
+            for (k, (pair, x)) in from.iter_mut().zip(&x[start..]).enumerate() {
+                let short = |cell: [u64; 3]| (((cell[2] - low[2]) << bits[1] | (cell[1] - low[1])) << bits[0]) | (cell[0] - low[0]);
+                let cell = self.cell(x, cells, counts);
+                found += usize::from(cell.is_some());
+                *pair.get_mut() = cell.map_or(u64::MAX, |cell| short(cell) << 32 | (start + k) as u64);
             }
-            return;
-        }
-        let [from, to] = &mut self.pairs;
-        from.resize(keys.len(), 0);
-        chunks(from, |start, from| {
-            for (k, (pair, key)) in from.iter_mut().zip(&keys[start..]).enumerate() {
-                let [x, y, z]: [u64; 3] = std::array::from_fn(|a| axis(*key, a as u32).wrapping_sub(low[a]));
-                *pair = (((z << bits[1] | y) << bits[0]) | x) << 32 | (start + k) as u64;
-            }
+            found as f64
         });
-        if found < keys.len() {
-            from.retain(|pair| keys[*pair as u32 as usize] != u128::MAX);
+        if (found as usize) < from.len() {
+            from.retain(|pair| pair.load(Relaxed) != u64::MAX);
         }
-        to.resize(from.len(), 0);
-        // Least significant digits first; each pass keeps the order of equals.
-        const DIGIT: u32 = 11;
+        to.resize_with(from.len(), Default::default);
+        let total: u32 = bits.iter().sum();
+        let digit = total.div_ceil(total.div_ceil(DIGIT).max(1));
         let mut shift = 32;
         while shift < 32 + total {
-            let digit = |pair: u64| (pair >> shift) as usize & ((1 << DIGIT) - 1);
-            let mut next = [0_u32; 1 << DIGIT];
-            from.iter().for_each(|pair| next[digit(*pair)] += 1);
+            let digit_of = |pair: u64| (pair >> shift) as usize & ((1 << digit) - 1);
+            let mut next = fold(from.len(), |range| {
+                let mut count = vec![0_u32; 1 << digit];
+                from[range].iter().for_each(|pair| count[digit_of(pair.load(Relaxed))] += 1);
+                count
+            });
             let mut sum = 0;
-            for n in &mut next {
-                (sum, *n) = (sum + *n, sum);
+            for d in 0..1 << digit {
+                for count in &mut next {
+                    (sum, count[d]) = (sum + count[d], sum);
+                }
             }
-            for pair in from.iter() {
-                let n = &mut next[digit(*pair)];
-                to[*n as usize] = *pair;
-                *n += 1;
-            }
+            from.par_chunks(CHUNK).zip(&mut next).for_each(|(from, next)| {
+                for pair in from {
+                    let pair = pair.load(Relaxed);
+                    let n = &mut next[digit_of(pair)];
+                    to[*n as usize].store(pair, Relaxed);
+                    *n += 1;
+                }
+            });
             std::mem::swap(from, to);
-            shift += DIGIT;
+            shift += digit;
         }
-        let mut last = u64::MAX;
-        for (place, pair) in from.iter().enumerate() {
-            self.order.push(*pair as u32);
-            self.place[*pair as u32 as usize] = place as u32;
-            if pair >> 32 != last {
-                last = pair >> 32;
-                self.start.push(place as u32);
+        self.order.resize(from.len(), 0);
+        let place = &self.place;
+        chunks(&mut self.order, |start, order| {
+            for (k, point) in order.iter_mut().enumerate() {
+                *point = from[start + k].load(Relaxed) as u32;
+                place[*point as usize].store((start + k) as u32, Relaxed);
             }
+        });
+        let from = &*from;
+        self.find_cells(x, counts, |place| from[place].load(Relaxed) >> 32);
+        self.pairs = pairs;
+    }
+
+    /// The same wherever they are.
+    fn sort_by_comparing(&mut self, x: &[Row], counts: Option<[u64; 3]>) {
+        let cells = 1.0 / self.width();
+        let keys: Vec<u128> = x.iter().map(|x| self.cell(x, cells, counts).map_or(u128::MAX, key)).collect();
+        self.order.extend((0..keys.len() as u32).filter(|i| keys[*i as usize] != u128::MAX));
+        self.order.par_sort_unstable_by_key(|i| (keys[*i as usize], *i));
+        for (place, i) in self.order.iter().enumerate() {
+            *self.place[*i as usize].get_mut() = place as u32;
         }
+        let order = self.order.clone();
+        self.find_cells(x, counts, |place| keys[order[place] as usize]);
+    }
+
+    /// Finds the cells that hold points, and the first place of each, by numbers that places in one cell share.
+    fn find_cells<K: PartialEq>(&mut self, x: &[Row], counts: Option<[u64; 3]>, number: impl Fn(usize) -> K + Sync) {
+        let cells = 1.0 / self.width();
+        let order = &self.order;
+        let found = fold(order.len(), |range| {
+            let mut found = Vec::new();
+            for place in range {
+                if place == 0 || number(place) != number(place - 1) {
+                    let cell = self.cell(&x[order[place] as usize], cells, counts);
+                    found.push((cell.map_or(u128::MAX, key), place as u32));
+                }
+            }
+            found
+        });
+        self.cells.clear();
+        self.start.clear();
+        for (key, first) in found.into_iter().flatten() {
+            self.cells.push(key);
+            self.start.push(first);
+        }
+        self.start.push(self.order.len() as u32);
     }
 
     /// Cuts the places into tiles, none of which leaves a line of cells along x.
@@ -346,7 +376,7 @@ impl Neighbours {
 
     /// The place of a point, if it has one.
     pub fn place(&self, point: usize) -> Option<usize> {
-        self.place.get(point).filter(|p| **p != NOWHERE).map(|p| *p as usize)
+        self.place.get(point).map(|p| p.load(Relaxed)).filter(|p| *p != NOWHERE).map(|p| p as usize)
     }
 
     /// Numbers of each point, place by place.
@@ -632,6 +662,36 @@ mod tests {
             assert_ne!(sums(&x, &mut open, Level::Scalar), right);
             for level in Level::available() {
                 assert_eq!(sums(&x, &mut Neighbours::periodic(1.0, sides), level), right, "{sides:?}, {level:?}");
+            }
+        }
+    }
+
+    /// By cell, and by index within a cell, whatever the chunks and the threads; cells close together, far apart, and periodic.
+    #[test]
+    fn places_follow_cells_and_points_on_any_number_of_threads() {
+        for (size, sides) in [(20.0, None), (5e4, None), (20.0, Some([20.0; 3]))] {
+            let mut x = cloud(3 * CHUNK + 17, [size; 3], 9);
+            x[5][1] = Real::NAN;
+            x[2 * CHUNK][2] = Real::INFINITY;
+            for threads in [1, 2, 8] {
+                let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+                let mut grid = Neighbours { sides, ..Neighbours::new(1.0) };
+                // Twice: nothing is left over from the first time.
+                pool.install(|| grid.rebuild(&cloud(4 * CHUNK, [50.0; 3], 10)));
+                pool.install(|| grid.rebuild(&x));
+                let cell = |i: &u32| grid.cell(&x[*i as usize], 1.0 / grid.width(), grid.counts()).map(key);
+                let mut right: Vec<u32> = (0..x.len() as u32).filter(|i| cell(i).is_some()).collect();
+                right.sort_by_key(|i| (cell(i), *i));
+                assert_eq!(grid.order, right, "{size}, {threads} threads");
+                assert_eq!(grid.len(), x.len() - 2);
+                assert!((0..x.len()).all(|i| grid.place(i).map(|p| right[p]) == cell(&(i as u32)).map(|_| i as u32)));
+                assert!(grid.cells.len() > 1000 && grid.cells.windows(2).all(|w| w[0] < w[1]));
+                assert!(
+                    grid.cells
+                        .iter()
+                        .zip(grid.start.windows(2))
+                        .all(|(c, w)| right[w[0] as usize..w[1] as usize].iter().all(|i| cell(i) == Some(*c)))
+                );
             }
         }
     }

@@ -19,13 +19,22 @@ const T: f64 = T1;
 #[cfg(feature = "double")]
 const T: f64 = 4.0 * T1 * T1 * T1 * (1.0 - 0.9e-6);
 
+/// a, b, c of the polynomial of the native cube in double precision.
+const FACTORS: [f64; 3] = [0.752_863_051_671_532_6, 0.052_139_911_117_565_475, 0.604_487_290_187_232_5];
+
+/// What the following start from: an estimate of 1/sqrt(x), or a guess.
+#[inline(always)]
+pub fn first_guess<W: Width, const NATIVE: bool>(w: W, x: W::L) -> W::L {
+    if NATIVE { w.estimate(x) } else { w.guess(x) }
+}
+
 /// w, in proportion to 1/sqrt(x), and t = x w².
 #[inline(always)]
-fn steps<W: Width, const NATIVE: bool>(w: W, x: W::L) -> (W::L, W::L) {
+fn steps<W: Width, const NATIVE: bool>(w: W, x: W::L, guess: W::L) -> (W::L, W::L) {
     let step = |y: W::L, c: f64| {
         if NATIVE { y * w.fused(-(x * y), y, w.splat(c as Real)) } else { y * (w.splat(c as Real) - x * (y * y)) }
     };
-    let y = step(w.guess(x), C);
+    let y = step(guess, C);
     #[cfg(feature = "double")]
     let y = step(y, 3.0 * T1);
     (y, x * (y * y))
@@ -39,24 +48,25 @@ fn parabola<W: Width, const NATIVE: bool>(w: W, t: W::L, a: f64, b: f64) -> W::L
     if NATIVE { w.fused(u, u, b) } else { u * u + b }
 }
 
-/// x^(-3/2) for x > 0, in units of [`cube_unit`]; `NATIVE` may differ in its last bits from machine to machine.
+/// x^(-3/2) for x > 0, in units of [`cube_unit`], times a weight, from the first guess; `NATIVE` may differ in its last bits from
+/// machine to machine.
 #[inline(always)]
-pub fn inverse_cube<W: Width, const NATIVE: bool>(w: W, x: W::L, weight: W::L) -> W::L {
+pub fn inverse_cube<W: Width, const NATIVE: bool>(w: W, x: W::L, guess: W::L, weight: W::L) -> W::L {
     if NATIVE && W::ESTIMATES {
-        let y = w.estimate(x);
+        let y = guess;
         let y_sq = y * y;
         return if cfg!(feature = "double") {
-            // (1 - e)^(-3/2) = 1 + 3/2 e + 15/8 e² + 35/16 e³ + 315/128 e⁴, the last by its best parabola over |e| < 2^-13.
-            let e = w.fused(-x, y_sq, w.splat(1.0));
-            let p = w.fused(e, w.splat(35.0 / 16.0), w.splat((15.0 / 8.0 + 315.0 / 128.0 / 67_108_864.0) as Real));
-            let p = w.fused(e, w.fused(e, p, w.splat(1.5)), w.splat(1.0));
-            ((weight * y) * y_sq) * p
+            // (1 - e)^(-3/2) = 1 + 3/2 e + 15/8 e² + 35/16 e³ + 315/128 e⁴, the last by its best parabola over |e| < 2^-13, as
+            // 35/16 (e + a)((e + b)² + c): one multiplication less than in powers of e.
+            let first = w.fused(-x, y_sq, w.splat((1.0 + FACTORS[0]) as Real));
+            let u = first + w.splat((FACTORS[1] - FACTORS[0]) as Real);
+            (((weight * y) * y_sq) * first) * w.fused(u, u, w.splat(FACTORS[2] as Real))
         } else {
             // 1 + 3/2 e = 3/2 (5/3 - x y²): 2.8e-8.
             ((weight * y) * y_sq) * w.fused(-x, y_sq, w.splat((5.0 / 3.0) as Real))
         };
     }
-    let (y, t) = steps::<W, NATIVE>(w, x);
+    let (y, t) = steps::<W, NATIVE>(w, x, guess);
     let p = parabola::<W, NATIVE>(w, t, 1.4 * T, T * T * (7.0 / 3.0 - 1.96));
     ((weight * y) * (y * y)) * p
 }
@@ -64,7 +74,7 @@ pub fn inverse_cube<W: Width, const NATIVE: bool>(w: W, x: W::L, weight: W::L) -
 /// What a sum over [`inverse_cube`] is multiplied with.
 pub fn cube_unit<W: Width, const NATIVE: bool>(_w: W) -> f64 {
     if NATIVE && W::ESTIMATES {
-        return if cfg!(feature = "double") { 1.0 } else { 1.5 };
+        return if cfg!(feature = "double") { 35.0 / 16.0 } else { 1.5 };
     }
     15.0 / 8.0 / (T * T * T * T.sqrt())
 }
@@ -79,7 +89,7 @@ pub fn inverse_root<W: Width, const NATIVE: bool>(w: W, x: W::L) -> W::L {
         let p = if cfg!(feature = "double") { w.fused(e, w.fused(e, w.splat(0.3125), w.splat(0.375)), w.splat(0.5)) } else { w.splat(0.5) };
         return w.fused(y * e, p, y);
     }
-    let (y, t) = steps::<W, NATIVE>(w, x);
+    let (y, t) = steps::<W, NATIVE>(w, x, w.guess(x));
     y * parabola::<W, NATIVE>(w, t, 5.0 / 3.0 * T, T * T * (5.0 - 25.0 / 9.0))
 }
 
@@ -104,7 +114,7 @@ mod tests {
                 // Every exponent between 1e-22 and 1e22, and mantissas without a pattern.
                 let x = (10.0_f64.powf(-22.0 + 0.0011 * f64::from(i)) * 1.3) as Real;
                 let exact = f64::from(x);
-                w.store(inverse_cube::<W, NATIVE>(w, w.splat(x), w.splat(1.0)), &mut all);
+                w.store(inverse_cube::<W, NATIVE>(w, w.splat(x), first_guess::<W, NATIVE>(w, w.splat(x)), w.splat(1.0)), &mut all);
                 cube = cube.max((f64::from(all[0]) * cube_unit::<W, NATIVE>(w) * (exact * exact.sqrt()) - 1.0).abs());
                 w.store(inverse_root::<W, NATIVE>(w, w.splat(x)), &mut all);
                 root = root.max((f64::from(all[0]) * root_unit::<W, NATIVE>(w) * exact.sqrt() - 1.0).abs());

@@ -1,6 +1,6 @@
 //! Arithmetic on whole columns of rows, number by number, on wide registers. Every width gives the same bits.
 
-use super::simd::{Kernel, Width, count, dispatch, packs};
+use super::simd::{Kernel, Width, ask_behind, count, dispatch, packs};
 use super::{Lane, Real, Row};
 
 /// What becomes of one number `out` of a row, given one number of each row in hand.
@@ -28,6 +28,7 @@ impl<F: Each, const BY_LAST: bool> Kernel for All<'_, F, BY_LAST> {
             pattern[i] = self.constant[i % 4];
         }
         packs!(W, w, (0..out.len()), |e| {
+            ask_behind(self.a, e / 4, count(w).div_ceil(4));
             let here = &mut out[e..];
             let of_row = if BY_LAST {
                 let mut last = [0.0; 4];

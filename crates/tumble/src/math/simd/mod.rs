@@ -131,6 +131,20 @@ pub fn ask(numbers: &[Real]) {
     let _ = numbers;
 }
 
+/// Asks memory for `count` rows, `at` rows behind the end of these: long columns are worked through part by part, and the next part
+/// lies behind this one. Memory is then read while registers are busy, not between the passes over a part.
+#[inline(always)]
+pub fn ask_behind(rows: &[Row], at: usize, count: usize) {
+    #[cfg(target_arch = "x86_64")]
+    for row in (0..count).step_by(64 / size_of::<Row>()) {
+        use std::arch::x86_64::{_MM_HINT_T0, _mm_prefetch};
+        // SAFETY: no address is wrong.
+        unsafe { _mm_prefetch::<_MM_HINT_T0>(rows.as_ptr_range().end.wrapping_add(at + row).cast()) };
+    }
+    #[cfg(not(target_arch = "x86_64"))]
+    let _ = (rows, at, count);
+}
+
 /// A kernel, generic over the register width.
 pub trait Kernel {
     /// What it returns.
@@ -240,7 +254,7 @@ pub struct Pack<S: Simd> {
 }
 
 macro_rules! operations {
-    ($splat:ident, $add:ident, $sub:ident, $mul:ident, $div:ident, $neg:ident, $sqrt:ident, $greater:ident, $select:ident) => {
+    ($splat:ident, $add:ident, $sub:ident, $mul:ident, $div:ident, $neg:ident, $sqrt:ident, $max:ident, $greater:ident, $select:ident) => {
         impl<S: Simd> Add for Pack<S> {
             type Output = Self;
             #[inline(always)]
@@ -304,6 +318,11 @@ macro_rules! operations {
                 Self { simd: self.simd, v: self.simd.$select(mask, then.v, other.v) }
             }
             #[inline(always)]
+            fn above_zero(self) -> Self {
+                // One instruction, which takes the second where the first is not larger: zero, for NaN and -0, too.
+                Self { simd: self.simd, v: self.simd.$max(self.v, self.simd.$splat(0.0)) }
+            }
+            #[inline(always)]
             fn any_positive(self) -> bool {
                 self.simd.any(self.simd.$greater(self.v, self.simd.$splat(0.0)))
             }
@@ -312,9 +331,9 @@ macro_rules! operations {
 }
 
 #[cfg(not(feature = "double"))]
-operations!(splat_f32s, add_f32s, sub_f32s, mul_f32s, div_f32s, neg_f32s, sqrt_f32s, greater_than_f32s, select_f32s);
+operations!(splat_f32s, add_f32s, sub_f32s, mul_f32s, div_f32s, neg_f32s, sqrt_f32s, max_f32s, greater_than_f32s, select_f32s);
 #[cfg(feature = "double")]
-operations!(splat_f64s, add_f64s, sub_f64s, mul_f64s, div_f64s, neg_f64s, sqrt_f64s, greater_than_f64s, select_f64s);
+operations!(splat_f64s, add_f64s, sub_f64s, mul_f64s, div_f64s, neg_f64s, sqrt_f64s, max_f64s, greater_than_f64s, select_f64s);
 
 /// The instruction sets that a kernel can be run on, for tests that compare their bits.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
