@@ -27,7 +27,14 @@ TANK: Tree = {
         {"name": "balls", "position": [[-0.2, 0, 0], [0.2, 0.1, 0]], "mass": [0.5, 30], "radius": 0.12},
     ],
     "sheet": [
-        {"name": "cloth", "size": [0.4, 0.4], "resolution": [9, 9], "center": [0, 0, -0.3], "density": 3, "pin": ["edge x-"]}
+        {
+            "name": "cloth",
+            "size": [0.4, 0.4],
+            "resolution": [9, 9],
+            "center": [0, 0, -0.3],
+            "density": 3,
+            "pin": ["edge x-"],
+        }
     ],
     "output": {"plot": False, "columns": ["position", "velocity", "force"]},
 }
@@ -56,7 +63,11 @@ def test_a_tank_has_the_same_bits_on_any_threads_and_restored(tmp_path: Path) ->
         ({"bodies": ["ballz"]}, 'gas "water".bodies[0]', 'no object "ballz"; did you mean "balls"'),
         ({"bodies": ["cloth"]}, 'gas "water".bodies[0]', "no object of [[particles]]"),
         ({"bodies": ["water"]}, 'gas "water".bodies[0]', "a fluid moves masses of dynamics"),
-        ({"box": {"size": [1, 1, 1], "resolution": 10}}, 'gas "water".bodies', "radius of 0.12 m, expected >= 1.5 cells"),
+        (
+            {"box": {"size": [1, 1, 1], "resolution": 10}},
+            'gas "water".bodies',
+            "radius of 0.12 m, expected >= 1.5 cells",
+        ),
         ({"pressure": {"method": "sor"}}, 'gas "water".pressure.method', "expected a method of gradients"),
         ({"sheet": [{"object": "balls"}]}, 'gas "water".sheet[0].object', "has no surface of triangles"),
         ({"sheet": [{"object": "cloth", "resistance": -1}]}, 'gas "water".sheet[0].resistance', "expected >= 0"),
@@ -80,7 +91,11 @@ def test_what_a_gas_moves_comes_after_it() -> None:
 def test_a_frame_says_where_moving_colliders_are_whatever_it_is_asked_for() -> None:
     scene = copy.deepcopy(TANK)
     scene["collider"] = [
-        {"name": "paddle", "shape": {"sphere": {"center": [0, 0, 0.3], "radius": 0.1}}, "motion": {"velocity": [1, 0, 0]}}
+        {
+            "name": "paddle",
+            "shape": {"sphere": {"center": [0, 0, 0.3], "radius": 0.1}},
+            "motion": {"velocity": [1, 0, 0]},
+        }
     ]
     scene["output"]["columns"] = ["pressure"]
     world = World(scene)
