@@ -142,7 +142,9 @@ viscosity = 1e-4
         run(&mut sim, 4);
         sim.hash()
     };
-    assert_eq!(hash("variable", ""), hash("boussinesq", ""));
+    for collider in ["", "[[collider]]\nname = \"ball\"\nshape.sphere = { center = [0.03, 0, 0.1], radius = 0.23 }\n"] {
+        assert_eq!(hash("variable", collider), hash("boussinesq", collider), "{collider}");
+    }
 }
 
 #[test]

@@ -52,7 +52,7 @@ fn a_held_net_brakes_a_tube_as_its_resistance_says() {
     });
     // The implicit law lags by K C/2, C = 0.16 at first: 0.035, 0.018, 0.009.
     let orders = orders(&errors);
-    assert!(errors[0] < 0.05 && orders.iter().all(|p| (p - 1.0).abs() < 0.1), "{errors:?} {orders:?}");
+    assert!(errors.iter().all(|e| (0.0..0.05).contains(e)) && orders.iter().all(|p| (p - 1.0).abs() < 0.1), "{errors:?} {orders:?}");
 }
 
 #[test]

@@ -92,7 +92,7 @@ pub struct Exchange {
     mail: Vec<Letter>,
     fluxes: Vec<Flux>,
     winds: Vec<Wind>,
-    /// Sum of all impulses ever posted and ever delivered [N s].
+    /// Sum of all impulses ever posted [N s].
     pub posted: Vector,
     /// Sum of all impulses ever delivered [N s].
     pub delivered: Vector,

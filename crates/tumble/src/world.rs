@@ -74,11 +74,11 @@ impl World {
         let mut report = StepReport::default();
         for k in 0..u64::from(self.exchanges) {
             // From whole numbers, so that time does not drift.
-            let t = (self.frame * u64::from(self.exchanges) + k) as f64 * self.dt;
+            let [t, end] = [k, k + 1].map(|k| (self.frame * u64::from(self.exchanges) + k) as f64 * self.dt);
             for system in &mut self.systems {
                 system.absorb(&mut self.exchange);
                 report.add(&system.advance(t, self.dt, &mut self.exchange, go_on)?);
-                system.publish(t + self.dt, &mut self.exchange);
+                system.publish(end, &mut self.exchange);
             }
         }
         Ok(report)
@@ -133,9 +133,7 @@ impl World {
         let posted = archive.numbers("exchange")?;
         self.systems.iter_mut().try_for_each(|s| s.restore(archive))?;
         if self.exchange.is_heard() {
-            // As it was when the interval before ended, to the bit.
-            let done = self.frame * u64::from(self.exchanges);
-            let time = done.checked_sub(1).map_or(0.0, |before| before as f64 * self.dt + self.dt);
+            let time = self.time();
             self.systems.iter_mut().for_each(|s| s.publish(time, &mut self.exchange));
         }
         self.exchange.restore(&posted)

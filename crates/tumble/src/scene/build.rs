@@ -155,6 +155,9 @@ pub fn build(scene: &Scene, assets: &Assets) -> Result<Built, SceneError> {
         };
         warnings.extend(buried(scene, &parts, &colliders));
         let mut system = parts.build(settings).map_err(|e| placed(scene, e))?;
+        if exchange.ports_of(index).next().is_some() {
+            system.expect_pushes();
+        }
         anchors.iter().for_each(|anchor| coupling::hang(&mut system, index, anchor, dt, &mut exchange, &mut warnings));
         systems.push(Box::new(system));
     }

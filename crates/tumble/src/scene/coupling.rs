@@ -64,6 +64,11 @@ fn moved_by(scene: &Scene, plans: &[Plan], words: &Gas, name: &str, wrong: &mut 
         wrong(format!("there is no object \"{name}\"{hint}"));
         return None;
     };
+    let all = scene.gas.iter().flat_map(|gas| gas.bodies.iter().chain(gas.sheet.iter().map(|sheet| &sheet.object)));
+    if all.filter(|other| *other == name).count() > 1 {
+        wrong(format!("\"{name}\" is named more than once; one fluid moves it, as a ball or as a sheet"));
+        return None;
+    }
     let (own, other) = (place(plans, "gas", words.system.as_deref())?, place(plans, kind, *system)?);
     if plans[other].method != Method::Dynamics {
         wrong(format!("\"{name}\" is in a system of method {}; a fluid moves masses of dynamics", plans[other].method.name()));

@@ -348,6 +348,10 @@ impl Read<'_, '_> {
             self.wrong(".pressure.method", "cosine, which knows one density alone; take multigrid_gradients");
             return None;
         }
+        if !words.sheet.is_empty() && words.densities == Densities::Variable {
+            self.wrong(".densities", "variable, expected boussinesq: sheets know one density alone");
+            return None;
+        }
         let pressure = &words.pressure;
         let settings = Settings {
             density: words.fluid_density,
@@ -394,8 +398,7 @@ impl Read<'_, '_> {
     }
 }
 
-/// The system of the fluids that it moves, or what is wrong with them.
-/// `moved` is what each fluid of the scene moves.
+/// A system with its fluids, or what is wrong with them; `moved` is what each fluid of the scene moves.
 pub fn gas(
     scene: &Scene,
     plans: &[Plan],

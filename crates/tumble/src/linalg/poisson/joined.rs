@@ -70,7 +70,10 @@ impl<T: Weight> Solver<T> {
 
     /// p . J p of all joints together; p has no mean over floating components.
     pub(super) fn joined_curvature(&self, p: &[Real]) -> f64 {
-        let square = |joint: &Joint| joint.weight * joint.sum(|at| f64::from(p[at])) * joint.sum(|at| f64::from(p[at]));
+        let square = |joint: &Joint| {
+            let product = joint.sum(|at| f64::from(p[at]));
+            joint.weight * product * product
+        };
         self.joints.iter().map(square).sum()
     }
 

@@ -55,11 +55,16 @@ impl Body {
         }
     }
 
-    /// Signed distance [m] and direction of a point from the surface; `flat` is the axis across the plane.
-    pub(super) fn near(&self, x: Vector, flat: Option<usize>) -> (f64, Vector) {
+    /// Signed distance [m] and direction of a point from the surface, of the nearest image across periodic sides.
+    pub(super) fn near(&self, x: Vector, grid: &Grid) -> (f64, Vector) {
         let mut way: [f64; 3] = (x - self.position).into();
-        if let Some(axis) = flat {
-            way[axis] = 0.0;
+        for axis in 0..3 {
+            if grid.flat == Some(axis) {
+                way[axis] = 0.0;
+            } else if grid.periodic[axis] {
+                let length = grid.n[axis] as f64 * grid.dx;
+                way[axis] -= length * (way[axis] / length).round();
+            }
         }
         let way = Vector::from(way);
         let far = way.norm();
@@ -84,6 +89,8 @@ impl Body {
         let port = exchange.port(self.port);
         (self.position, self.velocity, self.acceleration) = (port.position, port.velocity, port.acceleration);
         self.inverse_mass = port.inverse_mass;
+        // A step that was cut short may have left some.
+        self.impulse = Vector::default();
     }
 
     /// Gives its system what the fluid has given it.

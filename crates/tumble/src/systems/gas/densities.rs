@@ -2,7 +2,7 @@
 //!
 //!   rho = rho_0/(1 + beta (T - T0)) + weight s,   u = u* - rho_0/rho_f grad q,   f = g (1 - rho_0/rho_f)         (gas.13)
 //!
-//! rho_f of a face is the mean of the two cells beside it, on a side of the box that of the cell before it.
+//! rho_f of a face is the mean of the two cells beside it, on a side of the box that of the cell beside it.
 //! Tests: crates/tumble-f64/tests/densities.rs. Limits: the kinematic viscosity is the same everywhere.
 
 use super::fluid::{Carried, Failure, Settings};

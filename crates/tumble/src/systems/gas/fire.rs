@@ -53,7 +53,9 @@ impl Fire {
         let part = g * left / (1.0 + g);
         let after = part / (1.0 - part);
         let volume = (1.0 + g) / (1.0 + after);
-        let growth = functions::ln(volume);
+        // ln(1 + x) in a form that keeps its digits where x is small.
+        let x = (g - after) / (1.0 + after);
+        let growth = if x < 1e-5 { x * (1.0 - 0.5 * x * (1.0 - x * (2.0 / 3.0))) } else { functions::ln(volume) };
         Burnt { fuel: after / self.expansion, smoke: (smoke + soot) / volume, warming: self.warming * growth / self.expansion, growth }
     }
 }

@@ -129,7 +129,11 @@ impl System for Gas {
     }
 
     fn publish(&mut self, t: f64, exchange: &mut Exchange) {
-        self.fluids.iter().for_each(|fluid| exchange.blow(&fluid.name, t, &fluid.u));
+        for fluid in &mut self.fluids {
+            // What is beyond the sides is in no snapshot.
+            hold(&mut fluid.u, &fluid.settings.sides, t);
+            exchange.blow(&fluid.name, t, &fluid.u);
+        }
     }
 
     fn columns(&self, names: &[&str], out: &mut Vec<Column>) {

@@ -6,7 +6,8 @@
 //! it, that end a step with the w of the implicit law: it takes energy from them, whatever the step, and no momentum.
 //!
 //! Source: [taylor1944]. Limits: w of a step is at least w/(1 + K C/2) with the Courant number C of w, so that K above 2/C acts like
-//! 2/C; what is smaller than two cells is felt as if it were that large.
+//! 2/C; what is smaller than two cells is felt as if it were that large; beside walls and colliders, what is taken from faces that are held
+//! is lost.
 //! Tests: crates/tumble-f64/tests/sheets.rs.
 
 use super::spots::Spot;
@@ -88,12 +89,20 @@ impl Sheet {
         self.share_areas(grid.flat);
         let stride = grid.lattice().stride;
         let cell = (0..grid.dimension()).fold(density, |m, _| m * grid.dx);
+        let wrapped = |x: Vector| {
+            let mut x: [f64; 3] = x.into();
+            for a in grid.axes().filter(|a| grid.periodic[*a]) {
+                let length = grid.n[a] as f64 * grid.dx;
+                x[a] -= length * ((x[a] - grid.origin[a]) / length).floor();
+            }
+            Vector::from(x)
+        };
         let inside = |x: Vector| {
             let x: [f64; 3] = x.into();
             grid.axes().all(|a| (0.0..=grid.n[a] as f64 * grid.dx).contains(&(x[a] - grid.origin[a])))
         };
         let (resistance, friction) = (self.resistance, self.friction);
-        for mass in self.masses.iter_mut().filter(|mass| inside(mass.x)) {
+        for mass in self.masses.iter_mut().filter(|mass| inside(wrapped(mass.x))) {
             let area = mass.area.norm();
             if area == 0.0 {
                 continue;
@@ -102,7 +111,8 @@ impl Sheet {
             if let Some(flat) = grid.flat {
                 w[flat] = 0.0;
             }
-            let spots: [Option<Spot>; 3] = std::array::from_fn(|a| (grid.flat != Some(a)).then(|| Spot::new(grid, Place::Face(a), mass.x)));
+            let spots: [Option<Spot>; 3] =
+                std::array::from_fn(|a| (grid.flat != Some(a)).then(|| Spot::new(grid, Place::Face(a), wrapped(mass.x))));
             for part in &u.parts {
                 let Place::Face(axis) = part.place else { continue };
                 let Some(spot) = &spots[axis] else { continue };

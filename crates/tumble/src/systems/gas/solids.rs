@@ -207,7 +207,7 @@ impl Solids {
             }
         }
         for (i, body) in self.bodies.iter().enumerate() {
-            let (d, n) = body.near(x, self.grid.flat);
+            let (d, n) = body.near(x, &self.grid);
             if d < best.1 {
                 best = (self.colliders.len() + i, d, n, body.velocity);
             }
