@@ -88,7 +88,7 @@ def test_no_ball_is_too_light(ratio: float) -> None:
     ("change", "place", "message"),
     [
         ({"bodies": ["ballz"]}, 'gas "water".bodies[0]', 'no object "ballz"; did you mean "balls"'),
-        ({"bodies": ["cloth"]}, 'gas "water".bodies[0]', "no object of [[particles]]"),
+        ({"bodies": ["cloth"], "sheet": []}, 'gas "water".bodies[0]', "no object of [[particles]]"),
         ({"bodies": ["water"]}, 'gas "water".bodies[0]', "a fluid moves masses of dynamics"),
         (
             {"box": {"size": [1, 1, 1], "resolution": 10}},
