@@ -201,6 +201,55 @@ fn a_ball_moves_on_in_every_sub_step_of_the_fluid() {
     assert!(at(0.313) == 0.0 && at(0.45) == 0.0 && at(-0.1) > 0.0 && at(-0.2) > 0.0, "{} {} {}", at(0.313), at(0.45), at(-0.1));
 }
 
+/// A ball of a volume of 14.1 litres in a tank of water whose walls keep its centre 0.2 m away.
+fn tank(mass: f64, z: f64, frames: usize) -> String {
+    format!(
+        r#"
+time = {{ fps = 24, frames = {frames}, exchanges = 2 }}
+[[gas]]
+name = "water"
+box = {{ size = [1, 1, 1], center = [0, 0, 0.5], resolution = 16 }}
+fluid_density = 1000
+bodies = ["ball"]
+[[particles]]
+name = "ball"
+position = [[0, 0, {z}]]
+radius = 0.15
+mass = [{mass}]
+[[collider]]
+name = "tank"
+inside = true
+thickness = 0.2
+shape.box = {{ center = [0, 0, 0.5], size = [1, 1, 1] }}
+"#
+    )
+}
+
+#[test]
+fn the_fluid_around_a_ball_that_leans_on_a_wall_rests() {
+    for (mass, z) in [(0.05, 0.8), (1.0, 0.8), (5.0, 0.8), (40.0, 0.2)] {
+        let mut sim = simulation(&tank(mass, z, 24));
+        run(&mut sim, 24);
+        let x = column(&sim, "ball", "position")[0];
+        assert!((x.z - z).abs() < 1e-6 && sim.ledger().kinetic < 1e-12, "{mass} kg: {x:?} {:e} J", sim.ledger().kinetic);
+    }
+}
+
+#[test]
+fn a_ball_that_reaches_a_wall_brings_no_more_energy_than_its_way() {
+    for mass in [0.05, 1.0, 5.0] {
+        let mut sim = simulation(&tank(mass, 0.5, 48));
+        let displaced = 1000.0 * 4.0 / 3.0 * PI * 0.15_f64.powi(3);
+        let most = 9.8 * 0.3 * (displaced - mass);
+        let mut energies = Vec::new();
+        for _ in 0..48 {
+            step(&mut sim);
+            energies.push(sim.ledger().kinetic);
+        }
+        assert!(energies.iter().all(|e| *e < most) && energies[47] < 0.5 * most, "{mass}: {most} {}", show(&energies));
+    }
+}
+
 #[test]
 fn a_restored_ball_goes_on_with_the_same_bits() {
     let text = cavity(16, false, 0.3, [2, 1], "time = { fps = 24, frames = 5 }", "");

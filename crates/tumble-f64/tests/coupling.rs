@@ -46,7 +46,7 @@ fn energy(sim: &Simulation) -> f64 {
     (r * r + speed * speed / (W * W)) / 0.01
 }
 
-/// What the exchange has posted and delivered [N s], and the momentum in the mail, from a snapshot: ports (11 numbers each),
+/// What the exchange has posted and delivered [N s], and the momentum in the mail, from a snapshot: ports (14 numbers each),
 /// posted, delivered, then the mail as port, kind and impulse.
 fn exchange(sim: &Simulation) -> ([f64; 3], [f64; 3], [f64; 3]) {
     let bytes = sim.save(&[]);
@@ -54,7 +54,7 @@ fn exchange(sim: &Simulation) -> ([f64; 3], [f64; 3], [f64; 3]) {
     let name = tensors.names().into_iter().find(|n| n.ends_with(" exchange")).unwrap().to_string();
     let numbers: Vec<f64> =
         tensors.tensor(&name).unwrap().data().chunks_exact(8).map(|b| f64::from_le_bytes(b.try_into().unwrap())).collect();
-    let rest = &numbers[1 + 11 * numbers[0] as usize..];
+    let rest = &numbers[1 + 14 * numbers[0] as usize..];
     let three = |s: &[f64]| [s[0], s[1], s[2]];
     let mail = rest[6..].chunks_exact(5).fold([0.0; 3], |sum, m| [sum[0] + m[2], sum[1] + m[3], sum[2] + m[4]]);
     (three(rest), three(&rest[3..]), mail)

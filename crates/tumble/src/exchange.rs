@@ -23,6 +23,9 @@ pub struct PortState {
     pub velocity: Vector,
     /// Acceleration by all that its own system does to it [m/s²], where [`Exchange::open_body`] asked for it.
     pub acceleration: Vector,
+    /// Away from the solid of its own system that it touches; zero if it touches none. Asked for like the acceleration, which knows
+    /// nothing of contact.
+    pub normal: Vector,
     /// 1/mass [1/kg], 0 for what is held.
     pub inverse_mass: f64,
     /// Time at which they hold [s].
@@ -36,13 +39,13 @@ impl PortState {
     }
 
     fn numbers(&self) -> [f64; PORT] {
-        let [x, v, a] = [self.position, self.velocity, self.acceleration].map(<[f64; 3]>::from);
-        [x[0], x[1], x[2], v[0], v[1], v[2], a[0], a[1], a[2], self.inverse_mass, self.time]
+        let [x, v, a, n] = [self.position, self.velocity, self.acceleration, self.normal].map(<[f64; 3]>::from);
+        [x[0], x[1], x[2], v[0], v[1], v[2], a[0], a[1], a[2], n[0], n[1], n[2], self.inverse_mass, self.time]
     }
 }
 
 /// Numbers of a port in a snapshot.
-const PORT: usize = 11;
+const PORT: usize = 14;
 
 /// An impulse on its way.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -105,7 +108,7 @@ impl Exchange {
         self.ports.len() - 1
     }
 
-    /// Makes a row of a system a port that tells its acceleration.
+    /// Makes a row of a system a port that tells its acceleration and what it touches.
     pub fn open_body(&mut self, system: usize, row: usize) -> Port {
         let port = self.open(system, row);
         self.bodies.push(port);
@@ -227,7 +230,7 @@ impl Exchange {
         }
         for (port, s) in self.ports.iter_mut().zip(ports.chunks_exact(PORT)) {
             (port.position, port.velocity, port.acceleration) = (v(&s[..3]), v(&s[3..6]), v(&s[6..9]));
-            (port.inverse_mass, port.time) = (s[9], s[10]);
+            (port.normal, port.inverse_mass, port.time) = (v(&s[9..12]), s[12], s[13]);
         }
         (self.posted, self.delivered) = (v(&sums[..3]), v(&sums[3..]));
         for (flux, s) in self.fluxes.iter_mut().zip(fluxes.chunks_exact(2)) {

@@ -354,6 +354,17 @@ impl Dynamics {
         self.memory.ready = false;
     }
 
+    /// The normal of the nearest solid that a point leans on, zero if there is none.
+    fn touched(&self, x: Vector, t: f64) -> Vector {
+        let gap = |collider: &crate::geometry::Collider| {
+            let thick = collider.thickness;
+            let (distance, normal) = collider.distance(x, t, 2.0 * thick);
+            (distance <= thick * (1.0 + 1e-3)).then_some((distance - thick, normal))
+        };
+        let nearest = self.laws.colliders.iter().filter_map(gap).reduce(|a, b| if b.0 < a.0 { b } else { a });
+        nearest.map_or(Vector::default(), |(_, normal)| normal)
+    }
+
     /// Accelerations now [m/s²]; none where a user's force fails, which the next step tells.
     fn rates(&mut self, t: f64) -> Vec<Row> {
         let mut out = vec![ZERO; self.state.x.len()];
@@ -461,12 +472,14 @@ impl System for Dynamics {
     }
 
     fn publish(&mut self, t: f64, exchange: &mut Exchange) {
-        let rates = if exchange.has_body(self.index) { self.rates(t) } else { Vec::new() };
+        let told = exchange.has_body(self.index);
+        let rates = if told { self.rates(t) } else { Vec::new() };
         for port in exchange.ports_of(self.index) {
             let i = port.owner.1;
             (port.position, port.velocity, port.time) = (xyz64(self.state.x[i]), xyz64(self.state.v[i]), t);
             port.acceleration = rates.get(i).map_or(Vector::default(), |a| xyz64(*a));
             port.inverse_mass = f64::from(self.laws.masses.inverse(i, &self.state.x));
+            port.normal = if told { self.touched(port.position, t) } else { Vector::default() };
         }
     }
 

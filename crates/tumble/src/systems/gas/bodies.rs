@@ -33,6 +33,8 @@ pub struct Body {
     pub acceleration: Vector,
     /// 1/mass [1/kg]; 0 if it is held.
     pub inverse_mass: f64,
+    /// The normal of a solid of its own system that it rests on: along it, the ball is held.
+    rests: Option<Vector>,
     /// What the fluid has given it in this interval [N s].
     pub impulse: Vector,
     /// Of each axis, the numbers of faces' cells and their closed shares.
@@ -50,6 +52,7 @@ impl Body {
             velocity: Vector::default(),
             acceleration: Vector::default(),
             inverse_mass: 0.0,
+            rests: None,
             impulse: Vector::default(),
             faces: Default::default(),
         }
@@ -84,11 +87,14 @@ impl Body {
         grid.axes().map(share).product::<f64>() * whole
     }
 
-    /// Takes its state from its system.
-    pub(super) fn listen(&mut self, exchange: &Exchange) {
+    /// Takes its state from its system. What is pressed against a solid and does not leave it rests on it.
+    pub(super) fn listen(&mut self, exchange: &Exchange, gravity: [f64; 3], density: f64, grid: &Grid) {
         let port = exchange.port(self.port);
         (self.position, self.velocity, self.acceleration) = (port.position, port.velocity, port.acceleration);
         self.inverse_mass = port.inverse_mass;
+        let pressed = self.acceleration - Vector::from(gravity) * (density * self.displaced(grid) * self.inverse_mass);
+        let leaves = port.velocity.dot(port.normal) > 1e-3 * (pressed.norm() * self.radius).sqrt();
+        self.rests = (pressed.dot(port.normal) < 0.0 && !leaves).then_some(port.normal);
         // A step that was cut short may have left some.
         self.impulse = Vector::default();
     }
@@ -100,7 +106,23 @@ impl Body {
 
     fn push(&mut self, impulse: Vector) {
         self.impulse = self.impulse + impulse;
-        self.velocity = self.velocity + impulse * self.inverse_mass;
+        self.velocity = self.velocity + self.free(impulse * self.inverse_mass);
+    }
+
+    /// The part of a change of velocity that nothing holds.
+    fn free(&self, change: Vector) -> Vector {
+        self.rests.map_or(change, |n| change - n * n.dot(change))
+    }
+
+    /// Three directions, and whether the ball is free along each.
+    fn directions(&self) -> [([f64; 3], bool); 3] {
+        let Some(n) = self.rests else { return [([1.0, 0.0, 0.0], true), ([0.0, 1.0, 0.0], true), ([0.0, 0.0, 1.0], true)] };
+        let least = [n.x.abs(), n.y.abs(), n.z.abs()];
+        let axis = if least[0] <= least[1] && least[0] <= least[2] { 0 } else { 1 + usize::from(least[2] < least[1]) };
+        let mut along = [0.0; 3];
+        along[axis] = 1.0;
+        let first = n.cross(along.into()).normalized();
+        [(n.into(), false), (first.into(), true), (n.cross(first).into(), true)]
     }
 
     /// What is not the pressure's, for h seconds: other forces, and the weight of the fluid that it displaces.      (gas.17)
@@ -108,19 +130,23 @@ impl Body {
         if self.inverse_mass == 0.0 {
             return;
         }
-        self.velocity = self.velocity + self.acceleration * h;
+        self.velocity = self.velocity + self.free(self.acceleration * h);
         self.push(Vector::from(gravity) * (-h * density * self.displaced(grid)));
     }
 
-    /// Its part of the matrix of the pressure, a row for each axis; `mass` is that of the fluid in a cell [kg].
+    /// Its part of the matrix of the pressure, a row for each direction; `mass` is that of the fluid in a cell [kg].
     pub(super) fn joints(&self, mass: f64) -> impl Iterator<Item = Joint> + '_ {
-        self.faces.iter().map(move |cells| Joint::new(cells.clone(), mass * self.inverse_mass))
+        self.directions().into_iter().map(move |(way, free)| {
+            let part = |a: usize| self.faces[a].iter().filter(move |_| way[a] != 0.0).map(move |(at, j)| (*at, *j * way[a] as Real));
+            Joint::new((0..3).flat_map(part).collect(), if free { mass * self.inverse_mass } else { 0.0 })
+        })
     }
 
     /// Takes the impulse of a pressure, from j . q of its rows [m²/s]; `mass` is rho dx^(d-1) [kg/m].
     pub(super) fn yield_to(&mut self, products: &[f64], mass: f64) {
-        if let ([x, y, z], true) = (products, self.inverse_mass > 0.0) {
-            self.push(Vector::from([*x, *y, *z]) * mass);
+        if self.inverse_mass > 0.0 {
+            let all = self.directions().into_iter().zip(products);
+            self.push(all.fold(Vector::default(), |sum, ((way, _), product)| sum + Vector::from(way) * (product * mass)));
         }
     }
 }

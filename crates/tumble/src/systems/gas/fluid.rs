@@ -368,7 +368,9 @@ impl Fluid {
 
     /// Takes the state of what it moves.
     pub fn listen(&mut self, exchange: &Exchange) {
-        self.bodies().iter_mut().for_each(|body| body.listen(exchange));
+        let grid = self.grid();
+        let (gravity, density) = (self.settings.gravity, self.settings.density);
+        self.bodies().iter_mut().for_each(|body| body.listen(exchange, gravity, density, &grid));
         self.join();
         self.sheets.iter_mut().for_each(|sheet| sheet.listen(exchange));
     }
