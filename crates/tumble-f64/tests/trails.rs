@@ -141,6 +141,28 @@ lifetime = 0.5
 }
 
 #[test]
+fn velocities_are_linear_between_faces_and_times() {
+    let grid = Grid::new([6, 5, 7], 0.25, [-0.7, -0.6, -0.8]).unwrap();
+    // Linear in place, and from another such field to another in time: what is linear between is exact.
+    let early = |x: [f64; 3]| [1.0 + 2.0 * x[0] - x[2], 0.5 * x[1], x[0] + 3.0 * x[1]];
+    let late = |x: [f64; 3]| [-2.0 + x[1], 4.0 * x[0] - x[1], 0.25 + x[2]];
+    let states = vec![
+        (2.0, Arc::new(Vectors::of(grid, "m/s", early).unwrap())),
+        (2.5, Arc::new(Vectors::of(grid, "m/s", late).unwrap())),
+    ];
+    let flow = OnGrid { fluid: "air".into(), states };
+    for x in [[0.013, -0.02, 0.1], [-0.31, 0.27, -0.4], [0.4, 0.1, 0.33]] {
+        for (t, s) in [(1.0, 0.0), (2.0, 0.0), (2.05, 0.1), (2.4, 0.8), (2.5, 1.0), (9.0, 1.0)] {
+            let v: [f64; 3] = flow.at(t, x.into()).into();
+            for a in 0..3 {
+                let exact = (1.0 - s) * early(x)[a] + s * late(x)[a];
+                assert!((v[a] - exact).abs() < 1e-13, "{x:?} {t} {a}: {} {exact}", v[a]);
+            }
+        }
+    }
+}
+
+#[test]
 fn a_field_of_no_gas_is_told() {
     let text = "version = 1\n[[system]]\nmethod = \"tracers\"\nintegrator = \"rk4\"\n[[particles]]\nname = \"p\"\nposition = [[0, 0, 0]]\n[[field]]\nkind = \"gas\"\nof = \"steam\"\n";
     let error = tumble_f64::scene::Simulation::new(tumble_interface::Scene::from_toml(text).unwrap(), Default::default()).err().unwrap();
