@@ -146,10 +146,7 @@ fn velocities_are_linear_between_faces_and_times() {
     // Linear in place, and from another such field to another in time: what is linear between is exact.
     let early = |x: [f64; 3]| [1.0 + 2.0 * x[0] - x[2], 0.5 * x[1], x[0] + 3.0 * x[1]];
     let late = |x: [f64; 3]| [-2.0 + x[1], 4.0 * x[0] - x[1], 0.25 + x[2]];
-    let states = vec![
-        (2.0, Arc::new(Vectors::of(grid, "m/s", early).unwrap())),
-        (2.5, Arc::new(Vectors::of(grid, "m/s", late).unwrap())),
-    ];
+    let states = vec![(2.0, Arc::new(Vectors::of(grid, "m/s", early).unwrap())), (2.5, Arc::new(Vectors::of(grid, "m/s", late).unwrap()))];
     let flow = OnGrid { fluid: "air".into(), states };
     for x in [[0.013, -0.02, 0.1], [-0.31, 0.27, -0.4], [0.4, 0.1, 0.33]] {
         for (t, s) in [(1.0, 0.0), (2.0, 0.0), (2.05, 0.1), (2.4, 0.8), (2.5, 1.0), (9.0, 1.0)] {
