@@ -155,6 +155,9 @@ def test_words_that_nothing_heeds_are_told(spring: Tree, scene_file: SceneFile, 
     floor = {"collider": [{"name": "f", "shape": {"floor": {"height": 0.0}}}]}
     answer = tumble("check", scene_file(tracers(spring) | floor))
     assert (answer.code, "feel no colliders" in answer.err) == (0, True)
+    still = {key: value for key, value in tracers(spring).items() if key != "field"}
+    answer = tumble("check", scene_file(still))
+    assert (answer.code, "no [[field]] to follow" in answer.err) == (0, True)
 
 
 def broken(*_: Any) -> Any:

@@ -4,16 +4,15 @@ mod common;
 
 use common::noisy;
 use std::f64::consts::PI;
-use tumble_f64::operators::{Advection, Interpolation, Scratch, Trace, advect, advect_vectors, sample};
+use tumble_f64::math::Spare;
+use tumble_f64::operators::{Advection, Interpolation, Trace, advect, advect_vectors, sample};
 use tumble_f64::state::{Field, Grid, GridError, Place, Vectors};
 
 const TRACES: [Trace; 3] = [Trace::Euler, Trace::Rk2, Trace::Rk3];
 const KINDS: [Interpolation; 3] = [Interpolation::Linear, Interpolation::Cubic, Interpolation::MonotoneCubic];
 
 fn carried(f: &Field, u: &Vectors, h: f64, how: &Advection) -> Field {
-    let mut out = Field { sides: f.sides, ..Field::new(f.grid, f.place, f.unit.clone()).unwrap() };
-    advect(&[f], u, h, how, &mut [&mut out], &mut Scratch::default()).unwrap();
-    out
+    advect(&[f], u, h, how, &mut Spare::default()).unwrap().remove(0)
 }
 
 /// All ways to carry.
@@ -175,11 +174,10 @@ fn bump_error(n: usize, d3: bool, interpolation: Interpolation, corrected: bool)
     let steps = n * 2 / 5; // Courant number 0.625 along x
     let h = 0.25 / steps as f64;
     let mut f = Field::of(g, Place::Cell, "", wave).unwrap();
-    let mut out = f.clone();
-    let mut scratch = Scratch::default();
+    let mut spare = Spare::default();
     for _ in 0..steps {
-        advect(&[&f], &u, h, &how, &mut [&mut out], &mut scratch).unwrap();
-        std::mem::swap(&mut f.data, &mut out.data);
+        let new = advect(&[&f], &u, h, &how, &mut spare).unwrap().remove(0);
+        spare.keep(std::mem::replace(&mut f, new));
     }
     let exact = |x: [f64; 3]| wave(std::array::from_fn(|a| x[a] - 0.25 * speed[a]));
     f.each().map(|at| (f.value(at) - exact(g.point(Place::Cell, at))).abs()).sum::<f64>() / f.each().count() as f64
@@ -227,10 +225,10 @@ fn zalesaks_disk_keeps_its_area() {
     let u = rotation(g);
     let first = f.clone();
     let turn = |how: &Advection, steps: usize, f: &mut Field| {
-        let (mut out, mut scratch) = (f.clone(), Scratch::default());
+        let mut spare = Spare::default();
         for _ in 0..steps {
-            advect(&[f], &u, 1.0 / steps as f64, how, &mut [&mut out], &mut scratch).unwrap();
-            std::mem::swap(&mut f.data, &mut out.data);
+            let new = advect(&[f], &u, 1.0 / steps as f64, how, &mut spare).unwrap().remove(0);
+            spare.keep(std::mem::replace(f, new));
         }
     };
     let how = Advection { trace: Trace::Rk3, ..Advection::default() };
@@ -315,17 +313,13 @@ fn bits_do_not_depend_on_threads() {
     for how in ways() {
         let on = |threads| {
             let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
-            pool.install(|| {
-                let (mut a, mut b) = (f.clone(), f.clone());
-                advect(&[&f, &e], &u, 0.7, &how, &mut [&mut a, &mut b], &mut Scratch::default()).unwrap();
-                (a, b)
-            })
+            pool.install(|| advect(&[&f, &e], &u, 0.7, &how, &mut Spare::default()).unwrap())
         };
         let one = on(1);
         assert_eq!(one, on(2));
         assert_eq!(one, on(5));
         // Fields that share their paths are carried as if alone.
-        assert_eq!(one.1.values(), carried(&e, &u, 0.7, &how).values());
+        assert_eq!(one[1].values(), carried(&e, &u, 0.7, &how).values());
     }
 }
 
@@ -339,10 +333,9 @@ fn what_turns_with_the_fluid_keeps_its_angle_to_it() {
         let v = Vectors::of(g, "", radial).unwrap();
         let quarter = |turning| {
             let how = Advection { trace: Trace::Rk3, interpolation: Interpolation::Cubic, turning, ..Advection::default() };
-            let (mut now, mut out, mut scratch) = (v.clone(), v.clone(), Scratch::default());
+            let (mut now, mut spare) = (v.clone(), Spare::default());
             for _ in 0..10 {
-                advect_vectors(&now, &u, 0.025, &how, &mut out, &mut scratch).unwrap();
-                std::mem::swap(&mut now, &mut out);
+                now = advect_vectors(&now, &u, 0.025, &how, &mut spare).unwrap();
             }
             let norm = |a: &Vectors, b: Option<&Vectors>| {
                 let each = |p: usize, f: &Field| -> f64 {
@@ -389,11 +382,10 @@ fn mixed_places_are_refused_by_name() {
     let g = plane(4);
     let (cell, node) = (Field::new(g, Place::Cell, "").unwrap(), Field::new(g, Place::Node, "").unwrap());
     let u = rotation(g);
-    let mut out = cell.clone();
-    let mut work = Scratch::default();
-    let mut go = |f: &Field, u: &Vectors| advect(&[f], u, 0.1, &Advection::default(), &mut [&mut out], &mut work).unwrap_err();
-    let refused = go(&node, &u);
-    assert_eq!(refused, GridError::Mixed { what: "advection", expected: Place::Node, found: Place::Cell });
+    let all = |f: &[&Field], u: &Vectors| advect(f, u, 0.1, &Advection::default(), &mut Spare::default()).unwrap_err();
+    let go = |f: &Field, u: &Vectors| all(&[f], u);
+    let refused = all(&[&cell, &node], &u);
+    assert_eq!(refused, GridError::Mixed { what: "advected field", expected: Place::Cell, found: Place::Node });
     let swapped = Vectors { parts: vec![u.parts[1].clone(), u.parts[0].clone()] };
     assert!(matches!(go(&cell, &swapped), GridError::Mixed { expected: Place::Face(0), found: Place::Face(1), .. }));
     assert!(matches!(go(&Field::new(plane(5), Place::Cell, "").unwrap(), &u), GridError::Grids { .. }));

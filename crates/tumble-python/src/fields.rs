@@ -4,8 +4,9 @@ use crate::errors::TumbleError;
 use numpy::{AllowTypeChange, PyArray1, PyArrayDyn, PyArrayLike2, PyArrayLikeDyn, PyArrayMethods, PyUntypedArrayMethods};
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyTuple};
+use tumble_f64::math::Spare;
 use tumble_f64::operators as verbs;
-use tumble_f64::operators::{Advection, Interpolation, Scratch, Trace};
+use tumble_f64::operators::{Advection, Interpolation, Trace};
 use tumble_f64::state::{self, GridError, Place, Side, Sides, Vectors};
 
 type Any<'py> = Bound<'py, PyAny>;
@@ -400,18 +401,18 @@ pub fn advect<'py>(
         return Err(wrong(format!("advection by {h} s in {substeps} pieces, expected a finite time in 1 or more")));
     }
     let how = Advection { trace, substeps, interpolation: self::interpolation(interpolation)?, corrected, turning };
-    let mut out = f.clone();
-    py.detach(|| {
-        let mut scratch = Scratch::default();
+    let out = py.detach(|| {
+        let mut spare = Spare::default();
         if turning {
-            return checked(verbs::advect_vectors(&f, &u, h, &how, &mut out, &mut scratch));
+            return Ok(checked(verbs::advect_vectors(&f, &u, h, &how, &mut spare))?.parts);
         }
-        for (f, out) in f.parts.iter().zip(&mut out.parts) {
-            checked(verbs::advect(&[f], &u, h, &how, &mut [out], &mut scratch))?;
+        let mut out = Vec::new();
+        for f in &f.parts {
+            out.extend(checked(verbs::advect(&[f], &u, h, &how, &mut spare))?);
         }
-        Ok(())
+        Ok::<_, PyErr>(out)
     })?;
-    handed(py, out.parts)
+    handed(py, out)
 }
 
 /// What a field, or each component of vectors, becomes when it diffuses for a duration [s] with kappa [m²/s].

@@ -3,6 +3,7 @@
 use crate::exchange::Exchange;
 use crate::math::parallel::CHUNK;
 use crate::math::{Real, Row};
+use crate::state::Field;
 use rayon::prelude::*;
 use tumble_interface::engine::{Ledger, Stability, StepReport, UserForce, UserIntegrator};
 use tumble_interface::{Column, StepError};
@@ -140,6 +141,16 @@ impl Archive {
         self.table(name, 1, numbers.len(), numbers.capacity()).copy_from_slice(numbers);
     }
 
+    /// Writes the points of a field, without its pads.
+    pub fn push_field(&mut self, name: &str, field: &Field) {
+        let [x, y, z] = field.points();
+        let into = self.table(name, 1, x * y * z, 0);
+        into.par_chunks_mut(x).enumerate().for_each(|(row, into)| {
+            let at = field.index([0, row % y, row / y]);
+            into.copy_from_slice(&field.data[at..at + x]);
+        });
+    }
+
     /// Writes a column of indices, with the room that it has.
     #[allow(clippy::ptr_arg)] // for its capacity
     pub fn push_indices(&mut self, name: &str, indices: &Vec<u32>) {
@@ -194,6 +205,14 @@ impl Archive {
                 numbers.clone_into(into);
                 Some(())
             }
+            _ => None,
+        }
+    }
+
+    /// Reads the points of a field.
+    pub fn field(&mut self, name: &str, into: &mut Field) -> Option<()> {
+        match self.pop(name)? {
+            Part::Table(1, numbers) => into.set(numbers).ok(),
             _ => None,
         }
     }

@@ -133,8 +133,8 @@ def pressure(
       tumble lab pressure
       tumble lab pressure --cells 96 --budget 60
     """
-    if not 0 < budget < float("inf"):
-        raise typer.BadParameter("expected > 0 s", param_hint="--budget")
+    if not 0.1 <= budget < float("inf"):
+        raise typer.BadParameter(f"{budget:g} s, expected 0.1 s or more", param_hint="--budget")
     from tumble.lab.pressure import page
 
     with Progress("lab") as progress:

@@ -1,6 +1,7 @@
 //! L0: the scalar type, lanes, vectors, quaternions, derivatives, fixed-order parallel loops.
 
 pub mod animated;
+pub mod column;
 pub mod dual;
 pub mod formula;
 pub mod functions;
@@ -16,6 +17,7 @@ pub mod simd;
 pub mod vec3;
 
 pub use animated::{Signal, VectorSignal};
+pub use column::{Column, Spare};
 pub use dual::Dual;
 pub use lane::Lane;
 pub use lattice::Lattice;

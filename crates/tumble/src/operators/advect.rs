@@ -8,11 +8,11 @@
 //! Stable at any step. Paths stay within walls and wrap where the grid is periodic. Positions are displacements from the row's own
 //! points: a shift by whole cells changes no bit. Source: [stam1999], [selle2008]; tests: crates/tumble-f64/tests/advection.rs.
 
-use super::sample::{COUNT, Interpolation, Lot, SEGMENT, Spots, Start, View, locate, read, read_still};
+use super::sample::{COUNT, Interpolation, Lot, SEGMENT, Spots, Start, View, corners, locate, read, read_still};
 use super::stencil::{each_row, each_row_with};
 use crate::math::simd::{Kernel, Width, dispatch, packs};
-use crate::math::{Lane, Real, functions};
-use crate::state::{Field, Grid, GridError, Vectors};
+use crate::math::{Lane, Real, Spare, functions};
+use crate::state::{Field, Grid, GridError, Place, Vectors};
 
 /// How a path is traced.                                                    (grids.16)
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -44,26 +44,6 @@ pub struct Advection {
 impl Default for Advection {
     fn default() -> Self {
         Self { trace: Trace::Rk2, substeps: 1, interpolation: Interpolation::Linear, corrected: false, turning: false }
-    }
-}
-
-/// Fields of a correction, kept between steps.
-#[derive(Debug, Clone, Default)]
-pub struct Scratch {
-    fields: Vec<Field>,
-}
-
-impl Scratch {
-    /// `count` fields like this one; their numbers are anything.
-    fn like(&mut self, f: &Field, count: usize) -> Result<&mut [Field], GridError> {
-        self.fields.retain(|s| s.data.len() == f.data.len());
-        while self.fields.len() < count {
-            self.fields.push(Field::new(f.grid, f.place, f.unit.clone())?);
-        }
-        for s in &mut self.fields[..count] {
-            (s.grid, s.place, s.sides) = (f.grid, f.place, f.sides);
-        }
-        Ok(&mut self.fields[..count])
     }
 }
 
@@ -158,7 +138,7 @@ impl<'a> Flow<'a> {
                 continue;
             };
             locate(view, start, d, count, spots);
-            read(view, spots, count, &mut out[*a], None);
+            read(view, spots, count, &mut out[*a]);
         }
     }
 
@@ -221,61 +201,57 @@ impl Work {
     }
 }
 
-/// Carries fields that stand at one place by the flow u for h seconds: `out` is what `fields` become. They share their paths.
-pub fn advect(
-    fields: &[&Field],
-    u: &Vectors,
-    h: f64,
-    how: &Advection,
-    out: &mut [&mut Field],
-    scratch: &mut Scratch,
-) -> Result<(), GridError> {
+/// What fields that stand at one place become when the flow u carries them for h seconds, in columns of `spare`. They share their
+/// paths.
+pub fn advect(fields: &[&Field], u: &Vectors, h: f64, how: &Advection, spare: &mut Spare) -> Result<Vec<Field>, GridError> {
     let flow = Flow::new(u, h, how)?;
-    let Some(first) = fields.first() else { return Ok(()) };
-    if fields.len() != out.len() {
-        return Err(GridError::Components { what: "advection", expected: fields.len(), found: out.len() });
-    }
-    for (f, out) in fields.iter().zip(out.iter()) {
-        f.expect(&flow.grid, first.place, "advected field")?;
-        out.expect(&flow.grid, first.place, "advection")?;
-    }
+    let Some(first) = fields.first() else { return Ok(Vec::new()) };
+    fields.iter().try_for_each(|f| f.expect(&flow.grid, first.place, "advected field"))?;
     let offset = flow.grid.offset(first.place);
     let views: Vec<View> = fields.iter().map(|f| View::new(f, how.interpolation)).collect();
+    let mut like = |f: &Field| Ok(Field { sides: f.sides, ..spare.field(f.grid, f.place, f.unit.clone())? });
+    let mut carried: Vec<Field> = fields.iter().map(|f| like(f)).collect::<Result<_, GridError>>()?;
     if !how.corrected {
-        each_row_with(out, Work::new, |work, j, k, rows| carry(&flow, &views, Start { at: [0, j, k], offset }, rows, &mut [], work));
-        return Ok(());
+        let mut all: Vec<&mut Field> = carried.iter_mut().collect();
+        each_row_with(&mut all, Work::new, |work, j, k, rows| carry(&flow, &views, Start { at: [0, j, k], offset }, rows, &mut [], work));
+        return Ok(carried);
     }
-    let count = fields.len();
-    // Carried, least and greatest corner of every field.
-    let kept = scratch.like(first, 3 * count)?;
-    for (i, f) in fields.iter().enumerate() {
-        kept[i].sides = f.sides;
+    // The cells that paths come from: their corners are bounds. Fields that are read alike share them.
+    let mut group = vec![0; fields.len()];
+    for c in 1..fields.len() {
+        group[c] = group[c - 1] + usize::from(!views[c].is_like(&views[c - 1]));
     }
-    let mut all: Vec<&mut Field> = kept.iter_mut().collect();
+    let mut cells: Vec<Field> = (0..=group[fields.len() - 1]).map(|_| like(first)).collect::<Result<_, GridError>>()?;
+    let mut out: Vec<Field> = fields.iter().map(|f| like(f)).collect::<Result<_, GridError>>()?;
+    let mut all: Vec<&mut Field> = carried.iter_mut().chain(&mut cells).collect();
     each_row_with(&mut all, Work::new, |work, j, k, rows| {
-        let (carried, bounds) = rows.split_at_mut(count);
-        carry(&flow, &views, Start { at: [0, j, k], offset }, carried, bounds, work);
+        let (carried, cells) = rows.split_at_mut(fields.len());
+        carry(&flow, &views, Start { at: [0, j, k], offset }, carried, cells, work);
     });
-    let (carried, bounds) = kept.split_at(count);
     let back: Vec<View> = carried.iter().map(|f| View::new(f, how.interpolation)).collect();
-    each_row_with(out, Work::new, |work, j, k, rows| {
+    let mut all: Vec<&mut Field> = out.iter_mut().collect();
+    each_row_with(&mut all, Work::new, |work, j, k, rows| {
         let n = rows.first().map_or(0, |row| row.len());
+        let at = first.index([0, j, k]);
         for i in (0..n).step_by(SEGMENT) {
             let (start, len) = (Start { at: [i, j, k], offset }, SEGMENT.min(n - i));
             flow.trace(start, len, -1.0, work);
             for (c, row) in rows.iter_mut().enumerate() {
-                if c == 0 || !back[c].is_like(&back[c - 1]) {
+                if c == 0 || group[c] != group[c - 1] {
                     locate(&back[c], start, &work.d, len, &mut work.spots);
                 }
-                read(&back[c], &work.spots, len, &mut work.values, None);
-                let at = carried[c].index([i, j, k]);
-                let (from, there) = (&fields[c].data[at..at + len], &carried[c].data[at..at + len]);
-                let bounds = [&bounds[c].data[at..at + len], &bounds[count + c].data[at..at + len]];
-                dispatch(Correct { out: &mut row[i..i + len], from, there, back: &work.values, bounds });
+                read(&back[c], &work.spots, len, &mut work.values);
+                let from: &[i32] = bytemuck::cast_slice(&cells[group[c]].data[at..at + n]);
+                corners(&views[c], &from[i..i + len], &mut work.corners);
+                let of = |f: &'_ Field| -> std::ops::Range<usize> { f.index([i, j, k])..f.index([i, j, k]) + len };
+                let (from, there) = (&fields[c].data[of(fields[c])], &carried[c].data[of(&carried[c])]);
+                dispatch(Correct { out: &mut row[i..i + len], from, there, back: &work.values, bounds: &work.corners });
             }
         }
     });
-    Ok(())
+    drop((views, back));
+    carried.into_iter().chain(cells).for_each(|field| spare.keep(field));
+    Ok(out)
 }
 
 struct Correct<'a> {
@@ -283,7 +259,7 @@ struct Correct<'a> {
     from: &'a [Real],
     there: &'a [Real],
     back: &'a [Real],
-    bounds: [&'a [Real]; 2],
+    bounds: &'a [Lot<Real>; 2],
 }
 
 impl Kernel for Correct<'_> {
@@ -301,40 +277,34 @@ impl Kernel for Correct<'_> {
     }
 }
 
-/// One way: fills a row of each field, and its bounds (all least corners, then all greatest) if there are rows for them.
-fn carry(flow: &Flow, views: &[View], start: Start, rows: &mut [&mut [Real]], bounds: &mut [&mut [Real]], work: &mut Work) {
+/// One way: fills a row of each field, and one of the cells that the paths of fields read alike come from if there are rows for them.
+fn carry(flow: &Flow, views: &[View], start: Start, rows: &mut [&mut [Real]], cells: &mut [&mut [Real]], work: &mut Work) {
     let n = rows.first().map_or(0, |row| row.len());
     for i in (0..n).step_by(SEGMENT) {
         let (start, len) = (Start { at: [i, start.at[1], start.at[2]], ..start }, SEGMENT.min(n - i));
         flow.trace(start, len, 1.0, work);
+        let mut group = 0;
         for (c, row) in rows.iter_mut().enumerate() {
             if c == 0 || !views[c].is_like(&views[c - 1]) {
                 locate(&views[c], start, &work.d, len, &mut work.spots);
+                if let Some(cells) = cells.get_mut(group) {
+                    bytemuck::cast_slice_mut::<Real, i32>(cells)[i..i + len].copy_from_slice(&work.spots.index[..len]);
+                }
+                group += 1;
             }
-            let wanted = if bounds.is_empty() { None } else { Some(&mut work.corners) };
-            read(&views[c], &work.spots, len, &mut work.values, wanted);
+            read(&views[c], &work.spots, len, &mut work.values);
             row[i..i + len].copy_from_slice(&work.values[..len]);
-            if !bounds.is_empty() {
-                bounds[c][i..i + len].copy_from_slice(&work.corners[0][..len]);
-                bounds[views.len() + c][i..i + len].copy_from_slice(&work.corners[1][..len]);
-            }
         }
     }
 }
 
-/// Carries vectors on faces, component by component or, if `turning`, turned with the fluid as a whole; then they are not corrected.
-pub fn advect_vectors(
-    vectors: &Vectors,
-    u: &Vectors,
-    h: f64,
-    how: &Advection,
-    out: &mut Vectors,
-    scratch: &mut Scratch,
-) -> Result<(), GridError> {
+/// What vectors on faces become, component by component or, if `turning`, turned with the fluid as a whole; then they are not
+/// corrected.
+pub fn advect_vectors(vectors: &Vectors, u: &Vectors, h: f64, how: &Advection, spare: &mut Spare) -> Result<Vectors, GridError> {
     let grid = vectors.on_faces("advected vectors")?;
-    out.check(&grid, grid.axes().map(crate::state::Place::Face).collect(), "advection of vectors")?;
     if !how.turning {
-        return vectors.parts.iter().zip(&mut out.parts).try_for_each(|(f, out)| advect(&[f], u, h, how, &mut [out], scratch));
+        let parts = vectors.parts.iter().map(|f| advect(&[f], u, h, how, spare));
+        return Ok(Vectors { parts: parts.collect::<Result<Vec<_>, _>>()?.into_iter().flatten().collect() });
     }
     let flow = Flow::new(u, h, how)?;
     if flow.grid != grid {
@@ -344,9 +314,11 @@ pub fn advect_vectors(
     super::curl(u, &mut turn)?;
     let spin: Vec<(usize, View)> = (0..3).filter_map(|a| turn.part(a).map(|f| (a, View::new(f, Interpolation::Linear)))).collect();
     let views: Vec<(usize, View)> = grid.axes().zip(&vectors.parts).map(|(a, f)| (a, View::new(f, how.interpolation))).collect();
-    for (axis, part) in grid.axes().zip(&mut out.parts) {
+    let mut parts = Vec::new();
+    for (axis, f) in grid.axes().zip(&vectors.parts) {
+        let mut part = Field { sides: f.sides, ..spare.field(grid, Place::Face(axis), f.unit.clone())? };
         let offset = grid.offset(part.place);
-        each_row(part, |j, k, row| {
+        each_row(&mut part, |j, k, row| {
             let mut work = Work::new();
             let (mut v, mut w) = ([[0.0; SEGMENT]; 3], [[0.0; SEGMENT]; 3]);
             for i in (0..row.len()).step_by(SEGMENT) {
@@ -358,11 +330,11 @@ pub fn advect_vectors(
                 }
                 for (a, view) in &views {
                     locate(view, start, d, len, spots);
-                    read(view, spots, len, &mut v[*a], None);
+                    read(view, spots, len, &mut v[*a]);
                 }
                 for (a, view) in &spin {
                     locate(view, start, middle, len, spots);
-                    read(view, spots, len, &mut w[*a], None);
+                    read(view, spots, len, &mut w[*a]);
                 }
                 for e in 0..len {
                     let at = |lots: &Ways| [0, 1, 2].map(|a| f64::from(lots[a][e]));
@@ -370,8 +342,9 @@ pub fn advect_vectors(
                 }
             }
         });
+        parts.push(part);
     }
-    Ok(())
+    Ok(Vectors { parts })
 }
 
 /// v turned by the rotation vector r: Rodrigues' formula.                          (grids.20)
@@ -416,8 +389,7 @@ mod tests {
         for (axis, periods) in [0, 1].into_iter().flat_map(|axis| [-2, -1, 0, 1, 2].map(|p| (axis, p))) {
             let cells = f64::from(periods) * g.n[axis] as f64 + 0.25;
             let u = Vectors::of(g, "m/s", |_| std::array::from_fn(|a| if a == axis { cells * g.dx / h } else { 0.0 })).unwrap();
-            let mut out = f.clone();
-            advect(&[&f], &u, h, &how, &mut [&mut out], &mut Scratch::default()).unwrap();
+            let out = advect(&[&f], &u, h, &how, &mut Spare::default()).unwrap().remove(0);
             for at in f.each() {
                 let mut before = at;
                 before[axis] = (at[axis] + g.n[axis] - 1) % g.n[axis];
@@ -438,11 +410,7 @@ mod tests {
         for interpolation in [Interpolation::Linear, Interpolation::MonotoneCubic] {
             for corrected in [false, true] {
                 let how = Advection { interpolation, corrected, ..Advection::default() };
-                let go = |f: &Field, u: &Vectors| {
-                    let mut out = f.clone();
-                    advect(&[f], u, h, &how, &mut [&mut out], &mut Scratch::default()).unwrap();
-                    out
-                };
+                let go = |f: &Field, u: &Vectors| advect(&[f], u, h, &how, &mut Spare::default()).unwrap().remove(0);
                 assert_eq!(go(&f, &even).values(), shifted(&f, by).values());
                 let (here, there) = (go(&f, &uneven), go(&shifted(&f, by), &moved));
                 assert_ne!(here.values(), f.values());

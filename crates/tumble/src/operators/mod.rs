@@ -10,7 +10,7 @@ pub mod diffuse;
 pub mod sample;
 mod stencil;
 
-pub use advect::{Advection, Scratch, Trace, advect, advect_vectors};
+pub use advect::{Advection, Trace, advect, advect_vectors};
 pub use differences::{average, curl, directional, divergence, gradient, laplacian, upwind, vector_laplacian};
 pub use diffuse::{diffuse, diffuse_step, diffusion_limit};
 pub use sample::{Interpolation, sample};

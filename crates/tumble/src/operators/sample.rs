@@ -137,7 +137,8 @@ pub(super) struct Start {
 
 /// Which numbers to read and their weights.
 pub(super) struct Spots {
-    index: Lot<i32>,
+    /// The lower corner of the cell of each.
+    pub(super) index: Lot<i32>,
     t: [Lot<Real>; 3],
 }
 
@@ -350,7 +351,6 @@ struct Read<'a, 'b> {
     spots: &'a Spots,
     count: usize,
     out: &'a mut Lot<Real>,
-    bounds: Option<&'a mut [Lot<Real>; 2]>,
 }
 
 #[inline(always)]
@@ -379,57 +379,32 @@ const AHEAD: i32 = 3;
 impl Read<'_, '_> {
     #[inline(always)]
     fn linear<const X: bool, const Y: bool, const Z: bool, W: Width>(self, w: W) {
-        let Self { view, spots, count, out, mut bounds } = self;
+        let Self { view, spots, count, out } = self;
         let (ny, nz) = (1 + usize::from(Y), 1 + usize::from(Z));
         let zero = w.splat(0.0);
         let mut e = 0;
         while e < count {
             let mut index = [0_i32; 16];
             index[..W::N].copy_from_slice(&spots.index[e..e + W::N]);
-            let first = index[0];
-            let mut off = 0;
-            for l in 0..W::N {
-                off |= (index[l] - l as i32) ^ first;
-            }
+            let cells = Cells::new::<W>(index);
             // What the next rows need, if their paths are like these.
             for z in 0..nz as i32 {
-                let next = first + AHEAD * view.axes[1].stride + z * view.axes[2].stride;
+                let next = index[0] + AHEAD * view.axes[1].stride + z * view.axes[2].stride;
                 ask(view.data.get(next as usize..next as usize + 1).unwrap_or(&[]));
             }
             let (tx, ty, tz) = (w.load(&spots.t[0][e..]), w.load(&spots.t[1][e..]), w.load(&spots.t[2][e..]));
             let mut planes = [zero; 2];
-            let (mut low, mut high) = (zero, zero);
             for z in 0..nz {
                 let mut rows = [zero; 2];
                 for y in 0..ny {
                     let step = y as i32 * view.axes[1].stride + z as i32 * view.axes[2].stride;
-                    // Paths that are alike lead to numbers that lie side by side.
-                    let [a, b] = if off == 0 {
-                        let numbers = &view.data[(first + step) as usize..];
-                        [w.load(numbers), w.load(&numbers[1..])]
-                    } else {
-                        let mut at = [0_i32; 16];
-                        for l in 0..W::N {
-                            at[l] = index[l] + step;
-                        }
-                        // SAFETY: `locate` found a cell whose corners are all inside.
-                        unsafe { w.pairs(&view.data, &at) }
-                    };
+                    // SAFETY: `locate` found a cell whose corners are all inside.
+                    let [a, b] = unsafe { cells.pairs(w, view, step) };
                     rows[y] = if X { line(a, b, tx) } else { a };
-                    if bounds.is_some() {
-                        let (l, h) = if X { (least(a, b), most(a, b)) } else { (a, a) };
-                        let begun = y + z > 0;
-                        low = if begun { least(low, l) } else { l };
-                        high = if begun { most(high, h) } else { h };
-                    }
                 }
                 planes[z] = if Y { line(rows[0], rows[1], ty) } else { rows[0] };
             }
             w.store(if Z { line(planes[0], planes[1], tz) } else { planes[0] }, &mut out[e..]);
-            if let Some(bounds) = &mut bounds {
-                w.store(low, &mut bounds[0][e..]);
-                w.store(high, &mut bounds[1][e..]);
-            }
             e += W::N;
         }
     }
@@ -437,7 +412,7 @@ impl Read<'_, '_> {
     /// The loops over rows are not unrolled: most of the time goes into loading sixteen rows of four numbers.
     #[inline(always)]
     fn cubic<W: Width>(self, w: W) {
-        let Self { view, spots, count, out, mut bounds } = self;
+        let Self { view, spots, count, out } = self;
         let [x, y, z] = view.there;
         let (ny, nz) = (if y { 4 } else { 1 }, if z { 4 } else { 1 });
         let monotone = view.how == Interpolation::MonotoneCubic;
@@ -448,7 +423,6 @@ impl Read<'_, '_> {
         while e < count {
             let (tx, ty, tz) = (w.load(&spots.t[0][e..]), w.load(&spots.t[1][e..]), w.load(&spots.t[2][e..]));
             let mut planes = [zero; 4];
-            let (mut low, mut high, mut begun) = (zero, zero, false);
             for k in 0..nz {
                 let mut rows = [zero; 4];
                 for j in 0..ny {
@@ -460,20 +434,10 @@ impl Read<'_, '_> {
                     // SAFETY: `locate` found a cell whose corners and their neighbours are all inside.
                     let p = unsafe { w.quads(&view.data, &at) };
                     rows[j] = if x { curve(p, tx, one) } else { p[0] };
-                    if bounds.is_some() && (!y || j == 1 || j == 2) && (!z || k == 1 || k == 2) {
-                        let (l, h) = if x { (least(p[1], p[2]), most(p[1], p[2])) } else { (p[0], p[0]) };
-                        low = if begun { least(low, l) } else { l };
-                        high = if begun { most(high, h) } else { h };
-                        begun = true;
-                    }
                 }
                 planes[k] = if y { curve(rows, ty, one) } else { rows[0] };
             }
             w.store(if z { curve(planes, tz, one) } else { planes[0] }, &mut out[e..]);
-            if let Some(bounds) = &mut bounds {
-                w.store(low, &mut bounds[0][e..]);
-                w.store(high, &mut bounds[1][e..]);
-            }
             e += W::N;
         }
     }
@@ -493,10 +457,85 @@ impl Kernel for Read<'_, '_> {
     }
 }
 
-/// The values at spots; with the least and the greatest corner of each one's cell if asked for.
+/// The values at spots.
 #[inline]
-pub(super) fn read(view: &View, spots: &Spots, count: usize, out: &mut Lot<Real>, bounds: Option<&mut [Lot<Real>; 2]>) {
-    dispatch(Read { view, spots, count, out, bounds });
+pub(super) fn read(view: &View, spots: &Spots, count: usize, out: &mut Lot<Real>) {
+    dispatch(Read { view, spots, count, out });
+}
+
+/// Where the cells of a pack are.
+struct Cells {
+    index: [i32; 16],
+    /// Paths that are alike lead to cells that lie side by side.
+    aligned: bool,
+}
+
+impl Cells {
+    #[inline(always)]
+    fn new<W: Width>(index: [i32; 16]) -> Self {
+        let mut off = 0;
+        for l in 0..W::N {
+            off |= (index[l] - l as i32) ^ index[0];
+        }
+        Self { index, aligned: off == 0 }
+    }
+
+    /// The numbers so many further on, and those after them.
+    ///
+    /// # Safety
+    /// They are in the view.
+    #[inline(always)]
+    unsafe fn pairs<W: Width>(&self, w: W, view: &View, step: i32) -> [W::L; 2] {
+        if self.aligned {
+            let numbers = &view.data[(self.index[0] + step) as usize..];
+            return [w.load(numbers), w.load(&numbers[1..])];
+        }
+        let mut at = [0_i32; 16];
+        for l in 0..W::N {
+            at[l] = self.index[l] + step;
+        }
+        // SAFETY: the caller's.
+        unsafe { w.pairs(&view.data, &at) }
+    }
+}
+
+struct Corners<'a, 'b> {
+    view: &'a View<'b>,
+    cells: &'a [i32],
+    out: &'a mut [Lot<Real>; 2],
+}
+
+impl Kernel for Corners<'_, '_> {
+    type Output = ();
+    #[inline(always)]
+    fn run<W: Width>(self, w: W) {
+        let Self { view, cells, out } = self;
+        let [x, y, z] = view.there;
+        let (ny, nz) = (1 + i32::from(y), 1 + i32::from(z));
+        for (pack, part) in cells.chunks(W::N).enumerate() {
+            let mut index = [part[0]; 16];
+            index[..part.len()].copy_from_slice(part);
+            let cells = Cells::new::<W>(index);
+            let (mut low, mut high) = (w.splat(Real::INFINITY), w.splat(-Real::INFINITY));
+            for z in 0..nz {
+                for y in 0..ny {
+                    let step = y * view.axes[1].stride + z * view.axes[2].stride;
+                    // SAFETY: `locate` found cells whose corners are all inside.
+                    let [a, b] = unsafe { cells.pairs(w, view, step) };
+                    let (l, h) = if x { (least(a, b), most(a, b)) } else { (a, a) };
+                    (low, high) = (least(low, l), most(high, h));
+                }
+            }
+            w.store(low, &mut out[0][pack * W::N..]);
+            w.store(high, &mut out[1][pack * W::N..]);
+        }
+    }
+}
+
+/// The least and the greatest corner of cells that `locate` has found.
+#[inline]
+pub(super) fn corners(view: &View, cells: &[i32], out: &mut [Lot<Real>; 2]) {
+    dispatch(Corners { view, cells, out });
 }
 
 /// The point of the grid's cells at or below a position along an axis, and the way from it, in cells. Positions that are no numbers
@@ -534,7 +573,7 @@ pub fn sample(f: &Field, points: &[[f64; 3]], how: Interpolation) -> Result<Vec<
             all.index[e] = all.index[0];
         }
         let mut values = [0.0; SEGMENT];
-        read(&view, &all, points.len(), &mut values, None);
+        read(&view, &all, points.len(), &mut values);
         out.copy_from_slice(&values[..points.len()]);
     });
     Ok(out)
@@ -567,9 +606,10 @@ mod tests {
                 let all = |level| {
                     let (mut spots, mut out, mut bounds) = (Spots::new(), [0.0; SEGMENT], [[0.0; SEGMENT]; 2]);
                     let start = Start { at: [0, 0, 0], offset: [0.0, 0.5, 0.0] };
-                    let (count, bounded) = (40, Some(&mut bounds));
+                    let count = 40;
                     dispatch_at(level, Locate { view: &view, start, d: &d, count, spots: &mut spots });
-                    dispatch_at(level, Read { view: &view, spots: &spots, count, out: &mut out, bounds: bounded });
+                    dispatch_at(level, Read { view: &view, spots: &spots, count, out: &mut out });
+                    dispatch_at(level, Corners { view: &view, cells: &spots.index[..count], out: &mut bounds });
                     [&out[..40], &bounds[0][..40], &bounds[1][..40]].concat().iter().map(|v| v.to_bits()).collect::<Vec<_>>()
                 };
                 let one = all(Level::Scalar);
@@ -597,7 +637,7 @@ mod tests {
                     let (mut spots, mut still, mut all) = (Spots::new(), [0.0; SEGMENT], [0.0; SEGMENT]);
                     read_still(&view, start, points[0], &mut still);
                     locate(&view, start, &[[0.0; SEGMENT]; 3], points[0], &mut spots);
-                    read(&view, &spots, points[0], &mut all, None);
+                    read(&view, &spots, points[0], &mut all);
                     assert_eq!(still[..points[0]], all[..points[0]], "{from} {to} {j} {k}");
                     rows += 1;
                 }

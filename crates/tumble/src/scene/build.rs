@@ -228,6 +228,9 @@ fn unused(scene: &Scene, plans: &[Plan]) -> Vec<String> {
     if !scene.field.is_empty() && !methods.contains(&Method::Tracers) {
         warnings.push("no object is moved by a system of tracers, so that nothing follows the fields".into());
     }
+    if scene.field.is_empty() && methods.contains(&Method::Tracers) {
+        warnings.push("tracers have no [[field]] to follow, and stay where they are; add one".into());
+    }
     if !methods.contains(&Method::Dynamics) {
         let on_grids = |m: &Method| matches!(m, Method::Heat | Method::Compressible);
         let solids = !scene.collider.is_empty() && !methods.contains(&Method::Gas);
@@ -254,6 +257,12 @@ fn unused(scene: &Scene, plans: &[Plan]) -> Vec<String> {
         }
     }
     if scene.collider.is_empty() {
+        for gas in scene.gas.iter().filter(|gas| !gas.bodies.is_empty()) {
+            warnings.push(format!(
+                "gas \"{}\".bodies: the sides of the box are no obstacle to balls, and there is no collider; add one of its shape with inside = true",
+                gas.name
+            ));
+        }
         for emitter in &scene.emitter {
             if let Some(i) = emitter.kill.iter().position(|rule| matches!(rule, Kill::NearCollider(_))) {
                 let name = &emitter.name;

@@ -1,7 +1,7 @@
 //! Numbers on a grid that know their place.
 
 use super::grid::{Grid, GridError, Place};
-use crate::math::Real;
+use crate::math::{Column, Real};
 use std::borrow::Cow;
 
 /// What a field is beyond a wall of its grid; periodic axes have no walls. Values c are mirrored in the wall, at distance s
@@ -40,14 +40,19 @@ pub struct Field {
     /// SI unit.
     pub unit: Cow<'static, str>,
     /// The numbers, as `grid.lattice()` lays them out.
-    pub data: Vec<Real>,
+    pub data: Column,
 }
 
 impl Field {
     /// Zeros between closed walls.
     pub fn new(grid: Grid, place: Place, unit: impl Into<Cow<'static, str>>) -> Result<Self, GridError> {
+        Self::over(grid, place, unit, Column::zeros(grid.lattice().len()))
+    }
+
+    /// What a column of the lattice's length holds, between closed walls.
+    pub fn over(grid: Grid, place: Place, unit: impl Into<Cow<'static, str>>, data: Column) -> Result<Self, GridError> {
         let place = grid.place(place)?;
-        Ok(Self { grid, place, sides: Sides::default(), unit: unit.into(), data: vec![0.0; grid.lattice().len()] })
+        Ok(Self { grid, place, sides: Sides::default(), unit: unit.into(), data })
     }
 
     /// A function of the points [m], between closed walls.

@@ -2,6 +2,7 @@
 
 mod field;
 mod grid;
+mod spare;
 
 pub use field::{Field, Side, Sides, Vectors};
 pub use grid::{Grid, GridError, Place};

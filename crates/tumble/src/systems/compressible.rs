@@ -507,20 +507,15 @@ impl System for Compressible {
 
     fn save(&self, archive: &mut Archive) {
         for gas in &self.gases {
-            archive.push_numbers("density", &gas.density.data);
-            gas.velocity.parts.iter().for_each(|part| archive.push_numbers("velocity", &part.data));
+            archive.push_field("density", &gas.density);
+            gas.velocity.parts.iter().for_each(|part| archive.push_field("velocity", part));
         }
     }
 
     fn restore(&mut self, archive: &mut Archive) -> Option<()> {
         for gas in &mut self.gases {
-            let fields = std::iter::once(("density", &mut gas.density)).chain(gas.velocity.parts.iter_mut().map(|part| ("velocity", part)));
-            for (name, field) in fields {
-                let mut data = Vec::new();
-                archive.column(name, &mut data)?;
-                (data.len() == field.data.len()).then_some(())?;
-                field.data = data;
-            }
+            archive.field("density", &mut gas.density)?;
+            gas.velocity.parts.iter_mut().try_for_each(|part| archive.field("velocity", part))?;
         }
         Some(())
     }

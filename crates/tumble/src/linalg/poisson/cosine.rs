@@ -4,12 +4,11 @@
 //! two real lines make one complex line. Sixteen such pairs stand side by side in registers, so that the transform is written as for
 //! one, and every width has the same bits. The Fourier transform sorts itself (Stockham), with radices 4, 2, 3, 5.
 
-use super::column::Column;
 use super::faces::Weight;
 use super::level::{Block, Grid, LANES, Rows};
 use crate::math::functions::{cos, exp, sin};
 use crate::math::simd::{Kernel, Level as Registers, Width, dispatch_at};
-use crate::math::{Lane, Lattice, Real};
+use crate::math::{Column, Lane, Lattice, Real};
 use rayon::prelude::*;
 use std::cell::RefCell;
 use std::f64::consts::PI;

@@ -25,9 +25,7 @@ pub(super) enum Before {
 pub(super) fn solve<T: Weight>(solver: &mut Solver<T>, before: Before, x: &mut [Real], params: &Params) -> Info {
     let n = solver.fine.lattice.n;
     let registers = solver.registers;
-    let [mut p, mut q] = [std::mem::take(&mut solver.p), std::mem::take(&mut solver.q)];
-    p.reserve(x.len());
-    q.reserve(x.len());
+    let mut p = std::mem::take(&mut solver.p);
     let mut info = Info::by(solver.clock);
     let [start, most] = solver.norms();
     let mut old = f64::INFINITY;
@@ -37,12 +35,14 @@ pub(super) fn solve<T: Weight>(solver: &mut Solver<T>, before: Before, x: &mut [
         let mean = mean as Real;
         let beta = (rz / old) as Real;
         old = rz;
+        let mut q = std::mem::take(&mut solver.fine.x);
         let grid = &solver.fine;
         let z = if before == Before::Nothing { &grid.b } else { &grid.y };
         // Not 0 p: an earlier solve may have left anything there.
         let before = if info.iterations == 0 { z } else { &p };
+        // A cycle leaves nothing of use in x.
         let [curvature, ..] = run(n, registers, &Direction { grid, z, mean, p: before, beta, q: Rows::of(&mut q) });
-        std::mem::swap(&mut p, &mut q);
+        solver.fine.x = std::mem::replace(&mut p, q);
         let curvature = curvature + solver.joined_curvature(&p);
         if !(rz > 0.0 && curvature > 0.0) {
             break;
@@ -53,7 +53,7 @@ pub(super) fn solve<T: Weight>(solver: &mut Solver<T>, before: Before, x: &mut [
             break;
         }
     }
-    (solver.p, solver.q) = (p, q);
+    solver.p = p;
     info
 }
 
@@ -62,8 +62,7 @@ pub(super) fn solve<T: Weight>(solver: &mut Solver<T>, before: Before, x: &mut [
 pub(super) fn cycles<T: Weight>(solver: &mut Solver<T>, x: &mut [Real], params: &Params) -> Info {
     let n = solver.fine.lattice.n;
     let registers = solver.registers;
-    let mut q = std::mem::take(&mut solver.q);
-    q.reserve(x.len());
+    let mut q = std::mem::take(&mut solver.p);
     let mut info = Info::by(solver.clock);
     let [start, most] = solver.norms();
     info.begin(start, most, params.target);
@@ -78,7 +77,7 @@ pub(super) fn cycles<T: Weight>(solver: &mut Solver<T>, x: &mut [Real], params: 
         let [rr, _, _, most] = step(solver, (rz / curvature) as Real, &q, x);
         info.add(rr, start, most, params.target);
     }
-    solver.q = q;
+    solver.p = q;
     info
 }
 
@@ -93,13 +92,12 @@ pub(super) fn direct<T: Weight>(
     let [start, most] = solver.norms();
     info.begin(start, most, params.target);
     if !info.converged {
-        let mut q = std::mem::take(&mut solver.q);
-        q.reserve(x.len());
+        let mut q = std::mem::take(&mut solver.p);
         q.copy_from_slice(&solver.fine.b);
         solve(&solver.fine, &mut q, solver.registers);
         let [rr, _, _, most] = step(solver, 1.0, &q, x);
         info.add(rr, start, most, params.target);
-        solver.q = q;
+        solver.p = q;
     }
     info
 }

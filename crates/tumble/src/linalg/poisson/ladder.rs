@@ -54,7 +54,6 @@ pub(super) fn relax<T: Weight>(solver: &mut Solver<T>, x: &mut [Real], params: &
         _ => 1.0,
     } as Real;
     let mut other = std::mem::take(&mut solver.p);
-    other.reserve(x.len());
     let (grid, registers) = (&solver.fine, solver.registers);
     let mut info = Info::by(solver.clock);
     let mut start = 0.0;

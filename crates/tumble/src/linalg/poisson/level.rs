@@ -4,10 +4,9 @@
 //! faces are all open, but perhaps for a wall at its ends, needs no weights, and gives the same bits as the one that reads them. Tiles have a fixed shape and compute
 //! the rows around them anew, so that neither the number of threads nor the width of registers shows in a result.
 
-use super::column::Column;
 use super::faces::Weight;
 use crate::math::simd::{Kernel, Level as Registers, Width, ask, dispatch_at};
-use crate::math::{Lane, Lattice, Real};
+use crate::math::{Column, Lane, Lattice, Real};
 use rayon::prelude::*;
 use std::cell::RefCell;
 use std::marker::PhantomData;
@@ -24,7 +23,7 @@ pub(super) fn blocks(row: &[Real]) -> &[Block] {
     row.as_chunks().0
 }
 
-/// A grid, its matrix and three columns on it.
+/// A grid, its matrix and, while it is worked on, three columns.
 #[derive(Debug, Clone)]
 pub(super) struct Grid<T> {
     pub lattice: Lattice,
@@ -87,7 +86,6 @@ impl<T: Weight> Grid<T> {
     pub fn new(lattice: Lattice, periodic: [bool; 3], w: [Vec<T>; 3], extra: Option<Vec<Real>>) -> Self {
         let [n0, n1, n2] = lattice.n;
         let width = n0.next_multiple_of(LANES);
-        let column = || Column::zeros(lattice.len());
         let is = |axis: usize, c: T, range: std::ops::Range<usize>| w[axis][range].iter().all(|w| *w == c);
         let mut ends = periodic[0];
         let flat = n2 == 1 && (0..n1).all(|j| [0, 1].iter().all(|k| is(2, T::CLOSED, lattice.at(0, j, *k)..lattice.at(n0, j, *k))));
@@ -129,12 +127,18 @@ impl<T: Weight> Grid<T> {
             edges,
             flat,
             ends,
-            b: column(),
-            x: column(),
-            y: column(),
+            b: Column::default(),
+            x: Column::default(),
+            y: Column::default(),
             width,
             zeros: Column::zeros(width),
         }
+    }
+
+    /// The same with columns of its own.
+    pub fn with_columns(mut self) -> Self {
+        [self.b, self.x, self.y] = [(); 3].map(|()| Column::zeros(self.lattice.len()));
+        self
     }
 
     /// The number of the first cell of row (j, k), which may lie one row outside; sides that are joined continue for ever.

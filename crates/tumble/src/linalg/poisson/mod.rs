@@ -9,7 +9,6 @@
 //!
 //! Verified by `crates/tumble-f64/tests/pressure.rs`.
 
-mod column;
 mod cosine;
 mod faces;
 mod incomplete;
@@ -30,8 +29,7 @@ pub use report::{Excess, Fault, Info, Method, Params, Target};
 
 use crate::math::parallel::chunks;
 use crate::math::simd::{Kernel, Level as Registers, Width, dispatch};
-use crate::math::{Lattice, Real};
-use column::Column;
+use crate::math::{Column, Lattice, Real, Spare};
 use cosine::Cosine;
 use incomplete::Factors;
 use krylov::Before;
@@ -64,8 +62,10 @@ pub struct Solver<T> {
     /// Made when first asked for.
     incomplete: Option<Factors>,
     cosine: Option<Cosine>,
+    /// The direction of conjugate gradients, or the other of two iterates.
     p: Column,
-    q: Column,
+    /// What its columns are taken from while it works.
+    pub spare: Spare,
     registers: Registers,
     clock: report::Clock,
 }
@@ -75,7 +75,6 @@ impl<T: Weight> Solver<T> {
     /// closed sides, and on the upper one of two that are joined, do not matter. `extra` [1] is added to the diagonal: a
     /// reaction, an implicit step (dx²/(nu dt)), or a free surface (w/theta of the faces to air, whose own weight is then closed).
     pub fn new(lattice: Lattice, sides: [[Side; 2]; 3], weights: [&[T]; 3], extra: Option<&[Real]>) -> Result<Self, Fault> {
-        let n = lattice.n;
         if lattice.is_empty() {
             return Err(Fault::Shape { expected: 1, given: 0 });
         }
@@ -84,6 +83,19 @@ impl<T: Weight> Solver<T> {
                 return Err(Fault::Shape { expected: lattice.len(), given: column });
             }
         }
+        Self::of(lattice, sides, |axis, at| weights[axis][at], extra)
+    }
+
+    /// Of a box without anything in it.
+    pub fn empty(lattice: Lattice, sides: [[Side; 2]; 3]) -> Result<Self, Fault> {
+        if lattice.is_empty() {
+            return Err(Fault::Shape { expected: 1, given: 0 });
+        }
+        Self::of(lattice, sides, |_, _| T::OPEN, None)
+    }
+
+    fn of(lattice: Lattice, sides: [[Side; 2]; 3], weights: impl Fn(usize, usize) -> T, extra: Option<&[Real]>) -> Result<Self, Fault> {
+        let n = lattice.n;
         for axis in 0..3 {
             if (sides[axis][0] == Side::Periodic) != (sides[axis][1] == Side::Periodic) {
                 return Err(Fault::Sides { axis });
@@ -99,7 +111,7 @@ impl<T: Weight> Solver<T> {
                     for i in 0..up(0) {
                         let cell = [i, j, k];
                         let at = lattice.at(i, j, k);
-                        let given = weights[axis][at];
+                        let given = weights(axis, at);
                         let side = match cell[axis] {
                             0 => Some(sides[axis][0]),
                             c if c == n[axis] => Some(sides[axis][1]),
@@ -109,7 +121,7 @@ impl<T: Weight> Solver<T> {
                             None => given,
                             Some(Side::Open) => given,
                             Some(Side::Periodic) if periodic[axis] => {
-                                weights[axis][at - if cell[axis] == 0 { 0 } else { n[axis] * lattice.stride[axis] }]
+                                weights(axis, at - if cell[axis] == 0 { 0 } else { n[axis] * lattice.stride[axis] })
                             }
                             _ => continue,
                         };
@@ -141,8 +153,8 @@ impl<T: Weight> Solver<T> {
             sides,
             incomplete: None,
             cosine: None,
-            p: Column::new(),
-            q: Column::new(),
+            p: Column::default(),
+            spare: Spare::default(),
             registers: Registers::Avx512,
             clock: report::Clock::default(),
         })
@@ -179,8 +191,21 @@ impl<T: Weight> Solver<T> {
                 return Err(Fault::Shape { expected, given });
             }
         }
-        self.pockets.load(&mut self.fine, b, params.excess)?;
-        self.solve_loaded(q, params)
+        self.working(|solver| {
+            solver.pockets.load(&mut solver.fine, Some(b), params.excess)?;
+            solver.solve_loaded(q, params)
+        })
+    }
+
+    /// Does something with columns from the spare ones.
+    fn working<R>(&mut self, work: impl FnOnce(&mut Self) -> R) -> R {
+        let len = self.fine.lattice.len();
+        let Self { fine, spare, p, .. } = self;
+        [&mut fine.b, &mut fine.x, &mut fine.y, &mut *p].into_iter().for_each(|column| *column = spare.column(len));
+        let result = work(self);
+        let Self { fine, spare, p, .. } = self;
+        [&mut fine.b, &mut fine.x, &mut fine.y, p].into_iter().for_each(|column| spare.give(std::mem::take(column)));
+        result
     }
 
     /// The same with the right-hand side in place.
@@ -215,23 +240,36 @@ impl<T: Weight> Solver<T> {
     }
 
     /// Solves until what is left, as the caller evaluates it, meets the target: in single precision the residual that an iteration
-    /// carries along says less and less about the true one. `evaluate(solver, correction, b)` adds the correction to the unknowns, or
-    /// takes its gradient from the velocity, and writes the right-hand side that is then left to `b`.           (pressure.12)
+    /// carries along says less and less about the true one. `evaluate(solver, correction, b)` adds the correction, if there is one yet,
+    /// to the unknowns, or takes its gradient from the velocity, and writes the right-hand side that is then left to `b`. The
+    /// correction has the lattice's length.                                                                  (pressure.12)
     pub fn refine(
         &mut self,
-        b: &mut [Real],
         correction: &mut [Real],
         params: &Params,
-        mut evaluate: impl FnMut(&Self, &[Real], &mut [Real]),
+        evaluate: impl FnMut(&Self, Option<&[Real]>, &mut Column),
     ) -> Result<Info, Fault> {
-        let expected = self.fine.lattice.len();
-        for given in [b.len(), correction.len()] {
-            if given != expected {
-                return Err(Fault::Shape { expected, given });
-            }
+        let (expected, given) = (self.fine.lattice.len(), correction.len());
+        if given != expected {
+            return Err(Fault::Shape { expected, given });
         }
+        self.working(|solver| solver.refine_with(correction, params, evaluate))
+    }
+
+    fn refine_with(
+        &mut self,
+        correction: &mut [Real],
+        params: &Params,
+        mut evaluate: impl FnMut(&Self, Option<&[Real]>, &mut Column),
+    ) -> Result<Info, Fault> {
         let mut info = Info { pockets: self.pockets(), ..Info::by(self.clock) };
-        self.pockets.load(&mut self.fine, b, params.excess)?;
+        let mut left = |solver: &mut Self, correction: Option<&[Real]>, excess: Excess| {
+            let mut b = std::mem::take(&mut solver.fine.b);
+            evaluate(solver, correction, &mut b);
+            solver.fine.b = b;
+            solver.pockets.load(&mut solver.fine, None, excess)
+        };
+        left(self, None, params.excess)?;
         let [start, most] = self.norms();
         info.begin(start, most, params.target);
         let (mut now, mut largest) = (start, most);
@@ -247,9 +285,8 @@ impl<T: Weight> Solver<T> {
                 ..*params
             };
             let part = self.solve_loaded(correction, &inner)?;
-            evaluate(self, correction, b);
             // What rounding adds to a mean is no fault of the caller's.
-            self.pockets.load(&mut self.fine, b, Excess::Remove)?;
+            left(self, Some(&*correction), Excess::Remove)?;
             let [after, most] = self.norms();
             let scale = (now / start).sqrt();
             info.residuals.extend(part.residuals.iter().map(|r| r * scale));
@@ -288,11 +325,16 @@ impl<T: Weight> Solver<T> {
             }
         }
         q.fill(0.0);
-        let (mut left, mut correction) = (b.to_vec(), vec![0.0; expected]);
-        self.refine(&mut left, &mut correction, params, |solver, correction, left| {
-            chunks(q, |start, q| q.iter_mut().zip(&correction[start..]).for_each(|(q, c)| *q += f64::from(*c)));
-            solver.residual(b, q, left);
-        })
+        let mut correction = self.spare.column(expected);
+        let info = self.refine(&mut correction, params, |solver, correction, left| match correction {
+            None => left.copy_from_slice(b),
+            Some(correction) => {
+                chunks(q, |start, q| q.iter_mut().zip(&correction[start..]).for_each(|(q, c)| *q += f64::from(*c)));
+                solver.residual(b, q, left);
+            }
+        });
+        self.spare.give(correction);
+        info
     }
 
     /// out = b - A q, evaluated in double precision.

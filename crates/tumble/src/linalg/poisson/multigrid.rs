@@ -75,7 +75,7 @@ pub(super) fn coarser<T: Weight>(fine: &Grid<T>) -> Grid<Real> {
         });
         sums
     });
-    Grid::new(lattice, periodic, w, extra)
+    Grid::new(lattice, periodic, w, extra).with_columns()
 }
 
 /// y ~ A^-1 b on a grid and all coarser ones; returns b.y, the sum of y and that of b.

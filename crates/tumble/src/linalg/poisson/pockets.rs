@@ -131,8 +131,10 @@ impl Pockets {
         self.components.len().saturating_sub(1)
     }
 
-    /// Copies a right-hand side to the grid's b, without the means; the sums of b and of its magnitude decide whether there are any.
-    pub fn load<T: Weight>(&self, grid: &mut Grid<T>, from: &[Real], excess: Excess) -> Result<(), Fault> {
+    /// Copies a right-hand side to the grid's b, or takes the one that is there, without the means; the sums of b and of its magnitude
+    /// decide whether there are any.
+    pub fn load<T: Weight>(&self, grid: &mut Grid<T>, given: Option<&[Real]>, excess: Excess) -> Result<(), Fault> {
+        let from = given.unwrap_or(&grid.b);
         let parts: Vec<([f64; 2], Vec<(usize, [f64; 2])>)> = self.rows[..self.rows.len() - 1]
             .par_chunks(TASK)
             .enumerate()
@@ -184,11 +186,15 @@ impl Pockets {
                 // SAFETY: runs are disjoint.
                 let out = unsafe { b.take(run.at, run.cells) };
                 let mean = means[run.component] as Real;
-                for (out, from) in out.iter_mut().zip(run.of(from)) {
-                    *out = from - mean;
+                match given {
+                    Some(from) => out.iter_mut().zip(run.of(from)).for_each(|(out, from)| *out = from - mean),
+                    None => out.iter_mut().for_each(|b| *b -= mean),
                 }
             }
         });
+        let mut b = std::mem::take(&mut grid.b);
+        self.clear(grid, &mut b);
+        grid.b = b;
         Ok(())
     }
 

@@ -36,9 +36,9 @@ impl Fluid {
     fn named(&self, name: &str) -> Result<Option<Column>, GridError> {
         let one = |unit: &'static str, field: &Field| Some(self.column(name, unit, std::slice::from_ref(field)));
         Ok(match name {
-            "density" => self.smoke.as_ref().and_then(|c| one("kg/m³", &c.field)),
-            "temperature" => self.temperature.as_ref().and_then(|c| one("K", &c.field)),
-            "fuel" => self.flame.as_ref().and_then(|flame| one("kg/m³", &flame.fuel.field)),
+            "density" => self.smoke.as_ref().and_then(|f| one("kg/m³", f)),
+            "temperature" => self.temperature.as_ref().and_then(|f| one("K", f)),
+            "fuel" => self.flame.as_ref().and_then(|flame| one("kg/m³", &flame.fuel)),
             "pressure" => one("Pa", &self.pressure),
             "velocity" => Some(self.column(name, "m/s", &self.at_cells(&self.u)?)),
             "vorticity" => {
@@ -101,7 +101,7 @@ impl Fluid {
     fn carried_mass(&self) -> f64 {
         let total = |f: &Field| sum(f, |at, n| f.data[at..at + n].iter().map(|x| f64::from(*x)).sum());
         let fuel = self.flame.iter().map(|flame| &flame.fuel);
-        self.smoke.iter().chain(fuel).fold(0.0, |mass, c| mass + self.volume() * total(&c.field))
+        self.smoke.iter().chain(fuel).fold(0.0, |mass, c| mass + self.volume() * total(c))
     }
 
     /// Speed of the fastest cell [m/s].
@@ -157,8 +157,8 @@ impl Fluid {
     /// The first number that is not finite.
     pub fn broken(&self, system: &str, t: f64) -> Option<StepError> {
         let carried = [("density", &self.smoke), ("temperature", &self.temperature)];
-        let fuel = self.flame.iter().map(|flame| ("fuel", &flame.fuel.field));
-        let scalars = carried.into_iter().filter_map(|(name, c)| Some((name, &c.as_ref()?.field))).chain(fuel);
+        let fuel = self.flame.iter().map(|flame| ("fuel", &flame.fuel));
+        let scalars = carried.into_iter().filter_map(|(name, c)| Some((name, c.as_ref()?))).chain(fuel);
         let all = self.u.parts.iter().map(|part| ("velocity", part)).chain(scalars);
         for (name, field) in all {
             // Adding up finds any of them; only then is it looked for.
@@ -184,18 +184,18 @@ impl Fluid {
         None
     }
 
-    fn kept(&self) -> Vec<(&'static str, &Vec<Real>)> {
-        let mut all: Vec<(&'static str, &Vec<Real>)> = self.u.parts.iter().map(|part| ("u", &part.data)).collect();
-        all.extend(self.smoke.iter().map(|c| ("smoke", &c.field.data)));
-        all.extend(self.temperature.iter().map(|c| ("temperature", &c.field.data)));
-        all.extend(self.flame.iter().map(|flame| ("fuel", &flame.fuel.field.data)));
-        all.push(("pressure", &self.pressure.data));
+    fn kept(&self) -> Vec<(&'static str, &Field)> {
+        let mut all: Vec<(&'static str, &Field)> = self.u.parts.iter().map(|part| ("u", part)).collect();
+        all.extend(self.smoke.iter().map(|f| ("smoke", f)));
+        all.extend(self.temperature.iter().map(|f| ("temperature", f)));
+        all.extend(self.flame.iter().map(|flame| ("fuel", &flame.fuel)));
+        all.push(("pressure", &self.pressure));
         all
     }
 
     /// Writes everything that the next step depends on.
     pub fn save(&self, archive: &mut Archive) {
-        self.kept().into_iter().for_each(|(name, data)| archive.push_numbers(name, data));
+        self.kept().into_iter().for_each(|(name, field)| archive.push_field(name, field));
         if let Some(flame) = &self.flame {
             archive.push("burnt", Part::Numbers(flame.books.to_vec()));
         }
@@ -207,19 +207,12 @@ impl Fluid {
 
     /// Reads it back.
     pub fn restore(&mut self, archive: &mut Archive) -> Option<()> {
-        let length = self.grid().lattice().len();
-        let mut read = |name: &str, into: &mut Vec<Real>| {
-            archive.column(name, into)?;
-            let fits = into.len() == length;
-            // A field has its length whatever comes.
-            into.resize(length, 0.0);
-            fits.then_some(())
-        };
-        self.u.parts.iter_mut().try_for_each(|part| read("u", &mut part.data))?;
-        self.smoke.iter_mut().try_for_each(|c| read("smoke", &mut c.field.data))?;
-        self.temperature.iter_mut().try_for_each(|c| read("temperature", &mut c.field.data))?;
-        self.flame.iter_mut().try_for_each(|flame| read("fuel", &mut flame.fuel.field.data))?;
-        read("pressure", &mut self.pressure.data)?;
+        let mut read = |name: &str, field: &mut Field| archive.field(name, field);
+        self.u.parts.iter_mut().try_for_each(|part| read("u", part))?;
+        self.smoke.iter_mut().try_for_each(|f| read("smoke", f))?;
+        self.temperature.iter_mut().try_for_each(|f| read("temperature", f))?;
+        self.flame.iter_mut().try_for_each(|flame| read("fuel", &mut flame.fuel))?;
+        read("pressure", &mut self.pressure)?;
         if let Some(flame) = &mut self.flame {
             let [start, came] = archive.numbers("burnt")?[..] else { return None };
             flame.books = [start, came];
@@ -237,9 +230,9 @@ impl Fluid {
     pub fn write(&mut self, column: &str, values: &[f64]) -> bool {
         let values: Vec<Real> = values.iter().map(|x| *x as Real).collect();
         let field = match column {
-            "density" => self.smoke.as_mut().map(|c| &mut c.field),
-            "temperature" => self.temperature.as_mut().map(|c| &mut c.field),
-            "fuel" => self.flame.as_mut().map(|flame| &mut flame.fuel.field),
+            "density" => self.smoke.as_mut(),
+            "temperature" => self.temperature.as_mut(),
+            "fuel" => self.flame.as_mut().map(|flame| &mut flame.fuel),
             _ => {
                 let axis = FACES.iter().position(|face| *face == column);
                 self.u.parts.iter_mut().find(|part| axis.is_some_and(|a| part.place == Place::Face(a)))

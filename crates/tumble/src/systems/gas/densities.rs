@@ -5,7 +5,7 @@
 //! rho_f of a face is the mean of the two cells beside it, on a side of the box that of the cell beside it.
 //! Tests: crates/tumble-f64/tests/densities.rs. Limits: the kinematic viscosity is the same everywhere.
 
-use super::fluid::{Carried, Failure, Settings};
+use super::fluid::{Failure, Settings};
 use super::rows::{Face, runs};
 use crate::linalg::poisson::Weight;
 use crate::math::Real;
@@ -32,14 +32,14 @@ impl Densities {
     }
 
     /// Takes them from smoke and warmth.                                                                 (gas.13)
-    pub fn measure(&mut self, settings: &Settings, smoke: Option<&Carried>, warmth: Option<&Carried>) {
+    pub fn measure(&mut self, settings: &Settings, smoke: Option<&Field>, warmth: Option<&Field>) {
         let (beta, ambient) = (settings.expansion as Real, settings.ambient as Real);
         let weight = (settings.weight / settings.density) as Real;
         each_row(&mut self.ratio, |j, k, row| {
-            let at = |carried: Option<&Carried>| carried.map(|c| c.field.index([0, j, k]));
+            let at = |carried: Option<&Field>| carried.map(|c| c.index([0, j, k]));
             match (warmth, at(warmth)) {
                 (Some(warmth), Some(at)) => {
-                    let warmth = &warmth.field.data[at..];
+                    let warmth = &warmth.data[at..];
                     for (ratio, t) in row.iter_mut().zip(warmth) {
                         // Beyond the range is beyond the range from either side.
                         *ratio = 1.0 / (1.0 + beta * (t - ambient)).max(RANGE[0]);
@@ -48,7 +48,7 @@ impl Densities {
                 _ => row.fill(1.0),
             }
             if let (Some(smoke), Some(at)) = (smoke, at(smoke)) {
-                row.iter_mut().zip(&smoke.field.data[at..]).for_each(|(ratio, s)| *ratio += weight * s);
+                row.iter_mut().zip(&smoke.data[at..]).for_each(|(ratio, s)| *ratio += weight * s);
             }
             row.iter_mut().for_each(|ratio| *ratio = ratio.clamp(RANGE[0], RANGE[1]));
         });

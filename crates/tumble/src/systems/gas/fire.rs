@@ -6,7 +6,7 @@
 //! Both are solved exactly over a step, cell by cell. Sources: [feldman2003] (fuel, soot, divergence), [nguyen2002] (radiation).
 //! Tests: crates/tumble-f64/tests/fire.rs. Limits: nothing asks for oxygen; without an open side there is no room to take.
 
-use super::fluid::{Carried, Failure};
+use super::fluid::Failure;
 use super::rows::sum;
 use crate::math::{Real, functions};
 use crate::operators::{each_row, each_row_of};
@@ -65,7 +65,7 @@ pub struct Flame {
     /// How it burns.
     pub fire: Fire,
     /// Fuel at cells [kg/m³].
-    pub fuel: Carried,
+    pub fuel: Field,
     /// Growth of volume S at cells [1/s].
     pub(super) swelling: Field,
     /// Sum of T - T0 over the cells at the start, and all that came in since [K].
@@ -74,19 +74,19 @@ pub struct Flame {
 
 impl Flame {
     /// Of a fuel, in a fluid of this temperature.
-    pub fn new(fire: Fire, fuel: Carried, grid: Grid, temperature: Option<&Carried>, ambient: f64) -> Result<Self, Failure> {
+    pub fn new(fire: Fire, fuel: Field, grid: Grid, temperature: Option<&Field>, ambient: f64) -> Result<Self, Failure> {
         let swelling = Field::new(grid, Place::Cell, "1/s")?;
-        let start = temperature.map_or(0.0, |warmth| excess(&warmth.field, ambient));
+        let start = temperature.map_or(0.0, |warmth| excess(warmth, ambient));
         Ok(Self { fire, fuel, swelling, books: [start, 0.0] })
     }
 
     /// Burns for h seconds; `warmth` and `smoke` are those of the fluid.                                  (fire.1)
-    pub(super) fn burn(&mut self, warmth: &mut Carried, smoke: Option<&mut Carried>, ambient: f64, h: f64) {
+    pub(super) fn burn(&mut self, warmth: &mut Field, smoke: Option<&mut Field>, ambient: f64, h: f64) {
         let Self { fire, fuel, swelling, books } = self;
         let left = functions::exp(-h / fire.burn_time);
         let ignition = fire.ignition as Real;
-        let mut fields = vec![&mut fuel.field, &mut warmth.field, &mut *swelling];
-        fields.extend(smoke.map(|smoke| &mut smoke.field));
+        let mut fields = vec![&mut *fuel, &mut *warmth, &mut *swelling];
+        fields.extend(smoke);
         each_row_of(&mut fields, |_, _, rows| {
             let [fuel, warmth, swelling, smoke @ ..] = rows else { return };
             for i in 0..fuel.len() {
@@ -104,7 +104,7 @@ impl Flame {
         if fire.expansion > 0.0 {
             // A volume that grows at a temperature holds more.
             let more = |at: usize, n: usize| {
-                let one = |i: usize| f64::from(swelling.data[i]) * (f64::from(warmth.field.data[i]) - ambient);
+                let one = |i: usize| f64::from(swelling.data[i]) * (f64::from(warmth.data[i]) - ambient);
                 (at..at + n).map(one).sum()
             };
             books[1] += h * sum(swelling, more);

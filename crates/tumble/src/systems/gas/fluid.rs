@@ -8,12 +8,11 @@ use super::rows::{magnitude, worse};
 use super::sheets::Sheet;
 use super::sides::{Beyond, hold};
 use super::solids::Solids;
-use super::viscosity::Conjugates;
 use crate::exchange::Exchange;
 use crate::geometry::Vector;
-use crate::linalg::poisson::{Fault, Params, Solver, Weight};
+use crate::linalg::poisson::{Fault, Params, Solver};
 use crate::math::{Real, VectorSignal};
-use crate::operators::{Advection, Scratch, advect, advect_vectors};
+use crate::operators::{Advection, advect, advect_vectors};
 use crate::state::{Field, Grid, GridError, Place, Side, Vectors};
 use tumble_interface::StepError;
 use tumble_interface::engine::StepReport;
@@ -73,28 +72,6 @@ pub struct Settings {
     pub courant: f64,
 }
 
-/// A field that is carried, and where it is carried to.
-pub struct Carried {
-    /// Its values at cells.
-    pub field: Field,
-    /// Of anything.
-    pub(super) next: Field,
-}
-
-impl Carried {
-    /// From values at cells.
-    pub fn new(field: Field) -> Self {
-        Self { next: field.clone(), field }
-    }
-
-    /// The same with its sides set.
-    pub fn beyond(mut self, sides: &[[Beyond; 2]; 3], ambient: f64, inflow: impl Fn([f64; 3]) -> f64 + Copy) -> Self {
-        self.field.sides = sides.each_ref().map(|ends| ends.each_ref().map(|side| side.carried(ambient, inflow)));
-        self.next.sides = self.field.sides;
-        self
-    }
-}
-
 /// A fluid in a box.
 pub struct Fluid {
     /// Name of the object.
@@ -104,9 +81,9 @@ pub struct Fluid {
     /// Velocity on faces [m/s].
     pub u: Vectors,
     /// Density of smoke at cells [kg/m³].
-    pub smoke: Option<Carried>,
+    pub smoke: Option<Field>,
     /// Temperature at cells [K].
-    pub temperature: Option<Carried>,
+    pub temperature: Option<Field>,
     /// Fuel that burns.
     pub flame: Option<Flame>,
     /// Pressure of the last projection at cells [Pa].
@@ -117,13 +94,6 @@ pub struct Fluid {
     pub(super) solids: Option<Solids>,
     /// What hangs in it.
     pub sheets: Vec<Sheet>,
-    /// Of anything: velocities, right-hand side and unknown of the pressure, and what operators need.
-    pub(super) next: Vectors,
-    pub(super) b: Field,
-    pub(super) left: Vec<Real>,
-    pub(super) q: Vec<Real>,
-    pub(super) conjugates: Conjugates,
-    scratch: Scratch,
 }
 
 /// What stops a step.
@@ -195,33 +165,28 @@ impl Fluid {
         [smoke, temperature, fuel]: [Option<Field>; 3],
     ) -> Result<Self, Failure> {
         let grid = u.on_faces("velocity of a fluid")?;
-        let lattice = grid.lattice();
         let mut solids = solids;
         // At the start bodies have the velocity that they are given.
         let masses: Vec<f64> = solids.iter_mut().flat_map(|s| &mut s.bodies).map(|body| std::mem::take(&mut body.inverse_mass)).collect();
         let solver = solver(grid, &settings, solids.as_ref())?;
         let sides = &settings.sides;
-        let smoke = smoke.map(|f| Carried::new(f).beyond(sides, 0.0, |[density, _, _]| density));
-        let temperature = temperature.map(|f| Carried::new(f).beyond(sides, settings.ambient, |[_, temperature, _]| temperature));
+        let smoke = smoke.map(|f| carried(f, sides, 0.0, |[density, _, _]| density));
+        let temperature = temperature.map(|f| carried(f, sides, settings.ambient, |[_, temperature, _]| temperature));
         let flame = match (settings.fire, fuel) {
             (Some(fire), Some(fuel)) => {
-                let fuel = Carried::new(fuel).beyond(sides, 0.0, |[_, _, fuel]| fuel);
+                let fuel = carried(fuel, sides, 0.0, |[_, _, fuel]| fuel);
                 Some(Flame::new(fire, fuel, grid, temperature.as_ref(), settings.ambient)?)
             }
             _ => None,
         };
-        // Only a viscous fluid needs them.
-        let spare = || if settings.viscosity > 0.0 { Field::new(grid, Place::Cell, "") } else { Ok(nothing(grid)) };
         let mut pressure = Field::new(grid, Place::Cell, "Pa")?;
         for (axis, end) in (0..3).flat_map(|a| [(a, 0), (a, 1)]) {
             if matches!(sides[axis][end], Beyond::Open) {
                 pressure.sides[axis][end] = Side::Value(0.0);
             }
         }
-        let conjugates = [spare()?, spare()?, spare()?];
         let mut fluid = Self {
             name,
-            next: u.clone(),
             u,
             smoke,
             temperature,
@@ -231,11 +196,6 @@ impl Fluid {
             solver,
             solids,
             sheets: Vec::new(),
-            b: Field::new(grid, Place::Cell, "m²/s")?,
-            left: vec![0.0; lattice.len()],
-            q: vec![0.0; lattice.len()],
-            conjugates,
-            scratch: Scratch::default(),
             settings,
         };
         hold(&mut fluid.u, &fluid.settings.sides, 0.0);
@@ -249,7 +209,7 @@ impl Fluid {
 
     /// Its cells.
     pub fn grid(&self) -> Grid {
-        self.b.grid
+        self.pressure.grid
     }
 
     /// One step of h seconds from t to `end` [s].
@@ -292,9 +252,17 @@ impl Fluid {
             let h = t - solids.time;
             solids.bodies.iter_mut().for_each(|body| body.position = body.position + body.velocity * h);
             solids.place(t);
-            self.solver = solver(self.b.grid, &self.settings, Some(solids))?;
+            self.renew()?;
         }
         self.clear();
+        Ok(())
+    }
+
+    /// A new pressure solver, in the memory of the old one.
+    fn renew(&mut self) -> Result<(), Failure> {
+        let spare = std::mem::take(&mut self.solver.spare);
+        self.solver = solver(self.grid(), &self.settings, self.solids.as_ref())?;
+        self.solver.spare = spare;
         Ok(())
     }
 
@@ -309,7 +277,7 @@ impl Fluid {
             (body.position, body.velocity) = (v(&s[..3]), v(&s[3..]));
         }
         solids.place(t);
-        self.solver = solver(self.b.grid, &self.settings, Some(solids)).ok()?;
+        self.renew().ok()?;
         self.clear();
         Some(())
     }
@@ -317,9 +285,9 @@ impl Fluid {
     /// Takes what is carried out of the solids.
     pub(super) fn clear(&mut self) {
         let Some(solids) = &self.solids else { return };
-        self.smoke.iter_mut().for_each(|smoke| solids.clear(&mut smoke.field.data, 0.0));
-        self.temperature.iter_mut().for_each(|warmth| solids.clear(&mut warmth.field.data, self.settings.ambient));
-        self.flame.iter_mut().for_each(|flame| solids.clear(&mut flame.fuel.field.data, 0.0));
+        self.smoke.iter_mut().for_each(|smoke| solids.clear(&mut smoke.data, 0.0));
+        self.temperature.iter_mut().for_each(|warmth| solids.clear(&mut warmth.data, self.settings.ambient));
+        self.flame.iter_mut().for_each(|flame| solids.clear(&mut flame.fuel.data, 0.0));
     }
 
     /// Takes the densities from what is carried.
@@ -340,21 +308,17 @@ impl Fluid {
         if let Some(solids) = &self.solids {
             solids.extend(&mut self.u);
             let fuel = self.flame.iter_mut().map(|flame| &mut flame.fuel);
-            self.smoke.iter_mut().chain(&mut self.temperature).chain(fuel).for_each(|carried| solids.shade(&mut carried.field));
+            self.smoke.iter_mut().chain(&mut self.temperature).chain(fuel).for_each(|carried| solids.shade(carried));
         }
-        let Self { u, next, smoke, temperature, flame, settings, scratch, .. } = self;
+        let Self { u, smoke, temperature, flame, settings, solver, .. } = self;
+        let spare = &mut solver.spare;
         let fuel = flame.iter_mut().map(|flame| &mut flame.fuel);
-        let carried: Vec<&mut Carried> = smoke.iter_mut().chain(temperature.iter_mut()).chain(fuel).collect();
-        let (from, mut to): (Vec<&Field>, Vec<&mut Field>) = carried.into_iter().map(|c| (&c.field, &mut c.next)).unzip();
-        advect(&from, u, h, &settings.scalars, &mut to, scratch)?;
-        let fuel = flame.iter_mut().map(|flame| &mut flame.fuel);
-        for carried in smoke.iter_mut().chain(temperature.iter_mut()).chain(fuel) {
-            std::mem::swap(&mut carried.field.data, &mut carried.next.data);
-        }
-        advect_vectors(u, u, h, &settings.velocity, next, scratch)?;
-        for (part, next) in u.parts.iter_mut().zip(&mut next.parts) {
-            std::mem::swap(&mut part.data, &mut next.data);
-        }
+        let carried: Vec<&mut Field> = smoke.iter_mut().chain(temperature.iter_mut()).chain(fuel).collect();
+        let from: Vec<&Field> = carried.iter().map(|field| &**field).collect();
+        let new = advect(&from, u, h, &settings.scalars, spare)?;
+        carried.into_iter().zip(new).for_each(|(field, new)| spare.keep(std::mem::replace(field, new)));
+        let new = advect_vectors(u, u, h, &settings.velocity, spare)?;
+        std::mem::replace(u, new).parts.into_iter().for_each(|part| spare.keep(part));
         hold(u, &settings.sides, t + h);
         Ok(())
     }
@@ -395,10 +359,10 @@ impl Fluid {
     /// The largest step [s] of the Courant number, within `left` [s]: forces speed the fluid up on the way.
     pub fn courant_step(&self, left: f64) -> f64 {
         let settings = &self.settings;
-        let most = |f: &Option<Carried>, around: f64| {
-            f.as_ref().map_or(0.0, |c| {
+        let most = |f: &Option<Field>, around: f64| {
+            f.as_ref().map_or(0.0, |f| {
                 let far = |x: &Real| (f64::from(*x) - around).abs();
-                super::rows::largest(&c.field, |at, n| c.field.data[at..at + n].iter().map(far).fold(0.0, worse))
+                super::rows::largest(f, |at, n| f.data[at..at + n].iter().map(far).fold(0.0, worse))
             })
         };
         let g = settings.gravity.iter().map(|g| g * g).sum::<f64>().sqrt();
@@ -421,15 +385,13 @@ fn solver(grid: Grid, settings: &Settings, solids: Option<&Solids>) -> Result<So
             solver.join(solids.joints(settings.density));
             solver
         }),
-        None => {
-            let open = vec![u8::OPEN; lattice.len()];
-            Solver::new(lattice, sides, [&open, &open, &open], None)
-        }
+        None => Solver::empty(lattice, sides),
     };
     solver.map_err(Failure::Pressure)
 }
 
-/// A field without numbers.
-fn nothing(grid: Grid) -> Field {
-    Field { grid, place: Place::Cell, sides: Default::default(), unit: "".into(), data: Vec::new() }
+/// A field that is carried, with what comes in through the sides of its box.
+fn carried(mut field: Field, sides: &[[Beyond; 2]; 3], ambient: f64, inflow: impl Fn([f64; 3]) -> f64 + Copy) -> Field {
+    field.sides = sides.each_ref().map(|ends| ends.each_ref().map(|side| side.carried(ambient, inflow)));
+    field
 }

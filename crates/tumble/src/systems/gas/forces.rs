@@ -2,7 +2,7 @@
 
 use super::confinement::confine;
 use super::fire::{excess, radiate};
-use super::fluid::{Carried, Failure, Fluid};
+use super::fluid::{Failure, Fluid};
 use super::rows::{Face, runs};
 use crate::geometry::Collider;
 use crate::math::{Real, Row, VectorSignal, functions};
@@ -76,9 +76,9 @@ fn feed(data: &mut [Real], points: &[(usize, Real)], amount: f64) {
 }
 
 /// f -> ambient + factor (f - ambient)
-fn fade(carried: &mut Carried, ambient: f64, factor: f64) {
+fn fade(carried: &mut Field, ambient: f64, factor: f64) {
     let (ambient, factor) = (ambient as Real, factor as Real);
-    each_row(&mut carried.field, |_, _, row| row.iter_mut().for_each(|f| *f = ambient + factor * (*f - ambient)));
+    each_row(carried, |_, _, row| row.iter_mut().for_each(|f| *f = ambient + factor * (*f - ambient)));
 }
 
 /// u += scale (mean of the two cells beside each face - around)
@@ -109,16 +109,16 @@ impl Fluid {
         self.burn(h);
         let gained = self.excess() - before;
         self.flame.iter_mut().for_each(|flame| flame.books[1] += gained);
+        let grid = self.grid();
         if let Some(solids) = &mut self.solids {
             let settings = &self.settings;
-            solids.bodies.iter_mut().for_each(|body| body.fall(h, settings.gravity, settings.density, &self.b.grid));
+            solids.bodies.iter_mut().for_each(|body| body.fall(h, settings.gravity, settings.density, &grid));
             solids.follow();
         }
         if let Some(solids) = self.solids.as_mut().filter(|_| self.settings.viscosity > 0.0) {
             solids.keep(&mut self.u);
         }
         self.push(t, h)?;
-        let grid = self.b.grid;
         let Self { sheets, u, settings, .. } = self;
         sheets.iter_mut().for_each(|sheet| sheet.trade(u, &grid, settings.density, h));
         Ok(())
@@ -139,7 +139,7 @@ impl Fluid {
         if let Some(warmth) = &mut self.temperature
             && settings.radiation > 0.0
         {
-            radiate(&mut warmth.field, settings.ambient, settings.radiation, h);
+            radiate(warmth, settings.ambient, settings.radiation, h);
         }
         for source in &settings.sources {
             let time = (t + h).min(source.times[1]) - t.max(source.times[0]);
@@ -148,16 +148,16 @@ impl Fluid {
             }
             let cells = source.cover(Place::Cell);
             if let Some(smoke) = &mut self.smoke {
-                feed(&mut smoke.field.data, cells, time * source.smoke);
-                source.density.iter().for_each(|density| pull(&mut smoke.field.data, cells, *density));
+                feed(&mut smoke.data, cells, time * source.smoke);
+                source.density.iter().for_each(|density| pull(&mut smoke.data, cells, *density));
             }
             if let Some(warmth) = &mut self.temperature {
-                feed(&mut warmth.field.data, cells, time * source.heating);
-                source.temperature.iter().for_each(|temperature| pull(&mut warmth.field.data, cells, *temperature));
+                feed(&mut warmth.data, cells, time * source.heating);
+                source.temperature.iter().for_each(|temperature| pull(&mut warmth.data, cells, *temperature));
             }
             if let Some(flame) = &mut self.flame {
-                feed(&mut flame.fuel.field.data, cells, time * source.fuel);
-                source.fuel_density.iter().for_each(|fuel| pull(&mut flame.fuel.field.data, cells, *fuel));
+                feed(&mut flame.fuel.data, cells, time * source.fuel);
+                source.fuel_density.iter().for_each(|fuel| pull(&mut flame.fuel.data, cells, *fuel));
             }
             if let Some(velocity) = &source.velocity {
                 let v = <[f64; 3]>::from(velocity.value(t + h));
@@ -172,7 +172,7 @@ impl Fluid {
     /// The sum of T - T0, where there is a fire to keep books of [K].
     pub(super) fn excess(&self) -> f64 {
         let warmth = self.temperature.as_ref().filter(|_| self.flame.is_some());
-        warmth.map_or(0.0, |warmth| excess(&warmth.field, self.settings.ambient))
+        warmth.map_or(0.0, |warmth| excess(warmth, self.settings.ambient))
     }
 
     /// What is hot enough burns.                                                                      (fire.1)
@@ -201,13 +201,13 @@ impl Fluid {
                 && light
                 && g * settings.weight != 0.0
             {
-                push_by(part, axis, &smoke.field, h * g * settings.weight / settings.density, 0.0);
+                push_by(part, axis, smoke, h * g * settings.weight / settings.density, 0.0);
             }
             if let Some(warmth) = &self.temperature
                 && light
                 && g * settings.expansion != 0.0
             {
-                push_by(part, axis, &warmth.field, -h * g * settings.expansion, settings.ambient);
+                push_by(part, axis, warmth, -h * g * settings.expansion, settings.ambient);
             }
             if constant[axis] != 0.0 {
                 let add = (h * constant[axis]) as Real;

@@ -24,7 +24,7 @@ mod viscosity;
 
 pub use bodies::Body;
 pub use fire::{Fire, Flame};
-pub use fluid::{Carried, Failed, Failure, Fluid, Settings};
+pub use fluid::{Failed, Failure, Fluid, Settings};
 pub use forces::{Cover, Source};
 pub use sheets::Sheet;
 pub use sides::{Beyond, hold};

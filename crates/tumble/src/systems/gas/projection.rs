@@ -3,11 +3,11 @@
 use super::fluid::{Failure, Fluid};
 use super::rows::{self, Face, runs};
 use super::solids::Solids;
-use crate::linalg::poisson::{Excess, Params, Solver, Target};
-use crate::math::Real;
+use crate::linalg::poisson::{Excess, Fault, Info, Params, Solver, Target, Weight};
 use crate::math::parallel::chunks;
+use crate::math::{Column, Real};
 use crate::operators::each_row;
-use crate::state::{Field, Vectors};
+use crate::state::{Field, Place, Vectors};
 use tumble_interface::engine::StepReport;
 use tumble_interface::scene::OnFailure;
 
@@ -56,7 +56,7 @@ pub fn around(u: &Vectors, solids: Option<&Solids>, swelling: Option<&Field>, b:
 fn subtract_gradient(u: &mut Vectors, q: &[Real], open: [[bool; 2]; 3], light: Option<&Vectors>) {
     for (index, part) in u.parts.iter_mut().enumerate() {
         let light = light.and_then(|light| light.parts.get(index));
-        let crate::state::Place::Face(axis) = part.place else { continue };
+        let Place::Face(axis) = part.place else { continue };
         let scale = (1.0 / part.grid.dx) as Real;
         let grid = part.grid;
         let lattice = grid.lattice();
@@ -95,6 +95,18 @@ fn subtract_gradient(u: &mut Vectors, q: &[Real], open: [[bool; 2]; 3], light: O
     }
 }
 
+/// Solves with a correction among the spare columns.
+fn refine<T: Weight>(
+    solver: &mut Solver<T>,
+    params: &Params,
+    evaluate: impl FnMut(&Solver<T>, Option<&[Real]>, &mut Column),
+) -> Result<Info, Fault> {
+    let mut correction = solver.spare.column(solver.lattice().len());
+    let info = solver.refine(&mut correction, params, evaluate);
+    solver.spare.give(correction);
+    info
+}
+
 impl Fluid {
     /// Makes the velocity at time t free of divergence, but for what fire swells; h [s] only scales the pressure that it takes.          (gas.4)
     pub fn projection(&mut self, t: f64, h: f64, report: &mut StepReport) -> Result<(), Failure> {
@@ -104,11 +116,11 @@ impl Fluid {
             solids.close(&mut self.u);
         }
         let mut fastest = self.fastest();
-        let Self { u, b, left, q, pressure, settings, solver, solids, flame, densities, .. } = self;
+        let Self { u, pressure, settings, solver, solids, flame, densities, .. } = self;
         let swelling = flame.as_ref().filter(|flame| flame.fire.expansion > 0.0).map(|flame| &flame.swelling);
         let mass = settings.density * solids.as_ref().map_or(0.0, Solids::area);
-        around(u, solids.as_ref(), swelling, b);
-        let dx = b.grid.dx;
+        let grid = pressure.grid;
+        let dx = grid.dx;
         if let Some(swelling) = swelling {
             // A fluid at rest is moved by nothing else.
             fastest = rows::worse(fastest, dx * rows::magnitude(swelling));
@@ -122,33 +134,39 @@ impl Fluid {
         let open = settings.sides.each_ref().map(|sides| sides.each_ref().map(|s| matches!(s, super::Beyond::Open)));
         pressure.data.fill(0.0);
         let to_pressure = (settings.density / h) as Real;
-        left.copy_from_slice(&b.data);
         let densities = densities.as_ref();
         let light = densities.map(|densities| &densities.light);
         // Another equation in every step.
         let varying = densities.map(|densities| {
             let weights = densities.weights(solids.as_ref().map(|solids| &solids.open));
             let sides = settings.sides.each_ref().map(|ends| ends.each_ref().map(super::Beyond::pressure));
-            let mut solver = Solver::new(solver.lattice(), sides, weights.each_ref().map(Vec::as_slice), None)?;
-            solver.join(solids.as_ref().map_or(Vec::new(), |solids| solids.joints(settings.density)));
-            Ok(solver)
+            let mut varying = Solver::new(solver.lattice(), sides, weights.each_ref().map(Vec::as_slice), None)?;
+            varying.join(solids.as_ref().map_or(Vec::new(), |solids| solids.joints(settings.density)));
+            varying.spare = std::mem::take(&mut solver.spare);
+            Ok(varying)
         });
         let mut varying = varying.transpose().map_err(Failure::Pressure)?;
-        let mut take = |yielded: &[f64], q: &[Real], left: &mut [Real]| {
-            subtract_gradient(u, q, open, light);
-            if let Some(solids) = solids {
-                solids.bodies.iter_mut().zip(yielded.chunks(3)).for_each(|(body, products)| body.yield_to(products, mass));
-                solids.follow();
-                solids.close(u);
+        let mut take = |yielded: &dyn Fn(&[Real]) -> Vec<f64>, q: Option<&[Real]>, b: &mut Column| {
+            if let Some(q) = q {
+                subtract_gradient(u, q, open, light);
+                if let Some(solids) = solids {
+                    solids.bodies.iter_mut().zip(yielded(q).chunks(3)).for_each(|(body, products)| body.yield_to(products, mass));
+                    solids.follow();
+                    solids.close(u);
+                }
+                chunks(&mut pressure.data, |start, p| p.iter_mut().zip(&q[start..]).for_each(|(p, q)| *p += to_pressure * q));
             }
-            chunks(&mut pressure.data, |start, p| p.iter_mut().zip(&q[start..]).for_each(|(p, q)| *p += to_pressure * q));
-            around(u, solids.as_ref(), swelling, b);
-            left.copy_from_slice(&b.data);
+            let mut left = Field { grid, place: Place::Cell, sides: Default::default(), unit: "m²/s".into(), data: std::mem::take(b) };
+            around(u, solids.as_ref(), swelling, &mut left);
+            *b = left.data;
         };
         let info = match &mut varying {
-            None => solver.refine(left, q, &params, |solver, q, left| take(&solver.yielded(q), q, left)),
-            Some(solver) => solver.refine(left, q, &params, |solver, q, left| take(&solver.yielded(q), q, left)),
+            None => refine(solver, &params, |solver, q, b| take(&|q| solver.yielded(q), q, b)),
+            Some(varying) => refine(varying, &params, |solver, q, b| take(&|q| solver.yielded(q), q, b)),
         };
+        if let Some(varying) = varying {
+            solver.spare = varying.spare;
+        }
         let info = info.map_err(Failure::Pressure)?;
         report.linear += info.iterations as u64;
         report.pressure = info.residuals;

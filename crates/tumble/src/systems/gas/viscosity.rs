@@ -8,7 +8,7 @@
 use super::fluid::{Failure, Fluid};
 use super::rows::dot;
 use super::solids::Solids;
-use crate::math::Real;
+use crate::math::{Real, Spare};
 use crate::operators::{diffuse, each_row, laplacian};
 use crate::state::{Field, Place, Side};
 use tumble_interface::engine::StepReport;
@@ -42,17 +42,27 @@ fn free(part: &mut Field) {
     }
 }
 
-/// Fields for conjugate gradients: residual, direction, product.
-pub type Conjugates = [Field; 3];
+/// x(t + h) = (1 + h kappa lap) x(t)
+fn explicit(x: &mut Field, kappa: f64, h: f64, spare: &mut Spare) -> Result<(), Failure> {
+    let mut next = spare.field(x.grid, x.place, "")?;
+    let done = diffuse(x, kappa, h, &mut next);
+    spare.keep(next);
+    done?;
+    Ok(())
+}
 
 /// Solves (1 - c lap) x = b from x = b; returns iterations and whether it converged.
-fn implicit(x: &mut Field, c: f64, solids: Option<&Solids>, scratch: &mut Conjugates) -> Result<(usize, bool), Failure> {
-    let [r, p, product] = scratch;
-    for field in [&mut *r, &mut *p, &mut *product] {
-        (field.grid, field.place) = (x.grid, x.place);
-        // The same sides at rest: directions change nothing that is held.
-        field.sides = x.sides.map(|ends| ends.map(|side| if let Side::Value(_) = side { Side::Value(0.0) } else { Side::Closed }));
-    }
+fn implicit(x: &mut Field, c: f64, solids: Option<&Solids>, spare: &mut Spare) -> Result<(usize, bool), Failure> {
+    // The same sides at rest: directions change nothing that is held.
+    let sides = x.sides.map(|ends| ends.map(|side| if let Side::Value(_) = side { Side::Value(0.0) } else { Side::Closed }));
+    let mut field = || Ok::<_, Failure>(Field { sides, ..spare.field(x.grid, x.place, "")? });
+    let mut fields = [field()?, field()?, field()?];
+    let found = conjugate_gradients(x, c, solids, &mut fields);
+    fields.into_iter().for_each(|field| spare.keep(field));
+    found
+}
+
+fn conjugate_gradients(x: &mut Field, c: f64, solids: Option<&Solids>, [r, p, product]: &mut [Field; 3]) -> Result<(usize, bool), Failure> {
     laplacian(x, product)?;
     let free = |part: &mut Field| {
         free(part);
@@ -87,15 +97,16 @@ fn implicit(x: &mut Field, c: f64, solids: Option<&Solids>, scratch: &mut Conjug
 impl Fluid {
     /// Viscosity of the velocity, and diffusion of smoke and warmth, for h seconds from t on.             (gas.3)
     pub fn viscosity(&mut self, t: f64, h: f64, report: &mut StepReport) -> Result<(), Failure> {
+        let spare = &mut self.solver.spare;
         for (carried, spread) in [(&mut self.smoke, 0), (&mut self.temperature, 1)] {
             let diffusivity = self.settings.diffusivity[spread];
             if let Some(carried) = carried
                 && diffusivity > 0.0
             {
                 if let Some(solids) = &self.solids {
-                    solids.shade(&mut carried.field);
+                    solids.shade(carried);
                 }
-                diffuse(&mut carried.field, diffusivity, h, &mut carried.next)?;
+                explicit(carried, diffusivity, h, spare)?;
             }
         }
         self.clear();
@@ -110,9 +121,9 @@ impl Fluid {
         for axis in 0..self.u.parts.len() {
             let part = &mut self.u.parts[axis];
             match self.settings.viscous {
-                Viscous::Explicit => drop(diffuse(part, nu, h, &mut self.next.parts[axis])?),
+                Viscous::Explicit => explicit(part, nu, h, &mut self.solver.spare)?,
                 Viscous::Implicit => {
-                    let (iterations, converged) = implicit(part, h * nu, self.solids.as_ref(), &mut self.conjugates)?;
+                    let (iterations, converged) = implicit(part, h * nu, self.solids.as_ref(), &mut self.solver.spare)?;
                     report.linear += iterations as u64;
                     report.unconverged += u64::from(!converged);
                 }

@@ -3,7 +3,7 @@
 use super::pass::{Cells, Pass};
 use crate::linalg::poisson::{Excess, Method, Params, Series, Side, Solver, Target};
 use crate::math::parallel::sum;
-use crate::math::{Real, Signal};
+use crate::math::{Column, Real, Signal};
 use crate::state::{Field, Grid, GridError, Place};
 use rayon::prelude::*;
 use tumble_interface::engine::StepReport;
@@ -113,8 +113,8 @@ pub struct Body {
     start: f64,
     /// The time of its temperatures [s].
     pub time: f64,
-    next: Vec<Real>,
-    correction: Vec<Real>,
+    next: Column,
+    correction: Column,
     implicit: Option<Implicit>,
     series: Option<(f64, Series)>,
 }
@@ -136,7 +136,7 @@ impl Body {
             start: 0.0,
             time: 0.0,
             next: t.data.clone(),
-            correction: Vec::new(),
+            correction: Column::new(),
             implicit: None,
             series: None,
             plan,
@@ -449,7 +449,7 @@ impl Body {
         let Some(mut work) = self.implicit.take() else { return };
         let mut right = std::mem::take(&mut self.next);
         let mut d = std::mem::take(&mut self.correction);
-        d.resize(right.len(), 0.0);
+        d.reserve(right.len());
         self.pass(None, &mut right);
         let (powers, beyond) = (self.powers(times), self.beyond(times));
         let books = self.come.clone();
@@ -498,7 +498,7 @@ impl Body {
             self.come[link.of as usize] -= per_link * f64::from(link.g);
         }
         let cells = self.cells.as_ref();
-        d.par_iter_mut().zip(&old).enumerate().for_each(|(at, (d, t))| {
+        d.par_iter_mut().zip(&old[..]).enumerate().for_each(|(at, (d, t))| {
             *d = if cells.is_none_or(|c| c.m[at] > 0.0) { *t + (*d + shift as Real) } else { *t };
         });
         (self.t.data, self.correction, self.next) = (d, old, right);
@@ -521,7 +521,7 @@ impl Body {
             let of_volume = grid.dx * grid.dx / self.own().conductivity;
             self.arise(&powers, h, of_volume, false, &mut gain);
             series.gain(&mut gain);
-            self.t.data.par_iter_mut().zip(&gain).for_each(|(t, gain)| *t += gain);
+            self.t.data.par_iter_mut().zip(&gain[..]).for_each(|(t, gain)| *t += gain);
             self.next = gain;
         }
         self.series = Some((of, series));

@@ -209,7 +209,7 @@ impl System for Heat {
 
     fn save(&self, archive: &mut Archive) {
         for body in &self.bodies {
-            archive.push_numbers("temperature", &body.t.data);
+            archive.push_field("temperature", &body.t);
             let mut numbers = body.come.clone();
             numbers.push(body.time);
             archive.push("heat", Part::Numbers(numbers));
@@ -218,14 +218,10 @@ impl System for Heat {
 
     fn restore(&mut self, archive: &mut Archive) -> Option<()> {
         for body in &mut self.bodies {
-            let count = body.t.data.len();
-            archive.column("temperature", &mut body.t.data)?;
+            archive.field("temperature", &mut body.t)?;
             let mut come = archive.numbers("heat")?;
             let time = come.pop()?;
-            if body.t.data.len() != count || come.len() != body.come.len() {
-                body.t.data.resize(count, 0.0);
-                return None;
-            }
+            (come.len() == body.come.len()).then_some(())?;
             (body.come, body.time) = (come, time);
         }
         Some(())
