@@ -112,6 +112,15 @@ def test_wrong_input_ends_with_2_and_leaves_nothing(
         ("version = 1\n[[particles]]\nname = 'p'\nposition = [[0, 0, 1e999]]\n", "inf, expected a finite number in m"),
         ("version = 1\nx = = 2\n", "line 2"),
         ("", "version"),
+        ("version = 2\n", "version: 2, expected 1\n"),
+        (
+            "version = 1\n[[emitter]]\nname = 'e'\nfrom = { point = {}, disk = { radius = 1 } }\n",
+            "point and disk: only one of them",
+        ),
+        (
+            "version = 1\n[[emitter]]\nname = 'e'\nfrom = { point = {} }\nburst = [{ count = 1 }]\ncolor = [255, 128, 0]\n",
+            "color[0]: 255, expected >= 0 and <= 1",
+        ),
     ],
 )
 def test_wrong_files_end_with_2(tumble: Command, text: str, message: str) -> None:
@@ -158,6 +167,47 @@ def test_words_that_nothing_heeds_are_told(spring: Tree, scene_file: SceneFile, 
     still = {key: value for key, value in tracers(spring).items() if key != "field"}
     answer = tumble("check", scene_file(still))
     assert (answer.code, "no [[field]] to follow" in answer.err) == (0, True)
+
+
+BOX = {"inside": {"box": {"center": [5, 0, 0], "size": [1, 1, 1]}}}
+
+
+@pytest.mark.parametrize(
+    ("words", "doubt"),
+    [
+        ({"rate": 100, "start": 99}, "nothing is born in the 1 s"),
+        ({"burst": [{"time": 50, "count": 9}]}, "nothing is born in the 1 s"),
+        ({"rate": 100}, None),
+        ({"burst": [{"time": 0.5, "count": 9}]}, None),
+        (
+            {"rate": 100, "velocity": [40, 0, 0], "kill": [BOX]},
+            r"kill\[0\].inside: at 40 m/s.*time.exchanges to 2 or more",
+        ),
+        ({"rate": 100, "velocity": [20, 0, 0], "kill": [BOX]}, None),
+    ],
+)
+def test_what_emitters_hardly_mean_is_told(
+    scene_file: SceneFile, tumble: Command, words: Tree, doubt: str | None
+) -> None:
+    emitter = {"name": "e", "from": {"point": {}}} | words
+    scene = {"version": 1, "time": {"fps": 24, "frames": 24}, "emitter": [emitter], "output": {"plot": False}}
+    answer = tumble("check", scene_file(scene))
+    told = re.sub(r"\s+", " ", answer.err)
+    assert answer.code == 0
+    assert re.search(doubt, told) if doubt else "emitter" not in told, told
+
+
+def test_a_formula_that_is_not_finite_is_named(spring: Tree) -> None:
+    from tumble import StepError, World
+
+    free = {"name": "q", "position": [[0.5, 0, 0], [0, 0, 1]]}
+    forces = [{"kind": "drag", "rate": 0.1}, {"kind": "acceleration", "value": ["1/x", 0, 0], "on": ["q"]}]
+    world = World(spring | {"particles": [*spring["particles"], free], "force": forces})
+    with pytest.raises(
+        StepError, match=r"\"q\", particle 1. force\[1\] gives no finite number at \[0.0, 0.0, 1.0\] m"
+    ) as caught:
+        world.step(1)
+    assert caught.value.report["cause"].startswith("force[1]")
 
 
 def broken(*_: Any) -> Any:

@@ -144,6 +144,11 @@ impl<'a> Checker<'a> {
         if let (Value::Table(entries), false) = (&node.value, fitting.is_empty()) {
             let single = |b: &Schema| b["required"].as_array().filter(|r| r.len() == 1).and_then(|r| r[0].as_str().map(str::to_string));
             let keys: Vec<String> = resolved.iter().filter_map(|b| single(b)).collect();
+            let alone = |b: &Schema| b["properties"].as_object().is_some_and(|all| all.len() == 1);
+            let given: Vec<&str> = entries.iter().map(|(key, _)| key.as_str()).filter(|key| keys.iter().any(|k| k == key)).collect();
+            if given.len() > 1 && resolved.iter().all(|b| alone(b) || single(b).is_none()) {
+                return self.report(node, path, format!("{}: only one of them", given.join(" and ")));
+            }
             let chosen = fitting.iter().find(|i| single(resolved[**i]).is_some_and(|k| entries.iter().any(|(key, _)| *key == k)));
             return match chosen {
                 Some(i) => self.visit(node, &branches[*i], path, unit),
@@ -287,6 +292,16 @@ fn in_range(x: f64, schema: &Schema) -> bool {
 /// `>= 0 N/m`, `> 0 and <= 1`, or without bounds `in m`.
 fn range(schema: &Schema, unit: Option<&str>) -> String {
     let [low, high, above, below] = bounds(schema);
+    if let (Some(low), Some(high)) = (low, high)
+        && low == high
+    {
+        return plain(low);
+    }
+    if let (Some(low), Some(high)) = (low, high)
+        && low == high
+    {
+        return plain(low);
+    }
     let parts: Vec<String> = [(">=", low), (">", above), ("<=", high), ("<", below)]
         .into_iter()
         .filter_map(|(sign, b)| b.map(|b| format!("{sign} {}", plain(b))))

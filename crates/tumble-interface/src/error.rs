@@ -138,6 +138,8 @@ pub struct Breakdown {
     pub stable_step: f64,
     /// Energy over its scale, where it could be computed.
     pub energy_ratio: Option<f64>,
+    /// What made it so, if that is known: `force[0] gives no finite number at [0, 0, 1] m`.
+    pub cause: Option<String>,
 }
 
 impl fmt::Display for Breakdown {
@@ -155,6 +157,9 @@ impl fmt::Display for Breakdown {
         match id {
             Some(id) => write!(f, "first bad {column} in emitter \"{object}\", the particle with id {id}. ")?,
             None => write!(f, "first bad {column} in \"{object}\", particle {index}. ")?,
+        }
+        if let Some(cause) = &self.cause {
+            return write!(f, "{cause}");
         }
         if *stable_step == 0.0 {
             write!(f, "{integrator} has no stable step for this system")

@@ -50,7 +50,8 @@ pub fn step_error(py: Python<'_>, error: &tumble_interface::StepError) -> PyErr 
             report.set_item("integrator", &b.integrator)?;
             report.set_item("step", b.step)?;
             report.set_item("stable_step", b.stable_step)?;
-            report.set_item("energy_ratio", b.energy_ratio)
+            report.set_item("energy_ratio", b.energy_ratio)?;
+            report.set_item("cause", &b.cause)
         };
         match error {
             E::NotFinite(b) => broken("not_finite", b)?,

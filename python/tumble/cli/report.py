@@ -112,6 +112,8 @@ def _place(report: Mapping[str, Any]) -> list[str]:
         f"  step used    {seconds(report['step'])}",
         f"  stable step  {limit}",
     ]
+    if report.get("cause"):
+        lines.insert(2, f"  because      {report['cause']}")
     if report.get("energy_ratio") is not None:
         lines.append(f"  energy       {float(report['energy_ratio']):.3g} times its scale")
     return lines

@@ -97,12 +97,15 @@ pub struct Emitter {
     pub radius_spread: f64,
     /// Red, green and blue in pictures, 0 to 1, in linear light (a half is sRGB's 188 of 255).
     #[serde(default)]
+    #[schemars(inner(range(min = 0.0, max = 1.0)))]
     pub color: Option<[f64; 3]>,
     /// Each particle has a colour between `color` and this one.
     #[serde(default)]
+    #[schemars(inner(range(min = 0.0, max = 1.0)))]
     pub color_to: Option<[f64; 3]>,
     /// Colour that it has faded to at the end of its life; needs a `lifetime`.
     #[serde(default)]
+    #[schemars(inner(range(min = 0.0, max = 1.0)))]
     pub color_end: Option<[f64; 3]>,
     /// How much of the way behind each is drawn in pictures.
     #[serde(default)]

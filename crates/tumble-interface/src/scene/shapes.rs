@@ -36,6 +36,7 @@ pub struct Collider {
     pub motion: Option<Motion>,
     /// Red, green and blue in pictures, 0 to 1, in linear light (a half is sRGB's 188 of 255).
     #[serde(default)]
+    #[schemars(inner(range(min = 0.0, max = 1.0)))]
     pub color: Option<[f64; 3]>,
 }
 

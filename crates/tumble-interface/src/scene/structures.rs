@@ -49,6 +49,7 @@ pub struct Particles {
     pub trail: f64,
     /// Red, green and blue in pictures, 0 to 1, in linear light (a half is sRGB's 188 of 255).
     #[serde(default)]
+    #[schemars(inner(range(min = 0.0, max = 1.0)))]
     pub color: Option<[f64; 3]>,
 }
 
@@ -173,6 +174,7 @@ pub struct Galaxy {
     pub trail: f64,
     /// Red, green and blue in pictures, 0 to 1, in linear light (a half is sRGB's 188 of 255).
     #[serde(default)]
+    #[schemars(inner(range(min = 0.0, max = 1.0)))]
     pub color: Option<[f64; 3]>,
 }
 
@@ -241,6 +243,7 @@ pub struct Rope {
     pub radius: f64,
     /// Red, green and blue in pictures, 0 to 1, in linear light (a half is sRGB's 188 of 255).
     #[serde(default)]
+    #[schemars(inner(range(min = 0.0, max = 1.0)))]
     pub color: Option<[f64; 3]>,
 }
 
@@ -311,6 +314,7 @@ pub struct Sheet {
     pub pin: Vec<Pin>,
     /// Red, green and blue in pictures, 0 to 1, in linear light (a half is sRGB's 188 of 255).
     #[serde(default)]
+    #[schemars(inner(range(min = 0.0, max = 1.0)))]
     pub color: Option<[f64; 3]>,
 }
 
@@ -352,6 +356,7 @@ pub struct Block {
     pub pin: Vec<Pin>,
     /// Red, green and blue in pictures, 0 to 1, in linear light (a half is sRGB's 188 of 255).
     #[serde(default)]
+    #[schemars(inner(range(min = 0.0, max = 1.0)))]
     pub color: Option<[f64; 3]>,
 }
 
@@ -398,6 +403,7 @@ pub struct Net {
     pub pin: Vec<Pin>,
     /// Red, green and blue in pictures, 0 to 1, in linear light (a half is sRGB's 188 of 255).
     #[serde(default)]
+    #[schemars(inner(range(min = 0.0, max = 1.0)))]
     pub color: Option<[f64; 3]>,
 }
 

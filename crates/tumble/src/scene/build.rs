@@ -4,6 +4,7 @@ use super::Assets;
 use super::checks::{check, objects, others, place};
 use super::coupling;
 use super::gas::gas;
+use super::hints::unused;
 use super::laws::{Reader, flat};
 use super::memory::memory;
 use crate::exchange::Exchange;
@@ -23,8 +24,7 @@ use std::borrow::Cow;
 use std::sync::Arc;
 use tumble_interface::check::plain;
 use tumble_interface::scene::{
-    Animated, Bits, Emitter, Event, Field as Stream, Force as Words, Kill, MeshFile, Method, Particles, Plane, Scene, Shape, Source,
-    System as Plan, Vicsek,
+    Animated, Bits, Field as Stream, Force as Words, MeshFile, Method, Plane, Scene, Shape, System as Plan, Vicsek,
 };
 use tumble_interface::{Column, Data, Issue, Mesh, SceneError};
 
@@ -220,71 +220,6 @@ fn placed(scene: &Scene, mut error: SceneError) -> SceneError {
     error
 }
 
-/// What the scene says and nothing heeds.
-fn unused(scene: &Scene, plans: &[Plan]) -> Vec<String> {
-    let carried = |(kind, _, system): &(&str, &str, Option<&str>)| place(plans, kind, *system).map(|i| plans[i].method);
-    let methods: Vec<Method> = objects(scene).iter().filter_map(carried).collect();
-    let mut warnings = Vec::new();
-    if !scene.field.is_empty() && !methods.contains(&Method::Tracers) {
-        warnings.push("no object is moved by a system of tracers, so that nothing follows the fields".into());
-    }
-    if scene.field.is_empty() && methods.contains(&Method::Tracers) {
-        warnings.push("tracers have no [[field]] to follow, and stay where they are; add one".into());
-    }
-    if !methods.contains(&Method::Dynamics) {
-        let on_grids = |m: &Method| matches!(m, Method::Heat | Method::Compressible);
-        let solids = !scene.collider.is_empty() && !methods.contains(&Method::Gas);
-        for (words, given) in [("forces", !scene.force.is_empty()), ("colliders", solids)] {
-            if given {
-                let kind = if methods.contains(&Method::Tracers) {
-                    "tracers"
-                } else if methods.iter().all(on_grids) {
-                    "on grids"
-                } else {
-                    "in a vicsek system"
-                };
-                warnings.push(format!("all objects are {kind}, which feel no {words}"));
-            }
-        }
-    }
-    for (i, force) in scene.force.iter().enumerate() {
-        let reached = |name: &String| force.on().is_none_or(|on| on.contains(name));
-        let charged = |p: &Particles| p.charge.iter().any(|q| *q != 0.0) && reached(&p.name);
-        let emitted = |e: &Emitter| e.charge != 0.0 && reached(&e.name);
-        let any = scene.particles.iter().any(charged) || scene.emitter.iter().any(emitted);
-        if matches!(force, Words::Magnetic { .. } | Words::Electric { .. } | Words::Electrostatics { .. }) && !any {
-            warnings.push(format!("force[{i}]: nothing in its reach has a charge; give particles a charge"));
-        }
-    }
-    if scene.collider.is_empty() {
-        for gas in scene.gas.iter().filter(|gas| !gas.bodies.is_empty()) {
-            warnings.push(format!(
-                "gas \"{}\".bodies: the sides of the box are no obstacle to balls, and there is no collider; add one of its shape with inside = true",
-                gas.name
-            ));
-        }
-        for emitter in &scene.emitter {
-            if let Some(i) = emitter.kill.iter().position(|rule| matches!(rule, Kill::NearCollider(_))) {
-                let name = &emitter.name;
-                warnings.push(format!("emitter \"{name}\".kill[{i}]: near_collider, but there is no collider; add one, or leave it out"));
-            }
-        }
-        for emitter in &scene.emitter {
-            if matches!(&emitter.from, Source::Particles { at: Event::Bounce, .. }) {
-                let name = &emitter.name;
-                warnings.push(format!("emitter \"{name}\".from.particles.at: there is no collider to bounce off; add one"));
-            }
-        }
-        for (i, _) in scene.force.iter().enumerate().filter(|(_, f)| matches!(f, Words::Flock { avoidance, .. } if *avoidance > 0.0)) {
-            warnings.push(format!("force[{i}].avoidance: there is no collider to shun; add one, or leave it out"));
-        }
-    }
-    if let Some(last) = scene.output.stills.iter().find(|i| **i > scene.time.frames) {
-        warnings.push(format!("output.stills: there is no frame {last}; the last one is {}", scene.time.frames));
-    }
-    warnings
-}
-
 fn stepping(plan: &Plan) -> Stepping {
     match (plan.substeps, plan.step) {
         (Some(n), _) => Stepping::Substeps(n),
@@ -411,7 +346,7 @@ fn act(scene: &Scene, parts: &mut [Parts], issues: &mut Vec<Issue>) {
             let (on, others) = (bodies(&on), others.map(|_| bodies(&other)));
             match reader.law(&path, force) {
                 _ if on.is_empty() => {}
-                Some(law) => parts.forces.push((law, on)),
+                Some(law) => parts.forces.push((path.clone(), law, on)),
                 None => parts.between.push((force.clone(), on, others)),
             }
         }

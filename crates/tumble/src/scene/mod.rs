@@ -5,6 +5,7 @@ mod checks;
 mod coupling;
 mod cures;
 mod gas;
+mod hints;
 mod laws;
 mod memory;
 mod simulation;

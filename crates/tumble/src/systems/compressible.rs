@@ -377,6 +377,7 @@ impl Compressible {
                 step: h,
                 stable_step: gas.limit(),
                 energy_ratio,
+                cause: None,
             });
             Some(if energy_ratio.is_some() { StepError::Exploded(about) } else { StepError::NotFinite(about) })
         })

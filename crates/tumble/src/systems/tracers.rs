@@ -282,6 +282,7 @@ impl System for Tracers {
             step: 0.0,
             stable_step: f64::INFINITY,
             energy_ratio: None,
+            cause: None,
         });
         Some(StepError::NotFinite(breakdown))
     }

@@ -1,10 +1,12 @@
 //! What a system tells about itself: columns, topology, ledger, and whether it has broken down.
 
 use super::Dynamics;
+use super::laws::Acting;
+use crate::forces::Group;
 use crate::integrators::stability::limits;
 use crate::math::parallel::{fold, max, sum};
 use crate::math::simd::{Kernel, Width, dispatch};
-use crate::math::{Quat, Real, Row, Vec3, is_finite, xyz64};
+use crate::math::{Quat, Real, Row, Vec3, ZERO, is_finite, xyz64};
 use crate::system::System;
 use tumble_interface::engine::{BLOW_UP, Ledger};
 use tumble_interface::error::Breakdown;
@@ -313,8 +315,22 @@ impl Dynamics {
             step: 0.0,
             stable_step: 0.0,
             energy_ratio,
+            cause: self.culprit(i),
         });
         Err(if energy_ratio.is_none() { StepError::NotFinite(breakdown) } else { StepError::Exploded(breakdown) })
+    }
+
+    /// The force that is not finite on a row as it was before the sub-step that broke it.
+    fn culprit(&self, i: usize) -> Option<String> {
+        let (t, x, v) = self.witness.as_ref()?;
+        let (x, v) = (x.get(i..=i)?, v.get(i..=i)?);
+        let is_bad = |acting: &&Acting| {
+            let mut force = [ZERO];
+            acting.law.add(*t, Group::new(&self.laws.masses, i, x, v), &mut force);
+            acting.ranges.iter().any(|range| range.contains(&i)) && !is_finite(force[0])
+        };
+        let name = &self.laws.forces.iter().find(is_bad)?.name;
+        Some(format!("{name} gives no finite number at {:?} m", <[f64; 3]>::from(xyz64(x[0]))))
     }
 
     /// Object and index within it of a row.

@@ -98,7 +98,7 @@ pub struct Parts {
     objects: Vec<Draft>,
     emitters: Vec<Emitter>,
     /// Forces on each mass by itself, with the objects that they act on, counted from the first that was begun.
-    pub forces: Vec<(Box<dyn Force>, Vec<usize>)>,
+    pub forces: Vec<(String, Box<dyn Force>, Vec<usize>)>,
     /// Forces between masses of some objects, and the other objects that the words name.
     pub between: Vec<(Words, Vec<usize>, Option<Vec<usize>>)>,
 }
@@ -412,9 +412,9 @@ impl Parts {
             batch.linearize(&state.x, crate::elements::Weights { stiffness: 1.0, damping: 0.0, hessian: Hessian::Definite });
             batch.add_diagonal(&state.x, &mut stiffness);
         }
-        let acting = |(law, on)| {
+        let acting = |(name, law, on)| {
             let objects = placed(on);
-            Acting { law, ranges: rows_of(&objects), objects }
+            Acting { name, law, ranges: rows_of(&objects), objects }
         };
         let forces = self.forces.into_iter().map(acting).collect();
         let laws = super::laws::Laws {
@@ -451,6 +451,7 @@ impl Parts {
             broken: 0,
             pushed: false,
             watched: false,
+            witness: None,
             between: pairs,
             pool: Pool::new(points, self.emitters),
         };

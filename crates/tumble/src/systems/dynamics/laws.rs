@@ -17,6 +17,8 @@ use tumble_interface::scene::Solver;
 
 /// A force on each mass by itself, and on whose.
 pub struct Acting {
+    /// Where the scene says it.
+    pub name: String,
     /// The force.
     pub law: Box<dyn Force>,
     /// Objects that it acts on.

@@ -77,6 +77,8 @@ pub struct Dynamics {
     /// Whether other systems push masses of this one.
     pushed: bool,
     watched: bool,
+    /// Time and state before the sub-step, while watched.
+    witness: Option<(f64, Vec<Row>, Vec<Row>)>,
 }
 
 /// A damped spring to a port of another system, as impulses at the start of each sub-step.
@@ -382,6 +384,7 @@ impl Dynamics {
             while done < dt && go_on() {
                 self.remember();
                 let (begun, left) = (done, dt - done);
+                self.witness(t + done);
                 let y = (&mut self.state.x[..], &mut self.state.v[..]);
                 let times = (t + done, left, dt);
                 let taken = adaptive_step(
@@ -432,6 +435,7 @@ impl Dynamics {
                 break;
             }
             let time = t + f64::from(k) * h;
+            self.witness(time);
             self.pull_tethers(h, exchange);
             self.substep(time, h, &mut report).map_err(|e| e.in_system(&self.name))?;
             self.deliver(&mut unborn, if k + 1 == substeps { end } else { time + h }, h, end)?;
@@ -439,6 +443,11 @@ impl Dynamics {
         }
         self.bury(end, dt, h)?;
         Ok(report)
+    }
+
+    /// While watched: keeps the state at time t.
+    fn witness(&mut self, t: f64) {
+        self.witness = self.watched.then(|| (t, self.state.x.clone(), self.state.v.clone()));
     }
 
     /// While watched: the first breakdown as an error.

@@ -179,6 +179,7 @@ impl Fluid {
                 step: 0.0,
                 stable_step: f64::INFINITY,
                 energy_ratio: None,
+                cause: None,
             })));
         }
         None

@@ -93,6 +93,7 @@ impl Heat {
                 step: h,
                 stable_step: body.limit(),
                 energy_ratio: None,
+                cause: None,
             })))
         })
     }

@@ -1,0 +1,104 @@
+//! What a scene says in vain, and what it hardly means.
+
+use super::checks::{objects, place};
+use tumble_interface::check::plain;
+use tumble_interface::scene::{
+    Animated, AnimatedVector, Component, Emitter, Event, Force as Words, Kill, Method, Particles, Scene, Shape, Source, System as Plan,
+};
+
+/// What the scene says and nothing heeds.
+pub fn unused(scene: &Scene, plans: &[Plan]) -> Vec<String> {
+    let carried = |(kind, _, system): &(&str, &str, Option<&str>)| place(plans, kind, *system).map(|i| plans[i].method);
+    let methods: Vec<Method> = objects(scene).iter().filter_map(carried).collect();
+    let mut warnings = Vec::new();
+    if !scene.field.is_empty() && !methods.contains(&Method::Tracers) {
+        warnings.push("no object is moved by a system of tracers, so that nothing follows the fields".into());
+    }
+    if scene.field.is_empty() && methods.contains(&Method::Tracers) {
+        warnings.push("tracers have no [[field]] to follow, and stay where they are; add one".into());
+    }
+    if !methods.contains(&Method::Dynamics) {
+        let on_grids = |m: &Method| matches!(m, Method::Heat | Method::Compressible);
+        let solids = !scene.collider.is_empty() && !methods.contains(&Method::Gas);
+        for (words, given) in [("forces", !scene.force.is_empty()), ("colliders", solids)] {
+            if given {
+                let kind = if methods.contains(&Method::Tracers) {
+                    "tracers"
+                } else if methods.iter().all(on_grids) {
+                    "on grids"
+                } else {
+                    "in a vicsek system"
+                };
+                warnings.push(format!("all objects are {kind}, which feel no {words}"));
+            }
+        }
+    }
+    for (i, force) in scene.force.iter().enumerate() {
+        let reached = |name: &String| force.on().is_none_or(|on| on.contains(name));
+        let charged = |p: &Particles| p.charge.iter().any(|q| *q != 0.0) && reached(&p.name);
+        let emitted = |e: &Emitter| e.charge != 0.0 && reached(&e.name);
+        let any = scene.particles.iter().any(charged) || scene.emitter.iter().any(emitted);
+        if matches!(force, Words::Magnetic { .. } | Words::Electric { .. } | Words::Electrostatics { .. }) && !any {
+            warnings.push(format!("force[{i}]: nothing in its reach has a charge; give particles a charge"));
+        }
+    }
+    if scene.collider.is_empty() {
+        for gas in scene.gas.iter().filter(|gas| !gas.bodies.is_empty()) {
+            warnings.push(format!(
+                "gas \"{}\".bodies: the sides of the box are no obstacle to balls, and there is no collider; add one of its shape with inside = true",
+                gas.name
+            ));
+        }
+        for emitter in &scene.emitter {
+            if let Some(i) = emitter.kill.iter().position(|rule| matches!(rule, Kill::NearCollider(_))) {
+                let name = &emitter.name;
+                warnings.push(format!("emitter \"{name}\".kill[{i}]: near_collider, but there is no collider; add one, or leave it out"));
+            }
+        }
+        for emitter in &scene.emitter {
+            if matches!(&emitter.from, Source::Particles { at: Event::Bounce, .. }) {
+                let name = &emitter.name;
+                warnings.push(format!("emitter \"{name}\".from.particles.at: there is no collider to bounce off; add one"));
+            }
+        }
+        for (i, _) in scene.force.iter().enumerate().filter(|(_, f)| matches!(f, Words::Flock { avoidance, .. } if *avoidance > 0.0)) {
+            warnings.push(format!("force[{i}].avoidance: there is no collider to shun; add one, or leave it out"));
+        }
+    }
+    scene.emitter.iter().for_each(|emitter| doubts(scene, emitter, &mut warnings));
+    if let Some(last) = scene.output.stills.iter().find(|i| **i > scene.time.frames) {
+        warnings.push(format!("output.stills: there is no frame {last}; the last one is {}", scene.time.frames));
+    }
+    warnings
+}
+
+/// Whether an emitter has particles at all, and whether regions that kill them are thick enough for their speed.
+fn doubts(scene: &Scene, emitter: &Emitter, warnings: &mut Vec<String>) {
+    let (name, end) = (&emitter.name, f64::from(scene.time.frames) / scene.time.fps);
+    let quiet = matches!(emitter.rate, Animated::Value(rate) if rate <= 0.0) || emitter.start >= emitter.end.unwrap_or(end).min(end);
+    if quiet && !matches!(emitter.from, Source::Particles { .. }) && emitter.burst.iter().all(|b| b.time >= end || b.count == 0) {
+        warnings.push(format!("emitter \"{name}\": nothing is born in the {} s of the scene; see its rate, start and burst", plain(end)));
+    }
+    let given = match &emitter.velocity {
+        AnimatedVector::Components(all) => all.iter().map(|c| if let Component::Value(v) = c { v * v } else { 0.0 }).sum::<f64>().sqrt(),
+        _ => 0.0,
+    };
+    let speed = given.max(emitter.speed.abs());
+    let way = speed / (scene.time.fps * f64::from(scene.time.exchanges));
+    for (i, rule) in emitter.kill.iter().enumerate() {
+        let thick = match rule {
+            Kill::Inside(Shape::Sphere { radius, .. } | Shape::Capsule { radius, .. }) => 2.0 * radius,
+            Kill::Inside(Shape::Box { size, .. }) => size.iter().copied().fold(f64::INFINITY, f64::min),
+            _ => continue,
+        };
+        if way > thick {
+            let enough = (f64::from(scene.time.exchanges) * way / thick).ceil();
+            warnings.push(format!(
+                "emitter \"{name}\".kill[{i}].inside: at {} m/s particles may pass {} m unseen, for rules are looked at when an exchange \
+                 interval ends; set time.exchanges to {enough} or more",
+                plain(speed),
+                plain(thick)
+            ));
+        }
+    }
+}
