@@ -89,7 +89,7 @@ fn wrong_types_say_what_was_expected() {
         "version = 2\ntime = 3\n[[sheet]]\nname = 'a'\nsize = 'big'\nresolution = [4.5, 4]\npin = [3]\n[[rope]]\nname = 'r'\nfrom = [0, 0]\nto = [0, 0, 1]\nsegments = 4\n",
     );
     let expected = [
-        "line 1: version: 2, expected >= 1 and <= 1",
+        "line 1: version: 2, expected 1",
         "line 2: time: 3, expected a table",
         "line 5: sheet \"a\".size: \"big\", expected a list of 2, each a number > 0 m",
         "line 6: sheet \"a\".resolution[0]: 4.5, expected a whole number >= 2 and <= 1e9",
