@@ -229,5 +229,5 @@ export type Answer = { id: number } &
     | { type: "failed"; failure: Failure }
   );
 
-/** Without an id: the worker is ready, with its version. */
-export type Notice = { type: "ready"; version: string };
+/** Without an id: the worker is ready, with its version; or it will never be. */
+export type Notice = { type: "ready"; version: string } | { type: "broken"; message: string };
