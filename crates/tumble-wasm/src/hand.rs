@@ -25,7 +25,13 @@ pub struct Held {
 
 impl Held {
     /// A mass and those around it. The name of their system comes with them.
-    pub fn new(loaded: &mut Loaded, object: &str, row: usize, target: [f64; 3], stiffness: Option<f64>) -> Result<(String, Self), SceneError> {
+    pub fn new(
+        loaded: &mut Loaded,
+        object: &str,
+        row: usize,
+        target: [f64; 3],
+        stiffness: Option<f64>,
+    ) -> Result<(String, Self), SceneError> {
         let wrong = |message: &str| SceneError::one(object, message);
         let objects = loaded.world.objects();
         let system = objects.iter().find(|(_, name, _)| name == object).and_then(|(_, _, system)| system.clone());
