@@ -22,7 +22,6 @@ export interface PlotOptions {
   /** Read to those who do not see it. */
   label: string;
   x?: string;
-  y?: string;
   log?: boolean;
   logX?: boolean;
   /** Curves in the plane: x and y of the same point, both scaled alike. */
@@ -32,6 +31,14 @@ export interface PlotOptions {
   /** A line across at this x. */
   mark?: () => number | null;
 }
+
+/** Powers of ten alone. */
+function power(v: number): string {
+  const e = Math.log10(v);
+  return Math.abs(e - Math.round(e)) < 1e-6 ? `10${raised(Math.round(e))}` : "";
+}
+
+const raised = (n: number): string => [...String(n)].map((c) => (c === "-" ? "⁻" : "⁰¹²³⁴⁵⁶⁷⁸⁹"[Number(c)])).join("");
 
 export class Plot {
   readonly element: HTMLElement;
@@ -63,19 +70,17 @@ export class Plot {
     const width = this.element.clientWidth;
     if (!width) return;
     this.plot?.destroy();
-    const { x, y, log, logX, mark, legend } = this.options;
-    const axis = (label: string | undefined, side: number): uPlot.Axis => ({
+    const { x, log, logX, mark, legend } = this.options;
+    const axis = (side: number): uPlot.Axis => ({
       stroke: css("--muted"),
       grid: { stroke: css("--line"), width: 1 },
       ticks: { show: false },
       font: "11px system-ui, sans-serif",
       size: side === 3 ? 58 : 26,
       gap: 4,
-      values: (_u, values) => values.map((v) => (v === null ? "" : show(v, 3))),
-      label: undefined,
+      values: (_u, values) => values.map((v) => (v === null ? "" : (side === 3 ? log : logX) ? power(v) : show(v, 3))),
       side,
-      space: side === 3 ? 28 : 60,
-      ...(label && side === 3 ? {} : {}),
+      space: side === 3 ? 24 : 60,
     });
     this.plot = new uPlot(
       {
@@ -86,9 +91,9 @@ export class Plot {
         padding: [8, 8, 0, 0],
         scales: {
           x: { time: false, distr: logX ? 3 : 1 },
-          y: { distr: log ? 3 : 1, range: log ? (_u, low, high) => [Math.max(low, 1e-30), Math.max(high, low * 10, 1e-29)] : undefined },
+          y: { distr: log ? 3 : 1, range: log ? (_u, low, high) => (low > 0 && high > 0 ? [low / 1.2, Math.max(high * 1.2, low * 10)] : [0.1, 10]) : undefined },
         },
-        axes: [axis(x, 2), axis(y, 3)],
+        axes: [axis(2), axis(3)],
         series: [
           { label: x ?? "" },
           ...this.curves.map((c): uPlot.Series => ({ label: c.label, stroke: c.color, width: c.width ?? 1.75, dash: c.dash, points: { show: false }, value: (_u, v) => show(v) })),

@@ -43,6 +43,8 @@ export class Session {
   /** Milliseconds that a frame takes the engine, of late. */
   cost = 0;
   wanted: () => string[] | undefined = () => undefined;
+  /** Every frame is asked for by itself, because ways behind particles are drawn through them. */
+  each = false;
   private frames = new Map<number, Frame>();
   private bytes = 0;
   private last = 0;
@@ -136,6 +138,11 @@ export class Session {
       for (let i = 1; i < indices.length - 60 && this.bytes > 0.75 * MEMORY; i += 2) this.drop(indices[i]);
       for (let i = 2; i < indices.length - 30 && this.bytes > MEMORY; i += 2) this.drop(indices[i]);
     }
+  }
+
+  /** Keeps only so many frames, the last ones. */
+  trim(count: number): void {
+    for (const old of [...this.frames.keys()]) if (old < this.last - count) this.drop(old);
   }
 
   private drop(index: number): void {
@@ -240,8 +247,7 @@ export class Session {
     return this.queue(async () => {
       if (this.closed || (playing && !this.playing)) return;
       if (age !== this.age) return;
-      // Each frame by itself where ways behind particles are drawn, and frames are cheap to keep.
-      const frame = await this.engine.step({ frames, budget: 40, columns: this.wanted() }, this.world);
+      const frame = await this.engine.step({ frames: this.each ? 1 : frames, budget: 40, columns: this.wanted() }, this.world);
       const taken = Math.max(frame.ledgers.length, 1);
       this.cost = this.cost ? 0.8 * this.cost + (0.2 * frame.ms) / taken : frame.ms / taken;
       this.take(frame);

@@ -16,8 +16,9 @@ export interface Lab {
 export async function lab(): Promise<Lab> {
   const executablePath = PLACES.find((p) => p && existsSync(p));
   if (!executablePath) throw new Error("no Chromium here: apt-get install chromium, or set CHROMIUM to one");
-  if (!existsSync("dist/index.html")) throw new Error("nothing is built: make web");
-  const server: PreviewServer = await preview({ preview: { port: 0, host: "127.0.0.1" }, logLevel: "error" });
+  const outDir = process.env.DIST ?? "dist";
+  if (!existsSync(`${outDir}/index.html`)) throw new Error("nothing is built: make web");
+  const server: PreviewServer = await preview({ build: { outDir }, preview: { port: 0, host: "127.0.0.1" }, logLevel: "error" });
   const address = server.resolvedUrls!.local[0];
   const browser = await chromium.launch({ executablePath, headless: true, args: ["--no-sandbox", "--use-gl=angle", "--use-angle=swiftshader", "--enable-unsafe-swiftshader"] });
   return {

@@ -1,7 +1,7 @@
 /** One scene: picture, playback, energy, its values, its text, its theory. */
 import { check, choice, h, iconButton, saveAs, say, setIcon, show, svg, ICONS, type Page } from "../dom";
 import { EngineError } from "../engine/client";
-import type { Cure, Failure, SceneInfo, Value, Vector } from "../engine/protocol";
+import type { Cure, Failure, SceneInfo, Value } from "../engine/protocol";
 import { acceptFiles, opened } from "../drop";
 import { npz } from "../npz";
 import { Panel } from "../panel";
@@ -11,8 +11,9 @@ import { LONGEST, pack, unpack, type Shared } from "../share";
 import { sceneOf, titleOf } from "../scenes";
 import { cards, topics } from "../theory";
 import { keys, transport } from "../transport";
-import { gradient } from "../view/colors";
-import { legendMap, Stage } from "../view/stage";
+import { legendBox } from "../legend";
+import { pointers } from "../pointer";
+import { Stage } from "../view/stage";
 import type { Editor } from "../editor";
 
 /** Columns of grids that can be shown, and how they are called. */
@@ -51,9 +52,9 @@ export const page: Page = async (main, rest) => {
 
   const session = new Session(0);
   const canvas = h("canvas", { "aria-hidden": "true" });
-  const legendBox = h("div", { class: "legend", hidden: true });
+  const { element: legendElement, update: tellLegend } = legendBox(() => stage);
   const wait = h("div", { class: "wait" }, "Loading the engine …");
-  const stageBox = h("div", { class: "stage", tabindex: 0, role: "group", "aria-label": "Picture of the scene. Space plays, arrows turn the view, plus and minus zoom, 0 brings the view back." }, canvas, legendBox, wait);
+  const stageBox = h("div", { class: "stage", tabindex: 0, role: "group", "aria-label": "Picture of the scene. Space plays, arrows turn the view, plus and minus zoom, 0 brings the view back." }, canvas, legendElement, wait);
   const title = h("h1", {}, titleOf(start.toml) || start.name);
   const alert = h("div", { class: "alert", role: "alert", hidden: true });
   const lookBar = h("div", { class: "look", role: "group", "aria-label": "What is shown" });
@@ -157,21 +158,11 @@ export const page: Page = async (main, rest) => {
     const now = books[session.shown?.index ?? books.length - 1];
     if (now) energyKey.set([show(now.kinetic, 3), show(now.elastic, 3), show(now.external - external0, 3), show(now.energy - external0, 3)]);
   };
-  const tellLegend = () => {
-    const l = stage.legend;
-    legendBox.hidden = !l;
-    if (!l) return;
-    const unit = l.unit && l.unit !== "1" ? ` ${l.unit}` : "";
-    legendBox.replaceChildren(
-      h("span", { class: "legend-name" }, `${l.name}${unit ? `, ${l.unit}` : ""}`),
-      h("i", { style: `background:${gradient(legendMap(l.name))}` }),
-      h("span", { class: "legend-ends" }, h("span", {}, show(l.low, 3)), h("span", {}, show(l.high, 3))),
-    );
-  };
   let opening = true;
   session.on("loaded", (info) => {
     wait.hidden = true;
     stage.open(info, session.frame, !opening);
+    session.each = stage.trails;
     opening = false;
     drawLook(info);
     panel?.open(info, session.toml, session.overrides);
@@ -195,9 +186,6 @@ export const page: Page = async (main, rest) => {
       // Only a new frame has no trouble with what has gone wrong before.
       if (!alert.dataset.keep) alert.hidden = true;
     } else tellHash();
-  });
-  session.on("branched", (from) => {
-    void from;
   });
   session.on("failed", (failure) => complain(failure));
 
@@ -402,54 +390,7 @@ export const page: Page = async (main, rest) => {
     lookBar.replaceChildren(...parts);
   };
 
-  // The pointer pulls masses and stirs gases.
-  const pointers = new Map<number, { held?: { point: import("three").Vector3; object: string; row: number }; last?: import("three").Vector3; time: number }>();
-  let pulling = false;
-  canvas.addEventListener("pointerdown", (event) => {
-    if (event.button !== 0) return;
-    const gas = stage.flat ? stage.gas : null;
-    const near = gas ? null : stage.nearest(event, event.pointerType === "touch" ? 34 : 18);
-    if (!near && !gas) return;
-    event.stopPropagation();
-    canvas.setPointerCapture(event.pointerId);
-    stage.turning = false;
-    const at = stage.under(event, near?.point) ?? undefined;
-    pointers.set(event.pointerId, { held: near ? { point: near.point, object: near.object, row: near.row } : undefined, last: at, time: performance.now() });
-    void session.branch();
-    if (!session.playing) session.play();
-  }, { capture: true });
-  canvas.addEventListener("pointermove", (event) => {
-    const own = pointers.get(event.pointerId);
-    if (!own) return;
-    const at = stage.under(event, own.held?.point);
-    if (!at) return;
-    if (own.held) {
-      if (pulling) return;
-      pulling = true;
-      void session.grab(own.held.object, own.held.row, at.toArray() as Vector).catch(() => {}).finally(() => (pulling = false));
-      const now = session.shown?.columns[own.held.object]?.position?.data;
-      if (now) stage.spring(own.held.point.clone().set(now[3 * own.held.row], now[3 * own.held.row + 1], now[3 * own.held.row + 2]), at);
-    } else if (own.last) {
-      const gas = stage.gas;
-      const seconds = Math.max((performance.now() - own.time) / 1000, 0.004);
-      if (!gas || pulling) return;
-      const push = at.clone().sub(own.last).divideScalar(seconds);
-      own.last = at;
-      own.time = performance.now();
-      pulling = true;
-      void session.stir(gas.name, at.toArray() as Vector, push.toArray() as Vector, stage.width / 30).catch(() => {}).finally(() => (pulling = false));
-    }
-  });
-  const letGo = (event: PointerEvent) => {
-    const own = pointers.get(event.pointerId);
-    if (!own) return;
-    pointers.delete(event.pointerId);
-    stage.spring();
-    stage.turning = true;
-    if (own.held) void session.release().catch(() => {});
-  };
-  canvas.addEventListener("pointerup", letGo);
-  canvas.addEventListener("pointercancel", letGo);
+  const offPointers = pointers(canvas, stage, session);
 
   // What leaves the page.
   const share = async () => {
@@ -541,6 +482,7 @@ export const page: Page = async (main, rest) => {
     removeEventListener("dragover", drag);
     removeEventListener("drop", drop);
     offKeys();
+    offPointers();
     if (recorder) recorder.stop();
     energy.close();
     editor?.close();

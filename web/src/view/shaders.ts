@@ -138,7 +138,10 @@ export const PLANE = {
         ivec2 k = ivec2(floor(q));
         vec2 t = q - floor(q);
         value = mix(mix(cell(k), cell(k + ivec2(1, 0)), t.x), mix(cell(k + ivec2(0, 1)), cell(k + ivec2(1, 1)), t.x), t.y);
+        // Beside a hole the cell itself.
+        if (isnan(value)) value = cell(ivec2(floor(p)));
       } else value = cell(ivec2(floor(p)));
+      if (isnan(value)) discard;
       gl_FragColor = paint(value);
       if (lines) {
         vec2 px = fwidth(p);

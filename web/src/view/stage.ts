@@ -155,6 +155,11 @@ export class Stage {
     return thing?.grid ? { name: thing.name, grid: thing.grid } : null;
   }
 
+  /** Whether ways behind particles are drawn. */
+  get trails(): boolean {
+    return this.things.some((t) => t.trail > 0);
+  }
+
   /** Columns that the look asks for beside those of the scene. */
   get wanted(): string[] {
     const names = new Set<string>(this.info?.columns ?? []);
@@ -207,7 +212,7 @@ export class Stage {
         thing.body = new Pieces(0, { thinnest: 1, lit: false });
         thing.body.pairs(topology.position.data, sharp(topology.position.data, topology.triangles.data), color);
       } else if (kind === "points") {
-        thing.body = new Points(this.night);
+        thing.body = new Points(this.night, countOf(entry) < 200 ? 3.5 : 1.5);
         if (thing.trail > 0) this.add((thing.way = new Pieces(0.3 * radius, { lit: false, glow: this.night, thinnest: 0.8 })));
       } else if (kind === "curve") {
         thing.body = new Pieces(radius, { thinnest: 1.5 });
@@ -216,6 +221,10 @@ export class Stage {
       }
       if (thing.body) this.add(thing.body);
       if (topology.links?.data.length && kind !== "curve") this.add((thing.links = new Pieces(kind === "points" ? 0.25 * radius : 0, { thinnest: kind === "points" ? 1.2 : 0.7, lit: kind === "points" })));
+      if (kind === "plane" && grid) {
+        this.add((thing.way = new Pieces(0, { lit: false, thinnest: 0.6 })));
+        outline(thing.way, grid);
+      }
       if (kind === "plane") this.add((thing.arrows = new Pieces(0, { lit: false, thinnest: 1.1, front: true })));
       this.things.push(thing);
     }
@@ -800,6 +809,12 @@ export class Stage {
   }
 }
 
+/** How many masses an object of particles has, about. */
+function countOf(entry: Entry): number {
+  if (Array.isArray(entry.position)) return entry.position.length;
+  return Number(entry.cloud?.count ?? entry.stars ?? 1e6);
+}
+
 function planeOf(shape: unknown): [THREE.Vector3, THREE.Vector3] | undefined {
   const s = (shape ?? {}) as Entry;
   if ("floor" in s) return [new THREE.Vector3(0, 0, Number(s.floor?.height ?? 0)), new THREE.Vector3(0, 0, 1)];
@@ -819,6 +834,18 @@ function carry(columns: Record<string, Column>, point: THREE.Vector3, normal: TH
   const q = new THREE.Quaternion(...([...columns.turn.data] as [number, number, number, number]));
   point.applyQuaternion(q).add(new THREE.Vector3(...([...(columns.translation?.data ?? [0, 0, 0])] as Vector)));
   normal.applyQuaternion(q);
+}
+
+/** A line around a grid in a plane. */
+function outline(line: Pieces, grid: Grid): void {
+  const [a, b] = [0, 1, 2].filter((axis) => axis !== grid.flat);
+  const corners = [[0, 0], [1, 0], [1, 1], [0, 1]].flatMap(([u, v]) => {
+    const p = grid.origin.map((o, axis) => o + 0.5 * grid.cells[axis] * grid.spacing);
+    p[a] = grid.origin[a] + u * grid.cells[a] * grid.spacing;
+    p[b] = grid.origin[b] + v * grid.cells[b] * grid.spacing;
+    return p;
+  });
+  line.pairs(Float32Array.from(corners), Uint32Array.from([0, 1, 1, 2, 2, 3, 3, 0]), [0.35, 0.37, 0.4]);
 }
 
 /** Pairs of vertices along sharp edges of a mesh; of a round one all. */
