@@ -89,6 +89,11 @@ pub struct Hand {
 }
 
 impl Hand {
+    /// Whether any system has its force.
+    pub fn is_known(&self) -> bool {
+        !self.known.is_empty()
+    }
+
     /// Moves the target if this mass is held already.
     pub fn drag(&mut self, object: &str, row: usize, target: [f64; 3]) -> bool {
         self.known.iter().any(|(_, shared)| {

@@ -145,8 +145,13 @@ impl World {
         self.loaded.world.save(&[])
     }
 
-    /// Goes to a state of this scene.
+    /// Goes to a state of this scene, where nothing is held.
     pub fn restore(&mut self, bytes: &[u8]) -> Answer<()> {
+        if self.hand.is_known() {
+            // A force once added stays, and masses that feel one are stepped in another order: a world without it is made.
+            self.loaded = self.loaded.again().map_err(thrown)?;
+            self.hand = Hand::default();
+        }
         self.loaded.world.restore(bytes).map_err(|e| self.loaded.wrong(e))
     }
 

@@ -30,9 +30,9 @@ pub struct Loaded {
 /// Meshes with the hash of their files.
 type Files = Arc<HashMap<String, (Mesh, String)>>;
 
-/// The tree of a scene with its overrides.
-pub fn tree(toml: &str, overrides: &[String]) -> Result<Node, SceneError> {
-    let mut node = Node::from_toml(toml)?;
+/// The tree of a scene, in TOML or JSON, with its overrides.
+pub fn tree(text: &str, overrides: &[String]) -> Result<Node, SceneError> {
+    let mut node = if text.trim_start().starts_with('{') { Node::from_json(text)? } else { Node::from_toml(text)? };
     overrides.iter().try_for_each(|assignment| node.set_text(assignment))?;
     Ok(node)
 }
@@ -62,6 +62,11 @@ impl Loaded {
         let mut node = self.node.clone();
         node.set(path, value)?;
         Self::build(node, self.files.clone())
+    }
+
+    /// The same at its start.
+    pub fn again(&self) -> Result<Self, Failure> {
+        Self::build(self.node.clone(), self.files.clone())
     }
 
     fn build(node: Node, files: Files) -> Result<Self, Failure> {
