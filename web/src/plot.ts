@@ -32,6 +32,13 @@ export interface PlotOptions {
   mark?: () => number | null;
 }
 
+/** Powers of ten, eight at most. */
+function decades(low: number, high: number): number[] {
+  const [a, b] = [Math.ceil(Math.log10(low) - 1e-9), Math.floor(Math.log10(high) + 1e-9)];
+  const stride = Math.max(1, Math.ceil((b - a + 1) / 8));
+  return Array.from({ length: Math.max(0, Math.floor((b - a) / stride) + 1) }, (_, i) => 10 ** (a + i * stride));
+}
+
 /** Powers of ten alone. */
 function power(v: number): string {
   const e = Math.log10(v);
@@ -80,6 +87,7 @@ export class Plot {
       gap: 4,
       values: (_u, values) => values.map((v) => (v === null ? "" : (side === 3 ? log : logX) ? power(v) : show(v, 3))),
       side,
+      splits: (side === 3 ? log : logX) ? (_u, _k, low, high) => decades(low, high) : undefined,
       space: side === 3 ? 24 : 60,
     });
     this.plot = new uPlot(

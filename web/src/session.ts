@@ -275,9 +275,14 @@ export class Session {
   /** To a frame, stepping as far as needed. Throws `EngineError`. */
   async goto(index: number, progress: (index: number) => void = () => {}): Promise<void> {
     this.pause();
-    while (this.last < index && !this.closed) {
-      await this.forward(Math.min(index - this.last, 8), false);
-      progress(this.last);
+    try {
+      while (this.last < index && !this.closed) {
+        await this.forward(Math.min(index - this.last, 8), false);
+        progress(this.last);
+      }
+    } catch (error) {
+      this.fail(error);
+      throw error;
     }
     this.scrub(index);
   }

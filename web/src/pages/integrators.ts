@@ -44,9 +44,10 @@ const SYSTEMS: Record<string, System> = {
   spring: {
     name: "Spring", about: "One mass on a spring, one swing a second, no damping. Its energy should stay what it is, its phase should be a circle.",
     field: false, omega: W, steps: [0.002, 0.5], end: 20, object: "spring", zero: 0, axes: ["extension [m]", "velocity/ω [m]"],
-    toml: (s, h) => `${head("A mass on a spring", h, dynamics(s))}[world]\ngravity = [0, 0, 0]\n[[particles]]\nname = "spring"\nposition = [[0, 0, 0], [1.5, 0, 0]]\nmass = [1]\nradius = 0.08\npin = ["vertex 0"]\nspring = [{ between = [0, 1], stiffness = ${W * W}, rest_length = 1 }]\n[output]\ncolumns = ["position", "velocity"]\n`,
-    phase: (x, v) => [x[3] - 1, (v?.[3] ?? 0) / W],
-    exact: (t) => [1 + 0.5 * Math.cos(W * t), 0, 0],
+    // A spring without a rest length is linear however far it goes.
+    toml: (s, h) => `${head("A mass on a spring", h, dynamics(s))}[world]\ngravity = [0, 0, 0]\n[[particles]]\nname = "spring"\nposition = [[0, 0, 0], [0.5, 0, 0]]\nmass = [1]\nradius = 0.08\npin = ["vertex 0"]\nspring = [{ between = [0, 1], stiffness = ${W * W}, rest_length = 0 }]\n[output]\ncolumns = ["position", "velocity"]\n`,
+    phase: (x, v) => [x[3], (v?.[3] ?? 0) / W],
+    exact: (t) => [0.5 * Math.cos(W * t), 0, 0],
     theory: { page: "oscillator", tags: ["oscillator.1", "oscillator.2"] },
   },
   rusty: {
@@ -366,7 +367,8 @@ export const page: Page = async (main) => {
       if (s.exact) {
         const e = s.exact(frame.time);
         const k = x.length - 3;
-        run.error[frame.index] = Math.max(Math.hypot(x[k] - e[0], x[k + 1] - e[1], x[k + 2] - e[2]), 1e-17);
+        const off = Math.hypot(x[k] - e[0], x[k + 1] - e[1], x[k + 2] - e[2]);
+        run.error[frame.index] = off > 1e-13 ? off : null;
       }
     }
   };
@@ -429,7 +431,7 @@ export const page: Page = async (main) => {
     const [c, w, hgt] = fit(run.canvas);
     if (!x || !w) return;
     const up = system === "pendulum" || system === "sheet" ? 2 : 1;
-    const frames: Record<string, [number, number, number]> = { spring: [0.8, 0, 0.95], rusty: [0.8, 0, 0.95], pendulum: [0, -0.45, 1.35], orbit: [-0.5, 0, 1.35], swirl: [0, 0, 1.7], sink: [0, 0, 1.3], sheet: [0, -0.35, 0.95] };
+    const frames: Record<string, [number, number, number]> = { spring: [-0.2, 0, 0.95], rusty: [0.8, 0, 0.95], pendulum: [0, -0.45, 1.35], orbit: [-0.5, 0, 1.35], swirl: [0, 0, 1.7], sink: [0, 0, 1.3], sheet: [0, -0.35, 0.95] };
     const [mx, my, half] = frames[system];
     const scale = Math.min(w, hgt * 1.6) / (2 * half) / (hgt < w ? Math.max(1, (w / hgt) / 1.6) : 1);
     const put = (i: number): [number, number] => {
@@ -457,6 +459,8 @@ export const page: Page = async (main) => {
       c.beginPath();
       if (system === "spring" || system === "rusty") {
         const [a, b] = [put(0), put(1)];
+        // The wall is where there is room for it.
+        if (system === "spring") a[0] = w / 2 + (-1 - mx) * scale;
         c.moveTo(...a);
         for (let i = 1; i < 16; i++) c.lineTo(a[0] + ((b[0] - a[0]) * i) / 16, a[1] + (i % 2 ? 6 : -6));
         c.lineTo(...b);
@@ -471,6 +475,7 @@ export const page: Page = async (main) => {
       const n = x.length / 3;
       for (let i = 0; i < n; i++) {
         const [a, b] = put(i);
+        if (system === "spring" && i === 0) continue;
         c.fillStyle = n > 1 && i === 0 ? ink : color;
         c.beginPath();
         c.arc(a, b, n > 1 && i === 0 ? 4 : 7, 0, 7);
