@@ -50,7 +50,7 @@ export class Editor {
           syntaxHighlighting(style),
           EditorView.lineWrapping,
           look,
-          EditorView.contentAttributes.of({ "aria-label": "Text of the scene, TOML" }),
+          EditorView.contentAttributes.of({ "aria-label": "Text of the scene, TOML", tabindex: "0" }),
           EditorView.updateListener.of((u) => u.docChanged && this.changed()),
           // Tab leaves the editor, as everywhere on the page.
           keymap.of([{ key: "Mod-Enter", run: () => (run(), true) }, ...defaultKeymap, ...historyKeymap]),

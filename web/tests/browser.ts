@@ -3,7 +3,8 @@ import { existsSync } from "node:fs";
 import { chromium, type Browser, type BrowserContextOptions, type Page } from "playwright-core";
 import { preview, type PreviewServer } from "vite";
 
-const PLACES = [process.env.CHROMIUM, "/usr/bin/chromium", "/usr/bin/chromium-browser", "/usr/bin/google-chrome"];
+/** The browser, if there is one. */
+export const CHROMIUM = [process.env.CHROMIUM, "/usr/bin/chromium", "/usr/bin/chromium-browser", "/usr/bin/google-chrome"].find((p) => p && existsSync(p));
 
 export interface Lab {
   address: string;
@@ -14,13 +15,12 @@ export interface Lab {
 }
 
 export async function lab(): Promise<Lab> {
-  const executablePath = PLACES.find((p) => p && existsSync(p));
-  if (!executablePath) throw new Error("no Chromium here: apt-get install chromium, or set CHROMIUM to one");
+  if (!CHROMIUM) throw new Error("no Chromium here: apt-get install chromium, or set CHROMIUM to one");
   const outDir = process.env.DIST ?? "dist";
   if (!existsSync(`${outDir}/index.html`)) throw new Error("nothing is built: make web");
   const server: PreviewServer = await preview({ build: { outDir }, preview: { port: 0, host: "127.0.0.1" }, logLevel: "error" });
   const address = server.resolvedUrls!.local[0];
-  const browser = await chromium.launch({ executablePath, headless: true, args: ["--no-sandbox", "--use-gl=angle", "--use-angle=swiftshader", "--enable-unsafe-swiftshader"] });
+  const browser = await chromium.launch({ executablePath: CHROMIUM, headless: true, args: ["--no-sandbox", "--use-gl=angle", "--use-angle=swiftshader", "--enable-unsafe-swiftshader"] });
   return {
     address,
     browser,

@@ -3,7 +3,7 @@ import { check, choice, h, iconButton, saveAs, show, type Page } from "../dom";
 import { EngineError } from "../engine/client";
 import type { Value, Vector } from "../engine/protocol";
 import { legendBox } from "../legend";
-import { curveColor, Plot } from "../plot";
+import { curveColor, isDark, Plot } from "../plot";
 import { pointers } from "../pointer";
 import { engine, Session } from "../session";
 import { cards } from "../theory";
@@ -74,7 +74,7 @@ lifetime_spread = 0.4
 jitter = 1
 radius = 0.0012
 trail = ${c.trail}
-color = [0.02, 0.04, 0.08]
+color = ${isDark() ? "[0.75, 0.8, 0.85]" : "[0.02, 0.04, 0.08]"}
 
 [[field]]
 kind = "gas"

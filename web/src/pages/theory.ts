@@ -30,7 +30,7 @@ export const page: Page = async (main, rest) => {
   document.title = `${heading(text)} · tumble`;
   const article = h("article", { class: "narrow prose" });
   // Our own pages, bundled; nothing that a scene holds comes here.
-  article.innerHTML = await marked.parse(text);
+  article.innerHTML = await marked.parse(text.replace(/ {3,}(\([a-z]+\.\d+\))$/gm, "   $1"));
   for (const link of article.querySelectorAll("a")) {
     const to = link.getAttribute("href") ?? "";
     const other = /^([a-z]+)\.md(#.*)?$/.exec(to);

@@ -92,7 +92,9 @@ export class Pieces implements Layer {
       vertexShader: PIECES.vertex,
       fragmentShader: PIECES.fragment,
       uniforms: { radius: { value: radius }, thinnest: { value: thinnest }, size: PIXELS, lit: { value: lit ? 1 : 0 }, fade: { value: 1 } },
-      transparent: true,
+      transparent: !lit || glow,
+      // Round edges of solid pieces by coverage: blended ones would hide what lies behind them.
+      alphaToCoverage: lit && !glow,
       depthWrite: !glow && lit,
       depthTest: !front,
       blending: glow ? THREE.AdditiveBlending : THREE.NormalBlending,

@@ -40,7 +40,9 @@ export const PIECES = {
     void main() {
       float beyond = max(abs(at.x) - halfLength, 0.0);
       float d = length(vec2(beyond, at.y)) / width;
-      float edge = 1.0 - smoothstep(1.0 - 1.2 / max(width, 1.2), 1.0, d);
+      if (d > 1.0) discard;
+      // Soft along the sides alone, so that pieces that meet leave no notch.
+      float edge = 1.0 - smoothstep(1.0 - 1.2 / max(width, 1.2), 1.0, abs(at.y) / width);
       float alpha = shade.a * edge * fade;
       if (alpha < 0.02) discard;
       float up = sqrt(max(1.0 - d * d, 0.0));
