@@ -93,8 +93,9 @@ chromium:
 		|| { command -v apt-get >/dev/null && apt-get update -qq && apt-get install -qq -y --no-install-recommends chromium; } \
 		|| echo "no Chromium here, and no apt to install it: the tests of the browser laboratory need one"
 
-test-web: setup web chromium
-	cd web && npm test --silent
+test-web: setup chromium
+	@if command -v npm >/dev/null; then $(MAKE) --no-print-directory web && cd web && npm test --silent; \
+		else echo "no Node here: the browser laboratory is not tested; it needs Node 20.19 or later, with npm"; fi
 
 validate: setup openvdb
 	cargo test --workspace --exclude tumble-python --release --quiet -- --include-ignored --nocapture

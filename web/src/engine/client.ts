@@ -15,6 +15,8 @@ export class EngineError extends Error {
 /** Milliseconds after which a worker that does not answer is taken for dead. */
 const PATIENCE = { load: 30_000, step: 60_000, cures: 60_000, other: 30_000 };
 
+const CLOSED: Failure = { kind: "crash", message: "the engine was closed", issues: [] };
+
 interface Waiting {
   question: Question;
   give: (answer: Answer) => void;
@@ -156,7 +158,7 @@ export class Engine {
     this.closed = true;
     clearTimeout(this.watch);
     this.worker?.terminate();
-    this.failAll({ kind: "crash", message: "the engine was closed", issues: [] });
+    this.failAll(CLOSED);
   }
 
   /** Any question; rejects with an `EngineError`. */
@@ -170,6 +172,7 @@ export class Engine {
   }
 
   private send(question: Question): Promise<Answer> {
+    if (this.closed) return Promise.reject(new EngineError(CLOSED));
     return new Promise((give, fail) => {
       const id = this.next++;
       this.waiting.set(id, { question, give, fail });

@@ -17,6 +17,7 @@ use super::lane::{RSQRT, newton_rsqrt};
 use super::{Lane, Real, Row};
 use pulp::Simd;
 use std::ops::{Add, Div, Mul, Neg, Sub};
+use std::sync::atomic::{AtomicU8, Ordering};
 
 /// Indices into rows 0..rows, checked at construction, so that kernels may load without checks.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
@@ -356,7 +357,7 @@ operations!(splat_f32s, add_f32s, sub_f32s, mul_f32s, div_f32s, neg_f32s, sqrt_f
 operations!(splat_f64s, add_f64s, sub_f64s, mul_f64s, div_f64s, neg_f64s, sqrt_f64s, greater_than_f64s, select_f64s);
 
 /// The instruction sets that a kernel can be run on, for tests that compare their bits.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Level {
     /// One number at a time.
     Scalar,
@@ -391,10 +392,30 @@ impl Level {
     }
 }
 
+/// No kernel of this process uses wider registers than these.
+static WIDEST: AtomicU8 = AtomicU8::new(Level::Avx512 as u8);
+
+/// Holds all kernels of this process to registers no wider than `level`, to compare machines. The bits stay the same.
+pub fn hold_to(level: Level) {
+    WIDEST.store(level as u8, Ordering::Relaxed);
+}
+
+/// The widest registers that kernels use.
+pub fn widest() -> Level {
+    let most = WIDEST.load(Ordering::Relaxed);
+    Level::available().into_iter().rfind(|level| *level as u8 <= most).unwrap_or(Level::Scalar)
+}
+
 /// Runs a kernel on the widest registers of this machine.
 #[inline]
 pub fn dispatch<K: Kernel>(kernel: K) -> K::Output {
     dispatch_at(Level::Avx512, kernel)
+}
+
+/// The level that kernels are held to.
+#[cfg(target_arch = "x86_64")]
+fn held(most: u8) -> Level {
+    [Level::Scalar, Level::Narrow, Level::Avx2][most.min(2) as usize]
 }
 
 /// Runs a kernel on registers no wider than `level`.
@@ -402,6 +423,8 @@ pub fn dispatch<K: Kernel>(kernel: K) -> K::Output {
 pub fn dispatch_at<K: Kernel>(level: Level, kernel: K) -> K::Output {
     #[cfg(target_arch = "x86_64")]
     {
+        let most = WIDEST.load(Ordering::Relaxed);
+        let level = if level as u8 <= most { level } else { held(most) };
         if let (Level::Avx512, Some(simd)) = (level, x86::avx512()) {
             return Simd::vectorize(simd, x86::InAvx512 { kernel, simd });
         }
