@@ -64,10 +64,20 @@ async function go(): Promise<void> {
       if (link.getAttribute("href") === `#/${section}` || (section === "scene" && link.getAttribute("href") === "#/")) link.setAttribute("aria-current", "page");
       else link.removeAttribute("aria-current");
     }
-    const { page } = await open();
-    if (own !== visit) return;
-    scrollTo(0, 0);
-    const end = await page(main, match[1] ?? "");
+    let end: Leave;
+    try {
+      const { page } = await open();
+      if (own !== visit) return;
+      scrollTo(0, 0);
+      end = await page(main, match[1] ?? "");
+    } catch (error) {
+      if (own !== visit) return;
+      const webgl = document.createElement("canvas").getContext("webgl2");
+      main.className = "";
+      main.replaceChildren(h("div", { class: "narrow" }, h("h1", {}, "This page could not be shown"), h("p", {}, webgl ? String((error as Error)?.message ?? error) : "It draws with WebGL 2, which this browser does not offer.")));
+      console.error(error);
+      return;
+    }
     if (own !== visit) end();
     else leave = end;
     return;

@@ -49,8 +49,12 @@ export const sceneOf = (id: string): Shipped | undefined => SCENES.find((s) => s
 /** Title of a scene without reading all of it. */
 export const titleOf = (text: string): string => /^title\s*=\s*"((?:[^"\\]|\\.)*)"/m.exec(text)?.[1].replace(/\\"/g, '"') ?? "";
 
-/** A mesh that a scene names and that ships with tumble. */
+/** A mesh that a scene names: what `tumble view` serves beside a scene, or what ships with tumble. */
 export async function asset(path: string): Promise<Uint8Array | null> {
+  if (new URLSearchParams(location.search).has("view")) {
+    const own = await fetch(`view/${encodeURIComponent(path)}`).catch(() => null);
+    if (own?.ok) return new Uint8Array(await own.arrayBuffer());
+  }
   const name = path.split("/").pop()!;
   const url = Object.entries(assets).find(([key]) => key.endsWith(`/${name}`))?.[1];
   if (!url) return null;

@@ -4,6 +4,7 @@ import type { Failure, Files, Frame, Ledger, SceneInfo, Stability, StepReport, V
 import { asset } from "./scenes";
 
 let shared: Engine | null = null;
+let worlds = 100;
 
 /** One worker for all pages; it starts with the first of them. */
 export function engine(): Engine {
@@ -59,8 +60,8 @@ export class Session {
   private age = 0;
 
   private readonly engine = engine();
-
-  constructor(readonly world = 0) {}
+  /** Each session has a world of its own: one that ends does not take that of the next. */
+  readonly world = worlds++;
 
   on<K extends keyof Events>(name: K, listener: (event: Events[K]) => void): void {
     ((this.listeners[name] ??= []) as ((event: Events[K]) => void)[]).push(listener);
@@ -359,6 +360,18 @@ export class Session {
   refresh(): Promise<void> {
     if ((this.shown?.index ?? 0) < this.last) return Promise.resolve();
     return this.queue(() => this.read()).catch((error) => this.fail(error));
+  }
+
+  /** After the worker was started anew: its worlds stand at their start. */
+  async revived(): Promise<void> {
+    this.pause();
+    this.age++;
+    await this.queue(async () => {
+      this.forget(0);
+      this.ledgers = [];
+      this.last = 0;
+      await this.read();
+    }).catch((error) => this.fail(error));
   }
 
   close(): void {

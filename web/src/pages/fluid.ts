@@ -89,7 +89,7 @@ export const page: Page = async (main) => {
   document.title = "Fluid · tumble";
   main.className = "lab-page";
   const choices: Choices = { ...START };
-  const session = new Session(0);
+  const session = new Session();
   session.endless = true;
   const canvas = h("canvas", { "aria-hidden": "true" });
   const { element: legendElement, update: tellLegend } = legendBox(() => stage);
@@ -103,7 +103,7 @@ export const page: Page = async (main) => {
     const value = h("output", { "aria-label": label }, "–");
     return { value, row: h("div", { class: "figure" }, h("span", {}, label), value) };
   };
-  const figures = { left: now("Residual left"), iterations: now("Iterations"), cost: now("Engine, a step"), courant: now("Courant number"), kinetic: now("Kinetic energy") };
+  const figures = { left: now("Divergence"), iterations: now("Iterations"), cost: now("Engine, a step"), courant: now("Courant number"), kinetic: now("Kinetic energy") };
   figures.left.value.id = "residual";
   figures.iterations.value.id = "iterations";
   const advice = h("p", { class: "doc", role: "status" });
@@ -177,6 +177,7 @@ export const page: Page = async (main) => {
         choices.tolerance = Number((10 ** v).toPrecision(1));
         void set("gas.0.pressure.tolerance", choices.tolerance);
       }),
+      h("p", { class: "muted plot-title" }, "Residual over the first, by iteration"),
       residual.element,
       h("div", { class: "figures" }, figures.left.row, figures.iterations.row),
       advice,
@@ -264,13 +265,13 @@ export const page: Page = async (main) => {
     if (report) {
       figures.courant.value.textContent = show(report.courant, 2);
       const list = report.pressure;
-      const last = list[list.length - 1];
-      figures.left.value.textContent = list.length ? show(last, 2) : "–";
-      figures.iterations.value.textContent = String(report.linear || Math.max(list.length - 1, 0));
+      figures.left.value.textContent = show(report.residual, 2);
+      figures.left.value.classList.toggle("bad", report.unconverged > 0);
+      figures.iterations.value.textContent = String(report.linear);
       if (performance.now() - book > 150) {
         book = performance.now();
-        residual.set([list.map((_, i) => i), list.map((r) => (r > 0 ? r : null))]);
-        advice.textContent = report.unconverged ? "The pressure has not met its tolerance: what is left of the divergence makes the fluid swell and shrink. Look at the view of the divergence." : "";
+        residual.set([[0, ...list.map((_, i) => i + 1)], [1, ...list.map((r) => (r > 0 ? r : null))]]);
+        advice.textContent = report.unconverged ? "The pressure has not met its tolerance. What is left of the divergence makes the fluid swell and shrink: look at its view." : "Largest divergence times the size of a cell, over the fastest velocity; the tolerance bounds it.";
         const books = session.ledgers.slice(Math.max(0, session.ledgers.length - 1200));
         energy.set([books.map((l) => l.time), books.map((l) => l.kinetic)]);
       }
@@ -280,7 +281,7 @@ export const page: Page = async (main) => {
   });
   session.on("failed", (failure) => complain(new EngineError(failure)));
 
-  const offPointers = pointers(canvas, stage, session, { dye: () => 0.5, size: () => 1 / 24 });
+  const offPointers = pointers(canvas, stage, session, { dye: () => 0.2, size: () => 1 / 24 });
   // By keys: a ring that goes along.
   const cursor = new Vector3();
   const stir = (event: KeyboardEvent) => {
@@ -297,7 +298,7 @@ export const page: Page = async (main) => {
     const scale = box.width / stage.width;
     ring.style.left = `${box.width / 2 + cursor.x * scale}px`;
     ring.style.top = `${box.height / 2 - cursor.z * scale}px`;
-    void session.stir(gas.name, cursor.toArray() as Vector, [go[0] * 0.6, 0, go[1] * 0.6], stage.width / 24, 0.5).catch(() => {});
+    void session.stir(gas.name, cursor.toArray() as Vector, [go[0] * 0.6, 0, go[1] * 0.6], stage.width / 24, 0.2).catch(() => {});
     if (!session.playing) session.play();
   };
   stageBox.addEventListener("keydown", stir);
@@ -307,6 +308,7 @@ export const page: Page = async (main) => {
   engine().onrestart = (message) => {
     alert.hidden = false;
     alert.replaceChildren(h("strong", {}, "The engine was started anew."), h("pre", {}, message));
+    void session.revived();
   };
   void cards([{ page: "gas", tags: ["gas.1", "gas.3", "gas.4", "gas.5"] }, { page: "pressure", tags: ["pressure.1", "pressure.2"] }]).then((made) => theory.replaceChildren(...made));
   void session

@@ -120,7 +120,7 @@ const LECTURE: [string, { system: string; schemes: string[]; h: number }][] = [
   ["Forward Euler's spiral", { system: "swirl", schemes: ["forward_euler", "midpoint", "rk4"], h: 0.2 }],
   ["Overshoot", { system: "sink", schemes: ["forward_euler", "heun", "rk4"], h: 1.1 }],
   ["Adaptive steps", { system: "orbit", schemes: ["adaptive_euler", "dormand_prince", "symplectic_euler", "rk4"], h: 0.1 }],
-  ["A sheet that explodes", { system: "sheet", schemes: ["forward_euler", "symplectic_euler", "implicit_euler"], h: 0.02 }],
+  ["A sheet that explodes", { system: "sheet", schemes: ["forward_euler", "symplectic_euler", "implicit_euler"], h: 0.0125 }],
 ];
 
 const plain = (scheme: string) => scheme.replace(/_/g, " ").replace("euler", "Euler").replace("heun", "Heun").replace("rk4", "RK4").replace("verlet", "Verlet").replace("dormand prince", "Dormand–Prince").replace("bdf2", "BDF2").replace(/^./, (c) => c.toUpperCase());
@@ -185,7 +185,7 @@ export const page: Page = async (main) => {
   const phase = h("canvas", { class: "phase", role: "img", "aria-label": "Paths of all integrators, and the exact one" });
   const phaseTitle = h("h2", {}, "Phase");
   const phaseBox = h("div", { class: "chart" }, h("div", { class: "chart-head" }, phaseTitle, h("span", { class: "muted axes" })), phase);
-  const errorBox = h("div", { class: "chart" }, h("div", { class: "chart-head" }, h("h2", {}, "Error"), h("span", { class: "muted axes" }, "distance from the exact solution [m]")), error.plot.element);
+  const errorBox = h("div", { class: "chart" }, h("div", { class: "chart-head" }, h("h2", {}, "Error"), h("span", { class: "muted axes" }, "from the exact one [m]")), error.plot.element);
   const stepOut = h("output", { id: "step" });
   const slider = h("input", { type: "range", min: 0, max: 1, step: 0.001, id: "h", "aria-label": "Step h", oninput: () => {
     const [low, high] = SYSTEMS[system].steps;
@@ -265,7 +265,8 @@ export const page: Page = async (main) => {
       return [h("i", { style: `left:calc(${at} * (100% - 1rem) + 0.5rem);background:${curveColor(k)}`, title: `${plain(r.scheme)}: ${show(limit, 3)} s` })];
     });
     marks.replaceChildren(...placed);
-    limitText.textContent = placed.length ? "The marks are the largest usable steps that the engine predicts from the stiffest mode: less than a thousandfold energy in a hundred periods." : "";
+    const z = limits.length && system === "spring" ? `ω h = ${show(W * step, 3)}. ` : "";
+    limitText.textContent = z + (placed.length ? "The marks are the largest usable steps that the engine predicts from the stiffest mode: less than a thousandfold energy in a hundred periods." : "");
   };
 
   const judge = (scheme: string): string => {
@@ -573,7 +574,7 @@ export const page: Page = async (main) => {
         } catch (e) {
           if (own !== age) return;
           if (!(e instanceof EngineError)) throw e;
-          run.dead = `blew up after ${run.n + 1} steps, at ${show((run.n + 1) * step, 3)} s: the engine stopped it at a thousandfold energy`;
+          run.dead = `blew up in step ${run.n + 1}, at ${show((run.n + 1) * step, 3)} s: the engine stopped it at a thousandfold energy`;
           run.card.dataset.dead = "true";
           if (e.failure.kind !== "step") run.dead = e.failure.message.split("\n")[0];
         }

@@ -1,4 +1,5 @@
 /** One scene: picture, playback, energy, its values, its text, its theory. */
+import { parse } from "smol-toml";
 import { check, choice, h, iconButton, saveAs, say, setIcon, show, svg, ICONS, type Page } from "../dom";
 import { EngineError } from "../engine/client";
 import type { Cure, Failure, SceneInfo, Value } from "../engine/protocol";
@@ -24,7 +25,7 @@ async function source(rest: string): Promise<{ toml: string; overrides: [string,
     const shared = await unpack(rest.slice(2));
     const overrides = shared.overrides.map((o): [string, Value] => {
       const cut = o.indexOf("=");
-      return [o.slice(0, cut), JSON.parse(o.slice(cut + 1)) as Value];
+      return [o.slice(0, cut), valueOf(o.slice(cut + 1))];
     });
     return { toml: shared.toml, overrides, shared, name: "shared", id: null };
   }
@@ -39,6 +40,15 @@ async function source(rest: string): Promise<{ toml: string; overrides: [string,
   return { toml: await known.text(), overrides: [], shared: null, name: known.name, id: known.id };
 }
 
+/** What stands right of an "=": TOML, or a bare word. */
+function valueOf(text: string): Value {
+  try {
+    return parse(`x = ${text}`).x as Value;
+  } catch {
+    return text.trim();
+  }
+}
+
 export const page: Page = async (main, rest) => {
   main.className = "lab-page";
   let start: Awaited<ReturnType<typeof source>>;
@@ -50,7 +60,7 @@ export const page: Page = async (main, rest) => {
     return () => {};
   }
 
-  const session = new Session(0);
+  const session = new Session();
   const canvas = h("canvas", { "aria-hidden": "true" });
   const { element: legendElement, update: tellLegend } = legendBox(() => stage);
   const wait = h("div", { class: "wait" }, "Loading the engine …");
@@ -112,7 +122,7 @@ export const page: Page = async (main, rest) => {
           "div",
           { class: "lab-head" },
           h("div", {}, title, start.id ? h("p", { class: "scene-id" }, start.id) : h("p", { class: "scene-id" }, start.shared ? "from a link" : start.name)),
-          h("div", { class: "actions" }, shareButton, iconButton("camera", "Save the picture (PNG)", () => void png()), record, iconButton("down", "Download the kept frames (NPZ)", () => saveAs(npz(session.kept.map((i) => session.frame(i)!)), `${start.name}.npz`)), iconButton("frame", "View of the scene's camera", () => stage.goHome())),
+          h("div", { class: "actions" }, shareButton, iconButton("camera", "Save the picture (PNG)", () => void png()), record, iconButton("down", "Download the kept frames (NPZ)", () => saveAs(npz(session.kept.map((i) => session.frame(i)!)), `${start.name}.npz`)), h("button", { type: "button", class: "icon-button", title: "Save the surfaces (GLB)", "aria-label": "Save the surfaces (GLB)", onclick: () => void glb() }, svg(ICONS.cube)), iconButton("frame", "View of the scene's camera", () => stage.goHome())),
         ),
         alert,
         stageBox,
@@ -214,14 +224,7 @@ export const page: Page = async (main, rest) => {
           { class: "cures" },
           ...(good.length ? good : found).map((c) => {
             const cut = c.set.indexOf("=");
-            const value = (() => {
-              const text = c.set.slice(cut + 1).trim();
-              try {
-                return JSON.parse(text) as Value;
-              } catch {
-                return text;
-              }
-            })();
+            const value = valueOf(c.set.slice(cut + 1));
             return h("li", {}, h("code", {}, c.set), c.survived ? h("button", { type: "button", class: "button", onclick: () => void change(c.set.slice(0, cut).trim(), value).then(() => session.reset()) }, "Take it, from the start") : " does not help");
           }),
         ),
@@ -396,7 +399,7 @@ export const page: Page = async (main, rest) => {
   const share = async () => {
     const at = session.latest;
     const hash = await session.hash();
-    const link = await pack({ version: engine().version, toml: session.toml, overrides: [...session.overrides].map(([p, v]) => `${p}=${JSON.stringify(v)}`), frame: at, hash });
+    const link = await pack({ version: engine().version, toml: session.toml, overrides: [...session.overrides].map(([p, v]) => `${p}=${literal(v)}`), frame: at, hash });
     if (link.length > LONGEST) {
       saveAs(new Blob([session.toml], { type: "application/toml" }), `${start.name}.toml`);
       return say("Too large for a link: the scene was saved as a file instead.");
@@ -412,6 +415,11 @@ export const page: Page = async (main, rest) => {
     }
   };
   const png = async () => saveAs(await stage.picture(), `${start.name}-${session.shown?.index ?? 0}.png`);
+  const glb = async () => {
+    const blob = await stage.surfaces();
+    if (blob) saveAs(blob, `${start.name}-${session.shown?.index ?? 0}.glb`);
+    else say("There is no surface in this scene.");
+  };
   let recorder: MediaRecorder | null = null;
   const film = () => {
     if (recorder) return recorder.stop();
@@ -445,7 +453,10 @@ export const page: Page = async (main, rest) => {
   addEventListener("dragover", drag);
   addEventListener("drop", drop);
   const offKeys = keys(session, stage);
-  const restarted = (message: string) => complain({ kind: "crash", message: `${message}\nThe scene stands at its start again.`, issues: [] });
+  const restarted = (message: string) => {
+    complain({ kind: "crash", message: `${message}\nThe scene stands at its start again.`, issues: [] });
+    void session.revived();
+  };
   engine().onrestart = restarted;
 
   const schema = engine()

@@ -803,6 +803,22 @@ export class Stage {
     return new Promise((resolve, reject) => flat.toBlob((b) => (b ? resolve(b) : reject(new Error("no picture"))), type, quality));
   }
 
+  /** All surfaces as a GLB file, y up as that format has it; null where there are none. */
+  async surfaces(): Promise<Blob | null> {
+    const bodies = this.things.flatMap((t) => (t.body instanceof Surface ? [{ name: t.name, mesh: t.body.object }] : []));
+    if (!bodies.length) return null;
+    const { GLTFExporter } = await import("three/examples/jsm/exporters/GLTFExporter.js");
+    const root = new THREE.Group();
+    root.rotation.x = -Math.PI / 2;
+    for (const { name, mesh } of bodies) {
+      const copy = mesh.clone();
+      copy.name = name;
+      root.add(copy);
+    }
+    const data = (await new GLTFExporter().parseAsync(root, { binary: true })) as ArrayBuffer;
+    return new Blob([data], { type: "model/gltf-binary" });
+  }
+
   get background(): [string, string] {
     if (this.night) return ["#07090f", "#0b0d14"];
     return document.documentElement.dataset.theme === "dark" ? ["#1b2027", "#14181d"] : ["#f6f8fa", "#e3e8ee"];
