@@ -13,7 +13,19 @@ ROOT = HERE.parent
 VENV = ROOT / ".venv-bench"
 PEERS = ["devito", "jax", "numba", "phiflow", "pyamg", "scipy", "taichi"]
 OURS = ["numpy", "typer", "rich"]
-CASES = ["start", "springs", "implicit", "particles", "emission", "gravitation", "flock", "pressure", "smoke", "heat", "web"]
+CASES = [
+    "start",
+    "springs",
+    "implicit",
+    "particles",
+    "emission",
+    "gravitation",
+    "flock",
+    "pressure",
+    "smoke",
+    "heat",
+    "web",
+]
 # What is aimed at: (case, ours, theirs, at least this ratio), or at most for costs.
 TARGETS = {
     ("springs", "taichi"): (5.0, "at least"),
