@@ -325,7 +325,9 @@ export class Session {
       const { info, live } = await this.engine.set(path, value, this.world);
       this.overrides.set(path, value);
       if (live) {
+        const same = JSON.stringify(this.info?.objects) === JSON.stringify(info.objects);
         this.info = info;
+        if (!same) this.tell("loaded", info);
         await this.read();
       } else {
         this.age++;

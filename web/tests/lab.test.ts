@@ -302,6 +302,24 @@ describe("fluid", () => {
   });
 });
 
+describe("walls", () => {
+  it("are drawn into the fluid while it flows", async () => {
+    const { page, errors } = await own.open("fluid", STILL);
+    await ready(page);
+    await page.evaluate(() => (window as any).tumble.session.goto(3));
+    await page.locator("label:has-text('Dragging') select").selectOption("draw");
+    const box = (await page.locator(".stage").boundingBox())!;
+    await page.mouse.move(box.x + 0.5 * box.width, box.y + 0.3 * box.height);
+    await page.mouse.down();
+    for (let i = 1; i < 8; i++) await page.mouse.move(box.x + (0.5 + 0.02 * i) * box.width, box.y + (0.3 + 0.05 * i) * box.height);
+    await page.mouse.up();
+    await page.waitForFunction(() => (window as any).tumble.session.info.objects.some((o: any) => o.kind === "collider"), null, { timeout: 20_000 });
+    assert.ok((await page.evaluate(() => (window as any).tumble.session.latest)) >= 3, "the fluid began anew");
+    assert.deepEqual(errors, []);
+    await page.context().close();
+  });
+});
+
 describe("integrators", () => {
   it("blow up and decay as their formulas say", async () => {
     const { page, errors } = await own.open("integrators");

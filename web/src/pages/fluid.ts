@@ -1,11 +1,13 @@
 /** A fluid in a box, to stir: views of everything that a step makes, and a pressure that may be as bad as one likes. */
+import { parse } from "smol-toml";
 import { check, choice, h, iconButton, saveAs, show, type Page } from "../dom";
 import { EngineError } from "../engine/client";
 import type { Value, Vector } from "../engine/protocol";
 import { legendBox } from "../legend";
 import { curveColor, isDark, Plot } from "../plot";
 import { pointers } from "../pointer";
-import { engine, Session } from "../session";
+import { engine, literal, Session } from "../session";
+import { pack } from "../share";
 import { cards } from "../theory";
 import { keys, transport } from "../transport";
 import { LOOK, Stage } from "../view/stage";
@@ -35,11 +37,22 @@ interface Choices {
   particles: boolean;
   lifetime: number;
   trail: number;
+  /** Drawn by hand: points in the plane. */
+  walls: [number, number][][];
 }
 
-const START: Choices = { cells: 192, method: "multigrid_gradients", iterations: 100, tolerance: 1e-3, viscosity: 0, confinement: 0, advection: "corrected", obstacle: "none", particles: true, lifetime: 3, trail: 0.3 };
+const START: Choices = { cells: 192, method: "multigrid_gradients", iterations: 100, tolerance: 1e-3, viscosity: 0, confinement: 0, advection: "corrected", obstacle: "none", particles: true, lifetime: 3, trail: 0.3, walls: [] };
 
 const CARRIED = { linear: '{ interpolation = "linear" }', corrected: "{ corrected = true }", cubic: '{ interpolation = "monotone_cubic", corrected = true }' };
+
+/** Straight pieces of walls that were drawn. */
+const pieces = (c: Choices) =>
+  c.walls.flatMap((wall, k) =>
+    wall.slice(1).map(([x, z], i) => ({ name: `wall ${k + 1}.${i + 1}`, shape: { capsule: { from: [wall[i][0], 0, wall[i][1]], to: [x, 0, z], radius: 0.018 } } })),
+  );
+
+/** All solids, as a list of the scene. */
+const solids = (c: Choices) => [...((parse(OBSTACLES[c.obstacle]).collider ?? []) as Value[]), ...pieces(c)];
 
 const scene = (c: Choices) => `version = 1
 title = "A fluid to stir"
@@ -81,6 +94,7 @@ kind = "gas"
 of = "fluid"
 ` : ""}
 ${OBSTACLES[c.obstacle]}
+${pieces(c).map((w) => `[[collider]]\nname = "${w.name}"\nshape = ${literal(w.shape)}\n`).join("\n")}
 [output]
 columns = ["position", "density"]
 `;
@@ -89,6 +103,7 @@ export const page: Page = async (main) => {
   document.title = "Fluid · tumble";
   main.className = "lab-page";
   const choices: Choices = { ...START };
+  let drawing = false;
   const session = new Session();
   session.endless = true;
   const canvas = h("canvas", { "aria-hidden": "true" });
@@ -130,6 +145,11 @@ export const page: Page = async (main) => {
     } catch (error) {
       complain(error);
     }
+  };
+
+  const asScene = async () => {
+    const toml = scene(choices).replace(/^frames = .*$/m, "frames = 900");
+    location.hash = `#/s/${await pack({ version: engine().version, toml, overrides: [], frame: 0, hash: "" })}`;
   };
 
   const range = (label: string, low: number, high: number, value: number, text: (v: number) => string, act: (v: number) => void, step = (high - low) / 100) => {
@@ -202,8 +222,13 @@ export const page: Page = async (main) => {
       }),
       choice("Obstacles", [["none", "none"], ["disk", "a disk"], ["gate", "a gate"], ["posts", "posts"]], choices.obstacle, (v) => {
         choices.obstacle = v;
-        void rerun();
+        void set("collider", solids(choices) as Value);
       }),
+      choice("Dragging", [["stir", "stirs"], ["draw", "draws walls"]], "stir", (v) => (drawing = v === "draw")),
+      h("button", { type: "button", class: "button", onclick: () => {
+        choices.walls = [];
+        void set("collider", solids(choices) as Value);
+      } }, "Clear the walls"),
     ),
     h("section", { class: "card" }, h("h2", {}, "Particles"),
       check("Particles go with the flow", choices.particles, (on) => {
@@ -235,8 +260,9 @@ export const page: Page = async (main) => {
     h("div", { class: "lab" },
       h("section", { class: "view", "aria-label": "Fluid" },
         h("div", { class: "lab-head" },
-          h("div", {}, h("h1", {}, "A fluid to stir"), h("p", { class: "muted" }, "Drag through it, with as many fingers as you like.")),
-          h("div", { class: "actions" }, view, iconButton("camera", "Save the picture (PNG)", () => void stage.picture().then((b) => saveAs(b, "fluid.png"))), iconButton("reset", "From the start, with these settings", () => void rerun()))),
+          h("div", {}, h("h1", {}, "A fluid to stir"), h("p", { class: "muted" }, "Drag through it, or draw walls.")),
+          h("div", { class: "actions" }, view, iconButton("camera", "Save the picture (PNG)", () => void stage.picture().then((b) => saveAs(b, "fluid.png"))), iconButton("reset", "From the start, with these settings", () => void rerun()),
+            h("button", { type: "button", class: "button", title: "With its text and all its values", onclick: () => void asScene() }, "As a scene"))),
         alert, stageBox, transport(session),
         h("div", { class: "energy" }, h("h2", {}, "Kinetic energy", h("span", { class: "unit" }, "J")), h("div", { class: "figures in-line" }, figures.kinetic.row, figures.courant.row, figures.cost.row), energy.element),
         theory,
@@ -281,7 +307,33 @@ export const page: Page = async (main) => {
   });
   session.on("failed", (failure) => complain(new EngineError(failure)));
 
+  // Walls, one for each stroke.
+  let stroke: [number, number][] | null = null;
+  const inside = (p: Vector3): [number, number] => [Number(Math.min(Math.max(p.x, -0.78), 0.78).toFixed(3)), Number(Math.min(Math.max(p.z, -0.43), 0.43).toFixed(3))];
+  const draw = (event: PointerEvent) => {
+    if (!drawing) return;
+    event.stopImmediatePropagation();
+    const at = stage.under(event);
+    if (!at) return;
+    if (event.type === "pointerdown") {
+      canvas.setPointerCapture(event.pointerId);
+      stroke = [inside(at)];
+    } else if (stroke && event.type === "pointermove") {
+      const [x, z] = inside(at);
+      const [px, pz] = stroke[stroke.length - 1];
+      if (Math.hypot(x - px, z - pz) > 0.05 && stroke.length < 40) stroke.push([x, z]);
+    } else if (stroke) {
+      if (stroke.length > 1 && choices.walls.length < 12) {
+        choices.walls.push(stroke);
+        void set("collider", solids(choices) as Value);
+      }
+      stroke = null;
+    }
+  };
+  for (const name of ["pointerdown", "pointermove", "pointerup", "pointercancel"] as const) canvas.addEventListener(name, draw, { capture: true });
+  // After those that draw, which may keep an event from it.
   const offPointers = pointers(canvas, stage, session, { dye: () => 0.2, size: () => 1 / 24 });
+
   // By keys: a ring that goes along.
   const cursor = new Vector3();
   const stir = (event: KeyboardEvent) => {

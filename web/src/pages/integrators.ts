@@ -4,6 +4,7 @@ import { EngineError } from "../engine/client";
 import type { Frame, Ledger, SceneInfo, Stability } from "../engine/protocol";
 import { curveColor, isDark, Plot, type Curve } from "../plot";
 import { engine } from "../session";
+import { pack } from "../share";
 import { cards } from "../theory";
 
 interface System {
@@ -252,6 +253,12 @@ export const page: Page = async (main) => {
     }));
   };
 
+  const asScene = async (scheme: string) => {
+    const s = SYSTEMS[system];
+    const toml = s.toml(scheme, step).replace(/^frames = .*$/m, `frames = ${Math.max(1, Math.ceil(s.end / step))}`);
+    location.hash = `#/s/${await pack({ version: engine().version, toml, overrides: [], frame: 0, hash: "" })}`;
+  };
+
   const limitOf = (scheme: string) => limits.find((l) => l.integrator === scheme);
   const drawMarks = () => {
     const [low, high] = SYSTEMS[system].steps;
@@ -307,7 +314,7 @@ export const page: Page = async (main) => {
       const ratio = h("output", { class: "big", "data-ratio": scheme }, "1");
       const verdict = h("p", { class: "verdict" });
       const predicted = h("p", { class: "muted predicted" });
-      const card = h("article", { class: "run", "data-scheme": scheme, style: `--curve:${curveColor(k)}` }, h("h2", {}, plain(scheme)), canvas, h("div", { class: "run-figure" }, h("span", { class: "muted" }, s.field ? "r / r₀" : "E / E₀"), ratio), predicted, verdict);
+      const card = h("article", { class: "run", "data-scheme": scheme, style: `--curve:${curveColor(k)}` }, h("div", { class: "run-head" }, h("h2", {}, plain(scheme)), h("button", { type: "button", class: "as-scene", "aria-label": `Open ${plain(scheme)} as a scene`, title: "Open as a scene, with its text and values", onclick: () => void asScene(scheme) }, "↗")), canvas, h("div", { class: "run-figure" }, h("span", { class: "muted" }, s.field ? "r / r₀" : "E / E₀"), ratio), predicted, verdict);
       return { world: 10 + k, scheme, info: null, frame: null, n: 0, quantity: [], error: [], path: [], first: 0, dead: "", canvas, ratio, verdict, predicted, card };
     });
     board.replaceChildren(...runs.map((r) => r.card));

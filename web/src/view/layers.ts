@@ -160,11 +160,15 @@ export class Surface implements Layer {
   private readonly material: THREE.MeshStandardMaterial;
   private triangles: Numbers;
 
-  constructor(position: Numbers, triangles: Numbers, color: Rgb, { moving = true, flat = false, dark = false } = {}) {
+  constructor(position: Numbers, triangles: Numbers, color: Rgb, { moving = true, flat = false, plain = false } = {}) {
     this.triangles = triangles;
     this.material = new THREE.MeshStandardMaterial({ roughness: 0.75, metalness: 0, side: THREE.DoubleSide, flatShading: flat && moving });
     this.material.color.setRGB(...color, THREE.LinearSRGBColorSpace);
-    if (dark) this.material.roughness = 1;
+    // Seen head-on, light would only tell that a disk is a ball.
+    if (plain) {
+      this.material.emissive.copy(this.material.color);
+      this.material.color.set(0);
+    }
     let geometry = new THREE.BufferGeometry();
     geometry.setAttribute("position", new THREE.BufferAttribute(Float32Array.from(position), 3));
     geometry.setIndex(new THREE.BufferAttribute(Uint32Array.from(triangles), 1));
