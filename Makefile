@@ -76,11 +76,12 @@ web/node_modules/.ready: web/package-lock.json
 	@touch $@
 
 $(BINDGEN):
-	@command -v rustup >/dev/null && rustup target add wasm32-unknown-unknown || echo "no rustup here: the build needs Rust's wasm32-unknown-unknown"
 	cargo install --quiet wasm-bindgen-cli --version =$(patsubst target/tools/wasm-bindgen-%/bin/wasm-bindgen,%,$@) --root $(patsubst %/bin/wasm-bindgen,%,$@)
 
 # One after the other, whatever -j says: both leave the same file.
 $(PKG)/single_bg.wasm: $(BINDGEN) $(RUST)
+	@if command -v rustup >/dev/null; then rustup --quiet target add wasm32-unknown-unknown; \
+		else echo "no rustup here: the build needs Rust's target wasm32-unknown-unknown"; fi
 	cargo build --quiet --profile web -p tumble-wasm --target wasm32-unknown-unknown
 	$(BINDGEN) --target web --remove-name-section --remove-producers-section --out-name single --out-dir $(PKG) $(WASM)
 

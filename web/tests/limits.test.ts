@@ -8,7 +8,7 @@ import type { Failure, SceneInfo } from "../src/engine/protocol";
 
 const PKG = resolve(import.meta.dirname, "../src/engine/pkg");
 const engine = await import(`${PKG}/single.js`);
-engine.initSync({ module: readFileSync(`${PKG}/single_bg.wasm`) });
+const { memory } = engine.initSync({ module: readFileSync(`${PKG}/single_bg.wasm`) });
 
 const BALL = `version = 1\n[[particles]]\nname = "p"\nposition = [[0.0, 0.0, 1.0]]\n`;
 const SHEET = `version = 1\n[time]\nfps = 24\n[[sheet]]\nname = "s"\nsize = [1.0, 1.0]\nresolution = [8, 8]\npin = ["corner 0 0"]\n[sheet.links]\nstructural = { modulus = 10.0 }\n`;
@@ -160,4 +160,21 @@ test("kept frames stay within their memory", () => {
   assert.ok(kept.frames().every((f) => f < 200));
   kept.cut(0);
   assert.deepEqual(kept.frames(), [0]);
+});
+
+test("memory stays flat over frames, worlds and values", () => {
+  const round = () => {
+    const world = made(SHEET);
+    for (let i = 0; i < 400; i++) {
+      world.step(60_000);
+      world.columns(["position", "velocity"]);
+      world.save();
+    }
+    for (let i = 0; i < 50; i++) world.set("world.gravity", `[0, 0, ${-i}]`);
+    world.free();
+  };
+  round();
+  const before = memory.buffer.byteLength;
+  for (let i = 0; i < 5; i++) round();
+  assert.equal(memory.buffer.byteLength, before);
 });
