@@ -365,12 +365,13 @@ export const page: Page = async (main, rest) => {
           again();
         }));
       } else {
-        const at = h("input", { type: "range", min: 0, max: 1, step: 0.005, value: look.sliceAt, "aria-label": "Place of the slice", oninput: () => {
+        const at = h("input", { type: "range", min: 0, max: 1, step: 0.005, value: look.sliceAt, "aria-label": "Place of the slice", hidden: look.slice === null, oninput: () => {
           look.sliceAt = Number(at.value);
           stage.again();
         } });
         parts.push(choice("See", [["", "smoke"], ["0", "slice across x"], ["1", "slice across y"], ["2", "slice across z"]], look.slice === null ? "" : String(look.slice), (v) => {
           look.slice = v === "" ? null : Number(v);
+          at.hidden = look.slice === null;
           again();
         }), at);
       }

@@ -8,6 +8,7 @@ export const PIECES = {
     attribute vec4 tint;
     uniform float radius;
     uniform float thinnest;
+    uniform float lit;
     uniform vec2 size;
     varying vec4 shade;
     varying vec2 at;
@@ -26,8 +27,10 @@ export const PIECES = {
       halfLength = 0.5 * length(along);
       along = halfLength > 1e-4 ? along / (2.0 * halfLength) : vec2(1.0, 0.0);
       vec2 across = vec2(-along.y, along.x);
-      vec2 here = (position.x < 0.0 ? p - along * width : q + along * width) + across * position.y * width;
-      at = vec2(position.x * (halfLength + width), position.y * width);
+      // Those that one sees through end flat: round ends would lie over each other.
+      float cap = width * lit;
+      vec2 here = (position.x < 0.0 ? p - along * cap : q + along * cap) + across * position.y * width;
+      at = vec2(position.x * (halfLength + cap), position.y * width);
       gl_Position = vec4(here / (0.5 * size) * mid.w, mid.zw);
     }`,
   fragment: /* glsl */ `

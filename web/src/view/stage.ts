@@ -207,7 +207,7 @@ export class Stage {
       if (kind === "plane" && grid) thing.body = new PlaneField(grid, color);
       else if (kind === "space" && grid) thing.body = new SpaceField(grid, color);
       else if (kind === "solid" && topology.position && topology.triangles && !entry.inside) {
-        thing.body = new Surface(topology.position.data, topology.triangles.data, color, { moving: false });
+        thing.body = new Surface(topology.position.data, topology.triangles.data, color, { moving: false, plain: info.dimension === 2 });
       } else if (kind === "solid" && topology.position && topology.triangles) {
         thing.body = new Pieces(0, { thinnest: 1, lit: false });
         thing.body.pairs(topology.position.data, sharp(topology.position.data, topology.triangles.data), color);
@@ -478,7 +478,7 @@ export class Stage {
     if (x && thing.body instanceof Surface && x.length === thing.topology.position?.data.length) {
       this.scene.remove(object);
       thing.body.dispose();
-      thing.body = new Surface(x, thing.topology.triangles.data, thing.color, { moving: false });
+      thing.body = new Surface(x, thing.topology.triangles.data, thing.color, { moving: false, plain: this.flat });
       this.add(thing.body);
     }
     if (columns.turn) {
