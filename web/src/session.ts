@@ -144,6 +144,8 @@ export class Session {
   /** Keeps only so many frames, the last ones. */
   trim(count: number): void {
     for (const old of [...this.frames.keys()]) if (old < this.last - count) this.drop(old);
+    // Nor the books of long ago.
+    for (let i = this.last - 3000; i >= 0 && this.ledgers[i]; i--) delete this.ledgers[i];
   }
 
   private drop(index: number): void {

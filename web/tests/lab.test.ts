@@ -45,18 +45,22 @@ describe("gallery", () => {
   });
 
   it("comes with less than 3 MB for the first picture of a scene", async () => {
-    const { page } = await own.open("", STILL);
-    let bytes = 0;
-    page.on("response", async (r) => {
-      if (r.ok()) bytes += gzipSync(await r.body().catch(() => Buffer.alloc(0))).length;
+    // A context of its own: nothing is in its cache.
+    const context = await own.browser.newContext({ ...STILL, viewport: { width: 1280, height: 800 } });
+    const page = await context.newPage();
+    const sizes: Promise<number>[] = [];
+    context.on("response", (r) => {
+      if (r.ok()) sizes.push(r.body().then((b) => gzipSync(b).length, () => 0));
     });
-    await page.goto("about:blank");
     const start = Date.now();
     await page.goto(`${own.address}#/scene/drape/clamped-sheet`);
     await frame(page, 0);
-    console.log(`# first picture after ${Date.now() - start} ms, ${(bytes / 1e6).toFixed(2)} MB gzipped`);
-    assert.ok(bytes > 100_000 && bytes < 3e6, `${bytes} bytes`);
-    await page.context().close();
+    const taken = Date.now() - start;
+    const bytes = (await Promise.all(sizes)).reduce((a, b) => a + b, 0);
+    console.log(`# first picture after ${taken} ms, ${(bytes / 1e6).toFixed(2)} MB gzipped`);
+    // With the engine, which is above 1 MB.
+    assert.ok(bytes > 1e6 && bytes < 3e6, `${bytes} bytes`);
+    await context.close();
   });
 });
 
@@ -252,6 +256,36 @@ describe("text and values", () => {
     assert.deepEqual(errors, []);
     await page.evaluate(() => (location.hash = "#/s/bm90IGEgbGluaw"));
     await page.waitForSelector("text=This cannot be opened");
+    await page.context().close();
+  });
+});
+
+describe("files", () => {
+  it("are opened: a mesh gets a sheet that falls on it, anything else is refused", async () => {
+    const { page, errors } = await own.open("", STILL);
+    await page.setInputFiles("#file", { name: "notes.txt", mimeType: "text/plain", buffer: Buffer.from("x") });
+    await page.waitForFunction(() => /neither a scene/.test(document.getElementById("say")?.textContent ?? ""));
+    await page.setInputFiles("#file", `${SCENES}/assets/bunny.ply`);
+    await ready(page);
+    const info = await page.evaluate(() => (window as any).tumble.session.info);
+    assert.match(info.title, /falls on bunny\.ply/);
+    assert.deepEqual(info.objects.map((o: any) => o.kind), ["sheet", "collider", "collider"]);
+    assert.deepEqual(errors, []);
+    await page.context().close();
+  });
+
+  it("tell of a failed run, and of changes that would have saved it", async () => {
+    const { page, errors } = await own.open("scene/failures/stiff-sheet", STILL);
+    await ready(page);
+    await page.evaluate(() => (window as any).tumble.session.goto(5).catch(() => {}));
+    await page.click("text=Look for a cure");
+    await page.waitForSelector(".cures li", { timeout: 60_000 });
+    const cures = await page.$$eval(".cures li", (all) => all.map((l) => l.textContent ?? ""));
+    assert.ok(cures.some((c) => /implicit|symplectic|step/.test(c) && /Take it/.test(c)), cures.join("; "));
+    await page.locator(".cures button").first().click();
+    await frame(page, 4);
+    assert.ok(await page.evaluate(() => (window as any).tumble.session.overrides.size > 0 && (document.querySelector('.alert') as HTMLElement).hidden));
+    assert.deepEqual(errors, []);
     await page.context().close();
   });
 });

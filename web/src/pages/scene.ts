@@ -223,9 +223,16 @@ export const page: Page = async (main, rest) => {
           "ul",
           { class: "cures" },
           ...(good.length ? good : found).map((c) => {
-            const cut = c.set.indexOf("=");
-            const value = valueOf(c.set.slice(cut + 1));
-            return h("li", {}, h("code", {}, c.set), c.survived ? h("button", { type: "button", class: "button", onclick: () => void change(c.set.slice(0, cut).trim(), value).then(() => session.reset()) }, "Take it, from the start") : " does not help");
+            // One or more, with blanks between: "system.0.integrator=rk4 system.0.substeps=161".
+            const changes = c.set.split(/ (?=[\w.]+=)/).map((one): [string, Value] => [one.slice(0, one.indexOf("=")), valueOf(one.slice(one.indexOf("=") + 1))]);
+            const act = () => {
+              alert.hidden = true;
+              void session.load(session.toml, [...session.overrides, ...changes]).then(() => {
+                if (editor) syncText();
+                session.play();
+              });
+            };
+            return h("li", {}, h("code", {}, c.set), c.survived ? h("button", { type: "button", class: "button", onclick: act }, "Take it, from the start") : " does not help");
           }),
         ),
       );
