@@ -7,12 +7,20 @@ RUST := $(wildcard Cargo.toml Cargo.lock crates/*/Cargo.toml) $(shell find crate
 # A test that panics has failed, which is what tests are for.
 TESTS_MAY := -A clippy::unwrap_used -A clippy::expect_used -A clippy::panic
 
-.PHONY: help setup demo test lint test-rust test-python openvdb validate bench clean
+# The browser's engine: the tool must have the version of the crate.
+BINDGEN := target/tools/wasm-bindgen-$(shell sed -n 's/^wasm-bindgen = "=\([0-9.]*\)".*/\1/p' Cargo.toml)/bin/wasm-bindgen
+WASM := target/wasm32-unknown-unknown/web/tumble_wasm.wasm
+PKG := web/src/engine/pkg
+WEB := $(shell find web -path web/node_modules -prune -o -path web/dist -prune -o -path $(PKG) -prune -o -type f -print) \
+	$(shell find python/tumble/scenes docs/theory -type f)
+
+.PHONY: help setup demo test lint test-rust test-python test-web web chromium openvdb validate bench clean
 
 help:
 	@echo "make demo      set up, drape a sheet over the Stanford bunny, show where the film is"
 	@echo "make test      set up, pass all tests"
 	@echo "make setup     leave $(BIN)/tumble"
+	@echo "make web       build the browser laboratory into web/dist, and for \`tumble view\`"
 	@echo "make validate  the long figures"
 	@echo "make bench     speed against peers, which it installs into .venv-bench"
 
@@ -31,7 +39,7 @@ $(VENV)/.engine: $(VENV)/.python $(RUST)
 demo: setup
 	$(BIN)/tumble run drape/sheet-on-bunny --out out/demo --force
 
-test: setup lint test-rust test-python
+test: setup lint test-rust test-python test-web
 	@echo "All tests passed."
 
 lint: setup
@@ -54,6 +62,42 @@ openvdb:
 test-python: setup openvdb
 	$(BIN)/python -m pytest
 
+web: python/tumble/web/index.html
+
+# A static folder; its copy ships in the wheel.
+python/tumble/web/index.html: $(PKG)/single_bg.wasm $(PKG)/double_bg.wasm web/node_modules/.ready $(WEB)
+	cd web && npm run --silent build
+	rm -rf python/tumble/web
+	cp -r web/dist python/tumble/web
+
+web/node_modules/.ready: web/package-lock.json
+	@command -v npm >/dev/null || { echo "make web needs Node 20.19 or later, with npm"; exit 1; }
+	cd web && npm ci --silent --no-audit --no-fund
+	@touch $@
+
+$(BINDGEN):
+	cargo install --quiet wasm-bindgen-cli --version =$(patsubst target/tools/wasm-bindgen-%/bin/wasm-bindgen,%,$@) --root $(patsubst %/bin/wasm-bindgen,%,$@)
+
+# One after the other, whatever -j says: both leave the same file.
+$(PKG)/single_bg.wasm: $(BINDGEN) $(RUST)
+	@if command -v rustup >/dev/null; then rustup --quiet target add wasm32-unknown-unknown; \
+		else echo "no rustup here: the build needs Rust's target wasm32-unknown-unknown"; fi
+	cargo build --quiet --profile web -p tumble-wasm --target wasm32-unknown-unknown
+	$(BINDGEN) --target web --remove-name-section --remove-producers-section --out-name single --out-dir $(PKG) $(WASM)
+
+$(PKG)/double_bg.wasm: $(PKG)/single_bg.wasm
+	cargo build --quiet --profile web -p tumble-wasm --target wasm32-unknown-unknown --features double
+	$(BINDGEN) --target web --remove-name-section --remove-producers-section --out-name double --out-dir $(PKG) $(WASM)
+
+chromium:
+	@command -v chromium chromium-browser google-chrome >/dev/null \
+		|| { command -v apt-get >/dev/null && apt-get update -qq && apt-get install -qq -y --no-install-recommends chromium; } \
+		|| echo "no Chromium here, and no apt to install it: the tests of the browser laboratory need one"
+
+test-web: setup chromium
+	@if command -v npm >/dev/null; then $(MAKE) --no-print-directory web && cd web && npm test --silent; \
+		else echo "no Node here: the browser laboratory is not tested; it needs Node 20.19 or later, with npm"; fi
+
 validate: setup openvdb
 	cargo test --workspace --exclude tumble-python --release --quiet -- --include-ignored --nocapture
 	$(BIN)/python -m pytest -s
@@ -62,4 +106,4 @@ bench: setup
 	$(PYTHON) benchmarks/bench.py
 
 clean:
-	rm -rf target out dist $(VENV) .venv-bench
+	rm -rf target out dist $(VENV) .venv-bench web/dist web/node_modules $(PKG) python/tumble/web

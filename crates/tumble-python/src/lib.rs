@@ -32,8 +32,12 @@ mod _engine {
     #[pymodule_init]
     fn init(module: &Bound<'_, PyModule>) -> PyResult<()> {
         module.add("version", env!("CARGO_PKG_VERSION"))?;
-        let level = tumble::math::simd::Level::available().last().map_or("scalar", |level| level.name());
-        module.add("instructions", level)?;
+        // To compare with the engine of browsers, which has no wider registers.
+        if std::env::var("TUMBLE_REGISTERS").is_ok_and(|bits| bits == "128") {
+            tumble::math::simd::hold_to(tumble::math::simd::Level::Narrow);
+            tumble_f64::math::simd::hold_to(tumble_f64::math::simd::Level::Narrow);
+        }
+        module.add("instructions", tumble::math::simd::widest().name())?;
         errors::add(module)
     }
 }

@@ -11,7 +11,7 @@ from typing import Annotated, Any
 import typer
 from typer.core import TyperGroup
 
-from tumble.cli import check, export, lab, plot, render, run, scenes
+from tumble.cli import check, export, lab, plot, render, run, scenes, view
 from tumble.cli.console import complain, survive_narrow_streams
 
 
@@ -63,6 +63,7 @@ def _root(
       tumble check sheet-on-bunny       is the step small enough?
       tumble run sheet-on-bunny         simulate into out/sheet-on-bunny
       tumble render sheet-on-bunny      look at the last frame
+      tumble view sheet-on-ball         play with it in a browser
 
     \b
     Exit codes: 0 fine; 1 the simulation failed or broke an expectation;
@@ -81,7 +82,7 @@ def application() -> typer.Typer:
         pretty_exceptions_enable=False,
         context_settings={"help_option_names": ["-h", "--help"]},
     )
-    for verb in (run.run, check.check, render.render, export.export, plot.plot, scenes.scenes):
+    for verb in (run.run, check.check, render.render, export.export, plot.plot, scenes.scenes, view.view):
         app.command()(verb)
     app.add_typer(lab.app, name="lab")
     return app

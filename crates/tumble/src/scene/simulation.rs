@@ -2,12 +2,13 @@
 
 use super::Assets;
 use super::build::{build, plans};
+use super::checks::{objects, place};
 use super::cures;
 use crate::geometry::{Collider, Shape};
 use crate::world::World;
 use std::sync::Arc;
 use tumble_interface::engine::{Cure, Engine, Ledger, Stability, StepReport, UserForce, UserIntegrator};
-use tumble_interface::scene::Integrator;
+use tumble_interface::scene::{Integrator, System};
 use tumble_interface::{Column, Frame, Issue, Scene, SceneError, StepError};
 
 /// A world together with the scene that it was built from.
@@ -40,6 +41,18 @@ impl Simulation {
     /// The scene that it was built from.
     pub fn scene(&self) -> &Scene {
         &self.scene
+    }
+
+    /// The systems, with their defaults written out.
+    pub fn plans(&self) -> Vec<System> {
+        plans(&self.scene)
+    }
+
+    /// Kind and name of every object, with the name of the system that moves it.
+    pub fn objects(&self) -> Vec<(&'static str, String, Option<String>)> {
+        let plans = self.plans();
+        let system = |kind, named| place(&plans, kind, named).map(|i| plans[i].name.clone());
+        objects(&self.scene).into_iter().map(|(kind, name, named)| (kind, name.into(), system(kind, named))).collect()
     }
 
     /// Where the moving colliders are: `translation` and `turn` of the mesh in the topology, x = turn p + translation, and

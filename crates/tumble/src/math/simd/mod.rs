@@ -5,6 +5,10 @@
 //! In kernels use `for` loops and `#[inline(always)]` functions only: closures and `array::map` become calls
 //! compiled without the wide registers.
 
+#[cfg(any(target_arch = "x86_64", all(target_arch = "wasm32", target_feature = "simd128")))]
+mod registers;
+#[cfg(all(target_arch = "wasm32", target_feature = "simd128"))]
+mod wasm;
 #[cfg(target_arch = "x86_64")]
 mod x86;
 
@@ -13,6 +17,7 @@ use super::lane::{RSQRT, newton_rsqrt};
 use super::{Lane, Real, Row};
 use pulp::Simd;
 use std::ops::{Add, Div, Mul, Neg, Sub};
+use std::sync::atomic::{AtomicU8, Ordering};
 
 /// Indices into rows 0..rows, checked at construction, so that kernels may load without checks.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
@@ -244,6 +249,26 @@ type Mask<S> = <S as Simd>::m64s;
 pub trait Registers: Simd {
     /// Whether any lane of a mask is set.
     fn any(self, mask: Mask<Self>) -> bool;
+    /// The larger of x and 0; 0 for NaN and -0, too.
+    #[cfg(not(feature = "double"))]
+    #[inline(always)]
+    fn above_zero(self, x: Register<Self>) -> Register<Self> {
+        // One instruction, which takes the second where the first is not larger.
+        self.max_f32s(x, self.splat_f32s(0.0))
+    }
+    /// The larger of x and 0; 0 for NaN and -0, too.
+    #[cfg(feature = "double")]
+    #[inline(always)]
+    fn above_zero(self, x: Register<Self>) -> Register<Self> {
+        self.max_f64s(x, self.splat_f64s(0.0))
+    }
+    /// The number whose bits are `from` less half the bits of x.
+    #[cfg(not(feature = "double"))]
+    #[inline(always)]
+    fn half_bits(self, from: u32, x: Register<Self>) -> Register<Self> {
+        let half = self.wrapping_dyn_shr_u32s(self.transmute_u32s_f32s(x), self.splat_u32s(1));
+        self.transmute_f32s_u32s(self.sub_u32s(self.splat_u32s(from), half))
+    }
 }
 
 /// A register with arithmetic operators.
@@ -254,7 +279,7 @@ pub struct Pack<S: Simd> {
 }
 
 macro_rules! operations {
-    ($splat:ident, $add:ident, $sub:ident, $mul:ident, $div:ident, $neg:ident, $sqrt:ident, $max:ident, $greater:ident, $select:ident) => {
+    ($splat:ident, $add:ident, $sub:ident, $mul:ident, $div:ident, $neg:ident, $sqrt:ident, $greater:ident, $select:ident) => {
         impl<S: Simd> Add for Pack<S> {
             type Output = Self;
             #[inline(always)]
@@ -302,10 +327,7 @@ macro_rules! operations {
             #[cfg(not(feature = "double"))]
             #[inline(always)]
             fn rsqrt(self) -> Self {
-                let s = self.simd;
-                let half = s.wrapping_dyn_shr_u32s(s.transmute_u32s_f32s(self.v), s.splat_u32s(1));
-                let guess = s.transmute_f32s_u32s(s.sub_u32s(s.splat_u32s(RSQRT), half));
-                newton_rsqrt(self, Self { simd: s, v: guess })
+                newton_rsqrt(self, Self { simd: self.simd, v: self.simd.half_bits(RSQRT, self.v) })
             }
             #[cfg(feature = "double")]
             #[inline(always)]
@@ -319,8 +341,7 @@ macro_rules! operations {
             }
             #[inline(always)]
             fn above_zero(self) -> Self {
-                // One instruction, which takes the second where the first is not larger: zero, for NaN and -0, too.
-                Self { simd: self.simd, v: self.simd.$max(self.v, self.simd.$splat(0.0)) }
+                Self { simd: self.simd, v: self.simd.above_zero(self.v) }
             }
             #[inline(always)]
             fn any_positive(self) -> bool {
@@ -331,15 +352,17 @@ macro_rules! operations {
 }
 
 #[cfg(not(feature = "double"))]
-operations!(splat_f32s, add_f32s, sub_f32s, mul_f32s, div_f32s, neg_f32s, sqrt_f32s, max_f32s, greater_than_f32s, select_f32s);
+operations!(splat_f32s, add_f32s, sub_f32s, mul_f32s, div_f32s, neg_f32s, sqrt_f32s, greater_than_f32s, select_f32s);
 #[cfg(feature = "double")]
-operations!(splat_f64s, add_f64s, sub_f64s, mul_f64s, div_f64s, neg_f64s, sqrt_f64s, max_f64s, greater_than_f64s, select_f64s);
+operations!(splat_f64s, add_f64s, sub_f64s, mul_f64s, div_f64s, neg_f64s, sqrt_f64s, greater_than_f64s, select_f64s);
 
 /// The instruction sets that a kernel can be run on, for tests that compare their bits.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Level {
     /// One number at a time.
     Scalar,
+    /// SSE4.2, or those of WebAssembly: 128-bit registers.
+    Narrow,
     /// AVX2: 256-bit registers.
     Avx2,
     /// AVX-512: 512-bit registers.
@@ -350,9 +373,9 @@ impl Level {
     /// The levels that this machine has.
     pub fn available() -> Vec<Level> {
         #[cfg(target_arch = "x86_64")]
-        let wide = [(Self::Avx2, x86::avx2().is_some()), (Self::Avx512, x86::avx512().is_some())];
+        let wide = [(Self::Narrow, x86::sse().is_some()), (Self::Avx2, x86::avx2().is_some()), (Self::Avx512, x86::avx512().is_some())];
         #[cfg(not(target_arch = "x86_64"))]
-        let wide = [];
+        let wide = [(Self::Narrow, cfg!(all(target_arch = "wasm32", target_feature = "simd128")))];
         std::iter::once(Self::Scalar).chain(wide.into_iter().filter(|(_, has)| *has).map(|(level, _)| level)).collect()
     }
 }
@@ -362,10 +385,25 @@ impl Level {
     pub fn name(self) -> &'static str {
         match self {
             Self::Scalar => "scalar",
+            Self::Narrow => "128 bits",
             Self::Avx2 => "avx2",
             Self::Avx512 => "avx512",
         }
     }
+}
+
+/// No kernel of this process uses wider registers than these.
+static WIDEST: AtomicU8 = AtomicU8::new(Level::Avx512 as u8);
+
+/// Holds all kernels of this process to registers no wider than `level`, to compare machines. The bits stay the same.
+pub fn hold_to(level: Level) {
+    WIDEST.store(level as u8, Ordering::Relaxed);
+}
+
+/// The widest registers that kernels use.
+pub fn widest() -> Level {
+    let most = WIDEST.load(Ordering::Relaxed);
+    Level::available().into_iter().rfind(|level| *level as u8 <= most).unwrap_or(Level::Scalar)
 }
 
 /// Runs a kernel on the widest registers of this machine.
@@ -374,17 +412,33 @@ pub fn dispatch<K: Kernel>(kernel: K) -> K::Output {
     dispatch_at(Level::Avx512, kernel)
 }
 
+/// The level that kernels are held to.
+#[cfg(target_arch = "x86_64")]
+fn held(most: u8) -> Level {
+    [Level::Scalar, Level::Narrow, Level::Avx2][most.min(2) as usize]
+}
+
 /// Runs a kernel on registers no wider than `level`.
 #[inline]
 pub fn dispatch_at<K: Kernel>(level: Level, kernel: K) -> K::Output {
     #[cfg(target_arch = "x86_64")]
     {
+        let most = WIDEST.load(Ordering::Relaxed);
+        let level = if level as u8 <= most { level } else { held(most) };
         if let (Level::Avx512, Some(simd)) = (level, x86::avx512()) {
             return Simd::vectorize(simd, x86::InAvx512 { kernel, simd });
         }
         if let (Level::Avx2 | Level::Avx512, Some(simd)) = (level, x86::avx2()) {
             return Simd::vectorize(simd, x86::InAvx2 { kernel, simd });
         }
+        if let (Level::Narrow | Level::Avx2 | Level::Avx512, Some(simd)) = (level, x86::sse()) {
+            return Simd::vectorize(simd, x86::InSse { kernel, simd });
+        }
+    }
+    #[cfg(all(target_arch = "wasm32", target_feature = "simd128"))]
+    if level != Level::Scalar {
+        // SAFETY: the module is compiled for these registers.
+        return kernel.run(unsafe { pulp::wasm::Simd128::new_unchecked() });
     }
     let _ = level;
     kernel.run(Scalar)

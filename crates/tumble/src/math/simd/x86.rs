@@ -1,8 +1,14 @@
-//! The registers of AVX2 and AVX-512.
+//! The registers of SSE4.2, AVX2 and AVX-512.
 
+use super::registers::{Transpose, four_packs, width};
 use super::{GUESS, Kernel, Mask, Pack, Real, Registers, Row, Width};
-use pulp::x86::{V3, V4};
+use pulp::x86::{V2, V3, V4};
 use pulp::{Simd, WithSimd, cast};
+
+pub fn sse() -> Option<V2> {
+    static TOKEN: std::sync::OnceLock<Option<V2>> = std::sync::OnceLock::new();
+    *TOKEN.get_or_init(V2::try_new)
+}
 
 pub fn avx2() -> Option<V3> {
     static TOKEN: std::sync::OnceLock<Option<V3>> = std::sync::OnceLock::new();
@@ -30,8 +36,22 @@ macro_rules! entry {
         }
     };
 }
+entry!(InSse, V2);
 entry!(InAvx2, V3);
 entry!(InAvx512, V4);
+
+impl Registers for V2 {
+    #[inline(always)]
+    fn any(self, mask: Mask<Self>) -> bool {
+        self.sse._mm_movemask_ps(cast(mask)) != 0
+    }
+    #[cfg(not(feature = "double"))]
+    #[inline(always)]
+    fn half_bits(self, from: u32, x: Self::f32s) -> Self::f32s {
+        let half = self.sse2._mm_srli_epi32::<1>(cast(x));
+        cast(self.sse2._mm_sub_epi32(cast(self.splat_u32s(from)), half))
+    }
+}
 
 impl Registers for V3 {
     #[inline(always)]
@@ -47,159 +67,15 @@ impl Registers for V4 {
     }
 }
 
-/// Everything that does not depend on how rows are transposed.
-macro_rules! width {
-    ($token:ident, $n:expr, $splat:ident, $fused:ident, $guess:expr, $estimates:expr, $estimate:expr, $floor:expr, $whole:expr) => {
-        impl Width for $token {
-            type L = Pack<$token>;
-            const N: usize = $n;
-            #[inline(always)]
-            fn splat(self, c: Real) -> Self::L {
-                Pack { simd: self, v: self.$splat(c) }
-            }
-            #[inline(always)]
-            fn load(self, from: &[Real]) -> Self::L {
-                // Not pulp's partial load, which is a call.
-                let mut numbers = [0.0; $n];
-                numbers.copy_from_slice(&from[..$n]);
-                Pack { simd: self, v: cast::<[Real; $n], _>(numbers) }
-            }
-            #[inline(always)]
-            fn store(self, v: Self::L, to: &mut [Real]) {
-                to[..$n].copy_from_slice(&cast::<_, [Real; $n]>(v.v));
-            }
-            #[inline(always)]
-            unsafe fn gather(self, rows: &[Row], index: &[u32]) -> [Self::L; 4] {
-                let index = &index[..$n];
-                let mut picked = [[0.0; 4]; $n];
-                for i in 0..$n {
-                    debug_assert!((index[i] as usize) < rows.len());
-                    // SAFETY: the caller has checked the indices.
-                    picked[i] = unsafe { *rows.get_unchecked(index[i] as usize) };
-                }
-                self.transpose(picked)
-            }
-            #[inline(always)]
-            unsafe fn pairs(self, from: &[Real], index: &[i32]) -> [Self::L; 2] {
-                let mut at = [0; $n];
-                at.copy_from_slice(&index[..$n]);
-                debug_assert!(at.iter().all(|i| *i >= 0 && (*i as usize) + 1 < from.len()));
-                // SAFETY: the caller has checked the indices.
-                unsafe { self.pairs_at(from.as_ptr(), at) }
-            }
-            #[inline(always)]
-            unsafe fn quads(self, from: &[Real], index: &[i32]) -> [Self::L; 4] {
-                let index = &index[..$n];
-                let mut picked = [[0.0; 4]; $n];
-                for i in 0..$n {
-                    debug_assert!(index[i] >= 0 && (index[i] as usize) + 3 < from.len());
-                    // SAFETY: the caller has checked the indices; an array of numbers is aligned as one of them.
-                    picked[i] = unsafe { *from.as_ptr().add(index[i] as usize).cast::<Row>() };
-                }
-                self.transpose(picked)
-            }
-            #[inline(always)]
-            fn floor(self, x: Self::L) -> Self::L {
-                Pack { simd: self, v: cast($floor(self, cast(x.v))) }
-            }
-            #[inline(always)]
-            fn whole(self, x: Self::L, to: &mut [i32]) {
-                to[..$n].copy_from_slice(&cast::<_, [i32; $n]>($whole(self, cast(x.v))));
-            }
-            #[inline(always)]
-            fn scatter(self, v: [Self::L; 4], rows: &mut [Row], start: usize, stride: usize) {
-                if stride == 1 {
-                    let run = self.untranspose_run(v);
-                    let to = rows[start..start + $n].as_flattened_mut();
-                    for i in 0..4 {
-                        self.store(run[i], &mut to[i * $n..]);
-                    }
-                    return;
-                }
-                let untransposed = self.untranspose(v);
-                assert!(start + ($n - 1) * stride < rows.len());
-                for i in 0..$n {
-                    rows[start + i * stride] = untransposed[i];
-                }
-            }
-            #[inline(always)]
-            fn rows(self, rows: &[Row], start: usize) -> [Self::L; 4] {
-                let from = rows[start..start + $n].as_flattened();
-                let mut run = [self.splat(0.0); 4];
-                for i in 0..4 {
-                    run[i] = self.load(&from[i * $n..]);
-                }
-                self.transpose_run(run)
-            }
-            #[inline(always)]
-            fn add_to_rows(self, v: [Self::L; 4], rows: &mut [Row], start: usize) {
-                let run = self.untranspose_run(v);
-                let to = rows[start..start + $n].as_flattened_mut();
-                for i in 0..4 {
-                    let here = &mut to[i * $n..];
-                    self.store(self.load(here) + run[i], here);
-                }
-            }
-            #[inline(always)]
-            fn spread(self, of_rows: &[Real], at: usize) -> Self::L {
-                let mut numbers = [0.0; $n / 4];
-                numbers.copy_from_slice(&of_rows[at / 4..at / 4 + $n / 4]);
-                self.each_four_times(numbers)
-            }
-            #[inline(always)]
-            fn guess(self, x: Self::L) -> Self::L {
-                Pack { simd: self, v: $guess(self, x.v) }
-            }
-            #[inline(always)]
-            fn fused(self, a: Self::L, b: Self::L, c: Self::L) -> Self::L {
-                Pack { simd: self, v: self.$fused(a.v, b.v, c.v) }
-            }
-            const ESTIMATES: bool = $estimates;
-            #[inline(always)]
-            fn estimate(self, x: Self::L) -> Self::L {
-                Pack { simd: self, v: $estimate(self, x.v) }
-            }
-        }
-    };
-}
-
-/// Rows of four numbers to four registers with x, y, z and w and back; consecutive rows fill four registers, too.
-trait Transpose: Simd {
-    type Rows;
-    type OfRows;
-    /// a a a a b b b b ...
-    fn each_four_times(self, numbers: Self::OfRows) -> Pack<Self>;
-    fn transpose(self, rows: Self::Rows) -> [Pack<Self>; 4];
-    type Index;
-    /// # Safety
-    /// All indices and those after them are inside.
-    unsafe fn pairs_at(self, from: *const Real, index: Self::Index) -> [Pack<Self>; 2];
-    fn untranspose(self, v: [Pack<Self>; 4]) -> Self::Rows;
-    fn transpose_run(self, run: [Pack<Self>; 4]) -> [Pack<Self>; 4];
-    fn untranspose_run(self, v: [Pack<Self>; 4]) -> [Pack<Self>; 4];
-}
-
-macro_rules! four_packs {
-    ($simd:expr, [$x:expr, $y:expr, $z:expr, $w:expr]) => {
-        [
-            Pack { simd: $simd, v: cast($x) },
-            Pack { simd: $simd, v: cast($y) },
-            Pack { simd: $simd, v: cast($z) },
-            Pack { simd: $simd, v: cast($w) },
-        ]
-    };
-}
-
 #[cfg(not(feature = "double"))]
 mod single {
     use super::*;
-    use std::arch::x86_64::{__m256, __m512};
+    use std::arch::x86_64::{__m128, __m256, __m512};
 
     /// GUESS - bits/2.
     #[inline(always)]
-    fn guess<S: Simd>(s: S, x: S::f32s) -> S::f32s {
-        let half = s.wrapping_dyn_shr_u32s(s.transmute_u32s_f32s(x), s.splat_u32s(1));
-        s.transmute_f32s_u32s(s.sub_u32s(s.splat_u32s(GUESS), half))
+    fn guess<S: Registers>(s: S, x: S::f32s) -> S::f32s {
+        s.half_bits(GUESS, x)
     }
 
     #[inline(always)]
@@ -207,10 +83,21 @@ mod single {
         cast(s.avx512f._mm512_rsqrt14_ps(cast(x)))
     }
 
-    width!(V3, 8, splat_f32s, mul_add_f32s, guess, false, guess, |s: V3, x| s.avx._mm256_floor_ps(x), |s: V3, x| s
-        .avx
-        ._mm256_cvttps_epi32(x));
-    width!(V4, 16, splat_f32s, mul_add_f32s, guess, true, estimate, |s: V4, x| s.avx512f._mm512_roundscale_ps::<1>(x), |s: V4, x| s
+    /// a b + c, rounded once.
+    #[inline(always)]
+    fn fused<S: Simd>(s: S, a: S::f32s, b: S::f32s, c: S::f32s) -> S::f32s {
+        s.mul_add_f32s(a, b, c)
+    }
+
+    /// a b + c where no instruction rounds once.
+    #[inline(always)]
+    fn apart(s: V2, a: <V2 as Simd>::f32s, b: <V2 as Simd>::f32s, c: <V2 as Simd>::f32s) -> <V2 as Simd>::f32s {
+        s.add_f32s(s.mul_f32s(a, b), c)
+    }
+
+    width!(V2, 4, splat_f32s, apart, guess, false, guess, |s: V2, x| s.sse4_1._mm_floor_ps(x), |s: V2, x| s.sse2._mm_cvttps_epi32(x));
+    width!(V3, 8, splat_f32s, fused, guess, false, guess, |s: V3, x| s.avx._mm256_floor_ps(x), |s: V3, x| s.avx._mm256_cvttps_epi32(x));
+    width!(V4, 16, splat_f32s, fused, guess, true, estimate, |s: V4, x| s.avx512f._mm512_roundscale_ps::<1>(x), |s: V4, x| s
         .avx512f
         ._mm512_cvttps_epi32(x));
 
@@ -221,6 +108,49 @@ mod single {
             let (ef, gh) = ($s.$hi($a, $b), $s.$hi($c, $d));
             [$s.$shuffle::<0x44>(ab, cd), $s.$shuffle::<0xEE>(ab, cd), $s.$shuffle::<0x44>(ef, gh), $s.$shuffle::<0xEE>(ef, gh)]
         }};
+    }
+
+    impl Transpose for V2 {
+        type Rows = [Row; 4];
+        type Index = [i32; 4];
+        #[inline(always)]
+        unsafe fn pairs_at(self, from: *const f32, index: [i32; 4]) -> [Pack<Self>; 2] {
+            let from = from.cast::<f64>();
+            let mut p = [0.0_f64; 4];
+            for l in 0..4 {
+                // SAFETY: the caller has checked the indices.
+                p[l] = unsafe { from.byte_add(4 * index[l] as usize).read_unaligned() };
+            }
+            let (s, [low, high]): (_, [__m128; 2]) = (self.sse, cast(p));
+            let pack = |v: __m128| Pack { simd: self, v: cast(v) };
+            [pack(s._mm_shuffle_ps::<0x88>(low, high)), pack(s._mm_shuffle_ps::<0xDD>(low, high))]
+        }
+        type OfRows = [f32; 1];
+        #[inline(always)]
+        fn each_four_times(self, [a]: [f32; 1]) -> Pack<Self> {
+            Pack { simd: self, v: self.splat_f32s(a) }
+        }
+        #[inline(always)]
+        fn transpose(self, r: [Row; 4]) -> [Pack<Self>; 4] {
+            let s = self.sse;
+            let [a, b, c, d] = [cast(r[0]), cast(r[1]), cast(r[2]), cast(r[3])];
+            let [x, y, z, w] = four_by_four!(s, _mm_unpacklo_ps, _mm_unpackhi_ps, _mm_shuffle_ps, [a, b, c, d]);
+            four_packs!(self, [x, y, z, w])
+        }
+        #[inline(always)]
+        fn untranspose(self, v: [Pack<Self>; 4]) -> [Row; 4] {
+            let rows = self.untranspose_run(v);
+            [cast(rows[0].v), cast(rows[1].v), cast(rows[2].v), cast(rows[3].v)]
+        }
+        #[inline(always)]
+        fn transpose_run(self, run: [Pack<Self>; 4]) -> [Pack<Self>; 4] {
+            self.transpose([cast(run[0].v), cast(run[1].v), cast(run[2].v), cast(run[3].v)])
+        }
+        #[inline(always)]
+        fn untranspose_run(self, v: [Pack<Self>; 4]) -> [Pack<Self>; 4] {
+            // A row is a register: there and back is the same.
+            self.transpose_run(v)
+        }
     }
 
     impl Transpose for V3 {
@@ -375,7 +305,7 @@ mod single {
 #[cfg(feature = "double")]
 mod double {
     use super::*;
-    use std::arch::x86_64::{__m256d, __m512d};
+    use std::arch::x86_64::{__m128d, __m256d, __m512d};
 
     /// GUESS - bits/2.
     #[inline(always)]
@@ -396,12 +326,43 @@ mod double {
         cast(s.avx512f._mm512_rsqrt14_pd(cast(x)))
     }
 
-    width!(V3, 4, splat_f64s, mul_add_f64s, guess3, false, guess3, |s: V3, x| s.avx._mm256_floor_pd(x), |s: V3, x| s
-        .avx
-        ._mm256_cvttpd_epi32(x));
-    width!(V4, 8, splat_f64s, mul_add_f64s, guess4, true, estimate, |s: V4, x| s.avx512f._mm512_roundscale_pd::<1>(x), |s: V4, x| s
+    /// GUESS - bits/2.
+    #[inline(always)]
+    fn guess2(s: V2, x: <V2 as Simd>::f64s) -> <V2 as Simd>::f64s {
+        let half = s.sse2._mm_srli_epi64::<1>(cast(x));
+        cast(s.sse2._mm_sub_epi64(cast(s.splat_u64s(GUESS)), half))
+    }
+
+    /// a b + c, rounded once.
+    #[inline(always)]
+    fn fused<S: Simd>(s: S, a: S::f64s, b: S::f64s, c: S::f64s) -> S::f64s {
+        s.mul_add_f64s(a, b, c)
+    }
+
+    /// a b + c where no instruction rounds once.
+    #[inline(always)]
+    fn apart(s: V2, a: <V2 as Simd>::f64s, b: <V2 as Simd>::f64s, c: <V2 as Simd>::f64s) -> <V2 as Simd>::f64s {
+        s.add_f64s(s.mul_f64s(a, b), c)
+    }
+
+    /// Two whole numbers; the upper half of the register holds zeros.
+    #[inline(always)]
+    fn whole2(s: V2, x: __m128d) -> [i32; 2] {
+        let [a, b, _, _]: [i32; 4] = cast(s.sse2._mm_cvttpd_epi32(x));
+        [a, b]
+    }
+
+    width!(V2, 2, splat_f64s, apart, guess2, false, guess2, |s: V2, x| s.sse4_1._mm_floor_pd(x), whole2);
+    width!(V3, 4, splat_f64s, fused, guess3, false, guess3, |s: V3, x| s.avx._mm256_floor_pd(x), |s: V3, x| s.avx._mm256_cvttpd_epi32(x));
+    width!(V4, 8, splat_f64s, fused, guess4, true, estimate, |s: V4, x| s.avx512f._mm512_roundscale_pd::<1>(x), |s: V4, x| s
         .avx512f
         ._mm512_cvttpd_epi32(x));
+
+    /// Transposes two by two; its own inverse.
+    #[inline(always)]
+    fn two_by_two(s: V2, a: __m128d, b: __m128d) -> [__m128d; 2] {
+        [s.sse2._mm_unpacklo_pd(a, b), s.sse2._mm_unpackhi_pd(a, b)]
+    }
 
     /// Transposes four by four; its own inverse.
     #[inline(always)]
@@ -414,6 +375,46 @@ mod double {
             s._mm256_permute2f128_pd::<0x31>(ab, cd),
             s._mm256_permute2f128_pd::<0x31>(ef, gh),
         ]
+    }
+
+    impl Transpose for V2 {
+        type Rows = [Row; 2];
+        type Index = [i32; 2];
+        #[inline(always)]
+        unsafe fn pairs_at(self, from: *const f64, i: [i32; 2]) -> [Pack<Self>; 2] {
+            let mut p = [[0.0; 2]; 2];
+            for l in 0..2 {
+                // SAFETY: the caller has checked the indices.
+                p[l] = unsafe { *from.add(i[l] as usize).cast::<[f64; 2]>() };
+            }
+            let [low, high] = two_by_two(self, cast(p[0]), cast(p[1]));
+            [Pack { simd: self, v: cast(low) }, Pack { simd: self, v: cast(high) }]
+        }
+        type OfRows = [f64; 1];
+        #[inline(always)]
+        fn each_four_times(self, [a]: [f64; 1]) -> Pack<Self> {
+            Pack { simd: self, v: self.splat_f64s(a) }
+        }
+        #[inline(always)]
+        fn transpose(self, r: [Row; 2]) -> [Pack<Self>; 4] {
+            let [a, b, c, d]: [__m128d; 4] = cast(r);
+            let ([x, y], [z, w]) = (two_by_two(self, a, c), two_by_two(self, b, d));
+            four_packs!(self, [x, y, z, w])
+        }
+        #[inline(always)]
+        fn untranspose(self, [x, y, z, w]: [Pack<Self>; 4]) -> [Row; 2] {
+            let ([a, c], [b, d]) = (two_by_two(self, cast(x.v), cast(y.v)), two_by_two(self, cast(z.v), cast(w.v)));
+            cast([a, b, c, d])
+        }
+        #[inline(always)]
+        fn transpose_run(self, run: [Pack<Self>; 4]) -> [Pack<Self>; 4] {
+            self.transpose(cast([run[0].v, run[1].v, run[2].v, run[3].v]))
+        }
+        #[inline(always)]
+        fn untranspose_run(self, v: [Pack<Self>; 4]) -> [Pack<Self>; 4] {
+            let [a, b, c, d]: [__m128d; 4] = cast(self.untranspose(v));
+            four_packs!(self, [a, b, c, d])
+        }
     }
 
     impl Transpose for V3 {

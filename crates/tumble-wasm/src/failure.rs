@@ -1,0 +1,47 @@
+//! What goes wrong, as the page reads it.
+
+use serde::Serialize;
+use tumble_interface::{Issue, SceneError, StepError};
+
+/// `Failure` of web/src/engine/protocol.ts.
+#[derive(Serialize)]
+pub struct Failure {
+    kind: &'static str,
+    message: String,
+    issues: Vec<Issue>,
+    line: Option<usize>,
+    path: Option<String>,
+    missing: Vec<String>,
+}
+
+impl Failure {
+    fn new(kind: &'static str, message: String) -> Self {
+        Self { kind, message, issues: Vec::new(), line: None, path: None, missing: Vec::new() }
+    }
+
+    /// More than the browser has.
+    pub fn limit(message: String) -> Self {
+        Self::new("limit", message)
+    }
+
+    /// A step that failed.
+    pub fn step(error: &StepError) -> Self {
+        Self::new("step", error.to_string())
+    }
+
+    /// The same, with the mesh files that are missing.
+    pub fn missing(mut self, files: Vec<String>) -> Self {
+        self.missing = files;
+        self
+    }
+}
+
+impl From<SceneError> for Failure {
+    fn from(error: SceneError) -> Self {
+        let mut failure = Self::new("scene", error.to_string());
+        failure.line = error.issues.first().and_then(|issue| issue.line);
+        failure.path = error.issues.first().map(|issue| issue.path.clone());
+        failure.issues = error.issues;
+        failure
+    }
+}

@@ -1,0 +1,191 @@
+//! From text and bytes to a world, within what a browser can hold.
+
+use crate::engine::scene::{Assets, Simulation, memory};
+use crate::failure::Failure;
+use serde::Serialize;
+use std::collections::HashMap;
+use std::sync::Arc;
+use tumble_interface::engine::Engine;
+use tumble_interface::tree::Node;
+use tumble_interface::{Issue, Mesh, Scene, SceneError};
+use tumble_io::Format;
+use twox_hash::XxHash3_64;
+
+/// Longest text of a scene [bytes].
+const MOST_TEXT: usize = 8 << 20;
+/// All meshes of a scene together [bytes].
+const MOST_FILES: usize = 64 << 20;
+/// Largest estimate of the memory of a scene [GiB]: a module can have four, and memory once taken is not given back.
+const MOST_MEMORY: f64 = 1.5;
+
+/// A scene, as it was given and as it moves.
+pub struct Loaded {
+    pub world: Simulation,
+    node: Node,
+    scene: Scene,
+    files: Files,
+    memory: f64,
+}
+
+/// Meshes with the hash of their files.
+type Files = Arc<HashMap<String, (Mesh, String)>>;
+
+/// The tree of a scene, in TOML or JSON, with its overrides.
+pub fn tree(text: &str, overrides: &[String]) -> Result<Node, SceneError> {
+    let mut node = if text.trim_start().starts_with('{') { Node::from_json(text)? } else { Node::from_toml(text)? };
+    overrides.iter().try_for_each(|assignment| node.set_text(assignment))?;
+    Ok(node)
+}
+
+impl Loaded {
+    pub fn new(toml: &str, overrides: &[String], files: Vec<(String, Vec<u8>)>) -> Result<Self, Failure> {
+        if toml.len() > MOST_TEXT {
+            let size = toml.len() >> 20;
+            return Err(Failure::limit(format!("the text of the scene has {size} MiB, the limit here is {} MiB", MOST_TEXT >> 20)));
+        }
+        let size: usize = files.iter().map(|(_, bytes)| bytes.len()).sum();
+        if size > MOST_FILES {
+            return Err(Failure::limit(format!("the meshes have {} MiB, the limit here is {} MiB", size >> 20, MOST_FILES >> 20)));
+        }
+        let mut meshes = HashMap::new();
+        for (path, bytes) in files {
+            let wrong = |message: String| SceneError::one("", format!("\"{path}\": {message}"));
+            let format = Format::from_path(&path).ok_or_else(|| wrong("it has none of the suffixes .obj, .ply, .stl, .glb".into()))?;
+            let mesh = tumble_io::mesh(&bytes, format).map_err(|e| wrong(e.to_string()))?;
+            meshes.insert(path, (mesh, format!("{:016x}", XxHash3_64::oneshot(&bytes))));
+        }
+        Self::build(tree(toml, overrides)?, Arc::new(meshes))
+    }
+
+    /// The same with another value at a path.
+    pub fn changed(&self, path: &str, value: Node) -> Result<Self, Failure> {
+        let mut node = self.node.clone();
+        node.set(path, value)?;
+        Self::build(node, self.files.clone())
+    }
+
+    /// The same at its start.
+    pub fn again(&self) -> Result<Self, Failure> {
+        Self::build(self.node.clone(), self.files.clone())
+    }
+
+    fn build(node: Node, files: Files) -> Result<Self, Failure> {
+        let lines = |error: SceneError| -> Failure { with_lines(error, &node).into() };
+        let mut scene = Scene::from_tree(&node).map_err(lines)?;
+        let assets = assets(&mut scene, &files).map_err(|(error, missing)| lines(error).missing(missing))?;
+        let bytes = memory(&scene, &assets);
+        let gibibytes = bytes / 1024.0_f64.powi(3);
+        if gibibytes > MOST_MEMORY {
+            return Err(Failure::limit(format!(
+                "the scene needs about {gibibytes:.1} GiB, the limit in a browser is {MOST_MEMORY} GiB; lower a resolution, a count, a rate or a lifetime, or run it with `tumble run`"
+            )));
+        }
+        let world = Simulation::new(scene.clone(), assets).map_err(lines)?;
+        Ok(Self { world, node, scene, files, memory: bytes })
+    }
+
+    /// What the index of a frame means: its length and its exchanges.
+    pub fn clock(&self) -> (f64, u32) {
+        (self.scene.time.fps, self.scene.time.exchanges)
+    }
+
+    /// The scene.
+    pub fn scene(&self) -> &Scene {
+        &self.scene
+    }
+
+    /// An error as it is thrown, with its lines.
+    pub fn wrong(&self, error: SceneError) -> wasm_bindgen::JsValue {
+        crate::thrown(with_lines(error, &self.node).into())
+    }
+
+    /// JSON of `SceneInfo`.
+    pub fn info(&self) -> impl Serialize + '_ {
+        let objects = self.world.objects();
+        let colliders = self.scene.collider.iter().map(|c| Object { name: c.name.clone(), kind: "collider", system: None });
+        let systems = self.world.plans().into_iter().map(|plan| System {
+            name: plan.name,
+            method: plan.method.name(),
+            integrator: plan.integrator.name(),
+        });
+        Info {
+            title: &self.scene.title,
+            fps: self.scene.time.fps,
+            frames: self.scene.time.frames,
+            dt: self.scene.frame_time(),
+            dimension: self.scene.dimension,
+            plane: &self.scene.plane,
+            precision: &self.scene.precision,
+            objects: objects.into_iter().map(|(kind, name, system)| Object { name, kind, system }).chain(colliders).collect(),
+            systems: systems.collect(),
+            columns: &self.scene.output.columns,
+            scene: self.scene.to_json(),
+            warnings: self.world.warnings(),
+            hash: format!("{:016x}", self.world.hash()),
+            memory: self.memory,
+        }
+    }
+}
+
+#[derive(Serialize)]
+struct Object {
+    name: String,
+    kind: &'static str,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    system: Option<String>,
+}
+
+#[derive(Serialize)]
+struct System {
+    name: String,
+    method: &'static str,
+    integrator: &'static str,
+}
+
+#[derive(Serialize)]
+struct Info<'a> {
+    title: &'a str,
+    fps: f64,
+    frames: u32,
+    dt: f64,
+    dimension: u8,
+    plane: &'a tumble_interface::scene::Plane,
+    precision: &'a tumble_interface::scene::Precision,
+    objects: Vec<Object>,
+    systems: Vec<System>,
+    columns: &'a [String],
+    scene: serde_json::Value,
+    warnings: &'a [String],
+    hash: String,
+    memory: f64,
+}
+
+fn with_lines(mut error: SceneError, node: &Node) -> SceneError {
+    for issue in &mut error.issues {
+        issue.line = issue.line.or_else(|| node.line_of(&issue.path));
+    }
+    error.issues.sort_by_key(|issue| issue.line);
+    error
+}
+
+/// The meshes that the scene names, with the hashes of their content noted; or what is missing.
+fn assets(scene: &mut Scene, files: &Files) -> Result<Assets, (SceneError, Vec<String>)> {
+    let (mut assets, mut issues, mut missing) = (HashMap::new(), Vec::new(), Vec::new());
+    for file in scene.mesh_files_mut() {
+        let Some((mesh, hash)) = files.get(file.path) else {
+            issues.push(Issue::new(format!("{}.path", file.place), format!("there is no file \"{}\"; drop it on the page", file.path)));
+            if !missing.iter().any(|path| path == file.path) {
+                missing.push(file.path.to_string());
+            }
+            continue;
+        };
+        if file.hash.as_ref().is_some_and(|wanted| wanted != hash) {
+            let message =
+                format!("the content of \"{}\" has changed since this scene was resolved; give the old file, or leave out hash", file.path);
+            issues.push(Issue::new(format!("{}.hash", file.place), message));
+        }
+        *file.hash = Some(hash.clone());
+        assets.insert(file.path.to_string(), mesh.clone());
+    }
+    if issues.is_empty() { Ok(Arc::new(assets)) } else { Err((SceneError { issues }, missing)) }
+}

@@ -1,0 +1,115 @@
+"""`tumble view`: what is served, and what is not."""
+
+import base64
+import json
+import signal
+import subprocess
+import sys
+import threading
+import urllib.error
+import urllib.request
+import zlib
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+import pytest
+from conftest import Answer
+from runs import Tree
+
+from tumble import __version__
+from tumble.cli import find, view
+
+Command = Callable[..., Answer]
+SceneFile = Callable[..., Path]
+
+
+@pytest.fixture
+def built(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    folder = tmp_path / "web"
+    (folder / "assets").mkdir(parents=True)
+    (folder / "index.html").write_text("<title>tumble</title>")
+    (folder / "assets" / "a.wasm").write_bytes(b"\0asm")
+    (folder / "assets" / "a.js").write_text("export {}")
+    (tmp_path / "secret").write_text("secret")
+    monkeypatch.setattr(view, "BUILT", folder)
+    return folder
+
+
+@pytest.fixture
+def site(built: Path, tmp_path: Path) -> Iterator[str]:
+    mesh = tmp_path / "my mesh (1).ply"
+    mesh.write_text("ply")
+    with view.server(0, {"../my mesh (1).ply": mesh}) as served:
+        thread = threading.Thread(target=served.serve_forever)
+        thread.start()
+        yield f"http://127.0.0.1:{served.server_port}"
+        served.shutdown()
+        thread.join()
+
+
+def get(url: str) -> tuple[int, str, bytes]:
+    try:
+        with urllib.request.urlopen(url, timeout=10) as answer:
+            return answer.status, answer.headers["Content-Type"], answer.read()
+    except urllib.error.HTTPError as error:
+        return error.code, "", b""
+
+
+def test_the_laboratory_is_served_with_its_types(site: str) -> None:
+    assert get(f"{site}/?view")[1:] == ("text/html", b"<title>tumble</title>")
+    assert get(f"{site}/assets/a.wasm")[1:] == ("application/wasm", b"\0asm")
+    assert get(f"{site}/assets/a.js")[1] == "text/javascript"
+
+
+def test_the_meshes_of_the_scene_are_served_and_nothing_else(site: str) -> None:
+    # encodeURIComponent leaves the parentheses as they are.
+    assert get(f"{site}/view/..%2Fmy%20mesh%20(1).ply")[2] == b"ply"
+    for path in ("view/..%2Fsecret", "view/other.ply", "..%2Fsecret", "%2e%2e/secret", "assets/", "view/"):
+        assert get(f"{site}/{path}")[0] == 404, path
+
+
+def test_a_scene_that_ships_is_opened_by_name(built: Path) -> None:
+    fragment, meshes = view.address("sheet-on-bunny", None)
+    assert fragment == "scene/drape/sheet-on-bunny"
+    assert [path.resolve() for path in meshes.values()] == [find.SCENES / "assets" / "bunny.ply"]
+
+
+def test_any_other_scene_is_in_the_link(built: Path, spring: Tree, scene_file: SceneFile) -> None:
+    file = scene_file(spring)
+    fragment, meshes = view.address(str(file), ["time.fps=30"])
+    assert fragment.startswith("s/") and meshes == {}
+    packed = fragment.removeprefix("s/")
+    tree = json.loads(zlib.decompress(base64.urlsafe_b64decode(packed + "=" * (-len(packed) % 4)), wbits=-15))
+    assert tree == [1, __version__, file.read_text(), ["time.fps=30"], 0, ""]
+    assert view.address("rope", ["time.fps=30"])[0].startswith("s/")
+
+
+def test_wrong_scenes_are_told_before_anything_is_served(
+    built: Path, spring: Tree, scene_file: SceneFile, tumble: Command
+) -> None:
+    answer = tumble("view", scene_file(spring | {"time": {"fps": -1}}), "--no-open")
+    assert answer.code == 2 and "expected > 0" in answer.err
+    long = scene_file(spring)
+    long.write_text(long.read_text() + " " * view.LARGEST)
+    answer = tumble("view", long, "--no-open")
+    assert answer.code == 2 and "2 MB" in answer.err
+
+
+def test_what_is_not_built_is_said(built: Path, tumble: Command) -> None:
+    (built / "index.html").unlink()
+    answer = tumble("view", "--no-open")
+    assert answer.code == 1 and "make web" in answer.err
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="no SIGINT to a child")
+def test_ctrl_c_ends_it(built: Path) -> None:
+    code = f"from pathlib import Path; from tumble.cli import main, view; view.BUILT = Path({str(built)!r}); main()"
+    command = [sys.executable, "-c", code, "view", "rope", "--no-open"]
+    with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as child:
+        assert child.stdout is not None
+        url = child.stdout.readline()
+        assert url.startswith("http://127.0.0.1:") and url.endswith("/?view#/scene/structures/rope\n")
+        assert get(url.split("#")[0])[0] == 200
+        child.send_signal(signal.SIGINT)
+        _, errors = child.communicate(timeout=20)
+    assert child.returncode == 0 and errors == ""

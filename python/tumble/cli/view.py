@@ -1,0 +1,134 @@
+"""`tumble view`: the browser laboratory, served from this machine, with a scene opened."""
+
+import base64
+import json
+import mimetypes
+import zlib
+from collections.abc import Mapping
+from http.server import SimpleHTTPRequestHandler, ThreadingHTTPServer
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+from urllib.parse import quote, unquote, urlsplit
+
+import typer
+
+from tumble.cli import find
+from tumble.cli.console import say
+
+if TYPE_CHECKING:
+    from tumble import Scene
+
+BUILT = Path(__file__).resolve().parent.parent / "web"
+"""What `make web` builds."""
+
+LARGEST = 2_000_000
+"""Bytes of a scene's text that a link may hold; web/src/share.ts has the same."""
+
+_TYPES = {".js": "text/javascript", ".wasm": "application/wasm", ".css": "text/css", ".webp": "image/webp"}
+
+
+def view(
+    scene: Annotated[
+        str | None,
+        typer.Argument(
+            metavar="[SCENE]",
+            help="A .toml or .json file, or the name of a scene from `tumble scenes`; without it, the gallery.",
+        ),
+    ] = None,
+    set: find.SetOption = None,
+    port: Annotated[int, typer.Option(min=0, max=65535, metavar="N", help="Port; 0 takes any free one.")] = 0,
+    open: Annotated[bool, typer.Option("--open/--no-open", help="Open a browser.")] = True,
+) -> None:
+    """Run a scene in a browser, with everything to change by hand.
+
+    Nothing leaves this machine. Ctrl-C ends it.
+
+    \b
+    Examples:
+      tumble view rope
+      tumble view my.toml --set time.fps=30
+    """
+    from tumble import TumbleError
+
+    if not (BUILT / "index.html").is_file():
+        raise TumbleError(f"{BUILT} does not hold the browser laboratory; `make web` builds it")
+    fragment, meshes = ("", {}) if scene is None else address(scene, set)
+    with server(port, meshes) as served:
+        url = f"http://127.0.0.1:{served.server_port}/?view#/{fragment}"
+        say(f"{url}\nCtrl-C ends it")
+        if open:
+            import webbrowser
+
+            webbrowser.open(url)
+        try:
+            served.serve_forever()
+        except KeyboardInterrupt:
+            say()
+
+
+def address(argument: str, overrides: list[str] | None) -> tuple[str, dict[str, Path]]:
+    """What stands behind `#/` to open a scene, and the files of its meshes by the paths in it."""
+    from tumble import SceneError
+
+    file = find.scene_file(argument)
+    checked = find.scene(argument, overrides)
+    meshes = {path: Path(checked.folder) / path for path in _meshes(checked)}
+    shipped = {path: name for name, path in find.shipped().items()}
+    if file in shipped and not overrides:
+        return f"scene/{shipped[file]}", meshes
+    text = file.read_text(encoding="utf-8")
+    if len(text.encode()) > LARGEST:
+        raise SceneError(f"{file}: the browser takes scenes of up to {LARGEST // 1_000_000} MB of text")
+    return f"s/{link(text, overrides or [])}", meshes
+
+
+def link(text: str, overrides: list[str]) -> str:
+    """A scene as web/src/share.ts reads it."""
+    from tumble import __version__
+
+    tree = json.dumps([1, __version__, text, overrides, 0, ""], ensure_ascii=False)
+    packer = zlib.compressobj(9, wbits=-15)
+    packed = packer.compress(tree.encode()) + packer.flush()
+    return base64.urlsafe_b64encode(packed).decode().rstrip("=")
+
+
+def _meshes(scene: "Scene") -> list[str]:
+    """Paths of the mesh files that a scene names."""
+
+    def walk(node: Any) -> list[str]:
+        if isinstance(node, dict):
+            own = [node["path"]] if isinstance(node.get("path"), str) and "hash" in node else []
+            return own + [path for below in node.values() for path in walk(below)]
+        return [path for below in node for path in walk(below)] if isinstance(node, list) else []
+
+    return list(dict.fromkeys(walk(scene.to_dict())))
+
+
+def server(port: int, meshes: Mapping[str, Path]) -> ThreadingHTTPServer:
+    """Serves the laboratory, and at view/PATH the meshes, to this machine alone."""
+    files = {f"/view/{quote(path, safe='')}": file for path, file in meshes.items()}
+
+    class Handler(SimpleHTTPRequestHandler):
+        def __init__(self, *arguments: Any, **options: Any) -> None:
+            self.extensions_map = {**mimetypes.types_map, **_TYPES, "": "application/octet-stream"}
+            super().__init__(*arguments, directory=str(BUILT), **options)
+
+        def translate_path(self, path: str) -> str:
+            own = urlsplit(path).path
+            if own.startswith("/view/"):
+                found = files.get(f"/view/{quote(unquote(own.removeprefix('/view/')), safe='')}")
+                return str(found) if found else str(BUILT / "view")
+            return super().translate_path(path)
+
+        def end_headers(self) -> None:
+            self.send_header("Cache-Control", "no-cache")
+            self.send_header("X-Content-Type-Options", "nosniff")
+            super().end_headers()
+
+        def list_directory(self, path: Any) -> None:
+            self.send_error(404)
+
+        def log_message(self, format: str, *arguments: Any) -> None:
+            pass
+
+    return ThreadingHTTPServer(("127.0.0.1", port), Handler)

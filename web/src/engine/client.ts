@@ -1,0 +1,247 @@
+/** The page's side: questions as promises, and a new worker where the old one died or hangs. */
+
+import type {
+  Answer, Cure, Failure, Files, Frame, Notice, Question, SceneInfo, Stability, Value, Vector,
+} from "./protocol";
+
+/** What a question was answered with when it could not be done. */
+export class EngineError extends Error {
+  constructor(readonly failure: Failure) {
+    super(failure.message);
+    this.name = "EngineError";
+  }
+}
+
+/** Milliseconds after which a worker that does not answer is taken for dead. */
+const PATIENCE = { load: 30_000, step: 60_000, cures: 60_000, other: 30_000 };
+
+const CLOSED: Failure = { kind: "crash", message: "the engine was closed", issues: [] };
+
+interface Waiting {
+  question: Question;
+  give: (answer: Answer) => void;
+  fail: (error: EngineError) => void;
+}
+
+/** Meshes of a scene that `tumble view` serves beside the page; nothing where the page comes from elsewhere, or one of them is not there. */
+async function beside(paths: string[]): Promise<Files | null> {
+  if (!paths.length || !new URLSearchParams(location.search).has("view")) return null;
+  const files: Files = {};
+  for (const path of paths) {
+    const answer = await fetch(`view/${encodeURIComponent(path)}`).catch(() => null);
+    if (!answer?.ok) return null;
+    files[path] = new Uint8Array(await answer.arrayBuffer());
+  }
+  return files;
+}
+
+/** What a world was made from, to make it again. */
+interface Made {
+  toml: string;
+  overrides: string[];
+  files: Files;
+  sets: { path: string; value: Value }[];
+}
+
+export interface FrameOptions {
+  columns?: string[];
+  hash?: boolean;
+}
+
+export class Engine {
+  /** Called when the worker died and every world stands at its start again. */
+  onrestart: (message: string) => void = () => {};
+  /** Version of the engine, once it is there. */
+  version = "";
+
+  /** None where it died before it could answer anything: the next question starts another. */
+  private worker: Worker | undefined;
+  private ready = false;
+  private next = 1;
+  private readonly waiting = new Map<number, Waiting>();
+  private readonly made = new Map<number, Made>();
+  private watch: ReturnType<typeof setTimeout> | undefined;
+  private reviving: Promise<void> | undefined;
+  private closed = false;
+
+  constructor() {
+    this.worker = this.start();
+  }
+
+  /** Checks and builds a scene. The old world goes on where this fails. */
+  async load(toml: string, options: { overrides?: string[]; files?: Files; world?: number } = {}): Promise<SceneInfo> {
+    const { overrides = [], files = {}, world = 0 } = options;
+    let answer: Answer;
+    try {
+      answer = await this.ask({ type: "load", toml, overrides, files, world });
+    } catch (error) {
+      const missing = error instanceof EngineError ? (error.failure.missing ?? []) : [];
+      const found = await beside(missing.filter((path) => !(path in files)));
+      if (!found) throw error;
+      return this.load(toml, { overrides, files: { ...files, ...found }, world });
+    }
+    this.made.set(world, { toml, overrides, files, sets: [] });
+    return (answer as Answer & { type: "loaded" }).info;
+  }
+
+  /** Simulates frames, as many as fit into `budget` [ms]; answers with the last. */
+  step(options: FrameOptions & { frames?: number; budget?: number } = {}, world = 0): Promise<Frame> {
+    return this.frame({ type: "step", ...options, world });
+  }
+
+  /** The frame as it stands. */
+  read(options: FrameOptions = {}, world = 0): Promise<Frame> {
+    return this.frame({ type: "read", ...options, world });
+  }
+
+  /** Back to the first frame. */
+  reset(columns?: string[], world = 0): Promise<Frame> {
+    return this.frame({ type: "reset", columns, world });
+  }
+
+  /** To the kept frame at or before this one. */
+  restore(frame: number, columns?: string[], world = 0): Promise<Frame> {
+    return this.frame({ type: "restore", frame, columns, world });
+  }
+
+  /** Overrides a value of the scene and goes on; `live: false` if the world had to start anew. */
+  async set(path: string, value: Value, world = 0): Promise<{ info: SceneInfo; live: boolean }> {
+    const answer = (await this.ask({ type: "set", path, value, world })) as Answer & { type: "changed" };
+    const made = this.made.get(world);
+    if (made) made.sets = [...made.sets.filter((set) => set.path !== path), { path, value }];
+    return { info: answer.info, live: answer.live };
+  }
+
+  /** Pulls a mass to a point, or the one that is held to another point. */
+  async grab(object: string, row: number, target: Vector, stiffness?: number, world = 0): Promise<void> {
+    await this.ask({ type: "grab", object, row, target, stiffness, world });
+  }
+
+  async release(world = 0): Promise<void> {
+    await this.ask({ type: "release", world });
+  }
+
+  /** Pushes a gas around a point. */
+  async stir(gas: string, position: Vector, velocity: Vector, radius: number, density?: number, world = 0): Promise<void> {
+    await this.ask({ type: "stir", gas, position, velocity, radius, density, world });
+  }
+
+  /** Sets a column of an object. */
+  async write(object: string, column: string, values: Float64Array, world = 0): Promise<void> {
+    await this.ask({ type: "write", object, column, values, world });
+  }
+
+  async hash(world = 0): Promise<string> {
+    return ((await this.ask({ type: "hash", world })) as Answer & { type: "hash" }).hash;
+  }
+
+  async stability(world = 0): Promise<Stability[]> {
+    return ((await this.ask({ type: "stability", world })) as Answer & { type: "stability" }).stability;
+  }
+
+  async cures(world = 0): Promise<Cure[]> {
+    return ((await this.ask({ type: "cures", world })) as Answer & { type: "cures" }).cures;
+  }
+
+  async schema(): Promise<Record<string, unknown>> {
+    return ((await this.ask({ type: "schema" })) as Answer & { type: "schema" }).schema;
+  }
+
+  /** Forgets a world. */
+  async drop(world: number): Promise<void> {
+    this.made.delete(world);
+    await this.ask({ type: "drop", world });
+  }
+
+  /** Ends the worker; what waits fails. */
+  close(): void {
+    this.closed = true;
+    clearTimeout(this.watch);
+    this.worker?.terminate();
+    this.failAll(CLOSED);
+  }
+
+  /** Any question; rejects with an `EngineError`. */
+  async ask(question: Question): Promise<Answer> {
+    await this.reviving;
+    return this.send(question);
+  }
+
+  private async frame(question: Question): Promise<Frame> {
+    return ((await this.ask(question)) as Answer & { type: "frame" }).frame;
+  }
+
+  private send(question: Question): Promise<Answer> {
+    if (this.closed) return Promise.reject(new EngineError(CLOSED));
+    return new Promise((give, fail) => {
+      const id = this.next++;
+      this.waiting.set(id, { question, give, fail });
+      this.worker ??= this.start();
+      this.worker.postMessage({ ...question, id });
+      if (this.waiting.size === 1) this.look();
+    });
+  }
+
+  private start(): Worker {
+    this.ready = false;
+    const worker = new Worker(new URL("./worker.ts", import.meta.url), { type: "module" });
+    worker.addEventListener("message", (event: MessageEvent<Answer | Notice>) => this.hear(event.data));
+    worker.addEventListener("error", (event) => this.died(event.message || "the worker could not be started"));
+    return worker;
+  }
+
+  private hear(answer: Answer | Notice): void {
+    if (answer.type === "ready") {
+      this.version = answer.version;
+      this.ready = true;
+      return;
+    }
+    if (answer.type === "broken") return this.died(answer.message);
+    const waiting = this.waiting.get(answer.id);
+    if (!waiting) return;
+    if (answer.type === "failed" && answer.failure.kind === "crash") return this.died(answer.failure.message);
+    this.waiting.delete(answer.id);
+    this.look();
+    if (answer.type === "failed") waiting.fail(new EngineError(answer.failure));
+    else waiting.give(answer);
+  }
+
+  /** Watches the question that is answered next. */
+  private look(): void {
+    clearTimeout(this.watch);
+    const [first] = this.waiting.values();
+    if (!first) return;
+    const { type } = first.question;
+    const patience = type === "load" || type === "step" || type === "cures" ? PATIENCE[type] : PATIENCE.other;
+    this.watch = setTimeout(() => this.died(`the engine gave no answer for ${patience / 1000} s and was stopped`), patience);
+  }
+
+  private failAll(failure: Failure): void {
+    const waiting = [...this.waiting.values()];
+    this.waiting.clear();
+    clearTimeout(this.watch);
+    for (const { fail } of waiting) fail(new EngineError(failure));
+  }
+
+  /** Starts a new worker and makes every world again that had been made, those that kill it once more left out. */
+  private died(message: string): void {
+    if (this.closed) return;
+    this.worker?.terminate();
+    this.worker = this.ready ? this.start() : undefined;
+    this.failAll({ kind: "crash", message, issues: [] });
+    if (this.reviving) return;
+    this.reviving = (async () => {
+      for (const [world, { toml, overrides, files, sets }] of [...this.made]) {
+        try {
+          await this.send({ type: "load", toml, overrides, files, world });
+          for (const { path, value } of sets) await this.send({ type: "set", path, value, world });
+        } catch {
+          this.made.delete(world);
+        }
+      }
+    })().finally(() => {
+      this.reviving = undefined;
+      this.onrestart(message);
+    });
+  }
+}

@@ -1,0 +1,224 @@
+/** The engine's side: worlds in WebAssembly, asked by messages, one at a time. It computes only when asked. */
+
+import type { Answer, Columns, Failure, Frame, Ledger, Notice, Request, SceneInfo, StepReport } from "./protocol";
+import { Kept } from "./kept";
+
+type Module = typeof import("./pkg/single");
+type World = InstanceType<Module["World"]>;
+
+/** Milliseconds that a frame may take before the worker gives up on it. */
+const FRAME_LIMIT = 30_000;
+/** Milliseconds that the search for cures may take. */
+const CURE_LIMIT = 20_000;
+/** Bytes of snapshots of one world. */
+const KEEP = 192 * 2 ** 20;
+
+interface Running {
+  world: World;
+  info: SceneInfo;
+  kept: Kept;
+}
+
+const worlds = new Map<number, Running>();
+const modules: Partial<Record<"single" | "double", Promise<Module>>> = {};
+
+/** The engine of a precision; the double one is another module, fetched when a scene first asks for it. */
+function engine(precision: "single" | "double"): Promise<Module> {
+  modules[precision] ??= (async () => {
+    const module = precision === "single" ? await import("./pkg/single") : ((await import("./pkg/double")) as unknown as Module);
+    await module.default();
+    return module;
+  })();
+  return modules[precision];
+}
+
+function running(world: number): Running {
+  const found = worlds.get(world);
+  if (!found) throw new Asked("no scene is loaded");
+  return found;
+}
+
+/** A question that makes no sense; nothing is broken. */
+class Asked extends Error {}
+
+function info(world: World): SceneInfo {
+  const topology = world.topology() as unknown as Columns;
+  return { ...(JSON.parse(world.info()) as SceneInfo), topology };
+}
+
+function ledger(world: World): Ledger {
+  return JSON.parse(world.ledger()) as Ledger;
+}
+
+function add(total: StepReport | null, next: StepReport): StepReport {
+  if (!total) return next;
+  const range = total.step_range && next.step_range;
+  return {
+    steps: total.steps + next.steps,
+    rejected: total.rejected + next.rejected,
+    step_range: range
+      ? [Math.min(total.step_range![0], next.step_range![0]), Math.max(total.step_range![1], next.step_range![1])]
+      : (total.step_range ?? next.step_range),
+    newton: total.newton + next.newton,
+    linear: total.linear + next.linear,
+    residual: Math.max(total.residual, next.residual),
+    unconverged: total.unconverged + next.unconverged,
+    broken: total.broken + next.broken,
+    clamped: total.clamped + next.clamped,
+    trials: total.trials.concat(next.trials),
+    courant: Math.max(total.courant, next.courant),
+    pressure: next.pressure.length ? next.pressure : total.pressure,
+  };
+}
+
+function frame(at: Running, asked: { columns?: string[]; hash?: boolean }, done?: Partial<Frame>): Frame {
+  const { world, kept } = at;
+  return {
+    index: world.index(),
+    time: world.time(),
+    columns: world.columns(asked.columns ?? at.info.columns) as unknown as Columns,
+    ledgers: done?.ledgers?.length ? done.ledgers : [ledger(world)],
+    report: done?.report ?? null,
+    ms: done?.ms ?? 0,
+    kept: kept.frames(),
+    ...(asked.hash ? { hash: world.hash() } : {}),
+  };
+}
+
+function keep({ world, kept }: Running): void {
+  kept.add(world.index(), () => world.save());
+}
+
+/** What was kept after this moment is no future of it any more; the moment itself is kept as it is now. */
+function branch(at: Running): void {
+  at.kept.cut(at.world.index());
+  keep(at);
+}
+
+async function load(request: Request & { type: "load" }): Promise<SceneInfo> {
+  const single = await engine("single");
+  const overrides = request.overrides ?? [];
+  const module = single.precision(request.toml, overrides) === "double" ? await engine("double") : single;
+  const world = new module.World(request.toml, overrides, new Map(Object.entries(request.files ?? {})));
+  const number = request.world ?? 0;
+  const at: Running = { world, info: info(world), kept: new Kept(KEEP) };
+  keep(at);
+  // The old one is let go only now: had the new one failed, it would go on.
+  worlds.get(number)?.world.free();
+  worlds.set(number, at);
+  return at.info;
+}
+
+function step(request: Request & { type: "step" }): Frame {
+  const at = running(request.world ?? 0);
+  const start = performance.now();
+  const ledgers: Ledger[] = [];
+  let report: StepReport | null = null;
+  const count = Math.max(1, Math.floor(request.frames ?? 1));
+  for (let i = 0; i < count; i++) {
+    if (i > 0 && performance.now() - start >= (request.budget ?? Infinity)) break;
+    report = add(report, JSON.parse(at.world.step(FRAME_LIMIT)) as StepReport);
+    ledgers.push(ledger(at.world));
+    keep(at);
+  }
+  return frame(at, request, { ledgers, report, ms: performance.now() - start });
+}
+
+async function answer(request: Request): Promise<Answer> {
+  const { id } = request;
+  const number = request.world ?? 0;
+  switch (request.type) {
+    case "load":
+      return { id, type: "loaded", info: await load(request) };
+    case "step":
+      return { id, type: "frame", frame: step(request) };
+    case "read":
+      return { id, type: "frame", frame: frame(running(number), request) };
+    case "reset":
+    case "restore": {
+      const at = running(number);
+      at.world.restore(at.kept.at(request.type === "reset" ? 0 : request.frame));
+      return { id, type: "frame", frame: frame(at, request) };
+    }
+    case "set": {
+      const at = running(number);
+      const live = at.world.set(request.path, JSON.stringify(request.value));
+      at.info = info(at.world);
+      if (live) branch(at);
+      else {
+        at.kept = new Kept(KEEP);
+        keep(at);
+      }
+      return { id, type: "changed", info: at.info, live };
+    }
+    case "grab": {
+      const at = running(number);
+      at.world.grab(request.object, request.row, Float64Array.from(request.target), request.stiffness);
+      at.kept.cut(at.world.index());
+      return { id, type: "done" };
+    }
+    case "release":
+      running(number).world.release();
+      return { id, type: "done" };
+    case "stir": {
+      const at = running(number);
+      const { gas, position, velocity, radius, density = 0 } = request;
+      at.world.stir(gas, Float64Array.from(position), Float64Array.from(velocity), radius, density);
+      at.kept.cut(at.world.index());
+      return { id, type: "done" };
+    }
+    case "write": {
+      const at = running(number);
+      at.world.write(request.object, request.column, request.values);
+      branch(at);
+      return { id, type: "done" };
+    }
+    case "hash":
+      return { id, type: "hash", hash: running(number).world.hash() };
+    case "stability":
+      return { id, type: "stability", stability: JSON.parse(running(number).world.stability()) };
+    case "cures":
+      return { id, type: "cures", cures: JSON.parse(running(number).world.cures(CURE_LIMIT)) };
+    case "schema":
+      return { id, type: "schema", schema: JSON.parse((await engine("single")).schema()) };
+    case "drop":
+      worlds.get(number)?.world.free();
+      worlds.delete(number);
+      return { id, type: "done" };
+  }
+}
+
+/** What the engine threw: its own failures are JSON; anything else has killed it. */
+function failure(thrown: unknown): Failure {
+  if (typeof thrown === "string") return JSON.parse(thrown) as Failure;
+  if (thrown instanceof Asked) return { kind: "scene", message: thrown.message, issues: [] };
+  const panic = (globalThis as { tumblePanic?: string }).tumblePanic;
+  const message = panic ?? (thrown instanceof Error ? thrown.message : String(thrown));
+  return { kind: "crash", message: `the engine stopped: ${message}`, issues: [] };
+}
+
+/** The buffers of all columns of an answer: they move to the page. */
+function buffers(answer: Answer): ArrayBuffer[] {
+  const columns = answer.type === "frame" ? answer.frame.columns : undefined;
+  if (!columns) return [];
+  return Object.values(columns).flatMap((object) => Object.values(object).map((column) => column.data.buffer as ArrayBuffer));
+}
+
+let turn: Promise<void> = Promise.resolve();
+
+addEventListener("message", (event: MessageEvent<Request>) => {
+  turn = turn.then(async () => {
+    let reply: Answer;
+    try {
+      reply = await answer(event.data);
+    } catch (thrown) {
+      reply = { id: event.data.id, type: "failed", failure: failure(thrown) };
+    }
+    postMessage(reply, { transfer: buffers(reply) });
+  });
+});
+
+engine("single").then(
+  (module) => postMessage({ type: "ready", version: module.version() } satisfies Notice),
+  (error: unknown) => postMessage({ type: "broken", message: String(error) } satisfies Notice),
+);

@@ -1,0 +1,19 @@
+/** What the colours of a picture mean. */
+import { h, show } from "./dom";
+import { gradient } from "./view/colors";
+import { legendMap, type Stage } from "./view/stage";
+
+export function legendBox(stage: () => Stage): { element: HTMLElement; update: () => void } {
+  const element = h("div", { class: "legend", hidden: true });
+  const update = () => {
+    const l = stage().legend;
+    element.hidden = !l;
+    if (!l) return;
+    element.replaceChildren(
+      h("span", { class: "legend-name" }, l.unit && l.unit !== "1" ? `${l.name}, ${l.unit}` : l.name),
+      h("i", { style: `background:${gradient(legendMap(l.name))}` }),
+      h("span", { class: "legend-ends" }, h("span", {}, show(l.low, 3)), h("span", {}, show(l.high, 3))),
+    );
+  };
+  return { element, update };
+}

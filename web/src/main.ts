@@ -1,0 +1,90 @@
+import "./style.css";
+import { h, iconButton, type Leave, type Page } from "./dom";
+
+const main = document.getElementById("main")!;
+const nav = document.getElementById("nav")!;
+
+/** Address after "#/" -> page; each is fetched when it is first opened. */
+const PAGES: [RegExp, string, () => Promise<{ page: Page }>][] = [
+  [/^$/, "Gallery", () => import("./pages/gallery")],
+  [/^fluid(?:\/(.*))?$/, "Fluid", () => import("./pages/fluid")],
+  [/^integrators(?:\/(.*))?$/, "Integrators", () => import("./pages/integrators")],
+  [/^theory(?:\/(.*))?$/, "Theory", () => import("./pages/theory")],
+  [/^scene\/(.*)$/, "", () => import("./pages/scene")],
+  [/^(s\/.*)$/, "", () => import("./pages/scene")],
+];
+const LINKS = ["", "fluid", "integrators", "theory"];
+
+/** Links of the header. */
+for (const [k, name] of PAGES.map((p) => p[1]).entries()) if (name) nav.append(h("a", { href: `#/${LINKS[k]}` }, name));
+
+// Light or dark: as the system says, until a person says otherwise.
+const system = matchMedia("(prefers-color-scheme: dark)");
+function theme(): void {
+  let wish: string | null = null;
+  try {
+    wish = localStorage.getItem("theme");
+  } catch {
+    // No storage: as the system says.
+  }
+  document.documentElement.dataset.theme = wish ?? (system.matches ? "dark" : "light");
+  dispatchEvent(new Event("themechange"));
+}
+system.addEventListener("change", theme);
+theme();
+document.getElementById("tools")!.append(
+  iconButton("theme", "Light or dark", () => {
+    const next = document.documentElement.dataset.theme === "dark" ? "light" : "dark";
+    try {
+      localStorage.setItem("theme", next);
+    } catch {
+      // Holds for this visit.
+    }
+    document.documentElement.dataset.theme = next;
+    dispatchEvent(new Event("themechange"));
+  }),
+);
+
+let leave: Leave = () => {};
+let visit = 0;
+
+async function go(): Promise<void> {
+  const own = ++visit;
+  const address = decodeURI(location.hash.replace(/^#\/?/, ""));
+  if (location.hash === "#main") return main.focus();
+  leave();
+  leave = () => {};
+  main.replaceChildren();
+  main.className = "";
+  for (const [pattern, , open] of PAGES) {
+    const match = pattern.exec(address);
+    if (!match) continue;
+    const section = address.split("/")[0];
+    for (const link of nav.querySelectorAll("a")) {
+      if (link.getAttribute("href") === `#/${section}` || (section === "scene" && link.getAttribute("href") === "#/")) link.setAttribute("aria-current", "page");
+      else link.removeAttribute("aria-current");
+    }
+    let end: Leave;
+    try {
+      const { page } = await open();
+      if (own !== visit) return;
+      scrollTo(0, 0);
+      end = await page(main, match[1] ?? "");
+    } catch (error) {
+      if (own !== visit) return;
+      const webgl = document.createElement("canvas").getContext("webgl2");
+      main.className = "";
+      main.replaceChildren(h("div", { class: "narrow" }, h("h1", {}, "This page could not be shown"), h("p", {}, webgl ? String((error as Error)?.message ?? error) : "It draws with WebGL 2, which this browser does not offer.")));
+      console.error(error);
+      return;
+    }
+    if (own !== visit) end();
+    else leave = end;
+    return;
+  }
+  document.title = "tumble";
+  main.append(h("div", { class: "narrow" }, h("h1", {}, "There is no such page"), h("p", {}, h("a", { href: "#/" }, "To the gallery"))));
+}
+
+addEventListener("hashchange", () => void go());
+void go();

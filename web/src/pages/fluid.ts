@@ -1,0 +1,388 @@
+/** A fluid in a box, to stir: views of everything that a step makes, and a pressure that may be as bad as one likes. */
+import { parse } from "smol-toml";
+import { check, choice, h, iconButton, saveAs, show, type Page } from "../dom";
+import { EngineError } from "../engine/client";
+import type { Value, Vector } from "../engine/protocol";
+import { legendBox } from "../legend";
+import { curveColor, isDark, Plot } from "../plot";
+import { pointers } from "../pointer";
+import { engine, literal, Session } from "../session";
+import { pack } from "../share";
+import { cards } from "../theory";
+import { keys, transport } from "../transport";
+import { LOOK, Stage } from "../view/stage";
+import { Vector3 } from "three";
+
+const VIEWS: [string, string][] = [["density", "Dye"], ["pressure", "Pressure"], ["speed", "Speed, with arrows"], ["vorticity", "Vorticity"], ["divergence", "Divergence that is left"]];
+const SOLVERS: [string, string][] = [
+  ["jacobi", "Jacobi"], ["gauss_seidel", "Gauss–Seidel, red and black"], ["sor", "Over-relaxation"], ["conjugate_gradients", "Conjugate gradients"],
+  ["incomplete_cholesky", "… with incomplete Cholesky"], ["modified_incomplete_cholesky", "… with MIC(0)"], ["multigrid", "Multigrid"], ["multigrid_gradients", "Multigrid gradients"], ["cosine", "Cosine transform"],
+];
+const OBSTACLES: Record<string, string> = {
+  none: "",
+  disk: `[[collider]]\nname = "disk"\nshape = { sphere = { center = [-0.25, 0, 0], radius = 0.1 } }\n`,
+  gate: `[[collider]]\nname = "upper"\nshape = { box = { center = [0, 0, 0.29], size = [0.05, 1, 0.32] } }\n\n[[collider]]\nname = "lower"\nshape = { box = { center = [0, 0, -0.29], size = [0.05, 1, 0.32] } }\n`,
+  posts: [-0.3, -0.1, 0.1, 0.3].map((z, i) => `[[collider]]\nname = "post ${i + 1}"\nshape = { sphere = { center = [${i % 2 ? 0.12 : -0.12}, 0, ${z}], radius = 0.055 } }\n`).join("\n"),
+};
+
+interface Choices {
+  cells: number;
+  method: string;
+  iterations: number;
+  tolerance: number;
+  viscosity: number;
+  confinement: number;
+  advection: "linear" | "corrected" | "cubic";
+  obstacle: string;
+  particles: boolean;
+  lifetime: number;
+  trail: number;
+  /** Drawn by hand: points in the plane. */
+  walls: [number, number][][];
+}
+
+const START: Choices = { cells: 192, method: "multigrid_gradients", iterations: 100, tolerance: 1e-3, viscosity: 0, confinement: 0, advection: "corrected", obstacle: "none", particles: true, lifetime: 3, trail: 0.3, walls: [] };
+
+const CARRIED = { linear: '{ interpolation = "linear" }', corrected: "{ corrected = true }", cubic: '{ interpolation = "monotone_cubic", corrected = true }' };
+
+/** Straight pieces of walls that were drawn. */
+const pieces = (c: Choices) =>
+  c.walls.flatMap((wall, k) =>
+    wall.slice(1).map(([x, z], i) => ({ name: `wall ${k + 1}.${i + 1}`, shape: { capsule: { from: [wall[i][0], 0, wall[i][1]], to: [x, 0, z], radius: 0.018 } } })),
+  );
+
+/** All solids, as a list of the scene. */
+const solids = (c: Choices) => [...((parse(OBSTACLES[c.obstacle]).collider ?? []) as Value[]), ...pieces(c)];
+
+const scene = (c: Choices) => `version = 1
+title = "A fluid to stir"
+dimension = 2
+
+[time]
+fps = 60
+frames = 100_000_000
+
+[[system]]
+name = "flow"
+method = "gas"
+substeps = 1
+${c.particles ? '\n[[system]]\nname = "dust"\nmethod = "tracers"\nintegrator = "heun"\nsubsteps = 1\n' : ""}
+[[gas]]
+name = "fluid"
+box = { size = [1.6, 1, 0.9], resolution = ${c.cells} }
+fluid_density = 1
+${c.viscosity > 0 ? `viscosity = ${c.viscosity}\n` : ""}confinement = ${c.confinement}
+velocity = ["1.1*exp(-60*((z - 0.1)^2)) - 1.1*exp(-60*((z + 0.1)^2))", 0, "0.25*sin(8*x)*exp(-20*z^2)"]
+smoke = { initial = "0.9*smoothstep(0.02, -0.02, abs(abs(z) - 0.12) - 0.05)", weight = 0, dissipation = 0.04 }
+advection = { velocity = ${CARRIED[c.advection]} }
+pressure = { method = "${c.method}", iterations = ${c.iterations}, tolerance = ${c.tolerance} }
+${c.particles ? `
+[[emitter]]
+name = "dust"
+system = "dust"
+from = { box = { size = [1.6, 0, 0.9] } }
+rate = ${Math.round(1500 / c.lifetime)}
+lifetime = ${c.lifetime}
+lifetime_spread = 0.4
+jitter = 1
+radius = 0.0012
+trail = ${c.trail}
+color = ${isDark() ? "[0.75, 0.8, 0.85]" : "[0.02, 0.04, 0.08]"}
+
+[[field]]
+kind = "gas"
+of = "fluid"
+` : ""}
+${OBSTACLES[c.obstacle]}
+${pieces(c).map((w) => `[[collider]]\nname = "${w.name}"\nshape = ${literal(w.shape)}\n`).join("\n")}
+[output]
+columns = ["position", "density"]
+`;
+
+export const page: Page = async (main) => {
+  document.title = "Fluid · tumble";
+  main.className = "lab-page";
+  const choices: Choices = { ...START };
+  let drawing = false;
+  const session = new Session();
+  session.endless = true;
+  const canvas = h("canvas", { "aria-hidden": "true" });
+  const { element: legendElement, update: tellLegend } = legendBox(() => stage);
+  const ring = h("div", { class: "ring", hidden: true });
+  const wait = h("div", { class: "wait" }, "Loading the engine …");
+  const stageBox = h("div", { class: "stage stirs", tabindex: 0, role: "group", "aria-label": "The fluid. Drag to stir; with the keyboard, arrows stir around the ring, space plays." }, canvas, legendElement, ring, wait);
+  const alert = h("div", { class: "alert", role: "alert", hidden: true });
+  const energy = new Plot([{ label: "kinetic energy", color: curveColor(0), width: 2 }], { label: "Kinetic energy against time", x: "time [s]", height: 130 });
+  const residual = new Plot([{ label: "residual", color: curveColor(1), width: 2 }], { label: "Residual of the pressure after each iteration, on a logarithmic scale", x: "iteration", log: true, height: 130 });
+  const now = (label: string) => {
+    const value = h("output", { "aria-label": label }, "–");
+    return { value, row: h("div", { class: "figure" }, h("span", {}, label), value) };
+  };
+  const figures = { left: now("Divergence"), iterations: now("Iterations"), cost: now("Engine, a step"), courant: now("Courant number"), kinetic: now("Kinetic energy") };
+  figures.left.value.id = "residual";
+  figures.iterations.value.id = "iterations";
+  const advice = h("p", { class: "doc", role: "status" });
+
+  const rerun = async () => {
+    try {
+      await session.load(scene(choices));
+      alert.hidden = true;
+      session.play();
+    } catch (error) {
+      complain(error);
+    }
+  };
+  const complain = (error: unknown) => {
+    if (!(error instanceof EngineError)) throw error;
+    alert.hidden = false;
+    alert.replaceChildren(h("strong", {}, "This does not work."), h("pre", {}, error.failure.message));
+  };
+  const set = async (path: string, value: Value) => {
+    try {
+      await session.set(path, value);
+      alert.hidden = true;
+      if (!session.playing) session.play();
+    } catch (error) {
+      complain(error);
+    }
+  };
+
+  const asScene = async () => {
+    const toml = scene(choices).replace(/^frames = .*$/m, "frames = 900");
+    location.hash = `#/s/${await pack({ version: engine().version, toml, overrides: [], frame: 0, hash: "" })}`;
+  };
+
+  const range = (label: string, low: number, high: number, value: number, text: (v: number) => string, act: (v: number) => void, step = (high - low) / 100) => {
+    const out = h("output", {}, text(value));
+    let timer = 0;
+    const slider = h("input", {
+      type: "range", min: low, max: high, step, value,
+      oninput: () => {
+        out.textContent = text(Number(slider.value));
+        slider.setAttribute("aria-valuetext", text(Number(slider.value)));
+        clearTimeout(timer);
+        timer = window.setTimeout(() => act(Number(slider.value)), 120);
+      },
+    });
+    return h("label", { class: "slide" }, h("span", { class: "slide-head" }, h("span", {}, label), out), slider);
+  };
+
+  const view = choice("View", VIEWS, "density", (v) => showView(v));
+  view.querySelector("select")!.id = "view";
+  const showView = (v: string) => {
+    stage.look.field = v;
+    stage.look.arrows = v === "speed";
+    stage.look.cells = v !== "density" && choices.cells <= 128;
+    stage.look.dye = v === "density";
+    void session.refresh().then(() => {
+      stage.again();
+      tellLegend();
+    });
+  };
+  const power = (low: number, high: number) => ({ of: (v: number) => (v <= low ? 0 : 10 ** v), low, high });
+  const thick = power(-6, -1.5);
+  const controls = h(
+    "div",
+    { class: "controls" },
+    h("section", { class: "card" }, h("h2", {}, "Pressure"),
+      choice("Solver", SOLVERS, choices.method, (v) => {
+        choices.method = v;
+        void set("gas.0.pressure.method", v);
+      }),
+      range("Iterations at most", 0, 3, Math.log10(choices.iterations), (v) => String(Math.round(10 ** v)), (v) => {
+        choices.iterations = Math.round(10 ** v);
+        void set("gas.0.pressure.iterations", choices.iterations);
+      }),
+      range("Tolerance", -6, -1, Math.log10(choices.tolerance), (v) => show(Number((10 ** v).toPrecision(1)), 1), (v) => {
+        choices.tolerance = Number((10 ** v).toPrecision(1));
+        void set("gas.0.pressure.tolerance", choices.tolerance);
+      }),
+      h("p", { class: "muted plot-title" }, "Residual over the first, by iteration"),
+      residual.element,
+      h("div", { class: "figures" }, figures.left.row, figures.iterations.row),
+      advice,
+    ),
+    h("section", { class: "card" }, h("h2", {}, "Fluid"),
+      choice("Carried by", [["linear", "linear interpolation"], ["corrected", "MacCormack's correction"], ["cubic", "cubics and correction"]], choices.advection, (v) => {
+        choices.advection = v as Choices["advection"];
+        void set("gas.0.advection.velocity", v === "linear" ? { interpolation: "linear", corrected: false } : v === "corrected" ? { interpolation: "linear", corrected: true } : { interpolation: "monotone_cubic", corrected: true });
+      }),
+      h("p", { class: "doc" }, "Each step looks up where the fluid came from. Linear interpolation there smooths it, as a viscosity would: watch the kinetic energy."),
+      range("Viscosity [Pa s]", thick.low, thick.high, thick.low, (v) => show(thick.of(v), 2), (v) => {
+        choices.viscosity = thick.of(v);
+        void set("gas.0.viscosity", choices.viscosity);
+      }),
+      range("Vorticity confinement", 0, 1, 0, (v) => show(v, 2), (v) => {
+        choices.confinement = v;
+        void set("gas.0.confinement", v);
+      }),
+      choice("Cells along", [["64", "64"], ["96", "96"], ["128", "128"], ["192", "192"], ["256", "256"], ["384", "384"]], String(choices.cells), (v) => {
+        choices.cells = Number(v);
+        void rerun();
+      }),
+      choice("Obstacles", [["none", "none"], ["disk", "a disk"], ["gate", "a gate"], ["posts", "posts"]], choices.obstacle, (v) => {
+        choices.obstacle = v;
+        void set("collider", solids(choices) as Value);
+      }),
+      choice("Dragging", [["stir", "stirs"], ["draw", "draws walls"]], "stir", (v) => (drawing = v === "draw")),
+      h("button", { type: "button", class: "button", onclick: () => {
+        choices.walls = [];
+        void set("collider", solids(choices) as Value);
+      } }, "Clear the walls"),
+    ),
+    h("section", { class: "card" }, h("h2", {}, "Particles"),
+      check("Particles go with the flow", choices.particles, (on) => {
+        choices.particles = on;
+        void rerun();
+      }),
+      range("Lifetime [s]", 0.5, 8, choices.lifetime, (v) => show(v, 2), (v) => {
+        choices.lifetime = v;
+        void rerun();
+      }),
+      range("Length of trails [s]", 0, 1, choices.trail, (v) => show(v, 2), (v) => {
+        choices.trail = v;
+        void rerun();
+      }),
+    ),
+    h("section", { class: "card" }, h("h2", {}, "Picture"),
+      check("Cells", false, (on) => {
+        stage.look.cells = on;
+        stage.again();
+      }),
+      check("Arrows", false, (on) => {
+        stage.look.arrows = on;
+        void session.refresh().then(() => stage.again());
+      }),
+    ),
+  );
+  const theory = h("div", { class: "beside" });
+  main.append(
+    h("div", { class: "lab" },
+      h("section", { class: "view", "aria-label": "Fluid" },
+        h("div", { class: "lab-head" },
+          h("div", {}, h("h1", {}, "A fluid to stir"), h("p", { class: "muted" }, "Drag through it, or draw walls.")),
+          h("div", { class: "actions" }, view, iconButton("camera", "Save the picture (PNG)", () => void stage.picture().then((b) => saveAs(b, "fluid.png"))), iconButton("reset", "From the start, with these settings", () => void rerun()),
+            h("button", { type: "button", class: "button", title: "With its text and all its values", onclick: () => void asScene() }, "As a scene"))),
+        alert, stageBox, transport(session),
+        h("div", { class: "energy" }, h("h2", {}, "Kinetic energy", h("span", { class: "unit" }, "J")), h("div", { class: "figures in-line" }, figures.kinetic.row, figures.courant.row, figures.cost.row), energy.element),
+        theory,
+      ),
+      h("aside", { class: "side scrolls", "aria-label": "Settings", tabindex: 0 }, controls),
+    ),
+  );
+
+  const stage = new Stage(canvas, { controls: false, shadows: false });
+  stage.look = { ...LOOK, field: "density" };
+  session.wanted = () => stage.wanted;
+  let book = 0;
+  session.on("loaded", (info) => {
+    wait.hidden = true;
+    stage.open(info, session.frame);
+    session.each = stage.trails;
+  });
+  session.on("frame", (frame) => {
+    stage.show(frame);
+    tellLegend();
+    main.dataset.frame = String(frame.index);
+    const report = session.report;
+    const ledger = session.ledgers[frame.index];
+    if (ledger) figures.kinetic.value.textContent = `${show(ledger.kinetic, 3)} J`;
+    figures.cost.value.textContent = `${show(session.cost, 2)} ms`;
+    if (report) {
+      figures.courant.value.textContent = show(report.courant, 2);
+      const list = report.pressure;
+      figures.left.value.textContent = show(report.residual, 2);
+      figures.left.value.classList.toggle("bad", report.unconverged > 0);
+      figures.iterations.value.textContent = String(report.linear);
+      if (performance.now() - book > 150) {
+        book = performance.now();
+        residual.set([[0, ...list.map((_, i) => i + 1)], [1, ...list.map((r) => (r > 0 ? r : null))]]);
+        advice.textContent = report.unconverged ? "The pressure has not met its tolerance. What is left of the divergence makes the fluid swell and shrink: look at its view." : "Largest divergence times the size of a cell, over the fastest velocity; the tolerance bounds it.";
+        const books = session.ledgers.slice(Math.max(0, session.ledgers.length - 1200));
+        energy.set([books.map((l) => l.time), books.map((l) => l.kinetic)]);
+      }
+    }
+    // A demo without an end keeps no past.
+    session.trim(90);
+  });
+  session.on("failed", (failure) => complain(new EngineError(failure)));
+
+  // Walls, one for each stroke.
+  let stroke: [number, number][] | null = null;
+  const inside = (p: Vector3): [number, number] => [Number(Math.min(Math.max(p.x, -0.78), 0.78).toFixed(3)), Number(Math.min(Math.max(p.z, -0.43), 0.43).toFixed(3))];
+  const draw = (event: PointerEvent) => {
+    if (!drawing) return;
+    event.stopImmediatePropagation();
+    const at = stage.under(event);
+    if (!at) return;
+    if (event.type === "pointerdown") {
+      canvas.setPointerCapture(event.pointerId);
+      stroke = [inside(at)];
+    } else if (stroke && event.type === "pointermove") {
+      const [x, z] = inside(at);
+      const [px, pz] = stroke[stroke.length - 1];
+      if (Math.hypot(x - px, z - pz) > 0.05 && stroke.length < 40) stroke.push([x, z]);
+    } else if (stroke) {
+      if (stroke.length > 1 && choices.walls.length < 12) {
+        choices.walls.push(stroke);
+        void set("collider", solids(choices) as Value);
+      }
+      stroke = null;
+    }
+  };
+  for (const name of ["pointerdown", "pointermove", "pointerup", "pointercancel"] as const) canvas.addEventListener(name, draw, { capture: true });
+  // After those that draw, which may keep an event from it.
+  const offPointers = pointers(canvas, stage, session, { dye: () => 0.2, size: () => 1 / 24 });
+
+  // By keys: a ring that goes along.
+  const cursor = new Vector3();
+  const stir = (event: KeyboardEvent) => {
+    const way: Record<string, [number, number]> = { ArrowLeft: [-1, 0], ArrowRight: [1, 0], ArrowUp: [0, 1], ArrowDown: [0, -1] };
+    const go = way[event.key];
+    const gas = stage.gas;
+    if (!go || !gas) return;
+    event.preventDefault();
+    event.stopPropagation();
+    cursor.x = Math.min(Math.max(cursor.x + 0.03 * go[0], -0.78), 0.78);
+    cursor.z = Math.min(Math.max(cursor.z + 0.03 * go[1], -0.43), 0.43);
+    ring.hidden = false;
+    const box = stageBox.getBoundingClientRect();
+    const scale = box.width / stage.width;
+    ring.style.left = `${box.width / 2 + cursor.x * scale}px`;
+    ring.style.top = `${box.height / 2 - cursor.z * scale}px`;
+    void session.stir(gas.name, cursor.toArray() as Vector, [go[0] * 0.6, 0, go[1] * 0.6], stage.width / 24, 0.2).catch(() => {});
+    if (!session.playing) session.play();
+  };
+  stageBox.addEventListener("keydown", stir);
+  const theme = () => stage.theme();
+  addEventListener("themechange", theme);
+  const offKeys = keys(session);
+  engine().onrestart = (message) => {
+    alert.hidden = false;
+    alert.replaceChildren(h("strong", {}, "The engine was started anew."), h("pre", {}, message));
+    void session.revived();
+  };
+  void cards([{ page: "gas", tags: ["gas.1", "gas.3", "gas.4", "gas.5"] }, { page: "pressure", tags: ["pressure.1", "pressure.2"] }]).then((made) => theory.replaceChildren(...made));
+  void session
+    .load(scene(choices))
+    .then(() => {
+      main.dataset.ready = "true";
+      if (!matchMedia("(prefers-reduced-motion: reduce)").matches) session.play();
+    })
+    .catch((error) => {
+      wait.hidden = true;
+      main.dataset.ready = "failed";
+      complain(error);
+    });
+  Object.assign(window, { tumble: { session, stage, engine: engine() } });
+
+  return () => {
+    removeEventListener("themechange", theme);
+    offKeys();
+    offPointers();
+    energy.close();
+    residual.close();
+    session.close();
+    stage.dispose();
+  };
+};

@@ -1,0 +1,513 @@
+/** One scene: picture, playback, energy, its values, its text, its theory. */
+import { parse } from "smol-toml";
+import { check, choice, h, iconButton, saveAs, say, setIcon, show, svg, ICONS, type Page } from "../dom";
+import { EngineError } from "../engine/client";
+import type { Cure, Failure, SceneInfo, Value } from "../engine/protocol";
+import { acceptFiles, opened } from "../drop";
+import { npz } from "../npz";
+import { Panel } from "../panel";
+import { curveColor, legend, Plot, type Curve } from "../plot";
+import { engine, literal, Session } from "../session";
+import { LONGEST, pack, unpack, type Shared } from "../share";
+import { sceneOf, titleOf } from "../scenes";
+import { cards, topics } from "../theory";
+import { keys, transport } from "../transport";
+import { legendBox } from "../legend";
+import { pointers } from "../pointer";
+import { Stage } from "../view/stage";
+import type { Editor } from "../editor";
+
+/** Columns of grids that can be shown, and how they are called. */
+const FIELDS: [string, string][] = [["density", "Density"], ["temperature", "Temperature"], ["pressure", "Pressure"], ["speed", "Speed"], ["vorticity", "Vorticity"], ["divergence", "Divergence"], ["fuel", "Fuel"]];
+
+async function source(rest: string): Promise<{ toml: string; overrides: [string, Value][]; shared: Shared | null; name: string; id: string | null }> {
+  if (rest.startsWith("s/")) {
+    const shared = await unpack(rest.slice(2));
+    const overrides = shared.overrides.map((o): [string, Value] => {
+      const cut = o.indexOf("=");
+      return [o.slice(0, cut), valueOf(o.slice(cut + 1))];
+    });
+    return { toml: shared.toml, overrides, shared, name: "shared", id: null };
+  }
+  const file = /^file\/(\d+)$/.exec(rest);
+  if (file) {
+    const own = opened[Number(file[1]) - 1];
+    if (!own) throw new Error("This file was opened in another visit; open it again.");
+    return { toml: own.toml, overrides: [], shared: null, name: own.name.replace(/\.\w+$/, ""), id: null };
+  }
+  const known = sceneOf(rest);
+  if (!known) throw new Error(`There is no scene "${rest}".`);
+  return { toml: await known.text(), overrides: [], shared: null, name: known.name, id: known.id };
+}
+
+/** What stands right of an "=": TOML, or a bare word. */
+function valueOf(text: string): Value {
+  try {
+    return parse(`x = ${text}`).x as Value;
+  } catch {
+    return text.trim();
+  }
+}
+
+export const page: Page = async (main, rest) => {
+  main.className = "lab-page";
+  let start: Awaited<ReturnType<typeof source>>;
+  try {
+    start = await source(rest);
+  } catch (error) {
+    document.title = "tumble";
+    main.append(h("div", { class: "narrow" }, h("h1", {}, "This cannot be opened"), h("p", {}, String((error as Error).message ?? error)), h("p", {}, h("a", { href: "#/" }, "To the gallery"))));
+    return () => {};
+  }
+
+  const session = new Session();
+  const canvas = h("canvas", { "aria-hidden": "true" });
+  const { element: legendElement, update: tellLegend } = legendBox(() => stage);
+  const wait = h("div", { class: "wait" }, "Loading the engine …");
+  const stageBox = h("div", { class: "stage", tabindex: 0, role: "group", "aria-label": "Picture of the scene. Space plays, arrows turn the view, plus and minus zoom, 0 brings the view back." }, canvas, legendElement, wait);
+  const title = h("h1", {}, titleOf(start.toml) || start.name);
+  const alert = h("div", { class: "alert", role: "alert", hidden: true });
+  const lookBar = h("div", { class: "look", role: "group", "aria-label": "What is shown" });
+  const energyCurves = (): Curve[] => [
+    { label: "kinetic", color: curveColor(1) },
+    { label: "elastic", color: curveColor(2) },
+    { label: "external", color: curveColor(3) },
+    { label: "total", color: curveColor(0), width: 2.25 },
+    { label: "total before the branch", color: curveColor(0), dash: [4, 4], width: 1.25 },
+  ];
+  const energy = new Plot(energyCurves(), { label: "Energies against time", x: "time [s]", height: 140, mark: () => session.shown?.time ?? null });
+  const energyKey = legend(energyCurves().slice(0, 4));
+  const hashBox = h("output", { class: "hash", "aria-label": "State hash" }, "–");
+  const facts = h("dl", { class: "facts" });
+
+  // The side: values, text, theory.
+  const valuesTab = h("div", { id: "tab-values", role: "tabpanel", "aria-labelledby": "t-values" });
+  const editorBox = h("div", { class: "editor" });
+  const issuesBox = h("ul", { class: "issues" });
+  const textTab = h("div", { id: "tab-text", role: "tabpanel", "aria-labelledby": "t-text", hidden: true, class: "text-tab" });
+  const theoryTab = h("div", { id: "tab-theory", role: "tabpanel", "aria-labelledby": "t-theory", hidden: true });
+  const factsTab = h("div", { id: "tab-facts", role: "tabpanel", "aria-labelledby": "t-facts", hidden: true }, facts);
+  const tabs: [string, string, HTMLElement][] = [["values", "Values", valuesTab], ["text", "Text", textTab], ["theory", "Theory", theoryTab], ["facts", "Facts", factsTab]];
+  const buttons = tabs.map(([id, label], k) =>
+    h("button", {
+      id: `t-${id}`, type: "button", role: "tab", "aria-selected": k === 0 ? "true" : "false", "aria-controls": `tab-${id}`, tabindex: k === 0 ? 0 : -1,
+      onclick: () => choose(k),
+      onkeydown: (event: KeyboardEvent) => {
+        const step = event.key === "ArrowRight" ? 1 : event.key === "ArrowLeft" ? -1 : 0;
+        if (step) choose((k + step + tabs.length) % tabs.length, true);
+      },
+    }, label),
+  );
+  const choose = (k: number, focus = false) => {
+    tabs.forEach(([, , panel], i) => {
+      panel.hidden = i !== k;
+      buttons[i].setAttribute("aria-selected", String(i === k));
+      buttons[i].tabIndex = i === k ? 0 : -1;
+    });
+    if (focus) buttons[k].focus();
+    if (tabs[k][0] === "text") void openEditor();
+    if (tabs[k][0] === "facts") void tellFacts();
+  };
+
+  const shareButton = h("button", { type: "button", class: "button", onclick: () => void share() }, svg(ICONS.share, 16), "Copy link");
+  const record = iconButton("record", "Record a film (WebM)", () => film());
+  main.append(
+    h(
+      "div",
+      { class: "lab" },
+      h(
+        "section",
+        { class: "view", "aria-label": "Simulation" },
+        h(
+          "div",
+          { class: "lab-head" },
+          h("div", {}, title, start.id ? h("p", { class: "scene-id" }, start.id) : h("p", { class: "scene-id" }, start.shared ? "from a link" : start.name)),
+          h("div", { class: "actions" }, shareButton, iconButton("camera", "Save the picture (PNG)", () => void png()), record, iconButton("down", "Download the kept frames (NPZ)", () => saveAs(npz(session.kept.map((i) => session.frame(i)!)), `${start.name}.npz`)), h("button", { type: "button", class: "icon-button", title: "Save the surfaces (GLB)", "aria-label": "Save the surfaces (GLB)", onclick: () => void glb() }, svg(ICONS.cube)), iconButton("frame", "View of the scene's camera", () => stage.goHome())),
+        ),
+        alert,
+        stageBox,
+        transport(session),
+        lookBar,
+        h("div", { class: "energy" }, h("h2", {}, "Energy", h("span", { class: "unit" }, "J")), energyKey.element, energy.element),
+        h("p", { class: "hash-line" }, "State hash ", hashBox, h("span", { class: "muted" }, " the same on every machine, in a tab and on the command line")),
+      ),
+      h("aside", { class: "side", "aria-label": "The scene" }, h("div", { class: "tabs", role: "tablist", "aria-label": "The scene" }, ...buttons), ...tabs.map((t) => t[2])),
+    ),
+  );
+
+  const stage = new Stage(canvas);
+  session.wanted = () => stage.wanted;
+
+  // The picture follows the world.
+  let ghost: (number | null)[] = [];
+  let hashWait = 0;
+  const tellHash = () => {
+    clearTimeout(hashWait);
+    hashWait = window.setTimeout(async () => {
+      if (session.playing || session.shown?.index !== session.latest) return;
+      const at = session.latest;
+      const hash = await session.hash().catch(() => null);
+      if (hash && at === session.latest && !session.playing) {
+        hashBox.textContent = hash;
+        hashBox.dataset.frame = String(at);
+        if (start.shared?.hash && start.shared.frame === at && session.toml === start.shared.toml) {
+          hashBox.append(h("span", { class: start.shared.hash === hash ? "good" : "bad" }, start.shared.hash === hash ? " as in the link" : ` the link says ${start.shared.hash}`));
+        }
+      }
+    }, 120);
+  };
+  const drawEnergy = () => {
+    const books = session.ledgers;
+    const external0 = books[0]?.external ?? 0;
+    const times = books.map((l) => l.time);
+    const extra = ghost.length > books.length ? ghost.length : books.length;
+    const dt = session.info?.dt ?? 1;
+    const xs: number[] = Array.from({ length: extra }, (_, i) => times[i] ?? i * dt);
+    const pad = (list: (number | null)[]) => Array.from({ length: extra }, (_, i) => (Number.isFinite(list[i]) ? list[i] : null));
+    energy.set([xs, pad(books.map((l) => l.kinetic)), pad(books.map((l) => l.elastic)), pad(books.map((l) => l.external - external0)), pad(books.map((l) => l.energy - external0)), pad(ghost)]);
+    const now = books[session.shown?.index ?? books.length - 1];
+    if (now) energyKey.set([show(now.kinetic, 3), show(now.elastic, 3), show(now.external - external0, 3), show(now.energy - external0, 3)]);
+  };
+  let opening = true;
+  session.on("loaded", (info) => {
+    wait.hidden = true;
+    stage.open(info, session.frame, !opening);
+    session.each = stage.trails;
+    opening = false;
+    drawLook(info);
+    panel?.open(info, session.toml, session.overrides);
+    title.textContent = info.title || start.name;
+    document.title = `${info.title || start.name} · tumble`;
+    stageBox.classList.toggle("night", stage.night);
+    hashBox.textContent = info.hash;
+    hashBox.dataset.frame = "0";
+    void cards(topics(info)).then((made) => theoryTab.replaceChildren(...made));
+    void tellFacts();
+  });
+  session.on("frame", (frame) => {
+    stage.show(frame);
+    tellLegend();
+    drawEnergy();
+    tellHash();
+    main.dataset.frame = String(frame.index);
+  });
+  session.on("playing", (on) => {
+    if (on) {
+      // Only a new frame has no trouble with what has gone wrong before.
+      if (!alert.dataset.keep) alert.hidden = true;
+    } else tellHash();
+  });
+  session.on("failed", (failure) => complain(failure));
+
+  const complain = (failure: Failure) => {
+    alert.hidden = false;
+    alert.dataset.kind = failure.kind;
+    const lines = failure.message.split("\n");
+    alert.replaceChildren(
+      h("strong", {}, failure.kind === "scene" ? "The scene has a mistake; the one before goes on." : failure.kind === "step" ? "The simulation failed." : failure.kind === "limit" ? "Too much for this tab." : "The engine was started anew."),
+      h("pre", {}, lines.slice(0, 12).join("\n")),
+    );
+    if (failure.kind === "step") {
+      const button = h("button", { type: "button", class: "button", onclick: () => void cures(button) }, "Look for a cure");
+      alert.append(button);
+    }
+  };
+  const cures = async (button: HTMLButtonElement) => {
+    button.disabled = true;
+    button.textContent = "Trying changes from the last good frame …";
+    try {
+      const found: Cure[] = await engine().cures(session.world);
+      const good = found.filter((c) => c.survived);
+      button.replaceWith(
+        h(
+          "ul",
+          { class: "cures" },
+          ...(good.length ? good : found).map((c) => {
+            // One or more, with blanks between: "system.0.integrator=rk4 system.0.substeps=161".
+            const changes = c.set.split(/ (?=[\w.]+=)/).map((one): [string, Value] => [one.slice(0, one.indexOf("=")), valueOf(one.slice(one.indexOf("=") + 1))]);
+            const act = () => {
+              alert.hidden = true;
+              void session.load(session.toml, [...session.overrides, ...changes]).then(() => {
+                if (editor) syncText();
+                session.play();
+              });
+            };
+            return h("li", {}, h("code", {}, c.set), c.survived ? h("button", { type: "button", class: "button", onclick: act }, "Take it, from the start") : " does not help");
+          }),
+        ),
+      );
+    } catch (error) {
+      button.replaceWith(h("p", {}, String((error as Error).message)));
+    }
+  };
+
+  // Values.
+  let panel: Panel | null = null;
+  const change = async (path: string, value: Value) => {
+    try {
+      const before = session.ledgers.map((l) => l.energy - (session.ledgers[0]?.external ?? 0));
+      const live = await session.set(path, value);
+      ghost = before;
+      alert.hidden = true;
+      panel?.say(live ? `${path} = ${literal(value)}: goes on from frame ${session.latest}. The dashed curve is what was before.` : `${path} = ${literal(value)}: sizes have changed, so the scene starts anew.`);
+      if (editor) syncText();
+    } catch (error) {
+      if (error instanceof EngineError) {
+        panel?.say(error.failure.message.split("\n").slice(0, 3).join(" "), true);
+        if (session.info) panel?.open(session.info, session.toml, session.overrides);
+      } else throw error;
+    }
+  };
+
+  // Text.
+  let editor: Editor | null = null;
+  let making: Promise<void> | null = null;
+  const run = h("button", { type: "button", class: "button primary", onclick: () => void apply() }, "Run");
+  const changedNote = h("p", { class: "note" });
+  const syncText = () => {
+    const list = [...session.overrides].map(([p, v]) => `${p} = ${literal(v)}`);
+    changedNote.textContent = list.length ? `Changed by the panel, beside the text: ${list.join("; ")}` : "";
+  };
+  textTab.append(h("div", { class: "text-head" }, run, h("span", { class: "muted" }, "Ctrl + Enter")), editorBox, issuesBox, changedNote);
+  const openEditor = () =>
+    (making ??= (async () => {
+      const { Editor: Made } = await import("../editor");
+      editor = new Made(editorBox, () => void apply());
+      editor.text = session.toml || start.toml;
+      syncText();
+    })());
+  const apply = async () => {
+    if (!editor) return;
+    const text = editor.text;
+    run.disabled = true;
+    try {
+      const was = session.playing;
+      session.pause();
+      ghost = [];
+      await session.load(text);
+      editor.issues([]);
+      issuesBox.replaceChildren();
+      alert.hidden = true;
+      syncText();
+      if (was) session.play();
+    } catch (error) {
+      if (!(error instanceof EngineError)) throw error;
+      const { failure } = error;
+      complain(failure);
+      editor.issues(failure.issues);
+      issuesBox.replaceChildren(...failure.issues.map((i) => h("li", {}, i.line ? h("button", { type: "button", class: "line", onclick: () => editor?.goto(i.line!) }, `Line ${i.line}`) : null, h("span", {}, `${i.path ? `${i.path}: ` : ""}${i.message}`))));
+    } finally {
+      run.disabled = false;
+    }
+  };
+
+  // Facts.
+  const tellFacts = async () => {
+    const info = session.info;
+    if (!info || factsTab.hidden) return;
+    const rows: [string, string][] = [
+      ["Frames", `${info.frames} at ${show(info.fps)} a second`],
+      ["Precision", info.precision],
+      ["Objects", info.objects.map((o) => `${o.name} (${o.kind})`).join(", ")],
+      ["Systems", info.systems.map((s) => `${s.name}: ${s.method}${s.integrator ? `, ${s.integrator}` : ""}`).join("; ")],
+      ["Memory, at most", `${show(info.memory / 2 ** 20, 3)} MiB`],
+    ];
+    const report = session.report;
+    if (report) rows.push(["Last answer", `${report.steps} steps, ${report.newton} Newton and ${report.linear} linear iterations`]);
+    const body: HTMLElement[] = rows.flatMap(([k, v]) => [h("dt", {}, k), h("dd", {}, v)]);
+    if (info.warnings.length) body.push(h("dt", {}, "Doubtful"), h("dd", {}, info.warnings.join("\n")));
+    facts.replaceChildren(...body);
+    const list = await session.stability().catch(() => []);
+    const stable = list.filter((s) => s.limits.length);
+    for (const s of stable) {
+      facts.append(
+        h("dt", {}, `Largest steps of "${s.system}"`),
+        h(
+          "dd",
+          {},
+          h("p", {}, `now ${s.integrator.replace(/_/g, " ")}, ${show(s.step, 3)} s; stiffest mode ${show(s.frequency, 3)} rad/s`),
+          h("div", { class: "scroll", tabindex: 0 }, h("table", {}, h("thead", {}, h("tr", {}, h("th", { scope: "col" }, "integrator"), h("th", { scope: "col" }, "stable [s]"), h("th", { scope: "col" }, "usable [s]"))), h("tbody", {}, ...s.limits.map((l) => h("tr", { class: l.integrator === s.integrator ? "now" : false }, h("th", { scope: "row" }, l.integrator.replace(/_/g, " ")), h("td", {}, l.stable === null ? "any" : l.stable === 0 ? "none" : show(l.stable, 3)), h("td", {}, l.usable === null ? "any" : l.usable === 0 ? "none" : show(l.usable, 3))))))),
+        ),
+      );
+    }
+  };
+
+  // What is shown.
+  const drawLook = (info: SceneInfo) => {
+    const look = stage.look;
+    const grids = info.objects.filter((o) => ["gas", "heat", "compressible"].includes(o.kind));
+    const masses = info.objects.some((o) => !["gas", "heat", "compressible", "collider"].includes(o.kind));
+    const again = () => {
+      void session.refresh().then(() => {
+        stage.again();
+        tellLegend();
+      });
+      stage.again();
+      tellLegend();
+    };
+    const parts: HTMLElement[] = [];
+    if (grids.length) {
+      const kinds = new Set(grids.map((g) => g.kind));
+      const scene = info.scene as Record<string, any>;
+      const gas = (scene.gas ?? [])[0];
+      const there = FIELDS.filter(([name]) => {
+        if (kinds.has("gas")) return name === "density" ? gas?.smoke : name === "temperature" ? gas?.temperature : name === "fuel" ? gas?.fire : true;
+        if (kinds.has("heat")) return name === "temperature";
+        return ["density", "speed", "vorticity"].includes(name);
+      });
+      parts.push(choice("Shown", [["", "by itself"], ...there], look.field ?? "", (v) => {
+        look.field = v || null;
+        again();
+      }));
+      const space = info.dimension === 3;
+      if (!space) {
+        parts.push(check("Arrows", look.arrows, (on) => {
+          look.arrows = on;
+          again();
+        }), check("Cells", look.cells, (on) => {
+          look.cells = on;
+          again();
+        }), check("Dye", look.dye, (on) => {
+          look.dye = on;
+          again();
+        }));
+      } else {
+        const at = h("input", { type: "range", min: 0, max: 1, step: 0.005, value: look.sliceAt, "aria-label": "Place of the slice", hidden: look.slice === null, oninput: () => {
+          look.sliceAt = Number(at.value);
+          stage.again();
+        } });
+        parts.push(choice("See", [["", "smoke"], ["0", "slice across x"], ["1", "slice across y"], ["2", "slice across z"]], look.slice === null ? "" : String(look.slice), (v) => {
+          look.slice = v === "" ? null : Number(v);
+          at.hidden = look.slice === null;
+          again();
+        }), at);
+      }
+    }
+    if (masses) {
+      const linked = Object.values(info.topology).some((t) => t.links?.data.length);
+      parts.push(choice("Colour", [["object", "of the object"], ["speed", "speed"], ...(linked ? [["strain", "strain of links"] as [string, string]] : [])], look.color, (v) => {
+        look.color = v as typeof look.color;
+        again();
+      }));
+      if (linked) parts.push(check("Links", look.links, (on) => {
+        look.links = on;
+        again();
+      }));
+      parts.push(check("Trails", look.trails, (on) => {
+        look.trails = on;
+        again();
+      }));
+    }
+    lookBar.replaceChildren(...parts);
+  };
+
+  const offPointers = pointers(canvas, stage, session);
+
+  // What leaves the page.
+  const share = async () => {
+    const at = session.latest;
+    const hash = await session.hash();
+    const link = await pack({ version: engine().version, toml: session.toml, overrides: [...session.overrides].map(([p, v]) => `${p}=${literal(v)}`), frame: at, hash });
+    if (link.length > LONGEST) {
+      saveAs(new Blob([session.toml], { type: "application/toml" }), `${start.name}.toml`);
+      return say("Too large for a link: the scene was saved as a file instead.");
+    }
+    const address = `${location.href.split("#")[0]}#/s/${link}`;
+    main.dataset.link = address;
+    try {
+      await navigator.clipboard.writeText(address);
+      say("The link is copied. It holds the scene, its seed and the version.");
+    } catch {
+      history.replaceState(null, "", address);
+      say("The address of this page now holds the scene.");
+    }
+  };
+  const png = async () => saveAs(await stage.picture(), `${start.name}-${session.shown?.index ?? 0}.png`);
+  const glb = async () => {
+    const blob = await stage.surfaces();
+    if (blob) saveAs(blob, `${start.name}-${session.shown?.index ?? 0}.glb`);
+    else say("There is no surface in this scene.");
+  };
+  let recorder: MediaRecorder | null = null;
+  const film = () => {
+    if (recorder) return recorder.stop();
+    if (!("MediaRecorder" in window)) return say("This browser cannot record.");
+    const parts: Blob[] = [];
+    recorder = new MediaRecorder(canvas.captureStream(30), { mimeType: MediaRecorder.isTypeSupported("video/webm;codecs=vp9") ? "video/webm;codecs=vp9" : "video/webm", videoBitsPerSecond: 8e6 });
+    recorder.ondataavailable = (e) => parts.push(e.data);
+    recorder.onstop = () => {
+      recorder = null;
+      setIcon(record, "record", "Record a film (WebM)");
+      record.classList.remove("live");
+      saveAs(new Blob(parts, { type: "video/webm" }), `${start.name}.webm`);
+    };
+    recorder.start();
+    setIcon(record, "stop", "End the film and save it");
+    record.classList.add("live");
+    session.play();
+  };
+
+  const theme = () => {
+    stage.theme();
+    energy.setCurves(energyCurves());
+    drawEnergy();
+  };
+  addEventListener("themechange", theme);
+  const drag = (event: DragEvent) => event.preventDefault();
+  const drop = (event: DragEvent) => {
+    event.preventDefault();
+    void acceptFiles([...(event.dataTransfer?.files ?? [])]).catch((e) => say(String(e.message ?? e)));
+  };
+  addEventListener("dragover", drag);
+  addEventListener("drop", drop);
+  const offKeys = keys(session, stage);
+  const restarted = (message: string) => {
+    complain({ kind: "crash", message: `${message}\nThe scene stands at its start again.`, issues: [] });
+    void session.revived();
+  };
+  engine().onrestart = restarted;
+
+  const schema = engine()
+    .schema()
+    .then((found) => {
+      panel = new Panel(found, { set: change });
+      valuesTab.append(panel.element);
+      if (session.info) panel.open(session.info, session.toml, session.overrides);
+    })
+    .catch((error) => valuesTab.append(h("p", {}, String(error.message ?? error))));
+  void session
+    .load(start.toml, start.overrides)
+    .then(async () => {
+      if (start.shared?.frame) await session.goto(start.shared.frame, (i) => (wait.textContent = `frame ${i} of ${start.shared!.frame}`));
+      else if (!matchMedia("(prefers-reduced-motion: reduce)").matches) session.play();
+      main.dataset.ready = "true";
+    })
+    .catch((error) => {
+      wait.hidden = true;
+      main.dataset.ready = "failed";
+      if (error instanceof EngineError) {
+        complain(error.failure);
+        choose(1);
+        void openEditor().then(() => editor?.issues(error.failure.issues));
+      } else throw error;
+    });
+
+  if (start.shared && start.shared.version && engine().version && start.shared.version !== engine().version) say(`This link was made by version ${start.shared.version}; this is ${engine().version}: bits may differ.`);
+  // For tests and for the curious.
+  Object.assign(window, { tumble: { session, stage, engine: engine() } });
+
+  return () => {
+    removeEventListener("themechange", theme);
+    removeEventListener("dragover", drag);
+    removeEventListener("drop", drop);
+    offKeys();
+    offPointers();
+    if (recorder) recorder.stop();
+    energy.close();
+    editor?.close();
+    session.close();
+    stage.dispose();
+    void schema;
+  };
+};
+

@@ -1,0 +1,302 @@
+/** Controls for the values of a scene, made from its schema: label, unit, range, what the word means. */
+import { parse } from "smol-toml";
+import type { SceneInfo, Value } from "./engine/protocol";
+import { check, h } from "./dom";
+
+type Schema = Record<string, any>;
+type Tree = Record<string, any>;
+
+/** What panels leave to the text. */
+const LEFT_OUT = new Set(["version", "title", "output", "expect", "camera", "name", "precision", "bits", "dimension", "plane", "color", "color_to", "color_end"]);
+
+export interface PanelHost {
+  set(path: string, value: Value): Promise<void>;
+}
+
+/** A schema without its references; what stands beside a reference counts. */
+function resolve(node: Schema, all: Schema): Schema {
+  let found = node;
+  for (let depth = 0; depth < 8; depth++) {
+    if (found.$ref) {
+      const { $ref, ...rest } = found;
+      const target = all.$defs[String($ref).split("/").pop()!] as Schema;
+      found = { ...target, ...rest, description: rest.description || target.description };
+      continue;
+    }
+    const some = (found.anyOf ?? []).filter((b: Schema) => b.type !== "null");
+    if (found.anyOf && some.length === 1) {
+      const { anyOf: _, ...rest } = found;
+      found = { ...some[0], ...rest };
+      continue;
+    }
+    break;
+  }
+  return found;
+}
+
+/** The branch of a choice of tables that a value is. */
+function branch(schema: Schema, value: any, all: Schema): Schema | null {
+  const branches: Schema[] = schema.oneOf ?? schema.anyOf ?? [];
+  for (const raw of branches) {
+    const b = resolve(raw, all);
+    if (typeof value === "number" && (b.type === "number" || b.type === "integer")) return b;
+    if (typeof value === "string" && (b.type === "string" || "const" in b) && (!("const" in b) || b.const === value)) return b;
+    if (Array.isArray(value) && b.type === "array") return b;
+    if (value && typeof value === "object" && !Array.isArray(value) && b.properties) {
+      const kind = b.properties.kind?.const;
+      if (kind !== undefined ? kind === value.kind : Object.keys(value).every((k) => k in b.properties)) return b;
+    }
+  }
+  return null;
+}
+
+const typeOf = (schema: Schema): string => (Array.isArray(schema.type) ? schema.type.find((t: string) => t !== "null") : schema.type) ?? "";
+const plain = (key: string): string => key.replace(/_/g, " ");
+const capital = (text: string): string => text.charAt(0).toUpperCase() + text.slice(1);
+
+let count = 0;
+
+export class Panel {
+  readonly element = h("div", { class: "panel" });
+  private readonly groups = h("div", { class: "groups" });
+  private readonly note = h("p", { class: "note", role: "status" });
+  private everything = false;
+  private opened = new Set<string>();
+  private closed = new Set<string>();
+  private info: SceneInfo | null = null;
+  private explicit: Tree = {};
+
+  constructor(
+    private readonly schema: Schema,
+    private readonly host: PanelHost,
+  ) {
+    this.element.append(
+      h("div", { class: "panel-head" }, check("Every word, with defaults", false, (on) => {
+        this.everything = on;
+        this.draw();
+      })),
+      this.groups,
+      this.note,
+    );
+  }
+
+  open(info: SceneInfo, toml: string, overrides: Map<string, Value>): void {
+    try {
+      this.explicit = parse(toml) as Tree;
+    } catch {
+      this.explicit = {};
+    }
+    for (const path of overrides.keys()) mark(this.explicit, path.split("."));
+    const same = this.info && JSON.stringify(shape(this.info.scene)) === JSON.stringify(shape(info.scene));
+    this.info = info;
+    // A panel in use is not made anew under the fingers.
+    if (same && this.groups.contains(document.activeElement)) return;
+    this.draw();
+  }
+
+  say(text: string, bad = false): void {
+    this.note.textContent = text;
+    this.note.classList.toggle("bad", bad);
+  }
+
+  private draw(): void {
+    if (!this.info) return;
+    const scene = this.info.scene as Tree;
+    const groups: Node[] = [];
+    for (const [key, raw] of Object.entries(this.schema.properties as Record<string, Schema>)) {
+      const value = scene[key];
+      if (LEFT_OUT.has(key) || value === null || value === undefined) continue;
+      const schema = resolve(raw, this.schema);
+      if (Array.isArray(value)) {
+        value.forEach((entry, i) => {
+          const item = resolve(schema.items ?? {}, this.schema);
+          const name = entry?.name ?? entry?.kind ?? String(i + 1);
+          const group = this.group(`${key}.${i}`, entry, item, this.explicit[key]?.[i], `${name}`, capital(plain(key)));
+          if (group) groups.push(group);
+        });
+      } else if (typeof value === "object") {
+        const group = this.group(key, value, schema, this.explicit[key], capital(plain(key)), "");
+        if (group) groups.push(group);
+      } else if (key in this.explicit || this.everything) {
+        const row = this.row(key, value, schema, key);
+        if (row) groups.push(row);
+      }
+    }
+    this.groups.replaceChildren(...groups);
+    if (!groups.length) this.groups.append(h("p", { class: "muted" }, "This scene leaves everything at its defaults."));
+  }
+
+  private group(path: string, value: Tree, schema: Schema, explicit: Tree | undefined, title: string, kind: string): HTMLElement | null {
+    const rows = this.rows(path, value, schema, explicit);
+    if (!rows.length) return null;
+    const open = this.opened.has(path) || (!this.closed.has(path) && !["collider", "camera", "time"].includes(path.split(".")[0]));
+    const details = h("details", { open, class: "group" }, h("summary", {}, h("span", { class: "group-title" }, title), kind ? h("span", { class: "group-kind" }, kind) : null), ...rows);
+    details.addEventListener("toggle", () => {
+      (details.open ? this.opened : this.closed).add(path);
+      (details.open ? this.closed : this.opened).delete(path);
+    });
+    return details;
+  }
+
+  private rows(path: string, value: Tree, schema: Schema, explicit: Tree | undefined): HTMLElement[] {
+    const own = schema.properties ? schema : branch(schema, value, this.schema);
+    if (!own?.properties) return [];
+    const rows: HTMLElement[] = [];
+    for (const [key, raw] of Object.entries(own.properties as Record<string, Schema>)) {
+      if (LEFT_OUT.has(key) || key === "kind" || key === "system" || key === "method") continue;
+      const inner = value?.[key];
+      if (inner === null || inner === undefined) continue;
+      const said = explicit?.[key] !== undefined;
+      if (!said && !this.everything) continue;
+      const row = this.row(`${path}.${key}`, inner, resolve(raw as Schema, this.schema), key, explicit?.[key]);
+      if (row) rows.push(row);
+    }
+    return rows;
+  }
+
+  private row(path: string, value: any, schema: Schema, key: string, explicit?: any): HTMLElement | null {
+    const unit = schema["x-unit"] && schema["x-unit"] !== "1" ? String(schema["x-unit"]) : "";
+    let kind = schema;
+    if (schema.oneOf || schema.anyOf) {
+      const words: string[] = (schema.oneOf ?? schema.anyOf).flatMap((b: Schema) => ("const" in b ? [String(b.const)] : b.enum ?? []));
+      if (typeof value === "string" && words.includes(value)) return this.field(path, key, schema, "", (id) => this.select(id, path, value, schema));
+      const found = branch(schema, value, this.schema);
+      if (!found) return null;
+      kind = { ...found, description: schema.description ?? found.description, "x-unit": schema["x-unit"] ?? found["x-unit"] };
+    }
+    const type = typeOf(kind);
+    const units = unit || (kind["x-unit"] && kind["x-unit"] !== "1" ? String(kind["x-unit"]) : "");
+    if (typeof value === "boolean") return this.field(path, key, kind, "", (id) => this.toggle(id, path, value));
+    if (typeof value === "number") return this.field(path, key, kind, units, (id) => this.number(id, path, value, kind, type === "integer"));
+    if (typeof value === "string") {
+      if (Array.isArray(kind.enum)) return this.field(path, key, kind, "", (id) => this.select(id, path, value, { oneOf: kind.enum.map((c: string) => ({ const: c })) }));
+      return this.field(path, key, kind, units, (id) => this.text(id, path, value));
+    }
+    if (Array.isArray(value)) {
+      if (value.length && value.length <= 4 && value.every((v) => typeof v === "number" || typeof v === "string")) return this.field(path, key, kind, units, (id) => this.vector(id, path, value));
+      if (value.length && value.every((v) => v && typeof v === "object" && !Array.isArray(v))) {
+        const item = resolve(kind.items ?? {}, this.schema);
+        const groups = value.map((v, i) => this.group(`${path}.${i}`, v, item, explicit?.[i], v.name ?? v.kind ?? `${plain(key)} ${i + 1}`, "")).filter((g) => g !== null);
+        return groups.length ? h("div", { class: "nested" }, ...groups) : null;
+      }
+      return null;
+    }
+    if (typeof value === "object") {
+      const rows = this.rows(path, value, kind, typeof explicit === "object" ? explicit : undefined);
+      // What was written short ("structural = 500") has its number inside.
+      const inner = !rows.length && typeof explicit === "number" && typeof value.modulus === "number" ? this.rows(path, value, kind, { modulus: explicit }) : rows;
+      if (!inner.length) return null;
+      return h("fieldset", { class: "sub" }, h("legend", {}, capital(plain(key))), ...inner);
+    }
+    return null;
+  }
+
+  private field(path: string, key: string, schema: Schema, unit: string, control: (id: string) => HTMLElement): HTMLElement {
+    const id = `v${++count}`;
+    const doc = String(schema.description ?? "").replace(/\s+/g, " ").replace(/`/g, "");
+    return h(
+      "div",
+      { class: "field", "data-path": path },
+      h("div", { class: "field-head" }, h("label", { for: id }, capital(plain(key))), unit ? h("span", { class: "unit" }, unit) : null),
+      control(id),
+      doc ? h("p", { class: "doc", id: `${id}d` }, doc) : null,
+    );
+  }
+
+  private async send(path: string, value: Value): Promise<void> {
+    await this.host.set(path, value);
+  }
+
+  private number(id: string, path: string, value: number, schema: Schema, whole: boolean): HTMLElement {
+    const low = schema.minimum ?? schema.exclusiveMinimum;
+    const high = schema.maximum ?? schema.exclusiveMaximum;
+    const input = h("input", { id, type: "number", value: String(value), step: "any", min: schema.minimum ?? false, max: schema.maximum ?? false, "aria-describedby": `${id}d`, inputmode: whole ? "numeric" : "decimal" });
+    // Short ranges are straight; long ones of positive numbers run by factors around the value.
+    const straight = low !== undefined && high !== undefined && high - low <= 1000 && high / Math.max(Math.abs(value), 1e-9) < 1e3;
+    const positive = !straight && value > 0;
+    const [from, to] = straight ? [low, high] : positive ? [Math.log10(value) - 1, Math.log10(value) + 1] : value === 0 ? [low === undefined ? -1 : 0, 1] : [-2 * Math.abs(value), 2 * Math.abs(value)];
+    const slider = h("input", { type: "range", min: from, max: to, step: (to - from) / 200, value: positive ? Math.log10(value) : value, "aria-label": `${id} slider`, tabindex: -1, "aria-hidden": "true" });
+    let timer = 0;
+    slider.addEventListener("input", () => {
+      let v = positive ? 10 ** Number(slider.value) : Number(slider.value);
+      v = whole ? Math.round(v) : Number(v.toPrecision(3));
+      if (schema.exclusiveMinimum !== undefined && v <= schema.exclusiveMinimum) return;
+      if (schema.minimum !== undefined) v = Math.max(v, schema.minimum);
+      input.value = String(v);
+      clearTimeout(timer);
+      timer = window.setTimeout(() => void this.send(path, v), 160);
+    });
+    input.addEventListener("change", () => {
+      const v = Number(input.value);
+      if (input.value === "" || !Number.isFinite(v)) return void (input.value = String(value));
+      slider.value = String(positive && v > 0 ? Math.log10(v) : v);
+      void this.send(path, whole ? Math.round(v) : v);
+    });
+    return h("div", { class: "control" }, slider, input);
+  }
+
+  private select(id: string, path: string, value: string, schema: Schema): HTMLElement {
+    const branches = ((schema.oneOf ?? schema.anyOf) as Schema[]).flatMap((b): [string, string][] => ("const" in b ? [[String(b.const), String(b.description ?? "")]] : (b.enum ?? []).map((e: string): [string, string] => [e, ""])));
+    const says = h("p", { class: "doc says" });
+    const tell = (v: string) => (says.textContent = (branches.find((b) => b[0] === v)?.[1] ?? "").replace(/\s+/g, " "));
+    const list = h(
+      "select",
+      {
+        id,
+        "aria-describedby": `${id}d`,
+        onchange: () => {
+          tell(list.value);
+          void this.send(path, list.value);
+        },
+      },
+      ...branches.map(([v]) => h("option", { value: v, selected: v === value }, plain(v))),
+    );
+    tell(value);
+    return h("div", { class: "control wide" }, list, says);
+  }
+
+  private toggle(id: string, path: string, value: boolean): HTMLElement {
+    const box = h("input", { id, type: "checkbox", checked: value, onchange: () => void this.send(path, box.checked) });
+    return h("div", { class: "control wide" }, box);
+  }
+
+  private text(id: string, path: string, value: string): HTMLElement {
+    const input = h("input", { id, type: "text", value, spellcheck: "false", onchange: () => void this.send(path, input.value) });
+    return h("div", { class: "control wide" }, input);
+  }
+
+  private vector(id: string, path: string, value: (number | string)[]): HTMLElement {
+    const words = value.some((v) => typeof v === "string");
+    const inputs = value.map((v, i) =>
+      h("input", {
+        id: i ? `${id}-${i}` : id,
+        type: "text",
+        inputmode: words ? "text" : "decimal",
+        value: typeof v === "number" ? String(Number(v.toPrecision(7))) : v,
+        "aria-label": i ? `component ${i + 1}` : false,
+        onchange: () => {
+          const next = inputs.map((el, k) => (el.value.trim() !== "" && Number.isFinite(Number(el.value)) ? Number(el.value) : words ? el.value : value[k]));
+          void this.send(path, next as Value);
+        },
+      }),
+    );
+    return h("div", { class: "control vector" }, ...inputs);
+  }
+}
+
+/** Which keys there are, without their values. */
+function shape(tree: any): any {
+  if (Array.isArray(tree)) return tree.length > 8 ? tree.length : tree.map(shape);
+  if (tree && typeof tree === "object") return Object.fromEntries(Object.entries(tree).map(([k, v]) => [k, shape(v)]));
+  return typeof tree;
+}
+
+function mark(tree: Tree, path: string[]): void {
+  let at: any = tree;
+  for (const [i, key] of path.entries()) {
+    if (i === path.length - 1) at[key] ??= true;
+    else if (at[key] === undefined || typeof at[key] !== "object") at = at[key] = {};
+    else at = at[key];
+  }
+}
+

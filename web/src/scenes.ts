@@ -1,0 +1,70 @@
+/** The scenes that ship with tumble, from the one place where they live, and the pages of theory. */
+
+const texts = import.meta.glob("../../python/tumble/scenes/*/*.toml", { query: "?raw", import: "default" }) as Record<string, () => Promise<string>>;
+const assets = import.meta.glob("../../python/tumble/scenes/assets/*.{ply,obj,stl,glb}", { query: "?url", import: "default", eager: true }) as Record<string, string>;
+const pictures = import.meta.glob("../pictures/*.webp", { query: "?url", import: "default", eager: true }) as Record<string, string>;
+const pages = import.meta.glob("../../docs/theory/*.md", { query: "?raw", import: "default" }) as Record<string, () => Promise<string>>;
+
+export interface Shipped {
+  /** ROW/NAME, as on the command line. */
+  id: string;
+  row: string;
+  name: string;
+  picture: string | null;
+  text: () => Promise<string>;
+}
+
+const idOf = (path: string) => path.split("/").slice(-2).join("/").replace(/\.toml$/, "");
+
+/** Rows in the order in which a newcomer would look. */
+const ROWS = ["drape", "springs", "structures", "integrators", "contact", "particles", "gravity", "gas", "heat", "failures"];
+export const ROW_TITLES: Record<string, string> = {
+  drape: "Cloth",
+  springs: "Springs",
+  structures: "Structures",
+  integrators: "Integrators",
+  contact: "Contact",
+  particles: "Particles",
+  gravity: "Gravity",
+  gas: "Gas and smoke",
+  heat: "Heat",
+  failures: "What goes wrong",
+};
+
+export const SCENES: Shipped[] = Object.entries(texts)
+  .map(([path, text]) => {
+    const id = idOf(path);
+    const [row, name] = id.split("/");
+    return { id, row, name, text, picture: pictures[`../pictures/${row}-${name}.webp`] ?? null };
+  })
+  .sort((a, b) => order(a.row) - order(b.row) || a.name.localeCompare(b.name));
+
+function order(row: string): number {
+  const k = ROWS.indexOf(row);
+  return k < 0 ? ROWS.length : k;
+}
+
+export const sceneOf = (id: string): Shipped | undefined => SCENES.find((s) => s.id === id);
+
+/** Title of a scene without reading all of it. */
+export const titleOf = (text: string): string => /^title\s*=\s*"((?:[^"\\]|\\.)*)"/m.exec(text)?.[1].replace(/\\"/g, '"') ?? "";
+
+/** A mesh that a scene names: what `tumble view` serves beside a scene, or what ships with tumble. */
+export async function asset(path: string): Promise<Uint8Array | null> {
+  if (new URLSearchParams(location.search).has("view")) {
+    const own = await fetch(`view/${encodeURIComponent(path)}`).catch(() => null);
+    if (own?.ok) return new Uint8Array(await own.arrayBuffer());
+  }
+  const name = path.split("/").pop()!;
+  const url = Object.entries(assets).find(([key]) => key.endsWith(`/${name}`))?.[1];
+  if (!url) return null;
+  const answer = await fetch(url);
+  return answer.ok ? new Uint8Array(await answer.arrayBuffer()) : null;
+}
+
+export const theoryNames = Object.keys(pages).map((path) => path.split("/").pop()!.replace(".md", ""));
+
+export async function theoryText(name: string): Promise<string | null> {
+  const page = pages[`../../docs/theory/${name}.md`];
+  return page ? page() : null;
+}

@@ -1,0 +1,91 @@
+/** The theory beside each page: equations by their tags, where they are explained, and the files that implement them. */
+import sources from "virtual:sources";
+import type { SceneInfo } from "./engine/protocol";
+import { h } from "./dom";
+import { theoryText } from "./scenes";
+
+export interface Topic {
+  page: string;
+  tags: string[];
+}
+
+const SCHEMES: Record<string, string> = {
+  forward_euler: "1", symplectic_euler: "2", modified_euler: "3", midpoint: "5", heun: "5", rk4: "5", verlet: "6", velocity_verlet: "7",
+  adaptive_euler: "8", dormand_prince: "9", implicit_euler: "10", implicit_midpoint: "11", bdf2: "12",
+};
+
+const FORCES: Record<string, Topic> = {
+  attraction: { page: "orbits", tags: ["orbits.1"] },
+  gravitation: { page: "orbits", tags: ["orbits.11"] },
+  flock: { page: "flocks", tags: ["flocks.1"] },
+  magnetic: { page: "particles", tags: [] },
+  electric: { page: "particles", tags: [] },
+  electrostatics: { page: "particles", tags: [] },
+  pair: { page: "neighbours", tags: ["neighbours.1"] },
+};
+
+/** What a scene is about, the most special first. */
+export function topics(info: SceneInfo): Topic[] {
+  const found: Topic[] = [];
+  const scene = info.scene as Record<string, any>;
+  const has = (kind: string) => info.objects.some((o) => o.kind === kind);
+  if (has("gas")) found.push({ page: "gas", tags: ["gas.1", "gas.3", "gas.4", "gas.5"] }, { page: "pressure", tags: ["pressure.1"] });
+  if ((scene.gas ?? []).some((g: any) => g.fire)) found.push({ page: "fire", tags: ["fire.1"] });
+  if (has("heat")) found.push({ page: "heat", tags: ["heat.1"] });
+  if (has("compressible")) found.push({ page: "compressible", tags: ["compressible.1"] });
+  if (info.systems.some((s) => s.method === "vicsek")) found.push({ page: "flocks", tags: ["flocks.1"] });
+  for (const force of scene.force ?? []) if (FORCES[force.kind]) found.push(FORCES[force.kind]);
+  if ((scene.rope ?? []).some((r: any) => r.rod)) found.push({ page: "rods", tags: ["rods.1"] });
+  if ((scene.block ?? []).some((b: any) => b.material)) found.push({ page: "solids", tags: [] });
+  if (["sheet", "rope", "block", "net"].some(has) || (scene.particles ?? []).some((p: any) => p.spring?.length)) found.push({ page: "springs", tags: ["springs.1", "springs.2"] });
+  if (has("collider") && !has("gas")) found.push({ page: "contact", tags: ["contact.1"] });
+  if (has("emitter")) found.push({ page: "particles", tags: [] });
+  const schemes = [...new Set(info.systems.filter((s) => ["dynamics", "tracers"].includes(s.method)).map((s) => s.integrator))];
+  if (schemes.length) found.push({ page: "integrators", tags: schemes.map((s) => `integrators.${SCHEMES[s] ?? "1"}`) });
+  const pages = new Map<string, Topic>();
+  for (const t of found) {
+    const old = pages.get(t.page);
+    if (old) old.tags = [...new Set([...old.tags, ...t.tags])];
+    else pages.set(t.page, { page: t.page, tags: [...t.tags] });
+  }
+  return [...pages.values()];
+}
+
+/** The lines of an equation: its own, and those before it that belong to it. */
+export function equation(text: string, tag: string): string | null {
+  for (const [, block] of text.matchAll(/```text\n([\s\S]*?)```/g)) {
+    const lines = block.split("\n");
+    const end = lines.findIndex((l) => l.includes(`(${tag})`));
+    if (end < 0) continue;
+    let start = end;
+    while (start > 0 && lines[start - 1].trim() && !/\([a-z]+\.\d+\)\s*$/.test(lines[start - 1])) start--;
+    return lines.slice(start, end + 1).map((l) => l.replace(/\s+(\([a-z]+\.\d+\))\s*$/, "    $1")).join("\n").trim();
+  }
+  return null;
+}
+
+export const question = (text: string): string => /^\*(.+?)\*$/ms.exec(text)?.[1].replace(/\s+/g, " ") ?? "";
+export const heading = (text: string): string => /^#\s+(.+)$/m.exec(text)?.[1] ?? "";
+
+/** Cards of the topics. */
+export async function cards(list: Topic[]): Promise<HTMLElement[]> {
+  const made = await Promise.all(
+    list.map(async ({ page, tags }) => {
+      const text = await theoryText(page);
+      if (!text) return null;
+      const known = tags.length ? tags : [...text.matchAll(/\(([a-z]+\.\d+)\)\s*$/gm)].map((m) => m[1]).filter((t) => t.startsWith(`${page}.`)).slice(0, 2);
+      const parts = known.map((tag) => equation(text, tag)).filter((e) => e !== null);
+      const files = [...new Set(known.flatMap((tag) => sources[tag] ?? []))].slice(0, 4);
+      return h(
+        "section",
+        { class: "card theory-card" },
+        h("h3", {}, heading(text)),
+        h("p", { class: "muted" }, question(text)),
+        ...parts.map((e) => h("pre", { class: "equation", tabindex: 0 }, e)),
+        files.length ? h("p", { class: "files" }, "In the engine: ", ...files.flatMap((f, i) => [i ? ", " : "", h("code", {}, f)])) : null,
+        h("p", {}, h("a", { href: `#/theory/${page}` }, `Read on: ${heading(text).toLowerCase()}`)),
+      );
+    }),
+  );
+  return made.filter((c) => c !== null);
+}

@@ -1,0 +1,69 @@
+/** Play, pause, one frame, back, speed, and the way through kept frames. */
+import { choice, h, iconButton, setIcon, show } from "./dom";
+import type { Session } from "./session";
+
+export function transport(session: Session): HTMLElement {
+  const play = iconButton("play", "Play", () => session.toggle(), { class: "icon-button primary" });
+  const slider = h("input", { type: "range", min: 0, max: 1, step: 1, value: 0, "aria-label": "Frame", class: "scrub", oninput: () => session.scrub(Number(slider.value)) });
+  const clock = h("output", { class: "clock", "aria-label": "Frame and time" });
+  const cost = h("span", { class: "cost" });
+  const update = () => {
+    const frame = session.shown;
+    const info = session.info;
+    if (!frame || !info) return;
+    const last = session.endless ? session.latest : Math.max(info.frames, session.latest);
+    slider.max = String(last);
+    slider.value = String(frame.index);
+    slider.style.setProperty("--there", `${(100 * session.latest) / Math.max(last, 1)}%`);
+    slider.style.setProperty("--here", `${(100 * frame.index) / Math.max(last, 1)}%`);
+    slider.setAttribute("aria-valuetext", `frame ${frame.index} of ${last}, ${show(frame.time)} seconds`);
+    clock.textContent = `${frame.index} / ${last} · ${show(frame.time, 3)} s`;
+    cost.textContent = session.cost ? `${show(session.cost, 2)} ms a frame` : "";
+  };
+  session.on("frame", update);
+  session.on("loaded", update);
+  session.on("playing", (on) => setIcon(play, on ? "pause" : "play", on ? "Pause" : "Play"));
+  return h(
+    "div",
+    { class: "transport", role: "group", "aria-label": "Playback" },
+    play,
+    iconButton("back", "One frame back", () => session.previous()),
+    iconButton("next", "One frame on", () => void session.next()),
+    iconButton("reset", "Back to the start", () => void session.reset()),
+    slider,
+    clock,
+    choice("Speed", [["0.1", "0.1 ×"], ["0.25", "0.25 ×"], ["0.5", "0.5 ×"], ["1", "1 ×"], ["2", "2 ×"], ["4", "4 ×"]], "1", (v) => (session.speed = Number(v))),
+    cost,
+  );
+}
+
+/** Keys of pages that play: space, arrows, Home. */
+export function keys(session: Session, stage?: { nudge(dx: number, dy: number, zoom: number): void; goHome(): void }): () => void {
+  const act = (event: KeyboardEvent) => {
+    const target = event.target as HTMLElement;
+    if (event.ctrlKey || event.metaKey || event.altKey || target.closest("input:not([type=checkbox]), select, textarea, [contenteditable], [role=tab], button, a, summary")) return;
+    const steps: Record<string, () => void> = {
+      " ": () => session.toggle(),
+      ".": () => void session.next(),
+      ",": () => session.previous(),
+      Home: () => void session.reset(),
+    };
+    if (stage && target.closest(".stage")) {
+      Object.assign(steps, {
+        ArrowLeft: () => stage.nudge(-1, 0, 1),
+        ArrowRight: () => stage.nudge(1, 0, 1),
+        ArrowUp: () => stage.nudge(0, -1, 1),
+        ArrowDown: () => stage.nudge(0, 1, 1),
+        "+": () => stage.nudge(0, 0, 1.15),
+        "-": () => stage.nudge(0, 0, 1 / 1.15),
+        "0": () => stage.goHome(),
+      });
+    }
+    const step = steps[event.key];
+    if (!step) return;
+    event.preventDefault();
+    step();
+  };
+  addEventListener("keydown", act);
+  return () => removeEventListener("keydown", act);
+}

@@ -1,0 +1,919 @@
+/** The picture of a world: objects in layers, a camera, light. It draws when something has changed, never by itself. */
+import * as THREE from "three";
+import { OrbitControls } from "three/examples/jsm/controls/OrbitControls.js";
+import type { Column, Columns, Frame, Numbers, SceneInfo, Vector } from "../engine/protocol";
+import { mapOf, PALETTE, SIGNED, table } from "./colors";
+import { gridOf, PIXELS, PlaneField, Pieces, Points, Range, scalars, SpaceField, Surface, type Grid, type Layer, type Rgb } from "./layers";
+
+/** How fields and objects are shown; of all objects together. */
+export interface Look {
+  /** Column of grids; without it the first of what there is to see. */
+  field: string | null;
+  /** Dye in the object's colour instead of a map of colours. */
+  dye: boolean;
+  arrows: boolean;
+  cells: boolean;
+  /** Axis across which a field in space is cut; null shows smoke. */
+  slice: number | null;
+  sliceAt: number;
+  links: boolean;
+  color: "object" | "speed" | "strain";
+  trails: boolean;
+}
+
+export const LOOK: Look = { field: null, dye: true, arrows: false, cells: false, slice: null, sliceAt: 0.5, links: false, color: "object", trails: true };
+
+/** What a legend tells. */
+export interface Legend {
+  name: string;
+  unit: string;
+  low: number;
+  high: number;
+}
+
+/** What is shown of a grid where nobody says: the first of these that there is. */
+const SHOWN = ["density", "fuel", "temperature", "vorticity", "speed", "pressure", "divergence"];
+const SMOKE: Rgb = [0.52, 0.53, 0.56];
+const SOLID: Rgb = [0.42, 0.41, 0.39];
+const GLOWING = 1000;
+
+interface Thing {
+  name: string;
+  kind: "points" | "curve" | "surface" | "solid" | "ground" | "plane" | "space";
+  color: Rgb;
+  radius: number;
+  trail: number;
+  leap: number;
+  topology: Record<string, Column>;
+  grid: Grid | null;
+  body?: Points | Surface | PlaneField | SpaceField | Pieces;
+  links?: Pieces;
+  way?: Pieces;
+  arrows?: Pieces;
+  ranges: Map<string, Range>;
+  plane?: THREE.Mesh;
+  at?: [THREE.Vector3, THREE.Vector3];
+}
+
+type Entry = Record<string, any>;
+
+const linear = (code: string): Rgb => {
+  const c = new THREE.Color(code);
+  return [c.r, c.g, c.b];
+};
+
+export class Stage {
+  readonly renderer: THREE.WebGLRenderer;
+  readonly scene = new THREE.Scene();
+  private camera: THREE.PerspectiveCamera | THREE.OrthographicCamera = new THREE.PerspectiveCamera(35, 1, 0.01, 1000);
+  private controls: OrbitControls;
+  private things: Thing[] = [];
+  private info: SceneInfo | null = null;
+  private frame: Frame | null = null;
+  private past: (index: number) => Frame | undefined = () => undefined;
+  private reach = 1;
+  private home = { position: new THREE.Vector3(), target: new THREE.Vector3(), width: 1 };
+  private dirty = false;
+  private readonly light = new THREE.DirectionalLight(0xffffff, 2.1);
+  private readonly sky = new THREE.HemisphereLight(0xffffff, 0xb8b2a8, 1.25);
+  private readonly observer: ResizeObserver;
+  private anchors: { pieces: Pieces; ends: [string, number][] } | null = null;
+  private readonly handle = new Pieces(0, { lit: false, thinnest: 1.5, front: true });
+  look: Look = { ...LOOK };
+  legend: Legend | null = null;
+  /** Called after each picture. */
+  drawn: () => void = () => {};
+  /** Draws without the means of large screens, for small pictures side by side. */
+  constructor(readonly canvas: HTMLCanvasElement, { controls = true, shadows = true } = {}) {
+    this.renderer = new THREE.WebGLRenderer({ canvas, antialias: true, alpha: true, preserveDrawingBuffer: false, powerPreference: "high-performance" });
+    this.renderer.shadowMap.enabled = shadows;
+    this.renderer.shadowMap.type = THREE.PCFShadowMap;
+    this.renderer.toneMapping = THREE.NoToneMapping;
+    this.light.castShadow = shadows;
+    this.light.shadow.mapSize.set(1024, 1024);
+    this.light.shadow.radius = 4;
+    this.light.shadow.bias = -0.0005;
+    this.light.shadow.normalBias = 0.02;
+    this.scene.add(this.light, this.light.target, this.sky, this.handle.object);
+    this.controls = this.controlled();
+    this.controls.enabled = controls;
+    this.observer = new ResizeObserver(() => this.resize());
+    this.observer.observe(canvas.parentElement ?? canvas);
+  }
+
+  private controlled(): OrbitControls {
+    const controls = new OrbitControls(this.camera, this.canvas);
+    controls.enableDamping = false;
+    controls.addEventListener("change", () => this.touch());
+    // The page scrolls by one finger where there is nothing to turn.
+    return controls;
+  }
+
+  dispose(): void {
+    this.observer.disconnect();
+    this.clear();
+    this.handle.dispose();
+    this.controls.dispose();
+    this.renderer.dispose();
+    this.renderer.forceContextLoss();
+    this.info = this.frame = null;
+  }
+
+  private clear(): void {
+    for (const thing of this.things) {
+      for (const layer of [thing.body, thing.links, thing.way, thing.arrows]) {
+        if (!layer) continue;
+        this.scene.remove((layer as Layer).object);
+        layer.dispose();
+      }
+      if (thing.plane) {
+        this.scene.remove(thing.plane);
+        thing.plane.geometry.dispose();
+        (thing.plane.material as THREE.Material).dispose();
+      }
+    }
+    if (this.anchors) {
+      this.scene.remove(this.anchors.pieces.object);
+      this.anchors.pieces.dispose();
+      this.anchors = null;
+    }
+    this.things = [];
+  }
+
+  get night(): boolean {
+    return (this.info?.scene.camera as Entry | undefined)?.look === "night";
+  }
+
+  get flat(): boolean {
+    return this.info?.dimension === 2;
+  }
+
+  /** Whether a gas lies in a plane, which a pointer can stir. */
+  get gas(): { name: string; grid: Grid } | null {
+    const object = this.info?.objects.find((o) => o.kind === "gas");
+    const thing = this.things.find((t) => t.name === object?.name && t.grid);
+    return thing?.grid ? { name: thing.name, grid: thing.grid } : null;
+  }
+
+  /** Whether ways behind particles are drawn. */
+  get trails(): boolean {
+    return this.things.some((t) => t.trail > 0);
+  }
+
+  /** Columns that the look asks for beside those of the scene. */
+  get wanted(): string[] {
+    const names = new Set<string>(this.info?.columns ?? []);
+    for (const thing of this.things) {
+      if (thing.grid) {
+        if (this.look.arrows || this.look.field === "speed") names.add("velocity");
+        if (this.look.field && this.look.field !== "speed") names.add(this.look.field);
+      } else if (thing.kind !== "solid" && thing.kind !== "ground") {
+        names.add("position");
+        if (this.look.color === "speed") names.add("velocity");
+        if (this.look.color === "strain") names.add("link_strain");
+      }
+    }
+    return [...names];
+  }
+
+  /** A new world. The camera stays where it is if the world is another version of the one before. */
+  open(info: SceneInfo, past: (index: number) => Frame | undefined, keepCamera = false): void {
+    this.clear();
+    this.info = info;
+    this.past = past;
+    this.frame = null;
+    const entries = new Map<string, Entry>();
+    for (const list of Object.values(info.scene)) {
+      if (!Array.isArray(list)) continue;
+      for (const entry of list) if (entry && typeof entry === "object" && typeof (entry as Entry).name === "string") entries.set((entry as Entry).name, entry as Entry);
+    }
+    let colors = 0;
+    for (const object of info.objects) {
+      // Names of systems are no names of objects.
+      const list = info.scene[object.kind];
+      const entry: Entry = (Array.isArray(list) && list.find((e) => (e as Entry).name === object.name)) || entries.get(object.name) || {};
+      const topology = info.topology[object.name] ?? {};
+      const grid = gridOf(topology);
+      const solid = object.kind === "collider";
+      const at = solid ? planeOf(entry.shape) : undefined;
+      let color: Rgb;
+      if (Array.isArray(entry.color)) color = entry.color as Rgb;
+      else if (solid) color = at ? [0.82, 0.82, 0.82] : SOLID;
+      else if (grid?.flat === 3) color = SMOKE;
+      else color = linear(PALETTE[colors++ % PALETTE.length]);
+      const kind: Thing["kind"] = grid ? (grid.flat === 3 ? "space" : "plane") : solid ? (at ? "ground" : "solid") : topology.triangles?.data.length ? "surface" : topology.curve?.data.length ? "curve" : "points";
+      const radius = topology.radius?.data.length ? topology.radius.data[0] : 0.01;
+      const thing: Thing = { name: object.name, kind, color, radius, trail: Number(entry.trail ?? 0), leap: leapOf(info, object.system), topology, grid, ranges: new Map(), at };
+      if (kind === "plane" && grid) thing.body = new PlaneField(grid, color);
+      else if (kind === "space" && grid) thing.body = new SpaceField(grid, color);
+      else if (kind === "solid" && topology.position && topology.triangles && !entry.inside) {
+        thing.body = new Surface(topology.position.data, topology.triangles.data, color, { moving: false, plain: info.dimension === 2 });
+      } else if (kind === "solid" && topology.position && topology.triangles) {
+        thing.body = new Pieces(0, { thinnest: 1, lit: false });
+        thing.body.pairs(topology.position.data, sharp(topology.position.data, topology.triangles.data), color);
+      } else if (kind === "points") {
+        thing.body = new Points(this.night, countOf(entry) < 200 ? 3.5 : 1.5);
+        if (thing.trail > 0) this.add((thing.way = new Pieces(0.3 * radius, { lit: false, glow: this.night, thinnest: 0.8 })));
+      } else if (kind === "curve") {
+        thing.body = new Pieces(radius, { thinnest: 1.5 });
+      } else if (at) {
+        this.ground(thing);
+      }
+      if (thing.body) this.add(thing.body);
+      if (topology.links?.data.length && kind !== "curve") this.add((thing.links = new Pieces(kind === "points" ? 0.25 * radius : 0, { thinnest: kind === "points" ? 1.2 : 0.7, lit: kind === "points" })));
+      if (kind === "plane" && grid) {
+        this.add((thing.way = new Pieces(0, { lit: false, thinnest: 0.6 })));
+        outline(thing.way, grid);
+      }
+      if (kind === "plane") this.add((thing.arrows = new Pieces(0, { lit: false, thinnest: 1.1, front: true })));
+      this.things.push(thing);
+    }
+    const anchors = Array.isArray(info.scene.anchor) ? (info.scene.anchor as Entry[]) : [];
+    if (anchors.length) {
+      const ends = anchors.flatMap((a) => (a.between as string[]).map((end): [string, number] => [end.slice(0, end.lastIndexOf(" ")), Number(end.slice(end.lastIndexOf(" ") + 1))]));
+      this.anchors = { pieces: new Pieces(0, { thinnest: 1.5 }), ends };
+      this.add(this.anchors.pieces);
+    }
+    this.theme();
+    this.frameCamera(keepCamera);
+  }
+
+  private add(layer: Layer): void {
+    this.scene.add(layer.object);
+  }
+
+  /** Light and ground follow the colours of the page. */
+  theme(): void {
+    const dark = this.dark;
+    this.sky.intensity = dark ? 0.85 : 1.35;
+    this.sky.groundColor.set(dark ? 0x2a2a30 : 0xb8b2a8);
+    this.light.intensity = dark ? 1.6 : 1.9;
+    for (const thing of this.things) {
+      if (!thing.plane) continue;
+      const m = thing.plane.material as THREE.MeshStandardMaterial;
+      const own = thing.color.some((c) => Math.abs(c - 0.82) > 1e-6);
+      if (dark && !own) m.color.setRGB(0.06, 0.066, 0.075, THREE.LinearSRGBColorSpace);
+      else m.color.setRGB(...thing.color, THREE.LinearSRGBColorSpace);
+    }
+    this.touch();
+  }
+
+  private get dark(): boolean {
+    return this.night || document.documentElement.dataset.theme === "dark";
+  }
+
+  private ground(thing: Thing): void {
+    const material = new THREE.MeshStandardMaterial({ roughness: 1, transparent: true, side: THREE.FrontSide });
+    material.onBeforeCompile = (shader) => {
+      shader.vertexShader = shader.vertexShader.replace("#include <common>", "#include <common>\nvarying vec2 vAway;").replace("#include <begin_vertex>", "#include <begin_vertex>\nvAway = position.xy;");
+      shader.fragmentShader = shader.fragmentShader
+        .replace("#include <common>", "#include <common>\nvarying vec2 vAway;")
+        .replace("#include <alphamap_fragment>", "#include <alphamap_fragment>\ndiffuseColor.a *= 1.0 - smoothstep(0.30, 1.0, length(vAway));");
+    };
+    thing.plane = new THREE.Mesh(new THREE.CircleGeometry(1, 96), material);
+    thing.plane.receiveShadow = true;
+    thing.plane.renderOrder = -2;
+    this.scene.add(thing.plane);
+  }
+
+  /** Bounds of what must fit. */
+  private bounds(): THREE.Box3 {
+    const box = new THREE.Box3();
+    const point = new THREE.Vector3();
+    const take = (x: Numbers) => {
+      for (let i = 0; i + 2 < x.length; i += 3) if (Number.isFinite(x[i] + x[i + 1] + x[i + 2])) box.expandByPoint(point.set(x[i], x[i + 1], x[i + 2]));
+    };
+    const columns = this.frame?.columns ?? {};
+    for (const thing of this.things) {
+      if (thing.grid) {
+        const { origin, cells, spacing, flat } = thing.grid;
+        const low = new THREE.Vector3(...origin);
+        const high = low.clone().add(new THREE.Vector3(...cells).multiplyScalar(spacing));
+        if (flat < 3) {
+          const middle = 0.5 * (low.getComponent(flat) + high.getComponent(flat));
+          low.setComponent(flat, middle);
+          high.setComponent(flat, middle);
+        }
+        box.expandByPoint(low).expandByPoint(high);
+      } else if (thing.kind === "solid" && thing.topology.position) {
+        take(thing.topology.position.data);
+      } else {
+        const x = columns[thing.name]?.position;
+        if (x) take(x.data);
+      }
+    }
+    if (box.isEmpty()) box.set(new THREE.Vector3(-1, -1, -1), new THREE.Vector3(1, 1, 1));
+    return box;
+  }
+
+  private frameCamera(keep: boolean): void {
+    if (!this.info) return;
+    const words = (this.info.scene.camera ?? {}) as Entry;
+    const box = this.bounds();
+    const middle = box.getCenter(new THREE.Vector3());
+    const size = box.getSize(new THREE.Vector3());
+    this.reach = Math.max(size.length() * 0.5, 1e-6);
+    const angle = Number(words.view_angle ?? 35);
+    const tan = Math.tan((0.5 * angle * Math.PI) / 180);
+    const wish = Array.isArray(words.position) ? new THREE.Vector3(...(words.position as Vector)) : null;
+    const goal = Array.isArray(words.target) ? new THREE.Vector3(...(words.target as Vector)) : middle;
+    const flat = this.info.dimension === 2;
+    const [w, hgt] = this.size();
+    const wasFlat = (this.camera as THREE.OrthographicCamera).isOrthographicCamera;
+    if (keep && !!wasFlat === flat) return;
+    if (!!wasFlat !== flat || !this.controls) {
+      const enabled = this.controls.enabled;
+      this.controls.dispose();
+      this.camera = flat ? new THREE.OrthographicCamera() : new THREE.PerspectiveCamera(35, 1, 0.01, 1000);
+      this.controls = this.controlled();
+      this.controls.enabled = enabled;
+      this.controls.enableRotate = !flat;
+    }
+    if (flat) {
+      const top = this.info.plane === "xy";
+      this.camera.up.set(0, top ? 1 : 0, top ? 0 : 1);
+      const across = size.x;
+      const tall = top ? size.y : size.z;
+      // With grids all of them must be seen, as large as they can.
+      const grids = this.things.some((t) => t.grid);
+      const width = wish && !grids ? 2 * tan * wish.distanceTo(goal) : Math.max(across, (tall * w) / hgt) * (grids ? 1.02 : 1.12);
+      this.home = { position: goal.clone().add(top ? new THREE.Vector3(0, 0, 10 * this.reach + 1) : new THREE.Vector3(0, -10 * this.reach - 1, 0)), target: goal.clone(), width };
+    } else {
+      this.camera.up.set(0, 0, 1);
+      let position = wish;
+      if (!position) {
+        const from = new THREE.Vector3(0.42, -1, 0.4).normalize();
+        const distance = (1.12 * Math.max(size.x * 0.55 + size.y * 0.25, (size.z * 0.55 + size.y * 0.2) * (16 / 9))) / tan + 0.35 * size.y;
+        position = goal.clone().addScaledVector(from, Math.max(distance, 1e-6));
+      }
+      if (position.distanceTo(goal) < 1e-9) position.y -= 1;
+      // Straight from above there is no up; a hair beside it there is.
+      const down = goal.clone().sub(position);
+      if (Math.hypot(down.x, down.y) < 1e-6 * down.length()) position = position.clone().add(new THREE.Vector3(0, -1e-3 * down.length(), 0));
+      const distance = position.distanceTo(goal);
+      this.home = { position: position.clone(), target: goal.clone(), width: 2 * tan * distance };
+      (this.camera as THREE.PerspectiveCamera).near = distance * 0.01;
+      (this.camera as THREE.PerspectiveCamera).far = distance * 60;
+    }
+    this.goHome();
+  }
+
+  /** Back to the camera of the scene. */
+  goHome(): void {
+    this.camera.position.copy(this.home.position);
+    this.controls.target.copy(this.home.target);
+    this.camera.zoom = 1;
+    const shine = this.home.target;
+    const span = Math.max(this.home.width * 0.75, 1e-6);
+    const away = this.home.position.clone().sub(shine);
+    const left = new THREE.Vector3().crossVectors(new THREE.Vector3(0, 0, 1), away).normalize().negate();
+    this.light.position.copy(shine).addScaledVector(left, span * 1.1).add(new THREE.Vector3(0, 0, span * 1.7)).addScaledVector(away.normalize(), span * 0.45);
+    this.light.target.position.copy(shine);
+    const s = this.light.shadow.camera;
+    s.left = s.bottom = -span;
+    s.right = s.top = span;
+    s.near = 0.01 * span;
+    s.far = 5 * span;
+    s.updateProjectionMatrix();
+    this.controls.update();
+    this.resize();
+  }
+
+  private size(): [number, number] {
+    const host = this.canvas.parentElement ?? this.canvas;
+    return [Math.max(host.clientWidth, 16), Math.max(host.clientHeight, 16)];
+  }
+
+  resize(): void {
+    const [w, hgt] = this.size();
+    const ratio = Math.min(window.devicePixelRatio || 1, 2);
+    this.renderer.setPixelRatio(ratio);
+    this.renderer.setSize(w, hgt, false);
+    const aspect = w / hgt;
+    if (this.camera instanceof THREE.OrthographicCamera) {
+      const half = 0.5 * Math.max(this.home.width, 1e-9);
+      // What is as wide as the box may be taller than the window.
+      const box = this.bounds().getSize(new THREE.Vector3());
+      const tall = this.info?.plane === "xy" ? box.y : box.z;
+      const grids = this.things.some((t) => t.grid);
+      const wide = grids ? Math.max(box.x, tall * aspect) * 0.51 : half;
+      this.camera.left = -wide;
+      this.camera.right = wide;
+      this.camera.top = wide / aspect;
+      this.camera.bottom = -wide / aspect;
+      this.camera.near = -1e3 * this.reach;
+      this.camera.far = 1e3 * this.reach + 100;
+    } else {
+      const tan = (0.5 * this.home.width) / Math.max(this.home.position.distanceTo(this.home.target), 1e-9);
+      // The scene's angle holds for pictures of 16:9; taller windows see as much from left to right, wider ones as much from top to bottom.
+      const tall = (tan * 9) / 16;
+      this.camera.fov = (2 * Math.atan(aspect > 16 / 9 ? tall : tan / aspect) * 180) / Math.PI;
+      this.camera.aspect = aspect;
+    }
+    this.camera.updateProjectionMatrix();
+    this.touch();
+  }
+
+  /** Asks for a picture. */
+  touch(): void {
+    if (this.dirty) return;
+    this.dirty = true;
+    requestAnimationFrame(() => {
+      if (!this.dirty) return;
+      this.render();
+    });
+  }
+
+  render(): void {
+    this.dirty = false;
+    this.renderer.getDrawingBufferSize(PIXELS.value);
+    this.renderer.render(this.scene, this.camera);
+    this.drawn();
+  }
+
+  /** Shows a frame. */
+  show(frame: Frame): void {
+    const first = this.frame === null;
+    this.frame = frame;
+    this.legend = null;
+    const far = Math.max(this.home.width * 1.6, 1e-6);
+    for (const thing of this.things) {
+      const columns = frame.columns[thing.name] ?? {};
+      if (thing.plane && thing.at) {
+        const [point, normal] = thing.at;
+        const p = point.clone();
+        const n = normal.clone();
+        carry(columns, p, n);
+        const foot = this.home.target.clone().addScaledVector(n, -this.home.target.clone().sub(p).dot(n));
+        thing.plane.position.copy(foot);
+        thing.plane.quaternion.setFromUnitVectors(new THREE.Vector3(0, 0, 1), n);
+        thing.plane.scale.setScalar(far);
+      } else if (thing.kind === "solid") this.solid(thing, columns);
+      else if (thing.grid) this.field(thing, thing.grid, columns);
+      else this.masses(thing, columns, frame);
+    }
+    if (this.anchors) {
+      const ends = this.anchors.ends.map(([name, row]) => {
+        const x = frame.columns[name]?.position?.data;
+        return x ? [x[3 * row], x[3 * row + 1], x[3 * row + 2]] : [0, 0, 0];
+      });
+      this.anchors.pieces.pairs(Float32Array.from(ends.flat()), Uint32Array.from(ends.keys()), SOLID);
+    }
+    if (first) {
+      const words = (this.info?.scene.camera ?? {}) as Entry;
+      if (!words.position || this.flat) this.frameCamera(false);
+    }
+    this.touch();
+  }
+
+  /** Shows the frame once more: the look has changed. */
+  again(): void {
+    if (this.frame) this.show(this.frame);
+  }
+
+  private solid(thing: Thing, columns: Record<string, Column>): void {
+    if (!thing.body) return;
+    const object = thing.body.object;
+    const x = columns.position?.data;
+    if (x && thing.body instanceof Surface && x.length === thing.topology.position?.data.length) {
+      this.scene.remove(object);
+      thing.body.dispose();
+      thing.body = new Surface(x, thing.topology.triangles.data, thing.color, { moving: false, plain: this.flat });
+      this.add(thing.body);
+    }
+    if (columns.turn) {
+      const q = columns.turn.data;
+      const t = columns.translation?.data ?? [0, 0, 0];
+      thing.body.object.quaternion.set(q[0], q[1], q[2], q[3]);
+      thing.body.object.position.set(t[0], t[1], t[2]);
+    }
+  }
+
+  private field(thing: Thing, grid: Grid, columns: Record<string, Column>): void {
+    const chosen = this.look.field;
+    const has = (name: string) => name in columns || (name === "speed" && "velocity" in columns);
+    let name = chosen && has(chosen) ? chosen : undefined;
+    if (!name) {
+      name = SHOWN.find((n) => {
+        if (!has(n)) return false;
+        const values = scalars(columns[n] ?? columns.velocity);
+        return values.some((v) => v !== values[0]);
+      }) ?? SHOWN.find(has);
+    }
+    if (!name) return;
+    const column = columns[name] ?? columns.velocity;
+    const signed = SIGNED.includes(name) && column.width === 1;
+    let values = scalars(column);
+    if (grid.flat === 3 && signed) values = values.map((v) => Math.abs(v));
+    let range = thing.ranges.get(name);
+    if (!range) thing.ranges.set(name, (range = new Range(grid.flat === 3 && signed ? "" : name)));
+    range.look(values);
+    const [low, high] = range.pair;
+    this.legend = { name, unit: column.unit, low, high };
+    if (thing.body instanceof PlaneField) {
+      const dye = this.look.dye && (name === "density" || name === "fuel") && low === 0;
+      if (dye) this.legend = null;
+      thing.body.set(name, values, [low, high], { dye, smoothly: !this.look.cells, lines: this.look.cells });
+    } else if (thing.body instanceof SpaceField) {
+      const warm = columns.temperature;
+      let hot: { values: Numbers; low: number; high: number } | undefined;
+      if (warm) {
+        let heat = thing.ranges.get("heat");
+        if (!heat) thing.ranges.set("heat", (heat = new Range("temperature")));
+        heat.look(warm.data);
+        if (heat.high > GLOWING) hot = { values: warm.data, low: 0, high: Math.max(heat.high, 1) };
+      }
+      thing.body.cut(this.look.slice, this.look.sliceAt);
+      if (this.look.slice === null) this.legend = null;
+      thing.body.set(name, values, name === "temperature" && this.look.slice === null ? [Math.min(low + 0.02 * (high - low), high - 1e-9), high] : [low, high], this.look.slice === null ? hot : undefined);
+    }
+    if (thing.arrows) this.arrows(thing, grid, columns.velocity);
+  }
+
+  private arrows(thing: Thing, grid: Grid, velocity: Column | undefined): void {
+    if (!thing.arrows) return;
+    thing.arrows.object.visible = this.look.arrows && !!velocity;
+    if (!this.look.arrows || !velocity) return;
+    const [a, b] = [0, 1, 2].filter((axis) => axis !== grid.flat);
+    const n = grid.cells[a];
+    const m = grid.cells[b];
+    const every = Math.max(1, Math.round(Math.max(n, m) / 40));
+    const v = velocity.data;
+    let range = thing.ranges.get("arrows");
+    if (!range) thing.ranges.set("arrows", (range = new Range("speed")));
+    range.look(scalars(velocity));
+    const scale = range.high > 0 ? (1.6 * every * grid.spacing) / range.high : 0;
+    const across = grid.origin[grid.flat] + 0.5 * grid.spacing;
+    const { start, end, tint } = thing.arrows.begin(3 * Math.ceil(n / every) * Math.ceil(m / every));
+    let k = 0;
+    const put = (p: number[], q: number[]) => {
+      for (let d = 0; d < 3; d++) {
+        start[3 * k + d] = p[d];
+        end[3 * k + d] = q[d];
+      }
+      const c = this.dark || !(this.look.dye && this.look.field === "density") ? 0.95 : 0.1;
+      tint.set([c, c, c, 0.85], 4 * k);
+      k++;
+    };
+    const at = (u: number, w: number) => {
+      const p = [0, 0, 0];
+      p[a] = u;
+      p[b] = w;
+      p[grid.flat] = across;
+      return p;
+    };
+    for (let j = Math.floor(every / 2); j < m; j += every) {
+      for (let i = Math.floor(every / 2); i < n; i += every) {
+        const c = i + n * j;
+        const vx = v[2 * c] * scale;
+        const vy = v[2 * c + 1] * scale;
+        const length = Math.hypot(vx, vy);
+        if (!(length > 0.12 * every * grid.spacing)) continue;
+        const x = grid.origin[a] + (i + 0.5) * grid.spacing;
+        const y = grid.origin[b] + (j + 0.5) * grid.spacing;
+        const tip = at(x + 0.5 * vx, y + 0.5 * vy);
+        put(at(x - 0.5 * vx, y - 0.5 * vy), tip);
+        for (const s of [1, -1]) put(tip, at(x + 0.5 * vx - 0.28 * (vx - 0.6 * s * vy), y + 0.5 * vy - 0.28 * (vy + 0.6 * s * vx)));
+      }
+    }
+    thing.arrows.done(k);
+  }
+
+  private masses(thing: Thing, columns: Record<string, Column>, frame: Frame): void {
+    const x = columns.position?.data;
+    if (!x) return;
+    const n = x.length / 3;
+    const colors = this.shades(thing, columns, n);
+    const links = thing.topology.links?.data;
+    const strain = columns.link_strain?.data;
+    const start = this.past(0)?.columns[thing.name]?.link_strain?.data;
+    const broken = (piece: number) => !!strain && !!start && Number.isNaN(strain[piece]) && !Number.isNaN(start[piece]);
+    const torn = new Set<number>();
+    if (strain && start && links) for (let i = 0; i < strain.length; i++) if (broken(i)) torn.add(Math.min(links[2 * i], links[2 * i + 1]) * n + Math.max(links[2 * i], links[2 * i + 1]));
+    const ofPiece = (pairs: Numbers) => (piece: number): Rgb => {
+      const p = 3 * pairs[2 * piece];
+      return [colors![p], colors![p + 1], colors![p + 2]];
+    };
+    if (thing.kind === "surface") {
+      if (!thing.body) {
+        thing.body = new Surface(x, thing.topology.triangles.data, thing.color, { flat: this.info?.objects.find((o) => o.name === thing.name)?.kind === "block" });
+        this.add(thing.body);
+      }
+      const surface = thing.body as Surface;
+      surface.set(x, torn);
+      surface.paint(colors);
+      surface.tint(colors ? [1, 1, 1] : thing.color);
+      surface.object.visible = !this.look.links;
+    } else if (thing.kind === "curve") {
+      const curve = thing.topology.curve.data;
+      const pairs = new Uint32Array(2 * Math.max(curve.length - 1, 0));
+      for (let i = 0; i + 1 < curve.length; i++) pairs.set([curve[i], curve[i + 1]], 2 * i);
+      const gone = (piece: number) => torn.has(Math.min(pairs[2 * piece], pairs[2 * piece + 1]) * n + Math.max(pairs[2 * piece], pairs[2 * piece + 1]));
+      (thing.body as Pieces).pairs(x, pairs, colors ? ofPiece(pairs) : thing.color, gone);
+    } else {
+      const r = columns.radius?.data ?? thing.radius;
+      const own = columns.color?.data;
+      (thing.body as Points).set(x, r, colors ?? own ?? thing.color);
+      if (thing.way) this.way(thing, frame, own);
+    }
+    if (thing.links && links) {
+      const shown = thing.kind === "points" || this.look.links || this.flat;
+      thing.links.object.visible = shown;
+      const shade = thing.color.map((c) => c * (thing.kind === "points" ? 0.6 : this.look.links ? 1 : 0.35)) as Rgb;
+      if (shown) thing.links.pairs(x, links, colors && this.look.color === "strain" && strain ? this.strained(strain) : colors ? ofPiece(links) : shade, broken);
+    }
+  }
+
+  private strained(strain: Numbers): (piece: number) => Rgb {
+    const [low, high] = this.legend ? [this.legend.low, this.legend.high] : [-0.1, 0.1];
+    const map = palette("RdBu_r");
+    return (piece) => pick(map, (strain[piece] - low) / (high - low));
+  }
+
+  /** Colours of masses by what the look asks for; null for those of the object. */
+  private shades(thing: Thing, columns: Record<string, Column>, n: number): Float32Array | null {
+    const by = this.look.color;
+    const links = thing.topology.links?.data;
+    let values: Numbers;
+    if (by === "speed" && columns.velocity) values = scalars(columns.velocity);
+    else if (by === "strain" && columns.link_strain && links) {
+      // The mean over the links of each mass.
+      values = new Float32Array(n);
+      const count = new Uint16Array(n);
+      columns.link_strain.data.forEach((s, i) => {
+        if (!Number.isFinite(s)) return;
+        for (const p of [links[2 * i], links[2 * i + 1]]) {
+          values[p] += s;
+          count[p]++;
+        }
+      });
+      for (let i = 0; i < n; i++) values[i] /= Math.max(count[i], 1);
+    } else return null;
+    const name = by === "strain" ? "pressure" : "speed";
+    let range = thing.ranges.get(by);
+    if (!range) thing.ranges.set(by, (range = new Range(name)));
+    range.look(values);
+    const [low, high] = range.pair;
+    this.legend = { name: by, unit: by === "speed" ? "m/s" : "1", low, high };
+    const map = palette(by === "strain" ? "RdBu_r" : "viridis");
+    const out = new Float32Array(3 * n);
+    for (let i = 0; i < n; i++) out.set(pick(map, (values[i] - low) / (high - low)), 3 * i);
+    return out;
+  }
+
+  /** Where the particles have been. */
+  private way(thing: Thing, frame: Frame, own: Numbers | undefined): void {
+    const way = thing.way!;
+    way.object.visible = this.look.trails;
+    if (!this.look.trails) return;
+    const past: Frame[] = [frame];
+    for (let k = frame.index - 1; k >= 0; k--) {
+      const before = this.past(k);
+      if (!before || before.time < frame.time - thing.trail - 1e-9) break;
+      past.push(before);
+    }
+    let total = 0;
+    for (let k = 0; k + 1 < past.length; k++) total += (past[k + 1].columns[thing.name]?.position?.data.length ?? 0) / 3;
+    const { start, end, tint } = way.begin(Math.max(total, 1));
+    let used = 0;
+    const dim = this.night ? 1 : 0.75;
+    for (let k = 0; k + 1 < past.length; k++) {
+      const after = past[k].columns[thing.name];
+      const before = past[k + 1].columns[thing.name];
+      if (!after?.position || !before?.position) continue;
+      const p = before.position.data;
+      const q = after.position.data;
+      const shade = after.color?.data ?? (k === 0 ? own : undefined);
+      const fresh = 1 - (frame.time - past[k].time) / Math.max(thing.trail, 1e-9);
+      const rows = matched(before.id?.data, after.id?.data, p.length / 3, q.length / 3);
+      for (const [i, j] of rows) {
+        const dx = q[3 * j] - p[3 * i];
+        const dy = q[3 * j + 1] - p[3 * i + 1];
+        const dz = q[3 * j + 2] - p[3 * i + 2];
+        if (Math.hypot(dx, dy, dz) > thing.leap) continue;
+        for (let d = 0; d < 3; d++) {
+          start[3 * used + d] = p[3 * i + d];
+          end[3 * used + d] = q[3 * j + d];
+          tint[4 * used + d] = dim * (shade ? shade[3 * j + d] : thing.color[d]);
+        }
+        tint[4 * used + 3] = 0.15 + 0.75 * Math.max(fresh, 0);
+        used++;
+      }
+    }
+    way.done(used);
+  }
+
+  /** The mass nearest to a point of the window, within some pixels. */
+  nearest(event: { clientX: number; clientY: number }, within = 28): { object: string; row: number; point: THREE.Vector3; mass: number } | null {
+    if (!this.frame) return null;
+    const box = this.canvas.getBoundingClientRect();
+    const mx = event.clientX - box.left;
+    const my = event.clientY - box.top;
+    const matrix = new THREE.Matrix4().multiplyMatrices(this.camera.projectionMatrix, this.camera.matrixWorldInverse);
+    const p = new THREE.Vector3();
+    let best = within ** 2;
+    let depth = Infinity;
+    let found: { object: string; row: number; point: THREE.Vector3; mass: number } | null = null;
+    for (const thing of this.things) {
+      if (!["points", "curve", "surface"].includes(thing.kind)) continue;
+      const x = this.frame.columns[thing.name]?.position?.data;
+      if (!x) continue;
+      const masses = thing.topology.mass?.data;
+      for (let i = 0; i < x.length / 3; i++) {
+        p.set(x[3 * i], x[3 * i + 1], x[3 * i + 2]).applyMatrix4(matrix);
+        if (p.z > 1) continue;
+        const dx = (0.5 + 0.5 * p.x) * box.width - mx;
+        const dy = (0.5 - 0.5 * p.y) * box.height - my;
+        const d = dx * dx + dy * dy;
+        // Of those about as near, the one in front.
+        if (d < best - 25 || (d < best + 25 && d < within ** 2 && p.z < depth)) {
+          best = Math.min(best, d);
+          depth = p.z;
+          found = { object: thing.name, row: i, point: new THREE.Vector3(x[3 * i], x[3 * i + 1], x[3 * i + 2]), mass: masses ? masses[Math.min(i, masses.length - 1)] : 1 };
+        }
+      }
+    }
+    return found;
+  }
+
+  /** The point under the pointer in the plane through `through` that faces the camera. */
+  under(event: { clientX: number; clientY: number }, through?: THREE.Vector3): THREE.Vector3 | null {
+    const box = this.canvas.getBoundingClientRect();
+    const at = new THREE.Vector2(((event.clientX - box.left) / box.width) * 2 - 1, 1 - ((event.clientY - box.top) / box.height) * 2);
+    const ray = new THREE.Raycaster();
+    ray.setFromCamera(at, this.camera);
+    const normal = this.camera.getWorldDirection(new THREE.Vector3());
+    const plane = new THREE.Plane().setFromNormalAndCoplanarPoint(normal, through ?? this.home.target);
+    return ray.ray.intersectPlane(plane, new THREE.Vector3());
+  }
+
+  /** Width of what is seen [m], and whether the camera turns by the pointer. */
+  get width(): number {
+    return this.home.width / this.camera.zoom;
+  }
+
+  set turning(on: boolean) {
+    this.controls.enabled = on;
+  }
+
+  /** Draws the spring between a mass and the pointer; nothing without an end. */
+  spring(from?: THREE.Vector3, to?: THREE.Vector3): void {
+    if (from && to) {
+      const { start, end, tint } = this.handle.begin(1);
+      start.set(from.toArray());
+      end.set(to.toArray());
+      tint.set([0.9, 0.25, 0.1, 1]);
+      this.handle.done(1);
+    } else if (this.handle.object.geometry.getAttribute("start")) this.handle.done(0);
+    this.touch();
+  }
+
+  /** Moves the camera by keys: turns (or moves, in a plane) and zooms. */
+  nudge(dx: number, dy: number, zoom: number): void {
+    const away = this.camera.position.clone().sub(this.controls.target);
+    if (this.camera instanceof THREE.OrthographicCamera) {
+      this.camera.zoom *= zoom;
+      this.camera.updateProjectionMatrix();
+    } else {
+      const ball = new THREE.Spherical().setFromVector3(new THREE.Vector3(away.x, away.z, -away.y));
+      ball.theta -= dx * 0.1;
+      ball.phi = Math.min(Math.max(ball.phi - dy * 0.1, 0.02), Math.PI - 0.02);
+      ball.radius /= zoom;
+      const turned = new THREE.Vector3().setFromSpherical(ball);
+      this.camera.position.copy(this.controls.target).add(new THREE.Vector3(turned.x, -turned.z, turned.y));
+      this.controls.update();
+    }
+    this.touch();
+  }
+
+  /** The picture as it is, with its background. */
+  async picture(type = "image/png", quality?: number): Promise<Blob> {
+    this.render();
+    const flat = document.createElement("canvas");
+    flat.width = this.canvas.width;
+    flat.height = this.canvas.height;
+    const context = flat.getContext("2d")!;
+    const [top, bottom] = this.background;
+    const shade = context.createLinearGradient(0, 0, 0, flat.height);
+    shade.addColorStop(0, top);
+    shade.addColorStop(1, bottom);
+    context.fillStyle = shade;
+    context.fillRect(0, 0, flat.width, flat.height);
+    context.drawImage(this.canvas, 0, 0);
+    return new Promise((resolve, reject) => flat.toBlob((b) => (b ? resolve(b) : reject(new Error("no picture"))), type, quality));
+  }
+
+  /** All surfaces as a GLB file, y up as that format has it; null where there are none. */
+  async surfaces(): Promise<Blob | null> {
+    const bodies = this.things.flatMap((t) => (t.body instanceof Surface ? [{ name: t.name, mesh: t.body.object }] : []));
+    if (!bodies.length) return null;
+    const { GLTFExporter } = await import("three/examples/jsm/exporters/GLTFExporter.js");
+    const root = new THREE.Group();
+    root.rotation.x = -Math.PI / 2;
+    for (const { name, mesh } of bodies) {
+      const copy = mesh.clone();
+      copy.name = name;
+      root.add(copy);
+    }
+    const data = (await new GLTFExporter().parseAsync(root, { binary: true })) as ArrayBuffer;
+    return new Blob([data], { type: "model/gltf-binary" });
+  }
+
+  get background(): [string, string] {
+    if (this.night) return ["#07090f", "#0b0d14"];
+    return document.documentElement.dataset.theme === "dark" ? ["#1b2027", "#14181d"] : ["#f6f8fa", "#e3e8ee"];
+  }
+}
+
+/** How many masses an object of particles has, about. */
+function countOf(entry: Entry): number {
+  if (Array.isArray(entry.position)) return entry.position.length;
+  return Number(entry.cloud?.count ?? entry.stars ?? 1e6);
+}
+
+function planeOf(shape: unknown): [THREE.Vector3, THREE.Vector3] | undefined {
+  const s = (shape ?? {}) as Entry;
+  if ("floor" in s) return [new THREE.Vector3(0, 0, Number(s.floor?.height ?? 0)), new THREE.Vector3(0, 0, 1)];
+  if ("plane" in s) return [new THREE.Vector3(...((s.plane.point ?? [0, 0, 0]) as Vector)), new THREE.Vector3(...(s.plane.normal as Vector)).normalize()];
+  return undefined;
+}
+
+/** A step farther than this is none: the particle has left a square that repeats itself on the other side. */
+function leapOf(info: SceneInfo, system: string | undefined): number {
+  const systems = (Array.isArray(info.scene.system) ? info.scene.system : []) as Entry[];
+  const side = systems.find((s) => s.name === system)?.vicsek?.side;
+  return side ? Number(side) / 2 : Infinity;
+}
+
+function carry(columns: Record<string, Column>, point: THREE.Vector3, normal: THREE.Vector3): void {
+  if (!columns.turn) return;
+  const q = new THREE.Quaternion(...([...columns.turn.data] as [number, number, number, number]));
+  point.applyQuaternion(q).add(new THREE.Vector3(...([...(columns.translation?.data ?? [0, 0, 0])] as Vector)));
+  normal.applyQuaternion(q);
+}
+
+/** A line around a grid in a plane. */
+function outline(line: Pieces, grid: Grid): void {
+  const [a, b] = [0, 1, 2].filter((axis) => axis !== grid.flat);
+  const corners = [[0, 0], [1, 0], [1, 1], [0, 1]].flatMap(([u, v]) => {
+    const p = grid.origin.map((o, axis) => o + 0.5 * grid.cells[axis] * grid.spacing);
+    p[a] = grid.origin[a] + u * grid.cells[a] * grid.spacing;
+    p[b] = grid.origin[b] + v * grid.cells[b] * grid.spacing;
+    return p;
+  });
+  line.pairs(Float32Array.from(corners), Uint32Array.from([0, 1, 1, 2, 2, 3, 3, 0]), [0.35, 0.37, 0.4]);
+}
+
+/** Pairs of vertices along sharp edges of a mesh; of a round one all. */
+function sharp(x: Numbers, triangles: Numbers): Uint32Array {
+  const faces = new Map<string, THREE.Vector3[]>();
+  const point = (i: number) => new THREE.Vector3(x[3 * i], x[3 * i + 1], x[3 * i + 2]);
+  for (let t = 0; t < triangles.length; t += 3) {
+    const [a, b, c] = [triangles[t], triangles[t + 1], triangles[t + 2]];
+    const normal = point(b).sub(point(a)).cross(point(c).sub(point(a))).normalize();
+    for (const [p, q] of [[a, b], [b, c], [c, a]]) {
+      const key = `${Math.min(p, q)} ${Math.max(p, q)}`;
+      faces.set(key, [...(faces.get(key) ?? []), normal]);
+    }
+  }
+  const pairs = [...faces].map(([key, n]) => ({ ends: key.split(" ").map(Number), sharp: n.length !== 2 || n[0].dot(n[1]) < 0.7 }));
+  const some = pairs.filter((p) => p.sharp);
+  return Uint32Array.from((some.length ? some : pairs).flatMap((p) => p.ends));
+}
+
+/** Rows of particles that are in two frames. */
+function* matched(before: Numbers | undefined, after: Numbers | undefined, n: number, m: number): Generator<[number, number]> {
+  if (before && after) {
+    const rows = new Map<number, number>();
+    for (let i = 0; i < n; i++) rows.set(before[i], i);
+    for (let j = 0; j < m; j++) {
+      const i = rows.get(after[j]);
+      if (i !== undefined) yield [i, j];
+    }
+  } else for (let i = 0; i < Math.min(n, m); i++) yield [i, i];
+}
+
+const PALETTES = new Map<string, Float32Array>();
+
+/** A map of colours in linear light. */
+function palette(name: Parameters<typeof table>[0]): Float32Array {
+  let known = PALETTES.get(name);
+  if (!known) {
+    const bytes = table(name);
+    const c = new THREE.Color();
+    known = new Float32Array(256 * 3);
+    for (let i = 0; i < 256; i++) known.set(c.setRGB(bytes[4 * i] / 255, bytes[4 * i + 1] / 255, bytes[4 * i + 2] / 255, THREE.SRGBColorSpace).toArray(), 3 * i);
+    PALETTES.set(name, known);
+  }
+  return known;
+}
+
+function pick(map: Float32Array, share: number): Rgb {
+  const i = 3 * Math.round(255 * Math.min(Math.max(share || 0, 0), 1));
+  return [map[i], map[i + 1], map[i + 2]];
+}
+
+/** Which map the legend shows. */
+export const legendMap = (name: string) => (name === "strain" ? ("RdBu_r" as const) : name === "speed" ? ("viridis" as const) : mapOf(name));
+
+export type { Columns };

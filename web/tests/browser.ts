@@ -1,0 +1,49 @@
+/** Debian's Chromium and the built folder, for tests and pictures. */
+import { existsSync } from "node:fs";
+import { chromium, type Browser, type BrowserContextOptions, type Page } from "playwright-core";
+import { preview, type PreviewServer } from "vite";
+
+/** The browser, if there is one. */
+export const CHROMIUM = [process.env.CHROMIUM, "/usr/bin/chromium", "/usr/bin/chromium-browser", "/usr/bin/google-chrome"].find((p) => p && existsSync(p));
+
+export interface Lab {
+  address: string;
+  browser: Browser;
+  /** A page whose errors are collected. */
+  open(path: string, options?: BrowserContextOptions): Promise<{ page: Page; errors: string[] }>;
+  close(): Promise<void>;
+}
+
+export async function lab(): Promise<Lab> {
+  if (!CHROMIUM) throw new Error("no Chromium here: apt-get install chromium, or set CHROMIUM to one");
+  const outDir = process.env.DIST ?? "dist";
+  if (!existsSync(`${outDir}/index.html`)) throw new Error("nothing is built: make web");
+  const server: PreviewServer = await preview({ build: { outDir }, preview: { port: 0, host: "127.0.0.1" }, logLevel: "error" });
+  const address = server.resolvedUrls!.local[0];
+  const browser = await chromium.launch({ executablePath: CHROMIUM, headless: true, args: ["--no-sandbox", "--use-gl=angle", "--use-angle=swiftshader", "--enable-unsafe-swiftshader"] });
+  return {
+    address,
+    browser,
+    async open(path, options = {}) {
+      const context = await browser.newContext({ viewport: { width: 1280, height: 800 }, ...options });
+      const page = await context.newPage();
+      const errors: string[] = [];
+      page.on("pageerror", (e) => errors.push(String(e)));
+      page.on("console", (m) => {
+        // What software rendering has to say about itself is no error of ours.
+        if (m.type() === "error" && !/GPU stall|GL Driver|WebGL-0x/.test(m.text())) errors.push(m.text());
+      });
+      await page.goto(`${address}#/${path}`);
+      return { page, errors };
+    },
+    async close() {
+      await browser.close();
+      await server.close();
+    },
+  };
+}
+
+/** Waits until the scene page shows a frame at or after this one. */
+export async function frame(page: Page, index: number, timeout = 60_000): Promise<void> {
+  await page.waitForFunction((i) => Number(document.getElementById("main")!.dataset.frame ?? -1) >= i, index, { timeout });
+}

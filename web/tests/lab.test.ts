@@ -1,0 +1,446 @@
+/** The laboratory in a real browser. Needs `dist` (make web) and Chromium. */
+import assert from "node:assert/strict";
+import { readdirSync, readFileSync } from "node:fs";
+import { createRequire } from "node:module";
+import { gzipSync } from "node:zlib";
+import { after, before, describe, it } from "node:test";
+import type { Page } from "playwright-core";
+import { frame, lab, type Lab } from "./browser.ts";
+
+const SCENES = "../python/tumble/scenes";
+const ids = readdirSync(SCENES, { withFileTypes: true })
+  .filter((row) => row.isDirectory() && row.name !== "assets")
+  .flatMap((row) => readdirSync(`${SCENES}/${row.name}`).filter((f) => f.endsWith(".toml")).map((f) => `${row.name}/${f.slice(0, -5)}`))
+  .sort();
+
+let own: Lab;
+before(async () => {
+  own = await lab();
+});
+after(() => own?.close());
+
+const STILL = { reducedMotion: "reduce" } as const;
+const ready = (page: Page, timeout = 90_000) => page.waitForFunction(() => document.getElementById("main")!.dataset.ready, null, { timeout });
+/** Leaves the world of the page before for another, in the same worker. */
+const visit = async (page: Page, path: string) => {
+  await page.evaluate((to) => {
+    delete document.getElementById("main")!.dataset.ready;
+    location.hash = `#/${to}`;
+  }, path);
+  await ready(page);
+};
+
+describe("gallery", () => {
+  it("shows every scene that ships, with a picture", async () => {
+    const { page, errors } = await own.open("");
+    await page.waitForSelector(".tile");
+    const tiles = await page.$$eval(".tile", (all) => all.map((t) => ({ id: t.querySelector(".tile-id")!.textContent, title: t.querySelector(".tile-title")!.textContent, picture: !!t.querySelector("img") })));
+    assert.deepEqual(tiles.map((t) => t.id).sort(), ids);
+    assert.deepEqual(tiles.filter((t) => !t.picture || !t.title).map((t) => t.id), []);
+    await page.fill("input[type=search]", "bunny");
+    const found = await page.$$eval(".tile-id", (all) => all.map((t) => t.textContent));
+    assert.ok(found.length > 0 && found.length < ids.length && found.includes("drape/sheet-on-bunny"), `found ${found}`);
+    assert.deepEqual(errors, []);
+    await page.context().close();
+  });
+
+  it("comes with less than 3 MB for the first picture of a scene", async () => {
+    // A context of its own: nothing is in its cache.
+    const context = await own.browser.newContext({ ...STILL, viewport: { width: 1280, height: 800 } });
+    const page = await context.newPage();
+    const sizes: Promise<number>[] = [];
+    context.on("response", (r) => {
+      if (r.ok()) sizes.push(r.body().then((b) => gzipSync(b).length, () => 0));
+    });
+    const start = Date.now();
+    await page.goto(`${own.address}#/scene/drape/clamped-sheet`);
+    await frame(page, 0);
+    const taken = Date.now() - start;
+    const bytes = (await Promise.all(sizes)).reduce((a, b) => a + b, 0);
+    console.log(`# first picture after ${taken} ms, ${(bytes / 1e6).toFixed(2)} MB gzipped`);
+    // With the engine, which is above 1 MB.
+    assert.ok(bytes > 1e6 && bytes < 3e6, `${bytes} bytes`);
+    await context.close();
+  });
+});
+
+/** Scenes that show nothing in their first frame, and when they do. */
+const LATER: Record<string, number> = { "springs/rusty": 32, "particles/fireworks": 30 };
+/** Scenes that are there to fail. */
+const FAILING = ["failures/stiff-sheet"];
+
+describe("scenes", () => {
+  it("all load, move, and are seen, without an error", async () => {
+    const { page, errors } = await own.open(`scene/${ids[0]}`, { ...STILL, viewport: { width: 640, height: 480 } });
+    await ready(page);
+    const failures: string[] = [];
+    for (const id of ids) {
+      const start = Date.now();
+      if (id !== ids[0]) await visit(page, `scene/${id}`);
+      const seen = await page.evaluate(async (end) => {
+        const { session, stage } = (window as any).tumble;
+        if (!session.info) return { error: document.querySelector(".alert")?.textContent ?? "nothing loaded" };
+        const before = await session.hash();
+        await session.goto(end).catch(() => {});
+        const after = await session.hash();
+        const image = await createImageBitmap(await stage.picture());
+        const small = new OffscreenCanvas(160, 90);
+        const context = small.getContext("2d")!;
+        context.drawImage(image, 0, 0, 160, 90);
+        const { data } = context.getImageData(0, 0, 160, 90);
+        // Pixels that are not the background, whose colours run from top to bottom alone.
+        let drawn = 0;
+        for (let y = 0; y < 90; y++) for (let x = 1; x < 160; x++) {
+          const [p, q] = [4 * (160 * y + x), 4 * 160 * y];
+          if (Math.abs(data[p] - data[q]) + Math.abs(data[p + 1] - data[q + 1]) + Math.abs(data[p + 2] - data[q + 2]) > 8) drawn++;
+        }
+        return { moved: before !== after, index: session.shown.index, drawn, finite: Number.isFinite(session.ledgers[end]?.energy), alert: document.querySelector<HTMLElement>(".alert:not([hidden])")?.dataset.kind };
+      }, LATER[id] ?? 1);
+      if (FAILING.includes(id)) {
+        if (seen.alert !== "step") failures.push(`${id}: does not say that it failed`);
+      } else if ("error" in seen) failures.push(`${id}: ${seen.error}`);
+      else if (!seen.moved || seen.index !== (LATER[id] ?? 1) || seen.alert || !seen.finite || seen.drawn < 3) failures.push(`${id}: ${JSON.stringify(seen)}`);
+      if (process.env.VERBOSE) console.log(`# ${id} ${Date.now() - start} ms ${JSON.stringify(seen)}`);
+    }
+    assert.deepEqual(failures, []);
+    assert.deepEqual(errors, []);
+    await page.context().close();
+  });
+
+  it("play by the space bar, go back, and go another way", async () => {
+    const { page, errors } = await own.open("scene/structures/rope", STILL);
+    await ready(page);
+    await page.focus(".stage");
+    await page.keyboard.press(" ");
+    await frame(page, 8);
+    await page.keyboard.press(" ");
+    assert.equal(await page.getAttribute(".transport .primary", "aria-label"), "Play");
+    const result = await page.evaluate(async () => {
+      const { session } = (window as any).tumble;
+      await session.reset();
+      for (let i = 0; i < 6; i++) await session.next();
+      await session.goto(10);
+      const straight = await session.hash();
+      session.scrub(5);
+      const shown = session.shown.index;
+      // The same value: the same way, bit by bit.
+      const live = await session.set("force.0.rate", 1.0);
+      const from = session.latest;
+      await session.goto(10);
+      const same = await session.hash();
+      session.scrub(5);
+      await session.set("force.0.rate", 3.0);
+      await session.goto(10);
+      return { straight, shown, live, from, same, other: await session.hash() };
+    });
+    assert.equal(result.shown, 5);
+    assert.equal(result.from, 5);
+    assert.equal(result.live, true);
+    assert.equal(result.same, result.straight);
+    assert.notEqual(result.other, result.straight);
+    assert.deepEqual(errors, []);
+    await page.context().close();
+  });
+
+  it("are pulled by the pointer", async () => {
+    const { page, errors } = await own.open("scene/springs/forever", STILL);
+    await ready(page);
+    const at = await page.evaluate(() => {
+      const { stage, session } = (window as any).tumble;
+      const x = session.shown.columns.spring.position.data;
+      const p = stage.under({ clientX: 0, clientY: 0 }).clone().set(x[3], x[4], x[5]).project((stage as any).camera);
+      const box = document.querySelector(".stage canvas")!.getBoundingClientRect();
+      return { x: box.left + (0.5 + 0.5 * p.x) * box.width, y: box.top + (0.5 - 0.5 * p.y) * box.height };
+    });
+    await page.mouse.move(at.x, at.y);
+    await page.mouse.down();
+    await page.mouse.move(at.x, at.y - 40, { steps: 3 });
+    await page.mouse.move(at.x, at.y - 80, { steps: 3 });
+    await frame(page, 4);
+    // Alone it would stay on the axis for ever.
+    await page.waitForFunction(() => Math.abs((window as any).tumble.session.shown.columns.spring.position.data[5]) > 0.05, null, { timeout: 20_000 });
+    await page.mouse.up();
+    assert.deepEqual(errors, []);
+    await page.context().close();
+  });
+});
+
+describe("text and values", () => {
+  it("show an error at its line while the old scene goes on", async () => {
+    const { page, errors } = await own.open("scene/springs/forever", STILL);
+    await ready(page);
+    await page.click("#t-text");
+    await page.waitForSelector(".cm-content");
+    const before = await page.evaluate(() => (window as any).tumble.session.info.hash);
+    const text: string = await page.evaluate(() => (window as any).tumble.session.toml);
+    const broken = text.replace("substeps = 20", "substeps = -20");
+    const line = broken.split("\n").findIndex((l) => l.includes("-20")) + 1;
+    await page.locator(".cm-content").fill(broken);
+    await page.click("text=Run");
+    await page.waitForSelector(".issues .line");
+    assert.equal(await page.textContent(".issues .line"), `Line ${line}`);
+    assert.match((await page.textContent(".issues")) ?? "", /substeps/);
+    assert.equal(await page.$$eval(".cm-lint-marker-error", (m) => m.length), 1);
+    // The old one still steps.
+    const moved = await page.evaluate(async () => {
+      const { session } = (window as any).tumble;
+      await session.goto(3);
+      return { index: session.shown.index, hash: session.info.hash };
+    });
+    assert.deepEqual(moved, { index: 3, hash: before });
+    await page.locator(".cm-content").fill(text.replace("substeps = 20", "substeps = 40"));
+    await page.click("text=Run");
+    await page.waitForFunction(() => (window as any).tumble.session.info.scene.system[0].substeps === 40);
+    assert.deepEqual(errors, []);
+    await page.context().close();
+  });
+
+  it("make controls of the schema, with units and texts", async () => {
+    const { page, errors } = await own.open("scene/structures/rope", STILL);
+    await ready(page);
+    const field = page.locator('[data-path="rope.0.density"]');
+    await field.waitFor();
+    assert.match((await field.textContent()) ?? "", /Density.*kg\/m.*Mass per length/s);
+    await field.locator("input[type=number]").fill("0.4");
+    await field.locator("input[type=number]").press("Enter");
+    await page.waitForFunction(() => (window as any).tumble.session.info.scene.rope[0].density === 0.4);
+    // What the schema refuses leaves the value as it was, with the reason.
+    await page.locator('[data-path="rope.0.density"] input[type=number]').fill("-1");
+    await page.locator('[data-path="rope.0.density"] input[type=number]').press("Enter");
+    await page.waitForSelector(".note.bad");
+    assert.equal(await page.evaluate(() => (window as any).tumble.session.info.scene.rope[0].density), 0.4);
+    assert.deepEqual(errors, []);
+    await page.context().close();
+  });
+
+  it("travel in a link: whoever opens it sees the same bits", async () => {
+    const first = await own.open("scene/structures/rope", STILL);
+    await ready(first.page);
+    const hash = await first.page.evaluate(async () => {
+      const { session } = (window as any).tumble;
+      await session.set("force.0.rate", 2.5);
+      await session.goto(12);
+      return session.hash();
+    });
+    await first.page.click("text=Copy link");
+    await first.page.waitForFunction(() => document.getElementById("main")!.dataset.link);
+    const link = (await first.page.evaluate(() => document.getElementById("main")!.dataset.link))!;
+    const second = await own.open(link.split("#/")[1], STILL);
+    await ready(second.page);
+    await second.page.waitForFunction((h) => document.querySelector(".hash")!.textContent!.startsWith(h), hash);
+    assert.match((await second.page.textContent(".hash")) ?? "", /as in the link/);
+    assert.equal(await second.page.evaluate(() => (window as any).tumble.session.shown.index), 12);
+    assert.deepEqual([...first.errors, ...second.errors], []);
+    await first.page.context().close();
+    await second.page.context().close();
+  });
+
+  it("stay text: markup in a title is shown, sizes are limited, damaged links are refused", async () => {
+    const { page, errors } = await own.open("scene/springs/forever", STILL);
+    await ready(page);
+    const result = await page.evaluate(async () => {
+      const { session } = (window as any).tumble;
+      const text: string = session.toml;
+      await session.load(text.replace(/title = .*/, 'title = "<img src=x onerror=window.hit=1><b>x</b>"'));
+      const title = document.querySelector("h1")!;
+      const huge = await session.load('version = 1\n[[block]]\nname = "b"\nsize = [1, 1, 1]\nresolution = [5000, 5000, 5000]\nlinks = { structural = 1 }\n').then(() => "loaded", (e: any) => e.failure.message);
+      const deep = await session.load(`version = 1\nx = ${"[".repeat(20000)}`).then(() => "loaded", (e: any) => e.failure.message);
+      return { text: title.textContent, children: title.childElementCount, hit: (window as any).hit, huge, deep, alive: await session.hash() };
+    });
+    assert.equal(result.text, "<img src=x onerror=window.hit=1><b>x</b>");
+    assert.equal(result.children, 0);
+    assert.equal(result.hit, undefined);
+    assert.match(result.huge, /memory|GiB|large/i);
+    assert.notEqual(result.deep, "loaded");
+    assert.match(result.alive, /^[0-9a-f]{16}$/);
+    assert.deepEqual(errors, []);
+    await page.evaluate(() => (location.hash = "#/s/bm90IGEgbGluaw"));
+    await page.waitForSelector("text=This cannot be opened");
+    await page.context().close();
+  });
+});
+
+describe("files", () => {
+  it("are opened: a mesh gets a sheet that falls on it, anything else is refused", async () => {
+    const { page, errors } = await own.open("", STILL);
+    await page.setInputFiles("#file", { name: "notes.txt", mimeType: "text/plain", buffer: Buffer.from("x") });
+    await page.waitForFunction(() => /neither a scene/.test(document.getElementById("say")?.textContent ?? ""));
+    await page.setInputFiles("#file", `${SCENES}/assets/bunny.ply`);
+    await ready(page);
+    const info = await page.evaluate(() => (window as any).tumble.session.info);
+    assert.match(info.title, /falls on bunny\.ply/);
+    assert.deepEqual(info.objects.map((o: any) => o.kind), ["sheet", "collider", "collider"]);
+    assert.deepEqual(errors, []);
+    await page.context().close();
+  });
+
+  it("tell of a failed run, and of changes that would have saved it", async () => {
+    const { page, errors } = await own.open("scene/failures/stiff-sheet", STILL);
+    await ready(page);
+    await page.evaluate(() => (window as any).tumble.session.goto(5).catch(() => {}));
+    await page.click("text=Look for a cure");
+    await page.waitForSelector(".cures li", { timeout: 60_000 });
+    const cures = await page.$$eval(".cures li", (all) => all.map((l) => l.textContent ?? ""));
+    assert.ok(cures.some((c) => /implicit|symplectic|step/.test(c) && /Take it/.test(c)), cures.join("; "));
+    await page.locator(".cures button").first().click();
+    await frame(page, 4);
+    assert.ok(await page.evaluate(() => (window as any).tumble.session.overrides.size > 0 && (document.querySelector('.alert') as HTMLElement).hidden));
+    assert.deepEqual(errors, []);
+    await page.context().close();
+  });
+});
+
+describe("fluid", () => {
+  it("is stirred by the pointer, and its pressure is as good as its iterations", async () => {
+    const { page, errors } = await own.open("fluid", STILL);
+    await ready(page);
+    const picture = () =>
+      page.evaluate(async () => {
+        const { stage } = (window as any).tumble;
+        const image = await createImageBitmap(await stage.picture());
+        const small = new OffscreenCanvas(128, 72);
+        const context = small.getContext("2d")!;
+        context.drawImage(image, 0, 0, 128, 72);
+        return [...context.getImageData(0, 0, 128, 72).data];
+      });
+    const differ = (a: number[], b: number[]) => a.reduce((s, v, i) => s + (Math.abs(v - b[i]) > 12 ? 1 : 0), 0) / a.length;
+    const calm = await picture();
+    const box = (await page.locator(".stage").boundingBox())!;
+    await page.mouse.move(box.x + 0.3 * box.width, box.y + 0.15 * box.height);
+    await page.mouse.down();
+    for (let i = 1; i <= 8; i++) {
+      await page.mouse.move(box.x + (0.3 + 0.05 * i) * box.width, box.y + (0.15 + 0.02 * i) * box.height);
+      await page.waitForTimeout(60);
+    }
+    await page.mouse.up();
+    await page.evaluate(() => (window as any).tumble.session.pause());
+    const stirred = await picture();
+    assert.ok(differ(calm, stirred) > 0.01, `stirring changed ${differ(calm, stirred)}`);
+    await page.selectOption("#view", "pressure");
+    await page.waitForFunction(() => (window as any).tumble.stage.legend?.name === "pressure");
+    const pressure = await picture();
+    assert.ok(differ(stirred, pressure) > 0.1, `the view of the pressure changed ${differ(stirred, pressure)}`);
+    // Few iterations of Jacobi leave much more than multigrid does.
+    const left = await page.evaluate(async () => {
+      const { session } = (window as any).tumble;
+      await session.next();
+      const good = session.report.pressure.at(-1);
+      await session.set("gas.0.pressure.method", "jacobi");
+      await session.set("gas.0.pressure.iterations", 5);
+      await session.next();
+      return { good, bad: session.report.pressure.at(-1), unconverged: session.report.unconverged };
+    });
+    assert.ok(left.bad > 10 * left.good && left.unconverged > 0, JSON.stringify(left));
+    assert.deepEqual(errors, []);
+    await page.context().close();
+  });
+});
+
+describe("walls", () => {
+  it("are drawn into the fluid while it flows", async () => {
+    const { page, errors } = await own.open("fluid", STILL);
+    await ready(page);
+    await page.evaluate(() => (window as any).tumble.session.goto(3));
+    await page.locator("label:has-text('Dragging') select").selectOption("draw");
+    const box = (await page.locator(".stage").boundingBox())!;
+    await page.mouse.move(box.x + 0.5 * box.width, box.y + 0.3 * box.height);
+    await page.mouse.down();
+    for (let i = 1; i < 8; i++) await page.mouse.move(box.x + (0.5 + 0.02 * i) * box.width, box.y + (0.3 + 0.05 * i) * box.height);
+    await page.mouse.up();
+    await page.waitForFunction(() => (window as any).tumble.session.info.objects.some((o: any) => o.kind === "collider"), null, { timeout: 20_000 });
+    assert.ok((await page.evaluate(() => (window as any).tumble.session.latest)) >= 3, "the fluid began anew");
+    assert.deepEqual(errors, []);
+    await page.context().close();
+  });
+});
+
+describe("integrators", () => {
+  it("blow up and decay as their formulas say", async () => {
+    const { page, errors } = await own.open("integrators");
+    await page.click("text=Implicit damping");
+    const shown = (scheme: string, steps: number) =>
+      page.waitForFunction(([s, n]) => {
+        const out = document.querySelector(`[data-ratio=${s}]`) as HTMLElement | null;
+        return out && Number(out.dataset.steps) >= Number(n) ? { ratio: Number(out.dataset.value), steps: Number(out.dataset.steps) } : false;
+      }, [scheme, steps] as const, { timeout: 60_000 }).then((handle) => handle.jsonValue() as Promise<{ ratio: number; steps: number }>);
+    // z = 2π 0.05: implicit Euler keeps 1/(1 + z²) of the energy a step.
+    const z = 2 * Math.PI * 0.05;
+    const implicit = await shown("implicit_euler", 20);
+    const exact = (1 + z * z) ** -implicit.steps;
+    assert.ok(Math.abs(implicit.ratio / exact - 1) < 1e-6, `${implicit.ratio}, expected ${exact}`);
+    const midpoint = await shown("implicit_midpoint", 20);
+    assert.ok(Math.abs(midpoint.ratio - 1) < 1e-6, `${midpoint.ratio}`);
+    await page.click("text=The spring's growing energy");
+    await page.waitForSelector("[data-ratio=forward_euler]");
+    const y = 2 * Math.PI * 0.02;
+    const forward = await shown("forward_euler", 100);
+    const grown = (1 + y * y) ** forward.steps;
+    assert.ok(Math.abs(forward.ratio / grown - 1) < 1e-6, `${forward.ratio}, expected ${grown}`);
+    const symplectic = await shown("symplectic_euler", 100);
+    assert.ok(symplectic.ratio > 0.8 && symplectic.ratio < 1.25, `${symplectic.ratio}`);
+    // Beyond its limit the engine stops it, and the page says so.
+    await page.click("text=Beyond the limit");
+    await page.waitForFunction(() => /blew up/.test(document.querySelector("[data-scheme=symplectic_euler] .verdict")?.textContent ?? ""), null, { timeout: 60_000 });
+    assert.deepEqual(errors, []);
+    await page.context().close();
+  });
+});
+
+describe("everyone", () => {
+  const axe = readFileSync(createRequire(import.meta.url).resolve("axe-core/axe.min.js"), "utf8");
+  const PAGES = ["", "scene/drape/sheet-on-ball", "fluid", "integrators", "theory", "theory/gas"];
+  for (const colorScheme of ["light", "dark"] as const) {
+    it(`finds nothing serious by axe, ${colorScheme}`, async () => {
+      const found: string[] = [];
+      for (const path of PAGES) {
+        const { page } = await own.open(path, { ...STILL, colorScheme, bypassCSP: true });
+        await page.waitForSelector("h1");
+        if (/scene|fluid|integ/.test(path)) await ready(page);
+        for (const tab of path.startsWith("scene") ? ["values", "text", "theory", "facts"] : [""]) {
+          if (tab) await page.click(`#t-${tab}`);
+          if (tab === "text") await page.waitForSelector(".cm-content");
+          await page.evaluate(axe);
+          const issues = await page.evaluate((dark) => (window as any).axe.run(document, { resultTypes: ["violations"], ...(dark ? { runOnly: ["color-contrast"] } : {}) }).then((r: any) => r.violations.filter((v: any) => ["serious", "critical"].includes(v.impact)).map((v: any) => `${v.id}: ${v.nodes.slice(0, 3).map((n: any) => n.target.join(" ") + " " + (n.any[0]?.message ?? "")).join("; ")}`)), colorScheme === "dark");
+          found.push(...issues.map((i: string) => `${path} ${tab}: ${i}`));
+        }
+        await page.context().close();
+      }
+      assert.deepEqual(found, []);
+    });
+  }
+
+  it("fits a phone, and is worked by touch", async () => {
+    for (const path of PAGES) {
+      const { page, errors } = await own.open(path, { ...STILL, viewport: { width: 390, height: 844 }, hasTouch: true, isMobile: true });
+      await page.waitForSelector("h1");
+      if (/scene|fluid|integ/.test(path)) await ready(page);
+      const wide = await page.evaluate(() => document.documentElement.scrollWidth);
+      assert.ok(wide <= 390, `${path} is ${wide} pixels wide`);
+      if (path.startsWith("scene")) {
+        await page.tap(".transport .primary");
+        await frame(page, 1);
+      }
+      assert.deepEqual(errors, []);
+      await page.context().close();
+    }
+  });
+
+  it("needs no more memory as time goes on: 2,000 frames", async () => {
+    const { page, errors } = await own.open("scene/structures/rope", STILL);
+    await ready(page);
+    const sizes = await page.evaluate(async () => {
+      const { session } = (window as any).tumble;
+      const out: number[] = [];
+      for (const end of [500, 2000]) {
+        await session.goto(end);
+        session.trim(10);
+        out.push((performance as any).memory.usedJSHeapSize);
+      }
+      return out;
+    });
+    // The books of 1,500 frames and the kept states of the engine are below 8 MB.
+    assert.ok(sizes[1] - sizes[0] < 8e6, `${sizes}`);
+    assert.deepEqual(errors, []);
+    await page.context().close();
+  });
+});

@@ -1,0 +1,180 @@
+/** Wrong and hostile scenes: a message that says what and where, and the engine goes on. */
+import assert from "node:assert/strict";
+import { readFileSync } from "node:fs";
+import { resolve } from "node:path";
+import { test } from "node:test";
+import { Kept } from "../src/engine/kept";
+import type { Failure, SceneInfo } from "../src/engine/protocol";
+
+const PKG = resolve(import.meta.dirname, "../src/engine/pkg");
+const engine = await import(`${PKG}/single.js`);
+const { memory } = engine.initSync({ module: readFileSync(`${PKG}/single_bg.wasm`) });
+
+const BALL = `version = 1\n[[particles]]\nname = "p"\nposition = [[0.0, 0.0, 1.0]]\n`;
+const SHEET = `version = 1\n[time]\nfps = 24\n[[sheet]]\nname = "s"\nsize = [1.0, 1.0]\nresolution = [8, 8]\npin = ["corner 0 0"]\n[sheet.links]\nstructural = { modulus = 10.0 }\n`;
+const GAS = `version = 1\ndimension = 2\n[[system]]\nname = "air"\nmethod = "gas"\n[[gas]]\nname = "g"\n[gas.box]\nsize = [1.0, 1.0, 1.0]\nresolution = 32\n[gas.smoke]\n`;
+
+function made(toml: string, overrides: string[] = [], files = new Map<string, Uint8Array>()) {
+  return new engine.World(toml, overrides, files);
+}
+
+function failure(act: () => unknown): Failure {
+  try {
+    act();
+  } catch (thrown) {
+    assert.equal(typeof thrown, "string", `the engine died: ${(globalThis as { tumblePanic?: string }).tumblePanic ?? thrown}`);
+    return JSON.parse(thrown as string) as Failure;
+  }
+  throw new Error("nothing failed");
+}
+
+test("a mistake has its line and its cure", () => {
+  const found = failure(() => made(SHEET.replace("fps = 24", "fps = -24")));
+  assert.equal(found.kind, "scene");
+  assert.equal(found.line, 3);
+  assert.equal(found.path, "time.fps");
+  assert.match(found.message, /expected > 0/);
+  assert.equal(failure(() => made("version = 1\nx = = 2\n")).line, 2);
+  // What is seen only when it is built, too.
+  assert.equal(failure(() => made(SHEET.replace("corner 0 0", "corner 7 7"))).line, 8);
+});
+
+test("what is too large is refused before any memory is taken", () => {
+  for (const [toml, override] of [
+    [SHEET, "sheet.s.resolution=[100000, 100000]"],
+    [GAS, "gas.g.box.resolution=1000000"],
+    [BALL, "particles.p.cloud={ shape = 'box', count = 4000000000, size = [1, 1, 1] }"],
+  ] as const) {
+    const found = failure(() => made(toml, [override]));
+    assert.ok(found.kind === "limit" || found.kind === "scene", found.message);
+    assert.ok(found.message.length > 20);
+  }
+  assert.equal(failure(() => made(SHEET, ["sheet.s.resolution=[3000, 3000]"])).kind, "limit");
+  assert.equal(failure(() => made("#".repeat(9 << 20))).kind, "limit");
+});
+
+test("hostile text is only text", () => {
+  const deep = `version = 1\nx = ${"[".repeat(100_000)}${"]".repeat(100_000)}\n`;
+  assert.equal(failure(() => made(deep)).kind, "scene");
+  assert.equal(failure(() => made(`{"version": 1, "x": ${'{"a":'.repeat(1000)}1${"}".repeat(1000)}}`)).kind, "scene");
+  for (const value of ["nan", "inf", "1e999", '"x"']) {
+    assert.equal(failure(() => made(BALL.replace("1.0]]", `${value}]]`))).kind, "scene");
+  }
+  const odd = BALL.replace('"p"', '"__proto__"').replace("version = 1", 'version = 1\ntitle = "<img src=x onerror=alert(1)>"');
+  const world = made(odd);
+  const columns = world.columns(["position"]);
+  assert.ok(Object.keys(columns).includes("__proto__"));
+  assert.equal((JSON.parse(world.info()) as SceneInfo).title, "<img src=x onerror=alert(1)>");
+  world.free();
+});
+
+test("broken meshes and missing ones are named", () => {
+  const net = `version = 1\n[[net]]\nname = "n"\nmesh = { path = "a.obj" }\n`;
+  assert.deepEqual(failure(() => made(net)).missing, ["a.obj"]);
+  for (const bytes of ["", "f 1 2 3\n", "v 0 0 0\nf 1 1 9999999999\n", "v nan 0 0\n"]) {
+    assert.equal(failure(() => made(net, [], new Map([["a.obj", new TextEncoder().encode(bytes)]]))).kind, "scene");
+  }
+});
+
+test("a frame that takes too long ends with a message, at the last good frame", () => {
+  const world = made(SHEET, ["system.0.substeps=100000"]);
+  const before = world.hash();
+  const found = failure(() => world.step(50));
+  assert.equal(found.kind, "limit");
+  assert.equal(world.hash(), before);
+  world.free();
+});
+
+test("a scene that blows up says so and stays at its last good frame", () => {
+  const world = made(SHEET, ["system.0.integrator=forward_euler", "system.0.substeps=1", "sheet.s.links.structural.modulus=1e6"]);
+  const found = failure(() => {
+    for (let i = 0; i < 200; i++) world.step(60_000);
+  });
+  assert.equal(found.kind, "step");
+  assert.match(found.message, /stable step|no stable step/);
+  world.free();
+});
+
+test("values change in a running world, or start it anew", () => {
+  const world = made(SHEET);
+  for (let i = 0; i < 5; i++) world.step(60_000);
+  const state = world.hash();
+  assert.equal(world.set("world.gravity", "[0, 0, -1]"), true);
+  assert.equal(world.index(), 5);
+  assert.equal(world.hash(), state);
+  assert.deepEqual((JSON.parse(world.info()) as SceneInfo).scene.world, { gravity: [0, 0, -1], memory_limit: 8 });
+  assert.equal(world.set("sheet.s.resolution", "[9, 9]"), false);
+  assert.equal(world.index(), 0);
+  assert.equal(failure(() => world.set("sheet.s.resolution", "[1, 9]")).kind, "scene");
+  assert.equal(failure(() => world.set("nothing.here", "1")).kind, "scene");
+  world.free();
+});
+
+test("a hand pulls and lets go, and going back forgets it", () => {
+  const world = made(SHEET);
+  const height = () => Number(world.columns(["position"]).s.position.data[3 * 63 + 2]);
+  const start = world.save();
+  for (let i = 0; i < 12; i++) world.step(60_000);
+  const [fallen, free] = [height(), world.hash()];
+  world.restore(start);
+  world.grab("s", 63, [0.5, 0.5, 1.0], undefined);
+  for (let i = 0; i < 12; i++) world.step(60_000);
+  assert.ok(height() > fallen + 0.1, `${height()} against ${fallen}`);
+  world.release();
+  world.restore(start);
+  for (let i = 0; i < 12; i++) world.step(60_000);
+  assert.equal(world.hash(), free);
+  assert.equal(failure(() => world.grab("s", 64, [0, 0, 0], undefined)).kind, "scene");
+  assert.equal(failure(() => world.grab("nobody", 0, [0, 0, 0], undefined)).kind, "scene");
+  world.free();
+});
+
+test("a gas is stirred around a point", () => {
+  const world = made(GAS);
+  world.stir("g", [0, 0, 0], [1, 0, 0.5], 0.1, 2.0);
+  const columns = world.columns(["velocity_x", "density"]).g;
+  const [x, density] = [columns.velocity_x, columns.density];
+  assert.deepEqual(x.points, [33, 32]);
+  // Around the middle of the box; one row of faces left of it, one right.
+  const peak = Math.max(...x.data);
+  assert.ok(peak > 0.9 && peak <= 1.0, String(peak));
+  const at = x.data.indexOf(peak) % 33;
+  assert.ok(Math.abs(at - 16) <= 1, String(at));
+  // The integral of a Gaussian of radius r is pi r², here of 2 kg/m³.
+  const mass = density.data.reduce((sum: number, d: number) => sum + d, 0) / 32 ** 2;
+  assert.ok(Math.abs(mass - 2 * Math.PI * 0.01) < 1e-4, String(mass));
+  world.step(60_000);
+  assert.equal(failure(() => world.stir("g", [0, 0, 0], [1, 0, 0], 0, 0)).kind, "scene");
+  assert.equal(failure(() => world.stir("h", [0, 0, 0], [1, 0, 0], 1, 0)).kind, "scene");
+  world.free();
+});
+
+test("kept frames stay within their memory", () => {
+  const kept = new Kept(1000);
+  for (let i = 0; i <= 500; i++) kept.add(i, () => new Uint8Array(10).fill(i % 256));
+  const frames = kept.frames();
+  assert.equal(frames[0], 0);
+  assert.ok(frames.length > 40 && frames.length <= 100, String(frames.length));
+  assert.equal(kept.at(300)[0], frames.filter((f) => f <= 300).at(-1)! % 256);
+  kept.cut(200);
+  assert.ok(kept.frames().every((f) => f < 200));
+  kept.cut(0);
+  assert.deepEqual(kept.frames(), [0]);
+});
+
+test("memory stays flat over frames, worlds and values", () => {
+  const round = () => {
+    const world = made(SHEET);
+    for (let i = 0; i < 400; i++) {
+      world.step(60_000);
+      world.columns(["position", "velocity"]);
+      world.save();
+    }
+    for (let i = 0; i < 50; i++) world.set("world.gravity", `[0, 0, ${-i}]`);
+    world.free();
+  };
+  round();
+  const before = memory.buffer.byteLength;
+  for (let i = 0; i < 5; i++) round();
+  assert.equal(memory.buffer.byteLength, before);
+});
