@@ -209,13 +209,13 @@ export const page: Page = async (main) => {
     void restart();
   });
   const boxes = h("fieldset", { class: "schemes" }, h("legend", {}, "Integrators, two to six"));
-  const lecture = h("ul", { class: "lecture" }, ...LECTURE.map(([name, set], k) => h("li", {}, h("button", { type: "button", class: "button", "data-set": k, onclick: () => {
+  const lecture = h("ul", { class: "lecture", "aria-label": "Pictures of the lecture" }, ...LECTURE.map(([name, set], k) => h("li", {}, h("button", { type: "button", class: "button", "data-set": k, onclick: () => {
     ({ system, h: step } = set);
     schemes = [...set.schemes];
     which.querySelector("select")!.value = system;
     void restart();
   } }, name))));
-  const theory = h("div", { class: "beside" });
+  const theory = h("section", { class: "beside", "aria-label": "Theory" });
   const note = h("p", { class: "note", role: "status" });
 
   main.append(
@@ -223,15 +223,14 @@ export const page: Page = async (main) => {
       h("section", { class: "view", "aria-label": "Runs" },
         h("div", { class: "lab-head" }, h("h1", {}, "Integrators side by side"),
           h("div", { class: "actions" }, play, iconButton("reset", "Back to the start", () => void restart()), choice("Speed", [["0.25", "0.25 ×"], ["1", "1 ×"], ["4", "4 ×"]], "1", (v) => (speed = Number(v))), clock)),
-        about, alert, board,
-        h("div", { class: "charts" }, energyBox, phaseBox, errorBox),
-        theory),
+        about, lecture, alert, board,
+        h("div", { class: "charts" }, energyBox, phaseBox, errorBox)),
       h("aside", { class: "side scrolls", "aria-label": "Settings", tabindex: 0 },
         h("div", { class: "controls" },
-          h("section", { class: "card" }, h("h2", {}, "From the lecture"), lecture),
           h("section", { class: "card" }, h("h2", {}, "System and step"), which,
             h("div", { class: "slide" }, h("div", { class: "slide-head" }, h("label", { for: "h" }, "Step h"), stepOut), slider, marks, limitText)),
-          h("section", { class: "card" }, boxes, note)))),
+          h("section", { class: "card" }, boxes, note))),
+      theory),
   );
 
   const allowed = (scheme: string) => !SYSTEMS[system].field || FOR_FIELDS.has(scheme);
@@ -318,8 +317,8 @@ export const page: Page = async (main) => {
       return { world: 10 + k, scheme, info: null, frame: null, n: 0, quantity: [], error: [], path: [], first: 0, dead: "", canvas, ratio, verdict, predicted, card };
     });
     board.replaceChildren(...runs.map((r) => r.card));
-    energyTitle.textContent = s.field ? "Radius over the first" : "Energy over the first";
-    (phaseBox.querySelector(".axes") as HTMLElement).textContent = `${s.axes[0]} across, ${s.axes[1]} up`;
+    energyTitle.textContent = s.field ? "Radius, r / r₀" : "Energy, E / E₀";
+    (phaseBox.querySelector(".axes") as HTMLElement).textContent = `${s.axes[0]} →, ${s.axes[1]} ↑`;
     phaseTitle.textContent = s.phase.length === 2 ? "Phase" : "Path";
     errorBox.hidden = !s.exact;
     rescale();

@@ -367,7 +367,8 @@ export const page: Page = async (main, rest) => {
         }), check("Cells", look.cells, (on) => {
           look.cells = on;
           again();
-        }), check("Dye", look.dye, (on) => {
+        }));
+        if (gas?.smoke) parts.push(check("Dye", look.dye, (on) => {
           look.dye = on;
           again();
         }));
@@ -393,7 +394,7 @@ export const page: Page = async (main, rest) => {
         look.links = on;
         again();
       }));
-      parts.push(check("Trails", look.trails, (on) => {
+      if (stage.trails) parts.push(check("Trails", look.trails, (on) => {
         look.trails = on;
         again();
       }));
