@@ -44,7 +44,7 @@ const W = 2 * Math.PI;
 const SYSTEMS: Record<string, System> = {
   spring: {
     name: "Spring", about: "One mass on a spring, one swing a second, no damping. Its energy should stay what it is, its phase should be a circle.",
-    field: false, omega: W, steps: [0.002, 0.5], end: 20, object: "spring", zero: 0, axes: ["extension [m]", "velocity/ω [m]"],
+    field: false, omega: W, steps: [0.002, 0.5], end: 20, object: "spring", zero: 0, axes: ["extension [m]", "v/ω [m]"],
     // A spring without a rest length is linear however far it goes.
     toml: (s, h) => `${head("A mass on a spring", h, dynamics(s))}[world]\ngravity = [0, 0, 0]\n[[particles]]\nname = "spring"\nposition = [[0, 0, 0], [0.5, 0, 0]]\nmass = [1]\nradius = 0.08\npin = ["vertex 0"]\nspring = [{ between = [0, 1], stiffness = ${W * W}, rest_length = 0 }]\n[output]\ncolumns = ["position", "velocity"]\n`,
     phase: (x, v) => [x[3], (v?.[3] ?? 0) / W],
@@ -53,7 +53,7 @@ const SYSTEMS: Record<string, System> = {
   },
   rusty: {
     name: "Rusty spring", about: "The same spring with internal damping: the swing dies, and with it the energy. A scheme should lose as much as the spring does, no more.",
-    field: false, omega: W, steps: [0.002, 0.5], end: 12, object: "spring", zero: 0, axes: ["extension [m]", "velocity/ω [m]"],
+    field: false, omega: W, steps: [0.002, 0.5], end: 12, object: "spring", zero: 0, axes: ["extension [m]", "v/ω [m]"],
     toml: (s, h) => `${head("A rusty spring", h, dynamics(s))}[world]\ngravity = [0, 0, 0]\n[[particles]]\nname = "spring"\nposition = [[0, 0, 0], [1.5, 0, 0]]\nmass = [1]\nradius = 0.08\npin = ["vertex 0"]\nspring = [{ between = [0, 1], stiffness = ${W * W}, rest_length = 1, damping = 0.6 }]\n[output]\ncolumns = ["position", "velocity"]\n`,
     phase: (x, v) => [x[3] - 1, (v?.[3] ?? 0) / W],
     exact: (t) => {
