@@ -50,12 +50,19 @@ let visit = 0;
 
 async function go(): Promise<void> {
   const own = ++visit;
-  const address = decodeURI(location.hash.replace(/^#\/?/, ""));
+  let address = location.hash.replace(/^#\/?/, "");
+  try {
+    address = decodeURI(address);
+  } catch {
+    // A damaged address: as it stands.
+  }
   if (location.hash === "#main") return main.focus();
   leave();
   leave = () => {};
   main.replaceChildren();
   main.className = "";
+  // The engine comes while the page does.
+  if (/^(scene|s|fluid|integrators)\b/.test(address)) void import("./session").then(({ engine }) => engine().schema()).catch(() => {});
   for (const [pattern, , open] of PAGES) {
     const match = pattern.exec(address);
     if (!match) continue;

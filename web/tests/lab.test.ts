@@ -142,6 +142,23 @@ describe("scenes", () => {
     await page.context().close();
   });
 
+  it("have legends that tell what is there", async () => {
+    const { page, errors } = await own.open("scene/gas/obstacle", STILL);
+    await ready(page);
+    const told = await page.evaluate(async () => {
+      const { session, stage } = (window as any).tumble;
+      Object.assign(stage.look, { field: "temperature", slice: 1 });
+      await session.goto(2);
+      const data: Float32Array = session.shown.columns.air.temperature.data;
+      return { ...stage.legend, least: data.reduce((a, b) => Math.min(a, b)), most: data.reduce((a, b) => Math.max(a, b)) };
+    });
+    assert.equal(told.unit, "K");
+    assert.deepEqual([told.low, told.high], [told.least, told.most]);
+    assert.ok(told.most > 390 && told.most < 394, `the source holds 393 K, not ${told.most}`);
+    assert.deepEqual(errors, []);
+    await page.context().close();
+  });
+
   it("are pulled by the pointer", async () => {
     const { page, errors } = await own.open("scene/springs/forever", STILL);
     await ready(page);

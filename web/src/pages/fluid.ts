@@ -255,7 +255,7 @@ export const page: Page = async (main) => {
       }),
     ),
   );
-  const theory = h("div", { class: "beside" });
+  const theory = h("section", { class: "beside", "aria-label": "Theory" });
   main.append(
     h("div", { class: "lab" },
       h("section", { class: "view", "aria-label": "Fluid" },
@@ -265,9 +265,9 @@ export const page: Page = async (main) => {
             h("button", { type: "button", class: "button", title: "With its text and all its values", onclick: () => void asScene() }, "As a scene"))),
         alert, stageBox, transport(session),
         h("div", { class: "energy" }, h("h2", {}, "Kinetic energy", h("span", { class: "unit" }, "J")), h("div", { class: "figures in-line" }, figures.kinetic.row, figures.courant.row, figures.cost.row), energy.element),
-        theory,
       ),
       h("aside", { class: "side scrolls", "aria-label": "Settings", tabindex: 0 }, controls),
+      theory,
     ),
   );
 

@@ -44,7 +44,7 @@ const W = 2 * Math.PI;
 const SYSTEMS: Record<string, System> = {
   spring: {
     name: "Spring", about: "One mass on a spring, one swing a second, no damping. Its energy should stay what it is, its phase should be a circle.",
-    field: false, omega: W, steps: [0.002, 0.5], end: 20, object: "spring", zero: 0, axes: ["extension [m]", "velocity/ω [m]"],
+    field: false, omega: W, steps: [0.002, 0.5], end: 20, object: "spring", zero: 0, axes: ["extension [m]", "v/ω [m]"],
     // A spring without a rest length is linear however far it goes.
     toml: (s, h) => `${head("A mass on a spring", h, dynamics(s))}[world]\ngravity = [0, 0, 0]\n[[particles]]\nname = "spring"\nposition = [[0, 0, 0], [0.5, 0, 0]]\nmass = [1]\nradius = 0.08\npin = ["vertex 0"]\nspring = [{ between = [0, 1], stiffness = ${W * W}, rest_length = 0 }]\n[output]\ncolumns = ["position", "velocity"]\n`,
     phase: (x, v) => [x[3], (v?.[3] ?? 0) / W],
@@ -53,7 +53,7 @@ const SYSTEMS: Record<string, System> = {
   },
   rusty: {
     name: "Rusty spring", about: "The same spring with internal damping: the swing dies, and with it the energy. A scheme should lose as much as the spring does, no more.",
-    field: false, omega: W, steps: [0.002, 0.5], end: 12, object: "spring", zero: 0, axes: ["extension [m]", "velocity/ω [m]"],
+    field: false, omega: W, steps: [0.002, 0.5], end: 12, object: "spring", zero: 0, axes: ["extension [m]", "v/ω [m]"],
     toml: (s, h) => `${head("A rusty spring", h, dynamics(s))}[world]\ngravity = [0, 0, 0]\n[[particles]]\nname = "spring"\nposition = [[0, 0, 0], [1.5, 0, 0]]\nmass = [1]\nradius = 0.08\npin = ["vertex 0"]\nspring = [{ between = [0, 1], stiffness = ${W * W}, rest_length = 1, damping = 0.6 }]\n[output]\ncolumns = ["position", "velocity"]\n`,
     phase: (x, v) => [x[3] - 1, (v?.[3] ?? 0) / W],
     exact: (t) => {
@@ -209,13 +209,13 @@ export const page: Page = async (main) => {
     void restart();
   });
   const boxes = h("fieldset", { class: "schemes" }, h("legend", {}, "Integrators, two to six"));
-  const lecture = h("ul", { class: "lecture" }, ...LECTURE.map(([name, set], k) => h("li", {}, h("button", { type: "button", class: "button", "data-set": k, onclick: () => {
+  const lecture = h("ul", { class: "lecture", "aria-label": "Pictures of the lecture" }, ...LECTURE.map(([name, set], k) => h("li", {}, h("button", { type: "button", class: "button", "data-set": k, onclick: () => {
     ({ system, h: step } = set);
     schemes = [...set.schemes];
     which.querySelector("select")!.value = system;
     void restart();
   } }, name))));
-  const theory = h("div", { class: "beside" });
+  const theory = h("section", { class: "beside", "aria-label": "Theory" });
   const note = h("p", { class: "note", role: "status" });
 
   main.append(
@@ -223,15 +223,14 @@ export const page: Page = async (main) => {
       h("section", { class: "view", "aria-label": "Runs" },
         h("div", { class: "lab-head" }, h("h1", {}, "Integrators side by side"),
           h("div", { class: "actions" }, play, iconButton("reset", "Back to the start", () => void restart()), choice("Speed", [["0.25", "0.25 ×"], ["1", "1 ×"], ["4", "4 ×"]], "1", (v) => (speed = Number(v))), clock)),
-        about, alert, board,
-        h("div", { class: "charts" }, energyBox, phaseBox, errorBox),
-        theory),
+        about, lecture, alert, board,
+        h("div", { class: "charts" }, energyBox, phaseBox, errorBox)),
       h("aside", { class: "side scrolls", "aria-label": "Settings", tabindex: 0 },
         h("div", { class: "controls" },
-          h("section", { class: "card" }, h("h2", {}, "From the lecture"), lecture),
           h("section", { class: "card" }, h("h2", {}, "System and step"), which,
             h("div", { class: "slide" }, h("div", { class: "slide-head" }, h("label", { for: "h" }, "Step h"), stepOut), slider, marks, limitText)),
-          h("section", { class: "card" }, boxes, note)))),
+          h("section", { class: "card" }, boxes, note))),
+      theory),
   );
 
   const allowed = (scheme: string) => !SYSTEMS[system].field || FOR_FIELDS.has(scheme);
@@ -318,8 +317,8 @@ export const page: Page = async (main) => {
       return { world: 10 + k, scheme, info: null, frame: null, n: 0, quantity: [], error: [], path: [], first: 0, dead: "", canvas, ratio, verdict, predicted, card };
     });
     board.replaceChildren(...runs.map((r) => r.card));
-    energyTitle.textContent = s.field ? "Radius over the first" : "Energy over the first";
-    (phaseBox.querySelector(".axes") as HTMLElement).textContent = `${s.axes[0]} across, ${s.axes[1]} up`;
+    energyTitle.textContent = s.field ? "Radius, r / r₀" : "Energy, E / E₀";
+    (phaseBox.querySelector(".axes") as HTMLElement).textContent = `${s.axes[0]} →, ${s.axes[1]} ↑`;
     phaseTitle.textContent = s.phase.length === 2 ? "Phase" : "Path";
     errorBox.hidden = !s.exact;
     rescale();

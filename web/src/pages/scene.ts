@@ -367,7 +367,8 @@ export const page: Page = async (main, rest) => {
         }), check("Cells", look.cells, (on) => {
           look.cells = on;
           again();
-        }), check("Dye", look.dye, (on) => {
+        }));
+        if (gas?.smoke) parts.push(check("Dye", look.dye, (on) => {
           look.dye = on;
           again();
         }));
@@ -393,7 +394,7 @@ export const page: Page = async (main, rest) => {
         look.links = on;
         again();
       }));
-      parts.push(check("Trails", look.trails, (on) => {
+      if (stage.trails) parts.push(check("Trails", look.trails, (on) => {
         look.trails = on;
         again();
       }));
@@ -433,13 +434,14 @@ export const page: Page = async (main, rest) => {
     if (recorder) return recorder.stop();
     if (!("MediaRecorder" in window)) return say("This browser cannot record.");
     const parts: Blob[] = [];
-    recorder = new MediaRecorder(canvas.captureStream(30), { mimeType: MediaRecorder.isTypeSupported("video/webm;codecs=vp9") ? "video/webm;codecs=vp9" : "video/webm", videoBitsPerSecond: 8e6 });
+    const mimeType = ["video/webm;codecs=vp9", "video/webm", "video/mp4"].find((t) => MediaRecorder.isTypeSupported(t));
+    recorder = new MediaRecorder(canvas.captureStream(30), { mimeType, videoBitsPerSecond: 8e6 });
     recorder.ondataavailable = (e) => parts.push(e.data);
     recorder.onstop = () => {
       recorder = null;
       setIcon(record, "record", "Record a film (WebM)");
       record.classList.remove("live");
-      saveAs(new Blob(parts, { type: "video/webm" }), `${start.name}.webm`);
+      saveAs(new Blob(parts, { type: mimeType }), `${start.name}.${mimeType?.includes("mp4") ? "mp4" : "webm"}`);
     };
     recorder.start();
     setIcon(record, "stop", "End the film and save it");

@@ -274,16 +274,21 @@ export class Range {
   constructor(private readonly column: string) {}
 
   look(values: Numbers): void {
-    const step = Math.max(1, Math.floor(values.length / 4096));
-    const seen: number[] = [];
-    for (let i = Math.floor(step / 2); i < values.length; i += step) if (Number.isFinite(values[i])) seen.push(values[i]);
-    if (!seen.length) return;
-    seen.sort((a, b) => a - b);
-    const at = (q: number) => seen[Math.min(Math.floor(q * seen.length), seen.length - 1)];
-    let low = seen[0];
-    let high = seen[seen.length - 1];
+    let low = Infinity;
+    let high = -Infinity;
+    for (let i = 0; i < values.length; i++) {
+      const v = values[i];
+      if (v < low) low = v;
+      if (v > high) high = v;
+    }
+    if (!Number.isFinite(low) || !Number.isFinite(high)) return;
     if (SIGNED.includes(this.column)) {
-      // A few cells beside walls are far off the rest.
+      // A few cells beside walls are far off the rest. An odd stride does not stay in a few columns of the grid.
+      const step = Math.floor(values.length / 4096) | 1;
+      const seen: number[] = [];
+      for (let i = step >> 1; i < values.length; i += step) if (Number.isFinite(values[i])) seen.push(values[i]);
+      seen.sort((a, b) => a - b);
+      const at = (q: number) => seen[Math.min(Math.floor(q * seen.length), seen.length - 1)];
       high = Math.max(Math.abs(at(0.01)), Math.abs(at(0.99)), 0.25 * Math.max(-low, high));
       low = -high;
     } else if (low >= 0 && low < 0.5 * high) {
