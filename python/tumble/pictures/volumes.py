@@ -15,6 +15,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from tumble.pictures.blackbody import developed
 from tumble.pictures.framing import Camera
 from tumble.pictures.look import key_light
 from tumble.pictures.splats import DIM, NEAR, Shade, sights
@@ -37,9 +38,6 @@ THIN = 0.15
 
 LEFT = 0.004
 """Rays that have less of their light left end."""
-
-CROSSTALK = 0.02
-"""Share of the other colours' light that each layer of film sees: what is very bright turns white."""
 
 COARSE = 48
 """Blocks of cells along each axis in the shadow on other things."""
@@ -205,12 +203,6 @@ def _smoke(light: Floats, depth: Floats, cloud: Smoke, camera: Camera, bright: f
     out = light.reshape(-1, 3).copy()
     out[pixels] = out[pixels] * left[:, None] + scattered[:, None] * np.array(cloud.color) + shining
     return out.reshape(light.shape)
-
-
-def developed(light: Array) -> Array:
-    """Light as on film: each of three layers saturates by itself."""
-    sum_ = light.sum(axis=-1, keepdims=True)
-    return np.asarray(1 - np.exp(-((1 - 3 * CROSSTALK) * light + CROSSTALK * sum_)))
 
 
 def _between(slices: npt.NDArray[Any], k: float) -> npt.NDArray[Any]:
