@@ -156,7 +156,7 @@ def render(renderer: str, things: list[Thing], camera: Camera, samples: int = SA
     images = [t for t in things if isinstance(t, Image)]
     if not (clouds or smoke or images or night):
         return _drawn(renderer, things, camera, samples)
-    scenery: list[Thing] = [t for t in things if isinstance(t, Body | Ground)] + traced
+    scenery: list[Thing] = [*(t for t in things if isinstance(t, Body | Ground)), *traced]
     # By night nothing at all is dark, and drawn at once.
     light, depth = (None, np.full(camera.size[::-1], np.inf))
     if scenery or not night:

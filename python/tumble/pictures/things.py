@@ -640,7 +640,7 @@ def _image(
 def _holes(scene: Mapping[str, Any], name: str, grid: Box) -> npt.NDArray[np.bool_]:
     """The cells that are no part of a heated body."""
     holes = np.zeros(grid.cells, dtype=bool)
-    body = next((b for b in scene.get("heat") or () if b.get("name") == name), {})
+    body: Mapping[str, Any] = next((b for b in scene.get("heat") or () if b.get("name") == name), {})
     regions = body.get("region") or ()
     if regions:
         x = np.stack(np.meshgrid(*(grid.points(a) for a in range(3)), indexing="ij"), axis=-1)
