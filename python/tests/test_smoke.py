@@ -270,7 +270,11 @@ def test_waves_in_a_fluid_are_seen_though_they_start_as_a_bang() -> None:
     bang = 1.2 + np.where(x == 20, 0.1, 0.0) * (np.arange(20) == 10)
     wave = 1.2 + 0.015 * np.sin(x)
     run.columns = lambda t: {"dye": {"density": bang if t == 0 else wave}}
-    name, low, high = Stage(run)._range(Stage(run).objects[0], grids.box(run.static["dye"]))  # type: ignore
+    grid, stage = grids.box(run.static["dye"]), Stage(run)
+    assert grid is not None
+    found = stage._range(stage.objects[0], grid)
+    assert found is not None
+    name, low, high = found
     assert name == "density" and low + high == pytest.approx(2.4, abs=1e-3)
     assert 0.0145 < 0.5 * (high - low) < 0.0151  # A tenth of the bang would be 0.01.
 
