@@ -54,9 +54,9 @@ def test_the_table_keeps_what_it_was_made_of() -> None:
 
 def test_film_is_linear_in_the_dark_and_white_in_the_light() -> None:
     dim = np.array([[1e-4, 2e-4, 0.0]])
-    layers = (1 - 3 * volumes.CROSSTALK) * dim + volumes.CROSSTALK * 3e-4
-    np.testing.assert_allclose(volumes.developed(dim), layers, rtol=2e-4)
-    red, yellow, white = volumes.developed(np.array([[1.0, 0.1, 0.0], [20.0, 4.0, 0.0], [400.0, 90.0, 0.0]]))
+    layers = (1 - 3 * blackbody.CROSSTALK) * dim + blackbody.CROSSTALK * 3e-4
+    np.testing.assert_allclose(blackbody.developed(dim), layers, rtol=2e-4)
+    red, yellow, white = blackbody.developed(np.array([[1.0, 0.1, 0.0], [20.0, 4.0, 0.0], [400.0, 90.0, 0.0]]))
     assert red[0] > 0.5 > 3 * red[1] and yellow[1] > 0.95 > 2 * yellow[2] and white.min() > 0.99
 
 
@@ -72,7 +72,7 @@ def test_light_of_a_glowing_block_is_kirchhoffs() -> None:
     dark, depth = np.zeros((48, 64, 3)), np.full((48, 64), np.inf)
     cube = Smoke("", np.full(3, -0.2), 0.4 / n, extinction, (0.0, 0.0, 0.0), glow=source)
     got = volumes.smoke(dark, depth, [cube], view)[24, 32]
-    expected = volumes.developed(np.array([0.3, 0.2, 0.1]) * (1 - np.exp(-tau)))
+    expected = blackbody.developed(np.array([0.3, 0.2, 0.1]) * (1 - np.exp(-tau)))
     np.testing.assert_allclose(got, expected, rtol=2e-4)
     # Along the ray, with s = tau/0.4: int s exp(-s x) exp(-k x) dx = s/(s + k) (1 - exp(-(s + k) 0.4)).
     s, k = tau / 0.4, 4.0
@@ -80,7 +80,7 @@ def test_light_of_a_glowing_block_is_kirchhoffs() -> None:
     slanted = Smoke("", cube.low, cube.spacing, extinction, cube.color, glow=source * fall[None, :, None, None])
     got = volumes.smoke(dark, depth, [slanted], view)[24, 32]
     light = np.array([0.3, 0.2, 0.1]) * s / (s + k) * (1 - np.exp(-(s + k) * 0.4))
-    np.testing.assert_allclose(got, volumes.developed(light), rtol=2e-3)
+    np.testing.assert_allclose(got, blackbody.developed(light), rtol=2e-3)
 
 
 def test_a_hot_gas_glows_and_a_cold_one_does_not() -> None:

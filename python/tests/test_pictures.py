@@ -471,6 +471,14 @@ def test_a_film_shows_every_frame_in_order(tmp_path: Path) -> None:
     assert [p.name for p in path.parent.iterdir()] == ["film.mp4"]
 
 
+@pytest.mark.parametrize(("fps", "played"), [(10000.0, 24.0), (0.15, 24.0), (12.0, 12.0), (60.0, 60.0)])
+def test_films_play_at_rates_that_can_be_watched(fps: float, played: float, tmp_path: Path) -> None:
+    run = fake_run.studio()
+    run.scene["time"]["fps"] = fps
+    meta, pictures = decoded(film(run, tmp_path / "film.mp4", PLAIN, size=(32, 18), processes=1))
+    assert meta["fps"] == pytest.approx(played) and len(pictures) == 5
+
+
 def test_odd_sizes_and_fewer_frames(tmp_path: Path) -> None:
     path = film(fake_run.studio(), tmp_path / "film.mp4", PLAIN, every=2, size=(81, 45), processes=1)
     meta, pictures = decoded(path)

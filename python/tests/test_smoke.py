@@ -6,11 +6,11 @@ import fake_run
 import numpy as np
 import pytest
 
-from tumble import ExportError, grids
+from tumble import ExportError, grids, pictures
 from tumble.film import film
 from tumble.pictures import Studio, volumes
 from tumble.pictures.framing import Camera
-from tumble.pictures.things import Image, Smoke, Spheres
+from tumble.pictures.things import DEEP, SMOKE, Image, Smoke, Spheres, Stage, _within
 from tumble.slices import cut, slices
 from tumble.style import display, linear
 
@@ -169,6 +169,114 @@ def test_only_grids_can_be_drawn_with_bodies() -> None:
     run.columns = lambda t: before(t) | {"p": {"position": np.array([[0.0, -0.3, 0.4]])}}
     things = Studio(run, "matplotlib").things(2)
     assert {Smoke, Spheres} <= {type(t) for t in things}
+
+
+def test_smoke_is_seen_through_as_much_from_the_front_as_from_above() -> None:
+    """A layer that is wide and thin: along the view, whatever it is, an optical depth of DEEP where it is thickest."""
+    run = fake_run.plume(16)
+    layer = np.zeros((16, 16, 32), dtype=np.float32)
+    layer[:, :, 10:20] = 3.0
+    run.columns = lambda t: {"smoke": {"density": layer}}
+    for view, rows in ((Y, 16), (-Z, 10)):
+        thing = next(t for t in Stage(run, view).things(0) if isinstance(t, Smoke))
+        assert thing.extinction.max() * rows * thing.spacing == pytest.approx(DEEP, rel=1e-5)
+    # Little of it stays as thin as anything of that density in a box of that size.
+    layer[:, :, 11:] = 0.0
+    thing = next(t for t in Stage(run, -Z).things(0) if isinstance(t, Smoke))
+    assert thing.extinction.max() == pytest.approx(40.0 / (4 / 3), rel=1e-5)
+
+
+def test_dye_in_a_liquid_has_a_colour() -> None:
+    for density, grey in ((1.2, True), (1000.0, False)):
+        run = fake_run.plume(8, gas=[{"name": "smoke", "fluid_density": density}])
+        thing = next(t for t in Stage(run).things(2) if isinstance(t, Smoke))
+        assert (thing.color == SMOKE) == grey
+
+
+@pytest.mark.parametrize("night", [False, True])
+def test_what_glows_is_painted_where_smoke_is_traced(night: bool, monkeypatch: pytest.MonkeyPatch) -> None:
+    got: list[list[object]] = []
+
+    def drawn(renderer: str, things: list[object], view: Camera, samples: int) -> np.ndarray:
+        got.append(things)
+        return np.zeros((48, 64, 3), dtype=np.uint8)
+
+    monkeypatch.setattr(pictures, "_drawn", drawn)
+    monkeypatch.setattr(pictures, "_KEPT", {})
+    cold = block(8)
+    glow = np.ones((8, 8, 8, 3), dtype=np.float32)
+    hot = Smoke("", cold.low - 0.45 * X, cold.spacing, cold.extinction, cold.color, glow=glow)
+    seen = pictures.render(pictures.TRACED, [cold, hot], camera(Y), 1, night)
+    assert seen[24, 4].min() > 100
+    # By night there is nothing to trace by.
+    assert got == ([] if night else [[cold]])
+
+
+def test_holes_of_a_heated_body_show_what_is_behind() -> None:
+    """Two holes, and a part in one of them that is none."""
+    box = {"center": [-0.5, 0, 0.7], "size": [0.4, 1, 0.6], "rotate": [0, 0, 0]}
+    part = {"center": [-0.5, 0, 0.7], "radius": 0.1}
+    run = fake_run.ink("xz", 20)
+    run.scene["heat"] = [
+        {
+            "name": "dye",
+            "region": [
+                {"shape": {"box": box}, "hole": {"temperature": 300.0}},
+                {"shape": {"sphere": part}, "hole": None},
+                {"shape": {"capsule": {"from": [0.5, 0, 0.5], "to": [0.5, 0, 0.9], "radius": 0.15}}, "hole": {}},
+            ],
+        }
+    ]
+    warm = run.columns
+    run.columns = lambda t: {"dye": {"temperature": warm(t)["dye"]["temperature"]}}
+    plate = next(t for t in Stage(run).things(2) if isinstance(t, Image))
+    x = -1 + (np.arange(40)[:, None] + 0.5) / 20
+    z = 0.2 + (np.arange(20)[None, :] + 0.5) / 20
+    hole = (np.abs(x + 0.5) < 0.2) & (np.abs(z - 0.7) < 0.3) & (np.hypot(x + 0.5, z - 0.7) > 0.1)
+    hole |= np.hypot(x - 0.5, np.maximum(np.abs(z - 0.7) - 0.2, 0)) < 0.15
+    np.testing.assert_array_equal(plate.cover, np.where(hole, 0.0, 1.0))
+
+
+def test_points_in_a_box_that_is_turned() -> None:
+    """A rod along x, turned about x, y and z in turn: along the third column of turns that is computed by hand."""
+    rod = {"center": [0.1, 0.2, 0.3], "size": [2.0, 0.02, 0.02], "rotate": [70.0, 30.0, 40.0]}
+    b, c = np.radians([30.0, 40.0])
+    along = np.array([np.cos(c) * np.cos(b), np.sin(c) * np.cos(b), -np.sin(b)])
+    points = np.array([0.1, 0.2, 0.3]) + along * np.array([-1.01, -0.99, 0.0, 0.99, 1.01])[:, None]
+    np.testing.assert_array_equal(_within({"box": rod}, points), [False, True, True, True, False])
+    np.testing.assert_array_equal(_within({"floor": {"height": 0.0}}, np.outer([-1, 1], Z)), [True, False])
+
+
+def test_fire_in_a_plane_glows() -> None:
+    run = fake_run.ink("xz", 16)
+    cold = run.columns
+
+    def columns(t: float) -> dict[str, dict[str, np.ndarray]]:
+        own = cold(t)["dye"]
+        return {"dye": {"density": own["density"], "temperature": (293 + 1500 * own["density"]).astype(np.float32)}}
+
+    run.columns = columns
+    plate = next(t for t in Stage(run).things(3) if isinstance(t, Image))
+    density = run.frame(3)["dye"]["density"]
+    hot, none = plate.light[density > 0.97], plate.light[density < 1e-3]
+    assert (hot[:, 0] > 0.9).all() and (hot[:, 0] > 1.2 * hot[:, 2]).all()  # 1.02 and 0.69 to 0.79: yellow,
+    assert none.max() < 0.05  # and black.
+
+
+def test_waves_in_a_fluid_are_seen_though_they_start_as_a_bang() -> None:
+    """What 98 % of the cells of a frame keep is in the colours, both ways from rest."""
+    run = fake_run.ink("xz", 20)
+    x = np.arange(40)[:, None] + 0 * np.arange(20)
+    bang = 1.2 + np.where(x == 20, 0.1, 0.0) * (np.arange(20) == 10)
+    wave = 1.2 + 0.015 * np.sin(x)
+    run.columns = lambda t: {"dye": {"density": bang if t == 0 else wave}}
+    grid, stage = grids.box(run.static["dye"]), Stage(run)
+    assert grid is not None
+    found = stage._range(stage.objects[0], grid)
+    assert found is not None
+    name, low, high = found
+    assert name == "density" and low + high == pytest.approx(2.4, abs=1e-3)
+    assert 0.0145 < 0.5 * (high - low) < 0.0151  # A tenth of the bang would be 0.01.
 
 
 # Slices

@@ -34,6 +34,12 @@ QUALITY = 18
 SAMPLES = 8
 """Samples per pixel; in motion, half those of a still do."""
 
+PLAYED = (10.0, 60.0)
+"""Frame rates [1/s] at which a film plays as fast as the run."""
+
+WATCHED = 24.0
+"""The rate of all others: slow motion, or time lapse."""
+
 AHEAD = 2
 """Pictures in the making or waiting, per process."""
 
@@ -47,7 +53,7 @@ def film(
     progress: Callable[[int, int], None] | None = None,
     processes: int | None = None,
 ) -> Path:
-    """Writes the film of a run at the scene's frame rate; with `every` = n of each n-th frame, as fast as the run.
+    """Writes the film of a run at `rate(run)`; with `every` = n of each n-th frame, as fast.
 
     Odd sizes grow by a pixel, because of yuv420p. `progress(done, total)` is called after each picture. The file
     appears when it is complete. Raises ExportError.
@@ -59,14 +65,14 @@ def film(
     if (width, height) != studio.camera.size:
         studio = Studio(run, studio.renderer, (width, height))
     frames = range(0, run.n_frames, every)
-    rate = float(run.scene.get("time", {}).get("fps", 24.0)) / every
+    pace = rate(run) / every
     goal = Path(path)
     unfinished = goal.with_name(f".{goal.name}.part")
     try:
         with writing(goal):
             goal.parent.mkdir(parents=True, exist_ok=True)
         drawn = contextlib.closing(_pictures(studio, frames, processes or _cores()))
-        with _encoder(unfinished, goal, (width, height), rate) as sink, drawn as pictures:
+        with _encoder(unfinished, goal, (width, height), pace) as sink, drawn as pictures:
             for done, image in enumerate(pictures, start=1):
                 sink.write(np.ascontiguousarray(image).data)
                 if progress is not None:
@@ -77,6 +83,12 @@ def film(
         with contextlib.suppress(OSError):
             unfinished.unlink(missing_ok=True)
     return goal
+
+
+def rate(run: Recording) -> float:
+    """Frames a second of the film of a run: as many as the scene has, if that can be watched."""
+    fps = float(run.scene.get("time", {}).get("fps", WATCHED))
+    return fps if PLAYED[0] <= fps <= PLAYED[1] else WATCHED
 
 
 def _cores() -> int:

@@ -33,11 +33,25 @@ def summary(run: "Run") -> str:
             "the first: raise solver.newton_iterations, or take a smaller step"
         )
     lines += _too_fast(run.scene, float(ledger["courant"].max()))
-    lines += [f"  {run.folder / name}" for name in _RESULTS if (run.folder / name).exists()]
+    lines += [
+        f"  {run.folder / name}{_pace(run) if name == 'film.mp4' else ''}"
+        for name in _RESULTS
+        if (run.folder / name).exists()
+    ]
     if asked := expect.count(run.scene):
         kept = asked - len(run.manifest["expectations"])
         lines.append(f"  expectations: {kept} of {asked} kept")
     return "\n".join(lines)
+
+
+def _pace(run: "Run") -> str:
+    """How much faster than the run its film plays."""
+    from tumble.film import rate
+
+    faster = rate(run) / float(run.scene["time"]["fps"])
+    if faster == 1.0:
+        return ""
+    return f" (time lapse, {faster:.3g} times)" if faster > 1.0 else f" (slow motion, {1 / faster:.3g} times)"
 
 
 def _too_fast(scene: Mapping[str, Any], reached: float) -> list[str]:

@@ -92,7 +92,7 @@ class Studio:
         self.samples = samples
         points = functools.cache(lambda: framing.outline(run))
         self.camera = framing.camera(run, size, points)
-        self.stage = Stage(run)
+        self.stage = Stage(run, self.camera.axes[2])
         self._backdrop = self._grounds_below(points)
 
     def picture(self, i: int) -> Picture:
@@ -150,11 +150,13 @@ class Studio:
 def render(renderer: str, things: list[Thing], camera: Camera, samples: int = SAMPLES, night: bool = False) -> Picture:
     """Draws things with one of the renderers, and clouds, images and smoke over them. Raises ExportError if it fails."""
     clouds = [t for t in things if isinstance(t, Cloud)]
-    smoke = [t for t in things if isinstance(t, Smoke)] if renderer != TRACED else []
+    # Traced light comes from outside: what glows is painted, as is all by night.
+    traced = [t for t in things if isinstance(t, Smoke) and renderer == TRACED and not night and t.glow is None]
+    smoke = [t for t in things if isinstance(t, Smoke) and not any(t is other for other in traced)]
     images = [t for t in things if isinstance(t, Image)]
     if not (clouds or smoke or images or night):
         return _drawn(renderer, things, camera, samples)
-    scenery: list[Thing] = [t for t in things if isinstance(t, Body | Ground) or (isinstance(t, Smoke) and not smoke)]
+    scenery: list[Thing] = [*(t for t in things if isinstance(t, Body | Ground)), *traced]
     # By night nothing at all is dark, and drawn at once.
     light, depth = (None, np.full(camera.size[::-1], np.inf))
     if scenery or not night:

@@ -6,6 +6,8 @@
 x, y, z are the sums of Gaussian lobes of [wyman2013].
 """
 
+from typing import Any
+
 import numpy as np
 import numpy.typing as npt
 
@@ -34,6 +36,9 @@ TO_SRGB = np.array(
 
 TABLE = np.arange(300.0, 6001.0, 10.0)
 """Temperatures between which colours are interpolated [K]."""
+
+CROSSTALK = 0.02
+"""Share of the other colours' light that each layer of film sees: what is very bright turns white."""
 
 
 def planck(wavelength: npt.ArrayLike, temperature: npt.ArrayLike) -> Floats:
@@ -81,3 +86,9 @@ def glow(temperature: npt.NDArray[np.float32], white: float) -> npt.NDArray[np.f
     table = np.log(np.maximum(table / colors(white).max(), 1e-30))
     t = np.clip(np.nan_to_num(temperature, nan=0.0), TABLE[0], TABLE[-1])
     return np.stack([np.exp(np.interp(t, TABLE, table[:, c])) for c in range(3)], axis=-1).astype(np.float32)
+
+
+def developed(light: npt.NDArray[Any]) -> npt.NDArray[Any]:
+    """Light as on film: each of three layers saturates by itself."""
+    sum_ = light.sum(axis=-1, keepdims=True)
+    return np.asarray(1 - np.exp(-((1 - 3 * CROSSTALK) * light + CROSSTALK * sum_)))

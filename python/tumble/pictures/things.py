@@ -19,7 +19,7 @@ import numpy.typing as npt
 from tumble import grids
 from tumble._engine import ExportError
 from tumble.grids import Box
-from tumble.pictures.blackbody import glow
+from tumble.pictures.blackbody import developed, glow
 from tumble.pictures.surfaces import Floats, Indices, balls, normals, outward, split, tubes
 from tumble.style import COLORS, GROUND, PALETTE, SOLID, Rgb, linear, rgb
 
@@ -202,6 +202,9 @@ LOOKED_AT = 9
 SMOKE: Rgb = (0.52, 0.53, 0.56)
 """Colour of smoke that has none of its own."""
 
+LIQUID = 100.0
+"""What floats in a fluid as dense as this [kg/m³] is dye, and has a colour of its own."""
+
 GLOWING = 1000.0
 """A gas that gets hotter than this [K] in a run is seen to glow."""
 
@@ -213,6 +216,21 @@ BURNING = 0.3
 
 THICK = 40.0
 """Optical depth of the thickest smoke of a run across its whole box, the mean of its sides."""
+
+DEEP = 6.0
+"""Optical depth, along the view, of the smoke of a run where most of it is in a row, at most."""
+
+BROAD = 0.9
+"""Share of the rows with smoke in them that are no deeper than that."""
+
+USUAL = 0.98
+"""Share of the cells of a frame that are no farther from rest than the ends of the map of colours,"""
+
+PEAK = 0.1
+"""which are no nearer than this share of the farthest."""
+
+SOOT: Rgb = (0.02, 0.02, 0.025)
+"""Colour of soot in a plane, where it does not glow."""
 
 DYE = 3.0
 """Optical depth of the thickest dye in a plane."""
@@ -248,7 +266,7 @@ def objects(run: Recording) -> list[Object]:
             color = (r, g, b)
         elif solid:
             color = SOLID if plane is None else GROUND
-        elif grid is not None and grid.flat == 3:
+        elif grid is not None and grid.flat == 3 and float(entry.get("fluid_density", 0.0)) < LIQUID:
             color = SMOKE
         else:
             color = rgb(PALETTE[colors % len(PALETTE)])
@@ -326,8 +344,10 @@ def colors(columns: Columns, thing: Object) -> Floats:
 class Stage:
     """All that can be seen of a run."""
 
-    def __init__(self, run: Recording) -> None:
+    def __init__(self, run: Recording, view: Floats | None = None) -> None:
+        """`view` is the direction in which the camera looks, +y if not given."""
         self.run = run
+        self._view = 1 if view is None else int(np.argmax(np.abs(view)))
         self.flat: str | None = str(run.scene.get("plane", "xz")) if run.scene.get("dimension", 3) == 2 else None
         self.objects = objects(run)
         self._start: Columns = run.frame(0) if run.n_frames else {}
@@ -340,6 +360,8 @@ class Stage:
         self._ways: dict[tuple[str, int], Floats] = {}
         self._pieces: dict[tuple[str, int], tuple[Floats, Floats]] = {}
         self._ranges: dict[str, tuple[str, float, float] | None] = {}
+        self._most: dict[str, float] = {}
+        self._holes: dict[str, npt.NDArray[np.bool_]] = {}
         self._hottest: dict[str, float] = {}
 
     def things(self, i: int, thinnest: float = 0.0) -> list[Thing]:
@@ -384,13 +406,18 @@ class Stage:
             values = _one_number(grid, columns.get(thing.name, {}), name)
             # As a share of what there is in the whole run.
             share = np.nan_to_num((values - low) / (high - low), nan=1.0, posinf=1.0, neginf=0.0)
+            glow = self._glow(thing, grid, columns)
             if grid.flat == 3:
-                glow = self._glow(thing, grid, columns)
-                most = THICK * (1.0 if glow is None else BURNING) / float(grid.size.mean())
+                if thing.name not in self._most:
+                    self._most[thing.name] = self._thickest(thing, grid, name, low, high)
+                most = self._most[thing.name] * (1.0 if glow is None else BURNING)
                 thick = (np.clip(share, 0.0, None) * most).astype(np.float32)
                 drawn.append(Smoke(thing.name, grid.origin, grid.spacing, thick, thing.color, glow=glow))
             else:
-                drawn.append(_image(thing, grid, name, share, name in ("density", "fuel") and low == 0.0))
+                if thing.name not in self._holes:
+                    self._holes[thing.name] = _holes(self.run.scene, thing.name, grid)
+                dye = name in ("density", "fuel") and low == 0.0
+                drawn.append(_image(thing, grid, name, share, dye, self._holes[thing.name], glow))
         if grid.flat < 3:
             corners = grid.corners[[[0, 1, 3, 2], [0, 1, 5, 4], [0, 2, 6, 4]][grid.flat]]
             line = np.stack([corners, np.roll(corners, -1, axis=0)], axis=1).reshape(-1, 3)
@@ -410,6 +437,19 @@ class Stage:
         values = _one_number(grid, columns[thing.name], "temperature").astype(np.float32)
         return EXPOSURE * glow(values, self._hottest[thing.name])
 
+    def _thickest(self, thing: Object, grid: Box, name: str, low: float, high: float) -> float:
+        """Extinction where there is most of it [1/m]: thick, but what it hides along the view shines through."""
+        looks = np.unique(np.linspace(0, self.run.n_frames - 1, LOOKED_AT).astype(int)).tolist()
+        reach = 0.0
+        for i in looks:
+            values = _one_number(grid, self.run.frame(i).get(thing.name, {}), name)
+            share = np.nan_to_num((values - low) / (high - low), nan=0.0, posinf=1.0, neginf=0.0)
+            rows = grid.spacing * np.clip(share, 0.0, None).sum(axis=self._view)
+            if (some := rows > 0.02 * rows.max(initial=0.0)).any():
+                reach = max(reach, float(np.quantile(rows[some], BROAD)))
+        thick = THICK / float(grid.size.mean())
+        return min(thick, DEEP / reach) if reach > 0.0 else thick
+
     def _range(self, thing: Object, grid: Box) -> tuple[str, float, float] | None:
         """What is shown of an object on a grid, from where to where; nothing if there is nothing to see."""
         looks = np.unique(np.linspace(0, self.run.n_frames - 1, LOOKED_AT).astype(int)).tolist()
@@ -427,12 +467,16 @@ class Stage:
             if name in ("density", "fuel") and low < DENSE * high:
                 return name, 0.0, high
             if name in SIGNED:
-                # A few cells beside walls are far off the rest.
-                most = max((float(np.quantile(np.abs(v), 0.998)) for v in finite if v.size), default=0.0) or high
+                most = _far(finite, 0.0)
                 return name, 0.0 if grid.flat == 3 else -most, most
             if name == "temperature" and grid.flat == 3:
                 low = float(np.median(np.concatenate([v.ravel() for v in finite])))
                 return (name, low, high) if high > low else None
+            if name == "density":
+                # Waves in the fluid itself: both ways from rest.
+                rest = float(np.median(np.concatenate([v.ravel() for v in finite])))
+                most = _far(finite, rest)
+                return name, rest - most, rest + most
             return name, low, high
         return None
 
@@ -560,8 +604,22 @@ def _one_number(grid: Box, table: Mapping[str, Array], name: str) -> Floats:
     return np.asarray(np.abs(values) if grid.flat == 3 and name in SIGNED else values)
 
 
-def _image(thing: Object, grid: Box, name: str, share: Floats, dye: bool) -> Image:
-    """What lies in a plane: dye in the object's colour, all else in a map of colours."""
+def _far(values: list[Floats], rest: float) -> float:
+    """How far most values are from rest. A few cells beside walls, or at the start, are far off all others."""
+    off = [np.abs(v - rest) for v in values if v.size]
+    return max(max(float(np.quantile(d, USUAL)), PEAK * float(d.max())) for d in off)
+
+
+def _image(
+    thing: Object,
+    grid: Box,
+    name: str,
+    share: Floats,
+    dye: bool,
+    holes: npt.NDArray[np.bool_],
+    glow: npt.NDArray[np.float32] | None = None,
+) -> Image:
+    """What lies in a plane: dye in the object's colour, a gas that glows in its own light, all else in a map of colours."""
     import matplotlib
 
     a, b = grid.axes
@@ -569,11 +627,52 @@ def _image(thing: Object, grid: Box, name: str, share: Floats, dye: bool) -> Ima
     corner, sides = grid.corners[0], np.diag(grid.size)
     if dye:
         cover = 1 - np.exp(-DYE * np.clip(share, 0.0, None))
-        light = np.broadcast_to(np.array(thing.color), (*share.shape, 3))
+        light = np.broadcast_to(np.array(thing.color if glow is None else SOOT), (*share.shape, 3))
+        if glow is not None:
+            light = light + developed(np.squeeze(glow, axis=grid.flat))
     else:
         cover = np.ones(share.shape)
         light = linear(matplotlib.colormaps[COLORS.get(name, "viridis")](share)[..., :3])
+    cover = np.where(np.squeeze(holes, axis=grid.flat), 0.0, cover)
     return Image(thing.name, corner, sides[a], sides[b], np.asarray(light, dtype=float), cover)
+
+
+def _holes(scene: Mapping[str, Any], name: str, grid: Box) -> npt.NDArray[np.bool_]:
+    """The cells that are no part of a heated body."""
+    holes = np.zeros(grid.cells, dtype=bool)
+    body: Mapping[str, Any] = next((b for b in scene.get("heat") or () if b.get("name") == name), {})
+    regions = body.get("region") or ()
+    if regions:
+        x = np.stack(np.meshgrid(*(grid.points(a) for a in range(3)), indexing="ij"), axis=-1)
+        if grid.flat < 3:
+            x[..., grid.flat] = grid.origin[grid.flat] + 0.5 * grid.spacing
+        for region in regions:  # Of several at one place the last counts.
+            holes[_within(region["shape"], x)] = region.get("hole") is not None
+    return holes
+
+
+def _within(shape: Mapping[str, Any], x: Floats) -> npt.NDArray[np.bool_]:
+    """Which points lie in a shape that is no mesh."""
+    ((kind, words),) = shape.items()
+    if kind == "sphere":
+        return np.asarray(np.linalg.norm(x - np.array(words.get("center", (0, 0, 0))), axis=-1) <= words["radius"])
+    if kind == "box":
+        d = x - np.array(words.get("center", (0, 0, 0)))
+        for axis, angle in reversed(list(enumerate(np.radians(words.get("rotate", (0, 0, 0)))))):
+            a, b = (axis + 1) % 3, (axis + 2) % 3
+            # Back from turned to not turned.
+            u, v = d[..., a].copy(), d[..., b].copy()
+            d[..., a], d[..., b] = np.cos(angle) * u + np.sin(angle) * v, np.cos(angle) * v - np.sin(angle) * u
+        return np.asarray((np.abs(d) <= 0.5 * np.array(words["size"])).all(axis=-1))
+    if kind == "capsule":
+        start, end = np.array(words["from"], dtype=float), np.array(words["to"], dtype=float)
+        along = end - start
+        t = np.clip((x - start) @ along / max(float(along @ along), 1e-300), 0.0, 1.0)
+        return np.asarray(np.linalg.norm(x - start - t[..., None] * along, axis=-1) <= words["radius"])
+    plane = _plane(shape)
+    if plane is None:
+        return np.zeros(x.shape[:-1], dtype=bool)
+    return np.asarray((x - plane[0]) @ plane[1] <= 0.0)
 
 
 def _piece(thing: Object, before: Columns, after: Columns) -> tuple[Floats, Floats]:

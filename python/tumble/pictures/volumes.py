@@ -15,6 +15,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from tumble.pictures.blackbody import developed
 from tumble.pictures.framing import Camera
 from tumble.pictures.look import key_light
 from tumble.pictures.splats import DIM, NEAR, Shade, sights
@@ -38,8 +39,8 @@ THIN = 0.15
 LEFT = 0.004
 """Rays that have less of their light left end."""
 
-CROSSTALK = 0.02
-"""Share of the other colours' light that each layer of film sees: what is very bright turns white."""
+DARK = 0.02
+"""Light that changes by powers between cells does so evenly where there is less: else edges of flames look like cells."""
 
 COARSE = 48
 """Blocks of cells along each axis in the shadow on other things."""
@@ -135,7 +136,7 @@ def _smoke(light: Floats, depth: Floats, cloud: Smoke, camera: Camera, bright: f
         glow = np.pad(glow, ((0, 0), (1, 1), (1, 1), (0, 0)))
     powers = None
     if cloud.glow is not None:
-        powers = np.log(np.maximum(np.moveaxis(cloud.glow[part], (axis, u, v), (0, 1, 2)), 1e-12)).astype(np.float32)
+        powers = _soft(np.log(np.moveaxis(cloud.glow[part], (axis, u, v), (0, 1, 2)) + np.float32(DARK)))
         powers = np.pad(powers, ((0, 0), (1, 1), (1, 1), (0, 0)), mode="edge")
     n, rows, columns = both.shape
     parts = 2 if powers is not None or float(extinction.max()) * cloud.spacing > THIN else 1
@@ -198,7 +199,7 @@ def _smoke(light: Floats, depth: Floats, cloud: Smoke, camera: Camera, bright: f
             cells = _between(powers, k).reshape(-1, 3)
             shine = ((1 - a) * (1 - b))[:, None] * cells[corner] + ((1 - a) * b)[:, None] * cells[corner + 1]
             shine += (a * (1 - b))[:, None] * cells[corner + columns] + (a * b)[:, None] * cells[corner + columns + 1]
-            shining[some] += (left[some] * (1 - through))[:, None] * np.exp(shine)
+            shining[some] += (left[some] * (1 - through))[:, None] * np.maximum(np.exp(shine) - np.float32(DARK), 0)
         left[some] *= through
     if cloud.glow is not None:
         shining = developed(shining)
@@ -207,10 +208,15 @@ def _smoke(light: Floats, depth: Floats, cloud: Smoke, camera: Camera, bright: f
     return out.reshape(light.shape)
 
 
-def developed(light: Array) -> Array:
-    """Light as on film: each of three layers saturates by itself."""
-    sum_ = light.sum(axis=-1, keepdims=True)
-    return np.asarray(1 - np.exp(-((1 - 3 * CROSSTALK) * light + CROSSTALK * sum_)))
+def _soft(values: Array) -> Array:
+    """Each cell with its neighbours, 1/4, 1/2, 1/4 along each axis, but at the ends: flames are as thin as cells, and would
+    look like them."""
+    for axis in range(3):
+        v = np.moveaxis(values, axis, 0)
+        blend = v.astype(np.float32)
+        blend[1:-1] = np.float32(0.25) * (v[:-2] + v[2:]) + np.float32(0.5) * v[1:-1]
+        values = np.moveaxis(blend, 0, axis)
+    return values
 
 
 def _between(slices: npt.NDArray[Any], k: float) -> npt.NDArray[Any]:
