@@ -6,13 +6,12 @@ import sys
 import time
 from collections.abc import Mapping
 from contextlib import suppress
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from tumble import _engine, expect
-from tumble._engine import ExportError, SceneError, StepError, World
+from tumble._engine import ExportError, StepError, World
 from tumble.folder import (
     FORMAT,
     LEDGER,
@@ -245,10 +244,3 @@ def _difference(path: str, old: Any, new: Any) -> str | None:
 def _short(value: Any) -> str:
     text = repr(value)
     return text if len(text) <= 40 else text[:37] + "..."
-
-
-def refuse(path: Path, text: str) -> SceneError:
-    """The error for a folder that does not fit."""
-    error = SceneError(f"{path}: {text}")
-    error.issues = [{"path": str(path), "line": None, "message": text}]
-    return error

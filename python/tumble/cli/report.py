@@ -32,12 +32,22 @@ def summary(run: "Run") -> str:
             f"  {counted(unconverged, 'step')} stopped before Newton's method converged, at a residual of up to {worst:.1e} of "
             "the first: raise solver.newton_iterations, or take a smaller step"
         )
+    lines += _particles(run)
     lines += _too_fast(run.scene, float(ledger["courant"].max()))
     lines += [f"  {run.folder / name}" for name in _RESULTS if (run.folder / name).exists()]
     if asked := expect.count(run.scene):
         kept = asked - len(run.manifest["expectations"])
         lines.append(f"  expectations: {kept} of {asked} kept")
     return "\n".join(lines)
+
+
+def _particles(run: "Run") -> list[str]:
+    """How many particles there were, of each emitter."""
+    from tumble.emitters import born
+
+    counts = born(run)
+    each = [f'"{name}" {born} born, {alive} alive' for name, (born, alive) in counts.items()]
+    return [f"  particles: {'; '.join(each)} at the end"] if each else []
 
 
 def _too_fast(scene: Mapping[str, Any], reached: float) -> list[str]:
