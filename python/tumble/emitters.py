@@ -50,7 +50,7 @@ class Forecast:
         there = np.flatnonzero(self.alive >= 0.5)
         return float(self.t[there[0]]) if len(there) else None
 
-    def at(self, times: npt.ArrayLike) -> Floats:
+    def at(self, times: Floats) -> Floats:
         """Particles there at some times [s]."""
         return np.interp(times, self.t, self.alive)
 
@@ -146,6 +146,16 @@ def _children(words: Tree, parent: Forecast | None, t: Floats) -> tuple[Floats, 
         born = born + count * _survived(parent.words, t, parent.born)
     killed = bool(parent.words["kill"]) or parent.words["when_full"] == "replace_oldest"
     return born, parent.known and not killed
+
+
+def largest(tree: Tree) -> list[str]:
+    """The emitter that asks for most particles, in words, if they matter for memory."""
+    most = max(forecast(tree), key=lambda f: f.largest, default=None)
+    if most is None or most.largest < 1_000_000:
+        return []
+    return [
+        f'emitter "{most.name}" alone asks for {most.largest:.3g} particles at once: lower its rate or set its most'
+    ]
 
 
 def born(run: "Run") -> dict[str, tuple[int, int]]:

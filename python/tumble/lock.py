@@ -39,10 +39,13 @@ def alone(folder: Path) -> Iterator[None]:
 
 def ask(folder: Path) -> None:
     """Raises SceneError if somebody writes there."""
-    if os.path.exists(folder / LOCK):
-        handle = _locked(folder, 0)
-        if handle is not None:
-            os.close(handle)
+    try:
+        there = (folder / LOCK).exists()
+    except OSError:
+        return
+    handle = _locked(folder, 0) if there else None
+    if handle is not None:
+        os.close(handle)
 
 
 def _make(folder: Path) -> list[Path]:

@@ -70,7 +70,7 @@ def run(
     if renderer != "auto" and (asked["film"] or frames_to_draw):
         resolve(renderer)  # Says now, rather than after the simulation, if it does not work here.
     try:
-        with find.naming(find.scene_file(scene), folder), Progress("simulate") as progress:
+        with find.naming(find.scene_file(scene), folder, checked), Progress("simulate") as progress:
             done = simulate(checked, folder, resume=resume, threads=threads, progress=progress, overwrite=force)
     except StepError as error:
         again = [*(["--out", str(out)] if out else []), *_flags(flags, renderer)]
