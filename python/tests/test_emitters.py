@@ -159,7 +159,10 @@ def test_check_steps_until_it_breaks(tumble: Command, scene_file: SceneFile) -> 
 
 
 def test_check_tells_tracers_from_particles(tumble: Command, scene_file: SceneFile) -> None:
-    words = {"field": [{"kind": "uniform", "velocity": [1, 0, 0]}], "system": [{"method": "tracers", "integrator": "rk4"}]}
+    words = {
+        "field": [{"kind": "uniform", "velocity": [1, 0, 0]}],
+        "system": [{"method": "tracers", "integrator": "rk4"}],
+    }
     drops = {"name": "q", "position": [[0, 0, 0]]}
     answer = tumble("check", scene_file(emitting({**POINT, "rate": 10}, particles=[drops], **words)))
     assert answer.code == 0

@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from tumble import _engine, expect
+from tumble import _engine, energy, expect
 from tumble._engine import ExportError, StepError, World
 from tumble.folder import (
     FORMAT,
@@ -153,9 +153,28 @@ class Recorder:
     def fail(self, error: StepError) -> None:
         """Notes why the physics broke, then tries what would have helped."""
         self.stop("failed", str(error), getattr(error, "report", {}))
+        failure = self.manifest["failure"]
         with suppress(KeyboardInterrupt):  # The failure is worth more than its cures.
-            self.manifest["failure"]["cures"] = self.world.cures()
+            failure["cures"] = self.world.cures()
+            self._soften(failure)
         self.stop("failed")
+
+    def _soften(self, failure: dict[str, Any]) -> None:
+        """Tries to soften what came too near for the steps, and puts that before the other cures."""
+        from tumble.run import Run
+
+        report = failure["report"]
+        names = [system["name"] for system in self.scene["system"]]
+        step = float(report.get("step") or 0.0)
+        if step <= 0.0 or not energy.unsoftened(self.scene):
+            return
+        met = energy.encounters(Run(self.files.path), range(self.written - 1, self.written + 1), step)
+        failure["near"] = [energy.told(one) for one in met]
+        if met:
+            system = names.index(report["system"]) if report["system"] in names else 0
+            sets = energy.changes(self.scene, met, system)
+            cure = energy.attempt(self.world.scene, sets, self.written + 3)
+            failure["cures"] = [cure, *failure["cures"]]
 
     def stop(self, status: str, message: str | None = None, report: Mapping[str, Any] | None = None) -> None:
         """Notes, as far as the disk allows, that the run ended early and why."""

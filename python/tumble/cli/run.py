@@ -92,6 +92,8 @@ def run(
         )
         raise typer.Exit(stopped(stop)) from None
     say(report.summary(done))
+    if text := report.gained(done, scene, overrides, [*(["--out", str(out)] if out else []), *_flags(flags, renderer)]):
+        warn(text)
     for failure in failures:
         complain(str(failure))
     broken = done.manifest["expectations"]
