@@ -191,3 +191,11 @@ def test_a_run_ends_with_how_many_there_were(tumble: Command, scene_file: SceneF
     assert answer.code == 0
     # One a frame for two seconds, each there for six frames.
     assert 'particles: "p" 48 born, 6 alive; "q" 7 born, 7 alive at the end' in answer.out
+
+
+def test_the_lab_refuses_emitters_and_says_what_to_do(tumble: Command, scene_file: SceneFile) -> None:
+    still = {"name": "q", "position": [[0, 0, 0]], "velocity": [[1, 0, 0]]}
+    answer = tumble("lab", "integrators", scene_file(emitting({**POINT, "rate": 10}, particles=[still])))
+    assert answer.code == 2
+    assert 'emitter "p": the lab compares' in answer.err and "[[particles]]" in answer.err
+    assert not list(Path("out").glob("lab/*"))
