@@ -137,8 +137,7 @@ class World:
     def add_force(
         self, force: Callable[[float, Array, Array, Array], npt.ArrayLike], system: str | None = None
     ) -> None:
-        """Adds a force: force(t, x, v, mass) -> n x 3 [N], from x [m] and v [m/s], n x 3, and mass [kg], n. With
-        emitters n changes from call to call, and may be 0."""
+        """Adds a force: force(t, x, v, mass) -> n x 3 [N], from x [m] and v [m/s], n x 3, and mass [kg], n."""
 
     def set_integrator(
         self,
