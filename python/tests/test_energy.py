@@ -66,6 +66,9 @@ def test_what_gives_energy_and_what_takes_it() -> None:
     assert energy.sources(force(kind="attraction", gm="1 + t"))
     assert energy.sources(force(kind="attraction", gm=1, center=["t", 0, 0]))
     assert energy.sources(force(kind="turbulence", strength=1))
+    # Their potential is not in the books.
+    assert energy.sources(force(kind="attraction", gm=1, radius=1))
+    assert energy.sources(force(kind="repulsion", stiffness=1, distance=1, on=["p"], **{"from": ["p"]}))
     assert energy.sources(solid(belt=[1, 0, 0])) and energy.sources(solid(motion={"velocity": [1, 0, 0]}))
     assert not energy.sources(solid()) and energy.sinks(solid())
     assert energy.sinks(force(kind="drag", rate=1)) and not energy.sources(force(kind="drag", rate=1))
@@ -112,14 +115,15 @@ def copied(text: str) -> list[str]:
     return shlex.split(line)[1:]
 
 
-@pytest.mark.parametrize(("scene", "times"), [(STARS, 235.0), (NEAR, 100.0)])
+@pytest.mark.parametrize("scene", [STARS, NEAR])
 def test_a_run_tells_of_energy_from_nowhere_and_how_to_keep_it(
-    tumble: Command, scene_file: SceneFile, scene: Tree, times: float
+    tumble: Command, scene_file: SceneFile, scene: Tree
 ) -> None:
     answer = tumble("run", scene_file(scene))
     assert answer.code == 0
     found = energy.growth(Run("out/scene").ledger)
-    assert found.times == pytest.approx(times, rel=0.01)
+    # Measured: 235 and 100; what two masses do that met within a step is chance.
+    assert 10.0 < found.times < 1000.0
     assert f"warning: the energy grew by {found.times:.3g} times its scale" in answer.err
     assert "has no softening, and masses came within" in answer.err
     cure = copied(answer.err)
@@ -196,3 +200,53 @@ def test_advice_fits_the_scene(spring: Tree) -> None:
     assert "springs far too stiff" in report._advice(Scene(spring).to_dict())
     assert "spring" not in report._advice(resolved())
     assert "softening" in report._advice(resolved(force=[{"kind": "gravitation"}]))
+
+
+POTENTIALS: list[Tree] = [
+    {"kind": "cohesion", "strength": 1, "radius": 0.4},
+    {"kind": "repulsion", "stiffness": 50, "distance": 0.3},
+    {"kind": "lennard_jones", "epsilon": 0.01, "sigma": 0.1},
+    {"kind": "attraction", "gm": 1, "softening": 0.1},
+    {"kind": "attraction", "gm": 1, "power": -1},
+    {"kind": "electrostatics", "constant": 10, "softening": 0.05},
+    {"kind": "gravitation", "constant": 0.01, "softening": 0.05},
+    {"kind": "magnetic", "field": [0, 0, 5]},
+]
+
+
+@pytest.mark.parametrize("force", POTENTIALS, ids=lambda force: str(force["kind"]))
+def test_what_is_said_to_give_no_energy_gives_none(force: Tree) -> None:
+    from tumble import Scene, World
+
+    rng = np.random.default_rng(0)
+    crowd = {
+        "name": "p",
+        "position": rng.uniform(0, 1, (60, 3)).tolist(),
+        "velocity": (0.05 * rng.normal(size=(60, 3))).tolist(),
+        "mass": [1.0],
+        "charge": rng.choice([-0.1, 0.1], 60).tolist(),
+    }
+    scene = Scene(
+        {
+            "version": 1,
+            "precision": "double",
+            "time": {"frames": 12},
+            "world": FLOATING,
+            "system": [{"integrator": "velocity_verlet", "substeps": 200}],
+            "particles": [crowd],
+            "force": [force],
+        }
+    )
+    assert energy.sources(scene.to_dict()) == []
+    world = World(scene)
+    ledgers = [world.ledger]
+    for _ in range(12):
+        world.step()
+        ledgers.append(world.ledger)
+    table = {
+        key: np.array([ledger[key] for ledger in ledgers])
+        for key in ("mass", "kinetic", "elastic", "external", "energy")
+    }
+    # Measured: 2e-5 of the scale at most, in steps of 1/4800 s.
+    assert np.abs(np.diff(table["energy"], prepend=table["energy"][0])).max() < 1e-3 * table["kinetic"].max()
+    assert energy.growth(table).times < 1e-3

@@ -28,7 +28,7 @@ _TAKE = {"drag", "wind", "viscosity", "flock", "propulsion"}
 
 def sources(scene: Tree) -> list[str]:
     """What may give energy to masses, beside springs, gravity and each other, which are in the books."""
-    found = [f"force.{i} ({f['kind']})" for i, f in enumerate(scene["force"]) if f["kind"] in _GIVE or _changes(f)]
+    found = [f"force.{i} ({f['kind']})" for i, f in enumerate(scene["force"]) if f["kind"] in _GIVE or _open(f)]
     found += [f'collider "{c["name"]}"' for c in scene["collider"] if _moves(c)]
     found += [f'emitter "{e["name"]}"' for e in scene["emitter"]]
     found += [f'gas "{g["name"]}"' for g in scene["gas"] if g.get("bodies") or g.get("sheet")]
@@ -39,11 +39,11 @@ def sources(scene: Tree) -> list[str]:
 
 def sinks(scene: Tree) -> list[str]:
     """What takes energy from masses."""
-    found = [f"force.{i} ({f['kind']})" for i, f in enumerate(scene["force"]) if f["kind"] in _TAKE or _changes(f)]
+    found = [f"force.{i} ({f['kind']})" for i, f in enumerate(scene["force"]) if f["kind"] in _TAKE or _open(f)]
     found += [f'collider "{c["name"]}"' for c in scene["collider"]]
     found += [f'emitter "{e["name"]}"' for e in scene["emitter"] if e["lifetime"] is not None or e["kill"]]
     found += [f"{kind} {thing['name']}" for kind, thing in _things(scene) if _damped(thing)]
-    return found + [f'anchor "{a["name"]}"' for a in scene["anchor"] if a["damping"]]
+    return found + [f'anchor "{a["name"]}"' for a in scene["anchor"] if a["damping"] or len(scene["system"]) > 1]
 
 
 def has_springs(scene: Tree) -> bool:
@@ -73,6 +73,11 @@ def _damped(value: Any) -> bool:
         words = ("damping", "break_strain", "rod", "material")
         return any(key in words and bool(v) for key, v in value.items()) or any(map(_damped, value.values()))
     return isinstance(value, list) and any(map(_damped, value))
+
+
+def _open(force: Tree) -> bool:
+    """Whether a force has no potential in the books: it changes in time, fades out, or is not felt in return."""
+    return _changes(force) or bool(force.get("from")) or (force["kind"] == "attraction" and force["radius"] is not None)
 
 
 def _changes(value: Any) -> bool:
