@@ -169,6 +169,15 @@ DUST: Tree = {
 }
 
 
+@pytest.mark.parametrize("scene", [DUST, NEAR])
+def test_softening_cures_steps_that_become_too_small(tumble: Command, scene_file: SceneFile, scene: Tree) -> None:
+    answer = tumble("run", scene_file({**scene, "system": [{"integrator": "dormand_prince"}]}))
+    assert (answer.code, "became too small" in answer.err) == (1, True)
+    assert ".softening=" in next(line for line in answer.err.splitlines() if "recommended" in line)
+    again = tumble(*copied(answer.err))
+    assert (again.code, "warning" in again.err) == (0, False)
+
+
 def test_softening_is_recommended_where_masses_come_too_near(tumble: Command, scene_file: SceneFile) -> None:
     answer = tumble("run", scene_file(DUST))
     assert answer.code == 1

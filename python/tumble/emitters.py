@@ -1,5 +1,6 @@
 """How many particles emitters will hold: from the words of a scene, before it is simulated; and how many a run had."""
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
@@ -37,7 +38,8 @@ class Forecast:
 
     @property
     def total(self) -> int:
-        return round(float(self.born[-1]))
+        # A particle is born when the sum passes a whole number.
+        return math.floor(float(self.born[-1]) + 0.01)
 
     @property
     def largest(self) -> int:

@@ -143,6 +143,9 @@ def from_nowhere(run: "Run") -> Growth | None:
 
 # Masses that come near each other or a centre of attraction
 
+ADAPTIVE = ("adaptive_euler", "dormand_prince")
+"""Integrators that choose their steps."""
+
 ANGLE = 0.5
 """Of an orbit at the softening length, what a step may take [rad]."""
 
@@ -226,10 +229,10 @@ def _encounter(run: "Run", i: int, columns: Mapping[str, Mapping[str, Any]], ste
 def changes(scene: Tree, met: Sequence[Encounter], system: int) -> list[str]:
     """Overrides that soften what came too near, and shorten the steps of a system where that alone is not enough."""
     sets = [f"force.{one.force}.softening={one.softening:g}" for one in met]
+    plan: Tree = scene["system"][system] if system < len(scene["system"]) else {}
     steps = [one.step for one in met if one.step is not None]
-    if steps:
+    if steps and plan.get("integrator") not in ADAPTIVE:
         interval = 1.0 / scene["time"]["fps"] / scene["time"]["exchanges"]
-        plan: Tree = scene["system"][system] if system < len(scene["system"]) else {}
         n = math.ceil(interval / min(steps))
         sets.append(f"system.{system}.step={min(steps):.2g}" if plan.get("step") else f"system.{system}.substeps={n}")
     return sets

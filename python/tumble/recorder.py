@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from tumble import _engine, energy, expect
-from tumble._engine import ExportError, StepError, World
+from tumble._engine import ExportError, StepError, TumbleError, World
 from tumble.folder import (
     FORMAT,
     LEDGER,
@@ -30,9 +30,6 @@ MANIFEST_INTERVAL = 5.0
 more than a hundredth of it."""
 
 KEPT_CHECKPOINTS = 2
-
-ADAPTIVE = ("adaptive_euler", "dormand_prince")
-"""Integrators that choose their steps."""
 
 _EMPTY_REPORT: dict[str, Any] = {}
 
@@ -101,7 +98,7 @@ class Recorder:
         self.ledger = Table(self.files.ledger, LEDGER, rows)
         self.tables.append(self.ledger)
         self.trials: Table | None = None
-        if any(system["integrator"] in ADAPTIVE for system in self.scene["system"]):
+        if any(system["integrator"] in energy.ADAPTIVE for system in self.scene["system"]):
             self.trials = Table(self.files.trials, TRIALS, trials)
             self.tables.append(self.trials)
 
@@ -156,7 +153,8 @@ class Recorder:
         failure = self.manifest["failure"]
         with suppress(KeyboardInterrupt):  # The failure is worth more than its cures.
             failure["cures"] = self.world.cures()
-            self._soften(failure)
+            with suppress(TumbleError, OSError):
+                self._soften(failure)
         self.stop("failed")
 
     def _soften(self, failure: dict[str, Any]) -> None:
@@ -165,13 +163,17 @@ class Recorder:
 
         report = failure["report"]
         names = [system["name"] for system in self.scene["system"]]
-        step = float(report.get("step") or 0.0)
-        if step <= 0.0 or not energy.unsoftened(self.scene):
+        interval = 1.0 / self.scene["time"]["fps"] / self.scene["time"]["exchanges"]
+        system = names.index(report["system"]) if report.get("system") in names else 0
+        adaptive = bool(names) and self.scene["system"][system]["integrator"] in energy.ADAPTIVE
+        step = interval if adaptive else float(report.get("step") or interval)
+        if not energy.unsoftened(self.scene):
             return
         met = energy.encounters(Run(self.files.path), range(self.written - 1, self.written + 1), step)
         failure["near"] = [energy.told(one) for one in met]
-        if met:
-            system = names.index(report["system"]) if report["system"] in names else 0
+        shortest = min((one.step or step for one in met), default=0.0)
+        # No dearer than the other trials.
+        if met and interval / shortest < 50.0 * interval / step + 20_000.0:
             sets = energy.changes(self.scene, met, system)
             cure = energy.attempt(self.world.scene, sets, self.written + 3)
             failure["cures"] = [cure, *failure["cures"]]

@@ -301,21 +301,24 @@ def _table(scene: "Scene", estimate: dict[str, Any], when: _When | None = None) 
     period = f" (period {seconds(2 * math.pi / frequency)})" if frequency > 0 else ""
     fixed = estimate["integrator"] in _limits(estimate)
     steps = f"{seconds(step)}, {round(frame / step)} per frame" if fixed else "chosen as it goes"
+    level, verdict = predict(estimate)
+    if when is not None and not when.judged and level < 2:
+        verdict = "not judged"
     lines = [
         f'system "{estimate["system"]}"',
         f"  integrator      {estimate['integrator']}",
         f"  step            {steps}",
         f"  stiffest mode   {frequency:.4g} rad/s{period}{where}",
         f"  damping         {estimate['damping']:.4g} 1/s of that mode, {estimate['damping_max']:.4g} 1/s at most",
-        f"  verdict         {predict(estimate)[1] if when is None or when.judged else 'not judged'}",
+        f"  verdict         {verdict}",
         *([f"  particles       {when.text}"] if when is not None else []),
         "",
         f"    {'integrator':18} {'largest stable':>15} {'largest usable':>15}  at {seconds(step)}",
     ]
     for name, (stable, usable) in _limits(estimate).items():
-        verdict = ("ok", "gains energy slowly", "explodes")[_verdict(step, stable, usable)[0]]
+        seen = ("ok", "gains energy slowly", "explodes")[_verdict(step, stable, usable)[0]]
         mark = ">" if name == estimate["integrator"] else " "
-        lines.append(f"  {mark} {name:18} {seconds(stable):>15} {seconds(usable):>15}  {verdict}")
+        lines.append(f"  {mark} {name:18} {seconds(stable):>15} {seconds(usable):>15}  {seen}")
     if not fixed:
         lines.append(f"  > {estimate['integrator']:18} {'chooses its own steps':>31}  ok")
     return "\n".join(lines)

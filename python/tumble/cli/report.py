@@ -147,7 +147,7 @@ def gained(run: "Run", scene: str, overrides: Sequence[str], again: Sequence[str
         cause, changes = "; ".join(map(energy.told, met)), energy.changes(run.scene, met, k)
     elif own in _GAINS:
         cause, changes = f"{own} gains energy where things oscillate", [f"system.{k}.integrator=symplectic_euler"]
-    elif own in ("adaptive_euler", "dormand_prince"):
+    elif own in energy.ADAPTIVE:
         tolerance = 0.01 * plan["adaptive"]["tolerance"]
         cause, changes = "the tolerance is too coarse", [f"system.{k}.adaptive.tolerance={tolerance:.1e}"]
     else:
@@ -203,6 +203,8 @@ def _ranked(cures: Sequence[Mapping[str, Any]]) -> list[Mapping[str, Any]]:
         growth = float(cure["energy_ratio"])
         if not cure["survived"]:
             return math.inf
+        if ".softening=" in cure["set"] and not abs(growth) > _MOST:
+            return -1.0  # What was wrong with the scene, where other changes only take the steps that happen to last.
         return max(growth, _NO_GAIN) if math.isfinite(growth) else sys.float_info.max
 
     return sorted(cures, key=rank)
