@@ -340,7 +340,66 @@ def test_ctrl_c_anywhere_else_is_quiet(
     assert (answer.code, answer.err) == (130, "error: stopped\n")
 
 
+def test_a_signal_to_terminate_ends_as_ctrl_c_does(spring: Tree, scene_file: SceneFile, tumble: Command) -> None:
+    process = start(scene_file(spring), "--frames", "1000000")
+    process.terminate()
+    _, err = process.communicate(timeout=60)
+    assert process.returncode == 143
+    assert "Traceback" not in err
+    kept = Run("out/scene")
+    assert (kept.status, f"{kept.n_frames} frame" in err) == ("interrupted", True)
+    assert tumble(*copied(err, "run"), "--set", f"time.frames={kept.n_frames + 5}").code == 0
+
+
+def test_a_folder_in_which_a_run_is_writing_is_refused(spring: Tree, scene_file: SceneFile, tumble: Command) -> None:
+    file = scene_file(spring)
+    process = start(file, "--frames", "1000000")
+    for more in (["--force"], ["--resume"], []):
+        answer = tumble("run", file, *more)
+        assert answer.code == 2
+        assert answer.err.startswith(f"error: out/scene: a run is writing here (pid {process.pid})")
+    assert tumble("run", file, "--out", "elsewhere").code == 0
+    process.kill()
+    process.communicate(timeout=60)
+    # The file outlives who wrote it, the lock does not.
+    assert Path("out/scene/.lock").exists()
+    assert tumble("run", file, "--resume", "--set", "time.frames=1000").code == 0
+    assert not Path("out/scene/.lock").exists()
+    assert len(set(Run("out/scene").hashes)) == Run("out/scene").n_frames
+
+
+def test_results_are_written_alone_too(
+    spring: Tree, scene_file: SceneFile, tumble: Command, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    file = scene_file(spring)
+    codes = []
+
+    def film(*_: object) -> None:
+        again = subprocess.run([*PYTHON, "run", str(file), "--force"], capture_output=True, check=False)
+        codes.append((again.returncode, b"a run is writing here" in again.stderr))
+
+    monkeypatch.setattr("tumble.cli.render.film", film)
+    assert tumble("run", file, "--film").code == 0
+    assert codes == [(2, True)]
+
+
+def test_a_frame_that_is_not_there_is_missed_once(spring: Tree, scene_file: SceneFile, tumble: Command) -> None:
+    spring["output"]["stills"] = [120]
+    assert tumble("run", scene_file(spring)).err.count("120") == 1
+
+
 # Disks and streams
+
+
+def test_a_folder_that_cannot_be_is_a_fault_of_the_input(spring: Tree, scene_file: SceneFile, tumble: Command) -> None:
+    Path("file").touch()
+    for place in ("file", "file/below", "/proc/nowhere", "x" * 300):
+        answer = tumble("run", scene_file(spring), "--out", place)
+        assert answer.code == 2, place
+        assert answer.err.startswith(f"error: {place}: ") and "choose another" in answer.err
+    # Nor is anything left behind by a scene that is wrong.
+    assert tumble("run", scene_file(spring), "--out", "a/b", "--set", "system.0.step=-1").code == 2
+    assert not Path("a").exists()
 
 
 @pytest.mark.parametrize(

@@ -1,11 +1,18 @@
-"""Births and deaths in single precision, where ages are sums that round."""
+"""Births and deaths in single precision, where ages are sums that round; and what is told of them."""
 
+from collections.abc import Callable
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
+from conftest import Answer
 
 import tumble
+from tumble import emitters
+
+Command = Callable[..., Answer]
+SceneFile = Callable[..., Path]
 
 
 def world(fps: float, *emitters: dict[str, Any]) -> tumble.World:
@@ -50,3 +57,145 @@ def test_what_breaks_is_named_by_its_id() -> None:
     assert f"id {report['id']}." in str(failure.value)
     assert report["id"] > 20
     assert report["index"] < 7
+
+
+# What is told before a run
+
+
+def emitting(*emitters: dict[str, Any], frames: int = 48, **more: Any) -> dict[str, Any]:
+    """A scene of 24 frames a second."""
+    return {"version": 1, "time": {"fps": 24, "frames": frames}, "emitter": list(emitters), **more}
+
+
+POINT = {"name": "p", "from": {"point": {"at": [0, 0, 1]}}}
+
+
+@pytest.mark.parametrize(
+    ("words", "born", "largest"),
+    [
+        ({"rate": 100}, 200, 200),
+        ({"rate": 100, "start": 0.5, "end": 1.25}, 75, 75),
+        ({"rate": 100, "lifetime": 0.5}, 200, 50),
+        ({"rate": 100, "lifetime": 0.5, "lifetime_spread": 0.9}, 200, 50),
+        ({"rate": 100, "most": 30}, 200, 30),
+        ({"rate": "100*t"}, 200, 200),
+        ({"rate": {"keys": [[0, 0], [1, 100]]}}, 150, 150),
+        ({"burst": [{"time": 0.5, "count": 70}, {"time": 1.5, "count": 30}, {"time": 3, "count": 9}]}, 100, 100),
+        ({"burst": [{"time": 0.5, "count": 70}, {"time": 1.5, "count": 30}], "lifetime": 0.8}, 100, 70),
+        ({"rate": 100, "start": 5}, 0, 0),
+    ],
+)
+def test_what_an_emitter_will_hold(words: dict[str, Any], born: int, largest: int) -> None:
+    # By hand: rates times times. Sums over a thousandth of 2 s miss at most one piece, 0.2 particles.
+    (expected,) = emitters.forecast(tumble.Scene(emitting({**POINT, **words})).to_dict())
+    assert (expected.total, expected.largest, expected.known) == (born, largest, True)
+    there = tumble.World(emitting({**POINT, **words}))
+    counts = []
+    for _ in range(48):
+        there.step()
+        counts.append(len(there.frame["p"]["id"]))
+    assert max(counts) == pytest.approx(largest, abs=0.2 * largest if "lifetime_spread" in words else 5)
+
+
+def test_children_are_counted_where_that_can_be_done() -> None:
+    parent = {**POINT, "rate": 10, "lifetime": 0.5}
+
+    def of(**words: Any) -> dict[str, Any]:
+        at = words.pop("at", "death")
+        return {"name": "q", "from": {"particles": {"of": "p", "at": at}}, **words}
+
+    def child(parent: dict[str, Any], words: dict[str, Any]) -> emitters.Forecast:
+        return emitters.forecast(tumble.Scene(emitting(parent, words)).to_dict())[1]
+
+    # 15 of 20 have died after 2 s.
+    assert child(parent, of(burst=[{"count": 4}])).total == pytest.approx(60, abs=1)
+    # Five at once from 0.5 s on, and half as many on the way there: 2.5/2 + 5 x 1.5 particle seconds.
+    assert child(parent, of(rate=8)).total == pytest.approx(8 * (0.5 * 2.5 + 1.5 * 5), abs=1)
+    assert child(parent, of(burst=[{"count": 4}])).known
+    assert not child(parent, of(at="bounce", burst=[{"count": 4}])).known
+    assert not child({**parent, "kill": [{"faster_than": 1}]}, of(burst=[{"count": 4}])).known
+
+
+STIFF = emitting(
+    {**POINT, "from": {"sphere": {"radius": 0.5}}, "burst": [{"time": 0.2, "count": 200}], "mass": 0.001},
+    frames=24,
+    system=[{"integrator": "velocity_verlet", "substeps": 1}],
+    force=[{"kind": "drag", "coefficient": 1.0}],
+)
+
+
+def test_check_judges_particles_that_are_not_yet_born(tumble: Command, scene_file: SceneFile) -> None:
+    answer = tumble("check", scene_file(STIFF))
+    assert answer.code == 1
+    # k/m = 1000/s and a limit of h k/m <= 1 for velocity Verlet: 41.7 ms is 41.7 times too long.
+    assert "will explode: 41.7 times the largest stable step" in answer.out
+    assert 'emitter    "p": 200 born in 1 s, up to 200 at once' in answer.out
+    assert "up to 200 emitted particles" in answer.out
+    assert "tracer" not in answer.out and "fine" not in answer.out
+    # Of 200 particles 32 bytes each, in 20 of the 25 frames.
+    assert "up to 6.4 kB on disk, the run 128 kB" in answer.out
+    answer = tumble("check", scene_file(STIFF), "--set", "system.0.substeps=100")
+    assert (answer.code, "fine: " in answer.out, "with 200 particles" in answer.out) == (0, True, True)
+
+
+def test_check_says_what_it_cannot_judge(
+    tumble: Command, scene_file: SceneFile, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("tumble.cli.check._WORK", -1.0)
+    answer = tumble("check", scene_file(STIFF))
+    assert answer.code == 0
+    assert "cannot be judged" in answer.out and "not judged (main): tumble run" in answer.out
+    assert "fine" not in answer.out and "stable" not in answer.out.split("verdict")[1].splitlines()[0]
+
+
+def test_check_steps_until_it_breaks(tumble: Command, scene_file: SceneFile) -> None:
+    dust = {"name": "dust", "from": {"sphere": {"radius": 1}}, "rate": 500}
+    pull = {"kind": "attraction", "gm": 5}
+    verlet = {"integrator": "velocity_verlet"}
+    scene = emitting(dust, world={"gravity": [0, 0, 0]}, system=[verlet], force=[pull])
+    answer = tumble("check", scene_file(scene))
+    assert (answer.code, "will break down in frame 5" in answer.out) == (1, True)
+    assert "fine" not in answer.out
+
+
+def test_check_tells_tracers_from_particles(tumble: Command, scene_file: SceneFile) -> None:
+    words = {
+        "field": [{"kind": "uniform", "velocity": [1, 0, 0]}],
+        "system": [{"method": "tracers", "integrator": "rk4"}],
+    }
+    drops = {"name": "q", "position": [[0, 0, 0]]}
+    answer = tumble("check", scene_file(emitting({**POINT, "rate": 10}, particles=[drops], **words)))
+    assert answer.code == 0
+    assert '"p" (tracers): 20 born in 2 s' in answer.out
+    assert '"q": 1 tracer' in answer.out
+
+
+def test_check_says_who_is_never_born(tumble: Command, scene_file: SceneFile) -> None:
+    late = {**POINT, "burst": [{"time": 50, "count": 9}]}
+    answer = tumble("check", scene_file(emitting(late)))
+    assert '"p": 0 born in 2 s, the first after 50 s' in answer.out
+    assert "no particle is born in the time of the scene" in answer.out
+
+
+@pytest.mark.parametrize("verb", ["check", "run"])
+def test_too_much_memory_is_laid_at_an_emitter(tumble: Command, scene_file: SceneFile, verb: str) -> None:
+    few = {**POINT, "name": "few", "rate": 10}
+    answer = tumble(verb, scene_file(emitting(few, {**POINT, "rate": 1e12})))
+    assert answer.code == 2
+    assert "memory_limit" in answer.err and 'emitter "p" alone asks for 2e+12 particles' in answer.err
+
+
+def test_a_run_ends_with_how_many_there_were(tumble: Command, scene_file: SceneFile) -> None:
+    fading = {**POINT, "rate": 24, "lifetime": 0.25}
+    answer = tumble("run", scene_file(emitting(fading, {**POINT, "name": "q", "burst": [{"count": 7}]})), "--no-plot")
+    assert answer.code == 0
+    # One a frame for two seconds, each there for six frames.
+    assert 'particles: "p" 48 born, 6 alive; "q" 7 born, 7 alive at the end' in answer.out
+
+
+def test_the_lab_refuses_emitters_and_says_what_to_do(tumble: Command, scene_file: SceneFile) -> None:
+    still = {"name": "q", "position": [[0, 0, 0]], "velocity": [[1, 0, 0]]}
+    answer = tumble("lab", "integrators", scene_file(emitting({**POINT, "rate": 10}, particles=[still])))
+    assert answer.code == 2
+    assert 'emitter "p": the lab compares' in answer.err and "[[particles]]" in answer.err
+    assert not list(Path("out").glob("lab/*"))

@@ -18,7 +18,7 @@ from typing import IO, Any
 import numpy as np
 import numpy.typing as npt
 
-from tumble._engine import ExportError, World
+from tumble._engine import ExportError, SceneError, World
 
 Columns = dict[str, dict[str, npt.NDArray[Any]]]
 """Object name -> column name -> array."""
@@ -41,6 +41,9 @@ LEDGER = [
 
 TRIALS = ["time", "step", "error", "accepted", "frame"]
 """Columns of trials.csv, one row per step that an adaptive integrator tried on the way to `frame`."""
+
+LOCK = ".lock"
+"""Says who writes here, while somebody does."""
 
 _WRITTEN = """
 static.npz columns.json ledger.csv trials.csv frames/*.npz checkpoints/*.safetensors
@@ -82,7 +85,9 @@ class RunFolder:
 
     def is_free(self) -> bool:
         """Whether a new run can go here: nothing is here yet."""
-        return not os.path.lexists(self.path) or (self.path.is_dir() and not any(self.path.iterdir()))
+        if not os.path.lexists(self.path):
+            return True
+        return self.path.is_dir() and all(file.name == LOCK for file in self.path.iterdir())
 
     def make(self) -> None:
         for folder in ("frames", "checkpoints"):
@@ -117,6 +122,13 @@ class RunFolder:
         return limit
 
 
+def refuse(path: Path, text: str) -> SceneError:
+    """The error for a folder that does not fit."""
+    error = SceneError(f"{path}: {text}")
+    error.issues = [{"path": str(path), "line": None, "message": text}]
+    return error
+
+
 @contextmanager
 def writing(path: Path) -> Iterator[None]:
     """Turns the system's refusals into an ExportError that says what to do."""
@@ -127,19 +139,26 @@ def writing(path: Path) -> Iterator[None]:
 
 
 def _explain(path: Path, error: OSError) -> ExportError:
+    return ExportError(f"{path}: {reason(error)}")
+
+
+def reason(error: OSError) -> str:
+    """Why something cannot be written, and what to do."""
     kept = "; what was finished before is readable"
     match error.errno:
         case errno.ENOSPC | errno.EDQUOT:
             text = f"no space left on the disk{kept}: free some, then go on with --resume"
         case errno.EACCES | errno.EPERM | errno.EROFS:
             text = f"this place cannot be written ({error.strerror}); choose another one with --out"
+        case errno.ENAMETOOLONG | errno.ELOOP | errno.EINVAL:
+            text = f"this is no place for a folder ({error.strerror}); choose another one with --out"
         case errno.ENOENT:
             text = "the folder has vanished, or cannot be made; choose another one with --out"
         case errno.ENOTDIR | errno.EEXIST:
             text = f"there is a file where a folder should be ({error.strerror}); choose another one with --out"
         case _:
             text = f"cannot be written: {error.strerror or error}{kept}"
-    return ExportError(f"{path}: {text}")
+    return text
 
 
 def write_whole(path: Path, data: bytes) -> None:
@@ -177,6 +196,16 @@ def read_columns(path: Path) -> Columns:
     except (OSError, ValueError, EOFError, zipfile.BadZipFile) as error:
         raise ExportError(f"{path}: is damaged ({error}); --resume computes again what is lost") from error
     return columns
+
+
+def read_column(path: Path, name: str, column: str) -> npt.NDArray[Any] | None:
+    """One column of an .npz, without reading the others; None where it is not."""
+    key = f"{name}/{column}"
+    try:
+        with np.load(path) as archive:
+            return np.asarray(archive[key]) if key in archive.files else None
+    except (OSError, ValueError, EOFError, zipfile.BadZipFile) as error:
+        raise ExportError(f"{path}: is damaged ({error}); --resume computes again what is lost") from error
 
 
 def write_checkpoint(world: World, path: Path) -> None:

@@ -6,13 +6,12 @@ import sys
 import time
 from collections.abc import Mapping
 from contextlib import suppress
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from tumble import _engine, expect
-from tumble._engine import ExportError, SceneError, StepError, World
+from tumble import _engine, energy, expect
+from tumble._engine import ExportError, StepError, TumbleError, World
 from tumble.folder import (
     FORMAT,
     LEDGER,
@@ -31,9 +30,6 @@ MANIFEST_INTERVAL = 5.0
 more than a hundredth of it."""
 
 KEPT_CHECKPOINTS = 2
-
-ADAPTIVE = ("adaptive_euler", "dormand_prince")
-"""Integrators that choose their steps."""
 
 _EMPTY_REPORT: dict[str, Any] = {}
 
@@ -102,7 +98,7 @@ class Recorder:
         self.ledger = Table(self.files.ledger, LEDGER, rows)
         self.tables.append(self.ledger)
         self.trials: Table | None = None
-        if any(system["integrator"] in ADAPTIVE for system in self.scene["system"]):
+        if any(system["integrator"] in energy.ADAPTIVE for system in self.scene["system"]):
             self.trials = Table(self.files.trials, TRIALS, trials)
             self.tables.append(self.trials)
 
@@ -154,9 +150,33 @@ class Recorder:
     def fail(self, error: StepError) -> None:
         """Notes why the physics broke, then tries what would have helped."""
         self.stop("failed", str(error), getattr(error, "report", {}))
+        failure = self.manifest["failure"]
         with suppress(KeyboardInterrupt):  # The failure is worth more than its cures.
-            self.manifest["failure"]["cures"] = self.world.cures()
+            failure["cures"] = self.world.cures()
+            with suppress(TumbleError, OSError):
+                self._soften(failure)
         self.stop("failed")
+
+    def _soften(self, failure: dict[str, Any]) -> None:
+        """Tries to soften what came too near for the steps, and puts that before the other cures."""
+        from tumble.run import Run
+
+        report = failure["report"]
+        names = [system["name"] for system in self.scene["system"]]
+        interval = 1.0 / self.scene["time"]["fps"] / self.scene["time"]["exchanges"]
+        system = names.index(report["system"]) if report.get("system") in names else 0
+        adaptive = bool(names) and self.scene["system"][system]["integrator"] in energy.ADAPTIVE
+        step = interval if adaptive else float(report.get("step") or interval)
+        if not energy.unsoftened(self.scene):
+            return
+        met = energy.encounters(Run(self.files.path), range(self.written - 1, self.written + 1), step)
+        failure["near"] = [energy.told(one) for one in met]
+        shortest = min((one.step or step for one in met), default=0.0)
+        # No dearer than the other trials.
+        if met and interval / shortest < 50.0 * interval / step + 20_000.0:
+            sets = energy.changes(self.scene, met, system)
+            cure = energy.attempt(self.world.scene, sets, self.written + 3)
+            failure["cures"] = [cure, *failure["cures"]]
 
     def stop(self, status: str, message: str | None = None, report: Mapping[str, Any] | None = None) -> None:
         """Notes, as far as the disk allows, that the run ended early and why."""
@@ -245,10 +265,3 @@ def _difference(path: str, old: Any, new: Any) -> str | None:
 def _short(value: Any) -> str:
     text = repr(value)
     return text if len(text) <= 40 else text[:37] + "..."
-
-
-def refuse(path: Path, text: str) -> SceneError:
-    """The error for a folder that does not fit."""
-    error = SceneError(f"{path}: {text}")
-    error.issues = [{"path": str(path), "line": None, "message": text}]
-    return error

@@ -13,8 +13,9 @@ import numpy.typing as npt
 
 from tumble import _engine, expect
 from tumble._engine import ExportError, Scene, SceneError, StepError, World
-from tumble.folder import FORMAT, LEDGER, TRIALS, Columns, RunFolder, plain, read_columns, read_rows
-from tumble.recorder import Recorder, changed, refuse
+from tumble.folder import FORMAT, LEDGER, TRIALS, Columns, RunFolder, plain, read_columns, read_rows, reason, refuse
+from tumble.lock import alone, ask
+from tumble.recorder import Recorder, changed
 
 Progress = Callable[[int, int], None]
 """Called with frames done and frames in all."""
@@ -41,12 +42,27 @@ def simulate(
     if frames is not None:
         scene = scene.replace(f"time.frames={frames}")
     files = RunFolder(folder)
-    earlier = _admit(files, scene, resume, overwrite)
+    ask(files.path)
+    _admit(files, scene, resume, overwrite)
     world = World(scene, threads)
     expect.probes(world, scene.to_dict())
+    with alone(files.path):
+        # Another run may have come and gone meanwhile.
+        earlier = _admit(files, scene, resume, overwrite)
+        return _simulate(files, world, threads, progress, earlier, overwrite)
+
+
+def _simulate(
+    files: RunFolder,
+    world: World,
+    threads: int | None,
+    progress: Progress | None,
+    earlier: dict[str, Any] | None,
+    overwrite: bool,
+) -> "Run":
     if earlier is not None and not _return_to_checkpoint(world, files):
         earlier, overwrite = None, True
-        world = World(scene, threads)
+        world = World(world.scene, threads)
     if earlier is None and overwrite and files.is_run():
         files.clear()
     recorder = Recorder(files, world, threads, earlier)
@@ -54,7 +70,7 @@ def simulate(
         recorder.start() if earlier is None else recorder.go_on()
         _advance(world, recorder, progress)
         recorder.finish()
-        run = Run(folder)
+        run = Run(files.path)
         recorder.judge(expect.check(run))
     except StepError as error:
         recorder.fail(error)
@@ -67,7 +83,7 @@ def simulate(
         raise
     finally:
         recorder.close()
-    return Run(folder)
+    return Run(files.path)
 
 
 def _advance(world: World, recorder: Recorder, progress: Progress | None) -> None:
@@ -84,8 +100,11 @@ def _advance(world: World, recorder: Recorder, progress: Progress | None) -> Non
 
 def _admit(files: RunFolder, scene: Scene, resume: bool, overwrite: bool) -> dict[str, Any] | None:
     """The manifest of the run to go on with, if any; refuses a folder in which something else is."""
-    if files.is_free():
-        return None
+    try:
+        if files.is_free():
+            return None
+    except OSError as error:
+        raise refuse(files.path, reason(error)) from error
     if not files.is_run():
         what = "holds files, but no run" if files.path.is_dir() else "is a file"
         raise refuse(files.path, f"{what}; choose another folder with --out")

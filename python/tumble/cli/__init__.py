@@ -1,6 +1,7 @@
 """The command line: `tumble VERB`, one file per verb.
 
-Exit codes: 0 fine, 1 the simulation failed or broke an expectation, 2 the input is wrong, 130 stopped with Ctrl-C.
+Exit codes: 0 fine, 1 the simulation failed or broke an expectation, 2 the input is wrong, 130 stopped with Ctrl-C, 143
+stopped by a signal to terminate.
 """
 
 import errno
@@ -12,7 +13,7 @@ import typer
 from typer.core import TyperGroup
 
 from tumble.cli import check, export, lab, plot, render, run, scenes, view
-from tumble.cli.console import complain, survive_narrow_streams
+from tumble.cli.console import complain, heed_termination, stopped, survive_narrow_streams
 
 
 class Verbs(TyperGroup):
@@ -21,9 +22,9 @@ class Verbs(TyperGroup):
     def invoke(self, ctx: Any) -> Any:
         try:
             return super().invoke(ctx)
-        except KeyboardInterrupt:
+        except KeyboardInterrupt as stop:
             complain("stopped")
-            raise typer.Exit(130) from None
+            raise typer.Exit(stopped(stop)) from None
         except MemoryError:
             complain("out of memory: the scene needs more than this machine has; take a lower resolution")
             raise typer.Exit(1) from None
@@ -67,7 +68,7 @@ def _root(
 
     \b
     Exit codes: 0 fine; 1 the simulation failed or broke an expectation;
-    2 the input is wrong; 130 stopped with Ctrl-C.
+    2 the input is wrong; 130 stopped with Ctrl-C, 143 by a signal to terminate.
     """
 
 
@@ -91,4 +92,5 @@ def application() -> typer.Typer:
 def main(arguments: Sequence[str] | None = None) -> None:
     """Runs the command line and exits."""
     survive_narrow_streams()
+    heed_termination()
     application()(args=arguments, prog_name="tumble")

@@ -1,6 +1,8 @@
 """`tumble check`: is the scene right, and will its steps be stable?"""
 
 import math
+import time
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
@@ -10,9 +12,16 @@ from tumble.cli.console import counted, say, seconds, size, warn
 
 if TYPE_CHECKING:
     from tumble import Scene, World
+    from tumble.emitters import Forecast
 
 _SAFETY = 0.7
 """Of its largest stable step, what an explicit integrator is advised to take."""
+
+_WORK = 1e6
+"""Frames times masses, cells and particles that are simulated to see how stable particles are that are not yet born."""
+
+_PATIENCE = 5.0
+"""And seconds, at most, where forces are dear."""
 
 
 def check(
@@ -30,62 +39,227 @@ def check(
       tumble check my.toml --set system.soft.integrator=forward_euler
     """
     from tumble import World
+    from tumble.emitters import forecast
     from tumble.expect import probes
 
     checked = find.scene(scene, set)
-    with find.naming(find.scene_file(scene)):
+    with find.naming(find.scene_file(scene), scene=checked):
         world = World(checked, threads)
         probes(world, checked.to_dict())
-    say(_contents(checked, world))
+    tree = checked.to_dict()
+    expected = forecast(tree)
+    say(_contents(checked, world, expected))
     estimates = world.stability()
+    judged, fault = _judge(tree, world, expected, estimates)
     cures: list[list[str]] = []
     for estimate in estimates:
         say()
-        say(_table(checked, estimate))
+        say(_table(checked, estimate, judged.get(estimate["system"])))
         if predict(estimate)[0] == 2:
-            cures += _cures(checked.to_dict(), estimate)
+            cures += _cures(tree, estimate)
     without = [name for name in world.systems if name not in {e["system"] for e in estimates}]
     if without:
         say(f"\nno estimate for: {', '.join(without)}")
     say()
     for text in world.warnings:
         warn(text)
+    if fault is not None:
+        say(f"will break down {fault}\nwhat would help, {find.command('run', scene, set)} tries and tells")
     if cures:
         say("will explode. Any of these helps, by the estimate:")
         for cure in cures:
             say(f"  {find.command('run', scene, [*find.without(set or (), cure, world.systems), *cure])}")
+    if cures or fault is not None:
         raise typer.Exit(1)
-    say(f"fine: {find.command('run', scene, set)}")
+    blind = [system for system, when in judged.items() if not when.judged]
+    word = f"not judged ({', '.join(blind)})" if blind else "fine"
+    say(f"{word}: {find.command('run', scene, set)}")
 
 
-def _contents(scene: "Scene", world: "World") -> str:
+@dataclass
+class _When:
+    """When the stability of a system with emitters was judged."""
+
+    judged: bool
+    text: str
+
+
+def _judge(
+    tree: dict[str, Any], world: "World", expected: "list[Forecast]", estimates: list[dict[str, Any]]
+) -> "tuple[dict[str, _When], str | None]":
+    """Steps the world until many of the particles of each system are there, as far as the work is bounded, and puts the
+    worst estimate on the way in place of that of the start. Returns when systems with emitters were judged, and what broke."""
+    import numpy as np
+
+    from tumble import StepError
+
+    whose = _systems(tree, world)
+    held = {e["system"]: [f for f in expected if whose[f.name] == e["system"]] for e in estimates}
+    held = {system: own for system, own in held.items() if own}
+    if not held:
+        return {}, None
+    last, fps = tree["time"]["frames"], tree["time"]["fps"]
+    times = np.arange(last + 1) / fps
+    goals = {system: np.sum([f.at(times) for f in own], axis=0) for system, own in held.items()}
+    # Frames at which to judge: the first with any, and those where 1/8, 1/4, 1/2 and all of the most are there.
+    look = {0}
+    for counts in goals.values():
+        for share in (0.0, 0.125, 0.25, 0.5, 1.0):
+            look.update(np.flatnonzero((counts > 0.5) & (counts >= share * counts.max()))[:1].tolist())
+    seen: dict[str, list[tuple[int, int]]] = {system: [] for system in held}
+    work, fault, begin = 0.0, None, time.monotonic()
+    others = sum(len(t.get("mass", ())) for t in world.topology.values()) + _cells(tree)
+    while True:
+        frame = world.frame_index
+        if frame in look or not all(seen.values()):
+            there = {name: len(table["id"]) for name, table in world.columns("id").items()}
+            present = {system: sum(there.get(f.name, 0) for f in own) for system, own in held.items()}
+            new = [s for s, n in present.items() if n and (frame in look or not seen[s])]
+            if new:
+                _take_worse(estimates, [e for e in world.stability() if e["system"] in new])
+            for system in new:
+                seen[system].append((frame, present[system]))
+        work += others + sum(float(f.at(times[frame])) for f in expected)
+        if frame >= max(look | ({last} if not all(seen.values()) else set())) or work > _WORK:
+            break
+        if time.monotonic() - begin > _PATIENCE:
+            break
+        try:
+            world.step()
+        except StepError as error:
+            fault = f"in frame {frame + 1}, {error}"
+            break
+    return {system: _when(seen[system], goals[system], held[system], fps) for system in held}, fault
+
+
+def _when(seen: list[tuple[int, int]], counts: Any, own: "list[Forecast]", fps: float) -> _When:
+    if not seen:
+        if counts.max() < 0.5 and all(f.known for f in own):
+            return _When(True, "no particle is born in the time of the scene")
+        return _When(False, "cannot be judged: no particle was born in the frames that were tried")
+    frame, n = seen[-1]
+    most = max(n, round(float(counts.max())))
+    share = "" if n >= most else f" of about {most} that will be there"
+    return _When(True, f"judged up to frame {frame} (t = {frame / fps:.4g} s), with {counted(n, 'particle')}{share}")
+
+
+def _take_worse(estimates: list[dict[str, Any]], others: list[dict[str, Any]]) -> None:
+    def badness(estimate: dict[str, Any]) -> tuple[float, float]:
+        return predict(estimate)[0], max(estimate["frequency"], estimate["damping_max"])
+
+    for other in others:
+        for i, estimate in enumerate(estimates):
+            if estimate["system"] == other["system"] and badness(other) > badness(estimate):
+                estimates[i] = other
+
+
+def _cells(tree: dict[str, Any]) -> float:
+    """Cells of all grids, each as much work as several masses."""
+    total = 0.0
+    for kind in ("gas", "heat", "compressible"):
+        for thing in tree[kind]:
+            box = thing["box"]
+            edges = sorted(box["size"])[1 if tree["dimension"] == 2 else 0 :]
+            total += 20.0 * math.prod(edge / edges[-1] * box["resolution"] for edge in edges)
+    return total
+
+
+def _systems(tree: dict[str, Any], world: "World") -> dict[str, str]:
+    """The system of each emitter: the one that it names, or the first that can."""
+    moves = [s["name"] for s in tree["system"] if s.get("method") in ("dynamics", "tracers")] or world.systems[:1]
+    return {e["name"]: e["system"] or moves[0] for e in tree["emitter"] if e["system"] or moves}
+
+
+def _holds(expected: "Forecast", duration: float) -> str:
+    """What an emitter will hold."""
+    words = expected.words
+    source = words["from"].get("particles")
+    parts = []
+    if source:
+        parts.append(f'children of "{source["of"]}"')
+    if expected.total or expected.known:
+        parts.append(f"{'' if expected.known else 'about '}{expected.total} born in {duration:.6g} s")
+        if expected.total:
+            parts.append(f"up to {expected.largest} at once")
+    if not expected.known:
+        more = "bounce" if source and source["at"] == "bounce" else "death"
+        count = sum(burst["count"] for burst in words["burst"])
+        parts.append(f"{count} at each {more}" if count else "how many, nobody knows before")
+    if words["most"] is not None:
+        parts.append(f"at most {words['most']}")
+    if words["kill"] and expected.total:
+        parts.append("fewer by its kill rules")
+    if expected.known and not expected.total and not source:
+        first = min(
+            [burst["time"] for burst in words["burst"]] + ([words["start"]] if words["rate"] else []), default=None
+        )
+        parts.append("neither rate nor burst" if first is None else f"the first after {first:.6g} s")
+    return ", ".join(parts)
+
+
+def _contents(scene: "Scene", world: "World", expected: "list[Forecast]") -> str:
     tree = scene.to_dict()
-    time = tree["time"]
+    span = tree["time"]
     lines = [
         f'scene      "{tree["title"]}", {tree["precision"]} precision, seed {tree["seed"]}',
-        f"time       {time['frames']} frames at {time['fps']:.6g} per second = {time['frames'] / time['fps']:.6g} s",
+        f"time       {span['frames']} frames at {span['fps']:.6g} per second = {span['frames'] / span['fps']:.6g} s",
     ]
     words = {"mass": "mass", "links": "link", "triangles": "triangle", "pinned": "pin"}
     solid = {collider["name"] for collider in tree["collider"]}
+    born = {f.name for f in expected}
     topology, positions = world.topology, world.columns("position")
     for name, table in topology.items():
+        if name in born:
+            continue
         parts = [counted(len(table[key]), word) for key, word in words.items() if key in table]
         if "position" in positions.get(name, {}) and "mass" not in table and name not in solid:
-            parts.insert(0, counted(len(positions[name]["position"]), "tracer"))
+            word = "particle" if _is_of(tree, name, "vicsek") else "tracer"
+            parts.insert(0, counted(len(positions[name]["position"]), word))
         lines.append(f'{"collider" if name in solid else "object":10} "{name}": {", ".join(parts) or "no mesh"}')
+    duration = span["frames"] / span["fps"]
+    for f in expected:
+        kind = " (tracers)" if _is_of(tree, f.name, "tracers") else ""
+        lines.append(f'emitter    "{f.name}"{kind}: {_holds(f, duration)}')
     for anchor in tree["anchor"]:
         lines.append(f'anchor     "{anchor["name"]}": from {" to ".join(anchor["between"])}')
     masses, links = (sum(len(t.get(key, ())) for t in topology.values()) for key in ("mass", "links"))
-    frame = sum(array.nbytes for table in world.frame.values() for array in table.values())
     totals = [counted(masses, "mass"), counted(links, "link"), counted(len(world.systems), "system")]
+    if most := sum(f.largest for f in expected):
+        totals.insert(1, f"up to {counted(most, 'emitted particle')}")
     lines.append(f"in all     {', '.join(totals)}")
     taken = _memory()
     memory = f"{size(taken)} in use, " if taken else ""
     lines.append(
         f"memory     {memory}limit {tree['world']['memory_limit']:.3g} GiB; "
-        f"a frame takes {size(frame)} on disk, the run {size(frame * (time['frames'] + 1))}"
+        f"{_disk(world, expected, span['frames'], span['fps'])}"
     )
     return "\n".join(lines)
+
+
+def _disk(world: "World", expected: "list[Forecast]", frames: int, fps: float) -> str:
+    """What frames will take on disk."""
+    import numpy as np
+
+    born = {f.name for f in expected}
+    columns = world.frame
+    still = sum(a.nbytes for name, table in columns.items() for a in table.values() if name not in born)
+    sizes = np.full(frames + 1, float(still))
+    for f in expected:
+        each = sum(a.itemsize * math.prod(a.shape[1:]) for a in columns.get(f.name, {}).values())
+        sizes += each * f.at(np.arange(frames + 1) / fps)
+    if all(f.known for f in expected):
+        return f"a frame takes {'up to ' if born else ''}{size(sizes.max())} on disk, the run {size(sizes.sum())}"
+    blind = ", ".join(f'"{f.name}"' for f in expected if not f.known)
+    return f"a frame takes {size(sizes.max())} on disk, the run {size(sizes.sum())}, without what comes of {blind}"
+
+
+def _is_of(tree: dict[str, Any], name: str, method: str) -> bool:
+    """Whether a system of this method moves an object."""
+    things = [t for kind in ("particles", "emitter") for t in tree[kind] if t["name"] == name]
+    named = next((t["system"] for t in things), None)
+    systems = [s for s in tree["system"] if s["method"] in ("dynamics", "tracers", "vicsek")]
+    own = [s for s in systems if named is None or s["name"] == named]
+    return bool(own) and own[0]["method"] == method
 
 
 def _memory() -> float:
@@ -120,27 +294,31 @@ def _verdict(step: float, stable: float, usable: float) -> tuple[int, str]:
     return 2, f"will explode: {step / stable:.3g} times the largest stable step"
 
 
-def _table(scene: "Scene", estimate: dict[str, Any]) -> str:
+def _table(scene: "Scene", estimate: dict[str, Any], when: _When | None = None) -> str:
     step, frequency = estimate["step"], estimate["frequency"]
     frame = 1.0 / scene.to_dict()["time"]["fps"]
     where = f', most at particle {estimate["culprit"][1]} of "{estimate["culprit"][0]}"' if estimate["culprit"] else ""
     period = f" (period {seconds(2 * math.pi / frequency)})" if frequency > 0 else ""
     fixed = estimate["integrator"] in _limits(estimate)
     steps = f"{seconds(step)}, {round(frame / step)} per frame" if fixed else "chosen as it goes"
+    level, verdict = predict(estimate)
+    if when is not None and not when.judged and level < 2:
+        verdict = "not judged"
     lines = [
         f'system "{estimate["system"]}"',
         f"  integrator      {estimate['integrator']}",
         f"  step            {steps}",
         f"  stiffest mode   {frequency:.4g} rad/s{period}{where}",
         f"  damping         {estimate['damping']:.4g} 1/s of that mode, {estimate['damping_max']:.4g} 1/s at most",
-        f"  verdict         {predict(estimate)[1]}",
+        f"  verdict         {verdict}",
+        *([f"  particles       {when.text}"] if when is not None else []),
         "",
         f"    {'integrator':18} {'largest stable':>15} {'largest usable':>15}  at {seconds(step)}",
     ]
     for name, (stable, usable) in _limits(estimate).items():
-        verdict = ("ok", "gains energy slowly", "explodes")[_verdict(step, stable, usable)[0]]
+        seen = ("ok", "gains energy slowly", "explodes")[_verdict(step, stable, usable)[0]]
         mark = ">" if name == estimate["integrator"] else " "
-        lines.append(f"  {mark} {name:18} {seconds(stable):>15} {seconds(usable):>15}  {verdict}")
+        lines.append(f"  {mark} {name:18} {seconds(stable):>15} {seconds(usable):>15}  {seen}")
     if not fixed:
         lines.append(f"  > {estimate['integrator']:18} {'chooses its own steps':>31}  ok")
     return "\n".join(lines)

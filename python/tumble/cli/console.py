@@ -2,7 +2,9 @@
 
 import codecs
 import math
+import signal
 import sys
+import threading
 import time
 from types import TracebackType
 from typing import TYPE_CHECKING, Any, Self
@@ -28,6 +30,25 @@ def survive_narrow_streams() -> None:
         reconfigure = getattr(stream, "reconfigure", None)
         if reconfigure is not None:
             reconfigure(errors="tumble")
+
+
+class Terminated(KeyboardInterrupt):
+    """Somebody wants the process to end: as with Ctrl-C, what was finished is kept."""
+
+
+def heed_termination() -> None:
+    """Has a signal to terminate stop things as Ctrl-C does."""
+
+    def stop(*_: object) -> None:
+        raise Terminated
+
+    if signal.getsignal(signal.SIGTERM) is signal.SIG_DFL and threading.current_thread() is threading.main_thread():
+        signal.signal(signal.SIGTERM, stop)
+
+
+def stopped(stop: KeyboardInterrupt) -> int:
+    """The exit code of who was stopped."""
+    return 128 + (signal.SIGTERM if isinstance(stop, Terminated) else signal.SIGINT)
 
 
 def say(text: object = "", end: str = "\n") -> None:

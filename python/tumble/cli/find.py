@@ -91,9 +91,10 @@ def scene(argument: str, overrides: Sequence[str] | None) -> "Scene":
 
 
 @contextmanager
-def naming(file: Path, besides: Path | None = None) -> Iterator[None]:
+def naming(file: Path, besides: Path | None = None, scene: "Scene | None" = None) -> Iterator[None]:
     """Puts the name of the scene's file before what is wrong with the scene, also if that is found only when it is built.
-    What is wrong with the folder `besides` is not the scene's fault."""
+    What is wrong with the folder `besides` is not the scene's fault. Where it asks for too much memory, the emitter that asks
+    for most is named."""
     from tumble import SceneError
 
     try:
@@ -102,6 +103,10 @@ def naming(file: Path, besides: Path | None = None) -> Iterator[None]:
         if any(issue["path"] == str(besides) for issue in getattr(error, "issues", ())):
             raise
         lines = str(error).splitlines()
+        if scene is not None and any(issue["path"] == "world.memory_limit" for issue in getattr(error, "issues", ())):
+            from tumble.emitters import largest
+
+            lines += largest(scene.to_dict())
         text = f"{file}: {lines[0]}" if len(lines) == 1 else "\n  ".join([f"{file}:", *lines])
         named = SceneError(text)
         named.issues = getattr(error, "issues", [])

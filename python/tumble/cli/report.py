@@ -14,6 +14,13 @@ if TYPE_CHECKING:
 _NO_GAIN = 0.1
 """Growth of the energy over its scale below which a change counts as gaining none."""
 
+_MOST = 0.5
+"""Growth or loss of the energy over its scale beyond which a change that was tried is not recommended, unless something in the
+scene may give or take that much."""
+
+_GAINS = ("forward_euler", "modified_euler", "midpoint", "heun")
+"""Integrators that gain energy of oscillations at any step."""
+
 _RESULTS = ["film.mp4", "scene.usda", "ply", "energy.png", "stills"]
 
 
@@ -32,6 +39,7 @@ def summary(run: "Run") -> str:
             f"  {counted(unconverged, 'step')} stopped before Newton's method converged, at a residual of up to {worst:.1e} of "
             "the first: raise solver.newton_iterations, or take a smaller step"
         )
+    lines += _particles(run)
     lines += _too_fast(run.scene, float(ledger["courant"].max()))
     lines += [
         f"  {run.folder / name}{_pace(run) if name == 'film.mp4' else ''}"
@@ -54,6 +62,15 @@ def _pace(run: "Run") -> str:
     return f" (time lapse, {faster:.3g} times)" if faster > 1.0 else f" (slow motion, {1 / faster:.3g} times)"
 
 
+def _particles(run: "Run") -> list[str]:
+    """How many particles there were, of each emitter."""
+    from tumble.emitters import born
+
+    counts = born(run)
+    each = [f'"{name}" {born} born, {alive} alive' for name, (born, alive) in counts.items()]
+    return [f"  particles: {'; '.join(each)} at the end"] if each else []
+
+
 def _too_fast(scene: Mapping[str, Any], reached: float) -> list[str]:
     """A warning if steps that were given let a fluid pass far more cells than its Courant number."""
     given = any(s["method"] == "gas" and (s.get("substeps") or s.get("step")) for s in scene["system"])
@@ -69,31 +86,93 @@ def _too_fast(scene: Mapping[str, Any], reached: float) -> list[str]:
 def failure(run: "Run", error: "StepError", scene: str, overrides: Sequence[str], again: Sequence[str] = ()) -> str:
     """What broke, where and when, the step against its limit, and what was tried; `again` ends the command to copy."""
     report = getattr(error, "report", {})
-    cures = _ranked(run.manifest["failure"]["cures"])
+    trouble = run.manifest["failure"]
+    cures = _ranked(trouble["cures"])
+    best = next((cure for cure in cures if cure["survived"] and _keeps_energy(cure, run.scene)), None)
     lines = [f"{_headline(report)}, after frame {run.n_frames - 1}"]
     if "index" in report:
         lines += _place(report)
     else:
         lines.append(f"  {error}")
+    lines += [f"  too near     {text}" for text in trouble.get("near", ())]
     if cures:
         lines.append("What was tried:")
-    for i, cure in enumerate(cures):
+    for cure in sorted(cures, key=lambda cure: cure is not best):
         change = " ".join(settings(cure["set"].split()))
         growth = float(cure["energy_ratio"])
-        energy = f"energy {growth:+.2g} of its scale" if math.isfinite(growth) else ""
-        mark = "  <- recommended" if i == 0 and cure["survived"] else ""
-        lines.append(f"  {'helped' if cure['survived'] else 'failed'}  {change:56} {energy}{mark}".rstrip())
+        what = f"energy {growth:+.2g} of its scale" if math.isfinite(growth) else ""
+        fine = cure["survived"] and _keeps_energy(cure, run.scene)
+        word = "helped" if fine else "lasted" if cure["survived"] else "failed"
+        mark = "  <- recommended" if cure is best else ", wrong" if word == "lasted" else ""
+        lines.append(f"  {word}  {change:56} {what}{mark}".rstrip())
     kept = f"Kept: {counted(run.n_frames, 'frame')} in {run.folder}"
-    if cures and cures[0]["survived"]:
-        changes = cures[0]["set"].split()
+    if best is not None:
+        changes = best["set"].split()
         systems = [system["name"] for system in run.scene["system"]] or ["main"]
         sets = [*without(overrides, changes, systems), *changes]
         lines.append(f"{kept}. Try\n  {command('run', scene, sets, *again, '--force')}")
     elif cures:
-        lines.append(f"{kept}. None of this helped: look for masses that are far too light or springs far too stiff")
+        lines.append(f"{kept}. None of this helped: {_advice(run.scene)}")
     else:
         lines.append(f"{kept}.")
     return "\n".join(lines)
+
+
+def _keeps_energy(cure: Mapping[str, Any], scene: Mapping[str, Any]) -> bool:
+    """Whether what a trial gained or lost of its energy may be right."""
+    from tumble import energy
+
+    growth = float(cure["energy_ratio"])
+    if not math.isfinite(growth) or abs(growth) <= _MOST:
+        return True
+    if growth < 0.0:
+        return bool(energy.sinks(scene))
+    # Births bring energy; but so do masses that come too near.
+    return bool(energy.sources(scene)) and not energy.unsoftened(scene)
+
+
+def _advice(scene: Mapping[str, Any]) -> str:
+    """Where to look when no change of the steps helps."""
+    from tumble import energy
+
+    if found := energy.unsoftened(scene):
+        which = ", ".join(f"force.{i}" for i in found)
+        return f"{which} grows without bound where masses come near; give it a softening"
+    if energy.has_springs(scene):
+        return "look for masses that are far too light or springs far too stiff"
+    return "take far smaller steps, or look for forces that are far too strong for such light masses"
+
+
+def gained(run: "Run", scene: str, overrides: Sequence[str], again: Sequence[str] = ()) -> str | None:
+    """A warning if the energy grew and nothing gave any, with the likely cause and its cure."""
+    from tumble import energy
+
+    grown = energy.from_nowhere(run)
+    if grown is None:
+        return None
+    plans = run.scene["system"]
+    k = next((i for i, plan in enumerate(plans) if plan["method"] == "dynamics"), 0)
+    plan: Mapping[str, Any] = plans[k] if plans else {"integrator": "symplectic_euler"}
+    names = [plan["name"] for plan in plans] or ["main"]
+    step = float(run.ledger["largest_step"][grown.frame])
+    met = energy.encounters(run, range(grown.frame - 2, grown.frame + 1), step)
+    own = plan["integrator"]
+    if met:
+        cause, changes = "; ".join(map(energy.told, met)), energy.changes(run.scene, met, k)
+    elif own in _GAINS:
+        cause, changes = f"{own} gains energy where things oscillate", [f"system.{k}.integrator=symplectic_euler"]
+    elif own in energy.ADAPTIVE:
+        tolerance = 0.01 * plan["adaptive"]["tolerance"]
+        cause, changes = "the tolerance is too coarse", [f"system.{k}.adaptive.tolerance={tolerance:.1e}"]
+    else:
+        n = math.ceil(4.0 / run.fps / run.scene["time"]["exchanges"] / step)
+        shorter = f"step={step / 4.0:.2g}" if plan.get("step") else f"substeps={n}"
+        cause, changes = f"steps of {seconds(step)} are too long", [f"system.{k}.{shorter}"]
+    sets = [*without(overrides, changes, names), *changes]
+    return (
+        f"the energy grew by {grown.times:.3g} times its scale, from frame {grown.frame} on, and nothing in the scene gives "
+        f"any: {cause}. Try\n  {command('run', scene, sets, *again, '--force')}"
+    )
 
 
 def _headline(report: Mapping[str, Any]) -> str:
@@ -140,6 +219,8 @@ def _ranked(cures: Sequence[Mapping[str, Any]]) -> list[Mapping[str, Any]]:
         growth = float(cure["energy_ratio"])
         if not cure["survived"]:
             return math.inf
+        if ".softening=" in cure["set"] and not abs(growth) > _MOST:
+            return -1.0  # What was wrong with the scene, where other changes only take the steps that happen to last.
         return max(growth, _NO_GAIN) if math.isfinite(growth) else sys.float_info.max
 
     return sorted(cures, key=rank)

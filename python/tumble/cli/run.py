@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from tumble.cli import find, report
-from tumble.cli.console import Progress, complain, counted, say, warn
+from tumble.cli.console import Progress, complain, counted, say, stopped, warn
 
 if TYPE_CHECKING:
     from tumble import Run, TumbleError
@@ -43,6 +43,7 @@ def run(
       tumble run my.toml --resume
     """
     from tumble import StepError
+    from tumble.lock import alone
     from tumble.run import Run, simulate
 
     if resume and force:
@@ -69,27 +70,30 @@ def run(
     if renderer != "auto" and (asked["film"] or frames_to_draw):
         resolve(renderer)  # Says now, rather than after the simulation, if it does not work here.
     try:
-        with find.naming(find.scene_file(scene), folder), Progress("simulate") as progress:
+        with find.naming(find.scene_file(scene), folder, checked), Progress("simulate") as progress:
             done = simulate(checked, folder, resume=resume, threads=threads, progress=progress, overwrite=force)
     except StepError as error:
         again = [*(["--out", str(out)] if out else []), *_flags(flags, renderer)]
         print(report.failure(Run(folder), error, scene, overrides, again), file=sys.stderr)
         raise typer.Exit(1) from None
-    except KeyboardInterrupt:
+    except KeyboardInterrupt as stop:
         again = [*(["--out", str(out)] if out else []), "--resume", *_flags(flags, renderer)]
         _say_what_is_kept(folder, find.command("run", scene, overrides, *again))
-        raise typer.Exit(130) from None
+        raise typer.Exit(stopped(stop)) from None
 
     for text in done.manifest["warnings"]:
         warn(text)
     try:
-        failures = _write_results(done, asked, frames_to_draw, renderer)
-    except KeyboardInterrupt:
+        with alone(folder):
+            failures = _write_results(done, asked, frames_to_draw, renderer)
+    except KeyboardInterrupt as stop:
         complain(
             f"stopped; the simulation in {folder} is complete, see `tumble render --help` and `tumble export --help`"
         )
-        raise typer.Exit(130) from None
+        raise typer.Exit(stopped(stop)) from None
     say(report.summary(done))
+    if text := report.gained(done, scene, overrides, [*(["--out", str(out)] if out else []), *_flags(flags, renderer)]):
+        warn(text)
     for failure in failures:
         complain(str(failure))
     broken = done.manifest["expectations"]
@@ -156,8 +160,6 @@ def _write_results(run: "Run", asked: dict[str, bool], stills: list[int], render
             for k, i in enumerate(there):
                 still(run, i, None, renderer)
                 progress(k + 1, len(there))
-        if late := [str(i) for i in stills if i >= run.n_frames]:
-            warn(f"no still of frame {', '.join(late)}: the last frame is {run.n_frames - 1}")
 
     tasks = {"plot": plot, "vdb": vdb, "usd": usd, "ply": ply, "film": draw_film, "stills": draw_stills}
     for name, task in tasks.items():

@@ -170,6 +170,12 @@ class Subject:
 def subject(scene: Scene) -> Subject:
     """Makes a scene ready for testing."""
     tree = scene.to_dict()
+    if tree["emitter"]:
+        raise SceneError(
+            f'emitter "{tree["emitter"][0]["name"]}": the lab compares paths and energies of masses that are there from '
+            "start to end, and emitted particles are not; put [[particles]] with a cloud in the place of emitters, or "
+            "compare runs of `tumble run` with --set system.0.integrator=..."
+        )
     tree["precision"] = "double"
     tree["output"] = {"columns": ["position"], "plot": False}
     tree["expect"] = {}
