@@ -1,5 +1,5 @@
-"""The browser's engine in headless Chromium against the native one held to registers of the same width, on one thread; and what a
-tab can do in real time. Needs `make web` and Chromium."""
+"""The browser's engine in headless Chromium against the native one held to registers of the same width, on one thread; and what
+a tab can do in real time. Needs `make web` and Chromium."""
 
 import json
 import os
