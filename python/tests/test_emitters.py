@@ -175,6 +175,7 @@ def test_check_says_who_is_never_born(tumble: Command, scene_file: SceneFile) ->
     answer = tumble("check", scene_file(emitting(late)))
     assert '"p": 0 born in 2 s, the first after 50 s' in answer.out
     assert "no particle is born in the time of the scene" in answer.out
+    assert answer.code == 0 and "fine" not in answer.out and "stable\n" not in answer.out
 
 
 @pytest.mark.parametrize("verb", ["check", "run"])
@@ -191,6 +192,9 @@ def test_a_run_ends_with_how_many_there_were(tumble: Command, scene_file: SceneF
     assert answer.code == 0
     # One a frame for two seconds, each there for six frames.
     assert 'particles: "p" 48 born, 6 alive; "q" 7 born, 7 alive at the end' in answer.out
+    many = [{**fading, "name": f"p{i}", "start": 9 if i == 3 else 0} for i in range(5)]
+    answer = tumble("run", scene_file(emitting(*many)), "--no-plot", "--force")
+    assert 'particles: of 5 emitters 192 born, "p3" never, 24 alive at the end' in answer.out
 
 
 def test_the_lab_refuses_emitters_and_says_what_to_do(tumble: Command, scene_file: SceneFile) -> None:

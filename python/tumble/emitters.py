@@ -44,7 +44,7 @@ class Forecast:
     @property
     def largest(self) -> int:
         """Particles there at once, at most."""
-        return round(float(self.alive.max()))
+        return math.floor(float(self.alive.max()) + 0.01)
 
     @cached_property
     def first(self) -> float | None:

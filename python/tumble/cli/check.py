@@ -31,7 +31,8 @@ def check(
 ) -> None:
     """Check a scene, and estimate which steps are stable.
 
-    Ends with code 1 if a system is predicted to explode, 2 if the scene is wrong.
+    Where there are emitters, the scene is simulated, for seconds at most, until many of their particles are there. Ends
+    with code 1 if a system is predicted to explode, or does, 2 if the scene is wrong.
 
     \b
     Examples:
@@ -135,10 +136,10 @@ def _judge(
 def _when(seen: list[tuple[int, int]], counts: Any, own: "list[Forecast]", fps: float) -> _When:
     if not seen:
         if counts.max() < 0.5 and all(f.known for f in own):
-            return _When(True, "no particle is born in the time of the scene")
+            return _When(False, "no particle is born in the time of the scene")
         return _When(False, "cannot be judged: no particle was born in the frames that were tried")
     frame, n = seen[-1]
-    most = max(n, round(float(counts.max())))
+    most = max(n, math.floor(float(counts.max()) + 0.01))
     share = "" if n >= most else f" of about {most} that will be there"
     return _When(True, f"judged up to frame {frame} (t = {frame / fps:.4g} s), with {counted(n, 'particle')}{share}")
 

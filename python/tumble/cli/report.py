@@ -68,6 +68,10 @@ def _particles(run: "Run") -> list[str]:
 
     counts = born(run)
     each = [f'"{name}" {born} born, {alive} alive' for name, (born, alive) in counts.items()]
+    if len(each) > 4:
+        born_in_all, alive_in_all = (sum(numbers) for numbers in zip(*counts.values(), strict=True))
+        never = [f', "{name}" never' for name, (born, _) in counts.items() if not born]
+        each = [f"of {len(each)} emitters {born_in_all} born{''.join(never)}, {alive_in_all} alive"]
     return [f"  particles: {'; '.join(each)} at the end"] if each else []
 
 
