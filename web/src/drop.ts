@@ -1,4 +1,5 @@
 /** Files that a person brings: scenes, and meshes. */
+import { stringify } from "smol-toml";
 import { dropped } from "./session";
 
 /** Larger ones are refused [bytes]. */
@@ -46,11 +47,14 @@ export async function acceptFiles(files: File[]): Promise<void> {
     if (/\.toml$/i.test(file.name)) {
       if (file.size > LARGEST.scene) throw new Error(`${file.name} is larger than a scene may be (1 MB)`);
       scene = { name: file.name, toml: await file.text() };
+    } else if (/\.json$/i.test(file.name)) {
+      if (file.size > LARGEST.scene) throw new Error(`${file.name} is larger than a scene may be (1 MB)`);
+      scene = { name: file.name, toml: stringify(JSON.parse(await file.text()) as Record<string, unknown>) };
     } else if (/\.(ply|obj|stl|glb)$/i.test(file.name)) {
       if (file.size > LARGEST.mesh) throw new Error(`${file.name} is larger than a mesh may be (64 MiB)`);
       dropped[file.name] = new Uint8Array(await file.arrayBuffer());
       mesh = file.name;
-    } else throw new Error(`${file.name} is neither a scene (.toml) nor a mesh (.ply, .obj, .stl, .glb)`);
+    } else throw new Error(`${file.name} is neither a scene (.toml, .json) nor a mesh (.ply, .obj, .stl, .glb)`);
   }
   if (!scene && mesh) scene = { name: mesh, toml: FALLING(mesh) };
   if (!scene) return;

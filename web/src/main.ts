@@ -1,5 +1,5 @@
 import "./style.css";
-import { h, iconButton, type Leave, type Page } from "./dom";
+import { h, iconButton, say, type Leave, type Page } from "./dom";
 
 const main = document.getElementById("main")!;
 const nav = document.getElementById("nav")!;
@@ -92,6 +92,14 @@ async function go(): Promise<void> {
   document.title = "tumble";
   main.append(h("div", { class: "narrow" }, h("h1", {}, "There is no such page"), h("p", {}, h("a", { href: "#/" }, "To the gallery"))));
 }
+
+// Scenes and meshes may be dropped on any page.
+addEventListener("dragover", (event) => event.preventDefault());
+addEventListener("drop", (event) => {
+  event.preventDefault();
+  const files = [...(event.dataTransfer?.files ?? [])];
+  if (files.length) void import("./drop").then(({ acceptFiles }) => acceptFiles(files)).catch((error) => say(String(error.message ?? error)));
+});
 
 addEventListener("hashchange", () => void go());
 void go();

@@ -282,6 +282,14 @@ describe("files", () => {
     const { page, errors } = await own.open("", STILL);
     await page.setInputFiles("#file", { name: "notes.txt", mimeType: "text/plain", buffer: Buffer.from("x") });
     await page.waitForFunction(() => /neither a scene/.test(document.getElementById("say")?.textContent ?? ""));
+    await page.setInputFiles("#file", { name: "one.json", mimeType: "application/json", buffer: Buffer.from(JSON.stringify({ version: 1, title: "one mass", particles: [{ name: "p", position: [[0, 0, 1]] }] })) });
+    await ready(page);
+    assert.equal(await page.evaluate(() => (window as any).tumble.session.info.title), "one mass");
+    await page.evaluate(() => {
+      delete document.getElementById("main")!.dataset.ready;
+      location.hash = "#/";
+    });
+    await page.waitForSelector("#file", { state: "attached" });
     await page.setInputFiles("#file", `${SCENES}/assets/bunny.ply`);
     await ready(page);
     const info = await page.evaluate(() => (window as any).tumble.session.info);

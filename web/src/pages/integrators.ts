@@ -147,6 +147,9 @@ interface Run {
   path: [number, number][];
   first: number;
   dead: string;
+  /** Steps that the scheme took, and the shortest [s]. */
+  steps: number;
+  shortest: number;
   canvas: HTMLCanvasElement;
   ratio: HTMLElement;
   verdict: HTMLElement;
@@ -314,7 +317,7 @@ export const page: Page = async (main) => {
       const verdict = h("p", { class: "verdict" });
       const predicted = h("p", { class: "muted predicted" });
       const card = h("article", { class: "run", "data-scheme": scheme, style: `--curve:${curveColor(k)}` }, h("div", { class: "run-head" }, h("h2", {}, plain(scheme)), h("button", { type: "button", class: "as-scene", "aria-label": `Open ${plain(scheme)} as a scene`, title: "Open as a scene, with its text and values", onclick: () => void asScene(scheme) }, "↗")), canvas, h("div", { class: "run-figure" }, h("span", { class: "muted" }, s.field ? "r / r₀" : "E / E₀"), ratio), predicted, verdict);
-      return { world: 10 + k, scheme, info: null, frame: null, n: 0, quantity: [], error: [], path: [], first: 0, dead: "", canvas, ratio, verdict, predicted, card };
+      return { world: 10 + k, scheme, info: null, frame: null, n: 0, quantity: [], error: [], path: [], first: 0, dead: "", steps: 0, shortest: Infinity, canvas, ratio, verdict, predicted, card };
     });
     board.replaceChildren(...runs.map((r) => r.card));
     energyTitle.textContent = s.field ? "Radius, r / r₀" : "Energy, E / E₀";
@@ -366,6 +369,8 @@ export const page: Page = async (main) => {
     });
     if (s.field) run.quantity[frame.index] = quantityOf(run, undefined, frame);
     run.n = frame.index;
+    run.steps += frame.report?.steps ?? 0;
+    run.shortest = Math.min(run.shortest, frame.report?.step_range?.[0] ?? Infinity);
     const columns = frame.columns[s.object] ?? {};
     const x = columns.position?.data;
     if (x) {
@@ -397,7 +402,7 @@ export const page: Page = async (main) => {
       const predict = system === "spring" ? PREDICTED[run.scheme] : undefined;
       const z = W * step;
       run.predicted.textContent = predict ? `formula: ${show(predict(z, run.n), 4)}` : "";
-      run.verdict.textContent = run.dead || judge(run.scheme);
+      run.verdict.textContent = run.dead || (ADAPTIVE.has(run.scheme) && run.steps ? `chose ${run.steps} steps so far, the shortest ${show(run.shortest, 2)} s` : judge(run.scheme));
       run.verdict.classList.toggle("bad", !!run.dead || /too long|no step/.test(run.verdict.textContent));
       sketch(run, curveColor(k));
     });

@@ -3,7 +3,7 @@ import { parse } from "smol-toml";
 import { check, choice, h, iconButton, saveAs, say, setIcon, show, svg, ICONS, type Page } from "../dom";
 import { EngineError } from "../engine/client";
 import type { Cure, Failure, SceneInfo, Value } from "../engine/protocol";
-import { acceptFiles, opened } from "../drop";
+import { opened } from "../drop";
 import { npz } from "../npz";
 import { Panel } from "../panel";
 import { curveColor, legend, Plot, type Curve } from "../plot";
@@ -455,13 +455,6 @@ export const page: Page = async (main, rest) => {
     drawEnergy();
   };
   addEventListener("themechange", theme);
-  const drag = (event: DragEvent) => event.preventDefault();
-  const drop = (event: DragEvent) => {
-    event.preventDefault();
-    void acceptFiles([...(event.dataTransfer?.files ?? [])]).catch((e) => say(String(e.message ?? e)));
-  };
-  addEventListener("dragover", drag);
-  addEventListener("drop", drop);
   const offKeys = keys(session, stage);
   const restarted = (message: string) => {
     complain({ kind: "crash", message: `${message}\nThe scene stands at its start again.`, issues: [] });
@@ -500,8 +493,6 @@ export const page: Page = async (main, rest) => {
 
   return () => {
     removeEventListener("themechange", theme);
-    removeEventListener("dragover", drag);
-    removeEventListener("drop", drop);
     offKeys();
     offPointers();
     if (recorder) recorder.stop();
