@@ -93,16 +93,29 @@ def _hide(found: Floats, thing: Body, camera: Camera) -> None:
     corners = vertices[triangles]
     seen = camera.project(vertices)[triangles]
     whole = (seen[..., 2] > NEAR).all(axis=1)
-    edges = np.linalg.norm((seen - np.roll(seen, 1, axis=1))[..., :2], axis=2).max(axis=1)
-    wanted = np.where(whole, np.clip(edges / 0.45, 1, 1024), 512)
-    fine = 1 << np.ceil(np.log2(wanted)).astype(int)
+    sides = np.linalg.norm((np.roll(seen, -1, axis=1) - seen)[..., :2], axis=2)
+    # The longest side first: points lie in rows along it.
+    turn = (np.argmax(sides, axis=1)[:, None] + np.arange(3)) % 3
+    corners, seen = (np.take_along_axis(x, turn[..., None], axis=1) for x in (corners, seen))
+    edges = sides.max(axis=1)
+    (ax, ay), (bx, by) = (seen[:, 1] - seen[:, 0])[:, :2].T, (seen[:, 2] - seen[:, 0])[:, :2].T
+    with np.errstate(invalid="ignore"):
+        high = np.nan_to_num(np.abs(ax * by - ay * bx) / np.maximum(edges, 1e-12))
+    fine, rows = (
+        1 << np.ceil(np.log2(np.where(whole, np.clip(length / 0.45, 1, 1024), 512))).astype(int)
+        for length in (edges, high)
+    )
     outside = (seen[..., :2].max(axis=1) < 0).any(axis=1) | (seen[..., :2].min(axis=1) > (width, height)).any(axis=1)
     fine[whole & outside] = 0
     fine[(seen[..., 2] <= NEAR).all(axis=1)] = 0
-    for n in np.unique(fine[fine > 0]).tolist():
-        i, j = (w[np.add(*np.indices((n + 1, n + 1))) <= n] / n for w in np.indices((n + 1, n + 1)))
-        weights = np.stack([i, j, 1 - i - j], axis=1)
-        some = corners[fine == n]
+    for n, m in np.unique(np.stack([fine, rows], axis=1)[fine > 0], axis=0).tolist():
+        i, j = (w / d for w, d in zip(np.indices((n + 1, m + 1)), (n, m), strict=True))
+        if n == m:
+            i, j = (w[np.add(*np.indices((n + 1, n + 1))) <= n] for w in (i, j))
+            weights = np.stack([i, j, 1 - i - j], axis=1)
+        else:
+            weights = np.stack([(1 - j) * (1 - i), (1 - j) * i, j], axis=-1).reshape(-1, 3)
+        some = corners[(fine == n) & (rows == m)]
         for begin in range(0, len(some), max(CHUNK // len(weights), 1)):
             part = some[begin : begin + max(CHUNK // len(weights), 1)]
             x, y, z = camera.project(np.einsum("wk,tkd->twd", weights, part).reshape(-1, 3)).T
