@@ -30,6 +30,15 @@ const visit = async (page: Page, path: string) => {
   await ready(page);
 };
 
+describe("theory", () => {
+  it("is cited by tags that stand in docs", () => {
+    const cited = ["src/theory.ts", "src/pages/fluid.ts", "src/pages/integrators.ts"].flatMap((f) => [...readFileSync(f, "utf8").matchAll(/"([a-z]+)\.(\d+)"/g)].map((m) => [m[1], m[2]]));
+    const text = (page: string) => readFileSync(`../docs/theory/${page}.md`, "utf8");
+    assert.ok(cited.length > 30);
+    assert.deepEqual(cited.filter(([page, k]) => !text(page).includes(`(${page}.${k})`)), []);
+  });
+});
+
 describe("gallery", () => {
   it("shows every scene that ships, with a picture", async () => {
     const { page, errors } = await own.open("");
