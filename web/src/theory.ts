@@ -15,13 +15,22 @@ const SCHEMES: Record<string, string> = {
 };
 
 const FORCES: Record<string, Topic> = {
-  attraction: { page: "orbits", tags: ["orbits.1"] },
+  attraction: { page: "orbits", tags: ["orbits.1", "orbits.2"] },
   gravitation: { page: "orbits", tags: ["orbits.11"] },
-  flock: { page: "flocks", tags: ["flocks.1"] },
-  magnetic: { page: "particles", tags: [] },
-  electric: { page: "particles", tags: [] },
-  electrostatics: { page: "particles", tags: [] },
-  pair: { page: "neighbours", tags: ["neighbours.1"] },
+  flock: { page: "flocks", tags: ["flocks.1", "flocks.3"] },
+  drag: { page: "particles", tags: ["particles.3"] },
+  wind: { page: "particles", tags: ["particles.4"] },
+  vortex: { page: "particles", tags: ["particles.6"] },
+  propulsion: { page: "particles", tags: ["particles.7"] },
+  magnetic: { page: "particles", tags: ["particles.8"] },
+  electric: { page: "particles", tags: ["particles.9"] },
+  turbulence: { page: "particles", tags: ["particles.10"] },
+  acceleration: { page: "particles", tags: ["particles.1"] },
+  formula: { page: "particles", tags: ["particles.1"] },
+  lennard_jones: { page: "neighbours", tags: ["neighbours.5"] },
+  repulsion: { page: "neighbours", tags: ["neighbours.7"] },
+  cohesion: { page: "neighbours", tags: ["neighbours.8"] },
+  viscosity: { page: "neighbours", tags: ["neighbours.9"] },
 };
 
 /** What a scene is about, the most special first. */
@@ -34,12 +43,14 @@ export function topics(info: SceneInfo): Topic[] {
   if (has("heat")) found.push({ page: "heat", tags: ["heat.1"] });
   if (has("compressible")) found.push({ page: "compressible", tags: ["compressible.1"] });
   if (info.systems.some((s) => s.method === "vicsek")) found.push({ page: "flocks", tags: ["flocks.1"] });
-  for (const force of scene.force ?? []) if (FORCES[force.kind]) found.push(FORCES[force.kind]);
+  for (const force of [...(scene.force ?? []), ...(scene.field ?? [])]) if (FORCES[force.kind] && force.kind !== "drag") found.push(FORCES[force.kind]);
   if ((scene.rope ?? []).some((r: any) => r.rod)) found.push({ page: "rods", tags: ["rods.1"] });
-  if ((scene.block ?? []).some((b: any) => b.material)) found.push({ page: "solids", tags: [] });
-  if (["sheet", "rope", "block", "net"].some(has) || (scene.particles ?? []).some((p: any) => p.spring?.length)) found.push({ page: "springs", tags: ["springs.1", "springs.2"] });
+  if ((scene.block ?? []).some((b: any) => b.material)) found.push({ page: "solids", tags: ["solids.1", "solids.4"] });
+  if (["sheet", "block", "net"].some(has) || (scene.rope ?? []).some((r: any) => !r.rod) || (scene.particles ?? []).some((p: any) => p.spring?.length)) found.push({ page: "springs", tags: ["springs.1", "springs.2"] });
   if (has("collider") && !has("gas")) found.push({ page: "contact", tags: ["contact.1"] });
-  if (has("emitter")) found.push({ page: "particles", tags: [] });
+  // Almost every scene has some drag; none is about it.
+  if ((scene.force ?? []).some((f: any) => f.kind === "drag")) found.push(FORCES.drag);
+  if (has("emitter")) found.push({ page: "particles", tags: ["particles.2"] });
   const schemes = [...new Set(info.systems.filter((s) => ["dynamics", "tracers"].includes(s.method)).map((s) => s.integrator))];
   if (schemes.length) found.push({ page: "integrators", tags: schemes.map((s) => `integrators.${SCHEMES[s] ?? "1"}`) });
   const pages = new Map<string, Topic>();

@@ -26,6 +26,8 @@ export async function lab(): Promise<Lab> {
     browser,
     async open(path, options = {}) {
       const context = await browser.newContext({ viewport: { width: 1280, height: 800 }, ...options });
+      // Machines that do other things, too, are slow; nothing here waits longer than it must.
+      context.setDefaultTimeout(90_000);
       const page = await context.newPage();
       const errors: string[] = [];
       page.on("pageerror", (e) => errors.push(String(e)));
@@ -44,6 +46,6 @@ export async function lab(): Promise<Lab> {
 }
 
 /** Waits until the scene page shows a frame at or after this one. */
-export async function frame(page: Page, index: number, timeout = 60_000): Promise<void> {
+export async function frame(page: Page, index: number, timeout = 90_000): Promise<void> {
   await page.waitForFunction((i) => Number(document.getElementById("main")!.dataset.frame ?? -1) >= i, index, { timeout });
 }

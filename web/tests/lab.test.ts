@@ -30,6 +30,15 @@ const visit = async (page: Page, path: string) => {
   await ready(page);
 };
 
+describe("theory", () => {
+  it("is cited by tags that stand in docs", () => {
+    const cited = ["src/theory.ts", "src/pages/fluid.ts", "src/pages/integrators.ts"].flatMap((f) => [...readFileSync(f, "utf8").matchAll(/"([a-z]+)\.(\d+)"/g)].map((m) => [m[1], m[2]]));
+    const text = (page: string) => readFileSync(`../docs/theory/${page}.md`, "utf8");
+    assert.ok(cited.length > 30);
+    assert.deepEqual(cited.filter(([page, k]) => !text(page).includes(`(${page}.${k})`)), []);
+  });
+});
+
 describe("gallery", () => {
   it("shows every scene that ships, with a picture", async () => {
     const { page, errors } = await own.open("");
@@ -175,7 +184,7 @@ describe("scenes", () => {
     await page.mouse.move(at.x, at.y - 80, { steps: 3 });
     await frame(page, 4);
     // Alone it would stay on the axis for ever.
-    await page.waitForFunction(() => Math.abs((window as any).tumble.session.shown.columns.spring.position.data[5]) > 0.05, null, { timeout: 20_000 });
+    await page.waitForFunction(() => Math.abs((window as any).tumble.session.shown.columns.spring.position.data[5]) > 0.05);
     await page.mouse.up();
     assert.deepEqual(errors, []);
     await page.context().close();
@@ -304,7 +313,7 @@ describe("files", () => {
     await ready(page);
     await page.evaluate(() => (window as any).tumble.session.goto(5).catch(() => {}));
     await page.click("text=Look for a cure");
-    await page.waitForSelector(".cures li", { timeout: 60_000 });
+    await page.waitForSelector(".cures li");
     const cures = await page.$$eval(".cures li", (all) => all.map((l) => l.textContent ?? ""));
     assert.ok(cures.some((c) => /implicit|symplectic|step/.test(c) && /Take it/.test(c)), cures.join("; "));
     await page.locator(".cures button").first().click();
@@ -372,7 +381,7 @@ describe("walls", () => {
     await page.mouse.down();
     for (let i = 1; i < 8; i++) await page.mouse.move(box.x + (0.5 + 0.02 * i) * box.width, box.y + (0.3 + 0.05 * i) * box.height);
     await page.mouse.up();
-    await page.waitForFunction(() => (window as any).tumble.session.info.objects.some((o: any) => o.kind === "collider"), null, { timeout: 20_000 });
+    await page.waitForFunction(() => (window as any).tumble.session.info.objects.some((o: any) => o.kind === "collider"));
     assert.ok((await page.evaluate(() => (window as any).tumble.session.latest)) >= 3, "the fluid began anew");
     assert.deepEqual(errors, []);
     await page.context().close();
@@ -387,7 +396,7 @@ describe("integrators", () => {
       page.waitForFunction(([s, n]) => {
         const out = document.querySelector(`[data-ratio=${s}]`) as HTMLElement | null;
         return out && Number(out.dataset.steps) >= Number(n) ? { ratio: Number(out.dataset.value), steps: Number(out.dataset.steps) } : false;
-      }, [scheme, steps] as const, { timeout: 60_000 }).then((handle) => handle.jsonValue() as Promise<{ ratio: number; steps: number }>);
+      }, [scheme, steps] as const).then((handle) => handle.jsonValue() as Promise<{ ratio: number; steps: number }>);
     // z = 2π 0.05: implicit Euler keeps 1/(1 + z²) of the energy a step.
     const z = 2 * Math.PI * 0.05;
     const implicit = await shown("implicit_euler", 20);
@@ -405,7 +414,7 @@ describe("integrators", () => {
     assert.ok(symplectic.ratio > 0.8 && symplectic.ratio < 1.25, `${symplectic.ratio}`);
     // Beyond its limit the engine stops it, and the page says so.
     await page.click("text=Beyond the limit");
-    await page.waitForFunction(() => /blew up/.test(document.querySelector("[data-scheme=symplectic_euler] .verdict")?.textContent ?? ""), null, { timeout: 60_000 });
+    await page.waitForFunction(() => /blew up/.test(document.querySelector("[data-scheme=symplectic_euler] .verdict")?.textContent ?? ""));
     assert.deepEqual(errors, []);
     await page.context().close();
   });

@@ -1,9 +1,10 @@
 /** The picture of a world: objects in layers, a camera, light. It draws when something has changed, never by itself. */
 import * as THREE from "three";
 import { OrbitControls } from "three/examples/jsm/controls/OrbitControls.js";
-import type { Column, Columns, Frame, Numbers, SceneInfo, Vector } from "../engine/protocol";
-import { mapOf, PALETTE, SIGNED, table } from "./colors";
+import type { Column, Frame, Numbers, SceneInfo, Vector } from "../engine/protocol";
+import { mapOf, PALETTE, SIGNED } from "./colors";
 import { gridOf, PIXELS, PlaneField, Pieces, Points, Range, scalars, SpaceField, Surface, type Grid, type Layer, type Rgb } from "./layers";
+import { arrows, carry, countOf, leapOf, matched, outline, palette, pick, planeOf, sharp } from "./scenery";
 
 /** How fields and objects are shown; of all objects together. */
 export interface Look {
@@ -527,56 +528,13 @@ export class Stage {
       if (this.look.slice === null) this.legend = null;
       thing.body.set(name, values, name === "temperature" && this.look.slice === null ? [Math.min(low + 0.02 * (high - low), high - 1e-9), high] : [low, high], this.look.slice === null ? hot : undefined);
     }
-    if (thing.arrows) this.arrows(thing, grid, columns.velocity);
-  }
-
-  private arrows(thing: Thing, grid: Grid, velocity: Column | undefined): void {
     if (!thing.arrows) return;
-    thing.arrows.object.visible = this.look.arrows && !!velocity;
-    if (!this.look.arrows || !velocity) return;
-    const [a, b] = [0, 1, 2].filter((axis) => axis !== grid.flat);
-    const n = grid.cells[a];
-    const m = grid.cells[b];
-    const every = Math.max(1, Math.round(Math.max(n, m) / 40));
-    const v = velocity.data;
-    let range = thing.ranges.get("arrows");
-    if (!range) thing.ranges.set("arrows", (range = new Range("speed")));
-    range.look(scalars(velocity));
-    const scale = range.high > 0 ? (1.6 * every * grid.spacing) / range.high : 0;
-    const across = grid.origin[grid.flat] + 0.5 * grid.spacing;
-    const { start, end, tint } = thing.arrows.begin(3 * Math.ceil(n / every) * Math.ceil(m / every));
-    let k = 0;
-    const put = (p: number[], q: number[]) => {
-      for (let d = 0; d < 3; d++) {
-        start[3 * k + d] = p[d];
-        end[3 * k + d] = q[d];
-      }
-      const c = this.dark || !(this.look.dye && this.look.field === "density") ? 0.95 : 0.1;
-      tint.set([c, c, c, 0.85], 4 * k);
-      k++;
-    };
-    const at = (u: number, w: number) => {
-      const p = [0, 0, 0];
-      p[a] = u;
-      p[b] = w;
-      p[grid.flat] = across;
-      return p;
-    };
-    for (let j = Math.floor(every / 2); j < m; j += every) {
-      for (let i = Math.floor(every / 2); i < n; i += every) {
-        const c = i + n * j;
-        const vx = v[2 * c] * scale;
-        const vy = v[2 * c + 1] * scale;
-        const length = Math.hypot(vx, vy);
-        if (!(length > 0.12 * every * grid.spacing)) continue;
-        const x = grid.origin[a] + (i + 0.5) * grid.spacing;
-        const y = grid.origin[b] + (j + 0.5) * grid.spacing;
-        const tip = at(x + 0.5 * vx, y + 0.5 * vy);
-        put(at(x - 0.5 * vx, y - 0.5 * vy), tip);
-        for (const s of [1, -1]) put(tip, at(x + 0.5 * vx - 0.28 * (vx - 0.6 * s * vy), y + 0.5 * vy - 0.28 * (vy + 0.6 * s * vx)));
-      }
-    }
-    thing.arrows.done(k);
+    thing.arrows.object.visible = this.look.arrows && !!columns.velocity;
+    if (!thing.arrows.object.visible) return;
+    let fastest = thing.ranges.get("arrows");
+    if (!fastest) thing.ranges.set("arrows", (fastest = new Range("speed")));
+    fastest.look(scalars(columns.velocity));
+    arrows(thing.arrows, grid, columns.velocity, fastest.high, this.dark || !(this.look.dye && this.look.field === "density") ? 0.95 : 0.1);
   }
 
   private masses(thing: Thing, columns: Record<string, Column>, frame: Frame): void {
@@ -825,95 +783,6 @@ export class Stage {
   }
 }
 
-/** How many masses an object of particles has, about. */
-function countOf(entry: Entry): number {
-  if (Array.isArray(entry.position)) return entry.position.length;
-  return Number(entry.cloud?.count ?? entry.stars ?? 1e6);
-}
-
-function planeOf(shape: unknown): [THREE.Vector3, THREE.Vector3] | undefined {
-  const s = (shape ?? {}) as Entry;
-  if ("floor" in s) return [new THREE.Vector3(0, 0, Number(s.floor?.height ?? 0)), new THREE.Vector3(0, 0, 1)];
-  if ("plane" in s) return [new THREE.Vector3(...((s.plane.point ?? [0, 0, 0]) as Vector)), new THREE.Vector3(...(s.plane.normal as Vector)).normalize()];
-  return undefined;
-}
-
-/** A step farther than this is none: the particle has left a square that repeats itself on the other side. */
-function leapOf(info: SceneInfo, system: string | undefined): number {
-  const systems = (Array.isArray(info.scene.system) ? info.scene.system : []) as Entry[];
-  const side = systems.find((s) => s.name === system)?.vicsek?.side;
-  return side ? Number(side) / 2 : Infinity;
-}
-
-function carry(columns: Record<string, Column>, point: THREE.Vector3, normal: THREE.Vector3): void {
-  if (!columns.turn) return;
-  const q = new THREE.Quaternion(...([...columns.turn.data] as [number, number, number, number]));
-  point.applyQuaternion(q).add(new THREE.Vector3(...([...(columns.translation?.data ?? [0, 0, 0])] as Vector)));
-  normal.applyQuaternion(q);
-}
-
-/** A line around a grid in a plane. */
-function outline(line: Pieces, grid: Grid): void {
-  const [a, b] = [0, 1, 2].filter((axis) => axis !== grid.flat);
-  const corners = [[0, 0], [1, 0], [1, 1], [0, 1]].flatMap(([u, v]) => {
-    const p = grid.origin.map((o, axis) => o + 0.5 * grid.cells[axis] * grid.spacing);
-    p[a] = grid.origin[a] + u * grid.cells[a] * grid.spacing;
-    p[b] = grid.origin[b] + v * grid.cells[b] * grid.spacing;
-    return p;
-  });
-  line.pairs(Float32Array.from(corners), Uint32Array.from([0, 1, 1, 2, 2, 3, 3, 0]), [0.35, 0.37, 0.4]);
-}
-
-/** Pairs of vertices along sharp edges of a mesh; of a round one all. */
-function sharp(x: Numbers, triangles: Numbers): Uint32Array {
-  const faces = new Map<string, THREE.Vector3[]>();
-  const point = (i: number) => new THREE.Vector3(x[3 * i], x[3 * i + 1], x[3 * i + 2]);
-  for (let t = 0; t < triangles.length; t += 3) {
-    const [a, b, c] = [triangles[t], triangles[t + 1], triangles[t + 2]];
-    const normal = point(b).sub(point(a)).cross(point(c).sub(point(a))).normalize();
-    for (const [p, q] of [[a, b], [b, c], [c, a]]) {
-      const key = `${Math.min(p, q)} ${Math.max(p, q)}`;
-      faces.set(key, [...(faces.get(key) ?? []), normal]);
-    }
-  }
-  const pairs = [...faces].map(([key, n]) => ({ ends: key.split(" ").map(Number), sharp: n.length !== 2 || n[0].dot(n[1]) < 0.7 }));
-  const some = pairs.filter((p) => p.sharp);
-  return Uint32Array.from((some.length ? some : pairs).flatMap((p) => p.ends));
-}
-
-/** Rows of particles that are in two frames. */
-function* matched(before: Numbers | undefined, after: Numbers | undefined, n: number, m: number): Generator<[number, number]> {
-  if (before && after) {
-    const rows = new Map<number, number>();
-    for (let i = 0; i < n; i++) rows.set(before[i], i);
-    for (let j = 0; j < m; j++) {
-      const i = rows.get(after[j]);
-      if (i !== undefined) yield [i, j];
-    }
-  } else for (let i = 0; i < Math.min(n, m); i++) yield [i, i];
-}
-
-const PALETTES = new Map<string, Float32Array>();
-
-/** A map of colours in linear light. */
-function palette(name: Parameters<typeof table>[0]): Float32Array {
-  let known = PALETTES.get(name);
-  if (!known) {
-    const bytes = table(name);
-    const c = new THREE.Color();
-    known = new Float32Array(256 * 3);
-    for (let i = 0; i < 256; i++) known.set(c.setRGB(bytes[4 * i] / 255, bytes[4 * i + 1] / 255, bytes[4 * i + 2] / 255, THREE.SRGBColorSpace).toArray(), 3 * i);
-    PALETTES.set(name, known);
-  }
-  return known;
-}
-
-function pick(map: Float32Array, share: number): Rgb {
-  const i = 3 * Math.round(255 * Math.min(Math.max(share || 0, 0), 1));
-  return [map[i], map[i + 1], map[i + 2]];
-}
-
 /** Which map the legend shows. */
 export const legendMap = (name: string) => (name === "strain" ? ("RdBu_r" as const) : name === "speed" ? ("viridis" as const) : mapOf(name));
 
-export type { Columns };

@@ -98,8 +98,8 @@ macro_rules! width {
             }
             #[inline(always)]
             fn spread(self, of_rows: &[Real], at: usize) -> Self::L {
-                let mut numbers = [0.0; ($n + 3) / 4];
-                numbers.copy_from_slice(&of_rows[at / 4..at / 4 + ($n + 3) / 4]);
+                let mut numbers = [0.0; usize::div_ceil($n, 4)];
+                numbers.copy_from_slice(&of_rows[at / 4..at / 4 + usize::div_ceil($n, 4)]);
                 self.each_four_times(numbers)
             }
             #[inline(always)]
