@@ -144,13 +144,13 @@ def test_an_unwritable_folder_is_a_clear_error(spring: Tree, tmp_path: Path, mon
         raise PermissionError(errno.EACCES, "Permission denied", str(self))
 
     monkeypatch.setattr(Path, "mkdir", mkdir)
-    with pytest.raises(ExportError, match=r"cannot be written \(Permission denied\).*--out"):
+    with pytest.raises(SceneError, match=r"cannot be written \(Permission denied\).*--out"):
         simulate(spring, tmp_path / "run")
 
 
 def test_a_file_in_the_way_of_the_folder_is_a_clear_error(spring: Tree, tmp_path: Path) -> None:
     (tmp_path / "file").write_text("mine")
-    with pytest.raises(ExportError, match=r"file where a folder should be.*--out"):
+    with pytest.raises(SceneError, match=r"file where a folder should be.*--out"):
         simulate(spring, tmp_path / "file" / "run")
     with pytest.raises(SceneError, match=r"is a file.*--out"):
         simulate(spring, tmp_path / "file")
