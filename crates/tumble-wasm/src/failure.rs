@@ -3,9 +3,13 @@
 use serde::Serialize;
 use tumble_interface::{Issue, SceneError, StepError};
 
-/// `Failure` of web/src/engine/protocol.ts.
+/// `Failure` of web/src/engine/protocol.ts, boxed: it is rare and large.
 #[derive(Serialize)]
-pub struct Failure {
+#[serde(transparent)]
+pub struct Failure(Box<Words>);
+
+#[derive(Serialize)]
+struct Words {
     kind: &'static str,
     message: String,
     issues: Vec<Issue>,
@@ -16,7 +20,7 @@ pub struct Failure {
 
 impl Failure {
     fn new(kind: &'static str, message: String) -> Self {
-        Self { kind, message, issues: Vec::new(), line: None, path: None, missing: Vec::new() }
+        Self(Box::new(Words { kind, message, issues: Vec::new(), line: None, path: None, missing: Vec::new() }))
     }
 
     /// More than the browser has.
@@ -31,7 +35,7 @@ impl Failure {
 
     /// The same, with the mesh files that are missing.
     pub fn missing(mut self, files: Vec<String>) -> Self {
-        self.missing = files;
+        self.0.missing = files;
         self
     }
 }
@@ -39,9 +43,9 @@ impl Failure {
 impl From<SceneError> for Failure {
     fn from(error: SceneError) -> Self {
         let mut failure = Self::new("scene", error.to_string());
-        failure.line = error.issues.first().and_then(|issue| issue.line);
-        failure.path = error.issues.first().map(|issue| issue.path.clone());
-        failure.issues = error.issues;
+        failure.0.line = error.issues.first().and_then(|issue| issue.line);
+        failure.0.path = error.issues.first().map(|issue| issue.path.clone());
+        failure.0.issues = error.issues;
         failure
     }
 }
