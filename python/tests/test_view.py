@@ -103,7 +103,9 @@ def test_what_is_not_built_is_said(built: Path, tumble: Command) -> None:
 
 @pytest.mark.skipif(sys.platform == "win32", reason="no SIGINT to a child")
 def test_ctrl_c_ends_it(built: Path) -> None:
-    code = f"from pathlib import Path; from tumble.cli import main, view; view.BUILT = Path({str(built)!r}); main()"
+    # A job in the background is born deaf to Ctrl-C.
+    listen = "import signal; signal.signal(signal.SIGINT, signal.default_int_handler)"
+    code = f"{listen}; from pathlib import Path; from tumble.cli import main, view; view.BUILT = Path({str(built)!r}); main()"
     command = [sys.executable, "-c", code, "view", "rope", "--no-open"]
     with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as child:
         assert child.stdout is not None
@@ -111,5 +113,8 @@ def test_ctrl_c_ends_it(built: Path) -> None:
         assert url.startswith("http://127.0.0.1:") and url.endswith("/?view#/scene/structures/rope\n")
         assert get(url.split("#")[0])[0] == 200
         child.send_signal(signal.SIGINT)
-        _, errors = child.communicate(timeout=20)
+        try:
+            _, errors = child.communicate(timeout=20)
+        finally:
+            child.kill()
     assert child.returncode == 0 and errors == ""
