@@ -201,7 +201,7 @@ impl Read<'_, '_> {
             }
         };
         let value = |x: [f64; 3]| formula.at(0.0, Vec3::from(x), [0.0; 3].into())[0];
-        let field = Field::of(*grid, Place::Cell, unit, &value).ok()?;
+        let field = Field::of(*grid, Place::Cell, unit, value).ok()?;
         let bad = field.each().find(|at| {
             let value = f64::from(field.value(*at));
             !(value.is_finite() && value >= least)
