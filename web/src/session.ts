@@ -267,11 +267,27 @@ export class Session {
     else await this.forward(1, false).catch((error) => this.fail(error));
   }
 
+  /** One sub-step on: a look inside the frame, until it is whole. What came after the frame that is shown is gone. */
+  async substep(): Promise<void> {
+    this.pause();
+    try {
+      await this.branch();
+      const substeps = (this.shown?.inside?.substeps ?? 0) + 1;
+      const found = await this.queue(() => this.engine.inside(substeps, this.wanted(), this.world));
+      if (found) this.display(found);
+      else await this.forward(1, false);
+    } catch (error) {
+      this.fail(error);
+    }
+  }
+
   /** One frame back. */
   previous(): void {
     this.pause();
     const shown = this.shown?.index ?? 0;
-    const kept = this.kept.filter((i) => i < shown).pop();
+    // From between two frames to the one before.
+    const before = this.shown?.inside ? shown + 1 : shown;
+    const kept = this.kept.filter((i) => i < before).pop();
     if (kept !== undefined) this.display(this.frames.get(kept)!);
   }
 

@@ -14,7 +14,7 @@ use failure::Failure;
 use hand::{Hand, Held};
 use load::Loaded;
 use serde::Serialize;
-use tumble_interface::engine::Engine;
+use tumble_interface::engine::{Engine, Ledger};
 use tumble_interface::tree::Node;
 use tumble_interface::{Column, Data, SceneError};
 use wasm_bindgen::prelude::*;
@@ -113,6 +113,26 @@ impl World {
         }
     }
 
+    /// Looks at the named columns after so many sub-steps of the next frame, without going there; `null` where the frame has no more.
+    /// { columns, about: JSON of system, step [s], time [s] and ledger }. Throws a failure as JSON.
+    pub fn inside(&mut self, substeps: f64, names: Vec<String>, limit: f64) -> Answer<Option<js_sys::Object>> {
+        let end = now() + limit;
+        let names: Vec<&str> = names.iter().map(String::as_str).collect();
+        match self.loaded.world.inside(substeps.max(1.0) as u64, &names, &|| now() < end) {
+            Ok(Some(inside)) => {
+                let about = serde_json::json!({
+                    "system": inside.system,
+                    "step": inside.step,
+                    "time": inside.frame.time,
+                    "ledger": Books::of(inside.ledger),
+                });
+                Ok(Some(arrays::with_columns(inside.frame.columns, &about.to_string())))
+            }
+            Ok(None) => Ok(None),
+            Err(error) => Err(thrown(Failure::step(&error))),
+        }
+    }
+
     /// Frames simulated so far.
     pub fn index(&self) -> f64 {
         self.loaded.world.frame_index() as f64
@@ -125,14 +145,7 @@ impl World {
 
     /// The books now, as JSON.
     pub fn ledger(&self) -> String {
-        #[derive(Serialize)]
-        struct Books {
-            #[serde(flatten)]
-            ledger: tumble_interface::engine::Ledger,
-            energy: f64,
-        }
-        let ledger = self.loaded.world.ledger();
-        json(&Books { energy: ledger.energy(), ledger })
+        json(&Books::of(self.loaded.world.ledger()))
     }
 
     /// Hash of everything that the next step depends on.
@@ -205,6 +218,20 @@ impl World {
     /// Sets a column of an object.
     pub fn write(&mut self, object: &str, column: &str, values: Vec<f64>) -> Answer<()> {
         self.loaded.world.write(object, column, &values).map_err(|e| self.loaded.wrong(e))
+    }
+}
+
+/// A ledger with its sum.
+#[derive(Serialize)]
+struct Books {
+    #[serde(flatten)]
+    ledger: Ledger,
+    energy: f64,
+}
+
+impl Books {
+    fn of(ledger: Ledger) -> Self {
+        Self { energy: ledger.energy(), ledger }
     }
 }
 
