@@ -188,7 +188,12 @@ impl World {
     /// whose turn has not come are still at the start of their interval. Returns (columns, about) with about: system and step [s] of the
     /// last sub-step, time [s], ledger; None where the frame has no more sub-steps. Raises StepError for a sub-step that breaks.
     #[pyo3(signature = (substeps, *names))]
-    fn inside<'py>(&mut self, py: Python<'py>, substeps: u64, names: Vec<String>) -> PyResult<Option<(Bound<'py, PyDict>, Bound<'py, PyDict>)>> {
+    fn inside<'py>(
+        &mut self,
+        py: Python<'py>,
+        substeps: u64,
+        names: Vec<String>,
+    ) -> PyResult<Option<(Bound<'py, PyDict>, Bound<'py, PyDict>)>> {
         if substeps == 0 {
             return Err(scene_error(py, &SceneError::one("substeps", "0, expected >= 1")));
         }

@@ -72,7 +72,11 @@ impl World {
     }
 
     /// All intervals of a frame; `done` hears of each turn: which system, from when on [s], and what it took.
-    fn intervals(&mut self, go_on: &(dyn Fn() -> bool + Sync), mut done: impl FnMut(usize, f64, &StepReport)) -> Result<StepReport, StepError> {
+    fn intervals(
+        &mut self,
+        go_on: &(dyn Fn() -> bool + Sync),
+        mut done: impl FnMut(usize, f64, &StepReport),
+    ) -> Result<StepReport, StepError> {
         let mut report = StepReport::default();
         for k in 0..u64::from(self.exchanges) {
             // From whole numbers, so that time does not drift.
@@ -121,7 +125,9 @@ impl World {
             }
         });
         let seen = match (&result, last) {
-            (Ok(_), Some((system, time, step))) if asked.into_inner() > n && go_on() => Some(see(self, time, self.systems[system].name(), step)),
+            (Ok(_), Some((system, time, step))) if asked.into_inner() > n && go_on() => {
+                Some(see(self, time, self.systems[system].name(), step))
+            }
             _ => None,
         };
         self.roll_back();
