@@ -2,7 +2,6 @@
 
 mod arrays;
 mod failure;
-mod hand;
 mod load;
 
 #[cfg(not(feature = "double"))]
@@ -10,13 +9,13 @@ use tumble as engine;
 #[cfg(feature = "double")]
 use tumble_f64 as engine;
 
+use engine::scene::hand::{self, Hand, Held};
 use failure::Failure;
-use hand::{Hand, Held};
 use load::Loaded;
 use serde::Serialize;
+use tumble_interface::SceneError;
 use tumble_interface::engine::{Engine, Ledger};
 use tumble_interface::tree::Node;
-use tumble_interface::{Column, Data, SceneError};
 use wasm_bindgen::prelude::*;
 
 /// What goes out as JSON or as an error.
@@ -197,7 +196,7 @@ impl World {
         if self.hand.drag(object, row, target) {
             return Ok(());
         }
-        let (system, held) = Held::new(&mut self.loaded, object, row, target, stiffness).map_err(|e| self.loaded.wrong(e))?;
+        let (system, held) = Held::new(&mut self.loaded.world, object, row, target, stiffness).map_err(|e| self.loaded.wrong(e))?;
         if self.hand.take(&system, held) {
             self.loaded.world.add_force(&system, self.hand.force(&system)).map_err(|e| self.loaded.wrong(e))?;
         }
@@ -251,13 +250,4 @@ fn json(value: &impl Serialize) -> String {
 
 fn thrown(failure: Failure) -> JsValue {
     json(&failure).into()
-}
-
-/// The numbers of a column in double precision.
-fn numbers(column: &Column) -> Vec<f64> {
-    match &column.data {
-        Data::F32(v) => v.iter().map(|x| f64::from(*x)).collect(),
-        Data::F64(v) => v.clone(),
-        Data::U32(v) => v.iter().map(|x| f64::from(*x)).collect(),
-    }
 }
