@@ -116,6 +116,40 @@ describe("scenes", () => {
     await page.context().close();
   });
 
+  it("go sub-step by sub-step through a frame, and leave its bits alone", async () => {
+    const { page, errors } = await own.open("scene/structures/rope", STILL);
+    await ready(page);
+    const { substeps, straight, dt } = await page.evaluate(async () => {
+      const { session } = (window as any).tumble;
+      await session.goto(3);
+      const straight = await session.hash();
+      session.scrub(2);
+      return { substeps: session.info.scene.system[0].substeps as number, straight, dt: session.info.dt as number };
+    });
+    assert.ok(substeps > 3);
+    await page.focus(".stage");
+    const times: number[] = [];
+    for (let k = 1; k < substeps; k++) {
+      await page.keyboard.press(";");
+      await page.waitForFunction((n) => (window as any).tumble.session.shown.inside?.substeps === n, k);
+      times.push(await page.evaluate(() => (window as any).tumble.session.shown.time));
+    }
+    assert.match((await page.textContent(".clock")) ?? "", new RegExp(`^2 \\+ ${substeps - 1} sub-steps`));
+    const h = dt / substeps;
+    times.forEach((t, k) => assert.ok(Math.abs(t - (2 * dt + (k + 1) * h)) < 1e-9, `${k}: ${t}`));
+    // The last one makes the frame whole.
+    await page.click("[aria-label='One sub-step on']");
+    await page.waitForFunction(() => (window as any).tumble.session.shown.index === 3);
+    assert.equal(await page.evaluate(() => (window as any).tumble.session.hash()), straight);
+    // Back from between two frames is to the one before.
+    await page.keyboard.press(";");
+    await page.waitForFunction(() => (window as any).tumble.session.shown.inside);
+    await page.click("[aria-label='One frame back']");
+    assert.deepEqual(await page.evaluate(() => [(window as any).tumble.session.shown.index, !!(window as any).tumble.session.shown.inside]), [3, false]);
+    assert.deepEqual(errors, []);
+    await page.context().close();
+  });
+
   it("play by the space bar, go back, and go another way", async () => {
     const { page, errors } = await own.open("scene/structures/rope", STILL);
     await ready(page);
