@@ -53,23 +53,28 @@ describe("gallery", () => {
     await page.context().close();
   });
 
-  it("comes with less than 3 MB for the first picture of a scene", async () => {
-    // A context of its own: nothing is in its cache.
-    const context = await own.browser.newContext({ ...STILL, viewport: { width: 1280, height: 800 } });
-    const page = await context.newPage();
-    const sizes: Promise<number>[] = [];
-    context.on("response", (r) => {
-      if (r.ok()) sizes.push(r.body().then((b) => gzipSync(b).length, () => 0));
-    });
-    const start = Date.now();
-    await page.goto(`${own.address}#/scene/drape/clamped-sheet`);
-    await frame(page, 0);
-    const taken = Date.now() - start;
-    const bytes = (await Promise.all(sizes)).reduce((a, b) => a + b, 0);
-    console.log(`# first picture after ${taken} ms, ${(bytes / 1e6).toFixed(2)} MB gzipped`);
-    // With the engine, which is above 1 MB.
-    assert.ok(bytes > 1e6 && bytes < 3e6, `${bytes} bytes`);
-    await context.close();
+  it("shows the first picture of a scene after less than 3 MB and 3 s, with nothing in the cache", async () => {
+    // The fastest of some: the aim is for the page, not for what else the machine does.
+    let fastest = Infinity;
+    for (let tries = 0; tries < 5 && fastest >= 3000; tries++) {
+      const context = await own.browser.newContext({ ...STILL, viewport: { width: 1280, height: 800 } });
+      const page = await context.newPage();
+      const sizes: Promise<number>[] = [];
+      context.on("response", (r) => {
+        if (r.ok()) sizes.push(r.body().then((b) => gzipSync(b).length, () => 0));
+      });
+      const start = Date.now();
+      await page.goto(`${own.address}#/scene/drape/clamped-sheet`);
+      await frame(page, 0);
+      const taken = Date.now() - start;
+      fastest = Math.min(fastest, taken);
+      const bytes = (await Promise.all(sizes)).reduce((a, b) => a + b, 0);
+      console.log(`# first picture after ${taken} ms, ${(bytes / 1e6).toFixed(2)} MB gzipped`);
+      // With the engine, which is above 1 MB.
+      assert.ok(bytes > 1e6 && bytes < 3e6, `${bytes} bytes`);
+      await context.close();
+    }
+    assert.ok(fastest < 3000, `${fastest} ms`);
   });
 });
 
@@ -121,7 +126,7 @@ describe("scenes", () => {
     await ready(page);
     const { substeps, straight, dt } = await page.evaluate(async () => {
       const { session } = (window as any).tumble;
-      await session.goto(3);
+      for (let i = 0; i < 3; i++) await session.next();
       const straight = await session.hash();
       session.scrub(2);
       return { substeps: session.info.scene.system[0].substeps as number, straight, dt: session.info.dt as number };
@@ -142,6 +147,7 @@ describe("scenes", () => {
     await page.waitForFunction(() => (window as any).tumble.session.shown.index === 3);
     assert.equal(await page.evaluate(() => (window as any).tumble.session.hash()), straight);
     // Back from between two frames is to the one before.
+    await page.focus(".stage");
     await page.keyboard.press(";");
     await page.waitForFunction(() => (window as any).tumble.session.shown.inside);
     await page.click("[aria-label='One frame back']");
