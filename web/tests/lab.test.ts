@@ -408,6 +408,65 @@ describe("fluid", () => {
     assert.deepEqual(errors, []);
     await page.context().close();
   });
+
+  it("is stirred in space, too, in the slice that is shown", async () => {
+    const { page, errors } = await own.open("fluid", STILL);
+    await ready(page);
+    await page.selectOption("#space", "slice");
+    await page.waitForFunction(() => (window as any).tumble.session.info.dimension === 3);
+    await page.selectOption("#view", "pressure");
+    await page.evaluate(async () => {
+      const { session } = (window as any).tumble;
+      session.pause();
+      await session.next();
+    });
+    // A pressure has both signs; only what is looked through like smoke has not.
+    const { low, high } = await page.evaluate(() => (window as any).tumble.stage.legend);
+    assert.ok(low < 0 && low === -high, `${low} to ${high}`);
+    const box = (await page.locator(".stage").boundingBox())!;
+    const before = await page.evaluate(() => (window as any).tumble.session.hash());
+    const at = await page.evaluate(([x, y]) => {
+      const { session, stage } = (window as any).tumble;
+      const all: number[][] = [];
+      const stir = session.stir.bind(session);
+      session.stir = (gas: string, position: number[], ...rest: unknown[]) => (all.push(position), stir(gas, position, ...rest));
+      session.play = () => {};
+      (window as any).stirred = all;
+      stage.look.sliceAt = 0.75;
+      return stage.under({ clientX: x, clientY: y }, stage.stirred.through).toArray();
+    }, [box.x + 0.6 * box.width, box.y + 0.5 * box.height] as const);
+    assert.ok(Math.abs(at[1] - 0.125) < 1e-6, `${at}`);
+    await page.mouse.move(box.x + 0.4 * box.width, box.y + 0.5 * box.height);
+    await page.mouse.down();
+    await page.mouse.move(box.x + 0.5 * box.width, box.y + 0.5 * box.height, { steps: 4 });
+    await page.waitForFunction(() => (window as any).stirred.length);
+    await page.mouse.up();
+    assert.notEqual(await page.evaluate(() => (window as any).tumble.session.hash()), before);
+    assert.ok((await page.evaluate(() => (window as any).stirred)).every((p: number[]) => Math.abs(p[1] - 0.125) < 1e-6));
+    assert.deepEqual(errors, []);
+    await page.context().close();
+  });
+
+  it("is stirred by several fingers", async () => {
+    const { page, errors } = await own.open("fluid", { ...STILL, viewport: { width: 390, height: 844 }, hasTouch: true, isMobile: true });
+    await ready(page);
+    await page.evaluate(() => {
+      const { session } = (window as any).tumble;
+      const all: number[][] = [];
+      session.stir = async (_: string, position: number[]) => void all.push(position);
+      (window as any).stirred = all;
+    });
+    const box = (await page.locator(".stage").boundingBox())!;
+    const touch = await page.context().newCDPSession(page);
+    const fingers = (k: number) => [0.25, 0.75].map((x, id) => ({ x: box.x + (x + 0.02 * k) * box.width, y: box.y + 0.5 * box.height, id }));
+    await touch.send("Input.dispatchTouchEvent", { type: "touchStart", touchPoints: fingers(0) });
+    for (let k = 1; k < 5; k++) await touch.send("Input.dispatchTouchEvent", { type: "touchMove", touchPoints: fingers(k) });
+    await touch.send("Input.dispatchTouchEvent", { type: "touchEnd", touchPoints: [] });
+    const sides = (await page.evaluate(() => (window as any).stirred)).map((p: number[]) => p[0] < 0);
+    assert.ok(sides.includes(true) && sides.includes(false), `${sides}`);
+    assert.deepEqual(errors, []);
+    await page.context().close();
+  });
 });
 
 describe("walls", () => {
