@@ -5,6 +5,8 @@ import { EngineError } from "../engine/client";
 import type { Cure, Failure, SceneInfo, Value } from "../engine/protocol";
 import { opened } from "../drop";
 import { npz } from "../npz";
+import { FamilySwitches } from "../families";
+import { familiesOf, FAMILIES } from "../links";
 import { Panel } from "../panel";
 import { curveColor, legend, Plot, type Curve } from "../plot";
 import { engine, literal, Session } from "../session";
@@ -19,6 +21,9 @@ import type { Editor } from "../editor";
 
 /** Columns of grids that can be shown, and how they are called. */
 const FIELDS: [string, string][] = [["density", "Density"], ["temperature", "Temperature"], ["pressure", "Pressure"], ["speed", "Speed"], ["vorticity", "Vorticity"], ["divergence", "Divergence"], ["fuel", "Fuel"]];
+
+/** Values that only say how a scene starts: a world that goes on would never look at them. */
+const STARTS = /^(galaxy\.|particles\.\d+\.(position|velocity|cloud)|(sheet|block)\.\d+\.(center|rotate))/;
 
 async function source(rest: string): Promise<{ toml: string; overrides: [string, Value][]; shared: Shared | null; name: string; id: string | null }> {
   if (rest.startsWith("s/")) {
@@ -176,6 +181,7 @@ export const page: Page = async (main, rest) => {
     opening = false;
     drawLook(info);
     panel?.open(info, session.toml, session.overrides);
+    switches.open(info, session.toml);
     title.textContent = info.title || start.name;
     document.title = `${info.title || start.name} · tumble`;
     stageBox.classList.toggle("night", stage.night);
@@ -183,6 +189,11 @@ export const page: Page = async (main, rest) => {
     hashBox.dataset.frame = "0";
     void cards(topics(info)).then((made) => theoryTab.replaceChildren(...made));
     void tellFacts();
+  });
+  session.on("changed", (info) => {
+    stage.changed(info);
+    panel?.open(info, session.toml, session.overrides);
+    switches.open(info, session.toml);
   });
   session.on("frame", (frame) => {
     stage.show(frame);
@@ -243,21 +254,34 @@ export const page: Page = async (main, rest) => {
 
   // Values.
   let panel: Panel | null = null;
-  const change = async (path: string, value: Value) => {
+  const change = async (path: string, value: Value, what = `${path} = ${literal(value)}`) => {
     try {
       const before = session.ledgers.map((l) => l.energy - (session.ledgers[0]?.external ?? 0));
+      if (STARTS.test(path)) {
+        ghost = before;
+        await session.load(session.toml, [...session.overrides, [path, value]]);
+        alert.hidden = true;
+        panel?.say(`${what}: says how the scene starts, so it starts anew.`);
+        if (editor) syncText();
+        return;
+      }
       const live = await session.set(path, value);
       ghost = before;
       alert.hidden = true;
-      panel?.say(live ? `${path} = ${literal(value)}: goes on from frame ${session.latest}. The dashed curve is what was before.` : `${path} = ${literal(value)}: sizes have changed, so the scene starts anew.`);
+      panel?.say(live ? `${what}: goes on from frame ${session.latest}. The dashed curve is what was before.` : `${what}: sizes have changed, so the scene starts anew.`);
       if (editor) syncText();
     } catch (error) {
       if (error instanceof EngineError) {
         panel?.say(error.failure.message.split("\n").slice(0, 3).join(" "), true);
-        if (session.info) panel?.open(session.info, session.toml, session.overrides);
+        if (!session.info) return;
+        panel?.open(session.info, session.toml, session.overrides);
+        switches.open(session.info, session.toml);
       } else throw error;
     }
   };
+
+  const switches = new FamilySwitches(change);
+  valuesTab.append(switches.element);
 
   // Text.
   let editor: Editor | null = null;
@@ -390,10 +414,18 @@ export const page: Page = async (main, rest) => {
         look.color = v as typeof look.color;
         again();
       }));
-      if (linked) parts.push(check("Links", look.links, (on) => {
-        look.links = on;
-        again();
-      }));
+      if (linked) {
+        const there = new Set(info.objects.flatMap((o) => [...(familiesOf(info, o) ?? [])]));
+        const families = h("span", { class: "sights", role: "group", "aria-label": "Families of links that are drawn", hidden: !look.links }, ...(there.size > 1 ? FAMILIES.filter((_, i) => there.has(i)) : []).map((f) => check(f, !look.unseen.includes(f), (on) => {
+          look.unseen = on ? look.unseen.filter((u) => u !== f) : [...look.unseen, f];
+          again();
+        })));
+        parts.push(check("Links", look.links, (on) => {
+          look.links = on;
+          families.hidden = !on;
+          again();
+        }), families);
+      }
       if (stage.trails) parts.push(check("Trails", look.trails, (on) => {
         look.trails = on;
         again();
