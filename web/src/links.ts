@@ -8,7 +8,7 @@ export type Family = (typeof FAMILIES)[number];
 export const RESISTS: Record<Family, string> = {
   structural: "links lie between neighbours and resist stretching.",
   shear: "links lie along diagonals and resist shear, which the others let through.",
-  bend: "links lead from each mass to the next but one and resist folding, weakly.",
+  bend: "links skip a mass, or cross an edge of triangles, and resist folding, weakly.",
 };
 
 type Settings = Record<string, Value | null>;
@@ -81,7 +81,7 @@ function onLattice(resolution: number[]): (a: number, b: number) => number {
       farthest = Math.max(farthest, way);
       [a, b] = [Math.floor(a / n), Math.floor(b / n)];
     }
-    return directions > 1 ? 1 : farthest - 1;
+    return directions > 1 ? 1 : farthest > 1 ? 2 : 0;
   };
 }
 

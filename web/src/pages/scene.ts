@@ -11,7 +11,7 @@ import { Panel } from "../panel";
 import { curveColor, legend, Plot, type Curve } from "../plot";
 import { engine, literal, Session } from "../session";
 import { LONGEST, pack, unpack, type Shared } from "../share";
-import { sceneOf, titleOf } from "../scenes";
+import { beside, sceneOf, titleOf } from "../scenes";
 import { cards, topics } from "../theory";
 import { keys, transport } from "../transport";
 import { legendBox } from "../legend";
@@ -114,6 +114,7 @@ export const page: Page = async (main, rest) => {
     if (tabs[k][0] === "facts") void tellFacts();
   };
 
+  const others = start.id ? beside(start.id) : [];
   const shareButton = h("button", { type: "button", class: "button", onclick: () => void share() }, svg(ICONS.share, 16), "Copy link");
   const record = iconButton("record", "Record a film (WebM)", () => film());
   main.append(
@@ -130,6 +131,7 @@ export const page: Page = async (main, rest) => {
           h("div", { class: "actions" }, shareButton, iconButton("camera", "Save the picture (PNG)", () => void png()), record, iconButton("down", "Download the kept frames (NPZ)", () => saveAs(npz(session.kept.map((i) => session.frame(i)!)), `${start.name}.npz`)), h("button", { type: "button", class: "icon-button", title: "Save the surfaces (GLB)", "aria-label": "Save the surfaces (GLB)", onclick: () => void glb() }, svg(ICONS.cube)), iconButton("frame", "View of the scene's camera", () => stage.goHome())),
         ),
         alert,
+        others.length > 1 ? h("nav", { class: "others", "aria-label": "Scenes like this one" }, ...others.map((s) => h("a", { href: `#/scene/${s.id}`, "aria-current": s.id === start.id ? "page" : false }, s.name.replace(/[_-]/g, " ")))) : null,
         stageBox,
         transport(session),
         lookBar,
@@ -139,6 +141,8 @@ export const page: Page = async (main, rest) => {
       h("aside", { class: "side", "aria-label": "The scene" }, h("div", { class: "tabs", role: "tablist", "aria-label": "The scene" }, ...buttons), ...tabs.map((t) => t[2])),
     ),
   );
+
+  main.querySelector(".others [aria-current]")?.scrollIntoView({ block: "nearest", inline: "center" });
 
   const stage = new Stage(canvas);
   session.wanted = () => stage.wanted;

@@ -8,8 +8,8 @@ import { literal } from "../session";
 import type { Value } from "../engine/protocol";
 
 export type Kind = "rope" | "sheet" | "block" | "net";
-export const DEEDS = ["shear", "bend", "twist", "stretch"] as const;
-export type Deed = (typeof DEEDS)[number];
+
+export type Deed = "shear" | "bend" | "twist" | "stretch";
 
 export interface Choices {
   kind: Kind;
@@ -34,7 +34,7 @@ interface Build {
   pieces: string;
   hand: number;
   deeds: Deed[];
-  /** How far it is bent and twisted [rad]. */
+  /** How far it is bent and twisted [rad]; what is thin bends where its ends are pushed together. */
   bend: number;
   twist: number;
 }
@@ -45,15 +45,19 @@ const WIDTH = 0.8;
 const THICK = 0.3;
 const ROUND = 0.22;
 const RAD = Math.PI / 180;
+const PUSH = 0.55;
+/** What is thin bends at a touch: the springs are softer by this. */
+export const SOFT = 30;
+const SHEAR = 28 * RAD;
 
 export const BUILDS: Record<Kind, Build> = {
   rope: {
     name: "Rope", about: "A chain of masses. Its structural links resist stretching and nothing else; bend links, from each mass to the next but one, keep it from folding.",
-    families: ["structural", "bend"], modulus: { structural: 60, shear: 0, bend: 20 }, unit: "N", fineness: [6, 16, 60], pieces: "Segments", hand: 40, deeds: ["bend", "stretch"], bend: 170 * RAD, twist: 0,
+    families: ["structural", "bend"], modulus: { structural: 60, shear: 0, bend: 20 }, unit: "N", fineness: [6, 16, 60], pieces: "Segments", hand: 40, deeds: ["bend", "stretch"], bend: 0, twist: 0,
   },
   sheet: {
     name: "Sheet", about: "A grid of masses. Without shear links each of its squares is a hinged parallelogram; without bend links it folds wherever it likes.",
-    families: ["structural", "shear", "bend"], modulus: { structural: 500, shear: 300, bend: 100 }, unit: "N/m", fineness: [6, 14, 36], pieces: "Squares along it", hand: 120, deeds: ["shear", "bend", "twist", "stretch"], bend: 150 * RAD, twist: 110 * RAD,
+    families: ["structural", "shear", "bend"], modulus: { structural: 500, shear: 300, bend: 100 }, unit: "N/m", fineness: [6, 14, 36], pieces: "Squares along it", hand: 120, deeds: ["shear", "bend", "twist", "stretch"], bend: 0, twist: 110 * RAD,
   },
   block: {
     name: "Block", about: "A box of masses with the three families along and across its three axes. Its structural links alone carry no shear: it is the diagonals that make it a solid.",
@@ -61,7 +65,7 @@ export const BUILDS: Record<Kind, Build> = {
   },
   net: {
     name: "Net", about: "A tube of triangles with a link along each edge. A triangle has no other shape, so it resists shear without a family for that; bend links cross each edge and keep it round.",
-    families: ["structural", "bend"], modulus: { structural: 300, shear: 0, bend: 100 }, unit: "N/m", fineness: [7, 12, 24], pieces: "Triangles round it", hand: 150, deeds: ["shear", "bend", "twist", "stretch"], bend: 100 * RAD, twist: 90 * RAD,
+    families: ["structural", "bend"], modulus: { structural: 300, shear: 0, bend: 100 }, unit: "N/m", fineness: [7, 12, 24], pieces: "Triangles round it", hand: 150, deeds: ["shear", "bend", "twist", "stretch"], bend: 70 * RAD, twist: 90 * RAD,
   },
 };
 
@@ -123,20 +127,25 @@ function moved([x, y, z]: Point, deed: Deed, { bend, twist }: Build): Point {
   const half = 0.5 * LENGTH;
   if (deed === "stretch") return [x + 0.3 * LENGTH, y, z];
   // Along a circle, so that what lies along it keeps its length.
-  if (deed === "shear") return [x - LENGTH * (1 - Math.cos(40 * RAD)), y - LENGTH * Math.sin(40 * RAD), z];
+  if (deed === "shear") return [x - LENGTH * (1 - Math.cos(SHEAR)), y + LENGTH * Math.sin(SHEAR), z];
   if (deed === "twist") return [x, y * Math.cos(twist) - z * Math.sin(twist), y * Math.sin(twist) + z * Math.cos(twist)];
+  // Towards its other end, and a little down: the rest leaves the straight line upwards.
+  if (!bend) return [x - PUSH, y, z - 0.03];
   // As if all of it were bent to a circle.
   const r = LENGTH / bend - z;
   const angle = (bend * (x + half)) / LENGTH;
   return [-half + r * Math.sin(angle), y, LENGTH / bend - r * Math.cos(angle)];
 }
 
+/** All springs of the hand together, as they act [N/m]. */
+export const strength = (c: Choices): number => (c.deed === null ? 0 : c.deed === "bend" && !BUILDS[c.kind].bend ? c.hand / SOFT : c.hand);
+
 /** The springs of the hand, for a live change: to the places of a deed; without one they have no stiffness. */
 export function springs(c: Choices): Value[] {
   const { held } = plan(c);
   const deeds = BUILDS[c.kind].deeds;
   const first = Math.max(deeds.indexOf(c.deed!), 0) * held.length;
-  const stiffness = c.deed ? c.hand / held.length : 0;
+  const stiffness = strength(c) / held.length;
   return held.map((row, k) => ({ name: `hand ${k}`, between: [`${c.kind} ${row}`, `places ${first + k}`], stiffness, rest_length: 0 }));
 }
 
@@ -167,7 +176,7 @@ export function scene(c: Choices): string {
   const pins = pinned.map((i) => `"vertex ${node(i).join(" ")}"`).join(", ");
   const numbers = (p: Point) => `[${p.map((v) => Number(v.toFixed(6))).join(", ")}]`;
   const shape = {
-    rope: `from = ${numbers(points[0])}\nto = ${numbers(points[points.length - 1])}\nsegments = ${c.fineness}\ndensity = 0.3\nradius = 0.018`,
+    rope: `from = ${numbers(points[0])}\nto = ${numbers(points[points.length - 1])}\nsegments = ${c.fineness}\ndensity = 0.3\nradius = 0.022`,
     sheet: `size = [${LENGTH}, ${WIDTH}]\nresolution = ${literal(resolution.slice(0, 2))}\ndensity = 0.3`,
     block: `size = [${LENGTH}, ${THICK}, ${THICK}]\nresolution = ${literal(resolution)}\ndensity = 8`,
     net: `mesh = { path = "${MESH}" }\ndensity = 0.3`,
@@ -201,14 +210,22 @@ ${b.deeds.map((d) => `    ${held.map((i) => numbers(moved(points[i], d, b))).joi
 pin = ["all"]
 radius = 0.004
 
+# Seen, not felt: what is pinned.
+[[particles]]
+name = "wall"
+position = [${pinned.map((i) => numbers(points[i])).join(", ")}]
+pin = ["all"]
+radius = 0.011
+color = [0.2, 0.21, 0.23]
+
 ${springs(c).map((s) => `[[anchor]]\n${Object.entries(s as Record<string, Value>).map(([k, v]) => `${k} = ${literal(v)}`).join("\n")}\n`).join("\n")}
 [[force]]
 kind = "drag"
 rate = 3
 
 [camera]
-position = [0.5, -3.1, 2.1]
-target = [0, -0.05, 0.05]
+position = [0.3, -3.2, 2.2]
+target = [0, 0.05, 0.1]
 
 [output]
 columns = ["position", "link_strain"]

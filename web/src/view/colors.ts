@@ -14,7 +14,7 @@ const MAPS = {
     "40004b 621a6e 7f3c8d 9568a6 ae8bbd c7abd2 dec9e2 ede2ee f6f7f6 e4f2e0 cbeac5 abdda5 7ec37f 50a65a 298440 10632b 00441b",
   // Grey in the middle: thin links without strain must be seen before light and dark.
   strain:
-    "092a78 113b8d 194ca2 215db7 296ecc 4379c1 5e84b6 788fac 929aa1 a58a84 b87b66 cb6c49 de5c2c c64a24 af371b 982412 80120a",
+    "163a9e 1c48ab 2257b8 2766c5 2d74d2 467ec6 6087ba 7990ad 929aa1 a68c85 b97d68 cc6e4c e06030 d24e28 c43d1f b62c16 a81a0e",
 } as const;
 
 export type MapName = keyof typeof MAPS;

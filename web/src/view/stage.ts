@@ -219,7 +219,7 @@ export class Stage {
         this.ground(thing);
       }
       if (thing.body) this.add(thing.body);
-      if (topology.links?.data.length && kind !== "curve") this.add((thing.links = new Pieces(kind === "points" ? 0.25 * radius : 0, { thinnest: kind === "points" ? 1.2 : 0.7, lit: kind === "points" })));
+      if (topology.links?.data.length) this.add((thing.links = new Pieces(kind === "points" ? 0.25 * radius : 0, { thinnest: kind === "curve" ? 2 : kind === "points" || topology.links.data.length < 8000 ? 1.2 : 0.7, lit: kind === "points" })));
       if (kind === "plane" && grid) {
         this.add((thing.way = new Pieces(0, { lit: false, thinnest: 0.6 })));
         outline(thing.way, grid);
@@ -573,6 +573,7 @@ export class Stage {
       for (let i = 0; i + 1 < curve.length; i++) pairs.set([curve[i], curve[i + 1]], 2 * i);
       const gone = (piece: number) => torn.has(Math.min(pairs[2 * piece], pairs[2 * piece + 1]) * n + Math.max(pairs[2 * piece], pairs[2 * piece + 1]));
       (thing.body as Pieces).pairs(x, pairs, colors ? ofPiece(pairs) : thing.color, gone);
+      thing.body!.object.visible = !this.look.links || !links;
     } else {
       const r = columns.radius?.data ?? thing.radius;
       const own = columns.color?.data;
@@ -580,7 +581,7 @@ export class Stage {
       if (thing.way) this.way(thing, frame, own);
     }
     if (thing.links && links) {
-      const shown = thing.kind === "points" || this.look.links || this.flat;
+      const shown = thing.kind === "points" || this.look.links || (this.flat && thing.kind !== "curve");
       thing.links.object.visible = shown;
       const shade = thing.color.map((c) => c * (thing.kind === "points" ? 0.6 : this.look.links ? 1 : 0.35)) as Rgb;
       if (shown) thing.links.pairs(x, links, colors && this.look.color === "strain" && strain ? (piece) => this.shades.link(strain[piece]) : colors ? ofPiece(links) : shade, left);
