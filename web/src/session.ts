@@ -16,6 +16,8 @@ const MEMORY = 192 * 2 ** 20;
 
 type Events = {
   loaded: SceneInfo;
+  /** Other values, the same objects. */
+  changed: SceneInfo;
   frame: Frame;
   failed: Failure;
   playing: boolean;
@@ -341,11 +343,14 @@ export class Session {
     await this.branch();
     return this.queue(async () => {
       const { info, live } = await this.engine.set(path, value, this.world);
+      // What was changed below this place is gone, and in the order of changes this one is the last.
+      for (const old of [...this.overrides.keys()]) if (`${old}.`.startsWith(`${path}.`)) this.overrides.delete(old);
       this.overrides.set(path, value);
       if (live) {
-        const same = JSON.stringify(this.info?.objects) === JSON.stringify(info.objects);
+        const shape = (i: SceneInfo | null) => JSON.stringify([i?.objects, i && Object.values(i.topology).map((t) => t.links?.data.length)]);
+        const same = shape(this.info) === shape(info);
         this.info = info;
-        if (!same) this.tell("loaded", info);
+        this.tell(same ? "changed" : "loaded", info);
         await this.read();
       } else {
         this.age++;

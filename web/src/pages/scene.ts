@@ -5,11 +5,13 @@ import { EngineError } from "../engine/client";
 import type { Cure, Failure, SceneInfo, Value } from "../engine/protocol";
 import { opened } from "../drop";
 import { npz } from "../npz";
+import { FamilySwitches } from "../families";
+import { familiesOf, FAMILIES } from "../links";
 import { Panel } from "../panel";
 import { curveColor, legend, Plot, type Curve } from "../plot";
 import { engine, literal, Session } from "../session";
 import { LONGEST, pack, unpack, type Shared } from "../share";
-import { sceneOf, titleOf } from "../scenes";
+import { beside, sceneOf, titleOf } from "../scenes";
 import { cards, topics } from "../theory";
 import { keys, transport } from "../transport";
 import { legendBox } from "../legend";
@@ -19,6 +21,9 @@ import type { Editor } from "../editor";
 
 /** Columns of grids that can be shown, and how they are called. */
 const FIELDS: [string, string][] = [["density", "Density"], ["temperature", "Temperature"], ["pressure", "Pressure"], ["speed", "Speed"], ["vorticity", "Vorticity"], ["divergence", "Divergence"], ["fuel", "Fuel"]];
+
+/** Values that only say how a scene starts: a world that goes on would never look at them. */
+const STARTS = /^(galaxy\.|particles\.\d+\.(position|velocity|cloud)|(sheet|block)\.\d+\.(center|rotate))/;
 
 async function source(rest: string): Promise<{ toml: string; overrides: [string, Value][]; shared: Shared | null; name: string; id: string | null }> {
   if (rest.startsWith("s/")) {
@@ -109,6 +114,7 @@ export const page: Page = async (main, rest) => {
     if (tabs[k][0] === "facts") void tellFacts();
   };
 
+  const others = start.id ? beside(start.id) : [];
   const shareButton = h("button", { type: "button", class: "button", onclick: () => void share() }, svg(ICONS.share, 16), "Copy link");
   const record = iconButton("record", "Record a film (WebM)", () => film());
   main.append(
@@ -125,6 +131,7 @@ export const page: Page = async (main, rest) => {
           h("div", { class: "actions" }, shareButton, iconButton("camera", "Save the picture (PNG)", () => void png()), record, iconButton("down", "Download the kept frames (NPZ)", () => saveAs(npz(session.kept.map((i) => session.frame(i)!)), `${start.name}.npz`)), h("button", { type: "button", class: "icon-button", title: "Save the surfaces (GLB)", "aria-label": "Save the surfaces (GLB)", onclick: () => void glb() }, svg(ICONS.cube)), iconButton("frame", "View of the scene's camera", () => stage.goHome())),
         ),
         alert,
+        others.length > 1 ? h("nav", { class: "others", "aria-label": "Scenes like this one" }, ...others.map((s) => h("a", { href: `#/scene/${s.id}`, "aria-current": s.id === start.id ? "page" : false }, s.name.replace(/[_-]/g, " ")))) : null,
         stageBox,
         transport(session),
         lookBar,
@@ -134,6 +141,8 @@ export const page: Page = async (main, rest) => {
       h("aside", { class: "side", "aria-label": "The scene" }, h("div", { class: "tabs", role: "tablist", "aria-label": "The scene" }, ...buttons), ...tabs.map((t) => t[2])),
     ),
   );
+
+  main.querySelector(".others [aria-current]")?.scrollIntoView({ block: "nearest", inline: "center" });
 
   const stage = new Stage(canvas);
   session.wanted = () => stage.wanted;
@@ -176,6 +185,7 @@ export const page: Page = async (main, rest) => {
     opening = false;
     drawLook(info);
     panel?.open(info, session.toml, session.overrides);
+    switches.open(info, session.toml);
     title.textContent = info.title || start.name;
     document.title = `${info.title || start.name} · tumble`;
     stageBox.classList.toggle("night", stage.night);
@@ -183,6 +193,11 @@ export const page: Page = async (main, rest) => {
     hashBox.dataset.frame = "0";
     void cards(topics(info)).then((made) => theoryTab.replaceChildren(...made));
     void tellFacts();
+  });
+  session.on("changed", (info) => {
+    stage.changed(info);
+    panel?.open(info, session.toml, session.overrides);
+    switches.open(info, session.toml);
   });
   session.on("frame", (frame) => {
     stage.show(frame);
@@ -243,21 +258,34 @@ export const page: Page = async (main, rest) => {
 
   // Values.
   let panel: Panel | null = null;
-  const change = async (path: string, value: Value) => {
+  const change = async (path: string, value: Value, what = `${path} = ${literal(value)}`) => {
     try {
       const before = session.ledgers.map((l) => l.energy - (session.ledgers[0]?.external ?? 0));
+      if (STARTS.test(path)) {
+        ghost = before;
+        await session.load(session.toml, [...session.overrides, [path, value]]);
+        alert.hidden = true;
+        panel?.say(`${what}: says how the scene starts, so it starts anew.`);
+        if (editor) syncText();
+        return;
+      }
       const live = await session.set(path, value);
       ghost = before;
       alert.hidden = true;
-      panel?.say(live ? `${path} = ${literal(value)}: goes on from frame ${session.latest}. The dashed curve is what was before.` : `${path} = ${literal(value)}: sizes have changed, so the scene starts anew.`);
+      panel?.say(live ? `${what}: goes on from frame ${session.latest}. The dashed curve is what was before.` : `${what}: sizes have changed, so the scene starts anew.`);
       if (editor) syncText();
     } catch (error) {
       if (error instanceof EngineError) {
         panel?.say(error.failure.message.split("\n").slice(0, 3).join(" "), true);
-        if (session.info) panel?.open(session.info, session.toml, session.overrides);
+        if (!session.info) return;
+        panel?.open(session.info, session.toml, session.overrides);
+        switches.open(session.info, session.toml);
       } else throw error;
     }
   };
+
+  const switches = new FamilySwitches(change);
+  valuesTab.append(switches.element);
 
   // Text.
   let editor: Editor | null = null;
@@ -390,10 +418,18 @@ export const page: Page = async (main, rest) => {
         look.color = v as typeof look.color;
         again();
       }));
-      if (linked) parts.push(check("Links", look.links, (on) => {
-        look.links = on;
-        again();
-      }));
+      if (linked) {
+        const there = new Set(info.objects.flatMap((o) => [...(familiesOf(info, o) ?? [])]));
+        const families = h("span", { class: "sights", role: "group", "aria-label": "Families of links that are drawn", hidden: !look.links }, ...(there.size > 1 ? FAMILIES.filter((_, i) => there.has(i)) : []).map((f) => check(f, !look.unseen.includes(f), (on) => {
+          look.unseen = on ? look.unseen.filter((u) => u !== f) : [...look.unseen, f];
+          again();
+        })));
+        parts.push(check("Links", look.links, (on) => {
+          look.links = on;
+          families.hidden = !on;
+          again();
+        }), families);
+      }
       if (stage.trails) parts.push(check("Trails", look.trails, (on) => {
         look.trails = on;
         again();
