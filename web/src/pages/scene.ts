@@ -425,9 +425,10 @@ export const page: Page = async (main, rest) => {
   };
   const png = async () => saveAs(await stage.picture(), `${start.name}-${session.shown?.index ?? 0}.png`);
   const glb = async () => {
-    const blob = await stage.surfaces();
-    if (blob) saveAs(blob, `${start.name}-${session.shown?.index ?? 0}.glb`);
-    else say("There is no surface in this scene.");
+    const { surfaces } = stage;
+    if (!surfaces.length) return say("There is no surface in this scene.");
+    const { glb: made } = await import("../view/glb");
+    saveAs(await made(surfaces), `${start.name}-${session.shown?.index ?? 0}.glb`);
   };
   let recorder: MediaRecorder | null = null;
   const film = () => {

@@ -3,6 +3,7 @@ import * as THREE from "three";
 import { toCreasedNormals } from "three/examples/jsm/utils/BufferGeometryUtils.js";
 import type { Column, Numbers } from "../engine/protocol";
 import { mapOf, SIGNED, table, type MapName } from "./colors";
+import { SOLIDS } from "./depths";
 import { BALLS, PIECES, PLANE, SPACE } from "./shaders";
 
 export type Rgb = [number, number, number];
@@ -406,6 +407,7 @@ export class SpaceField implements Layer {
   private readonly extent: THREE.Vector3;
   private readonly viewer = new THREE.Vector3();
   private readonly parallel = new THREE.Vector3();
+  private readonly unproject = new THREE.Matrix4();
 
   constructor(grid: Grid, ink: Rgb) {
     const [nx, ny, nz] = grid.cells;
@@ -430,10 +432,12 @@ export class SpaceField implements Layer {
       new THREE.ShaderMaterial({
         vertexShader: SPACE.vertex,
         fragmentShader: SPACE.smoke,
-        uniforms: { ...shared, viewer: { value: this.viewer }, parallel: { value: this.parallel }, thick: { value: 40 / mean }, fire: { value: false }, heat: { value: this.heat } },
+        uniforms: { ...shared, ...SOLIDS, size: PIXELS, unproject: { value: this.unproject }, viewer: { value: this.viewer }, parallel: { value: this.parallel }, thick: { value: 40 / mean }, fire: { value: false }, heat: { value: this.heat } },
         transparent: true,
+        // The way through it ends where something solid begins; its far sides are seen from within, too.
         depthWrite: false,
-        side: THREE.FrontSide,
+        depthTest: false,
+        side: THREE.BackSide,
       }),
     );
     this.smoke.position.copy(this.low).addScaledVector(this.extent, 0.5);
@@ -441,6 +445,7 @@ export class SpaceField implements Layer {
       camera.getWorldPosition(this.viewer);
       if ((camera as THREE.OrthographicCamera).isOrthographicCamera) camera.getWorldDirection(this.parallel);
       else this.parallel.set(0, 0, 0);
+      this.unproject.copy(camera.projectionMatrixInverse);
     };
     const sheet = new THREE.BufferGeometry();
     sheet.setAttribute("position", new THREE.Float32BufferAttribute(new Float32Array(12), 3));

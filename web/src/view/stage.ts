@@ -3,8 +3,10 @@ import * as THREE from "three";
 import { OrbitControls } from "three/examples/jsm/controls/OrbitControls.js";
 import type { Column, Frame, Numbers, SceneInfo, Vector } from "../engine/protocol";
 import { mapOf, PALETTE, SIGNED } from "./colors";
+import { Depths } from "./depths";
 import { gridOf, PIXELS, PlaneField, Pieces, Points, Range, scalars, SpaceField, Surface, type Grid, type Layer, type Rgb } from "./layers";
-import { arrows, carry, countOf, leapOf, matched, outline, palette, pick, planeOf, sharp } from "./scenery";
+import { arrows, carry, countOf, leapOf, outline, palette, pick, planeOf, sharp } from "./scenery";
+import { trails } from "./trails";
 
 /** How fields and objects are shown; of all objects together. */
 export interface Look {
@@ -79,6 +81,7 @@ export class Stage {
   private readonly sky = new THREE.HemisphereLight(0xffffff, 0xb8b2a8, 1.25);
   private readonly observer: ResizeObserver;
   private anchors: { pieces: Pieces; ends: [string, number][] } | null = null;
+  private readonly depths = new Depths();
   private readonly handle = new Pieces(0, { lit: false, thinnest: 1.5, front: true });
   look: Look = { ...LOOK };
   legend: Legend | null = null;
@@ -114,6 +117,7 @@ export class Stage {
     this.observer.disconnect();
     this.clear();
     this.handle.dispose();
+    this.depths.dispose();
     this.controls.dispose();
     this.renderer.dispose();
     this.renderer.forceContextLoss();
@@ -428,6 +432,7 @@ export class Stage {
   render(): void {
     this.dirty = false;
     this.renderer.getDrawingBufferSize(PIXELS.value);
+    this.depths.draw(this.renderer, this.scene, this.camera, PIXELS.value);
     this.renderer.render(this.scene, this.camera);
     this.drawn();
   }
@@ -572,7 +577,10 @@ export class Stage {
       const r = columns.radius?.data ?? thing.radius;
       const own = columns.color?.data;
       (thing.body as Points).set(x, r, colors ?? own ?? thing.color);
-      if (thing.way) this.way(thing, frame, own);
+      if (thing.way) {
+        thing.way.object.visible = this.look.trails;
+        if (this.look.trails) trails(thing.way, thing, frame, this.past, this.night);
+      }
     }
     if (thing.links && links) {
       const shown = thing.kind === "points" || this.look.links || this.flat;
@@ -617,48 +625,6 @@ export class Stage {
     const out = new Float32Array(3 * n);
     for (let i = 0; i < n; i++) out.set(pick(map, (values[i] - low) / (high - low)), 3 * i);
     return out;
-  }
-
-  /** Where the particles have been. */
-  private way(thing: Thing, frame: Frame, own: Numbers | undefined): void {
-    const way = thing.way!;
-    way.object.visible = this.look.trails;
-    if (!this.look.trails) return;
-    const past: Frame[] = [frame];
-    for (let k = frame.index - 1; k >= 0; k--) {
-      const before = this.past(k);
-      if (!before || before.time < frame.time - thing.trail - 1e-9) break;
-      past.push(before);
-    }
-    let total = 0;
-    for (let k = 0; k + 1 < past.length; k++) total += (past[k + 1].columns[thing.name]?.position?.data.length ?? 0) / 3;
-    const { start, end, tint } = way.begin(Math.max(total, 1));
-    let used = 0;
-    const dim = this.night ? 1 : 0.75;
-    for (let k = 0; k + 1 < past.length; k++) {
-      const after = past[k].columns[thing.name];
-      const before = past[k + 1].columns[thing.name];
-      if (!after?.position || !before?.position) continue;
-      const p = before.position.data;
-      const q = after.position.data;
-      const shade = after.color?.data ?? (k === 0 ? own : undefined);
-      const fresh = 1 - (frame.time - past[k].time) / Math.max(thing.trail, 1e-9);
-      const rows = matched(before.id?.data, after.id?.data, p.length / 3, q.length / 3);
-      for (const [i, j] of rows) {
-        const dx = q[3 * j] - p[3 * i];
-        const dy = q[3 * j + 1] - p[3 * i + 1];
-        const dz = q[3 * j + 2] - p[3 * i + 2];
-        if (Math.hypot(dx, dy, dz) > thing.leap) continue;
-        for (let d = 0; d < 3; d++) {
-          start[3 * used + d] = p[3 * i + d];
-          end[3 * used + d] = q[3 * j + d];
-          tint[4 * used + d] = dim * (shade ? shade[3 * j + d] : thing.color[d]);
-        }
-        tint[4 * used + 3] = 0.15 + 0.75 * Math.max(fresh, 0);
-        used++;
-      }
-    }
-    way.done(used);
   }
 
   /** The mass nearest to a point of the window, within some pixels. */
@@ -761,20 +727,9 @@ export class Stage {
     return new Promise((resolve, reject) => flat.toBlob((b) => (b ? resolve(b) : reject(new Error("no picture"))), type, quality));
   }
 
-  /** All surfaces as a GLB file, y up as that format has it; null where there are none. */
-  async surfaces(): Promise<Blob | null> {
-    const bodies = this.things.flatMap((t) => (t.body instanceof Surface ? [{ name: t.name, mesh: t.body.object }] : []));
-    if (!bodies.length) return null;
-    const { GLTFExporter } = await import("three/examples/jsm/exporters/GLTFExporter.js");
-    const root = new THREE.Group();
-    root.rotation.x = -Math.PI / 2;
-    for (const { name, mesh } of bodies) {
-      const copy = mesh.clone();
-      copy.name = name;
-      root.add(copy);
-    }
-    const data = (await new GLTFExporter().parseAsync(root, { binary: true })) as ArrayBuffer;
-    return new Blob([data], { type: "model/gltf-binary" });
+  /** What is drawn as triangles. */
+  get surfaces(): { name: string; mesh: THREE.Mesh }[] {
+    return this.things.flatMap((t) => (t.body instanceof Surface ? [{ name: t.name, mesh: t.body.object }] : []));
   }
 
   get background(): [string, string] {
