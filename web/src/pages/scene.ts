@@ -1,12 +1,12 @@
 /** One scene: picture, playback, energy, its values, its text, its theory. */
 import { parse } from "smol-toml";
-import { check, choice, h, iconButton, saveAs, say, setIcon, show, svg, ICONS, type Page } from "../dom";
+import { check, choice, h, iconButton, saveAs, say, show, svg, ICONS, type Page } from "../dom";
 import { EngineError } from "../engine/client";
 import type { Cure, Failure, SceneInfo, Value } from "../engine/protocol";
 import { opened } from "../drop";
-import { npz } from "../npz";
 import { Panel } from "../panel";
 import { curveColor, legend, Plot, type Curve } from "../plot";
+import { saving } from "../saving";
 import { engine, literal, Session } from "../session";
 import { LONGEST, pack, unpack, type Shared } from "../share";
 import { sceneOf, titleOf } from "../scenes";
@@ -61,6 +61,7 @@ export const page: Page = async (main, rest) => {
   }
 
   const session = new Session();
+  session.each = true;
   const canvas = h("canvas", { "aria-hidden": "true" });
   const { element: legendElement, update: tellLegend } = legendBox(() => stage);
   const wait = h("div", { class: "wait" }, "Loading the engine …");
@@ -110,7 +111,7 @@ export const page: Page = async (main, rest) => {
   };
 
   const shareButton = h("button", { type: "button", class: "button", onclick: () => void share() }, svg(ICONS.share, 16), "Copy link");
-  const record = iconButton("record", "Record a film (WebM)", () => film());
+  const saved = saving(session, () => stage, start.name);
   main.append(
     h(
       "div",
@@ -122,7 +123,7 @@ export const page: Page = async (main, rest) => {
           "div",
           { class: "lab-head" },
           h("div", {}, title, start.id ? h("p", { class: "scene-id" }, start.id) : h("p", { class: "scene-id" }, start.shared ? "from a link" : start.name)),
-          h("div", { class: "actions" }, shareButton, iconButton("camera", "Save the picture (PNG)", () => void png()), record, iconButton("down", "Download the kept frames (NPZ)", () => saveAs(npz(session.kept.map((i) => session.frame(i)!)), `${start.name}.npz`)), h("button", { type: "button", class: "icon-button", title: "Save the surfaces (GLB)", "aria-label": "Save the surfaces (GLB)", onclick: () => void glb() }, svg(ICONS.cube)), iconButton("frame", "View of the scene's camera", () => stage.goHome())),
+          h("div", { class: "actions" }, shareButton, ...saved.buttons, iconButton("frame", "View of the scene's camera", () => stage.goHome())),
         ),
         alert,
         stageBox,
@@ -172,7 +173,6 @@ export const page: Page = async (main, rest) => {
   session.on("loaded", (info) => {
     wait.hidden = true;
     stage.open(info, session.frame, !opening);
-    session.each = stage.trails;
     opening = false;
     drawLook(info);
     panel?.open(info, session.toml, session.overrides);
@@ -423,33 +423,6 @@ export const page: Page = async (main, rest) => {
       say("The address of this page now holds the scene.");
     }
   };
-  const png = async () => saveAs(await stage.picture(), `${start.name}-${session.shown?.index ?? 0}.png`);
-  const glb = async () => {
-    const { surfaces } = stage;
-    if (!surfaces.length) return say("There is no surface in this scene.");
-    const { glb: made } = await import("../view/glb");
-    saveAs(await made(surfaces), `${start.name}-${session.shown?.index ?? 0}.glb`);
-  };
-  let recorder: MediaRecorder | null = null;
-  const film = () => {
-    if (recorder) return recorder.stop();
-    if (!("MediaRecorder" in window)) return say("This browser cannot record.");
-    const parts: Blob[] = [];
-    const mimeType = ["video/webm;codecs=vp9", "video/webm", "video/mp4"].find((t) => MediaRecorder.isTypeSupported(t));
-    recorder = new MediaRecorder(canvas.captureStream(30), { mimeType, videoBitsPerSecond: 8e6 });
-    recorder.ondataavailable = (e) => parts.push(e.data);
-    recorder.onstop = () => {
-      recorder = null;
-      setIcon(record, "record", "Record a film (WebM)");
-      record.classList.remove("live");
-      saveAs(new Blob(parts, { type: mimeType }), `${start.name}.${mimeType?.includes("mp4") ? "mp4" : "webm"}`);
-    };
-    recorder.start();
-    setIcon(record, "stop", "End the film and save it");
-    record.classList.add("live");
-    session.play();
-  };
-
   const theme = () => {
     stage.theme();
     energy.setCurves(energyCurves());
@@ -496,7 +469,7 @@ export const page: Page = async (main, rest) => {
     removeEventListener("themechange", theme);
     offKeys();
     offPointers();
-    if (recorder) recorder.stop();
+    saved.close();
     energy.close();
     editor?.close();
     session.close();

@@ -716,6 +716,12 @@ export class Stage {
     const flat = document.createElement("canvas");
     flat.width = this.canvas.width;
     flat.height = this.canvas.height;
+    this.copy(flat);
+    return new Promise((resolve, reject) => flat.toBlob((b) => (b ? resolve(b) : reject(new Error("no picture"))), type, quality));
+  }
+
+  /** What was just drawn, on its background, which is no part of the canvas itself. */
+  copy(flat: HTMLCanvasElement): void {
     const context = flat.getContext("2d")!;
     const [top, bottom] = this.background;
     const shade = context.createLinearGradient(0, 0, 0, flat.height);
@@ -723,8 +729,7 @@ export class Stage {
     shade.addColorStop(1, bottom);
     context.fillStyle = shade;
     context.fillRect(0, 0, flat.width, flat.height);
-    context.drawImage(this.canvas, 0, 0);
-    return new Promise((resolve, reject) => flat.toBlob((b) => (b ? resolve(b) : reject(new Error("no picture"))), type, quality));
+    context.drawImage(this.canvas, 0, 0, flat.width, flat.height);
   }
 
   /** What is drawn as triangles. */
