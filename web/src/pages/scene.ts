@@ -1,5 +1,6 @@
 /** One scene: picture, playback, energy, its values, its text, its theory. */
 import { parse } from "smol-toml";
+import { Comparison } from "../compare";
 import { check, choice, h, iconButton, saveAs, say, show, svg, ICONS, type Page } from "../dom";
 import { EngineError } from "../engine/client";
 import type { Cure, Failure, SceneInfo, Value } from "../engine/protocol";
@@ -7,7 +8,8 @@ import { opened } from "../drop";
 import { Panel } from "../panel";
 import { curveColor, legend, Plot, type Curve } from "../plot";
 import { saving } from "../saving";
-import { engine, literal, Session } from "../session";
+import { engine, Session } from "../session";
+import { literal } from "../values";
 import { LONGEST, pack, unpack, type Shared } from "../share";
 import { sceneOf, titleOf } from "../scenes";
 import { cards, topics } from "../theory";
@@ -61,7 +63,7 @@ export const page: Page = async (main, rest) => {
   }
 
   const session = new Session();
-  session.each = true;
+  session.each = session.compares = true;
   const canvas = h("canvas", { "aria-hidden": "true" });
   const { element: legendElement, update: tellLegend } = legendBox(() => stage);
   const wait = h("div", { class: "wait" }, "Loading the engine …");
@@ -74,10 +76,10 @@ export const page: Page = async (main, rest) => {
     { label: "elastic", color: curveColor(2) },
     { label: "external", color: curveColor(3) },
     { label: "total", color: curveColor(0), width: 2.25 },
-    { label: "total before the branch", color: curveColor(0), dash: [4, 4], width: 1.25 },
+    { label: "total, old way", color: curveColor(0), dash: [4, 4], width: 1.25 },
   ];
   const energy = new Plot(energyCurves(), { label: "Energies against time", x: "time [s]", height: 140, mark: () => session.shown?.time ?? null });
-  const energyKey = legend(energyCurves().slice(0, 4));
+  const energyKey = legend(energyCurves());
   const hashBox = h("output", { class: "hash", "aria-label": "State hash" }, "–");
   const facts = h("dl", { class: "facts" });
 
@@ -111,7 +113,10 @@ export const page: Page = async (main, rest) => {
   };
 
   const shareButton = h("button", { type: "button", class: "button", onclick: () => void share() }, svg(ICONS.share, 16), "Copy link");
-  const saved = saving(session, () => stage, start.name);
+  const stage = new Stage(canvas);
+  session.wanted = () => stage.wanted;
+  const saved = saving(session, stage, start.name);
+  const comparison = new Comparison(session, stage, () => tellLegend());
   main.append(
     h(
       "div",
@@ -129,18 +134,16 @@ export const page: Page = async (main, rest) => {
         stageBox,
         transport(session),
         lookBar,
-        h("div", { class: "energy" }, h("h2", {}, "Energy", h("span", { class: "unit" }, "J")), energyKey.element, energy.element),
+        comparison.bar,
+        h("div", { class: "books" }, h("div", { class: "energy" }, h("h2", {}, "Energy", h("span", { class: "unit" }, "J")), energyKey.element, energy.element), comparison.chart),
         h("p", { class: "hash-line" }, "State hash ", hashBox, h("span", { class: "muted" }, " the same on every machine, in a tab and on the command line")),
       ),
       h("aside", { class: "side", "aria-label": "The scene" }, h("div", { class: "tabs", role: "tablist", "aria-label": "The scene" }, ...buttons), ...tabs.map((t) => t[2])),
     ),
   );
 
-  const stage = new Stage(canvas);
-  session.wanted = () => stage.wanted;
 
   // The picture follows the world.
-  let ghost: (number | null)[] = [];
   let hashWait = 0;
   const tellHash = () => {
     clearTimeout(hashWait);
@@ -160,19 +163,20 @@ export const page: Page = async (main, rest) => {
   const drawEnergy = () => {
     const books = session.ledgers;
     const external0 = books[0]?.external ?? 0;
-    const times = books.map((l) => l.time);
-    const extra = ghost.length > books.length ? ghost.length : books.length;
     const dt = session.info?.dt ?? 1;
-    const xs: number[] = Array.from({ length: extra }, (_, i) => times[i] ?? i * dt);
-    const pad = (list: (number | null)[]) => Array.from({ length: extra }, (_, i) => (Number.isFinite(list[i]) ? list[i] : null));
-    energy.set([xs, pad(books.map((l) => l.kinetic)), pad(books.map((l) => l.elastic)), pad(books.map((l) => l.external - external0)), pad(books.map((l) => l.energy - external0)), pad(ghost)]);
+    const count = Math.max(books.length, Math.round(comparison.end / dt) + 1);
+    const times = Array.from({ length: count }, (_, i) => books[i]?.time ?? i * dt);
+    const pad = (list: (number | null)[]) => times.map((_, i) => (Number.isFinite(list[i]) ? list[i] : null));
+    const old = comparison.energies(times);
+    energy.set([times, pad(books.map((l) => l.kinetic)), pad(books.map((l) => l.elastic)), pad(books.map((l) => l.external - external0)), pad(books.map((l) => l.energy - external0)), old]);
+    (energyKey.element.lastElementChild as HTMLElement).hidden = !session.before;
     const now = books[session.shown?.index ?? books.length - 1];
-    if (now) energyKey.set([show(now.kinetic, 3), show(now.elastic, 3), show(now.external - external0, 3), show(now.energy - external0, 3)]);
+    if (now) energyKey.set([show(now.kinetic, 3), show(now.elastic, 3), show(now.external - external0, 3), show(now.energy - external0, 3), show(old[session.shown?.index ?? 0], 3)]);
   };
   let opening = true;
   session.on("loaded", (info) => {
     wait.hidden = true;
-    stage.open(info, session.frame, !opening);
+    stage.open(info, comparison.past, !opening);
     opening = false;
     drawLook(info);
     panel?.open(info, session.toml, session.overrides);
@@ -180,17 +184,17 @@ export const page: Page = async (main, rest) => {
     document.title = `${info.title || start.name} · tumble`;
     stageBox.classList.toggle("night", stage.night);
     hashBox.textContent = info.hash;
-    hashBox.dataset.frame = "0";
+    hashBox.dataset.frame = String(session.latest);
     void cards(topics(info)).then((made) => theoryTab.replaceChildren(...made));
     void tellFacts();
   });
   session.on("frame", (frame) => {
-    stage.show(frame);
-    tellLegend();
+    comparison.show(frame);
     drawEnergy();
     tellHash();
     main.dataset.frame = String(frame.index);
   });
+  session.on("before", () => drawEnergy());
   session.on("playing", (on) => {
     if (on) {
       // Only a new frame has no trouble with what has gone wrong before.
@@ -245,11 +249,9 @@ export const page: Page = async (main, rest) => {
   let panel: Panel | null = null;
   const change = async (path: string, value: Value) => {
     try {
-      const before = session.ledgers.map((l) => l.energy - (session.ledgers[0]?.external ?? 0));
       const live = await session.set(path, value);
-      ghost = before;
       alert.hidden = true;
-      panel?.say(live ? `${path} = ${literal(value)}: goes on from frame ${session.latest}. The dashed curve is what was before.` : `${path} = ${literal(value)}: sizes have changed, so the scene starts anew.`);
+      panel?.say(live ? `${path} = ${literal(value)}: goes on from frame ${session.latest}; the way before is kept beside it.` : `${path} = ${literal(value)}: sizes have changed, so the scene starts anew.`);
       if (editor) syncText();
     } catch (error) {
       if (error instanceof EngineError) {
@@ -283,7 +285,6 @@ export const page: Page = async (main, rest) => {
     try {
       const was = session.playing;
       session.pause();
-      ghost = [];
       await session.load(text);
       editor.issues([]);
       issuesBox.replaceChildren();
@@ -338,12 +339,8 @@ export const page: Page = async (main, rest) => {
     const grids = info.objects.filter((o) => ["gas", "heat", "compressible"].includes(o.kind));
     const masses = info.objects.some((o) => !["gas", "heat", "compressible", "collider"].includes(o.kind));
     const again = () => {
-      void session.refresh().then(() => {
-        stage.again();
-        tellLegend();
-      });
-      stage.again();
-      tellLegend();
+      void session.refresh().then(() => comparison.again());
+      comparison.again();
     };
     const parts: HTMLElement[] = [];
     if (grids.length) {
@@ -375,7 +372,7 @@ export const page: Page = async (main, rest) => {
       } else {
         const at = h("input", { type: "range", min: 0, max: 1, step: 0.005, value: look.sliceAt, "aria-label": "Place of the slice", hidden: look.slice === null, oninput: () => {
           look.sliceAt = Number(at.value);
-          stage.again();
+          comparison.again();
         } });
         parts.push(choice("See", [["", "smoke"], ["0", "slice across x"], ["1", "slice across y"], ["2", "slice across z"]], look.slice === null ? "" : String(look.slice), (v) => {
           look.slice = v === "" ? null : Number(v);
@@ -425,6 +422,7 @@ export const page: Page = async (main, rest) => {
   };
   const theme = () => {
     stage.theme();
+    comparison.theme();
     energy.setCurves(energyCurves());
     drawEnergy();
   };
@@ -463,7 +461,7 @@ export const page: Page = async (main, rest) => {
 
   if (start.shared && start.shared.version && engine().version && start.shared.version !== engine().version) say(`This link was made by version ${start.shared.version}; this is ${engine().version}: bits may differ.`);
   // For tests and for the curious.
-  Object.assign(window, { tumble: { session, stage, engine: engine() } });
+  Object.assign(window, { tumble: { session, stage, comparison, engine: engine() } });
 
   return () => {
     removeEventListener("themechange", theme);
@@ -471,6 +469,7 @@ export const page: Page = async (main, rest) => {
     offPointers();
     saved.close();
     energy.close();
+    comparison.close();
     editor?.close();
     session.close();
     stage.dispose();

@@ -24,6 +24,9 @@ function release(object: THREE.Object3D): void {
   });
 }
 
+/** A little farther away than it is. */
+const BEHIND = { polygonOffset: true, polygonOffsetFactor: 2, polygonOffsetUnits: 8 };
+
 /** Grows by half as much again, so that a growing swarm seldom makes new buffers. */
 function room(attribute: THREE.BufferAttribute | undefined, count: number, width: number, instanced: boolean): THREE.BufferAttribute {
   if (attribute && attribute.count >= count) return attribute;
@@ -38,13 +41,14 @@ export class Points implements Layer {
   readonly object: THREE.Points;
   private readonly geometry = new THREE.BufferGeometry();
 
-  constructor(glow: boolean, thinnest = 1.5) {
+  /** Lights in the dark, or, of a ghost, rings. */
+  constructor(glow: boolean, thinnest = 1.5, ghost = false) {
     const material = new THREE.ShaderMaterial({
       vertexShader: BALLS.vertex,
       fragmentShader: BALLS.fragment,
-      uniforms: { thinnest: { value: thinnest }, size: PIXELS, glow: { value: glow } },
-      transparent: glow,
-      depthWrite: !glow,
+      uniforms: { thinnest: { value: thinnest }, size: PIXELS, glow: { value: glow }, ghost: { value: ghost } },
+      transparent: glow || ghost,
+      depthWrite: !glow && !ghost,
       blending: glow ? THREE.AdditiveBlending : THREE.NormalBlending,
     });
     this.object = new THREE.Points(this.geometry, material);
@@ -150,6 +154,12 @@ export class Pieces implements Layer {
     this.material.uniforms.radius.value = value;
   }
 
+  /** Lets one see through it, and through to what lies in the same place. */
+  veil(opacity: number): void {
+    this.material.uniforms.fade.value = opacity;
+    Object.assign(this.material, BEHIND);
+  }
+
   dispose(): void {
     release(this.object);
   }
@@ -222,6 +232,12 @@ export class Surface implements Layer {
       this.material.vertexColors = !!colors;
       this.material.needsUpdate = true;
     }
+  }
+
+  /** Lets one see through it, and through to what lies in the same place. */
+  veil(opacity: number): void {
+    Object.assign(this.material, { ...BEHIND, transparent: true, depthWrite: false, opacity });
+    this.object.castShadow = this.object.receiveShadow = false;
   }
 
   tint(color: Rgb): void {

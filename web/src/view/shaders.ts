@@ -80,6 +80,7 @@ export const BALLS = {
   fragment: /* glsl */ `
     uniform mat4 projectionMatrix;
     uniform bool glow;
+    uniform bool ghost;
     varying vec3 shade;
     varying float depth;
     varying float ball;
@@ -88,7 +89,13 @@ export const BALLS = {
       vec2 p = vec2(gl_PointCoord.x * 2.0 - 1.0, 1.0 - gl_PointCoord.y * 2.0);
       float d = dot(p, p);
       if (d > 1.0) discard;
-      if (glow) {
+      if (ghost) {
+        // Rings, a pixel and a half wide and at least a seventh of the ball.
+        float width = max(3.0 * fwidth(gl_PointCoord.x), 0.14);
+        if (sqrt(d) < 1.0 - width) discard;
+        gl_FragColor = vec4(shade, 0.25 + 0.35 * small);
+        gl_FragDepth = gl_FragCoord.z;
+      } else if (glow) {
         float core = exp(-6.0 * d) * small;
         gl_FragColor = vec4(shade * 1.6 + 0.25 * core, core);
       } else {

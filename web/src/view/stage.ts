@@ -5,7 +5,7 @@ import type { Column, Frame, Numbers, SceneInfo, Vector } from "../engine/protoc
 import { mapOf, PALETTE, SIGNED } from "./colors";
 import { Depths } from "./depths";
 import { gridOf, PIXELS, PlaneField, Pieces, Points, Range, scalars, SpaceField, Surface, type Grid, type Layer, type Rgb } from "./layers";
-import { arrows, carry, countOf, leapOf, outline, palette, pick, planeOf, sharp } from "./scenery";
+import { arrows, carry, countOf, leapOf, outline, palette, pick, planeOf, sharp, shownOf } from "./scenery";
 import { trails } from "./trails";
 
 /** How fields and objects are shown; of all objects together. */
@@ -34,8 +34,6 @@ export interface Legend {
   high: number;
 }
 
-/** What is shown of a grid where nobody says: the first of these that there is. */
-const SHOWN = ["density", "fuel", "temperature", "vorticity", "speed", "pressure", "divergence"];
 const SMOKE: Rgb = [0.52, 0.53, 0.56];
 const SOLID: Rgb = [0.42, 0.41, 0.39];
 const GLOWING = 1000;
@@ -496,16 +494,7 @@ export class Stage {
   }
 
   private field(thing: Thing, grid: Grid, columns: Record<string, Column>): void {
-    const chosen = this.look.field;
-    const has = (name: string) => name in columns || (name === "speed" && "velocity" in columns);
-    let name = chosen && has(chosen) ? chosen : undefined;
-    if (!name) {
-      name = SHOWN.find((n) => {
-        if (!has(n)) return false;
-        const values = scalars(columns[n] ?? columns.velocity);
-        return values.some((v) => v !== values[0]);
-      }) ?? SHOWN.find(has);
-    }
+    const name = shownOf(columns, this.look.field);
     if (!name) return;
     const column = columns[name] ?? columns.velocity;
     const signed = SIGNED.includes(name) && column.width === 1;
