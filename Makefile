@@ -14,13 +14,14 @@ PKG := web/src/engine/pkg
 WEB := $(shell find web -path web/node_modules -prune -o -path web/dist -prune -o -path $(PKG) -prune -o -type f -print) \
 	$(shell find python/tumble/scenes docs/theory -type f)
 
-.PHONY: help setup demo test lint test-rust test-python test-web web chromium openvdb validate bench clean
+.PHONY: help setup demo test lint test-rust test-python test-web web wheel chromium openvdb validate bench clean
 
 help:
 	@echo "make demo      set up, drape a sheet over the Stanford bunny, show where the film is"
 	@echo "make test      set up, pass all tests"
 	@echo "make setup     leave $(BIN)/tumble"
 	@echo "make web       build the browser laboratory into web/dist, and for \`tumble view\`"
+	@echo "make wheel     the package with all of it, in dist/"
 	@echo "make validate  the long figures"
 	@echo "make bench     speed against peers, which it installs into .venv-bench"
 
@@ -69,6 +70,11 @@ python/tumble/web/index.html: $(PKG)/single_bg.wasm $(PKG)/double_bg.wasm web/no
 	cd web && npm run --silent build
 	rm -rf python/tumble/web
 	cp -r web/dist python/tumble/web
+
+# To give away: with the scenes and the laboratory inside.
+wheel: setup web
+	$(BIN)/maturin build --release --quiet --out dist
+	@$(BIN)/python -m zipfile --list dist/tumble-*.whl | grep -q " *tumble/web/index.html" && ls dist/tumble-*.whl
 
 web/node_modules/.ready: web/package-lock.json
 	@command -v npm >/dev/null || { echo "make web needs Node 20.19 or later, with npm"; exit 1; }

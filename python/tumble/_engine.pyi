@@ -99,6 +99,12 @@ class World:
         """The named columns: position [m] n x 3, velocity [m/s] n x 3, orientation n x 4 (x, y, z, w), angular_velocity
         [rad/s] n x 3, link_strain n."""
 
+    def inside(self, substeps: int, *names: str) -> tuple[Columns, dict[str, Any]] | None:
+        """The named columns after so many sub-steps of the next frame, all systems in turn; the world itself stays where it
+        is. Systems whose turn has not come are still at the start of their interval. Returns (columns, about) with about:
+        system and step [s] of the last sub-step, time [s], ledger; None where the frame has no more sub-steps. Raises
+        StepError for a sub-step that breaks."""
+
     @property
     def units(self) -> dict[str, dict[str, str]]:
         """Units of all columns: object -> column -> SI unit."""

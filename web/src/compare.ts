@@ -181,7 +181,7 @@ export class Comparison {
     const old = this.other(frame);
     const field = this.seen === "difference" ? this.field : null;
     if (old && this.seen === "before") this.stage.show(old);
-    else if (old && field && old.index === frame.index) this.stage.show(difference(frame, old, field.name));
+    else if (old && field && old.index === frame.index && !frame.inside) this.stage.show(difference(frame, old, field.name));
     else this.stage.show(frame);
     this.ghost.show(this.ghostly && this.seen !== "before" ? old : undefined);
     this.drawn();

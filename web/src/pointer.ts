@@ -27,20 +27,21 @@ export function pointers(canvas: HTMLCanvasElement, stage: Stage, session: Sessi
   const held = new Map<number, Held>();
   const down = (event: PointerEvent) => {
     if (event.button !== 0 || !session.info) return;
-    const gas = stage.flat ? stage.gas : null;
+    const gas = stage.stirred;
     const near = gas ? null : stage.nearest(event, event.pointerType === "touch" ? 34 : 18);
     if (!near && !gas) return;
     event.stopPropagation();
     canvas.setPointerCapture(event.pointerId);
     stage.turning = false;
-    held.set(event.pointerId, { mass: near ?? undefined, last: stage.under(event, near?.point), time: performance.now(), busy: false });
+    held.set(event.pointerId, { mass: near ?? undefined, last: stage.under(event, near?.point ?? gas?.through), time: performance.now(), busy: false });
     void session.branch().catch(() => {});
     if (!session.playing) session.play();
   };
   const move = (event: PointerEvent) => {
     const own = held.get(event.pointerId);
     if (!own) return;
-    const at = stage.under(event, own.mass?.point);
+    const gas = stage.stirred;
+    const at = stage.under(event, own.mass?.point ?? gas?.through);
     if (!at) return;
     if (own.mass) {
       const { object, row, point } = own.mass;
@@ -51,7 +52,6 @@ export function pointers(canvas: HTMLCanvasElement, stage: Stage, session: Sessi
       void session.grab(object, row, at.toArray() as Vector).catch(() => {}).finally(() => (own.busy = false));
       return;
     }
-    const gas = stage.gas;
     if (!gas || own.busy || !own.last) return;
     const seconds = Math.max((performance.now() - own.time) / 1000, 0.004);
     const push = at.clone().sub(own.last).multiplyScalar(SHARE / seconds);

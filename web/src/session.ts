@@ -264,11 +264,27 @@ export class Session {
     else await this.forward(1, false).catch((error) => this.fail(error));
   }
 
+  /** One sub-step on: a look inside the frame, until it is whole. What came after the frame that is shown is gone. */
+  async substep(): Promise<void> {
+    this.pause();
+    try {
+      await this.cut();
+      const substeps = (this.shown?.inside?.substeps ?? 0) + 1;
+      const found = await this.queue(() => this.engine.inside(substeps, this.wanted(), this.world));
+      if (found) this.display(found);
+      else await this.forward(1, false);
+    } catch (error) {
+      this.fail(error);
+    }
+  }
+
   /** One frame back. */
   previous(): void {
     this.pause();
     const shown = this.shown?.index ?? 0;
-    const kept = this.kept.filter((i) => i < shown).pop();
+    // From between two frames to the one before.
+    const before = this.shown?.inside ? shown + 1 : shown;
+    const kept = this.kept.filter((i) => i < before).pop();
     if (kept !== undefined) this.display(this.way.frame(kept)!);
   }
 
@@ -368,6 +384,21 @@ export class Session {
     this.before = branch;
     if (old && branch && old.id !== branch.id) void this.engine.unpark(old.id, this.world).catch(() => {});
     if (old || branch) this.tell("before", branch);
+  }
+
+  /** The engine goes to the frame that is shown; what came after it is gone. */
+  private cut(): Promise<void> {
+    const shown = this.shown?.index ?? 0;
+    return this.queue(async () => {
+      if (shown >= this.latest) return;
+      const { branch, frame, root } = await this.part(shown, false);
+      if (branch) await this.engine.unpark(branch.id, this.world);
+      if (!frame) return;
+      this.history = back(this.history, root);
+      if (this.before) this.compare({ ...this.before, at: Math.min(this.before.at, root) });
+      this.take(frame);
+      this.display(frame);
+    });
   }
 
   /** Before the pointer changes something: the engine goes to the frame that is shown. */

@@ -16,8 +16,12 @@ export function transport(session: Session): HTMLElement {
     slider.value = String(frame.index);
     slider.style.setProperty("--there", `${(100 * session.latest) / Math.max(last, 1)}%`);
     slider.style.setProperty("--here", `${(100 * frame.index) / Math.max(last, 1)}%`);
-    slider.setAttribute("aria-valuetext", `frame ${frame.index} of ${last}, ${show(frame.time)} seconds`);
-    clock.textContent = `${frame.index} / ${last} · ${show(frame.time, 3)} s`;
+    const { inside } = frame;
+    const between = inside ? ` + ${inside.substeps} sub-step${inside.substeps > 1 ? "s" : ""}` : "";
+    slider.setAttribute("aria-valuetext", `frame ${frame.index}${between} of ${last}, ${show(frame.time)} seconds`);
+    clock.textContent = inside
+      ? `${frame.index}${between} (${inside.system}, ${show(inside.step, 3)} s) · ${show(frame.time, 4)} s`
+      : `${frame.index} / ${last} · ${show(frame.time, 3)} s`;
     cost.textContent = session.cost ? `${show(session.cost, 2)} ms a frame` : "";
   };
   session.on("frame", update);
@@ -28,6 +32,7 @@ export function transport(session: Session): HTMLElement {
     { class: "transport", role: "group", "aria-label": "Playback" },
     play,
     iconButton("back", "One frame back", () => session.previous()),
+    iconButton("substep", "One sub-step on", () => void session.substep()),
     iconButton("next", "One frame on", () => void session.next()),
     iconButton("reset", "Back to the start", () => void session.reset()),
     slider,
@@ -37,7 +42,7 @@ export function transport(session: Session): HTMLElement {
   );
 }
 
-/** Keys of pages that play: space, arrows, Home. */
+/** Keys of pages that play: space, comma and point, semicolon, arrows, Home. */
 export function keys(session: Session, stage?: { nudge(dx: number, dy: number, zoom: number): void; goHome(): void }): () => void {
   const act = (event: KeyboardEvent) => {
     const target = event.target as HTMLElement;
@@ -46,6 +51,7 @@ export function keys(session: Session, stage?: { nudge(dx: number, dy: number, z
       " ": () => session.toggle(),
       ".": () => void session.next(),
       ",": () => session.previous(),
+      ";": () => void session.substep(),
       Home: () => void session.reset(),
     };
     if (stage && target.closest(".stage")) {

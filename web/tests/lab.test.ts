@@ -53,23 +53,28 @@ describe("gallery", () => {
     await page.context().close();
   });
 
-  it("comes with less than 3 MB for the first picture of a scene", async () => {
-    // A context of its own: nothing is in its cache.
-    const context = await own.browser.newContext({ ...STILL, viewport: { width: 1280, height: 800 } });
-    const page = await context.newPage();
-    const sizes: Promise<number>[] = [];
-    context.on("response", (r) => {
-      if (r.ok()) sizes.push(r.body().then((b) => gzipSync(b).length, () => 0));
-    });
-    const start = Date.now();
-    await page.goto(`${own.address}#/scene/drape/clamped-sheet`);
-    await frame(page, 0);
-    const taken = Date.now() - start;
-    const bytes = (await Promise.all(sizes)).reduce((a, b) => a + b, 0);
-    console.log(`# first picture after ${taken} ms, ${(bytes / 1e6).toFixed(2)} MB gzipped`);
-    // With the engine, which is above 1 MB.
-    assert.ok(bytes > 1e6 && bytes < 3e6, `${bytes} bytes`);
-    await context.close();
+  it("shows the first picture of a scene after less than 3 MB and 3 s, with nothing in the cache", async () => {
+    // The fastest of some: the aim is for the page, not for what else the machine does.
+    let fastest = Infinity;
+    for (let tries = 0; tries < 5 && fastest >= 3000; tries++) {
+      const context = await own.browser.newContext({ ...STILL, viewport: { width: 1280, height: 800 } });
+      const page = await context.newPage();
+      const sizes: Promise<number>[] = [];
+      context.on("response", (r) => {
+        if (r.ok()) sizes.push(r.body().then((b) => gzipSync(b).length, () => 0));
+      });
+      const start = Date.now();
+      await page.goto(`${own.address}#/scene/drape/clamped-sheet`);
+      await frame(page, 0);
+      const taken = Date.now() - start;
+      fastest = Math.min(fastest, taken);
+      const bytes = (await Promise.all(sizes)).reduce((a, b) => a + b, 0);
+      console.log(`# first picture after ${taken} ms, ${(bytes / 1e6).toFixed(2)} MB gzipped`);
+      // With the engine, which is above 1 MB.
+      assert.ok(bytes > 1e6 && bytes < 3e6, `${bytes} bytes`);
+      await context.close();
+    }
+    assert.ok(fastest < 3000, `${fastest} ms`);
   });
 });
 
@@ -112,6 +117,41 @@ describe("scenes", () => {
       if (process.env.VERBOSE) console.log(`# ${id} ${Date.now() - start} ms ${JSON.stringify(seen)}`);
     }
     assert.deepEqual(failures, []);
+    assert.deepEqual(errors, []);
+    await page.context().close();
+  });
+
+  it("go sub-step by sub-step through a frame, and leave its bits alone", async () => {
+    const { page, errors } = await own.open("scene/structures/rope", STILL);
+    await ready(page);
+    const { substeps, straight, dt } = await page.evaluate(async () => {
+      const { session } = (window as any).tumble;
+      for (let i = 0; i < 3; i++) await session.next();
+      const straight = await session.hash();
+      session.scrub(2);
+      return { substeps: session.info.scene.system[0].substeps as number, straight, dt: session.info.dt as number };
+    });
+    assert.ok(substeps > 3);
+    await page.focus(".stage");
+    const times: number[] = [];
+    for (let k = 1; k < substeps; k++) {
+      await page.keyboard.press(";");
+      await page.waitForFunction((n) => (window as any).tumble.session.shown.inside?.substeps === n, k);
+      times.push(await page.evaluate(() => (window as any).tumble.session.shown.time));
+    }
+    assert.match((await page.textContent(".clock")) ?? "", new RegExp(`^2 \\+ ${substeps - 1} sub-steps`));
+    const h = dt / substeps;
+    times.forEach((t, k) => assert.ok(Math.abs(t - (2 * dt + (k + 1) * h)) < 1e-9, `${k}: ${t}`));
+    // The last one makes the frame whole.
+    await page.click("[aria-label='One sub-step on']");
+    await page.waitForFunction(() => (window as any).tumble.session.shown.index === 3);
+    assert.equal(await page.evaluate(() => (window as any).tumble.session.hash()), straight);
+    // Back from between two frames is to the one before.
+    await page.focus(".stage");
+    await page.keyboard.press(";");
+    await page.waitForFunction(() => (window as any).tumble.session.shown.inside);
+    await page.click("[aria-label='One frame back']");
+    assert.deepEqual(await page.evaluate(() => [(window as any).tumble.session.shown.index, !!(window as any).tumble.session.shown.inside]), [3, false]);
     assert.deepEqual(errors, []);
     await page.context().close();
   });
@@ -365,6 +405,65 @@ describe("fluid", () => {
       return { good, bad: session.report.pressure.at(-1), unconverged: session.report.unconverged };
     });
     assert.ok(left.bad > 10 * left.good && left.unconverged > 0, JSON.stringify(left));
+    assert.deepEqual(errors, []);
+    await page.context().close();
+  });
+
+  it("is stirred in space, too, in the slice that is shown", async () => {
+    const { page, errors } = await own.open("fluid", STILL);
+    await ready(page);
+    await page.selectOption("#space", "slice");
+    await page.waitForFunction(() => (window as any).tumble.session.info.dimension === 3);
+    await page.selectOption("#view", "pressure");
+    await page.evaluate(async () => {
+      const { session } = (window as any).tumble;
+      session.pause();
+      await session.next();
+    });
+    // A pressure has both signs; only what is looked through like smoke has not.
+    const { low, high } = await page.evaluate(() => (window as any).tumble.stage.legend);
+    assert.ok(low < 0 && low === -high, `${low} to ${high}`);
+    const box = (await page.locator(".stage").boundingBox())!;
+    const before = await page.evaluate(() => (window as any).tumble.session.hash());
+    const at = await page.evaluate(([x, y]) => {
+      const { session, stage } = (window as any).tumble;
+      const all: number[][] = [];
+      const stir = session.stir.bind(session);
+      session.stir = (gas: string, position: number[], ...rest: unknown[]) => (all.push(position), stir(gas, position, ...rest));
+      session.play = () => {};
+      (window as any).stirred = all;
+      stage.look.sliceAt = 0.75;
+      return stage.under({ clientX: x, clientY: y }, stage.stirred.through).toArray();
+    }, [box.x + 0.6 * box.width, box.y + 0.5 * box.height] as const);
+    assert.ok(Math.abs(at[1] - 0.125) < 1e-6, `${at}`);
+    await page.mouse.move(box.x + 0.4 * box.width, box.y + 0.5 * box.height);
+    await page.mouse.down();
+    await page.mouse.move(box.x + 0.5 * box.width, box.y + 0.5 * box.height, { steps: 4 });
+    await page.waitForFunction(() => (window as any).stirred.length);
+    await page.mouse.up();
+    assert.notEqual(await page.evaluate(() => (window as any).tumble.session.hash()), before);
+    assert.ok((await page.evaluate(() => (window as any).stirred)).every((p: number[]) => Math.abs(p[1] - 0.125) < 1e-6));
+    assert.deepEqual(errors, []);
+    await page.context().close();
+  });
+
+  it("is stirred by several fingers", async () => {
+    const { page, errors } = await own.open("fluid", { ...STILL, viewport: { width: 390, height: 844 }, hasTouch: true, isMobile: true });
+    await ready(page);
+    await page.evaluate(() => {
+      const { session } = (window as any).tumble;
+      const all: number[][] = [];
+      session.stir = async (_: string, position: number[]) => void all.push(position);
+      (window as any).stirred = all;
+    });
+    const box = (await page.locator(".stage").boundingBox())!;
+    const touch = await page.context().newCDPSession(page);
+    const fingers = (k: number) => [0.25, 0.75].map((x, id) => ({ x: box.x + (x + 0.02 * k) * box.width, y: box.y + 0.5 * box.height, id }));
+    await touch.send("Input.dispatchTouchEvent", { type: "touchStart", touchPoints: fingers(0) });
+    for (let k = 1; k < 5; k++) await touch.send("Input.dispatchTouchEvent", { type: "touchMove", touchPoints: fingers(k) });
+    await touch.send("Input.dispatchTouchEvent", { type: "touchEnd", touchPoints: [] });
+    const sides = (await page.evaluate(() => (window as any).stirred)).map((p: number[]) => p[0] < 0);
+    assert.ok(sides.includes(true) && sides.includes(false), `${sides}`);
     assert.deepEqual(errors, []);
     await page.context().close();
   });

@@ -47,12 +47,16 @@ pub struct StepReport {
     pub courant: f64,
     /// Residuals of the last pressure solve after each iteration, relative to its start.
     pub pressure: Vec<f64>,
+    /// Length of the last sub-step, and of all together [s]; for those who look inside a frame.
+    #[serde(skip)]
+    pub way: (f64, f64),
 }
 
 impl StepReport {
     /// Counts a sub-step of length h [s].
     pub fn stepped(&mut self, h: f64) {
         self.steps += 1;
+        self.way = (h, self.way.1 + h);
         self.step_range = Some(self.step_range.map_or((h, h), |(a, b)| (a.min(h), b.max(h))));
     }
 
@@ -116,6 +120,20 @@ impl Ledger {
     pub fn energy(&self) -> f64 {
         self.kinetic + self.elastic + self.external
     }
+}
+
+/// What is seen between two sub-steps of a frame.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Inside {
+    /// The state there. Systems go one after the other through an interval, so those whose turn has not come are still at its start.
+    /// The index is that of the last whole frame.
+    pub frame: Frame,
+    /// The books there.
+    pub ledger: Ledger,
+    /// The system that took the last sub-step.
+    pub system: String,
+    /// Length of that sub-step [s].
+    pub step: f64,
 }
 
 /// A force written by a user, on the masses of one system.
@@ -194,6 +212,10 @@ pub trait Engine: Send {
     /// Simulates one frame. `go_on` is asked between sub-steps; when it says no, the state goes back to the last
     /// frame and `Ok(None)` is returned. After an error the state is that of the last good frame, too.
     fn step(&mut self, go_on: &(dyn Fn() -> bool + Sync)) -> Result<Option<StepReport>, StepError>;
+
+    /// Looks at the state after so many sub-steps of the next frame, all systems in turn; the world stays where it is. `None` where the
+    /// frame has no more of them, and when `go_on` says no. A sub-step that breaks the state is an error.
+    fn inside(&mut self, substeps: u64, columns: &[&str], go_on: &(dyn Fn() -> bool + Sync)) -> Result<Option<Inside>, StepError>;
 
     /// The current state: the named columns of every object that has them.
     fn frame(&self, columns: &[&str]) -> Frame;

@@ -25,6 +25,15 @@ impl Data {
     pub fn is_empty(&self) -> bool {
         self.len() == 0
     }
+
+    /// All of them in double precision.
+    pub fn numbers(&self) -> Vec<f64> {
+        match self {
+            Self::F32(v) => v.iter().map(|x| f64::from(*x)).collect(),
+            Self::F64(v) => v.clone(),
+            Self::U32(v) => v.iter().map(|x| f64::from(*x)).collect(),
+        }
+    }
 }
 
 impl From<Vec<f32>> for Data {

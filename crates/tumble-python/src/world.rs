@@ -11,7 +11,7 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::{RecvTimeoutError, channel};
 use std::time::Duration;
-use tumble_interface::engine::{Engine, StepReport};
+use tumble_interface::engine::{Engine, Ledger, StepReport};
 use tumble_interface::scene::Precision;
 use tumble_interface::{Column, SceneError, StepError};
 
@@ -184,6 +184,31 @@ impl World {
         arrays::columns(py, self.engine.frame(&names).columns)
     }
 
+    /// The named columns after so many sub-steps of the next frame, all systems in turn; the world itself stays where it is. Systems
+    /// whose turn has not come are still at the start of their interval. Returns (columns, about) with about: system and step [s] of the
+    /// last sub-step, time [s], ledger; None where the frame has no more sub-steps. Raises StepError for a sub-step that breaks.
+    #[pyo3(signature = (substeps, *names))]
+    fn inside<'py>(
+        &mut self,
+        py: Python<'py>,
+        substeps: u64,
+        names: Vec<String>,
+    ) -> PyResult<Option<(Bound<'py, PyDict>, Bound<'py, PyDict>)>> {
+        if substeps == 0 {
+            return Err(scene_error(py, &SceneError::one("substeps", "0, expected >= 1")));
+        }
+        let names: Vec<&str> = names.iter().map(String::as_str).collect();
+        let (engine, pool) = (&mut self.engine, self.pool.as_ref());
+        let seen = work(py, pool, |go_on| engine.inside(substeps, &names, go_on))?;
+        let Some(inside) = seen.map_err(|error| step_error(py, &error))? else { return Ok(None) };
+        let about = PyDict::new(py);
+        about.set_item("system", &inside.system)?;
+        about.set_item("step", inside.step)?;
+        about.set_item("time", inside.frame.time)?;
+        about.set_item("ledger", books(py, &inside.ledger)?)?;
+        Ok(Some((arrays::columns(py, inside.frame.columns)?, about)))
+    }
+
     /// Units of all columns: object -> column -> SI unit.
     #[getter]
     fn units<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
@@ -206,9 +231,7 @@ impl World {
     fn ledger<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
         let (engine, pool) = (&self.engine, self.pool.as_ref());
         let ledger = work(py, pool, |_| engine.ledger())?;
-        let books = pythonize::pythonize(py, &ledger)?;
-        books.set_item("energy", ledger.energy())?;
-        Ok(books)
+        books(py, &ledger)
     }
 
     /// Hash of everything that the next step depends on, 16 hexadecimal digits.
@@ -290,6 +313,13 @@ impl World {
     fn __repr__(&self) -> String {
         format!("World(frame={}, time={})", self.engine.frame_index(), self.engine.time())
     }
+}
+
+/// A ledger with its sum.
+fn books<'py>(py: Python<'py>, ledger: &Ledger) -> PyResult<Bound<'py, PyAny>> {
+    let books = pythonize::pythonize(py, ledger)?;
+    books.set_item("energy", ledger.energy())?;
+    Ok(books)
 }
 
 fn callable(py: Python<'_>, value: &Py<PyAny>, what: &str) -> PyResult<()> {

@@ -39,3 +39,11 @@ pub fn columns(columns: Vec<Column>) -> Object {
     }
     all
 }
+
+/// { columns, about }
+pub fn with_columns(all: Vec<Column>, about: &str) -> Object {
+    let one = table();
+    put(&one, "columns", &columns(all));
+    put(&one, "about", &about.into());
+    one
+}

@@ -2,7 +2,6 @@
 
 mod arrays;
 mod failure;
-mod hand;
 mod load;
 
 #[cfg(not(feature = "double"))]
@@ -10,13 +9,13 @@ use tumble as engine;
 #[cfg(feature = "double")]
 use tumble_f64 as engine;
 
+use engine::scene::hand::{self, Hand, Held};
 use failure::Failure;
-use hand::{Hand, Held};
 use load::Loaded;
 use serde::Serialize;
-use tumble_interface::engine::Engine;
+use tumble_interface::SceneError;
+use tumble_interface::engine::{Engine, Ledger};
 use tumble_interface::tree::Node;
-use tumble_interface::{Column, Data, SceneError};
 use wasm_bindgen::prelude::*;
 
 /// What goes out as JSON or as an error.
@@ -113,6 +112,26 @@ impl World {
         }
     }
 
+    /// Looks at the named columns after so many sub-steps of the next frame, without going there; `null` where the frame has no more.
+    /// { columns, about: JSON of system, step [s], time [s] and ledger }. Throws a failure as JSON.
+    pub fn inside(&mut self, substeps: f64, names: Vec<String>, limit: f64) -> Answer<Option<js_sys::Object>> {
+        let end = now() + limit;
+        let names: Vec<&str> = names.iter().map(String::as_str).collect();
+        match self.loaded.world.inside(substeps.max(1.0) as u64, &names, &|| now() < end) {
+            Ok(Some(inside)) => {
+                let about = serde_json::json!({
+                    "system": inside.system,
+                    "step": inside.step,
+                    "time": inside.frame.time,
+                    "ledger": Books::of(inside.ledger),
+                });
+                Ok(Some(arrays::with_columns(inside.frame.columns, &about.to_string())))
+            }
+            Ok(None) => Ok(None),
+            Err(error) => Err(thrown(Failure::step(&error))),
+        }
+    }
+
     /// Frames simulated so far.
     pub fn index(&self) -> f64 {
         self.loaded.world.frame_index() as f64
@@ -125,14 +144,7 @@ impl World {
 
     /// The books now, as JSON.
     pub fn ledger(&self) -> String {
-        #[derive(Serialize)]
-        struct Books {
-            #[serde(flatten)]
-            ledger: tumble_interface::engine::Ledger,
-            energy: f64,
-        }
-        let ledger = self.loaded.world.ledger();
-        json(&Books { energy: ledger.energy(), ledger })
+        json(&Books::of(self.loaded.world.ledger()))
     }
 
     /// Hash of everything that the next step depends on.
@@ -184,7 +196,7 @@ impl World {
         if self.hand.drag(object, row, target) {
             return Ok(());
         }
-        let (system, held) = Held::new(&mut self.loaded, object, row, target, stiffness).map_err(|e| self.loaded.wrong(e))?;
+        let (system, held) = Held::new(&mut self.loaded.world, object, row, target, stiffness).map_err(|e| self.loaded.wrong(e))?;
         if self.hand.take(&system, held) {
             self.loaded.world.add_force(&system, self.hand.force(&system)).map_err(|e| self.loaded.wrong(e))?;
         }
@@ -208,6 +220,20 @@ impl World {
     }
 }
 
+/// A ledger with its sum.
+#[derive(Serialize)]
+struct Books {
+    #[serde(flatten)]
+    ledger: Ledger,
+    energy: f64,
+}
+
+impl Books {
+    fn of(ledger: Ledger) -> Self {
+        Self { energy: ledger.energy(), ledger }
+    }
+}
+
 /// Tried steps of adaptive integrators that go out.
 const MOST_TRIALS: usize = 4096;
 
@@ -224,13 +250,4 @@ fn json(value: &impl Serialize) -> String {
 
 fn thrown(failure: Failure) -> JsValue {
     json(&failure).into()
-}
-
-/// The numbers of a column in double precision.
-fn numbers(column: &Column) -> Vec<f64> {
-    match &column.data {
-        Data::F32(v) => v.iter().map(|x| f64::from(*x)).collect(),
-        Data::F64(v) => v.clone(),
-        Data::U32(v) => v.iter().map(|x| f64::from(*x)).collect(),
-    }
 }

@@ -89,11 +89,6 @@ impl Loaded {
         (self.scene.time.fps, self.scene.time.exchanges)
     }
 
-    /// The scene.
-    pub fn scene(&self) -> &Scene {
-        &self.scene
-    }
-
     /// An error as it is thrown, with its lines.
     pub fn wrong(&self, error: SceneError) -> wasm_bindgen::JsValue {
         crate::thrown(with_lines(error, &self.node).into())

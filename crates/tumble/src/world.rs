@@ -6,6 +6,7 @@ use crate::system::{Archive, Part, System};
 use safetensors::tensor::{Dtype, SafeTensors, TensorView, serialize};
 use std::collections::HashMap;
 use std::hash::Hasher;
+use std::sync::atomic::{AtomicU64, Ordering};
 use tumble_interface::engine::{Ledger, Stability, StepReport};
 use tumble_interface::{Column, SceneError, StepError};
 use twox_hash::XxHash3_64;
@@ -48,7 +49,7 @@ impl World {
     /// what it posts reaches the others on their next turn, the same interval for those after it, the next for those
     /// before it. After an error, or when `go_on` says no (`None`), the state is that of the last good frame.
     pub fn step(&mut self, go_on: &(dyn Fn() -> bool + Sync)) -> Result<Option<StepReport>, StepError> {
-        let result = self.intervals(go_on);
+        let result = self.intervals(go_on, |_, _, _| {});
         let report = match result {
             Ok(report) if go_on() => report,
             Ok(_) => {
@@ -70,14 +71,21 @@ impl World {
         Ok(Some(report))
     }
 
-    fn intervals(&mut self, go_on: &(dyn Fn() -> bool + Sync)) -> Result<StepReport, StepError> {
+    /// All intervals of a frame; `done` hears of each turn: which system, from when on [s], and what it took.
+    fn intervals(
+        &mut self,
+        go_on: &(dyn Fn() -> bool + Sync),
+        mut done: impl FnMut(usize, f64, &StepReport),
+    ) -> Result<StepReport, StepError> {
         let mut report = StepReport::default();
         for k in 0..u64::from(self.exchanges) {
             // From whole numbers, so that time does not drift.
             let [t, end] = [k, k + 1].map(|k| (self.frame * u64::from(self.exchanges) + k) as f64 * self.dt);
-            for system in &mut self.systems {
+            for (i, system) in self.systems.iter_mut().enumerate() {
                 system.absorb(&mut self.exchange);
-                report.add(&system.advance(t, self.dt, &mut self.exchange, go_on)?);
+                let turn = system.advance(t, self.dt, &mut self.exchange, go_on)?;
+                done(i, t, &turn);
+                report.add(&turn);
                 system.publish(end, &mut self.exchange);
             }
         }
@@ -87,11 +95,43 @@ impl World {
     /// Goes back to the last good frame and steps again, watching every sub-step.
     fn first_breakdown(&mut self) -> Option<StepError> {
         self.roll_back();
-        self.systems.iter_mut().for_each(|s| s.watch(true));
-        let found = self.intervals(&|| true).err();
-        self.systems.iter_mut().for_each(|s| s.watch(false));
+        let found = self.watched(&|| true, |_, _, _| {}).err();
         self.roll_back();
         found
+    }
+
+    /// A frame sub-step by sub-step, each of which is looked at.
+    fn watched(&mut self, go_on: &(dyn Fn() -> bool + Sync), done: impl FnMut(usize, f64, &StepReport)) -> Result<StepReport, StepError> {
+        self.systems.iter_mut().for_each(|s| s.watch(true));
+        let result = self.intervals(go_on, done);
+        self.systems.iter_mut().for_each(|s| s.watch(false));
+        result
+    }
+
+    /// Lets `see` look at the world after `n` sub-steps of the next frame, at the time [s] of the system that took the last one, with
+    /// the name of that system and the length of the sub-step [s]; then the world is back at its last good frame. `None`: the frame
+    /// has no more sub-steps, or `go_on` said no.
+    pub fn inside<T>(
+        &mut self,
+        n: u64,
+        go_on: &(dyn Fn() -> bool + Sync),
+        see: impl FnOnce(&Self, f64, &str, f64) -> T,
+    ) -> Result<Option<T>, StepError> {
+        let (asked, dt, mut last) = (AtomicU64::new(0), self.dt, None);
+        let counted = || asked.fetch_add(1, Ordering::Relaxed) < n && go_on();
+        let result = self.watched(&counted, |system, t, turn| {
+            if turn.steps > 0 {
+                last = Some((system, t + turn.way.1.min(dt), turn.way.0));
+            }
+        });
+        let seen = match (&result, last) {
+            (Ok(_), Some((system, time, step))) if asked.into_inner() > n && go_on() => {
+                Some(see(self, time, self.systems[system].name(), step))
+            }
+            _ => None,
+        };
+        self.roll_back();
+        result.map(|_| seen).map_err(|error| self.explain(error))
     }
 
     /// Adds the step in use and the stable one, at the last good frame.
@@ -205,7 +245,11 @@ impl World {
 
     /// The books of all systems together.
     pub fn ledger(&self) -> Ledger {
-        let time = self.time();
+        self.ledger_at(self.time())
+    }
+
+    /// The same, of a state at this time [s].
+    pub fn ledger_at(&self, time: f64) -> Ledger {
         let mut total = Ledger { time, ..Ledger::default() };
         for books in self.systems.iter().map(|s| s.ledger(time)) {
             total.mass += books.mass;

@@ -273,3 +273,59 @@ fn an_abandoned_step_leaves_no_trace() {
         assert_eq!(sim.hash(), other.hash(), "{name}");
     }
 }
+
+#[test]
+fn looks_inside_a_frame_show_its_sub_steps_and_leave_no_trace() {
+    let names = ["position", "velocity", "density", "temperature"];
+    for (name, text, _) in scenes() {
+        let (mut sim, mut other) = (simulation(&text), simulation(&text));
+        run(&mut sim, 1);
+        run(&mut other, 1);
+        let (start, before) = (sim.hash(), sim.frame(&names));
+        let steps = other.step(&|| true).unwrap().unwrap().steps;
+        let mut last: (f64, Vec<_>) = (before.time, before.columns);
+        let looks: std::collections::BTreeSet<u64> = [1, 2, steps / 2, steps - 1].into_iter().filter(|n| (1..steps).contains(n)).collect();
+        for n in looks {
+            let seen = sim.inside(n, &names, &|| true).unwrap().unwrap_or_else(|| panic!("{name}: no sub-step {n} of {steps}"));
+            assert!(seen.frame.index == 1 && seen.step > 0.0 && seen.frame.time <= other.time(), "{name}: {n}");
+            assert_eq!(seen.ledger.time, seen.frame.time, "{name}: {n}");
+            // Systems go one after the other: only where there is one does time run on.
+            assert!(sim.systems().len() > 1 || seen.frame.time > last.0, "{name}: {n}");
+            assert!(seen.frame.columns != last.1, "{name}: nothing moves in sub-step {n}");
+            last = (seen.frame.time, seen.frame.columns);
+        }
+        assert!(sim.inside(steps, &names, &|| true).unwrap().is_none(), "{name}: the frame has more than {steps} sub-steps");
+        assert!(sim.inside(1, &names, &|| false).unwrap().is_none(), "{name}");
+        assert_eq!(sim.hash(), start, "{name}");
+        run(&mut sim, 1);
+        assert_eq!(sim.hash(), other.hash(), "{name}");
+    }
+}
+
+#[test]
+fn half_of_a_frame_is_a_frame_of_half_the_length() {
+    let (whole, half) = (
+        "time.fps = 64\n[[system]]\nintegrator = \"verlet\"\nsubsteps = 12",
+        "time.fps = 128\n[[system]]\nintegrator = \"verlet\"\nsubsteps = 6",
+    );
+    let scene = |head: &str| simulation(&(sheet("", "links = { structural = 50, bend = 2 }").replace("time.fps = 60\n[[system]]\n", head)));
+    let (mut whole, mut half) = (scene(whole), scene(half));
+    run(&mut whole, 3);
+    run(&mut half, 7);
+    let inside = whole.inside(6, &["position", "velocity"], &|| true).unwrap().unwrap();
+    assert_eq!(inside.frame.time, half.time());
+    assert!(inside.frame.columns == half.frame(&["position", "velocity"]).columns);
+    assert_eq!(inside.ledger, half.ledger());
+}
+
+#[test]
+fn a_look_at_what_breaks_is_an_error_with_the_sub_step() {
+    let mut sim = simulation(
+        "time.fps = 10\n[[system]]\nintegrator = \"forward_euler\"\nsubsteps = 20\n[[rope]]\nname = \"rope\"\nfrom = [0, 0, 0]\nto = [1, 0, 0]\nsegments = 8\npin = [\"start\"]\n\
+         links = { structural = 1e5 }\n",
+    );
+    let start = sim.hash();
+    let error = (1..20).find_map(|n| sim.inside(n, &["position"], &|| true).err()).expect("nothing breaks");
+    assert!(matches!(error, StepError::Exploded(_) | StepError::NotFinite(_)), "{error}");
+    assert_eq!(sim.hash(), start);
+}

@@ -94,6 +94,12 @@ export class Engine {
     return this.frame({ type: "step", ...options, world });
   }
 
+  /** The state after so many sub-steps of the next frame; `null` where it has no more. */
+  async inside(substeps: number, columns?: string[], world = 0): Promise<Frame | null> {
+    const answer = await this.ask({ type: "inside", substeps, columns, world });
+    return answer.type === "frame" ? answer.frame : null;
+  }
+
   /** The frame as it stands. */
   read(options: FrameOptions = {}, world = 0): Promise<Frame> {
     return this.frame({ type: "read", ...options, world });

@@ -107,6 +107,8 @@ export interface Frame {
   ms: number;
   /** Frames that `restore` can go to, rising. */
   kept: number[];
+  /** Where this is a look inside the frame that comes after `index`: how many sub-steps in, whose the last one was, and its length [s]. */
+  inside?: { substeps: number; system: string; step: number };
 }
 
 /** The pre-flight estimate of one system. A limit of 0: no step is stable; `null`: every one is. */
@@ -160,6 +162,8 @@ export type Request = Asked &
      * Columns where given replace those of the scene.
      */
     | { type: "step"; frames?: number; budget?: number; columns?: string[]; hash?: boolean }
+    /** A look at the state after so many sub-steps of the next frame; the world stays where it is. -> frame, or done: it has no more. */
+    | { type: "inside"; substeps: number; columns?: string[] }
     /** The frame as it stands, without a step. -> frame */
     | { type: "read"; columns?: string[]; hash?: boolean }
     /** Back to frame 0. -> frame */

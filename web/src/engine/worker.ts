@@ -162,6 +162,20 @@ function step(request: Request & { type: "step" }): Frame {
   return frame(at, request, { ledgers, report, ms: performance.now() - start });
 }
 
+function inside(request: Request & { type: "inside" }): Frame | null {
+  const at = running(request.world ?? 0);
+  const start = performance.now();
+  const found = at.world.inside(request.substeps, request.columns ?? at.info.columns, FRAME_LIMIT) as { columns: Columns; about: string } | undefined;
+  if (!found) return null;
+  const { system, step, time, ledger } = JSON.parse(found.about) as { system: string; step: number; time: number; ledger: Ledger };
+  return {
+    ...frame(at, { columns: [] }, { ledgers: [ledger], ms: performance.now() - start }),
+    columns: found.columns,
+    time,
+    inside: { substeps: request.substeps, system, step },
+  };
+}
+
 async function answer(request: Request): Promise<Answer> {
   const { id } = request;
   const number = request.world ?? 0;
@@ -170,6 +184,10 @@ async function answer(request: Request): Promise<Answer> {
       return { id, type: "loaded", info: await load(request) };
     case "step":
       return { id, type: "frame", frame: step(request) };
+    case "inside": {
+      const found = inside(request);
+      return found ? { id, type: "frame", frame: found } : { id, type: "done" };
+    }
     case "read":
       return { id, type: "frame", frame: frame(running(number), request) };
     case "reset":

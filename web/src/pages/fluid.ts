@@ -1,4 +1,4 @@
-/** A fluid in a box, to stir: views of everything that a step makes, and a pressure that may be as bad as one likes. */
+/** A fluid in a box, in a plane or in space, to stir: views of everything that a step makes, and a pressure that may be as bad as one likes. */
 import { parse } from "smol-toml";
 import { check, choice, h, iconButton, saveAs, show, type Page } from "../dom";
 import { EngineError } from "../engine/client";
@@ -14,7 +14,7 @@ import { keys, transport } from "../transport";
 import { LOOK, Stage } from "../view/stage";
 import { Vector3 } from "three";
 
-const VIEWS: [string, string][] = [["density", "Dye"], ["pressure", "Pressure"], ["speed", "Speed, with arrows"], ["vorticity", "Vorticity"], ["divergence", "Divergence that is left"]];
+const VIEWS: [string, string][] = [["density", "Dye"], ["pressure", "Pressure"], ["speed", "Speed, with arrows"], ["vorticity", "Vorticity"], ["divergence", "Residual: divergence that is left"]];
 const SOLVERS: [string, string][] = [
   ["jacobi", "Jacobi"], ["gauss_seidel", "Gauss–Seidel, red and black"], ["sor", "Over-relaxation"], ["conjugate_gradients", "Conjugate gradients"],
   ["incomplete_cholesky", "… with incomplete Cholesky"], ["modified_incomplete_cholesky", "… with MIC(0)"], ["multigrid", "Multigrid"], ["multigrid_gradients", "Multigrid gradients"], ["cosine", "Cosine transform"],
@@ -38,11 +38,13 @@ interface Choices {
   particles: boolean;
   lifetime: number;
   trail: number;
-  /** Drawn by hand: points in the plane. */
+  /** In space a slice is shown, or all of the smoke. */
+  space: "plane" | "slice" | "smoke";
+  /** Drawn by hand, in the plane: points. */
   walls: [number, number][][];
 }
 
-const START: Choices = { cells: 192, method: "multigrid_gradients", iterations: 100, tolerance: 1e-3, viscosity: 0, confinement: 0, advection: "corrected", obstacle: "none", particles: true, lifetime: 3, trail: 0.3, walls: [] };
+const START: Choices = { cells: 192, method: "multigrid_gradients", iterations: 100, tolerance: 1e-3, viscosity: 0, confinement: 0, advection: "corrected", obstacle: "none", particles: true, lifetime: 3, trail: 0.3, space: "plane", walls: [] };
 
 const CARRIED = { linear: '{ interpolation = "linear" }', corrected: "{ corrected = true }", cubic: '{ interpolation = "monotone_cubic", corrected = true }' };
 
@@ -55,9 +57,13 @@ const pieces = (c: Choices) =>
 /** All solids, as a list of the scene. */
 const solids = (c: Choices) => [...((parse(OBSTACLES[c.obstacle]).collider ?? []) as Value[]), ...pieces(c)];
 
+/** Cells along, and how deep the box is, in space [m]. */
+const SPACE = { cells: ["48", "64", "96", "128"], depth: 0.5 };
+const PLANE = ["64", "96", "128", "192", "256", "384"];
+
 const scene = (c: Choices) => `version = 1
 title = "A fluid to stir"
-dimension = 2
+dimension = ${c.space === "plane" ? 2 : 3}
 
 [time]
 fps = 60
@@ -70,10 +76,10 @@ substeps = 1
 ${c.particles ? '\n[[system]]\nname = "dust"\nmethod = "tracers"\nintegrator = "heun"\nsubsteps = 1\n' : ""}
 [[gas]]
 name = "fluid"
-box = { size = [1.6, 1, 0.9], resolution = ${c.cells} }
+box = { size = [1.6, ${c.space === "plane" ? 1 : SPACE.depth}, 0.9], resolution = ${c.cells} }
 fluid_density = 1
 ${c.viscosity > 0 ? `viscosity = ${c.viscosity}\n` : ""}confinement = ${c.confinement}
-velocity = ["1.1*exp(-60*((z - 0.1)^2)) - 1.1*exp(-60*((z + 0.1)^2))", 0, "0.25*sin(8*x)*exp(-20*z^2)"]
+velocity = ["1.1*exp(-60*((z - 0.1)^2)) - 1.1*exp(-60*((z + 0.1)^2))", ${c.space === "plane" ? 0 : '"0.1*sin(5*x)*cos(9*y)"'}, "0.25*sin(8*x)*exp(-20*z^2)"]
 smoke = { initial = "0.9*smoothstep(0.02, -0.02, abs(abs(z) - 0.12) - 0.05)", weight = 0, dissipation = 0.04 }
 advection = { velocity = ${CARRIED[c.advection]} }
 pressure = { method = "${c.method}", iterations = ${c.iterations}, tolerance = ${c.tolerance} }
@@ -81,7 +87,7 @@ ${c.particles ? `
 [[emitter]]
 name = "dust"
 system = "dust"
-from = { box = { size = [1.6, 0, 0.9] } }
+from = { box = { size = [1.6, ${c.space === "plane" ? 0 : SPACE.depth}, 0.9] } }
 rate = ${Math.round(1500 / c.lifetime)}
 lifetime = ${c.lifetime}
 lifetime_spread = 0.4
@@ -96,6 +102,7 @@ of = "fluid"
 ` : ""}
 ${OBSTACLES[c.obstacle]}
 ${pieces(c).map((w) => `[[collider]]\nname = "${w.name}"\nshape = ${literal(w.shape)}\n`).join("\n")}
+${c.space === "plane" ? "" : `[camera]\nposition = ${c.space === "slice" ? "[0, -2.9, 0]" : "[1.2, -2.9, 0.95]"}\ntarget = [0, 0, 0]\n`}
 [output]
 columns = ["position", "density"]
 `;
@@ -171,15 +178,62 @@ export const page: Page = async (main) => {
   const view = choice("View", VIEWS, "density", (v) => showView(v));
   view.querySelector("select")!.id = "view";
   const showView = (v: string) => {
+    const space = choices.space !== "plane";
     stage.look.field = v;
-    stage.look.arrows = v === "speed";
-    stage.look.cells = v !== "density" && choices.cells <= 128;
+    stage.look.arrows = v === "speed" && !space;
+    stage.look.cells = v !== "density" && choices.cells <= 128 && !space;
     stage.look.dye = v === "density";
+    // Only smoke can be looked through.
+    stage.look.slice = choices.space === "slice" || (space && v !== "density") ? 1 : null;
     void session.refresh().then(() => {
       stage.again();
       tellLegend();
     });
   };
+  const cells = choice("Cells along", [], "", (v) => {
+    choices.cells = Number(v);
+    void rerun();
+  });
+  const fillCells = () => {
+    const list = choices.space === "plane" ? PLANE : SPACE.cells;
+    if (!list.includes(String(choices.cells))) choices.cells = choices.space === "plane" ? START.cells : 64;
+    cells.querySelector("select")!.replaceChildren(...list.map((n) => h("option", { value: n, selected: n === String(choices.cells) }, n)));
+  };
+  fillCells();
+  const sliceAt = range("Place of the slice", 0, 1, 0.5, (v) => `${show((v - 0.5) * SPACE.depth, 2)} m`, (v) => {
+    stage.look.sliceAt = v;
+    stage.again();
+  });
+  sliceAt.hidden = true;
+  const dragging = choice("Dragging", [["stir", "stirs"], ["draw", "draws walls"]], "stir", (v) => (drawing = v === "draw"));
+  const clear = h("button", { type: "button", class: "button", onclick: () => {
+    choices.walls = [];
+    void set("collider", solids(choices) as Value);
+  } }, "Clear the walls");
+  const cellsShown = check("Cells", false, (on) => {
+    stage.look.cells = on;
+    stage.again();
+  });
+  const arrowsShown = check("Arrows", false, (on) => {
+    stage.look.arrows = on;
+    void session.refresh().then(() => stage.again());
+  });
+  const space = choice("Fluid", [["plane", "in a plane"], ["slice", "in space, cut by a slice"], ["smoke", "in space, its smoke"]], choices.space, (v) => {
+    choices.space = v as Choices["space"];
+    const plane = v === "plane";
+    // Walls are drawn in a plane.
+    if (!plane) choices.walls = [];
+    for (const part of [dragging, clear, cellsShown, arrowsShown]) part.hidden = !plane;
+    sliceAt.hidden = plane;
+    if (!plane && drawing) {
+      drawing = false;
+      dragging.querySelector("select")!.value = "stir";
+    }
+    fillCells();
+    showView(view.querySelector("select")!.value);
+    void rerun();
+  });
+  space.querySelector("select")!.id = "space";
   const power = (low: number, high: number) => ({ of: (v: number) => (v <= low ? 0 : 10 ** v), low, high });
   const thick = power(-6, -1.5);
   const controls = h(
@@ -217,19 +271,15 @@ export const page: Page = async (main) => {
         choices.confinement = v;
         void set("gas.0.confinement", v);
       }),
-      choice("Cells along", [["64", "64"], ["96", "96"], ["128", "128"], ["192", "192"], ["256", "256"], ["384", "384"]], String(choices.cells), (v) => {
-        choices.cells = Number(v);
-        void rerun();
-      }),
+      space,
+      sliceAt,
+      cells,
       choice("Obstacles", [["none", "none"], ["disk", "a disk"], ["gate", "a gate"], ["posts", "posts"]], choices.obstacle, (v) => {
         choices.obstacle = v;
         void set("collider", solids(choices) as Value);
       }),
-      choice("Dragging", [["stir", "stirs"], ["draw", "draws walls"]], "stir", (v) => (drawing = v === "draw")),
-      h("button", { type: "button", class: "button", onclick: () => {
-        choices.walls = [];
-        void set("collider", solids(choices) as Value);
-      } }, "Clear the walls"),
+      dragging,
+      clear,
     ),
     h("section", { class: "card" }, h("h2", {}, "Particles"),
       check("Particles go with the flow", choices.particles, (on) => {
@@ -245,16 +295,7 @@ export const page: Page = async (main) => {
         void rerun();
       }),
     ),
-    h("section", { class: "card" }, h("h2", {}, "Picture"),
-      check("Cells", false, (on) => {
-        stage.look.cells = on;
-        stage.again();
-      }),
-      check("Arrows", false, (on) => {
-        stage.look.arrows = on;
-        void session.refresh().then(() => stage.again());
-      }),
-    ),
+    h("section", { class: "card" }, h("h2", {}, "Picture"), cellsShown, arrowsShown),
   );
   const theory = h("section", { class: "beside", "aria-label": "Theory" });
   main.append(
@@ -340,8 +381,9 @@ export const page: Page = async (main) => {
   const stir = (event: KeyboardEvent) => {
     const way: Record<string, [number, number]> = { ArrowLeft: [-1, 0], ArrowRight: [1, 0], ArrowUp: [0, 1], ArrowDown: [0, -1] };
     const go = way[event.key];
-    const gas = stage.gas;
+    const gas = stage.stirred;
     if (!go || !gas) return;
+    cursor.y = gas.through?.y ?? 0;
     event.preventDefault();
     event.stopPropagation();
     cursor.x = Math.min(Math.max(cursor.x + 0.03 * go[0], -0.78), 0.78);

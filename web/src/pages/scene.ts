@@ -67,7 +67,7 @@ export const page: Page = async (main, rest) => {
   const canvas = h("canvas", { "aria-hidden": "true" });
   const { element: legendElement, update: tellLegend } = legendBox(() => stage);
   const wait = h("div", { class: "wait" }, "Loading the engine …");
-  const stageBox = h("div", { class: "stage", tabindex: 0, role: "group", "aria-label": "Picture of the scene. Space plays, arrows turn the view, plus and minus zoom, 0 brings the view back." }, canvas, legendElement, wait);
+  const stageBox = h("div", { class: "stage", tabindex: 0, role: "group", "aria-label": "Picture of the scene. Space plays, comma and point go by frames, semicolon by sub-steps, arrows turn the view, plus and minus zoom, 0 brings the view back." }, canvas, legendElement, wait);
   const title = h("h1", {}, titleOf(start.toml) || start.name);
   const alert = h("div", { class: "alert", role: "alert", hidden: true });
   const lookBar = h("div", { class: "look", role: "group", "aria-label": "What is shown" });
@@ -170,7 +170,7 @@ export const page: Page = async (main, rest) => {
     const old = comparison.energies(times);
     energy.set([times, pad(books.map((l) => l.kinetic)), pad(books.map((l) => l.elastic)), pad(books.map((l) => l.external - external0)), pad(books.map((l) => l.energy - external0)), old]);
     (energyKey.element.lastElementChild as HTMLElement).hidden = !session.before;
-    const now = books[session.shown?.index ?? books.length - 1];
+    const now = session.shown?.inside ? session.shown.ledgers[0] : books[session.shown?.index ?? books.length - 1];
     if (now) energyKey.set([show(now.kinetic, 3), show(now.elastic, 3), show(now.external - external0, 3), show(now.energy - external0, 3), show(old[session.shown?.index ?? 0], 3)]);
   };
   let opening = true;

@@ -158,6 +158,20 @@ export class Stage {
     return thing?.grid ? { name: thing.name, grid: thing.grid } : null;
   }
 
+  /**
+   * The gas that a pointer stirs, and a point of the plane in which it does where that is not the gas itself: in space it is a slice, which
+   * stands before a camera that does not turn.
+   */
+  get stirred(): { name: string; through?: THREE.Vector3 } | null {
+    const gas = this.gas;
+    if (!gas || this.flat) return gas && { name: gas.name };
+    const { slice, sliceAt } = this.look;
+    if (slice === null || this.controls.enabled) return null;
+    const { origin, spacing, cells } = gas.grid;
+    const [x, y, z] = [0, 1, 2].map((a) => origin[a] + (a === slice ? sliceAt : 0.5) * cells[a] * spacing);
+    return { name: gas.name, through: new THREE.Vector3(x, y, z) };
+  }
+
   /** Whether ways behind particles are drawn. */
   get trails(): boolean {
     return this.things.some((t) => t.trail > 0);
@@ -499,9 +513,12 @@ export class Stage {
     const column = columns[name] ?? columns.velocity;
     const signed = SIGNED.includes(name) && column.width === 1;
     let values = scalars(column);
-    if (grid.flat === 3 && signed) values = values.map((v) => Math.abs(v));
-    let range = thing.ranges.get(name);
-    if (!range) thing.ranges.set(name, (range = new Range(grid.flat === 3 && signed ? "" : name)));
+    // There is no less smoke than none.
+    const sizes = grid.flat === 3 && signed && this.look.slice === null;
+    if (sizes) values = values.map((v) => Math.abs(v));
+    const key = sizes ? `size of ${name}` : name;
+    let range = thing.ranges.get(key);
+    if (!range) thing.ranges.set(key, (range = new Range(sizes ? "" : name)));
     range.look(values);
     const [low, high] = range.pair;
     this.legend = { name, unit: column.unit, low, high };

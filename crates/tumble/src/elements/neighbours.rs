@@ -22,6 +22,16 @@ const MIXED: u32 = u32::MAX;
 /// Kinds at most, so that they stay in the first cache.
 const KINDS: usize = 64;
 
+/// Sixteen entries side by side.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Slot {
+    /// Where its run starts, counted from the first row.
+    run: u32,
+    /// Which of the kinds its sixteen springs are. They are then not read one by one: on a sheet three quarters of what a pass over the
+    /// springs reads from memory.
+    kind: u32,
+}
+
 /// The springs of every row, seen from that row.
 pub struct Neighbours<const D: usize, const P: usize> {
     /// First row, a multiple of SLICE.
@@ -30,11 +40,9 @@ pub struct Neighbours<const D: usize, const P: usize> {
     pub rows: usize,
     /// Where each slice starts, in entries; one more than there are slices.
     pub start: Vec<u32>,
-    /// Of each slot: where its run starts, counted from `first`.
-    run: Vec<u32>,
-    /// Of each slot: which of `kinds` its sixteen springs are. They are then not read one by one: on a sheet three quarters
-    /// of what a pass over the springs reads from memory.
-    kind: Vec<u32>,
+    slots: Vec<Slot>,
+    /// Whether any slot is a run.
+    has_runs: bool,
     kinds: Vec<Pack<Real, D, P>>,
     /// Of each entry: the row of the neighbour. An entry without a spring has no stiffness.
     pub neighbour: Index,
@@ -74,8 +82,8 @@ impl<const D: usize, const P: usize> Neighbours<D, P> {
             first,
             rows: count,
             start: vec![0],
-            run: Vec::new(),
-            kind: Vec::new(),
+            slots: Vec::new(),
+            has_runs: false,
             kinds: Vec::new(),
             neighbour: Index::default(),
             rest: std::array::from_fn(|_| Vec::new()),
@@ -119,7 +127,7 @@ impl<const D: usize, const P: usize> Neighbours<D, P> {
                 }
             }
             for (s, slot) in slots.iter().enumerate() {
-                lists.run.push(runs.get(s).map_or(SCATTERED, |offset| (begin as isize + offset) as u32));
+                let run = runs.get(s).map_or(SCATTERED, |offset| (begin as isize + offset) as u32);
                 for k in slot {
                     if let Some(k) = k {
                         lists.entries[k / 2][k % 2] = neighbour.len() as u32;
@@ -139,10 +147,11 @@ impl<const D: usize, const P: usize> Neighbours<D, P> {
                     .iter()
                     .all(|k| matches!((k, slot[0]), (Some(k), Some(first)) if pack(&members[k / 2]) == pack(&members[first / 2])));
                 let kind = if alike { slot[0].and_then(|k| lists.kind_of(pack(&members[k / 2]))) } else { None };
-                lists.kind.push(kind.unwrap_or(MIXED));
+                lists.slots.push(Slot { run, kind: kind.unwrap_or(MIXED) });
             }
             lists.start.push(neighbour.len() as u32);
         }
+        lists.has_runs = lists.slots.iter().any(|slot| slot.run != SCATTERED);
         lists.neighbour = Index::new(neighbour, rows)?;
         Some(lists)
     }
@@ -162,18 +171,25 @@ impl<const D: usize, const P: usize> Neighbours<D, P> {
         for entry in self.entries[spring].map(|e| e as usize) {
             self.stiffness[entry] = stiffness;
             self.damping[entry] = damping;
-            self.kind[entry / SLICE] = MIXED;
+            self.slots[entry / SLICE].kind = MIXED;
         }
     }
 
-    /// What a pack of entries is made of.
+    /// The slots of a slice, each with its first entry.
     #[inline(always)]
-    pub fn pack<W: Width>(&self, w: W, entry: usize) -> Pack<W::L, D, P> {
+    pub fn slots(&self, slice: usize) -> impl Iterator<Item = (usize, Slot)> {
+        let entries = self.start[slice] as usize..self.start[slice + 1] as usize;
+        let slots = &self.slots[entries.start / SLICE..entries.end / SLICE];
+        entries.step_by(SLICE).zip(slots.iter().copied())
+    }
+
+    /// What a pack of entries of a slot is made of.
+    #[inline(always)]
+    pub fn pack<W: Width>(&self, w: W, slot: Slot, entry: usize) -> Pack<W::L, D, P> {
         let zero = w.splat(0.0);
         let mut pack = Pack { rest: [zero; D], law: [zero; P], stiffness: zero, damping: zero };
-        let kind = self.kind[entry / SLICE];
-        if kind != MIXED {
-            let spring = &self.kinds[kind as usize];
+        // A slot that is mixed has the number of no kind.
+        if let Some(spring) = self.kinds.get(slot.kind as usize) {
             for d in 0..D {
                 pack.rest[d] = w.splat(spring.rest[d]);
             }
@@ -210,24 +226,29 @@ impl<const D: usize, const P: usize> Neighbours<D, P> {
         ((a - first) / SLICE..(b - first).div_ceil(SLICE), &mut out[a - start..b - start])
     }
 
-    /// The vectors of the rows at the other ends of a pack of entries.
+    /// The vectors of the rows at the other ends of a pack of entries: those of a slot from the lane on.
     ///
     /// # Safety
-    /// `rows` holds every row that the lists were made for.
+    /// `rows` holds every row that the lists were made for, and `columns` were filled by these lists.
     #[inline(always)]
-    pub unsafe fn load<W: Width>(&self, w: W, rows: &[Row], columns: &Columns, entry: usize) -> Vec3<W::L> {
-        let run = self.run[entry / SLICE];
-        if run != SCATTERED {
-            return columns.load(w, run as usize + entry % SLICE);
+    pub unsafe fn load<W: Width>(&self, w: W, rows: &[Row], columns: &Columns, slot: Slot, entry: usize, lane: usize) -> Vec3<W::L> {
+        if slot.run != SCATTERED {
+            // SAFETY: a run starts at a row of the lists, and columns are longer by a slice.
+            return unsafe { columns.load(w, slot.run as usize + lane) };
         }
         // SAFETY: promised by the caller.
         let [x, y, z, _] = unsafe { w.gather(rows, &self.neighbour.get()[entry..]) };
         Vec3 { x, y, z }
     }
 
+    /// Whether columns have the length of those that these lists have filled.
+    pub fn has_filled(&self, columns: &Columns) -> bool {
+        !self.has_runs || columns.0.iter().all(|c| c.len() == self.rows + SLICE)
+    }
+
     /// Fills columns from the rows of the lists, unless no slot is a run.
     pub fn fill(&self, columns: &mut Columns, rows: &[Row]) {
-        if self.run.iter().any(|r| *r != SCATTERED) {
+        if self.has_runs {
             columns.fill(&rows[self.first..self.first + self.rows]);
         }
     }
@@ -243,9 +264,13 @@ fn pack<const D: usize, const P: usize>(m: &Members<2, D, P>) -> Pack<Real, D, P
 pub struct Columns([Vec<Real>; 3]);
 
 impl Columns {
+    /// # Safety
+    /// `at` is inside, and so are as many rows after it as a register holds.
     #[inline(always)]
-    fn load<W: Width>(&self, w: W, at: usize) -> Vec3<W::L> {
-        Vec3 { x: w.load(&self.0[0][at..]), y: w.load(&self.0[1][at..]), z: w.load(&self.0[2][at..]) }
+    unsafe fn load<W: Width>(&self, w: W, at: usize) -> Vec3<W::L> {
+        let [x, y, z] = &self.0;
+        // SAFETY: promised by the caller; all three have one length.
+        unsafe { Vec3 { x: w.load_at(x, at), y: w.load_at(y, at), z: w.load_at(z, at) } }
     }
 
     fn fill(&mut self, rows: &[Row]) {
@@ -305,7 +330,7 @@ mod tests {
             }
         }
         assert_eq!(lists.stiffness.iter().filter(|k| **k != 0.0).count(), found);
-        assert!(lists.run.iter().filter(|r| **r != SCATTERED).count() >= 6, "{:?}", lists.run);
+        assert!(lists.slots.iter().filter(|s| s.run != SCATTERED).count() >= 6, "{:?}", lists.slots);
         assert!(Neighbours::new(75, &members).is_none());
     }
 }

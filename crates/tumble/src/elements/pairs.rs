@@ -186,21 +186,20 @@ impl<E: Pair<M, D>, Y: Law<P>, const M: usize, const D: usize, const P: usize> G
             None => None,
         };
         let mut sum = Vec3 { x: zero, y: zero, z: zero };
-        let mut entry = lists.start[slice] as usize + lane;
-        while entry < lists.start[slice + 1] as usize {
-            // SAFETY: `add_forces` has checked x and v.
-            let d = unsafe { lists.load(w, self.x, &self.columns[0], entry) } - here;
-            let p = lists.pack(w, entry);
+        for (start, slot) in lists.slots(slice) {
+            let entry = start + lane;
+            // SAFETY: `add_forces` has checked x, v and their columns.
+            let d = unsafe { lists.load(w, self.x, &self.columns[0], slot, entry, lane) } - here;
+            let p = lists.pack(w, slot, entry);
             let damping = match moving {
                 Some((v, velocity)) => {
                     // SAFETY: as above.
-                    let rate = unsafe { lists.load(w, v, &self.columns[1], entry) } - velocity;
+                    let rate = unsafe { lists.load(w, v, &self.columns[1], slot, entry, lane) } - velocity;
                     Some((p.damping, rate))
                 }
                 None => None,
             };
             sum = sum + E::pull::<Y, _, P>(p.stiffness, p.law, p.rest, d, damping);
-            entry += SLICE;
         }
         let at = i - self.slices.start * SLICE;
         let [x, y, z, _] = w.rows(self.out, at);
@@ -234,20 +233,19 @@ impl<E: Pair<M, D>, Y: Law<P>, const M: usize, const D: usize, const P: usize> L
         let [x, y, z, _] = w.rows(self.x, lists.first + slice * SLICE + lane);
         let here = Vec3 { x, y, z };
         let (scale_k, scale_b) = (w.splat(self.weights.stiffness), w.splat(self.weights.damping));
-        let mut entry = lists.start[slice] as usize + lane;
-        while entry < lists.start[slice + 1] as usize {
+        for (start, slot) in lists.slots(slice) {
+            let entry = start + lane;
             // SAFETY: `linearize` has checked x.
             let [x, y, z, _] = unsafe { w.gather(self.x, &lists.neighbour.get()[entry..]) };
-            let p = lists.pack(w, entry);
+            let p = lists.pack(w, slot, entry);
             let (k, b) = (scale_k * p.stiffness, scale_b * p.damping);
             let exact = self.weights.hessian == Hessian::Exact;
             let (q, s) = E::stiffness::<Y, _, P>(k, b, p.law, p.rest, Vec3 { x, y, z } - here, exact);
-            let slot = &mut self.cache[(entry - lists.start[self.slices.start] as usize) / SLICE];
-            w.store(q.x, &mut slot[0][lane..]);
-            w.store(q.y, &mut slot[1][lane..]);
-            w.store(q.z, &mut slot[2][lane..]);
-            w.store(s, &mut slot[3][lane..]);
-            entry += SLICE;
+            let cached = &mut self.cache[(entry - lists.start[self.slices.start] as usize) / SLICE];
+            w.store(q.x, &mut cached[0][lane..]);
+            w.store(q.y, &mut cached[1][lane..]);
+            w.store(q.z, &mut cached[2][lane..]);
+            w.store(s, &mut cached[3][lane..]);
         }
     }
 }
@@ -280,14 +278,12 @@ impl<const D: usize, const P: usize> Product<'_, D, P> {
         let here = Vec3 { x, y, z };
         let zero = w.splat(0.0);
         let mut sum = Vec3 { x: zero, y: zero, z: zero };
-        let mut entry = lists.start[slice] as usize + lane;
-        while entry < lists.start[slice + 1] as usize {
-            // SAFETY: `add_product` has checked u.
-            let d = here - unsafe { lists.load(w, self.u, self.columns, entry) };
-            let slot = &self.cache[entry / SLICE];
-            let q = Vec3 { x: w.load(&slot[0][lane..]), y: w.load(&slot[1][lane..]), z: w.load(&slot[2][lane..]) };
-            sum = sum + q * q.dot(d) + d * w.load(&slot[3][lane..]);
-            entry += SLICE;
+        for (start, slot) in lists.slots(slice) {
+            // SAFETY: `add_product` has checked u and its columns.
+            let d = here - unsafe { lists.load(w, self.u, self.columns, slot, start + lane, lane) };
+            let cached = &self.cache[start / SLICE];
+            let q = Vec3 { x: w.load(&cached[0][lane..]), y: w.load(&cached[1][lane..]), z: w.load(&cached[2][lane..]) };
+            sum = sum + q * q.dot(d) + d * w.load(&cached[3][lane..]);
         }
         let at = i - self.slices.start * SLICE;
         let [x, y, z, _] = w.rows(self.out, at);
@@ -352,6 +348,7 @@ impl<E: Pair<M, D>, Y: Law<P>, const M: usize, const D: usize, const P: usize> B
     fn add_forces(&self, x: &[Row], v: &[Row], start: usize, force: &mut [Row]) {
         self.list.check(&[x, v]);
         let v = self.list.damped.then_some(v);
+        assert!(self.lists.has_filled(&self.columns[0]) && (v.is_none() || self.lists.has_filled(&self.columns[1])));
         let (slices, out) = self.lists.within(start, force);
         dispatch(Gather::<E, Y, M, D, P> { lists: &self.lists, columns: &self.columns, slices, x, v, out, kind: PhantomData });
     }
@@ -384,6 +381,7 @@ impl<E: Pair<M, D>, Y: Law<P>, const M: usize, const D: usize, const P: usize> B
 
     fn add_product(&self, u: &[Row], start: usize, out: &mut [Row]) {
         self.list.check(&[u]);
+        assert!(self.lists.has_filled(&self.columns[0]));
         let (slices, out) = self.lists.within(start, out);
         dispatch(Product { lists: &self.lists, columns: &self.columns[0], cache: &self.cache, slices, u, out });
     }

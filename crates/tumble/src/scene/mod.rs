@@ -5,6 +5,7 @@ mod checks;
 mod coupling;
 mod cures;
 mod gas;
+pub mod hand;
 mod hints;
 mod laws;
 mod memory;

@@ -7,7 +7,7 @@ use super::cures;
 use crate::geometry::{Collider, Shape};
 use crate::world::World;
 use std::sync::Arc;
-use tumble_interface::engine::{Cure, Engine, Ledger, Stability, StepReport, UserForce, UserIntegrator};
+use tumble_interface::engine::{Cure, Engine, Inside, Ledger, Stability, StepReport, UserForce, UserIntegrator};
 use tumble_interface::scene::{Integrator, System};
 use tumble_interface::{Column, Frame, Issue, Scene, SceneError, StepError};
 
@@ -55,25 +55,6 @@ impl Simulation {
         objects(&self.scene).into_iter().map(|(kind, name, named)| (kind, name.into(), system(kind, named))).collect()
     }
 
-    /// Where the moving colliders are: `translation` and `turn` of the mesh in the topology, x = turn p + translation, and
-    /// `position` of vertices that move by themselves.
-    fn places(&self, out: &mut Vec<Column>) {
-        let time = self.world.time();
-        for (thing, collider) in self.scene.collider.iter().zip(self.colliders.iter()) {
-            let mut add = |name: &str, unit, width, data: Vec<f64>| {
-                out.push(Column { object: thing.name.clone(), name: name.into(), unit, width, points: Vec::new(), data: data.into() });
-            };
-            if let Shape::Animated { facets, .. } = &collider.shape {
-                add("position", "m", 3, facets.vertices(time).concat());
-            }
-            if let Some(motion) = &collider.motion {
-                let (pose, _) = motion.at(time);
-                add("translation", "m", 3, <[f64; 3]>::from(pose.shift).to_vec());
-                add("turn", "1", 4, pose.turn.row().to_vec());
-            }
-        }
-    }
-
     fn system_error(&self, system: &str, message: &str) -> SceneError {
         let names = self.world.names();
         if names.contains(&system) {
@@ -81,6 +62,24 @@ impl Simulation {
         }
         let hint = tumble_interface::check::suggestion(system, names.iter().copied());
         SceneError::one(format!("system \"{system}\""), format!("there is no such system{hint} (systems: {})", names.join(", ")))
+    }
+}
+
+/// Where the moving colliders are: `translation` and `turn` of the mesh in the topology, x = turn p + translation, and
+/// `position` of vertices that move by themselves.
+fn places(scene: &Scene, colliders: &[Collider], time: f64, out: &mut Vec<Column>) {
+    for (thing, collider) in scene.collider.iter().zip(colliders) {
+        let mut add = |name: &str, unit, width, data: Vec<f64>| {
+            out.push(Column { object: thing.name.clone(), name: name.into(), unit, width, points: Vec::new(), data: data.into() });
+        };
+        if let Shape::Animated { facets, .. } = &collider.shape {
+            add("position", "m", 3, facets.vertices(time).concat());
+        }
+        if let Some(motion) = &collider.motion {
+            let (pose, _) = motion.at(time);
+            add("translation", "m", 3, <[f64; 3]>::from(pose.shift).to_vec());
+            add("turn", "1", 4, pose.turn.row().to_vec());
+        }
     }
 }
 
@@ -108,10 +107,20 @@ impl Engine for Simulation {
     }
 
     fn frame(&self, columns: &[&str]) -> Frame {
-        let mut all = self.world.columns(columns);
+        let (time, mut all) = (self.world.time(), self.world.columns(columns));
         // Whatever is asked for: a picture of anything has to show them where they are.
-        self.places(&mut all);
-        Frame { time: self.world.time(), index: self.world.frame_index(), columns: all }
+        places(&self.scene, &self.colliders, time, &mut all);
+        Frame { time, index: self.world.frame_index(), columns: all }
+    }
+
+    fn inside(&mut self, substeps: u64, columns: &[&str], go_on: &(dyn Fn() -> bool + Sync)) -> Result<Option<Inside>, StepError> {
+        let (scene, colliders) = (&self.scene, &self.colliders);
+        self.world.inside(substeps, go_on, |world, time, system, step| {
+            let mut all = world.columns(columns);
+            places(scene, colliders, time, &mut all);
+            let frame = Frame { time, index: world.frame_index(), columns: all };
+            Inside { frame, ledger: world.ledger_at(time), system: system.into(), step }
+        })
     }
 
     fn topology(&self) -> Vec<Column> {

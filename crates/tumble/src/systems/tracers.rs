@@ -207,8 +207,10 @@ impl System for Tracers {
                 report.stepped(h);
                 self.deliver(&mut unborn, if done == dt { end } else { t + done }, end);
             }
-            self.bury(end, dt)?;
-            self.time = end;
+            if done == dt {
+                self.bury(end, dt)?;
+                self.time = end;
+            }
             return Ok(report);
         }
         let by_step = self.settings.step.map(|step| integrators::equal_steps(dt, step) as u32);
@@ -216,7 +218,7 @@ impl System for Tracers {
         let h = dt / f64::from(n);
         for k in 0..n {
             if !go_on() {
-                break;
+                return Ok(report);
             }
             let (time, ready, memory) = (t + f64::from(k) * h, self.memory.ready, &mut self.memory.slices());
             let (equation, x, v) = (&mut Carried(&self.flow), &mut self.x, &mut []);

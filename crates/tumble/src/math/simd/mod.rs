@@ -53,6 +53,11 @@ pub trait Width: Copy + Send + Sync {
     fn splat(self, c: Real) -> Self::L;
     /// Loads `from[..N]`.
     fn load(self, from: &[Real]) -> Self::L;
+    /// Loads `from[at..at + N]` and looks at no bound.
+    ///
+    /// # Safety
+    /// `at + N <= from.len()`.
+    unsafe fn load_at(self, from: &[Real], at: usize) -> Self::L;
     /// Stores to `to[..N]`.
     fn store(self, v: Self::L, to: &mut [Real]);
     /// Loads the rows `index[..N]` and transposes them: four registers with x, y, z and w of N rows.
@@ -172,6 +177,11 @@ impl Width for Scalar {
     #[inline(always)]
     fn load(self, from: &[Real]) -> Real {
         from[0]
+    }
+    #[inline(always)]
+    unsafe fn load_at(self, from: &[Real], at: usize) -> Real {
+        // SAFETY: the caller has checked the place.
+        unsafe { *from.get_unchecked(at) }
     }
     #[inline(always)]
     fn store(self, v: Real, to: &mut [Real]) {

@@ -21,6 +21,12 @@ macro_rules! width {
                 Pack { simd: self, v: cast::<[Real; $n], _>(numbers) }
             }
             #[inline(always)]
+            unsafe fn load_at(self, from: &[Real], at: usize) -> Self::L {
+                debug_assert!(at + $n <= from.len());
+                // SAFETY: the caller has checked the place; an array of numbers is aligned as one of them.
+                Pack { simd: self, v: cast(unsafe { *from.as_ptr().add(at).cast::<[Real; $n]>() }) }
+            }
+            #[inline(always)]
             fn store(self, v: Self::L, to: &mut [Real]) {
                 to[..$n].copy_from_slice(&cast::<_, [Real; $n]>(v.v));
             }

@@ -408,7 +408,9 @@ impl Dynamics {
                 last = h;
                 self.look(t + done)?;
             }
-            self.bury(end, dt, last)?;
+            if done == dt {
+                self.bury(end, dt, last)?;
+            }
             return Ok(report);
         }
         let substeps = self.substeps(dt);
@@ -432,7 +434,7 @@ impl Dynamics {
         }
         for k in 0..substeps {
             if !go_on() {
-                break;
+                return Ok(report);
             }
             let time = t + f64::from(k) * h;
             self.witness(time);

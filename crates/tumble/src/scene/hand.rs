@@ -1,8 +1,7 @@
-//! What the pointer does: it pulls masses with springs, and stirs gases.
+//! What a hand does to a simulation: it pulls masses with springs, and stirs gases.
 
-use crate::engine::scene::Simulation;
-use crate::load::Loaded;
-use crate::numbers;
+use super::Simulation;
+use crate::math::functions::exp;
 use std::sync::{Arc, Mutex};
 use tumble_interface::engine::{Engine, UserForce};
 use tumble_interface::{Column, Data, SceneError};
@@ -24,22 +23,23 @@ pub struct Held {
 }
 
 impl Held {
-    /// A mass and those around it. The name of their system comes with them.
+    /// A mass (row of its object) and those around it, on a spring to `target` [m]; `stiffness` [N/m] is that of all together, chosen
+    /// where left out. The name of their system comes with them.
     pub fn new(
-        loaded: &mut Loaded,
+        simulation: &mut Simulation,
         object: &str,
         row: usize,
         target: [f64; 3],
         stiffness: Option<f64>,
     ) -> Result<(String, Self), SceneError> {
         let wrong = |message: &str| SceneError::one(object, message);
-        let objects = loaded.world.objects();
+        let objects = simulation.objects();
         let system = objects.iter().find(|(_, name, _)| name == object).and_then(|(_, _, system)| system.clone());
         let system = system.ok_or_else(|| wrong("there is no such object to hold"))?;
         let beside: Vec<&String> = objects.iter().filter(|o| o.2.as_ref() == Some(&system)).map(|(_, name, _)| name).collect();
-        let topology = loaded.world.topology();
-        let frame = loaded.world.frame(&["position"]);
-        let column = |all: &'_ [Column], name: &str| all.iter().find(|c| c.object == object && c.name == name).map(numbers);
+        let topology = simulation.topology();
+        let frame = simulation.frame(&["position"]);
+        let column = |all: &'_ [Column], name: &str| all.iter().find(|c| c.object == object && c.name == name).map(|c| c.data.numbers());
         let (Some(x), Some(mass)) = (column(&frame.columns, "position"), column(&topology, "mass")) else {
             return Err(wrong("it cannot be held: its particles have no mass of their own, or come and go"));
         };
@@ -64,8 +64,8 @@ impl Held {
         let near: Vec<usize> = (0..mass.len()).filter(|i| distance(at(*i), center) <= radius && !pinned.contains(&(*i as u32))).collect();
         let total: f64 = mass.iter().sum();
         let share: f64 = near.iter().map(|i| mass[*i]).sum();
-        let estimate = loaded.world.stability().into_iter().find(|s| s.system == system);
-        let h = estimate.map_or(f64::INFINITY, |s| s.step).min(loaded.scene().frame_time());
+        let estimate = simulation.stability().into_iter().find(|s| s.system == system);
+        let h = estimate.map_or(f64::INFINITY, |s| s.step).min(simulation.scene().frame_time());
         let masses = near.into_iter().map(|i| {
             let p = at(i);
             let all = stiffness.filter(|k| k.is_finite() && *k > 0.0).unwrap_or(total * (std::f64::consts::TAU * FREQUENCY).powi(2));
@@ -154,9 +154,9 @@ impl UserForce for Pull {
     }
 }
 
-/// Adds a Gaussian to the faces of a gas, and to its smoke.
+/// Adds to the velocity [m/s] and the density [kg/m³] of a gas around a point, falling off as a Gaussian of `radius` [m].
 pub fn stir(
-    world: &mut Simulation,
+    simulation: &mut Simulation,
     gas: &str,
     position: [f64; 3],
     velocity: [f64; 3],
@@ -167,8 +167,8 @@ pub fn stir(
     if !(radius.is_finite() && radius > 0.0 && density.is_finite()) {
         return Err(wrong("expected a radius > 0 m and a finite density"));
     }
-    let topology = world.topology();
-    let of_grid = |name: &str| topology.iter().find(|c| c.object == gas && c.name == name).map(numbers);
+    let topology = simulation.topology();
+    let of_grid = |name: &str| topology.iter().find(|c| c.object == gas && c.name == name).map(|c| c.data.numbers());
     let (Some(origin), Some(spacing), Some(flat)) = (of_grid("grid_origin"), of_grid("grid_spacing"), of_grid("grid_flat")) else {
         return Err(wrong("there is no such gas"));
     };
@@ -179,9 +179,9 @@ pub fn stir(
         if amount == 0.0 {
             continue;
         }
-        let frame = world.frame(&[name]);
+        let frame = simulation.frame(&[name]);
         let Some(column) = frame.column(gas, name).filter(|c| c.points.len() == axes.len() && c.width == 1) else { continue };
-        let mut values = numbers(column);
+        let mut values = column.data.numbers();
         // What each axis contributes to the Gaussian; their product is the weight.
         let along: Vec<Vec<f64>> = axes
             .iter()
@@ -204,12 +204,12 @@ pub fn stir(
                 *i = 0;
             }
         }
-        world.write(gas, name, &values)?;
+        simulation.write(gas, name, &values)?;
     }
     Ok(())
 }
 
 /// exp(-x²), zero where it is too small to be seen.
 fn gaussian(x: f64) -> f64 {
-    if x.abs() > 4.0 { 0.0 } else { crate::engine::math::functions::exp(-x * x) }
+    if x.abs() > 4.0 { 0.0 } else { exp(-x * x) }
 }

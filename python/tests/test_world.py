@@ -1,0 +1,57 @@
+"""Looks inside a frame."""
+
+from typing import Any
+
+import numpy as np
+import pytest
+
+from tumble import SceneError, StepError, World
+
+Tree = dict[str, Any]
+
+TWO: Tree = {
+    "version": 1,
+    "time": {"fps": 10},
+    "system": [{"name": "fine", "substeps": 4}, {"name": "coarse", "substeps": 2}],
+    "particles": [
+        {"name": "a", "system": "fine", "position": [[0, 0, 0]]},
+        {"name": "b", "system": "coarse", "position": [[0, 0, 0]]},
+    ],
+}
+
+
+def test_systems_go_one_after_the_other_and_the_world_stays_where_it_is() -> None:
+    world = World(TWO)
+    start = world.hash()
+    heights = []
+    for n in range(1, 6):
+        columns, about = world.inside(n, "position") or pytest.fail(f"no sub-step {n}")
+        assert about["system"] == ("fine" if n <= 4 else "coarse")
+        assert about["step"] == pytest.approx(0.1 / (4 if n <= 4 else 2))
+        assert about["time"] == pytest.approx(0.025 * n if n <= 4 else 0.05)
+        assert about["ledger"]["mass"] == 2
+        heights.append([columns[name]["position"][0, 2] for name in "ab"])
+    assert np.all(np.diff(np.array(heights)[:4, 0]) < 0)
+    assert [height[1] < 0 for height in heights] == [False] * 4 + [True]
+    # The sixth makes the frame whole: that is a step.
+    assert world.inside(6, "position") is None
+    assert (world.hash(), world.frame_index) == (start, 0)
+    world.step()
+    assert world.columns("position")["a"]["position"][0, 2] == heights[3][0]
+
+
+def test_what_breaks_inside_a_frame_is_told() -> None:
+    rope = {
+        "name": "rope",
+        "from": [0, 0, 0],
+        "to": [1, 0, 0],
+        "segments": 8,
+        "links": {"structural": 1e5},
+        "pin": ["start"],
+    }
+    world = World({"version": 1, "system": [{"integrator": "forward_euler", "substeps": 30}], "rope": [rope]})
+    with pytest.raises(StepError):
+        for n in range(1, 30):
+            world.inside(n)
+    with pytest.raises(SceneError, match="expected >= 1"):
+        world.inside(0)
