@@ -1,5 +1,5 @@
 /** Frames as an NPZ file, which numpy.load reads: a zip of arrays, not compressed. */
-import type { Frame, Numbers } from "./engine/protocol";
+import type { Column, Frame, Numbers } from "./engine/protocol";
 
 const TABLE = Uint32Array.from({ length: 256 }, (_, n) => {
   let c = n;
@@ -24,15 +24,29 @@ function npy(data: Numbers, shape: number[]): Uint8Array {
   return out;
 }
 
-/** `frames` as "OBJECT/COLUMN/000012.npy", and "time.npy". Grids are (..., ny, nx, width): the last axis of points first. */
+/** A column as Python's `World.columns` has it: n, n x width, or nx x ny (x nz) (x width). */
+function array({ data, width, points }: Column): [Numbers, number[]] {
+  const shape = points.length ? [...points] : [data.length / width];
+  if (width > 1) shape.push(width);
+  if (points.length < 2) return [data, shape];
+  // Here the first axis is the fastest; in the file it is the slowest.
+  const out = data.slice();
+  const [nx, ny, nz = 1] = points;
+  let to = 0;
+  for (let i = 0; i < nx; i++) for (let j = 0; j < ny; j++) for (let k = 0; k < nz; k++) {
+    const from = width * (i + nx * (j + ny * k));
+    for (let d = 0; d < width; d++) out[to++] = data[from + d];
+  }
+  return [out, shape];
+}
+
+/** `frames` as "OBJECT/COLUMN/000012.npy", and "time.npy". */
 export function npz(frames: Frame[]): Blob {
   const files: [string, Uint8Array][] = [["time", npy(Float64Array.from(frames.map((f) => f.time)), [frames.length])]];
   for (const frame of frames) {
     for (const [object, columns] of Object.entries(frame.columns)) {
       for (const [name, column] of Object.entries(columns)) {
-        const rows = column.points.length ? [...column.points].reverse() : [column.data.length / column.width];
-        const shape = column.width > 1 ? [...rows, column.width] : rows;
-        files.push([`${object}/${name}/${String(frame.index).padStart(6, "0")}`, npy(column.data, shape)]);
+        files.push([`${object}/${name}/${String(frame.index).padStart(6, "0")}`, npy(...array(column))]);
       }
     }
   }

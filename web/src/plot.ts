@@ -8,6 +8,8 @@ export interface Curve {
   color: string;
   dash?: number[];
   width?: number;
+  /** Goes on across points that are not there. */
+  spans?: boolean;
 }
 
 /** Colours of curves on light and on dark, each with enough contrast. */
@@ -104,7 +106,7 @@ export class Plot {
         axes: [axis(2), axis(3)],
         series: [
           { label: x ?? "" },
-          ...this.curves.map((c): uPlot.Series => ({ label: c.label, stroke: c.color, width: c.width ?? 1.75, dash: c.dash, points: { show: false }, value: (_u, v) => show(v) })),
+          ...this.curves.map((c): uPlot.Series => ({ label: c.label, stroke: c.color, width: c.width ?? 1.75, dash: c.dash, spanGaps: c.spans, points: { show: false }, value: (_u, v) => show(v) })),
         ],
         hooks: mark
           ? {
@@ -167,7 +169,7 @@ export function legend(curves: Curve[]): { element: HTMLElement; set: (values: s
   const element = h(
     "ul",
     { class: "curves" },
-    ...curves.map((c, i) => h("li", {}, h("i", { style: `background:${c.color}` }), h("span", {}, c.label), values[i])),
+    ...curves.map((c, i) => h("li", {}, h("i", { class: c.dash ? "dash" : false, style: `--curve:${c.color}` }), h("span", {}, c.label), values[i])),
   );
   return { element, set: (texts) => texts.forEach((t, i) => (values[i].textContent = t)) };
 }

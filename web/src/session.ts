@@ -1,10 +1,14 @@
 /** A world as the page sees it: plays, keeps frames, goes back, branches. It never waits for the screen, nor the screen for it. */
+import { back, gather, merged, turned, type Branch, type Change, type Start } from "./branch";
 import { Engine, EngineError } from "./engine/client";
 import type { Failure, Files, Frame, Ledger, SceneInfo, Stability, StepReport, Value, Vector } from "./engine/protocol";
 import { asset } from "./scenes";
+import { literal, valueAt } from "./values";
+import { Way } from "./way";
 
 let shared: Engine | null = null;
 let worlds = 100;
+let branches = 1;
 
 /** One worker for all pages; it starts with the first of them. */
 export function engine(): Engine {
@@ -21,11 +25,18 @@ type Events = {
   frame: Frame;
   failed: Failure;
   playing: boolean;
-  /** Frames from this one on are gone: the world went another way. */
-  branched: number;
+  /** The way that is compared with, or what is known of it, is another. */
+  before: Branch | null;
 };
 
-const sizeOf = (frame: Frame): number => Object.values(frame.columns).reduce((s, o) => s + Object.values(o).reduce((t, c) => t + c.data.byteLength, 0), 0);
+/** What was done to let the world go another way: settled when it does, undone when it cannot. */
+interface Parting {
+  branch: Branch | null;
+  /** The frame that it went back to, and the kept one before it from which it stepped. */
+  frame: Frame | null;
+  root: number;
+  moved: boolean;
+}
 
 /** Bytes of mesh files that came with a scene, by the name that the scene gives them. */
 export const dropped: Files = {};
@@ -36,8 +47,14 @@ export class Session {
   overrides = new Map<string, Value>();
   /** The frame that is shown. */
   shown: Frame | null = null;
-  ledgers: Ledger[] = [];
   report: StepReport | null = null;
+  /** What the world began with, and what was changed since, in order. */
+  start: Start = { overrides: new Map(), scene: {} };
+  history: Change[] = [];
+  /** Keeps the way that was left for a change, to compare. */
+  compares = false;
+  /** That way. */
+  before: Branch | null = null;
   /** Simulated time over time, as far as the machine keeps up. */
   speed = 1;
   playing = false;
@@ -46,11 +63,11 @@ export class Session {
   /** Milliseconds that a frame takes the engine, of late. */
   cost = 0;
   wanted: () => string[] | undefined = () => undefined;
-  /** Every frame is asked for by itself, because ways behind particles are drawn through them. */
+  /** Keeps every frame, also where the screen shows fewer. */
   each = false;
-  private frames = new Map<number, Frame>();
-  private bytes = 0;
-  private last = 0;
+  private way = new Way(MEMORY);
+  /** The way that was left by going to the start: compared with from the next change on. */
+  private left: Branch | null = null;
   private ticking = 0;
   private clock = 0;
   private due = 0;
@@ -103,6 +120,8 @@ export class Session {
       this.age++;
       this.toml = toml;
       this.overrides = new Map(overrides);
+      this.left = null;
+      this.compare(null);
       this.begin(info);
       await this.read();
       return info;
@@ -111,10 +130,10 @@ export class Session {
 
   private begin(info: SceneInfo): void {
     this.info = info;
-    this.forget(0);
-    this.ledgers = [];
+    this.way = new Way(MEMORY);
+    this.start = { overrides: new Map(this.overrides), scene: info.scene };
+    this.history = [];
     this.report = null;
-    this.last = 0;
     this.tell("loaded", info);
   }
 
@@ -125,55 +144,28 @@ export class Session {
   }
 
   private take(frame: Frame): void {
-    if (frame.index < this.last) this.forget(frame.index + 1);
-    const old = this.frames.get(frame.index);
-    if (old) this.bytes -= sizeOf(old);
-    this.frames.set(frame.index, frame);
-    this.bytes += sizeOf(frame);
-    this.last = frame.index;
-    const first = frame.index - frame.ledgers.length + 1;
-    frame.ledgers.forEach((ledger, i) => (this.ledgers[Math.max(first, 0) + i] = ledger));
-    this.ledgers.length = frame.index + 1;
+    this.way.take(frame);
     if (frame.report) this.report = frame.report;
-    // Every second one goes, oldest first, the start excepted, until the rest fits.
-    if (this.bytes > MEMORY) {
-      const indices = [...this.frames.keys()].sort((a, b) => a - b);
-      for (let i = 1; i < indices.length - 60 && this.bytes > 0.75 * MEMORY; i += 2) this.drop(indices[i]);
-      for (let i = 2; i < indices.length - 30 && this.bytes > MEMORY; i += 2) this.drop(indices[i]);
-    }
   }
 
   /** Keeps only so many frames, the last ones. */
   trim(count: number): void {
-    for (const old of [...this.frames.keys()]) if (old < this.last - count) this.drop(old);
-    // Nor the books of long ago.
-    for (let i = this.last - 3000; i >= 0 && this.ledgers[i]; i--) delete this.ledgers[i];
-  }
-
-  private drop(index: number): void {
-    const frame = this.frames.get(index);
-    if (!frame) return;
-    this.bytes -= sizeOf(frame);
-    this.frames.delete(index);
-  }
-
-  private forget(from: number): void {
-    for (const index of [...this.frames.keys()]) if (index >= from) this.drop(index);
+    this.way.trim(count);
   }
 
   /** A kept frame. */
-  readonly frame = (index: number): Frame | undefined => this.frames.get(index);
+  readonly frame = (index: number): Frame | undefined => this.way.frame(index);
+
+  get ledgers(): Ledger[] {
+    return this.way.ledgers;
+  }
 
   get kept(): number[] {
-    return [...this.frames.keys()].sort((a, b) => a - b);
+    return this.way.kept;
   }
 
   get latest(): number {
-    return this.last;
-  }
-
-  get memory(): number {
-    return this.bytes;
+    return this.way.last;
   }
 
   private display(frame: Frame): void {
@@ -184,10 +176,8 @@ export class Session {
   /** Shows a kept frame, or the one nearest to it. */
   scrub(index: number): void {
     this.pause();
-    const kept = this.kept;
-    if (!kept.length) return;
-    const near = kept.reduce((a, b) => (Math.abs(b - index) < Math.abs(a - index) ? b : a));
-    this.display(this.frames.get(near)!);
+    const near = this.way.near(index);
+    if (near) this.display(near);
   }
 
   get atEnd(): boolean {
@@ -228,10 +218,10 @@ export class Session {
       return;
     }
     const shown = this.shown?.index ?? 0;
-    if (shown < this.last) {
+    if (shown < this.way.last) {
       this.due -= 1;
       const next = this.kept.find((i) => i > shown);
-      if (next !== undefined) this.display(this.frames.get(next)!);
+      if (next !== undefined) this.display(this.way.frame(next)!);
       return;
     }
     const frames = Math.max(1, Math.floor(Math.min(this.due, this.endless ? 8 : this.info.frames - shown)));
@@ -252,11 +242,18 @@ export class Session {
     return this.queue(async () => {
       if (this.closed || (playing && !this.playing)) return;
       if (age !== this.age) return;
-      const frame = await this.engine.step({ frames: this.each ? 1 : frames, budget: 40, columns: this.wanted() }, this.world);
-      const taken = Math.max(frame.ledgers.length, 1);
-      this.cost = this.cost ? 0.8 * this.cost + (0.2 * frame.ms) / taken : frame.ms / taken;
-      this.take(frame);
-      this.display(frame);
+      const start = performance.now();
+      let frame: Frame | undefined;
+      try {
+        for (let left = this.each ? frames : 1; left > 0 && performance.now() - start < 40; left--) {
+          frame = await this.engine.step({ frames: this.each ? 1 : frames, budget: 40, columns: this.wanted() }, this.world);
+          const taken = Math.max(frame.ledgers.length, 1);
+          this.cost = this.cost ? 0.8 * this.cost + (0.2 * frame.ms) / taken : frame.ms / taken;
+          this.take(frame);
+        }
+      } finally {
+        if (frame) this.display(frame);
+      }
     }).finally(() => (this.busy = false));
   }
 
@@ -265,7 +262,7 @@ export class Session {
     this.pause();
     const shown = this.shown?.index ?? 0;
     const kept = this.kept.find((i) => i > shown);
-    if (kept !== undefined) this.display(this.frames.get(kept)!);
+    if (kept !== undefined) this.display(this.way.frame(kept)!);
     else await this.forward(1, false).catch((error) => this.fail(error));
   }
 
@@ -273,7 +270,7 @@ export class Session {
   async substep(): Promise<void> {
     this.pause();
     try {
-      await this.branch();
+      await this.cut();
       const substeps = (this.shown?.inside?.substeps ?? 0) + 1;
       const found = await this.queue(() => this.engine.inside(substeps, this.wanted(), this.world));
       if (found) this.display(found);
@@ -290,16 +287,16 @@ export class Session {
     // From between two frames to the one before.
     const before = this.shown?.inside ? shown + 1 : shown;
     const kept = this.kept.filter((i) => i < before).pop();
-    if (kept !== undefined) this.display(this.frames.get(kept)!);
+    if (kept !== undefined) this.display(this.way.frame(kept)!);
   }
 
   /** To a frame, stepping as far as needed. Throws `EngineError`. */
   async goto(index: number, progress: (index: number) => void = () => {}): Promise<void> {
     this.pause();
     try {
-      while (this.last < index && !this.closed) {
-        await this.forward(Math.min(index - this.last, 8), false);
-        progress(this.last);
+      while (this.way.last < index && !this.closed) {
+        await this.forward(Math.min(index - this.way.last, 8), false);
+        progress(this.way.last);
       }
     } catch (error) {
       this.fail(error);
@@ -311,54 +308,202 @@ export class Session {
   async reset(): Promise<void> {
     this.pause();
     await this.queue(async () => {
+      if (this.compares && this.latest > 0) {
+        if (this.left) await this.engine.unpark(this.left.id, this.world);
+        this.left = await this.park(this.history.every((c) => c.path && !c.frame) ? this.latest : 0);
+      }
       const frame = await this.engine.reset(this.wanted(), this.world);
-      this.forget(0);
-      this.ledgers = [];
-      this.last = 0;
-      this.take(frame);
-      this.tell("branched", 0);
-      this.display(frame);
+      this.restart(frame);
     }).catch((error) => this.fail(error));
   }
 
-  /** Before something is changed: the engine goes to the frame that is shown, and what came after it is gone. */
-  async branch(): Promise<void> {
-    const shown = this.shown?.index ?? 0;
-    if (shown >= this.last) return;
-    await this.queue(async () => {
-      let frame = await this.engine.restore(shown, this.wanted(), this.world);
-      while (frame.index < shown) {
+  private restart(frame: Frame): void {
+    this.history = back(this.history, 0);
+    this.way = new Way(MEMORY);
+    this.take(frame);
+    this.display(frame);
+  }
+
+  /** The way that the world went, kept by the engine, too. */
+  private async park(at: number): Promise<Branch> {
+    const id = branches++;
+    return { ...this.stands(id, await this.engine.park(id, this.world)), at };
+  }
+
+  private stands(id: number, hash: string): Branch {
+    const { info, overrides, start, history } = this;
+    return { id, hash, way: this.way.copy(MEMORY / 2), info: info!, overrides, start, history, changes: [], at: 0 };
+  }
+
+  /** Before something is changed at a frame: parks a way that would be lost, or that shall be compared with, and goes to that frame. */
+  private async part(at: number, always: boolean): Promise<Parting> {
+    const lost = at < this.latest;
+    const parting: Parting = { branch: null, frame: null, root: at, moved: false };
+    if (!lost && !(always && this.compares && !this.before && !this.left)) return parting;
+    parting.branch = await this.park(at);
+    if (!lost) return parting;
+    parting.moved = true;
+    try {
+      let frame = await this.engine.restore(at, this.wanted(), this.world);
+      parting.root = frame.index;
+      while (frame.index < at) {
         const before = frame.index;
-        frame = await this.engine.step({ frames: shown - before, columns: this.wanted() }, this.world);
+        frame = await this.engine.step({ frames: at - before, columns: this.wanted() }, this.world);
         if (frame.index <= before) break;
       }
+      parting.frame = frame;
+    } catch (error) {
+      await this.undo(parting);
+      throw error;
+    }
+    return parting;
+  }
+
+  private async undo({ branch, moved }: Parting): Promise<void> {
+    if (branch && moved) await this.engine.take(branch.id, undefined, this.world);
+    else if (branch) await this.engine.unpark(branch.id, this.world);
+  }
+
+  /** The world went another way: what was kept beyond is no future of it. */
+  private settle({ branch, frame, root }: Parting, change: Change): void {
+    if (frame) {
+      this.history = back(this.history, root);
       this.take(frame);
-      this.tell("branched", frame.index);
+    }
+    this.history = gather(this.history, change);
+    const other = branch ?? this.left;
+    if (!this.compares) {
+      if (branch) void this.engine.unpark(branch.id, this.world).catch(() => {});
+    } else if (other) {
+      if (branch && this.left) void this.engine.unpark(this.left.id, this.world).catch(() => {});
+      this.left = null;
+      this.compare({ ...other, at: Math.min(other.at, change.frame), changes: [change] });
+    } else if (this.before) this.compare({ ...this.before, changes: merged(this.before.changes, change) });
+  }
+
+  private compare(branch: Branch | null): void {
+    const old = this.before;
+    this.before = branch;
+    if (old && branch && old.id !== branch.id) void this.engine.unpark(old.id, this.world).catch(() => {});
+    if (old || branch) this.tell("before", branch);
+  }
+
+  /** The engine goes to the frame that is shown; what came after it is gone. */
+  private cut(): Promise<void> {
+    const shown = this.shown?.index ?? 0;
+    return this.queue(async () => {
+      if (shown >= this.latest) return;
+      const { branch, frame, root } = await this.part(shown, false);
+      if (branch) await this.engine.unpark(branch.id, this.world);
+      if (!frame) return;
+      this.history = back(this.history, root);
+      if (this.before) this.compare({ ...this.before, at: Math.min(this.before.at, root) });
+      this.take(frame);
       this.display(frame);
     });
   }
 
-  /** Changes a value. Says whether the world goes on from where it stands. Throws `EngineError`. */
-  async set(path: string, value: Value): Promise<boolean> {
-    await this.branch();
+  /** Before the pointer changes something: the engine goes to the frame that is shown. */
+  branch(): Promise<void> {
+    const shown = this.shown?.index ?? 0;
+    const lost = shown < this.latest;
     return this.queue(async () => {
-      const { info, live } = await this.engine.set(path, value, this.world);
+      const at = lost ? Math.min(shown, this.latest) : this.latest;
+      const parting = await this.part(at, false);
+      this.settle(parting, { frame: at, path: "", from: null, to: null });
+      if (parting.frame) this.display(parting.frame);
+    });
+  }
+
+  /** Changes a value. Says whether the world goes on from where it stands. Throws `EngineError`, and then nothing has changed. */
+  set(path: string, value: Value): Promise<boolean> {
+    const shown = this.shown?.index ?? 0;
+    const lost = shown < this.latest;
+    return this.queue(async () => {
+      const at = lost ? Math.min(shown, this.latest) : this.latest;
+      const from = valueAt(this.info?.scene, path);
+      const parting = await this.part(at, true);
+      let changed: { info: SceneInfo; live: boolean };
+      try {
+        changed = await this.engine.set(path, value, this.world);
+      } catch (error) {
+        await this.undo(parting);
+        throw error;
+      }
+      const { info, live } = changed;
+      this.overrides = new Map(this.overrides);
       // What was changed below this place is gone, and in the order of changes this one is the last.
       for (const old of [...this.overrides.keys()]) if (`${old}.`.startsWith(`${path}.`)) this.overrides.delete(old);
       this.overrides.set(path, value);
+      this.settle(parting, { frame: live ? at : 0, path, from, to: value });
       if (live) {
         const shape = (i: SceneInfo | null) => JSON.stringify([i?.objects, i && Object.values(i.topology).map((t) => t.links?.data.length)]);
         const same = shape(this.info) === shape(info);
         this.info = info;
         this.tell(same ? "changed" : "loaded", info);
-        await this.read();
       } else {
         this.age++;
         this.begin(info);
-        await this.read();
       }
+      await this.read();
       return live;
     });
+  }
+
+  /** Takes the way of before again, exactly as it stood; that of now is then the one of before. */
+  async takeBefore(): Promise<void> {
+    this.pause();
+    await this.queue(async () => {
+      const shown = this.shown?.index ?? 0;
+      await this.swap();
+      this.tell("loaded", this.info!);
+      this.tell("before", this.before);
+      this.scrub(shown);
+    }).catch((error) => this.fail(error));
+  }
+
+  private async swap(): Promise<void> {
+    const { before, left } = this;
+    if (!before) return;
+    if (left) await this.engine.unpark(left.id, this.world);
+    this.left = null;
+    const now = this.stands(branches++, await this.engine.hash(this.world));
+    const info = await this.engine.take(before.id, now.id, this.world);
+    this.age++;
+    this.info = info;
+    this.way = before.way.copy(MEMORY);
+    this.overrides = before.overrides;
+    this.start = before.start;
+    this.history = before.history;
+    this.before = { ...now, at: before.at, changes: turned(before.changes) };
+  }
+
+  /** Runs the way of before as far as that of now, while `go` says so of the frames that it comes to. */
+  async catchUp(go: (index: number) => boolean): Promise<void> {
+    this.pause();
+    await this.queue(async () => {
+      const end = this.way.frame(this.latest)?.time ?? 0;
+      await this.swap();
+      let failed: unknown;
+      try {
+        const dt = this.info!.dt;
+        while (!this.closed && (this.way.frame(this.latest)?.time ?? end) < end - 0.5 * dt && go(this.latest)) {
+          this.way.take(await this.engine.step({ columns: this.wanted() }, this.world));
+        }
+      } catch (error) {
+        failed = error;
+      }
+      await this.swap().catch((error) => (failed ??= error));
+      this.tell("before", this.before);
+      if (failed) throw failed;
+    }).catch((error) => this.fail(error));
+  }
+
+  /** Forgets the way of before. */
+  async forgetBefore(): Promise<void> {
+    const { before } = this;
+    this.compare(null);
+    if (before) await this.queue(() => this.engine.unpark(before.id, this.world));
   }
 
   grab(object: string, row: number, target: Vector, stiffness?: number): Promise<void> {
@@ -383,7 +528,7 @@ export class Session {
 
   /** Reads the frame again where its columns have changed. */
   refresh(): Promise<void> {
-    if ((this.shown?.index ?? 0) < this.last) return Promise.resolve();
+    if ((this.shown?.index ?? 0) < this.way.last) return Promise.resolve();
     return this.queue(() => this.read()).catch((error) => this.fail(error));
   }
 
@@ -391,26 +536,16 @@ export class Session {
   async revived(): Promise<void> {
     this.pause();
     this.age++;
-    await this.queue(async () => {
-      this.forget(0);
-      this.ledgers = [];
-      this.last = 0;
-      await this.read();
-    }).catch((error) => this.fail(error));
+    this.left = null;
+    this.compare(null);
+    await this.queue(async () => this.restart(await this.engine.read({ columns: this.wanted() }, this.world))).catch((error) => this.fail(error));
   }
 
   close(): void {
     this.pause();
     this.closed = true;
-    this.frames.clear();
+    this.way = new Way(0);
+    this.before = this.left = null;
     void this.queue(() => this.engine.drop(this.world)).catch(() => {});
   }
-}
-
-/** A value as TOML writes it. */
-export function literal(value: Value): string {
-  if (typeof value === "string") return JSON.stringify(value);
-  if (Array.isArray(value)) return `[${value.map(literal).join(", ")}]`;
-  if (typeof value === "object") return `{ ${Object.entries(value).map(([k, v]) => `${k} = ${literal(v)}`).join(", ")} }`;
-  return String(value);
 }

@@ -5,6 +5,7 @@ import { resolve } from "node:path";
 import { test } from "node:test";
 import { Kept } from "../src/engine/kept";
 import type { Failure, SceneInfo } from "../src/engine/protocol";
+import { Way } from "../src/way";
 
 const PKG = resolve(import.meta.dirname, "../src/engine/pkg");
 const engine = await import(`${PKG}/single.js`);
@@ -160,6 +161,31 @@ test("kept frames stay within their memory", () => {
   assert.ok(kept.frames().every((f) => f < 200));
   kept.cut(0);
   assert.deepEqual(kept.frames(), [0]);
+});
+
+test("frames stay within their memory, those of both ways", () => {
+  const frame = (index: number) => ({ index, time: index, columns: { a: { x: { data: new Float32Array(25), width: 1, points: [], unit: "1" } } }, ledgers: [], report: null, ms: 0, kept: [] });
+  const way = new Way(10_000);
+  for (let i = 0; i <= 500; i++) {
+    way.take(frame(i));
+    assert.ok(way.memory <= 10_000, `${way.memory} bytes after frame ${i}`);
+    assert.ok(way.frame(0) && way.frame(i));
+  }
+  // A hundred fit; the last ones are all there.
+  assert.ok(way.kept.length >= 75 && way.kept.length <= 100, `${way.kept.length}`);
+  for (let i = 470; i <= 500; i++) assert.ok(way.frame(i), `frame ${i}`);
+  const other = way.copy(2_000);
+  assert.ok(other.memory <= 2_000 && other.kept.length >= 15, `${other.kept}`);
+  assert.deepEqual([other.kept[0], other.kept.at(-1), other.last], [0, 500, 500]);
+  assert.equal(way.near(3)!.index, way.kept.reduce((a, b) => (Math.abs(b - 3) < Math.abs(a - 3) ? b : a)));
+  // Going another way forgets what came after, here and nowhere else.
+  const { length } = other.kept;
+  way.take(frame(480));
+  assert.deepEqual([way.last, way.kept.at(-1), other.kept.length], [480, 480, length]);
+  // One frame alone may be larger than the bound.
+  const large = new Way(50);
+  for (let i = 0; i < 4; i++) large.take(frame(i));
+  assert.deepEqual(large.kept, [0, 3]);
 });
 
 test("memory stays flat over frames, worlds and values", () => {

@@ -1,5 +1,6 @@
 /** The page's side: questions as promises, and a new worker where the old one died or hangs. */
 
+import { literal } from "../values";
 import type {
   Answer, Cure, Failure, Files, Frame, Notice, Question, SceneInfo, Stability, Value, Vector,
 } from "./protocol";
@@ -15,6 +16,7 @@ export class EngineError extends Error {
 /** Milliseconds after which a worker that does not answer is taken for dead. */
 const PATIENCE = { load: 30_000, step: 60_000, cures: 60_000, other: 30_000 };
 
+const GONE: Failure = { kind: "scene", message: "this way is no longer kept", issues: [] };
 const CLOSED: Failure = { kind: "crash", message: "the engine was closed", issues: [] };
 
 interface Waiting {
@@ -60,6 +62,8 @@ export class Engine {
   private next = 1;
   private readonly waiting = new Map<number, Waiting>();
   private readonly made = new Map<number, Made>();
+  /** What ways that are parked were made from. */
+  private readonly parked = new Map<number, Made & { world: number }>();
   private watch: ReturnType<typeof setTimeout> | undefined;
   private reviving: Promise<void> | undefined;
   private closed = false;
@@ -80,6 +84,7 @@ export class Engine {
       if (!found) throw error;
       return this.load(toml, { overrides, files: { ...files, ...found }, world });
     }
+    this.forget(world);
     this.made.set(world, { toml, overrides, files, sets: [] });
     return (answer as Answer & { type: "loaded" }).info;
   }
@@ -114,7 +119,7 @@ export class Engine {
   async set(path: string, value: Value, world = 0): Promise<{ info: SceneInfo; live: boolean }> {
     const answer = (await this.ask({ type: "set", path, value, world })) as Answer & { type: "changed" };
     const made = this.made.get(world);
-    if (made) made.sets = [...made.sets.filter((set) => set.path !== path), { path, value }];
+    if (made) this.made.set(world, { ...made, sets: [...made.sets.filter((set) => set.path !== path), { path, value }] });
     return { info: answer.info, live: answer.live };
   }
 
@@ -153,10 +158,43 @@ export class Engine {
     return ((await this.ask({ type: "schema" })) as Answer & { type: "schema" }).schema;
   }
 
+  /** Keeps the way that a world went under a number; answers with the hash of the state in which it stands. */
+  async park(as: number, world = 0): Promise<string> {
+    const { hash } = (await this.ask({ type: "park", as, world })) as Answer & { type: "hash" };
+    const made = this.made.get(world);
+    if (made) this.parked.set(as, { ...made, world });
+    return hash;
+  }
+
+  /** Back to a way that was parked, as it stood; the one of now is parked in its turn where `as` is given. */
+  async take(from: number, as?: number, world = 0): Promise<SceneInfo> {
+    const made = this.parked.get(from);
+    if (!made) throw new EngineError(GONE);
+    const { toml, files } = made;
+    const overrides = [...made.overrides, ...made.sets.map(({ path, value }) => `${path}=${literal(value)}`)];
+    const { info } = (await this.ask({ type: "take", from, as, toml, overrides, files, world })) as Answer & { type: "changed" };
+    const now = this.made.get(world);
+    if (as !== undefined && now) this.parked.set(as, { ...now, world });
+    this.parked.delete(from);
+    this.made.set(world, made);
+    return info;
+  }
+
+  /** Forgets a way that was parked. */
+  async unpark(as: number, world = 0): Promise<void> {
+    this.parked.delete(as);
+    await this.ask({ type: "unpark", as, world });
+  }
+
   /** Forgets a world. */
   async drop(world: number): Promise<void> {
-    this.made.delete(world);
+    this.forget(world);
     await this.ask({ type: "drop", world });
+  }
+
+  private forget(world: number): void {
+    this.made.delete(world);
+    for (const [as, made] of [...this.parked]) if (made.world === world) this.parked.delete(as);
   }
 
   /** Ends the worker; what waits fails. */
@@ -235,6 +273,7 @@ export class Engine {
     this.worker?.terminate();
     this.worker = this.ready ? this.start() : undefined;
     this.failAll({ kind: "crash", message, issues: [] });
+    this.parked.clear();
     if (this.reviving) return;
     this.reviving = (async () => {
       for (const [world, { toml, overrides, files, sets }] of [...this.made]) {

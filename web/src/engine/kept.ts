@@ -14,10 +14,26 @@ export class Kept {
     const state = save();
     this.states.set(frame, state);
     this.bytes += state.length;
+    this.thin();
+  }
+
+  private thin(): void {
     while (this.bytes > this.most && this.states.size > 2) {
       this.stride *= 2;
       for (const kept of [...this.states.keys()]) if (kept % this.stride !== 0) this.forget(kept);
     }
+  }
+
+  /** The same states within another bound. They are shared, not copied. */
+  copy(most: number): Kept {
+    const made = new Kept(most);
+    made.stride = this.stride;
+    for (const [frame, state] of this.states) {
+      made.states.set(frame, state);
+      made.bytes += state.length;
+    }
+    made.thin();
+    return made;
   }
 
   /** The state of the kept frame at or before this one. */

@@ -193,6 +193,15 @@ export type Request = Asked &
     | { type: "cures" }
     /** JSON schema of scenes: docs, defaults, ranges; units are under "x-unit". -> schema */
     | { type: "schema" }
+    /** Keeps the way that the world went, as it stands, under a number of the page's: the world may then go another. -> hash */
+    | { type: "park"; as: number }
+    /**
+     * Goes back to a way that was parked, exactly as it stood; `toml`, `overrides` and `files` are those of the world then. The way that
+     * the world went instead is parked in its turn where `as` is given. -> changed
+     */
+    | { type: "take"; from: number; as?: number; toml: string; overrides: string[]; files: Files }
+    /** Forgets a way that was parked. -> done */
+    | { type: "unpark"; as: number }
     /** Forgets a world. -> done */
     | { type: "drop" }
   );

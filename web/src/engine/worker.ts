@@ -1,6 +1,6 @@
 /** The engine's side: worlds in WebAssembly, asked by messages, one at a time. It computes only when asked. */
 
-import type { Answer, Columns, Failure, Frame, Ledger, Notice, Request, SceneInfo, StepReport } from "./protocol";
+import type { Answer, Columns, Failure, Files, Frame, Ledger, Notice, Request, SceneInfo, StepReport } from "./protocol";
 import { Kept } from "./kept";
 
 type Module = typeof import("./pkg/single");
@@ -13,10 +13,21 @@ const CURE_LIMIT = 20_000;
 /** Bytes of snapshots of one world. */
 const KEEP = 192 * 2 ** 20;
 
+/** Bytes of snapshots of a way that is parked. */
+const KEEP_PARKED = 64 * 2 ** 20;
+
+/** A way that a world went before it went another: its snapshots, and how it stood. */
+interface Parked {
+  kept: Kept;
+  end: Uint8Array;
+}
+
 interface Running {
   world: World;
   info: SceneInfo;
   kept: Kept;
+  /** By the page's numbers. */
+  parked: Map<number, Parked>;
 }
 
 const worlds = new Map<number, Running>();
@@ -95,13 +106,40 @@ function branch(at: Running): void {
   keep(at);
 }
 
-async function load(request: Request & { type: "load" }): Promise<SceneInfo> {
+async function build(toml: string, overrides: string[], files: Files): Promise<World> {
   const single = await engine("single");
-  const overrides = request.overrides ?? [];
-  const module = single.precision(request.toml, overrides) === "double" ? await engine("double") : single;
-  const world = new module.World(request.toml, overrides, new Map(Object.entries(request.files ?? {})));
+  const module = single.precision(toml, overrides) === "double" ? await engine("double") : single;
+  return new module.World(toml, overrides, new Map(Object.entries(files)));
+}
+
+function park(at: Running): Parked {
+  return { kept: at.kept.copy(KEEP_PARKED), end: at.world.save() };
+}
+
+async function take(request: Request & { type: "take" }): Promise<SceneInfo> {
+  const at = running(request.world ?? 0);
+  const parked = at.parked.get(request.from);
+  if (!parked) throw new Asked("this way is no longer kept");
+  const world = await build(request.toml, request.overrides, request.files);
+  try {
+    world.restore(parked.end);
+  } catch (thrown) {
+    world.free();
+    throw thrown;
+  }
+  at.parked.delete(request.from);
+  if (request.as !== undefined) at.parked.set(request.as, park(at));
+  at.world.free();
+  at.world = world;
+  at.kept = parked.kept.copy(KEEP);
+  at.info = info(world);
+  return at.info;
+}
+
+async function load(request: Request & { type: "load" }): Promise<SceneInfo> {
+  const world = await build(request.toml, request.overrides ?? [], request.files ?? {});
   const number = request.world ?? 0;
-  const at: Running = { world, info: info(world), kept: new Kept(KEEP) };
+  const at: Running = { world, info: info(world), kept: new Kept(KEEP), parked: new Map() };
   keep(at);
   // The old one is let go only now: had the new one failed, it would go on.
   worlds.get(number)?.world.free();
@@ -199,6 +237,16 @@ async function answer(request: Request): Promise<Answer> {
       return { id, type: "cures", cures: JSON.parse(running(number).world.cures(CURE_LIMIT)) };
     case "schema":
       return { id, type: "schema", schema: JSON.parse((await engine("single")).schema()) };
+    case "park": {
+      const at = running(number);
+      at.parked.set(request.as, park(at));
+      return { id, type: "hash", hash: at.world.hash() };
+    }
+    case "take":
+      return { id, type: "changed", info: await take(request), live: true };
+    case "unpark":
+      running(number).parked.delete(request.as);
+      return { id, type: "done" };
     case "drop":
       worlds.get(number)?.world.free();
       worlds.delete(number);

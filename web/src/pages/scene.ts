@@ -1,15 +1,17 @@
 /** One scene: picture, playback, energy, its values, its text, its theory. */
 import { parse } from "smol-toml";
-import { check, choice, h, iconButton, saveAs, say, setIcon, show, svg, ICONS, type Page } from "../dom";
+import { Comparison } from "../compare";
+import { check, choice, h, iconButton, saveAs, say, show, svg, ICONS, type Page } from "../dom";
 import { EngineError } from "../engine/client";
 import type { Cure, Failure, SceneInfo, Value } from "../engine/protocol";
 import { opened } from "../drop";
-import { npz } from "../npz";
 import { FamilySwitches } from "../families";
 import { familiesOf, FAMILIES } from "../links";
 import { Panel } from "../panel";
 import { curveColor, legend, Plot, type Curve } from "../plot";
-import { engine, literal, Session } from "../session";
+import { saving } from "../saving";
+import { engine, Session } from "../session";
+import { literal } from "../values";
 import { LONGEST, pack, unpack, type Shared } from "../share";
 import { beside, sceneOf, titleOf } from "../scenes";
 import { cards, topics } from "../theory";
@@ -66,6 +68,7 @@ export const page: Page = async (main, rest) => {
   }
 
   const session = new Session();
+  session.each = session.compares = true;
   const canvas = h("canvas", { "aria-hidden": "true" });
   const { element: legendElement, update: tellLegend } = legendBox(() => stage);
   const wait = h("div", { class: "wait" }, "Loading the engine …");
@@ -78,10 +81,10 @@ export const page: Page = async (main, rest) => {
     { label: "elastic", color: curveColor(2) },
     { label: "external", color: curveColor(3) },
     { label: "total", color: curveColor(0), width: 2.25 },
-    { label: "total before the branch", color: curveColor(0), dash: [4, 4], width: 1.25 },
+    { label: "total, old way", color: curveColor(0), dash: [4, 4], width: 1.25 },
   ];
   const energy = new Plot(energyCurves(), { label: "Energies against time", x: "time [s]", height: 140, mark: () => session.shown?.time ?? null });
-  const energyKey = legend(energyCurves().slice(0, 4));
+  const energyKey = legend(energyCurves());
   const hashBox = h("output", { class: "hash", "aria-label": "State hash" }, "–");
   const facts = h("dl", { class: "facts" });
 
@@ -116,7 +119,10 @@ export const page: Page = async (main, rest) => {
 
   const others = start.id ? beside(start.id) : [];
   const shareButton = h("button", { type: "button", class: "button", onclick: () => void share() }, svg(ICONS.share, 16), "Copy link");
-  const record = iconButton("record", "Record a film (WebM)", () => film());
+  const stage = new Stage(canvas);
+  session.wanted = () => stage.wanted;
+  const saved = saving(session, stage, start.name);
+  const comparison = new Comparison(session, stage, () => tellLegend());
   main.append(
     h(
       "div",
@@ -128,14 +134,15 @@ export const page: Page = async (main, rest) => {
           "div",
           { class: "lab-head" },
           h("div", {}, title, start.id ? h("p", { class: "scene-id" }, start.id) : h("p", { class: "scene-id" }, start.shared ? "from a link" : start.name)),
-          h("div", { class: "actions" }, shareButton, iconButton("camera", "Save the picture (PNG)", () => void png()), record, iconButton("down", "Download the kept frames (NPZ)", () => saveAs(npz(session.kept.map((i) => session.frame(i)!)), `${start.name}.npz`)), h("button", { type: "button", class: "icon-button", title: "Save the surfaces (GLB)", "aria-label": "Save the surfaces (GLB)", onclick: () => void glb() }, svg(ICONS.cube)), iconButton("frame", "View of the scene's camera", () => stage.goHome())),
+          h("div", { class: "actions" }, shareButton, ...saved.buttons, iconButton("frame", "View of the scene's camera", () => stage.goHome())),
         ),
         alert,
         others.length > 1 ? h("nav", { class: "others", "aria-label": "Scenes like this one" }, ...others.map((s) => h("a", { href: `#/scene/${s.id}`, "aria-current": s.id === start.id ? "page" : false }, s.name.replace(/[_-]/g, " ")))) : null,
         stageBox,
         transport(session),
         lookBar,
-        h("div", { class: "energy" }, h("h2", {}, "Energy", h("span", { class: "unit" }, "J")), energyKey.element, energy.element),
+        comparison.bar,
+        h("div", { class: "books" }, h("div", { class: "energy" }, h("h2", {}, "Energy", h("span", { class: "unit" }, "J")), energyKey.element, energy.element), comparison.chart),
         h("p", { class: "hash-line" }, "State hash ", hashBox, h("span", { class: "muted" }, " the same on every machine, in a tab and on the command line")),
       ),
       h("aside", { class: "side", "aria-label": "The scene" }, h("div", { class: "tabs", role: "tablist", "aria-label": "The scene" }, ...buttons), ...tabs.map((t) => t[2])),
@@ -144,11 +151,7 @@ export const page: Page = async (main, rest) => {
 
   main.querySelector(".others [aria-current]")?.scrollIntoView({ block: "nearest", inline: "center" });
 
-  const stage = new Stage(canvas);
-  session.wanted = () => stage.wanted;
-
   // The picture follows the world.
-  let ghost: (number | null)[] = [];
   let hashWait = 0;
   const tellHash = () => {
     clearTimeout(hashWait);
@@ -168,20 +171,20 @@ export const page: Page = async (main, rest) => {
   const drawEnergy = () => {
     const books = session.ledgers;
     const external0 = books[0]?.external ?? 0;
-    const times = books.map((l) => l.time);
-    const extra = ghost.length > books.length ? ghost.length : books.length;
     const dt = session.info?.dt ?? 1;
-    const xs: number[] = Array.from({ length: extra }, (_, i) => times[i] ?? i * dt);
-    const pad = (list: (number | null)[]) => Array.from({ length: extra }, (_, i) => (Number.isFinite(list[i]) ? list[i] : null));
-    energy.set([xs, pad(books.map((l) => l.kinetic)), pad(books.map((l) => l.elastic)), pad(books.map((l) => l.external - external0)), pad(books.map((l) => l.energy - external0)), pad(ghost)]);
+    const count = Math.max(books.length, Math.round(comparison.end / dt) + 1);
+    const times = Array.from({ length: count }, (_, i) => books[i]?.time ?? i * dt);
+    const pad = (list: (number | null)[]) => times.map((_, i) => (Number.isFinite(list[i]) ? list[i] : null));
+    const old = comparison.energies(times);
+    energy.set([times, pad(books.map((l) => l.kinetic)), pad(books.map((l) => l.elastic)), pad(books.map((l) => l.external - external0)), pad(books.map((l) => l.energy - external0)), old]);
+    (energyKey.element.lastElementChild as HTMLElement).hidden = !session.before;
     const now = session.shown?.inside ? session.shown.ledgers[0] : books[session.shown?.index ?? books.length - 1];
-    if (now) energyKey.set([show(now.kinetic, 3), show(now.elastic, 3), show(now.external - external0, 3), show(now.energy - external0, 3)]);
+    if (now) energyKey.set([show(now.kinetic, 3), show(now.elastic, 3), show(now.external - external0, 3), show(now.energy - external0, 3), show(old[session.shown?.index ?? 0], 3)]);
   };
   let opening = true;
   session.on("loaded", (info) => {
     wait.hidden = true;
-    stage.open(info, session.frame, !opening);
-    session.each = stage.trails;
+    stage.open(info, comparison.past, !opening);
     opening = false;
     drawLook(info);
     panel?.open(info, session.toml, session.overrides);
@@ -190,7 +193,7 @@ export const page: Page = async (main, rest) => {
     document.title = `${info.title || start.name} · tumble`;
     stageBox.classList.toggle("night", stage.night);
     hashBox.textContent = info.hash;
-    hashBox.dataset.frame = "0";
+    hashBox.dataset.frame = String(session.latest);
     void cards(topics(info)).then((made) => theoryTab.replaceChildren(...made));
     void tellFacts();
   });
@@ -200,12 +203,12 @@ export const page: Page = async (main, rest) => {
     switches.open(info, session.toml);
   });
   session.on("frame", (frame) => {
-    stage.show(frame);
-    tellLegend();
+    comparison.show(frame);
     drawEnergy();
     tellHash();
     main.dataset.frame = String(frame.index);
   });
+  session.on("before", () => drawEnergy());
   session.on("playing", (on) => {
     if (on) {
       // Only a new frame has no trouble with what has gone wrong before.
@@ -260,9 +263,7 @@ export const page: Page = async (main, rest) => {
   let panel: Panel | null = null;
   const change = async (path: string, value: Value, what = `${path} = ${literal(value)}`) => {
     try {
-      const before = session.ledgers.map((l) => l.energy - (session.ledgers[0]?.external ?? 0));
       if (STARTS.test(path)) {
-        ghost = before;
         await session.load(session.toml, [...session.overrides, [path, value]]);
         alert.hidden = true;
         panel?.say(`${what}: says how the scene starts, so it starts anew.`);
@@ -270,9 +271,8 @@ export const page: Page = async (main, rest) => {
         return;
       }
       const live = await session.set(path, value);
-      ghost = before;
       alert.hidden = true;
-      panel?.say(live ? `${what}: goes on from frame ${session.latest}. The dashed curve is what was before.` : `${what}: sizes have changed, so the scene starts anew.`);
+      panel?.say(live ? `${what}: goes on from frame ${session.latest}; the way before is kept beside it.` : `${what}: sizes have changed, so the scene starts anew.`);
       if (editor) syncText();
     } catch (error) {
       if (error instanceof EngineError) {
@@ -311,7 +311,6 @@ export const page: Page = async (main, rest) => {
     try {
       const was = session.playing;
       session.pause();
-      ghost = [];
       await session.load(text);
       editor.issues([]);
       issuesBox.replaceChildren();
@@ -366,12 +365,8 @@ export const page: Page = async (main, rest) => {
     const grids = info.objects.filter((o) => ["gas", "heat", "compressible"].includes(o.kind));
     const masses = info.objects.some((o) => !["gas", "heat", "compressible", "collider"].includes(o.kind));
     const again = () => {
-      void session.refresh().then(() => {
-        stage.again();
-        tellLegend();
-      });
-      stage.again();
-      tellLegend();
+      void session.refresh().then(() => comparison.again());
+      comparison.again();
     };
     const parts: HTMLElement[] = [];
     if (grids.length) {
@@ -403,7 +398,7 @@ export const page: Page = async (main, rest) => {
       } else {
         const at = h("input", { type: "range", min: 0, max: 1, step: 0.005, value: look.sliceAt, "aria-label": "Place of the slice", hidden: look.slice === null, oninput: () => {
           look.sliceAt = Number(at.value);
-          stage.again();
+          comparison.again();
         } });
         parts.push(choice("See", [["", "smoke"], ["0", "slice across x"], ["1", "slice across y"], ["2", "slice across z"]], look.slice === null ? "" : String(look.slice), (v) => {
           look.slice = v === "" ? null : Number(v);
@@ -459,34 +454,9 @@ export const page: Page = async (main, rest) => {
       say("The address of this page now holds the scene.");
     }
   };
-  const png = async () => saveAs(await stage.picture(), `${start.name}-${session.shown?.index ?? 0}.png`);
-  const glb = async () => {
-    const blob = await stage.surfaces();
-    if (blob) saveAs(blob, `${start.name}-${session.shown?.index ?? 0}.glb`);
-    else say("There is no surface in this scene.");
-  };
-  let recorder: MediaRecorder | null = null;
-  const film = () => {
-    if (recorder) return recorder.stop();
-    if (!("MediaRecorder" in window)) return say("This browser cannot record.");
-    const parts: Blob[] = [];
-    const mimeType = ["video/webm;codecs=vp9", "video/webm", "video/mp4"].find((t) => MediaRecorder.isTypeSupported(t));
-    recorder = new MediaRecorder(canvas.captureStream(30), { mimeType, videoBitsPerSecond: 8e6 });
-    recorder.ondataavailable = (e) => parts.push(e.data);
-    recorder.onstop = () => {
-      recorder = null;
-      setIcon(record, "record", "Record a film (WebM)");
-      record.classList.remove("live");
-      saveAs(new Blob(parts, { type: mimeType }), `${start.name}.${mimeType?.includes("mp4") ? "mp4" : "webm"}`);
-    };
-    recorder.start();
-    setIcon(record, "stop", "End the film and save it");
-    record.classList.add("live");
-    session.play();
-  };
-
   const theme = () => {
     stage.theme();
+    comparison.theme();
     energy.setCurves(energyCurves());
     drawEnergy();
   };
@@ -525,14 +495,15 @@ export const page: Page = async (main, rest) => {
 
   if (start.shared && start.shared.version && engine().version && start.shared.version !== engine().version) say(`This link was made by version ${start.shared.version}; this is ${engine().version}: bits may differ.`);
   // For tests and for the curious.
-  Object.assign(window, { tumble: { session, stage, engine: engine() } });
+  Object.assign(window, { tumble: { session, stage, comparison, engine: engine() } });
 
   return () => {
     removeEventListener("themechange", theme);
     offKeys();
     offPointers();
-    if (recorder) recorder.stop();
+    saved.close();
     energy.close();
+    comparison.close();
     editor?.close();
     session.close();
     stage.dispose();

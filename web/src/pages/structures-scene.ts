@@ -4,7 +4,7 @@
  * while the world goes on, and stands in the scene.
  */
 import { FAMILIES, type Family } from "../links";
-import { literal } from "../session";
+import { literal } from "../values";
 import type { Value } from "../engine/protocol";
 
 export type Kind = "rope" | "sheet" | "block" | "net";

@@ -27,10 +27,11 @@ const OF: Record<string, MapName> = {
   vorticity: "RdBu_r",
   pressure: "PuOr_r",
   divergence: "PRGn",
+  difference: "RdBu_r",
 };
 
 /** Shown around zero. */
-export const SIGNED = ["vorticity", "pressure", "divergence"];
+export const SIGNED = ["vorticity", "pressure", "divergence", "difference"];
 
 /** Colours of objects, in the order in which they are handed out: Paul Tol's "bright" scheme. */
 export const PALETTE = ["#4477aa", "#ee6677", "#228833", "#ccbb44", "#66ccee", "#aa3377"];

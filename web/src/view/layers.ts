@@ -3,6 +3,7 @@ import * as THREE from "three";
 import { toCreasedNormals } from "three/examples/jsm/utils/BufferGeometryUtils.js";
 import type { Column, Numbers } from "../engine/protocol";
 import { mapOf, SIGNED, table, type MapName } from "./colors";
+import { SOLIDS } from "./depths";
 import { BALLS, PIECES, PLANE, SPACE } from "./shaders";
 
 export type Rgb = [number, number, number];
@@ -23,6 +24,9 @@ function release(object: THREE.Object3D): void {
   });
 }
 
+/** A little farther away than it is. */
+const BEHIND = { polygonOffset: true, polygonOffsetFactor: 2, polygonOffsetUnits: 8 };
+
 /** Grows by half as much again, so that a growing swarm seldom makes new buffers. */
 function room(attribute: THREE.BufferAttribute | undefined, count: number, width: number, instanced: boolean): THREE.BufferAttribute {
   if (attribute && attribute.count >= count) return attribute;
@@ -37,13 +41,14 @@ export class Points implements Layer {
   readonly object: THREE.Points;
   private readonly geometry = new THREE.BufferGeometry();
 
-  constructor(glow: boolean, thinnest = 1.5) {
+  /** Lights in the dark, or, of a ghost, rings. */
+  constructor(glow: boolean, thinnest = 1.5, ghost = false) {
     const material = new THREE.ShaderMaterial({
       vertexShader: BALLS.vertex,
       fragmentShader: BALLS.fragment,
-      uniforms: { thinnest: { value: thinnest }, size: PIXELS, glow: { value: glow } },
-      transparent: glow,
-      depthWrite: !glow,
+      uniforms: { thinnest: { value: thinnest }, size: PIXELS, glow: { value: glow }, ghost: { value: ghost } },
+      transparent: glow || ghost,
+      depthWrite: !glow && !ghost,
       blending: glow ? THREE.AdditiveBlending : THREE.NormalBlending,
     });
     this.object = new THREE.Points(this.geometry, material);
@@ -149,6 +154,12 @@ export class Pieces implements Layer {
     this.material.uniforms.radius.value = value;
   }
 
+  /** Lets one see through it, and through to what lies in the same place. */
+  veil(opacity: number): void {
+    this.material.uniforms.fade.value = opacity;
+    Object.assign(this.material, BEHIND);
+  }
+
   dispose(): void {
     release(this.object);
   }
@@ -221,6 +232,12 @@ export class Surface implements Layer {
       this.material.vertexColors = !!colors;
       this.material.needsUpdate = true;
     }
+  }
+
+  /** Lets one see through it, and through to what lies in the same place. */
+  veil(opacity: number): void {
+    Object.assign(this.material, { ...BEHIND, transparent: true, depthWrite: false, opacity });
+    this.object.castShadow = this.object.receiveShadow = false;
   }
 
   tint(color: Rgb): void {
@@ -406,6 +423,7 @@ export class SpaceField implements Layer {
   private readonly extent: THREE.Vector3;
   private readonly viewer = new THREE.Vector3();
   private readonly parallel = new THREE.Vector3();
+  private readonly unproject = new THREE.Matrix4();
 
   constructor(grid: Grid, ink: Rgb) {
     const [nx, ny, nz] = grid.cells;
@@ -430,10 +448,12 @@ export class SpaceField implements Layer {
       new THREE.ShaderMaterial({
         vertexShader: SPACE.vertex,
         fragmentShader: SPACE.smoke,
-        uniforms: { ...shared, viewer: { value: this.viewer }, parallel: { value: this.parallel }, thick: { value: 40 / mean }, fire: { value: false }, heat: { value: this.heat } },
+        uniforms: { ...shared, ...SOLIDS, size: PIXELS, unproject: { value: this.unproject }, viewer: { value: this.viewer }, parallel: { value: this.parallel }, thick: { value: 40 / mean }, fire: { value: false }, heat: { value: this.heat } },
         transparent: true,
+        // The way through it ends where something solid begins; its far sides are seen from within, too.
         depthWrite: false,
-        side: THREE.FrontSide,
+        depthTest: false,
+        side: THREE.BackSide,
       }),
     );
     this.smoke.position.copy(this.low).addScaledVector(this.extent, 0.5);
@@ -441,6 +461,7 @@ export class SpaceField implements Layer {
       camera.getWorldPosition(this.viewer);
       if ((camera as THREE.OrthographicCamera).isOrthographicCamera) camera.getWorldDirection(this.parallel);
       else this.parallel.set(0, 0, 0);
+      this.unproject.copy(camera.projectionMatrixInverse);
     };
     const sheet = new THREE.BufferGeometry();
     sheet.setAttribute("position", new THREE.Float32BufferAttribute(new Float32Array(12), 3));

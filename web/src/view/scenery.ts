@@ -2,9 +2,25 @@
 import * as THREE from "three";
 import type { Column, Numbers, SceneInfo, Vector } from "../engine/protocol";
 import { table } from "./colors";
-import type { Grid, Pieces, Rgb } from "./layers";
+import { scalars, type Grid, type Pieces, type Rgb } from "./layers";
 
 type Entry = Record<string, any>;
+
+/** What is shown of a grid where nobody says: the first of these that there is, and that is not the same everywhere. */
+const SHOWN = ["density", "fuel", "temperature", "vorticity", "speed", "pressure", "divergence"];
+
+/** The column of a grid that is shown where `chosen` is asked for; a difference before all. */
+export function shownOf(columns: Record<string, Column>, chosen: string | null): string | undefined {
+  const has = (name: string) => name in columns || (name === "speed" && "velocity" in columns);
+  if (has("difference")) return "difference";
+  if (chosen && has(chosen)) return chosen;
+  const varied = SHOWN.find((name) => {
+    if (!has(name)) return false;
+    const values = scalars(columns[name] ?? columns.velocity);
+    return values.some((v) => v !== values[0]);
+  });
+  return varied ?? SHOWN.find(has);
+}
 
 /** Arrows along a velocity, so many that they do not meet; the fastest are as long as the way between two. */
 export function arrows(pieces: Pieces, grid: Grid, velocity: Column, fastest: number, shade: number): void {

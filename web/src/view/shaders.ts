@@ -80,6 +80,7 @@ export const BALLS = {
   fragment: /* glsl */ `
     uniform mat4 projectionMatrix;
     uniform bool glow;
+    uniform bool ghost;
     varying vec3 shade;
     varying float depth;
     varying float ball;
@@ -88,7 +89,13 @@ export const BALLS = {
       vec2 p = vec2(gl_PointCoord.x * 2.0 - 1.0, 1.0 - gl_PointCoord.y * 2.0);
       float d = dot(p, p);
       if (d > 1.0) discard;
-      if (glow) {
+      if (ghost) {
+        // Rings, a pixel and a half wide and at least a seventh of the ball.
+        float width = max(3.0 * fwidth(gl_PointCoord.x), 0.14);
+        if (sqrt(d) < 1.0 - width) discard;
+        gl_FragColor = vec4(shade, 0.25 + 0.35 * small);
+        gl_FragDepth = gl_FragCoord.z;
+      } else if (glow) {
         float core = exp(-6.0 * d) * small;
         gl_FragColor = vec4(shade * 1.6 + 0.25 * core, core);
       } else {
@@ -164,9 +171,11 @@ export const SPACE = {
     uniform vec3 low;
     uniform vec3 extent;
     varying vec3 inside;
+    varying vec3 seen;
     void main() {
       vec4 world = modelMatrix * vec4(position, 1.0);
       inside = (world.xyz - low) / extent;
+      seen = (viewMatrix * world).xyz;
       gl_Position = projectionMatrix * viewMatrix * world;
     }`,
   smoke: /* glsl */ `
@@ -181,22 +190,37 @@ export const SPACE = {
     uniform bool fire;
     uniform sampler3D heat;
     uniform vec3 ink;
+    uniform sampler2D depths;
+    uniform bool solid;
+    uniform vec2 size;
+    uniform mat4 unproject;
     varying vec3 inside;
+    varying vec3 seen;
     vec3 black(float share) {
       float t = clamp(share, 0.0, 1.2);
       return 3.0 * pow(t, 4.0) * vec3(1.0, 0.42 * t, 0.16 * t * t);
     }
     void main() {
+      // Lengths along the way, from the far side on: the viewer and all that is seen lie at negative ones.
+      bool straight = dot(parallel, parallel) > 0.0;
       vec3 eye = (viewer - low) / extent;
-      vec3 way = dot(parallel, parallel) > 0.0 ? parallel / extent : inside - eye;
+      vec3 way = straight ? parallel / extent : inside - eye;
       way /= length(way * extent);
       vec3 a = (vec3(0.0) - inside) / way, b = (vec3(1.0) - inside) / way;
-      vec3 far = max(a, b);
-      float last = min(min(far.x, far.y), far.z);
-      float first = 0.0;
+      vec3 near = min(a, b);
+      float first = max(max(near.x, near.y), near.z);
+      if (!straight) first = max(first, -length(seen));
+      float last = 0.0;
+      if (solid) {
+        vec2 place = gl_FragCoord.xy / size;
+        vec4 behind = unproject * vec4(vec3(place, texture2D(depths, place).r) * 2.0 - 1.0, 1.0);
+        behind.xyz /= behind.w;
+        last = min(last, straight ? seen.z - behind.z : length(behind.xyz) - length(seen));
+      }
+      if (last <= first) discard;
       const int STEPS = 72;
-      float stride = last / float(STEPS);
-      float t = fract(sin(dot(gl_FragCoord.xy, vec2(12.9898, 78.233))) * 43758.5453) * stride;
+      float stride = (last - first) / float(STEPS);
+      float t = first + fract(sin(dot(gl_FragCoord.xy, vec2(12.9898, 78.233))) * 43758.5453) * stride;
       float through = 1.0;
       vec3 light = vec3(0.0);
       for (int i = 0; i < STEPS; i++) {

@@ -4,9 +4,11 @@ import { OrbitControls } from "three/examples/jsm/controls/OrbitControls.js";
 import type { Column, Frame, Numbers, SceneInfo, Vector } from "../engine/protocol";
 import { FAMILIES, familiesOf, isOn, linked, type Family } from "../links";
 import { mapOf, PALETTE, SIGNED } from "./colors";
+import { Depths } from "./depths";
 import { gridOf, PIXELS, PlaneField, Pieces, Points, Range, scalars, SpaceField, Surface, type Grid, type Layer, type Rgb } from "./layers";
-import { arrows, carry, countOf, endsOf, leapOf, matched, outline, planeOf, sharp } from "./scenery";
+import { arrows, carry, countOf, endsOf, leapOf, outline, planeOf, sharp, shownOf } from "./scenery";
 import { isLeft, Shades, type Legend, type Shaded } from "./shades";
+import { trails } from "./trails";
 
 /** How fields and objects are shown; of all objects together. */
 export interface Look {
@@ -30,8 +32,6 @@ export interface Look {
 
 export const LOOK: Look = { field: null, dye: true, arrows: false, cells: false, slice: null, sliceAt: 0.5, links: false, unseen: [], hidden: [], color: "object", trails: true };
 
-/** What is shown of a grid where nobody says: the first of these that there is. */
-const SHOWN = ["density", "fuel", "temperature", "vorticity", "speed", "pressure", "divergence"];
 const SMOKE: Rgb = [0.52, 0.53, 0.56];
 const SOLID: Rgb = [0.42, 0.41, 0.39];
 const GLOWING = 1000;
@@ -75,6 +75,7 @@ export class Stage {
   private readonly sky = new THREE.HemisphereLight(0xffffff, 0xb8b2a8, 1.25);
   private readonly observer: ResizeObserver;
   private anchors: { pieces: Pieces; ends: [string, number][] } | null = null;
+  private readonly depths = new Depths();
   private readonly handle = new Pieces(0, { lit: false, thinnest: 1.5, front: true });
   private shades = new Shades();
   look: Look = { ...LOOK };
@@ -111,6 +112,7 @@ export class Stage {
     this.observer.disconnect();
     this.clear();
     this.handle.dispose();
+    this.depths.dispose();
     this.controls.dispose();
     this.renderer.dispose();
     this.renderer.forceContextLoss();
@@ -445,6 +447,7 @@ export class Stage {
   render(): void {
     this.dirty = false;
     this.renderer.getDrawingBufferSize(PIXELS.value);
+    this.depths.draw(this.renderer, this.scene, this.camera, PIXELS.value);
     this.renderer.render(this.scene, this.camera);
     this.drawn();
   }
@@ -509,16 +512,7 @@ export class Stage {
   }
 
   private field(thing: Thing, grid: Grid, columns: Record<string, Column>): void {
-    const chosen = this.look.field;
-    const has = (name: string) => name in columns || (name === "speed" && "velocity" in columns);
-    let name = chosen && has(chosen) ? chosen : undefined;
-    if (!name) {
-      name = SHOWN.find((n) => {
-        if (!has(n)) return false;
-        const values = scalars(columns[n] ?? columns.velocity);
-        return values.some((v) => v !== values[0]);
-      }) ?? SHOWN.find(has);
-    }
+    const name = shownOf(columns, this.look.field);
     if (!name) return;
     const column = columns[name] ?? columns.velocity;
     const signed = SIGNED.includes(name) && column.width === 1;
@@ -595,7 +589,10 @@ export class Stage {
       const r = columns.radius?.data ?? thing.radius;
       const own = columns.color?.data;
       (thing.body as Points).set(x, r, colors ?? own ?? thing.color);
-      if (thing.way) this.way(thing, frame, own);
+      if (thing.way) {
+        thing.way.object.visible = this.look.trails;
+        if (this.look.trails) trails(thing.way, thing, frame, this.past, this.night);
+      }
     }
     if (thing.links && links) {
       const shown = thing.kind === "points" || this.look.links || (this.flat && thing.kind !== "curve");
@@ -603,48 +600,6 @@ export class Stage {
       const shade = thing.color.map((c) => c * (thing.kind === "points" ? 0.6 : this.look.links ? 1 : 0.35)) as Rgb;
       if (shown) thing.links.pairs(x, links, colors && this.look.color === "strain" && strain ? (piece) => this.shades.link(strain[piece]) : colors ? ofPiece(links) : shade, left);
     }
-  }
-
-  /** Where the particles have been. */
-  private way(thing: Thing, frame: Frame, own: Numbers | undefined): void {
-    const way = thing.way!;
-    way.object.visible = this.look.trails;
-    if (!this.look.trails) return;
-    const past: Frame[] = [frame];
-    for (let k = frame.index - 1; k >= 0; k--) {
-      const before = this.past(k);
-      if (!before || before.time < frame.time - thing.trail - 1e-9) break;
-      past.push(before);
-    }
-    let total = 0;
-    for (let k = 0; k + 1 < past.length; k++) total += (past[k + 1].columns[thing.name]?.position?.data.length ?? 0) / 3;
-    const { start, end, tint } = way.begin(Math.max(total, 1));
-    let used = 0;
-    const dim = this.night ? 1 : 0.75;
-    for (let k = 0; k + 1 < past.length; k++) {
-      const after = past[k].columns[thing.name];
-      const before = past[k + 1].columns[thing.name];
-      if (!after?.position || !before?.position) continue;
-      const p = before.position.data;
-      const q = after.position.data;
-      const shade = after.color?.data ?? (k === 0 ? own : undefined);
-      const fresh = 1 - (frame.time - past[k].time) / Math.max(thing.trail, 1e-9);
-      const rows = matched(before.id?.data, after.id?.data, p.length / 3, q.length / 3);
-      for (const [i, j] of rows) {
-        const dx = q[3 * j] - p[3 * i];
-        const dy = q[3 * j + 1] - p[3 * i + 1];
-        const dz = q[3 * j + 2] - p[3 * i + 2];
-        if (Math.hypot(dx, dy, dz) > thing.leap) continue;
-        for (let d = 0; d < 3; d++) {
-          start[3 * used + d] = p[3 * i + d];
-          end[3 * used + d] = q[3 * j + d];
-          tint[4 * used + d] = dim * (shade ? shade[3 * j + d] : thing.color[d]);
-        }
-        tint[4 * used + 3] = 0.15 + 0.75 * Math.max(fresh, 0);
-        used++;
-      }
-    }
-    way.done(used);
   }
 
   /** The mass nearest to a point of the window, within some pixels. */
@@ -736,6 +691,12 @@ export class Stage {
     const flat = document.createElement("canvas");
     flat.width = this.canvas.width;
     flat.height = this.canvas.height;
+    this.copy(flat);
+    return new Promise((resolve, reject) => flat.toBlob((b) => (b ? resolve(b) : reject(new Error("no picture"))), type, quality));
+  }
+
+  /** What was just drawn, on its background, which is no part of the canvas itself. */
+  copy(flat: HTMLCanvasElement): void {
     const context = flat.getContext("2d")!;
     const [top, bottom] = this.background;
     const shade = context.createLinearGradient(0, 0, 0, flat.height);
@@ -743,24 +704,12 @@ export class Stage {
     shade.addColorStop(1, bottom);
     context.fillStyle = shade;
     context.fillRect(0, 0, flat.width, flat.height);
-    context.drawImage(this.canvas, 0, 0);
-    return new Promise((resolve, reject) => flat.toBlob((b) => (b ? resolve(b) : reject(new Error("no picture"))), type, quality));
+    context.drawImage(this.canvas, 0, 0, flat.width, flat.height);
   }
 
-  /** All surfaces as a GLB file, y up as that format has it; null where there are none. */
-  async surfaces(): Promise<Blob | null> {
-    const bodies = this.things.flatMap((t) => (t.body instanceof Surface ? [{ name: t.name, mesh: t.body.object }] : []));
-    if (!bodies.length) return null;
-    const { GLTFExporter } = await import("three/examples/jsm/exporters/GLTFExporter.js");
-    const root = new THREE.Group();
-    root.rotation.x = -Math.PI / 2;
-    for (const { name, mesh } of bodies) {
-      const copy = mesh.clone();
-      copy.name = name;
-      root.add(copy);
-    }
-    const data = (await new GLTFExporter().parseAsync(root, { binary: true })) as ArrayBuffer;
-    return new Blob([data], { type: "model/gltf-binary" });
+  /** What is drawn as triangles. */
+  get surfaces(): { name: string; mesh: THREE.Mesh }[] {
+    return this.things.flatMap((t) => (t.body instanceof Surface ? [{ name: t.name, mesh: t.body.object }] : []));
   }
 
   get background(): [string, string] {
