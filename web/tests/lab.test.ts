@@ -533,7 +533,7 @@ describe("everyone", () => {
           if (tab) await page.click(`#t-${tab}`);
           if (tab === "text") await page.waitForSelector(".cm-content");
           await page.evaluate(axe);
-          const issues = await page.evaluate((dark) => (window as any).axe.run(document, { resultTypes: ["violations"], ...(dark ? { runOnly: ["color-contrast"] } : {}) }).then((r: any) => r.violations.filter((v: any) => ["serious", "critical"].includes(v.impact)).map((v: any) => `${v.id}: ${v.nodes.slice(0, 3).map((n: any) => n.target.join(" ") + " " + (n.any[0]?.message ?? "")).join("; ")}`)), colorScheme === "dark");
+          const issues = await page.evaluate(() => (window as any).axe.run(document, { resultTypes: ["violations"] }).then((r: any) => r.violations.filter((v: any) => ["serious", "critical"].includes(v.impact)).map((v: any) => `${v.id}: ${v.nodes.slice(0, 3).map((n: any) => n.target.join(" ") + " " + (n.any[0]?.message ?? "")).join("; ")}`)));
           found.push(...issues.map((i: string) => `${path} ${tab}: ${i}`));
         }
         await page.context().close();
