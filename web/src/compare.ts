@@ -147,7 +147,7 @@ export class Comparison {
     this.bar.replaceChildren(
       h("div", { class: "before-head" }, h("h2", {}, "Before and now"), h("p", { class: "changes" }, changes.join("; "))),
       h("div", { class: "before-acts" }, ...parts),
-      h("p", { class: "muted" }, `The old way stands at frame ${before.way.last}, hash `, h("span", { class: "hash" }, before.hash)),
+      h("p", { class: "muted" }, `The old way stands at frame ${before.way.last}, hash `, h("code", {}, before.hash)),
     );
     this.draw();
   }
