@@ -2,7 +2,7 @@
 import { difference, fieldOf, ofField, ofPositions, type Measure } from "./apart";
 import type { Change } from "./branch";
 import { check, choice, h, show } from "./dom";
-import type { Frame, SceneInfo } from "./engine/protocol";
+import type { Frame, SceneInfo, Value } from "./engine/protocol";
 import { curveColor, Plot } from "./plot";
 import type { Session } from "./session";
 import { literal } from "./values";
@@ -11,7 +11,12 @@ import type { Stage } from "./view/stage";
 
 const GRIDS = ["gas", "heat", "compressible"];
 
-const told = ({ path, from, to, frame }: Change): string => (path ? `${path}: ${from === null ? "not set" : literal(from)} → ${to === null ? "not set" : literal(to)}` : "by the pointer") + `, from frame ${frame}`;
+function short(value: Value | null): string {
+  const text = value === null ? "not set" : literal(value);
+  return text.length > 60 ? `${text.slice(0, 57)} …` : text;
+}
+
+const told = ({ path, from, to, frame }: Change): string => `${path ? `${path}: ${short(from)} → ${short(to)}` : "by the pointer"}, from frame ${frame}`;
 
 const gridsOf = (info: SceneInfo): string[] => info.objects.filter((o) => GRIDS.includes(o.kind)).map((o) => o.name);
 const movingOf = (info: SceneInfo): string[] => info.objects.filter((o) => ![...GRIDS, "collider"].includes(o.kind)).map((o) => o.name);

@@ -9,11 +9,12 @@ const PAGES: [RegExp, string, () => Promise<{ page: Page }>][] = [
   [/^$/, "Gallery", () => import("./pages/gallery")],
   [/^fluid(?:\/(.*))?$/, "Fluid", () => import("./pages/fluid")],
   [/^integrators(?:\/(.*))?$/, "Integrators", () => import("./pages/integrators")],
+  [/^structures(?:\/(.*))?$/, "Structures", () => import("./pages/structures")],
   [/^theory(?:\/(.*))?$/, "Theory", () => import("./pages/theory")],
   [/^scene\/(.*)$/, "", () => import("./pages/scene")],
   [/^(s\/.*)$/, "", () => import("./pages/scene")],
 ];
-const LINKS = ["", "fluid", "integrators", "theory"];
+const LINKS = ["", "fluid", "integrators", "structures", "theory"];
 
 /** Links of the header. */
 for (const [k, name] of PAGES.map((p) => p[1]).entries()) if (name) nav.append(h("a", { href: `#/${LINKS[k]}` }, name));
@@ -62,7 +63,7 @@ async function go(): Promise<void> {
   main.replaceChildren();
   main.className = "";
   // The engine comes while the page does.
-  if (/^(scene|s|fluid|integrators)\b/.test(address)) void import("./session").then(({ engine }) => engine().schema()).catch(() => {});
+  if (/^(scene|s|fluid|integrators|structures)\b/.test(address)) void import("./session").then(({ engine }) => engine().schema()).catch(() => {});
   for (const [pattern, , open] of PAGES) {
     const match = pattern.exec(address);
     if (!match) continue;

@@ -9,6 +9,29 @@ type Tree = Record<string, any>;
 /** What panels leave to the text. */
 const LEFT_OUT = new Set(["version", "title", "output", "expect", "camera", "name", "precision", "bits", "dimension", "plane", "color", "color_to", "color_end"]);
 
+/** The most telling words of what moves particles, by table and kind: they come first. */
+const TELLING: Record<string, string[]> = {
+  emitter: ["rate", "speed", "cone", "lifetime"],
+  galaxy: ["toomre", "thickness", "stars"],
+  "system.vicsek": ["noise", "speed", "radius"],
+  "force.flock": ["cohesion", "alignment", "separation", "speed", "view", "fear"],
+  "force.gravitation": ["constant", "softening"],
+  "force.turbulence": ["strength", "scale", "rate"],
+  "force.vortex": ["swirl", "inward", "lift"],
+  "force.attraction": ["gm"],
+  "force.lennard_jones": ["epsilon"],
+  "force.wind": ["rate", "coefficient"],
+  "force.magnetic": ["field"],
+  "force.electric": ["field"],
+  "field.turbulence": ["strength", "scale", "rate"],
+  "field.vortex": ["swirl", "inward", "lift"],
+  "field.swirl": ["rate"],
+  "field.sink": ["rate"],
+  "field.uniform": ["velocity"],
+};
+/** So many of them, at most, so that the rest stays in sight. */
+const MOST_TELLING = 9;
+
 export interface PanelHost {
   set(path: string, value: Value): Promise<void>;
 }
@@ -61,6 +84,8 @@ export class Panel {
   private readonly groups = h("div", { class: "groups" });
   private readonly note = h("p", { class: "note", role: "status" });
   private everything = false;
+  /** Paths of the most telling values, which are not shown twice. */
+  private shown = new Set<string>();
   private opened = new Set<string>();
   private closed = new Set<string>();
   private info: SceneInfo | null = null;
@@ -86,7 +111,7 @@ export class Panel {
     } catch {
       this.explicit = {};
     }
-    for (const path of overrides.keys()) mark(this.explicit, path.split("."));
+    for (const [path, value] of overrides) mark(this.explicit, path.split("."), value);
     const same = this.info && JSON.stringify(shape(this.info.scene)) === JSON.stringify(shape(info.scene));
     this.info = info;
     // A panel in use is not made anew under the fingers.
@@ -103,6 +128,9 @@ export class Panel {
     if (!this.info) return;
     const scene = this.info.scene as Tree;
     const groups: Node[] = [];
+    this.shown.clear();
+    const play = this.play(scene);
+    if (play) groups.push(play);
     for (const [key, raw] of Object.entries(this.schema.properties as Record<string, Schema>)) {
       const value = scene[key];
       if (LEFT_OUT.has(key) || value === null || value === undefined) continue;
@@ -126,6 +154,40 @@ export class Panel {
     if (!groups.length) this.groups.append(h("p", { class: "muted" }, "This scene leaves everything at its defaults."));
   }
 
+  /** The values that one would like to turn first. */
+  private play(scene: Tree): HTMLElement | null {
+    const entries: [string, string, Tree, Schema][] = [];
+    const take = (table: string, path: string, entry: Tree, schema: Schema) => {
+      entries.push([table === "emitter" || table === "galaxy" ? table : `${table}.${entry.kind}`, path, entry, schema]);
+      const air = (entry.air ?? []) as Tree[];
+      const own = air.length ? branch(schema, entry, this.schema) : null;
+      air.forEach((field, i) => take("field", `${path}.air.${i}`, field, resolve(resolve(own!.properties.air, this.schema).items, this.schema)));
+    };
+    for (const table of ["galaxy", "force", "field", "emitter"]) {
+      const list = (scene[table] ?? []) as Tree[];
+      const items = resolve(resolve(this.schema.properties[table], this.schema).items, this.schema);
+      list.forEach((entry, i) => take(table, `${table}.${i}`, entry, items));
+    }
+    const systems = resolve(resolve(this.schema.properties.system, this.schema).items, this.schema);
+    (scene.system as Tree[]).forEach((s, i) => s.vicsek && entries.push(["system.vicsek", `system.${i}.vicsek`, s.vicsek, resolve(systems.properties.vicsek, this.schema)]));
+    const sets: HTMLElement[] = [];
+    for (const [kind, path, entry, schema] of entries) {
+      const own = schema.properties ? schema : branch(schema, entry, this.schema);
+      const rows: HTMLElement[] = [];
+      for (const key of TELLING[kind] ?? []) {
+        const value = entry[key];
+        if (!own?.properties?.[key] || value === null || value === undefined || value === 0 || this.shown.size >= MOST_TELLING) continue;
+        const row = this.row(`${path}.${key}`, value, resolve(own.properties[key], this.schema), key);
+        if (!row) continue;
+        rows.push(row);
+        this.shown.add(`${path}.${key}`);
+      }
+      if (rows.length) sets.push(h("fieldset", { class: "sub" }, h("legend", {}, capital(plain(String(entry.name ?? entry.kind ?? kind.split(".").pop())))), ...rows));
+    }
+    if (!sets.length) return null;
+    return h("details", { open: !this.closed.has("play"), class: "group play", ontoggle: (event: Event) => this.closed[(event.target as HTMLDetailsElement).open ? "delete" : "add"]("play") }, h("summary", {}, h("span", { class: "group-title" }, "Play with")), ...sets);
+  }
+
   private group(path: string, value: Tree, schema: Schema, explicit: Tree | undefined, title: string, kind: string): HTMLElement | null {
     const rows = this.rows(path, value, schema, explicit);
     if (!rows.length) return null;
@@ -147,7 +209,7 @@ export class Panel {
       const inner = value?.[key];
       if (inner === null || inner === undefined) continue;
       const said = explicit?.[key] !== undefined;
-      if (!said && !this.everything) continue;
+      if ((!said && !this.everything) || this.shown.has(`${path}.${key}`)) continue;
       const row = this.row(`${path}.${key}`, inner, resolve(raw as Schema, this.schema), key, explicit?.[key]);
       if (row) rows.push(row);
     }
@@ -183,10 +245,8 @@ export class Panel {
     }
     if (typeof value === "object") {
       const rows = this.rows(path, value, kind, typeof explicit === "object" ? explicit : undefined);
-      // What was written short ("structural = 500") has its number inside.
-      const inner = !rows.length && typeof explicit === "number" && typeof value.modulus === "number" ? this.rows(path, value, kind, { modulus: explicit }) : rows;
-      if (!inner.length) return null;
-      return h("fieldset", { class: "sub" }, h("legend", {}, capital(plain(key))), ...inner);
+      if (!rows.length) return null;
+      return h("fieldset", { class: "sub" }, h("legend", {}, capital(plain(key))), ...rows);
     }
     return null;
   }
@@ -203,7 +263,19 @@ export class Panel {
     );
   }
 
+  /** A value below a table that the text leaves out is set with all of its table, so that the rest keeps its value. */
   private async send(path: string, value: Value): Promise<void> {
+    const keys = path.split(".");
+    let [said, now]: any[] = [this.explicit, this.info?.scene];
+    for (const [i, key] of keys.slice(0, -1).entries()) {
+      said = said?.[key];
+      now = now?.[key];
+      if (Array.isArray(now) || !now || typeof now !== "object") continue;
+      if (said && typeof said === "object") continue;
+      const table = structuredClone(now);
+      keys.slice(i + 1, -1).reduce((at, k) => at[k], table)[keys.at(-1)!] = value;
+      return this.host.set(keys.slice(0, i + 1).join("."), full(table));
+    }
     await this.host.set(path, value);
   }
 
@@ -284,6 +356,13 @@ export class Panel {
   }
 }
 
+/** Without what is not there: TOML has no word for it. */
+function full(tree: any): Value {
+  if (Array.isArray(tree)) return tree.map(full);
+  if (!tree || typeof tree !== "object") return tree;
+  return Object.fromEntries(Object.entries(tree).flatMap(([k, v]) => (v === null ? [] : [[k, full(v)]])));
+}
+
 /** Which keys there are, without their values. */
 function shape(tree: any): any {
   if (Array.isArray(tree)) return tree.length > 8 ? tree.length : tree.map(shape);
@@ -291,10 +370,10 @@ function shape(tree: any): any {
   return typeof tree;
 }
 
-function mark(tree: Tree, path: string[]): void {
+function mark(tree: Tree, path: string[], value: Value): void {
   let at: any = tree;
   for (const [i, key] of path.entries()) {
-    if (i === path.length - 1) at[key] ??= true;
+    if (i === path.length - 1) at[key] = value;
     else if (at[key] === undefined || typeof at[key] !== "object") at = at[key] = {};
     else at = at[key];
   }

@@ -45,6 +45,13 @@ function order(row: string): number {
   return k < 0 ? ROWS.length : k;
 }
 
+/** Scenes to go on to from another: those of its row; what flies by itself and what gravitation holds are one. */
+export function beside(id: string): Shipped[] {
+  const kin = (row: string) => (row === "gravity" ? "particles" : row);
+  const own = sceneOf(id);
+  return own ? SCENES.filter((s) => kin(s.row) === kin(own.row)) : [];
+}
+
 export const sceneOf = (id: string): Shipped | undefined => SCENES.find((s) => s.id === id);
 
 /** Title of a scene without reading all of it. */

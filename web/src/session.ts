@@ -28,6 +28,8 @@ const MEMORY = 192 * 2 ** 20;
 
 type Events = {
   loaded: SceneInfo;
+  /** Other values, the same objects. */
+  changed: SceneInfo;
   frame: Frame;
   failed: Failure;
   playing: boolean;
@@ -441,14 +443,15 @@ export class Session {
       }
       const { info, live } = changed;
       this.overrides = new Map(this.overrides);
-      // The last of several counts, as with assignments one after the other.
-      this.overrides.delete(path);
+      // What was changed below this place is gone, and in the order of changes this one is the last.
+      for (const old of [...this.overrides.keys()]) if (`${old}.`.startsWith(`${path}.`)) this.overrides.delete(old);
       this.overrides.set(path, value);
       this.settle(parting, { frame: live ? at : 0, path, from, to: value });
       if (live) {
-        const same = JSON.stringify(this.info?.objects) === JSON.stringify(info.objects);
+        const shape = (i: SceneInfo | null) => JSON.stringify([i?.objects, i && Object.values(i.topology).map((t) => t.links?.data.length)]);
+        const same = shape(this.info) === shape(info);
         this.info = info;
-        if (!same) this.tell("loaded", info);
+        this.tell(same ? "changed" : "loaded", info);
       } else {
         this.age++;
         this.begin(info);

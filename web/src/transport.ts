@@ -66,7 +66,8 @@ export function keys(session: Session, stage?: { nudge(dx: number, dy: number, z
       });
     }
     const step = steps[event.key];
-    if (!step) return;
+    // A box is checked by the space bar.
+    if (!step || (event.key === " " && target.closest("input"))) return;
     event.preventDefault();
     step();
   };

@@ -2,11 +2,11 @@
 import { parse, stringify } from "smol-toml";
 import type { Value } from "./engine/protocol";
 
-/** A value as TOML writes it. */
+/** A value as TOML writes it; what is not set in a table is left out. */
 export function literal(value: Value): string {
   if (typeof value === "string") return JSON.stringify(value);
   if (Array.isArray(value)) return `[${value.map(literal).join(", ")}]`;
-  if (typeof value === "object") return `{ ${Object.entries(value).map(([k, v]) => `${/^[\w-]+$/.test(k) ? k : JSON.stringify(k)} = ${literal(v)}`).join(", ")} }`;
+  if (typeof value === "object") return `{ ${Object.entries(value).filter(([, v]) => v !== null).map(([k, v]) => `${/^[\w-]+$/.test(k) ? k : JSON.stringify(k)} = ${literal(v)}`).join(", ")} }`;
   return String(value);
 }
 

@@ -46,6 +46,8 @@ export const page: Page = async (main) => {
           { class: "hero-actions" },
           h("a", { class: "button primary", href: "#/fluid" }, "Stir a fluid"),
           h("a", { class: "button", href: "#/integrators" }, "Compare integrators"),
+          h("a", { class: "button", href: "#/structures" }, "Take a structure apart"),
+          h("a", { class: "button", href: "#/scene/particles/fountain" }, "Play with particles"),
           file,
           h("label", { for: "file", class: "button" }, "Open a file …"),
         ),

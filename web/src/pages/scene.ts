@@ -3,12 +3,14 @@ import { Comparison } from "../compare";
 import { check, choice, h, iconButton, saveAs, say, show, svg, ICONS, type Page } from "../dom";
 import { EngineError } from "../engine/client";
 import type { Cure, Failure, SceneInfo, Value } from "../engine/protocol";
+import { FamilySwitches } from "../families";
+import { familiesOf, FAMILIES } from "../links";
 import { Panel } from "../panel";
 import { curveColor, legend, Plot, type Curve } from "../plot";
 import { saving } from "../saving";
 import { engine, Session } from "../session";
 import { literal, valueOf } from "../values";
-import { titleOf } from "../scenes";
+import { beside, titleOf } from "../scenes";
 import { addressOf } from "../share";
 import { begin, source, toShare, type Source } from "../source";
 import { cards, topics } from "../theory";
@@ -20,6 +22,9 @@ import type { Editor } from "../editor";
 
 /** Columns of grids that can be shown, and how they are called. */
 const FIELDS: [string, string][] = [["density", "Density"], ["temperature", "Temperature"], ["pressure", "Pressure"], ["speed", "Speed"], ["vorticity", "Vorticity"], ["divergence", "Divergence"], ["fuel", "Fuel"]];
+
+/** Values that only say how a scene starts: a world that goes on would never look at them. */
+const STARTS = /^(galaxy\.|particles\.\d+\.(position|velocity|cloud)|(sheet|block)\.\d+\.(center|rotate))/;
 
 export const page: Page = async (main, rest) => {
   main.className = "lab-page";
@@ -83,6 +88,7 @@ export const page: Page = async (main, rest) => {
     if (tabs[k][0] === "facts") void tellFacts();
   };
 
+  const others = start.id ? beside(start.id) : [];
   const shareButton = h("button", { type: "button", class: "button", onclick: () => void share() }, svg(ICONS.share, 16), "Copy link");
   const stage = new Stage(canvas);
   session.wanted = () => stage.wanted;
@@ -102,6 +108,7 @@ export const page: Page = async (main, rest) => {
           h("div", { class: "actions" }, shareButton, ...saved.buttons, iconButton("frame", "View of the scene's camera", () => stage.goHome())),
         ),
         alert,
+        others.length > 1 ? h("nav", { class: "others", "aria-label": "Scenes like this one" }, ...others.map((s) => h("a", { href: `#/scene/${s.id}`, "aria-current": s.id === start.id ? "page" : false }, s.name.replace(/[_-]/g, " ")))) : null,
         stageBox,
         transport(session),
         lookBar,
@@ -113,6 +120,7 @@ export const page: Page = async (main, rest) => {
     ),
   );
 
+  main.querySelector(".others [aria-current]")?.scrollIntoView({ block: "nearest", inline: "center" });
 
   // The picture follows the world.
   let hashWait = 0;
@@ -155,6 +163,7 @@ export const page: Page = async (main, rest) => {
     opening = false;
     drawLook(info);
     panel?.open(info, session.toml, session.overrides);
+    switches.open(info, session.toml);
     title.textContent = info.title || start.name;
     document.title = `${info.title || start.name} · tumble`;
     stageBox.classList.toggle("night", stage.night);
@@ -162,6 +171,11 @@ export const page: Page = async (main, rest) => {
     hashBox.dataset.frame = String(session.latest);
     void cards(topics(info)).then((made) => theoryTab.replaceChildren(...made));
     void tellFacts();
+  });
+  session.on("changed", (info) => {
+    stage.changed(info);
+    panel?.open(info, session.toml, session.overrides);
+    switches.open(info, session.toml);
   });
   session.on("frame", (frame) => {
     comparison.show(frame);
@@ -222,19 +236,31 @@ export const page: Page = async (main, rest) => {
 
   // Values.
   let panel: Panel | null = null;
-  const change = async (path: string, value: Value) => {
+  const change = async (path: string, value: Value, what = `${path} = ${literal(value)}`) => {
     try {
+      if (STARTS.test(path)) {
+        await session.load(session.toml, [...session.overrides, [path, value]]);
+        alert.hidden = true;
+        panel?.say(`${what}: says how the scene starts, so it starts anew.`);
+        if (editor) syncText();
+        return;
+      }
       const live = await session.set(path, value);
       alert.hidden = true;
-      panel?.say(live ? `${path} = ${literal(value)}: goes on from frame ${session.latest}; the way before is kept beside it.` : `${path} = ${literal(value)}: sizes have changed, so the scene starts anew.`);
+      panel?.say(live ? `${what}: goes on from frame ${session.latest}; the way before is kept beside it.` : `${what}: sizes have changed, so the scene starts anew.`);
       if (editor) syncText();
     } catch (error) {
       if (error instanceof EngineError) {
         panel?.say(error.failure.message.split("\n").slice(0, 3).join(" "), true);
-        if (session.info) panel?.open(session.info, session.toml, session.overrides);
+        if (!session.info) return;
+        panel?.open(session.info, session.toml, session.overrides);
+        switches.open(session.info, session.toml);
       } else throw error;
     }
   };
+
+  const switches = new FamilySwitches(change);
+  valuesTab.append(switches.element);
 
   // Text.
   let editor: Editor | null = null;
@@ -362,10 +388,18 @@ export const page: Page = async (main, rest) => {
         look.color = v as typeof look.color;
         again();
       }));
-      if (linked) parts.push(check("Links", look.links, (on) => {
-        look.links = on;
-        again();
-      }));
+      if (linked) {
+        const there = new Set(info.objects.flatMap((o) => [...(familiesOf(info, o) ?? [])]));
+        const families = h("span", { class: "sights", role: "group", "aria-label": "Families of links that are drawn", hidden: !look.links }, ...(there.size > 1 ? FAMILIES.filter((_, i) => there.has(i)) : []).map((f) => check(f, !look.unseen.includes(f), (on) => {
+          look.unseen = on ? look.unseen.filter((u) => u !== f) : [...look.unseen, f];
+          again();
+        })));
+        parts.push(check("Links", look.links, (on) => {
+          look.links = on;
+          families.hidden = !on;
+          again();
+        }), families);
+      }
       if (stage.trails) parts.push(check("Trails", look.trails, (on) => {
         look.trails = on;
         again();

@@ -12,6 +12,9 @@ const MAPS = {
     "2d004b 451871 5f3a91 7b6aa8 9990bf b7b1d5 cfcfe5 e4e5f0 f7f7f6 fce8cd fed59f fdbc6b ee9b39 d97b12 bd6109 9e4c07 7f3b08",
   PRGn:
     "40004b 621a6e 7f3c8d 9568a6 ae8bbd c7abd2 dec9e2 ede2ee f6f7f6 e4f2e0 cbeac5 abdda5 7ec37f 50a65a 298440 10632b 00441b",
+  // Grey in the middle: thin links without strain must be seen before light and dark.
+  strain:
+    "163a9e 1c48ab 2257b8 2766c5 2d74d2 467ec6 6087ba 7990ad 929aa1 a68c85 b97d68 cc6e4c e06030 d24e28 c43d1f b62c16 a81a0e",
 } as const;
 
 export type MapName = keyof typeof MAPS;

@@ -152,3 +152,9 @@ export function pick(map: Float32Array, share: number): Rgb {
   const i = 3 * Math.round(255 * Math.min(Math.max(share || 0, 0), 1));
   return [map[i], map[i + 1], map[i + 2]];
 }
+
+/** Object and row of both ends of each anchor. One without stiffness holds nothing. */
+export function endsOf(info: SceneInfo): [string, number][] {
+  const anchors = Array.isArray(info.scene.anchor) ? (info.scene.anchor as Entry[]).filter((a) => a.stiffness > 0) : [];
+  return anchors.flatMap((a) => (a.between as string[]).map((end): [string, number] => [end.slice(0, end.lastIndexOf(" ")), Number(end.slice(end.lastIndexOf(" ") + 1))]));
+}

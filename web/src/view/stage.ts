@@ -2,10 +2,12 @@
 import * as THREE from "three";
 import { OrbitControls } from "three/examples/jsm/controls/OrbitControls.js";
 import type { Column, Frame, Numbers, SceneInfo, Vector } from "../engine/protocol";
+import { FAMILIES, familiesOf, isOn, linked, type Family } from "../links";
 import { mapOf, PALETTE, SIGNED } from "./colors";
 import { Depths } from "./depths";
 import { gridOf, PIXELS, PlaneField, Pieces, Points, Range, scalars, SpaceField, Surface, type Grid, type Layer, type Rgb } from "./layers";
-import { arrows, carry, countOf, leapOf, outline, palette, pick, planeOf, sharp, shownOf } from "./scenery";
+import { arrows, carry, countOf, endsOf, leapOf, outline, planeOf, sharp, shownOf } from "./scenery";
+import { isLeft, Shades, type Legend, type Shaded } from "./shades";
 import { trails } from "./trails";
 
 /** How fields and objects are shown; of all objects together. */
@@ -20,32 +22,26 @@ export interface Look {
   slice: number | null;
   sliceAt: number;
   links: boolean;
+  /** Families of links that are not drawn. */
+  unseen: Family[];
+  /** Objects that are not drawn. */
+  hidden: string[];
   color: "object" | "speed" | "strain";
   trails: boolean;
 }
 
-export const LOOK: Look = { field: null, dye: true, arrows: false, cells: false, slice: null, sliceAt: 0.5, links: false, color: "object", trails: true };
-
-/** What a legend tells. */
-export interface Legend {
-  name: string;
-  unit: string;
-  low: number;
-  high: number;
-}
+export const LOOK: Look = { field: null, dye: true, arrows: false, cells: false, slice: null, sliceAt: 0.5, links: false, unseen: [], hidden: [], color: "object", trails: true };
 
 const SMOKE: Rgb = [0.52, 0.53, 0.56];
 const SOLID: Rgb = [0.42, 0.41, 0.39];
 const GLOWING = 1000;
 
-interface Thing {
-  name: string;
+interface Thing extends Shaded {
   kind: "points" | "curve" | "surface" | "solid" | "ground" | "plane" | "space";
   color: Rgb;
   radius: number;
   trail: number;
   leap: number;
-  topology: Record<string, Column>;
   grid: Grid | null;
   body?: Points | Surface | PlaneField | SpaceField | Pieces;
   links?: Pieces;
@@ -81,6 +77,7 @@ export class Stage {
   private anchors: { pieces: Pieces; ends: [string, number][] } | null = null;
   private readonly depths = new Depths();
   private readonly handle = new Pieces(0, { lit: false, thinnest: 1.5, front: true });
+  private shades = new Shades();
   look: Look = { ...LOOK };
   legend: Legend | null = null;
   /** Called after each picture. */
@@ -204,6 +201,7 @@ export class Stage {
       if (!Array.isArray(list)) continue;
       for (const entry of list) if (entry && typeof entry === "object" && typeof (entry as Entry).name === "string") entries.set((entry as Entry).name, entry as Entry);
     }
+    this.shades = new Shades();
     let colors = 0;
     for (const object of info.objects) {
       // Names of systems are no names of objects.
@@ -220,7 +218,7 @@ export class Stage {
       else color = linear(PALETTE[colors++ % PALETTE.length]);
       const kind: Thing["kind"] = grid ? (grid.flat === 3 ? "space" : "plane") : solid ? (at ? "ground" : "solid") : topology.triangles?.data.length ? "surface" : topology.curve?.data.length ? "curve" : "points";
       const radius = topology.radius?.data.length ? topology.radius.data[0] : 0.01;
-      const thing: Thing = { name: object.name, kind, color, radius, trail: Number(entry.trail ?? 0), leap: leapOf(info, object.system), topology, grid, ranges: new Map(), at };
+      const thing: Thing = { name: object.name, kind, color, radius, trail: Number(entry.trail ?? 0), leap: leapOf(info, object.system), topology, grid, families: familiesOf(info, object), acting: [], ranges: new Map(), at };
       if (kind === "plane" && grid) thing.body = new PlaneField(grid, color);
       else if (kind === "space" && grid) thing.body = new SpaceField(grid, color);
       else if (kind === "solid" && topology.position && topology.triangles && !entry.inside) {
@@ -237,7 +235,7 @@ export class Stage {
         this.ground(thing);
       }
       if (thing.body) this.add(thing.body);
-      if (topology.links?.data.length && kind !== "curve") this.add((thing.links = new Pieces(kind === "points" ? 0.25 * radius : 0, { thinnest: kind === "points" ? 1.2 : 0.7, lit: kind === "points" })));
+      if (topology.links?.data.length) this.add((thing.links = new Pieces(kind === "points" ? 0.25 * radius : 0, { thinnest: kind === "curve" ? 2 : kind === "points" || topology.links.data.length < 8000 ? 1.2 : 0.7, lit: kind === "points" })));
       if (kind === "plane" && grid) {
         this.add((thing.way = new Pieces(0, { lit: false, thinnest: 0.6 })));
         outline(thing.way, grid);
@@ -245,14 +243,19 @@ export class Stage {
       if (kind === "plane") this.add((thing.arrows = new Pieces(0, { lit: false, thinnest: 1.1, front: true })));
       this.things.push(thing);
     }
-    const anchors = Array.isArray(info.scene.anchor) ? (info.scene.anchor as Entry[]) : [];
-    if (anchors.length) {
-      const ends = anchors.flatMap((a) => (a.between as string[]).map((end): [string, number] => [end.slice(0, end.lastIndexOf(" ")), Number(end.slice(end.lastIndexOf(" ") + 1))]));
-      this.anchors = { pieces: new Pieces(0, { thinnest: 1.5 }), ends };
-      this.add(this.anchors.pieces);
-    }
+    this.changed(info);
     this.theme();
     this.frameCamera(keepCamera);
+  }
+
+  /** The same objects with other values. */
+  changed(info: SceneInfo): void {
+    this.info = info;
+    const own = linked(info);
+    for (const thing of this.things) thing.acting = FAMILIES.map((f) => isOn(own.find((l) => l.name === thing.name)?.families[f]));
+    const ends = endsOf(info);
+    if (!this.anchors && ends.length) this.add((this.anchors = { pieces: new Pieces(0, { thinnest: 1.5 }), ends }).pieces);
+    if (this.anchors) this.anchors.ends = ends;
   }
 
   private add(layer: Layer): void {
@@ -453,7 +456,8 @@ export class Stage {
   show(frame: Frame): void {
     const first = this.frame === null;
     this.frame = frame;
-    this.legend = null;
+    this.shades.take(this.things, frame, this.look.color, this.look.unseen, this.look.links);
+    this.legend = this.shades.legend;
     const far = Math.max(this.home.width * 1.6, 1e-6);
     for (const thing of this.things) {
       const columns = frame.columns[thing.name] ?? {};
@@ -468,7 +472,7 @@ export class Stage {
         thing.plane.scale.setScalar(far);
       } else if (thing.kind === "solid") this.solid(thing, columns);
       else if (thing.grid) this.field(thing, thing.grid, columns);
-      else this.masses(thing, columns, frame);
+      else if (!this.look.hidden.includes(thing.name)) this.masses(thing, columns, frame);
     }
     if (this.anchors) {
       const ends = this.anchors.ends.map(([name, row]) => {
@@ -552,11 +556,12 @@ export class Stage {
     const x = columns.position?.data;
     if (!x) return;
     const n = x.length / 3;
-    const colors = this.shades(thing, columns, n);
+    const colors = this.shades.of(thing.name);
     const links = thing.topology.links?.data;
     const strain = columns.link_strain?.data;
     const start = this.past(0)?.columns[thing.name]?.link_strain?.data;
     const broken = (piece: number) => !!strain && !!start && Number.isNaN(strain[piece]) && !Number.isNaN(start[piece]);
+    const left = (piece: number) => broken(piece) || isLeft(thing, piece, this.look.unseen);
     const torn = new Set<number>();
     if (strain && start && links) for (let i = 0; i < strain.length; i++) if (broken(i)) torn.add(Math.min(links[2 * i], links[2 * i + 1]) * n + Math.max(links[2 * i], links[2 * i + 1]));
     const ofPiece = (pairs: Numbers) => (piece: number): Rgb => {
@@ -579,6 +584,7 @@ export class Stage {
       for (let i = 0; i + 1 < curve.length; i++) pairs.set([curve[i], curve[i + 1]], 2 * i);
       const gone = (piece: number) => torn.has(Math.min(pairs[2 * piece], pairs[2 * piece + 1]) * n + Math.max(pairs[2 * piece], pairs[2 * piece + 1]));
       (thing.body as Pieces).pairs(x, pairs, colors ? ofPiece(pairs) : thing.color, gone);
+      thing.body!.object.visible = !this.look.links || !links;
     } else {
       const r = columns.radius?.data ?? thing.radius;
       const own = columns.color?.data;
@@ -589,48 +595,11 @@ export class Stage {
       }
     }
     if (thing.links && links) {
-      const shown = thing.kind === "points" || this.look.links || this.flat;
+      const shown = thing.kind === "points" || this.look.links || (this.flat && thing.kind !== "curve");
       thing.links.object.visible = shown;
       const shade = thing.color.map((c) => c * (thing.kind === "points" ? 0.6 : this.look.links ? 1 : 0.35)) as Rgb;
-      if (shown) thing.links.pairs(x, links, colors && this.look.color === "strain" && strain ? this.strained(strain) : colors ? ofPiece(links) : shade, broken);
+      if (shown) thing.links.pairs(x, links, colors && this.look.color === "strain" && strain ? (piece) => this.shades.link(strain[piece]) : colors ? ofPiece(links) : shade, left);
     }
-  }
-
-  private strained(strain: Numbers): (piece: number) => Rgb {
-    const [low, high] = this.legend ? [this.legend.low, this.legend.high] : [-0.1, 0.1];
-    const map = palette("RdBu_r");
-    return (piece) => pick(map, (strain[piece] - low) / (high - low));
-  }
-
-  /** Colours of masses by what the look asks for; null for those of the object. */
-  private shades(thing: Thing, columns: Record<string, Column>, n: number): Float32Array | null {
-    const by = this.look.color;
-    const links = thing.topology.links?.data;
-    let values: Numbers;
-    if (by === "speed" && columns.velocity) values = scalars(columns.velocity);
-    else if (by === "strain" && columns.link_strain && links) {
-      // The mean over the links of each mass.
-      values = new Float32Array(n);
-      const count = new Uint16Array(n);
-      columns.link_strain.data.forEach((s, i) => {
-        if (!Number.isFinite(s)) return;
-        for (const p of [links[2 * i], links[2 * i + 1]]) {
-          values[p] += s;
-          count[p]++;
-        }
-      });
-      for (let i = 0; i < n; i++) values[i] /= Math.max(count[i], 1);
-    } else return null;
-    const name = by === "strain" ? "pressure" : "speed";
-    let range = thing.ranges.get(by);
-    if (!range) thing.ranges.set(by, (range = new Range(name)));
-    range.look(values);
-    const [low, high] = range.pair;
-    this.legend = { name: by, unit: by === "speed" ? "m/s" : "1", low, high };
-    const map = palette(by === "strain" ? "RdBu_r" : "viridis");
-    const out = new Float32Array(3 * n);
-    for (let i = 0; i < n; i++) out.set(pick(map, (values[i] - low) / (high - low)), 3 * i);
-    return out;
   }
 
   /** The mass nearest to a point of the window, within some pixels. */
@@ -645,7 +614,7 @@ export class Stage {
     let depth = Infinity;
     let found: { object: string; row: number; point: THREE.Vector3; mass: number } | null = null;
     for (const thing of this.things) {
-      if (!["points", "curve", "surface"].includes(thing.kind)) continue;
+      if (!["points", "curve", "surface"].includes(thing.kind) || this.look.hidden.includes(thing.name)) continue;
       const x = this.frame.columns[thing.name]?.position?.data;
       if (!x) continue;
       const masses = thing.topology.mass?.data;
@@ -750,5 +719,5 @@ export class Stage {
 }
 
 /** Which map the legend shows. */
-export const legendMap = (name: string) => (name === "strain" ? ("RdBu_r" as const) : name === "speed" ? ("viridis" as const) : mapOf(name));
+export const legendMap = (name: string) => (name === "strain" ? ("strain" as const) : name === "speed" ? ("viridis" as const) : mapOf(name));
 
