@@ -134,13 +134,13 @@ export class Comparison {
           })
         : null,
       fits
-        ? choice("See", [["now", "what is now"], ["before", "what was before"], ["difference", "the difference"]], this.seen, (v) => {
+        ? choice("Way seen", [["now", "that of now"], ["before", "the old one"], ["difference", "difference"]], this.seen, (v) => {
             this.seen = v as typeof this.seen;
             this.again();
           })
         : null,
       masses.length && grids.length
-        ? choice("Apart in", [["positions", "positions"], ["field", "what is shown of the grid"]], this.measured, (v) => {
+        ? choice("Apart in", [["positions", "positions"], ["field", "field"]], this.measured, (v) => {
             this.measured = v as typeof this.measured;
             this.draw();
           })

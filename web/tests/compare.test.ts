@@ -143,11 +143,11 @@ describe("two ways", () => {
     assert.ok(values.slice(6).every((v, i) => v > values[5 + i]), `${values}`);
     assert.match((await page.textContent(".apart"))!, /kg\/m³.*density/);
     const hash = await page.evaluate(() => (window as any).tumble.session.hash());
-    await page.locator("label:has-text('See') select").selectOption("difference");
+    await page.locator("label:has-text('Way seen') select").selectOption("difference");
     const legend = await page.evaluate(() => (window as any).tumble.stage.legend);
     assert.equal(legend.name, "difference");
     assert.ok(legend.high > 0 && legend.low === -legend.high, JSON.stringify(legend));
-    await page.locator("label:has-text('See') select").selectOption("before");
+    await page.locator("label:has-text('Way seen') select").selectOption("before");
     assert.equal(await page.evaluate(() => {
       const { session, stage } = (window as any).tumble;
       return stage.frame === session.before.way.frame(10);
