@@ -11,6 +11,7 @@ TESTS_MAY := -A clippy::unwrap_used -A clippy::expect_used -A clippy::panic
 BINDGEN := target/tools/wasm-bindgen-$(shell sed -n 's/^wasm-bindgen = "=\([0-9.]*\)".*/\1/p' Cargo.toml)/bin/wasm-bindgen
 WASM := target/wasm32-unknown-unknown/web/tumble_wasm.wasm
 PKG := web/src/engine/pkg
+VERSION := $(shell sed -n 's/^version = "\(.*\)"/\1/p' Cargo.toml | head -n 1)
 WEB := $(shell find web -path web/node_modules -prune -o -path web/dist -prune -o -path $(PKG) -prune -o -type f -print) \
 	$(shell find python/tumble/scenes docs/theory -type f)
 
@@ -65,11 +66,13 @@ test-python: setup openvdb
 
 web: python/tumble/web/index.html
 
-# A static folder; its copy ships in the wheel.
+# A static folder, with the versions that were built there before; this one ships in the wheel.
 python/tumble/web/index.html: $(PKG)/single_bg.wasm $(PKG)/double_bg.wasm web/node_modules/.ready $(WEB)
 	cd web && npm run --silent build
 	rm -rf python/tumble/web
-	cp -r web/dist python/tumble/web
+	mkdir -p python/tumble/web/v
+	cp web/dist/*.html python/tumble/web
+	cp -r web/dist/v/$(VERSION) python/tumble/web/v
 
 # To give away: with the scenes and the laboratory inside.
 wheel: setup web

@@ -1,4 +1,5 @@
-import { readdirSync, readFileSync } from "node:fs";
+import { createHash } from "node:crypto";
+import { readdirSync, readFileSync, writeFileSync } from "node:fs";
 import { join, relative, resolve } from "node:path";
 import { defineConfig, type Plugin } from "vite";
 
@@ -28,11 +29,33 @@ function sources(): Plugin {
   };
 }
 
+/** Version of the engine, which is that of the laboratory. */
+const version = /^version = "([^"]+)"/m.exec(readFileSync(join(root, "Cargo.toml"), "utf8"))![1];
+
+/**
+ * Each version lies in a folder of its own, `dist/v/VERSION/`, where links that it wrote lead; what is beside it stays. The first page of
+ * the site takes everything from there, and what is not found is told by a page of its own.
+ */
+function site(): Plugin {
+  return {
+    name: "site",
+    apply: "build",
+    writeBundle({ dir }) {
+      const first = readFileSync(join(dir!, "index.html"), "utf8");
+      const dist = resolve(dir!, "../..");
+      writeFileSync(join(dist, "index.html"), first.replaceAll('="./assets/', `="./v/${version}/assets/`));
+      const lost = readFileSync(join(import.meta.dirname, "404.html"), "utf8").replace('"VERSION"', JSON.stringify(version));
+      const script = /<script>([^]*)<\/script>/.exec(lost)![1];
+      writeFileSync(join(dist, "404.html"), lost.replace("SCRIPT", `sha256-${createHash("sha256").update(script).digest("base64")}`));
+    },
+  };
+}
+
 export default defineConfig({
   // Relative, so that the folder can be put anywhere on any host.
   base: "./",
-  plugins: [sources()],
+  plugins: [sources(), site()],
   worker: { format: "es" },
-  build: { target: "es2022", chunkSizeWarningLimit: 900 },
+  build: { outDir: `dist/v/${version}`, target: "es2022", chunkSizeWarningLimit: 900 },
   server: { fs: { allow: [root] } },
 });

@@ -16,7 +16,7 @@ import pytest
 from conftest import Answer
 from runs import Tree
 
-from tumble import __version__
+from tumble import Scene, __version__
 from tumble.cli import find, view
 
 Command = Callable[..., Answer]
@@ -27,7 +27,10 @@ SceneFile = Callable[..., Path]
 def built(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     folder = tmp_path / "web"
     (folder / "assets").mkdir(parents=True)
-    (folder / "index.html").write_text("<title>tumble</title>")
+    (folder / "v" / __version__).mkdir(parents=True)
+    for place in (folder, folder / "v" / __version__):
+        (place / "index.html").write_text("<title>tumble</title>")
+    (folder / "404.html").write_text("<title>lost</title>")
     (folder / "assets" / "a.wasm").write_bytes(b"\0asm")
     (folder / "assets" / "a.js").write_text("export {}")
     (tmp_path / "secret").write_text("secret")
@@ -52,11 +55,12 @@ def get(url: str) -> tuple[int, str, bytes]:
         with urllib.request.urlopen(url, timeout=10) as answer:
             return answer.status, answer.headers["Content-Type"], answer.read()
     except urllib.error.HTTPError as error:
-        return error.code, "", b""
+        return error.code, error.headers["Content-Type"], error.read()
 
 
 def test_the_laboratory_is_served_with_its_types(site: str) -> None:
     assert get(f"{site}/?view")[1:] == ("text/html", b"<title>tumble</title>")
+    assert get(f"{site}/v/{__version__}/?view")[1:] == ("text/html", b"<title>tumble</title>")
     assert get(f"{site}/assets/a.wasm")[1:] == ("application/wasm", b"\0asm")
     assert get(f"{site}/assets/a.js")[1] == "text/javascript"
 
@@ -80,7 +84,12 @@ def test_any_other_scene_is_in_the_link(built: Path, spring: Tree, scene_file: S
     assert fragment.startswith("s/") and meshes == {}
     packed = fragment.removeprefix("s/")
     tree = json.loads(zlib.decompress(base64.urlsafe_b64decode(packed + "=" * (-len(packed) % 4)), wbits=-15))
-    assert tree == [1, __version__, file.read_text(), ["time.fps=30"], 0, ""]
+    resolved = tree.pop("scene")
+    assert (tree.pop("text"), tree.pop("overrides")) == (file.read_text(), ["time.fps=30"])
+    assert tree == {"tumble": __version__, "changes": [], "frame": 0, "hash": ""}
+    # Every default is written out, so that no later version takes another.
+    assert resolved == Scene.load(file, ["time.fps=30"]).to_dict()
+    assert resolved["time"]["fps"] == 30 and resolved["seed"] == 0 and "gravity" in resolved["world"]
     assert view.address("rope", ["time.fps=30"])[0].startswith("s/")
 
 
@@ -92,11 +101,16 @@ def test_wrong_scenes_are_told_before_anything_is_served(
     long = scene_file(spring)
     long.write_text(long.read_text() + " " * view.LARGEST)
     answer = tumble("view", long, "--no-open")
-    assert answer.code == 2 and "2 MB" in answer.err
+    assert answer.code == 2 and "up to 2 MB" in answer.err
+
+
+def test_versions_that_are_not_there_are_told_by_a_page(site: str) -> None:
+    assert get(f"{site}/v/0.0.1/") == (404, "text/html; charset=utf-8", b"<title>lost</title>")
+    assert get(f"{site}/v/{__version__}/assets/a.js") == (404, "text/html; charset=utf-8", b"<title>lost</title>")
 
 
 def test_what_is_not_built_is_said(built: Path, tumble: Command) -> None:
-    (built / "index.html").unlink()
+    (built / "v" / __version__ / "index.html").unlink()
     answer = tumble("view", "--no-open")
     assert answer.code == 1 and "make web" in answer.err
 
@@ -110,7 +124,7 @@ def test_ctrl_c_ends_it(built: Path) -> None:
     with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as child:
         assert child.stdout is not None
         url = child.stdout.readline()
-        assert url.startswith("http://127.0.0.1:") and url.endswith("/?view#/scene/structures/rope\n")
+        assert url.startswith("http://127.0.0.1:") and url.endswith(f"/v/{__version__}/?view#/scene/structures/rope\n")
         assert get(url.split("#")[0])[0] == 200
         child.send_signal(signal.SIGINT)
         try:

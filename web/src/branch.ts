@@ -10,10 +10,11 @@ export interface Change {
   to: Value | null;
 }
 
-/** What a world began with: what is set beside its text, and all of its values. */
+/** What a world began with: what is set beside its text, all of its values, and the hash of its first state. */
 export interface Start {
   overrides: Map<string, Value>;
   scene: Record<string, unknown>;
+  hash: string;
 }
 
 /** All that makes a world what it is, but its text. */

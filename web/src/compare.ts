@@ -2,7 +2,7 @@
 import { difference, fieldOf, ofField, ofPositions, type Measure } from "./apart";
 import type { Change } from "./branch";
 import { check, choice, h, show } from "./dom";
-import type { Frame, SceneInfo } from "./engine/protocol";
+import type { Frame, SceneInfo, Value } from "./engine/protocol";
 import { curveColor, Plot } from "./plot";
 import type { Session } from "./session";
 import { literal } from "./values";
@@ -11,7 +11,12 @@ import type { Stage } from "./view/stage";
 
 const GRIDS = ["gas", "heat", "compressible"];
 
-const told = ({ path, from, to, frame }: Change): string => (path ? `${path}: ${from === null ? "not set" : literal(from)} → ${to === null ? "not set" : literal(to)}` : "by the pointer") + `, from frame ${frame}`;
+function short(value: Value | null): string {
+  const text = value === null ? "not set" : literal(value);
+  return text.length > 60 ? `${text.slice(0, 57)} …` : text;
+}
+
+const told = ({ path, from, to, frame }: Change): string => `${path ? `${path}: ${short(from)} → ${short(to)}` : "by the pointer"}, from frame ${frame}`;
 
 const gridsOf = (info: SceneInfo): string[] => info.objects.filter((o) => GRIDS.includes(o.kind)).map((o) => o.name);
 const movingOf = (info: SceneInfo): string[] => info.objects.filter((o) => ![...GRIDS, "collider"].includes(o.kind)).map((o) => o.name);
@@ -129,13 +134,13 @@ export class Comparison {
           })
         : null,
       fits
-        ? choice("See", [["now", "what is now"], ["before", "what was before"], ["difference", "the difference"]], this.seen, (v) => {
+        ? choice("Way seen", [["now", "that of now"], ["before", "the old one"], ["difference", "difference"]], this.seen, (v) => {
             this.seen = v as typeof this.seen;
             this.again();
           })
         : null,
       masses.length && grids.length
-        ? choice("Apart in", [["positions", "positions"], ["field", "what is shown of the grid"]], this.measured, (v) => {
+        ? choice("Apart in", [["positions", "positions"], ["field", "field"]], this.measured, (v) => {
             this.measured = v as typeof this.measured;
             this.draw();
           })
@@ -147,7 +152,7 @@ export class Comparison {
     this.bar.replaceChildren(
       h("div", { class: "before-head" }, h("h2", {}, "Before and now"), h("p", { class: "changes" }, changes.join("; "))),
       h("div", { class: "before-acts" }, ...parts),
-      h("p", { class: "muted" }, `The old way stands at frame ${before.way.last}, hash `, h("span", { class: "hash" }, before.hash)),
+      h("p", { class: "muted" }, `The old way stands at frame ${before.way.last}, hash `, h("code", {}, before.hash)),
     );
     this.draw();
   }

@@ -90,7 +90,7 @@ export function say(text: string): void {
   bar.textContent = text;
   bar.classList.add("shown");
   clearTimeout(Number(bar.dataset.timer));
-  bar.dataset.timer = String(setTimeout(() => bar.classList.remove("shown"), 3500));
+  bar.dataset.timer = String(setTimeout(() => bar.classList.remove("shown"), Math.max(3500, 70 * text.length)));
 }
 
 export function saveAs(blob: Blob, name: string): void {

@@ -1,12 +1,14 @@
 /** Files that a person brings: scenes, and meshes. */
 import { stringify } from "smol-toml";
+import type { Files } from "./engine/protocol";
 import { dropped } from "./session";
+import { fromFile, type Shared } from "./share";
 
 /** Larger ones are refused [bytes]. */
-const LARGEST = { scene: 1_000_000, mesh: 64 * 2 ** 20 };
+const LARGEST = { scene: 1_000_000, mesh: 64 * 2 ** 20, shared: 64 * 2 ** 20 };
 
 /** Scenes that were opened from files, by their number in the address. */
-export const opened: { name: string; toml: string }[] = [];
+export const opened: { name: string; toml: string; files: Files; shared?: Shared }[] = [];
 
 const FALLING = (path: string) => `version = 1
 title = "A sheet falls on ${path.replace(/["\\\\\u0000-\u001f]/g, "")}"
@@ -41,22 +43,28 @@ friction = 0.5
 
 /** Opens a scene; meshes are kept for scenes that name them. A mesh alone gets a sheet that falls on it. */
 export async function acceptFiles(files: File[]): Promise<void> {
-  let scene: { name: string; toml: string } | null = null;
+  let scene: (typeof opened)[number] | null = null;
   let mesh: string | null = null;
   for (const file of files) {
     if (/\.toml$/i.test(file.name)) {
       if (file.size > LARGEST.scene) throw new Error(`${file.name} is larger than a scene may be (1 MB)`);
-      scene = { name: file.name, toml: await file.text() };
+      scene = { name: file.name, toml: await file.text(), files: {} };
     } else if (/\.json$/i.test(file.name)) {
       if (file.size > LARGEST.scene) throw new Error(`${file.name} is larger than a scene may be (1 MB)`);
-      scene = { name: file.name, toml: stringify(JSON.parse(await file.text()) as Record<string, unknown>) };
+      scene = { name: file.name, toml: stringify(JSON.parse(await file.text()) as Record<string, unknown>), files: {} };
     } else if (/\.(ply|obj|stl|glb)$/i.test(file.name)) {
       if (file.size > LARGEST.mesh) throw new Error(`${file.name} is larger than a mesh may be (64 MiB)`);
       dropped[file.name] = new Uint8Array(await file.arrayBuffer());
       mesh = file.name;
-    } else throw new Error(`${file.name} is neither a scene (.toml, .json) nor a mesh (.ply, .obj, .stl, .glb)`);
+    } else if (/\.tumble$/i.test(file.name)) {
+      if (file.size > LARGEST.shared) throw new Error(`${file.name} is larger than a shared scene may be (64 MiB)`);
+      const { shared, meshes } = await fromFile(new Uint8Array(await file.arrayBuffer())).catch((error) => {
+        throw new Error(`${file.name} is damaged: ${error.message ?? error}`);
+      });
+      scene = { name: file.name, toml: shared.text, files: meshes, shared };
+    } else throw new Error(`${file.name} is neither a scene (.toml, .json, .tumble) nor a mesh (.ply, .obj, .stl, .glb)`);
   }
-  if (!scene && mesh) scene = { name: mesh, toml: FALLING(mesh) };
+  if (!scene && mesh) scene = { name: mesh, toml: FALLING(mesh), files: {} };
   if (!scene) return;
   opened.push(scene);
   location.hash = `#/scene/file/${opened.length}`;

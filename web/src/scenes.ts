@@ -1,4 +1,5 @@
 /** The scenes that ship with tumble, from the one place where they live, and the pages of theory. */
+import { root } from "./share";
 
 const texts = import.meta.glob("../../python/tumble/scenes/*/*.toml", { query: "?raw", import: "default" }) as Record<string, () => Promise<string>>;
 const assets = import.meta.glob("../../python/tumble/scenes/assets/*.{ply,obj,stl,glb}", { query: "?url", import: "default", eager: true }) as Record<string, string>;
@@ -56,12 +57,15 @@ export const sceneOf = (id: string): Shipped | undefined => SCENES.find((s) => s
 /** Title of a scene without reading all of it. */
 export const titleOf = (text: string): string => /^title\s*=\s*"((?:[^"\\]|\\.)*)"/m.exec(text)?.[1].replace(/\\"/g, '"') ?? "";
 
-/** A mesh that a scene names: what `tumble view` serves beside a scene, or what ships with tumble. */
-export async function asset(path: string): Promise<Uint8Array | null> {
-  if (new URLSearchParams(location.search).has("view")) {
-    const own = await fetch(`view/${encodeURIComponent(path)}`).catch(() => null);
-    if (own?.ok) return new Uint8Array(await own.arrayBuffer());
-  }
+/** A mesh of the scene that `tumble view` serves beside the page. */
+export async function viewed(path: string): Promise<Uint8Array | null> {
+  if (!new URLSearchParams(location.search).has("view")) return null;
+  const answer = await fetch(`${root()}view/${encodeURIComponent(path)}`).catch(() => null);
+  return answer?.ok ? new Uint8Array(await answer.arrayBuffer()) : null;
+}
+
+/** A mesh that ships with tumble. */
+export async function shipped(path: string): Promise<Uint8Array | null> {
   const name = path.split("/").pop()!;
   const url = Object.entries(assets).find(([key]) => key.endsWith(`/${name}`))?.[1];
   if (!url) return null;

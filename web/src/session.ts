@@ -2,8 +2,8 @@
 import { back, gather, merged, turned, type Branch, type Change, type Start } from "./branch";
 import { Engine, EngineError } from "./engine/client";
 import type { Failure, Files, Frame, Ledger, SceneInfo, Stability, StepReport, Value, Vector } from "./engine/protocol";
-import { asset } from "./scenes";
-import { literal, valueAt } from "./values";
+import { shipped, viewed } from "./scenes";
+import { literal, meshesOf, valueAt } from "./values";
 import { Way } from "./way";
 
 let shared: Engine | null = null;
@@ -13,6 +13,14 @@ let branches = 1;
 /** One worker for all pages; it starts with the first of them. */
 export function engine(): Engine {
   return (shared ??= new Engine());
+}
+
+/** A scene with every default written out. Throws `EngineError`. */
+export async function resolved(toml: string): Promise<Record<string, unknown>> {
+  const world = worlds++;
+  const { scene } = await engine().load(toml, { world });
+  await engine().drop(world);
+  return scene;
 }
 
 /** Numbers of kept frames take at most this much [bytes]. */
@@ -44,12 +52,14 @@ export const dropped: Files = {};
 export class Session {
   info: SceneInfo | null = null;
   toml = "";
+  /** Meshes that came with the scene. */
+  private files: Files = {};
   overrides = new Map<string, Value>();
   /** The frame that is shown. */
   shown: Frame | null = null;
   report: StepReport | null = null;
   /** What the world began with, and what was changed since, in order. */
-  start: Start = { overrides: new Map(), scene: {} };
+  start: Start = { overrides: new Map(), scene: {}, hash: "" };
   history: Change[] = [];
   /** Keeps the way that was left for a change, to compare. */
   compares = false;
@@ -97,11 +107,11 @@ export class Session {
     return next;
   }
 
-  /** A new scene. Where it is wrong the old world stays, and this throws. */
-  load(toml: string, overrides: [string, Value][] = []): Promise<SceneInfo> {
+  /** A new scene, with meshes of its own where it has some that no page knows. Where it is wrong the old world stays, and this throws. */
+  load(toml: string, overrides: [string, Value][] = [], own: Files = this.files): Promise<SceneInfo> {
     return this.queue(async () => {
       const words = overrides.map(([path, value]) => `${path}=${literal(value)}`);
-      const files: Files = { ...dropped };
+      const files: Files = { ...dropped, ...own };
       let info: SceneInfo;
       for (let tries = 0; ; tries++) {
         try {
@@ -111,7 +121,7 @@ export class Session {
           const missing = error instanceof EngineError ? (error.failure.missing ?? []).filter((path) => !(path in files)) : [];
           if (!missing.length || tries > 3) throw error;
           for (const path of missing) {
-            const bytes = await asset(path);
+            const bytes = (await viewed(path)) ?? (await shipped(path));
             if (!bytes) throw error;
             files[path] = bytes;
           }
@@ -119,6 +129,7 @@ export class Session {
       }
       this.age++;
       this.toml = toml;
+      this.files = own;
       this.overrides = new Map(overrides);
       this.left = null;
       this.compare(null);
@@ -131,7 +142,7 @@ export class Session {
   private begin(info: SceneInfo): void {
     this.info = info;
     this.way = new Way(MEMORY);
-    this.start = { overrides: new Map(this.overrides), scene: info.scene };
+    this.start = { overrides: new Map(this.overrides), scene: info.scene, hash: info.hash };
     this.history = [];
     this.report = null;
     this.tell("loaded", info);
@@ -520,6 +531,43 @@ export class Session {
 
   hash(): Promise<string> {
     return this.queue(() => this.engine.hash(this.world));
+  }
+
+  /**
+   * What leads to the frame that is shown, and the hash of its state, to share it. What the pointer did nobody can repeat: then it is the
+   * first frame.
+   */
+  moment(): Promise<{ frame: number; hash: string; changes: Change[] }> {
+    const shown = this.shown?.index ?? 0;
+    return this.queue(async () => {
+      const frame = Math.min(shown, this.latest);
+      if (this.history.some((c) => !c.path && c.frame < frame)) return { frame: 0, hash: this.start.hash, changes: back(this.history, 0).filter((c) => c.path) };
+      const changes = this.history.filter((c) => c.path && c.frame <= frame);
+      if (frame === this.latest) return { frame, changes, hash: await this.engine.hash(this.world) };
+      const parting = await this.part(frame, false);
+      try {
+        // Stepped to from a frame before a later change, it is another state.
+        const other = this.history.some((c) => c.frame > parting.root && parting.root < frame);
+        return { frame, changes, hash: other ? "" : await this.engine.hash(this.world) };
+      } finally {
+        await this.undo(parting);
+      }
+    });
+  }
+
+  /** All that the world is made of and that was done to it; two of the same are the same. */
+  get recipe(): string {
+    return JSON.stringify([this.toml, [...this.start.overrides], this.history.map((c) => [c.frame, c.path, c.to])]);
+  }
+
+  /** The meshes of the scene that do not ship with tumble. */
+  async meshes(): Promise<Files> {
+    const found: Files = {};
+    for (const path of meshesOf(this.start.scene)) {
+      const bytes = this.files[path] ?? dropped[path] ?? (await viewed(path));
+      if (bytes) found[path] = bytes;
+    }
+    return found;
   }
 
   stability(): Promise<Stability[]> {

@@ -58,7 +58,7 @@ describe("two ways", () => {
     });
     assert.ok(Math.abs(lengths[10] / by - 1) < 1e-12, `${lengths[10]}, by hand ${by}`);
     assert.match((await page.textContent(".before .changes"))!, /force\.0\.rate: 1 → 3, from frame 4/);
-    assert.equal(await page.textContent(".before .hash"), old);
+    assert.equal(await page.textContent(".before code"), old);
     const now = await page.evaluate(() => (window as any).tumble.session.hash());
     assert.notEqual(now, old);
 
@@ -70,7 +70,7 @@ describe("two ways", () => {
     });
     assert.deepEqual(taken, { index: 10, rate: 1, beside: 0 });
     assert.match((await page.textContent(".before .changes"))!, /force\.0\.rate: 3 → 1, from frame 4/);
-    assert.equal(await page.textContent(".before .hash"), now);
+    assert.equal(await page.textContent(".before code"), now);
     assert.deepEqual(await apart(page, 10), lengths);
     // It goes on as if nothing had been.
     const on = await page.evaluate(async () => {
@@ -107,7 +107,7 @@ describe("two ways", () => {
     assert.equal(await page.evaluate(() => (window as any).tumble.session.hash()), now);
     assert.match((await page.textContent(".before .changes"))!, /rate: 1 → 5, from frame 3$/);
     // The old one is what it would have been.
-    const old = (await page.textContent(".before .hash"))!;
+    const old = (await page.textContent(".before code"))!;
     await page.evaluate(async () => {
       const { session } = (window as any).tumble;
       await session.load(session.toml);
@@ -143,11 +143,11 @@ describe("two ways", () => {
     assert.ok(values.slice(6).every((v, i) => v > values[5 + i]), `${values}`);
     assert.match((await page.textContent(".apart"))!, /kg\/m³.*density/);
     const hash = await page.evaluate(() => (window as any).tumble.session.hash());
-    await page.locator("label:has-text('See') select").selectOption("difference");
+    await page.locator("label:has-text('Way seen') select").selectOption("difference");
     const legend = await page.evaluate(() => (window as any).tumble.stage.legend);
     assert.equal(legend.name, "difference");
     assert.ok(legend.high > 0 && legend.low === -legend.high, JSON.stringify(legend));
-    await page.locator("label:has-text('See') select").selectOption("before");
+    await page.locator("label:has-text('Way seen') select").selectOption("before");
     assert.equal(await page.evaluate(() => {
       const { session, stage } = (window as any).tumble;
       return stage.frame === session.before.way.frame(10);

@@ -1,13 +1,13 @@
 /** `tumble view`: a scene of one's own, with a mesh beside it, in a browser. */
 import assert from "node:assert/strict";
 import { execFileSync, spawn } from "node:child_process";
-import { existsSync, mkdtempSync, writeFileSync } from "node:fs";
+import { existsSync, mkdtempSync, readFileSync, writeFileSync } from "node:fs";
 import { tmpdir } from "node:os";
 import { join, resolve } from "node:path";
 import { test } from "node:test";
 import { chromium } from "playwright-core";
 import { frame } from "./browser";
-import { unpack } from "../src/share";
+import { fromFile, unpack } from "../src/share";
 
 const ROOT = resolve(import.meta.dirname, "../..");
 const PYTHON = resolve(ROOT, ".venv/bin/python");
@@ -15,11 +15,12 @@ const CHROMIUM = [process.env.CHROMIUM, "/usr/bin/chromium", "/usr/bin/chromium-
 const skip = !existsSync(PYTHON) && "no native engine here: make setup";
 
 test("the page reads the links that the command line makes", { skip }, async () => {
-  const code = `from tumble.cli.view import link; print(link('title = "Wärme – 20 m²"\\n' * 50, ["time.fps=30"]))`;
+  const code = `from tumble.cli.view import link, shared; print(link(shared('title = "Wärme – 20 m²"\\n' * 50, ["time.fps=30"], {"seed": 7})))`;
   const packed = execFileSync(PYTHON, ["-c", code], { encoding: "utf8", cwd: ROOT }).trim();
   const shared = await unpack(packed);
-  assert.equal(shared.toml, 'title = "Wärme – 20 m²"\n'.repeat(50));
+  assert.equal(shared.text, 'title = "Wärme – 20 m²"\n'.repeat(50));
   assert.deepEqual(shared.overrides, ["time.fps=30"]);
+  assert.deepEqual(shared.scene, { seed: 7 });
 });
 
 test("a scene with a mesh of its own opens", { skip: skip || (!CHROMIUM && "no Chromium here") }, async () => {
@@ -34,6 +35,20 @@ test("a scene with a mesh of its own opens", { skip: skip || (!CHROMIUM && "no C
     const address = await new Promise<string>((found) => served.stdout.once("data", (text: Buffer) => found(text.toString().split("\n")[0])));
     const page = await browser.newPage();
     await page.goto(address);
+    await frame(page, 0);
+    assert.match(await page.title(), /A tent/);
+    // What the command line resolved is what the page does.
+    const version = /\/v\/([^/]+)\/\?view#\/s\//.exec(address)![1];
+    await page.waitForFunction((v) => document.querySelector(".scene-id")!.textContent === `from a link of tumble ${v}`, version);
+    // A mesh of one's own goes into a file.
+    const [download] = await Promise.all([page.waitForEvent("download"), page.click("text=Copy link")]);
+    const { meshes } = await fromFile(readFileSync(await download.path()));
+    assert.deepEqual(Buffer.from(meshes["my tent.obj"]), readFileSync(join(folder, "my tent.obj")));
+    // Another version is not here: the server says so, and what to do.
+    const answer = await page.goto(address.replace(`/v/${version}/`, "/v/0.0.1/"));
+    assert.equal(answer!.status(), 404);
+    assert.equal(await page.textContent("h1"), "tumble 0.0.1 is not kept here");
+    await page.click(`text=Open the scene with version ${version}`);
     await frame(page, 0);
     assert.match(await page.title(), /A tent/);
   } finally {

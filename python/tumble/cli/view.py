@@ -22,7 +22,7 @@ BUILT = Path(__file__).resolve().parent.parent / "web"
 """What `make web` builds."""
 
 LARGEST = 2_000_000
-"""Bytes of a scene's text that a link may hold; web/src/share.ts has the same."""
+"""Bytes that a link may unpack to; web/src/share.ts has the same."""
 
 _TYPES = {".js": "text/javascript", ".wasm": "application/wasm", ".css": "text/css", ".webp": "image/webp"}
 
@@ -48,13 +48,13 @@ def view(
       tumble view rope
       tumble view my.toml --set time.fps=30
     """
-    from tumble import TumbleError
+    from tumble import TumbleError, __version__
 
-    if not (BUILT / "index.html").is_file():
-        raise TumbleError(f"{BUILT} does not hold the browser laboratory; `make web` builds it")
+    if not (BUILT / "v" / __version__ / "index.html").is_file():
+        raise TumbleError(f"{BUILT} does not hold the browser laboratory of tumble {__version__}; `make web` builds it")
     fragment, meshes = ("", {}) if scene is None else address(scene, set)
     with server(port, meshes) as served:
-        url = f"http://127.0.0.1:{served.server_port}/?view#/{fragment}"
+        url = f"http://127.0.0.1:{served.server_port}/v/{__version__}/?view#/{fragment}"
         say(f"{url}\nCtrl-C ends it")
         if open:
             import webbrowser
@@ -77,19 +77,28 @@ def address(argument: str, overrides: list[str] | None) -> tuple[str, dict[str, 
     if file in shipped and not overrides:
         return f"scene/{shipped[file]}", meshes
     text = file.read_text(encoding="utf-8")
-    if len(text.encode()) > LARGEST:
-        raise SceneError(f"{file}: the browser takes scenes of up to {LARGEST // 1_000_000} MB of text")
-    return f"s/{link(text, overrides or [])}", meshes
+    tree = shared(text, overrides or [], checked.to_dict())
+    if len(tree) > LARGEST:
+        raise SceneError(
+            f"{file}: as text, and with every default written out, the scene has {len(tree) / 1e6:.1f} MB; "
+            f"the browser takes up to {LARGEST // 1_000_000} MB"
+        )
+    return f"s/{link(tree)}", meshes
 
 
-def link(text: str, overrides: list[str]) -> str:
-    """A scene as web/src/share.ts reads it."""
+def shared(text: str, overrides: list[str], resolved: dict[str, Any]) -> bytes:
+    """A scene as web/src/share.ts reads it: as it was written, and what it means."""
     from tumble import __version__
 
-    tree = json.dumps([1, __version__, text, overrides, 0, ""], ensure_ascii=False)
+    tree: dict[str, Any] = {"tumble": __version__, "text": text, "overrides": overrides, "scene": resolved}
+    tree |= {"changes": [], "frame": 0, "hash": ""}
+    return json.dumps(tree, ensure_ascii=False, separators=(",", ":")).encode()
+
+
+def link(tree: bytes) -> str:
+    """What stands behind `#/s/`."""
     packer = zlib.compressobj(9, wbits=-15)
-    packed = packer.compress(tree.encode()) + packer.flush()
-    return base64.urlsafe_b64encode(packed).decode().rstrip("=")
+    return base64.urlsafe_b64encode(packer.compress(tree) + packer.flush()).decode().rstrip("=")
 
 
 def _meshes(scene: "Scene") -> list[str]:
@@ -127,6 +136,19 @@ def server(port: int, meshes: Mapping[str, Path]) -> ThreadingHTTPServer:
 
         def list_directory(self, path: Any) -> None:
             self.send_error(404)
+
+        def send_error(self, code: int, message: str | None = None, explain: str | None = None) -> None:
+            lost = BUILT / "404.html"
+            if code != 404 or not lost.is_file():
+                return super().send_error(code, message, explain)
+            # Links to other versions lead here; the page says which, and what to do.
+            body = lost.read_bytes()
+            self.send_response(404)
+            self.send_header("Content-Type", "text/html; charset=utf-8")
+            self.send_header("Content-Length", str(len(body)))
+            self.end_headers()
+            if self.command != "HEAD":
+                self.wfile.write(body)
 
         def log_message(self, format: str, *arguments: Any) -> None:
             pass

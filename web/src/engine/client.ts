@@ -25,18 +25,6 @@ interface Waiting {
   fail: (error: EngineError) => void;
 }
 
-/** Meshes of a scene that `tumble view` serves beside the page; nothing where the page comes from elsewhere, or one of them is not there. */
-async function beside(paths: string[]): Promise<Files | null> {
-  if (!paths.length || !new URLSearchParams(location.search).has("view")) return null;
-  const files: Files = {};
-  for (const path of paths) {
-    const answer = await fetch(`view/${encodeURIComponent(path)}`).catch(() => null);
-    if (!answer?.ok) return null;
-    files[path] = new Uint8Array(await answer.arrayBuffer());
-  }
-  return files;
-}
-
 /** What a world was made from, to make it again. */
 interface Made {
   toml: string;
@@ -75,15 +63,7 @@ export class Engine {
   /** Checks and builds a scene. The old world goes on where this fails. */
   async load(toml: string, options: { overrides?: string[]; files?: Files; world?: number } = {}): Promise<SceneInfo> {
     const { overrides = [], files = {}, world = 0 } = options;
-    let answer: Answer;
-    try {
-      answer = await this.ask({ type: "load", toml, overrides, files, world });
-    } catch (error) {
-      const missing = error instanceof EngineError ? (error.failure.missing ?? []) : [];
-      const found = await beside(missing.filter((path) => !(path in files)));
-      if (!found) throw error;
-      return this.load(toml, { overrides, files: { ...files, ...found }, world });
-    }
+    const answer = await this.ask({ type: "load", toml, overrides, files, world });
     this.forget(world);
     this.made.set(world, { toml, overrides, files, sets: [] });
     return (answer as Answer & { type: "loaded" }).info;

@@ -8,7 +8,7 @@ import { curveColor, isDark, Plot } from "../plot";
 import { pointers } from "../pointer";
 import { engine, Session } from "../session";
 import { literal } from "../values";
-import { pack } from "../share";
+import { addressed } from "../source";
 import { cards } from "../theory";
 import { keys, transport } from "../transport";
 import { LOOK, Stage } from "../view/stage";
@@ -157,7 +157,7 @@ export const page: Page = async (main) => {
 
   const asScene = async () => {
     const toml = scene(choices).replace(/^frames = .*$/m, "frames = 900");
-    location.hash = `#/s/${await pack({ version: engine().version, toml, overrides: [], frame: 0, hash: "" })}`;
+    location.hash = await addressed(toml);
   };
 
   const range = (label: string, low: number, high: number, value: number, text: (v: number) => string, act: (v: number) => void, step = (high - low) / 100) => {

@@ -31,7 +31,7 @@ export const page: Page = async (main) => {
     list.replaceChildren(...sections.filter((s) => s !== null));
     if (!list.childElementCount) list.append(h("p", { class: "muted" }, "No scene has these words."));
   };
-  const file = h("input", { type: "file", accept: ".toml,.json,.ply,.obj,.stl,.glb", multiple: true, class: "visually-hidden", id: "file", onchange: () => void acceptFiles([...(file.files ?? [])]).catch((e) => say(String(e.message ?? e))) });
+  const file = h("input", { type: "file", accept: ".toml,.json,.tumble,.ply,.obj,.stl,.glb", multiple: true, class: "visually-hidden", id: "file", onchange: () => void acceptFiles([...(file.files ?? [])]).catch((e) => say(String(e.message ?? e))) });
   main.append(
     h(
       "div",

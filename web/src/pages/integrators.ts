@@ -4,7 +4,7 @@ import { EngineError } from "../engine/client";
 import type { Frame, Ledger, SceneInfo, Stability } from "../engine/protocol";
 import { curveColor, isDark, Plot, type Curve } from "../plot";
 import { engine } from "../session";
-import { pack } from "../share";
+import { addressed } from "../source";
 import { cards } from "../theory";
 
 interface System {
@@ -258,7 +258,7 @@ export const page: Page = async (main) => {
   const asScene = async (scheme: string) => {
     const s = SYSTEMS[system];
     const toml = s.toml(scheme, step).replace(/^frames = .*$/m, `frames = ${Math.max(1, Math.ceil(s.end / step))}`);
-    location.hash = `#/s/${await pack({ version: engine().version, toml, overrides: [], frame: 0, hash: "" })}`;
+    location.hash = await addressed(toml);
   };
 
   const limitOf = (scheme: string) => limits.find((l) => l.integrator === scheme);

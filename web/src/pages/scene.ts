@@ -1,19 +1,18 @@
 /** One scene: picture, playback, energy, its values, its text, its theory. */
-import { parse } from "smol-toml";
 import { Comparison } from "../compare";
 import { check, choice, h, iconButton, saveAs, say, show, svg, ICONS, type Page } from "../dom";
 import { EngineError } from "../engine/client";
 import type { Cure, Failure, SceneInfo, Value } from "../engine/protocol";
-import { opened } from "../drop";
 import { FamilySwitches } from "../families";
 import { familiesOf, FAMILIES } from "../links";
 import { Panel } from "../panel";
 import { curveColor, legend, Plot, type Curve } from "../plot";
 import { saving } from "../saving";
 import { engine, Session } from "../session";
-import { literal } from "../values";
-import { LONGEST, pack, unpack, type Shared } from "../share";
-import { beside, sceneOf, titleOf } from "../scenes";
+import { literal, valueOf } from "../values";
+import { beside, titleOf } from "../scenes";
+import { addressOf } from "../share";
+import { begin, source, toShare, type Source } from "../source";
 import { cards, topics } from "../theory";
 import { keys, transport } from "../transport";
 import { legendBox } from "../legend";
@@ -27,38 +26,9 @@ const FIELDS: [string, string][] = [["density", "Density"], ["temperature", "Tem
 /** Values that only say how a scene starts: a world that goes on would never look at them. */
 const STARTS = /^(galaxy\.|particles\.\d+\.(position|velocity|cloud)|(sheet|block)\.\d+\.(center|rotate))/;
 
-async function source(rest: string): Promise<{ toml: string; overrides: [string, Value][]; shared: Shared | null; name: string; id: string | null }> {
-  if (rest.startsWith("s/")) {
-    const shared = await unpack(rest.slice(2));
-    const overrides = shared.overrides.map((o): [string, Value] => {
-      const cut = o.indexOf("=");
-      return [o.slice(0, cut), valueOf(o.slice(cut + 1))];
-    });
-    return { toml: shared.toml, overrides, shared, name: "shared", id: null };
-  }
-  const file = /^file\/(\d+)$/.exec(rest);
-  if (file) {
-    const own = opened[Number(file[1]) - 1];
-    if (!own) throw new Error("This file was opened in another visit; open it again.");
-    return { toml: own.toml, overrides: [], shared: null, name: own.name.replace(/\.\w+$/, ""), id: null };
-  }
-  const known = sceneOf(rest);
-  if (!known) throw new Error(`There is no scene "${rest}".`);
-  return { toml: await known.text(), overrides: [], shared: null, name: known.name, id: known.id };
-}
-
-/** What stands right of an "=": TOML, or a bare word. */
-function valueOf(text: string): Value {
-  try {
-    return parse(`x = ${text}`).x as Value;
-  } catch {
-    return text.trim();
-  }
-}
-
 export const page: Page = async (main, rest) => {
   main.className = "lab-page";
-  let start: Awaited<ReturnType<typeof source>>;
+  let start: Source;
   try {
     start = await source(rest);
   } catch (error) {
@@ -73,7 +43,8 @@ export const page: Page = async (main, rest) => {
   const { element: legendElement, update: tellLegend } = legendBox(() => stage);
   const wait = h("div", { class: "wait" }, "Loading the engine …");
   const stageBox = h("div", { class: "stage", tabindex: 0, role: "group", "aria-label": "Picture of the scene. Space plays, comma and point go by frames, semicolon by sub-steps, arrows turn the view, plus and minus zoom, 0 brings the view back." }, canvas, legendElement, wait);
-  const title = h("h1", {}, titleOf(start.toml) || start.name);
+  const sceneId = h("p", { class: "scene-id" }, start.id ?? start.name);
+  const title = h("h1", {}, titleOf(start.text) || start.name);
   const alert = h("div", { class: "alert", role: "alert", hidden: true });
   const lookBar = h("div", { class: "look", role: "group", "aria-label": "What is shown" });
   const energyCurves = (): Curve[] => [
@@ -133,7 +104,7 @@ export const page: Page = async (main, rest) => {
         h(
           "div",
           { class: "lab-head" },
-          h("div", {}, title, start.id ? h("p", { class: "scene-id" }, start.id) : h("p", { class: "scene-id" }, start.shared ? "from a link" : start.name)),
+          h("div", {}, title, sceneId),
           h("div", { class: "actions" }, shareButton, ...saved.buttons, iconButton("frame", "View of the scene's camera", () => stage.goHome())),
         ),
         alert,
@@ -153,6 +124,9 @@ export const page: Page = async (main, rest) => {
 
   // The picture follows the world.
   let hashWait = 0;
+  /** What a shared scene is, as long as nobody has changed it. */
+  let recipe = "";
+  const origin = rest.startsWith("s/") ? "link" : "file";
   const tellHash = () => {
     clearTimeout(hashWait);
     hashWait = window.setTimeout(async () => {
@@ -162,8 +136,9 @@ export const page: Page = async (main, rest) => {
       if (hash && at === session.latest && !session.playing) {
         hashBox.textContent = hash;
         hashBox.dataset.frame = String(at);
-        if (start.shared?.hash && start.shared.frame === at && session.toml === start.shared.toml) {
-          hashBox.append(h("span", { class: start.shared.hash === hash ? "good" : "bad" }, start.shared.hash === hash ? " as in the link" : ` the link says ${start.shared.hash}`));
+        if (start.shared?.hash && start.shared.frame === at && session.recipe === recipe) {
+          const same = start.shared.hash === hash;
+          hashBox.append(h("span", { class: same ? "good" : "bad" }, same ? ` as in the ${origin}` : ` the ${origin} says ${start.shared.hash}`));
         }
       }
     }, 120);
@@ -301,7 +276,7 @@ export const page: Page = async (main, rest) => {
     (making ??= (async () => {
       const { Editor: Made } = await import("../editor");
       editor = new Made(editorBox, () => void apply());
-      editor.text = session.toml || start.toml;
+      editor.text = session.toml || start.text;
       syncText();
     })());
   const apply = async () => {
@@ -437,21 +412,22 @@ export const page: Page = async (main, rest) => {
 
   // What leaves the page.
   const share = async () => {
-    const at = session.latest;
-    const hash = await session.hash();
-    const link = await pack({ version: engine().version, toml: session.toml, overrides: [...session.overrides].map(([p, v]) => `${p}=${literal(v)}`), frame: at, hash });
-    if (link.length > LONGEST) {
-      saveAs(new Blob([session.toml], { type: "application/toml" }), `${start.name}.toml`);
-      return say("Too large for a link: the scene was saved as a file instead.");
+    const { version } = engine();
+    const made = await toShare(session, version).catch((error) => ({ failed: String(error.message ?? error) }));
+    if ("failed" in made) return say(made.failed);
+    const pulled = session.history.some((c) => !c.path) ? " What the pointer did is not in it: it begins at the first frame." : "";
+    if ("file" in made) {
+      saveAs(made.file, `${start.name}.tumble`);
+      return say(`${made.reason}: it was saved as a file, which opens when it is dropped on this page.${pulled}`);
     }
-    const address = `${location.href.split("#")[0]}#/s/${link}`;
+    const address = addressOf(version, made.link);
     main.dataset.link = address;
     try {
       await navigator.clipboard.writeText(address);
-      say("The link is copied. It holds the scene, its seed and the version.");
+      say(`The link is copied. It holds the scene with all of its values, its seed and the version.${pulled}`);
     } catch {
       history.replaceState(null, "", address);
-      say("The address of this page now holds the scene.");
+      say(`The address of this page now holds the scene.${pulled}`);
     }
   };
   const theme = () => {
@@ -476,10 +452,16 @@ export const page: Page = async (main, rest) => {
       if (session.info) panel.open(session.info, session.toml, session.overrides);
     })
     .catch((error) => valuesTab.append(h("p", {}, String(error.message ?? error))));
-  void session
-    .load(start.toml, start.overrides)
-    .then(async () => {
-      if (start.shared?.frame) await session.goto(start.shared.frame, (i) => (wait.textContent = `frame ${i} of ${start.shared!.frame}`));
+  void begin(session, start, (i) => (wait.textContent = `frame ${i} of ${start.shared!.frame}`))
+    .then((told) => {
+      recipe = session.recipe;
+      if (start.shared) {
+        const { version } = start.shared;
+        const here = engine().version;
+        sceneId.textContent = [`from a ${origin} of tumble ${version}`, version === here ? "" : `opened with ${here}: bits may differ`, told].filter(Boolean).join("; ");
+      }
+      // Where somebody shared a moment, one stands at it, with its hash.
+      if (start.shared?.hash) tellHash();
       else if (!matchMedia("(prefers-reduced-motion: reduce)").matches) session.play();
       main.dataset.ready = "true";
     })
@@ -493,7 +475,6 @@ export const page: Page = async (main, rest) => {
       } else throw error;
     });
 
-  if (start.shared && start.shared.version && engine().version && start.shared.version !== engine().version) say(`This link was made by version ${start.shared.version}; this is ${engine().version}: bits may differ.`);
   // For tests and for the curious.
   Object.assign(window, { tumble: { session, stage, comparison, engine: engine() } });
 

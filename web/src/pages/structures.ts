@@ -7,7 +7,7 @@ import { FAMILIES, familiesOf, RESISTS, type Family } from "../links";
 import { curveColor, Plot } from "../plot";
 import { pointers } from "../pointer";
 import { dropped, engine, Session } from "../session";
-import { pack } from "../share";
+import { addressed } from "../source";
 import { cards } from "../theory";
 import { keys, transport } from "../transport";
 import { LOOK, Stage } from "../view/stage";
@@ -156,7 +156,7 @@ export const page: Page = async (main) => {
 
   const asScene = async () => {
     const toml = scene(c).replace(/^frames = .*$/m, "frames = 600");
-    location.hash = `#/s/${await pack({ version: engine().version, toml, overrides: [], frame: 0, hash: "" })}`;
+    location.hash = await addressed(toml);
   };
   const theory = h("section", { class: "beside", "aria-label": "Theory" });
   main.append(
