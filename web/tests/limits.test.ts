@@ -5,6 +5,7 @@ import { resolve } from "node:path";
 import { test } from "node:test";
 import { Kept } from "../src/engine/kept";
 import type { Failure, SceneInfo } from "../src/engine/protocol";
+import { asked, readable } from "../src/engine/worth";
 
 const PKG = resolve(import.meta.dirname, "../src/engine/pkg");
 const engine = await import(`${PKG}/single.js`);
@@ -177,4 +178,21 @@ test("memory stays flat over frames, worlds and values", () => {
   const before = memory.buffer.byteLength;
   for (let i = 0; i < 5; i++) round();
   assert.equal(memory.buffer.byteLength, before);
+});
+
+test("a failure of a hostile scene is short enough to be shown", () => {
+  const found = readable(failure(() => made(`${BALL}${'[[force]]\nkind = "dra"\n'.repeat(5000)}`)));
+  assert.equal(found.issues.length, 100);
+  assert.match(found.message, /^line 6: force\[0\]\.kind[^]*… and 4900 more$/);
+  assert.ok(found.message.length < 7000);
+  const long = readable(failure(() => made(`${BALL}${"k".repeat(1e6)} = 1\n`)));
+  assert.ok(long.message.length < 7000 && long.issues[0].message.length < 1000 && long.issues[0].path.length < 1000);
+  const short = failure(() => made("version = 1\nx = = 2\n"));
+  assert.deepEqual(readable(short), { ...short, path: short.path });
+});
+
+test("of the files that were brought only those count that a scene names", () => {
+  const [mesh, other] = [new Uint8Array([1]), new Uint8Array([2])];
+  assert.deepEqual(asked(["meshes/a.obj", "b.obj", "__proto__"], { "a.obj": mesh, "c.obj": other }), new Map([["meshes/a.obj", mesh]]));
+  assert.deepEqual(asked(["x/a.obj"], { "a.obj": other, "x/a.obj": mesh }), new Map([["x/a.obj", mesh]]));
 });

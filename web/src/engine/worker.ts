@@ -1,7 +1,8 @@
 /** The engine's side: worlds in WebAssembly, asked by messages, one at a time. It computes only when asked. */
 
-import type { Answer, Columns, Failure, Frame, Ledger, Notice, Request, SceneInfo, StepReport } from "./protocol";
+import type { Answer, Columns, Failure, Files, Frame, Ledger, Notice, Request, SceneInfo, StepReport } from "./protocol";
 import { Kept } from "./kept";
+import { asked, readable } from "./worth";
 
 type Module = typeof import("./pkg/single");
 type World = InstanceType<Module["World"]>;
@@ -95,11 +96,23 @@ function branch(at: Running): void {
   keep(at);
 }
 
+/** A world with those of the files that its scene names: others, broken ones too, do not matter to it. */
+function build(module: Module, toml: string, overrides: string[], files: Files): World {
+  try {
+    return new module.World(toml, overrides, new Map());
+  } catch (thrown) {
+    const missing = typeof thrown === "string" ? ((JSON.parse(thrown) as Failure).missing ?? []) : [];
+    const found = asked(missing, files);
+    if (!found.size) throw thrown;
+    return new module.World(toml, overrides, found);
+  }
+}
+
 async function load(request: Request & { type: "load" }): Promise<SceneInfo> {
   const single = await engine("single");
   const overrides = request.overrides ?? [];
   const module = single.precision(request.toml, overrides) === "double" ? await engine("double") : single;
-  const world = new module.World(request.toml, overrides, new Map(Object.entries(request.files ?? {})));
+  const world = build(module, request.toml, overrides, request.files ?? {});
   const number = request.world ?? 0;
   const at: Running = { world, info: info(world), kept: new Kept(KEEP) };
   keep(at);
@@ -208,7 +221,7 @@ async function answer(request: Request): Promise<Answer> {
 
 /** What the engine threw: its own failures are JSON; anything else has killed it. */
 function failure(thrown: unknown): Failure {
-  if (typeof thrown === "string") return JSON.parse(thrown) as Failure;
+  if (typeof thrown === "string") return readable(JSON.parse(thrown) as Failure);
   if (thrown instanceof Asked) return { kind: "scene", message: thrown.message, issues: [] };
   const panic = (globalThis as { tumblePanic?: string }).tumblePanic;
   const message = panic ?? (thrown instanceof Error ? thrown.message : String(thrown));
