@@ -163,6 +163,15 @@ test("kept frames stay within their memory", () => {
   assert.deepEqual(kept.frames(), [0]);
 });
 
+test("of small states no more are kept than can be listed with every frame", () => {
+  const kept = new Kept(2 ** 30);
+  for (let i = 0; i <= 300_000; i++) kept.add(i, () => new Uint8Array([i % 251]));
+  const frames = kept.frames();
+  assert.ok(frames.length > 4000 && frames.length <= 8192, String(frames.length));
+  assert.equal(kept.at(299_999)[0], frames.at(-1)! % 251);
+  assert.equal(kept.at(63)[0], frames.filter((f) => f <= 63).at(-1)! % 251);
+});
+
 test("memory stays flat over frames, worlds and values", () => {
   const round = () => {
     const world = made(SHEET);
