@@ -72,6 +72,21 @@ def test_the_meshes_of_the_scene_are_served_and_nothing_else(site: str) -> None:
         assert get(f"{site}/{path}")[0] == 404, path
 
 
+def test_other_names_and_odd_paths_are_refused(site: str, capfd: pytest.CaptureFixture[str]) -> None:
+    def asked(host: str) -> int:
+        request = urllib.request.Request(f"{site}/view/..%2Fmy%20mesh%20(1).ply", headers={"Host": host})
+        try:
+            with urllib.request.urlopen(request, timeout=10) as answer:
+                return int(answer.status)
+        except urllib.error.HTTPError as error:
+            return error.code
+
+    port = site.rsplit(":", 1)[1]
+    assert [asked(f"{name}:{port}") for name in ("127.0.0.1", "localhost", "elsewhere.example")] == [200, 200, 421]
+    assert get(f"{site}/a%00b")[0] == get(f"{site}/index.html%00.js")[0] == 404
+    assert "Traceback" not in capfd.readouterr().err
+
+
 def test_a_scene_that_ships_is_opened_by_name(built: Path) -> None:
     fragment, meshes = view.address("sheet-on-bunny", None)
     assert fragment == "scene/drape/sheet-on-bunny"

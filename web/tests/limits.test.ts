@@ -6,6 +6,7 @@ import { test } from "node:test";
 import { Kept } from "../src/engine/kept";
 import type { Failure, SceneInfo } from "../src/engine/protocol";
 import { Way } from "../src/way";
+import { asked, readable } from "../src/engine/worth";
 
 const PKG = resolve(import.meta.dirname, "../src/engine/pkg");
 const engine = await import(`${PKG}/single.js`);
@@ -188,6 +189,15 @@ test("frames stay within their memory, those of both ways", () => {
   assert.deepEqual(large.kept, [0, 3]);
 });
 
+test("of small states no more are kept than can be listed with every frame", () => {
+  const kept = new Kept(2 ** 30);
+  for (let i = 0; i <= 300_000; i++) kept.add(i, () => new Uint8Array([i % 251]));
+  const frames = kept.frames();
+  assert.ok(frames.length > 4000 && frames.length <= 8192, String(frames.length));
+  assert.equal(kept.at(299_999)[0], frames.at(-1)! % 251);
+  assert.equal(kept.at(63)[0], frames.filter((f) => f <= 63).at(-1)! % 251);
+});
+
 test("memory stays flat over frames, worlds and values", () => {
   const round = () => {
     const world = made(SHEET);
@@ -203,4 +213,21 @@ test("memory stays flat over frames, worlds and values", () => {
   const before = memory.buffer.byteLength;
   for (let i = 0; i < 5; i++) round();
   assert.equal(memory.buffer.byteLength, before);
+});
+
+test("a failure of a hostile scene is short enough to be shown", () => {
+  const found = readable(failure(() => made(`${BALL}${'[[force]]\nkind = "dra"\n'.repeat(5000)}`)));
+  assert.equal(found.issues.length, 100);
+  assert.match(found.message, /^line 6: force\[0\]\.kind[^]*… and 4900 more$/);
+  assert.ok(found.message.length < 7000);
+  const long = readable(failure(() => made(`${BALL}${"k".repeat(1e6)} = 1\n`)));
+  assert.ok(long.message.length < 7000 && long.issues[0].message.length < 1000 && long.issues[0].path.length < 1000);
+  const short = failure(() => made("version = 1\nx = = 2\n"));
+  assert.deepEqual(readable(short), { ...short, path: short.path });
+});
+
+test("of the files that were brought only those count that a scene names", () => {
+  const [mesh, other] = [new Uint8Array([1]), new Uint8Array([2])];
+  assert.deepEqual(asked(["meshes/a.obj", "b.obj", "__proto__"], { "a.obj": mesh, "c.obj": other }), new Map([["meshes/a.obj", mesh]]));
+  assert.deepEqual(asked(["x/a.obj"], { "a.obj": other, "x/a.obj": mesh }), new Map([["x/a.obj", mesh]]));
 });

@@ -122,6 +122,14 @@ def server(port: int, meshes: Mapping[str, Path]) -> ThreadingHTTPServer:
             self.extensions_map = {**mimetypes.types_map, **_TYPES, "": "application/octet-stream"}
             super().__init__(*arguments, directory=str(BUILT), **options)
 
+        def send_head(self) -> Any:
+            # A page elsewhere whose name is made to lead here must not read the scene's files.
+            if self.headers.get("Host", "127.0.0.1").rsplit(":", 1)[0] not in ("127.0.0.1", "localhost"):
+                return self.send_error(421)
+            if "\0" in unquote(self.path):
+                return self.send_error(404)
+            return super().send_head()
+
         def translate_path(self, path: str) -> str:
             own = urlsplit(path).path
             if own.startswith("/view/"):

@@ -4,7 +4,11 @@ export class Kept {
   private bytes = 0;
   private stride = 1;
 
-  constructor(private readonly most: number) {}
+  /** Small states are many before they are large: their number has a bound of its own. */
+  constructor(
+    private readonly most: number,
+    private readonly count = 8192,
+  ) {}
 
   /** Keeps a frame if it is one of those that are kept now. */
   add(frame: number, save: () => Uint8Array): void {
@@ -18,7 +22,7 @@ export class Kept {
   }
 
   private thin(): void {
-    while (this.bytes > this.most && this.states.size > 2) {
+    while ((this.bytes > this.most || this.states.size > this.count) && this.states.size > 2) {
       this.stride *= 2;
       for (const kept of [...this.states.keys()]) if (kept % this.stride !== 0) this.forget(kept);
     }
@@ -38,7 +42,8 @@ export class Kept {
 
   /** The state of the kept frame at or before this one. */
   at(frame: number): Uint8Array {
-    const found = Math.max(0, ...this.frames().filter((kept) => kept <= frame));
+    let found = 0;
+    for (const kept of this.states.keys()) if (kept <= frame && kept > found) found = kept;
     const state = this.states.get(found);
     if (!state) throw new Error("the first frame was not kept");
     return state;

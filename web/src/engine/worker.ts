@@ -2,6 +2,7 @@
 
 import type { Answer, Columns, Failure, Files, Frame, Ledger, Notice, Request, SceneInfo, StepReport } from "./protocol";
 import { Kept } from "./kept";
+import { asked, readable } from "./worth";
 
 type Module = typeof import("./pkg/single");
 type World = InstanceType<Module["World"]>;
@@ -106,10 +107,18 @@ function branch(at: Running): void {
   keep(at);
 }
 
+/** A world with those of the files that its scene names: others, broken ones too, do not matter to it. */
 async function build(toml: string, overrides: string[], files: Files): Promise<World> {
   const single = await engine("single");
   const module = single.precision(toml, overrides) === "double" ? await engine("double") : single;
-  return new module.World(toml, overrides, new Map(Object.entries(files)));
+  try {
+    return new module.World(toml, overrides, new Map());
+  } catch (thrown) {
+    const missing = typeof thrown === "string" ? ((JSON.parse(thrown) as Failure).missing ?? []) : [];
+    const found = asked(missing, files);
+    if (!found.size) throw thrown;
+    return new module.World(toml, overrides, found);
+  }
 }
 
 function park(at: Running): Parked {
@@ -256,7 +265,7 @@ async function answer(request: Request): Promise<Answer> {
 
 /** What the engine threw: its own failures are JSON; anything else has killed it. */
 function failure(thrown: unknown): Failure {
-  if (typeof thrown === "string") return JSON.parse(thrown) as Failure;
+  if (typeof thrown === "string") return readable(JSON.parse(thrown) as Failure);
   if (thrown instanceof Asked) return { kind: "scene", message: thrown.message, issues: [] };
   const panic = (globalThis as { tumblePanic?: string }).tumblePanic;
   const message = panic ?? (thrown instanceof Error ? thrown.message : String(thrown));
