@@ -231,7 +231,7 @@ fn bits_are_those_of_any_number_of_threads_and_of_a_restored_run() {
 fn a_step_too_long_ends_with_an_explanation() {
     let words = "box = { size = [1, 1, 1], resolution = 16 }\ninitial_density = \"1.2 + 0.01*exp(-50*(x^2 + y^2))\"";
     let mut sim = scene(0.1, "substeps = 6", 2, words);
-    let stability = sim.stability().remove(0);
+    let stability = sim.stability(&|| true).remove(0);
     let limit = stability.limits[0].stable;
     assert!((limit / (1.0 / 16.0 / (C * 2.0_f64.sqrt())) - 1.0).abs() < 1e-9 && stability.step > limit, "{stability:?}");
     let error = (0..100).find_map(|_| sim.step(&|| true).err()).unwrap().to_string();

@@ -25,7 +25,7 @@ fn a_held_mass_follows_its_spring_and_is_free_when_let_go() {
     );
     let mut hand = Hand::default();
     let (w, d): (f64, f64) = (3.0, 0.4);
-    let (system, held) = Held::new(&mut sim, "p", 1, [d, 1.0, 0.0], Some(2.0 * w * w)).unwrap();
+    let (system, held) = Held::new(&mut sim, "p", 1, [d, 1.0, 0.0], Some(2.0 * w * w), &|| true).unwrap();
     assert!(hand.take(&system, held));
     sim.add_force(&system, hand.force(&system)).unwrap();
     for frame in 1..=60 {
@@ -48,7 +48,7 @@ fn what_cannot_be_held_or_stirred_says_so() {
         "[[particles]]\nname = \"p\"\nposition = [[0, 0, 0]]\n[[emitter]]\nname = \"e\"\nrate = 10\nlifetime = 1\nfrom.sphere.radius = 0.1\n",
     );
     for (object, row) in [("p", 1), ("e", 0), ("none", 0)] {
-        let error = Held::new(&mut sim, object, row, [0.0; 3], None).err().unwrap();
+        let error = Held::new(&mut sim, object, row, [0.0; 3], None, &|| true).err().unwrap();
         assert!(error.to_string().contains(object), "{error}");
     }
     let error = stir(&mut sim, "p", [0.0; 3], [1.0, 0.0, 0.0], 0.1, 0.0).err().unwrap();

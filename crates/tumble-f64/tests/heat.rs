@@ -187,7 +187,7 @@ fn a_step_beyond_the_limit_is_refused_and_automatic_ones_are_within() {
     let wrong = Simulation::new(Scene::from_toml(&text("substeps = 5")).unwrap(), Default::default()).err().unwrap().to_string();
     assert!(wrong.contains("system \"s\".substeps") && wrong.contains("grows beyond 0.00167 s"), "{wrong}");
     let mut sim = Simulation::new(Scene::from_toml(&text("")).unwrap(), Default::default()).unwrap();
-    let stability = sim.stability().remove(0);
+    let stability = sim.stability(&|| true).remove(0);
     let limit = stability.limit(stability.integrator).unwrap().stable;
     assert!((limit / (0.01 / 6.0) - 1.0).abs() < 1e-3, "{limit}");
     assert!(stability.step <= 0.7 * limit && stability.step > 0.5 * limit, "{} {limit}", stability.step);

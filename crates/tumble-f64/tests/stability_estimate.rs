@@ -66,7 +66,7 @@ fn usable(scheme: Integrator, h: f64, frequency: f64, damping: f64, shape: &[Vec
 
 #[test]
 fn the_predicted_step_is_the_measured_one() {
-    let frequency = sheet(Integrator::Rk4, 1e-4, 0.0).stability()[0].frequency;
+    let frequency = sheet(Integrator::Rk4, 1e-4, 0.0).stability(&|| true)[0].frequency;
     let shape = stiffest_shape(frequency);
     // b = 2e-5 s k: forward Euler is then stable up to h = b/k, because c = 2e-5 s w² for every mode. (integrators.31)
     for (scheme, damping) in [
@@ -80,7 +80,7 @@ fn the_predicted_step_is_the_measured_one() {
         (Integrator::SymplecticEuler, 2e-4),
         (Integrator::Verlet, 2e-5),
     ] {
-        let predicted = sheet(scheme, 1e-4, damping).stability()[0].limit(scheme).unwrap().usable;
+        let predicted = sheet(scheme, 1e-4, damping).stability(&|| true)[0].limit(scheme).unwrap().usable;
         let (mut low, mut high) = (0.7 * predicted, 1.4 * predicted);
         let fine = |h: f64| usable(scheme, h, frequency, damping, &shape);
         assert!(fine(low) && !fine(high), "{}: the limit is not near {predicted:e}", scheme.name());
@@ -113,7 +113,7 @@ fn of_modes_of_one_frequency_the_least_damped_limits() {
     let head = "time.fps = 100\nworld.gravity = [0, 0, 0]\n[[system]]\nintegrator = \"forward_euler\"\nsubsteps = 1\n";
     let of = |damping: &[f64]| {
         let text = head.to_string() + &(0..).zip(damping).map(|(i, d)| pair(i, *d)).collect::<String>();
-        let limit = simulation(&text).stability()[0].limit(Integrator::ForwardEuler).unwrap();
+        let limit = simulation(&text).stability(&|| true)[0].limit(Integrator::ForwardEuler).unwrap();
         (limit.stable, limit.usable)
     };
     // Damped alone: stable below c/w² = 4/100 s. Together: as the undamped one alone, w h = 0.0110 (integrators.35).
@@ -122,4 +122,12 @@ fn of_modes_of_one_frequency_the_least_damped_limits() {
     assert!((damped.0 - 0.04).abs() < 1e-6);
     assert!(undamped.0 == 0.0 && (undamped.1 - 0.0110 / 10.0).abs() < 1e-5);
     assert!((mixed.1 / undamped.1 - 1.0).abs() < 0.02 && mixed.0 < 0.02 * damped.0);
+}
+
+#[test]
+fn an_estimate_ends_when_it_is_told_to() {
+    let scene = "[[system]]\nname = \"explicit\"\n[[rope]]\nname = \"rope\"\nfrom = [0, 0, 0]\nto = [1, 0, 0]\nsegments = 40\n";
+    let mut sim = simulation(scene);
+    assert_eq!(sim.stability(&|| true).len(), 1);
+    assert!(sim.stability(&|| false).is_empty());
 }

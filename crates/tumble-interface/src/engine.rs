@@ -238,8 +238,8 @@ pub trait Engine: Send {
     /// Goes to a saved state of the same scene.
     fn restore(&mut self, bytes: &[u8]) -> Result<(), SceneError>;
 
-    /// The largest stable steps, from the stiffest mode of each system as it is now.
-    fn stability(&mut self) -> Vec<Stability>;
+    /// The largest stable steps, from the stiffest mode of each system as it is now; none of those for which `go_on` says no.
+    fn stability(&mut self, go_on: &(dyn Fn() -> bool + Sync)) -> Vec<Stability>;
 
     /// After a failed step: changes of step or integrator, each tried from the last good frame.
     fn cures(&mut self, go_on: &(dyn Fn() -> bool + Sync)) -> Vec<Cure>;

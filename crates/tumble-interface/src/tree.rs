@@ -86,6 +86,9 @@ impl Node {
     /// Sets the value at a dotted path: `time.fps`, `system.0.step`, `sheet.flag.size` (by index or by name).
     pub fn set(&mut self, path: &str, value: Node) -> Result<(), SceneError> {
         let error = |message: String| SceneError::one(path, message);
+        if path.split('.').count() > DEPTH {
+            return Err(SceneError::one("", "nested too deeply to be a scene"));
+        }
         let mut node = self;
         let mut keys = path.split('.').peekable();
         while let Some(key) = keys.next() {

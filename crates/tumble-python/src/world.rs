@@ -276,7 +276,7 @@ impl World {
     /// damping_max [1/s], culprit (object, index), limits (integrator, stable [s], usable [s]).
     fn stability<'py>(&mut self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
         let (engine, pool) = (&mut self.engine, self.pool.as_ref());
-        let all = work(py, pool, |_| engine.stability())?;
+        let all = work(py, pool, |go_on| engine.stability(go_on))?;
         Ok(pythonize::pythonize(py, &all)?)
     }
 

@@ -179,9 +179,10 @@ impl World {
         Ok(fits)
     }
 
-    /// The stability estimates, as JSON.
-    pub fn stability(&mut self) -> String {
-        json(&self.loaded.world.stability())
+    /// The stability estimates, as JSON, of those systems for which they are made within `limit` [ms].
+    pub fn stability(&mut self, limit: f64) -> String {
+        let end = now() + limit;
+        json(&self.loaded.world.stability(&|| now() < end))
     }
 
     /// After a failed step: changes that were tried from the last good frame, as JSON. Ends after `limit` [ms].
@@ -196,7 +197,9 @@ impl World {
         if self.hand.drag(object, row, target) {
             return Ok(());
         }
-        let (system, held) = Held::new(&mut self.loaded.world, object, row, target, stiffness).map_err(|e| self.loaded.wrong(e))?;
+        let end = now() + GRAB_LIMIT;
+        let (system, held) =
+            Held::new(&mut self.loaded.world, object, row, target, stiffness, &|| now() < end).map_err(|e| self.loaded.wrong(e))?;
         if self.hand.take(&system, held) {
             self.loaded.world.add_force(&system, self.hand.force(&system)).map_err(|e| self.loaded.wrong(e))?;
         }
@@ -219,6 +222,9 @@ impl World {
         self.loaded.world.write(object, column, &values).map_err(|e| self.loaded.wrong(e))
     }
 }
+
+/// Milliseconds for the estimate of how stiff a hand may be.
+const GRAB_LIMIT: f64 = 1000.0;
 
 /// A ledger with its sum.
 #[derive(Serialize)]

@@ -18,6 +18,11 @@ const MOST_FILES: usize = 64 << 20;
 /// Largest estimate of the memory of a scene [GiB]: a module can have four, and memory once taken is not given back.
 const MOST_MEMORY: f64 = 1.5;
 
+/// Most colliders: each is drawn by itself.
+const MOST_COLLIDERS: usize = 2000;
+/// Most mistakes that are told of.
+const MOST_ISSUES: usize = 1000;
+
 /// A scene, as it was given and as it moves.
 pub struct Loaded {
     pub world: Simulation,
@@ -72,6 +77,12 @@ impl Loaded {
     fn build(node: Node, files: Files) -> Result<Self, Failure> {
         let lines = |error: SceneError| -> Failure { with_lines(error, &node).into() };
         let mut scene = Scene::from_tree(&node).map_err(lines)?;
+        let colliders = scene.collider.len();
+        if colliders > MOST_COLLIDERS {
+            return Err(Failure::limit(format!(
+                "the scene has {colliders} colliders, the limit in a browser is {MOST_COLLIDERS}; make one mesh of them, or run it with `tumble run`"
+            )));
+        }
         let assets = assets(&mut scene, &files).map_err(|(error, missing)| lines(error).missing(missing))?;
         let bytes = memory(&scene, &assets);
         let gibibytes = bytes / 1024.0_f64.powi(3);
@@ -160,6 +171,8 @@ fn with_lines(mut error: SceneError, node: &Node) -> SceneError {
         issue.line = issue.line.or_else(|| node.line_of(&issue.path));
     }
     error.issues.sort_by_key(|issue| issue.line);
+    // Nobody reads more, and texts of hostile scenes have millions.
+    error.issues.truncate(MOST_ISSUES);
     error
 }
 

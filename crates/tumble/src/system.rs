@@ -39,8 +39,8 @@ pub trait System: Send + Sync {
     /// While watched, a system looks for a breakdown after every sub-step and returns the first as an error.
     fn watch(&mut self, on: bool);
 
-    /// Largest stable steps from its stiffest modes now; `None` if it has none to tell.
-    fn stability(&mut self, dt: f64) -> Option<Stability>;
+    /// Largest stable steps from its stiffest modes now; `None` if it has none to tell, or if `go_on` says no.
+    fn stability(&mut self, dt: f64, go_on: &(dyn Fn() -> bool + Sync)) -> Option<Stability>;
 
     /// Writes everything that the next step depends on.
     fn save(&self, archive: &mut Archive);

@@ -58,13 +58,13 @@ impl World {
             }
             Err(error) => {
                 self.roll_back();
-                return Err(self.explain(error));
+                return Err(self.explain(error, go_on));
             }
         };
         let time = (self.frame + 1) as f64 * f64::from(self.exchanges) * self.dt;
         if let Some(error) = self.systems.iter_mut().find_map(|s| s.breakdown(time)) {
             let error = self.first_breakdown().unwrap_or(error);
-            return Err(self.explain(error));
+            return Err(self.explain(error, go_on));
         }
         self.frame += 1;
         self.keep();
@@ -131,15 +131,15 @@ impl World {
             _ => None,
         };
         self.roll_back();
-        result.map(|_| seen).map_err(|error| self.explain(error))
+        result.map(|_| seen).map_err(|error| self.explain(error, go_on))
     }
 
     /// Adds the step in use and the stable one, at the last good frame.
-    fn explain(&mut self, mut error: StepError) -> StepError {
+    fn explain(&mut self, mut error: StepError, go_on: &(dyn Fn() -> bool + Sync)) -> StepError {
         if let StepError::NotFinite(b) | StepError::Exploded(b) = &mut error {
             let dt = self.dt;
             let system = self.systems.iter_mut().find(|s| s.name() == b.system);
-            if let Some(stability) = system.and_then(|s| s.stability(dt)) {
+            if let Some(stability) = system.and_then(|s| s.stability(dt, go_on)) {
                 b.step = stability.step;
                 b.stable_step = stability.limit(stability.integrator).map_or(f64::INFINITY, |l| l.stable);
             }
@@ -271,10 +271,10 @@ impl World {
         total
     }
 
-    /// The pre-flight estimate of every system that has one.
-    pub fn stability(&mut self) -> Vec<Stability> {
+    /// The pre-flight estimate of every system that has one; none of those for which `go_on` says no.
+    pub fn stability(&mut self, go_on: &(dyn Fn() -> bool + Sync)) -> Vec<Stability> {
         let dt = self.dt;
-        self.systems.iter_mut().filter_map(|s| s.stability(dt)).collect()
+        self.systems.iter_mut().filter_map(|s| s.stability(dt, go_on)).collect()
     }
 
     /// The system of that name.

@@ -187,7 +187,7 @@ export type Request = Asked &
     | { type: "write"; object: string; column: string; values: Float64Array }
     /** -> hash */
     | { type: "hash" }
-    /** -> stability; takes about as long as some steps */
+    /** -> stability, of those systems for which it is found in some seconds; takes about as long as some steps */
     | { type: "stability" }
     /** After a failed step. -> cures; takes long */
     | { type: "cures" }

@@ -9,6 +9,8 @@ type World = InstanceType<Module["World"]>;
 
 /** Milliseconds that a frame may take before the worker gives up on it. */
 const FRAME_LIMIT = 30_000;
+/** Milliseconds that the estimates of stability may take. */
+const STABILITY_LIMIT = 4_000;
 /** Milliseconds that the search for cures may take. */
 const CURE_LIMIT = 20_000;
 /** Bytes of snapshots of one world. */
@@ -241,7 +243,7 @@ async function answer(request: Request): Promise<Answer> {
     case "hash":
       return { id, type: "hash", hash: running(number).world.hash() };
     case "stability":
-      return { id, type: "stability", stability: JSON.parse(running(number).world.stability()) };
+      return { id, type: "stability", stability: JSON.parse(running(number).world.stability(STABILITY_LIMIT)) };
     case "cures":
       return { id, type: "cures", cures: JSON.parse(running(number).world.cures(CURE_LIMIT)) };
     case "schema":

@@ -54,6 +54,8 @@ pub struct Course {
     pub velocity: VectorSignal,
     /// Way of the source [m].
     pub path: VectorSignal,
+    /// When the scene ends [s].
+    pub end: f64,
 }
 
 /// A source of particles.
@@ -129,7 +131,8 @@ impl Emitter {
     /// About how many will live at once.
     pub fn expected(&self) -> usize {
         let rate = if self.course.rate.is_constant() { self.course.rate.value(0.0) } else { 0.0 };
-        let life = self.words.lifetime.unwrap_or(0.0) * (1.0 + self.words.lifetime_spread);
+        // Who lives for longer than the scene is not followed by as many as lifetime and rate say.
+        let life = (self.words.lifetime.unwrap_or(0.0) * (1.0 + self.words.lifetime_spread)).min(self.course.end);
         let bursts: f64 = self.words.burst.iter().map(|b| f64::from(b.count)).sum();
         (1.05 * rate * life + bursts).min(4e9) as usize
     }

@@ -295,6 +295,7 @@ fn fill(scene: &Scene, plans: &[Plan], assets: &Assets, issues: &mut Vec<Issue>)
                 rate: reader.signal(&at_path("rate"), &thing.rate, 0.0),
                 velocity: reader.in_plane(&at_path("velocity"), &thing.velocity),
                 path: reader.in_plane(&at_path("path"), &thing.path),
+                end: scene.frame_time() * f64::from(scene.time.frames),
             };
             let tracers = place(plans, "emitter", thing.system.as_deref()).is_some_and(|i| plans[i].method == Method::Tracers);
             recipes::emitter(site, thing, course, (scene.seed, flat, tracers), &mesh);

@@ -24,13 +24,15 @@ pub struct Held {
 
 impl Held {
     /// A mass (row of its object) and those around it, on a spring to `target` [m]; `stiffness` [N/m] is that of all together, chosen
-    /// where left out. The name of their system comes with them.
+    /// where left out: as stiff as the steps of the scene bear, as far as that is known before `go_on` says no. The name of their system
+    /// comes with them.
     pub fn new(
         simulation: &mut Simulation,
         object: &str,
         row: usize,
         target: [f64; 3],
         stiffness: Option<f64>,
+        go_on: &(dyn Fn() -> bool + Sync),
     ) -> Result<(String, Self), SceneError> {
         let wrong = |message: &str| SceneError::one(object, message);
         let objects = simulation.objects();
@@ -64,7 +66,7 @@ impl Held {
         let near: Vec<usize> = (0..mass.len()).filter(|i| distance(at(*i), center) <= radius && !pinned.contains(&(*i as u32))).collect();
         let total: f64 = mass.iter().sum();
         let share: f64 = near.iter().map(|i| mass[*i]).sum();
-        let estimate = simulation.stability().into_iter().find(|s| s.system == system);
+        let estimate = simulation.stability(go_on).into_iter().find(|s| s.system == system);
         let h = estimate.map_or(f64::INFINITY, |s| s.step).min(simulation.scene().frame_time());
         let masses = near.into_iter().map(|i| {
             let p = at(i);

@@ -150,8 +150,8 @@ impl Engine for Simulation {
         self.world.restore(bytes)
     }
 
-    fn stability(&mut self) -> Vec<Stability> {
-        self.world.stability()
+    fn stability(&mut self, go_on: &(dyn Fn() -> bool + Sync)) -> Vec<Stability> {
+        self.world.stability(go_on)
     }
 
     fn cures(&mut self, go_on: &(dyn Fn() -> bool + Sync)) -> Vec<Cure> {
@@ -159,7 +159,7 @@ impl Engine for Simulation {
         let plan = &plans(&self.scene)[system];
         // The estimate is that of the start, where the trials begin.
         let Ok(mut start) = Self::new(self.scene.clone(), self.assets.clone()) else { return Vec::new() };
-        let stability = start.stability().into_iter().find(|s| s.system == plan.name);
+        let stability = start.stability(go_on).into_iter().find(|s| s.system == plan.name);
         let usable: Vec<(Integrator, f64)> = stability.iter().flat_map(|s| s.limits.iter().map(|l| (l.integrator, l.usable))).collect();
         let step = if step > 0.0 { step } else { stability.map_or(self.scene.frame_time(), |s| s.step) };
         cures::cures(&self.scene, &self.assets, self.world.frame_index() + 1, system, step, &usable, go_on)

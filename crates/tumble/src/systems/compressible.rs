@@ -489,7 +489,7 @@ impl System for Compressible {
         self.watched = on;
     }
 
-    fn stability(&mut self, dt: f64) -> Option<Stability> {
+    fn stability(&mut self, dt: f64, _go_on: &(dyn Fn() -> bool + Sync)) -> Option<Stability> {
         let stiffest = self.gases.iter().min_by(|a, b| a.limit().total_cmp(&b.limit()))?;
         let (grid, stable) = (stiffest.grid(), stiffest.limit());
         let d = grid.axes().filter(|a| grid.n[*a] > 1).count() as f64;

@@ -291,7 +291,7 @@ impl System for Tracers {
 
     fn watch(&mut self, _on: bool) {}
 
-    fn stability(&mut self, _dt: f64) -> Option<Stability> {
+    fn stability(&mut self, _dt: f64, _go_on: &(dyn Fn() -> bool + Sync)) -> Option<Stability> {
         None
     }
 

@@ -234,7 +234,7 @@ impl System for Swarm {
 
     fn watch(&mut self, _on: bool) {}
 
-    fn stability(&mut self, _dt: f64) -> Option<Stability> {
+    fn stability(&mut self, _dt: f64, _go_on: &(dyn Fn() -> bool + Sync)) -> Option<Stability> {
         None
     }
 

@@ -343,9 +343,9 @@ impl Dynamics {
     }
 
     /// The pre-flight estimate.
-    pub(super) fn estimate(&mut self, dt: f64) -> tumble_interface::engine::Stability {
+    pub(super) fn estimate(&mut self, dt: f64, go_on: &(dyn Fn() -> bool + Sync)) -> Option<tumble_interface::engine::Stability> {
         use tumble_interface::scene::Integrator;
-        let modes = self.modes();
+        let modes = self.modes(go_on)?;
         let list = modes.list();
         let fixed = Integrator::ALL.into_iter().filter(|i| !i.is_adaptive());
         let limits = fixed
@@ -355,7 +355,7 @@ impl Dynamics {
             })
             .collect();
         let substeps = self.substeps(dt);
-        tumble_interface::engine::Stability {
+        Some(tumble_interface::engine::Stability {
             system: self.name.clone(),
             integrator: self.integrator,
             step: dt / substeps,
@@ -364,7 +364,7 @@ impl Dynamics {
             damping_max: modes.most_damped.damping,
             culprit: modes.culprit.map(|i| self.whose(i)),
             limits,
-        }
+        })
     }
 }
 

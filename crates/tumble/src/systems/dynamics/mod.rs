@@ -134,8 +134,7 @@ impl Dynamics {
 
     /// Largest usable step of the integrator in use [s].
     fn limit(&mut self) -> f64 {
-        let modes = self.modes();
-        integrators::stability::limits(self.integrator, &modes.list()).1
+        self.modes(&|| true).map_or(f64::INFINITY, |modes| integrators::stability::limits(self.integrator, &modes.list()).1)
     }
 
     /// Springs to other systems: half of the interaction that this system owns. Each is an impulse h f, so what one side
@@ -520,8 +519,8 @@ impl System for Dynamics {
         self.watched = on;
     }
 
-    fn stability(&mut self, dt: f64) -> Option<Stability> {
-        Some(self.estimate(dt))
+    fn stability(&mut self, dt: f64, go_on: &(dyn Fn() -> bool + Sync)) -> Option<Stability> {
+        self.estimate(dt, go_on)
     }
 
     fn save(&self, archive: &mut Archive) {

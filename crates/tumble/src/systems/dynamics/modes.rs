@@ -33,9 +33,9 @@ impl Modes {
 
 impl Dynamics {
     /// The modes of the system as it is now.
-    pub(super) fn modes(&mut self) -> Modes {
-        let (k, shape) = self.largest(1.0, 0.0);
-        let (d, damped_shape) = self.largest(0.0, 1.0);
+    pub(super) fn modes(&mut self, go_on: &(dyn Fn() -> bool + Sync)) -> Option<Modes> {
+        let (k, shape) = self.largest(1.0, 0.0, go_on)?;
+        let (d, damped_shape) = self.largest(0.0, 1.0, go_on)?;
         let rate_in = |system: &mut Self, shape: &[Row], (stiffness, damping)| system.rayleigh(shape, stiffness, damping).max(0.0);
         let frequency = k.max(0.0).sqrt();
         let damping = if d > 0.0 && frequency > 0.0 { rate_in(self, &shape, (0.0, 1.0)) } else { d.max(0.0) };
@@ -48,11 +48,11 @@ impl Dynamics {
         let mut least_damped = stiffest;
         if d > 0.0 && frequency > 0.0 {
             // The largest of w² - s c: among modes of like frequency the one that is damped least.
-            let (_, shape) = self.largest(1.0, -0.5 * frequency * frequency / d);
+            let (_, shape) = self.largest(1.0, -0.5 * frequency * frequency / d, go_on)?;
             let (w_sq, c) = (rate_in(self, &shape, (1.0, 0.0)), rate_in(self, &shape, (0.0, 1.0)));
             least_damped = Mode { frequency: w_sq.sqrt(), damping: c };
         }
-        Modes { stiffest, most_damped: Mode { frequency: other, damping: d.max(0.0) }, least_damped, culprit: culprit.flatten() }
+        Some(Modes { stiffest, most_damped: Mode { frequency: other, damping: d.max(0.0) }, least_damped, culprit: culprit.flatten() })
     }
 
     /// y = M^-1/2 (stiffness K + damping D) M^-1/2 u.
@@ -102,7 +102,7 @@ impl Dynamics {
 
     /// The largest eigenvalue and its vector. The recurrence is run twice, so that no basis is kept: once for the
     /// tridiagonal matrix, once to add up the vector.
-    fn largest(&mut self, stiffness: f64, damping: f64) -> (f64, Vec<Row>) {
+    fn largest(&mut self, stiffness: f64, damping: f64, go_on: &(dyn Fn() -> bool + Sync)) -> Option<(f64, Vec<Row>)> {
         self.prepare((stiffness, damping));
         let n = self.state.x.len();
         let start = || -> Vec<Row> {
@@ -121,7 +121,7 @@ impl Dynamics {
         let first = start();
         let (mut alpha, mut beta) = (Vec::new(), Vec::new());
         let weights = (stiffness, damping);
-        self.recurrence(&first, weights, &mut alpha, &mut beta, |_, _| {});
+        self.recurrence(&first, weights, &mut alpha, &mut beta, |_, _| go_on())?;
         let (value, weights_of) = tridiagonal_largest(&alpha, &beta);
         let mut vector = vec![ZERO; n];
         let (mut again, mut beta_again) = (Vec::new(), Vec::new());
@@ -129,8 +129,9 @@ impl Dynamics {
             if let Some(c) = weights_of.get(k) {
                 vector.iter_mut().zip(q).for_each(|(v, q)| *v = crate::math::axpy(*v, *c as Real, *q));
             }
-        });
-        (value, vector)
+            go_on()
+        })?;
+        Some((value, vector))
     }
 
     fn recurrence(
@@ -139,12 +140,14 @@ impl Dynamics {
         weights: (f64, f64),
         alpha: &mut Vec<f64>,
         beta: &mut Vec<f64>,
-        mut each: impl FnMut(usize, &[Row]),
-    ) {
+        mut each: impl FnMut(usize, &[Row]) -> bool,
+    ) -> Option<()> {
         let mut q = first.to_vec();
         let mut before = vec![ZERO; q.len()];
         for k in 0..STEPS {
-            each(k, &q);
+            if !each(k, &q) {
+                return None;
+            }
             let mut w = self.apply(&q, weights);
             let a = inner(&w, &q);
             let b = beta.last().copied().unwrap_or(0.0);
@@ -155,12 +158,13 @@ impl Dynamics {
             let norm = inner(&w, &w).sqrt();
             let size = alpha.iter().fold(0.0_f64, |m, a| m.max(a.abs()));
             if norm <= 1e-5 * size || !norm.is_finite() {
-                return;
+                break;
             }
             beta.push(norm);
             w.iter_mut().for_each(|w| *w = scale(*w, (1.0 / norm) as Real));
             before = std::mem::replace(&mut q, w);
         }
+        Some(())
     }
 }
 

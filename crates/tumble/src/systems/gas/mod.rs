@@ -162,7 +162,7 @@ impl System for Gas {
     }
 
     /// Every step is stable.
-    fn stability(&mut self, _dt: f64) -> Option<Stability> {
+    fn stability(&mut self, _dt: f64, _go_on: &(dyn Fn() -> bool + Sync)) -> Option<Stability> {
         None
     }
 

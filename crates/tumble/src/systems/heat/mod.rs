@@ -187,7 +187,7 @@ impl System for Heat {
         self.watched = on;
     }
 
-    fn stability(&mut self, dt: f64) -> Option<Stability> {
+    fn stability(&mut self, dt: f64, _go_on: &(dyn Fn() -> bool + Sync)) -> Option<Stability> {
         let worst = self.bodies.iter().max_by(|a, b| a.fastest().total_cmp(&b.fastest()))?;
         let first = self.bodies.iter().find(|b| b.plan.scheme == HeatScheme::Explicit).unwrap_or(worst);
         let mode = Mode { frequency: 0.0, damping: worst.fastest() };
