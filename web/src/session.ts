@@ -185,7 +185,7 @@ export class Session {
   }
 
   play(): void {
-    if (this.playing || !this.info) return;
+    if (this.playing || this.closed || !this.info) return;
     if (this.atEnd) this.scrub(0);
     this.playing = true;
     this.clock = performance.now();

@@ -67,6 +67,9 @@ export const page: Page = async (main, rest) => {
     return () => {};
   }
 
+  // Left before its text came.
+  if (!main.isConnected) return () => {};
+
   const session = new Session();
   session.each = session.compares = true;
   const canvas = h("canvas", { "aria-hidden": "true" });

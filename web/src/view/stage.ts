@@ -82,7 +82,9 @@ export class Stage {
   legend: Legend | null = null;
   /** Called after each picture. */
   drawn: () => void = () => {};
-  /** Draws without the means of large screens, for small pictures side by side. */
+  /** Whether pointers may turn the camera. */
+  private readonly turns: boolean;
+
   constructor(readonly canvas: HTMLCanvasElement, { controls = true, shadows = true } = {}) {
     this.renderer = new THREE.WebGLRenderer({ canvas, antialias: true, alpha: true, preserveDrawingBuffer: false, powerPreference: "high-performance" });
     this.renderer.shadowMap.enabled = shadows;
@@ -94,8 +96,8 @@ export class Stage {
     this.light.shadow.bias = -0.0005;
     this.light.shadow.normalBias = 0.02;
     this.scene.add(this.light, this.light.target, this.sky, this.handle.object);
+    this.turns = controls;
     this.controls = this.controlled();
-    this.controls.enabled = controls;
     this.observer = new ResizeObserver(() => this.resize());
     this.observer.observe(canvas.parentElement ?? canvas);
   }
@@ -103,8 +105,8 @@ export class Stage {
   private controlled(): OrbitControls {
     const controls = new OrbitControls(this.camera, this.canvas);
     controls.enableDamping = false;
+    controls.enabled = this.turns;
     controls.addEventListener("change", () => this.touch());
-    // The page scrolls by one finger where there is nothing to turn.
     return controls;
   }
 
@@ -117,6 +119,7 @@ export class Stage {
     this.renderer.dispose();
     this.renderer.forceContextLoss();
     this.info = this.frame = null;
+    this.dirty = false;
   }
 
   private clear(): void {
@@ -148,8 +151,8 @@ export class Stage {
     return this.info?.dimension === 2;
   }
 
-  /** Whether a gas lies in a plane, which a pointer can stir. */
-  get gas(): { name: string; grid: Grid } | null {
+  /** The first gas. */
+  private get gas(): { name: string; grid: Grid } | null {
     const object = this.info?.objects.find((o) => o.kind === "gas");
     const thing = this.things.find((t) => t.name === object?.name && t.grid);
     return thing?.grid ? { name: thing.name, grid: thing.grid } : null;
@@ -163,7 +166,7 @@ export class Stage {
     const gas = this.gas;
     if (!gas || this.flat) return gas && { name: gas.name };
     const { slice, sliceAt } = this.look;
-    if (slice === null || this.controls.enabled) return null;
+    if (slice === null || this.turns) return null;
     const { origin, spacing, cells } = gas.grid;
     const [x, y, z] = [0, 1, 2].map((a) => origin[a] + (a === slice ? sliceAt : 0.5) * cells[a] * spacing);
     return { name: gas.name, through: new THREE.Vector3(x, y, z) };
@@ -341,12 +344,10 @@ export class Stage {
     const [w, hgt] = this.size();
     const wasFlat = (this.camera as THREE.OrthographicCamera).isOrthographicCamera;
     if (keep && !!wasFlat === flat) return;
-    if (!!wasFlat !== flat || !this.controls) {
-      const enabled = this.controls.enabled;
+    if (!!wasFlat !== flat) {
       this.controls.dispose();
       this.camera = flat ? new THREE.OrthographicCamera() : new THREE.PerspectiveCamera(35, 1, 0.01, 1000);
       this.controls = this.controlled();
-      this.controls.enabled = enabled;
       this.controls.enableRotate = !flat;
     }
     if (flat) {
@@ -646,13 +647,14 @@ export class Stage {
     return ray.ray.intersectPlane(plane, new THREE.Vector3());
   }
 
-  /** Width of what is seen [m], and whether the camera turns by the pointer. */
+  /** Width of what is seen [m]. */
   get width(): number {
     return this.home.width / this.camera.zoom;
   }
 
+  /** Whether the pointer turns the camera now; never where it may not at all. */
   set turning(on: boolean) {
-    this.controls.enabled = on;
+    this.controls.enabled = on && this.turns;
   }
 
   /** Draws the spring between a mass and the pointer; nothing without an end. */
