@@ -101,22 +101,18 @@ export class Session {
   load(toml: string, overrides: [string, Value][] = []): Promise<SceneInfo> {
     return this.queue(async () => {
       const words = overrides.map(([path, value]) => `${path}=${literal(value)}`);
-      const files: Files = { ...dropped };
-      let info: SceneInfo;
-      for (let tries = 0; ; tries++) {
-        try {
-          info = await this.engine.load(toml, { overrides: words, files, world: this.world });
-          break;
-        } catch (error) {
-          const missing = error instanceof EngineError ? (error.failure.missing ?? []).filter((path) => !(path in files)) : [];
-          if (!missing.length || tries > 3) throw error;
-          for (const path of missing) {
-            const bytes = await asset(path);
-            if (!bytes) throw error;
-            files[path] = bytes;
-          }
+      const files: Files = {};
+      const build = () => this.engine.load(toml, { overrides: words, files, world: this.world });
+      const info = await build().catch(async (error) => {
+        const missing = error instanceof EngineError ? (error.failure.missing ?? []) : [];
+        if (!missing.length) throw error;
+        for (const path of missing) {
+          const bytes = dropped[path] ?? (await asset(path));
+          if (!bytes) throw error;
+          files[path] = bytes;
         }
-      }
+        return build();
+      });
       this.age++;
       this.toml = toml;
       this.overrides = new Map(overrides);
@@ -291,12 +287,11 @@ export class Session {
   }
 
   /** To a frame, stepping as far as needed. Throws `EngineError`. */
-  async goto(index: number, progress: (index: number) => void = () => {}): Promise<void> {
+  async goto(index: number): Promise<void> {
     this.pause();
     try {
       while (this.way.last < index && !this.closed) {
         await this.forward(Math.min(index - this.way.last, 8), false);
-        progress(this.way.last);
       }
     } catch (error) {
       this.fail(error);
@@ -506,8 +501,8 @@ export class Session {
     if (before) await this.queue(() => this.engine.unpark(before.id, this.world));
   }
 
-  grab(object: string, row: number, target: Vector, stiffness?: number): Promise<void> {
-    return this.queue(() => this.engine.grab(object, row, target, stiffness, this.world));
+  grab(object: string, row: number, target: Vector): Promise<void> {
+    return this.queue(() => this.engine.grab(object, row, target, this.world));
   }
 
   release(): Promise<void> {

@@ -25,18 +25,6 @@ interface Waiting {
   fail: (error: EngineError) => void;
 }
 
-/** Meshes of a scene that `tumble view` serves beside the page; nothing where the page comes from elsewhere, or one of them is not there. */
-async function beside(paths: string[]): Promise<Files | null> {
-  if (!paths.length || !new URLSearchParams(location.search).has("view")) return null;
-  const files: Files = {};
-  for (const path of paths) {
-    const answer = await fetch(`view/${encodeURIComponent(path)}`).catch(() => null);
-    if (!answer?.ok) return null;
-    files[path] = new Uint8Array(await answer.arrayBuffer());
-  }
-  return files;
-}
-
 /** What a world was made from, to make it again. */
 interface Made {
   toml: string;
@@ -45,7 +33,7 @@ interface Made {
   sets: { path: string; value: Value }[];
 }
 
-export interface FrameOptions {
+interface FrameOptions {
   columns?: string[];
   hash?: boolean;
 }
@@ -75,18 +63,10 @@ export class Engine {
   /** Checks and builds a scene. The old world goes on where this fails. */
   async load(toml: string, options: { overrides?: string[]; files?: Files; world?: number } = {}): Promise<SceneInfo> {
     const { overrides = [], files = {}, world = 0 } = options;
-    let answer: Answer;
-    try {
-      answer = await this.ask({ type: "load", toml, overrides, files, world });
-    } catch (error) {
-      const missing = error instanceof EngineError ? (error.failure.missing ?? []) : [];
-      const found = await beside(missing.filter((path) => !(path in files)));
-      if (!found) throw error;
-      return this.load(toml, { overrides, files: { ...files, ...found }, world });
-    }
+    const { info } = (await this.ask({ type: "load", toml, overrides, files, world })) as Answer & { type: "loaded" };
     this.forget(world);
     this.made.set(world, { toml, overrides, files, sets: [] });
-    return (answer as Answer & { type: "loaded" }).info;
+    return info;
   }
 
   /** Simulates frames, as many as fit into `budget` [ms]; answers with the last. */
@@ -124,8 +104,8 @@ export class Engine {
   }
 
   /** Pulls a mass to a point, or the one that is held to another point. */
-  async grab(object: string, row: number, target: Vector, stiffness?: number, world = 0): Promise<void> {
-    await this.ask({ type: "grab", object, row, target, stiffness, world });
+  async grab(object: string, row: number, target: Vector, world = 0): Promise<void> {
+    await this.ask({ type: "grab", object, row, target, world });
   }
 
   async release(world = 0): Promise<void> {
@@ -135,11 +115,6 @@ export class Engine {
   /** Pushes a gas around a point. */
   async stir(gas: string, position: Vector, velocity: Vector, radius: number, density?: number, world = 0): Promise<void> {
     await this.ask({ type: "stir", gas, position, velocity, radius, density, world });
-  }
-
-  /** Sets a column of an object. */
-  async write(object: string, column: string, values: Float64Array, world = 0): Promise<void> {
-    await this.ask({ type: "write", object, column, values, world });
   }
 
   async hash(world = 0): Promise<string> {

@@ -100,12 +100,6 @@ function keep({ world, kept }: Running): void {
   kept.add(world.index(), () => world.save());
 }
 
-/** What was kept after this moment is no future of it any more; the moment itself is kept as it is now. */
-function branch(at: Running): void {
-  at.kept.cut(at.world.index());
-  keep(at);
-}
-
 async function build(toml: string, overrides: string[], files: Files): Promise<World> {
   const single = await engine("single");
   const module = single.precision(toml, overrides) === "double" ? await engine("double") : single;
@@ -200,16 +194,15 @@ async function answer(request: Request): Promise<Answer> {
       const at = running(number);
       const live = at.world.set(request.path, JSON.stringify(request.value));
       at.info = info(at.world);
-      if (live) branch(at);
-      else {
-        at.kept = new Kept(KEEP);
-        keep(at);
-      }
+      // What was kept after this moment is no future of it any more; the moment itself is kept as it is now.
+      if (live) at.kept.cut(at.world.index());
+      else at.kept = new Kept(KEEP);
+      keep(at);
       return { id, type: "changed", info: at.info, live };
     }
     case "grab": {
       const at = running(number);
-      at.world.grab(request.object, request.row, Float64Array.from(request.target), request.stiffness);
+      at.world.grab(request.object, request.row, Float64Array.from(request.target));
       at.kept.cut(at.world.index());
       return { id, type: "done" };
     }
@@ -221,12 +214,6 @@ async function answer(request: Request): Promise<Answer> {
       const { gas, position, velocity, radius, density = 0 } = request;
       at.world.stir(gas, Float64Array.from(position), Float64Array.from(velocity), radius, density);
       at.kept.cut(at.world.index());
-      return { id, type: "done" };
-    }
-    case "write": {
-      const at = running(number);
-      at.world.write(request.object, request.column, request.values);
-      branch(at);
       return { id, type: "done" };
     }
     case "hash":

@@ -213,10 +213,8 @@ export const page: Page = async (main, rest) => {
   });
   session.on("before", () => drawEnergy());
   session.on("playing", (on) => {
-    if (on) {
-      // Only a new frame has no trouble with what has gone wrong before.
-      if (!alert.dataset.keep) alert.hidden = true;
-    } else tellHash();
+    if (on) alert.hidden = true;
+    else tellHash();
   });
   session.on("failed", (failure) => complain(failure));
 
@@ -471,7 +469,7 @@ export const page: Page = async (main, rest) => {
   };
   engine().onrestart = restarted;
 
-  const schema = engine()
+  void engine()
     .schema()
     .then((found) => {
       panel = new Panel(found, { set: change });
@@ -482,7 +480,7 @@ export const page: Page = async (main, rest) => {
   void session
     .load(start.toml, start.overrides)
     .then(async () => {
-      if (start.shared?.frame) await session.goto(start.shared.frame, (i) => (wait.textContent = `frame ${i} of ${start.shared!.frame}`));
+      if (start.shared?.frame) await session.goto(start.shared.frame);
       else if (!matchMedia("(prefers-reduced-motion: reduce)").matches) session.play();
       main.dataset.ready = "true";
     })
@@ -510,7 +508,6 @@ export const page: Page = async (main, rest) => {
     editor?.close();
     session.close();
     stage.dispose();
-    void schema;
   };
 };
 

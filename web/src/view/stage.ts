@@ -3,7 +3,7 @@ import * as THREE from "three";
 import { OrbitControls } from "three/examples/jsm/controls/OrbitControls.js";
 import type { Column, Frame, Numbers, SceneInfo, Vector } from "../engine/protocol";
 import { FAMILIES, familiesOf, isOn, linked, type Family } from "../links";
-import { mapOf, PALETTE, SIGNED } from "./colors";
+import { PALETTE, SIGNED } from "./colors";
 import { Depths } from "./depths";
 import { gridOf, PIXELS, PlaneField, Pieces, Points, Range, scalars, SpaceField, Surface, type Grid, type Layer, type Rgb } from "./layers";
 import { arrows, carry, countOf, endsOf, leapOf, outline, planeOf, sharp, shownOf } from "./scenery";
@@ -523,7 +523,7 @@ export class Stage {
     if (sizes) values = values.map((v) => Math.abs(v));
     const key = sizes ? `size of ${name}` : name;
     let range = thing.ranges.get(key);
-    if (!range) thing.ranges.set(key, (range = new Range(sizes ? "" : name)));
+    if (!range) thing.ranges.set(key, (range = new Range(signed && !sizes)));
     range.look(values);
     const [low, high] = range.pair;
     this.legend = { name, unit: column.unit, low, high };
@@ -536,7 +536,7 @@ export class Stage {
       let hot: { values: Numbers; low: number; high: number } | undefined;
       if (warm) {
         let heat = thing.ranges.get("heat");
-        if (!heat) thing.ranges.set("heat", (heat = new Range("temperature")));
+        if (!heat) thing.ranges.set("heat", (heat = new Range(false)));
         heat.look(warm.data);
         if (heat.high > GLOWING) hot = { values: warm.data, low: 0, high: Math.max(heat.high, 1) };
       }
@@ -548,7 +548,7 @@ export class Stage {
     thing.arrows.object.visible = this.look.arrows && !!columns.velocity;
     if (!thing.arrows.object.visible) return;
     let fastest = thing.ranges.get("arrows");
-    if (!fastest) thing.ranges.set("arrows", (fastest = new Range("speed")));
+    if (!fastest) thing.ranges.set("arrows", (fastest = new Range(false)));
     fastest.look(scalars(columns.velocity));
     arrows(thing.arrows, grid, columns.velocity, fastest.high, this.dark || !(this.look.dye && this.look.field === "density") ? 0.95 : 0.1);
   }
@@ -719,7 +719,4 @@ export class Stage {
     return document.documentElement.dataset.theme === "dark" ? ["#1b2027", "#14181d"] : ["#f6f8fa", "#e3e8ee"];
   }
 }
-
-/** Which map the legend shows. */
-export const legendMap = (name: string) => (name === "strain" ? ("strain" as const) : name === "speed" ? ("viridis" as const) : mapOf(name));
 
