@@ -1,10 +1,10 @@
 /** One system under two to six integrators, side by side: energy, phase, error, and the step that each can take. */
+import { asScene } from "../demo";
 import { check, choice, h, iconButton, setIcon, show, type Page } from "../dom";
 import { EngineError } from "../engine/client";
 import type { Frame, Ledger, SceneInfo, Stability } from "../engine/protocol";
 import { curveColor, isDark, Plot, type Curve } from "../plot";
 import { engine } from "../session";
-import { pack } from "../share";
 import { cards, SCHEMES } from "../theory";
 
 interface System {
@@ -252,11 +252,7 @@ export const page: Page = async (main) => {
     }));
   };
 
-  const asScene = async (scheme: string) => {
-    const s = SYSTEMS[system];
-    const toml = s.toml(scheme, step).replace(/^frames = .*$/m, `frames = ${Math.max(1, Math.ceil(s.end / step))}`);
-    location.hash = `#/s/${await pack({ version: engine().version, toml, overrides: [], frame: 0, hash: "" })}`;
-  };
+  const openScene = (scheme: string) => asScene(SYSTEMS[system].toml(scheme, step), Math.max(1, Math.ceil(SYSTEMS[system].end / step)));
 
   const limitOf = (scheme: string) => limits.find((l) => l.integrator === scheme);
   const drawMarks = () => {
@@ -313,7 +309,7 @@ export const page: Page = async (main) => {
       const ratio = h("output", { class: "big", "data-ratio": scheme }, "1");
       const verdict = h("p", { class: "verdict" });
       const predicted = h("p", { class: "muted predicted" });
-      const card = h("article", { class: "run", "data-scheme": scheme, style: `--curve:${curveColor(k)}` }, h("div", { class: "run-head" }, h("h2", {}, plain(scheme)), h("button", { type: "button", class: "as-scene", "aria-label": `Open ${plain(scheme)} as a scene`, title: "Open as a scene, with its text and values", onclick: () => void asScene(scheme) }, "↗")), canvas, h("div", { class: "run-figure" }, h("span", { class: "muted" }, s.field ? "r / r₀" : "E / E₀"), ratio), predicted, verdict);
+      const card = h("article", { class: "run", "data-scheme": scheme, style: `--curve:${curveColor(k)}` }, h("div", { class: "run-head" }, h("h2", {}, plain(scheme)), h("button", { type: "button", class: "as-scene", "aria-label": `Open ${plain(scheme)} as a scene`, title: "Open as a scene, with its text and values", onclick: () => void openScene(scheme) }, "↗")), canvas, h("div", { class: "run-figure" }, h("span", { class: "muted" }, s.field ? "r / r₀" : "E / E₀"), ratio), predicted, verdict);
       return { world: 10 + k, scheme, info: null, frame: null, n: 0, quantity: [], error: [], path: [], first: 0, dead: "", steps: 0, shortest: Infinity, canvas, ratio, verdict, predicted, card };
     });
     board.replaceChildren(...runs.map((r) => r.card));

@@ -82,21 +82,22 @@ export class Stage {
   legend: Legend | null = null;
   /** Called after each picture. */
   drawn: () => void = () => {};
-  /** Whether pointers may turn the camera. */
-  private readonly turns: boolean;
 
-  constructor(readonly canvas: HTMLCanvasElement, { controls = true, shadows = true } = {}) {
+  constructor(
+    readonly canvas: HTMLCanvasElement,
+    /** Whether pointers may turn the camera; where they do not, there is nothing to throw a shadow. */
+    private readonly turns = true,
+  ) {
     this.renderer = new THREE.WebGLRenderer({ canvas, antialias: true, alpha: true, preserveDrawingBuffer: false, powerPreference: "high-performance" });
-    this.renderer.shadowMap.enabled = shadows;
+    this.renderer.shadowMap.enabled = turns;
     this.renderer.shadowMap.type = THREE.PCFShadowMap;
     this.renderer.toneMapping = THREE.NoToneMapping;
-    this.light.castShadow = shadows;
+    this.light.castShadow = turns;
     this.light.shadow.mapSize.set(1024, 1024);
     this.light.shadow.radius = 4;
     this.light.shadow.bias = -0.0005;
     this.light.shadow.normalBias = 0.02;
     this.scene.add(this.light, this.light.target, this.sky, this.handle.object);
-    this.turns = controls;
     this.controls = this.controlled();
     this.observer = new ResizeObserver(() => this.resize());
     this.observer.observe(canvas.parentElement ?? canvas);
