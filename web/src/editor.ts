@@ -34,7 +34,6 @@ export class Editor {
   constructor(
     parent: HTMLElement,
     run: () => void,
-    private readonly changed: () => void = () => {},
   ) {
     this.view = new EditorView({
       parent,
@@ -51,7 +50,6 @@ export class Editor {
           EditorView.lineWrapping,
           look,
           EditorView.contentAttributes.of({ "aria-label": "Text of the scene, TOML", tabindex: "0" }),
-          EditorView.updateListener.of((u) => u.docChanged && this.changed()),
           // Tab leaves the editor, as everywhere on the page.
           keymap.of([{ key: "Mod-Enter", run: () => (run(), true) }, ...defaultKeymap, ...historyKeymap]),
         ],

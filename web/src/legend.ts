@@ -1,7 +1,7 @@
 /** What the colours of a picture mean. */
 import { h, show } from "./dom";
-import { gradient } from "./view/colors";
-import { legendMap, type Stage } from "./view/stage";
+import { gradient, mapOf } from "./view/colors";
+import type { Stage } from "./view/stage";
 
 export function legendBox(stage: () => Stage): { element: HTMLElement; update: () => void } {
   const element = h("div", { class: "legend", hidden: true });
@@ -11,7 +11,7 @@ export function legendBox(stage: () => Stage): { element: HTMLElement; update: (
     if (!l) return;
     element.replaceChildren(
       h("span", { class: "legend-name" }, l.unit && l.unit !== "1" ? `${l.name}, ${l.unit}` : l.name),
-      h("i", { style: `background:${gradient(legendMap(l.name))}` }),
+      h("i", { style: `background:${gradient(mapOf(l.name))}` }),
       h("span", { class: "legend-ends" }, h("span", {}, show(l.low, 3)), l.low === -l.high ? h("span", {}, "0") : null, h("span", {}, show(l.high, 3))),
     );
   };

@@ -1,7 +1,8 @@
 import "./style.css";
 import { h, iconButton, say, type Leave, type Page } from "./dom";
 
-const main = document.getElementById("main")!;
+/** Each visit has its own, so that a page that is left before it has come appears nowhere. */
+let main = document.getElementById("main")!;
 const nav = document.getElementById("nav")!;
 
 /** Address after "#/" -> page; each is fetched when it is first opened. */
@@ -57,11 +58,11 @@ async function go(): Promise<void> {
   } catch {
     // A damaged address: as it stands.
   }
-  if (location.hash === "#main") return main.focus();
   leave();
   leave = () => {};
-  main.replaceChildren();
-  main.className = "";
+  const fresh = h("main", { id: "main", tabindex: -1 });
+  main.replaceWith(fresh);
+  main = fresh;
   // The engine comes while the page does.
   if (/^(scene|s|fluid|integrators|structures)\b/.test(address)) void import("./session").then(({ engine }) => engine().schema()).catch(() => {});
   for (const [pattern, , open] of PAGES) {
@@ -77,7 +78,7 @@ async function go(): Promise<void> {
       const { page } = await open();
       if (own !== visit) return;
       scrollTo(0, 0);
-      end = await page(main, match[1] ?? "");
+      end = await page(fresh, match[1] ?? "");
     } catch (error) {
       if (own !== visit) return;
       const webgl = document.createElement("canvas").getContext("webgl2");
@@ -93,6 +94,12 @@ async function go(): Promise<void> {
   document.title = "tumble";
   main.append(h("div", { class: "narrow" }, h("h1", {}, "There is no such page"), h("p", {}, h("a", { href: "#/" }, "To the gallery"))));
 }
+
+// The address is that of the page: it must not become "#main".
+document.querySelector(".skip")!.addEventListener("click", (event) => {
+  event.preventDefault();
+  main.focus();
+});
 
 // Scenes and meshes may be dropped on any page.
 addEventListener("dragover", (event) => event.preventDefault());

@@ -13,23 +13,19 @@ export interface Curve {
 }
 
 /** Colours of curves on light and on dark, each with enough contrast. */
-export const CURVES = ["#2a6f97", "#c8553d", "#2d7d46", "#8a6d00", "#7b4fa3", "#0e7c86"];
-export const CURVES_DARK = ["#6db6e3", "#f08a73", "#6cc98a", "#d9bc4a", "#bd98e0", "#5cc8d2"];
+const CURVES = ["#2a6f97", "#c8553d", "#2d7d46", "#8a6d00", "#7b4fa3", "#0e7c86"];
+const CURVES_DARK = ["#6db6e3", "#f08a73", "#6cc98a", "#d9bc4a", "#bd98e0", "#5cc8d2"];
 
 const css = (name: string) => getComputedStyle(document.documentElement).getPropertyValue(name).trim();
 export const isDark = () => document.documentElement.dataset.theme === "dark";
 export const curveColor = (k: number) => (isDark() ? CURVES_DARK : CURVES)[k % CURVES.length];
 
-export interface PlotOptions {
+interface PlotOptions {
   /** Read to those who do not see it. */
   label: string;
   x?: string;
   log?: boolean;
-  logX?: boolean;
-  /** Curves in the plane: x and y of the same point, both scaled alike. */
-  phase?: boolean;
   height?: number;
-  legend?: boolean;
   /** A line across at this x. */
   mark?: () => number | null;
 }
@@ -79,7 +75,7 @@ export class Plot {
     const width = this.element.clientWidth;
     if (!width) return;
     this.plot?.destroy();
-    const { x, log, logX, mark, legend } = this.options;
+    const { x, log, mark } = this.options;
     const axis = (side: number): uPlot.Axis => ({
       stroke: css("--muted"),
       grid: { stroke: css("--line"), width: 1 },
@@ -87,9 +83,9 @@ export class Plot {
       font: "11px system-ui, sans-serif",
       size: side === 3 ? 58 : 26,
       gap: 4,
-      values: (_u, values) => values.map((v) => (v === null ? "" : (side === 3 ? log : logX) ? power(v) : show(v, 3))),
+      values: (_u, values) => values.map((v) => (v === null ? "" : side === 3 && log ? power(v) : show(v, 3))),
       side,
-      splits: (side === 3 ? log : logX) ? (_u, _k, low, high) => decades(low, high) : undefined,
+      splits: side === 3 && log ? (_u, _k, low, high) => decades(low, high) : undefined,
       space: side === 3 ? 24 : 60,
     });
     this.plot = new uPlot(
@@ -97,10 +93,10 @@ export class Plot {
         width,
         height: this.height,
         cursor: { y: false, drag: { x: false, y: false }, points: { show: false } },
-        legend: { show: legend ?? false },
+        legend: { show: false },
         padding: [8, 8, 0, 0],
         scales: {
-          x: { time: false, distr: logX ? 3 : 1 },
+          x: { time: false },
           y: { distr: log ? 3 : 1, range: log ? (_u, low, high) => (low > 0 && high > 0 ? [low / 1.2, Math.max(high * 1.2, low * 10)] : [0.1, 10]) : undefined },
         },
         axes: [axis(2), axis(3)],
@@ -148,10 +144,6 @@ export class Plot {
       if (this.plot) this.plot.setData(this.data);
       else this.build();
     });
-  }
-
-  redraw(): void {
-    this.plot?.redraw(false);
   }
 
   close(): void {

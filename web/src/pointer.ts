@@ -11,19 +11,17 @@ interface Held {
   busy: boolean;
 }
 
-export interface Stirring {
+interface Stirring {
   /** Density of dye that comes with the stirring [kg/m³]. */
   dye?: () => number;
   /** Radius over the width of the picture. */
   size?: () => number;
-  /** Told at each stir. */
-  stirred?: (at: Vector3) => void;
 }
 
 /** A pass over a point is some events long; each gives a part of the pointer's velocity. */
 const SHARE = 0.22;
 
-export function pointers(canvas: HTMLCanvasElement, stage: Stage, session: Session, { dye, size, stirred }: Stirring = {}): () => void {
+export function pointers(canvas: HTMLCanvasElement, stage: Stage, session: Session, { dye, size }: Stirring = {}): () => void {
   const held = new Map<number, Held>();
   const down = (event: PointerEvent) => {
     if (event.button !== 0 || !session.info) return;
@@ -58,7 +56,6 @@ export function pointers(canvas: HTMLCanvasElement, stage: Stage, session: Sessi
     own.last = at;
     own.time = performance.now();
     own.busy = true;
-    stirred?.(at);
     void session.stir(gas.name, at.toArray() as Vector, push.toArray() as Vector, stage.width * (size?.() ?? 1 / 30), dye?.()).catch(() => {}).finally(() => (own.busy = false));
   };
   const up = (event: PointerEvent) => {

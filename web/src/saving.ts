@@ -4,10 +4,13 @@ import { npz } from "./npz";
 import type { Session } from "./session";
 import type { Stage } from "./view/stage";
 
+/** A button that saves the picture; `name` without a suffix. */
+export const pictureButton = (stage: Stage, name: () => string): HTMLButtonElement =>
+  iconButton("camera", "Save the picture (PNG)", () => void stage.picture().then((picture) => saveAs(picture, `${name()}.png`)));
+
 /** Buttons, and what ends them. Files are called after `name`. */
 export function saving(session: Session, stage: Stage, name: string): { buttons: HTMLElement[]; close: () => void } {
   const file = () => `${name}-${session.shown?.index ?? 0}`;
-  const png = async () => saveAs(await stage.picture(), `${file()}.png`);
   const frames = () => saveAs(npz(session.kept.map((i) => session.frame(i)!)), `${name}.npz`);
   const glb = async () => {
     const { surfaces } = stage;
@@ -45,7 +48,7 @@ export function saving(session: Session, stage: Stage, name: string): { buttons:
   const record = iconButton("record", "Record a film (WebM)", film);
   return {
     buttons: [
-      iconButton("camera", "Save the picture (PNG)", () => void png()),
+      pictureButton(stage, file),
       record,
       iconButton("down", "Download the kept frames (NPZ)", frames),
       iconButton("cube", "Save the surfaces (GLB)", () => void glb()),

@@ -1,6 +1,7 @@
 /** A world as the page sees it: plays, keeps frames, goes back, branches. It never waits for the screen, nor the screen for it. */
 import { back, gather, merged, turned, type Branch, type Change, type Start } from "./branch";
 import { Engine, EngineError } from "./engine/client";
+import { asked } from "./engine/worth";
 import type { Failure, Files, Frame, Ledger, SceneInfo, Stability, StepReport, Value, Vector } from "./engine/protocol";
 import { shipped, viewed } from "./scenes";
 import { literal, meshesOf, valueAt } from "./values";
@@ -84,6 +85,8 @@ export class Session {
   private turn: Promise<unknown> = Promise.resolve();
   private listeners: { [K in keyof Events]?: ((event: Events[K]) => void)[] } = {};
   private closed = false;
+  /** Counts what ends the way to a frame. */
+  private going = 0;
   private busy = false;
   /** Each load counts, so that answers of an older world are not shown. */
   private age = 0;
@@ -111,22 +114,19 @@ export class Session {
   load(toml: string, overrides: [string, Value][] = [], own: Files = this.files): Promise<SceneInfo> {
     return this.queue(async () => {
       const words = overrides.map(([path, value]) => `${path}=${literal(value)}`);
-      const files: Files = { ...dropped, ...own };
-      let info: SceneInfo;
-      for (let tries = 0; ; tries++) {
-        try {
-          info = await this.engine.load(toml, { overrides: words, files, world: this.world });
-          break;
-        } catch (error) {
-          const missing = error instanceof EngineError ? (error.failure.missing ?? []).filter((path) => !(path in files)) : [];
-          if (!missing.length || tries > 3) throw error;
-          for (const path of missing) {
-            const bytes = (await viewed(path)) ?? (await shipped(path));
-            if (!bytes) throw error;
-            files[path] = bytes;
-          }
+      const files: Files = {};
+      const build = () => this.engine.load(toml, { overrides: words, files, world: this.world });
+      const info = await build().catch(async (error) => {
+        const missing = error instanceof EngineError ? (error.failure.missing ?? []) : [];
+        if (!missing.length) throw error;
+        const brought = asked(missing, { ...dropped, ...own });
+        for (const path of missing) {
+          const bytes = brought.get(path) ?? (await viewed(path)) ?? (await shipped(path));
+          if (!bytes) throw error;
+          files[path] = bytes;
         }
-      }
+        return build();
+      });
       this.age++;
       this.toml = toml;
       this.files = own;
@@ -196,7 +196,7 @@ export class Session {
   }
 
   play(): void {
-    if (this.playing || !this.info) return;
+    if (this.playing || this.closed || !this.info) return;
     if (this.atEnd) this.scrub(0);
     this.playing = true;
     this.clock = performance.now();
@@ -270,7 +270,7 @@ export class Session {
 
   /** One frame on. */
   async next(): Promise<void> {
-    this.pause();
+    this.stop();
     const shown = this.shown?.index ?? 0;
     const kept = this.kept.find((i) => i > shown);
     if (kept !== undefined) this.display(this.way.frame(kept)!);
@@ -279,7 +279,7 @@ export class Session {
 
   /** One sub-step on: a look inside the frame, until it is whole. What came after the frame that is shown is gone. */
   async substep(): Promise<void> {
-    this.pause();
+    this.stop();
     try {
       await this.cut();
       const substeps = (this.shown?.inside?.substeps ?? 0) + 1;
@@ -293,7 +293,7 @@ export class Session {
 
   /** One frame back. */
   previous(): void {
-    this.pause();
+    this.stop();
     const shown = this.shown?.index ?? 0;
     // From between two frames to the one before.
     const before = this.shown?.inside ? shown + 1 : shown;
@@ -301,11 +301,18 @@ export class Session {
     if (kept !== undefined) this.display(this.way.frame(kept)!);
   }
 
-  /** To a frame, stepping as far as needed. Throws `EngineError`. */
-  async goto(index: number, progress: (index: number) => void = () => {}): Promise<void> {
+  /** Ends playing, and the way to a frame that is far. */
+  stop(): void {
+    this.going++;
     this.pause();
+  }
+
+  /** To a frame, stepping as far as needed; `false` where something else was done before it was there. Throws `EngineError`. */
+  async goto(index: number, progress: (index: number) => void = () => {}): Promise<boolean> {
+    this.stop();
+    const own = this.going;
     try {
-      while (this.way.last < index && !this.closed) {
+      while (this.way.last < index && own === this.going) {
         await this.forward(Math.min(index - this.way.last, 8), false);
         progress(this.way.last);
       }
@@ -313,11 +320,13 @@ export class Session {
       this.fail(error);
       throw error;
     }
+    if (own !== this.going) return false;
     this.scrub(index);
+    return true;
   }
 
   async reset(): Promise<void> {
-    this.pause();
+    this.stop();
     await this.queue(async () => {
       if (this.compares && this.latest > 0) {
         if (this.left) await this.engine.unpark(this.left.id, this.world);
@@ -517,8 +526,8 @@ export class Session {
     if (before) await this.queue(() => this.engine.unpark(before.id, this.world));
   }
 
-  grab(object: string, row: number, target: Vector, stiffness?: number): Promise<void> {
-    return this.queue(() => this.engine.grab(object, row, target, stiffness, this.world));
+  grab(object: string, row: number, target: Vector): Promise<void> {
+    return this.queue(() => this.engine.grab(object, row, target, this.world));
   }
 
   release(): Promise<void> {
@@ -590,7 +599,7 @@ export class Session {
   }
 
   close(): void {
-    this.pause();
+    this.stop();
     this.closed = true;
     this.way = new Way(0);
     this.before = this.left = null;

@@ -45,6 +45,8 @@ export async function source(rest: string): Promise<Source> {
   return { text: await known.text(), overrides: [], files: {}, shared: null, name: known.name, id: known.id };
 }
 
+const STOPPED = "stopped before the frame that was shared";
+
 /**
  * Loads a source and brings it to where it was shared. The text counts where it still means the scene that was shared; where defaults have
  * changed since, the resolved scene does. Answers with what is to be said of that.
@@ -70,13 +72,13 @@ export async function begin(session: Session, start: Source, progress: (frame: n
   session.compares = false;
   try {
     for (const { frame, path, value } of shared.changes) {
-      await session.goto(frame, progress);
+      if (!(await session.goto(frame, progress))) return STOPPED;
       await session.set(path, value);
     }
   } finally {
     session.compares = compares;
   }
-  if (shared.frame > session.latest) await session.goto(shared.frame, progress);
+  if (shared.frame > session.latest && !(await session.goto(shared.frame, progress))) return STOPPED;
   return told;
 }
 

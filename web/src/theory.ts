@@ -4,12 +4,13 @@ import type { SceneInfo } from "./engine/protocol";
 import { h } from "./dom";
 import { theoryText } from "./scenes";
 
-export interface Topic {
+interface Topic {
   page: string;
   tags: string[];
 }
 
-const SCHEMES: Record<string, string> = {
+/** Integrators, and the equations of docs/theory/integrators.md that they are. */
+export const SCHEMES: Record<string, string> = {
   forward_euler: "1", symplectic_euler: "2", modified_euler: "3", midpoint: "5", heun: "5", rk4: "5", verlet: "6", velocity_verlet: "7",
   adaptive_euler: "8", dormand_prince: "9", implicit_euler: "10", implicit_midpoint: "11", bdf2: "12",
 };

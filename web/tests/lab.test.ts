@@ -78,6 +78,43 @@ describe("gallery", () => {
   });
 });
 
+describe("pages", () => {
+  it("that are left before they have come leave nothing behind", async () => {
+    const { page, errors } = await own.open("scene/structures/rope");
+    await ready(page);
+    await page.evaluate(async () => {
+      const { session } = (window as any).tumble;
+      const prototype = Object.getPrototypeOf(session);
+      const { load, play } = prototype;
+      (window as any).playing = [];
+      prototype.load = function (...words: unknown[]) {
+        return load.apply(this, words).then((info: unknown) => ((window as any).loaded = (window as any).loaded + 1 || 1, info));
+      };
+      prototype.play = function () {
+        play.call(this);
+        (window as any).playing.push(this);
+      };
+      // To the page of fluids, and away as soon as it is there.
+      const seen = new MutationObserver(() => {
+        if (!document.querySelector(".stirs")) return;
+        seen.disconnect();
+        location.hash = "#/theory";
+      });
+      seen.observe(document.body, { childList: true, subtree: true });
+      location.hash = "#/fluid";
+    });
+    await page.waitForSelector(".contents");
+    await page.waitForFunction(() => (window as any).loaded && (window as any).playing.length);
+    const left = await page.evaluate(() => ({ playing: (window as any).playing.some((s: any) => s.playing), ready: document.getElementById("main")!.dataset.ready, heads: [...document.querySelectorAll("h1")].map((e) => e.textContent) }));
+    assert.deepEqual(left, { playing: false, ready: undefined, heads: ["Theory"] });
+    await page.focus(".skip");
+    await page.keyboard.press("Enter");
+    assert.deepEqual(await page.evaluate(() => [document.activeElement!.id, location.hash]), ["main", "#/theory"]);
+    assert.deepEqual(errors, []);
+    await page.context().close();
+  });
+});
+
 /** Scenes that show nothing in their first frame, and when they do. */
 const LATER: Record<string, number> = { "springs/rusty": 32, "particles/fireworks": 30 };
 /** Scenes that are there to fail. */
@@ -419,6 +456,12 @@ describe("fluid", () => {
     await page.mouse.up();
     assert.notEqual(await page.evaluate(() => (window as any).tumble.session.hash()), before);
     assert.ok((await page.evaluate(() => (window as any).stirred)).every((p: number[]) => Math.abs(p[1] - 0.125) < 1e-6));
+    // And again: letting go does not give the pointer to the camera.
+    await page.evaluate(() => ((window as any).stirred.length = 0));
+    await page.mouse.down();
+    await page.mouse.move(box.x + 0.6 * box.width, box.y + 0.5 * box.height, { steps: 4 });
+    await page.waitForFunction(() => (window as any).stirred.length);
+    await page.mouse.up();
     assert.deepEqual(errors, []);
     await page.context().close();
   });

@@ -216,11 +216,6 @@ impl World {
         let (position, velocity) = (point("position", &position)?, point("velocity", &velocity)?);
         hand::stir(&mut self.loaded.world, gas, position, velocity, radius, density).map_err(|e| self.loaded.wrong(e))
     }
-
-    /// Sets a column of an object.
-    pub fn write(&mut self, object: &str, column: &str, values: Vec<f64>) -> Answer<()> {
-        self.loaded.world.write(object, column, &values).map_err(|e| self.loaded.wrong(e))
-    }
 }
 
 /// Milliseconds for the estimate of how stiff a hand may be.

@@ -33,7 +33,7 @@ interface Made {
   sets: { path: string; value: Value }[];
 }
 
-export interface FrameOptions {
+interface FrameOptions {
   columns?: string[];
   hash?: boolean;
 }
@@ -63,10 +63,10 @@ export class Engine {
   /** Checks and builds a scene. The old world goes on where this fails. */
   async load(toml: string, options: { overrides?: string[]; files?: Files; world?: number } = {}): Promise<SceneInfo> {
     const { overrides = [], files = {}, world = 0 } = options;
-    const answer = await this.ask({ type: "load", toml, overrides, files, world });
+    const { info } = (await this.ask({ type: "load", toml, overrides, files, world })) as Answer & { type: "loaded" };
     this.forget(world);
     this.made.set(world, { toml, overrides, files, sets: [] });
-    return (answer as Answer & { type: "loaded" }).info;
+    return info;
   }
 
   /** Simulates frames, as many as fit into `budget` [ms]; answers with the last. */
@@ -104,8 +104,8 @@ export class Engine {
   }
 
   /** Pulls a mass to a point, or the one that is held to another point. */
-  async grab(object: string, row: number, target: Vector, stiffness?: number, world = 0): Promise<void> {
-    await this.ask({ type: "grab", object, row, target, stiffness, world });
+  async grab(object: string, row: number, target: Vector, world = 0): Promise<void> {
+    await this.ask({ type: "grab", object, row, target, world });
   }
 
   async release(world = 0): Promise<void> {
@@ -115,11 +115,6 @@ export class Engine {
   /** Pushes a gas around a point. */
   async stir(gas: string, position: Vector, velocity: Vector, radius: number, density?: number, world = 0): Promise<void> {
     await this.ask({ type: "stir", gas, position, velocity, radius, density, world });
-  }
-
-  /** Sets a column of an object. */
-  async write(object: string, column: string, values: Float64Array, world = 0): Promise<void> {
-    await this.ask({ type: "write", object, column, values, world });
   }
 
   async hash(world = 0): Promise<string> {

@@ -176,15 +176,13 @@ export type Request = Asked &
      */
     | { type: "set"; path: string; value: Value }
     /** A spring from a mass (row of its object) to a point; again with another target to drag. -> done */
-    | { type: "grab"; object: string; row: number; target: Vector; stiffness?: number }
+    | { type: "grab"; object: string; row: number; target: Vector }
     | { type: "release" }
     /**
      * Adds to the velocity [m/s] (and density [kg/m³] of smoke, where given) of a gas around a point, falling off as a Gaussian of `radius` [m].
      * -> done
      */
     | { type: "stir"; gas: string; position: Vector; velocity: Vector; radius: number; density?: number }
-    /** Sets position or velocity of an object, three numbers per mass; columns of a gas. -> done */
-    | { type: "write"; object: string; column: string; values: Float64Array }
     /** -> hash */
     | { type: "hash" }
     /** -> stability, of those systems for which it is found in some seconds; takes about as long as some steps */

@@ -2,7 +2,7 @@
 
 import type { Answer, Columns, Failure, Files, Frame, Ledger, Notice, Request, SceneInfo, StepReport } from "./protocol";
 import { Kept } from "./kept";
-import { asked, readable } from "./worth";
+import { readable } from "./worth";
 
 type Module = typeof import("./pkg/single");
 type World = InstanceType<Module["World"]>;
@@ -103,24 +103,10 @@ function keep({ world, kept }: Running): void {
   kept.add(world.index(), () => world.save());
 }
 
-/** What was kept after this moment is no future of it any more; the moment itself is kept as it is now. */
-function branch(at: Running): void {
-  at.kept.cut(at.world.index());
-  keep(at);
-}
-
-/** A world with those of the files that its scene names: others, broken ones too, do not matter to it. */
 async function build(toml: string, overrides: string[], files: Files): Promise<World> {
   const single = await engine("single");
   const module = single.precision(toml, overrides) === "double" ? await engine("double") : single;
-  try {
-    return new module.World(toml, overrides, new Map());
-  } catch (thrown) {
-    const missing = typeof thrown === "string" ? ((JSON.parse(thrown) as Failure).missing ?? []) : [];
-    const found = asked(missing, files);
-    if (!found.size) throw thrown;
-    return new module.World(toml, overrides, found);
-  }
+  return new module.World(toml, overrides, new Map(Object.entries(files)));
 }
 
 function park(at: Running): Parked {
@@ -211,16 +197,15 @@ async function answer(request: Request): Promise<Answer> {
       const at = running(number);
       const live = at.world.set(request.path, JSON.stringify(request.value));
       at.info = info(at.world);
-      if (live) branch(at);
-      else {
-        at.kept = new Kept(KEEP);
-        keep(at);
-      }
+      // What was kept after this moment is no future of it any more; the moment itself is kept as it is now.
+      if (live) at.kept.cut(at.world.index());
+      else at.kept = new Kept(KEEP);
+      keep(at);
       return { id, type: "changed", info: at.info, live };
     }
     case "grab": {
       const at = running(number);
-      at.world.grab(request.object, request.row, Float64Array.from(request.target), request.stiffness);
+      at.world.grab(request.object, request.row, Float64Array.from(request.target));
       at.kept.cut(at.world.index());
       return { id, type: "done" };
     }
@@ -232,12 +217,6 @@ async function answer(request: Request): Promise<Answer> {
       const { gas, position, velocity, radius, density = 0 } = request;
       at.world.stir(gas, Float64Array.from(position), Float64Array.from(velocity), radius, density);
       at.kept.cut(at.world.index());
-      return { id, type: "done" };
-    }
-    case "write": {
-      const at = running(number);
-      at.world.write(request.object, request.column, request.values);
-      branch(at);
       return { id, type: "done" };
     }
     case "hash":

@@ -1,17 +1,15 @@
 /** A fluid in a box, in a plane or in space, to stir: views of everything that a step makes, and a pressure that may be as bad as one likes. */
 import { parse } from "smol-toml";
-import { check, choice, h, iconButton, saveAs, show, type Page } from "../dom";
-import { EngineError } from "../engine/client";
+import { asScene, asSceneButton, figure, slide } from "../demo";
+import { check, choice, h, iconButton, show, type Page } from "../dom";
 import type { Value, Vector } from "../engine/protocol";
-import { legendBox } from "../legend";
 import { curveColor, isDark, Plot } from "../plot";
 import { pointers } from "../pointer";
-import { engine, Session } from "../session";
+import { pictureButton } from "../saving";
 import { literal } from "../values";
-import { addressed } from "../source";
 import { cards } from "../theory";
-import { keys, transport } from "../transport";
-import { LOOK, Stage } from "../view/stage";
+import { transport } from "../transport";
+import { reducedMotion, Viewer } from "../viewer";
 import { Vector3 } from "three";
 
 const VIEWS: [string, string][] = [["density", "Dye"], ["pressure", "Pressure"], ["speed", "Speed, with arrows"], ["vorticity", "Vorticity"], ["divergence", "Residual: divergence that is left"]];
@@ -109,70 +107,25 @@ columns = ["position", "density"]
 
 export const page: Page = async (main) => {
   document.title = "Fluid · tumble";
-  main.className = "lab-page";
   const choices: Choices = { ...START };
   let drawing = false;
-  const session = new Session();
+  const viewer = new Viewer(main, "The fluid. Drag to stir; with the keyboard, arrows stir around the ring, space plays.", false);
+  const { session, stage, canvas } = viewer;
   session.endless = true;
-  const canvas = h("canvas", { "aria-hidden": "true" });
-  const { element: legendElement, update: tellLegend } = legendBox(() => stage);
+  stage.look.field = "density";
   const ring = h("div", { class: "ring", hidden: true });
-  const wait = h("div", { class: "wait" }, "Loading the engine …");
-  const stageBox = h("div", { class: "stage stirs", tabindex: 0, role: "group", "aria-label": "The fluid. Drag to stir; with the keyboard, arrows stir around the ring, space plays." }, canvas, legendElement, ring, wait);
-  const alert = h("div", { class: "alert", role: "alert", hidden: true });
+  viewer.box.classList.add("stirs");
+  viewer.box.append(ring);
   const energy = new Plot([{ label: "kinetic energy", color: curveColor(0), width: 2 }], { label: "Kinetic energy against time", x: "time [s]", height: 130 });
   const residual = new Plot([{ label: "residual", color: curveColor(1), width: 2 }], { label: "Residual of the pressure after each iteration, on a logarithmic scale", x: "iteration", log: true, height: 130 });
-  const now = (label: string) => {
-    const value = h("output", { "aria-label": label }, "–");
-    return { value, row: h("div", { class: "figure" }, h("span", {}, label), value) };
-  };
-  const figures = { left: now("Divergence"), iterations: now("Iterations"), cost: now("Engine, a step"), courant: now("Courant number"), kinetic: now("Kinetic energy") };
-  figures.left.value.id = "residual";
-  figures.iterations.value.id = "iterations";
+  const figures = { left: figure("Divergence", "residual"), iterations: figure("Iterations", "iterations"), cost: figure("Engine, a step"), courant: figure("Courant number"), kinetic: figure("Kinetic energy") };
   const advice = h("p", { class: "doc", role: "status" });
 
   const rerun = async () => {
-    try {
-      await session.load(scene(choices));
-      alert.hidden = true;
-      session.play();
-    } catch (error) {
-      complain(error);
-    }
-  };
-  const complain = (error: unknown) => {
-    if (!(error instanceof EngineError)) throw error;
-    alert.hidden = false;
-    alert.replaceChildren(h("strong", {}, "This does not work."), h("pre", {}, error.failure.message));
+    if (!(await viewer.attempt(() => session.load(scene(choices))))) session.play();
   };
   const set = async (path: string, value: Value) => {
-    try {
-      await session.set(path, value);
-      alert.hidden = true;
-      if (!session.playing) session.play();
-    } catch (error) {
-      complain(error);
-    }
-  };
-
-  const asScene = async () => {
-    const toml = scene(choices).replace(/^frames = .*$/m, "frames = 900");
-    location.hash = await addressed(toml);
-  };
-
-  const range = (label: string, low: number, high: number, value: number, text: (v: number) => string, act: (v: number) => void, step = (high - low) / 100) => {
-    const out = h("output", {}, text(value));
-    let timer = 0;
-    const slider = h("input", {
-      type: "range", min: low, max: high, step, value,
-      oninput: () => {
-        out.textContent = text(Number(slider.value));
-        slider.setAttribute("aria-valuetext", text(Number(slider.value)));
-        clearTimeout(timer);
-        timer = window.setTimeout(() => act(Number(slider.value)), 120);
-      },
-    });
-    return h("label", { class: "slide" }, h("span", { class: "slide-head" }, h("span", {}, label), out), slider);
+    if (!(await viewer.attempt(() => session.set(path, value)))) session.play();
   };
 
   const view = choice("View", VIEWS, "density", (v) => showView(v));
@@ -187,7 +140,7 @@ export const page: Page = async (main) => {
     stage.look.slice = choices.space === "slice" || (space && v !== "density") ? 1 : null;
     void session.refresh().then(() => {
       stage.again();
-      tellLegend();
+      viewer.tellLegend();
     });
   };
   const cells = choice("Cells along", [], "", (v) => {
@@ -200,7 +153,7 @@ export const page: Page = async (main) => {
     cells.querySelector("select")!.replaceChildren(...list.map((n) => h("option", { value: n, selected: n === String(choices.cells) }, n)));
   };
   fillCells();
-  const sliceAt = range("Place of the slice", 0, 1, 0.5, (v) => `${show((v - 0.5) * SPACE.depth, 2)} m`, (v) => {
+  const sliceAt = slide("Place of the slice", 0, 1, 0.5, (v) => `${show((v - 0.5) * SPACE.depth, 2)} m`, (v) => {
     stage.look.sliceAt = v;
     stage.again();
   });
@@ -244,11 +197,11 @@ export const page: Page = async (main) => {
         choices.method = v;
         void set("gas.0.pressure.method", v);
       }),
-      range("Iterations at most", 0, 3, Math.log10(choices.iterations), (v) => String(Math.round(10 ** v)), (v) => {
+      slide("Iterations at most", 0, 3, Math.log10(choices.iterations), (v) => String(Math.round(10 ** v)), (v) => {
         choices.iterations = Math.round(10 ** v);
         void set("gas.0.pressure.iterations", choices.iterations);
       }),
-      range("Tolerance", -6, -1, Math.log10(choices.tolerance), (v) => show(Number((10 ** v).toPrecision(1)), 1), (v) => {
+      slide("Tolerance", -6, -1, Math.log10(choices.tolerance), (v) => show(Number((10 ** v).toPrecision(1)), 1), (v) => {
         choices.tolerance = Number((10 ** v).toPrecision(1));
         void set("gas.0.pressure.tolerance", choices.tolerance);
       }),
@@ -263,11 +216,11 @@ export const page: Page = async (main) => {
         void set("gas.0.advection.velocity", v === "linear" ? { interpolation: "linear", corrected: false } : v === "corrected" ? { interpolation: "linear", corrected: true } : { interpolation: "monotone_cubic", corrected: true });
       }),
       h("p", { class: "doc" }, "Each step looks up where the fluid came from. Linear interpolation there smooths it, as a viscosity would: watch the kinetic energy."),
-      range("Viscosity [Pa s]", thick.low, thick.high, thick.low, (v) => show(thick.of(v), 2), (v) => {
+      slide("Viscosity [Pa s]", thick.low, thick.high, thick.low, (v) => show(thick.of(v), 2), (v) => {
         choices.viscosity = thick.of(v);
         void set("gas.0.viscosity", choices.viscosity);
       }),
-      range("Vorticity confinement", 0, 1, 0, (v) => show(v, 2), (v) => {
+      slide("Vorticity confinement", 0, 1, 0, (v) => show(v, 2), (v) => {
         choices.confinement = v;
         void set("gas.0.confinement", v);
       }),
@@ -286,11 +239,11 @@ export const page: Page = async (main) => {
         choices.particles = on;
         void rerun();
       }),
-      range("Lifetime [s]", 0.5, 8, choices.lifetime, (v) => show(v, 2), (v) => {
+      slide("Lifetime [s]", 0.5, 8, choices.lifetime, (v) => show(v, 2), (v) => {
         choices.lifetime = v;
         void rerun();
       }),
-      range("Length of trails [s]", 0, 1, choices.trail, (v) => show(v, 2), (v) => {
+      slide("Length of trails [s]", 0, 1, choices.trail, (v) => show(v, 2), (v) => {
         choices.trail = v;
         void rerun();
       }),
@@ -303,9 +256,8 @@ export const page: Page = async (main) => {
       h("section", { class: "view", "aria-label": "Fluid" },
         h("div", { class: "lab-head" },
           h("div", {}, h("h1", {}, "A fluid to stir"), h("p", { class: "muted" }, "Drag through it, or draw walls.")),
-          h("div", { class: "actions" }, view, iconButton("camera", "Save the picture (PNG)", () => void stage.picture().then((b) => saveAs(b, "fluid.png"))), iconButton("reset", "From the start, with these settings", () => void rerun()),
-            h("button", { type: "button", class: "button", title: "With its text and all its values", onclick: () => void asScene() }, "As a scene"))),
-        alert, stageBox, transport(session),
+          h("div", { class: "actions" }, view, pictureButton(stage, () => "fluid"), iconButton("reset", "From the start, with these settings", () => void rerun()), asSceneButton(() => asScene(scene(choices), 900)))),
+        viewer.alert, viewer.box, transport(session),
         h("div", { class: "energy" }, h("h2", {}, "Kinetic energy", h("span", { class: "unit" }, "J")), h("div", { class: "figures in-line" }, figures.kinetic.row, figures.courant.row, figures.cost.row), energy.element),
       ),
       h("aside", { class: "side scrolls", "aria-label": "Settings", tabindex: 0 }, controls),
@@ -313,19 +265,14 @@ export const page: Page = async (main) => {
     ),
   );
 
-  const stage = new Stage(canvas, { controls: false, shadows: false });
-  stage.look = { ...LOOK, field: "density" };
-  session.wanted = () => stage.wanted;
   let book = 0;
   session.on("loaded", (info) => {
-    wait.hidden = true;
     stage.open(info, session.frame);
     session.each = stage.trails;
   });
   session.on("frame", (frame) => {
     stage.show(frame);
-    tellLegend();
-    main.dataset.frame = String(frame.index);
+    viewer.tellLegend();
     const report = session.report;
     const ledger = session.ledgers[frame.index];
     if (ledger) figures.kinetic.value.textContent = `${show(ledger.kinetic, 3)} J`;
@@ -347,7 +294,6 @@ export const page: Page = async (main) => {
     // A demo without an end keeps no past.
     session.trim(90);
   });
-  session.on("failed", (failure) => complain(new EngineError(failure)));
 
   // Walls, one for each stroke.
   let stroke: [number, number][] | null = null;
@@ -389,43 +335,23 @@ export const page: Page = async (main) => {
     cursor.x = Math.min(Math.max(cursor.x + 0.03 * go[0], -0.78), 0.78);
     cursor.z = Math.min(Math.max(cursor.z + 0.03 * go[1], -0.43), 0.43);
     ring.hidden = false;
-    const box = stageBox.getBoundingClientRect();
+    const box = viewer.box.getBoundingClientRect();
     const scale = box.width / stage.width;
     ring.style.left = `${box.width / 2 + cursor.x * scale}px`;
     ring.style.top = `${box.height / 2 - cursor.z * scale}px`;
     void session.stir(gas.name, cursor.toArray() as Vector, [go[0] * 0.6, 0, go[1] * 0.6], stage.width / 24, 0.2).catch(() => {});
     if (!session.playing) session.play();
   };
-  stageBox.addEventListener("keydown", stir);
-  const theme = () => stage.theme();
-  addEventListener("themechange", theme);
-  const offKeys = keys(session);
-  engine().onrestart = (message) => {
-    alert.hidden = false;
-    alert.replaceChildren(h("strong", {}, "The engine was started anew."), h("pre", {}, message));
-    void session.revived();
-  };
+  viewer.box.addEventListener("keydown", stir);
   void cards([{ page: "gas", tags: ["gas.1", "gas.3", "gas.4", "gas.5"] }, { page: "pressure", tags: ["pressure.1", "pressure.2"] }]).then((made) => theory.replaceChildren(...made));
-  void session
-    .load(scene(choices))
-    .then(() => {
-      main.dataset.ready = "true";
-      if (!matchMedia("(prefers-reduced-motion: reduce)").matches) session.play();
-    })
-    .catch((error) => {
-      wait.hidden = true;
-      main.dataset.ready = "failed";
-      complain(error);
-    });
-  Object.assign(window, { tumble: { session, stage, engine: engine() } });
+  void viewer.begin(() => session.load(scene(choices))).then((failure) => {
+    if (!failure && !reducedMotion()) session.play();
+  });
 
   return () => {
-    removeEventListener("themechange", theme);
-    offKeys();
     offPointers();
     energy.close();
     residual.close();
-    session.close();
-    stage.dispose();
+    viewer.close();
   };
 };

@@ -1,11 +1,11 @@
 /** One system under two to six integrators, side by side: energy, phase, error, and the step that each can take. */
+import { asScene } from "../demo";
 import { check, choice, h, iconButton, setIcon, show, type Page } from "../dom";
 import { EngineError } from "../engine/client";
 import type { Frame, Ledger, SceneInfo, Stability } from "../engine/protocol";
 import { curveColor, isDark, Plot, type Curve } from "../plot";
 import { engine } from "../session";
-import { addressed } from "../source";
-import { cards } from "../theory";
+import { cards, SCHEMES } from "../theory";
 
 interface System {
   name: string;
@@ -24,7 +24,7 @@ interface System {
   axes: [string, string];
   /** Where the last mass is, exactly. */
   exact?(t: number): [number, number, number];
-  /** Added to the energy, so that it starts above zero [J]; `null` takes what the masses weigh. */
+  /** Added to the energy, so that it starts above zero [J]. */
   zero: number;
   theory: { page: string; tags: string[] };
 }
@@ -107,11 +107,8 @@ const SYSTEMS: Record<string, System> = {
   },
 };
 
-const SCHEMES = ["forward_euler", "symplectic_euler", "modified_euler", "midpoint", "heun", "rk4", "verlet", "velocity_verlet", "adaptive_euler", "dormand_prince", "implicit_euler", "implicit_midpoint", "bdf2"];
 /** Those that need no second-order form, for flows. */
 const FOR_FIELDS = new Set(["forward_euler", "midpoint", "heun", "rk4", "adaptive_euler", "dormand_prince"]);
-
-const TAGS: Record<string, string> = { forward_euler: "1", symplectic_euler: "2", modified_euler: "3", midpoint: "5", heun: "5", rk4: "5", verlet: "6", velocity_verlet: "7", adaptive_euler: "8", dormand_prince: "9", implicit_euler: "10", implicit_midpoint: "11", bdf2: "12" };
 
 const LECTURE: [string, { system: string; schemes: string[]; h: number }][] = [
   ["The spring's growing energy", { system: "spring", schemes: ["forward_euler", "modified_euler", "symplectic_euler"], h: 0.02 }],
@@ -178,18 +175,18 @@ export const page: Page = async (main) => {
   const clock = h("output", { class: "clock", "aria-label": "Time" }, "0 s");
   const play = iconButton("play", "Play", () => (playing ? pause() : start()), { class: "icon-button primary" });
   const curves = (): Curve[] => runs.map((r, k) => ({ label: plain(r.scheme), color: curveColor(k), width: 2 }));
-  const make = (label: string, y: string, logarithmic: boolean) => ({ plot: new Plot([], { label, x: "time [s]", log: logarithmic, height: 190 }), y });
-  let energy = make("Energy over the first energy, against time", "", log);
-  const error = make("Distance from the exact solution, against time", "", true);
+  const make = (label: string, log: boolean) => new Plot([], { label, x: "time [s]", log, height: 190 });
+  let energy = make("Energy over the first energy, against time", log);
+  const error = make("Distance from the exact solution, against time", true);
   const energyTitle = h("h2", {}, "Energy");
   const energyBox = h("div", { class: "chart" }, h("div", { class: "chart-head" }, energyTitle, check("Logarithmic", log, (on) => {
     log = on;
     rescale();
-  })), energy.plot.element);
+  })), energy.element);
   const phase = h("canvas", { class: "phase", role: "img", "aria-label": "Paths of all integrators, and the exact one" });
   const phaseTitle = h("h2", {}, "Phase");
   const phaseBox = h("div", { class: "chart" }, h("div", { class: "chart-head" }, phaseTitle, h("span", { class: "muted axes" })), phase);
-  const errorBox = h("div", { class: "chart" }, h("div", { class: "chart-head" }, h("h2", {}, "Error"), h("span", { class: "muted axes" }, "from the exact one [m]")), error.plot.element);
+  const errorBox = h("div", { class: "chart" }, h("div", { class: "chart-head" }, h("h2", {}, "Error"), h("span", { class: "muted axes" }, "from the exact one [m]")), error.element);
   const stepOut = h("output", { id: "step" });
   const slider = h("input", { type: "range", min: 0, max: 1, step: 0.001, id: "h", "aria-label": "Step h", oninput: () => {
     const [low, high] = SYSTEMS[system].steps;
@@ -239,7 +236,7 @@ export const page: Page = async (main) => {
   const allowed = (scheme: string) => !SYSTEMS[system].field || FOR_FIELDS.has(scheme);
 
   const drawBoxes = () => {
-    boxes.replaceChildren(boxes.firstElementChild!, ...SCHEMES.filter(allowed).map((s) => {
+    boxes.replaceChildren(boxes.firstElementChild!, ...Object.keys(SCHEMES).filter(allowed).map((s) => {
       const box = check(plain(s), schemes.includes(s), (on) => {
         const next = on ? [...schemes, s] : schemes.filter((x) => x !== s);
         if (next.length < 2 || next.length > 6) {
@@ -248,18 +245,14 @@ export const page: Page = async (main) => {
           return;
         }
         note.textContent = "";
-        schemes = SCHEMES.filter((x) => next.includes(x));
+        schemes = Object.keys(SCHEMES).filter((x) => next.includes(x));
         void restart();
       });
       return box;
     }));
   };
 
-  const asScene = async (scheme: string) => {
-    const s = SYSTEMS[system];
-    const toml = s.toml(scheme, step).replace(/^frames = .*$/m, `frames = ${Math.max(1, Math.ceil(s.end / step))}`);
-    location.hash = await addressed(toml);
-  };
+  const openScene = (scheme: string) => asScene(SYSTEMS[system].toml(scheme, step), Math.max(1, Math.ceil(SYSTEMS[system].end / step)));
 
   const limitOf = (scheme: string) => limits.find((l) => l.integrator === scheme);
   const drawMarks = () => {
@@ -316,7 +309,7 @@ export const page: Page = async (main) => {
       const ratio = h("output", { class: "big", "data-ratio": scheme }, "1");
       const verdict = h("p", { class: "verdict" });
       const predicted = h("p", { class: "muted predicted" });
-      const card = h("article", { class: "run", "data-scheme": scheme, style: `--curve:${curveColor(k)}` }, h("div", { class: "run-head" }, h("h2", {}, plain(scheme)), h("button", { type: "button", class: "as-scene", "aria-label": `Open ${plain(scheme)} as a scene`, title: "Open as a scene, with its text and values", onclick: () => void asScene(scheme) }, "↗")), canvas, h("div", { class: "run-figure" }, h("span", { class: "muted" }, s.field ? "r / r₀" : "E / E₀"), ratio), predicted, verdict);
+      const card = h("article", { class: "run", "data-scheme": scheme, style: `--curve:${curveColor(k)}` }, h("div", { class: "run-head" }, h("h2", {}, plain(scheme)), h("button", { type: "button", class: "as-scene", "aria-label": `Open ${plain(scheme)} as a scene`, title: "Open as a scene, with its text and values", onclick: () => void openScene(scheme) }, "↗")), canvas, h("div", { class: "run-figure" }, h("span", { class: "muted" }, s.field ? "r / r₀" : "E / E₀"), ratio), predicted, verdict);
       return { world: 10 + k, scheme, info: null, frame: null, n: 0, quantity: [], error: [], path: [], first: 0, dead: "", steps: 0, shortest: Infinity, canvas, ratio, verdict, predicted, card };
     });
     board.replaceChildren(...runs.map((r) => r.card));
@@ -325,7 +318,7 @@ export const page: Page = async (main) => {
     phaseTitle.textContent = s.phase.length === 2 ? "Phase" : "Path";
     errorBox.hidden = !s.exact;
     rescale();
-    error.plot.setCurves(curves());
+    error.setCurves(curves());
     try {
       await Promise.all(runs.map(async (run) => {
         run.info = await engine().load(s.toml(run.scheme, step), { world: run.world });
@@ -346,17 +339,17 @@ export const page: Page = async (main) => {
     if (own !== age) return;
     drawMarks();
     draw();
-    void cards([s.theory, { page: "integrators", tags: [...new Set(schemes.map((x) => `integrators.${TAGS[x]}`))] }]).then((made) => own === age && theory.replaceChildren(...made));
+    void cards([s.theory, { page: "integrators", tags: [...new Set(schemes.map((x) => `integrators.${SCHEMES[x]}`))] }]).then((made) => own === age && theory.replaceChildren(...made));
     main.dataset.ready = "true";
     if (!still && !closed) start();
   };
 
   const rescale = () => {
-    energy.plot.close();
-    energy.plot.element.remove();
-    energy = make("Energy over the first energy, against time", "", log);
-    energyBox.append(energy.plot.element);
-    energy.plot.setCurves(curves());
+    energy.close();
+    energy.element.remove();
+    energy = make("Energy over the first energy, against time", log);
+    energyBox.append(energy.element);
+    energy.setCurves(curves());
     draw();
   };
 
@@ -418,8 +411,8 @@ export const page: Page = async (main) => {
         }
         return undefined as unknown as null;
       });
-      energy.plot.set([xs, ...runs.map((r) => thin(r.quantity, r.quantity[0] || 1))]);
-      if (s.exact) error.plot.set([xs, ...runs.map((r) => thin(r.error, 0))]);
+      energy.set([xs, ...runs.map((r) => thin(r.quantity, r.quantity[0] || 1))]);
+      if (s.exact) error.set([xs, ...runs.map((r) => thin(r.error, 0))]);
       drawPhase();
     }
   };
@@ -597,8 +590,8 @@ export const page: Page = async (main) => {
 
   const theme = () => {
     runs.forEach((r, k) => r.card.style.setProperty("--curve", curveColor(k)));
-    energy.plot.setCurves(curves());
-    error.plot.setCurves(curves());
+    energy.setCurves(curves());
+    error.setCurves(curves());
     draw();
   };
   addEventListener("themechange", theme);
@@ -622,8 +615,8 @@ export const page: Page = async (main) => {
     removeEventListener("themechange", theme);
     removeEventListener("keydown", keydown);
     sized.disconnect();
-    energy.plot.close();
-    error.plot.close();
+    energy.close();
+    error.close();
     for (const run of runs) void engine().drop(run.world).catch(() => {});
   };
 };

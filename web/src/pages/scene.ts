@@ -2,22 +2,21 @@
 import { Comparison } from "../compare";
 import { check, choice, h, iconButton, saveAs, say, show, svg, ICONS, type Page } from "../dom";
 import { EngineError } from "../engine/client";
-import type { Cure, Failure, SceneInfo, Value } from "../engine/protocol";
+import type { Cure, SceneInfo, Value } from "../engine/protocol";
 import { FamilySwitches } from "../families";
 import { familiesOf, FAMILIES } from "../links";
 import { Panel } from "../panel";
 import { curveColor, legend, Plot, type Curve } from "../plot";
 import { saving } from "../saving";
-import { engine, Session } from "../session";
+import { engine } from "../session";
 import { literal, valueOf } from "../values";
 import { beside, titleOf } from "../scenes";
 import { addressOf } from "../share";
 import { begin, source, toShare, type Source } from "../source";
 import { cards, topics } from "../theory";
-import { keys, transport } from "../transport";
-import { legendBox } from "../legend";
+import { transport } from "../transport";
 import { pointers } from "../pointer";
-import { Stage } from "../view/stage";
+import { reducedMotion, Viewer } from "../viewer";
 import type { Editor } from "../editor";
 
 /** Columns of grids that can be shown, and how they are called. */
@@ -27,7 +26,6 @@ const FIELDS: [string, string][] = [["density", "Density"], ["temperature", "Tem
 const STARTS = /^(galaxy\.|particles\.\d+\.(position|velocity|cloud)|(sheet|block)\.\d+\.(center|rotate))/;
 
 export const page: Page = async (main, rest) => {
-  main.className = "lab-page";
   let start: Source;
   try {
     start = await source(rest);
@@ -37,15 +35,18 @@ export const page: Page = async (main, rest) => {
     return () => {};
   }
 
-  const session = new Session();
+  // Left before its text came.
+  if (!main.isConnected) return () => {};
+
+  const viewer = new Viewer(main, "Picture of the scene. Space plays, comma and point go by frames, semicolon by sub-steps, arrows turn the view, plus and minus zoom, 0 brings the view back.", true, (failure) => {
+    if (failure.kind !== "step") return null;
+    const button: HTMLButtonElement = h("button", { type: "button", class: "button", onclick: () => void cures(button) }, "Look for a cure");
+    return button;
+  });
+  const { session, stage, canvas, alert } = viewer;
   session.each = session.compares = true;
-  const canvas = h("canvas", { "aria-hidden": "true" });
-  const { element: legendElement, update: tellLegend } = legendBox(() => stage);
-  const wait = h("div", { class: "wait" }, "Loading the engine …");
-  const stageBox = h("div", { class: "stage", tabindex: 0, role: "group", "aria-label": "Picture of the scene. Space plays, comma and point go by frames, semicolon by sub-steps, arrows turn the view, plus and minus zoom, 0 brings the view back." }, canvas, legendElement, wait);
   const sceneId = h("p", { class: "scene-id" }, start.id ?? start.name);
   const title = h("h1", {}, titleOf(start.text) || start.name);
-  const alert = h("div", { class: "alert", role: "alert", hidden: true });
   const lookBar = h("div", { class: "look", role: "group", "aria-label": "What is shown" });
   const energyCurves = (): Curve[] => [
     { label: "kinetic", color: curveColor(1) },
@@ -90,10 +91,8 @@ export const page: Page = async (main, rest) => {
 
   const others = start.id ? beside(start.id) : [];
   const shareButton = h("button", { type: "button", class: "button", onclick: () => void share() }, svg(ICONS.share, 16), "Copy link");
-  const stage = new Stage(canvas);
-  session.wanted = () => stage.wanted;
   const saved = saving(session, stage, start.name);
-  const comparison = new Comparison(session, stage, () => tellLegend());
+  const comparison = new Comparison(session, stage, viewer.tellLegend);
   main.append(
     h(
       "div",
@@ -109,7 +108,7 @@ export const page: Page = async (main, rest) => {
         ),
         alert,
         others.length > 1 ? h("nav", { class: "others", "aria-label": "Scenes like this one" }, ...others.map((s) => h("a", { href: `#/scene/${s.id}`, "aria-current": s.id === start.id ? "page" : false }, s.name.replace(/[_-]/g, " ")))) : null,
-        stageBox,
+        viewer.box,
         transport(session),
         lookBar,
         comparison.bar,
@@ -158,7 +157,6 @@ export const page: Page = async (main, rest) => {
   };
   let opening = true;
   session.on("loaded", (info) => {
-    wait.hidden = true;
     stage.open(info, comparison.past, !opening);
     opening = false;
     drawLook(info);
@@ -166,7 +164,7 @@ export const page: Page = async (main, rest) => {
     switches.open(info, session.toml);
     title.textContent = info.title || start.name;
     document.title = `${info.title || start.name} · tumble`;
-    stageBox.classList.toggle("night", stage.night);
+    viewer.box.classList.toggle("night", stage.night);
     hashBox.textContent = info.hash;
     hashBox.dataset.frame = String(session.latest);
     void cards(topics(info)).then((made) => theoryTab.replaceChildren(...made));
@@ -181,30 +179,12 @@ export const page: Page = async (main, rest) => {
     comparison.show(frame);
     drawEnergy();
     tellHash();
-    main.dataset.frame = String(frame.index);
   });
   session.on("before", () => drawEnergy());
   session.on("playing", (on) => {
-    if (on) {
-      // Only a new frame has no trouble with what has gone wrong before.
-      if (!alert.dataset.keep) alert.hidden = true;
-    } else tellHash();
+    if (on) alert.hidden = true;
+    else tellHash();
   });
-  session.on("failed", (failure) => complain(failure));
-
-  const complain = (failure: Failure) => {
-    alert.hidden = false;
-    alert.dataset.kind = failure.kind;
-    const lines = failure.message.split("\n");
-    alert.replaceChildren(
-      h("strong", {}, failure.kind === "scene" ? "The scene has a mistake; the one before goes on." : failure.kind === "step" ? "The simulation failed." : failure.kind === "limit" ? "Too much for this tab." : "The engine was started anew."),
-      h("pre", {}, lines.slice(0, 12).join("\n")),
-    );
-    if (failure.kind === "step") {
-      const button = h("button", { type: "button", class: "button", onclick: () => void cures(button) }, "Look for a cure");
-      alert.append(button);
-    }
-  };
   const cures = async (button: HTMLButtonElement) => {
     button.disabled = true;
     button.textContent = "Trying changes from the last good frame …";
@@ -295,7 +275,7 @@ export const page: Page = async (main, rest) => {
     } catch (error) {
       if (!(error instanceof EngineError)) throw error;
       const { failure } = error;
-      complain(failure);
+      viewer.complain(failure);
       editor.issues(failure.issues);
       issuesBox.replaceChildren(...failure.issues.map((i) => h("li", {}, i.line ? h("button", { type: "button", class: "line", onclick: () => editor?.goto(i.line!) }, `Line ${i.line}`) : null, h("span", {}, `${i.path ? `${i.path}: ` : ""}${i.message}`))));
     } finally {
@@ -431,20 +411,12 @@ export const page: Page = async (main, rest) => {
     }
   };
   const theme = () => {
-    stage.theme();
     comparison.theme();
     energy.setCurves(energyCurves());
     drawEnergy();
   };
   addEventListener("themechange", theme);
-  const offKeys = keys(session, stage);
-  const restarted = (message: string) => {
-    complain({ kind: "crash", message: `${message}\nThe scene stands at its start again.`, issues: [] });
-    void session.revived();
-  };
-  engine().onrestart = restarted;
-
-  const schema = engine()
+  void engine()
     .schema()
     .then((found) => {
       panel = new Panel(found, { set: change });
@@ -452,8 +424,9 @@ export const page: Page = async (main, rest) => {
       if (session.info) panel.open(session.info, session.toml, session.overrides);
     })
     .catch((error) => valuesTab.append(h("p", {}, String(error.message ?? error))));
-  void begin(session, start, (i) => (wait.textContent = `frame ${i} of ${start.shared!.frame}`))
-    .then((told) => {
+  void viewer
+    .begin(async () => {
+      const told = await begin(session, start, (i) => viewer.waiting(`frame ${i} of ${start.shared!.frame}`, () => session.stop()));
       recipe = session.recipe;
       if (start.shared) {
         const { version } = start.shared;
@@ -462,17 +435,12 @@ export const page: Page = async (main, rest) => {
       }
       // Where somebody shared a moment, one stands at it, with its hash.
       if (start.shared?.hash) tellHash();
-      else if (!matchMedia("(prefers-reduced-motion: reduce)").matches) session.play();
-      main.dataset.ready = "true";
+      else if (!reducedMotion()) session.play();
     })
-    .catch((error) => {
-      wait.hidden = true;
-      main.dataset.ready = "failed";
-      if (error instanceof EngineError) {
-        complain(error.failure);
-        choose(1);
-        void openEditor().then(() => editor?.issues(error.failure.issues));
-      } else throw error;
+    .then((failure) => {
+      if (!failure) return;
+      choose(1);
+      void openEditor().then(() => editor?.issues(failure.issues));
     });
 
   // For tests and for the curious.
@@ -480,15 +448,12 @@ export const page: Page = async (main, rest) => {
 
   return () => {
     removeEventListener("themechange", theme);
-    offKeys();
     offPointers();
     saved.close();
     energy.close();
     comparison.close();
     editor?.close();
-    session.close();
-    stage.dispose();
-    void schema;
+    viewer.close();
   };
 };
 

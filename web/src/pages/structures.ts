@@ -1,16 +1,15 @@
 /** A rope, a sheet, a block or a net between a wall and a hand: what each family of links resists. */
-import { check, choice, h, iconButton, saveAs, show, type Page } from "../dom";
-import { EngineError } from "../engine/client";
+import { asScene, asSceneButton, figure, slide } from "../demo";
+import { check, choice, h, iconButton, show, type Page } from "../dom";
 import type { Frame, Value } from "../engine/protocol";
-import { legendBox } from "../legend";
 import { FAMILIES, familiesOf, RESISTS, type Family } from "../links";
 import { curveColor, Plot } from "../plot";
 import { pointers } from "../pointer";
-import { dropped, engine, Session } from "../session";
-import { addressed } from "../source";
+import { pictureButton } from "../saving";
+import { dropped } from "../session";
 import { cards } from "../theory";
-import { keys, transport } from "../transport";
-import { LOOK, Stage } from "../view/stage";
+import { transport } from "../transport";
+import { reducedMotion, Viewer } from "../viewer";
 import { BUILDS, grip, links, mesh, MESH, scene, SOFT, springs, start, strength, type Choices, type Deed, type Kind } from "./structures-scene";
 
 const VERBS: Record<Deed, string> = { shear: "Shear it", bend: "Bend it", twist: "Twist it", stretch: "Stretch it" };
@@ -18,64 +17,27 @@ const capital = (text: string) => text.charAt(0).toUpperCase() + text.slice(1);
 
 export const page: Page = async (main) => {
   document.title = "Structures · tumble";
-  main.className = "lab-page";
   let c: Choices = start("sheet");
-  const session = new Session();
+  const viewer = new Viewer(main, "The structure. Drag a mass to pull it; space plays, arrows turn the view, plus and minus zoom, 0 brings the view back.");
+  const { session, stage, canvas } = viewer;
   session.endless = true;
-  const canvas = h("canvas", { "aria-hidden": "true" });
-  const { element: legendElement, update: tellLegend } = legendBox(() => stage);
-  const wait = h("div", { class: "wait" }, "Loading the engine …");
-  const stageBox = h("div", { class: "stage", tabindex: 0, role: "group", "aria-label": "The structure. Drag a mass to pull it; space plays, arrows turn the view, plus and minus zoom, 0 brings the view back." }, canvas, legendElement, wait);
-  const alert = h("div", { class: "alert", role: "alert", hidden: true });
+  Object.assign(stage.look, { links: true, color: "strain", hidden: ["places"] });
+  session.wanted = () => [...new Set([...stage.wanted, "link_strain"])];
   const about = h("p", { class: "doc", id: "about" });
   const plot = new Plot([{ label: "energy of the links", color: curveColor(0), width: 2 }], { label: "Elastic energy of the links against time", x: "time [s]", height: 130 });
-  const figure = (id: string, label: string) => {
-    const value = h("output", { id, "aria-label": label }, "–");
-    return { value, row: h("div", { class: "figure" }, h("span", {}, label), value) };
-  };
-  const figures = { strain: figure("strain", "Largest strain"), energy: figure("energy", "Energy of the links"), way: figure("way", "The end gave way"), pull: figure("pull", "The hand pulls") };
+  const figures = { strain: figure("Largest strain", "strain"), energy: figure("Energy of the links", "energy"), way: figure("The end gave way", "way"), pull: figure("The hand pulls", "pull") };
 
-  const complain = (error: unknown) => {
-    if (!(error instanceof EngineError)) throw error;
-    alert.hidden = false;
-    alert.replaceChildren(h("strong", {}, "This does not work."), h("pre", {}, error.failure.message));
-  };
-  const rebuild = async () => {
+  const rebuild = () => {
     if (c.kind === "net") dropped[MESH] = mesh(c);
-    try {
-      await session.load(scene(c));
-      alert.hidden = true;
-    } catch (error) {
-      complain(error);
-    }
+    return session.load(scene(c));
   };
   /** Changes a value while the world goes on. */
   const set = async (path: string, value: Value) => {
-    try {
-      await session.set(path, value);
-      alert.hidden = true;
-      session.play();
-    } catch (error) {
-      complain(error);
-    }
+    if (!(await viewer.attempt(() => session.set(path, value)))) session.play();
   };
   const hold = () => set("anchor", springs(c));
   const relink = () => set(`${c.kind}.0.links`, links(c));
 
-  const slide = (label: string, low: number, high: number, value: number, text: (v: number) => string, act: (v: number) => void, step = (high - low) / 100) => {
-    const out = h("output", {}, text(value));
-    let timer = 0;
-    const input = h("input", {
-      type: "range", min: low, max: high, step, value, "aria-label": label, "aria-valuetext": text(value),
-      oninput: () => {
-        out.textContent = text(Number(input.value));
-        input.setAttribute("aria-valuetext", text(Number(input.value)));
-        clearTimeout(timer);
-        timer = window.setTimeout(() => act(Number(input.value)), 120);
-      },
-    });
-    return h("label", { class: "slide" }, h("span", { class: "slide-head" }, h("span", {}, label), out), input);
-  };
   /** By factors of ten around a value, two figures. */
   const factor = (label: string, unit: string, middle: number, value: number, act: (v: number) => void) => {
     const of = (v: number) => Number((10 ** v).toPrecision(2));
@@ -87,7 +49,7 @@ export const page: Page = async (main) => {
     // A rope is a line without them, too.
     seeLinks(c.kind !== "rope");
     draw();
-    void rebuild();
+    void viewer.attempt(rebuild);
   });
   which.querySelector("select")!.id = "structure";
   const deeds = h("div", { class: "deeds", role: "group", "aria-label": "What the hand does" });
@@ -110,7 +72,7 @@ export const page: Page = async (main) => {
   const picture = h("section", { class: "card" }, h("h2", {}, "Picture"), strainBox, asLinks, sights);
   const again = () => void session.refresh().then(() => {
     stage.again();
-    tellLegend();
+    viewer.tellLegend();
   });
 
   const press = () => {
@@ -130,7 +92,7 @@ export const page: Page = async (main) => {
     const [least, , most] = b.fineness;
     build.replaceChildren(h("h2", {}, "Structure"), which, about, slide(b.pieces, least, most, c.fineness, String, (v) => {
       c.fineness = v;
-      void rebuild();
+      void viewer.attempt(rebuild);
     }, 1));
     families.replaceChildren(h("h2", {}, "Families of links"), ...b.families.map((family) =>
       h("div", { class: "family" },
@@ -154,19 +116,14 @@ export const page: Page = async (main) => {
     })));
   };
 
-  const asScene = async () => {
-    const toml = scene(c).replace(/^frames = .*$/m, "frames = 600");
-    location.hash = await addressed(toml);
-  };
   const theory = h("section", { class: "beside", "aria-label": "Theory" });
   main.append(
     h("div", { class: "lab" },
       h("section", { class: "view", "aria-label": "Structure" },
         h("div", { class: "lab-head" },
           h("div", {}, h("h1", {}, "Structures in the hand"), h("p", { class: "muted" }, "Take a family of links away, and see what it was for.")),
-          h("div", { class: "actions" }, iconButton("camera", "Save the picture (PNG)", () => void stage.picture().then((b) => saveAs(b, `${c.kind}.png`))), iconButton("frame", "View from the start", () => stage.goHome()),
-            h("button", { type: "button", class: "button", title: "With its text and all its values", onclick: () => void asScene() }, "As a scene"))),
-        alert, stageBox, deeds, transport(session),
+          h("div", { class: "actions" }, pictureButton(stage, () => c.kind), iconButton("frame", "View from the start", () => stage.goHome()), asSceneButton(() => asScene(scene(c), 600)))),
+        viewer.alert, viewer.box, deeds, transport(session),
         h("div", { class: "figures in-line" }, figures.way.row, figures.pull.row, figures.energy.row, figures.strain.row),
         h("div", { class: "energy" }, h("h2", {}, "Energy of the links", h("span", { class: "unit" }, "J")), plot.element),
       ),
@@ -175,9 +132,6 @@ export const page: Page = async (main) => {
     ),
   );
 
-  const stage = new Stage(canvas);
-  stage.look = { ...LOOK, links: true, color: "strain", hidden: ["places"] };
-  session.wanted = () => [...new Set([...stage.wanted, "link_strain"])];
   draw();
 
   /** Energy of the links at each time. */
@@ -225,7 +179,6 @@ export const page: Page = async (main) => {
     ends = grip(c);
   };
   session.on("loaded", (info) => {
-    wait.hidden = true;
     curve = [];
     stage.open(info, session.frame, false);
     took();
@@ -236,39 +189,23 @@ export const page: Page = async (main) => {
   });
   session.on("frame", (frame) => {
     stage.show(frame);
-    tellLegend();
+    viewer.tellLegend();
     measure(frame);
-    main.dataset.frame = String(frame.index);
     session.trim(900);
   });
-  session.on("failed", (failure) => complain(new EngineError(failure)));
 
   const offPointers = pointers(canvas, stage, session);
-  const theme = () => stage.theme();
-  addEventListener("themechange", theme);
-  const offKeys = keys(session, stage);
-  engine().onrestart = (message) => {
-    alert.hidden = false;
-    alert.replaceChildren(h("strong", {}, "The engine was started anew."), h("pre", {}, message));
-    void session.revived();
-  };
   void cards([{ page: "structures", tags: ["structures.1", "structures.2", "structures.11"] }, { page: "springs", tags: ["springs.1", "springs.2", "springs.8"] }, { page: "bending", tags: [] }]).then((made) => theory.replaceChildren(...made));
-  void rebuild().then(() => {
-    main.dataset.ready = session.info ? "true" : "failed";
-    if (session.info && !matchMedia("(prefers-reduced-motion: reduce)").matches) {
-      c.deed = "shear";
-      press();
-      void hold();
-    }
+  void viewer.begin(rebuild).then((failure) => {
+    if (failure || reducedMotion()) return;
+    c.deed = "shear";
+    press();
+    void hold();
   });
-  Object.assign(window, { tumble: { session, stage, engine: engine() } });
 
   return () => {
-    removeEventListener("themechange", theme);
-    offKeys();
     offPointers();
     plot.close();
-    session.close();
-    stage.dispose();
+    viewer.close();
   };
 };

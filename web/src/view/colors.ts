@@ -19,7 +19,7 @@ const MAPS = {
 
 export type MapName = keyof typeof MAPS;
 
-/** Colours of what lies on grids; all others in viridis. */
+/** Colours of columns; all others in viridis. */
 const OF: Record<string, MapName> = {
   density: "cividis",
   fuel: "cividis",
@@ -28,6 +28,7 @@ const OF: Record<string, MapName> = {
   pressure: "PuOr_r",
   divergence: "PRGn",
   difference: "RdBu_r",
+  strain: "strain",
 };
 
 /** Shown around zero. */

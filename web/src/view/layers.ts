@@ -2,7 +2,7 @@
 import * as THREE from "three";
 import { toCreasedNormals } from "three/examples/jsm/utils/BufferGeometryUtils.js";
 import type { Column, Numbers } from "../engine/protocol";
-import { mapOf, SIGNED, table, type MapName } from "./colors";
+import { mapOf, table, type MapName } from "./colors";
 import { SOLIDS } from "./depths";
 import { BALLS, PIECES, PLANE, SPACE } from "./shaders";
 
@@ -150,10 +150,6 @@ export class Pieces implements Layer {
     this.done(k);
   }
 
-  set radius(value: number) {
-    this.material.uniforms.radius.value = value;
-  }
-
   /** Lets one see through it, and through to what lies in the same place. */
   veil(opacity: number): void {
     this.material.uniforms.fade.value = opacity;
@@ -282,13 +278,13 @@ export function scalars(column: Column): Numbers {
   return out;
 }
 
-/** From where to where the colours of a field run: grows at once, shrinks slowly. */
+/** From where to where the colours of a field run, around zero where it is signed: grows at once, shrinks slowly. */
 export class Range {
   low = 0;
   high = 0;
   private fresh = true;
 
-  constructor(private readonly column: string) {}
+  constructor(private readonly signed: boolean) {}
 
   look(values: Numbers): void {
     let low = Infinity;
@@ -299,7 +295,7 @@ export class Range {
       if (v > high) high = v;
     }
     if (!Number.isFinite(low) || !Number.isFinite(high)) return;
-    if (SIGNED.includes(this.column)) {
+    if (this.signed) {
       // A few cells beside walls are far off the rest. An odd stride does not stay in a few columns of the grid.
       const step = Math.floor(values.length / 4096) | 1;
       const seen: number[] = [];
@@ -384,13 +380,13 @@ export class PlaneField implements Layer {
     this.object.renderOrder = -1;
   }
 
-  set(name: string, values: Numbers, range: [number, number], { dye = false, smoothly = true, lines = false, map }: { dye?: boolean; smoothly?: boolean; lines?: boolean; map?: MapName } = {}): void {
+  set(name: string, values: Numbers, range: [number, number], { dye, smoothly, lines }: { dye: boolean; smoothly: boolean; lines: boolean }): void {
     const data = this.texture.image.data as Float32Array;
     if (values.length !== data.length) return;
     data.set(values);
     this.texture.needsUpdate = true;
     const u = this.material.uniforms;
-    u.map.value = mapTexture(map ?? mapOf(name));
+    u.map.value = mapTexture(mapOf(name));
     u.range.value.set(...range);
     u.dye.value = dye;
     u.smoothly.value = smoothly;

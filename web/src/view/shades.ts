@@ -1,6 +1,7 @@
 /** Colours of masses and links by what they do: one scale for all objects of a picture, so that its legend holds for each. */
 import type { Column, Frame, Numbers } from "../engine/protocol";
 import { FAMILIES, type Family } from "../links";
+import { mapOf } from "./colors";
 import { Range, scalars, type Rgb } from "./layers";
 import { palette, pick } from "./scenery";
 
@@ -53,7 +54,7 @@ function joined(lists: Numbers[]): Numbers {
 
 export class Shades {
   legend: Legend | null = null;
-  private ranges = { speed: new Range("speed"), strain: new Range("pressure") };
+  private ranges = { speed: new Range(false), strain: new Range(true) };
   private colors = new Map<string, Float32Array>();
 
   /** Takes the colours of a frame. */
@@ -81,7 +82,7 @@ export class Shades {
     let [low, high] = this.ranges[by].pair;
     if (strain && high < UNSTRAINED) [low, high] = [-UNSTRAINED, UNSTRAINED];
     this.legend = { name: by, unit: strain ? "1" : "m/s", low, high };
-    const map = palette(strain ? "strain" : "viridis");
+    const map = palette(mapOf(by));
     for (const [name, list] of values) {
       const colors = new Float32Array(3 * list.length);
       for (let i = 0; i < list.length; i++) colors.set(pick(map, (list[i] - low) / (high - low)), 3 * i);

@@ -3,7 +3,7 @@ import * as THREE from "three";
 import { OrbitControls } from "three/examples/jsm/controls/OrbitControls.js";
 import type { Column, Frame, Numbers, SceneInfo, Vector } from "../engine/protocol";
 import { FAMILIES, familiesOf, isOn, linked, type Family } from "../links";
-import { mapOf, PALETTE, SIGNED } from "./colors";
+import { PALETTE, SIGNED } from "./colors";
 import { Depths } from "./depths";
 import { gridOf, PIXELS, PlaneField, Pieces, Points, Range, scalars, SpaceField, Surface, type Grid, type Layer, type Rgb } from "./layers";
 import { arrows, carry, countOf, endsOf, leapOf, outline, planeOf, sharp, shownOf } from "./scenery";
@@ -82,20 +82,23 @@ export class Stage {
   legend: Legend | null = null;
   /** Called after each picture. */
   drawn: () => void = () => {};
-  /** Draws without the means of large screens, for small pictures side by side. */
-  constructor(readonly canvas: HTMLCanvasElement, { controls = true, shadows = true } = {}) {
+
+  constructor(
+    readonly canvas: HTMLCanvasElement,
+    /** Whether pointers may turn the camera; where they do not, there is nothing to throw a shadow. */
+    private readonly turns = true,
+  ) {
     this.renderer = new THREE.WebGLRenderer({ canvas, antialias: true, alpha: true, preserveDrawingBuffer: false, powerPreference: "high-performance" });
-    this.renderer.shadowMap.enabled = shadows;
+    this.renderer.shadowMap.enabled = turns;
     this.renderer.shadowMap.type = THREE.PCFShadowMap;
     this.renderer.toneMapping = THREE.NoToneMapping;
-    this.light.castShadow = shadows;
+    this.light.castShadow = turns;
     this.light.shadow.mapSize.set(1024, 1024);
     this.light.shadow.radius = 4;
     this.light.shadow.bias = -0.0005;
     this.light.shadow.normalBias = 0.02;
     this.scene.add(this.light, this.light.target, this.sky, this.handle.object);
     this.controls = this.controlled();
-    this.controls.enabled = controls;
     this.observer = new ResizeObserver(() => this.resize());
     this.observer.observe(canvas.parentElement ?? canvas);
   }
@@ -103,8 +106,8 @@ export class Stage {
   private controlled(): OrbitControls {
     const controls = new OrbitControls(this.camera, this.canvas);
     controls.enableDamping = false;
+    controls.enabled = this.turns;
     controls.addEventListener("change", () => this.touch());
-    // The page scrolls by one finger where there is nothing to turn.
     return controls;
   }
 
@@ -117,6 +120,7 @@ export class Stage {
     this.renderer.dispose();
     this.renderer.forceContextLoss();
     this.info = this.frame = null;
+    this.dirty = false;
   }
 
   private clear(): void {
@@ -148,8 +152,8 @@ export class Stage {
     return this.info?.dimension === 2;
   }
 
-  /** Whether a gas lies in a plane, which a pointer can stir. */
-  get gas(): { name: string; grid: Grid } | null {
+  /** The first gas. */
+  private get gas(): { name: string; grid: Grid } | null {
     const object = this.info?.objects.find((o) => o.kind === "gas");
     const thing = this.things.find((t) => t.name === object?.name && t.grid);
     return thing?.grid ? { name: thing.name, grid: thing.grid } : null;
@@ -163,7 +167,7 @@ export class Stage {
     const gas = this.gas;
     if (!gas || this.flat) return gas && { name: gas.name };
     const { slice, sliceAt } = this.look;
-    if (slice === null || this.controls.enabled) return null;
+    if (slice === null || this.turns) return null;
     const { origin, spacing, cells } = gas.grid;
     const [x, y, z] = [0, 1, 2].map((a) => origin[a] + (a === slice ? sliceAt : 0.5) * cells[a] * spacing);
     return { name: gas.name, through: new THREE.Vector3(x, y, z) };
@@ -341,12 +345,10 @@ export class Stage {
     const [w, hgt] = this.size();
     const wasFlat = (this.camera as THREE.OrthographicCamera).isOrthographicCamera;
     if (keep && !!wasFlat === flat) return;
-    if (!!wasFlat !== flat || !this.controls) {
-      const enabled = this.controls.enabled;
+    if (!!wasFlat !== flat) {
       this.controls.dispose();
       this.camera = flat ? new THREE.OrthographicCamera() : new THREE.PerspectiveCamera(35, 1, 0.01, 1000);
       this.controls = this.controlled();
-      this.controls.enabled = enabled;
       this.controls.enableRotate = !flat;
     }
     if (flat) {
@@ -522,7 +524,7 @@ export class Stage {
     if (sizes) values = values.map((v) => Math.abs(v));
     const key = sizes ? `size of ${name}` : name;
     let range = thing.ranges.get(key);
-    if (!range) thing.ranges.set(key, (range = new Range(sizes ? "" : name)));
+    if (!range) thing.ranges.set(key, (range = new Range(signed && !sizes)));
     range.look(values);
     const [low, high] = range.pair;
     this.legend = { name, unit: column.unit, low, high };
@@ -535,7 +537,7 @@ export class Stage {
       let hot: { values: Numbers; low: number; high: number } | undefined;
       if (warm) {
         let heat = thing.ranges.get("heat");
-        if (!heat) thing.ranges.set("heat", (heat = new Range("temperature")));
+        if (!heat) thing.ranges.set("heat", (heat = new Range(false)));
         heat.look(warm.data);
         if (heat.high > GLOWING) hot = { values: warm.data, low: 0, high: Math.max(heat.high, 1) };
       }
@@ -547,7 +549,7 @@ export class Stage {
     thing.arrows.object.visible = this.look.arrows && !!columns.velocity;
     if (!thing.arrows.object.visible) return;
     let fastest = thing.ranges.get("arrows");
-    if (!fastest) thing.ranges.set("arrows", (fastest = new Range("speed")));
+    if (!fastest) thing.ranges.set("arrows", (fastest = new Range(false)));
     fastest.look(scalars(columns.velocity));
     arrows(thing.arrows, grid, columns.velocity, fastest.high, this.dark || !(this.look.dye && this.look.field === "density") ? 0.95 : 0.1);
   }
@@ -646,13 +648,14 @@ export class Stage {
     return ray.ray.intersectPlane(plane, new THREE.Vector3());
   }
 
-  /** Width of what is seen [m], and whether the camera turns by the pointer. */
+  /** Width of what is seen [m]. */
   get width(): number {
     return this.home.width / this.camera.zoom;
   }
 
+  /** Whether the pointer turns the camera now; never where it may not at all. */
   set turning(on: boolean) {
-    this.controls.enabled = on;
+    this.controls.enabled = on && this.turns;
   }
 
   /** Draws the spring between a mass and the pointer; nothing without an end. */
@@ -717,7 +720,4 @@ export class Stage {
     return document.documentElement.dataset.theme === "dark" ? ["#1b2027", "#14181d"] : ["#f6f8fa", "#e3e8ee"];
   }
 }
-
-/** Which map the legend shows. */
-export const legendMap = (name: string) => (name === "strain" ? ("strain" as const) : name === "speed" ? ("viridis" as const) : mapOf(name));
 
