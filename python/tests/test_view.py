@@ -2,6 +2,7 @@
 
 import base64
 import json
+import random
 import signal
 import subprocess
 import sys
@@ -117,6 +118,11 @@ def test_wrong_scenes_are_told_before_anything_is_served(
     long.write_text(long.read_text() + " " * view.LARGEST)
     answer = tumble("view", long, "--no-open")
     assert answer.code == 2 and "up to 2 MB" in answer.err
+    numbers = random.Random(1)
+    points = [[numbers.random() for _ in range(3)] for _ in range(8000)]
+    many = scene_file({"version": 1, "particles": [{"name": "p", "position": points}]})
+    answer = tumble("view", many, "--no-open")
+    assert answer.code == 2 and "too large for an address" in answer.err and "drop the file" in answer.err
 
 
 def test_versions_that_are_not_there_are_told_by_a_page(site: str) -> None:

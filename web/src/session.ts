@@ -368,7 +368,7 @@ export class Session {
       parting.root = frame.index;
       while (frame.index < at) {
         const before = frame.index;
-        frame = await this.engine.step({ frames: at - before, columns: this.wanted() }, this.world);
+        frame = await this.engine.step({ frames: at - before, budget: 1000, columns: this.wanted() }, this.world);
         if (frame.index <= before) break;
       }
       parting.frame = frame;

@@ -55,7 +55,39 @@ test("what is too large is refused before any memory is taken", () => {
   assert.equal(failure(() => made("#".repeat(9 << 20))).kind, "limit");
 });
 
+test("what lives for longer than its scene takes no memory for it", () => {
+  const emitter = 'version = 1\ntime.frames = 24\n[[emitter]]\nname = "e"\nfrom.box.size = [1, 1, 1]\nrate = 10\nlifetime = ';
+  const before = memory.buffer.byteLength;
+  for (const lifetime of ["1e7", "1e9", "1e300"]) {
+    const world = made(emitter + lifetime);
+    for (let i = 0; i < 30; i++) world.step(60_000);
+    world.free();
+  }
+  assert.ok(memory.buffer.byteLength - before < 2 ** 24, `${memory.buffer.byteLength - before} bytes`);
+});
+
+test("what is found by long search ends in time", () => {
+  const stars = 'version = 1\nworld.gravity = [0, 0, 0]\n[[force]]\nkind = "gravitation"\nconstant = 1\nsoftening = 0.1\n[[galaxy]]\nname = "g"\nstars = 12000\nmass = 1\nlength = 1\n';
+  const world = made(stars);
+  const start = performance.now();
+  assert.deepEqual(JSON.parse(world.stability(50)), []);
+  world.grab("g", 7, [0, 0, 0], undefined);
+  // Nothing is told of how long it may be, but a whole search takes more than a minute.
+  assert.ok(performance.now() - start < 30_000);
+  world.free();
+});
+
+test("more colliders than can be drawn are refused", () => {
+  const many = (n: number) => BALL + Array.from({ length: n }, (_, i) => `[[collider]]\nname = "c${i}"\nshape.floor.height = -${i}\n`).join("");
+  made(many(10)).free();
+  const found = failure(() => made(many(2001)));
+  assert.equal(found.kind, "limit");
+  assert.match(found.message, /2001 colliders.* 2000/);
+});
+
 test("hostile text is only text", () => {
+  assert.match(failure(() => made(BALL, [`${Array(100_000).fill("a").join(".")}=1`])).message, /nested too deeply/);
+  assert.equal(failure(() => made(BALL + "[[force]]\n".repeat(3000))).issues.length, 1000);
   const deep = `version = 1\nx = ${"[".repeat(100_000)}${"]".repeat(100_000)}\n`;
   assert.equal(failure(() => made(deep)).kind, "scene");
   assert.equal(failure(() => made(`{"version": 1, "x": ${'{"a":'.repeat(1000)}1${"}".repeat(1000)}}`)).kind, "scene");

@@ -54,6 +54,25 @@ const dropped = async (name: string, buffer: Buffer) => {
 };
 
 describe("links", () => {
+  it("to a frame that is far away can be stopped", async () => {
+    const first = await scene("springs/forever");
+    const { text, resolved } = await first.page.evaluate(() => ({ text: (window as any).tumble.session.toml, resolved: (window as any).tumble.session.info.scene }));
+    const link = await pack({ version: VERSION, text, overrides: [], scene: resolved, changes: [], frame: 1e9, hash: "0".repeat(16) });
+    const { page, errors } = await visit(`${own.address}v/${VERSION}/#/s/${link}`);
+    await page.click("text=Stop here");
+    await ready(page);
+    const latest = () => page.evaluate(() => (window as any).tumble.session.latest as number);
+    const stopped = await latest();
+    await page.waitForTimeout(300);
+    assert.equal(await latest(), stopped);
+    assert.match((await page.textContent(".scene-id")) ?? "", /stopped before the frame that was shared/);
+    await page.click("[aria-label='One frame on']");
+    await page.waitForFunction((n) => (window as any).tumble.session.latest === n + 1, stopped);
+    assert.deepEqual([...first.errors, ...errors], []);
+    await first.page.context().close();
+    await page.context().close();
+  });
+
   it("hold what was changed on the way: whoever opens one under its version sees the same bits", async () => {
     const first = await scene("structures/rope");
     const hashes = await first.page.evaluate(async () => {

@@ -24,6 +24,9 @@ BUILT = Path(__file__).resolve().parent.parent / "web"
 LARGEST = 2_000_000
 """Bytes that a link may unpack to; web/src/share.ts has the same."""
 
+LONGEST = 100_000
+"""Characters of an address that a program takes as an argument."""
+
 _TYPES = {".js": "text/javascript", ".wasm": "application/wasm", ".css": "text/css", ".webp": "image/webp"}
 
 
@@ -83,7 +86,13 @@ def address(argument: str, overrides: list[str] | None) -> tuple[str, dict[str, 
             f"{file}: as text, and with every default written out, the scene has {len(tree) / 1e6:.1f} MB; "
             f"the browser takes up to {LARGEST // 1_000_000} MB"
         )
-    return f"s/{link(tree)}", meshes
+    packed = link(tree)
+    if len(packed) > LONGEST:
+        raise SceneError(
+            f"{file}: the scene is too large for an address, {len(packed)} characters of {LONGEST}; "
+            "open the gallery with `tumble view` and drop the file on it"
+        )
+    return f"s/{packed}", meshes
 
 
 def shared(text: str, overrides: list[str], resolved: dict[str, Any]) -> bytes:

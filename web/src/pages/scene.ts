@@ -300,6 +300,10 @@ export const page: Page = async (main, rest) => {
     if (info.warnings.length) body.push(h("dt", {}, "Doubtful"), h("dd", {}, info.warnings.join("\n")));
     facts.replaceChildren(...body);
     const list = await session.stability().catch(() => []);
+    const found = new Set(list.map((s) => s.system));
+    for (const s of info.systems) {
+      if (s.method === "dynamics" && !found.has(s.name)) facts.append(h("dt", {}, `Largest steps of "${s.name}"`), h("dd", {}, "take too long to find here; `tumble check` finds them"));
+    }
     const stable = list.filter((s) => s.limits.length);
     for (const s of stable) {
       facts.append(
