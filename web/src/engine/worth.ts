@@ -12,10 +12,9 @@ const cut = (text: string, most: number): string => (text.length > most ? `${tex
 export function readable(failure: Failure): Failure {
   const { issues } = failure;
   const lines = failure.message.split("\n", MOST_ISSUES).map((line) => cut(line, LONGEST.one));
-  const more = issues.length - MOST_ISSUES;
   return {
     ...failure,
-    message: `${cut(lines.join("\n"), LONGEST.all)}${more > 0 ? `\n… and ${more} more` : ""}`,
+    message: `${cut(lines.join("\n"), LONGEST.all)}${issues.length > MOST_ISSUES ? "\n… and more" : ""}`,
     path: failure.path && cut(failure.path, LONGEST.one),
     issues: issues.slice(0, MOST_ISSUES).map((issue) => ({ ...issue, path: cut(issue.path, LONGEST.one), message: cut(issue.message, LONGEST.one) })),
   };
