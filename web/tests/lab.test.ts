@@ -446,6 +446,35 @@ describe("fluid", () => {
     await page.context().close();
   });
 
+  it("has curves in colours of light and of dark", async () => {
+    const { page, errors } = await own.open("fluid", { ...STILL, colorScheme: "light" });
+    await ready(page);
+    await page.evaluate(async () => {
+      const { session } = (window as any).tumble;
+      for (let i = 0; i < 6; i++) await session.next();
+      // The plot takes so many frames at once.
+      await new Promise((done) => setTimeout(done, 200));
+      await session.next();
+    });
+    const seen = () =>
+      page.evaluate(async () => {
+        await new Promise((done) => setTimeout(done, 100));
+        const canvas = document.querySelector<HTMLCanvasElement>(".energy canvas")!;
+        const { data } = canvas.getContext("2d")!.getImageData(0, 0, canvas.width, canvas.height);
+        const [light, dark] = [[0x2a, 0x6f, 0x97], [0x6d, 0xb6, 0xe3]].map(([r, g, b]) => {
+          let n = 0;
+          for (let i = 0; i < data.length; i += 4) if (data[i + 3] > 200 && Math.abs(data[i] - r) + Math.abs(data[i + 1] - g) + Math.abs(data[i + 2] - b) < 12) n++;
+          return n > 10;
+        });
+        return { light, dark };
+      });
+    assert.deepEqual(await seen(), { light: true, dark: false });
+    await page.click("[aria-label='Light or dark']");
+    assert.deepEqual(await seen(), { light: false, dark: true });
+    assert.deepEqual(errors, []);
+    await page.context().close();
+  });
+
   it("is stirred in space, too, in the slice that is shown", async () => {
     const { page, errors } = await own.open("fluid", STILL);
     await ready(page);
