@@ -21,7 +21,7 @@ export class Comparison {
   readonly chart: HTMLElement;
   private readonly plot: Plot;
   private readonly title = h("h2", {});
-  private readonly value = h("output", { class: "value", "aria-label": "How far apart now" });
+  private readonly value = h("output", { class: "value", "aria-label": "How far apart now", "aria-live": "off" });
   private readonly what = h("span", {});
   private readonly ghost: Ghost;
   private seen: "now" | "before" | "difference" = "now";

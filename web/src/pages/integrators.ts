@@ -172,7 +172,7 @@ export const page: Page = async (main) => {
   const about = h("p", { class: "lead small" });
   const board = h("div", { class: "runs" });
   const alert = h("div", { class: "alert", role: "alert", hidden: true });
-  const clock = h("output", { class: "clock", "aria-label": "Time" }, "0 s");
+  const clock = h("output", { class: "clock", "aria-label": "Time", "aria-live": "off" }, "0 s");
   const play = iconButton("play", "Play", () => (playing ? pause() : start()), { class: "icon-button primary" });
   const curves = (): Curve[] => runs.map((r, k) => ({ label: plain(r.scheme), color: k, width: 2 }));
   const make = (label: string, log: boolean) => new Plot([], { label, x: "time [s]", log, height: 190 });
@@ -306,7 +306,7 @@ export const page: Page = async (main) => {
     for (const old of runs) void engine().drop(old.world).catch(() => {});
     runs = schemes.map((scheme, k) => {
       const canvas = h("canvas", { "aria-hidden": "true" });
-      const ratio = h("output", { class: "big", "data-ratio": scheme }, "1");
+      const ratio = h("output", { class: "big", "data-ratio": scheme, "aria-live": "off" }, "1");
       const verdict = h("p", { class: "verdict" });
       const predicted = h("p", { class: "muted predicted" });
       const card = h("article", { class: "run", "data-scheme": scheme, style: `--curve:${curveStyle(k)}` }, h("div", { class: "run-head" }, h("h2", {}, plain(scheme)), h("button", { type: "button", class: "as-scene", "aria-label": `Open ${plain(scheme)} as a scene`, title: "Open as a scene, with its text and values", onclick: () => void openScene(scheme) }, "↗")), canvas, h("div", { class: "run-figure" }, h("span", { class: "muted" }, s.field ? "r / r₀" : "E / E₀"), ratio), predicted, verdict);

@@ -440,7 +440,7 @@ export const page: Page = async (main, rest) => {
   void engine()
     .schema()
     .then((found) => {
-      panel = new Panel(found, { set: change });
+      panel = new Panel(found, change);
       valuesTab.append(panel.element);
       if (session.info) panel.open(session.info, session.toml, session.overrides);
     })
