@@ -1,17 +1,12 @@
 /** The laboratory in a real browser. Needs `dist` (make web) and Chromium. */
 import assert from "node:assert/strict";
-import { readdirSync, readFileSync } from "node:fs";
-import { createRequire } from "node:module";
+import { readFileSync } from "node:fs";
 import { gzipSync } from "node:zlib";
 import { after, before, describe, it } from "node:test";
 import type { Page } from "playwright-core";
-import { frame, lab, type Lab } from "./browser.ts";
+import { frame, lab, ready, SCENES, serious, shipped, STILL, type Lab } from "./browser.ts";
 
-const SCENES = "../python/tumble/scenes";
-const ids = readdirSync(SCENES, { withFileTypes: true })
-  .filter((row) => row.isDirectory() && row.name !== "assets")
-  .flatMap((row) => readdirSync(`${SCENES}/${row.name}`).filter((f) => f.endsWith(".toml")).map((f) => `${row.name}/${f.slice(0, -5)}`))
-  .sort();
+const ids = shipped();
 
 let own: Lab;
 before(async () => {
@@ -19,8 +14,6 @@ before(async () => {
 });
 after(() => own?.close());
 
-const STILL = { reducedMotion: "reduce" } as const;
-const ready = (page: Page, timeout = 90_000) => page.waitForFunction(() => document.getElementById("main")!.dataset.ready, null, { timeout });
 /** Leaves the world of the page before for another, in the same worker. */
 const visit = async (page: Page, path: string) => {
   await page.evaluate((to) => {
@@ -592,7 +585,6 @@ describe("integrators", () => {
 });
 
 describe("everyone", () => {
-  const axe = readFileSync(createRequire(import.meta.url).resolve("axe-core/axe.min.js"), "utf8");
   const PAGES = ["", "scene/drape/sheet-on-ball", "fluid", "integrators", "theory", "theory/gas"];
   for (const colorScheme of ["light", "dark"] as const) {
     it(`finds nothing serious by axe, ${colorScheme}`, async () => {
@@ -604,9 +596,8 @@ describe("everyone", () => {
         for (const tab of path.startsWith("scene") ? ["values", "text", "theory", "facts"] : [""]) {
           if (tab) await page.click(`#t-${tab}`);
           if (tab === "text") await page.waitForSelector(".cm-content");
-          await page.evaluate(axe);
-          const issues = await page.evaluate((dark) => (window as any).axe.run(document, { resultTypes: ["violations"], ...(dark ? { runOnly: ["color-contrast"] } : {}) }).then((r: any) => r.violations.filter((v: any) => ["serious", "critical"].includes(v.impact)).map((v: any) => `${v.id}: ${v.nodes.slice(0, 3).map((n: any) => n.target.join(" ") + " " + (n.any[0]?.message ?? "")).join("; ")}`)), colorScheme === "dark");
-          found.push(...issues.map((i: string) => `${path} ${tab}: ${i}`));
+          const issues = await serious(page, colorScheme === "dark");
+          found.push(...issues.map((i) => `${path} ${tab}: ${i}`));
         }
         await page.context().close();
       }
