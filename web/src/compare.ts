@@ -3,13 +3,12 @@ import { difference, fieldOf, ofField, ofPositions, type Measure } from "./apart
 import type { Change } from "./branch";
 import { check, choice, h, show } from "./dom";
 import type { Frame, SceneInfo, Value } from "./engine/protocol";
-import { curveColor, Plot } from "./plot";
+import { Plot } from "./plot";
 import type { Session } from "./session";
 import { literal } from "./values";
 import { Ghost } from "./view/ghost";
+import { gridsOf, massesOf } from "./view/scenery";
 import type { Stage } from "./view/stage";
-
-const GRIDS = ["gas", "heat", "compressible"];
 
 function short(value: Value | null): string {
   const text = value === null ? "not set" : literal(value);
@@ -18,8 +17,7 @@ function short(value: Value | null): string {
 
 const told = ({ path, from, to, frame }: Change): string => `${path ? `${path}: ${short(from)} → ${short(to)}` : "by the pointer"}, from frame ${frame}`;
 
-const gridsOf = (info: SceneInfo): string[] => info.objects.filter((o) => GRIDS.includes(o.kind)).map((o) => o.name);
-const movingOf = (info: SceneInfo): string[] => info.objects.filter((o) => ![...GRIDS, "collider"].includes(o.kind)).map((o) => o.name);
+const names = (objects: SceneInfo["objects"]): string[] => objects.map((o) => o.name);
 
 export class Comparison {
   /** What was changed, and what can be done with the old way. */
@@ -28,7 +26,7 @@ export class Comparison {
   readonly chart: HTMLElement;
   private readonly plot: Plot;
   private readonly title = h("h2", {});
-  private readonly value = h("output", { class: "value", "aria-label": "How far apart now" });
+  private readonly value = h("output", { class: "value", "aria-label": "How far apart now", "aria-live": "off" });
   private readonly what = h("span", {});
   private readonly ghost: Ghost;
   private seen: "now" | "before" | "difference" = "now";
@@ -44,14 +42,10 @@ export class Comparison {
     private readonly drawn: () => void,
   ) {
     this.ghost = new Ghost(stage.scene);
-    this.plot = new Plot(this.curves(), { label: "How far the two ways are apart, against time", x: "time [s]", height: 140, mark: () => session.shown?.time ?? null });
+    this.plot = new Plot([{ label: "apart", color: 4, width: 2, spans: true }], { label: "How far the two ways are apart, against time", x: "time [s]", height: 140, mark: () => session.shown?.time ?? null });
     this.chart = h("div", { class: "energy apart", hidden: true }, this.title, h("ul", { class: "curves" }, h("li", {}, this.what, this.value)), this.plot.element);
     session.on("before", () => this.open());
     session.on("loaded", () => this.open());
-  }
-
-  private curves() {
-    return [{ label: "apart", color: curveColor(4), width: 2, spans: true }];
   }
 
   private get dark(): boolean {
@@ -59,7 +53,6 @@ export class Comparison {
   }
 
   theme(): void {
-    this.plot.setCurves(this.curves());
     this.ghost.open(this.session.before?.info ?? null, this.dark);
     this.again();
   }
@@ -83,7 +76,7 @@ export class Comparison {
   private get field(): { name: string; unit: string } | null {
     const { session } = this;
     const frame = session.frame(session.latest) ?? session.shown;
-    return frame && session.info ? fieldOf(frame, gridsOf(session.info), this.stage.look.field) : null;
+    return frame && session.info ? fieldOf(frame, names(gridsOf(session.info)), this.stage.look.field) : null;
   }
 
   /** A kept frame of the way that is shown. */
@@ -119,15 +112,15 @@ export class Comparison {
       this.again();
       return;
     }
-    const grids = gridsOf(info);
-    const masses = movingOf(info);
+    const grids = names(gridsOf(info));
+    const masses = massesOf(info);
     const fits = grids.length > 0 && grids.every((name) => JSON.stringify([...(before.info.topology[name]?.grid_cells?.data ?? [])]) === JSON.stringify([...(info.topology[name]?.grid_cells?.data ?? [])]));
     if (!fits) this.seen = "now";
     if (!masses.length || !grids.length) this.measured = grids.length ? "field" : "positions";
     const changes = before.changes.map(told);
     if (changes.length > 3) changes.splice(3, changes.length, `and ${before.changes.length - 3} more`);
     const parts: (HTMLElement | null)[] = [
-      Ghost.fits(before.info)
+      massesOf(before.info).length
         ? check("Ghost of the old way", this.ghostly, (on) => {
             this.ghostly = on;
             this.again();
@@ -207,7 +200,7 @@ export class Comparison {
     const of = field?.name ?? "positions";
     const known = this.known.get(a);
     if (known?.other === b && known.of === of) return known.value;
-    const measure: Measure = field ? ofField(field.name) : ofPositions(movingOf(info));
+    const measure: Measure = field ? ofField(field.name) : ofPositions(names(massesOf(info)));
     const value = measure(a, b);
     this.known.set(a, { other: b, of, value });
     return value;

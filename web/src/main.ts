@@ -5,35 +5,35 @@ import { h, iconButton, say, type Leave, type Page } from "./dom";
 let main = document.getElementById("main")!;
 const nav = document.getElementById("nav")!;
 
-/** Address after "#/" -> page; each is fetched when it is first opened. */
-const PAGES: [RegExp, string, () => Promise<{ page: Page }>][] = [
-  [/^$/, "Gallery", () => import("./pages/gallery")],
-  [/^fluid(?:\/(.*))?$/, "Fluid", () => import("./pages/fluid")],
-  [/^integrators(?:\/(.*))?$/, "Integrators", () => import("./pages/integrators")],
-  [/^structures(?:\/(.*))?$/, "Structures", () => import("./pages/structures")],
-  [/^theory(?:\/(.*))?$/, "Theory", () => import("./pages/theory")],
-  [/^scene\/(.*)$/, "", () => import("./pages/scene")],
-  [/^(s\/.*)$/, "", () => import("./pages/scene")],
+/** Address after "#/" -> page, with its name in the header; each is fetched when it is first opened. */
+const PAGES: { address: RegExp; link?: [string, string]; open: () => Promise<{ page: Page }> }[] = [
+  { address: /^$/, link: ["", "Gallery"], open: () => import("./pages/gallery") },
+  { address: /^fluid(?:\/(.*))?$/, link: ["fluid", "Fluid"], open: () => import("./pages/fluid") },
+  { address: /^integrators(?:\/(.*))?$/, link: ["integrators", "Integrators"], open: () => import("./pages/integrators") },
+  { address: /^structures(?:\/(.*))?$/, link: ["structures", "Structures"], open: () => import("./pages/structures") },
+  { address: /^theory(?:\/(.*))?$/, link: ["theory", "Theory"], open: () => import("./pages/theory") },
+  { address: /^scene\/(.*)$/, open: () => import("./pages/scene") },
+  { address: /^(s\/.*)$/, open: () => import("./pages/scene") },
 ];
-const LINKS = ["", "fluid", "integrators", "structures", "theory"];
 
-/** Links of the header. */
-for (const [k, name] of PAGES.map((p) => p[1]).entries()) if (name) nav.append(h("a", { href: `#/${LINKS[k]}` }, name));
+for (const { link } of PAGES) if (link) nav.append(h("a", { href: `#/${link[0]}` }, link[1]));
 
 // Light or dark: as the system says, until a person says otherwise.
 const system = matchMedia("(prefers-color-scheme: dark)");
-function theme(): void {
-  let wish: string | null = null;
-  try {
-    wish = localStorage.getItem("theme");
-  } catch {
-    // No storage: as the system says.
-  }
+function theme(wish: string | null): void {
   document.documentElement.dataset.theme = wish ?? (system.matches ? "dark" : "light");
   dispatchEvent(new Event("themechange"));
 }
-system.addEventListener("change", theme);
-theme();
+/** What a person said; nothing where the browser keeps nothing. */
+function wished(): string | null {
+  try {
+    return localStorage.getItem("theme");
+  } catch {
+    return null;
+  }
+}
+system.addEventListener("change", () => theme(wished()));
+theme(wished());
 document.getElementById("tools")!.append(
   iconButton("theme", "Light or dark", () => {
     const next = document.documentElement.dataset.theme === "dark" ? "light" : "dark";
@@ -42,8 +42,7 @@ document.getElementById("tools")!.append(
     } catch {
       // Holds for this visit.
     }
-    document.documentElement.dataset.theme = next;
-    dispatchEvent(new Event("themechange"));
+    theme(next);
   }),
 );
 
@@ -65,14 +64,14 @@ async function go(): Promise<void> {
   main = fresh;
   // The engine comes while the page does.
   if (/^(scene|s|fluid|integrators|structures)\b/.test(address)) void import("./session").then(({ engine }) => engine().schema()).catch(() => {});
-  for (const [pattern, , open] of PAGES) {
+  const section = address.split("/")[0];
+  for (const link of nav.querySelectorAll("a")) {
+    if (link.getAttribute("href") === `#/${section === "scene" ? "" : section}`) link.setAttribute("aria-current", "page");
+    else link.removeAttribute("aria-current");
+  }
+  for (const { address: pattern, open } of PAGES) {
     const match = pattern.exec(address);
     if (!match) continue;
-    const section = address.split("/")[0];
-    for (const link of nav.querySelectorAll("a")) {
-      if (link.getAttribute("href") === `#/${section}` || (section === "scene" && link.getAttribute("href") === "#/")) link.setAttribute("aria-current", "page");
-      else link.removeAttribute("aria-current");
-    }
     let end: Leave;
     try {
       const { page } = await open();

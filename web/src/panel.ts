@@ -32,10 +32,6 @@ const TELLING: Record<string, string[]> = {
 /** So many of them, at most, so that the rest stays in sight. */
 const MOST_TELLING = 9;
 
-export interface PanelHost {
-  set(path: string, value: Value): Promise<void>;
-}
-
 /** A schema without its references; what stands beside a reference counts. */
 function resolve(node: Schema, all: Schema): Schema {
   let found = node;
@@ -93,7 +89,7 @@ export class Panel {
 
   constructor(
     private readonly schema: Schema,
-    private readonly host: PanelHost,
+    private readonly set: (path: string, value: Value) => Promise<void>,
   ) {
     this.element.append(
       h("div", { class: "panel-head" }, check("Every word, with defaults", false, (on) => {
@@ -185,12 +181,18 @@ export class Panel {
       if (rows.length) sets.push(h("fieldset", { class: "sub" }, h("legend", {}, capital(plain(String(entry.name ?? entry.kind ?? kind.split(".").pop())))), ...rows));
     }
     if (!sets.length) return null;
-    return h("details", { open: !this.closed.has("play"), class: "group play", ontoggle: (event: Event) => this.closed[(event.target as HTMLDetailsElement).open ? "delete" : "add"]("play") }, h("summary", {}, h("span", { class: "group-title" }, "Play with")), ...sets);
+    const group = this.details("play", "Play with", "", sets);
+    group.classList.add("play");
+    return group;
   }
 
   private group(path: string, value: Tree, schema: Schema, explicit: Tree | undefined, title: string, kind: string): HTMLElement | null {
     const rows = this.rows(path, value, schema, explicit);
-    if (!rows.length) return null;
+    return rows.length ? this.details(path, title, kind, rows) : null;
+  }
+
+  /** What can be folded away, and stays as a person left it. */
+  private details(path: string, title: string, kind: string, rows: HTMLElement[]): HTMLElement {
     const open = this.opened.has(path) || (!this.closed.has(path) && !["collider", "camera", "time"].includes(path.split(".")[0]));
     const details = h("details", { open, class: "group" }, h("summary", {}, h("span", { class: "group-title" }, title), kind ? h("span", { class: "group-kind" }, kind) : null), ...rows);
     details.addEventListener("toggle", () => {
@@ -254,11 +256,13 @@ export class Panel {
   private field(path: string, key: string, schema: Schema, unit: string, control: (id: string) => HTMLElement): HTMLElement {
     const id = `v${++count}`;
     const doc = String(schema.description ?? "").replace(/\s+/g, " ").replace(/`/g, "");
+    const body = control(id);
+    if (doc) body.querySelector(`#${id}`)!.setAttribute("aria-describedby", `${id}d`);
     return h(
       "div",
       { class: "field", "data-path": path },
       h("div", { class: "field-head" }, h("label", { for: id }, capital(plain(key))), unit ? h("span", { class: "unit" }, unit) : null),
-      control(id),
+      body,
       doc ? h("p", { class: "doc", id: `${id}d` }, doc) : null,
     );
   }
@@ -274,20 +278,20 @@ export class Panel {
       if (said && typeof said === "object") continue;
       const table = structuredClone(now);
       keys.slice(i + 1, -1).reduce((at, k) => at[k], table)[keys.at(-1)!] = value;
-      return this.host.set(keys.slice(0, i + 1).join("."), full(table));
+      return this.set(keys.slice(0, i + 1).join("."), full(table));
     }
-    await this.host.set(path, value);
+    await this.set(path, value);
   }
 
   private number(id: string, path: string, value: number, schema: Schema, whole: boolean): HTMLElement {
     const low = schema.minimum ?? schema.exclusiveMinimum;
     const high = schema.maximum ?? schema.exclusiveMaximum;
-    const input = h("input", { id, type: "number", value: String(value), step: "any", min: schema.minimum ?? false, max: schema.maximum ?? false, "aria-describedby": `${id}d`, inputmode: whole ? "numeric" : "decimal" });
+    const input = h("input", { id, type: "number", value: String(value), step: "any", min: schema.minimum ?? false, max: schema.maximum ?? false, inputmode: whole ? "numeric" : "decimal" });
     // Short ranges are straight; long ones of positive numbers run by factors around the value.
     const straight = low !== undefined && high !== undefined && high - low <= 1000 && high / Math.max(Math.abs(value), 1e-9) < 1e3;
     const positive = !straight && value > 0;
     const [from, to] = straight ? [low, high] : positive ? [Math.log10(value) - 1, Math.log10(value) + 1] : value === 0 ? [low === undefined ? -1 : 0, 1] : [-2 * Math.abs(value), 2 * Math.abs(value)];
-    const slider = h("input", { type: "range", min: from, max: to, step: (to - from) / 200, value: positive ? Math.log10(value) : value, "aria-label": `${id} slider`, tabindex: -1, "aria-hidden": "true" });
+    const slider = h("input", { type: "range", min: from, max: to, step: (to - from) / 200, value: positive ? Math.log10(value) : value, tabindex: -1, "aria-hidden": "true" });
     let timer = 0;
     slider.addEventListener("input", () => {
       let v = positive ? 10 ** Number(slider.value) : Number(slider.value);
@@ -315,7 +319,6 @@ export class Panel {
       "select",
       {
         id,
-        "aria-describedby": `${id}d`,
         onchange: () => {
           tell(list.value);
           void this.send(path, list.value);

@@ -5,7 +5,8 @@ import { h, show } from "./dom";
 
 export interface Curve {
   label: string;
-  color: string;
+  /** Which of `CURVES`. */
+  color: number;
   dash?: number[];
   width?: number;
   /** Goes on across points that are not there. */
@@ -18,7 +19,9 @@ const CURVES_DARK = ["#6db6e3", "#f08a73", "#6cc98a", "#d9bc4a", "#bd98e0", "#5c
 
 const css = (name: string) => getComputedStyle(document.documentElement).getPropertyValue(name).trim();
 export const isDark = () => document.documentElement.dataset.theme === "dark";
+/** The colour of a curve now, and as the page's own styles take it. */
 export const curveColor = (k: number) => (isDark() ? CURVES_DARK : CURVES)[k % CURVES.length];
+export const curveStyle = (k: number) => `light-dark(${CURVES[k % CURVES.length]}, ${CURVES_DARK[k % CURVES.length]})`;
 
 interface PlotOptions {
   /** Read to those who do not see it. */
@@ -102,7 +105,7 @@ export class Plot {
         axes: [axis(2), axis(3)],
         series: [
           { label: x ?? "" },
-          ...this.curves.map((c): uPlot.Series => ({ label: c.label, stroke: c.color, width: c.width ?? 1.75, dash: c.dash, spanGaps: c.spans, points: { show: false }, value: (_u, v) => show(v) })),
+          ...this.curves.map((c): uPlot.Series => ({ label: c.label, stroke: curveColor(c.color), width: c.width ?? 1.75, dash: c.dash, spanGaps: c.spans, points: { show: false }, value: (_u, v) => show(v) })),
         ],
         hooks: mark
           ? {
@@ -161,7 +164,7 @@ export function legend(curves: Curve[]): { element: HTMLElement; set: (values: s
   const element = h(
     "ul",
     { class: "curves" },
-    ...curves.map((c, i) => h("li", {}, h("i", { class: c.dash ? "dash" : false, style: `--curve:${c.color}` }), h("span", {}, c.label), values[i])),
+    ...curves.map((c, i) => h("li", {}, h("i", { class: c.dash ? "dash" : false, style: `--curve:${curveStyle(c.color)}` }), h("span", {}, c.label), values[i])),
   );
   return { element, set: (texts) => texts.forEach((t, i) => (values[i].textContent = t)) };
 }

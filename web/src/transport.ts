@@ -5,7 +5,7 @@ import type { Session } from "./session";
 export function transport(session: Session): HTMLElement {
   const play = iconButton("play", "Play", () => session.toggle(), { class: "icon-button primary" });
   const slider = h("input", { type: "range", min: 0, max: 1, step: 1, value: 0, "aria-label": "Frame", class: "scrub", oninput: () => session.scrub(Number(slider.value)) });
-  const clock = h("output", { class: "clock", "aria-label": "Frame and time" });
+  const clock = h("output", { class: "clock", "aria-label": "Frame and time", "aria-live": "off" });
   const cost = h("span", { class: "cost" });
   const update = () => {
     const frame = session.shown;

@@ -1,8 +1,9 @@
 /** Seconds that frames of scenes take in Chromium, compute only: { name: scene } on stdin, { name: seconds } on stdout. */
-import { existsSync, readFileSync } from "node:fs";
+import { readFileSync } from "node:fs";
 import { createServer } from "node:http";
 import { resolve } from "node:path";
 import { chromium } from "playwright-core";
+import { CHROMIUM } from "./browser.ts";
 
 const PKG = resolve(import.meta.dirname, "../src/engine/pkg");
 const repeats = Number(process.argv[2] ?? 7);
@@ -17,8 +18,7 @@ const server = createServer((request, response) => {
 });
 await new Promise<void>((done) => server.listen(0, "127.0.0.1", done));
 const { port } = server.address() as { port: number };
-const places = [process.env.CHROMIUM, "/usr/bin/chromium", "/usr/bin/chromium-browser", "/usr/bin/google-chrome"];
-const browser = await chromium.launch({ executablePath: places.find((place) => place && existsSync(place)), headless: true, args: ["--no-sandbox"] });
+const browser = await chromium.launch({ executablePath: CHROMIUM, headless: true, args: ["--no-sandbox"] });
 const seconds: Record<string, number> = {};
 for (const [name, scene] of Object.entries(scenes)) {
   const page = await browser.newPage();

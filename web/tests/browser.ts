@@ -1,5 +1,6 @@
 /** Debian's Chromium and the built folder, for tests and pictures. */
-import { existsSync } from "node:fs";
+import { existsSync, readdirSync, readFileSync } from "node:fs";
+import { createRequire } from "node:module";
 import { chromium, type Browser, type BrowserContextOptions, type Page } from "playwright-core";
 import { preview, type PreviewServer } from "vite";
 
@@ -43,6 +44,30 @@ export async function lab(): Promise<Lab> {
       await server.close();
     },
   };
+}
+
+/** Where scenes live, and all that ship, as ROW/NAME. */
+export const SCENES = "../python/tumble/scenes";
+export const shipped = (): string[] =>
+  readdirSync(SCENES, { withFileTypes: true })
+    .filter((row) => row.isDirectory() && row.name !== "assets")
+    .flatMap((row) => readdirSync(`${SCENES}/${row.name}`).filter((f) => f.endsWith(".toml")).map((f) => `${row.name}/${f.slice(0, -5)}`))
+    .sort();
+
+/** Options of pages that play nothing by themselves. */
+export const STILL = { reducedMotion: "reduce" } as const;
+
+/** Waits until a page has its world, or has failed to get it. */
+export const ready = (page: Page) => page.waitForFunction(() => document.getElementById("main")!.dataset.ready);
+
+/** What axe-core finds that is serious or worse. The page must have been opened with `bypassCSP`. */
+export async function serious(page: Page): Promise<string[]> {
+  await page.evaluate(readFileSync(createRequire(import.meta.url).resolve("axe-core/axe.min.js"), "utf8"));
+  return page.evaluate(async () => {
+    const { violations } = await (window as any).axe.run(document, { resultTypes: ["violations"] });
+    const bad = violations.filter((v: any) => ["serious", "critical"].includes(v.impact));
+    return bad.map((v: any) => `${v.id}: ${v.nodes.slice(0, 3).map((n: any) => `${n.target.join(" ")} ${n.any[0]?.message ?? ""}`).join("; ")}`);
+  });
 }
 
 /** Waits until the scene page shows a frame at or after this one. */

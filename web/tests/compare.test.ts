@@ -1,10 +1,8 @@
 /** Time branches: a world goes another way, the two are compared, and the old one is taken again. */
 import assert from "node:assert/strict";
-import { readFileSync } from "node:fs";
-import { createRequire } from "node:module";
 import { after, before, describe, it } from "node:test";
 import type { Page } from "playwright-core";
-import { lab, type Lab } from "./browser.ts";
+import { lab, ready, serious, STILL, type Lab } from "./browser.ts";
 
 let own: Lab;
 before(async () => {
@@ -13,8 +11,8 @@ before(async () => {
 after(() => own?.close());
 
 const open = async (id: string) => {
-  const { page, errors } = await own.open(`scene/${id}`, { reducedMotion: "reduce" });
-  await page.waitForFunction(() => document.getElementById("main")!.dataset.ready);
+  const { page, errors } = await own.open(`scene/${id}`, STILL);
+  await ready(page);
   return { page, errors };
 };
 
@@ -216,8 +214,8 @@ describe("two ways", () => {
 
   for (const colorScheme of ["light", "dark"] as const) {
     it(`are told without anything serious by axe, ${colorScheme}`, async () => {
-      const { page } = await own.open("scene/structures/rope", { reducedMotion: "reduce", colorScheme, bypassCSP: true });
-      await page.waitForFunction(() => document.getElementById("main")!.dataset.ready);
+      const { page } = await own.open("scene/structures/rope", { ...STILL, colorScheme, bypassCSP: true });
+      await ready(page);
       await page.evaluate(async () => {
         const { session } = (window as any).tumble;
         await session.goto(3);
@@ -225,9 +223,7 @@ describe("two ways", () => {
         await session.goto(6);
       });
       await page.waitForSelector(".catch-up");
-      await page.evaluate(readFileSync(createRequire(import.meta.url).resolve("axe-core/axe.min.js"), "utf8"));
-      const found = await page.evaluate(() => (window as any).axe.run(document, { resultTypes: ["violations"] }).then((r: any) => r.violations.filter((v: any) => ["serious", "critical"].includes(v.impact)).map((v: any) => `${v.id}: ${v.nodes[0].target.join(" ")}`)));
-      assert.deepEqual(found, []);
+      assert.deepEqual(await serious(page), []);
       await page.context().close();
     });
   }

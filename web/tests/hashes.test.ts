@@ -4,7 +4,7 @@ import { execFileSync } from "node:child_process";
 import { existsSync, readFileSync } from "node:fs";
 import { resolve } from "node:path";
 import { test } from "node:test";
-import { lab } from "./browser.ts";
+import { lab, ready, STILL } from "./browser.ts";
 
 const ROOT = resolve(import.meta.dirname, "../..");
 const PYTHON = resolve(ROOT, ".venv/bin/python");
@@ -33,8 +33,8 @@ test("states in a tab have the native engine's bits", { skip: !existsSync(PYTHON
   const lines = new Map(native.trim().split("\n").map((line) => [line.split(" ")[0], line.split(" ").slice(1)]));
   const own = await lab();
   try {
-    const { page, errors } = await own.open("scene/springs/forever", { reducedMotion: "reduce" });
-    await page.waitForFunction(() => document.getElementById("main")!.dataset.ready);
+    const { page, errors } = await own.open("scene/springs/forever", STILL);
+    await ready(page);
     const precisions = new Set<string>();
     for (const name of NAMES) {
       const text = readFileSync(`${ROOT}/python/tumble/scenes/${name}.toml`, "utf8");

@@ -1,17 +1,12 @@
 /** The laboratory in a real browser. Needs `dist` (make web) and Chromium. */
 import assert from "node:assert/strict";
-import { readdirSync, readFileSync } from "node:fs";
-import { createRequire } from "node:module";
+import { readFileSync } from "node:fs";
 import { gzipSync } from "node:zlib";
 import { after, before, describe, it } from "node:test";
 import type { Page } from "playwright-core";
-import { frame, lab, type Lab } from "./browser.ts";
+import { frame, lab, ready, SCENES, serious, shipped, STILL, type Lab } from "./browser.ts";
 
-const SCENES = "../python/tumble/scenes";
-const ids = readdirSync(SCENES, { withFileTypes: true })
-  .filter((row) => row.isDirectory() && row.name !== "assets")
-  .flatMap((row) => readdirSync(`${SCENES}/${row.name}`).filter((f) => f.endsWith(".toml")).map((f) => `${row.name}/${f.slice(0, -5)}`))
-  .sort();
+const ids = shipped();
 
 let own: Lab;
 before(async () => {
@@ -19,8 +14,6 @@ before(async () => {
 });
 after(() => own?.close());
 
-const STILL = { reducedMotion: "reduce" } as const;
-const ready = (page: Page, timeout = 90_000) => page.waitForFunction(() => document.getElementById("main")!.dataset.ready, null, { timeout });
 /** Leaves the world of the page before for another, in the same worker. */
 const visit = async (page: Page, path: string) => {
   await page.evaluate((to) => {
@@ -422,6 +415,35 @@ describe("fluid", () => {
     await page.context().close();
   });
 
+  it("has curves in colours of light and of dark", async () => {
+    const { page, errors } = await own.open("fluid", { ...STILL, colorScheme: "light" });
+    await ready(page);
+    await page.evaluate(async () => {
+      const { session } = (window as any).tumble;
+      for (let i = 0; i < 6; i++) await session.next();
+      // The plot takes so many frames at once.
+      await new Promise((done) => setTimeout(done, 200));
+      await session.next();
+    });
+    const seen = () =>
+      page.evaluate(async () => {
+        await new Promise((done) => setTimeout(done, 100));
+        const canvas = document.querySelector<HTMLCanvasElement>(".energy canvas")!;
+        const { data } = canvas.getContext("2d")!.getImageData(0, 0, canvas.width, canvas.height);
+        const [light, dark] = [[0x2a, 0x6f, 0x97], [0x6d, 0xb6, 0xe3]].map(([r, g, b]) => {
+          let n = 0;
+          for (let i = 0; i < data.length; i += 4) if (data[i + 3] > 200 && Math.abs(data[i] - r) + Math.abs(data[i + 1] - g) + Math.abs(data[i + 2] - b) < 12) n++;
+          return n > 10;
+        });
+        return { light, dark };
+      });
+    assert.deepEqual(await seen(), { light: true, dark: false });
+    await page.click("[aria-label='Light or dark']");
+    assert.deepEqual(await seen(), { light: false, dark: true });
+    assert.deepEqual(errors, []);
+    await page.context().close();
+  });
+
   it("is stirred in space, too, in the slice that is shown", async () => {
     const { page, errors } = await own.open("fluid", STILL);
     await ready(page);
@@ -539,7 +561,6 @@ describe("integrators", () => {
 });
 
 describe("everyone", () => {
-  const axe = readFileSync(createRequire(import.meta.url).resolve("axe-core/axe.min.js"), "utf8");
   const PAGES = ["", "scene/drape/sheet-on-ball", "fluid", "integrators", "theory", "theory/gas"];
   for (const colorScheme of ["light", "dark"] as const) {
     it(`finds nothing serious by axe, ${colorScheme}`, async () => {
@@ -551,9 +572,8 @@ describe("everyone", () => {
         for (const tab of path.startsWith("scene") ? ["values", "text", "theory", "facts"] : [""]) {
           if (tab) await page.click(`#t-${tab}`);
           if (tab === "text") await page.waitForSelector(".cm-content");
-          await page.evaluate(axe);
-          const issues = await page.evaluate(() => (window as any).axe.run(document, { resultTypes: ["violations"] }).then((r: any) => r.violations.filter((v: any) => ["serious", "critical"].includes(v.impact)).map((v: any) => `${v.id}: ${v.nodes.slice(0, 3).map((n: any) => n.target.join(" ") + " " + (n.any[0]?.message ?? "")).join("; ")}`)));
-          found.push(...issues.map((i: string) => `${path} ${tab}: ${i}`));
+          const issues = await serious(page);
+          found.push(...issues.map((i) => `${path} ${tab}: ${i}`));
         }
         await page.context().close();
       }

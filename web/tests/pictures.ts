@@ -1,8 +1,7 @@
 /** Pictures of the gallery: each scene by the app itself, at a frame that shows what it is about. `npm run pictures [ROW/NAME ...]` */
-import { mkdirSync, readdirSync, readFileSync, writeFileSync } from "node:fs";
-import { lab } from "./browser.ts";
+import { mkdirSync, readFileSync, writeFileSync } from "node:fs";
+import { lab, SCENES, shipped } from "./browser.ts";
 
-const SCENES = "../python/tumble/scenes";
 /** Frame of the picture, where two thirds of the scene do not show it best. */
 const AT: Record<string, number> = {
   "contact/bounce": 30, "drape/sheet-on-bunny": 40, "drape/sheet-on-ball": 40, "failures/stiff-sheet": 8, "gas/bad_solver": 18, "gas/bunny": 50, "gas/fire": 45,
@@ -11,10 +10,7 @@ const AT: Record<string, number> = {
 };
 
 const asked = process.argv.slice(2);
-const ids = readdirSync(SCENES, { withFileTypes: true })
-  .filter((row) => row.isDirectory() && row.name !== "assets")
-  .flatMap((row) => readdirSync(`${SCENES}/${row.name}`).filter((f) => f.endsWith(".toml")).map((f) => `${row.name}/${f.slice(0, -5)}`))
-  .filter((id) => !asked.length || asked.includes(id));
+const ids = shipped().filter((id) => !asked.length || asked.includes(id));
 
 mkdirSync("pictures", { recursive: true });
 const own = await lab();

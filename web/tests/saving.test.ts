@@ -6,7 +6,7 @@ import { tmpdir } from "node:os";
 import { join, resolve } from "node:path";
 import { after, before, describe, it } from "node:test";
 import type { Page } from "playwright-core";
-import { frame, lab, type Lab } from "./browser.ts";
+import { frame, lab, ready, STILL, type Lab } from "./browser.ts";
 
 const ROOT = resolve(import.meta.dirname, "../..");
 const PYTHON = resolve(ROOT, ".venv/bin/python");
@@ -20,8 +20,8 @@ before(async () => {
 after(() => own?.close());
 
 const open = async (id: string) => {
-  const { page, errors } = await own.open(`scene/${id}`, { reducedMotion: "reduce" });
-  await page.waitForFunction(() => document.getElementById("main")!.dataset.ready);
+  const { page, errors } = await own.open(`scene/${id}`, STILL);
+  await ready(page);
   return { page, errors };
 };
 

@@ -1,22 +1,18 @@
 /** Families of links and what else one plays with, in a real browser. Needs `dist` (make web) and Chromium. */
 import assert from "node:assert/strict";
 import { readFileSync } from "node:fs";
-import { createRequire } from "node:module";
 import { resolve } from "node:path";
 import { after, before, describe, it } from "node:test";
 import type { Page } from "playwright-core";
 import type { SceneInfo } from "../src/engine/protocol";
 import { changed, familiesOf, linked } from "../src/links";
-import { lab, type Lab } from "./browser.ts";
+import { lab, ready, serious, STILL, type Lab } from "./browser.ts";
 
 let own: Lab;
 before(async () => {
   own = await lab();
 });
 after(() => own?.close());
-
-const STILL = { reducedMotion: "reduce" } as const;
-const ready = (page: Page) => page.waitForFunction(() => document.getElementById("main")!.dataset.ready, null);
 
 describe("families of links", async () => {
   const PKG = resolve(import.meta.dirname, "../src/engine/pkg");
@@ -266,7 +262,6 @@ describe("scenes", () => {
 });
 
 describe("everyone", () => {
-  const axe = readFileSync(createRequire(import.meta.url).resolve("axe-core/axe.min.js"), "utf8");
   const PAGES = ["structures", "scene/structures/others", "scene/particles/flock"];
   for (const colorScheme of ["light", "dark"] as const) {
     it(`finds nothing serious by axe, ${colorScheme}`, async () => {
@@ -278,8 +273,7 @@ describe("everyone", () => {
           await held(page);
           await numbers(page, 10);
         }
-        await page.evaluate(axe);
-        const found = await page.evaluate(() => (window as any).axe.run(document, { resultTypes: ["violations"] }).then((r: any) => r.violations.filter((v: any) => ["serious", "critical"].includes(v.impact)).map((v: any) => `${v.id}: ${v.nodes.slice(0, 3).map((n: any) => n.target.join(" ")).join("; ")}`)));
+        const found = await serious(page);
         assert.deepEqual([path, found, errors], [path, [], []]);
         await page.context().close();
       }

@@ -3,7 +3,7 @@ import { parse } from "smol-toml";
 import { asScene, asSceneButton, figure, slide } from "../demo";
 import { check, choice, h, iconButton, show, type Page } from "../dom";
 import type { Value, Vector } from "../engine/protocol";
-import { curveColor, isDark, Plot } from "../plot";
+import { isDark, Plot } from "../plot";
 import { pointers } from "../pointer";
 import { pictureButton } from "../saving";
 import { literal } from "../values";
@@ -116,8 +116,8 @@ export const page: Page = async (main) => {
   const ring = h("div", { class: "ring", hidden: true });
   viewer.box.classList.add("stirs");
   viewer.box.append(ring);
-  const energy = new Plot([{ label: "kinetic energy", color: curveColor(0), width: 2 }], { label: "Kinetic energy against time", x: "time [s]", height: 130 });
-  const residual = new Plot([{ label: "residual", color: curveColor(1), width: 2 }], { label: "Residual of the pressure after each iteration, on a logarithmic scale", x: "iteration", log: true, height: 130 });
+  const energy = new Plot([{ label: "kinetic energy", color: 0, width: 2 }], { label: "Kinetic energy against time", x: "time [s]", height: 130 });
+  const residual = new Plot([{ label: "residual", color: 1, width: 2 }], { label: "Residual of the pressure after each iteration, on a logarithmic scale", x: "iteration", log: true, height: 130 });
   const figures = { left: figure("Divergence", "residual"), iterations: figure("Iterations", "iterations"), cost: figure("Engine, a step"), courant: figure("Courant number"), kinetic: figure("Kinetic energy") };
   const advice = h("p", { class: "doc", role: "status" });
 

@@ -3,7 +3,7 @@ import { asScene } from "../demo";
 import { check, choice, h, iconButton, setIcon, show, type Page } from "../dom";
 import { EngineError } from "../engine/client";
 import type { Frame, Ledger, SceneInfo, Stability } from "../engine/protocol";
-import { curveColor, isDark, Plot, type Curve } from "../plot";
+import { curveColor, curveStyle, isDark, Plot, type Curve } from "../plot";
 import { engine } from "../session";
 import { cards, SCHEMES } from "../theory";
 
@@ -172,9 +172,9 @@ export const page: Page = async (main) => {
   const about = h("p", { class: "lead small" });
   const board = h("div", { class: "runs" });
   const alert = h("div", { class: "alert", role: "alert", hidden: true });
-  const clock = h("output", { class: "clock", "aria-label": "Time" }, "0 s");
+  const clock = h("output", { class: "clock", "aria-label": "Time", "aria-live": "off" }, "0 s");
   const play = iconButton("play", "Play", () => (playing ? pause() : start()), { class: "icon-button primary" });
-  const curves = (): Curve[] => runs.map((r, k) => ({ label: plain(r.scheme), color: curveColor(k), width: 2 }));
+  const curves = (): Curve[] => runs.map((r, k) => ({ label: plain(r.scheme), color: k, width: 2 }));
   const make = (label: string, log: boolean) => new Plot([], { label, x: "time [s]", log, height: 190 });
   let energy = make("Energy over the first energy, against time", log);
   const error = make("Distance from the exact solution, against time", true);
@@ -264,7 +264,7 @@ export const page: Page = async (main) => {
       if (!limit) return [];
       const at = Math.log(limit / low) / Math.log(high / low);
       if (!(at >= 0 && at <= 1)) return [];
-      return [h("i", { style: `left:calc(${at} * (100% - 1rem) + 0.5rem);background:${curveColor(k)}`, title: `${plain(r.scheme)}: ${show(limit, 3)} s` })];
+      return [h("i", { style: `left:calc(${at} * (100% - 1rem) + 0.5rem);background:${curveStyle(k)}`, title: `${plain(r.scheme)}: ${show(limit, 3)} s` })];
     });
     marks.replaceChildren(...placed);
     const z = limits.length && system === "spring" ? `ω h = ${show(W * step, 3)}. ` : "";
@@ -306,10 +306,10 @@ export const page: Page = async (main) => {
     for (const old of runs) void engine().drop(old.world).catch(() => {});
     runs = schemes.map((scheme, k) => {
       const canvas = h("canvas", { "aria-hidden": "true" });
-      const ratio = h("output", { class: "big", "data-ratio": scheme }, "1");
+      const ratio = h("output", { class: "big", "data-ratio": scheme, "aria-live": "off" }, "1");
       const verdict = h("p", { class: "verdict" });
       const predicted = h("p", { class: "muted predicted" });
-      const card = h("article", { class: "run", "data-scheme": scheme, style: `--curve:${curveColor(k)}` }, h("div", { class: "run-head" }, h("h2", {}, plain(scheme)), h("button", { type: "button", class: "as-scene", "aria-label": `Open ${plain(scheme)} as a scene`, title: "Open as a scene, with its text and values", onclick: () => void openScene(scheme) }, "↗")), canvas, h("div", { class: "run-figure" }, h("span", { class: "muted" }, s.field ? "r / r₀" : "E / E₀"), ratio), predicted, verdict);
+      const card = h("article", { class: "run", "data-scheme": scheme, style: `--curve:${curveStyle(k)}` }, h("div", { class: "run-head" }, h("h2", {}, plain(scheme)), h("button", { type: "button", class: "as-scene", "aria-label": `Open ${plain(scheme)} as a scene`, title: "Open as a scene, with its text and values", onclick: () => void openScene(scheme) }, "↗")), canvas, h("div", { class: "run-figure" }, h("span", { class: "muted" }, s.field ? "r / r₀" : "E / E₀"), ratio), predicted, verdict);
       return { world: 10 + k, scheme, info: null, frame: null, n: 0, quantity: [], error: [], path: [], first: 0, dead: "", steps: 0, shortest: Infinity, canvas, ratio, verdict, predicted, card };
     });
     board.replaceChildren(...runs.map((r) => r.card));
@@ -588,12 +588,7 @@ export const page: Page = async (main) => {
     if (own === age) draw(false);
   };
 
-  const theme = () => {
-    runs.forEach((r, k) => r.card.style.setProperty("--curve", curveColor(k)));
-    energy.setCurves(curves());
-    error.setCurves(curves());
-    draw();
-  };
+  const theme = () => draw();
   addEventListener("themechange", theme);
   const keydown = (event: KeyboardEvent) => {
     if (event.key !== " " || (event.target as HTMLElement).closest("input, select, button, a, pre")) return;

@@ -6,7 +6,7 @@ import type { Cure, SceneInfo, Value } from "../engine/protocol";
 import { FamilySwitches } from "../families";
 import { familiesOf, FAMILIES } from "../links";
 import { Panel } from "../panel";
-import { curveColor, legend, Plot, type Curve } from "../plot";
+import { legend, Plot, type Curve } from "../plot";
 import { saving } from "../saving";
 import { engine } from "../session";
 import { literal, valueOf } from "../values";
@@ -16,6 +16,7 @@ import { begin, source, toShare, type Source } from "../source";
 import { cards, topics } from "../theory";
 import { transport } from "../transport";
 import { pointers } from "../pointer";
+import { gridsOf, massesOf } from "../view/scenery";
 import { reducedMotion, Viewer } from "../viewer";
 import type { Editor } from "../editor";
 
@@ -48,15 +49,15 @@ export const page: Page = async (main, rest) => {
   const sceneId = h("p", { class: "scene-id" }, start.id ?? start.name);
   const title = h("h1", {}, titleOf(start.text) || start.name);
   const lookBar = h("div", { class: "look", role: "group", "aria-label": "What is shown" });
-  const energyCurves = (): Curve[] => [
-    { label: "kinetic", color: curveColor(1) },
-    { label: "elastic", color: curveColor(2) },
-    { label: "external", color: curveColor(3) },
-    { label: "total", color: curveColor(0), width: 2.25 },
-    { label: "total, old way", color: curveColor(0), dash: [4, 4], width: 1.25 },
+  const energyCurves: Curve[] = [
+    { label: "kinetic", color: 1 },
+    { label: "elastic", color: 2 },
+    { label: "external", color: 3 },
+    { label: "total", color: 0, width: 2.25 },
+    { label: "total, old way", color: 0, dash: [4, 4], width: 1.25 },
   ];
-  const energy = new Plot(energyCurves(), { label: "Energies against time", x: "time [s]", height: 140, mark: () => session.shown?.time ?? null });
-  const energyKey = legend(energyCurves());
+  const energy = new Plot(energyCurves, { label: "Energies against time", x: "time [s]", height: 140, mark: () => session.shown?.time ?? null });
+  const energyKey = legend(energyCurves);
   const hashBox = h("output", { class: "hash", "aria-label": "State hash" }, "–");
   const facts = h("dl", { class: "facts" });
 
@@ -321,8 +322,8 @@ export const page: Page = async (main, rest) => {
   // What is shown.
   const drawLook = (info: SceneInfo) => {
     const look = stage.look;
-    const grids = info.objects.filter((o) => ["gas", "heat", "compressible"].includes(o.kind));
-    const masses = info.objects.some((o) => !["gas", "heat", "compressible", "collider"].includes(o.kind));
+    const grids = gridsOf(info);
+    const masses = massesOf(info).length > 0;
     const again = () => {
       void session.refresh().then(() => comparison.again());
       comparison.again();
@@ -414,16 +415,12 @@ export const page: Page = async (main, rest) => {
       say(`The address of this page now holds the scene.${pulled}`);
     }
   };
-  const theme = () => {
-    comparison.theme();
-    energy.setCurves(energyCurves());
-    drawEnergy();
-  };
+  const theme = () => comparison.theme();
   addEventListener("themechange", theme);
   void engine()
     .schema()
     .then((found) => {
-      panel = new Panel(found, { set: change });
+      panel = new Panel(found, change);
       valuesTab.append(panel.element);
       if (session.info) panel.open(session.info, session.toml, session.overrides);
     })

@@ -3,7 +3,7 @@ import { asScene, asSceneButton, figure, slide } from "../demo";
 import { check, choice, h, iconButton, show, type Page } from "../dom";
 import type { Frame, Value } from "../engine/protocol";
 import { FAMILIES, familiesOf, RESISTS, type Family } from "../links";
-import { curveColor, Plot } from "../plot";
+import { Plot } from "../plot";
 import { pointers } from "../pointer";
 import { pictureButton } from "../saving";
 import { dropped } from "../session";
@@ -24,7 +24,7 @@ export const page: Page = async (main) => {
   Object.assign(stage.look, { links: true, color: "strain", hidden: ["places"] });
   session.wanted = () => [...new Set([...stage.wanted, "link_strain"])];
   const about = h("p", { class: "doc", id: "about" });
-  const plot = new Plot([{ label: "energy of the links", color: curveColor(0), width: 2 }], { label: "Elastic energy of the links against time", x: "time [s]", height: 130 });
+  const plot = new Plot([{ label: "energy of the links", color: 0, width: 2 }], { label: "Elastic energy of the links against time", x: "time [s]", height: 130 });
   const figures = { strain: figure("Largest strain", "strain"), energy: figure("Energy of the links", "energy"), way: figure("The end gave way", "way"), pull: figure("The hand pulls", "pull") };
 
   const rebuild = () => {

@@ -2,6 +2,7 @@
 import * as THREE from "three";
 import type { Column, Frame, SceneInfo } from "../engine/protocol";
 import { Pieces, Points, Surface, type Layer, type Rgb } from "./layers";
+import { massesOf } from "./scenery";
 
 interface Shade {
   name: string;
@@ -9,8 +10,6 @@ interface Shade {
   body: Layer;
   set: (x: Frame["columns"][string]) => void;
 }
-
-const GRIDS = ["gas", "heat", "compressible", "collider"];
 
 export class Ghost {
   private readonly group = new THREE.Group();
@@ -23,11 +22,6 @@ export class Ghost {
     scene.add(this.group);
   }
 
-  /** Whether a world has anything that can be seen so: masses, not what lies on grids. */
-  static fits(info: SceneInfo): boolean {
-    return info.objects.some((o) => !GRIDS.includes(o.kind));
-  }
-
   /** Of which world; null ends it. */
   open(info: SceneInfo | null, dark: boolean): void {
     if (info === this.info && dark === this.dark) return;
@@ -35,8 +29,7 @@ export class Ghost {
     this.info = info;
     this.dark = dark;
     const color: Rgb = dark ? [0.75, 0.82, 0.95] : [0.02, 0.03, 0.06];
-    for (const object of info?.objects ?? []) {
-      if (GRIDS.includes(object.kind)) continue;
+    for (const object of info ? massesOf(info) : []) {
       const topology = info!.topology[object.name] ?? {};
       const radius = topology.radius?.data[0] ?? 0.01;
       const shade = this.shade(topology, color, radius);

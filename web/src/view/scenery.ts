@@ -6,6 +6,12 @@ import { scalars, type Grid, type Pieces, type Rgb } from "./layers";
 
 type Entry = Record<string, any>;
 
+const GRIDS = ["gas", "heat", "compressible"];
+
+/** Objects that lie on grids, and those that are made of masses. */
+export const gridsOf = (info: SceneInfo): SceneInfo["objects"] => info.objects.filter((o) => GRIDS.includes(o.kind));
+export const massesOf = (info: SceneInfo): SceneInfo["objects"] => info.objects.filter((o) => ![...GRIDS, "collider"].includes(o.kind));
+
 /** What is shown of a grid where nobody says: the first of these that there is, and that is not the same everywhere. */
 const SHOWN = ["density", "fuel", "temperature", "vorticity", "speed", "pressure", "divergence"];
 
