@@ -1,5 +1,7 @@
 /** Files that a person brings: scenes, and meshes. */
 import { stringify } from "smol-toml";
+import { say } from "./dom";
+import { asked } from "./engine/worth";
 import type { Files } from "./engine/protocol";
 import { dropped } from "./session";
 import { fromFile, type Shared } from "./share";
@@ -41,6 +43,13 @@ thickness = 0.01
 friction = 0.5
 `;
 
+/** Meshes that the scene of the page misses, and what is done when they are there. */
+let wanted: { paths: string[]; then: () => void } | null = null;
+
+export function want(paths: string[], then: () => void = () => {}): void {
+  wanted = paths.length ? { paths, then } : null;
+}
+
 /** Opens a scene; meshes are kept for scenes that name them. A mesh alone gets a sheet that falls on it. */
 export async function acceptFiles(files: File[]): Promise<void> {
   let scene: (typeof opened)[number] | null = null;
@@ -63,6 +72,11 @@ export async function acceptFiles(files: File[]): Promise<void> {
       });
       scene = { name: file.name, toml: shared.text, files: meshes, shared };
     } else throw new Error(`${file.name} is neither a scene (.toml, .json, .tumble) nor a mesh (.ply, .obj, .stl, .glb)`);
+  }
+  if (!scene && wanted) {
+    const there = asked(wanted.paths, dropped).size;
+    if (there === wanted.paths.length) return wanted.then();
+    if (there) return say(`${wanted.paths.length - there} more are missing.`);
   }
   if (!scene && mesh) scene = { name: mesh, toml: FALLING(mesh), files: {} };
   if (!scene) return;

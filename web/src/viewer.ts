@@ -25,6 +25,7 @@ export class Viewer {
   readonly alert = h("div", { class: "alert", role: "alert", hidden: true });
   readonly tellLegend: () => void;
   private readonly wait = h("div", { class: "wait" }, "Loading the engine …");
+  private far: HTMLElement | null = null;
   private readonly offKeys: () => void;
   private readonly theme = () => this.stage.theme();
 
@@ -84,7 +85,10 @@ export class Viewer {
   /** Says how far something long is, with a way out of it. */
   waiting(text: string, stop: () => void): void {
     this.wait.hidden = false;
-    this.wait.replaceChildren(h("span", {}, text), h("button", { type: "button", class: "button", onclick: stop }, "Stop here"));
+    this.far ??= h("span", {});
+    this.far.textContent = text;
+    // One button for all of the way: it must not go away under the finger.
+    if (!this.far.isConnected) this.wait.replaceChildren(this.far, h("button", { type: "button", class: "button", onclick: stop }, "Stop here"));
   }
 
   /** The same with the first scene: after it the page is ready. */

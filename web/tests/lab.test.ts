@@ -354,6 +354,25 @@ describe("files", () => {
     await page.context().close();
   });
 
+  it("that a scene misses are dropped on its page, which then goes on", async () => {
+    const { page, errors } = await own.open("", STILL);
+    const text = 'version = 1\ntitle = "waits"\n[[particles]]\nname = "p"\nposition = [[0, 0, 1]]\n[[collider]]\nname = "b"\nshape.mesh.path = "meshes/one.ply"\n';
+    await page.setInputFiles("#file", { name: "waits.toml", mimeType: "application/toml", buffer: Buffer.from(text) });
+    await page.waitForFunction(() => document.getElementById("main")!.dataset.ready === "failed");
+    assert.match((await page.textContent(".alert")) ?? "", /no file "meshes\/one\.ply"; drop it on the page/);
+    const drop = (name: string) =>
+      page.evaluate(([bytes, as]) => {
+        const dataTransfer = new DataTransfer();
+        dataTransfer.items.add(new File([new Uint8Array(bytes as number[])], as as string));
+        dispatchEvent(new DragEvent("drop", { dataTransfer, cancelable: true }));
+      }, [[...readFileSync(`${SCENES}/assets/bunny.ply`)], name] as const);
+    await drop("one.ply");
+    await page.waitForFunction(() => document.getElementById("main")!.dataset.ready === "true");
+    assert.equal(await page.evaluate(() => (window as any).tumble.session.info.title), "waits");
+    assert.deepEqual(errors, []);
+    await page.context().close();
+  });
+
   it("tell of a failed run, and of changes that would have saved it", async () => {
     const { page, errors } = await own.open("scene/failures/stiff-sheet", STILL);
     await ready(page);

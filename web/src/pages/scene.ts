@@ -1,6 +1,7 @@
 /** One scene: picture, playback, energy, its values, its text, its theory. */
 import { Comparison } from "../compare";
 import { check, choice, h, iconButton, saveAs, say, show, svg, ICONS, type Page } from "../dom";
+import { want } from "../drop";
 import { EngineError } from "../engine/client";
 import type { Cure, SceneInfo, Value } from "../engine/protocol";
 import { FamilySwitches } from "../families";
@@ -276,6 +277,7 @@ export const page: Page = async (main, rest) => {
     } catch (error) {
       if (!(error instanceof EngineError)) throw error;
       const { failure } = error;
+      want(failure.missing ?? [], () => void apply());
       viewer.complain(failure);
       editor.issues(failure.issues);
       issuesBox.replaceChildren(...failure.issues.map((i) => h("li", {}, i.line ? h("button", { type: "button", class: "line", onclick: () => editor?.goto(i.line!) }, `Line ${i.line}`) : null, h("span", {}, `${i.path ? `${i.path}: ` : ""}${i.message}`))));
@@ -440,6 +442,7 @@ export const page: Page = async (main, rest) => {
     })
     .then((failure) => {
       if (!failure) return;
+      want(failure.missing ?? [], () => dispatchEvent(new Event("hashchange")));
       choose(1);
       void openEditor().then(() => editor?.issues(failure.issues));
     });
@@ -448,6 +451,7 @@ export const page: Page = async (main, rest) => {
   Object.assign(window, { tumble: { session, stage, comparison, engine: engine() } });
 
   return () => {
+    want([]);
     removeEventListener("themechange", theme);
     offPointers();
     saved.close();
