@@ -184,9 +184,10 @@ impl World {
         arrays::columns(py, self.engine.frame(&names).columns)
     }
 
-    /// The named columns after so many sub-steps of the next frame, all systems in turn; the world itself stays where it is. Systems
-    /// whose turn has not come are still at the start of their interval. Returns (columns, about) with about: system and step [s] of the
-    /// last sub-step, time [s], ledger; None where the frame has no more sub-steps. Raises StepError for a sub-step that breaks.
+    /// The named columns after so many sub-steps of the next frame, all systems in turn; the world itself stays where it
+    /// is. Systems whose turn has not come are still at the start of their interval. Returns (columns, about) with about:
+    /// system and step [s] of the last sub-step, time [s], ledger; None where the frame has no more sub-steps. Raises
+    /// StepError for a sub-step that breaks.
     #[pyo3(signature = (substeps, *names))]
     fn inside<'py>(
         &mut self,
