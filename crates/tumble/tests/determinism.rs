@@ -329,3 +329,24 @@ fn a_look_at_what_breaks_is_an_error_with_the_sub_step() {
     assert!(matches!(error, StepError::Exploded(_) | StepError::NotFinite(_)), "{error}");
     assert_eq!(sim.hash(), start);
 }
+
+/// Who dies in a frame dies at its end: inside of it all are still there.
+#[test]
+fn a_look_inside_a_frame_buries_nobody() {
+    for system in [
+        "integrator = \"velocity_verlet\"\nsubsteps = 4",
+        "integrator = \"dormand_prince\"\nadaptive = { tolerance = 1e-6, first_step = 0.02 }",
+        "method = \"tracers\"\nintegrator = \"heun\"\nsubsteps = 4",
+        "method = \"tracers\"\nintegrator = \"dormand_prince\"\nadaptive = { tolerance = 1e-6, first_step = 0.02 }",
+    ] {
+        let field = if system.contains("tracers") { "[[field]]\nkind = \"swirl\"\nrate = 2\n" } else { "" };
+        let mut sim = simulation(&format!(
+            "time.fps = 10\n[[system]]\n{system}\n{field}[[emitter]]\nname = \"e\"\nburst = [{{ time = 0, count = 50 }}]\nlifetime = 0.09\nfrom.sphere.radius = 0.1\n"
+        ));
+        let count = |frame: &tumble_interface::Frame| frame.column("e", "position").map_or(0, |c| c.data.len() / 3);
+        let seen = sim.inside(1, &["position"], &|| true).unwrap().unwrap();
+        assert_eq!(count(&seen.frame), 50, "{system}, at {} s", seen.frame.time);
+        run(&mut sim, 1);
+        assert_eq!(count(&sim.frame(&["position"])), 0, "{system}");
+    }
+}
