@@ -29,7 +29,7 @@ pub use structures::{
     Block, Cloud, CloudShape, Diagonals, Galaxy, Halo, Link, LinkSettings, Links, Material, Net, Particles, Pin, Profile, Region, Rod,
     Rope, Sheet, Spring,
 };
-pub use systems::{Adaptive, Hessian, Integrator, Linear, Method, OnFailure, Solver, System, Vicsek};
+pub use systems::{Adaptive, Hessian, Integrator, Linear, Method, OnFailure, PositionBased, Projection, Solver, System, Vicsek};
 
 use crate::check::check;
 use crate::error::{Issue, SceneError};

@@ -24,12 +24,15 @@ use std::borrow::Cow;
 use std::sync::Arc;
 use tumble_interface::check::plain;
 use tumble_interface::scene::{
-    Animated, Bits, Field as Stream, Force as Words, MeshFile, Method, Plane, Scene, Shape, System as Plan, Vicsek,
+    Animated, Bits, Field as Stream, Force as Words, Integrator, MeshFile, Method, Plane, Scene, Shape, System as Plan, Vicsek,
 };
 use tumble_interface::{Column, Data, Issue, Mesh, SceneError};
 
 /// Births that are looked at before a run.
 const TRIALS: usize = 64;
+
+/// Longest sub-step of position-based dynamics where a scene says nothing [s].
+const POSITION_BASED_STEP: f64 = 1e-3;
 
 /// A world, the surfaces of its colliders, and what is doubtful about it.
 pub struct Built {
@@ -47,7 +50,11 @@ fn fluids(scene: &Scene) -> impl Iterator<Item = &String> {
 /// The systems of a scene, or the default ones.
 pub fn plans(scene: &Scene) -> Vec<Plan> {
     if !scene.system.is_empty() {
-        return scene.system.clone();
+        let named = |plan: &Plan| match plan.method {
+            Method::PositionBased => Plan { method: Method::Dynamics, integrator: Integrator::PositionBased, ..plan.clone() },
+            _ => plan.clone(),
+        };
+        return scene.system.iter().map(named).collect();
     }
     // Each method on grids has a system of its own; all other objects are in one of dynamics.
     let mut methods =
@@ -148,6 +155,7 @@ pub fn build(scene: &Scene, assets: &Assets) -> Result<Built, SceneError> {
             stepping: stepping(plan),
             adaptive: plan.adaptive.clone(),
             solver: plan.solver.clone(),
+            sweeps: plan.position_based.clone(),
             clamp: plan.clamp,
             gravity,
             native: scene.bits == Bits::Native,
@@ -224,6 +232,7 @@ fn stepping(plan: &Plan) -> Stepping {
     match (plan.substeps, plan.step) {
         (Some(n), _) => Stepping::Substeps(n),
         (None, Some(step)) => Stepping::Step(step),
+        (None, None) if plan.integrator == Integrator::PositionBased => Stepping::Step(POSITION_BASED_STEP),
         // An implicit scheme needs no more than one step an interval.
         (None, None) if plan.integrator.is_implicit() => Stepping::Substeps(1),
         (None, None) => Stepping::Automatic,
@@ -281,7 +290,9 @@ fn fill(scene: &Scene, plans: &[Plan], assets: &Assets, issues: &mut Vec<Issue>)
                 Method::Tracers => drop(recipes::tracers(thing, &mut wrong)),
                 Method::Vicsek => drop(recipes::walkers(thing, &mut wrong)),
                 // None is placed in a system on grids.
-                Method::Dynamics | Method::Heat | Method::Compressible | Method::Gas => recipes::particles(site, thing),
+                Method::Dynamics | Method::PositionBased | Method::Heat | Method::Compressible | Method::Gas => {
+                    recipes::particles(site, thing)
+                }
             }
         });
     }

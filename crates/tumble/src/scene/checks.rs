@@ -176,7 +176,7 @@ pub fn check(scene: &Scene, systems: &[System]) -> Vec<Issue> {
 /// The system that moves an object of this kind: the one it names, else the first that can.
 pub fn place(systems: &[System], kind: &str, named: Option<&str>) -> Option<usize> {
     let can = |s: &System| match s.method {
-        Method::Dynamics => !matches!(kind, "gas" | "heat" | "compressible"),
+        Method::Dynamics | Method::PositionBased => !matches!(kind, "gas" | "heat" | "compressible"),
         Method::Gas | Method::Heat | Method::Compressible => kind == s.method.name(),
         Method::Tracers => matches!(kind, "particles" | "emitter"),
         Method::Vicsek => kind == "particles",
@@ -187,7 +187,7 @@ pub fn place(systems: &[System], kind: &str, named: Option<&str>) -> Option<usiz
 /// What an object is, if it is nothing that forces move.
 fn massless(systems: &[System], kind: &str, named: Option<&str>) -> Option<&'static str> {
     match systems[place(systems, kind, named)?].method {
-        Method::Dynamics => None,
+        Method::Dynamics | Method::PositionBased => None,
         Method::Tracers => Some("tracers"),
         Method::Vicsek => Some("particles of a vicsek system"),
         Method::Heat => Some("bodies on grids"),
@@ -250,9 +250,10 @@ fn check_system(system: &System, path: &str, wrong: &mut impl FnMut(String, Stri
         _ => {}
     }
     if system.clamp.is_some()
-        && (system.method != Method::Dynamics || !matches!(integrator, Integrator::ModifiedEuler | Integrator::Verlet))
+        && (system.method != Method::Dynamics
+            || !matches!(integrator, Integrator::ModifiedEuler | Integrator::Verlet | Integrator::PositionBased))
     {
-        wrong(format!("{path}.clamp"), "the position clamp goes with modified_euler or verlet".into());
+        wrong(format!("{path}.clamp"), "the position clamp goes with modified_euler, verlet or position_based".into());
     }
 }
 
