@@ -61,7 +61,7 @@ class Subject:
     @property
     def discontinuous(self) -> bool:
         """Whether something in it happens at the end of a step only: contact, breaking, pulls between systems."""
-        links = [thing.get("links") or {} for kind in ("rope", "sheet", "block", "net") for thing in self.tree[kind]]
+        links = [thing.get("links") or {} for kind in ("rope", "sheet", "block", "net", "cloth") for thing in self.tree[kind]]
         laws = [law for of in links for law in of.values() if isinstance(law, dict)]
         laws += [spring for thing in self.tree["particles"] for spring in thing["spring"]]
         return self.coupled or bool(self.tree["collider"]) or any(law.get("break_strain") for law in laws)
@@ -91,7 +91,7 @@ class Subject:
         """Whether something in it pulls back or brakes, so that a step can be too long."""
         if self.tracers:
             return self.rate > 0
-        things = [kind for kind in ("rope", "sheet", "block", "net", "anchor") if self.tree[kind]]
+        things = [kind for kind in ("rope", "sheet", "block", "net", "cloth", "anchor") if self.tree[kind]]
         springs = any(thing["spring"] for thing in self.tree["particles"])
         hold = {"drag", "lennard_jones", "repulsion", "cohesion", "viscosity"}
         forces = any(force["kind"] in hold for force in self.tree["force"])

@@ -85,7 +85,7 @@ pub fn build(scene: &Scene, assets: &Assets) -> Result<Built, SceneError> {
     let scene = &*drawn;
     let mut warnings = unused(scene, &plans);
     let (colliders, scenery) = solids(scene, assets, &mut issues);
-    let mut parts = fill(scene, &plans, assets, &mut issues);
+    let mut parts = fill(scene, &plans, assets, &colliders, &mut issues);
     let anchors: Vec<coupling::Link> =
         scene.anchor.iter().filter_map(|anchor| coupling::link(scene, &plans, anchor, &parts, &mut issues)).collect();
     for anchor in &anchors {
@@ -274,12 +274,14 @@ fn solids(scene: &Scene, assets: &Assets, issues: &mut Vec<Issue>) -> (Vec<Colli
 }
 
 /// Parts of every system, filled by the recipes in the order of the scene.
-fn fill(scene: &Scene, plans: &[Plan], assets: &Assets, issues: &mut Vec<Issue>) -> Vec<Parts> {
+fn fill(scene: &Scene, plans: &[Plan], assets: &Assets, colliders: &[Collider], issues: &mut Vec<Issue>) -> Vec<Parts> {
+    // Issues leave colliders out, and then nothing is built.
+    let solids: Vec<(String, Collider)> = scene.collider.iter().map(|c| c.name.clone()).zip(colliders.iter().cloned()).collect();
     let mut parts: Vec<Parts> = plans.iter().map(|_| Parts::default()).collect();
     let up: Vector = if scene.dimension == 2 && scene.plane == Plane::Xy { [0.0, 1.0, 0.0] } else { [0.0, 0.0, 1.0] }.into();
     let mut at = |kind: &str, system: &Option<String>, recipe: &mut dyn FnMut(&mut Site<'_>)| {
         if let Some(index) = place(plans, kind, system.as_deref()) {
-            recipe(&mut Site { parts: &mut parts[index], issues: &mut *issues, up });
+            recipe(&mut Site { parts: &mut parts[index], issues: &mut *issues, up, solids: &solids });
         }
     };
     for thing in &scene.particles {
@@ -326,6 +328,9 @@ fn fill(scene: &Scene, plans: &[Plan], assets: &Assets, issues: &mut Vec<Issue>)
             Some(mesh) => recipes::net(site, thing, &recipes::placed(mesh, &thing.mesh)),
             None => site.issues.push(Issue::new(format!("net \"{}\".mesh", thing.name), "the mesh has not been loaded")),
         });
+    }
+    for thing in &scene.cloth {
+        at("cloth", &thing.system, &mut |site| recipes::cloth(site, thing));
     }
     for thing in &scene.galaxy {
         let pull = scene.force.iter().find(|f| matches!(f, Words::Gravitation { .. }) && f.on().is_none_or(|on| on.contains(&thing.name)));

@@ -34,12 +34,13 @@ pub fn objects(scene: &Scene) -> Vec<(&'static str, &str, Option<&str>)> {
     let sheets = scene.sheet.iter().map(|o| ("sheet", o.name.as_str(), o.system.as_deref()));
     let blocks = scene.block.iter().map(|o| ("block", o.name.as_str(), o.system.as_deref()));
     let nets = scene.net.iter().map(|o| ("net", o.name.as_str(), o.system.as_deref()));
+    let cloths = scene.cloth.iter().map(|o| ("cloth", o.name.as_str(), o.system.as_deref()));
     let emitters = scene.emitter.iter().map(|o| ("emitter", o.name.as_str(), o.system.as_deref()));
     let galaxies = scene.galaxy.iter().map(|o| ("galaxy", o.name.as_str(), o.system.as_deref()));
     let gases = scene.gas.iter().map(|o| ("gas", o.name.as_str(), o.system.as_deref()));
     let bodies = scene.heat.iter().map(|o| ("heat", o.name.as_str(), o.system.as_deref()));
     let sounding = scene.compressible.iter().map(|o| ("compressible", o.name.as_str(), o.system.as_deref()));
-    let things = particles.chain(emitters).chain(ropes).chain(sheets).chain(blocks).chain(nets).chain(galaxies);
+    let things = particles.chain(emitters).chain(ropes).chain(sheets).chain(blocks).chain(nets).chain(cloths).chain(galaxies);
     things.chain(gases).chain(bodies).chain(sounding).collect()
 }
 
@@ -49,7 +50,7 @@ pub fn check(scene: &Scene, systems: &[System]) -> Vec<Issue> {
     let mut wrong = |path: String, message: String| issues.push(Issue::new(path, message));
     let objects = objects(scene);
     if objects.is_empty() {
-        let message = "nothing to simulate: add particles, an emitter, a rope, a sheet, a block, a net, a galaxy, a gas, heat or a \
+        let message = "nothing to simulate: add particles, an emitter, a rope, a sheet, a block, a net, cloth, a galaxy, a gas, heat or a \
                        compressible gas";
         wrong(String::new(), message.into());
     }
@@ -324,7 +325,13 @@ fn check_plane(scene: &Scene, wrong: &mut impl FnMut(String, String)) {
             }
         }
     }
-    for (kind, name) in scene.block.iter().map(|b| ("block", &b.name)).chain(scene.net.iter().map(|n| ("net", &n.name))) {
+    for (kind, name) in scene
+        .block
+        .iter()
+        .map(|b| ("block", &b.name))
+        .chain(scene.net.iter().map(|n| ("net", &n.name)))
+        .chain(scene.cloth.iter().map(|c| ("cloth", &c.name)))
+    {
         wrong(format!("{kind} \"{name}\""), "it does not fit into a plane; use dimension = 3".into());
     }
     for thing in &scene.galaxy {

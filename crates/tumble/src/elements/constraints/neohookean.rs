@@ -2,7 +2,7 @@
 //! after the other they take gradients at different places, which do not cancel, and the solid does not keep its own rest state.
 //!
 //!   (a11 + alpha1) d1 + a12 d2 = -(c1 + alpha1 lambda1),   a12 d1 + (a22 + alpha2) d2 = -(c2 + alpha2 lambda2),
-//!   a_ij = sum_n w_n g_in . g_jn,   c1 = |F|, c2 = det F - 1 - mu/lambda                      (solids.2)
+//!   a_ij = sum_n w_n g_in . g_jn,   c1 = |F|, c2 = det F - 1 - mu/lambda                      (solids.10)
 //!
 //! One sweep a sub-step: at rest the two gradients are parallel, and round-off grows with sweeps. Verified: an unloaded block stays at rest.
 

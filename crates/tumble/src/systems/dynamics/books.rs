@@ -280,7 +280,7 @@ impl Dynamics {
     /// explosion would carry its scale along; where others push, nobody knows where energy came from.
     pub(super) fn rescale(&mut self, books: &Ledger) {
         let drives = self.laws.colliders.iter().any(|c| c.moves()) || self.laws.batches.iter().any(|b| b.drives().is_some());
-        let driven = self.pushed || drives || !self.laws.user.is_empty();
+        let driven = self.pushed || !self.held.is_empty() || drives || !self.laws.user.is_empty();
         let gain = if driven { 0.0 } else { (books.energy() - self.scale.start).max(0.0) };
         let external = (books.external - self.scale.external).abs();
         let energy = books.kinetic.max(books.elastic).max(external) - gain;

@@ -1,5 +1,6 @@
 //! From the parts that recipes collect to a system.
 
+use super::held::Held;
 use super::laws::Acting;
 use super::{Dynamics, Stepping, books};
 use crate::elements::{
@@ -98,6 +99,7 @@ pub struct Parts {
     stretches: Vec<Members<3, 2, 0>>,
     bends: Vec<Members<2, 5, 0>>,
     energy_at_rest: [f64; 2],
+    held: Vec<Held>,
     objects: Vec<Draft>,
     emitters: Vec<Emitter>,
     /// Forces on each mass by itself, with the objects that they act on, counted from the first that was begun.
@@ -198,6 +200,11 @@ impl Parts {
     /// Holds a point.
     pub fn pin(&mut self, point: u32) {
         self.points[point as usize].3 = true;
+    }
+
+    /// Lets a point that is held follow a collider, counted from the first, or one of its bones.
+    pub fn follow(&mut self, point: u32, collider: usize, bone: Option<usize>) {
+        self.held.push(Held { row: point as usize, collider, bone, place: self.position(point) });
     }
 
     /// Holds a frame.
@@ -456,6 +463,7 @@ impl Parts {
             constraints: batches.constraints,
             sweeps: settings.sweeps.clone(),
             rates: Vec::new(),
+            held: Held::at_rest(self.held, &settings.colliders),
             user: None,
             scratch: Default::default(),
             before: Vec::new(),

@@ -4,6 +4,7 @@
 mod books;
 mod build;
 mod contact;
+mod held;
 mod implicit;
 mod laws;
 mod life;
@@ -21,6 +22,7 @@ use crate::math::{Real, Row, Vec3, ZERO, axpy, row, sub, xyz64};
 use crate::pool::{Hit, Pool};
 use crate::state::{Object, State};
 use crate::system::{Archive, Part, System};
+use held::Held;
 use laws::{Laws, Local, flat};
 use rayon::prelude::*;
 use tumble_interface::engine::{Ledger, Stability, StepReport, UserForce, UserIntegrator};
@@ -67,6 +69,8 @@ pub struct Dynamics {
     /// Elements of a position-based system, which are no forces there.
     constraints: Vec<Box<dyn Constraints>>,
     sweeps: PositionBased,
+    /// Points that follow colliders.
+    held: Vec<Held>,
     user: Option<Box<dyn UserIntegrator>>,
     memory: Memory,
     scratch: Scratch,
@@ -170,6 +174,7 @@ impl Dynamics {
 
     /// One sub-step of a scheme with a fixed step, contact, clamp and breaking included.
     fn substep(&mut self, t: f64, h: f64, report: &mut StepReport) -> Result<(), StepError> {
+        self.lead_held(t, h);
         self.remember();
         let mut user = self.user.take();
         let result = match &mut user {
@@ -201,6 +206,7 @@ impl Dynamics {
 
     /// What follows a step of length h from t on: clamp, contact, breaking. Whatever it changes, the scheme starts anew from.
     fn after(&mut self, t: f64, h: f64, report: &mut StepReport) {
+        self.place_held(t + h);
         if let Some(clamp) = self.clamp.as_mut().filter(|_| self.integrator != Integrator::PositionBased) {
             let masses = &self.laws.masses;
             let one = |v: &[Row], i: usize| 0.5 * f64::from(masses.mass[i]) * xyz64(v[i]).norm_sq();
@@ -391,6 +397,7 @@ impl Dynamics {
         if self.integrator.is_adaptive() && self.user.is_none() {
             let (mut done, mut last) = (0.0, dt);
             while done < dt && go_on() {
+                self.lead_held(t + done, dt - done);
                 self.remember();
                 let (begun, left) = (done, dt - done);
                 self.witness(t + done);
@@ -430,6 +437,7 @@ impl Dynamics {
         let each = self.laws.is_local()
             && self.constraints.is_empty()
             && self.tethers.is_empty()
+            && self.held.is_empty()
             && self.user.is_none()
             && self.clamp.is_none()
             && !self.integrator.is_implicit()
