@@ -19,7 +19,7 @@ fn issues(text: &str) -> String {
 
 fn triangles(sim: &Simulation, object: &str) -> Vec<[u32; 3]> {
     let all = sim.topology();
-    match &all.column(object, "triangles").unwrap().data {
+    match &all.iter().find(|c| c.object == object && c.name == "triangles").unwrap().data {
         Data::U32(t) => t.chunks_exact(3).map(|t| [t[0], t[1], t[2]]).collect(),
         _ => panic!("triangles are indices"),
     }
@@ -71,19 +71,21 @@ fn seams_close_and_hold() {
 
 #[test]
 fn what_is_wrong_with_a_pattern_is_told_with_its_place() {
-    let unequal = issues(&SQUARES.replace("SIDE, 0.5]", "0.5, 0.45]").replace("SIDE", "0.5").replace("[0, 0.5]], origin", "[0, 0.4]], origin"));
+    let unequal =
+        issues(&SQUARES.replace("SIDE, 0.5]", "0.5, 0.45]").replace("SIDE", "0.5").replace("[0, 0.5]], origin", "[0, 0.4]], origin"));
     assert!(unequal.contains("cloth \"c\".seams[0]") && unequal.contains("0.5000 m and 0.4000 m"), "{unequal}");
     let none = issues(&SQUARES.replace("SIDE", "0.5").replace("side = 3", "side = 4"));
     assert!(none.contains("cloth \"c\".seams[0].to.side") && none.contains("the last one is 3"), "{none}");
     let unknown = issues(&SQUARES.replace("SIDE", "0.5").replace("to = { panel = \"b\"", "to = { panel = \"d\""));
     assert!(unknown.contains("\"d\" is no panel; known are a, b"), "{unknown}");
-    let crossed = issues(&SQUARES.replace("[0.5, 0], [0.5, 0.5], [0, 0.5]] },", "[0.5, 0.5], [0.5, 0], [0, 0.5]] },").replace("SIDE", "0.5"));
+    let crossed =
+        issues(&SQUARES.replace("[0.5, 0], [0.5, 0.5], [0, 0.5]] },", "[0.5, 0.5], [0.5, 0], [0, 0.5]] },").replace("SIDE", "0.5"));
     assert!(crossed.contains("panels[0].outline") && crossed.contains("cross"), "{crossed}");
     let fine = issues("[[cloth]]\nname = \"c\"\ndress = {}\nresolution = 1e-5\n");
     assert!(fine.contains("cloth \"c\".resolution") || fine.contains("memory_limit"), "{fine}");
     let empty = issues("[[cloth]]\nname = \"c\"\n");
     assert!(empty.contains("expected panels or a dress"), "{empty}");
-    let text = "[[rope]]\nname = \"r\"\nfrom = [0, 0, 0]\nto = [1, 0, 0]\npin = [{ which = \"start\", follow = { collider = \"x\" } }]\n\
+    let text = "[[rope]]\nname = \"r\"\nfrom = [0, 0, 0]\nto = [1, 0, 0]\nsegments = 4\npin = [{ which = \"start\", follow = { collider = \"x\" } }]\n\
                 [[collider]]\nname = \"ball\"\nshape.sphere = { center = [9, 0, 0], radius = 1 }\n";
     let lost = issues(text);
     assert!(lost.contains("rope \"r\".pin[0]") && lost.contains("known are ball"), "{lost}");

@@ -153,7 +153,8 @@ impl fmt::Display for Breakdown {
             }
             return write!(f, ". Take smaller sub-steps, or look at sources and formulas there");
         }
-        write!(f, "system \"{system}\" ({integrator}, step {step:.3e} s) at t = {} s: ", short(*time))?;
+        let step = if *step > 0.0 { format!(", step {step:.3e} s") } else { String::new() };
+        write!(f, "system \"{system}\" ({integrator}{step}) at t = {} s: ", short(*time))?;
         match id {
             Some(id) => write!(f, "first bad {column} in emitter \"{object}\", the particle with id {id}. ")?,
             None => write!(f, "first bad {column} in \"{object}\", particle {index}. ")?,

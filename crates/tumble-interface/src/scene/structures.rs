@@ -482,20 +482,8 @@ pub struct LinkSettings {
 pub enum Pin {
     /// In words: `"all"`, `"start"`, `"corner 0 1"`, `"vertex 3 4"`, `"edge x-"`, `"face z+"`.
     Words(String),
-    /// All within a radius of a point.
+    /// All within a radius of a point, or in words with what they follow.
     Region(Region),
-    /// In words, with what they follow.
-    Named(Named),
-}
-
-/// Masses that follow a collider, in words.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
-#[serde(deny_unknown_fields)]
-pub struct Named {
-    /// The words: `"edge y+"`.
-    pub which: String,
-    /// What they follow.
-    pub follow: Follow,
 }
 
 /// What pinned masses follow, as if they were part of it.
@@ -509,16 +497,21 @@ pub struct Follow {
     pub bone: Option<String>,
 }
 
-/// All masses within a radius of a point at the start.
+/// All masses within a radius of a point at the start, or those that words name.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Region {
     /// The point.
+    #[serde(default)]
     #[schemars(extend("x-unit" = "m"))]
-    pub center: [f64; 3],
+    pub center: Option<[f64; 3]>,
     /// The radius.
+    #[serde(default)]
     #[schemars(extend("x-unit" = "m", "exclusiveMinimum" = 0.0))]
-    pub radius: f64,
+    pub radius: Option<f64>,
+    /// The words instead of a point and a radius: `"edge y+"`.
+    #[serde(default)]
+    pub which: Option<String>,
     /// What they follow; without it, they stay where they are.
     #[serde(default)]
     pub follow: Option<Follow>,

@@ -301,6 +301,10 @@ pub struct PositionBased {
     /// Sweeps end early when none moves a point farther than this.
     #[schemars(extend("x-unit" = "m", "exclusiveMinimum" = 0.0))]
     pub tolerance: Option<f64>,
+    /// Points are kept within this many times the shortest way along links to what is pinned: for large things that hang, which few
+    /// sweeps leave too long. Below what a stiffness would give, it wins over it.
+    #[schemars(range(min = 1.0), extend("x-unit" = "1"))]
+    pub tethers: Option<f64>,
     /// What a sweep does to an element.
     pub projection: Projection,
     /// Share of its error that a plain element has lost after all iterations of a sub-step (`plain` only).
@@ -310,7 +314,7 @@ pub struct PositionBased {
 
 impl Default for PositionBased {
     fn default() -> Self {
-        Self { iterations: 1, tolerance: None, projection: Projection::Compliant, stiffness: 1.0 }
+        Self { iterations: 1, tolerance: None, tethers: None, projection: Projection::Compliant, stiffness: 1.0 }
     }
 }
 

@@ -290,11 +290,12 @@ struct Sweep<'a> {
     before: &'a [Row],
     /// Whether multipliers start from zero.
     first: bool,
+    damped: bool,
     plain: Option<Real>,
 }
 
-/// Projects a range of elements; with multipliers if LAMBDA, with damping if DAMPED.
-struct Project<'a, E, Y, const N: usize, const M: usize, const D: usize, const P: usize, const LAMBDA: bool, const DAMPED: bool> {
+/// Projects a range of elements; `lambda` is empty where one sweep is all.
+struct Project<'a, E, Y, const N: usize, const M: usize, const D: usize, const P: usize> {
     columns: &'a Columns<N, D, P>,
     range: Range<usize>,
     lambda: &'a mut [Real],
@@ -302,13 +303,13 @@ struct Project<'a, E, Y, const N: usize, const M: usize, const D: usize, const P
     kind: PhantomData<(E, Y)>,
 }
 
-impl<E: Element<N, M, D>, Y: Law<P>, const N: usize, const M: usize, const D: usize, const P: usize, const LAMBDA: bool, const DAMPED: bool>
-    Kernel for Project<'_, E, Y, N, M, D, P, LAMBDA, DAMPED>
+impl<E: Element<N, M, D>, Y: Law<P>, const N: usize, const M: usize, const D: usize, const P: usize> Kernel
+    for Project<'_, E, Y, N, M, D, P>
 {
     type Output = ();
     #[inline(always)]
     fn run<W: Width>(self, w: W) {
-        let (columns, sweep, start) = (self.columns, self.sweep, self.range.start);
+        let (columns, sweep, start, many) = (self.columns, self.sweep, self.range.start, !self.lambda.is_empty());
         let inverse_h = 1.0 / sweep.h;
         packs!(W, w, self.range, |e| {
             let (rest, law) = columns.pack(w, e);
@@ -322,7 +323,7 @@ impl<E: Element<N, M, D>, Y: Law<P>, const N: usize, const M: usize, const D: us
             let soft = w.load(&columns.compliance[e..]);
             let (mut alpha, mut share) = (soft * w.splat(inverse_h * inverse_h), zero);
             let mut before = None;
-            if DAMPED && sweep.plain.is_none() {
+            if sweep.damped {
                 let ratio = soft * w.load(&columns.damping[e..]) * w.splat(inverse_h);
                 alpha = alpha / (one + ratio);
                 share = ratio / (one + ratio);
@@ -333,10 +334,10 @@ impl<E: Element<N, M, D>, Y: Law<P>, const N: usize, const M: usize, const D: us
                 // What has broken stays so.
                 alpha = (soft - w.splat(0.5 * LIMP as Real)).positive(alpha, zero);
             }
-            let lambda = if LAMBDA && !sweep.first { w.load(&self.lambda[e - start..]) } else { zero };
+            let lambda = if many && !sweep.first { w.load(&self.lambda[e - start..]) } else { zero };
             let compliance = Compliance { alpha, lambda, share };
             let (mut moves, delta) = project::<E, Y, _, N, M, D, P>(compliance, law, rest, x, before, weights);
-            if LAMBDA {
+            if many {
                 w.store(lambda + delta, &mut self.lambda[e - start..]);
             }
             if let Some(part) = sweep.plain {
@@ -412,13 +413,10 @@ impl<E: Element<N, M, D>, Y: Law<P>, const N: usize, const M: usize, const D: us
             self.lambda.resize(columns.len(), 0.0);
         }
         let (x, first) = (Shared(x.as_mut_ptr()), step.iteration == 0);
-        let sweep = Sweep { h: step.h as Real, x, before: step.before, first, plain: step.plain };
+        let sweep = Sweep { h: step.h as Real, x, before: step.before, first, damped, plain: step.plain };
         let lambda = if many { &mut self.lambda[..] } else { &mut [] };
-        columns.sweep(usize::from(many), lambda, |range, lambda| match (many, damped) {
-            (false, false) => dispatch(Project::<_, _, N, M, D, P, false, false> { columns, range, lambda, sweep, kind }),
-            (false, true) => dispatch(Project::<_, _, N, M, D, P, false, true> { columns, range, lambda, sweep, kind }),
-            (true, false) => dispatch(Project::<_, _, N, M, D, P, true, false> { columns, range, lambda, sweep, kind }),
-            (true, true) => dispatch(Project::<_, _, N, M, D, P, true, true> { columns, range, lambda, sweep, kind }),
+        columns.sweep(usize::from(many), lambda, |range, lambda| {
+            dispatch(Project::<_, _, N, M, D, P> { columns, range, lambda, sweep, kind });
         });
     }
 

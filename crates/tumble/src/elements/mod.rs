@@ -18,6 +18,7 @@ mod list;
 mod neighbours;
 mod pairs;
 mod rod;
+mod tethers;
 mod tetrahedron;
 mod vector;
 
@@ -31,6 +32,7 @@ pub use law::{Law, Linear, Nonlinear};
 pub use list::Members;
 pub use pairs::{Pair, Pairs};
 pub use rod::{BendTwist, StretchShear};
+pub use tethers::Tethers;
 pub use tetrahedron::{TetShear, TetStrain, TetVolume, rest_matrix};
 pub use vector::Vector;
 

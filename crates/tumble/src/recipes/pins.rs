@@ -22,8 +22,7 @@ pub fn pinned(site: &mut Site<'_>, thing: &Pinnable<'_>, pins: &[Pin]) -> Vec<u3
     for (i, pin) in pins.iter().enumerate() {
         let (found, follow) = match pin {
             Pin::Words(words) => (in_words(thing, words), None),
-            Pin::Region(region) => (within(site, thing, region), region.follow.as_ref()),
-            Pin::Named(named) => (in_words(thing, &named.which), Some(&named.follow)),
+            Pin::Region(region) => (in_table(site, thing, region), region.follow.as_ref()),
         };
         let carrier = follow.map(|follow| carrier(site, follow)).transpose();
         match found.and_then(|found| Ok((found, carrier?))) {
@@ -56,13 +55,18 @@ fn carrier(site: &Site<'_>, follow: &Follow) -> Result<(usize, Option<usize>), S
     }
 }
 
-fn within(site: &Site<'_>, thing: &Pinnable<'_>, region: &Region) -> Result<Vec<u32>, String> {
+fn in_table(site: &Site<'_>, thing: &Pinnable<'_>, region: &Region) -> Result<Vec<u32>, String> {
+    let (center, radius) = match (region.center, region.radius, &region.which) {
+        (Some(center), Some(radius), None) => (center, radius),
+        (None, None, Some(words)) => return in_words(thing, words),
+        _ => return Err("expected center and radius, or which".into()),
+    };
     let count: u32 = thing.n.iter().product();
-    let distance = |i: u32| (site.parts.position(thing.first + i) - Vector::from(region.center)).norm();
-    let found: Vec<u32> = (0..count).filter(|i| distance(*i) <= region.radius).collect();
+    let distance = |i: u32| (site.parts.position(thing.first + i) - Vector::from(center)).norm();
+    let found: Vec<u32> = (0..count).filter(|i| distance(*i) <= radius).collect();
     if found.is_empty() {
         let nearest = (0..count).map(distance).fold(f64::INFINITY, f64::min);
-        return Err(format!("no mass lies within {} m; the nearest is {nearest:.4} m away", region.radius));
+        return Err(format!("no mass lies within {radius} m; the nearest is {nearest:.4} m away"));
     }
     Ok(found)
 }

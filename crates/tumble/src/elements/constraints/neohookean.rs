@@ -63,7 +63,7 @@ fn measures<L: Lane>(rest: [L; 10], x: [[L; 4]; 4]) -> (L, [[L; 4]; 4], L, [[L; 
     (c1, TetShear::pullback(b, x, f), c2, TetVolume::pullback(rest, x, [c1.like(1.0)]))
 }
 
-struct Project<'a, const LAMBDA: bool> {
+struct Project<'a> {
     columns: &'a Columns<4, 10, 1>,
     range: Range<usize>,
     lambda: [&'a mut [Real]; 2],
@@ -72,12 +72,13 @@ struct Project<'a, const LAMBDA: bool> {
     first: bool,
 }
 
-impl<const LAMBDA: bool> Kernel for Project<'_, LAMBDA> {
+impl Kernel for Project<'_> {
     type Output = ();
     #[inline(always)]
     fn run<W: Width>(self, w: W) {
         let (columns, start) = (self.columns, self.range.start);
         let [lambda1, lambda2] = self.lambda;
+        let many = !lambda1.is_empty();
         let scale = 1.0 / (self.h * self.h);
         packs!(W, w, self.range, |e| {
             let (rest, [soft2]) = columns.pack(w, e);
@@ -85,7 +86,7 @@ impl<const LAMBDA: bool> Kernel for Project<'_, LAMBDA> {
             let mut x = unsafe { columns.gather(w, 0, self.x.rows(), e) };
             let (alpha1, alpha2) = (w.load(&columns.compliance[e..]) * w.splat(scale), soft2 * w.splat(scale));
             let (mut l1, mut l2) = (w.splat(0.0), w.splat(0.0));
-            if LAMBDA && !self.first {
+            if many && !self.first {
                 l1 = w.load(&lambda1[e - start..]);
                 l2 = w.load(&lambda2[e - start..]);
             }
@@ -101,7 +102,7 @@ impl<const LAMBDA: bool> Kernel for Project<'_, LAMBDA> {
             let det = a11 * a22 - a12 * a12;
             let inverse = det.positive(w.splat(1.0) / det, w.splat(0.0));
             let (d1, d2) = ((b1 * a22 - b2 * a12) * inverse, (a11 * b2 - a12 * b1) * inverse);
-            if LAMBDA {
+            if many {
                 w.store(l1 + d1, &mut lambda1[e - start..]);
                 w.store(l2 + d2, &mut lambda2[e - start..]);
             }
@@ -162,14 +163,14 @@ impl Constraints for Neohookean {
         let (x, h, first) = (Shared(x.as_mut_ptr()), step.h as Real, step.iteration == 0);
         if step.iterations == 1 {
             columns.sweep(0, &mut [], |range, _| {
-                dispatch(Project::<false> { columns, range, lambda: [&mut [], &mut []], h, x, first });
+                dispatch(Project { columns, range, lambda: [&mut [], &mut []], h, x, first });
             });
         } else {
             // A task has the multipliers of its elements: first those of the shear, then those of the volume.
             self.lambda.resize(2 * columns.len(), 0.0);
             columns.sweep(2, &mut self.lambda, |range, own| {
                 let (shear, volume) = own.split_at_mut(range.len());
-                dispatch(Project::<true> { columns, range, lambda: [shear, volume], h, x, first });
+                dispatch(Project { columns, range, lambda: [shear, volume], h, x, first });
             });
         }
     }

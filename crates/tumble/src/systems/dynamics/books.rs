@@ -10,6 +10,7 @@ use crate::math::{Quat, Real, Row, Vec3, ZERO, is_finite, xyz64};
 use crate::system::System;
 use tumble_interface::engine::{BLOW_UP, Ledger};
 use tumble_interface::error::Breakdown;
+use tumble_interface::scene::Integrator;
 use tumble_interface::{Column, Data, StepError};
 
 /// What the energy is measured against.
@@ -304,7 +305,12 @@ impl Dynamics {
         let search = || columns.into_iter().find_map(|(column, rows)| Some((column, bad(rows)?, None)));
         let mut found = if finite { None } else { search() };
         if found.is_none() {
-            let ratio = self.scale.growth(&books).filter(|g| *g > BLOW_UP || g.is_nan());
+            // What a sweep leaves undone is no energy that anything will feel.
+            let mut felt = books.clone();
+            if self.integrator == Integrator::PositionBased {
+                felt.elastic = 0.0;
+            }
+            let ratio = self.scale.growth(&felt).filter(|g| *g > BLOW_UP || g.is_nan());
             if let Some(ratio) = ratio {
                 let fastest =
                     (0..self.laws.masses.points).max_by(|a, b| xyz64(state.v[*a]).norm_sq().total_cmp(&xyz64(state.v[*b]).norm_sq()));
@@ -323,7 +329,7 @@ impl Dynamics {
             time: t,
             integrator: self.integrator.name().into(),
             step: 0.0,
-            stable_step: 0.0,
+            stable_step: if self.integrator == Integrator::PositionBased { f64::INFINITY } else { 0.0 },
             energy_ratio,
             cause: self.culprit(i),
         });
@@ -354,7 +360,6 @@ impl Dynamics {
 
     /// The pre-flight estimate.
     pub(super) fn estimate(&mut self, dt: f64, go_on: &(dyn Fn() -> bool + Sync)) -> Option<tumble_interface::engine::Stability> {
-        use tumble_interface::scene::Integrator;
         if self.integrator == Integrator::PositionBased {
             // Stable for every step.
             return None;

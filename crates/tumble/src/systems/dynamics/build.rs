@@ -5,7 +5,7 @@ use super::laws::Acting;
 use super::{Dynamics, Stepping, books};
 use crate::elements::{
     BendTwist, Constraints, Distance, Element, Elements, Hinge, Linear, Members, Neohookean, Nonlinear, Pairs, Projected, StretchShear,
-    TetShear, TetStrain, TetVolume, Vector,
+    TetShear, TetStrain, TetVolume, Tethers, Vector,
 };
 use crate::forces::{Attractor, Cohesion, DirectSum, Flock, Force, Goal, Habits, Halos, LennardJones, Near, Repulsion, Viscosity};
 use crate::geometry::Collider;
@@ -389,6 +389,7 @@ impl Parts {
             1 => self.nonlinear.members[i].nodes,
             _ => self.vector.members[i].nodes,
         };
+        let reach = reach(&settings, &self.objects, (&self.linear.members, &self.nonlinear.members), &state);
         let mut objects = Vec::new();
         let mut places = Vec::new();
         for (draft, next) in self.objects.into_iter().zip(next) {
@@ -463,6 +464,7 @@ impl Parts {
             constraints: batches.constraints,
             sweeps: settings.sweeps.clone(),
             rates: Vec::new(),
+            reach,
             held: Held::at_rest(self.held, &settings.colliders),
             user: None,
             scratch: Default::default(),
@@ -481,6 +483,19 @@ impl Parts {
         system.begin_life(settings.interval).map_err(|e| SceneError::one(format!("system \"{}\"", settings.name), e.to_string()))?;
         Ok(system)
     }
+}
+
+/// Tethers of every object that has held points, where the scene asks for them.
+fn reach(
+    settings: &Settings,
+    objects: &[Draft],
+    (linear, nonlinear): (&[Members<2, 1, 0>], &[Members<2, 1, 2>]),
+    state: &State,
+) -> Vec<Tethers> {
+    let Some(slack) = settings.sweeps.tethers.filter(|_| settings.integrator == Integrator::PositionBased) else { return Vec::new() };
+    let links: Vec<_> = linear.iter().map(|m| (m.nodes, m.rest[0])).chain(nonlinear.iter().map(|m| (m.nodes, m.rest[0]))).collect();
+    let held = |i: usize| state.x[i][3] == 0.0;
+    objects.iter().filter_map(|draft| Tethers::new(draft.object.points.clone(), &links, &held, slack)).collect()
 }
 
 /// The batches of a force between masses.

@@ -13,7 +13,7 @@ mod position_based;
 
 pub use build::{Parts, Settings, SpringPart};
 
-use crate::elements::{Constraints, Limit, Linear, Projected, Projection};
+use crate::elements::{Constraints, Limit, Linear, Projected, Projection, Tethers};
 use crate::exchange::{Exchange, Port};
 use crate::geometry::Vector;
 use crate::integrators::{self, Equation, Memory, Scratch, Step, adaptive_step};
@@ -69,6 +69,7 @@ pub struct Dynamics {
     /// Elements of a position-based system, which are no forces there.
     constraints: Vec<Box<dyn Constraints>>,
     sweeps: PositionBased,
+    reach: Vec<Tethers>,
     /// Points that follow colliders.
     held: Vec<Held>,
     user: Option<Box<dyn UserIntegrator>>,

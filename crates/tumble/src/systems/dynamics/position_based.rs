@@ -48,6 +48,7 @@ impl Dynamics {
             if let Some(clamp) = &mut self.clamp {
                 clamp.project(x, &projection);
             }
+            self.reach.iter().for_each(|tethers| tethers.project(x));
             report.sweeps += 1;
             let way = |i: usize| xyz64(sub(x[i], old[i])).norm();
             if words.tolerance.is_some_and(|most| max(x.len(), |range| range.map(way).fold(0.0, f64::max)) <= most) {
