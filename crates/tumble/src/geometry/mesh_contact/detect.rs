@@ -1,0 +1,436 @@
+//! Which features are near each other, and how far vertices may go before any two of them could meet.
+//!
+//!   |x_v - X_v| ≤ b_v = gamma min(reach, nearest distance of a pair with v)             (contact.16)
+//!
+//! X is where the vertices were when pairs were found. Every point of an edge or a triangle is a mean of its vertices and goes no
+//! farther than the farthest of them, so that a pair at the distance d keeps at least (1 - 2 gamma) d > 0; nothing passes through.
+//! A plane between the two features of a pair says less: `hold` only stops what goes towards it.        (contact.17)
+//!
+//! Source: [chen2025], whose bound is a ball; the planes are ours.
+
+use super::distance::{Nearest, edge_edge, point_triangle};
+use super::topology::Topology;
+use super::tree::{LEAF, Tree, around, grown, whole};
+use crate::geometry::Vector;
+use crate::math::{Real, Row, xyz64};
+use rayon::prelude::*;
+use std::sync::atomic::{AtomicU64, Ordering::Relaxed};
+
+/// The part of a distance that each side may use up; below 1/2, so that something is left of it.
+pub const GAMMA: f64 = 0.45;
+/// Leaves per task.
+const TASK: usize = 32;
+/// Vertices per task.
+const CHUNK: usize = 1024;
+
+/// What a pair is made of.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Kind {
+    /// The first vertex is a point, the others a triangle.
+    PointTriangle,
+    /// The first two vertices are an edge, the others another one.
+    EdgeEdge,
+}
+
+/// Two features that are near each other.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Pair {
+    /// What it is made of.
+    pub kind: Kind,
+    /// The vertices of both features.
+    pub vertices: [u32; 4],
+    /// Weights of the vertices, negative ones for the second feature, whose sum is zero: the sum of weights times vertices
+    /// leads from the second feature to the first where they are nearest.
+    pub weights: [Real; 4],
+    /// That direction, of length 1. Where the features touch, that across both.
+    pub normal: [Real; 3],
+    /// Distance [m].
+    pub distance: Real,
+    /// Distance at which they are in contact [m].
+    pub thickness: Real,
+}
+
+/// What `hold` did.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub struct Held {
+    /// Vertices that were held back.
+    pub held: usize,
+    /// Fixed vertices that went farther than their bounds: what they do to others is not safe; find pairs more often.
+    pub driven: usize,
+}
+
+/// Finds pairs. What it finds depends only on topology and positions, never on what was found before.
+#[derive(Debug, Default)]
+pub struct Detector {
+    reach: f64,
+    at: Vec<Vector>,
+    points: Tree,
+    edges: Tree,
+    triangles: Tree,
+    pairs: Vec<Pair>,
+    bounds: Vec<f64>,
+    /// Vertices that may be on the wrong side of something: pairs with one on each side are left alone.
+    loose: Vec<bool>,
+    /// Pairs of each vertex: those of v are `lists[start[v]..start[v + 1]]`. Empty until `hold` needs them.
+    start: Vec<u32>,
+    lists: Vec<u32>,
+    nearest: Vec<AtomicU64>,
+}
+
+/// Pairs found by a task, and how many of them each of its features has.
+type Found = (Vec<Pair>, Vec<(u32, u32)>);
+
+impl Detector {
+    /// Nothing found yet.
+    pub fn new() -> Self {
+        Self::default()
+    }
+
+    /// Leaves alone all pairs that have one of these vertices on either side, without contact and without bounds: those of a
+    /// tangle, see `tangled`. One flag per vertex, or none at all.
+    pub fn set_loose(&mut self, loose: Vec<bool>) {
+        self.loose = loose;
+    }
+
+    /// Pairs nearer than the reach: points with triangles, then edges with edges, each sorted by their features.
+    pub fn pairs(&self) -> &[Pair] {
+        &self.pairs
+    }
+
+    /// How far each vertex may go [m] from where it was, in any direction.
+    pub fn bounds(&self) -> &[f64] {
+        &self.bounds
+    }
+
+    /// Where the vertices were [m].
+    pub fn at(&self) -> &[Vector] {
+        &self.at
+    }
+
+    /// Finds all pairs of features nearer than `reach` [m]. `x` has a row for each vertex of the topology, at least.
+    pub fn detect(&mut self, topology: &Topology, x: &[Row], reach: f64) {
+        self.reach = if reach.is_finite() { reach.max(0.0) } else { 0.0 };
+        self.start.clear();
+        self.pairs.clear();
+        let n = topology.vertices();
+        if x.len() < n {
+            self.bounds = vec![0.0; n];
+            return;
+        }
+        self.at.resize(n, Vector::default());
+        self.at.par_iter_mut().zip(x).with_min_len(CHUNK).for_each(|(p, x)| *p = xyz64(*x));
+        self.fit(topology);
+        let point_triangle = self.with_triangles(topology);
+        let edge_edge = self.with_edges(topology);
+        for (found, n) in [(point_triangle, topology.points().len()), (edge_edge, topology.edges().len())] {
+            append(&mut self.pairs, found, n);
+        }
+        self.bound(n);
+    }
+
+    /// Fits the trees to the positions.
+    fn fit(&mut self, topology: &Topology) {
+        let at = &self.at;
+        let finite = |p: &Vector| p.norm_sq().is_finite();
+        let origin = topology.points().iter().map(|v| at[*v as usize]).find(finite).unwrap_or_default();
+        let of = |v: u32| at[v as usize];
+        let points = topology.points();
+        self.points.fit(points.len(), |i| around([of(points[i as usize])], origin));
+        let edges = topology.edges();
+        self.edges.fit(edges.len(), |i| around(edges[i as usize].map(of), origin));
+        let triangles = topology.triangles();
+        self.triangles.fit(triangles.len(), |i| around(triangles[i as usize].map(of), origin));
+    }
+
+    fn with_triangles(&self, topology: &Topology) -> Vec<Found> {
+        let (points, triangles) = (topology.points(), topology.triangles());
+        search(&self.points, &self.triangles, self.reach, |i, j, found| {
+            let (v, t) = (points[i as usize], triangles[j as usize]);
+            if topology.meet([v], t) {
+                let near = point_triangle(self.at[v as usize], t.map(|v| self.at[v as usize]));
+                let rest = |x: &[Vector]| point_triangle(x[v as usize], t.map(|v| x[v as usize])).distance_sq.sqrt();
+                self.keep(topology, Kind::PointTriangle, [v, t[0], t[1], t[2]], near, rest, found);
+            }
+        })
+    }
+
+    fn with_edges(&self, topology: &Topology) -> Vec<Found> {
+        let edges = topology.edges();
+        search(&self.edges, &self.edges, self.reach, |i, j, found| {
+            let (e, f) = (edges[i as usize], edges[j as usize]);
+            if i < j && topology.meet(e, f) {
+                let near = edge_edge(e.map(|v| self.at[v as usize]), f.map(|v| self.at[v as usize]));
+                let rest = |x: &[Vector]| edge_edge(e.map(|v| x[v as usize]), f.map(|v| x[v as usize])).distance_sq.sqrt();
+                self.keep(topology, Kind::EdgeEdge, [e[0], e[1], f[0], f[1]], near, rest, found);
+            }
+        })
+    }
+
+    /// Keeps a pair that is near.
+    #[inline(always)]
+    fn keep(
+        &self,
+        topology: &Topology,
+        kind: Kind,
+        vertices: [u32; 4],
+        near: Nearest,
+        rest: impl Fn(&[Vector]) -> f64,
+        found: &mut Vec<Pair>,
+    ) {
+        if near.distance_sq >= self.reach * self.reach || near.distance_sq.is_nan() || self.is_tangled(kind, vertices) {
+            return;
+        }
+        let distance = near.distance_sq.sqrt();
+        let p = vertices.map(|v| self.at[v as usize]);
+        let w = near.weights;
+        let mut n = p[0] * w[0] + p[1] * w[1] + p[2] * w[2] + p[3] * w[3];
+        if distance == 0.0 {
+            n = match kind {
+                Kind::PointTriangle => (p[2] - p[1]).cross(p[3] - p[1]),
+                Kind::EdgeEdge => (p[1] - p[0]).cross(p[3] - p[2]),
+            };
+        }
+        let n = n.tamed().normalized();
+        found.push(Pair {
+            kind,
+            vertices,
+            weights: w.map(|w| w as Real),
+            normal: [n.x as Real, n.y as Real, n.z as Real],
+            distance: distance as Real,
+            thickness: topology.thickness(vertices[0], vertices[3], rest) as Real,
+        });
+    }
+
+    fn is_tangled(&self, kind: Kind, v: [u32; 4]) -> bool {
+        let loose = |v: u32| self.loose.get(v as usize).is_some_and(|l| *l);
+        match kind {
+            Kind::PointTriangle => loose(v[0]) && (loose(v[1]) || loose(v[2]) || loose(v[3])),
+            Kind::EdgeEdge => (loose(v[0]) || loose(v[1])) && (loose(v[2]) || loose(v[3])),
+        }
+    }
+
+    /// The bound of each vertex. Distances that are not negative sort like their bits.
+    fn bound(&mut self, n: usize) {
+        self.nearest.clear();
+        self.nearest.extend((0..n).map(|_| AtomicU64::new(self.reach.to_bits())));
+        let nearest = &self.nearest;
+        self.pairs.par_iter().with_min_len(CHUNK).for_each(|pair| {
+            // Rounding to single precision may have made it longer.
+            let d = (f64::from(pair.distance) * (1.0 - f64::from(f32::EPSILON))).to_bits();
+            for v in pair.vertices {
+                if nearest[v as usize].load(Relaxed) > d {
+                    nearest[v as usize].fetch_min(d, Relaxed);
+                }
+            }
+        });
+        self.bounds.clear();
+        self.bounds.extend(self.nearest.iter().map(|d| GAMMA * f64::from_bits(d.load(Relaxed))));
+    }
+
+    /// Holds back every vertex that went too far from where it was when pairs were found: to a ball of gamma times the reach, and
+    /// to its side of a plane between the features of each of its pairs. What goes along or away from a plane is not held back. As
+    /// long as all positions since pairs were found have passed through here, or lie between ones that have, nothing has met.
+    pub fn hold(&mut self, topology: &Topology, x: &mut [Row]) -> Held {
+        let n = topology.vertices();
+        if x.len() < n || self.at.len() < n {
+            return Held::default();
+        }
+        if self.start.is_empty() {
+            self.list(n);
+        }
+        let this = &*self;
+        let counts: Vec<Held> = x[..n]
+            .par_chunks_mut(CHUNK)
+            .enumerate()
+            .map(|(c, x)| {
+                let mut counts = Held::default();
+                for (i, x) in x.iter_mut().enumerate() {
+                    let v = c * CHUNK + i;
+                    let far = (xyz64(*x) - this.at[v]).norm_sq();
+                    // What is not finite stays so, for others to find.
+                    if far <= this.bounds[v] * this.bounds[v] || !far.is_finite() {
+                        continue;
+                    }
+                    if topology.is_fixed(v as u32) {
+                        counts.driven += 1;
+                    } else {
+                        counts.held += usize::from(this.hold_one(v, x));
+                    }
+                }
+                counts
+            })
+            .collect();
+        counts.iter().fold(Held::default(), |a, b| Held { held: a.held + b.held, driven: a.driven + b.driven })
+    }
+
+    fn hold_one(&self, v: usize, x: &mut Row) -> bool {
+        let lists = &self.lists[self.start[v] as usize..self.start[v + 1] as usize];
+        let walls: Vec<Wall> = lists.iter().map(|i| self.wall(&self.pairs[*i as usize], v as u32)).collect();
+        let radius = GAMMA * self.reach;
+        let inside = |c: Vector| c.norm_sq() <= radius * radius && walls.iter().all(|w| w.allows(c));
+        let way = xyz64(*x) - self.at[v];
+        if inside(way) {
+            return false;
+        }
+        // Along each plane as far as it goes; what several planes leave over is cut to the part of the way that all allow.
+        let mut c = way * (radius / way.norm()).min(1.0);
+        for w in &walls {
+            c = w.slide(c);
+        }
+        c = c * walls.iter().fold(1.0, |s: f64, w| s.min(w.part(c)));
+        // Each number is rounded towards where it was. That need not be allowed: less, then, and in the end nothing.
+        let w = x[3];
+        for _ in 0..4 {
+            *x = towards(self.at[v], c, w);
+            if inside(xyz64(*x) - self.at[v]) {
+                return true;
+            }
+            c = c * 0.75;
+        }
+        *x = towards(self.at[v], Vector::default(), w);
+        true
+    }
+
+    /// What a pair allows one of its vertices.
+    fn wall(&self, pair: &Pair, v: u32) -> Wall {
+        let n = Vector::from(pair.normal.map(f64::from));
+        let along = pair.vertices.map(|v| n.dot(self.at[v as usize]));
+        let (first, low, high) = match pair.kind {
+            Kind::PointTriangle => (pair.vertices[0] == v, along[0], along[1].max(along[2]).max(along[3])),
+            Kind::EdgeEdge => (pair.vertices[0] == v || pair.vertices[1] == v, along[0].min(along[1]), along[2].max(along[3])),
+        };
+        let d = f64::from(pair.distance) * (1.0 - f64::from(f32::EPSILON));
+        let (gap, middle) = (low - high, 0.5 * (low + high));
+        // A plane that hardly parts them is none: a ball, as for `bounds`.
+        if gap.is_nan() || gap < 0.95 * d || d <= 0.0 {
+            return Wall { normal: Vector::default(), room: GAMMA * d };
+        }
+        let sign = if first { 1.0 } else { -1.0 };
+        Wall { normal: n * sign, room: sign * (n.dot(self.at[v as usize]) - middle) - (0.5 - GAMMA) * gap }
+    }
+
+    /// The pairs of each vertex.
+    fn list(&mut self, n: usize) {
+        self.start.resize(n + 1, 0);
+        for v in self.pairs.iter().flat_map(|p| p.vertices) {
+            self.start[v as usize + 1] += 1;
+        }
+        for v in 0..n {
+            self.start[v + 1] += self.start[v];
+        }
+        let mut next = self.start.clone();
+        self.lists.clear();
+        self.lists.resize(4 * self.pairs.len(), 0);
+        for (i, p) in self.pairs.iter().enumerate() {
+            for v in p.vertices {
+                self.lists[next[v as usize] as usize] = i as u32;
+                next[v as usize] += 1;
+            }
+        }
+    }
+}
+
+/// A plane that a vertex must not reach: normal·c ≥ -room for its way c. Without a normal, a ball: |c| ≤ room.
+#[derive(Debug, Clone, Copy)]
+struct Wall {
+    normal: Vector,
+    room: f64,
+}
+
+impl Wall {
+    fn is_ball(&self) -> bool {
+        self.normal.norm_sq() == 0.0
+    }
+
+    fn allows(&self, c: Vector) -> bool {
+        if self.is_ball() { c.norm_sq() <= self.room * self.room } else { self.normal.dot(c) >= -self.room }
+    }
+
+    /// A way along the plane, where it would cross it.
+    fn slide(&self, c: Vector) -> Vector {
+        let over = self.normal.dot(c) + self.room;
+        if self.is_ball() || over >= 0.0 { c } else { c - self.normal * (over / self.normal.norm_sq()) }
+    }
+
+    /// The part of a way that stays on this side.
+    fn part(&self, c: Vector) -> f64 {
+        let towards = if self.is_ball() { c.norm() } else { -self.normal.dot(c) };
+        if towards > self.room { (self.room / towards).max(0.0) } else { 1.0 }
+    }
+}
+
+/// a + c, each number rounded towards a, and a fourth number.
+fn towards(a: Vector, c: Vector, w: Real) -> Row {
+    let round = |a: f64, c: f64| {
+        let r = (a + c) as Real;
+        let over = (f64::from(r) - a).abs() > c.abs();
+        match (over, f64::from(r) > a) {
+            (false, _) => r,
+            (true, true) => r.next_down(),
+            (true, false) => r.next_up(),
+        }
+    };
+    [round(a.x, c.x), round(a.y, c.y), round(a.z, c.z), w]
+}
+
+/// Pulls every vertex that went farther than its bound from `at` back to the sphere around it, and returns how many. Numbers are
+/// rounded towards `at`, so that none is farther than its bound. What is not finite stays so, for others to find.
+pub fn truncate(at: &[Vector], x: &mut [Row], bounds: &[f64]) -> usize {
+    let one = |((a, x), b): ((&Vector, &mut Row), &f64)| {
+        let way = xyz64(*x) - *a;
+        let length = way.norm();
+        if length <= *b || !length.is_finite() {
+            return 0;
+        }
+        *x = towards(*a, way * (b / length), x[3]);
+        1
+    };
+    at.par_iter().zip(x).zip(bounds).with_min_len(CHUNK).map(one).sum()
+}
+
+/// Calls `f` for all features i of `from` and j of `with` whose boxes are nearer than `reach`; those of a feature i come one
+/// after the other.
+fn search(from: &Tree, with: &Tree, reach: f64, f: impl Fn(u32, u32, &mut Vec<Pair>) + Sync) -> Vec<Found> {
+    let reach = (reach * (1.0 + f64::from(f32::EPSILON))) as f32;
+    let task = |task: usize| {
+        let (mut found, mut counts, mut leaves) = (Vec::new(), Vec::new(), Vec::new());
+        for leaf in task * TASK..((task + 1) * TASK).min(from.n_leaves()) {
+            leaves.clear();
+            with.walk(&grown(&whole(from, leaf), reach), |l| leaves.push(l));
+            for (place, i) in from.features(leaf).iter().enumerate() {
+                let b = grown(&from.bounds(leaf, place), reach);
+                let before = found.len();
+                for l in &leaves {
+                    let mut mask = with.mask(*l, &b);
+                    while mask != 0 {
+                        f(*i, with.features(*l as usize)[mask.trailing_zeros() as usize % LEAF], &mut found);
+                        mask &= mask - 1;
+                    }
+                }
+                if found.len() > before {
+                    found[before..].sort_unstable_by_key(|p: &Pair| p.vertices);
+                    counts.push((*i, (found.len() - before) as u32));
+                }
+            }
+        }
+        (found, counts)
+    };
+    (0..from.n_leaves().div_ceil(TASK)).into_par_iter().map(task).collect()
+}
+
+/// Appends the pairs of n features in the order of features.
+fn append(pairs: &mut Vec<Pair>, found: Vec<Found>, n: usize) {
+    // Task, first place and count for each feature.
+    let mut runs = vec![(0_u32, 0_u32, 0_u32); n];
+    for (task, (_, counts)) in found.iter().enumerate() {
+        let mut first = 0;
+        for (i, count) in counts {
+            runs[*i as usize] = (task as u32, first, *count);
+            first += count;
+        }
+    }
+    pairs.reserve(found.iter().map(|(pairs, _)| pairs.len()).sum());
+    for (task, first, count) in runs {
+        pairs.extend_from_slice(&found[task as usize].0[first as usize..(first + count) as usize]);
+    }
+}
