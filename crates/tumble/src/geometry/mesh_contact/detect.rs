@@ -42,7 +42,7 @@ pub struct Pair {
     /// Weights of the vertices, negative ones for the second feature, whose sum is zero: the sum of weights times vertices
     /// leads from the second feature to the first where they are nearest.
     pub weights: [Real; 4],
-    /// That direction, of length 1. Where the features touch, that across both.
+    /// That direction, of length 1. Where the features touch, that across both; zero if there is none.
     pub normal: [Real; 3],
     /// Distance [m].
     pub distance: Real,
@@ -74,6 +74,9 @@ pub struct Detector {
     /// Pairs of each vertex: those of v are `lists[start[v]..start[v + 1]]`. Empty until `hold` needs them.
     start: Vec<u32>,
     lists: Vec<u32>,
+    /// What `hold` works in: who went too far, and the plane of each pair.
+    far: Vec<bool>,
+    chosen: Vec<u8>,
     nearest: Vec<AtomicU64>,
 }
 
@@ -191,6 +194,9 @@ impl Detector {
             };
         }
         let n = n.tamed().normalized();
+        if !n.norm_sq().is_finite() {
+            return;
+        }
         found.push(Pair {
             kind,
             vertices,
@@ -235,37 +241,56 @@ impl Detector {
         if x.len() < n || self.at.len() < n {
             return Held::default();
         }
+        let mut far = std::mem::take(&mut self.far);
+        far.resize(n, false);
+        far.par_iter_mut().enumerate().with_min_len(CHUNK).for_each(|(v, far)| {
+            let length_sq = (xyz64(x[v]) - self.at[v]).norm_sq();
+            // What is not finite stays so, for others to find.
+            *far = length_sq > self.bounds[v] * self.bounds[v] && length_sq.is_finite();
+        });
+        let held = if far.iter().any(|far| *far) { self.hold_those(topology, x, &far) } else { Held::default() };
+        self.far = far;
+        held
+    }
+
+    fn hold_those(&mut self, topology: &Topology, x: &mut [Row], far: &[bool]) -> Held {
         if self.start.is_empty() {
-            self.list(n);
+            self.list(far.len());
         }
+        let mut chosen = std::mem::take(&mut self.chosen);
+        chosen.resize(self.pairs.len(), 0);
+        let choose = |(pair, chosen): (&Pair, &mut u8)| {
+            *chosen = if pair.vertices.iter().any(|v| far[*v as usize]) { self.choose(pair, x) } else { 0 };
+        };
+        self.pairs.par_iter().zip(chosen.par_iter_mut()).with_min_len(CHUNK).for_each(choose);
+        // Planes towards which the ways led that were there before anyone was held: all sides of a pair must see the same one.
+        let before: &[Row] = &x.to_vec();
         let this = &*self;
-        let counts: Vec<Held> = x[..n]
-            .par_chunks_mut(CHUNK)
-            .enumerate()
-            .map(|(c, x)| {
-                let mut counts = Held::default();
-                for (i, x) in x.iter_mut().enumerate() {
-                    let v = c * CHUNK + i;
-                    let far = (xyz64(*x) - this.at[v]).norm_sq();
-                    // What is not finite stays so, for others to find.
-                    if far <= this.bounds[v] * this.bounds[v] || !far.is_finite() {
-                        continue;
-                    }
-                    if topology.is_fixed(v as u32) {
-                        counts.driven += 1;
-                    } else {
-                        counts.held += usize::from(this.hold_one(v, x));
-                    }
+        let task = |(c, x): (usize, &mut [Row])| {
+            let mut counts = Held::default();
+            for (i, x) in x.iter_mut().enumerate() {
+                let v = c * CHUNK + i;
+                if far[v] && topology.is_fixed(v as u32) {
+                    counts.driven += 1;
+                } else if far[v] {
+                    counts.held += usize::from(this.hold_one(v, x, &chosen, before));
                 }
-                counts
-            })
-            .collect();
+            }
+            counts
+        };
+        let counts: Vec<Held> = x[..far.len()].par_chunks_mut(CHUNK).enumerate().map(task).collect();
+        self.chosen = chosen;
         counts.iter().fold(Held::default(), |a, b| Held { held: a.held + b.held, driven: a.driven + b.driven })
     }
 
-    fn hold_one(&self, v: usize, x: &mut Row) -> bool {
+    fn hold_one(&self, v: usize, x: &mut Row, chosen: &[u8], before: &[Row]) -> bool {
         let lists = &self.lists[self.start[v] as usize..self.start[v + 1] as usize];
-        let walls: Vec<Wall> = lists.iter().map(|i| self.wall(&self.pairs[*i as usize], v as u32)).collect();
+        let wall = |i: &u32| {
+            let pair = &self.pairs[*i as usize];
+            let place = pair.vertices.iter().position(|u| *u as usize == v).unwrap_or(0);
+            self.plane(pair, chosen[*i as usize], before).wall(pair, place)
+        };
+        let walls: Vec<Wall> = lists.iter().map(wall).collect();
         let radius = GAMMA * self.reach;
         let inside = |c: Vector| c.norm_sq() <= radius * radius && walls.iter().all(|w| w.allows(c));
         let way = xyz64(*x) - self.at[v];
@@ -291,22 +316,67 @@ impl Detector {
         true
     }
 
-    /// What a pair allows one of its vertices.
-    fn wall(&self, pair: &Pair, v: u32) -> Wall {
-        let n = Vector::from(pair.normal.map(f64::from));
-        let along = pair.vertices.map(|v| n.dot(self.at[v as usize]));
-        let (first, low, high) = match pair.kind {
-            Kind::PointTriangle => (pair.vertices[0] == v, along[0], along[1].max(along[2]).max(along[3])),
-            Kind::EdgeEdge => (pair.vertices[0] == v || pair.vertices[1] == v, along[0].min(along[1]), along[2].max(along[3])),
+    /// Which of the planes between the features of a pair leaves most of the ways of its vertices.
+    fn choose(&self, pair: &Pair, x: &[Row]) -> u8 {
+        let part = |choice: u8| {
+            let plane = self.plane(pair, choice, x);
+            let part = |k: usize| {
+                let v = pair.vertices[k] as usize;
+                plane.wall(pair, k).part(xyz64(x[v]) - self.at[v])
+            };
+            part(0).min(part(1)).min(part(2)).min(part(3))
+        };
+        let mut best = (0, part(0));
+        for choice in 1..3 {
+            let part = if best.1 < 1.0 { part(choice) } else { 0.0 };
+            if part > best.1 {
+                best = (choice, part);
+            }
+        }
+        best.0
+    }
+
+    /// A plane between the features of a pair: 0 across the way from one to the other, 1 that of the triangle or of both edges (of
+    /// parallel ones: of the edge and of the way that one goes past the other), 2 the first one turned to lie along that way. If it
+    /// does not part them, a ball.
+    fn plane(&self, pair: &Pair, choice: u8, x: &[Row]) -> Plane {
+        let p = pair.vertices.map(|v| self.at[v as usize]);
+        let across = Vector::from(pair.normal.map(f64::from));
+        let past = || {
+            let way = |k: usize| (xyz64(x[pair.vertices[k] as usize]) - p[k]) * f64::from(pair.weights[k]);
+            (way(0) + way(1) + way(2) + way(3)).normalized()
+        };
+        let mut normal = match (choice, pair.kind) {
+            (0, _) => across,
+            (1, Kind::PointTriangle) => (p[2] - p[1]).cross(p[3] - p[1]).normalized(),
+            (1, Kind::EdgeEdge) => {
+                let (u, v) = ((p[1] - p[0]).normalized(), (p[3] - p[2]).normalized());
+                let both = u.cross(v);
+                if both.norm_sq() > 1e-6 { both.normalized() } else { u.cross(past()).normalized() }
+            }
+            _ => {
+                let past = past();
+                (across - past * across.dot(past)).normalized()
+            }
+        };
+        if normal.dot(across) < 0.0 {
+            normal = -normal;
+        }
+        let along = p.map(|p| normal.dot(p));
+        let (low, high) = match pair.kind {
+            Kind::PointTriangle => (along[0], along[1].max(along[2]).max(along[3])),
+            Kind::EdgeEdge => (along[0].min(along[1]), along[2].max(along[3])),
         };
         let d = f64::from(pair.distance) * (1.0 - f64::from(f32::EPSILON));
         let (gap, middle) = (low - high, 0.5 * (low + high));
-        // A plane that hardly parts them is none: a ball, as for `bounds`.
-        if gap.is_nan() || gap < 0.95 * d || d <= 0.0 {
-            return Wall { normal: Vector::default(), room: GAMMA * d };
+        // A plane that is crooked by rounding is none. The others may be nearer to the features than their distance is.
+        let parts = d > 0.0 && gap >= if choice == 0 { 0.95 * d } else { 0.0 };
+        let room = |k: usize, sign: f64| sign * (along[k] - middle) - (0.5 - GAMMA) * gap;
+        let second = if pair.kind == Kind::PointTriangle { 1.0 } else { -1.0 };
+        match parts {
+            true => Plane { normal, room: [room(0, 1.0), room(1, -second), room(2, -1.0), room(3, -1.0)] },
+            false => Plane { normal: Vector::default(), room: [if choice == 0 { GAMMA * d } else { 0.0 }; 4] },
         }
-        let sign = if first { 1.0 } else { -1.0 };
-        Wall { normal: n * sign, room: sign * (n.dot(self.at[v as usize]) - middle) - (0.5 - GAMMA) * gap }
     }
 
     /// The pairs of each vertex.
@@ -327,6 +397,21 @@ impl Detector {
                 next[v as usize] += 1;
             }
         }
+    }
+}
+
+/// A plane between two features, and how far from it each vertex is, less what must be left.
+#[derive(Debug, Clone, Copy)]
+struct Plane {
+    normal: Vector,
+    room: [f64; 4],
+}
+
+impl Plane {
+    /// What it is to the vertex at a place of the pair.
+    fn wall(&self, pair: &Pair, place: usize) -> Wall {
+        let first = place == 0 || place == 1 && pair.kind == Kind::EdgeEdge;
+        Wall { normal: if first { self.normal } else { -self.normal }, room: self.room[place] }
     }
 }
 

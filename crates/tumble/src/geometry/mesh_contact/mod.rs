@@ -8,11 +8,13 @@ mod crossing;
 mod detect;
 mod distance;
 mod impact;
+mod tangle;
 mod topology;
 mod tree;
 
-pub use crossing::{contour, intersections, passes, tangled, untangle_directions};
+pub use crossing::{intersections, passes, tangled};
 pub use detect::{Detector, GAMMA, Held, Kind, Pair, truncate};
 pub use distance::{Nearest, edge_edge, point_triangle};
 pub use impact::{edge_edge_impact, point_triangle_impact};
+pub use tangle::{contour, untangle_directions};
 pub use topology::{Owner, Topology};
