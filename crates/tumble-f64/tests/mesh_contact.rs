@@ -641,10 +641,9 @@ fn tangled_sheets_come_apart() {
                 break;
             }
             let ways = untangle_directions(&topology, &x, &crossings, 0.01);
-            assert!(ways.iter().all(|w| w.norm() <= 0.01));
+            assert!(ways.iter().all(|w| w.norm() <= 0.01 + 1e-15));
             x = moved(&x, &ways, 1.0);
             rounds += 1;
-            println!("{name} {rounds}: {} {}", crossings.len(), contour(&topology, &x, &crossings).0);
             assert!(rounds < 100, "{name}: {} of {}", crossings.len(), start.len());
         }
         println!("{name}: {} crossings gone after {rounds} rounds", start.len());

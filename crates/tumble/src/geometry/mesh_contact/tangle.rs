@@ -122,12 +122,39 @@ pub fn contour(topology: &Topology, x: &[Row], crossings: &[(u32, u32)]) -> (f64
     (all.iter().map(|c| c.length).sum(), gradient)
 }
 
+/// The number of vertices that hang together with each vertex without the edges that cross something, and which ones they are.
+fn parts(topology: &Topology, crossings: &[(u32, u32)]) -> (Vec<u32>, Vec<u32>) {
+    let mut part: Vec<u32> = (0..topology.vertices() as u32).collect();
+    fn root(part: &mut [u32], mut v: u32) -> u32 {
+        while part[v as usize] != v {
+            part[v as usize] = part[part[v as usize] as usize];
+            v = part[v as usize];
+        }
+        v
+    }
+    for (e, [a, b]) in topology.edges.iter().enumerate() {
+        let first = crossings.partition_point(|c| (c.0 as usize) < e);
+        if crossings.get(first).is_none_or(|c| c.0 as usize != e) {
+            let (a, b) = (root(&mut part, *a), root(&mut part, *b));
+            part[a.max(b) as usize] = a.min(b);
+        }
+    }
+    let mut size = vec![0; part.len()];
+    for v in 0..part.len() {
+        part[v] = root(&mut part, v as u32);
+        size[part[v] as usize] += 1;
+    }
+    (part.iter().map(|p| size[*p as usize]).collect(), part)
+}
+
 /// A way out for each vertex [m], at most `step` long: all that meets along one connected line goes the same way, the two sides
-/// against each other, so that the line becomes shorter and no corner is bent off to make it so. Fixed vertices stay; zero for
-/// all that do not take part. `crossings` are those of `intersections`.
+/// against each other, so that the line becomes shorter and no corner is bent off to make it so. A line that cuts a surface in two
+/// need not become shorter (a straight side that hangs through a floor): there the smaller part goes back to where the larger
+/// one is. Fixed vertices stay; zero for all that do not take part. `crossings` are those of `intersections`.
 pub fn untangle_directions(topology: &Topology, x: &[Row], crossings: &[(u32, u32)], step: f64) -> Vec<Vector> {
     let mut ways = vec![Vector::default(); topology.vertices()];
     let Some((lines, all)) = lines(topology, x, crossings) else { return ways };
+    let (size, part) = parts(topology, crossings);
     let mut side: Vec<f64> = vec![0.0; all.len()];
     for first in 0..all.len() {
         if side[first] != 0.0 {
@@ -146,7 +173,17 @@ pub fn untangle_directions(topology: &Topology, x: &[Row], crossings: &[(u32, u3
             }
         }
         let g = line.iter().fold(Vector::default(), |g, i| g + (all[*i].of_edge - all[*i].of_triangle) * side[*i]);
-        let way = g * (-step / (1.0 + g.norm_sq()).sqrt());
+        // Out of the other surface, for what is cut off.
+        let out = line.iter().fold(Vector::default(), |out, i| {
+            let ([a, b], t) = (topology.edges[crossings[*i].0 as usize], topology.triangles[crossings[*i].1 as usize]);
+            let [p, q, r] = t.map(|v| lines.at(v));
+            let n = (q - p).cross(r - p).normalized() * side[*i];
+            let small_to_large = (lines.at(b) - lines.at(a)) * (f64::from(size[b as usize]) - f64::from(size[a as usize]));
+            let cut = part[a as usize] != part[b as usize];
+            let turn = small_to_large.dot(n * side[*i]);
+            if !cut || turn == 0.0 { out } else { out + n * turn.signum() }
+        });
+        let way = out * (step / (1.0 + out.norm_sq()).sqrt()) - g * (step / (1.0 + g.norm_sq()).sqrt());
         if !way.norm_sq().is_finite() {
             continue;
         }
