@@ -136,13 +136,28 @@ impl Detector {
         let at = &self.at;
         let finite = |p: &Vector| p.norm_sq().is_finite();
         let origin = topology.points().iter().map(|v| at[*v as usize]).find(finite).unwrap_or_default();
-        let of = |v: u32| at[v as usize];
         let points = topology.points();
-        self.points.fit(points.len(), |i| around([of(points[i as usize])], origin));
+        self.points.fit(points.len(), |i| around([at[points[i as usize] as usize]], origin));
         let edges = topology.edges();
-        self.edges.fit(edges.len(), |i| around(edges[i as usize].map(of), origin));
+        self.edges.fit(edges.len(), |i| around(Self::two(edges[i as usize], at), origin));
         let triangles = topology.triangles();
-        self.triangles.fit(triangles.len(), |i| around(triangles[i as usize].map(of), origin));
+        self.triangles.fit(triangles.len(), |i| around(Self::three(triangles[i as usize], at), origin));
+    }
+
+    /// Where some vertices are. Not `array::map`, which would be a call.
+    #[inline(always)]
+    fn two([a, b]: [u32; 2], x: &[Vector]) -> [Vector; 2] {
+        [x[a as usize], x[b as usize]]
+    }
+
+    #[inline(always)]
+    fn three([a, b, c]: [u32; 3], x: &[Vector]) -> [Vector; 3] {
+        [x[a as usize], x[b as usize], x[c as usize]]
+    }
+
+    #[inline(always)]
+    fn four(&self, [a, b, c, d]: [u32; 4]) -> [Vector; 4] {
+        [self.at[a as usize], self.at[b as usize], self.at[c as usize], self.at[d as usize]]
     }
 
     fn with_triangles(&self, topology: &Topology) -> Vec<Found> {
@@ -150,8 +165,8 @@ impl Detector {
         search(&self.points, &self.triangles, self.reach, |i, j, found| {
             let (v, t) = (points[i as usize], triangles[j as usize]);
             if topology.meet([v], t) {
-                let near = point_triangle(self.at[v as usize], t.map(|v| self.at[v as usize]));
-                let rest = |x: &[Vector]| point_triangle(x[v as usize], t.map(|v| x[v as usize])).distance_sq.sqrt();
+                let near = point_triangle(self.at[v as usize], Self::three(t, &self.at));
+                let rest = |x: &[Vector]| point_triangle(x[v as usize], Self::three(t, x)).distance_sq.sqrt();
                 self.keep(topology, Kind::PointTriangle, [v, t[0], t[1], t[2]], near, rest, found);
             }
         })
@@ -162,8 +177,8 @@ impl Detector {
         search(&self.edges, &self.edges, self.reach, |i, j, found| {
             let (e, f) = (edges[i as usize], edges[j as usize]);
             if i < j && topology.meet(e, f) {
-                let near = edge_edge(e.map(|v| self.at[v as usize]), f.map(|v| self.at[v as usize]));
-                let rest = |x: &[Vector]| edge_edge(e.map(|v| x[v as usize]), f.map(|v| x[v as usize])).distance_sq.sqrt();
+                let near = edge_edge(Self::two(e, &self.at), Self::two(f, &self.at));
+                let rest = |x: &[Vector]| edge_edge(Self::two(e, x), Self::two(f, x)).distance_sq.sqrt();
                 self.keep(topology, Kind::EdgeEdge, [e[0], e[1], f[0], f[1]], near, rest, found);
             }
         })
@@ -184,7 +199,7 @@ impl Detector {
             return;
         }
         let distance = near.distance_sq.sqrt();
-        let p = vertices.map(|v| self.at[v as usize]);
+        let p = self.four(vertices);
         let w = near.weights;
         let mut n = p[0] * w[0] + p[1] * w[1] + p[2] * w[2] + p[3] * w[3];
         if distance == 0.0 {
@@ -200,7 +215,7 @@ impl Detector {
         found.push(Pair {
             kind,
             vertices,
-            weights: w.map(|w| w as Real),
+            weights: [w[0] as Real, w[1] as Real, w[2] as Real, w[3] as Real],
             normal: [n.x as Real, n.y as Real, n.z as Real],
             distance: distance as Real,
             thickness: topology.thickness(vertices[0], vertices[3], rest) as Real,
@@ -340,8 +355,9 @@ impl Detector {
     /// parallel ones: of the edge and of the way that one goes past the other), 2 the first one turned to lie along that way. If it
     /// does not part them, a ball.
     fn plane(&self, pair: &Pair, choice: u8, x: &[Row]) -> Plane {
-        let p = pair.vertices.map(|v| self.at[v as usize]);
-        let across = Vector::from(pair.normal.map(f64::from));
+        let p = self.four(pair.vertices);
+        let [nx, ny, nz] = pair.normal;
+        let across = Vector { x: f64::from(nx), y: f64::from(ny), z: f64::from(nz) };
         let past = || {
             let way = |k: usize| (xyz64(x[pair.vertices[k] as usize]) - p[k]) * f64::from(pair.weights[k]);
             (way(0) + way(1) + way(2) + way(3)).normalized()
@@ -362,7 +378,7 @@ impl Detector {
         if normal.dot(across) < 0.0 {
             normal = -normal;
         }
-        let along = p.map(|p| normal.dot(p));
+        let along = [normal.dot(p[0]), normal.dot(p[1]), normal.dot(p[2]), normal.dot(p[3])];
         let (low, high) = match pair.kind {
             Kind::PointTriangle => (along[0], along[1].max(along[2]).max(along[3])),
             Kind::EdgeEdge => (along[0].min(along[1]), along[2].max(along[3])),

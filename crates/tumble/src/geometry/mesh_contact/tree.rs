@@ -16,7 +16,8 @@ const GROWTH: f64 = 1.5;
 /// A box: lower corner, upper corner [m].
 pub(super) type Box3 = [[f32; 3]; 2];
 
-const NOTHING: Box3 = [[f32::INFINITY; 3], [f32::NEG_INFINITY; 3]];
+/// Meets no box; finite, so that it can be grown.
+const NOTHING: Box3 = [[f32::MAX; 3], [f32::MIN; 3]];
 
 /// A node. A leaf's `leaf` is its number, an inner node's is NONE.
 #[derive(Debug, Clone, Copy)]
@@ -42,7 +43,7 @@ pub(super) struct Tree {
     size: f64,
 }
 
-/// A box around points, rounded outwards.
+/// A box around points, rounded outwards; empty if one of them is not finite in single precision.
 #[inline(always)]
 pub(super) fn around<const N: usize>(points: [Vector; N], origin: Vector) -> Box3 {
     let mut b = NOTHING;
@@ -53,6 +54,10 @@ pub(super) fn around<const N: usize>(points: [Vector; N], origin: Vector) -> Box
             b[0][k] = b[0][k].min(c);
             b[1][k] = b[1][k].max(c);
         }
+    }
+    let widest = (b[1][0] - b[0][0]) + (b[1][1] - b[0][1]) + (b[1][2] - b[0][2]);
+    if !widest.is_finite() || points.iter().any(|p| !p.norm_sq().is_finite()) {
+        return NOTHING;
     }
     for k in 0..3 {
         b[0][k] -= b[0][k].abs() * f32::EPSILON + f32::MIN_POSITIVE;
@@ -118,7 +123,7 @@ impl Tree {
     fn refit(&mut self, bounds: &(impl Fn(u32) -> Box3 + Sync)) -> f64 {
         let mut whole = vec![NOTHING; self.leaves.len()];
         let fit = |(leaf, whole, order): (&mut Leaf, &mut Box3, &[u32])| {
-            let [low, high] = [[f32::INFINITY; LEAF], [f32::NEG_INFINITY; LEAF]];
+            let [low, high] = [[f32::MAX; LEAF], [f32::MIN; LEAF]];
             *leaf = [low, low, low, high, high, high];
             for (l, i) in order.iter().enumerate() {
                 let b = bounds(*i);
@@ -185,17 +190,18 @@ impl Tree {
     #[inline(always)]
     pub fn mask(&self, leaf: u32, b: &Box3) -> u32 {
         let of = &self.leaves[leaf as usize];
-        let mut meets = [0_u32; LEAF];
+        let mut apart = [false; LEAF];
         for l in 0..LEAF {
-            let yes = (of[0][l] <= b[1][0])
-                & (of[1][l] <= b[1][1])
-                & (of[2][l] <= b[1][2])
-                & (of[3][l] >= b[0][0])
-                & (of[4][l] >= b[0][1])
-                & (of[5][l] >= b[0][2]);
-            meets[l] = u32::from(yes) << l;
+            apart[l] = (of[0][l] > b[1][0])
+                | (of[1][l] > b[1][1])
+                | (of[2][l] > b[1][2])
+                | (of[3][l] < b[0][0])
+                | (of[4][l] < b[0][1])
+                | (of[5][l] < b[0][2]);
         }
-        meets.iter().fold(0, |a, m| a | m)
+        // One bit for each: eight bools are the bytes 0 or 1 of a number, and the factor moves them to its top byte.
+        let bytes = u64::from_le_bytes(apart.map(u8::from));
+        !(bytes.wrapping_mul(0x0102_0408_1020_4080) >> 56) as u32 & 0xff
     }
 }
 
