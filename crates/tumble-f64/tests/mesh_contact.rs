@@ -573,6 +573,10 @@ fn intersections_are_all_there_are() {
     }
     assert!(all.len() > 100, "{}", all.len());
     assert_eq!(found, all);
+    // With trees that were fitted to something else.
+    let mut other = Detector::new();
+    other.detect(&topology, &moved(&x, &vec![vector(3.0, 2.0, 1.0); x.len()], 1.0), 0.1);
+    assert_eq!(other.intersections(&topology, &x), all);
     let loose = tangled(&topology, &all[..1], 0);
     assert_eq!(loose.iter().filter(|l| **l).count(), 5);
     assert!(tangled(&topology, &all[..1], 1).iter().filter(|l| **l).count() > 12);

@@ -5,7 +5,7 @@
 #![allow(clippy::unwrap_used)]
 
 use std::time::Instant;
-use tumble::geometry::mesh_contact::{Detector, Owner, Topology, intersections};
+use tumble::geometry::mesh_contact::{Detector, Owner, Topology};
 use tumble::math::{Real, Row};
 
 /// A sheet of 1 m, folded twice into layers that are 3 mm apart, wrinkled and turned: no axis is along an edge.
@@ -48,7 +48,7 @@ fn main() {
         let mut detector = Detector::new();
         detector.detect(&topology, &x, reach);
         let best = |f: &mut dyn FnMut()| {
-            (0..15).fold(f64::INFINITY, |best, _| {
+            (0..25).fold(f64::INFINITY, |best, _| {
                 let start = Instant::now();
                 f();
                 best.min(start.elapsed().as_secs_f64() * 1e3)
@@ -60,7 +60,7 @@ fn main() {
             detector.hold(&topology, &mut x);
         });
         let judge = best(&mut || {
-            intersections(&topology, &x);
+            detector.intersections(&topology, &x);
         });
         println!(
             "{name}: {} vertices, {} triangles, {} edges, reach {reach} m: detect {detect:.2} ms ({} pairs), hold {hold:.2} ms, intersections {judge:.2} ms ({})",
@@ -68,7 +68,7 @@ fn main() {
             topology.triangles().len(),
             topology.edges().len(),
             detector.pairs().len(),
-            intersections(&topology, &x).len(),
+            detector.intersections(&topology, &x).len(),
         );
     }
 }

@@ -36,20 +36,27 @@ pub fn passes([a, b]: [Vector; 2], [p, q, r]: [Vector; 3]) -> bool {
 /// All edges that pass through triangles with which they share no vertex, as (edge, triangle), sorted. Seams count as shared. Of
 /// objects that do not touch themselves, only what passes through others counts. `x` has a row for each vertex, at least.
 pub fn intersections(topology: &Topology, x: &[Row]) -> Vec<(u32, u32)> {
+    crossings(topology, x, &mut Tree::default(), &mut Tree::default())
+}
+
+/// The same with trees for edges and triangles.
+pub(super) fn crossings(topology: &Topology, x: &[Row], edges: &mut Tree, triangles: &mut Tree) -> Vec<(u32, u32)> {
     if x.len() < topology.vertices() {
         return Vec::new();
     }
     let at = |v: u32| xyz64(x[v as usize]);
+    let two = |[a, b]: [u32; 2]| [at(a), at(b)];
+    let three = |[a, b, c]: [u32; 3]| [at(a), at(b), at(c)];
     let finite = |p: &Vector| p.norm_sq().is_finite();
     let origin = topology.points().iter().map(|v| at(*v)).find(finite).unwrap_or_default();
-    let (mut edges, mut triangles) = (Tree::default(), Tree::default());
-    edges.fit(topology.edges.len(), |i| around(topology.edges[i as usize].map(at), origin));
-    triangles.fit(topology.triangles.len(), |i| around(topology.triangles[i as usize].map(at), origin));
+    edges.fit(topology.edges.len(), |i| around(two(topology.edges[i as usize]), origin));
+    triangles.fit(topology.triangles.len(), |i| around(three(topology.triangles[i as usize]), origin));
+    let (edges, triangles) = (&*edges, &*triangles);
     let task = |task: usize| {
         let (mut found, mut leaves) = (Vec::new(), Vec::new());
         for leaf in task * TASK..((task + 1) * TASK).min(edges.n_leaves()) {
             leaves.clear();
-            triangles.walk(&whole(&edges, leaf), |l| leaves.push(l));
+            triangles.walk(&whole(edges, leaf), 0, |l| leaves.push(l));
             for (place, i) in edges.features(leaf).iter().enumerate() {
                 let (b, e) = (edges.bounds(leaf, place), topology.edges[*i as usize]);
                 for l in &leaves {
@@ -57,7 +64,7 @@ pub fn intersections(topology: &Topology, x: &[Row]) -> Vec<(u32, u32)> {
                     while mask != 0 {
                         let j = triangles.features(*l as usize)[mask.trailing_zeros() as usize % LEAF];
                         let t = topology.triangles[j as usize];
-                        if topology.meet(e, t) && passes(e.map(at), t.map(at)) {
+                        if topology.meet(e, t) && passes(two(e), three(t)) {
                             found.push((*i, j));
                         }
                         mask &= mask - 1;

@@ -8,6 +8,7 @@
 //!
 //! Source: [chen2025], whose bound is a ball; the planes are ours.
 
+use super::crossing::crossings;
 use super::distance::{Nearest, edge_edge, point_triangle};
 use super::topology::Topology;
 use super::tree::{LEAF, Tree, around, grown, whole};
@@ -80,9 +81,6 @@ pub struct Detector {
     nearest: Vec<AtomicU64>,
 }
 
-/// Pairs found by a task, and how many of them each of its features has.
-type Found = (Vec<Pair>, Vec<(u32, u32)>);
-
 impl Detector {
     /// Nothing found yet.
     pub fn new() -> Self {
@@ -125,10 +123,15 @@ impl Detector {
         self.fit(topology);
         let point_triangle = self.with_triangles(topology);
         let edge_edge = self.with_edges(topology);
-        for (found, n) in [(point_triangle, topology.points().len()), (edge_edge, topology.edges().len())] {
-            append(&mut self.pairs, found, n);
-        }
+        // Sorted by the first vertex: points have one, edges the smaller of two.
+        append(&mut self.pairs, &point_triangle, n);
+        append(&mut self.pairs, &edge_edge, n);
         self.bound(n);
+    }
+
+    /// What `intersections` finds, in less time: with the trees of this.
+    pub fn intersections(&mut self, topology: &Topology, x: &[Row]) -> Vec<(u32, u32)> {
+        crossings(topology, x, &mut self.edges, &mut self.triangles)
     }
 
     /// Fits the trees to the positions.
@@ -160,9 +163,9 @@ impl Detector {
         [self.at[a as usize], self.at[b as usize], self.at[c as usize], self.at[d as usize]]
     }
 
-    fn with_triangles(&self, topology: &Topology) -> Vec<Found> {
+    fn with_triangles(&self, topology: &Topology) -> Vec<Vec<Pair>> {
         let (points, triangles) = (topology.points(), topology.triangles());
-        search(&self.points, &self.triangles, self.reach, |i, j, found| {
+        search::<false>(&self.points, &self.triangles, self.reach, |i, j, found| {
             let (v, t) = (points[i as usize], triangles[j as usize]);
             if topology.meet([v], t) {
                 let near = point_triangle(self.at[v as usize], Self::three(t, &self.at));
@@ -172,11 +175,11 @@ impl Detector {
         })
     }
 
-    fn with_edges(&self, topology: &Topology) -> Vec<Found> {
+    fn with_edges(&self, topology: &Topology) -> Vec<Vec<Pair>> {
         let edges = topology.edges();
-        search(&self.edges, &self.edges, self.reach, |i, j, found| {
-            let (e, f) = (edges[i as usize], edges[j as usize]);
-            if i < j && topology.meet(e, f) {
+        search::<true>(&self.edges, &self.edges, self.reach, |i, j, found| {
+            let (e, f) = (edges[i.min(j) as usize], edges[i.max(j) as usize]);
+            if topology.meet(e, f) {
                 let near = edge_edge(Self::two(e, &self.at), Self::two(f, &self.at));
                 let rest = |x: &[Vector]| edge_edge(Self::two(e, x), Self::two(f, x)).distance_sq.sqrt();
                 self.keep(topology, Kind::EdgeEdge, [e[0], e[1], f[0], f[1]], near, rest, found);
@@ -489,49 +492,64 @@ pub fn truncate(at: &[Vector], x: &mut [Row], bounds: &[f64]) -> usize {
     at.par_iter().zip(x).zip(bounds).with_min_len(CHUNK).map(one).sum()
 }
 
-/// Calls `f` for all features i of `from` and j of `with` whose boxes are nearer than `reach`; those of a feature i come one
-/// after the other.
-fn search(from: &Tree, with: &Tree, reach: f64, f: impl Fn(u32, u32, &mut Vec<Pair>) + Sync) -> Vec<Found> {
+/// Calls `f` for all features i of `from` and j of `with` whose boxes are nearer than `reach`. In a tree with ITSELF each two come
+/// once, and none with itself.
+fn search<const ITSELF: bool>(from: &Tree, with: &Tree, reach: f64, f: impl Fn(u32, u32, &mut Vec<Pair>) + Sync) -> Vec<Vec<Pair>> {
     let reach = (reach * (1.0 + f64::from(f32::EPSILON))) as f32;
     let task = |task: usize| {
-        let (mut found, mut counts, mut leaves) = (Vec::new(), Vec::new(), Vec::new());
+        let (mut found, mut leaves) = (Vec::new(), Vec::new());
         for leaf in task * TASK..((task + 1) * TASK).min(from.n_leaves()) {
             leaves.clear();
-            with.walk(&grown(&whole(from, leaf), reach), |l| leaves.push(l));
+            with.walk(&grown(&whole(from, leaf), reach), if ITSELF { leaf as u32 } else { 0 }, |l| leaves.push(l));
             for (place, i) in from.features(leaf).iter().enumerate() {
                 let b = grown(&from.bounds(leaf, place), reach);
-                let before = found.len();
                 for l in &leaves {
                     let mut mask = with.mask(*l, &b);
+                    if ITSELF && *l as usize == leaf {
+                        mask &= !1 << place;
+                    }
                     while mask != 0 {
                         f(*i, with.features(*l as usize)[mask.trailing_zeros() as usize % LEAF], &mut found);
                         mask &= mask - 1;
                     }
                 }
-                if found.len() > before {
-                    found[before..].sort_unstable_by_key(|p: &Pair| p.vertices);
-                    counts.push((*i, (found.len() - before) as u32));
-                }
             }
         }
-        (found, counts)
+        found
     };
     (0..from.n_leaves().div_ceil(TASK)).into_par_iter().map(task).collect()
 }
 
-/// Appends the pairs of n features in the order of features.
-fn append(pairs: &mut Vec<Pair>, found: Vec<Found>, n: usize) {
-    // Task, first place and count for each feature.
-    let mut runs = vec![(0_u32, 0_u32, 0_u32); n];
-    for (task, (_, counts)) in found.iter().enumerate() {
-        let mut first = 0;
-        for (i, count) in counts {
-            runs[*i as usize] = (task as u32, first, *count);
-            first += count;
+/// Appends pairs, sorted by their vertices, of which there are n.
+fn append(pairs: &mut Vec<Pair>, found: &[Vec<Pair>], n: usize) {
+    let Some(any) = found.iter().flatten().next() else { return };
+    // How many begin with each vertex; then where the next one of them goes.
+    let mut next = vec![0_u32; n + 1];
+    found.iter().flatten().for_each(|p| next[p.vertices[0] as usize + 1] += 1);
+    (0..n).for_each(|v| next[v + 1] += next[v]);
+    let ends: Vec<u32> = next[1..].to_vec();
+    let first = pairs.len();
+    pairs.resize(first + ends[n - 1] as usize, *any);
+    let mut rest = &mut pairs[first..];
+    for p in found.iter().flatten() {
+        let at = &mut next[p.vertices[0] as usize];
+        rest[*at as usize] = *p;
+        *at += 1;
+    }
+    let mut runs = Vec::with_capacity(n.div_ceil(CHUNK));
+    let mut done = 0;
+    for ends in ends.chunks(CHUNK) {
+        let (these, others) = rest.split_at_mut((ends[ends.len() - 1] - done) as usize);
+        runs.push((these, ends, done));
+        done = ends[ends.len() - 1];
+        rest = others;
+    }
+    runs.into_par_iter().for_each(|(pairs, ends, done)| {
+        let mut start = 0;
+        for end in ends {
+            let end = (end - done) as usize;
+            pairs[start..end].sort_unstable_by_key(|p| p.vertices);
+            start = end;
         }
-    }
-    pairs.reserve(found.iter().map(|(pairs, _)| pairs.len()).sum());
-    for (task, first, count) in runs {
-        pairs.extend_from_slice(&found[task as usize].0[first as usize..(first + count) as usize]);
-    }
+    });
 }

@@ -25,6 +25,9 @@ pub struct Topology {
     /// The smallest vertex that each one is sewn to, itself if to none.
     weld: Vec<u32>,
     fixed: Vec<bool>,
+    /// Whether there are any at all.
+    has_welds: bool,
+    has_fixed: bool,
     rest: Vec<Vector>,
     /// Triangles at each edge: those of edge e are `wings[wing[e]..wing[e + 1]]`.
     wing: Vec<u32>,
@@ -94,6 +97,7 @@ impl Topology {
     /// Counts two vertices as one where features that share a vertex are told from others: both sides of a seam.
     pub fn weld(&mut self, a: u32, b: u32) {
         if let (Some(a), Some(b)) = (self.weld.get(a as usize).copied(), self.weld.get(b as usize).copied()) {
+            self.has_welds |= a != b;
             for w in self.weld.iter_mut().filter(|w| **w == a.max(b)) {
                 *w = a.min(b);
             }
@@ -104,6 +108,7 @@ impl Topology {
     pub fn fix(&mut self, vertex: u32, fixed: bool) {
         if let Some(f) = self.fixed.get_mut(vertex as usize) {
             *f = fixed;
+            self.has_fixed |= fixed;
         }
     }
 
@@ -152,12 +157,22 @@ impl Topology {
     /// Whether the features a and b can meet: they share no vertex, one can move, and their objects touch.
     #[inline(always)]
     pub(super) fn meet<const A: usize, const B: usize>(&self, a: [u32; A], b: [u32; B]) -> bool {
+        // Most that lie near each other share a vertex: this comes first, and looks at nothing else.
+        let mut same = false;
+        for i in 0..A {
+            for j in 0..B {
+                same |= a[i] == b[j];
+            }
+        }
+        if same || self.has_welds && self.share(a, b) {
+            return false;
+        }
         let (of_a, of_b) = (self.owner[a[0] as usize], self.owner[b[0] as usize]);
-        if of_a == of_b && !self.owners[of_a as usize].itself || self.share(a, b) {
+        if of_a == of_b && !self.owners[of_a as usize].itself {
             return false;
         }
         let fixed = |v: &u32| self.fixed[*v as usize];
-        !(a.iter().all(fixed) && b.iter().all(fixed))
+        !(self.has_fixed && a.iter().all(fixed) && b.iter().all(fixed))
     }
 
     /// Whether two features share a vertex, seams counted as one.

@@ -19,12 +19,13 @@ pub(super) type Box3 = [[f32; 3]; 2];
 /// Meets no box; finite, so that it can be grown.
 const NOTHING: Box3 = [[f32::MAX; 3], [f32::MIN; 3]];
 
-/// A node. A leaf's `leaf` is its number, an inner node's is NONE.
+/// A node. A leaf's `leaf` is its number, an inner node's is NONE; `last` is the last leaf in it.
 #[derive(Debug, Clone, Copy)]
 struct Node {
     bounds: Box3,
     after: u32,
     leaf: u32,
+    last: u32,
 }
 
 const NONE: u32 = u32::MAX;
@@ -170,12 +171,12 @@ impl Tree {
         [[b[0][place], b[1][place], b[2][place]], [b[3][place], b[4][place], b[5][place]]]
     }
 
-    /// Calls `f` for all leaves that a box meets.
+    /// Calls `f` for all leaves that a box meets, from a leaf on.
     #[inline(always)]
-    pub fn walk(&self, b: &Box3, mut f: impl FnMut(u32)) {
+    pub fn walk(&self, b: &Box3, from: u32, mut f: impl FnMut(u32)) {
         let mut i = 0;
         while let Some(node) = self.nodes.get(i) {
-            if !overlap(&node.bounds, b) {
+            if node.last < from || !overlap(&node.bounds, b) {
                 i = node.after as usize;
                 continue;
             }
@@ -213,7 +214,7 @@ pub(super) fn whole(tree: &Tree, leaf: usize) -> Box3 {
 /// Splits at the median of the longest axis of the centres, at a multiple of LEAF, so that all leaves but the last are full.
 fn split(order: &mut [u32], first: usize, centres: &[[f32; 3]], nodes: &mut Vec<Node>) {
     let me = nodes.len();
-    nodes.push(Node { bounds: NOTHING, after: 0, leaf: NONE });
+    nodes.push(Node { bounds: NOTHING, after: 0, leaf: NONE, last: ((first + order.len() - 1) / LEAF) as u32 });
     if order.len() <= LEAF {
         nodes[me].leaf = (first / LEAF) as u32;
     } else {
