@@ -53,7 +53,9 @@ const THIN: Owner = Owner { radius: 0.01, itself: true };
 
 /// A sheet of n × n squares over the unit square, at a height.
 fn sheet(n: u32, first: u32, place: impl Fn(f64, f64) -> Vector) -> (Vec<Row>, Vec<[u32; 3]>) {
-    let x = (0..=n).flat_map(|j| (0..=n).map(move |i| (i, j))).map(|(i, j)| row(place(f64::from(i) / f64::from(n), f64::from(j) / f64::from(n))));
+    let x = (0..=n)
+        .flat_map(|j| (0..=n).map(move |i| (i, j)))
+        .map(|(i, j)| row(place(f64::from(i) / f64::from(n), f64::from(j) / f64::from(n))));
     let at = |i: u32, j: u32| first + j * (n + 1) + i;
     let square = |i: u32, j: u32| [[at(i, j), at(i + 1, j), at(i + 1, j + 1)], [at(i, j), at(i + 1, j + 1), at(i, j + 1)]];
     (x.collect(), (0..n).flat_map(|j| (0..n).flat_map(move |i| square(i, j))).collect())
@@ -376,7 +378,10 @@ fn nothing_passes_what_holds() {
 fn degenerate_input_is_harmless() {
     let o = vector(0.0, 0.0, 0.0);
     let (a, b) = (vector(1.0, 0.0, 0.0), vector(2.0, 0.0, 0.0));
-    let x: Vec<Row> = [o, a, b, o, a, b, o, o, o, a, a, vector(0.0, f64::NAN, 0.0), vector(f64::INFINITY, 0.0, 0.0), vector(1e300, 0.0, 0.0)].map(row).to_vec();
+    let x: Vec<Row> =
+        [o, a, b, o, a, b, o, o, o, a, a, vector(0.0, f64::NAN, 0.0), vector(f64::INFINITY, 0.0, 0.0), vector(1e300, 0.0, 0.0)]
+            .map(row)
+            .to_vec();
     let mut topology = Topology::new(x.len());
     let triangles = [[0, 1, 2], [3, 4, 5], [6, 7, 8], [8, 9, 10], [9, 9, 10], [1, 2, 11], [2, 3, 12], [4, 5, 13], [0, 1, 99]];
     topology.add(THIN, &triangles, &[[0, 0], [7, 77]], &[88]);
@@ -416,7 +421,8 @@ fn far_from_the_origin_nothing_changes() {
     assert_eq!(pairs.iter().map(|p| p.vertices).collect::<Vec<_>>(), detector.pairs().iter().map(|p| p.vertices).collect::<Vec<_>>());
     // Places are rounded to 1.1e-13 m.
     pairs.iter().zip(detector.pairs()).for_each(|(a, b)| close(a.distance, b.distance, 1e-12));
-    bounds.iter().zip(detector.bounds()).for_each(|(a, b)| close(*a, *b, 1e-12));
+    // 64 times that is left of each distance.
+    bounds.iter().zip(detector.bounds()).for_each(|(a, b)| close(*a, *b, 1e-11));
 }
 
 /// The same bits on any number of threads, and whatever was looked at before.

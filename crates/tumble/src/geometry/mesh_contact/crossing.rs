@@ -98,4 +98,3 @@ pub fn tangled(topology: &Topology, crossings: &[(u32, u32)], rings: u32) -> Vec
     }
     loose
 }
-

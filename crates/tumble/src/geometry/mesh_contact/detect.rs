@@ -19,6 +19,8 @@ use std::sync::atomic::{AtomicU64, Ordering::Relaxed};
 
 /// The part of a distance that each side may use up; below 1/2, so that something is left of it.
 pub const GAMMA: f64 = 0.45;
+/// What is always left of a distance, as a part of how far from the origin it is: below, planes would be noise.
+const LEAST: f64 = 64.0 * f64::EPSILON;
 /// Leaves per task.
 const TASK: usize = 32;
 /// Vertices per task.
@@ -77,7 +79,7 @@ pub struct Detector {
     lists: Vec<u32>,
     /// What `hold` works in: who went too far, and the plane of each pair.
     far: Vec<bool>,
-    chosen: Vec<u8>,
+    chosen: Vec<Plane>,
     nearest: Vec<AtomicU64>,
 }
 
@@ -233,14 +235,20 @@ impl Detector {
         }
     }
 
+    /// The distance that is left to a pair [m].
+    fn least(&self, pair: &Pair) -> f64 {
+        let p = self.at[pair.vertices[3] as usize];
+        LEAST * p.x.abs().max(p.y.abs()).max(p.z.abs())
+    }
+
     /// The bound of each vertex. Distances that are not negative sort like their bits.
     fn bound(&mut self, n: usize) {
         self.nearest.clear();
         self.nearest.extend((0..n).map(|_| AtomicU64::new(self.reach.to_bits())));
         let nearest = &self.nearest;
-        self.pairs.par_iter().with_min_len(CHUNK).for_each(|pair| {
-            // Rounding to single precision may have made it longer.
-            let d = (f64::from(pair.distance) * (1.0 - f64::from(f32::EPSILON))).to_bits();
+        let this = &*self;
+        this.pairs.par_iter().with_min_len(CHUNK).for_each(|pair| {
+            let d = (usable(pair) - this.least(pair)).max(0.0).to_bits();
             for v in pair.vertices {
                 if nearest[v as usize].load(Relaxed) > d {
                     nearest[v as usize].fetch_min(d, Relaxed);
@@ -276,13 +284,15 @@ impl Detector {
             self.list(far.len());
         }
         let mut chosen = std::mem::take(&mut self.chosen);
-        chosen.resize(self.pairs.len(), 0);
-        let choose = |(pair, chosen): (&Pair, &mut u8)| {
-            *chosen = if pair.vertices.iter().any(|v| far[*v as usize]) { self.choose(pair, x) } else { 0 };
+        chosen.resize(self.pairs.len(), Plane::default());
+        // Planes towards which the ways lead that are there before anyone is held: all sides of a pair must see the same one.
+        let ways: &[Row] = x;
+        let choose = |(pair, chosen): (&Pair, &mut Plane)| {
+            if pair.vertices.iter().any(|v| far[*v as usize]) {
+                *chosen = self.choose(pair, ways);
+            }
         };
         self.pairs.par_iter().zip(chosen.par_iter_mut()).with_min_len(CHUNK).for_each(choose);
-        // Planes towards which the ways led that were there before anyone was held: all sides of a pair must see the same one.
-        let before: &[Row] = &x.to_vec();
         let this = &*self;
         let task = |(c, x): (usize, &mut [Row])| {
             let mut counts = Held::default();
@@ -291,7 +301,7 @@ impl Detector {
                 if far[v] && topology.is_fixed(v as u32) {
                     counts.driven += 1;
                 } else if far[v] {
-                    counts.held += usize::from(this.hold_one(v, x, &chosen, before));
+                    counts.held += usize::from(this.hold_one(v, x, &chosen));
                 }
             }
             counts
@@ -301,12 +311,12 @@ impl Detector {
         counts.iter().fold(Held::default(), |a, b| Held { held: a.held + b.held, driven: a.driven + b.driven })
     }
 
-    fn hold_one(&self, v: usize, x: &mut Row, chosen: &[u8], before: &[Row]) -> bool {
+    fn hold_one(&self, v: usize, x: &mut Row, chosen: &[Plane]) -> bool {
         let lists = &self.lists[self.start[v] as usize..self.start[v + 1] as usize];
         let wall = |i: &u32| {
             let pair = &self.pairs[*i as usize];
             let place = pair.vertices.iter().position(|u| *u as usize == v).unwrap_or(0);
-            self.plane(pair, chosen[*i as usize], before).wall(pair, place)
+            chosen[*i as usize].wall(pair, place)
         };
         let walls: Vec<Wall> = lists.iter().map(wall).collect();
         let radius = GAMMA * self.reach;
@@ -334,35 +344,40 @@ impl Detector {
         true
     }
 
-    /// Which of the planes between the features of a pair leaves most of the ways of its vertices.
-    fn choose(&self, pair: &Pair, x: &[Row]) -> u8 {
-        let part = |choice: u8| {
-            let plane = self.plane(pair, choice, x);
-            let part = |k: usize| {
-                let v = pair.vertices[k] as usize;
-                plane.wall(pair, k).part(xyz64(x[v]) - self.at[v])
-            };
+    /// The plane between the features of a pair that leaves most of the ways of its vertices.
+    fn choose(&self, pair: &Pair, x: &[Row]) -> Plane {
+        let way = |k: usize| {
+            let v = pair.vertices[k] as usize;
+            xyz64(x[v]) - self.at[v]
+        };
+        let ways = [way(0), way(1), way(2), way(3)];
+        let part = |plane: &Plane| {
+            let part = |k: usize| plane.wall(pair, k).part(ways[k]);
             part(0).min(part(1)).min(part(2)).min(part(3))
         };
-        let mut best = (0, part(0));
+        let mut best = self.plane(pair, 0, &ways);
+        let mut most = part(&best);
         for choice in 1..3 {
-            let part = if best.1 < 1.0 { part(choice) } else { 0.0 };
-            if part > best.1 {
-                best = (choice, part);
+            if most < 1.0 {
+                let plane = self.plane(pair, choice, &ways);
+                let part = part(&plane);
+                if part > most {
+                    (best, most) = (plane, part);
+                }
             }
         }
-        best.0
+        best
     }
 
     /// A plane between the features of a pair: 0 across the way from one to the other, 1 that of the triangle or of both edges (of
     /// parallel ones: of the edge and of the way that one goes past the other), 2 the first one turned to lie along that way. If it
     /// does not part them, a ball.
-    fn plane(&self, pair: &Pair, choice: u8, x: &[Row]) -> Plane {
+    fn plane(&self, pair: &Pair, choice: u8, ways: &[Vector; 4]) -> Plane {
         let p = self.four(pair.vertices);
         let [nx, ny, nz] = pair.normal;
         let across = Vector { x: f64::from(nx), y: f64::from(ny), z: f64::from(nz) };
         let past = || {
-            let way = |k: usize| (xyz64(x[pair.vertices[k] as usize]) - p[k]) * f64::from(pair.weights[k]);
+            let way = |k: usize| ways[k] * f64::from(pair.weights[k]);
             (way(0) + way(1) + way(2) + way(3)).normalized()
         };
         let mut normal = match (choice, pair.kind) {
@@ -381,20 +396,24 @@ impl Detector {
         if normal.dot(across) < 0.0 {
             normal = -normal;
         }
-        let along = [normal.dot(p[0]), normal.dot(p[1]), normal.dot(p[2]), normal.dot(p[3])];
+        // From one of them: differences of near places are exact.
+        let along = [normal.dot(p[0] - p[3]), normal.dot(p[1] - p[3]), normal.dot(p[2] - p[3]), 0.0];
         let (low, high) = match pair.kind {
             Kind::PointTriangle => (along[0], along[1].max(along[2]).max(along[3])),
             Kind::EdgeEdge => (along[0].min(along[1]), along[2].max(along[3])),
         };
-        let d = f64::from(pair.distance) * (1.0 - f64::from(f32::EPSILON));
+        let d = usable(pair);
         let (gap, middle) = (low - high, 0.5 * (low + high));
         // A plane that is crooked by rounding is none. The others may be nearer to the features than their distance is.
         let parts = d > 0.0 && gap >= if choice == 0 { 0.95 * d } else { 0.0 };
-        let room = |k: usize, sign: f64| sign * (along[k] - middle) - (0.5 - GAMMA) * gap;
+        let left = (0.5 * (gap - self.least(pair))).min(GAMMA * gap).max(0.0);
+        let room = |k: usize, sign: f64| sign * (along[k] - middle) - 0.5 * gap + left;
         let second = if pair.kind == Kind::PointTriangle { 1.0 } else { -1.0 };
         match parts {
             true => Plane { normal, room: [room(0, 1.0), room(1, -second), room(2, -1.0), room(3, -1.0)] },
-            false => Plane { normal: Vector::default(), room: [if choice == 0 { GAMMA * d } else { 0.0 }; 4] },
+            false => {
+                Plane { normal: Vector::default(), room: [if choice == 0 { GAMMA * (d - self.least(pair)).max(0.0) } else { 0.0 }; 4] }
+            }
         }
     }
 
@@ -419,8 +438,13 @@ impl Detector {
     }
 }
 
+/// The distance of a pair [m], without what rounding to single precision may have added.
+fn usable(pair: &Pair) -> f64 {
+    f64::from(pair.distance) * (1.0 - f64::from(f32::EPSILON))
+}
+
 /// A plane between two features, and how far from it each vertex is, less what must be left.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone, Copy, Default)]
 struct Plane {
     normal: Vector,
     room: [f64; 4],
@@ -552,4 +576,43 @@ fn append(pairs: &mut Vec<Pair>, found: &[Vec<Pair>], n: usize) {
             start = end;
         }
     });
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::{Owner, intersections};
+    use super::*;
+
+    /// Two sheets that are pressed together until they are as near as numbers can say: nothing passes, and they come apart again.
+    #[test]
+    fn layers_never_stick_nor_pass_at_the_limit_of_the_numbers() {
+        let place = |i: u32, j: u32, z: f64| [10.0 + 0.1 * f64::from(i), 10.0 + 0.1 * f64::from(j) + 0.03 * f64::from(i), z];
+        let sheet = |z: f64| (0..36).map(move |k| place(k % 6, k / 6, z).map(|c| c as Real)).map(|[x, y, z]| [x, y, z, 1.0]);
+        let mut x: Vec<Row> = sheet(10.0).chain(sheet(10.01)).collect();
+        x[36..].iter_mut().for_each(|x| x[0] += 0.043);
+        let squares = (0..72).filter(|k| k % 6 < 5 && k % 36 < 30);
+        let triangles: Vec<[u32; 3]> = squares.flat_map(|k| [[k, k + 1, k + 7], [k, k + 7, k + 6]]).collect();
+        let mut topology = Topology::new(72);
+        topology.add(Owner { radius: 1e-3, itself: true }, &triangles, &[], &[]);
+        let mut detector = Detector::new();
+        let least = |detector: &Detector| detector.pairs().iter().map(|p| f64::from(p.distance)).fold(1.0, f64::min);
+        for round in 0..60 {
+            detector.detect(&topology, &x, 0.02);
+            let wrinkle = |v: usize| 1e-3 * ((7 * v + round) % 5) as Real;
+            for v in 36..72 {
+                x[v][2] -= 0.01 + wrinkle(v);
+                x[v][1] += wrinkle(v);
+            }
+            (0..36).for_each(|v| x[v][2] += wrinkle(v));
+            assert!(detector.hold(&topology, &mut x).held > 30);
+            assert_eq!(intersections(&topology, &x), []);
+        }
+        detector.detect(&topology, &x, 0.02);
+        let near = least(&detector);
+        assert!(near > 0.0 && near < 256.0 * 10.0 * f64::from(Real::EPSILON), "{near}");
+        x[36..].iter_mut().for_each(|x| x[2] += 5e-3);
+        detector.hold(&topology, &mut x);
+        detector.detect(&topology, &x, 0.02);
+        assert!(least(&detector) > 4e-3, "{}", least(&detector));
+    }
 }
