@@ -30,7 +30,7 @@ fn triangles(n: u32) -> Vec<[u32; 3]> {
     let at = |i: u32, j: u32| j * (n + 1) + i;
     let square = |i: u32, j: u32| {
         let (a, b, c, d) = (at(i, j), at(i + 1, j), at(i + 1, j + 1), at(i, j + 1));
-        if (i + j) % 2 == 0 { [[a, b, c], [a, c, d]] } else { [[a, b, d], [b, c, d]] }
+        if (i + j).is_multiple_of(2) { [[a, b, c], [a, c, d]] } else { [[a, b, d], [b, c, d]] }
     };
     (0..n).flat_map(|j| (0..n).flat_map(move |i| square(i, j))).collect()
 }
