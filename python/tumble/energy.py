@@ -64,7 +64,7 @@ def unsoftened(scene: Tree) -> list[int]:
 
 
 def _things(scene: Tree) -> list[tuple[str, Tree]]:
-    return [(kind, thing) for kind in ("particles", "rope", "sheet", "block", "net") for thing in scene[kind]]
+    return [(kind, thing) for kind in ("particles", "rope", "sheet", "block", "net", "cloth") for thing in scene[kind]]
 
 
 def _damped(value: Any) -> bool:

@@ -4,7 +4,7 @@
 mod common;
 
 use common::Numbers;
-use tumble_f64::elements::{Batch, Distance, Elements, Linear, Members};
+use tumble_f64::elements::{Constraints, Distance, Linear, Members, Projected, Projection};
 use tumble_f64::math::Row;
 
 /// Points of a chain that is bent everywhere, so that no two constraints are parallel.
@@ -16,7 +16,7 @@ type Displacement = Vec<[f64; 3]>;
 
 struct Chain {
     rest: Vec<Row>,
-    links: Box<dyn Batch>,
+    links: Box<dyn Constraints>,
 }
 
 impl Chain {
@@ -32,7 +32,7 @@ impl Chain {
         let length = |i: usize| (0..3).map(|a| (rest[i + 1][a] - rest[i][a]).powi(2)).sum::<f64>().sqrt();
         let member = |i| Members { nodes: [i as u32, i as u32 + 1], rest: [length(i)], law: [], stiffness: f64::INFINITY, damping: 0.0 };
         let members: Vec<_> = (0..POINTS - 1).map(member).collect();
-        let links = Elements::<Distance, Linear, 2, 1, 1, 0>::new(POINTS, &members).unwrap();
+        let links = Projected::<Distance, Linear, 2, 1, 1, 0>::new(POINTS, POINTS, &[], &members, &[]).unwrap();
         Self { rest, links: Box::new(links) }
     }
 
@@ -40,7 +40,8 @@ impl Chain {
     fn project(&mut self, d: &Displacement, sweeps: usize) -> Displacement {
         let mut x: Vec<Row> =
             self.rest.iter().zip(d).map(|(r, d)| [r[0] + SMALL * d[0], r[1] + SMALL * d[1], r[2] + SMALL * d[2], r[3]]).collect();
-        (0..sweeps).for_each(|_| self.links.project(&mut x, 1.0));
+        let step = Projection { h: 1.0, before: &[], iteration: 0, iterations: 1, plain: None };
+        (0..sweeps).for_each(|_| self.links.project(&mut x, &step));
         x.iter().zip(&self.rest).map(|(x, r)| [0, 1, 2].map(|a| (x[a] - r[a]) / SMALL)).collect()
     }
 

@@ -37,6 +37,8 @@ pub struct StepReport {
     pub residual: f64,
     /// Steps whose Newton iteration did not reach its tolerance.
     pub unconverged: u64,
+    /// Sweeps over the elements of position-based systems.
+    pub sweeps: u64,
     /// Links that broke.
     pub broken: u64,
     /// Energy taken out by the position clamp [J].
@@ -72,6 +74,7 @@ impl StepReport {
         self.linear += other.linear;
         self.residual = self.residual.max(other.residual);
         self.unconverged += other.unconverged;
+        self.sweeps += other.sweeps;
         self.broken += other.broken;
         self.clamped += other.clamped;
         self.trials.extend_from_slice(&other.trials);

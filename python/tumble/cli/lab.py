@@ -24,6 +24,7 @@ def lab() -> None:
       tumble lab operators
       tumble lab compressible
       tumble lab pressure
+      tumble lab positions
     """
 
 
@@ -117,6 +118,19 @@ def compressible(out: OutOption = None) -> None:
     from tumble.lab.compressible import page
 
     say(page(out or find.OUT / "lab" / "compressible"))
+
+
+@app.command()
+def positions(out: OutOption = None) -> None:
+    """Show how soon position-based dynamics obeys a stiffness, by sub-steps and by sweeps.
+
+    \b
+    Example:
+      tumble lab positions
+    """
+    from tumble.lab.positions import page
+
+    say(page(out or find.OUT / "lab" / "positions"))
 
 
 @app.command()

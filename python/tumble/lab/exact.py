@@ -93,7 +93,7 @@ def tracers(fields: list[Tree], positions: Floats) -> Linear | None:
 def springs(tree: Tree, world: World) -> Linear | None:
     """The motion of one object of undamped springs of rest length zero, f = k (b - a) (springs.1), under gravity,
     uniform accelerations and drag; None where anything of the scene is not linear."""
-    things = [len(tree[kind]) for kind in ("rope", "sheet", "block", "net", "anchor", "collider")]
+    things = [len(tree[kind]) for kind in ("rope", "sheet", "block", "net", "cloth", "anchor", "collider")]
     if any(things) or len(tree["particles"]) != 1 or tree["dimension"] != 3 or len(world.systems) != 1:
         return None
     if any(system.get("clamp") for system in tree["system"]):

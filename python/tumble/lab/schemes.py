@@ -20,8 +20,9 @@ TANGENT = Family("Euler along the tangent", "#ee6677", "#c0394d")
 RUNGE_KUTTA = Family("Runge-Kutta", "#4477aa", "#35608c")
 SYMPLECTIC = Family("Symplectic", "#228833", "#1b6f29")
 IMPLICIT = Family("Implicit", "#c79a1b", "#85650a")
+POSITIONS = Family("Position-based", "#33a5b5", "#1d7380")
 ADAPTIVE = Family("Adaptive", "#aa3377", "#932b66")
-FAMILIES = (TANGENT, RUNGE_KUTTA, SYMPLECTIC, IMPLICIT, ADAPTIVE)
+FAMILIES = (TANGENT, RUNGE_KUTTA, SYMPLECTIC, IMPLICIT, POSITIONS, ADAPTIVE)
 
 
 @dataclass(frozen=True)
@@ -78,6 +79,7 @@ SCHEMES: tuple[Scheme, ...] = (
     _scheme("implicit_euler", IMPLICIT, 1, 0, 0),
     _scheme("implicit_midpoint", IMPLICIT, 2, 0, 1),
     _scheme("bdf2", IMPLICIT, 2, 0, 2),
+    _scheme("position_based", POSITIONS, 1, 1, 0, True),
     _scheme("adaptive_euler", ADAPTIVE, 1, 2, 0),
     _scheme("dormand_prince", ADAPTIVE, 5, 6, 1),
 )

@@ -61,7 +61,7 @@ class Subject:
     @property
     def discontinuous(self) -> bool:
         """Whether something in it happens at the end of a step only: contact, breaking, pulls between systems."""
-        links = [thing.get("links") or {} for kind in ("rope", "sheet", "block", "net") for thing in self.tree[kind]]
+        links = [thing.get("links") or {} for kind in ("rope", "sheet", "block", "net", "cloth") for thing in self.tree[kind]]
         laws = [law for of in links for law in of.values() if isinstance(law, dict)]
         laws += [spring for thing in self.tree["particles"] for spring in thing["spring"]]
         return self.coupled or bool(self.tree["collider"]) or any(law.get("break_strain") for law in laws)
@@ -91,7 +91,7 @@ class Subject:
         """Whether something in it pulls back or brakes, so that a step can be too long."""
         if self.tracers:
             return self.rate > 0
-        things = [kind for kind in ("rope", "sheet", "block", "net", "anchor") if self.tree[kind]]
+        things = [kind for kind in ("rope", "sheet", "block", "net", "cloth", "anchor") if self.tree[kind]]
         springs = any(thing["spring"] for thing in self.tree["particles"])
         hold = {"drag", "lennard_jones", "repulsion", "cohesion", "viscosity"}
         forces = any(force["kind"] in hold for force in self.tree["force"])
@@ -114,7 +114,7 @@ class Subject:
                         "substeps": None,
                         "adaptive": {**own["adaptive"], "tolerance": tolerance, "smallest": 1e-12},
                     }
-                if scheme.word not in ("modified_euler", "verlet"):
+                if scheme.word not in ("modified_euler", "verlet", "position_based"):
                     own["clamp"] = None
             systems.append(own)
         time = {"fps": 1.0 / interval, "frames": frames, "exchanges": exchanges}
@@ -183,6 +183,8 @@ def subject(scene: Scene) -> Subject:
         tree["system"] = [{"name": "main", "method": "dynamics", "integrator": "symplectic_euler"}]
     for system in tree["system"]:
         system.setdefault("method", "dynamics")
+        if system["method"] == "position_based":
+            system |= {"method": "dynamics", "integrator": "position_based"}
         system["adaptive"] = dict(system.get("adaptive") or {})
     methods = {system["method"] for system in tree["system"]}
     if methods == {"vicsek"}:
@@ -192,7 +194,7 @@ def subject(scene: Scene) -> Subject:
     if {"tracers", "dynamics"} <= methods:
         notes.append("Tracers move as the scene says; what is compared here are the masses.")
     if any(system.get("clamp") for system in tree["system"]):
-        notes.append("The position clamp goes with modified_euler and verlet only; the others run without it.")
+        notes.append("The position clamp goes with modified_euler, verlet and position_based only; the others run without it.")
     bare = Subject(tree, scene.folder, tracers, 0.0, 0.0, 0.0, None, {}, None, np.zeros((0, 3)), None, notes)
     world = bare.world(BY_WORD["rk4"], 1.0 / float(tree["time"]["fps"]), 1, substeps=1)
     bare.start = bare.positions(world)
@@ -203,6 +205,8 @@ def subject(scene: Scene) -> Subject:
     else:
         bare.solution = exact.springs(tree, world)
         _mass_limits(bare, world.stability())
+        # Elements that are constraints have no mode that could grow.
+        bare.limits["position_based"] = Limits(np.inf, np.inf)
     return bare
 
 

@@ -2,6 +2,7 @@
 //! schema; JSON Schema, the reference page and the Python stubs are generated from them.
 
 mod animated;
+mod cloth;
 mod compressible;
 mod emitters;
 mod forces;
@@ -14,6 +15,7 @@ mod structures;
 mod systems;
 
 pub use animated::{Animated, AnimatedVector, Component, Interpolation, Keys, VectorKeys};
+pub use cloth::{Cloth, Dress, Panel, Seam, Side};
 pub use compressible::Compressible;
 pub use emitters::{Between, Burst, Cause, Emitter, Event, Kill, Source, WhenFull};
 pub use forces::{Anchor, Field, Force, Goal};
@@ -26,10 +28,10 @@ pub use heat::{Heat, HeatRegion, HeatScheme, HeatSide, HeatSides, HeatSource};
 pub use output::{Camera, Expect, Look, Output, Probe};
 pub use shapes::{Collider, MeshFile, MeshFrame, MeshFrames, MeshRef, Motion, Pace, Pose, Shape};
 pub use structures::{
-    Block, Cloud, CloudShape, Diagonals, Galaxy, Halo, Link, LinkSettings, Links, Material, Net, Particles, Pin, Profile, Region, Rod,
-    Rope, Sheet, Spring,
+    Block, Cloud, CloudShape, Diagonals, Follow, Galaxy, Halo, Link, LinkSettings, Links, Material, Named, Net, Particles, Pin, Profile,
+    Region, Rod, Rope, Sheet, Spring,
 };
-pub use systems::{Adaptive, Hessian, Integrator, Linear, Method, OnFailure, Solver, System, Vicsek};
+pub use systems::{Adaptive, Hessian, Integrator, Linear, Method, OnFailure, PositionBased, Projection, Solver, System, Vicsek};
 
 use crate::check::check;
 use crate::error::{Issue, SceneError};
@@ -90,6 +92,9 @@ pub struct Scene {
     /// Springs along the edges of any mesh.
     #[serde(default)]
     pub net: Vec<Net>,
+    /// Cloth cut from panels and sewn.
+    #[serde(default)]
+    pub cloth: Vec<Cloth>,
     /// Stars, placed at random and set going so that they hold together; needs a force of gravitation.
     #[serde(default)]
     pub galaxy: Vec<Galaxy>,

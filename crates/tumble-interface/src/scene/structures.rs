@@ -484,6 +484,29 @@ pub enum Pin {
     Words(String),
     /// All within a radius of a point.
     Region(Region),
+    /// In words, with what they follow.
+    Named(Named),
+}
+
+/// Masses that follow a collider, in words.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Named {
+    /// The words: `"edge y+"`.
+    pub which: String,
+    /// What they follow.
+    pub follow: Follow,
+}
+
+/// What pinned masses follow, as if they were part of it.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Follow {
+    /// Name of a collider.
+    pub collider: String,
+    /// Which of its bones; without it, the collider as a rigid whole.
+    #[serde(default)]
+    pub bone: Option<String>,
 }
 
 /// All masses within a radius of a point at the start.
@@ -496,6 +519,9 @@ pub struct Region {
     /// The radius.
     #[schemars(extend("x-unit" = "m", "exclusiveMinimum" = 0.0))]
     pub radius: f64,
+    /// What they follow; without it, they stay where they are.
+    #[serde(default)]
+    pub follow: Option<Follow>,
 }
 
 fn sheet_links() -> Links {

@@ -29,13 +29,16 @@ pub struct System {
     #[serde(default)]
     pub adaptive: Adaptive,
     /// Springs longer than this many times their rest length are shortened to it after each step
-    /// (`modified_euler` and `verlet` only).
+    /// (`modified_euler` and `verlet`), or in each iteration (`position_based`).
     #[serde(default)]
     #[schemars(extend("x-unit" = "1", "exclusiveMinimum" = 1.0))]
     pub clamp: Option<f64>,
     /// Settings of the implicit integrators.
     #[serde(default)]
     pub solver: Solver,
+    /// Settings of `position_based`.
+    #[serde(default)]
+    pub position_based: PositionBased,
     /// The numbers of the `vicsek` method, which needs them.
     #[serde(default)]
     pub vicsek: Option<Vicsek>,
@@ -52,6 +55,7 @@ impl Default for System {
             adaptive: Adaptive::default(),
             clamp: None,
             solver: Solver::default(),
+            position_based: PositionBased::default(),
             vicsek: None,
         }
     }
@@ -68,6 +72,8 @@ pub enum Method {
     /// Masses under forces: x'' = f(x, v, t) / m.
     #[default]
     Dynamics,
+    /// Another word for `dynamics` with `integrator = "position_based"`.
+    PositionBased,
     /// Massless particles carried by velocity fields: x' = u(x, t).
     Tracers,
     /// The model of Vicsek: particles of constant speed that take the mean direction of all within a radius, and err. A map:
@@ -86,6 +92,7 @@ impl Method {
     pub fn name(self) -> &'static str {
         match self {
             Self::Dynamics => "dynamics",
+            Self::PositionBased => "position_based",
             Self::Tracers => "tracers",
             Self::Vicsek => "vicsek",
             Self::Heat => "heat",
@@ -144,10 +151,13 @@ pub enum Integrator {
     ImplicitMidpoint,
     /// Two-step backward differentiation. Order 2; damps high frequencies.
     Bdf2,
+    /// Position-based dynamics: positions are predicted without the elements, then moved until each element is satisfied; velocities
+    /// follow. Stable for every step; iterated to convergence it is implicit Euler. Order 1; damps.
+    PositionBased,
 }
 
 impl Integrator {
-    /// All of them, from the simplest on.
+    /// All that step any y' = f(y, t), from the simplest on: not `position_based`, which needs elements.
     pub const ALL: [Integrator; 13] = [
         Self::ForwardEuler,
         Self::SymplecticEuler,
@@ -180,6 +190,7 @@ impl Integrator {
             Self::ImplicitEuler => "implicit_euler",
             Self::ImplicitMidpoint => "implicit_midpoint",
             Self::Bdf2 => "bdf2",
+            Self::PositionBased => "position_based",
         }
     }
 
@@ -195,13 +206,18 @@ impl Integrator {
 
     /// Whether it needs y split into positions and velocities.
     pub fn needs_velocities(self) -> bool {
-        matches!(self, Self::SymplecticEuler | Self::ModifiedEuler | Self::Verlet | Self::VelocityVerlet)
+        matches!(self, Self::SymplecticEuler | Self::ModifiedEuler | Self::Verlet | Self::VelocityVerlet | Self::PositionBased)
     }
 
     /// Order of convergence.
     pub fn order(self) -> u32 {
         match self {
-            Self::ForwardEuler | Self::SymplecticEuler | Self::ModifiedEuler | Self::AdaptiveEuler | Self::ImplicitEuler => 1,
+            Self::ForwardEuler
+            | Self::SymplecticEuler
+            | Self::ModifiedEuler
+            | Self::AdaptiveEuler
+            | Self::ImplicitEuler
+            | Self::PositionBased => 1,
             Self::Midpoint | Self::Heun | Self::Verlet | Self::VelocityVerlet | Self::ImplicitMidpoint | Self::Bdf2 => 2,
             Self::Rk4 => 4,
             Self::DormandPrince => 5,
@@ -273,6 +289,40 @@ impl Default for Solver {
             on_failure: OnFailure::Warn,
         }
     }
+}
+
+/// Settings of position-based dynamics.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields, default)]
+pub struct PositionBased {
+    /// Sweeps over all elements in a sub-step. More sub-steps are worth more than more iterations.
+    #[schemars(range(min = 1, max = 100_000))]
+    pub iterations: u32,
+    /// Sweeps end early when none moves a point farther than this.
+    #[schemars(extend("x-unit" = "m", "exclusiveMinimum" = 0.0))]
+    pub tolerance: Option<f64>,
+    /// What a sweep does to an element.
+    pub projection: Projection,
+    /// Share of its error that a plain element has lost after all iterations of a sub-step (`plain` only).
+    #[schemars(range(max = 1.0), extend("x-unit" = "1", "exclusiveMinimum" = 0.0))]
+    pub stiffness: f64,
+}
+
+impl Default for PositionBased {
+    fn default() -> Self {
+        Self { iterations: 1, tolerance: None, projection: Projection::Compliant, stiffness: 1.0 }
+    }
+}
+
+/// How an element is satisfied.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum Projection {
+    /// As far as its stiffness in SI units asks for (XPBD): the converged motion does not depend on iterations, and that of short
+    /// sub-steps not on their count.
+    Compliant,
+    /// Its error is taken back whatever its stiffness (PBD): how soft things are depends on iterations and sub-steps.
+    Plain,
 }
 
 /// A linear solver.

@@ -58,9 +58,6 @@ pub trait Batch: Send + Sync {
     fn add_diagonal(&mut self, x: &[Row], blocks: &mut [Block]);
     /// Gives every block of the matrix, as row, column and entries; both triangles.
     fn entries(&self, x: &[Row], sink: &mut dyn FnMut(usize, usize, [[f64; 3]; 3]));
-    /// Projects the positions of points once, element by element in colour order; x[i][3] are inverse masses.
-    /// `h` is the sub-step [s]; an infinite stiffness is rigid.
-    fn project(&mut self, x: &mut [Row], h: f64);
     /// Lengthening over rest length of every element that is a link.
     fn link_strain(&self, _x: &[Row]) -> Vec<Real> {
         Vec::new()
@@ -260,9 +257,5 @@ impl<E: Element<N, M, D>, Y: Law<P>, const N: usize, const M: usize, const D: us
 
     fn entries(&self, x: &[Row], sink: &mut dyn FnMut(usize, usize, [[f64; 3]; 3])) {
         self.list.entries(x, sink);
-    }
-
-    fn project(&mut self, x: &mut [Row], h: f64) {
-        self.list.project(x, h);
     }
 }

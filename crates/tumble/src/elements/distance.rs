@@ -12,6 +12,7 @@ pub struct Distance;
 
 impl Element<2, 1, 1> for Distance {
     const NAME: &'static str = "distance";
+    const LENGTH: Option<usize> = Some(0);
     #[inline(always)]
     fn residual<L: Lane>([l]: [L; 1], [x0, x1]: [[L; 4]; 2]) -> [L; 1] {
         [(point(x1) - point(x0)).norm() - l]

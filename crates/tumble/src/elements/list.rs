@@ -1,12 +1,11 @@
 //! Elements of one kind as columns, with everything about them that needs no scratch: energies, products of single
-//! elements, colours, projection.
+//! elements.
 
 use super::batch::Weights;
-use super::{Element, Law, energy, gauss_newton, hessian, project, tangents};
-use crate::math::parallel::{CHUNK, fold};
+use super::{Element, Law, energy, gauss_newton, hessian, tangents};
+use crate::math::parallel::fold;
 use crate::math::simd::{Index, Kernel, Scalar, Width, count, dispatch, packs};
-use crate::math::{Lane, Quat, Real, Row, Vec3, axpy, row};
-use rayon::prelude::*;
+use crate::math::{Lane, Quat, Real, Row, Vec3};
 use std::marker::PhantomData;
 use std::ops::Range;
 use tumble_interface::scene::Hessian;
@@ -35,7 +34,6 @@ pub struct List<E, Y, const N: usize, const M: usize, const D: usize, const P: u
     pub damping: Vec<Real>,
     pub damped: bool,
     pub weights: Weights,
-    colors: Option<Vec<Vec<u32>>>,
     kind: PhantomData<(E, Y)>,
 }
 
@@ -64,7 +62,6 @@ impl<E: Element<N, M, D>, Y: Law<P>, const N: usize, const M: usize, const D: us
             damping: column(&|m| m.damping),
             damped: members.iter().any(|m| m.damping != 0.0),
             weights: Weights { stiffness: 1.0, damping: 0.0, hessian: Hessian::Definite },
-            colors: None,
             kind: PhantomData,
         })
     }
@@ -195,59 +192,6 @@ impl<E: Element<N, M, D>, Y: Law<P>, const N: usize, const M: usize, const D: us
     pub fn energy(&self, x: &[Row]) -> f64 {
         self.check(&[x]);
         fold(self.len(), |range| dispatch(Energies { list: self, range, x })).into_iter().sum()
-    }
-
-    /// Groups of elements that share no node, greedily in element order.
-    fn color(&self) -> Vec<Vec<u32>> {
-        let rows = self.nodes.iter().map(Index::rows).max().unwrap_or(0);
-        let mut used: Vec<u64> = vec![0; rows];
-        let mut colors: Vec<Vec<u32>> = Vec::new();
-        let mut late: Vec<u32> = Vec::new();
-        for e in 0..self.len() {
-            let taken = self.nodes.iter().fold(0, |t, i| t | used[i.get()[e] as usize]);
-            let color = (!taken).trailing_zeros() as usize;
-            if color == 64 {
-                late.push(e as u32);
-                continue;
-            }
-            for index in &self.nodes {
-                used[index.get()[e] as usize] |= 1 << color;
-            }
-            if color == colors.len() {
-                colors.push(Vec::new());
-            }
-            colors[color].push(e as u32);
-        }
-        // Elements around a node with more than 64 of them go one by one.
-        colors.extend(late.into_iter().map(|e| vec![e]));
-        colors
-    }
-
-    /// Projects every element once; see `Batch::project`.
-    pub fn project(&mut self, x: &mut [Row], h: f64) {
-        self.check(&[x]);
-        let colors = self.colors.take().unwrap_or_else(|| self.color());
-        for color in &colors {
-            let correction = |e: &u32| {
-                let e = *e as usize;
-                let p = self.pack(Scalar, e);
-                let rows = self.rows(Scalar, x, e);
-                let mut w = [0.0; N];
-                for a in 0..N {
-                    w[a] = rows[a][3];
-                }
-                let alpha = (1.0 / (f64::from(p.stiffness) * h * h)) as Real;
-                project::<E, Real, N, M, D>(alpha, 0.0, p.rest, rows, w).0
-            };
-            let corrections: Vec<[Vec3<Real>; N]> = color.par_iter().with_min_len(CHUNK).map(correction).collect();
-            for (e, dx) in color.iter().zip(corrections) {
-                for a in 0..N {
-                    let i = self.nodes[a].get()[*e as usize] as usize;
-                    x[i] = axpy(x[i], 1.0, row(dx[a], 0.0));
-                }
-            }
-        }
-        self.colors = Some(colors);
     }
 }
 

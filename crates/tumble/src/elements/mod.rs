@@ -10,6 +10,7 @@
 
 mod batch;
 mod bend;
+mod constraints;
 mod contact;
 mod distance;
 mod law;
@@ -23,6 +24,7 @@ mod vector;
 pub use crate::linalg::blocks::Block;
 pub use batch::{Batch, Elements, Weights};
 pub use bend::Hinge;
+pub use constraints::{Constraints, Neohookean, Projected, Projection};
 pub use contact::PointPlane;
 pub use distance::{Distance, Limit};
 pub use law::{Law, Linear, Nonlinear};
@@ -40,6 +42,8 @@ pub trait Element<const N: usize, const M: usize, const D: usize>: Send + Sync +
     const NAME: &'static str;
     /// How many of the nodes, the last ones, are frames.
     const FRAMES: usize = 0;
+    /// Of a link, which of the rest numbers is its length.
+    const LENGTH: Option<usize> = None;
     /// The measure r that the stiffness multiplies.
     fn residual<L: Lane>(rest: [L; D], x: [[L; 4]; N]) -> [L; M];
     /// J(x)^T y: forces on points, and on the four numbers of a frame.
@@ -207,39 +211,90 @@ pub fn tangents<E: Element<N, M, D>, Y: Law<P>, L: Lane, const N: usize, const M
     r
 }
 
-/// One step of the position-based projection of |r| to zero with compliance `alpha` = 1/(k h²) [1/kg] for a measure in metres, which
-/// is 0 for a rigid constraint. Points only; `w` are inverse masses. Returns the corrections.
+/// What the projection of an element knows beside its positions.
+#[derive(Clone, Copy)]
+pub struct Compliance<L> {
+    /// 1/((k + b/h) h²), 0 for a rigid element.
+    pub alpha: L,
+    /// The multiplier so far.
+    pub lambda: L,
+    /// s = (b/h)/(k + b/h), the share of damping.
+    pub share: L,
+}
+
+/// One step of the position-based projection. It minimizes along one line, that of the forces, what a step of implicit Euler minimizes:
+/// k phi(r) + b/(2h) |r - r_before|² and the kinetic energy. With y = (1 - s) stress(r)/k + s (r - r_before):
 ///
-///   dx_i = -w_i g_i (c + alpha lambda) / (sum_j w_j |g_j|² + alpha),   g = J^T r/|r|, c = |r|      (elements.5)
+///   dx_i = w_i g_i dlambda,   dlambda = -(c + alpha lambda) / (t sum_j w_j |g_j|² + alpha),   g = J^T y/|y|, c = |y|  (elements.5)
 ///
-/// Source: [macklin2016], eq. 18.
+/// and c = y, g = J^T for a measure of one number; t is the slope of y. `w` are inverse masses of points and inverse inertias of frames.
+/// Returns the corrections, rotation vectors for frames, and dlambda.
+///
+/// Source: [macklin2016], eq. 18, 26. Differs: damping is that of the element's own force.
 #[inline(always)]
-pub fn project<E: Element<N, M, D>, L: Lane, const N: usize, const M: usize, const D: usize>(
-    alpha: L,
-    lambda: L,
+pub fn project<E: Element<N, M, D>, Y: Law<P>, L: Lane, const N: usize, const M: usize, const D: usize, const P: usize>(
+    compliance: Compliance<L>,
+    law: [L; P],
     rest: [L; D],
     x: [[L; 4]; N],
+    before: Option<[[L; 4]; N]>,
     w: [L; N],
 ) -> ([Vec3<L>; N], L) {
+    let Compliance { alpha, lambda, share } = compliance;
+    let one = alpha.like(1.0);
     let r = E::residual(rest, x);
-    let mut norm_sq = alpha.zero();
-    for i in 0..M {
-        norm_sq = norm_sq + r[i] * r[i];
-    }
-    let c = norm_sq.sqrt();
     let mut y = r;
     for i in 0..M {
-        y[i] = c.positive(r[i] / c, c.zero());
+        y[i] = Y::stress(one, law, r[i]);
     }
-    let g = E::pullback(rest, x, y);
-    let mut weight = alpha;
+    if let Some(before) = before {
+        let r_before = E::residual(rest, before);
+        for i in 0..M {
+            y[i] = (one - share) * y[i] + share * (r[i] - r_before[i]);
+        }
+    }
+    let (mut c, mut slope) = (y[0], one);
+    if M == 1 {
+        slope = Y::tangent(one, law, r[0]);
+        if before.is_some() {
+            slope = (one - share) * slope + share;
+        }
+        y[0] = one;
+    } else {
+        let mut norm_sq = alpha.zero();
+        for i in 0..M {
+            norm_sq = norm_sq + y[i] * y[i];
+        }
+        c = norm_sq.sqrt();
+        for i in 0..M {
+            y[i] = c.positive(y[i] / c, c.zero());
+        }
+    }
+    let g = lower(E::FRAMES, x, E::pullback(rest, x, y));
+    let mut weight = alpha.zero();
     for i in 0..N {
-        weight = weight + w[i] * point(g[i]).norm_sq();
+        weight = weight + w[i] * g[i].norm_sq();
     }
+    weight = slope * weight + alpha;
     let delta = weight.positive(-(c + alpha * lambda) / weight, c.zero());
-    let mut out = [point(g[0]); N];
+    let mut out = g;
     for i in 0..N {
-        out[i] = point(g[i]) * (w[i] * delta);
+        out[i] = g[i] * (w[i] * delta);
     }
     (out, delta)
+}
+
+/// Nodes after a correction: points move, frames turn.
+#[inline(always)]
+pub fn corrected<L: Lane, const N: usize>(frames: usize, x: [[L; 4]; N], d: [Vec3<L>; N]) -> [[L; 4]; N] {
+    let mut out = x;
+    for i in 0..N {
+        if i < N - frames {
+            out[i] = [x[i][0] + d[i].x, x[i][1] + d[i].y, x[i][2] + d[i].z, x[i][3]];
+        } else {
+            let q = Quat::from_row(x[i]);
+            out[i] = (q + (q * Quat::pure(d[i])).scaled(x[i][0].like(0.5))).normalized().row();
+        }
+    }
+    out
 }

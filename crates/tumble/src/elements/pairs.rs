@@ -427,10 +427,6 @@ impl<E: Pair<M, D>, Y: Law<P>, const M: usize, const D: usize, const P: usize> B
         }
     }
 
-    fn project(&mut self, x: &mut [Row], h: f64) {
-        self.list.project(x, h);
-    }
-
     fn link_strain(&self, x: &[Row]) -> Vec<Real> {
         self.list.check(&[x]);
         let mut strain = fold(self.len(), |range| range.map(|e| self.strain_of(x, e)).collect::<Vec<_>>()).concat();

@@ -693,8 +693,6 @@ impl Batch for DirectSum {
             }
         }
     }
-
-    fn project(&mut self, _x: &mut [Row], _h: f64) {}
 }
 
 /// Masses per task: a task reads all others, so that it is long however few they are.

@@ -430,6 +430,4 @@ impl Batch for Flock {
             }
         }
     }
-
-    fn project(&mut self, _x: &mut [Row], _h: f64) {}
 }

@@ -201,8 +201,6 @@ impl Batch for Halos {
             }
         }
     }
-
-    fn project(&mut self, _x: &mut [Row], _h: f64) {}
 }
 
 fn add(out: &mut Row, f: Vec3<f64>) {

@@ -322,6 +322,4 @@ impl<P: PairLaw> Batch for Near<P> {
             }
         }
     }
-
-    fn project(&mut self, _x: &mut [Row], _h: f64) {}
 }

@@ -54,6 +54,21 @@ impl Collider {
         self.motion.as_ref().map(|m| m.at(t))
     }
 
+    /// Names of its bones.
+    pub fn bones(&self) -> Vec<&str> {
+        Vec::new()
+    }
+
+    /// The bone of that name.
+    pub fn bone(&self, name: &str) -> Option<usize> {
+        self.bones().iter().position(|bone| *bone == name)
+    }
+
+    /// Where it is at time t as a rigid whole, or where one of its bones is.
+    pub fn pose(&self, _bone: Option<usize>, t: f64) -> Pose {
+        self.at(t).map_or(Pose::default(), |(pose, _)| pose)
+    }
+
     fn near(&self, local: Vector, t: f64, within: f64) -> (f64, Vector, Vector) {
         if self.inside { self.shape.near_walls(local, t, within) } else { self.shape.near(local, t, within) }
     }

@@ -153,7 +153,7 @@ pub fn equal_steps(dt: f64, step: f64) -> f64 {
 /// x_t+h = x_t + h (v_t + v_t+h)/2 + lead h² a, as if at the velocity v + lead h a.                (contact.14)
 pub fn lead(scheme: Integrator) -> f64 {
     match scheme {
-        Integrator::SymplecticEuler | Integrator::ImplicitEuler => 0.5,
+        Integrator::SymplecticEuler | Integrator::ImplicitEuler | Integrator::PositionBased => 0.5,
         Integrator::ForwardEuler => -0.5,
         Integrator::AdaptiveEuler => -0.25,
         _ => 0.0,
@@ -185,7 +185,8 @@ pub struct Step<'a, 'm> {
 /// Takes a step.
 pub fn step(scheme: Integrator, mut step: Step<'_, '_>) -> Result<(), StepError> {
     match scheme {
-        Integrator::SymplecticEuler => split::symplectic_euler(step),
+        // Without elements, that is what position-based dynamics does.
+        Integrator::SymplecticEuler | Integrator::PositionBased => split::symplectic_euler(step),
         Integrator::ModifiedEuler => split::modified_euler(step),
         Integrator::Verlet => split::verlet(step),
         Integrator::VelocityVerlet => split::velocity_verlet(step),

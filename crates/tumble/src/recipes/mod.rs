@@ -5,7 +5,10 @@
 //! once.                                                               (springs.8)
 
 mod block;
+mod cloth;
 mod compressible;
+mod cut;
+mod dress;
 mod emitter;
 mod galaxy;
 mod grid;
@@ -20,6 +23,7 @@ mod scenery;
 mod sheet;
 
 pub use block::block;
+pub use cloth::cloth;
 pub use compressible::compressible;
 pub use emitter::{emitter, region};
 pub use galaxy::galaxy;
@@ -31,7 +35,7 @@ pub use rope::rope;
 pub use scenery::{animated, placed, scenery, solid};
 pub use sheet::sheet;
 
-use crate::geometry::Vector;
+use crate::geometry::{Collider, Vector};
 use crate::systems::dynamics::{Parts, SpringPart};
 use tumble_interface::Issue;
 use tumble_interface::scene::Link;
@@ -44,6 +48,8 @@ pub struct Site<'a> {
     pub issues: &'a mut Vec<Issue>,
     /// Direction that counts as up.
     pub up: Vector,
+    /// The scene's colliders, for what follows them.
+    pub solids: &'a [(String, Collider)],
 }
 
 impl Site<'_> {

@@ -2,7 +2,7 @@
 
 use super::Site;
 use crate::geometry::Vector;
-use tumble_interface::scene::{Pin, Region};
+use tumble_interface::scene::{Follow, Pin, Region};
 
 /// What a thing offers to pin.
 pub struct Pinnable<'a> {
@@ -20,18 +20,40 @@ pub struct Pinnable<'a> {
 pub fn pinned(site: &mut Site<'_>, thing: &Pinnable<'_>, pins: &[Pin]) -> Vec<u32> {
     let mut all = Vec::new();
     for (i, pin) in pins.iter().enumerate() {
-        let found = match pin {
-            Pin::Words(words) => in_words(thing, words),
-            Pin::Region(region) => within(site, thing, region),
+        let (found, follow) = match pin {
+            Pin::Words(words) => (in_words(thing, words), None),
+            Pin::Region(region) => (within(site, thing, region), region.follow.as_ref()),
+            Pin::Named(named) => (in_words(thing, &named.which), Some(&named.follow)),
         };
-        match found {
-            Ok(found) => all.extend(found.into_iter().map(|p| p + thing.first)),
+        let carrier = follow.map(|follow| carrier(site, follow)).transpose();
+        match found.and_then(|found| Ok((found, carrier?))) {
+            Ok((found, carrier)) => {
+                all.extend(found.iter().map(|p| p + thing.first));
+                if let Some((solid, bone)) = carrier {
+                    found.iter().for_each(|p| site.parts.follow(p + thing.first, solid, bone));
+                }
+            }
             Err(message) => site.wrong(format!("{}.pin[{i}]", thing.path), message),
         }
     }
     all.sort_unstable();
     all.dedup();
     all
+}
+
+/// The collider that is followed, counted from the first, and its bone.
+fn carrier(site: &Site<'_>, follow: &Follow) -> Result<(usize, Option<usize>), String> {
+    let Some(solid) = site.solids.iter().position(|(name, _)| *name == follow.collider) else {
+        let known: Vec<&str> = site.solids.iter().map(|(name, _)| name.as_str()).collect();
+        return Err(format!("there is no collider \"{}\" to follow; known are {}", follow.collider, known.join(", ")));
+    };
+    let Some(bone) = &follow.bone else { return Ok((solid, None)) };
+    let collider = &site.solids[solid].1;
+    match collider.bone(bone) {
+        Some(bone) => Ok((solid, Some(bone))),
+        None if collider.bones().is_empty() => Err(format!("collider \"{}\" has no bones; leave out bone", follow.collider)),
+        None => Err(format!("collider \"{}\" has no bone \"{bone}\"; known are {}", follow.collider, collider.bones().join(", "))),
+    }
 }
 
 fn within(site: &Site<'_>, thing: &Pinnable<'_>, region: &Region) -> Result<Vec<u32>, String> {

@@ -24,12 +24,15 @@ use std::borrow::Cow;
 use std::sync::Arc;
 use tumble_interface::check::plain;
 use tumble_interface::scene::{
-    Animated, Bits, Field as Stream, Force as Words, MeshFile, Method, Plane, Scene, Shape, System as Plan, Vicsek,
+    Animated, Bits, Field as Stream, Force as Words, Integrator, MeshFile, Method, Plane, Scene, Shape, System as Plan, Vicsek,
 };
 use tumble_interface::{Column, Data, Issue, Mesh, SceneError};
 
 /// Births that are looked at before a run.
 const TRIALS: usize = 64;
+
+/// Longest sub-step of position-based dynamics where a scene says nothing [s].
+const POSITION_BASED_STEP: f64 = 1e-3;
 
 /// A world, the surfaces of its colliders, and what is doubtful about it.
 pub struct Built {
@@ -47,7 +50,11 @@ fn fluids(scene: &Scene) -> impl Iterator<Item = &String> {
 /// The systems of a scene, or the default ones.
 pub fn plans(scene: &Scene) -> Vec<Plan> {
     if !scene.system.is_empty() {
-        return scene.system.clone();
+        let named = |plan: &Plan| match plan.method {
+            Method::PositionBased => Plan { method: Method::Dynamics, integrator: Integrator::PositionBased, ..plan.clone() },
+            _ => plan.clone(),
+        };
+        return scene.system.iter().map(named).collect();
     }
     // Each method on grids has a system of its own; all other objects are in one of dynamics.
     let mut methods =
@@ -78,7 +85,7 @@ pub fn build(scene: &Scene, assets: &Assets) -> Result<Built, SceneError> {
     let scene = &*drawn;
     let mut warnings = unused(scene, &plans);
     let (colliders, scenery) = solids(scene, assets, &mut issues);
-    let mut parts = fill(scene, &plans, assets, &mut issues);
+    let mut parts = fill(scene, &plans, assets, &colliders, &mut issues);
     let anchors: Vec<coupling::Link> =
         scene.anchor.iter().filter_map(|anchor| coupling::link(scene, &plans, anchor, &parts, &mut issues)).collect();
     for anchor in &anchors {
@@ -148,6 +155,7 @@ pub fn build(scene: &Scene, assets: &Assets) -> Result<Built, SceneError> {
             stepping: stepping(plan),
             adaptive: plan.adaptive.clone(),
             solver: plan.solver.clone(),
+            sweeps: plan.position_based.clone(),
             clamp: plan.clamp,
             gravity,
             native: scene.bits == Bits::Native,
@@ -224,6 +232,7 @@ fn stepping(plan: &Plan) -> Stepping {
     match (plan.substeps, plan.step) {
         (Some(n), _) => Stepping::Substeps(n),
         (None, Some(step)) => Stepping::Step(step),
+        (None, None) if plan.integrator == Integrator::PositionBased => Stepping::Step(POSITION_BASED_STEP),
         // An implicit scheme needs no more than one step an interval.
         (None, None) if plan.integrator.is_implicit() => Stepping::Substeps(1),
         (None, None) => Stepping::Automatic,
@@ -265,12 +274,14 @@ fn solids(scene: &Scene, assets: &Assets, issues: &mut Vec<Issue>) -> (Vec<Colli
 }
 
 /// Parts of every system, filled by the recipes in the order of the scene.
-fn fill(scene: &Scene, plans: &[Plan], assets: &Assets, issues: &mut Vec<Issue>) -> Vec<Parts> {
+fn fill(scene: &Scene, plans: &[Plan], assets: &Assets, colliders: &[Collider], issues: &mut Vec<Issue>) -> Vec<Parts> {
+    // Issues leave colliders out, and then nothing is built.
+    let solids: Vec<(String, Collider)> = scene.collider.iter().map(|c| c.name.clone()).zip(colliders.iter().cloned()).collect();
     let mut parts: Vec<Parts> = plans.iter().map(|_| Parts::default()).collect();
     let up: Vector = if scene.dimension == 2 && scene.plane == Plane::Xy { [0.0, 1.0, 0.0] } else { [0.0, 0.0, 1.0] }.into();
     let mut at = |kind: &str, system: &Option<String>, recipe: &mut dyn FnMut(&mut Site<'_>)| {
         if let Some(index) = place(plans, kind, system.as_deref()) {
-            recipe(&mut Site { parts: &mut parts[index], issues: &mut *issues, up });
+            recipe(&mut Site { parts: &mut parts[index], issues: &mut *issues, up, solids: &solids });
         }
     };
     for thing in &scene.particles {
@@ -281,7 +292,9 @@ fn fill(scene: &Scene, plans: &[Plan], assets: &Assets, issues: &mut Vec<Issue>)
                 Method::Tracers => drop(recipes::tracers(thing, &mut wrong)),
                 Method::Vicsek => drop(recipes::walkers(thing, &mut wrong)),
                 // None is placed in a system on grids.
-                Method::Dynamics | Method::Heat | Method::Compressible | Method::Gas => recipes::particles(site, thing),
+                Method::Dynamics | Method::PositionBased | Method::Heat | Method::Compressible | Method::Gas => {
+                    recipes::particles(site, thing)
+                }
             }
         });
     }
@@ -315,6 +328,9 @@ fn fill(scene: &Scene, plans: &[Plan], assets: &Assets, issues: &mut Vec<Issue>)
             Some(mesh) => recipes::net(site, thing, &recipes::placed(mesh, &thing.mesh)),
             None => site.issues.push(Issue::new(format!("net \"{}\".mesh", thing.name), "the mesh has not been loaded")),
         });
+    }
+    for thing in &scene.cloth {
+        at("cloth", &thing.system, &mut |site| recipes::cloth(site, thing));
     }
     for thing in &scene.galaxy {
         let pull = scene.force.iter().find(|f| matches!(f, Words::Gravitation { .. }) && f.on().is_none_or(|on| on.contains(&thing.name)));

@@ -34,12 +34,13 @@ pub fn objects(scene: &Scene) -> Vec<(&'static str, &str, Option<&str>)> {
     let sheets = scene.sheet.iter().map(|o| ("sheet", o.name.as_str(), o.system.as_deref()));
     let blocks = scene.block.iter().map(|o| ("block", o.name.as_str(), o.system.as_deref()));
     let nets = scene.net.iter().map(|o| ("net", o.name.as_str(), o.system.as_deref()));
+    let cloths = scene.cloth.iter().map(|o| ("cloth", o.name.as_str(), o.system.as_deref()));
     let emitters = scene.emitter.iter().map(|o| ("emitter", o.name.as_str(), o.system.as_deref()));
     let galaxies = scene.galaxy.iter().map(|o| ("galaxy", o.name.as_str(), o.system.as_deref()));
     let gases = scene.gas.iter().map(|o| ("gas", o.name.as_str(), o.system.as_deref()));
     let bodies = scene.heat.iter().map(|o| ("heat", o.name.as_str(), o.system.as_deref()));
     let sounding = scene.compressible.iter().map(|o| ("compressible", o.name.as_str(), o.system.as_deref()));
-    let things = particles.chain(emitters).chain(ropes).chain(sheets).chain(blocks).chain(nets).chain(galaxies);
+    let things = particles.chain(emitters).chain(ropes).chain(sheets).chain(blocks).chain(nets).chain(cloths).chain(galaxies);
     things.chain(gases).chain(bodies).chain(sounding).collect()
 }
 
@@ -49,7 +50,7 @@ pub fn check(scene: &Scene, systems: &[System]) -> Vec<Issue> {
     let mut wrong = |path: String, message: String| issues.push(Issue::new(path, message));
     let objects = objects(scene);
     if objects.is_empty() {
-        let message = "nothing to simulate: add particles, an emitter, a rope, a sheet, a block, a net, a galaxy, a gas, heat or a \
+        let message = "nothing to simulate: add particles, an emitter, a rope, a sheet, a block, a net, cloth, a galaxy, a gas, heat or a \
                        compressible gas";
         wrong(String::new(), message.into());
     }
@@ -176,7 +177,7 @@ pub fn check(scene: &Scene, systems: &[System]) -> Vec<Issue> {
 /// The system that moves an object of this kind: the one it names, else the first that can.
 pub fn place(systems: &[System], kind: &str, named: Option<&str>) -> Option<usize> {
     let can = |s: &System| match s.method {
-        Method::Dynamics => !matches!(kind, "gas" | "heat" | "compressible"),
+        Method::Dynamics | Method::PositionBased => !matches!(kind, "gas" | "heat" | "compressible"),
         Method::Gas | Method::Heat | Method::Compressible => kind == s.method.name(),
         Method::Tracers => matches!(kind, "particles" | "emitter"),
         Method::Vicsek => kind == "particles",
@@ -187,7 +188,7 @@ pub fn place(systems: &[System], kind: &str, named: Option<&str>) -> Option<usiz
 /// What an object is, if it is nothing that forces move.
 fn massless(systems: &[System], kind: &str, named: Option<&str>) -> Option<&'static str> {
     match systems[place(systems, kind, named)?].method {
-        Method::Dynamics => None,
+        Method::Dynamics | Method::PositionBased => None,
         Method::Tracers => Some("tracers"),
         Method::Vicsek => Some("particles of a vicsek system"),
         Method::Heat => Some("bodies on grids"),
@@ -250,9 +251,10 @@ fn check_system(system: &System, path: &str, wrong: &mut impl FnMut(String, Stri
         _ => {}
     }
     if system.clamp.is_some()
-        && (system.method != Method::Dynamics || !matches!(integrator, Integrator::ModifiedEuler | Integrator::Verlet))
+        && (system.method != Method::Dynamics
+            || !matches!(integrator, Integrator::ModifiedEuler | Integrator::Verlet | Integrator::PositionBased))
     {
-        wrong(format!("{path}.clamp"), "the position clamp goes with modified_euler or verlet".into());
+        wrong(format!("{path}.clamp"), "the position clamp goes with modified_euler, verlet or position_based".into());
     }
 }
 
@@ -323,7 +325,13 @@ fn check_plane(scene: &Scene, wrong: &mut impl FnMut(String, String)) {
             }
         }
     }
-    for (kind, name) in scene.block.iter().map(|b| ("block", &b.name)).chain(scene.net.iter().map(|n| ("net", &n.name))) {
+    for (kind, name) in scene
+        .block
+        .iter()
+        .map(|b| ("block", &b.name))
+        .chain(scene.net.iter().map(|n| ("net", &n.name)))
+        .chain(scene.cloth.iter().map(|c| ("cloth", &c.name)))
+    {
         wrong(format!("{kind} \"{name}\""), "it does not fit into a plane; use dimension = 3".into());
     }
     for thing in &scene.galaxy {

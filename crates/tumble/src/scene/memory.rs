@@ -4,7 +4,7 @@ use super::Assets;
 use crate::geometry::GridSdf;
 use crate::math::Signal;
 use tumble_interface::Scene;
-use tumble_interface::scene::{Diagonals, Emitter, GridBox, HeatScheme, Shape, Source};
+use tumble_interface::scene::{Diagonals, Dress, Emitter, GridBox, HeatScheme, Shape, Source};
 
 /// Bytes for a mass: its rows in state, scratch, snapshot and history, in double precision.
 const MASS: f64 = 1200.0;
@@ -62,6 +62,15 @@ pub fn memory(scene: &Scene, assets: &Assets) -> f64 {
     }
     for mesh in scene.net.iter().filter_map(|thing| assets.get(&thing.mesh.path)) {
         bytes += mesh.vertices.len() as f64 * (MASS + 15.0 * LINK);
+    }
+    for thing in &scene.cloth {
+        let girth = |d: &Dress| (d.bust_girth * (d.bodice + d.shoulder), d.waist_girth / std::f64::consts::TAU);
+        let of_dress = |d: &Dress| girth(d).0 + std::f64::consts::PI * (girth(d).1 + d.skirt) * (girth(d).1 + d.skirt);
+        let twice =
+            |o: &[[f64; 2]]| (0..o.len()).map(|i| o[i][0] * o[(i + 1) % o.len()][1] - o[(i + 1) % o.len()][0] * o[i][1]).sum::<f64>();
+        let area = thing.panels.iter().map(|p| 0.5 * twice(&p.outline).abs()).sum::<f64>() + thing.dress.as_ref().map_or(0.0, of_dress);
+        // Equilateral triangles have an area of sqrt(3)/2 edge² a point; sides add some.
+        bytes += 1.5 * area / (thing.resolution * thing.resolution) * (MASS + 15.0 * LINK);
     }
     bytes += scene.gas.iter().map(|thing| super::gas::bytes(thing, super::laws::flat(scene), !scene.collider.is_empty())).sum::<f64>();
     for thing in &scene.collider {

@@ -64,7 +64,22 @@ pub trait Width: Copy + Send + Sync {
     ///
     /// # Safety
     /// Every index is below `rows.len()`.
-    unsafe fn gather(self, rows: &[Row], index: &[u32]) -> [Self::L; 4];
+    #[inline(always)]
+    unsafe fn gather(self, rows: &[Row], index: &[u32]) -> [Self::L; 4] {
+        debug_assert!(index[..Self::N].iter().all(|i| (*i as usize) < rows.len()));
+        // SAFETY: the caller has checked the indices.
+        unsafe { self.gather_at(rows.as_ptr(), index) }
+    }
+    /// The same from a place in memory, whose other rows others may write.
+    ///
+    /// # Safety
+    /// There are rows at every index, and nobody writes them.
+    unsafe fn gather_at(self, rows: *const Row, index: &[u32]) -> [Self::L; 4];
+    /// Stores N rows at `index[..N]`.
+    ///
+    /// # Safety
+    /// There are rows at every index, all different, and nobody else reads or writes them.
+    unsafe fn put(self, v: [Self::L; 4], rows: *mut Row, index: &[u32]);
     /// Loads `from[i]` and `from[i + 1]` for `index[..N]`.
     ///
     /// # Safety
@@ -188,9 +203,14 @@ impl Width for Scalar {
         to[0] = v;
     }
     #[inline(always)]
-    unsafe fn gather(self, rows: &[Row], index: &[u32]) -> [Real; 4] {
+    unsafe fn gather_at(self, rows: *const Row, index: &[u32]) -> [Real; 4] {
         // SAFETY: the caller has checked the index.
-        unsafe { *rows.get_unchecked(index[0] as usize) }
+        unsafe { *rows.add(index[0] as usize) }
+    }
+    #[inline(always)]
+    unsafe fn put(self, v: [Real; 4], rows: *mut Row, index: &[u32]) {
+        // SAFETY: the caller has checked the index.
+        unsafe { *rows.add(index[0] as usize) = v };
     }
     #[inline(always)]
     unsafe fn pairs(self, from: &[Real], index: &[i32]) -> [Real; 2] {

@@ -31,15 +31,23 @@ macro_rules! width {
                 to[..$n].copy_from_slice(&cast::<_, [Real; $n]>(v.v));
             }
             #[inline(always)]
-            unsafe fn gather(self, rows: &[Row], index: &[u32]) -> [Self::L; 4] {
+            unsafe fn gather_at(self, rows: *const Row, index: &[u32]) -> [Self::L; 4] {
                 let index = &index[..$n];
                 let mut picked = [[0.0; 4]; $n];
                 for i in 0..$n {
-                    debug_assert!((index[i] as usize) < rows.len());
                     // SAFETY: the caller has checked the indices.
-                    picked[i] = unsafe { *rows.get_unchecked(index[i] as usize) };
+                    picked[i] = unsafe { *rows.add(index[i] as usize) };
                 }
                 self.transpose(picked)
+            }
+            #[inline(always)]
+            unsafe fn put(self, v: [Self::L; 4], rows: *mut Row, index: &[u32]) {
+                let index = &index[..$n];
+                let untransposed = self.untranspose(v);
+                for i in 0..$n {
+                    // SAFETY: the caller has checked the indices.
+                    unsafe { *rows.add(index[i] as usize) = untransposed[i] };
+                }
             }
             #[inline(always)]
             unsafe fn pairs(self, from: &[Real], index: &[i32]) -> [Self::L; 2] {

@@ -170,8 +170,14 @@ impl Dynamics {
     }
 
     fn link_strain(&self, object: &crate::state::Object) -> Vec<Real> {
-        let strain =
-            |(batch, range): &(usize, std::ops::Range<usize>)| self.laws.batches[*batch].link_strain(&self.state.x)[range.clone()].to_vec();
+        let x = &self.state.x;
+        let strain = |(batch, range): &(usize, std::ops::Range<usize>)| {
+            let all = match self.constraints.get(*batch) {
+                Some(constraints) => constraints.link_strain(x),
+                None => self.laws.batches[*batch].link_strain(x),
+            };
+            all[range.clone()].to_vec()
+        };
         object.links.iter().flat_map(strain).collect()
     }
 
@@ -202,7 +208,10 @@ impl Dynamics {
 
     /// Energy of the elastic batches, or of the others [J].
     fn between(&self, elastic: bool) -> f64 {
-        self.laws.batches.iter().filter(|b| b.is_elastic() == elastic).map(|b| b.energy(&self.state.x)).sum()
+        let x = &self.state.x;
+        let constraints = if elastic { &self.constraints[..] } else { &[] };
+        let forces = self.laws.batches.iter().filter(|b| b.is_elastic() == elastic).map(|b| b.energy(x));
+        forces.chain(constraints.iter().map(|c| c.energy(x))).sum()
     }
 
     pub(super) fn books(&self, t: f64) -> Ledger {
@@ -217,7 +226,8 @@ impl Dynamics {
             total.angular = total.angular + Quat::from_row(x[i].map(f64::from)).turn(turning * inertia);
             total.kinetic += 0.5 * inertia * turning.norm_sq();
         }
-        let stretch = self.laws.batches.iter().map(|b| b.largest_strain(x) + 1.0).fold(0.0, f64::max);
+        let strains = self.laws.batches.iter().map(|b| b.largest_strain(x)).chain(self.constraints.iter().map(|c| c.largest_strain(x)));
+        let stretch = strains.fold(0.0, |most, strain| f64::max(most, strain + 1.0));
         let depths = |i: usize| {
             let p = xyz64(x[i]);
             self.laws.colliders.iter().filter_map(move |c| c.touch(p, t)).map(|t| t.depth)
@@ -270,7 +280,7 @@ impl Dynamics {
     /// explosion would carry its scale along; where others push, nobody knows where energy came from.
     pub(super) fn rescale(&mut self, books: &Ledger) {
         let drives = self.laws.colliders.iter().any(|c| c.moves()) || self.laws.batches.iter().any(|b| b.drives().is_some());
-        let driven = self.pushed || drives || !self.laws.user.is_empty();
+        let driven = self.pushed || !self.held.is_empty() || drives || !self.laws.user.is_empty();
         let gain = if driven { 0.0 } else { (books.energy() - self.scale.start).max(0.0) };
         let external = (books.external - self.scale.external).abs();
         let energy = books.kinetic.max(books.elastic).max(external) - gain;
@@ -345,6 +355,10 @@ impl Dynamics {
     /// The pre-flight estimate.
     pub(super) fn estimate(&mut self, dt: f64, go_on: &(dyn Fn() -> bool + Sync)) -> Option<tumble_interface::engine::Stability> {
         use tumble_interface::scene::Integrator;
+        if self.integrator == Integrator::PositionBased {
+            // Stable for every step.
+            return None;
+        }
         let modes = self.modes(go_on)?;
         let list = modes.list();
         let fixed = Integrator::ALL.into_iter().filter(|i| !i.is_adaptive());

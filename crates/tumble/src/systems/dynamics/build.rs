@@ -1,9 +1,11 @@
 //! From the parts that recipes collect to a system.
 
+use super::held::Held;
 use super::laws::Acting;
 use super::{Dynamics, Stepping, books};
 use crate::elements::{
-    BendTwist, Distance, Element, Elements, Hinge, Linear, Members, Nonlinear, Pairs, StretchShear, TetShear, TetStrain, TetVolume, Vector,
+    BendTwist, Constraints, Distance, Element, Elements, Hinge, Linear, Members, Neohookean, Nonlinear, Pairs, Projected, StretchShear,
+    TetShear, TetStrain, TetVolume, Vector,
 };
 use crate::forces::{Attractor, Cohesion, DirectSum, Flock, Force, Goal, Habits, Halos, LennardJones, Near, Repulsion, Viscosity};
 use crate::geometry::Collider;
@@ -13,7 +15,7 @@ use crate::pool::{Emitter, Pool};
 use crate::state::{Masses, Object, State};
 use std::ops::Range;
 use std::sync::Arc;
-use tumble_interface::scene::{Adaptive, Force as Words, Hessian, Integrator, Solver};
+use tumble_interface::scene::{Adaptive, Force as Words, Hessian, Integrator, PositionBased, Solver};
 use tumble_interface::{Issue, SceneError};
 
 /// How a system steps.
@@ -32,6 +34,8 @@ pub struct Settings {
     pub adaptive: Adaptive,
     /// Of the implicit schemes.
     pub solver: Solver,
+    /// Of position-based dynamics.
+    pub sweeps: PositionBased,
     /// Springs longer than this many times their rest length are shortened.
     pub clamp: Option<f64>,
     /// Gravity [m/s²].
@@ -95,6 +99,7 @@ pub struct Parts {
     stretches: Vec<Members<3, 2, 0>>,
     bends: Vec<Members<2, 5, 0>>,
     energy_at_rest: [f64; 2],
+    held: Vec<Held>,
     objects: Vec<Draft>,
     emitters: Vec<Emitter>,
     /// Forces on each mass by itself, with the objects that they act on, counted from the first that was begun.
@@ -195,6 +200,11 @@ impl Parts {
     /// Holds a point.
     pub fn pin(&mut self, point: u32) {
         self.points[point as usize].3 = true;
+    }
+
+    /// Lets a point that is held follow a collider, counted from the first, or one of its bones.
+    pub fn follow(&mut self, point: u32, collider: usize, bone: Option<usize>) {
+        self.held.push(Held { row: point as usize, collider, bone, place: self.position(point) });
     }
 
     /// Holds a frame.
@@ -339,7 +349,14 @@ impl Parts {
         }
         let lost = || SceneError::one(format!("system \"{}\"", settings.name), "an element refers to a mass that is not there");
         let end = self.counts();
-        let mut batches = Batches { rows, list: Vec::new() };
+        let projected = settings.integrator == Integrator::PositionBased;
+        let mut batches = Batches {
+            rows,
+            points,
+            projected: projected.then(|| masses.inverse_inertia.clone()),
+            list: Vec::new(),
+            constraints: Vec::new(),
+        };
         let clamp = settings.clamp.map(|ratio| {
             let short = |m: &Members<2, 1, 0>| Members { rest: [m.rest[0] * ratio], stiffness: f64::INFINITY, damping: 0.0, ..*m };
             let linear = self.linear.members.iter().map(short);
@@ -348,7 +365,7 @@ impl Parts {
                 .members
                 .iter()
                 .map(|m| short(&Members { nodes: m.nodes, rest: m.rest, law: [], stiffness: 0.0, damping: 0.0 }));
-            Elements::new(rows, &linear.chain(others).collect::<Vec<_>>())
+            Projected::new(rows, rows, &[], &linear.chain(others).collect::<Vec<_>>(), &[])
         });
         let kinds = [
             batches.springs::<Distance, Linear, 1, 1, 0>(&self.linear),
@@ -358,8 +375,7 @@ impl Parts {
         let made = [
             batches.add::<Distance, 2, 1, 1>(&self.dampers, 0.0),
             batches.add::<Hinge, 4, 1, 1>(&self.hinges, 0.0),
-            batches.add::<TetShear, 4, 9, 9>(&self.shears, self.energy_at_rest[0]),
-            batches.add::<TetVolume, 4, 1, 10>(&self.volumes, self.energy_at_rest[1]),
+            batches.solids(&self.shears, &self.volumes, self.energy_at_rest),
             batches.add::<TetStrain, 4, 6, 9>(&self.strains, 0.0),
             batches.add::<StretchShear, 3, 3, 2>(&self.stretches, 0.0),
             batches.add::<BendTwist, 2, 3, 5>(&self.bends, 0.0),
@@ -412,13 +428,15 @@ impl Parts {
             batch.linearize(&state.x, crate::elements::Weights { stiffness: 1.0, damping: 0.0, hessian: Hessian::Definite });
             batch.add_diagonal(&state.x, &mut stiffness);
         }
+        let mut grip: Vec<Real> = stiffness.iter().map(|k| (k[0] + k[1] + k[2]) / 3.0).collect();
+        batches.constraints.iter().for_each(|c| c.add_grip(&state.x, &mut grip));
         let acting = |(name, law, on)| {
             let objects = placed(on);
             Acting { name, law, ranges: rows_of(&objects), objects }
         };
         let forces = self.forces.into_iter().map(acting).collect();
         let laws = super::laws::Laws {
-            grip: stiffness.iter().map(|k| (k[0] + k[1] + k[2]) / 3.0).collect(),
+            grip,
             batches: batches.list,
             forces,
             gravity: settings.gravity,
@@ -442,6 +460,10 @@ impl Parts {
             objects,
             tethers: Vec::new(),
             clamp: clamp.flatten(),
+            constraints: batches.constraints,
+            sweeps: settings.sweeps.clone(),
+            rates: Vec::new(),
+            held: Held::at_rest(self.held, &settings.colliders),
             user: None,
             scratch: Default::default(),
             before: Vec::new(),
@@ -539,10 +561,14 @@ fn between(
     }]
 }
 
-/// Batches in the order in which they act.
+/// Elements in the order in which they act: as forces, or as constraints.
 struct Batches {
     rows: usize,
+    points: usize,
+    /// Inverse inertias of frames, if elements are constraints.
+    projected: Option<Vec<Real>>,
     list: Vec<Box<dyn crate::elements::Batch>>,
+    constraints: Vec<Box<dyn Constraints>>,
 }
 
 impl Batches {
@@ -554,6 +580,11 @@ impl Batches {
         if springs.members.is_empty() {
             return Some(None);
         }
+        if let Some(inverse) = &self.projected {
+            let springs = Projected::<E, Y, 2, M, D, P>::new(self.rows, self.points, inverse, &springs.members, &springs.limits)?;
+            self.constraints.push(Box::new(springs));
+            return Some(Some(self.constraints.len() - 1));
+        }
         self.list.push(Box::new(Pairs::<E, Y, M, D, P>::new(self.rows, &springs.members, &springs.limits)?));
         Some(Some(self.list.len() - 1))
     }
@@ -564,10 +595,26 @@ impl Batches {
         members: &[Members<N, D, 0>],
         energy_at_rest: f64,
     ) -> Option<()> {
-        if !members.is_empty() {
+        if members.is_empty() {
+            return Some(());
+        }
+        if let Some(inverse) = &self.projected {
+            let elements = Projected::<E, Linear, N, M, D, 0>::new(self.rows, self.points, inverse, members, &[])?;
+            self.constraints.push(Box::new(elements));
+        } else {
             let elements = Elements::<E, Linear, N, M, D, 0>::new(self.rows, members)?;
             self.list.push(Box::new(elements.with_energy_at_rest(energy_at_rest)));
         }
+        Some(())
+    }
+
+    /// Adds both laws of solids, if there are any; `None` if a node is not a row.
+    fn solids(&mut self, shears: &[Members<4, 9, 0>], volumes: &[Members<4, 10, 0>], energy_at_rest: [f64; 2]) -> Option<()> {
+        if self.projected.is_none() || shears.is_empty() {
+            self.add::<TetShear, 4, 9, 9>(shears, energy_at_rest[0])?;
+            return self.add::<TetVolume, 4, 1, 10>(volumes, energy_at_rest[1]);
+        }
+        self.constraints.push(Box::new(Neohookean::new(self.rows, shears, volumes, energy_at_rest[0] + energy_at_rest[1])?));
         Some(())
     }
 }

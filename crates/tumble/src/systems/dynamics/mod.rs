@@ -4,14 +4,16 @@
 mod books;
 mod build;
 mod contact;
+mod held;
 mod implicit;
 mod laws;
 mod life;
 mod modes;
+mod position_based;
 
 pub use build::{Parts, Settings, SpringPart};
 
-use crate::elements::{Batch, Elements, Limit, Linear};
+use crate::elements::{Constraints, Limit, Linear, Projected, Projection};
 use crate::exchange::{Exchange, Port};
 use crate::geometry::Vector;
 use crate::integrators::{self, Equation, Memory, Scratch, Step, adaptive_step};
@@ -20,10 +22,11 @@ use crate::math::{Real, Row, Vec3, ZERO, axpy, row, sub, xyz64};
 use crate::pool::{Hit, Pool};
 use crate::state::{Object, State};
 use crate::system::{Archive, Part, System};
+use held::Held;
 use laws::{Laws, Local, flat};
 use rayon::prelude::*;
 use tumble_interface::engine::{Ledger, Stability, StepReport, UserForce, UserIntegrator};
-use tumble_interface::scene::{Adaptive, Integrator};
+use tumble_interface::scene::{Adaptive, Integrator, PositionBased};
 use tumble_interface::{Column, StepError};
 
 /// Rows of masses that do not feel each other which are stepped together: 24 KB in single precision, with accelerations.
@@ -62,7 +65,12 @@ pub struct Dynamics {
     /// Batches between masses of some objects, with these objects and others that they name.
     between: Vec<(usize, Vec<usize>, Option<Vec<usize>>)>,
     tethers: Vec<Tether>,
-    clamp: Option<Elements<Limit, Linear, 2, 1, 1, 0>>,
+    clamp: Option<Projected<Limit, Linear, 2, 1, 1, 0>>,
+    /// Elements of a position-based system, which are no forces there.
+    constraints: Vec<Box<dyn Constraints>>,
+    sweeps: PositionBased,
+    /// Points that follow colliders.
+    held: Vec<Held>,
     user: Option<Box<dyn UserIntegrator>>,
     memory: Memory,
     scratch: Scratch,
@@ -71,6 +79,8 @@ pub struct Dynamics {
     before_v: Vec<Row>,
     /// Positions before the clamp.
     unclamped: Vec<Row>,
+    /// Accelerations of the predicted velocities; scratch.
+    rates: Vec<Row>,
     /// What the energy is measured against, and the energy at the start [J].
     scale: books::Scale,
     broken: u64,
@@ -164,10 +174,12 @@ impl Dynamics {
 
     /// One sub-step of a scheme with a fixed step, contact, clamp and breaking included.
     fn substep(&mut self, t: f64, h: f64, report: &mut StepReport) -> Result<(), StepError> {
+        self.lead_held(t, h);
         self.remember();
         let mut user = self.user.take();
         let result = match &mut user {
             Some(user) => self.user_step(user.as_mut(), t, h),
+            None if self.integrator == Integrator::PositionBased => self.project_step(t, h, report),
             None => {
                 let (equation, x, v, ready) = (&mut self.laws, &mut self.state.x, &mut self.state.v, self.memory.ready);
                 let (memory, scratch) = (&mut self.memory.slices(), &mut self.scratch);
@@ -184,7 +196,7 @@ impl Dynamics {
 
     /// Keeps what contact and clamp compare with.
     fn remember(&mut self) {
-        if !self.laws.colliders.is_empty() {
+        if !self.laws.colliders.is_empty() || self.integrator == Integrator::PositionBased {
             self.before.resize(self.state.x.len(), ZERO);
             self.before_v.resize(self.state.x.len(), ZERO);
             self.before.copy_from_slice(&self.state.x);
@@ -194,14 +206,16 @@ impl Dynamics {
 
     /// What follows a step of length h from t on: clamp, contact, breaking. Whatever it changes, the scheme starts anew from.
     fn after(&mut self, t: f64, h: f64, report: &mut StepReport) {
-        if let Some(clamp) = &mut self.clamp {
+        self.place_held(t + h);
+        if let Some(clamp) = self.clamp.as_mut().filter(|_| self.integrator != Integrator::PositionBased) {
             let masses = &self.laws.masses;
             let one = |v: &[Row], i: usize| 0.5 * f64::from(masses.mass[i]) * xyz64(v[i]).norm_sq();
             let kinetic = |v: &[Row]| sum(masses.points, |range| range.map(|i| one(v, i)).sum());
             let energy = |state: &State| kinetic(&state.v) + self.laws.batches.iter().map(|b| b.energy(&state.x)).sum::<f64>();
             let was = energy(&self.state);
             self.unclamped.clone_from(&self.state.x);
-            clamp.project(&mut self.state.x, h);
+            let projection = Projection { h, before: &self.unclamped, iteration: 0, iterations: 1, plain: None };
+            clamp.project(&mut self.state.x, &projection);
             let inverse_h = (1.0 / h) as Real;
             let mut moved = false;
             for i in 0..masses.points {
@@ -250,7 +264,9 @@ impl Dynamics {
                 hits.into_iter().for_each(|(row, hit)| self.pool.note_row(row, hit));
             }
         }
-        let broken: u64 = self.laws.batches.iter_mut().map(|b| b.break_links(&self.state.x)).sum();
+        let x = &self.state.x;
+        let broken: u64 = self.laws.batches.iter_mut().map(|b| b.break_links(x)).sum::<u64>()
+            + self.constraints.iter_mut().map(|c| c.break_links(x)).sum::<u64>();
         if broken > 0 {
             report.broken += broken;
             self.broken += broken;
@@ -381,6 +397,7 @@ impl Dynamics {
         if self.integrator.is_adaptive() && self.user.is_none() {
             let (mut done, mut last) = (0.0, dt);
             while done < dt && go_on() {
+                self.lead_held(t + done, dt - done);
                 self.remember();
                 let (begun, left) = (done, dt - done);
                 self.witness(t + done);
@@ -418,7 +435,9 @@ impl Dynamics {
         }
         let (substeps, h) = (substeps as u32, dt / substeps);
         let each = self.laws.is_local()
+            && self.constraints.is_empty()
             && self.tethers.is_empty()
+            && self.held.is_empty()
             && self.user.is_none()
             && self.clamp.is_none()
             && !self.integrator.is_implicit()
@@ -541,6 +560,9 @@ impl System for Dynamics {
         for batch in &self.laws.batches {
             archive.push("broken", Part::Indices(batch.broken()));
         }
+        for constraints in &self.constraints {
+            archive.push("broken", Part::Indices(constraints.broken()));
+        }
     }
 
     fn restore(&mut self, archive: &mut Archive) -> Option<()> {
@@ -567,6 +589,13 @@ impl System for Dynamics {
                 return None;
             }
             batch.set_broken(&broken);
+        }
+        for constraints in &mut self.constraints {
+            let broken = archive.indices("broken")?;
+            if broken.iter().any(|e| *e as usize >= constraints.len()) {
+                return None;
+            }
+            constraints.set_broken(&broken);
         }
         Some(())
     }

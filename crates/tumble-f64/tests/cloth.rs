@@ -1,0 +1,115 @@
+//! Cloth cut from panels: what it weighs, how it is sewn, and pins that follow colliders.
+
+#![allow(clippy::unwrap_used, clippy::panic)] // helpers of tests fail by panicking, too
+
+mod common;
+
+use common::{positions, run, simulation, step, vector};
+use tumble_f64::scene::Simulation;
+use tumble_interface::scene::Integrator;
+use tumble_interface::{Data, Engine, Scene};
+
+fn issues(text: &str) -> String {
+    let scene = Scene::from_toml(&format!("version = 1\n{text}")).unwrap_or_else(|e| panic!("{e}"));
+    match Simulation::new(scene, Default::default()) {
+        Ok(_) => panic!("nothing is wrong with it"),
+        Err(error) => error.to_string(),
+    }
+}
+
+fn triangles(sim: &Simulation, object: &str) -> Vec<[u32; 3]> {
+    let all = sim.topology();
+    match &all.column(object, "triangles").unwrap().data {
+        Data::U32(t) => t.chunks_exact(3).map(|t| [t[0], t[1], t[2]]).collect(),
+        _ => panic!("triangles are indices"),
+    }
+}
+
+#[test]
+fn a_dress_weighs_what_its_pattern_says() {
+    for resolution in [0.06, 0.03] {
+        let sim = simulation(&format!("[[cloth]]\nname = \"dress\"\ndensity = 0.2\nresolution = {resolution}\ndress = {{}}\n"));
+        // The skirt is a ring around a waist of 0.76 m, 0.55 m long; the bodice two trapezes below the arms, and straps.
+        let inner = 0.76 / std::f64::consts::TAU;
+        let skirt = std::f64::consts::PI * ((inner + 0.55_f64).powi(2) - inner * inner);
+        let below = 2.0 * 0.2 * 0.25 * (0.76 + 0.94);
+        let mass = sim.ledger().mass / 0.2;
+        let (least, most) = (skirt + below, skirt + below + 0.22 * 0.94);
+        println!("resolution {resolution}: {mass:.4} m², between {least:.4} and {most:.4}");
+        // Arcs are cut to polygons of about 60 sides, which lose 0.2 % of a circle.
+        assert!(mass > 0.99 * least && mass < most);
+        // At the start every edge is nearly as long as in the pattern: the dress hangs on the body as it is cut.
+        assert!(sim.ledger().stretch < 1.35, "{}", sim.ledger().stretch);
+        assert!(triangles(&sim, "dress").len() as f64 > 1.5 * mass / (resolution * resolution));
+    }
+}
+
+/// Two squares side by side, 2 cm apart, sewn along their neighbouring sides.
+const SQUARES: &str = "[[system]]\nmethod = \"position_based\"\nsubsteps = 20\n[[cloth]]\nname = \"c\"\nresolution = 0.1\nhinge = 1e-3\n\
+     panels = [{ name = \"a\", outline = [[0, 0], [0.5, 0], [0.5, 0.5], [0, 0.5]] },\n\
+     { name = \"b\", outline = [[0, 0], [SIDE, 0], [SIDE, 0.5], [0, 0.5]], origin = [0.52, 0, 0] }]\n\
+     seams = [{ from = { panel = \"a\", side = 1 }, to = { panel = \"b\", side = 3 } }]\n";
+
+#[test]
+fn seams_close_and_hold() {
+    let text = SQUARES.replace("SIDE", "0.5");
+    let mut sim = simulation(&format!("{text}pin = [\"vertex 0\"]\n[[force]]\nkind = \"drag\"\nrate = 2\n"));
+    let x = positions(&sim, "c");
+    let half = x.len() / 2;
+    let along = |x: &[common::Vector], at: f64| -> Vec<usize> { (0..x.len()).filter(|i| (x[*i].x - at).abs() < 1e-9).collect() };
+    let (left, right) = (along(&x, 0.5), along(&x, 0.52));
+    assert!(left.len() == 6 && right.len() == 6 && left.iter().all(|i| *i < half) && right.iter().all(|i| *i >= half));
+    run(&mut sim, 48);
+    let x = positions(&sim, "c");
+    for a in &left {
+        let nearest = right.iter().map(|b| (x[*a] - x[*b]).norm()).fold(f64::INFINITY, f64::min);
+        // 0.05 kg hang on 6 stitches of 1e4 N/m: 8e-6 m each; the first ones carry more.
+        assert!(nearest < 1e-3, "{nearest}");
+    }
+    assert!(x.iter().all(|x| x.z < 0.51) && x[x.len() - 1].z < -0.2, "it hangs");
+}
+
+#[test]
+fn what_is_wrong_with_a_pattern_is_told_with_its_place() {
+    let unequal = issues(&SQUARES.replace("SIDE, 0.5]", "0.5, 0.45]").replace("SIDE", "0.5").replace("[0, 0.5]], origin", "[0, 0.4]], origin"));
+    assert!(unequal.contains("cloth \"c\".seams[0]") && unequal.contains("0.5000 m and 0.4000 m"), "{unequal}");
+    let none = issues(&SQUARES.replace("SIDE", "0.5").replace("side = 3", "side = 4"));
+    assert!(none.contains("cloth \"c\".seams[0].to.side") && none.contains("the last one is 3"), "{none}");
+    let unknown = issues(&SQUARES.replace("SIDE", "0.5").replace("to = { panel = \"b\"", "to = { panel = \"d\""));
+    assert!(unknown.contains("\"d\" is no panel; known are a, b"), "{unknown}");
+    let crossed = issues(&SQUARES.replace("[0.5, 0], [0.5, 0.5], [0, 0.5]] },", "[0.5, 0.5], [0.5, 0], [0, 0.5]] },").replace("SIDE", "0.5"));
+    assert!(crossed.contains("panels[0].outline") && crossed.contains("cross"), "{crossed}");
+    let fine = issues("[[cloth]]\nname = \"c\"\ndress = {}\nresolution = 1e-5\n");
+    assert!(fine.contains("cloth \"c\".resolution") || fine.contains("memory_limit"), "{fine}");
+    let empty = issues("[[cloth]]\nname = \"c\"\n");
+    assert!(empty.contains("expected panels or a dress"), "{empty}");
+    let text = "[[rope]]\nname = \"r\"\nfrom = [0, 0, 0]\nto = [1, 0, 0]\npin = [{ which = \"start\", follow = { collider = \"x\" } }]\n\
+                [[collider]]\nname = \"ball\"\nshape.sphere = { center = [9, 0, 0], radius = 1 }\n";
+    let lost = issues(text);
+    assert!(lost.contains("rope \"r\".pin[0]") && lost.contains("known are ball"), "{lost}");
+    let boneless = issues(&text.replace("\"x\"", "\"ball\", bone = \"hips\""));
+    assert!(boneless.contains("has no bones"), "{boneless}");
+}
+
+#[test]
+fn pins_follow_a_collider_under_every_integrator() {
+    let schemes: Vec<Integrator> = Integrator::ALL.into_iter().chain([Integrator::PositionBased]).collect();
+    for scheme in schemes {
+        let steps = if scheme.is_adaptive() { "" } else { "substeps = 40" };
+        let mut sim = simulation(&format!(
+            "time.fps = 20\n[[system]]\nintegrator = \"{}\"\n{steps}\n[[rope]]\nname = \"r\"\nfrom = [0, 0, 2]\nto = [1, 0, 2]\nsegments = 8\n\
+             links = {{ structural = {{ modulus = 20, damping = 0.5 }} }}\npin = [{{ center = [0, 0, 2], radius = 0.01, follow = {{ collider = \"wheel\" }} }}]\n\
+             [[collider]]\nname = \"wheel\"\nshape.sphere = {{ center = [0, 0, 5], radius = 0.1 }}\n\
+             motion = {{ pivot = [0, 0, 5], spin = [0, 1.5, 0], velocity = [0.1, 0, 0] }}\n",
+            scheme.name()
+        ));
+        for frame in 1..=10 {
+            step(&mut sim);
+            let (t, x) = (f64::from(frame) / 20.0, positions(&sim, "r"));
+            let a = 1.5 * t;
+            let exact = vector(0.1 * t - 3.0 * a.sin(), 0.0, 5.0 - 3.0 * a.cos());
+            assert!((x[0] - exact).norm() < 1e-9, "{} at {t}: {:?}, {exact:?}", scheme.name(), x[0]);
+            assert!((x[1] - x[0]).norm() < 0.2, "{}", scheme.name());
+        }
+    }
+}

@@ -1,0 +1,491 @@
+//! Elements that a position-based method satisfies one after the other: Gauss-Seidel over colours, elements of one colour side by side,
+//! since no two of them share a node. The order of elements is fixed, and so are the bits, whatever the threads and registers.
+//!
+//! Source: [bender2015], section 5; [macklin2016]. Verified in `tests/position_based.rs`.
+
+use super::list::Members;
+use super::{Compliance, Element, Law, corrected, energy, project};
+use crate::math::parallel::fold;
+use crate::math::simd::{Index, Kernel, Width, count, dispatch, packs};
+use crate::math::{Lane, Quat, Real, Row, xyz};
+use rayon::prelude::*;
+use std::marker::PhantomData;
+use std::ops::Range;
+
+mod neohookean;
+
+pub use neohookean::Neohookean;
+
+/// Elements per task.
+const TASK: usize = 2048;
+/// Compliance of what has broken, and of a damper without stiffness [m/N]: nothing that is there feels it.
+const LIMP: f64 = 1e18;
+
+/// A sub-step, as elements see it.
+#[derive(Debug, Clone, Copy)]
+pub struct Projection<'a> {
+    /// Its length [s].
+    pub h: f64,
+    /// Points and frames when it began, for damping.
+    pub before: &'a [Row],
+    /// Which sweep this is, from 0 on.
+    pub iteration: u32,
+    /// How many there are at most.
+    pub iterations: u32,
+    /// Of plain elements, whatever their stiffness, the share of the error that a sweep takes back.
+    pub plain: Option<Real>,
+}
+
+/// Elements of one kind that are projected.
+pub trait Constraints: Send + Sync {
+    /// Name of the kind.
+    fn name(&self) -> &'static str;
+    /// Count of elements.
+    fn len(&self) -> usize;
+    /// Whether there are none.
+    fn is_empty(&self) -> bool {
+        self.len() == 0
+    }
+    /// Potential energy [J], zero at rest; nothing of rigid elements.
+    fn energy(&self, x: &[Row]) -> f64;
+    /// Corrects points and frames once, element by element; x[i][3] are inverse masses of points.
+    fn project(&mut self, x: &mut [Row], step: &Projection<'_>);
+    /// Adds the stiffness with which the elements hold each row [N/m].
+    fn add_grip(&self, x: &[Row], grip: &mut [Real]);
+    /// Lengthening over rest length of every element that is a link, in the order in which they were given.
+    fn link_strain(&self, _x: &[Row]) -> Vec<Real> {
+        Vec::new()
+    }
+    /// The largest of them; negative infinity if there is none.
+    fn largest_strain(&self, _x: &[Row]) -> f64 {
+        f64::NEG_INFINITY
+    }
+    /// Breaks the links that are strained beyond their limit; returns how many.
+    fn break_links(&mut self, _x: &[Row]) -> u64 {
+        0
+    }
+    /// Which links have broken, as indices.
+    fn broken(&self) -> Vec<u32> {
+        Vec::new()
+    }
+    /// Mends all links, then breaks these.
+    fn set_broken(&mut self, _broken: &[u32]) {}
+}
+
+/// Rows that tasks write side by side, each others.
+#[derive(Clone, Copy)]
+struct Shared(*mut Row);
+
+// SAFETY: whoever uses the pointer sees to it that no two tasks touch the same row.
+unsafe impl Send for Shared {}
+// SAFETY: as above.
+unsafe impl Sync for Shared {}
+
+impl Shared {
+    fn rows(self) -> *mut Row {
+        self.0
+    }
+}
+
+/// Elements sorted by colour, and by their first node within a colour, so that memory is walked through in order.
+struct Columns<const N: usize, const D: usize, const P: usize> {
+    nodes: [Index; N],
+    rest: [Vec<Real>; D],
+    law: [Vec<Real>; P],
+    /// 1/k.
+    compliance: Vec<Real>,
+    /// Empty if nothing is damped.
+    damping: Vec<Real>,
+    /// Inverse inertias of frames [1/(kg m²)]; empty for points.
+    inverse: [Vec<Real>; N],
+    /// Ranges of elements that share no node.
+    colors: Vec<Range<usize>>,
+    /// For every place, which of the elements given stands there.
+    given: Vec<u32>,
+}
+
+fn compliance(stiffness: f64) -> Real {
+    (1.0 / stiffness).min(LIMP) as Real
+}
+
+impl<const N: usize, const D: usize, const P: usize> Columns<N, D, P> {
+    /// `None` if a node is not one of the rows; `inverse` are the inverse inertias of frames, the rows from `points` on.
+    fn new(rows: usize, points: usize, inverse: &[Real], members: &[Members<N, D, P>]) -> Option<Self> {
+        if members.iter().flat_map(|m| m.nodes).any(|i| i as usize >= rows) || rows > points + inverse.len() {
+            return None;
+        }
+        let (given, colors) = sorted(rows, members);
+        let of = |place: &u32| &members[*place as usize];
+        let column = |f: &dyn Fn(&Members<N, D, P>) -> f64| -> Vec<Real> { given.iter().map(|e| f(of(e)) as Real).collect() };
+        let mut nodes: [Index; N] = std::array::from_fn(|_| Index::default());
+        for (a, index) in nodes.iter_mut().enumerate() {
+            *index = Index::new(given.iter().map(|e| of(e).nodes[a]).collect(), rows)?;
+        }
+        let inverse = std::array::from_fn(|a| {
+            let of_frame = |i: &u32| inverse.get((*i as usize).wrapping_sub(points)).copied();
+            nodes[a].get().iter().map_while(of_frame).collect()
+        });
+        let damped = members.iter().any(|m| m.damping != 0.0);
+        Some(Self {
+            nodes,
+            rest: std::array::from_fn(|d| column(&|m| m.rest[d])),
+            law: std::array::from_fn(|p| column(&|m| m.law[p])),
+            compliance: given.iter().map(|e| compliance(of(e).stiffness)).collect(),
+            damping: if damped { column(&|m| m.damping) } else { Vec::new() },
+            inverse,
+            colors,
+            given,
+        })
+    }
+
+    fn len(&self) -> usize {
+        self.given.len()
+    }
+
+    /// Panics unless there are rows for the unchecked loads.
+    fn check(&self, rows: &[Row]) {
+        assert!(self.nodes.iter().all(|i| i.rows() <= rows.len()), "a column is shorter than the rows that elements use");
+    }
+
+    /// Rows of the nodes of a pack; the last `frames` are scaled to length 1.
+    ///
+    /// # Safety
+    /// Nobody writes these rows, and `check` has been called on them.
+    #[inline(always)]
+    unsafe fn gather<W: Width>(&self, w: W, frames: usize, x: *const Row, e: usize) -> [[W::L; 4]; N] {
+        let mut out = [[w.splat(0.0); 4]; N];
+        for a in 0..N {
+            // SAFETY: see above.
+            out[a] = unsafe { w.gather_at(x, &self.nodes[a].get()[e..]) };
+            if a >= N - frames {
+                out[a] = Quat::from_row(out[a]).normalized().row();
+            }
+        }
+        out
+    }
+
+    /// Rest numbers and parameters of the law of a pack.
+    #[inline(always)]
+    fn pack<W: Width>(&self, w: W, e: usize) -> ([W::L; D], [W::L; P]) {
+        let (mut rest, mut law) = ([w.splat(0.0); D], [w.splat(0.0); P]);
+        for d in 0..D {
+            rest[d] = w.load(&self.rest[d][e..]);
+        }
+        for p in 0..P {
+            law[p] = w.load(&self.law[p][e..]);
+        }
+        (rest, law)
+    }
+
+    /// Calls `run(elements, their numbers)` for tasks of one colour after the other; `each` of the numbers belong to an element, and those
+    /// of a task stand side by side.
+    fn sweep(&self, each: usize, numbers: &mut [Real], run: impl Fn(Range<usize>, &mut [Real]) + Sync) {
+        let mut left = numbers;
+        for color in &self.colors {
+            let (own, rest) = std::mem::take(&mut left).split_at_mut(each * color.len());
+            left = rest;
+            let task = |t: usize| {
+                let start = color.start + t * TASK;
+                start..(start + TASK).min(color.end)
+            };
+            if color.len() <= 2 * TASK {
+                run(color.clone(), own);
+            } else if each == 0 {
+                (0..color.len().div_ceil(TASK)).into_par_iter().for_each(|t| run(task(t), &mut []));
+            } else {
+                own.par_chunks_mut(each * TASK).enumerate().for_each(|(t, own)| run(task(t), own));
+            }
+        }
+    }
+}
+
+/// Elements by colour, and the ranges of the colours: greedily in the order given, each element takes the first colour that none of its
+/// nodes has.
+fn sorted<const N: usize, const D: usize, const P: usize>(rows: usize, members: &[Members<N, D, P>]) -> (Vec<u32>, Vec<Range<usize>>) {
+    let mut used: Vec<u64> = vec![0; rows];
+    let mut colors: Vec<Vec<u32>> = Vec::new();
+    // Elements around a node with more than 64 of them go one by one.
+    let mut late: Vec<u32> = Vec::new();
+    for (e, member) in members.iter().enumerate() {
+        let taken = member.nodes.iter().fold(0, |t, i| t | used[*i as usize]);
+        let color = (!taken).trailing_zeros() as usize;
+        if color == 64 {
+            late.push(e as u32);
+            continue;
+        }
+        for i in member.nodes {
+            used[i as usize] |= 1 << color;
+        }
+        if color == colors.len() {
+            colors.push(Vec::new());
+        }
+        colors[color].push(e as u32);
+    }
+    for color in &mut colors {
+        color.sort_by_key(|e| members[*e as usize].nodes[0]);
+    }
+    colors.extend(late.into_iter().map(|e| vec![e]));
+    let mut start = 0;
+    let ranges = colors.iter().map(|c| {
+        start += c.len();
+        start - c.len()..start
+    });
+    let ranges = ranges.collect();
+    (colors.concat(), ranges)
+}
+
+/// Elements E with the law Y.
+pub struct Projected<E, Y, const N: usize, const M: usize, const D: usize, const P: usize> {
+    columns: Columns<N, D, P>,
+    lambda: Vec<Real>,
+    /// Strain at which each breaks, in place; empty if none does.
+    limits: Vec<Real>,
+    broken: Vec<Broken>,
+    kind: PhantomData<(E, Y)>,
+}
+
+/// A broken link, with what would mend it.
+struct Broken {
+    place: usize,
+    compliance: Real,
+    damping: Real,
+}
+
+impl<E: Element<N, M, D>, Y: Law<P>, const N: usize, const M: usize, const D: usize, const P: usize> Projected<E, Y, N, M, D, P> {
+    /// Elements over rows 0..rows, of which those from `points` on are frames with the inverse inertias `inverse` [1/(kg m²)]; `None`
+    /// if a node is not one of them. `limits` are the strains at which links break (infinite: never), or empty.
+    pub fn new(rows: usize, points: usize, inverse: &[Real], members: &[Members<N, D, P>], limits: &[f64]) -> Option<Self> {
+        let columns = Columns::new(rows, points, inverse, members)?;
+        let breaks = limits.iter().any(|l| l.is_finite());
+        let limits = if breaks { columns.given.iter().map(|e| limits[*e as usize] as Real).collect() } else { Vec::new() };
+        Some(Self { columns, lambda: Vec::new(), limits, broken: Vec::new(), kind: PhantomData })
+    }
+
+    fn set(&mut self, place: usize, compliance: Real, damping: Real) {
+        self.columns.compliance[place] = compliance;
+        if let Some(old) = self.columns.damping.get_mut(place) {
+            *old = damping;
+        }
+    }
+
+    fn tear(&mut self, place: usize) {
+        let damping = self.columns.damping.get(place).copied().unwrap_or(0.0);
+        self.broken.push(Broken { place, compliance: self.columns.compliance[place], damping });
+        self.set(place, LIMP as Real, 0.0);
+    }
+
+    /// Lengthening over rest length; NaN of what is no link or has broken.
+    fn strain_at(&self, x: &[Row], place: usize) -> Real {
+        let Some(rest) = E::LENGTH.map(|d| self.columns.rest[d][place]) else { return Real::NAN };
+        let ends = [0, 1].map(|a| xyz(x[self.columns.nodes[a].get()[place] as usize]));
+        if self.columns.compliance[place] < LIMP as Real { ((ends[1] - ends[0]).norm() - rest) / rest } else { Real::NAN }
+    }
+}
+
+/// What is common to all elements of a sweep.
+#[derive(Clone, Copy)]
+struct Sweep<'a> {
+    h: Real,
+    x: Shared,
+    before: &'a [Row],
+    /// Whether multipliers start from zero.
+    first: bool,
+    plain: Option<Real>,
+}
+
+/// Projects a range of elements; with multipliers if LAMBDA, with damping if DAMPED.
+struct Project<'a, E, Y, const N: usize, const M: usize, const D: usize, const P: usize, const LAMBDA: bool, const DAMPED: bool> {
+    columns: &'a Columns<N, D, P>,
+    range: Range<usize>,
+    lambda: &'a mut [Real],
+    sweep: Sweep<'a>,
+    kind: PhantomData<(E, Y)>,
+}
+
+impl<E: Element<N, M, D>, Y: Law<P>, const N: usize, const M: usize, const D: usize, const P: usize, const LAMBDA: bool, const DAMPED: bool>
+    Kernel for Project<'_, E, Y, N, M, D, P, LAMBDA, DAMPED>
+{
+    type Output = ();
+    #[inline(always)]
+    fn run<W: Width>(self, w: W) {
+        let (columns, sweep, start) = (self.columns, self.sweep, self.range.start);
+        let inverse_h = 1.0 / sweep.h;
+        packs!(W, w, self.range, |e| {
+            let (rest, law) = columns.pack(w, e);
+            // SAFETY: `check` has been called; no element of a colour shares a node with another.
+            let x = unsafe { columns.gather(w, E::FRAMES, sweep.x.rows(), e) };
+            let mut weights = [w.splat(0.0); N];
+            for a in 0..N {
+                weights[a] = if a < N - E::FRAMES { x[a][3] } else { w.load(&columns.inverse[a][e..]) };
+            }
+            let (zero, one) = (w.splat(0.0), w.splat(1.0));
+            let soft = w.load(&columns.compliance[e..]);
+            let (mut alpha, mut share) = (soft * w.splat(inverse_h * inverse_h), zero);
+            let mut before = None;
+            if DAMPED && sweep.plain.is_none() {
+                let ratio = soft * w.load(&columns.damping[e..]) * w.splat(inverse_h);
+                alpha = alpha / (one + ratio);
+                share = ratio / (one + ratio);
+                // SAFETY: as above.
+                before = Some(unsafe { columns.gather(w, E::FRAMES, sweep.before.as_ptr(), e) });
+            }
+            if sweep.plain.is_some() {
+                // What has broken stays so.
+                alpha = (soft - w.splat(0.5 * LIMP as Real)).positive(alpha, zero);
+            }
+            let lambda = if LAMBDA && !sweep.first { w.load(&self.lambda[e - start..]) } else { zero };
+            let compliance = Compliance { alpha, lambda, share };
+            let (mut moves, delta) = project::<E, Y, _, N, M, D, P>(compliance, law, rest, x, before, weights);
+            if LAMBDA {
+                w.store(lambda + delta, &mut self.lambda[e - start..]);
+            }
+            if let Some(part) = sweep.plain {
+                for a in 0..N {
+                    moves[a] = moves[a] * w.splat(part);
+                }
+            }
+            let x = corrected(E::FRAMES, x, moves);
+            for a in 0..N {
+                // SAFETY: as above.
+                unsafe { w.put(x[a], sweep.x.rows(), &columns.nodes[a].get()[e..]) };
+            }
+        });
+    }
+}
+
+struct Energies<'a, E, Y, const N: usize, const M: usize, const D: usize, const P: usize> {
+    columns: &'a Columns<N, D, P>,
+    range: Range<usize>,
+    x: &'a [Row],
+    kind: PhantomData<(E, Y)>,
+}
+
+impl<E: Element<N, M, D>, Y: Law<P>, const N: usize, const M: usize, const D: usize, const P: usize> Kernel
+    for Energies<'_, E, Y, N, M, D, P>
+{
+    type Output = f64;
+    #[inline(always)]
+    fn run<W: Width>(self, w: W) -> f64 {
+        let (columns, mut total, mut each) = (self.columns, 0.0, [0.0; 16]);
+        packs!(W, w, self.range, |e| {
+            let (rest, law) = columns.pack(w, e);
+            // SAFETY: `energy` has called `check`.
+            let x = unsafe { columns.gather(w, E::FRAMES, self.x.as_ptr(), e) };
+            let soft = w.load(&columns.compliance[e..]);
+            let k = soft.positive(w.splat(1.0) / soft, w.splat(0.0));
+            w.store(energy::<E, Y, _, N, M, D, P>(k, law, rest, x), &mut each);
+            // One after the other, so that every width gives the same sum.
+            for one in &each[..count(w)] {
+                total += f64::from(*one);
+            }
+        });
+        total
+    }
+}
+
+impl<E: Element<N, M, D>, Y: Law<P>, const N: usize, const M: usize, const D: usize, const P: usize> Constraints
+    for Projected<E, Y, N, M, D, P>
+{
+    fn name(&self) -> &'static str {
+        E::NAME
+    }
+
+    fn len(&self) -> usize {
+        self.columns.len()
+    }
+
+    fn energy(&self, x: &[Row]) -> f64 {
+        self.columns.check(x);
+        let (columns, kind) = (&self.columns, PhantomData::<(E, Y)>);
+        fold(self.len(), |range| dispatch(Energies { columns, range, x, kind })).into_iter().sum()
+    }
+
+    fn project(&mut self, x: &mut [Row], step: &Projection<'_>) {
+        let (columns, kind) = (&self.columns, PhantomData::<(E, Y)>);
+        columns.check(x);
+        let damped = !columns.damping.is_empty() && step.plain.is_none();
+        if damped {
+            columns.check(step.before);
+        }
+        let many = step.iterations > 1 && step.plain.is_none();
+        if many {
+            self.lambda.resize(columns.len(), 0.0);
+        }
+        let (x, first) = (Shared(x.as_mut_ptr()), step.iteration == 0);
+        let sweep = Sweep { h: step.h as Real, x, before: step.before, first, plain: step.plain };
+        let lambda = if many { &mut self.lambda[..] } else { &mut [] };
+        columns.sweep(usize::from(many), lambda, |range, lambda| match (many, damped) {
+            (false, false) => dispatch(Project::<_, _, N, M, D, P, false, false> { columns, range, lambda, sweep, kind }),
+            (false, true) => dispatch(Project::<_, _, N, M, D, P, false, true> { columns, range, lambda, sweep, kind }),
+            (true, false) => dispatch(Project::<_, _, N, M, D, P, true, false> { columns, range, lambda, sweep, kind }),
+            (true, true) => dispatch(Project::<_, _, N, M, D, P, true, true> { columns, range, lambda, sweep, kind }),
+        });
+    }
+
+    fn add_grip(&self, x: &[Row], grip: &mut [Real]) {
+        self.columns.check(x);
+        for e in 0..self.len() {
+            let (rest, _) = self.columns.pack(crate::math::simd::Scalar, e);
+            // SAFETY: checked above.
+            let x = unsafe { self.columns.gather(crate::math::simd::Scalar, E::FRAMES, x.as_ptr(), e) };
+            let soft = self.columns.compliance[e];
+            for m in 0..M {
+                let g = E::pullback(rest, x, std::array::from_fn(|i| if i == m { 1.0 } else { 0.0 }));
+                for a in 0..N - E::FRAMES {
+                    let size: Real = (0..3).map(|c| g[a][c] * g[a][c]).sum();
+                    grip[self.columns.nodes[a].get()[e] as usize] += if soft > 0.0 { size / soft } else { 0.0 };
+                }
+            }
+        }
+    }
+
+    fn link_strain(&self, x: &[Row]) -> Vec<Real> {
+        self.columns.check(x);
+        let mut strain = vec![Real::NAN; self.len()];
+        for (place, given) in self.columns.given.iter().enumerate() {
+            strain[*given as usize] = self.strain_at(x, place);
+        }
+        strain
+    }
+
+    fn largest_strain(&self, x: &[Row]) -> f64 {
+        if E::LENGTH.is_none() {
+            return f64::NEG_INFINITY;
+        }
+        self.columns.check(x);
+        // NaN is never the larger.
+        let largest = |range: Range<usize>| range.map(|place| self.strain_at(x, place)).fold(Real::NEG_INFINITY, Real::max);
+        fold(self.len(), largest).into_iter().fold(f64::NEG_INFINITY, |m, s| m.max(f64::from(s)))
+    }
+
+    fn break_links(&mut self, x: &[Row]) -> u64 {
+        if self.limits.is_empty() {
+            return 0;
+        }
+        self.columns.check(x);
+        let beyond = |place: &usize| self.strain_at(x, *place).abs() > self.limits[*place];
+        let found = fold(self.len(), |range| range.filter(beyond).collect::<Vec<_>>()).concat();
+        for place in &found {
+            self.tear(*place);
+        }
+        found.len() as u64
+    }
+
+    fn broken(&self) -> Vec<u32> {
+        self.broken.iter().map(|b| self.columns.given[b.place]).collect()
+    }
+
+    fn set_broken(&mut self, broken: &[u32]) {
+        for mended in std::mem::take(&mut self.broken) {
+            self.set(mended.place, mended.compliance, mended.damping);
+        }
+        if broken.is_empty() {
+            return;
+        }
+        let mut places = vec![0; self.len()];
+        self.columns.given.iter().enumerate().for_each(|(place, given)| places[*given as usize] = place);
+        for given in broken {
+            self.tear(places[*given as usize]);
+        }
+    }
+}
