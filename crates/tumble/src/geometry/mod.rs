@@ -3,6 +3,7 @@
 pub mod bvh;
 pub mod contact;
 pub mod facets;
+pub mod mesh_contact;
 pub mod motion;
 pub mod neighbours;
 pub mod sampling;
