@@ -37,6 +37,7 @@ class Broken:
 _UNITS = {
     "max_stretch": "",
     "max_penetration": "m",
+    "max_intersections": "",
     "max_speed": "m/s",
     "max_energy_drift": "",
     "max_energy_growth": "",
@@ -87,6 +88,7 @@ def check(run: "Run") -> list[Broken]:
     curves: dict[str, Curve] = {
         "max_stretch": ledger["stretch"],
         "max_penetration": ledger["penetration"],
+        "max_intersections": ledger["intersections"],
         "max_speed": ledger["speed"],
         "max_energy_drift": np.abs(energy_changes(ledger)),
         "max_energy_growth": energy_changes(ledger),

@@ -106,6 +106,8 @@ pub struct Ledger {
     pub stretch: f64,
     /// Deepest mass inside a collider or its thickness [m].
     pub penetration: f64,
+    /// Edges of soft surfaces that pass through triangles, where `self_contact` is on.
+    pub intersections: u64,
     /// Fastest mass [m/s].
     pub speed: f64,
     /// Masses that touch a collider.

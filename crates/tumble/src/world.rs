@@ -262,6 +262,7 @@ impl World {
             total.external += books.external;
             total.stretch = total.stretch.max(books.stretch);
             total.penetration = total.penetration.max(books.penetration);
+            total.intersections += books.intersections;
             total.speed = total.speed.max(books.speed);
             total.contacts += books.contacts;
             total.broken += books.broken;

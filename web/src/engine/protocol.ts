@@ -70,6 +70,7 @@ export interface Ledger {
   energy: number;
   stretch: number;
   penetration: number;
+  intersections: number;
   speed: number;
   contacts: number;
   broken: number;

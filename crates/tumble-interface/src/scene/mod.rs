@@ -28,10 +28,12 @@ pub use heat::{Heat, HeatRegion, HeatScheme, HeatSide, HeatSides, HeatSource};
 pub use output::{Camera, Expect, Look, Output, Probe};
 pub use shapes::{Collider, MeshFile, MeshFrame, MeshFrames, MeshRef, Motion, Pace, Pose, Shape};
 pub use structures::{
-    Block, Cloud, CloudShape, Diagonals, Follow, Galaxy, Halo, Link, LinkSettings, Links, Material, Net, Particles, Pin, Profile,
-    Region, Rod, Rope, Sheet, Spring,
+    Block, Cloud, CloudShape, Diagonals, Follow, Galaxy, Halo, Link, LinkSettings, Links, Material, Net, Particles, Pin, Profile, Region,
+    Rod, Rope, Sheet, Spring,
 };
-pub use systems::{Adaptive, Hessian, Integrator, Linear, Method, OnFailure, PositionBased, Projection, Solver, System, Vicsek};
+pub use systems::{
+    Adaptive, Hessian, Integrator, Linear, Method, OnFailure, PositionBased, Projection, SelfContact, Solver, System, Vicsek,
+};
 
 use crate::check::check;
 use crate::error::{Issue, SceneError};

@@ -90,6 +90,8 @@ pub struct Expect {
     /// Deepest mass inside a collider.
     #[schemars(range(min = 0.0), extend("x-unit" = "m"))]
     pub max_penetration: Option<f64>,
+    /// Edges of soft surfaces that pass through triangles, where `self_contact` is on.
+    pub max_intersections: Option<u64>,
     /// Fastest mass.
     #[schemars(range(min = 0.0), extend("x-unit" = "m/s"))]
     pub max_speed: Option<f64>,

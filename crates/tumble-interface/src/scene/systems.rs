@@ -39,6 +39,9 @@ pub struct System {
     /// Settings of `position_based`.
     #[serde(default)]
     pub position_based: PositionBased,
+    /// Surfaces and curves keep off themselves and each other (`position_based` only).
+    #[serde(default)]
+    pub self_contact: Option<SelfContact>,
     /// The numbers of the `vicsek` method, which needs them.
     #[serde(default)]
     pub vicsek: Option<Vicsek>,
@@ -56,6 +59,7 @@ impl Default for System {
             clamp: None,
             solver: Solver::default(),
             position_based: PositionBased::default(),
+            self_contact: None,
             vicsek: None,
         }
     }
@@ -316,6 +320,20 @@ impl Default for PositionBased {
     fn default() -> Self {
         Self { iterations: 1, tolerance: None, tethers: None, projection: Projection::Compliant, stiffness: 1.0 }
     }
+}
+
+/// Contact of soft surfaces with themselves and each other.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct SelfContact {
+    /// Distance at which surfaces touch. Less than the length of edges; it is also the scale of the safe distance that nothing passes, so
+    /// that larger is faster.
+    #[schemars(extend("x-unit" = "m", "exclusiveMinimum" = 0.0))]
+    pub thickness: f64,
+    /// Coulomb friction coefficient, static and sliding.
+    #[serde(default)]
+    #[schemars(range(min = 0.0), extend("x-unit" = "1"))]
+    pub friction: f64,
 }
 
 /// How an element is satisfied.

@@ -156,6 +156,7 @@ pub fn build(scene: &Scene, assets: &Assets) -> Result<Built, SceneError> {
             adaptive: plan.adaptive.clone(),
             solver: plan.solver.clone(),
             sweeps: plan.position_based.clone(),
+            self_contact: plan.self_contact.clone(),
             clamp: plan.clamp,
             gravity,
             native: scene.bits == Bits::Native,

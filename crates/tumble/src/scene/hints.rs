@@ -11,6 +11,9 @@ pub fn unused(scene: &Scene, plans: &[Plan]) -> Vec<String> {
     let carried = |(kind, _, system): &(&str, &str, Option<&str>)| place(plans, kind, *system).map(|i| plans[i].method);
     let methods: Vec<Method> = objects(scene).iter().filter_map(carried).collect();
     let mut warnings = Vec::new();
+    for plan in plans.iter().filter(|plan| plan.self_contact.is_some() && plan.integrator != Integrator::PositionBased) {
+        warnings.push(format!("system \"{}\".self_contact: only position_based heeds it, and the integrator is {}", plan.name, plan.integrator.name()));
+    }
     if !scene.field.is_empty() && !methods.contains(&Method::Tracers) {
         warnings.push("no object is moved by a system of tracers, so that nothing follows the fields".into());
     }

@@ -15,7 +15,7 @@ use crate::pool::{Emitter, Pool};
 use crate::state::{Masses, Object, State};
 use std::ops::Range;
 use std::sync::Arc;
-use tumble_interface::scene::{Adaptive, Force as Words, Hessian, Integrator, PositionBased, Solver};
+use tumble_interface::scene::{Adaptive, Force as Words, Hessian, Integrator, PositionBased, SelfContact, Solver};
 use tumble_interface::{Issue, SceneError};
 
 /// How a system steps.
@@ -36,6 +36,8 @@ pub struct Settings {
     pub solver: Solver,
     /// Of position-based dynamics.
     pub sweeps: PositionBased,
+    /// Contact of surfaces with each other.
+    pub self_contact: Option<SelfContact>,
     /// Springs longer than this many times their rest length are shortened.
     pub clamp: Option<f64>,
     /// Gravity [m/s²].
@@ -414,6 +416,9 @@ impl Parts {
                 objects.push(object);
             }
         }
+        let sewn = self.vector.members.iter().map(|m| m.nodes);
+        let layers = settings.self_contact.as_ref().filter(|_| projected);
+        let layers = layers.and_then(|words| super::layers::Layers::new(words, &objects, sewn, &state));
         let placed = |on: Vec<usize>| -> Vec<usize> { on.into_iter().map(|i| places[i]).collect() };
         let rows_of = |on: &[usize]| -> Vec<Range<usize>> { on.iter().map(|i| objects[*i].points.clone()).collect() };
         let mut pairs = Vec::new();
@@ -465,6 +470,7 @@ impl Parts {
             sweeps: settings.sweeps.clone(),
             rates: Vec::new(),
             reach,
+            layers,
             held: Held::at_rest(self.held, &settings.colliders),
             user: None,
             scratch: Default::default(),

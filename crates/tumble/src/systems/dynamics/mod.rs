@@ -7,6 +7,7 @@ mod contact;
 mod held;
 mod implicit;
 mod laws;
+mod layers;
 mod life;
 mod modes;
 mod position_based;
@@ -24,6 +25,7 @@ use crate::state::{Object, State};
 use crate::system::{Archive, Part, System};
 use held::Held;
 use laws::{Laws, Local, flat};
+use layers::Layers;
 use rayon::prelude::*;
 use tumble_interface::engine::{Ledger, Stability, StepReport, UserForce, UserIntegrator};
 use tumble_interface::scene::{Adaptive, Integrator, PositionBased};
@@ -70,6 +72,7 @@ pub struct Dynamics {
     constraints: Vec<Box<dyn Constraints>>,
     sweeps: PositionBased,
     reach: Vec<Tethers>,
+    layers: Option<Layers>,
     /// Points that follow colliders.
     held: Vec<Held>,
     user: Option<Box<dyn UserIntegrator>>,
@@ -265,6 +268,7 @@ impl Dynamics {
                 hits.into_iter().for_each(|(row, hit)| self.pool.note_row(row, hit));
             }
         }
+        self.hold_layers(h);
         let x = &self.state.x;
         let broken: u64 = self.laws.batches.iter_mut().map(|b| b.break_links(x)).sum::<u64>()
             + self.constraints.iter_mut().map(|c| c.break_links(x)).sum::<u64>();
@@ -430,6 +434,7 @@ impl Dynamics {
             }
             return Ok(report);
         }
+        self.untangle();
         let substeps = self.substeps(dt);
         if substeps > MOST_SUBSTEPS {
             return Err(StepError::StepTooSmall { system: self.name.clone(), time: t, step: dt / substeps });

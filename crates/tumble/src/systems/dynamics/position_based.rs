@@ -19,6 +19,8 @@ use tumble_interface::scene::Projection as Kind;
 impl Dynamics {
     /// A sub-step without contact, which follows; `before` and `before_v` hold where it starts from.
     pub(super) fn project_step(&mut self, t: f64, h: f64, report: &mut StepReport) -> Result<(), StepError> {
+        // Who may meet whom.
+        self.find_pairs(h);
         // Forces that are no elements, predicted velocities and positions.
         let (mut rates, kinematics) = (std::mem::take(&mut self.rates), self.laws.kinematics());
         rates.resize(self.state.x.len(), ZERO);
@@ -33,30 +35,32 @@ impl Dynamics {
         self.rates = rates;
         done?;
         // Sweeps over all elements.
-        let words = &self.sweeps;
+        let words = self.sweeps.clone();
         // n sweeps that each take back 1 - (1 - k)^(1/n) leave 1 - k of an error.
         let part = 1.0 - crate::math::functions::pow(1.0 - words.stiffness, 1.0 / f64::from(words.iterations));
         let plain = (words.projection == Kind::Plain).then_some(part as Real);
-        let x = &mut self.state.x;
         let mut old: Vec<Row> = Vec::new();
         for iteration in 0..words.iterations {
             if words.tolerance.is_some() {
-                old.clone_from(x);
+                old.clone_from(&self.state.x);
             }
+            let x = &mut self.state.x;
             let projection = Projection { h, before: &self.before, iteration, iterations: words.iterations, plain };
             self.constraints.iter_mut().for_each(|c| c.project(x, &projection));
             if let Some(clamp) = &mut self.clamp {
                 clamp.project(x, &projection);
             }
             self.reach.iter().for_each(|tethers| tethers.project(x));
+            self.push_apart();
             report.sweeps += 1;
+            let x = &self.state.x;
             let way = |i: usize| xyz64(sub(x[i], old[i])).norm();
             if words.tolerance.is_some_and(|most| max(x.len(), |range| range.map(way).fold(0.0, f64::max)) <= most) {
                 break;
             }
         }
         // Velocities: a point that no element has moved keeps its own to the last bit.
-        let (before, points) = (&self.before, kinematics.points);
+        let (x, before, points) = (&self.state.x, &self.before, kinematics.points);
         self.state.v.par_chunks_mut(CHUNK).zip(x.par_chunks(CHUNK)).enumerate().for_each(|(c, (v, x))| {
             for (k, (v, x)) in v.iter_mut().zip(x).enumerate() {
                 let i = c * CHUNK + k;

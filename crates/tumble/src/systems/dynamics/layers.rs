@@ -1,0 +1,143 @@
+//! Soft surfaces keep off themselves and each other: pairs of near features are found at the start of a sub-step, projected like any
+//! other constraint with friction, and whatever would still pass is held back at its end. Nothing here is in a snapshot: pairs depend on
+//! positions alone.
+//!
+//!   C = n . Σ w_i x_i - thickness >= 0,   dx_i = m_i^-1 w_i n max(0, -C)/Σ_j m_j^-1 w_j²            (positions.4)
+
+use super::Dynamics;
+use crate::geometry::mesh_contact::{Detector, Owner, Pair, Topology, intersections, tangled, untangle_directions};
+use crate::math::{Real, Row, Vec3, axpy, row, sub, xyz};
+use crate::state::{Object, State};
+use tumble_interface::scene::SelfContact;
+
+/// Pairs are looked for within the thickness and this many times the way of the fastest vertex in a sub-step: a little more than
+/// 1/0.45, so that it is not held back by what nobody has looked for.
+const AHEAD: f64 = 2.4;
+/// That reach over the thickness, at least and at most.
+const REACH: (f64, f64) = (1.5, 8.0);
+/// Rounds in which a bad start, or what the fastest have passed, is untangled before each exchange interval.
+const ROUNDS: usize = 4;
+
+/// Surfaces of a system, and who is near whom.
+pub struct Layers {
+    topology: Topology,
+    detector: Detector,
+    friction: f64,
+}
+
+impl Layers {
+    /// All triangles and curves of the objects; `sewn` points count as one. `None` if there is nothing that could meet.
+    pub fn new(words: &SelfContact, objects: &[Object], sewn: impl Iterator<Item = [u32; 2]>, state: &State) -> Option<Self> {
+        let points = objects.iter().map(|o| o.points.end).max()?;
+        let mut topology = Topology::new(points);
+        for object in objects.iter().filter(|o| o.stream.is_none()) {
+            let first = object.points.start as u32;
+            let triangles: Vec<[u32; 3]> = object.triangles.iter().map(|t| t.map(|i| i + first)).collect();
+            let segments: Vec<[u32; 2]> = object.curve.windows(2).map(|c| [c[0] + first, c[1] + first]).collect();
+            topology.add(Owner { radius: 0.5 * words.thickness, itself: true }, &triangles, &segments, &[]);
+        }
+        if topology.points().is_empty() {
+            return None;
+        }
+        sewn.for_each(|[a, b]| topology.weld(a, b));
+        (0..points).filter(|i| state.x[*i][3] == 0.0).for_each(|i| topology.fix(i as u32, true));
+        topology.set_rest(&state.x[..points]);
+        Some(Self { topology, detector: Detector::new(), friction: words.friction })
+    }
+
+    /// Edges that pass through triangles.
+    pub fn intersections(&self, x: &[Row]) -> u64 {
+        intersections(&self.topology, x).len() as u64
+    }
+
+    /// Untangles what has passed, before an interval; what is still tangled is left alone until it is out.
+    fn untangle(&mut self, x: &mut [Row]) {
+        for round in 0..=ROUNDS {
+            let crossings = self.detector.intersections(&self.topology, x);
+            let loose = if crossings.is_empty() { Vec::new() } else { tangled(&self.topology, &crossings, 1) };
+            self.detector.set_loose(loose);
+            if crossings.is_empty() || round == ROUNDS {
+                break;
+            }
+            let step = 0.5 * self.topology.largest_thickness();
+            let ways = untangle_directions(&self.topology, x, &crossings, step);
+            for (x, way) in x.iter_mut().zip(ways) {
+                *x = axpy(*x, 1.0, row(Vec3 { x: way.x as Real, y: way.y as Real, z: way.z as Real }, 0.0));
+            }
+        }
+    }
+}
+
+impl Dynamics {
+    /// Before an interval: what is tangled.
+    pub(super) fn untangle(&mut self) {
+        if let Some(layers) = &mut self.layers {
+            layers.untangle(&mut self.state.x);
+        }
+    }
+
+    /// Before a sub-step of length h [s]: who is near whom.
+    pub(super) fn find_pairs(&mut self, h: f64) {
+        let Some(layers) = &mut self.layers else { return };
+        let n = layers.topology.vertices();
+        let fastest = self.state.v[..n].iter().map(|v| f64::from(xyz(*v).norm_sq())).fold(0.0, f64::max).sqrt();
+        let gravity = Vec3::from(self.laws.gravity).norm();
+        let thickness = layers.topology.largest_thickness();
+        let way = (fastest + gravity * h) * h;
+        let reach = (thickness + AHEAD * way).clamp(REACH.0 * thickness, REACH.1 * thickness);
+        layers.detector.detect(&layers.topology, &self.state.x, reach);
+    }
+
+    /// In a sweep: pushes pairs apart that are too near, with friction on what they slide in the sub-step.
+    pub(super) fn push_apart(&mut self) {
+        let Some(layers) = &mut self.layers else { return };
+        let (x, before) = (&mut self.state.x, &self.before);
+        for pair in layers.detector.pairs() {
+            push(pair, layers.friction as Real, x, before);
+        }
+    }
+
+    /// After a sub-step of length h [s]: holds back what would pass through something.
+    pub(super) fn hold_layers(&mut self, h: f64) {
+        let Some(layers) = &mut self.layers else { return };
+        let x = &mut self.state.x;
+        self.unclamped.clone_from(x);
+        if layers.detector.hold(&layers.topology, x).held == 0 {
+            return;
+        }
+        let inverse_h = (1.0 / h) as Real;
+        for ((x, old), v) in x.iter().zip(&self.unclamped).zip(&mut self.state.v).take(layers.topology.vertices()) {
+            let change = sub(*x, *old);
+            if change[..3] != [0.0; 3] && x[3] > 0.0 {
+                *v = axpy(*v, inverse_h, [change[0], change[1], change[2], 0.0]);
+            }
+        }
+    }
+}
+
+/// Projects one pair.
+fn push(pair: &Pair, friction: Real, x: &mut [Row], before: &[Row]) {
+    let at = pair.vertices.map(|v| v as usize);
+    let n = Vec3::from(pair.normal);
+    let (mut d, mut weight) = (n * 0.0, 0.0);
+    for k in 0..4 {
+        d = d + xyz(x[at[k]]) * pair.weights[k];
+        weight += x[at[k]][3] * pair.weights[k] * pair.weights[k];
+    }
+    let depth = pair.thickness - n.dot(d);
+    if !(depth > 0.0 && weight > 0.0) {
+        return;
+    }
+    let mut slid = d;
+    for k in 0..4 {
+        slid = slid - xyz(before[at[k]]) * pair.weights[k];
+    }
+    let slid = slid - n * n.dot(slid);
+    let (way, most) = (slid.norm(), friction * depth);
+    let back = if way > most { slid * (most / way) } else { slid };
+    let push = (n * depth - back) * (1.0 / weight);
+    for k in 0..4 {
+        let i = at[k];
+        x[i] = axpy(x[i], x[i][3] * pair.weights[k], row(push, 0.0));
+    }
+}
