@@ -12,10 +12,11 @@ mod build;
 mod glb;
 mod obj;
 mod ply;
+mod skin;
 mod stl;
 mod vdb;
 
-use tumble_interface::Mesh;
+use tumble_interface::{Character, Mesh};
 
 pub use vdb::{Class, Volume, vdb};
 
@@ -71,6 +72,17 @@ pub fn mesh(bytes: &[u8], format: Format) -> Result<Mesh, String> {
         Format::Glb => glb::read(bytes),
     };
     read.and_then(build::finish).map_err(|message| format!("{}: {}", format.name(), one_line(&message)))
+}
+
+/// Reads a skinned figure with its movements from a GLB file, or from the text of a glTF file with its data inside.
+///
+/// The mesh is one as from [`mesh`]; every joint, bind and vertex that is named exists, parents come before children, the
+/// weights of each vertex add up to 1, all numbers are finite, times rise, and each track has as many values as it needs.
+///
+/// # Errors
+/// One line: what is wrong with the file, where, and what to do.
+pub fn character(bytes: &[u8]) -> Result<Character, String> {
+    skin::read(bytes).map_err(|message| format!("glTF: {}", one_line(&message)))
 }
 
 /// Longest message [characters]; the file may be quoted in it, and a line of a file may be of any length.

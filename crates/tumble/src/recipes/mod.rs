@@ -7,6 +7,7 @@
 mod block;
 mod compressible;
 mod emitter;
+mod figures;
 mod galaxy;
 mod grid;
 mod heat;
@@ -22,6 +23,7 @@ mod sheet;
 pub use block::block;
 pub use compressible::compressible;
 pub use emitter::{emitter, region};
+pub use figures::{MANNEQUIN, bytes as figure_bytes, character, mannequin};
 pub use galaxy::galaxy;
 pub use grid::grid;
 pub use heat::heat;
