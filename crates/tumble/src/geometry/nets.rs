@@ -1,7 +1,7 @@
-//! The surface of a signed distance as triangles: one vertex in each cell that the surface crosses, one quadrilateral for each
+//! The surface of a signed distance as triangles: one vertex for each sheet of the surface in a cell, one quadrilateral for each
 //! edge of the lattice that it crosses, then vertices drawn onto the surface and spread evenly on it.
 //!
-//! Source: [gibson1998]. Closed and facing outward; where two sheets lie within one cell, an edge may have four triangles.
+//! Source: [gibson1998]. Closed and facing outward; where two sheets meet twice at one face of a cell, an edge has four triangles (cells are too large there).
 //! Verified by tests/character.rs.
 
 use super::Vector;
@@ -39,22 +39,32 @@ pub fn surface(phi: &dyn Fn(Vector) -> f64, (low, high): (Vector, Vector), cell:
             }
         }
     }
-    let mut numbers: HashMap<usize, u32> = HashMap::new();
+    // Of each cell the vertex of each edge that is crossed.
+    let mut numbers: HashMap<usize, [u32; 12]> = HashMap::new();
     let mut mesh = Mesh::default();
     for i in lattice(n.map(|n| n - 1)) {
-        let (mut sum, mut count) = (Vector::default(), 0.0);
-        for (a, b) in EDGES {
-            let [p, q] = [a, b].map(|c| std::array::from_fn(|k| i[k] + (c >> k & 1)));
-            let (u, v) = (values[index(p)], values[index(q)]);
-            if (u < 0.0) != (v < 0.0) {
+        let corner = |c: usize| -> [usize; 3] { std::array::from_fn(|k| i[k] + (c >> k & 1)) };
+        let inside: [bool; 8] = std::array::from_fn(|c| values[index(corner(c))] < 0.0);
+        if inside == [inside[0]; 8] {
+            continue;
+        }
+        let sheet = sheets(&inside);
+        let mut own = [u32::MAX; 12];
+        for first in 0..12 {
+            if sheet[first] != first || inside[EDGES[first].0] == inside[EDGES[first].1] {
+                continue;
+            }
+            let (mut sum, mut count) = (Vector::default(), 0.0);
+            for (e, (a, b)) in EDGES.into_iter().enumerate().filter(|(e, _)| sheet[*e] == first) {
+                let (p, q) = (corner(a), corner(b));
+                let (u, v) = (values[index(p)], values[index(q)]);
                 sum = sum + place(p) + (place(q) - place(p)) * (u / (u - v));
                 count += 1.0;
+                own[e] = mesh.vertices.len() as u32;
             }
-        }
-        if count > 0.0 {
-            numbers.insert(index(i), mesh.vertices.len() as u32);
             mesh.vertices.push((sum * (1.0 / count)).into());
         }
+        numbers.insert(index(i), own);
     }
     for i in lattice(n.map(|n| n - 1)) {
         for a in 0..3 {
@@ -73,7 +83,9 @@ pub fn surface(phi: &dyn Fn(Vector) -> f64, (low, high): (Vector, Vector), cell:
                 let mut cell = i;
                 cell[b] -= down[0];
                 cell[c] -= down[1];
-                numbers.get(&index(cell)).copied()
+                let corner = down[0] << b | down[1] << c;
+                let edge = EDGES.iter().position(|e| *e == (corner, corner | 1 << a))?;
+                numbers.get(&index(cell)).map(|own| own[edge])
             };
             let [Some(p), Some(q), Some(r), Some(s)] = [[1, 1], [0, 1], [0, 0], [1, 0]].map(around) else { continue };
             let [p, q, r, s] = if u { [p, q, r, s] } else { [s, r, q, p] };
@@ -119,6 +131,35 @@ fn spread(phi: &dyn Fn(Vector) -> f64, mesh: &mut Mesh, cell: f64) {
             *vertex = p.into();
         }
     }
+}
+
+/// Which crossed edges of a cell lie on one sheet of the surface: of each edge the first of its sheet. On a face whose edges are all
+/// crossed, the inside is cut in two; both cells of a face see it alike.
+fn sheets(inside: &[bool; 8]) -> [usize; 12] {
+    let mut sheet: [usize; 12] = std::array::from_fn(|e| e);
+    let edge = |a: usize, b: usize| EDGES.iter().position(|e| *e == (a.min(b), a.max(b))).unwrap_or(0);
+    let mut join = |a: usize, b: usize| {
+        let (from, to) = (sheet[a].max(sheet[b]), sheet[a].min(sheet[b]));
+        sheet.iter_mut().filter(|s| **s == from).for_each(|s| *s = to);
+    };
+    for axis in 0..3 {
+        for side in 0..2 {
+            let (u, v) = (1 << ((axis + 1) % 3), 1 << ((axis + 2) % 3));
+            let ring = [0, u, u | v, v].map(|c| c | side << axis);
+            let edges: [usize; 4] = std::array::from_fn(|k| edge(ring[k], ring[(k + 1) % 4]));
+            let crossed: Vec<usize> = (0..4).filter(|k| inside[ring[*k]] != inside[ring[(k + 1) % 4]]).collect();
+            match crossed[..] {
+                [a, b] => join(edges[a], edges[b]),
+                [_, _, _, _] => {
+                    for k in (0..4).filter(|k| inside[ring[*k]]) {
+                        join(edges[k], edges[(k + 3) % 4]);
+                    }
+                }
+                _ => {}
+            }
+        }
+    }
+    sheet
 }
 
 /// Edges of a cell: pairs of corners, bit k of a corner is its place along axis k.

@@ -291,7 +291,7 @@ fn step(p: f64) -> (f64, f64, f64) {
     };
     // The heel rises before the foot leaves the floor, the toes before it comes down.
     let heel = 42.0 * ramp(p, 0.36, 0.62) * (1.0 - ramp(p, 0.64, 0.86));
-    let toes = 15.0 * (ramp(p, 0.80, 0.99) + 1.0 - ramp(p, 0.0, 0.11) - if p < 0.5 { 0.0 } else { 1.0 });
+    let toes = 15.0 * (ramp(p, 0.80, 0.99) + 1.0 - ramp(p, 0.0, 0.11));
     // A foot on its heel has its ball this much higher.
     let length = super::BALL + 0.045;
     let z = 0.035 * bump(p, 0.60, 0.98) + length * sin(toes.to_radians());
