@@ -22,6 +22,8 @@ pub struct Facets {
     around: Vec<u32>,
     times: Vec<f64>,
     frames: Vec<Vec<Vector>>,
+    /// Of each interval where nothing of the mesh comes, and nothing is within it.
+    apart: Vec<Apart>,
     /// Where the last keyframe goes on: a time among `times`, and how far everything has gone from there [m].
     back: Option<(f64, Vector)>,
 }
@@ -110,9 +112,11 @@ impl Facets {
                 next[*i as usize] += 1;
             }
         }
-        let mut facets = Self { nodes, boxes: Vec::new(), triangles, first, around, times, frames, back };
+        let mut facets = Self { nodes, boxes: Vec::new(), triangles, first, around, times, frames, apart: Vec::new(), back };
         let pairs = (0..facets.frames.len().saturating_sub(1).max(1)).into_par_iter().map(|k| facets.refit(k)).collect();
         facets.boxes = pairs;
+        let apart = facets.boxes.par_iter().map(|boxes| Apart::new(&facets.nodes, boxes)).collect();
+        facets.apart = apart;
         Some(facets)
     }
 
@@ -240,6 +244,12 @@ impl Facets {
         &self.around[self.first[v as usize] as usize..self.first[v as usize + 1] as usize]
     }
 
+    /// Whether p is certain to be outside a closed mesh at time t; what is close to it never is certain.
+    pub fn apart(&self, p: Vector, t: f64) -> bool {
+        let m = self.moment(t);
+        self.apart[m.interval].holds(p - m.gone)
+    }
+
     /// The closest point to p at time t, if one lies nearer than `within` [m].
     pub fn nearest(&self, p: Vector, t: f64, within: f64) -> Option<Nearest> {
         let m = self.moment(t);
@@ -357,6 +367,64 @@ impl Facets {
             }
         }
         best
+    }
+}
+
+/// Cells along the longest side of a mesh.
+const CELLS: f64 = 40.0;
+
+/// Cubes around a mesh that no box of its tree touches and that are connected with the space around it.
+#[derive(Debug, Clone)]
+struct Apart {
+    low: [f64; 3],
+    cell: f64,
+    n: [usize; 3],
+    bits: Vec<u64>,
+}
+
+impl Apart {
+    fn new(nodes: &[Node], boxes: &[[[f32; 3]; 2]]) -> Self {
+        let [low, high] = boxes[0].map(|x| x.map(f64::from));
+        let size: [f64; 3] = std::array::from_fn(|a| high[a] - low[a]);
+        let cell = size.iter().fold(f64::MIN_POSITIVE, |a, b| a.max(*b)) / CELLS;
+        // A free cell all around.
+        let low = low.map(|x| x - 1.5 * cell);
+        let n = size.map(|s| (s / cell) as usize + 4);
+        let mut shut = vec![false; n[0] * n[1] * n[2]];
+        let index = |x: usize, y: usize, z: usize| (z * n[1] + y) * n[0] + x;
+        for (_, [l, h]) in nodes.iter().zip(boxes).filter(|(node, _)| node.count > 0) {
+            let at = |x: f32, a: usize| (((f64::from(x) - low[a]) / cell) as usize).min(n[a] - 1);
+            for z in at(l[2], 2)..=at(h[2], 2) {
+                for y in at(l[1], 1)..=at(h[1], 1) {
+                    shut[index(at(l[0], 0), y, z)..=index(at(h[0], 0), y, z)].fill(true);
+                }
+            }
+        }
+        let mut bits = vec![0_u64; shut.len().div_ceil(64)];
+        let mut todo = vec![0_usize];
+        shut[0] = true;
+        while let Some(i) = todo.pop() {
+            bits[i / 64] |= 1 << (i % 64);
+            let at = [i % n[0], i / n[0] % n[1], i / n[0] / n[1]];
+            for (a, step) in [1, n[0], n[0] * n[1]].into_iter().enumerate() {
+                for next in [(at[a] > 0).then(|| i - step), (at[a] + 1 < n[a]).then(|| i + step)].into_iter().flatten() {
+                    if !std::mem::replace(&mut shut[next], true) {
+                        todo.push(next);
+                    }
+                }
+            }
+        }
+        Self { low, cell, n, bits }
+    }
+
+    fn holds(&self, p: Vector) -> bool {
+        let p: [f64; 3] = p.into();
+        let at: [f64; 3] = std::array::from_fn(|a| (p[a] - self.low[a]) / self.cell);
+        if (0..3).any(|a| !(0.0..self.n[a] as f64).contains(&at[a])) {
+            return true;
+        }
+        let i = (at[2] as usize * self.n[1] + at[1] as usize) * self.n[0] + at[0] as usize;
+        self.bits[i / 64] >> (i % 64) & 1 == 1
     }
 }
 

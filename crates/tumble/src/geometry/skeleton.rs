@@ -3,7 +3,7 @@
 //!   x(t) = sum_b w_b M_b(t) p,   M_b = P G_b(t) B_b                                     (character.1)
 //!
 //! p vertex as it was bound [m], w_b its weights, B_b the inverse of the bone's place then, G_b(t) its place now, P where the
-//! figure stands. All are functions of time alone. Source: [gltf2], 3.7.3.3. Breaks: a joint bent or twisted by much more than 90°
+//! figure stands. All are functions of time alone. Source: [gltf2021], 3.7.3.3. Breaks: a joint bent or twisted by much more than 90°
 //! loses volume there.
 
 use super::motion::{Pose, Twist};
@@ -289,7 +289,7 @@ fn slerp(a: [f64; 4], b: [f64; 4], s: f64) -> [f64; 4] {
 ///
 ///   p = (2s³ - 3s² + 1) p0 + d (s³ - 2s² + s) m0 + (3s² - 2s³) p1 + d (s³ - s²) m1             (character.4)
 ///
-/// p values, m rates. Source: [gltf2], appendix C.
+/// p values, m rates. Source: [gltf2021], appendix C.
 pub fn sample(track: &Track, t: f64) -> Option<[f64; 4]> {
     let cubic = track.between == Between::Cubic;
     let value = |k: usize| track.values.get(if cubic { 3 * k + 1 } else { k }).copied();
