@@ -134,7 +134,8 @@ fn tracks_step_go_straight_and_curve() {
     let two = [[1.0, 2.0, 3.0, 0.0], [3.0, 2.0, 7.0, 0.0]];
     let step = track(Part::Translation, Between::Step, &[1.0, 3.0], &two);
     let straight = track(Part::Translation, Between::Linear, &[1.0, 3.0], &two);
-    for (at, by_step, by_line) in [(0.0, two[0], two[0]), (2.5, two[0], [2.5, 2.0, 6.0, 0.0]), (3.0, two[1], two[1]), (9.0, two[1], two[1])] {
+    for (at, by_step, by_line) in [(0.0, two[0], two[0]), (2.5, two[0], [2.5, 2.0, 6.0, 0.0]), (3.0, two[1], two[1]), (9.0, two[1], two[1])]
+    {
         assert_eq!((value(&step, at), value(&straight, at)), (by_step, by_line));
     }
     // From 1 with rate 2 to 3 with rate -1, 2 s apart: at s = 1/4 (54 + 2 x 9 x 2 + 10 x 3 + 2 x (-3) x (-1))/64.

@@ -1,4 +1,4 @@
-//! Bytes of a mesh file in, a [`Mesh`] out; and volumes in, bytes of a VDB file out ([`vdb`]). Nothing here opens a file, so
+//! Bytes of a mesh file in, a [`Mesh`] or a [`Character`] out; and volumes in, bytes of a VDB file out ([`vdb`]). Nothing here opens a file, so
 //! the browser uses it too.
 //!
 //! What is common to all formats of meshes: coordinates are taken as they stand in the file (no axis is turned, no unit
@@ -31,7 +31,7 @@ pub enum Format {
     Stl,
     /// Binary glTF 2.0 with its buffer inside, node transforms applied. **glTF is y-up**; the coordinates are left so.
     /// The format splits vertices at seams of normals and texture coordinates: within one mesh of one node, equal
-    /// positions are welded. Skins, morph targets and animations are ignored.
+    /// positions are welded. Skins, morph targets and animations are ignored: [`character`] reads them.
     Glb,
 }
 

@@ -8,16 +8,15 @@ use gltf::json::accessor::{ComponentType, Type};
 use gltf::json::mesh::{Mode, Primitive};
 use gltf::json::scene::Node;
 use gltf::json::validation::Checked;
-use tumble_interface::character::{Between, Bind, Character, Clip, Influence, Joint, Part, Track, Transform};
 use tumble_interface::Mesh;
+use tumble_interface::character::{Between, Bind, Character, Clip, Influence, Joint, Part, Track, Transform};
 
 /// Sets of four joints that a vertex may have; the four largest weights count.
 const SETS: u32 = 4;
 
 const INDICES: [ComponentType; 3] = [ComponentType::U8, ComponentType::U16, ComponentType::U32];
 const WEIGHTS: [ComponentType; 3] = [ComponentType::F32, ComponentType::U8, ComponentType::U16];
-const ROTATIONS: [ComponentType; 5] =
-    [ComponentType::F32, ComponentType::I8, ComponentType::U8, ComponentType::I16, ComponentType::U16];
+const ROTATIONS: [ComponentType; 5] = [ComponentType::F32, ComponentType::I8, ComponentType::U8, ComponentType::I16, ComponentType::U16];
 
 pub fn read(bytes: &[u8]) -> Result<Character, String> {
     if bytes.is_empty() {
@@ -146,7 +145,10 @@ impl<'a> Reader<'a> {
                 let joints = self.scene.column(joints, Type::Vec4, &INDICES[..2])?;
                 let weights = self.scene.column(weights, Type::Vec4, &WEIGHTS)?;
                 if joints.count != positions.count || weights.count != positions.count {
-                    return Err(format!("{} positions, but {} joints and {} weights; {DAMAGED}", positions.count, joints.count, weights.count));
+                    return Err(format!(
+                        "{} positions, but {} joints and {} weights; {DAMAGED}",
+                        positions.count, joints.count, weights.count
+                    ));
                 }
                 sets.push((joints, weights));
             }
@@ -193,7 +195,8 @@ impl<'a> Reader<'a> {
                     return Err(wrong(format!("node {node} does not exist; {DAMAGED}")));
                 }
                 let Some(joint) = self.joint_of[node] else { continue };
-                let sampler = animation.samplers.get(channel.sampler.value()).ok_or_else(|| wrong(format!("no such sampler; {DAMAGED}")))?;
+                let sampler =
+                    animation.samplers.get(channel.sampler.value()).ok_or_else(|| wrong(format!("no such sampler; {DAMAGED}")))?;
                 let between = match sampler.interpolation {
                     Checked::Valid(Interpolation::Linear) => Between::Linear,
                     Checked::Valid(Interpolation::Step) => Between::Step,

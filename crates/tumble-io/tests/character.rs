@@ -79,7 +79,11 @@ fn faults_name_the_place_and_the_cure() {
         (r#""WEIGHTS_0": 3"#, r#""WEIGHTS_0": 4"#, &["accessor 4", "type"]),
         (r#", "WEIGHTS_0": 3"#, "", &["WEIGHTS_0", "export"]),
         (r#""output": 6"#, r#""output": 7"#, &["animation 0, channel 0", "accessor 7"]),
-        (r#""output": 7, "interpolation": "STEP""#, r#""output": 7, "interpolation": "CUBICSPLINE""#, &["animation 1", "2 values", "expected 6"]),
+        (
+            r#""output": 7, "interpolation": "STEP""#,
+            r#""output": 7, "interpolation": "CUBICSPLINE""#,
+            &["animation 1", "2 values", "expected 6"],
+        ),
         (r#""count": 2, "type": "SCALAR""#, r#""count": 3, "type": "SCALAR""#, &["accessor 5", "beyond"]),
         (r#""byteOffset": 500, "byteLength": 8"#, r#""byteOffset": 504, "byteLength": 8"#, &["animation 0", "rise"]),
         (r#""buffers": [{"#, r#""buffers": [{"uri": "arm.bin", "#, &["another file", ".glb"]),

@@ -255,7 +255,7 @@ pub enum Moves {
     /// It stands at ease and breathes.
     #[default]
     Stand,
-    /// It walks, a step of 0.66 m in 0.55 s at a height of 1.7 m.
+    /// It walks, a step of 0.55 m in 0.55 s at a height of 1.7 m.
     Walk,
     /// It turns about the vertical on the balls of its feet, arms held out, once in 1.6 s.
     Twirl,

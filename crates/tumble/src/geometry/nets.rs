@@ -163,8 +163,7 @@ fn sheets(inside: &[bool; 8]) -> [usize; 12] {
 }
 
 /// Edges of a cell: pairs of corners, bit k of a corner is its place along axis k.
-const EDGES: [(usize, usize); 12] =
-    [(0, 1), (2, 3), (4, 5), (6, 7), (0, 2), (1, 3), (4, 6), (5, 7), (0, 4), (1, 5), (2, 6), (3, 7)];
+const EDGES: [(usize, usize); 12] = [(0, 1), (2, 3), (4, 5), (6, 7), (0, 2), (1, 3), (4, 6), (5, 7), (0, 4), (1, 5), (2, 6), (3, 7)];
 
 fn lattice(n: [usize; 3]) -> impl Iterator<Item = [usize; 3]> {
     (0..n[2]).flat_map(move |z| (0..n[1]).flat_map(move |y| (0..n[0]).map(move |x| [x, y, z])))

@@ -29,10 +29,7 @@ impl Affine {
     fn of(scale: Vector, pose: &Pose) -> Self {
         let unit = |x: f64, y: f64, z: f64| pose.turn.turn(Vector { x, y, z });
         let (a, b, c) = (unit(scale.x, 0.0, 0.0), unit(0.0, scale.y, 0.0), unit(0.0, 0.0, scale.z));
-        Self {
-            m: [Vector { x: a.x, y: b.x, z: c.x }, Vector { x: a.y, y: b.y, z: c.y }, Vector { x: a.z, y: b.z, z: c.z }],
-            t: pose.shift,
-        }
+        Self { m: [Vector { x: a.x, y: b.x, z: c.x }, Vector { x: a.y, y: b.y, z: c.y }, Vector { x: a.z, y: b.z, z: c.z }], t: pose.shift }
     }
 
     /// A rigid one.
@@ -138,9 +135,7 @@ impl Rig {
     fn joints(&self, t: f64) -> Vec<(Pose, Affine)> {
         let (share, mut tau) = self.clock.at(t);
         match &self.act {
-            Act::Mannequin(dance) => {
-                dance.joints(share, tau).into_iter().map(|pose| (pose, Affine::rigid(&pose))).collect()
-            }
+            Act::Mannequin(dance) => dance.joints(share, tau).into_iter().map(|pose| (pose, Affine::rigid(&pose))).collect(),
             Act::Clip { joints, clip, period } => {
                 if let Some(period) = period.filter(|p| *p > 0.0) {
                     tau -= period * floor(tau / period);

@@ -75,7 +75,9 @@ pub fn memory(scene: &Scene, assets: &Assets) -> f64 {
         }
         let end = scene.frame_time() * f64::from(scene.time.frames);
         bytes += match &thing.shape {
-            Shape::Mannequin(words) => crate::recipes::figure_bytes(crate::recipes::MANNEQUIN, end.min(words.start + words.settle + 10.0), words.rate),
+            Shape::Mannequin(words) => {
+                crate::recipes::figure_bytes(crate::recipes::MANNEQUIN, end.min(words.start + words.settle + 10.0), words.rate)
+            }
             Shape::Character(words) => {
                 assets.character(&words.path).map_or(0.0, |file| crate::recipes::figure_bytes(file.mesh.vertices.len(), end, words.rate))
             }

@@ -253,11 +253,7 @@ impl Stance {
         let beat = 1.0 - cowave(2.0 * t);
         let calm = 1.0 - spin;
         let middle = [0, 1].map(|k| 0.5 * (balls[0][k] + balls[1][k]));
-        s.0[HIPS] = [
-            middle[0] + 0.035 * sway,
-            middle[1] + super::BALL - 0.004 - 0.05 * spin,
-            0.903 - 0.009 * beat * calm + 0.034 * spin,
-        ];
+        s.0[HIPS] = [middle[0] + 0.035 * sway, middle[1] + super::BALL - 0.004 - 0.05 * spin, 0.903 - 0.009 * beat * calm + 0.034 * spin];
         s.0[PELVIS] = [0.0, -6.5 * sway, 6.0 * wave(0.5 * t) * calm];
         s.0[SPINE] = [0.0, 5.0 * sway, -3.0 * wave(0.5 * t) * calm];
         s.0[CHEST] = [-2.0 * spin, 4.0 * sway, -6.0 * wave(0.5 * t) * calm];
