@@ -41,7 +41,7 @@ pub fn surface(phi: &dyn Fn(Vector) -> f64, (low, high): (Vector, Vector), cell:
     }
     // Of each cell the vertex of each edge that is crossed.
     let mut numbers: HashMap<usize, [u32; 12]> = HashMap::new();
-    let mut mesh = Mesh::default();
+    let (mut mesh, mut quads) = (Mesh::default(), Vec::new());
     for i in lattice(n.map(|n| n - 1)) {
         let corner = |c: usize| -> [usize; 3] { std::array::from_fn(|k| i[k] + (c >> k & 1)) };
         let inside: [bool; 8] = std::array::from_fn(|c| values[index(corner(c))] < 0.0);
@@ -89,22 +89,28 @@ pub fn surface(phi: &dyn Fn(Vector) -> f64, (low, high): (Vector, Vector), cell:
             };
             let [Some(p), Some(q), Some(r), Some(s)] = [[1, 1], [0, 1], [0, 0], [1, 0]].map(around) else { continue };
             let [p, q, r, s] = if u { [p, q, r, s] } else { [s, r, q, p] };
-            let at = |i: u32| Vector::from(mesh.vertices[i as usize]);
-            // The shorter diagonal.
-            let short = (at(p) - at(r)).norm_sq() <= (at(q) - at(s)).norm_sq();
-            mesh.triangles.extend(if short { [[p, q, r], [p, r, s]] } else { [[q, r, s], [q, s, p]] });
+            quads.push([p, q, r, s]);
         }
     }
-    spread(phi, &mut mesh, cell);
+    spread(phi, &mut mesh.vertices, &quads, cell);
+    for [p, q, r, s] in quads {
+        let at = |i: u32| Vector::from(mesh.vertices[i as usize]);
+        // The shorter diagonal.
+        let short = (at(p) - at(r)).norm_sq() <= (at(q) - at(s)).norm_sq();
+        mesh.triangles.extend(if short { [[p, q, r], [p, r, s]] } else { [[q, r, s], [q, s, p]] });
+    }
     mesh
 }
 
 /// Each vertex goes half the way to the middle of its neighbours along the surface, then onto it.
-fn spread(phi: &dyn Fn(Vector) -> f64, mesh: &mut Mesh, cell: f64) {
-    let mut near = vec![Vec::new(); mesh.vertices.len()];
-    for ([a, b], _) in mesh.edges() {
-        near[a as usize].push(b);
-        near[b as usize].push(a);
+fn spread(phi: &dyn Fn(Vector) -> f64, vertices: &mut [[f64; 3]], quads: &[[u32; 4]], cell: f64) {
+    let mut near = vec![Vec::new(); vertices.len()];
+    for quad in quads {
+        for k in 0..4 {
+            let (a, b) = (quad[k], quad[(k + 1) % 4]);
+            near[a as usize].push(b);
+            near[b as usize].push(a);
+        }
     }
     let h = 1e-3 * cell;
     let slope = |p: Vector| {
@@ -112,8 +118,8 @@ fn spread(phi: &dyn Fn(Vector) -> f64, mesh: &mut Mesh, cell: f64) {
         Vector { x: d(h, 0.0, 0.0), y: d(0.0, h, 0.0), z: d(0.0, 0.0, h) } * (0.5 / h)
     };
     for round in 0..=ROUNDS {
-        let old: Vec<Vector> = mesh.vertices.iter().map(|v| Vector::from(*v)).collect();
-        for (i, vertex) in mesh.vertices.iter_mut().enumerate() {
+        let old: Vec<Vector> = vertices.iter().map(|v| Vector::from(*v)).collect();
+        for (i, vertex) in vertices.iter_mut().enumerate() {
             let mut p = old[i];
             let g = slope(p);
             if round < ROUNDS && !near[i].is_empty() {

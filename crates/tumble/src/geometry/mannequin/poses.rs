@@ -231,6 +231,8 @@ impl Stance {
             (1, 7.4, 7.9, [0.26, 0.0]),
         ];
         let mut s = Self::bind();
+        // What begins before the dance does, or ends after it.
+        let around = |a: f64, b: f64| bump(t - DANCE, a, b) + bump(t, a, b) + bump(t + DANCE, a, b);
         let spin = bump(t, 4.6, 7.0);
         let mut balls = [[0.09, -super::BALL], [-0.09, -super::BALL]];
         let (mut up, mut pitch) = ([0.0; 2], [26.0 * spin; 2]);
@@ -241,9 +243,9 @@ impl Stance {
                 balls[foot][k] += way[k] * u;
             }
             up[foot] += 0.045 * bump(t, a, b);
-            pitch[foot] += 16.0 * bump(t, a - 0.1, b - 0.05);
+            pitch[foot] += 16.0 * around(a - 0.1, b - 0.05);
             // The weight is on the other foot.
-            sway += bump(t, a - 0.12, b + 0.12) * if foot == 0 { -1.0 } else { 1.0 };
+            sway += around(a - 0.12, b + 0.12) * if foot == 0 { -1.0 } else { 1.0 };
         }
         // Feet close and one before the other while turning.
         for (foot, m) in [(0, 1.0), (1, -1.0)] {
