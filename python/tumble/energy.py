@@ -23,6 +23,7 @@ NOISE = 1e-3
 """Of the largest energy of a kind, what may be gained by rounding."""
 
 _GIVE = {"wind", "flock", "acceleration", "electric", "vortex", "turbulence", "propulsion"}
+_ALIVE = {"animated_mesh", "character", "mannequin"}
 _TAKE = {"drag", "wind", "viscosity", "flock", "propulsion"}
 
 
@@ -90,7 +91,7 @@ def _changes(value: Any) -> bool:
 
 
 def _moves(collider: Tree) -> bool:
-    return bool(collider["motion"]) or any(collider["belt"]) or "animated_mesh" in collider["shape"]
+    return bool(collider["motion"]) or any(collider["belt"]) or not _ALIVE.isdisjoint(collider["shape"])
 
 
 @dataclass(frozen=True)

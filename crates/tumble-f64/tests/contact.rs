@@ -150,7 +150,7 @@ fn sheet_on(shape: &str, scheme: Integrator) -> Simulation {
     let scene = Scene::from_toml(&text).unwrap();
     let ball = surface::sphere(4, vector(0.0, 0.0, 0.0), 0.4);
     let assets = Arc::new(HashMap::from([("ball.obj".to_string(), ball)]));
-    Simulation::new(scene, assets).unwrap()
+    Simulation::new(scene, assets.into()).unwrap()
 }
 
 #[test]

@@ -276,7 +276,7 @@ fn plate(z: f64) -> Mesh {
 fn with_meshes(text: &str, meshes: &[(&str, Mesh)]) -> Simulation {
     let scene = Scene::from_toml(&format!("version = 1\n{text}")).unwrap_or_else(|e| panic!("{e}\n{text}"));
     let assets: HashMap<String, Mesh> = meshes.iter().map(|(n, m)| (n.to_string(), m.clone())).collect();
-    Simulation::new(scene, Arc::new(assets)).unwrap_or_else(|e| panic!("{e}\n{text}"))
+    Simulation::new(scene, Arc::new(assets).into()).unwrap_or_else(|e| panic!("{e}\n{text}"))
 }
 
 /// A plate of triangles that rises carries and hits like a plane that rises.
@@ -355,7 +355,7 @@ fn thin_walls_hold() {
 }
 
 fn solid(shape: Shape, inside: bool, thickness: f64) -> Collider {
-    Collider { shape, inside, thickness, friction: 0.0, restitution: 0.0, belt: Vector::default(), motion: None }
+    Collider { shape, inside, thickness, friction: 0.0, restitution: 0.0, belt: Vector::default(), motion: None, rig: None }
 }
 
 fn facets(mesh: &Mesh) -> Facets {

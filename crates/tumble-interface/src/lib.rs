@@ -3,6 +3,8 @@
 //! Nothing here depends on the engine's scalar type, so the single- and the double-precision engine
 //! share it, and fronts (Python, command line, browser) see both through one [`engine::Engine`] trait.
 
+pub mod assets;
+pub mod character;
 pub mod check;
 pub mod engine;
 pub mod error;
@@ -11,6 +13,8 @@ pub mod mesh;
 pub mod scene;
 pub mod tree;
 
+pub use assets::Assets;
+pub use character::Character;
 pub use engine::Engine;
 pub use error::{Issue, SceneError, StepError};
 pub use frame::{Column, Data, Frame};

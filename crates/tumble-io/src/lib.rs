@@ -1,4 +1,4 @@
-//! Bytes of a mesh file in, a [`Mesh`] out; and volumes in, bytes of a VDB file out ([`vdb`]). Nothing here opens a file, so
+//! Bytes of a mesh file in, a [`Mesh`] or a [`Character`] out; and volumes in, bytes of a VDB file out ([`vdb`]). Nothing here opens a file, so
 //! the browser uses it too.
 //!
 //! What is common to all formats of meshes: coordinates are taken as they stand in the file (no axis is turned, no unit
@@ -12,10 +12,11 @@ mod build;
 mod glb;
 mod obj;
 mod ply;
+mod skin;
 mod stl;
 mod vdb;
 
-use tumble_interface::Mesh;
+use tumble_interface::{Character, Mesh};
 
 pub use vdb::{Class, Volume, vdb};
 
@@ -30,7 +31,7 @@ pub enum Format {
     Stl,
     /// Binary glTF 2.0 with its buffer inside, node transforms applied. **glTF is y-up**; the coordinates are left so.
     /// The format splits vertices at seams of normals and texture coordinates: within one mesh of one node, equal
-    /// positions are welded. Skins, morph targets and animations are ignored.
+    /// positions are welded. Skins, morph targets and animations are ignored: [`character`] reads them.
     Glb,
 }
 
@@ -71,6 +72,17 @@ pub fn mesh(bytes: &[u8], format: Format) -> Result<Mesh, String> {
         Format::Glb => glb::read(bytes),
     };
     read.and_then(build::finish).map_err(|message| format!("{}: {}", format.name(), one_line(&message)))
+}
+
+/// Reads a skinned figure with its movements from a GLB file, or from the text of a glTF file with its data inside.
+///
+/// The mesh is one as from [`mesh`]; every joint, bind and vertex that is named exists, parents come before children, the
+/// weights of each vertex add up to 1, all numbers are finite, times rise, and each track has as many values as it needs.
+///
+/// # Errors
+/// One line: what is wrong with the file, where, and what to do.
+pub fn character(bytes: &[u8]) -> Result<Character, String> {
+    skin::read(bytes).map_err(|message| format!("glTF: {}", one_line(&message)))
 }
 
 /// Longest message [characters]; the file may be quoted in it, and a line of a file may be of any length.

@@ -5,7 +5,7 @@ mod files;
 use files::*;
 use proptest::prelude::*;
 use proptest::sample::Index;
-use tumble_io::{Format, mesh};
+use tumble_io::{Format, character, mesh};
 
 /// A file of every kind, with the formats that may read it.
 fn valid() -> Vec<(Vec<u8>, Format)> {
@@ -28,6 +28,30 @@ fn read(bytes: &[u8], format: Format) {
             assert!(mesh.vertices.iter().flatten().all(|x| x.is_finite()));
             assert!(mesh.triangles.iter().flatten().all(|i| (*i as usize) < mesh.vertices.len()));
             mesh.defects();
+        }
+        Err(message) => assert!(!message.is_empty() && !message.contains('\n') && message.chars().count() < 320, "{message}"),
+    }
+}
+
+/// Reads a figure; whatever comes out keeps the promises of [`character`].
+fn read_character(bytes: &[u8]) {
+    match character(bytes) {
+        Ok(c) => {
+            let (joints, binds) = (c.joints.len(), c.binds.len());
+            assert!(!c.mesh.triangles.is_empty() && c.skin.len() == c.mesh.vertices.len());
+            assert!(c.mesh.triangles.iter().flatten().all(|i| (*i as usize) < c.mesh.vertices.len()));
+            assert!(c.joints.iter().enumerate().all(|(i, j)| j.parent.is_none_or(|p| (p as usize) < i)));
+            assert!(c.binds.iter().all(|b| (b.joint as usize) < joints && b.inverse.iter().flatten().all(|x| x.is_finite())));
+            for four in &c.skin {
+                assert!(four.iter().all(|f| (f.bind as usize) < binds && f.weight >= 0.0));
+                assert!((four.iter().map(|f| f.weight).sum::<f64>() - 1.0).abs() < 1e-12);
+            }
+            for track in c.clips.iter().flat_map(|c| &c.tracks) {
+                assert!((track.joint as usize) < joints && !track.times.is_empty());
+                assert!(track.times.windows(2).all(|t| t[0] < t[1]) && track.values.iter().flatten().all(|x| x.is_finite()));
+                let each = if track.between == tumble_interface::character::Between::Cubic { 3 } else { 1 };
+                assert_eq!(track.values.len(), each * track.times.len());
+            }
         }
         Err(message) => assert!(!message.is_empty() && !message.contains('\n') && message.chars().count() < 320, "{message}"),
     }
@@ -110,6 +134,22 @@ fn every_single_byte_at_either_end_of_its_range_is_survived() {
     }
 }
 
+#[test]
+fn every_truncation_and_byte_of_a_figure_is_survived() {
+    let bytes = arm();
+    assert!(character(&bytes).is_ok());
+    for end in 0..bytes.len() {
+        read_character(&bytes[..end]);
+    }
+    for at in 0..bytes.len() {
+        for byte in [0, 0x7f, 0x80, 0xff, b'9', bytes[at] ^ 1] {
+            let mut changed = bytes.clone();
+            changed[at] = byte;
+            read_character(&changed);
+        }
+    }
+}
+
 proptest! {
     #![proptest_config(ProptestConfig { cases: 4000, failure_persistence: None, ..ProptestConfig::default() })]
 
@@ -146,6 +186,18 @@ proptest! {
             apply(&mut json, change);
         }
         read(&glb(&String::from_utf8_lossy(&json), &glb_buffer()), Format::Glb);
+    }
+
+    #[test]
+    fn changed_figures_are_survived(changes in prop::collection::vec(change(), 1..8)) {
+        let (mut json, mut bytes) = (arm_json("").into_bytes(), arm());
+        for change in &changes {
+            apply(&mut json, change);
+            apply(&mut bytes, change);
+        }
+        read_character(&bytes);
+        read_character(&json);
+        read_character(&glb(&String::from_utf8_lossy(&json), &arm_buffer()));
     }
 
     /// Any number in the JSON replaced: still well-formed, so counts, offsets and indices are believed as far as they can be.

@@ -6,9 +6,8 @@ use pyo3::prelude::*;
 use pyo3::types::{PyBool, PyDict, PyFloat, PyInt, PyList, PyString, PyTuple};
 use std::collections::HashMap;
 use std::path::{Path, PathBuf};
-use std::sync::Arc;
 use tumble_interface::tree::{Node, Value};
-use tumble_interface::{Issue, Mesh, SceneError};
+use tumble_interface::{Assets, Character, Issue, Mesh, SceneError};
 use tumble_io::Format;
 use twox_hash::XxHash3_64;
 
@@ -17,7 +16,7 @@ use twox_hash::XxHash3_64;
 #[derive(Clone)]
 pub struct Scene {
     pub scene: tumble_interface::Scene,
-    pub assets: Arc<HashMap<String, Mesh>>,
+    pub assets: Assets,
     pub folder: PathBuf,
     /// The tree as it was given, for overrides and for the lines of issues.
     node: Node,
@@ -28,7 +27,7 @@ impl Scene {
         let result = py.detach(|| -> Result<Self, SceneError> {
             let mut scene = tumble_interface::Scene::from_tree(&node)?;
             let assets = load_assets(&mut scene, &folder)?;
-            Ok(Self { scene, assets: Arc::new(assets), folder, node: node.clone() })
+            Ok(Self { scene, assets: Assets::new(assets.meshes, assets.characters), folder, node: node.clone() })
         });
         result.map_err(|e| scene_error(py, &with_lines(e, &node)))
     }
@@ -145,17 +144,33 @@ fn to_node(value: &Bound<'_, PyAny>, path: &str, depth: usize) -> Result<Node, S
     Ok(value_of.into())
 }
 
+/// The files that a scene names, by path.
+#[derive(Default)]
+struct Files {
+    meshes: HashMap<String, Mesh>,
+    characters: HashMap<String, Character>,
+}
+
 /// Reads every mesh file that the scene names, once, and notes the hash of its content.
-fn load_assets(scene: &mut tumble_interface::Scene, folder: &Path) -> Result<HashMap<String, Mesh>, SceneError> {
-    let (mut assets, mut hashes, mut issues) = (HashMap::new(), HashMap::new(), Vec::new());
+fn load_assets(scene: &mut tumble_interface::Scene, folder: &Path) -> Result<Files, SceneError> {
+    let (mut assets, mut hashes, mut issues) = (Files::default(), HashMap::new(), Vec::new());
     for file in scene.mesh_files_mut() {
-        let place = &file.place;
-        if !assets.contains_key(file.path) {
-            match read_mesh(&folder.join(file.path)) {
-                Ok((mesh, hash)) => {
-                    assets.insert(file.path.to_string(), mesh);
-                    hashes.insert(file.path.to_string(), hash);
-                }
+        let (place, path) = (&file.place, folder.join(file.path));
+        let known = if file.skinned { assets.characters.contains_key(file.path) } else { assets.meshes.contains_key(file.path) };
+        if !known {
+            let read = if file.skinned {
+                read_character(&path).map(|(character, hash)| {
+                    assets.characters.insert(file.path.to_string(), character);
+                    hash
+                })
+            } else {
+                read_mesh(&path).map(|(mesh, hash)| {
+                    assets.meshes.insert(file.path.to_string(), mesh);
+                    hash
+                })
+            };
+            match read {
+                Ok(hash) => drop(hashes.insert(file.path.to_string(), hash)),
                 Err(message) => {
                     issues.push(Issue::new(format!("{place}.path"), message));
                     continue;
@@ -180,6 +195,12 @@ fn read_mesh(path: &Path) -> Result<(Mesh, String), String> {
     let bytes = std::fs::read(path).map_err(|e| errors::file_error(path, &e))?;
     let mesh = tumble_io::mesh(&bytes, format).map_err(|e| format!("\"{}\": {e}", path.display()))?;
     Ok((mesh, format!("{:016x}", XxHash3_64::oneshot(&bytes))))
+}
+
+fn read_character(path: &Path) -> Result<(Character, String), String> {
+    let bytes = std::fs::read(path).map_err(|e| errors::file_error(path, &e))?;
+    let character = tumble_io::character(&bytes).map_err(|e| format!("\"{}\": {e}", path.display()))?;
+    Ok((character, format!("{:016x}", XxHash3_64::oneshot(&bytes))))
 }
 
 /// Vertices n x 3 and triangles m x 3 of a mesh file.

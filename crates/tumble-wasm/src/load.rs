@@ -1,13 +1,13 @@
 //! From text and bytes to a world, within what a browser can hold.
 
-use crate::engine::scene::{Assets, Simulation, memory};
+use crate::engine::scene::{Simulation, memory};
 use crate::failure::Failure;
 use serde::Serialize;
 use std::collections::HashMap;
 use std::sync::Arc;
 use tumble_interface::engine::Engine;
 use tumble_interface::tree::Node;
-use tumble_interface::{Issue, Mesh, Scene, SceneError};
+use tumble_interface::{Assets, Character, Issue, Mesh, Scene, SceneError};
 use tumble_io::Format;
 use twox_hash::XxHash3_64;
 
@@ -32,8 +32,15 @@ pub struct Loaded {
     memory: f64,
 }
 
-/// Meshes with the hash of their files.
-type Files = Arc<HashMap<String, (Mesh, String)>>;
+/// What is in a file: a mesh or the reason why there is none, for glTF also a character, and the hash of its content.
+struct Read {
+    mesh: Result<Mesh, String>,
+    character: Result<Character, String>,
+    hash: String,
+}
+
+/// The files of a page.
+type Files = Arc<HashMap<String, Read>>;
 
 /// The tree of a scene, in TOML or JSON, with its overrides.
 pub fn tree(text: &str, overrides: &[String]) -> Result<Node, SceneError> {
@@ -55,9 +62,16 @@ impl Loaded {
         let mut meshes = HashMap::new();
         for (path, bytes) in files {
             let wrong = |message: String| SceneError::one("", format!("\"{path}\": {message}"));
-            let format = Format::from_path(&path).ok_or_else(|| wrong("it has none of the suffixes .obj, .ply, .stl, .glb".into()))?;
-            let mesh = tumble_io::mesh(&bytes, format).map_err(|e| wrong(e.to_string()))?;
-            meshes.insert(path, (mesh, format!("{:016x}", XxHash3_64::oneshot(&bytes))));
+            let hash = format!("{:016x}", XxHash3_64::oneshot(&bytes));
+            let format = Format::from_path(&path);
+            let skinned = format == Some(Format::Glb) || path.to_lowercase().ends_with(".gltf");
+            let none = "it has none of the suffixes .obj, .ply, .stl, .glb";
+            let mesh = format.map_or_else(|| Err(none.into()), |format| tumble_io::mesh(&bytes, format));
+            let character = if skinned { tumble_io::character(&bytes) } else { Err("it has none of the suffixes .glb, .gltf".into()) };
+            if let (Err(e), Err(_)) = (&mesh, &character) {
+                return Err(wrong(e.clone()).into());
+            }
+            meshes.insert(path, Read { mesh, character, hash });
         }
         Self::build(tree(toml, overrides)?, Arc::new(meshes))
     }
@@ -178,9 +192,9 @@ fn with_lines(mut error: SceneError, node: &Node) -> SceneError {
 
 /// The meshes that the scene names, with the hashes of their content noted; or what is missing.
 fn assets(scene: &mut Scene, files: &Files) -> Result<Assets, (SceneError, Vec<String>)> {
-    let (mut assets, mut issues, mut missing) = (HashMap::new(), Vec::new(), Vec::new());
+    let (mut meshes, mut characters, mut issues, mut missing) = (HashMap::new(), HashMap::new(), Vec::new(), Vec::new());
     for file in scene.mesh_files_mut() {
-        let Some((mesh, hash)) = files.get(file.path) else {
+        let Some(Read { mesh, character, hash }) = files.get(file.path) else {
             issues.push(Issue::new(format!("{}.path", file.place), format!("there is no file \"{}\"; drop it on the page", file.path)));
             if !missing.iter().any(|path| path == file.path) {
                 missing.push(file.path.to_string());
@@ -193,7 +207,15 @@ fn assets(scene: &mut Scene, files: &Files) -> Result<Assets, (SceneError, Vec<S
             issues.push(Issue::new(format!("{}.hash", file.place), message));
         }
         *file.hash = Some(hash.clone());
-        assets.insert(file.path.to_string(), mesh.clone());
+        let path = file.path.to_string();
+        let read = if file.skinned {
+            character.clone().map(|character| drop(characters.insert(path, character)))
+        } else {
+            mesh.clone().map(|mesh| drop(meshes.insert(path, mesh)))
+        };
+        if let Err(message) = read {
+            issues.push(Issue::new(format!("{}.path", file.place), format!("\"{}\": {message}", file.path)));
+        }
     }
-    if issues.is_empty() { Ok(Arc::new(assets)) } else { Err((SceneError { issues }, missing)) }
+    if issues.is_empty() { Ok(Assets::new(meshes, characters)) } else { Err((SceneError { issues }, missing)) }
 }

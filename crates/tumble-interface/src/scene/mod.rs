@@ -26,7 +26,7 @@ pub use gas::{
 pub use grids::GridBox;
 pub use heat::{Heat, HeatRegion, HeatScheme, HeatSide, HeatSides, HeatSource};
 pub use output::{Camera, Expect, Look, Output, Probe};
-pub use shapes::{Collider, MeshFile, MeshFrame, MeshFrames, MeshRef, Motion, Pace, Pose, Shape};
+pub use shapes::{Collider, Figure, Mannequin, MeshFile, MeshFrame, MeshFrames, MeshRef, Motion, Moves, Pace, Pose, Shape};
 pub use structures::{
     Block, Cloud, CloudShape, Diagonals, Follow, Galaxy, Halo, Link, LinkSettings, Links, Material, Net, Particles, Pin, Profile, Region,
     Rod, Rope, Sheet, Spring,
@@ -252,10 +252,10 @@ impl Scene {
         1.0 / self.time.fps
     }
 
-    /// Meshes that the scene names, in order of appearance.
+    /// Meshes and characters that the scene names, in order of appearance.
     pub fn mesh_files_mut(&mut self) -> Vec<MeshRef<'_>> {
         fn one(place: String, file: &mut MeshFile) -> MeshRef<'_> {
-            MeshRef { place, path: &file.path, hash: &mut file.hash }
+            MeshRef { skinned: false, place, path: &file.path, hash: &mut file.hash }
         }
         let mut all: Vec<MeshRef<'_>> = Vec::new();
         all.extend(self.net.iter_mut().map(|n| one(format!("net \"{}\".mesh", n.name), &mut n.mesh)));
@@ -266,10 +266,14 @@ impl Scene {
                 Shape::AnimatedMesh(mesh) => {
                     let frames = mesh.frames.iter_mut().enumerate();
                     all.extend(frames.map(|(i, f)| MeshRef {
+                        skinned: false,
                         place: format!("{place}.animated_mesh.frames[{i}]"),
                         path: &f.path,
                         hash: &mut f.hash,
                     }));
+                }
+                Shape::Character(file) => {
+                    all.push(MeshRef { skinned: true, place: format!("{place}.character"), path: &file.path, hash: &mut file.hash });
                 }
                 _ => {}
             }

@@ -138,6 +138,99 @@ pub fn glb_json(nodes: &str, scene: &str) -> String {
     )
 }
 
+/// Bytes of the arm: a prism of three rings along z, carried by two bones, and three clips. All numbers are floats but indices and joints.
+pub fn arm_buffer() -> Vec<u8> {
+    let mut bytes = Vec::new();
+    let floats = |bytes: &mut Vec<u8>, all: &[f32]| all.iter().for_each(|x| bytes.extend(x.to_le_bytes()));
+    // 0: nine positions.
+    for z in [0.0, 1.0, 2.0] {
+        floats(&mut bytes, &[0.2, 0.0, z, -0.1, 0.2, z, -0.1, -0.2, z]);
+    }
+    // 108: triangles of two sides of three quadrilaterals, and two ends, as u16; 108 bytes.
+    let mut triangles = vec![[0_u16, 2, 1], [6, 7, 8]];
+    for ring in [0, 3] {
+        for k in 0..3 {
+            let (a, b) = (ring + k, ring + (k + 1) % 3);
+            triangles.extend([[a, b, b + 3], [a, b + 3, a + 3]]);
+        }
+    }
+    bytes.extend(triangles.as_flattened().iter().flat_map(|i| i.to_le_bytes()));
+    bytes.resize(192, 0);
+    // 192: joints as u8, 216 + 12: weights.
+    for ring in 0..3 {
+        for _ in 0..3 {
+            bytes.extend(if ring == 1 { [0_u8, 1, 0, 0] } else { [ring / 2, 0, 0, 0] });
+        }
+    }
+    for ring in 0..3 {
+        for _ in 0..3 {
+            floats(&mut bytes, if ring == 1 { &[0.5, 0.5, 0.0, 0.0] } else { &[1.0, 0.0, 0.0, 0.0] });
+        }
+    }
+    // 372: inverse bind matrices, by columns: the elbow is 1 up.
+    for z in [0.0, -1.0] {
+        floats(&mut bytes, &[1.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, z, 1.0]);
+    }
+    // 500: times 0 and 2; 508: two turns, 0 and 90 degrees about x; 540: two movements.
+    let half = std::f32::consts::FRAC_1_SQRT_2;
+    floats(&mut bytes, &[0.0, 2.0]);
+    floats(&mut bytes, &[0.0, 0.0, 0.0, 1.0, half, 0.0, 0.0, half]);
+    floats(&mut bytes, &[0.0, 0.0, 0.0, 1.0, 2.0, 3.0]);
+    // 564: the same movements with rates of 1 along x before and after.
+    floats(&mut bytes, &[0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 1.0, 0.0, 0.0, 1.0, 2.0, 3.0, 0.0, 0.0, 0.0]);
+    bytes
+}
+
+/// JSON of the arm; `buffer` is what the buffer says of itself beside its length.
+pub fn arm_json(buffer: &str) -> String {
+    let length = arm_buffer().len();
+    format!(
+        r#"{{"asset": {{"version": "2.0"}}, "scene": 0, "scenes": [{{"nodes": [3]}}],
+        "nodes": [{{"name": "upper", "children": [1]}}, {{"name": "lower", "translation": [0, 0, 1]}},
+                  {{"mesh": 0, "skin": 0, "translation": [9, 9, 9]}}, {{"name": "figure", "children": [2, 0]}}],
+        "skins": [{{"joints": [0, 1], "inverseBindMatrices": 4}}],
+        "meshes": [{{"primitives": [{{"attributes": {{"POSITION": 0, "JOINTS_0": 2, "WEIGHTS_0": 3}}, "indices": 1}}]}}],
+        "animations": [
+          {{"name": "bend", "samplers": [{{"input": 5, "output": 6}}], "channels": [{{"sampler": 0, "target": {{"node": 1, "path": "rotation"}}}}]}},
+          {{"name": "jump", "samplers": [{{"input": 5, "output": 7, "interpolation": "STEP"}}],
+            "channels": [{{"sampler": 0, "target": {{"node": 3, "path": "translation"}}}}]}},
+          {{"samplers": [{{"input": 5, "output": 8, "interpolation": "CUBICSPLINE"}}],
+            "channels": [{{"sampler": 0, "target": {{"node": 3, "path": "translation"}}}}]}}],
+        "accessors": [{{"bufferView": 0, "componentType": 5126, "count": 9, "type": "VEC3"}},
+                      {{"bufferView": 1, "componentType": 5123, "count": 42, "type": "SCALAR"}},
+                      {{"bufferView": 2, "componentType": 5121, "count": 9, "type": "VEC4"}},
+                      {{"bufferView": 3, "componentType": 5126, "count": 9, "type": "VEC4"}},
+                      {{"bufferView": 4, "componentType": 5126, "count": 2, "type": "MAT4"}},
+                      {{"bufferView": 5, "componentType": 5126, "count": 2, "type": "SCALAR"}},
+                      {{"bufferView": 6, "componentType": 5126, "count": 2, "type": "VEC4"}},
+                      {{"bufferView": 7, "componentType": 5126, "count": 2, "type": "VEC3"}},
+                      {{"bufferView": 8, "componentType": 5126, "count": 6, "type": "VEC3"}}],
+        "bufferViews": [{{"buffer": 0, "byteLength": 108}}, {{"buffer": 0, "byteOffset": 108, "byteLength": 84}},
+                        {{"buffer": 0, "byteOffset": 192, "byteLength": 36}}, {{"buffer": 0, "byteOffset": 228, "byteLength": 144}},
+                        {{"buffer": 0, "byteOffset": 372, "byteLength": 128}}, {{"buffer": 0, "byteOffset": 500, "byteLength": 8}},
+                        {{"buffer": 0, "byteOffset": 508, "byteLength": 32}}, {{"buffer": 0, "byteOffset": 540, "byteLength": 24}},
+                        {{"buffer": 0, "byteOffset": 564, "byteLength": 72}}],
+        "buffers": [{{{buffer} "byteLength": {length}}}]}}"#
+    )
+}
+
+/// A skinned and animated arm as GLB.
+pub fn arm() -> Vec<u8> {
+    glb(&arm_json(""), &arm_buffer())
+}
+
+/// Bytes as base64.
+pub fn base64(bytes: &[u8]) -> String {
+    const SIGNS: &[u8; 64] = b"ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
+    let mut text = String::new();
+    for three in bytes.chunks(3) {
+        let word = three.iter().fold(0_u32, |w, b| w << 8 | u32::from(*b)) << (8 * (3 - three.len()));
+        let signs = (0..4).map(|k| if k <= three.len() { SIGNS[(word >> (18 - 6 * k)) as usize & 63] as char } else { '=' });
+        text.extend(signs);
+    }
+    text
+}
+
 pub fn glb_tetrahedron(nodes: &str, scene: &str) -> Vec<u8> {
     glb(&glb_json(nodes, scene), &glb_buffer())
 }

@@ -1,7 +1,8 @@
 //! Where masses touch solids. Candidates come from here for every method; each method resolves them its own way.
 
 use super::motion::{Pose, Twist};
-use super::{Motion, Shape, Vector};
+use super::{Motion, Rig, Shape, Vector};
+use std::sync::Arc;
 
 /// A solid turns less than this while the way of a mass past it counts as straight [rad].
 const TURN: f64 = 0.25;
@@ -25,6 +26,8 @@ pub struct Collider {
     pub belt: Vector,
     /// How it moves; `None` if it does not.
     pub motion: Option<Motion>,
+    /// Its bones, if it is a figure.
+    pub rig: Option<Arc<Rig>>,
 }
 
 /// A mass within the thickness of a solid.
@@ -54,19 +57,13 @@ impl Collider {
         self.motion.as_ref().map(|m| m.at(t))
     }
 
-    /// Names of its bones.
-    pub fn bones(&self) -> Vec<&str> {
-        Vec::new()
-    }
-
-    /// The bone of that name.
-    pub fn bone(&self, name: &str) -> Option<usize> {
-        self.bones().iter().position(|bone| *bone == name)
-    }
-
     /// Where it is at time t as a rigid whole, or where one of its bones is.
-    pub fn pose(&self, _bone: Option<usize>, t: f64) -> Pose {
-        self.at(t).map_or(Pose::default(), |(pose, _)| pose)
+    pub fn pose(&self, bone: Option<usize>, t: f64) -> Pose {
+        let place = match bone {
+            Some(bone) => self.bone_pose(bone, t),
+            None => self.at(t),
+        };
+        place.map_or(Pose::default(), |(pose, _)| pose)
     }
 
     fn near(&self, local: Vector, t: f64, within: f64) -> (f64, Vector, Vector) {
@@ -155,6 +152,28 @@ impl Collider {
             (a, before) = (b, time);
         }
         None
+    }
+
+    /// Names of its bones; none if it is no figure.
+    pub fn bones(&self) -> &[String] {
+        self.rig.as_ref().map_or(&[], |rig| &rig.names)
+    }
+
+    /// The bone of a name, for [`bone_pose`](Self::bone_pose).
+    pub fn bone(&self, name: &str) -> Option<usize> {
+        self.rig.as_ref()?.bone(name)
+    }
+
+    /// Where a bone is at time t, and how it moves: what is tied to it at p0 when t = 0 is at `pose.out(start.back(p0))`, with the velocity
+    /// `twist.at` there. A function of time alone.
+    pub fn bone_pose(&self, bone: usize, t: f64) -> Option<(Pose, Twist)> {
+        let (pose, twist) = self.rig.as_ref()?.moving(bone, t)?;
+        let Some((whole, course)) = self.at(t) else { return Some((pose, twist)) };
+        // v = course at x, and the turned velocity in the frame of the figure.
+        let angular = whole.turn.turn(twist.angular);
+        let linear = whole.turn.turn(twist.linear) - angular.cross(whole.shift) + course.linear;
+        let pose = Pose { turn: whole.turn * pose.turn, shift: whole.out(pose.shift) };
+        Some((pose, Twist { linear, angular: angular + course.angular }))
     }
 
     /// Whether it, or its surface, ever moves.

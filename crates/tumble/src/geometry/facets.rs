@@ -6,21 +6,26 @@
 
 use super::Vector;
 use super::bvh::{Feature, Node, build, closest_on_triangle, high, low};
-use crate::math::functions::acos;
+use crate::math::functions::{acos, floor};
+use rayon::prelude::*;
 use tumble_interface::Mesh;
 
 /// Triangles with keyframes.
 #[derive(Debug, Clone)]
 pub struct Facets {
     nodes: Vec<Node>,
-    /// Of each interval the lower and upper corner of every node.
-    boxes: Vec<Vec<(Vector, Vector)>>,
+    /// Of each interval the lower and upper corner of every node, rounded outward.
+    boxes: Vec<Vec<[[f32; 3]; 2]>>,
     triangles: Vec<[u32; 3]>,
     /// Triangles around vertex v: `around[first[v]..first[v + 1]]`.
     first: Vec<u32>,
     around: Vec<u32>,
     times: Vec<f64>,
     frames: Vec<Vec<Vector>>,
+    /// Of each interval where nothing of the mesh comes, and nothing is within it.
+    apart: Vec<Apart>,
+    /// Where the last keyframe goes on: a time among `times`, and how far everything has gone from there [m].
+    back: Option<(f64, Vector)>,
 }
 
 /// Where a time lies among the keyframes.
@@ -31,6 +36,10 @@ struct Moment {
     s: f64,
     /// Its rate [1/s].
     rate: f64,
+    /// Movement of all keyframes since the first round [m].
+    gone: Vector,
+    /// Time less that on the list of keyframes [s].
+    past: f64,
 }
 
 /// The closest point of a mesh.
@@ -73,11 +82,15 @@ impl Facets {
     /// counts of vertices differ.
     pub fn new(meshes: &[&Mesh], times: &[f64]) -> Option<Self> {
         let frames: Vec<Vec<Vector>> = meshes.iter().map(|m| m.vertices.iter().map(|v| Vector::from(*v)).collect()).collect();
+        Self::of(meshes.first()?.triangles.clone(), frames, times.to_vec(), None)
+    }
+
+    /// Keyframes of vertices [m] at rising times; after the last it goes on from a time in `back`, moved as much as that says [m].
+    pub fn of(mut triangles: Vec<[u32; 3]>, frames: Vec<Vec<Vector>>, times: Vec<f64>, back: Option<(f64, Vector)>) -> Option<Self> {
         let start = frames.first()?;
         if times.len() != frames.len() || frames.iter().any(|f| f.len() != start.len()) {
             return None;
         }
-        let mut triangles = meshes.first()?.triangles.clone();
         if triangles.is_empty() || triangles.iter().flatten().any(|i| *i as usize >= start.len()) {
             return None;
         }
@@ -99,25 +112,28 @@ impl Facets {
                 next[*i as usize] += 1;
             }
         }
-        let mut facets = Self { nodes, boxes: Vec::new(), triangles, first, around, times: times.to_vec(), frames };
-        let pairs = (0..facets.frames.len().saturating_sub(1).max(1)).map(|k| facets.refit(k)).collect();
+        let mut facets = Self { nodes, boxes: Vec::new(), triangles, first, around, times, frames, apart: Vec::new(), back };
+        let pairs = (0..facets.frames.len().saturating_sub(1).max(1)).into_par_iter().map(|k| facets.refit(k)).collect();
         facets.boxes = pairs;
+        let apart = facets.boxes.par_iter().map(|boxes| Apart::new(&facets.nodes, boxes)).collect();
+        facets.apart = apart;
         Some(facets)
     }
 
     /// The boxes of an interval: they hold both ends, and so all between.
-    fn refit(&self, k: usize) -> Vec<(Vector, Vector)> {
+    fn refit(&self, k: usize) -> Vec<[[f32; 3]; 2]> {
         let (a, b) = (&self.frames[k], &self.frames[(k + 1).min(self.frames.len() - 1)]);
-        let mut boxes = vec![(Vector::default(), Vector::default()); self.nodes.len()];
+        let mut boxes = vec![[[0.0; 3]; 2]; self.nodes.len()];
         for (i, node) in self.nodes.iter().enumerate().rev() {
             boxes[i] = if node.count == 0 {
-                let (left, right) = (boxes[i + 1], boxes[node.next as usize]);
-                (low(left.0, right.0), high(left.1, right.1))
+                let ([a, b], [c, d]) = (boxes[i + 1], boxes[node.next as usize]);
+                [std::array::from_fn(|k| f32::min(a[k], c[k])), std::array::from_fn(|k| f32::max(b[k], d[k]))]
             } else {
                 let range = node.next as usize..(node.next + node.count) as usize;
                 let corners = self.triangles[range].iter().flatten().flat_map(|v| [a[*v as usize], b[*v as usize]]);
                 let none = Vector { x: f64::INFINITY, y: f64::INFINITY, z: f64::INFINITY };
-                corners.fold((none, -none), |(l, h), p| (low(l, p), high(h, p)))
+                let (l, h) = corners.fold((none, -none), |(l, h), p| (low(l, p), high(h, p)));
+                [<[f64; 3]>::from(l).map(|x| (x as f32).next_down()), <[f64; 3]>::from(h).map(|x| (x as f32).next_up())]
             };
         }
         boxes
@@ -125,15 +141,37 @@ impl Facets {
 
     fn moment(&self, t: f64) -> Moment {
         let last = self.boxes.len() - 1;
+        let (t, past, gone) = self.round(t);
         let next = self.times.partition_point(|x| *x <= t);
+        let still = |interval, s| Moment { interval, s, rate: 0.0, gone, past };
         if next == 0 || self.frames.len() < 2 {
-            return Moment { interval: 0, s: 0.0, rate: 0.0 };
+            return still(0, 0.0);
         }
         if next == self.times.len() {
-            return Moment { interval: last, s: 1.0, rate: 0.0 };
+            return still(last, 1.0);
         }
         let span = self.times[next] - self.times[next - 1];
-        Moment { interval: next - 1, s: (t - self.times[next - 1]) / span, rate: 1.0 / span }
+        Moment { interval: next - 1, s: (t - self.times[next - 1]) / span, rate: 1.0 / span, gone, past }
+    }
+
+    /// The time on the list of keyframes, what it is less, and how far all has gone since.
+    fn round(&self, t: f64) -> (f64, f64, Vector) {
+        if let (Some((from, gone)), Some(last)) = (self.back, self.times.last())
+            && t >= *last
+            && *last > from
+        {
+            let n = floor((t - from) / (last - from));
+            let past = n * (last - from);
+            return (t - past, past, gone * n);
+        }
+        (t, 0.0, Vector::default())
+    }
+
+    /// The first keyframe after a time.
+    fn next_key(&self, t: f64) -> Option<f64> {
+        // A key as near as round-off is the one at which t is.
+        let (local, past, _) = self.round(t + 1e-12 * (1.0 + t.abs()));
+        self.times.get(self.times.partition_point(|x| *x <= local)).map(|x| x + past)
     }
 
     fn vertex(&self, m: Moment, i: u32) -> Vector {
@@ -148,15 +186,22 @@ impl Facets {
 
     /// Lower and upper corner of everything at all times [m].
     pub fn bounds(&self) -> (Vector, Vector) {
-        let all = self.boxes.iter().map(|b| b[0]);
         let none = Vector { x: f64::INFINITY, y: f64::INFINITY, z: f64::INFINITY };
-        all.fold((none, -none), |(l, h), b| (low(l, b.0), high(h, b.1)))
+        if self.back.is_some_and(|(_, gone)| gone != Vector::default()) {
+            return (-none, none);
+        }
+        self.frames.iter().flatten().fold((none, -none), |(l, h), p| (low(l, *p), high(h, *p)))
+    }
+
+    /// The triangles, in the order of the tree.
+    pub fn triangles(&self) -> &[[u32; 3]] {
+        &self.triangles
     }
 
     /// Vertices at time t [m].
     pub fn vertices(&self, t: f64) -> Vec<[f64; 3]> {
         let m = self.moment(t);
-        (0..self.frames[0].len() as u32).map(|i| self.vertex(m, i).into()).collect()
+        (0..self.frames[0].len() as u32).map(|i| (self.vertex(m, i) + m.gone).into()).collect()
     }
 
     /// Largest speed of a vertex [m/s].
@@ -199,22 +244,42 @@ impl Facets {
         &self.around[self.first[v as usize] as usize..self.first[v as usize + 1] as usize]
     }
 
+    /// Whether p is certain to be outside a closed mesh at time t; what is close to it never is certain.
+    pub fn apart(&self, p: Vector, t: f64) -> bool {
+        let m = self.moment(t);
+        self.apart[m.interval].holds(p - m.gone)
+    }
+
     /// The closest point to p at time t, if one lies nearer than `within` [m].
     pub fn nearest(&self, p: Vector, t: f64, within: f64) -> Option<Nearest> {
         let m = self.moment(t);
+        let p = p - m.gone;
         let boxes = &self.boxes[m.interval];
         let mut limit = within * within;
         let mut best = None;
-        let mut stack = vec![0_usize];
-        while let Some(i) = stack.pop() {
-            if distance_sq(boxes[i], p) >= limit {
+        // The tree halves its triangles: it is never deeper than this.
+        let mut stack = [(0_u32, 0.0_f64); 64];
+        let mut n = 1;
+        stack[0].1 = distance_sq(&boxes[0], p);
+        while n > 0 {
+            n -= 1;
+            let (i, far) = stack[n];
+            if far >= limit {
                 continue;
             }
-            let node = &self.nodes[i];
+            let node = &self.nodes[i as usize];
             if node.count == 0 {
-                let (left, right) = (i + 1, node.next as usize);
-                let near = distance_sq(boxes[left], p) <= distance_sq(boxes[right], p);
-                stack.extend(if near { [right, left] } else { [left, right] });
+                let (left, right) = (i + 1, node.next);
+                let (a, b) = (distance_sq(&boxes[left as usize], p), distance_sq(&boxes[right as usize], p));
+                let (near, other) = if a <= b { ((left, a), (right, b)) } else { ((right, b), (left, a)) };
+                if other.1 < limit {
+                    stack[n] = other;
+                    n += 1;
+                }
+                if near.1 < limit {
+                    stack[n] = near;
+                    n += 1;
+                }
                 continue;
             }
             for k in node.next as usize..(node.next + node.count) as usize {
@@ -247,7 +312,7 @@ impl Facets {
             }
         };
         let velocity = self.velocity(m, k, Self::weights(point, corners));
-        Some(Nearest { point, normal, velocity, distance: limit.sqrt() })
+        Some(Nearest { point: point + m.gone, normal, velocity, distance: limit.sqrt() })
     }
 
     /// The first passage of a point that goes straight from a at time t0 to b at t1. `slack` [m] is the round-off of a:
@@ -257,7 +322,7 @@ impl Facets {
         let part = |t: f64| if t1 > t0 { (t - t0) / (t1 - t0) } else { 0.0 };
         loop {
             // Straight until the next keyframe.
-            let cut = self.times.iter().copied().find(|t| *t > from && *t < t1).unwrap_or(t1);
+            let cut = self.next_key(from).filter(|t| *t < t1).unwrap_or(t1);
             let (s0, s1) = (part(from), if cut == t1 { 1.0 } else { part(cut) });
             let (p, q) = (a + (b - a) * s0, a + (b - a) * s1);
             if let Some(mut found) = self.piece(p, q, (from, cut), sides, slack) {
@@ -275,7 +340,8 @@ impl Facets {
         // Both ends within one interval; the middle says which.
         let m = self.moment(0.5 * (t0 + t1));
         let k = m.interval;
-        let at = |t: f64| if m.rate > 0.0 { (t - self.times[k]) * m.rate } else { m.s };
+        let (a, b) = (a - m.gone, b - m.gone);
+        let at = |t: f64| if m.rate > 0.0 { (t - m.past - self.times[k]) * m.rate } else { m.s };
         let (m0, m1) = (Moment { s: at(t0), ..m }, Moment { s: at(t1), ..m });
         let d = b - a;
         let boxes = &self.boxes[k];
@@ -283,7 +349,7 @@ impl Facets {
         let mut stack = vec![0_usize];
         while let Some(i) = stack.pop() {
             let until = best.map_or(1.0, |b| b.s);
-            if !crosses(boxes[i], a, d, until, slack) {
+            if !crosses(&boxes[i], a, d, until, slack) {
                 continue;
             }
             let node = &self.nodes[i];
@@ -301,6 +367,64 @@ impl Facets {
             }
         }
         best
+    }
+}
+
+/// Cells along the longest side of a mesh.
+const CELLS: f64 = 40.0;
+
+/// Cubes around a mesh that no box of its tree touches and that are connected with the space around it.
+#[derive(Debug, Clone)]
+struct Apart {
+    low: [f64; 3],
+    cell: f64,
+    n: [usize; 3],
+    bits: Vec<u64>,
+}
+
+impl Apart {
+    fn new(nodes: &[Node], boxes: &[[[f32; 3]; 2]]) -> Self {
+        let [low, high] = boxes[0].map(|x| x.map(f64::from));
+        let size: [f64; 3] = std::array::from_fn(|a| high[a] - low[a]);
+        let cell = size.iter().fold(f64::MIN_POSITIVE, |a, b| a.max(*b)) / CELLS;
+        // A free cell all around.
+        let low = low.map(|x| x - 1.5 * cell);
+        let n = size.map(|s| (s / cell) as usize + 4);
+        let mut shut = vec![false; n[0] * n[1] * n[2]];
+        let index = |x: usize, y: usize, z: usize| (z * n[1] + y) * n[0] + x;
+        for (_, [l, h]) in nodes.iter().zip(boxes).filter(|(node, _)| node.count > 0) {
+            let at = |x: f32, a: usize| (((f64::from(x) - low[a]) / cell) as usize).min(n[a] - 1);
+            for z in at(l[2], 2)..=at(h[2], 2) {
+                for y in at(l[1], 1)..=at(h[1], 1) {
+                    shut[index(at(l[0], 0), y, z)..=index(at(h[0], 0), y, z)].fill(true);
+                }
+            }
+        }
+        let mut bits = vec![0_u64; shut.len().div_ceil(64)];
+        let mut todo = vec![0_usize];
+        shut[0] = true;
+        while let Some(i) = todo.pop() {
+            bits[i / 64] |= 1 << (i % 64);
+            let at = [i % n[0], i / n[0] % n[1], i / n[0] / n[1]];
+            for (a, step) in [1, n[0], n[0] * n[1]].into_iter().enumerate() {
+                for next in [(at[a] > 0).then(|| i - step), (at[a] + 1 < n[a]).then(|| i + step)].into_iter().flatten() {
+                    if !std::mem::replace(&mut shut[next], true) {
+                        todo.push(next);
+                    }
+                }
+            }
+        }
+        Self { low, cell, n, bits }
+    }
+
+    fn holds(&self, p: Vector) -> bool {
+        let p: [f64; 3] = p.into();
+        let at: [f64; 3] = std::array::from_fn(|a| (p[a] - self.low[a]) / self.cell);
+        if (0..3).any(|a| !(0.0..self.n[a] as f64).contains(&at[a])) {
+            return true;
+        }
+        let i = (at[2] as usize * self.n[1] + at[1] as usize) * self.n[0] + at[0] as usize;
+        self.bits[i / 64] >> (i % 64) & 1 == 1
     }
 }
 
@@ -369,18 +493,18 @@ fn passes(a: Vector, d: Vector, start: [Vector; 3], end: [Vector; 3], sides: Sid
     None
 }
 
-fn distance_sq((l, h): (Vector, Vector), p: Vector) -> f64 {
-    let outside = |p: f64, l: f64, h: f64| (l - p).max(p - h).max(0.0);
-    let d = Vector { x: outside(p.x, l.x, h.x), y: outside(p.y, l.y, h.y), z: outside(p.z, l.z, h.z) };
+fn distance_sq([l, h]: &[[f32; 3]; 2], p: Vector) -> f64 {
+    let outside = |p: f64, l: f32, h: f32| (f64::from(l) - p).max(p - f64::from(h)).max(0.0);
+    let d = Vector { x: outside(p.x, l[0], h[0]), y: outside(p.y, l[1], h[1]), z: outside(p.z, l[2], h[2]) };
     d.norm_sq()
 }
 
 /// Whether a + d s comes within `slack` of the box for an s between 0 and `until`.
-fn crosses((l, h): (Vector, Vector), a: Vector, d: Vector, until: f64, slack: f64) -> bool {
-    let (l, h, a, d): ([f64; 3], [f64; 3], [f64; 3], [f64; 3]) = (l.into(), h.into(), a.into(), d.into());
+fn crosses([l, h]: &[[f32; 3]; 2], a: Vector, d: Vector, until: f64, slack: f64) -> bool {
+    let (a, d): ([f64; 3], [f64; 3]) = (a.into(), d.into());
     let (mut first, mut last) = (0.0_f64, until.max(0.0));
     for k in 0..3 {
-        let (near, far) = (l[k] - slack - a[k], h[k] + slack - a[k]);
+        let (near, far) = (f64::from(l[k]) - slack - a[k], f64::from(h[k]) + slack - a[k]);
         if d[k] == 0.0 {
             if near > 0.0 || far < 0.0 {
                 return false;

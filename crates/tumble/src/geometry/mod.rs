@@ -3,12 +3,15 @@
 pub mod bvh;
 pub mod contact;
 pub mod facets;
+pub mod mannequin;
 pub mod mesh_contact;
 pub mod motion;
 pub mod neighbours;
+pub mod nets;
 pub mod sampling;
 pub mod sdf;
 pub mod shape;
+pub mod skeleton;
 pub mod surface;
 
 pub use bvh::Bvh;
@@ -19,6 +22,7 @@ pub use neighbours::{Meet, Neighbours};
 pub use sampling::Sampler;
 pub use sdf::GridSdf;
 pub use shape::Shape;
+pub use skeleton::Rig;
 
 /// A point or direction.
 pub type Vector = crate::math::Vec3<f64>;

@@ -84,8 +84,10 @@ impl Shape {
                 (d, gradient.normalized())
             }
             Self::Animated { facets, shell } => {
-                let within = if *shell { within } else { f64::INFINITY };
-                let Some(found) = facets.nearest(p, t, within) else { return (within, Vector::default(), Vector::default()) };
+                // Far inside a solid there may be nothing near, too.
+                let near = facets.nearest(p, t, within);
+                let deep = || if *shell || facets.apart(p, t) { None } else { facets.nearest(p, t, f64::INFINITY) };
+                let Some(found) = near.or_else(deep) else { return (within, Vector::default(), Vector::default()) };
                 let way = p - found.point;
                 let inside = !shell && way.dot(found.normal) < 0.0;
                 let sign = if inside { -1.0 } else { 1.0 };

@@ -11,7 +11,7 @@ use tumble_interface::scene::{Animated, Collider, Component, Heat, HeatScheme, H
 
 /// A solid without a mesh.
 fn shape(words: &Words) -> Result<Shape, String> {
-    if matches!(words, Words::Mesh(_) | Words::AnimatedMesh(_)) {
+    if matches!(words, Words::Mesh(_) | Words::AnimatedMesh(_) | Words::Character(_) | Words::Mannequin(_)) {
         return Err("a mesh, expected a sphere, box, plane, floor or capsule".into());
     }
     let thing = Collider {
@@ -25,7 +25,7 @@ fn shape(words: &Words) -> Result<Shape, String> {
         motion: None,
         color: None,
     };
-    solid(&thing, &[]).map(|solid| solid.shape).map_err(|(_, message)| message)
+    solid(&thing, &[], None).map(|solid| solid.shape).map_err(|(_, message)| message)
 }
 
 fn contains(shape: &Shape, x: [f64; 3]) -> bool {

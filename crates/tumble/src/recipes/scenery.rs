@@ -1,8 +1,9 @@
 //! Colliders: the solids that masses feel, and the meshes that pictures show.
 
 use crate::geometry::motion::Key;
-use crate::geometry::{Collider, Facets, GridSdf, Motion, Shape, Vector, surface};
+use crate::geometry::{Collider, Facets, GridSdf, Motion, Rig, Shape, Vector, surface};
 use crate::math::rotation::from_degrees;
+use std::sync::Arc;
 use tumble_interface::Mesh;
 use tumble_interface::scene::{Collider as Thing, MeshFile, MeshFrames, Motion as Moves, Pace, Shape as Words};
 
@@ -34,8 +35,9 @@ pub fn animated(meshes: &[&Mesh], frames: &MeshFrames) -> Vec<Mesh> {
 type Wrong = (String, String);
 
 /// The solid of a collider; its meshes, one for each keyframe, stand where they belong. `Err` says what is wrong with
-/// which key.
-pub fn solid(thing: &Thing, meshes: &[Mesh]) -> Result<Collider, Wrong> {
+/// which key. A figure comes with its bones and the keyframes of its skin.
+pub fn solid(thing: &Thing, meshes: &[Mesh], figure: Option<(Arc<Rig>, Facets)>) -> Result<Collider, Wrong> {
+    let (rig, figure) = figure.unzip();
     let wrong = |key: &str, message: String| Err((key.to_string(), message));
     let shape = match &thing.shape {
         Words::Sphere { center, radius } => Shape::Sphere { center: (*center).into(), radius: *radius },
@@ -87,6 +89,16 @@ pub fn solid(thing: &Thing, meshes: &[Mesh]) -> Result<Collider, Wrong> {
                 None => return wrong(key, "the mesh has no triangles".into()),
             }
         }
+        Words::Character(_) | Words::Mannequin(_) => {
+            let (key, shell) = match &thing.shape {
+                Words::Character(words) => (".shape.character", words.shell),
+                _ => (".shape.mannequin", false),
+            };
+            let Some(facets) = figure else { return wrong(key, "a figure, expected sphere, box, plane, floor, capsule or mesh".into()) };
+            let mesh = Mesh { vertices: facets.vertices(0.0), triangles: facets.triangles().to_vec() };
+            whole(&mesh, key, shell, thing.thickness)?;
+            Shape::Animated { facets, shell }
+        }
     };
     let shell = matches!(shape, Shape::Mesh { shell: true, .. } | Shape::Animated { shell: true, .. });
     if thing.inside && (shell || matches!(shape, Shape::Plane { .. })) {
@@ -101,6 +113,7 @@ pub fn solid(thing: &Thing, meshes: &[Mesh]) -> Result<Collider, Wrong> {
         restitution: thing.restitution,
         belt: thing.belt.into(),
         motion: thing.motion.as_ref().map(motion).transpose()?,
+        rig,
     })
 }
 
@@ -148,7 +161,7 @@ fn volume(mesh: &Mesh) -> f64 {
 }
 
 /// The surface of a collider for pictures.
-pub fn scenery(thing: &Thing, meshes: &[Mesh]) -> Mesh {
+pub fn scenery(thing: &Thing, meshes: &[Mesh], solid: Option<&Collider>) -> Mesh {
     match &thing.shape {
         Words::Sphere { center, radius } => surface::sphere(4, (*center).into(), *radius),
         Words::Box { center, size, rotate } => surface::cuboid((*center).into(), Vector::from(*size) * 0.5, from_degrees(*rotate)),
@@ -156,5 +169,9 @@ pub fn scenery(thing: &Thing, meshes: &[Mesh]) -> Mesh {
         Words::Floor { height } => surface::square([0.0, 0.0, *height].into(), [0.0, 0.0, 1.0].into(), PLANE),
         Words::Capsule { from, to, radius } => surface::capsule((*from).into(), (*to).into(), *radius),
         Words::Mesh(_) | Words::AnimatedMesh(_) => meshes.first().cloned().unwrap_or_default(),
+        Words::Character(_) | Words::Mannequin(_) => match solid.map(|s| &s.shape) {
+            Some(Shape::Animated { facets, .. }) => Mesh { vertices: facets.vertices(0.0), triangles: facets.triangles().to_vec() },
+            _ => Mesh::default(),
+        },
     }
 }

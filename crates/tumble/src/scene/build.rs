@@ -260,11 +260,21 @@ fn solids(scene: &Scene, assets: &Assets, issues: &mut Vec<Issue>) -> (Vec<Colli
             }
             _ => Vec::new(),
         };
-        match recipes::solid(thing, &meshes) {
+        let end = scene.frame_time() * f64::from(scene.time.frames);
+        let figure = match &thing.shape {
+            Shape::Mannequin(words) => Some(recipes::mannequin(words, end)),
+            Shape::Character(words) => Some(match assets.character(&words.path) {
+                Some(file) => recipes::character(words, file, end),
+                None => Err((".shape.character".into(), "the file has not been loaded".into())),
+            }),
+            _ => None,
+        };
+        let solid = figure.transpose().and_then(|figure| recipes::solid(thing, &meshes, figure));
+        let surface = recipes::scenery(thing, &meshes, solid.as_ref().ok());
+        match solid {
             Ok(collider) => colliders.push(collider),
             Err((key, message)) => issues.push(Issue::new(format!("collider \"{}\"{key}", thing.name), message)),
         }
-        let surface = recipes::scenery(thing, &meshes);
         let mut add = |name: &str, unit, data| {
             scenery.push(Column { object: thing.name.clone(), name: name.into(), unit, width: 3, points: Vec::new(), data })
         };

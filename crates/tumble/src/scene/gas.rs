@@ -150,7 +150,7 @@ impl Read<'_, '_> {
         let mut sources = Vec::new();
         for (i, words) in self.words.source.iter().enumerate() {
             let key = |key: &str| format!(".source[{i}].{key}");
-            if matches!(words.shape, Shape::Mesh(_) | Shape::AnimatedMesh(_)) {
+            if matches!(words.shape, Shape::Mesh(_) | Shape::AnimatedMesh(_) | Shape::Character(_) | Shape::Mannequin(_)) {
                 self.wrong(&key("shape"), "a mesh, expected sphere, box, plane, floor or capsule");
                 continue;
             }

@@ -82,6 +82,16 @@ pub fn memory(scene: &Scene, assets: &Assets) -> f64 {
             let size = if file.rotate == [0.0; 3] { size } else { [size.iter().map(|s| s * s).sum::<f64>().sqrt(); 3] };
             bytes += GridSdf::bytes(size, file.resolution, thing.thickness);
         }
+        let end = scene.frame_time() * f64::from(scene.time.frames);
+        bytes += match &thing.shape {
+            Shape::Mannequin(words) => {
+                crate::recipes::figure_bytes(crate::recipes::MANNEQUIN, end.min(words.start + words.settle + 10.0), words.rate)
+            }
+            Shape::Character(words) => {
+                assets.character(&words.path).map_or(0.0, |file| crate::recipes::figure_bytes(file.mesh.vertices.len(), end, words.rate))
+            }
+            _ => 0.0,
+        };
         if let Shape::AnimatedMesh(frames) = &thing.shape {
             // Vertices, and two corners of the boxes, about one for each vertex.
             let meshes = frames.frames.iter().filter_map(|f| assets.get(&f.path));

@@ -13,10 +13,4 @@ mod simulation;
 
 pub use memory::memory;
 pub use simulation::Simulation;
-
-use std::collections::HashMap;
-use std::sync::Arc;
-use tumble_interface::Mesh;
-
-/// The meshes that a scene names, by path, as they stand in their files.
-pub type Assets = Arc<HashMap<String, Mesh>>;
+pub use tumble_interface::Assets;

@@ -1,6 +1,7 @@
 //! Points that are held and follow a collider, or one of its bones: functions of time alone, and so in no snapshot.
 
 use super::Dynamics;
+use crate::geometry::motion::Pose;
 use crate::geometry::{Collider, Vector};
 use crate::math::{Real, row, xyz64};
 
@@ -26,10 +27,22 @@ impl Held {
 }
 
 impl Dynamics {
+    /// Held points, and where what they follow is at t; those of one bone stand side by side.
+    fn poses(&self, t: f64) -> Vec<(Held, Pose)> {
+        let mut last: Option<(Held, Pose)> = None;
+        let one = |held: &Held| {
+            let same = last.filter(|(other, _)| (other.collider, other.bone) == (held.collider, held.bone));
+            let pose = same.map_or_else(|| self.laws.colliders[held.collider].pose(held.bone, t), |(_, pose)| pose);
+            last = Some((*held, pose));
+            (*held, pose)
+        };
+        self.held.iter().map(one).collect()
+    }
+
     /// Gives held points the velocity that takes them to where they have to be at t + h.
     pub(super) fn lead_held(&mut self, t: f64, h: f64) {
-        for held in &self.held {
-            let to = self.laws.colliders[held.collider].pose(held.bone, t + h).out(held.place);
+        for (held, pose) in self.poses(t + h) {
+            let to = pose.out(held.place);
             let v = (to - xyz64(self.state.x[held.row])) * (1.0 / h);
             self.state.v[held.row] = row(real(v), 0.0);
         }
@@ -37,8 +50,8 @@ impl Dynamics {
 
     /// Puts held points to where they have to be at t.
     pub(super) fn place_held(&mut self, t: f64) {
-        for held in &self.held {
-            let x = self.laws.colliders[held.collider].pose(held.bone, t).out(held.place);
+        for (held, pose) in self.poses(t) {
+            let x = pose.out(held.place);
             self.state.x[held.row] = row(real(x), 0.0);
         }
     }

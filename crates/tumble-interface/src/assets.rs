@@ -1,0 +1,35 @@
+//! What a scene takes from files.
+
+use crate::{Character, Mesh};
+use std::collections::HashMap;
+use std::sync::Arc;
+
+/// The meshes and characters that a scene names, by path, as they stand in their files.
+#[derive(Debug, Clone, Default)]
+pub struct Assets {
+    meshes: Arc<HashMap<String, Mesh>>,
+    characters: Arc<HashMap<String, Character>>,
+}
+
+impl Assets {
+    /// Meshes, and characters.
+    pub fn new(meshes: HashMap<String, Mesh>, characters: HashMap<String, Character>) -> Self {
+        Self { meshes: Arc::new(meshes), characters: Arc::new(characters) }
+    }
+
+    /// The mesh of a path.
+    pub fn get(&self, path: &str) -> Option<&Mesh> {
+        self.meshes.get(path)
+    }
+
+    /// The character of a path.
+    pub fn character(&self, path: &str) -> Option<&Character> {
+        self.characters.get(path)
+    }
+}
+
+impl From<Arc<HashMap<String, Mesh>>> for Assets {
+    fn from(meshes: Arc<HashMap<String, Mesh>>) -> Self {
+        Self { meshes, ..Self::default() }
+    }
+}
