@@ -7,6 +7,7 @@ mod emitters;
 mod forces;
 mod gas;
 mod grids;
+mod hair;
 mod heat;
 mod output;
 mod shapes;
@@ -25,6 +26,7 @@ pub use grids::GridBox;
 pub use heat::{Heat, HeatRegion, HeatScheme, HeatSide, HeatSides, HeatSource};
 pub use output::{Camera, Expect, Look, Output, Probe};
 pub use shapes::{Collider, MeshFile, MeshFrame, MeshFrames, MeshRef, Motion, Pace, Pose, Shape};
+pub use hair::{Clump, Curl, Hair, HairCollisions};
 pub use structures::{
     Block, Cloud, CloudShape, Diagonals, Galaxy, Halo, Link, LinkSettings, Links, Material, Net, Particles, Pin, Profile, Region, Rod,
     Rope, Sheet, Spring,
@@ -81,6 +83,9 @@ pub struct Scene {
     /// Chains of springs, or rods.
     #[serde(default)]
     pub rope: Vec<Rope>,
+    /// Strands planted on surfaces.
+    #[serde(default)]
+    pub hair: Vec<Hair>,
     /// Lattices of springs in a rectangle.
     #[serde(default)]
     pub sheet: Vec<Sheet>,
@@ -252,6 +257,9 @@ impl Scene {
         }
         let mut all: Vec<MeshRef<'_>> = Vec::new();
         all.extend(self.net.iter_mut().map(|n| one(format!("net \"{}\".mesh", n.name), &mut n.mesh)));
+        for Hair { name, mesh, .. } in &mut self.hair {
+            all.extend(mesh.as_mut().map(|mesh| one(format!("hair \"{name}\".mesh"), mesh)));
+        }
         for thing in &mut self.collider {
             let place = format!("collider \"{}\".shape", thing.name);
             match &mut thing.shape {

@@ -1,20 +1,21 @@
 //! From the parts that recipes collect to a system.
 
 use super::laws::Acting;
-use super::{Dynamics, Stepping, books};
+use super::coat::Coat;
+use super::{Carried, Dynamics, Stepping, books};
 use crate::elements::{
-    BendTwist, Constraints, Distance, Element, Elements, Hinge, Linear, Members, Neohookean, Nonlinear, Pairs, Projected, StretchShear,
-    TetShear, TetStrain, TetVolume, Vector,
+    BendTwist, Constraints, Distance, Element, Elements, Hinge, Linear, Members, Neohookean, Nonlinear, Pairs, Projected, Strands,
+    StretchShear, TetShear, TetStrain, TetVolume, Vector,
 };
 use crate::forces::{Attractor, Cohesion, DirectSum, Flock, Force, Goal, Habits, Halos, LennardJones, Near, Repulsion, Viscosity};
 use crate::geometry::Collider;
 use crate::integrators::Memory;
-use crate::math::{Real, Vec3, functions};
+use crate::math::{Quat, Real, Vec3, functions};
 use crate::pool::{Emitter, Pool};
 use crate::state::{Masses, Object, State};
 use std::ops::Range;
 use std::sync::Arc;
-use tumble_interface::scene::{Adaptive, Force as Words, Hessian, Integrator, PositionBased, Solver};
+use tumble_interface::scene::{Adaptive, Force as Words, HairCollisions, Hessian, Integrator, PositionBased, Solver};
 use tumble_interface::{Issue, SceneError};
 
 /// How a system steps.
@@ -97,6 +98,12 @@ pub struct Parts {
     strains: Vec<Members<4, 9, 0>>,
     stretches: Vec<Members<3, 2, 0>>,
     bends: Vec<Members<2, 5, 0>>,
+    /// Points and frames that colliders carry: which, and where they are in the collider.
+    carried: Vec<Carried>,
+    /// Hair that acts on itself, by object.
+    coats: Vec<(usize, HairCollisions)>,
+    /// Strains at which segments of rods break.
+    rod_limits: Vec<f64>,
     energy_at_rest: [f64; 2],
     objects: Vec<Draft>,
     emitters: Vec<Emitter>,
@@ -263,8 +270,19 @@ impl Parts {
         self.energy_at_rest[1] += 0.5 * lame_mu * lame_mu / lambda * volume;
     }
 
-    /// Adds the stretch and shear of a rod segment between two points, with its frame.
-    pub fn rod_stretch(&mut self, points: [u32; 2], frame: u32, rest: [f64; 2], stiffness: f64, damping: f64) {
+    /// A collider carries a point, which is at `x` [m] in it, and a frame, whose turn in it is `q`. Both must be held.
+    pub fn carry(&mut self, collider: usize, point: u32, x: Vec3<f64>, frame: u32, q: Quat<f64>) {
+        self.carried.push(Carried { collider, point: point as usize, x, frame: frame as usize, q });
+    }
+
+    /// Makes the object under construction act on itself as a continuum.
+    pub fn coat(&mut self, words: HairCollisions) {
+        self.coats.push((self.objects.len() - 1, words));
+    }
+
+    /// Adds the stretch and shear of a rod segment between two points, with its frame and the strain at which it breaks.
+    pub fn rod_stretch(&mut self, points: [u32; 2], frame: u32, rest: [f64; 2], stiffness: f64, damping: f64, breaks: Option<f64>) {
+        self.rod_limits.push(breaks.unwrap_or(f64::INFINITY));
         self.stretches.push(Members { nodes: [points[0], points[1], frame], rest, law: [], stiffness, damping });
     }
 
@@ -315,6 +333,17 @@ impl Parts {
             return Err(SceneError::one(format!("system \"{}\"", settings.name), message));
         }
         let rows = points + self.frames.len();
+        let stepwise = settings.integrator.is_adaptive();
+        if stepwise && (!self.carried.is_empty() || !self.coats.is_empty()) {
+            let message = "hair that acts on itself, or that a collider carries, needs steps of equal length; set another integrator";
+            return Err(SceneError::one(format!("system \"{}\".integrator", settings.name), message));
+        }
+        if settings.integrator != Integrator::PositionBased && self.rod_limits.iter().any(|l| l.is_finite()) {
+            let message = "rods with a break_strain break in position-based systems only; set integrator = \"position_based\"";
+            return Err(SceneError::one(format!("system \"{}\".integrator", settings.name), message));
+        }
+        self.carried.retain(|c| settings.colliders.get(c.collider).is_some_and(|c| c.motion.is_some()));
+        self.carried.iter_mut().for_each(|c| c.frame += points);
         for nodes in self.stretches.iter_mut().map(|m| &mut m.nodes) {
             nodes[2] += points as u32;
         }
@@ -370,8 +399,7 @@ impl Parts {
             batches.add::<Hinge, 4, 1, 1>(&self.hinges, 0.0),
             batches.solids(&self.shears, &self.volumes, self.energy_at_rest),
             batches.add::<TetStrain, 4, 6, 9>(&self.strains, 0.0),
-            batches.add::<StretchShear, 3, 3, 2>(&self.stretches, 0.0),
-            batches.add::<BendTwist, 2, 3, 5>(&self.bends, 0.0),
+            batches.rods(&self.stretches, &mut self.bends, &self.rod_limits),
         ];
         if made.contains(&None) || kinds.contains(&None) {
             return Err(lost());
@@ -406,6 +434,7 @@ impl Parts {
                 objects.push(object);
             }
         }
+        let coats = self.coats.into_iter().map(|(i, words)| Coat::new(objects[places[i]].points.clone(), words, &state.x)).collect();
         let placed = |on: Vec<usize>| -> Vec<usize> { on.into_iter().map(|i| places[i]).collect() };
         let rows_of = |on: &[usize]| -> Vec<Range<usize>> { on.iter().map(|i| objects[*i].points.clone()).collect() };
         let mut pairs = Vec::new();
@@ -453,6 +482,8 @@ impl Parts {
             objects,
             tethers: Vec::new(),
             clamp: clamp.flatten(),
+            carried: self.carried,
+            coats,
             constraints: batches.constraints,
             sweeps: settings.sweeps.clone(),
             rates: Vec::new(),
@@ -598,6 +629,16 @@ impl Batches {
             self.list.push(Box::new(elements.with_energy_at_rest(energy_at_rest)));
         }
         Some(())
+    }
+
+    /// Adds rods, if there are any: as constraints, chains are solved as a whole.
+    fn rods(&mut self, stretches: &[Members<3, 2, 0>], bends: &mut Vec<Members<2, 5, 0>>, limits: &[f64]) -> Option<()> {
+        let strands = self.projected.as_ref().and_then(|inverse| Strands::new(self.rows, self.points, inverse, stretches, bends, limits));
+        match strands {
+            Some(strands) => self.constraints.push(Box::new(strands)),
+            None => self.add::<StretchShear, 3, 3, 2>(stretches, 0.0)?,
+        }
+        self.add::<BendTwist, 2, 3, 5>(bends, 0.0)
     }
 
     /// Adds both laws of solids, if there are any; `None` if a node is not a row.

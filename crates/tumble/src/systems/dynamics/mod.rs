@@ -3,6 +3,7 @@
 
 mod books;
 mod build;
+mod coat;
 mod contact;
 mod implicit;
 mod laws;
@@ -15,9 +16,10 @@ pub use build::{Parts, Settings, SpringPart};
 use crate::elements::{Constraints, Limit, Linear, Projected, Projection};
 use crate::exchange::{Exchange, Port};
 use crate::geometry::Vector;
+use crate::geometry::motion::Pose;
 use crate::integrators::{self, Equation, Memory, Scratch, Step, adaptive_step};
 use crate::math::parallel::{CHUNK, sum};
-use crate::math::{Real, Row, Vec3, ZERO, axpy, row, sub, xyz64};
+use crate::math::{Quat, Real, Row, Vec3, ZERO, axpy, row, sub, xyz64};
 use crate::pool::{Hit, Pool};
 use crate::state::{Object, State};
 use crate::system::{Archive, Part, System};
@@ -67,6 +69,8 @@ pub struct Dynamics {
     /// Elements of a position-based system, which are no forces there.
     constraints: Vec<Box<dyn Constraints>>,
     sweeps: PositionBased,
+    carried: Vec<Carried>,
+    coats: Vec<coat::Coat>,
     user: Option<Box<dyn UserIntegrator>>,
     memory: Memory,
     scratch: Scratch,
@@ -85,6 +89,18 @@ pub struct Dynamics {
     watched: bool,
     /// Time and state before the sub-step, while watched.
     witness: Option<(f64, Vec<Row>, Vec<Row>)>,
+}
+
+/// A held point and a held frame that a collider carries.
+#[derive(Debug, Clone, Copy, PartialEq)]
+struct Carried {
+    collider: usize,
+    /// Its row, and where it is in the collider [m].
+    point: usize,
+    x: Vector,
+    /// Its row, and its turn in the collider.
+    frame: usize,
+    q: Quat<f64>,
 }
 
 /// A damped spring to a port of another system, as impulses at the start of each sub-step.
@@ -170,7 +186,13 @@ impl Dynamics {
 
     /// One sub-step of a scheme with a fixed step, contact, clamp and breaking included.
     fn substep(&mut self, t: f64, h: f64, report: &mut StepReport) -> Result<(), StepError> {
+        let (x, v) = (&self.state.x, &mut self.state.v);
+        self.coats.iter_mut().for_each(|coat| coat.act(h, x, v));
         self.remember();
+        if self.integrator != Integrator::PositionBased {
+            self.carry(t + h);
+            self.memory.ready &= self.carried.is_empty() && self.coats.is_empty();
+        }
         let mut user = self.user.take();
         let result = match &mut user {
             Some(user) => self.user_step(user.as_mut(), t, h),
@@ -187,6 +209,21 @@ impl Dynamics {
         report.stepped(h);
         self.after(t, h, report);
         Ok(())
+    }
+
+    /// Puts what colliders carry where it is at time t.
+    fn carry(&mut self, t: f64) {
+        let mut last = None;
+        for c in &self.carried {
+            if last.is_none_or(|(k, _)| k != c.collider) {
+                let motion = self.laws.colliders[c.collider].motion.as_ref();
+                last = Some((c.collider, motion.map_or_else(Pose::default, |m| m.at(t).0)));
+            }
+            let Some((_, pose)) = last else { continue };
+            let x = pose.out(c.x);
+            self.state.x[c.point] = row(Vec3 { x: x.x as Real, y: x.y as Real, z: x.z as Real }, 0.0);
+            self.state.x[c.frame] = (pose.turn * c.q).row().map(|q| q as Real);
+        }
     }
 
     /// Keeps what contact and clamp compare with.

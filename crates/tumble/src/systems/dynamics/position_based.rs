@@ -32,6 +32,7 @@ impl Dynamics {
         });
         self.rates = rates;
         done?;
+        self.carry(t + h);
         // Sweeps over all elements.
         let words = &self.sweeps;
         // n sweeps that each take back 1 - (1 - k)^(1/n) leave 1 - k of an error.
