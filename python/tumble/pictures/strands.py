@@ -9,8 +9,8 @@ from tumble.pictures.surfaces import Floats, Indices, unit
 NEAR = 6
 """Neighbours of a strand among which the two others of a triangle are drawn."""
 
-FAR = 4.0
-"""Neighbours farther apart than this many usual distances have nothing between them."""
+FAR = 2.0
+"""Neighbours farther apart than this many times the usual distance of the last of them have nothing between them."""
 
 SEED = 7
 """Of the places of strands between others: every picture and export has the same."""
@@ -44,7 +44,7 @@ def strands(x: Floats, points: int, render: int) -> Strands:
     if render <= 1 or n < 3:
         return Strands(points, own, only)
     near, distance = _nearest(roots, min(NEAR, n - 1))
-    usual = np.median(distance[:, 0])
+    usual = np.median(distance[:, -1])
     random = np.random.default_rng(SEED)
     first = np.tile(np.arange(n), render - 1)
     pick = np.argsort(random.random((len(first), near.shape[1])), axis=1)[:, :2]
