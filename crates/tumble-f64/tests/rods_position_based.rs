@@ -30,18 +30,29 @@ fn cantilever(gamma: f64, segments: u32, extra: &str) -> Vec<Vector> {
 /// Drop and reach of the elastica under its own weight, by the boundary-value problem theta'' = -Gamma (1 - s) cos(theta)/L².
 #[test]
 fn a_cantilever_bends_as_the_elastica() {
-    for (gamma, drop, reach) in
-        [(0.1, 0.012498, 0.999911), (1.0, 0.123471, 0.991246), (5.0, 0.495905, 0.846657), (20.0, 0.829881, 0.445232), (100.0, 0.937524, 0.159223)]
-    {
+    for (gamma, drop, reach) in [
+        (0.1, 0.012498, 0.999911),
+        (1.0, 0.123471, 0.991246),
+        (5.0, 0.495905, 0.846657),
+        (20.0, 0.829881, 0.445232),
+        (100.0, 0.937524, 0.159223),
+    ] {
         for segments in [16, 32, 64] {
             let x = cantilever(gamma, segments, "");
             let tip = x[segments as usize];
             let (h, w) = (-tip.z / drop - 1.0, tip.x / reach - 1.0);
             let ratio = (-tip.z / tip.x) / (drop / reach) - 1.0;
-            println!("Gamma = {gamma}, {segments} segments: drop off by {:.2} %, reach by {:.2} %, H/W by {:.2} %", 100.0 * h, 100.0 * w, 100.0 * ratio);
-            assert!(h.abs() < 0.03 && w.abs() < 0.03, "{h} {w}");
-            // Second order in the length of segments.
-            assert!(segments < 64 || ratio.abs() < 0.01, "{ratio}");
+            println!(
+                "Gamma = {gamma}, {segments} segments: drop off by {:.2} %, reach by {:.2} %, H/W by {:.2} %",
+                100.0 * h,
+                100.0 * w,
+                100.0 * ratio
+            );
+            // Second order in the length of segments: at most 0.7 %, 3.3 % and 4.1 % for 16, of them the last two only where the rod hangs
+            // almost straight down and reaches a sixth of its length; 0.2 %, 0.8 %, 1 % for 32; 0.07 %, 0.2 %, 0.3 % for 64.
+            let most = if segments == 16 && gamma > 50.0 { 0.05 } else { 0.03 };
+            assert!(h.abs() < 0.01 && w.abs() < most && ratio.abs() < most, "{h} {w} {ratio}");
+            assert!(segments < 64 || ratio.abs() < 0.005, "{ratio}");
             assert!(tip.y.abs() < 1e-9);
         }
     }
@@ -52,7 +63,7 @@ fn a_cantilever_bends_as_the_elastica() {
 fn a_column_buckles_at_its_own_weight() {
     let lean = |gamma: f64| {
         let mut sim = simulation(&format!(
-            "{HEAD}[[force]]\nkind = \"drag\"\nrate = 3\n[[force]]\nkind = \"wind\"\nvelocity = [\"0.2*smoothstep(0.51, 0.5, t)\", 0, 0]\nrate = 1\n\
+            "{HEAD}[[force]]\nkind = \"drag\"\nrate = 3\n[[force]]\nkind = \"acceleration\"\nvalue = [\"0.1*smoothstep(0.51, 0.5, t)\", 0, 0]\n\
              [[rope]]\nname = \"r\"\nfrom = [0, 0, 0]\nto = [0, 0, 1]\nsegments = 32\ndensity = 0.1\npin = [\"start\"]\nrod = {{ stretch = 1e5, bend = {:e} }}\n",
             1.0 / gamma
         ));
@@ -98,15 +109,28 @@ impl Beam {
         x.extend(ends.iter().map(|q| q.row()));
         let length = |i: usize| (course[i + 1] - course[i]).norm();
         let stretches: Vec<Members<3, 2, 0>> = (0..n)
-            .map(|i| Members { nodes: [i, i + 1, points + i].map(|i| i as u32), rest: [length(i), 1.0], law: [], stiffness: stretch * length(i), damping: 0.0 })
+            .map(|i| Members {
+                nodes: [i, i + 1, points + i].map(|i| i as u32),
+                rest: [length(i), 1.0],
+                law: [],
+                stiffness: stretch * length(i),
+                damping: 0.0,
+            })
             .collect();
         let joint = |a: usize, b: usize, l: f64| {
             let p = Quat::from_row(x[a]).conj() * Quat::from_row(x[b]);
             let k = p.v * (2.0 / l);
-            Members { nodes: [a as u32, b as u32], rest: [2.0 / l, k.x, k.y, k.z, (twist / bend).sqrt()], law: [], stiffness: bend * l, damping: 0.0 }
+            Members {
+                nodes: [a as u32, b as u32],
+                rest: [2.0 / l, k.x, k.y, k.z, (twist / bend).sqrt()],
+                law: [],
+                stiffness: bend * l,
+                damping: 0.0,
+            }
         };
         let held = [points + n, points + n + 1];
-        let mut bends: Vec<Members<2, 5, 0>> = (1..n).map(|i| joint(points + i - 1, points + i, 0.5 * (length(i - 1) + length(i)))).collect();
+        let mut bends: Vec<Members<2, 5, 0>> =
+            (1..n).map(|i| joint(points + i - 1, points + i, 0.5 * (length(i - 1) + length(i)))).collect();
         bends.push(joint(held[0], points, 0.5 * length(0)));
         if both {
             bends.push(joint(held[1], points + n - 1, 0.5 * length(n - 1)));
@@ -210,16 +234,18 @@ fn a_twisted_rod_leaves_its_line() {
     assert!(below.0 < 0.9 && above.0 > 1.1, "{below:?} {above:?}");
 }
 
-/// A vertical strip clamped on top whose foot stands on a floor that rises by eps L: it slips where mu falls below |T/N| of the elastica.
+/// Friction takes the foot as free for a sub-step, which must therefore be short for the foot's mass on the springs of its segment:
+/// k h²/m = 0.08 here. A vertical strip clamped on top whose foot stands on a floor that rises by eps L: it slips where mu falls below |T/N| of the elastica.
 #[test]
 fn a_foot_slips_where_friction_ends() {
     for (mu, exact) in [(0.2, 0.155), (0.4, 0.37)] {
         let mut sim = simulation(&format!(
-            "precision = \"double\"\nworld.gravity = [0, 0, 0]\ntime.fps = 50\n[[system]]\nmethod = \"position_based\"\n[[force]]\nkind = \"drag\"\nrate = 8\n\
-             [[force]]\nkind = \"wind\"\nvelocity = [\"0.2*smoothstep(0.51, 0.5, t)\", 0, 0]\nrate = 8\n\
-             [[rope]]\nname = \"r\"\nfrom = [0, 0, 1]\nto = [0, 0, 0]\nsegments = 32\ndensity = 0.1\npin = [\"start\"]\nrod = {{ stretch = 1e4, bend = 0.1 }}\n\
+            "precision = \"double\"\nworld.gravity = [0, 0, 0]\ntime.fps = 50\n[[system]]\nmethod = \"position_based\"\nsubsteps = 200\n[[force]]\nkind = \"drag\"\nrate = 8\n\
+             [[force]]\nkind = \"acceleration\"\nvalue = [\"0.02*smoothstep(0.51, 0.5, t)\", 0, 0]\n\
+             [[rope]]\nname = \"r\"\nfrom = [0, 0, 1]\nto = [0, 0, 0]\nsegments = 32\ndensity = 0.1\npin = [\"start\"]\nrod = {{ stretch = 400, bend = 0.1 }}\n\
              [[collider]]\nname = \"floor\"\nfriction = {mu}\nshape.floor.height = -1e-4\nmotion.keys = [{{ time = 0 }}, {{ time = 6, translate = [0, 0, 0.45] }}]\n"
         ));
+        // Once it slips it goes on slowly, as fast as the floor asks for.
         let mut stuck = None;
         let mut slipped = None;
         for i in 1..=300 {
@@ -231,7 +257,7 @@ fn a_foot_slips_where_friction_ends() {
             }
             if let Some(at) = stuck
                 && slipped.is_none()
-                && (foot.x - at).abs() > 0.01
+                && (foot.x - at).abs() > 5e-4
             {
                 slipped = Some(eps);
             }
@@ -246,7 +272,9 @@ fn a_foot_slips_where_friction_ends() {
 #[test]
 fn a_rod_breaks_where_it_is_pulled_too_far() {
     let scene = |limit: &str, integrator: &str| {
-        format!("precision = \"double\"\nworld.gravity = [0, 0, -10]\n[[system]]\nintegrator = \"{integrator}\"\nsubsteps = 40\n[[rope]]\nname = \"r\"\nfrom = [0, 0, 0]\nto = [0, 0, -1]\nsegments = 10\ndensity = 0.1\npin = [\"start\"]\nrod = {{ stretch = 20, bend = 1e-3, damping = 0.05{limit} }}\n")
+        format!(
+            "precision = \"double\"\nworld.gravity = [0, 0, -10]\n[[system]]\nintegrator = \"{integrator}\"\nsubsteps = 40\n[[rope]]\nname = \"r\"\nfrom = [0, 0, 0]\nto = [0, 0, -1]\nsegments = 10\ndensity = 0.1\npin = [\"start\"]\nrod = {{ stretch = 20, bend = 1e-3, damping = 0.05{limit} }}\n"
+        )
     };
     // At rest the first segment is strained by 0.95 N/20 N = 4.75 %, and swings up to twice that at first.
     let mut whole = simulation(&scene(", break_strain = 0.12", "position_based"));

@@ -90,7 +90,7 @@ fn scenes() -> Vec<(&'static str, String, usize)> {
     let hair = "[[system]]\nmethod = \"position_based\"\nsubsteps = 10\n[[collider]]\nname = \"head\"\nthickness = 0.002\nfriction = 0.3\nshape.sphere.radius = 0.1\n\
                 motion = { spin = [0, 3, 0], keys = [{ time = 0 }, { time = 0.2, translate = [0.1, 0, 0.1], rotate = [0, 40, 0] }] }\n\
                 [[hair]]\nname = \"hair\"\non = \"head\"\ncount = 301\nlength = 0.12\nspread = 0.3\nsegments = 14\nlean = [0.3, 0, 0.2]\ncurl = { radius = 0.02, pitch = 0.05 }\n\
-                clump = { count = 20 }\ndamping = 0.01\ncollisions = { cell = 0.015, friction = 8, pressure = 0.2 }\n";
+                clump = { count = 20 }\ndamping = 0.01\ncollisions = { cell = 0.015, friction = 8, pressure = 0.02 }\n";
     vec![
         ("smoke", smoke.to_string(), 16),
         ("fire", fire, 6),

@@ -23,10 +23,10 @@ pub use gas::{
     PressureMethod, Smoke, Solid, Temperature, Viscous,
 };
 pub use grids::GridBox;
+pub use hair::{Clump, Curl, Hair, HairCollisions};
 pub use heat::{Heat, HeatRegion, HeatScheme, HeatSide, HeatSides, HeatSource};
 pub use output::{Camera, Expect, Look, Output, Probe};
 pub use shapes::{Collider, MeshFile, MeshFrame, MeshFrames, MeshRef, Motion, Pace, Pose, Shape};
-pub use hair::{Clump, Curl, Hair, HairCollisions};
 pub use structures::{
     Block, Cloud, CloudShape, Diagonals, Galaxy, Halo, Link, LinkSettings, Links, Material, Net, Particles, Pin, Profile, Region, Rod,
     Rope, Sheet, Spring,

@@ -49,7 +49,10 @@ pub fn hair(site: &mut Site<'_>, thing: &Hair, seed: u32, ground: &Ground<'_>) {
         let turn = thing.length / f64::from(thing.segments) / curl.radius.hypot(curl.pitch / TAU);
         if turn > 1.5 {
             let least = (f64::from(thing.segments) * turn / 1.5).ceil();
-            let message = format!("{} pieces of a strand turn by {turn:.1} rad each in its curl, expected at most 1.5 rad: {least} segments", thing.segments);
+            let message = format!(
+                "{} pieces of a strand turn by {turn:.1} rad each in its curl, expected at most 1.5 rad: {least} segments",
+                thing.segments
+            );
             return site.wrong(format!("{path}.segments"), message);
         }
     }
@@ -155,7 +158,9 @@ fn plant(site: &mut Site<'_>, thing: &Hair, shape: &[Vector], carrier: Option<(u
     }
     site.parts.pin(points[0]);
     let mut turn = from_z_to(shape[1] - shape[0]);
-    let held = site.parts.frame(turn.row(), 1.0);
+    // A stick's inertia beside the wire's own.                                                            (hair.4)
+    let inertia = |l: f64| per_length * l * (thing.radius * thing.radius / 2.0 + l * l / 12.0);
+    let held = site.parts.frame(turn.row(), inertia((shape[1] - shape[0]).norm()));
     site.parts.clamp_frame(held);
     if let Some((collider, pose)) = carrier {
         site.parts.carry(collider, points[0], pose.back(shape[0]), held, pose.turn.conj() * turn);
@@ -166,9 +171,7 @@ fn plant(site: &mut Site<'_>, thing: &Hair, shape: &[Vector], carrier: Option<(u
         let l = way.norm();
         let d = way.normalized();
         turn = if i == 0 { turn } else { super::rope::shortest(turn.axis_z(), d) * turn };
-        // A stick's inertia beside the wire's own: (hair.4).
-        let inertia = per_length * l * (thing.radius * thing.radius / 2.0 + l * l / 12.0);
-        let frame = site.parts.frame(turn.row(), inertia);
+        let frame = site.parts.frame(turn.row(), inertia(l));
         let k = stretch * l;
         site.parts.rod_stretch([points[i], points[i + 1]], frame, [l, shear.sqrt()], k, k * thing.damping, None);
         let distance = 0.5 * (before.2 + l);

@@ -275,13 +275,7 @@ fn solids(scene: &Scene, assets: &Assets, issues: &mut Vec<Issue>) -> (Vec<Colli
 }
 
 /// Parts of every system, filled by the recipes in the order of the scene.
-fn fill(
-    scene: &Scene,
-    plans: &[Plan],
-    assets: &Assets,
-    solids: (&[Collider], &[Mesh]),
-    issues: &mut Vec<Issue>,
-) -> Vec<Parts> {
+fn fill(scene: &Scene, plans: &[Plan], assets: &Assets, solids: (&[Collider], &[Mesh]), issues: &mut Vec<Issue>) -> Vec<Parts> {
     let mut parts: Vec<Parts> = plans.iter().map(|_| Parts::default()).collect();
     let up: Vector = if scene.dimension == 2 && scene.plane == Plane::Xy { [0.0, 1.0, 0.0] } else { [0.0, 0.0, 1.0] }.into();
     let mut at = |kind: &str, system: &Option<String>, recipe: &mut dyn FnMut(&mut Site<'_>)| {

@@ -3,8 +3,8 @@
 use super::Assets;
 use crate::geometry::GridSdf;
 use crate::math::Signal;
-use tumble_interface::{Mesh, Scene};
 use tumble_interface::scene::{Diagonals, Emitter, GridBox, HeatScheme, Shape, Source};
+use tumble_interface::{Mesh, Scene};
 
 /// Bytes for a mass: its rows in state, scratch, snapshot and history, in double precision.
 const MASS: f64 = 1200.0;

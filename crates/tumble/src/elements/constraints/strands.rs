@@ -424,8 +424,7 @@ impl Group {
         frame: Quat<W::L>,
     ) -> Stretched<W::L> {
         let at = i * self.count + s;
-        let (inverse, shear, there) =
-            (w.load(&self.stretch[0][at..]), w.load(&self.stretch[1][at..]), w.load(&self.stretch[2][at..]));
+        let (inverse, shear, there) = (w.load(&self.stretch[0][at..]), w.load(&self.stretch[1][at..]), w.load(&self.stretch[2][at..]));
         let way = Vec3 { x: points[1][0] - points[0][0], y: points[1][1] - points[0][1], z: points[1][2] - points[0][2] };
         let d = frame.conj().turn(way * inverse);
         let s = [shear, shear, there];

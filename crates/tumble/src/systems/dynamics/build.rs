@@ -1,7 +1,7 @@
 //! From the parts that recipes collect to a system.
 
-use super::laws::Acting;
 use super::coat::Coat;
+use super::laws::Acting;
 use super::{Carried, Dynamics, Stepping, books};
 use crate::elements::{
     BendTwist, Constraints, Distance, Element, Elements, Hinge, Linear, Members, Neohookean, Nonlinear, Pairs, Projected, Strands,
