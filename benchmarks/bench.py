@@ -21,6 +21,7 @@ CASES = [
     "emission",
     "gravitation",
     "flock",
+    "hair",
     "pressure",
     "smoke",
     "heat",

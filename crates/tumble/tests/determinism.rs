@@ -87,6 +87,10 @@ fn scenes() -> Vec<(&'static str, String, usize)> {
     let smoke = "[[system]]\nmethod = \"tracers\"\nintegrator = \"rk4\"\nsubsteps = 2\n[[field]]\nkind = \"swirl\"\nrate = 3\n[[field]]\nkind = \"turbulence\"\nstrength = 0.3\nscale = 0.4\n\
                  [[emitter]]\nname = \"smoke\"\nrate = \"20000*(1 + sin(9*t))\"\npath = \"[0.3*cos(5*t), 0.3*sin(5*t), 0]\"\nlifetime = 0.5\nlifetime_spread = 0.2\nfrom.sphere.radius = 0.1\n\
                  [[particles]]\nname = \"three\"\nposition = [[1, 0, 0], [0, 1, 0], [0, 0, 1]]\n";
+    let hair = "[[system]]\nmethod = \"position_based\"\nsubsteps = 10\n[[collider]]\nname = \"head\"\nthickness = 0.002\nfriction = 0.3\nshape.sphere.radius = 0.1\n\
+                motion = { spin = [0, 3, 0], keys = [{ time = 0 }, { time = 0.2, translate = [0.1, 0, 0.1], rotate = [0, 40, 0] }] }\n\
+                [[hair]]\nname = \"hair\"\non = \"head\"\ncount = 301\nlength = 0.12\nspread = 0.3\nsegments = 14\nlean = [0.3, 0, 0.2]\ncurl = { radius = 0.02, pitch = 0.05 }\n\
+                clump = { count = 20 }\ndamping = 0.01\ncollisions = { cell = 0.015, friction = 8, pressure = 0.02 }\n";
     vec![
         ("smoke", smoke.to_string(), 16),
         ("fire", fire, 6),
@@ -105,6 +109,8 @@ fn scenes() -> Vec<(&'static str, String, usize)> {
         ("sheet, iterated", sheet("method = \"position_based\"\nsubsteps = 2\nposition_based.iterations = 4", hinges), 10),
         ("sheet, torn, position based", sheet("method = \"position_based\"\nsubsteps = 12", torn), 20),
         ("rod, position based", rod("position_based", "= 20"), 10),
+        ("hair", hair.to_string(), 10),
+        ("hair, iterated", hair.replace("substeps = 10", "substeps = 2\nposition_based.iterations = 3"), 5),
         ("jelly, position based", jelly.replace("symplectic_euler", "position_based"), 4),
         ("sheet, torn", sheet("integrator = \"velocity_verlet\"\nsubsteps = 12", torn), 20),
         ("rod, explicit", rod("symplectic_euler", "= 200"), 20),

@@ -73,6 +73,8 @@ class Part:
     radius: float = 0.0
     cut: tuple[npt.NDArray[np.int64], npt.NDArray[np.int64]] | None = None
     """What `surfaces.split` says of a solid that has sharp edges."""
+    taper: npt.NDArray[np.float64] | None = None
+    """Radius of each point of a strand of hair."""
     trail: bool = False
     """Whether its curves are the ways of points, as long as `Object.trail` says."""
 
@@ -190,6 +192,12 @@ def _parts(found: list[Object], start: Columns) -> list[Part]:
             parts.append(Part(thing, path(thing.name), thing.name, "Points", radius=thing.radius))
         elif thing.kind == "grid":
             parts.append(Part(thing, path(thing.name), thing.name, "Volume"))
+        elif thing.strands is not None:
+            shown = thing.strands
+            counts = np.full(len(shown.guides), shown.points)
+            taper = thing.radius * np.sqrt(1.0 - 0.96 * np.linspace(0.0, 1.0, shown.points))
+            where = path(thing.name)
+            parts.append(Part(thing, where, thing.name, "BasisCurves", None, counts, thing.radius, taper=taper))
         elif thing.kind == "curve":
             counts = np.array([len(thing.curve)])
             where = path(thing.name)
@@ -258,6 +266,16 @@ def _values(part: Part, columns: Columns, ways: Ways) -> Iterator[tuple[str, str
         points, counts = ways[part.thing.name]
         yield "points", "point3f[]", points
         yield "curveVertexCounts", "int[]", counts
+        yield "extent", "float3[]", _extent(points, np.float32(part.radius))
+        return
+    if part.taper is not None and part.thing.strands is not None:
+        shown = part.thing.strands
+        points = np.ascontiguousarray(shown.of(positions(columns, part.thing)).reshape(-1, 3), dtype=np.float32)
+        yield "points", "point3f[]", points
+        speeds = columns.get(part.thing.name, {}).get("velocity")
+        if speeds is not None:
+            moved = shown.of(np.asarray(speeds, dtype=float)).reshape(-1, 3)
+            yield "velocities", "vector3f[]", np.ascontiguousarray(moved, dtype=np.float32)
         yield "extent", "float3[]", _extent(points, np.float32(part.radius))
         return
     x = _places(part.thing, columns)
@@ -387,7 +405,12 @@ def _objects(run: Recording, parts: list[Part], start: Columns, ways: Ways) -> A
             else:
                 assert part.counts is not None
                 curves.CreateCurveVertexCountsAttr(Vt.IntArray.FromNumpy(part.counts.astype(np.int32)))
-                curves.CreateWidthsAttr(Vt.FloatArray(n, 2 * part.radius))
+                if part.taper is None:
+                    widths = Vt.FloatArray(n, 2 * part.radius)
+                else:
+                    each = np.tile(2 * part.taper, len(part.counts)).astype(np.float32)
+                    widths = Vt.FloatArray.FromNumpy(each)
+                curves.CreateWidthsAttr(widths)
                 curves.SetWidthsInterpolation(UsdGeom.Tokens.vertex)
         else:
             mesh = UsdGeom.Mesh(prim)

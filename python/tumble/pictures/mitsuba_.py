@@ -17,11 +17,14 @@ from tumble.pictures.denoise import denoise
 from tumble.pictures.framing import Camera
 from tumble.pictures.look import FADE, background, fading, key_light, soften
 from tumble.pictures.surfaces import Floats, Indices, balls, joined, turned, unit
-from tumble.pictures.things import Body, Ground, Mesh, Smoke, Spheres, Thing, Tubes, as_triangles
+from tumble.pictures.things import Body, Ground, Hair, Mesh, Smoke, Spheres, Thing, Tubes, as_triangles
 from tumble.style import Rgb, display
 
 MANY = 20_000
 """More spheres than these are drawn as triangles."""
+
+SHADES = (0.75, 1.0, 1.2, 0.9)
+"""Brightness of strands of hair, one after the other."""
 
 FEW = 5_000
 """More curves than these end flat."""
@@ -145,6 +148,8 @@ def _shapes(mi: Any, bodies: list[Body], camera: Camera, folder: Path) -> dict[s
             found = _spheres(mi, thing)
         elif isinstance(thing, Tubes):
             found = _tubes(mi, thing, folder / f"{k}.txt")
+        elif isinstance(thing, Hair):
+            found = _hair(mi, thing, folder / f"{k}")
         elif isinstance(thing, Mesh) and len(thing.triangles):
             look = mi.load_dict(_bsdf(thing.color, thing.fabric))
             found = {"": _mesh(mi, *turned(thing.vertices, thing.triangles, thing.normals, camera.eye), look)}
@@ -201,6 +206,23 @@ def _tubes(mi: Any, thing: Tubes, file: Path) -> dict[str, Any]:
         ends = [p for c in curves for p in (c[0].tolist(), c[-1].tolist())]
         for j, p in enumerate(ends):
             parts[f"{j}"] = {"type": "sphere", "center": p, "radius": thing.radius, "bsdf": look}
+    return parts
+
+
+def _hair(mi: Any, thing: Hair, stem: Path) -> dict[str, Any]:
+    """Strands in a few shades, as curves."""
+    parts: dict[str, Any] = {}
+    for j, shade in enumerate(SHADES):
+        curves = thing.curves[j :: len(SHADES)]
+        if not len(curves):
+            continue
+        rows = np.concatenate([curves, np.broadcast_to(thing.radii[:, None], (*curves.shape[:2], 1))], axis=-1)
+        line = "%.7g %.7g %.7g %.7g\n" * curves.shape[1] + "\n"
+        file = stem.with_name(f"{stem.name}-{j}.txt")
+        file.write_text("".join(line % tuple(strand) for strand in rows.reshape(len(rows), -1).tolist()))
+        r, g, b = thing.color
+        look = mi.load_dict(_bsdf((r * shade, g * shade, b * shade), False))
+        parts[f"{j}"] = {"type": "linearcurve", "filename": str(file), "bsdf": look}
     return parts
 
 

@@ -20,6 +20,7 @@ from tumble import grids
 from tumble._engine import ExportError
 from tumble.grids import Box
 from tumble.pictures.blackbody import developed, glow
+from tumble.pictures.strands import Strands, prisms, strands
 from tumble.pictures.surfaces import Floats, Indices, balls, normals, outward, split, tubes
 from tumble.style import COLORS, GROUND, PALETTE, SOLID, Rgb, linear, rgb
 
@@ -77,6 +78,8 @@ class Object:
     triangles: Indices = field(default_factory=lambda: np.zeros((0, 3), dtype=np.int64))
     links: Indices = field(default_factory=lambda: np.zeros((0, 2), dtype=np.int64))
     curve: Indices = field(default_factory=lambda: np.zeros(0, dtype=np.int64))
+    strands: Strands | None = None
+    """Hair: the curves that are drawn."""
     position: Floats | None = None
     """Vertices [m] of what does not move."""
     plane: tuple[Floats, Floats] | None = None
@@ -119,6 +122,17 @@ class Tubes:
     points: Floats
     counts: Indices
     radius: float
+    color: Rgb
+
+
+@dataclass(frozen=True)
+class Hair:
+    """Strands, strands x points x 3, that taper."""
+
+    name: str
+    curves: Floats
+    radii: Floats
+    """Of the points of a strand."""
     color: Rgb
 
 
@@ -181,7 +195,7 @@ class Image:
     """How much it hides, n x m."""
 
 
-Body = Mesh | Spheres | Tubes
+Body = Mesh | Spheres | Tubes | Hair
 Thing = Body | Ground | Cloud | Smoke | Image
 
 MANY = 2_000
@@ -238,6 +252,9 @@ DYE = 3.0
 FEW = 200
 """An object of fewer masses than these is drawn at least three times as thick as the thinnest."""
 
+HAIR = 0.2
+"""Radius of the thinnest strand, over that of the thinnest of other things."""
+
 SYSTEMS = ("system", "anchor", "force", "field")
 """Sections of a scene whose names are not names of objects."""
 
@@ -271,6 +288,10 @@ def objects(run: Recording) -> list[Object]:
         else:
             color = rgb(PALETTE[colors % len(PALETTE)])
             colors += 1
+        per_strand = int(np.ravel(columns.get("curve_points", 0))[0])
+        tufts = None
+        if per_strand > 0 and "position" in start.get(name, {}):
+            tufts = strands(start[name]["position"], per_strand, int(entry.get("render", 1)))
         kind: Kind = "points"
         if grid is not None:
             kind = "grid"
@@ -291,6 +312,7 @@ def objects(run: Recording) -> list[Object]:
                 triangles=_indices(columns, "triangles", 3),
                 links=_indices(columns, "links", 2),
                 curve=_indices(columns, "curve", 1).ravel(),
+                strands=tufts,
                 position=np.asarray(columns["position"], dtype=float).reshape(-1, 3) if "position" in columns else None,
                 plane=plane,
                 container=bool(entry.get("inside", False)),
@@ -532,6 +554,10 @@ class Stage:
     def _moving(self, thing: Object, columns: Columns, thinnest: float) -> list[Thing]:
         x = positions(columns, thing)
         broken = self._broken(thing, columns)
+        if thing.strands is not None:
+            taper = 1.0 - 0.8 * np.linspace(0.0, 1.0, thing.strands.points) ** 2
+            radii = max(thing.radius, HAIR * thinnest) * taper
+            return [Hair(thing.name, thing.strands.of(x), radii, thing.color)]
         thing = replace(thing, radius=max(thing.radius, thinnest * (3 if len(x) < FEW else 1)))
         if thing.kind in ("sheet", "block"):
             triangles = _without(thing.triangles, thing.links[broken])
@@ -753,6 +779,8 @@ def placed(things: list[Thing], origin: Floats, scale: float) -> list[Thing]:
             out.append(replace(t, centers=(t.centers - origin) / scale, radii=t.radii / scale))
         elif isinstance(t, Tubes):
             out.append(replace(t, points=(t.points - origin) / scale, radius=t.radius / scale))
+        elif isinstance(t, Hair):
+            out.append(replace(t, curves=(t.curves - origin) / scale, radii=t.radii / scale))
         elif isinstance(t, Cloud):
             ways = (t.ways - origin) / scale
             out.append(replace(t, centers=(t.centers - origin) / scale, radii=t.radii / scale, ways=ways))
@@ -776,4 +804,6 @@ def as_triangles(thing: Body, finer: int = 2) -> tuple[Floats, Indices, Floats]:
     if isinstance(thing, Spheres):
         many = sum(len(thing.centers) > limit for limit in (500, 5_000, 50_000))
         return balls(thing.centers, thing.radii, max(finer - many, 0))
+    if isinstance(thing, Hair):
+        return prisms(thing.curves, thing.radii)
     return tubes(thing.points, thing.counts, thing.radius)

@@ -8,6 +8,7 @@ mod emitters;
 mod forces;
 mod gas;
 mod grids;
+mod hair;
 mod heat;
 mod output;
 mod shapes;
@@ -24,6 +25,7 @@ pub use gas::{
     PressureMethod, Smoke, Solid, Temperature, Viscous,
 };
 pub use grids::GridBox;
+pub use hair::{Clump, Curl, Hair, HairCollisions};
 pub use heat::{Heat, HeatRegion, HeatScheme, HeatSide, HeatSides, HeatSource};
 pub use output::{Camera, Expect, Look, Output, Probe};
 pub use shapes::{Collider, Figure, Mannequin, MeshFile, MeshFrame, MeshFrames, MeshRef, Motion, Moves, Pace, Pose, Shape};
@@ -85,6 +87,9 @@ pub struct Scene {
     /// Chains of springs, or rods.
     #[serde(default)]
     pub rope: Vec<Rope>,
+    /// Strands planted on surfaces.
+    #[serde(default)]
+    pub hair: Vec<Hair>,
     /// Lattices of springs in a rectangle.
     #[serde(default)]
     pub sheet: Vec<Sheet>,
@@ -259,6 +264,9 @@ impl Scene {
         }
         let mut all: Vec<MeshRef<'_>> = Vec::new();
         all.extend(self.net.iter_mut().map(|n| one(format!("net \"{}\".mesh", n.name), &mut n.mesh)));
+        for Hair { name, mesh, .. } in &mut self.hair {
+            all.extend(mesh.as_mut().map(|mesh| one(format!("hair \"{name}\".mesh"), mesh)));
+        }
         for thing in &mut self.collider {
             let place = format!("collider \"{}\".shape", thing.name);
             match &mut thing.shape {

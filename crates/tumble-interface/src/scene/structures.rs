@@ -273,6 +273,10 @@ pub struct Rod {
     #[serde(default)]
     #[schemars(range(min = 0.0), extend("x-unit" = "s"))]
     pub damping: f64,
+    /// A segment breaks for good when its length is off by more than this share; only in position-based systems.
+    #[serde(default)]
+    #[schemars(extend("x-unit" = "1", "exclusiveMinimum" = 0.0))]
+    pub break_strain: Option<f64>,
 }
 
 /// A rectangle of masses and links.

@@ -13,8 +13,10 @@ use std::marker::PhantomData;
 use std::ops::Range;
 
 mod neohookean;
+mod strands;
 
 pub use neohookean::Neohookean;
+pub use strands::Strands;
 
 /// Elements per task.
 const TASK: usize = 2048;

@@ -25,7 +25,7 @@ mod vector;
 pub use crate::linalg::blocks::Block;
 pub use batch::{Batch, Elements, Weights};
 pub use bend::Hinge;
-pub use constraints::{Constraints, Neohookean, Projected, Projection};
+pub use constraints::{Constraints, Neohookean, Projected, Projection, Strands};
 pub use contact::PointPlane;
 pub use distance::{Distance, Limit};
 pub use law::{Law, Linear, Nonlinear};

@@ -87,7 +87,7 @@ fn frames(site: &mut Site<'_>, thing: &Rope, rod: &Rod, places: &[Vector], first
             }
         }
         let k = rod.stretch * spacing;
-        site.parts.rod_stretch([first + i as u32, first + i as u32 + 1], frame, [spacing, shear], k, k * rod.damping);
+        site.parts.rod_stretch([first + i as u32, first + i as u32 + 1], frame, [spacing, shear], k, k * rod.damping, rod.break_strain);
         if i > 0 && rod.bend > 0.0 {
             bend(site, rod, [before, frame], spacing, twist);
         }
@@ -114,7 +114,7 @@ fn clamp(site: &mut Site<'_>, rod: &Rod, frame: u32, turn: Quat<f64>, spacing: f
 }
 
 /// The shortest rotation from one unit vector to another.
-fn shortest(a: Vector, b: Vector) -> Quat<f64> {
+pub(super) fn shortest(a: Vector, b: Vector) -> Quat<f64> {
     let q = Quat { v: a.cross(b), w: 1.0 + a.dot(b) };
     if q.w > 1e-12 { q.normalized() } else { from_z_to(b) * from_z_to(a).conj() }
 }

@@ -24,7 +24,7 @@ use std::borrow::Cow;
 use std::sync::Arc;
 use tumble_interface::check::plain;
 use tumble_interface::scene::{
-    Animated, Bits, Field as Stream, Force as Words, Integrator, MeshFile, Method, Plane, Scene, Shape, System as Plan, Vicsek,
+    Animated, Bits, Field as Stream, Force as Words, Hair, Integrator, MeshFile, Method, Plane, Scene, Shape, System as Plan, Vicsek,
 };
 use tumble_interface::{Column, Data, Issue, Mesh, SceneError};
 
@@ -84,8 +84,8 @@ pub fn build(scene: &Scene, assets: &Assets) -> Result<Built, SceneError> {
     let drawn = with_clouds(scene);
     let scene = &*drawn;
     let mut warnings = unused(scene, &plans);
-    let (colliders, scenery) = solids(scene, assets, &mut issues);
-    let mut parts = fill(scene, &plans, assets, &colliders, &mut issues);
+    let (colliders, scenery, surfaces) = solids(scene, assets, &mut issues);
+    let mut parts = fill(scene, &plans, assets, (&colliders, &surfaces), &mut issues);
     let anchors: Vec<coupling::Link> =
         scene.anchor.iter().filter_map(|anchor| coupling::link(scene, &plans, anchor, &parts, &mut issues)).collect();
     for anchor in &anchors {
@@ -249,8 +249,8 @@ fn gravity(scene: &Scene) -> [f64; 3] {
     g
 }
 
-fn solids(scene: &Scene, assets: &Assets, issues: &mut Vec<Issue>) -> (Vec<Collider>, Vec<Column>) {
-    let (mut colliders, mut scenery) = (Vec::new(), Vec::new());
+fn solids(scene: &Scene, assets: &Assets, issues: &mut Vec<Issue>) -> (Vec<Collider>, Vec<Column>, Vec<Mesh>) {
+    let (mut colliders, mut scenery, mut surfaces) = (Vec::new(), Vec::new(), Vec::new());
     for thing in &scene.collider {
         let meshes: Vec<Mesh> = match &thing.shape {
             Shape::Mesh(file) => assets.get(&file.path).map(|mesh| recipes::placed(mesh, file)).into_iter().collect(),
@@ -280,19 +280,20 @@ fn solids(scene: &Scene, assets: &Assets, issues: &mut Vec<Issue>) -> (Vec<Colli
         };
         add("position", "m", Data::F64(surface.vertices.concat()));
         add("triangles", "1", Data::U32(surface.triangles.concat()));
+        surfaces.push(surface);
     }
-    (colliders, scenery)
+    (colliders, scenery, surfaces)
 }
 
 /// Parts of every system, filled by the recipes in the order of the scene.
-fn fill(scene: &Scene, plans: &[Plan], assets: &Assets, colliders: &[Collider], issues: &mut Vec<Issue>) -> Vec<Parts> {
+fn fill(scene: &Scene, plans: &[Plan], assets: &Assets, solids: (&[Collider], &[Mesh]), issues: &mut Vec<Issue>) -> Vec<Parts> {
     // Issues leave colliders out, and then nothing is built.
-    let solids: Vec<(String, Collider)> = scene.collider.iter().map(|c| c.name.clone()).zip(colliders.iter().cloned()).collect();
+    let named: Vec<(String, Collider)> = scene.collider.iter().map(|c| c.name.clone()).zip(solids.0.iter().cloned()).collect();
     let mut parts: Vec<Parts> = plans.iter().map(|_| Parts::default()).collect();
     let up: Vector = if scene.dimension == 2 && scene.plane == Plane::Xy { [0.0, 1.0, 0.0] } else { [0.0, 0.0, 1.0] }.into();
     let mut at = |kind: &str, system: &Option<String>, recipe: &mut dyn FnMut(&mut Site<'_>)| {
         if let Some(index) = place(plans, kind, system.as_deref()) {
-            recipe(&mut Site { parts: &mut parts[index], issues: &mut *issues, up, solids: &solids });
+            recipe(&mut Site { parts: &mut parts[index], issues: &mut *issues, up, solids: &named });
         }
     };
     for thing in &scene.particles {
@@ -328,6 +329,9 @@ fn fill(scene: &Scene, plans: &[Plan], assets: &Assets, colliders: &[Collider], 
     for thing in &scene.rope {
         at("rope", &thing.system, &mut |site| recipes::rope(site, thing));
     }
+    for thing in &scene.hair {
+        at("hair", &thing.system, &mut |site| planted(site, scene, thing, assets, solids));
+    }
     for thing in &scene.sheet {
         at("sheet", &thing.system, &mut |site| recipes::sheet(site, thing));
     }
@@ -354,6 +358,37 @@ fn fill(scene: &Scene, plans: &[Plan], assets: &Assets, colliders: &[Collider], 
         });
     }
     parts
+}
+
+/// Hair on its mesh or collider.
+fn planted(site: &mut Site<'_>, scene: &Scene, thing: &Hair, assets: &Assets, (colliders, surfaces): (&[Collider], &[Mesh])) {
+    let path = format!("hair \"{}\"", thing.name);
+    let mut wrong = |key: &str, message: String| site.issues.push(Issue::new(format!("{path}{key}"), message));
+    if thing.count.is_some() == thing.per_area.is_some() {
+        return wrong(".count", "expected either a count of strands or per_area, strands per area".into());
+    }
+    match (&thing.mesh, &thing.on) {
+        (Some(file), None) => match assets.get(&file.path) {
+            Some(mesh) => {
+                let mesh = recipes::placed(mesh, file);
+                recipes::hair(site, thing, scene.seed, &recipes::Ground { mesh: &mesh, carrier: None });
+            }
+            None => wrong(".mesh", "the mesh has not been loaded".into()),
+        },
+        (None, Some(name)) => {
+            let Some(k) = scene.collider.iter().position(|c| c.name == *name) else {
+                return wrong(".on", format!("there is no collider \"{name}\""));
+            };
+            if let Shape::Plane { .. } | Shape::Floor { .. } | Shape::AnimatedMesh(_) = scene.collider[k].shape {
+                return wrong(".on", format!("collider \"{name}\" has no end or changes its shape; hair grows on what moves as a whole"));
+            }
+            // What is wrong with the collider is told elsewhere.
+            let (true, Some(mesh)) = (colliders.len() == scene.collider.len(), surfaces.get(k)) else { return };
+            let carrier = colliders[k].motion.as_ref().map(|motion| (k, motion.at(0.0).0));
+            recipes::hair(site, thing, scene.seed, &recipes::Ground { mesh, carrier });
+        }
+        _ => wrong(".on", "expected either the name of a collider, or a mesh".into()),
+    }
 }
 
 /// Gives every system the forces that act on its objects, and reads the fields.

@@ -32,6 +32,7 @@ pub fn objects(scene: &Scene) -> Vec<(&'static str, &str, Option<&str>)> {
     let particles = scene.particles.iter().map(|o| ("particles", o.name.as_str(), o.system.as_deref()));
     let ropes = scene.rope.iter().map(|o| ("rope", o.name.as_str(), o.system.as_deref()));
     let sheets = scene.sheet.iter().map(|o| ("sheet", o.name.as_str(), o.system.as_deref()));
+    let hairs = scene.hair.iter().map(|o| ("hair", o.name.as_str(), o.system.as_deref()));
     let blocks = scene.block.iter().map(|o| ("block", o.name.as_str(), o.system.as_deref()));
     let nets = scene.net.iter().map(|o| ("net", o.name.as_str(), o.system.as_deref()));
     let cloths = scene.cloth.iter().map(|o| ("cloth", o.name.as_str(), o.system.as_deref()));
@@ -40,7 +41,7 @@ pub fn objects(scene: &Scene) -> Vec<(&'static str, &str, Option<&str>)> {
     let gases = scene.gas.iter().map(|o| ("gas", o.name.as_str(), o.system.as_deref()));
     let bodies = scene.heat.iter().map(|o| ("heat", o.name.as_str(), o.system.as_deref()));
     let sounding = scene.compressible.iter().map(|o| ("compressible", o.name.as_str(), o.system.as_deref()));
-    let things = particles.chain(emitters).chain(ropes).chain(sheets).chain(blocks).chain(nets).chain(cloths).chain(galaxies);
+    let things = particles.chain(emitters).chain(ropes).chain(hairs).chain(sheets).chain(blocks).chain(nets).chain(cloths).chain(galaxies);
     things.chain(gases).chain(bodies).chain(sounding).collect()
 }
 
@@ -50,7 +51,7 @@ pub fn check(scene: &Scene, systems: &[System]) -> Vec<Issue> {
     let mut wrong = |path: String, message: String| issues.push(Issue::new(path, message));
     let objects = objects(scene);
     if objects.is_empty() {
-        let message = "nothing to simulate: add particles, an emitter, a rope, a sheet, a block, a net, cloth, a galaxy, a gas, heat or a \
+        let message = "nothing to simulate: add particles, an emitter, a rope, hair, a sheet, a block, a net, cloth, a galaxy, a gas, heat or a \
                        compressible gas";
         wrong(String::new(), message.into());
     }

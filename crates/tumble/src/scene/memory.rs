@@ -3,8 +3,8 @@
 use super::Assets;
 use crate::geometry::GridSdf;
 use crate::math::Signal;
-use tumble_interface::Scene;
 use tumble_interface::scene::{Diagonals, Dress, Emitter, GridBox, HeatScheme, Shape, Source};
+use tumble_interface::{Mesh, Scene};
 
 /// Bytes for a mass: its rows in state, scratch, snapshot and history, in double precision.
 const MASS: f64 = 1200.0;
@@ -48,6 +48,29 @@ pub fn memory(scene: &Scene, assets: &Assets) -> f64 {
     for thing in &scene.rope {
         let links = if thing.rod.is_some() { 6.0 } else { 2.0 };
         bytes += (f64::from(thing.segments) + 1.0) * (2.0 * MASS + links * LINK);
+    }
+    for thing in &scene.hair {
+        let of = |mesh: &Mesh, scale: f64| {
+            let corner = |i: u32| mesh.vertices[i as usize];
+            let area = |t: &[u32; 3]| {
+                let [a, b, c] = t.map(corner).map(crate::math::Vec3::from);
+                (b - a).cross(c - a).norm() / 2.0
+            };
+            mesh.triangles.iter().map(area).sum::<f64>() * scale * scale
+        };
+        let carrier = scene.collider.iter().find(|c| Some(&c.name) == thing.on.as_ref()).map(|c| &c.shape);
+        let file = if let Some(Shape::Mesh(file)) = carrier { Some(file) } else { thing.mesh.as_ref() };
+        let area = match carrier {
+            Some(Shape::Sphere { radius, .. }) => 13.0 * radius * radius,
+            Some(Shape::Box { size: [a, b, c], .. }) => 2.0 * (a * b + b * c + c * a),
+            Some(Shape::Capsule { from, to, radius }) => {
+                let way = (0..3).map(|a| (to[a] - from[a]).powi(2)).sum::<f64>().sqrt();
+                6.3 * radius * (way + 2.0 * radius)
+            }
+            _ => file.and_then(|file| Some(of(assets.get(&file.path)?, file.scale))).unwrap_or(0.0),
+        };
+        let strands = thing.per_area.map_or(f64::from(thing.count.unwrap_or(1)), |n| n * area);
+        bytes += strands * (f64::from(thing.segments) + 2.0) * (2.0 * MASS + 4.0 * LINK);
     }
     for thing in &scene.sheet {
         let n: f64 = thing.resolution.iter().map(|n| f64::from(*n)).product();

@@ -54,6 +54,8 @@ pub struct Object {
     pub triangles: Vec<[u32; 3]>,
     /// Points in the order of a curve, counted from its first; empty if it is none.
     pub curve: Vec<u32>,
+    /// Of many curves, how many points each has; 0 if it is one.
+    pub curve_points: u32,
     /// Its links: index of the batch and the elements in it.
     pub links: Vec<(usize, Range<usize>)>,
     /// The two points of each link, counted from its first, in the order of `links`.

@@ -201,6 +201,9 @@ impl Dynamics {
             add("triangles", "1", 3, Data::U32(object.triangles.concat()));
             add("links", "1", 2, Data::U32(object.link_ends.concat()));
             add("curve", "1", 1, Data::U32(object.curve.clone()));
+            if object.curve_points > 0 {
+                add("curve_points", "1", 1, Data::U32(vec![object.curve_points]));
+            }
             if object.radius > 0.0 {
                 add("radius", "m", 1, Data::F64(vec![object.radius]));
             }

@@ -1,21 +1,22 @@
 //! From the parts that recipes collect to a system.
 
+use super::coat::Coat;
 use super::held::Held;
 use super::laws::Acting;
 use super::{Dynamics, Stepping, books};
 use crate::elements::{
-    BendTwist, Constraints, Distance, Element, Elements, Hinge, Linear, Members, Neohookean, Nonlinear, Pairs, Projected, StretchShear,
-    TetShear, TetStrain, TetVolume, Tethers, Vector,
+    BendTwist, Constraints, Distance, Element, Elements, Hinge, Linear, Members, Neohookean, Nonlinear, Pairs, Projected, Strands,
+    StretchShear, TetShear, TetStrain, TetVolume, Tethers, Vector,
 };
 use crate::forces::{Attractor, Cohesion, DirectSum, Flock, Force, Goal, Habits, Halos, LennardJones, Near, Repulsion, Viscosity};
 use crate::geometry::Collider;
 use crate::integrators::Memory;
-use crate::math::{Real, Vec3, functions};
+use crate::math::{Quat, Real, Vec3, functions};
 use crate::pool::{Emitter, Pool};
 use crate::state::{Masses, Object, State};
 use std::ops::Range;
 use std::sync::Arc;
-use tumble_interface::scene::{Adaptive, Force as Words, Hessian, Integrator, PositionBased, SelfContact, Solver};
+use tumble_interface::scene::{Adaptive, Force as Words, HairCollisions, Hessian, Integrator, PositionBased, SelfContact, Solver};
 use tumble_interface::{Issue, SceneError};
 
 /// How a system steps.
@@ -100,8 +101,14 @@ pub struct Parts {
     strains: Vec<Members<4, 9, 0>>,
     stretches: Vec<Members<3, 2, 0>>,
     bends: Vec<Members<2, 5, 0>>,
+    /// Hair that acts on itself, by object.
+    coats: Vec<(usize, HairCollisions)>,
+    /// Strains at which segments of rods break.
+    rod_limits: Vec<f64>,
     energy_at_rest: [f64; 2],
+    /// Points that follow colliders, by their places in the world at t = 0, and those whose places in what they follow are known.
     held: Vec<Held>,
+    carried: Vec<Held>,
     objects: Vec<Draft>,
     emitters: Vec<Emitter>,
     /// Forces on each mass by itself, with the objects that they act on, counted from the first that was begun.
@@ -206,7 +213,7 @@ impl Parts {
 
     /// Lets a point that is held follow a collider, counted from the first, or one of its bones.
     pub fn follow(&mut self, point: u32, collider: usize, bone: Option<usize>) {
-        self.held.push(Held { row: point as usize, collider, bone, place: self.position(point) });
+        self.held.push(Held { row: point as usize, collider, bone, place: self.position(point), frame: None });
     }
 
     /// Holds a frame.
@@ -272,8 +279,19 @@ impl Parts {
         self.energy_at_rest[1] += 0.5 * lame_mu * lame_mu / lambda * volume;
     }
 
-    /// Adds the stretch and shear of a rod segment between two points, with its frame.
-    pub fn rod_stretch(&mut self, points: [u32; 2], frame: u32, rest: [f64; 2], stiffness: f64, damping: f64) {
+    /// A collider carries a point, which is at `x` [m] in it, and a frame, whose turn in it is `q`. Both must be held.
+    pub fn carry(&mut self, collider: usize, point: u32, x: Vec3<f64>, frame: u32, q: Quat<f64>) {
+        self.carried.push(Held { row: point as usize, collider, bone: None, place: x, frame: Some((frame as usize, q)) });
+    }
+
+    /// Makes the object under construction act on itself as a continuum.
+    pub fn coat(&mut self, words: HairCollisions) {
+        self.coats.push((self.objects.len() - 1, words));
+    }
+
+    /// Adds the stretch and shear of a rod segment between two points, with its frame and the strain at which it breaks.
+    pub fn rod_stretch(&mut self, points: [u32; 2], frame: u32, rest: [f64; 2], stiffness: f64, damping: f64, breaks: Option<f64>) {
+        self.rod_limits.push(breaks.unwrap_or(f64::INFINITY));
         self.stretches.push(Members { nodes: [points[0], points[1], frame], rest, law: [], stiffness, damping });
     }
 
@@ -324,6 +342,16 @@ impl Parts {
             return Err(SceneError::one(format!("system \"{}\"", settings.name), message));
         }
         let rows = points + self.frames.len();
+        if settings.integrator.is_adaptive() && !self.coats.is_empty() {
+            let message = "hair that acts on itself needs steps of equal length; set another integrator";
+            return Err(SceneError::one(format!("system \"{}\".integrator", settings.name), message));
+        }
+        if settings.integrator != Integrator::PositionBased && self.rod_limits.iter().any(|l| l.is_finite()) {
+            let message = "rods with a break_strain break in position-based systems only; set integrator = \"position_based\"";
+            return Err(SceneError::one(format!("system \"{}\".integrator", settings.name), message));
+        }
+        self.carried.retain(|c| settings.colliders.get(c.collider).is_some_and(|c| c.motion.is_some()));
+        self.carried.iter_mut().filter_map(|held| held.frame.as_mut()).for_each(|(frame, _)| *frame += points);
         for nodes in self.stretches.iter_mut().map(|m| &mut m.nodes) {
             nodes[2] += points as u32;
         }
@@ -379,8 +407,7 @@ impl Parts {
             batches.add::<Hinge, 4, 1, 1>(&self.hinges, 0.0),
             batches.solids(&self.shears, &self.volumes, self.energy_at_rest),
             batches.add::<TetStrain, 4, 6, 9>(&self.strains, 0.0),
-            batches.add::<StretchShear, 3, 3, 2>(&self.stretches, 0.0),
-            batches.add::<BendTwist, 2, 3, 5>(&self.bends, 0.0),
+            batches.rods(&self.stretches, &mut self.bends, &self.rod_limits),
         ];
         if made.contains(&None) || kinds.contains(&None) {
             return Err(lost());
@@ -419,6 +446,7 @@ impl Parts {
         let sewn = self.vector.members.iter().map(|m| m.nodes);
         let layers = settings.self_contact.as_ref().filter(|_| projected);
         let layers = layers.and_then(|words| super::layers::Layers::new(words, &objects, sewn, &state));
+        let coats = self.coats.into_iter().map(|(i, words)| Coat::new(objects[places[i]].points.clone(), words, &state.x)).collect();
         let placed = |on: Vec<usize>| -> Vec<usize> { on.into_iter().map(|i| places[i]).collect() };
         let rows_of = |on: &[usize]| -> Vec<Range<usize>> { on.iter().map(|i| objects[*i].points.clone()).collect() };
         let mut pairs = Vec::new();
@@ -466,12 +494,13 @@ impl Parts {
             objects,
             tethers: Vec::new(),
             clamp: clamp.flatten(),
+            coats,
             constraints: batches.constraints,
             sweeps: settings.sweeps.clone(),
             rates: Vec::new(),
             reach,
             layers,
-            held: Held::at_rest(self.held, &settings.colliders),
+            held: Held::at_rest(self.held, &settings.colliders).into_iter().chain(self.carried).collect(),
             user: None,
             scratch: Default::default(),
             before: Vec::new(),
@@ -627,6 +656,16 @@ impl Batches {
             self.list.push(Box::new(elements.with_energy_at_rest(energy_at_rest)));
         }
         Some(())
+    }
+
+    /// Adds rods, if there are any: as constraints, chains are solved as a whole.
+    fn rods(&mut self, stretches: &[Members<3, 2, 0>], bends: &mut Vec<Members<2, 5, 0>>, limits: &[f64]) -> Option<()> {
+        let strands = self.projected.as_ref().and_then(|inverse| Strands::new(self.rows, self.points, inverse, stretches, bends, limits));
+        match strands {
+            Some(strands) => self.constraints.push(Box::new(strands)),
+            None => self.add::<StretchShear, 3, 3, 2>(stretches, 0.0)?,
+        }
+        self.add::<BendTwist, 2, 3, 5>(bends, 0.0)
     }
 
     /// Adds both laws of solids, if there are any; `None` if a node is not a row.

@@ -1,9 +1,9 @@
-//! Points that are held and follow a collider, or one of its bones: functions of time alone, and so in no snapshot.
+//! Points and frames that are held and follow a collider, or one of its bones: functions of time alone, and so in no snapshot.
 
 use super::Dynamics;
 use crate::geometry::motion::Pose;
 use crate::geometry::{Collider, Vector};
-use crate::math::{Real, row, xyz64};
+use crate::math::{Quat, Real, row, xyz64};
 
 /// A point that follows.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -16,6 +16,8 @@ pub struct Held {
     pub bone: Option<usize>,
     /// Where it is in what it follows [m].
     pub place: Vector,
+    /// A held frame that follows with it, and its turn in what it follows.
+    pub frame: Option<(usize, Quat<f64>)>,
 }
 
 impl Held {
@@ -53,6 +55,9 @@ impl Dynamics {
         for (held, pose) in self.poses(t) {
             let x = pose.out(held.place);
             self.state.x[held.row] = row(real(x), 0.0);
+            if let Some((frame, q)) = held.frame {
+                self.state.x[frame] = (pose.turn * q).row().map(|q| q as Real);
+            }
         }
     }
 }

@@ -3,6 +3,7 @@
 
 mod books;
 mod build;
+mod coat;
 mod contact;
 mod held;
 mod implicit;
@@ -75,6 +76,7 @@ pub struct Dynamics {
     layers: Option<Layers>,
     /// Points that follow colliders.
     held: Vec<Held>,
+    coats: Vec<coat::Coat>,
     user: Option<Box<dyn UserIntegrator>>,
     memory: Memory,
     scratch: Scratch,
@@ -178,8 +180,11 @@ impl Dynamics {
 
     /// One sub-step of a scheme with a fixed step, contact, clamp and breaking included.
     fn substep(&mut self, t: f64, h: f64, report: &mut StepReport) -> Result<(), StepError> {
+        let (x, v) = (&self.state.x, &mut self.state.v);
+        self.coats.iter_mut().for_each(|coat| coat.act(h, x, v));
         self.lead_held(t, h);
         self.remember();
+        self.memory.ready &= self.held.is_empty() && self.coats.is_empty();
         let mut user = self.user.take();
         let result = match &mut user {
             Some(user) => self.user_step(user.as_mut(), t, h),

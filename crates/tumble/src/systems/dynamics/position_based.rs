@@ -34,6 +34,7 @@ impl Dynamics {
         });
         self.rates = rates;
         done?;
+        self.place_held(t + h);
         // Sweeps over all elements.
         let words = self.sweeps.clone();
         // n sweeps that each take back 1 - (1 - k)^(1/n) leave 1 - k of an error.
