@@ -95,7 +95,7 @@ pub struct Side {
 }
 
 /// A dress with a bodice on two straps and a skirt that is a full circle, hung around a body that stands upright at the start, its front
-/// towards -y.
+/// towards -y. It fits the mannequin of 1.7 m as it is.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct Dress {
@@ -134,16 +134,16 @@ pub struct Dress {
 impl Default for Dress {
     fn default() -> Self {
         Self {
-            waist: [0.0, 0.0, 1.04],
-            waist_girth: 0.76,
-            bust_girth: 0.94,
-            bodice: 0.2,
-            shoulder: 0.22,
+            waist: [0.0, 0.0, 1.0],
+            waist_girth: 0.8,
+            bust_girth: 0.96,
+            bodice: 0.24,
+            shoulder: 0.245,
             strap_distance: 0.2,
             strap: 0.05,
             skirt: 0.55,
-            depth: 0.75,
-            fall: 25.0,
+            depth: 0.82,
+            fall: 50.0,
         }
     }
 }

@@ -418,7 +418,7 @@ impl Parts {
             1 => self.nonlinear.members[i].nodes,
             _ => self.vector.members[i].nodes,
         };
-        let reach = reach(&settings, &self.objects, (&self.linear.members, &self.nonlinear.members), &state);
+        let reach = reach(&settings, &self.objects, (&self.linear.members, &self.nonlinear.members, &self.vector.members), &state);
         let mut objects = Vec::new();
         let mut places = Vec::new();
         for (draft, next) in self.objects.into_iter().zip(next) {
@@ -524,11 +524,12 @@ impl Parts {
 fn reach(
     settings: &Settings,
     objects: &[Draft],
-    (linear, nonlinear): (&[Members<2, 1, 0>], &[Members<2, 1, 2>]),
+    (linear, nonlinear, seams): (&[Members<2, 1, 0>], &[Members<2, 1, 2>], &[Members<2, 0, 0>]),
     state: &State,
 ) -> Vec<Tethers> {
     let Some(slack) = settings.sweeps.tethers.filter(|_| settings.integrator == Integrator::PositionBased) else { return Vec::new() };
-    let links: Vec<_> = linear.iter().map(|m| (m.nodes, m.rest[0])).chain(nonlinear.iter().map(|m| (m.nodes, m.rest[0]))).collect();
+    let links = linear.iter().map(|m| (m.nodes, m.rest[0])).chain(nonlinear.iter().map(|m| (m.nodes, m.rest[0])));
+    let links: Vec<_> = links.chain(seams.iter().map(|m| (m.nodes, 0.0))).collect();
     let held = |i: usize| state.x[i][3] == 0.0;
     objects.iter().filter_map(|draft| Tethers::new(draft.object.points.clone(), &links, &held, slack)).collect()
 }
