@@ -22,6 +22,7 @@ CASES = [
     "gravitation",
     "flock",
     "hair",
+    "cloth",
     "pressure",
     "smoke",
     "heat",
@@ -59,6 +60,7 @@ TARGETS = {
         (f"web {task}", "real time"): (1.0, "at least")
         for task in ("fluid 256² to 1e-3", "sheet 128², 10 sub-steps", "1e6 ballistic particles")
     },
+    **{(f"cloth {n}", peer): (10.0, "at least") for n in (128, 256) for peer in ("taichi", "pypbd")},
     ("import", "import numpy"): (1.5, "at most"),
     ("help", "import numpy"): (4.0, "at most"),
 }

@@ -103,7 +103,7 @@ fn hair_keeps_its_momentum_among_itself() {
             "version = 1\nprecision = \"double\"\nworld.gravity = [0, 0, 0]\n[[system]]\nmethod = \"position_based\"\n\
              [[hair]]\nname = \"h\"\nmesh.path = \"plate\"\ncount = 300\nlength = 0.1\nsegments = 10\nyoung = 1e-9\n{collisions}\n"
         );
-        let assets = Assets::new(HashMap::from([("plate".to_string(), plate)]));
+        let assets = Assets::new(HashMap::from([("plate".to_string(), plate)]), HashMap::new());
         let mut sim = Simulation::new(Scene::from_toml(&scene).unwrap(), assets).unwrap();
         let mut numbers = common::Numbers(3);
         let v: Vec<Vector> = positions(&sim, "h").iter().map(|x| numbers.vector() * 0.2 + vector(0.3, 0.0, x.x)).collect();

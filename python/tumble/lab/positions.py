@@ -1,4 +1,4 @@
-"""How fast position-based dynamics converges: sweeps against sub-steps, compliant against plain, on a chain whose length is known."""
+"""How fast position-based dynamics converges: sweeps against sub-steps, on a chain whose length is known."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -83,10 +83,10 @@ def page(folder: Path) -> Path:
     sections = [
         Section(
             "Sub-steps against sweeps",
-            f"<p>A chain of {LINKS} links hangs by one end, at {FPS} frames a second. Its links stretch by their compliance times the weight "
-            f"below them, together by {1e3 * exact():.3g} mm. Shown is how far off that the chain is when it rests, against the projections of each "
-            "link in a frame. Compliant elements (positions.2) come to the right length both ways, by sub-steps much sooner; plain ones come to "
-            "a chain that does not stretch at all, an error of 1.</p>",
+            f"<p>A chain of {LINKS} links hangs by one end, at {FPS} frames a second. Its links stretch by their compliance "
+            f"times the weight below them, together by {1e3 * exact():.3g} mm. Shown is how far off that the chain is when it "
+            "rests, against the projections of each link in a frame. Compliant elements (positions.2) come to the right "
+            "length both ways, by sub-steps much sooner; plain ones to a chain that does not stretch: an error of 1.</p>",
             partial(_errors, ways=ways),
             4.2,
             "Error of the length over work",
@@ -95,8 +95,8 @@ def page(folder: Path) -> Path:
     by_steps, by_sweeps = ways[0].errors, ways[1].errors
     at = WORK.index(32)
     points = [
-        f"With {WORK[at]} projections of each link in a frame the compliant chain is off by {100 * by_steps[at]:.2g} % in sub-steps, by "
-        f"{100 * by_sweeps[at]:.2g} % in sweeps.",
+        f"With {WORK[at]} projections of each link in a frame the compliant chain is off by {100 * by_steps[at]:.2g} % in "
+        f"sub-steps, by {100 * by_sweeps[at]:.2g} % in sweeps.",
         f"Plain: {100 * ways[2].errors[at]:.3g} % and {100 * ways[3].errors[at]:.3g} %, whatever the stiffness.",
     ]
     return write(
@@ -121,7 +121,14 @@ def _errors(figure: FigureBase, ways: list[Way]) -> None:
     axes = figure.add_subplot()
     for way in ways:
         ink = PALETTE[1 if way.plain else 0]
-        axes.loglog(WORK, way.errors, "-" if way.substeps else "--", marker="o" if way.substeps else "s", color=ink, label=way.title)
+        axes.loglog(
+            WORK,
+            way.errors,
+            "-" if way.substeps else "--",
+            marker="o" if way.substeps else "s",
+            color=ink,
+            label=way.title,
+        )
     axes.axhline(0.005, color=INK, lw=0.8, ls=":")
     axes.text(WORK[0], 0.0053, "0.5 %", color=INK, fontsize=8)
     axes.set_xlabel("projections of each link in a frame")

@@ -61,7 +61,9 @@ class Subject:
     @property
     def discontinuous(self) -> bool:
         """Whether something in it happens at the end of a step only: contact, breaking, pulls between systems."""
-        links = [thing.get("links") or {} for kind in ("rope", "sheet", "block", "net", "cloth") for thing in self.tree[kind]]
+        links = [
+            thing.get("links") or {} for kind in ("rope", "sheet", "block", "net", "cloth") for thing in self.tree[kind]
+        ]
         laws = [law for of in links for law in of.values() if isinstance(law, dict)]
         laws += [spring for thing in self.tree["particles"] for spring in thing["spring"]]
         return self.coupled or bool(self.tree["collider"]) or any(law.get("break_strain") for law in laws)
@@ -194,7 +196,9 @@ def subject(scene: Scene) -> Subject:
     if {"tracers", "dynamics"} <= methods:
         notes.append("Tracers move as the scene says; what is compared here are the masses.")
     if any(system.get("clamp") for system in tree["system"]):
-        notes.append("The position clamp goes with modified_euler, verlet and position_based only; the others run without it.")
+        notes.append(
+            "The position clamp goes with modified_euler, verlet and position_based only; the others run without it."
+        )
     bare = Subject(tree, scene.folder, tracers, 0.0, 0.0, 0.0, None, {}, None, np.zeros((0, 3)), None, notes)
     world = bare.world(BY_WORD["rk4"], 1.0 / float(tree["time"]["fps"]), 1, substeps=1)
     bare.start = bare.positions(world)

@@ -21,7 +21,7 @@ export type Columns = Record<string, Record<string, Column>>;
 
 /** The kinds of objects that a scene can hold, as its tables are called. */
 export type ObjectKind =
-  | "particles" | "emitter" | "galaxy" | "rope" | "sheet" | "block" | "net" | "gas" | "heat" | "compressible" | "collider";
+  | "particles" | "emitter" | "galaxy" | "rope" | "hair" | "sheet" | "block" | "net" | "cloth" | "gas" | "heat" | "compressible" | "collider";
 
 export interface ObjectInfo {
   name: string;
