@@ -46,7 +46,7 @@ def main():
         world = tumble.World(scene(strands), threads=THREADS)
         seconds = median(world.step, repeats=7)
         each = 1e9 * seconds / (strands * SEGMENTS * SUBSTEPS)
-        stretch = world.ledger()["stretch"]
+        stretch = world.ledger["stretch"]
         check = f"a frame of {SUBSTEPS} sub-steps, {each:.0f} ns a segment and sub-step; stretch at most {stretch:.4f}"
         show(f"hair {strands} x {SEGMENTS + 1}", "tumble", seconds, "s", check)
 

@@ -252,7 +252,7 @@ DYE = 3.0
 FEW = 200
 """An object of fewer masses than these is drawn at least three times as thick as the thinnest."""
 
-HAIR = 0.2
+HAIR = 0.3
 """Radius of the thinnest strand, over that of the thinnest of other things."""
 
 SYSTEMS = ("system", "anchor", "force", "field")

@@ -17,6 +17,8 @@ use rayon::prelude::*;
 
 /// Strands solved by one task, and of equal length.
 const TASK: usize = 64;
+/// Farthest that a frame turns in a sweep [rad]; a strand that would turn more takes a part of its step.
+const FARTHEST: Real = 0.4;
 /// Added to the diagonal, relative to it: rigid elements may ask for the same twice.
 const RIDGE: f64 = 8.0 * Real::EPSILON as f64;
 
@@ -602,21 +604,15 @@ impl Solve<'_> {
         for k in (0..2 * n + 1).rev() {
             let (own, next) = factor.split_at_mut(k + 3);
             own[k + 2].back([&next[0], &next[1]]);
-            if !self.lambda.is_empty() {
-                for c in 0..3 {
-                    let at = (3 * k + c) * count + s;
-                    w.store(w.load(&self.lambda[at..]) + factor[k + 2].y[c], &mut self.lambda[at..]);
-                }
-            }
         }
-        // Points and frames.
-        let part = w.splat(if let Some(part) = step.plain { part } else { 1.0 });
+        // What moves and turns by how much, kept in place of the factor.
         // SAFETY: as above.
         let (mut q, mut p) = unsafe { (group.frame(w, x, 1, s), group.point(w, x, 0, s)) };
         // SAFETY: as above.
         let held = unsafe { group.frame(w, x, 0, s) };
         let mut torque = pulled(group.bent(w, step, 0, s, [held, q]).by[1], factor[2].y);
         let mut force = Vec3 { x: zero, y: zero, z: zero };
+        let mut most = zero;
         for i in 0..n {
             // SAFETY: as above.
             let (next, ahead) = unsafe { (group.frame(w, x, i + 2, s), group.point(w, x, i + 1, s)) };
@@ -624,20 +620,44 @@ impl Solve<'_> {
             let bend = group.bent(w, step, i + 1, s, [q, next]);
             let pull = pulled(stretch.by_point, factor[2 * i + 3].y);
             let turn = torque + pulled(stretch.by_frame, factor[2 * i + 3].y) + pulled(bend.by[0], factor[2 * i + 4].y);
-            let [to] = corrected::<_, 1>(0, [p], [(force - pull) * (p[3] * part)]);
-            let [turned] = corrected::<_, 1>(1, [q.row()], [turn * (w.load(&group.inertia[(i + 1) * count + s..]) * part)]);
-            // SAFETY: as above.
-            unsafe {
-                w.put(to, self.x.rows(), &group.points.get()[i * count + s..]);
-                w.put(turned, self.x.rows(), &group.frames.get()[(i + 1) * count + s..]);
-            }
+            let (way, turn) = ((force - pull) * p[3], turn * w.load(&group.inertia[(i + 1) * count + s..]));
+            let angle = turn.norm_sq();
+            most = (angle - most).positive(angle, most);
+            factor[2 * i + 3].own = [way.x, way.y, way.z, turn.x, turn.y, turn.z];
             force = pull;
             torque = pulled(bend.by[1], factor[2 * i + 4].y);
             (q, p) = (next, ahead);
         }
-        let [to] = corrected::<_, 1>(0, [p], [force * (p[3] * part)]);
-        // SAFETY: as above.
-        unsafe { w.put(to, self.x.rows(), &group.points.get()[n * count + s..]) };
+        let way = force * p[3];
+        factor[2 * n + 3].own = [way.x, way.y, way.z, zero, zero, zero];
+        // All of it, unless a frame turns too far for what is linear in it.
+        let far = w.splat(FARTHEST * FARTHEST);
+        let share = (most - far).positive(w.splat(FARTHEST) / (most - far).positive(most, far).sqrt(), w.splat(1.0));
+        if !self.lambda.is_empty() {
+            for k in 0..2 * n + 1 {
+                for c in 0..3 {
+                    let at = (3 * k + c) * count + s;
+                    w.store(w.load(&self.lambda[at..]) + factor[k + 2].y[c] * share, &mut self.lambda[at..]);
+                }
+            }
+        }
+        let part = share * w.splat(if let Some(part) = step.plain { part } else { 1.0 });
+        for i in 0..=n {
+            let [a, b, c, d, e, f] = factor[2 * i + 3].own;
+            // SAFETY: as above.
+            let p = unsafe { group.point(w, x, i, s) };
+            let [to] = corrected::<_, 1>(0, [p], [Vec3 { x: a, y: b, z: c } * part]);
+            // SAFETY: as above.
+            unsafe { w.put(to, self.x.rows(), &group.points.get()[i * count + s..]) };
+            if i == n {
+                break;
+            }
+            // SAFETY: as above.
+            let q = unsafe { group.frame(w, x, i + 1, s) };
+            let [turned] = corrected::<_, 1>(1, [q.row()], [Vec3 { x: d, y: e, z: f } * part]);
+            // SAFETY: as above.
+            unsafe { w.put(turned, self.x.rows(), &group.frames.get()[(i + 1) * count + s..]) };
+        }
     }
 }
 

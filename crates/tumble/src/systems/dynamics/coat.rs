@@ -28,10 +28,11 @@ pub struct Coat {
 
 #[derive(Debug, Clone, Default)]
 struct Scratch {
-    /// The cell of every free point, and the points cell by cell.
+    /// The cell of every free point, where the points of a cell end, and the points cell by cell.
     cells: Vec<u32>,
     starts: Vec<u32>,
-    order: Vec<u32>,
+    /// Of each, how far into the cell it is; momentum and mass [kg m/s, kg].
+    order: Vec<([f64; 3], [f64; 4])>,
     /// Momentum, then mass [kg m/s, kg]; then velocity, and density over rest density.
     nodes: Vec<[f64; 4]>,
     /// Velocities that pressure gives [m/s].
@@ -123,9 +124,11 @@ impl Coat {
         for c in 0..total {
             starts[c + 1] += starts[c];
         }
-        order.resize(x.len(), 0);
+        order.resize(x.len(), ([0.0; 3], [0.0; 4]));
         for (i, c) in cells.iter().enumerate().filter(|(_, c)| **c != u32::MAX) {
-            order[starts[*c as usize] as usize] = i as u32;
+            let m = 1.0 / f64::from(x[i][3]);
+            let [u, v, w] = [0, 1, 2].map(|a| m * f64::from(v[i][a]));
+            order[starts[*c as usize] as usize] = (lattice.place(xyz64(x[i])).1, [u, v, w, m]);
             starts[*c as usize] += 1;
         }
         // `starts` are ends now: a cell begins where the one before ends.
@@ -143,13 +146,11 @@ impl Coat {
                     }
                     let c = lattice.node([i - di, j - dj, k - dk]);
                     let begin = if c == 0 { 0 } else { starts[c - 1] };
-                    for p in &order[begin as usize..starts[c] as usize] {
-                        let p = *p as usize;
-                        let m = Lattice::weight(lattice.place(xyz64(x[p])).1, corner) / f64::from(x[p][3]);
-                        for a in 0..3 {
-                            sum[a] += m * f64::from(v[p][a]);
+                    for (part, carried) in &order[begin as usize..starts[c] as usize] {
+                        let w = Lattice::weight(*part, corner);
+                        for a in 0..4 {
+                            sum[a] += w * carried[a];
                         }
-                        sum[3] += m;
                     }
                 }
                 *node = sum;
