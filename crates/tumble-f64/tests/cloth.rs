@@ -28,8 +28,10 @@ fn triangles(sim: &Simulation, object: &str) -> Vec<[u32; 3]> {
 #[test]
 fn a_dress_weighs_what_its_pattern_says() {
     for resolution in [0.06, 0.03] {
-        let sim = simulation(&format!("[[cloth]]\nname = \"dress\"\ndensity = 0.2\nresolution = {resolution}\n\
-             dress = {{ waist_girth = 0.76, bust_girth = 0.94, bodice = 0.2, shoulder = 0.22 }}\n"));
+        let sim = simulation(&format!(
+            "[[cloth]]\nname = \"dress\"\ndensity = 0.2\nresolution = {resolution}\n\
+             dress = {{ waist_girth = 0.76, bust_girth = 0.94, bodice = 0.2, shoulder = 0.22 }}\n"
+        ));
         // The skirt is a ring around a waist of 0.76 m, 0.55 m long; the bodice two trapezes below the arms, and straps.
         let inner = 0.76 / std::f64::consts::TAU;
         let skirt = std::f64::consts::PI * ((inner + 0.55_f64).powi(2) - inner * inner);

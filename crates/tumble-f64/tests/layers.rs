@@ -40,7 +40,10 @@ fn a_pile_of_sheets_stays_apart_at_every_step_length() {
     for (fps, substeps) in [(24, 8), (24, 40), (100, 20)] {
         let sheet = |k: usize| {
             let turn = 17 * k;
-            format!("[[sheet]]\nname = \"s{k}\"\nsize = [0.5, 0.5]\nresolution = [9, 9]\ncenter = [0, 0, {}]\nrotate = [0, 0, {turn}]\n{LINKS}\n", 0.03 + 0.03 * k as f64)
+            format!(
+                "[[sheet]]\nname = \"s{k}\"\nsize = [0.5, 0.5]\nresolution = [9, 9]\ncenter = [0, 0, {}]\nrotate = [0, 0, {turn}]\n{LINKS}\n",
+                0.03 + 0.03 * k as f64
+            )
         };
         let sheets: String = (0..6).map(sheet).collect();
         let mut sim = simulation(&format!(

@@ -309,6 +309,7 @@ impl<E: Element<N, M, D>, Y: Law<P>, const N: usize, const M: usize, const D: us
     for Project<'_, E, Y, N, M, D, P>
 {
     type Output = ();
+    #[allow(clippy::assign_op_pattern)] // lanes have no +=
     #[inline(always)]
     fn run<W: Width>(self, w: W) {
         let (columns, sweep, start, many) = (self.columns, self.sweep, self.range.start, !self.lambda.is_empty());

@@ -74,6 +74,7 @@ struct Project<'a> {
 
 impl Kernel for Project<'_> {
     type Output = ();
+    #[allow(clippy::assign_op_pattern)] // lanes have no +=
     #[inline(always)]
     fn run<W: Width>(self, w: W) {
         let (columns, start) = (self.columns, self.range.start);

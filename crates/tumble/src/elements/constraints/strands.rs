@@ -641,7 +641,7 @@ impl Solve<'_> {
                 }
             }
         }
-        let part = share * w.splat(if let Some(part) = step.plain { part } else { 1.0 });
+        let part = share * w.splat(step.plain.unwrap_or(1.0));
         for i in 0..=n {
             let [a, b, c, d, e, f] = factor[2 * i + 3].own;
             // SAFETY: as above.
