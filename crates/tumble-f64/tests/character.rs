@@ -156,7 +156,7 @@ fn the_mannequin_is_closed_symmetric_and_as_tall_as_it_says() {
     assert_eq!(mesh.defects(), Defects::default());
     let vertex = |i: u32| Vector::from(mesh.vertices[i as usize]);
     let corners = |t: &[u32; 3]| t.map(vertex);
-    let volume: f64 = mesh.triangles.iter().map(|t| corners(t)).map(|[a, b, c]| a.dot(b.cross(c)) / 6.0).sum();
+    let volume: f64 = mesh.triangles.iter().map(corners).map(|[a, b, c]| a.dot(b.cross(c)) / 6.0).sum();
     println!("{} triangles, {volume:.4} m³", mesh.triangles.len());
     // A slender person of 1.7 m: 50 to 65 kg at the density of water.
     assert!((0.045..0.070).contains(&volume));
