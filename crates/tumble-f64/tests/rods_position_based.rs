@@ -6,7 +6,7 @@
 mod common;
 
 use common::{Vector, positions, run, simulation, vector};
-use tumble_f64::elements::{Constraints, Members, Projection, Strands};
+use tumble_f64::elements::{Constraints, Element, Members, Projection, Strands, StretchShear};
 use tumble_f64::math::rotation::from_z_to;
 use tumble_f64::math::{Quat, Row};
 use tumble_f64::scene::Simulation;
@@ -234,37 +234,37 @@ fn a_twisted_rod_leaves_its_line() {
     assert!(below.0 < 0.9 && above.0 > 1.1, "{below:?} {above:?}");
 }
 
-/// Friction takes the foot as free for a sub-step, which must therefore be short for the foot's mass on the springs of its segment:
-/// k h²/m = 0.08 here. A vertical strip clamped on top whose foot stands on a floor that rises by eps L: it slips where mu falls below |T/N| of the elastica.
+/// A vertical strip clamped on top whose foot is held on a floor that rises by eps L: it would slip where friction is less than |T/N|,
+/// and the reactions of the planar elastica are known.
 #[test]
-fn a_foot_slips_where_friction_ends() {
-    for (mu, exact) in [(0.2, 0.155), (0.4, 0.37)] {
-        let mut sim = simulation(&format!(
-            "precision = \"double\"\nworld.gravity = [0, 0, 0]\ntime.fps = 50\n[[system]]\nmethod = \"position_based\"\nsubsteps = 200\n[[force]]\nkind = \"drag\"\nrate = 8\n\
-             [[force]]\nkind = \"acceleration\"\nvalue = [\"0.02*smoothstep(0.51, 0.5, t)\", 0, 0]\n\
-             [[rope]]\nname = \"r\"\nfrom = [0, 0, 1]\nto = [0, 0, 0]\nsegments = 32\ndensity = 0.1\npin = [\"start\"]\nrod = {{ stretch = 400, bend = 0.1 }}\n\
-             [[collider]]\nname = \"floor\"\nfriction = {mu}\nshape.floor.height = -1e-4\nmotion.keys = [{{ time = 0 }}, {{ time = 6, translate = [0, 0, 0.45] }}]\n"
-        ));
-        // Once it slips it goes on slowly, as fast as the floor asks for.
-        let mut stuck = None;
-        let mut slipped = None;
-        for i in 1..=300 {
-            common::step(&mut sim);
-            let eps = 0.45 * f64::from(i) / 300.0;
-            let foot = positions(&sim, "r")[32];
-            if i == 25 {
-                stuck = Some(foot.x);
-            }
-            if let Some(at) = stuck
-                && slipped.is_none()
-                && (foot.x - at).abs() > 5e-4
-            {
-                slipped = Some(eps);
-            }
+fn a_foot_needs_the_friction_of_the_elastica() {
+    let n = 40;
+    let course: Vec<Vector> = (0..=n).map(|i| vector(0.0, 0.0, 1.0 - i as f64 / n as f64)).collect();
+    let mut strip = Beam::new(&course, 1.0, 1.0, 1e5, false);
+    strip.x[n][3] = 0.0;
+    let mut eps = 0.0;
+    for (goal, normal, mu) in [
+        (0.05, 20.5731, 0.1035),
+        (0.1, 20.9586, 0.1528),
+        (0.2, 21.7212, 0.2378),
+        (0.3, 22.4177, 0.3265),
+        (0.4, 22.9163, 0.4344),
+        (0.5, 22.9156, 0.5845),
+    ] {
+        while eps < goal - 1e-9 {
+            eps += 0.001;
+            strip.x[n][2] = eps;
+            let aside = if eps < 0.02 { 0.1 } else { 0.0 };
+            strip.relax(0.05, 20, |i| vector(if i < n { aside } else { 0.0 }, 0.0, 0.0));
         }
-        println!("mu = {mu}: slips at eps = {slipped:?}, elastica {exact}");
-        let slipped = slipped.unwrap();
-        assert!((slipped / exact - 1.0).abs() < 0.08, "{slipped} {exact}");
+        strip.relax(0.05, 4000, |_| Vector::default());
+        // What the last segment does to the foot.
+        let (l, nodes) = (1.0 / n as f64, [strip.x[n - 1], strip.x[n], strip.x[n + n]]);
+        let y = StretchShear::residual([l, 1.0], nodes).map(|r| 1e5 * l * r);
+        let [_, pull, _] = StretchShear::pullback([l, 1.0], nodes, y);
+        let found = (pull[0] / pull[2]).abs();
+        println!("eps = {eps:.2}: N L²/EI = {:.4}, table {normal}; |T/N| = {found:.4}, table {mu}", pull[2].abs());
+        assert!((found / mu - 1.0).abs() < 0.05 && (pull[2].abs() / normal - 1.0).abs() < 0.05, "{found} {pull:?}");
     }
 }
 
