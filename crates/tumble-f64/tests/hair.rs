@@ -40,7 +40,7 @@ fn strands_are_planted_evenly_and_as_long_as_said() {
 fn groomed_hair_is_at_rest() {
     // Curled, leaning and in clumps, without gravity: nothing moves, and nothing is stored.
     let mut sim = simulation(&format!(
-        "world.gravity = [0, 0, 0]\n{BALL}[[hair]]\nname = \"h\"\non = \"ball\"\ncount = 40\nlength = 0.1\nsegments = 20\nlean = [0.3, 0, 0.2]\ncurl = {{ radius = 0.002, pitch = 0.03 }}\nclump = {{ count = 20, strength = 0.7 }}\n"
+        "world.gravity = [0, 0, 0]\n{BALL}[[hair]]\nname = \"h\"\non = \"ball\"\ncount = 40\nlength = 0.1\nsegments = 20\nlean = [1.5, 0, 0.7]\ncurl = {{ radius = 0.002, pitch = 0.03 }}\nclump = {{ count = 20, strength = 0.7 }}\n"
     ));
     let x = positions(&sim, "h");
     run(&mut sim, 12);

@@ -8,7 +8,7 @@
 
 use super::Site;
 use crate::geometry::motion::Pose;
-use crate::geometry::{Sampler, Vector};
+use crate::geometry::{Collider, Sampler, Vector};
 use crate::math::functions::{cos, sin};
 use crate::math::rotation::from_z_to;
 use crate::math::{Quat, Random};
@@ -18,7 +18,9 @@ use tumble_interface::scene::Hair;
 
 /// Roots that are tried for each that must be above a height.
 const TRIES: u32 = 4096;
-/// Strands at most, and points.
+/// Times that a point is moved out of a solid.
+const COMB: usize = 6;
+/// Strands at most.
 const MOST: f64 = 1e7;
 
 /// What a hair grows on.
@@ -27,6 +29,8 @@ pub struct Ground<'a> {
     pub mesh: &'a Mesh,
     /// The collider that carries the roots, if it moves, and where that is at the start.
     pub carrier: Option<(usize, Pose)>,
+    /// The collider that strands are combed off.
+    pub solid: Option<&'a Collider>,
 }
 
 /// Adds the masses, frames and elements of all strands.
@@ -77,7 +81,10 @@ pub fn hair(site: &mut Site<'_>, thing: &Hair, seed: u32, ground: &Ground<'_>) {
             }
             _ => own.clone(),
         };
-        let shape: Vec<Vector> = shape.into_iter().map(|p| pose.out(p)).collect();
+        let mut shape: Vec<Vector> = shape.into_iter().map(|p| pose.out(p)).collect();
+        if let Some(solid) = ground.solid {
+            comb(&mut shape, solid, 1.02 * solid.thickness + 1e-4 * thing.length);
+        }
         plant(site, thing, &shape, carrier.map(|k| (k, pose)));
     }
     let n = thing.segments + 1;
@@ -112,6 +119,29 @@ fn drawn(own: &[Vector], middle: &[Vector], strength: f64) -> Vec<Vector> {
         out.push(before + along * l);
     }
     out
+}
+
+/// Moves points out of a solid, to a distance [m] from it, and keeps the lengths of pieces: what starts in contact at its roots would
+/// strive against it for ever.
+fn comb(shape: &mut [Vector], solid: &Collider, clear: f64) {
+    for i in 1..shape.len() {
+        let (before, l) = (shape[i - 1], (shape[i] - shape[i - 1]).norm());
+        let rest = shape[i..].to_vec();
+        let start = shape[i];
+        for _ in 0..COMB {
+            let (distance, normal) = solid.distance(shape[i], 0.0, clear);
+            if distance >= clear {
+                break;
+            }
+            let way = shape[i] + normal * (clear - distance) - before;
+            if way.norm() > 0.0 {
+                shape[i] = before + way.normalized() * l;
+            }
+        }
+        // The rest of the strand comes along.
+        let moved = shape[i] - start;
+        shape[i..].iter_mut().zip(rest).for_each(|(x, was)| *x = was + moved);
+    }
 }
 
 /// The points of a strand: straight, or a spiral of that radius and pitch which leaves the root in the direction of growth.

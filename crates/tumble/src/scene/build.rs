@@ -371,7 +371,7 @@ fn planted(site: &mut Site<'_>, scene: &Scene, thing: &Hair, assets: &Assets, (c
         (Some(file), None) => match assets.get(&file.path) {
             Some(mesh) => {
                 let mesh = recipes::placed(mesh, file);
-                recipes::hair(site, thing, scene.seed, &recipes::Ground { mesh: &mesh, carrier: None });
+                recipes::hair(site, thing, scene.seed, &recipes::Ground { mesh: &mesh, carrier: None, solid: None });
             }
             None => wrong(".mesh", "the mesh has not been loaded".into()),
         },
@@ -385,7 +385,7 @@ fn planted(site: &mut Site<'_>, scene: &Scene, thing: &Hair, assets: &Assets, (c
             // What is wrong with the collider is told elsewhere.
             let (true, Some(mesh)) = (colliders.len() == scene.collider.len(), surfaces.get(k)) else { return };
             let carrier = colliders[k].motion.as_ref().map(|motion| (k, motion.at(0.0).0));
-            recipes::hair(site, thing, scene.seed, &recipes::Ground { mesh, carrier });
+            recipes::hair(site, thing, scene.seed, &recipes::Ground { mesh, carrier, solid: Some(&colliders[k]) });
         }
         _ => wrong(".on", "expected either the name of a collider, or a mesh".into()),
     }

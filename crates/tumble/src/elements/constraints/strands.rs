@@ -11,9 +11,11 @@
 
 use super::{Constraints, Members, Projection, Shared, compliance};
 use crate::elements::{BendTwist, Element, Linear, StretchShear, corrected, energy};
+use crate::math::parallel::fold;
 use crate::math::simd::{Index, Kernel, Scalar, Width, dispatch};
 use crate::math::{Lane, Quat, Real, Row, Vec3, xyz};
 use rayon::prelude::*;
+use std::ops::Range;
 
 /// Strands solved by one task, and of equal length.
 const TASK: usize = 64;
@@ -716,13 +718,20 @@ impl Constraints for Strands {
         }
     }
 
+    fn largest_strain(&self, x: &[Row]) -> f64 {
+        self.check(x);
+        // NaN, of what has broken, is never the larger.
+        let largest = |range: Range<usize>| range.map(|e| self.strain(x, e)).fold(Real::NEG_INFINITY, Real::max);
+        fold(self.len(), largest).into_iter().fold(f64::NEG_INFINITY, |m, s| m.max(f64::from(s)))
+    }
+
     fn break_links(&mut self, x: &[Row]) -> u64 {
         if self.limits.is_empty() {
             return 0;
         }
         self.check(x);
         let beyond = |e: &usize| self.strain(x, *e).abs() > self.limits[*e];
-        let found: Vec<usize> = (0..self.len()).filter(beyond).collect();
+        let found = fold(self.len(), |range| range.filter(beyond).collect::<Vec<_>>()).concat();
         found.iter().for_each(|e| self.tear(*e as u32));
         found.len() as u64
     }
