@@ -12,6 +12,7 @@ mod heat;
 mod output;
 mod shapes;
 mod structures;
+mod surfaces;
 mod systems;
 
 pub use animated::{Animated, AnimatedVector, Component, Interpolation, Keys, VectorKeys};
@@ -31,6 +32,7 @@ pub use structures::{
     Block, Cloud, CloudShape, Diagonals, Follow, Galaxy, Halo, Link, LinkSettings, Links, Material, Named, Net, Particles, Pin, Profile,
     Region, Rod, Rope, Sheet, Spring,
 };
+pub use surfaces::{Fill, Fluid, Inflation, Membrane, ShapeMatching};
 pub use systems::{Adaptive, Hessian, Integrator, Linear, Method, OnFailure, PositionBased, Projection, Solver, System, Vicsek};
 
 use crate::check::check;

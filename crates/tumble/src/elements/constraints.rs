@@ -12,9 +12,15 @@ use rayon::prelude::*;
 use std::marker::PhantomData;
 use std::ops::Range;
 
+mod density;
 mod neohookean;
+mod shape;
+mod volume;
 
+pub use density::{Density, spline};
 pub use neohookean::Neohookean;
+pub use shape::Shape;
+pub use volume::{Volume, enclosed};
 
 /// Elements per task.
 const TASK: usize = 2048;

@@ -11,7 +11,7 @@ mod life;
 mod modes;
 mod position_based;
 
-pub use build::{Parts, Settings, SpringPart};
+pub use build::{Closed, Liquid, Parts, Settings, SpringPart};
 
 use crate::elements::{Constraints, Limit, Linear, Projected, Projection};
 use crate::exchange::{Exchange, Port};
