@@ -110,6 +110,17 @@ fn cases() -> Vec<Case> {
         let halos = [(1, 0.7), (2, 0.4), (4, 0.5)];
         add(Box::new(Halos::new(0.7, softening, &halos, &[0..2, 3..7], &masses)), points(7), 7, true);
     }
+    let flat = [[0.0, 0.0, 0.0], [0.2, 1.0, 0.0], [-0.8, 0.4, 0.0], [0.9, 0.7, 0.0]].map(Vec3::from);
+    let rest = IsometricBend::rest(flat).unwrap();
+    let isometric = [[0, 1, 2, 3], [2, 3, 4, 5]].map(|nodes| Members { nodes, rest, law: [], stiffness: 1.5, damping: 0.0 });
+    add(batch::<IsometricBend, Linear, 4, 3, 3, 0>(6, &isometric), points(6), 6, true);
+    let (b, area) = Membrane::axes([flat[0], flat[1], flat[2]], flat[3], 0.4).unwrap();
+    let root = Membrane::root(3.0, 2.0, 0.5, 0.8).unwrap();
+    let rest = std::array::from_fn(|i| if i < 4 { b[i] } else { root[i - 4] });
+    let membrane = |nodes, damping| Members { nodes, rest, law: [], stiffness: area, damping };
+    add(batch::<Membrane, Linear, 3, 3, 8, 0>(4, &[membrane([0, 1, 2], 0.2), membrane([3, 2, 1], 0.0)]), points(4), 4, true);
+    let areas = [[0, 1, 2], [3, 2, 1]].map(|nodes| Members { nodes, rest: [0.4], law: [], stiffness: 2.0, damping: 0.1 });
+    add(batch::<Area, Linear, 3, 1, 1, 0>(4, &areas), points(4), 4, true);
     cases
 }
 
@@ -284,7 +295,9 @@ fn internal_damping_opposes_motion_and_leaves_rigid_motion_alone() {
             let power: f64 = (0..n).map(|i| (xyz(moving[i]) - xyz(at_rest[i])).dot(xyz(v[i]))).sum();
             if is_rigid {
                 assert!(power.abs() < 1e-13, "{}: {power}", case.batch.name());
-            } else if !["limit", "vector", "tetrahedron shear", "gravitation", "electrostatics", "halos"].contains(&case.batch.name()) {
+            } else if !["limit", "vector", "isometric bend", "tetrahedron shear", "gravitation", "electrostatics", "halos"]
+                .contains(&case.batch.name())
+            {
                 assert!(power < -1e-5, "{}: {power}", case.batch.name());
             }
         }

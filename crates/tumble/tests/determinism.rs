@@ -91,7 +91,21 @@ fn scenes() -> Vec<(&'static str, String, usize)> {
                 motion = { spin = [0, 3, 0], keys = [{ time = 0 }, { time = 0.2, translate = [0.1, 0, 0.1], rotate = [0, 40, 0] }] }\n\
                 [[hair]]\nname = \"hair\"\non = \"head\"\ncount = 301\nlength = 0.12\nspread = 0.3\nsegments = 14\nlean = [0.3, 0, 0.2]\ncurl = { radius = 0.02, pitch = 0.05 }\n\
                 clump = { count = 20 }\ndamping = 0.01\ncollisions = { cell = 0.015, friction = 8, pressure = 0.02 }\n";
+    let surface = "hinge = 1e-5\nisometric = 1e-5\nmembrane = { warp = 50, weft = 30, angle = 20, damping = 1e-4 }\narea = 5";
+    let shape = "[[system]]\nmethod = \"position_based\"\nsubsteps = 4\nposition_based.iterations = 2\n[[block]]\nname = \"b\"\nsize = [0.3, 0.3, 0.3]\nresolution = [17, 17, 17]\n\
+                 center = [0, 0, 0.2]\nrotate = [20, 30, 0]\nshape_matching.frequency = 5\n[[collider]]\nname = \"floor\"\nfriction = 0.3\nshape.floor.height = 0\n";
+    let pool = "[[system]]\nmethod = \"position_based\"\nsubsteps = 8\n[[particles]]\nname = \"water\"\n\
+                fluid = { spacing = 0.02, viscosity = 0.5, fill = [{ center = [-0.1, 0, 0.2], size = [0.32, 0.36, 0.4] }] }\n\
+                [[collider]]\nname = \"tank\"\ninside = true\nshape.box = { center = [0, 0, 0.4], size = [0.6, 0.4, 0.8] }\n";
     vec![
+        ("sheet, membrane", sheet("method = \"position_based\"\nsubsteps = 8", surface), 10),
+        (
+            "sheet, membrane, implicit",
+            sheet("integrator = \"implicit_euler\"\nsolver = { newton_tolerance = 1e-3, linear_tolerance = 1e-2 }", surface),
+            6,
+        ),
+        ("block, shape", shape.to_string(), 10),
+        ("pool", pool.to_string(), 6),
         ("smoke", smoke.to_string(), 16),
         ("fire", fire, 6),
         ("dust, stirred", stirred, 8),

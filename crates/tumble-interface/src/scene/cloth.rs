@@ -1,6 +1,7 @@
 //! Cloth that is cut from flat panels and sewn.
 
 use super::structures::{Link, LinkSettings, Links, Pin};
+use super::surfaces::Membrane;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -30,13 +31,25 @@ pub struct Cloth {
     #[serde(default = "density")]
     #[schemars(extend("x-unit" = "kg/m²", "exclusiveMinimum" = 0.0))]
     pub density: f64,
-    /// Spring families, modulus in N/m: `structural` along edges, `bend` across them.
-    #[serde(default = "links")]
-    pub links: Links,
+    /// Spring families, modulus in N/m: `structural` along edges, `bend` across them. Without it, structural 500 with damping 0.5.
+    #[serde(default)]
+    pub links: Option<Links>,
     /// Dihedral bending stiffness between neighbouring triangles.
     #[serde(default = "hinge")]
     #[schemars(range(min = 0.0), extend("x-unit" = "N m"))]
     pub hinge: f64,
+    /// The same beside it, quadratic in the positions and flat at rest, whatever the shape of the mesh: cheaper than a hinge, and equal to it where
+    /// nothing is stretched.
+    #[serde(default)]
+    #[schemars(range(min = 0.0), extend("x-unit" = "N m"))]
+    pub isometric: f64,
+    /// Resistance against stretch as of a woven membrane; links are then left out unless they are given.
+    #[serde(default)]
+    pub membrane: Option<Membrane>,
+    /// Stiffness of each triangle against changes of its area: tension over relative change.
+    #[serde(default)]
+    #[schemars(range(min = 0.0), extend("x-unit" = "N/m"))]
+    pub area: f64,
     /// Stiffness of seams, springs without length: force per length of a seam over the gap in it.
     #[serde(default = "thread")]
     #[schemars(extend("x-unit" = "N/m²", "exclusiveMinimum" = 0.0))]
@@ -172,7 +185,7 @@ fn up() -> [f64; 3] {
     [0.0, 0.0, 1.0]
 }
 
-fn links() -> Links {
+pub(super) fn links() -> Links {
     let structural = Some(Link::Settings(LinkSettings { modulus: 500.0, damping: 0.5, ..LinkSettings::default() }));
     Links { structural, ..Links::default() }
 }

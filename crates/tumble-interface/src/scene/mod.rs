@@ -13,6 +13,7 @@ mod heat;
 mod output;
 mod shapes;
 mod structures;
+mod surfaces;
 mod systems;
 
 pub use animated::{Animated, AnimatedVector, Component, Interpolation, Keys, VectorKeys};
@@ -33,6 +34,7 @@ pub use structures::{
     Block, Cloud, CloudShape, Diagonals, Follow, Galaxy, Halo, Link, LinkSettings, Links, Material, Net, Particles, Pin, Profile, Region,
     Rod, Rope, Sheet, Spring,
 };
+pub use surfaces::{Fill, Fluid, Inflation, Membrane, ShapeMatching};
 pub use systems::{
     Adaptive, Hessian, Integrator, Linear, Method, OnFailure, PositionBased, Projection, SelfContact, Solver, System, Vicsek,
 };

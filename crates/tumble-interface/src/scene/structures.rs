@@ -1,6 +1,7 @@
 //! Structures of masses and links. Stiffness is given so that it does not depend on how finely an
 //! object is divided: k_s = modulus x (length, area or volume that the link stands for) / l0².
 
+use super::surfaces::{Fluid, Inflation, Membrane, ShapeMatching};
 use super::{MeshFile, items_above_zero};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -39,6 +40,12 @@ pub struct Particles {
     /// Springs between them.
     #[serde(default)]
     pub spring: Vec<Spring>,
+    /// Makes it a liquid that fills boxes at the start, instead of `position`, `cloud` and `mass`. Position-based dynamics only.
+    #[serde(default)]
+    pub fluid: Option<Fluid>,
+    /// Keeps the whole in shape. Position-based dynamics only.
+    #[serde(default)]
+    pub shape_matching: Option<ShapeMatching>,
     /// Radius in pictures.
     #[serde(default = "centimetre")]
     #[schemars(extend("x-unit" = "m", "exclusiveMinimum" = 0.0))]
@@ -307,12 +314,24 @@ pub struct Sheet {
     #[schemars(extend("x-unit" = "kg/m²", "exclusiveMinimum" = 0.0))]
     pub density: f64,
     /// Spring families, modulus in N/m. Without it, structural 500, shear 200 and bend 10.
-    #[serde(default = "sheet_links")]
-    pub links: Links,
+    #[serde(default)]
+    pub links: Option<Links>,
     /// Dihedral bending stiffness between neighbouring triangles.
     #[serde(default)]
     #[schemars(range(min = 0.0), extend("x-unit" = "N m"))]
     pub hinge: f64,
+    /// The same beside it, quadratic in the positions and flat at rest, whatever the shape of the mesh: cheaper than a hinge, and equal to it where
+    /// nothing is stretched.
+    #[serde(default)]
+    #[schemars(range(min = 0.0), extend("x-unit" = "N m"))]
+    pub isometric: f64,
+    /// Resistance against stretch as of a woven membrane; links are then left out unless they are given.
+    #[serde(default)]
+    pub membrane: Option<Membrane>,
+    /// Stiffness of each triangle against changes of its area: tension over relative change.
+    #[serde(default)]
+    #[schemars(range(min = 0.0), extend("x-unit" = "N/m"))]
+    pub area: f64,
     /// Masses that stay where they are: `"corner 0 0"`, `"vertex 3 4"`, `"edge x-"`.
     #[serde(default)]
     pub pin: Vec<Pin>,
@@ -355,6 +374,9 @@ pub struct Block {
     /// Fills it with elastic tetrahedra.
     #[serde(default)]
     pub material: Option<Material>,
+    /// Keeps the whole in shape. Position-based dynamics only.
+    #[serde(default)]
+    pub shape_matching: Option<ShapeMatching>,
     /// Masses that stay where they are: `"corner 0 0 0"`, `"vertex 1 2 3"`, `"face z-"`.
     #[serde(default)]
     pub pin: Vec<Pin>,
@@ -396,12 +418,30 @@ pub struct Net {
     #[schemars(extend("x-unit" = "kg/m²", "exclusiveMinimum" = 0.0))]
     pub density: f64,
     /// Spring families, modulus in N/m: `structural` along edges, `bend` across them. Without it, structural 500 and bend 10.
-    #[serde(default = "net_links")]
-    pub links: Links,
+    #[serde(default)]
+    pub links: Option<Links>,
     /// Dihedral bending stiffness between neighbouring triangles.
     #[serde(default)]
     #[schemars(range(min = 0.0), extend("x-unit" = "N m"))]
     pub hinge: f64,
+    /// The same beside it, quadratic in the positions and flat at rest, whatever the shape of the mesh: cheaper than a hinge, and equal to it where
+    /// nothing is stretched.
+    #[serde(default)]
+    #[schemars(range(min = 0.0), extend("x-unit" = "N m"))]
+    pub isometric: f64,
+    /// Resistance against stretch as of a woven membrane; links are then left out unless they are given.
+    #[serde(default)]
+    pub membrane: Option<Membrane>,
+    /// Stiffness of each triangle against changes of its area: tension over relative change.
+    #[serde(default)]
+    #[schemars(range(min = 0.0), extend("x-unit" = "N/m"))]
+    pub area: f64,
+    /// Volume and pressure of what it encloses; the mesh must be closed. Position-based dynamics only.
+    #[serde(default)]
+    pub pressure: Option<Inflation>,
+    /// Keeps the whole in shape; links are then left out unless they are given. Position-based dynamics only.
+    #[serde(default)]
+    pub shape_matching: Option<ShapeMatching>,
     /// Masses that stay where they are: `"vertex 3"`, or all within a radius of a point.
     #[serde(default)]
     pub pin: Vec<Pin>,
@@ -521,12 +561,12 @@ pub struct Region {
     pub follow: Option<Follow>,
 }
 
-fn sheet_links() -> Links {
+pub(super) fn sheet_links() -> Links {
     let family = |modulus| Some(Link::Settings(LinkSettings { modulus, ..LinkSettings::default() }));
     Links { structural: family(500.0), shear: family(200.0), bend: family(10.0), diagonals: Diagonals::Both }
 }
 
-fn net_links() -> Links {
+pub(super) fn net_links() -> Links {
     Links { shear: None, ..sheet_links() }
 }
 

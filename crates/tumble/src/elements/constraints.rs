@@ -12,11 +12,17 @@ use rayon::prelude::*;
 use std::marker::PhantomData;
 use std::ops::Range;
 
+mod density;
 mod neohookean;
+mod shape;
 mod strands;
+mod volume;
 
+pub use density::{Density, spline};
 pub use neohookean::Neohookean;
+pub use shape::Shape;
 pub use strands::Strands;
+pub use volume::{Volume, enclosed};
 
 /// Elements per task.
 const TASK: usize = 2048;

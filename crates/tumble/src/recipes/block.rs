@@ -18,11 +18,16 @@ pub fn block(site: &mut Site<'_>, thing: &Block) {
         (Some(links), None) => lattice.links(site, links),
         (None, Some(material)) => tetrahedra(site, &lattice, material),
         (Some(_), Some(_)) => site.wrong(format!("{path}.links"), "a block of tetrahedra has no links; leave out links or material"),
-        (None, None) => site.wrong(path.as_str(), "expected links (springs) or material (tetrahedra)"),
+        (None, None) if thing.shape_matching.is_some() => {}
+        (None, None) => site.wrong(path.as_str(), "expected links (springs), material (tetrahedra) or shape_matching"),
     }
     let first = lattice.index([0; 3]);
     let pins = pinned(site, &Pinnable { path: &path, n: &lattice.n, first, is_lattice: true }, &thing.pin);
     pins.iter().for_each(|p| site.parts.pin(*p));
+    if let Some(words) = &thing.shape_matching {
+        let count: usize = lattice.n.iter().map(|n| *n as usize).product();
+        site.shape(first as usize..first as usize + count, words, &path);
+    }
     let triangles = surface(&lattice, first);
     if let Some(object) = site.parts.object() {
         object.triangles = triangles;

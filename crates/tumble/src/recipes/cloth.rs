@@ -5,6 +5,7 @@ use super::Site;
 use super::cut::{Cut, Stitch, cut};
 use super::dress::dress;
 use super::pins::{Pinnable, pinned};
+use super::surface::Surface;
 use crate::geometry::Vector;
 use crate::systems::dynamics::SpringPart;
 use tumble_interface::Mesh;
@@ -18,7 +19,8 @@ const MOST: f64 = 5e6;
 /// Adds the masses, links, hinges, seams and triangles.
 pub fn cloth(site: &mut Site<'_>, thing: &Cloth) {
     let path = format!("cloth \"{}\"", thing.name);
-    if thing.links.shear.is_some() {
+    let links = thing.links();
+    if links.shear.is_some() {
         site.wrong(format!("{path}.links.shear"), "cloth of triangles has no diagonals; known here: structural, bend");
     }
     let (cuts, stitches) = match (&thing.dress, thing.panels.is_empty()) {
@@ -81,17 +83,19 @@ pub fn cloth(site: &mut Site<'_>, thing: &Cloth) {
         let distance = |a: u32, b: u32| (flat(a)[0] - flat(b)[0]).hypot(flat(a)[1] - flat(b)[1]);
         for ([a, b], faces) in own.edges() {
             let stands_for: f64 = faces.iter().map(|t| measure(&own.triangles[*t as usize])).sum();
-            if let Some(family) = &thing.links.structural {
+            if let Some(family) = &links.structural {
                 site.link_of(family, [at + a, at + b], stands_for, distance(a, b));
             }
-            if let (Some(family), [t, u]) = (&thing.links.bend, &faces[..]) {
+            if let (Some(family), [t, u]) = (&links.bend, &faces[..]) {
                 let opposite = |t: u32| own.triangles[t as usize].into_iter().find(|i| *i != a && *i != b);
                 if let (Some(c), Some(d)) = (opposite(*t), opposite(*u)) {
                     site.link_of(family, [at + c, at + d], stands_for, distance(c, d));
                 }
             }
         }
-        site.hinges(&own, at, thing.hinge);
+        let words =
+            Surface { path: &path, hinge: thing.hinge, isometric: thing.isometric, membrane: thing.membrane.as_ref(), area: thing.area };
+        site.surface(&own, at, &words, Vector { x: 1.0, y: 0.0, z: 0.0 });
         all.triangles.extend(own.triangles.iter().map(|t| t.map(|i| i + start)));
         sides.push(piece.sides.into_iter().map(|side| side.into_iter().map(|i| at + i).collect()).collect());
     }

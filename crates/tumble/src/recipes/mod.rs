@@ -23,6 +23,7 @@ mod places;
 mod rope;
 mod scenery;
 mod sheet;
+mod surface;
 
 pub use block::block;
 pub use cloth::cloth;
@@ -81,33 +82,6 @@ impl Site<'_> {
                 tension_only: settings.tension_only,
                 break_strain: settings.break_strain,
             });
-        }
-    }
-
-    /// Hinges across every edge of a mesh of points that has two triangles; `stiffness` is the bending stiffness per
-    /// width [N m], the rest angle that of the mesh. k = B l²/(A1 + A2), which gives a sheet bent
-    /// to a cylinder its stiffness B.                                  (bending.6)
-    fn hinges(&mut self, mesh: &tumble_interface::Mesh, first: u32, stiffness: f64) {
-        use crate::elements::{Element, Hinge};
-        if stiffness == 0.0 {
-            return;
-        }
-        let vertex = |i: u32| Vector::from(mesh.vertices[i as usize]);
-        for ([a, b], faces) in mesh.edges() {
-            let [t, u] = faces[..] else { continue };
-            let (t, u) = (mesh.triangles[t as usize], mesh.triangles[u as usize]);
-            let opposite = |t: [u32; 3]| t.into_iter().find(|i| *i != a && *i != b);
-            let (Some(c), Some(d)) = (opposite(t), opposite(u)) else { continue };
-            // n1 = e x (x2 - x0) must be the outward normal of its triangle: edge a b runs forward in it.
-            let forward = (0..3).any(|k| t[k] == a && t[(k + 1) % 3] == b);
-            let (c, d) = if forward { (c, d) } else { (d, c) };
-            let area = |t: [u32; 3]| (vertex(t[1]) - vertex(t[0])).cross(vertex(t[2]) - vertex(t[0])).norm() / 2.0;
-            let (areas, length_sq) = (area(t) + area(u), (vertex(b) - vertex(a)).norm_sq());
-            if areas > 0.0 && length_sq > 0.0 {
-                let row = |i: u32| [vertex(i).x, vertex(i).y, vertex(i).z, 0.0];
-                let [rest] = Hinge::residual([0.0], [row(a), row(b), row(c), row(d)]);
-                self.parts.hinge([a, b, c, d].map(|i| i + first), rest, stiffness * length_sq / areas);
-            }
         }
     }
 }

@@ -2,6 +2,7 @@
 
 use super::Site;
 use super::pins::{Pinnable, pinned};
+use super::surface::Surface;
 use crate::geometry::Vector;
 use tumble_interface::Mesh;
 use tumble_interface::scene::Net;
@@ -26,23 +27,33 @@ pub fn net(site: &mut Site<'_>, thing: &Net, mesh: &Mesh) {
         );
     }
     let first = mesh.vertices.iter().zip(&mass).map(|(x, m)| site.parts.point(Vector::from(*x), Vector::default(), *m)).min().unwrap_or(0);
-    if thing.links.shear.is_some() {
+    let links = thing.links();
+    if links.shear.is_some() {
         site.wrong(format!("{path}.links.shear"), "a net of triangles has no diagonals; known here: structural, bend");
     }
     let edges = mesh.edges();
     for ([a, b], faces) in &edges {
         let measure: f64 = faces.iter().map(|t| areas[*t as usize]).sum();
-        if let Some(family) = &thing.links.structural {
+        if let Some(family) = &links.structural {
             site.link(family, [first + a, first + b], measure);
         }
-        if let (Some(family), [t, u]) = (&thing.links.bend, &faces[..]) {
+        if let (Some(family), [t, u]) = (&links.bend, &faces[..]) {
             let opposite = |t: u32| mesh.triangles[t as usize].into_iter().find(|i| i != a && i != b);
             if let (Some(c), Some(d)) = (opposite(*t), opposite(*u)) {
                 site.link(family, [first + c, first + d], measure);
             }
         }
     }
-    site.hinges(mesh, first, thing.hinge);
+    let words =
+        Surface { path: &path, hinge: thing.hinge, isometric: thing.isometric, membrane: thing.membrane.as_ref(), area: thing.area };
+    // The triangles' own planes have no axes in common; the x axis has a direction in most.
+    site.surface(mesh, first, &words, Vector { x: 1.0, y: 0.0, z: 0.0 });
+    if let Some(words) = &thing.pressure {
+        site.inflate(mesh, first, words, &path);
+    }
+    if let Some(words) = &thing.shape_matching {
+        site.shape(first as usize..first as usize + mesh.vertices.len(), words, &path);
+    }
     let pins = pinned(site, &Pinnable { path: &path, n: &[mesh.vertices.len() as u32], first, is_lattice: false }, &thing.pin);
     pins.iter().for_each(|p| site.parts.pin(*p));
     if let Some(object) = site.parts.object() {

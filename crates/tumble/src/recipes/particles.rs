@@ -5,15 +5,26 @@ use super::pins::{Pinnable, pinned};
 use crate::geometry::Vector;
 use crate::math::Random;
 use crate::math::functions::{cos, pow, sin};
-use crate::systems::dynamics::SpringPart;
-use tumble_interface::scene::{CloudShape, Particles};
+use crate::systems::dynamics::{Liquid, SpringPart};
+use tumble_interface::scene::{CloudShape, Fluid, Particles};
 
 /// What the random numbers of a cloud are drawn for.
 const PLACE: u32 = 0;
 const DIRECTION: u32 = 1;
 
-/// Puts the masses of an object's cloud into its lists.
+/// Puts the masses of an object's cloud, or those of its liquid, into its lists.
 pub fn draw_cloud(thing: &mut Particles, seed: u32) {
+    if let Some(fluid) = &thing.fluid {
+        let [s, mass] = [fluid.spacing, fluid.density * fluid.spacing * fluid.spacing * fluid.spacing];
+        for fill in &fluid.fill {
+            let n = fill.size.map(|size| (size / s).round().max(1.0) as u64);
+            for k in 0..n[0] * n[1] * n[2] {
+                let at = [k % n[0], k / n[0] % n[1], k / (n[0] * n[1])];
+                thing.position.push(std::array::from_fn(|a| fill.center[a] + s * (at[a] as f64 - 0.5 * (n[a] - 1) as f64)));
+            }
+        }
+        thing.mass = vec![mass];
+    }
     let Some(cloud) = thing.cloud.take() else { return };
     let random = Random::new(seed, &thing.name);
     let full: Vec<usize> = (0..3).filter(|a| cloud.size[*a] > 0.0).collect();
@@ -92,6 +103,13 @@ pub fn particles(site: &mut Site<'_>, thing: &Particles) {
     for pin in pinned(site, &Pinnable { path: &path, n: &[n as u32], first, is_lattice: false }, &thing.pin) {
         site.parts.pin(pin);
     }
+    if let Some(words) = &thing.shape_matching {
+        site.shape(first as usize..first as usize + n, words, &path);
+    }
+    if let Some(Fluid { spacing, stiffness, viscosity, .. }) = thing.fluid {
+        let liquid = Liquid { spacing, bulk: stiffness.unwrap_or(f64::INFINITY), viscosity };
+        site.parts.liquid(format!("{path}.fluid"), first as usize..first as usize + n, liquid);
+    }
     for (i, spring) in thing.spring.iter().enumerate() {
         let [a, b] = spring.between;
         if a.max(b) as usize >= n || a == b {
@@ -140,6 +158,8 @@ pub fn tracers(thing: &Particles, wrong: &mut impl FnMut(String, &str)) -> Trace
     refuse("charge", !thing.charge.is_empty());
     refuse("pin", !thing.pin.is_empty());
     refuse("spring", !thing.spring.is_empty());
+    refuse("shape_matching", thing.shape_matching.is_some());
+    refuse("fluid", thing.fluid.is_some());
     Tracer { x: thing.position.iter().map(|x| Vector::from(*x)).collect() }
 }
 
@@ -151,6 +171,8 @@ pub fn walkers(thing: &Particles, wrong: &mut impl FnMut(String, &str)) -> Vec<[
         ("charge", !thing.charge.is_empty()),
         ("pin", !thing.pin.is_empty()),
         ("spring", !thing.spring.is_empty()),
+        ("shape_matching", thing.shape_matching.is_some()),
+        ("fluid", thing.fluid.is_some()),
     ];
     for (key, _) in given.into_iter().filter(|(_, given)| *given) {
         let message = "particles of a vicsek system have a direction and no mass; leave it out, or use a dynamics system";

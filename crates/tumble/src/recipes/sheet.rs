@@ -3,10 +3,11 @@
 use super::Site;
 use super::lattice::Lattice;
 use super::pins::{Pinnable, pinned};
+use super::surface::Surface;
 use tumble_interface::Mesh;
 use tumble_interface::scene::Sheet;
 
-/// Adds the masses, links, hinges and triangles.
+/// Adds the masses, links, elements and triangles.
 ///
 /// ```text
 ///   y-   (i, j+1)---(i+1, j+1)       index i + nx j; the triangles and the single diagonal of
@@ -18,8 +19,9 @@ pub fn sheet(site: &mut Site<'_>, thing: &Sheet) {
     let path = format!("sheet \"{}\"", thing.name);
     site.parts.begin(&thing.name, 0.0);
     let lattice = Lattice::build(site, thing.resolution, thing.size, thing.center, thing.rotate, thing.density);
-    lattice.links(site, &thing.links);
+    lattice.links(site, &thing.links());
     let first = lattice.index([0; 3]);
+    let warp = site.parts.position(lattice.index([1, 0, 0])) - site.parts.position(first);
     let mut triangles = Vec::new();
     for j in 1..lattice.n[1] {
         for i in 1..lattice.n[0] {
@@ -29,10 +31,12 @@ pub fn sheet(site: &mut Site<'_>, thing: &Sheet) {
     }
     let pins = pinned(site, &Pinnable { path: &path, n: &lattice.n[..2], first, is_lattice: true }, &thing.pin);
     pins.iter().for_each(|p| site.parts.pin(*p));
-    if thing.hinge > 0.0 {
+    if thing.hinge > 0.0 || thing.isometric > 0.0 || thing.area > 0.0 || thing.membrane.is_some() {
         let vertices = lattice.nodes().map(|node| site.parts.position(lattice.index(node)).into()).collect();
         let mesh = Mesh { vertices, triangles };
-        site.hinges(&mesh, first, thing.hinge);
+        let words =
+            Surface { path: &path, hinge: thing.hinge, isometric: thing.isometric, membrane: thing.membrane.as_ref(), area: thing.area };
+        site.surface(&mesh, first, &words, warp);
         triangles = mesh.triangles;
     }
     if let Some(object) = site.parts.object() {

@@ -211,7 +211,7 @@ fn short(x: f64) -> String {
 
 /// The scene with the masses of its clouds drawn.
 fn with_clouds(scene: &Scene) -> Cow<'_, Scene> {
-    if scene.particles.iter().all(|thing| thing.cloud.is_none()) {
+    if scene.particles.iter().all(|thing| thing.cloud.is_none() && thing.fluid.is_none()) {
         return Cow::Borrowed(scene);
     }
     let mut scene = scene.clone();

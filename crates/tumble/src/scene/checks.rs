@@ -84,12 +84,17 @@ pub fn check(scene: &Scene, systems: &[System]) -> Vec<Issue> {
         }
     }
     for thing in &scene.particles {
-        let message = match (thing.position.is_empty(), thing.cloud.is_some()) {
-            (true, false) => "missing, expected positions or a cloud",
-            (false, true) => "given beside cloud; leave out one of them",
+        let message = match (thing.position.is_empty(), thing.cloud.is_some(), thing.fluid.is_some()) {
+            (true, false, false) => "missing, expected positions, a cloud or a fluid",
+            (false, true, _) => "given beside cloud; leave out one of them",
+            (false, _, true) => "given beside fluid, which fills boxes; leave out one of them",
+            (_, true, true) => "a cloud beside a fluid, which fills boxes; leave out one of them",
             _ => continue,
         };
         wrong(format!("particles \"{}\".position", thing.name), message.into());
+    }
+    for thing in scene.particles.iter().filter(|thing| thing.fluid.is_some() && thing.mass != [1.0]) {
+        wrong(format!("particles \"{}\".mass", thing.name), "given beside fluid, whose density and spacing say it; leave it out".into());
     }
     for anchor in &scene.anchor {
         let path = format!("anchor \"{}\"", anchor.name);
@@ -263,6 +268,9 @@ fn check_system(system: &System, path: &str, wrong: &mut impl FnMut(String, Stri
 fn check_plane(scene: &Scene, wrong: &mut impl FnMut(String, String)) {
     let (axis, name) = if scene.plane == Plane::Xz { (1, "y") } else { (2, "z") };
     for thing in &scene.particles {
+        if thing.fluid.is_some() {
+            wrong(format!("particles \"{}\".fluid", thing.name), "a liquid needs three dimensions; set dimension = 3".into());
+        }
         for (key, p) in thing.cloud.iter().flat_map(|c| [("center", c.center), ("size", c.size)]) {
             if p[axis] != 0.0 {
                 wrong(format!("particles \"{}\".cloud.{key}", thing.name), off_plane(axis, p[axis]));

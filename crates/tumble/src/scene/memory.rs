@@ -3,7 +3,7 @@
 use super::Assets;
 use crate::geometry::GridSdf;
 use crate::math::Signal;
-use tumble_interface::scene::{Diagonals, Dress, Emitter, GridBox, HeatScheme, Shape, Source};
+use tumble_interface::scene::{Diagonals, Dress, Emitter, Fluid, GridBox, HeatScheme, Shape, Source};
 use tumble_interface::{Mesh, Scene};
 
 /// Bytes for a mass: its rows in state, scratch, snapshot and history, in double precision.
@@ -26,6 +26,11 @@ pub fn memory(scene: &Scene, assets: &Assets) -> f64 {
     let diagonals = |d: &Diagonals| if *d == Diagonals::Both { 2.0 } else { 1.0 };
     let mut bytes = 0.0;
     for thing in &scene.particles {
+        let filled =
+            |f: &Fluid| f.fill.iter().map(|b| b.size.iter().map(|s| (s / f.spacing).round().max(1.0)).product::<f64>()).sum::<f64>();
+        let liquid = thing.fluid.as_ref().map_or(0.0, filled);
+        // A particle of a liquid has sums over its neighbours and a place among them besides.
+        bytes += liquid * 3.0 * MASS;
         bytes += (thing.position.len() as f64 + thing.cloud.as_ref().map_or(0.0, |c| f64::from(c.count))) * MASS
             + thing.spring.len() as f64 * LINK;
     }
@@ -74,8 +79,13 @@ pub fn memory(scene: &Scene, assets: &Assets) -> f64 {
     }
     for thing in &scene.sheet {
         let n: f64 = thing.resolution.iter().map(|n| f64::from(*n)).product();
-        let hinges = if thing.hinge > 0.0 { 9.0 } else { 0.0 };
-        bytes += n * (MASS + (4.0 + diagonals(&thing.links.diagonals) + hinges) * LINK);
+        // Three edges and two triangles a mass; a hinge has the size of three links.
+        let each = |there: bool, links: f64| if there { links } else { 0.0 };
+        let elements = each(thing.hinge > 0.0, 9.0)
+            + each(thing.isometric > 0.0, 9.0)
+            + each(thing.membrane.is_some(), 6.0)
+            + each(thing.area > 0.0, 4.0);
+        bytes += n * (MASS + (4.0 + diagonals(&thing.links().diagonals) + elements) * LINK);
     }
     for thing in &scene.block {
         let n: f64 = thing.resolution.iter().map(|n| f64::from(*n)).product();

@@ -5,10 +5,12 @@ use super::held::Held;
 use super::laws::Acting;
 use super::{Dynamics, Stepping, books};
 use crate::elements::{
-    BendTwist, Constraints, Distance, Element, Elements, Hinge, Linear, Members, Neohookean, Nonlinear, Pairs, Projected, Strands,
-    StretchShear, TetShear, TetStrain, TetVolume, Tethers, Vector,
+    Area, BendTwist, Constraints, Density, Distance, Element, Elements, Hinge, IsometricBend, Linear, Members, Membrane, Neohookean,
+    Nonlinear, Pairs, Projected, Shape, Strands, StretchShear, TetShear, TetStrain, TetVolume, Tethers, Vector, Volume,
 };
-use crate::forces::{Attractor, Cohesion, DirectSum, Flock, Force, Goal, Habits, Halos, LennardJones, Near, Repulsion, Viscosity};
+use crate::forces::{
+    Attractor, Cohesion, DirectSum, Flock, Force, Goal, Habits, Halos, LennardJones, Near, Newtonian, Repulsion, Viscosity,
+};
 use crate::geometry::Collider;
 use crate::integrators::Memory;
 use crate::math::{Quat, Real, Vec3, functions};
@@ -68,6 +70,28 @@ pub struct SpringPart {
     pub break_strain: Option<f64>,
 }
 
+/// A closed surface that holds a volume.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Closed {
+    /// Its triangles, counter-clockwise from outside.
+    pub triangles: Vec<[u32; 3]>,
+    /// Volume at which nothing presses [m³].
+    pub target: f64,
+    /// Pressure over the change of volume [Pa/m³]; infinite to keep it.
+    pub stiffness: f64,
+}
+
+/// A liquid of particles.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Liquid {
+    /// Spacing at rest [m].
+    pub spacing: f64,
+    /// Bulk modulus [Pa]; infinite to keep the density.
+    pub bulk: f64,
+    /// Viscosity [Pa s].
+    pub viscosity: f64,
+}
+
 /// Springs of one kind, with the strains at which they break.
 #[derive(Default)]
 struct Springs<const D: usize, const P: usize> {
@@ -82,10 +106,13 @@ impl<const D: usize, const P: usize> Springs<D, P> {
     }
 }
 
+/// Position [m], velocity [m/s], mass [kg], whether it is held.
+type Point = (Vec3<f64>, Vec3<f64>, f64, bool);
+
 /// Masses and elements under construction. Nodes are counted from 0: points by points, frames by frames.
 #[derive(Default)]
 pub struct Parts {
-    points: Vec<(Vec3<f64>, Vec3<f64>, f64, bool)>,
+    points: Vec<Point>,
     frames: Vec<([f64; 4], f64, bool)>,
     /// Points with an electric charge [C].
     charges: Vec<(u32, f64)>,
@@ -96,6 +123,13 @@ pub struct Parts {
     vector: Springs<0, 0>,
     dampers: Vec<Members<2, 1, 0>>,
     hinges: Vec<Members<4, 1, 0>>,
+    isometric: Vec<Members<4, 3, 0>>,
+    membranes: Vec<Members<3, 8, 0>>,
+    areas: Vec<Members<3, 1, 0>>,
+    /// Closed surfaces and whole bodies, each with its place in the scene.
+    closed: Vec<(String, Closed)>,
+    shapes: Vec<(String, Range<usize>, f64)>,
+    liquids: Vec<(String, Range<usize>, Liquid)>,
     shears: Vec<Members<4, 9, 0>>,
     volumes: Vec<Members<4, 10, 0>>,
     strains: Vec<Members<4, 9, 0>>,
@@ -263,6 +297,39 @@ impl Parts {
         self.hinges.push(Members { nodes, rest: [rest], law: [], stiffness, damping: 0.0 });
     }
 
+    /// Adds a flat hinge, quadratic in the positions, over edge 0 1 with opposite corners 2 and 3.
+    pub fn isometric(&mut self, nodes: [u32; 4], rest: [f64; 3], stiffness: f64) {
+        self.isometric.push(Members { nodes, rest, law: [], stiffness, damping: 0.0 });
+    }
+
+    /// Adds a membrane: the inverse of its rest edges, the root of its matrix, its rest area [m²] and damping time [s].
+    pub fn membrane(&mut self, nodes: [u32; 3], b: [f64; 4], root: [f64; 4], area: f64, damping: f64) {
+        let mut rest = [0.0; 8];
+        rest[..4].copy_from_slice(&b);
+        rest[4..].copy_from_slice(&root);
+        self.membranes.push(Members { nodes, rest, law: [], stiffness: area, damping: area * damping });
+    }
+
+    /// Adds a resistance against changes of the rest area [m²]; k [N/m³].
+    pub fn area(&mut self, nodes: [u32; 3], rest: f64, stiffness: f64) {
+        self.areas.push(Members { nodes, rest: [rest], law: [], stiffness, damping: 0.0 });
+    }
+
+    /// Adds a closed surface, at this place of the scene.
+    pub fn closed(&mut self, path: String, closed: Closed) {
+        self.closed.push((path, closed));
+    }
+
+    /// Keeps some points in the shape that they have now, by kappa [1/s²].
+    pub fn shape(&mut self, path: String, points: Range<usize>, kappa: f64) {
+        self.shapes.push((path, points, kappa));
+    }
+
+    /// Makes some points a liquid.
+    pub fn liquid(&mut self, path: String, points: Range<usize>, liquid: Liquid) {
+        self.liquids.push((path, points, liquid));
+    }
+
     /// Adds a stable Neo-Hookean tetrahedron of rest volume V [m³] with the material's Lamé constants [Pa] and damping
     /// time [s].
     pub fn tetrahedron(&mut self, nodes: [u32; 4], b: [f64; 9], volume: f64, lame_mu: f64, lame_lambda: f64, damping: f64) {
@@ -337,6 +404,13 @@ impl Parts {
     pub fn build(mut self, settings: Settings) -> Result<Dynamics, SceneError> {
         self.check_range()?;
         let points = self.points.len();
+        if let Some(path) =
+            self.closed.iter().map(|c| &c.0).chain(self.shapes.iter().map(|s| &s.0)).chain(self.liquids.iter().map(|l| &l.0)).next()
+            && settings.integrator != Integrator::PositionBased
+        {
+            let message = "a constraint on all masses at once, which only position-based dynamics knows; set method = \"position_based\"";
+            return Err(SceneError::one(path.as_str(), message));
+        }
         if !self.emitters.is_empty() && !self.frames.is_empty() {
             let message = "it holds rods and emitters; rods have frames, which must come last: give one of them a system of its own";
             return Err(SceneError::one(format!("system \"{}\"", settings.name), message));
@@ -405,9 +479,13 @@ impl Parts {
         let made = [
             batches.add::<Distance, 2, 1, 1>(&self.dampers, 0.0),
             batches.add::<Hinge, 4, 1, 1>(&self.hinges, 0.0),
+            batches.add::<IsometricBend, 4, 3, 3>(&self.isometric, 0.0),
+            batches.add::<Membrane, 3, 3, 8>(&self.membranes, 0.0),
+            batches.add::<Area, 3, 1, 1>(&self.areas, 0.0),
             batches.solids(&self.shears, &self.volumes, self.energy_at_rest),
             batches.add::<TetStrain, 4, 6, 9>(&self.strains, 0.0),
             batches.rods(&self.stretches, &mut self.bends, &self.rod_limits),
+            batches.wholes(&self.points, std::mem::take(&mut self.closed), &self.shapes, &self.liquids),
         ];
         if made.contains(&None) || kinds.contains(&None) {
             return Err(lost());
@@ -676,6 +754,31 @@ impl Batches {
             return self.add::<TetVolume, 4, 1, 10>(volumes, energy_at_rest[1]);
         }
         self.constraints.push(Box::new(Neohookean::new(self.rows, shears, volumes, energy_at_rest[0] + energy_at_rest[1])?));
+        Some(())
+    }
+
+    /// Adds what acts on whole bodies; `None` if a node is not a row. There are some only where elements are constraints.
+    fn wholes(
+        &mut self,
+        points: &[Point],
+        closed: Vec<(String, Closed)>,
+        shapes: &[(String, Range<usize>, f64)],
+        liquids: &[(String, Range<usize>, Liquid)],
+    ) -> Option<()> {
+        for (_, Closed { triangles, target, stiffness }) in closed {
+            self.constraints.push(Box::new(Volume::new(self.points, triangles, target, stiffness)?));
+        }
+        for (_, range, kappa) in shapes {
+            let (mass, places): (Vec<f64>, Vec<_>) = points.get(range.clone())?.iter().map(|(x, _, mass, _)| (*mass, *x)).unzip();
+            self.constraints.push(Box::new(Shape::new(range.clone(), mass, &places, *kappa)?));
+        }
+        for (_, range, Liquid { spacing, bulk, viscosity }) in liquids {
+            self.constraints.push(Box::new(Density::new(range.clone(), *spacing, *bulk)));
+            if *viscosity > 0.0 {
+                let law = Newtonian { viscosity: *viscosity, spacing: *spacing };
+                self.list.push(Box::new(Near::new(law, vec![range.clone()], None)));
+            }
+        }
         Some(())
     }
 }

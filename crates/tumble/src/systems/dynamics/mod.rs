@@ -13,7 +13,7 @@ mod life;
 mod modes;
 mod position_based;
 
-pub use build::{Parts, Settings, SpringPart};
+pub use build::{Closed, Liquid, Parts, Settings, SpringPart};
 
 use crate::elements::{Constraints, Limit, Linear, Projected, Projection, Tethers};
 use crate::exchange::{Exchange, Port};

@@ -1,0 +1,183 @@
+//! Shape matching: masses are drawn to their places in the rest shape, moved and turned as fits them best.
+//!
+//!   E = kappa/2 sum_i m_i |x_i - g_i|²,   g_i = c + R q_i,   R = argmin E                         (shapes.1)
+//!
+//! c is the centre of mass and q_i the rest places from theirs. A sub-step of implicit Euler is solved exactly: c and R, which minimize E,
+//! do not change on the way. Without kappa the shape is rigid.
+//! Source: [mueller2005]; the rotation is that of [horn1987], an eigenvector, which needs no start from the last one and so no state.
+//! Verified in `tests/surfaces.rs`.
+
+use super::{Constraints, Projection};
+use crate::math::parallel::{chunks, fold};
+use crate::math::{Quat, Real, Row, Vec3, xyz64};
+use std::ops::Range;
+
+type Vector = Vec3<f64>;
+
+/// The points of one body.
+pub struct Shape {
+    rows: Range<usize>,
+    mass: Vec<f64>,
+    total: f64,
+    /// Rest places from the centre of mass [m].
+    rest: Vec<Vector>,
+    /// kappa [1/s²]; infinite if rigid.
+    kappa: f64,
+    /// What each has been moved by in this sub-step [m]; empty for one sweep.
+    moved: Vec<Vector>,
+}
+
+impl Shape {
+    /// The rows from `rows.start` on with these masses [kg] and places at rest [m], held by `kappa` [1/s²]; `None` if there is not one of each
+    /// for every row, or no mass.
+    pub fn new(rows: Range<usize>, mass: Vec<f64>, places: &[Vector], kappa: f64) -> Option<Self> {
+        if mass.len() != rows.len() || places.len() != rows.len() {
+            return None;
+        }
+        let total: f64 = mass.iter().sum();
+        let center = mass.iter().zip(places).fold(Vector::default(), |sum, (m, x)| sum + *x * *m) * (1.0 / total);
+        let rest = places.iter().map(|x| *x - center).collect();
+        (total > 0.0).then_some(Self { rows, mass, total, rest, kappa, moved: Vec::new() })
+    }
+
+    /// The centre of mass and the rotation that fits best.
+    fn fit(&self, x: &[Row]) -> (Vector, Quat<f64>) {
+        let x = &x[self.rows.clone()];
+        // Measured from one point, so that nothing is lost far from the origin.
+        let origin = x.first().map_or(Vector::default(), |row| xyz64(*row));
+        let first = |range: Range<usize>| range.fold(Vector::default(), |sum, i| sum + (xyz64(x[i]) - origin) * self.mass[i]);
+        let center = origin + fold(x.len(), first).into_iter().fold(Vector::default(), |a, b| a + b) * (1.0 / self.total);
+        // S = sum m q (x - c)^T, as rows.
+        let second = |range: Range<usize>| {
+            range.fold([Vector::default(); 3], |s, i| {
+                let (q, d) = (self.rest[i], (xyz64(x[i]) - center) * self.mass[i]);
+                [s[0] + d * q.x, s[1] + d * q.y, s[2] + d * q.z]
+            })
+        };
+        let add = |a: [Vector; 3], b: [Vector; 3]| [a[0] + b[0], a[1] + b[1], a[2] + b[2]];
+        let s = fold(x.len(), second).into_iter().fold([Vector::default(); 3], add);
+        (center, rotation(s))
+    }
+}
+
+/// The rotation R with the largest sum of m x . R q from S = sum m q x^T.
+fn rotation(s: [Vector; 3]) -> Quat<f64> {
+    let [[xx, xy, xz], [yx, yy, yz], [zx, zy, zz]] = s.map(<[f64; 3]>::from);
+    // [horn1987], order w, x, y, z.
+    let matrix = [
+        [xx + yy + zz, yz - zy, zx - xz, xy - yx],
+        [yz - zy, xx - yy - zz, xy + yx, zx + xz],
+        [zx - xz, xy + yx, yy - xx - zz, yz + zy],
+        [xy - yx, zx + xz, yz + zy, zz - xx - yy],
+    ];
+    let [w, x, y, z] = largest_eigenvector(matrix);
+    Quat { v: Vec3 { x, y, z }, w }
+}
+
+/// The eigenvector of the largest eigenvalue of a symmetric matrix, by Jacobi's rotations in fixed order.
+fn largest_eigenvector(mut a: [[f64; 4]; 4]) -> [f64; 4] {
+    let mut v = [[0.0; 4]; 4];
+    (0..4).for_each(|i| v[i][i] = 1.0);
+    // Quadratic convergence: five sweeps reach round-off, more find nothing to turn.
+    for _ in 0..12 {
+        let mut turned = false;
+        for p in 0..3 {
+            for q in p + 1..4 {
+                let off = a[p][q];
+                if off.abs() <= 1e-17 * (a[p][p].abs() + a[q][q].abs()) {
+                    continue;
+                }
+                turned = true;
+                let theta = (a[q][q] - a[p][p]) / (2.0 * off);
+                let t = theta.signum() / (theta.abs() + (theta * theta + 1.0).sqrt());
+                let cos = 1.0 / (t * t + 1.0).sqrt();
+                let sin = t * cos;
+                for k in 0..4 {
+                    let (x, y) = (a[k][p], a[k][q]);
+                    (a[k][p], a[k][q]) = (cos * x - sin * y, sin * x + cos * y);
+                }
+                for k in 0..4 {
+                    let (x, y) = (a[p][k], a[q][k]);
+                    (a[p][k], a[q][k]) = (cos * x - sin * y, sin * x + cos * y);
+                }
+                for row in &mut v {
+                    let (x, y) = (row[p], row[q]);
+                    (row[p], row[q]) = (cos * x - sin * y, sin * x + cos * y);
+                }
+            }
+        }
+        if !turned {
+            break;
+        }
+    }
+    let most = (1..4).fold(0, |best, i| if a[i][i] > a[best][best] { i } else { best });
+    let norm = v.iter().map(|row| row[most] * row[most]).sum::<f64>().sqrt();
+    v.map(|row| row[most] / norm)
+}
+
+impl Constraints for Shape {
+    fn name(&self) -> &'static str {
+        "shape"
+    }
+
+    fn len(&self) -> usize {
+        1
+    }
+
+    fn energy(&self, x: &[Row]) -> f64 {
+        if self.kappa.is_infinite() {
+            return 0.0;
+        }
+        let ((center, turn), rest) = (self.fit(x), &self.rest);
+        let goal = |i: usize| center + turn.turn(rest[i]);
+        let rows = &x[self.rows.clone()];
+        let of = |i: usize| 0.5 * self.kappa * self.mass[i] * (xyz64(rows[i]) - goal(i)).norm_sq();
+        fold(rows.len(), |range| range.map(of).sum::<f64>()).into_iter().sum()
+    }
+
+    fn project(&mut self, x: &mut [Row], step: &Projection<'_>) {
+        let many = step.iterations > 1 && step.plain.is_none();
+        let mut moved = std::mem::take(&mut self.moved);
+        if many && (step.iteration == 0 || moved.len() != self.rows.len()) {
+            moved.clear();
+            moved.resize(self.rows.len(), Vector::default());
+        }
+        let ((center, turn), rest) = (self.fit(x), &self.rest);
+        let goal = |i: usize| center + turn.turn(rest[i]);
+        // alpha = m/(kappa h²), and so is what it multiplies.
+        let soft = if step.plain.is_some() { 0.0 } else { 1.0 / (self.kappa * step.h * step.h) };
+        let part = step.plain.map_or(1.0, f64::from) / (1.0 + soft);
+        let way = |i: usize, row: &Row, moved: Vector| (goal(i) - xyz64(*row) - moved * soft) * part;
+        let put = |row: &mut Row, d: Vector| {
+            if row[3] > 0.0 {
+                *row = [row[0] + d.x as Real, row[1] + d.y as Real, row[2] + d.z as Real, row[3]];
+            }
+        };
+        let rows = &mut x[self.rows.clone()];
+        if many {
+            crate::math::parallel::chunks2(rows, &mut moved, |start, rows, moved| {
+                for (k, (row, moved)) in rows.iter_mut().zip(moved).enumerate() {
+                    let d = way(start + k, row, *moved);
+                    *moved = *moved + d;
+                    put(row, d);
+                }
+            });
+        } else {
+            chunks(rows, |start, rows| {
+                for (k, row) in rows.iter_mut().enumerate() {
+                    let d = way(start + k, row, Vector::default());
+                    put(row, d);
+                }
+            });
+        }
+        self.moved = moved;
+    }
+
+    fn add_grip(&self, _: &[Row], grip: &mut [Real]) {
+        if self.kappa.is_finite() {
+            for (grip, m) in grip[self.rows.clone()].iter_mut().zip(&self.mass) {
+                *grip += (self.kappa * m) as Real;
+            }
+        }
+    }
+}
