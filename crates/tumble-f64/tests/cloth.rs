@@ -4,9 +4,8 @@
 
 mod common;
 
-use common::{positions, run, simulation, step, vector};
+use common::{every, positions, run, simulation, step, vector};
 use tumble_f64::scene::Simulation;
-use tumble_interface::scene::Integrator;
 use tumble_interface::{Data, Engine, Scene};
 
 fn issues(text: &str) -> String {
@@ -98,8 +97,7 @@ fn what_is_wrong_with_a_pattern_is_told_with_its_place() {
 
 #[test]
 fn pins_follow_a_collider_under_every_integrator() {
-    let schemes: Vec<Integrator> = Integrator::ALL.into_iter().chain([Integrator::PositionBased]).collect();
-    for scheme in schemes {
+    for scheme in every() {
         let steps = if scheme.is_adaptive() { "" } else { "substeps = 40" };
         let mut sim = simulation(&format!(
             "time.fps = 20\n[[system]]\nintegrator = \"{}\"\n{steps}\n[[rope]]\nname = \"r\"\nfrom = [0, 0, 2]\nto = [1, 0, 2]\nsegments = 8\n\

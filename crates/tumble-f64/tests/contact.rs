@@ -4,7 +4,7 @@
 
 mod common;
 
-use common::{positions, run, simulation, step, vector, velocities};
+use common::{every, positions, run, simulation, step, vector, velocities};
 use std::collections::HashMap;
 use std::sync::Arc;
 use tumble_f64::geometry::surface;
@@ -45,7 +45,7 @@ fn on_incline(sim: &Simulation, degrees: f64) -> (f64, f64, f64) {
 #[test]
 fn a_slider_sticks_below_the_angle_of_friction_and_slides_above_it() {
     let limit = MU.atan().to_degrees();
-    for scheme in Integrator::ALL {
+    for scheme in every() {
         let mut below = slider(scheme, limit - 1.0);
         run(&mut below, 100);
         let (way, height, speed) = on_incline(&below, limit - 1.0);
@@ -85,7 +85,7 @@ fn a_slider_sticks_below_the_angle_of_friction_and_slides_above_it() {
 /// Dropped from H, a mass with restitution 1/2 comes back to H/4.
 #[test]
 fn a_bounce_loses_what_restitution_says() {
-    for scheme in Integrator::ALL {
+    for scheme in every() {
         let mut sim = simulation(&format!(
             "time.fps = 200\n{}[[particles]]\nname = \"p\"\nposition = [[0, 0, 1.0]]\n\
              [[collider]]\nname = \"floor\"\nrestitution = 0.5\nshape.floor.height = 0\n",
@@ -115,7 +115,7 @@ fn a_bounce_loses_what_restitution_says() {
 #[test]
 fn a_resting_mass_rests() {
     for restitution in [0.0, 0.5] {
-        for scheme in Integrator::ALL {
+        for scheme in every() {
             let mut sim = simulation(&format!(
                 "time.fps = 60\n{}[[particles]]\nname = \"p\"\nposition = [[0, 0, 0]]\n\
                  [[collider]]\nname = \"floor\"\nfriction = 0.3\nrestitution = {restitution}\nshape.floor.height = 0\n",
@@ -163,9 +163,14 @@ fn every_solid_holds_a_sheet() {
         ("mesh", "shape.mesh = { path = \"ball.obj\", resolution = 48 }"),
     ];
     for (name, shape) in shapes {
-        for scheme in
-            [Integrator::SymplecticEuler, Integrator::VelocityVerlet, Integrator::Rk4, Integrator::ImplicitEuler, Integrator::Bdf2]
-        {
+        for scheme in [
+            Integrator::SymplecticEuler,
+            Integrator::VelocityVerlet,
+            Integrator::Rk4,
+            Integrator::ImplicitEuler,
+            Integrator::Bdf2,
+            Integrator::PositionBased,
+        ] {
             let mut sim = sheet_on(shape, scheme);
             let mut deepest = 0.0_f64;
             let mut contacts = 0;

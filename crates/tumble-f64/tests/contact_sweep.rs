@@ -5,7 +5,7 @@
 
 mod common;
 
-use common::{Vector, positions, run, simulation, step, vector, velocities};
+use common::{Vector, every, positions, run, simulation, step, vector, velocities};
 use proptest::prelude::*;
 use std::collections::HashMap;
 use std::sync::Arc;
@@ -88,7 +88,7 @@ fn a_bouncing_ball_rests_when_the_series_says() {
 fn an_elastic_ball_bounces_for_ever() {
     // Step doubling changes its step in flight and with it the speed of its path; implicit Euler damps.
     let others = [Integrator::AdaptiveEuler, Integrator::ImplicitEuler];
-    for scheme in Integrator::ALL.into_iter().filter(|s| !others.contains(s)) {
+    for scheme in every().into_iter().filter(|s| !others.contains(s)) {
         for h in [1e-2, 2e-3] {
             // Two steps a frame; dropped from 1 m.
             let words = words(scheme, 0.5 / h, 2);
@@ -136,7 +136,7 @@ fn an_elastic_ball_bounces_for_ever() {
 #[test]
 fn velocities_lag_behind_positions() {
     let h = 0.01;
-    for scheme in Integrator::ALL {
+    for scheme in every() {
         let words = words(scheme, 1.0 / h, 1).replace("tolerance = 1e-8", &format!("tolerance = 1\nadaptive.first_step = {h}"));
         let sim = &mut one(&words, vector(0.0, 0.0, 9.0), vector(1.0, 0.0, 2.0), "shape.floor.height = 0", G);
         // BDF2 starts with implicit Euler, from whose lag a third is left after each step: 1.4e-10.
@@ -156,7 +156,7 @@ fn velocities_lag_behind_positions() {
 fn a_slider_stops_where_it_should() {
     let (a, mu, v) = (10.0_f64.to_radians(), 0.5, 2.0);
     let expected = v * v / (2.0 * G * (mu * a.cos() - a.sin()));
-    for scheme in Integrator::ALL {
+    for scheme in every() {
         let down = vector(a.cos(), 0.0, -a.sin());
         let collider = format!("friction = {mu}\nshape.plane.normal = [{:e}, 0, {:e}]", a.sin(), a.cos());
         let sim = &mut one(&words(scheme, 100.0, 10), vector(0.0, 0.0, 0.0), down * v, &collider, G);
@@ -203,7 +203,7 @@ fn light_in_a_round_room() {
 fn a_belt_drags() {
     let (mu, belt) = (0.3, 2.0);
     for words_of in ["belt = [2, 0, 0]", "motion.velocity = [2, 0, 0]"] {
-        for scheme in Integrator::ALL {
+        for scheme in every() {
             let collider = format!("friction = {mu}\n{words_of}\nshape.floor.height = 0");
             let sim = &mut one(&words(scheme, 100.0, 10), vector(0.0, 0.0, 0.0), vector(0.0, 0.0, 0.0), &collider, G);
             run(sim, 40);
@@ -223,7 +223,7 @@ fn a_belt_drags() {
 /// What an elastic bat hits leaves with 2u - v, whatever the scheme; also where the bat turns, and where it is fast.
 #[test]
 fn a_bat_hits() {
-    for scheme in Integrator::ALL {
+    for scheme in every() {
         for (u, v) in [(3.0, -1.0), (300.0, -100.0), (-1.0, -4.0)] {
             let collider =
                 format!("restitution = 1\nmotion.velocity = [0, 0, {u}]\nshape.plane = {{ point = [0, 0, -1], normal = [0, 0, 1] }}");
@@ -329,7 +329,7 @@ fn thin_walls_hold() {
     let wall = surface::cuboid(vector(0.0, 0.0, 0.0), vector(2.0, 2.0, 0.0005), from_degrees([0.0; 3]));
     let meshes = [("wall", wall), ("plate", plate(0.0))];
     for (name, shape) in walls {
-        for scheme in Integrator::ALL {
+        for scheme in every() {
             for speed in [30.0, 1e4] {
                 let text = scene(
                     &words(scheme, 24.0, 1),

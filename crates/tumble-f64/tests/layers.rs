@@ -85,3 +85,42 @@ fn a_bad_start_is_untangled_without_launching_anything() {
     run(&mut sim, 30);
     assert_eq!(sim.ledger().intersections, 0);
 }
+
+/// A sheet on another that is held sticks below atan(mu) and slides above it with g (sin a - mu cos a), as on a solid.
+#[test]
+fn a_sheet_on_a_sheet_slides_from_the_angle_of_friction_on() {
+    let mu: f64 = 0.4;
+    let limit = mu.atan().to_degrees();
+    let way = |degrees: f64| {
+        let a = degrees.to_radians();
+        let mut sim = simulation(&format!(
+            "precision = \"double\"\ntime.fps = 50\nworld.gravity = [{:e}, 0, {:e}]\n[[system]]\nmethod = \"position_based\"\nsubsteps = 20\n\
+             self_contact = {{ thickness = 0.01, friction = {mu} }}\n\
+             [[sheet]]\nname = \"held\"\nsize = [2, 0.6]\nresolution = [41, 13]\npin = [\"all\"]\n{LINKS}\n\
+             [[sheet]]\nname = \"free\"\nsize = [0.3, 0.3]\nresolution = [7, 7]\ncenter = [-0.6, 0, 0.0101]\n{LINKS}\n",
+            9.8 * a.sin(),
+            -9.8 * a.cos()
+        ));
+        let middle = |sim: &tumble_f64::scene::Simulation| positions(sim, "free").iter().map(|x| x.x).sum::<f64>() / 49.0;
+        // It settles first.
+        run(&mut sim, 10);
+        let start = middle(&sim);
+        run(&mut sim, 20);
+        let half = middle(&sim);
+        run(&mut sim, 10);
+        assert_eq!(sim.ledger().intersections, 0);
+        (start, half, middle(&sim))
+    };
+    let (start, half, end) = way(limit - 1.0);
+    println!("1 degree below: {:.1e} m in 0.6 s", end - start);
+    assert!((end - start).abs() < 1e-3, "{} {} {}", start, half, end);
+    for beyond in [1.0, 10.0] {
+        let a = (limit + beyond).to_radians();
+        let exact = 9.8 * (a.sin() - mu * a.cos());
+        let (start, _, end) = way(limit + beyond);
+        // From rest at t = 0, less what it went in the first 0.2 s.
+        let expected = 0.5 * exact * (0.8 * 0.8 - 0.2 * 0.2);
+        println!("{beyond} above: {:.4} m, expected {expected:.4} m", end - start);
+        assert!(((end - start) / expected - 1.0).abs() < 0.1, "{beyond}: {} {expected}", end - start);
+    }
+}

@@ -180,7 +180,7 @@ fn icosahedron(radius: f64) -> Mesh {
 
 fn with_mesh(text: &str, mesh: Mesh) -> Result<Simulation, String> {
     let scene = Scene::from_toml(&format!("version = 1\n{text}")).map_err(|e| e.to_string())?;
-    Simulation::new(scene, Arc::new(HashMap::from([("ball.obj".to_string(), mesh)]))).map_err(|e| e.to_string())
+    Simulation::new(scene, Arc::new(HashMap::from([("ball.obj".to_string(), mesh)])).into()).map_err(|e| e.to_string())
 }
 
 fn volume_of(sim: &Simulation, mesh: &Mesh) -> f64 {

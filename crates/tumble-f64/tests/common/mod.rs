@@ -15,6 +15,11 @@ pub fn fixed() -> Vec<Integrator> {
     Integrator::ALL.into_iter().filter(|i| !i.is_adaptive()).collect()
 }
 
+/// All schemes, position-based dynamics too.
+pub fn every() -> Vec<Integrator> {
+    Integrator::ALL.into_iter().chain([Integrator::PositionBased]).collect()
+}
+
 /// A simulation of a scene in TOML; `version = 1` is added.
 pub fn simulation(text: &str) -> Simulation {
     let scene = Scene::from_toml(&format!("version = 1\n{text}")).unwrap_or_else(|e| panic!("{e}\n{text}"));

@@ -179,7 +179,11 @@ impl Engine for Simulation {
     fn replace_integrator(&mut self, system: &str, integrator: Box<dyn UserIntegrator>) -> Result<(), SceneError> {
         match self.world.system(system).map(|s| s.replace_integrator(integrator)) {
             Some(true) => Ok(()),
-            _ => Err(self.system_error(system, "it moves particles without mass, which have no velocities to integrate")),
+            _ => Err(self.system_error(
+                system,
+                "it is no system of forces and velocities that another scheme could integrate; \
+                 give it an integrator other than \"position_based\"",
+            )),
         }
     }
 

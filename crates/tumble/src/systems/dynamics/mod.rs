@@ -447,6 +447,7 @@ impl Dynamics {
         let (substeps, h) = (substeps as u32, dt / substeps);
         let each = self.laws.is_local()
             && self.constraints.is_empty()
+            && self.layers.is_none()
             && self.tethers.is_empty()
             && self.held.is_empty()
             && self.user.is_none()
@@ -618,6 +619,10 @@ impl System for Dynamics {
     }
 
     fn replace_integrator(&mut self, integrator: Box<dyn UserIntegrator>) -> bool {
+        // What is a constraint there is no force that a scheme could ask for.
+        if self.integrator == Integrator::PositionBased {
+            return false;
+        }
         self.user = Some(integrator);
         true
     }
