@@ -5,6 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from tumble.pictures.surfaces import Floats, Indices, unit
+from tumble.style import Rgb
 
 NEAR = 6
 """Neighbours of a strand among which the two others of a triangle are drawn."""
@@ -14,6 +15,17 @@ FAR = 2.0
 
 SEED = 7
 """Of the places of strands between others: every picture and export has the same."""
+
+
+@dataclass(frozen=True)
+class Hair:
+    """Strands, strands x points x 3, that taper."""
+
+    name: str
+    curves: Floats
+    radii: Floats
+    """Of the points of a strand."""
+    color: Rgb
 
 
 @dataclass(frozen=True)
@@ -33,6 +45,11 @@ class Strands:
         if len(self.guides) == len(curves):
             return curves
         return np.asarray(np.einsum("mk,mkpc->mpc", self.weights, curves[self.guides]))
+
+    def hair(self, name: str, x: Floats, radius: float, color: Rgb) -> Hair:
+        """What is drawn of them, with this radius at the roots."""
+        taper = 1.0 - 0.8 * np.linspace(0.0, 1.0, self.points) ** 2
+        return Hair(name, self.of(x), radius * taper, color)
 
 
 def strands(x: Floats, points: int, render: int) -> Strands:

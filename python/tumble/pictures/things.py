@@ -20,7 +20,7 @@ from tumble import grids
 from tumble._engine import ExportError
 from tumble.grids import Box
 from tumble.pictures.blackbody import developed, glow
-from tumble.pictures.strands import Strands, prisms, strands
+from tumble.pictures.strands import Hair, Strands, prisms, strands
 from tumble.pictures.surfaces import Floats, Indices, balls, normals, outward, split, tubes
 from tumble.style import COLORS, GROUND, PALETTE, SOLID, Rgb, linear, rgb
 
@@ -122,17 +122,6 @@ class Tubes:
     points: Floats
     counts: Indices
     radius: float
-    color: Rgb
-
-
-@dataclass(frozen=True)
-class Hair:
-    """Strands, strands x points x 3, that taper."""
-
-    name: str
-    curves: Floats
-    radii: Floats
-    """Of the points of a strand."""
     color: Rgb
 
 
@@ -555,9 +544,7 @@ class Stage:
         x = positions(columns, thing)
         broken = self._broken(thing, columns)
         if thing.strands is not None:
-            taper = 1.0 - 0.8 * np.linspace(0.0, 1.0, thing.strands.points) ** 2
-            radii = max(thing.radius, HAIR * thinnest) * taper
-            return [Hair(thing.name, thing.strands.of(x), radii, thing.color)]
+            return [thing.strands.hair(thing.name, x, max(thing.radius, HAIR * thinnest), thing.color)]
         thing = replace(thing, radius=max(thing.radius, thinnest * (3 if len(x) < FEW else 1)))
         if thing.kind in ("sheet", "block"):
             triangles = _without(thing.triangles, thing.links[broken])

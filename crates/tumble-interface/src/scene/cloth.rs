@@ -82,6 +82,11 @@ pub struct Panel {
     /// Direction of its second axis, as far as that is across the first.
     #[serde(default = "up")]
     pub up: [f64; 3],
+    /// Radius of the cylinder, along `up`, that it is laid around at the start: it touches it at the origin, from the side where
+    /// `right` points to the right. Without it, the panel starts flat.
+    #[serde(default)]
+    #[schemars(extend("x-unit" = "m", "exclusiveMinimum" = 0.0))]
+    pub around: Option<f64>,
 }
 
 /// Two sides of panels that are sewn together. They must be of one length, to a fiftieth.

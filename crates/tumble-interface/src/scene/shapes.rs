@@ -144,6 +144,20 @@ pub enum Shape {
         #[schemars(extend("x-unit" = "m", "exclusiveMinimum" = 0.0))]
         radius: f64,
     },
+    /// A solid of revolution about an axis along z: funnels, bowls, vases, cones.
+    Lathe {
+        /// Where the axis has z = 0.
+        #[serde(default)]
+        #[schemars(extend("x-unit" = "m"))]
+        center: [f64; 3],
+        /// Corners of half the cut through it, in order around: distance from the axis and height of each.
+        #[schemars(length(min = 3), extend("x-unit" = "m"))]
+        profile: Vec<[f64; 2]>,
+        /// Flat sides around.
+        #[serde(default = "around")]
+        #[schemars(range(min = 3, max = 1000))]
+        sides: u32,
+    },
     /// A triangle mesh from a file.
     Mesh(MeshFile),
     /// A triangle mesh whose vertices move, from a file for each of some times.
@@ -153,6 +167,10 @@ pub enum Shape {
     /// A figure that is made here: an artist's mannequin that stands, walks, twirls or dances. It looks along -y, its left is +x, its
     /// soles are at z = 0.
     Mannequin(Mannequin),
+}
+
+fn around() -> u32 {
+    64
 }
 
 /// A skinned, animated figure from a GLB or glTF file. Between frames of `rate` its vertices move straight.

@@ -66,6 +66,30 @@ pub fn capsule(a: Vector, b: Vector, radius: f64) -> Mesh {
     Mesh { vertices, triangles }
 }
 
+/// A solid of revolution about an axis along z: the profile holds distances from the axis and heights, counter-clockwise where the
+/// distance grows to the right.
+pub fn revolved(center: Vector, profile: &[[f64; 2]], sides: u32) -> Mesh {
+    let mut mesh = Mesh::default();
+    // A corner on the axis is one vertex, any other a ring of them.
+    let mut rings = Vec::new();
+    for [r, z] in profile {
+        rings.push((mesh.vertices.len() as u32, *r > 0.0));
+        for k in 0..if *r > 0.0 { sides } else { 1 } {
+            let angle = f64::from(k) / f64::from(sides) * std::f64::consts::TAU;
+            mesh.vertices.push((center + Vector { x: r * cos(angle), y: r * sin(angle), z: *z }).into());
+        }
+    }
+    for (i, low) in rings.iter().enumerate() {
+        let high = rings[(i + 1) % rings.len()];
+        let at = |(first, ring): (u32, bool), k: u32| first + if ring { k % sides } else { 0 };
+        for k in 0..sides {
+            let [a, b, c, d] = [at(*low, k), at(*low, k + 1), at(high, k + 1), at(high, k)];
+            mesh.triangles.extend([[a, b, c], [a, c, d]].into_iter().filter(|[i, j, k]| i != j && j != k && k != i));
+        }
+    }
+    mesh
+}
+
 /// A box with these half edges, turned.
 pub fn cuboid(center: Vector, half: Vector, turn: Quat<f64>) -> Mesh {
     let sign = |bit: usize, k: usize| if k >> bit & 1 == 1 { 1.0 } else { -1.0 };
@@ -107,6 +131,14 @@ mod tests {
         let (a, b) = (Vector::from([1.0, 0.0, 0.0]), Vector::from([1.0, 3.0, 4.0]));
         let pill = capsule(a, b, 2.0);
         assert_eq!(pill.defects(), Defects::default());
+        // A cone with a radius of 3 and a height of 4; a ring with a square cut, by the theorem of Pappus.
+        for (profile, exact) in
+            [(vec![[0.0, 0.0], [3.0, 0.0], [0.0, 4.0]], 12.0), (vec![[2.0, 0.0], [3.0, 0.0], [3.0, 1.0], [2.0, 1.0]], 5.0)]
+        {
+            let solid = revolved([1.0, 2.0, 3.0].into(), &profile, 200);
+            assert_eq!(solid.defects(), Defects::default());
+            assert!((volume(&solid) / (exact * std::f64::consts::PI) - 1.0).abs() < 1e-3);
+        }
         // A cylinder of length 5 and a ball.
         assert!((volume(&pill) / (std::f64::consts::PI * (20.0 + 32.0 / 3.0)) - 1.0).abs() < 0.01);
         let block = cuboid([1.0, 0.0, 0.0].into(), [0.5, 1.0, 2.0].into(), crate::math::rotation::from_degrees([10.0, 20.0, 30.0]));

@@ -7,6 +7,7 @@ use super::dress::dress;
 use super::pins::{Pinnable, pinned};
 use super::surface::Surface;
 use crate::geometry::Vector;
+use crate::math::functions;
 use crate::systems::dynamics::SpringPart;
 use tumble_interface::Mesh;
 use tumble_interface::scene::{Cloth, Panel, Seam};
@@ -168,9 +169,14 @@ fn of_panels(site: &mut Site<'_>, thing: &Cloth, path: &str) -> Option<(Vec<Cut>
 fn flat_panel(panel: &Panel) -> Cut {
     let n = panel.outline.len();
     let sides = (0..n).map(|i| vec![panel.outline[i], panel.outline[(i + 1) % n]]).collect();
-    let origin = Vector::from(panel.origin);
+    let (origin, around) = (Vector::from(panel.origin), panel.around);
     let right = Vector::from(panel.right).normalized();
     let up = Vector::from(panel.up);
     let up = (up - right * up.dot(right)).normalized();
-    Cut { sides, place: Box::new(move |p| origin + right * p[0] + up * p[1]) }
+    let out = right.cross(up);
+    let place = move |[u, v]: [f64; 2]| match around {
+        Some(r) => origin + up * v + right * (r * functions::sin(u / r)) + out * (r * (functions::cos(u / r) - 1.0)),
+        None => origin + right * u + up * v,
+    };
+    Cut { sides, place: Box::new(place) }
 }

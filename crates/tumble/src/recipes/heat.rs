@@ -11,8 +11,8 @@ use tumble_interface::scene::{Animated, Collider, Component, Heat, HeatScheme, H
 
 /// A solid without a mesh.
 fn shape(words: &Words) -> Result<Shape, String> {
-    if matches!(words, Words::Mesh(_) | Words::AnimatedMesh(_) | Words::Character(_) | Words::Mannequin(_)) {
-        return Err("a mesh, expected a sphere, box, plane, floor or capsule".into());
+    if matches!(words, Words::Lathe { .. } | Words::Mesh(_) | Words::AnimatedMesh(_) | Words::Character(_) | Words::Mannequin(_)) {
+        return Err("a mesh or a solid of revolution, expected a sphere, box, plane, floor or capsule".into());
     }
     let thing = Collider {
         name: String::new(),

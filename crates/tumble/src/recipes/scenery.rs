@@ -54,6 +54,13 @@ pub fn solid(thing: &Thing, meshes: &[Mesh], figure: Option<(Arc<Rig>, Facets)>)
         }
         Words::Floor { height } => Shape::Plane { normal: [0.0, 0.0, 1.0].into(), offset: *height },
         Words::Capsule { from, to, radius } => Shape::Capsule { from: (*from).into(), to: (*to).into(), radius: *radius },
+        Words::Lathe { center, profile, sides } => {
+            let mesh = turned(*center, profile, *sides)?;
+            match Facets::new(&[&mesh], &[0.0]) {
+                Some(facets) => Shape::Animated { facets, shell: false },
+                None => return wrong(".shape.lathe.profile", "it makes no triangle with an area".into()),
+            }
+        }
         Words::Mesh(file) => {
             let Some(mesh) = meshes.first() else { return wrong(".shape.mesh", "the mesh has not been loaded".into()) };
             whole(mesh, ".shape.mesh", file.shell, thing.thickness)?;
@@ -117,6 +124,31 @@ pub fn solid(thing: &Thing, meshes: &[Mesh], figure: Option<(Arc<Rig>, Facets)>)
     })
 }
 
+/// The surface of a solid of revolution.
+fn turned(center: [f64; 3], profile: &[[f64; 2]], sides: u32) -> Result<Mesh, Wrong> {
+    let wrong = |key: String, message: &str| Err((format!(".shape.lathe.profile{key}"), message.to_string()));
+    if let Some(k) = profile.iter().position(|p| p[0] < 0.0) {
+        return wrong(format!("[{k}][0]"), "less than 0 m, expected a distance from the axis");
+    }
+    let n = profile.len();
+    let side = |a: [f64; 2], b: [f64; 2], c: [f64; 2]| (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0]);
+    let edge = |i: usize| (profile[i], profile[(i + 1) % n]);
+    for i in 0..n {
+        for j in i + 2..n.min(i + n - 1) {
+            let ((a, b), (c, d)) = (edge(i), edge(j));
+            if side(a, b, c) * side(a, b, d) <= 0.0 && side(c, d, a) * side(c, d, b) <= 0.0 {
+                return wrong(format!("[{j}]"), "the side from here touches another; go around the cut once");
+            }
+        }
+    }
+    let area: f64 = (1..n - 1).map(|i| side(profile[0], profile[i], profile[i + 1])).sum();
+    let mut profile = profile.to_vec();
+    if area < 0.0 {
+        profile.reverse();
+    }
+    Ok(surface::revolved(center.into(), &profile, sides))
+}
+
 fn motion(words: &Moves) -> Result<Motion, Wrong> {
     for (i, pair) in words.keys.windows(2).enumerate() {
         if pair[1].time <= pair[0].time {
@@ -168,6 +200,7 @@ pub fn scenery(thing: &Thing, meshes: &[Mesh], solid: Option<&Collider>) -> Mesh
         Words::Plane { point, normal } => surface::square((*point).into(), Vector::from(*normal).tamed().normalized(), PLANE),
         Words::Floor { height } => surface::square([0.0, 0.0, *height].into(), [0.0, 0.0, 1.0].into(), PLANE),
         Words::Capsule { from, to, radius } => surface::capsule((*from).into(), (*to).into(), *radius),
+        Words::Lathe { center, profile, sides } => turned(*center, profile, *sides).unwrap_or_default(),
         Words::Mesh(_) | Words::AnimatedMesh(_) => meshes.first().cloned().unwrap_or_default(),
         Words::Character(_) | Words::Mannequin(_) => match solid.map(|s| &s.shape) {
             Some(Shape::Animated { facets, .. }) => Mesh { vertices: facets.vertices(0.0), triangles: facets.triangles().to_vec() },

@@ -362,7 +362,7 @@ fn check_plane(scene: &Scene, wrong: &mut impl FnMut(String, String)) {
             Shape::Plane { normal, .. } => normal[axis] == 0.0,
             Shape::Floor { .. } => axis == 1,
             Shape::Capsule { from, to, .. } => from[axis] == 0.0 && to[axis] == 0.0,
-            Shape::Mesh(_) | Shape::AnimatedMesh(_) | Shape::Character(_) | Shape::Mannequin(_) => false,
+            Shape::Lathe { .. } | Shape::Mesh(_) | Shape::AnimatedMesh(_) | Shape::Character(_) | Shape::Mannequin(_) => false,
         };
         let about = |v: &[f64; 3]| (0..3).all(|a| a == axis || v[a] == 0.0);
         let stays = thing.belt[axis] == 0.0

@@ -150,8 +150,11 @@ impl Read<'_, '_> {
         let mut sources = Vec::new();
         for (i, words) in self.words.source.iter().enumerate() {
             let key = |key: &str| format!(".source[{i}].{key}");
-            if matches!(words.shape, Shape::Mesh(_) | Shape::AnimatedMesh(_) | Shape::Character(_) | Shape::Mannequin(_)) {
-                self.wrong(&key("shape"), "a mesh, expected sphere, box, plane, floor or capsule");
+            if matches!(
+                words.shape,
+                Shape::Lathe { .. } | Shape::Mesh(_) | Shape::AnimatedMesh(_) | Shape::Character(_) | Shape::Mannequin(_)
+            ) {
+                self.wrong(&key("shape"), "a mesh or a solid of revolution, expected sphere, box, plane, floor or capsule");
                 continue;
             }
             let region = match recipes::region(&words.shape) {

@@ -123,6 +123,7 @@ pub fn memory(scene: &Scene, assets: &Assets) -> f64 {
             Shape::Character(words) => {
                 assets.character(&words.path).map_or(0.0, |file| crate::recipes::figure_bytes(file.mesh.vertices.len(), end, words.rate))
             }
+            Shape::Lathe { profile, sides, .. } => profile.len() as f64 * f64::from(*sides) * 160.0,
             _ => 0.0,
         };
         if let Shape::AnimatedMesh(frames) = &thing.shape {
