@@ -23,6 +23,7 @@ mod rod;
 mod tethers;
 mod tetrahedron;
 mod vector;
+mod woven;
 
 pub use crate::linalg::blocks::Block;
 pub use batch::{Batch, Elements, Weights};
@@ -39,6 +40,7 @@ pub use rod::{BendTwist, StretchShear};
 pub use tethers::Tethers;
 pub use tetrahedron::{TetShear, TetStrain, TetVolume, rest_matrix};
 pub use vector::Vector;
+pub use woven::{Moment, Woven};
 
 use crate::math::{Dual, Lane, Quat, Vec3};
 
