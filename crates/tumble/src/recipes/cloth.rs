@@ -100,6 +100,7 @@ pub fn cloth(site: &mut Site<'_>, thing: &Cloth) {
             isometric: thing.isometric,
             membrane: thing.membrane.as_ref(),
             fabric: fabric.clone(),
+            squares: false,
             area: thing.area,
         };
         site.surface(&own, at, &words, Vector { x: 1.0, y: 0.0, z: 0.0 });

@@ -51,6 +51,7 @@ pub fn net(site: &mut Site<'_>, thing: &Net, mesh: &Mesh) {
         isometric: thing.isometric,
         membrane: thing.membrane.as_ref(),
         fabric,
+        squares: false,
         area: thing.area,
     };
     // The triangles' own planes have no axes in common; the x axis has a direction in most.

@@ -27,7 +27,12 @@ pub fn sheet(site: &mut Site<'_>, thing: &Sheet) {
     for j in 1..lattice.n[1] {
         for i in 1..lattice.n[0] {
             let [a, b, c, d] = [[i - 1, j - 1], [i, j - 1], [i, j], [i - 1, j]].map(|[i, j]| lattice.index([i, j, 0]) - first);
-            triangles.extend([[a, b, c], [a, c, d]]);
+            // Alternating diagonals prefer no direction; links and drawings know the others.
+            if fabric.is_some() && (i + j) % 2 == 1 {
+                triangles.extend([[a, b, d], [b, c, d]]);
+            } else {
+                triangles.extend([[a, b, c], [a, c, d]]);
+            }
         }
     }
     let pins = pinned(site, &Pinnable { path: &path, n: &lattice.n[..2], first, is_lattice: true }, &thing.pin);
@@ -41,6 +46,7 @@ pub fn sheet(site: &mut Site<'_>, thing: &Sheet) {
             isometric: thing.isometric,
             membrane: thing.membrane.as_ref(),
             fabric,
+            squares: true,
             area: thing.area,
         };
         site.surface(&mesh, first, &words, warp);

@@ -21,6 +21,8 @@ pub struct Surface<'a> {
     pub membrane: Option<&'a Words>,
     /// Measured fabric.
     pub fabric: Option<Measured>,
+    /// Whether its triangles are squares with alternating diagonals, for fabrics.
+    pub squares: bool,
     /// Stiffness against changes of area [N/m].
     pub area: f64,
 }
@@ -32,16 +34,40 @@ pub struct Measured {
     words: FabricUse,
 }
 
+/// Free strips of nearly equilateral triangles are as stiff as 8/9 of their hinges.
+const EQUILATERAL: f64 = 9.0 / 8.0;
+/// Hinges of squares are folded by 2/3 of the curvature of the surface.
+const SQUARES: f64 = 1.5;
+
 impl Measured {
-    /// Bending stiffness [N m] across an edge with this direction in a triangle, at each curvature of the record; linear in the angle to the warp
-    /// between 0, 45 and 90 degrees.
-    fn across(&self, edge: Vector, triangle: [Vector; 3], warp: Vector) -> [f64; 5] {
+    /// Bending stiffness [N m] of hinges along an edge with this direction in a triangle, at each curvature of the record. In a mesh of squares,
+    /// whose sides and diagonals give way one after the other, such that free strips along both and between have that of the record:
+    ///
+    ///   1/B(a) = 1/b_side(a) + 1/(4 b_diagonal)                      (fabrics.11)
+    fn hinges(&self, edge: Vector, triangle: [Vector; 3], warp: Vector, squares: Option<bool>) -> [f64; 5] {
         let (u, v) = Membrane::grain(triangle, warp, self.words.angle.to_radians());
-        let at = functions::atan2(edge.dot(v).abs(), edge.dot(u).abs()) / std::f64::consts::FRAC_PI_4;
-        let (row, part) = if at < 1.0 { (0, at) } else { (1, at - 1.0) };
-        let [from, to] = [self.record.bending[row], self.record.bending[row + 1]];
+        let at = functions::atan2(edge.dot(v), edge.dot(u)).to_degrees();
         let factor = self.words.thicken * self.words.bending;
-        std::array::from_fn(|i| factor * (from[i] + part * (to[i] - from[i])).max(0.0))
+        std::array::from_fn(|i| {
+            let soft = |turn: f64| 1.0 / (factor * self.across(at + turn, i));
+            let Some(diagonal) = squares else { return EQUILATERAL / soft(0.0) };
+            let (sides, diagonals) = if diagonal { (45.0, 0.0) } else { (0.0, 45.0) };
+            let mean = |turn: f64| 0.5 * (soft(turn) + soft(turn + 90.0));
+            // In the limit of what any mesh of squares can do.
+            let stiffer = soft(sides).min(soft(sides + 90.0));
+            let part = ((mean(diagonals) - 0.5 * mean(sides)) / 1.5).clamp(0.05 * stiffer, 0.9 * stiffer);
+            if diagonal { 0.25 / part } else { 1.0 / (soft(0.0) - part) }
+        })
+    }
+
+    /// That of the record for creases at an angle to the warp [degrees], linear between 0, 45 and 90.
+    fn across(&self, angle: f64, sample: usize) -> f64 {
+        let at = angle.abs() % 180.0;
+        let at = if at > 90.0 { 180.0 - at } else { at } / 45.0;
+        let (row, part) = if at < 1.0 { (0, at) } else { (1, at - 1.0) };
+        // What is not > 0 resists hardly.
+        let number = |row: usize| self.record.bending[row][sample].max(1e-3 * self.record.bending[row][0]);
+        number(row) + part * (number(row + 1) - number(row))
     }
 }
 
@@ -119,9 +145,14 @@ impl Site<'_> {
                 }
                 if let Some(fabric) = &words.fabric {
                     let way = vertex(b) - vertex(a);
-                    let sides = [t, u].map(|t| fabric.across(way, t.map(vertex), warp));
+                    // A diagonal lies opposite to a right angle.
+                    let (to_a, to_b) = (vertex(a) - vertex(c), vertex(b) - vertex(c));
+                    let squares = words.squares.then(|| to_a.dot(to_b).abs() < 1e-6 * to_a.norm() * to_b.norm());
+                    let sides = [t, u].map(|t| fabric.hinges(way, t.map(vertex), warp, squares));
                     let samples = std::array::from_fn(|i| (sides[0][i] + sides[1][i]) / 2.0);
-                    if let Some((stiffness, law)) = Moment::samples(samples, length_sq.sqrt() / areas) {
+                    if let Some((stiffness, law)) =
+                        Moment::samples(samples, if words.squares { SQUARES } else { 1.0 } * length_sq.sqrt() / areas)
+                    {
                         self.parts.crease(nodes, rest, stiffness * share, law, fabric.words.damping);
                     }
                 }
