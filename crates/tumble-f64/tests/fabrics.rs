@@ -145,16 +145,15 @@ fn elastica(length: f64, weight: f64, curvature: &dyn Fn(f64) -> f64) -> f64 {
 }
 
 /// The same from a simulated strip that is cut at an angle to the warp.
-fn strip(fabric: &Fabric, length: f64, angle: f64, system: &str) -> f64 {
+fn strip(fabric: &Fabric, length: f64, angle: f64, (n, m): (u32, u32), system: &str) -> f64 {
     // Hinges stand for half a segment to either side: the clamp is half a segment before the last held row.
-    let n = 40_u32;
     let d = length / (f64::from(n) + 0.5);
-    let pins: Vec<String> = (0..2).flat_map(|i| (0..3).map(move |j| format!("\"vertex {i} {j}\""))).collect();
+    let pins: Vec<String> = (0..2).flat_map(|i| (0..m).map(move |j| format!("\"vertex {i} {j}\""))).collect();
     let text = format!(
         "version = 1\nprecision = \"double\"\ntime.fps = 50\n[[system]]\n{system}\n[[force]]\nkind = \"drag\"\nrate = 12\n[[sheet]]\nname = \"s\"\n\
-         size = [{}, {}]\nresolution = [{}, 3]\nfabric = {{ path = \"it\", angle = {angle} }}\npin = [{}]\n",
+         size = [{}, {}]\nresolution = [{}, {m}]\nfabric = {{ path = \"it\", angle = {angle} }}\npin = [{}]\n",
         d * f64::from(n + 1),
-        2.0 * d,
+        d * f64::from(m - 1),
         n + 2,
         pins.join(", ")
     );
@@ -165,7 +164,8 @@ fn strip(fabric: &Fabric, length: f64, angle: f64, system: &str) -> f64 {
     let x = positions(&sim, "s");
     let (row, speed) = ((n + 2) as usize, sim.ledger().speed);
     assert!(speed < 1e-3, "still moves at {speed} m/s");
-    let (clamp, tip) = (x[row + 1], x[2 * row - 1]);
+    let middle = row * (m / 2) as usize;
+    let (clamp, tip) = (x[middle + 1], x[middle + row - 1]);
     (clamp.z - tip.z) / (tip.x - clamp.x + 0.5 * d)
 }
 
@@ -193,9 +193,9 @@ fn strips_of_all_fabrics_hang_at_the_angle_of_the_cantilever_test() {
             let mut fabric = record(name);
             fabric.bending = fabric.bending.map(|row| [row[0]; 5]);
             let c = (across(&fabric, angle)[0] / (fabric.density * G)).cbrt();
-            let found = strip(&fabric, 2.0 * c, angle, "integrator = \"implicit_euler\"");
+            let found = strip(&fabric, 2.0 * c, angle, (30, 13), "integrator = \"implicit_euler\"");
             println!("{name} at {angle}: overhang {:.2} cm, tangent {found:.4}, {:.2} %", 200.0 * c, 100.0 * (found / target - 1.0));
-            assert!((found / target - 1.0).abs() < 0.02, "{name} at {angle}: {found}");
+            assert!((found / target - 1.0).abs() < 0.05, "{name} at {angle}: {found}");
         }
     }
 }
@@ -204,11 +204,10 @@ fn strips_of_all_fabrics_hang_at_the_angle_of_the_cantilever_test() {
 #[test]
 fn strips_of_whole_records_hang_like_the_elastica_with_their_moments() {
     for name in SHIPPED {
-        for (angle, system) in [
-            (0.0, "integrator = \"implicit_euler\""),
-            (90.0, "integrator = \"implicit_euler\""),
-            (90.0, "method = \"position_based\"\nsubsteps = 60"),
-        ] {
+        let implicit = "integrator = \"implicit_euler\"";
+        for (angle, mesh, system) in
+            [(0.0, (30, 13), implicit), (90.0, (30, 13), implicit), (90.0, (12, 5), "method = \"position_based\"\nsubsteps = 100")]
+        {
             let fabric = record(name);
             let b = across(&fabric, angle);
             let length = 1.6 * (b[0] / (fabric.density * G)).cbrt();
@@ -223,7 +222,7 @@ fn strips_of_whole_records_hang_like_the_elastica_with_their_moments() {
                 low
             };
             let exact = elastica(length, fabric.density * G, &curvature);
-            let found = strip(&fabric, length, angle, system);
+            let found = strip(&fabric, length, angle, mesh, system);
             println!("{name} at {angle}, {system:?}: tangent {found:.4}, exact {exact:.4}, {:.2} %", 100.0 * (found / exact - 1.0));
             assert!((found / exact - 1.0).abs() < 0.05, "{name} at {angle}: {found} {exact}");
         }

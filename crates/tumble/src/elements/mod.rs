@@ -263,7 +263,7 @@ pub fn project<E: Element<N, M, D>, Y: Law<P>, L: Lane, const N: usize, const M:
     }
     let (mut c, mut slope) = (y[0], one);
     if M == 1 {
-        slope = Y::tangent(one, law, r[0]);
+        slope = Y::descent(one, law, r[0]);
         if before.is_some() {
             slope = (one - share) * slope + share;
         }

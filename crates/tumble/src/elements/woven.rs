@@ -222,4 +222,10 @@ impl Law<8> for Moment {
         let stress = k * m / p[0];
         r.positive(stress, -stress)
     }
+    #[inline(always)]
+    fn descent<L: Lane>(k: L, p: [L; 8], r: L) -> L {
+        let (tangent, stress) = (Self::tangent(k, p, r), Self::stress(k, p, r));
+        let secant = (r * r).positive(stress / r, tangent);
+        (secant - tangent).positive(secant, tangent)
+    }
 }

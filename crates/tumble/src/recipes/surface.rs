@@ -34,29 +34,24 @@ pub struct Measured {
     words: FabricUse,
 }
 
-/// Free strips of nearly equilateral triangles are as stiff as 8/9 of their hinges.
-const EQUILATERAL: f64 = 9.0 / 8.0;
-/// Hinges of squares are folded by 2/3 of the curvature of the surface.
-const SQUARES: f64 = 1.5;
+/// Sides of squares are folded by 3/4 of the curvature of the surface.
+const SQUARES: f64 = 4.0 / 3.0;
 
 impl Measured {
-    /// Bending stiffness [N m] of hinges along an edge with this direction in a triangle, at each curvature of the record. In a mesh of squares,
-    /// whose sides and diagonals give way one after the other, such that free strips along both and between have that of the record:
-    ///
-    ///   1/B(a) = 1/b_side(a) + 1/(4 b_diagonal)                      (fabrics.11)
+    /// Bending stiffness [N m] of hinges along an edge with this direction in a triangle, at each curvature of the record; of a side of squares,
+    /// or of a diagonal, such that a surface bent along either side, or between them, has that of the record: (fabrics.11).
     fn hinges(&self, edge: Vector, triangle: [Vector; 3], warp: Vector, squares: Option<bool>) -> [f64; 5] {
         let (u, v) = Membrane::grain(triangle, warp, self.words.angle.to_radians());
         let at = functions::atan2(edge.dot(v), edge.dot(u)).to_degrees();
         let factor = self.words.thicken * self.words.bending;
         std::array::from_fn(|i| {
-            let soft = |turn: f64| 1.0 / (factor * self.across(at + turn, i));
-            let Some(diagonal) = squares else { return EQUILATERAL / soft(0.0) };
-            let (sides, diagonals) = if diagonal { (45.0, 0.0) } else { (0.0, 45.0) };
-            let mean = |turn: f64| 0.5 * (soft(turn) + soft(turn + 90.0));
-            // In the limit of what any mesh of squares can do.
-            let stiffer = soft(sides).min(soft(sides + 90.0));
-            let part = ((mean(diagonals) - 0.5 * mean(sides)) / 1.5).clamp(0.05 * stiffer, 0.9 * stiffer);
-            if diagonal { 0.25 / part } else { 1.0 / (soft(0.0) - part) }
+            let stiff = |turn: f64| factor * self.across(at + turn, i);
+            let Some(diagonal) = squares else { return stiff(0.0) };
+            let side = if diagonal { 45.0 } else { 0.0 };
+            let (own, other) = (stiff(side), stiff(side + 90.0));
+            let between = 0.5 * (stiff(side + 45.0) + stiff(side - 45.0));
+            let [side, _, diagonals] = of_squares([own, other, between]);
+            if diagonal { diagonals } else { side }
         })
     }
 
@@ -69,6 +64,21 @@ impl Measured {
         let number = |row: usize| self.record.bending[row][sample].max(1e-3 * self.record.bending[row][0]);
         number(row) + part * (number(row + 1) - number(row))
     }
+}
+
+/// Stiffness of both sides and of the diagonals of squares whose diagonals alternate, for that of creases along either side and between:
+///
+///   B_y = b_y - b_y²/s,  B_x = b_x - b_x²/s,  B_d = b_d (1 + (b_x + b_y)/s),  s = b_x + b_y + 4 b_d   (fabrics.11)
+fn of_squares([one, other, between]: [f64; 3]) -> [f64; 3] {
+    let mut b = [4.0 / 3.0 * one, 4.0 / 3.0 * other, 2.0 / 3.0 * between];
+    // Contracts by a half each time; where there is no solution it ends near by.
+    for _ in 0..40 {
+        let s = b[0] + b[1] + 4.0 * b[2];
+        let side = |stiff: f64| 0.5 * (s - (s * s - 4.0 * s * stiff).max(0.0).sqrt());
+        let next = [side(one), side(other), between * s / (s + b[0] + b[1])];
+        b = std::array::from_fn(|i| 0.5 * (b[i] + next[i]));
+    }
+    b
 }
 
 impl Site<'_> {
