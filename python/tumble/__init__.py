@@ -10,7 +10,7 @@ import importlib
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from tumble._engine import ExportError, Scene, SceneError, StepError, TumbleError, World, load_mesh
+    from tumble._engine import ExportError, Scene, SceneError, StepError, TumbleError, World, load_fabric, load_mesh
     from tumble.run import Run
 
     __version__: str
@@ -24,6 +24,7 @@ __all__ = [
     "TumbleError",
     "World",
     "__version__",
+    "load_fabric",
     "load_mesh",
 ]
 

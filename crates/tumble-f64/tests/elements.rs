@@ -121,6 +121,22 @@ fn cases() -> Vec<Case> {
     add(batch::<Membrane, Linear, 3, 3, 8, 0>(4, &[membrane([0, 1, 2], 0.2), membrane([3, 2, 1], 0.0)]), points(4), 4, true);
     let areas = [[0, 1, 2], [3, 2, 1]].map(|nodes| Members { nodes, rest: [0.4], law: [], stiffness: 2.0, damping: 0.1 });
     add(batch::<Area, Linear, 3, 1, 1, 0>(4, &areas), points(4), 4, true);
+    // Measured cloth: strains of a few percent both ways, beyond the record, pressed, sheared; folds of one to thirty times the first sample.
+    let record = tumble_io::shipped("interlock").unwrap();
+    let mut own = Numbers(11);
+    let mut own = |n: usize| -> Vec<Row> { (0..n).map(|_| own.row()).collect() };
+    let triangle = [[0.0, 0.0, 0.0], [1.0, 0.1, 0.0], [0.2, 0.9, 0.0]].map(Vec3::from);
+    for strain in [0.03, 0.1, 0.25, 0.6] {
+        let (b, area) = Membrane::axes(triangle, Vec3::from([1.0, 0.4, 0.0]), 0.3).unwrap();
+        let member = [Members { nodes: [0, 1, 2], rest: Woven::rest(b, &record, 2.0), law: [], stiffness: area, damping: 0.2 }];
+        let moved: Vec<Row> = triangle.iter().zip(own(3)).map(|(x, d)| row(*x + xyz(d) * strain, 0.0)).collect();
+        add(batch::<Woven, Linear, 3, 3, 28, 0>(3, &member), moved, 3, true);
+    }
+    for s in [1.0, 10.0, 45.0, 300.0] {
+        let (stiffness, law) = Moment::samples([2.0, 3.0, 0.1, 2.5, 1.0], s).unwrap();
+        let member = [Members { nodes: [0, 1, 2, 3], rest: [0.1], law, stiffness, damping: 0.2 }];
+        add(batch::<Hinge, Moment, 4, 1, 1, 8>(4, &member), own(4), 4, true);
+    }
     cases
 }
 

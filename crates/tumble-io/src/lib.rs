@@ -1,4 +1,4 @@
-//! Bytes of a mesh file in, a [`Mesh`] or a [`Character`] out; and volumes in, bytes of a VDB file out ([`vdb`]). Nothing here opens a file, so
+//! Bytes of a mesh file in, a [`Mesh`] or a [`Character`] out; of a record, a [`Fabric`](tumble_interface::Fabric); and volumes in, bytes of a VDB file out ([`vdb`]). Nothing here opens a file, so
 //! the browser uses it too.
 //!
 //! What is common to all formats of meshes: coordinates are taken as they stand in the file (no axis is turned, no unit
@@ -9,6 +9,7 @@
 //! Verified by `tests/formats.rs` and `tests/fuzz.rs`.
 
 mod build;
+mod fabric;
 mod glb;
 mod obj;
 mod ply;
@@ -18,6 +19,7 @@ mod vdb;
 
 use tumble_interface::{Character, Mesh};
 
+pub use fabric::{fabric, record_is_json, shipped};
 pub use vdb::{Class, Volume, vdb};
 
 /// A mesh file format.

@@ -6,8 +6,9 @@ use pyo3::prelude::*;
 use pyo3::types::{PyBool, PyDict, PyFloat, PyInt, PyList, PyString, PyTuple};
 use std::collections::HashMap;
 use std::path::{Path, PathBuf};
+use tumble_interface::scene::FabricRef;
 use tumble_interface::tree::{Node, Value};
-use tumble_interface::{Assets, Character, Issue, Mesh, SceneError};
+use tumble_interface::{Assets, Character, Fabric, Issue, Mesh, SceneError};
 use tumble_io::Format;
 use twox_hash::XxHash3_64;
 
@@ -27,7 +28,8 @@ impl Scene {
         let result = py.detach(|| -> Result<Self, SceneError> {
             let mut scene = tumble_interface::Scene::from_tree(&node)?;
             let assets = load_assets(&mut scene, &folder)?;
-            Ok(Self { scene, assets: Assets::new(assets.meshes, assets.characters), folder, node: node.clone() })
+            let assets = Assets::new(assets.meshes, assets.characters).with_fabrics(load_fabrics(&mut scene, &folder)?);
+            Ok(Self { scene, assets, folder, node: node.clone() })
         });
         result.map_err(|e| scene_error(py, &with_lines(e, &node)))
     }
@@ -186,6 +188,62 @@ fn load_assets(scene: &mut tumble_interface::Scene, folder: &Path) -> Result<Fil
         *file.hash = found;
     }
     if issues.is_empty() { Ok(assets) } else { Err(SceneError { issues }) }
+}
+
+/// Reads every record that the scene names, once, and notes the hash of its content.
+fn load_fabrics(scene: &mut tumble_interface::Scene, folder: &Path) -> Result<HashMap<String, Fabric>, SceneError> {
+    let (mut fabrics, mut issues) = (HashMap::new(), Vec::new());
+    for FabricRef { place, words } in scene.fabrics_mut() {
+        let key = words.key().to_string();
+        let read = match words.choice() {
+            Err(message) => Err((String::new(), message)),
+            Ok(None) => tumble_io::shipped(&key).map(|fabric| (fabric, None)).map_err(|e| (words.name_key().into(), e)),
+            Ok(Some(path)) => read_fabric(&folder.join(path)).map(|(fabric, hash)| (fabric, Some(hash))).map_err(|e| (".path".into(), e)),
+        };
+        match read {
+            Ok((fabric, found)) => {
+                if let Some(hash) = words.hash_mut() {
+                    if hash.is_some() && *hash != found {
+                        let message = format!(
+                            "the content of \"{key}\" has changed since this scene was resolved; restore the file, or leave out hash"
+                        );
+                        issues.push(Issue::new(format!("{place}.hash"), message));
+                    }
+                    *hash = found;
+                }
+                fabrics.insert(key, fabric);
+            }
+            Err((below, message)) => issues.push(Issue::new(format!("{place}{below}"), message)),
+        }
+    }
+    if issues.is_empty() { Ok(fabrics) } else { Err(SceneError { issues }) }
+}
+
+fn read_fabric(path: &Path) -> Result<(Fabric, String), String> {
+    let Some(json) = tumble_io::record_is_json(&path.to_string_lossy()) else {
+        return Err(format!("\"{}\" has none of the suffixes .toml, .json", path.display()));
+    };
+    let bytes = std::fs::read(path).map_err(|e| errors::file_error(path, &e))?;
+    let fabric = tumble_io::fabric(&bytes, json).map_err(|e| format!("\"{}\": {e}", path.display()))?;
+    Ok((fabric, format!("{:016x}", XxHash3_64::oneshot(&bytes))))
+}
+
+/// The record of a shipped fabric, or of a file, as a dict: name, composition, source, density, stretching and bending.
+#[pyfunction]
+pub fn load_fabric<'py>(py: Python<'py>, fabric: &str) -> PyResult<Bound<'py, PyDict>> {
+    let read = match tumble_io::record_is_json(fabric) {
+        Some(_) => read_fabric(Path::new(fabric)).map(|(fabric, _)| fabric),
+        None => tumble_io::shipped(fabric),
+    };
+    let record = read.map_err(|e| scene_error(py, &SceneError::one("", e)))?;
+    let dict = PyDict::new(py);
+    dict.set_item("name", record.name)?;
+    dict.set_item("composition", record.composition)?;
+    dict.set_item("source", record.source)?;
+    dict.set_item("density", record.density)?;
+    dict.set_item("stretching", record.stretching.map(Vec::from).to_vec())?;
+    dict.set_item("bending", record.bending.map(Vec::from).to_vec())?;
+    Ok(dict)
 }
 
 fn read_mesh(path: &Path) -> Result<(Mesh, String), String> {

@@ -6,8 +6,9 @@ use serde::Serialize;
 use std::collections::HashMap;
 use std::sync::Arc;
 use tumble_interface::engine::Engine;
+use tumble_interface::scene::FabricRef;
 use tumble_interface::tree::Node;
-use tumble_interface::{Assets, Character, Issue, Mesh, Scene, SceneError};
+use tumble_interface::{Assets, Character, Fabric, Issue, Mesh, Scene, SceneError};
 use tumble_io::Format;
 use twox_hash::XxHash3_64;
 
@@ -32,10 +33,11 @@ pub struct Loaded {
     memory: f64,
 }
 
-/// What is in a file: a mesh or the reason why there is none, for glTF also a character, and the hash of its content.
+/// What is in a file: a mesh or the reason why there is none, for glTF also a character, or the record of a fabric, and the hash of its content.
 struct Read {
     mesh: Result<Mesh, String>,
     character: Result<Character, String>,
+    fabric: Result<Fabric, String>,
     hash: String,
 }
 
@@ -68,10 +70,13 @@ impl Loaded {
             let none = "it has none of the suffixes .obj, .ply, .stl, .glb";
             let mesh = format.map_or_else(|| Err(none.into()), |format| tumble_io::mesh(&bytes, format));
             let character = if skinned { tumble_io::character(&bytes) } else { Err("it has none of the suffixes .glb, .gltf".into()) };
-            if let (Err(e), Err(_)) = (&mesh, &character) {
-                return Err(wrong(e.clone()).into());
+            let record = tumble_io::record_is_json(&path);
+            let fabric =
+                record.map_or_else(|| Err("it has none of the suffixes .toml, .json".into()), |json| tumble_io::fabric(&bytes, json));
+            if let (Err(e), Err(_), Err(of_record)) = (&mesh, &character, &fabric) {
+                return Err(wrong(if record.is_some() { of_record } else { e }.clone()).into());
             }
-            meshes.insert(path, Read { mesh, character, hash });
+            meshes.insert(path, Read { mesh, character, fabric, hash });
         }
         Self::build(tree(toml, overrides)?, Arc::new(meshes))
     }
@@ -194,7 +199,7 @@ fn with_lines(mut error: SceneError, node: &Node) -> SceneError {
 fn assets(scene: &mut Scene, files: &Files) -> Result<Assets, (SceneError, Vec<String>)> {
     let (mut meshes, mut characters, mut issues, mut missing) = (HashMap::new(), HashMap::new(), Vec::new(), Vec::new());
     for file in scene.mesh_files_mut() {
-        let Some(Read { mesh, character, hash }) = files.get(file.path) else {
+        let Some(Read { mesh, character, hash, .. }) = files.get(file.path) else {
             issues.push(Issue::new(format!("{}.path", file.place), format!("there is no file \"{}\"; drop it on the page", file.path)));
             if !missing.iter().any(|path| path == file.path) {
                 missing.push(file.path.to_string());
@@ -217,5 +222,40 @@ fn assets(scene: &mut Scene, files: &Files) -> Result<Assets, (SceneError, Vec<S
             issues.push(Issue::new(format!("{}.path", file.place), format!("\"{}\": {message}", file.path)));
         }
     }
-    if issues.is_empty() { Ok(Assets::new(meshes, characters)) } else { Err((SceneError { issues }, missing)) }
+    let mut fabrics = HashMap::new();
+    for FabricRef { place, words } in scene.fabrics_mut() {
+        let key = words.key().to_string();
+        let found = match words.choice() {
+            Err(message) => Err((String::new(), message)),
+            Ok(None) => tumble_io::shipped(&key).map(|fabric| (fabric, None)).map_err(|e| (words.name_key().into(), e)),
+            Ok(Some(path)) => match files.get(path) {
+                Some(Read { fabric, hash, .. }) => match fabric {
+                    Ok(fabric) => Ok((fabric.clone(), Some(hash.clone()))),
+                    Err(message) => Err((".path".into(), format!("\"{path}\": {message}"))),
+                },
+                None => {
+                    if !missing.iter().any(|known| known == path) {
+                        missing.push(path.to_string());
+                    }
+                    Err((".path".into(), format!("there is no file \"{path}\"; drop it on the page")))
+                }
+            },
+        };
+        match found {
+            Ok((fabric, found)) => {
+                if let Some(hash) = words.hash_mut() {
+                    if hash.is_some() && *hash != found {
+                        let message = format!(
+                            "the content of \"{key}\" has changed since this scene was resolved; give the old file, or leave out hash"
+                        );
+                        issues.push(Issue::new(format!("{place}.hash"), message));
+                    }
+                    *hash = found;
+                }
+                fabrics.insert(key, fabric);
+            }
+            Err((below, message)) => issues.push(Issue::new(format!("{place}{below}"), message)),
+        }
+    }
+    if issues.is_empty() { Ok(Assets::new(meshes, characters).with_fabrics(fabrics)) } else { Err((SceneError { issues }, missing)) }
 }

@@ -25,6 +25,7 @@ def lab() -> None:
       tumble lab compressible
       tumble lab pressure
       tumble lab positions
+      tumble lab fabric denim
     """
 
 
@@ -131,6 +132,29 @@ def positions(out: OutOption = None) -> None:
     from tumble.lab.positions import page
 
     say(page(out or find.OUT / "lab" / "positions"))
+
+
+@app.command()
+def fabric(
+    fabrics: Annotated[
+        list[str] | None,
+        typer.Argument(metavar="[NAME|FILE]...", help="Shipped fabrics or records.", show_default="all that ship"),
+    ] = None,
+    out: OutOption = None,
+) -> None:
+    """Pull, hang and drape measured fabrics, beside what their records say.
+
+    \b
+    Examples:
+      tumble lab fabric
+      tumble lab fabric denim mine.json
+    """
+    from tumble.lab.fabric import SHIPPED, page
+
+    with Progress("lab") as progress:
+        written, text = page(out or find.OUT / "lab" / "fabric", fabrics or list(SHIPPED), progress=progress)
+    say(text)
+    say(written)
 
 
 @app.command()

@@ -1,5 +1,6 @@
 //! Cloth that is cut from flat panels and sewn.
 
+use super::fabrics::FabricWords;
 use super::structures::{Link, LinkSettings, Links, Pin};
 use super::surfaces::Membrane;
 use schemars::JsonSchema;
@@ -27,17 +28,17 @@ pub struct Cloth {
     #[serde(default = "resolution")]
     #[schemars(extend("x-unit" = "m", "exclusiveMinimum" = 0.0))]
     pub resolution: f64,
-    /// Mass per area.
-    #[serde(default = "density")]
+    /// Mass per area. Without it, that of the fabric, or 0.2.
+    #[serde(default)]
     #[schemars(extend("x-unit" = "kg/m²", "exclusiveMinimum" = 0.0))]
-    pub density: f64,
+    pub density: Option<f64>,
     /// Spring families, modulus in N/m: `structural` along edges, `bend` across them. Without it, structural 500 with damping 0.5.
     #[serde(default)]
     pub links: Option<Links>,
-    /// Dihedral bending stiffness between neighbouring triangles.
-    #[serde(default = "hinge")]
+    /// Dihedral bending stiffness between neighbouring triangles. Without it 1e-5, beside a fabric 0.
+    #[serde(default)]
     #[schemars(range(min = 0.0), extend("x-unit" = "N m"))]
-    pub hinge: f64,
+    pub hinge: Option<f64>,
     /// The same beside it, quadratic in the positions and flat at rest, whatever the shape of the mesh: cheaper than a hinge, and equal to it where
     /// nothing is stretched.
     #[serde(default)]
@@ -46,6 +47,10 @@ pub struct Cloth {
     /// Resistance against stretch as of a woven membrane; links are then left out unless they are given.
     #[serde(default)]
     pub membrane: Option<Membrane>,
+    /// Measured fabric, by the name of a shipped one or the path of its record: stretch, bending and, unless given, density. Links are then left
+    /// out unless they are given.
+    #[serde(default)]
+    pub fabric: Option<FabricWords>,
     /// Stiffness of each triangle against changes of its area: tension over relative change.
     #[serde(default)]
     #[schemars(range(min = 0.0), extend("x-unit" = "N/m"))]
@@ -168,14 +173,6 @@ impl Default for Dress {
 
 fn resolution() -> f64 {
     0.03
-}
-
-fn density() -> f64 {
-    0.2
-}
-
-fn hinge() -> f64 {
-    1e-5
 }
 
 fn thread() -> f64 {

@@ -5,6 +5,7 @@ mod animated;
 mod cloth;
 mod compressible;
 mod emitters;
+mod fabrics;
 mod forces;
 mod gas;
 mod grids;
@@ -20,6 +21,7 @@ pub use animated::{Animated, AnimatedVector, Component, Interpolation, Keys, Vec
 pub use cloth::{Cloth, Dress, Panel, Seam, Side};
 pub use compressible::Compressible;
 pub use emitters::{Between, Burst, Cause, Emitter, Event, Kill, Source, WhenFull};
+pub use fabrics::{FabricRef, FabricUse, FabricWords};
 pub use forces::{Anchor, Field, Force, Goal};
 pub use gas::{
     Advections, Carriage, Densities, ExcessFlow, Fire, Gas, GasSide, GasSides, GasSource, GridInterpolation, Order, PathTrace, Pressure,
@@ -257,6 +259,16 @@ impl Scene {
     /// Duration of one frame [s].
     pub fn frame_time(&self) -> f64 {
         1.0 / self.time.fps
+    }
+
+    /// Records of fabrics that the scene names, in order of appearance.
+    pub fn fabrics_mut(&mut self) -> Vec<FabricRef<'_>> {
+        let sheets = self.sheet.iter_mut().map(|o| ("sheet", &o.name, &mut o.fabric));
+        let nets = self.net.iter_mut().map(|o| ("net", &o.name, &mut o.fabric));
+        let cloths = self.cloth.iter_mut().map(|o| ("cloth", &o.name, &mut o.fabric));
+        let all = sheets.chain(nets).chain(cloths);
+        all.filter_map(|(kind, name, words)| Some(FabricRef { place: format!("{kind} \"{name}\".fabric"), words: words.as_mut()? }))
+            .collect()
     }
 
     /// Meshes and characters that the scene names, in order of appearance.

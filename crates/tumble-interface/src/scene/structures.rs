@@ -1,6 +1,7 @@
 //! Structures of masses and links. Stiffness is given so that it does not depend on how finely an
 //! object is divided: k_s = modulus x (length, area or volume that the link stands for) / l0².
 
+use super::fabrics::FabricWords;
 use super::surfaces::{Fluid, Inflation, Membrane, ShapeMatching};
 use super::{MeshFile, items_above_zero};
 use schemars::JsonSchema;
@@ -309,10 +310,10 @@ pub struct Sheet {
     #[serde(default)]
     #[schemars(extend("x-unit" = "°"))]
     pub rotate: [f64; 3],
-    /// Mass per area.
-    #[serde(default = "fifth")]
+    /// Mass per area. Without it, that of the fabric, or 0.2.
+    #[serde(default)]
     #[schemars(extend("x-unit" = "kg/m²", "exclusiveMinimum" = 0.0))]
-    pub density: f64,
+    pub density: Option<f64>,
     /// Spring families, modulus in N/m. Without it, structural 500, shear 200 and bend 10.
     #[serde(default)]
     pub links: Option<Links>,
@@ -328,6 +329,10 @@ pub struct Sheet {
     /// Resistance against stretch as of a woven membrane; links are then left out unless they are given.
     #[serde(default)]
     pub membrane: Option<Membrane>,
+    /// Measured fabric, by the name of a shipped one or the path of its record: stretch, bending and, unless given, density. Links are then left
+    /// out unless they are given.
+    #[serde(default)]
+    pub fabric: Option<FabricWords>,
     /// Stiffness of each triangle against changes of its area: tension over relative change.
     #[serde(default)]
     #[schemars(range(min = 0.0), extend("x-unit" = "N/m"))]
@@ -413,10 +418,10 @@ pub struct Net {
     pub system: Option<String>,
     /// The mesh.
     pub mesh: MeshFile,
-    /// Mass per area.
-    #[serde(default = "fifth")]
+    /// Mass per area. Without it, that of the fabric, or 0.2.
+    #[serde(default)]
     #[schemars(extend("x-unit" = "kg/m²", "exclusiveMinimum" = 0.0))]
-    pub density: f64,
+    pub density: Option<f64>,
     /// Spring families, modulus in N/m: `structural` along edges, `bend` across them. Without it, structural 500 and bend 10.
     #[serde(default)]
     pub links: Option<Links>,
@@ -432,6 +437,10 @@ pub struct Net {
     /// Resistance against stretch as of a woven membrane; links are then left out unless they are given.
     #[serde(default)]
     pub membrane: Option<Membrane>,
+    /// Measured fabric, by the name of a shipped one or the path of its record: stretch, bending and, unless given, density. Links are then left
+    /// out unless they are given.
+    #[serde(default)]
+    pub fabric: Option<FabricWords>,
     /// Stiffness of each triangle against changes of its area: tension over relative change.
     #[serde(default)]
     #[schemars(range(min = 0.0), extend("x-unit" = "N/m"))]
@@ -580,10 +589,6 @@ fn centimetre() -> f64 {
 
 fn tenth() -> f64 {
     0.1
-}
-
-fn fifth() -> f64 {
-    0.2
 }
 
 fn thousand() -> f64 {

@@ -113,21 +113,27 @@ pub struct Fill {
 impl Sheet {
     /// Its springs: those given, else the default ones if nothing else makes it elastic.
     pub fn links(&self) -> Links {
-        links(&self.links, self.membrane.is_some(), super::structures::sheet_links)
+        links(&self.links, self.membrane.is_some() || self.fabric.is_some(), super::structures::sheet_links)
     }
 }
 
 impl Net {
     /// Its springs: those given, else the default ones if nothing else makes it elastic.
     pub fn links(&self) -> Links {
-        links(&self.links, self.membrane.is_some() || self.shape_matching.is_some(), super::structures::net_links)
+        let elastic = self.membrane.is_some() || self.fabric.is_some() || self.shape_matching.is_some();
+        links(&self.links, elastic, super::structures::net_links)
     }
 }
 
 impl Cloth {
     /// Its springs: those given, else the default ones if nothing else makes it elastic.
     pub fn links(&self) -> Links {
-        links(&self.links, self.membrane.is_some(), super::cloth::links)
+        links(&self.links, self.membrane.is_some() || self.fabric.is_some(), super::cloth::links)
+    }
+
+    /// Its dihedral bending stiffness [N m].
+    pub fn hinge(&self) -> f64 {
+        self.hinge.unwrap_or(if self.fabric.is_some() { 0.0 } else { 1e-5 })
     }
 }
 

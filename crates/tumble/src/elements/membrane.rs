@@ -21,13 +21,21 @@ pub struct Membrane;
 pub struct Area;
 
 impl Membrane {
-    /// The inverse B of the rest edges in the axes warp and weft, row by row, and the area [m²]; `None` without area. `warp` counts as far
-    /// as it lies in the triangle, or the y axis if none of it does, turned by `angle` [rad].
+    /// The inverse B of the rest edges in the axes warp and weft, row by row, and the area [m²]; `None` without area.
     pub fn axes(x: [Vector; 3], warp: Vector, angle: f64) -> Option<([f64; 4], f64)> {
         let (d1, d2) = (x[1] - x[0], x[2] - x[0]);
-        let normal = d1.cross(d2);
-        let twice = normal.norm();
-        let n = normal * (1.0 / twice);
+        let (u, v) = Self::grain(x, warp, angle);
+        let ([a, b], [c, d]) = ([d1.dot(u), d2.dot(u)], [d1.dot(v), d2.dot(v)]);
+        let det = a * d - b * c;
+        let inverse = [d / det, -b / det, -c / det, a / det];
+        (inverse.iter().all(|b| b.is_finite()) && det > 0.0).then_some((inverse, 0.5 * det))
+    }
+
+    /// Directions of warp and weft in a triangle. `warp` counts as far as it lies in the triangle, or the y axis if none of it does, turned by
+    /// `angle` [rad]. Not finite if the triangle has no area.
+    pub fn grain(x: [Vector; 3], warp: Vector, angle: f64) -> (Vector, Vector) {
+        let normal = (x[1] - x[0]).cross(x[2] - x[0]);
+        let n = normal * (1.0 / normal.norm());
         let within = |d: Vector| d - n * d.dot(n);
         let mut u = within(warp);
         if u.norm() < 1e-6 * warp.norm() {
@@ -36,11 +44,7 @@ impl Membrane {
         let u = u.normalized();
         let v = n.cross(u);
         let (cos, sin) = (crate::math::functions::cos(angle), crate::math::functions::sin(angle));
-        let (u, v) = (u * cos + v * sin, v * cos - u * sin);
-        let ([a, b], [c, d]) = ([d1.dot(u), d2.dot(u)], [d1.dot(v), d2.dot(v)]);
-        let det = a * d - b * c;
-        let inverse = [d / det, -b / det, -c / det, a / det];
-        (inverse.iter().all(|b| b.is_finite()) && det > 0.0).then_some((inverse, 0.5 * det))
+        (u * cos + v * sin, v * cos - u * sin)
     }
 
     /// L11, L21, L22, L33 of a material with the stiffnesses `warp`, `weft` and `shear` [N/m]; `None` if it is not stable.

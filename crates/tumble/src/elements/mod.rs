@@ -23,6 +23,7 @@ mod rod;
 mod tethers;
 mod tetrahedron;
 mod vector;
+mod woven;
 
 pub use crate::linalg::blocks::Block;
 pub use batch::{Batch, Elements, Weights};
@@ -39,6 +40,7 @@ pub use rod::{BendTwist, StretchShear};
 pub use tethers::Tethers;
 pub use tetrahedron::{TetShear, TetStrain, TetVolume, rest_matrix};
 pub use vector::Vector;
+pub use woven::{Moment, Woven};
 
 use crate::math::{Dual, Lane, Quat, Vec3};
 
@@ -261,7 +263,7 @@ pub fn project<E: Element<N, M, D>, Y: Law<P>, L: Lane, const N: usize, const M:
     }
     let (mut c, mut slope) = (y[0], one);
     if M == 1 {
-        slope = Y::tangent(one, law, r[0]);
+        slope = Y::descent(one, law, r[0]);
         if before.is_some() {
             slope = (one - share) * slope + share;
         }

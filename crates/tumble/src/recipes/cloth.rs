@@ -24,6 +24,7 @@ pub fn cloth(site: &mut Site<'_>, thing: &Cloth) {
     if links.shear.is_some() {
         site.wrong(format!("{path}.links.shear"), "cloth of triangles has no diagonals; known here: structural, bend");
     }
+    let Some((fabric, density)) = site.fabric(&path, thing.fabric.as_ref(), thing.density) else { return };
     let (cuts, stitches) = match (&thing.dress, thing.panels.is_empty()) {
         (Some(words), true) => dress(words),
         (None, false) => {
@@ -70,7 +71,7 @@ pub fn cloth(site: &mut Site<'_>, thing: &Cloth) {
         };
         let mut mass = vec![0.0; piece.flat.len()];
         for t in &piece.triangles {
-            t.iter().for_each(|i| mass[*i as usize] += thing.density * measure(t) / 3.0);
+            t.iter().for_each(|i| mass[*i as usize] += density * measure(t) / 3.0);
         }
         for (p, m) in piece.flat.iter().zip(&mass) {
             let x = (words.place)(*p);
@@ -94,8 +95,15 @@ pub fn cloth(site: &mut Site<'_>, thing: &Cloth) {
                 }
             }
         }
-        let words =
-            Surface { path: &path, hinge: thing.hinge, isometric: thing.isometric, membrane: thing.membrane.as_ref(), area: thing.area };
+        let words = Surface {
+            path: &path,
+            hinge: thing.hinge(),
+            isometric: thing.isometric,
+            membrane: thing.membrane.as_ref(),
+            fabric: fabric.clone(),
+            squares: false,
+            area: thing.area,
+        };
         site.surface(&own, at, &words, Vector { x: 1.0, y: 0.0, z: 0.0 });
         all.triangles.extend(own.triangles.iter().map(|t| t.map(|i| i + start)));
         sides.push(piece.sides.into_iter().map(|side| side.into_iter().map(|i| at + i).collect()).collect());

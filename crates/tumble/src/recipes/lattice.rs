@@ -121,7 +121,13 @@ mod tests {
     fn shares_add_up_to_the_whole() {
         for n in [5, 9] {
             let (mut parts, mut issues) = (Parts::default(), Vec::new());
-            let mut site = Site { parts: &mut parts, issues: &mut issues, up: Vector::default(), solids: &[] };
+            let mut site = Site {
+                parts: &mut parts,
+                issues: &mut issues,
+                up: Vector::default(),
+                solids: &[],
+                assets: &tumble_interface::Assets::default(),
+            };
             let lattice = Lattice::build(&mut site, [n, 7], [2.0, 3.0], [0.0; 3], [0.0; 3], 0.5);
             let sum = |step: [i64; 3]| -> f64 {
                 let inside = |node: &[u32; 3]| (0..3).all(|a| (0..i64::from(lattice.n[a])).contains(&(i64::from(node[a]) + step[a])));

@@ -42,8 +42,8 @@ pub use sheet::sheet;
 
 use crate::geometry::{Collider, Vector};
 use crate::systems::dynamics::{Parts, SpringPart};
-use tumble_interface::Issue;
 use tumble_interface::scene::Link;
+use tumble_interface::{Assets, Issue};
 
 /// Where a recipe puts masses and elements, and what it finds wrong.
 pub struct Site<'a> {
@@ -55,6 +55,8 @@ pub struct Site<'a> {
     pub up: Vector,
     /// The scene's colliders, for what follows them.
     pub solids: &'a [(String, Collider)],
+    /// What comes from files.
+    pub assets: &'a Assets,
 }
 
 impl Site<'_> {

@@ -13,12 +13,13 @@ use tumble_interface::scene::Net;
 pub fn net(site: &mut Site<'_>, thing: &Net, mesh: &Mesh) {
     let path = format!("net \"{}\"", thing.name);
     site.parts.begin(&thing.name, 0.0);
+    let Some((fabric, density)) = site.fabric(&path, thing.fabric.as_ref(), thing.density) else { return };
     let corner = |i: u32| Vector::from(mesh.vertices[i as usize]);
     let area = |t: &[u32; 3]| (corner(t[1]) - corner(t[0])).cross(corner(t[2]) - corner(t[0])).norm() / 2.0;
     let areas: Vec<f64> = mesh.triangles.iter().map(area).collect();
     let mut mass = vec![0.0; mesh.vertices.len()];
     for (t, area) in mesh.triangles.iter().zip(&areas) {
-        t.iter().for_each(|i| mass[*i as usize] += thing.density * area / 3.0);
+        t.iter().for_each(|i| mass[*i as usize] += density * area / 3.0);
     }
     if let Some(i) = mass.iter().position(|m| *m == 0.0) {
         return site.wrong(
@@ -44,8 +45,15 @@ pub fn net(site: &mut Site<'_>, thing: &Net, mesh: &Mesh) {
             }
         }
     }
-    let words =
-        Surface { path: &path, hinge: thing.hinge, isometric: thing.isometric, membrane: thing.membrane.as_ref(), area: thing.area };
+    let words = Surface {
+        path: &path,
+        hinge: thing.hinge,
+        isometric: thing.isometric,
+        membrane: thing.membrane.as_ref(),
+        fabric,
+        squares: false,
+        area: thing.area,
+    };
     // The triangles' own planes have no axes in common; the x axis has a direction in most.
     site.surface(mesh, first, &words, Vector { x: 1.0, y: 0.0, z: 0.0 });
     if let Some(words) = &thing.pressure {

@@ -18,7 +18,8 @@ use tumble_interface::scene::Sheet;
 pub fn sheet(site: &mut Site<'_>, thing: &Sheet) {
     let path = format!("sheet \"{}\"", thing.name);
     site.parts.begin(&thing.name, 0.0);
-    let lattice = Lattice::build(site, thing.resolution, thing.size, thing.center, thing.rotate, thing.density);
+    let Some((fabric, density)) = site.fabric(&path, thing.fabric.as_ref(), thing.density) else { return };
+    let lattice = Lattice::build(site, thing.resolution, thing.size, thing.center, thing.rotate, density);
     lattice.links(site, &thing.links());
     let first = lattice.index([0; 3]);
     let warp = site.parts.position(lattice.index([1, 0, 0])) - site.parts.position(first);
@@ -26,16 +27,28 @@ pub fn sheet(site: &mut Site<'_>, thing: &Sheet) {
     for j in 1..lattice.n[1] {
         for i in 1..lattice.n[0] {
             let [a, b, c, d] = [[i - 1, j - 1], [i, j - 1], [i, j], [i - 1, j]].map(|[i, j]| lattice.index([i, j, 0]) - first);
-            triangles.extend([[a, b, c], [a, c, d]]);
+            // Alternating diagonals prefer no direction; links and drawings know the others.
+            if fabric.is_some() && (i + j) % 2 == 1 {
+                triangles.extend([[a, b, d], [b, c, d]]);
+            } else {
+                triangles.extend([[a, b, c], [a, c, d]]);
+            }
         }
     }
     let pins = pinned(site, &Pinnable { path: &path, n: &lattice.n[..2], first, is_lattice: true }, &thing.pin);
     pins.iter().for_each(|p| site.parts.pin(*p));
-    if thing.hinge > 0.0 || thing.isometric > 0.0 || thing.area > 0.0 || thing.membrane.is_some() {
+    if thing.hinge > 0.0 || thing.isometric > 0.0 || thing.area > 0.0 || thing.membrane.is_some() || fabric.is_some() {
         let vertices = lattice.nodes().map(|node| site.parts.position(lattice.index(node)).into()).collect();
         let mesh = Mesh { vertices, triangles };
-        let words =
-            Surface { path: &path, hinge: thing.hinge, isometric: thing.isometric, membrane: thing.membrane.as_ref(), area: thing.area };
+        let words = Surface {
+            path: &path,
+            hinge: thing.hinge,
+            isometric: thing.isometric,
+            membrane: thing.membrane.as_ref(),
+            fabric,
+            squares: true,
+            area: thing.area,
+        };
         site.surface(&mesh, first, &words, warp);
         triangles = mesh.triangles;
     }

@@ -293,7 +293,7 @@ fn fill(scene: &Scene, plans: &[Plan], assets: &Assets, solids: (&[Collider], &[
     let up: Vector = if scene.dimension == 2 && scene.plane == Plane::Xy { [0.0, 1.0, 0.0] } else { [0.0, 0.0, 1.0] }.into();
     let mut at = |kind: &str, system: &Option<String>, recipe: &mut dyn FnMut(&mut Site<'_>)| {
         if let Some(index) = place(plans, kind, system.as_deref()) {
-            recipe(&mut Site { parts: &mut parts[index], issues: &mut *issues, up, solids: &named });
+            recipe(&mut Site { parts: &mut parts[index], issues: &mut *issues, up, solids: &named, assets });
         }
     };
     for thing in &scene.particles {

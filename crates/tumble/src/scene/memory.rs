@@ -84,6 +84,7 @@ pub fn memory(scene: &Scene, assets: &Assets) -> f64 {
         let elements = each(thing.hinge > 0.0, 9.0)
             + each(thing.isometric > 0.0, 9.0)
             + each(thing.membrane.is_some(), 6.0)
+            + each(thing.fabric.is_some(), 20.0)
             + each(thing.area > 0.0, 4.0);
         bytes += n * (MASS + (4.0 + diagonals(&thing.links().diagonals) + elements) * LINK);
     }
@@ -93,8 +94,9 @@ pub fn memory(scene: &Scene, assets: &Assets) -> f64 {
         let solids = if thing.material.is_some() { 6.0 } else { 0.0 };
         bytes += n * (MASS + links * LINK + solids * TETRAHEDRON);
     }
-    for mesh in scene.net.iter().filter_map(|thing| assets.get(&thing.mesh.path)) {
-        bytes += mesh.vertices.len() as f64 * (MASS + 15.0 * LINK);
+    let woven = |there: bool| if there { 35.0 } else { 15.0 };
+    for (thing, mesh) in scene.net.iter().filter_map(|thing| Some((thing, assets.get(&thing.mesh.path)?))) {
+        bytes += mesh.vertices.len() as f64 * (MASS + woven(thing.fabric.is_some()) * LINK);
     }
     for thing in &scene.cloth {
         let girth = |d: &Dress| (d.bust_girth * (d.bodice + d.shoulder), d.waist_girth / std::f64::consts::TAU);
@@ -103,7 +105,7 @@ pub fn memory(scene: &Scene, assets: &Assets) -> f64 {
             |o: &[[f64; 2]]| (0..o.len()).map(|i| o[i][0] * o[(i + 1) % o.len()][1] - o[(i + 1) % o.len()][0] * o[i][1]).sum::<f64>();
         let area = thing.panels.iter().map(|p| 0.5 * twice(&p.outline).abs()).sum::<f64>() + thing.dress.as_ref().map_or(0.0, of_dress);
         // Equilateral triangles have an area of sqrt(3)/2 edge² a point; sides add some.
-        bytes += 1.5 * area / (thing.resolution * thing.resolution) * (MASS + 15.0 * LINK);
+        bytes += 1.5 * area / (thing.resolution * thing.resolution) * (MASS + woven(thing.fabric.is_some()) * LINK);
     }
     bytes += scene.gas.iter().map(|thing| super::gas::bytes(thing, super::laws::flat(scene), !scene.collider.is_empty())).sum::<f64>();
     for thing in &scene.collider {

@@ -5,8 +5,8 @@ use super::held::Held;
 use super::laws::Acting;
 use super::{Dynamics, Stepping, books};
 use crate::elements::{
-    Area, BendTwist, Constraints, Density, Distance, Element, Elements, Hinge, IsometricBend, Linear, Members, Membrane, Neohookean,
-    Nonlinear, Pairs, Projected, Shape, Strands, StretchShear, TetShear, TetStrain, TetVolume, Tethers, Vector, Volume,
+    Area, BendTwist, Constraints, Density, Distance, Element, Elements, Hinge, IsometricBend, Law, Linear, Members, Membrane, Moment,
+    Neohookean, Nonlinear, Pairs, Projected, Shape, Strands, StretchShear, TetShear, TetStrain, TetVolume, Tethers, Vector, Volume, Woven,
 };
 use crate::forces::{
     Attractor, Cohesion, DirectSum, Flock, Force, Goal, Habits, Halos, LennardJones, Near, Newtonian, Repulsion, Viscosity,
@@ -126,6 +126,8 @@ pub struct Parts {
     isometric: Vec<Members<4, 3, 0>>,
     membranes: Vec<Members<3, 8, 0>>,
     areas: Vec<Members<3, 1, 0>>,
+    woven: Vec<Members<3, 28, 0>>,
+    creases: Vec<Members<4, 1, 8>>,
     /// Closed surfaces and whole bodies, each with its place in the scene.
     closed: Vec<(String, Closed)>,
     shapes: Vec<(String, Range<usize>, f64)>,
@@ -315,6 +317,16 @@ impl Parts {
         self.areas.push(Members { nodes, rest: [rest], law: [], stiffness, damping: 0.0 });
     }
 
+    /// Adds a triangle of a measured fabric: its rest numbers, rest area [m²] and damping time [s].
+    pub fn woven(&mut self, nodes: [u32; 3], rest: [f64; 28], area: f64, damping: f64) {
+        self.woven.push(Members { nodes, rest, law: [], stiffness: area, damping: area * damping });
+    }
+
+    /// Adds a hinge of a measured fabric over edge 0 1 with opposite corners 2 and 3, with damping time [s].
+    pub fn crease(&mut self, nodes: [u32; 4], rest: f64, stiffness: f64, law: [f64; 8], damping: f64) {
+        self.creases.push(Members { nodes, rest: [rest], law, stiffness, damping: stiffness * damping });
+    }
+
     /// Adds a closed surface, at this place of the scene.
     pub fn closed(&mut self, path: String, closed: Closed) {
         self.closed.push((path, closed));
@@ -482,6 +494,8 @@ impl Parts {
             batches.add::<IsometricBend, 4, 3, 3>(&self.isometric, 0.0),
             batches.add::<Membrane, 3, 3, 8>(&self.membranes, 0.0),
             batches.add::<Area, 3, 1, 1>(&self.areas, 0.0),
+            batches.add::<Woven, 3, 3, 28>(&self.woven, 0.0),
+            batches.add_with::<Hinge, Moment, 4, 1, 1, 8>(&self.creases, 0.0),
             batches.solids(&self.shears, &self.volumes, self.energy_at_rest),
             batches.add::<TetStrain, 4, 6, 9>(&self.strains, 0.0),
             batches.rods(&self.stretches, &mut self.bends, &self.rod_limits),
@@ -724,14 +738,23 @@ impl Batches {
         members: &[Members<N, D, 0>],
         energy_at_rest: f64,
     ) -> Option<()> {
+        self.add_with::<E, Linear, N, M, D, 0>(members, energy_at_rest)
+    }
+
+    /// The same with a law of their own.
+    fn add_with<E: Element<N, M, D>, Y: Law<P>, const N: usize, const M: usize, const D: usize, const P: usize>(
+        &mut self,
+        members: &[Members<N, D, P>],
+        energy_at_rest: f64,
+    ) -> Option<()> {
         if members.is_empty() {
             return Some(());
         }
         if let Some(inverse) = &self.projected {
-            let elements = Projected::<E, Linear, N, M, D, 0>::new(self.rows, self.points, inverse, members, &[])?;
+            let elements = Projected::<E, Y, N, M, D, P>::new(self.rows, self.points, inverse, members, &[])?;
             self.constraints.push(Box::new(elements));
         } else {
-            let elements = Elements::<E, Linear, N, M, D, 0>::new(self.rows, members)?;
+            let elements = Elements::<E, Y, N, M, D, P>::new(self.rows, members)?;
             self.list.push(Box::new(elements.with_energy_at_rest(energy_at_rest)));
         }
         Some(())

@@ -1,0 +1,231 @@
+//! Triangles and hinges of measured cloth, whose stiffness changes with direction, strain and curvature.
+
+use super::{Element, Law, force, point};
+use crate::math::{Lane, Vec3};
+use tumble_interface::Fabric;
+
+/// Largest Green strain up to which stretch is measured: the stretch 7/6.
+const MOST_STRAIN: f64 = 13.0 / 72.0;
+/// The mean of the weight v over the way to that strain, (fabrics.5).
+const MEAN_AT_MOST: f64 = 114.8 / 169.0;
+/// Samples of bending are this far apart [1/m].
+const CURVATURE: f64 = 10.0;
+
+/// The stretch of a measured fabric. F and e as for the membrane; C, the elastic matrix, is no constant:
+///
+///   r = L(e)^T e,   L L^T = C(e) = C0 + m(e) (Ca(e) - C0)            (fabrics.3)
+///
+/// with C0 at small strain, Ca for the direction of the largest stretch and m the mean over the way of the weight that the record gives it, so
+/// that the work along a straight way from rest is exactly that of the record.
+/// x [m]   L [(N/m)^(1/2)]   k = rest area [m²].   Rest: B row by row, C0, the differences of the five directions from what is before them; each
+/// as 2 C11, 2 C12, 2 C22, C33/2.
+/// Source: [wang2011]; as read by [narain2012]. Differs: there the stress is C(e) e, which has no potential.
+/// Degenerate: where the smaller stretch is a stretch, too, directions fade; unstrained m = 0.
+pub struct Woven;
+
+/// The moment of a measured fabric over r = 2 sin(theta/2), with kappa = s |r| the curvature over 10/m:
+///
+///   stress = k M(kappa)/s sign(r),   M = b(kappa) kappa              (fabrics.8)
+///
+/// b is linear between samples at kappa = 0, 1, 2, 3, 4, constant beyond, and 1 at 0; where M would fall it stays as it is, (fabrics.9).
+/// Parameters: s [1/m over 10/m], b at 1, 2, 3; slope and curvature of M from 3 to k4, which is 4 or the end of a constant moment; k4; b beyond.
+/// Source: [wang2011].
+pub struct Moment;
+
+impl Woven {
+    /// The rest numbers from B and a record.
+    pub fn rest(b: [f64; 4], fabric: &Fabric, thicken: f64) -> [f64; 28] {
+        let row = |i: usize| {
+            let c = fabric.stretching[i].map(|c| c.max(0.0) * thicken);
+            [2.0 * c[0], 2.0 * c[1], 2.0 * c[2], 0.5 * c[3]]
+        };
+        let mut rest = [0.0; 28];
+        rest[..4].copy_from_slice(&b);
+        let mut before = [0.0; 4];
+        for i in 0..6 {
+            for (c, (value, old)) in row(i).into_iter().zip(before).enumerate() {
+                rest[4 + 4 * i + c] = value - old;
+            }
+            before = row(i);
+        }
+        rest
+    }
+}
+
+impl Moment {
+    /// The stiffness at no curvature [N m] and the parameters, for five samples [N m] and a hinge with s [1/m]; `None` if the first is not > 0.
+    pub fn samples(samples: [f64; 5], s: f64) -> Option<(f64, [f64; 8])> {
+        let first = samples[0];
+        if first.is_nan() || first <= 0.0 {
+            return None;
+        }
+        let mut b = samples.map(|b| b.max(0.0) / first);
+        // The slope of M at the end of a piece is b + kappa b'.
+        for i in 0..3 {
+            let i_ = i as f64;
+            b[i + 1] = b[i + 1].max(b[i] * (i_ + 1.0) / (i_ + 2.0));
+        }
+        let (t1, t2, k4) =
+            if b[4] < 0.8 * b[3] { (0.0, 0.0, 3.0 * b[3] / b[4].max(1e-6)) } else { (b[3] + 3.0 * (b[4] - b[3]), b[4] - b[3], 4.0) };
+        Some((first, [s / CURVATURE, b[1], b[2], b[3], t1, t2, k4, b[4].max(1e-6)]))
+    }
+}
+
+#[inline(always)]
+fn least<L: Lane>(a: L, b: L) -> L {
+    (b - a).positive(a, b)
+}
+
+/// f1 and f2.
+#[inline(always)]
+fn deformation<L: Lane>(rest: &[L; 28], x: [[L; 4]; 3]) -> [Vec3<L>; 2] {
+    let x0 = point(x[0]);
+    let (d1, d2) = (point(x[1]) - x0, point(x[2]) - x0);
+    [d1 * rest[0] + d2 * rest[2], d1 * rest[1] + d2 * rest[3]]
+}
+
+#[inline(always)]
+fn strain<L: Lane>([f1, f2]: [Vec3<L>; 2]) -> [L; 3] {
+    let (one, half) = (f1.x.like(1.0), f1.x.like(0.5));
+    [(f1.norm_sq() - one) * half, (f2.norm_sq() - one) * half, f1.dot(f2)]
+}
+
+/// What of the strain the coefficients depend on: the weight m and the direction c, with their slopes.
+struct Place<L> {
+    m: L,
+    c: L,
+    dm: [L; 3],
+    dc: [L; 3],
+}
+
+/// g1 >= g2 are the principal strains; c is the cosine of twice the angle between warp and the direction of g1, times 1 - (g2/g1)² where both
+/// are stretched.                                                       (fabrics.4, fabrics.5, fabrics.6)
+#[inline(always)]
+fn place<L: Lane>([e1, e2, e3]: [L; 3]) -> Place<L> {
+    let (zero, one, two, half) = (e1.zero(), e1.like(1.0), e1.like(2.0), e1.like(0.5));
+    let (d, sum) = (e1 - e2, e1 + e2);
+    let q = (d * d + e3 * e3).sqrt();
+    let (g1, g2) = ((sum + q) * half, (sum - q) * half);
+    let (cos, sin) = (q.positive(d / q, zero), q.positive(e3 / q, zero));
+    let dg1 = [(one + cos) * half, (one - cos) * half, sin * half];
+    let most = e1.like(MOST_STRAIN);
+    let g = g1.above_zero();
+    let inner = least(g, most);
+    let t = two * inner / (one + (one + two * inner).sqrt());
+    let half_way = one + t * half;
+    let inside = e1.like(6.0) * t * (e1.like(2.0 / 3.0) + t * (e1.like(0.75) + t * e1.like(0.2))) / (half_way * half_way);
+    let far = most / g;
+    let m = (g - most).positive(one - far * far * e1.like(1.0 - MEAN_AT_MOST), inside);
+    let v = (g - most).positive(one, e1.like(6.0) * t);
+    let slope = g.positive(two * (v - m) / g, zero);
+    // c = w d, with w = 1/q or, where both are stretched, (g1 + g2)/g1².
+    let w = g2.positive(sum / (g1 * g1), q.positive(one / q, zero));
+    let wq = g2.positive(zero, -(w * w));
+    let (ws, wg) = (g2.positive(one / (g1 * g1), zero), g2.positive(-(two * w) / g1, zero));
+    let dw = |sum: L, dq: L, dg: L| ws * sum + wq * dq + wg * dg;
+    let dc = [w + d * dw(one, cos, dg1[0]), d * dw(one, -cos, dg1[1]) - w, d * dw(zero, sin, dg1[2])];
+    Place { m, c: w * d, dm: [slope * dg1[0], slope * dg1[1], slope * dg1[2]], dc }
+}
+
+/// Coefficients of the direction c less those of small strain, and their slopes: from one measured direction to the next by a smooth step in c.
+///                                                                      (fabrics.7)
+#[inline(always)]
+fn direction<L: Lane>(rest: &[L; 28], c: L) -> ([L; 4], [L; 4]) {
+    let (zero, one) = (c.zero(), c.like(1.0));
+    let (mut value, mut slope) = ([rest[8], rest[9], rest[10], rest[11]], [zero; 4]);
+    let root = std::f64::consts::FRAC_1_SQRT_2;
+    for (k, (from, width)) in [(1.0, 1.0 - root), (root, root), (0.0, root), (-root, 1.0 - root)].into_iter().enumerate() {
+        let inverse = c.like(1.0 / width);
+        let u = least(((c.like(from) - c) * inverse).above_zero(), one);
+        let step = u * u * (c.like(3.0) - (u + u));
+        let rate = -(c.like(6.0) * u * (one - u) * inverse);
+        for i in 0..4 {
+            let difference = rest[12 + 4 * k + i];
+            value[i] = value[i] + step * difference;
+            slope[i] = slope[i] + rate * difference;
+        }
+    }
+    (value, slope)
+}
+
+/// L11, L21, L22, L33.
+#[inline(always)]
+fn root<L: Lane>(rest: &[L; 28], m: L, value: &[L; 4]) -> [L; 4] {
+    let c = |i: usize| rest[4 + i] + m * value[i];
+    let l11 = c(0).sqrt();
+    let l21 = c(1) / l11;
+    [l11, l21, (c(2) - l21 * l21).above_zero().sqrt(), c(3).above_zero().sqrt()]
+}
+
+impl Element<3, 3, 28> for Woven {
+    const NAME: &'static str = "fabric";
+    #[inline(always)]
+    fn residual<L: Lane>(rest: [L; 28], x: [[L; 4]; 3]) -> [L; 3] {
+        let e = strain(deformation(&rest, x));
+        let at = place(e);
+        let (value, _) = direction(&rest, at.c);
+        let l = root(&rest, at.m, &value);
+        [l[0] * e[0] + l[1] * e[1], l[2] * e[1], l[3] * e[2]]
+    }
+    #[inline(always)]
+    fn pullback<L: Lane>(rest: [L; 28], x: [[L; 4]; 3], [y1, y2, y3]: [L; 3]) -> [[L; 4]; 3] {
+        let [f1, f2] = deformation(&rest, x);
+        let e = strain([f1, f2]);
+        let at = place(e);
+        let (value, slope) = direction(&rest, at.c);
+        let [l11, l21, l22, l33] = root(&rest, at.m, &value);
+        let (zero, half) = (y1.zero(), y1.like(0.5));
+        // What y says about the entries of L, then of C.
+        let over = |a: L, l: L| l.positive(a * half / l, zero);
+        let c22 = over(y2 * e[1], l22);
+        let in21 = y1 * e[1] - c22 * l21 * y1.like(2.0);
+        let c12 = in21 / l11;
+        let c11 = (y1 * e[0] - c12 * l21) * half / l11;
+        let c33 = over(y3 * e[2], l33);
+        let with = |t: &[L; 4]| c11 * t[0] + c12 * t[1] + c22 * t[2] + c33 * t[3];
+        let (in_m, in_c) = (with(&value), at.m * with(&slope));
+        let mut s = [l11 * y1, l21 * y1 + l22 * y2, l33 * y3];
+        for i in 0..3 {
+            s[i] = s[i] + in_m * at.dm[i] + in_c * at.dc[i];
+        }
+        let (p1, p2) = (f1 * s[0] + f2 * s[2], f2 * s[1] + f1 * s[2]);
+        let (g1, g2) = (p1 * rest[0] + p2 * rest[1], p1 * rest[2] + p2 * rest[3]);
+        [force(-(g1 + g2)), force(g1), force(g2)]
+    }
+}
+
+/// The moment over s and k at a curvature, in samples, and the work up to there.
+#[inline(always)]
+fn moment<L: Lane>([_, b1, b2, b3, t1, t2, k4, b4]: [L; 8], kappa: L) -> (L, L) {
+    let (one, half, third) = (kappa.like(1.0), kappa.like(0.5), kappa.like(1.0 / 3.0));
+    let near = least(kappa, kappa.like(3.0));
+    let (from1, from2) = ((near - one).above_zero(), (near - kappa.like(2.0)).above_zero());
+    let (m0, m1, m2) = (b1 - one, b2 - b1 - b1 + one, b3 - b2 - b2 + b1);
+    let m = near * (one + m0 * near + m1 * from1 + m2 * from2);
+    let bend = |m: L, from: L, at: f64| m * from * from * (from * third + kappa.like(0.5 * at));
+    let e = near * near * (half + m0 * near * third) + bend(m1, from1, 1.0) + bend(m2, from2, 2.0);
+    let u = (least(kappa, k4) - kappa.like(3.0)).above_zero();
+    let at3 = kappa.like(3.0) * b3;
+    let beyond = (kappa - k4).above_zero();
+    (m + u * (t1 + t2 * u) + b4 * beyond, e + u * (at3 + u * (t1 * half + t2 * u * third)) + b4 * beyond * (k4 + beyond * half))
+}
+
+impl Law<8> for Moment {
+    #[inline(always)]
+    fn energy<L: Lane>(k: L, p: [L; 8], r: L) -> L {
+        let (_, e) = moment(p, r.positive(r, -r) * p[0]);
+        k * e / (p[0] * p[0])
+    }
+    #[inline(always)]
+    fn stress<L: Lane>(k: L, p: [L; 8], r: L) -> L {
+        let (m, _) = moment(p, r.positive(r, -r) * p[0]);
+        let stress = k * m / p[0];
+        r.positive(stress, -stress)
+    }
+    #[inline(always)]
+    fn descent<L: Lane>(k: L, p: [L; 8], r: L) -> L {
+        let (tangent, stress) = (Self::tangent(k, p, r), Self::stress(k, p, r));
+        let secant = (r * r).positive(stress / r, tangent);
+        (secant - tangent).positive(secant, tangent)
+    }
+}
