@@ -41,6 +41,12 @@ pub trait Batch: Send + Sync {
     fn drives(&self) -> Option<f64> {
         None
     }
+    /// Whether it depends on velocities in a way that its matrix at rest does not tell.
+    fn feels_velocity(&self) -> bool {
+        false
+    }
+    /// From now on the forces act on velocities for h [s] at once: they must not carry them beyond where they would come to rest.
+    fn act_at_once(&mut self, _h: f64) {}
     /// The rows of the objects that it acts between have changed, those of the others that it names, and what they weigh.
     fn renew(&mut self, _on: Vec<Range<usize>>, _others: Option<Vec<Range<usize>>>, _masses: &crate::state::Masses) {}
     /// Prepares the forces at (t, x, v): what has to be known of all elements before rows can be summed.
@@ -79,14 +85,15 @@ pub trait Batch: Send + Sync {
 }
 
 /// For every row, the slots (element times N plus node) that act on it.
-struct Incidence {
+pub struct Incidence {
     first: usize,
     start: Vec<u32>,
     slot: Vec<u32>,
 }
 
 impl Incidence {
-    fn new<const N: usize>(nodes: &[Index; N]) -> Self {
+    /// Of elements with these nodes.
+    pub fn new<const N: usize>(nodes: &[Index; N]) -> Self {
         let all = || nodes.iter().flat_map(|i| i.get().iter().copied());
         let (first, last) = all().fold((u32::MAX, 0), |(a, b), i| (a.min(i), b.max(i)));
         let rows = if first > last { 0 } else { (last - first + 1) as usize };
@@ -107,6 +114,15 @@ impl Incidence {
             }
         }
         Self { first, start, slot }
+    }
+
+    /// Calls `f(row, its number, its slots in order)` for the rows from `start` on that have any.
+    pub fn rows<O>(&self, start: usize, out: &mut [O], f: impl Fn(usize, &mut O, &[u32])) {
+        let end = (start + out.len()).min(self.first + self.start.len() - 1);
+        for row in start.max(self.first)..end {
+            let i = row - self.first;
+            f(row, &mut out[row - start], &self.slot[self.start[i] as usize..self.start[i + 1] as usize]);
+        }
     }
 
     /// out[row] += the sum of its slots, in slot order, for the rows from `start` on.

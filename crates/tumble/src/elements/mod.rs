@@ -25,7 +25,7 @@ mod tetrahedron;
 mod vector;
 
 pub use crate::linalg::blocks::Block;
-pub use batch::{Batch, Elements, Weights};
+pub use batch::{Batch, Elements, Incidence, Weights};
 pub use bend::Hinge;
 pub use constraints::{Constraints, Density, Neohookean, Projected, Projection, Shape, Strands, Volume, enclosed, spline};
 pub use contact::PointPlane;

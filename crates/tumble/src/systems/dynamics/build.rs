@@ -9,7 +9,7 @@ use crate::elements::{
     Nonlinear, Pairs, Projected, Shape, Strands, StretchShear, TetShear, TetStrain, TetVolume, Tethers, Vector, Volume,
 };
 use crate::forces::{
-    Attractor, Cohesion, DirectSum, Flock, Force, Goal, Habits, Halos, LennardJones, Near, Newtonian, Repulsion, Viscosity,
+    Air, Attractor, Cohesion, DirectSum, Flock, Force, Goal, Habits, Halos, LennardJones, Near, Newtonian, Repulsion, Sails, Viscosity,
 };
 use crate::geometry::Collider;
 use crate::integrators::Memory;
@@ -147,6 +147,10 @@ pub struct Parts {
     emitters: Vec<Emitter>,
     /// Forces on each mass by itself, with the objects that they act on, counted from the first that was begun.
     pub forces: Vec<(String, Box<dyn Force>, Vec<usize>)>,
+    /// The air around the surfaces of some objects.
+    pub airs: Vec<(Air, Vec<usize>)>,
+    /// Times of the run at which forces that change in time are tried [s].
+    pub times: Vec<f64>,
     /// Forces between masses of some objects, and the other objects that the words name.
     pub between: Vec<(Words, Vec<usize>, Option<Vec<usize>>)>,
 }
@@ -535,6 +539,14 @@ impl Parts {
                 batches.list.push(batch);
             }
         }
+        for (air, on) in self.airs {
+            let own = |i: &usize| objects[*i].triangles.iter().map(|t| t.map(|v| v + objects[*i].points.start as u32)).collect::<Vec<_>>();
+            let triangles: Vec<[u32; 3]> = placed(on).iter().flat_map(own).collect();
+            if triangles.is_empty() {
+                continue;
+            }
+            batches.list.push(Box::new(Sails::new(air, &triangles, &state.x[..points], &masses.mass, &self.times).ok_or_else(lost)?));
+        }
         let mut stiffness = vec![[0.0; 6]; rows];
         for batch in &mut batches.list {
             batch.linearize(&state.x, crate::elements::Weights { stiffness: 1.0, damping: 0.0, hessian: Hessian::Definite });
@@ -685,7 +697,7 @@ fn between(
             };
             Box::new(Flock::new(habits, on, others.unwrap_or_default(), masses, settings.colliders.clone()))
         }
-        // Forces on each mass by itself.
+        // Forces on each mass by itself, and on surfaces.
         _ => return Vec::new(),
     }]
 }
