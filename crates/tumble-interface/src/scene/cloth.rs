@@ -1,7 +1,7 @@
 //! Cloth that is cut from flat panels and sewn.
 
 use super::structures::{Link, LinkSettings, Links, Pin};
-use super::surfaces::Membrane;
+use super::surfaces::{Membrane, Tear};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -46,6 +46,9 @@ pub struct Cloth {
     /// Resistance against stretch as of a woven membrane; links are then left out unless they are given.
     #[serde(default)]
     pub membrane: Option<Membrane>,
+    /// How it tears; without it, it does not.
+    #[serde(default)]
+    pub tear: Option<Tear>,
     /// Stiffness of each triangle against changes of its area: tension over relative change.
     #[serde(default)]
     #[schemars(range(min = 0.0), extend("x-unit" = "N/m"))]

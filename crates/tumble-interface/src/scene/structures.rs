@@ -1,7 +1,7 @@
 //! Structures of masses and links. Stiffness is given so that it does not depend on how finely an
 //! object is divided: k_s = modulus x (length, area or volume that the link stands for) / l0².
 
-use super::surfaces::{Fluid, Inflation, Membrane, ShapeMatching};
+use super::surfaces::{Fluid, Inflation, Membrane, ShapeMatching, Tear};
 use super::{MeshFile, items_above_zero};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -328,6 +328,9 @@ pub struct Sheet {
     /// Resistance against stretch as of a woven membrane; links are then left out unless they are given.
     #[serde(default)]
     pub membrane: Option<Membrane>,
+    /// How it tears; without it, it does not.
+    #[serde(default)]
+    pub tear: Option<Tear>,
     /// Stiffness of each triangle against changes of its area: tension over relative change.
     #[serde(default)]
     #[schemars(range(min = 0.0), extend("x-unit" = "N/m"))]
@@ -432,6 +435,9 @@ pub struct Net {
     /// Resistance against stretch as of a woven membrane; links are then left out unless they are given.
     #[serde(default)]
     pub membrane: Option<Membrane>,
+    /// How it tears; without it, it does not.
+    #[serde(default)]
+    pub tear: Option<Tear>,
     /// Stiffness of each triangle against changes of its area: tension over relative change.
     #[serde(default)]
     #[schemars(range(min = 0.0), extend("x-unit" = "N/m"))]

@@ -80,6 +80,10 @@ pub trait Batch: Send + Sync {
     fn broken(&self) -> Vec<u32> {
         Vec::new()
     }
+    /// Puts nodes of elements, as (element, node), onto other rows.
+    fn rewire(&mut self, _changes: &[(u32, usize, u32)]) {}
+    /// Breaks elements for good.
+    fn give_up(&mut self, _elements: &[u32]) {}
     /// Mends all links, then breaks these.
     fn set_broken(&mut self, _broken: &[u32]) {}
 }
@@ -144,13 +148,21 @@ pub struct Elements<E, Y, const N: usize, const M: usize, const D: usize, const 
     incidence: Incidence,
     slots: Vec<Row>,
     energy_at_rest: f64,
+    /// What has broken: element, stiffness and damping that would mend it.
+    broken: Vec<(u32, Real, Real)>,
 }
 
 impl<E: Element<N, M, D>, Y: Law<P>, const N: usize, const M: usize, const D: usize, const P: usize> Elements<E, Y, N, M, D, P> {
     /// Elements over rows 0..rows; `None` if a node is not one of them.
     pub fn new(rows: usize, members: &[Members<N, D, P>]) -> Option<Self> {
         let list = List::new(rows, members)?;
-        Some(Self { incidence: Incidence::new(&list.nodes), slots: vec![ZERO; N * members.len()], energy_at_rest: 0.0, list })
+        Some(Self {
+            incidence: Incidence::new(&list.nodes),
+            slots: vec![ZERO; N * members.len()],
+            energy_at_rest: 0.0,
+            broken: Vec::new(),
+            list,
+        })
     }
 
     /// Elements that hold this energy [J] at rest; it is left out of the books.
@@ -273,5 +285,36 @@ impl<E: Element<N, M, D>, Y: Law<P>, const N: usize, const M: usize, const D: us
 
     fn entries(&self, x: &[Row], sink: &mut dyn FnMut(usize, usize, [[f64; 3]; 3])) {
         self.list.entries(x, sink);
+    }
+
+    fn rewire(&mut self, changes: &[(u32, usize, u32)]) {
+        if changes.is_empty() {
+            return;
+        }
+        for (element, node, row) in changes {
+            self.list.nodes[*node].set(*element as usize, *row);
+        }
+        self.incidence = Incidence::new(&self.list.nodes);
+    }
+
+    fn give_up(&mut self, elements: &[u32]) {
+        for e in elements {
+            let (k, b) = (&mut self.list.stiffness[*e as usize], &mut self.list.damping[*e as usize]);
+            if *k != 0.0 || *b != 0.0 {
+                self.broken.push((*e, *k, *b));
+                (*k, *b) = (0.0, 0.0);
+            }
+        }
+    }
+
+    fn broken(&self) -> Vec<u32> {
+        self.broken.iter().map(|b| b.0).collect()
+    }
+
+    fn set_broken(&mut self, broken: &[u32]) {
+        for (e, stiffness, damping) in std::mem::take(&mut self.broken) {
+            (self.list.stiffness[e as usize], self.list.damping[e as usize]) = (stiffness, damping);
+        }
+        self.give_up(broken);
     }
 }

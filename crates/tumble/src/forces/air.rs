@@ -205,6 +205,16 @@ impl Batch for Sails {
         });
     }
 
+    fn rewire(&mut self, changes: &[(u32, usize, u32)]) {
+        if changes.is_empty() {
+            return;
+        }
+        for (element, node, row) in changes {
+            self.nodes[*node].set(*element as usize, *row);
+        }
+        self.incidence = Incidence::new(&self.nodes);
+    }
+
     /// How the force changes with the place and the turn of a triangle is left out: it is slow beside what velocities do.
     fn linearize(&mut self, x: &[Row], weights: Weights) {
         self.check(x);
