@@ -22,9 +22,9 @@ TOO_MUCH = 1.0
 NOISE = 1e-3
 """Of the largest energy of a kind, what may be gained by rounding."""
 
-_GIVE = {"wind", "flock", "acceleration", "electric", "vortex", "turbulence", "propulsion"}
+_GIVE = {"wind", "air", "flock", "acceleration", "electric", "vortex", "turbulence", "propulsion"}
 _ALIVE = {"animated_mesh", "character", "mannequin"}
-_TAKE = {"drag", "wind", "viscosity", "flock", "propulsion"}
+_TAKE = {"drag", "wind", "air", "viscosity", "flock", "propulsion"}
 
 
 def sources(scene: Tree) -> list[str]:

@@ -31,6 +31,7 @@ fn sheet(system: &str, links: &str) -> String {
 fn scenes() -> Vec<(&'static str, String, usize)> {
     let hinges = "hinge = 2e-5\nlinks = { structural = { modulus = 50, damping = 0.005 }, shear = 20 }";
     let links = "links = { structural = { modulus = 50, damping = 0.005 }, shear = 20, bend = 2 }";
+    let air = "[[force]]\nkind = \"air\"\nwind = [{ kind = \"uniform\", velocity = [\"6*sin(9*t)\", 3, 2] }, { kind = \"turbulence\", strength = 2, scale = 0.3 }]\n";
     let torn = "links = { structural = { modulus = 20, break_strain = 0.01 }, shear = 8 }\npin = [\"corner 0 0\", \"corner 1 1\"]";
     let mut dust = String::from(
         "[[system]]\nintegrator = \"velocity_verlet\"\nsubsteps = 3\n[[force]]\nkind = \"drag\"\nrate = 0.3\n[[particles]]\nname = \"dust\"\nposition = [",
@@ -98,6 +99,9 @@ fn scenes() -> Vec<(&'static str, String, usize)> {
                 fluid = { spacing = 0.02, viscosity = 0.5, fill = [{ center = [-0.1, 0, 0.2], size = [0.32, 0.36, 0.4] }] }\n\
                 [[collider]]\nname = \"tank\"\ninside = true\nshape.box = { center = [0, 0, 0.4], size = [0.6, 0.4, 0.8] }\n";
     vec![
+        ("sheet, air, position based", sheet("method = \"position_based\"\nsubsteps = 8", links) + air, 20),
+        ("sheet, air, explicit", sheet("integrator = \"rk4\"\nsubsteps = 24", links) + air, 6),
+        ("sheet, air, implicit", sheet("integrator = \"implicit_euler\"", hinges) + air, 6),
         ("sheet, membrane", sheet("method = \"position_based\"\nsubsteps = 8", surface), 10),
         (
             "sheet, membrane, implicit",

@@ -2,7 +2,7 @@
 
 use super::fabrics::FabricWords;
 use super::structures::{Link, LinkSettings, Links, Pin};
-use super::surfaces::Membrane;
+use super::surfaces::{Membrane, Tear};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -51,6 +51,9 @@ pub struct Cloth {
     /// out unless they are given.
     #[serde(default)]
     pub fabric: Option<FabricWords>,
+    /// How it tears; without it, it does not.
+    #[serde(default)]
+    pub tear: Option<Tear>,
     /// Stiffness of each triangle against changes of its area: tension over relative change.
     #[serde(default)]
     #[schemars(range(min = 0.0), extend("x-unit" = "N/m"))]

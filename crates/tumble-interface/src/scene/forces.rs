@@ -46,6 +46,32 @@ pub enum Force {
         #[serde(default)]
         on: Option<Vec<String>>,
     },
+    /// Air around the triangles of sheets, nets and cloth: drag along its velocity relative to each, lift across it, friction in the surface,
+    /// F = rho/2 A (C_D |s| w + C_L (s |w| n - s²/|w| w) + C_F |w| (w - s n)), w = u - v, s = w . n.
+    Air {
+        /// rho.
+        #[serde(default = "air_density")]
+        #[schemars(range(min = 0.0), extend("x-unit" = "kg/m³"))]
+        density: f64,
+        /// C_D, for the area that the air sees.
+        #[serde(default = "plate")]
+        #[schemars(range(min = 0.0), extend("x-unit" = "1"))]
+        drag: f64,
+        /// C_L: the lift is C_L sin a cos a at the angle a between air and surface. As large as `drag`, it is that of a plate that turns the air.
+        #[serde(default = "plate")]
+        #[schemars(range(min = 0.0), extend("x-unit" = "1"))]
+        lift: f64,
+        /// C_F, of both faces together.
+        #[serde(default = "skin")]
+        #[schemars(range(min = 0.0), extend("x-unit" = "1"))]
+        friction: f64,
+        /// Velocity fields of the air; they add up. Without one, it is still.
+        #[serde(default)]
+        wind: Vec<Field>,
+        /// Names of objects; without it, all that have triangles.
+        #[serde(default)]
+        on: Option<Vec<String>>,
+    },
     /// Attraction to a point, f = -m gm d / r^(power + 1) with r² = |d|² + softening². A negative gm repels.
     Attraction {
         /// The point; may change in time.
@@ -482,6 +508,18 @@ pub struct Anchor {
     pub rest_length: Option<f64>,
 }
 
+fn air_density() -> f64 {
+    1.2
+}
+
+fn plate() -> f64 {
+    1.2
+}
+
+fn skin() -> f64 {
+    0.01
+}
+
 fn coulomb() -> f64 {
     8.987_551_792_3e9
 }
@@ -540,6 +578,7 @@ impl Force {
         match self {
             Self::Drag { on, .. }
             | Self::Wind { on, .. }
+            | Self::Air { on, .. }
             | Self::Attraction { on, .. }
             | Self::Gravitation { on, .. }
             | Self::Electrostatics { on, .. }

@@ -36,7 +36,7 @@ pub use structures::{
     Block, Cloud, CloudShape, Diagonals, Follow, Galaxy, Halo, Link, LinkSettings, Links, Material, Net, Particles, Pin, Profile, Region,
     Rod, Rope, Sheet, Spring,
 };
-pub use surfaces::{Fill, Fluid, Inflation, Membrane, ShapeMatching};
+pub use surfaces::{Fill, Fluid, Inflation, Membrane, ShapeMatching, Tear, Weak};
 pub use systems::{
     Adaptive, Hessian, Integrator, Linear, Method, OnFailure, PositionBased, Projection, SelfContact, Solver, System, Vicsek,
 };

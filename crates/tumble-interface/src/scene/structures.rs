@@ -2,7 +2,7 @@
 //! object is divided: k_s = modulus x (length, area or volume that the link stands for) / l0².
 
 use super::fabrics::FabricWords;
-use super::surfaces::{Fluid, Inflation, Membrane, ShapeMatching};
+use super::surfaces::{Fluid, Inflation, Membrane, ShapeMatching, Tear};
 use super::{MeshFile, items_above_zero};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -333,6 +333,9 @@ pub struct Sheet {
     /// out unless they are given.
     #[serde(default)]
     pub fabric: Option<FabricWords>,
+    /// How it tears; without it, it does not.
+    #[serde(default)]
+    pub tear: Option<Tear>,
     /// Stiffness of each triangle against changes of its area: tension over relative change.
     #[serde(default)]
     #[schemars(range(min = 0.0), extend("x-unit" = "N/m"))]
@@ -441,6 +444,9 @@ pub struct Net {
     /// out unless they are given.
     #[serde(default)]
     pub fabric: Option<FabricWords>,
+    /// How it tears; without it, it does not.
+    #[serde(default)]
+    pub tear: Option<Tear>,
     /// Stiffness of each triangle against changes of its area: tension over relative change.
     #[serde(default)]
     #[schemars(range(min = 0.0), extend("x-unit" = "N/m"))]

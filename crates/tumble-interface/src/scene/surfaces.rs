@@ -50,6 +50,42 @@ impl Membrane {
     }
 }
 
+/// How a surface tears: where an edge of a triangle is stretched too much, one of its ends comes apart, for good.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Tear {
+    /// Lengthening over rest length at which an edge gives way.
+    #[schemars(extend("x-unit" = "1", "exclusiveMinimum" = 0.0))]
+    pub strain: f64,
+    /// How much stronger or weaker single edges are, at most, over that strain.
+    #[serde(default)]
+    #[schemars(range(min = 0.0, max = 0.99), extend("x-unit" = "1"))]
+    pub spread: f64,
+    /// Where it is weaker: a seam that has worn out, a notch.
+    #[serde(default)]
+    pub weak: Vec<Weak>,
+    /// How many times a vertex can come apart; so many masses are kept ready, at the end of its columns. Without it, half as many as there are
+    /// triangles.
+    #[serde(default)]
+    #[schemars(range(max = 10_000_000))]
+    pub spare: Option<u32>,
+}
+
+/// A ball in which a surface is weaker, as it lies at the start.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Weak {
+    /// Its middle.
+    #[schemars(extend("x-unit" = "m"))]
+    pub center: [f64; 3],
+    /// Its radius.
+    #[schemars(extend("x-unit" = "m", "exclusiveMinimum" = 0.0))]
+    pub radius: f64,
+    /// Strain at which edges give way there.
+    #[schemars(range(min = 0.0), extend("x-unit" = "1"))]
+    pub strain: f64,
+}
+
 /// What a closed net holds in.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]

@@ -41,6 +41,12 @@ pub trait Batch: Send + Sync {
     fn drives(&self) -> Option<f64> {
         None
     }
+    /// Whether it depends on velocities in a way that its matrix at rest does not tell.
+    fn feels_velocity(&self) -> bool {
+        false
+    }
+    /// From now on the forces act on velocities for h [s] at once: they must not carry them beyond where they would come to rest.
+    fn act_at_once(&mut self, _h: f64) {}
     /// The rows of the objects that it acts between have changed, those of the others that it names, and what they weigh.
     fn renew(&mut self, _on: Vec<Range<usize>>, _others: Option<Vec<Range<usize>>>, _masses: &crate::state::Masses) {}
     /// Prepares the forces at (t, x, v): what has to be known of all elements before rows can be summed.
@@ -74,19 +80,24 @@ pub trait Batch: Send + Sync {
     fn broken(&self) -> Vec<u32> {
         Vec::new()
     }
+    /// Puts nodes of elements, as (element, node), onto other rows.
+    fn rewire(&mut self, _changes: &[(u32, usize, u32)]) {}
+    /// Breaks elements for good.
+    fn give_up(&mut self, _elements: &[u32]) {}
     /// Mends all links, then breaks these.
     fn set_broken(&mut self, _broken: &[u32]) {}
 }
 
 /// For every row, the slots (element times N plus node) that act on it.
-struct Incidence {
+pub struct Incidence {
     first: usize,
     start: Vec<u32>,
     slot: Vec<u32>,
 }
 
 impl Incidence {
-    fn new<const N: usize>(nodes: &[Index; N]) -> Self {
+    /// Of elements with these nodes.
+    pub fn new<const N: usize>(nodes: &[Index; N]) -> Self {
         let all = || nodes.iter().flat_map(|i| i.get().iter().copied());
         let (first, last) = all().fold((u32::MAX, 0), |(a, b), i| (a.min(i), b.max(i)));
         let rows = if first > last { 0 } else { (last - first + 1) as usize };
@@ -109,6 +120,15 @@ impl Incidence {
         Self { first, start, slot }
     }
 
+    /// Calls `f(row, its number, its slots in order)` for the rows from `start` on that have any.
+    pub fn rows<O>(&self, start: usize, out: &mut [O], f: impl Fn(usize, &mut O, &[u32])) {
+        let end = (start + out.len()).min(self.first + self.start.len() - 1);
+        for row in start.max(self.first)..end {
+            let i = row - self.first;
+            f(row, &mut out[row - start], &self.slot[self.start[i] as usize..self.start[i + 1] as usize]);
+        }
+    }
+
     /// out[row] += the sum of its slots, in slot order, for the rows from `start` on.
     fn add<T: Copy, O>(&self, slots: &[T], start: usize, out: &mut [O], add: impl Fn(&mut O, T)) {
         let end = (start + out.len()).min(self.first + self.start.len() - 1);
@@ -128,13 +148,21 @@ pub struct Elements<E, Y, const N: usize, const M: usize, const D: usize, const 
     incidence: Incidence,
     slots: Vec<Row>,
     energy_at_rest: f64,
+    /// What has broken: element, stiffness and damping that would mend it.
+    broken: Vec<(u32, Real, Real)>,
 }
 
 impl<E: Element<N, M, D>, Y: Law<P>, const N: usize, const M: usize, const D: usize, const P: usize> Elements<E, Y, N, M, D, P> {
     /// Elements over rows 0..rows; `None` if a node is not one of them.
     pub fn new(rows: usize, members: &[Members<N, D, P>]) -> Option<Self> {
         let list = List::new(rows, members)?;
-        Some(Self { incidence: Incidence::new(&list.nodes), slots: vec![ZERO; N * members.len()], energy_at_rest: 0.0, list })
+        Some(Self {
+            incidence: Incidence::new(&list.nodes),
+            slots: vec![ZERO; N * members.len()],
+            energy_at_rest: 0.0,
+            broken: Vec::new(),
+            list,
+        })
     }
 
     /// Elements that hold this energy [J] at rest; it is left out of the books.
@@ -257,5 +285,36 @@ impl<E: Element<N, M, D>, Y: Law<P>, const N: usize, const M: usize, const D: us
 
     fn entries(&self, x: &[Row], sink: &mut dyn FnMut(usize, usize, [[f64; 3]; 3])) {
         self.list.entries(x, sink);
+    }
+
+    fn rewire(&mut self, changes: &[(u32, usize, u32)]) {
+        if changes.is_empty() {
+            return;
+        }
+        for (element, node, row) in changes {
+            self.list.nodes[*node].set(*element as usize, *row);
+        }
+        self.incidence = Incidence::new(&self.list.nodes);
+    }
+
+    fn give_up(&mut self, elements: &[u32]) {
+        for e in elements {
+            let (k, b) = (&mut self.list.stiffness[*e as usize], &mut self.list.damping[*e as usize]);
+            if *k != 0.0 || *b != 0.0 {
+                self.broken.push((*e, *k, *b));
+                (*k, *b) = (0.0, 0.0);
+            }
+        }
+    }
+
+    fn broken(&self) -> Vec<u32> {
+        self.broken.iter().map(|b| b.0).collect()
+    }
+
+    fn set_broken(&mut self, broken: &[u32]) {
+        for (e, stiffness, damping) in std::mem::take(&mut self.broken) {
+            (self.list.stiffness[e as usize], self.list.damping[e as usize]) = (stiffness, damping);
+        }
+        self.give_up(broken);
     }
 }

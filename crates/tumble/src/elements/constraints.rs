@@ -76,6 +76,10 @@ pub trait Constraints: Send + Sync {
     fn broken(&self) -> Vec<u32> {
         Vec::new()
     }
+    /// Puts nodes of elements, as (element, node), onto other rows.
+    fn rewire(&mut self, _changes: &[(u32, usize, u32)]) {}
+    /// Breaks elements for good.
+    fn give_up(&mut self, _elements: &[u32]) {}
     /// Mends all links, then breaks these.
     fn set_broken(&mut self, _broken: &[u32]) {}
 }
@@ -148,6 +152,13 @@ impl<const N: usize, const D: usize, const P: usize> Columns<N, D, P> {
 
     fn len(&self) -> usize {
         self.given.len()
+    }
+
+    /// For every element given, the place where it stands.
+    fn places(&self) -> Vec<usize> {
+        let mut places = vec![0; self.len()];
+        self.given.iter().enumerate().for_each(|(place, given)| places[*given as usize] = place);
+        places
     }
 
     /// Panics unless there are rows for the unchecked loads.
@@ -478,6 +489,31 @@ impl<E: Element<N, M, D>, Y: Law<P>, const N: usize, const M: usize, const D: us
         found.len() as u64
     }
 
+    /// Elements of a colour that get a new row in place of one that they shared with others of other colours do not share it with each
+    /// other: the colours stay.
+    fn rewire(&mut self, changes: &[(u32, usize, u32)]) {
+        if changes.is_empty() {
+            return;
+        }
+        let places = self.columns.places();
+        for (element, node, row) in changes {
+            self.columns.nodes[*node].set(places[*element as usize], *row);
+        }
+    }
+
+    fn give_up(&mut self, elements: &[u32]) {
+        if elements.is_empty() {
+            return;
+        }
+        let places = self.columns.places();
+        for e in elements {
+            let place = places[*e as usize];
+            if self.columns.compliance[place] < LIMP as Real {
+                self.tear(place);
+            }
+        }
+    }
+
     fn broken(&self) -> Vec<u32> {
         self.broken.iter().map(|b| self.columns.given[b.place]).collect()
     }
@@ -489,8 +525,7 @@ impl<E: Element<N, M, D>, Y: Law<P>, const N: usize, const M: usize, const D: us
         if broken.is_empty() {
             return;
         }
-        let mut places = vec![0; self.len()];
-        self.columns.given.iter().enumerate().for_each(|(place, given)| places[*given as usize] = place);
+        let places = self.columns.places();
         for given in broken {
             self.tear(places[*given as usize]);
         }

@@ -26,7 +26,7 @@ mod vector;
 mod woven;
 
 pub use crate::linalg::blocks::Block;
-pub use batch::{Batch, Elements, Weights};
+pub use batch::{Batch, Elements, Incidence, Weights};
 pub use bend::Hinge;
 pub use constraints::{Constraints, Density, Neohookean, Projected, Projection, Shape, Strands, Volume, enclosed, spline};
 pub use contact::PointPlane;

@@ -459,6 +459,35 @@ impl<E: Pair<M, D>, Y: Law<P>, const M: usize, const D: usize, const P: usize> B
         found.len() as u64
     }
 
+    fn rewire(&mut self, changes: &[(u32, usize, u32)]) {
+        if changes.is_empty() {
+            return;
+        }
+        for (element, node, row) in changes {
+            self.list.nodes[*node].set(*element as usize, *row);
+        }
+        let list = &self.list;
+        let member = |e: usize| Members {
+            nodes: [0, 1].map(|a| list.nodes[a].get()[e]),
+            rest: std::array::from_fn(|d| f64::from(list.rest[d][e])),
+            law: std::array::from_fn(|p| f64::from(list.law[p][e])),
+            stiffness: f64::from(list.stiffness[e]),
+            damping: f64::from(list.damping[e]),
+        };
+        let members: Vec<Members<2, D, P>> = (0..list.len()).map(member).collect();
+        if let Some(lists) = Neighbours::new(list.nodes[0].rows(), &members) {
+            self.lists = lists;
+        }
+    }
+
+    fn give_up(&mut self, elements: &[u32]) {
+        for e in elements {
+            if self.list.stiffness[*e as usize] != 0.0 || self.list.damping[*e as usize] != 0.0 {
+                self.tear(*e);
+            }
+        }
+    }
+
     fn broken(&self) -> Vec<u32> {
         self.broken.iter().map(|b| b.spring).collect()
     }

@@ -1,6 +1,7 @@
 //! L3: forces that act on each mass by itself or between masses, and velocity fields. One file per law.
 
 mod acceleration;
+mod air;
 mod attraction;
 mod cohesion;
 mod direct_sum;
@@ -23,6 +24,7 @@ mod vortex;
 mod wind;
 
 pub use acceleration::Acceleration;
+pub use air::{Air, Sails};
 pub use attraction::Attraction;
 pub use cohesion::Cohesion;
 pub use direct_sum::{Attractor, DirectSum};

@@ -50,6 +50,8 @@ pub fn cloth(site: &mut Site<'_>, thing: &Cloth) {
     }
     site.parts.begin(&thing.name, 0.0);
     let mut all = Mesh::default();
+    // Corners of triangles in their panel.
+    let mut cut_out: Vec<[Vector; 3]> = Vec::new();
     let mut sides: Vec<Vec<Vec<u32>>> = Vec::new();
     let mut first = None;
     for (k, words) in cuts.iter().enumerate() {
@@ -105,6 +107,7 @@ pub fn cloth(site: &mut Site<'_>, thing: &Cloth) {
             area: thing.area,
         };
         site.surface(&own, at, &words, Vector { x: 1.0, y: 0.0, z: 0.0 });
+        cut_out.extend(own.triangles.iter().map(|t| t.map(|i| Vector::from(own.vertices[i as usize]))));
         all.triangles.extend(own.triangles.iter().map(|t| t.map(|i| i + start)));
         sides.push(piece.sides.into_iter().map(|side| side.into_iter().map(|i| at + i).collect()).collect());
     }
@@ -127,8 +130,12 @@ pub fn cloth(site: &mut Site<'_>, thing: &Cloth) {
     let first = first.unwrap_or(0);
     let pins = pinned(site, &Pinnable { path: &path, n: &[all.vertices.len() as u32], first, is_lattice: false }, &thing.pin);
     pins.iter().for_each(|p| site.parts.pin(*p));
+    let places: Vec<_> = all.triangles.iter().map(|t| t.map(|i| Vector::from(all.vertices[i as usize]))).collect();
     if let Some(object) = site.parts.object() {
         object.triangles = all.triangles;
+    }
+    if let Some(words) = &thing.tear {
+        site.tear(words, &cut_out, &places, &path);
     }
 }
 

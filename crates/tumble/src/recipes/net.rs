@@ -67,4 +67,14 @@ pub fn net(site: &mut Site<'_>, thing: &Net, mesh: &Mesh) {
     if let Some(object) = site.parts.object() {
         object.triangles.clone_from(&mesh.triangles);
     }
+    if let Some(words) = &thing.tear {
+        if thing.pressure.is_some() || thing.shape_matching.is_some() {
+            return site.wrong(
+                format!("{path}.tear"),
+                "what tears can neither hold a pressure nor keep a shape as a whole; leave out one of them",
+            );
+        }
+        let corners: Vec<_> = mesh.triangles.iter().map(|t| t.map(corner)).collect();
+        site.tear(words, &corners, &corners, &path);
+    }
 }

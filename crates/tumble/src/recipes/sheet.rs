@@ -52,7 +52,11 @@ pub fn sheet(site: &mut Site<'_>, thing: &Sheet) {
         site.surface(&mesh, first, &words, warp);
         triangles = mesh.triangles;
     }
+    let corners: Vec<_> = triangles.iter().map(|t| t.map(|i| site.parts.position(i + first))).collect();
     if let Some(object) = site.parts.object() {
         object.triangles = triangles;
+    }
+    if let Some(words) = &thing.tear {
+        site.tear(words, &corners, &corners, &path);
     }
 }

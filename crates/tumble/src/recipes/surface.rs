@@ -4,9 +4,9 @@ use super::Site;
 use crate::elements::{Element, Hinge, IsometricBend, Membrane, Moment, Woven, enclosed};
 use crate::geometry::Vector;
 use crate::math::functions;
-use crate::systems::dynamics::Closed;
+use crate::systems::dynamics::{Closed, TearPart};
 use std::ops::Range;
-use tumble_interface::scene::{FabricUse, FabricWords, Inflation, Membrane as Words, ShapeMatching};
+use tumble_interface::scene::{FabricUse, FabricWords, Inflation, Membrane as Words, ShapeMatching, Tear};
 use tumble_interface::{Fabric, Mesh};
 
 /// The words of a surface that its recipes share.
@@ -171,6 +171,32 @@ impl Site<'_> {
                 }
             }
         }
+    }
+
+    /// Lets the object under construction tear. `rest` are the corners of each of its triangles [m] where nothing is strained, `places` those
+    /// at the start.
+    pub(super) fn tear(&mut self, words: &Tear, rest: &[[Vector; 3]], places: &[[Vector; 3]], path: &str) {
+        let noise = |t: usize, k: usize, rest: &[[Vector; 3]]| {
+            // The same from both triangles of an edge: from where its middle is at the start.
+            let m = rest[t][k] + rest[t][(k + 1) % 3];
+            let mixed = [m.x, m.y, m.z].iter().fold(0x9e37_79b9_7f4a_7c15_u64, |h, c| {
+                let q = (c * 1e6).round() as i64 as u64;
+                (h ^ q).wrapping_mul(0xbf58_476d_1ce4_e5b9).rotate_left(31)
+            });
+            let mixed = (mixed ^ (mixed >> 29)).wrapping_mul(0x94d0_49bb_1331_11eb);
+            ((mixed >> 11) as f64) / (1_u64 << 53) as f64 * 2.0 - 1.0
+        };
+        let strength = |t: usize, k: usize| {
+            let middle = (places[t][k] + places[t][(k + 1) % 3]) * 0.5;
+            let weak = words.weak.iter().filter(|w| (middle - Vector::from(w.center)).norm() <= w.radius);
+            let strain = weak.map(|w| w.strain).fold(words.strain, f64::min);
+            strain * (1.0 + words.spread * noise(t, k, places))
+        };
+        let edges = |t: usize| [0, 1, 2].map(|k| (rest[t][(k + 1) % 3] - rest[t][k]).norm());
+        let all = 0..rest.len();
+        let spare = words.spare.map_or_else(|| all.len() / 2 + 1, |spare| spare as usize);
+        let limit = all.clone().map(|t| [0, 1, 2].map(|k| strength(t, k))).collect();
+        self.parts.tear(TearPart { path: format!("{path}.tear"), spare, rest: all.map(edges).collect(), limit });
     }
 
     /// The volume inside a closed mesh, whose vertices are points from `first` on.

@@ -398,6 +398,7 @@ fn act(scene: &Scene, parts: &mut [Parts], issues: &mut Vec<Issue>) {
         let path = format!("force[{i}]");
         // What is wrong with a force is told even where it acts on nothing.
         reader.law(&path, force);
+        reader.air(&path, force);
         for parts in &mut *parts {
             let others = others(force);
             let other = |name: &str| others.is_some_and(|(_, others)| others.iter().any(|o| o == name));
@@ -407,6 +408,11 @@ fn act(scene: &Scene, parts: &mut [Parts], issues: &mut Vec<Issue>) {
             let bodies =
                 |of: &dyn Fn(&str) -> bool| -> Vec<usize> { parts.bodies().filter(|(_, name)| of(name)).map(|(i, _)| i).collect() };
             let (on, others) = (bodies(&on), others.map(|_| bodies(&other)));
+            if let Some(air) = reader.air(&path, force) {
+                parts.times = reader.times().to_vec();
+                parts.airs.push((air, on));
+                continue;
+            }
             match reader.law(&path, force) {
                 _ if on.is_empty() => {}
                 Some(law) => parts.forces.push((path.clone(), law, on)),

@@ -46,6 +46,18 @@ pub fn unused(scene: &Scene, plans: &[Plan]) -> Vec<String> {
         let charged = |p: &Particles| p.charge.iter().any(|q| *q != 0.0) && reached(&p.name);
         let emitted = |e: &Emitter| e.charge != 0.0 && reached(&e.name);
         let any = scene.particles.iter().any(charged) || scene.emitter.iter().any(emitted);
+        if matches!(force, Words::Air { .. })
+            && !scene
+                .sheet
+                .iter()
+                .map(|t| &t.name)
+                .chain(scene.net.iter().map(|t| &t.name))
+                .chain(scene.cloth.iter().map(|t| &t.name))
+                .chain(scene.block.iter().map(|t| &t.name))
+                .any(reached)
+        {
+            warnings.push(format!("force[{i}]: nothing in its reach has a surface; give it a sheet, a net or cloth"));
+        }
         if matches!(force, Words::Magnetic { .. } | Words::Electric { .. } | Words::Electrostatics { .. }) && !any {
             warnings.push(format!("force[{i}]: nothing in its reach has a charge; give particles a charge"));
         }

@@ -1,7 +1,7 @@
 //! From the words of forces and fields to laws: formulas are read, and what is wrong with them is told.
 
 use crate::forces::{
-    Acceleration, Attraction, Current, Drag, Electric, Flow, Force, InPlane, Magnetic, OnGrid, Propulsion, Turbulence, Vortex, Wind,
+    Acceleration, Air, Attraction, Current, Drag, Electric, Flow, Force, InPlane, Magnetic, OnGrid, Propulsion, Turbulence, Vortex, Wind,
 };
 use crate::math::formula::Of;
 use crate::math::{Signal, Vec3, VectorSignal};
@@ -107,7 +107,8 @@ impl<'a> Reader<'a> {
             | Words::Repulsion { .. }
             | Words::Cohesion { .. }
             | Words::Viscosity { .. }
-            | Words::Flock { .. } => return None,
+            | Words::Flock { .. }
+            | Words::Air { .. } => return None,
             Words::Drag { coefficient, rate, quadratic, .. } => {
                 Box::new(Drag { coefficient: *coefficient, rate: *rate, quadratic: *quadratic })
             }
@@ -141,6 +142,18 @@ impl<'a> Reader<'a> {
             Some(axis) => Box::new(InPlane { law, axis }),
             None => law,
         })
+    }
+
+    /// The law of a force on surfaces; `None` for any other.
+    pub fn air(&mut self, path: &str, words: &Words) -> Option<Air> {
+        let Words::Air { density, drag, lift, friction, wind, .. } = words else { return None };
+        let flow = self.flow(&format!("{path}.wind"), wind);
+        Some(Air { density: *density, drag: *drag, lift: *lift, friction: *friction, flow })
+    }
+
+    /// Times of the run at which what changes is tried [s].
+    pub fn times(&self) -> &[f64] {
+        &self.times
     }
 
     fn vortex(&mut self, path: &str, center: &AnimatedVector, axis: [f64; 3], core: f64, values: [&Animated; 3]) -> Vortex {

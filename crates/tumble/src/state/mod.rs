@@ -48,6 +48,8 @@ pub struct Object {
     pub name: String,
     /// Its points, as rows.
     pub points: Range<usize>,
+    /// How many of them, the last ones, are spare vertices of a surface that tears.
+    pub spare: usize,
     /// Its frames, as rows.
     pub frames: Range<usize>,
     /// Triangles over its points, counted from its first.

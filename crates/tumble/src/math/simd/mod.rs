@@ -37,6 +37,13 @@ impl Index {
         &self.index
     }
 
+    /// Puts another row at a place, if it is one.
+    pub fn set(&mut self, place: usize, row: u32) {
+        if (row as usize) < self.rows {
+            self.index[place] = row;
+        }
+    }
+
     /// How many rows they index at least.
     pub fn rows(&self) -> usize {
         self.rows

@@ -152,10 +152,18 @@ impl Sums {
 
 impl Dynamics {
     pub(super) fn write_columns(&self, names: &[&str], out: &mut Vec<Column>) {
-        for object in &self.objects {
+        for (index, object) in self.objects.iter().enumerate() {
+            let tear = self.tears.iter().find(|tear| tear.object() == index);
             for name in names {
                 let (unit, width, data): (_, _, Vec<Real>) = match *name {
-                    "position" => ("m", 3, numbers(&self.state.x[object.points.clone()], 3)),
+                    "position" => {
+                        let mut x = numbers(&self.state.x[object.points.clone()], 3);
+                        // Spare vertices are where the first one is, out of nobody's picture.
+                        for i in tear.iter().flat_map(|tear| tear.idle()) {
+                            x.copy_within(0..3, 3 * (i - object.points.start));
+                        }
+                        ("m", 3, x)
+                    }
                     "velocity" => ("m/s", 3, numbers(&self.state.v[object.points.clone()], 3)),
                     "orientation" if !object.frames.is_empty() => ("1", 4, numbers(&self.state.x[object.frames.clone()], 4)),
                     "angular_velocity" if !object.frames.is_empty() => ("rad/s", 3, numbers(&self.state.v[object.frames.clone()], 3)),
@@ -163,6 +171,11 @@ impl Dynamics {
                     _ => continue,
                 };
                 out.push(object.column(name, unit, width, Data::from(data)));
+                if let (Some(tear), &"position") = (tear, name) {
+                    let first = object.points.start as u32;
+                    let triangles = tear.triangles().iter().flatten().map(|i| i - first).collect();
+                    out.push(object.column("triangles", "1", 3, Data::U32(triangles)));
+                }
             }
             if let Some(stream) = object.stream {
                 self.pool.write(stream, &object.name, &self.laws.masses.mass, out);
@@ -196,7 +209,8 @@ impl Dynamics {
                 continue;
             }
             add("mass", "kg", 1, Data::from(self.laws.masses.mass[object.points.clone()].to_vec()));
-            let pinned = object.points.clone().filter(|i| self.state.x[*i][3] == 0.0).map(|i| (i - object.points.start) as u32);
+            let points = object.points.start..object.points.end - object.spare;
+            let pinned = points.filter(|i| self.state.x[*i][3] == 0.0).map(|i| (i - object.points.start) as u32);
             add("pinned", "1", 1, Data::U32(pinned.collect()));
             add("triangles", "1", 3, Data::U32(object.triangles.concat()));
             add("links", "1", 2, Data::U32(object.link_ends.concat()));
@@ -234,7 +248,8 @@ impl Dynamics {
         let stretch = strains.fold(0.0, |most, strain| f64::max(most, strain + 1.0));
         let depths = |i: usize| {
             let p = xyz64(x[i]);
-            self.laws.colliders.iter().filter_map(move |c| c.touch(p, t)).map(|t| t.depth)
+            let colliders = if masses.mass[i] > 0.0 { &self.laws.colliders[..] } else { &[] };
+            colliders.iter().filter_map(move |c| c.touch(p, t)).map(|t| t.depth)
         };
         let touching = !self.laws.colliders.is_empty();
         Ledger {

@@ -3,13 +3,14 @@
 use super::coat::Coat;
 use super::held::Held;
 use super::laws::Acting;
+use super::tear::{Edges, Kind, Tear, TearPart};
 use super::{Dynamics, Stepping, books};
 use crate::elements::{
     Area, BendTwist, Constraints, Density, Distance, Element, Elements, Hinge, IsometricBend, Law, Linear, Members, Membrane, Moment,
     Neohookean, Nonlinear, Pairs, Projected, Shape, Strands, StretchShear, TetShear, TetStrain, TetVolume, Tethers, Vector, Volume, Woven,
 };
 use crate::forces::{
-    Attractor, Cohesion, DirectSum, Flock, Force, Goal, Habits, Halos, LennardJones, Near, Newtonian, Repulsion, Viscosity,
+    Air, Attractor, Cohesion, DirectSum, Flock, Force, Goal, Habits, Halos, LennardJones, Near, Newtonian, Repulsion, Sails, Viscosity,
 };
 use crate::geometry::Collider;
 use crate::integrators::Memory;
@@ -100,6 +101,20 @@ struct Springs<const D: usize, const P: usize> {
 }
 
 impl<const D: usize, const P: usize> Springs<D, P> {
+    /// Adds some of them to others, those along an edge of two triangles as two halves.
+    fn halved(&self, range: Range<usize>, edges: Option<&Edges<'_>>, into: &mut Self) {
+        for e in range {
+            let (mut member, limit) = (self.members[e], self.limits[e]);
+            let halves = if edges.is_some_and(|edges| edges.at(member.nodes).len() == 2) { 2 } else { 1 };
+            member.stiffness /= f64::from(halves);
+            member.damping /= f64::from(halves);
+            for _ in 0..halves {
+                into.members.push(member);
+                into.limits.push(limit);
+            }
+        }
+    }
+
     fn push(&mut self, part: &SpringPart, rest: [f64; D], law: [f64; P], damping: f64) {
         self.members.push(Members { nodes: part.ends, rest, law, stiffness: part.stiffness, damping });
         self.limits.push(part.break_strain.unwrap_or(f64::INFINITY));
@@ -149,6 +164,10 @@ pub struct Parts {
     emitters: Vec<Emitter>,
     /// Forces on each mass by itself, with the objects that they act on, counted from the first that was begun.
     pub forces: Vec<(String, Box<dyn Force>, Vec<usize>)>,
+    /// The air around the surfaces of some objects.
+    pub airs: Vec<(Air, Vec<usize>)>,
+    /// Times of the run at which forces that change in time are tried [s].
+    pub times: Vec<f64>,
     /// Forces between masses of some objects, and the other objects that the words name.
     pub between: Vec<(Words, Vec<usize>, Option<Vec<usize>>)>,
 }
@@ -157,6 +176,7 @@ pub struct Parts {
 struct Draft {
     object: Object,
     links: [usize; 3],
+    tear: Option<TearPart>,
 }
 
 impl Parts {
@@ -164,11 +184,42 @@ impl Parts {
     pub fn begin(&mut self, name: &str, radius: f64) {
         let (p, f) = (self.points.len(), self.frames.len());
         let object = Object { name: name.into(), points: p..p, frames: f..f, radius, ..Object::default() };
-        self.objects.push(Draft { object, links: self.counts() });
+        self.objects.push(Draft { object, links: self.counts(), tear: None });
     }
 
     fn counts(&self) -> [usize; 3] {
         [self.linear.members.len(), self.nonlinear.members.len(), self.vector.members.len()]
+    }
+
+    /// Lets the object under construction tear; it must have its triangles, pins and elements.
+    pub fn tear(&mut self, part: TearPart) {
+        let Some(first) = self.objects.last().and_then(|d| self.points.get(d.object.points.start)) else { return };
+        // Spare vertices weigh nothing and are held where the first is, until they are needed.
+        let idle = (first.0, Vec3::default(), 0.0, true);
+        self.points.extend(std::iter::repeat_n(idle, part.spare));
+        let end = self.points.len();
+        if let Some(draft) = self.objects.last_mut() {
+            draft.object.points.end = end;
+            draft.object.spare = part.spare;
+            draft.tear = Some(part);
+        }
+    }
+
+    /// Makes two of every link along an edge that two triangles share, in surfaces that tear: one for each.
+    fn halve_links(&mut self) {
+        let mut drafts = std::mem::take(&mut self.objects);
+        let ends: Vec<[usize; 3]> = drafts.iter().skip(1).map(|d| d.links).chain([self.counts()]).collect();
+        let (mut linear, mut nonlinear) = (Springs::default(), Springs::default());
+        for (draft, end) in drafts.iter_mut().zip(ends) {
+            let (start, first) = (draft.links, draft.object.points.start as u32);
+            let rows: Vec<[u32; 3]> = draft.object.triangles.iter().map(|t| t.map(|i| i + first)).collect();
+            let edges = draft.tear.as_ref().map(|_| Edges::new(&rows));
+            draft.links[0] = linear.members.len();
+            draft.links[1] = nonlinear.members.len();
+            self.linear.halved(start[0]..end[0], edges.as_ref(), &mut linear);
+            self.nonlinear.halved(start[1]..end[1], edges.as_ref(), &mut nonlinear);
+        }
+        (self.linear, self.nonlinear, self.objects) = (linear, nonlinear, drafts);
     }
 
     /// The object under construction.
@@ -400,7 +451,8 @@ impl Parts {
                 let message = format!("a {what} of {number:.3e}, expected between {low:.0e} and {high:.0e}; or set precision = \"double\"");
                 issues.push(Issue::new(draft.object.name.as_str(), message));
             };
-            let masses = self.points[draft.object.points.clone()].iter().map(|p| p.2);
+            let points = draft.object.points.start..draft.object.points.end - draft.object.spare;
+            let masses = self.points[points].iter().map(|p| p.2);
             if let Some(mass) = masses.into_iter().find(|m| !fits(*m) || !fits(1.0 / m)) {
                 wrong("mass", mass);
             }
@@ -428,6 +480,16 @@ impl Parts {
             return Err(SceneError::one(format!("system \"{}\"", settings.name), message));
         }
         let rows = points + self.frames.len();
+        if self.objects.iter().any(|d| d.tear.is_some()) {
+            self.halve_links();
+        }
+        if let Some(part) = self.objects.iter().find_map(|d| d.tear.as_ref())
+            && settings.sweeps.tethers.is_some()
+            && settings.integrator == Integrator::PositionBased
+        {
+            let message = "tethers of the system would hold what has torn off; leave out one of them";
+            return Err(SceneError::one(part.path.as_str(), message));
+        }
         if settings.integrator.is_adaptive() && !self.coats.is_empty() {
             let message = "hair that acts on itself needs steps of equal length; set another integrator";
             return Err(SceneError::one(format!("system \"{}\".integrator", settings.name), message));
@@ -446,7 +508,7 @@ impl Parts {
         }
         let (mut state, mut masses) = (State::default(), Masses { points, ..Masses::default() });
         for (x, v, mass, pinned) in &self.points {
-            let w = if *pinned { 0.0 } else { 1.0 / mass };
+            let w = if *pinned || *mass == 0.0 { 0.0 } else { 1.0 / mass };
             state.x.push([x.x as Real, x.y as Real, x.z as Real, w as Real]);
             state.v.push(if *pinned { [0.0; 4] } else { [v.x as Real, v.y as Real, v.z as Real, 0.0] });
             masses.mass.push(*mass as Real);
@@ -513,6 +575,8 @@ impl Parts {
         let reach = reach(&settings, &self.objects, (&self.linear.members, &self.nonlinear.members, &self.vector.members), &state);
         let mut objects = Vec::new();
         let mut places = Vec::new();
+        let torn: Vec<(usize, TearPart)> =
+            self.objects.iter_mut().enumerate().filter_map(|(i, draft)| Some((i, draft.tear.take()?))).collect();
         for (draft, next) in self.objects.into_iter().zip(next) {
             let mut object = draft.object;
             object.frames = object.frames.start + points..object.frames.end + points;
@@ -548,6 +612,50 @@ impl Parts {
                 pairs.push((batches.list.len(), on.clone(), others.clone()));
                 batches.list.push(batch);
             }
+        }
+        let mut sails = Vec::new();
+        for (air, on) in self.airs {
+            let own = |i: &usize| objects[*i].triangles.iter().map(|t| t.map(|v| v + objects[*i].points.start as u32)).collect::<Vec<_>>();
+            let on = placed(on);
+            let triangles: Vec<[u32; 3]> = on.iter().flat_map(own).collect();
+            if triangles.is_empty() {
+                continue;
+            }
+            sails.push((batches.list.len(), on));
+            batches.list.push(Box::new(Sails::new(air, &triangles, &state.x[..points], &masses.mass, &self.times).ok_or_else(lost)?));
+        }
+        let kind = |i: usize| if projected { Kind::Constraints(i) } else { Kind::Batch(i) };
+        let named = |name: &str| {
+            let at = if projected {
+                batches.constraints.iter().position(|c| c.name() == name)
+            } else {
+                batches.list.iter().position(|b| b.name() == name)
+            };
+            at.map(kind)
+        };
+        let mut tears = Vec::new();
+        for (index, part) in torn.iter().filter_map(|(draft, part)| Some((*places.get(*draft)?, part))) {
+            let object = &objects[index];
+            let first = object.points.start as u32;
+            let own: Vec<[u32; 3]> = object.triangles.iter().map(|t| t.map(|i| i + first)).collect();
+            let (edges, x) = (Edges::new(&own), &state.x[..points]);
+            let clamp = clamp.as_ref().and_then(|c| c.as_ref()).map(|_| Kind::Clamp);
+            let ties = [
+                edges.ties(kinds[0].flatten().map(kind), &self.linear.members, 0, x),
+                edges.ties(kinds[1].flatten().map(kind), &self.nonlinear.members, 0, x),
+                edges.ties(clamp, &self.linear.members, 0, x),
+                edges.ties(clamp, &self.nonlinear.members, self.linear.members.len(), x),
+                edges.ties(named(Hinge::NAME), &self.hinges, 0, x),
+                edges.ties(named(IsometricBend::NAME), &self.isometric, 0, x),
+                edges.ties(named(Membrane::NAME), &self.membranes, 0, x),
+                edges.ties(named(Area::NAME), &self.areas, 0, x),
+            ];
+            let count = |i: &usize| objects[*i].triangles.len();
+            let blown = sails.iter().filter_map(|(batch, on)| {
+                let at = on.iter().position(|i| *i == index)?;
+                Some(edges.own(Kind::Batch(*batch), on[..at].iter().map(count).sum()))
+            });
+            tears.push(Tear::new(index, object, part, &masses.mass, x, ties.into_iter().flatten().chain(blown).collect()));
         }
         let mut stiffness = vec![[0.0; 6]; rows];
         for batch in &mut batches.list {
@@ -592,6 +700,7 @@ impl Parts {
             rates: Vec::new(),
             reach,
             layers,
+            tears,
             held: Held::at_rest(self.held, &settings.colliders).into_iter().chain(self.carried).collect(),
             user: None,
             scratch: Default::default(),
@@ -699,7 +808,7 @@ fn between(
             };
             Box::new(Flock::new(habits, on, others.unwrap_or_default(), masses, settings.colliders.clone()))
         }
-        // Forces on each mass by itself.
+        // Forces on each mass by itself, and on surfaces.
         _ => return Vec::new(),
     }]
 }

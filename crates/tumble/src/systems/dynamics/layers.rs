@@ -5,6 +5,7 @@
 //!   C = n . Σ w_i x_i - thickness >= 0,   dx_i = m_i^-1 w_i n max(0, -C)/Σ_j m_j^-1 w_j²            (positions.4)
 
 use super::Dynamics;
+use super::tear::Tear;
 use crate::geometry::mesh_contact::{Detector, Owner, Pair, Topology, intersections, tangled, untangle_directions};
 use crate::math::{Real, Row, Vec3, axpy, row, sub, xyz};
 use crate::state::{Object, State};
@@ -23,26 +24,56 @@ pub struct Layers {
     topology: Topology,
     detector: Detector,
     friction: f64,
+    thickness: f64,
+    sewn: Vec<[u32; 2]>,
+    /// Places at the start, for surfaces that tear.
+    rest: Vec<Row>,
 }
 
 impl Layers {
     /// All triangles and curves of the objects; `sewn` points count as one. `None` if there is nothing that could meet.
     pub fn new(words: &SelfContact, objects: &[Object], sewn: impl Iterator<Item = [u32; 2]>, state: &State) -> Option<Self> {
         let points = objects.iter().map(|o| o.points.end).max()?;
+        let mut layers = Self {
+            topology: Topology::default(),
+            detector: Detector::new(),
+            friction: words.friction,
+            thickness: words.thickness,
+            sewn: sewn.collect(),
+            rest: state.x[..points].to_vec(),
+        };
+        layers.topology = layers.meeting(objects, &[]);
+        (!layers.topology.points().is_empty()).then_some(layers)
+    }
+
+    /// Takes up what has torn.
+    pub fn renew(&mut self, objects: &[Object], tears: &[Tear]) {
+        self.topology = self.meeting(objects, tears);
+        self.detector = Detector::new();
+    }
+
+    /// What can meet. Copies of a vertex count as one where features that share it are told from others: both sides of a tear start
+    /// from the same place.
+    fn meeting(&self, objects: &[Object], tears: &[Tear]) -> Topology {
+        let points = self.rest.len();
         let mut topology = Topology::new(points);
-        for object in objects.iter().filter(|o| o.stream.is_none()) {
+        for (index, object) in objects.iter().enumerate().filter(|(_, o)| o.stream.is_none()) {
             let first = object.points.start as u32;
-            let triangles: Vec<[u32; 3]> = object.triangles.iter().map(|t| t.map(|i| i + first)).collect();
+            let torn = tears.iter().find(|tear| tear.object() == index);
+            let whole = || object.triangles.iter().map(|t| t.map(|i| i + first)).collect();
+            let triangles: Vec<[u32; 3]> = torn.map_or_else(whole, |tear| tear.triangles().to_vec());
             let segments: Vec<[u32; 2]> = object.curve.windows(2).map(|c| [c[0] + first, c[1] + first]).collect();
-            topology.add(Owner { radius: 0.5 * words.thickness, itself: true }, &triangles, &segments, &[]);
+            topology.add(Owner { radius: 0.5 * self.thickness, itself: true }, &triangles, &segments, &[]);
         }
-        if topology.points().is_empty() {
-            return None;
+        self.sewn.iter().for_each(|[a, b]| topology.weld(*a, *b));
+        let mut rest = self.rest.clone();
+        for [copy, of] in tears.iter().flat_map(|tear| tear.copies()) {
+            topology.weld(copy, of);
+            rest[copy as usize] = self.rest[of as usize];
         }
-        sewn.for_each(|[a, b]| topology.weld(a, b));
-        (0..points).filter(|i| state.x[*i][3] == 0.0).for_each(|i| topology.fix(i as u32, true));
-        topology.set_rest(&state.x[..points]);
-        Some(Self { topology, detector: Detector::new(), friction: words.friction })
+        (0..points).filter(|i| rest[*i][3] == 0.0).for_each(|i| topology.fix(i as u32, true));
+        topology.set_rest(&rest);
+        topology
     }
 
     /// Edges that pass through triangles.

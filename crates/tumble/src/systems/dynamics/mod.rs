@@ -12,8 +12,10 @@ mod layers;
 mod life;
 mod modes;
 mod position_based;
+mod tear;
 
 pub use build::{Closed, Liquid, Parts, Settings, SpringPart};
+pub use tear::TearPart;
 
 use crate::elements::{Constraints, Limit, Linear, Projected, Projection, Tethers};
 use crate::exchange::{Exchange, Port};
@@ -74,6 +76,8 @@ pub struct Dynamics {
     sweeps: PositionBased,
     reach: Vec<Tethers>,
     layers: Option<Layers>,
+    /// Surfaces that tear.
+    tears: Vec<tear::Tear>,
     /// Points that follow colliders.
     held: Vec<Held>,
     coats: Vec<coat::Coat>,
@@ -282,6 +286,7 @@ impl Dynamics {
             self.broken += broken;
             self.memory.ready = false;
         }
+        self.tear(report);
     }
 
     fn user_step(&mut self, user: &mut dyn UserIntegrator, t: f64, h: f64) -> Result<(), StepError> {
@@ -569,6 +574,9 @@ impl System for Dynamics {
         let numbers =
             vec![ready, self.memory.next_step, self.memory.last_error, f64::from(self.automatic), self.measured as f64, self.broken as f64];
         archive.push("numbers", Part::Numbers(numbers.into_iter().chain(self.scale.numbers()).collect()));
+        for tear in &self.tears {
+            archive.push("triangles", Part::Indices(tear.triangles().concat()));
+        }
         for batch in &self.laws.batches {
             archive.push("broken", Part::Indices(batch.broken()));
         }
@@ -595,6 +603,12 @@ impl System for Dynamics {
         (self.automatic, self.measured) = (*automatic as u32, *measured as usize);
         self.broken = *broken as u64;
         self.scale = books::Scale::from_numbers(scale)?;
+        for tear in &mut self.tears {
+            tear.set(&archive.indices("triangles")?)?;
+        }
+        if !self.tears.is_empty() {
+            self.follow_tears();
+        }
         for batch in &mut self.laws.batches {
             let broken = archive.indices("broken")?;
             if broken.iter().any(|e| *e as usize >= batch.len()) {

@@ -90,6 +90,9 @@ impl Dynamics {
     fn prepare(&mut self, (stiffness, damping): (f64, f64)) {
         let weights = Weights { stiffness: stiffness as Real, damping: damping as Real, hessian: Hessian::Definite };
         for batch in &mut self.laws.batches {
+            if batch.feels_velocity() {
+                batch.begin_forces(0.0, &self.state.x, &self.state.v);
+            }
             batch.linearize(&self.state.x, weights);
         }
     }

@@ -24,6 +24,7 @@ impl Dynamics {
         // Forces that are no elements, predicted velocities and positions.
         let (mut rates, kinematics) = (std::mem::take(&mut self.rates), self.laws.kinematics());
         rates.resize(self.state.x.len(), ZERO);
+        self.laws.batches.iter_mut().for_each(|b| b.act_at_once(h));
         let done = self.laws.rate(t, &self.state.x, &self.state.v, &mut rates);
         let step = h as Real;
         chunks2(&mut self.state.x, &mut self.state.v, |start, x, v| {
