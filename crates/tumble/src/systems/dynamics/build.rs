@@ -1,20 +1,18 @@
 //! From the parts that recipes collect to a system.
 
+use super::batches::{Batches, between};
 use super::coat::Coat;
 use super::held::Held;
 use super::laws::Acting;
 use super::tear::{Edges, Kind, Tear, TearPart};
 use super::{Dynamics, Stepping, books};
 use crate::elements::{
-    Area, BendTwist, Constraints, Density, Distance, Element, Elements, Hinge, IsometricBend, Law, Linear, Members, Membrane, Moment,
-    Neohookean, Nonlinear, Pairs, Projected, Shape, Strands, StretchShear, TetShear, TetStrain, TetVolume, Tethers, Vector, Volume, Woven,
+    Area, Distance, Hinge, IsometricBend, Linear, Members, Membrane, Moment, Nonlinear, Projected, TetStrain, Tethers, Vector, Woven,
 };
-use crate::forces::{
-    Air, Attractor, Cohesion, DirectSum, Flock, Force, Goal, Habits, Halos, LennardJones, Near, Newtonian, Repulsion, Sails, Viscosity,
-};
+use crate::forces::{Air, Force, Sails};
 use crate::geometry::Collider;
 use crate::integrators::Memory;
-use crate::math::{Quat, Real, Vec3, functions};
+use crate::math::{Quat, Real, Vec3};
 use crate::pool::{Emitter, Pool};
 use crate::state::{Masses, Object, State};
 use std::ops::Range;
@@ -95,9 +93,11 @@ pub struct Liquid {
 
 /// Springs of one kind, with the strains at which they break.
 #[derive(Default)]
-struct Springs<const D: usize, const P: usize> {
-    members: Vec<Members<2, D, P>>,
-    limits: Vec<f64>,
+pub struct Springs<const D: usize, const P: usize> {
+    /// The springs.
+    pub members: Vec<Members<2, D, P>>,
+    /// Strains at which they break.
+    pub limits: Vec<f64>,
 }
 
 impl<const D: usize, const P: usize> Springs<D, P> {
@@ -122,7 +122,7 @@ impl<const D: usize, const P: usize> Springs<D, P> {
 }
 
 /// Position [m], velocity [m/s], mass [kg], whether it is held.
-type Point = (Vec3<f64>, Vec3<f64>, f64, bool);
+pub type Point = (Vec3<f64>, Vec3<f64>, f64, bool);
 
 /// Masses and elements under construction. Nodes are counted from 0: points by points, frames by frames.
 #[derive(Default)]
@@ -550,20 +550,23 @@ impl Parts {
             batches.springs::<Distance, Nonlinear, 1, 1, 2>(&self.nonlinear),
             batches.springs::<Vector, Linear, 3, 0, 0>(&self.vector),
         ];
-        let made = [
-            batches.add::<Distance, 2, 1, 1>(&self.dampers, 0.0),
+        let dampers = batches.add::<Distance, 2, 1, 1>(&self.dampers, 0.0);
+        let surfaces = [
             batches.add::<Hinge, 4, 1, 1>(&self.hinges, 0.0),
             batches.add::<IsometricBend, 4, 3, 3>(&self.isometric, 0.0),
             batches.add::<Membrane, 3, 3, 8>(&self.membranes, 0.0),
             batches.add::<Area, 3, 1, 1>(&self.areas, 0.0),
             batches.add::<Woven, 3, 3, 28>(&self.woven, 0.0),
             batches.add_with::<Hinge, Moment, 4, 1, 1, 8>(&self.creases, 0.0),
+        ];
+        let made = [
+            dampers.map(|_| ()),
             batches.solids(&self.shears, &self.volumes, self.energy_at_rest),
-            batches.add::<TetStrain, 4, 6, 9>(&self.strains, 0.0),
+            batches.add::<TetStrain, 4, 6, 9>(&self.strains, 0.0).map(|_| ()),
             batches.rods(&self.stretches, &mut self.bends, &self.rod_limits),
             batches.wholes(&self.points, std::mem::take(&mut self.closed), &self.shapes, &self.liquids),
         ];
-        if made.contains(&None) || kinds.contains(&None) {
+        if made.contains(&None) || kinds.contains(&None) || surfaces.contains(&None) {
             return Err(lost());
         }
         let next: Vec<[usize; 3]> = self.objects.iter().skip(1).map(|d| d.links).chain([end]).collect();
@@ -625,14 +628,7 @@ impl Parts {
             batches.list.push(Box::new(Sails::new(air, &triangles, &state.x[..points], &masses.mass, &self.times).ok_or_else(lost)?));
         }
         let kind = |i: usize| if projected { Kind::Constraints(i) } else { Kind::Batch(i) };
-        let named = |name: &str| {
-            let at = if projected {
-                batches.constraints.iter().position(|c| c.name() == name)
-            } else {
-                batches.list.iter().position(|b| b.name() == name)
-            };
-            at.map(kind)
-        };
+        let [hinges, isometric, membranes, areas, woven, creases] = surfaces.map(|at| at.flatten().map(kind));
         let mut tears = Vec::new();
         for (index, part) in torn.iter().filter_map(|(draft, part)| Some((*places.get(*draft)?, part))) {
             let object = &objects[index];
@@ -645,10 +641,12 @@ impl Parts {
                 edges.ties(kinds[1].flatten().map(kind), &self.nonlinear.members, 0, x),
                 edges.ties(clamp, &self.linear.members, 0, x),
                 edges.ties(clamp, &self.nonlinear.members, self.linear.members.len(), x),
-                edges.ties(named(Hinge::NAME), &self.hinges, 0, x),
-                edges.ties(named(IsometricBend::NAME), &self.isometric, 0, x),
-                edges.ties(named(Membrane::NAME), &self.membranes, 0, x),
-                edges.ties(named(Area::NAME), &self.areas, 0, x),
+                edges.ties(hinges, &self.hinges, 0, x),
+                edges.ties(isometric, &self.isometric, 0, x),
+                edges.ties(membranes, &self.membranes, 0, x),
+                edges.ties(areas, &self.areas, 0, x),
+                edges.ties(woven, &self.woven, 0, x),
+                edges.ties(creases, &self.creases, 0, x),
             ];
             let count = |i: &usize| objects[*i].triangles.len();
             let blown = sails.iter().filter_map(|(batch, on)| {
@@ -733,184 +731,4 @@ fn reach(
     let links: Vec<_> = links.chain(seams.iter().map(|m| (m.nodes, 0.0))).collect();
     let held = |i: usize| state.x[i][3] == 0.0;
     objects.iter().filter_map(|draft| Tethers::new(draft.object.points.clone(), &links, &held, slack)).collect()
-}
-
-/// The batches of a force between masses.
-fn between(
-    words: Words,
-    on: Vec<Range<usize>>,
-    others: Option<Vec<Range<usize>>>,
-    masses: &Masses,
-    halos: &[(u32, f64)],
-    settings: &Settings,
-) -> Vec<Box<dyn crate::elements::Batch>> {
-    vec![match words {
-        Words::Gravitation { constant, softening, .. } => {
-            let attractor = Attractor::Mass(constant);
-            let points: Box<dyn crate::elements::Batch> =
-                Box::new(DirectSum::new(attractor, softening, settings.native, halos, on.clone(), masses));
-            if halos.is_empty() {
-                return vec![points];
-            }
-            return vec![Box::new(Halos::new(constant, softening, halos, &on, masses)), points];
-        }
-        Words::Electrostatics { constant, softening, .. } => {
-            Box::new(DirectSum::new(Attractor::Charge(-constant), softening, settings.native, &[], on, masses))
-        }
-        Words::LennardJones { epsilon, sigma, cutoff, smooth, .. } => {
-            Box::new(Near::new(LennardJones::new(epsilon, sigma, cutoff.unwrap_or(2.5 * sigma), smooth), on, others))
-        }
-        Words::Repulsion { stiffness, distance, exponent, .. } => {
-            Box::new(Near::new(Repulsion { stiffness, distance, exponent }, on, others))
-        }
-        Words::Cohesion { strength, radius, .. } => Box::new(Near::new(Cohesion { strength, radius }, on, others)),
-        Words::Viscosity { coefficient, radius, central, .. } => {
-            Box::new(Near::new(Viscosity { coefficient, radius, central }, on, others))
-        }
-        Words::Flock {
-            radius,
-            nearest,
-            view,
-            cohesion,
-            alignment,
-            separation,
-            spacing,
-            speed,
-            propulsion,
-            max_acceleration,
-            goal,
-            avoidance,
-            clearance,
-            fear,
-            fear_radius,
-            chase,
-            predator_speed,
-            ..
-        } => {
-            let habits = Habits {
-                radius,
-                nearest: nearest.unwrap_or(0) as usize,
-                view: if view < 360.0 { functions::cos((0.5 * view).to_radians()) } else { -2.0 },
-                cohesion,
-                alignment,
-                separation,
-                spacing: spacing.unwrap_or(0.5 * radius),
-                speed,
-                propulsion,
-                limit: max_acceleration.unwrap_or(0.0),
-                goals: goal.into_iter().map(|g| Goal { point: g.point.into(), strength: g.strength }).collect(),
-                avoidance,
-                clearance: clearance.unwrap_or(radius),
-                fear,
-                fear_radius: fear_radius.unwrap_or(3.0 * radius),
-                chase,
-                predator_speed: predator_speed.unwrap_or(speed),
-            };
-            Box::new(Flock::new(habits, on, others.unwrap_or_default(), masses, settings.colliders.clone()))
-        }
-        // Forces on each mass by itself, and on surfaces.
-        _ => return Vec::new(),
-    }]
-}
-
-/// Elements in the order in which they act: as forces, or as constraints.
-struct Batches {
-    rows: usize,
-    points: usize,
-    /// Inverse inertias of frames, if elements are constraints.
-    projected: Option<Vec<Real>>,
-    list: Vec<Box<dyn crate::elements::Batch>>,
-    constraints: Vec<Box<dyn Constraints>>,
-}
-
-impl Batches {
-    /// Adds springs, if there are any; `None` if one is not between rows, else the index of the batch.
-    fn springs<E: crate::elements::Pair<M, D>, Y: crate::elements::Law<P>, const M: usize, const D: usize, const P: usize>(
-        &mut self,
-        springs: &Springs<D, P>,
-    ) -> Option<Option<usize>> {
-        if springs.members.is_empty() {
-            return Some(None);
-        }
-        if let Some(inverse) = &self.projected {
-            let springs = Projected::<E, Y, 2, M, D, P>::new(self.rows, self.points, inverse, &springs.members, &springs.limits)?;
-            self.constraints.push(Box::new(springs));
-            return Some(Some(self.constraints.len() - 1));
-        }
-        self.list.push(Box::new(Pairs::<E, Y, M, D, P>::new(self.rows, &springs.members, &springs.limits)?));
-        Some(Some(self.list.len() - 1))
-    }
-
-    /// Adds elements, if there are any; `None` if a node is not a row.
-    fn add<E: Element<N, M, D>, const N: usize, const M: usize, const D: usize>(
-        &mut self,
-        members: &[Members<N, D, 0>],
-        energy_at_rest: f64,
-    ) -> Option<()> {
-        self.add_with::<E, Linear, N, M, D, 0>(members, energy_at_rest)
-    }
-
-    /// The same with a law of their own.
-    fn add_with<E: Element<N, M, D>, Y: Law<P>, const N: usize, const M: usize, const D: usize, const P: usize>(
-        &mut self,
-        members: &[Members<N, D, P>],
-        energy_at_rest: f64,
-    ) -> Option<()> {
-        if members.is_empty() {
-            return Some(());
-        }
-        if let Some(inverse) = &self.projected {
-            let elements = Projected::<E, Y, N, M, D, P>::new(self.rows, self.points, inverse, members, &[])?;
-            self.constraints.push(Box::new(elements));
-        } else {
-            let elements = Elements::<E, Y, N, M, D, P>::new(self.rows, members)?;
-            self.list.push(Box::new(elements.with_energy_at_rest(energy_at_rest)));
-        }
-        Some(())
-    }
-
-    /// Adds rods, if there are any: as constraints, chains are solved as a whole.
-    fn rods(&mut self, stretches: &[Members<3, 2, 0>], bends: &mut Vec<Members<2, 5, 0>>, limits: &[f64]) -> Option<()> {
-        let strands = self.projected.as_ref().and_then(|inverse| Strands::new(self.rows, self.points, inverse, stretches, bends, limits));
-        match strands {
-            Some(strands) => self.constraints.push(Box::new(strands)),
-            None => self.add::<StretchShear, 3, 3, 2>(stretches, 0.0)?,
-        }
-        self.add::<BendTwist, 2, 3, 5>(bends, 0.0)
-    }
-
-    /// Adds both laws of solids, if there are any; `None` if a node is not a row.
-    fn solids(&mut self, shears: &[Members<4, 9, 0>], volumes: &[Members<4, 10, 0>], energy_at_rest: [f64; 2]) -> Option<()> {
-        if self.projected.is_none() || shears.is_empty() {
-            self.add::<TetShear, 4, 9, 9>(shears, energy_at_rest[0])?;
-            return self.add::<TetVolume, 4, 1, 10>(volumes, energy_at_rest[1]);
-        }
-        self.constraints.push(Box::new(Neohookean::new(self.rows, shears, volumes, energy_at_rest[0] + energy_at_rest[1])?));
-        Some(())
-    }
-
-    /// Adds what acts on whole bodies; `None` if a node is not a row. There are some only where elements are constraints.
-    fn wholes(
-        &mut self,
-        points: &[Point],
-        closed: Vec<(String, Closed)>,
-        shapes: &[(String, Range<usize>, f64)],
-        liquids: &[(String, Range<usize>, Liquid)],
-    ) -> Option<()> {
-        for (_, Closed { triangles, target, stiffness }) in closed {
-            self.constraints.push(Box::new(Volume::new(self.points, triangles, target, stiffness)?));
-        }
-        for (_, range, kappa) in shapes {
-            let (mass, places): (Vec<f64>, Vec<_>) = points.get(range.clone())?.iter().map(|(x, _, mass, _)| (*mass, *x)).unzip();
-            self.constraints.push(Box::new(Shape::new(range.clone(), mass, &places, *kappa)?));
-        }
-        for (_, range, Liquid { spacing, bulk, viscosity }) in liquids {
-            self.constraints.push(Box::new(Density::new(range.clone(), *spacing, *bulk)));
-            if *viscosity > 0.0 {
-                let law = Newtonian { viscosity: *viscosity, spacing: *spacing };
-                self.list.push(Box::new(Near::new(law, vec![range.clone()], None)));
-            }
-        }
-        Some(())
-    }
 }

@@ -1,6 +1,7 @@
 //! Masses under forces: x'' = f(x, v, t)/m, stepped by any integrator. Points and frames, elements between them, forces
 //! on each, contact with solids.
 
+mod batches;
 mod books;
 mod build;
 mod coat;
