@@ -22,8 +22,10 @@ GRAVITY = 9.8
 CHORD = np.tan(np.radians(41.5))
 """Height over width of a strip that hangs as the cantilever test wants it."""
 STRETCHES = (1.0, 1.005, 1.01, 1.02, 1.04, 1.06, 1.08, 1.1)
-SEGMENTS = 32
+SEGMENTS = 24
 """Of a strip that hangs."""
+WIDTH = 0.025
+"""Of it [m]."""
 DISK, SUPPORT = 0.15, 0.09
 """Radii of Cusick's specimen and of the disk under it [m]."""
 EDGE = 0.0075
@@ -45,7 +47,7 @@ class Measured:
     pulled: dict[int, Floats] = field(default_factory=dict)
     """For each angle: stretches, forces per width [N/m], and those of the record."""
     hung: dict[int, tuple[float, float, float, float]] = field(default_factory=dict)
-    """For each angle: twice the bending length of B(0), overhang at 41.5 degrees of the elastica and of the simulated strip [m];
+    """For each angle: twice the bending length of B(0), overhang at 41.5 degrees of the elastica and of the simulation [m];
     B(0) [N m]."""
     coefficient: float = 0.0
     """Of the drape."""
@@ -66,7 +68,7 @@ def moment(samples: Floats, kappa: Floats) -> Floats:
     falls = b[4] < 0.8 * b[3]
     bending = np.interp(kappa, [0, 10, 20, 30, 40], [*b[:4], b[3] * 0.75 if falls else b[4]])
     found = bending * kappa
-    return np.where(kappa > 30, np.maximum(30 * b[3], b[4] * kappa), found) if falls else found
+    return np.asarray(np.where(kappa > 30, np.maximum(30 * b[3], b[4] * kappa), found)) if falls else found
 
 
 def overhang(samples: Floats, density: float, chord: float = float(CHORD)) -> float:
@@ -95,8 +97,8 @@ def overhang(samples: Floats, density: float, chord: float = float(CHORD)) -> fl
 
 
 def stress(record: Record, e: Floats) -> Floats:
-    """Stress [N/m] of the record itself for a Green strain e11, e22, 2 e12 in its axes, as [narain2012] reads it: linear in angle
-    and stretch."""
+    """Stress [N/m] of the record itself for a Green strain e11, e22, 2 e12 in its axes, as [narain2012] reads it: linear in
+    angle and stretch."""
     e11, e22, shear = e
     values, vectors = np.linalg.eigh(np.array([[e11, shear / 2], [shear / 2, e22]]))
     stretch = np.sqrt(max(1 + 2 * values[1], 0.0))
@@ -166,14 +168,15 @@ def hang(fabric: str, length: float, angle: int) -> float:
     """Height over width of the chord of a strip that hangs over an edge."""
     # A hinge stands for half a segment to either side: the clamp is half a segment before the last held masses.
     d = length / (SEGMENTS + 0.5)
-    pins = [f"vertex {i} {j}" for i in range(2) for j in range(3)]
+    rows = 2 * round(WIDTH / d / 2) + 1
+    pins = [f"vertex {i} {j}" for i in range(2) for j in range(rows)]
     sheet = {
-        "name": "strip", "size": [d * (SEGMENTS + 1), 2 * d], "resolution": [SEGMENTS + 2, 3], "pin": pins,
+        "name": "strip", "size": [d * (SEGMENTS + 1), d * (rows - 1)], "resolution": [SEGMENTS + 2, rows], "pin": pins,
         "fabric": words(fabric, angle=angle),
     }  # fmt: skip
     world = World(_scene({"substeps": 2, **LOOSE}, 12.0, sheet=[sheet]), threads=1)
     world.step(75)
-    x = world.frame["strip"]["position"].reshape(3, SEGMENTS + 2, 3)[1]
+    x = world.frame["strip"]["position"].reshape(rows, SEGMENTS + 2, 3)[rows // 2]
     return float((x[1, 2] - x[-1, 2]) / (x[-1, 0] - x[1, 0] + d / 2))
 
 
@@ -191,13 +194,13 @@ def cantilever(fabric: str, record: Record, angle: int) -> tuple[float, float, f
     return twice, exact, float(found), float(samples[0])
 
 
-def drape(fabric: Words, *, density: float | None = None, edge: float = EDGE, frames: int = 75) -> tuple[Floats, Any]:
+def drape(fabric: Words, *, edge: float = EDGE, frames: int = 75) -> tuple[Floats, Any]:
     """Points and triangles of a disk of cloth on a smaller one (Cusick's test), which holds it."""
     turn = 2 * np.pi * np.arange(96) / 96
     outline = (DISK * np.stack([np.cos(turn), np.sin(turn)], axis=1)).tolist()
     cloth = {
         "name": "cloth", "panels": [{"name": "disk", "outline": outline, "up": [0, 1, 0]}], "resolution": edge,
-        "fabric": fabric, "pin": [{"center": [0, 0, 0], "radius": SUPPORT}], **({} if density is None else {"density": density}),
+        "fabric": fabric, "pin": [{"center": [0, 0, 0], "radius": SUPPORT}],
     }  # fmt: skip
     # What is flat would stay so: a breath from one side.
     breath = {"kind": "acceleration", "value": "[0, 0, 2*sin(40*x)*cos(34*y + 1)*(1 - smoothstep(0, 0.4, t))]"}
@@ -262,8 +265,8 @@ def page(folder: Path, fabrics: list[str], *, progress: Callable[[int, int], Non
     sections = [
         Section(
             "Pulled",
-            "<p>Strips of 20 x 5 cm, cut at an angle to the warp and pulled by their clamped ends: force per width over strain. "
-            "Dots: simulated. Lines: the stress of the record, its sides free (fabrics.2).</p>",
+            "<p>Strips of 20 x 5 cm, cut at an angle to the warp and pulled by their clamped ends: force per width over "
+            "strain. Dots: simulated. Lines: the stress of the record, its sides free (fabrics.2).</p>",
             partial(_pulled, found=found),
             3.6,
             "Force per width over strain",
