@@ -11,7 +11,7 @@ from pathlib import Path
 HERE = Path(__file__).parent
 ROOT = HERE.parent
 VENV = ROOT / ".venv-bench"
-PEERS = ["devito", "jax", "numba", "phiflow", "pyamg", "scipy", "taichi"]
+PEERS = ["devito", "jax", "newton", "numba", "phiflow", "pyamg", "pypbd", "scipy", "taichi"]
 OURS = ["numpy", "typer", "rich"]
 CASES = [
     "start",
@@ -60,7 +60,7 @@ TARGETS = {
         (f"web {task}", "real time"): (1.0, "at least")
         for task in ("fluid 256² to 1e-3", "sheet 128², 10 sub-steps", "1e6 ballistic particles")
     },
-    **{(f"cloth {n}", peer): (10.0, "at least") for n in (128, 256) for peer in ("taichi", "pypbd")},
+    **{(f"cloth {n}", peer): (10.0, "at least") for n in (128, 256) for peer in ("newton", "pypbd", "taichi")},
     ("import", "import numpy"): (1.5, "at most"),
     ("help", "import numpy"): (4.0, "at most"),
 }

@@ -64,6 +64,19 @@ fn groomed_hair_is_at_rest() {
     assert!((radius / exact - 1.0).abs() < 1e-3, "{radius} {exact}");
 }
 
+/// However different a strand and the middle of its clump are: the shape at rest has no fold.
+#[test]
+fn strands_of_a_clump_have_no_folds() {
+    let sim = simulation(&format!(
+        "{BALL}[[hair]]\nname = \"h\"\non = \"ball\"\ncount = 400\nlength = 0.1\nspread = 0.45\nsegments = 12\nlean = [0, 0, -0.6]\n\
+         clump = {{ count = 100, strength = 0.3 }}\n"
+    ));
+    let cosine = |p: &[Vector]| (p[1] - p[0]).normalized().dot((p[2] - p[1]).normalized());
+    let sharpest = positions(&sim, "h").chunks(13).flat_map(|c| c.windows(3).map(cosine).collect::<Vec<_>>()).fold(1.0, f64::min);
+    println!("sharpest bend {:.0} degrees", sharpest.acos().to_degrees());
+    assert!(sharpest > 0.5, "{sharpest}");
+}
+
 #[test]
 fn roots_go_where_the_collider_goes() {
     let motion = "motion = { spin = [0, 2, 0], pivot = [0, 0, 1], keys = [{ time = 0, translate = [0.2, 0, 0] }, { time = 0.4, translate = [0, 0.3, 0], rotate = [0, 0, 60] }] }\n";

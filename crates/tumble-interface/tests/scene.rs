@@ -74,10 +74,10 @@ kind = "attraction"
         "line 13: sheet \"flag\".links.structral: unknown key; did you mean \"structural\"?",
         "line 13: sheet \"flag\".links.shear: -1 N, N/m or Pa, expected >= 0 N, N/m or Pa",
         "line 13: sheet \"flag\".links.bend.modulus: -2 N, N/m or Pa, expected >= 0 N, N/m or Pa",
-        "line 15: collider[0].shape: expected one of the keys sphere, box, plane, floor, capsule, mesh, animated_mesh, character, mannequin; did you mean \"sphere\"?",
+        "line 15: collider[0].shape: expected one of the keys sphere, box, plane, floor, capsule, lathe, mesh, animated_mesh, character, mannequin; did you mean \"sphere\"?",
         "line 16: collider[0].name: 3, expected a string",
-        "line 17: force[0].kind: missing, expected one of drag, wind, attraction, gravitation, lennard_jones, repulsion, cohesion, viscosity, flock, electrostatics, acceleration, magnetic, electric, vortex, turbulence, propulsion",
-        "line 20: force[1].kind: \"drgg\", expected one of drag, wind, attraction, gravitation, lennard_jones, repulsion, cohesion, viscosity, flock, electrostatics, acceleration, magnetic, electric, vortex, turbulence, propulsion; did you mean \"drag\"?",
+        "line 17: force[0].kind: missing, expected one of drag, wind, air, attraction, gravitation, lennard_jones, repulsion, cohesion, viscosity, flock, electrostatics, acceleration, magnetic, electric, vortex, turbulence, propulsion",
+        "line 20: force[1].kind: \"drgg\", expected one of drag, wind, air, attraction, gravitation, lennard_jones, repulsion, cohesion, viscosity, flock, electrostatics, acceleration, magnetic, electric, vortex, turbulence, propulsion; did you mean \"drag\"?",
         "line 21: force[2].gm: missing, expected a number in m³/s² or a formula or keyframes",
     ];
     assert_eq!(found, expected);

@@ -107,16 +107,14 @@ fn nearest(roots: &[(Vector, Vector)], x: Vector) -> usize {
 /// length of its pieces.
 fn drawn(own: &[Vector], middle: &[Vector], strength: f64) -> Vec<Vector> {
     let last = (own.len() - 1) as f64;
+    // Half of the way is kept apart, so that strands do not lie in each other.
+    let target = |i: usize| own[i] + (middle[i] - own[i]) * (strength * (i as f64 / last).powi(2));
     let mut out = vec![own[0]];
     for i in 1..own.len() {
-        let s = i as f64 / last;
-        // Half of the way is kept apart, so that strands do not lie in each other.
-        let target = own[i] + (middle[i] - own[i]) * (strength * s * s);
-        let before = out[i - 1];
-        let way = target - before;
-        let l = (own[i] - own[i - 1]).norm();
-        let along = if way.norm() > 1e-9 * l { way.normalized() } else { (own[i] - own[i - 1]).normalized() };
-        out.push(before + along * l);
+        // Along the drawn strand: towards its points would lead back, where pieces of full length have gone farther than they.
+        let (way, piece) = (target(i) - target(i - 1), own[i] - own[i - 1]);
+        let along = if way.norm() > 1e-9 * piece.norm() { way.normalized() } else { piece.normalized() };
+        out.push(out[i - 1] + along * piece.norm());
     }
     out
 }
