@@ -32,6 +32,7 @@ fn scenes() -> Vec<(&'static str, String, usize)> {
     let hinges = "hinge = 2e-5\nlinks = { structural = { modulus = 50, damping = 0.005 }, shear = 20 }";
     let links = "links = { structural = { modulus = 50, damping = 0.005 }, shear = 20, bend = 2 }";
     let air = "[[force]]\nkind = \"air\"\nwind = [{ kind = \"uniform\", velocity = [\"6*sin(9*t)\", 3, 2] }, { kind = \"turbulence\", strength = 2, scale = 0.3 }]\n";
+    let ripping = "tear = { strain = 0.01, spread = 0.3 }\nlinks = { structural = 60, shear = 30, bend = 1 }\nhinge = 1e-5\npin = [\"corner 0 0\", \"corner 1 1\"]";
     let torn = "links = { structural = { modulus = 20, break_strain = 0.01 }, shear = 8 }\npin = [\"corner 0 0\", \"corner 1 1\"]";
     let mut dust = String::from(
         "[[system]]\nintegrator = \"velocity_verlet\"\nsubsteps = 3\n[[force]]\nkind = \"drag\"\nrate = 0.3\n[[particles]]\nname = \"dust\"\nposition = [",
@@ -102,6 +103,8 @@ fn scenes() -> Vec<(&'static str, String, usize)> {
         ("sheet, air, position based", sheet("method = \"position_based\"\nsubsteps = 8", links) + air, 20),
         ("sheet, air, explicit", sheet("integrator = \"rk4\"\nsubsteps = 24", links) + air, 6),
         ("sheet, air, implicit", sheet("integrator = \"implicit_euler\"", hinges) + air, 6),
+        ("sheet, ripping, position based", sheet("method = \"position_based\"\nsubsteps = 12\nself_contact.thickness = 0.004", ripping) + air, 12),
+        ("sheet, ripping", sheet("integrator = \"velocity_verlet\"\nsubsteps = 30", ripping) + air, 12),
         ("sheet, membrane", sheet("method = \"position_based\"\nsubsteps = 8", surface), 10),
         (
             "sheet, membrane, implicit",

@@ -39,7 +39,7 @@ from tumble.folder import writing
 from tumble.pictures.framing import camera
 from tumble.pictures.look import key_light
 from tumble.pictures.surfaces import normals, split
-from tumble.pictures.things import Columns, Object, Recording, colors, objects, positions, radii
+from tumble.pictures.things import Columns, Object, Recording, colors, objects, positions, radii, torn
 
 ROOT = "/scene"
 SENSOR = 0.36
@@ -51,7 +51,7 @@ TRAIL = 0.3
 SPRING = 0.25
 """Radius of springs over the radius of the masses that they join."""
 
-KNOWN = ("position", "velocity", "id", "radius", "color")
+KNOWN = ("position", "velocity", "id", "radius", "color", "triangles")
 """Columns that become something else than a primvar of their name."""
 
 Numbers = npt.NDArray[np.float32] | npt.NDArray[np.int64] | npt.NDArray[np.int32]
@@ -286,7 +286,10 @@ def _values(part: Part, columns: Columns, ways: Ways) -> Iterator[tuple[str, str
     if v is not None:
         yield "velocities", "vector3f[]", np.ascontiguousarray(np.reshape(v, (-1, 3))[chosen], dtype=np.float32)
     if part.kind == "Mesh":
-        source, triangles = part.cut or (np.arange(len(x)), part.thing.triangles)
+        now = torn(columns, part.thing)
+        if now is not None:
+            yield "faceVertexIndices", "int[]", np.ascontiguousarray(now.ravel(), dtype=np.int32)
+        source, triangles = part.cut or (np.arange(len(x)), part.thing.triangles if now is None else now)
         n = normals(x[source], triangles)
         yield "normals", "normal3f[]", np.ascontiguousarray(n[triangles.ravel()] if part.cut else n, dtype=np.float32)
     varying = _varying(part, columns)

@@ -324,6 +324,12 @@ def positions(columns: Columns, thing: Object) -> Floats:
     return np.asarray(column, dtype=float).reshape(-1, 3)
 
 
+def torn(columns: Columns, thing: Object) -> Indices | None:
+    """Triangles of a surface that tears as they are in a frame, m x 3; None for any other, whose triangles stay."""
+    column = columns.get(thing.name, {}).get("triangles")
+    return None if column is None else np.asarray(column, dtype=np.int64).reshape(-1, 3)
+
+
 def carried(thing: Object, columns: Columns, x: Floats) -> Floats:
     """Points [m] of a collider where it is in a frame: its own vertices, or turned and moved as a whole."""
     own = columns.get(thing.name, {})
@@ -547,7 +553,8 @@ class Stage:
             return [thing.strands.hair(thing.name, x, max(thing.radius, HAIR * thinnest), thing.color)]
         thing = replace(thing, radius=max(thing.radius, thinnest * (3 if len(x) < FEW else 1)))
         if thing.kind in ("sheet", "block"):
-            triangles = _without(thing.triangles, thing.links[broken])
+            now = torn(columns, thing)
+            triangles = _without(thing.triangles, thing.links[broken]) if now is None else now
             shown: list[Thing] = [self._mesh(thing, x, triangles)]
             if self.flat is not None and len(thing.links):
                 shade = (thing.color[0] * 0.35, thing.color[1] * 0.35, thing.color[2] * 0.35)

@@ -3,7 +3,7 @@
 //! moves on with the same velocity. What then hangs together by a vertex alone comes apart, too.
 //!
 //! The triangles say everything: masses, and between which rows every element acts, follow from them, so that they are all that a
-//! snapshot needs. An element of a triangle goes with it; one across an edge breaks where the edge has opened. Links along an edge
+//! snapshot needs. Strength is (cloth.3). An element of a triangle goes with it; one across an edge breaks where the edge has opened. Links along an edge
 //! are therefore two, one for each of its triangles.
 //!
 //! Source: [mueller2007], section 4.4. Differs: vertices at a rim come apart first, so that tears run on from their tips; a vertex and its
