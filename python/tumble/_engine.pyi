@@ -163,8 +163,8 @@ def write_vdb(volumes: Sequence[Mapping[str, Any]], zip: bool) -> bytes:
     half. Raises ExportError."""
 
 def load_fabric(fabric: str) -> dict[str, Any]:
-    """The record of a shipped fabric by name, or of a .toml or .json file: name, composition, source, density [kg/m²], stretching
-    [N/m] and bending [N m]. Raises SceneError."""
+    """The record of a shipped fabric by name, or of a .toml or .json file: name, composition, source, density [kg/m²],
+    stretching [N/m] and bending [N m]. Raises SceneError."""
 
 def load_mesh(path: Path) -> tuple[npt.NDArray[np.float64], npt.NDArray[np.uint32]]:
     """Vertices [file units] n x 3 and triangles m x 3 of an OBJ, PLY, STL or GLB file. Raises SceneError."""
