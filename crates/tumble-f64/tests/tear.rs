@@ -48,14 +48,15 @@ fn pieces(triangles: &[[u32; 3]]) -> usize {
 /// Both halves fly apart, along x, with a turn and some shear.
 fn fling(sim: &mut Simulation) {
     let x = positions(sim, "s");
-    let v: Vec<Vector> = x.iter().map(|x| vector(6.0 * x.x.signum() * x.x.abs().sqrt() + x.y, 0.5 - 0.7 * x.x, 0.3 * x.x * x.y)).collect();
+    let v: Vec<Vector> = x.iter().map(|x| vector(24.0 * x.x.signum() * x.x.abs().sqrt() + x.y, 0.5 - 0.7 * x.x, 0.3 * x.x * x.y)).collect();
     write(sim, "s", "velocity", &v);
 }
 
 /// A tear gives nothing and takes nothing but the energy of what has broken.
 #[test]
 fn mass_and_momentum_outlast_a_tear() {
-    for (scheme, substeps) in [("symplectic_euler", 40), ("rk4", 40), ("implicit_euler", 4), ("position_based", 10), ("dormand_prince", 1)] {
+    for (scheme, substeps) in [("symplectic_euler", 40), ("rk4", 40), ("implicit_euler", 4), ("position_based", 10), ("dormand_prince", 1)]
+    {
         let substeps = if scheme == "dormand_prince" { 1 } else { substeps };
         let mut sim = sheet(scheme, substeps, ALL, "tear = { strain = 0.3, spread = 0.2 }");
         fling(&mut sim);
@@ -79,7 +80,8 @@ fn mass_and_momentum_outlast_a_tear() {
         // 0.2 kg at some m/s; implicit schemes solve to 1e-10 of their forces, and one iteration of theirs turns by second order.
         let bound = if scheme == "implicit_euler" { 1e-6 } else { 1e-12 };
         assert!(p < bound, "{scheme}: {p:e}");
-        assert!(scheme == "implicit_euler" || scheme == "position_based" || l < 1e-10 || scheme == "symplectic_euler" && l < 1e-10, "{scheme}: {l:e}");
+        // Only the symplectic scheme keeps it to round-off, tears or not.
+        assert!(scheme != "symplectic_euler" || l < 1e-12, "{scheme}: {l:e}");
         assert!(after.kinetic + after.elastic < before.kinetic + before.elastic + 1e-6);
         // No triangle has lost its corners, and each vertex belongs to triangles that hang together.
         assert_eq!(now.len(), 2 * (SIZE - 1) * (SIZE - 1));
@@ -162,14 +164,19 @@ fn spare_vertices_run_out_and_weak_places_tear_first() {
     let mut sim = sheet("position_based", 10, "", "tear = { strain = 0.3, spare = 3 }");
     fling(&mut sim);
     assert_eq!(run(&mut sim, 20).broken, 3);
-    let mut sim = sheet("position_based", 20, "", "tear = { strain = 50, weak = [{ center = [0.2, 0.5, 0], radius = 0.2, strain = 0.05 }] }");
+    let mut sim =
+        sheet("position_based", 20, "", "tear = { strain = 50, weak = [{ center = [0.2, 0.5, 0], radius = 0.2, strain = 0.05 }] }");
     let whole = triangles(&sim);
     let start = positions(&sim, "s");
     let v: Vec<Vector> = start.iter().map(|x| vector(2.0 * x.x, 0.0, 0.0)).collect();
     write(&mut sim, "s", "velocity", &v);
     let report = run(&mut sim, 20);
     let changed: Vec<u32> = whole.iter().flatten().zip(triangles(&sim).iter().flatten()).filter(|(a, b)| a != b).map(|(a, _)| *a).collect();
-    println!("{} came apart, at corners {changed:?}; fastest {:.2} m/s", report.broken, velocities(&sim, "s").iter().map(|v| v.norm()).fold(0.0, f64::max));
+    println!(
+        "{} came apart, at corners {changed:?}; fastest {:.2} m/s",
+        report.broken,
+        velocities(&sim, "s").iter().map(|v| v.norm()).fold(0.0, f64::max)
+    );
     assert!(report.broken > 0);
     // An edge is weak if its middle is within the ball, and its ends lie no farther than half a diagonal from there.
     assert!(changed.iter().all(|i| (start[*i as usize] - vector(0.2, 0.5, 0.0)).norm() < 0.2 + 0.09));

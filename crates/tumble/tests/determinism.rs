@@ -103,7 +103,11 @@ fn scenes() -> Vec<(&'static str, String, usize)> {
         ("sheet, air, position based", sheet("method = \"position_based\"\nsubsteps = 8", links) + air, 20),
         ("sheet, air, explicit", sheet("integrator = \"rk4\"\nsubsteps = 24", links) + air, 6),
         ("sheet, air, implicit", sheet("integrator = \"implicit_euler\"", hinges) + air, 6),
-        ("sheet, ripping, position based", sheet("method = \"position_based\"\nsubsteps = 12\nself_contact.thickness = 0.004", ripping) + air, 12),
+        (
+            "sheet, ripping, position based",
+            sheet("method = \"position_based\"\nsubsteps = 12\nself_contact.thickness = 0.004", ripping) + air,
+            12,
+        ),
         ("sheet, ripping", sheet("integrator = \"velocity_verlet\"\nsubsteps = 30", ripping) + air, 12),
         ("sheet, membrane", sheet("method = \"position_based\"\nsubsteps = 8", surface), 10),
         (
