@@ -162,6 +162,12 @@ fn strip(fabric: &Fabric, length: f64, angle: f64, (n, m): (u32, u32), system: &
     let assets = Assets::default().with_fabrics(HashMap::from([("it".to_string(), fabric.clone())]));
     let mut sim = Simulation::new(scene, assets).unwrap_or_else(|e| panic!("{e}"));
     run(&mut sim, 100);
+    // Stiff strips creep for longer.
+    for _ in 0..4 {
+        if sim.ledger().speed >= 0.03 {
+            run(&mut sim, 50);
+        }
+    }
     let x = positions(&sim, "s");
     let (row, speed) = ((n + 2) as usize, sim.ledger().speed);
     // Sweeps of position-based dynamics let it creep.
@@ -227,7 +233,7 @@ fn strips_of_whole_records_hang_like_the_elastica_with_their_moments() {
             let free = elastica(length, fabric.density * G, &|m| curvature(m * 9.0 / 8.0));
             let found = strip(&fabric, length, angle, mesh, system);
             println!("{name} at {angle}, {system:?}: tangent {found:.4}, between {exact:.4} and {free:.4}");
-            // Measured: 4 % outside at most, where the record changes fast; hinges see 3/4 of the curvature only on the mean.
+            // Measured: 5.5 % outside at most, where the record changes fast; hinges see 3/4 of the curvature only on the mean.
             assert!(found > 0.94 * exact && found < 1.03 * free, "{name} at {angle}: {found} {exact} {free}");
         }
     }
