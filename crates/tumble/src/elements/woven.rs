@@ -6,6 +6,8 @@ use tumble_interface::Fabric;
 
 /// Largest Green strain up to which stretch is measured: the stretch 7/6.
 const MOST_STRAIN: f64 = 13.0 / 72.0;
+/// Strains below this count as none.
+const NO_STRAIN: f64 = 1e-12;
 /// The mean of the weight v over the way to that strain, (fabrics.5).
 const MEAN_AT_MOST: f64 = 114.8 / 169.0;
 /// Samples of bending are this far apart [1/m].
@@ -106,7 +108,9 @@ fn place<L: Lane>([e1, e2, e3]: [L; 3]) -> Place<L> {
     let (d, sum) = (e1 - e2, e1 + e2);
     let q = (d * d + e3 * e3).sqrt();
     let (g1, g2) = ((sum + q) * half, (sum - q) * half);
-    let (cos, sin) = (q.positive(d / q, zero), q.positive(e3 / q, zero));
+    // What is far below rounding counts as no strain: its inverse squared would be beyond single precision.
+    let counts = |strain: L| strain - e1.like(NO_STRAIN);
+    let (cos, sin) = (counts(q).positive(d / q, zero), counts(q).positive(e3 / q, zero));
     let dg1 = [(one + cos) * half, (one - cos) * half, sin * half];
     let most = e1.like(MOST_STRAIN);
     let g = g1.above_zero();
@@ -117,11 +121,11 @@ fn place<L: Lane>([e1, e2, e3]: [L; 3]) -> Place<L> {
     let far = most / g;
     let m = (g - most).positive(one - far * far * e1.like(1.0 - MEAN_AT_MOST), inside);
     let v = (g - most).positive(one, e1.like(6.0) * t);
-    let slope = g.positive(two * (v - m) / g, zero);
+    let slope = counts(g).positive(two * (v - m) / g, zero);
     // c = w d, with w = 1/q or, where both are stretched, (g1 + g2)/g1².
-    let w = g2.positive(sum / (g1 * g1), q.positive(one / q, zero));
-    let wq = g2.positive(zero, -(w * w));
-    let (ws, wg) = (g2.positive(one / (g1 * g1), zero), g2.positive(-(two * w) / g1, zero));
+    let w = counts(g2).positive(sum / (g1 * g1), counts(q).positive(one / q, zero));
+    let wq = counts(g2).positive(zero, -(w * w));
+    let (ws, wg) = (counts(g2).positive(one / (g1 * g1), zero), counts(g2).positive(-(two * w) / g1, zero));
     let dw = |sum: L, dq: L, dg: L| ws * sum + wq * dq + wg * dg;
     let dc = [w + d * dw(one, cos, dg1[0]), d * dw(one, -cos, dg1[1]) - w, d * dw(zero, sin, dg1[2])];
     Place { m, c: w * d, dm: [slope * dg1[0], slope * dg1[1], slope * dg1[2]], dc }
