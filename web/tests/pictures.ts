@@ -6,7 +6,7 @@ import { lab, SCENES, shipped } from "./browser.ts";
 const AT: Record<string, number> = {
   "contact/bounce": 30, "drape/sheet-on-bunny": 40, "drape/sheet-on-ball": 40, "failures/stiff-sheet": 8, "gas/bad_solver": 18, "gas/bunny": 50, "gas/fire": 45,
   "gas/plume": 60, "gas/obstacle": 50, "gas/flag_in_a_jet": 40, "gravity/galaxy": 40, "gravity/encounter": 80, "particles/waterfall": 70, "particles/fountain": 50,
-  "cloth/dress": 50, "cloth/drapes": 40, "cloth/funnel": 50, "cloth/hair-on-bunny": 8, "cloth/mannequin": 40, "cloth/pile": 24, "cloth/torn-flag": 60, "cloth/twist": 60,
+  "cloth/dress": 50, "cloth/drapes": 40, "cloth/funnel": 50, "cloth/mannequin": 40, "cloth/torn-flag": 60, "cloth/twist": 60,
   "integrators/overshoot": 5, "springs/rusty": 33, "structures/blocks": 16, "structures/others": 40, "gas/vortex_street": 100,
 };
 

@@ -190,14 +190,17 @@ export class Surface implements Layer {
     this.object.frustumCulled = false;
   }
 
-  /** New places of the vertices; `torn` are pairs of vertices across which nothing is drawn. */
-  set(position: Numbers, torn?: Set<number>): void {
+  /** New places of the vertices; `torn` are pairs of vertices across which nothing is drawn; `triangles` are those of a surface that tears. */
+  set(position: Numbers, torn?: Set<number>, triangles?: Numbers): void {
     const g = this.object.geometry;
     const p = g.getAttribute("position") as THREE.BufferAttribute;
     if (p.array.length !== position.length) return;
     p.array.set(position);
     p.needsUpdate = true;
-    if (torn?.size) {
+    if (triangles) {
+      (g.getIndex()!.array as Uint32Array).set(triangles);
+      g.getIndex()!.needsUpdate = true;
+    } else if (torn?.size) {
       const n = position.length / 3;
       const t = this.triangles;
       const whole: number[] = [];

@@ -576,7 +576,7 @@ export class Stage {
         this.add(thing.body);
       }
       const surface = thing.body as Surface;
-      surface.set(x, torn);
+      surface.set(x, torn, columns.triangles?.data);
       surface.paint(colors);
       surface.tint(colors ? [1, 1, 1] : thing.color);
       surface.object.visible = !this.look.links;
