@@ -67,8 +67,8 @@ fn nothing_acts_on_what_moves_with_the_air() {
 /// A flat sheet falls as v_t tanh(g t/v_t) with v_t = sqrt(2 sigma g/(rho C_D)), whatever its area.                 (cloth.2)
 #[test]
 fn a_flat_sheet_falls_at_terminal_velocity() {
-    let (sigma, g, rho, drag) = (0.15, 9.81, 1.2, 1.2);
-    let terminal = (2.0 * sigma * g / (rho * drag) as f64).sqrt();
+    let (sigma, g, rho, drag) = (0.15_f64, 9.81, 1.2, 1.2);
+    let terminal = (2.0 * sigma * g / (rho * drag)).sqrt();
     for (scheme, substeps, bound) in [
         ("rk4", 40, 2e-5),
         ("velocity_verlet", 40, 1e-3),
