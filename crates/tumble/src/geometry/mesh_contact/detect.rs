@@ -5,13 +5,14 @@
 //! X is where the vertices were when pairs were found. Every point of an edge or a triangle is a mean of its vertices and goes no
 //! farther than the farthest of them, so that a pair at the distance d keeps at least (1 - 2 gamma) d > 0; nothing passes through.
 //! A plane between the two features of a pair says less: `hold` only stops what goes towards it.        (contact.17)
+//! Where it is known which way a vertex is about to go, it may go gamma reach off any part of that way.  (contact.20)
 //!
-//! Source: [chen2025], whose bound is a ball; the planes are ours.
+//! Source: [chen2025], whose bound is a ball; the planes and the ways are ours.
 
 use super::crossing::crossings;
 use super::distance::{Nearest, edge_edge, point_triangle};
 use super::topology::Topology;
-use super::tree::{LEAF, Tree, around, grown, whole};
+use super::tree::{Box3, LEAF, Tree, around, grown, union, whole};
 use crate::geometry::Vector;
 use crate::math::{Real, Row, xyz64};
 use rayon::prelude::*;
@@ -67,6 +68,8 @@ pub struct Held {
 pub struct Detector {
     reach: f64,
     at: Vec<Vector>,
+    /// Where the vertices are about to go from there; empty if nowhere.
+    ways: Vec<Vector>,
     points: Tree,
     edges: Tree,
     triangles: Tree,
@@ -112,16 +115,25 @@ impl Detector {
 
     /// Finds all pairs of features nearer than `reach` [m]. `x` has a row for each vertex of the topology, at least.
     pub fn detect(&mut self, topology: &Topology, x: &[Row], reach: f64) {
+        self.detect_along(topology, x, &[], reach);
+    }
+
+    /// Finds all pairs of features that could come nearer than `reach` [m] while each vertex goes some part of its way [m]; without
+    /// ways, none moves. Rows of both for each vertex of the topology, at least.
+    pub fn detect_along(&mut self, topology: &Topology, x: &[Row], ways: &[Vector], reach: f64) {
         self.reach = if reach.is_finite() { reach.max(0.0) } else { 0.0 };
         self.start.clear();
         self.pairs.clear();
         let n = topology.vertices();
-        if x.len() < n {
+        if x.len() < n || ways.len() < n && !ways.is_empty() {
             self.bounds = vec![0.0; n];
             return;
         }
         self.at.resize(n, Vector::default());
         self.at.par_iter_mut().zip(x).with_min_len(CHUNK).for_each(|(p, x)| *p = xyz64(*x));
+        // A way that is not finite is none.
+        self.ways.clear();
+        self.ways.extend(ways.iter().take(n).map(|w| if w.norm_sq().is_finite() { *w } else { Vector::default() }));
         self.fit(topology);
         let point_triangle = self.with_triangles(topology);
         let edge_edge = self.with_edges(topology);
@@ -138,15 +150,13 @@ impl Detector {
 
     /// Fits the trees to the positions.
     fn fit(&mut self, topology: &Topology) {
-        let at = &self.at;
+        let (at, ways) = (&self.at, &self.ways);
         let finite = |p: &Vector| p.norm_sq().is_finite();
         let origin = topology.points().iter().map(|v| at[*v as usize]).find(finite).unwrap_or_default();
-        let points = topology.points();
-        self.points.fit(points.len(), |i| around([at[points[i as usize] as usize]], origin));
-        let edges = topology.edges();
-        self.edges.fit(edges.len(), |i| around(Self::two(edges[i as usize], at), origin));
-        let triangles = topology.triangles();
-        self.triangles.fit(triangles.len(), |i| around(Self::three(triangles[i as usize], at), origin));
+        let (points, edges, triangles) = (topology.points(), topology.edges(), topology.triangles());
+        self.points.fit(points.len(), |i| swept([points[i as usize]], at, ways, origin));
+        self.edges.fit(edges.len(), |i| swept(edges[i as usize], at, ways, origin));
+        self.triangles.fit(triangles.len(), |i| swept(triangles[i as usize], at, ways, origin));
     }
 
     /// Where some vertices are. Not `array::map`, which would be a call.
@@ -200,7 +210,8 @@ impl Detector {
         rest: impl Fn(&[Vector]) -> f64,
         found: &mut Vec<Pair>,
     ) {
-        if near.distance_sq >= self.reach * self.reach || near.distance_sq.is_nan() || self.is_tangled(kind, vertices) {
+        let far = self.ways.is_empty() && near.distance_sq >= self.reach * self.reach;
+        if far || near.distance_sq.is_nan() || self.is_tangled(kind, vertices) {
             return;
         }
         let distance = near.distance_sq.sqrt();
@@ -214,7 +225,7 @@ impl Detector {
             };
         }
         let n = n.tamed().normalized();
-        if !n.norm_sq().is_finite() {
+        if !n.norm_sq().is_finite() || distance - self.approach(kind, vertices, n) >= self.reach {
             return;
         }
         found.push(Pair {
@@ -225,6 +236,27 @@ impl Detector {
             distance: distance as Real,
             thickness: topology.thickness(vertices[0], vertices[3], rest) as Real,
         });
+    }
+
+    /// How far the features of a pair could come towards each other along a direction from the second to the first [m].
+    #[inline(always)]
+    fn approach(&self, kind: Kind, vertices: [u32; 4], n: Vector) -> f64 {
+        if self.ways.is_empty() {
+            return 0.0;
+        }
+        let [a, b, c, d] = vertices.map(|v| n.dot(self.ways[v as usize]));
+        match kind {
+            Kind::PointTriangle => b.max(c).max(d).max(0.0) - a.min(0.0),
+            Kind::EdgeEdge => c.max(d).max(0.0) - a.min(b).min(0.0),
+        }
+    }
+
+    /// The nearest place to where a vertex has gone that it was expected at: on its way.
+    #[inline(always)]
+    fn on_way(&self, v: usize, gone: Vector) -> Vector {
+        let Some(way) = self.ways.get(v) else { return Vector::default() };
+        let length_sq = way.norm_sq();
+        if length_sq > 0.0 { *way * (gone.dot(*way) / length_sq).clamp(0.0, 1.0) } else { Vector::default() }
     }
 
     fn is_tangled(&self, kind: Kind, v: [u32; 4]) -> bool {
@@ -244,7 +276,8 @@ impl Detector {
     /// The bound of each vertex. Distances that are not negative sort like their bits.
     fn bound(&mut self, n: usize) {
         self.nearest.clear();
-        self.nearest.extend((0..n).map(|_| AtomicU64::new(self.reach.to_bits())));
+        let way = |v: usize| self.ways.get(v).map_or(0.0, |w| w.norm() / GAMMA);
+        self.nearest.extend((0..n).map(|v| AtomicU64::new((self.reach + way(v)).to_bits())));
         let nearest = &self.nearest;
         let this = &*self;
         this.pairs.par_iter().with_min_len(CHUNK).for_each(|pair| {
@@ -259,7 +292,7 @@ impl Detector {
         self.bounds.extend(self.nearest.iter().map(|d| GAMMA * f64::from_bits(d.load(Relaxed))));
     }
 
-    /// Holds back every vertex that went too far from where it was when pairs were found: to a ball of gamma times the reach, and
+    /// Holds back every vertex that went too far from where it was when pairs were found: to gamma times the reach off its way, and
     /// to its side of a plane between the features of each of its pairs. What goes along or away from a plane is not held back. As
     /// long as all positions since pairs were found have passed through here, or lie between ones that have, nothing has met.
     pub fn hold(&mut self, topology: &Topology, x: &mut [Row]) -> Held {
@@ -270,9 +303,11 @@ impl Detector {
         let mut far = std::mem::take(&mut self.far);
         far.resize(n, false);
         far.par_iter_mut().enumerate().with_min_len(CHUNK).for_each(|(v, far)| {
-            let length_sq = (xyz64(x[v]) - self.at[v]).norm_sq();
+            let way = xyz64(x[v]) - self.at[v];
+            let (length_sq, radius) = (way.norm_sq(), GAMMA * self.reach);
+            let off = || !self.ways.is_empty() && (way - self.on_way(v, way)).norm_sq() > radius * radius;
             // What is not finite stays so, for others to find.
-            *far = length_sq > self.bounds[v] * self.bounds[v] && length_sq.is_finite();
+            *far = length_sq.is_finite() && (length_sq > self.bounds[v] * self.bounds[v] || off());
         });
         let held = if far.iter().any(|far| *far) { self.hold_those(topology, x, &far) } else { Held::default() };
         self.far = far;
@@ -289,7 +324,7 @@ impl Detector {
         let ways: &[Row] = x;
         let choose = |(pair, chosen): (&Pair, &mut Plane)| {
             if pair.vertices.iter().any(|v| far[*v as usize]) {
-                *chosen = self.choose(pair, ways);
+                *chosen = self.choose(pair, ways, far);
             }
         };
         self.pairs.par_iter().zip(chosen.par_iter_mut()).with_min_len(CHUNK).for_each(choose);
@@ -320,13 +355,15 @@ impl Detector {
         };
         let walls: Vec<Wall> = lists.iter().map(wall).collect();
         let radius = GAMMA * self.reach;
-        let inside = |c: Vector| c.norm_sq() <= radius * radius && walls.iter().all(|w| w.allows(c));
+        let inside = |c: Vector| (c - self.on_way(v, c)).norm_sq() <= radius * radius && walls.iter().all(|w| w.allows(c));
         let way = xyz64(*x) - self.at[v];
         if inside(way) {
             return false;
         }
         // Along each plane as far as it goes; what several planes leave over is cut to the part of the way that all allow.
-        let mut c = way * (radius / way.norm()).min(1.0);
+        let on_way = self.on_way(v, way);
+        let off = way - on_way;
+        let mut c = on_way + off * (radius / off.norm()).min(1.0);
         for w in &walls {
             c = w.slide(c);
         }
@@ -344,15 +381,18 @@ impl Detector {
         true
     }
 
-    /// The plane between the features of a pair that leaves most of the ways of its vertices.
-    fn choose(&self, pair: &Pair, x: &[Row]) -> Plane {
+    /// The plane between the features of a pair that leaves most of the ways of its vertices, and all of those that are not held.
+    fn choose(&self, pair: &Pair, x: &[Row], far: &[bool]) -> Plane {
         let way = |k: usize| {
             let v = pair.vertices[k] as usize;
             xyz64(x[v]) - self.at[v]
         };
         let ways = [way(0), way(1), way(2), way(3)];
         let part = |plane: &Plane| {
-            let part = |k: usize| plane.wall(pair, k).part(ways[k]);
+            let part = |k: usize| {
+                let part = plane.wall(pair, k).part(ways[k]);
+                if part < 1.0 && !far[pair.vertices[k] as usize] { -1.0 } else { part }
+            };
             part(0).min(part(1)).min(part(2)).min(part(3))
         };
         let mut best = self.plane(pair, 0, &ways);
@@ -514,6 +554,13 @@ pub fn truncate(at: &[Vector], x: &mut [Row], bounds: &[f64]) -> usize {
         1
     };
     at.par_iter().zip(x).zip(bounds).with_min_len(CHUNK).map(one).sum()
+}
+
+/// A box around where vertices are and are about to go.
+#[inline(always)]
+fn swept<const N: usize>(vertices: [u32; N], at: &[Vector], ways: &[Vector], origin: Vector) -> Box3 {
+    let here = around(vertices.map(|v| at[v as usize]), origin);
+    if ways.is_empty() { here } else { union(&here, &around(vertices.map(|v| at[v as usize] + ways[v as usize]), origin)) }
 }
 
 /// Calls `f` for all features i of `from` and j of `with` whose boxes are nearer than `reach`. In a tree with ITSELF each two come

@@ -67,8 +67,9 @@ pub(super) fn around<const N: usize>(points: [Vector; N], origin: Vector) -> Box
     b
 }
 
+/// The box around two boxes.
 #[inline(always)]
-fn union(a: &Box3, b: &Box3) -> Box3 {
+pub(super) fn union(a: &Box3, b: &Box3) -> Box3 {
     let mut u = *a;
     for k in 0..3 {
         u[0][k] = u[0][k].min(b[0][k]);
