@@ -324,6 +324,57 @@ fn truncation_brings_back_what_went_too_far() {
     }
 }
 
+/// Where it is known which way all go, long ways are free, any parts of them and what leaves them are safe, and what goes
+/// together is no pair.                                                                                          (contact.20)
+#[test]
+fn nothing_passes_beside_the_ways() {
+    let mut random = Numbers::new(29);
+    let mut detector = Detector::new();
+    let (mut held, mut free) = (0, 0);
+    for trial in 0..400 {
+        let (topology, mut x) = soup(trial, 10, 0.8);
+        for _ in 0..12 {
+            let together = random.vector() * 0.5;
+            let ways: Vec<Vector> = (0..x.len()).map(|_| together + random.vector() * 0.2).collect();
+            detector.detect_along(&topology, &x, &ways, 0.1);
+            // Some go on, some are stopped, some are thrown about.
+            let part = |random: &mut Numbers, w: &Vector| match random.next() {
+                r if r < -0.5 => *w,
+                r if r < 0.0 => Vector::default(),
+                r if r < 0.5 => *w * r,
+                _ => *w * 0.5 + random.vector() * 0.3,
+            };
+            let parts: Vec<Vector> = ways.iter().map(|w| part(&mut random, w)).collect();
+            let mut next = moved(&x, &parts, 1.0);
+            let before = next.clone();
+            held += detector.hold(&topology, &mut next).held;
+            free += next.iter().zip(&before).filter(|(a, b)| a == b).count();
+            let parts: Vec<Vector> = (0..x.len() as u32).map(|v| at(&next, v) - at(&x, v)).collect();
+            for part in [0.5, 1.0] {
+                assert_eq!(intersections(&topology, &moved(&x, &parts, part)), []);
+            }
+            x = next;
+        }
+    }
+    assert!(held > 10_000 && free > 10_000, "{held} held, {free} free");
+    // Two layers 3 cm apart that fall 1.5 cm: of that the upper one comes nearer if the lower one is stopped, to no less than 1 cm.
+    let (mut x, lower) = sheet(3, 0, |u, v| vector(u, v, 0.0));
+    let (above, upper) = sheet(3, 16, |u, v| vector(u, v, 0.03));
+    x.extend(above);
+    let mut topology = Topology::new(x.len());
+    topology.add(THIN, &[lower, upper].concat(), &[], &[]);
+    let fall = |lower: f64, upper: f64| (0..32).map(|v| vector(0.0, 0.0, if v < 16 { lower } else { upper })).collect::<Vec<Vector>>();
+    let pairs = |detector: &mut Detector, ways: &[Vector]| {
+        detector.detect_along(&topology, &x, ways, 0.01);
+        detector.pairs().len()
+    };
+    assert_eq!(pairs(&mut detector, &fall(-0.015, -0.015)), 0);
+    assert!(pairs(&mut detector, &fall(0.0, -0.021)) > 0);
+    let mut next = moved(&x, &fall(-0.015, -0.015), 1.0);
+    pairs(&mut detector, &fall(-0.015, -0.015));
+    assert_eq!(detector.hold(&topology, &mut next), Held::default());
+}
+
 /// Held by planes, any motion is safe, again and again; along and away from each other layers are free.          (contact.17)
 #[test]
 fn nothing_passes_what_holds() {

@@ -9,12 +9,13 @@ use common::{Vector, list, positions, run, simulation, step, vector, velocities}
 use tumble_f64::elements::{
     Constraints, Distance, Hinge, Limit, Linear, Members, Neohookean, Nonlinear, Projected, Projection, StretchShear, rest_matrix,
 };
+use tumble_f64::geometry::Walls;
 use tumble_f64::math::{Row, ZERO};
 use tumble_f64::scene::Simulation;
 use tumble_interface::Engine;
 
 fn step_of(h: f64, iteration: u32, iterations: u32, before: &[Row]) -> Projection<'_> {
-    Projection { h, before, iteration, iterations, plain: None }
+    Projection { h, before, iteration, iterations, plain: None, walls: Walls::default() }
 }
 
 type Springs = Projected<Distance, Linear, 2, 1, 1, 0>;

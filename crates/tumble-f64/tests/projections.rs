@@ -5,6 +5,7 @@ mod common;
 
 use common::Numbers;
 use tumble_f64::elements::{Constraints, Distance, Linear, Members, Projected, Projection};
+use tumble_f64::geometry::Walls;
 use tumble_f64::math::Row;
 
 /// Points of a chain that is bent everywhere, so that no two constraints are parallel.
@@ -40,7 +41,7 @@ impl Chain {
     fn project(&mut self, d: &Displacement, sweeps: usize) -> Displacement {
         let mut x: Vec<Row> =
             self.rest.iter().zip(d).map(|(r, d)| [r[0] + SMALL * d[0], r[1] + SMALL * d[1], r[2] + SMALL * d[2], r[3]]).collect();
-        let step = Projection { h: 1.0, before: &[], iteration: 0, iterations: 1, plain: None };
+        let step = Projection { h: 1.0, before: &[], iteration: 0, iterations: 1, plain: None, walls: Walls::default() };
         (0..sweeps).for_each(|_| self.links.project(&mut x, &step));
         x.iter().zip(&self.rest).map(|(x, r)| [0, 1, 2].map(|a| (x[a] - r[a]) / SMALL)).collect()
     }

@@ -7,6 +7,7 @@ mod common;
 
 use common::{Vector, positions, run, simulation, vector};
 use tumble_f64::elements::{Constraints, Element, Members, Projection, Strands, StretchShear};
+use tumble_f64::geometry::Walls;
 use tumble_f64::math::rotation::from_z_to;
 use tumble_f64::math::{Quat, Row};
 use tumble_f64::scene::Simulation;
@@ -150,7 +151,8 @@ impl Beam {
                 let way = push(i) * (h * h * self.x[i][3]);
                 self.x[i] = [self.x[i][0] + way.x, self.x[i][1] + way.y, self.x[i][2] + way.z, self.x[i][3]];
             }
-            self.rod.project(&mut self.x, &Projection { h, before: &[], iteration: 0, iterations: 1, plain: None });
+            self.rod
+                .project(&mut self.x, &Projection { h, before: &[], iteration: 0, iterations: 1, plain: None, walls: Walls::default() });
         }
     }
 

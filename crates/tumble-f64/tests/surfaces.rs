@@ -11,12 +11,13 @@ use std::sync::Arc;
 use tumble_f64::elements::{
     Constraints, Element, IsometricBend, Linear, Members, Membrane, Projected, Projection, Shape, Volume, enclosed,
 };
+use tumble_f64::geometry::Walls;
 use tumble_f64::math::{Row, rotation, xyz};
 use tumble_f64::scene::Simulation;
 use tumble_interface::{Engine, Mesh, Scene};
 
 fn step_of(h: f64, iteration: u32, iterations: u32) -> Projection<'static> {
-    Projection { h, before: &[], iteration, iterations, plain: None }
+    Projection { h, before: &[], iteration, iterations, plain: None, walls: Walls::default() }
 }
 
 fn rows(x: &[Vector], w: &[f64]) -> Vec<Row> {
@@ -256,7 +257,7 @@ fn a_projected_volume_moves_as_computed_by_hand() {
     let mut soft = Volume::new(4, triangles.clone(), 0.2, k).unwrap();
     let mut moved = rows(&x, &[1.0, 2.0, 3.0, 0.0]);
     let over: f64 = 1.0 / 6.0 - 0.2;
-    assert!((soft.energy(&moved) - 0.5 * k * over * over).abs() < 1e-15);
+    assert!((soft.energy(&moved, Walls::default()) - 0.5 * k * over * over).abs() < 1e-15);
     soft.project(&mut moved, &step_of(h, 0, 2));
     // Weight (3 + 2 + 3 + 0)/36, alpha = 1/(k h²) = 2.5.
     let lambda = -over / (8.0 / 36.0 + 2.5);
@@ -306,7 +307,7 @@ fn a_deformed_shape_comes_back_and_keeps_its_momenta() {
     for (kappa, part) in [(f64::INFINITY, 1.0), (kappa, kappa * h * h / (1.0 + kappa * h * h))] {
         let mut shape = Shape::new(0..30, mass.clone(), &rest, kappa).unwrap();
         let mut moved = rows(&x, &w);
-        let energy = shape.energy(&moved);
+        let energy = shape.energy(&moved, Walls::default());
         shape.project(&mut moved, &step_of(h, 0, 1));
         let d: Vec<Vector> = moved.iter().zip(&x).map(|(row, x)| xyz(*row) - *x).collect();
         let (mut p, mut l, mut size) = (Vector::default(), Vector::default(), 0.0);
@@ -318,7 +319,7 @@ fn a_deformed_shape_comes_back_and_keeps_its_momenta() {
         assert!(size > 3.0 && p.norm() < 1e-13 * size && l.norm() < 1e-13 * size, "{p:?} {l:?} {size}");
         if kappa.is_finite() {
             // Implicit Euler is solved in one step: the deformation is what is left of it, and a second sweep finds nothing to do.
-            let left = shape.energy(&moved) / energy;
+            let left = shape.energy(&moved, Walls::default()) / energy;
             assert!((left - (1.0 - part) * (1.0 - part)).abs() < 1e-13, "{left}");
             let mut twice = rows(&x, &w);
             (0..2).for_each(|i| shape.project(&mut twice, &step_of(h, i, 2)));

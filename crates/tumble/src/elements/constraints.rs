@@ -5,6 +5,7 @@
 
 use super::list::Members;
 use super::{Compliance, Element, Law, corrected, energy, project};
+use crate::geometry::Walls;
 use crate::math::parallel::fold;
 use crate::math::simd::{Index, Kernel, Width, count, dispatch, packs};
 use crate::math::{Lane, Quat, Real, Row, xyz};
@@ -18,7 +19,7 @@ mod shape;
 mod strands;
 mod volume;
 
-pub use density::{Density, spline};
+pub use density::{Density, behind, spline};
 pub use neohookean::Neohookean;
 pub use shape::Shape;
 pub use strands::Strands;
@@ -42,6 +43,8 @@ pub struct Projection<'a> {
     pub iterations: u32,
     /// Of plain elements, whatever their stiffness, the share of the error that a sweep takes back.
     pub plain: Option<Real>,
+    /// What liquids meet, at its end.
+    pub walls: Walls<'a>,
 }
 
 /// Elements of one kind that are projected.
@@ -55,7 +58,7 @@ pub trait Constraints: Send + Sync {
         self.len() == 0
     }
     /// Potential energy [J], zero at rest; nothing of rigid elements.
-    fn energy(&self, x: &[Row]) -> f64;
+    fn energy(&self, x: &[Row], walls: Walls<'_>) -> f64;
     /// Corrects points and frames once, element by element; x[i][3] are inverse masses of points.
     fn project(&mut self, x: &mut [Row], step: &Projection<'_>);
     /// Adds the stiffness with which the elements hold each row [N/m].
@@ -415,7 +418,7 @@ impl<E: Element<N, M, D>, Y: Law<P>, const N: usize, const M: usize, const D: us
         self.columns.len()
     }
 
-    fn energy(&self, x: &[Row]) -> f64 {
+    fn energy(&self, x: &[Row], _: Walls<'_>) -> f64 {
         self.columns.check(x);
         let (columns, kind) = (&self.columns, PhantomData::<(E, Y)>);
         fold(self.len(), |range| dispatch(Energies { columns, range, x, kind })).into_iter().sum()

@@ -52,6 +52,36 @@ pub struct Impact {
     pub velocity: Vector,
 }
 
+/// Solids at a time.
+#[derive(Debug, Clone, Copy, Default)]
+pub struct Walls<'a> {
+    /// The solids.
+    pub colliders: &'a [Collider],
+    /// The time [s].
+    pub t: f64,
+}
+
+impl Walls<'_> {
+    /// Calls `f` with the distance [m] of p from where masses are stopped, and the direction away from there, of every surface that is
+    /// nearer than `within` [m]: of a solid the nearest one, of a container up to three, as if each were flat. Solids count as having a
+    /// thickness of at least `thickness` [m].
+    pub fn near(&self, p: Vector, thickness: f64, within: f64, mut f: impl FnMut(f64, Vector)) {
+        for collider in self.colliders {
+            let (mut from, thickness) = (p, thickness.max(collider.thickness));
+            for _ in 0..if collider.inside { 3 } else { 1 } {
+                let reach = within + thickness;
+                let (distance, normal) = collider.distance(from, self.t, reach);
+                if distance >= reach || normal.norm_sq() == 0.0 {
+                    break;
+                }
+                f(distance - thickness + normal.dot(p - from), normal);
+                // Where that surface is out of reach, whatever the rounding.
+                from = from + normal * (1.01 * reach - distance);
+            }
+        }
+    }
+}
+
 impl Collider {
     fn at(&self, t: f64) -> Option<(Pose, Twist)> {
         self.motion.as_ref().map(|m| m.at(t))

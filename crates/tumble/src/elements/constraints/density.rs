@@ -3,19 +3,36 @@
 //!   C_i = V sum_j W(|x_i - x_j|) - 1 <= 0,   W = (a³/4 - b³)/(pi s³),   a = max(0, 2 - r/s), b = max(0, 1 - r/s)   (liquids.1, liquids.2)
 //!
 //! V = s³ [m³] is a particle's share of a liquid at rest, s [m] the spacing. All particles are corrected at once from where they were, by
-//! half of what each alone would need (liquids.5): more would overshoot. Positive pressure only, so that surfaces are free.
+//! half of what each alone would need (liquids.5): more would overshoot. Positive pressure only, so that surfaces are free. Behind a
+//! wall the liquid goes on, at rest, so that a particle at a wall has what it has inside                       (liquids.7).
 //! Source: [macklin2013]. Differs: compliance instead of a mixture of forces, masses in the weights, no tensile term; viscosity is a force.
 //! Verified in `tests/liquids.rs`.
 
 use super::{Constraints, Projection};
-use crate::geometry::{Meet, Neighbours};
+use crate::geometry::{Meet, Neighbours, Vector, Walls};
 use crate::math::parallel::{chunks, sum};
-use crate::math::{Lane, Real, Row};
+use crate::math::{Lane, Real, Row, xyz64};
 use std::f64::consts::PI;
 use std::ops::Range;
 
 /// What a sweep takes back of what each particle alone would need.                                   (liquids.5)
 const PART: Real = 0.5;
+
+/// How far beyond the outermost layer of particles, half a spacing off a wall, the liquid behind it begins, over s: that layer of a cubic
+/// lattice misses a neighbouring one, 3/20 of its density, and `behind` of this is that.
+const BEGINS: f64 = 0.5825604019819524;
+
+/// Of what lies beyond a plane at the distance q s >= 0: the part of all W, minus its slope over q, and s² V times the integral of
+/// |grad W|².                                                                                          (liquids.7)
+pub fn behind(q: f64) -> [f64; 3] {
+    let (a, b) = ((2.0 - q).max(0.0), (1.0 - q).max(0.0));
+    let (a4, b4) = (a * a * a * a, b * b * b * b);
+    let part = a4 * a * (3.0 - a) / 60.0 - b4 * b * (3.0 - 2.0 * b) / 30.0;
+    let less = a4 * (5.0 - 2.0 * a) / 20.0 - b4 * (5.0 - 4.0 * b) / 10.0;
+    let mixed = b4 * (1.0 / 12.0 + b * (1.0 / 20.0 - b * (1.0 / 30.0 + b / 42.0)));
+    let inner = 2.0 * b4 * b * b * (1.0 / 30.0 - b / 42.0) - mixed;
+    [part, less, (1.125 * a4 * a * a * (1.0 / 15.0 - a / 42.0) + 9.0 * inner) / PI]
+}
 
 /// pi s³ W and minus pi s⁴ dW/dr at r = q s: the cubic spline of [monaghan1992], 0 beyond q = 2.
 #[inline(always)]
@@ -35,6 +52,8 @@ pub struct Density {
     sums: Vec<[Real; 5]>,
     pushed: Vec<[Real; 4]>,
     moves: Vec<[Real; 3]>,
+    /// What walls add to the density of each, s times its gradient, and what they would add to the last of the sums over others.
+    against: Vec<[Real; 5]>,
     /// Multipliers so far, and what this sweep adds.
     lambda: Vec<Real>,
     delta: Vec<Real>,
@@ -94,6 +113,7 @@ impl Density {
             sums: Vec::new(),
             pushed: Vec::new(),
             moves: Vec::new(),
+            against: Vec::new(),
             lambda: Vec::new(),
             delta: Vec::new(),
         }
@@ -105,11 +125,34 @@ impl Density {
         grid.sorted(|i| x[i], points);
         grid.gather(&Sums { inverse: 1.0 / self.spacing }, points, sums);
     }
+
+    /// What walls add. Where several are near, the liquid between them is what none of them takes.
+    fn lean(&self, x: &[Row], walls: Walls<'_>, against: &mut Vec<[Real; 5]>) {
+        against.clear();
+        against.resize(x.len(), [0.0; 5]);
+        if walls.colliders.is_empty() {
+            return;
+        }
+        let s = self.spacing;
+        chunks(against, |start, against| {
+            for (against, x) in against.iter_mut().zip(&x[start..]) {
+                let (mut free, mut slope, mut stiff) = (1.0, Vector::default(), 0.0);
+                walls.near(xyz64(*x), 0.5 * s, 2.0 * s, |distance, normal| {
+                    // Deeper there is no more than that.
+                    let [part, less, squares] = behind((distance / s + BEGINS).max(0.0));
+                    stiff += squares;
+                    slope = slope * (1.0 - part) - normal * (free * less);
+                    free *= 1.0 - part;
+                });
+                *against = [1.0 - free, slope.x, slope.y, slope.z, stiff * f64::from(x[3])].map(|c| c as Real);
+            }
+        });
+    }
 }
 
-/// C of sums: with the particle's own share, V W(0) = 1/pi.
-fn excess(sums: &[Real; 5]) -> Real {
-    sums[0] + (1.0 / PI - 1.0) as Real
+/// C of sums and of what walls add: with the particle's own share, V W(0) = 1/pi.
+fn excess(sums: &[Real; 5], against: &[Real; 5]) -> Real {
+    sums[0] + (1.0 / PI - 1.0) as Real + against[0]
 }
 
 impl Constraints for Density {
@@ -121,22 +164,26 @@ impl Constraints for Density {
         self.rows.len()
     }
 
-    fn energy(&self, x: &[Row]) -> f64 {
+    fn energy(&self, x: &[Row], walls: Walls<'_>) -> f64 {
         if self.compliance == 0.0 {
             return 0.0;
         }
         let (mut grid, mut points, mut sums) = (Neighbours::new(2.0 * self.spacing), Vec::new(), Vec::new());
-        self.gather(&mut grid, &x[self.rows.clone()], &mut points, &mut sums);
-        let of = |s: &[Real; 5]| 0.5 * f64::from(excess(s)).max(0.0) * f64::from(excess(s)).max(0.0) / self.compliance;
-        sum(sums.len(), |range| sums[range].iter().map(of).sum())
+        let (x, mut against) = (&x[self.rows.clone()], Vec::new());
+        self.gather(&mut grid, x, &mut points, &mut sums);
+        self.lean(x, walls, &mut against);
+        let of = |i: usize| grid.place(i).map_or(0.0, |place| f64::from(excess(&sums[place], &against[i])).max(0.0));
+        sum(x.len(), |range| range.map(|i| 0.5 * of(i) * of(i) / self.compliance).sum())
     }
 
     fn project(&mut self, x: &mut [Row], step: &Projection<'_>) {
         let rows = &mut x[self.rows.clone()];
         let mut grid = std::mem::take(&mut self.grid);
         let (mut points, mut sums) = (std::mem::take(&mut self.points), std::mem::take(&mut self.sums));
+        let mut against = std::mem::take(&mut self.against);
         self.gather(&mut grid, rows, &mut points, &mut sums);
-        (self.grid, self.points, self.sums) = (grid, points, sums);
+        self.lean(rows, step.walls, &mut against);
+        (self.grid, self.points, self.sums, self.against) = (grid, points, sums, against);
         if step.iteration == 0 || self.lambda.len() != rows.len() {
             self.lambda.clear();
             self.lambda.resize(rows.len(), 0.0);
@@ -146,17 +193,18 @@ impl Constraints for Density {
         let spacing = self.spacing as Real;
         let alpha = if step.plain.is_some() { 0.0 } else { (self.compliance / (step.h * step.h)) as Real * spacing * spacing };
         let part = PART * step.plain.unwrap_or(1.0);
-        let (grid, sums, lambda, own) = (&self.grid, &self.sums, &self.lambda, &*rows);
+        let (grid, sums, lambda, own, against) = (&self.grid, &self.sums, &self.lambda, &*rows, &self.against);
         chunks(&mut self.delta, |start, delta| {
             for (k, delta) in delta.iter_mut().enumerate() {
                 let i = start + k;
                 *delta = 0.0;
                 if let Some(place) = grid.place(i) {
-                    let s = &sums[place];
-                    let weight = own[i][3] * (s[1] * s[1] + s[2] * s[2] + s[3] * s[3]) + s[4] + alpha;
+                    let (s, w) = (&sums[place], &against[i]);
+                    let slope = [s[1] + w[1], s[2] + w[2], s[3] + w[3]];
+                    let weight = own[i][3] * (slope[0] * slope[0] + slope[1] * slope[1] + slope[2] * slope[2]) + s[4] + w[4] + alpha;
                     if weight > 0.0 {
                         // Never a pull: the multiplier stays at or below 0.
-                        let next = lambda[i] - part * (excess(s) + alpha * lambda[i]) / weight;
+                        let next = lambda[i] - part * (excess(s, w) + alpha * lambda[i]) / weight;
                         *delta = next.min(0.0) - lambda[i];
                     }
                 }
@@ -168,12 +216,12 @@ impl Constraints for Density {
         let delta = &self.delta;
         self.grid.sorted(|i| [own[i][0], own[i][1], own[i][2], delta[i]], &mut self.pushed);
         self.grid.gather(&Moves { inverse: 1.0 / self.spacing }, &self.pushed, &mut self.moves);
-        let (grid, moves) = (&self.grid, &self.moves);
+        let (grid, moves, against, delta) = (&self.grid, &self.moves, &self.against, &self.delta);
         chunks(rows, |start, rows| {
             for (k, row) in rows.iter_mut().enumerate() {
                 if let Some(place) = grid.place(start + k) {
-                    let (m, c) = (moves[place], row[3] * spacing);
-                    *row = [row[0] + m[0] * c, row[1] + m[1] * c, row[2] + m[2] * c, row[3]];
+                    let (m, c, w, d) = (moves[place], row[3] * spacing, against[start + k], delta[start + k]);
+                    *row = [row[0] + (m[0] + w[1] * d) * c, row[1] + (m[1] + w[2] * d) * c, row[2] + (m[2] + w[3] * d) * c, row[3]];
                 }
             }
         });

@@ -8,6 +8,7 @@
 
 use super::{Columns, Constraints, Members, Projection, Shared, compliance};
 use crate::elements::{Element, TetShear, TetVolume, energy, law::Linear, point};
+use crate::geometry::Walls;
 use crate::math::parallel::fold;
 use crate::math::simd::{Kernel, Scalar, Width, count, dispatch, packs};
 use crate::math::{Lane, Real, Row, Vec3};
@@ -152,7 +153,7 @@ impl Constraints for Neohookean {
         self.columns.len()
     }
 
-    fn energy(&self, x: &[Row]) -> f64 {
+    fn energy(&self, x: &[Row], _: Walls<'_>) -> f64 {
         self.columns.check(x);
         let columns = &self.columns;
         fold(self.len(), |range| dispatch(Energies { columns, range, x })).into_iter().sum::<f64>() - self.energy_at_rest

@@ -8,6 +8,7 @@
 //! Verified in `tests/surfaces.rs`.
 
 use super::{Constraints, Projection};
+use crate::geometry::Walls;
 use crate::math::parallel::{chunks, fold};
 use crate::math::{Quat, Real, Row, Vec3, xyz64};
 use std::ops::Range;
@@ -124,7 +125,7 @@ impl Constraints for Shape {
         1
     }
 
-    fn energy(&self, x: &[Row]) -> f64 {
+    fn energy(&self, x: &[Row], _: Walls<'_>) -> f64 {
         if self.kappa.is_infinite() {
             return 0.0;
         }

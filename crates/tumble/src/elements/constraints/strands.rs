@@ -11,6 +11,7 @@
 
 use super::{Constraints, Members, Projection, Shared, compliance};
 use crate::elements::{BendTwist, Element, Linear, StretchShear, corrected, energy};
+use crate::geometry::Walls;
 use crate::math::parallel::fold;
 use crate::math::simd::{Index, Kernel, Scalar, Width, dispatch};
 use crate::math::{Lane, Quat, Real, Row, Vec3, xyz};
@@ -672,7 +673,7 @@ impl Constraints for Strands {
         self.places.len()
     }
 
-    fn energy(&self, x: &[Row]) -> f64 {
+    fn energy(&self, x: &[Row], _: Walls<'_>) -> f64 {
         self.check(x);
         let one = |group: &Group| {
             let mut total = 0.0;

@@ -7,6 +7,7 @@
 //! Verified in `tests/surfaces.rs`: an icosahedron between pressure and tension, and an exact volume.
 
 use super::{Constraints, Projection};
+use crate::geometry::Walls;
 use crate::math::parallel::{CHUNK, fold};
 use crate::math::{Real, Row, Vec3, xyz64};
 use rayon::prelude::*;
@@ -81,7 +82,7 @@ impl Constraints for Volume {
         1
     }
 
-    fn energy(&self, x: &[Row]) -> f64 {
+    fn energy(&self, x: &[Row], _: Walls<'_>) -> f64 {
         if self.compliance == 0.0 {
             return 0.0;
         }

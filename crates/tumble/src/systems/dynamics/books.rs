@@ -3,6 +3,7 @@
 use super::Dynamics;
 use super::laws::Acting;
 use crate::forces::Group;
+use crate::geometry::Walls;
 use crate::integrators::stability::limits;
 use crate::math::parallel::{fold, max, sum};
 use crate::math::simd::{Kernel, Width, dispatch};
@@ -225,11 +226,12 @@ impl Dynamics {
     }
 
     /// Energy of the elastic batches, or of the others [J].
-    fn between(&self, elastic: bool) -> f64 {
+    fn between(&self, elastic: bool, t: f64) -> f64 {
         let x = &self.state.x;
         let constraints = if elastic { &self.constraints[..] } else { &[] };
+        let walls = Walls { colliders: &self.laws.colliders, t };
         let forces = self.laws.batches.iter().filter(|b| b.is_elastic() == elastic).map(|b| b.energy(x));
-        forces.chain(constraints.iter().map(|c| c.energy(x))).sum()
+        forces.chain(constraints.iter().map(|c| c.energy(x, walls))).sum()
     }
 
     pub(super) fn books(&self, t: f64) -> Ledger {
@@ -258,8 +260,8 @@ impl Dynamics {
             momentum: total.momentum.into(),
             angular_momentum: total.angular.into(),
             kinetic: total.kinetic,
-            elastic: self.between(true),
-            external: self.between(false) + self.laws.external_energy(t, x, v) - Vec3::from(self.laws.gravity).dot(total.first_moment),
+            elastic: self.between(true, t),
+            external: self.between(false, t) + self.laws.external_energy(t, x, v) - Vec3::from(self.laws.gravity).dot(total.first_moment),
             stretch,
             penetration: if touching { max(n, |range| range.flat_map(depths).fold(0.0, f64::max)).max(0.0) } else { 0.0 },
             intersections: self.layers.as_ref().map_or(0, |layers| layers.intersections(x)),
@@ -286,7 +288,7 @@ impl Dynamics {
         let reach = self.laws.colliders.iter().filter_map(|c| c.motion.as_ref()).map(|m| far(m.pivot, first)).fold(size, |a, b| a + b);
         let fastest = self.laws.colliders.iter().map(|c| c.fastest(reach)).fold(0.0, f64::max);
         let hit = 2.0 * books.mass * fastest * fastest;
-        self.scale = Scale::new(&books, fall.max(self.between(false).abs()).max(hit).max(driven), self.noise());
+        self.scale = Scale::new(&books, fall.max(self.between(false, 0.0).abs()).max(hit).max(driven), self.noise());
     }
 
     /// Energy [J] that a thing at rest may seem to hold: a thousand times what its links store because positions are rounded.

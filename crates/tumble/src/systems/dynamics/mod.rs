@@ -20,7 +20,7 @@ pub use tear::TearPart;
 
 use crate::elements::{Constraints, Limit, Linear, Projected, Projection, Tethers};
 use crate::exchange::{Exchange, Port};
-use crate::geometry::Vector;
+use crate::geometry::{Vector, Walls};
 use crate::integrators::{self, Equation, Memory, Scratch, Step, adaptive_step};
 use crate::math::parallel::{CHUNK, sum};
 use crate::math::{Real, Row, Vec3, ZERO, axpy, row, sub, xyz64};
@@ -228,7 +228,7 @@ impl Dynamics {
             let energy = |state: &State| kinetic(&state.v) + self.laws.batches.iter().map(|b| b.energy(&state.x)).sum::<f64>();
             let was = energy(&self.state);
             self.unclamped.clone_from(&self.state.x);
-            let projection = Projection { h, before: &self.unclamped, iteration: 0, iterations: 1, plain: None };
+            let projection = Projection { h, before: &self.unclamped, iteration: 0, iterations: 1, plain: None, walls: Walls::default() };
             clamp.project(&mut self.state.x, &projection);
             let inverse_h = (1.0 / h) as Real;
             let mut moved = false;

@@ -8,6 +8,7 @@
 
 use super::Dynamics;
 use crate::elements::{Constraints, Projection};
+use crate::geometry::Walls;
 use crate::integrators::Equation;
 use crate::math::parallel::{CHUNK, chunks2, max};
 use crate::math::{Quat, Real, Row, Vec3, ZERO, axpy, sub, xyz64};
@@ -46,8 +47,8 @@ impl Dynamics {
             if words.tolerance.is_some() {
                 old.clone_from(&self.state.x);
             }
-            let x = &mut self.state.x;
-            let projection = Projection { h, before: &self.before, iteration, iterations: words.iterations, plain };
+            let (x, walls) = (&mut self.state.x, Walls { colliders: &self.laws.colliders, t: t + h });
+            let projection = Projection { h, before: &self.before, iteration, iterations: words.iterations, plain, walls };
             self.constraints.iter_mut().for_each(|c| c.project(x, &projection));
             if let Some(clamp) = &mut self.clamp {
                 clamp.project(x, &projection);
