@@ -225,7 +225,7 @@ def main():
 
         def told(who, seconds, count, found, n=n):
             most, many, mean = found
-            check = f"{1e3 * seconds:.1f} ms a frame, {count} constraints, stretch {most:.3f} (99.9 %: {many:.3f}, mean {mean:.4f})"
+            check = f"{1e3 * seconds:.1f} ms a frame, {count} constraints, stretch {most:.3f} (99.9 %: {many:.3f}, mean {mean:.4f})"  # noqa: E501
             show(f"cloth {n}", who, SUBSTEPS * count / seconds, "solves/s", check)
 
         count, *found = bench_tumble(n, edges, lengths)
