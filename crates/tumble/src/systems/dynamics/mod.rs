@@ -215,8 +215,10 @@ impl Dynamics {
         }
         if !self.laws.colliders.is_empty() || self.layers.is_some() || self.integrator == Integrator::PositionBased {
             self.before.resize(self.state.x.len(), ZERO);
-            self.before_v.resize(self.state.x.len(), ZERO);
             self.before.copy_from_slice(&self.state.x);
+        }
+        if !self.laws.colliders.is_empty() {
+            self.before_v.resize(self.state.x.len(), ZERO);
             self.before_v.copy_from_slice(&self.state.v);
         }
     }
