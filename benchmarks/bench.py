@@ -23,6 +23,7 @@ CASES = [
     "flock",
     "hair",
     "cloth",
+    "contact",
     "pressure",
     "smoke",
     "heat",
@@ -61,6 +62,8 @@ TARGETS = {
         for task in ("fluid 256² to 1e-3", "sheet 128², 10 sub-steps", "1e6 ballistic particles")
     },
     **{(f"cloth {n}", peer): (10.0, "at least") for n in (128, 256) for peer in ("newton", "pypbd", "taichi")},
+    **{(f"cloth, memory, {bending}", "300 bytes"): (1.0, "at most") for bending in ("links", "isometric")},
+    ("self-contact, a particle", "6 x 24²"): (1.5, "at most"),
     ("import", "import numpy"): (1.5, "at most"),
     ("help", "import numpy"): (4.0, "at most"),
 }

@@ -39,7 +39,7 @@ pub struct System {
     /// Settings of `position_based`.
     #[serde(default)]
     pub position_based: PositionBased,
-    /// Surfaces and curves keep off themselves and each other (`position_based` only).
+    /// Surfaces and curves keep off themselves and each other: in the sweeps of `position_based`, else after each step.
     #[serde(default)]
     pub self_contact: Option<SelfContact>,
     /// The numbers of the `vicsek` method, which needs them.

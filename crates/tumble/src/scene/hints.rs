@@ -3,8 +3,7 @@
 use super::checks::{objects, place};
 use tumble_interface::check::plain;
 use tumble_interface::scene::{
-    Animated, AnimatedVector, Component, Emitter, Event, Force as Words, Integrator, Kill, Method, Particles, Scene, Shape, Source,
-    System as Plan,
+    Animated, AnimatedVector, Component, Emitter, Event, Force as Words, Kill, Method, Particles, Scene, Shape, Source, System as Plan,
 };
 
 /// What the scene says and nothing heeds.
@@ -12,13 +11,6 @@ pub fn unused(scene: &Scene, plans: &[Plan]) -> Vec<String> {
     let carried = |(kind, _, system): &(&str, &str, Option<&str>)| place(plans, kind, *system).map(|i| plans[i].method);
     let methods: Vec<Method> = objects(scene).iter().filter_map(carried).collect();
     let mut warnings = Vec::new();
-    for plan in plans.iter().filter(|plan| plan.self_contact.is_some() && plan.integrator != Integrator::PositionBased) {
-        warnings.push(format!(
-            "system \"{}\".self_contact: only position_based heeds it, and the integrator is {}",
-            plan.name,
-            plan.integrator.name()
-        ));
-    }
     if !scene.field.is_empty() && !methods.contains(&Method::Tracers) {
         warnings.push("no object is moved by a system of tracers, so that nothing follows the fields".into());
     }

@@ -603,8 +603,7 @@ impl Parts {
             }
         }
         let sewn = self.vector.members.iter().map(|m| m.nodes);
-        let layers = settings.self_contact.as_ref().filter(|_| projected);
-        let layers = layers.and_then(|words| super::layers::Layers::new(words, &objects, sewn, &state));
+        let layers = settings.self_contact.as_ref().and_then(|words| super::layers::Layers::new(words, &objects, sewn, &state));
         let coats = self.coats.into_iter().map(|(i, words)| Coat::new(objects[places[i]].points.clone(), words, &state.x)).collect();
         let placed = |on: Vec<usize>| -> Vec<usize> { on.into_iter().map(|i| places[i]).collect() };
         let rows_of = |on: &[usize]| -> Vec<Range<usize>> { on.iter().map(|i| objects[*i].points.clone()).collect() };

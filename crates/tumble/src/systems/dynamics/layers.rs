@@ -17,7 +17,8 @@ use tumble_interface::scene::SelfContact;
 const ASIDE: f64 = 0.5;
 /// That reach over the thickness, at least and at most.
 const REACH: (f64, f64) = (1.5, 8.0);
-/// Rounds in which a bad start, or what the fastest have passed, is untangled before each exchange interval.
+/// Rounds in which a bad start, or what the fastest have passed, is untangled before each exchange interval; and in which pairs are pushed apart
+/// after a step of a scheme that has no sweeps.
 const ROUNDS: usize = 4;
 
 /// Surfaces of a system, and who is near whom.
@@ -134,20 +135,36 @@ impl Dynamics {
         }
     }
 
+    /// After a step of length h [s] of a scheme without sweeps: pushes pairs apart. Velocities change by as much as positions in h.
+    pub(super) fn part_layers(&mut self, h: f64) {
+        if self.layers.is_none() {
+            return;
+        }
+        self.unclamped.clone_from(&self.state.x);
+        (0..ROUNDS).for_each(|_| self.push_apart());
+        self.take_along(h);
+    }
+
+    /// Velocities follow what has moved away from `unclamped`.
+    fn take_along(&mut self, h: f64) {
+        let Some(layers) = &self.layers else { return };
+        let inverse_h = (1.0 / h) as Real;
+        for ((x, old), v) in self.state.x.iter().zip(&self.unclamped).zip(&mut self.state.v).take(layers.topology.vertices()) {
+            let change = sub(*x, *old);
+            if change[..3] != [0.0; 3] && x[3] > 0.0 {
+                *v = axpy(*v, inverse_h, [change[0], change[1], change[2], 0.0]);
+                self.memory.ready = false;
+            }
+        }
+    }
+
     /// After a sub-step of length h [s]: holds back what would pass through something.
     pub(super) fn hold_layers(&mut self, h: f64) {
         let Some(layers) = &mut self.layers else { return };
         let x = &mut self.state.x;
         self.unclamped.clone_from(x);
-        if layers.detector.hold(&layers.topology, x).held == 0 {
-            return;
-        }
-        let inverse_h = (1.0 / h) as Real;
-        for ((x, old), v) in x.iter().zip(&self.unclamped).zip(&mut self.state.v).take(layers.topology.vertices()) {
-            let change = sub(*x, *old);
-            if change[..3] != [0.0; 3] && x[3] > 0.0 {
-                *v = axpy(*v, inverse_h, [change[0], change[1], change[2], 0.0]);
-            }
+        if layers.detector.hold(&layers.topology, x).held > 0 {
+            self.take_along(h);
         }
     }
 }

@@ -188,7 +188,7 @@ impl Dynamics {
         let (x, v) = (&self.state.x, &mut self.state.v);
         self.coats.iter_mut().for_each(|coat| coat.act(h, x, v));
         self.lead_held(t, h);
-        self.remember();
+        self.remember(h);
         self.memory.ready &= self.held.is_empty() && self.coats.is_empty();
         let mut user = self.user.take();
         let result = match &mut user {
@@ -208,12 +208,17 @@ impl Dynamics {
         Ok(())
     }
 
-    /// Keeps what contact and clamp compare with.
-    fn remember(&mut self) {
-        if !self.laws.colliders.is_empty() || self.integrator == Integrator::PositionBased {
+    /// Keeps what contact and clamp compare with in a step of at most h [s]; who may meet whom in it, for schemes that do not ask themselves.
+    fn remember(&mut self, h: f64) {
+        if self.integrator != Integrator::PositionBased {
+            self.find_pairs(h);
+        }
+        if !self.laws.colliders.is_empty() || self.layers.is_some() || self.integrator == Integrator::PositionBased {
             self.before.resize(self.state.x.len(), ZERO);
-            self.before_v.resize(self.state.x.len(), ZERO);
             self.before.copy_from_slice(&self.state.x);
+        }
+        if !self.laws.colliders.is_empty() {
+            self.before_v.resize(self.state.x.len(), ZERO);
             self.before_v.copy_from_slice(&self.state.v);
         }
     }
@@ -243,6 +248,9 @@ impl Dynamics {
                 self.memory.ready = false;
                 report.clamped += was - energy(&self.state);
             }
+        }
+        if self.integrator != Integrator::PositionBased {
+            self.part_layers(h);
         }
         if !self.laws.colliders.is_empty() {
             let heeded = self.pool.heeded();
@@ -414,7 +422,7 @@ impl Dynamics {
             let (mut done, mut last) = (0.0, dt);
             while done < dt && go_on() {
                 self.lead_held(t + done, dt - done);
-                self.remember();
+                self.remember(dt - done);
                 let (begun, left) = (done, dt - done);
                 self.witness(t + done);
                 let y = (&mut self.state.x[..], &mut self.state.v[..]);

@@ -18,7 +18,7 @@ use tumble_interface::engine::StepReport;
 use tumble_interface::scene::Projection as Kind;
 
 impl Dynamics {
-    /// A sub-step without contact, which follows; `before` and `before_v` hold where it starts from.
+    /// A sub-step without contact, which follows; `before` holds where it starts from.
     pub(super) fn project_step(&mut self, t: f64, h: f64, report: &mut StepReport) -> Result<(), StepError> {
         // Who may meet whom.
         self.find_pairs(h);

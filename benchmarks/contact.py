@@ -1,0 +1,140 @@
+"""What cloth costs beside its projections: memory of a particle, contact of layers with each other, the dress on its dancer.
+
+There is no peer in it. Shown are bytes that stay resident of a sheet of 512², with another one beside it; the time that
+self-contact adds to six layers that lie on each other, in three sizes; and frames of the shipped dress in three.
+
+python contact.py [threads [part ...]], with the parts memory, layers, dress"""
+
+import ctypes
+import sys
+import tomllib
+from math import log
+from pathlib import Path
+
+from common import THREADS, median, show
+
+FPS = 60
+SUBSTEPS = 10
+LAYERS = 6
+SIZES = (24, 48, 96)
+# Edges of the dress's triangles [m]; the last makes 20,000 of them.
+EDGES = (0.03, 0.02, 0.0141)
+
+
+def resident():
+    """Bytes of this process in memory, without what has been given back."""
+    ctypes.CDLL("libc.so.6").malloc_trim(0)
+    return int(Path("/proc/self/statm").read_text().split()[1]) * 4096
+
+
+def sheet(n, bending):
+    links = {"structural": 1e4, "shear": 2e3}
+    words = {"links": links | {"bend": 200.0}} if bending == "links" else {"links": links, "isometric": 1e-5}
+    held = {"name": "sheet", "size": [1.0, 1.0], "resolution": [n, n], "pin": ["corner 0 0", "corner 1 0"]}
+    return {
+        "version": 1,
+        "time": {"fps": FPS},
+        "system": [{"method": "position_based", "substeps": SUBSTEPS}],
+        "sheet": [held | words],
+    }
+
+
+def memory(bending, n=512):
+    import tumble
+
+    other = tumble.World(sheet(n, bending), threads=THREADS)
+    other.step(2)
+    before = resident()
+    world = tumble.World(sheet(n, bending), threads=THREADS)
+    world.step(2)
+    return (resident() - before) / n**2
+
+
+def layers(n, touching):
+    """Sheets that fall on each other and a floor, all lengths in proportion to the distance of particles."""
+    dx = 1.0 / (n - 1)
+    sheets = [
+        {
+            "name": f"s{k}",
+            "size": [1.0, 1.0],
+            "resolution": [n, n],
+            "center": [0.0, 0.0, (1.0 + 0.6 * k) * dx],
+            "rotate": [0.0, 0.0, 7.0 * k],
+            "links": {"structural": 1e3, "shear": 200.0},
+        }
+        for k in range(LAYERS)
+    ]
+    contact = {"self_contact": {"thickness": 0.5 * dx, "friction": 0.3}} if touching else {}
+    return {
+        "version": 1,
+        "time": {"fps": FPS},
+        "system": [{"method": "position_based", "substeps": SUBSTEPS} | contact],
+        "sheet": sheets,
+        "collider": [{"name": "floor", "shape": {"floor": {"height": 0.0}}, "thickness": 0.5 * dx, "friction": 0.5}],
+    }
+
+
+def frame(scene, warm):
+    """Seconds of a frame, after some, and the books."""
+    import tumble
+
+    world = tumble.World(scene, threads=THREADS)
+    world.step(warm)
+    return median(world.step), world
+
+
+def growth(sizes, seconds):
+    """Exponent with which time grows with the count, from the first to the last."""
+    return log(seconds[-1] / seconds[0]) / log(sizes[-1] / sizes[0])
+
+
+def show_memory():
+    for bending in ("links", "isometric"):
+        case = f"cloth, memory, {bending}"
+        show(
+            case,
+            "tumble",
+            memory(bending),
+            "B",
+            "a particle of a sheet of 512² with stretching, shear and bending, resident",
+        )
+        show(case, "300 bytes", 300.0, "B", "what it may be")
+
+
+def show_layers():
+    counts, costs = [], []
+    for n in SIZES:
+        together, world = frame(layers(n, True), 8)
+        apart, _ = frame(layers(n, False), 8)
+        counts.append(LAYERS * n * n)
+        costs.append(together - apart)
+        check = (
+            f"self-contact alone; {1e3 * together:.1f} ms a frame in all, {world.ledger['intersections']} intersections"
+        )
+        show(f"layers {LAYERS} x {n}²", "tumble", costs[-1], "s", check)
+    check = f"and sub-step; grows with the count to the power of {growth(counts, costs):.2f}"
+    show("self-contact, a particle", "tumble", costs[-1] / counts[-1] / SUBSTEPS, "s", check)
+    show("self-contact, a particle", f"{LAYERS} x {SIZES[0]}²", costs[0] / counts[0] / SUBSTEPS, "s", "the smallest")
+
+
+def show_dress():
+    dress = tomllib.loads((Path(__file__).parent.parent / "python/tumble/scenes/cloth/dress.toml").read_text())
+    counts, costs = [], []
+    for edge in EDGES:
+        dress["cloth"][0]["resolution"] = edge
+        seconds, world = frame(dress, 12)
+        counts.append(len(world.topology["dress"]["triangles"]))
+        costs.append(seconds)
+        books = world.ledger
+        check = (
+            f"a frame of 1/24 s, 20 sub-steps; stretch {books['stretch']:.3f}, {books['intersections']} intersections"
+        )
+        show(f"dress, {counts[-1]} triangles", "tumble", seconds, "s", check)
+    check = f"a frame; grows with the count to the power of {growth(counts, costs):.2f}"
+    show("dress, a triangle", "tumble", costs[-1] / counts[-1], "s", check)
+    show("dress, a triangle", f"{counts[0]} triangles", costs[0] / counts[0], "s", "the coarsest")
+
+
+for part, run in {"memory": show_memory, "layers": show_layers, "dress": show_dress}.items():
+    if part in (sys.argv[2:] or [part]):
+        run()
