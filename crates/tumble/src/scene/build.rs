@@ -164,6 +164,7 @@ pub fn build(scene: &Scene, assets: &Assets) -> Result<Built, SceneError> {
         };
         warnings.extend(buried(scene, &parts, &colliders));
         let mut system = parts.build(settings).map_err(|e| placed(scene, e))?;
+        warnings.extend(system.tangles());
         if exchange.ports_of(index).next().is_some() {
             system.expect_pushes();
         }
