@@ -10,7 +10,17 @@ import importlib
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from tumble._engine import ExportError, Scene, SceneError, StepError, TumbleError, World, load_fabric, load_mesh
+    from tumble._engine import (
+        ExportError,
+        Scene,
+        SceneError,
+        StepError,
+        TumbleError,
+        World,
+        load_fabric,
+        load_mesh,
+        repair_mesh,
+    )
     from tumble.run import Run
 
     __version__: str
@@ -26,6 +36,7 @@ __all__ = [
     "__version__",
     "load_fabric",
     "load_mesh",
+    "repair_mesh",
 ]
 
 # Looked up when first used: `import tumble` alone loads neither the engine nor NumPy.

@@ -57,6 +57,11 @@ class Scene:
     def folder(self) -> str:
         """Folder in which mesh files are looked for."""
 
+    @property
+    def mesh_files(self) -> list[tuple[str, int | None, str]]:
+        """The mesh files that it names: place of the name in the scene, its line or None, and the path as it stands there.
+        Files of figures are left out."""
+
     @staticmethod
     def schema() -> dict[str, Any]:
         """JSON Schema of a scene; units are under "x-unit"."""
@@ -167,7 +172,12 @@ def load_fabric(fabric: str) -> dict[str, Any]:
     stretching [N/m] and bending [N m]. Raises SceneError."""
 
 def load_mesh(path: Path) -> tuple[npt.NDArray[np.float64], npt.NDArray[np.uint32]]:
-    """Vertices [file units] n x 3 and triangles m x 3 of an OBJ, PLY, STL or GLB file. Raises SceneError."""
+    """Vertices [file units] n x 3 and triangles m x 3 of an OBJ, PLY, STL, GLB or USD file. Raises SceneError."""
+
+def repair_mesh(path: Path) -> tuple[str | None, dict[str, int]]:
+    """The mesh of a file mended, as the text of an OBJ file, or None if nothing had to be done; counts of vertices welded,
+    triangles repeated, degenerate and turned, edges split, and of edges that are still open or odd. Raises SceneError if it
+    cannot be read or nothing is left."""
 
 Side = Literal["closed"] | tuple[Literal["slope", "value", "ghost"], float]
 """Beyond a wall: no slope, a slope along the outward normal, a value at the wall, a value at the points beyond."""

@@ -60,7 +60,7 @@ fn arm() -> Character {
     };
     let quarter = [[0.0, 0.0, 0.0, 1.0], [FRAC_1_SQRT_2, 0.0, 0.0, FRAC_1_SQRT_2]];
     Character {
-        mesh: Mesh { vertices: [ring(0.0), ring(1.0), ring(2.0)].concat(), triangles },
+        mesh: Mesh { vertices: [ring(0.0), ring(1.0), ring(2.0)].concat(), triangles, ..Mesh::default() },
         joints: vec![joint("upper", None, 0.0), joint("lower", Some(0), 1.0)],
         binds: vec![bind(0, 0.0), bind(1, -1.0)],
         skin: [0.0, 0.5, 1.0].into_iter().flat_map(|a| [by(a); 3]).collect(),
@@ -275,7 +275,7 @@ fn a_point_by_the_tree_is_that_of_all_triangles() {
     let rig = rig(Moves::Walk, true, 0.5);
     let facets = rig.facets(30.0, 20.0).unwrap();
     let t = 9.3;
-    let mesh = Mesh { vertices: facets.vertices(t), triangles: facets.triangles().to_vec() };
+    let mesh = Mesh { vertices: facets.vertices(t), triangles: facets.triangles().to_vec(), ..Mesh::default() };
     let tree = Bvh::new(&mesh).unwrap();
     let middle = Vector::from(mesh.vertices[0]);
     for k in 0..200 {

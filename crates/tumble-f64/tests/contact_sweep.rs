@@ -270,7 +270,7 @@ fn plate(z: f64) -> Mesh {
         let a = k % n + (k / n) * (n + 1);
         [[a, a + 1, a + n + 2], [a, a + n + 2, a + n + 1]]
     });
-    Mesh { vertices, triangles: triangles.collect() }
+    Mesh { vertices, triangles: triangles.collect(), ..Mesh::default() }
 }
 
 fn with_meshes(text: &str, meshes: &[(&str, Mesh)]) -> Simulation {

@@ -110,8 +110,11 @@ fn roots_go_where_the_collider_goes() {
 fn hair_keeps_its_momentum_among_itself() {
     let total = |collisions: &str| {
         // On a plate that is no collider.
-        let plate =
-            Mesh { vertices: vec![[0.0; 3], [0.2, 0.0, 0.0], [0.2, 0.2, 0.0], [0.0, 0.2, 0.0]], triangles: vec![[0, 1, 2], [0, 2, 3]] };
+        let plate = Mesh {
+            vertices: vec![[0.0; 3], [0.2, 0.0, 0.0], [0.2, 0.2, 0.0], [0.0, 0.2, 0.0]],
+            triangles: vec![[0, 1, 2], [0, 2, 3]],
+            ..Mesh::default()
+        };
         let scene = format!(
             "version = 1\nprecision = \"double\"\nworld.gravity = [0, 0, 0]\n[[system]]\nmethod = \"position_based\"\n\
              [[hair]]\nname = \"h\"\nmesh.path = \"plate\"\ncount = 300\nlength = 0.1\nsegments = 10\nyoung = 1e-9\n{collisions}\n"

@@ -96,6 +96,11 @@ fn a_bad_start_is_untangled_without_launching_anything() {
          [[sheet]]\nname = \"b\"\nsize = [0.6, 0.6]\nresolution = [8, 8]\ncenter = [0.1, 0, 0.25]\nrotate = [0, 60, 20]\n{LINKS}\n"
     ));
     let start = sim.ledger().intersections;
+    let told = sim.warnings().join("\n");
+    assert!(told.contains(&format!("{start} edges pass through triangles")), "{told}");
+    // The square of b and the plane of a meet around (0.1, 0, 0).
+    let place: Vec<f64> = told.split(['[', ']']).nth(1).unwrap().split(", ").map(|x| x.parse().unwrap()).collect();
+    assert!(told.contains("passes through \"") && place[2].abs() < 0.1 && (place[0] - 0.1).abs() < 0.4 && place[1].abs() < 0.4, "{told}");
     let mut fastest = 0.0_f64;
     let mut frames = 0;
     while sim.ledger().intersections > 0 && frames < 120 {

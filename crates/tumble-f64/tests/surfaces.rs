@@ -176,7 +176,7 @@ fn icosahedron(radius: f64) -> Mesh {
         }
     }
     assert_eq!(triangles.len(), 20);
-    Mesh { vertices, triangles }
+    Mesh { vertices, triangles, ..Mesh::default() }
 }
 
 fn with_mesh(text: &str, mesh: Mesh) -> Result<Simulation, String> {

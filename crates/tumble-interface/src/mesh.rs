@@ -7,6 +7,9 @@ pub struct Mesh {
     pub vertices: Vec<[f64; 3]>,
     /// Vertex indices, counter-clockwise seen from outside.
     pub triangles: Vec<[u32; 3]>,
+    /// Texture coordinates of the corners of each triangle, v upwards, as far as the file has some; empty if it has none. A
+    /// vertex has several of them where it lies on a seam.
+    pub texture: Vec<Option<[[f64; 2]; 3]>>,
 }
 
 /// What a linter finds in a mesh.
@@ -92,6 +95,7 @@ mod tests {
         Mesh {
             vertices: vec![[0.0; 3], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]],
             triangles: vec![[0, 2, 1], [0, 1, 3], [1, 2, 3], [0, 3, 2]],
+            ..Mesh::default()
         }
     }
 

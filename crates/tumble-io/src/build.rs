@@ -10,6 +10,16 @@ pub fn fan(triangles: &mut Vec<[u32; 3]>, polygon: &[u32]) {
     }
 }
 
+/// Texture coordinates of the corners of a triangle, if all of them have some.
+pub type Texture = Option<[[f64; 2]; 3]>;
+
+/// Appends the texture coordinates of the same fan.
+pub fn texture_fan(texture: &mut Vec<Texture>, polygon: &[Option<[f64; 2]>]) {
+    if let [first, rest @ ..] = polygon {
+        texture.extend(rest.windows(2).map(|pair| Some([(*first)?, pair[0]?, pair[1]?])));
+    }
+}
+
 /// Numbers positions so that equal ones get the same number. Equal means equal bits, but -0 equals 0.
 #[derive(Default)]
 pub struct Weld {
@@ -29,9 +39,9 @@ impl Weld {
     }
 }
 
-/// Checks that the mesh is one, and drops vertices that no triangle uses.
+/// Checks that the mesh is one, and drops vertices that no triangle uses and texture coordinates that are no numbers.
 pub fn finish(mesh: Mesh) -> Result<Mesh, String> {
-    let Mesh { vertices, mut triangles } = mesh;
+    let Mesh { vertices, mut triangles, texture } = mesh;
     let n = vertices.len();
     if triangles.is_empty() {
         return Err(format!("no triangles in the file ({n} vertices); export a surface mesh, not points or curves"));
@@ -51,8 +61,13 @@ pub fn finish(mesh: Mesh) -> Result<Mesh, String> {
             }
         }
     }
+    let mut texture: Vec<Texture> =
+        texture.into_iter().map(|corners| corners.filter(|c| c.as_flattened().iter().all(|x| x.is_finite()))).collect();
+    if texture.len() != triangles.len() || texture.iter().all(Option::is_none) {
+        texture.clear();
+    }
     if used.iter().all(|used| *used) {
-        return Ok(Mesh { vertices, triangles });
+        return Ok(Mesh { vertices, triangles, texture });
     }
     let mut kept = 0;
     let mut new = vec![0; n];
@@ -64,7 +79,7 @@ pub fn finish(mesh: Mesh) -> Result<Mesh, String> {
         *i = new[*i as usize];
     }
     let vertices = vertices.into_iter().zip(used).filter_map(|(v, used)| used.then_some(v)).collect();
-    Ok(Mesh { vertices, triangles })
+    Ok(Mesh { vertices, triangles, texture })
 }
 
 /// Cure for a file whose parts contradict each other.

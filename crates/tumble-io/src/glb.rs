@@ -143,6 +143,10 @@ impl<'a> Scene<'a> {
             return Err("a primitive without POSITION; export the mesh with its vertices".to_owned());
         };
         let positions = self.column(positions.value(), Type::Vec3, &[ComponentType::F32])?;
+        // What is wrong with texture coordinates only leaves them out.
+        let texture = primitive.attributes.get(&Checked::Valid(Semantic::TexCoords(0)));
+        let texture = texture
+            .and_then(|column| self.column(column.value(), Type::Vec2, &[ComponentType::F32, ComponentType::U8, ComponentType::U16]).ok());
         let indices = [ComponentType::U8, ComponentType::U16, ComponentType::U32];
         let indices = match primitive.indices {
             Some(column) => Some(self.column(column.value(), Type::Scalar, &indices)?),
@@ -158,14 +162,24 @@ impl<'a> Scene<'a> {
             }
             numbers.push(number);
         }
-        self.add_triangles(mode, indices.as_ref(), &numbers, mirrored)
+        // In glTF v points down.
+        let texture: Vec<_> = texture.iter().flat_map(|c| (0..c.count).map(|i| [c.number(i, 0), 1.0 - c.number(i, 1)])).collect();
+        self.add_triangles(mode, indices.as_ref(), &numbers, &texture, mirrored)
     }
 
-    /// Appends the triangles of a primitive; `numbers` are those of its vertices in the mesh.
-    pub fn add_triangles(&mut self, mode: Mode, indices: Option<&Column<'_>>, numbers: &[u32], mirrored: bool) -> Result<(), String> {
+    /// Appends the triangles of a primitive; `numbers` are those of its vertices in the mesh, `texture` their texture coordinates.
+    pub fn add_triangles(
+        &mut self,
+        mode: Mode,
+        indices: Option<&Column<'_>>,
+        numbers: &[u32],
+        texture: &[[f64; 2]],
+        mirrored: bool,
+    ) -> Result<(), String> {
         let n = indices.map_or(numbers.len(), |indices| indices.count);
+        let index = |k: usize| indices.map_or(k, |indices| indices.integer(k));
         let corner = |k: usize| {
-            let i = indices.map_or(k, |indices| indices.integer(k));
+            let i = index(k);
             numbers
                 .get(i)
                 .copied()
@@ -183,6 +197,8 @@ impl<'a> Scene<'a> {
             };
             let (b, c) = if mirrored { (c, b) } else { (b, c) };
             self.mesh.triangles.push([corner(a)?, corner(b)?, corner(c)?]);
+            let at = |k: usize| texture.get(index(k)).copied();
+            self.mesh.texture.push((|| Some([at(a)?, at(b)?, at(c)?]))());
         }
         Ok(())
     }

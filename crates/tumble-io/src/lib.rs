@@ -3,8 +3,8 @@
 //!
 //! What is common to all formats of meshes: coordinates are taken as they stand in the file (no axis is turned, no unit
 //! converted); a polygon becomes the fan of triangles around its first corner, which is right for convex ones; objects,
-//! groups and materials are merged; normals, colours and textures are dropped; vertices that no triangle uses are
-//! dropped, the others keep their order. Any bytes give a mesh or a one-line message that names the cure, never a panic;
+//! groups and materials are merged; normals, colours and images are dropped, texture coordinates kept; vertices that no triangle
+//! uses are dropped, the others keep their order. Any bytes give a mesh or a one-line message that names the cure, never a panic;
 //! work and memory grow with the length of the file, not with the counts it declares (instances in a GLB have a limit).
 //! Verified by `tests/formats.rs` and `tests/fuzz.rs`.
 
@@ -13,6 +13,7 @@ mod fabric;
 mod glb;
 mod obj;
 mod ply;
+mod repair;
 mod skin;
 mod stl;
 mod vdb;
@@ -20,6 +21,8 @@ mod vdb;
 use tumble_interface::{Character, Mesh};
 
 pub use fabric::{fabric, record_is_json, shipped};
+pub use obj::write as obj;
+pub use repair::{Repairs, repair};
 pub use vdb::{Class, Volume, vdb};
 
 /// A mesh file format.
@@ -27,7 +30,8 @@ pub use vdb::{Class, Volume, vdb};
 pub enum Format {
     /// Wavefront OBJ. Vertices are the `v` lines: seams of normals or texture coordinates split nothing.
     Obj,
-    /// Stanford PLY: ASCII, binary little-endian or binary big-endian.
+    /// Stanford PLY: ASCII, binary little-endian or binary big-endian. Texture coordinates are `s`, `t` or `u`, `v` of vertices, which are
+    /// split at seams (equal positions are then welded), or lists `texcoord` of faces.
     Ply,
     /// STL, ASCII or binary. The format repeats each vertex in each triangle: equal positions are welded.
     Stl,

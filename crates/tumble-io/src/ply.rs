@@ -1,6 +1,6 @@
 //! Stanford PLY, by the crate `ply-rs-bw`. What it would believe unseen is checked first: the declared counts.
 
-use crate::build::{DAMAGED, fan};
+use crate::build::{DAMAGED, Weld, fan, texture_fan};
 use ply_rs_bw::parser::{ParseError, Parser, Reader};
 use ply_rs_bw::ply::{ElementDef, Encoding, Property, PropertyAccess, PropertyAccessResult, PropertyType, ScalarType};
 use tumble_interface::Mesh;
@@ -28,7 +28,8 @@ pub fn read(bytes: &[u8]) -> Result<Mesh, String> {
     }
 
     let mut mesh = Mesh::default();
-    let mut polygons = Vec::new();
+    let mut polygons: Vec<Polygon> = Vec::new();
+    let mut texture = Vec::new();
     let cut = |e: ParseError| {
         let text = e.to_string();
         // The parser counts rows of a binary file as lines.
@@ -45,6 +46,9 @@ pub fn read(bytes: &[u8]) -> Result<Mesh, String> {
                     return Err(format!("the vertices have no property \"{axis}\"; export x, y and z"));
                 }
                 let vertices = Parser::<Vertex>::new().read_payload_for_element(&mut reader, element, &header).map_err(cut)?;
+                if PAIRS.iter().any(|pair| pair.iter().all(|name| element.properties.contains_key(*name))) {
+                    texture = vertices.iter().map(|v| v.texture).collect();
+                }
                 mesh.vertices = vertices.into_iter().map(|v| v.position).collect();
             }
             "face" => {
@@ -61,8 +65,17 @@ pub fn read(bytes: &[u8]) -> Result<Mesh, String> {
             Some(corners) if corners.len() < 3 => {
                 return Err(format!("face {f} has {} vertices, it needs 3; {DAMAGED}", corners.len()));
             }
-            Some(corners) => fan(&mut mesh.triangles, corners),
+            Some(corners) => {
+                fan(&mut mesh.triangles, corners);
+                let own = |k: usize| Some([*polygon.texture.get(2 * k)?, *polygon.texture.get(2 * k + 1)?]);
+                let of_vertex = |i: u32| texture.get(i as usize).copied();
+                let all: Vec<_> = corners.iter().enumerate().map(|(k, i)| own(k).or_else(|| of_vertex(*i))).collect();
+                texture_fan(&mut mesh.texture, &all);
+            }
         }
+    }
+    if !texture.is_empty() {
+        weld(&mut mesh)?;
     }
     if mesh.triangles.is_empty() && header.elements.contains_key("tristrips") {
         return Err("the file has triangle strips, which are not read; export it with faces".to_owned());
@@ -99,24 +112,51 @@ fn size(scalar: &ScalarType) -> usize {
     }
 }
 
+/// Names of texture coordinates of vertices.
+const PAIRS: [[&str; 2]; 4] = [["s", "t"], ["u", "v"], ["texture_u", "texture_v"], ["texture_s", "texture_t"]];
+
+/// Vertices with texture coordinates are split at seams: equal positions become one.
+fn weld(mesh: &mut Mesh) -> Result<(), String> {
+    let mut weld = Weld::default();
+    let mut kept = Vec::new();
+    let mut numbers = Vec::with_capacity(mesh.vertices.len());
+    for x in &mesh.vertices {
+        let number = weld.number(*x, kept.len())?;
+        if number as usize == kept.len() {
+            kept.push(*x);
+        }
+        numbers.push(number);
+    }
+    let n = numbers.len();
+    for i in mesh.triangles.as_flattened_mut() {
+        let new = numbers.get(*i as usize).copied();
+        *i = new.ok_or_else(|| format!("a face uses vertex {i}, but there are {n} (counted from 0); {DAMAGED}"))?;
+    }
+    mesh.vertices = kept;
+    Ok(())
+}
+
 /// A row of `vertex`.
 struct Vertex {
     position: [f64; 3],
+    texture: [f64; 2],
 }
 
 impl PropertyAccess for Vertex {
     fn new() -> Self {
-        Self { position: [f64::NAN; 3] }
+        Self { position: [f64::NAN; 3], texture: [f64::NAN; 2] }
     }
 
     fn set_property(&mut self, name: &str, value: Property) -> PropertyAccessResult {
-        let axis = match name {
-            "x" => 0,
-            "y" => 1,
-            "z" => 2,
+        let place = match name {
+            "x" => &mut self.position[0],
+            "y" => &mut self.position[1],
+            "z" => &mut self.position[2],
+            _ if PAIRS.iter().any(|pair| pair[0] == name) => &mut self.texture[0],
+            _ if PAIRS.iter().any(|pair| pair[1] == name) => &mut self.texture[1],
             _ => return PropertyAccessResult::Ignored,
         };
-        self.position[axis] = match value {
+        *place = match value {
             Property::Char(x) => x.into(),
             Property::UChar(x) => x.into(),
             Property::Short(x) => x.into(),
@@ -135,18 +175,22 @@ impl PropertyAccess for Vertex {
 struct Polygon {
     /// `None` if there is no such property, if it is no list of integers or if one is negative.
     corners: Option<Vec<u32>>,
+    /// Texture coordinates of its corners, two by two, as far as it has some of its own.
+    texture: Vec<f64>,
 }
 
 impl PropertyAccess for Polygon {
     fn new() -> Self {
-        Self { corners: None }
+        Self { corners: None, texture: Vec::new() }
     }
 
     fn set_property(&mut self, name: &str, value: Property) -> PropertyAccessResult {
-        if !matches!(name, "vertex_indices" | "vertex_index") {
-            return PropertyAccessResult::Ignored;
+        match (name, value) {
+            ("vertex_indices" | "vertex_index", value) => self.corners = value.to_u32_list(),
+            ("texcoord" | "texcoords", Property::ListFloat(all)) => self.texture = all.into_iter().map(f64::from).collect(),
+            ("texcoord" | "texcoords", Property::ListDouble(all)) => self.texture = all,
+            _ => return PropertyAccessResult::Ignored,
         }
-        self.corners = value.to_u32_list();
         PropertyAccessResult::Set
     }
 }

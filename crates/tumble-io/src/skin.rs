@@ -172,7 +172,7 @@ impl<'a> Reader<'a> {
             }
             numbers.push(number);
         }
-        self.scene.add_triangles(mode, indices.as_ref(), &numbers, mirrored)
+        self.scene.add_triangles(mode, indices.as_ref(), &numbers, &[], mirrored)
     }
 
     fn clips(&mut self) -> Result<(), String> {

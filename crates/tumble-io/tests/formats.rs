@@ -58,6 +58,56 @@ fn every_format_rejects_the_empty_the_foreign_and_the_cut_off() {
     }
 }
 
+// ---- Texture
+
+#[test]
+fn a_garment_is_the_same_from_every_format() {
+    let skirt = skirt();
+    // Seven columns of texture on six of vertices.
+    assert_eq!((skirt.vertices.len(), split(&skirt).0.len()), (12, 14));
+    let files = [
+        (tumble_io::obj(&skirt).into_bytes(), Format::Obj),
+        (ply_textured(&skirt, ["s", "t"]), Format::Ply),
+        (ply_textured(&skirt, ["u", "v"]), Format::Ply),
+        (ply_textured(&skirt, ["texture_u", "texture_v"]), Format::Ply),
+        (ply_wedges(&skirt), Format::Ply),
+        (glb_textured(&skirt), Format::Glb),
+    ];
+    for (i, (bytes, format)) in files.iter().enumerate() {
+        assert_eq!(mesh(bytes, *format).unwrap(), skirt, "{i}");
+    }
+    // STL has no texture.
+    assert!(mesh(&stl_ascii(&skirt), Format::Stl).unwrap().texture.is_empty());
+    assert!(mesh(&obj(), Format::Obj).unwrap().texture.is_empty());
+}
+
+#[test]
+fn a_mirrored_node_mirrors_its_triangles_with_their_texture() {
+    let (whole, turned) = (skirt(), mesh(&glb_placed(&skirt(), r#""scale": [1, 1, -1], "#), Format::Glb).unwrap());
+    for t in 0..whole.triangles.len() {
+        let ([a, b, c], texture) = (whole.triangles[t], whole.texture[t].unwrap());
+        assert_eq!((turned.triangles[t], turned.texture[t]), ([a, c, b], Some([texture[0], texture[2], texture[1]])));
+    }
+}
+
+#[test]
+fn what_is_wrong_with_texture_only_leaves_it_out() {
+    let three = "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 1 1 0\nvt 0 0 0.5\nvt 1 0\nvt 0 1\nvt x 1\nvt 1\n";
+    let texture = |faces: &str| text(&format!("{three}{faces}"), Format::Obj).unwrap().texture;
+    let whole = Some([[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]]);
+    assert_eq!(texture("f 1/1 2/2 3/3\n"), [whole]);
+    assert_eq!(texture("f 1/-5 2/-4/9 3/-3/\nf 4 3 2\n"), [whole, None]);
+    // Coordinates may come after the faces.
+    assert_eq!(texture("f 1/6 2/7 3/8\nvt 0 0\nvt 1 0\nvt 0 1\n"), [whole]);
+    // The fan of a polygon.
+    assert_eq!(texture("f 1/1 2/2 4/3 3/2\n"), [whole, Some([[0.0, 0.0], [0.0, 1.0], [1.0, 0.0]])]);
+    for odd in ["f 1/0 2/2 3/3\n", "f 1/1 2/2 3/99\n", "f 1/4 2/2 3/3\n", "f 1/5 2/2 3/3\n", "f 1/1 2/a 3/3\n", "f 1//1 2//2 3//3\n"] {
+        assert_eq!(texture(odd), [], "{odd}");
+    }
+    // Of a polygon the triangles are left that have some.
+    assert_eq!(texture("f 1/1 2/2 4/3 3\n"), [whole, None]);
+}
+
 // ---- OBJ
 
 #[test]
@@ -70,9 +120,11 @@ fn obj_keeps_positions_whole_across_seams_groups_and_materials() {
     let file = "mtllib none.mtl\nv 0 0 0 1.0\nv 1 0 0 0.5 0.5 0.5\nv 0 2 0\nv 0 0 3\nvt 0 0\nvt 1 0\nvn 0 0 1\nvn 1 0 0\n\
                 o a\nf 1/1/1 3/2/1 2/1/2\ng b\nusemtl red\nf -4//1 -3//2 -1//1 # negative counts back\n\
                 s off\nf 2/1 3/2 \\\n4/99999999999\nl 1 2\np 3\nf 1 4 3\n";
-    assert_eq!(text(file, Format::Obj).unwrap(), tetrahedron());
+    // One face has a texture at all of its corners.
+    let whole = Mesh { texture: vec![Some([[0.0, 0.0], [1.0, 0.0], [0.0, 0.0]]), None, None, None], ..tetrahedron() };
+    assert_eq!(text(file, Format::Obj).unwrap(), whole);
     let windows = file.replace('\n', "\r\n");
-    assert_eq!(text(&windows, Format::Obj).unwrap(), tetrahedron());
+    assert_eq!(text(&windows, Format::Obj).unwrap(), whole);
 }
 
 #[test]
@@ -86,7 +138,7 @@ fn obj_reads_double_precision_and_latin_1_names() {
 #[test]
 fn unused_vertices_go_and_the_others_keep_their_order() {
     let file = "v 9 9 9\nv 0 0 0\nv 1 0 0\nv 8 8 8\nv 0 2 0\nf 5 2 3\n";
-    let Mesh { vertices, triangles } = text(file, Format::Obj).unwrap();
+    let Mesh { vertices, triangles, .. } = text(file, Format::Obj).unwrap();
     assert_eq!(vertices, [[0.0; 3], [1.0, 0.0, 0.0], [0.0, 2.0, 0.0]]);
     assert_eq!(triangles, [[2, 0, 1]]);
 }
@@ -132,7 +184,7 @@ fn ply_skips_other_elements_and_properties() {
         property list uint8 uint32 vertex_index\nproperty float quality\nend_header\n"
         .to_vec();
     bytes.extend(b"90\n255 0.1 0 0\n0 0.1 0 1\n0 0.1 2 0\n2 7 7 3 0 1 2 0.5\n");
-    let Mesh { vertices, triangles } = mesh(&bytes, Format::Ply).unwrap();
+    let Mesh { vertices, triangles, .. } = mesh(&bytes, Format::Ply).unwrap();
     assert_eq!(vertices, [[0.0, 0.0, 0.1], [1.0, 0.0, 0.1], [0.0, 2.0, 0.1]]);
     assert_eq!(triangles, [[0, 1, 2]]);
 }
@@ -199,6 +251,7 @@ fn stl_vertices_are_welded() {
     let first = Mesh {
         vertices: [0, 2, 1, 3].map(|i| tetrahedron().vertices[i]).to_vec(),
         triangles: vec![[0, 1, 2], [0, 2, 3], [2, 1, 3], [0, 3, 1]],
+        ..Mesh::default()
     };
     for bytes in [stl_ascii(&tetrahedron()), stl_binary(&tetrahedron(), b"")] {
         let found = mesh(&bytes, Format::Stl).unwrap();

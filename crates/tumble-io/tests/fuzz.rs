@@ -5,7 +5,7 @@ mod files;
 use files::*;
 use proptest::prelude::*;
 use proptest::sample::Index;
-use tumble_io::{Format, character, mesh};
+use tumble_io::{Format, character, mesh, repair};
 
 /// A file of every kind, with the formats that may read it.
 fn valid() -> Vec<(Vec<u8>, Format)> {
@@ -17,6 +17,10 @@ fn valid() -> Vec<(Vec<u8>, Format)> {
         (stl_ascii(&tetrahedron()), Format::Stl),
         (stl_binary(&tetrahedron(), b"solid"), Format::Stl),
         (glb_tetrahedron(r#"{"children": [1]}, {"mesh": 0, "translation": [1, 2, 3]}"#, "0"), Format::Glb),
+        (ply_textured(&skirt(), ["s", "t"]), Format::Ply),
+        (ply_wedges(&skirt()), Format::Ply),
+        (glb_textured(&skirt()), Format::Glb),
+        (tumble_io::obj(&skirt()).into_bytes(), Format::Obj),
     ]
 }
 
@@ -27,7 +31,10 @@ fn read(bytes: &[u8], format: Format) {
             assert!(!mesh.triangles.is_empty());
             assert!(mesh.vertices.iter().flatten().all(|x| x.is_finite()));
             assert!(mesh.triangles.iter().flatten().all(|i| (*i as usize) < mesh.vertices.len()));
+            assert!(mesh.texture.is_empty() || mesh.texture.len() == mesh.triangles.len());
+            assert!(mesh.texture.iter().flatten().flatten().flatten().all(|x| x.is_finite()));
             mesh.defects();
+            repair(&mesh);
         }
         Err(message) => assert!(!message.is_empty() && !message.contains('\n') && message.chars().count() < 320, "{message}"),
     }
@@ -162,7 +169,7 @@ proptest! {
 
     /// Past the first check, so that what follows sees the noise.
     #[test]
-    fn random_bytes_after_a_true_beginning_are_survived(which in 0..7_usize, cut in any::<Index>(), noise in prop::collection::vec(any::<u8>(), 0..300)) {
+    fn random_bytes_after_a_true_beginning_are_survived(which in 0..11_usize, cut in any::<Index>(), noise in prop::collection::vec(any::<u8>(), 0..300)) {
         let (mut bytes, format) = valid().swap_remove(which);
         bytes.truncate(cut.index(bytes.len()));
         bytes.extend(noise);
@@ -170,7 +177,7 @@ proptest! {
     }
 
     #[test]
-    fn changed_files_are_survived(which in 0..7_usize, changes in prop::collection::vec(change(), 1..8)) {
+    fn changed_files_are_survived(which in 0..11_usize, changes in prop::collection::vec(change(), 1..8)) {
         let (mut bytes, format) = valid().swap_remove(which);
         for change in &changes {
             apply(&mut bytes, change);

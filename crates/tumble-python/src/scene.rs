@@ -6,7 +6,7 @@ use pyo3::prelude::*;
 use pyo3::types::{PyBool, PyDict, PyFloat, PyInt, PyList, PyString, PyTuple};
 use std::collections::HashMap;
 use std::path::{Path, PathBuf};
-use tumble_interface::scene::FabricRef;
+use tumble_interface::scene::{FabricRef, MeshRef};
 use tumble_interface::tree::{Node, Value};
 use tumble_interface::{Assets, Character, Fabric, Issue, Mesh, SceneError};
 use tumble_io::Format;
@@ -90,6 +90,17 @@ impl Scene {
     #[getter]
     fn folder(&self) -> String {
         self.folder.display().to_string()
+    }
+
+    /// The mesh files that it names: place of the name in the scene, its line or None, and the path as it stands there.
+    /// Files of figures are left out.
+    #[getter]
+    fn mesh_files(&self) -> Vec<(String, Option<usize>, String)> {
+        let mut scene = self.scene.clone();
+        let files = scene.mesh_files_mut();
+        let place = |file: &MeshRef<'_>| (format!("{}.path", file.place), file.path.to_string());
+        let places = files.iter().filter(|file| !file.skinned).map(place);
+        places.map(|(place, path)| (place.clone(), self.node.line_of(&place), path)).collect()
     }
 
     /// JSON Schema of a scene; units are under "x-unit".
@@ -246,13 +257,26 @@ pub fn load_fabric<'py>(py: Python<'py>, fabric: &str) -> PyResult<Bound<'py, Py
     Ok(dict)
 }
 
+/// Suffixes of files that OpenUSD reads.
+const USD: [&str; 4] = ["usd", "usda", "usdc", "usdz"];
+
 fn read_mesh(path: &Path) -> Result<(Mesh, String), String> {
-    let Some(format) = Format::from_path(&path.to_string_lossy()) else {
-        return Err(format!("\"{}\" has none of the suffixes .obj, .ply, .stl, .glb", path.display()));
+    let is_usd = path.extension().is_some_and(|e| USD.iter().any(|usd| e.eq_ignore_ascii_case(usd)));
+    let format = if is_usd { Some(Format::Obj) } else { Format::from_path(&path.to_string_lossy()) };
+    let Some(format) = format else {
+        return Err(format!("\"{}\" has none of the suffixes .obj, .ply, .stl, .glb, .usd, .usda, .usdc, .usdz", path.display()));
     };
     let bytes = std::fs::read(path).map_err(|e| errors::file_error(path, &e))?;
-    let mesh = tumble_io::mesh(&bytes, format).map_err(|e| format!("\"{}\": {e}", path.display()))?;
-    Ok((mesh, format!("{:016x}", XxHash3_64::oneshot(&bytes))))
+    let hash = format!("{:016x}", XxHash3_64::oneshot(&bytes));
+    let named = |e: String| format!("\"{}\": {e}", path.display());
+    if !is_usd {
+        return Ok((tumble_io::mesh(&bytes, format).map_err(named)?, hash));
+    }
+    // OpenUSD is a library of Python.
+    let text = Python::attach(|py| -> PyResult<String> { py.import("tumble.usd")?.call_method1("as_obj", (path,))?.extract() });
+    let text = text.map_err(|e| named(Python::attach(|py| e.value(py).to_string())))?;
+    let mesh = tumble_io::mesh(text.as_bytes(), format).map_err(|e| named(e.replacen("OBJ", "USD", 1)))?;
+    Ok((mesh, hash))
 }
 
 fn read_character(path: &Path) -> Result<(Character, String), String> {
@@ -269,4 +293,33 @@ pub fn load_mesh(py: Python<'_>, path: PathBuf) -> PyResult<(Bound<'_, PyArray2<
     let (n, m) = (mesh.vertices.len(), mesh.triangles.len());
     let vertices = PyArray1::from_vec(py, mesh.vertices.concat()).reshape([n, 3])?;
     Ok((vertices, PyArray1::from_vec(py, mesh.triangles.concat()).reshape([m, 3])?))
+}
+
+/// The mesh of a file mended, as the text of an OBJ file, or None if nothing had to be done; counts of vertices welded, triangles repeated,
+/// degenerate and turned, edges split, and of edges that are still open or odd. Raises SceneError if it cannot be read or nothing is left.
+#[pyfunction]
+pub fn repair_mesh(py: Python<'_>, path: PathBuf) -> PyResult<(Option<String>, Bound<'_, PyDict>)> {
+    let wrong = |e: String| scene_error(py, &SceneError::one("", e));
+    let (mesh, _) = read_mesh(&path).map_err(wrong)?;
+    let (mended, done, left) = py.detach(|| {
+        let (mended, done) = tumble_io::repair(&mesh);
+        let left = mended.defects();
+        (mended, done, left)
+    });
+    if mended.triangles.is_empty() {
+        return Err(wrong(format!("\"{}\": no triangle has an area; export the mesh again", path.display())));
+    }
+    let counts = PyDict::new(py);
+    for (name, n) in [
+        ("welded", done.welded),
+        ("repeated", done.repeated),
+        ("degenerate", done.degenerate),
+        ("turned", done.turned),
+        ("split", done.split),
+        ("open", left.open_edges),
+        ("odd", left.bad_edges),
+    ] {
+        counts.set_item(name, n)?;
+    }
+    Ok(((!done.is_none()).then(|| tumble_io::obj(&mended)), counts))
 }

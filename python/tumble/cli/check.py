@@ -28,22 +28,37 @@ def check(
     scene: find.SceneArgument,
     set: find.SetOption = None,
     threads: Annotated[int | None, typer.Option(min=1, metavar="N", help="Processor cores to use.")] = None,
+    repair: Annotated[
+        bool, typer.Option("--repair", help="Mend the scene's mesh files, into new ones beside them.")
+    ] = False,
+    force: Annotated[bool, typer.Option("--force", help="With --repair: replace files of an earlier repair.")] = False,
 ) -> None:
     """Check a scene, and estimate which steps are stable.
 
     Where there are emitters, the scene is simulated, for seconds at most, until many of their particles are there. Ends
     with code 1 if a system is predicted to explode, or does, 2 if the scene is wrong.
 
+    With --repair, meshes that are not sound are mended: rims that lie on each other are sewn, triangles that stand there
+    twice or have no area go, all are made to face one way, outward where a mesh is closed, and edges of more than two
+    triangles come apart. NAME.ply becomes NAME.repaired.obj beside it, the lines of the scene to change are told, and
+    the scene is checked as if they had been. Originals and the scene's file stay as they are; holes stay open.
+
     \b
     Examples:
       tumble check my.toml
       tumble check my.toml --set system.soft.integrator=forward_euler
+      tumble check my.toml --repair
     """
     from tumble import World
     from tumble.emitters import forecast
     from tumble.expect import probes
 
     checked = find.scene(scene, set)
+    if repair:
+        from tumble.cli.repair import mend
+
+        set = [*(set or ()), *mend(find.scene_file(scene), checked, force)]
+        checked = find.scene(scene, set)
     with find.naming(find.scene_file(scene), scene=checked):
         world = World(checked, threads)
         probes(world, checked.to_dict())

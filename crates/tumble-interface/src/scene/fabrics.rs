@@ -23,8 +23,8 @@ pub struct FabricUse {
     /// The file of its record instead, TOML or JSON; relative to the scene.
     #[serde(default)]
     pub path: Option<String>,
-    /// Turn of the warp in the surface, counter-clockwise seen from outside. At 0 it is the first axis of a sheet or of a panel, and on a net
-    /// the x axis as far as it lies in a triangle.
+    /// Turn of the warp in the surface, counter-clockwise seen from outside. At 0 it is the first axis of a sheet or of a panel, on a net the
+    /// x axis as far as it lies in a triangle, or u in the plane of its pattern.
     #[serde(default)]
     #[schemars(extend("x-unit" = "°"))]
     pub angle: f64,

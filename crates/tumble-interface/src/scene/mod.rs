@@ -33,8 +33,8 @@ pub use heat::{Heat, HeatRegion, HeatScheme, HeatSide, HeatSides, HeatSource};
 pub use output::{Camera, Expect, Look, Output, Probe};
 pub use shapes::{Collider, Figure, Mannequin, MeshFile, MeshFrame, MeshFrames, MeshRef, Motion, Moves, Pace, Pose, Shape};
 pub use structures::{
-    Block, Cloud, CloudShape, Diagonals, Follow, Galaxy, Halo, Link, LinkSettings, Links, Material, Net, Particles, Pin, Profile, Region,
-    Rod, Rope, Sheet, Spring,
+    Block, Cloud, CloudShape, Diagonals, Follow, Galaxy, Halo, Link, LinkSettings, Links, Material, Net, Particles, Pattern, Pin, Profile,
+    Region, Rod, Rope, Sheet, Spring,
 };
 pub use surfaces::{Fill, Fluid, Inflation, Membrane, ShapeMatching, Tear, Weak};
 pub use systems::{

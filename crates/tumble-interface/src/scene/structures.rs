@@ -421,6 +421,10 @@ pub struct Net {
     pub system: Option<String>,
     /// The mesh.
     pub mesh: MeshFile,
+    /// The texture coordinates of the mesh are the flat pattern that it is made from: where nothing is strained, and the direction of the warp,
+    /// along u. Without it, nothing is strained at the start.
+    #[serde(default)]
+    pub pattern: Option<Pattern>,
     /// Mass per area. Without it, that of the fabric, or 0.2.
     #[serde(default)]
     #[schemars(extend("x-unit" = "kg/m²", "exclusiveMinimum" = 0.0))]
@@ -464,6 +468,15 @@ pub struct Net {
     #[serde(default)]
     #[schemars(inner(range(min = 0.0, max = 1.0)))]
     pub color: Option<[f64; 3]>,
+}
+
+/// Texture coordinates as flat panels.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Pattern {
+    /// Length of one unit of texture coordinates.
+    #[schemars(extend("x-unit" = "m", "exclusiveMinimum" = 0.0))]
+    pub scale: f64,
 }
 
 /// Families of links. A family that is left out is not there.

@@ -30,8 +30,8 @@ pub struct Membrane {
     #[serde(default)]
     #[schemars(range(min = 0.0), extend("x-unit" = "s"))]
     pub damping: f64,
-    /// Turn of the warp in the surface, counter-clockwise seen from outside. At 0 it is the first axis of a sheet or of a panel, and on a net the
-    /// x axis as far as it lies in a triangle.
+    /// Turn of the warp in the surface, counter-clockwise seen from outside. At 0 it is the first axis of a sheet or of a panel, on a net the
+    /// x axis as far as it lies in a triangle, or u in the plane of its pattern.
     #[serde(default)]
     #[schemars(extend("x-unit" = "°"))]
     pub angle: f64,

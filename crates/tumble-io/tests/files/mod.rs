@@ -8,6 +8,7 @@ pub fn tetrahedron() -> Mesh {
     Mesh {
         vertices: vec![[0.0; 3], [1.0, 0.0, 0.0], [0.0, 2.0, 0.0], [0.0, 0.0, 3.0]],
         triangles: vec![[0, 2, 1], [0, 1, 3], [1, 2, 3], [0, 3, 2]],
+        ..Mesh::default()
     }
 }
 
@@ -27,7 +28,7 @@ pub const CUBE_FACES: [[u32; 4]; 6] = [[0, 3, 2, 1], [4, 5, 6, 7], [0, 1, 5, 4],
 /// The cube as fans: (a, b, c), (a, c, d) of each face.
 pub fn cube() -> Mesh {
     let triangles = CUBE_FACES.iter().flat_map(|[a, b, c, d]| [[*a, *b, *c], [*a, *c, *d]]).collect();
-    Mesh { vertices: CUBE.to_vec(), triangles }
+    Mesh { vertices: CUBE.to_vec(), triangles, ..Mesh::default() }
 }
 
 pub fn volume(mesh: &Mesh) -> f64 {
@@ -80,6 +81,97 @@ pub fn ply(format: &str) -> Vec<u8> {
         }
     }
     bytes
+}
+
+/// A skirt of six sides as it is sewn from one panel: the texture goes on where the vertices begin again. All numbers are whole parts of a
+/// power of two.
+pub fn skirt() -> Mesh {
+    let around = [[1.0, 0.0], [0.5, 0.875], [-0.5, 0.875], [-1.0, 0.0], [-0.5, -0.875], [0.5, -0.875]];
+    let vertices = [0.0, 0.5].iter().flat_map(|z| around.map(|[x, y]| [x, y, *z])).collect();
+    let mut mesh = Mesh { vertices, ..Mesh::default() };
+    for i in 0..6_u32 {
+        let at = |(i, j): (u32, u32)| i % 6 + 6 * j;
+        let flat = |(i, j): (u32, u32)| [0.125 * f64::from(i) - 0.25, 0.25 + 0.0625 * f64::from(j)];
+        for t in [[(i, 0), (i + 1, 0), (i + 1, 1)], [(i, 0), (i + 1, 1), (i, 1)]] {
+            mesh.triangles.push(t.map(at));
+            mesh.texture.push(Some(t.map(flat)));
+        }
+    }
+    mesh
+}
+
+/// Vertices of a mesh with texture, split where they have several, those of one place in a row; and its triangles of them.
+pub fn split(mesh: &Mesh) -> (Vec<([f64; 3], [f64; 2])>, Vec<[u32; 3]>) {
+    let corner = |t: usize, k: usize| (mesh.triangles[t][k], mesh.texture[t].unwrap()[k]);
+    let mut all: Vec<(u32, [f64; 2])> = (0..mesh.triangles.len()).flat_map(|t| (0..3).map(move |k| corner(t, k))).collect();
+    all.sort_by(|a, b| a.partial_cmp(b).unwrap());
+    all.dedup();
+    let number = |t: usize, k: usize| all.iter().position(|c| *c == corner(t, k)).unwrap() as u32;
+    let triangles = (0..mesh.triangles.len()).map(|t| [0, 1, 2].map(|k| number(t, k))).collect();
+    (all.iter().map(|(i, at)| (mesh.vertices[*i as usize], *at)).collect(), triangles)
+}
+
+/// A mesh with texture as ASCII PLY, with these names of its coordinates.
+pub fn ply_textured(mesh: &Mesh, [u, v]: [&str; 2]) -> Vec<u8> {
+    let (vertices, triangles) = split(mesh);
+    let mut text = format!(
+        "ply\nformat ascii 1.0\nelement vertex {}\nproperty double x\nproperty double y\nproperty double z\nproperty float {u}\n\
+         property float {v}\nelement face {}\nproperty list uchar int vertex_indices\nend_header\n",
+        vertices.len(),
+        triangles.len()
+    );
+    vertices.iter().for_each(|([x, y, z], [u, v])| text += &format!("{x} {y} {z} {u} {v}\n"));
+    triangles.iter().for_each(|[a, b, c]| text += &format!("3 {a} {b} {c}\n"));
+    text.into_bytes()
+}
+
+/// The same with the coordinates in lists of the faces, and vertices that are not split.
+pub fn ply_wedges(mesh: &Mesh) -> Vec<u8> {
+    let mut text = format!(
+        "ply\nformat ascii 1.0\nelement vertex {}\nproperty double x\nproperty double y\nproperty double z\nelement face {}\n\
+         property list uchar int vertex_indices\nproperty list uchar float texcoord\nend_header\n",
+        mesh.vertices.len(),
+        mesh.triangles.len()
+    );
+    mesh.vertices.iter().for_each(|[x, y, z]| text += &format!("{x} {y} {z}\n"));
+    for ([a, b, c], texture) in mesh.triangles.iter().zip(&mesh.texture) {
+        let flat: Vec<String> = texture.unwrap().as_flattened().iter().map(f64::to_string).collect();
+        text += &format!("3 {a} {b} {c} 6 {}\n", flat.join(" "));
+    }
+    text.into_bytes()
+}
+
+/// The same as GLB, whose v points down.
+pub fn glb_textured(mesh: &Mesh) -> Vec<u8> {
+    glb_placed(mesh, "")
+}
+
+/// The same, placed by a node with these words.
+pub fn glb_placed(mesh: &Mesh, words: &str) -> Vec<u8> {
+    let (vertices, triangles) = split(mesh);
+    let (n, m) = (vertices.len(), triangles.len());
+    let floats = |all: Vec<f64>| all.into_iter().flat_map(|x| (x as f32).to_le_bytes());
+    let mut buffer: Vec<u8> = floats(vertices.iter().flat_map(|v| v.0).collect()).collect();
+    buffer.extend(floats(vertices.iter().flat_map(|v| [v.1[0], 1.0 - v.1[1]]).collect()));
+    buffer.extend(triangles.as_flattened().iter().flat_map(|i| (*i as u16).to_le_bytes()));
+    let json = format!(
+        r#"{{"asset": {{"version": "2.0"}}, "scene": 0, "scenes": [{{"nodes": [0]}}], "nodes": [{{{words}"mesh": 0}}],
+        "meshes": [{{"primitives": [{{"attributes": {{"POSITION": 0, "TEXCOORD_0": 1}}, "indices": 2}}]}}],
+        "accessors": [{{"bufferView": 0, "componentType": 5126, "count": {n}, "type": "VEC3"}},
+                      {{"bufferView": 1, "componentType": 5126, "count": {n}, "type": "VEC2"}},
+                      {{"bufferView": 2, "componentType": 5123, "count": {}, "type": "SCALAR"}}],
+        "bufferViews": [{{"buffer": 0, "byteLength": {}}}, {{"buffer": 0, "byteOffset": {}, "byteLength": {}}},
+                        {{"buffer": 0, "byteOffset": {}, "byteLength": {}}}],
+        "buffers": [{{"byteLength": {}}}]}}"#,
+        3 * m,
+        12 * n,
+        12 * n,
+        8 * n,
+        20 * n,
+        6 * m,
+        buffer.len()
+    );
+    glb(&json, &buffer)
 }
 
 /// Any mesh as ASCII STL.

@@ -266,6 +266,6 @@ pub(crate) mod tests {
 
     #[test]
     fn a_mesh_without_area_gives_no_tree() {
-        assert!(Bvh::new(&Mesh { vertices: vec![[0.0; 3]; 3], triangles: vec![[0, 1, 2]] }).is_none());
+        assert!(Bvh::new(&Mesh { vertices: vec![[0.0; 3]; 3], triangles: vec![[0, 1, 2]], ..Mesh::default() }).is_none());
     }
 }

@@ -202,7 +202,7 @@ mod tests {
     #[test]
     fn what_has_no_measure_has_no_points() {
         assert!(Sampler::curve(&[[1.0; 3], [1.0; 3]]).is_none());
-        let flat = Mesh { vertices: vec![[0.0; 3]; 3], triangles: vec![[0, 1, 2]] };
+        let flat = Mesh { vertices: vec![[0.0; 3]; 3], triangles: vec![[0, 1, 2]], ..Mesh::default() };
         assert!(Sampler::surface(&flat).is_none());
         assert!(Sampler::volume(&flat).is_none());
     }

@@ -12,6 +12,7 @@ pub fn sphere(levels: u32, center: Vector, radius: f64) -> Mesh {
     let mut mesh = Mesh {
         vertices: vec![[1.0, 0.0, 0.0], [-1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, -1.0, 0.0], [0.0, 0.0, 1.0], [0.0, 0.0, -1.0]],
         triangles: vec![[0, 2, 4], [2, 1, 4], [1, 3, 4], [3, 0, 4], [2, 0, 5], [1, 2, 5], [3, 1, 5], [0, 3, 5]],
+        ..Mesh::default()
     };
     for _ in 0..levels {
         let mut middle = HashMap::new();
@@ -63,7 +64,7 @@ pub fn capsule(a: Vector, b: Vector, radius: f64) -> Mesh {
         let top = 1 + (rows - 1) * SIDES;
         triangles.push([last, top + i, top + j]);
     }
-    Mesh { vertices, triangles }
+    Mesh { vertices, triangles, ..Mesh::default() }
 }
 
 /// A solid of revolution about an axis along z: the profile holds distances from the axis and heights, counter-clockwise where the
@@ -98,6 +99,7 @@ pub fn cuboid(center: Vector, half: Vector, turn: Quat<f64>) -> Mesh {
     Mesh {
         vertices: (0..8).map(|k| corner(k).into()).collect(),
         triangles: faces.iter().flat_map(|[a, b, c, d]| [[*a, *b, *c], [*a, *c, *d]]).collect(),
+        ..Mesh::default()
     }
 }
 
@@ -108,6 +110,7 @@ pub fn square(center: Vector, normal: Vector, half: f64) -> Mesh {
     Mesh {
         vertices: vec![corner(-1.0, -1.0), corner(1.0, -1.0), corner(1.0, 1.0), corner(-1.0, 1.0)],
         triangles: vec![[0, 1, 2], [0, 2, 3]],
+        ..Mesh::default()
     }
 }
 

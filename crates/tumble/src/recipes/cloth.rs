@@ -5,7 +5,7 @@ use super::Site;
 use super::cut::{Cut, Stitch, cut};
 use super::dress::dress;
 use super::pins::{Pinnable, pinned};
-use super::surface::Surface;
+use super::surface::{Rest, Surface};
 use crate::geometry::Vector;
 use crate::math::functions;
 use crate::systems::dynamics::SpringPart;
@@ -83,7 +83,11 @@ pub fn cloth(site: &mut Site<'_>, thing: &Cloth) {
         }
         let at = first.unwrap_or(0) + start;
         // In its own plane the panel is a mesh like any other.
-        let own = Mesh { vertices: piece.flat.iter().map(|p| [p[0], p[1], 0.0]).collect(), triangles: piece.triangles.clone() };
+        let own = Mesh {
+            vertices: piece.flat.iter().map(|p| [p[0], p[1], 0.0]).collect(),
+            triangles: piece.triangles.clone(),
+            ..Mesh::default()
+        };
         let distance = |a: u32, b: u32| (flat(a)[0] - flat(b)[0]).hypot(flat(a)[1] - flat(b)[1]);
         for ([a, b], faces) in own.edges() {
             let stands_for: f64 = faces.iter().map(|t| measure(&own.triangles[*t as usize])).sum();
@@ -106,7 +110,7 @@ pub fn cloth(site: &mut Site<'_>, thing: &Cloth) {
             squares: false,
             area: thing.area,
         };
-        site.surface(&own, at, &words, Vector { x: 1.0, y: 0.0, z: 0.0 });
+        site.surface(&own, at, &words, &Rest::mesh(&own, Vector { x: 1.0, y: 0.0, z: 0.0 }));
         cut_out.extend(own.triangles.iter().map(|t| t.map(|i| Vector::from(own.vertices[i as usize]))));
         all.triangles.extend(own.triangles.iter().map(|t| t.map(|i| i + start)));
         sides.push(piece.sides.into_iter().map(|side| side.into_iter().map(|i| at + i).collect()).collect());

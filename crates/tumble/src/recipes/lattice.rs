@@ -122,6 +122,7 @@ mod tests {
         for n in [5, 9] {
             let (mut parts, mut issues) = (Parts::default(), Vec::new());
             let mut site = Site {
+                hints: &mut Vec::new(),
                 parts: &mut parts,
                 issues: &mut issues,
                 up: Vector::default(),

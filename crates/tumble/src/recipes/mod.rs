@@ -51,6 +51,8 @@ pub struct Site<'a> {
     pub parts: &'a mut Parts,
     /// Everything wrong so far.
     pub issues: &'a mut Vec<Issue>,
+    /// What it hardly means.
+    pub hints: &'a mut Vec<String>,
     /// Direction that counts as up.
     pub up: Vector,
     /// The scene's colliders, for what follows them.

@@ -2,10 +2,15 @@
 
 use super::Site;
 use super::pins::{Pinnable, pinned};
-use super::surface::Surface;
+use super::surface::{Rest, Surface};
 use crate::geometry::Vector;
 use tumble_interface::Mesh;
-use tumble_interface::scene::Net;
+use tumble_interface::scene::{Net, Pattern};
+
+/// A triangle has no area if that is less than this part of its longest side squared.
+const SLIVER: f64 = 1e-9;
+/// Areas of a pattern and of its mesh that differ by more than this factor are worth a hint.
+const UNLIKE: f64 = 2.0;
 
 /// Adds the masses, links, hinges and triangles. `mesh` stands where it belongs.
 ///
@@ -14,9 +19,11 @@ pub fn net(site: &mut Site<'_>, thing: &Net, mesh: &Mesh) {
     let path = format!("net \"{}\"", thing.name);
     site.parts.begin(&thing.name, 0.0);
     let Some((fabric, density)) = site.fabric(&path, thing.fabric.as_ref(), thing.density) else { return };
-    let corner = |i: u32| Vector::from(mesh.vertices[i as usize]);
-    let area = |t: &[u32; 3]| (corner(t[1]) - corner(t[0])).cross(corner(t[2]) - corner(t[0])).norm() / 2.0;
-    let areas: Vec<f64> = mesh.triangles.iter().map(area).collect();
+    let Ok(panels) = thing.pattern.as_ref().map(|words| pattern(site, words, mesh, &path)).transpose() else { return };
+    // The triangles' own planes have no axes in common; the x axis has a direction in most.
+    let along = Vector { x: 1.0, y: 0.0, z: 0.0 };
+    let rest = panels.as_deref().map_or_else(|| Rest::mesh(mesh, along), |panels| Rest::pattern(mesh, panels));
+    let areas: Vec<f64> = (0..mesh.triangles.len()).map(|t| area(rest.corners(t))).collect();
     let mut mass = vec![0.0; mesh.vertices.len()];
     for (t, area) in mesh.triangles.iter().zip(&areas) {
         t.iter().for_each(|i| mass[*i as usize] += density * area / 3.0);
@@ -36,12 +43,19 @@ pub fn net(site: &mut Site<'_>, thing: &Net, mesh: &Mesh) {
     for ([a, b], faces) in &edges {
         let measure: f64 = faces.iter().map(|t| areas[*t as usize]).sum();
         if let Some(family) = &links.structural {
-            site.link(family, [first + a, first + b], measure);
+            match panels {
+                Some(_) => site.link_of(family, [first + a, first + b], measure, rest.length([*a, *b], faces)),
+                None => site.link(family, [first + a, first + b], measure),
+            }
         }
         if let (Some(family), [t, u]) = (&links.bend, &faces[..]) {
             let opposite = |t: u32| mesh.triangles[t as usize].into_iter().find(|i| i != a && i != b);
             if let (Some(c), Some(d)) = (opposite(*t), opposite(*u)) {
-                site.link(family, [first + c, first + d], measure);
+                let ends = [first + c, first + d];
+                match rest.wings([*a, *b], faces).filter(|_| panels.is_some()) {
+                    Some(wings) => site.link_of(family, ends, measure, (wings.at[2] - wings.at[3]).norm()),
+                    None => site.link(family, ends, measure),
+                }
             }
         }
     }
@@ -54,8 +68,7 @@ pub fn net(site: &mut Site<'_>, thing: &Net, mesh: &Mesh) {
         squares: false,
         area: thing.area,
     };
-    // The triangles' own planes have no axes in common; the x axis has a direction in most.
-    site.surface(mesh, first, &words, Vector { x: 1.0, y: 0.0, z: 0.0 });
+    site.surface(mesh, first, &words, &rest);
     if let Some(words) = &thing.pressure {
         site.inflate(mesh, first, words, &path);
     }
@@ -74,7 +87,73 @@ pub fn net(site: &mut Site<'_>, thing: &Net, mesh: &Mesh) {
                 "what tears can neither hold a pressure nor keep a shape as a whole; leave out one of them",
             );
         }
-        let corners: Vec<_> = mesh.triangles.iter().map(|t| t.map(corner)).collect();
-        site.tear(words, &corners, &corners, &path);
+        let places: Vec<_> = (0..mesh.triangles.len()).map(|t| Rest::mesh(mesh, along).corners(t)).collect();
+        site.tear(words, panels.as_deref().unwrap_or(&places), &places, &path);
     }
+}
+
+fn area([a, b, c]: [Vector; 3]) -> f64 {
+    (b - a).cross(c - a).norm() / 2.0
+}
+
+/// The triangles of a mesh in the plane of its texture coordinates [m]; `Err`, and an issue, if they are no pattern.
+fn pattern(site: &mut Site<'_>, words: &Pattern, mesh: &Mesh, path: &str) -> Result<Vec<[Vector; 3]>, ()> {
+    let path = format!("{path}.pattern");
+    let place = |t: usize| {
+        let [a, b, c] = mesh.triangles[t].map(|i| Vector::from(mesh.vertices[i as usize]));
+        let middle: [f64; 3] = ((a + b + c) * (1.0 / 3.0)).into();
+        format!("triangle {t} (from 0, around [{}])", middle.map(|x| format!("{x:.4}")).join(", "))
+    };
+    let mut wrong = |message: String| {
+        site.wrong(path.clone(), message);
+        Err(())
+    };
+    const EXPORT: &str =
+        "unwrap it and export it again with them (vt in OBJ, s and t in PLY, TEXCOORD_0 in GLB; STL has none), or leave out pattern";
+    if mesh.texture.len() != mesh.triangles.len() {
+        return wrong(format!("the mesh has no texture coordinates; {EXPORT}"));
+    }
+    let mut panels = Vec::with_capacity(mesh.texture.len());
+    for (t, corners) in mesh.texture.iter().enumerate() {
+        let Some(corners) = corners else { return wrong(format!("{} has no texture coordinates; {EXPORT}", place(t))) };
+        panels.push(corners.map(|[u, v]| Vector { x: u * words.scale, y: v * words.scale, z: 0.0 }));
+    }
+    let longest = |[a, b, c]: [Vector; 3]| (b - a).norm_sq().max((c - b).norm_sq()).max((a - c).norm_sq());
+    let is_flat = |x: &[Vector; 3]| area(*x) <= SLIVER * longest(*x) || !area(*x).is_finite();
+    if let Some(t) = panels.iter().position(is_flat) {
+        let n = panels.iter().filter(|x| is_flat(x)).count();
+        let more = if n > 1 { format!(", nor have {} others", n - 1) } else { String::new() };
+        return wrong(format!("{} has no area in texture coordinates{more}; unwrap the mesh again, each panel flat", place(t)));
+    }
+    let (flat, real): (f64, f64) = panels
+        .iter()
+        .zip(0..)
+        .map(|(x, t)| (area(*x), area(Rest::mesh(mesh, Vector::default()).corners(t))))
+        .fold((0.0, 0.0), |s, a| (s.0 + a.0, s.1 + a.1));
+    let ratio = flat / real;
+    if real > 0.0 && !(1.0 / UNLIKE..=UNLIKE).contains(&ratio) {
+        site.hints.push(format!(
+            "{path}.scale: the pattern has {flat:.4} m² and the mesh {real:.4} m²; a scale of {:.4} would make them equal",
+            words.scale / ratio.sqrt()
+        ));
+    }
+    let side = |t: u32| {
+        let [a, b, c] = panels[t as usize];
+        (b - a).cross(c - a).z > 0.0
+    };
+    let at = |t: u32, end: u32| mesh.triangles[t as usize].iter().position(|i| *i == end).map(|k| mesh.texture[t as usize].map(|c| c[k]));
+    let folded = |(ends, faces): &&([u32; 2], Vec<u32>)| match faces[..] {
+        [t, u] => side(t) != side(u) && ends.iter().all(|end| at(t, *end) == at(u, *end)),
+        _ => false,
+    };
+    let edges = mesh.edges();
+    if let Some((_, faces)) = edges.iter().find(folded) {
+        let n = edges.iter().filter(folded).count();
+        let message = format!(
+            "{path}: the texture is folded over at {n} edges, the first at {}; no cloth is cut so, unwrap the mesh again",
+            place(faces[0] as usize)
+        );
+        site.hints.push(message);
+    }
+    Ok(panels)
 }

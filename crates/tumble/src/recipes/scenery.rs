@@ -14,7 +14,7 @@ const PLANE: f64 = 10.0;
 pub fn placed(mesh: &Mesh, file: &MeshFile) -> Mesh {
     let (turn, shift) = (from_degrees(file.rotate), Vector::from(file.translate));
     let place = |v: &[f64; 3]| (turn.turn(Vector::from(*v) * file.scale) + shift).into();
-    Mesh { vertices: mesh.vertices.iter().map(place).collect(), triangles: mesh.triangles.clone() }
+    Mesh { vertices: mesh.vertices.iter().map(place).collect(), triangles: mesh.triangles.clone(), texture: mesh.texture.clone() }
 }
 
 /// The meshes of an animation put in their place.
@@ -102,7 +102,7 @@ pub fn solid(thing: &Thing, meshes: &[Mesh], figure: Option<(Arc<Rig>, Facets)>)
                 _ => (".shape.mannequin", false),
             };
             let Some(facets) = figure else { return wrong(key, "a figure, expected sphere, box, plane, floor, capsule or mesh".into()) };
-            let mesh = Mesh { vertices: facets.vertices(0.0), triangles: facets.triangles().to_vec() };
+            let mesh = Mesh { vertices: facets.vertices(0.0), triangles: facets.triangles().to_vec(), ..Mesh::default() };
             whole(&mesh, key, shell, thing.thickness)?;
             Shape::Animated { facets, shell }
         }
@@ -203,7 +203,9 @@ pub fn scenery(thing: &Thing, meshes: &[Mesh], solid: Option<&Collider>) -> Mesh
         Words::Lathe { center, profile, sides } => turned(*center, profile, *sides).unwrap_or_default(),
         Words::Mesh(_) | Words::AnimatedMesh(_) => meshes.first().cloned().unwrap_or_default(),
         Words::Character(_) | Words::Mannequin(_) => match solid.map(|s| &s.shape) {
-            Some(Shape::Animated { facets, .. }) => Mesh { vertices: facets.vertices(0.0), triangles: facets.triangles().to_vec() },
+            Some(Shape::Animated { facets, .. }) => {
+                Mesh { vertices: facets.vertices(0.0), triangles: facets.triangles().to_vec(), ..Mesh::default() }
+            }
             _ => Mesh::default(),
         },
     }

@@ -3,7 +3,7 @@
 use super::Site;
 use super::lattice::Lattice;
 use super::pins::{Pinnable, pinned};
-use super::surface::Surface;
+use super::surface::{Rest, Surface};
 use tumble_interface::Mesh;
 use tumble_interface::scene::Sheet;
 
@@ -39,7 +39,7 @@ pub fn sheet(site: &mut Site<'_>, thing: &Sheet) {
     pins.iter().for_each(|p| site.parts.pin(*p));
     if thing.hinge > 0.0 || thing.isometric > 0.0 || thing.area > 0.0 || thing.membrane.is_some() || fabric.is_some() {
         let vertices = lattice.nodes().map(|node| site.parts.position(lattice.index(node)).into()).collect();
-        let mesh = Mesh { vertices, triangles };
+        let mesh = Mesh { vertices, triangles, ..Mesh::default() };
         let words = Surface {
             path: &path,
             hinge: thing.hinge,
@@ -49,7 +49,7 @@ pub fn sheet(site: &mut Site<'_>, thing: &Sheet) {
             squares: true,
             area: thing.area,
         };
-        site.surface(&mesh, first, &words, warp);
+        site.surface(&mesh, first, &words, &Rest::mesh(&mesh, warp));
         triangles = mesh.triangles;
     }
     let corners: Vec<_> = triangles.iter().map(|t| t.map(|i| site.parts.position(i + first))).collect();

@@ -27,6 +27,88 @@ pub struct Surface<'a> {
     pub area: f64,
 }
 
+/// Where nothing of a surface is strained, and the direction of its warp.
+pub struct Rest<'a> {
+    mesh: &'a Mesh,
+    pattern: Option<&'a [[Vector; 3]]>,
+    warp: Vector,
+}
+
+/// Two triangles on both sides of an edge: its ends, what lies opposite on the left and on the right; the triangles; and where these four are at
+/// rest.
+pub struct Wings {
+    pub nodes: [u32; 4],
+    pub faces: [usize; 2],
+    pub at: [Vector; 4],
+}
+
+impl<'a> Rest<'a> {
+    /// The mesh as it is, with this direction of the warp as far as it lies in a triangle.
+    pub fn mesh(mesh: &'a Mesh, warp: Vector) -> Self {
+        Self { mesh, pattern: None, warp }
+    }
+
+    /// Flat triangles in the xy plane, with the warp along x. Neighbours need not be neighbours there, and may be turned over.
+    pub fn pattern(mesh: &'a Mesh, pattern: &'a [[Vector; 3]]) -> Self {
+        Self { mesh, pattern: Some(pattern), warp: Vector { x: 1.0, y: 0.0, z: 0.0 } }
+    }
+
+    /// Corners of a triangle [m].
+    pub fn corners(&self, triangle: usize) -> [Vector; 3] {
+        match self.pattern {
+            Some(pattern) => pattern[triangle],
+            None => self.mesh.triangles[triangle].map(|i| Vector::from(self.mesh.vertices[i as usize])),
+        }
+    }
+
+    /// Direction of the warp and what it is still to be turned by [rad], for an angle [degrees]. A pattern is turned in its plane, seen from one
+    /// side, a mesh as seen from outside.
+    fn warp(&self, angle: f64) -> (Vector, f64) {
+        let angle = angle.to_radians();
+        match self.pattern {
+            Some(_) => (Vector { x: functions::cos(angle), y: functions::sin(angle), z: 0.0 }, 0.0),
+            None => (self.warp, angle),
+        }
+    }
+
+    /// From one end of an edge to the other in one of its triangles.
+    fn edge(&self, triangle: usize, ends: [u32; 2]) -> Vector {
+        let (nodes, corners) = (self.mesh.triangles[triangle], self.corners(triangle));
+        let [a, b] = ends.map(|end| nodes.iter().position(|i| *i == end).map_or(Vector::default(), |k| corners[k]));
+        b - a
+    }
+
+    /// Length of an edge [m]; where its triangles do not agree, as along seams of a pattern, the mean.
+    pub fn length(&self, ends: [u32; 2], faces: &[u32]) -> f64 {
+        faces.iter().map(|t| self.edge(*t as usize, ends).norm()).sum::<f64>() / faces.len() as f64
+    }
+
+    /// What lies on both sides of an edge; `None` unless it has two triangles. Those of a pattern are laid side by side.
+    pub fn wings(&self, [a, b]: [u32; 2], faces: &[u32]) -> Option<Wings> {
+        let faces: [u32; 2] = faces.try_into().ok()?;
+        let [t, u] = faces.map(|t| self.mesh.triangles[t as usize]);
+        let opposite = |t: [u32; 3]| t.into_iter().find(|i| *i != a && *i != b);
+        let (c, d) = (opposite(t)?, opposite(u)?);
+        // n1 = e x (x2 - x0) must be the outward normal of its triangle: edge a b runs forward in it.
+        let forward = (0..3).any(|k| t[k] == a && t[(k + 1) % 3] == b);
+        let side = |left: bool| if left == forward { (c, faces[0] as usize) } else { (d, faces[1] as usize) };
+        let (left, right) = (side(true), side(false));
+        let at = if self.pattern.is_none() {
+            [a, b, left.0, right.0].map(|i| Vector::from(self.mesh.vertices[i as usize]))
+        } else {
+            let half = 0.5 * self.length([a, b], &faces);
+            let place = |(corner, triangle): (u32, usize), sign: f64| {
+                let (e, to) = (self.edge(triangle, [a, b]), self.edge(triangle, [a, corner]));
+                let length = e.norm();
+                Vector { x: to.dot(e) / length - 0.5 * length, y: sign * e.cross(to).norm() / length, z: 0.0 }
+            };
+            let end = |x: f64| Vector { x, y: 0.0, z: 0.0 };
+            [end(-half), end(half), place(left, 1.0), place(right, -1.0)]
+        };
+        Some(Wings { nodes: [a, b, left.0, right.0], faces: faces.map(|t| t as usize), at })
+    }
+}
+
 /// A record and how it is used.
 #[derive(Clone)]
 pub struct Measured {
@@ -40,8 +122,9 @@ const SQUARES: f64 = 4.0 / 3.0;
 impl Measured {
     /// Bending stiffness [N m] of hinges along an edge with this direction in a triangle, at each curvature of the record; of a side of squares,
     /// or of a diagonal, such that a surface bent along either side, or between them, has that of the record: (fabrics.11).
-    fn hinges(&self, edge: Vector, triangle: [Vector; 3], warp: Vector, squares: Option<bool>) -> [f64; 5] {
-        let (u, v) = Membrane::grain(triangle, warp, self.words.angle.to_radians());
+    fn hinges(&self, edge: Vector, triangle: [Vector; 3], rest: &Rest<'_>, squares: Option<bool>) -> [f64; 5] {
+        let (warp, angle) = rest.warp(self.words.angle);
+        let (u, v) = Membrane::grain(triangle, warp, angle);
         let at = functions::atan2(edge.dot(v), edge.dot(u)).to_degrees();
         let factor = self.words.thicken * self.words.bending;
         std::array::from_fn(|i| {
@@ -94,32 +177,33 @@ impl Site<'_> {
         Some((Some(Measured { record, words }), density))
     }
 
-    /// All elements of the triangles of a mesh at rest, whose vertices are points from `first` on; `warp` is the direction of the warp.
-    pub(super) fn surface(&mut self, mesh: &Mesh, first: u32, words: &Surface<'_>, warp: Vector) {
-        self.bending(mesh, first, words, warp);
-        let corners = |t: &[u32; 3]| t.map(|i| Vector::from(mesh.vertices[i as usize]));
+    /// All elements of the triangles of a mesh whose vertices are points from `first` on; `rest` is where nothing is strained.
+    pub(super) fn surface(&mut self, mesh: &Mesh, first: u32, words: &Surface<'_>, rest: &Rest<'_>) {
+        self.bending(mesh, first, words, rest);
         if let Some(membrane) = words.membrane {
             let Some(root) = Membrane::root(membrane.warp, membrane.weft(), membrane.poisson, membrane.shear()) else {
                 let most = (membrane.warp / membrane.weft()).sqrt();
                 let message = format!("{}, expected less than sqrt(warp/weft) = {most:.4}", membrane.poisson);
                 return self.wrong(format!("{}.membrane.poisson", words.path), message);
             };
-            for t in &mesh.triangles {
-                if let Some((b, area)) = Membrane::axes(corners(t), warp, membrane.angle.to_radians()) {
+            for (i, t) in mesh.triangles.iter().enumerate() {
+                let (warp, angle) = rest.warp(membrane.angle);
+                if let Some((b, area)) = Membrane::axes(rest.corners(i), warp, angle) {
                     self.parts.membrane(t.map(|i| i + first), b, root, area, membrane.damping);
                 }
             }
         }
         if let Some(Measured { record, words: fabric }) = &words.fabric {
-            for t in &mesh.triangles {
-                if let Some((b, area)) = Membrane::axes(corners(t), warp, fabric.angle.to_radians()) {
+            for (i, t) in mesh.triangles.iter().enumerate() {
+                let (warp, angle) = rest.warp(fabric.angle);
+                if let Some((b, area)) = Membrane::axes(rest.corners(i), warp, angle) {
                     self.parts.woven(t.map(|i| i + first), Woven::rest(b, record, fabric.thicken), area, fabric.damping);
                 }
             }
         }
         if words.area > 0.0 {
-            for t in &mesh.triangles {
-                let [a, b, c] = corners(t);
+            for (i, t) in mesh.triangles.iter().enumerate() {
+                let [a, b, c] = rest.corners(i);
                 let area = (b - a).cross(c - a).norm() / 2.0;
                 if area > 0.0 {
                     self.parts.area(t.map(|i| i + first), area, words.area / area);
@@ -129,44 +213,38 @@ impl Site<'_> {
     }
 
     /// Hinges across every edge of a mesh that has two triangles; B is the bending stiffness per width [N m]. A dihedral hinge has the rest
-    /// angle of the mesh. k = B l²/(A1 + A2), which gives a sheet bent to a cylinder its stiffness B.      (bending.6)
-    fn bending(&mut self, mesh: &Mesh, first: u32, words: &Surface<'_>, warp: Vector) {
+    /// angle of the mesh, or none if there is a pattern. k = B l²/(A1 + A2), which gives a sheet bent to a cylinder its stiffness B.      (bending.6)
+    fn bending(&mut self, mesh: &Mesh, first: u32, words: &Surface<'_>, rest: &Rest<'_>) {
         if words.hinge == 0.0 && words.isometric == 0.0 && words.fabric.is_none() {
             return;
         }
-        let vertex = |i: u32| Vector::from(mesh.vertices[i as usize]);
         for ([a, b], faces) in mesh.edges() {
-            let [t, u] = faces[..] else { continue };
-            let (t, u) = (mesh.triangles[t as usize], mesh.triangles[u as usize]);
-            let opposite = |t: [u32; 3]| t.into_iter().find(|i| *i != a && *i != b);
-            let (Some(c), Some(d)) = (opposite(t), opposite(u)) else { continue };
-            // n1 = e x (x2 - x0) must be the outward normal of its triangle: edge a b runs forward in it.
-            let forward = (0..3).any(|k| t[k] == a && t[(k + 1) % 3] == b);
-            let (c, d) = if forward { (c, d) } else { (d, c) };
-            let area = |t: [u32; 3]| (vertex(t[1]) - vertex(t[0])).cross(vertex(t[2]) - vertex(t[0])).norm() / 2.0;
-            let (areas, length_sq) = (area(t) + area(u), (vertex(b) - vertex(a)).norm_sq());
+            let Some(Wings { nodes: [_, _, c, d], faces: [t, u], at }) = rest.wings([a, b], &faces) else { continue };
+            let area = |t: usize| {
+                let [a, b, c] = rest.corners(t);
+                (b - a).cross(c - a).norm() / 2.0
+            };
+            let (areas, length_sq) = (area(t) + area(u), (at[1] - at[0]).norm_sq());
             if areas > 0.0 && length_sq > 0.0 {
                 let nodes = [a, b, c, d].map(|i| i + first);
                 let share = length_sq / areas;
-                let row = |i: u32| [vertex(i).x, vertex(i).y, vertex(i).z, 0.0];
-                let [rest] = Hinge::residual([0.0], [row(a), row(b), row(c), row(d)]);
+                let [angle] = Hinge::residual([0.0], at.map(|x| [x.x, x.y, x.z, 0.0]));
                 if words.hinge > 0.0 {
-                    self.parts.hinge(nodes, rest, words.hinge * share);
+                    self.parts.hinge(nodes, angle, words.hinge * share);
                 }
                 if let Some(fabric) = &words.fabric {
-                    let way = vertex(b) - vertex(a);
                     // A diagonal lies opposite to a right angle.
-                    let (to_a, to_b) = (vertex(a) - vertex(c), vertex(b) - vertex(c));
+                    let (to_a, to_b) = (at[0] - at[2], at[1] - at[2]);
                     let squares = words.squares.then(|| to_a.dot(to_b).abs() < 1e-6 * to_a.norm() * to_b.norm());
-                    let sides = [t, u].map(|t| fabric.hinges(way, t.map(vertex), warp, squares));
+                    let sides = [t, u].map(|t| fabric.hinges(rest.edge(t, [a, b]), rest.corners(t), rest, squares));
                     let samples = std::array::from_fn(|i| (sides[0][i] + sides[1][i]) / 2.0);
                     if let Some((stiffness, law)) =
                         Moment::samples(samples, if words.squares { SQUARES } else { 1.0 } * length_sq.sqrt() / areas)
                     {
-                        self.parts.crease(nodes, rest, stiffness * share, law, fabric.words.damping);
+                        self.parts.crease(nodes, angle, stiffness * share, law, fabric.words.damping);
                     }
                 }
-                if let (true, Some(rest)) = (words.isometric > 0.0, IsometricBend::rest([a, b, c, d].map(vertex))) {
+                if let (true, Some(rest)) = (words.isometric > 0.0, IsometricBend::rest(at)) {
                     self.parts.isometric(nodes, rest, words.isometric * share);
                 }
             }

@@ -85,7 +85,7 @@ pub fn build(scene: &Scene, assets: &Assets) -> Result<Built, SceneError> {
     let scene = &*drawn;
     let mut warnings = unused(scene, &plans);
     let (colliders, scenery, surfaces) = solids(scene, assets, &mut issues);
-    let mut parts = fill(scene, &plans, assets, (&colliders, &surfaces), &mut issues);
+    let mut parts = fill(scene, &plans, assets, (&colliders, &surfaces), (&mut issues, &mut warnings));
     let anchors: Vec<coupling::Link> =
         scene.anchor.iter().filter_map(|anchor| coupling::link(scene, &plans, anchor, &parts, &mut issues)).collect();
     for anchor in &anchors {
@@ -164,6 +164,7 @@ pub fn build(scene: &Scene, assets: &Assets) -> Result<Built, SceneError> {
         };
         warnings.extend(buried(scene, &parts, &colliders));
         let mut system = parts.build(settings).map_err(|e| placed(scene, e))?;
+        warnings.extend(system.tangles());
         if exchange.ports_of(index).next().is_some() {
             system.expect_pushes();
         }
@@ -286,14 +287,20 @@ fn solids(scene: &Scene, assets: &Assets, issues: &mut Vec<Issue>) -> (Vec<Colli
 }
 
 /// Parts of every system, filled by the recipes in the order of the scene.
-fn fill(scene: &Scene, plans: &[Plan], assets: &Assets, solids: (&[Collider], &[Mesh]), issues: &mut Vec<Issue>) -> Vec<Parts> {
+fn fill(
+    scene: &Scene,
+    plans: &[Plan],
+    assets: &Assets,
+    solids: (&[Collider], &[Mesh]),
+    (issues, hints): (&mut Vec<Issue>, &mut Vec<String>),
+) -> Vec<Parts> {
     // Issues leave colliders out, and then nothing is built.
     let named: Vec<(String, Collider)> = scene.collider.iter().map(|c| c.name.clone()).zip(solids.0.iter().cloned()).collect();
     let mut parts: Vec<Parts> = plans.iter().map(|_| Parts::default()).collect();
     let up: Vector = if scene.dimension == 2 && scene.plane == Plane::Xy { [0.0, 1.0, 0.0] } else { [0.0, 0.0, 1.0] }.into();
     let mut at = |kind: &str, system: &Option<String>, recipe: &mut dyn FnMut(&mut Site<'_>)| {
         if let Some(index) = place(plans, kind, system.as_deref()) {
-            recipe(&mut Site { parts: &mut parts[index], issues: &mut *issues, up, solids: &named, assets });
+            recipe(&mut Site { parts: &mut parts[index], issues: &mut *issues, hints: &mut *hints, up, solids: &named, assets });
         }
     };
     for thing in &scene.particles {

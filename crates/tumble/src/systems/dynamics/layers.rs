@@ -86,6 +86,16 @@ impl Layers {
         intersections(&self.topology, x).len() as u64
     }
 
+    /// How many edges pass through triangles, which objects are the first two, and where [m]; `None` if there are none.
+    fn tangles(&self, objects: &[Object], x: &[Row]) -> Option<(usize, [usize; 2], Vector)> {
+        let all = intersections(&self.topology, x);
+        let (edge, triangle) = *all.first()?;
+        let (edge, triangle) = (self.topology.edges()[edge as usize], self.topology.triangles()[triangle as usize]);
+        let owner = |vertex: u32| objects.iter().position(|o| o.points.contains(&(vertex as usize)));
+        let place = triangle.iter().fold(Vector::default(), |sum, i| sum + xyz64(x[*i as usize])) * (1.0 / 3.0);
+        Some((all.len(), [owner(edge[0])?, owner(triangle[0])?], place))
+    }
+
     /// Untangles what has passed, before an interval; what is still tangled is left alone until it is out.
     fn untangle(&mut self, x: &mut [Row]) {
         for round in 0..=ROUNDS {
@@ -105,6 +115,19 @@ impl Layers {
 }
 
 impl Dynamics {
+    /// Surfaces that pass through each other as they are, as a sentence with the place; `None` if none do, or may.
+    pub fn tangles(&self) -> Option<String> {
+        let (n, [one, other], place) = self.layers.as_ref()?.tangles(&self.objects, &self.state.x)?;
+        let (one, other) = (&self.objects[one].name, &self.objects[other].name);
+        let through = if one == other { "itself".to_string() } else { format!("\"{other}\"") };
+        let place = <[f64; 3]>::from(place).map(|x| format!("{x:.4}")).join(", ");
+        Some(format!(
+            "system \"{}\": {n} edges pass through triangles at the start; at [{place}] \"{one}\" passes through {through}. They are pushed out as far \
+             as that succeeds; start without",
+            self.name
+        ))
+    }
+
     /// Before an interval: what is tangled.
     pub(super) fn untangle(&mut self) {
         if let Some(layers) = &mut self.layers {

@@ -1,0 +1,84 @@
+"""The meshes of a scene mended, for `tumble check --repair`."""
+
+import json
+import os
+import re
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from tumble.cli.console import say
+
+if TYPE_CHECKING:
+    from tumble import Scene
+
+_ENDING = ".repaired.obj"
+
+_DONE = {
+    "welded": ("vertex", "vertices", "sewn to others at the same place"),
+    "repeated": ("triangle", "triangles", "dropped that stood there already"),
+    "degenerate": ("triangle", "triangles", "dropped that had no area"),
+    "turned": ("triangle", "triangles", "turned around"),
+    "split": ("edge", "edges", "of more than two triangles taken apart"),
+}
+_LEFT = {
+    "open": ("edge is", "edges are", "still open"),
+    "odd": ("edge is", "edges are", "still odd: a surface with one side"),
+}
+
+
+def mend(file: Path, scene: "Scene", force: bool) -> list[str]:
+    """Mends the mesh files of a scene, says what was done, and returns the settings that use the new ones. Raises SceneError
+    where a file of that name is there, unless `force` replaces it."""
+    from tumble import SceneError, repair_mesh
+
+    changes: dict[str, Path] = {}
+    seen: set[str] = set()
+    places = scene.mesh_files
+    for _, _, path in places:
+        if path in seen:
+            continue
+        seen.add(path)
+        old = Path(scene.folder) / path
+        text, counts = repair_mesh(old)
+        left = _words(_LEFT, counts)
+        if text is None:
+            say(f"{old}: nothing to mend" + (f"; {left}" if left else ""))
+            continue
+        new = old.with_name(old.name.removesuffix(old.suffix) + _ENDING)
+        if new.exists() and not force:
+            raise SceneError(f"{new}: is there already; take it, delete it, or replace it with --force")
+        say(f"{old}: {_words(_DONE, counts)}" + (f"; {left}" if left else ""))
+        part = new.with_name(f".{new.name}.{os.getpid()}.part")
+        try:
+            part.write_text(text, encoding="ascii")
+            part.replace(new)
+        finally:
+            part.unlink(missing_ok=True)
+        say(f"  written to {new}")
+        changes[path] = new.relative_to(scene.folder) if new.is_relative_to(scene.folder) else new
+    if not seen:
+        say("the scene names no mesh file")
+    tree, settings = scene.to_dict(), []
+    for place, line, path in places:
+        if path in changes:
+            where = f", line {line}" if line else ""
+            value = json.dumps(changes[path].as_posix(), ensure_ascii=False)
+            say(f"{file}{where}: {place} = {value}")
+            settings.append(f"{_key(place, tree)}={value}")
+    say()
+    return settings
+
+
+def _words(words: dict[str, tuple[str, str, str]], counts: dict[str, int]) -> str:
+    parts = []
+    for key, (one, many, what) in words.items():
+        if counts[key]:
+            parts.append(f"{counts[key]} {one if counts[key] == 1 else many} {what}")
+    return ", ".join(parts)
+
+
+def _key(place: str, tree: dict[str, Any]) -> str:
+    """A place of an error, `net "n".mesh.path`, as a key of a setting: `net.0.mesh.path`."""
+    kind, name, rest = re.fullmatch(r'(\w+) "(.*)"(\..*)', place, re.S).groups()  # type: ignore[union-attr]
+    index = next(i for i, thing in enumerate(tree[kind]) if thing["name"] == name)
+    return f"{kind}.{index}" + re.sub(r"\[(\d+)\]", r".\1", rest)
