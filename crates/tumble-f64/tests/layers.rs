@@ -153,3 +153,26 @@ fn a_sheet_on_a_sheet_slides_from_the_angle_of_friction_on() {
         assert!(((end - start) / expected - 1.0).abs() < 0.1, "{beyond}: {} {expected}", end - start);
     }
 }
+
+/// A rope that falls across another one hangs over it; without self-contact it goes on.
+#[test]
+fn a_rope_hangs_over_a_rope() {
+    let gap = |words: &str| {
+        let mut sim = simulation(&format!(
+            "precision = \"double\"\ntime.fps = 60\n[[system]]\nmethod = \"position_based\"\nsubsteps = 10\n{words}\n\
+             [[rope]]\nname = \"tight\"\nfrom = [-0.5, 0, 0]\nto = [0.5, 0, 0]\nsegments = 25\nlinks.structural = 1000\npin = [\"start\", \"end\"]\n\
+             [[rope]]\nname = \"loose\"\nfrom = [0.01, -0.4, 0.1]\nto = [0.03, 0.4, 0.1]\nsegments = 20\nlinks.structural = 1000\n"
+        ));
+        run(&mut sim, 40);
+        let (tight, loose) = (positions(&sim, "tight"), positions(&sim, "loose"));
+        let least = |x: &[Vector]| x.iter().map(|p| p.z).fold(f64::INFINITY, f64::min);
+        let most = |x: &[Vector]| x.iter().map(|p| p.z).fold(f64::NEG_INFINITY, f64::max);
+        (most(&loose) - least(&tight), least(&loose) - least(&tight))
+    };
+    let (top, end) = gap("self_contact = { thickness = 0.02, friction = 0.5 }");
+    let (through, _) = gap("");
+    println!("over the rope {top:.4} m, its ends {end:.3} m; without contact {through:.2} m");
+    // Its axis lies a thickness above that of the other, and its ends hang down.
+    assert!(top > 0.01 && top < 0.06 && end < -0.2, "{top} {end}");
+    assert!(through < -0.5, "{through}");
+}

@@ -331,7 +331,7 @@ pub struct MeshRef<'a> {
     pub hash: &'a mut Option<String>,
 }
 
-/// A triangle mesh from an OBJ, PLY, STL or GLB file, placed in the world: scaled, turned, then moved.
+/// A triangle mesh from an OBJ, PLY, STL or GLB file, or outside the browser from USD, placed in the world: scaled, turned, then moved.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct MeshFile {
