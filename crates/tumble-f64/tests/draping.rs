@@ -187,7 +187,7 @@ fn strip(gamma: f64, cells: u32, bending: &str, mirrored: bool, system: &str) ->
         let ([a, b, c, e], [f, g, h, k]) = (corners(0), corners(1));
         [[a, b, c], [a, c, e], [f, g, k], [g, h, k]]
     };
-    let mesh = Mesh { vertices, triangles: (0..rows - 1).flat_map(cell).collect() };
+    let mesh = Mesh { vertices, triangles: (0..rows - 1).flat_map(cell).collect(), ..Mesh::default() };
     let scene = Scene::from_toml(&text).unwrap_or_else(|e| panic!("{e}\n{text}"));
     let assets = Arc::new(HashMap::from([("strip.obj".to_string(), mesh)]));
     let mut sim = Simulation::new(scene, assets.into()).unwrap_or_else(|e| panic!("{e}"));
