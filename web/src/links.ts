@@ -4,9 +4,6 @@ import type { Column, ObjectInfo, SceneInfo, Value } from "./engine/protocol";
 export const FAMILIES = ["structural", "shear", "bend"] as const;
 export type Family = (typeof FAMILIES)[number];
 
-/** What the engine gives an object that has no words for its links. */
-const DEFAULT: Record<string, any> = { structural: { modulus: 1000 } };
-
 /** What each resists, after docs/theory/structures.md. */
 export const RESISTS: Record<Family, string> = {
   structural: "links lie between neighbours and resist stretching.",
@@ -43,7 +40,7 @@ export function linked(info: SceneInfo): Linked[] {
     if (!KINDS.includes(object.kind)) return [];
     const [entry, index] = entryOf(info, object) ?? [];
     if (!entry || entry.rod || entry.material) return [];
-    const links: Entry = entry.links ?? DEFAULT;
+    const links: Entry = entry.links ?? {};
     const families = Object.fromEntries(FAMILIES.flatMap((f) => (links[f] === null || links[f] === undefined ? [] : [[f, (typeof links[f] === "number" ? { modulus: links[f] } : links[f]) as Settings]])));
     const systems = (info.scene.system ?? []) as Entry[];
     return [{ name: object.name, path: `${object.kind}.${index}.links`, families, diagonals: links.diagonals ?? "both", clamped: systems.some((s) => s.name === object.system && s.clamp) }];
@@ -68,7 +65,7 @@ export function familiesOf(info: SceneInfo, object: ObjectInfo): Uint8Array | nu
   if (!entry || !topology.links) return null;
   const pairs = topology.links.data;
   const out = new Uint8Array(pairs.length / 2);
-  const between = object.kind === "net" ? onEdges(topology.triangles, !(entry.links ?? DEFAULT).structural) : onLattice(object.kind === "rope" ? [entry.segments + 1] : entry.resolution);
+  const between = object.kind === "net" ? onEdges(topology.triangles, !entry.links?.structural) : onLattice(object.kind === "rope" ? [entry.segments + 1] : entry.resolution);
   for (let i = 0; i < out.length; i++) out[i] = between(pairs[2 * i], pairs[2 * i + 1]);
   return out;
 }

@@ -37,6 +37,26 @@ shape = { sphere = { radius = 0.3 } }
 }
 
 #[test]
+fn default_links_are_written_out_where_nothing_else_makes_a_thing_elastic() {
+    let words = |extra: &str| {
+        format!(
+            "version = 1\n[[rope]]\nname = \"r\"\nfrom = [0, 0, 0]\nto = [1, 0, 0]\nsegments = 2\n\
+             [[sheet]]\nname = \"s\"\nsize = [1, 1]\nresolution = [2, 2]\n{extra}\n[[net]]\nname = \"n\"\nmesh = {{ path = \"m.obj\" }}\n{extra}"
+        )
+    };
+    let links = |extra: &str| {
+        let json = Scene::from_toml(&words(extra)).unwrap().to_json();
+        let again: Scene = serde_json::from_value(json.clone()).unwrap();
+        assert_eq!(again.to_json(), json);
+        ["rope", "sheet", "net"]
+            .map(|kind| ["structural", "shear", "bend"].map(|family| json[kind][0]["links"][family]["modulus"].as_f64()))
+    };
+    let rope = [Some(1000.0), None, None];
+    assert_eq!(links(""), [rope, [Some(500.0), Some(200.0), Some(10.0)], [Some(500.0), None, Some(10.0)]]);
+    assert_eq!(links("membrane = { warp = 100 }"), [rope, [None; 3], [None; 3]]);
+}
+
+#[test]
 fn every_error_is_reported_at_once() {
     let found = errors(
         r#"version = 1

@@ -253,7 +253,12 @@ impl Scene {
 
     /// The scene as JSON, every default written out.
     pub fn to_json(&self) -> serde_json::Value {
-        serde_json::to_value(self).unwrap_or_default()
+        let mut full = self.clone();
+        full.rope.iter_mut().filter(|o| o.rod.is_none()).for_each(|o| o.links = Some(o.links()));
+        full.sheet.iter_mut().for_each(|o| o.links = Some(o.links()));
+        full.net.iter_mut().for_each(|o| o.links = Some(o.links()));
+        full.cloth.iter_mut().for_each(|o| o.links = Some(o.links()));
+        serde_json::to_value(full).unwrap_or_default()
     }
 
     /// Duration of one frame [s].

@@ -589,6 +589,10 @@ pub struct Region {
     pub follow: Option<Follow>,
 }
 
+pub(super) fn rope_links() -> Links {
+    Links { structural: Some(Link::Settings(LinkSettings { modulus: 1000.0, ..LinkSettings::default() })), ..Links::default() }
+}
+
 pub(super) fn sheet_links() -> Links {
     let family = |modulus| Some(Link::Settings(LinkSettings { modulus, ..LinkSettings::default() }));
     Links { structural: family(500.0), shear: family(200.0), bend: family(10.0), diagonals: Diagonals::Both }

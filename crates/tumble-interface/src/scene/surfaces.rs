@@ -1,7 +1,7 @@
 //! Elastic surfaces, what they enclose, and bodies that keep their shape.
 
 use super::structures::Links;
-use super::{Cloth, Net, Sheet};
+use super::{Cloth, Net, Rope, Sheet};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -144,6 +144,13 @@ pub struct Fill {
     /// Lengths of its edges; as many particles as fit best.
     #[schemars(transform = super::items_above_zero, extend("x-unit" = "m"))]
     pub size: [f64; 3],
+}
+
+impl Rope {
+    /// Its springs: those given, else stiff ones between neighbours. Not of a rod, which has none.
+    pub fn links(&self) -> Links {
+        links(&self.links, self.rod.is_some(), super::structures::rope_links)
+    }
 }
 
 impl Sheet {

@@ -6,7 +6,7 @@ use crate::geometry::Vector;
 use crate::math::functions::{cos, sin};
 use crate::math::rotation::from_z_to;
 use crate::math::{Quat, bisect};
-use tumble_interface::scene::{Link, LinkSettings, Links, Rod, Rope};
+use tumble_interface::scene::{Links, Rod, Rope};
 
 /// Adds the masses, and links or rod elements.
 pub fn rope(site: &mut Site<'_>, thing: &Rope) {
@@ -40,19 +40,14 @@ pub fn rope(site: &mut Site<'_>, thing: &Rope) {
             let ends = [pins.contains(&first), pins.contains(&(first + n))];
             frames(site, thing, rod, &places, first, ends, spacing);
         }
-        (None, links) => {
-            let links = links.clone().unwrap_or_else(default_links);
+        (None, _) => {
+            let links = thing.links();
             if links.shear.is_some() {
                 site.wrong(format!("{path}.links.shear"), "a rope has no diagonals; known here: structural, bend");
             }
             chain(site, &links, first, n, spacing);
         }
     }
-}
-
-/// Without links, a rope is a chain of stiff springs.
-fn default_links() -> Links {
-    Links { structural: Some(Link::Settings(LinkSettings { modulus: 1000.0, ..LinkSettings::default() })), ..Links::default() }
 }
 
 /// Springs by the rest length, which a slack or a taut start does not have between its masses.
