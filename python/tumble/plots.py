@@ -3,7 +3,7 @@
 import contextlib
 import os
 import textwrap
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from itertools import pairwise
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -95,6 +95,41 @@ def ledger(run: Recording, columns: str | Sequence[str], path: str | os.PathLike
         return save(figure, path)
 
 
+def beside(
+    runs: Mapping[str, Recording],
+    columns: Sequence[str],
+    path: str | os.PathLike[str],
+    starts: Mapping[str, float] | None = None,
+) -> Path:
+    """Plots columns of several runs over time, a pair of axes for each column, a curve for each run with its name beside it.
+    A vector's name stands for its three columns; without columns, the energies. The curve of a branch begins where `starts`
+    says [s], at a line. Raises ExportError."""
+    first = next(iter(runs.values()))
+    wanted = [n for name in columns for n in _expanded(first, name)]
+    if not wanted:
+        wanted = [n for n in ENERGIES if any(np.any(_column(run, n) != 0) for run in runs.values())] + ["energy"]
+    begins = starts or {}
+    share = 2.0 if len(wanted) == 1 else 1.4
+    with settings():
+        figure, axes = _figure([share] * len(wanted))
+        for ax, name in zip(axes, wanted, strict=True):
+            curves, times = [], []
+            for k, (label, run) in enumerate(runs.items()):
+                t = _column(run, "time")
+                shown = t >= begins.get(label, -np.inf)
+                times.append(t[shown])
+                curves.append((label, _column(run, name)[shown], PALETTE[k % len(PALETTE)]))
+            for moment in sorted(set(begins.values())):
+                ax.axvline(moment, color=FAINT, linewidth=0.8, linestyle=(0, (3, 3)))
+            _draw(ax, share, times, curves)
+            for line in ax.lines[len(set(begins.values())) + len(PALETTE) :]:
+                line.set_linestyle((0, (4, 1.5)))
+            ax.set_ylabel(_label([name], unit(name)))
+        axes[0].set_title(figure_title(first, ""))
+        axes[-1].set_xlabel("time [s]")
+        return save(figure, path)
+
+
 def unit(column: str) -> str:
     """The unit of a column of the ledger; nothing for counts."""
     stem = column[:-2] if column.endswith(("_x", "_y", "_z")) else column
@@ -148,11 +183,13 @@ def _figure(heights: Sequence[float]) -> tuple["Figure", list["Axes"]]:
     return figure, axes
 
 
-def _draw(ax: "Axes", share: float, t: Floats, curves: Sequence[tuple[str, Floats, str]]) -> None:
-    """Curves with their names beside their ends, moved apart where they would meet; `share` is the height in rows."""
-    for _, values, color in curves:
-        ax.plot(t, values, color=color)
-    if not len(t):
+def _draw(ax: "Axes", share: float, t: Floats | Sequence[Floats], curves: Sequence[tuple[str, Floats, str]]) -> None:
+    """Curves with their names beside their ends, moved apart where they would meet; `share` is the height in rows. `t` is one
+    for all, or a list with one for each."""
+    times = t if isinstance(t, list) else [t] * len(curves)
+    for when, (_, values, color) in zip(times, curves, strict=True):
+        ax.plot(when, values, color=color)
+    if not any(len(when) for when in times):
         return
     ends = [(float(v[np.isfinite(v)][-1]) if np.isfinite(v).any() else 0.0) for _, v, _ in curves]
     ax.margins(x=0.01)
