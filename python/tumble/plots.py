@@ -21,6 +21,8 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
+    from tumble.refine import Study
+
 Floats = npt.NDArray[np.float64]
 
 UNITS = {
@@ -130,6 +132,57 @@ def beside(
         return save(figure, path)
 
 
+def convergence(study: "Study", path: str | os.PathLike[str]) -> Path:
+    """Plots the first measure of the ledger over time at every level, and below it how much each measure changes from one
+    level to the next, over its size, beside slopes of order 1, 2 and 4. Raises ExportError."""
+    from matplotlib.ticker import NullLocator
+
+    columns = [m.name.partition("@")[0] for m in study.measures if "." not in m.name]
+    runs = {f"level {k}": run for k, run in enumerate(study.runs) if run is not None}
+    with settings():
+        figure, axes = _figure([1.8, 2.6] if columns else [2.6], sharex=False)
+        if columns:
+            name = columns[0]
+            times = [_column(run, "time") for run in runs.values()]
+            curves = [(k, _column(run, name), PALETTE[i % len(PALETTE)]) for i, (k, run) in enumerate(runs.items())]
+            _draw(axes[0], 1.8, times, curves)
+            axes[0].set_ylabel(_label([name], unit(name)))
+            axes[0].set_xlabel("time [s]")
+        axes[0].set_title(figure_title(next(iter(runs.values())), "refined"))
+        ax = axes[-1]
+        ends: list[tuple[str, float, str]] = []
+        finest, top = study.levels - 1, 0.0
+        for i, m in enumerate(study.measures):
+            values = np.array(m.values)
+            size = np.max(np.abs(values[np.isfinite(values)]), initial=0.0)
+            changes = np.abs(np.diff(values)) / size if size else np.zeros(finest)
+            shown = np.isfinite(changes) & (changes > 0)
+            if shown.any():
+                color = PALETTE[i % len(PALETTE)]
+                ax.plot(np.arange(1, finest + 1)[shown], changes[shown], color=color, marker="o", markersize=4)
+                ends.append((m.name, float(changes[shown][-1]), color))
+                top = max(top, float(changes[shown][0]))
+        for order in (1, 2, 4) if top else ():
+            ax.plot(
+                [1, finest],
+                [top, top * 2.0 ** (-order * (finest - 1))],
+                color=FAINT,
+                linewidth=0.8,
+                linestyle=(0, (3, 3)),
+            )
+            ends.append((f"order {order}", top * 2.0 ** (-order * (finest - 1)), FAINT))
+        ax.set_yscale("log")
+        ax.set_xticks(range(1, finest + 1), [f"{k - 1} to {k}" for k in range(1, finest + 1)])
+        ax.xaxis.set_minor_locator(NullLocator())
+        ax.set_xlabel("level")
+        ax.set_ylabel("relative change")
+        low, high = np.log(ax.get_ylim())
+        places = _apart([(np.log(value) - low) / (high - low) for _, value, _ in ends], LABEL / (ROW * 2.6))
+        for (label, _, color), place in zip(ends, places, strict=True):
+            ax.annotate(label, (1.015, place), xycoords="axes fraction", va="center", color=color, fontsize=9)
+        return save(figure, path)
+
+
 def unit(column: str) -> str:
     """The unit of a column of the ledger; nothing for counts."""
     stem = column[:-2] if column.endswith(("_x", "_y", "_z")) else column
@@ -173,11 +226,11 @@ def settings() -> Iterator[None]:
         yield
 
 
-def _figure(heights: Sequence[float]) -> tuple["Figure", list["Axes"]]:
+def _figure(heights: Sequence[float], sharex: bool = True) -> tuple["Figure", list["Axes"]]:
     from matplotlib.figure import Figure
 
     figure = Figure(figsize=(6.4, 0.9 + ROW * sum(heights)), layout="constrained")
-    grid = figure.subplots(len(heights), 1, sharex=True, squeeze=False, height_ratios=list(heights))
+    grid = figure.subplots(len(heights), 1, sharex=sharex, squeeze=False, height_ratios=list(heights))
     axes: list[Axes] = list(grid[:, 0])
     figure.align_ylabels(axes)
     return figure, axes

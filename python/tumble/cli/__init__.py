@@ -12,7 +12,7 @@ from typing import Annotated, Any
 import typer
 from typer.core import TyperGroup
 
-from tumble.cli import branch, check, diff, export, lab, plot, render, run, scenes, view
+from tumble.cli import branch, check, diff, export, lab, plot, refine, render, run, scenes, view
 from tumble.cli.console import complain, heed_termination, stopped, survive_narrow_streams
 
 
@@ -86,6 +86,7 @@ def application() -> typer.Typer:
     for verb in (
         run.run,
         check.check,
+        refine.refine,
         render.render,
         export.export,
         plot.plot,
