@@ -183,9 +183,11 @@ class Recorder:
         self.manifest["expectations"] = [b.to_dict() for b in broken]
         self._write_manifest()
 
-    def fail(self, error: StepError) -> None:
-        """Notes why the physics broke, then tries what would have helped."""
+    def fail(self, error: StepError, cures: bool = True) -> None:
+        """Notes why the physics broke, then, if `cures` are asked for, tries what would have helped."""
         self.stop("failed", str(error), getattr(error, "report", {}))
+        if not cures:
+            return
         failure = self.manifest["failure"]
         with suppress(KeyboardInterrupt):  # The failure is worth more than its cures.
             failure["cures"] = self.world.cures()

@@ -85,8 +85,7 @@ class Measure:
     def judge(self, ulp: float, factor: float = FACTOR) -> None:
         """Finds order, limit and error (refinement.2, refinement.3); `ulp` is the relative distance of two numbers that
         neighbour each other."""
-        broken = [k for k, value in enumerate(self.values) if not math.isfinite(value)]
-        fine = self.values[broken[-1] + 1 if broken else 0 :]
+        fine = _in_a_row(self.values)
         steps = [b - a for a, b in pairwise(fine)]
         floor = ROUND_OFF * ulp * max(map(abs, fine), default=0.0)
         self.orders = [_order(a, b, factor) for a, b in pairwise(steps)]
@@ -142,12 +141,14 @@ def study(
     overwrite: bool = False,
     threads: int | None = None,
     progress: Named | None = None,
+    warn: Callable[[str], None] | None = None,
 ) -> Study:
     """Runs a scene at several resolutions, in `folder`/level-0, level-1 and so on, each twice as fine as the one before, and
     looks where its measures tend to.
 
     `what` names the words that are refined, as `plan` has it, and `measures` what is measured, as `value` has it. `resume`
-    keeps levels that were finished, `overwrite` replaces them. Raises SceneError if the scene, a path or a measure is wrong.
+    keeps levels that were finished, `overwrite` replaces them. `warn` is told, before a level is
+    simulated, if its steps are too long by estimate. Raises SceneError if the scene, a path or a measure is wrong.
     """
     refined, notes = plan(scene, levels, what)
     goal = Path(folder)
@@ -161,9 +162,14 @@ def study(
     failures: dict[int, str] = {}
     for k, finer in enumerate(scenes):
         place = goal / f"level-{k}"
+        if warn is not None:
+            for text in _too_long(World(finer, threads)):
+                warn(f"level {k}: {text}")
         try:
             shown = progress(f"level {k}") if progress else None
-            done = simulate(finer, place, resume=resume, threads=threads, progress=shown, overwrite=overwrite)
+            done = simulate(
+                finer, place, resume=resume, threads=threads, progress=shown, overwrite=overwrite, cures=False
+            )
             runs.append(done)
         except StepError as error:
             failures[k] = str(error).splitlines()[0]
@@ -177,6 +183,22 @@ def study(
     return Study(scene, goal, refined, notes, runs, failures, found)
 
 
+def _too_long(world: World) -> list[str]:
+    """Systems whose steps are longer than what is usable by estimate."""
+    found = []
+    for about in world.stability():
+        usable = next(
+            (float(at["usable"]) for at in about["limits"] if at["integrator"] == about["integrator"]), math.inf
+        )
+        if float(about["step"]) > usable:
+            found.append(
+                f'system "{about["system"]}" takes steps of {about["step"]:.3g} s, usable are {usable:.3g} s by estimate: '
+                "it is likely to break. Halved distances ask for half the step, with internal damping for a quarter: take more "
+                "substeps, or refine them with --what system.0.substeps*4"
+            )
+    return found
+
+
 # What is refined
 
 
@@ -184,8 +206,9 @@ def plan(scene: Scene, levels: int, what: Sequence[str] = ()) -> tuple[list[Refi
     """The words that are refined, with their values at each level, and what is to be said about them.
 
     `what` are paths such as "system.0.substeps" or "rope.rope.segments". Counts are doubled; masses along the sides of
-    sheets and blocks are 2 n - 1, so that their distances are halved; lengths, times and tolerances are halved. Without it:
-    how finely each thing is divided, and the given steps of each system; where there is nothing of that, the sub-steps.
+    sheets and blocks are 2 n - 1, so that their distances are halved; lengths, times and tolerances are halved.
+    "system.0.substeps*4" and "system.0.step/4" say another factor. Without it: how finely each thing is divided, and the
+    given steps of each system; where there is nothing of that, the sub-steps.
     Raises SceneError.
     """
     tree = scene.to_dict()
@@ -206,8 +229,12 @@ def plan(scene: Scene, levels: int, what: Sequence[str] = ()) -> tuple[list[Refi
         else:
             own.append((i, system))
     if not paths:
-        if any(system["integrator"] in ADAPTIVE for _, system in own):
-            raise _wrong("system", "adaptive steps are not refined by default; name their tolerance with --what")
+        adaptive = [i for i, system in own if system["integrator"] in ADAPTIVE]
+        if adaptive:
+            cure = f"--what system.{adaptive[0]}.adaptive.tolerance refines it"
+            raise _wrong(
+                f"system.{adaptive[0]}", f"its steps follow a tolerance, which is not refined by default; {cure}"
+            )
         count = max(1, len(tree["system"]))
         paths = [f"system.{i}.substeps" for i in range(count)]
     else:
@@ -218,15 +245,36 @@ def plan(scene: Scene, levels: int, what: Sequence[str] = ()) -> tuple[list[Refi
     return [_refined(scene, tree, path, levels) for path in paths], notes
 
 
-def _refined(scene: Scene, tree: Mapping[str, Any], path: str, levels: int) -> Refined:
+def _refined(scene: Scene, tree: Mapping[str, Any], text: str, levels: int) -> Refined:
+    path, times, number = (re.fullmatch(r"(.*?)(?:([*/])([0-9.]+))?", text) or _never()).groups()
+    try:
+        factor = float(number) if number else 0.0
+    except ValueError:
+        factor = math.nan
+    if number and not 1.0 < factor < 1e6:
+        raise _wrong(text, f"a factor of {number}, expected more than 1")
     place = _named(tree, path)
     start = _at(tree, place)
     if start is None and place.endswith(".substeps"):
         start = _own_substeps(scene, tree, place)
     values = [start]
     for _ in range(levels - 1):
-        values.append(_finer(place, values[-1], path))
+        values.append(_scaled(values[-1], times, factor, text) if number else _finer(place, values[-1], text))
     return Refined(place, values)
+
+
+def _scaled(value: Any, times: str, factor: float, told: str) -> Any:
+    """A number times a factor that was given, or divided by it."""
+    if isinstance(value, bool) or not isinstance(value, int | float):
+        raise _wrong(told, f"{value!r}, expected a number to refine by a factor")
+    new = value * factor if times == "*" else value / factor
+    if isinstance(value, int) and new != round(new):
+        raise _wrong(told, f"{value} is a count, and {new:g} is none")
+    return int(new) if isinstance(value, int) else new
+
+
+def _never() -> re.Match[str]:
+    raise AssertionError("any text matches")
 
 
 def _finer(path: str, value: Any, told: str) -> Any:
@@ -353,6 +401,17 @@ def _of_object(columns: Columns, measure: str, name: str, how: str) -> float:
     if how not in _OVER_ELEMENTS:
         raise _wrong(measure, f'"{how}", expected {", ".join(_OVER_ELEMENTS)} or the index of an element')
     return float(_OVER_ELEMENTS[how](array)) if array.size else math.nan
+
+
+def _in_a_row(values: Sequence[float]) -> list[float]:
+    """The finest three or more neighbouring levels that did not break, with those before them; or what there is."""
+    rows: list[list[float]] = [[]]
+    for number in values:
+        if math.isfinite(number):
+            rows[-1].append(number)
+        else:
+            rows.append([])
+    return next((row for row in reversed(rows) if len(row) >= 3), rows[-1])
 
 
 def _order(before: float, after: float, factor: float) -> float:

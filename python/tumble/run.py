@@ -30,11 +30,13 @@ def simulate(
     threads: int | None = None,
     progress: Progress | None = None,
     overwrite: bool = False,
+    cures: bool = True,
 ) -> "Run":
     """Simulates a scene into a folder.
 
     `frames` overrides the scene's. `resume` goes on where an earlier run in the folder was stopped, to the same bits as
     if it had not been; without an earlier run it starts one. `overwrite` replaces an earlier run.
+    Where the physics breaks, `cures` are tried, which takes as long as many such runs.
 
     Raises SceneError if the scene or the folder is wrong, before anything is written; StepError if the physics breaks;
     ExportError if a file cannot be written. Whatever was finished by then can be read with `Run.open`.
@@ -50,7 +52,7 @@ def simulate(
     with alone(files.path):
         # Another run may have come and gone meanwhile.
         earlier = admit(files, scene, resume, overwrite)
-        return _simulate(files, world, threads, progress, earlier, overwrite)
+        return _simulate(files, world, threads, progress, earlier, overwrite, cures)
 
 
 def _simulate(
@@ -60,6 +62,7 @@ def _simulate(
     progress: Progress | None,
     earlier: dict[str, Any] | None,
     overwrite: bool,
+    cures: bool,
 ) -> "Run":
     if earlier is not None and not return_to_checkpoint(world, files):
         earlier, overwrite = None, True
@@ -67,11 +70,11 @@ def _simulate(
     if earlier is None and overwrite and files.is_run():
         files.clear()
     recorder = Recorder(files, world, threads, earlier)
-    return record(recorder, recorder.start if earlier is None else recorder.go_on, progress)
+    return record(recorder, recorder.start if earlier is None else recorder.go_on, progress, cures)
 
 
-def record(recorder: Recorder, begin: Callable[[], None], progress: Progress | None) -> "Run":
-    """Begins to record, and simulates to the last frame."""
+def record(recorder: Recorder, begin: Callable[[], None], progress: Progress | None, cures: bool = True) -> "Run":
+    """Begins to record, and simulates to the last frame. Where that fails, `cures` are tried."""
     files, world = recorder.files, recorder.world
     try:
         begin()
@@ -80,7 +83,7 @@ def record(recorder: Recorder, begin: Callable[[], None], progress: Progress | N
         run = Run(files.path)
         recorder.judge(expect.check(run))
     except StepError as error:
-        recorder.fail(error)
+        recorder.fail(error, cures)
         raise
     except KeyboardInterrupt:
         recorder.stop("interrupted", "stopped by the user")

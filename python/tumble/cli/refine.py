@@ -46,7 +46,7 @@ def refine(
     Level 0 is the scene as it is; each further level is twice as fine. Without --what, that is how finely each thing is
     divided (segments, resolution) and the substeps or step of each system that has one; where a scene has none of them, the
     substeps. Counts are doubled; the masses along the sides of sheets and blocks become 2 n - 1, which halves their distances;
-    lengths, times and tolerances are halved.
+    lengths, times and tolerances are halved. PATH*F and PATH/F say another factor; orders count doublings all the same.
 
     A measure is a column of ledger.csv at the end, or its largest, smallest or mean value over the frames: energy, speed@max.
     Or a column of an object in the last frame, over its elements or of one: rope.position.z@min, p.position.x@1.
@@ -65,7 +65,7 @@ def refine(
     Examples:
       tumble refine springs/forever --levels 5 --set precision=double
       tumble refine rope --measure rope.position.z@min --frames 24
-      tumble refine my.toml --what system.0.substeps --what sheet.flag.resolution
+      tumble refine my.toml --what system.0.substeps*4 --what sheet.flag.resolution
     """
     from tumble.refine import study, write
 
@@ -80,7 +80,7 @@ def refine(
             stack.pop_all().close()
             return stack.enter_context(Progress(level))
 
-        found = study(checked, folder, levels, what or (), measure or (), resume, force, threads, shown)
+        found = study(checked, folder, levels, what or (), measure or (), resume, force, threads, shown, warn)
     for line in _told(found):
         say(line)
     for note in found.notes:
