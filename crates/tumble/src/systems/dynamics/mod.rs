@@ -417,9 +417,11 @@ impl Dynamics {
                 self.lead_held(t + done, dt - done);
                 self.remember(dt - done);
                 let (begun, left) = (done, dt - done);
+                // The error of a step knows nothing of contact.
+                let longest = self.longest_among_pairs().max(self.adaptive.smallest * dt).min(left);
                 self.witness(t + done);
                 let y = (&mut self.state.x[..], &mut self.state.v[..]);
-                let times = (t + done, left, dt);
+                let times = (t + done, longest, dt);
                 let taken = adaptive_step(
                     self.integrator,
                     &self.adaptive,
