@@ -1,10 +1,9 @@
 //! L4: what the world asks of a system, and the archive that snapshots are made of.
 
 use crate::exchange::Exchange;
-use crate::math::parallel::CHUNK;
+use crate::math::parallel::{CHUNK, Tasks, rows};
 use crate::math::{Real, Row};
 use crate::state::Field;
-use rayon::prelude::*;
 use tumble_interface::engine::{Ledger, Stability, StepReport, UserForce, UserIntegrator};
 use tumble_interface::{Column, StepError};
 
@@ -128,7 +127,7 @@ impl Archive {
     /// Writes the first three numbers of each row. There may be as many as `room` later.
     pub fn push_points(&mut self, name: &str, rows: &[Row], room: usize) {
         let into = self.table(name, 3, rows.len(), room);
-        into.par_chunks_mut(3 * CHUNK).zip(rows.par_chunks(CHUNK)).for_each(|(into, rows)| {
+        into.chunks_mut(3 * CHUNK).zip(rows.chunks(CHUNK)).in_parallel(|(into, rows)| {
             for (into, row) in into.chunks_exact_mut(3).zip(rows) {
                 into.copy_from_slice(&row[..3]);
             }
@@ -145,7 +144,7 @@ impl Archive {
     pub fn push_field(&mut self, name: &str, field: &Field) {
         let [x, y, z] = field.points();
         let into = self.table(name, 1, x * y * z, 0);
-        into.par_chunks_mut(x).enumerate().for_each(|(row, into)| {
+        rows(into, x, |row, into| {
             let at = field.index([0, row % y, row / y]);
             into.copy_from_slice(&field.data[at..at + x]);
         });

@@ -3,10 +3,9 @@
 use super::list::{List, Members};
 use super::{Element, Law};
 use crate::linalg::blocks::Block;
-use crate::math::parallel::{CHUNK, chunks, fold};
+use crate::math::parallel::{CHUNK, Tasks, chunks, fold};
 use crate::math::simd::{Index, Kernel, Width, dispatch, packs};
 use crate::math::{Real, Row, ZERO, add};
-use rayon::prelude::*;
 use std::ops::Range;
 use tumble_interface::scene::Hessian;
 
@@ -174,10 +173,7 @@ impl<E: Element<N, M, D>, Y: Law<P>, const N: usize, const M: usize, const D: us
     /// Calls `f(list, range, slots)` for every chunk of elements.
     fn fill(&mut self, f: impl Fn(&List<E, Y, N, M, D, P>, Range<usize>, &mut [Row]) + Sync) {
         let list = &self.list;
-        self.slots
-            .par_chunks_mut(N * CHUNK)
-            .enumerate()
-            .for_each(|(i, slots)| f(list, i * CHUNK..((i + 1) * CHUNK).min(list.len()), slots));
+        self.slots.chunks_mut(N * CHUNK).enumerate().in_parallel(|(i, slots)| f(list, i * CHUNK..((i + 1) * CHUNK).min(list.len()), slots));
     }
 }
 

@@ -6,10 +6,9 @@
 use super::list::Members;
 use super::{Compliance, Element, Law, corrected, energy, project};
 use crate::geometry::Walls;
-use crate::math::parallel::fold;
+use crate::math::parallel::{self, Tasks, fold};
 use crate::math::simd::{Index, Kernel, Width, count, dispatch, packs};
 use crate::math::{Lane, Quat, Real, Row, xyz};
-use rayon::prelude::*;
 use std::marker::PhantomData;
 use std::ops::Range;
 
@@ -213,9 +212,9 @@ impl<const N: usize, const D: usize, const P: usize> Columns<N, D, P> {
             if color.len() <= 2 * TASK {
                 run(color.clone(), own);
             } else if each == 0 {
-                (0..color.len().div_ceil(TASK)).into_par_iter().for_each(|t| run(task(t), &mut []));
+                parallel::each(color.len().div_ceil(TASK), &|t| run(task(t), &mut []));
             } else {
-                own.par_chunks_mut(each * TASK).enumerate().for_each(|(t, own)| run(task(t), own));
+                own.chunks_mut(each * TASK).enumerate().in_parallel(|(t, own)| run(task(t), own));
             }
         }
     }

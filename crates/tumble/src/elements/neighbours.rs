@@ -6,10 +6,9 @@
 //! one where a few rows lack that neighbour.
 
 use super::list::{Members, Pack};
-use crate::math::parallel::CHUNK;
+use crate::math::parallel::{CHUNK, Tasks};
 use crate::math::simd::{Index, Kernel, Width, dispatch, packs};
 use crate::math::{Real, Row, Vec3};
-use rayon::prelude::*;
 use std::ops::Range;
 
 /// Rows per slice; every register width divides it, and chunks of rows hold whole ones.
@@ -279,8 +278,8 @@ impl Columns {
         for column in [&mut *x, &mut *y, &mut *z] {
             column.resize(length, 0.0);
         }
-        let parts = x.par_chunks_mut(CHUNK).zip(y.par_chunks_mut(CHUNK)).zip(z.par_chunks_mut(CHUNK));
-        parts.zip(rows.par_chunks(CHUNK)).for_each(|(((x, y), z), rows)| dispatch(Transpose { rows, to: [x, y, z] }));
+        let parts = x.chunks_mut(CHUNK).zip(y.chunks_mut(CHUNK)).zip(z.chunks_mut(CHUNK));
+        parts.zip(rows.chunks(CHUNK)).in_parallel(|(((x, y), z), rows)| dispatch(Transpose { rows, to: [x, y, z] }));
     }
 }
 

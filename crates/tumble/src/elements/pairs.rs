@@ -6,10 +6,9 @@ use super::list::{List, Members};
 use super::neighbours::{Columns, Neighbours, SLICE};
 use super::{Distance, Element, Law, Vector};
 use crate::linalg::blocks::Block;
-use crate::math::parallel::{chunks, fold};
+use crate::math::parallel::{Tasks, chunks, fold};
 use crate::math::simd::{Kernel, Scalar, Width, count, dispatch, packs};
 use crate::math::{Lane, Real, Row, Vec3, xyz};
-use rayon::prelude::*;
 use std::marker::PhantomData;
 use std::ops::Range;
 use tumble_interface::scene::Hessian;
@@ -369,7 +368,7 @@ impl<E: Pair<M, D>, Y: Law<P>, const M: usize, const D: usize, const P: usize> B
             parts.push((slices, part));
             left = rest;
         }
-        parts.into_par_iter().for_each(|(slices, cache)| {
+        parts.into_iter().in_parallel(|(slices, cache)| {
             dispatch(Linearize::<E, Y, M, D, P> { lists, weights, slices, x, cache, kind: PhantomData });
         });
     }

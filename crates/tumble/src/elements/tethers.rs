@@ -5,10 +5,9 @@
 //!
 //! Source: [kim2012]. Differs: held points that are linked to each other are one group, of which only the nearest ties a point.
 
-use crate::math::parallel::CHUNK;
+use crate::math::parallel::{CHUNK, Tasks};
 use crate::math::simd::{Index, Kernel, Width, dispatch, packs};
 use crate::math::{Lane, Real, Row, Vec3};
-use rayon::prelude::*;
 use std::cmp::Reverse;
 use std::collections::BinaryHeap;
 use std::ops::Range;
@@ -124,7 +123,7 @@ impl Tethers {
     pub fn project(&self, x: &mut [Row]) {
         // Held points do not move; the others are read and written by one task each.
         let held: Vec<Row> = x[self.rows.clone()].to_vec();
-        x[self.rows.clone()].par_chunks_mut(CHUNK).enumerate().for_each(|(c, x)| {
+        x[self.rows.clone()].chunks_mut(CHUNK).enumerate().in_parallel(|(c, x)| {
             for (index, length) in &self.groups {
                 dispatch(Pull { index: &index.get()[c * CHUNK..], length: &length[c * CHUNK..], first: self.rows.start, held: &held, x });
             }

@@ -10,10 +10,9 @@
 
 use super::Flow;
 use crate::elements::{Batch, Block, Incidence, Weights};
-use crate::math::parallel::{CHUNK, chunks};
+use crate::math::parallel::{CHUNK, Tasks, chunks};
 use crate::math::simd::Index;
 use crate::math::{Lane, Real, Row, Vec3, ZERO, add, row, xyz64};
-use rayon::prelude::*;
 
 /// What the air does to a surface.
 pub struct Air {
@@ -171,7 +170,7 @@ impl Batch for Sails {
         relative.resize(n, ZERO);
         forces.resize(n, ZERO);
         let sails = &*self;
-        relative.par_chunks_mut(BLOCK).zip(forces.par_chunks_mut(BLOCK)).enumerate().for_each(|(block, (relative, forces))| {
+        relative.chunks_mut(BLOCK).zip(forces.chunks_mut(BLOCK)).enumerate().in_parallel(|(block, (relative, forces))| {
             let mut middle = [ZERO; BLOCK];
             let third = 1.0 / 3.0;
             for (k, middle) in middle.iter_mut().enumerate().take(forces.len()) {
@@ -239,7 +238,7 @@ impl Batch for Sails {
         let mut products = std::mem::take(&mut self.products);
         products.resize(self.len(), ZERO);
         let sails = &*self;
-        products.par_chunks_mut(CHUNK).enumerate().for_each(|(c, products)| {
+        products.chunks_mut(CHUNK).enumerate().in_parallel(|(c, products)| {
             for (k, out) in products.iter_mut().enumerate() {
                 let e = c * CHUNK + k;
                 let [a, b, d] = [0, 1, 2].map(|a| u[sails.nodes[a].get()[e] as usize]);

@@ -1,12 +1,11 @@
 //! The direct sum: every mass pulls every other, every charge pushes every other.
 
 use crate::elements::{Batch, Block, Weights};
-use crate::math::parallel::chunks;
+use crate::math::parallel::{Tasks, chunks};
 use crate::math::roots::{cube_unit, first_guess, inverse_cube, inverse_root, root_unit};
 use crate::math::simd::{Kernel, Width, count, dispatch, packs};
 use crate::math::{Lane, Real, Row, Vec3, xyz64};
 use crate::state::Masses;
-use rayon::prelude::*;
 use std::ops::Range;
 use tumble_interface::scene::Hessian;
 
@@ -555,7 +554,7 @@ impl DirectSum {
         forces.resize(n, [0.0; 3]);
         let law = &*self;
         let strip = |k: usize| k * size..((k + 1) * size).min(n);
-        sums.par_chunks_mut(6 * size).zip(&pairs).for_each(|(out, (a, b))| {
+        sums.chunks_mut(6 * size).zip(&pairs).in_parallel(|(out, (a, b))| {
             let mut columns = out.chunks_exact_mut(size);
             let mut three = || std::array::from_fn(|_| columns.next().unwrap_or(&mut []));
             let out = [three(), three()];
@@ -660,7 +659,7 @@ impl Batch for DirectSum {
 
     fn add_product(&self, _u: &[Row], start: usize, out: &mut [Row]) {
         self.among(start, out, |first, out| {
-            out.par_chunks_mut(TASK).enumerate().for_each(|(k, out)| dispatch(Product { law: self, first: first + k * TASK, out }));
+            out.chunks_mut(TASK).enumerate().in_parallel(|(k, out)| dispatch(Product { law: self, first: first + k * TASK, out }));
         });
     }
 
@@ -669,7 +668,7 @@ impl Batch for DirectSum {
         let law = &*self;
         chunks(blocks, |start, blocks| {
             law.among(start, blocks, |first, blocks| {
-                blocks.par_chunks_mut(TASK).enumerate().for_each(|(k, blocks)| dispatch(Diagonal { law, first: first + k * TASK, blocks }));
+                blocks.chunks_mut(TASK).enumerate().in_parallel(|(k, blocks)| dispatch(Diagonal { law, first: first + k * TASK, blocks }));
             });
         });
     }
@@ -700,7 +699,7 @@ const TASK: usize = 128;
 
 /// `f(range)` of fixed shares of 0..n, in order.
 fn tasks(n: usize, f: impl Fn(Range<usize>) -> f64 + Sync) -> Vec<f64> {
-    (0..n.div_ceil(TASK)).into_par_iter().map(|k| f(k * TASK..((k + 1) * TASK).min(n))).collect()
+    (0..n.div_ceil(TASK)).map_in_parallel(|k| f(k * TASK..((k + 1) * TASK).min(n)))
 }
 
 #[cfg(test)]

@@ -7,7 +7,7 @@
 use super::Vector;
 use super::bvh::{Feature, Node, build, closest_on_triangle, high, low};
 use crate::math::functions::{acos, floor};
-use rayon::prelude::*;
+use crate::math::parallel::Tasks;
 use tumble_interface::Mesh;
 
 /// Triangles with keyframes.
@@ -113,9 +113,9 @@ impl Facets {
             }
         }
         let mut facets = Self { nodes, boxes: Vec::new(), triangles, first, around, times, frames, apart: Vec::new(), back };
-        let pairs = (0..facets.frames.len().saturating_sub(1).max(1)).into_par_iter().map(|k| facets.refit(k)).collect();
+        let pairs = (0..facets.frames.len().saturating_sub(1).max(1)).map_in_parallel(|k| facets.refit(k));
         facets.boxes = pairs;
-        let apart = facets.boxes.par_iter().map(|boxes| Apart::new(&facets.nodes, boxes)).collect();
+        let apart = facets.boxes.iter().map_in_parallel(|boxes| Apart::new(&facets.nodes, boxes));
         facets.apart = apart;
         Some(facets)
     }

@@ -9,7 +9,7 @@
 //!
 //! Source: sorting by cell is [green2010].
 
-use crate::math::parallel::{CHUNK, chunk_sum, chunks, fold};
+use crate::math::parallel::{CHUNK, Tasks, chunk_sum, chunks, fold};
 use crate::math::simd::{Kernel, Level, Width, dispatch_at};
 use crate::math::{Lane, Real, Row, ZERO};
 use rayon::prelude::*;
@@ -211,7 +211,7 @@ impl Neighbours {
                     (sum, count[d]) = (sum + count[d], sum);
                 }
             }
-            from.par_chunks(CHUNK).zip(&mut next).for_each(|(from, next)| {
+            from.chunks(CHUNK).zip(&mut next).in_parallel(|(from, next)| {
                 for pair in from {
                     let pair = pair.load(Relaxed);
                     let n = &mut next[digit_of(pair)];
@@ -304,7 +304,7 @@ impl Neighbours {
         runs.clear();
         runs.resize(self.tiles.len() * each, [0; 2]);
         let grid = &*self;
-        runs.par_chunks_mut(TASK * each).zip(self.tiles.par_chunks(TASK)).for_each(|(runs, tiles)| {
+        runs.chunks_mut(TASK * each).zip(self.tiles.chunks(TASK)).in_parallel(|(runs, tiles)| {
             // Tiles are in order, and so are their neighbours along each line.
             let mut at = [None; LINES];
             for (runs, tile) in runs.chunks_exact_mut(each).zip(tiles) {
@@ -434,7 +434,7 @@ impl Neighbours {
         if self.len() <= CHUNK / 16 {
             tasks.into_iter().for_each(|(tiles, runs, out)| f(tiles, runs, out));
         } else {
-            tasks.into_par_iter().for_each(|(tiles, runs, out)| f(tiles, runs, out));
+            tasks.into_iter().in_parallel(|(tiles, runs, out)| f(tiles, runs, out));
         }
     }
 }

@@ -1,7 +1,7 @@
 //! Signed distance on a grid: exact at the nodes near the surface, trilinear between them.
 
 use super::{Bvh, Vector};
-use rayon::prelude::*;
+use crate::math::parallel::Tasks;
 use tumble_interface::Mesh;
 
 /// Nodes along the side of a tile.
@@ -44,7 +44,7 @@ impl GridSdf {
             nodes.map(|p| if far { (middle - (p - center).norm()) as f32 } else { distance(p) as f32 }).collect()
         };
         let count = tiles[0] * tiles[1] * tiles[2];
-        let blocks: Vec<Vec<f32>> = (0..count).into_par_iter().map(tile).collect();
+        let blocks: Vec<Vec<f32>> = (0..count).map_in_parallel(tile);
         let mut values = vec![0.0; n[0] * n[1] * n[2]];
         for (t, block) in blocks.iter().enumerate() {
             let [a, b, c] = [t % tiles[0], t / tiles[0] % tiles[1], t / (tiles[0] * tiles[1])].map(|i| i * TILE);

@@ -8,9 +8,8 @@
 //! It needs no energy, so drag and friction may take part. Source: [nocedal2006], 3.1 and 7.1; [hager2005], T2.
 
 use super::{Equation, Kinematics, Stage};
-use crate::math::parallel::{CHUNK, chunks, chunks2, sum};
+use crate::math::parallel::{chunk_sum, chunks, chunks2, sum};
 use crate::math::{Real, Row, ZERO, axpy, dot, scale, sub};
-use rayon::prelude::*;
 use tumble_interface::StepError;
 use tumble_interface::engine::StepReport;
 use tumble_interface::scene::{Hessian, OnFailure, Solver};
@@ -160,16 +159,16 @@ fn evaluate(equation: &mut dyn Stiff, stage: &Stage<'_>, x: &[Row], v: &[Row], r
     equation.force(stage.t, x, v, stage.gh, residual)?;
     let inverse_gh = (1.0 / stage.gh) as Real;
     let w = equation.inverse_mass();
-    let parts = residual.par_chunks_mut(CHUNK).enumerate().map(|(c, residual)| {
+    Ok(chunk_sum(residual, |start, residual| {
         let mut sum = 0.0;
         for (k, r) in residual.iter_mut().enumerate() {
-            let i = c * CHUNK + k;
+            let i = start + k;
             *r = if w[i] > 0.0 { axpy(scale(*r, -1.0), inverse_gh / w[i], sub(v[i], stage.v[i])) } else { ZERO };
             sum += f64::from(w[i]) * dot(*r, *r);
         }
         sum
-    });
-    Ok(parts.collect::<Vec<f64>>().iter().sum::<f64>().sqrt())
+    })
+    .sqrt())
 }
 
 /// v += c d.

@@ -3,9 +3,8 @@
 //! Vectors are in the engine's scalar, all products in double precision over fixed chunks, so that the iterates have the
 //! same bits on any number of threads. Source: [shewchuk1994], B3; negative curvature: [nocedal2006], 7.1.
 
-use crate::math::parallel::{CHUNK, chunk_sum, chunks, sum};
+use crate::math::parallel::{CHUNK, Tasks, chunk_sum, chunks, sum};
 use crate::math::{Real, Row, ZERO, rows};
-use rayon::prelude::*;
 
 /// A symmetric operator and its preconditioner, chunk by chunk: `start` is a multiple of CHUNK.
 pub trait Operator {
@@ -96,18 +95,15 @@ pub fn solve(operator: &mut (impl Operator + Sync), b: &[Row], x: &mut [Row], pa
 
 /// x += alpha p, r -= alpha q, q = preconditioned r; returns r . q. One pass over memory.
 fn update(operator: &(impl Operator + Sync), alpha: Real, x: &mut [Row], r: &mut [Row], p: &[Row], q: &mut [Row]) -> f64 {
-    let parts: Vec<f64> = x
-        .par_chunks_mut(CHUNK)
-        .zip(r.par_chunks_mut(CHUNK))
-        .zip(p.par_chunks(CHUNK).zip(q.par_chunks_mut(CHUNK)))
-        .enumerate()
-        .map(|(c, ((x, r), (p, q)))| {
-            rows::axpy(x, alpha, p);
-            rows::axpy(r, -alpha, q);
-            operator.precondition(c * CHUNK, r, q);
-            rows::dot(r, q)
-        })
-        .collect();
+    let parts: Vec<f64> =
+        x.chunks_mut(CHUNK).zip(r.chunks_mut(CHUNK)).zip(p.chunks(CHUNK).zip(q.chunks_mut(CHUNK))).enumerate().map_in_parallel(
+            |(c, ((x, r), (p, q)))| {
+                rows::axpy(x, alpha, p);
+                rows::axpy(r, -alpha, q);
+                operator.precondition(c * CHUNK, r, q);
+                rows::dot(r, q)
+            },
+        );
     parts.iter().sum()
 }
 

@@ -3,17 +3,51 @@
 
 use rayon::prelude::*;
 use std::ops::Range;
+use std::sync::{Mutex, PoisonError};
 
 /// Rows per task. A chunk of positions and velocities (32 B a row in single precision) stays in a 2 MiB L2 cache
 /// with its scratch; smaller ones cost scheduling, larger ones balance badly.
 pub const CHUNK: usize = 4096;
+
+/// Calls `f(0)`, ..., `f(n - 1)`, each once, on all threads. What runs in parallel does so through here: rayon's machinery is
+/// compiled once for all loops.
+pub fn each(n: usize, f: &(dyn Fn(usize) + Sync)) {
+    if n <= 1 {
+        (0..n).for_each(f);
+    } else {
+        (0..n).into_par_iter().with_max_len(1).for_each(f);
+    }
+}
+
+/// Tasks for all threads, coarse ones: each costs an entry of a list and a lock.
+pub trait Tasks: Iterator<Item: Send> + Sized {
+    /// Calls `f` for each.
+    fn in_parallel(self, f: impl Fn(Self::Item) + Sync) {
+        let tasks: Vec<_> = self.map(|task| Mutex::new(Some(task))).collect();
+        each(tasks.len(), &|i| {
+            let task = tasks[i].lock().unwrap_or_else(PoisonError::into_inner).take();
+            task.into_iter().for_each(&f);
+        });
+    }
+
+    /// What `f` gives for each, in their order.
+    fn map_in_parallel<R: Send>(self, f: impl Fn(Self::Item) -> R + Sync) -> Vec<R> {
+        let mut results: Vec<Option<R>> = Vec::new();
+        let tasks: Vec<_> = self.collect();
+        results.resize_with(tasks.len(), || None);
+        tasks.into_iter().zip(&mut results).in_parallel(|(task, result)| *result = Some(f(task)));
+        results.into_iter().flatten().collect()
+    }
+}
+
+impl<I: Iterator<Item: Send>> Tasks for I {}
 
 /// Calls `f(start, chunk)` for every chunk of `a`.
 pub fn chunks<A: Send>(a: &mut [A], f: impl Fn(usize, &mut [A]) + Sync) {
     if a.len() <= CHUNK {
         return f(0, a);
     }
-    a.par_chunks_mut(CHUNK).enumerate().for_each(|(i, a)| f(i * CHUNK, a));
+    a.chunks_mut(CHUNK).enumerate().in_parallel(|(i, a)| f(i * CHUNK, a));
 }
 
 /// Calls `f(start, chunk of a, chunk of b)`.
@@ -22,12 +56,20 @@ pub fn chunks2<A: Send, B: Send>(a: &mut [A], b: &mut [B], f: impl Fn(usize, &mu
     if a.len() <= CHUNK {
         return f(0, a, b);
     }
-    a.par_chunks_mut(CHUNK).zip(b.par_chunks_mut(CHUNK)).enumerate().for_each(|(i, (a, b))| f(i * CHUNK, a, b));
+    a.chunks_mut(CHUNK).zip(b.chunks_mut(CHUNK)).enumerate().in_parallel(|(i, (a, b))| f(i * CHUNK, a, b));
+}
+
+/// Calls `f(r, row)` for every row of `n` of `a`.
+pub fn rows<A: Send>(a: &mut [A], n: usize, f: impl Fn(usize, &mut [A]) + Sync) {
+    let task = (CHUNK / n).max(1);
+    a.chunks_mut(task * n).enumerate().in_parallel(|(t, part)| {
+        part.chunks_mut(n).enumerate().for_each(|(r, row)| f(t * task + r, row));
+    });
 }
 
 /// Sum of `f(start, chunk)` over the chunks of `a`, added in order.
 pub fn chunk_sum<A: Send>(a: &mut [A], f: impl Fn(usize, &mut [A]) -> f64 + Sync) -> f64 {
-    a.par_chunks_mut(CHUNK).enumerate().map(|(c, a)| f(c * CHUNK, a)).collect::<Vec<f64>>().iter().sum()
+    a.chunks_mut(CHUNK).enumerate().map_in_parallel(|(c, a)| f(c * CHUNK, a)).iter().sum()
 }
 
 /// Sum of `f(range)` over the chunks of 0..n, added in order.
@@ -43,11 +85,7 @@ pub fn max(n: usize, f: impl Fn(Range<usize>) -> f64 + Sync) -> f64 {
 /// `f(range)` of every chunk of 0..n, in order.
 pub fn fold<T: Send>(n: usize, f: impl Fn(Range<usize>) -> T + Sync) -> Vec<T> {
     let range = |i: usize| i * CHUNK..((i + 1) * CHUNK).min(n);
-    let count = n.div_ceil(CHUNK);
-    if count <= 1 {
-        return (0..count).map(|i| f(range(i))).collect();
-    }
-    (0..count).into_par_iter().map(|i| f(range(i))).collect()
+    (0..n.div_ceil(CHUNK)).map_in_parallel(|i| f(range(i)))
 }
 
 #[cfg(test)]

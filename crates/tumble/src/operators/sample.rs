@@ -5,10 +5,10 @@
 //! box are moved to its wall, or wrapped; what is not a number goes to the lower wall. Tests: crates/tumble-f64/tests/operators.rs.
 
 use super::stencil::{ghosted, reach};
+use crate::math::parallel::Tasks;
 use crate::math::simd::{Kernel, Scalar, Width, ask, dispatch};
 use crate::math::{Lane, Real};
 use crate::state::{Field, Grid, GridError, Side};
-use rayon::prelude::*;
 use std::borrow::Cow;
 
 /// How values between points are made.
@@ -101,7 +101,7 @@ fn padded(f: &Field, points: [usize; 3], there: [bool; 3], pad: usize) -> (Vec<R
     // Four numbers are read at once where the row has fewer.
     let mut data = vec![0.0; strides[2] * n[2] + 4];
     let body = n[0] * n[1] * n[2];
-    data[..body].par_chunks_mut(strides[2]).enumerate().for_each(|(k, plane)| {
+    data[..body].chunks_mut(strides[2]).enumerate().in_parallel(|(k, plane)| {
         let k = k as isize - pads[2] as isize;
         for (j, row) in plane.chunks_mut(n[0]).enumerate() {
             let j = j as isize - pads[1] as isize;
@@ -553,7 +553,7 @@ pub fn sample(f: &Field, points: &[[f64; 3]], how: Interpolation) -> Result<Vec<
     f.expect(&f.grid, f.place, "sampled field")?;
     let view = View::new(f, how);
     let mut out = vec![0.0; points.len()];
-    out.par_chunks_mut(SEGMENT).zip(points.par_chunks(SEGMENT)).for_each(|(out, points)| {
+    out.chunks_mut(SEGMENT).zip(points.chunks(SEGMENT)).in_parallel(|(out, points)| {
         let (mut spots, mut all) = (Spots::new(), Spots::new());
         let mut d = [[0.0; SEGMENT]; 3];
         for (e, x) in points.iter().enumerate() {

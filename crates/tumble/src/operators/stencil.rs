@@ -1,10 +1,9 @@
 //! Rows of fields and their neighbours, ghosts included.
 
 use crate::math::Real;
-use crate::math::parallel::CHUNK;
+use crate::math::parallel::{CHUNK, Tasks};
 use crate::math::simd::{Kernel, Width, dispatch};
 use crate::state::{Field, Side};
-use rayon::prelude::*;
 
 /// A value a + b c made of the stored value c.
 #[derive(Clone, Copy)]
@@ -110,7 +109,7 @@ pub fn each_row_with<T>(
     if tasks.len() <= 2 {
         tasks.into_iter().enumerate().for_each(|(t, chunks)| body(t, chunks));
     } else {
-        tasks.into_par_iter().enumerate().for_each(|(t, chunks)| body(t, chunks));
+        tasks.into_iter().enumerate().in_parallel(|(t, chunks)| body(t, chunks));
     }
 }
 

@@ -2,8 +2,8 @@
 //! with is a function of the scene's seed, the emitter's name and the particle's id, so that nothing of it needs storing.
 
 use crate::geometry::{Collider, Sampler, Vector, sampling};
+use crate::math::parallel::fold;
 use crate::math::{Random, Real, Row, Signal, VectorSignal, xyz64};
-use rayon::prelude::*;
 use tumble_interface::scene::{Between, Cause, Emitter as Words, Event, Source, WhenFull};
 
 /// What random numbers are drawn for: the moment of birth, mass, radius and colour; the direction and speed; users' columns; the
@@ -357,7 +357,7 @@ impl Emitter {
             }
             birth
         };
-        Some((0..count).into_par_iter().with_min_len(256).map(one).collect())
+        Some(fold(count, |range| range.map(one).collect::<Vec<_>>()).concat())
     }
 
     /// Where the source is at a time, and how fast it moves.

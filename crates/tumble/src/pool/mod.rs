@@ -7,10 +7,10 @@ mod emitter;
 pub use emitter::{Birth, Course, Emitter, Kill, Near, Origin, Parent};
 
 use crate::geometry::Vector;
+use crate::math::parallel::{Tasks, chunks, fold};
 use crate::math::{Real, Row, xyz64};
 use crate::state::Object;
 use crate::system::{Archive, Part};
-use rayon::prelude::*;
 use std::ops::Range;
 use tumble_interface::scene::Cause;
 use tumble_interface::{Column, Data, StepError};
@@ -175,7 +175,7 @@ impl Pool {
     pub fn conceive(&mut self, system: &str, t: f64, dt: f64) -> Result<Vec<Vec<Birth>>, StepError> {
         self.interval = dt;
         let older = dt as Real;
-        self.age.par_chunks_mut(TASK).for_each(|ages| ages.iter_mut().for_each(|age| *age += older));
+        chunks(&mut self.age, |_, ages| ages.iter_mut().for_each(|age| *age += older));
         (0..self.len()).map(|s| self.births(s, t, dt).ok_or_else(|| self.full(s, system, t))).collect()
     }
 
@@ -213,7 +213,7 @@ impl Pool {
         if self.streams[s].emitter.has_rate() {
             let of =
                 |k: usize| self.until(parent, k, f64::INFINITY, (t, t), x[self.rows(parent).start + k], v[self.rows(parent).start + k]);
-            let mut parents: Vec<Parent> = (0..self.streams[parent].len).into_par_iter().with_min_len(TASK).map(of).collect();
+            let mut parents: Vec<Parent> = fold(self.streams[parent].len, |range| range.map(of).collect::<Vec<_>>()).concat();
             parents.extend(self.stirred.iter().filter(|e| e.stream == parent && e.death.is_some()).map(|e| e.parent));
             let Stream { emitter, len, next, .. } = &mut self.streams[s];
             births = emitter.children(&parents, *next, emitter.room(*len)?)?;
@@ -330,7 +330,7 @@ impl Pool {
             let old = ages[task.clone()].iter().zip(task).filter(|(age, _)| f64::from(**age) >= safe);
             old.filter_map(|(_, i)| dies(i)).collect()
         };
-        tasks.into_par_iter().flat_map_iter(among).collect()
+        tasks.into_iter().map_in_parallel(among).concat()
     }
 
     /// The oldest of an emitter that have to make room for the newborn, if they may: each dies as the one is born that takes its

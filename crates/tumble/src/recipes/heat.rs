@@ -3,10 +3,10 @@
 use super::places::{Map, fill, middle};
 use super::{grid, solid};
 use crate::geometry::{Shape, Vector};
+use crate::math::parallel::fold;
 use crate::math::{Real, Signal};
 use crate::state::{Field, Place};
 use crate::systems::heat::{Body, Boundary, Material, Plan, Source};
-use rayon::prelude::*;
 use tumble_interface::scene::{Animated, Collider, Component, Heat, HeatScheme, HeatSide, Shape as Words};
 
 /// A solid without a mesh.
@@ -148,7 +148,7 @@ pub fn heat(
     let mut material: Vec<u16> = Vec::new();
     if !regions.is_empty() {
         let all: Vec<[usize; 3]> = Field::new(grid, Place::Cell, "").map(|f| f.each().collect()).unwrap_or_default();
-        material = all.par_iter().map(|at| number(middle(&grid, *at)) as u16).collect();
+        material = fold(all.len(), |range| all[range].iter().map(|at| number(middle(&grid, *at)) as u16).collect::<Vec<_>>()).concat();
     }
     let reference = own.at(std::array::from_fn(|a| grid.origin[a] + 0.5 * grid.dx * if flat == Some(a) { 0.0 } else { grid.n[a] as f64 }));
     let reference = if reference.is_finite() { reference } else { 0.0 };

@@ -1,9 +1,9 @@
 //! Functions of place on grids.
 
 use crate::math::formula::{Formula, Of};
+use crate::math::parallel::rows;
 use crate::math::{Real, Vec3};
 use crate::state::{Grid, Place};
-use rayon::prelude::*;
 use tumble_interface::scene::Component;
 
 /// A function of place.
@@ -44,7 +44,7 @@ pub fn middle(grid: &Grid, at: [usize; 3]) -> [f64; 3] {
 /// Sets every cell of a column.
 pub fn fill(grid: &Grid, column: &mut [Real], value: impl Fn([usize; 3]) -> f64 + Sync) {
     let l = grid.lattice();
-    column[l.at(0, 0, 0)..].par_chunks_mut(l.stride[1]).enumerate().for_each(|(r, row)| {
+    rows(&mut column[l.at(0, 0, 0)..], l.stride[1], |r, row| {
         let (j, k) = (r % (l.n[1] + 2), r / (l.n[1] + 2));
         if j < l.n[1] && k < l.n[2] {
             for (i, out) in row[..l.n[0]].iter_mut().enumerate() {

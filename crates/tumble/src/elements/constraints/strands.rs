@@ -12,10 +12,9 @@
 use super::{Constraints, Members, Projection, Shared, compliance};
 use crate::elements::{BendTwist, Element, Linear, StretchShear, corrected, energy};
 use crate::geometry::Walls;
-use crate::math::parallel::fold;
+use crate::math::parallel::{Tasks, fold};
 use crate::math::simd::{Index, Kernel, Scalar, Width, dispatch};
 use crate::math::{Lane, Quat, Real, Row, Vec3, xyz};
-use rayon::prelude::*;
 use std::ops::Range;
 
 /// Strands solved by one task, and of equal length.
@@ -696,7 +695,7 @@ impl Constraints for Strands {
             }
             total
         };
-        self.groups.par_iter().map(one).collect::<Vec<f64>>().into_iter().sum()
+        self.groups.iter().map_in_parallel(one).into_iter().sum()
     }
 
     fn project(&mut self, x: &mut [Row], step: &Projection<'_>) {
@@ -705,7 +704,7 @@ impl Constraints for Strands {
             self.check(step.before);
         }
         let x = Shared(x.as_mut_ptr());
-        self.groups.par_iter_mut().for_each(|group| group.project(x, step));
+        self.groups.iter_mut().in_parallel(|group| group.project(x, step));
     }
 
     fn add_grip(&self, _x: &[Row], grip: &mut [Real]) {

@@ -8,9 +8,8 @@
 
 use super::{Constraints, Projection};
 use crate::geometry::Walls;
-use crate::math::parallel::{CHUNK, fold};
+use crate::math::parallel::{CHUNK, Tasks, fold};
 use crate::math::{Real, Row, Vec3, xyz64};
-use rayon::prelude::*;
 
 type Vector = Vec3<f64>;
 
@@ -98,7 +97,7 @@ impl Constraints for Volume {
         let mut gradient = std::mem::take(&mut self.gradient);
         gradient.resize(self.points.len(), Vector::default());
         let (this, rows) = (&*self, &*x);
-        gradient.par_chunks_mut(CHUNK).enumerate().for_each(|(chunk, out)| {
+        gradient.chunks_mut(CHUNK).enumerate().in_parallel(|(chunk, out)| {
             out.iter_mut().enumerate().for_each(|(k, g)| *g = this.slope(rows, chunk * CHUNK + k));
         });
         let weigh = |k: usize| f64::from(rows[this.points[k] as usize][3]) * gradient[k].norm_sq();

@@ -10,8 +10,8 @@
 use super::topology::Topology;
 use super::tree::{LEAF, Tree, around, whole};
 use crate::geometry::Vector;
+use crate::math::parallel::Tasks;
 use crate::math::{Row, xyz64};
-use rayon::prelude::*;
 use robust::{Coord3D, orient3d};
 
 /// Leaves per task.
@@ -74,7 +74,7 @@ pub(super) fn crossings(topology: &Topology, x: &[Row], edges: &mut Tree, triang
         }
         found
     };
-    let tasks: Vec<Vec<(u32, u32)>> = (0..edges.n_leaves().div_ceil(TASK)).into_par_iter().map(task).collect();
+    let tasks: Vec<Vec<(u32, u32)>> = (0..edges.n_leaves().div_ceil(TASK)).map_in_parallel(task);
     let mut all = tasks.concat();
     all.sort_unstable();
     all

@@ -14,8 +14,8 @@ use super::distance::{Nearest, edge_edge, point_triangle};
 use super::topology::Topology;
 use super::tree::{Box3, LEAF, Tree, around, grown, union, whole};
 use crate::geometry::Vector;
+use crate::math::parallel::{Tasks, chunks};
 use crate::math::{Real, Row, xyz64};
-use rayon::prelude::*;
 use std::sync::atomic::{AtomicU64, Ordering::Relaxed};
 
 /// The part of a distance that each side may use up; below 1/2, so that something is left of it.
@@ -130,7 +130,7 @@ impl Detector {
             return;
         }
         self.at.resize(n, Vector::default());
-        self.at.par_iter_mut().zip(x).with_min_len(CHUNK).for_each(|(p, x)| *p = xyz64(*x));
+        chunks(&mut self.at, |start, at| at.iter_mut().zip(&x[start..]).for_each(|(p, x)| *p = xyz64(*x)));
         // A way that is not finite is none.
         self.ways.clear();
         self.ways.extend(ways.iter().take(n).map(|w| if w.norm_sq().is_finite() { *w } else { Vector::default() }));
@@ -280,14 +280,15 @@ impl Detector {
         self.nearest.extend((0..n).map(|v| AtomicU64::new((self.reach + way(v)).to_bits())));
         let nearest = &self.nearest;
         let this = &*self;
-        this.pairs.par_iter().with_min_len(CHUNK).for_each(|pair| {
+        let lower = |pair: &Pair| {
             let d = (usable(pair) - this.least(pair)).max(0.0).to_bits();
             for v in pair.vertices {
                 if nearest[v as usize].load(Relaxed) > d {
                     nearest[v as usize].fetch_min(d, Relaxed);
                 }
             }
-        });
+        };
+        this.pairs.chunks(CHUNK).in_parallel(|pairs| pairs.iter().for_each(lower));
         self.bounds.clear();
         self.bounds.extend(self.nearest.iter().map(|d| GAMMA * f64::from_bits(d.load(Relaxed))));
     }
@@ -302,13 +303,14 @@ impl Detector {
         }
         let mut far = std::mem::take(&mut self.far);
         far.resize(n, false);
-        far.par_iter_mut().enumerate().with_min_len(CHUNK).for_each(|(v, far)| {
+        let is_far = |v: usize| {
             let way = xyz64(x[v]) - self.at[v];
             let (length_sq, radius) = (way.norm_sq(), GAMMA * self.reach);
             let off = || !self.ways.is_empty() && (way - self.on_way(v, way)).norm_sq() > radius * radius;
             // What is not finite stays so, for others to find.
-            *far = length_sq.is_finite() && (length_sq > self.bounds[v] * self.bounds[v] || off());
-        });
+            length_sq.is_finite() && (length_sq > self.bounds[v] * self.bounds[v] || off())
+        };
+        chunks(&mut far, |start, far| far.iter_mut().enumerate().for_each(|(k, far)| *far = is_far(start + k)));
         let held = if far.iter().any(|far| *far) { self.hold_those(topology, x, &far) } else { Held::default() };
         self.far = far;
         held
@@ -322,12 +324,13 @@ impl Detector {
         chosen.resize(self.pairs.len(), Plane::default());
         // Planes towards which the ways lead that are there before anyone is held: all sides of a pair must see the same one.
         let ways: &[Row] = x;
-        let choose = |(pair, chosen): (&Pair, &mut Plane)| {
-            if pair.vertices.iter().any(|v| far[*v as usize]) {
-                *chosen = self.choose(pair, ways, far);
+        chunks(&mut chosen, |start, chosen| {
+            for (pair, chosen) in self.pairs[start..].iter().zip(chosen) {
+                if pair.vertices.iter().any(|v| far[*v as usize]) {
+                    *chosen = self.choose(pair, ways, far);
+                }
             }
-        };
-        self.pairs.par_iter().zip(chosen.par_iter_mut()).with_min_len(CHUNK).for_each(choose);
+        });
         let this = &*self;
         let task = |(c, x): (usize, &mut [Row])| {
             let mut counts = Held::default();
@@ -341,7 +344,7 @@ impl Detector {
             }
             counts
         };
-        let counts: Vec<Held> = x[..far.len()].par_chunks_mut(CHUNK).enumerate().map(task).collect();
+        let counts: Vec<Held> = x[..far.len()].chunks_mut(CHUNK).enumerate().map_in_parallel(task);
         self.chosen = chosen;
         counts.iter().fold(Held::default(), |a, b| Held { held: a.held + b.held, driven: a.driven + b.driven })
     }
@@ -553,7 +556,8 @@ pub fn truncate(at: &[Vector], x: &mut [Row], bounds: &[f64]) -> usize {
         *x = towards(*a, way * (b / length), x[3]);
         1
     };
-    at.par_iter().zip(x).zip(bounds).with_min_len(CHUNK).map(one).sum()
+    let tasks = at.chunks(CHUNK).zip(x.chunks_mut(CHUNK)).zip(bounds.chunks(CHUNK));
+    tasks.map_in_parallel(|((at, x), bounds)| at.iter().zip(x).zip(bounds).map(one).sum::<usize>()).into_iter().sum()
 }
 
 /// A box around where vertices are and are about to go.
@@ -588,7 +592,7 @@ fn search<const ITSELF: bool>(from: &Tree, with: &Tree, reach: f64, f: impl Fn(u
         }
         found
     };
-    (0..from.n_leaves().div_ceil(TASK)).into_par_iter().map(task).collect()
+    (0..from.n_leaves().div_ceil(TASK)).map_in_parallel(task)
 }
 
 /// Appends pairs, sorted by their vertices, of which there are n.
@@ -615,7 +619,7 @@ fn append(pairs: &mut Vec<Pair>, found: &[Vec<Pair>], n: usize) {
         done = ends[ends.len() - 1];
         rest = others;
     }
-    runs.into_par_iter().for_each(|(pairs, ends, done)| {
+    runs.into_iter().in_parallel(|(pairs, ends, done)| {
         let mut start = 0;
         for end in ends {
             let end = (end - done) as usize;

@@ -4,7 +4,7 @@
 //! Boxes are in single precision, rounded outwards, relative to an origin near the features.
 
 use crate::geometry::Vector;
-use rayon::prelude::*;
+use crate::math::parallel::{Tasks, chunks};
 
 /// Features per leaf.
 pub(super) const LEAF: usize = 8;
@@ -105,14 +105,14 @@ impl Tree {
             return;
         }
         self.order = (0..n as u32).collect();
-        let centres: Vec<[f32; 3]> = (0..n as u32)
-            .into_par_iter()
-            .map(|i| {
-                let [l, h] = bounds(i);
+        let mut centres = vec![[0.0; 3]; n];
+        chunks(&mut centres, |start, centres| {
+            for (k, centre) in centres.iter_mut().enumerate() {
+                let [l, h] = bounds((start + k) as u32);
                 // What is not finite lies anywhere.
-                [0, 1, 2].map(|k| if (l[k] + h[k]).is_finite() { l[k] + h[k] } else { 0.0 })
-            })
-            .collect();
+                *centre = [0, 1, 2].map(|k| if (l[k] + h[k]).is_finite() { l[k] + h[k] } else { 0.0 });
+            }
+        });
         self.nodes.clear();
         self.leaves = vec![[[0.0; LEAF]; 6]; n.div_ceil(LEAF)];
         if n > 0 {
@@ -124,7 +124,7 @@ impl Tree {
     /// Fits the boxes, and returns the sum of their sides.
     fn refit(&mut self, bounds: &(impl Fn(u32) -> Box3 + Sync)) -> f64 {
         let mut whole = vec![NOTHING; self.leaves.len()];
-        let fit = |(leaf, whole, order): (&mut Leaf, &mut Box3, &[u32])| {
+        let fit = |leaf: &mut Leaf, whole: &mut Box3, order: &[u32]| {
             let [low, high] = [[f32::MAX; LEAF], [f32::MIN; LEAF]];
             *leaf = [low, low, low, high, high, high];
             for (l, i) in order.iter().enumerate() {
@@ -136,8 +136,10 @@ impl Tree {
                 *whole = union(whole, &b);
             }
         };
-        let tasks = self.leaves.par_iter_mut().zip(whole.par_iter_mut()).zip(self.order.par_chunks(LEAF)).with_min_len(TASK);
-        tasks.for_each(|((leaf, whole), order)| fit((leaf, whole, order)));
+        let tasks = self.leaves.chunks_mut(TASK).zip(whole.chunks_mut(TASK)).zip(self.order.chunks(LEAF * TASK));
+        tasks.in_parallel(|((leaves, whole), order)| {
+            leaves.iter_mut().zip(whole).zip(order.chunks(LEAF)).for_each(|((leaf, whole), order)| fit(leaf, whole, order));
+        });
         let mut size = 0.0;
         for i in (0..self.nodes.len()).rev() {
             let node = self.nodes[i];

@@ -7,9 +7,9 @@
 use super::faces::Weight;
 use super::level::{Block, Grid, LANES, Rows};
 use crate::math::functions::{cos, exp, sin};
+use crate::math::parallel::each;
 use crate::math::simd::{Kernel, Level as Registers, Width, dispatch_at};
 use crate::math::{Column, Lane, Lattice, Real};
-use rayon::prelude::*;
 use std::cell::RefCell;
 use std::f64::consts::PI;
 
@@ -121,16 +121,16 @@ impl Cosine {
                 dispatch_at(registers, Lines { cosine: self, lattice, width, rows: &rows, axis, first, other, kind, scale, scratch });
             });
         };
-        (0..n[2]).into_par_iter().for_each(|k| {
-            (0..n[1].div_ceil(GROUP)).into_par_iter().for_each(|g| group(0, g * GROUP, k, Kind::Forward));
-            (0..pairs).into_par_iter().for_each(|g| group(1, g * GROUP, k, Kind::Forward));
+        each(n[2], &|k| {
+            each(n[1].div_ceil(GROUP), &|g| group(0, g * GROUP, k, Kind::Forward));
+            each(pairs, &|g| group(1, g * GROUP, k, Kind::Forward));
         });
-        (0..n[1]).into_par_iter().for_each(|j| {
-            (0..pairs).into_par_iter().for_each(|g| group(2, g * GROUP, j, Kind::Both));
+        each(n[1], &|j| {
+            each(pairs, &|g| group(2, g * GROUP, j, Kind::Both));
         });
-        (0..n[2]).into_par_iter().for_each(|k| {
-            (0..pairs).into_par_iter().for_each(|g| group(1, g * GROUP, k, Kind::Back));
-            (0..n[1].div_ceil(GROUP)).into_par_iter().for_each(|g| group(0, g * GROUP, k, Kind::Back));
+        each(n[2], &|k| {
+            each(pairs, &|g| group(1, g * GROUP, k, Kind::Back));
+            each(n[1].div_ceil(GROUP), &|g| group(0, g * GROUP, k, Kind::Back));
         });
     }
 }

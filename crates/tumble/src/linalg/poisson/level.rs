@@ -5,9 +5,9 @@
 //! the rows around them anew, so that neither the number of threads nor the width of registers shows in a result.
 
 use super::faces::Weight;
+use crate::math::parallel::Tasks;
 use crate::math::simd::{Kernel, Level as Registers, Width, ask, dispatch_at};
 use crate::math::{Column, Lane, Lattice, Real};
-use rayon::prelude::*;
 use std::cell::RefCell;
 use std::marker::PhantomData;
 
@@ -575,7 +575,7 @@ pub(super) fn run<P: Pass>(n: [usize; 3], registers: Registers, pass: &P) -> [f6
     let parts: Vec<[f64; 4]> = if tiles.len() < 2 || n.iter().product::<usize>() < SERIAL {
         tiles.iter().map(one).collect()
     } else {
-        tiles.par_iter().with_max_len(1).map(one).collect()
+        tiles.iter().map_in_parallel(one)
     };
     parts.iter().fold([0.0; 4], |all, part| {
         let most = if part[3] > all[3] { part[3] } else { all[3] };

@@ -27,7 +27,7 @@ pub use faces::{Weight, byte};
 pub use joined::Joint;
 pub use report::{Excess, Fault, Info, Method, Params, Target};
 
-use crate::math::parallel::chunks;
+use crate::math::parallel::{Tasks, chunks};
 use crate::math::simd::{Kernel, Level as Registers, Width, dispatch};
 use crate::math::{Column, Lattice, Real, Spare};
 use cosine::Cosine;
@@ -36,7 +36,6 @@ use krylov::Before;
 use level::Grid;
 use multigrid::{Coarsest, FEW};
 use pockets::Pockets;
-use rayon::prelude::*;
 
 /// What lies beyond a side of the box.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -353,13 +352,13 @@ impl<T: Weight> Solver<T> {
             }
         };
         let first = grid.lattice.at(0, 0, 0);
-        let rows = out[first..first + stride[2] * n[2]].par_chunks_mut(stride[1]).enumerate();
-        rows.for_each_init(
-            || vec![0.0; n[0] + 2],
-            |padded, (line, out)| {
+        out[first..first + stride[2] * n[2]].chunks_mut(LINES * stride[1]).enumerate().in_parallel(|(task, rows)| {
+            let mut padded = vec![0.0; n[0] + 2];
+            for (line, out) in rows.chunks_mut(stride[1]).enumerate() {
+                let line = task * LINES + line;
                 let (j, k) = (line % (n[1] + 2), line / (n[1] + 2));
                 if j >= n[1] {
-                    return;
+                    continue;
                 }
                 let at = grid.lattice.at(0, j, k);
                 let (j, k) = (j as isize, k as isize);
@@ -375,11 +374,14 @@ impl<T: Weight> Solver<T> {
                     others: [&padded[..], &padded[2..], row(j - 1, k), row(j + 1, k), row(j, k - 1), row(j, k + 1)],
                     w: [of(0, 0), of(0, 1), of(1, 0), of(1, stride[1]), of(2, 0), of(2, stride[2])],
                 });
-            },
-        );
+            }
+        });
         self.joined_residual(q, out);
     }
 }
+
+/// Rows per task of what is left.
+const LINES: usize = 16;
 
 /// What is left of a row, in double precision.
 struct Left<'a, T> {

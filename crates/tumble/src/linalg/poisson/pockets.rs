@@ -8,7 +8,7 @@ use super::faces::Weight;
 use super::level::{Grid, Kind, LANES, Rows};
 use super::report::{Excess, Fault};
 use crate::math::Real;
-use rayon::prelude::*;
+use crate::math::parallel::Tasks;
 
 /// Cells side by side in a row that open faces join.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -135,10 +135,8 @@ impl Pockets {
     /// decide whether there are any.
     pub fn load<T: Weight>(&self, grid: &mut Grid<T>, given: Option<&[Real]>, excess: Excess) -> Result<(), Fault> {
         let from = given.unwrap_or(&grid.b);
-        let parts: Vec<([f64; 2], Vec<(usize, [f64; 2])>)> = self.rows[..self.rows.len() - 1]
-            .par_chunks(TASK)
-            .enumerate()
-            .map(|(task, rows)| {
+        let parts: Vec<([f64; 2], Vec<(usize, [f64; 2])>)> =
+            self.rows[..self.rows.len() - 1].chunks(TASK).enumerate().map_in_parallel(|(task, rows)| {
                 let (mut main, mut others) = ([0.0; 2], Vec::new());
                 let end = self.rows[task * TASK + rows.len()];
                 for run in &self.runs[rows[0]..end] {
@@ -150,8 +148,7 @@ impl Pockets {
                     }
                 }
                 (main, others)
-            })
-            .collect();
+            });
         let mut totals = vec![[0.0; 2]; self.components.len()];
         let mut total = |component: usize, part: [f64; 2]| {
             totals[component][0] += part[0];
@@ -181,7 +178,7 @@ impl Pockets {
             return Err(Fault::Excess { cell: grid.cell(at), cells: 1, mean: f64::from(from[at]) });
         }
         let b = Rows::of(&mut grid.b);
-        self.runs.par_chunks(TASK).for_each(|runs| {
+        self.runs.chunks(TASK).in_parallel(|runs| {
             for run in runs {
                 // SAFETY: runs are disjoint.
                 let out = unsafe { b.take(run.at, run.cells) };

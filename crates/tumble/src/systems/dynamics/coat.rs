@@ -7,9 +7,8 @@
 //! may thin out. Breaks: h sqrt(pressure/rest density) above a cell. Verified in `tests/hair.rs`.
 
 use crate::math::functions::exp;
-use crate::math::parallel::fold;
+use crate::math::parallel::{Tasks, chunks, fold};
 use crate::math::{Real, Row, Vec3, xyz64};
-use rayon::prelude::*;
 use std::ops::Range;
 use tumble_interface::scene::HairCollisions;
 
@@ -114,8 +113,10 @@ impl Coat {
         let Scratch { cells, starts, order, nodes, .. } = &mut self.scratch;
         // Points sorted by cell, within a cell in their order.
         cells.resize(x.len(), 0);
-        cells.par_iter_mut().zip(x).for_each(|(cell, x)| {
-            *cell = if x[3] > 0.0 { lattice.node(lattice.place(xyz64(*x)).0) as u32 } else { u32::MAX };
+        chunks(cells, |start, cells| {
+            for (cell, x) in cells.iter_mut().zip(&x[start..]) {
+                *cell = if x[3] > 0.0 { lattice.node(lattice.place(xyz64(*x)).0) as u32 } else { u32::MAX };
+            }
         });
         let total = n[0] * n[1] * n[2];
         starts.clear();
@@ -134,7 +135,7 @@ impl Coat {
         // `starts` are ends now: a cell begins where the one before ends.
         nodes.resize(total, [0.0; 4]);
         let (starts, order) = (&*starts, &*order);
-        nodes.par_chunks_mut(n[0] * n[1]).enumerate().for_each(|(k, slab)| {
+        nodes.chunks_mut(n[0] * n[1]).enumerate().in_parallel(|(k, slab)| {
             for (s, node) in slab.iter_mut().enumerate() {
                 let (i, j) = (s % n[0], s / n[0]);
                 let mut sum = [0.0; 4];
@@ -171,7 +172,7 @@ impl Coat {
         let full = rest * cell.powi(3);
         let squeezed = |node: usize| words.pressure * (nodes[node][3] / full - 1.0).max(0.0);
         let strides = [1, n[0], n[0] * n[1]];
-        kicks.par_chunks_mut(n[0] * n[1]).enumerate().for_each(|(k, slab)| {
+        kicks.chunks_mut(n[0] * n[1]).enumerate().in_parallel(|(k, slab)| {
             for (s, kick) in slab.iter_mut().enumerate() {
                 let at = [s % n[0], s / n[0], k];
                 let node = lattice.node(at);
@@ -189,7 +190,7 @@ impl Coat {
         });
         let share = 1.0 - exp(-words.friction * h);
         let (nodes, kicks) = (&*nodes, &*kicks);
-        v[self.rows.clone()].par_iter_mut().zip(&x[self.rows.clone()]).for_each(|(v, x)| {
+        let stir = |v: &mut Row, x: &Row| {
             if x[3] == 0.0 {
                 return;
             }
@@ -210,6 +211,8 @@ impl Coat {
                 let own = f64::from(v[a]);
                 v[a] = (own + share * (around[a] - own) + kick[a]) as Real;
             }
-        });
+        };
+        let x = &x[self.rows.clone()];
+        chunks(&mut v[self.rows.clone()], |start, v| v.iter_mut().zip(&x[start..]).for_each(|(v, x)| stir(v, x)));
     }
 }

@@ -8,10 +8,10 @@ use super::laws::Local;
 use super::{BLOCK, Dynamics, contact};
 use crate::forces::One;
 use crate::integrators::{self, Equation, Memory, Scratch, Step};
+use crate::math::parallel::Tasks;
 use crate::math::{Real, Row, Vec3, ZERO, axpy, xyz64};
 use crate::pool::{Birth, Columns, Hit, Pool, due};
 use crate::state::Masses;
-use rayon::prelude::*;
 use tumble_interface::StepError;
 use tumble_interface::engine::StepReport;
 
@@ -136,8 +136,8 @@ impl Dynamics {
             }
             Ok(hits)
         };
-        let blocks = x.par_chunks_mut(BLOCK).zip(v.par_chunks_mut(BLOCK)).zip(births.par_chunks(BLOCK)).enumerate();
-        let done: Vec<Result<Vec<_>, StepError>> = blocks.map(|(c, ((x, v), births))| one(c * BLOCK, births, x, v)).collect();
+        let blocks = x.chunks_mut(BLOCK).zip(v.chunks_mut(BLOCK)).zip(births.chunks(BLOCK)).enumerate();
+        let done: Vec<Result<Vec<_>, StepError>> = blocks.map_in_parallel(|(c, ((x, v), births))| one(c * BLOCK, births, x, v));
         let hits = done.into_iter().collect::<Result<Vec<_>, StepError>>()?.concat();
         Ok(Grown { x, v, hits })
     }

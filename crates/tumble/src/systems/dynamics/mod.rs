@@ -22,7 +22,7 @@ use crate::elements::{Constraints, Limit, Linear, Projected, Projection, Tethers
 use crate::exchange::{Exchange, Port};
 use crate::geometry::{Vector, Walls};
 use crate::integrators::{self, Equation, Memory, Scratch, Step, adaptive_step};
-use crate::math::parallel::{CHUNK, sum};
+use crate::math::parallel::{CHUNK, Tasks, sum};
 use crate::math::{Real, Row, Vec3, ZERO, axpy, row, sub, xyz64};
 use crate::pool::{Hit, Pool};
 use crate::state::{Object, State};
@@ -30,7 +30,6 @@ use crate::system::{Archive, Part, System};
 use held::Held;
 use laws::{Laws, Local, flat};
 use layers::Layers;
-use rayon::prelude::*;
 use tumble_interface::engine::{Ledger, Stability, StepReport, UserForce, UserIntegrator};
 use tumble_interface::scene::{Adaptive, Integrator, PositionBased};
 use tumble_interface::{Column, StepError};
@@ -260,27 +259,25 @@ impl Dynamics {
             let penalty = self.laws.penalty && self.user.is_none();
             let points = self.laws.masses.points;
             let (colliders, before, before_v) = (&self.laws.colliders[..], &self.before, &self.before_v);
-            let touched: Vec<(bool, Vec<(usize, Hit)>)> = self.state.x[..points]
-                .par_chunks_mut(CHUNK)
-                .zip(self.state.v[..points].par_chunks_mut(CHUNK))
-                .enumerate()
-                .map(|(c, (x, v))| {
-                    let (mut any, mut hits) = (false, Vec::new());
-                    for (k, (x, v)) in x.iter_mut().zip(v).enumerate() {
-                        let i = c * CHUNK + k;
-                        let step = contact::Step { heeded: heeded.iter().any(|rows| rows.contains(&i)), ..step };
-                        if x[3] > 0.0 {
-                            let (was, told) = ((before[i], before_v[i]), |hit| hits.push((i, hit)));
-                            any |= if penalty {
-                                contact::bounce(colliders, &step, was, x, v, told)
-                            } else {
-                                contact::resolve(colliders, &step, was, x, v, told)
-                            };
+            let touched: Vec<(bool, Vec<(usize, Hit)>)> =
+                self.state.x[..points].chunks_mut(CHUNK).zip(self.state.v[..points].chunks_mut(CHUNK)).enumerate().map_in_parallel(
+                    |(c, (x, v))| {
+                        let (mut any, mut hits) = (false, Vec::new());
+                        for (k, (x, v)) in x.iter_mut().zip(v).enumerate() {
+                            let i = c * CHUNK + k;
+                            let step = contact::Step { heeded: heeded.iter().any(|rows| rows.contains(&i)), ..step };
+                            if x[3] > 0.0 {
+                                let (was, told) = ((before[i], before_v[i]), |hit| hits.push((i, hit)));
+                                any |= if penalty {
+                                    contact::bounce(colliders, &step, was, x, v, told)
+                                } else {
+                                    contact::resolve(colliders, &step, was, x, v, told)
+                                };
+                            }
                         }
-                    }
-                    (any, hits)
-                })
-                .collect();
+                        (any, hits)
+                    },
+                );
             for (any, hits) in touched {
                 self.memory.ready &= !any;
                 hits.into_iter().for_each(|(row, hit)| self.pool.note_row(row, hit));
@@ -340,15 +337,11 @@ impl Dynamics {
         }
         let was_ready = self.memory.ready;
         let heeded = self.pool.heeded();
-        let results: Vec<Result<(bool, Vec<(usize, Hit)>), StepError>> = state
-            .x
-            .par_chunks_mut(BLOCK)
-            .zip(state.v.par_chunks_mut(BLOCK))
-            .zip(memory)
-            .with_min_len(CHUNK / BLOCK)
-            .enumerate()
-            .map_init(Scratch::default, |scratch, (c, ((x, v), mut memory))| {
-                let start = c * BLOCK;
+        let mut blocks: Vec<_> = state.x.chunks_mut(BLOCK).zip(state.v.chunks_mut(BLOCK)).zip(memory).enumerate().collect();
+        let results = blocks.chunks_mut(CHUNK / BLOCK).map_in_parallel(|blocks| {
+            let scratch = &mut Scratch::default();
+            let moved = blocks.iter_mut().map(|(c, ((x, v), memory))| {
+                let start = *c * BLOCK;
                 let mut motion = Local { laws, masses: &laws.masses, start, newborn: None };
                 let points = motion.kinematics().points;
                 let (mut ready, mut before, mut before_v, mut hits) = (was_ready, Vec::new(), Vec::new(), Vec::new());
@@ -362,7 +355,7 @@ impl Dynamics {
                         before_v.clear();
                         before_v.extend_from_slice(v);
                     }
-                    let (t, equation, memory, report) = (t + f64::from(k) * h, &mut motion, &mut memory, &mut StepReport::default());
+                    let (t, equation, report) = (t + f64::from(k) * h, &mut motion, &mut StepReport::default());
                     integrators::step(scheme, Step { equation, t, h, x, v, memory, ready, scratch, report })?;
                     ready = true;
                     for i in 0..before.len().min(points) {
@@ -374,11 +367,11 @@ impl Dynamics {
                     }
                 }
                 Ok((ready, hits))
-            })
-            .collect();
+            });
+            moved.collect::<Result<Vec<_>, StepError>>()
+        });
         self.memory.ready = true;
-        for result in results {
-            let (ready, hits) = result?;
+        for (ready, hits) in results.into_iter().collect::<Result<Vec<_>, _>>()?.concat() {
             self.memory.ready &= ready;
             hits.into_iter().for_each(|(row, hit)| self.pool.note_row(row, hit));
         }
@@ -424,9 +417,11 @@ impl Dynamics {
                 self.lead_held(t + done, dt - done);
                 self.remember(dt - done);
                 let (begun, left) = (done, dt - done);
+                // The error of a step knows nothing of contact.
+                let longest = self.longest_among_pairs().max(self.adaptive.smallest * dt).min(left);
                 self.witness(t + done);
                 let y = (&mut self.state.x[..], &mut self.state.v[..]);
-                let times = (t + done, left, dt);
+                let times = (t + done, longest, dt);
                 let taken = adaptive_step(
                     self.integrator,
                     &self.adaptive,

@@ -10,9 +10,8 @@ use super::Dynamics;
 use crate::elements::{Constraints, Projection};
 use crate::geometry::Walls;
 use crate::integrators::Equation;
-use crate::math::parallel::{CHUNK, chunks2, max};
+use crate::math::parallel::{CHUNK, Tasks, chunks2, max};
 use crate::math::{Quat, Real, Row, Vec3, ZERO, axpy, sub, xyz64};
-use rayon::prelude::*;
 use tumble_interface::StepError;
 use tumble_interface::engine::StepReport;
 use tumble_interface::scene::Projection as Kind;
@@ -64,7 +63,7 @@ impl Dynamics {
         }
         // Velocities: a point that no element has moved keeps its own to the last bit.
         let (x, before, points) = (&self.state.x, &self.before, kinematics.points);
-        self.state.v.par_chunks_mut(CHUNK).zip(x.par_chunks(CHUNK)).enumerate().for_each(|(c, (v, x))| {
+        self.state.v.chunks_mut(CHUNK).zip(x.chunks(CHUNK)).enumerate().in_parallel(|(c, (v, x))| {
             for (k, (v, x)) in v.iter_mut().zip(x).enumerate() {
                 let i = c * CHUNK + k;
                 let predicted = kinematics.moved(i, before[i], *v, step);

@@ -17,8 +17,8 @@ use super::spots::Spot;
 use crate::geometry::{Collider, Vector};
 use crate::linalg::poisson::{Joint, Weight, byte};
 use crate::math::Real;
+use crate::math::parallel::Tasks;
 use crate::state::{Field, Grid, Place, Vectors};
-use rayon::prelude::*;
 use std::sync::Arc;
 
 /// Nodes along the edges of a block that one distance may settle.
@@ -221,7 +221,7 @@ impl Solids {
         self.measure(t);
         self.weigh();
         let n = self.grid.n;
-        let planes: Vec<Found> = (0..=n[2]).into_par_iter().map(|k| self.search(k, t)).collect();
+        let planes: Vec<Found> = (0..=n[2]).map_in_parallel(|k| self.search(k, t));
         let Self { cuts, closed, ghosts, dead, shades, .. } = self;
         cuts.clear();
         ghosts.clear();
@@ -282,7 +282,7 @@ impl Solids {
         let mut nodes = std::mem::take(&mut self.nodes);
         let (plane, first) = (l.stride[2], l.at(0, 0, 0) - l.stride[1]);
         let this = &*self;
-        nodes[first..].par_chunks_mut(BLOCK * plane).enumerate().for_each(|(block, nodes)| {
+        nodes[first..].chunks_mut(BLOCK * plane).enumerate().in_parallel(|(block, nodes)| {
             let from = block * BLOCK;
             for j0 in (0..points[1]).step_by(BLOCK) {
                 for i0 in (0..points[0]).step_by(BLOCK) {
@@ -328,7 +328,7 @@ impl Solids {
             let corners = self.corners(axis);
             let (plane, first) = (l.stride[2], l.at(0, 0, 0) - l.stride[1]);
             let nodes = &self.nodes;
-            open[axis][first..].par_chunks_mut(plane).take(points[2]).enumerate().for_each(|(k, open)| {
+            open[axis][first..].chunks_mut(plane).take(points[2]).enumerate().in_parallel(|(k, open)| {
                 for j in 0..points[1] {
                     let at = l.at(0, j, k);
                     let row = &mut open[at - first - k * plane..][..points[0]];

@@ -2,10 +2,9 @@
 
 use super::pass::{Cells, Pass};
 use crate::linalg::poisson::{Excess, Method, Params, Series, Side, Solver, Target};
-use crate::math::parallel::sum;
+use crate::math::parallel::{chunks, rows, sum};
 use crate::math::{Column, Real, Signal};
 use crate::state::{Field, Grid, GridError, Place};
-use rayon::prelude::*;
 use tumble_interface::engine::StepReport;
 use tumble_interface::scene::HeatScheme;
 
@@ -349,7 +348,7 @@ impl Body {
             }
             let factor = (factor * power) as Real;
             let first = l.at(0, 0, 0);
-            out[first..].par_chunks_mut(l.stride[1]).enumerate().for_each(|(r, row)| {
+            rows(&mut out[first..], l.stride[1], |r, row| {
                 let (j, k) = (r % (l.n[1] + 2), r / (l.n[1] + 2));
                 if j >= l.n[1] || k >= l.n[2] {
                     return;
@@ -458,7 +457,7 @@ impl Body {
         let arisen = self.come.last().copied().unwrap_or(0.0) - books.last().copied().unwrap_or(0.0);
         let old = std::mem::take(&mut self.t.data);
         self.borders(&beyond, h, |at| old[at], |at, net| right[at] += net);
-        right.par_iter_mut().for_each(|r| *r *= phi as Real);
+        chunks(&mut right, |_, right| right.iter_mut().for_each(|r| *r *= phi as Real));
         let params = Params {
             method: Method::MultigridGradients,
             target: Target::Relative(self.plan.tolerance),
@@ -498,8 +497,10 @@ impl Body {
             self.come[link.of as usize] -= per_link * f64::from(link.g);
         }
         let cells = self.cells.as_ref();
-        d.par_iter_mut().zip(&old[..]).enumerate().for_each(|(at, (d, t))| {
-            *d = if cells.is_none_or(|c| c.m[at] > 0.0) { *t + (*d + shift as Real) } else { *t };
+        chunks(&mut d, |start, d| {
+            for (at, (d, t)) in (start..).zip(d.iter_mut().zip(&old[start..])) {
+                *d = if cells.is_none_or(|c| c.m[at] > 0.0) { *t + (*d + shift as Real) } else { *t };
+            }
         });
         (self.t.data, self.correction, self.next) = (d, old, right);
         self.implicit = Some(work);
@@ -521,7 +522,7 @@ impl Body {
             let of_volume = grid.dx * grid.dx / self.own().conductivity;
             self.arise(&powers, h, of_volume, false, &mut gain);
             series.gain(&mut gain);
-            self.t.data.par_iter_mut().zip(&gain[..]).for_each(|(t, gain)| *t += gain);
+            chunks(&mut self.t.data, |start, t| t.iter_mut().zip(&gain[start..]).for_each(|(t, gain)| *t += gain));
             self.next = gain;
         }
         self.series = Some((of, series));

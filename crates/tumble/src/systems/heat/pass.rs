@@ -7,9 +7,9 @@
 //!
 //! Walls have weight zero. A face's two cells see opposite differences, so that nothing is lost between them.
 
+use crate::math::parallel::Tasks;
 use crate::math::simd::{Kernel, Width, dispatch};
 use crate::math::{Lattice, Real};
-use rayon::prelude::*;
 
 /// The materials of a body of several.
 #[derive(Debug, Clone)]
@@ -55,7 +55,7 @@ impl Pass<'_> {
         if all.len() <= 2 * ROWS * row {
             all.chunks_mut(ROWS * row).enumerate().for_each(|(task, chunk)| body(task, chunk));
         } else {
-            all.par_chunks_mut(ROWS * row).enumerate().for_each(|(task, chunk)| body(task, chunk));
+            all.chunks_mut(ROWS * row).enumerate().in_parallel(|(task, chunk)| body(task, chunk));
         }
     }
 
