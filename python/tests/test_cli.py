@@ -486,7 +486,19 @@ def test_importing_and_help_load_nothing_heavy() -> None:
 
 def test_every_verb_teaches_by_example(tumble: Command) -> None:
     verbs = re.findall(r"^  ([a-z]+) ", tumble("--help").out.split("Commands:")[1], re.MULTILINE)
-    assert set(verbs) == {"run", "check", "render", "export", "plot", "lab", "scenes", "view"}
+    assert set(verbs) == {
+        "run",
+        "check",
+        "render",
+        "export",
+        "plot",
+        "branch",
+        "diff",
+        "refine",
+        "lab",
+        "scenes",
+        "view",
+    }
     for verb in [[v] for v in verbs] + [["lab", "integrators"], ["lab", "structures"]]:
         answer = tumble(*verb, "--help")
         assert answer.code == 0

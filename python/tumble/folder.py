@@ -175,6 +175,22 @@ def write_whole(path: Path, data: bytes) -> None:
             raise
 
 
+def share(source: Path, path: Path) -> None:
+    """The same file at a second place, where the system can do that; else a copy. Files of runs are replaced, never changed, so
+    that neither place notices what becomes of the other."""
+    with writing(path):
+        with suppress(FileNotFoundError):
+            path.unlink()
+        try:
+            os.link(source, path)
+        except OSError:
+            try:
+                data = source.read_bytes()
+            except OSError as error:
+                raise ExportError(f"{source}: cannot be read ({error.strerror})") from error
+            write_whole(path, data)
+
+
 def write_columns(path: Path, columns: Columns) -> None:
     """Columns as an uncompressed .npz with keys `object/column`."""
     arrays = {f"{name}/{column}": array for name, table in columns.items() for column, array in table.items()}

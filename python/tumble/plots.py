@@ -3,7 +3,7 @@
 import contextlib
 import os
 import textwrap
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from itertools import pairwise
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -20,6 +20,8 @@ from tumble.style import FAINT, INK, PALETTE, RC
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
+
+    from tumble.refine import Study
 
 Floats = npt.NDArray[np.float64]
 
@@ -95,6 +97,92 @@ def ledger(run: Recording, columns: str | Sequence[str], path: str | os.PathLike
         return save(figure, path)
 
 
+def beside(
+    runs: Mapping[str, Recording],
+    columns: Sequence[str],
+    path: str | os.PathLike[str],
+    starts: Mapping[str, float] | None = None,
+) -> Path:
+    """Plots columns of several runs over time, a pair of axes for each column, a curve for each run with its name beside it.
+    A vector's name stands for its three columns; without columns, the energies. The curve of a branch begins where `starts`
+    says [s], at a line. Raises ExportError."""
+    first = next(iter(runs.values()))
+    wanted = [n for name in columns for n in _expanded(first, name)]
+    if not wanted:
+        wanted = [n for n in ENERGIES if any(np.any(_column(run, n) != 0) for run in runs.values())] + ["energy"]
+    begins = starts or {}
+    share = 2.0 if len(wanted) == 1 else 1.4
+    with settings():
+        figure, axes = _figure([share] * len(wanted))
+        for ax, name in zip(axes, wanted, strict=True):
+            curves, times = [], []
+            for k, (label, run) in enumerate(runs.items()):
+                t = _column(run, "time")
+                shown = t >= begins.get(label, -np.inf)
+                times.append(t[shown])
+                curves.append((label, _column(run, name)[shown], PALETTE[k % len(PALETTE)]))
+            for moment in sorted(set(begins.values())):
+                ax.axvline(moment, color=FAINT, linewidth=0.8, linestyle=(0, (3, 3)))
+            _draw(ax, share, times, curves)
+            for line in ax.lines[len(set(begins.values())) + len(PALETTE) :]:
+                line.set_linestyle((0, (4, 1.5)))
+            ax.set_ylabel(_label([name], unit(name)))
+        axes[0].set_title(figure_title(first, ""))
+        axes[-1].set_xlabel("time [s]")
+        return save(figure, path)
+
+
+def convergence(study: "Study", path: str | os.PathLike[str]) -> Path:
+    """Plots the first measure of the ledger over time at every level, and below it how much each measure changes from one
+    level to the next, over its size, beside slopes of order 1, 2 and 4. Raises ExportError."""
+    from matplotlib.ticker import NullLocator
+
+    columns = [m.name.partition("@")[0] for m in study.measures if "." not in m.name]
+    runs = {f"level {k}": run for k, run in enumerate(study.runs) if run is not None}
+    with settings():
+        figure, axes = _figure([1.8, 2.6] if columns else [2.6], sharex=False)
+        if columns:
+            name = columns[0]
+            times = [_column(run, "time") for run in runs.values()]
+            curves = [(k, _column(run, name), PALETTE[i % len(PALETTE)]) for i, (k, run) in enumerate(runs.items())]
+            _draw(axes[0], 1.8, times, curves)
+            axes[0].set_ylabel(_label([name], unit(name)))
+            axes[0].set_xlabel("time [s]")
+        axes[0].set_title(figure_title(next(iter(runs.values())), "refined"))
+        ax = axes[-1]
+        ends: list[tuple[str, float, str]] = []
+        finest, top = study.levels - 1, 0.0
+        for i, m in enumerate(study.measures):
+            values = np.array(m.values)
+            size = np.max(np.abs(values[np.isfinite(values)]), initial=0.0)
+            changes = np.abs(np.diff(values)) / size if size else np.zeros(finest)
+            shown = np.isfinite(changes) & (changes > 0)
+            if shown.any():
+                color = PALETTE[i % len(PALETTE)]
+                ax.plot(np.arange(1, finest + 1)[shown], changes[shown], color=color, marker="o", markersize=4)
+                ends.append((m.name, float(changes[shown][-1]), color))
+                top = max(top, float(changes[shown][0]))
+        for order in (1, 2, 4) if top else ():
+            ax.plot(
+                [1, finest],
+                [top, top * 2.0 ** (-order * (finest - 1))],
+                color=FAINT,
+                linewidth=0.8,
+                linestyle=(0, (3, 3)),
+            )
+            ends.append((f"order {order}", top * 2.0 ** (-order * (finest - 1)), FAINT))
+        ax.set_yscale("log")
+        ax.set_xticks(range(1, finest + 1), [f"{k - 1} to {k}" for k in range(1, finest + 1)])
+        ax.xaxis.set_minor_locator(NullLocator())
+        ax.set_xlabel("level")
+        ax.set_ylabel("relative change")
+        low, high = np.log(ax.get_ylim())
+        places = _apart([(np.log(value) - low) / (high - low) for _, value, _ in ends], LABEL / (ROW * 2.6))
+        for (label, _, color), place in zip(ends, places, strict=True):
+            ax.annotate(label, (1.015, place), xycoords="axes fraction", va="center", color=color, fontsize=9)
+        return save(figure, path)
+
+
 def unit(column: str) -> str:
     """The unit of a column of the ledger; nothing for counts."""
     stem = column[:-2] if column.endswith(("_x", "_y", "_z")) else column
@@ -138,21 +226,23 @@ def settings() -> Iterator[None]:
         yield
 
 
-def _figure(heights: Sequence[float]) -> tuple["Figure", list["Axes"]]:
+def _figure(heights: Sequence[float], sharex: bool = True) -> tuple["Figure", list["Axes"]]:
     from matplotlib.figure import Figure
 
     figure = Figure(figsize=(6.4, 0.9 + ROW * sum(heights)), layout="constrained")
-    grid = figure.subplots(len(heights), 1, sharex=True, squeeze=False, height_ratios=list(heights))
+    grid = figure.subplots(len(heights), 1, sharex=sharex, squeeze=False, height_ratios=list(heights))
     axes: list[Axes] = list(grid[:, 0])
     figure.align_ylabels(axes)
     return figure, axes
 
 
-def _draw(ax: "Axes", share: float, t: Floats, curves: Sequence[tuple[str, Floats, str]]) -> None:
-    """Curves with their names beside their ends, moved apart where they would meet; `share` is the height in rows."""
-    for _, values, color in curves:
-        ax.plot(t, values, color=color)
-    if not len(t):
+def _draw(ax: "Axes", share: float, t: Floats | Sequence[Floats], curves: Sequence[tuple[str, Floats, str]]) -> None:
+    """Curves with their names beside their ends, moved apart where they would meet; `share` is the height in rows. `t` is one
+    for all, or a list with one for each."""
+    times = t if isinstance(t, list) else [t] * len(curves)
+    for when, (_, values, color) in zip(times, curves, strict=True):
+        ax.plot(when, values, color=color)
+    if not any(len(when) for when in times):
         return
     ends = [(float(v[np.isfinite(v)][-1]) if np.isfinite(v).any() else 0.0) for _, v, _ in curves]
     ax.margins(x=0.01)

@@ -4,9 +4,9 @@ import os
 import platform
 import sys
 import time
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from contextlib import suppress
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -20,10 +20,14 @@ from tumble.folder import (
     RunFolder,
     Table,
     read_rows,
+    share,
     write_checkpoint,
     write_columns,
     write_json,
 )
+
+if TYPE_CHECKING:
+    from tumble.run import Run
 
 MANIFEST_INTERVAL = 5.0
 """Seconds between updates of run.json while a run goes on; more where the list of hashes is so long that writing takes
@@ -37,8 +41,16 @@ _EMPTY_REPORT: dict[str, Any] = {}
 class Recorder:
     """The open run folder of a world that is being simulated."""
 
-    def __init__(self, files: RunFolder, world: World, threads: int | None, earlier: Mapping[str, Any] | None) -> None:
-        """`earlier` is the manifest of the run that goes on."""
+    def __init__(
+        self,
+        files: RunFolder,
+        world: World,
+        threads: int | None,
+        earlier: Mapping[str, Any] | None,
+        descent: Sequence[Mapping[str, Any]] = (),
+    ) -> None:
+        """`earlier` is the manifest of the run that goes on; `descent` are the runs that this one branches off from, the
+        oldest first."""
         self.files = files
         self.world = world
         self.scene = world.scene.to_dict()
@@ -69,19 +81,39 @@ class Recorder:
             "stability": world.stability(),
             "expectations": [],
             "probes": [],
+            "descent": list(descent),
+            "folder": os.path.relpath(world.scene.folder or ".", files.path),
             "scene": self.scene,
             "hashes": self.hashes,
         }
 
     def start(self) -> None:
         """Opens a new folder and writes the start, frame 0."""
+        self._make()
+        self._open([], [])
+        self._record(self.world.frame, _EMPTY_REPORT, 0.0)
+
+    def branch_off(self, parent: "Run") -> None:
+        """Opens a new folder that begins with the frames of another run, up to the one at which the world stands."""
+        files, frame = RunFolder(parent.folder), self.world.frame_index
+        rows = read_rows(files.ledger, LEDGER)[: frame + 1]
+        self._make()
+        for i in range(frame):
+            share(files.frame(i), self.files.frame(i))
+        self._open(rows[:frame], [r for r in read_rows(files.trials, TRIALS) if float(r[-1]) <= frame])
+        self.hashes.extend(r[-1] for r in rows[:frame])
+        # The books of this frame are kept by the changed scene; the way to it was the parent's.
+        way: dict[str, Any] = dict(zip(LEDGER, rows[frame], strict=True))
+        way["step_range"] = way["smallest_step"], way["largest_step"]
+        self._record(self.world.frame, way, way["seconds"])
+        self.checkpoint()
+
+    def _make(self) -> None:
         self.files.make()
         self._write_manifest()
         topology, columns = self.world.topology, self.world.frame
         write_columns(self.files.static, topology)
         write_json(self.files.columns, describe(self.world.units, topology, columns))
-        self._open([], [])
-        self._record(columns, _EMPTY_REPORT, 0.0)
 
     def go_on(self) -> None:
         """Opens the folder of a stopped run at the frame of the world; later frames are dropped."""
@@ -113,7 +145,7 @@ class Recorder:
         if time.perf_counter() > self.update_due:
             self._write_manifest()
 
-    def _record(self, columns: Columns, report: Mapping[str, Any], seconds: float) -> None:
+    def _record(self, columns: Columns, report: Mapping[str, Any], seconds: float | str) -> None:
         """The frame first and its line of the ledger last: a frame with a line is complete."""
         index = self.world.frame_index
         state = self.world.hash()
@@ -126,13 +158,17 @@ class Recorder:
         self.written = index
 
     def checkpoint(self) -> None:
-        """Saves the state, so that the run can go on from here, and drops all but the last ones."""
+        """Saves the state, so that the run can go on from here, and drops old ones but for that of a branch's start."""
         if self.world.frame_index != self.written:
             return  # Stopped between the step and the frame's file.
         path = self.files.checkpoint(self.written)
         if not path.exists():
             write_checkpoint(self.world, path)
+        descent = self.manifest["descent"]
+        start = descent[-1]["frame"] if descent else None
         for old in self.files.checkpoints()[:-KEPT_CHECKPOINTS]:
+            if old == start:
+                continue
             with suppress(OSError):
                 self.files.checkpoint(old).unlink()
 
@@ -147,9 +183,11 @@ class Recorder:
         self.manifest["expectations"] = [b.to_dict() for b in broken]
         self._write_manifest()
 
-    def fail(self, error: StepError) -> None:
-        """Notes why the physics broke, then tries what would have helped."""
+    def fail(self, error: StepError, cures: bool = True) -> None:
+        """Notes why the physics broke, then, if `cures` are asked for, tries what would have helped."""
         self.stop("failed", str(error), getattr(error, "report", {}))
+        if not cures:
+            return
         failure = self.manifest["failure"]
         with suppress(KeyboardInterrupt):  # The failure is worth more than its cures.
             failure["cures"] = self.world.cures()
@@ -200,7 +238,7 @@ class Recorder:
 
 
 def ledger_row(
-    index: int, books: Mapping[str, Any], report: Mapping[str, Any], seconds: float, state: str
+    index: int, books: Mapping[str, Any], report: Mapping[str, Any], seconds: float | str, state: str
 ) -> list[str | int | float]:
     smallest, largest = report.get("step_range") or (np.nan, np.nan)
     values: dict[str, str | int | float] = {"frame": index, "seconds": seconds, "hash": state}

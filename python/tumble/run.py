@@ -2,8 +2,9 @@
 
 import json
 import os
+import shlex
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from functools import cached_property
 from pathlib import Path
 from typing import Any
@@ -29,11 +30,13 @@ def simulate(
     threads: int | None = None,
     progress: Progress | None = None,
     overwrite: bool = False,
+    cures: bool = True,
 ) -> "Run":
     """Simulates a scene into a folder.
 
     `frames` overrides the scene's. `resume` goes on where an earlier run in the folder was stopped, to the same bits as
     if it had not been; without an earlier run it starts one. `overwrite` replaces an earlier run.
+    Where the physics breaks, `cures` are tried, which takes as long as many such runs.
 
     Raises SceneError if the scene or the folder is wrong, before anything is written; StepError if the physics breaks;
     ExportError if a file cannot be written. Whatever was finished by then can be read with `Run.open`.
@@ -43,13 +46,13 @@ def simulate(
         scene = scene.replace(f"time.frames={frames}")
     files = RunFolder(folder)
     ask(files.path)
-    _admit(files, scene, resume, overwrite)
+    admit(files, scene, resume, overwrite)
     world = World(scene, threads)
     expect.probes(world, scene.to_dict())
     with alone(files.path):
         # Another run may have come and gone meanwhile.
-        earlier = _admit(files, scene, resume, overwrite)
-        return _simulate(files, world, threads, progress, earlier, overwrite)
+        earlier = admit(files, scene, resume, overwrite)
+        return _simulate(files, world, threads, progress, earlier, overwrite, cures)
 
 
 def _simulate(
@@ -59,21 +62,28 @@ def _simulate(
     progress: Progress | None,
     earlier: dict[str, Any] | None,
     overwrite: bool,
+    cures: bool,
 ) -> "Run":
-    if earlier is not None and not _return_to_checkpoint(world, files):
+    if earlier is not None and not return_to_checkpoint(world, files):
         earlier, overwrite = None, True
         world = World(world.scene, threads)
     if earlier is None and overwrite and files.is_run():
         files.clear()
     recorder = Recorder(files, world, threads, earlier)
+    return record(recorder, recorder.start if earlier is None else recorder.go_on, progress, cures)
+
+
+def record(recorder: Recorder, begin: Callable[[], None], progress: Progress | None, cures: bool = True) -> "Run":
+    """Begins to record, and simulates to the last frame. Where that fails, `cures` are tried."""
+    files, world = recorder.files, recorder.world
     try:
-        recorder.start() if earlier is None else recorder.go_on()
+        begin()
         _advance(world, recorder, progress)
         recorder.finish()
         run = Run(files.path)
         recorder.judge(expect.check(run))
     except StepError as error:
-        recorder.fail(error)
+        recorder.fail(error, cures)
         raise
     except KeyboardInterrupt:
         recorder.stop("interrupted", "stopped by the user")
@@ -98,8 +108,11 @@ def _advance(world: World, recorder: Recorder, progress: Progress | None) -> Non
             progress(world.frame_index, total)
 
 
-def _admit(files: RunFolder, scene: Scene, resume: bool, overwrite: bool) -> dict[str, Any] | None:
-    """The manifest of the run to go on with, if any; refuses a folder in which something else is."""
+def admit(
+    files: RunFolder, scene: Scene, resume: bool, overwrite: bool, descent: Sequence[Mapping[str, Any]] = ()
+) -> dict[str, Any] | None:
+    """The manifest of the run to go on with, if any; refuses a folder in which something else is. `descent` is that of the
+    branch to be."""
     try:
         if files.is_free():
             return None
@@ -119,6 +132,12 @@ def _admit(files: RunFolder, scene: Scene, resume: bool, overwrite: bool) -> dic
     if manifest.get("tumble") != _engine.version:
         text = f"was simulated by tumble {manifest.get('tumble')}, and this is {_engine.version}: the bits could differ"
         raise refuse(files.path, f"{text}; start again with --force, or choose another folder with --out")
+    if (found := manifest.get("descent", [])) != json.loads(json.dumps(plain(descent))):
+        what = "is no branch; go on with `tumble run SCENE --resume`"
+        if found:
+            parent = os.path.normpath(files.path / found[-1]["run"])
+            what = f"is a branch of {parent} at frame {found[-1]['frame']}; go on with `{go_on(files.path, manifest)}`"
+        raise refuse(files.path, f"{what}, replace it with --force, or choose another folder with --out")
     # Both scenes as JSON has them, so that 1 and 1.0, lists and tuples compare as equal.
     difference = changed(manifest["scene"], json.loads(json.dumps(plain(scene.to_dict()))))
     if difference is not None:
@@ -127,7 +146,7 @@ def _admit(files: RunFolder, scene: Scene, resume: bool, overwrite: bool) -> dic
     return manifest
 
 
-def _return_to_checkpoint(world: World, files: RunFolder) -> bool:
+def return_to_checkpoint(world: World, files: RunFolder) -> bool:
     """Goes to the newest checkpoint that is sound and before which every frame can be read."""
     hashes = [row[-1] for row in read_rows(files.ledger, LEDGER)]
     if not files.static.is_file() or not files.columns.is_file():
@@ -141,6 +160,15 @@ def _return_to_checkpoint(world: World, files: RunFolder) -> bool:
         if world.frame_index == frame and world.hash() == hashes[frame]:
             return True
     return False
+
+
+def go_on(path: Path, manifest: Mapping[str, Any]) -> str:
+    """The command that goes on with a branch."""
+    last = manifest["descent"][-1]
+    parent = os.path.normpath(path / last["run"])
+    sets = [word for text in last["set"] for word in ("--set", text)]
+    frames = ["--frames", str(manifest["frames"] - last["frame"])]
+    return shlex.join(["tumble", "branch", f"{parent}@{last['frame']}", *sets, *frames, "--out", str(path), "--resume"])
 
 
 def read_manifest(files: RunFolder) -> dict[str, Any]:
@@ -197,6 +225,12 @@ class Run:
     def n_frames(self) -> int:
         """Frames that can be read; frame 0 is the start."""
         return len(self._rows)
+
+    @property
+    def descent(self) -> list[dict[str, Any]]:
+        """The runs that this one branches off from, the oldest first: `run` (its folder, seen from here), `name`, `frame`,
+        `time` [s], `hash` of the state there, and what was `set`. Empty for a run that began at its start."""
+        return list(self.manifest.get("descent", []))
 
     @property
     def fps(self) -> float:

@@ -12,7 +12,7 @@ from typing import Annotated, Any
 import typer
 from typer.core import TyperGroup
 
-from tumble.cli import check, export, lab, plot, render, run, scenes, view
+from tumble.cli import branch, check, diff, export, lab, plot, refine, render, run, scenes, view
 from tumble.cli.console import complain, heed_termination, stopped, survive_narrow_streams
 
 
@@ -83,7 +83,18 @@ def application() -> typer.Typer:
         pretty_exceptions_enable=False,
         context_settings={"help_option_names": ["-h", "--help"]},
     )
-    for verb in (run.run, check.check, render.render, export.export, plot.plot, scenes.scenes, view.view):
+    for verb in (
+        run.run,
+        check.check,
+        refine.refine,
+        render.render,
+        export.export,
+        plot.plot,
+        branch.branch,
+        diff.diff,
+        scenes.scenes,
+        view.view,
+    ):
         app.command()(verb)
     app.add_typer(lab.app, name="lab")
     return app

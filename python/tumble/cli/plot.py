@@ -1,12 +1,16 @@
 """`tumble plot`: curves of a run, and slices through what lies on grids."""
 
+import os
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from tumble.cli import find
 from tumble.cli.console import say
+
+if TYPE_CHECKING:
+    from tumble import Run
 
 
 def plot(
@@ -28,24 +32,36 @@ def plot(
     thing: Annotated[
         str | None, typer.Option("--object", metavar="NAME", help="Whose grid.", show_default="the first")
     ] = None,
+    beside: Annotated[
+        list[str] | None,
+        typer.Option("--with", metavar="RUN", help="Draw this run in the same picture. Repeatable."),
+    ] = None,
+    branches: Annotated[
+        bool, typer.Option("--branches", help="Draw the run's branches beside it, and what it branched off from.")
+    ] = False,
     out: Annotated[
         Path | None, typer.Option(metavar="FILE", help="The picture to write.", show_default="in the run")
     ] = None,
 ) -> None:
     """Draw curves of a run over time, or slices through what lies on a grid.
 
-    Without columns, the energies.
+    Without columns, the energies. With --with or --branches, one pair of axes for each column and one curve for each run, with
+    its name; the curve of a branch begins at its frame, at a line.
 
     \b
     Examples:
       tumble plot out/sheet-on-bunny
       tumble plot out/sheet-on-bunny stretch speed --out stretch.png
+      tumble plot rope energy speed --branches
+      tumble plot out/coarse stretch --with out/fine --with out/finest
       tumble plot out/plume --slice pressure vorticity --frame 40 --axis x --at 0.1
     """
     from tumble.plots import energy, ledger
 
     found = find.run(run)
     names = [name for group in columns or () for name in group.split(",") if name]
+    if slice and (beside or branches):
+        raise typer.BadParameter("--slice draws one run; --with and --branches draw curves")
     if slice:
         from tumble.slices import slices
 
@@ -60,9 +76,40 @@ def plot(
             hint = find.near(name, [*known, *vectors])
             text = f"no column {name!r}{hint or '; there are ' + ', '.join([*vectors, *known])}"
             raise typer.BadParameter(text, param_hint="COLUMN")
+    if beside or branches:
+        say(_compare(found, [find.run(name) for name in beside or ()], branches, names, out))
+        return
     target = out or found.folder / ("ledger.png" if names else "energy.png")
     if names:
         ledger(found, names, target)
     else:
         energy(found, target)
     say(target)
+
+
+def _compare(found: "Run", others: "list[Run]", branches: bool, names: list[str], out: Path | None) -> Path:
+    """Draws runs in one picture."""
+    from tumble import SceneError
+    from tumble.branch import family, lineage
+    from tumble.plots import beside
+
+    runs = [found, *others]
+    if branches:
+        kin = family(found)
+        if not kin:
+            cure = f"`tumble branch {found.folder}@FRAME --set KEY=VALUE` makes one"
+            raise SceneError(f"{found.folder}: there is no branch of it beside it; {cure}")
+        older = [run for run in kin if len(run.descent) < len(found.descent)]
+        runs = [*older, found, *(run for run in kin if run not in older), *others]
+    shown = {os.path.realpath(run.folder): run for run in runs}
+    if len(shown) == 1:
+        raise typer.BadParameter("is the run itself", param_hint="--with")
+    labels = {where: run.folder.resolve().name for where, run in shown.items()}
+    if len(set(labels.values())) < len(labels):
+        labels = {where: str(run.folder) for where, run in shown.items()}
+    starts = {}
+    for where, run in shown.items():
+        if run.descent and os.path.realpath(lineage(run)[-1]) in shown:
+            starts[labels[where]] = float(run.descent[-1]["time"])
+    target = out or found.folder / ("ledger.png" if names else "energy.png")
+    return beside({labels[where]: run for where, run in shown.items()}, names, target, starts)

@@ -87,8 +87,16 @@ def _too_fast(scene: Mapping[str, Any], reached: float) -> list[str]:
     ]
 
 
-def failure(run: "Run", error: "StepError", scene: str, overrides: Sequence[str], again: Sequence[str] = ()) -> str:
-    """What broke, where and when, the step against its limit, and what was tried; `again` ends the command to copy."""
+def failure(
+    run: "Run",
+    error: "StepError",
+    scene: str,
+    overrides: Sequence[str],
+    again: Sequence[str] = (),
+    verb: str = "run",
+) -> str:
+    """What broke, where and when, the step against its limit, and what was tried; `again` ends the command to copy, which
+    begins with `verb`."""
     report = getattr(error, "report", {})
     trouble = run.manifest["failure"]
     cures = _ranked(trouble["cures"])
@@ -114,7 +122,7 @@ def failure(run: "Run", error: "StepError", scene: str, overrides: Sequence[str]
         changes = best["set"].split()
         systems = [system["name"] for system in run.scene["system"]] or ["main"]
         sets = [*without(overrides, changes, systems), *changes]
-        lines.append(f"{kept}. Try\n  {command('run', scene, sets, *again, '--force')}")
+        lines.append(f"{kept}. Try\n  {command(verb, scene, sets, *again, '--force')}")
     elif cures:
         lines.append(f"{kept}. None of this helped: {_advice(run.scene)}")
     else:

@@ -85,7 +85,7 @@ def run(
         warn(text)
     try:
         with alone(folder):
-            failures = _write_results(done, asked, frames_to_draw, renderer)
+            failures = write_results(done, asked, frames_to_draw, renderer)
     except KeyboardInterrupt as stop:
         complain(
             f"stopped; the simulation in {folder} is complete, see `tumble render --help` and `tumble export --help`"
@@ -120,7 +120,7 @@ def _say_what_is_kept(folder: Path, cure: str) -> None:
     complain(f"stopped; {counted(kept, 'frame')} in {folder} can be read. Go on with\n  {cure}")
 
 
-def _write_results(run: "Run", asked: dict[str, bool], stills: list[int], renderer: str) -> "list[TumbleError]":
+def write_results(run: "Run", asked: dict[str, bool], stills: list[int], renderer: str) -> "list[TumbleError]":
     """Writes what the scene asks for. What fails does not keep the rest from being written."""
     from tumble import TumbleError
     from tumble.cli.render import film, still

@@ -1,0 +1,236 @@
+"""Goes on from a frame of a run with a changed scene, as a run of its own that knows where it comes from."""
+
+import os
+import tempfile
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from tumble._engine import Scene, SceneError, World
+from tumble.folder import RunFolder, refuse
+from tumble.lock import alone, ask
+from tumble.recorder import Recorder, describe
+from tumble.run import Progress, Run, admit, record, return_to_checkpoint
+
+Descent = list[dict[str, Any]]
+
+
+def branch(
+    parent: Run,
+    frame: int,
+    folder: str | os.PathLike[str],
+    changes: Sequence[str] = (),
+    frames: int | None = None,
+    resume: bool = False,
+    threads: int | None = None,
+    progress: Progress | None = None,
+    overwrite: bool = False,
+) -> Run:
+    """Goes on from a frame of a run (-1 is the last) in another folder, with changes to its scene ("world.gravity=[0, 0, 0]").
+
+    The folder begins with the parent's frames, so that it is a run like any other; its `descent` says where it comes from. The
+    state is read from the nearest checkpoint before the frame, or made anew from the start, and simulated on to the frame.
+    `frames` is how many to simulate; without it, to the scene's last. Masses and pins cannot change, and where things start has
+    no effect: they are part of the state. `resume` and `overwrite` are those of `simulate`.
+
+    Raises SceneError if frame, changes or folder are wrong; StepError if the physics breaks; ExportError if a file cannot be
+    written.
+    """
+    k = _frame(parent, frame)
+    scene = _scene(parent, changes, k, frames)
+    files = RunFolder(folder)
+    if os.path.realpath(files.path) == os.path.realpath(parent.folder):
+        raise refuse(files.path, "is the run itself; choose another folder with --out")
+    ask(files.path)
+    descent = _descent(parent, k, files.path, changes)
+    admit(files, scene, resume, overwrite, descent)
+    world = World(scene, threads)
+    with alone(files.path):
+        earlier = admit(files, scene, resume, overwrite, descent)
+        if earlier is not None and return_to_checkpoint(world, files):
+            recorder = Recorder(files, world, threads, earlier, descent)
+            return record(recorder, recorder.go_on, progress)
+        _take_over(world, parent, k, threads)
+        if files.is_run():
+            files.clear()
+        recorder = Recorder(files, world, threads, None, descent)
+        return record(recorder, lambda: recorder.branch_off(parent), progress)
+
+
+def world_at(run: Run, frame: int, threads: int | None = None) -> World:
+    """The world of a run at one of its frames (-1 is the last): from the nearest checkpoint before it, or from the start,
+    simulated on to the frame. Raises SceneError if that is not the state that the run had."""
+    k = _frame(run, frame)
+    world = World(_own_scene(run), threads)
+    files = RunFolder(run.folder)
+    # Before that frame its scene was another one.
+    start = int(run.descent[-1]["frame"]) if run.descent else 0
+    for kept in reversed([i for i in files.checkpoints() if start <= i <= k]):
+        try:
+            world.load(files.checkpoint(kept))
+        except (SceneError, OSError):
+            continue
+        if world.frame_index == kept and world.hash() == run.hashes[kept]:
+            break
+    else:
+        world = World(world.scene, threads)
+        if run.descent:
+            try:
+                parent = Run(lineage(run)[-1])
+            except SceneError as error:
+                raise refuse(
+                    run.folder, f"frame {k} has to be made from the run that this is a branch of: {error}"
+                ) from error
+            _load(world, parent, min(k, start), threads)
+    if k > world.frame_index:
+        world.step(k - world.frame_index)
+    if world.hash() != run.hashes[k]:
+        made, own = run.manifest.get("tumble"), _version()
+        why = (
+            f"it was simulated by tumble {made}, and this is {own}"
+            if made != own
+            else "its bits hold for another machine"
+        )
+        there = ", ".join(map(str, files.checkpoints())) or "none"
+        text = f"frame {k} cannot be made again to the same bits: {why}; frames with a checkpoint: {there}"
+        raise refuse(run.folder, text)
+    return world
+
+
+def lineage(run: Run) -> list[Path]:
+    """The folders of the runs that a run branches off from, the oldest first."""
+    return [Path(os.path.normpath(run.folder / step["run"])) for step in run.descent]
+
+
+def family(run: Run) -> list[Run]:
+    """The runs beside a run that branch off from it, and those that it branches off from; the oldest first."""
+    own = os.path.realpath(run.folder)
+    found = [Run(path) for path in lineage(run) if RunFolder(path).is_run()]
+    for manifest in sorted(run.folder.resolve().parent.glob("*/run.json")):
+        if os.path.realpath(manifest.parent) == own:
+            continue
+        try:
+            other = Run(run.folder.parent / manifest.parent.name)
+        except SceneError:
+            continue
+        if own in [os.path.realpath(path) for path in lineage(other)]:
+            found.append(other)
+    return sorted(found, key=lambda other: len(other.descent))
+
+
+def _version() -> str:
+    from tumble._engine import version
+
+    return version
+
+
+def _frame(run: Run, frame: int) -> int:
+    n = run.n_frames
+    if not -n <= frame < n:
+        raise refuse(run.folder, f"has no frame {frame}; it has 0 to {n - 1}")
+    return frame % n
+
+
+def _own_scene(run: Run) -> Scene:
+    """The scene of a run, with the folder of its mesh files."""
+    folder = run.manifest.get("folder")
+    # Without empty lists, which have no first item to be changed.
+    return Scene(
+        {key: value for key, value in run.scene.items() if value != []},
+        "." if folder is None else os.path.normpath(run.folder / folder),
+    )
+
+
+def _scene(parent: Run, changes: Sequence[str], frame: int, frames: int | None) -> Scene:
+    """The scene of the branch."""
+    more = [] if frames is None else [f"time.frames={frame + frames}"]
+    scene = _own_scene(parent).replace(*changes, *more)
+    tree = scene.to_dict()
+    if tree["time"]["fps"] != parent.fps:
+        text = f"{tree['time']['fps']:g}, the frames so far were {parent.fps:g} a second; leave time.fps as it is"
+        raise _wrong("time.fps", text)
+    if tree["time"]["frames"] <= frame:
+        last = tree["time"]["frames"]
+        raise _wrong(
+            "time.frames", f"{last}, nothing is left to simulate after frame {frame}; ask for more with --frames"
+        )
+    return scene
+
+
+def _wrong(path: str, text: str) -> SceneError:
+    error = SceneError(f"{path}: {text}")
+    error.issues = [{"path": path, "line": None, "message": text}]
+    return error
+
+
+def _descent(parent: Run, frame: int, folder: Path, changes: Sequence[str]) -> Descent:
+    """The line of descent of a branch in `folder`."""
+    steps: Descent = []
+    for step, path in zip(parent.descent, lineage(parent), strict=True):
+        steps.append({**step, "run": os.path.relpath(path, folder)})
+    steps.append(
+        {
+            "run": os.path.relpath(parent.folder, folder),
+            "name": parent.folder.resolve().name,
+            "frame": frame,
+            "time": parent.time(frame),
+            "hash": parent.hashes[frame],
+            "set": list(changes),
+        }
+    )
+    return steps
+
+
+def _take_over(world: World, parent: Run, frame: int, threads: int | None) -> None:
+    """Puts the state of the parent's frame into the world of the changed scene."""
+    _same_masses(world, parent)
+    _load(world, parent, frame, threads)
+    _same_columns(world, parent)
+
+
+def _load(world: World, parent: Run, frame: int, threads: int | None) -> None:
+    """Goes to the state of another run's frame."""
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder) / "state.safetensors"
+        world_at(parent, frame, threads).save(path)
+        try:
+            world.load(path)
+        except SceneError as error:
+            text = (
+                f"the state of frame {frame} does not fit into the changed scene ({error}). A branch can change what acts and "
+                "how strongly: forces, stiffness, damping, colliders, steps, and integrators that keep the same state; not how "
+                "many things there are, nor precision. For that, run the scene anew with `tumble run`"
+            )
+            raise refuse(parent.folder, text) from error
+
+
+def _same_masses(world: World, parent: Run) -> None:
+    """Refuses a branch whose scene has other masses, or holds others of them: they are in the state, which knows no better."""
+    topology, none = world.topology, np.empty(0)
+    for name, table in parent.static.items():
+        now = topology.get(name, {})
+        for column, what in (("mass", "masses"), ("pinned", "pins")):
+            if not np.array_equal(table.get(column, none), now.get(column, none)):
+                text = f'{what} of "{name}" are part of the state, a branch cannot change them; run the scene anew for that'
+                raise refuse(parent.folder, text)
+
+
+def _same_columns(world: World, parent: Run) -> None:
+    """Refuses a branch whose frames would have other columns than the parent's."""
+    found = describe(world.units, world.topology, world.frame)
+
+    def kept(table: Mapping[str, Mapping[str, Any]]) -> dict[tuple[str, str], Any]:
+        return {
+            (name, column): [None if n is None else int(n) for n in about["shape"]]
+            for name, columns in table.items()
+            for column, about in columns.items()
+            if about["in"] == "frames"
+        }
+
+    before, after = kept(parent.columns), kept(found)
+    for name, column in [*before, *after]:
+        if before.get((name, column)) != after.get((name, column)):
+            text = f'{column} of "{name}" would be kept otherwise than so far: leave output.columns and objects as they are'
+            raise refuse(parent.folder, text)

@@ -1,0 +1,121 @@
+"""`tumble branch`: go on from a frame of a run, another way."""
+
+import sys
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from tumble.cli import find, report
+from tumble.cli.console import Progress, complain, counted, say, stopped, warn
+
+if TYPE_CHECKING:
+    from tumble import Run
+
+
+def branch(
+    origin: Annotated[
+        str,
+        typer.Argument(metavar="RUN@FRAME", help="A folder that `tumble run` wrote, or its name in out/, and a frame."),
+    ],
+    set: Annotated[
+        list[str] | None,
+        typer.Option("--set", metavar="KEY=VALUE", help="Change a key of the scene from that frame on. Repeatable."),
+    ] = None,
+    out: Annotated[
+        Path | None, typer.Option(metavar="DIR", help="Folder of the branch.", show_default="RUN@FRAME, beside RUN")
+    ] = None,
+    frames: Annotated[
+        int | None,
+        typer.Option(metavar="N", min=1, help="Frames to simulate after FRAME.", show_default="to the scene's last"),
+    ] = None,
+    resume: Annotated[bool, typer.Option("--resume", help="Go on where the branch in the folder was stopped.")] = False,
+    force: Annotated[bool, typer.Option("--force", help="Replace the run in the folder.")] = False,
+    threads: Annotated[
+        int | None, typer.Option(min=1, metavar="N", help="Processor cores to use; the result does not depend on it.")
+    ] = None,
+) -> None:
+    """Go on from a frame of a run with a changed scene, as a new run.
+
+    FRAME is any frame that the run has; -1 is the last. Where it has no checkpoint, the state is made again from the nearest
+    one before it, or from the start, and its hash is checked. The branch begins with the frames of its parent (as links, where
+    the disk can), so that it can be plotted, rendered, compared and branched again like any run. Its run.json keeps the line
+    of descent: each parent, frame, hash of the state there and what was changed.
+
+    What acts can be changed: forces, stiffness, damping, colliders, steps. What the state holds cannot: masses, what is
+    pinned, how many things there are. Where things start changes nothing; a branch whose change does nothing says so.
+
+    \b
+    Examples:
+      tumble branch sheet-on-ball@40 --set world.gravity='[0, 0, -1.6]'
+      tumble branch out/rope@-1 --frames 48 --out out/rope-longer
+      tumble plot rope --branches
+      tumble diff rope rope@40
+    """
+    from tumble import StepError
+    from tumble.branch import branch as go
+    from tumble.cli.run import write_results
+    from tumble.lock import alone
+
+    if resume and force:
+        raise typer.BadParameter("--resume goes on with a branch and --force replaces it; choose one")
+    parent, frame = _origin(origin)
+    changes = list(set or ())
+    k = frame % parent.n_frames if -parent.n_frames <= frame < parent.n_frames else frame
+    folder = out if out is not None else parent.folder.with_name(f"{parent.folder.resolve().name}@{k}")
+    again = [*(["--out", str(out)] if out else []), *(["--frames", str(frames)] if frames else [])]
+    at = f"{parent.folder}@{k}"
+    try:
+        with Progress("simulate") as progress:
+            done = go(parent, frame, folder, changes, frames, resume, threads, progress, force)
+    except StepError as error:
+        from tumble import Run
+
+        if not (folder / "run.json").is_file():
+            raise
+        print(report.failure(Run(folder), error, at, changes, again, "branch"), file=sys.stderr)
+        raise typer.Exit(1) from None
+    except KeyboardInterrupt as stop:
+        complain(f"stopped. Go on with\n  {find.command('branch', at, changes, *again, '--resume')}")
+        raise typer.Exit(stopped(stop)) from None
+    for text in done.manifest["warnings"]:
+        warn(text)
+    wanted = done.scene["output"]
+    with alone(folder):
+        asked = {name: wanted[name] for name in ("film", "usd", "ply", "vdb", "plot")}
+        failures = write_results(done, asked, wanted["stills"], "auto")
+    say(report.summary(done))
+    changed = f", changed: {' '.join(find.settings(changes))}" if changes else ", unchanged"
+    say(f"  branch    of {parent.folder} at frame {k} (t = {parent.time(k):.6g} s, hash {parent.hashes[k]}){changed}")
+    if changes and (text := _idle(done, parent, k)):
+        warn(text)
+    for failure in failures:
+        complain(str(failure))
+    broken = done.manifest["expectations"]
+    for expectation in broken:
+        complain(f"broken expectation: {expectation['text']}")
+    if broken or failures:
+        raise typer.Exit(1)
+
+
+def _origin(argument: str) -> "tuple[Run, int]":
+    """The run and the frame that RUN@FRAME means."""
+    name, mark, number = argument.rpartition("@")
+    try:
+        frame = int(number)
+    except ValueError:
+        mark = ""
+    if not mark or not name:
+        raise typer.BadParameter(f"{argument!r}, expected a run and a frame, as in sheet@40 or out/sheet@-1")
+    return find.run(name), frame
+
+
+def _idle(done: "Run", parent: "Run", frame: int) -> str | None:
+    """A warning if what was changed has changed nothing."""
+    n = min(done.n_frames, parent.n_frames)
+    if n <= frame + 1 or done.hashes[:n] != parent.hashes[:n]:
+        return None
+    return (
+        f"the change did nothing in {counted(n - 1 - frame, 'frame')}: the states are those of {parent.folder}; where things "
+        "start is part of the state, which a branch takes over"
+    )
