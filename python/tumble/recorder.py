@@ -66,7 +66,8 @@ class Recorder:
             "machine": machine(threads),
             "timings": self.timings,
             "warnings": list(world.warnings),
-            "stability": world.stability(),
+            # Of the start: the estimate settles how many steps an interval gets, and a run that goes on has settled it.
+            "stability": world.stability() if earlier is None else earlier.get("stability", []),
             "expectations": [],
             "probes": [],
             "scene": self.scene,
