@@ -24,6 +24,7 @@ help:
 	@echo "make web       build the browser laboratory into web/dist, and for \`tumble view\`"
 	@echo "make wheel     the package with all of it, in dist/"
 	@echo "make validate  the long figures"
+	@echo "make audit     known faults and licences of what tumble depends on"
 	@echo "make bench     speed against peers, which it installs into .venv-bench"
 
 setup: $(VENV)/.engine
@@ -118,8 +119,12 @@ validate: setup openvdb wasm
 	$(BIN)/python -m pytest -s -m ""
 	$(BIN)/python python/tests/matrix.py --all
 
+# Known faults and licences of what tumble depends on; asks three databases in the network, and says which do not answer.
+audit: setup
+	@$(BIN)/python python/tests/audit.py
+
 bench: setup
 	$(PYTHON) benchmarks/bench.py
 
 clean:
-	rm -rf target out dist $(VENV) .venv-bench web/dist web/node_modules $(PKG) python/tumble/web
+	rm -rf target out dist $(VENV) .venv-audit .venv-bench web/dist web/node_modules $(PKG) python/tumble/web
