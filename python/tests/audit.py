@@ -1,8 +1,8 @@
 """Are there known faults in what tumble depends on, and are the licences such that it may? `make audit`.
 
-cargo-deny for the Rust crates (rules in deny.toml), pip-audit for the Python packages of .venv, npm audit for the browser's. Each
-asks a database in the network. What cannot be asked is told, and is no all-clear. Ends with 1 where something was found, with 3
-where nothing was, but not everything could be asked; `--no-install` asks only with what is there.
+cargo-deny for the Rust crates (rules in deny.toml), pip-audit for the Python packages of .venv, npm audit for the browser's.
+Each asks a database in the network. What cannot be asked is told, and is no all-clear. Ends with 1 where something was found,
+with 3 where nothing was, but not everything could be asked; `--no-install` asks only with what is there.
 """
 
 import json

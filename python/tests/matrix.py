@@ -19,7 +19,7 @@ from pathlib import Path
 
 from tumble import Scene, StepError, World
 from tumble.cli import find
-from tumble.cli.view import _meshes
+from tumble.cli.view import mesh_paths
 
 ROOT = Path(__file__).parents[2]
 STATES = ROOT / "web" / "tests" / "states.mjs"
@@ -174,7 +174,7 @@ def wasm(rows: Sequence[tuple[Row, list[Path]]]) -> None:
             "name": row.case.name,
             "text": find.scene_file(row.case.name).read_text(encoding="utf-8"),
             "overrides": _overrides(row.case),
-            "files": {path: str(Path(scene.folder) / path) for path in _meshes(scene)},
+            "files": {path: str(Path(scene.folder) / path) for path in mesh_paths(scene)},
             "frames": row.case.frames,
         }
         jobs.append(job | ({"checkpoint": str(checkpoints[-1])} if checkpoints else {}))

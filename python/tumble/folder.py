@@ -188,6 +188,8 @@ def write_whole(path: Path, data: bytes) -> None:
 def write_columns(path: Path, columns: Columns) -> None:
     """Columns as an uncompressed .npz with keys `object/column`."""
     arrays = {f"{name}/{column}": array for name, table in columns.items() for column, array in table.items()}
+    if any("\0" in key for key in arrays):
+        raise ExportError(f"{path}: the name of an object has a NUL in it, where names in archives end; rename it")
     buffer = io.BytesIO()
     np.savez(buffer, **arrays)  # type: ignore[arg-type]
     write_whole(path, buffer.getvalue())
