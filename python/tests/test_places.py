@@ -134,8 +134,12 @@ def test_files_that_may_not_grow(spring: Tree, tmp_path: Path, reference: Run, l
 
 
 @pytest.fixture
-def somebody() -> Iterator[Path]:
+def somebody(spring: Tree, tmp_path: Path) -> Iterator[Path]:
     """A folder of a user without rights, who is at work."""
+    # Loads what that user may not read.
+    before = simulate(spring, tmp_path / "before", frames=11)
+    check(before.folder, before)
+    assert before.frame(0) and simulate(spring, before.folder, frames=12, resume=True).n_frames == 13
     place = Path(f"/tmp/tumble-{os.getpid()}-{time.monotonic_ns()}")
     place.mkdir(mode=0o777)
     root = os.geteuid() == 0
