@@ -15,7 +15,7 @@ VERSION := $(shell sed -n 's/^version = "\(.*\)"/\1/p' Cargo.toml | head -n 1)
 WEB := $(shell find web -path web/node_modules -prune -o -path web/dist -prune -o -path $(PKG) -prune -o -type f -print) \
 	$(shell find python/tumble/scenes docs/theory -type f)
 
-.PHONY: help setup demo test lint test-rust test-python test-web web wheel chromium openvdb validate bench clean
+.PHONY: help setup demo test lint test-rust test-python test-web web wasm wheel chromium openvdb validate audit bench clean
 
 help:
 	@echo "make demo      set up, drape a sheet over the Stanford bunny, show where the film is"
@@ -24,6 +24,7 @@ help:
 	@echo "make web       build the browser laboratory into web/dist, and for \`tumble view\`"
 	@echo "make wheel     the package with all of it, in dist/"
 	@echo "make validate  the long figures"
+	@echo "make audit     known faults and licences of what tumble depends on"
 	@echo "make bench     speed against peers, which it installs into .venv-bench"
 
 setup: $(VENV)/.engine
@@ -61,7 +62,7 @@ openvdb:
 		|| { command -v apt-get >/dev/null && apt-get update -qq && apt-get install -qq -y --no-install-recommends python3-openvdb; } \
 		|| echo "no python3-openvdb here: tests of VDB files need it where there is apt, and are skipped elsewhere"
 
-test-python: setup openvdb
+test-python: setup openvdb wasm
 	$(BIN)/python -m pytest
 
 web: python/tumble/web/index.html
@@ -78,6 +79,11 @@ python/tumble/web/index.html: $(PKG)/single_bg.wasm $(PKG)/double_bg.wasm web/no
 wheel: setup web
 	$(BIN)/maturin build --release --quiet --out dist
 	@$(BIN)/python -m zipfile --list dist/tumble-*.whl | grep -q " *tumble/web/index.html" && ls dist/tumble-*.whl
+
+# The browser's engine, where there is a Node that its bits can be compared in.
+wasm:
+	@if command -v node >/dev/null; then $(MAKE) --no-print-directory $(PKG)/double_bg.wasm; \
+		else echo "no Node here: the bits of WebAssembly are not compared"; fi
 
 web/node_modules/.ready: web/package-lock.json
 	@command -v npm >/dev/null || { echo "make web needs Node 20.19 or later, with npm"; exit 1; }
@@ -107,12 +113,18 @@ test-web: setup chromium
 	@if command -v npm >/dev/null; then $(MAKE) --no-print-directory web && cd web && npm test --silent; \
 		else echo "no Node here: the browser laboratory is not tested; it needs Node 20.19 or later, with npm"; fi
 
-validate: setup openvdb
+# With the tests that are marked long, and every scene in the determinism matrix.
+validate: setup openvdb wasm
 	cargo test --workspace --exclude tumble-python --release --quiet -- --include-ignored --nocapture
-	$(BIN)/python -m pytest -s
+	$(BIN)/python -m pytest -s -m ""
+	$(BIN)/python python/tests/matrix.py --all
+
+# Known faults and licences of what tumble depends on; asks three databases in the network, and says which do not answer.
+audit: setup
+	@$(BIN)/python python/tests/audit.py
 
 bench: setup
 	$(PYTHON) benchmarks/bench.py
 
 clean:
-	rm -rf target out dist $(VENV) .venv-bench web/dist web/node_modules $(PKG) python/tumble/web
+	rm -rf target out dist $(VENV) .venv-audit .venv-bench web/dist web/node_modules $(PKG) python/tumble/web

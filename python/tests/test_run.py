@@ -74,6 +74,18 @@ def test_native_bits_are_noted_with_the_instructions(spring: Tree, tmp_path: Pat
     assert manifest["machine"]["instructions"] in ("scalar", "avx2", "avx512")
 
 
+def test_bits_of_a_factorization_are_those_of_a_machine(spring: Tree, tmp_path: Path) -> None:
+    for integrator, linear, bits in (
+        ("implicit_euler", "cholesky", "machine"),
+        ("bdf2", "cholesky", "machine"),
+        ("implicit_midpoint", "pcg", "portable"),
+        ("rk4", "cholesky", "portable"),
+    ):
+        spring["system"] = [{"integrator": integrator, "substeps": 8, "solver": {"linear": linear}}]
+        run = simulate(spring, tmp_path / "run", frames=1, overwrite=True)
+        assert run.manifest["bits"] == bits, integrator
+
+
 def test_the_ledger_counts_steps(reference: Run) -> None:
     ledger = reference.ledger
     assert list(ledger) == LEDGER[:-1]

@@ -4,6 +4,7 @@ import base64
 import json
 import random
 import signal
+import socket
 import subprocess
 import sys
 import threading
@@ -153,3 +154,90 @@ def test_ctrl_c_ends_it(built: Path) -> None:
         finally:
             child.kill()
     assert child.returncode == 0 and errors == ""
+
+
+def raw(site: str, request: str) -> tuple[int, str]:
+    """The answer to words that no browser would send."""
+    host, port = site.removeprefix("http://").split(":")
+    with socket.create_connection((host, int(port)), timeout=10) as line:
+        line.sendall(request.encode())
+        line.shutdown(socket.SHUT_WR)
+        answer = b"".join(iter(lambda: line.recv(65536), b"")).decode()
+    return int(answer.split()[1]), answer
+
+
+def test_only_this_machine_is_listened_to(built: Path) -> None:
+    with view.server(0, {}) as served:
+        assert served.server_address[0] == "127.0.0.1"
+        assert served.socket.getsockname()[0] == "127.0.0.1"
+
+
+def test_other_pages_cannot_read_it(site: str) -> None:
+    def asked(path: str = "/assets/a.js", **headers: str) -> int:
+        lines = "".join(f"{name.replace('_', '-')}: {value}\r\n" for name, value in headers.items())
+        return raw(site, f"GET {path} HTTP/1.1\r\nHost: {site.removeprefix('http://')}\r\n{lines}\r\n")[0]
+
+    mesh = "/view/..%2Fmy%20mesh%20(1).ply"
+    own = {"Origin": site, "Sec_Fetch_Site": "same-origin", "Sec_Fetch_Mode": "cors"}
+    for path in ("/", "/assets/a.js", mesh):
+        assert asked(path) == asked(path, **own) == 200
+        # Typed in, or opened by the command; or a link on another page.
+        assert asked(path, Sec_Fetch_Site="none", Sec_Fetch_Mode="navigate") == 200
+        assert asked(path, Sec_Fetch_Site="cross-site", Sec_Fetch_Mode="navigate") == 200
+        for origin in (
+            "https://elsewhere.example",
+            "null",
+            "http://127.0.0.1:1",
+            site.replace("http", "https"),
+            f"{site}.example",
+        ):
+            assert asked(path, Origin=origin) == 403, origin
+        for where in ("cross-site", "same-site"):
+            assert asked(path, Sec_Fetch_Site=where, Sec_Fetch_Mode="no-cors") == 403
+    for host in ("127.0.0.1.example", "elsewhere.example:127.0.0.1", "127.0.0.1:80:80", "[::1]", ""):
+        assert raw(site, f"GET / HTTP/1.1\r\nHost: {host}\r\n\r\n")[0] == 421, host
+    head = raw(site, f"GET / HTTP/1.1\r\nHost: {site.removeprefix('http://')}\r\n\r\n")[1]
+    assert "Cross-Origin-Resource-Policy: same-origin" in head and "frame-ancestors 'none'" in head
+    assert "Access-Control" not in head
+
+
+def test_no_path_leads_out_of_its_folders(site: str, tmp_path: Path, built: Path) -> None:
+    (tmp_path / "web-beside").mkdir()
+    (tmp_path / "web-beside" / "secret").write_text("secret")
+    host = site.removeprefix("http://")
+    paths = [
+        "/../secret",
+        "//../secret",
+        "/assets/../../secret",
+        "/./../secret",
+        "/..%5csecret",
+        "/%2e%2e/%2e%2e/secret",
+    ]
+    paths += [
+        f"/{tmp_path}/secret",
+        f"//{tmp_path}/secret",
+        f"/view/{tmp_path}/secret",
+        "/view/../../secret",
+        "/view/..%2f..%2fsecret",
+    ]
+    paths += [
+        "/../web-beside/secret",
+        "/view/..%2Fmy%20mesh%20(1).ply/../secret",
+        f"file://{tmp_path}/secret",
+        f"{site}/../secret",
+    ]
+    paths += [
+        "/view/..%252Fsecret",
+        "/..;/secret",
+        "/%c0%ae%c0%ae/secret",
+        "/assets/a.js/../../../secret",
+        "/view",
+        "/" + "../" * 40 + "etc/passwd",
+    ]
+    for path in paths:
+        code, answer = raw(site, f"GET {path} HTTP/1.1\r\nHost: {host}\r\n\r\n")
+        assert code == 404 and "secret\n" not in answer + "\n" and "root:" not in answer, path
+    for method in ("PUT", "POST", "DELETE", "OPTIONS", "PATCH", "TRACE", "CONNECT"):
+        code, _ = raw(site, f"{method} /assets/a.js HTTP/1.1\r\nHost: {host}\r\nContent-Length: 1\r\n\r\nx")
+        assert code == 501, method
+    assert (built / "assets" / "a.js").read_text() == "export {}"

@@ -6,6 +6,7 @@ disk that is full at the end.
 """
 
 import contextlib
+import errno
 import multiprocessing
 import os
 import signal
@@ -23,7 +24,7 @@ from typing import IO
 import numpy as np
 
 from tumble._engine import ExportError
-from tumble.folder import writing
+from tumble.folder import reason, writing
 from tumble.pictures import Picture, Studio, render
 from tumble.pictures.framing import Camera
 from tumble.pictures.things import Recording, Thing
@@ -180,5 +181,7 @@ def _encoder(path: Path, goal: Path, size: tuple[int, int], rate: float) -> Iter
             process.stdin.close()
         if code != 0 or not complete:
             words.seek(0)
-            reason = words.read().decode(errors="replace").strip().splitlines()
-            raise ExportError(f"{goal}: ffmpeg failed: {reason[-1] if reason else f'exit code {code}'}")
+            said = words.read().decode(errors="replace").strip().splitlines()
+            if any(os.strerror(errno.ENOSPC) in line for line in said):
+                raise ExportError(f"{goal}: {reason(OSError(errno.ENOSPC, os.strerror(errno.ENOSPC)))}")
+            raise ExportError(f"{goal}: ffmpeg failed: {said[-1] if said else f'exit code {code}'}")

@@ -54,6 +54,9 @@ run.json
 """
 """What a run writes and --force deletes: the manifest last, because a folder without it is not taken for a run."""
 
+_FOLDERS = ("frames", "checkpoints", "stills", "usd", "ply", "volumes", "slices")
+"""Where it writes them."""
+
 
 class RunFolder:
     """Where everything is."""
@@ -84,10 +87,17 @@ class RunFolder:
         return self.manifest.is_file()
 
     def is_free(self) -> bool:
-        """Whether a new run can go here: nothing is here yet."""
+        """Whether a new run can go here: nothing is here yet, but for what a run leaves that is killed before it has written
+        its manifest, or after --force has deleted the one of another."""
         if not os.path.lexists(self.path):
             return True
-        return self.path.is_dir() and all(file.name == LOCK for file in self.path.iterdir())
+
+        def nothing(file: Path) -> bool:
+            if file.name in _FOLDERS and file.is_dir() and not file.is_symlink():
+                return not any(file.iterdir())
+            return file.name in (LOCK, self.manifest.name + ".tmp")
+
+        return self.path.is_dir() and all(map(nothing, self.path.iterdir()))
 
     def make(self) -> None:
         for folder in ("frames", "checkpoints"):
@@ -100,14 +110,14 @@ class RunFolder:
             for pattern in _WRITTEN.split():
                 for file in [*self.path.glob(pattern), *self.path.glob(pattern + ".tmp")]:
                     file.unlink()
-            for folder in ("frames", "checkpoints", "stills", "usd", "ply", "volumes", "slices"):
+            for folder in _FOLDERS:
                 with suppress(OSError):
                     (self.path / folder).rmdir()
 
     def drop_after(self, frame: int) -> None:
-        """Deletes the frames and checkpoints after a frame."""
+        """Deletes the frames and checkpoints after a frame, the last one first: a stop on the way leaves no gap."""
         with writing(self.path):
-            late = [self.frame(i) for i in self._numbers("frames", ".npz") if i > frame]
+            late = [self.frame(i) for i in reversed(self._numbers("frames", ".npz")) if i > frame]
             late += [self.checkpoint(i) for i in self.checkpoints() if i > frame]
             for file in [*late, *self.path.glob("frames/*.tmp"), *self.path.glob("checkpoints/*.tmp")]:
                 file.unlink()
@@ -194,6 +204,8 @@ def share(source: Path, path: Path) -> None:
 def write_columns(path: Path, columns: Columns) -> None:
     """Columns as an uncompressed .npz with keys `object/column`."""
     arrays = {f"{name}/{column}": array for name, table in columns.items() for column, array in table.items()}
+    if any("\0" in key for key in arrays):
+        raise ExportError(f"{path}: the name of an object has a NUL in it, where names in archives end; rename it")
     buffer = io.BytesIO()
     np.savez(buffer, **arrays)  # type: ignore[arg-type]
     write_whole(path, buffer.getvalue())

@@ -35,6 +35,9 @@ more than a hundredth of it."""
 
 KEPT_CHECKPOINTS = 2
 
+IMPLICIT = ("implicit_euler", "implicit_midpoint", "bdf2")
+"""Integrators that solve linear systems."""
+
 _EMPTY_REPORT: dict[str, Any] = {}
 
 
@@ -73,12 +76,13 @@ class Recorder:
             "fps": self.scene["time"]["fps"],
             "seed": self.scene["seed"],
             "precision": self.scene["precision"],
-            "bits": self.scene["bits"],
+            "bits": tier(self.scene),
             "resumed": int((earlier or {}).get("resumed", -1)) + 1,
             "machine": machine(threads),
             "timings": self.timings,
             "warnings": list(world.warnings),
-            "stability": world.stability(),
+            # Of the start: the estimate settles how many steps an interval gets, and a run that goes on has settled it.
+            "stability": world.stability() if earlier is None else earlier.get("stability", []),
             "expectations": [],
             "probes": [],
             "descent": list(descent),
@@ -263,6 +267,13 @@ def describe(units: Mapping[str, Mapping[str, str]], *tables: Columns) -> dict[s
                 entry = {"unit": unit, "shape": shape, "dtype": array.dtype.name, "in": place}
                 described.setdefault(name, {})[column] = entry
     return described
+
+
+def tier(scene: Mapping[str, Any]) -> str:
+    """How far the bits hold: "portable" everywhere, "native" where the instructions are the same, "machine" on this one alone,
+    which goes for the sparse factorization of a library."""
+    factored = any(s["integrator"] in IMPLICIT and s["solver"]["linear"] == "cholesky" for s in scene["system"])
+    return "machine" if factored else str(scene["bits"])
 
 
 def machine(threads: int | None) -> dict[str, Any]:

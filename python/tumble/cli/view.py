@@ -75,7 +75,7 @@ def address(argument: str, overrides: list[str] | None) -> tuple[str, dict[str, 
 
     file = find.scene_file(argument)
     checked = find.scene(argument, overrides)
-    meshes = {path: Path(checked.folder) / path for path in _meshes(checked)}
+    meshes = {path: Path(checked.folder) / path for path in mesh_paths(checked)}
     shipped = {path: name for name, path in find.shipped().items()}
     if file in shipped and not overrides:
         return f"scene/{shipped[file]}", meshes
@@ -110,7 +110,7 @@ def link(tree: bytes) -> str:
     return base64.urlsafe_b64encode(packer.compress(tree) + packer.flush()).decode().rstrip("=")
 
 
-def _meshes(scene: "Scene") -> list[str]:
+def mesh_paths(scene: "Scene") -> list[str]:
     """Paths of the mesh files that a scene names."""
 
     def walk(node: Any) -> list[str]:
@@ -133,8 +133,15 @@ def server(port: int, meshes: Mapping[str, Path]) -> ThreadingHTTPServer:
 
         def send_head(self) -> Any:
             # A page elsewhere whose name is made to lead here must not read the scene's files.
-            if self.headers.get("Host", "127.0.0.1").rsplit(":", 1)[0] not in ("127.0.0.1", "localhost"):
+            host = self.headers.get("Host", "127.0.0.1")
+            if host.rsplit(":", 1)[0] not in ("127.0.0.1", "localhost"):
                 return self.send_error(421)
+            # Nor any other page, be it on this machine: it may only lead here.
+            if self.headers.get("Origin", f"http://{host}") != f"http://{host}":
+                return self.send_error(403)
+            site, mode = (self.headers.get(f"Sec-Fetch-{name}") for name in ("Site", "Mode"))
+            if site in ("cross-site", "same-site") and mode != "navigate":
+                return self.send_error(403)
             if "\0" in unquote(self.path):
                 return self.send_error(404)
             return super().send_head()
@@ -149,6 +156,8 @@ def server(port: int, meshes: Mapping[str, Path]) -> ThreadingHTTPServer:
         def end_headers(self) -> None:
             self.send_header("Cache-Control", "no-cache")
             self.send_header("X-Content-Type-Options", "nosniff")
+            self.send_header("Cross-Origin-Resource-Policy", "same-origin")
+            self.send_header("Content-Security-Policy", "frame-ancestors 'none'")
             super().end_headers()
 
         def list_directory(self, path: Any) -> None:

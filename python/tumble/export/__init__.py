@@ -1,6 +1,7 @@
 """Runs in the file formats of other programs."""
 
 import re
+from itertools import chain, count
 
 DIGITS = 6
 """Digits of the number of a frame in the name of its file, at least."""
@@ -11,6 +12,6 @@ def file_names(names: list[str]) -> dict[str, str]:
     found: dict[str, str] = {}
     for name in names:
         stem = re.sub(r"[^\w-]", "_", name)
-        free = next(s for s in (stem, *(f"{stem}_{k}" for k in range(2, 1_000_000))) if s not in found.values())
-        found[name] = free
+        others = (f"{stem}_{k}" for k in count(2))
+        found[name] = next(s for s in chain([stem], others) if s not in found.values())
     return found
