@@ -163,7 +163,6 @@ def test_adaptive_steps_of_newborn_particles_go_on_to_the_same_bits(tmp_path: Pa
     assert resumed.manifest["resumed"] == 1 and resumed.manifest["stability"] == whole.manifest["stability"]
 
 
-@pytest.mark.xfail(strict=True, reason="the estimate is remembered as the choice of how many steps an interval gets")
 def test_an_estimate_of_stability_changes_no_state() -> None:
     one, other = World(Scene(SPRAY)), World(Scene(SPRAY))
     for world in (one, other):

@@ -1,5 +1,7 @@
 //! Elements that a position-based method satisfies one after the other: Gauss-Seidel over colours, elements of one colour side by side,
-//! since no two of them share a node. The order of elements is fixed, and so are the bits, whatever the threads and registers.
+//! since no two of them share a node. Threads first take clusters, elements between rows that are near each other in memory, and go
+//! through all colours of one without waiting for others; elements between clusters follow, colour by colour. The order of elements is
+//! fixed, and so are the bits, whatever the threads and registers.
 //!
 //! Source: [bender2015], section 5; [macklin2016]. Verified in `tests/position_based.rs`.
 
@@ -8,7 +10,7 @@ use super::{Compliance, Element, Law, corrected, energy, project};
 use crate::geometry::Walls;
 use crate::math::parallel::{self, Tasks, fold};
 use crate::math::simd::{Index, Kernel, Width, count, dispatch, packs};
-use crate::math::{Lane, Quat, Real, Row, xyz};
+use crate::math::{Lane, Quat, Real, Row, Vec3, xyz};
 use std::marker::PhantomData;
 use std::ops::Range;
 
@@ -24,7 +26,9 @@ pub use shape::Shape;
 pub use strands::Strands;
 pub use volume::{Volume, enclosed};
 
-/// Elements per task.
+/// Rows of a cluster: 64 KB in single precision.
+const CLUSTER: usize = 4096;
+/// Elements per task, of those between clusters.
 const TASK: usize = 2048;
 /// Compliance of what has broken, and of a damper without stiffness [m/N]: nothing that is there feels it.
 const LIMP: f64 = 1e18;
@@ -101,7 +105,7 @@ impl Shared {
     }
 }
 
-/// Elements sorted by colour, and by their first node within a colour, so that memory is walked through in order.
+/// Elements sorted by cluster, by colour, and by their first node within a colour, so that memory is walked through in order.
 struct Columns<const N: usize, const D: usize, const P: usize> {
     nodes: [Index; N],
     rest: [Vec<Real>; D],
@@ -112,8 +116,7 @@ struct Columns<const N: usize, const D: usize, const P: usize> {
     damping: Vec<Real>,
     /// Inverse inertias of frames [1/(kg m²)]; empty for points.
     inverse: [Vec<Real>; N],
-    /// Ranges of elements that share no node.
-    colors: Vec<Range<usize>>,
+    order: Order,
     /// For every place, which of the elements given stands there.
     given: Vec<u32>,
 }
@@ -128,7 +131,7 @@ impl<const N: usize, const D: usize, const P: usize> Columns<N, D, P> {
         if members.iter().flat_map(|m| m.nodes).any(|i| i as usize >= rows) || rows > points + inverse.len() {
             return None;
         }
-        let (given, colors) = sorted(rows, members);
+        let (given, order) = sorted(rows, members);
         let of = |place: &u32| &members[*place as usize];
         let column = |f: &dyn Fn(&Members<N, D, P>) -> f64| -> Vec<Real> { given.iter().map(|e| f(of(e)) as Real).collect() };
         let mut nodes: [Index; N] = std::array::from_fn(|_| Index::default());
@@ -147,7 +150,7 @@ impl<const N: usize, const D: usize, const P: usize> Columns<N, D, P> {
             compliance: given.iter().map(|e| compliance(of(e).stiffness)).collect(),
             damping: if damped { column(&|m| m.damping) } else { Vec::new() },
             inverse,
-            colors,
+            order,
             given,
         })
     }
@@ -198,13 +201,25 @@ impl<const N: usize, const D: usize, const P: usize> Columns<N, D, P> {
         (rest, law)
     }
 
-    /// Calls `run(elements, their numbers)` for tasks of one colour after the other; `each` of the numbers belong to an element, and those
-    /// of a task stand side by side.
+    /// Calls `run(elements, their numbers)` for ranges of elements that share no node; `each` of the numbers belong to an element.
     fn sweep(&self, each: usize, numbers: &mut [Real], run: impl Fn(Range<usize>, &mut [Real]) + Sync) {
         let mut left = numbers;
-        for color in &self.colors {
-            let (own, rest) = std::mem::take(&mut left).split_at_mut(each * color.len());
+        let mut take = |elements: usize| -> &mut [Real] {
+            let (own, rest) = std::mem::take(&mut left).split_at_mut(each * elements);
             left = rest;
+            own
+        };
+        let clusters = self.order.clusters.iter().map(|colors| (colors, take(colors.iter().map(Range::len).sum())));
+        clusters.in_parallel(|(colors, numbers)| {
+            let mut left = numbers;
+            for color in colors {
+                let (own, rest) = left.split_at_mut(each * color.len());
+                left = rest;
+                run(color.clone(), own);
+            }
+        });
+        for color in &self.order.between {
+            let own = take(color.len());
             let task = |t: usize| {
                 let start = color.start + t * TASK;
                 start..(start + TASK).min(color.end)
@@ -220,18 +235,48 @@ impl<const N: usize, const D: usize, const P: usize> Columns<N, D, P> {
     }
 }
 
-/// Elements by colour, and the ranges of the colours: greedily in the order given, each element takes the first colour that none of its
-/// nodes has.
-fn sorted<const N: usize, const D: usize, const P: usize>(rows: usize, members: &[Members<N, D, P>]) -> (Vec<u32>, Vec<Range<usize>>) {
-    let mut used: Vec<u64> = vec![0; rows];
+/// Ranges of elements that share no node.
+struct Order {
+    /// The colours of each cluster; no element of one has a node of another.
+    clusters: Vec<Vec<Range<usize>>>,
+    /// The colours of what lies between clusters.
+    between: Vec<Range<usize>>,
+}
+
+/// Elements in the order in which they are satisfied.
+fn sorted<const N: usize, const D: usize, const P: usize>(rows: usize, members: &[Members<N, D, P>]) -> (Vec<u32>, Order) {
+    let mut inside: Vec<Vec<u32>> = vec![Vec::new(); rows.div_ceil(CLUSTER)];
+    let mut between = Vec::new();
+    for (e, member) in members.iter().enumerate() {
+        let cluster = member.nodes[0] as usize / CLUSTER;
+        let whole = member.nodes.iter().all(|i| *i as usize / CLUSTER == cluster);
+        if whole { inside[cluster].push(e as u32) } else { between.push(e as u32) }
+    }
+    let mut given = Vec::with_capacity(members.len());
+    let mut used = vec![0; rows];
+    let clusters = inside.iter().filter(|own| !own.is_empty()).map(|own| colored(own, members, &mut used, &mut given)).collect();
+    used.fill(0);
+    let between = colored(&between, members, &mut used, &mut given);
+    (given, Order { clusters, between })
+}
+
+/// Appends elements by colour, and returns the ranges of the colours: greedily in the order given, each element takes the first colour that
+/// none of its nodes has `used`.
+fn colored<const N: usize, const D: usize, const P: usize>(
+    elements: &[u32],
+    members: &[Members<N, D, P>],
+    used: &mut [u64],
+    given: &mut Vec<u32>,
+) -> Vec<Range<usize>> {
     let mut colors: Vec<Vec<u32>> = Vec::new();
     // Elements around a node with more than 64 of them go one by one.
     let mut late: Vec<u32> = Vec::new();
-    for (e, member) in members.iter().enumerate() {
+    for e in elements {
+        let member = &members[*e as usize];
         let taken = member.nodes.iter().fold(0, |t, i| t | used[*i as usize]);
         let color = (!taken).trailing_zeros() as usize;
         if color == 64 {
-            late.push(e as u32);
+            late.push(*e);
             continue;
         }
         for i in member.nodes {
@@ -240,19 +285,19 @@ fn sorted<const N: usize, const D: usize, const P: usize>(rows: usize, members: 
         if color == colors.len() {
             colors.push(Vec::new());
         }
-        colors[color].push(e as u32);
+        colors[color].push(*e);
     }
     for color in &mut colors {
         color.sort_by_key(|e| members[*e as usize].nodes[0]);
     }
     colors.extend(late.into_iter().map(|e| vec![e]));
-    let mut start = 0;
-    let ranges = colors.iter().map(|c| {
+    let mut start = given.len();
+    given.extend(colors.iter().flatten());
+    let ends = colors.iter().map(|c| {
         start += c.len();
         start - c.len()..start
     });
-    let ranges = ranges.collect();
-    (colors.concat(), ranges)
+    ends.collect()
 }
 
 /// Elements E with the law Y.
@@ -406,6 +451,35 @@ impl<E: Element<N, M, D>, Y: Law<P>, const N: usize, const M: usize, const D: us
     }
 }
 
+/// The largest strain of links that are not broken.
+struct Strains<'a, E, const N: usize, const M: usize, const D: usize, const P: usize> {
+    columns: &'a Columns<N, D, P>,
+    range: Range<usize>,
+    x: &'a [Row],
+    kind: PhantomData<[E; M]>,
+}
+
+impl<E: Element<N, M, D>, const N: usize, const M: usize, const D: usize, const P: usize> Kernel for Strains<'_, E, N, M, D, P> {
+    type Output = Real;
+    #[inline(always)]
+    fn run<W: Width>(self, w: W) -> Real {
+        let (columns, mut largest, mut each) = (self.columns, Real::NEG_INFINITY, [0.0; 16]);
+        let Some(d) = E::LENGTH else { return largest };
+        packs!(W, w, self.range, |e| {
+            // SAFETY: `largest_strain` has called `check`.
+            let x = unsafe { columns.gather(w, E::FRAMES, self.x.as_ptr(), e) };
+            let (rest, soft) = (w.load(&columns.rest[d][e..]), w.load(&columns.compliance[e..]));
+            let way = Vec3 { x: x[1][0] - x[0][0], y: x[1][1] - x[0][1], z: x[1][2] - x[0][2] };
+            let strain = (way.norm() - rest) / rest;
+            let limp = soft - w.splat(0.5 * LIMP as Real);
+            w.store(limp.positive(w.splat(Real::NEG_INFINITY), strain), &mut each);
+            // NaN is never the larger.
+            largest = each[..count(w)].iter().fold(largest, |m, s| m.max(*s));
+        });
+        largest
+    }
+}
+
 impl<E: Element<N, M, D>, Y: Law<P>, const N: usize, const M: usize, const D: usize, const P: usize> Constraints
     for Projected<E, Y, N, M, D, P>
 {
@@ -473,9 +547,9 @@ impl<E: Element<N, M, D>, Y: Law<P>, const N: usize, const M: usize, const D: us
             return f64::NEG_INFINITY;
         }
         self.columns.check(x);
-        // NaN is never the larger.
-        let largest = |range: Range<usize>| range.map(|place| self.strain_at(x, place)).fold(Real::NEG_INFINITY, Real::max);
-        fold(self.len(), largest).into_iter().fold(f64::NEG_INFINITY, |m, s| m.max(f64::from(s)))
+        let (columns, kind) = (&self.columns, PhantomData::<[E; M]>);
+        let largest = fold(self.len(), |range| dispatch(Strains { columns, range, x, kind }));
+        largest.into_iter().fold(f64::NEG_INFINITY, |m, s| m.max(f64::from(s)))
     }
 
     fn break_links(&mut self, x: &[Row]) -> u64 {
@@ -531,5 +605,42 @@ impl<E: Element<N, M, D>, Y: Law<P>, const N: usize, const M: usize, const D: us
         for given in broken {
             self.tear(places[*given as usize]);
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn all_elements_come_once_and_none_side_by_side_share_a_node() {
+        // A strip of rows of 50, with links to the right, up and to one hub that more than 64 links have.
+        let n = 3 * CLUSTER as u32;
+        let near = (0..n - 50).flat_map(|i| [[i, i + 1], [i, i + 50]]);
+        let members: Vec<_> = near
+            .chain((1000..1100).map(|i| [7, i]))
+            .map(|nodes| Members { nodes, rest: [1.0], law: [], stiffness: 1.0, damping: 0.0 })
+            .collect();
+        let (given, order) = sorted(n as usize, &members);
+        let mut sum = given.clone();
+        sum.sort_unstable();
+        assert!(sum.into_iter().eq(0..members.len() as u32));
+        let ranges: Vec<_> = order.clusters.iter().flatten().chain(&order.between).cloned().collect();
+        assert_eq!(ranges.first().map(|r| r.start), Some(0));
+        assert!(ranges.windows(2).all(|r| r[0].end == r[1].start) && ranges.last().map(|r| r.end) == Some(given.len()));
+        let nodes = |range: &Range<usize>| -> Vec<u32> {
+            let mut all: Vec<u32> = given[range.clone()].iter().flat_map(|e| members[*e as usize].nodes).collect();
+            all.sort_unstable();
+            all
+        };
+        for range in &ranges {
+            assert!(nodes(range).windows(2).all(|n| n[0] < n[1]), "{range:?} shares a node");
+        }
+        assert_eq!(order.clusters.len(), 3);
+        for (c, cluster) in order.clusters.iter().enumerate() {
+            assert!(cluster.iter().flat_map(nodes).all(|i| i as usize / CLUSTER == c));
+        }
+        // Only links over the two borders are left: 50 up and one to the right each.
+        assert_eq!(order.between.iter().map(Range::len).sum::<usize>(), 2 * 51);
     }
 }

@@ -394,7 +394,10 @@ impl Dynamics {
                 tumble_interface::engine::Limit { integrator, stable, usable }
             })
             .collect();
+        // Looking changes no state.
+        let kept = (self.automatic, self.measured);
         let substeps = self.substeps(dt);
+        (self.automatic, self.measured) = kept;
         Some(tumble_interface::engine::Stability {
             system: self.name.clone(),
             integrator: self.integrator,
