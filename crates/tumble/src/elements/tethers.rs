@@ -18,7 +18,9 @@ const GROUPS: usize = 4;
 /// Tethers of a run of rows.
 pub struct Tethers {
     rows: Range<usize>,
-    /// For each of some groups, the held point of every row and the length of the tether [m], infinite where there is none.
+    /// Rows of the held points.
+    held: Vec<u32>,
+    /// For each of some groups, which of them every row is tied to, and the length of the tether [m], infinite where there is none.
     groups: Vec<(Index, Vec<Real>)>,
 }
 
@@ -111,21 +113,23 @@ impl Tethers {
             }
         }
         let most = best.iter().map(Vec::len).max().filter(|most| *most > 0)?;
+        let held: Vec<u32> = (0..n).filter(|i| is_held(*i)).map(|i| (rows.start + i) as u32).collect();
+        let which = |from: u32| held.partition_point(|row| *row < from + rows.start as u32) as u32;
         let of = |k: usize| {
-            let pin = |i: usize| best[i].get(k).map_or(0, |(_, from)| *from) + rows.start as u32;
+            let pin = |i: usize| best[i].get(k).map_or(0, |(_, from)| which(*from));
             let length = |i: usize| best[i].get(k).map_or(Real::INFINITY, |(d, _)| (slack * d) as Real);
-            Some((Index::new((0..n).map(pin).collect(), rows.end)?, (0..n).map(length).collect()))
+            Some((Index::new((0..n).map(pin).collect(), held.len())?, (0..n).map(length).collect()))
         };
-        Some(Self { groups: (0..most).map(of).collect::<Option<Vec<_>>>()?, rows })
+        let groups = (0..most).map(of).collect::<Option<Vec<_>>>()?;
+        Some(Self { rows, held, groups })
     }
 
     /// Pulls every point back to the length of its tethers.
     pub fn project(&self, x: &mut [Row]) {
-        // Held points do not move; the others are read and written by one task each.
-        let held: Vec<Row> = x[self.rows.clone()].to_vec();
+        let held: Vec<Row> = self.held.iter().map(|i| x[*i as usize]).collect();
         x[self.rows.clone()].chunks_mut(CHUNK).enumerate().in_parallel(|(c, x)| {
             for (index, length) in &self.groups {
-                dispatch(Pull { index: &index.get()[c * CHUNK..], length: &length[c * CHUNK..], first: self.rows.start, held: &held, x });
+                dispatch(Pull { index: &index.get()[c * CHUNK..], length: &length[c * CHUNK..], held: &held, x });
             }
         });
     }
@@ -134,7 +138,6 @@ impl Tethers {
 struct Pull<'a> {
     index: &'a [u32],
     length: &'a [Real],
-    first: usize,
     held: &'a [Row],
     x: &'a mut [Row],
 }
@@ -145,8 +148,8 @@ impl Kernel for Pull<'_> {
     fn run<W: Width>(self, w: W) {
         packs!(W, w, (0..self.x.len()), |i| {
             let [x, y, z, q] = w.rows(self.x, i);
-            // SAFETY: held points are rows of the same run, from `first` on.
-            let [px, py, pz, _] = unsafe { w.gather_at(self.held.as_ptr().wrapping_sub(self.first), &self.index[i..]) };
+            // SAFETY: the index was made for as many rows as are held.
+            let [px, py, pz, _] = unsafe { w.gather_at(self.held.as_ptr(), &self.index[i..]) };
             let d = Vec3 { x: x - px, y: y - py, z: z - pz };
             let (size, most) = (d.norm(), w.load(&self.length[i..]));
             let back = (size - most).positive((size - most) / size, w.splat(0.0));
