@@ -55,8 +55,7 @@ def branch(
     from tumble import StepError
     from tumble.branch import branch as go
     from tumble.branch import is_branch, with_name
-    from tumble.cli.run import write_results
-    from tumble.lock import alone
+    from tumble.cli.run import judge, present
 
     if resume and force:
         raise typer.BadParameter("--resume goes on with a branch and --force replaces it; choose one")
@@ -81,24 +80,14 @@ def branch(
         how = ["--resume"] if is_branch(folder, parent, k, changes) else ["--force"] if force else []
         complain(f"stopped. Go on with\n  {find.command('branch', at, changes, *again, *how)}")
         raise typer.Exit(stopped(stop)) from None
-    for text in done.manifest["warnings"]:
-        warn(text)
     wanted = done.scene["output"]
-    with alone(folder):
-        asked = {name: wanted[name] for name in ("film", "usd", "ply", "vdb", "plot")}
-        failures = write_results(done, asked, wanted["stills"], "auto")
-    say(report.summary(done))
+    asked = {name: wanted[name] for name in ("film", "usd", "ply", "vdb", "plot")}
+    failures = present(done, asked, wanted["stills"], "auto")
     changed = f", changed: {' '.join(find.settings(changes))}" if changes else ", unchanged"
     say(f"  branch    of {parent.folder} at frame {k} (t = {parent.time(k):.6g} s, hash {parent.hashes[k]}){changed}")
     if changes and (text := _idle(done, parent, k)):
         warn(text)
-    for failure in failures:
-        complain(str(failure))
-    broken = done.manifest["expectations"]
-    for expectation in broken:
-        complain(f"broken expectation: {expectation['text']}")
-    if broken or failures:
-        raise typer.Exit(1)
+    judge(done, failures)
 
 
 def _origin(argument: str) -> "tuple[Run, int]":

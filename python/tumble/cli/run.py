@@ -43,7 +43,6 @@ def run(
       tumble run my.toml --resume
     """
     from tumble import StepError
-    from tumble.lock import alone
     from tumble.run import Run, simulate
 
     if resume and force:
@@ -81,19 +80,32 @@ def run(
         _say_what_is_kept(folder, find.command("run", scene, overrides, *again))
         raise typer.Exit(stopped(stop)) from None
 
+    failures = present(done, asked, frames_to_draw, renderer)
+    if text := report.gained(done, scene, overrides, [*(["--out", str(out)] if out else []), *_flags(flags, renderer)]):
+        warn(text)
+    judge(done, failures)
+
+
+def present(done: "Run", asked: dict[str, bool], stills: list[int], renderer: str) -> "list[TumbleError]":
+    """Says what a finished run warns of, writes what it is asked for, and sums it up; returns what could not be written."""
+    from tumble.lock import alone
+
     for text in done.manifest["warnings"]:
         warn(text)
     try:
-        with alone(folder):
-            failures = write_results(done, asked, frames_to_draw, renderer)
+        with alone(done.folder):
+            failures = write_results(done, asked, stills, renderer)
     except KeyboardInterrupt as stop:
         complain(
-            f"stopped; the simulation in {folder} is complete, see `tumble render --help` and `tumble export --help`"
+            f"stopped; the simulation in {done.folder} is complete, see `tumble render --help` and `tumble export --help`"
         )
         raise typer.Exit(stopped(stop)) from None
     say(report.summary(done))
-    if text := report.gained(done, scene, overrides, [*(["--out", str(out)] if out else []), *_flags(flags, renderer)]):
-        warn(text)
+    return failures
+
+
+def judge(done: "Run", failures: "list[TumbleError]") -> None:
+    """Ends with 1 where something could not be written or an expectation is broken."""
     for failure in failures:
         complain(str(failure))
     broken = done.manifest["expectations"]

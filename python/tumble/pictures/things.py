@@ -1,11 +1,8 @@
 """What there is to see in a run: its objects, and for each frame meshes, spheres, tubes and grounds with colours.
 
-Renderers draw these four and know nothing of scenes. What lies on grids becomes smoke, or in a plane an image, which
-`volumes` paints over the picture. Particles become spheres (and tubes for their springs and the way
-behind them), or, where there are many or they come and go, a cloud, which `splats` paints over the picture; ropes and
-anchors become tubes, sheets, blocks and nets meshes, colliders meshes, floors and planes grounds. Torn links show: a
-triangle or a piece of rope across a link that broke is left out (this needs `link_strain` among the scene's output
-columns).
+Renderers draw these four and know nothing of scenes. Ropes and anchors become tubes, sheets, blocks and nets meshes, floors
+grounds; particles spheres, or, where many come and go, a cloud that `splats` paints over the picture; what lies on grids smoke
+or an image that `volumes` paints. Where a link broke, triangle or rope is left out (if `link_strain` is an output column).
 """
 
 from collections.abc import Mapping

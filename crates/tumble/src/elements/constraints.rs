@@ -611,6 +611,7 @@ impl<E: Element<N, M, D>, Y: Law<P>, const N: usize, const M: usize, const D: us
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::elements::{Distance, Linear};
 
     #[test]
     fn all_elements_come_once_and_none_side_by_side_share_a_node() {
@@ -642,5 +643,37 @@ mod tests {
         }
         // Only links over the two borders are left: 50 up and one to the right each.
         assert_eq!(order.between.iter().map(Range::len).sum::<usize>(), 2 * 51);
+    }
+
+    #[test]
+    fn links_inside_and_between_clusters_are_all_satisfied_in_their_order() {
+        // A zigzag over three clusters, whose links are to be shorter than they are, from 1 to 0.7 m.
+        let n = 3 * CLUSTER as u32;
+        let members: Vec<_> =
+            (0..n - 1).map(|i| Members { nodes: [i, i + 1], rest: [0.7], law: [], stiffness: f64::INFINITY, damping: 0.0 }).collect();
+        let start: Vec<Row> = (0..n).map(|i| [(i % 64) as Real * 0.8, 0.6 * (i % 2) as Real, 0.1 * (i / 64) as Real, 1.0]).collect();
+        let (given, _) = sorted(n as usize, &members);
+        // One link after the other, in double precision: both ends go half of the way.
+        let mut expected: Vec<[f64; 3]> = start.iter().map(|x| [0, 1, 2].map(|c| f64::from(x[c]))).collect();
+        for e in given {
+            let [a, b] = [e as usize, e as usize + 1];
+            let d: [f64; 3] = std::array::from_fn(|c| expected[b][c] - expected[a][c]);
+            let length = d.iter().map(|d| d * d).sum::<f64>().sqrt();
+            for c in 0..3 {
+                let half = 0.5 * (1.0 - 0.7 / length) * d[c];
+                expected[a][c] += half;
+                expected[b][c] -= half;
+            }
+        }
+        for iterations in [1, 2] {
+            let mut x = start.clone();
+            let mut links = Projected::<Distance, Linear, 2, 1, 1, 0>::new(n as usize, n as usize, &[], &members, &[]).unwrap();
+            let step = Projection { h: 0.01, before: &start, iteration: 0, iterations, plain: None, walls: Walls::default() };
+            links.project(&mut x, &step);
+            let off = |(x, e): (&Row, &[f64; 3])| (0..3).map(|c| (f64::from(x[c]) - e[c]).abs()).fold(0.0, f64::max);
+            let most = x.iter().zip(&expected).map(off).fold(0.0, f64::max);
+            // Some roundings of numbers up to 51.
+            assert!(most < 200.0 * f64::from(Real::EPSILON), "{iterations}: {most}");
+        }
     }
 }
