@@ -123,7 +123,8 @@ class World:
     @property
     def ledger(self) -> dict[str, Any]:
         """The books: time, mass, momentum (3), angular_momentum (3), kinetic, elastic, external, energy [J], stretch,
-        penetration [m], intersections, speed [m/s], contacts, broken, heat and heat_in [J]."""
+        penetration [m], intersections, speed [m/s], contacts, broken, heat and heat_in [J], volume [m³],
+        divergence [1/s]."""
 
     def hash(self) -> str:
         """Hash of everything that the next step depends on, 16 hexadecimal digits."""

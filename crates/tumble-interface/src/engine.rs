@@ -118,6 +118,10 @@ pub struct Ledger {
     pub heat: f64,
     /// Heat that has come in through surfaces and from sources [J].
     pub heat_in: f64,
+    /// Volume inside closed surfaces of soft objects [m³].
+    pub volume: f64,
+    /// Largest divergence of a gas's velocity in a cell [1/s].
+    pub divergence: f64,
 }
 
 impl Ledger {

@@ -268,6 +268,8 @@ impl World {
             total.broken += books.broken;
             total.heat += books.heat;
             total.heat_in += books.heat_in;
+            total.volume += books.volume;
+            total.divergence = total.divergence.max(books.divergence);
         }
         total
     }
