@@ -102,13 +102,13 @@ def test_divergence_is_bounded(tmp_path: Path) -> None:
     scene: Tree = {"version": 1, "time": {"fps": 24, "frames": 3}, "gas": [gas]}
     left = []
     for tolerance in (1e-1, 1e-5):
-        gas["solver"] = {"tolerance": tolerance}
+        gas["pressure"] = {"tolerance": tolerance}
         world = World(Scene(scene))
         world.step(3)
         left.append(float(np.abs(world.columns("divergence")["g"]["divergence"]).max()))
         assert world.ledger["divergence"] == pytest.approx(left[-1], rel=1e-6)
     assert left[0] > 10 * left[1] > 0
-    gas["solver"] = {"tolerance": 1e-1}
+    gas["pressure"] = {"tolerance": 1e-1}
     assert broken(scene, tmp_path / "run", max_divergence=0.99 * left[0])[0][0] == "max_divergence"
 
 
