@@ -205,7 +205,11 @@ def main() -> int:
     parser.add_argument("--all", action="store_true", help="every scene that ships")
     parser.add_argument("--frames", type=int, help="instead of 21 of slow scenes and 61 of others")
     asked = parser.parse_args()
-    cases = every_scene() if asked.all else [Case(name, 61) for name in asked.names] or list(TEN.values())
+    cases = (
+        every_scene()
+        if asked.all
+        else [Case(name, 21 if name in SLOW else 61) for name in asked.names] or list(TEN.values())
+    )
     if asked.frames is not None:
         cases = [Case(case.name, asked.frames, case.every, case.overrides) for case in cases]
     lacking = why_no_wasm()

@@ -115,8 +115,9 @@ def test_a_branch_is_never_begun_anew_from_the_start(reference: Run, spring: Tre
     for frame, changes in ((12, [SOFTER]), (13, [])):
         with pytest.raises(SceneError, match="is a branch of"):
             branch(reference, frame, found.folder, changes, resume=True)
+    other = shutil.copytree(reference.folder, tmp_path / "another")
     with pytest.raises(SceneError, match="is no branch"):
-        branch(found, 13, reference.folder, resume=True)
+        branch(found, 13, other, resume=True)
 
 
 def test_the_parent_outlives_its_branches(reference: Run, tmp_path: Path) -> None:
@@ -129,6 +130,29 @@ def test_the_parent_outlives_its_branches(reference: Run, tmp_path: Path) -> Non
     simulate(reference.scene | {"seed": 5}, reference.folder, frames=2, overwrite=True)
     for i, position in enumerate(found_before):
         np.testing.assert_array_equal(found.frame(i)["p"]["position"], position)
+
+
+def test_no_run_on_the_line_of_descent_is_replaced(reference: Run, tmp_path: Path) -> None:
+    """Each would go on from the other, and their frames would be lost."""
+    shutil.copytree(reference.folder, tmp_path / "first")
+    first = Run(tmp_path / "first")
+    second = branch(first, 13, tmp_path / "second", [SOFTER])
+    third = branch(second, 20, tmp_path / "third", [SOFTER])
+    for taken in (first, second, third):
+        with pytest.raises(SceneError, match="branches off from"):
+            branch(third, -1, taken.folder, frames=2, overwrite=True)
+        assert_same(Run(taken.folder), taken)
+
+
+def test_a_run_may_be_where_one_is(
+    reference: Run, tmp_path: Path, tumble: Command, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    shutil.copytree(reference.folder, tmp_path / "runs" / "first")
+    monkeypatch.chdir(tmp_path / "runs" / "first")
+    answer = tumble("branch", ".@13", "--set", SOFTER)
+    assert answer.code == 0, answer.err
+    assert [run.folder.name for run in family(Run("."))] == ["first@13"]
+    assert (tmp_path / "runs" / "first@13" / "run.json").is_file()
 
 
 def test_copies_where_the_disk_has_no_links(reference: Run, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -218,6 +218,20 @@ def test_damage_is_told_and_ends_with_1(pair: tuple[Run, Run], tumble: Command) 
     assert str(path) in answer.err and "--resume" in answer.err
 
 
+def test_a_column_that_a_frame_has_lost_is_damage(pair: tuple[Run, Run], tumble: Command) -> None:
+    one, other = pair
+    path = other.folder / "frames" / sorted(p.name for p in (other.folder / "frames").iterdir())[2]
+    with np.load(path) as file:
+        whole = dict(file)
+    lost = next(name for name in whole if name.endswith("velocity"))
+    np.savez(path, **{name: array for name, array in whole.items() if name != lost})
+    answer = tumble("diff", str(one.folder), str(other.folder), "--deep")
+    assert answer.code == 1 and "frame 2 has lost velocity" in answer.err
+    np.savez(path, **(whole | {lost: whole[lost][:, :2]}))
+    answer = tumble("diff", str(one.folder), str(other.folder), "--deep")
+    assert answer.code == 1 and "one was changed" in answer.err
+
+
 def test_the_manifest_has_the_hash_of_every_frame(pair: tuple[Run, Run]) -> None:
     manifest = json.loads((pair[0].folder / "run.json").read_text())
     assert manifest["hashes"] == pair[0].hashes

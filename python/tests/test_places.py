@@ -217,6 +217,7 @@ def test_ctrl_c_at_any_moment_loses_no_frame(spring: Tree, scene_file: SceneFile
             assert process.stderr is not None
             while "simulate" not in process.stderr.readline():
                 assert process.poll() is None
+            # The moment is what is varied; there is nothing to wait for.
             time.sleep(moments.uniform(0, 0.1))
             process.send_signal(signal.SIGINT)
             err = process.communicate(timeout=60)[1]

@@ -230,6 +230,35 @@ def test_measures_that_are_not_there_are_told_before_anything_runs(
     assert not Path("out").exists()
 
 
+def test_an_index_of_what_is_refined_is_refused(tmp_path: Path) -> None:
+    rope: Tree = {"name": "r", "from": [0, 0, 0], "to": [1, 0, 0], "segments": 4}
+    scene: Tree = {"version": 1, "time": {"frames": 1}, "rope": [rope]}
+    with pytest.raises(SceneError, match="another place at each level"):
+        study(Scene(scene), tmp_path / "study", 3, measures=["r.position.z@2"])
+    only_steps = study(Scene(scene), tmp_path / "study", 3, ["system.0.substeps"], ["r.position.z@2"])
+    assert all(np.isfinite(m.values).all() for m in only_steps.measures)
+
+
+def test_all_levels_must_be_possible_before_the_first_runs(tmp_path: Path) -> None:
+    sheet: Tree = {"name": "s", "size": [1, 1], "resolution": [20, 20]}
+    scene: Tree = {"version": 1, "time": {"frames": 1}, "world": {"memory_limit": 0.01}, "sheet": [sheet]}
+    with pytest.raises(SceneError, match=r"level [123]: .*memory"):
+        study(Scene(scene), tmp_path / "study", 4)
+    assert not (tmp_path / "study").exists()
+
+
+def test_levels_of_an_earlier_study_that_went_further_are_dropped(oscillator: Tree, tmp_path: Path) -> None:
+    study(Scene(oscillator), tmp_path / "study", 4)
+    (tmp_path / "study" / "level-9").mkdir()
+    (tmp_path / "study" / "level-9" / "mine.txt").write_text("mine")
+    study(Scene(oscillator), tmp_path / "study", 2, overwrite=True)
+    assert sorted(p.name for p in (tmp_path / "study").glob("level-*/*") if p.name in ("run.json", "mine.txt")) == [
+        "mine.txt",
+        "run.json",
+        "run.json",
+    ]
+
+
 def test_measures_are_what_they_say(reference: Run) -> None:
     ledger, last = reference.ledger, reference.frame(-1)["p"]["position"].astype(float)
     assert value(reference, "kinetic") == value(reference, "kinetic@end") == ledger["kinetic"][-1]

@@ -1,5 +1,6 @@
 """Goes on from a frame of a run with a changed scene, as a run of its own that knows where it comes from."""
 
+import json
 import os
 import tempfile
 from collections.abc import Mapping, Sequence
@@ -8,8 +9,8 @@ from typing import Any
 
 import numpy as np
 
-from tumble._engine import Scene, SceneError, World
-from tumble.folder import RunFolder, refuse
+from tumble._engine import Scene, SceneError, StepError, World
+from tumble.folder import RunFolder, plain, refuse
 from tumble.lock import alone, ask
 from tumble.recorder import Recorder, describe
 from tumble.run import Progress, Run, admit, record, return_to_checkpoint
@@ -41,8 +42,10 @@ def branch(
     k = _frame(parent, frame)
     scene = _scene(parent, changes, k, frames)
     files = RunFolder(folder)
-    if os.path.realpath(files.path) == os.path.realpath(parent.folder):
-        raise refuse(files.path, "is the run itself; choose another folder with --out")
+    if os.path.realpath(files.path) in map(os.path.realpath, [parent.folder, *lineage(parent)]):
+        raise refuse(
+            files.path, "is the run itself, or one that it branches off from; choose another folder with --out"
+        )
     ask(files.path)
     descent = _descent(parent, k, files.path, changes)
     admit(files, scene, resume, overwrite, descent)
@@ -85,7 +88,10 @@ def world_at(run: Run, frame: int, threads: int | None = None) -> World:
                 ) from error
             _load(world, parent, min(k, start), threads)
     if k > world.frame_index:
-        world.step(k - world.frame_index)
+        try:
+            world.step(k - world.frame_index)
+        except StepError as error:
+            raise refuse(run.folder, f"frame {k} cannot be made again: {error}") from error
     if world.hash() != run.hashes[k]:
         made, own = run.manifest.get("tumble"), _version()
         why = (
@@ -106,18 +112,32 @@ def lineage(run: Run) -> list[Path]:
 
 def family(run: Run) -> list[Run]:
     """The runs beside a run that branch off from it, and those that it branches off from; the oldest first."""
-    own = os.path.realpath(run.folder)
+    home = with_name(run.folder)
+    own = os.path.realpath(home)
     found = [Run(path) for path in lineage(run) if RunFolder(path).is_run()]
-    for manifest in sorted(run.folder.resolve().parent.glob("*/run.json")):
+    for manifest in sorted(home.parent.glob("*/run.json")):
         if os.path.realpath(manifest.parent) == own:
             continue
         try:
-            other = Run(run.folder.parent / manifest.parent.name)
+            other = Run(manifest.parent)
         except SceneError:
             continue
         if own in [os.path.realpath(path) for path in lineage(other)]:
             found.append(other)
     return sorted(found, key=lambda other: len(other.descent))
+
+
+def with_name(folder: Path) -> Path:
+    """A path that ends with the folder's own name, and not with `.` or `..`."""
+    return folder if folder.name not in ("", "..") else folder.resolve()
+
+
+def is_branch(folder: Path, parent: Run, frame: int, changes: Sequence[str]) -> bool:
+    """Whether a folder holds this branch, which can then be gone on with."""
+    if not RunFolder(folder).is_run():
+        return False
+    wanted: Descent = json.loads(json.dumps(plain(_descent(parent, frame, folder, changes))))
+    return bool(Run(folder).descent == wanted)
 
 
 def _version() -> str:

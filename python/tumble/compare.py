@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import numpy.typing as npt
 
+from tumble._engine import ExportError
 from tumble.folder import Columns, refuse
 from tumble.recorder import changed
 
@@ -200,7 +201,15 @@ def _first(a: "Run", b: "Run", n: int, deep: bool, mixed: bool) -> tuple[int | N
 
 
 def _columns_differ(a: "Run", b: "Run", frame: int) -> Iterator[ColumnDifference]:
-    yield from _tables_differ(a.frame(frame), b.frame(frame), a.columns)
+    one, other = a.frame(frame), b.frame(frame)
+    for run, table in ((a, one), (b, other)):
+        for name, columns in run.columns.items():
+            for column, about in columns.items():
+                if about["in"] == "frames" and column not in table.get(name, {}):
+                    raise ExportError(
+                        f'{run.folder}: frame {frame} has lost {column} of "{name}"; the file was changed'
+                    )
+    yield from _tables_differ(one, other, a.columns)
 
 
 def _tables_differ(a: Columns, b: Columns, about: Mapping[str, Mapping[str, Any]]) -> Iterator[ColumnDifference]:
@@ -233,7 +242,9 @@ def _differ(name: str, column: str, unit: str, a: Array, b: Array, ids: Array | 
     n = min(lengths)
     a, b = (np.atleast_1d(a)[:n], np.atleast_1d(b)[:n])
     if a.shape != b.shape:
-        raise ValueError(f"{column} of {name}: {a.shape} against {b.shape}")
+        raise ExportError(
+            f'{column} of "{name}" is {a.shape} in one frame file and {b.shape} in the other; one was changed'
+        )
     unequal = _unequal(a, b)
     count = int(np.count_nonzero(unequal))
     if not count and lengths[0] == lengths[1]:

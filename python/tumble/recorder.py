@@ -81,7 +81,7 @@ class Recorder:
             "machine": machine(threads),
             "timings": self.timings,
             "warnings": list(world.warnings),
-            # Of the start: the estimate settles how many steps an interval gets, and a run that goes on has settled it.
+            # Of the state that the run began with.
             "stability": world.stability() if earlier is None else earlier.get("stability", []),
             "expectations": [],
             "probes": [],

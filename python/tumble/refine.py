@@ -17,7 +17,8 @@ import numpy as np
 
 from tumble._engine import Scene, SceneError, StepError, World
 from tumble.energy import ADAPTIVE
-from tumble.folder import LEDGER, Columns, cell, write_whole
+from tumble.folder import LEDGER, Columns, RunFolder, cell, write_whole
+from tumble.lock import alone
 from tumble.run import Run, simulate
 
 if TYPE_CHECKING:
@@ -121,7 +122,7 @@ class Study:
     refined: list[Refined]
     notes: list[str]
     runs: list[Run | None]
-    """The run of each level; None where not even its start could be simulated."""
+    """The run of each level; None where it broke."""
     failures: dict[int, str]
     """Levels that broke, and why."""
     measures: list[Measure]
@@ -158,13 +159,29 @@ def study(
         start = World(scene, threads)
         for name in names:
             _measured(name, dict.fromkeys(LEDGER, np.zeros(1)), start.frame)
+    divided = _divided(scene.to_dict(), refined)
+    for name in names:
+        thing = next((thing for thing in divided if name.startswith(f"{thing}.")), None)
+        if thing is not None and re.search(r"@[0-9]+$", name):
+            raise _wrong(
+                name,
+                f'"{thing}" is refined, so that an index is another place at each level; expected max, min or mean',
+            )
+    # All levels must be possible before the first is simulated.
+    for k, finer in enumerate(scenes):
+        try:
+            too_long = _too_long(World(finer, threads))
+        except SceneError as error:
+            raise _wrong(f"level {k}", str(error)) from error
+        if warn is not None:
+            for text in too_long:
+                warn(f"level {k}: {text}")
+    if overwrite:
+        _drop_levels(goal, levels)
     runs: list[Run | None] = []
     failures: dict[int, str] = {}
     for k, finer in enumerate(scenes):
         place = goal / f"level-{k}"
-        if warn is not None:
-            for text in _too_long(World(finer, threads)):
-                warn(f"level {k}: {text}")
         try:
             shown = progress(f"level {k}") if progress else None
             done = simulate(
@@ -181,6 +198,21 @@ def study(
     for measure in found:
         measure.judge(ulp)
     return Study(scene, goal, refined, notes, runs, failures, found)
+
+
+def _divided(tree: Mapping[str, Any], refined: Sequence[Refined]) -> list[str]:
+    """The names of things that have other elements at each level."""
+    words = [(word.path.split(".", 2)) for word in refined]
+    return [tree[kind][int(i)]["name"] for kind, i, word in words if _WORDS.get(kind) == word]
+
+
+def _drop_levels(goal: Path, levels: int) -> None:
+    """Takes away the levels of an earlier study that went further."""
+    for place in goal.glob("level-*"):
+        number = place.name.removeprefix("level-")
+        if number.isdigit() and int(number) >= levels and RunFolder(place).is_run():
+            with alone(place):
+                RunFolder(place).clear()
 
 
 def _too_long(world: World) -> list[str]:
@@ -395,6 +427,8 @@ def _of_object(columns: Columns, measure: str, name: str, how: str) -> float:
     elif array.ndim == 2 and array.shape[1] <= 4:
         array = np.linalg.norm(array, axis=1)
     if re.fullmatch(r"[0-9]+", how):
+        if not array.size:
+            return math.nan
         if int(how) >= array.size:
             raise _wrong(measure, f"element {how}, expected < {array.size}")
         return float(array.reshape(-1)[int(how)])

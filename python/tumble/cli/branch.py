@@ -54,6 +54,7 @@ def branch(
     """
     from tumble import StepError
     from tumble.branch import branch as go
+    from tumble.branch import is_branch, with_name
     from tumble.cli.run import write_results
     from tumble.lock import alone
 
@@ -62,7 +63,7 @@ def branch(
     parent, frame = _origin(origin)
     changes = list(set or ())
     k = frame % parent.n_frames if -parent.n_frames <= frame < parent.n_frames else frame
-    folder = out if out is not None else parent.folder.with_name(f"{parent.folder.resolve().name}@{k}")
+    folder = out if out is not None else with_name(parent.folder).with_name(f"{parent.folder.resolve().name}@{k}")
     again = [*(["--out", str(out)] if out else []), *(["--frames", str(frames)] if frames else [])]
     at = f"{parent.folder}@{k}"
     try:
@@ -76,7 +77,9 @@ def branch(
         print(report.failure(Run(folder), error, at, changes, again, "branch"), file=sys.stderr)
         raise typer.Exit(1) from None
     except KeyboardInterrupt as stop:
-        complain(f"stopped. Go on with\n  {find.command('branch', at, changes, *again, '--resume')}")
+        # Before the branch has begun, the folder may hold another run, or none.
+        how = ["--resume"] if is_branch(folder, parent, k, changes) else ["--force"] if force else []
+        complain(f"stopped. Go on with\n  {find.command('branch', at, changes, *again, *how)}")
         raise typer.Exit(stopped(stop)) from None
     for text in done.manifest["warnings"]:
         warn(text)

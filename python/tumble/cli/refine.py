@@ -115,6 +115,8 @@ def _told(found: "Study") -> list[str]:
         )
         lines.append(f"  {text}".rstrip())
     lines += [f"  {m.name}: {m.verdict}" for m in found.measures]
+    if found.failures:
+        lines.append("  orders, limits and errors are those of the finest levels in a row that did not break")
     return lines
 
 

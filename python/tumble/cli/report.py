@@ -108,7 +108,8 @@ def failure(
         lines.append(f"  {error}")
     lines += [f"  too near     {text}" for text in trouble.get("near", ())]
     if cures:
-        lines.append("What was tried:")
+        # What is tried begins at the start of the scene, not where a branch does.
+        lines.append("What was tried, from the start of the changed scene:" if verb == "branch" else "What was tried:")
     for cure in sorted(cures, key=lambda cure: cure is not best):
         change = " ".join(settings(cure["set"].split()))
         growth = float(cure["energy_ratio"])
