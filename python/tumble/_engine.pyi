@@ -139,6 +139,10 @@ class World:
     def load(self, path: Path) -> None:
         """Goes to a checkpoint of the same scene. Raises SceneError; the world then stays as it was."""
 
+    def reconsider(self) -> None:
+        """After the state of another scene was loaded: what was chosen from that scene, as how many sub-steps an interval gets and what
+        energies are measured against, is chosen anew from the state as it is now."""
+
     def stability(self) -> list[dict[str, Any]]:
         """For each system, from its stiffest mode as it is now: system, integrator, step [s], frequency [rad/s], damping,
         damping_max [1/s], culprit (object, index), limits (integrator, stable [s], usable [s])."""

@@ -274,6 +274,12 @@ impl World {
         self.engine.restore(&bytes).map_err(|e| scene_error(py, &e))
     }
 
+    /// After the state of another scene was loaded: what was chosen from that scene, as how many sub-steps an interval gets and what
+    /// energies are measured against, is chosen anew from the state as it is now.
+    fn reconsider(&mut self) {
+        self.engine.reconsider();
+    }
+
     /// For each system, from its stiffest mode as it is now: system, integrator, step [s], frequency [rad/s], damping,
     /// damping_max [1/s], culprit (object, index), limits (integrator, stable [s], usable [s]).
     fn stability<'py>(&mut self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {

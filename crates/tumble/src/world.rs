@@ -274,6 +274,11 @@ impl World {
         total
     }
 
+    /// What systems chose from another scene is chosen anew.
+    pub fn reconsider(&mut self) {
+        self.systems.iter_mut().for_each(|s| s.reconsider());
+    }
+
     /// The pre-flight estimate of every system that has one; none of those for which `go_on` says no.
     pub fn stability(&mut self, go_on: &(dyn Fn() -> bool + Sync)) -> Vec<Stability> {
         let dt = self.dt;
