@@ -140,8 +140,8 @@ class World:
         """Goes to a checkpoint of the same scene. Raises SceneError; the world then stays as it was."""
 
     def reconsider(self) -> None:
-        """After the state of another scene was loaded: what was chosen from that scene, as how many sub-steps an interval gets and what
-        energies are measured against, is chosen anew from the state as it is now."""
+        """After the state of another scene was loaded: what was chosen from that scene, as how many sub-steps an interval
+        gets and what energies are measured against, is chosen anew from the state as it is now."""
 
     def stability(self) -> list[dict[str, Any]]:
         """For each system, from its stiffest mode as it is now: system, integrator, step [s], frequency [rad/s], damping,

@@ -274,8 +274,8 @@ impl World {
         self.engine.restore(&bytes).map_err(|e| scene_error(py, &e))
     }
 
-    /// After the state of another scene was loaded: what was chosen from that scene, as how many sub-steps an interval gets and what
-    /// energies are measured against, is chosen anew from the state as it is now.
+    /// After the state of another scene was loaded: what was chosen from that scene, as how many sub-steps an interval
+    /// gets and what energies are measured against, is chosen anew from the state as it is now.
     fn reconsider(&mut self) {
         self.engine.reconsider();
     }
