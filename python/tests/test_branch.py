@@ -44,6 +44,7 @@ def test_a_branch_is_the_changed_world_in_the_old_state(reference: Run, spring: 
     old.save(tmp_path / "state")
     world = World(Scene(spring).replace(SOFTER))
     world.load(tmp_path / "state")
+    world.reconsider()
     assert found.hashes[:14] == reference.hashes[:14]
     for i in range(13, N + 1):
         assert found.hashes[i] == world.hash()
@@ -58,6 +59,18 @@ def test_a_branch_is_the_changed_world_in_the_old_state(reference: Run, spring: 
     assert found.ledger["elastic"][13] == pytest.approx(reference.ledger["elastic"][13] / 2, rel=1e-6)
     # What it took to come there was the parent's.
     np.testing.assert_array_equal(found.ledger["steps"][:14], reference.ledger["steps"][:14])
+
+
+def test_a_stiffer_branch_chooses_its_steps_anew(reference: Run, spring: Tree, tmp_path: Path) -> None:
+    """One step a frame is enough for the parent, and would throw the mass out of a branch ten times as fast."""
+    assert set(reference.ledger["steps"][1:14]) == {1}
+    stiffer = ["particles.p.spring.0.stiffness=1e4", HANGING]
+    found = branch(reference, 13, tmp_path / "stiff", stiffer)
+    assert found.status == "finished" and found.ledger["steps"][14:].min() >= 3
+    assert_same(branch(found, 20, tmp_path / "again"), found)
+    # The first step after a change takes nothing from before it: what a scheme keeps is of the old forces.
+    shutil.rmtree(found.folder / "checkpoints")
+    assert world_at(found, 20).hash() == found.hashes[20]
 
 
 def test_the_manifest_keeps_the_line_of_descent(reference: Run, tmp_path: Path) -> None:

@@ -123,7 +123,8 @@ class World:
     @property
     def ledger(self) -> dict[str, Any]:
         """The books: time, mass, momentum (3), angular_momentum (3), kinetic, elastic, external, energy [J], stretch,
-        penetration [m], intersections, speed [m/s], contacts, broken, heat and heat_in [J]."""
+        penetration [m], intersections, speed [m/s], contacts, broken, heat and heat_in [J], volume [m³],
+        divergence [1/s]."""
 
     def hash(self) -> str:
         """Hash of everything that the next step depends on, 16 hexadecimal digits."""
@@ -137,6 +138,10 @@ class World:
 
     def load(self, path: Path) -> None:
         """Goes to a checkpoint of the same scene. Raises SceneError; the world then stays as it was."""
+
+    def reconsider(self) -> None:
+        """After the state of another scene was loaded: what was chosen from that scene, as how many sub-steps an interval
+        gets and what energies are measured against, is chosen anew from the state as it is now."""
 
     def stability(self) -> list[dict[str, Any]]:
         """For each system, from its stiffest mode as it is now: system, integrator, step [s], frequency [rad/s], damping,

@@ -3,7 +3,7 @@
 import json
 import os
 import tempfile
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -52,14 +52,20 @@ def branch(
     world = World(scene, threads)
     with alone(files.path):
         earlier = admit(files, scene, resume, overwrite, descent)
+
+        def begin(how: Callable[[], None]) -> None:
+            how()
+            if changes and world.frame_index == k:
+                world.reconsider()
+
         if earlier is not None and return_to_checkpoint(world, files):
             recorder = Recorder(files, world, threads, earlier, descent)
-            return record(recorder, recorder.go_on, progress)
+            return record(recorder, lambda: begin(recorder.go_on), progress)
         _take_over(world, parent, k, threads)
         if files.is_run():
             files.clear()
         recorder = Recorder(files, world, threads, None, descent)
-        return record(recorder, lambda: recorder.branch_off(parent), progress)
+        return record(recorder, lambda: begin(lambda: recorder.branch_off(parent)), progress)
 
 
 def world_at(run: Run, frame: int, threads: int | None = None) -> World:
@@ -88,6 +94,8 @@ def world_at(run: Run, frame: int, threads: int | None = None) -> World:
                 ) from error
             _load(world, parent, min(k, start), threads)
     if k > world.frame_index:
+        if world.frame_index == start and run.descent and run.descent[-1]["set"]:
+            world.reconsider()
         try:
             world.step(k - world.frame_index)
         except StepError as error:

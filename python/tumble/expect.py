@@ -43,6 +43,10 @@ _UNITS = {
     "max_energy_growth": "",
     "max_final_kinetic": "J",
     "max_mass_error": "",
+    "max_momentum_change": "kg m/s",
+    "max_angular_momentum_change": "kg m²/s",
+    "max_volume_error": "",
+    "max_divergence": "1/s",
     "max_heat_error": "",
     "broken_links": "",
 }
@@ -64,11 +68,17 @@ def energy_changes(ledger: Mapping[str, npt.NDArray[Any]]) -> Curve:
     return relative
 
 
-def mass_error(ledger: Mapping[str, npt.NDArray[Any]]) -> Curve:
-    """|m - m_0| over m_0."""
-    mass = ledger["mass"]
-    error: Curve = np.abs(mass - mass[:1]) / max(float(np.abs(mass[0])), 1e-300)
+def relative_error(column: npt.NDArray[Any]) -> Curve:
+    """|a - a_0| over |a_0|."""
+    error: Curve = np.abs(column - column[:1]) / max(float(np.abs(column[0])), 1e-300)
     return error
+
+
+def change(ledger: Mapping[str, npt.NDArray[Any]], name: str) -> Curve:
+    """|a - a_0| of a vector in three columns."""
+    vectors = np.stack([ledger[f"{name}_{axis}"] for axis in "xyz"], axis=1)
+    length: Curve = np.linalg.norm(vectors - vectors[:1], axis=1)
+    return length
 
 
 def heat_error(ledger: Mapping[str, npt.NDArray[Any]]) -> Curve:
@@ -92,7 +102,11 @@ def check(run: "Run") -> list[Broken]:
         "max_speed": ledger["speed"],
         "max_energy_drift": np.abs(energy_changes(ledger)),
         "max_energy_growth": energy_changes(ledger),
-        "max_mass_error": mass_error(ledger),
+        "max_mass_error": relative_error(ledger["mass"]),
+        "max_momentum_change": change(ledger, "momentum"),
+        "max_angular_momentum_change": change(ledger, "angular_momentum"),
+        "max_volume_error": relative_error(ledger["volume"]),
+        "max_divergence": ledger["divergence"],
         "max_heat_error": heat_error(ledger),
     }
     broken = [_over(name, curve, expect[name]) for name, curve in curves.items() if expect.get(name) is not None]

@@ -32,7 +32,7 @@ LEDGER = [
     "momentum_x", "momentum_y", "momentum_z",
     "angular_momentum_x", "angular_momentum_y", "angular_momentum_z",
     "kinetic", "elastic", "external", "energy",
-    "stretch", "penetration", "intersections", "speed", "contacts", "broken", "heat", "heat_in",
+    "stretch", "penetration", "intersections", "speed", "contacts", "broken", "heat", "heat_in", "volume", "divergence",
     "steps", "rejected", "newton", "linear", "residual", "unconverged", "clamped", "courant",
     "smallest_step", "largest_step", "seconds", "hash",
 ]

@@ -18,6 +18,7 @@ fn sheets_that_meet_keep_momentum_and_do_not_pass() {
         ("velocity_verlet", "substeps = 40"),
         ("rk4", "substeps = 40"),
         ("dormand_prince", "adaptive.tolerance = 1e-4"),
+        ("adaptive_euler", "adaptive.tolerance = 1e-5"),
         ("implicit_euler", "substeps = 10"),
         ("implicit_midpoint", "substeps = 10"),
         ("bdf2", "substeps = 10"),

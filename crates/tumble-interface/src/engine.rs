@@ -118,6 +118,10 @@ pub struct Ledger {
     pub heat: f64,
     /// Heat that has come in through surfaces and from sources [J].
     pub heat_in: f64,
+    /// Volume inside closed surfaces of soft objects [m³].
+    pub volume: f64,
+    /// Largest divergence of a gas's velocity in a cell [1/s].
+    pub divergence: f64,
 }
 
 impl Ledger {
@@ -242,6 +246,10 @@ pub trait Engine: Send {
 
     /// Goes to a saved state of the same scene.
     fn restore(&mut self, bytes: &[u8]) -> Result<(), SceneError>;
+
+    /// After a state of another scene was taken over: what was chosen from that scene, as how many sub-steps an interval gets and what
+    /// energies are measured against, is chosen anew from the state as it is now.
+    fn reconsider(&mut self);
 
     /// The largest stable steps, from the stiffest mode of each system as it is now; none of those for which `go_on` says no.
     fn stability(&mut self, go_on: &(dyn Fn() -> bool + Sync)) -> Vec<Stability>;

@@ -227,7 +227,8 @@ impl World {
     }
 
     /// The books: time, mass, momentum (3), angular_momentum (3), kinetic, elastic, external, energy [J], stretch,
-    /// penetration [m], intersections, speed [m/s], contacts, broken, heat and heat_in [J].
+    /// penetration [m], intersections, speed [m/s], contacts, broken, heat and heat_in [J], volume [m³],
+    /// divergence [1/s].
     #[getter]
     fn ledger<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
         let (engine, pool) = (&self.engine, self.pool.as_ref());
@@ -271,6 +272,12 @@ impl World {
     fn load(&mut self, py: Python<'_>, path: PathBuf) -> PyResult<()> {
         let bytes = read(py, &path)?;
         self.engine.restore(&bytes).map_err(|e| scene_error(py, &e))
+    }
+
+    /// After the state of another scene was loaded: what was chosen from that scene, as how many sub-steps an interval
+    /// gets and what energies are measured against, is chosen anew from the state as it is now.
+    fn reconsider(&mut self) {
+        self.engine.reconsider();
     }
 
     /// For each system, from its stiffest mode as it is now: system, integrator, step [s], frequency [rad/s], damping,

@@ -38,6 +38,9 @@ pub trait System: Send + Sync {
     /// While watched, a system looks for a breakdown after every sub-step and returns the first as an error.
     fn watch(&mut self, on: bool);
 
+    /// Forgets what it chose from a scene whose state it had before.
+    fn reconsider(&mut self) {}
+
     /// Largest stable steps from its stiffest modes now; `None` if it has none to tell, or if `go_on` says no.
     fn stability(&mut self, dt: f64, go_on: &(dyn Fn() -> bool + Sync)) -> Option<Stability>;
 

@@ -268,8 +268,15 @@ impl World {
             total.broken += books.broken;
             total.heat += books.heat;
             total.heat_in += books.heat_in;
+            total.volume += books.volume;
+            total.divergence = total.divergence.max(books.divergence);
         }
         total
+    }
+
+    /// What systems chose from another scene is chosen anew.
+    pub fn reconsider(&mut self) {
+        self.systems.iter_mut().for_each(|s| s.reconsider());
     }
 
     /// The pre-flight estimate of every system that has one; none of those for which `go_on` says no.

@@ -104,8 +104,11 @@ def _origin(argument: str) -> "tuple[Run, int]":
 
 def _idle(done: "Run", parent: "Run", frame: int) -> str | None:
     """A warning if what was changed has changed nothing."""
+    from tumble.compare import compare
+
     n = min(done.n_frames, parent.n_frames)
-    if n <= frame + 1 or done.hashes[:n] != parent.hashes[:n]:
+    # Not by hashes: what a branch chooses anew is in them, too.
+    if n <= frame + 1 or compare(parent, done, until=n - 1).seen is not None:
         return None
     return (
         f"the change did nothing in {counted(n - 1 - frame, 'frame')}: the states are those of {parent.folder}; where things "

@@ -76,6 +76,8 @@ export interface Ledger {
   broken: number;
   heat: number;
   heat_in: number;
+  volume: number;
+  divergence: number;
 }
 
 /** What the frames of one answer took, together. */

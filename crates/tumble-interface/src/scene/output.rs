@@ -107,6 +107,18 @@ pub struct Expect {
     /// |m - m_0| over the mass at the start.
     #[schemars(range(min = 0.0), extend("x-unit" = "1"))]
     pub max_mass_error: Option<f64>,
+    /// |P - P_0|, how far the momentum is from that at the start.
+    #[schemars(range(min = 0.0), extend("x-unit" = "kg m/s"))]
+    pub max_momentum_change: Option<f64>,
+    /// |L - L_0|, how far the angular momentum about the origin is from that at the start.
+    #[schemars(range(min = 0.0), extend("x-unit" = "kg m²/s"))]
+    pub max_angular_momentum_change: Option<f64>,
+    /// |V - V_0| over the volume inside closed surfaces at the start.
+    #[schemars(range(min = 0.0), extend("x-unit" = "1"))]
+    pub max_volume_error: Option<f64>,
+    /// Largest divergence of the velocity of gases in any cell; of one that burns, with what fire swells.
+    #[schemars(range(min = 0.0), extend("x-unit" = "1/s"))]
+    pub max_divergence: Option<f64>,
     /// Heat that bodies have gained less heat that came in, over the largest of both so far.
     #[schemars(range(min = 0.0), extend("x-unit" = "1"))]
     pub max_heat_error: Option<f64>,

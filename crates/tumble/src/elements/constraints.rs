@@ -380,7 +380,8 @@ impl<E: Element<N, M, D>, Y: Law<P>, const N: usize, const M: usize, const D: us
         let inverse_h = 1.0 / sweep.h;
         packs!(W, w, self.range, |e| {
             let (rest, law) = columns.pack(w, e);
-            // SAFETY: `check` has been called; no element of a colour shares a node with another.
+            // SAFETY: `check` has been called. Of elements that are projected at the same time none share a node: those of a colour by its
+            // making, those of two clusters since each has rows of its own.
             let x = unsafe { columns.gather(w, E::FRAMES, sweep.x.rows(), e) };
             let mut weights = [w.splat(0.0); N];
             for a in 0..N {
@@ -565,8 +566,8 @@ impl<E: Element<N, M, D>, Y: Law<P>, const N: usize, const M: usize, const D: us
         found.len() as u64
     }
 
-    /// Elements of a colour that get a new row in place of one that they shared with others of other colours do not share it with each
-    /// other: the colours stay.
+    /// Elements that get a new row in place of an old one all had the old one: inside of a cluster they are all of that cluster, and of
+    /// different colours; so clusters and colours stay.
     fn rewire(&mut self, changes: &[(u32, usize, u32)]) {
         if changes.is_empty() {
             return;

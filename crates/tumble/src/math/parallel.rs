@@ -9,8 +9,8 @@ use std::sync::{Mutex, PoisonError};
 /// with its scratch; smaller ones cost scheduling, larger ones balance badly.
 pub const CHUNK: usize = 4096;
 
-/// Calls `f(0)`, ..., `f(n - 1)`, each once, on all threads. What runs in parallel does so through here: rayon's machinery is
-/// compiled once for all loops.
+/// Calls `f(0)`, ..., `f(n - 1)`, each once, on all threads. All parallel loops go through here, so that rayon's machinery is
+/// compiled once.
 pub fn each(n: usize, f: &(dyn Fn(usize) + Sync)) {
     if n <= 1 {
         (0..n).for_each(f);

@@ -150,6 +150,10 @@ impl Engine for Simulation {
         self.world.restore(bytes)
     }
 
+    fn reconsider(&mut self) {
+        self.world.reconsider();
+    }
+
     fn stability(&mut self, go_on: &(dyn Fn() -> bool + Sync)) -> Vec<Stability> {
         self.world.stability(go_on)
     }

@@ -54,6 +54,8 @@ pub struct Object {
     pub frames: Range<usize>,
     /// Triangles over its points, counted from its first.
     pub triangles: Vec<[u32; 3]>,
+    /// Whether the triangles enclose a volume, and go on to: none tears.
+    pub closed: bool,
     /// Points in the order of a curve, counted from its first; empty if it is none.
     pub curve: Vec<u32>,
     /// Of many curves, how many points each has; 0 if it is one.

@@ -2,12 +2,14 @@
 
 use super::Dynamics;
 use super::laws::Acting;
+use crate::elements::enclosed;
 use crate::forces::Group;
 use crate::geometry::Walls;
 use crate::integrators::stability::limits;
 use crate::math::parallel::{fold, max, sum};
 use crate::math::simd::{Kernel, Width, dispatch};
 use crate::math::{Quat, Real, Row, Vec3, ZERO, is_finite, xyz64};
+use crate::state::Object;
 use crate::system::System;
 use tumble_interface::engine::{BLOW_UP, Ledger};
 use tumble_interface::error::Breakdown;
@@ -184,7 +186,7 @@ impl Dynamics {
         }
     }
 
-    fn link_strain(&self, object: &crate::state::Object) -> Vec<Real> {
+    fn link_strain(&self, object: &Object) -> Vec<Real> {
         let x = &self.state.x;
         let strain = |(batch, range): &(usize, std::ops::Range<usize>)| {
             let all = match self.constraints.get(*batch) {
@@ -254,6 +256,7 @@ impl Dynamics {
             colliders.iter().filter_map(move |c| c.touch(p, t)).map(|t| t.depth)
         };
         let touching = !self.laws.colliders.is_empty();
+        let inside = |o: &Object| enclosed(&o.triangles, |i| xyz64(x[o.points.start + i as usize]));
         Ledger {
             time: t,
             mass: total.mass,
@@ -268,6 +271,7 @@ impl Dynamics {
             speed: total.speed_sq.sqrt(),
             contacts: if touching { sum(n, |range| range.filter(|i| depths(*i).next().is_some()).count() as f64) as u64 } else { 0 },
             broken: self.broken,
+            volume: self.objects.iter().filter(|o| o.closed).map(inside).sum(),
             ..Ledger::default()
         }
     }

@@ -595,6 +595,7 @@ impl Parts {
                 }
             }
             places.push(objects.len());
+            object.closed = torn.iter().all(|(i, _)| i + 1 != places.len()) && is_closed(&object.triangles);
             if object.stream.is_some() {
                 object.points = points..points;
             }
@@ -730,4 +731,12 @@ fn reach(
     let links: Vec<_> = links.chain(seams.iter().map(|m| (m.nodes, 0.0))).collect();
     let held = |i: usize| state.x[i][3] == 0.0;
     objects.iter().filter_map(|draft| Tethers::new(draft.object.points.clone(), &links, &held, slack)).collect()
+}
+
+/// Whether triangles enclose something: each way along an edge comes once, and so does the way back.
+fn is_closed(triangles: &[[u32; 3]]) -> bool {
+    let mut ways: Vec<[u32; 2]> = triangles.iter().flat_map(|[a, b, c]| [[*a, *b], [*b, *c], [*c, *a]]).collect();
+    ways.sort_unstable();
+    let once = ways.windows(2).all(|w| w[0] != w[1]);
+    once && !ways.is_empty() && ways.iter().all(|[a, b]| ways.binary_search(&[*b, *a]).is_ok())
 }

@@ -149,15 +149,16 @@ impl Dynamics {
         layers.detector.detect_along(&layers.topology, x, &layers.ways, reach);
     }
 
-    /// The step [s] in which those that are about to meet go half of their thickness past each other; infinite if none are.
-    pub(super) fn longest_among_pairs(&self) -> f64 {
+    /// The step [s] in which those that are about to meet in h [s] go half of their thickness past each other; infinite if none are.
+    /// (contact.21)
+    pub(super) fn longest_among_pairs(&self, h: f64) -> f64 {
         let Some(layers) = &self.layers else { return f64::INFINITY };
         let passing = |pair: &Pair| {
             let parts = pair.vertices.iter().zip(pair.weights);
-            let v = parts.fold(Vector::default(), |sum, (v, w)| sum + xyz64(self.state.v[*v as usize]) * f64::from(w));
-            v.norm() / f64::from(pair.thickness)
+            let way = parts.fold(Vector::default(), |sum, (v, w)| sum + layers.ways[*v as usize] * f64::from(w));
+            way.norm() / f64::from(pair.thickness)
         };
-        0.5 / layers.detector.pairs().iter().map(passing).fold(0.0, f64::max)
+        0.5 * h / layers.detector.pairs().iter().map(passing).fold(0.0, f64::max)
     }
 
     /// In a sweep: pushes pairs apart that are too near, with friction on what they slide in the sub-step.

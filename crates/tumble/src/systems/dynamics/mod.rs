@@ -418,7 +418,7 @@ impl Dynamics {
                 self.remember(dt - done);
                 let (begun, left) = (done, dt - done);
                 // The error of a step knows nothing of contact.
-                let longest = self.longest_among_pairs().max(self.adaptive.smallest * dt).min(left);
+                let longest = self.longest_among_pairs(left).max(self.adaptive.smallest * dt).min(left);
                 self.witness(t + done);
                 let y = (&mut self.state.x[..], &mut self.state.v[..]);
                 let times = (t + done, longest, dt);
@@ -557,6 +557,12 @@ impl System for Dynamics {
 
     fn watch(&mut self, on: bool) {
         self.watched = on;
+    }
+
+    fn reconsider(&mut self) {
+        (self.automatic, self.measured) = (0, 0);
+        (self.memory.ready, self.memory.next_step) = (false, 0.0);
+        self.set_scale();
     }
 
     fn stability(&mut self, dt: f64, go_on: &(dyn Fn() -> bool + Sync)) -> Option<Stability> {

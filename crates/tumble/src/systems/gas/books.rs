@@ -46,19 +46,22 @@ impl Fluid {
                 curl(&self.u, &mut spin)?;
                 Some(self.column(name, "1/s", &self.at_cells(&spin)?))
             }
-            "divergence" => {
-                let mut field = Field::new(self.grid(), Place::Cell, "1/s")?;
-                if let Some(solids) = &self.solids {
-                    let scale = (-1.0 / (field.grid.dx * field.grid.dx)) as Real;
-                    around(&self.u, Some(solids), None, &mut field);
-                    field.data.iter_mut().for_each(|x| *x *= scale);
-                } else {
-                    divergence(&self.u, &mut field)?;
-                }
-                one("1/s", &field)
-            }
+            "divergence" => one("1/s", &self.divergence()?),
             _ => FACES.iter().position(|face| *face == name).and_then(|axis| one("m/s", self.u.part(axis)?)),
         })
+    }
+
+    /// Divergence of its velocity, around solids of what flows through open faces [1/s].
+    fn divergence(&self) -> Result<Field, GridError> {
+        let mut field = Field::new(self.grid(), Place::Cell, "1/s")?;
+        if let Some(solids) = &self.solids {
+            let scale = (-1.0 / (field.grid.dx * field.grid.dx)) as Real;
+            around(&self.u, Some(solids), None, &mut field);
+            field.data.iter_mut().for_each(|x| *x *= scale);
+        } else {
+            divergence(&self.u, &mut field)?;
+        }
+        Ok(field)
     }
 
     fn at_cells(&self, vectors: &Vectors) -> Result<Vec<Field>, GridError> {
@@ -112,8 +115,8 @@ impl Fluid {
         rows::largest(first, |at, n| (at..at + n).map(sq).fold(0.0, rows::worse)).sqrt()
     }
 
-    /// Adds its mass of smoke and fuel, momentum, kinetic energy and speed of the fluid, and the heat of one that burns. A face on a side of the box counts half, one that
-    /// is open in part by its share.
+    /// Adds its mass of smoke and fuel, momentum, kinetic energy, speed and divergence of the fluid, and the heat of one that burns. A face
+    /// on a side of the box counts half, one that is open in part by its share.
     pub fn count(&self, books: &mut Ledger) {
         let grid = self.grid();
         let mass = self.volume() * self.settings.density;
@@ -152,6 +155,8 @@ impl Fluid {
             books.kinetic += 0.5 * mass * weighed(2);
         }
         books.speed = books.speed.max(self.speed());
+        // Only fields of another grid could fail here.
+        books.divergence = books.divergence.max(self.divergence().map_or(0.0, |field| rows::magnitude(&field)));
     }
 
     /// The first number that is not finite.
