@@ -67,7 +67,11 @@ pub trait Batch: Send + Sync {
     fn link_strain(&self, _x: &[Row]) -> Vec<Real> {
         Vec::new()
     }
-    /// The largest of them; negative infinity if there is none.
+    /// The rows of their ends.
+    fn link_ends(&self) -> Vec<[u32; 2]> {
+        Vec::new()
+    }
+    /// The largest lengthening over rest length; negative infinity if there is none.
     fn largest_strain(&self, _x: &[Row]) -> f64 {
         f64::NEG_INFINITY
     }

@@ -70,7 +70,11 @@ pub trait Constraints: Send + Sync {
     fn link_strain(&self, _x: &[Row]) -> Vec<Real> {
         Vec::new()
     }
-    /// The largest of them; negative infinity if there is none.
+    /// The rows of their ends.
+    fn link_ends(&self) -> Vec<[u32; 2]> {
+        Vec::new()
+    }
+    /// The largest lengthening over rest length; negative infinity if there is none.
     fn largest_strain(&self, _x: &[Row]) -> f64 {
         f64::NEG_INFINITY
     }
@@ -541,6 +545,15 @@ impl<E: Element<N, M, D>, Y: Law<P>, const N: usize, const M: usize, const D: us
             strain[*given as usize] = self.strain_at(x, place);
         }
         strain
+    }
+
+    fn link_ends(&self) -> Vec<[u32; 2]> {
+        let mut ends = vec![[0; 2]; self.len()];
+        for (place, given) in self.columns.given.iter().enumerate() {
+            let node = |a: usize| self.columns.nodes.get(a).map_or(0, |nodes| nodes.get()[place]);
+            ends[*given as usize] = [0, 1].map(node);
+        }
+        ends
     }
 
     fn largest_strain(&self, x: &[Row]) -> f64 {

@@ -435,6 +435,10 @@ impl<E: Pair<M, D>, Y: Law<P>, const M: usize, const D: usize, const P: usize> B
         strain
     }
 
+    fn link_ends(&self) -> Vec<[u32; 2]> {
+        (0..self.len()).map(|e| [0, 1].map(|a| self.list.nodes[a].get()[e])).collect()
+    }
+
     fn largest_strain(&self, x: &[Row]) -> f64 {
         self.list.check(&[x]);
         let parts = match self.broken.is_empty() {

@@ -62,8 +62,6 @@ pub struct Object {
     pub curve_points: u32,
     /// Its links: index of the batch and the elements in it.
     pub links: Vec<(usize, Range<usize>)>,
-    /// The two points of each link, counted from its first, in the order of `links`.
-    pub link_ends: Vec<[u32; 2]>,
     /// The emitter in the system's pool whose particles these are; their number changes.
     pub stream: Option<usize>,
     /// Radius in pictures [m]; 0 for a surface.

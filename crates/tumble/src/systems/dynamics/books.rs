@@ -2,7 +2,7 @@
 
 use super::Dynamics;
 use super::laws::Acting;
-use crate::elements::enclosed;
+use crate::elements::{Batch, Constraints, enclosed};
 use crate::forces::Group;
 use crate::geometry::Walls;
 use crate::integrators::stability::limits;
@@ -186,16 +186,32 @@ impl Dynamics {
         }
     }
 
-    fn link_strain(&self, object: &Object) -> Vec<Real> {
-        let x = &self.state.x;
-        let strain = |(batch, range): &(usize, std::ops::Range<usize>)| {
+    /// What the elements of the links of an object say of them.
+    fn of_links<T: Clone>(
+        &self,
+        object: &Object,
+        of_constraints: impl Fn(&dyn Constraints) -> Vec<T>,
+        of_batch: impl Fn(&dyn Batch) -> Vec<T>,
+    ) -> Vec<T> {
+        let of = |(batch, range): &(usize, std::ops::Range<usize>)| {
             let all = match self.constraints.get(*batch) {
-                Some(constraints) => constraints.link_strain(x),
-                None => self.laws.batches[*batch].link_strain(x),
+                Some(constraints) => of_constraints(constraints.as_ref()),
+                None => of_batch(self.laws.batches[*batch].as_ref()),
             };
             all[range.clone()].to_vec()
         };
-        object.links.iter().flat_map(strain).collect()
+        object.links.iter().flat_map(of).collect()
+    }
+
+    fn link_strain(&self, object: &Object) -> Vec<Real> {
+        let x = &self.state.x;
+        self.of_links(object, |c| c.link_strain(x), |b| b.link_strain(x))
+    }
+
+    /// The two points of each link, counted from the object's first.
+    fn link_ends(&self, object: &Object) -> Vec<u32> {
+        let ends = self.of_links(object, |c| c.link_ends(), |b| b.link_ends());
+        ends.concat().into_iter().map(|row| row - object.points.start as u32).collect()
     }
 
     pub(super) fn write_topology(&self, out: &mut Vec<Column>) {
@@ -216,7 +232,7 @@ impl Dynamics {
             let pinned = points.filter(|i| self.state.x[*i][3] == 0.0).map(|i| (i - object.points.start) as u32);
             add("pinned", "1", 1, Data::U32(pinned.collect()));
             add("triangles", "1", 3, Data::U32(object.triangles.concat()));
-            add("links", "1", 2, Data::U32(object.link_ends.concat()));
+            add("links", "1", 2, Data::U32(self.link_ends(object)));
             add("curve", "1", 1, Data::U32(object.curve.clone()));
             if object.curve_points > 0 {
                 add("curve_points", "1", 1, Data::U32(vec![object.curve_points]));

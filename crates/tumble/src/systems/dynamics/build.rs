@@ -570,11 +570,6 @@ impl Parts {
             return Err(lost());
         }
         let next: Vec<[usize; 3]> = self.objects.iter().skip(1).map(|d| d.links).chain([end]).collect();
-        let ends = |kind: usize, i: usize| match kind {
-            0 => self.linear.members[i].nodes,
-            1 => self.nonlinear.members[i].nodes,
-            _ => self.vector.members[i].nodes,
-        };
         let reach = reach(&settings, &self.objects, (&self.linear.members, &self.nonlinear.members, &self.vector.members), &state);
         let mut objects = Vec::new();
         let mut places = Vec::new();
@@ -590,7 +585,6 @@ impl Parts {
                 }
                 let range = draft.links[kind]..next[kind];
                 if let (Some(Some(batch)), false) = (kinds[kind], range.is_empty()) {
-                    object.link_ends.extend(range.clone().map(|i| ends(kind, i).map(|p| p - object.points.start as u32)));
                     object.links.push((batch, range));
                 }
             }

@@ -124,6 +124,13 @@ impl Laws {
         rows::each(frames, &masses.inverse_inertia[first..first + x_frames.len()], x_frames, ZERO, Weigh);
     }
 
+    /// Accelerations of the rows from `start` on, where no mass feels another.
+    pub fn rate_alone(&self, t: f64, start: usize, x: &[Row], v: &[Row], out: &mut [Row]) {
+        out.fill(ZERO);
+        self.add_local(t, start, x, v, out);
+        self.accelerate(&self.masses, start, x, out);
+    }
+
     /// Forces of everything but contact [N, N m].
     pub fn forces(&mut self, t: f64, x: &[Row], v: &[Row], out: &mut [Row]) -> Result<(), StepError> {
         self.begin(t, x, v)?;

@@ -212,7 +212,9 @@ impl Dynamics {
         if self.integrator != Integrator::PositionBased {
             self.find_pairs(h);
         }
-        if !self.laws.colliders.is_empty() || self.layers.is_some() || self.integrator == Integrator::PositionBased {
+        // Where positions are predicted, they are kept then.
+        let predicted = self.integrator == Integrator::PositionBased && self.user.is_none();
+        if !predicted && (!self.laws.colliders.is_empty() || self.layers.is_some()) {
             self.before.resize(self.state.x.len(), ZERO);
             self.before.copy_from_slice(&self.state.x);
         }

@@ -6,12 +6,14 @@
 //! Stable for every step. One sweep over compliant elements a sub-step is a step of implicit Euler to first order in h [macklin2019]; what
 //! is not satisfied yet makes things softer. Verified in `tests/position_based.rs`.
 
-use super::Dynamics;
+use super::{BLOCK, Dynamics};
 use crate::elements::{Constraints, Projection};
 use crate::geometry::Walls;
 use crate::integrators::Equation;
-use crate::math::parallel::{CHUNK, Tasks, chunks2, max};
-use crate::math::{Quat, Real, Row, Vec3, ZERO, axpy, sub, xyz64};
+use crate::math::parallel::{CHUNK, Tasks, chunks, max};
+use crate::math::simd::{Kernel, Width, dispatch, packs};
+use crate::math::{Quat, Real, Row, Vec3, ZERO, rotation, rows, sub, xyz, xyz64};
+use crate::state::State;
 use tumble_interface::StepError;
 use tumble_interface::engine::StepReport;
 use tumble_interface::scene::Projection as Kind;
@@ -21,20 +23,7 @@ impl Dynamics {
     pub(super) fn project_step(&mut self, t: f64, h: f64, report: &mut StepReport) -> Result<(), StepError> {
         // Who may meet whom.
         self.find_pairs(h);
-        // Forces that are no elements, predicted velocities and positions.
-        let (mut rates, kinematics) = (std::mem::take(&mut self.rates), self.laws.kinematics());
-        rates.resize(self.state.x.len(), ZERO);
-        self.laws.batches.iter_mut().for_each(|b| b.act_at_once(h));
-        let done = self.laws.rate(t, &self.state.x, &self.state.v, &mut rates);
-        let step = h as Real;
-        chunks2(&mut self.state.x, &mut self.state.v, |start, x, v| {
-            for (v, a) in v.iter_mut().zip(&rates[start..]) {
-                *v = axpy(*v, step, *a);
-            }
-            kinematics.drift(start, x, v, step);
-        });
-        self.rates = rates;
-        done?;
+        self.predict(t, h)?;
         self.place_held(t + h);
         // Sweeps over all elements.
         let words = self.sweeps.clone();
@@ -62,20 +51,72 @@ impl Dynamics {
             }
         }
         // Velocities: a point that no element has moved keeps its own to the last bit.
-        let (x, before, points) = (&self.state.x, &self.before, kinematics.points);
-        self.state.v.chunks_mut(CHUNK).zip(x.chunks(CHUNK)).enumerate().in_parallel(|(c, (v, x))| {
-            for (k, (v, x)) in v.iter_mut().zip(x).enumerate() {
-                let i = c * CHUNK + k;
-                let predicted = kinematics.moved(i, before[i], *v, step);
-                if i < points {
-                    *v = axpy(*v, 1.0 / step, sub(*x, predicted));
-                    v[3] = 0.0;
-                } else if predicted != *x {
-                    *v = turning(before[i], *x, step);
+        let (x, before, kinematics, step) = (&self.state.x, &self.before, self.laws.kinematics(), h as Real);
+        chunks(&mut self.state.v, |start, v| {
+            let rows = start..start + v.len();
+            let (x, before) = (&x[rows.clone()], &before[rows]);
+            let (points, frames) = v.split_at_mut(kinematics.points.saturating_sub(start).min(v.len()));
+            let first = points.len();
+            dispatch(Velocities { v: points, x, before, h: step });
+            for ((v, x), before) in frames.iter_mut().zip(&x[first..]).zip(&before[first..]) {
+                if rotation::turn(*before, xyz(*v) * step) != *x {
+                    *v = turning(*before, *x, step);
                 }
             }
         });
         Ok(())
+    }
+
+    /// Forces that are no elements, predicted velocities and positions; `before` keeps where they start from.
+    fn predict(&mut self, t: f64, h: f64) -> Result<(), StepError> {
+        let (Self { laws, state: State { x, v, .. }, rates, before, .. }, step) = (self, h as Real);
+        let (local, kinematics) = (laws.is_local(), laws.kinematics());
+        laws.batches.iter_mut().for_each(|b| b.act_at_once(h));
+        if !local {
+            rates.resize(x.len(), ZERO);
+            laws.rate(t, x, v, rates)?;
+        }
+        before.resize(x.len(), ZERO);
+        let mut blocks: Vec<_> = x.chunks_mut(BLOCK).zip(v.chunks_mut(BLOCK)).zip(before.chunks_mut(BLOCK)).enumerate().collect();
+        blocks.chunks_mut(CHUNK / BLOCK).in_parallel(|blocks| {
+            for (c, ((x, v), before)) in blocks {
+                let start = *c * BLOCK;
+                if local {
+                    let rates = &mut [ZERO; BLOCK][..x.len()];
+                    laws.rate_alone(t, start, x, v, rates);
+                    rows::axpy(v, step, rates);
+                } else {
+                    rows::axpy(v, step, &rates[start..start + x.len()]);
+                }
+                before.copy_from_slice(x);
+                kinematics.drift(start, x, v, step);
+            }
+        });
+        Ok(())
+    }
+}
+
+/// v + ((x - x_old)/h - v) of points, as the change of what was predicted.
+struct Velocities<'a> {
+    v: &'a mut [Row],
+    x: &'a [Row],
+    before: &'a [Row],
+    h: Real,
+}
+
+impl Kernel for Velocities<'_> {
+    type Output = ();
+    #[inline(always)]
+    fn run<W: Width>(self, w: W) {
+        let (v, x, before) = (self.v.as_flattened_mut(), self.x.as_flattened(), self.before.as_flattened());
+        let inverse_h = 1.0 / self.h;
+        packs!(W, w, (0..v.len()), |i| {
+            let here = &mut v[i..];
+            let own = w.load(here);
+            // The last numbers of rows, inverse masses, are the same in both.
+            let predicted = w.load(&before[i..]) + w.splat(self.h) * own;
+            w.store(own + w.splat(inverse_h) * (w.load(&x[i..]) - predicted), here);
+        });
     }
 }
 
@@ -90,7 +131,6 @@ fn turning(from: Row, to: Row, h: Real) -> Row {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::math::{rotation, xyz};
 
     #[test]
     fn a_frame_that_turns_has_turned_at_its_velocity() {
