@@ -113,7 +113,8 @@ test-web: setup chromium
 	@if command -v npm >/dev/null; then $(MAKE) --no-print-directory web && cd web && npm test --silent; \
 		else echo "no Node here: the browser laboratory is not tested; it needs Node 20.19 or later, with npm"; fi
 
-# With the tests that are marked long, and every scene in the determinism matrix.
+# With the tests that are marked long, every scene in the determinism matrix, and a million random cases.
+validate: export TUMBLE_FUZZ = 30
 validate: setup openvdb wasm
 	cargo test --workspace --exclude tumble-python --release --quiet -- --include-ignored --nocapture
 	$(BIN)/python -m pytest -s -m ""

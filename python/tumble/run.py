@@ -17,6 +17,7 @@ from tumble._engine import ExportError, Scene, SceneError, StepError, World
 from tumble.folder import FORMAT, LEDGER, TRIALS, Columns, RunFolder, plain, read_columns, read_rows, reason, refuse
 from tumble.lock import alone, ask
 from tumble.recorder import Recorder, changed
+from tumble.soundness import fault_of_arrays, fault_of_columns, fault_of_manifest
 
 Progress = Callable[[int, int], None]
 """Called with frames done and frames in all."""
@@ -184,6 +185,8 @@ def read_manifest(files: RunFolder) -> dict[str, Any]:
     if manifest.get("format") != FORMAT:
         text = f"is a run of format {manifest.get('format')}; this tumble reads format {FORMAT}"
         raise refuse(files.path, text)
+    if fault := fault_of_manifest(manifest):
+        raise ExportError(f"{files.manifest}: is damaged ({fault}); simulate again with --force")
     return manifest
 
 
@@ -240,7 +243,7 @@ class Run:
     @cached_property
     def static(self) -> Columns:
         """What does not change: masses, links, triangles, colliders; see `World.topology`."""
-        return read_columns(self._files.static)
+        return self._sound(read_columns(self._files.static), "static", self._files.static)
 
     @cached_property
     def columns(self) -> dict[str, dict[str, dict[str, Any]]]:
@@ -250,11 +253,24 @@ class Run:
             described: dict[str, dict[str, dict[str, Any]]] = json.loads(self._files.columns.read_bytes())
         except (OSError, ValueError) as error:
             raise ExportError(f"{self._files.columns}: cannot be read ({error})") from error
+        if fault := fault_of_columns(described):
+            raise ExportError(f"{self._files.columns}: is damaged ({fault}); simulate again with --force")
         return described
+
+    def _sound(self, columns: Columns, place: str, path: Path) -> Columns:
+        """The columns of a file, if they are as described; where the description is lost, as they are."""
+        try:
+            described = self.columns
+        except ExportError:
+            return columns
+        if fault := fault_of_arrays(columns, described, place):
+            raise ExportError(f"{path}: is damaged ({fault}); simulate again with --force")
+        return columns
 
     def frame(self, i: int) -> Columns:
         """The columns of a frame, by object; -1 is the last. Raises IndexError, or ExportError if a file is damaged."""
-        return read_columns(self._files.frame(self._index(i)))
+        path = self._files.frame(self._index(i))
+        return self._sound(read_columns(path), "frames", path)
 
     def time(self, i: int) -> float:
         """Simulated time of a frame [s]."""

@@ -19,7 +19,7 @@ struct Checker<'a> {
 
 impl<'a> Checker<'a> {
     fn report(&mut self, node: &Node, path: &str, message: String) {
-        self.issues.push(Issue { path: path.to_string(), line: node.line, message });
+        self.issues.push(Issue::on(node.line, path, message));
     }
 
     /// Follows `$ref`s to the schema that says something.
@@ -114,7 +114,7 @@ impl<'a> Checker<'a> {
         let resolved: Vec<&'a Schema> = branches.iter().map(|b| self.resolve(b)).collect();
         let constants: Vec<&str> = resolved.iter().flat_map(|b| words(b)).collect();
         if let Value::Text(text) = &node.value {
-            if constants.contains(&text.as_str()) || resolved.iter().any(|b| words(b).is_empty() && fits_type(node, b)) {
+            if constants.contains(&text.as_str()) || resolved.iter().any(|b| words(b).is_empty() && !is_choice(b) && fits_type(node, b)) {
                 return;
             }
             if !constants.is_empty() {
@@ -137,7 +137,7 @@ impl<'a> Checker<'a> {
                 }
             };
         }
-        let fitting: Vec<usize> = (0..branches.len()).filter(|i| fits_type(node, resolved[*i])).collect();
+        let fitting: Vec<usize> = (0..branches.len()).filter(|i| self.may_fit(node, resolved[*i])).collect();
         if let [only] = fitting[..] {
             return self.visit(node, &branches[only], path, unit);
         }
@@ -170,6 +170,15 @@ impl<'a> Checker<'a> {
             attempt.issues
         });
         self.issues.extend(attempts.min_by_key(Vec::len).unwrap_or_default());
+    }
+
+    /// Whether the type is right, or that of an alternative within.
+    fn may_fit(&self, node: &Node, schema: &'a Schema) -> bool {
+        let schema = self.resolve(schema);
+        match schema["oneOf"].as_array().or(schema["anyOf"].as_array()) {
+            Some(branches) => branches.iter().any(|branch| self.may_fit(node, branch)),
+            None => fits_type(node, schema),
+        }
     }
 
     /// What a schema accepts, in words: `a number > 0 N/m`.
@@ -232,8 +241,9 @@ impl<'a> Checker<'a> {
     }
 }
 
-/// `a.b`, or `a` at the top.
+/// `a.b`, or `a` at the top; a key without letters is quoted.
 fn join(path: &str, key: &str) -> String {
+    let key = if key.is_empty() { "\"\"" } else { key };
     if path.is_empty() { key.to_string() } else { format!("{path}.{key}") }
 }
 
@@ -256,6 +266,11 @@ fn types(schema: &Schema) -> Vec<&str> {
         Schema::Array(list) => list.iter().filter_map(Schema::as_str).collect(),
         _ => Vec::new(),
     }
+}
+
+/// Whether a schema is one of alternatives.
+fn is_choice(schema: &Schema) -> bool {
+    schema["oneOf"].is_array() || schema["anyOf"].is_array()
 }
 
 fn fits_type(node: &Node, schema: &Schema) -> bool {
@@ -281,7 +296,15 @@ fn number(node: &Node) -> f64 {
 }
 
 fn bounds(schema: &Schema) -> [Option<f64>; 4] {
-    ["minimum", "maximum", "exclusiveMinimum", "exclusiveMaximum"].map(|k| schema[k].as_f64())
+    let [low, high, above, below] = ["minimum", "maximum", "exclusiveMinimum", "exclusiveMaximum"].map(|k| schema[k].as_f64());
+    // Where the schema says nothing, whole numbers end where those of the machine do.
+    let most = match schema["format"].as_str() {
+        Some("uint8") => Some(f64::from(u8::MAX)),
+        Some("uint32") => Some(f64::from(u32::MAX)),
+        Some("uint64") => Some(2.0_f64.powi(53)),
+        _ => None,
+    };
+    [low, high.or(most.filter(|_| below.is_none())), above, below]
 }
 
 fn in_range(x: f64, schema: &Schema) -> bool {
@@ -292,11 +315,6 @@ fn in_range(x: f64, schema: &Schema) -> bool {
 /// `>= 0 N/m`, `> 0 and <= 1`, or without bounds `in m`.
 fn range(schema: &Schema, unit: Option<&str>) -> String {
     let [low, high, above, below] = bounds(schema);
-    if let (Some(low), Some(high)) = (low, high)
-        && low == high
-    {
-        return plain(low);
-    }
     if let (Some(low), Some(high)) = (low, high)
         && low == high
     {

@@ -14,10 +14,34 @@ pub struct Issue {
 }
 
 impl Issue {
-    /// An issue at `path`, without a line.
+    /// An issue at `path`, without a line. Both texts become one line each, without excess: they may quote names of any kind.
     pub fn new(path: impl Into<String>, message: impl Into<String>) -> Self {
-        Self { path: path.into(), line: None, message: message.into() }
+        Self { path: one_line(path.into(), LONGEST_PATH), line: None, message: one_line(message.into(), LONGEST_MESSAGE) }
     }
+
+    /// An issue at `path`, on that line if there is one.
+    pub fn on(line: Option<usize>, path: impl Into<String>, message: impl Into<String>) -> Self {
+        Self { line, ..Self::new(path, message) }
+    }
+}
+
+/// Longest path of an issue [characters].
+const LONGEST_PATH: usize = 400;
+/// Longest message of an issue [characters]; the longest of our own lists all keys of a force.
+const LONGEST_MESSAGE: usize = 2000;
+
+/// The text with control characters as escapes, cut off where it is longer than `most` characters.
+fn one_line(text: String, most: usize) -> String {
+    let mut text = if text.chars().any(char::is_control) {
+        text.chars().map(|c| if c.is_control() { c.escape_default().to_string() } else { c.to_string() }).collect()
+    } else {
+        text
+    };
+    if let Some((cut, _)) = text.char_indices().nth(most) {
+        text.truncate(cut);
+        text.push_str("...");
+    }
+    text
 }
 
 impl fmt::Display for Issue {

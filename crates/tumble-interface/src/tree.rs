@@ -31,6 +31,9 @@ pub enum Value {
     Table(Vec<(String, Node)>),
 }
 
+/// What is said of deeper ones.
+pub(crate) const TOO_DEEP: &str = "nested too deeply to be a scene";
+
 /// Deepest nesting that is read; a scene needs about eight levels.
 const DEPTH: usize = 64;
 
@@ -60,21 +63,17 @@ impl Node {
     /// Reads TOML text.
     pub fn from_toml(text: &str) -> Result<Node, SceneError> {
         let lines = Lines::of(text);
-        let table = toml::de::DeTable::parse(text).map_err(|e| SceneError {
-            issues: vec![Issue {
-                path: String::new(),
-                line: e.span().map(|s| lines.at(s.start)),
-                message: format!("not TOML: {}", e.message()),
-            }],
+        let table = toml::de::DeTable::parse(text).map_err(|e| match e.message() {
+            "recursion limit" => SceneError::one("", TOO_DEEP),
+            message => SceneError { issues: vec![Issue::on(e.span().map(|s| lines.at(s.start)), "", format!("not TOML: {message}"))] },
         })?;
         Ok(Node { value: convert_table(table.get_ref(), &lines), line: Some(1) })
     }
 
     /// Reads JSON text.
     pub fn from_json(text: &str) -> Result<Node, SceneError> {
-        let value: serde_json::Value = serde_json::from_str(text).map_err(|e| SceneError {
-            issues: vec![Issue { path: String::new(), line: Some(e.line()), message: format!("not JSON: {e}") }],
-        })?;
+        let value: serde_json::Value =
+            serde_json::from_str(text).map_err(|e| SceneError { issues: vec![Issue::on(Some(e.line()), "", format!("not JSON: {e}"))] })?;
         Ok(Self::from_value(&value))
     }
 
@@ -87,7 +86,7 @@ impl Node {
     pub fn set(&mut self, path: &str, value: Node) -> Result<(), SceneError> {
         let error = |message: String| SceneError::one(path, message);
         if path.split('.').count() > DEPTH {
-            return Err(SceneError::one("", "nested too deeply to be a scene"));
+            return Err(SceneError::one("", TOO_DEEP));
         }
         let mut node = self;
         let mut keys = path.split('.').peekable();

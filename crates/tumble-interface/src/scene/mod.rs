@@ -43,9 +43,10 @@ pub use systems::{
 
 use crate::check::check;
 use crate::error::{Issue, SceneError};
-use crate::tree::Node;
+use crate::tree::{Node, TOO_DEEP};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
+use std::sync::LazyLock;
 
 /// A whole simulation: what is there, how it moves, what is written out.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
@@ -235,9 +236,10 @@ impl Scene {
     /// what depends on several values together (a pin on a missing corner) is checked when the world is built.
     pub fn from_tree(tree: &Node) -> Result<Scene, SceneError> {
         if tree.too_deep() {
-            return Err(SceneError::one("", "nested too deeply to be a scene"));
+            return Err(SceneError::one("", TOO_DEEP));
         }
-        let issues = check(tree, &Self::schema());
+        static SCHEMA: LazyLock<serde_json::Value> = LazyLock::new(Scene::schema);
+        let issues = check(tree, &SCHEMA);
         if !issues.is_empty() {
             return Err(SceneError { issues });
         }

@@ -3,7 +3,7 @@
 use super::Assets;
 use crate::geometry::GridSdf;
 use crate::math::Signal;
-use tumble_interface::scene::{Diagonals, Dress, Emitter, Fluid, GridBox, HeatScheme, Shape, Source};
+use tumble_interface::scene::{Diagonals, Dress, Emitter, Fluid, GridBox, HeatScheme, Linear, Shape, Source, System};
 use tumble_interface::{Mesh, Scene};
 
 /// Bytes for a mass: its rows in state, scratch, snapshot and history, in double precision.
@@ -18,12 +18,22 @@ const TETRAHEDRON: f64 = 1400.0;
 /// Bytes for a cell of a body that conducts heat: temperatures twice and in the snapshot; materials; multigrid of implicit schemes;
 /// in double precision.
 const WARM: [f64; 3] = [24.0, 48.0, 160.0];
-/// Bytes for a cell of a compressible gas: density and three components of velocity, twice and in the snapshot.
-const SOUND: f64 = 100.0;
+/// Bytes for a cell of a compressible gas, density and three components of velocity in all that a step keeps of them: measured, 44 numbers
+/// in either precision.
+const SOUND: f64 = 46.0 * std::mem::size_of::<crate::math::Real>() as f64;
+/// Bytes for a mass of the factors of a direct solver: along curves, on surfaces, and in bodies for each mass along an edge of the smaller
+/// cross-section. Measured: 1.9 kB in ropes, 13.3 to 14.5 kB in sheets of 100 to 400 masses along a side, 2.0 to 2.7 kB in bodies of 10 to 30.
+const FACTORS: [f64; 3] = [2.5e3, 16e3, 2.8e3];
 
 /// An upper estimate of the bytes that the scene's objects and colliders need.
 pub fn memory(scene: &Scene, assets: &Assets) -> f64 {
     let diagonals = |d: &Diagonals| if *d == Diagonals::Both { 2.0 } else { 1.0 };
+    // What a direct solver takes, of the objects that it may have to solve for.
+    let factors = |system: &Option<String>, each: f64| {
+        let moves = |s: &System| system.as_ref().is_none_or(|name| *name == s.name);
+        let direct = scene.system.iter().any(|s| moves(s) && s.integrator.is_implicit() && s.solver.linear == Linear::Cholesky);
+        if direct { each } else { 0.0 }
+    };
     let mut bytes = 0.0;
     for thing in &scene.particles {
         let filled =
@@ -52,7 +62,7 @@ pub fn memory(scene: &Scene, assets: &Assets) -> f64 {
     bytes += scene.compressible.iter().map(|thing| cells(&thing.grid) * SOUND).sum::<f64>();
     for thing in &scene.rope {
         let links = if thing.rod.is_some() { 6.0 } else { 2.0 };
-        bytes += (f64::from(thing.segments) + 1.0) * (2.0 * MASS + links * LINK);
+        bytes += (f64::from(thing.segments) + 1.0) * (2.0 * MASS + links * LINK + factors(&thing.system, FACTORS[0]));
     }
     for thing in &scene.hair {
         let of = |mesh: &Mesh, scale: f64| {
@@ -75,7 +85,7 @@ pub fn memory(scene: &Scene, assets: &Assets) -> f64 {
             _ => file.and_then(|file| Some(of(assets.get(&file.path)?, file.scale))).unwrap_or(0.0),
         };
         let strands = thing.per_area.map_or(f64::from(thing.count.unwrap_or(1)), |n| n * area);
-        bytes += strands * (f64::from(thing.segments) + 2.0) * (2.0 * MASS + 4.0 * LINK);
+        bytes += strands * (f64::from(thing.segments) + 2.0) * (2.0 * MASS + 4.0 * LINK + factors(&thing.system, FACTORS[0]));
     }
     for thing in &scene.sheet {
         let n: f64 = thing.resolution.iter().map(|n| f64::from(*n)).product();
@@ -86,17 +96,20 @@ pub fn memory(scene: &Scene, assets: &Assets) -> f64 {
             + each(thing.membrane.is_some(), 6.0)
             + each(thing.fabric.is_some(), 20.0)
             + each(thing.area > 0.0, 4.0);
-        bytes += n * (MASS + (4.0 + diagonals(&thing.links().diagonals) + elements) * LINK);
+        bytes += n * (MASS + (4.0 + diagonals(&thing.links().diagonals) + elements) * LINK + factors(&thing.system, FACTORS[1]));
     }
     for thing in &scene.block {
         let n: f64 = thing.resolution.iter().map(|n| f64::from(*n)).product();
         let links = thing.links.as_ref().map_or(0.0, |l| 6.0 + 3.0 * diagonals(&l.diagonals));
         let solids = if thing.material.is_some() { 6.0 } else { 0.0 };
-        bytes += n * (MASS + links * LINK + solids * TETRAHEDRON);
+        let mut edges = thing.resolution.map(f64::from);
+        edges.sort_by(f64::total_cmp);
+        let factor = factors(&thing.system, FACTORS[2] * (edges[0] * edges[1]).sqrt());
+        bytes += n * (MASS + links * LINK + solids * TETRAHEDRON + factor);
     }
     let woven = |there: bool| if there { 35.0 } else { 15.0 };
     for (thing, mesh) in scene.net.iter().filter_map(|thing| Some((thing, assets.get(&thing.mesh.path)?))) {
-        bytes += mesh.vertices.len() as f64 * (MASS + woven(thing.fabric.is_some()) * LINK);
+        bytes += mesh.vertices.len() as f64 * (MASS + woven(thing.fabric.is_some()) * LINK + factors(&thing.system, FACTORS[1]));
     }
     for thing in &scene.cloth {
         let girth = |d: &Dress| (d.bust_girth * (d.bodice + d.shoulder), d.waist_girth / std::f64::consts::TAU);
@@ -105,7 +118,8 @@ pub fn memory(scene: &Scene, assets: &Assets) -> f64 {
             |o: &[[f64; 2]]| (0..o.len()).map(|i| o[i][0] * o[(i + 1) % o.len()][1] - o[(i + 1) % o.len()][0] * o[i][1]).sum::<f64>();
         let area = thing.panels.iter().map(|p| 0.5 * twice(&p.outline).abs()).sum::<f64>() + thing.dress.as_ref().map_or(0.0, of_dress);
         // Equilateral triangles have an area of sqrt(3)/2 edge² a point; sides add some.
-        bytes += 1.5 * area / (thing.resolution * thing.resolution) * (MASS + woven(thing.fabric.is_some()) * LINK);
+        let each = MASS + woven(thing.fabric.is_some()) * LINK + factors(&thing.system, FACTORS[1]);
+        bytes += 1.5 * area / (thing.resolution * thing.resolution) * each;
     }
     bytes += scene.gas.iter().map(|thing| super::gas::bytes(thing, super::laws::flat(scene), !scene.collider.is_empty())).sum::<f64>();
     for thing in &scene.collider {

@@ -1,0 +1,80 @@
+"""Whether the files of a run folder hold what they should: what is well-formed may still have been changed by somebody."""
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from tumble._engine import Scene, SceneError, version
+
+_MANIFEST: dict[str, type | tuple[type, ...]] = {
+    "status": str,
+    "frames": int,
+    "hashes": list,
+    "descent": list,
+    "warnings": list,
+    "expectations": list,
+    "probes": list,
+    "stability": list,
+    "timings": dict,
+    "machine": dict,
+    "failure": (dict, str, type(None)),
+}
+
+_INDICES = ("pinned", "triangles", "links", "curve")
+"""Columns that count the particles of their object."""
+
+
+def fault_of_manifest(manifest: Mapping[str, Any]) -> str | None:
+    """What is wrong with a manifest."""
+    for key, kind in _MANIFEST.items():
+        if key in manifest and (not isinstance(manifest[key], kind) or isinstance(manifest[key], bool)):
+            return f'"{key}" is {manifest[key]!r}'
+    for key in ("descent", "expectations", "stability"):
+        if not all(isinstance(item, dict) for item in manifest.get(key, [])):
+            return f'"{key}" holds something else than tables'
+    # The words of another version may be others.
+    if manifest.get("tumble") == version:
+        try:
+            Scene(manifest["scene"])
+        except SceneError as error:
+            # Meshes and fabrics may be gone: what they became is in the run.
+            wrong = [i for i in error.issues if not str(i["path"]).endswith((".path", ".hash", ".name", ".fabric"))]
+            if wrong:
+                return f"scene: {wrong[0]['path']}: {wrong[0]['message']}"
+    return None
+
+
+def fault_of_columns(described: Any) -> str | None:
+    """What is wrong with the description of the columns."""
+    if not isinstance(described, dict):
+        return "it is no table of objects"
+    for name, table in described.items():
+        if not isinstance(table, dict):
+            return f'"{name}" is no table of columns'
+        for column, entry in table.items():
+            if not isinstance(entry, dict) or not all(isinstance(entry.get(key), str) for key in ("unit", "dtype", "in")):
+                return f'"{name}/{column}" has no unit, dtype or file'
+            shape = entry.get("shape")
+            if not isinstance(shape, list) or not all(n is None or (type(n) is int and n >= 0) for n in shape):
+                return f'"{name}/{column}" has no shape'
+    return None
+
+
+def fault_of_arrays(columns: Mapping[str, Mapping[str, npt.NDArray[Any]]], described: Mapping[str, Any], place: str) -> str | None:
+    """What is wrong with the arrays of a file. The first lengths may change from frame to frame."""
+    for name, table in described.items():
+        for column, entry in table.items():
+            if entry["in"] != place:
+                continue
+            array = columns.get(name, {}).get(column)
+            if array is None:
+                return f'"{name}/{column}" is missing'
+            if array.ndim != len(entry["shape"]) or list(array.shape[1:]) != entry["shape"][1:] or array.dtype != entry["dtype"]:
+                return f'"{name}/{column}" is {array.dtype} {list(array.shape)}, not {entry["dtype"]} {entry["shape"]}'
+            if place == "static" and column in _INDICES and "mass" in columns.get(name, {}) and array.size:
+                most = len(columns[name]["mass"])
+                if np.min(array) < 0 or np.max(array) >= most:
+                    return f'"{name}/{column}" names particles beyond the {most} that there are'
+    return None
