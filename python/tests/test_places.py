@@ -11,6 +11,7 @@ import subprocess
 import sys
 import time
 from collections.abc import Callable, Iterator
+from itertools import pairwise
 from pathlib import Path
 
 import pytest
@@ -66,10 +67,12 @@ def test_a_disk_that_is_full_at_any_moment(
     spring: Tree, tmp_path: Path, reference: Run, disk: Callable[[int], Path]
 ) -> None:
     whole = sum(-(-f.stat().st_size // 4096) * 4096 for f in reference.folder.rglob("*") if f.is_file())
+    # From next to nothing to next to all, at a random place of each twelfth.
     sizes = random.Random(3)
+    edges = [3 + i * (whole // 4096 - 7) // 12 for i in range(13)]
     frames = []
-    for _ in range(12):
-        place = disk(4096 * sizes.randrange(3, whole // 4096 - 4)) / "run"
+    for low, high in pairwise(edges):
+        place = disk(4096 * sizes.randrange(low, high)) / "run"
         with pytest.raises((ExportError, SceneError), match="no space left on the disk"):
             simulate(spring, place)
         frames.append(check(place, reference))

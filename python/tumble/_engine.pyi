@@ -130,7 +130,7 @@ class World:
         """Hash of everything that the next step depends on, 16 hexadecimal digits."""
 
     def save(self, path: Path) -> None:
-        """Writes a checkpoint (safetensors, the scene inside). Raises ExportError."""
+        """Writes a checkpoint (safetensors, the scene inside). Raises ExportError, whose cause is the system's OSError."""
 
     @staticmethod
     def restore(path: Path, threads: int | None = None) -> World:

@@ -243,7 +243,7 @@ def write_checkpoint(world: World, path: Path) -> None:
             world.save(temporary)
             temporary.replace(path)
         except ExportError as error:
-            raise ExportError(f"{error}; what was finished before is readable, and --resume goes on from it") from error
+            raise error.__cause__ if isinstance(error.__cause__, OSError) else error from None
         finally:
             with suppress(OSError):
                 temporary.unlink()

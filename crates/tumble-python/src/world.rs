@@ -241,15 +241,18 @@ impl World {
         format!("{:016x}", self.engine.hash())
     }
 
-    /// Writes a checkpoint (safetensors, the scene inside). Raises ExportError.
+    /// Writes a checkpoint (safetensors, the scene inside). Raises ExportError, whose cause is the system's OSError.
     fn save(&self, py: Python<'_>, path: PathBuf) -> PyResult<()> {
         let scene = self.scene.bind(py).get();
         // One text: several would be written in no fixed order.
         let folder = scene.folder.display().to_string();
         let about = serde_json::json!({ "version": env!("CARGO_PKG_VERSION"), "scene": scene.scene.to_json(), "folder": folder });
         let bytes = self.engine.save(&[("tumble", &about.to_string())]);
-        py.detach(|| std::fs::write(&path, bytes))
-            .map_err(|e| ExportError::new_err(format!("\"{}\" cannot be written: {e}", path.display())))
+        py.detach(|| std::fs::write(&path, bytes)).map_err(|e| {
+            let error = ExportError::new_err(format!("\"{}\" cannot be written: {e}", path.display()));
+            error.set_cause(py, Some(e.into()));
+            error
+        })
     }
 
     /// The world of a checkpoint. Raises SceneError.
