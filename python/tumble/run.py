@@ -37,7 +37,8 @@ def simulate(
 
     `frames` overrides the scene's. `resume` goes on where an earlier run in the folder was stopped, to the same bits as
     if it had not been; without an earlier run it starts one. `overwrite` replaces an earlier run.
-    Where the physics breaks, `cures` are tried, which takes as long as many such runs.
+    Where the physics breaks, `cures` are tried and a minimal scene that breaks as well is looked for, which takes as long as
+    many such runs.
 
     Raises SceneError if the scene or the folder is wrong, before anything is written; StepError if the physics breaks;
     ExportError if a file cannot be written. Whatever was finished by then can be read with `Run.open`.
