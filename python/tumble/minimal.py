@@ -59,7 +59,7 @@ _LISTS = (*_THINGS, "collider", "anchor", "field", "force", "system")
 _TOLD = ("title", "output", "camera", "expect")
 """What changes nothing of what is simulated."""
 
-_PAINT = ("color", "color_to", "color_end", "color_spread", "trail")
+_PAINT = ("color", "trail")
 
 _NAMES = ("on", "from", "bodies", "predators", "sheet", "collider", "object", "of", "system", "between")
 """Words that name other things."""
@@ -120,7 +120,9 @@ def minimize(
     """The smallest scene that breaks as `report` says, at the latest in `frame`, counted from 1; `scene` took so many sub-steps
     for the frames before. With `sure`, it is known that it does so from its start. None if it does not."""
     search = _Search(scene, report, frame, steps, threads, trials)
-    if not sure and not search.does(search.full, set()):
+    if sure:
+        search.tried[_key(search.scene(search.full))] = True
+    elif not search.does(search.full, set()):
         return None
     phases = (search.leave_out_things, search.lower_counts, search.thin_lists, search.leave_out_words)
     for phase, share in zip(phases, _SHARES, strict=True):
@@ -161,13 +163,16 @@ class _Search:
     ) -> None:
         self.folder, self.threads = scene.folder, threads
         full = scene.to_dict()
-        self.before = self._sizes(full, World(scene, threads), full["time"]["frames"])
+        world = World(scene, threads)
+        size = _elements(world, full)
+        self.before = _sizes(full, size, full["time"]["frames"])
         full["time"]["frames"] = frame
+        self.after = _sizes(full, size, frame)
         for key in _TOLD:
             full.pop(key, None)
         for kind in _LISTS:
             for thing in full[kind]:
-                for key in _PAINT:
+                for key in _PAINT if kind != "emitter" else ():  # Which draws them at random.
                     thing.pop(key, None)
         self.full: Tree = full
         self.gone: set[Unit] = set()
@@ -175,13 +180,11 @@ class _Search:
         self.fault = self._fault(report, full)
         self.frame = frame
         self.trials, self.most = 0, trials
-        own = _elements(World(self._scene(full), threads), full) + _OVERHEAD
-        self.per_frame = max(_steps(report, full), steps / max(frame - 1, 1))
-        self.work = (steps + self.per_frame) * own
+        self.per_frame = max(_steps(report, full), _expected(world, full), steps / max(frame - 1, 1))
+        self.work = (steps + self.per_frame) * (size + _OVERHEAD)
         """Of the smallest so far."""
         self.left = BUDGET[0] * self.work + BUDGET[1]
         self.tried: dict[str, bool] = {}
-        self.after = self._sizes(full, None, frame, own - _OVERHEAD)
         self.kept = {
             (kind, i) for kind in _THINGS for i, o in enumerate(full[kind]) if o["name"] == report.get("object")
         }
@@ -216,11 +219,9 @@ class _Search:
                 continue
             # Those that nothing binds to the culprit go first.
             bound = _bound(thing, one)
-            others = [j for j in range(count) if j not in bound]
-            for rest in (others, [j for j in sorted(bound) if j != one]):
-                before = set(range(len(self.full[kind][i]["position"]))) if rest is others else bound
-                if rest and before:
-                    self._thin_particles(kind, i, rest)
+            without = self._without_particles(kind, i)
+            self._thin([j for j in range(count) if j not in bound], without)
+            self._thin([j for j in sorted(bound) if j != one], without)
         for kind, i in self._here(_LISTS):
             thing = self.full[kind][i]
             nested = [f"{key}.{word}" for key, table in thing.items() if isinstance(table, dict) for word in table]
@@ -261,7 +262,7 @@ class _Search:
         changed = deepcopy(self.full)
         changed[unit[0]][unit[1]].pop(key, None)
         try:
-            self._scene(self._without(changed, set(self.gone)))
+            self.scene(self._without(changed, set(self.gone)))
         except SceneError:
             return False
         return True
@@ -271,8 +272,8 @@ class _Search:
         found = [(kind, i) for kind in kinds for i in range(len(self.full[kind])) if (kind, i) not in self.gone]
         return sorted(found, key=lambda unit: unit not in self.kept)
 
-    def _thin_particles(self, kind: str, i: int, rest: Sequence[int]) -> None:
-        """Leaves out of listed particles what it can of `rest`, indices as they were before."""
+    def _without_particles(self, kind: str, i: int) -> Callable[[Sequence[int]], bool]:
+        """Tries to leave out more and more of what particles there are now, by their indices."""
         whole = deepcopy(self.full[kind][i])
         kept = set(range(len(whole["position"])))
 
@@ -284,7 +285,7 @@ class _Search:
             kept.difference_update(some)
             return True
 
-        self._thin(rest, without)
+        return without
 
     def _thin_list(self, kind: str, i: int, key: str) -> None:
         whole = list(_at(self.full[kind][i], key))
@@ -320,7 +321,7 @@ class _Search:
         if found is None:
             return False
         tree, scene = found
-        key = json.dumps(scene.to_dict(), sort_keys=True)
+        key = _key(scene)
         if key not in self.tried:
             self.tried[key] = False
             report = self._simulate(scene, tree)
@@ -337,7 +338,7 @@ class _Search:
         for _ in range(5):
             tree = self._without(full, gone)
             try:
-                return tree, self._scene(tree)
+                return tree, self.scene(tree)
             except SceneError as error:
                 there = {k: [i for i in range(len(full[k])) if (k, i) not in gone] for k in _LISTS}
                 more = {u for issue in error.issues if (u := _unit(str(issue["path"]), full, there)) is not None}
@@ -347,7 +348,7 @@ class _Search:
                 gone |= more
         return None
 
-    def _scene(self, tree: Tree) -> Scene:
+    def scene(self, tree: Tree) -> Scene:
         return Scene(tree, self.folder)
 
     def _without(self, full: Tree, gone: set[Unit]) -> Tree:
@@ -384,8 +385,7 @@ class _Search:
             return None
         finally:
             self.trials += 1  # Building takes its time, too.
-        interval = 1.0 / tree["time"]["fps"]
-        if sum(interval / s["step"] for s in world.stability() if s["step"] > 0.0) > _STEEPER * self.per_frame + 1.0:
+        if _expected(world, tree) > _STEEPER * self.per_frame:
             return None
         size = _elements(world, tree) + _OVERHEAD
         most, work = min(self.left, self.work), 0.0
@@ -400,7 +400,7 @@ class _Search:
             if self._fault(report, tree) != self.fault:
                 return None
             self.report, self.frame, self.work = report, world.frame_index + 1, min(work, self.work)
-            self.after = self._sizes(tree, world, self.frame)
+            self.after = _sizes(tree, size - _OVERHEAD, self.frame)
             return report
         finally:
             self.left -= work
@@ -422,28 +422,30 @@ class _Search:
         keys = ("kind", "system", "object", "column")
         return (*(report.get(key) for key in keys), long, reason)
 
-    def _sizes(self, tree: Tree, world: World | None, frames: int, elements: int = 0) -> dict[str, int]:
-        if world is not None:
-            elements = _elements(world, tree)
-        things = sum(len(tree[kind]) for kind in _LISTS if kind != "system")
-        return {"things": things, "masses and cells": elements, "frames": frames}
-
     def found(self) -> Minimal:
         tree = self._without(self.full, set(self.gone))
         tree["time"]["frames"] = self.frame
         sizes = {key: (self.after[key], self.before[key]) for key in self.before}
-        sizes["frames"] = (self.frame, self.before["frames"])
         return Minimal(tree, self.folder, self.report, self.trials, sizes)
 
 
 # Parts of scenes
 
 
+def _key(scene: Scene) -> str:
+    return json.dumps(scene.to_dict(), sort_keys=True)
+
+
+def _sizes(tree: Tree, elements: int, frames: int) -> dict[str, int]:
+    things = sum(len(tree[kind]) for kind in _LISTS if kind != "system")
+    return {"things": things, "masses and cells": elements, "frames": frames}
+
+
 def _elements(world: World, tree: Tree) -> int:
-    """Masses and cells, and the particles of emitters that are there now."""
-    columns = world.columns("position") if tree["emitter"] else {}
-    masses = sum(len(table["mass"]) for table in world.topology.values() if "mass" in table)
-    born = sum(len(columns.get(e["name"], {}).get("position", ())) for e in tree["emitter"])
+    """Masses, particles and cells that are there now."""
+    columns = world.columns("position")
+    names = [thing["name"] for kind in _THINGS for thing in tree[kind]]
+    masses = sum(len(columns[name]["position"]) for name in names if "position" in columns.get(name, {}))
     boxes = [thing["box"] for kind in ("heat", "compressible", "gas") for thing in tree[kind]]
     across = "xyz".index(next(axis for axis in "xyz" if axis not in tree["plane"])) if tree["dimension"] == 2 else None
     cells = 0
@@ -451,7 +453,12 @@ def _elements(world: World, tree: Tree) -> int:
         sides = [side for axis, side in enumerate(box["size"]) if axis != across]
         dx = max(sides) / box["resolution"]
         cells += math.prod(max(1, round(side / dx)) for side in sides)
-    return masses + born + cells
+    return masses + cells
+
+
+def _expected(world: World, tree: Tree) -> float:
+    """The sub-steps that a frame takes by estimate."""
+    return sum(1.0 / tree["time"]["fps"] / about["step"] for about in world.stability() if about["step"] > 0.0)
 
 
 def _steps(report: Mapping[str, Any], tree: Tree) -> float:
