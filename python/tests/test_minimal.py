@@ -203,6 +203,53 @@ def test_what_is_left_breaks_in_the_same_place_for_the_same_reason(
     assert again.code == 1 and "FAILED" in again.err and f'of "{name}"' in again.err
 
 
+def test_another_break_is_not_taken_for_the_same(tmp_path: Path) -> None:
+    """Without the force that is to blame, the next one would break the same particle in the same frame."""
+    poles = [{"kind": "acceleration", "value": [f"1/(t-{t})", 0, 0]} for t in (0.25, 0.275)]
+    tree = {**CASES["force"], "force": [{"kind": "drag", "rate": 0.1}, *poles]}
+    with pytest.raises(StepError):
+        simulate(tree, tmp_path)
+    (force,) = tomllib.loads((tmp_path / "minimal.toml").read_text())["force"]
+    assert force["value"][0] == "1/(t-0.25)"
+
+
+def test_what_makes_a_break_another_one() -> None:
+    scene = Scene(CASES["force"])
+    report, frame = broken(scene, 20)
+    search = minimal._Search(scene, report, frame, 8.0, None, 1)
+    tree = scene.to_dict()
+    fault = search._fault(report, tree)
+    others = {"kind": "exploded", "system": "b", "object": "q", "column": "velocity", "cause": ""}
+    for key, value in others.items():
+        assert report[key] != value
+        assert search._fault({**report, key: value}, tree) != fault, key
+    assert search._fault({**report, "step": 1.0, "stable_step": 0.5}, tree) != fault
+    # Where and when, and what the index is now.
+    moved = re.sub(r"at \[.*?\]", "at [9, 9, 9]", report["cause"]).replace("force[2]", "force[1]")
+    assert moved != report["cause"]
+    fewer = {**tree, "force": tree["force"][1:]}
+    assert search._fault({**report, "time": 0.01, "index": 7, "cause": moved}, fewer) == fault
+
+
+def test_a_branch_is_tried_from_its_start(
+    spring: Tree, scene_file: SceneFile, tumble: Command, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    assert tumble("run", scene_file(spring)).code == 0
+    asked = []
+    minimize = minimal.minimize
+
+    def noted(*arguments: Any, **words: Any) -> Any:
+        asked.append(words["sure"])
+        return minimize(*arguments, **words)
+
+    monkeypatch.setattr(minimal, "minimize", noted)
+    sets = ["system.0.integrator=forward_euler", "system.0.substeps=4", "particles.p.spring.0.stiffness=1e8"]
+    words = [word for text in sets for word in ("--set", text)]
+    answer = tumble("branch", "out/scene@10", *words, "--frames", 5, "--out", "out/branch")
+    assert (answer.code, asked) == (1, [False])
+    assert broken(Scene.load("out/branch/minimal.toml"), 11)[0]["object"] == "p"
+
+
 def test_paths_hold_from_the_folder_of_the_run(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     (tmp_path / "meshes").mkdir()
     points = "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\n"
@@ -293,7 +340,9 @@ def test_trouble_on_the_way_leaves_the_error_as_it_was(
     assert answer.code == 1
     for word in ("FAILED", "Likely causes", "<- recommended", "Kept: "):
         assert word in answer.err, word
-    assert "small scene" not in answer.err and "Traceback" not in answer.err
+    assert "A small scene" not in answer.err and "Traceback" not in answer.err
+    # What broke is said before anything is looked for.
+    assert answer.err.index("energy exploded") < answer.err.index("Looking for") < answer.err.index("FAILED")
     failure = Run("out/scene").manifest["failure"]
     assert "minimal" not in failure and any(cure["survived"] for cure in failure["cures"])
     assert not Path("out/scene/minimal.toml").exists()

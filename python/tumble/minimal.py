@@ -1,8 +1,7 @@
-"""A small scene that breaks as a given one does, found by leaving things out and trying (delta debugging).
+"""A small scene that breaks as a given one does, found by leaving things out and trying: delta debugging.
 
-A change is kept if the first that breaks is still the same: kind of breakdown, object, column and reason, in the same frame
-or an earlier one. What is tried is counted, in trials and in work, and never timed: the same scene gives the same answer on any
-machine.
+A change is kept if the first that breaks is still the same (breakdown.4). What is tried is counted, in trials and in work, and
+never timed: the same scene gives the same answer on any machine. Source: [zeller2002].
 """
 
 import json
@@ -407,7 +406,7 @@ class _Search:
         return None
 
     def _fault(self, report: Mapping[str, Any], tree: Tree) -> tuple[Any, ...]:
-        """What must stay the same of a break."""
+        """What must stay the same of a break (breakdown.4)."""
         step, stable = float(report.get("step") or 0.0), float(report.get("stable_step", math.inf))
         long = step > stable
         cause = report.get("cause") or report.get("message") or ""
@@ -458,7 +457,7 @@ def _elements(world: World, tree: Tree) -> int:
 
 def _expected(world: World, tree: Tree) -> float:
     """The sub-steps that a frame takes by estimate."""
-    return sum(1.0 / tree["time"]["fps"] / about["step"] for about in world.stability() if about["step"] > 0.0)
+    return sum(1.0 / float(tree["time"]["fps"] * about["step"]) for about in world.stability() if about["step"] > 0.0)
 
 
 def _steps(report: Mapping[str, Any], tree: Tree) -> float:
