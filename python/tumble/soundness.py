@@ -54,7 +54,9 @@ def fault_of_columns(described: Any) -> str | None:
         if not isinstance(table, dict):
             return f'"{name}" is no table of columns'
         for column, entry in table.items():
-            if not isinstance(entry, dict) or not all(isinstance(entry.get(key), str) for key in ("unit", "dtype", "in")):
+            if not isinstance(entry, dict) or not all(
+                isinstance(entry.get(key), str) for key in ("unit", "dtype", "in")
+            ):
                 return f'"{name}/{column}" has no unit, dtype or file'
             shape = entry.get("shape")
             if not isinstance(shape, list) or not all(n is None or (type(n) is int and n >= 0) for n in shape):
@@ -62,7 +64,9 @@ def fault_of_columns(described: Any) -> str | None:
     return None
 
 
-def fault_of_arrays(columns: Mapping[str, Mapping[str, npt.NDArray[Any]]], described: Mapping[str, Any], place: str) -> str | None:
+def fault_of_arrays(
+    columns: Mapping[str, Mapping[str, npt.NDArray[Any]]], described: Mapping[str, Any], place: str
+) -> str | None:
     """What is wrong with the arrays of a file. The first lengths may change from frame to frame."""
     for name, table in described.items():
         for column, entry in table.items():
@@ -71,7 +75,11 @@ def fault_of_arrays(columns: Mapping[str, Mapping[str, npt.NDArray[Any]]], descr
             array = columns.get(name, {}).get(column)
             if array is None:
                 return f'"{name}/{column}" is missing'
-            if array.ndim != len(entry["shape"]) or list(array.shape[1:]) != entry["shape"][1:] or array.dtype != entry["dtype"]:
+            if (
+                array.ndim != len(entry["shape"])
+                or list(array.shape[1:]) != entry["shape"][1:]
+                or array.dtype != entry["dtype"]
+            ):
                 return f'"{name}/{column}" is {array.dtype} {list(array.shape)}, not {entry["dtype"]} {entry["shape"]}'
             if place == "static" and column in _INDICES and "mass" in columns.get(name, {}) and array.size:
                 most = len(columns[name]["mass"])
