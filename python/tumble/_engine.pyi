@@ -88,8 +88,8 @@ class World:
         """Names of the systems."""
 
     @property
-    def warnings(self) -> list[str]:
-        """What is doubtful about the scene."""
+    def warnings(self) -> list[dict[str, str]]:
+        """What is doubtful about the scene: code (as listed in docs/warnings.md), path and message of each."""
 
     def step(self, frames: int = 1) -> dict[str, Any]:
         """Simulates frames; returns what they took: steps, rejected, step_range [s], newton, linear, residual, unconverged,

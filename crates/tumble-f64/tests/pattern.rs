@@ -2,7 +2,7 @@
 
 #![allow(clippy::unwrap_used, clippy::panic)] // helpers of tests fail by panicking, too
 
-mod common;
+use crate::common;
 
 use common::{positions, run};
 use std::collections::HashMap;
@@ -217,7 +217,7 @@ fn what_is_wrong_with_a_pattern_is_told_with_its_place() {
     let told = |mesh: Mesh| {
         let words = format!("mesh.path = \"tube.obj\"\npattern.scale = {SCALE}\n");
         match with(&words, mesh, None) {
-            Ok(sim) => sim.warnings().join("\n"),
+            Ok(sim) => sim.warnings().iter().map(ToString::to_string).collect::<String>(),
             Err(message) => message,
         }
     };

@@ -3,6 +3,7 @@
 use crate::error::{SceneError, StepError};
 use crate::frame::{Column, Frame};
 use crate::scene::Integrator;
+use crate::warning::Warning;
 
 /// Growth of the energy over its scale at which a run is stopped.
 pub const BLOW_UP: f64 = 1000.0;
@@ -258,7 +259,7 @@ pub trait Engine: Send {
     fn cures(&mut self, go_on: &(dyn Fn() -> bool + Sync)) -> Vec<Cure>;
 
     /// Warnings from building the scene.
-    fn warnings(&self) -> &[String];
+    fn warnings(&self) -> &[Warning];
 
     /// Adds a user's force to the system of that name.
     fn add_force(&mut self, system: &str, force: Box<dyn UserForce>) -> Result<(), SceneError>;

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from tumble.cli import find, report
-from tumble.cli.console import Progress, complain, counted, say, stopped, warn
+from tumble.cli.console import Progress, complain, counted, say, stopped, warn, warn_of
 
 if TYPE_CHECKING:
     from tumble import Run, TumbleError
@@ -82,7 +82,7 @@ def run(
 
     failures = present(done, asked, frames_to_draw, renderer)
     if text := report.gained(done, scene, overrides, [*(["--out", str(out)] if out else []), *_flags(flags, renderer)]):
-        warn(text)
+        warn("energy-grew", text)
     judge(done, failures)
 
 
@@ -90,8 +90,7 @@ def present(done: "Run", asked: dict[str, bool], stills: list[int], renderer: st
     """Says what a finished run warns of, writes what it is asked for, and sums it up; returns what could not be written."""
     from tumble.lock import alone
 
-    for text in done.manifest["warnings"]:
-        warn(text)
+    warn_of([*done.manifest["warnings"], *report.doubts(done)])
     try:
         with alone(done.folder):
             failures = write_results(done, asked, stills, renderer)

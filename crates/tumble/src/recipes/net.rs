@@ -4,8 +4,9 @@ use super::Site;
 use super::pins::{Pinnable, pinned};
 use super::surface::{Rest, Surface};
 use crate::geometry::Vector;
-use tumble_interface::Mesh;
 use tumble_interface::scene::{Net, Pattern};
+use tumble_interface::warning::Code;
+use tumble_interface::{Mesh, Warning};
 
 /// A triangle has no area if that is less than this part of its longest side squared.
 const SLIVER: f64 = 1e-9;
@@ -132,10 +133,11 @@ fn pattern(site: &mut Site<'_>, words: &Pattern, mesh: &Mesh, path: &str) -> Res
         .fold((0.0, 0.0), |s, a| (s.0 + a.0, s.1 + a.1));
     let ratio = flat / real;
     if real > 0.0 && !(1.0 / UNLIKE..=UNLIKE).contains(&ratio) {
-        site.hints.push(format!(
-            "{path}.scale: the pattern has {flat:.4} m² and the mesh {real:.4} m²; a scale of {:.4} would make them equal",
+        let message = format!(
+            "the pattern has {flat:.4} m² and the mesh {real:.4} m²; a scale of {:.4} would make them equal",
             words.scale / ratio.sqrt()
-        ));
+        );
+        site.hints.push(Warning::new(Code::PatternScale, format!("{path}.scale"), message));
     }
     let side = |t: u32| {
         let [a, b, c] = panels[t as usize];
@@ -150,10 +152,10 @@ fn pattern(site: &mut Site<'_>, words: &Pattern, mesh: &Mesh, path: &str) -> Res
     if let Some((_, faces)) = edges.iter().find(folded) {
         let n = edges.iter().filter(folded).count();
         let message = format!(
-            "{path}: the texture is folded over at {n} edges, the first at {}; no cloth is cut so, unwrap the mesh again",
+            "the texture is folded over at {n} edges, the first at {}; no cloth is cut so, unwrap the mesh again",
             place(faces[0] as usize)
         );
-        site.hints.push(message);
+        site.hints.push(Warning::new(Code::FoldedPattern, path, message));
     }
     Ok(panels)
 }
