@@ -18,6 +18,7 @@ const UNLIKE: f64 = 2.0;
 pub fn net(site: &mut Site<'_>, thing: &Net, mesh: &Mesh) {
     let path = format!("net \"{}\"", thing.name);
     site.parts.begin(&thing.name, 0.0);
+    site.hints.extend(unsound(mesh, &path));
     let Some((fabric, density)) = site.fabric(&path, thing.fabric.as_ref(), thing.density) else { return };
     let Ok(panels) = thing.pattern.as_ref().map(|words| pattern(site, words, mesh, &path)).transpose() else { return };
     // The triangles' own planes have no axes in common; the x axis has a direction in most.
@@ -31,7 +32,10 @@ pub fn net(site: &mut Site<'_>, thing: &Net, mesh: &Mesh) {
     if let Some(i) = mass.iter().position(|m| *m == 0.0) {
         return site.wrong(
             format!("{path}.mesh"),
-            format!("vertex {i} has no triangle with an area, so it would have no mass; remove it from the mesh"),
+            format!(
+                "vertex {i} has no triangle with an area, so it would have no mass; remove it from the mesh, or mend that with \
+                 `tumble check SCENE --repair`"
+            ),
         );
     }
     let first = mesh.vertices.iter().zip(&mass).map(|(x, m)| site.parts.point(Vector::from(*x), Vector::default(), *m)).min().unwrap_or(0);
@@ -90,6 +94,12 @@ pub fn net(site: &mut Site<'_>, thing: &Net, mesh: &Mesh) {
         let places: Vec<_> = (0..mesh.triangles.len()).map(|t| Rest::mesh(mesh, along).corners(t)).collect();
         site.tear(words, panels.as_deref().unwrap_or(&places), &places, &path);
     }
+}
+
+/// What is wrong with the mesh of a soft surface, though it can be simulated.
+fn unsound(mesh: &Mesh, path: &str) -> Option<String> {
+    let flaws = mesh.flaws();
+    (!flaws.is_none()).then(|| format!("{path}.mesh: {flaws}; mend the file with `tumble check SCENE --repair`"))
 }
 
 fn area([a, b, c]: [Vector; 3]) -> f64 {
