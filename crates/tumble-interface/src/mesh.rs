@@ -128,6 +128,15 @@ impl Mesh {
         defects
     }
 
+    /// Texture coordinates of the corners of all triangles, as pictures want them, 0 where there are none; empty if there are none at all.
+    pub fn drawn_texture(&self) -> Vec<[f32; 6]> {
+        if self.texture.len() != self.triangles.len() {
+            return Vec::new();
+        }
+        let flat = |[[a, b], [c, d], [e, f]]: [[f64; 2]; 3]| [a, b, c, d, e, f].map(|x| x as f32);
+        self.texture.iter().map(|corners| corners.map_or([0.0; 6], flat)).collect()
+    }
+
     /// For each vertex, the first one at its place: at the same one, or so near that rounding may have moved it.
     pub fn places(&self) -> Vec<u32> {
         let all = || self.vertices.iter().flatten().map(|x| x.abs());

@@ -11,6 +11,8 @@ use tumble_interface::scene::{Net, Pattern};
 const SLIVER: f64 = 1e-9;
 /// Areas of a pattern and of its mesh that differ by more than this factor are worth a hint.
 const UNLIKE: f64 = 2.0;
+/// And by more than this, about 30 in lengths, are refused.
+const BEYOND: f64 = 1000.0;
 
 /// Adds the masses, links, hinges and triangles. `mesh` stands where it belongs.
 ///
@@ -83,6 +85,7 @@ pub fn net(site: &mut Site<'_>, thing: &Net, mesh: &Mesh) {
     pins.iter().for_each(|p| site.parts.pin(*p));
     if let Some(object) = site.parts.object() {
         object.triangles.clone_from(&mesh.triangles);
+        object.texture = mesh.drawn_texture();
     }
     if let Some(words) = &thing.tear {
         if thing.pressure.is_some() || thing.shape_matching.is_some() {
@@ -141,6 +144,15 @@ fn pattern(site: &mut Site<'_>, words: &Pattern, mesh: &Mesh, path: &str) -> Res
         .map(|(x, t)| (area(*x), area(Rest::mesh(mesh, Vector::default()).corners(t))))
         .fold((0.0, 0.0), |s, a| (s.0 + a.0, s.1 + a.1));
     let ratio = flat / real;
+    if real > 0.0 && !(1.0 / BEYOND..=BEYOND).contains(&ratio) {
+        let message = format!(
+            "{}, which makes the pattern {flat:.3e} m² where the mesh has {real:.3e} m²: no cloth is stretched so; expected about {:.3e}",
+            words.scale,
+            words.scale / ratio.sqrt()
+        );
+        site.wrong(format!("{path}.scale"), message);
+        return Err(());
+    }
     if real > 0.0 && !(1.0 / UNLIKE..=UNLIKE).contains(&ratio) {
         site.hints.push(format!(
             "{path}.scale: the pattern has {flat:.4} m² and the mesh {real:.4} m²; a scale of {:.4} would make them equal",
