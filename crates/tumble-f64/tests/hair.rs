@@ -105,6 +105,24 @@ fn roots_go_where_the_collider_goes() {
     }
 }
 
+/// Roots are in the body, by as much as it is thick: they are held, and nothing pushes them out.
+#[test]
+fn roots_are_no_penetration() {
+    for motion in ["", "motion.velocity = [0.1, 0, 0]\n"] {
+        let mut sim = simulation(&format!(
+            "{BALL}thickness = 0.003\n{motion}[[hair]]\nname = \"h\"\non = \"ball\"\ncount = 20\nlength = 0.05\nsegments = 6\n"
+        ));
+        let books = sim.ledger();
+        assert!(books.penetration == 0.0 && books.contacts == 0, "{} {}", books.penetration, books.contacts);
+        run(&mut sim, 2);
+        // What hangs onto the ball is moved out of it at the end of each sub-step.
+        assert!(sim.ledger().penetration < 1e-6, "{}", sim.ledger().penetration);
+        let x: Vec<Vector> = positions(&sim, "h").iter().map(|x| vector(x.x, x.y, x.z - 0.05)).collect();
+        common::write(&mut sim, "h", "position", &x);
+        assert!(sim.ledger().penetration > 0.01 && sim.ledger().contacts > 0);
+    }
+}
+
 /// Strands of almost no stiffness hold nothing, so that nothing but the hair itself acts.
 #[test]
 fn hair_keeps_its_momentum_among_itself() {

@@ -103,9 +103,9 @@ pub struct Ledger {
     pub elastic: f64,
     /// Potential energy of gravity and other forces that have one [J].
     pub external: f64,
-    /// Longest link over its rest length; 0 without links.
+    /// Longest link, piece of a rod or edge of a membrane or fabric over its rest length; 0 without any.
     pub stretch: f64,
-    /// Deepest mass inside a collider or its thickness [m].
+    /// Deepest mass inside a collider or its thickness [m], of those that are not held.
     pub penetration: f64,
     /// Edges of soft surfaces that pass through triangles, where `self_contact` is on.
     pub intersections: u64,
