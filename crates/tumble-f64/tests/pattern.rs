@@ -289,7 +289,7 @@ fn an_unsound_mesh_is_told_once() {
     let told = |change: &dyn Fn(&mut Mesh)| {
         let mut mesh = tube(&around);
         change(&mut mesh);
-        with("mesh.path = \"tube.obj\"", mesh, None).unwrap().warnings().to_vec()
+        with("mesh.path = \"tube.obj\"", mesh, None).unwrap().warnings().iter().map(ToString::to_string).collect::<Vec<_>>()
     };
     assert!(told(&|_| ()).is_empty());
     for (change, words) in [

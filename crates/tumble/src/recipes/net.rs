@@ -101,9 +101,11 @@ pub fn net(site: &mut Site<'_>, thing: &Net, mesh: &Mesh) {
 }
 
 /// What is wrong with the mesh of a soft surface, though it can be simulated.
-fn unsound(mesh: &Mesh, path: &str) -> Option<String> {
+fn unsound(mesh: &Mesh, path: &str) -> Option<Warning> {
     let flaws = mesh.flaws();
-    (!flaws.is_none()).then(|| format!("{path}.mesh: {flaws}; mend the file with `tumble check SCENE --repair`"))
+    let told =
+        || Warning::new(Code::UnsoundMesh, format!("{path}.mesh"), format!("{flaws}; mend the file with `tumble check SCENE --repair`"));
+    (!flaws.is_none()).then(told)
 }
 
 fn area([a, b, c]: [Vector; 3]) -> f64 {
