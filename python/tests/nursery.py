@@ -16,7 +16,8 @@ from types import TracebackType
 from typing import Any, Self
 
 PATIENCE = (5, 120)
-"""Seconds after which a case is asked to stop, as by Ctrl-C, and then until it counts as one that hangs. Steps heed it at once; building
+"""Seconds after which a case is asked to stop, as by Ctrl-C, and then until it counts as one that hangs. Steps heed it at once;
+building
 a scene ends first, which takes a few seconds at most."""
 
 ROOM = 12 << 30
@@ -33,7 +34,9 @@ class Nursery:
         )
         return self
 
-    def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None) -> None:
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
         assert self.process.stdin is not None and self.process.stdout is not None
         self.process.stdin.close()
         self.process.wait()
@@ -42,7 +45,10 @@ class Nursery:
     def ask(
         self, tree: Any, folder: str = ".", frames: int = 1, probe: bool = False, patience: float = PATIENCE[0]
     ) -> dict[str, Any]:
-        """What becomes of a scene in its first frames, or if it is only probed, before them: `end` is refused, built, broke, stopped, raised, died or hangs."""
+        """What becomes of a scene in its first frames, or if it is only probed, before them.
+
+        `end` is refused, built, broke, stopped, raised, died or hangs.
+        """
         assert self.process.stdin is not None and self.process.stdout is not None
         line = {"tree": tree, "folder": folder, "frames": frames, "probe": probe, "patience": patience}
         self.process.stdin.write(json.dumps(line) + "\n")
@@ -91,7 +97,7 @@ def live(task: dict[str, Any]) -> dict[str, Any]:
 
 
 def main() -> None:
-    import numpy  # noqa: F401, ICN001
+    import numpy  # noqa: F401
 
     import tumble  # noqa: F401
 
@@ -120,7 +126,9 @@ def main() -> None:
         os.close(back)
         _, code = os.waitpid(child, 0)
         if hangs or code != 0:
-            said = json.dumps({"end": "hangs" if hangs else "died", "issues": [], "text": f"status {code}", "taken": 0}).encode()
+            said = json.dumps(
+                {"end": "hangs" if hangs else "died", "issues": [], "text": f"status {code}", "taken": 0}
+            ).encode()
         print(said.decode(), flush=True)
 
 

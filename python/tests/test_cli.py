@@ -126,6 +126,28 @@ def test_a_spring_too_stiff_for_any_step_is_cured_by_an_implicit_scheme(
     assert tumble(*cure).code == 0
 
 
+@pytest.mark.parametrize(("kind", "missing"), [("ply", "no particles"), ("vdb", "nothing lies on a grid")])
+def test_files_of_what_is_not_there_are_refused_before_the_simulation(
+    kind: str, missing: str, scene_file: SceneFile, tumble: Command
+) -> None:
+    rope = {"name": "r", "from": [0, 0, 0], "to": [1, 0, 0], "segments": 4}
+    tree = {"version": 1, "time": {"frames": 2}, "rope": [rope]}
+    file = scene_file(tree | {"output": {kind: True}})
+    for verb in ("check", "run"):
+        answer = tumble(verb, file)
+        assert (
+            answer.code == 2
+            and f"output.{kind}" in answer.err
+            and missing in answer.err
+            and "leave it out" in answer.err
+        )
+    file = scene_file(tree)
+    answer = tumble("run", file, f"--{kind}")
+    assert answer.code == 2 and f"--{kind}" in answer.err and missing in answer.err
+    assert not Path("out").exists()
+    assert tumble("run", file, f"--no-{kind}").code == 0
+
+
 def test_overrides_that_a_change_replaces() -> None:
     given = ["system.soft.integrator=rk4", "system.1.step = 0.1", "time.frames=3"]
     assert find.without(given, ["system.0.integrator=verlet"], ["soft", "stiff"]) == given[1:]

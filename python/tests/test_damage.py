@@ -18,8 +18,32 @@ from tumble import Run, TumbleError, World
 from tumble.run import simulate
 
 FACTOR = float(os.environ.get("TUMBLE_FUZZ", "1"))
-FILES = ["run.json", "run.json", "ledger.csv", "columns.json", "static.npz", "frames/000003.npz", "checkpoints/000005.safetensors"]
-TOKENS = [b"", b"-", b"0", b"9" * 30, b"1e999", b"nan", b"\n", b"\0", b'"', b"[", b"}", b"null", b",", b"\xff", b"../../evil"]
+FILES = [
+    "run.json",
+    "run.json",
+    "ledger.csv",
+    "columns.json",
+    "static.npz",
+    "frames/000003.npz",
+    "checkpoints/000005.safetensors",
+]
+TOKENS = [
+    b"",
+    b"-",
+    b"0",
+    b"9" * 30,
+    b"1e999",
+    b"nan",
+    b"\n",
+    b"\0",
+    b'"',
+    b"[",
+    b"}",
+    b"null",
+    b",",
+    b"\xff",
+    b"../../evil",
+]
 
 
 def spoil_bytes(path: Path, dice: random.Random) -> None:
@@ -109,7 +133,14 @@ def test_damaged_runs_are_read_or_refused(spring: Tree, tmp_path: Path, tumble: 
         try:
             try:
                 run = Run(folder)
-                _ = [run.frame(i) for i in range(run.n_frames)], run.ledger, run.hashes, run.trials, run.static, run.columns
+                _ = (
+                    [run.frame(i) for i in range(run.n_frames)],
+                    run.ledger,
+                    run.hashes,
+                    run.trials,
+                    run.static,
+                    run.columns,
+                )
                 World.restore(folder / "checkpoints/000005.safetensors")
                 ends["read"] += 1
             except TumbleError as error:
@@ -120,6 +151,9 @@ def test_damaged_runs_are_read_or_refused(spring: Tree, tmp_path: Path, tumble: 
                 failures.append(f"seed {seed}, {name}: {answer}")
         except Exception as error:
             failures.append(f"seed {seed}, {name}: {type(error).__name__}: {error}")
-    print(f"\nruns, damaged: {sum(ends.values())} cases, {ends['refused']} refused, {ends['read']} read, {time.perf_counter() - begin:.0f} s")
+    print(
+        f"\nruns, damaged: {sum(ends.values())} cases, {ends['refused']} refused, {ends['read']} read,"
+        f" {time.perf_counter() - begin:.0f} s"
+    )
     assert not failures, "\n".join(failures)
     assert not list(tmp_path.rglob("evil*"))

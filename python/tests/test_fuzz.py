@@ -1,8 +1,8 @@
-"""Whole worlds, from scenes of any kind: they are refused with places, or simulated, or break with a report; nothing else happens. And
-they take no more memory than twice what was estimated.
+"""Whole worlds, from scenes of any kind: they are refused with places, or simulated, or break with a report; nothing else.
+And they take no more memory than twice what was estimated.
 
-Trees that the checker refuses, by the hundred thousand, are in crates/tumble-interface/tests/fuzz.rs; bytes of meshes, figures and
-fabrics in crates/tumble-io/tests/fuzz.rs; links in web/tests/share.test.ts. `TUMBLE_FUZZ=20` tries twenty times as many.
+Trees that the checker refuses, by the hundred thousand, are in crates/tumble-interface/tests/fuzz.rs; bytes of meshes, figures
+and fabrics in crates/tumble-io/tests/fuzz.rs; links in web/tests/share.test.ts. `TUMBLE_FUZZ=20` tries twenty times as many.
 """
 
 import copy
@@ -31,15 +31,29 @@ from tumble import Scene, SceneError, TumbleError
 FACTOR = float(os.environ.get("TUMBLE_FUZZ", "1"))
 SHIPPED = {f"{f.parent.name}/{f.stem}": f for f in sorted(Path(package.__file__).parent.glob("scenes/*/*.toml"))}
 WORDS = sorted(set(re.findall(r'"(?:const|enum)": "?\[?"([a-z_]+)"', json.dumps(Scene.schema()))))
-WORDS += sorted({word for text in re.findall(r'"enum": \[([^\]]*)\]', json.dumps(Scene.schema())) for word in re.findall(r'"(\w+)"', text)})
+WORDS += sorted(
+    {
+        word
+        for text in re.findall(r'"enum": \[([^\]]*)\]', json.dumps(Scene.schema()))
+        for word in re.findall(r'"(\w+)"', text)
+    }
+)
 
 LIMIT = 0.25
 """Memory that a changed scene may ask for [GiB]."""
 
 ALWAYS = 48 << 20
-"""Bytes that come with any scene: the stacks of threads, pages of the library, what Python makes of the tree and of the frame."""
+"""Bytes of any scene: the stacks of threads, pages of the library, what Python makes of the tree and of the frame."""
 
-SLOW = ["cloth/dress", "cloth/drapes", "cloth/mannequin", "cloth/hair-on-bunny", "gas/bunny", "drape/sheet-on-bunny", "cloth/pile"]
+SLOW = [
+    "cloth/dress",
+    "cloth/drapes",
+    "cloth/mannequin",
+    "cloth/hair-on-bunny",
+    "gas/bunny",
+    "drape/sheet-on-bunny",
+    "cloth/pile",
+]
 """Half a second a frame and more: left out where many cases matter more."""
 
 # Changed scenes
@@ -79,7 +93,9 @@ def change(tree: Tree, dice: random.Random, others: list[Tree]) -> None:
         case 1 if isinstance(holder, list):
             holder.extend(copy.deepcopy(value) for _ in range(dice.randrange(1, 4)))
         case 2:
-            holder[key] = dice.choice([None, True, "", [], {}, [0, 0, 1], dice.choice(WORDS), "sin(t)", "[x, y, z]", math.nan, math.inf])
+            holder[key] = dice.choice(
+                [None, True, "", [], {}, [0, 0, 1], dice.choice(WORDS), "sin(t)", "[x, y, z]", math.nan, math.inf]
+            )
         case 3 | 4:
             # Things and settings of another scene.
             other = dice.choice(others)
@@ -152,7 +168,10 @@ def test_changed_worlds_are_refused_built_or_break() -> None:
             if problem := wrong(answer):
                 failures.append(f"{file.stem}, seed {seed}: {problem}")
     counts = ", ".join(f"{count} {end}" for end, count in sorted(ends.items()))
-    print(f"\nworlds, changed: {sum(ends.values())} cases, {counts}, {time.perf_counter() - begin:.0f} s, memory at most {most:.2f} of the limit")
+    print(
+        f"\nworlds, changed: {sum(ends.values())} cases, {counts}, {time.perf_counter() - begin:.0f} s,"
+        f" memory at most {most:.2f} of the limit"
+    )
     assert not failures, "\n".join(failures)
 
 
@@ -190,7 +209,9 @@ LARGE: dict[str, Tree] = {
     "particles, neighbours": cloud(10**5, force=[{"kind": "flock", "radius": 0.02}]),
     "emitter": {"emitter": [{"name": "e", "rate": 400_000, "speed": 1, "from": {"disk": {"radius": 0.1}}}]},
     "liquid": {
-        "particles": [{"name": "w", "fluid": {"spacing": 0.025, "fill": [{"center": [0, 0, 0.5], "size": [1, 1, 0.6]}]}}],
+        "particles": [
+            {"name": "w", "fluid": {"spacing": 0.025, "fill": [{"center": [0, 0, 0.5], "size": [1, 1, 0.6]}]}}
+        ],
         "system": [POSITIONS],
     },
     "rope": {"rope": [{"name": "r", "from": [0, 0, 0], "to": [2000, 0, 0], "segments": 100_000}], "system": [IMPLICIT]},
@@ -210,7 +231,9 @@ LARGE: dict[str, Tree] = {
         "system": [POSITIONS],
     },
     "cloth": {
-        "cloth": [{"name": "c", "resolution": 0.01, "panels": [{"name": "a", "outline": [[0, 0], [2, 0], [2, 2], [0, 2]]}]}],
+        "cloth": [
+            {"name": "c", "resolution": 0.01, "panels": [{"name": "a", "outline": [[0, 0], [2, 0], [2, 2], [0, 2]]}]}
+        ],
         "system": [POSITIONS],
     },
     "gas in a plane": {"dimension": 2, "gas": [{"name": "g", "box": box(512), "smoke": {}}]},
@@ -230,7 +253,9 @@ def estimate(nursery: Nursery, tree: Tree, folder: str) -> float:
     """Bytes that a scene is said to take: the least limit under which it is built."""
 
     def said(limit: float) -> float | None:
-        answer = nursery.ask(tree | {"world": tree.get("world", {}) | {"memory_limit": limit}}, folder, probe=True, patience=120)
+        answer = nursery.ask(
+            tree | {"world": tree.get("world", {}) | {"memory_limit": limit}}, folder, probe=True, patience=120
+        )
         if answer["end"] == "built":
             return None
         assert [issue["path"] for issue in answer["issues"]] == ["world.memory_limit"], answer
@@ -257,10 +282,15 @@ def compare_memory(trees: dict[str, tuple[Tree, str]]) -> None:
             answer = nursery.ask(tree, folder, frames=2, patience=300)
             taken = answer["taken"]
             if answer["end"] not in ("built", "broke") or taken > 2 * guess + ALWAYS:
-                failures.append(f"{name}: {answer['end']}, {taken / 2**20:.0f} MiB taken, {guess / 2**20:.0f} MiB estimated")
+                failures.append(
+                    f"{name}: {answer['end']}, {taken / 2**20:.0f} MiB taken, {guess / 2**20:.0f} MiB estimated"
+                )
             most = max(most, ((taken - ALWAYS) / guess, name))
             print(f"{name}: {taken / 2**20:.0f} MiB taken, {guess / 2**20:.1f} estimated")
-    print(f"memory: {len(trees)} scenes, {time.perf_counter() - begin:.0f} s, memory at most {most[0]:.2f} of the estimate ({most[1]})")
+    print(
+        f"memory: {len(trees)} scenes, {time.perf_counter() - begin:.0f} s,"
+        f" memory at most {most[0]:.2f} of the estimate ({most[1]})"
+    )
     assert not failures, "\n".join(failures)
 
 
@@ -278,7 +308,10 @@ def test_memory_of_everything_is_estimated() -> None:
 
 def test_a_scene_that_asks_for_more_than_there_may_be_takes_nothing() -> None:
     with Nursery() as nursery:
-        for tree in ({"version": 1} | cloud(10**8), {"version": 1, "gas": [{"name": "g", "box": box(4000), "smoke": {}}]}):
+        for tree in (
+            {"version": 1} | cloud(10**8),
+            {"version": 1, "gas": [{"name": "g", "box": box(4000), "smoke": {}}]},
+        ):
             answer = nursery.ask(tree)
             assert answer["end"] == "refused" and answer["taken"] < ALWAYS
             assert re.search(r"about \d+\.\d GiB, the limit is 8 GiB", answer["text"])
@@ -297,9 +330,11 @@ LEAVES = (
 )
 TREES = st.recursive(
     LEAVES,
-    lambda below: st.lists(below, max_size=4)
-    | st.tuples(below, below)
-    | st.dictionaries(st.sampled_from(WORDS) | st.text(max_size=4) | st.integers(), below, max_size=4),
+    lambda below: (
+        st.lists(below, max_size=4)
+        | st.tuples(below, below)
+        | st.dictionaries(st.sampled_from(WORDS) | st.text(max_size=4) | st.integers(), below, max_size=4)
+    ),
     max_leaves=12,
 )
 

@@ -4,6 +4,7 @@ import re
 import sys
 from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -94,6 +95,82 @@ def test_what_is_still_wrong_is_told(spring: Tree, scene_file: SceneFile, tumble
     write(tmp_path, "v 1 1 1\nv 1 1 1\nv 1 1 1\nf 1 2 3\n")
     nothing = tumble("check", scene_file(with_cube(spring)), "--repair", "--force")
     assert nothing.code == 2 and "no triangle has an area" in nothing.err
+
+
+def quads(n: int, off: float = 0.0) -> str:
+    """A square metre of n x n squares with texture, each with vertices of its own, `off` by off in turn."""
+    lines, k = [], 0
+    for j in range(n):
+        for i in range(n):
+            for a, b in ((i, j), (i + 1, j), (i + 1, j + 1), (i, j + 1)):
+                k += 1
+                lines.append(f"v {a / n + off * (k % 3)!r} {b / n + off * (k % 2)!r} 0\nvt {a / n!r} {b / n!r}")
+            lines.append("f " + " ".join(f"{m}/{m}" for m in range(k - 3, k + 1)))
+    return "\n".join(lines) + "\n"
+
+
+def with_net(**words: Any) -> Tree:
+    net = {"name": "n", "mesh": {"path": "meshes/cube.obj"}, **words}
+    return {"version": 1, "time": {"frames": 2}, "net": [net]}
+
+
+def test_an_unsound_net_is_told_by_check_and_run(scene_file: SceneFile, tumble: Command, tmp_path: Path) -> None:
+    write(tmp_path, obj([*FACES[:5], FACES[0], [2, 6, 8, 4], [1, 1, 2]]) + "v 9 9 9\n")
+    scene = scene_file(with_net())
+    told = 'net "n".mesh: 2 triangles are there already, 1 triangle has no area'
+    for verb in ("check", "run"):
+        answer = tumble(verb, scene)
+        assert answer.code == 0, answer.err
+        assert told in answer.err and "1 vertex belongs to no triangle" in answer.err and "--repair" in answer.err, (
+            answer.err
+        )
+        assert answer.err.count('net "n".mesh') == 1
+    answer = tumble("check", scene, "--repair")
+    assert answer.code == 0 and "warning" not in answer.err and "1 vertex of no triangle left out" in answer.out, answer
+    # What the command at its end runs has nothing to be told of.
+    write(tmp_path, obj(FACES))
+    assert 'net "n"' not in tumble("check", scene).err
+
+
+@pytest.mark.parametrize("off", [0.0, 1e-9, 1e-7])
+def test_vertices_that_rounding_moved_apart_are_sewn(
+    off: float, scene_file: SceneFile, tumble: Command, tmp_path: Path
+) -> None:
+    file = write(tmp_path, quads(4, off))
+    scene = scene_file(with_net())
+    assert 'net "n".mesh: 48 open edges lie on others' in tumble("check", scene).err
+    answer = tumble("check", scene, "--repair")
+    assert answer.code == 0 and "39 vertices sewn to others" in answer.out and "lie on others" not in answer.err
+    vertices, triangles = load_mesh(file.with_name("cube.repaired.obj"))
+    assert len(vertices) == 25 and len(triangles) == 32 and vertices.max() <= 1 + 2 * off
+
+
+def test_texture_of_nets_arrives_in_usd(scene_file: SceneFile, tumble: Command, tmp_path: Path) -> None:
+    from pxr import Usd, UsdGeom
+
+    write(tmp_path, quads(3))
+    scene = scene_file(
+        with_net() | {"cloth": [{"name": "c", "panels": [{"name": "a", "outline": [[0, 0], [2, 0], [0, 1]]}]}]}
+    )
+    assert tumble("run", scene, "--usd").code == 0
+    stage = Usd.Stage.Open(str(tmp_path / "out" / "scene" / "scene.usda"))
+    for name, factor in (("n", 1.0), ("c", 1.0)):
+        prim = stage.GetPrimAtPath(f"/scene/{name}")
+        st = UsdGeom.PrimvarsAPI(prim).GetPrimvar("st")
+        assert st.GetInterpolation() == UsdGeom.Tokens.faceVarying and str(st.GetTypeName()) == "texCoord2f[]"
+        mesh = UsdGeom.Mesh(prim)
+        corners = np.array(mesh.GetPointsAttr().Get(0))[np.array(mesh.GetFaceVertexIndicesAttr().Get(0))]
+        # Texture is the place: of the net in the xy plane, of the panel, which hangs, in its own.
+        assert len(st.Get()) == len(corners) > 0
+        np.testing.assert_allclose(
+            np.array(st.Get()), factor * corners[:, [0, 1] if name == "n" else [0, 2]], atol=1e-6
+        )
+    assert not UsdGeom.PrimvarsAPI(stage.GetPrimAtPath("/scene/c")).GetPrimvar("other").HasValue()
+    # And is read again from there.
+    world = World(
+        Scene({"version": 1, "net": [{"name": "n", "mesh": {"path": "out/scene/scene.usda"}}]}, folder=tmp_path)
+    )
+    assert world.topology["n"]["texture"].shape[1:] == (6,)
 
 
 USDA = """#usda 1.0

@@ -21,6 +21,7 @@ def test_scene_keeps_what_it_expects(name: str, tmp_path: Path) -> None:
     assert run.n_frames == words["time"]["frames"] + 1
     assert run.manifest["status"] == "finished"
     assert run.manifest["expectations"] == []
+    assert run.manifest["warnings"] == []
 
 
 @pytest.mark.parametrize("name", [n for n in NAMES if n.startswith("failures/")])

@@ -88,8 +88,8 @@ class World:
         """Names of the systems."""
 
     @property
-    def warnings(self) -> list[str]:
-        """What is doubtful about the scene."""
+    def warnings(self) -> list[dict[str, str]]:
+        """What is doubtful about the scene: code (as listed in docs/warnings.md), path and message of each."""
 
     def step(self, frames: int = 1) -> dict[str, Any]:
         """Simulates frames; returns what they took: steps, rejected, step_range [s], newton, linear, residual, unconverged,
@@ -181,8 +181,8 @@ def load_mesh(path: Path) -> tuple[npt.NDArray[np.float64], npt.NDArray[np.uint3
 
 def repair_mesh(path: Path) -> tuple[str | None, dict[str, int]]:
     """The mesh of a file mended, as the text of an OBJ file, or None if nothing had to be done; counts of vertices welded,
-    triangles repeated, degenerate and turned, edges split, and of edges that are still open or odd. Raises SceneError if it
-    cannot be read or nothing is left."""
+    triangles repeated, degenerate and turned, edges split, vertices unused, and of edges that are still open or odd. Raises
+    SceneError if it cannot be read or nothing is left."""
 
 Side = Literal["closed"] | tuple[Literal["slope", "value", "ghost"], float]
 """Beyond a wall: no slope, a slope along the outward normal, a value at the wall, a value at the points beyond."""

@@ -201,15 +201,7 @@ def _first(a: "Run", b: "Run", n: int, deep: bool, mixed: bool) -> tuple[int | N
 
 
 def _columns_differ(a: "Run", b: "Run", frame: int) -> Iterator[ColumnDifference]:
-    one, other = a.frame(frame), b.frame(frame)
-    for run, table in ((a, one), (b, other)):
-        for name, columns in run.columns.items():
-            for column, about in columns.items():
-                if about["in"] == "frames" and column not in table.get(name, {}):
-                    raise ExportError(
-                        f'{run.folder}: frame {frame} has lost {column} of "{name}"; the file was changed'
-                    )
-    yield from _tables_differ(one, other, a.columns)
+    return _tables_differ(a.frame(frame), b.frame(frame), a.columns)
 
 
 def _tables_differ(a: Columns, b: Columns, about: Mapping[str, Mapping[str, Any]]) -> Iterator[ColumnDifference]:

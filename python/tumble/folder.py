@@ -23,7 +23,7 @@ from tumble._engine import ExportError, SceneError, World
 Columns = dict[str, dict[str, npt.NDArray[Any]]]
 """Object name -> column name -> array."""
 
-FORMAT = 1
+FORMAT = 2
 """Version of the run folder."""
 
 # fmt: off

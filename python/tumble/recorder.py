@@ -81,7 +81,7 @@ class Recorder:
             "resumed": int((earlier or {}).get("resumed", -1)) + 1,
             "machine": machine(threads),
             "timings": self.timings,
-            "warnings": list(world.warnings),
+            "warnings": world.warnings,
             # Of the state that the run began with.
             "stability": world.stability() if earlier is None else earlier.get("stability", []),
             "expectations": [],

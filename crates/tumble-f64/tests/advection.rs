@@ -1,6 +1,6 @@
 //! Advection: exact shifts, orders of paths, damping against its closed form, Zalesak's disk, limits, bits.
 
-mod common;
+use crate::common;
 
 use common::noisy;
 use std::f64::consts::PI;

@@ -2,7 +2,7 @@
 
 #![allow(clippy::unwrap_used, clippy::panic)] // helpers of tests fail by panicking, too
 
-mod common;
+use crate::common;
 
 use common::{Vector, positions, run, simulation, step, vector, velocities};
 use tumble_f64::scene::Simulation;

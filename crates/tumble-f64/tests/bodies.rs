@@ -2,7 +2,7 @@
 
 extern crate tumble_f64 as tumble;
 
-mod common;
+use crate::common;
 
 use common::{column, run, show, simulation, step};
 use std::f64::consts::PI;

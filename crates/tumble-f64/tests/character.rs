@@ -2,7 +2,7 @@
 
 #![allow(clippy::unwrap_used, clippy::panic)] // helpers of tests fail by panicking, too
 
-mod common;
+use crate::common;
 
 use common::{Vector, positions, simulation, step, vector};
 use std::collections::HashMap;
@@ -344,4 +344,15 @@ fn a_scene_with_a_character_says_what_is_wrong_with_it() {
     (0..24).for_each(|_| drop(step(&mut sim)));
     let hand = positions(&sim, "c");
     assert!(hand.iter().any(|x| (*x - vector(0.2, -1.0, 1.0)).norm() < 1e-9), "{hand:?}");
+}
+
+/// Scenes name bones, so both places where a reader looks for their names have all of them.
+#[test]
+fn every_bone_of_the_mannequin_is_documented() {
+    let texts = [include_str!("../../../docs/theory/character.md"), include_str!("../../../docs/scene.md")];
+    for bone in BONES {
+        let left = bone.strip_suffix("_r").map_or(bone.into(), |limb| format!("{limb}_l"));
+        let is_word = |text: &str| text.split(|c: char| !(c.is_alphanumeric() || c == '_')).any(|word| word == left);
+        assert!(texts.into_iter().all(is_word), "{bone}");
+    }
 }

@@ -2,7 +2,7 @@
 
 #![allow(clippy::unwrap_used, clippy::panic)] // helpers of tests fail by panicking, too
 
-mod common;
+use crate::common;
 
 use common::{every, positions, run, simulation, step, vector};
 use tumble_f64::scene::Simulation;
@@ -93,6 +93,71 @@ fn what_is_wrong_with_a_pattern_is_told_with_its_place() {
     assert!(lost.contains("rope \"r\".pin[0]") && lost.contains("known are ball"), "{lost}");
     let boneless = issues(&text.replace("\"x\"", "\"ball\", bone = \"hips\""));
     assert!(boneless.contains("has no bones"), "{boneless}");
+}
+
+/// What nobody means is refused, and it is the word at fault that is named.
+#[test]
+fn measures_beyond_sense_are_refused_with_the_word_at_fault() {
+    let two = "name = \"c\"\nresolution = RES\npanels = [{ name = \"a\", outline = [[0, 0], [1, 0], [1, HIGH], [0, HIGH]] },\n\
+               { name = \"OTHER\", outline = [[0, 0], [1, 0], [1, 1], [0, 1]], origin = [2, 0, 0] }]\n";
+    let panels = |res: &str, high: &str, other: &str| {
+        let words = two.replace("RES", res).replace("HIGH", high).replace("OTHER", other);
+        let scene = Scene::from_toml(&format!("version = 1\n[[cloth]]\n{words}")).unwrap_or_else(|e| panic!("{e}"));
+        Simulation::new(scene, Default::default()).map_or_else(|e| e.to_string(), |_| String::new())
+    };
+    assert_eq!(panels("0.1", "0.5", "b"), "");
+    // A ribbon of 2 mm is cut to triangles fifty times as long.
+    assert_eq!(panels("0.1", "0.002", "b"), "");
+    let thin = panels("0.03", "1e-6", "b");
+    assert!(thin.contains("cloth \"c\".panels[0].outline") && thin.contains("100 times as long as wide"), "{thin}");
+    let same = panels("0.1", "0.5", "a");
+    assert!(same.contains("cloth \"c\".panels[1].name") && same.contains("name of panels[0] already"), "{same}");
+    let coarse = panels("1e5", "0.5", "b");
+    assert!(coarse.contains("cloth \"c\".resolution") && coarse.contains("1.12 m; take a smaller one"), "{coarse}");
+    // A collar that closes to a line when it is cut coarsely.
+    let collar = "[[cloth]]\nname = \"c\"\nresolution = 0.9\npanels = [{ name = \"a\", \
+                  outline = [[0, 0], [1, 0], [1, 0.6], [0.9, 0.6], [0.9, 0.1], [0.1, 0.1], [0.1, 0.6], [0, 0.6]] }]\n";
+    assert_eq!(simulation(collar).warnings().len(), 0);
+    let dress = |words: &str| {
+        let scene = Scene::from_toml(&format!("version = 1\n[[cloth]]\nname = \"d\"\n{words}")).unwrap_or_else(|e| panic!("{e}"));
+        Simulation::new(scene, Default::default()).map_or_else(|e| e.to_string(), |_| String::new())
+    };
+    assert_eq!(dress("dress = {}\nresolution = 0.1"), "");
+    // A child's and a giant's.
+    assert_eq!(
+        dress("dress = { waist_girth = 0.5, bust_girth = 0.52, bodice = 0.14, shoulder = 0.15, strap_distance = 0.13, skirt = 0.3 }"),
+        ""
+    );
+    for (words, place, cure) in [
+        ("dress = { strap = 0.9 }", "dress.strap", "less than strap_distance, 0.2 m"),
+        ("dress = { strap_distance = 0.6 }", "dress.strap_distance", "less than half of bust_girth together, 0.48 m"),
+        ("dress = { waist_girth = 1e-6 }", "dress.waist_girth", "0.01 to 100 m"),
+        ("dress = { waist_girth = 300 }\nresolution = 10", "dress.waist_girth", "0.01 to 100 m"),
+        ("dress = { bust_girth = 1e-4 }", "dress.bust_girth", "0.16 to 4 m"),
+        ("dress = { skirt = 40 }\nresolution = 0.1", "dress.skirt", "0.016 to 16 m"),
+        ("dress = { shoulder = 1e-5 }", "dress.shoulder", "0.016 to 4 m"),
+        ("dress = {}\nresolution = 1e5", "resolution", "a sixth of it, 0.133 m"),
+    ] {
+        let told = dress(words);
+        assert!(told.contains(&format!("cloth \"d\".{place}:")) && told.contains(cure), "{words}: {told}");
+    }
+}
+
+#[test]
+fn panels_have_their_own_metres_as_texture() {
+    let sim = simulation(&SQUARES.replace("SIDE", "0.5"));
+    let columns = sim.topology();
+    let Data::F32(uv) = &columns.iter().find(|c| c.object == "c" && c.name == "texture").unwrap().data else { panic!() };
+    let (x, all) = (positions(&sim, "c"), triangles(&sim, "c"));
+    assert_eq!(uv.len(), 6 * all.len());
+    for (t, uv) in all.iter().zip(uv.chunks_exact(6)) {
+        for (k, i) in t.iter().enumerate() {
+            // The panels stand in the xz plane, the second one 0.52 m to the right.
+            let at = x[*i as usize];
+            let u = if at.x > 0.51 { at.x - 0.52 } else { at.x };
+            assert!((f64::from(uv[2 * k]) - u).abs() < 1e-6 && (f64::from(uv[2 * k + 1]) - at.z).abs() < 1e-6);
+        }
+    }
 }
 
 #[test]

@@ -3,7 +3,7 @@
 
 #![allow(clippy::unwrap_used, clippy::panic)] // helpers of tests fail by panicking, too
 
-mod common;
+use crate::common;
 
 use common::{orders, positions, run, simulation, slope, step, vector, velocities};
 use safetensors::SafeTensors;

@@ -2,7 +2,7 @@
 
 #![allow(clippy::unwrap_used, clippy::panic)] // helpers of tests fail by panicking, too
 
-mod common;
+use crate::common;
 
 use common::*;
 use std::collections::HashSet;
@@ -525,11 +525,11 @@ fn emitters_keep_to_the_plane() {
 fn what_starts_inside_a_collider_is_told() {
     let warnings = |things: &str| {
         let ball = "[[collider]]\nname = \"ball\"\nthickness = 0.05\nshape.sphere = { center = [3, 0, 0], radius = 1 }\n";
-        simulation(&format!("{things}\n{ball}")).warnings().to_vec()
+        simulation(&format!("{things}\n{ball}")).warnings().iter().map(ToString::to_string).collect::<Vec<_>>()
     };
     let told = |name: &str, when: &str, deep: &str| {
         vec![format!(
-            "masses of \"{name}\" start{when} up to {deep} m inside collider \"ball\", and will be thrown out of it; move one of them"
+            "\"{name}\": masses start{when} up to {deep} m inside collider \"ball\", and will be thrown out of it; move one of them"
         )]
     };
     let particles = "[[particles]]\nname = \"q\"\nposition = [[0, 0, 0], [2.25, 0, 0]]\n";
@@ -551,7 +551,7 @@ fn what_starts_inside_a_collider_is_told() {
 
 #[test]
 fn colliders_that_are_missing_are_told() {
-    let warnings = |text: &str| simulation(text).warnings().to_vec();
+    let warnings = |text: &str| simulation(text).warnings().iter().map(ToString::to_string).collect::<Vec<_>>();
     let emitter = "[[emitter]]\nname = \"p\"\nrate = 9\nkill = [{ slower_than = 1 }, { near_collider = 0.1 }]\nfrom.point = {}\n";
     assert_eq!(warnings(emitter), ["emitter \"p\".kill[1]: near_collider, but there is no collider; add one, or leave it out"]);
     let flock = "[[particles]]\nname = \"q\"\nposition = [[0, 0, 0]]\n[[force]]\nkind = \"flock\"\nradius = 1\navoidance = 3\n";

@@ -2,7 +2,7 @@
 
 extern crate tumble_f64 as tumble;
 
-mod common;
+use crate::common;
 
 use common::{grid, largest, run, simulation, step};
 use tumble_f64::scene::Simulation;

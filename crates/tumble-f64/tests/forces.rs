@@ -2,7 +2,7 @@
 
 #![allow(clippy::unwrap_used, clippy::panic)] // helpers of tests fail by panicking, too
 
-mod common;
+use crate::common;
 
 use common::{Numbers, Vector, fixed, orders, positions, run, show, simulation, vector, velocities};
 use tumble_f64::forces::Acceleration;

@@ -2,7 +2,7 @@
 
 #![allow(clippy::unwrap_used, clippy::panic)] // helpers of tests fail by panicking, too
 
-mod common;
+use crate::common;
 
 use common::{Vector, positions, run, simulation, step, vector, velocities};
 use std::collections::HashMap;
@@ -102,6 +102,24 @@ fn roots_go_where_the_collider_goes() {
         // Strands are clamped: their first piece still points outwards.
         let out = (*root - vector(0.0, 0.3, 1.0)).normalized();
         assert!((x[7 * i + 1] - *root).normalized().dot(out) > 0.97);
+    }
+}
+
+/// Roots are in the body, by as much as it is thick: they are held, and nothing pushes them out.
+#[test]
+fn roots_are_no_penetration() {
+    for motion in ["", "motion.velocity = [0.1, 0, 0]\n"] {
+        let mut sim = simulation(&format!(
+            "{BALL}thickness = 0.003\n{motion}[[hair]]\nname = \"h\"\non = \"ball\"\ncount = 20\nlength = 0.05\nsegments = 6\n"
+        ));
+        let books = sim.ledger();
+        assert!(books.penetration == 0.0 && books.contacts == 0, "{} {}", books.penetration, books.contacts);
+        run(&mut sim, 2);
+        // What hangs onto the ball is moved out of it at the end of each sub-step.
+        assert!(sim.ledger().penetration < 1e-6, "{}", sim.ledger().penetration);
+        let x: Vec<Vector> = positions(&sim, "h").iter().map(|x| vector(x.x, x.y, x.z - 0.05)).collect();
+        common::write(&mut sim, "h", "position", &x);
+        assert!(sim.ledger().penetration > 0.01 && sim.ledger().contacts > 0);
     }
 }
 

@@ -2,7 +2,7 @@
 
 #![allow(clippy::unwrap_used, clippy::panic)] // helpers of tests fail by panicking, too
 
-mod common;
+use crate::common;
 
 use common::{Vector, fixed, orders, positions, run, simulation, slope, step, vector, velocities};
 use tumble_f64::integrators::{Equation, Kinematics, Memory, Scratch, Stage, adaptive_step};

@@ -2,7 +2,7 @@
 
 #![allow(clippy::unwrap_used, clippy::panic)] // helpers of tests fail by panicking, too
 
-mod common;
+use crate::common;
 
 use common::{Vector, positions, run, simulation, step, vector, write};
 use tumble_interface::Engine;
@@ -97,7 +97,7 @@ fn a_bad_start_is_untangled_without_launching_anything() {
          [[sheet]]\nname = \"b\"\nsize = [0.6, 0.6]\nresolution = [8, 8]\ncenter = [0.1, 0, 0.25]\nrotate = [0, 60, 20]\n{LINKS}\n"
     ));
     let start = sim.ledger().intersections;
-    let told = sim.warnings().join("\n");
+    let told = sim.warnings().iter().map(ToString::to_string).collect::<String>();
     assert!(told.contains(&format!("{start} edges pass through triangles")), "{told}");
     // The square of b and the plane of a meet around (0.1, 0, 0).
     let place: Vec<f64> = told.split(['[', ']']).nth(1).unwrap().split(", ").map(|x| x.parse().unwrap()).collect();

@@ -1,6 +1,6 @@
 //! The verbs on grids: their orders, their identities, what lies beyond walls, interpolation and diffusion.
 
-mod common;
+use crate::common;
 
 use common::{noise, noisy};
 use std::f64::consts::PI;

@@ -2,13 +2,13 @@
 
 #![allow(clippy::unwrap_used, clippy::panic)] // helpers of tests fail by panicking, too
 
-mod common;
+use crate::common;
 
-use common::{positions, run};
+use common::{Vector, positions, run, write};
 use std::collections::HashMap;
 use std::f64::consts::PI;
 use tumble_f64::scene::Simulation;
-use tumble_interface::{Assets, Engine, Fabric, Mesh, Scene};
+use tumble_interface::{Assets, Data, Engine, Fabric, Mesh, Scene};
 
 /// Sides, rows, radius [m] and height [m] of the tube.
 const SIDES: usize = 12;
@@ -217,7 +217,7 @@ fn what_is_wrong_with_a_pattern_is_told_with_its_place() {
     let told = |mesh: Mesh| {
         let words = format!("mesh.path = \"tube.obj\"\npattern.scale = {SCALE}\n");
         match with(&words, mesh, None) {
-            Ok(sim) => sim.warnings().join("\n"),
+            Ok(sim) => sim.warnings().iter().map(ToString::to_string).collect::<String>(),
             Err(message) => message,
         }
     };
@@ -233,10 +233,89 @@ fn what_is_wrong_with_a_pattern_is_told_with_its_place() {
     let tiny = told(tube(&|s, z| [0.1 * s, 0.1 * z]));
     // A tenth of the length: the scale should be ten times as large.
     assert!(tiny.contains("net \"n\".pattern.scale") && tiny.contains("scale of 20.0000"), "{tiny}");
+    for factor in [1e-6, 1e3] {
+        let absurd = told(tube(&|s, z| [factor * s, factor * z]));
+        assert!(absurd.contains("net \"n\".pattern.scale") && absurd.contains("no cloth is stretched so"), "{absurd}");
+    }
     let middle = RADIUS * PI;
     let folded = told(tube(&|s, z| [if s > middle { 2.0 * middle - s } else { s }, z]));
     assert!(folded.contains("folded over") && folded.contains("unwrap"), "{folded}");
     let refused =
         Scene::from_toml("version = 1\n[[net]]\nname = \"n\"\nmesh.path = \"x.obj\"\npattern.scale = 0\n").unwrap_err().to_string();
     assert!(refused.contains("pattern.scale"), "{refused}");
+}
+
+/// The longest edge of a tube over its length where nothing is strained, for places of its vertices and of them at rest.
+fn longest(x: &[Vector], rest: &Mesh) -> f64 {
+    let length = |a: Vector, b: Vector| (b - a).norm();
+    let ratio = |([a, b], _): ([u32; 2], Vec<u32>)| {
+        let [a, b] = [a as usize, b as usize];
+        length(x[a], x[b]) / length(rest.vertices[a].into(), rest.vertices[b].into())
+    };
+    rest.edges().into_iter().map(ratio).fold(0.0, f64::max)
+}
+
+/// Membranes and fabrics have no links, but are stretched as well, whatever moves them.
+#[test]
+fn the_books_know_how_far_triangles_are_stretched() {
+    let fabric = Fabric {
+        density: 0.3,
+        stretching: [[200.0, 30.0, 900.0, 40.0]; 6],
+        bending: [[1e-4; 5], [2e-4; 5], [5e-4; 5]],
+        ..Fabric::default()
+    };
+    for scheme in ["position_based", "implicit_euler", "velocity_verlet"] {
+        for (words, counts) in [("membrane = { warp = 100 }", true), ("fabric = \"it\"", true), ("links = {}\narea = 100", false)] {
+            let words = format!("mesh.path = \"tube.obj\"\n{words}\n[[system]]\nintegrator = \"{scheme}\"");
+            let mut sim = with(&words, Mesh { texture: Vec::new(), ..tube(&around) }, Some(fabric.clone())).unwrap();
+            let (rest, start) = (tube(&around), positions(&sim, "n"));
+            for factors in [[1.0; 3], [1.0, 1.0, 1.25], [1.1, 1.1, 1.0], [0.5, 0.5, 0.5], [0.3, 1.4, 1.2]] {
+                let x: Vec<Vector> =
+                    start.iter().map(|x| Vector { x: factors[0] * x.x, y: factors[1] * x.y, z: factors[2] * x.z }).collect();
+                write(&mut sim, "n", "position", &x);
+                let (found, exact) = (sim.ledger().stretch, if counts { longest(&x, &rest) } else { 0.0 });
+                assert!((found - exact).abs() < 1e-12, "{words} {factors:?}: {found}, {exact}");
+            }
+        }
+    }
+    // The rest lengths are those of the pattern.
+    let words = format!("mesh = {{ path = \"tube.obj\", scale = 1.3 }}\npattern.scale = {SCALE}\nmembrane = {{ warp = 100 }}");
+    let found = with(&words, tube(&around), None).unwrap().ledger().stretch;
+    assert!((found - 1.3).abs() < 1e-12, "{found}");
+}
+
+#[test]
+fn an_unsound_mesh_is_told_once() {
+    let told = |change: &dyn Fn(&mut Mesh)| {
+        let mut mesh = tube(&around);
+        change(&mut mesh);
+        with("mesh.path = \"tube.obj\"", mesh, None).unwrap().warnings().iter().map(ToString::to_string).collect::<Vec<_>>()
+    };
+    assert!(told(&|_| ()).is_empty());
+    for (change, words) in [
+        ((|m| m.triangles.push(m.triangles[4])) as fn(&mut Mesh), "1 triangle is there already"),
+        (|m| m.triangles[30].swap(0, 1), "3 edges are between triangles that face different ways"),
+        (|m| m.triangles.push([3, 3, 4]), "1 triangle has no area"),
+        (|m| m.triangles.push([14, 27, 45]), "edges have more than two triangles"),
+        (|m| m.unused = 3, "3 vertices belong to no triangle"),
+    ] {
+        let all = told(&|mesh| {
+            mesh.texture.clear();
+            change(mesh);
+        });
+        let right = all.len() == 1 && all[0].starts_with("net \"n\".mesh: ") && all[0].contains(words);
+        assert!(right && all[0].ends_with("mend the file with `tumble check SCENE --repair`"), "{words}: {all:?}");
+    }
+}
+
+#[test]
+fn texture_goes_with_the_triangles() {
+    let sim = with(&format!("mesh.path = \"tube.obj\"\npattern.scale = {SCALE}"), tube(&around), None).unwrap();
+    let columns = sim.topology();
+    let found = columns.iter().find(|c| c.object == "n" && c.name == "texture").unwrap();
+    let Data::F32(uv) = &found.data else { panic!() };
+    let given: Vec<f32> = tube(&around).texture.iter().flat_map(|c| c.unwrap().concat()).map(|x| x as f32).collect();
+    assert!(found.width == 6 && *uv == given && given.iter().any(|x| *x > 0.5));
+    let bare = with("mesh.path = \"tube.obj\"", Mesh { texture: Vec::new(), ..tube(&around) }, None).unwrap();
+    assert!(bare.topology().iter().all(|c| c.name != "texture"));
 }

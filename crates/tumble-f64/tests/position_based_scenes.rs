@@ -1,6 +1,6 @@
 //! Position-based scenes as a whole: moved and turned, beside others, with extreme masses, triangles and steps.
 
-mod common;
+use crate::common;
 
 use common::{Vector, positions, simulation, step, vector, velocities};
 use tumble_f64::math::rotation::from_degrees;

@@ -1,7 +1,7 @@
 //! Positions that go to their constraints one after the other end where the nearest point in the metric of the masses is:
 //! docs/theory/projections.md. The same of velocities on grids: python/tests/test_fields.py.
 
-mod common;
+use crate::common;
 
 use common::Numbers;
 use tumble_f64::elements::{Constraints, Distance, Linear, Members, Projected, Projection};

@@ -3,7 +3,7 @@
 
 #![allow(clippy::unwrap_used, clippy::panic)] // helpers of tests fail by panicking, too
 
-mod common;
+use crate::common;
 
 use common::{Vector, positions, run, simulation, vector};
 use tumble_f64::elements::{Constraints, Element, Members, Projection, Strands, StretchShear};

@@ -2,7 +2,7 @@
 
 extern crate tumble_f64 as tumble;
 
-mod common;
+use crate::common;
 
 use common::{column, grid, orders, run, simulation, step};
 use tumble_interface::Engine;

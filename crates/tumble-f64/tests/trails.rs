@@ -2,7 +2,7 @@
 
 extern crate tumble_f64 as tumble;
 
-mod common;
+use crate::common;
 
 use common::{positions, run, show, simulation, step};
 use std::sync::Arc;
@@ -90,7 +90,7 @@ fn in_a_stream_that_grows_faster_points_fall() {
     assert!(x[0].z == 0.1 && x[1].z == -0.45);
     // A system before the gas has the velocity of the beginning of each interval of 0.05 s: 0.8 0.05/2 1.5 m less.
     let mut sim = stream(false, "acceleration = [0.8, 0, 0]");
-    assert!(sim.warnings().iter().any(|w| w.contains("put it behind")), "{:?}", sim.warnings());
+    assert!(sim.warnings().iter().any(|w| w.message.contains("put it behind")), "{:?}", sim.warnings());
     run(&mut sim, 30);
     let late = positions(&sim, "two")[0].x;
     assert!((late - (way - 0.03)).abs() < 1e-10, "{late}");

@@ -3,6 +3,7 @@
 use crate::error::{SceneError, StepError};
 use crate::frame::{Column, Frame};
 use crate::scene::Integrator;
+use crate::warning::Warning;
 
 /// Growth of the energy over its scale at which a run is stopped.
 pub const BLOW_UP: f64 = 1000.0;
@@ -102,9 +103,9 @@ pub struct Ledger {
     pub elastic: f64,
     /// Potential energy of gravity and other forces that have one [J].
     pub external: f64,
-    /// Longest link over its rest length; 0 without links.
+    /// Longest link, piece of a rod or edge of a membrane or fabric over its rest length; 0 without any.
     pub stretch: f64,
-    /// Deepest mass inside a collider or its thickness [m].
+    /// Deepest mass inside a collider or its thickness [m], of those that are not held.
     pub penetration: f64,
     /// Edges of soft surfaces that pass through triangles, where `self_contact` is on.
     pub intersections: u64,
@@ -258,7 +259,7 @@ pub trait Engine: Send {
     fn cures(&mut self, go_on: &(dyn Fn() -> bool + Sync)) -> Vec<Cure>;
 
     /// Warnings from building the scene.
-    fn warnings(&self) -> &[String];
+    fn warnings(&self) -> &[Warning];
 
     /// Adds a user's force to the system of that name.
     fn add_force(&mut self, system: &str, force: Box<dyn UserForce>) -> Result<(), SceneError>;

@@ -13,6 +13,7 @@ pub mod frame;
 pub mod mesh;
 pub mod scene;
 pub mod tree;
+pub mod warning;
 
 pub use assets::Assets;
 pub use character::Character;
@@ -22,3 +23,4 @@ pub use fabric::Fabric;
 pub use frame::{Column, Data, Frame};
 pub use mesh::Mesh;
 pub use scene::Scene;
+pub use warning::Warning;

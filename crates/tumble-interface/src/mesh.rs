@@ -1,5 +1,15 @@
 //! A triangle mesh as data; reading one from bytes is the work of `tumble-io`.
 
+use std::collections::HashMap;
+
+/// Vertices closer than this part of the largest coordinate may be one that was rounded: it is eight units in the last place of single
+/// precision, which is what places keep that were computed in two ways, or written with six digits behind the point.
+const ROUNDING: f64 = 1.0 / (1 << 20) as f64;
+/// And closer than this part of the shortest edge at either, so that nothing of a mesh that is as fine as that becomes one.
+const FINE: f64 = 0.01;
+/// A triangle counts as one without area if twice that is at most this part of its longest side squared.
+pub const SLIVER: f64 = 1e-12;
+
 /// Triangles over shared vertices.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Mesh {
@@ -10,6 +20,8 @@ pub struct Mesh {
     /// Texture coordinates of the corners of each triangle, v upwards, as far as the file has some; empty if it has none. A
     /// vertex has several of them where it lies on a seam.
     pub texture: Vec<Option<[[f64; 2]; 3]>>,
+    /// Vertices of the file that belong to no triangle and were left out, so that the numbers of those behind them have changed.
+    pub unused: usize,
 }
 
 /// What a linter finds in a mesh.
@@ -21,6 +33,46 @@ pub struct Defects {
     pub bad_edges: usize,
     /// Triangles of zero area or with a repeated vertex.
     pub degenerate: usize,
+}
+
+/// What makes a mesh doubtful as a soft surface, where open edges are no fault: what mending it would change.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub struct Flaws {
+    /// Triangles that are there already.
+    pub repeated: usize,
+    /// Triangles with a vertex twice, or without an area.
+    pub degenerate: usize,
+    /// Edges between two triangles that face different ways.
+    pub turned: usize,
+    /// Edges of more than two triangles.
+    pub crowded: usize,
+    /// Open edges that lie on others.
+    pub unsewn: usize,
+    /// Vertices that belong to no triangle.
+    pub unused: usize,
+}
+
+impl Flaws {
+    /// Whether there are none.
+    pub fn is_none(&self) -> bool {
+        *self == Self::default()
+    }
+}
+
+impl std::fmt::Display for Flaws {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        let kinds = [
+            (self.repeated, "triangle is there already", "triangles are there already"),
+            (self.degenerate, "triangle has no area", "triangles have no area"),
+            (self.turned, "edge is between triangles that face different ways", "edges are between triangles that face different ways"),
+            (self.crowded, "edge has more than two triangles", "edges have more than two triangles"),
+            (self.unsewn, "open edge lies on another", "open edges lie on others"),
+            (self.unused, "vertex belongs to no triangle", "vertices belong to no triangle"),
+        ];
+        let said = kinds.iter().filter(|(n, ..)| *n > 0);
+        let said: Vec<String> = said.map(|(n, one, many)| format!("{n} {}", if *n == 1 { one } else { many })).collect();
+        f.write_str(&said.join(", "))
+    }
 }
 
 impl Mesh {
@@ -39,7 +91,7 @@ impl Mesh {
 
     /// Edges as (low vertex, high vertex), each once, in order of first appearance, with their triangles.
     pub fn edges(&self) -> Vec<([u32; 2], Vec<u32>)> {
-        let mut index = std::collections::HashMap::new();
+        let mut index = HashMap::new();
         let mut edges: Vec<([u32; 2], Vec<u32>)> = Vec::new();
         for (t, triangle) in self.triangles.iter().enumerate() {
             for k in 0..3 {
@@ -60,8 +112,7 @@ impl Mesh {
         let mut defects = Defects::default();
         for t in &self.triangles {
             let [a, b, c] = t.map(|i| self.vertices[i as usize]);
-            let (u, v) = (sub(b, a), sub(c, a));
-            let n = [u[1] * v[2] - u[2] * v[1], u[2] * v[0] - u[0] * v[2], u[0] * v[1] - u[1] * v[0]];
+            let n = cross(sub(b, a), sub(c, a));
             if n.iter().all(|x| *x == 0.0) {
                 defects.degenerate += 1;
             }
@@ -76,6 +127,114 @@ impl Mesh {
         }
         defects
     }
+
+    /// Texture coordinates of the corners of all triangles, as pictures want them, 0 where there are none; empty if there are none at all.
+    pub fn drawn_texture(&self) -> Vec<[f32; 6]> {
+        if self.texture.len() != self.triangles.len() {
+            return Vec::new();
+        }
+        let flat = |[[a, b], [c, d], [e, f]]: [[f64; 2]; 3]| [a, b, c, d, e, f].map(|x| x as f32);
+        self.texture.iter().map(|corners| corners.map_or([0.0; 6], flat)).collect()
+    }
+
+    /// For each vertex, the first one at its place: at the same one, or so near that rounding may have moved it.
+    pub fn places(&self) -> Vec<u32> {
+        let all = || self.vertices.iter().flatten().map(|x| x.abs());
+        let largest = all().fold(0.0, f64::max);
+        let near = ROUNDING * largest;
+        // The shortest edge at each vertex that is none by the measure of rounding.
+        let mut edge_sq = vec![f64::INFINITY; self.vertices.len()];
+        for t in &self.triangles {
+            for k in 0..3 {
+                let [a, b] = [t[k], t[(k + 1) % 3]].map(|i| i as usize);
+                let way = sub(self.vertices[b], self.vertices[a]);
+                let length_sq = dot(way, way);
+                if length_sq > near * near {
+                    edge_sq[a] = edge_sq[a].min(length_sq);
+                    edge_sq[b] = edge_sq[b].min(length_sq);
+                }
+            }
+        }
+        // Cells wider than what is near, and not begun at zero, where vertices like to lie: most then look into one only.
+        let width = 8.0 * near.max(f64::MIN_POSITIVE);
+        let cell = |x: f64| ((x / width) + 0.381_966).floor() as i64;
+        let mut cells: HashMap<[i64; 3], Vec<u32>> = HashMap::new();
+        let mut places = Vec::with_capacity(self.vertices.len());
+        for (i, x) in self.vertices.iter().enumerate() {
+            let ends = x.map(|x| [cell(x - near), cell(x + near)]);
+            let is_same = |j: &&u32| {
+                let (way, j) = (sub(*x, self.vertices[**j as usize]), **j as usize);
+                let shortest_sq = edge_sq[i].min(edge_sq[j]);
+                let fine_sq = if shortest_sq.is_finite() { FINE * FINE * shortest_sq } else { 0.0 };
+                dot(way, way) <= fine_sq.min(near * near)
+            };
+            let mut found: Option<u32> = None;
+            for c in (0..8_usize).map(|k| [0, 1, 2].map(|a| ends[a][k >> a & 1])) {
+                let first = cells.get(&c).and_then(|there| there.iter().find(is_same));
+                found = [found, first.copied()].into_iter().flatten().min();
+            }
+            if found.is_none() {
+                cells.entry(x.map(cell)).or_default().push(i as u32);
+            }
+            places.push(found.unwrap_or(i as u32));
+        }
+        places
+    }
+
+    /// Counts what mending would change in a soft surface.
+    pub fn flaws(&self) -> Flaws {
+        let mut flaws = Flaws { unused: self.unused, ..Flaws::default() };
+        let places = self.places();
+        let place = |i: u32| places[i as usize];
+        // Each triangle by its vertices, however it faces, and by its places, as it does.
+        let (mut nodes_seen, mut places_seen) = (HashMap::new(), HashMap::new());
+        let mut kept = Vec::with_capacity(self.triangles.len());
+        for t in &self.triangles {
+            let mut at = t.map(place);
+            if at[0] == at[1] || at[1] == at[2] || at[2] == at[0] || self.is_sliver(*t) {
+                flaws.degenerate += 1;
+                continue;
+            }
+            let mut nodes = *t;
+            nodes.sort_unstable();
+            let least = (0..3).fold(0, |l, k| if at[k] < at[l] { k } else { l });
+            at.rotate_left(least);
+            let seen = [nodes_seen.insert(nodes, ()), places_seen.insert(at, ())];
+            if seen.iter().any(Option::is_some) { flaws.repeated += 1 } else { kept.push(*t) }
+        }
+        let kept = Self { triangles: kept, ..Self::default() };
+        // Open edges by their places: how many run from the lower to the higher, and how many back.
+        let mut rims: HashMap<[u32; 2], [usize; 2]> = HashMap::new();
+        for ([a, b], faces) in kept.edges() {
+            let forward = |t: &u32| runs(kept.triangles[*t as usize], a, b);
+            match faces[..] {
+                [t] => {
+                    let back = (place(a) > place(b)) == forward(&t);
+                    rims.entry([place(a).min(place(b)), place(a).max(place(b))]).or_default()[usize::from(back)] += 1;
+                }
+                [t, u] => flaws.turned += usize::from(forward(&t) == forward(&u)),
+                _ => flaws.crowded += 1,
+            }
+        }
+        flaws.unsewn = rims.values().filter(|n| n[0] > 0 && n[1] > 0 || n[0] + n[1] == 2).map(|n| n[0] + n[1]).sum();
+        flaws
+    }
+
+    /// Whether a triangle has no area.
+    pub fn is_sliver(&self, t: [u32; 3]) -> bool {
+        let [a, b, c] = t.map(|i| self.vertices[i as usize]);
+        let n = cross(sub(b, a), sub(c, a));
+        let longest_sq = [sub(b, a), sub(c, b), sub(a, c)].iter().map(|s| dot(*s, *s)).fold(0.0, f64::max);
+        dot(n, n).sqrt() <= SLIVER * longest_sq
+    }
+}
+
+fn cross(a: [f64; 3], b: [f64; 3]) -> [f64; 3] {
+    [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
+}
+
+fn dot(a: [f64; 3], b: [f64; 3]) -> f64 {
+    a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 }
 
 fn sub(a: [f64; 3], b: [f64; 3]) -> [f64; 3] {

@@ -41,7 +41,7 @@ impl Weld {
 
 /// Checks that the mesh is one, and drops vertices that no triangle uses and texture coordinates that are no numbers.
 pub fn finish(mesh: Mesh) -> Result<Mesh, String> {
-    let Mesh { vertices, mut triangles, texture } = mesh;
+    let Mesh { vertices, mut triangles, texture, .. } = mesh;
     let n = vertices.len();
     if triangles.is_empty() {
         return Err(format!("no triangles in the file ({n} vertices); export a surface mesh, not points or curves"));
@@ -67,7 +67,7 @@ pub fn finish(mesh: Mesh) -> Result<Mesh, String> {
         texture.clear();
     }
     if used.iter().all(|used| *used) {
-        return Ok(Mesh { vertices, triangles, texture });
+        return Ok(Mesh { vertices, triangles, texture, unused: 0 });
     }
     let mut kept = 0;
     let mut new = vec![0; n];
@@ -78,8 +78,9 @@ pub fn finish(mesh: Mesh) -> Result<Mesh, String> {
     for i in triangles.as_flattened_mut() {
         *i = new[*i as usize];
     }
-    let vertices = vertices.into_iter().zip(used).filter_map(|(v, used)| used.then_some(v)).collect();
-    Ok(Mesh { vertices, triangles, texture })
+    let vertices: Vec<_> = vertices.into_iter().zip(used).filter_map(|(v, used)| used.then_some(v)).collect();
+    let unused = n - vertices.len();
+    Ok(Mesh { vertices, triangles, texture, unused })
 }
 
 /// Cure for a file whose parts contradict each other.

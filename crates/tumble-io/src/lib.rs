@@ -77,7 +77,12 @@ pub fn mesh(bytes: &[u8], format: Format) -> Result<Mesh, String> {
         Format::Stl => stl::read(bytes),
         Format::Glb => glb::read(bytes),
     };
-    read.and_then(build::finish).map_err(|message| format!("{}: {}", format.name(), one_line(&message)))
+    let mut found = read.and_then(build::finish).map_err(|message| format!("{}: {}", format.name(), one_line(&message)))?;
+    if format == Format::Glb {
+        // Parts of a GLB share their vertices with each other; their numbers mean nothing to anybody.
+        found.unused = 0;
+    }
+    Ok(found)
 }
 
 /// Reads a skinned figure with its movements from a GLB file, or from the text of a glTF file with its data inside.

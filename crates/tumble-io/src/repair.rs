@@ -6,9 +6,8 @@
 
 use std::collections::HashMap;
 use tumble_interface::Mesh;
+use tumble_interface::mesh::SLIVER;
 
-/// A triangle counts as one without area if twice that is at most this part of its longest side squared.
-const SLIVER: f64 = 1e-12;
 /// Rounds of all steps, and of the first of them; a few are enough for all but contrived meshes.
 const ROUNDS: usize = 32;
 
@@ -25,6 +24,8 @@ pub struct Repairs {
     pub turned: usize,
     /// Edges of more than two triangles that were taken apart.
     pub split: usize,
+    /// Vertices that belonged to no triangle.
+    pub unused: usize,
 }
 
 impl Repairs {
@@ -43,9 +44,10 @@ impl Repairs {
 /// 5. edges of more than two triangles come apart into the surfaces that meet there;
 /// 6. closed pieces that face inward are turned, but not hollows within others.
 ///
+/// Vertices that are nearly at one place ([`Mesh::places`]) count as being there; the first stays where it is. Those of no triangle go.
 /// A mesh whose triangles all have no area comes back without any. Surfaces with one side only stay as they are.
 pub fn repair(mesh: &Mesh) -> (Mesh, Repairs) {
-    let (mut work, mut done) = (Work::of(mesh), Repairs::default());
+    let (mut work, mut done) = (Work::of(mesh), Repairs { unused: mesh.unused, ..Repairs::default() });
     for _ in 0..ROUNDS {
         let before = done;
         done.repeated += work.drop_repeated();
@@ -70,7 +72,12 @@ pub fn repair(mesh: &Mesh) -> (Mesh, Repairs) {
         }
     }
     done.turned = work.triangles.iter().filter(|t| t.turned).count();
-    if done.is_none() { (mesh.clone(), done) } else { (work.finish(!mesh.texture.is_empty()), done) }
+    if done.is_none() {
+        return (mesh.clone(), done);
+    }
+    // What did not become one with another is where it was.
+    work.vertices[..mesh.vertices.len()].copy_from_slice(&mesh.vertices);
+    (work.finish(!mesh.texture.is_empty()), done)
 }
 
 /// A triangle: its vertices and texture coordinates, and whether it was turned around.
@@ -161,7 +168,10 @@ struct Work {
 impl Work {
     fn of(mesh: &Mesh) -> Self {
         let triangle = |(i, t): (usize, &[u32; 3])| Triangle { at: *t, texture: mesh.texture.get(i).copied().flatten(), turned: false };
-        Self { vertices: mesh.vertices.clone(), triangles: mesh.triangles.iter().enumerate().map(triangle).collect() }
+        Self {
+            vertices: mesh.places().into_iter().map(|first| mesh.vertices[first as usize]).collect(),
+            triangles: mesh.triangles.iter().enumerate().map(triangle).collect(),
+        }
     }
 
     fn at(&self, vertex: u32) -> [f64; 3] {
@@ -610,6 +620,7 @@ impl Work {
             vertices: self.vertices.into_iter().zip(used).filter_map(|(x, used)| used.then_some(x)).collect(),
             triangles: self.triangles.iter().map(|t| t.at.map(|i| new[i as usize])).collect(),
             texture: if has_texture { self.triangles.iter().map(|t| t.texture).collect() } else { Vec::new() },
+            unused: 0,
         }
     }
 }

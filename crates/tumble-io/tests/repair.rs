@@ -5,7 +5,7 @@ mod files;
 use files::*;
 use proptest::prelude::*;
 use tumble_interface::Mesh;
-use tumble_interface::mesh::Defects;
+use tumble_interface::mesh::{Defects, Flaws};
 use tumble_io::{Format, Repairs, mesh, obj as written, repair};
 
 /// Bit by bit, -0 apart from 0.
@@ -20,6 +20,8 @@ fn closed(broken: &Mesh) -> (Mesh, Repairs) {
     assert_eq!(found.defects(), Defects::default(), "{done:?}");
     let (again, nothing) = repair(&found);
     assert!(nothing.is_none() && same(&found, &again), "{nothing:?}");
+    // A body that is inside out as a whole is as good a surface as any.
+    assert!(found.flaws().is_none() && (!broken.flaws().is_none() || done.turned > 0), "{} {}", found.flaws(), broken.flaws());
     (found, done)
 }
 
@@ -83,10 +85,93 @@ fn what_is_sound_stays_as_it_is() {
             .collect(),
         ..Mesh::default()
     };
+    assert_eq!(twisted.flaws(), Flaws { turned: 1, ..Flaws::default() });
     for clean in [tetrahedron(), cube(), hollow, touching, sheet(4), bow, twisted] {
         let (found, done) = repair(&clean);
         assert!(done.is_none() && same(&found, &clean), "{done:?}");
+        assert!(clean.flaws() == Flaws { turned: clean.flaws().turned, ..Flaws::default() }, "{}", clean.flaws());
     }
+}
+
+/// Every number off by as much, up or down.
+fn shaken(mesh: &Mesh, by: f64) -> Mesh {
+    let mut k = 0_u32;
+    let mut off = || {
+        k = k.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+        if k >> 31 == 0 { by } else { -by }
+    };
+    Mesh { vertices: mesh.vertices.iter().map(|v| v.map(|x| x + off())).collect(), ..mesh.clone() }
+}
+
+#[test]
+fn vertices_that_rounding_moved_apart_become_one() {
+    for (size, by) in [(1.0, 1e-9), (1.0, 1e-7), (1e-3, 1e-10), (1e4, 1e-3)] {
+        let whole = sheet(8);
+        let whole = Mesh { vertices: whole.vertices.iter().map(|v| v.map(|x| size * (0.125 * x - 0.4))).collect(), ..whole };
+        let broken = shaken(&soup(&whole), by);
+        // Every edge but those of the outline lies on another.
+        assert_eq!(broken.flaws(), Flaws { unsewn: 3 * 128 - 32, ..Flaws::default() }, "{size} {by}");
+        let (found, done) = repair(&broken);
+        assert_eq!((found.vertices.len(), done), (81, Repairs { welded: 3 * 128 - 81, ..Repairs::default() }), "{size} {by}");
+        assert!(found.flaws().is_none() && found.defects() == sheet(8).defects());
+        // Each vertex is one of those that were there.
+        assert!(found.vertices.iter().all(|x| broken.vertices.contains(x)));
+    }
+    // What is farther apart is a slit: single precision would know.
+    let beside = |gap: f64| repair(&and(&sheet(2), &moved(&sheet(2), [2.0 + gap, 0.0, 0.0]))).1.welded;
+    assert_eq!([0.0, 1e-9, 3e-6, 1e-5, 1e-3].map(beside), [3, 3, 3, 0, 0]);
+    // A copy that rounding moved stands there already; two closed bodies that nearly touch stay two, where they are.
+    let (found, done) = closed(&and(&cube(), &shaken(&cube(), 1e-9)));
+    assert_eq!((done.repeated, found), (12, cube()));
+    let near = and(&cube(), &moved(&cube(), [1.0 + 1e-9, 0.0, 0.0]));
+    let (found, done) = repair(&near);
+    assert!(done.is_none() && same(&found, &near));
+    let turned =
+        Mesh { triangles: near.triangles.iter().enumerate().map(|(i, t)| if i == 3 { [t[0], t[2], t[1]] } else { *t }).collect(), ..near };
+    assert!(repair(&turned).0.vertices == turned.vertices);
+}
+
+#[test]
+fn nothing_of_a_fine_mesh_becomes_one() {
+    // All finer than what rounding could be in single precision, beside a triangle as large as a metre.
+    let fine = sheet(8);
+    let fine = Mesh { vertices: fine.vertices.iter().map(|v| v.map(|x| 0.5 + 1e-7 * x)).collect(), ..fine };
+    // Edges that grow from 1e-8 m to a metre, by a half each.
+    let n = 46;
+    let graded = Mesh {
+        vertices: (0..2 * n).map(|i| [1e-8 * 1.5_f64.powi(i / 2), 1e-8 * 1.5_f64.powi(i / 2) * f64::from(i % 2), 0.0]).collect(),
+        triangles: (0..n as u32 - 1).flat_map(|i| [[2 * i, 2 * i + 2, 2 * i + 3], [2 * i, 2 * i + 3, 2 * i + 1]]).collect(),
+        ..Mesh::default()
+    };
+    for mesh in [and(&fine, &tetrahedron()), graded] {
+        let (found, done) = repair(&mesh);
+        assert!(done.is_none() && same(&found, &mesh) && mesh.flaws().is_none(), "{done:?} {}", mesh.flaws());
+    }
+}
+
+#[test]
+fn every_flaw_of_a_soft_surface_is_told() {
+    let mut net = sheet(4);
+    net.triangles.push(net.triangles[0]);
+    net.triangles.push([0, 0, 1]);
+    net.triangles[20].swap(0, 1);
+    net.vertices.push([2.5, 2.5, 1.0]);
+    net.triangles.push([6, 7, 25]);
+    net.unused = 2;
+    let flaws = net.flaws();
+    assert_eq!(flaws, Flaws { repeated: 1, degenerate: 1, turned: 3, crowded: 1, unsewn: 0, unused: 2 });
+    let told = "1 triangle is there already, 1 triangle has no area, 3 edges are between triangles that face different ways, \
+                1 edge has more than two triangles, 2 vertices belong to no triangle";
+    assert_eq!(flaws.to_string(), told);
+    // A triangle the other way round, too; and what the readers leave out.
+    let mut back = sheet(2);
+    back.triangles.push([back.triangles[3][1], back.triangles[3][0], back.triangles[3][2]]);
+    assert_eq!(back.flaws(), Flaws { repeated: 1, ..Flaws::default() });
+    let text = "v 9 9 9\nv 0 0 0\nv 1 0 0\nv 0 1 0\nf 2 3 4\n";
+    let found = mesh(text.as_bytes(), Format::Obj).unwrap();
+    assert_eq!((found.unused, found.flaws().unused), (1, 1));
+    let (mended, done) = repair(&found);
+    assert!(done == Repairs { unused: 1, ..Repairs::default() } && mended.flaws().is_none() && mended.vertices == found.vertices);
 }
 
 #[test]
@@ -279,7 +364,7 @@ proptest! {
         prop_assert_eq!(found.defects(), Defects::default());
         let right = if broken.vertices.iter().any(|v| v[0] == 2.0) { 2.0 } else { 1.0 };
         prop_assert!((volume(&found) - right).abs() < 1e-12, "{}", volume(&found));
-        prop_assert!(repair(&found).1.is_none());
+        prop_assert!(repair(&found).1.is_none() && found.flaws().is_none(), "{}", found.flaws());
     }
 
     /// Any triangles over few vertices: nothing is refused, and edges have two triangles at most.
@@ -293,7 +378,7 @@ proptest! {
         let n = vertices.len() as u32;
         let triangles: Vec<_> = triangles.into_iter().map(|t| t.map(|i| i % n)).collect();
         let texture = if textured { triangles.iter().map(|t| Some(t.map(|i| [f64::from(i), 0.5]))).collect() } else { Vec::new() };
-        let (found, done) = repair(&Mesh { vertices, triangles, texture });
+        let (found, done) = repair(&Mesh { vertices, triangles, texture, unused: 0 });
         prop_assert_eq!(found.defects().degenerate, 0);
         prop_assert!(found.edges().iter().all(|(_, faces)| faces.len() <= 2), "{:?}", done);
         prop_assert!(found.triangles.iter().flatten().all(|i| (*i as usize) < found.vertices.len()));

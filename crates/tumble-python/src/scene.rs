@@ -296,7 +296,7 @@ pub fn load_mesh(py: Python<'_>, path: PathBuf) -> PyResult<(Bound<'_, PyArray2<
 }
 
 /// The mesh of a file mended, as the text of an OBJ file, or None if nothing had to be done; counts of vertices welded, triangles repeated,
-/// degenerate and turned, edges split, and of edges that are still open or odd. Raises SceneError if it cannot be read or nothing is left.
+/// degenerate and turned, edges split, vertices unused, and of edges that are still open or odd. Raises SceneError if it cannot be read or nothing is left.
 #[pyfunction]
 pub fn repair_mesh(py: Python<'_>, path: PathBuf) -> PyResult<(Option<String>, Bound<'_, PyDict>)> {
     let wrong = |e: String| scene_error(py, &SceneError::one("", e));
@@ -316,6 +316,7 @@ pub fn repair_mesh(py: Python<'_>, path: PathBuf) -> PyResult<(Option<String>, B
         ("degenerate", done.degenerate),
         ("turned", done.turned),
         ("split", done.split),
+        ("unused", done.unused),
         ("open", left.open_edges),
         ("odd", left.bad_edges),
     ] {

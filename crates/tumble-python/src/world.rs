@@ -139,10 +139,10 @@ impl World {
         self.engine.systems()
     }
 
-    /// What is doubtful about the scene.
+    /// What is doubtful about the scene: code (as listed in docs/warnings.md), path and message of each.
     #[getter]
-    fn warnings(&self) -> Vec<String> {
-        self.engine.warnings().to_vec()
+    fn warnings<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
+        Ok(pythonize::pythonize(py, self.engine.warnings())?)
     }
 
     /// Simulates frames; returns what they took: steps, rejected, step_range [s], newton, linear, residual, unconverged,
@@ -250,7 +250,8 @@ impl World {
         let bytes = self.engine.save(&[("tumble", &about.to_string())]);
         py.detach(|| std::fs::write(&path, bytes)).map_err(|e| {
             let error = ExportError::new_err(format!("\"{}\" cannot be written: {e}", path.display()));
-            error.set_cause(py, Some(e.into()));
+            // The system's number, from which Python knows its kind.
+            error.set_cause(py, Some(pyo3::exceptions::PyOSError::new_err((e.raw_os_error(), e.to_string()))));
             error
         })
     }

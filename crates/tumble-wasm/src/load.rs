@@ -180,7 +180,7 @@ struct Info<'a> {
     systems: Vec<System>,
     columns: &'a [String],
     scene: serde_json::Value,
-    warnings: &'a [String],
+    warnings: &'a [tumble_interface::Warning],
     hash: String,
     memory: f64,
 }

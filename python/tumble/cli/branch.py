@@ -86,7 +86,7 @@ def branch(
     changed = f", changed: {' '.join(find.settings(changes))}" if changes else ", unchanged"
     say(f"  branch    of {parent.folder} at frame {k} (t = {parent.time(k):.6g} s, hash {parent.hashes[k]}){changed}")
     if changes and (text := _idle(done, parent, k)):
-        warn(text)
+        warn("idle-branch", text)
     judge(done, failures)
 
 

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from tumble.cli import find
-from tumble.cli.console import counted, say, seconds, size, warn
+from tumble.cli.console import counted, say, seconds, size, warn_of
 
 if TYPE_CHECKING:
     from tumble import Scene, World
@@ -77,8 +77,7 @@ def check(
     if without:
         say(f"\nno estimate for: {', '.join(without)}")
     say()
-    for text in world.warnings:
-        warn(text)
+    warn_of(world.warnings)
     if fault is not None:
         say(f"will break down {fault}\nwhat would help, {find.command('run', scene, set)} tries and tells")
     if cures:

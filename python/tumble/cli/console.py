@@ -6,6 +6,7 @@ import signal
 import sys
 import threading
 import time
+from collections.abc import Iterable, Mapping
 from types import TracebackType
 from typing import TYPE_CHECKING, Any, Self
 
@@ -30,6 +31,10 @@ def survive_narrow_streams() -> None:
         reconfigure = getattr(stream, "reconfigure", None)
         if reconfigure is not None:
             reconfigure(errors="tumble")
+
+
+_PLACES = 4
+"""Places of further warnings that are named."""
 
 
 class Terminated(KeyboardInterrupt):
@@ -61,9 +66,24 @@ def complain(text: str) -> None:
     _mark("error: ", "1;31", text)
 
 
-def warn(text: str) -> None:
-    """Something doubtful, on stderr."""
-    _mark("warning: ", "33", text)
+def warn(code: str, text: str) -> None:
+    """Something doubtful, on stderr. docs/warnings.md lists the codes."""
+    _mark(f"warning[{code}]: ", "33", text)
+
+
+def warn_of(warnings: Iterable[Mapping[str, str]]) -> None:
+    """Each code once: the first of its warnings in full, how many others there are, and where."""
+    kinds: dict[str, list[Mapping[str, str]]] = {}
+    for warning in warnings:
+        kinds.setdefault(warning["code"], []).append(warning)
+    for code, (first, *others) in kinds.items():
+        text = ": ".join(filter(None, (first["path"], first["message"])))
+        if others:
+            places = [warning["path"] for warning in others if warning["path"]]
+            more = [f"{len(places) - _PLACES} others"] if len(places) > _PLACES else []
+            where = f": {', '.join([*places[:_PLACES], *more])}" if places else ""
+            text += f" ({len(others)} more of this kind{where})"
+        warn(code, text)
 
 
 def broke(error: Exception) -> None:

@@ -144,6 +144,8 @@ def fabric(
 ) -> None:
     """Pull, hang and drape measured fabrics, beside what their records say.
 
+    Each fabric takes minutes: strips and a round of 15 cm are simulated until they rest. Name one to have only that.
+
     \b
     Examples:
       tumble lab fabric

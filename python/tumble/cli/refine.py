@@ -3,6 +3,7 @@
 import json
 import math
 from contextlib import ExitStack
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -80,11 +81,12 @@ def refine(
             stack.pop_all().close()
             return stack.enter_context(Progress(level))
 
-        found = study(checked, folder, levels, what or (), measure or (), resume, force, threads, shown, warn)
+        told = partial(warn, "long-steps")
+        found = study(checked, folder, levels, what or (), measure or (), resume, force, threads, shown, told)
     for line in _told(found):
         say(line)
     for note in found.notes:
-        warn(note)
+        warn("unrefined-steps", note)
     for k, text in found.failures.items():
         complain(f"level {k} failed: {text}; `tumble run` with its words says more: {_words(found, k)}")
     if found.measures and any(run is not None for run in found.runs):

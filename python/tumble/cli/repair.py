@@ -19,6 +19,7 @@ _DONE = {
     "degenerate": ("triangle", "triangles", "dropped that had no area"),
     "turned": ("triangle", "triangles", "turned around"),
     "split": ("edge", "edges", "of more than two triangles taken apart"),
+    "unused": ("vertex", "vertices", "of no triangle left out"),
 }
 _LEFT = {
     "open": ("edge is", "edges are", "still open"),

@@ -35,14 +35,7 @@ def summary(run: "Run") -> str:
     steps = counted(int(ledger["steps"].sum()), "step")
     took = f"{run.time(last):.6g} s simulated in {run.manifest['timings']['simulate']:.3g} s, {steps}"
     lines = [f"{run.folder}: {counted(run.n_frames, 'frame')} ({size(data)}), {took}, hash {run.hashes[last]}"]
-    if unconverged := int(ledger["unconverged"].sum()):
-        worst = float(ledger["residual"].max())
-        lines.append(
-            f"  {counted(unconverged, 'step')} stopped before Newton's method converged, at a residual of up to {worst:.1e} of "
-            "the first: raise solver.newton_iterations, or take a smaller step"
-        )
     lines += _particles(run)
-    lines += _too_fast(run.scene, float(ledger["courant"].max()))
     lines += [
         f"  {run.folder / name}{_pace(run) if name == 'film.mp4' else ''}"
         for name in _RESULTS
@@ -77,16 +70,31 @@ def _particles(run: "Run") -> list[str]:
     return [f"  particles: {'; '.join(each)} at the end"] if each else []
 
 
-def _too_fast(scene: Mapping[str, Any], reached: float) -> list[str]:
+def doubts(run: "Run") -> list[dict[str, str]]:
+    """What the books of a run warn of; docs/warnings.md lists the codes."""
+    ledger = run.ledger
+    found = _too_fast(run.scene, float(ledger["courant"].max()))
+    if unconverged := int(ledger["unconverged"].sum()):
+        worst = float(ledger["residual"].max())
+        message = (
+            f"{counted(unconverged, 'step')} of {int(ledger['steps'].sum())} stopped before Newton's method converged, at a "
+            f"residual of up to {worst:.1e} of the first: raise solver.newton_iterations, or take a smaller step"
+        )
+        found.append({"code": "unconverged", "path": "", "message": message})
+    return found
+
+
+def _too_fast(scene: Mapping[str, Any], reached: float) -> list[dict[str, str]]:
     """A warning if steps that were given let a fluid pass far more cells than its Courant number."""
     given = any(s["method"] == "gas" and (s.get("substeps") or s.get("step")) for s in scene["system"])
     asked = max((float(gas["courant"]) for gas in scene.get("gas", [])), default=math.inf)
     if not given or reached <= 2.0 * asked:
         return []
-    return [
-        f"  the fluid passed up to {reached:.3g} cells in a step, courant is {asked:.3g}: such steps smear; take more "
-        "substeps, or leave substeps and step out"
-    ]
+    message = (
+        f"the fluid passed up to {reached:.3g} cells in a step, courant is {asked:.3g}: such steps smear; take more substeps, "
+        "or leave substeps and step out"
+    )
+    return [{"code": "courant", "path": "", "message": message}]
 
 
 def failure(

@@ -2,12 +2,12 @@
 
 import sys
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
 from tumble.cli import find, report
-from tumble.cli.console import Progress, broke, complain, counted, say, stopped, warn
+from tumble.cli.console import Progress, broke, complain, counted, say, stopped, warn, warn_of
 
 if TYPE_CHECKING:
     from tumble import Run, TumbleError
@@ -64,6 +64,7 @@ def run(
         "vdb": wanted["vdb"] if vdb is None else vdb,
         "plot": wanted["plot"] if plot is None else plot,
     }
+    _refuse_empty(checked.to_dict(), ply, vdb)
     frames_to_draw = wanted["stills"] if stills else []
     flags = {"film": film, "usd": usd, "ply": ply, "vdb": vdb, "plot": plot, "stills": None if stills else False}
     if renderer != "auto" and (asked["film"] or frames_to_draw):
@@ -84,16 +85,29 @@ def run(
 
     failures = present(done, asked, frames_to_draw, renderer)
     if text := report.gained(done, scene, overrides, [*(["--out", str(out)] if out else []), *_flags(flags, renderer)]):
-        warn(text)
+        warn("energy-grew", text)
     judge(done, failures)
+
+
+def _refuse_empty(scene: dict[str, Any], ply: bool | None, vdb: bool | None) -> None:
+    """Raises BadParameter where an option asks for files of what is not there; where the scene asks, the engine says so."""
+    for option, given, kinds, what in (
+        ("--ply", ply, ("particles", "emitter", "galaxy"), "there are no particles"),
+        ("--vdb", vdb, ("gas", "heat", "compressible"), "nothing lies on a grid"),
+    ):
+        if given and not any(scene[kind] for kind in kinds):
+            sections = ", ".join(f"[[{kind}]]" for kind in kinds)
+            raise typer.BadParameter(
+                f"{what} to write, as {sections} would be; leave it out, --usd writes everything else",
+                param_hint=option,
+            )
 
 
 def present(done: "Run", asked: dict[str, bool], stills: list[int], renderer: str) -> "list[TumbleError]":
     """Says what a finished run warns of, writes what it is asked for, and sums it up; returns what could not be written."""
     from tumble.lock import alone
 
-    for text in done.manifest["warnings"]:
-        warn(text)
+    warn_of([*done.manifest["warnings"], *report.doubts(done)])
     try:
         with alone(done.folder):
             failures = write_results(done, asked, stills, renderer)

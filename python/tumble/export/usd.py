@@ -1,7 +1,8 @@
 """A run as Universal Scene Description: scene.usda, and beside it usd/ with a layer per frame.
 
     scene.usda              camera, lights, frame rate; refers to objects.usdc; names the frames as value clips
-    usd/objects.usdc        what does not change: topology, ids, widths, colours, colliders; points at the start
+    usd/objects.usdc        what does not change: topology, texture coordinates, ids, widths, colours, colliders; points at
+                            the start
     volumes/NAME.FRAME.vdb  what lies on grids; Volume prims in objects.usdc name the files of all frames
     usd/manifest.usda       which attributes the frames hold
     usd/frame.000000.usdc   points, velocities, normals and extents of a frame, at time code 0; and so on; of particles
@@ -423,6 +424,12 @@ def _objects(run: Recording, parts: list[Part], start: Columns, ways: Ways) -> A
             mesh.CreateSubdivisionSchemeAttr(UsdGeom.Tokens.none)
             mesh.SetNormalsInterpolation(UsdGeom.Tokens.faceVarying if part.cut else UsdGeom.Tokens.vertex)
             mesh.CreateDoubleSidedAttr(part.thing.kind == "sheet")
+            texture = part.thing.texture
+            if texture is not None and len(texture) == 3 * len(triangles):
+                st = UsdGeom.PrimvarsAPI(prim).CreatePrimvar(
+                    "st", Sdf.ValueTypeNames.TexCoord2fArray, UsdGeom.Tokens.faceVarying
+                )
+                st.Set(Vt.Vec2fArray.FromNumpy(np.ascontiguousarray(texture, dtype=np.float32)))
         look = UsdShade.Material.Define(stage, f"{ROOT}/looks/{part.path[len(ROOT) + 1 :]}")
         shader = UsdShade.Shader.Define(stage, look.GetPath().AppendChild("surface"))
         shader.CreateIdAttr("UsdPreviewSurface")

@@ -73,6 +73,8 @@ class Object:
     leap: float = float("inf")
     """A step farther than this [m] is none: the point has left a square that repeats itself on the other side."""
     triangles: Indices = field(default_factory=lambda: np.zeros((0, 3), dtype=np.int64))
+    texture: Array | None = None
+    """Texture coordinates of the corners of triangles, 3 m x 2, if there are some."""
     links: Indices = field(default_factory=lambda: np.zeros((0, 2), dtype=np.int64))
     curve: Indices = field(default_factory=lambda: np.zeros(0, dtype=np.int64))
     strands: Strands | None = None
@@ -296,6 +298,7 @@ def objects(run: Recording) -> list[Object]:
                 trail=float(entry.get("trail", 0.0)),
                 leap=_leap(run.scene, entry),
                 triangles=_indices(columns, "triangles", 3),
+                texture=np.asarray(columns["texture"]).reshape(-1, 2) if "texture" in columns else None,
                 links=_indices(columns, "links", 2),
                 curve=_indices(columns, "curve", 1).ravel(),
                 strands=tufts,

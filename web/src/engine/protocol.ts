@@ -50,7 +50,8 @@ export interface SceneInfo {
   topology: Columns;
   /** The resolved scene: every default written out. */
   scene: Record<string, unknown>;
-  warnings: string[];
+  /** What is doubtful; docs/warnings.md lists the codes. */
+  warnings: { code: string; path: string; message: string }[];
   /** State hash, 16 hexadecimal digits, as `tumble` prints it natively. */
   hash: string;
   /** Upper estimate of the memory that it needs [bytes]. */

@@ -300,7 +300,7 @@ export const page: Page = async (main, rest) => {
     const report = session.report;
     if (report) rows.push(["Last answer", `${report.steps} steps, ${report.newton} Newton and ${report.linear} linear iterations`]);
     const body: HTMLElement[] = rows.flatMap(([k, v]) => [h("dt", {}, k), h("dd", {}, v)]);
-    if (info.warnings.length) body.push(h("dt", {}, "Doubtful"), h("dd", {}, info.warnings.join("\n")));
+    if (info.warnings.length) body.push(h("dt", {}, "Doubtful"), h("dd", {}, info.warnings.map((w) => `${w.path ? `${w.path}: ` : ""}${w.message} [${w.code}]`).join("\n")));
     facts.replaceChildren(...body);
     const list = await session.stability().catch(() => []);
     const found = new Set(list.map((s) => s.system));

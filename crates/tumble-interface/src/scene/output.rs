@@ -84,10 +84,10 @@ pub enum Look {
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct Expect {
-    /// Longest link over its rest length.
+    /// Longest link, piece of a rod or edge of a membrane or fabric over its rest length.
     #[schemars(extend("x-unit" = "1", "exclusiveMinimum" = 0.0))]
     pub max_stretch: Option<f64>,
-    /// Deepest mass inside a collider.
+    /// Deepest mass inside a collider or its thickness, of those that are not held.
     #[schemars(range(min = 0.0), extend("x-unit" = "m"))]
     pub max_penetration: Option<f64>,
     /// Edges of soft surfaces that pass through triangles, where `self_contact` is on.

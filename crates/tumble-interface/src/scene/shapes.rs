@@ -217,7 +217,8 @@ pub struct Figure {
     pub shell: bool,
 }
 
-/// A mannequin.
+/// A mannequin. Its bones, which pins follow: `hips`, `spine`, `chest`, `neck`, `head`; on its left `shoulder_l`, `upper_arm_l`, `forearm_l`,
+/// `hand_l`, `thigh_l`, `shin_l`, `foot_l`, `toes_l`; and on its right the same with `_r`.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct Mannequin {

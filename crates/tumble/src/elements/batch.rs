@@ -71,7 +71,7 @@ pub trait Batch: Send + Sync {
     fn link_ends(&self) -> Vec<[u32; 2]> {
         Vec::new()
     }
-    /// The largest lengthening over rest length; negative infinity if there is none.
+    /// The largest lengthening of links, pieces of rods and edges of membranes and fabrics over rest length; negative infinity if there is none.
     fn largest_strain(&self, _x: &[Row]) -> f64 {
         f64::NEG_INFINITY
     }
@@ -246,6 +246,10 @@ impl<E: Element<N, M, D>, Y: Law<P>, const N: usize, const M: usize, const D: us
 
     fn energy(&self, x: &[Row]) -> f64 {
         self.list.energy(x) - self.energy_at_rest
+    }
+
+    fn largest_strain(&self, x: &[Row]) -> f64 {
+        self.list.largest_strain(x)
     }
 
     fn begin_forces(&mut self, _t: f64, x: &[Row], v: &[Row]) {

@@ -74,7 +74,7 @@ pub trait Constraints: Send + Sync {
     fn link_ends(&self) -> Vec<[u32; 2]> {
         Vec::new()
     }
-    /// The largest lengthening over rest length; negative infinity if there is none.
+    /// The largest lengthening of links, pieces of rods and edges of membranes and fabrics over rest length; negative infinity if there is none.
     fn largest_strain(&self, _x: &[Row]) -> f64 {
         f64::NEG_INFINITY
     }
@@ -456,7 +456,7 @@ impl<E: Element<N, M, D>, Y: Law<P>, const N: usize, const M: usize, const D: us
     }
 }
 
-/// The largest strain of links that are not broken.
+/// The largest strain of links and triangles that are not broken.
 struct Strains<'a, E, const N: usize, const M: usize, const D: usize, const P: usize> {
     columns: &'a Columns<N, D, P>,
     range: Range<usize>,
@@ -469,13 +469,21 @@ impl<E: Element<N, M, D>, const N: usize, const M: usize, const D: usize, const 
     #[inline(always)]
     fn run<W: Width>(self, w: W) -> Real {
         let (columns, mut largest, mut each) = (self.columns, Real::NEG_INFINITY, [0.0; 16]);
-        let Some(d) = E::LENGTH else { return largest };
         packs!(W, w, self.range, |e| {
             // SAFETY: `largest_strain` has called `check`.
             let x = unsafe { columns.gather(w, E::FRAMES, self.x.as_ptr(), e) };
-            let (rest, soft) = (w.load(&columns.rest[d][e..]), w.load(&columns.compliance[e..]));
-            let way = Vec3 { x: x[1][0] - x[0][0], y: x[1][1] - x[0][1], z: x[1][2] - x[0][2] };
-            let strain = (way.norm() - rest) / rest;
+            let soft = w.load(&columns.compliance[e..]);
+            let strain = match E::LENGTH {
+                Some(d) => {
+                    let rest = w.load(&columns.rest[d][e..]);
+                    let way = Vec3 { x: x[1][0] - x[0][0], y: x[1][1] - x[0][1], z: x[1][2] - x[0][2] };
+                    (way.norm() - rest) / rest
+                }
+                None => {
+                    let Some(strain) = E::lengthening(columns.pack(w, e).0, x) else { return largest };
+                    strain
+                }
+            };
             let limp = soft - w.splat(0.5 * LIMP as Real);
             w.store(limp.positive(w.splat(Real::NEG_INFINITY), strain), &mut each);
             // NaN is never the larger.
@@ -557,9 +565,6 @@ impl<E: Element<N, M, D>, Y: Law<P>, const N: usize, const M: usize, const D: us
     }
 
     fn largest_strain(&self, x: &[Row]) -> f64 {
-        if E::LENGTH.is_none() {
-            return f64::NEG_INFINITY;
-        }
         self.columns.check(x);
         let (columns, kind) = (&self.columns, PhantomData::<[E; M]>);
         let largest = fold(self.len(), |range| dispatch(Strains { columns, range, x, kind }));

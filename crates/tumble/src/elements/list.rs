@@ -193,6 +193,37 @@ impl<E: Element<N, M, D>, Y: Law<P>, const N: usize, const M: usize, const D: us
         self.check(&[x]);
         fold(self.len(), |range| dispatch(Energies { list: self, range, x })).into_iter().sum()
     }
+
+    /// The largest lengthening of elements that are not broken; negative infinity if there is none.
+    pub fn largest_strain(&self, x: &[Row]) -> f64 {
+        self.check(&[x]);
+        let most = fold(self.len(), |range| dispatch(Strains { list: self, range, x }));
+        most.into_iter().fold(f64::NEG_INFINITY, |m, s| m.max(f64::from(s)))
+    }
+}
+
+struct Strains<'a, E, Y, const N: usize, const M: usize, const D: usize, const P: usize> {
+    list: &'a List<E, Y, N, M, D, P>,
+    range: Range<usize>,
+    x: &'a [Row],
+}
+
+impl<E: Element<N, M, D>, Y: Law<P>, const N: usize, const M: usize, const D: usize, const P: usize> Kernel
+    for Strains<'_, E, Y, N, M, D, P>
+{
+    type Output = Real;
+    #[inline(always)]
+    fn run<W: Width>(self, w: W) -> Real {
+        let (mut largest, mut each) = (Real::NEG_INFINITY, [0.0; 16]);
+        packs!(W, w, self.range, |e| {
+            let p = self.list.pack(w, e);
+            let Some(strain) = E::lengthening(p.rest, self.list.rows(w, self.x, e)) else { return largest };
+            w.store(p.stiffness.positive(strain, w.splat(Real::NEG_INFINITY)), &mut each);
+            // NaN is never the larger.
+            largest = each[..count(w)].iter().fold(largest, |m, s| m.max(*s));
+        });
+        largest
+    }
 }
 
 struct Energies<'a, E, Y, const N: usize, const M: usize, const D: usize, const P: usize> {

@@ -68,8 +68,24 @@ fn deformation<L: Lane>(rest: [L; 8], x: [[L; 4]; 3]) -> [Vec3<L>; 2] {
     [d1 * rest[0] + d2 * rest[2], d1 * rest[1] + d2 * rest[3]]
 }
 
+/// The largest lengthening of an edge over its rest length, from B, whose inverse has the rest edges x1-x0 and x2-x0 as columns.
+#[inline(always)]
+pub fn edges<L: Lane>([b0, b1, b2, b3]: [L; 4], x: [[L; 4]; 3]) -> L {
+    let x0 = point(x[0]);
+    let (d1, d2) = (point(x[1]) - x0, point(x[2]) - x0);
+    let det = b0 * b3 - b1 * b2;
+    let ratio = |way: Vec3<L>, [u, v]: [L; 2]| way.norm() * det / (u * u + v * v).sqrt();
+    let larger = |a: L, b: L| (b - a).positive(b, a);
+    let most = larger(ratio(d1, [b3, b2]), ratio(d2, [b1, b0]));
+    larger(most, ratio(d2 - d1, [b1 + b3, b0 + b2])) - det.like(1.0)
+}
+
 impl Element<3, 3, 8> for Membrane {
     const NAME: &'static str = "membrane";
+    #[inline(always)]
+    fn lengthening<L: Lane>([b0, b1, b2, b3, ..]: [L; 8], x: [[L; 4]; 3]) -> Option<L> {
+        Some(edges([b0, b1, b2, b3], x))
+    }
     #[inline(always)]
     fn residual<L: Lane>(rest: [L; 8], x: [[L; 4]; 3]) -> [L; 3] {
         let [f1, f2] = deformation(rest, x);

@@ -56,6 +56,12 @@ pub trait Element<const N: usize, const M: usize, const D: usize>: Send + Sync +
     fn residual<L: Lane>(rest: [L; D], x: [[L; 4]; N]) -> [L; M];
     /// J(x)^T y: forces on points, and on the four numbers of a frame.
     fn pullback<L: Lane>(rest: [L; D], x: [[L; 4]; N], y: [L; M]) -> [[L; 4]; N];
+    /// Of a triangle or a piece of a rod that resists stretch, the largest lengthening of its edges over their rest lengths. Links have
+    /// `LENGTH`, or are pairs.
+    #[inline(always)]
+    fn lengthening<L: Lane>(_rest: [L; D], _x: [[L; 4]; N]) -> Option<L> {
+        None
+    }
 }
 
 /// The first three numbers of a node.

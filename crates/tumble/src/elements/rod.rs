@@ -30,6 +30,10 @@ impl Element<3, 3, 2> for StretchShear {
         let g = Quat::pure(d) * q * Quat::pure(-y);
         [force(-world), force(world), g.row()]
     }
+    #[inline(always)]
+    fn lengthening<L: Lane>([l, _]: [L; 2], [x0, x1, _]: [[L; 4]; 3]) -> Option<L> {
+        Some((point(x1) - point(x0)).norm() / l - l.like(1.0))
+    }
 }
 
 /// Bend and twist between the frames q0 and q1 of neighbouring segments:

@@ -164,6 +164,10 @@ fn root<L: Lane>(rest: &[L; 28], m: L, value: &[L; 4]) -> [L; 4] {
 impl Element<3, 3, 28> for Woven {
     const NAME: &'static str = "fabric";
     #[inline(always)]
+    fn lengthening<L: Lane>([b0, b1, b2, b3, ..]: [L; 28], x: [[L; 4]; 3]) -> Option<L> {
+        Some(super::membrane::edges([b0, b1, b2, b3], x))
+    }
+    #[inline(always)]
     fn residual<L: Lane>(rest: [L; 28], x: [[L; 4]; 3]) -> [L; 3] {
         let e = strain(deformation(&rest, x));
         let at = place(e);

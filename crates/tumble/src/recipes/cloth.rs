@@ -3,19 +3,28 @@
 
 use super::Site;
 use super::cut::{Cut, Stitch, cut};
-use super::dress::dress;
+use super::dress::{beyond_sense, dress};
 use super::pins::{Pinnable, pinned};
 use super::surface::{Rest, Surface};
 use crate::geometry::Vector;
 use crate::math::functions;
 use crate::systems::dynamics::SpringPart;
 use tumble_interface::Mesh;
+use tumble_interface::check::plain;
 use tumble_interface::scene::{Cloth, Panel, Seam};
 
 /// Sewn sides may differ in length by this part of it.
 const UNEQUAL: f64 = 0.02;
 /// Points of a cloth at most.
 const MOST: f64 = 5e6;
+
+/// Length over width of triangles at most: twice that of the thinnest that steps of all lengths are tried with.
+const THIN: f64 = 100.0;
+
+/// A number with three digits.
+pub fn short(x: f64) -> String {
+    plain(format!("{x:.2e}").parse().unwrap_or(x))
+}
 
 /// Adds the masses, links, hinges, seams and triangles.
 pub fn cloth(site: &mut Site<'_>, thing: &Cloth) {
@@ -26,7 +35,10 @@ pub fn cloth(site: &mut Site<'_>, thing: &Cloth) {
     }
     let Some((fabric, density)) = site.fabric(&path, thing.fabric.as_ref(), thing.density) else { return };
     let (cuts, stitches) = match (&thing.dress, thing.panels.is_empty()) {
-        (Some(words), true) => dress(words),
+        (Some(words), true) => match beyond_sense(words, thing.resolution) {
+            Some((key, message)) => return site.wrong(format!("{path}{key}"), message),
+            None => dress(words),
+        },
         (None, false) => {
             let Some(found) = of_panels(site, thing, &path) else { return };
             found
@@ -37,6 +49,11 @@ pub fn cloth(site: &mut Site<'_>, thing: &Cloth) {
     let area: f64 = cuts.iter().map(Cut::area).sum();
     if area / (thing.resolution * thing.resolution) > MOST {
         let message = format!("{} m makes more than {MOST:.0e} points of {area:.3} m² of cloth; take a larger one", thing.resolution);
+        return site.wrong(format!("{path}.resolution"), message);
+    }
+    if let Some(k) = cuts.iter().position(|panel| panel.extent() < thing.resolution) {
+        let (resolution, extent) = (plain(thing.resolution), short(cuts[k].extent()));
+        let message = format!("{resolution} m is more than panels[{k}] measures from corner to corner, {extent} m; take a smaller one");
         return site.wrong(format!("{path}.resolution"), message);
     }
     let mut lengths = vec![];
@@ -62,9 +79,32 @@ pub fn cloth(site: &mut Site<'_>, thing: &Cloth) {
             (length / thing.resolution).round().max(1.0) as usize
         };
         let Some(piece) = cut(words, thing.resolution, &count) else {
+            if let Some(finer) = words.finer(thing.resolution) {
+                let message = format!(
+                    "{} m is too coarse for panels[{k}]: sides that are cut so cross each other; {} m would do",
+                    plain(thing.resolution),
+                    short(finer)
+                );
+                return site.wrong(format!("{path}.resolution"), message);
+            }
+            if thing.dress.is_some() {
+                return site.wrong(format!("{path}.dress"), "its measures do not go together: sides of a panel cross each other");
+            }
             let message = "its sides cross each other, or it has no area; go around it once";
             return site.wrong(format!("{path}.panels[{k}].outline"), message);
         };
+        let (long, wide) = piece.thinnest();
+        if long > THIN * wide {
+            let message = format!(
+                "cut to edges of {} m it has a triangle {} m long and {} m wide, expected at most {THIN} times as long as wide; \
+                 make it wider there, or the resolution smaller",
+                plain(thing.resolution),
+                short(long),
+                short(wide)
+            );
+            let key = if thing.dress.is_some() { "dress".into() } else { format!("panels[{k}].outline") };
+            return site.wrong(format!("{path}.{key}"), message);
+        }
         let start = all.vertices.len() as u32;
         let flat = |i: u32| piece.flat[i as usize];
         let measure = |t: &[u32; 3]| {
@@ -137,6 +177,8 @@ pub fn cloth(site: &mut Site<'_>, thing: &Cloth) {
     let places: Vec<_> = all.triangles.iter().map(|t| t.map(|i| Vector::from(all.vertices[i as usize]))).collect();
     if let Some(object) = site.parts.object() {
         object.triangles = all.triangles;
+        // A metre of cloth is 1 of texture.
+        object.texture = cut_out.iter().map(|[a, b, c]| [a.x, a.y, b.x, b.y, c.x, c.y].map(|x| x as f32)).collect();
     }
     if let Some(words) = &thing.tear {
         site.tear(words, &cut_out, &places, &path);
@@ -147,6 +189,11 @@ pub fn cloth(site: &mut Site<'_>, thing: &Cloth) {
 fn of_panels(site: &mut Site<'_>, thing: &Cloth, path: &str) -> Option<(Vec<Cut>, Vec<Stitch>)> {
     let mut cuts = Vec::new();
     for (k, panel) in thing.panels.iter().enumerate() {
+        if let Some(first) = thing.panels[..k].iter().position(|p| p.name == panel.name) {
+            let message = format!("\"{}\" is the name of panels[{first}] already; seams tell panels by their names", panel.name);
+            site.wrong(format!("{path}.panels[{k}].name"), message);
+            return None;
+        }
         let (right, up) = (Vector::from(panel.right), Vector::from(panel.up));
         if right.cross(up).norm() <= 1e-9 * right.norm() * up.norm() || panel.outline.len() < 3 {
             site.wrong(format!("{path}.panels[{k}].up"), "it points along right, or one of them is zero; a plane needs two directions");

@@ -4,6 +4,9 @@
 use crate::geometry::Vector;
 use spade::{ConstrainedDelaunayTriangulation, Point2, Triangulation};
 
+/// Points that a panel is tried with, to say which resolution would do.
+const TRIED: f64 = 3e4;
+
 /// A panel before it is cut.
 pub struct Cut {
     /// Its sides in order around it, each a line of at least two points [m]; one ends where the next begins.
@@ -48,6 +51,36 @@ impl Cut {
         let twice = |p: &[[f64; 2]]| p[0][0] * p[1][1] - p[1][0] * p[0][1];
         self.sides.iter().flat_map(|side| side.windows(2)).map(twice).sum::<f64>().abs() / 2.0
     }
+
+    /// From one corner of the box around it to the other [m].
+    pub fn extent(&self) -> f64 {
+        let along = |a: usize| {
+            let all = self.sides.iter().flatten().map(|p| p[a]);
+            all.clone().fold(f64::NEG_INFINITY, f64::max) - all.fold(f64::INFINITY, f64::min)
+        };
+        distance([along(0), along(1)], [0.0, 0.0])
+    }
+
+    /// A length of edges [m] that it can be cut into, if it cannot into some of `edge` [m].
+    pub fn finer(&self, edge: f64) -> Option<f64> {
+        let (extent, around) = (self.extent(), (0..self.sides.len()).map(|side| self.length(side)).sum::<f64>());
+        let halves = std::iter::successors(Some(0.5 * edge.min(extent)), |r| Some(0.5 * r));
+        let few = |r: &f64| extent * extent < TRIED * r * r && around < TRIED * r;
+        halves.take_while(few).find(|r| cut(self, *r, &|side| (self.length(side) / r).round().max(1.0) as usize).is_some())
+    }
+}
+
+impl Piece {
+    /// The longest side of its thinnest triangle and its height above it [m].
+    pub fn thinnest(&self) -> (f64, f64) {
+        let shape = |t: &[u32; 3]| {
+            let [a, b, c] = t.map(|i| self.flat[i as usize]);
+            let long = distance(a, b).max(distance(b, c)).max(distance(c, a));
+            (long, ((b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0])).abs() / long)
+        };
+        let thinner = |a: (f64, f64), b: (f64, f64)| if b.0 * a.1 > a.0 * b.1 { b } else { a };
+        self.triangles.iter().map(shape).reduce(thinner).unwrap_or((1.0, 1.0))
+    }
 }
 
 /// The points that divide a line into `n` parts of one length, without the last end.
@@ -83,7 +116,8 @@ fn inside(line: &[[f64; 2]], p: [f64; 2]) -> (bool, f64) {
     (odd, nearest)
 }
 
-/// Cuts a panel into triangles with edges of about `edge` [m], a side into `count(side)` of them; `None` if its sides cross.
+/// Cuts a panel into triangles with edges of about `edge` [m], a side into `count(side)` of them; `None` if its sides cross, or do so when they are
+/// cut that coarsely.
 pub fn cut(panel: &Cut, edge: f64, count: &dyn Fn(usize) -> usize) -> Option<Piece> {
     let mut outline = Vec::new();
     let mut starts = Vec::new();

@@ -10,12 +10,17 @@
 //! The bodice hangs on a tube around the body that is as wide as the panels at every height, its straps bent over the shoulders; the
 //! skirt falls from the waist as a cone.
 
+use super::cloth::short;
 use super::cut::{Cut, Stitch};
 use crate::geometry::Vector;
 use crate::math::functions::{cos, sin};
 use std::f64::consts::{FRAC_PI_2, PI};
+use std::ops::RangeInclusive;
+use tumble_interface::check::plain;
 use tumble_interface::scene::Dress;
 
+/// Girths of waists, from a doll's to a monument's [m].
+const GIRTHS: RangeInclusive<f64> = 0.01..=100.0;
 /// Points along an arc.
 const ARC: usize = 96;
 
@@ -24,6 +29,49 @@ fn ellipse(girth: f64, depth: f64) -> (f64, f64) {
     let h = (1.0 - depth) * (1.0 - depth) / ((1.0 + depth) * (1.0 + depth));
     let round = PI * (1.0 + depth) * (1.0 + 3.0 * h / (10.0 + (4.0 - 3.0 * h).sqrt()));
     (girth / round, girth / round * depth)
+}
+
+/// Which measure is beyond sense, and why: nobody wears that, or its panels would overlap themselves.
+pub fn beyond_sense(words: &Dress, resolution: f64) -> Option<(&'static str, String)> {
+    let (girth, bust, apart, strap) = (words.waist_girth, words.bust_girth, words.strap_distance, words.strap);
+    if !GIRTHS.contains(&girth) {
+        return Some((".dress.waist_girth", format!("{} m, expected {} to {} m", plain(girth), GIRTHS.start(), GIRTHS.end())));
+    }
+    // Over the girth of the waist: from half of what the leanest doll would wear to several times what the longest train would.
+    let shares = [
+        (".dress.bust_girth", bust, 0.2, 5.0),
+        (".dress.bodice", words.bodice, 0.02, 5.0),
+        (".dress.shoulder", words.shoulder, 0.02, 5.0),
+        (".dress.skirt", words.skirt, 0.02, 20.0),
+        (".dress.strap", strap, 0.005, 5.0),
+    ];
+    if let Some((key, x, least, most)) = shares.into_iter().find(|(_, x, least, most)| !(least * girth..=most * girth).contains(x)) {
+        let (x, least, most, girth) = (plain(x), short(least * girth), short(most * girth), plain(girth));
+        return Some((key, format!("{x} m, expected {least} to {most} m beside a waist_girth of {girth} m")));
+    }
+    if strap >= apart {
+        let message =
+            format!("{} m, expected less than strap_distance, {} m: both straps would lie on each other", plain(strap), plain(apart));
+        return Some((".dress.strap", message));
+    }
+    if 0.5 * (apart + strap) >= 0.25 * bust {
+        let message = format!(
+            "{} m, and a strap is {} m wide, expected less than half of bust_girth together, {} m: straps would end beyond the sides",
+            plain(apart),
+            plain(strap),
+            short(0.5 * bust)
+        );
+        return Some((".dress.strap_distance", message));
+    }
+    (resolution > girth / 6.0).then(|| {
+        let message = format!(
+            "{} m is too coarse for a waist_girth of {} m, expected at most a sixth of it, {} m",
+            plain(resolution),
+            plain(girth),
+            short(girth / 6.0)
+        );
+        (".resolution", message)
+    })
 }
 
 /// The panels front, back, skirt front, skirt back, and their seams.

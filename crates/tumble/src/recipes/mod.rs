@@ -43,7 +43,7 @@ pub use sheet::sheet;
 use crate::geometry::{Collider, Vector};
 use crate::systems::dynamics::{Parts, SpringPart};
 use tumble_interface::scene::Link;
-use tumble_interface::{Assets, Issue};
+use tumble_interface::{Assets, Issue, Warning};
 
 /// Where a recipe puts masses and elements, and what it finds wrong.
 pub struct Site<'a> {
@@ -52,7 +52,7 @@ pub struct Site<'a> {
     /// Everything wrong so far.
     pub issues: &'a mut Vec<Issue>,
     /// What it hardly means.
-    pub hints: &'a mut Vec<String>,
+    pub hints: &'a mut Vec<Warning>,
     /// Direction that counts as up.
     pub up: Vector,
     /// The scene's colliders, for what follows them.

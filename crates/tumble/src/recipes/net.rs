@@ -4,13 +4,16 @@ use super::Site;
 use super::pins::{Pinnable, pinned};
 use super::surface::{Rest, Surface};
 use crate::geometry::Vector;
-use tumble_interface::Mesh;
 use tumble_interface::scene::{Net, Pattern};
+use tumble_interface::warning::Code;
+use tumble_interface::{Mesh, Warning};
 
 /// A triangle has no area if that is less than this part of its longest side squared.
 const SLIVER: f64 = 1e-9;
 /// Areas of a pattern and of its mesh that differ by more than this factor are worth a hint.
 const UNLIKE: f64 = 2.0;
+/// And by more than this, about 30 in lengths, are refused.
+const BEYOND: f64 = 1000.0;
 
 /// Adds the masses, links, hinges and triangles. `mesh` stands where it belongs.
 ///
@@ -18,6 +21,7 @@ const UNLIKE: f64 = 2.0;
 pub fn net(site: &mut Site<'_>, thing: &Net, mesh: &Mesh) {
     let path = format!("net \"{}\"", thing.name);
     site.parts.begin(&thing.name, 0.0);
+    site.hints.extend(unsound(mesh, &path));
     let Some((fabric, density)) = site.fabric(&path, thing.fabric.as_ref(), thing.density) else { return };
     let Ok(panels) = thing.pattern.as_ref().map(|words| pattern(site, words, mesh, &path)).transpose() else { return };
     // The triangles' own planes have no axes in common; the x axis has a direction in most.
@@ -31,7 +35,10 @@ pub fn net(site: &mut Site<'_>, thing: &Net, mesh: &Mesh) {
     if let Some(i) = mass.iter().position(|m| *m == 0.0) {
         return site.wrong(
             format!("{path}.mesh"),
-            format!("vertex {i} has no triangle with an area, so it would have no mass; remove it from the mesh"),
+            format!(
+                "vertex {i} has no triangle with an area, so it would have no mass; remove it from the mesh, or mend that with \
+                 `tumble check SCENE --repair`"
+            ),
         );
     }
     let first = mesh.vertices.iter().zip(&mass).map(|(x, m)| site.parts.point(Vector::from(*x), Vector::default(), *m)).min().unwrap_or(0);
@@ -79,6 +86,7 @@ pub fn net(site: &mut Site<'_>, thing: &Net, mesh: &Mesh) {
     pins.iter().for_each(|p| site.parts.pin(*p));
     if let Some(object) = site.parts.object() {
         object.triangles.clone_from(&mesh.triangles);
+        object.texture = mesh.drawn_texture();
     }
     if let Some(words) = &thing.tear {
         if thing.pressure.is_some() || thing.shape_matching.is_some() {
@@ -90,6 +98,14 @@ pub fn net(site: &mut Site<'_>, thing: &Net, mesh: &Mesh) {
         let places: Vec<_> = (0..mesh.triangles.len()).map(|t| Rest::mesh(mesh, along).corners(t)).collect();
         site.tear(words, panels.as_deref().unwrap_or(&places), &places, &path);
     }
+}
+
+/// What is wrong with the mesh of a soft surface, though it can be simulated.
+fn unsound(mesh: &Mesh, path: &str) -> Option<Warning> {
+    let flaws = mesh.flaws();
+    let told =
+        || Warning::new(Code::UnsoundMesh, format!("{path}.mesh"), format!("{flaws}; mend the file with `tumble check SCENE --repair`"));
+    (!flaws.is_none()).then(told)
 }
 
 fn area([a, b, c]: [Vector; 3]) -> f64 {
@@ -131,11 +147,21 @@ fn pattern(site: &mut Site<'_>, words: &Pattern, mesh: &Mesh, path: &str) -> Res
         .map(|(x, t)| (area(*x), area(Rest::mesh(mesh, Vector::default()).corners(t))))
         .fold((0.0, 0.0), |s, a| (s.0 + a.0, s.1 + a.1));
     let ratio = flat / real;
-    if real > 0.0 && !(1.0 / UNLIKE..=UNLIKE).contains(&ratio) {
-        site.hints.push(format!(
-            "{path}.scale: the pattern has {flat:.4} m² and the mesh {real:.4} m²; a scale of {:.4} would make them equal",
+    if real > 0.0 && !(1.0 / BEYOND..=BEYOND).contains(&ratio) {
+        let message = format!(
+            "{}, which makes the pattern {flat:.3e} m² where the mesh has {real:.3e} m²: no cloth is stretched so; expected about {:.3e}",
+            words.scale,
             words.scale / ratio.sqrt()
-        ));
+        );
+        site.wrong(format!("{path}.scale"), message);
+        return Err(());
+    }
+    if real > 0.0 && !(1.0 / UNLIKE..=UNLIKE).contains(&ratio) {
+        let message = format!(
+            "the pattern has {flat:.4} m² and the mesh {real:.4} m²; a scale of {:.4} would make them equal",
+            words.scale / ratio.sqrt()
+        );
+        site.hints.push(Warning::new(Code::PatternScale, format!("{path}.scale"), message));
     }
     let side = |t: u32| {
         let [a, b, c] = panels[t as usize];
@@ -150,10 +176,10 @@ fn pattern(site: &mut Site<'_>, words: &Pattern, mesh: &Mesh, path: &str) -> Res
     if let Some((_, faces)) = edges.iter().find(folded) {
         let n = edges.iter().filter(folded).count();
         let message = format!(
-            "{path}: the texture is folded over at {n} edges, the first at {}; no cloth is cut so, unwrap the mesh again",
+            "the texture is folded over at {n} edges, the first at {}; no cloth is cut so, unwrap the mesh again",
             place(faces[0] as usize)
         );
-        site.hints.push(message);
+        site.hints.push(Warning::new(Code::FoldedPattern, path, message));
     }
     Ok(panels)
 }

@@ -14,7 +14,7 @@ const PLANE: f64 = 10.0;
 pub fn placed(mesh: &Mesh, file: &MeshFile) -> Mesh {
     let (turn, shift) = (from_degrees(file.rotate), Vector::from(file.translate));
     let place = |v: &[f64; 3]| (turn.turn(Vector::from(*v) * file.scale) + shift).into();
-    Mesh { vertices: mesh.vertices.iter().map(place).collect(), triangles: mesh.triangles.clone(), texture: mesh.texture.clone() }
+    Mesh { vertices: mesh.vertices.iter().map(place).collect(), ..mesh.clone() }
 }
 
 /// The meshes of an animation put in their place.

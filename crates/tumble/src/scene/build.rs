@@ -7,6 +7,7 @@ use super::gas::gas;
 use super::hints::unused;
 use super::laws::{Reader, flat};
 use super::memory::memory;
+use super::plausible::implausible;
 use crate::exchange::Exchange;
 use crate::geometry::{Collider, Vector};
 use crate::math::parallel::fold;
@@ -26,7 +27,8 @@ use tumble_interface::check::plain;
 use tumble_interface::scene::{
     Animated, Bits, Field as Stream, Force as Words, Hair, Integrator, MeshFile, Method, Plane, Scene, Shape, System as Plan, Vicsek,
 };
-use tumble_interface::{Column, Data, Issue, Mesh, SceneError};
+use tumble_interface::warning::Code;
+use tumble_interface::{Column, Data, Issue, Mesh, SceneError, Warning};
 
 /// Births that are looked at before a run.
 const TRIALS: usize = 64;
@@ -39,7 +41,7 @@ pub struct Built {
     pub world: World,
     pub scenery: Vec<Column>,
     pub colliders: Arc<Vec<Collider>>,
-    pub warnings: Vec<String>,
+    pub warnings: Vec<Warning>,
 }
 
 /// Names of the fluids that carry tracers.
@@ -84,6 +86,7 @@ pub fn build(scene: &Scene, assets: &Assets) -> Result<Built, SceneError> {
     let drawn = with_clouds(scene);
     let scene = &*drawn;
     let mut warnings = unused(scene, &plans);
+    warnings.extend(implausible(scene, assets));
     let (colliders, scenery, surfaces) = solids(scene, assets, &mut issues);
     let mut parts = fill(scene, &plans, assets, (&colliders, &surfaces), (&mut issues, &mut warnings));
     let anchors: Vec<coupling::Link> =
@@ -123,9 +126,10 @@ pub fn build(scene: &Scene, assets: &Assets) -> Result<Built, SceneError> {
                 let later = scene.gas.iter().find(|gas| gas.name == *of).and_then(|gas| place(&plans, "gas", gas.system.as_deref()));
                 if let Some(later) = later.filter(|later| *later > index) {
                     let (own, other) = (&plan.name, &plans[later].name);
-                    warnings.push(format!(
-                        "system \"{own}\" comes before \"{other}\", whose gas carries it, and sees it as it was at the beginning of each exchange; put it behind"
-                    ));
+                    let message = format!(
+                        "comes before \"{other}\", whose gas carries it, and sees it as it was at the beginning of each exchange; put it behind"
+                    );
+                    warnings.push(Warning::new(Code::LateCarrier, format!("system \"{own}\""), message));
                 }
             }
             systems.push(Box::new(carried(scene, &plans, index, dt, parts.take_emitters())?));
@@ -176,7 +180,7 @@ pub fn build(scene: &Scene, assets: &Assets) -> Result<Built, SceneError> {
 }
 
 /// What starts inside a collider.
-fn buried(scene: &Scene, parts: &Parts, colliders: &[Collider]) -> Vec<String> {
+fn buried(scene: &Scene, parts: &Parts, colliders: &[Collider]) -> Vec<Warning> {
     type Start = (f64, Vector);
     let deeper = |a: (f64, f64, usize), b: (f64, f64, usize)| if b.0 > a.0 { b } else { a };
     let deepest = |start: &(dyn Fn(usize) -> Option<Start> + Sync), n: usize, spare: f64| {
@@ -198,9 +202,9 @@ fn buried(scene: &Scene, parts: &Parts, colliders: &[Collider]) -> Vec<String> {
         let (deep, t, k) = found?;
         let (deep, solid) = (short(deep), &scene.collider[k].name);
         let when = if t > 0.0 { format!(" at t = {} s", short(t)) } else { String::new() };
-        Some(format!(
-            "masses of \"{name}\" start{when} up to {deep} m inside collider \"{solid}\", and will be thrown out of it; move one of them"
-        ))
+        let message =
+            format!("masses start{when} up to {deep} m inside collider \"{solid}\", and will be thrown out of it; move one of them");
+        Some(Warning::new(Code::StartsInside, format!("\"{name}\""), message))
     };
     masses.chain(sources).filter_map(told).collect()
 }
@@ -276,11 +280,14 @@ fn solids(scene: &Scene, assets: &Assets, issues: &mut Vec<Issue>) -> (Vec<Colli
             Ok(collider) => colliders.push(collider),
             Err((key, message)) => issues.push(Issue::new(format!("collider \"{}\"{key}", thing.name), message)),
         }
-        let mut add = |name: &str, unit, data| {
-            scenery.push(Column { object: thing.name.clone(), name: name.into(), unit, width: 3, points: Vec::new(), data })
+        let mut add = |name: &str, unit, width, data: Data| {
+            if name != "texture" || !data.is_empty() {
+                scenery.push(Column { object: thing.name.clone(), name: name.into(), unit, width, points: Vec::new(), data });
+            }
         };
-        add("position", "m", Data::F64(surface.vertices.concat()));
-        add("triangles", "1", Data::U32(surface.triangles.concat()));
+        add("position", "m", 3, Data::F64(surface.vertices.concat()));
+        add("triangles", "1", 3, Data::U32(surface.triangles.concat()));
+        add("texture", "1", 6, Data::F32(surface.drawn_texture().concat()));
         surfaces.push(surface);
     }
     (colliders, scenery, surfaces)
@@ -292,7 +299,7 @@ fn fill(
     plans: &[Plan],
     assets: &Assets,
     solids: (&[Collider], &[Mesh]),
-    (issues, hints): (&mut Vec<Issue>, &mut Vec<String>),
+    (issues, hints): (&mut Vec<Issue>, &mut Vec<Warning>),
 ) -> Vec<Parts> {
     // Issues leave colliders out, and then nothing is built.
     let named: Vec<(String, Collider)> = scene.collider.iter().map(|c| c.name.clone()).zip(solids.0.iter().cloned()).collect();

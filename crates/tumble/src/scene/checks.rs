@@ -165,6 +165,16 @@ pub fn check(scene: &Scene, systems: &[System]) -> Vec<Issue> {
             wrong(format!("output.columns[{i}]"), format!("\"{column}\", expected one of {}{hint}", COLUMNS.join(", ")));
         }
     }
+    if scene.output.ply && !objects.iter().any(|(kind, ..)| matches!(*kind, "particles" | "emitter" | "galaxy")) {
+        let message = "true, but there are no particles to write: no [[particles]], [[emitter]] or [[galaxy]]; \
+                       leave it out, output.usd writes everything else";
+        wrong("output.ply".into(), message.into());
+    }
+    if scene.output.vdb && !objects.iter().any(|(kind, ..)| matches!(*kind, "gas" | "heat" | "compressible")) {
+        let message =
+            "true, but nothing lies on a grid: no [[gas]], [[heat]] or [[compressible]]; leave it out, output.usd writes everything else";
+        wrong("output.vdb".into(), message.into());
+    }
     for (i, probe) in scene.expect.probe.iter().enumerate() {
         if !objects.iter().any(|(_, name, _)| *name == probe.object) {
             let hint = suggestion(&probe.object, objects.iter().map(|o| o.1));

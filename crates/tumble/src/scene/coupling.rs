@@ -5,9 +5,10 @@ use crate::exchange::Exchange;
 use crate::geometry::Vector;
 use crate::systems::dynamics::{Dynamics, Parts, Tether};
 use crate::systems::gas::{Body, Sheet};
-use tumble_interface::Issue;
 use tumble_interface::check::suggestion;
 use tumble_interface::scene::{Anchor, Gas, Method, Scene, System as Plan};
+use tumble_interface::warning::Code;
+use tumble_interface::{Issue, Warning};
 
 /// Balls that one fluid moves at most.
 const MOST_BODIES: usize = 256;
@@ -140,7 +141,7 @@ pub fn link(scene: &Scene, plans: &[Plan], anchor: &Anchor, parts: &[Parts], iss
 }
 
 /// Between systems the one of the first end owns the spring; the other gives a port.
-pub fn hang(system: &mut Dynamics, index: usize, anchor: &Link, dt: f64, exchange: &mut Exchange, warnings: &mut Vec<String>) {
+pub fn hang(system: &mut Dynamics, index: usize, anchor: &Link, dt: f64, exchange: &mut Exchange, warnings: &mut Vec<Warning>) {
     let [(s, a), (t, b)] = anchor.ends;
     if s != t && t == index {
         system.expect_pushes();
@@ -154,10 +155,10 @@ pub fn hang(system: &mut Dynamics, index: usize, anchor: &Link, dt: f64, exchang
     let damp = dt * anchor.damping * anchor.inverse_mass;
     if turn > 0.5 || damp > 0.5 {
         let times = (2.0 * turn.max(damp)).ceil();
-        warnings.push(format!(
-            "anchor \"{}\": omega dt = {turn:.2}, c dt/m = {damp:.2}; systems exchange impulses explicitly, which needs both below 0.5: \
-             raise time.exchanges {times} times, or put both objects into one system",
-            anchor.name
-        ));
+        let message = format!(
+            "omega dt = {turn:.2}, c dt/m = {damp:.2}; systems exchange impulses explicitly, which needs both below 0.5: \
+             raise time.exchanges {times} times, or put both objects into one system"
+        );
+        warnings.push(Warning::new(Code::StiffAnchor, format!("anchor \"{}\"", anchor.name), message));
     }
 }

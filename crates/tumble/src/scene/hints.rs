@@ -1,26 +1,32 @@
 //! What a scene says in vain, and what it hardly means.
 
 use super::checks::{objects, place};
+use tumble_interface::Warning;
 use tumble_interface::check::plain;
 use tumble_interface::scene::{
     Animated, AnimatedVector, Component, Emitter, Event, Force as Words, Kill, Method, Particles, Scene, Shape, Source, System as Plan,
 };
+use tumble_interface::warning::Code;
 
 /// What the scene says and nothing heeds.
-pub fn unused(scene: &Scene, plans: &[Plan]) -> Vec<String> {
+pub fn unused(scene: &Scene, plans: &[Plan]) -> Vec<Warning> {
     let carried = |(kind, _, system): &(&str, &str, Option<&str>)| place(plans, kind, *system).map(|i| plans[i].method);
     let methods: Vec<Method> = objects(scene).iter().filter_map(carried).collect();
     let mut warnings = Vec::new();
     if !scene.field.is_empty() && !methods.contains(&Method::Tracers) {
-        warnings.push("no object is moved by a system of tracers, so that nothing follows the fields".into());
+        warnings.push(Warning::new(
+            Code::IdleFields,
+            "field",
+            "no object is moved by a system of tracers, so that nothing follows the fields",
+        ));
     }
     if scene.field.is_empty() && methods.contains(&Method::Tracers) {
-        warnings.push("tracers have no [[field]] to follow, and stay where they are; add one".into());
+        warnings.push(Warning::new(Code::IdleTracers, "", "tracers have no [[field]] to follow, and stay where they are; add one"));
     }
     if !methods.contains(&Method::Dynamics) {
         let on_grids = |m: &Method| matches!(m, Method::Heat | Method::Compressible);
         let solids = !scene.collider.is_empty() && !methods.contains(&Method::Gas);
-        for (words, given) in [("forces", !scene.force.is_empty()), ("colliders", solids)] {
+        for (key, words, given) in [("force", "forces", !scene.force.is_empty()), ("collider", "colliders", solids)] {
             if given {
                 let kind = if methods.contains(&Method::Tracers) {
                     "tracers"
@@ -29,11 +35,12 @@ pub fn unused(scene: &Scene, plans: &[Plan]) -> Vec<String> {
                 } else {
                     "in a vicsek system"
                 };
-                warnings.push(format!("all objects are {kind}, which feel no {words}"));
+                warnings.push(Warning::new(Code::Unfelt, key, format!("all objects are {kind}, which feel no {words}")));
             }
         }
     }
     for (i, force) in scene.force.iter().enumerate() {
+        let at = || format!("force[{i}]");
         let reached = |name: &String| force.on().is_none_or(|on| on.contains(name));
         let charged = |p: &Particles| p.charge.iter().any(|q| *q != 0.0) && reached(&p.name);
         let emitted = |e: &Emitter| e.charge != 0.0 && reached(&e.name);
@@ -48,48 +55,51 @@ pub fn unused(scene: &Scene, plans: &[Plan]) -> Vec<String> {
                 .chain(scene.block.iter().map(|t| &t.name))
                 .any(reached)
         {
-            warnings.push(format!("force[{i}]: nothing in its reach has a surface; give it a sheet, a net or cloth"));
+            warnings.push(Warning::new(Code::NoSurface, at(), "nothing in its reach has a surface; give it a sheet, a net or cloth"));
         }
         if matches!(force, Words::Magnetic { .. } | Words::Electric { .. } | Words::Electrostatics { .. }) && !any {
-            warnings.push(format!("force[{i}]: nothing in its reach has a charge; give particles a charge"));
+            warnings.push(Warning::new(Code::NoCharge, at(), "nothing in its reach has a charge; give particles a charge"));
         }
     }
     if scene.collider.is_empty() {
+        let mut alone = |path: String, message: &str| warnings.push(Warning::new(Code::NoCollider, path, message));
         for gas in scene.gas.iter().filter(|gas| !gas.bodies.is_empty()) {
-            warnings.push(format!(
-                "gas \"{}\".bodies: the sides of the box are no obstacle to balls, and there is no collider; add one of its shape with inside = true",
-                gas.name
-            ));
+            alone(
+                format!("gas \"{}\".bodies", gas.name),
+                "the sides of the box are no obstacle to balls, and there is no collider; add one of its shape with inside = true",
+            );
         }
         for emitter in &scene.emitter {
             if let Some(i) = emitter.kill.iter().position(|rule| matches!(rule, Kill::NearCollider(_))) {
                 let name = &emitter.name;
-                warnings.push(format!("emitter \"{name}\".kill[{i}]: near_collider, but there is no collider; add one, or leave it out"));
+                alone(format!("emitter \"{name}\".kill[{i}]"), "near_collider, but there is no collider; add one, or leave it out");
             }
         }
         for emitter in &scene.emitter {
             if matches!(&emitter.from, Source::Particles { at: Event::Bounce, .. }) {
                 let name = &emitter.name;
-                warnings.push(format!("emitter \"{name}\".from.particles.at: there is no collider to bounce off; add one"));
+                alone(format!("emitter \"{name}\".from.particles.at"), "there is no collider to bounce off; add one");
             }
         }
         for (i, _) in scene.force.iter().enumerate().filter(|(_, f)| matches!(f, Words::Flock { avoidance, .. } if *avoidance > 0.0)) {
-            warnings.push(format!("force[{i}].avoidance: there is no collider to shun; add one, or leave it out"));
+            alone(format!("force[{i}].avoidance"), "there is no collider to shun; add one, or leave it out");
         }
     }
     scene.emitter.iter().for_each(|emitter| doubts(scene, emitter, &mut warnings));
     if let Some(last) = scene.output.stills.iter().find(|i| **i > scene.time.frames) {
-        warnings.push(format!("output.stills: there is no frame {last}; the last one is {}", scene.time.frames));
+        let message = format!("there is no frame {last}; the last one is {}", scene.time.frames);
+        warnings.push(Warning::new(Code::NoSuchFrame, "output.stills", message));
     }
     warnings
 }
 
 /// Whether an emitter has particles at all, and whether regions that kill them are thick enough for their speed.
-fn doubts(scene: &Scene, emitter: &Emitter, warnings: &mut Vec<String>) {
+fn doubts(scene: &Scene, emitter: &Emitter, warnings: &mut Vec<Warning>) {
     let (name, end) = (&emitter.name, f64::from(scene.time.frames) / scene.time.fps);
     let quiet = matches!(emitter.rate, Animated::Value(rate) if rate <= 0.0) || emitter.start >= emitter.end.unwrap_or(end).min(end);
     if quiet && !matches!(emitter.from, Source::Particles { .. }) && emitter.burst.iter().all(|b| b.time >= end || b.count == 0) {
-        warnings.push(format!("emitter \"{name}\": nothing is born in the {} s of the scene; see its rate, start and burst", plain(end)));
+        let message = format!("nothing is born in the {} s of the scene; see its rate, start and burst", plain(end));
+        warnings.push(Warning::new(Code::NoBirths, format!("emitter \"{name}\""), message));
     }
     let given = match &emitter.velocity {
         AnimatedVector::Components(all) => all.iter().map(|c| if let Component::Value(v) = c { v * v } else { 0.0 }).sum::<f64>().sqrt(),
@@ -105,12 +115,13 @@ fn doubts(scene: &Scene, emitter: &Emitter, warnings: &mut Vec<String>) {
         };
         if way > thick {
             let enough = (f64::from(scene.time.exchanges) * way / thick).ceil();
-            warnings.push(format!(
-                "emitter \"{name}\".kill[{i}].inside: at {} m/s particles may pass {} m unseen, for rules are looked at when an exchange \
+            let message = format!(
+                "at {} m/s particles may pass {} m unseen, for rules are looked at when an exchange \
                  interval ends; set time.exchanges to {enough} or more",
                 plain(speed),
                 plain(thick)
-            ));
+            );
+            warnings.push(Warning::new(Code::ThinRegion, format!("emitter \"{name}\".kill[{i}].inside"), message));
         }
     }
 }

@@ -9,6 +9,7 @@ pub mod hand;
 mod hints;
 mod laws;
 mod memory;
+mod plausible;
 mod simulation;
 
 pub use memory::memory;

@@ -9,7 +9,7 @@ use crate::world::World;
 use std::sync::Arc;
 use tumble_interface::engine::{Cure, Engine, Inside, Ledger, Stability, StepReport, UserForce, UserIntegrator};
 use tumble_interface::scene::{Integrator, System};
-use tumble_interface::{Column, Frame, Issue, Scene, SceneError, StepError};
+use tumble_interface::{Column, Frame, Issue, Scene, SceneError, StepError, Warning};
 
 /// A world together with the scene that it was built from.
 pub struct Simulation {
@@ -18,7 +18,7 @@ pub struct Simulation {
     world: World,
     scenery: Vec<Column>,
     colliders: Arc<Vec<Collider>>,
-    warnings: Vec<String>,
+    warnings: Vec<Warning>,
     /// The failure of the last step: index and step of the system.
     failure: Option<(usize, f64)>,
 }
@@ -169,7 +169,7 @@ impl Engine for Simulation {
         cures::cures(&self.scene, &self.assets, self.world.frame_index() + 1, system, step, &usable, go_on)
     }
 
-    fn warnings(&self) -> &[String] {
+    fn warnings(&self) -> &[Warning] {
         &self.warnings
     }
 

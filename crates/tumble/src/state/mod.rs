@@ -54,6 +54,8 @@ pub struct Object {
     pub frames: Range<usize>,
     /// Triangles over its points, counted from its first.
     pub triangles: Vec<[u32; 3]>,
+    /// Texture coordinates u, v of the three corners of each triangle; empty if there are none.
+    pub texture: Vec<[f32; 6]>,
     /// Whether the triangles enclose a volume, and go on to: none tears.
     pub closed: bool,
     /// Points in the order of a curve, counted from its first; empty if it is none.

@@ -232,6 +232,7 @@ impl Dynamics {
             let pinned = points.filter(|i| self.state.x[*i][3] == 0.0).map(|i| (i - object.points.start) as u32);
             add("pinned", "1", 1, Data::U32(pinned.collect()));
             add("triangles", "1", 3, Data::U32(object.triangles.concat()));
+            add("texture", "1", 6, Data::F32(object.texture.concat()));
             add("links", "1", 2, Data::U32(self.link_ends(object)));
             add("curve", "1", 1, Data::U32(object.curve.clone()));
             if object.curve_points > 0 {
@@ -266,9 +267,10 @@ impl Dynamics {
         }
         let strains = self.laws.batches.iter().map(|b| b.largest_strain(x)).chain(self.constraints.iter().map(|c| c.largest_strain(x)));
         let stretch = strains.fold(0.0, |most, strain| f64::max(most, strain + 1.0));
+        // What is held is where it was put, as the roots of hair are, and no solid moves it.
         let depths = |i: usize| {
             let p = xyz64(x[i]);
-            let colliders = if masses.mass[i] > 0.0 { &self.laws.colliders[..] } else { &[] };
+            let colliders = if masses.mass[i] > 0.0 && x[i][3] > 0.0 { &self.laws.colliders[..] } else { &[] };
             colliders.iter().filter_map(move |c| c.touch(p, t)).map(|t| t.depth)
         };
         let touching = !self.laws.colliders.is_empty();

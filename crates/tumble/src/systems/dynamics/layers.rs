@@ -11,6 +11,7 @@ use crate::geometry::mesh_contact::{Detector, Owner, Pair, Topology, intersectio
 use crate::math::{Real, Row, Vec3, axpy, row, sub, xyz, xyz64};
 use crate::state::{Object, State};
 use tumble_interface::scene::SelfContact;
+use tumble_interface::warning::{Code, Warning};
 
 /// Pairs are looked for along the ways that vertices are about to go, within the thickness and this many times the way of the fastest
 /// one in a sub-step: elements turn vertices off their ways.
@@ -116,16 +117,16 @@ impl Layers {
 
 impl Dynamics {
     /// Surfaces that pass through each other as they are, as a sentence with the place; `None` if none do, or may.
-    pub fn tangles(&self) -> Option<String> {
+    pub fn tangles(&self) -> Option<Warning> {
         let (n, [one, other], place) = self.layers.as_ref()?.tangles(&self.objects, &self.state.x)?;
         let (one, other) = (&self.objects[one].name, &self.objects[other].name);
         let through = if one == other { "itself".to_string() } else { format!("\"{other}\"") };
         let place = <[f64; 3]>::from(place).map(|x| format!("{x:.4}")).join(", ");
-        Some(format!(
-            "system \"{}\": {n} edges pass through triangles at the start; at [{place}] \"{one}\" passes through {through}. They are pushed out as far \
-             as that succeeds; start without",
-            self.name
-        ))
+        let message = format!(
+            "{n} edges pass through triangles at the start; at [{place}] \"{one}\" passes through {through}. They are pushed out as far \
+             as that succeeds; start without"
+        );
+        Some(Warning::new(Code::TangledStart, format!("system \"{}\"", self.name), message))
     }
 
     /// Before an interval: what is tangled.

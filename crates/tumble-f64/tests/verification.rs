@@ -1,0 +1,54 @@
+//! The verification tests in double precision, in one program: many small ones take minutes to link.
+//!
+//! `cargo test --release -p tumble-f64 --test verification hair::` runs one file of them.
+
+mod common;
+
+mod advection;
+mod air;
+mod bodies;
+mod broken;
+mod character;
+mod cloth;
+mod compressible;
+mod conservation;
+mod contact;
+mod contact_sweep;
+mod coupling;
+mod damping;
+mod densities;
+mod draping;
+mod electrostatics;
+mod elements;
+mod emission;
+mod fabrics;
+mod fire;
+mod flock;
+mod forces;
+mod galaxy;
+mod gas;
+mod gravitation;
+mod hair;
+mod hand;
+mod heat;
+mod integrators_order;
+mod integrators_oscillator;
+mod layers;
+mod liquids;
+mod mesh_contact;
+mod neighbours;
+mod operators;
+mod pattern;
+mod pinned_velocity;
+mod position_based;
+mod position_based_scenes;
+mod pressure;
+mod projections;
+mod rods_position_based;
+mod sheets;
+mod solids;
+mod stability_estimate;
+mod statics;
+mod surfaces;
+mod tear;
+mod trails;

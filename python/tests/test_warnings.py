@@ -1,0 +1,150 @@
+"""Warnings have codes, are listed in docs/warnings.md, appear once with a count, and tell of figures unlike anything real."""
+
+import json
+import re
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import pytest
+from conftest import Answer
+from runs import Tree
+
+from tumble import World
+
+ROOT = Path(__file__).parents[2]
+LISTED = re.findall(r"^### (\S+)$", (ROOT / "docs/warnings.md").read_text(encoding="utf-8"), re.MULTILINE)
+
+
+def test_every_code_is_listed_and_every_listed_code_is_said() -> None:
+    words = re.findall(
+        r"(\w+) = \"([a-z-]+)\",", (ROOT / "crates/tumble-interface/src/warning.rs").read_text(encoding="utf-8")
+    )
+    engine = "".join(file.read_text(encoding="utf-8") for file in (ROOT / "crates/tumble/src").rglob("*.rs"))
+    unsaid = [code for variant, code in words if f"Code::{variant}" not in engine]
+    front = "".join(file.read_text(encoding="utf-8") for file in (ROOT / "python/tumble").rglob("*.py"))
+    said = re.findall(r'(?:warn\(|warn, |"code": )"([a-z-]+)"', front)
+    assert len(words) > 15 and len(said) > 4 and not unsaid
+    assert sorted(LISTED) == sorted({code for _, code in words} | set(said))
+    assert len(LISTED) == len(set(LISTED))
+
+
+def test_a_kind_appears_once_with_a_count(scene_file: Callable[..., Path], tumble: Callable[..., Answer]) -> None:
+    emitters = [{"name": f"e{i}", "rate": 9, "start": 60, "from": {"point": {"at": [i, 0, 0]}}} for i in range(9)]
+    scene = {"version": 1, "time": {"frames": 2}, "emitter": emitters, "output": {"plot": False, "stills": [40]}}
+    path = scene_file(scene)
+    for words in (["check", path], ["run", path, "--out", path.parent / "out"]):
+        answer = tumble(*map(str, words))
+        told = [line for line in answer.err.splitlines() if line.startswith("warning[")]
+        assert len(told) == 2, answer
+        births = next(line for line in told if line.startswith("warning[no-births]: "))
+        assert 'emitter "e0": nothing is born' in births and "(8 more of this kind: " in births
+        assert births.endswith('emitter "e1", emitter "e2", emitter "e3", emitter "e4", 4 others)'), births
+    kept = json.loads((path.parent / "out/run.json").read_text())["warnings"]
+    assert [w["code"] for w in kept].count("no-births") == 9 and len(kept) == 10
+
+
+SHEET = {"name": "s", "size": [1, 1], "resolution": [3, 3]}
+BLOCK = {"name": "b", "size": [1, 1, 1], "resolution": [2, 2, 2], "material": {"young": 1e6, "poisson": 0.3}}
+ROPE = {"name": "r", "from": [0, 0, 0], "to": [1, 0, 0], "segments": 2}
+LIQUID = {"spacing": 0.1, "fill": [{"center": [0, 0, 0], "size": [0.3, 0.3, 0.3]}]}
+SOFT = {"system": [{"method": "position_based"}]}
+DOUBTS: list[tuple[Tree, Tree, str, str, str]] = [
+    # What is doubtful, what is not, code, place, figure.
+    (
+        {"sheet": [SHEET | {"density": 8.1}]},
+        {"sheet": [SHEET | {"density": 7.9}]},
+        "implausible-weight",
+        'sheet "s".density',
+        "20 times",
+    ),
+    (
+        {"sheet": [SHEET | {"density": 5e-5}]},
+        {"sheet": [SHEET | {"density": 2e-4}]},
+        "implausible-weight",
+        'sheet "s".density',
+        "film",
+    ),
+    (
+        {"rope": [ROPE | {"density": 1100}]},
+        {"rope": [ROPE | {"density": 900}]},
+        "implausible-weight",
+        'rope "r".density',
+        "chains",
+    ),
+    (
+        {"block": [BLOCK | {"density": 45180}]},
+        {"block": [BLOCK | {"density": 22500}]},
+        "implausible-density",
+        'block "b".density',
+        "2 times",
+    ),
+    (
+        {"block": [BLOCK | {"density": 0.1}]},
+        {"block": [BLOCK | {"density": 0.2}]},
+        "implausible-density",
+        'block "b".density',
+        "0.16",
+    ),
+    (
+        {"particles": [{"name": "p", "fluid": LIQUID | {"density": 1}}], **SOFT},
+        {"particles": [{"name": "p", "fluid": LIQUID}], **SOFT},
+        "implausible-density",
+        'particles "p".fluid.density',
+        "less than 70",
+    ),
+    (
+        {"block": [BLOCK | {"material": {"young": 2.4e12, "poisson": 0.3}}]},
+        {"block": [BLOCK | {"material": {"young": 1.1e12, "poisson": 0.3}}]},
+        "implausible-stiffness",
+        'block "b".material.young',
+        "2 times as stiff as diamond",
+    ),
+    (
+        {"rope": [ROPE], "world": {"gravity": [0, 0, -980.665]}},
+        {"rope": [ROPE], "world": {"gravity": [0, 0, -274]}},
+        "implausible-gravity",
+        "world.gravity",
+        "100 times",
+    ),
+    (
+        {"sheet": [SHEET | {"size": [210, 1]}]},
+        {"sheet": [SHEET | {"size": [190, 1]}]},
+        "implausible-size",
+        'sheet "s".size',
+        "210 m",
+    ),
+    (
+        {"block": [BLOCK | {"size": [5e-5] * 3}]},
+        {"block": [BLOCK | {"size": [2e-4] * 3}]},
+        "implausible-size",
+        'block "b".size',
+        "5e-5",
+    ),
+]
+
+
+@pytest.mark.parametrize(("doubtful", "fine", "code", "path", "figure"), DOUBTS)
+def test_figures_unlike_anything_real_are_told(doubtful: Tree, fine: Tree, code: str, path: str, figure: str) -> None:
+    def told(words: Tree) -> list[dict[str, Any]]:
+        return World({"version": 1} | words).warnings
+
+    (warning,) = told(doubtful)
+    assert (warning["code"], warning["path"]) == (code, path) and figure in warning["message"], warning
+    assert told(fine) == []
+
+
+def test_a_mesh_in_millimetres_is_told(tmp_path: Path) -> None:
+    (tmp_path / "body.obj").write_text(
+        "v 0 0 0\nv 1700 0 0\nv 0 300 0\nv 0 0 200\nf 1 3 2\nf 1 2 4\nf 2 3 4\nf 1 4 3\n"
+    )
+
+    def told(scale: float) -> list[tuple[str, str]]:
+        mesh = {"path": str(tmp_path / "body.obj"), "scale": scale}
+        things = {"net": [{"name": "n", "mesh": mesh}], "collider": [{"name": "c", "shape": {"mesh": mesh}}]}
+        return [
+            (w["code"], w["path"]) for w in World({"version": 1} | things).warnings if w["code"] == "implausible-size"
+        ]
+
+    assert told(1.0) == [("implausible-size", 'net "n".mesh'), ("implausible-size", 'collider "c".shape.mesh')]
+    assert told(0.001) == []
