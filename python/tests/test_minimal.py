@@ -147,9 +147,9 @@ CASES: dict[str, Tree] = {
 CASES["heat"]["collider"] = []
 FIRST = {
     "springs": ("p", 2),
-    "cloth": ("s", 100),
+    "cloth": ("s", 4),
     "heat": ("h", 1),
-    "gas": ("g", 512),
+    "gas": ("g", 8),
     "liquid": ("w", 432),
     "force": ("p", 1),
 }

@@ -197,13 +197,13 @@ class _Search:
         self._thin(rest, lambda units: self.does(self.full, self.gone | set(units)))
 
     def lower_counts(self) -> None:
-        """To an eighth as long as that does, then to halves."""
+        """To an eighth as long as that does, then to halves; where coarser does not, smaller of the same fineness."""
         for kind, i in self._here(_COUNTS):
             for word in _COUNTS[kind]:
-                for factor in (8, 2):
-                    while (less := _fewer(kind, word, _at(self.full[kind][i], word), factor)) is not None:
-                        changed = deepcopy(self.full)
-                        _put(changed[kind][i], word, less)
+                for factor, how in ((8, _coarser), (8, _smaller), (2, _coarser), (2, _smaller)):
+                    while (thing := how(kind, word, self.full[kind][i], factor)) is not None:
+                        changed = {**self.full, kind: list(self.full[kind])}
+                        changed[kind][i] = thing
                         if not self.does(changed, self.gone):
                             break
 
@@ -497,6 +497,34 @@ def _unit(path: str, full: Tree, there: Mapping[str, Sequence[int]]) -> Unit | N
     if number is not None:
         return (kind, there[kind][int(number)]) if int(number) < len(there[kind]) else None
     return next(((kind, i) for i in there[kind] if full[kind][i].get("name") == match[4]), None)
+
+
+def _coarser(kind: str, word: str, thing: Tree, factor: int) -> Tree | None:
+    """A thing with a count that is lower by a factor; None if it has none."""
+    less = _fewer(kind, word, _at(thing, word), factor)
+    if less is None:
+        return None
+    changed = deepcopy(thing)
+    _put(changed, word, less)
+    return changed
+
+
+def _smaller(kind: str, word: str, thing: Tree, factor: int) -> Tree | None:
+    """The same, but made smaller by as much, so that it is as fine as before; None if there is no such thing."""
+    changed = _coarser(kind, word, thing, factor)
+    if changed is None:
+        return None
+    before, after = _at(thing, word), _at(changed, word)
+    if kind in ("sheet", "block"):
+        changed["size"] = [s * (b - 1) / (a - 1) for s, b, a in zip(thing["size"], after, before, strict=True)]
+    elif word == "box.resolution":
+        changed["box"]["size"] = [s * after / before for s in thing["box"]["size"]]
+    elif (kind, word) == ("rope", "segments"):
+        ends = zip(thing["from"], thing["to"], strict=True)
+        changed["to"] = [a + (b - a) * after / before for a, b in ends]
+    else:
+        return None
+    return changed
 
 
 def _fewer(kind: str, word: str, value: Any, factor: int) -> Any:
