@@ -13,7 +13,7 @@ from tumble._engine import Scene, SceneError, StepError, World
 from tumble.folder import RunFolder, plain, refuse
 from tumble.lock import alone, ask
 from tumble.recorder import Recorder, describe
-from tumble.run import Progress, Run, admit, record, return_to_checkpoint
+from tumble.run import Broke, Progress, Run, admit, record, return_to_checkpoint
 
 Descent = list[dict[str, Any]]
 
@@ -28,13 +28,14 @@ def branch(
     threads: int | None = None,
     progress: Progress | None = None,
     overwrite: bool = False,
+    broke: Broke | None = None,
 ) -> Run:
     """Goes on from a frame of a run (-1 is the last) in another folder, with changes to its scene ("world.gravity=[0, 0, 0]").
 
     The folder begins with the parent's frames, so that it is a run like any other; its `descent` says where it comes from. The
     state is read from the nearest checkpoint before the frame, or made anew from the start, and simulated on to the frame.
     `frames` is how many to simulate; without it, to the scene's last. Masses and pins cannot change, and where things start has
-    no effect: they are part of the state. `resume` and `overwrite` are those of `simulate`.
+    no effect: they are part of the state. `resume`, `overwrite` and `broke` are those of `simulate`.
 
     Raises SceneError if frame, changes or folder are wrong; StepError if the physics breaks; ExportError if a file cannot be
     written.
@@ -60,12 +61,12 @@ def branch(
 
         if earlier is not None and return_to_checkpoint(world, files):
             recorder = Recorder(files, world, threads, earlier, descent)
-            return record(recorder, lambda: begin(recorder.go_on), progress)
+            return record(recorder, lambda: begin(recorder.go_on), progress, broke=broke)
         _take_over(world, parent, k, threads)
         if files.is_run():
             files.clear()
         recorder = Recorder(files, world, threads, None, descent)
-        return record(recorder, lambda: begin(lambda: recorder.branch_off(parent)), progress)
+        return record(recorder, lambda: begin(lambda: recorder.branch_off(parent)), progress, broke=broke)
 
 
 def world_at(run: Run, frame: int, threads: int | None = None) -> World:

@@ -22,6 +22,9 @@ TOO_MUCH = 1.0
 NOISE = 1e-3
 """Of the largest energy of a kind, what may be gained by rounding."""
 
+KINDS = ("particles", "rope", "sheet", "block", "net", "cloth")
+"""Things that are made of masses and what binds them."""
+
 _GIVE = {"wind", "air", "flock", "acceleration", "electric", "vortex", "turbulence", "propulsion"}
 _ALIVE = {"animated_mesh", "character", "mannequin"}
 _TAKE = {"drag", "wind", "air", "viscosity", "flock", "propulsion"}
@@ -65,7 +68,7 @@ def unsoftened(scene: Tree) -> list[int]:
 
 
 def _things(scene: Tree) -> list[tuple[str, Tree]]:
-    return [(kind, thing) for kind in ("particles", "rope", "sheet", "block", "net", "cloth") for thing in scene[kind]]
+    return [(kind, thing) for kind in KINDS for thing in scene[kind]]
 
 
 def _damped(value: Any) -> bool:

@@ -50,6 +50,7 @@ static.npz columns.json ledger.csv trials.csv frames/*.npz checkpoints/*.safeten
 film.mp4 .film.mp4.part energy.png ledger.png stills/*.png columns.npz
 scene.usda usd/frame.*.usdc usd/manifest.usda usd/objects.usdc ply/*.ply
 volumes/*.vdb slices/*.png
+minimal.toml
 run.json
 """
 """What a run writes and --force deletes: the manifest last, because a folder without it is not taken for a run."""

@@ -2,6 +2,7 @@
 
 import os
 import platform
+import shlex
 import sys
 import time
 from collections.abc import Mapping, Sequence
@@ -10,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from tumble import _engine, energy, expect
+from tumble import _engine, causes, cures, energy, expect, minimal
 from tumble._engine import ExportError, StepError, TumbleError, World
 from tumble.folder import (
     FORMAT,
@@ -187,17 +188,52 @@ class Recorder:
         self.manifest["expectations"] = [b.to_dict() for b in broken]
         self._write_manifest()
 
-    def fail(self, error: StepError, cures: bool = True) -> None:
-        """Notes why the physics broke, then, if `cures` are asked for, tries what would have helped."""
+    def fail(self, error: StepError, explain: bool = True) -> None:
+        """Notes why the physics broke, then, if asked to `explain` it, tries what would have helped, and looks for a minimal
+        scene that breaks in the same way."""
         self.stop("failed", str(error), getattr(error, "report", {}))
-        if not cures:
+        if not explain:
             return
         failure = self.manifest["failure"]
-        with suppress(KeyboardInterrupt):  # The failure is worth more than its cures.
-            failure["cures"] = self.world.cures()
+        # The failure is worth more than its cures, and both more than a smaller scene.
+        with suppress(KeyboardInterrupt):
+            self._explain(failure)
+            failure["cures"] = cures.cures(self.world, self.scene, failure["report"])
             with suppress(TumbleError, OSError):
                 self._soften(failure)
+            self._explain(failure)
+            self.stop("failed")
+            with suppress(Exception):
+                self._minimize(failure)
         self.stop("failed")
+
+    def _explain(self, failure: dict[str, Any]) -> None:
+        """Notes the likely causes."""
+        from tumble.run import Run
+
+        with suppress(Exception):
+            run = Run(self.files.path)
+            failure["causes"] = causes.likely(self.world, self.scene, failure["report"], run, failure.get("near", ()))
+
+    def _minimize(self, failure: dict[str, Any]) -> None:
+        from tumble.run import Run
+
+        path = self.files.path / minimal.FILE
+        with suppress(OSError):
+            path.unlink()
+        found = minimal.minimize(
+            self.world.scene,
+            failure["report"],
+            self.written + 1,
+            float(Run(self.files.path).ledger["steps"].sum()),
+            # A branch has another past.
+            sure=not self.manifest["descent"],
+            threads=self.manifest["machine"]["threads"],
+        )
+        if found is not None:
+            minimal.write(found, path, shlex.join(["tumble", "run", minimal.FILE]))
+            failure["minimal"] = minimal.FILE
+            failure["smaller"] = found.text
 
     def _soften(self, failure: dict[str, Any]) -> None:
         """Tries to soften what came too near for the steps, and puts that before the other cures."""

@@ -22,6 +22,9 @@ from tumble.soundness import fault_of_arrays, fault_of_columns, fault_of_manifes
 Progress = Callable[[int, int], None]
 """Called with frames done and frames in all."""
 
+Broke = Callable[[StepError], None]
+"""Called with why the physics broke, before cures are tried."""
+
 
 def simulate(
     scene: Scene | Mapping[str, Any],
@@ -32,12 +35,14 @@ def simulate(
     progress: Progress | None = None,
     overwrite: bool = False,
     cures: bool = True,
+    broke: Broke | None = None,
 ) -> "Run":
     """Simulates a scene into a folder.
 
     `frames` overrides the scene's. `resume` goes on where an earlier run in the folder was stopped, to the same bits as
     if it had not been; without an earlier run it starts one. `overwrite` replaces an earlier run.
-    Where the physics breaks, `cures` are tried, which takes as long as many such runs.
+    Where the physics breaks, `cures` are tried and a minimal scene that breaks as well is looked for, which takes as long as
+    many such runs; `broke` is told before.
 
     Raises SceneError if the scene or the folder is wrong, before anything is written; StepError if the physics breaks;
     ExportError if a file cannot be written. Whatever was finished by then can be read with `Run.open`.
@@ -53,7 +58,7 @@ def simulate(
     with alone(files.path):
         # Another run may have come and gone meanwhile.
         earlier = admit(files, scene, resume, overwrite)
-        return _simulate(files, world, threads, progress, earlier, overwrite, cures)
+        return _simulate(files, world, threads, progress, earlier, overwrite, cures, broke)
 
 
 def _simulate(
@@ -64,6 +69,7 @@ def _simulate(
     earlier: dict[str, Any] | None,
     overwrite: bool,
     cures: bool,
+    broke: Broke | None,
 ) -> "Run":
     if earlier is not None and not return_to_checkpoint(world, files):
         earlier, overwrite = None, True
@@ -71,11 +77,17 @@ def _simulate(
     if earlier is None and overwrite and files.is_run():
         files.clear()
     recorder = Recorder(files, world, threads, earlier)
-    return record(recorder, recorder.start if earlier is None else recorder.go_on, progress, cures)
+    return record(recorder, recorder.start if earlier is None else recorder.go_on, progress, cures, broke)
 
 
-def record(recorder: Recorder, begin: Callable[[], None], progress: Progress | None, cures: bool = True) -> "Run":
-    """Begins to record, and simulates to the last frame. Where that fails, `cures` are tried."""
+def record(
+    recorder: Recorder,
+    begin: Callable[[], None],
+    progress: Progress | None,
+    cures: bool = True,
+    broke: Broke | None = None,
+) -> "Run":
+    """Begins to record, and simulates to the last frame. Where that fails, `broke` is told and `cures` are tried."""
     files, world = recorder.files, recorder.world
     try:
         begin()
@@ -84,6 +96,8 @@ def record(recorder: Recorder, begin: Callable[[], None], progress: Progress | N
         run = Run(files.path)
         recorder.judge(expect.check(run))
     except StepError as error:
+        if broke is not None and cures:
+            broke(error)
         recorder.fail(error, cures)
         raise
     except KeyboardInterrupt:

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from tumble.cli import find, report
-from tumble.cli.console import Progress, complain, counted, say, stopped, warn
+from tumble.cli.console import Progress, broke, complain, counted, say, stopped, warn
 
 if TYPE_CHECKING:
     from tumble import Run
@@ -67,7 +67,7 @@ def branch(
     at = f"{parent.folder}@{k}"
     try:
         with Progress("simulate") as progress:
-            done = go(parent, frame, folder, changes, frames, resume, threads, progress, force)
+            done = go(parent, frame, folder, changes, frames, resume, threads, progress, force, broke)
     except StepError as error:
         from tumble import Run
 

@@ -86,6 +86,13 @@ def warn_of(warnings: Iterable[Mapping[str, str]]) -> None:
         warn(code, text)
 
 
+def broke(error: Exception) -> None:
+    """What went wrong, said while it is being explained."""
+    first = str(error).splitlines()[0]
+    text = f"{first}\nLooking for causes, cures and a small scene that breaks as well; Ctrl-C ends that."
+    print(text, file=sys.stderr, flush=True)
+
+
 def _mark(word: str, color: str, text: str) -> None:
     print(f"\033[{color}m{word}\033[0m{text}" if sys.stderr.isatty() else word + text, file=sys.stderr, flush=True)
 

@@ -21,6 +21,8 @@ scene may give or take that much."""
 _GAINS = ("forward_euler", "modified_euler", "midpoint", "heun")
 """Integrators that gain energy of oscillations at any step."""
 
+_EMPTY: Mapping[str, Any] = {}
+
 _RESULTS = ["film.mp4", "scene.usda", "ply", "energy.png", "stills"]
 
 
@@ -111,10 +113,12 @@ def failure(
     best = next((cure for cure in cures if cure["survived"] and _keeps_energy(cure, run.scene)), None)
     lines = [f"{_headline(report)}, after frame {run.n_frames - 1}"]
     if "index" in report:
-        lines += _place(report)
+        lines += _place(report, run.scene)
     else:
         lines.append(f"  {error}")
-    lines += [f"  too near     {text}" for text in trouble.get("near", ())]
+    if likely := trouble.get("causes"):
+        lines.append("Likely causes, the likeliest first:")
+        lines += [f"  {i}. {text}" for i, text in enumerate(likely, 1)]
     if cures:
         # What is tried begins at the start of the scene, not where a branch does.
         lines.append("What was tried, from the start of the changed scene:" if verb == "branch" else "What was tried:")
@@ -126,6 +130,11 @@ def failure(
         word = "helped" if fine else "lasted" if cure["survived"] else "failed"
         mark = "  <- recommended" if cure is best else ", wrong" if word == "lasted" else ""
         lines.append(f"  {word}  {change:56} {what}{mark}".rstrip())
+    if small := trouble.get("minimal"):
+        path = run.folder / small
+        lines.append(
+            f"A small scene that breaks in the same way ({trouble['smaller']}):\n  {command('run', str(path))}"
+        )
     kept = f"Kept: {counted(run.n_frames, 'frame')} in {run.folder}"
     if best is not None:
         changes = best["set"].split()
@@ -133,7 +142,7 @@ def failure(
         sets = [*without(overrides, changes, systems), *changes]
         lines.append(f"{kept}. Try\n  {command(verb, scene, sets, *again, '--force')}")
     elif cures:
-        lines.append(f"{kept}. None of this helped: {_advice(run.scene)}")
+        lines.append(f"{kept}. None of this helped: {_advice(run.scene, report)}")
     else:
         lines.append(f"{kept}.")
     return "\n".join(lines)
@@ -152,10 +161,12 @@ def _keeps_energy(cure: Mapping[str, Any], scene: Mapping[str, Any]) -> bool:
     return bool(energy.sources(scene)) and not energy.unsoftened(scene)
 
 
-def _advice(scene: Mapping[str, Any]) -> str:
+def _advice(scene: Mapping[str, Any], report: Mapping[str, Any] = _EMPTY) -> str:
     """Where to look when no change of the steps helps."""
     from tumble import energy
 
+    if _on_grid(scene, report):
+        return f'look at the sources and formulas of "{report["object"]}"'
     if found := energy.unsoftened(scene):
         which = ", ".join(f"force.{i}" for i in found)
         return f"{which} grows without bound where masses come near; give it a softening"
@@ -208,7 +219,14 @@ def _headline(report: Mapping[str, Any]) -> str:
     return f"FAILED: {what}{when}"
 
 
-def _place(report: Mapping[str, Any]) -> list[str]:
+def _on_grid(scene: Mapping[str, Any], report: Mapping[str, Any]) -> bool:
+    """Whether it broke in a cell."""
+    from tumble.causes import GRIDS
+
+    return any(thing["name"] == report.get("object") for kind in GRIDS for thing in scene[kind])
+
+
+def _place(report: Mapping[str, Any], scene: Mapping[str, Any]) -> list[str]:
     integrator, stable = report["integrator"], float(report["stable_step"])
     if stable == 0.0:
         limit = f"none: {integrator} has no stable step for this system, it gains energy at any"
@@ -219,7 +237,8 @@ def _place(report: Mapping[str, Any]) -> list[str]:
             f"{seconds(stable)} by estimate, damping included; the step used is {report['step'] / stable:.3g} x that"
         )
     number = report.get("id")
-    whose = f"particle {report['index']}" if number is None else f"the particle with id {number}"
+    what = "cell" if _on_grid(scene, report) else "particle"
+    whose = f"{what} {report['index']}" if number is None else f"the particle with id {number}"
     lines = [
         f'  system       "{report["system"]}", {integrator}',
         f'  first bad    {report["column"]} of {whose} of "{report["object"]}"',

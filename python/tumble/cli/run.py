@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from tumble.cli import find, report
-from tumble.cli.console import Progress, complain, counted, say, stopped, warn, warn_of
+from tumble.cli.console import Progress, broke, complain, counted, say, stopped, warn, warn_of
 
 if TYPE_CHECKING:
     from tumble import Run, TumbleError
@@ -71,7 +71,9 @@ def run(
         resolve(renderer)  # Says now, rather than after the simulation, if it does not work here.
     try:
         with find.naming(find.scene_file(scene), folder, checked), Progress("simulate") as progress:
-            done = simulate(checked, folder, resume=resume, threads=threads, progress=progress, overwrite=force)
+            done = simulate(
+                checked, folder, resume=resume, threads=threads, progress=progress, overwrite=force, broke=broke
+            )
     except StepError as error:
         again = [*(["--out", str(out)] if out else []), *_flags(flags, renderer)]
         print(report.failure(Run(folder), error, scene, overrides, again), file=sys.stderr)
