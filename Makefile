@@ -9,13 +9,12 @@ TESTS_MAY := -A clippy::unwrap_used -A clippy::expect_used -A clippy::panic
 
 # The browser's engine: the tool must have the version of the crate.
 BINDGEN := target/tools/wasm-bindgen-$(shell sed -n 's/^wasm-bindgen = "=\([0-9.]*\)".*/\1/p' Cargo.toml)/bin/wasm-bindgen
-WASM := target/wasm32-unknown-unknown/web/tumble_wasm.wasm
 PKG := web/src/engine/pkg
 VERSION := $(shell sed -n 's/^version = "\(.*\)"/\1/p' Cargo.toml | head -n 1)
 WEB := $(shell find web -path web/node_modules -prune -o -path web/dist -prune -o -path $(PKG) -prune -o -type f -print) \
 	$(shell find python/tumble/scenes docs/theory -type f)
 
-.PHONY: help setup demo test lint test-rust test-python test-web web wasm wheel chromium openvdb validate audit bench clean
+.PHONY: help setup demo test lint test-rust test-python test-web web wasm wasm-target wheel chromium openvdb validate audit bench clean
 
 help:
 	@echo "make demo      set up, drape a sheet over the Stanford bunny, show where the film is"
@@ -82,7 +81,7 @@ wheel: setup web
 
 # The browser's engine, where there is a Node that its bits can be compared in.
 wasm:
-	@if command -v node >/dev/null; then $(MAKE) --no-print-directory $(PKG)/double_bg.wasm; \
+	@if command -v node >/dev/null; then $(MAKE) --no-print-directory -j 2 $(PKG)/single_bg.wasm $(PKG)/double_bg.wasm; \
 		else echo "no Node here: the bits of WebAssembly are not compared"; fi
 
 web/node_modules/.ready: web/package-lock.json
@@ -93,16 +92,22 @@ web/node_modules/.ready: web/package-lock.json
 $(BINDGEN):
 	cargo install --quiet wasm-bindgen-cli --version =$(patsubst target/tools/wasm-bindgen-%/bin/wasm-bindgen,%,$@) --root $(patsubst %/bin/wasm-bindgen,%,$@)
 
-# One after the other, whatever -j says: both leave the same file.
-$(PKG)/single_bg.wasm: $(BINDGEN) $(RUST)
+wasm-target:
 	@if command -v rustup >/dev/null; then rustup --quiet target add wasm32-unknown-unknown; \
 		else echo "no rustup here: the build needs Rust's target wasm32-unknown-unknown"; fi
-	cargo build --quiet --profile web -p tumble-wasm --target wasm32-unknown-unknown
-	$(BINDGEN) --target web --remove-name-section --remove-producers-section --out-name single --out-dir $(PKG) $(WASM)
 
-$(PKG)/double_bg.wasm: $(PKG)/single_bg.wasm
-	cargo build --quiet --profile web -p tumble-wasm --target wasm32-unknown-unknown --features double
-	$(BINDGEN) --target web --remove-name-section --remove-producers-section --out-name double --out-dir $(PKG) $(WASM)
+# In each precision, at the same time: most of a build is one thread of link-time optimisation.
+$(PKG)/single_bg.wasm: $(BINDGEN) $(RUST) | wasm-target
+	$(call wasm-module,single,)
+
+$(PKG)/double_bg.wasm: $(BINDGEN) $(RUST) | wasm-target
+	$(call wasm-module,double,--features double)
+
+define wasm-module
+cargo build --quiet --profile web -p tumble-wasm --target wasm32-unknown-unknown --target-dir target/wasm-$(1) $(2)
+$(BINDGEN) --target web --remove-name-section --remove-producers-section --out-name $(1) --out-dir $(PKG) \
+	target/wasm-$(1)/wasm32-unknown-unknown/web/tumble_wasm.wasm
+endef
 
 chromium:
 	@command -v chromium chromium-browser google-chrome >/dev/null \

@@ -136,7 +136,17 @@ impl<E: Element<N, M, D>, Y: Law<P>, const N: usize, const M: usize, const D: us
         for i in 0..M {
             c[i] = c[i] + b;
         }
-        gauss_newton::<E, L, N, M, D>(c, p.rest, x, u)
+        let mut out = gauss_newton::<E, L, N, M, D>(c, p.rest, x, u);
+        let mut y = E::residual(p.rest, x);
+        for i in 0..M {
+            y[i] = Y::stress(k, p.law, y[i]);
+        }
+        if let Some(tension) = E::tension(p.rest, x, y, u) {
+            for a in 0..N {
+                out[a] = out[a] + tension[a];
+            }
+        }
+        out
     }
 
     /// The 3N x 3N matrix of one element, as (node, component, column).

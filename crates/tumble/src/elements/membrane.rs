@@ -68,6 +68,12 @@ fn deformation<L: Lane>(rest: [L; 8], x: [[L; 4]; 3]) -> [Vec3<L>; 2] {
     [d1 * rest[0] + d2 * rest[2], d1 * rest[1] + d2 * rest[3]]
 }
 
+/// What belongs to the Green strain, L y.
+#[inline(always)]
+fn stress<L: Lane>(rest: [L; 8], [y1, y2, y3]: [L; 3]) -> [L; 3] {
+    [rest[4] * y1, rest[5] * y1 + rest[6] * y2, rest[7] * y3]
+}
+
 /// The largest lengthening of an edge over its rest length, from B, whose inverse has the rest edges x1-x0 and x2-x0 as columns.
 #[inline(always)]
 pub fn edges<L: Lane>([b0, b1, b2, b3]: [L; 4], x: [[L; 4]; 3]) -> L {
@@ -78,6 +84,23 @@ pub fn edges<L: Lane>([b0, b1, b2, b3]: [L; 4], x: [[L; 4]; 3]) -> L {
     let larger = |a: L, b: L| (b - a).positive(b, a);
     let most = larger(ratio(d1, [b3, b2]), ratio(d2, [b1, b0]));
     larger(most, ratio(d2 - d1, [b1 + b3, b0 + b2])) - det.like(1.0)
+}
+
+/// The product of the Hessian with u as far as it comes from tension, (membranes.10): that of the stress (s11, s22, s12), which belongs to the Green
+/// strain, without its negative part.
+#[inline(always)]
+pub fn taut<L: Lane>([b0, b1, b2, b3]: [L; 4], [s1, s2, s3]: [L; 3], u: [Vec3<L>; 3]) -> [Vec3<L>; 3] {
+    let (zero, half) = (b0.zero(), b0.like(0.5));
+    let (mean, d) = ((s1 + s2) * half, (s1 - s2) * half);
+    let q = (d * d + s3 * s3).sqrt();
+    let (p1, p2) = ((mean + q).above_zero(), (mean - q).above_zero());
+    let (same, turned) = ((p1 + p2) * half, q.positive((p1 - p2) * half / q, zero));
+    let (t1, t2, t3) = (same + turned * d, same - turned * d, turned * s3);
+    let (d1, d2) = (u[1] - u[0], u[2] - u[0]);
+    let (f1, f2) = (d1 * b0 + d2 * b2, d1 * b1 + d2 * b3);
+    let (p1, p2) = (f1 * t1 + f2 * t3, f2 * t2 + f1 * t3);
+    let (g1, g2) = (p1 * b0 + p2 * b1, p1 * b2 + p2 * b3);
+    [-(g1 + g2), g1, g2]
 }
 
 impl Element<3, 3, 8> for Membrane {
@@ -94,9 +117,14 @@ impl Element<3, 3, 8> for Membrane {
         [rest[4] * e1 + rest[5] * e2, rest[6] * e2, rest[7] * f1.dot(f2)]
     }
     #[inline(always)]
+    fn tension<L: Lane>(rest: [L; 8], _: [[L; 4]; 3], y: [L; 3], u: [Vec3<L>; 3]) -> Option<[Vec3<L>; 3]> {
+        let [b0, b1, b2, b3, ..] = rest;
+        Some(taut([b0, b1, b2, b3], stress(rest, y), u))
+    }
+    #[inline(always)]
     fn pullback<L: Lane>(rest: [L; 8], x: [[L; 4]; 3], [y1, y2, y3]: [L; 3]) -> [[L; 4]; 3] {
         let [f1, f2] = deformation(rest, x);
-        let (s1, s2, s3) = (rest[4] * y1, rest[5] * y1 + rest[6] * y2, rest[7] * y3);
+        let [s1, s2, s3] = stress(rest, [y1, y2, y3]);
         let (p1, p2) = (f1 * s1 + f2 * s3, f2 * s2 + f1 * s3);
         let (g1, g2) = (p1 * rest[0] + p2 * rest[1], p1 * rest[2] + p2 * rest[3]);
         [force(-(g1 + g2)), force(g1), force(g2)]

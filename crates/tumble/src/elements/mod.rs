@@ -62,6 +62,11 @@ pub trait Element<const N: usize, const M: usize, const D: usize>: Send + Sync +
     fn lengthening<L: Lane>(_rest: [L; D], _x: [[L; 4]; N]) -> Option<L> {
         None
     }
+    /// What tension adds to the product of the definite Hessian with u: the part of y d²r/dx² that is never negative. y is the stress.
+    #[inline(always)]
+    fn tension<L: Lane>(_rest: [L; D], _x: [[L; 4]; N], _y: [L; M], _u: [Vec3<L>; N]) -> Option<[Vec3<L>; N]> {
+        None
+    }
 }
 
 /// The first three numbers of a node.

@@ -1,5 +1,6 @@
 //! Triangles and hinges of measured cloth, whose stiffness changes with direction, strain and curvature.
 
+use super::membrane::{edges, taut};
 use super::{Element, Law, force, point};
 use crate::math::{Lane, Vec3};
 use tumble_interface::Fabric;
@@ -161,11 +162,35 @@ fn root<L: Lane>(rest: &[L; 28], m: L, value: &[L; 4]) -> [L; 4] {
     [l11, l21, (c(2) - l21 * l21).above_zero().sqrt(), c(3).above_zero().sqrt()]
 }
 
+/// What belongs to the Green strain where y belongs to r.
+#[inline(always)]
+fn stress<L: Lane>(rest: &[L; 28], f: [Vec3<L>; 2], [y1, y2, y3]: [L; 3]) -> [L; 3] {
+    let e = strain(f);
+    let at = place(e);
+    let (value, slope) = direction(rest, at.c);
+    let [l11, l21, l22, l33] = root(rest, at.m, &value);
+    let (zero, half) = (y1.zero(), y1.like(0.5));
+    // What y says about the entries of L, then of C.
+    let over = |a: L, l: L| l.positive(a * half / l, zero);
+    let c22 = over(y2 * e[1], l22);
+    let in21 = y1 * e[1] - c22 * l21 * y1.like(2.0);
+    let c12 = in21 / l11;
+    let c11 = (y1 * e[0] - c12 * l21) * half / l11;
+    let c33 = over(y3 * e[2], l33);
+    let with = |t: &[L; 4]| c11 * t[0] + c12 * t[1] + c22 * t[2] + c33 * t[3];
+    let (in_m, in_c) = (with(&value), at.m * with(&slope));
+    let mut s = [l11 * y1, l21 * y1 + l22 * y2, l33 * y3];
+    for i in 0..3 {
+        s[i] = s[i] + in_m * at.dm[i] + in_c * at.dc[i];
+    }
+    s
+}
+
 impl Element<3, 3, 28> for Woven {
     const NAME: &'static str = "fabric";
     #[inline(always)]
     fn lengthening<L: Lane>([b0, b1, b2, b3, ..]: [L; 28], x: [[L; 4]; 3]) -> Option<L> {
-        Some(super::membrane::edges([b0, b1, b2, b3], x))
+        Some(edges([b0, b1, b2, b3], x))
     }
     #[inline(always)]
     fn residual<L: Lane>(rest: [L; 28], x: [[L; 4]; 3]) -> [L; 3] {
@@ -176,26 +201,14 @@ impl Element<3, 3, 28> for Woven {
         [l[0] * e[0] + l[1] * e[1], l[2] * e[1], l[3] * e[2]]
     }
     #[inline(always)]
-    fn pullback<L: Lane>(rest: [L; 28], x: [[L; 4]; 3], [y1, y2, y3]: [L; 3]) -> [[L; 4]; 3] {
+    fn tension<L: Lane>(rest: [L; 28], x: [[L; 4]; 3], y: [L; 3], u: [Vec3<L>; 3]) -> Option<[Vec3<L>; 3]> {
+        let [b0, b1, b2, b3, ..] = rest;
+        Some(taut([b0, b1, b2, b3], stress(&rest, deformation(&rest, x), y), u))
+    }
+    #[inline(always)]
+    fn pullback<L: Lane>(rest: [L; 28], x: [[L; 4]; 3], y: [L; 3]) -> [[L; 4]; 3] {
         let [f1, f2] = deformation(&rest, x);
-        let e = strain([f1, f2]);
-        let at = place(e);
-        let (value, slope) = direction(&rest, at.c);
-        let [l11, l21, l22, l33] = root(&rest, at.m, &value);
-        let (zero, half) = (y1.zero(), y1.like(0.5));
-        // What y says about the entries of L, then of C.
-        let over = |a: L, l: L| l.positive(a * half / l, zero);
-        let c22 = over(y2 * e[1], l22);
-        let in21 = y1 * e[1] - c22 * l21 * y1.like(2.0);
-        let c12 = in21 / l11;
-        let c11 = (y1 * e[0] - c12 * l21) * half / l11;
-        let c33 = over(y3 * e[2], l33);
-        let with = |t: &[L; 4]| c11 * t[0] + c12 * t[1] + c22 * t[2] + c33 * t[3];
-        let (in_m, in_c) = (with(&value), at.m * with(&slope));
-        let mut s = [l11 * y1, l21 * y1 + l22 * y2, l33 * y3];
-        for i in 0..3 {
-            s[i] = s[i] + in_m * at.dm[i] + in_c * at.dc[i];
-        }
+        let s = stress(&rest, [f1, f2], y);
         let (p1, p2) = (f1 * s[0] + f2 * s[2], f2 * s[1] + f1 * s[2]);
         let (g1, g2) = (p1 * rest[0] + p2 * rest[1], p1 * rest[2] + p2 * rest[3]);
         [force(-(g1 + g2)), force(g1), force(g2)]
