@@ -1,10 +1,12 @@
 """Measured fabrics in scenes, and the laboratory that pulls, hangs and drapes them."""
 
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
+from conftest import Answer
 
 from tumble import Scene, SceneError, World, load_fabric
 from tumble.lab import fabric as lab
@@ -59,6 +61,19 @@ def test_a_bad_fabric_is_told_with_its_place(tmp_path: Path, fabric: Any, place:
         Scene(sheet(fabric), folder=tmp_path)
     issue = told.value.issues[0]
     assert issue["path"] == place and says in issue["message"], issue
+
+
+@pytest.mark.parametrize("scheme", ["position_based", "implicit_euler"])
+@pytest.mark.parametrize("surface", [{"fabric": "denim"}, {"membrane": {"warp": 100.0}}])
+def test_the_stretch_of_fabrics_and_membranes_is_held_to_what_is_expected(
+    scheme: str, surface: dict[str, Any], scene_file: Callable[..., Path], tumble: Callable[..., Answer]
+) -> None:
+    hung = {"name": "s", "size": [0.2, 0.4], "resolution": [5, 9], "rotate": [90, 0, 0], "pin": ["edge y+"], **surface}
+    tree = {"version": 1, "time": {"frames": 3}, "system": [{"integrator": scheme, "substeps": 10}], "sheet": [hung]}
+    # By its own weight the first row is longer by 1e-4 at least, and by no tenth.
+    for most, code in ((1.00001, 1), (1.1, 0)):
+        answer = tumble("run", scene_file(tree | {"expect": {"max_stretch": most}}), "--force")
+        assert answer.code == code and ("broken expectation: max_stretch" in answer.err) == (code == 1), answer.err
 
 
 def test_the_elastica_of_the_lab_is_that_of_the_cantilever_test() -> None:

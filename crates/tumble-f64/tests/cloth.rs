@@ -114,7 +114,7 @@ fn measures_beyond_sense_are_refused_with_the_word_at_fault() {
     assert!(same.contains("cloth \"c\".panels[1].name") && same.contains("name of panels[0] already"), "{same}");
     let coarse = panels("1e5", "0.5", "b");
     assert!(coarse.contains("cloth \"c\".resolution") && coarse.contains("1.12 m; take a smaller one"), "{coarse}");
-    // A collar that closes to a line when it is cut coarsely.
+    // However coarsely, a collar keeps its corners.
     let collar = "[[cloth]]\nname = \"c\"\nresolution = 0.9\npanels = [{ name = \"a\", \
                   outline = [[0, 0], [1, 0], [1, 0.6], [0.9, 0.6], [0.9, 0.1], [0.1, 0.1], [0.1, 0.6], [0, 0.6]] }]\n";
     assert_eq!(simulation(collar).warnings().len(), 0);

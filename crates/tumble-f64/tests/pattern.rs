@@ -296,7 +296,7 @@ fn an_unsound_mesh_is_told_once() {
         ((|m| m.triangles.push(m.triangles[4])) as fn(&mut Mesh), "1 triangle is there already"),
         (|m| m.triangles[30].swap(0, 1), "3 edges are between triangles that face different ways"),
         (|m| m.triangles.push([3, 3, 4]), "1 triangle has no area"),
-        (|m| m.triangles.push([14, 27, 45]), "edges have more than two triangles"),
+        (|m| m.triangles.push([14, 27, 45]), "1 edge has more than two triangles"),
         (|m| m.unused = 3, "3 vertices belong to no triangle"),
     ] {
         let all = told(&|mesh| {

@@ -142,16 +142,19 @@ impl Mesh {
         let all = || self.vertices.iter().flatten().map(|x| x.abs());
         let largest = all().fold(0.0, f64::max);
         let near = ROUNDING * largest;
-        // The shortest edge at each vertex that is none by the measure of rounding.
+        // The shortest edge at each vertex that is none by the measure of rounding; none where whole triangles are as small as that.
         let mut edge_sq = vec![f64::INFINITY; self.vertices.len()];
         for t in &self.triangles {
+            let corners = t.map(|i| self.vertices[i as usize]);
+            let sides = [0, 1, 2].map(|k| sub(corners[(k + 1) % 3], corners[k])).map(|way| dot(way, way));
+            let is_fine = sides.iter().all(|side| (0.0..=near * near).contains(side)) && sides.iter().any(|side| *side > 0.0);
             for k in 0..3 {
-                let [a, b] = [t[k], t[(k + 1) % 3]].map(|i| i as usize);
-                let way = sub(self.vertices[b], self.vertices[a]);
-                let length_sq = dot(way, way);
-                if length_sq > near * near {
-                    edge_sq[a] = edge_sq[a].min(length_sq);
-                    edge_sq[b] = edge_sq[b].min(length_sq);
+                for i in [t[k], t[(k + 1) % 3]].map(|i| i as usize) {
+                    if is_fine {
+                        edge_sq[i] = 0.0;
+                    } else if sides[k] > near * near {
+                        edge_sq[i] = edge_sq[i].min(sides[k]);
+                    }
                 }
             }
         }
@@ -164,8 +167,8 @@ impl Mesh {
             let ends = x.map(|x| [cell(x - near), cell(x + near)]);
             let is_same = |j: &&u32| {
                 let (way, j) = (sub(*x, self.vertices[**j as usize]), **j as usize);
-                let shortest_sq = edge_sq[i].min(edge_sq[j]);
-                let fine_sq = if shortest_sq.is_finite() { FINE * FINE * shortest_sq } else { 0.0 };
+                let known = edge_sq[i].is_finite() && edge_sq[j].is_finite();
+                let fine_sq = if known { FINE * FINE * edge_sq[i].min(edge_sq[j]) } else { 0.0 };
                 dot(way, way) <= fine_sq.min(near * near)
             };
             let mut found: Option<u32> = None;

@@ -143,7 +143,12 @@ fn nothing_of_a_fine_mesh_becomes_one() {
         triangles: (0..n as u32 - 1).flat_map(|i| [[2 * i, 2 * i + 2, 2 * i + 3], [2 * i, 2 * i + 3, 2 * i + 1]]).collect(),
         ..Mesh::default()
     };
-    for mesh in [and(&fine, &tetrahedron()), graded] {
+    // As fine, where large triangles have a corner; and with a thin one, as long as a metre, at one of its edges.
+    let mut at_corner = and(&moved(&fine, [0.5 + 3e-7, -0.5, -0.5]), &tetrahedron());
+    let apart = at_corner.clone();
+    let far = at_corner.vertices.iter().position(|x| *x == [0.0; 3]).unwrap() as u32;
+    at_corner.triangles.push([0, 9, far]);
+    for mesh in [and(&fine, &tetrahedron()), graded, apart, at_corner] {
         let (found, done) = repair(&mesh);
         assert!(done.is_none() && same(&found, &mesh) && mesh.flaws().is_none(), "{done:?} {}", mesh.flaws());
     }

@@ -79,16 +79,8 @@ pub fn cloth(site: &mut Site<'_>, thing: &Cloth) {
             (length / thing.resolution).round().max(1.0) as usize
         };
         let Some(piece) = cut(words, thing.resolution, &count) else {
-            if let Some(finer) = words.finer(thing.resolution) {
-                let message = format!(
-                    "{} m is too coarse for panels[{k}]: sides that are cut so cross each other; {} m would do",
-                    plain(thing.resolution),
-                    short(finer)
-                );
-                return site.wrong(format!("{path}.resolution"), message);
-            }
             if thing.dress.is_some() {
-                return site.wrong(format!("{path}.dress"), "its measures do not go together: sides of a panel cross each other");
+                return site.wrong(format!("{path}.dress"), "sides of a panel cross each other: its measures do not go together");
             }
             let message = "its sides cross each other, or it has no area; go around it once";
             return site.wrong(format!("{path}.panels[{k}].outline"), message);

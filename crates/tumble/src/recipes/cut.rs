@@ -4,9 +4,6 @@
 use crate::geometry::Vector;
 use spade::{ConstrainedDelaunayTriangulation, Point2, Triangulation};
 
-/// Points that a panel is tried with, to say which resolution would do.
-const TRIED: f64 = 3e4;
-
 /// A panel before it is cut.
 pub struct Cut {
     /// Its sides in order around it, each a line of at least two points [m]; one ends where the next begins.
@@ -59,14 +56,6 @@ impl Cut {
             all.clone().fold(f64::NEG_INFINITY, f64::max) - all.fold(f64::INFINITY, f64::min)
         };
         distance([along(0), along(1)], [0.0, 0.0])
-    }
-
-    /// A length of edges [m] that it can be cut into, if it cannot into some of `edge` [m].
-    pub fn finer(&self, edge: f64) -> Option<f64> {
-        let (extent, around) = (self.extent(), (0..self.sides.len()).map(|side| self.length(side)).sum::<f64>());
-        let halves = std::iter::successors(Some(0.5 * edge.min(extent)), |r| Some(0.5 * r));
-        let few = |r: &f64| extent * extent < TRIED * r * r && around < TRIED * r;
-        halves.take_while(few).find(|r| cut(self, *r, &|side| (self.length(side) / r).round().max(1.0) as usize).is_some())
     }
 }
 
