@@ -38,10 +38,11 @@ def check(
     Where there are emitters, the scene is simulated, for seconds at most, until many of their particles are there. Ends
     with code 1 if a system is predicted to explode, or does, 2 if the scene is wrong.
 
-    With --repair, meshes that are not sound are mended: rims that lie on each other are sewn, triangles that stand there
-    twice or have no area go, all are made to face one way, outward where a mesh is closed, and edges of more than two
-    triangles come apart. NAME.ply becomes NAME.repaired.obj beside it, the lines of the scene to change are told, and
-    the scene is checked as if they had been. Originals and the scene's file stay as they are; holes stay open.
+    With --repair, meshes that are not sound are mended: rims that lie on each other, or did before numbers were rounded,
+    are sewn, triangles that stand there twice or have no area go, as do vertices of no triangle, all are made to face one
+    way, outward where a mesh is closed, and edges of more than two triangles come apart. NAME.ply becomes
+    NAME.repaired.obj beside it, the lines of the scene to change are told, and the scene is checked as if they had been.
+    Originals and the scene's file stay as they are; holes stay open.
 
     \b
     Examples:
