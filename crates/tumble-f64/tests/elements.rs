@@ -234,6 +234,48 @@ fn matrices_are_symmetric_and_the_definite_one_is() {
     }
 }
 
+/// (membranes.10): what is pulled both ways has its exact matrix, what is pressed both ways has nothing across, and what is pulled one way and
+/// pressed the other has no less than exactly, and nothing negative.
+#[test]
+fn tension_stiffens_across_and_pressure_does_not() {
+    let triangle = [[0.0, 0.0, 0.0], [1.0, 0.1, 0.0], [0.2, 0.9, 0.0]].map(Vec3::from);
+    let (b, area) = Membrane::axes(triangle, Vec3::from([1.0, 0.4, 0.0]), 0.3).unwrap();
+    let root = Membrane::root(3.0, 2.0, 0.3, 0.8).unwrap();
+    let rest = std::array::from_fn(|i| if i < 4 { b[i] } else { root[i - 4] });
+    let membrane =
+        || batch::<Membrane, Linear, 3, 3, 8, 0>(3, &[Members { nodes: [0, 1, 2], rest, law: [], stiffness: area, damping: 0.0 }]);
+    let rest = Woven::rest(b, &tumble_io::shipped("interlock").unwrap(), 2.0);
+    let woven = || batch::<Woven, Linear, 3, 3, 28, 0>(3, &[Members { nodes: [0, 1, 2], rest, law: [], stiffness: area, damping: 0.0 }]);
+    let mut r = Numbers(17);
+    for (mut batch, linear) in [(membrane(), true), (woven(), false)] {
+        for (sx, sy) in [(1.2, 1.1), (0.9, 0.8), (1.2, 0.8), (1.0, 1.0)] {
+            let x = triangle.map(|p| row(Vec3 { x: p.x * sx, y: p.y * sy, z: 0.0 }, 0.0));
+            let mut products = |u: &[Row]| {
+                [Hessian::Exact, Hessian::Definite].map(|hessian| {
+                    batch.linearize(&x, Weights { stiffness: 1.0, damping: 0.0, hessian });
+                    product(batch.as_mut(), &x, u)
+                })
+            };
+            for _ in 0..8 {
+                let across: Vec<Row> = (0..3).map(|_| row(Vec3 { x: 0.0, y: 0.0, z: r.next() }, 0.0)).collect();
+                let [exact, definite] = products(&across).map(|k| inner(&k, &across));
+                match (sx > 1.0, sy > 1.0) {
+                    (true, true) => assert!(exact > 1e-3 && (exact - definite).abs() < 1e-12 * exact, "{exact} {definite}"),
+                    (false, false) => assert!(exact < 1e-12 && definite.abs() < 1e-12, "{exact} {definite}"),
+                    _ => assert!(definite > 1e-6 && definite > exact, "{exact} {definite}"),
+                }
+                if linear && sy > 1.0 {
+                    let any: Vec<Row> = (0..3).map(|_| r.row()).collect();
+                    let [exact, definite] = products(&any);
+                    for (a, b) in exact.iter().zip(&definite) {
+                        assert!((xyz(*a) - xyz(*b)).norm() < 1e-12, "{a:?} {b:?}");
+                    }
+                }
+            }
+        }
+    }
+}
+
 #[test]
 fn entries_and_diagonal_are_those_of_the_product() {
     let mut r = Numbers(13);

@@ -162,9 +162,9 @@ impl Default for Dress {
         Self {
             waist: [0.0, 0.0, 1.0],
             waist_girth: 0.8,
-            bust_girth: 0.96,
+            bust_girth: 0.98,
             bodice: 0.24,
-            shoulder: 0.245,
+            shoulder: 0.25,
             strap_distance: 0.2,
             strap: 0.05,
             skirt: 0.55,
