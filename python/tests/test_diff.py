@@ -226,7 +226,7 @@ def test_a_column_that_a_frame_has_lost_is_damage(pair: tuple[Run, Run], tumble:
     lost = next(name for name in whole if name.endswith("velocity"))
     np.savez(path, **{name: array for name, array in whole.items() if name != lost})
     answer = tumble("diff", str(one.folder), str(other.folder), "--deep")
-    assert answer.code == 1 and "sheet/velocity\" is missing" in answer.err
+    assert answer.code == 1 and 'sheet/velocity" is missing' in answer.err
     np.savez(path, **(whole | {lost: whole[lost][:, :2]}))
     answer = tumble("diff", str(one.folder), str(other.folder), "--deep")
     assert answer.code == 1 and "is damaged" in answer.err
