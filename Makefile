@@ -17,7 +17,7 @@ WEB := $(shell find web -path web/node_modules -prune -o -path web/dist -prune -
 .PHONY: help setup demo test lint test-rust test-python test-web web wasm wasm-target wheel chromium openvdb validate audit bench clean
 
 help:
-	@echo "make demo      set up, drape a sheet over the Stanford bunny, show where the film is"
+	@echo "make demo      set up, let a dress dance, show where the film is"
 	@echo "make test      set up, pass all tests"
 	@echo "make setup     leave $(BIN)/tumble"
 	@echo "make web       build the browser laboratory into web/dist, and for \`tumble view\`"
@@ -39,7 +39,7 @@ $(VENV)/.engine: $(VENV)/.python $(RUST)
 	@touch $@
 
 demo: setup
-	$(BIN)/tumble run drape/sheet-on-bunny --out out/demo --force
+	$(BIN)/tumble run cloth/dress --usd --out out/demo --force
 
 test: setup lint test-rust test-python test-web
 	@echo "All tests passed."
