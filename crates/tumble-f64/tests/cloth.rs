@@ -130,7 +130,7 @@ fn measures_beyond_sense_are_refused_with_the_word_at_fault() {
     );
     for (words, place, cure) in [
         ("dress = { strap = 0.9 }", "dress.strap", "less than strap_distance, 0.2 m"),
-        ("dress = { strap_distance = 0.6 }", "dress.strap_distance", "less than half of bust_girth together, 0.48 m"),
+        ("dress = { strap_distance = 0.6 }", "dress.strap_distance", "less than half of bust_girth together, 0.49 m"),
         ("dress = { waist_girth = 1e-6 }", "dress.waist_girth", "0.01 to 100 m"),
         ("dress = { waist_girth = 300 }\nresolution = 10", "dress.waist_girth", "0.01 to 100 m"),
         ("dress = { bust_girth = 1e-4 }", "dress.bust_girth", "0.16 to 4 m"),
