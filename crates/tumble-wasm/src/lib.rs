@@ -174,7 +174,8 @@ impl World {
             serde_json::from_str(value).map_err(|e| thrown(SceneError::one(path, format!("no value: {e}")).into()))?;
         let mut changed = self.loaded.changed(path, Node::from_value(&value)).map_err(thrown)?;
         let fits = changed.clock() == self.loaded.clock() && changed.world.restore(&self.loaded.world.save(&[])).is_ok();
-        if fits {
+        // The same value is no change: the world goes on as it would have, bit by bit.
+        if fits && !changed.is_same_scene(&self.loaded) {
             changed.world.reconsider();
         }
         self.loaded = changed;

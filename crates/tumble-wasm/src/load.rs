@@ -114,6 +114,11 @@ impl Loaded {
         Ok(Self { world, node, scene, files, memory: bytes })
     }
 
+    /// Whether both are of scenes that say the same, defaults written out.
+    pub fn is_same_scene(&self, other: &Self) -> bool {
+        self.scene.to_json() == other.scene.to_json()
+    }
+
     /// What the index of a frame means: its length and its exchanges.
     pub fn clock(&self) -> (f64, u32) {
         (self.scene.time.fps, self.scene.time.exchanges)
