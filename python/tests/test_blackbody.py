@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 from tumble.pictures import Studio, blackbody, volumes
-from tumble.pictures.things import Smoke
+from tumble.pictures.drawn import Smoke
 
 STEFAN = 5.670374419e-8
 """W/(m² K⁴), CODATA 2018."""

@@ -9,9 +9,10 @@ import pytest
 
 from tumble.film import film
 from tumble.pictures import Studio, framing, splats
+from tumble.pictures.drawn import Cloud, Ground, Mesh, Spheres
 from tumble.pictures.framing import Camera
 from tumble.pictures.look import key_light
-from tumble.pictures.things import Cloud, Ground, Mesh, Spheres, Stage
+from tumble.pictures.things import Stage
 from tumble.style import linear
 
 SIZE = (160, 90)

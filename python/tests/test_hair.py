@@ -8,8 +8,9 @@ import numpy as np
 import pytest
 
 from tumble.export import usd
-from tumble.pictures.strands import prisms, strands
-from tumble.pictures.things import Hair, Stage, as_triangles
+from tumble.pictures.drawn import as_triangles
+from tumble.pictures.strands import Hair, prisms, strands
+from tumble.pictures.things import Stage
 
 POINTS = 5
 COUNT = 40

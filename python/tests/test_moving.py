@@ -10,7 +10,8 @@ import pytest
 import tumble
 from tumble import SceneError
 from tumble.export import usd
-from tumble.pictures.things import Ground, Mesh, Stage, Tubes
+from tumble.pictures.drawn import Ground, Mesh, Tubes
+from tumble.pictures.things import Stage
 from tumble.run import simulate
 
 PLATE = "v {x} 0 0\nv 1 0 {z}\nv 0 1 {z}\nf 1 2 3\n"

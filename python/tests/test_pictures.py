@@ -19,7 +19,8 @@ from tumble import ExportError
 from tumble.film import film
 from tumble.pictures import Studio, framing, picture, render, renderers, resolve, surfaces
 from tumble.pictures.denoise import denoise
-from tumble.pictures.things import Ground, Mesh, Spheres, Stage, Tubes
+from tumble.pictures.drawn import Ground, Mesh, Spheres, Tubes
+from tumble.pictures.things import Stage
 from tumble.plots import energy, ledger, unit
 from tumble.style import display, linear, rgb
 

@@ -9,8 +9,9 @@ import pytest
 from tumble import ExportError, grids, pictures
 from tumble.film import film
 from tumble.pictures import Studio, volumes
+from tumble.pictures.drawn import Image, Smoke, Spheres
 from tumble.pictures.framing import Camera
-from tumble.pictures.things import DEEP, SMOKE, Image, Smoke, Spheres, Stage, _within
+from tumble.pictures.things import DEEP, SMOKE, Stage, _within
 from tumble.slices import cut, slices
 from tumble.style import display, linear
 

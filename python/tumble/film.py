@@ -26,8 +26,9 @@ import numpy as np
 from tumble._engine import ExportError
 from tumble.folder import reason, writing
 from tumble.pictures import Picture, Studio, render
+from tumble.pictures.drawn import Thing
 from tumble.pictures.framing import Camera
-from tumble.pictures.things import Recording, Thing
+from tumble.pictures.things import Recording
 
 QUALITY = 18
 """Constant rate factor of the encoder; 18 cannot be told from the original."""

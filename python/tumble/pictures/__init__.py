@@ -19,10 +19,11 @@ import numpy.typing as npt
 
 from tumble._engine import ExportError
 from tumble.pictures import framing, splats, volumes
+from tumble.pictures.drawn import Body, Cloud, Ground, Image, Mesh, Smoke, Thing, placed
 from tumble.pictures.framing import Camera
 from tumble.pictures.pyvista_ import headless
 from tumble.pictures.surfaces import Floats, unit
-from tumble.pictures.things import Body, Cloud, Ground, Image, Mesh, Recording, Smoke, Stage, Thing, placed
+from tumble.pictures.things import Recording, Stage
 from tumble.style import GROUND, SOLID, display, linear
 
 __all__ = ["RENDERERS", "TRACED", "Studio", "picture", "render", "renderers", "resolve"]

@@ -5,9 +5,9 @@ Cameras and things here are those of `Camera.unit`: target at the origin, camera
 
 import numpy as np
 
+from tumble.pictures.drawn import Body, Ground, Thing, as_triangles
 from tumble.pictures.framing import Camera
 from tumble.pictures.surfaces import Floats, Indices, joined, unit
-from tumble.pictures.things import Body, Ground, Thing, as_triangles
 from tumble.style import display, rgb
 
 SKY = "#f4f6f8", "#dfe4ea"

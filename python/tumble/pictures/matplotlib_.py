@@ -9,10 +9,10 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from tumble.pictures.drawn import Body, Ground, Mesh, Thing, as_triangles
 from tumble.pictures.framing import Camera
 from tumble.pictures.look import background, key_light, painted
 from tumble.pictures.surfaces import Floats, Indices, joined, turned, unit
-from tumble.pictures.things import Body, Ground, Mesh, Thing, as_triangles
 from tumble.style import display
 
 FINER = 2

@@ -14,11 +14,11 @@ import numpy as np
 import numpy.typing as npt
 
 from tumble.pictures.denoise import denoise
+from tumble.pictures.drawn import Body, Ground, Mesh, Smoke, Spheres, Thing, Tubes, as_triangles
 from tumble.pictures.framing import Camera
 from tumble.pictures.look import FADE, background, fading, key_light, soften
 from tumble.pictures.strands import Hair
 from tumble.pictures.surfaces import Floats, Indices, balls, joined, turned, unit
-from tumble.pictures.things import Body, Ground, Mesh, Smoke, Spheres, Thing, Tubes, as_triangles
 from tumble.style import Rgb, display
 
 MANY = 20_000

@@ -8,10 +8,10 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from tumble.pictures.drawn import Body, Ground, Mesh, Thing, as_triangles
 from tumble.pictures.framing import Camera
 from tumble.pictures.look import SKY, key_light, painted
 from tumble.pictures.surfaces import Floats, Indices
-from tumble.pictures.things import Body, Ground, Mesh, Thing, as_triangles
 from tumble.style import display
 
 RINGS = 160

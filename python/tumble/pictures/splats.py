@@ -13,10 +13,10 @@ Depth is along the view, as `Camera.project` has it; cameras are those of `Camer
 import numpy as np
 import numpy.typing as npt
 
+from tumble.pictures.drawn import Body, Cloud, Ground, Thing, as_triangles
 from tumble.pictures.framing import Camera
 from tumble.pictures.look import NIGHT, SHADOW, fading, key_light, soften
 from tumble.pictures.surfaces import Floats, unit
-from tumble.pictures.things import Body, Cloud, Ground, Thing, as_triangles
 
 Ints = npt.NDArray[np.int64]
 

@@ -16,11 +16,11 @@ import numpy as np
 import numpy.typing as npt
 
 from tumble.pictures.blackbody import developed
+from tumble.pictures.drawn import Image, Smoke
 from tumble.pictures.framing import Camera
 from tumble.pictures.look import key_light
 from tumble.pictures.splats import DIM, NEAR, Shade, sights
 from tumble.pictures.surfaces import Floats
-from tumble.pictures.things import Image, Smoke
 
 Array = npt.NDArray[np.float32]
 
