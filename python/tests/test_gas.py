@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from tumble import World, grids
-from tumble.cli.report import doubts
+from tumble.doubts import of_books
 from tumble.export import vdb
 from tumble.run import simulate
 
@@ -62,10 +62,10 @@ def test_steps_that_are_far_too_long_are_told_once(tmp_path: Path) -> None:
     scene["gas"][0]["acceleration"] = ["60*sin(pi*z/1.5)", 0, 0]
     scene["gas"][0]["courant"] = 0.5
     free = simulate(scene, tmp_path / "free")
-    assert not doubts(free)
+    assert not of_books(free)
     assert 0 < free.ledger["courant"].max() < 1
     held = simulate({**scene, "system": [{"method": "gas", "substeps": 1}]}, tmp_path / "held")
-    (told,) = doubts(held)
+    (told,) = of_books(held)
     assert told["code"] == "courant" and "cells in a step" in told["message"]
     assert held.ledger["courant"].max() > 1
 

@@ -1,6 +1,5 @@
 """Why the physics broke: what is in sight, the likeliest first."""
 
-import math
 import re
 from collections.abc import Iterator, Mapping, Sequence
 from typing import TYPE_CHECKING, Any
@@ -10,6 +9,7 @@ import numpy as np
 from tumble import energy
 from tumble._engine import World
 from tumble.cures import step_used, system, viscous_limit
+from tumble.doubts import of_books
 
 if TYPE_CHECKING:
     from tumble.run import Run
@@ -32,9 +32,6 @@ _UNLIKE = 1000.0
 _GROWN = 0.1
 """Growth of the energy over its scale, before the break, that is worth telling."""
 
-_COURANT = 2.0
-"""Cells that a fluid passes in a step, over what was asked for, that are worth telling."""
-
 
 def likely(
     world: World, scene: Mapping[str, Any], report: Mapping[str, Any], run: "Run", near: Sequence[str] = ()
@@ -46,11 +43,7 @@ def likely(
     found += _formulas(scene, report)
     found += near
     found += _started(scene, run)
-    unconverged = int(run.ledger["unconverged"].sum())
-    if unconverged:
-        worst = float(run.ledger["residual"].max())
-        found.append(f"{unconverged} steps before stopped unconverged, at a residual of up to {worst:.1e} of the first")
-    found += _too_fast(scene, run)
+    found += [doubt["message"] for doubt in of_books(run)]
     found += _unlike(scene, report, run)
     if run.n_frames > 1 and run.ledger["mass"].any():
         grown = energy.growth(run.ledger)
@@ -139,13 +132,6 @@ def _started(scene: Mapping[str, Any], run: "Run") -> Iterator[str]:
                 f'{shared} of {len(x)} particles of "{thing["name"]}" started in others: nearer than the spacing, '
                 f"{thing['fluid']['spacing']:g} m"
             )
-
-
-def _too_fast(scene: Mapping[str, Any], run: "Run") -> Iterator[str]:
-    asked = max((float(gas["courant"]) for gas in scene["gas"]), default=math.inf)
-    reached = float(run.ledger["courant"].max())
-    if reached > _COURANT * asked:
-        yield f"the fluid passed up to {reached:.3g} cells in a step, courant is {asked:.3g}"
 
 
 def _unlike(scene: Mapping[str, Any], report: Mapping[str, Any], run: "Run") -> Iterator[str]:

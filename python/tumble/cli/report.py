@@ -70,33 +70,6 @@ def _particles(run: "Run") -> list[str]:
     return [f"  particles: {'; '.join(each)} at the end"] if each else []
 
 
-def doubts(run: "Run") -> list[dict[str, str]]:
-    """What the books of a run warn of; docs/warnings.md lists the codes."""
-    ledger = run.ledger
-    found = _too_fast(run.scene, float(ledger["courant"].max()))
-    if unconverged := int(ledger["unconverged"].sum()):
-        worst = float(ledger["residual"].max())
-        message = (
-            f"{counted(unconverged, 'step')} of {int(ledger['steps'].sum())} stopped before Newton's method converged, at a "
-            f"residual of up to {worst:.1e} of the first: raise solver.newton_iterations, or take a smaller step"
-        )
-        found.append({"code": "unconverged", "path": "", "message": message})
-    return found
-
-
-def _too_fast(scene: Mapping[str, Any], reached: float) -> list[dict[str, str]]:
-    """A warning if steps that were given let a fluid pass far more cells than its Courant number."""
-    given = any(s["method"] == "gas" and (s.get("substeps") or s.get("step")) for s in scene["system"])
-    asked = max((float(gas["courant"]) for gas in scene.get("gas", [])), default=math.inf)
-    if not given or reached <= 2.0 * asked:
-        return []
-    message = (
-        f"the fluid passed up to {reached:.3g} cells in a step, courant is {asked:.3g}: such steps smear; take more substeps, "
-        "or leave substeps and step out"
-    )
-    return [{"code": "courant", "path": "", "message": message}]
-
-
 def failure(
     run: "Run",
     error: "StepError",
