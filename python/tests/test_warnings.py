@@ -56,7 +56,7 @@ DOUBTS: list[tuple[Tree, Tree, str, str, str]] = [
         {"sheet": [SHEET | {"density": 7.9}]},
         "implausible-weight",
         'sheet "s".density',
-        "20 times",
+        "20.2 times",
     ),
     (
         {"sheet": [SHEET | {"density": 5e-5}]},

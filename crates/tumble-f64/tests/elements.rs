@@ -276,6 +276,74 @@ fn tension_stiffens_across_and_pressure_does_not() {
     }
 }
 
+/// The largest lengthening of all but some elements, after those have been given up, as forces and as constraints.
+fn largest<E: Element<N, M, D>, const N: usize, const M: usize, const D: usize>(
+    members: &[Members<N, D, 0>],
+    x: &[Row],
+    points: usize,
+    lost: &[u32],
+) -> [f64; 2] {
+    let mut batch = Elements::<E, Linear, N, M, D, 0>::new(x.len(), members).unwrap();
+    batch.give_up(lost);
+    let inverse = vec![1.0; x.len() - points];
+    let mut constraints = Projected::<E, Linear, N, M, D, 0>::new(x.len(), points, &inverse, members, &[]).unwrap();
+    constraints.give_up(lost);
+    [batch.largest_strain(x), constraints.largest_strain(x)]
+}
+
+/// Of triangles each edge is the longest somewhere; of rods each piece. What is given up does not count.
+#[test]
+fn the_largest_lengthening_is_that_of_the_edges_that_hold() {
+    let mut r = Numbers(29);
+    let record = tumble_io::shipped("interlock").unwrap();
+    let warp = Vec3::from([1.0, 0.4, 0.0]);
+    let root = Membrane::root(3.0, 2.0, 0.3, 0.8).unwrap();
+    let same = |found: [f64; 2], exact: f64| assert!(found.iter().all(|f| (f - exact).abs() < 1e-12 * (1.0 + exact)), "{found:?} {exact}");
+    let mut longest = [0; 3];
+    for _ in 0..40 {
+        // More than fill any register, and a rest.
+        let (mut membranes, mut wovens, mut pieces, mut x) = (vec![], vec![], vec![], vec![]);
+        let (mut of_triangles, mut of_pieces) = (vec![], vec![]);
+        for e in 0..21_u32 {
+            let flat: [Vec3<f64>; 3] = std::array::from_fn(|_| Vec3 { z: 0.0, ..r.vector() });
+            let place: [Vec3<f64>; 3] = std::array::from_fn(|_| r.vector());
+            let Some((b, area)) = Membrane::axes(flat, warp, 0.3).filter(|(_, area)| *area > 0.01) else { continue };
+            let edge = |k: usize| (place[(k + 1) % 3] - place[k]).norm() / (flat[(k + 1) % 3] - flat[k]).norm() - 1.0;
+            let most = (0..3).max_by(|i, j| edge(*i).total_cmp(&edge(*j))).unwrap();
+            longest[most] += 1;
+            of_triangles.push(edge(most));
+            let nodes = [0, 1, 2].map(|k| x.len() as u32 + k);
+            x.extend(place.map(|p| row(p, 1.0)));
+            let rest = std::array::from_fn(|i| if i < 4 { b[i] } else { root[i - 4] });
+            membranes.push(Members { nodes, rest, law: [], stiffness: area, damping: 0.0 });
+            wovens.push(Members { nodes, rest: Woven::rest(b, &record, 2.0), law: [], stiffness: area, damping: 0.0 });
+            let l = 0.3 + f64::from(e) * 0.05;
+            pieces.push(Members { nodes: [nodes[0], nodes[1], 0], rest: [l, 0.6], law: [], stiffness: 2.0, damping: 0.0 });
+            of_pieces.push((place[1] - place[0]).norm() / l - 1.0);
+        }
+        let points = x.len();
+        let mut with_frames = x.clone();
+        for piece in &mut pieces {
+            piece.nodes[2] = with_frames.len() as u32;
+            with_frames.push(rotation::from_z_to(r.vector()).row());
+        }
+        // Whole, then without those that were stretched most.
+        for lost in [0, 5] {
+            let held = |all: &[f64]| -> (Vec<u32>, f64) {
+                let mut order: Vec<u32> = (0..all.len() as u32).collect();
+                order.sort_by(|i, j| all[*j as usize].total_cmp(&all[*i as usize]));
+                (order[..lost].to_vec(), all[order[lost] as usize])
+            };
+            let (gone, exact) = held(&of_triangles);
+            same(largest::<Membrane, 3, 3, 8>(&membranes, &x, points, &gone), exact);
+            same(largest::<Woven, 3, 3, 28>(&wovens, &x, points, &gone), exact);
+            let (gone, exact) = held(&of_pieces);
+            same(largest::<StretchShear, 3, 3, 2>(&pieces, &with_frames, points, &gone), exact);
+        }
+    }
+    assert!(longest.iter().all(|n| *n > 100), "{longest:?}");
+}
+
 #[test]
 fn entries_and_diagonal_are_those_of_the_product() {
     let mut r = Numbers(13);

@@ -335,6 +335,11 @@ pub fn plain(x: f64) -> String {
     if x != 0.0 && (x.abs() >= 1e7 || x.abs() < 1e-4) { format!("{x:e}") } else { format!("{x}") }
 }
 
+/// A number for people, with three digits.
+pub fn short(x: f64) -> String {
+    plain(format!("{x:.2e}").parse().unwrap_or(x))
+}
+
 /// The value as the author wrote it, shortened.
 fn show(node: &Node, unit: Option<&str>) -> String {
     match &node.value {

@@ -9,7 +9,7 @@ use super::list::Members;
 use super::{Compliance, Element, Law, corrected, energy, project};
 use crate::geometry::Walls;
 use crate::math::parallel::{self, Tasks, fold};
-use crate::math::simd::{Index, Kernel, Width, count, dispatch, packs};
+use crate::math::simd::{Index, Kernel, Width, count, dispatch, largest, packs};
 use crate::math::{Lane, Quat, Real, Row, Vec3, xyz};
 use std::marker::PhantomData;
 use std::ops::Range;
@@ -468,7 +468,7 @@ impl<E: Element<N, M, D>, const N: usize, const M: usize, const D: usize, const 
     type Output = Real;
     #[inline(always)]
     fn run<W: Width>(self, w: W) -> Real {
-        let (columns, mut largest, mut each) = (self.columns, Real::NEG_INFINITY, [0.0; 16]);
+        let (columns, mut most) = (self.columns, Real::NEG_INFINITY);
         packs!(W, w, self.range, |e| {
             // SAFETY: `largest_strain` has called `check`.
             let x = unsafe { columns.gather(w, E::FRAMES, self.x.as_ptr(), e) };
@@ -480,16 +480,14 @@ impl<E: Element<N, M, D>, const N: usize, const M: usize, const D: usize, const 
                     (way.norm() - rest) / rest
                 }
                 None => {
-                    let Some(strain) = E::lengthening(columns.pack(w, e).0, x) else { return largest };
+                    let Some(strain) = E::lengthening(columns.pack(w, e).0, x) else { return most };
                     strain
                 }
             };
             let limp = soft - w.splat(0.5 * LIMP as Real);
-            w.store(limp.positive(w.splat(Real::NEG_INFINITY), strain), &mut each);
-            // NaN is never the larger.
-            largest = each[..count(w)].iter().fold(largest, |m, s| m.max(*s));
+            most = largest(w, limp.positive(w.splat(Real::NEG_INFINITY), strain), most);
         });
-        largest
+        most
     }
 }
 

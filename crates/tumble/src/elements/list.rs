@@ -4,7 +4,7 @@
 use super::batch::Weights;
 use super::{Element, Law, energy, gauss_newton, hessian, tangents};
 use crate::math::parallel::fold;
-use crate::math::simd::{Index, Kernel, Scalar, Width, count, dispatch, packs};
+use crate::math::simd::{Index, Kernel, Scalar, Width, count, dispatch, largest, packs};
 use crate::math::{Lane, Quat, Real, Row, Vec3};
 use std::marker::PhantomData;
 use std::ops::Range;
@@ -224,15 +224,13 @@ impl<E: Element<N, M, D>, Y: Law<P>, const N: usize, const M: usize, const D: us
     type Output = Real;
     #[inline(always)]
     fn run<W: Width>(self, w: W) -> Real {
-        let (mut largest, mut each) = (Real::NEG_INFINITY, [0.0; 16]);
+        let mut most = Real::NEG_INFINITY;
         packs!(W, w, self.range, |e| {
             let p = self.list.pack(w, e);
-            let Some(strain) = E::lengthening(p.rest, self.list.rows(w, self.x, e)) else { return largest };
-            w.store(p.stiffness.positive(strain, w.splat(Real::NEG_INFINITY)), &mut each);
-            // NaN is never the larger.
-            largest = each[..count(w)].iter().fold(largest, |m, s| m.max(*s));
+            let Some(strain) = E::lengthening(p.rest, self.list.rows(w, self.x, e)) else { return most };
+            most = largest(w, p.stiffness.positive(strain, w.splat(Real::NEG_INFINITY)), most);
         });
-        largest
+        most
     }
 }
 

@@ -7,7 +7,7 @@ use super::neighbours::{Columns, Neighbours, SLICE};
 use super::{Distance, Element, Law, Vector};
 use crate::linalg::blocks::Block;
 use crate::math::parallel::{Tasks, chunks, fold};
-use crate::math::simd::{Kernel, Scalar, Width, count, dispatch, packs};
+use crate::math::simd::{Kernel, Scalar, Width, dispatch, largest, packs};
 use crate::math::{Lane, Real, Row, Vec3, xyz};
 use std::marker::PhantomData;
 use std::ops::Range;
@@ -310,16 +310,13 @@ impl<E: Pair<M, D>, Y: Law<P>, const M: usize, const D: usize, const P: usize> K
     type Output = Real;
     #[inline(always)]
     fn run<W: Width>(self, w: W) -> Real {
-        let (mut largest, mut each) = (Real::NEG_INFINITY, [0.0; 16]);
+        let mut most = Real::NEG_INFINITY;
         packs!(W, w, self.range, |e| {
             let p = self.list.pack(w, e);
             let [a, b] = self.list.vectors(w, self.x, e);
-            w.store(E::strain(p.rest, (b - a).norm()), &mut each);
-            for strain in &each[..count(w)] {
-                largest = if *strain > largest { *strain } else { largest };
-            }
+            most = largest(w, E::strain(p.rest, (b - a).norm()), most);
         });
-        largest
+        most
     }
 }
 

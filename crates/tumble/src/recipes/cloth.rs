@@ -10,7 +10,7 @@ use crate::geometry::Vector;
 use crate::math::functions;
 use crate::systems::dynamics::SpringPart;
 use tumble_interface::Mesh;
-use tumble_interface::check::plain;
+use tumble_interface::check::{plain, short};
 use tumble_interface::scene::{Cloth, Panel, Seam};
 
 /// Sewn sides may differ in length by this part of it.
@@ -20,11 +20,6 @@ const MOST: f64 = 5e6;
 
 /// Length over width of triangles at most: twice that of the thinnest that steps of all lengths are tried with.
 const THIN: f64 = 100.0;
-
-/// A number with three digits.
-pub fn short(x: f64) -> String {
-    plain(format!("{x:.2e}").parse().unwrap_or(x))
-}
 
 /// Adds the masses, links, hinges, seams and triangles.
 pub fn cloth(site: &mut Site<'_>, thing: &Cloth) {

@@ -10,13 +10,12 @@
 //! The bodice hangs on a tube around the body that is as wide as the panels at every height, its straps bent over the shoulders; the
 //! skirt falls from the waist as a cone.
 
-use super::cloth::short;
 use super::cut::{Cut, Stitch};
 use crate::geometry::Vector;
 use crate::math::functions::{cos, sin};
 use std::f64::consts::{FRAC_PI_2, PI};
 use std::ops::RangeInclusive;
-use tumble_interface::check::plain;
+use tumble_interface::check::{plain, short};
 use tumble_interface::scene::Dress;
 
 /// Girths of waists, from a doll's to a monument's [m].

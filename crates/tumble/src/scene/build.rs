@@ -23,7 +23,7 @@ use crate::systems::vicsek::Swarm;
 use crate::world::World;
 use std::borrow::Cow;
 use std::sync::Arc;
-use tumble_interface::check::plain;
+use tumble_interface::check::short;
 use tumble_interface::scene::{
     Animated, Bits, Field as Stream, Force as Words, Hair, Integrator, MeshFile, Method, Plane, Scene, Shape, System as Plan, Vicsek,
 };
@@ -207,11 +207,6 @@ fn buried(scene: &Scene, parts: &Parts, colliders: &[Collider]) -> Vec<Warning> 
         Some(Warning::new(Code::StartsInside, format!("\"{name}\""), message))
     };
     masses.chain(sources).filter_map(told).collect()
-}
-
-/// A number with three digits.
-fn short(x: f64) -> String {
-    plain(format!("{x:.2e}").parse().unwrap_or(x))
 }
 
 /// The scene with the masses of its clouds drawn.

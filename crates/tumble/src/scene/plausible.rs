@@ -1,7 +1,7 @@
 //! Whether what a scene says may be meant: figures beyond anything real are mostly slips of a unit.
 
 use tumble_interface::Assets;
-use tumble_interface::check::plain;
+use tumble_interface::check::{plain, short};
 use tumble_interface::scene::{MeshFile, Scene, Shape};
 use tumble_interface::warning::{Code, Warning};
 
@@ -15,7 +15,7 @@ const FILM: f64 = 1e-4;
 const OSMIUM: f64 = 22_590.0;
 /// Density of graphene aerogel [kg/m³], the lightest solid (Sun, Xu and Gao, Advanced Materials 25, 2013).
 const AEROGEL: f64 = 0.16;
-/// Density of liquid hydrogen [kg/m³], the lightest liquid but helium.
+/// Density of liquid hydrogen [kg/m³], the lightest liquid.
 const HYDROGEN: f64 = 70.0;
 /// Mass per length of the heaviest anchor chains [kg/m].
 const CHAIN: f64 = 1000.0;
@@ -25,9 +25,11 @@ const DIAMOND: f64 = 1.2e12;
 const EARTH: f64 = 9.80665;
 /// How many times the Earth's gravity may be; the Sun has 28 times.
 const STRONG: f64 = 30.0;
-/// Extents [m]: of anything; of cloth, as the largest tents; of what is solid, as the largest buildings.
+/// Least extent of anything [m].
 const SMALL: f64 = 1e-4;
+/// Largest extent of cloth [m], as of the largest tents.
 const BROAD: f64 = 200.0;
+/// Largest extent of what is solid [m], as of the largest buildings.
 const LARGE: f64 = 1000.0;
 
 /// What in the scene is unlike anything real.
@@ -41,7 +43,7 @@ pub fn implausible(scene: &Scene, assets: &Assets) -> Vec<Warning> {
     for (kind, name, density) in sheets.chain(nets).chain(cloths) {
         let Some(density) = density else { continue };
         let than = if density > HEAVY * DENIM {
-            format!("{} times as much as denim", times(density / DENIM))
+            format!("{} times as much as denim", short(density / DENIM))
         } else if density < FILM {
             "less than a film of a tenth of a micrometre".into()
         } else {
@@ -64,7 +66,7 @@ pub fn implausible(scene: &Scene, assets: &Assets) -> Vec<Warning> {
         .filter_map(|t| Some((format!("particles \"{}\".fluid.density", t.name), t.fluid.as_ref()?.density, HYDROGEN)));
     for (path, density, least) in blocks.chain(hair).chain(heat).chain(liquids) {
         let than = if density > OSMIUM {
-            format!("{} times as much as osmium, the densest element", times(density / OSMIUM))
+            format!("{} times as much as osmium, the densest element", short(density / OSMIUM))
         } else if density < least {
             format!("less than {} kg/m³, the lightest there is", plain(least))
         } else {
@@ -76,14 +78,14 @@ pub fn implausible(scene: &Scene, assets: &Assets) -> Vec<Warning> {
     for block in &scene.block {
         if let Some(young) = block.material.as_ref().map(|m| m.young).filter(|young| *young > DIAMOND) {
             let message =
-                format!("{} Pa is {} times as stiff as diamond; rubber has 1e6, steel 2.1e11", plain(young), times(young / DIAMOND));
+                format!("{} Pa is {} times as stiff as diamond; rubber has 1e6, steel 2.1e11", plain(young), short(young / DIAMOND));
             doubt(Code::ImplausibleStiffness, format!("block \"{}\".material.young", block.name), message);
         }
     }
 
     let gravity = scene.world.gravity.iter().map(|g| g * g).sum::<f64>().sqrt();
     if gravity > STRONG * EARTH {
-        let message = format!("{} m/s² is {} times that of the Earth; lengths are in metres", plain(gravity), times(gravity / EARTH));
+        let message = format!("{} m/s² is {} times that of the Earth; lengths are in metres", plain(gravity), short(gravity / EARTH));
         doubt(Code::ImplausibleGravity, "world.gravity".into(), message);
     }
 
@@ -98,7 +100,7 @@ pub fn implausible(scene: &Scene, assets: &Assets) -> Vec<Warning> {
     });
     for (path, size, most) in sheets.chain(blocks).chain(nets).chain(solids) {
         if size > 0.0 && !(SMALL..=most).contains(&size) {
-            let message = format!("{} m across; lengths are in metres: a mesh in millimetres needs a scale of 0.001", times(size));
+            let message = format!("{} m across; lengths are in metres: a mesh in millimetres needs a scale of 0.001", short(size));
             doubt(Code::ImplausibleSize, path, message);
         }
     }
@@ -109,9 +111,4 @@ pub fn implausible(scene: &Scene, assets: &Assets) -> Vec<Warning> {
 fn extent(points: &[[f64; 3]]) -> f64 {
     let along = |axis: usize| points.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), p| (p[axis].min(l), p[axis].max(h)));
     (0..3).map(along).map(|(low, high)| high - low).fold(0.0, f64::max)
-}
-
-/// A number for people, in two digits.
-fn times(x: f64) -> String {
-    plain(format!("{x:.1e}").parse().unwrap_or(x))
 }

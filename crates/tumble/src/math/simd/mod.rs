@@ -132,6 +132,14 @@ pub fn count<W: Width>(_w: W) -> usize {
     W::N
 }
 
+/// The largest of `most` and of all lanes; NaN is never the larger.
+#[inline(always)]
+pub fn largest<W: Width>(w: W, lanes: W::L, most: Real) -> Real {
+    let mut each = [0.0; 16];
+    w.store(lanes, &mut each);
+    each[..W::N].iter().fold(most, |most, lane| most.max(*lane))
+}
+
 /// Runs `$body` with `$w` and the first number `$e` of each pack of `$range`, then one by one.
 macro_rules! packs {
     ($width:ident, $w:ident, $range:expr, |$e:ident| $body:expr) => {{
