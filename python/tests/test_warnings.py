@@ -66,6 +66,13 @@ DOUBTS: list[tuple[Tree, Tree, str, str, str]] = [
         "film",
     ),
     (
+        {"sheet": [SHEET | {"fabric": {"name": "denim", "thicken": 30}}]},
+        {"sheet": [SHEET | {"fabric": {"name": "denim", "thicken": 10}}]},
+        "implausible-weight",
+        'sheet "s".fabric',
+        "times as much as denim",
+    ),
+    (
         {"rope": [ROPE | {"density": 1100}]},
         {"rope": [ROPE | {"density": 900}]},
         "implausible-weight",

@@ -179,7 +179,10 @@ fn wind_acts_per_length() {
 #[test]
 fn bad_hair_is_refused_with_its_place() {
     let issue = |words: &str| {
-        let text = format!("version = 1\n{BALL}[[collider]]\nname = \"floor\"\nshape.floor = {{}}\n[[hair]]\nname = \"h\"\n{words}\n");
+        let text = format!(
+            "version = 1\n{BALL}[[collider]]\nname = \"floor\"\nshape.floor = {{}}\n[[collider]]\nname = \"bowl\"\ninside = true\n\
+             shape.sphere.radius = 1\n[[collider]]\nname = \"dancer\"\nshape.mannequin = {{}}\n[[hair]]\nname = \"h\"\n{words}\n"
+        );
         match Scene::from_toml(&text) {
             Err(e) => e.to_string(),
             Ok(scene) => Simulation::new(scene, Default::default()).map(|_| ()).unwrap_err().to_string(),
@@ -190,6 +193,11 @@ fn bad_hair_is_refused_with_its_place() {
         ("on = \"ball\"\ncount = 0\nlength = 0.1", "count"),
         ("on = \"bald\"\ncount = 3\nlength = 0.1", "there is no collider \"bald\""),
         ("on = \"floor\"\ncount = 3\nlength = 0.1", "has no end"),
+        ("on = \"bowl\"\ncount = 3\nlength = 0.1", "is a container"),
+        ("on = \"dancer\"\ncount = 3\nlength = 0.1", "say which bone carries the roots, hips, "),
+        ("on = \"dancer\"\nbone = \"tail\"\ncount = 3\nlength = 0.1", "has no bone \"tail\"; known are hips, "),
+        ("on = \"ball\"\nbone = \"head\"\ncount = 3\nlength = 0.1", "has no bones"),
+        ("on = \"ball\"\ncount = 3\nlength = 1e30", "length"),
         ("on = \"ball\"\nlength = 0.1", "either a count of strands or per_area"),
         ("on = \"ball\"\ncount = 3\nper_area = 4\nlength = 0.1", "either a count of strands or per_area"),
         ("count = 3\nlength = 0.1", "either the name of a collider, or a mesh"),

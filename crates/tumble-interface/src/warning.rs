@@ -59,6 +59,8 @@ codes! {
     FoldedPattern = "folded-pattern",
     /// A mesh of soft matter with flaws.
     UnsoundMesh = "unsound-mesh",
+    /// Steps so short, places so far or rods so stiff that single precision does not suffice.
+    RoundOff = "round-off",
     /// A surface or line heavier or lighter than any real one.
     ImplausibleWeight = "implausible-weight",
     /// Matter denser or lighter than any real one.

@@ -110,6 +110,9 @@ impl<'a> Reader<'a> {
             if inverse.as_flattened().iter().any(|x| !x.is_finite()) {
                 return Err(format!("matrix {i} of skin {s} is not finite; {DAMAGED}"));
             }
+            if inverse.iter().all(|row| row[..3] == [0.0; 3]) {
+                return Err(format!("matrix {i} of skin {s} is zero; {DAMAGED}"));
+            }
             Ok(Bind { joint: self.joint(node)?, inverse })
         };
         skin.joints.iter().map(|joint| joint.value()).enumerate().map(bind).collect()
@@ -218,7 +221,10 @@ impl<'a> Reader<'a> {
         let values = self.scene.column(output, type_, components)?;
         let times: Vec<f64> = (0..times.count).map(|i| times.number(i, 0)).collect();
         let needed = times.len() * if between == Between::Cubic { 3 } else { 1 };
-        if times.is_empty() || values.count != needed {
+        if times.is_empty() {
+            return Err("no keys; export the animation again, or leave it out".to_owned());
+        }
+        if values.count != needed {
             return Err(format!("{} values for {} times, expected {needed}; {DAMAGED}", values.count, times.len()));
         }
         if times.iter().any(|t| !t.is_finite()) || times.windows(2).any(|t| t[1] <= t[0]) {
@@ -228,6 +234,10 @@ impl<'a> Reader<'a> {
         let values: Vec<[f64; 4]> = (0..values.count).map(value).collect();
         if values.as_flattened().iter().any(|x| !x.is_finite()) {
             return Err(format!("a value that is not finite; {DAMAGED}"));
+        }
+        let keys = |i: &usize| between != Between::Cubic || i % 3 == 1;
+        if part == Part::Rotation && (0..values.len()).filter(keys).any(|i| values[i] == [0.0; 4]) {
+            return Err(format!("a rotation without length; {DAMAGED}"));
         }
         Ok(Track { joint, part, times, values, between })
     }

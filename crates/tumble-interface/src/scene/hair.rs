@@ -16,6 +16,9 @@ pub struct Hair {
     /// Collider on whose surface it grows, and with which its roots move. This or `mesh`.
     #[serde(default)]
     pub on: Option<String>,
+    /// Which bone carries the roots, where `on` is a mannequin or a character: hair on its head, with `above`, follows `head`.
+    #[serde(default)]
+    pub bone: Option<String>,
     /// Mesh on which it grows; its roots stay. This or `on`.
     #[serde(default)]
     pub mesh: Option<MeshFile>,
@@ -32,7 +35,7 @@ pub struct Hair {
     #[schemars(extend("x-unit" = "m"))]
     pub above: Option<f64>,
     /// Length of a strand.
-    #[schemars(extend("x-unit" = "m", "exclusiveMinimum" = 0.0))]
+    #[schemars(range(min = 1e-6, max = 1000.0), extend("x-unit" = "m"))]
     pub length: f64,
     /// By what share of it a strand may be shorter, at random.
     #[serde(default)]
@@ -90,7 +93,7 @@ pub struct Hair {
 #[serde(deny_unknown_fields)]
 pub struct Curl {
     /// Radius of the spiral.
-    #[schemars(extend("x-unit" = "m", "exclusiveMinimum" = 0.0))]
+    #[schemars(range(min = 1e-6, max = 1000.0), extend("x-unit" = "m"))]
     pub radius: f64,
     /// Height of a turn; 0 is a ring.
     #[serde(default)]

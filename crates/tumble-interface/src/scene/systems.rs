@@ -156,7 +156,7 @@ pub enum Integrator {
     /// Two-step backward differentiation. Order 2; damps high frequencies.
     Bdf2,
     /// Position-based dynamics: positions are predicted without the elements, then moved until each element is satisfied; velocities
-    /// follow. Stable for every step; iterated to convergence it is implicit Euler. Order 1; damps.
+    /// follow. Iterated to convergence it is implicit Euler; swept once a sub-step it wants sub-steps of a few ms. Order 1; damps.
     PositionBased,
 }
 

@@ -64,6 +64,10 @@ pub trait Constraints: Send + Sync {
     fn energy(&self, x: &[Row], walls: Walls<'_>) -> f64;
     /// Corrects points and frames once, element by element; x[i][3] are inverse masses of points.
     fn project(&mut self, x: &mut [Row], step: &Projection<'_>);
+    /// How many times as soft as they should be round-off makes the elements in sub-steps of length h [s], the worst of them; 1 is not at all.
+    fn softening(&self, _h: f64) -> f64 {
+        1.0
+    }
     /// Adds the stiffness with which the elements hold each row [N/m].
     fn add_grip(&self, x: &[Row], grip: &mut [Real]);
     /// Lengthening over rest length of every element that is a link, in the order in which they were given.

@@ -4,7 +4,7 @@
 
 use super::Step;
 use crate::math::parallel::{chunks, chunks2};
-use crate::math::{Real, Row, add, axpy, rows, scale, sub};
+use crate::math::{Real, Row, add, axpy, rows, scale};
 use tumble_interface::StepError;
 
 /// v += h a(t, x, v), then x += h v.                                   (integrators.2)
@@ -39,11 +39,12 @@ fn euler(Step { equation, t, h, x, v, scratch, .. }: Step<'_, '_>, early: Real) 
     Ok(())
 }
 
-/// Stoermer's form: x_t+h = 2 x_t - x_t-h + h² a_t,   v_t = (x_t - x_t-h)/h + h/2 a_t.        (integrators.6)
+/// Stoermer's form: x_t+h = x_t + d,   d += h² a_t,   v_t = d/h + h/2 a_t,   where d = x_t - x_t-h.        (integrators.6)
 ///
-/// Order 2, symplectic, w h < 2. Memory: x_t-h and a_t. Frames, which have no differences, take the velocity form.
+/// Order 2, symplectic, w h < 2. Memory: d and a_t: of two positions far from the origin the difference would be lost in round-off. Frames,
+/// which have no differences, take the velocity form.
 pub(super) fn verlet(Step { equation, t, h, x, v, memory, ready, scratch, .. }: Step<'_, '_>) -> Result<(), StepError> {
-    let [before, a] = memory else { return Ok(()) };
+    let [way, a] = memory else { return Ok(()) };
     let kinematics = equation.kinematics();
     let [guess] = scratch.take(x.len());
     let (half, h) = ((h / 2.0) as Real, h as Real);
@@ -51,35 +52,35 @@ pub(super) fn verlet(Step { equation, t, h, x, v, memory, ready, scratch, .. }: 
     let time = t + f64::from(h);
     if !ready {
         equation.rate(t, x, v, a)?;
-        let (x, v, a) = (&*x, &*v, &**a);
-        chunks(before, |start, before| {
-            for (i, b) in before.iter_mut().enumerate() {
+        let (v, a) = (&*v, &**a);
+        chunks(way, |start, way| {
+            for (i, d) in way.iter_mut().enumerate() {
                 let i = start + i;
-                *b = axpy(axpy(x[i], -h, v[i]), h * half, a[i]);
+                *d = scale(axpy(v[i], -half, a[i]), h);
             }
         });
     }
     {
         let (v, a) = (&*v, &**a);
-        chunks2(x, before, |start, x, before| {
-            for (i, (x, before)) in x.iter_mut().zip(before).enumerate() {
+        chunks2(x, way, |start, x, way| {
+            for (i, (x, d)) in x.iter_mut().zip(way).enumerate() {
                 let i = start + i;
-                let after = if i < points {
-                    axpy(sub(add(*x, *x), *before), h * h, a[i])
+                if i < points {
+                    *d = axpy(*d, h * h, a[i]);
+                    *x = add(*x, *d);
                 } else {
-                    kinematics.moved(i, *x, axpy(v[i], half, a[i]), h)
-                };
-                *before = std::mem::replace(x, after);
+                    *x = kinematics.moved(i, *x, axpy(v[i], half, a[i]), h);
+                }
             }
         });
     }
     {
         // The velocity without its last half kick, and a first-order guess of the whole for forces that depend on it.
-        let (x, before, a) = (&*x, &**before, &**a);
+        let (way, a) = (&**way, &**a);
         chunks2(v, guess, |start, v, guess| {
             for (i, (v, guess)) in v.iter_mut().zip(guess).enumerate() {
                 let i = start + i;
-                *v = if i < points { scale(sub(x[i], before[i]), 1.0 / h) } else { axpy(*v, half, a[i]) };
+                *v = if i < points { scale(way[i], 1.0 / h) } else { axpy(*v, half, a[i]) };
                 *guess = axpy(*v, half, a[i]);
             }
         });

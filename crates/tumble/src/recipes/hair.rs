@@ -27,10 +27,23 @@ const MOST: f64 = 1e7;
 pub struct Ground<'a> {
     /// Its surface, without motion.
     pub mesh: &'a Mesh,
-    /// The collider that carries the roots, if it moves, and where that is at the start.
-    pub carrier: Option<(usize, Pose)>,
+    /// Where that stands at the start.
+    pub pose: Pose,
+    /// What carries the roots, if it moves, and where that is at the start.
+    pub carrier: Option<Carrier>,
     /// The collider that strands are combed off.
     pub solid: Option<&'a Collider>,
+}
+
+/// A collider, or one of its bones, and where it is at the start.
+#[derive(Clone, Copy)]
+pub struct Carrier {
+    /// Counted from the first.
+    pub collider: usize,
+    /// Of its bones.
+    pub bone: Option<usize>,
+    /// Its place.
+    pub pose: Pose,
 }
 
 /// Adds the masses, frames and elements of all strands.
@@ -72,7 +85,6 @@ pub fn hair(site: &mut Site<'_>, thing: &Hair, seed: u32, ground: &Ground<'_>) {
     }
     let grown: Vec<Vec<Vector>> = roots.iter().enumerate().map(|(i, root)| strand(thing, &random, i as u64, *root)).collect();
     site.parts.begin(&thing.name, thing.radius);
-    let (pose, carrier) = ground.carrier.as_ref().map_or((Pose::default(), None), |(k, pose)| (*pose, Some(*k)));
     for (i, own) in grown.iter().enumerate() {
         let shape = match &thing.clump {
             Some(clump) if i >= clump.count as usize => {
@@ -81,11 +93,11 @@ pub fn hair(site: &mut Site<'_>, thing: &Hair, seed: u32, ground: &Ground<'_>) {
             }
             _ => own.clone(),
         };
-        let mut shape: Vec<Vector> = shape.into_iter().map(|p| pose.out(p)).collect();
+        let mut shape: Vec<Vector> = shape.into_iter().map(|p| ground.pose.out(p)).collect();
         if let Some(solid) = ground.solid {
             comb(&mut shape, solid, 1.02 * solid.thickness + 1e-4 * thing.length);
         }
-        plant(site, thing, &shape, carrier.map(|k| (k, pose)));
+        plant(site, thing, &shape, ground.carrier);
     }
     let n = thing.segments + 1;
     if let Some(object) = site.parts.object() {
@@ -172,7 +184,7 @@ fn strand(thing: &Hair, random: &Random, id: u64, (root, normal): (Vector, Vecto
 }
 
 /// Masses, frames and elements of a strand at rest.
-fn plant(site: &mut Site<'_>, thing: &Hair, shape: &[Vector], carrier: Option<(usize, Pose)>) {
+fn plant(site: &mut Site<'_>, thing: &Hair, shape: &[Vector], carrier: Option<Carrier>) {
     let n = shape.len() - 1;
     let area = PI * thing.radius * thing.radius;
     let per_length = thing.density * area;
@@ -190,8 +202,8 @@ fn plant(site: &mut Site<'_>, thing: &Hair, shape: &[Vector], carrier: Option<(u
     let inertia = |l: f64| per_length * l * (thing.radius * thing.radius / 2.0 + l * l / 12.0);
     let held = site.parts.frame(turn.row(), inertia((shape[1] - shape[0]).norm()));
     site.parts.clamp_frame(held);
-    if let Some((collider, pose)) = carrier {
-        site.parts.carry(collider, points[0], pose.back(shape[0]), held, pose.turn.conj() * turn);
+    if let Some(Carrier { collider, bone, pose }) = carrier {
+        site.parts.carry((collider, bone), points[0], pose.back(shape[0]), held, pose.turn.conj() * turn);
     }
     let mut before = (held, turn, 0.0);
     for i in 0..n {

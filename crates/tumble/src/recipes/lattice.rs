@@ -126,7 +126,7 @@ mod tests {
                 parts: &mut parts,
                 issues: &mut issues,
                 up: Vector::default(),
-                solids: &[],
+                solids: None,
                 assets: &tumble_interface::Assets::default(),
             };
             let lattice = Lattice::build(&mut site, [n, 7], [2.0, 3.0], [0.0; 3], [0.0; 3], 0.5);

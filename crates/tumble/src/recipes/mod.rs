@@ -32,7 +32,7 @@ pub use emitter::{emitter, region};
 pub use figures::{MANNEQUIN, bytes as figure_bytes, character, mannequin};
 pub use galaxy::galaxy;
 pub use grid::grid;
-pub use hair::{Ground, hair};
+pub use hair::{Carrier, Ground, hair};
 pub use heat::heat;
 pub use net::net;
 pub use particles::{Tracer, draw_cloud, particles, tracers, walkers};
@@ -56,7 +56,7 @@ pub struct Site<'a> {
     /// Direction that counts as up.
     pub up: Vector,
     /// The scene's colliders, for what follows them.
-    pub solids: &'a [(String, Collider)],
+    pub solids: Option<&'a [(String, Collider)]>,
     /// What comes from files.
     pub assets: &'a Assets,
 }

@@ -1,7 +1,7 @@
 //! Which masses a pin means.
 
 use super::Site;
-use crate::geometry::Vector;
+use crate::geometry::{Collider, Vector};
 use tumble_interface::scene::{Follow, Pin, Region};
 
 /// What a thing offers to pin.
@@ -24,7 +24,8 @@ pub fn pinned(site: &mut Site<'_>, thing: &Pinnable<'_>, pins: &[Pin]) -> Vec<u3
             Pin::Words(words) => (in_words(thing, words), None),
             Pin::Region(region) => (in_table(site, thing, region), region.follow.as_ref()),
         };
-        let carrier = follow.map(|follow| carrier(site, follow)).transpose();
+        // What is wrong with a collider is told elsewhere.
+        let carrier = follow.zip(site.solids).map(|(follow, solids)| carrier(solids, follow)).transpose();
         match found.and_then(|found| Ok((found, carrier?))) {
             Ok((found, carrier)) => {
                 all.extend(found.iter().map(|p| p + thing.first));
@@ -41,13 +42,13 @@ pub fn pinned(site: &mut Site<'_>, thing: &Pinnable<'_>, pins: &[Pin]) -> Vec<u3
 }
 
 /// The collider that is followed, counted from the first, and its bone.
-fn carrier(site: &Site<'_>, follow: &Follow) -> Result<(usize, Option<usize>), String> {
-    let Some(solid) = site.solids.iter().position(|(name, _)| *name == follow.collider) else {
-        let known: Vec<&str> = site.solids.iter().map(|(name, _)| name.as_str()).collect();
+fn carrier(solids: &[(String, Collider)], follow: &Follow) -> Result<(usize, Option<usize>), String> {
+    let Some(solid) = solids.iter().position(|(name, _)| *name == follow.collider) else {
+        let known: Vec<&str> = solids.iter().map(|(name, _)| name.as_str()).collect();
         return Err(format!("there is no collider \"{}\" to follow; known are {}", follow.collider, known.join(", ")));
     };
     let Some(bone) = &follow.bone else { return Ok((solid, None)) };
-    let collider = &site.solids[solid].1;
+    let collider = &solids[solid].1;
     match collider.bone(bone) {
         Some(bone) => Ok((solid, Some(bone))),
         None if collider.bones().is_empty() => Err(format!("collider \"{}\" has no bones; leave out bone", follow.collider)),

@@ -9,6 +9,7 @@ use super::laws::{Reader, flat};
 use super::memory::memory;
 use super::plausible::implausible;
 use crate::exchange::Exchange;
+use crate::geometry::motion::Pose;
 use crate::geometry::{Collider, Vector};
 use crate::math::parallel::fold;
 use crate::pool::{Course, Emitter as Emission};
@@ -169,6 +170,7 @@ pub fn build(scene: &Scene, assets: &Assets) -> Result<Built, SceneError> {
         warnings.extend(buried(scene, &parts, &colliders));
         let mut system = parts.build(settings).map_err(|e| placed(scene, e))?;
         warnings.extend(system.tangles());
+        warnings.extend(system.round_off(dt));
         if exchange.ports_of(index).next().is_some() {
             system.expect_pushes();
         }
@@ -293,16 +295,17 @@ fn fill(
     scene: &Scene,
     plans: &[Plan],
     assets: &Assets,
-    solids: (&[Collider], &[Mesh]),
+    surfaced: (&[Collider], &[Mesh]),
     (issues, hints): (&mut Vec<Issue>, &mut Vec<Warning>),
 ) -> Vec<Parts> {
     // Issues leave colliders out, and then nothing is built.
-    let named: Vec<(String, Collider)> = scene.collider.iter().map(|c| c.name.clone()).zip(solids.0.iter().cloned()).collect();
+    let named: Vec<(String, Collider)> = scene.collider.iter().map(|c| c.name.clone()).zip(surfaced.0.iter().cloned()).collect();
+    let solids = (named.len() == scene.collider.len()).then_some(&named[..]);
     let mut parts: Vec<Parts> = plans.iter().map(|_| Parts::default()).collect();
     let up: Vector = if scene.dimension == 2 && scene.plane == Plane::Xy { [0.0, 1.0, 0.0] } else { [0.0, 0.0, 1.0] }.into();
     let mut at = |kind: &str, system: &Option<String>, recipe: &mut dyn FnMut(&mut Site<'_>)| {
         if let Some(index) = place(plans, kind, system.as_deref()) {
-            recipe(&mut Site { parts: &mut parts[index], issues: &mut *issues, hints: &mut *hints, up, solids: &named, assets });
+            recipe(&mut Site { parts: &mut parts[index], issues: &mut *issues, hints: &mut *hints, up, solids, assets });
         }
     };
     for thing in &scene.particles {
@@ -339,7 +342,7 @@ fn fill(
         at("rope", &thing.system, &mut |site| recipes::rope(site, thing));
     }
     for thing in &scene.hair {
-        at("hair", &thing.system, &mut |site| planted(site, scene, thing, assets, solids));
+        at("hair", &thing.system, &mut |site| planted(site, scene, thing, assets, surfaced));
     }
     for thing in &scene.sheet {
         at("sheet", &thing.system, &mut |site| recipes::sheet(site, thing));
@@ -380,7 +383,7 @@ fn planted(site: &mut Site<'_>, scene: &Scene, thing: &Hair, assets: &Assets, (c
         (Some(file), None) => match assets.get(&file.path) {
             Some(mesh) => {
                 let mesh = recipes::placed(mesh, file);
-                recipes::hair(site, thing, scene.seed, &recipes::Ground { mesh: &mesh, carrier: None, solid: None });
+                recipes::hair(site, thing, scene.seed, &recipes::Ground { mesh: &mesh, pose: Pose::default(), carrier: None, solid: None });
             }
             None => wrong(".mesh", "the mesh has not been loaded".into()),
         },
@@ -393,8 +396,29 @@ fn planted(site: &mut Site<'_>, scene: &Scene, thing: &Hair, assets: &Assets, (c
             }
             // What is wrong with the collider is told elsewhere.
             let (true, Some(mesh)) = (colliders.len() == scene.collider.len(), surfaces.get(k)) else { return };
-            let carrier = colliders[k].motion.as_ref().map(|motion| (k, motion.at(0.0).0));
-            recipes::hair(site, thing, scene.seed, &recipes::Ground { mesh, carrier, solid: Some(&colliders[k]) });
+            let (solid, bones) = (&colliders[k], colliders[k].bones());
+            if solid.inside {
+                let message =
+                    format!("collider \"{name}\" is a container, and hair grows outwards; let it grow on a mesh that faces inwards");
+                return wrong(".on", message);
+            }
+            let bone = match &thing.bone {
+                Some(bone) if bones.is_empty() => {
+                    return wrong(".bone", format!("collider \"{name}\" has no bones; leave out bone (\"{bone}\")"));
+                }
+                Some(bone) => match solid.bone(bone) {
+                    Some(bone) => Some(bone),
+                    None => return wrong(".bone", format!("collider \"{name}\" has no bone \"{bone}\"; known are {}", bones.join(", "))),
+                },
+                None if bones.is_empty() => None,
+                None => {
+                    let message = format!("collider \"{name}\" changes its shape: say which bone carries the roots, {}", bones.join(", "));
+                    return wrong(".bone", message);
+                }
+            };
+            let moves = bone.is_some() || solid.motion.is_some();
+            let carrier = moves.then(|| recipes::Carrier { collider: k, bone, pose: solid.pose(bone, 0.0) });
+            recipes::hair(site, thing, scene.seed, &recipes::Ground { mesh, pose: solid.pose(None, 0.0), carrier, solid: Some(solid) });
         }
         _ => wrong(".on", "expected either the name of a collider, or a mesh".into()),
     }

@@ -37,11 +37,15 @@ pub fn implausible(scene: &Scene, assets: &Assets) -> Vec<Warning> {
     let mut warnings = Vec::new();
     let mut doubt = |code, path: String, message: String| warnings.push(Warning::new(code, path, message));
 
-    let sheets = scene.sheet.iter().map(|t| ("sheet", &t.name, t.density));
-    let nets = scene.net.iter().map(|t| ("net", &t.name, t.density));
-    let cloths = scene.cloth.iter().map(|t| ("cloth", &t.name, t.density));
-    for (kind, name, density) in sheets.chain(nets).chain(cloths) {
-        let Some(density) = density else { continue };
+    let sheets = scene.sheet.iter().map(|t| ("sheet", &t.name, t.density, &t.fabric));
+    let nets = scene.net.iter().map(|t| ("net", &t.name, t.density, &t.fabric));
+    let cloths = scene.cloth.iter().map(|t| ("cloth", &t.name, t.density, &t.fabric));
+    for (kind, name, density, fabric) in sheets.chain(nets).chain(cloths) {
+        let record = || {
+            let words = fabric.as_ref()?;
+            Some((assets.fabric(words.key())?.density * words.settings().thicken, "fabric"))
+        };
+        let Some((density, key)) = density.map(|density| (density, "density")).or_else(record) else { continue };
         let than = if density > HEAVY * DENIM {
             format!("{} times as much as denim", short(density / DENIM))
         } else if density < FILM {
@@ -50,7 +54,7 @@ pub fn implausible(scene: &Scene, assets: &Assets) -> Vec<Warning> {
             continue;
         };
         let message = format!("{} kg/m² is {than}; densities of surfaces are per area, cotton has 0.15", plain(density));
-        doubt(Code::ImplausibleWeight, format!("{kind} \"{name}\".density"), message);
+        doubt(Code::ImplausibleWeight, format!("{kind} \"{name}\".{key}"), message);
     }
     for rope in scene.rope.iter().filter(|rope| rope.density > CHAIN) {
         let message = format!("{} kg/m is more than the heaviest chains; densities of ropes are per length", plain(rope.density));

@@ -21,8 +21,9 @@ use std::ops::Range;
 const TASK: usize = 64;
 /// Farthest that a frame turns in a sweep [rad]; a strand that would turn more takes a part of its step.
 const FARTHEST: Real = 0.4;
-/// Added to the diagonal, relative to it: rigid elements may ask for the same twice.
-const RIDGE: f64 = 8.0 * Real::EPSILON as f64;
+/// Compliance at least, relative to the diagonal: with less, round-off decides how far neighbours give way. Rigid elements may ask for the
+/// same twice.
+const RIDGE: f64 = 4.0 * Real::EPSILON as f64;
 
 type Stretch = Members<3, 2, 0>;
 type Bend = Members<2, 5, 0>;
@@ -219,6 +220,17 @@ impl Group {
             }
         }
         Some(group)
+    }
+
+    /// How much more the softest bend gives than it should, in sub-steps of length h [s].
+    fn softening(&self, h: f64) -> f64 {
+        let bend = |at: usize| {
+            let half = 0.5 * f64::from(self.bend[0][at]);
+            let diagonal = half * half * (f64::from(self.inertia[at]) + f64::from(self.inertia[at + self.count]));
+            let alpha = f64::from(self.bend[6][at]) / (h * h);
+            if alpha > 0.0 { RIDGE * diagonal / alpha } else { 1.0 }
+        };
+        (0..(self.n + 1) * self.count).map(bend).fold(1.0, f64::max)
     }
 
     fn project(&mut self, x: Shared, step: &Projection<'_>) {
@@ -483,7 +495,8 @@ fn right<L: Lane>(r: [L; 3], before: [L; 3], share: L, alpha: L, lambda: [L; 3])
 #[inline(always)]
 fn on_diagonal<L: Lane>(mut a: Block<L>, alpha: L) -> Block<L> {
     for k in 0..3 {
-        a[k][k] = (a[k][k] + alpha) * alpha.like(1.0 + RIDGE);
+        let least = a[k][k] * alpha.like(RIDGE);
+        a[k][k] = a[k][k] + (alpha - least).positive(alpha, least);
     }
     a
 }
@@ -670,6 +683,10 @@ impl Constraints for Strands {
 
     fn len(&self) -> usize {
         self.places.len()
+    }
+
+    fn softening(&self, h: f64) -> f64 {
+        self.groups.iter().map(|group| group.softening(h)).fold(1.0, f64::max)
     }
 
     fn energy(&self, x: &[Row], _: Walls<'_>) -> f64 {

@@ -156,7 +156,7 @@ impl Topology {
 
     /// Whether the features a and b can meet: they share no vertex, one can move, and their objects touch.
     #[inline(always)]
-    pub(super) fn meet<const A: usize, const B: usize>(&self, a: [u32; A], b: [u32; B]) -> bool {
+    pub fn meet<const A: usize, const B: usize>(&self, a: [u32; A], b: [u32; B]) -> bool {
         // Most that lie near each other share a vertex: this comes first, and looks at nothing else.
         let mut same = false;
         for i in 0..A {

@@ -404,7 +404,7 @@ impl Dynamics {
     /// The pre-flight estimate.
     pub(super) fn estimate(&mut self, dt: f64, go_on: &(dyn Fn() -> bool + Sync)) -> Option<tumble_interface::engine::Stability> {
         if self.integrator == Integrator::PositionBased {
-            // Stable for every step.
+            // No estimate is known.
             return None;
         }
         let modes = self.modes(go_on)?;

@@ -409,9 +409,9 @@ impl Parts {
         self.energy_at_rest[1] += 0.5 * lame_mu * lame_mu / lambda * volume;
     }
 
-    /// A collider carries a point, which is at `x` [m] in it, and a frame, whose turn in it is `q`. Both must be held.
-    pub fn carry(&mut self, collider: usize, point: u32, x: Vec3<f64>, frame: u32, q: Quat<f64>) {
-        self.carried.push(Held { row: point as usize, collider, bone: None, place: x, frame: Some((frame as usize, q)) });
+    /// A collider, or one of its bones, carries a point, which is at `x` [m] in it, and a frame, whose turn in it is `q`. Both must be held.
+    pub fn carry(&mut self, (collider, bone): (usize, Option<usize>), point: u32, x: Vec3<f64>, frame: u32, q: Quat<f64>) {
+        self.carried.push(Held { row: point as usize, collider, bone, place: x, frame: Some((frame as usize, q)) });
     }
 
     /// Makes the object under construction act on itself as a continuum.
@@ -498,7 +498,7 @@ impl Parts {
             let message = "rods with a break_strain break in position-based systems only; set integrator = \"position_based\"";
             return Err(SceneError::one(format!("system \"{}\".integrator", settings.name), message));
         }
-        self.carried.retain(|c| settings.colliders.get(c.collider).is_some_and(|c| c.motion.is_some()));
+        self.carried.retain(|held| settings.colliders.get(held.collider).is_some_and(|c| held.bone.is_some() || c.motion.is_some()));
         self.carried.iter_mut().filter_map(|held| held.frame.as_mut()).for_each(|(frame, _)| *frame += points);
         for nodes in self.stretches.iter_mut().map(|m| &mut m.nodes) {
             nodes[2] += points as u32;

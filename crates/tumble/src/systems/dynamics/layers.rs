@@ -21,6 +21,8 @@ const REACH: (f64, f64) = (1.5, 8.0);
 /// Rounds in which a bad start, or what the fastest have passed, is untangled before each exchange interval; and in which pairs are pushed apart
 /// after a step of a scheme that has no sweeps.
 const ROUNDS: usize = 4;
+/// Rounds in which what starts too near is parted.
+const PARTINGS: usize = 16;
 
 /// Surfaces of a system, and who is near whom.
 pub struct Layers {
@@ -97,6 +99,33 @@ impl Layers {
         Some((all.len(), [owner(edge[0])?, owner(triangle[0])?], place))
     }
 
+    /// Parts what is nearer than its thickness, all at rest: a push within a step would be a speed.
+    fn part(&mut self, x: &mut [Row]) {
+        let thickness = self.topology.largest_thickness();
+        for _ in 0..PARTINGS {
+            self.detector.detect(&self.topology, x, REACH.0 * thickness);
+            let start = x.to_vec();
+            self.detector.pairs().iter().for_each(|pair| push(pair, 0.0, x, &start));
+            self.detector.hold(&self.topology, x);
+            if *x == start[..] {
+                break;
+            }
+        }
+    }
+
+    /// How many vertices that could move lie exactly where others do, whose objects the first two are, and where [m]; `None` if none do.
+    fn twins(&self, objects: &[Object], x: &[Row]) -> Option<(usize, [usize; 2], Vector)> {
+        let mut points = self.topology.points().to_vec();
+        let place = |i: u32| [0, 1, 2].map(|k| (x[i as usize][k] + 0.0).to_bits());
+        points.sort_unstable_by_key(|i| (place(*i), *i));
+        let free = |i: u32| x[i as usize][3] > 0.0;
+        let same = |two: &[u32]| place(two[0]) == place(two[1]) && (free(two[0]) || free(two[1])) && self.topology.meet([two[0]], [two[1]]);
+        let twins: Vec<&[u32]> = points.windows(2).filter(|two| same(two)).collect();
+        let first = *twins.first()?;
+        let owner = |vertex: u32| objects.iter().position(|o| o.points.contains(&(vertex as usize)));
+        Some((twins.len(), [owner(first[0])?, owner(first[1])?], xyz64(x[first[0] as usize])))
+    }
+
     /// Untangles what has passed, before an interval; what is still tangled is left alone until it is out.
     fn untangle(&mut self, x: &mut [Row]) {
         for round in 0..=ROUNDS {
@@ -116,23 +145,37 @@ impl Layers {
 }
 
 impl Dynamics {
-    /// Surfaces that pass through each other as they are, as a sentence with the place; `None` if none do, or may.
+    /// Surfaces that pass through each other as they are, or lie in each other, as a sentence with the place; `None` if none do, or may.
     pub fn tangles(&self) -> Option<Warning> {
-        let (n, [one, other], place) = self.layers.as_ref()?.tangles(&self.objects, &self.state.x)?;
-        let (one, other) = (&self.objects[one].name, &self.objects[other].name);
-        let through = if one == other { "itself".to_string() } else { format!("\"{other}\"") };
-        let place = <[f64; 3]>::from(place).map(|x| format!("{x:.4}")).join(", ");
-        let message = format!(
-            "{n} edges pass through triangles at the start; at [{place}] \"{one}\" passes through {through}. They are pushed out as far \
-             as that succeeds; start without"
-        );
-        Some(Warning::new(Code::TangledStart, format!("system \"{}\"", self.name), message))
+        let layers = self.layers.as_ref()?;
+        let told = |(n, [one, other], place): (usize, [usize; 2], Vector), passing: bool| {
+            let (one, other) = (&self.objects[one].name, &self.objects[other].name);
+            let other = if one == other { "itself".to_string() } else { format!("\"{other}\"") };
+            let place = <[f64; 3]>::from(place).map(|x| format!("{x:.4}")).join(", ");
+            let message = if passing {
+                format!(
+                    "{n} edges pass through triangles at the start; at [{place}] \"{one}\" passes through {other}. They are pushed out as \
+                     far as that succeeds; start without"
+                )
+            } else {
+                format!(
+                    "{n} vertices lie exactly where others do; at [{place}] \"{one}\" lies in {other}. Nothing tells which side each belongs \
+                     to, so that they stay in each other: move one of them by a little"
+                )
+            };
+            Warning::new(Code::TangledStart, format!("system \"{}\"", self.name), message)
+        };
+        let passing = layers.tangles(&self.objects, &self.state.x).map(|found| told(found, true));
+        passing.or_else(|| layers.twins(&self.objects, &self.state.x).map(|found| told(found, false)))
     }
 
-    /// Before an interval: what is tangled.
-    pub(super) fn untangle(&mut self) {
+    /// Before an interval from t on: what is tangled, and at the start what is too near.
+    pub(super) fn untangle(&mut self, t: f64) {
         if let Some(layers) = &mut self.layers {
             layers.untangle(&mut self.state.x);
+            if t == 0.0 {
+                layers.part(&mut self.state.x);
+            }
         }
     }
 

@@ -450,7 +450,7 @@ impl Dynamics {
             }
             return Ok(report);
         }
-        self.untangle();
+        self.untangle(t);
         let substeps = self.substeps(dt);
         if substeps > MOST_SUBSTEPS {
             return Err(StepError::StepTooSmall { system: self.name.clone(), time: t, step: dt / substeps });

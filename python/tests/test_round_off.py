@@ -1,0 +1,108 @@
+"""Single precision, the default: what it can, and that what it cannot is told."""
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from tumble import Scene, World
+
+FALLING = (
+    "symplectic_euler",
+    "verlet",
+    "velocity_verlet",
+    "rk4",
+    "implicit_midpoint",
+    "bdf2",
+    "position_based",
+)
+
+
+def world(**tree: Any) -> World:
+    return World(Scene({"version": 1, **tree}))
+
+
+def doubts(world: World) -> list[str]:
+    return [w["message"] for w in world.warnings if w["code"] == "round-off"]
+
+
+@pytest.mark.parametrize("scheme", FALLING)
+@pytest.mark.parametrize("substeps", [40, 1000])
+def test_things_fall_in_steps_however_short(scheme: str, substeps: int) -> None:
+    """z = -g t²/2 after 2 s, of which schemes of first order miss g t h/2; the rest is round-off of 48,000 positions."""
+    system = {"integrator": scheme, "substeps": substeps}
+    fall = world(system=[system], particles=[{"name": "p", "position": [[0, 0, 0]]}])
+    fall.step(48)
+    z = float(fall.frame["p"]["position"][0][2])
+    assert z == pytest.approx(-0.5 * 9.8 * 4, abs=9.8 * 2 / (24 * substeps) + 0.03)
+
+
+def hanging_hair(folder: Path, segments: int, precision: str = "single") -> World:
+    """A horizontal strand of 2 cm."""
+    (folder / "wall.obj").write_text("v 0 0 0\nv 0 0.01 0\nv 0 0.01 0.01\nv 0 0 0.01\nf 1 2 3\nf 1 3 4\n")
+    hair = {"name": "h", "mesh": {"path": "wall.obj"}, "count": 1, "length": 0.02, "segments": segments}
+    tree = {
+        "version": 1,
+        "precision": precision,
+        "system": [{"method": "position_based", "substeps": 16}],
+        "hair": [hair],
+        "force": [{"kind": "drag", "rate": 20.0}],
+    }
+    return World(Scene(tree, folder))
+
+
+def test_hair_bends_as_its_stiffness_says_or_that_it_does_not_is_told(tmp_path: Path) -> None:
+    """A clamped strand sinks by q L⁴/(8 E I) at its end, q = rho A g (rods.4 while Gamma is small)."""
+    inertia = np.pi * 5e-5**4 / 4
+    exact = 1300 * np.pi * 5e-5**2 * 9.8 * 0.02**4 / (8 * 3e9 * inertia)
+    for segments in (16, 32):
+        strand = hanging_hair(tmp_path, segments)
+        assert not doubts(strand)
+        start = np.array(strand.frame["h"]["position"][-1])
+        strand.step(72)
+        ends = []
+        for _ in range(10):
+            strand.step()
+            ends.append(start - strand.frame["h"]["position"][-1])
+        # Measured: 0.4 % and 3 %.
+        assert np.mean(ends, axis=0)[2] == pytest.approx(exact, rel=0.05), segments
+    for segments, at_least in ((64, 5.0), (128, 50.0)):
+        (told,) = doubts(hanging_hair(tmp_path, segments))
+        assert float(told.split("up to ")[1].split()[0]) > at_least and 'precision = "double"' in told
+        assert not doubts(hanging_hair(tmp_path, segments, "double"))
+
+
+def pendulum(place: float, substeps: int, precision: str = "single") -> World:
+    bob = [place + np.sin(0.2), 0, -np.cos(0.2)]
+    mass = {"name": "p", "position": [[place, 0, 0], bob], "pin": ["vertex 0"]}
+    mass["spring"] = [{"between": [0, 1], "stiffness": 1e5}]
+    system = {"method": "position_based", "substeps": substeps}
+    return world(precision=precision, system=[system], particles=[mass])
+
+
+@pytest.mark.parametrize(("place", "substeps"), [(0, 20), (0, 100), (10, 20)])
+def test_a_pendulum_swings(place: float, substeps: int) -> None:
+    """From 0.2 rad, T = 2 pi sqrt(l/g) (1 + a²/16 + 11 a⁴/3072)."""
+    swing = pendulum(place, substeps)
+    assert not doubts(swing)
+    x = []
+    for _ in range(96):
+        swing.step()
+        x.append(float(swing.frame["p"]["position"][1][0]) - place)
+    t = (1 + np.arange(96)) / 24
+    falling = [k for k in range(95) if x[k] > 0 >= x[k + 1]]
+    cross = [t[k] + x[k] / (x[k] - x[k + 1]) / 24 for k in falling]
+    period = 2 * np.pi * np.sqrt(1 / 9.8) * (1 + 0.2**2 / 16 + 11 * 0.2**4 / 3072)
+    assert cross[1] - cross[0] == pytest.approx(period, rel=0.02 if place else 0.005)
+
+
+@pytest.mark.parametrize(("place", "substeps"), [(10, 100), (1000, 20), (0, 400)])
+def test_a_pendulum_that_cannot_swing_is_told(place: float, substeps: int) -> None:
+    (told,) = doubts(pendulum(place, substeps))
+    assert "from the origin" in told and 'precision = "double"' in told
+    assert not doubts(pendulum(place, substeps, "double"))
+    # What it says helps.
+    if "at most" in told:
+        fewer = int(told.split("at most ")[1].split()[0])
+        assert fewer < substeps and (fewer == 1 or not doubts(pendulum(place, fewer)))
