@@ -101,6 +101,8 @@ def main() -> None:
 
     import tumble  # noqa: F401
 
+    # Whoever starts tests in the background may have left it ignored.
+    signal.signal(signal.SIGINT, signal.default_int_handler)
     for line in sys.stdin:
         task = json.loads(line)
         patience = (task["patience"], PATIENCE[1])
@@ -120,6 +122,7 @@ def main() -> None:
                 hangs = waits > 0
                 os.kill(child, signal.SIGKILL if hangs else signal.SIGINT)
                 waits += 1
+                continue
             if not (part := os.read(back, 1 << 16)):
                 break
             said += part

@@ -31,6 +31,13 @@ def test_a_branch_without_a_change_has_the_bits_of_its_parent(reference: Run, tm
     assert_same(branch(reference, frame, tmp_path / "again"), reference)
 
 
+def test_a_value_that_is_there_already_is_no_change(reference: Run, spring: Tree, tmp_path: Path) -> None:
+    was = f"particles.p.spring.0.stiffness={spring['particles'][0]['spring'][0]['stiffness']}"
+    found = branch(reference, 13, tmp_path / "again", [was, "time.frames=30"])
+    assert found.descent[-1]["set"] == []
+    assert_same(found, simulate(spring, tmp_path / "whole", frames=30))
+
+
 def test_frames_after_the_parents_last_are_those_of_a_longer_run(reference: Run, spring: Tree, tmp_path: Path) -> None:
     longer = branch(reference, -1, tmp_path / "longer", frames=8)
     assert longer.n_frames == N + 1 + 8

@@ -93,8 +93,8 @@ class World:
 
     def step(self, frames: int = 1) -> dict[str, Any]:
         """Simulates frames; returns what they took: steps, rejected, step_range [s], newton, linear, residual, unconverged,
-        broken, clamped [J], trials (of adaptive integrators: time, step, error, accepted). Releases the GIL; Ctrl-C goes
-        back to the last frame and raises KeyboardInterrupt. Raises StepError."""
+        broken, clamped [J], trials (of adaptive integrators: time, step, error, accepted; the first 65536). Releases the GIL;
+        Ctrl-C goes back to the last frame and raises KeyboardInterrupt. Raises StepError."""
 
     @property
     def frame(self) -> Columns:

@@ -56,7 +56,7 @@ def branch(
 
         def begin(how: Callable[[], None]) -> None:
             how()
-            if changes and world.frame_index == k:
+            if descent[-1]["set"] and world.frame_index == k:
                 world.reconsider()
 
         if earlier is not None and return_to_checkpoint(world, files):
@@ -206,10 +206,17 @@ def _descent(parent: Run, frame: int, folder: Path, changes: Sequence[str]) -> D
             "frame": frame,
             "time": parent.time(frame),
             "hash": parent.hashes[frame],
-            "set": list(changes),
+            "set": list(changes) if _changes(parent, changes) else [],
         }
     )
     return steps
+
+
+def _changes(parent: Run, changes: Sequence[str]) -> bool:
+    """Whether the world becomes another one. With the values it had it goes on as it would have, bit by bit."""
+    before, after = _own_scene(parent).to_dict(), _own_scene(parent).replace(*changes).to_dict()
+    before["time"]["frames"] = after["time"]["frames"]
+    return bool(after != before)
 
 
 def _take_over(world: World, parent: Run, frame: int, threads: int | None) -> None:

@@ -40,7 +40,7 @@ LEDGER = [
 """Columns of ledger.csv, one row per frame: SI units; `seconds` is the time that computing the frame took."""
 
 TRIALS = ["time", "step", "error", "accepted", "frame"]
-"""Columns of trials.csv, one row per step that an adaptive integrator tried on the way to `frame`."""
+"""Columns of trials.csv, one row per step that an adaptive integrator tried on the way to `frame`, the first 65536 of each."""
 
 LOCK = ".lock"
 """Says who writes here, while somebody does."""

@@ -307,7 +307,8 @@ class Run:
 
     @cached_property
     def trials(self) -> dict[str, npt.NDArray[np.float64]]:
-        """The steps that adaptive integrators tried: time [s], step [s], error over tolerance, accepted, frame."""
+        """The steps that adaptive integrators tried: time [s], step [s], error over tolerance, accepted, frame; the first
+        65536 of each frame."""
         return _numbers(read_rows(self._files.trials, TRIALS), TRIALS)
 
 

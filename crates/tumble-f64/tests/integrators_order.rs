@@ -262,6 +262,19 @@ fn every_trial_is_logged() {
     }
 }
 
+/// A tolerance far below what is of use takes time, not memory: the log ends, the counts go on.
+#[test]
+fn the_log_of_trials_is_bounded() {
+    let mut sim = simulation(&scene(Integrator::AdaptiveEuler, "adaptive.tolerance = 1e-12"));
+    let report = step(&mut sim);
+    println!("{} steps", report.steps);
+    assert!(report.steps > StepReport::MOST_TRIALS as u64);
+    assert_eq!(report.trials.len(), StepReport::MOST_TRIALS);
+    let mut total = report.clone();
+    total.add(&report);
+    assert_eq!((total.trials.len(), total.steps), (StepReport::MOST_TRIALS, 2 * report.steps));
+}
+
 fn bodies() -> Motion<impl FnMut(&[Row], &[Row], &mut [Row])> {
     Motion::new(|x: &[Row], _: &[Row], out: &mut [Row]| {
         let places: [[f64; 2]; 7] = std::array::from_fn(|i| [x[i][0], x[i][1]]);

@@ -44,7 +44,7 @@ pub struct StepReport {
     pub broken: u64,
     /// Energy taken out by the position clamp [J].
     pub clamped: f64,
-    /// Steps tried by adaptive integrators, in order.
+    /// Steps tried by adaptive integrators, in order: the first `MOST_TRIALS`; `steps` and `rejected` count all.
     pub trials: Vec<Trial>,
     /// Cells that the fastest fluid on a grid passed in a sub-step, at most.
     pub courant: f64,
@@ -56,6 +56,16 @@ pub struct StepReport {
 }
 
 impl StepReport {
+    /// A tolerance that is far too small may take any number of them.
+    pub const MOST_TRIALS: usize = 1 << 16;
+
+    /// Logs a step that was tried.
+    pub fn tried(&mut self, trial: Trial) {
+        if self.trials.len() < Self::MOST_TRIALS {
+            self.trials.push(trial);
+        }
+    }
+
     /// Counts a sub-step of length h [s].
     pub fn stepped(&mut self, h: f64) {
         self.steps += 1;
@@ -78,7 +88,7 @@ impl StepReport {
         self.sweeps += other.sweeps;
         self.broken += other.broken;
         self.clamped += other.clamped;
-        self.trials.extend_from_slice(&other.trials);
+        other.trials.iter().for_each(|trial| self.tried(*trial));
         self.courant = self.courant.max(other.courant);
         if !other.pressure.is_empty() {
             self.pressure.clone_from(&other.pressure);

@@ -146,8 +146,8 @@ impl World {
     }
 
     /// Simulates frames; returns what they took: steps, rejected, step_range [s], newton, linear, residual, unconverged,
-    /// broken, clamped [J], trials (of adaptive integrators: time, step, error, accepted). Releases the GIL; Ctrl-C goes
-    /// back to the last frame and raises KeyboardInterrupt. Raises StepError.
+    /// broken, clamped [J], trials (of adaptive integrators: time, step, error, accepted; the first 65536). Releases the GIL;
+    /// Ctrl-C goes back to the last frame and raises KeyboardInterrupt. Raises StepError.
     #[pyo3(signature = (frames=1))]
     fn step<'py>(&mut self, py: Python<'py>, frames: u64) -> PyResult<Bound<'py, PyAny>> {
         let mut total = StepReport::default();

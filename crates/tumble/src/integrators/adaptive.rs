@@ -10,7 +10,7 @@ use tumble_interface::engine::{StepReport, Trial};
 use tumble_interface::scene::{Adaptive, Integrator};
 
 /// One accepted step of `adaptive_euler` or `dormand_prince` from t, at most `left` [s] long; returns its length.
-/// The step tried first is `memory.next_step`, or the settings' first one. Trials are logged in the report.
+/// The step tried first is `memory.next_step`, or the settings' first one. Trials are logged in the report, as many as it takes.
 pub fn adaptive_step(
     scheme: Integrator,
     settings: &Adaptive,
@@ -36,7 +36,7 @@ pub fn adaptive_step(
         };
         // A number that is not finite: the step is far too long, or the equation itself is not finite, which ends the loop below.
         let accepted = error <= 1.0;
-        report.trials.push(Trial { time: t, step: h, error, accepted });
+        report.tried(Trial { time: t, step: h, error, accepted });
         let factor = match scheme {
             _ if !error.is_finite() => 0.1,
             Integrator::DormandPrince => pi_factor(error, memory.last_error, accepted),
