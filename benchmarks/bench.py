@@ -81,8 +81,8 @@ def set_up() -> Path:
     return python
 
 
-def run(python: Path, case: str, threads: int) -> list[dict]:
-    """The JSON lines of one case."""
+def run(python: Path, case: str, threads: int) -> list[dict] | None:
+    """The JSON lines of one case; `None` if it failed."""
     environment = dict(
         os.environ, PYTHONPATH=str(ROOT / "python"), NUMBA_NUM_THREADS=str(threads), OMP_NUM_THREADS=str(threads)
     )
@@ -91,7 +91,7 @@ def run(python: Path, case: str, threads: int) -> list[dict]:
     done = subprocess.run(command, env=environment, capture_output=True, text=True)
     if done.returncode:
         print(done.stderr[-3000:])
-        raise SystemExit(f"{case} failed")
+        return None
     return [json.loads(line) for line in done.stdout.splitlines() if line.startswith("{")]
 
 
@@ -100,12 +100,15 @@ def main() -> None:
     python = set_up()
     cores = os.cpu_count() or 1
     rows: list[dict] = []
+    failed = []
     for case in cases:
         for threads in [1] if case in ("start", "web") else sorted({1, cores}):
             print(f"{case}, {threads} thread{'s' if threads > 1 else ''} ...", flush=True)
-            rows += run(python, case, threads)
+            found = run(python, case, threads)
+            rows += found or []
+            failed += [f"{case} ({threads}T)"] if found is None else []
     print(f"\n{platform.processor() or platform.machine()}, {cores} cores, medians\n")
-    width = max(len(r["who"]) for r in rows)
+    width = max((len(r["who"]) for r in rows), default=0)
     missed = 0
     for row in rows:
         print(
@@ -134,6 +137,8 @@ def main() -> None:
         writer.writeheader()
         writer.writerows(rows)
     print(f"\n{missed} aims missed; benchmarks/results.csv has the figures")
+    if failed:
+        raise SystemExit(f"failed: {', '.join(failed)}")
 
 
 if __name__ == "__main__":
