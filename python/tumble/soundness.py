@@ -20,6 +20,8 @@ _MANIFEST: dict[str, type | tuple[type, ...]] = {
     "timings": dict,
     "machine": dict,
     "failure": (dict, str, type(None)),
+    "resumed": int,
+    "folder": (str, type(None)),
 }
 
 _INDICES = ("pinned", "triangles", "links", "curve")
@@ -34,16 +36,30 @@ def fault_of_manifest(manifest: Mapping[str, Any]) -> str | None:
     for key in ("descent", "expectations", "stability"):
         if not all(isinstance(item, dict) for item in manifest.get(key, [])):
             return f'"{key}" holds something else than tables'
+    if any(type(seconds) not in (int, float) for seconds in manifest.get("timings", {}).values()):
+        return '"timings" holds something else than numbers'
     # The words of another version may be others.
     if manifest.get("tumble") == version:
         try:
-            Scene(manifest["scene"])
+            if missing := _missing(Scene(manifest["scene"]).to_dict(), manifest["scene"]):
+                return f"scene: {missing} is missing"
         except SceneError as error:
             # Meshes and fabrics may be gone: what they became is in the run.
             wrong = [i for i in error.issues if not str(i["path"]).endswith((".path", ".hash", ".name", ".fabric"))]
             if wrong:
                 return f"scene: {wrong[0]['path']}: {wrong[0]['message']}"
     return None
+
+
+def _missing(whole: Any, tree: Any, path: str = "") -> str | None:
+    """The first word of a resolved scene that another tree has not."""
+    if isinstance(whole, dict) and isinstance(tree, dict):
+        below = [(f"{path}.{key}" if path else key, value, tree.get(key, ...)) for key, value in whole.items()]
+    elif isinstance(whole, list) and isinstance(tree, list):
+        below = [(f"{path}[{i}]", *pair) for i, pair in enumerate(zip(whole, tree, strict=False))]
+    else:
+        return path if tree is ... else None
+    return next(filter(None, (_missing(a, b, at) for at, a, b in below)), None)
 
 
 def fault_of_columns(described: Any) -> str | None:
@@ -67,8 +83,9 @@ def fault_of_columns(described: Any) -> str | None:
 def fault_of_arrays(
     columns: Mapping[str, Mapping[str, npt.NDArray[Any]]], described: Mapping[str, Any], place: str
 ) -> str | None:
-    """What is wrong with the arrays of a file. The first lengths may change from frame to frame."""
+    """What is wrong with the arrays of a file. Particles come and go, and surfaces that tear get more points."""
     for name, table in described.items():
+        count = len(columns[name]["id"]) if place == "frames" and "id" in columns.get(name, {}) else None
         for column, entry in table.items():
             if entry["in"] != place:
                 continue
@@ -81,6 +98,11 @@ def fault_of_arrays(
                 or array.dtype != entry["dtype"]
             ):
                 return f'"{name}/{column}" is {array.dtype} {list(array.shape)}, not {entry["dtype"]} {entry["shape"]}'
+            least = entry["shape"][0] if entry["shape"] else None
+            if least is not None and len(array) < least:
+                return f'"{name}/{column}" has {len(array)} rows, not {least}'
+            if least is None and array.ndim and count is not None and len(array) != count:
+                return f'"{name}/{column}" has {len(array)} rows for {count} particles'
             if place == "static" and column in _INDICES and "mass" in columns.get(name, {}) and array.size:
                 most = len(columns[name]["mass"])
                 if np.min(array) < 0 or np.max(array) >= most:
