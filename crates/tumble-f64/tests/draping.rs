@@ -82,8 +82,8 @@ fn drape_converges(cells: &[usize]) {
         let differences: Vec<f64> = values.windows(2).map(|v| v[1] - v[0]).collect();
         let ratios: Vec<f64> = differences.windows(2).map(|d| (d[0] / d[1]).abs()).collect();
         println!("{name} at {cells:?} cells [m]: {values:.5?}, differences {}, ratios {ratios:.2?}", common::show(&differences));
-        // Measured: ratios of 4.4, 8.7, 7.5 at 16, 32, 64 cells; 5.1 of the depth at 32, 64, 128, where the hem, which hangs freely and costs
-        // little energy, goes in by 1.3 mm, 0.3 %, and down by 0.8 mm from 64 to 128.
+        // Measured: ratios of 4.6, 8.3, 9.7 at 16, 32, 64 cells; at 128 the depth is that at 64 to 2e-6 m, and the hem, which hangs freely and
+        // costs little energy, 0.6 mm further in and 0.3 mm lower.
         assert!(k > 0 || ratios.iter().all(|r| *r > 2.0), "{name}: {ratios:?}");
         assert!(differences.iter().zip(&values).all(|(d, v)| d.abs() > 1e-7 && d.abs() < 0.01 * v), "{name}: {differences:?}");
     }
@@ -211,22 +211,16 @@ fn a_strip_bends_as_the_elastica() {
             ("hinge", true, 24, implicit, 0.01),
             ("isometric", true, 24, implicit, 0.01),
             ("isometric", true, 16, sweeps, 0.03),
-            ("isometric", false, 48, implicit, 0.03),
+            ("isometric", false, 24, implicit, 0.01),
         ] {
-            // Free to twist, a narrow sheet with all diagonals alike is at its softest with kyy = -kxy = kxx/5: 0.8 B.   (bending.8)
-            // Its reach is that of a strip a little stiffer, because the clamp keeps it from twisting; where it hangs almost straight
-            // down, 4 % off, that is all that is left of it.
-            if !mirrored && gamma > 15.0 {
-                continue;
-            }
-            let found = strip(if mirrored { gamma } else { 0.8 * gamma }, cells, bending, mirrored, system);
+            let found = strip(gamma, cells, bending, mirrored, system);
             let errors = [found[0] / drop - 1.0, found[1] / reach - 1.0, found[0] / found[1] / (drop / reach) - 1.0];
             let [h, w, chord] = errors.map(|e| 100.0 * e);
             println!(
                 "Gamma = {gamma}, {bending}, mirrored {mirrored}, {}: drop {h:+.2} %, reach {w:+.2} %, H/W {chord:+.2} %",
                 &system[..12]
             );
-            // Measured: 0.6 % at most; 1.6 % by position-based dynamics; 2.8 % where it twists.
+            // Measured: 0.6 % at most, 0.14 % for the sheet; 1.6 % by position-based dynamics.
             assert!(errors.iter().all(|e| e.abs() < bound), "{errors:?}");
         }
     }

@@ -94,6 +94,29 @@ fn a_bent_sheet_has_the_same_energy_by_either_word() {
     assert!((bent("hinge = 0.01\nisometric = 0.01") / exact - 1.0).abs() < 1e-12);
 }
 
+/// Creases of any direction cost the same: W = B/2 (kxx² + kyy² + 2 kxy²), on cells that are not square, too.            (bending.13)
+#[test]
+fn a_sheet_bends_alike_in_all_directions() {
+    let ([nx, ny], [a, b], stiffness, kappa) = ([9, 6], [0.1, 0.16], 0.02, 0.05);
+    let [length, width] = [a * f64::from(nx - 1), b * f64::from(ny - 1)];
+    let mut sim = simulation(&format!(
+        "precision = \"double\"\nworld.gravity = [0, 0, 0]\n[[system]]\nintegrator = \"implicit_euler\"\n[[sheet]]\nname = \"s\"\n\
+         size = [{length}, {width}]\nresolution = [{nx}, {ny}]\nlinks = {{}}\nisometric = {stiffness}\n"
+    ));
+    let flat = positions(&sim, "s");
+    for degrees in [0.0_f64, 20.0, 45.0, 63.0, 90.0, 135.0] {
+        let (sin, cos) = degrees.to_radians().sin_cos();
+        let x: Vec<Vector> = flat.iter().map(|p| vector(p.x, p.y, p.z + kappa / 2.0 * (cos * p.x + sin * p.y).powi(2))).collect();
+        write(&mut sim, "s", "position", &x);
+        // Rows have no angle at their ends: half a cell at each does not bend.
+        let areas = [(length - a) * width, length * (width - b), length * width];
+        let squares = [cos.powi(4), sin.powi(4), 2.0 * (sin * cos).powi(2)];
+        let exact = stiffness / 2.0 * kappa * kappa * areas.iter().zip(squares).map(|(a, k)| a * k).sum::<f64>();
+        let energy = sim.ledger().energy();
+        assert!((energy / exact - 1.0).abs() < 1e-11, "{degrees}: {energy} {exact}");
+    }
+}
+
 #[test]
 fn a_projected_membrane_moves_as_computed_by_hand() {
     // A right triangle stretched along the warp by a half: e = (0.625, 0, 0), r = L^T e = (L11 e, 0, 0), dr/dx1 = L11 f1.

@@ -94,6 +94,56 @@ fn mass_and_momentum_outlast_a_tear() {
     }
 }
 
+/// What has come apart is joined by no element any more: each piece keeps its momentum.
+#[test]
+fn torn_pieces_exert_nothing_on_each_other() {
+    let mut sim = sheet("symplectic_euler", 40, ALL, "tear = { strain = 0.3, spread = 0.2 }");
+    let mut around = vec![0_u32; SIZE * SIZE];
+    let whole = triangles(&sim);
+    whole.iter().flatten().for_each(|i| around[*i as usize] += 1);
+    fling(&mut sim);
+    run(&mut sim, 20);
+    let now = triangles(&sim);
+    let spread = |piece: &mut Vec<usize>| {
+        for t in &now {
+            let least = t.iter().map(|i| piece[*i as usize]).min().unwrap();
+            t.iter().for_each(|i| piece[*i as usize] = least);
+        }
+    };
+    let mut piece: Vec<usize> = (0..positions(&sim, "s").len()).collect();
+    loop {
+        let before = piece.clone();
+        spread(&mut piece);
+        if piece == before {
+            break;
+        }
+    }
+    // A triangle has its part of the mass of each corner: 0.2 kg/m² over a cell, half of it at a rim, a quarter in a corner of the sheet.
+    let rim = |i: u32| if i == 0 || i as usize == SIZE - 1 { 0.5 } else { 1.0 };
+    let mass = |i: u32| 0.2 * rim(i % SIZE as u32) * rim(i / SIZE as u32) / ((SIZE - 1) * (SIZE - 1)) as f64;
+    let momenta = |sim: &Simulation| {
+        let (v, mut found) = (velocities(sim, "s"), BTreeMap::<usize, Vector>::new());
+        for (i, now) in whole.iter().flatten().zip(now.iter().flatten()) {
+            let part = v[*now as usize] * (mass(*i) / f64::from(around[*i as usize]));
+            let sum = found.entry(piece[*now as usize]).or_default();
+            *sum = *sum + part;
+        }
+        found
+    };
+    let before = momenta(&sim);
+    let all: Vector = before.values().fold(Vector::default(), |a, b| a + *b);
+    assert!((all - Vector::from(sim.ledger().momentum)).norm() < 1e-12 && before.len() > 1, "{all:?}");
+    let energy = sim.ledger().elastic;
+    assert_eq!(run(&mut sim, 2).broken, 0);
+    let worst = momenta(&sim).iter().map(|(k, p)| (*p - before[k]).norm()).fold(0.0, f64::max);
+    println!(
+        "{} pieces, whose elastic energy goes from {energy:.4} to {:.4} J: momenta change by {worst:.1e}",
+        before.len(),
+        sim.ledger().elastic
+    );
+    assert!(worst < 1e-13 && (sim.ledger().elastic / energy - 1.0).abs() > 0.1);
+}
+
 /// A sheet that is stretched evenly holds up to its strength and gives way beyond it.
 #[test]
 fn it_tears_beyond_its_strength_and_not_below() {

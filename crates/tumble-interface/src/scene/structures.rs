@@ -321,8 +321,8 @@ pub struct Sheet {
     #[serde(default)]
     #[schemars(range(min = 0.0), extend("x-unit" = "N m"))]
     pub hinge: f64,
-    /// The same beside it, quadratic in the positions and flat at rest, whatever the shape of the mesh: cheaper than a hinge, and equal to it where
-    /// nothing is stretched.
+    /// The same beside it as of a plate, alike in all directions; quadratic in the positions and cheaper than hinges, and exact where nothing is
+    /// stretched.
     #[serde(default)]
     #[schemars(range(min = 0.0), extend("x-unit" = "N m"))]
     pub isometric: f64,

@@ -9,7 +9,7 @@ use crate::math::Lane;
 ///   r = sum_i K_i x_i,   sum_i K_i = 0                               (bending.10)
 ///
 /// x [m]   K [1/m]   k [N m].   Without stretch |r| = 2 sin(theta/2), so that its energy is that of the dihedral hinge at every angle; its
-/// Hessian is constant. Rest: K_1, K_2, K_3.
+/// Hessian is constant. Three masses in a row are such a hinge, too: K_1 = 0 (bending.11). Rest: K_1, K_2, K_3.
 /// Source: [bergou2006], eq. 3. Differs: the factor, see (bending.6).
 pub struct IsometricBend;
 

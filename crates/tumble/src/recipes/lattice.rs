@@ -108,6 +108,33 @@ impl Lattice {
             (0..self.directions).for_each(|a| self.family(site, family, unit(a, 2), 1.0));
         }
     }
+
+    /// Bending as of a plate without Poisson's ratio, alike in all directions; B is its stiffness per width [N m]:
+    ///
+    ///   r = K2 (x2 - x0) + K3 (x3 - x0),  K2 = K3 = -1/a,  k = B w/a,  in each row of width w        (bending.11)
+    ///   r of (bending.10) for the diagonal of each cell,  k = 2 B a b/(a² + b²)                       (bending.12)
+    pub fn plate(&self, site: &mut Site<'_>, stiffness: f64) {
+        let [nx, ny, _] = self.n;
+        for [i, j, _] in self.nodes() {
+            // The second corner has no part: K1 = 0.
+            for (a, at, n) in [(0, i, nx), (1, j, ny)] {
+                if (1..n - 1).contains(&at) {
+                    let step = |way: i64| [(i, 0), (j, 1)].map(|(at, b)| if a == b { (i64::from(at) + way) as u32 } else { at });
+                    let other = if a == 0 { [i, if j > 0 { j - 1 } else { 1 }] } else { [if i > 0 { i - 1 } else { 1 }, j] };
+                    let nodes = [[i, j], other, step(-1), step(1)].map(|[i, j]| self.index([i, j, 0]));
+                    let (along, across) =
+                        (self.spacing[a], self.share([i, j, 0], std::array::from_fn(|b| i64::from(a == b))) / self.spacing[a]);
+                    site.parts.isometric(nodes, [0.0, -1.0 / along, -1.0 / along], stiffness * across / along);
+                }
+            }
+            if i + 1 < nx && j + 1 < ny {
+                let nodes = [[i, j], [i + 1, j + 1], [i + 1, j], [i, j + 1]].map(|[i, j]| self.index([i, j, 0]));
+                let (area, length_sq) = (self.spacing[0] * self.spacing[1], self.spacing[0].powi(2) + self.spacing[1].powi(2));
+                let k = length_sq.sqrt() / area;
+                site.parts.isometric(nodes, [k, -k, -k], 2.0 * stiffness * area / length_sq);
+            }
+        }
+    }
 }
 
 #[cfg(test)]

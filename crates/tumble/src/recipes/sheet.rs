@@ -37,13 +37,16 @@ pub fn sheet(site: &mut Site<'_>, thing: &Sheet) {
     }
     let pins = pinned(site, &Pinnable { path: &path, n: &lattice.n[..2], first, is_lattice: true }, &thing.pin);
     pins.iter().for_each(|p| site.parts.pin(*p));
-    if thing.hinge > 0.0 || thing.isometric > 0.0 || thing.area > 0.0 || thing.membrane.is_some() || fabric.is_some() {
+    if thing.isometric > 0.0 {
+        lattice.plate(site, thing.isometric);
+    }
+    if thing.hinge > 0.0 || thing.area > 0.0 || thing.membrane.is_some() || fabric.is_some() {
         let vertices = lattice.nodes().map(|node| site.parts.position(lattice.index(node)).into()).collect();
         let mesh = Mesh { vertices, triangles, ..Mesh::default() };
         let words = Surface {
             path: &path,
             hinge: thing.hinge,
-            isometric: thing.isometric,
+            isometric: 0.0,
             membrane: thing.membrane.as_ref(),
             fabric,
             squares: true,

@@ -116,6 +116,14 @@ impl<'a> Edges<'a> {
         self.of.get(&sorted(a, b)).map_or(&[], |c| &c[..])
     }
 
+    /// The corners of an edge and of what lies opposite to it on either side, and those that are the ends of the edge on both sides.
+    fn hinge(&self, [a, b, c, d]: [u32; 4]) -> Option<([u32; 4], [[u32; 2]; 2])> {
+        let with = |row: u32| self.at([a, b]).iter().copied().find(|at| self.corner(*at, row).is_some());
+        let [t, u] = [with(c)?, with(d)?];
+        let corners = [self.corner(t, a)?, self.corner(t, b)?, self.corner(t, c)?, self.corner(u, d)?];
+        Some((corners, [[corners[0], self.corner(u, a)?], [corners[1], self.corner(u, b)?]]))
+    }
+
     /// Where an element belongs; `half` says to which triangle of its edge a link goes. `None` if it goes with no triangle.
     fn tie<const N: usize>(&self, element: u32, nodes: [u32; N], half: usize, x: &[Row]) -> Option<Tie> {
         let (mut corners, mut same) = ([NONE; 4], [[0; 2]; 2]);
@@ -144,10 +152,17 @@ impl<'a> Edges<'a> {
                 (corners[0], corners[1], corners[2]) = (self.corner(at, a)?, self.corner(at, b)?, self.corner(at, c)?);
             }
             [a, b, c, d] => {
-                let with = |row: u32| self.at([a, b]).iter().copied().find(|at| self.corner(*at, row).is_some());
-                let [t, u] = [with(c)?, with(d)?];
-                corners = [self.corner(t, a)?, self.corner(t, b)?, self.corner(t, c)?, self.corner(u, d)?];
-                same = [[corners[0], self.corner(u, a)?], [corners[1], self.corner(u, b)?]];
+                if let Some((at, both)) = self.hinge([a, b, c, d]) {
+                    (corners, same) = (at, both);
+                } else if let Some(([c, d, a, b], both)) = self.hinge([c, d, a, b]) {
+                    (corners, same) = ([a, b, c, d], both);
+                } else {
+                    // Three in a row, over the first; the second only makes up the number.
+                    let [t, u, v] = [[a, c], [a, d], [a, b]].map(|edge| self.at(edge).first().copied());
+                    let (t, u) = (t?, u?);
+                    corners = [self.corner(t, a)?, self.corner(v?, b)?, self.corner(t, c)?, self.corner(u, d)?];
+                    same[0] = [corners[0], self.corner(u, a)?];
+                }
             }
             _ => return None,
         }
