@@ -89,3 +89,53 @@ def test_frames_of_an_animated_mesh_have_the_same_triangles(tmp_path: Path) -> N
     with pytest.raises(SceneError, match=r"flap.*frames\[1\].*4 vertices instead of 3"):
         tumble.World(tumble.Scene.load(tmp_path / "scene.json"))
     assert good.to_dict()["collider"][3]["name"] == "flap"
+
+
+CORNERS = [[x, y, z] for z in (0, 0.4) for y in (-0.2, 0.2) for x in (-0.2, 0.2)]
+SIDES = [[1, 3, 4, 2], [5, 6, 8, 7], [1, 2, 6, 5], [3, 7, 8, 4], [1, 5, 7, 3], [2, 4, 8, 6]]
+
+
+def passages(a: np.ndarray, b: np.ndarray, corners: np.ndarray) -> int:
+    """How many of the segments from a to b pass how many of the triangles, [n, 3, 3]."""
+    p, e, f = corners[:, 0], corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]
+    way, from_p = (b - a)[:, None], a[:, None] - p
+    across = np.cross(way, f)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        scale = 1 / np.sum(e * across, axis=-1)
+        u, turned = np.sum(from_p * across, axis=-1) * scale, np.cross(from_p, e)
+        v, t = np.sum(way * turned, axis=-1) * scale, np.sum(f * turned, axis=-1) * scale
+        return int(np.sum((u > 0) & (v > 0) & (u + v < 1) & (t > 0) & (t < 1)))
+
+
+@pytest.mark.parametrize("edged", [False, True])
+def test_a_net_that_follows_a_box_keeps_its_corners_out_of_coarse_cloth(tmp_path: Path, edged: bool) -> None:
+    lines = [f"v {x} {y} {z}" for x, y, z in CORNERS] + ["f " + " ".join(map(str, side)) for side in SIDES]
+    (tmp_path / "box.obj").write_text("\n".join(lines))
+    mesh = {"path": str(tmp_path / "box.obj")}
+    follows = {"center": [0, 0, 0.2], "radius": 1, "follow": {"collider": "box"}}
+    net = {"net": [{"name": "edges", "mesh": mesh, "pin": [follows]}]} if edged else {}
+    world = tumble.World(
+        tumble.Scene(
+            {
+                "version": 1,
+                "system": [{"method": "position_based", "self_contact": {"thickness": 0.006, "friction": 0.3}}],
+                "sheet": [{"name": "cloth", "size": [1, 1], "resolution": [10, 10], "center": [0.03, 0.02, 0.45]}],
+                "collider": [
+                    {"name": "box", "shape": {"mesh": mesh}, "thickness": 0.003, "motion": {"spin": [0, 0, 1]}}
+                ],
+                **net,
+            }
+        )
+    )
+    cloth, found = world.topology["cloth"]["triangles"], 0
+    box = np.array([[a, *pair] for a, *rest in SIDES for pair in (rest[:2], rest[1:])]) - 1
+    for _ in range(48):
+        world.step()
+        x = world.frame["cloth"]["position"].astype(float)
+        cos, sin = np.cos(world.time), np.sin(world.time)
+        solid = np.array(CORNERS) @ np.array([[cos, sin, 0], [-sin, cos, 0], [0, 0, 1]])
+        for (a, one), (b, other) in [((x, cloth), (solid, box)), ((solid, box), (x, cloth))]:
+            ends = a[one[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2)]
+            found += passages(ends[:, 0], ends[:, 1], b[other])
+    print(f"edges that pass faces, in 48 frames: {found}")
+    assert (found == 0) == edged
