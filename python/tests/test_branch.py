@@ -68,6 +68,23 @@ def test_a_branch_is_the_changed_world_in_the_old_state(reference: Run, spring: 
     np.testing.assert_array_equal(found.ledger["steps"][:14], reference.ledger["steps"][:14])
 
 
+def test_a_membrane_comes_instead_of_links_as_it_does_in_a_file(tmp_path: Path) -> None:
+    sheet = {"name": "p", "size": [1, 1], "resolution": [5, 5], "pin": ["edge x-"]}
+    cloth = {"version": 1, "time": {"frames": 6}, "sheet": [sheet]}
+    woven = "sheet.0.membrane={warp=100}"
+    run = simulate(cloth, tmp_path / "cloth")
+    found = branch(run, 3, tmp_path / "woven", [woven])
+    world = World(Scene(cloth).replace(woven))
+    assert world.scene.to_dict()["sheet"] == found.scene["sheet"]
+    old = World(Scene(cloth))
+    old.step(3)
+    old.save(tmp_path / "state")
+    world.load(tmp_path / "state")
+    world.reconsider()
+    world.step(3)
+    assert found.hashes[6] == world.hash() != run.hashes[6]
+
+
 def test_a_stiffer_branch_chooses_its_steps_anew(reference: Run, spring: Tree, tmp_path: Path) -> None:
     """One step a frame is enough for the parent, and would throw the mass out of a branch ten times as fast."""
     assert set(reference.ledger["steps"][1:14]) == {1}

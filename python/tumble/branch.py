@@ -175,7 +175,8 @@ def _own_scene(run: Run) -> Scene:
 def _scene(parent: Run, changes: Sequence[str], frame: int, frames: int | None) -> Scene:
     """The scene of the branch."""
     more = [] if frames is None else [f"time.frames={frame + frames}"]
-    scene = _own_scene(parent).replace(*changes, *more)
+    own = _own_scene(parent)
+    scene = _instead_of_links(own, own.replace(*changes, *more))
     tree = scene.to_dict()
     if tree["time"]["fps"] != parent.fps:
         text = f"{tree['time']['fps']:g}, the frames so far were {parent.fps:g} a second; leave time.fps as it is"
@@ -186,6 +187,25 @@ def _scene(parent: Run, changes: Sequence[str], frame: int, frames: int | None) 
             "time.frames", f"{last}, nothing is left to simulate after frame {frame}; ask for more with --frames"
         )
     return scene
+
+
+def _instead_of_links(own: Scene, scene: Scene) -> Scene:
+    """What a surface resists stretch with comes instead of links that nobody gave, as it does in a scene's file; the resolved
+    scene of a run has those written out."""
+    before, after = own.to_dict(), scene.to_dict()
+    changed = False
+    for kind in ("sheet", "net", "cloth"):
+        for old, new in zip(before[kind], after[kind], strict=False):
+            given = any(old[word] is None and new[word] is not None for word in ("membrane", "fabric"))
+            if given and new["links"] == old["links"] == _default_links(own, kind, old):
+                del new["links"]
+                changed = True
+    return Scene({key: value for key, value in after.items() if value != []}, scene.folder) if changed else scene
+
+
+def _default_links(own: Scene, kind: str, surface: Mapping[str, Any]) -> Any:
+    alone = {"version": 1, kind: [{**surface, "links": None, "system": None, "pin": []}]}
+    return Scene(alone, own.folder).to_dict()[kind][0]["links"]
 
 
 def _wrong(path: str, text: str) -> SceneError:
