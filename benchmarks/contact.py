@@ -1,6 +1,6 @@
 """What cloth costs beside its projections: memory of a particle, contact of layers with each other, the dress on its dancer.
 
-There is no peer in it. Shown are the bytes that a sheet of 512² holds, with another one beside it, and those that stay
+There is no peer in it. Shown are the bytes that a sheet of 512² holds, by the allocator's own count, and those that stay
 resident, with what the allocator keeps of the memory in which it was made; the time that self-contact adds to six layers
 that lie on each other, in three sizes; and frames of the shipped dress in three.
 
@@ -17,17 +17,38 @@ from common import THREADS, median, show
 FPS = 60
 SUBSTEPS = 10
 LAYERS = 6
-# Of malloc.h.
-M_MMAP_THRESHOLD = -3
 SIZES = (24, 48, 96)
 # Edges of the dress's triangles [m]; the last makes 20,000 of them.
 EDGES = (0.03, 0.02, 0.0141)
 
 
-def resident():
-    """Bytes of this process in memory, without what has been given back."""
-    ctypes.CDLL("libc.so.6").malloc_trim(0)
-    return int(Path("/proc/self/statm").read_text().split()[1]) * 4096
+class Mallinfo2(ctypes.Structure):
+    """Of malloc.h."""
+
+    _fields_ = [
+        (name, ctypes.c_size_t)
+        for name in [
+            "arena",
+            "ordblks",
+            "smblks",
+            "hblks",
+            "hblkhd",
+            "usmblks",
+            "fsmblks",
+            "uordblks",
+            "fordblks",
+            "keepcost",
+        ]
+    ]
+
+
+def taken():
+    """Bytes of this process that are allocated, and those in memory once the allocator has given back what it can."""
+    libc = ctypes.CDLL("libc.so.6")
+    libc.malloc_trim(0)
+    libc.mallinfo2.restype = Mallinfo2
+    info = libc.mallinfo2()
+    return info.uordblks + info.hblkhd, int(Path("/proc/self/statm").read_text().split()[1]) * 4096
 
 
 def sheet(n, bending):
@@ -43,14 +64,15 @@ def sheet(n, bending):
 
 
 def memory(bending, n=512):
+    """What a world with a sheet takes beside another one, for each particle: allocated and resident [bytes]."""
     import tumble
 
     other = tumble.World(sheet(n, bending), threads=THREADS)
     other.step(2)
-    before = resident()
+    before = taken()
     world = tumble.World(sheet(n, bending), threads=THREADS)
     world.step(2)
-    return (resident() - before) / n**2
+    return [(b - a) / n**2 for a, b in zip(before, taken(), strict=True)]
 
 
 def layers(n, touching):
@@ -92,14 +114,11 @@ def growth(sizes, seconds):
 
 
 def show_memory():
-    kinds = ("links", "isometric")
-    resident_bytes = [memory(bending) for bending in kinds]
-    # From here on the allocator keeps nothing of 64 KiB or more that is freed.
-    ctypes.CDLL("libc.so.6").mallopt(M_MMAP_THRESHOLD, 65536)
-    for bending, kept in zip(kinds, resident_bytes, strict=True):
+    for bending in ("links", "isometric"):
+        held, kept = memory(bending)
         case = f"cloth, memory, {bending}"
         check = f"held by a particle of a sheet of 512² with stretching, shear and bending; {kept:.1f} stay resident"
-        show(case, "tumble", memory(bending), "B", check)
+        show(case, "tumble", held, "B", check)
         show(case, "300 bytes", 300.0, "B", "what it may be")
 
 
