@@ -19,6 +19,7 @@ import numpy as np
 import numpy.typing as npt
 
 from tumble._engine import ExportError, SceneError, World
+from tumble.interrupts import held
 
 Columns = dict[str, dict[str, npt.NDArray[Any]]]
 """Object name -> column name -> array."""
@@ -127,7 +128,9 @@ class RunFolder:
         """How many frames, counted from the start and up to `limit`, can be read."""
         for i in range(limit):
             try:
-                zipfile.ZipFile(self.frame(i)).close()
+                # An archive that is half opened complains when it is collected.
+                with held():
+                    zipfile.ZipFile(self.frame(i)).close()
             except (OSError, zipfile.BadZipFile):
                 return i
         return limit

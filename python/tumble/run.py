@@ -15,6 +15,7 @@ import numpy.typing as npt
 from tumble import _engine, expect
 from tumble._engine import ExportError, Scene, SceneError, StepError, World
 from tumble.folder import FORMAT, LEDGER, TRIALS, Columns, RunFolder, plain, read_columns, read_rows, reason, refuse
+from tumble.interrupts import held
 from tumble.lock import alone, ask
 from tumble.recorder import Recorder, changed
 from tumble.soundness import fault_of_arrays, fault_of_columns, fault_of_manifest
@@ -90,9 +91,11 @@ def record(
     """Begins to record, and simulates to the last frame. Where that fails, `broke` is told and `cures` are tried."""
     files, world = recorder.files, recorder.world
     try:
-        begin()
+        with held():
+            begin()
         _advance(world, recorder, progress)
-        recorder.finish()
+        with held():
+            recorder.finish()
         run = Run(files.path)
         recorder.judge(expect.check(run))
     except StepError as error:
@@ -101,7 +104,8 @@ def record(
         recorder.fail(error, cures)
         raise
     except KeyboardInterrupt:
-        recorder.stop("interrupted", "stopped by the user")
+        with held():
+            recorder.stop("interrupted", "stopped by the user")
         raise
     except ExportError as error:
         recorder.stop("failed", str(error))
@@ -118,7 +122,8 @@ def _advance(world: World, recorder: Recorder, progress: Progress | None) -> Non
     while world.frame_index < total:
         begin = time.perf_counter()
         report = world.step()
-        recorder.frame(report, time.perf_counter() - begin)
+        with held():
+            recorder.frame(report, time.perf_counter() - begin)
         if progress is not None:
             progress(world.frame_index, total)
 
