@@ -76,8 +76,21 @@ def test_hair_on_a_figure_follows_its_bone() -> None:
     apart = [np.linalg.norm(r[:, None] - r[None], axis=2) for r in (roots, before)]
     np.testing.assert_allclose(apart[0], apart[1], atol=1e-5)
     assert world.ledger["stretch"] < 1.05
-    with pytest.raises(TumbleError, match="say which bone carries the roots, hips, spine"):
-        World(hairy())
+
+
+def test_hair_without_a_bone_follows_the_skin() -> None:
+    world = World(hairy())
+    start = np.array(world.frame["h"]["position"]).reshape(20, 9, 3)[:, 0]
+    skin = world.frame["dancer"]["position"]
+    # Each root stays where it is on the skin: as near to its nearest vertex as at the start, within what the skin stretches.
+    vertex = np.linalg.norm(skin[None] - start[:, None], axis=2).argmin(axis=1)
+    near = np.linalg.norm(skin[vertex] - start, axis=1)
+    world.step(24)
+    roots = np.array(world.frame["h"]["position"]).reshape(20, 9, 3)[:, 0]
+    skin = world.frame["dancer"]["position"]
+    assert np.linalg.norm(roots - start, axis=1).min() > 0.3
+    np.testing.assert_allclose(np.linalg.norm(skin[vertex] - roots, axis=1), near, atol=2e-3)
+    assert world.ledger["stretch"] < 1.05
 
 
 def test_a_broken_collider_is_told_once() -> None:

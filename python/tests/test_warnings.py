@@ -131,6 +131,31 @@ DOUBTS: list[tuple[Tree, Tree, str, str, str]] = [
 ]
 
 
+FLOOR: Tree = {"collider": [{"name": "c", "shape": {"floor": {}}}]}
+GAS: Tree = {"gas": [{"name": "g", "box": {"size": [1, 1, 1], "resolution": 4}}]}
+WARM: Tree = {"heat": [{"name": "h", "box": {"size": [1, 1, 1], "resolution": 4}}]}
+
+
+@pytest.mark.parametrize(
+    ("word", "idle", "used"),
+    [
+        ("max_stretch", GAS, {"rope": [ROPE]}),
+        ("max_penetration", {"rope": [ROPE]}, {"rope": [ROPE], **FLOOR}),
+        ("max_intersections", {"rope": [ROPE]}, {"sheet": [SHEET]}),
+        ("max_volume_error", {"sheet": [SHEET]}, {"block": [BLOCK]}),
+        ("max_divergence", {"rope": [ROPE]}, GAS),
+        ("max_heat_error", GAS, WARM),
+    ],
+)
+def test_bounds_of_what_is_not_there_are_told(word: str, idle: Tree, used: Tree) -> None:
+    def told(words: Tree) -> list[tuple[str, str]]:
+        found = World({"version": 1, "expect": {word: 1}} | words).warnings
+        return [(warning["code"], warning["path"]) for warning in found]
+
+    assert told(idle) == [("idle-expectation", f"expect.{word}")]
+    assert told(used) == []
+
+
 @pytest.mark.parametrize(("doubtful", "fine", "code", "path", "figure"), DOUBTS)
 def test_figures_unlike_anything_real_are_told(doubtful: Tree, fine: Tree, code: str, path: str, figure: str) -> None:
     def told(words: Tree) -> list[dict[str, Any]]:

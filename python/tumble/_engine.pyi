@@ -54,6 +54,10 @@ class Scene:
         """The resolved scene: every default written out, mesh files with the hash of their content."""
 
     @property
+    def memory(self) -> float:
+        """An upper estimate of the bytes that its world takes. Above `world.memory_limit` it is refused."""
+
+    @property
     def folder(self) -> str:
         """Folder in which mesh files are looked for."""
 
@@ -125,6 +129,11 @@ class World:
         """The books: time, mass, momentum (3), angular_momentum (3), kinetic, elastic, external, energy [J], stretch,
         penetration [m], intersections, speed [m/s], contacts, broken, heat and heat_in [J], volume [m³],
         divergence [1/s]."""
+
+    def account(self) -> dict[str, Any]:
+        """Who has how much of the books, and where their worst numbers are: `systems` as (name, ledger), `shares` with system,
+        object and ledger, `worst` with measure (a number of the ledger), value, object, other, particles, id, cell. For the
+        moment when a bound is broken: it takes longer than the ledger."""
 
     def hash(self) -> str:
         """Hash of everything that the next step depends on, 16 hexadecimal digits."""

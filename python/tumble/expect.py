@@ -1,18 +1,22 @@
-"""The bounds of a scene's [expect] table, checked against what a run wrote."""
+"""The bounds of a scene's [expect] table: those on curves are looked at in every frame, the others at the end of a run."""
 
+import math
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, field, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import numpy.typing as npt
 
 from tumble._engine import SceneError, World
+from tumble.folder import LEDGER
 
 if TYPE_CHECKING:
     from tumble.run import Run
 
 Curve = npt.NDArray[np.float64]
+Row = Mapping[str, float]
+"""The numbers of a frame in ledger.csv."""
 
 
 @dataclass(frozen=True)
@@ -24,11 +28,13 @@ class Broken:
     frame: int
     """The first frame that broke it."""
     value: float
-    """The worst value in any frame."""
+    """The value there."""
     bound: float
     unit: str
     text: str
-    """All of that in a sentence."""
+    """All of that in a sentence, with the culprit."""
+    culprit: dict[str, Any] = field(default_factory=dict)
+    """Who broke it, as far as is known: system, object, other, particles, id, cell."""
 
     def to_dict(self) -> dict[str, Any]:
         return asdict(self)
@@ -51,6 +57,20 @@ _UNITS = {
     "broken_links": "",
 }
 
+_WORST = ("stretch", "penetration", "intersections", "speed", "divergence")
+"""Numbers of the ledger that are those of the worst element."""
+
+_KEPT = {
+    "max_mass_error": "mass",
+    "max_momentum_change": "momentum",
+    "max_angular_momentum_change": "angular_momentum",
+    "max_volume_error": "volume",
+    "max_heat_error": "heat",
+    "max_energy_drift": "energy",
+    "max_energy_growth": "energy",
+}
+"""What must be kept, and the number of the ledger that has it."""
+
 
 def count(scene: Mapping[str, Any]) -> int:
     """How many expectations a resolved scene has."""
@@ -58,77 +78,186 @@ def count(scene: Mapping[str, Any]) -> int:
     return sum(expect.get(name) is not None for name in _UNITS) + len(expect.get("probe", ()))
 
 
+def numbers(row: Sequence[str]) -> Row:
+    """A row of ledger.csv without its hash."""
+    return {name: float(text) for name, text in zip(LEDGER[:-1], row, strict=False)}
+
+
+class _Relative:
+    """Changes over the largest size in any frame so far."""
+
+    def __init__(self) -> None:
+        self.size = 0.0
+
+    def __call__(self, change: float, *sizes: float) -> float:
+        self.size = max(self.size, *map(abs, sizes))
+        # Without any size there is nothing to drift from.
+        return change / self.size if self.size > 0.0 else (0.0 if change == 0.0 else math.nan)
+
+
+class Measures:
+    """What bounds on curves are for, frame by frame."""
+
+    def __init__(self) -> None:
+        self._first: Row | None = None
+        self._energy, self._heat = _Relative(), _Relative()
+
+    def energy(self, row: Row) -> float:
+        """(E - E_0) over the largest kinetic or elastic energy, or change of external energy, of any frame so far."""
+        first = self._first = self._first or row
+        return self._energy(
+            row["energy"] - first["energy"], row["kinetic"], row["elastic"], row["external"] - first["external"]
+        )
+
+    def add(self, row: Row) -> dict[str, float]:
+        """The measures at the next frame."""
+        growth = self.energy(row)
+        first = self._first or row
+
+        def relative(name: str) -> float:
+            return abs(row[name] - first[name]) / max(abs(first[name]), 1e-300)
+
+        def change(name: str) -> float:
+            return math.hypot(*(row[f"{name}_{axis}"] - first[f"{name}_{axis}"] for axis in "xyz"))
+
+        return {
+            **{f"max_{name}": row[name] for name in _WORST},
+            "max_energy_drift": abs(growth),
+            "max_energy_growth": growth,
+            "max_mass_error": relative("mass"),
+            "max_momentum_change": change("momentum"),
+            "max_angular_momentum_change": change("angular_momentum"),
+            "max_volume_error": relative("volume"),
+            # |heat gained - heat that came in| over the largest of both.
+            "max_heat_error": self._heat(abs(row["heat"] - row["heat_in"]), row["heat"], row["heat_in"]),
+        }
+
+
 def energy_changes(ledger: Mapping[str, npt.NDArray[Any]]) -> Curve:
-    """(E - E_0) over the largest kinetic or elastic energy, or change of external energy, of any frame so far."""
-    change = ledger["energy"] - ledger["energy"][:1]
-    external = np.abs(ledger["external"] - ledger["external"][:1])
-    scale = np.maximum.accumulate(np.maximum(np.maximum(ledger["kinetic"], np.abs(ledger["elastic"])), external))
-    # Without any energy there is nothing to drift from.
-    relative: Curve = np.divide(change, scale, out=np.zeros_like(change), where=scale != 0.0)
-    return relative
+    """`Measures.energy` of every frame."""
+    measures = Measures()
+    names = ("energy", "kinetic", "elastic", "external")
+    columns = [ledger[name].tolist() for name in names]
+    return np.array([measures.energy(dict(zip(names, row, strict=True))) for row in zip(*columns, strict=True)])
 
 
-def relative_error(column: npt.NDArray[Any]) -> Curve:
-    """|a - a_0| over |a_0|."""
-    error: Curve = np.abs(column - column[:1]) / max(float(np.abs(column[0])), 1e-300)
-    return error
+class Bounds:
+    """The bounds on curves that a run has to keep to in every frame."""
 
+    def __init__(self, expect: Mapping[str, Any]) -> None:
+        self._bounds = {name: float(bound) for name, bound in expect.items() if name in _UNITS and bound is not None}
+        self._measures = Measures()
+        self._frame = -1
+        self.broken: list[Broken] = []
+        """Those that are broken, each by the first frame that does."""
 
-def change(ledger: Mapping[str, npt.NDArray[Any]], name: str) -> Curve:
-    """|a - a_0| of a vector in three columns."""
-    vectors = np.stack([ledger[f"{name}_{axis}"] for axis in "xyz"], axis=1)
-    length: Curve = np.linalg.norm(vectors - vectors[:1], axis=1)
-    return length
-
-
-def heat_error(ledger: Mapping[str, npt.NDArray[Any]]) -> Curve:
-    """|heat gained - heat that came in| over the largest of both in any frame so far."""
-    gained, came = ledger["heat"], ledger["heat_in"]
-    scale = np.maximum.accumulate(np.maximum(np.abs(gained), np.abs(came)))
-    error: Curve = np.divide(np.abs(gained - came), scale, out=np.zeros_like(gained), where=scale != 0.0)
-    return error
+    def add(self, row: Row) -> None:
+        """Looks at the next frame."""
+        self._frame += 1
+        if not self._bounds:
+            return
+        for name, value in self._measures.add(row).items():
+            bound = self._bounds.get(name)
+            if bound is None or value <= bound or any(b.name == name for b in self.broken):
+                continue
+            unit = _UNITS[name] and f" {_UNITS[name]}"
+            text = f"{name}: {value:.6g}{unit} at frame {self._frame}, expected at most {bound:.6g}{unit}"
+            self.broken.append(Broken(name, self._frame, value, bound, _UNITS[name], text))
 
 
 def check(run: "Run") -> list[Broken]:
-    """The expectations that a finished run broke, in the order of the table."""
+    """The expectations that a run broke: by its frames, and if it went on to its last one, there."""
     expect = run.scene.get("expect", {})
-    ledger = run.ledger
     if not run.n_frames:
         return []
-    curves: dict[str, Curve] = {
-        "max_stretch": ledger["stretch"],
-        "max_penetration": ledger["penetration"],
-        "max_intersections": ledger["intersections"],
-        "max_speed": ledger["speed"],
-        "max_energy_drift": np.abs(energy_changes(ledger)),
-        "max_energy_growth": energy_changes(ledger),
-        "max_mass_error": relative_error(ledger["mass"]),
-        "max_momentum_change": change(ledger, "momentum"),
-        "max_angular_momentum_change": change(ledger, "angular_momentum"),
-        "max_volume_error": relative_error(ledger["volume"]),
-        "max_divergence": ledger["divergence"],
-        "max_heat_error": heat_error(ledger),
-    }
-    broken = [_over(name, curve, expect[name]) for name, curve in curves.items() if expect.get(name) is not None]
-    return [b for b in [*broken, *_at_the_end(run, expect)] if b is not None]
+    bounds = Bounds(expect)
+    for row in zip(*(run.ledger[name].tolist() for name in LEDGER[:-1]), strict=True):
+        bounds.add(dict(zip(LEDGER, row, strict=False)))
+    whole = run.n_frames > run.manifest["frames"]
+    return [*bounds.broken, *(b for b in (_at_the_end(run, expect) if whole else []) if b is not None)]
 
 
-def _over(name: str, curve: Curve, bound: float, start: int = 0) -> Broken | None:
-    """Whether a curve exceeds its bound; nan does."""
-    over = np.flatnonzero(~(curve <= bound))
-    if over.size == 0:
-        return None
-    first, worst = int(over[0]), float(np.max(curve))
-    unit = _UNITS[name] and f" {_UNITS[name]}"
-    text = f"{name}: {worst:.6g}{unit}, expected at most {bound:.6g}{unit}; first broken at frame {start + first}"
-    return Broken(name, start + first, worst, bound, _UNITS[name], text)
+def blamed(broken: Broken, world: World) -> Broken:
+    """The same with who broke it, in a world that is at that frame."""
+    name = broken.name.removeprefix("max_")
+    try:
+        if name in _WORST:
+            culprit = _worst(world.account(), name)
+        elif broken.name in _KEPT:
+            culprit = _changed(world.account(), World(world.scene).account(), _KEPT[broken.name])
+        else:
+            return broken
+    except SceneError:
+        # A file of the scene is there no more.
+        return broken
+    return replace(broken, culprit=culprit, text=f"{broken.text}{_told(culprit)}") if culprit else broken
+
+
+def _worst(account: Mapping[str, Any], name: str) -> dict[str, Any]:
+    """The element with the worst number; where that is not known, the object or system."""
+    found = [worst for worst in account["worst"] if worst["measure"] == name]
+    if found:
+        worst = max(found, key=lambda worst: worst["value"])
+        return {
+            key: worst[key] for key in ("object", "other", "particles", "id", "cell") if worst[key] not in (None, [])
+        }
+    return _most(account, lambda ledger, _: abs(ledger[name]), account)
+
+
+def _changed(account: Mapping[str, Any], start: Mapping[str, Any], name: str) -> dict[str, Any]:
+    """The object, or system, of which most has gone or come since the start."""
+
+    def amount(ledger: Mapping[str, Any]) -> Any:
+        if name == "energy":
+            return ledger["kinetic"] + ledger["elastic"] + ledger["external"]
+        return ledger["heat"] - ledger["heat_in"] if name == "heat" else np.array(ledger[name])
+
+    def change(now: Mapping[str, Any], before: Mapping[str, Any] | None) -> float:
+        return float(np.linalg.norm(np.atleast_1d(amount(now) - (amount(before) if before else 0.0))))
+
+    if name != "energy":
+        return _most(account, change, start)
+    # What stretches between objects, or acts on them, is the system's.
+    culprit = _most(account | {"shares": []}, change, start)
+    fastest = _worst(account, "speed")
+    return culprit | {"fastest": fastest} if culprit and fastest else culprit
+
+
+def _most(account: Mapping[str, Any], size: Any, start: Mapping[str, Any]) -> dict[str, Any]:
+    """The object, or where there are none the system, of the largest size of its ledger beside that at the start."""
+    shares = [({"system": s["system"], "object": s["object"]}, s["ledger"]) for s in account["shares"]]
+    before = {(s["system"], s["object"]): s["ledger"] for s in start["shares"]}
+    if not shares:
+        shares = [({"system": name}, ledger) for name, ledger in account["systems"]]
+        before = {(name, None): ledger for name, ledger in start["systems"]}
+    sizes = [(size(ledger, before.get((who["system"], who.get("object")))), who) for who, ledger in shares]
+    most = max(sizes, key=lambda one: one[0], default=(0.0, {}))
+    return most[1] if most[0] > 0.0 else {}
+
+
+def _told(culprit: Mapping[str, Any]) -> str:
+    """The culprit in words."""
+    words = f', by "{culprit["object"]}"' if "object" in culprit else f', by system "{culprit["system"]}"'
+    if "id" in culprit:
+        words += f", the particle with id {culprit['id']}"
+    elif particles := culprit.get("particles"):
+        words += f", particle{'s' if len(particles) > 1 else ''} {' and '.join(map(str, particles))}"
+    if "cell" in culprit:
+        words += f", cell {tuple(culprit['cell'])}"
+    if "other" in culprit:
+        words += f', through "{culprit["other"]}"'
+    if "fastest" in culprit:
+        words += f"; fastest there{_told(culprit['fastest'])[4:]}"
+    return words
 
 
 def _at_the_end(run: "Run", expect: Mapping[str, Any]) -> list[Broken | None]:
     last = run.n_frames - 1
     broken: list[Broken | None] = []
-    if (bound := expect.get("max_final_kinetic")) is not None:
-        broken.append(_over("max_final_kinetic", run.ledger["kinetic"][-1:], bound, last))
+    kinetic = float(run.ledger["kinetic"][-1])
+    if (bound := expect.get("max_final_kinetic")) is not None and not kinetic <= bound:
+        text = f"max_final_kinetic: {kinetic:.6g} J at frame {last}, expected at most {bound:.6g} J"
+        broken.append(Broken("max_final_kinetic", last, kinetic, bound, "J", text))
     if (bound := expect.get("broken_links")) is not None:
         links = int(run.ledger["broken"][-1])
         if links != bound:

@@ -8,7 +8,7 @@ from contextlib import contextmanager
 
 @contextmanager
 def held() -> Iterator[None]:
-    """What is within is done to its end, and only then stopped by a signal that came meanwhile. Where it raises, its error is told."""
+    """What is within is done to its end, and only then stopped by a signal that came meanwhile; an error within goes first."""
     # Others than Python's own handlers stop nothing in the midst of a file, and only the main thread is stopped by those.
     stops = [s for s in (signal.SIGTERM, signal.SIGINT) if callable(signal.getsignal(s))]
     if threading.current_thread() is not threading.main_thread():

@@ -62,6 +62,7 @@ class Recorder:
         self.tables: list[Table] = []
         self.written = -1
         """The last frame that is on disk."""
+        self.bounds = expect.Bounds(self.scene["expect"])
         self.began = time.perf_counter()
         self.update_due = self.began + MANIFEST_INTERVAL
         timings = dict((earlier or {}).get("timings", {}))
@@ -107,6 +108,8 @@ class Recorder:
             share(files.frame(i), self.files.frame(i))
         self._open(rows[:frame], [r for r in read_rows(files.trials, TRIALS) if float(r[-1]) <= frame])
         self.hashes.extend(r[-1] for r in rows[:frame])
+        for row in rows[:frame]:
+            self.bounds.add(expect.numbers(row))
         # The books of this frame are kept by the changed scene; the way to it was the parent's.
         way: dict[str, Any] = dict(zip(LEDGER, rows[frame], strict=True))
         way["step_range"] = way["smallest_step"], way["largest_step"]
@@ -129,6 +132,8 @@ class Recorder:
         self._open(rows, trials)
         self.hashes.extend(r[-1] for r in rows)
         self.written = frame
+        for row in rows:
+            self.bounds.add(expect.numbers(row))
         self._write_manifest()
 
     def _open(self, rows: list[list[str]], trials: list[list[str]]) -> None:
@@ -158,9 +163,11 @@ class Recorder:
         if self.trials is not None:
             trials = report.get("trials", ())
             self.trials.add([t["time"], t["step"], t["error"], int(t["accepted"]), index] for t in trials)
-        self.ledger.add([ledger_row(index, self.world.ledger, report, seconds, state)])
+        row = ledger_row(index, self.world.ledger, report, seconds, state)
+        self.ledger.add([row])
         self.hashes.append(state)
         self.written = index
+        self.bounds.add(dict(zip(LEDGER, row, strict=True)))
 
     def checkpoint(self) -> None:
         """Saves the state, so that the run can go on from here, and drops old ones but for that of a branch's start."""
@@ -178,14 +185,17 @@ class Recorder:
                 self.files.checkpoint(old).unlink()
 
     def finish(self) -> None:
-        self.manifest["status"] = "finished"
-        self.manifest["probes"] = expect.probes(self.world, self.scene)
+        """Closes a run that went on to its last frame, or ends one of which a bound is broken."""
+        whole = self.written == self.manifest["frames"]
+        self.manifest["status"] = "finished" if whole else "failed"
+        self.manifest["probes"] = expect.probes(self.world, self.scene) if whole else []
         self.checkpoint()
         self._write_manifest()
 
     def judge(self, broken: list[expect.Broken]) -> None:
-        """Notes the expectations that were broken."""
-        self.manifest["expectations"] = [b.to_dict() for b in broken]
+        """Notes the expectations that were broken, and who broke those on curves, which the world is still at."""
+        found = [expect.blamed(b, self.world) for b in broken]
+        self.manifest["expectations"] = [b.to_dict() for b in found]
         self._write_manifest()
 
     def fail(self, error: StepError, explain: bool = True) -> None:

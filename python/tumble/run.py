@@ -46,7 +46,8 @@ def simulate(
     many such runs; `broke` is told before.
 
     Raises SceneError if the scene or the folder is wrong, before anything is written; StepError if the physics breaks;
-    ExportError if a file cannot be written. Whatever was finished by then can be read with `Run.open`.
+    ExportError if a file cannot be written. Whatever was finished by then can be read with `Run.open`. A bound of [expect] that
+    is broken ends the run after that frame, with status "failed" and the bound and its culprit in `manifest["expectations"]`.
     """
     scene = scene if isinstance(scene, Scene) else Scene(scene)
     if frames is not None:
@@ -119,7 +120,7 @@ def _advance(world: World, recorder: Recorder, progress: Progress | None) -> Non
     total = recorder.manifest["frames"]
     if progress is not None:
         progress(min(world.frame_index, total), total)
-    while world.frame_index < total:
+    while world.frame_index < total and not recorder.bounds.broken:
         begin = time.perf_counter()
         report = world.step()
         with held():

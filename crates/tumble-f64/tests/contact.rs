@@ -21,16 +21,21 @@ fn system(scheme: Integrator, substeps: u32) -> String {
     format!("[[system]]\nintegrator = \"{}\"\n{steps}\n", scheme.name())
 }
 
-/// A mass on an incline that falls towards +x at an angle [degrees], at rest at the origin.
-fn slider(scheme: Integrator, degrees: f64) -> Simulation {
-    let a = degrees.to_radians();
+/// A mass on an incline that falls towards +x at an angle [degrees], at the origin, with a speed down [m/s].
+fn slider_with(scheme: Integrator, degrees: f64, friction: &str, speed: f64) -> Simulation {
+    let (sin, cos) = degrees.to_radians().sin_cos();
     simulation(&format!(
-        "time.fps = 100\n{}[[particles]]\nname = \"p\"\nposition = [[0, 0, 0]]\nmass = [0.7]\n\
-         [[collider]]\nname = \"incline\"\nfriction = {MU}\nshape.plane.normal = [{:e}, 0, {:e}]\n",
+        "time.fps = 100\n{}[[particles]]\nname = \"p\"\nposition = [[0, 0, 0]]\nmass = [0.7]\nvelocity = [[{:e}, 0, {:e}]]\n\
+         [[collider]]\nname = \"incline\"\n{friction}\nshape.plane.normal = [{sin:e}, 0, {cos:e}]\n",
         system(scheme, 4),
-        a.sin(),
-        a.cos()
+        speed * cos,
+        -speed * sin
     ))
+}
+
+/// The same at rest, with one coefficient.
+fn slider(scheme: Integrator, degrees: f64) -> Simulation {
+    slider_with(scheme, degrees, &format!("friction = {MU}"), 0.0)
 }
 
 /// Way down the incline, height above it, and speed down.
@@ -80,6 +85,37 @@ fn a_slider_sticks_below_the_angle_of_friction_and_slides_above_it() {
             assert!(height.abs() < 1e-4);
         }
     }
+}
+
+/// With mu_s = 0.7 for what rests and mu = 0.4 for what slides, a mass at rest stays up to atan(mu_s), and one that slides, because it was
+/// pushed or is beyond, gains g (sin a - mu cos a).                                                                        (contact.22)
+#[test]
+fn what_rests_holds_more_than_what_slides() {
+    let (resting, sliding) = (0.7_f64, 0.4);
+    let (limit, words) = (resting.atan().to_degrees(), format!("friction = {sliding}\nfriction_static = {resting}"));
+    for scheme in every() {
+        let mut below = slider_with(scheme, limit - 1.0, &words, 0.0);
+        run(&mut below, 100);
+        let (way, _, _) = on_incline(&below, limit - 1.0);
+        println!("{:18} 1 degree below: slid {way:.1e} m in 1 s", scheme.name());
+        // Implicit Euler creeps, after a start without normal force.                                             (contact.8)
+        assert!(way.abs() < if scheme == Integrator::ImplicitEuler { 4e-3 } else { 1e-12 }, "{} {way:e}", scheme.name());
+        for (degrees, speed) in [(limit - 1.0, 0.5), (limit + 1.0, 0.0)] {
+            let mut slides = slider_with(scheme, degrees, &words, speed);
+            run(&mut slides, 50);
+            let (_, _, v0) = on_incline(&slides, degrees);
+            run(&mut slides, 50);
+            let (_, _, v1) = on_incline(&slides, degrees);
+            let expected = G * (degrees.to_radians().sin() - sliding * degrees.to_radians().cos());
+            let off = (v1 - v0) / 0.5 / expected - 1.0;
+            println!("{:18} {degrees:.1} degrees, {speed} m/s: acceleration {off:+.1e} off", scheme.name());
+            assert!(off.abs() < 0.01, "{} {v0} {v1}", scheme.name());
+        }
+    }
+    let text = "version = 1\n[[particles]]\nname = \"p\"\nposition = [[0, 0, 0]]\n[[collider]]\nname = \"c\"\nfriction = 0.5\nfriction_static = 0.4\n\
+                shape.floor = {}\n";
+    let told = Simulation::new(Scene::from_toml(text).unwrap(), Default::default()).map(|_| ()).unwrap_err().to_string();
+    assert!(told.contains("collider \"c\".friction_static: 0.4, expected >= 0.5"), "{told}");
 }
 
 /// Dropped from H, a mass with restitution 1/2 comes back to H/4.

@@ -355,7 +355,7 @@ fn thin_walls_hold() {
 }
 
 fn solid(shape: Shape, inside: bool, thickness: f64) -> Collider {
-    Collider { shape, inside, thickness, friction: 0.0, restitution: 0.0, belt: Vector::default(), motion: None, rig: None }
+    Collider { shape, inside, thickness, friction: Default::default(), restitution: 0.0, belt: Vector::default(), motion: None, rig: None }
 }
 
 fn facets(mesh: &Mesh) -> Facets {
@@ -467,5 +467,34 @@ fn a_room_has_corners() {
         assert!((books.energy() - start).abs() < 1e-9, "{y}: {} of {start}", books.energy());
         let v = velocities(&sim, "p")[0];
         assert!(v.x.abs() + v.y.abs() < 1e-9 && v.z.abs() > 0.01, "{v:?}");
+    }
+}
+
+/// What is pinned to a surface that changes its shape goes with its nearest triangle, at the same weights of the corners and the same height.
+#[test]
+fn what_follows_a_surface_goes_with_its_triangle() {
+    // In 1 s (x, y) goes to (-y, 2 x), and all by 1 m upwards.
+    let triangle = |corners: [[f64; 3]; 3]| Mesh { vertices: corners.to_vec(), triangles: vec![[0, 1, 2]], ..Mesh::default() };
+    let meshes = [
+        ("a", triangle([[0.0, 0.0, 0.0], [3.0, 0.0, 0.0], [0.0, 3.0, 0.0]])),
+        ("b", triangle([[0.0, 0.0, 1.0], [0.0, 6.0, 1.0], [-3.0, 0.0, 1.0]])),
+    ];
+    for scheme in ["position_based", "implicit_euler", "rk4"] {
+        let text = format!(
+            "time.fps = 4\n[[system]]\nintegrator = \"{scheme}\"\n\
+             [[particles]]\nname = \"p\"\nposition = [[0.5, 1.0, 0.25], [1.5, 0.25, -0.1]]\nmass = [1, 1]\n\
+             pin = [{{ which = \"all\", follow = {{ collider = \"m\" }} }}]\n\
+             [[collider]]\nname = \"m\"\nmotion.velocity = [0, 0, 2]\n\
+             shape.animated_mesh = {{ shell = true, frames = [{{ time = 0, path = \"a\" }}, {{ time = 1, path = \"b\" }}] }}\n"
+        );
+        let mut sim = with_meshes(&text, &meshes);
+        for frame in 1..=4 {
+            step(&mut sim);
+            let t = f64::from(frame) / 4.0;
+            for (x, [u, v, height]) in positions(&sim, "p").into_iter().zip([[0.5, 1.0, 0.25], [1.5, 0.25, -0.1]]) {
+                let expected = vector(u * (1.0 - t) - v * t, v * (1.0 - t) + 2.0 * u * t, height + t + 2.0 * t);
+                assert!((x - expected).norm() < 1e-12, "{scheme}, {t} s: {x:?} {expected:?}");
+            }
+        }
     }
 }

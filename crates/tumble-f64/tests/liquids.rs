@@ -170,7 +170,7 @@ fn a_sweep_goes_down_the_energy_of_liquid_between_walls() {
         shape,
         inside,
         thickness,
-        friction: 0.0,
+        friction: Default::default(),
         restitution: 0.0,
         belt: Vector::default(),
         motion: None,

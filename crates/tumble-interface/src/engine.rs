@@ -117,7 +117,7 @@ pub struct Ledger {
     pub stretch: f64,
     /// Deepest mass inside a collider or its thickness [m], of those that are not held.
     pub penetration: f64,
-    /// Edges of soft surfaces that pass through triangles, where `self_contact` is on.
+    /// Edges of soft surfaces that pass through triangles, where `self_contact` is on or `max_intersections` is expected.
     pub intersections: u64,
     /// Fastest mass [m/s].
     pub speed: f64,
@@ -133,6 +133,47 @@ pub struct Ledger {
     pub volume: f64,
     /// Largest divergence of a gas's velocity in a cell [1/s].
     pub divergence: f64,
+}
+
+/// Who has how much of the books, and where their worst numbers are: whoever is to blame where a bound is broken.
+#[derive(Debug, Clone, PartialEq, Default, serde::Serialize)]
+pub struct Account {
+    /// The books of each system.
+    pub systems: Vec<(String, Ledger)>,
+    /// What objects have of them, where a system can tell them apart: mass, momenta, kinetic energy, speed, heat and volume.
+    pub shares: Vec<Share>,
+    /// The worst numbers of each system.
+    pub worst: Vec<Worst>,
+}
+
+/// What one object has of the books.
+#[derive(Debug, Clone, PartialEq, serde::Serialize)]
+pub struct Share {
+    /// Its system.
+    pub system: String,
+    /// Its name.
+    pub object: String,
+    /// Its own books.
+    pub ledger: Ledger,
+}
+
+/// The worst of something in the books.
+#[derive(Debug, Clone, PartialEq, serde::Serialize)]
+pub struct Worst {
+    /// Of what: the name of a number in the ledger.
+    pub measure: &'static str,
+    /// How much, in the unit of that.
+    pub value: f64,
+    /// The object.
+    pub object: String,
+    /// The other one, where two meet.
+    pub other: Option<String>,
+    /// Particles within the object.
+    pub particles: Vec<usize>,
+    /// Id of the particle, if an emitter has made it: its index says nothing.
+    pub id: Option<u32>,
+    /// Cell, on a grid.
+    pub cell: Option<[usize; 3]>,
 }
 
 impl Ledger {
@@ -245,6 +286,9 @@ pub trait Engine: Send {
 
     /// The books, now.
     fn ledger(&self) -> Ledger;
+
+    /// Who has how much of them, and where the worst is.
+    fn account(&self) -> Account;
 
     /// Hash of everything that the next step depends on.
     fn hash(&self) -> u64;

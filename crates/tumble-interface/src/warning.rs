@@ -43,6 +43,8 @@ codes! {
     NoBirths = "no-births",
     /// A region that fast particles may pass unseen.
     ThinRegion = "thin-region",
+    /// An expectation of what the scene has not.
+    IdleExpectation = "idle-expectation",
     /// A picture of a frame beyond the last.
     NoSuchFrame = "no-such-frame",
     /// Tracers that are moved before the gas that carries them.

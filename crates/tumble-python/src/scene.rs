@@ -6,7 +6,7 @@ use pyo3::prelude::*;
 use pyo3::types::{PyBool, PyDict, PyFloat, PyInt, PyList, PyString, PyTuple};
 use std::collections::HashMap;
 use std::path::{Path, PathBuf};
-use tumble_interface::scene::{FabricRef, MeshRef};
+use tumble_interface::scene::{FabricRef, MeshRef, Precision};
 use tumble_interface::tree::{Node, Value};
 use tumble_interface::{Assets, Character, Fabric, Issue, Mesh, SceneError};
 use tumble_io::Format;
@@ -84,6 +84,15 @@ impl Scene {
     /// The resolved scene: every default written out, mesh files with the hash of their content.
     fn to_dict<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
         Ok(pythonize::pythonize(py, &self.scene.to_json())?)
+    }
+
+    /// An upper estimate of the bytes that its world takes. Above `world.memory_limit` it is refused.
+    #[getter]
+    fn memory(&self) -> f64 {
+        match self.scene.precision {
+            Precision::Single => tumble::scene::memory(&self.scene, &self.assets),
+            Precision::Double => tumble_f64::scene::memory(&self.scene, &self.assets),
+        }
     }
 
     /// Folder in which mesh files are looked for.

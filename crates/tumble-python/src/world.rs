@@ -236,6 +236,15 @@ impl World {
         books(py, &ledger)
     }
 
+    /// Who has how much of the books, and where their worst numbers are: `systems` as (name, ledger), `shares` with system,
+    /// object and ledger, `worst` with measure (a number of the ledger), value, object, other, particles, id, cell. For the
+    /// moment when a bound is broken: it takes longer than the ledger.
+    fn account<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
+        let (engine, pool) = (&self.engine, self.pool.as_ref());
+        let account = work(py, pool, |_| engine.account())?;
+        Ok(pythonize::pythonize(py, &account)?)
+    }
+
     /// Hash of everything that the next step depends on, 16 hexadecimal digits.
     fn hash(&self) -> String {
         format!("{:016x}", self.engine.hash())

@@ -4,7 +4,7 @@ use crate::exchange::Exchange;
 use crate::math::parallel::{CHUNK, Tasks, rows};
 use crate::math::{Real, Row};
 use crate::state::Field;
-use tumble_interface::engine::{Ledger, Stability, StepReport, UserForce, UserIntegrator};
+use tumble_interface::engine::{Ledger, Share, Stability, StepReport, UserForce, UserIntegrator, Worst};
 use tumble_interface::{Column, StepError};
 
 /// One numerical method with its state.
@@ -30,6 +30,16 @@ pub trait System: Send + Sync {
 
     /// Its books at time t [s].
     fn ledger(&self, t: f64) -> Ledger;
+
+    /// What each of its objects has of them; none where it cannot tell.
+    fn shares(&self, _t: f64) -> Vec<Share> {
+        Vec::new()
+    }
+
+    /// Where the worst numbers of its books are, as far as it knows.
+    fn worst(&self, _t: f64) -> Vec<Worst> {
+        Vec::new()
+    }
 
     /// What has broken, if anything: a number that is not finite, or an energy beyond its scale. Of a state without fault
     /// the scale is taken.

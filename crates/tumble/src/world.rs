@@ -7,7 +7,7 @@ use safetensors::tensor::{Dtype, SafeTensors, TensorView, serialize};
 use std::collections::HashMap;
 use std::hash::Hasher;
 use std::sync::atomic::{AtomicU64, Ordering};
-use tumble_interface::engine::{Ledger, Stability, StepReport};
+use tumble_interface::engine::{Account, Ledger, Stability, StepReport};
 use tumble_interface::{Column, SceneError, StepError};
 use twox_hash::XxHash3_64;
 
@@ -272,6 +272,16 @@ impl World {
             total.divergence = total.divergence.max(books.divergence);
         }
         total
+    }
+
+    /// Who has how much of the books, and where the worst is.
+    pub fn account(&self) -> Account {
+        let (time, systems) = (self.time(), &self.systems);
+        Account {
+            systems: systems.iter().map(|s| (s.name().to_string(), s.ledger(time))).collect(),
+            shares: systems.iter().flat_map(|s| s.shares(time)).collect(),
+            worst: systems.iter().flat_map(|s| s.worst(time)).collect(),
+        }
     }
 
     /// What systems chose from another scene is chosen anew.

@@ -41,9 +41,13 @@ def summary(run: "Run") -> str:
         for name in _RESULTS
         if (run.folder / name).exists()
     ]
-    if asked := expect.count(run.scene):
-        kept = asked - len(run.manifest["expectations"])
-        lines.append(f"  expectations: {kept} of {asked} kept")
+    broken = len(run.manifest["expectations"])
+    if last < run.manifest["frames"]:
+        lines.append(
+            f"  expectations: {broken} broken, where the run ends: at frame {last} of {run.manifest['frames']}"
+        )
+    elif asked := expect.count(run.scene):
+        lines.append(f"  expectations: {asked - broken} of {asked} kept")
     return "\n".join(lines)
 
 

@@ -16,7 +16,8 @@ pub struct Hair {
     /// Collider on whose surface it grows, and with which its roots move. This or `mesh`.
     #[serde(default)]
     pub on: Option<String>,
-    /// Which bone carries the roots, where `on` is a mannequin or a character: hair on its head, with `above`, follows `head`.
+    /// Which bone carries the roots, where `on` is a mannequin or a character: hair on its head, with `above`, follows `head`. Without it,
+    /// each root follows its place on the surface.
     #[serde(default)]
     pub bone: Option<String>,
     /// Mesh on which it grows; its roots stay. This or `on`.

@@ -90,7 +90,7 @@ pub struct Expect {
     /// Deepest mass inside a collider or its thickness, of those that are not held.
     #[schemars(range(min = 0.0), extend("x-unit" = "m"))]
     pub max_penetration: Option<f64>,
-    /// Edges of soft surfaces that pass through triangles, where `self_contact` is on.
+    /// Edges of soft surfaces that pass through triangles of their system; they are counted with or without `self_contact`.
     pub max_intersections: Option<u64>,
     /// Fastest mass.
     #[schemars(range(min = 0.0), extend("x-unit" = "m/s"))]

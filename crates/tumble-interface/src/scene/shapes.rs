@@ -16,10 +16,14 @@ pub struct Collider {
     #[serde(default)]
     #[schemars(range(min = 0.0), extend("x-unit" = "m"))]
     pub thickness: f64,
-    /// Coulomb friction coefficient, static and sliding.
+    /// Coulomb friction coefficient of what slides.
     #[serde(default)]
     #[schemars(range(min = 0.0), extend("x-unit" = "1"))]
     pub friction: f64,
+    /// Coulomb friction coefficient of what rests, at least `friction`; without it, the same.
+    #[serde(default)]
+    #[schemars(range(min = 0.0), extend("x-unit" = "1"))]
+    pub friction_static: Option<f64>,
     /// Speed after a bounce over speed before.
     #[serde(default)]
     #[schemars(range(min = 0.0, max = 1.0), extend("x-unit" = "1"))]

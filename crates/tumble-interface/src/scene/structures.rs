@@ -564,7 +564,8 @@ pub enum Pin {
 pub struct Follow {
     /// Name of a collider.
     pub collider: String,
-    /// Which of its bones: one of a mannequin, or the name of a joint in the file of a character. Without it, the collider as a rigid whole.
+    /// Which of its bones: one of a mannequin, or the name of a joint in the file of a character. Without it, the nearest place of
+    /// a surface that moves by itself, or else the collider as a rigid whole.
     #[serde(default)]
     pub bone: Option<String>,
 }

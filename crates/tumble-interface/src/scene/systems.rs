@@ -330,10 +330,14 @@ pub struct SelfContact {
     /// that larger is faster.
     #[schemars(extend("x-unit" = "m", "exclusiveMinimum" = 0.0))]
     pub thickness: f64,
-    /// Coulomb friction coefficient, static and sliding.
+    /// Coulomb friction coefficient of what slides.
     #[serde(default)]
     #[schemars(range(min = 0.0), extend("x-unit" = "1"))]
     pub friction: f64,
+    /// Coulomb friction coefficient of what rests, at least `friction`; without it, the same.
+    #[serde(default)]
+    #[schemars(range(min = 0.0), extend("x-unit" = "1"))]
+    pub friction_static: Option<f64>,
 }
 
 /// How an element is satisfied.

@@ -75,6 +75,10 @@ pub trait Batch: Send + Sync {
     fn largest_strain(&self, _x: &[Row]) -> f64 {
         f64::NEG_INFINITY
     }
+    /// The element of the largest lengthening, by how much, and its first two rows.
+    fn most_strained(&self, _x: &[Row]) -> Option<(f64, [u32; 2])> {
+        None
+    }
     /// Breaks the links that are strained beyond their limit; returns how many.
     fn break_links(&mut self, _x: &[Row]) -> u64 {
         0
@@ -250,6 +254,10 @@ impl<E: Element<N, M, D>, Y: Law<P>, const N: usize, const M: usize, const D: us
 
     fn largest_strain(&self, x: &[Row]) -> f64 {
         self.list.largest_strain(x)
+    }
+
+    fn most_strained(&self, x: &[Row]) -> Option<(f64, [u32; 2])> {
+        self.list.most_strained(x)
     }
 
     fn begin_forces(&mut self, _t: f64, x: &[Row], v: &[Row]) {

@@ -8,7 +8,7 @@
 use super::list::Members;
 use super::{Compliance, Element, Law, corrected, energy, project};
 use crate::geometry::Walls;
-use crate::math::parallel::{self, Tasks, fold};
+use crate::math::parallel::{self, Tasks, fold, worst};
 use crate::math::simd::{Index, Kernel, Width, count, dispatch, largest, packs};
 use crate::math::{Lane, Quat, Real, Row, Vec3, xyz};
 use std::marker::PhantomData;
@@ -81,6 +81,10 @@ pub trait Constraints: Send + Sync {
     /// The largest lengthening of links, pieces of rods and edges of membranes and fabrics over rest length; negative infinity if there is none.
     fn largest_strain(&self, _x: &[Row]) -> f64 {
         f64::NEG_INFINITY
+    }
+    /// The element of the largest lengthening, by how much, and its first two rows.
+    fn most_strained(&self, _x: &[Row]) -> Option<(f64, [u32; 2])> {
+        None
     }
     /// Breaks the links that are strained beyond their limit; returns how many.
     fn break_links(&mut self, _x: &[Row]) -> u64 {
@@ -571,6 +575,14 @@ impl<E: Element<N, M, D>, Y: Law<P>, const N: usize, const M: usize, const D: us
         let (columns, kind) = (&self.columns, PhantomData::<[E; M]>);
         let largest = fold(self.len(), |range| dispatch(Strains { columns, range, x, kind }));
         largest.into_iter().fold(f64::NEG_INFINITY, |m, s| m.max(f64::from(s)))
+    }
+
+    fn most_strained(&self, x: &[Row]) -> Option<(f64, [u32; 2])> {
+        self.columns.check(x);
+        let (columns, kind) = (&self.columns, PhantomData::<[E; M]>);
+        let strain = |e: usize| f64::from(dispatch(Strains { columns, range: e..e + 1, x, kind }));
+        let (e, most) = worst(self.len(), strain)?;
+        Some((most, [0, 1].map(|a| columns.nodes[a.min(N - 1)].get()[e])))
     }
 
     fn break_links(&mut self, x: &[Row]) -> u64 {

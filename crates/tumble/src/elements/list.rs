@@ -3,7 +3,7 @@
 
 use super::batch::Weights;
 use super::{Element, Law, energy, gauss_newton, hessian, tangents};
-use crate::math::parallel::fold;
+use crate::math::parallel::{fold, worst};
 use crate::math::simd::{Index, Kernel, Scalar, Width, count, dispatch, largest, packs};
 use crate::math::{Lane, Quat, Real, Row, Vec3};
 use std::marker::PhantomData;
@@ -209,6 +209,14 @@ impl<E: Element<N, M, D>, Y: Law<P>, const N: usize, const M: usize, const D: us
         self.check(&[x]);
         let most = fold(self.len(), |range| dispatch(Strains { list: self, range, x }));
         most.into_iter().fold(f64::NEG_INFINITY, |m, s| m.max(f64::from(s)))
+    }
+
+    /// That lengthening, and the first two rows of the element that has it.
+    pub fn most_strained(&self, x: &[Row]) -> Option<(f64, [u32; 2])> {
+        self.check(&[x]);
+        let strain = |e: usize| f64::from(dispatch(Strains { list: self, range: e..e + 1, x }));
+        let (e, most) = worst(self.len(), strain)?;
+        Some((most, [0, 1].map(|a| self.nodes[a.min(N - 1)].get()[e])))
     }
 }
 

@@ -6,7 +6,7 @@ use super::list::{List, Members};
 use super::neighbours::{Columns, Neighbours, SLICE};
 use super::{Distance, Element, Law, Vector};
 use crate::linalg::blocks::Block;
-use crate::math::parallel::{Tasks, chunks, fold};
+use crate::math::parallel::{Tasks, chunks, fold, worst};
 use crate::math::simd::{Kernel, Scalar, Width, dispatch, largest, packs};
 use crate::math::{Lane, Real, Row, Vec3, xyz};
 use std::marker::PhantomData;
@@ -443,6 +443,12 @@ impl<E: Pair<M, D>, Y: Law<P>, const M: usize, const D: usize, const P: usize> B
             false => self.link_strain(x),
         };
         parts.into_iter().fold(f64::NEG_INFINITY, |m, s| m.max(f64::from(s)))
+    }
+
+    fn most_strained(&self, x: &[Row]) -> Option<(f64, [u32; 2])> {
+        let strain = self.link_strain(x);
+        let (e, most) = worst(strain.len(), |e| f64::from(strain[e]))?;
+        Some((most, [0, 1].map(|a| self.list.nodes[a].get()[e])))
     }
 
     fn break_links(&mut self, x: &[Row]) -> u64 {

@@ -18,8 +18,8 @@ pub struct Collider {
     pub inside: bool,
     /// Masses are kept this far from the surface [m].
     pub thickness: f64,
-    /// Coulomb friction coefficient.
-    pub friction: f64,
+    /// Coulomb friction.
+    pub friction: Friction,
     /// Speed after a bounce over speed before.
     pub restitution: f64,
     /// Velocity of the surface along itself [m/s].
@@ -28,6 +28,34 @@ pub struct Collider {
     pub motion: Option<Motion>,
     /// Its bones, if it is a figure.
     pub rig: Option<Arc<Rig>>,
+}
+
+/// Coefficients of Coulomb friction.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct Friction {
+    /// Of what slides.
+    pub sliding: f64,
+    /// Of what rests, at least as large.
+    pub resting: f64,
+}
+
+impl Friction {
+    /// How much friction takes of a slide, where the normal impulse is `press` in the same unit: all where it can hold that, else what it takes of
+    /// what slides.                                                                              (contact.22)
+    pub fn takes(self, slide: f64, press: f64) -> f64 {
+        if slide <= self.resting * press { slide } else { slide.min(self.sliding * press) }
+    }
+}
+
+/// What of a collider carries what is tied to it.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Carrier {
+    /// The collider as a rigid whole.
+    Whole,
+    /// One of its bones.
+    Bone(usize),
+    /// A triangle of a surface that moves by itself, and the weights of its corners where it carries.
+    Facet(usize, [f64; 3]),
 }
 
 /// A mass within the thickness of a solid.
@@ -87,13 +115,24 @@ impl Collider {
         self.motion.as_ref().map(|m| m.at(t))
     }
 
-    /// Where it is at time t as a rigid whole, or where one of its bones is.
-    pub fn pose(&self, bone: Option<usize>, t: f64) -> Pose {
-        let place = match bone {
-            Some(bone) => self.bone_pose(bone, t),
-            None => self.at(t),
-        };
-        place.map_or(Pose::default(), |(pose, _)| pose)
+    /// Where it is at time t as a rigid whole, or where one of its bones or triangles is.
+    pub fn pose(&self, carrier: Carrier, t: f64) -> Pose {
+        let whole = self.at(t).map_or(Pose::default(), |(pose, _)| pose);
+        match (carrier, &self.shape) {
+            (Carrier::Bone(bone), _) => self.bone_pose(bone, t).map_or(Pose::default(), |(pose, _)| pose),
+            (Carrier::Facet(triangle, weights), Shape::Animated { facets, .. }) => {
+                let own = facets.pose(triangle, weights, t);
+                Pose { turn: whole.turn * own.turn, shift: whole.out(own.shift) }
+            }
+            _ => whole,
+        }
+    }
+
+    /// What carries a thing that is at p when t = 0: the nearest place of a surface that moves by itself, or the whole.
+    pub fn carrier(&self, p: Vector) -> Carrier {
+        let Shape::Animated { facets, .. } = &self.shape else { return Carrier::Whole };
+        let local = self.at(0.0).map_or(p, |(pose, _)| pose.back(p));
+        facets.carrier(local).map_or(Carrier::Whole, |(triangle, weights)| Carrier::Facet(triangle, weights))
     }
 
     fn near(&self, local: Vector, t: f64, within: f64) -> (f64, Vector, Vector) {

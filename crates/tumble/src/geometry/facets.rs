@@ -6,8 +6,10 @@
 
 use super::Vector;
 use super::bvh::{Feature, Node, build, closest_on_triangle, high, low};
+use super::motion::Pose;
 use crate::math::functions::{acos, floor};
 use crate::math::parallel::Tasks;
+use crate::math::rotation::from_axes;
 use tumble_interface::Mesh;
 
 /// Triangles with keyframes.
@@ -202,6 +204,26 @@ impl Facets {
     pub fn vertices(&self, t: f64) -> Vec<[f64; 3]> {
         let m = self.moment(t);
         (0..self.frames[0].len() as u32).map(|i| (self.vertex(m, i) + m.gone).into()).collect()
+    }
+
+    /// The triangle nearest to p when t = 0, and the weights of its corners in the nearest point.
+    pub fn carrier(&self, p: Vector) -> Option<(usize, [f64; 3])> {
+        let m = self.moment(0.0);
+        let p = p - m.gone;
+        let corners = |t: usize| self.triangles[t].map(|i| self.vertex(m, i));
+        let closest = |t: usize| closest_on_triangle(p, corners(t)).0;
+        let whole = (0..self.triangles.len()).filter(|t| self.face(m, *t).norm_sq() > 0.0);
+        let far = whole.map(|t| (t, (closest(t) - p).norm_sq()));
+        let (t, _) = far.reduce(|a, b| if b.1 < a.1 { b } else { a })?;
+        Some((t, Self::weights(closest(t), corners(t))))
+    }
+
+    /// The place of a point of a triangle at time t, with axes along its first side and its normal.
+    pub fn pose(&self, t: usize, weights: [f64; 3], time: f64) -> Pose {
+        let m = self.moment(time);
+        let [a, b, c] = self.triangles[t].map(|i| self.vertex(m, i));
+        let turn = from_axes((b - a).normalized(), self.face(m, t));
+        Pose { turn, shift: a * weights[0] + b * weights[1] + c * weights[2] + m.gone }
     }
 
     /// Largest speed of a vertex [m/s].

@@ -82,6 +82,14 @@ pub fn max(n: usize, f: impl Fn(Range<usize>) -> f64 + Sync) -> f64 {
     fold(n, f).into_iter().fold(f64::NEG_INFINITY, |a, b| if a >= b || a.is_nan() { a } else { b })
 }
 
+/// Where in 0..n the largest of `f(i)` is, the first if there are several, and that; `None` where nothing is above negative infinity.
+pub fn worst(n: usize, f: impl Fn(usize) -> f64 + Sync) -> Option<(usize, f64)> {
+    let larger = |most: (usize, f64), one: (usize, f64)| if one.1 > most.1 { one } else { most };
+    let none = (0, f64::NEG_INFINITY);
+    let found = fold(n, |range| range.map(|i| (i, f(i))).fold(none, larger)).into_iter().fold(none, larger);
+    (found.1 > f64::NEG_INFINITY).then_some(found)
+}
+
 /// `f(range)` of every chunk of 0..n, in order.
 pub fn fold<T: Send>(n: usize, f: impl Fn(Range<usize>) -> T + Sync) -> Vec<T> {
     let range = |i: usize| i * CHUNK..((i + 1) * CHUNK).min(n);

@@ -22,6 +22,16 @@ pub fn from_z_to(d: Vec3<f64>) -> Quat<f64> {
     Quat { v: Vec3 { x: -d.y, y: d.x, z: 0.0 }, w: 1.0 + d.z }.normalized()
 }
 
+/// The rotation that takes e_x and e_z to two unit vectors across each other.
+pub fn from_axes(x: Vec3<f64>, z: Vec3<f64>) -> Quat<f64> {
+    let upright = from_z_to(z);
+    let before = upright.turn(Vec3 { x: 1.0, y: 0.0, z: 0.0 });
+    // About z, by its half angle.
+    let half = ((1.0 + before.dot(x)) / 2.0).max(0.0).sqrt();
+    let about = if half < 1e-8 { Quat { v: z, w: 0.0 } } else { Quat { v: z * (z.dot(before.cross(x)) / (2.0 * half)), w: half } };
+    (about * upright).normalized()
+}
+
 /// q exp(theta/2): the frame q turned by the rotation vector theta [rad], given in the frame's own axes.
 pub fn turn(q: Row, theta: Vec3<Real>) -> Row {
     let t = Vec3 { x: f64::from(theta.x), y: f64::from(theta.y), z: f64::from(theta.z) };

@@ -224,6 +224,7 @@ fn bounds(shape: &Solid) -> Collider {
         shape: shape.clone(),
         thickness: 0.0,
         friction: 0.0,
+        friction_static: None,
         restitution: 0.0,
         color: None,
         inside: false,

@@ -8,7 +8,7 @@
 
 use super::Site;
 use crate::geometry::motion::Pose;
-use crate::geometry::{Collider, Sampler, Vector};
+use crate::geometry::{Carrier, Collider, Sampler, Vector};
 use crate::math::functions::{cos, sin};
 use crate::math::rotation::from_z_to;
 use crate::math::{Quat, Random};
@@ -29,21 +29,8 @@ pub struct Ground<'a> {
     pub mesh: &'a Mesh,
     /// Where that stands at the start.
     pub pose: Pose,
-    /// What carries the roots, if it moves, and where that is at the start.
-    pub carrier: Option<Carrier>,
-    /// The collider that strands are combed off.
-    pub solid: Option<&'a Collider>,
-}
-
-/// A collider, or one of its bones, and where it is at the start.
-#[derive(Clone, Copy)]
-pub struct Carrier {
-    /// Counted from the first.
-    pub collider: usize,
-    /// Of its bones.
-    pub bone: Option<usize>,
-    /// Its place.
-    pub pose: Pose,
+    /// The collider that strands are combed off and that carries the roots, counted from the first, and which of its bones does.
+    pub solid: Option<(&'a Collider, usize, Option<usize>)>,
 }
 
 /// Adds the masses, frames and elements of all strands.
@@ -94,10 +81,10 @@ pub fn hair(site: &mut Site<'_>, thing: &Hair, seed: u32, ground: &Ground<'_>) {
             _ => own.clone(),
         };
         let mut shape: Vec<Vector> = shape.into_iter().map(|p| ground.pose.out(p)).collect();
-        if let Some(solid) = ground.solid {
+        if let Some((solid, ..)) = ground.solid {
             comb(&mut shape, solid, 1.02 * solid.thickness + 1e-4 * thing.length);
         }
-        plant(site, thing, &shape, ground.carrier);
+        plant(site, thing, &shape, ground);
     }
     let n = thing.segments + 1;
     if let Some(object) = site.parts.object() {
@@ -184,7 +171,7 @@ fn strand(thing: &Hair, random: &Random, id: u64, (root, normal): (Vector, Vecto
 }
 
 /// Masses, frames and elements of a strand at rest.
-fn plant(site: &mut Site<'_>, thing: &Hair, shape: &[Vector], carrier: Option<Carrier>) {
+fn plant(site: &mut Site<'_>, thing: &Hair, shape: &[Vector], ground: &Ground<'_>) {
     let n = shape.len() - 1;
     let area = PI * thing.radius * thing.radius;
     let per_length = thing.density * area;
@@ -202,8 +189,10 @@ fn plant(site: &mut Site<'_>, thing: &Hair, shape: &[Vector], carrier: Option<Ca
     let inertia = |l: f64| per_length * l * (thing.radius * thing.radius / 2.0 + l * l / 12.0);
     let held = site.parts.frame(turn.row(), inertia((shape[1] - shape[0]).norm()));
     site.parts.clamp_frame(held);
-    if let Some(Carrier { collider, bone, pose }) = carrier {
-        site.parts.carry((collider, bone), points[0], pose.back(shape[0]), held, pose.turn.conj() * turn);
+    if let Some((solid, number, bone)) = ground.solid {
+        let carrier = bone.map_or_else(|| solid.carrier(shape[0]), Carrier::Bone);
+        let pose = solid.pose(carrier, 0.0);
+        site.parts.carry((number, carrier), points[0], pose.back(shape[0]), held, pose.turn.conj() * turn);
     }
     let mut before = (held, turn, 0.0);
     for i in 0..n {

@@ -19,6 +19,7 @@ fn shape(words: &Words) -> Result<Shape, String> {
         shape: words.clone(),
         thickness: 0.0,
         friction: 0.0,
+        friction_static: None,
         restitution: 0.0,
         inside: false,
         belt: [0.0; 3],

@@ -32,7 +32,7 @@ pub use emitter::{emitter, region};
 pub use figures::{MANNEQUIN, bytes as figure_bytes, character, mannequin};
 pub use galaxy::galaxy;
 pub use grid::grid;
-pub use hair::{Carrier, Ground, hair};
+pub use hair::{Ground, hair};
 pub use heat::heat;
 pub use net::net;
 pub use particles::{Tracer, draw_cloud, particles, tracers, walkers};

@@ -1,7 +1,7 @@
 //! Which masses a pin means.
 
 use super::Site;
-use crate::geometry::{Collider, Vector};
+use crate::geometry::{Carrier, Collider, Vector};
 use tumble_interface::scene::{Follow, Pin, Region};
 
 /// What a thing offers to pin.
@@ -30,7 +30,11 @@ pub fn pinned(site: &mut Site<'_>, thing: &Pinnable<'_>, pins: &[Pin]) -> Vec<u3
             Ok((found, carrier)) => {
                 all.extend(found.iter().map(|p| p + thing.first));
                 if let Some((solid, bone)) = carrier {
-                    found.iter().for_each(|p| site.parts.follow(p + thing.first, solid, bone));
+                    for point in found.iter().map(|p| p + thing.first) {
+                        let nearest = |solids: &[(String, Collider)]| solids[solid].1.carrier(site.parts.position(point));
+                        let carrier = bone.map_or_else(|| site.solids.map_or(Carrier::Whole, nearest), Carrier::Bone);
+                        site.parts.follow(point, solid, carrier);
+                    }
                 }
             }
             Err(message) => site.wrong(format!("{}.pin[{i}]", thing.path), message),

@@ -1,7 +1,7 @@
 //! Colliders: the solids that masses feel, and the meshes that pictures show.
 
 use crate::geometry::motion::Key;
-use crate::geometry::{Collider, Facets, GridSdf, Motion, Rig, Shape, Vector, surface};
+use crate::geometry::{Collider, Facets, Friction, GridSdf, Motion, Rig, Shape, Vector, surface};
 use crate::math::rotation::from_degrees;
 use std::sync::Arc;
 use tumble_interface::Mesh;
@@ -116,7 +116,7 @@ pub fn solid(thing: &Thing, meshes: &[Mesh], figure: Option<(Arc<Rig>, Facets)>)
         shape,
         inside: thing.inside,
         thickness: thing.thickness,
-        friction: thing.friction,
+        friction: Friction { sliding: thing.friction, resting: thing.friction_static.unwrap_or(thing.friction) },
         restitution: thing.restitution,
         belt: thing.belt.into(),
         motion: thing.motion.as_ref().map(motion).transpose()?,

@@ -10,7 +10,7 @@ use super::memory::memory;
 use super::plausible::implausible;
 use crate::exchange::Exchange;
 use crate::geometry::motion::Pose;
-use crate::geometry::{Collider, Vector};
+use crate::geometry::{Carrier, Collider, Vector};
 use crate::math::parallel::fold;
 use crate::pool::{Course, Emitter as Emission};
 use crate::recipes::{self, Site};
@@ -78,8 +78,9 @@ pub fn build(scene: &Scene, assets: &Assets) -> Result<Built, SceneError> {
     let mut issues = check(scene, &plans);
     let (needed, limit) = (memory(scene, assets) / 1024.0_f64.powi(3), scene.world.memory_limit);
     if needed > limit {
+        let about = if needed < 1.0 { format!("{:.1} MiB", 1024.0 * needed) } else { format!("{needed:.1} GiB") };
         let message = format!(
-            "the scene needs about {needed:.1} GiB, the limit is {limit} GiB; lower a resolution, a rate or a lifetime, set most, or raise world.memory_limit"
+            "the scene needs about {about}, the limit is {limit} GiB; lower a resolution, a rate or a lifetime, set most, or raise world.memory_limit"
         );
         issues.push(Issue::new("world.memory_limit", message));
         return Err(SceneError { issues });
@@ -162,6 +163,7 @@ pub fn build(scene: &Scene, assets: &Assets) -> Result<Built, SceneError> {
             solver: plan.solver.clone(),
             sweeps: plan.position_based.clone(),
             self_contact: plan.self_contact.clone(),
+            counted: scene.expect.max_intersections.is_some(),
             clamp: plan.clamp,
             gravity,
             native: scene.bits == Bits::Native,
@@ -383,7 +385,7 @@ fn planted(site: &mut Site<'_>, scene: &Scene, thing: &Hair, assets: &Assets, (c
         (Some(file), None) => match assets.get(&file.path) {
             Some(mesh) => {
                 let mesh = recipes::placed(mesh, file);
-                recipes::hair(site, thing, scene.seed, &recipes::Ground { mesh: &mesh, pose: Pose::default(), carrier: None, solid: None });
+                recipes::hair(site, thing, scene.seed, &recipes::Ground { mesh: &mesh, pose: Pose::default(), solid: None });
             }
             None => wrong(".mesh", "the mesh has not been loaded".into()),
         },
@@ -391,8 +393,8 @@ fn planted(site: &mut Site<'_>, scene: &Scene, thing: &Hair, assets: &Assets, (c
             let Some(k) = scene.collider.iter().position(|c| c.name == *name) else {
                 return wrong(".on", format!("there is no collider \"{name}\""));
             };
-            if let Shape::Plane { .. } | Shape::Floor { .. } | Shape::AnimatedMesh(_) = scene.collider[k].shape {
-                return wrong(".on", format!("collider \"{name}\" has no end or changes its shape; hair grows on what moves as a whole"));
+            if let Shape::Plane { .. } | Shape::Floor { .. } = scene.collider[k].shape {
+                return wrong(".on", format!("collider \"{name}\" has no end; let hair grow on another"));
             }
             // What is wrong with the collider is told elsewhere.
             let (true, Some(mesh)) = (colliders.len() == scene.collider.len(), surfaces.get(k)) else { return };
@@ -410,15 +412,10 @@ fn planted(site: &mut Site<'_>, scene: &Scene, thing: &Hair, assets: &Assets, (c
                     Some(bone) => Some(bone),
                     None => return wrong(".bone", format!("collider \"{name}\" has no bone \"{bone}\"; known are {}", bones.join(", "))),
                 },
-                None if bones.is_empty() => None,
-                None => {
-                    let message = format!("collider \"{name}\" changes its shape: say which bone carries the roots, {}", bones.join(", "));
-                    return wrong(".bone", message);
-                }
+                None => None,
             };
-            let moves = bone.is_some() || solid.motion.is_some();
-            let carrier = moves.then(|| recipes::Carrier { collider: k, bone, pose: solid.pose(bone, 0.0) });
-            recipes::hair(site, thing, scene.seed, &recipes::Ground { mesh, pose: solid.pose(None, 0.0), carrier, solid: Some(solid) });
+            let ground = recipes::Ground { mesh, pose: solid.pose(Carrier::Whole, 0.0), solid: Some((solid, k, bone)) };
+            recipes::hair(site, thing, scene.seed, &ground);
         }
         _ => wrong(".on", "expected either the name of a collider, or a mesh".into()),
     }

@@ -7,7 +7,7 @@ use super::cures;
 use crate::geometry::{Collider, Shape};
 use crate::world::World;
 use std::sync::Arc;
-use tumble_interface::engine::{Cure, Engine, Inside, Ledger, Stability, StepReport, UserForce, UserIntegrator};
+use tumble_interface::engine::{Account, Cure, Engine, Inside, Ledger, Stability, StepReport, UserForce, UserIntegrator};
 use tumble_interface::scene::{Integrator, System};
 use tumble_interface::{Column, Frame, Issue, Scene, SceneError, StepError, Warning};
 
@@ -131,6 +131,10 @@ impl Engine for Simulation {
 
     fn ledger(&self) -> Ledger {
         self.world.ledger()
+    }
+
+    fn account(&self) -> Account {
+        self.world.account()
     }
 
     fn hash(&self) -> u64 {

@@ -16,7 +16,7 @@ use crate::math::{Real, bisect};
 use crate::operators::{average, curl, divergence, gradient, upwind, vector_laplacian};
 use crate::state::{Field, Grid, GridError, Place, Side, Vectors};
 use crate::system::{Archive, System};
-use tumble_interface::engine::{BLOW_UP, Ledger, Limit, Stability, StepReport};
+use tumble_interface::engine::{BLOW_UP, Ledger, Limit, Share, Stability, StepReport};
 use tumble_interface::error::Breakdown;
 use tumble_interface::scene::Integrator;
 use tumble_interface::{Column, Data, StepError};
@@ -479,6 +479,11 @@ impl System for Compressible {
             total.speed = total.speed.max(books.speed);
         }
         total
+    }
+
+    fn shares(&self, t: f64) -> Vec<Share> {
+        let share = |gas: &Gas| Share { system: self.settings.name.clone(), object: gas.name.clone(), ledger: gas.books(t) };
+        self.gases.iter().map(share).collect()
     }
 
     fn breakdown(&mut self, t: f64) -> Option<StepError> {

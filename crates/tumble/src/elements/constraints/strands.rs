@@ -12,7 +12,7 @@
 use super::{Constraints, Members, Projection, Shared, compliance};
 use crate::elements::{BendTwist, Element, Linear, StretchShear, corrected, energy};
 use crate::geometry::Walls;
-use crate::math::parallel::{Tasks, fold};
+use crate::math::parallel::{Tasks, fold, worst};
 use crate::math::simd::{Index, Kernel, Scalar, Width, dispatch};
 use crate::math::{Lane, Quat, Real, Row, Vec3, xyz};
 use std::ops::Range;
@@ -740,6 +740,15 @@ impl Constraints for Strands {
         // NaN, of what has broken, is never the larger.
         let largest = |range: Range<usize>| range.map(|e| self.strain(x, e)).fold(Real::NEG_INFINITY, Real::max);
         fold(self.len(), largest).into_iter().fold(f64::NEG_INFINITY, |m, s| m.max(f64::from(s)))
+    }
+
+    fn most_strained(&self, x: &[Row]) -> Option<(f64, [u32; 2])> {
+        self.check(x);
+        let (e, most) = worst(self.len(), |e| f64::from(self.strain(x, e)))?;
+        let (g, i, s) = self.places[e];
+        let group = &self.groups[g as usize];
+        let at = i as usize * group.count + s as usize;
+        Some((most, [at, at + group.count].map(|p| group.points.get()[p])))
     }
 
     fn break_links(&mut self, x: &[Row]) -> u64 {

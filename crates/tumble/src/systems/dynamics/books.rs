@@ -11,6 +11,7 @@ use crate::math::simd::{Kernel, Width, dispatch};
 use crate::math::{Quat, Real, Row, Vec3, ZERO, is_finite, xyz64};
 use crate::state::Object;
 use crate::system::System;
+use std::ops::Range;
 use tumble_interface::engine::{BLOW_UP, Ledger};
 use tumble_interface::error::Breakdown;
 use tumble_interface::scene::Integrator;
@@ -78,13 +79,13 @@ impl Scale {
 
 /// What points add up to, in one pass.
 #[derive(Default)]
-struct Sums {
-    mass: f64,
+pub(super) struct Sums {
+    pub mass: f64,
     first_moment: Vec3<f64>,
-    momentum: Vec3<f64>,
-    angular: Vec3<f64>,
-    kinetic: f64,
-    speed_sq: f64,
+    pub momentum: Vec3<f64>,
+    pub angular: Vec3<f64>,
+    pub kinetic: f64,
+    pub speed_sq: f64,
 }
 
 /// Points summed side by side.
@@ -253,28 +254,43 @@ impl Dynamics {
         forces.chain(constraints.iter().map(|c| c.energy(x, walls))).sum()
     }
 
+    /// What these points and frames add up to.
+    pub(super) fn sums(&self, points: Range<usize>, frames: Range<usize>) -> Sums {
+        let (x, v, masses) = (&self.state.x[points.clone()], &self.state.v[points.clone()], &self.laws.masses.mass[points.clone()]);
+        let mut total = Sums::default();
+        for part in fold(points.len(), |range| dispatch(Summation { mass: &masses[range.clone()], x: &x[range.clone()], v: &v[range] })) {
+            total.add(&part);
+        }
+        for i in frames {
+            let (inertia, turning) = (f64::from(self.laws.masses.mass[i]), xyz64(self.state.v[i]));
+            total.angular = total.angular + Quat::from_row(self.state.x[i].map(f64::from)).turn(turning * inertia);
+            total.kinetic += 0.5 * inertia * turning.norm_sq();
+        }
+        total
+    }
+
+    /// How deep a point is in each collider that it touches at time t [s]. What is held is where it was put, as the roots of hair are, and no
+    /// solid moves it.
+    pub(super) fn depths(&self, i: usize, t: f64) -> impl Iterator<Item = f64> {
+        let (x, masses) = (&self.state.x, &self.laws.masses);
+        let colliders = if masses.mass[i] > 0.0 && x[i][3] > 0.0 { &self.laws.colliders[..] } else { &[] };
+        let p = xyz64(x[i]);
+        colliders.iter().filter_map(move |c| c.touch(p, t)).map(|t| t.depth)
+    }
+
+    /// Volume inside the triangles of an object [m³].
+    pub(super) fn volume_in(&self, object: &Object) -> f64 {
+        enclosed(&object.triangles, |i| xyz64(self.state.x[object.points.start + i as usize]))
+    }
+
     pub(super) fn books(&self, t: f64) -> Ledger {
         let (x, v, masses) = (&self.state.x, &self.state.v, &self.laws.masses);
         let n = masses.points;
-        let mut total = Sums::default();
-        for part in fold(n, |range| dispatch(Summation { mass: &masses.mass[range.clone()], x: &x[range.clone()], v: &v[range] })) {
-            total.add(&part);
-        }
-        for i in n..x.len() {
-            let (inertia, turning) = (f64::from(masses.mass[i]), xyz64(v[i]));
-            total.angular = total.angular + Quat::from_row(x[i].map(f64::from)).turn(turning * inertia);
-            total.kinetic += 0.5 * inertia * turning.norm_sq();
-        }
+        let total = self.sums(0..n, n..x.len());
         let strains = self.laws.batches.iter().map(|b| b.largest_strain(x)).chain(self.constraints.iter().map(|c| c.largest_strain(x)));
         let stretch = strains.fold(0.0, |most, strain| f64::max(most, strain + 1.0));
-        // What is held is where it was put, as the roots of hair are, and no solid moves it.
-        let depths = |i: usize| {
-            let p = xyz64(x[i]);
-            let colliders = if masses.mass[i] > 0.0 && x[i][3] > 0.0 { &self.laws.colliders[..] } else { &[] };
-            colliders.iter().filter_map(move |c| c.touch(p, t)).map(|t| t.depth)
-        };
+        let depths = |i: usize| self.depths(i, t);
         let touching = !self.laws.colliders.is_empty();
-        let inside = |o: &Object| enclosed(&o.triangles, |i| xyz64(x[o.points.start + i as usize]));
         Ledger {
             time: t,
             mass: total.mass,
@@ -285,11 +301,11 @@ impl Dynamics {
             external: self.between(false, t) + self.laws.external_energy(t, x, v) - Vec3::from(self.laws.gravity).dot(total.first_moment),
             stretch,
             penetration: if touching { max(n, |range| range.flat_map(depths).fold(0.0, f64::max)).max(0.0) } else { 0.0 },
-            intersections: self.layers.as_ref().map_or(0, |layers| layers.intersections(x)),
+            intersections: self.layers.as_ref().or(self.judge.as_ref()).map_or(0, |layers| layers.intersections(x)),
             speed: total.speed_sq.sqrt(),
             contacts: if touching { sum(n, |range| range.filter(|i| depths(*i).next().is_some()).count() as f64) as u64 } else { 0 },
             broken: self.broken,
-            volume: self.objects.iter().filter(|o| o.closed).map(inside).sum(),
+            volume: self.objects.iter().filter(|o| o.closed).map(|o| self.volume_in(o)).sum(),
             ..Ledger::default()
         }
     }

@@ -4,13 +4,14 @@ use super::batches::{Batches, between};
 use super::coat::Coat;
 use super::held::Held;
 use super::laws::Acting;
+use super::layers::Layers;
 use super::tear::{Edges, Kind, Tear, TearPart};
 use super::{Dynamics, Stepping, books};
 use crate::elements::{
     Area, Distance, Hinge, IsometricBend, Linear, Members, Membrane, Moment, Nonlinear, Projected, TetStrain, Tethers, Vector, Woven,
 };
 use crate::forces::{Air, Force, Sails};
-use crate::geometry::Collider;
+use crate::geometry::{Carrier, Collider};
 use crate::integrators::Memory;
 use crate::math::{Quat, Real, Vec3};
 use crate::pool::{Emitter, Pool};
@@ -40,6 +41,8 @@ pub struct Settings {
     pub sweeps: PositionBased,
     /// Contact of surfaces with each other.
     pub self_contact: Option<SelfContact>,
+    /// Whether what passes through each other is counted without it, too.
+    pub counted: bool,
     /// Springs longer than this many times their rest length are shortened.
     pub clamp: Option<f64>,
     /// Gravity [m/s²].
@@ -298,9 +301,9 @@ impl Parts {
         self.points[point as usize].3 = true;
     }
 
-    /// Lets a point that is held follow a collider, counted from the first, or one of its bones.
-    pub fn follow(&mut self, point: u32, collider: usize, bone: Option<usize>) {
-        self.held.push(Held { row: point as usize, collider, bone, place: self.position(point), frame: None });
+    /// Lets a point that is held follow a collider, counted from the first.
+    pub fn follow(&mut self, point: u32, collider: usize, carrier: Carrier) {
+        self.held.push(Held { row: point as usize, collider, carrier, place: self.position(point), frame: None });
     }
 
     /// Holds a frame.
@@ -409,9 +412,9 @@ impl Parts {
         self.energy_at_rest[1] += 0.5 * lame_mu * lame_mu / lambda * volume;
     }
 
-    /// A collider, or one of its bones, carries a point, which is at `x` [m] in it, and a frame, whose turn in it is `q`. Both must be held.
-    pub fn carry(&mut self, (collider, bone): (usize, Option<usize>), point: u32, x: Vec3<f64>, frame: u32, q: Quat<f64>) {
-        self.carried.push(Held { row: point as usize, collider, bone, place: x, frame: Some((frame as usize, q)) });
+    /// A collider carries a point, which is at `x` [m] in it, and a frame, whose turn in it is `q`. Both must be held.
+    pub fn carry(&mut self, (collider, carrier): (usize, Carrier), point: u32, x: Vec3<f64>, frame: u32, q: Quat<f64>) {
+        self.carried.push(Held { row: point as usize, collider, carrier, place: x, frame: Some((frame as usize, q)) });
     }
 
     /// Makes the object under construction act on itself as a continuum.
@@ -498,7 +501,8 @@ impl Parts {
             let message = "rods with a break_strain break in position-based systems only; set integrator = \"position_based\"";
             return Err(SceneError::one(format!("system \"{}\".integrator", settings.name), message));
         }
-        self.carried.retain(|held| settings.colliders.get(held.collider).is_some_and(|c| held.bone.is_some() || c.motion.is_some()));
+        self.carried
+            .retain(|held| settings.colliders.get(held.collider).is_some_and(|c| held.carrier != Carrier::Whole || c.motion.is_some()));
         self.carried.iter_mut().filter_map(|held| held.frame.as_mut()).for_each(|(frame, _)| *frame += points);
         for nodes in self.stretches.iter_mut().map(|m| &mut m.nodes) {
             nodes[2] += points as u32;
@@ -598,7 +602,10 @@ impl Parts {
             }
         }
         let sewn = self.vector.members.iter().map(|m| m.nodes);
-        let layers = settings.self_contact.as_ref().and_then(|words| super::layers::Layers::new(words, &objects, sewn, &state));
+        let meeting = |words: &SelfContact| Layers::new(words, &objects, sewn.clone(), &state);
+        let layers = settings.self_contact.as_ref().and_then(meeting);
+        let counted = settings.counted && settings.self_contact.is_none();
+        let judge = counted.then_some(SelfContact { thickness: 0.0, friction: 0.0, friction_static: None }).as_ref().and_then(meeting);
         let coats = self.coats.into_iter().map(|(i, words)| Coat::new(objects[places[i]].points.clone(), words, &state.x)).collect();
         let placed = |on: Vec<usize>| -> Vec<usize> { on.into_iter().map(|i| places[i]).collect() };
         let rows_of = |on: &[usize]| -> Vec<Range<usize>> { on.iter().map(|i| objects[*i].points.clone()).collect() };
@@ -692,6 +699,7 @@ impl Parts {
             rates: Vec::new(),
             reach,
             layers,
+            judge,
             tears,
             held: Held::at_rest(self.held, &settings.colliders).into_iter().chain(self.carried).collect(),
             user: None,

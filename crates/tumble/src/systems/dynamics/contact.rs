@@ -3,7 +3,7 @@
 //! midpoint, and BDF2 has a history that an impact makes wrong.
 
 use crate::elements::{Block, Linear, PointPlane, forces};
-use crate::geometry::{Collider, Impact, Touch, Vector};
+use crate::geometry::{Collider, Friction, Impact, Touch, Vector};
 use crate::math::{Real, Row, row, xyz64};
 use crate::pool::Hit;
 
@@ -57,7 +57,7 @@ pub fn resolve(colliders: &[Collider], step: &Step, before: (Row, Row), x: &mut 
             touched = true;
             let way = position - xyz64(before.0) - surface * step.h;
             let along = way - normal * way.dot(normal);
-            let back = (collider.friction * depth).min(along.norm());
+            let back = collider.friction.takes(along.norm(), depth);
             let position = position + normal * depth - along.normalized() * back;
             let approach = (velocity - surface).dot(normal);
             let velocity = rebound(collider, velocity - surface, ahead, normal, step.resting) + surface;
@@ -77,12 +77,12 @@ fn rebound(collider: &Collider, velocity: Vector, ahead: Vector, normal: Vector,
     let slide = velocity - normal * approach;
     let bounce = if e > 0.0 && approach < -resting { -e * (approach + ahead) - ahead } else { 0.0 };
     let after = approach.max(bounce);
-    slide - limited(slide, collider.friction * (after - approach)) + normal * after
+    slide - rubbed(slide, collider.friction, after - approach) + normal * after
 }
 
-/// A vector, but no longer than `most`.
-fn limited(v: Vector, most: f64) -> Vector {
-    v.normalized() * most.min(v.norm())
+/// What friction takes of a slide.
+fn rubbed(slide: Vector, friction: Friction, press: f64) -> Vector {
+    slide.normalized() * friction.takes(slide.norm(), press)
 }
 
 /// Follows a mass through its step from impact to impact, under the acceleration `pull` that the step has found; says whether
@@ -131,7 +131,7 @@ fn meet(
             // It stays on the surface, which takes what presses, and rubs.
             let free = start + (pull - n * press) * rest;
             let slide = free - n * free.dot(n);
-            let after = free - limited(slide, -collider.friction * press * rest);
+            let after = free - rubbed(slide, collider.friction, -press * rest);
             to = from + ((start + after) * 0.5 + surface) * rest;
             (start, end) = (start + surface, after + surface);
         } else {
@@ -214,6 +214,18 @@ pub fn stiffness(mass: Real, grip: Real, gh: f64) -> f64 {
     PENALTY * f64::from(mass) / (gh * gh) + GRIP * f64::from(grip)
 }
 
+/// mu times the depth of a mass at time t.
+fn held(collider: &Collider, t: f64, (x, v): (Row, Row), resting: f64) -> f64 {
+    let Friction { sliding, resting: still } = collider.friction;
+    if still == 0.0 {
+        return 0.0;
+    }
+    let Some(touch) = collider.touch(xyz64(x), t) else { return 0.0 };
+    let velocity = xyz64(v) - touch.velocity;
+    let slide = velocity - touch.normal * velocity.dot(touch.normal);
+    touch.depth * if still > sliding && slide.norm() <= resting { still } else { sliding }
+}
+
 /// Penalty and friction of one mass in an implicit stage.
 pub struct Penalty {
     touch: Touch,
@@ -227,10 +239,17 @@ pub struct Penalty {
 impl Penalty {
     /// The contacts of a mass at x with velocity v, with this penalty stiffness [N/m]. Friction takes its normal force from
     /// `start`, where the mass was when the stage began: with that force held fixed friction has a convex potential, and
-    /// Newton's method converges.
+    /// Newton's method converges. So does it with the coefficient of what rests or slides then, faster than `resting`.
     ///
     /// `times` are those of the start and of the end of the stage.
-    pub fn of(colliders: &[Collider], times: (f64, f64), stiffness: f64, x: Row, v: Row, start: Row) -> impl Iterator<Item = Penalty> {
+    pub fn of(
+        colliders: &[Collider],
+        times: (f64, f64),
+        stiffness: f64,
+        (x, v): (Row, Row),
+        start: (Row, Row),
+        resting: f64,
+    ) -> impl Iterator<Item = Penalty> {
         colliders.iter().filter_map(move |collider| {
             let position = xyz64(x);
             let touch = collider.touch(position, times.1)?;
@@ -239,9 +258,7 @@ impl Penalty {
             Some(Penalty {
                 rest: [n.x, n.y, n.z, n.dot(position) + touch.depth],
                 stiffness,
-                friction: collider.friction
-                    * stiffness
-                    * if collider.friction > 0.0 { collider.touch(xyz64(start), times.0).map_or(0.0, |t| t.depth) } else { 0.0 },
+                friction: stiffness * held(collider, times.0, start, resting),
                 slide: velocity - n * velocity.dot(n),
                 touch,
             })

@@ -1,8 +1,8 @@
-//! Points and frames that are held and follow a collider, or one of its bones: functions of time alone, and so in no snapshot.
+//! Points and frames that are held and follow a collider, one of its bones, or its surface: functions of time alone, and so in no snapshot.
 
 use super::Dynamics;
 use crate::geometry::motion::Pose;
-use crate::geometry::{Collider, Vector};
+use crate::geometry::{Carrier, Collider, Vector};
 use crate::math::{Quat, Real, row, xyz64};
 
 /// A point that follows.
@@ -12,8 +12,8 @@ pub struct Held {
     pub row: usize,
     /// The collider, counted from the first.
     pub collider: usize,
-    /// One of its bones, or the whole.
-    pub bone: Option<usize>,
+    /// What of it.
+    pub carrier: Carrier,
     /// Where it is in what it follows [m].
     pub place: Vector,
     /// A held frame that follows with it, and its turn in what it follows.
@@ -23,18 +23,18 @@ pub struct Held {
 impl Held {
     /// Points whose places are those at t = 0 in the world.
     pub fn at_rest(mut points: Vec<Held>, colliders: &[Collider]) -> Vec<Held> {
-        points.iter_mut().for_each(|p| p.place = colliders[p.collider].pose(p.bone, 0.0).back(p.place));
+        points.iter_mut().for_each(|p| p.place = colliders[p.collider].pose(p.carrier, 0.0).back(p.place));
         points
     }
 }
 
 impl Dynamics {
-    /// Held points, and where what they follow is at t; those of one bone stand side by side.
+    /// Held points, and where what they follow is at t; those of one carrier stand side by side.
     fn poses(&self, t: f64) -> Vec<(Held, Pose)> {
         let mut last: Option<(Held, Pose)> = None;
         let one = |held: &Held| {
-            let same = last.filter(|(other, _)| (other.collider, other.bone) == (held.collider, held.bone));
-            let pose = same.map_or_else(|| self.laws.colliders[held.collider].pose(held.bone, t), |(_, pose)| pose);
+            let same = last.filter(|(other, _)| (other.collider, other.carrier) == (held.collider, held.carrier));
+            let pose = same.map_or_else(|| self.laws.colliders[held.collider].pose(held.carrier, t), |(_, pose)| pose);
             last = Some((*held, pose));
             (*held, pose)
         };
@@ -56,7 +56,10 @@ impl Dynamics {
             let x = pose.out(held.place);
             self.state.x[held.row] = row(real(x), 0.0);
             if let Some((frame, q)) = held.frame {
-                self.state.x[frame] = (pose.turn * q).row().map(|q| q as Real);
+                // Of the two that are the same turn, the one that is nearer to the last.
+                let turned = pose.turn * q;
+                let same = turned.dot(Quat::from_row(self.state.x[frame].map(f64::from))) >= 0.0;
+                self.state.x[frame] = if same { turned } else { -turned }.row().map(|q| q as Real);
             }
         }
     }

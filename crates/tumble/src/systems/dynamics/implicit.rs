@@ -4,6 +4,7 @@ use super::contact::{self, Penalty};
 use super::laws::{Acting, Laws};
 use crate::elements::{Batch, Weights};
 use crate::forces::Group;
+use crate::geometry::Vector;
 use crate::integrators::newton::{self, Linear, Stiff};
 use crate::linalg::blocks::{Block, Blocks};
 use crate::linalg::cholesky::{Assembly, Cholesky};
@@ -162,7 +163,10 @@ impl Laws {
     /// The contacts of mass i, at x with velocity v, in an implicit stage of length gh that ends at t.
     fn penalties(&self, i: usize, t: f64, gh: f64, x: Row, v: Row) -> impl Iterator<Item = Penalty> {
         let stiffness = contact::stiffness(self.masses.mass[i], self.grip.get(i).copied().unwrap_or(0.0), gh);
-        Penalty::of(&self.colliders, (t - gh, t), stiffness, x, v, self.start[i])
+        let [start_x, start_v] = &self.start;
+        // As much as gravity gives in two stages is no slide: the first stage of what lies has no normal force yet.
+        let resting = 2.0 * gh * Vector::from(self.gravity).norm();
+        Penalty::of(&self.colliders, (t - gh, t), stiffness, (x, v), (start_x[i], start_v[i]), resting)
     }
 }
 

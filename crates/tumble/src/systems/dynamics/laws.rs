@@ -48,8 +48,8 @@ pub struct Laws {
     pub penalty: bool,
     /// Stiffness with which the elements hold each row at the start [N/m]; emitted particles have none.
     pub grip: Vec<Real>,
-    /// Positions at the start of the implicit stage.
-    pub start: Vec<Row>,
+    /// Positions and velocities at the start of the implicit stage.
+    pub start: [Vec<Row>; 2],
     /// Settings of implicit stages.
     pub solver: Solver,
     /// Storage of implicit stages.
@@ -187,8 +187,10 @@ impl Equation for Laws {
 
     fn solve(&mut self, stage: &Stage<'_>, x: &mut [Row], v: &mut [Row], report: &mut StepReport) -> Result<(), StepError> {
         if !self.colliders.is_empty() {
-            self.start.clear();
-            self.start.extend_from_slice(x);
+            for (start, now) in self.start.iter_mut().zip([&*x, &*v]) {
+                start.clear();
+                start.extend_from_slice(now);
+            }
         }
         let masses = &self.masses;
         self.implicit.weights.clear();

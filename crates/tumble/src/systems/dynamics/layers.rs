@@ -6,8 +6,8 @@
 
 use super::Dynamics;
 use super::tear::Tear;
-use crate::geometry::Vector;
 use crate::geometry::mesh_contact::{Detector, Owner, Pair, Topology, intersections, tangled, untangle_directions};
+use crate::geometry::{Friction, Vector};
 use crate::math::{Real, Row, Vec3, axpy, row, sub, xyz, xyz64};
 use crate::state::{Object, State};
 use tumble_interface::scene::SelfContact;
@@ -28,7 +28,7 @@ const PARTINGS: usize = 16;
 pub struct Layers {
     topology: Topology,
     detector: Detector,
-    friction: f64,
+    friction: Friction,
     thickness: f64,
     sewn: Vec<[u32; 2]>,
     /// Places at the start, for surfaces that tear.
@@ -44,7 +44,7 @@ impl Layers {
         let mut layers = Self {
             topology: Topology::default(),
             detector: Detector::new(),
-            friction: words.friction,
+            friction: Friction { sliding: words.friction, resting: words.friction_static.unwrap_or(words.friction) },
             thickness: words.thickness,
             sewn: sewn.collect(),
             rest: state.x[..points].to_vec(),
@@ -89,14 +89,19 @@ impl Layers {
         intersections(&self.topology, x).len() as u64
     }
 
-    /// How many edges pass through triangles, which objects are the first two, and where [m]; `None` if there are none.
-    fn tangles(&self, objects: &[Object], x: &[Row]) -> Option<(usize, [usize; 2], Vector)> {
+    /// How many edges pass through triangles, and the first two that do.
+    pub fn crossing(&self, x: &[Row]) -> Option<(usize, [u32; 2], [u32; 3])> {
         let all = intersections(&self.topology, x);
         let (edge, triangle) = *all.first()?;
-        let (edge, triangle) = (self.topology.edges()[edge as usize], self.topology.triangles()[triangle as usize]);
+        Some((all.len(), self.topology.edges()[edge as usize], self.topology.triangles()[triangle as usize]))
+    }
+
+    /// How many edges pass through triangles, which objects are the first two, and where [m]; `None` if there are none.
+    fn tangles(&self, objects: &[Object], x: &[Row]) -> Option<(usize, [usize; 2], Vector)> {
+        let (count, edge, triangle) = self.crossing(x)?;
         let owner = |vertex: u32| objects.iter().position(|o| o.points.contains(&(vertex as usize)));
         let place = triangle.iter().fold(Vector::default(), |sum, i| sum + xyz64(x[*i as usize])) * (1.0 / 3.0);
-        Some((all.len(), [owner(edge[0])?, owner(triangle[0])?], place))
+        Some((count, [owner(edge[0])?, owner(triangle[0])?], place))
     }
 
     /// Parts what is nearer than its thickness, all at rest: a push within a step would be a speed.
@@ -105,7 +110,7 @@ impl Layers {
         for _ in 0..PARTINGS {
             self.detector.detect(&self.topology, x, REACH.0 * thickness);
             let start = x.to_vec();
-            self.detector.pairs().iter().for_each(|pair| push(pair, 0.0, x, &start));
+            self.detector.pairs().iter().for_each(|pair| push(pair, Friction::default(), x, &start));
             self.detector.hold(&self.topology, x);
             if *x == start[..] {
                 break;
@@ -210,7 +215,7 @@ impl Dynamics {
         let Some(layers) = &mut self.layers else { return };
         let (x, before) = (&mut self.state.x, &self.before);
         for pair in layers.detector.pairs() {
-            push(pair, layers.friction as Real, x, before);
+            push(pair, layers.friction, x, before);
         }
     }
 
@@ -249,7 +254,7 @@ impl Dynamics {
 }
 
 /// Projects one pair.
-fn push(pair: &Pair, friction: Real, x: &mut [Row], before: &[Row]) {
+fn push(pair: &Pair, friction: Friction, x: &mut [Row], before: &[Row]) {
     let at = pair.vertices.map(|v| v as usize);
     let n = Vec3::from(pair.normal);
     let (mut d, mut weight) = (n * 0.0, 0.0);
@@ -266,8 +271,9 @@ fn push(pair: &Pair, friction: Real, x: &mut [Row], before: &[Row]) {
         slid = slid - xyz(before[at[k]]) * pair.weights[k];
     }
     let slid = slid - n * n.dot(slid);
-    let (way, most) = (slid.norm(), friction * depth);
-    let back = if way > most { slid * (most / way) } else { slid };
+    // All or a part of the way; the bits of one coefficient are those of its product with the depth.
+    let (way, most) = (slid.norm(), friction.sliding as Real * depth);
+    let back = if way > friction.resting as Real * depth && way > most { slid * (most / way) } else { slid };
     let push = (n * depth - back) * (1.0 / weight);
     for k in 0..4 {
         let i = at[k];

@@ -1,6 +1,7 @@
 //! Masses under forces: x'' = f(x, v, t)/m, stepped by any integrator. Points and frames, elements between them, forces
 //! on each, contact with solids.
 
+mod account;
 mod batches;
 mod books;
 mod build;
@@ -30,7 +31,7 @@ use crate::system::{Archive, Part, System};
 use held::Held;
 use laws::{Laws, Local, flat};
 use layers::Layers;
-use tumble_interface::engine::{Ledger, Stability, StepReport, UserForce, UserIntegrator};
+use tumble_interface::engine::{Ledger, Share, Stability, StepReport, UserForce, UserIntegrator, Worst};
 use tumble_interface::scene::{Adaptive, Integrator, PositionBased};
 use tumble_interface::{Column, StepError};
 
@@ -76,6 +77,8 @@ pub struct Dynamics {
     sweeps: PositionBased,
     reach: Vec<Tethers>,
     layers: Option<Layers>,
+    /// What counts as passing through each other where nothing keeps it from doing so, if that is asked for.
+    judge: Option<Layers>,
     /// Surfaces that tear.
     tears: Vec<tear::Tear>,
     /// Points that follow colliders.
@@ -545,6 +548,14 @@ impl System for Dynamics {
 
     fn ledger(&self, t: f64) -> Ledger {
         self.books(t)
+    }
+
+    fn shares(&self, t: f64) -> Vec<Share> {
+        self.shares_at(t)
+    }
+
+    fn worst(&self, t: f64) -> Vec<Worst> {
+        self.worst_at(t)
     }
 
     fn breakdown(&mut self, t: f64) -> Option<StepError> {

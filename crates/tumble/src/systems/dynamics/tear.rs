@@ -494,7 +494,7 @@ impl Dynamics {
                 }
             }
         }
-        if let Some(layers) = &mut self.layers {
+        for layers in self.layers.iter_mut().chain(&mut self.judge) {
             layers.renew(&self.objects, &self.tears);
         }
     }

@@ -9,7 +9,7 @@ use crate::math::Real;
 use crate::operators::{average, curl, divergence};
 use crate::state::{Field, GridError, Place, Vectors};
 use crate::system::{Archive, Part};
-use tumble_interface::engine::Ledger;
+use tumble_interface::engine::{Ledger, Worst};
 use tumble_interface::error::Breakdown;
 use tumble_interface::{Column, Data, StepError};
 
@@ -157,6 +157,30 @@ impl Fluid {
         books.speed = books.speed.max(self.speed());
         // Only fields of another grid could fail here.
         books.divergence = books.divergence.max(self.divergence().map_or(0.0, |field| rows::magnitude(&field)));
+    }
+
+    /// The cells of the largest divergence and of the fastest flow.
+    pub fn worst(&self) -> Vec<Worst> {
+        let blame = |measure, field: &Field, of: &dyn Fn([usize; 3]) -> f64| {
+            let cell = field.each().max_by(|a, b| of(*a).total_cmp(&of(*b)))?;
+            Some(Worst {
+                measure,
+                value: of(cell),
+                object: self.name.clone(),
+                other: None,
+                particles: Vec::new(),
+                id: None,
+                cell: Some(cell),
+            })
+        };
+        let mut all = Vec::new();
+        // Only fields of another grid could fail here.
+        if let (Ok(divergence), Ok(velocity)) = (self.divergence(), self.at_cells(&self.u)) {
+            all.extend(blame("divergence", &divergence, &|at| f64::from(divergence.value(at).abs())));
+            let speed = |at: [usize; 3]| velocity.iter().map(|part| f64::from(part.value(at)).powi(2)).sum::<f64>().sqrt();
+            all.extend(blame("speed", &divergence, &speed));
+        }
+        all
     }
 
     /// The first number that is not finite.

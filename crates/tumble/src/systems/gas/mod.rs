@@ -33,7 +33,7 @@ pub use solids::Solids;
 use crate::exchange::Exchange;
 use crate::integrators::equal_steps;
 use crate::system::{Archive, System};
-use tumble_interface::engine::{Ledger, Stability, StepReport};
+use tumble_interface::engine::{Ledger, Share, Stability, StepReport, Worst};
 use tumble_interface::{Column, Data, StepError};
 
 /// Sub-steps of an exchange interval at most.
@@ -151,6 +151,19 @@ impl System for Gas {
         let mut total = Ledger { time: t, ..Ledger::default() };
         self.fluids.iter().for_each(|fluid| fluid.count(&mut total));
         total
+    }
+
+    fn shares(&self, t: f64) -> Vec<Share> {
+        let share = |fluid: &Fluid| {
+            let mut ledger = Ledger { time: t, ..Ledger::default() };
+            fluid.count(&mut ledger);
+            Share { system: self.name.clone(), object: fluid.name.clone(), ledger }
+        };
+        self.fluids.iter().map(share).collect()
+    }
+
+    fn worst(&self, _t: f64) -> Vec<Worst> {
+        self.fluids.iter().flat_map(Fluid::worst).collect()
     }
 
     fn breakdown(&mut self, t: f64) -> Option<StepError> {

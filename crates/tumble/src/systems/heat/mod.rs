@@ -18,7 +18,7 @@ use crate::integrators::stability::{Mode, limits};
 use crate::math::Real;
 use crate::state::{Field, Place};
 use crate::system::{Archive, Part, System};
-use tumble_interface::engine::{Ledger, Limit, Stability, StepReport};
+use tumble_interface::engine::{Ledger, Limit, Share, Stability, StepReport};
 use tumble_interface::error::Breakdown;
 use tumble_interface::scene::{HeatScheme, Integrator};
 use tumble_interface::{Column, Data, StepError};
@@ -177,6 +177,15 @@ impl System for Heat {
         let heat = self.bodies.iter().map(Body::stored).sum();
         let heat_in = self.bodies.iter().flat_map(|body| &body.come).sum();
         Ledger { time: t, heat, heat_in, ..Ledger::default() }
+    }
+
+    fn shares(&self, t: f64) -> Vec<Share> {
+        let share = |body: &Body| Share {
+            system: self.settings.name.clone(),
+            object: body.plan.name.clone(),
+            ledger: Ledger { time: t, heat: body.stored(), heat_in: body.come.iter().sum(), ..Ledger::default() },
+        };
+        self.bodies.iter().map(share).collect()
     }
 
     fn breakdown(&mut self, t: f64) -> Option<StepError> {
