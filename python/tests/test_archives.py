@@ -284,7 +284,10 @@ def load_changed(tree: Tree, cases: int, folder: Path) -> tuple[Counter[str], fl
         except Exception as error:
             failures.append(f"seed {seed}: {type(error).__name__}: {error}")
         # What breaks goes back to what was loaded, whatever that was.
-        found = [array for table in world.frame.values() for array in table.values() if array.dtype.kind == "f"]
+        # An age of nan is what it was loaded as: no force knows it, and no step changes it.
+        found = [
+            a for table in world.frame.values() for key, a in table.items() if a.dtype.kind == "f" and key != "age"
+        ]
         if end == "read" and not all(np.isfinite(array).all() for array in found):
             failures.append(f"seed {seed}: a frame that is not finite")
         # Nothing of what came before is left behind.
