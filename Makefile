@@ -14,7 +14,7 @@ VERSION := $(shell sed -n 's/^version = "\(.*\)"/\1/p' Cargo.toml | head -n 1)
 WEB := $(shell find web -path web/node_modules -prune -o -path web/dist -prune -o -path $(PKG) -prune -o -type f -print) \
 	$(shell find python/tumble/scenes docs/theory -type f)
 
-.PHONY: help setup demo test lint test-rust test-python test-web web wasm wasm-target wheel chromium openvdb validate audit bench clean
+.PHONY: help setup demo test lint test-rust test-python test-web web wasm wasm-target wheel chromium openvdb validate validate-rust validate-python validate-matrix validate-native audit bench clean
 
 help:
 	@echo "make demo      set up, let a dress dance, show where the film is"
@@ -22,7 +22,7 @@ help:
 	@echo "make setup     leave $(BIN)/tumble"
 	@echo "make web       build the browser laboratory into web/dist, and for \`tumble view\`"
 	@echo "make wheel     the package with all of it, in dist/"
-	@echo "make validate  the long figures"
+	@echo "make validate  all that is promised, in full, and counted"
 	@echo "make audit     known faults and licences of what tumble depends on"
 	@echo "make bench     speed against peers, which it installs into .venv-bench"
 
@@ -118,12 +118,30 @@ test-web: setup chromium
 	@if command -v npm >/dev/null; then $(MAKE) --no-print-directory web && cd web && npm test --silent; \
 		else echo "no Node here: the browser laboratory is not tested; it needs Node 20.19 or later, with npm"; fi
 
-# With the tests that are marked long, every scene in the determinism matrix, and a million random cases.
+# With the tests that are marked long, every scene in the determinism matrix, and a million random cases. Where one part fails the others
+# go on; at the end stands what was counted.
+COUNTS := $(CURDIR)/target/counts.jsonl
 validate: export TUMBLE_FUZZ = 30
+validate: export TUMBLE_COUNTS = $(COUNTS)
 validate: setup openvdb wasm
-	cargo test --workspace --exclude tumble-python --release --quiet -- --include-ignored --nocapture
+	@mkdir -p $(dir $(COUNTS)) && rm -f $(COUNTS)
+	@failed=; \
+	for part in validate-rust validate-python test-web validate-matrix validate-native; do \
+		echo "== $$part"; $(MAKE) --no-print-directory $$part || failed="$$failed $$part"; done; \
+	echo "== what was counted"; $(BIN)/python python/tests/counts.py $(COUNTS) || failed="$$failed counts"; \
+	if test -n "$$failed"; then echo "FAILED:$$failed"; exit 1; fi
+
+validate-rust:
+	cargo test --workspace --exclude tumble-python --release --quiet --no-fail-fast -- --include-ignored --nocapture
+
+validate-python:
 	$(BIN)/python -m pytest -s -m ""
+
+validate-matrix:
 	$(BIN)/python python/tests/matrix.py --all
+
+validate-native:
+	$(BIN)/python python/tests/matrix.py --bits native
 
 # Known faults and licences of what tumble depends on; asks three databases in the network, and says which do not answer.
 audit: setup

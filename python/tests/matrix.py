@@ -3,6 +3,7 @@
     python python/tests/matrix.py            the ten of `make test`
     python python/tests/matrix.py --all      every scene, as `make validate` does
     python python/tests/matrix.py gas/fire --frames 75
+    python python/tests/matrix.py --bits native      forces between all masses, in the fastest arithmetic of the machine
 
 Prints a line per scene and ends with 1 where one state differs in one bit. States are compared by hash at every frame.
 """
@@ -14,8 +15,10 @@ import subprocess
 import sys
 import tempfile
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
+
+from counts import note
 
 from tumble import Scene, StepError, World
 from tumble.cli import find
@@ -34,6 +37,7 @@ class Case:
     frames: int
     every: int = 10
     overrides: tuple[str, ...] = ()
+    bits: str = "portable"
 
 
 TEN = {
@@ -49,6 +53,13 @@ TEN = {
     "hair": Case("cloth/hair-on-bunny", 3, 2, ("hair.0.count=300",)),
 }
 """One for each kind of thing, cheap ones: `make test`."""
+
+NATIVE = [
+    Case("gravity/galaxy", 3, 1, ("galaxy.0.stars=4000",), "native"),
+    Case("gravity/encounter", 3, 1, ("galaxy.0.stars=2000", "galaxy.1.stars=2000"), "native"),
+    Case("gravity/figure-of-eight", 61, bits="native"),
+]
+"""What has bits of its own where `bits = "native"`: `make validate`."""
 
 SLOW = {
     "cloth/drapes",
@@ -73,12 +84,12 @@ def every_scene() -> list[Case]:
 
 
 def scene_of(case: Case) -> Scene:
-    """The scene as it ships, on the tier that promises the same bits everywhere."""
+    """The scene as it ships, on the tier of the case: portable bits are promised everywhere."""
     return Scene.load(find.scene_file(case.name), _overrides(case))
 
 
 def _overrides(case: Case) -> list[str]:
-    return ['bits="portable"', *case.overrides]
+    return [f'bits="{case.bits}"', *case.overrides]
 
 
 def states(world: World, frames: int, visit: Callable[[World], None] = lambda _: None) -> list[str]:
@@ -204,21 +215,33 @@ def main() -> int:
     parser.add_argument("names", nargs="*", help="scenes, as row/name")
     parser.add_argument("--all", action="store_true", help="every scene that ships")
     parser.add_argument("--frames", type=int, help="instead of 21 of slow scenes and 61 of others")
+    parser.add_argument(
+        "--bits", choices=["portable", "native"], default="portable", help="native: without WebAssembly"
+    )
     asked = parser.parse_args()
     cases = (
         every_scene()
         if asked.all
-        else [Case(name, 21 if name in SLOW else 61) for name in asked.names] or list(TEN.values())
+        else [Case(name, 21 if name in SLOW else 61) for name in asked.names]
+        or (list(TEN.values()) if asked.bits == "portable" else NATIVE)
     )
-    if asked.frames is not None:
-        cases = [Case(case.name, asked.frames, case.every, case.overrides) for case in cases]
-    lacking = why_no_wasm()
+    cases = [replace(case, bits=asked.bits, frames=asked.frames or case.frames) for case in cases]
+    lacking = why_no_wasm() if asked.bits == "portable" else "bits are native"
     rows = []
     for row in table(cases, lacking is None):
         rows.append(row)
         print(row, flush=True)
     bad = [row.case.name for row in rows if not row.good]
     print(f"{len(rows)} scenes, {sum(len(row.reference) for row in rows)} states: {'; '.join(bad) or 'the same bits'}")
+    count = sum(len(row.reference) for row in rows)
+    ways = ", ".join(dict.fromkeys(way for row in rows for way in row.ways))
+    note(
+        "states",
+        f"matrix, {asked.bits}, {len(rows)} scenes",
+        cases=count,
+        differ="; ".join(bad) or "none",
+        ways=ways or "none",
+    )
     if lacking is not None:
         print(f"not compared with WebAssembly: {lacking}")
     return 1 if bad else 0

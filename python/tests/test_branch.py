@@ -11,6 +11,8 @@ import numpy as np
 import pytest
 from conftest import Answer
 from runs import Killed, N, Tree, assert_same, kill_at
+from test_kills import SCENES
+from test_soak import MIXED
 
 from tumble import Run, Scene, SceneError, World
 from tumble.branch import branch, family, lineage, world_at
@@ -21,6 +23,15 @@ Command = Callable[..., Answer]
 SceneFile = Callable[..., Path]
 
 SOFTER = "particles.p.spring.0.stiffness=50"
+SYSTEMS: dict[str, Tree] = {
+    **SCENES,
+    "everything": MIXED,
+    "implicit": SCENES["sheets"]
+    | {"system": [{"integrator": "implicit_euler", "solver": {"newton_tolerance": 1e-3, "linear_tolerance": 1e-2}}]},
+    "two steps back": SCENES["sheets"] | {"system": [{"integrator": "bdf2"}]},
+}
+"""Emitters with adaptive steps, cloth on positions and on forces, a gas, and systems side by side."""
+
 HANGING = "particles.p.spring.0.rest_length=0.5"
 """What the engine would else derive from where the masses start."""
 
@@ -29,6 +40,17 @@ HANGING = "particles.p.spring.0.rest_length=0.5"
 def test_a_branch_without_a_change_has_the_bits_of_its_parent(reference: Run, tmp_path: Path, frame: int) -> None:
     """13 and 24 have no checkpoint: they are simulated to, from the start and from 20."""
     assert_same(branch(reference, frame, tmp_path / "again"), reference)
+
+
+@pytest.mark.parametrize("kind", SYSTEMS)
+def test_branches_of_any_system_have_the_bits_of_their_parent(kind: str, tmp_path: Path) -> None:
+    """Births go on where they were, adaptive steps from the last one, solvers from what they keep. Of frame 3 there is no
+    checkpoint: it is simulated to."""
+    scene = SYSTEMS[kind] | {"output": {"plot": False, "checkpoint": 4}}
+    parent = simulate(scene, tmp_path / "parent", frames=7)
+    assert len(set(parent.hashes)) == 8
+    for frame in (3, 4):
+        assert_same(branch(parent, frame, tmp_path / f"again-{frame}"), parent)
 
 
 def test_a_value_that_is_there_already_is_no_change(reference: Run, spring: Tree, tmp_path: Path) -> None:

@@ -1,7 +1,6 @@
 """Run folders that somebody has changed: they are read, or refused in words; no command ends in a traceback."""
 
 import json
-import os
 import random
 import shutil
 import time
@@ -12,12 +11,12 @@ from typing import Any
 
 import numpy as np
 from conftest import Answer
+from counts import FACTOR, note
 from runs import Tree
 
 from tumble import Run, TumbleError, World
 from tumble.run import simulate
 
-FACTOR = float(os.environ.get("TUMBLE_FUZZ", "1"))
 FILES = [
     "run.json",
     "run.json",
@@ -155,5 +154,6 @@ def test_damaged_runs_are_read_or_refused(spring: Tree, tmp_path: Path, tumble: 
         f"\nruns, damaged: {sum(ends.values())} cases, {ends['refused']} refused, {ends['read']} read,"
         f" {time.perf_counter() - begin:.0f} s"
     )
+    note("random cases", "runs, damaged", cases=ends.total(), **ends)
     assert not failures, "\n".join(failures)
     assert not list(tmp_path.rglob("evil*"))

@@ -2,7 +2,8 @@
 And they take no more memory than twice what was estimated.
 
 Trees that the checker refuses, by the hundred thousand, are in crates/tumble-interface/tests/fuzz.rs; bytes of meshes, figures
-and fabrics in crates/tumble-io/tests/fuzz.rs; links in web/tests/share.test.ts. `TUMBLE_FUZZ=20` tries twenty times as many.
+and fabrics in crates/tumble-io/tests/fuzz.rs; frames and checkpoints in test_archives.py; links in web/tests/fuzz.test.ts.
+`TUMBLE_FUZZ=20` tries twenty times as many.
 """
 
 import copy
@@ -20,6 +21,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from counts import FACTOR, note
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from nursery import Nursery
@@ -28,7 +30,6 @@ from runs import Tree
 import tumble as package
 from tumble import Scene, SceneError, TumbleError
 
-FACTOR = float(os.environ.get("TUMBLE_FUZZ", "1"))
 SHIPPED = {f"{f.parent.name}/{f.stem}": f for f in sorted(Path(package.__file__).parent.glob("scenes/*/*.toml"))}
 WORDS = sorted(set(re.findall(r'"(?:const|enum)": "?\[?"([a-z_]+)"', json.dumps(Scene.schema()))))
 WORDS += sorted(
@@ -172,6 +173,7 @@ def test_changed_worlds_are_refused_built_or_break() -> None:
         f"\nworlds, changed: {sum(ends.values())} cases, {counts}, {time.perf_counter() - begin:.0f} s,"
         f" memory at most {most:.2f} of the limit"
     )
+    note("random cases", "worlds, changed", cases=sum(ends.values()), **ends, memory=f"{most:.2f} of the limit")
     assert not failures, "\n".join(failures)
 
 
@@ -291,6 +293,7 @@ def compare_memory(trees: dict[str, tuple[Tree, str]]) -> None:
         f"memory: {len(trees)} scenes, {time.perf_counter() - begin:.0f} s,"
         f" memory at most {most[0]:.2f} of the estimate ({most[1]})"
     )
+    note("memory", "scenes, estimated and weighed", cases=len(trees), most=f"{most[0]:.2f} of the estimate ({most[1]})")
     assert not failures, "\n".join(failures)
 
 
@@ -339,15 +342,22 @@ TREES = st.recursive(
 )
 
 
-@settings(max_examples=max(round(400 * FACTOR), 1), deadline=None)
-@given(TREES, st.sampled_from([None, "particles", "sheet", "world", "system", "force", "gas"]))
-def test_any_tree_of_python_is_refused_or_a_scene(tree: Any, key: str | None) -> None:
-    whole = tree if key is None else {"version": 1, key: tree}
-    try:
-        Scene(whole)
-    except TumbleError as error:
-        assert isinstance(error, SceneError) and error.issues and str(error)
-        assert all(issue["message"] for issue in error.issues)
+def test_any_tree_of_python_is_refused_or_a_scene() -> None:
+    ends: Counter[str] = Counter()
+
+    @settings(max_examples=max(round(400 * FACTOR), 1), deadline=None)
+    @given(TREES, st.sampled_from([None, "particles", "sheet", "world", "system", "force", "gas"]))
+    def try_one(tree: Any, key: str | None) -> None:
+        try:
+            Scene(tree if key is None else {"version": 1, key: tree})
+            ends["read"] += 1
+        except TumbleError as error:
+            assert isinstance(error, SceneError) and error.issues and str(error)
+            assert all(issue["message"] for issue in error.issues)
+            ends["refused"] += 1
+
+    try_one()
+    note("random cases", "trees of Python", cases=ends.total(), **ends)
 
 
 def test_trees_that_hold_themselves_are_refused() -> None:

@@ -78,6 +78,40 @@ def test_every_promise_names_tests_and_one_command() -> None:
         assert len(shown) == 1 and len(items) >= 2, promise
 
 
+def unseen(items: list[str]) -> list[str]:
+    """Tests in Python that stand above a command of pytest which does not run their file, or leaves them out as long ones."""
+    command = next(item for item in items if item.startswith("show it: ")).removeprefix("show it: ").strip("`")
+    words = shlex.split(command)
+    if "pytest" not in words:
+        return []
+    tests = [
+        item.strip("`").partition("::") for item in items if "::" in item and item.strip("`").startswith("python/")
+    ]
+    everything = "-m" in words[words.index("pytest") :]
+    marked = {
+        name
+        for place, _, name in tests
+        if re.search(rf"@pytest\.mark\.long\n(?:@.*\n)*def {name}\(", (ROOT / place).read_text())
+    }
+    return [name for place, _, name in tests if place not in words or (name in marked and not everything)]
+
+
+@pytest.mark.parametrize("promise", PROMISES)
+def test_a_command_runs_the_tests_that_it_shows(promise: str) -> None:
+    assert unseen(PROMISES[promise]) == []
+
+
+def test_a_command_that_runs_something_else_would_be_missed() -> None:
+    kills, soak = (
+        "`python/tests/test_kills.py::test_200_killed_runs_go_on_to_the_same_bits`",
+        "`python/tests/test_soak.py::test_x`",
+    )
+    pytest_kills = "show it: `.venv/bin/python -m pytest -s{} python/tests/test_kills.py`"
+    assert unseen([kills, pytest_kills.format(' -m ""')]) == []
+    assert unseen([kills, pytest_kills.format("")]) == ["test_200_killed_runs_go_on_to_the_same_bits"]
+    assert unseen([kills, soak, pytest_kills.format(' -m ""')]) == ["test_x"]
+
+
 @pytest.mark.parametrize("command", COMMANDS)
 def test_a_command_can_be_given(command: str) -> None:
     makefile = (ROOT / "Makefile").read_text(encoding="utf-8")
@@ -95,6 +129,10 @@ def test_a_command_can_be_given(command: str) -> None:
                 assert files and all(file.is_file() for file in files)
                 scenes = [word for word in rest if "/" in word and not word.endswith(".py")]
                 assert all(find.scene_file(scene).is_file() for scene in scenes)
+            case ["cd", folder]:
+                assert (ROOT / folder).is_dir()
+            case ["node", "--import", "tsx", "--test", file]:
+                assert (ROOT / "web" / file).is_file()
             case ["cargo", "test", "--release", "-p", crate, "--test", name]:
                 assert (ROOT / "crates" / crate / "tests" / f"{name}.rs").is_file()
             case _:

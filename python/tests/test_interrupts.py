@@ -3,6 +3,7 @@
 import signal
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
+from typing import Any
 
 import pytest
 from runs import Tree
@@ -39,6 +40,40 @@ def test_what_is_held_is_done_before_the_stop(number: signal.Signals, monkeypatc
         signal.signal(number, former)
 
 
+@pytest.mark.parametrize("which", range(4))
+def test_a_stop_while_handlers_change_leaves_none_that_swallows(which: int, monkeypatch: pytest.MonkeyPatch) -> None:
+    """After each of the four changes that holding makes, two to hold and two to let go."""
+
+    def stop(*_: object) -> None:
+        raise KeyboardInterrupt
+
+    numbers = (signal.SIGTERM, signal.SIGINT)
+    change = signal.signal
+    former = [change(number, stop) for number in numbers]
+    count = 0
+
+    def interrupted(number: signal.Signals, handler: Any) -> Any:
+        nonlocal count
+        old = change(number, handler)
+        count += 1
+        if count == which + 1:
+            signal.raise_signal(numbers[(which + 1) % 2])
+            signal.raise_signal(numbers[which % 2])
+        return old
+
+    try:
+        with monkeypatch.context() as patch, pytest.raises(KeyboardInterrupt):
+            patch.setattr(signal, "signal", interrupted)
+            with held():
+                pass
+        for number in numbers:
+            with pytest.raises(KeyboardInterrupt):
+                signal.raise_signal(number)
+    finally:
+        for number, handler in zip(numbers, former, strict=True):
+            change(number, handler)
+
+
 def test_other_threads_hold_nothing() -> None:
     before = signal.getsignal(signal.SIGINT)
 
@@ -69,10 +104,11 @@ def test_a_stop_while_a_file_is_written_waits_for_the_frame(
     monkeypatch.setattr(recorder, "MANIFEST_INTERVAL", 0.0)
     try:
         with pytest.raises(KeyboardInterrupt):
-            simulate(spring | {"output": {"plot": False, "checkpoint": 1}}, tmp_path / "run")
+            # Far more than there are before the third time: the manifest waits a hundred times as long as writing it took.
+            simulate(spring | {"output": {"plot": False, "checkpoint": 1}}, tmp_path / "run", frames=100_000)
     finally:
         signal.signal(signal.SIGINT, former)
     run = Run(tmp_path / "run")
-    assert run.status == "interrupted" and 1 <= run.n_frames < 26
+    assert run.status == "interrupted" and 1 <= run.n_frames < 100_000
     assert run.manifest["hashes"] == run.hashes
     assert run.frame(-1) and not list(run.folder.rglob("*.tmp"))

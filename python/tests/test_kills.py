@@ -8,6 +8,7 @@ from collections import Counter
 from pathlib import Path
 
 import pytest
+from counts import note
 from runs import Killed, Tree, assert_same, killed
 
 from tumble import Run, Scene, SceneError, World
@@ -80,8 +81,9 @@ def readable(folder: Path, reference: Run) -> str:
     return "before the first checkpoint" if run.n_frames <= 5 else "between checkpoints"
 
 
-def killed_often(scene: Tree, kills: int, seed: int, folder: Path) -> Counter[str]:
+def killed_often(kind: str, kills: int, seed: int, folder: Path) -> Counter[str]:
     """Kills runs until there were so many kills, each at a moment drawn by a seed, and goes on after each."""
+    scene = SCENES[kind]
     reference = simulate(scene, folder / "reference", threads=1)
     took = reference.manifest["timings"]["total"]
     moments = random.Random(seed)
@@ -105,6 +107,7 @@ def killed_often(scene: Tree, kills: int, seed: int, folder: Path) -> Counter[st
             assert_same(Run(place), reference)
             shutil.rmtree(place)
     assert_same(simulate(scene, place, resume=True), reference)
+    note("kills", kind, cases=where.total(), **where)
     where["runs that went on to their end"] = resumed + 1
     return where
 
@@ -178,12 +181,12 @@ def test_an_estimate_of_stability_changes_no_state() -> None:
 
 @pytest.mark.parametrize("kind", SCENES)
 def test_killed_runs_go_on_to_the_same_bits(kind: str, tmp_path: Path) -> None:
-    print(kind, dict(killed_often(SCENES[kind], 4, 1, tmp_path)))
+    print(kind, dict(killed_often(kind, 4, 1, tmp_path)))
 
 
 @pytest.mark.long
 @pytest.mark.parametrize("kind", SCENES)
 def test_200_killed_runs_go_on_to_the_same_bits(kind: str, tmp_path: Path) -> None:
-    where = killed_often(SCENES[kind], 67, 2, tmp_path)
+    where = killed_often(kind, 67, 2, tmp_path)
     print(kind, dict(where))
     assert where["between checkpoints"] > 10 and where["before the first checkpoint"] > 0

@@ -1,12 +1,13 @@
 """Ten scenes that ship have the same bits on 1, 2 and 8 threads, restored, and as WebAssembly; `make validate` does all."""
 
+from dataclasses import replace
 from pathlib import Path
 
 import matrix
 import numpy as np
 import pytest
 
-from tumble import World
+from tumble import World, _engine
 
 
 @pytest.mark.parametrize("kind", list(matrix.TEN))
@@ -19,6 +20,15 @@ def test_a_scene_has_the_same_bits_everywhere(kind: str, tmp_path: Path) -> None
         ways |= {"wasm", "native to wasm"}
     assert len(row.reference) == case.frames + 1
     assert row.ways == dict.fromkeys(ways, "same") and row.good, str(row)
+
+
+def test_native_bits_are_the_same_on_any_count_of_threads_and_restored(tmp_path: Path) -> None:
+    case = replace(matrix.NATIVE[0], frames=2)
+    row, _ = matrix.native(case, tmp_path)
+    assert row.ways == dict.fromkeys(["2 threads", "8 threads", "restored"], "same") and row.good, str(row)
+    portable = World(matrix.scene_of(replace(case, bits="portable")))
+    if _engine.instructions in ("avx2", "avx512"):  # Else there is but one arithmetic.
+        assert matrix.states(portable, 2)[1:] != row.reference[1:]
 
 
 def test_webassembly_was_there() -> None:

@@ -133,7 +133,18 @@ DOUBTS: list[tuple[Tree, Tree, str, str, str]] = [
 
 FLOOR: Tree = {"collider": [{"name": "c", "shape": {"floor": {}}}]}
 GAS: Tree = {"gas": [{"name": "g", "box": {"size": [1, 1, 1], "resolution": 4}}]}
-WARM: Tree = {"heat": [{"name": "h", "box": {"size": [1, 1, 1], "resolution": 4}}]}
+WARM: Tree = {
+    "heat": [
+        {
+            "name": "h",
+            "box": {"size": [1, 1, 1], "resolution": 4},
+            "conductivity": 1,
+            "density": 1000,
+            "heat_capacity": 1000,
+            "temperature": 300,
+        }
+    ]
+}
 
 
 @pytest.mark.parametrize(

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import numpy.typing as npt
 
-from tumble._engine import SceneError, StepError, World
+from tumble._engine import ExportError, SceneError, StepError, World
 from tumble.folder import RunFolder, read_column
 
 if TYPE_CHECKING:
@@ -169,6 +169,10 @@ def born(run: "Run") -> dict[str, tuple[int, int]]:
         for i in range(run.n_frames):
             ids = read_column(files.frame(i), name, "id")
             if ids is not None:
+                if ids.ndim != 1 or ids.dtype.kind not in "iu":
+                    raise ExportError(
+                        f'{files.frame(i)}: is damaged ("{name}/id" counts nothing); simulate again with --force'
+                    )
                 last = len(ids)
                 # Ids count from 0 and are never used again.
                 most = max(most, int(ids.max()) + 1) if last else most

@@ -9,6 +9,7 @@ import io
 import json
 import math
 import os
+import textwrap
 import zipfile
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
@@ -129,9 +130,9 @@ class RunFolder:
         for i in range(limit):
             try:
                 # An archive that is half opened complains when it is collected.
-                with held():
-                    zipfile.ZipFile(self.frame(i)).close()
-            except (OSError, zipfile.BadZipFile):
+                with held(), _opened(self.frame(i)):
+                    pass
+            except ExportError:
                 return i
         return limit
 
@@ -218,26 +219,50 @@ def write_columns(path: Path, columns: Columns) -> None:
 def read_columns(path: Path) -> Columns:
     """The columns of an .npz."""
     columns: Columns = {}
-    try:
-        with np.load(path) as archive:
-            for key in archive.files:
-                name, _, column = key.rpartition("/")
-                columns.setdefault(name, {})[column] = archive[key]
-    except FileNotFoundError:
-        raise ExportError(f"{path}: is missing; --resume computes again what is lost") from None
-    except (OSError, ValueError, EOFError, zipfile.BadZipFile) as error:
-        raise ExportError(f"{path}: is damaged ({error}); --resume computes again what is lost") from error
+    with _opened(path) as archive:
+        for key in archive.namelist():
+            name, _, column = key.removesuffix(".npy").rpartition("/")
+            columns.setdefault(name, {})[column] = _array(archive, key)
     return columns
 
 
 def read_column(path: Path, name: str, column: str) -> npt.NDArray[Any] | None:
     """One column of an .npz, without reading the others; None where it is not."""
-    key = f"{name}/{column}"
+    key = f"{name}/{column}.npy"
+    with _opened(path) as archive:
+        return _array(archive, key) if key in archive.namelist() else None
+
+
+@contextmanager
+def _opened(path: Path) -> Iterator[zipfile.ZipFile]:
+    """An .npz, for reading; whatever is wrong with it is an ExportError."""
     try:
-        with np.load(path) as archive:
-            return np.asarray(archive[key]) if key in archive.files else None
-    except (OSError, ValueError, EOFError, zipfile.BadZipFile) as error:
-        raise ExportError(f"{path}: is damaged ({error}); --resume computes again what is lost") from error
+        with zipfile.ZipFile(path) as archive:
+            # Members of ours are not compressed: others could take any amount of memory.
+            if sum(member.file_size for member in archive.infolist()) > path.stat().st_size:
+                raise ValueError("it holds less than it says")
+            yield archive
+    except FileNotFoundError:
+        raise ExportError(f"{path}: is missing; --resume computes again what is lost") from None
+    except Exception as error:  # Neither zipfile nor NumPy says what it may raise.
+        why = textwrap.shorten(str(error), 200) or type(error).__name__
+        raise ExportError(f"{path}: is damaged ({why}); --resume computes again what is lost") from error
+
+
+def _array(archive: zipfile.ZipFile, key: str) -> npt.NDArray[Any]:
+    """An array of numbers, for which no room is made before it is known to be there."""
+    with archive.open(key) as file:
+        header = np.lib.format.read_array_header_1_0
+        if np.lib.format.read_magic(file) != (1, 0):
+            header = np.lib.format.read_array_header_2_0
+        shape, _, dtype = header(file)
+        if (
+            dtype.kind not in "biuf"
+            or dtype.itemsize * math.prod(shape) != archive.getinfo(key).file_size - file.tell()
+        ):
+            raise ValueError(f"{key!r} is no array of {shape} numbers")
+    with archive.open(key) as file:  # Where one goes back in a member, newer Pythons no longer check its sum.
+        return np.asarray(np.lib.format.read_array(file))
 
 
 def write_checkpoint(world: World, path: Path) -> None:

@@ -85,7 +85,7 @@ def fault_of_arrays(
 ) -> str | None:
     """What is wrong with the arrays of a file. Particles come and go, and surfaces that tear get more points."""
     for name, table in described.items():
-        count = len(columns[name]["id"]) if place == "frames" and "id" in columns.get(name, {}) else None
+        count = columns[name]["id"].size if place == "frames" and "id" in columns.get(name, {}) else None
         for column, entry in table.items():
             if entry["in"] != place:
                 continue
