@@ -75,7 +75,9 @@ def live(task: dict[str, Any]) -> dict[str, Any]:
     before = status("VmRSS:")
     answer: dict[str, Any] = {"issues": []}
     try:
-        world = World(Scene(task["tree"], task["folder"]))
+        scene = Scene(task["tree"], task["folder"])
+        answer["estimate"] = scene.memory
+        world = World(scene)
         answer["end"] = "built"
         if task["probe"]:
             return answer

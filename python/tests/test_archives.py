@@ -284,10 +284,7 @@ def load_changed(tree: Tree, cases: int, folder: Path) -> tuple[Counter[str], fl
         except Exception as error:
             failures.append(f"seed {seed}: {type(error).__name__}: {error}")
         # What breaks goes back to what was loaded, whatever that was.
-        # An age of nan is what it was loaded as: no force knows it, and no step changes it.
-        found = [
-            a for table in world.frame.values() for key, a in table.items() if a.dtype.kind == "f" and key != "age"
-        ]
+        found = [a for table in world.frame.values() for a in table.values() if a.dtype.kind == "f"]
         if end == "read" and not all(np.isfinite(array).all() for array in found):
             failures.append(f"seed {seed}: a frame that is not finite")
         # Nothing of what came before is left behind.

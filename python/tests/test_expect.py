@@ -189,17 +189,15 @@ def test_what_broke_a_bound_is_named(tmp_path: Path) -> None:
         found, text = culprit(landing, folder, **{name: 0.1})
         assert found == {"system": "main", "object": "fast"} and text.endswith(', by "fast"')
     found, text = culprit(landing, folder, max_energy_drift=0.1)
-    assert found["system"] == "main" and text.endswith(
-        f'; fastest there "{found["fastest"]["object"]}", particle 0'
-    )
+    assert found["system"] == "main" and text.endswith(f'; fastest there "{found["fastest"]["object"]}", particle 0')
     # What starts within the floor's thickness is in it.
     deep = moving | {"collider": [floor | {"shape": {"floor": {"height": 0.95}}}]}
     found, _ = culprit(
         deep | {"particles": [ball("still", 0, 2, 0), ball("deep", 2, 1, 0)]}, folder, max_penetration=0.04
     )
     assert found == {"object": "deep", "particles": [1]}
-    rope = {"name": "slack", "start": [0, 0, 0], "end": [1, 0, 0], "segments": 4, "pin": ["start"]}
-    taut = rope | {"name": "taut", "start": [0, 1, 0], "end": [1, 1, 0], "links": {"structural": {"modulus": 1.0}}}
+    rope = {"name": "slack", "from": [0, 0, 0], "to": [1, 0, 0], "segments": 4, "pin": ["start"]}
+    taut = rope | {"name": "taut", "from": [0, 1, 0], "to": [1, 1, 0], "links": {"structural": {"modulus": 1.0}}}
     for integrator in ("symplectic_euler", "position_based"):
         hung = scene | {"rope": [rope, taut], "world": {}, "system": [system | {"integrator": integrator}]}
         found, text = culprit(hung, folder, max_stretch=1.01)

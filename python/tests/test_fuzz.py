@@ -145,8 +145,8 @@ def wrong(answer: dict[str, Any]) -> str | None:
         return f"a frame that is not finite: {answer['energy']}"
     if answer["end"] == "broke" and (not answer["text"] or "\n" in answer["text"]):
         return f"broke with {answer['text']!r}"
-    if answer.get("taken", 0) > 2 * LIMIT * 2**30 + ALWAYS and not answer["crushed"]:
-        return f"{answer['taken'] / 2**20:.0f} MiB where {LIMIT} GiB are the limit"
+    if answer.get("taken", 0) > 2 * answer.get("estimate", 0.0) + ALWAYS and not answer["crushed"]:
+        return f"{answer['taken'] / 2**20:.0f} MiB where {answer['estimate'] / 2**20:.1f} were estimated"
     return None
 
 
@@ -165,15 +165,16 @@ def test_changed_worlds_are_refused_built_or_break() -> None:
             ends[answer["end"]] += 1
             # Of surfaces that are crushed to a point, everything meets everything; the estimate does not know.
             answer["crushed"] = "self_contact" in json.dumps(tree.get("system"))
-            most = max(most, 0 if answer["crushed"] else (answer.get("taken", 0) - ALWAYS) / (LIMIT * 2**30))
+            if not answer["crushed"]:
+                most = max(most, (answer.get("taken", 0) - ALWAYS) / max(answer.get("estimate", 0.0), 1.0))
             if problem := wrong(answer):
                 failures.append(f"{file.stem}, seed {seed}: {problem}")
     counts = ", ".join(f"{count} {end}" for end, count in sorted(ends.items()))
     print(
         f"\nworlds, changed: {sum(ends.values())} cases, {counts}, {time.perf_counter() - begin:.0f} s,"
-        f" memory at most {most:.2f} of the limit"
+        f" memory at most {most:.2f} of the estimate"
     )
-    note("random cases", "worlds, changed", cases=sum(ends.values()), **ends, memory=f"{most:.2f} of the limit")
+    note("random cases", "worlds, changed", cases=sum(ends.values()), **ends, memory=f"{most:.2f} of the estimate")
     assert not failures, "\n".join(failures)
 
 
@@ -251,38 +252,12 @@ LARGE: dict[str, Tree] = {
 """Scenes that take much, of every kind of object."""
 
 
-def estimate(nursery: Nursery, tree: Tree, folder: str) -> float:
-    """Bytes that a scene is said to take: the least limit under which it is built."""
-
-    def said(limit: float) -> float | None:
-        answer = nursery.ask(
-            tree | {"world": tree.get("world", {}) | {"memory_limit": limit}}, folder, probe=True, patience=120
-        )
-        if answer["end"] == "built":
-            return None
-        assert [issue["path"] for issue in answer["issues"]] == ["world.memory_limit"], answer
-        match = re.search(r"about ([\d.]+) GiB, the limit is", answer["text"])
-        assert match is not None
-        return float(match[1])
-
-    about = said(1e-12)
-    if about is None:
-        return 0.0
-    # The number is rounded to a tenth.
-    low, high = max(about - 0.05, 1e-6), about + 0.0501
-    while high / low > 1.05:
-        middle = math.sqrt(low * high)
-        low, high = (low, middle) if said(middle) is None else (middle, high)
-    return high * GIB
-
-
 def compare_memory(trees: dict[str, tuple[Tree, str]]) -> None:
     failures, most, begin = [], (0.0, ""), time.perf_counter()
     with Nursery() as nursery:
         for name, (tree, folder) in trees.items():
-            guess = estimate(nursery, tree, folder)
             answer = nursery.ask(tree, folder, frames=2, patience=300)
-            taken = answer["taken"]
+            taken, guess = answer["taken"], answer["estimate"]
             if answer["end"] not in ("built", "broke") or taken > 2 * guess + ALWAYS:
                 failures.append(
                     f"{name}: {answer['end']}, {taken / 2**20:.0f} MiB taken, {guess / 2**20:.0f} MiB estimated"

@@ -465,11 +465,11 @@ impl Pool {
         for (stream, counts) in self.streams.iter_mut().zip(counts.chunks_exact(3)) {
             (stream.len, stream.next, stream.flow) = (counts[0] as usize, counts[1] as u64, counts[2]);
         }
-        let total = self.streams.iter().map(|s| s.len).sum::<usize>();
+        let total = self.streams.iter().try_fold(0_usize, |sum, s| sum.checked_add(s.len))?;
         self.stirred.clear();
         self.id = archive.indices("id")?;
         archive.column("age", &mut self.age)?;
-        let mut fits = self.id.len() == total && self.age.len() == total;
+        let mut fits = self.id.len() == total && self.age.len() == total && self.age.iter().all(|age| age.is_finite());
         for (name, column) in &mut self.columns {
             archive.column(name, column)?;
             fits &= column.len() == total;

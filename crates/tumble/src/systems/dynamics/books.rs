@@ -434,7 +434,7 @@ impl Dynamics {
             .collect();
         // Looking changes no state.
         let kept = (self.automatic, self.measured);
-        let substeps = self.substeps(dt);
+        let substeps = self.substeps(dt, go_on);
         (self.automatic, self.measured) = kept;
         Some(tumble_interface::engine::Stability {
             system: self.name.clone(),

@@ -136,15 +136,15 @@ impl Dynamics {
         2.0 * h * Vec3::from(self.laws.gravity).norm()
     }
 
-    /// Sub-steps of an interval of length dt.
-    fn substeps(&mut self, dt: f64) -> f64 {
+    /// Sub-steps of an interval of length dt; any number if `go_on` says no.
+    fn substeps(&mut self, dt: f64, go_on: &(dyn Fn() -> bool + Sync)) -> f64 {
         match self.stepping {
             Stepping::Substeps(n) => f64::from(n),
             Stepping::Step(step) => integrators::equal_steps(dt, step),
             // A crowd that has grown may have another limit.
             Stepping::Automatic if self.automatic > 0 && self.state.x.len() <= 2 * self.measured => f64::from(self.automatic),
             Stepping::Automatic => {
-                let limit = if self.integrator.is_implicit() { f64::INFINITY } else { self.limit() };
+                let limit = if self.integrator.is_implicit() { f64::INFINITY } else { self.limit(go_on) };
                 let n = if limit > 0.0 { (dt / (0.7 * limit)).ceil().max(1.0) } else { 1.0 };
                 // What has no masses yet has no limit to keep to later.
                 if n <= MOST_SUBSTEPS && !self.state.x.is_empty() {
@@ -156,8 +156,8 @@ impl Dynamics {
     }
 
     /// Largest usable step of the integrator in use [s].
-    fn limit(&mut self) -> f64 {
-        self.modes(&|| true).map_or(f64::INFINITY, |modes| integrators::stability::limits(self.integrator, &modes.list()).1)
+    fn limit(&mut self, go_on: &(dyn Fn() -> bool + Sync)) -> f64 {
+        self.modes(go_on).map_or(f64::INFINITY, |modes| integrators::stability::limits(self.integrator, &modes.list()).1)
     }
 
     /// Springs to other systems: half of the interaction that this system owns. Each is an impulse h f, so what one side
@@ -454,7 +454,7 @@ impl Dynamics {
             return Ok(report);
         }
         self.untangle(t);
-        let substeps = self.substeps(dt);
+        let substeps = self.substeps(dt, go_on);
         if substeps > MOST_SUBSTEPS {
             return Err(StepError::StepTooSmall { system: self.name.clone(), time: t, step: dt / substeps });
         }
