@@ -153,7 +153,7 @@ def show_dress():
         show(f"dress, {counts[-1]} triangles", "tumble", seconds, "s", check)
     check = f"a frame; grows with the count to the power of {growth(counts, costs):.2f}"
     show("dress, a triangle", "tumble", costs[-1] / counts[-1], "s", check)
-    show("dress, a triangle", f"{counts[0]} triangles", costs[0] / counts[0], "s", "the coarsest")
+    show("dress, a triangle", "the coarsest", costs[0] / counts[0], "s", f"{counts[0]} triangles")
 
 
 for part, run in {"memory": show_memory, "layers": show_layers, "dress": show_dress}.items():

@@ -42,6 +42,31 @@ def missing_mesh(tree: Tree) -> Tree:
     return tree | {"collider": [{"name": "c", "shape": {"mesh": {"path": "gone.ply"}}}]}
 
 
+def no_such_bone(tree: Tree) -> Tree:
+    """Held by a figure that has bones, but none of that name."""
+    pin = {"center": [0, 0, 0], "radius": 1, "follow": {"collider": "dancer", "bone": "tail"}}
+    return tree | {
+        "collider": [{"name": "dancer", "shape": {"mannequin": {}}}],
+        "sheet": [{"name": "s", "size": [1, 1], "resolution": [4, 4], "pin": [pin]}],
+    }
+
+
+def five_rows_of_stretching(tree: Tree) -> Tree:
+    stretching, bending = "[500.0, 100.0, 500.0, 200.0], " * 5, "[1e-5, 1e-5, 1e-5, 1e-5, 1e-5], " * 3
+    Path("short.toml").write_text(f"density = 0.2\nstretching = [{stretching}]\nbending = [{bending}]\n")
+    return tree | {"sheet": [{"name": "s", "size": [1, 1], "resolution": [4, 4], "fabric": {"path": "short.toml"}}]}
+
+
+def unequal_seams(tree: Tree) -> Tree:
+    def panel(name: str, height: float) -> Tree:
+        return {"name": name, "outline": [[0, 0], [1, 0], [1, height], [0, height]]}
+
+    seam = {"from": {"panel": "a", "side": 1}, "to": {"panel": "b", "side": 3}}
+    return tree | {
+        "cloth": [{"name": "c", "resolution": 0.2, "panels": [panel("a", 1), panel("b", 2)], "seams": [seam]}]
+    }
+
+
 def tracers(tree: Tree) -> Tree:
     """The particles as tracers, without what only masses have."""
     thing = {key: tree["particles"][0][key] for key in ("name", "position")}
@@ -88,6 +113,12 @@ WRONG = [
     (billion, "memory_limit"),
     (empty_mesh, r"empty\.obj"),
     (missing_mesh, r"gone\.ply"),
+    (no_such_bone, r'sheet "s"\.pin\[0\]: collider "dancer" has no bone "tail"; known are hips, spine'),
+    (
+        five_rows_of_stretching,
+        r'sheet "s"\.fabric\.path.*short\.toml.*line 2: stretching: 5 rows.*row 6 \(90°\) is missing',
+    ),
+    (unequal_seams, r'cloth "c"\.seams\[0\].*1\.0000 m and 2\.0000 m long, expected the same'),
     (lambda tree: tree | {"time": {"frames": 0}}, r"time\.frames.*0"),
     (lambda tree: {}, "version"),
 ]

@@ -12,7 +12,7 @@ import pytest
 from matplotlib.image import imread
 
 from tumble import Scene, SceneError
-from tumble.lab import exact, findings, flocks, integrators, patterns, pressure, structures
+from tumble.lab import exact, findings, flocks, integrators, patterns, positions, pressure, structures
 from tumble.lab.cells import Purse
 from tumble.lab.limits import Found, largest_steps, stiffest_mode
 from tumble.lab.measure import Results
@@ -135,14 +135,39 @@ def studied(tree: Tree, **settings: Any) -> Results:
 
 
 def test_observed_orders() -> None:
-    words = ["forward_euler", "midpoint", "rk4", "verlet", "implicit_midpoint"]
+    words = ["forward_euler", "midpoint", "rk4", "verlet", "implicit_midpoint", "position_based"]
     results = studied(oscillator(), integrators=words, steps=[0.04, 0.02, 0.01, 0.005], duration=3.7, budget=20.0)
     seen = {s.word: findings.order(results, s) for s in results.schemes}
-    # Measured 1.03, 2.00, 4.00, 2.00, 2.00.
+    # Measured 1.09, 2.00, 4.00, 2.00, 2.00, 0.92.
     for word in words:
         assert abs(seen[word] - BY_WORD[word].order) < 0.3, seen
     assert results.reference is not None
     assert results.reference.how == "the exact solution"
+
+
+@pytest.mark.parametrize(
+    ("word", "factor"),
+    [
+        ("forward_euler", lambda z: 1 + z**2),
+        ("heun", lambda z: 1 + z**4 / 4),
+        ("implicit_euler", lambda z: 1 / (1 + z**2)),
+        ("implicit_midpoint", lambda z: 1.0),
+        # Converged on one spring by a single sweep, it is implicit Euler.
+        ("position_based", lambda z: 1 / (1 + z**2)),
+    ],
+)
+def test_energy_of_one_spring(word: str, factor: Callable[[float], float]) -> None:
+    """(integrators.21), .27, .25 and .26; those that solve equations do so to a relative residual of 1e-9."""
+    tested = subject(Scene(oscillator()))
+    for system in tested.tree["system"]:
+        system["solver"] = {"newton_tolerance": 1e-9, "linear_tolerance": 1e-9}
+    for z in (0.03, 0.3, 0.8):
+        world = tested.world(BY_WORD[word], z / W, 1, 1)
+        start = world.ledger["energy"]
+        for n in range(1, 11):
+            world.step()
+            assert world.ledger["energy"] / start == pytest.approx(factor(z) ** n, rel=1e-7), (z, n)
+    assert start == pytest.approx(W * W / 2)
 
 
 def test_a_converged_solution_stands_in_for_the_exact_one() -> None:
@@ -416,6 +441,49 @@ def test_the_scene_is_run_as_it_is_but_for_the_integrator() -> None:
     world.step()
     assert world.time == pytest.approx(0.25)
     assert tested.world(BY_WORD["verlet"], 0.25, 1, 5).scene.to_dict()["system"][0]["clamp"] == 1.5
+
+
+def slope(errors: list[float]) -> float:
+    """How fast they fall from the first to the last, each with twice the work of the one before."""
+    return math.log2(errors[0] / errors[-1]) / (1 - len(errors))
+
+
+def test_a_hanging_chain_converges_to_its_compliance_at_every_frame_rate() -> None:
+    """(positions.2): of second order in sub-steps, of first in sweeps until these reach from end to end."""
+    steps, sweeps = (
+        [abs(positions.error(False, substeps, work)) for work in (64, 128, 256, 512)] for substeps in (True, False)
+    )
+    # 10.5, 2.63, 0.656 and 0.164 %: -2.00 to the third digit.
+    assert slope(steps) == pytest.approx(-2.0, abs=0.02) and 0.001 < steps[-1] < 0.0025
+    # 5.84, 2.50, 0.88, 0.200: -1.62; from 1 to 16: 420 to 26, -1.00.
+    assert -1.8 < slope(sweeps) < -1.4 and sweeps[-1] > 50 * steps[-1]
+    assert slope([abs(positions.error(False, False, work)) for work in (1, 2, 4, 8, 16)]) == pytest.approx(
+        -1.0, abs=0.05
+    )
+    # What counts is the length of a sub-step, not of a frame: 1/7680 s, 0.420 % at 60 as at 120 frames a second.
+    at_60, at_120 = positions.error(False, True, 128, 60), positions.error(False, True, 64, 120)
+    assert 0.003 < at_60 < 0.005 and at_120 == pytest.approx(at_60, rel=1e-3)
+    # Sweeps that are enough converge to the same length: 2.7e-7.
+    assert 0 < positions.error(False, False, 256, 120) < 1e-5
+
+
+def test_a_plain_chain_ends_without_stretch_whatever_its_stiffness() -> None:
+    """Sub-steps: -0.993 and -0.999; sweeps, which are slower: 0.24 at 24 frames a second, -0.80 at 60, -0.95 at 120."""
+    assert positions.error(True, True, 256) == pytest.approx(-1.0, abs=0.01)
+    assert positions.error(True, True, 256, 60) == pytest.approx(-1.0, abs=0.002)
+    sweeps = [positions.error(True, False, 256, rate) for rate in positions.RATES]
+    assert sweeps[0] > 0.1 > sweeps[1] + 0.7 > sweeps[2] + 0.7, sweeps
+
+
+def test_page_of_positions(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(
+        positions, "lengthening", lambda plain, substeps, sweeps, rate=24: 0.02 + 1.0 / (substeps + sweeps)
+    )
+    path = positions.page(tmp_path / "lab")
+    assert "whatever the stiffness" in whole(path)
+    rows = table(path)
+    assert len(rows) == 8 * len(positions.WORK)
+    assert {row["frames a second"] for row in rows} == {"24", "60", "120"}
 
 
 @pytest.fixture(scope="module")
