@@ -46,6 +46,7 @@ mod pressure;
 mod projections;
 mod rods_position_based;
 mod sheets;
+mod single_steps;
 mod solids;
 mod stability_estimate;
 mod statics;
