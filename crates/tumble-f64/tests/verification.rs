@@ -14,6 +14,7 @@ mod compressible;
 mod conservation;
 mod contact;
 mod contact_sweep;
+mod converged;
 mod coupling;
 mod damping;
 mod densities;
