@@ -53,4 +53,5 @@ mod stability_estimate;
 mod statics;
 mod surfaces;
 mod tear;
+mod tied_shapes;
 mod trails;
