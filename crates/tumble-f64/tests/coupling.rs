@@ -249,7 +249,8 @@ fn projected_springs_on_an_anchor_keep_momentum_and_have_order_one() {
             common::show(&errors)
         );
         assert!(observed.iter().all(|p| (p - 1.0).abs() < 0.2) && errors[3] > 1e-6, "{errors:?} {observed:?}");
-        // 1600 steps in which places of 3 m are rounded to 4e-16 m, over their length of 6e-4 s. Measured: 3.7e-11 at most, and orders of 0.95 to 1.01.
+        // 1600 steps in which places of 3 m are rounded to 4e-16 m, over their length of 6e-4 s. Measured: 3.7e-11 at most, and orders of
+        // 0.95 to 1.01.
         assert!(lost < 1e-10, "{lost:e}");
     }
 }
