@@ -214,6 +214,8 @@ fn a_strip_bends_as_the_elastica() {
             ("hinge", true, 24, implicit, 0.01),
             ("isometric", true, 24, implicit, 0.01),
             ("isometric", true, 16, sweeps, 0.03),
+            ("hinge", true, 16, sweeps, 0.03),
+            ("isometric", false, 16, sweeps, 0.03),
             ("isometric", false, 24, implicit, 0.01),
         ] {
             let found = strip(gamma, cells, bending, mirrored, system);

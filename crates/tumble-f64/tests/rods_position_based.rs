@@ -38,7 +38,9 @@ fn a_cantilever_bends_as_the_elastica() {
         (20.0, 0.829881, 0.445232),
         (100.0, 0.937524, 0.159223),
     ] {
-        for segments in [16, 32, 64] {
+        // Where the rod hangs almost straight down and reaches a sixth of its length, 16 segments are too few: 3.3 % and 4.1 % off.
+        let divisions: &[u32] = if gamma < 50.0 { &[16, 32, 64] } else { &[32, 64] };
+        for &segments in divisions {
             let x = cantilever(gamma, segments, "");
             let tip = x[segments as usize];
             let (h, w) = (-tip.z / drop - 1.0, tip.x / reach - 1.0);
@@ -49,10 +51,8 @@ fn a_cantilever_bends_as_the_elastica() {
                 100.0 * w,
                 100.0 * ratio
             );
-            // Second order in the length of segments: at most 0.7 %, 3.3 % and 4.1 % for 16, of them the last two only where the rod hangs
-            // almost straight down and reaches a sixth of its length; 0.2 %, 0.8 %, 1 % for 32; 0.07 %, 0.2 %, 0.3 % for 64.
-            let most = if segments == 16 && gamma > 50.0 { 0.05 } else { 0.03 };
-            assert!(h.abs() < 0.01 && w.abs() < most && ratio.abs() < most, "{h} {w} {ratio}");
+            // Second order in the length of segments: at most 0.4 %, 0.7 %, 1.1 % for 16; 0.2 %, 0.9 %, 1.1 % for 32; 0.07 %, 0.3 %, 0.3 % for 64.
+            assert!(h.abs() < 0.01 && w.abs() < 0.03 && ratio.abs() < 0.03, "{h} {w} {ratio}");
             assert!(segments < 64 || ratio.abs() < 0.005, "{ratio}");
             assert!(tip.y.abs() < 1e-9);
         }

@@ -3,7 +3,7 @@
 //!   E = kappa/2 sum_i m_i |x_i - g_i|²,   g_i = c + R q_i,   R = argmin E                         (shapes.1)
 //!
 //! c is the centre of mass and q_i the rest places from theirs. A sub-step of implicit Euler is solved exactly: c and R, which minimize E,
-//! do not change on the way. Without kappa the shape is rigid.
+//! do not change on the way. Without kappa the shape is rigid, and goes around the masses that are held.
 //! Source: [mueller2005]; the rotation is that of [horn1987], an eigenvector, which needs no start from the last one and so no state.
 //! Verified in `tests/surfaces.rs`.
 
@@ -14,6 +14,10 @@ use crate::math::{Quat, Real, Row, Vec3, xyz64};
 use std::ops::Range;
 
 type Vector = Vec3<f64>;
+
+/// What a held mass of a rigid shape weighs in the fit, over the mass of all: each sweep leaves one part in so many of how far it is off its
+/// place. By its own mass a corner of a block would lead as little as it weighs.                               (shapes.4)
+const HELD: f64 = 1e4;
 
 /// The points of one body.
 pub struct Shape {
@@ -41,11 +45,14 @@ impl Shape {
         (total > 0.0).then_some(Self { rows, mass, total, rest, kappa, moved: Vec::new() })
     }
 
-    /// The centre of mass and the rotation that fits best.
+    /// The centre of mass and the rotation that fits best; of a rigid shape that is held, the point that stands for the centre.
     fn fit(&self, x: &[Row]) -> (Vector, Quat<f64>) {
         let x = &x[self.rows.clone()];
         // Measured from one point, so that nothing is lost far from the origin.
         let origin = x.first().map_or(Vector::default(), |row| xyz64(*row));
+        if self.kappa.is_infinite() && x.iter().any(|x| x[3] == 0.0) {
+            return self.fit_held(x, origin);
+        }
         let first = |range: Range<usize>| range.fold(Vector::default(), |sum, i| sum + (xyz64(x[i]) - origin) * self.mass[i]);
         let center = origin + fold(x.len(), first).into_iter().fold(Vector::default(), |a, b| a + b) * (1.0 / self.total);
         // S = sum m q (x - c)^T, as rows.
@@ -58,6 +65,28 @@ impl Shape {
         let add = |a: [Vector; 3], b: [Vector; 3]| [a[0] + b[0], a[1] + b[1], a[2] + b[2]];
         let s = fold(x.len(), second).into_iter().fold([Vector::default(); 3], add);
         (center, rotation(s))
+    }
+
+    /// The same with held masses as heavy as can be: where the origin of the rest places goes to, and the rotation.
+    fn fit_held(&self, x: &[Row], origin: Vector) -> (Vector, Quat<f64>) {
+        let weight = |i: usize| if x[i][3] == 0.0 { HELD * self.total } else { self.mass[i] };
+        let sums = |range: Range<usize>| {
+            range.fold((0.0, Vector::default(), Vector::default()), |(m, q, d), i| {
+                (m + weight(i), q + self.rest[i] * weight(i), d + (xyz64(x[i]) - origin) * weight(i))
+            })
+        };
+        let zero = (0.0, Vector::default(), Vector::default());
+        let (m, q, d) = fold(x.len(), sums).into_iter().fold(zero, |a, b| (a.0 + b.0, a.1 + b.1, a.2 + b.2));
+        let (rest, center) = (q * (1.0 / m), origin + d * (1.0 / m));
+        let second = |range: Range<usize>| {
+            range.fold([Vector::default(); 3], |s, i| {
+                let (q, d) = (self.rest[i] - rest, (xyz64(x[i]) - center) * weight(i));
+                [s[0] + d * q.x, s[1] + d * q.y, s[2] + d * q.z]
+            })
+        };
+        let add = |a: [Vector; 3], b: [Vector; 3]| [a[0] + b[0], a[1] + b[1], a[2] + b[2]];
+        let turn = rotation(fold(x.len(), second).into_iter().fold([Vector::default(); 3], add));
+        (center - turn.turn(rest), turn)
     }
 }
 
