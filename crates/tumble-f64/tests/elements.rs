@@ -98,11 +98,11 @@ fn cases() -> Vec<Case> {
     x.extend([frame([1.0, 2.0, 0.5]), frame([0.8, 2.0, 0.3])]);
     let stretch = [[0, 1, 3], [1, 2, 4]].map(|nodes| Members { nodes, rest: [0.7, 0.6], law: [], stiffness: 2.0, damping: 0.1 });
     add(batch::<StretchShear, Linear, 3, 3, 2, 0>(5, &stretch), x.clone(), 3, true);
-    let bend = [Members { nodes: [3, 4], rest: [2.0 / 0.7, 0.1, -0.2, 0.3, 0.8], law: [], stiffness: 1.2, damping: 0.1 }];
-    add(batch::<BendTwist, Linear, 2, 3, 5, 0>(5, &bend), x.clone(), 3, true);
+    let bend = [Members { nodes: [3, 4], rest: [2.0 / 0.7, 0.1, -0.2, 0.3, 1.7, 0.8], law: [], stiffness: 1.2, damping: 0.1 }];
+    add(batch::<BendTwist, Linear, 2, 3, 6, 0>(5, &bend), x.clone(), 3, true);
     // The same frames with one quaternion negated are the same orientations.
     x[4] = x[4].map(|q| -q);
-    add(batch::<BendTwist, Linear, 2, 3, 5, 0>(5, &bend), x, 3, true);
+    add(batch::<BendTwist, Linear, 2, 3, 6, 0>(5, &bend), x, 3, true);
     for softening in [0.0, 0.6] {
         let masses = Masses { charge: vec![1.0, -2.0, 9.0, 0.5, -1.5, 2.5, 1.0], ..Masses::default() };
         add(Box::new(DirectSum::new(Attractor::Charge(-0.7), softening, false, &[], vec![0..2, 3..7], &masses)), points(7), 7, true);

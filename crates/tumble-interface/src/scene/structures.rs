@@ -269,6 +269,15 @@ pub struct Rod {
     /// Bending stiffness E I.
     #[schemars(range(min = 0.0), extend("x-unit" = "N m²"))]
     pub bend: f64,
+    /// Bending stiffness towards `side`, as of a flat strip in its own plane; without it, `bend` in all directions.
+    #[serde(default)]
+    #[schemars(range(min = 0.0), extend("x-unit" = "N m²"))]
+    pub bend_side: Option<f64>,
+    /// Direction in which `bend_side` resists: the width of a flat strip at its start, made perpendicular to the rod. Without it, horizontal, so
+    /// that a strip lies flat, and along y where the rod starts vertically.
+    #[serde(default)]
+    #[schemars(extend("x-unit" = "1"))]
+    pub side: Option<[f64; 3]>,
     /// Twisting stiffness G J; without it, that of bending.
     #[serde(default)]
     #[schemars(range(min = 0.0), extend("x-unit" = "N m²"))]
@@ -277,7 +286,7 @@ pub struct Rod {
     #[serde(default)]
     #[schemars(extend("x-unit" = "kg m", "exclusiveMinimum" = 0.0))]
     pub inertia: Option<f64>,
-    /// Damping of all four, as a time: damping = time x stiffness.
+    /// Damping of all, as a time: damping = time x stiffness.
     #[serde(default)]
     #[schemars(range(min = 0.0), extend("x-unit" = "s"))]
     pub damping: f64,

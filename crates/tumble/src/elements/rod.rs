@@ -38,26 +38,26 @@ impl Element<3, 3, 2> for StretchShear {
 
 /// Bend and twist between the frames q0 and q1 of neighbouring segments:
 ///
-///   r = S (2/l Im(q0* q1) - kappa0),  S = diag(1, 1, s)              (rods.2)
+///   r = S (2/l Im(q0* q1) - kappa0),  S = diag(1, b, s)              (rods.2)
 ///
-/// l [m] distance of the segments' middles   kappa0 [1/m]   k = E I l [N m³]   s² = (G J)/(E I).
-/// Rest: 2/l, kappa0 (3), s. The nearer of q1 and -q1 is meant.
+/// l [m] distance of the segments' middles   kappa0 [1/m]   k = E I_1 l [N m³]   b² = I_2/I_1   s² = (G J)/(E I_1).
+/// I_1 is for bending about the frame's e_x, I_2 about its e_y. Rest: 2/l, kappa0 (3), b, s. The nearer of q1 and -q1 is meant.
 pub struct BendTwist;
 
-impl Element<2, 3, 5> for BendTwist {
+impl Element<2, 3, 6> for BendTwist {
     const NAME: &'static str = "rod bend";
     const FRAMES: usize = 2;
     #[inline(always)]
-    fn residual<L: Lane>([c, k1, k2, k3, s]: [L; 5], [q0, q1]: [[L; 4]; 2]) -> [L; 3] {
+    fn residual<L: Lane>([c, k1, k2, k3, side, s]: [L; 6], [q0, q1]: [[L; 4]; 2]) -> [L; 3] {
         let turn = Quat::from_row(q0).conj() * Quat::from_row(q1);
         let c = turn.w.positive(c, -c);
-        [turn.v.x * c - k1, turn.v.y * c - k2, (turn.v.z * c - k3) * s]
+        [turn.v.x * c - k1, (turn.v.y * c - k2) * side, (turn.v.z * c - k3) * s]
     }
     #[inline(always)]
-    fn pullback<L: Lane>([c, _, _, _, s]: [L; 5], [q0, q1]: [[L; 4]; 2], [a, b, d]: [L; 3]) -> [[L; 4]; 2] {
+    fn pullback<L: Lane>([c, _, _, _, side, s]: [L; 6], [q0, q1]: [[L; 4]; 2], [a, b, d]: [L; 3]) -> [[L; 4]; 2] {
         let (q0, q1) = (Quat::from_row(q0), Quat::from_row(q1));
         let c = (q0.conj() * q1).w.positive(c, -c);
-        let y = Quat::pure(crate::math::Vec3 { x: a * c, y: b * c, z: d * s * c });
+        let y = Quat::pure(crate::math::Vec3 { x: a * c, y: b * side * c, z: d * s * c });
         // y . Im(q0* q1): by q1 it is q0 y, by q0 it is q1 y*.
         [(q1 * y.conj()).row(), (q0 * y).row()]
     }

@@ -207,7 +207,8 @@ fn plant(site: &mut Site<'_>, thing: &Hair, shape: &[Vector], ground: &Ground<'_
         let p = before.1.conj() * turn;
         let c = if p.w < 0.0 { -2.0 } else { 2.0 } / distance;
         let k = bend * distance;
-        site.parts.rod_bend([before.0, frame], [2.0 / distance, c * p.v.x, c * p.v.y, c * p.v.z, twist.sqrt()], k, k * thing.damping);
+        let rest = [2.0 / distance, c * p.v.x, c * p.v.y, c * p.v.z, 1.0, twist.sqrt()];
+        site.parts.rod_bend([before.0, frame], rest, k, k * thing.damping);
         before = (frame, turn, l);
     }
 }

@@ -60,49 +60,77 @@ fn chain(site: &mut Site<'_>, links: &Links, first: u32, n: u32, spacing: f64) {
     }
 }
 
-/// A frame per segment, its third axis along the segment, carried on from the first without twist.
+/// A frame per segment, its third axis along the segment, carried on from the first without twist; the first axis of the first is where
+/// `bend_side` resists.                                                                                   (rods.8)
 fn frames(site: &mut Site<'_>, thing: &Rope, rod: &Rod, places: &[Vector], first: u32, clamped: [bool; 2], spacing: f64) {
-    let twist = rod.twist.unwrap_or(rod.bend);
-    if rod.bend == 0.0 && twist > 0.0 {
-        return site.wrong(format!("rope \"{}\".rod.bend", thing.name), "0 N m², expected > 0 N m² for a rod that resists twist");
+    let (side, twist) = (rod.bend_side.unwrap_or(rod.bend), rod.twist.unwrap_or(rod.bend));
+    if rod.bend == 0.0 && side.max(twist) > 0.0 {
+        let what = if twist > 0.0 { "twist" } else { "bending to one side" };
+        return site.wrong(format!("rope \"{}\".rod.bend", thing.name), format!("0 N m², expected > 0 N m² for a rod that resists {what}"));
     }
+    let Some(start) = first_frame(rod, places[1] - places[0], site.up) else {
+        return site.wrong(format!("rope \"{}\".rod.side", thing.name), "expected a direction across the rod, not along it");
+    };
+    let ratios = [side, twist].map(|k| if rod.bend > 0.0 { (k / rod.bend).sqrt() } else { 0.0 });
     // A round wire of density rho A has rho A r²/4 about its diameter and twice as much about its axis.
     let inertia = rod.inertia.unwrap_or(thing.density * thing.radius * thing.radius / 2.0) * spacing;
     let shear = (rod.shear.unwrap_or(rod.stretch) / rod.stretch).sqrt();
     let n = places.len() - 1;
-    let mut turn = Quat { v: Vector::default(), w: 1.0 };
-    let mut before = 0;
+    let (mut turn, mut before) = (start, 0);
     for i in 0..n {
         let d = (places[i + 1] - places[i]).normalized();
-        turn = if i == 0 { from_z_to(d) } else { shortest(turn.axis_z(), d) * turn };
+        if i > 0 {
+            turn = shortest(turn.axis_z(), d) * turn;
+        }
         let frame = site.parts.frame(turn.row(), inertia);
         for end in [(i == 0 && clamped[0]), (i + 1 == n && clamped[1])] {
             if end {
-                clamp(site, rod, frame, turn, spacing, twist);
+                clamp(site, rod, frame, turn, spacing, ratios);
             }
         }
         let k = rod.stretch * spacing;
         site.parts.rod_stretch([first + i as u32, first + i as u32 + 1], frame, [spacing, shear], k, k * rod.damping, rod.break_strain);
         if i > 0 && rod.bend > 0.0 {
-            bend(site, rod, [before, frame], spacing, twist);
+            bend(site, rod, [before, frame], spacing, ratios);
         }
         before = frame;
     }
 }
 
 /// Bend and twist between two frames at a distance of l [m].
-fn bend(site: &mut Site<'_>, rod: &Rod, frames: [u32; 2], l: f64, twist: f64) {
+fn bend(site: &mut Site<'_>, rod: &Rod, frames: [u32; 2], l: f64, [side, twist]: [f64; 2]) {
     let k = rod.bend * l;
-    site.parts.rod_bend(frames, [2.0 / l, 0.0, 0.0, 0.0, (twist / rod.bend).sqrt()], k, k * rod.damping);
+    site.parts.rod_bend(frames, [2.0 / l, 0.0, 0.0, 0.0, side, twist], k, k * rod.damping);
+}
+
+/// The frame of a segment that goes along d: its first axis is the rod's side, or horizontal; `None` if that lies along d. Round rods have no
+/// side, and the frame that is nearest to the world's axes.
+fn first_frame(rod: &Rod, d: Vector, up: Vector) -> Option<Quat<f64>> {
+    let d = d.normalized();
+    let upright = from_z_to(d);
+    let side = match (rod.side, rod.bend_side) {
+        (None, None) => return Some(upright),
+        (Some(side), _) => Vector::from(side).normalized(),
+        (None, Some(_)) if up.cross(d).norm() > 1e-6 => up.cross(d),
+        (None, Some(_)) => up.cross(Vector { x: 1.0, y: 0.0, z: 0.0 }),
+    };
+    let across = side - d * side.dot(d);
+    if across.norm() < 1e-6 {
+        return None;
+    }
+    // About e_z by the angle of which these are cosine and sine.
+    let Vector { x, y, .. } = upright.conj().turn(across.normalized());
+    let half = Quat { v: Vector { x: 0.0, y: 0.0, z: y }, w: 1.0 + x };
+    Some(upright * if half.w > 1e-12 { half.normalized() } else { Quat { v: Vector { x: 0.0, y: 0.0, z: 1.0 }, w: 0.0 } })
 }
 
 /// Holds a frame at the very end of the rod, half a segment from that of its last segment: holding the latter itself would
 /// clamp the rod half a segment too far along, an error of order 1.    (rods.5)
-fn clamp(site: &mut Site<'_>, rod: &Rod, frame: u32, turn: Quat<f64>, spacing: f64, twist: f64) {
+fn clamp(site: &mut Site<'_>, rod: &Rod, frame: u32, turn: Quat<f64>, spacing: f64, ratios: [f64; 2]) {
     if rod.bend > 0.0 {
         let held = site.parts.frame(turn.row(), 1.0);
         site.parts.clamp_frame(held);
-        bend(site, rod, [held, frame], spacing / 2.0, twist);
+        bend(site, rod, [held, frame], spacing / 2.0, ratios);
     } else {
         site.parts.clamp_frame(frame);
     }
@@ -173,5 +201,36 @@ mod tests {
         }
         let taut = course(Vector::default(), [3.0, 0.0, 0.0].into(), 2.0, 4, up);
         assert!((taut[1].x - 0.75).abs() < 1e-15);
+    }
+
+    #[test]
+    fn the_first_axis_of_a_strip_is_its_side() {
+        let unit = |x: f64, y: f64, z: f64| Vector { x, y, z };
+        let rod = |side: Option<[f64; 3]>, bend_side| Rod {
+            stretch: 1.0,
+            shear: None,
+            bend: 1.0,
+            bend_side,
+            side,
+            twist: None,
+            inertia: None,
+            damping: 0.0,
+            break_strain: None,
+        };
+        let axis = |side, d| {
+            let q = first_frame(&rod(side, Some(2.0)), d, unit(0.0, 0.0, 1.0)).unwrap_or_else(|| panic!("{d:?}"));
+            assert!((q.axis_z() - d.normalized()).norm() < 1e-14 && (q.v.norm_sq() + q.w * q.w - 1.0).abs() < 1e-14);
+            q.turn(unit(1.0, 0.0, 0.0))
+        };
+        // Flat unless it is told otherwise, also where the rod is vertical; upright; and what is given is made perpendicular.
+        for d in [unit(2.0, 0.0, 0.0), unit(-1.0, 0.5, 0.3), unit(0.0, 0.0, 1.0), unit(0.0, 0.0, -1.0)] {
+            assert!(axis(None, d).z.abs() < 1e-14);
+        }
+        assert!((axis(None, unit(0.0, 0.0, -1.0)).y.abs() - 1.0).abs() < 1e-14);
+        assert!((axis(Some([0.0, 0.0, 3.0]), unit(1.0, 0.0, 0.0)) - unit(0.0, 0.0, 1.0)).norm() < 1e-14);
+        assert!((axis(Some([1.0, 1.0, 0.0]), unit(1.0, 0.0, 0.0)) - unit(0.0, 1.0, 0.0)).norm() < 1e-14);
+        // The one that is opposite to that of the nearest frame.
+        assert!((axis(Some([-1.0, 0.0, 0.0]), unit(0.0, 0.0, 1.0)) - unit(-1.0, 0.0, 0.0)).norm() < 1e-14);
+        assert!(first_frame(&rod(Some([2.0, 0.0, 0.0]), None), unit(-1.0, 0.0, 0.0), unit(0.0, 0.0, 1.0)).is_none());
     }
 }

@@ -26,7 +26,7 @@ const FARTHEST: Real = 0.4;
 const RIDGE: f64 = 4.0 * Real::EPSILON as f64;
 
 type Stretch = Members<3, 2, 0>;
-type Bend = Members<2, 5, 0>;
+type Bend = Members<2, 6, 0>;
 type Block<L> = [[L; 3]; 3];
 
 /// All rods of a system that are chains.
@@ -53,13 +53,13 @@ struct Group {
     inertia: Vec<Real>,
     /// n a strand: 1/l, s, 1 or 0 for what is not there, 1/k, b/k.
     stretch: [Vec<Real>; 5],
-    /// n + 1 a strand: c, kappa0, s, 1 or 0, 1/k, b/k.
-    bend: [Vec<Real>; 8],
+    /// n + 1 a strand: c, kappa0, side, s, 1 or 0, 1/k, b/k.
+    bend: [Vec<Real>; 9],
     damped: bool,
     /// 3 (2 n + 1) a strand; empty for one sweep.
     lambda: Vec<Real>,
     /// What is taken out of `stretch` and `bend` where a segment broke.
-    whole: Option<Box<([Vec<Real>; 5], [Vec<Real>; 8])>>,
+    whole: Option<Box<([Vec<Real>; 5], [Vec<Real>; 9])>>,
 }
 
 /// A chain: which of the stretches, and which of the bends before each of them and after the last.
@@ -167,7 +167,7 @@ impl Strands {
         let at = i as usize * group.count + s as usize;
         (group.stretch[1][at], group.stretch[2][at]) = (0.0, 0.0);
         for at in [at, at + group.count] {
-            (0..6).for_each(|c| group.bend[c][at] = 0.0);
+            (0..7).for_each(|c| group.bend[c][at] = 0.0);
         }
         self.broken.push(e);
     }
@@ -206,10 +206,10 @@ impl Group {
         }
         for i in 0..=n {
             for chain in chains {
-                let mut numbers = [0.0; 8];
+                let mut numbers = [0.0; 9];
                 if let Some(m) = chain.bends[i].map(|e| &bends[e]) {
-                    (0..5).for_each(|c| numbers[c] = m.rest[c] as Real);
-                    (numbers[5], numbers[6], numbers[7]) = (1.0, compliance(m.stiffness), time(m.stiffness, m.damping));
+                    (0..6).for_each(|c| numbers[c] = m.rest[c] as Real);
+                    (numbers[6], numbers[7], numbers[8]) = (1.0, compliance(m.stiffness), time(m.stiffness, m.damping));
                     group.damped |= m.damping > 0.0;
                     // Seen from the held frame at the end, the rod bends the other way.
                     if i == n {
@@ -226,8 +226,9 @@ impl Group {
     fn softening(&self, h: f64) -> f64 {
         let bend = |at: usize| {
             let half = 0.5 * f64::from(self.bend[0][at]);
-            let diagonal = half * half * (f64::from(self.inertia[at]) + f64::from(self.inertia[at + self.count]));
-            let alpha = f64::from(self.bend[6][at]) / (h * h);
+            let side = f64::from(self.bend[4][at]).max(1.0);
+            let diagonal = (half * side).powi(2) * (f64::from(self.inertia[at]) + f64::from(self.inertia[at + self.count]));
+            let alpha = f64::from(self.bend[7][at]) / (h * h);
             if alpha > 0.0 { RIDGE * diagonal / alpha } else { 1.0 }
         };
         (0..(self.n + 1) * self.count).map(bend).fold(1.0, f64::max)
@@ -413,18 +414,18 @@ impl Group {
     #[inline(always)]
     fn bent<W: Width>(&self, w: W, step: &Projection<'_>, i: usize, s: usize, frames: [Quat<W::L>; 2]) -> Bent<W::L> {
         let at = i * self.count + s;
-        let (c, shear) = (w.load(&self.bend[0][at..]), w.load(&self.bend[4][at..]));
-        let rest = [c, w.load(&self.bend[1][at..]), w.load(&self.bend[2][at..]), w.load(&self.bend[3][at..]), shear];
+        let (c, side, twist) = (w.load(&self.bend[0][at..]), w.load(&self.bend[4][at..]), w.load(&self.bend[5][at..]));
+        let rest = [c, w.load(&self.bend[1][at..]), w.load(&self.bend[2][at..]), w.load(&self.bend[3][at..]), side, twist];
         let r = BendTwist::residual(rest, [frames[0].row(), frames[1].row()]);
         let p = frames[0].conj() * frames[1];
         let half = p.w.positive(c, -c) * w.splat(0.5);
-        let s = [half, half, half * shear];
+        let s = [half, half * side, half * twist];
         let (mut forth, mut back) = (cross(s, p.v), cross(s, p.v));
         for k in 0..3 {
             forth[k][k] = forth[k][k] + s[k] * p.w;
             back[k][k] = back[k][k] - s[k] * p.w;
         }
-        let (alpha, share) = soft(w, step, w.load(&self.bend[6][at..]), w.load(&self.bend[7][at..]));
+        let (alpha, share) = soft(w, step, w.load(&self.bend[7][at..]), w.load(&self.bend[8][at..]));
         Bent { r, by: [back, forth], alpha, share }
     }
 
@@ -704,10 +705,10 @@ impl Constraints for Strands {
             }
             for at in 0..(group.n + 1) * group.count {
                 let nodes = [row(&group.frames, at), row(&group.frames, at + group.count)];
-                if group.bend[5][at] > 0.0 {
-                    let rest = [0, 1, 2, 3, 4].map(|c| group.bend[c][at]);
-                    let k = 1.0 / group.bend[6][at];
-                    total += f64::from(energy::<BendTwist, Linear, _, 2, 3, 5, 0>(k, [], rest, nodes));
+                if group.bend[6][at] > 0.0 {
+                    let rest = [0, 1, 2, 3, 4, 5].map(|c| group.bend[c][at]);
+                    let k = 1.0 / group.bend[7][at];
+                    total += f64::from(energy::<BendTwist, Linear, _, 2, 3, 6, 0>(k, [], rest, nodes));
                 }
             }
             total

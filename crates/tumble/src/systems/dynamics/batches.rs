@@ -149,13 +149,13 @@ impl Batches {
     }
 
     /// Adds rods, if there are any: as constraints, chains are solved as a whole.
-    pub fn rods(&mut self, stretches: &[Members<3, 2, 0>], bends: &mut Vec<Members<2, 5, 0>>, limits: &[f64]) -> Option<()> {
+    pub fn rods(&mut self, stretches: &[Members<3, 2, 0>], bends: &mut Vec<Members<2, 6, 0>>, limits: &[f64]) -> Option<()> {
         let strands = self.projected.as_ref().and_then(|inverse| Strands::new(self.rows, self.points, inverse, stretches, bends, limits));
         match strands {
             Some(strands) => self.constraints.push(Box::new(strands)),
             None => _ = self.add::<StretchShear, 3, 3, 2>(stretches, 0.0)?,
         }
-        self.add::<BendTwist, 2, 3, 5>(bends, 0.0).map(|_| ())
+        self.add::<BendTwist, 2, 3, 6>(bends, 0.0).map(|_| ())
     }
 
     /// Adds both laws of solids, if there are any; `None` if a node is not a row.

@@ -154,7 +154,7 @@ pub struct Parts {
     volumes: Vec<Members<4, 10, 0>>,
     strains: Vec<Members<4, 9, 0>>,
     stretches: Vec<Members<3, 2, 0>>,
-    bends: Vec<Members<2, 5, 0>>,
+    bends: Vec<Members<2, 6, 0>>,
     /// Hair that acts on itself, by object.
     coats: Vec<(usize, HairCollisions)>,
     /// Strains at which segments of rods break.
@@ -429,7 +429,7 @@ impl Parts {
     }
 
     /// Adds the bend and twist between two frames.
-    pub fn rod_bend(&mut self, frames: [u32; 2], rest: [f64; 5], stiffness: f64, damping: f64) {
+    pub fn rod_bend(&mut self, frames: [u32; 2], rest: [f64; 6], stiffness: f64, damping: f64) {
         self.bends.push(Members { nodes: frames, rest, law: [], stiffness, damping });
     }
 
