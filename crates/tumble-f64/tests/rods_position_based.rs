@@ -340,7 +340,7 @@ fn a_twisted_ring_leaves_its_plane() {
                 let half = 0.5 * share * critical * f64::from(k) / 200.0;
                 ring.x[ring.held[1]] = (end * Quat { v: vector(0.0, 0.0, half.sin()), w: half.cos() }).row();
                 // Two opposite points up, another one down, and so is the held one.
-                let up = |i: usize| [0.0, 1.0, -1.0, 1.0, 0.0][4 * i / n] * f64::from(u8::from((4 * i) % n == 0));
+                let up = |i: usize| f64::from(u8::from([n / 4, 3 * n / 4].contains(&i))) - f64::from(u8::from(i == n / 2));
                 ring.relax(0.02, 20, |i| vector(0.0, 0.0, 1e-4 * up(i)));
             }
             // The ring as a whole may swing about its tangent where it is held; that keeps these four points in a plane.
