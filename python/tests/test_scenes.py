@@ -37,5 +37,24 @@ def test_failure_is_explained_and_cured(name: str) -> None:
     cured.step(world.scene.to_dict()["time"]["frames"])
 
 
+CROSS = [
+    "cloth/mannequin",
+    "drape/clamped-sheet",
+    "drape/sheet-on-ball",
+    "drape/sheet-on-bunny",
+    "gas/flag_in_a_jet",
+    "structures/blocks",
+    "structures/others",
+]
+"""Structures of springs without `self_contact`, which pass through themselves and each other as they fold and fall."""
+
+
+@pytest.mark.parametrize("name", [n for n in NAMES if not n.startswith("failures/")])
+def test_soft_surfaces_are_expected_not_to_pass_through_each_other(name: str) -> None:
+    words = tumble.Scene.load(SCENES / f"{name}.toml").to_dict()
+    soft = any(words[kind] for kind in ("sheet", "net", "cloth", "block"))
+    assert (words["expect"]["max_intersections"] == 0) == (soft and name not in CROSS)
+
+
 def test_there_are_scenes() -> None:
     assert len(NAMES) >= 14
