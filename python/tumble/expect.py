@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from tumble.run import Run
 
 Curve = npt.NDArray[np.float64]
-Row = Mapping[str, float]
+Row = Mapping[str, Any]
 """The numbers of a frame in ledger.csv."""
 
 
@@ -218,7 +218,7 @@ def _changed(account: Mapping[str, Any], start: Mapping[str, Any], name: str) ->
     if name != "energy":
         return _most(account, change, start)
     # What stretches between objects, or acts on them, is the system's.
-    culprit = _most(account | {"shares": []}, change, start)
+    culprit = _most({**account, "shares": []}, change, start)
     fastest = _worst(account, "speed")
     return culprit | {"fastest": fastest} if culprit and fastest else culprit
 
@@ -230,9 +230,9 @@ def _most(account: Mapping[str, Any], size: Any, start: Mapping[str, Any]) -> di
     if not shares:
         shares = [({"system": name}, ledger) for name, ledger in account["systems"]]
         before = {(name, None): ledger for name, ledger in start["systems"]}
-    sizes = [(size(ledger, before.get((who["system"], who.get("object")))), who) for who, ledger in shares]
-    most = max(sizes, key=lambda one: one[0], default=(0.0, {}))
-    return most[1] if most[0] > 0.0 else {}
+    sizes = [size(ledger, before.get((who["system"], who.get("object")))) for who, ledger in shares]
+    most = max(range(len(sizes)), key=sizes.__getitem__, default=None)
+    return shares[most][0] if most is not None and sizes[most] > 0.0 else {}
 
 
 def _told(culprit: Mapping[str, Any]) -> str:
