@@ -115,7 +115,7 @@ class Measures:
         first = self._first or row
 
         def relative(name: str) -> float:
-            return abs(row[name] - first[name]) / max(abs(first[name]), 1e-300)
+            return float(abs(row[name] - first[name]) / max(abs(first[name]), 1e-300))
 
         def change(name: str) -> float:
             return math.hypot(*(row[f"{name}_{axis}"] - first[f"{name}_{axis}"] for axis in "xyz"))
