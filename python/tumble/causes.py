@@ -88,9 +88,15 @@ def _mode(about: Mapping[str, Any], step: float) -> str:
 
 
 def _formulas(scene: Mapping[str, Any], report: Mapping[str, Any]) -> Iterator[str]:
-    """Formulas of what lies on a grid that may give no finite number, where its steps are not too long."""
+    """Formulas of what lies on a grid, and of fields that carry tracers, that may give no finite number, where steps are not too
+    long."""
     if report.get("kind") != "not_finite" or float(report["step"]) > float(report["stable_step"]):
         return
+    if system(scene, report)[1].get("method") == "tracers":
+        for i, field in enumerate(scene["field"]):
+            for path, text in _texts("", field):
+                if _UNSAFE.search(text):
+                    yield f'field.{i}{path} = "{text}" may give no finite number where a particle came'
     for kind in GRIDS:
         for thing in scene[kind]:
             if thing["name"] == report["object"]:
