@@ -88,8 +88,8 @@ def _mode(about: Mapping[str, Any], step: float) -> str:
 
 
 def _formulas(scene: Mapping[str, Any], report: Mapping[str, Any]) -> Iterator[str]:
-    """Formulas of what lies on a grid, and of fields that carry tracers, that may give no finite number, where steps are not too
-    long."""
+    """Formulas of what lies on a grid, and of fields that carry tracers, that may give no finite number, where steps are not
+    too long."""
     if report.get("kind") != "not_finite" or float(report["step"]) > float(report["stable_step"]):
         return
     if system(scene, report)[1].get("method") == "tracers":

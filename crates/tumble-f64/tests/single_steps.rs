@@ -163,15 +163,15 @@ fn relaxed(theta: f64, w: [f64; 2], [l, s, kappa]: [f64; 3], alpha: f64) -> [f64
 
 #[test]
 fn projected_frames_bend_and_twist_back_as_computed_by_hand() {
-    let (l, twist, k, h, theta, kappa) = (0.5, 1.5, 3.0, 0.4, 0.3, 0.1);
+    let (l, side, twist, k, h, theta, kappa) = (0.5, 1.2, 1.5, 3.0, 0.4, 0.3, 0.1);
     let w = [0.5, 2.0];
     for axis in 0..3 {
-        let mut rest = [2.0 / l, 0.0, 0.0, 0.0, twist];
+        let mut rest = [2.0 / l, 0.0, 0.0, 0.0, side, twist];
         rest[1 + axis] = kappa;
         let member = [Members { nodes: [0, 1], rest, law: [], stiffness: k, damping: 0.0 }];
         let mut x = vec![turned(axis, 0.2).row(), turned(axis, 0.2 + theta).row()];
-        Projected::<BendTwist, Linear, 2, 3, 5, 0>::new(2, 0, &w, &member, &[]).unwrap().project(&mut x, &step_of(h, 0, 1));
-        let s = if axis == 2 { twist } else { 1.0 };
+        Projected::<BendTwist, Linear, 2, 3, 6, 0>::new(2, 0, &w, &member, &[]).unwrap().project(&mut x, &step_of(h, 0, 1));
+        let s = [1.0, side, twist][axis];
         let [first, second] = relaxed(theta, w, [l, s, kappa], 1.0 / (k * h * h));
         println!("about axis {axis}: turned by {first:.4} and {second:.4} rad");
         assert!(first > 0.005 && second < -0.02);
@@ -189,7 +189,7 @@ fn a_twisted_strand_turns_back_as_computed_by_hand() {
     x.extend([turned(2, 0.2).row(), turned(2, 0.2 + theta).row()]);
     let stretches: Vec<Members<3, 2, 0>> =
         (0..2).map(|i| Members { nodes: [i, i + 1, 3 + i], rest: [l, 1.0], law: [], stiffness: 50.0, damping: 0.0 }).collect();
-    let mut bends = vec![Members { nodes: [3, 4], rest: [2.0 / l, 0.0, 0.0, 0.0, twist], law: [], stiffness: k, damping: 0.0 }];
+    let mut bends = vec![Members { nodes: [3, 4], rest: [2.0 / l, 0.0, 0.0, 0.0, 1.0, twist], law: [], stiffness: k, damping: 0.0 }];
     let mut strand = Strands::new(5, 3, &w, &stretches, &mut bends, &[]).unwrap();
     assert!(bends.is_empty());
     let start = x.clone();
