@@ -484,7 +484,7 @@ fn what_follows_a_surface_goes_with_its_triangle() {
             "time.fps = 4\n[[system]]\nintegrator = \"{scheme}\"\n\
              [[particles]]\nname = \"p\"\nposition = [[0.5, 1.0, 0.25], [1.5, 0.25, -0.1]]\nmass = [1, 1]\n\
              pin = [{{ which = \"all\", follow = {{ collider = \"m\" }} }}]\n\
-             [[collider]]\nname = \"m\"\nmotion.velocity = [0, 0, 2]\n\
+             [[collider]]\nname = \"m\"\nthickness = 0.01\nmotion.velocity = [0, 0, 2]\n\
              shape.animated_mesh = {{ shell = true, frames = [{{ time = 0, path = \"a\" }}, {{ time = 1, path = \"b\" }}] }}\n"
         );
         let mut sim = with_meshes(&text, &meshes);
