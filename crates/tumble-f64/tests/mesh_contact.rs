@@ -712,6 +712,7 @@ fn tangled_sheets_come_apart() {
 }
 
 proptest! {
+    #![proptest_config(ProptestConfig { failure_persistence: None, ..ProptestConfig::default() })]
     /// Distances do not depend on which feature is first, nor on where the frame is.
     #[test]
     fn distances_are_symmetric(p in prop::array::uniform4(prop::array::uniform3(-1.0..1.0_f64)), shift in prop::array::uniform3(-9.0..9.0_f64)) {

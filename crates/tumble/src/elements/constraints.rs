@@ -9,7 +9,7 @@ use super::list::Members;
 use super::{Compliance, Element, Law, corrected, energy, project};
 use crate::geometry::Walls;
 use crate::math::parallel::{self, Tasks, fold, worst};
-use crate::math::simd::{Index, Kernel, Width, count, dispatch, largest, packs};
+use crate::math::simd::{Index, Kernel, Width, count, dispatch, packs};
 use crate::math::{Lane, Quat, Real, Row, Vec3, xyz};
 use std::marker::PhantomData;
 use std::ops::Range;
@@ -133,6 +133,16 @@ struct Columns<const N: usize, const D: usize, const P: usize> {
     given: Vec<u32>,
 }
 
+/// Nodes whose frames, the last ones, have length 1.
+#[inline(always)]
+fn unit_frames<L: Lane, const N: usize>(frames: usize, nodes: [[L; 4]; N]) -> [[L; 4]; N] {
+    let mut out = nodes;
+    for a in N - frames..N {
+        out[a] = Quat::from_row(nodes[a]).normalized().row();
+    }
+    out
+}
+
 fn compliance(stiffness: f64) -> Real {
     (1.0 / stiffness).min(LIMP) as Real
 }
@@ -193,11 +203,38 @@ impl<const N: usize, const D: usize, const P: usize> Columns<N, D, P> {
         for a in 0..N {
             // SAFETY: see above.
             out[a] = unsafe { w.gather_at(x, &self.nodes[a].get()[e..]) };
-            if a >= N - frames {
-                out[a] = Quat::from_row(out[a]).normalized().row();
-            }
         }
-        out
+        unit_frames(frames, out)
+    }
+
+    /// The same of a pack that is `consecutive`.
+    ///
+    /// # Safety
+    /// As of `gather`.
+    #[inline(always)]
+    unsafe fn gather_run<W: Width>(&self, w: W, frames: usize, x: *const Row, e: usize) -> [[W::L; 4]; N] {
+        let mut out = [[w.splat(0.0); 4]; N];
+        for a in 0..N {
+            // SAFETY: see above.
+            out[a] = unsafe { w.rows_at(x, self.nodes[a].get()[e]) };
+        }
+        unit_frames(frames, out)
+    }
+
+    /// Whether the first nodes of a pack lie one behind the other, and so do the second ones: of links only, to which it happens on lattices.
+    #[inline(always)]
+    fn consecutive<W: Width>(&self, w: W, e: usize) -> bool {
+        N == 2 && w.consecutive(self.index(e))
+    }
+
+    /// The indices of a pack.
+    #[inline(always)]
+    fn index(&self, e: usize) -> [&[u32]; N] {
+        let mut index: [&[u32]; N] = [&[]; N];
+        for a in 0..N {
+            index[a] = &self.nodes[a].get()[e..];
+        }
+        index
     }
 
     /// Rest numbers and parameters of the law of a pack.
@@ -392,9 +429,10 @@ impl<E: Element<N, M, D>, Y: Law<P>, const N: usize, const M: usize, const D: us
         let inverse_h = 1.0 / sweep.h;
         packs!(W, w, self.range, |e| {
             let (rest, law) = columns.pack(w, e);
+            let (run, rows) = (columns.consecutive(w, e), sweep.x.rows());
             // SAFETY: `check` has been called. Of elements that are projected at the same time none share a node: those of a colour by its
             // making, those of two clusters since each has rows of its own.
-            let x = unsafe { columns.gather(w, E::FRAMES, sweep.x.rows(), e) };
+            let x = unsafe { if run { columns.gather_run(w, E::FRAMES, rows, e) } else { columns.gather(w, E::FRAMES, rows, e) } };
             let mut weights = [w.splat(0.0); N];
             for a in 0..N {
                 weights[a] = if a < N - E::FRAMES { x[a][3] } else { w.load(&columns.inverse[a][e..]) };
@@ -426,9 +464,16 @@ impl<E: Element<N, M, D>, Y: Law<P>, const N: usize, const M: usize, const D: us
                 }
             }
             let x = corrected(E::FRAMES, x, moves);
-            for a in 0..N {
-                // SAFETY: as above.
-                unsafe { w.put(x[a], sweep.x.rows(), &columns.nodes[a].get()[e..]) };
+            if run {
+                for a in 0..N {
+                    // SAFETY: as above.
+                    unsafe { w.put_rows(x[a], rows, columns.nodes[a].get()[e]) };
+                }
+            } else {
+                for a in 0..N {
+                    // SAFETY: as above.
+                    unsafe { w.put(x[a], rows, &columns.nodes[a].get()[e..]) };
+                }
             }
         });
     }
@@ -476,7 +521,7 @@ impl<E: Element<N, M, D>, const N: usize, const M: usize, const D: usize, const 
     type Output = Real;
     #[inline(always)]
     fn run<W: Width>(self, w: W) -> Real {
-        let (columns, mut most) = (self.columns, Real::NEG_INFINITY);
+        let (columns, mut most) = (self.columns, [Real::NEG_INFINITY; 16]);
         packs!(W, w, self.range, |e| {
             // SAFETY: `largest_strain` has called `check`.
             let x = unsafe { columns.gather(w, E::FRAMES, self.x.as_ptr(), e) };
@@ -488,14 +533,17 @@ impl<E: Element<N, M, D>, const N: usize, const M: usize, const D: usize, const 
                     (way.norm() - rest) / rest
                 }
                 None => {
-                    let Some(strain) = E::lengthening(columns.pack(w, e).0, x) else { return most };
+                    let Some(strain) = E::lengthening(columns.pack(w, e).0, x) else { return Real::NEG_INFINITY };
                     strain
                 }
             };
             let limp = soft - w.splat(0.5 * LIMP as Real);
-            most = largest(w, limp.positive(w.splat(Real::NEG_INFINITY), strain), most);
+            let strain = limp.positive(w.splat(Real::NEG_INFINITY), strain);
+            // NaN is never the larger.
+            let so_far = w.load(&most);
+            w.store((strain - so_far).positive(strain, so_far), &mut most);
         });
-        most
+        most.into_iter().fold(Real::NEG_INFINITY, Real::max)
     }
 }
 
@@ -680,20 +728,25 @@ mod tests {
 
     #[test]
     fn links_inside_and_between_clusters_are_all_satisfied_in_their_order() {
-        // A zigzag over three clusters, whose links are to be shorter than they are, from 1 to 0.7 m.
+        // A zigzag over three clusters, whose links are to be shorter than they are; and links between its rows of 64, of which packs have
+        // nodes one behind the other.
         let n = 3 * CLUSTER as u32;
-        let members: Vec<_> =
-            (0..n - 1).map(|i| Members { nodes: [i, i + 1], rest: [0.7], law: [], stiffness: f64::INFINITY, damping: 0.0 }).collect();
+        let link = |nodes, rest| Members { nodes, rest: [rest], law: [], stiffness: f64::INFINITY, damping: 0.0 };
+        let across = (0..n - 64).map(|i| link([i, i + 64], if i % 2 == 0 { 0.3 } else { 0.05 }));
+        let members: Vec<_> = (0..n - 1).map(|i| link([i, i + 1], 0.7)).chain(across).collect();
         let start: Vec<Row> = (0..n).map(|i| [(i % 64) as Real * 0.8, 0.6 * (i % 2) as Real, 0.1 * (i / 64) as Real, 1.0]).collect();
         let (given, _) = sorted(n as usize, &members);
+        let columns = Columns::new(n as usize, n as usize, &[], &members).unwrap();
+        assert!((0..given.len() - 16).any(|e| columns.index(e).iter().all(|i| (1..16).all(|l| i[l] == i[0] + l as u32))));
         // One link after the other, in double precision: both ends go half of the way.
         let mut expected: Vec<[f64; 3]> = start.iter().map(|x| [0, 1, 2].map(|c| f64::from(x[c]))).collect();
         for e in given {
-            let [a, b] = [e as usize, e as usize + 1];
+            let Members { nodes: [a, b], rest: [rest], .. } = members[e as usize];
+            let [a, b] = [a as usize, b as usize];
             let d: [f64; 3] = std::array::from_fn(|c| expected[b][c] - expected[a][c]);
             let length = d.iter().map(|d| d * d).sum::<f64>().sqrt();
             for c in 0..3 {
-                let half = 0.5 * (1.0 - 0.7 / length) * d[c];
+                let half = 0.5 * (1.0 - rest / length) * d[c];
                 expected[a][c] += half;
                 expected[b][c] -= half;
             }

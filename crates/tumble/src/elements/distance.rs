@@ -1,7 +1,7 @@
 //! Springs along a line.
 
 use super::{Element, force, point};
-use crate::math::Lane;
+use crate::math::{Lane, Vec3};
 
 /// The spring of rest length l:
 ///
@@ -13,6 +13,10 @@ pub struct Distance;
 impl Element<2, 1, 1> for Distance {
     const NAME: &'static str = "distance";
     const LENGTH: Option<usize> = Some(0);
+    #[inline(always)]
+    fn way<L: Lane>([x0, x1]: [[L; 4]; 2]) -> Option<Vec3<L>> {
+        Some(point(x1) - point(x0))
+    }
     #[inline(always)]
     fn residual<L: Lane>([l]: [L; 1], [x0, x1]: [[L; 4]; 2]) -> [L; 1] {
         [(point(x1) - point(x0)).norm() - l]

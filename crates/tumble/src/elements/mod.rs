@@ -52,6 +52,11 @@ pub trait Element<const N: usize, const M: usize, const D: usize>: Send + Sync +
     const FRAMES: usize = 0;
     /// Of a link, which of the rest numbers is its length.
     const LENGTH: Option<usize> = None;
+    /// Of a link, the way from its first point to its second; the measure is its length less a rest length.
+    #[inline(always)]
+    fn way<L: Lane>(_x: [[L; 4]; N]) -> Option<Vec3<L>> {
+        None
+    }
     /// The measure r that the stiffness multiplies.
     fn residual<L: Lane>(rest: [L; D], x: [[L; 4]; N]) -> [L; M];
     /// J(x)^T y: forces on points, and on the four numbers of a frame.
@@ -288,6 +293,15 @@ pub fn project<E: Element<N, M, D>, Y: Law<P>, L: Lane, const N: usize, const M:
         for i in 0..M {
             y[i] = c.positive(y[i] / c, c.zero());
         }
+    }
+    if let Some(way) = E::way(x) {
+        // Both g are of length 1: one quotient does for the direction and for dlambda.
+        let length = way.norm();
+        let weight = (slope * (w[0] + w[1]) + alpha) * length;
+        let part = weight.positive(-(c + alpha * lambda) / weight, c.zero());
+        let mut out = [-way * (w[0] * part); N];
+        out[1] = way * (w[1] * part);
+        return (out, part * length);
     }
     let g = lower(E::FRAMES, x, E::pullback(rest, x, y));
     let mut weight = alpha.zero();

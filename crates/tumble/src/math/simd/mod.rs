@@ -87,6 +87,18 @@ pub trait Width: Copy + Send + Sync {
     /// # Safety
     /// There are rows at every index, all different, and nobody else reads or writes them.
     unsafe fn put(self, v: [Self::L; 4], rows: *mut Row, index: &[u32]);
+    /// Whether all of these, `index[..N]`, are numbers one behind the other, as on lattices: then `rows_at` is faster than `gather_at`.
+    fn consecutive<const A: usize>(self, index: [&[u32]; A]) -> bool;
+    /// What `gather_at` loads of the rows `start..start + N`.
+    ///
+    /// # Safety
+    /// There are such rows, and nobody writes them.
+    unsafe fn rows_at(self, rows: *const Row, start: u32) -> [Self::L; 4];
+    /// What `put` does with the rows `start..start + N`.
+    ///
+    /// # Safety
+    /// There are such rows, and nobody else reads or writes them.
+    unsafe fn put_rows(self, v: [Self::L; 4], rows: *mut Row, start: u32);
     /// Loads `from[i]` and `from[i + 1]` for `index[..N]`.
     ///
     /// # Safety
@@ -226,6 +238,20 @@ impl Width for Scalar {
     unsafe fn put(self, v: [Real; 4], rows: *mut Row, index: &[u32]) {
         // SAFETY: the caller has checked the index.
         unsafe { *rows.add(index[0] as usize) = v };
+    }
+    #[inline(always)]
+    fn consecutive<const A: usize>(self, _index: [&[u32]; A]) -> bool {
+        true
+    }
+    #[inline(always)]
+    unsafe fn rows_at(self, rows: *const Row, start: u32) -> [Real; 4] {
+        // SAFETY: the caller has checked the place.
+        unsafe { *rows.add(start as usize) }
+    }
+    #[inline(always)]
+    unsafe fn put_rows(self, v: [Real; 4], rows: *mut Row, start: u32) {
+        // SAFETY: the caller has checked the place.
+        unsafe { *rows.add(start as usize) = v };
     }
     #[inline(always)]
     unsafe fn pairs(self, from: &[Real], index: &[i32]) -> [Real; 2] {
@@ -589,6 +615,54 @@ mod tests {
                 let wanted = [from[at], from[at + 1], from[at], from[at + 1], from[at + 2], from[at + 3], floor, floor];
                 assert_eq!(out[8 * i..8 * i + 8], wanted, "{level:?}");
             }
+        }
+    }
+
+    /// Moves rows to three places behind: where they lie one behind the other as whole registers, else one by one.
+    struct Shifts<'a> {
+        from: &'a [Row],
+        index: &'a Index,
+        to: &'a mut [Row],
+    }
+
+    impl Kernel for Shifts<'_> {
+        type Output = (usize, usize);
+        #[inline(always)]
+        fn run<W: Width>(self, w: W) -> (usize, usize) {
+            let mut runs = 0;
+            for start in (0..64).step_by(W::N) {
+                let index = &self.index.get()[start..];
+                let mut behind = [0; 16];
+                for l in 0..W::N {
+                    behind[l] = index[l] + 3;
+                }
+                let run = w.consecutive([index, &behind[..]]);
+                runs += usize::from(run);
+                // SAFETY: all indices are below 64, of 67 rows.
+                unsafe {
+                    if run {
+                        w.put_rows(w.rows_at(self.from.as_ptr(), index[0]), self.to.as_mut_ptr(), behind[0]);
+                    } else {
+                        w.put(w.gather_at(self.from.as_ptr(), index), self.to.as_mut_ptr(), &behind);
+                    }
+                }
+            }
+            (W::N, runs)
+        }
+    }
+
+    #[test]
+    fn every_width_moves_rows_that_lie_one_behind_the_other() {
+        let from: Vec<Row> = (0..67).map(|i| [i as Real, 0.1 * i as Real, -(i as Real), 100.0 + i as Real]).collect();
+        // All but two lie one behind the other.
+        let mut order: Vec<u32> = (0..64).collect();
+        order.swap(30, 31);
+        let index = Index::new(order, 64).unwrap();
+        for level in Level::available() {
+            let mut to = vec![[0.0; 4]; 67];
+            let (width, runs) = dispatch_at(level, Shifts { from: &from, index: &index, to: &mut to });
+            assert_eq!(&to[3..], &from[..64], "{level:?}");
+            assert_eq!(runs, 64 / width - usize::from(width > 1), "{level:?}");
         }
     }
 

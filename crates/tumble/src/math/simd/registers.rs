@@ -50,6 +50,33 @@ macro_rules! width {
                 }
             }
             #[inline(always)]
+            fn consecutive<const A: usize>(self, index: [&[u32]; A]) -> bool {
+                let mut off = [0; $n];
+                for a in 0..A {
+                    let index = &index[a][..$n];
+                    for i in 0..$n {
+                        off[i] |= index[i] ^ index[0].wrapping_add(i as u32);
+                    }
+                }
+                let mut any = 0;
+                for i in 0..$n {
+                    any |= off[i];
+                }
+                any == 0
+            }
+            #[inline(always)]
+            unsafe fn rows_at(self, rows: *const Row, start: u32) -> [Self::L; 4] {
+                // SAFETY: the caller has checked the place; arrays of numbers are aligned as one of them.
+                let run = unsafe { *rows.add(start as usize).cast::<[[Real; $n]; 4]>() };
+                self.transpose_run(four_packs!(self, [run[0], run[1], run[2], run[3]]))
+            }
+            #[inline(always)]
+            unsafe fn put_rows(self, v: [Self::L; 4], rows: *mut Row, start: u32) {
+                let [a, b, c, d] = self.untranspose_run(v);
+                // SAFETY: as above.
+                unsafe { *rows.add(start as usize).cast::<[[Real; $n]; 4]>() = [cast(a.v), cast(b.v), cast(c.v), cast(d.v)] };
+            }
+            #[inline(always)]
             unsafe fn pairs(self, from: &[Real], index: &[i32]) -> [Self::L; 2] {
                 let mut at = [0; $n];
                 at.copy_from_slice(&index[..$n]);
