@@ -1,5 +1,6 @@
 """Looks inside a frame."""
 
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -55,3 +56,29 @@ def test_what_breaks_inside_a_frame_is_told() -> None:
             world.inside(n)
     with pytest.raises(SceneError, match="expected >= 1"):
         world.inside(0)
+
+
+@pytest.mark.parametrize("scheme", ["implicit_euler", "implicit_midpoint", "bdf2"])
+def test_what_breaks_leaves_nothing_behind(scheme: str, tmp_path: Path) -> None:
+    """Numbers that overflow in a solve are gone with the state that held them."""
+    rope: Tree = {"name": "rope", "from": [0, 0, 1], "to": [1, 0, 1], "segments": 8, "pin": ["start"]}
+    rope["links"] = {"structural": {"modulus": 1000.0}}
+    system = [{"integrator": scheme, "substeps": 2}]
+    world = World({"version": 1, "system": system, "rope": [rope]}, threads=1)
+    world.step(2)
+    world.save(tmp_path / "state.safetensors")
+    world.step()
+    after, broke = world.hash(), 0
+    for far in 10.0 ** np.arange(6, 31, 2):
+        world.load(tmp_path / "state.safetensors")
+        position = np.array(world.frame["rope"]["position"])
+        position[3, 1] = far
+        world.write("rope", "position", position)
+        try:
+            world.step()
+        except StepError:
+            broke += 1
+        world.load(tmp_path / "state.safetensors")
+        world.step()
+        assert world.hash() == after, f"after {far:.0e} m"
+    assert broke > 1
