@@ -37,16 +37,8 @@ def test_failure_is_explained_and_cured(name: str) -> None:
     cured.step(world.scene.to_dict()["time"]["frames"])
 
 
-CROSS = [
-    "cloth/mannequin",
-    "drape/clamped-sheet",
-    "drape/sheet-on-ball",
-    "drape/sheet-on-bunny",
-    "gas/flag_in_a_jet",
-    "structures/blocks",
-    "structures/others",
-]
-"""Structures of springs without `self_contact`, which pass through themselves and each other as they fold and fall."""
+CROSS = ["cloth/mannequin"]
+"""Springs without `self_contact`, which pass through each other as they fold: it would hold the veil back and stretch it to 2.6 times its size."""
 
 
 @pytest.mark.parametrize("name", [n for n in NAMES if not n.startswith("failures/")])
