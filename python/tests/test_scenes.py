@@ -38,7 +38,7 @@ def test_failure_is_explained_and_cured(name: str) -> None:
 
 
 CROSS = ["cloth/mannequin"]
-"""Springs without `self_contact`, which pass through each other as they fold: it would hold the veil back and stretch it to 2.6 times its size."""
+"""Springs that pass through each other as they fold: `self_contact` would stretch this veil to 2.6 times its size."""
 
 
 @pytest.mark.parametrize("name", [n for n in NAMES if not n.startswith("failures/")])
