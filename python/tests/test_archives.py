@@ -24,7 +24,7 @@ from test_soak import MIXED
 
 from tumble import ExportError, Scene, SceneError, StepError, World
 from tumble.emitters import born
-from tumble.folder import RunFolder, read_column, read_columns, write_columns
+from tumble.folder import LEDGER, RunFolder, read_column, read_columns, read_rows, write_columns
 from tumble.run import simulate
 
 SLOWEST = 10.0
@@ -148,7 +148,8 @@ def test_frames_that_cannot_be_opened_are_computed_again(spring: Tree, tmp_path:
     path = run.folder / "frames/000005.npz"
     whole = path.read_bytes()
     changed(path, whole.index(b"PK\x01\x02") + 6, b"\xff")
-    assert RunFolder(run.folder).intact(7) == 5
+    files = RunFolder(run.folder)
+    assert files.intact(read_rows(files.ledger, LEDGER)) == 5
     assert simulate(spring, run.folder, frames=6, resume=True).manifest["resumed"] == 1
     assert path.read_bytes() == whole
 
@@ -156,7 +157,7 @@ def test_frames_that_cannot_be_opened_are_computed_again(spring: Tree, tmp_path:
 @pytest.mark.parametrize("ids", [np.array(3), np.array([np.nan]), np.zeros((2, 2), "u4")])
 def test_ids_that_count_nothing_are_damage(ids: np.ndarray[Any, Any], tmp_path: Path) -> None:
     run = simulate(SCENES["particles"], tmp_path / "run", frames=2)
-    write_columns(run.folder / "frames/000001.npz", {"spray": run.frame(1)["spray"] | {"id": ids}})
+    write_columns(run.folder / "frames/000001.npz", {"spray": run.frame(1)["spray"] | {"id": ids}}, run.mark(1))
     for read in (born, lambda run: run.frame(1)):
         with pytest.raises(ExportError, match=r"000001\.npz: is damaged"):
             read(run)

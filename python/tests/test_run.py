@@ -13,7 +13,7 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from runs import OBJECT, Killed, N, Tree, assert_same, half, kill_at, killed, truncate
 
-from tumble import Run, Scene, SceneError, World, _engine
+from tumble import ExportError, Run, Scene, SceneError, World, _engine
 from tumble.folder import LEDGER, cell, plain
 from tumble.run import simulate
 
@@ -178,6 +178,25 @@ def damage_frame_before_checkpoint(folder: Path) -> None:
     half(folder / "frames/000015.npz")
 
 
+def exchange_frames(folder: Path) -> None:
+    shutil.copy(folder / "frames/000004.npz", folder / "frames/000002.npz")
+
+
+def put_a_frame_of_another_run(folder: Path) -> None:
+    scene = json.loads((folder / "run.json").read_text())["scene"]
+    scene["particles"][0]["velocity"] = [[0, 0, 0], [0.6, 0, 0]]
+    other = simulate(scene, folder.parent / "other", frames=3).folder
+    shutil.copy(other / "frames/000003.npz", folder / "frames/000003.npz")
+
+
+def flip_a_bit_of_a_frame(folder: Path) -> None:
+    """In the middle of its numbers, where the archive's directory shows nothing."""
+    path = folder / "frames/000003.npz"
+    data = bytearray(path.read_bytes())
+    data[data.index(b"PK\x03\x04", 4) - 1] ^= 1
+    path.write_bytes(data)
+
+
 def lose_frame(folder: Path) -> None:
     (folder / "frames/000012.npz").unlink()
 
@@ -225,6 +244,9 @@ def leave_temporary_files(folder: Path) -> None:
         damage_last_frame,
         damage_early_frame,
         damage_frame_before_checkpoint,
+        exchange_frames,
+        put_a_frame_of_another_run,
+        flip_a_bit_of_a_frame,
         lose_frame,
         damage_checkpoint,
         damage_both_checkpoints,
@@ -257,6 +279,23 @@ def test_a_file_cut_off_anywhere_is_survived(
     path = killed(spring, folder / "run", 12) / which
     truncate(path, int(share * path.stat().st_size))
     assert_same(simulate(spring, folder / "run", frames=13, resume=True), whole)
+
+
+def test_lost_trials_are_noticed_and_tried_again(spring: Tree, tmp_path: Path) -> None:
+    spring["system"] = [{"integrator": "dormand_prince", "adaptive": {"tolerance": 1e-9}}]
+    whole = simulate(spring, tmp_path / "whole")
+    lines = (whole.folder / "trials.csv").read_bytes().splitlines(keepends=True)
+    assert len(lines) > 2 * N and whole.ledger["tried"].sum() == len(lines) - 1
+    folder = killed(spring, tmp_path / "run", 23)
+    # One in the middle, the last, and half of a line.
+    for lost in (lines[:9] + lines[10:], lines[:-1], [*lines[:9], lines[9][:5]]):
+        (folder / "trials.csv").write_bytes(b"".join(lost))
+        run = simulate(spring, folder, resume=True)
+        assert_same(run, whole)
+        assert all((run.trials[name] == whole.trials[name]).all() for name in whole.trials)
+    (folder / "trials.csv").write_bytes(b"".join(lines[:-1]))
+    with pytest.raises(ExportError, match=r"trials\.csv: is damaged \(of frame 25 .*--resume"):
+        _ = Run(folder).trials
 
 
 def test_what_came_after_the_checkpoint_is_dropped(spring: Tree, tmp_path: Path, reference: Run) -> None:

@@ -4,7 +4,6 @@ What `tumble view` serves, and to whom, is in test_view.py; links and files of t
 bytes that are no meshes in crates/tumble-io/tests/fuzz.rs.
 """
 
-import io
 import json
 import os
 import pickle
@@ -22,7 +21,7 @@ from conftest import Answer
 from counts import FACTOR, note
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from runs import OBJECT, Tree
+from runs import OBJECT, Tree, repack
 
 import tumble as package
 from tumble import ExportError, Run, Scene, SceneError, TumbleError, World
@@ -155,7 +154,7 @@ def test_archives_with_objects_in_them_are_damaged_ones(
     pickle.loads(pickle.dumps(trap))  # It does bite.
     Path("hit").rmdir()
     path = reference.folder / "frames/000003.npz"
-    np.savez(path, **{f"{OBJECT}/position": trap, "static": trap})
+    repack(path, {f"{OBJECT}/position": trap, "static": trap})
     np.savez(reference.folder / "static.npz", **{f"{OBJECT}/mass": trap})
     with pytest.raises(ExportError, match=r"000003\.npz: is damaged"):
         reference.frame(3)
@@ -185,9 +184,7 @@ def test_names_in_archives_do_not_lead_out_of_the_folder(
         elif path.suffix == ".npz":
             with np.load(path) as archive:
                 arrays = {key.replace("dust/", f"{name}/"): archive[key] for key in archive.files}
-            packed = io.BytesIO()
-            np.savez(packed, **arrays)
-            path.write_bytes(packed.getvalue())
+            repack(path, arrays)
     assert name in Run(run.folder).frame(1)
     before = {f for f in tmp_path.rglob("*") if not f.is_relative_to(run.folder)}
     for kind in ("--ply", "--usd", "--npz"):

@@ -23,7 +23,7 @@ def test_every_code_is_listed_and_every_listed_code_is_said() -> None:
     engine = "".join(file.read_text(encoding="utf-8") for file in (ROOT / "crates/tumble/src").rglob("*.rs"))
     unsaid = [code for variant, code in words if f"Code::{variant}" not in engine]
     front = "".join(file.read_text(encoding="utf-8") for file in (ROOT / "python/tumble").rglob("*.py"))
-    said = re.findall(r'(?:warn\(|warn, |yield \(\s*)"([a-z-]+)"', front)
+    said = re.findall(r'(?:warn\(|yield \(\s*|"code": )"([a-z-]+)"', front)
     assert len(words) > 15 and len(said) > 4 and not unsaid
     assert sorted(LISTED) == sorted({code for _, code in words} | set(said))
     assert len(LISTED) == len(set(LISTED))
@@ -145,6 +145,88 @@ WARM: Tree = {
         }
     ]
 }
+
+
+POINT: Tree = {"name": "p", "position": [[0, 0, 1]], "mass": [1]}
+SPRAY: Tree = {"name": "e", "rate": 9, "from": {"point": {"at": [0, 0, 1]}}}
+TRACERS: Tree = {"name": "t", "method": "tracers", "integrator": "rk4"}
+SWIRL: Tree = {"field": [{"kind": "vortex", "center": [0, 0, 0], "axis": [0, 0, 1], "swirl": 1}]}
+AIR: Tree = {"force": [{"kind": "air"}]}
+MAGNET: Tree = {"force": [{"kind": "magnetic", "field": [0, 0, 1]}]}
+TWO: Tree = {"system": [{"name": "a"}, {"name": "b"}]}
+
+
+def anchored(stiffness: float) -> Tree:
+    ends = [{"name": name, "system": name, "position": [[i, 0, 0]], "mass": [1]} for i, name in enumerate("ab")]
+    anchor = {"name": "tie", "between": ["a 0", "b 0"], "stiffness": stiffness}
+    return TWO | {"particles": ends, "anchor": [anchor]}
+
+
+def carried(*order: str) -> Tree:
+    systems = {"t": TRACERS, "g": {"name": "g", "method": "gas"}}
+    gas = GAS["gas"][0] | {"name": "air", "system": "g"}
+    return {
+        "system": [systems[name] for name in order],
+        "particles": [POINT | {"system": "t"}],
+        "gas": [gas],
+        "field": [{"kind": "gas", "of": "air"}],
+    }
+
+
+def killed_within(radius: float) -> Tree:
+    rule = {"inside": {"sphere": {"center": [0, 0, 0], "radius": radius}}}
+    return {"emitter": [SPRAY | {"velocity": [0, 0, -10], "kill": [rule]}]}
+
+
+VAIN: list[tuple[str, str, Tree, Tree]] = [
+    # Code, place, what is doubtful, and what is not.
+    ("idle-fields", "field", {"particles": [POINT], **SWIRL}, {"particles": [POINT], "system": [TRACERS], **SWIRL}),
+    (
+        "idle-tracers",
+        "",
+        {"particles": [POINT], "system": [TRACERS]},
+        {"particles": [POINT], "system": [TRACERS], **SWIRL},
+    ),
+    (
+        "unfelt",
+        "collider",
+        {"particles": [POINT], "system": [TRACERS], **SWIRL, **FLOOR},
+        {"particles": [POINT], **FLOOR},
+    ),
+    ("no-surface", "force[0]", {"particles": [POINT], **AIR}, {"sheet": [SHEET], **AIR}),
+    ("no-charge", "force[0]", {"particles": [POINT], **MAGNET}, {"particles": [POINT | {"charge": [1]}], **MAGNET}),
+    (
+        "no-collider",
+        'emitter "e".kill[0]',
+        {"emitter": [SPRAY | {"kill": [{"near_collider": 0.1}]}]},
+        {"emitter": [SPRAY | {"kill": [{"near_collider": 0.1}]}], **FLOOR},
+    ),
+    ("no-births", 'emitter "e"', {"emitter": [SPRAY | {"start": 60}]}, {"emitter": [SPRAY]}),
+    (
+        "no-such-frame",
+        "output.stills",
+        {"particles": [POINT], "time": {"frames": 2}, "output": {"stills": [3]}},
+        {"particles": [POINT], "time": {"frames": 2}, "output": {"stills": [2]}},
+    ),
+    ("thin-region", 'emitter "e".kill[0].inside', killed_within(0.1), killed_within(1.0)),
+    ("late-carrier", 'system "t"', carried("t", "g"), carried("g", "t")),
+    (
+        "starts-inside",
+        '"p"',
+        {"particles": [POINT | {"position": [[0, 0, -1]]}], **FLOOR},
+        {"particles": [POINT], **FLOOR},
+    ),
+    ("stiff-anchor", 'anchor "tie"', anchored(1e6), anchored(1.0)),
+]
+
+
+@pytest.mark.parametrize(("code", "path", "vain", "heeded"), VAIN, ids=[row[0] for row in VAIN])
+def test_what_a_scene_says_in_vain_is_told(code: str, path: str, vain: Tree, heeded: Tree) -> None:
+    def told(words: Tree) -> list[tuple[str, str]]:
+        return [(warning["code"], warning["path"]) for warning in World({"version": 1} | words).warnings]
+
+    assert told(vain) == [(code, path)]
+    assert told(heeded) == []
 
 
 @pytest.mark.parametrize(

@@ -167,7 +167,7 @@ def born(run: "Run") -> dict[str, tuple[int, int]]:
     for emitter in run.scene["emitter"]:
         name, most, last = str(emitter["name"]), 0, 0
         for i in range(run.n_frames):
-            ids = read_column(files.frame(i), name, "id")
+            ids = read_column(files.frame(i), name, "id", run.mark(i))
             if ids is not None:
                 if ids.ndim != 1 or ids.dtype.kind not in "iu":
                     raise ExportError(

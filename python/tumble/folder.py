@@ -11,6 +11,7 @@ import math
 import os
 import textwrap
 import zipfile
+from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
 from pathlib import Path
@@ -25,7 +26,7 @@ from tumble.interrupts import held
 Columns = dict[str, dict[str, npt.NDArray[Any]]]
 """Object name -> column name -> array."""
 
-FORMAT = 2
+FORMAT = 3
 """Version of the run folder."""
 
 # fmt: off
@@ -35,11 +36,12 @@ LEDGER = [
     "angular_momentum_x", "angular_momentum_y", "angular_momentum_z",
     "kinetic", "elastic", "external", "energy",
     "stretch", "penetration", "intersections", "speed", "contacts", "broken", "heat", "heat_in", "volume", "divergence",
-    "steps", "rejected", "newton", "linear", "residual", "unconverged", "clamped", "courant",
+    "steps", "rejected", "tried", "newton", "linear", "residual", "unconverged", "clamped", "courant",
     "smallest_step", "largest_step", "seconds", "hash",
 ]
 # fmt: on
-"""Columns of ledger.csv, one row per frame: SI units; `seconds` is the time that computing the frame took."""
+"""Columns of ledger.csv, one row per frame: SI units; `seconds` is the time that computing the frame took, `tried` counts its
+rows of trials.csv."""
 
 TRIALS = ["time", "step", "error", "accepted", "frame"]
 """Columns of trials.csv, one row per step that an adaptive integrator tried on the way to `frame`, the first 65536 of each."""
@@ -125,16 +127,26 @@ class RunFolder:
             for file in [*late, *self.path.glob("frames/*.tmp"), *self.path.glob("checkpoints/*.tmp")]:
                 file.unlink()
 
-    def intact(self, limit: int) -> int:
-        """How many frames, counted from the start and up to `limit`, can be read."""
+    def intact(self, rows: Sequence[Sequence[str]]) -> int:
+        """How many frames of these rows of the ledger, counted from the start, are there whole, to the last bit."""
+        _, limit = self.tried(rows)
         for i in range(limit):
             try:
                 # An archive that is half opened complains when it is collected.
-                with held(), _opened(self.frame(i)):
-                    pass
+                with held(), _opened(self.frame(i), marked(i, rows[i][-1])) as archive:
+                    if archive.testzip() is not None:
+                        return i
             except ExportError:
                 return i
         return limit
+
+    def tried(self, rows: Sequence[Sequence[str]]) -> tuple[list[list[str]], int]:
+        """The rows of trials.csv, and how many frames of these rows of the ledger, from the start, have all of theirs."""
+        trials = read_rows(self.trials, TRIALS)
+        found = Counter(float(row[-1]) for row in trials)
+        column = LEDGER.index("tried")
+        whole = (i for i, row in enumerate(rows) if found[i] != float(row[column]))
+        return trials, next(whole, len(rows))
 
 
 def refuse(path: Path, text: str) -> SceneError:
@@ -206,41 +218,50 @@ def share(source: Path, path: Path) -> None:
             write_whole(path, data)
 
 
-def write_columns(path: Path, columns: Columns) -> None:
-    """Columns as an uncompressed .npz with keys `object/column`."""
+def marked(frame: int, state: str) -> str:
+    """What the archive of a frame says of itself."""
+    return f"frame {frame}, state {state}"
+
+
+def write_columns(path: Path, columns: Columns, mark: str = "") -> None:
+    """Columns as an uncompressed .npz with keys `object/column`, and a mark by which it is known."""
     arrays = {f"{name}/{column}": array for name, table in columns.items() for column, array in table.items()}
     if any("\0" in key for key in arrays):
         raise ExportError(f"{path}: the name of an object has a NUL in it, where names in archives end; rename it")
     buffer = io.BytesIO()
     np.savez(buffer, **arrays)  # type: ignore[arg-type]
+    with zipfile.ZipFile(buffer, "a") as archive:
+        archive.comment = mark.encode()
     write_whole(path, buffer.getvalue())
 
 
-def read_columns(path: Path) -> Columns:
-    """The columns of an .npz."""
+def read_columns(path: Path, mark: str = "") -> Columns:
+    """The columns of an .npz, which must have the mark."""
     columns: Columns = {}
-    with _opened(path) as archive:
+    with _opened(path, mark) as archive:
         for key in archive.namelist():
             name, _, column = key.removesuffix(".npy").rpartition("/")
             columns.setdefault(name, {})[column] = _array(archive, key)
     return columns
 
 
-def read_column(path: Path, name: str, column: str) -> npt.NDArray[Any] | None:
+def read_column(path: Path, name: str, column: str, mark: str = "") -> npt.NDArray[Any] | None:
     """One column of an .npz, without reading the others; None where it is not."""
     key = f"{name}/{column}.npy"
-    with _opened(path) as archive:
+    with _opened(path, mark) as archive:
         return _array(archive, key) if key in archive.namelist() else None
 
 
 @contextmanager
-def _opened(path: Path) -> Iterator[zipfile.ZipFile]:
-    """An .npz, for reading; whatever is wrong with it is an ExportError."""
+def _opened(path: Path, mark: str) -> Iterator[zipfile.ZipFile]:
+    """An .npz that has this mark, for reading; whatever is wrong with it is an ExportError."""
     try:
         with zipfile.ZipFile(path) as archive:
             # Members of ours are not compressed: others could take any amount of memory.
             if sum(member.file_size for member in archive.infolist()) > path.stat().st_size:
                 raise ValueError("it holds less than it says")
+            if archive.comment != mark.encode():
+                raise ValueError(f"it should be {mark or 'no frame'}")
             yield archive
     except FileNotFoundError:
         raise ExportError(f"{path}: is missing; --resume computes again what is lost") from None

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from tumble import _engine, causes, cures, energy, expect, minimal
+from tumble import _engine, causes, cures, doubts, energy, expect, minimal
 from tumble._engine import ExportError, StepError, TumbleError, World
 from tumble.folder import (
     FORMAT,
@@ -20,6 +20,7 @@ from tumble.folder import (
     Columns,
     RunFolder,
     Table,
+    marked,
     read_rows,
     share,
     write_checkpoint,
@@ -106,7 +107,7 @@ class Recorder:
         self._make()
         for i in range(frame):
             share(files.frame(i), self.files.frame(i))
-        self._open(rows[:frame], [r for r in read_rows(files.trials, TRIALS) if float(r[-1]) <= frame])
+        self._open(rows[:frame], _until(frame, files))
         self.hashes.extend(r[-1] for r in rows[:frame])
         for row in rows[:frame]:
             self.bounds.add(expect.numbers(row))
@@ -127,7 +128,7 @@ class Recorder:
         """Opens the folder of a stopped run at the frame of the world; later frames are dropped."""
         frame = self.world.frame_index
         rows = read_rows(self.files.ledger, LEDGER)[: frame + 1]
-        trials = [r for r in read_rows(self.files.trials, TRIALS) if float(r[-1]) <= frame]
+        trials = _until(frame, self.files)
         self.files.drop_after(frame)
         self._open(rows, trials)
         self.hashes.extend(r[-1] for r in rows)
@@ -140,7 +141,8 @@ class Recorder:
         self.ledger = Table(self.files.ledger, LEDGER, rows)
         self.tables.append(self.ledger)
         self.trials: Table | None = None
-        if any(system["integrator"] in energy.ADAPTIVE for system in self.scene["system"]):
+        # A branch without adaptive steps may have a parent with them.
+        if trials or any(system["integrator"] in energy.ADAPTIVE for system in self.scene["system"]):
             self.trials = Table(self.files.trials, TRIALS, trials)
             self.tables.append(self.trials)
 
@@ -159,10 +161,11 @@ class Recorder:
         """The frame first and its line of the ledger last: a frame with a line is complete."""
         index = self.world.frame_index
         state = self.world.hash()
-        write_columns(self.files.frame(index), columns)
+        write_columns(self.files.frame(index), columns, marked(index, state))
         if self.trials is not None:
             trials = report.get("trials", ())
             self.trials.add([t["time"], t["step"], t["error"], int(t["accepted"]), index] for t in trials)
+            report = {"tried": len(trials), **report}
         row = ledger_row(index, self.world.ledger, report, seconds, state)
         self.ledger.add([row])
         self.hashes.append(state)
@@ -192,9 +195,11 @@ class Recorder:
         self.checkpoint()
         self._write_manifest()
 
-    def judge(self, broken: list[expect.Broken]) -> None:
-        """Notes the expectations that were broken, and who broke those on curves, which the world is still at."""
-        found = [expect.blamed(b, self.world) for b in broken]
+    def judge(self, run: "Run") -> None:
+        """Notes what is doubtful about the books of this run, the expectations that were broken, and who broke those on
+        curves, which the world is still at."""
+        found = [expect.blamed(b, self.world) for b in expect.check(run)]
+        self.manifest["warnings"] = [*self.world.warnings, *doubts.of_books(run)]
         self.manifest["expectations"] = [b.to_dict() for b in found]
         self._write_manifest()
 
@@ -285,6 +290,11 @@ class Recorder:
         write_json(self.files.manifest, self.manifest)
         end = time.perf_counter()
         self.update_due = end + max(MANIFEST_INTERVAL, 100 * (end - begin))
+
+
+def _until(frame: int, files: RunFolder) -> list[list[str]]:
+    """The rows of trials.csv up to a frame."""
+    return [row for row in read_rows(files.trials, TRIALS) if float(row[-1]) <= frame]
 
 
 def ledger_row(

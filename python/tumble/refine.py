@@ -142,14 +142,15 @@ def study(
     overwrite: bool = False,
     threads: int | None = None,
     progress: Named | None = None,
-    warn: Callable[[str], None] | None = None,
+    warn: Callable[[list[dict[str, str]]], object] | None = None,
 ) -> Study:
     """Runs a scene at several resolutions, in `folder`/level-0, level-1 and so on, each twice as fine as the one before, and
     looks where its measures tend to.
 
     `what` names the words that are refined, as `plan` has it, and `measures` what is measured, as `value` has it. `resume`
-    keeps levels that were finished, `overwrite` replaces them. `warn` is told, before a level is
-    simulated, if its steps are too long by estimate. Raises SceneError if the scene, a path or a measure is wrong.
+    keeps levels that were finished, `overwrite` replaces them. `warn` is told, before anything is simulated, which levels have
+    steps that are too long by estimate: code, path and message of each. Raises SceneError if the scene, a path or a measure is
+    wrong.
     """
     refined, notes = plan(scene, levels, what)
     goal = Path(folder)
@@ -168,14 +169,15 @@ def study(
                 f'"{thing}" is refined, so that an index is another place at each level; expected max, min or mean',
             )
     # All levels must be possible before the first is simulated.
+    doubts: list[dict[str, str]] = []
     for k, finer in enumerate(scenes):
         try:
             too_long = _too_long(World(finer, threads))
         except SceneError as error:
             raise _wrong(f"level {k}", str(error)) from error
-        if warn is not None:
-            for text in too_long:
-                warn(f"level {k}: {text}")
+        doubts += [{"code": "long-steps", "path": f"level {k}", "message": text} for text in too_long]
+    if warn is not None:
+        warn(doubts)
     if overwrite:
         _drop_levels(goal, levels)
     runs: list[Run | None] = []

@@ -14,7 +14,19 @@ import numpy.typing as npt
 
 from tumble import _engine, expect
 from tumble._engine import ExportError, Scene, SceneError, StepError, World
-from tumble.folder import FORMAT, LEDGER, TRIALS, Columns, RunFolder, plain, read_columns, read_rows, reason, refuse
+from tumble.folder import (
+    FORMAT,
+    LEDGER,
+    TRIALS,
+    Columns,
+    RunFolder,
+    marked,
+    plain,
+    read_columns,
+    read_rows,
+    reason,
+    refuse,
+)
 from tumble.interrupts import held
 from tumble.lock import alone, ask
 from tumble.recorder import Recorder, changed
@@ -98,7 +110,7 @@ def record(
         with held():
             recorder.finish()
         run = Run(files.path)
-        recorder.judge(expect.check(run))
+        recorder.judge(run)
     except StepError as error:
         if broke is not None and cures:
             broke(error)
@@ -169,16 +181,16 @@ def admit(
 
 def return_to_checkpoint(world: World, files: RunFolder) -> bool:
     """Goes to the newest checkpoint that is sound and before which every frame can be read."""
-    hashes = [row[-1] for row in read_rows(files.ledger, LEDGER)]
+    rows = read_rows(files.ledger, LEDGER)
     if not files.static.is_file() or not files.columns.is_file():
         return False
-    intact = files.intact(len(hashes))
+    intact = files.intact(rows)
     for frame in reversed([k for k in files.checkpoints() if k < intact]):
         try:
             world.load(files.checkpoint(frame))
         except (SceneError, OSError):
             continue
-        if world.frame_index == frame and world.hash() == hashes[frame]:
+        if world.frame_index == frame and world.hash() == rows[frame][-1]:
             return True
     return False
 
@@ -290,7 +302,11 @@ class Run:
     def frame(self, i: int) -> Columns:
         """The columns of a frame, by object; -1 is the last. Raises IndexError, or ExportError if a file is damaged."""
         path = self._files.frame(self._index(i))
-        return self._sound(read_columns(path), "frames", path)
+        return self._sound(read_columns(path, self.mark(i)), "frames", path)
+
+    def mark(self, i: int) -> str:
+        """What the file of a frame says of itself."""
+        return marked(self._index(i), self._rows[i][-1])
 
     def time(self, i: int) -> float:
         """Simulated time of a frame [s]."""
@@ -314,8 +330,12 @@ class Run:
     @cached_property
     def trials(self) -> dict[str, npt.NDArray[np.float64]]:
         """The steps that adaptive integrators tried: time [s], step [s], error over tolerance, accepted, frame; the first
-        65536 of each frame."""
-        return _numbers(read_rows(self._files.trials, TRIALS), TRIALS)
+        65536 of each frame. Raises ExportError where some are lost."""
+        trials, whole = self._files.tried(self._rows)
+        if whole < len(self._rows):
+            why = f"of frame {whole} the ledger counts others"
+            raise ExportError(f"{self._files.trials}: is damaged ({why}); --resume computes again what is lost")
+        return _numbers(trials, TRIALS)
 
 
 def _numbers(rows: list[list[str]], header: list[str]) -> dict[str, npt.NDArray[np.float64]]:

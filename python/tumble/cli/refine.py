@@ -3,14 +3,13 @@
 import json
 import math
 from contextlib import ExitStack
-from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from tumble.cli import find
-from tumble.cli.console import Progress, complain, counted, say, warn
+from tumble.cli.console import Progress, complain, counted, say, warn_of
 
 if TYPE_CHECKING:
     from tumble.refine import Study
@@ -81,12 +80,10 @@ def refine(
             stack.pop_all().close()
             return stack.enter_context(Progress(level))
 
-        told = partial(warn, "long-steps")
-        found = study(checked, folder, levels, what or (), measure or (), resume, force, threads, shown, told)
+        found = study(checked, folder, levels, what or (), measure or (), resume, force, threads, shown, warn_of)
     for line in _told(found):
         say(line)
-    for note in found.notes:
-        warn("unrefined-steps", note)
+    warn_of({"code": "unrefined-steps", "path": "", "message": note} for note in found.notes)
     for k, text in found.failures.items():
         complain(f"level {k} failed: {text}; `tumble run` with its words says more: {_words(found, k)}")
     if found.measures and any(run is not None for run in found.runs):

@@ -105,10 +105,9 @@ def _refuse_empty(scene: dict[str, Any], ply: bool | None, vdb: bool | None) -> 
 
 def present(done: "Run", asked: dict[str, bool], stills: list[int], renderer: str) -> "list[TumbleError]":
     """Says what a finished run warns of, writes what it is asked for, and sums it up; returns what could not be written."""
-    from tumble.doubts import of_books
     from tumble.lock import alone
 
-    warn_of([*done.manifest["warnings"], *of_books(done)])
+    warn_of(done.manifest["warnings"])
     try:
         with alone(done.folder):
             failures = write_results(done, asked, stills, renderer)
