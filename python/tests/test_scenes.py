@@ -37,15 +37,11 @@ def test_failure_is_explained_and_cured(name: str) -> None:
     cured.step(world.scene.to_dict()["time"]["frames"])
 
 
-CROSS = ["cloth/mannequin"]
-"""Springs that pass through each other as they fold: `self_contact` would stretch this veil to 2.6 times its size."""
-
-
 @pytest.mark.parametrize("name", [n for n in NAMES if not n.startswith("failures/")])
 def test_soft_surfaces_are_expected_not_to_pass_through_each_other(name: str) -> None:
     words = tumble.Scene.load(SCENES / f"{name}.toml").to_dict()
     soft = any(words[kind] for kind in ("sheet", "net", "cloth", "block"))
-    assert (words["expect"]["max_intersections"] == 0) == (soft and name not in CROSS)
+    assert (words["expect"]["max_intersections"] == 0) == soft
 
 
 def test_there_are_scenes() -> None:

@@ -67,7 +67,8 @@ fn measures(x: &[Vector]) -> [f64; 3] {
     [depth, radius, corners]
 }
 
-/// The mean depth, which is the potential energy over m g, changes less from one division to the next, at least by half; the hem stays where it is.
+/// The mean depth, which is the potential energy over m g, changes less from one division to the next, at least by half, until it stands still
+/// to 1e-5 m; the hem stays where it is.
 fn drape_converges(cells: &[usize]) {
     let mut x = Vec::new();
     let found: Vec<[f64; 3]> = cells
@@ -84,7 +85,8 @@ fn drape_converges(cells: &[usize]) {
         println!("{name} at {cells:?} cells [m]: {values:.5?}, differences {}, ratios {ratios:.2?}", common::show(&differences));
         // Measured: ratios of 4.6, 8.3, 9.7 at 16, 32, 64 cells; at 128 the depth is that at 64 to 2e-6 m, and the hem, which hangs freely and
         // costs little energy, 0.6 mm further in and 0.3 mm lower.
-        assert!(k > 0 || ratios.iter().all(|r| *r > 2.0), "{name}: {ratios:?}");
+        let less = |d: &[f64]| d[1].abs() < f64::max(0.5 * d[0].abs(), 1e-5);
+        assert!(k > 0 || differences.windows(2).all(less), "{name}: {ratios:?}");
         assert!(differences.iter().zip(&values).all(|(d, v)| d.abs() > 1e-7 && d.abs() < 0.01 * v), "{name}: {differences:?}");
     }
     // It hangs: flat, the hem is 0.56 m from the axis on the mean, and nothing is below the top.
@@ -105,7 +107,7 @@ fn a_drape_on_a_ball_converges() {
 #[test]
 #[ignore = "long: make validate"]
 fn a_fine_drape_on_a_ball_converges() {
-    drape_converges(&[32, 64, 128]);
+    drape_converges(&[32, 64, 128, 256]);
 }
 
 /// Step of implicit and position-based patches [s].
