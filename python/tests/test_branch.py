@@ -14,7 +14,7 @@ from runs import Killed, N, Tree, assert_same, kill_at
 from test_kills import SCENES
 from test_soak import MIXED
 
-from tumble import Run, Scene, SceneError, World
+from tumble import ExportError, Run, Scene, SceneError, World
 from tumble.branch import branch, family, lineage, world_at
 from tumble.compare import compare
 from tumble.run import simulate
@@ -161,6 +161,27 @@ def test_a_killed_branch_goes_on_to_the_same_bits(
     resumed = branch(reference, 13, folder, [SOFTER], resume=True)
     assert_same(resumed, whole)
     assert resumed.descent == whole.descent
+
+
+def test_a_damaged_parent_is_named_before_anything_is_lost(reference: Run, spring: Tree, tmp_path: Path) -> None:
+    path = reference.folder / "frames/000005.npz"
+    whole = path.read_bytes()
+    path.write_bytes(whole[:300] + bytes([whole[300] ^ 1]) + whole[301:])
+    with pytest.raises(ExportError, match=r"reference.*000005\.npz: is damaged .*--resume"):
+        branch(reference, 13, tmp_path / "b", [SOFTER])
+    assert not (tmp_path / "b/run.json").exists()
+    found = branch(simulate(spring, reference.folder, resume=True), 13, tmp_path / "b", [SOFTER])
+    # The damage may come later, to a file that both have.
+    path.unlink()
+    path.write_bytes(whole)
+    own = found.folder / "frames/000007.npz"
+    own.write_bytes(own.read_bytes()[:100])
+    with pytest.raises(ExportError, match=r"reference.*000007\.npz: is damaged"):
+        branch(reference, 13, found.folder, [SOFTER], resume=True)
+    assert Run(found.folder).frame(20)
+    parent = simulate(spring, reference.folder, resume=True)
+    healed = branch(parent, 13, found.folder, [SOFTER], resume=True)
+    assert_same(healed, branch(parent, 13, tmp_path / "whole", [SOFTER]))
 
 
 def test_a_branch_is_never_begun_anew_from_the_start(reference: Run, spring: Tree, tmp_path: Path) -> None:
@@ -353,6 +374,8 @@ def test_branches_are_drawn_beside_their_parent(
 ) -> None:
     branch(reference, 13, tmp_path / "softer", [SOFTER])
     branch(reference, 5, tmp_path / "weightless", ["world.gravity=[0, 0, 0]"], frames=30)
+    (tmp_path / "spoilt").mkdir()
+    (tmp_path / "spoilt/run.json").write_text("{")
     answer = tumble("plot", reference.folder, "--branches", "--out", "both.png")
     assert answer.code == 0, answer.err
     assert Path("both.png").stat().st_size > 10_000

@@ -23,6 +23,7 @@ FILES = [
     "ledger.csv",
     "columns.json",
     "static.npz",
+    "trials.csv",
     "frames/000003.npz",
     "checkpoints/000005.safetensors",
 ]
@@ -109,6 +110,7 @@ def spoil(folder: Path, dice: random.Random) -> str:
 def test_damaged_runs_are_read_or_refused(spring: Tree, tmp_path: Path, tumble: Callable[..., Answer]) -> None:
     """A failure names the seed."""
     spring["output"] = {"plot": False, "checkpoint": 5}
+    spring["system"] = [{"integrator": "dormand_prince"}]
     whole = simulate(spring, tmp_path / "whole", frames=8).folder
     scene = tmp_path / "spring.json"
     scene.write_text(json.dumps(spring | {"time": {"fps": 24, "frames": 8}}))

@@ -13,7 +13,7 @@ from runs import Tree, repack
 
 from tumble import Run, SceneError
 from tumble.compare import compare
-from tumble.folder import marked, read_columns, write_columns
+from tumble.folder import STATIC, marked, read_columns, write_columns
 from tumble.run import simulate
 
 Command = Callable[..., Answer]
@@ -142,9 +142,9 @@ def test_books_are_compared(pair: tuple[Run, Run], tumble: Command) -> None:
 
 def test_static_columns_are_compared(pair: tuple[Run, Run]) -> None:
     a, b = pair
-    static = read_columns(b.folder / "static.npz")
+    static = read_columns(b.folder / "static.npz", STATIC)
     static["sheet"]["mass"][5] *= 2
-    write_columns(b.folder / "static.npz", static)
+    write_columns(b.folder / "static.npz", static, STATIC)
     found = compare(a, Run(b.folder))
     assert (found.frame, found.columns[0].column, found.columns[0].index) == (0, "mass", (5,))
 

@@ -217,12 +217,6 @@ def test_frames_out_of_range_and_damaged_frames(reference: Run) -> None:
     assert reference.frame(6)[OBJECT]["position"].shape == (2, 3)
 
 
-def test_frames_at_the_end_that_are_missing_do_not_count(reference: Run) -> None:
-    for i in (N - 1, N):
-        (reference.folder / f"frames/{i:06}.npz").unlink()
-    assert Run(reference.folder).n_frames == N - 1
-
-
 def test_reading_a_table_stops_at_the_first_row_that_is_not_whole(tmp_path: Path) -> None:
     path = tmp_path / "t.csv"
     for text, rows in [

@@ -125,6 +125,7 @@ def test_a_run_tells_of_energy_from_nowhere_and_how_to_keep_it(
     # Measured: 235 and 100; what two masses do that met within a step is chance.
     assert 10.0 < found.times < 1000.0
     assert f"warning[energy-grew]: the energy grew by {found.times:.3g} times its scale" in answer.err
+    assert "energy-grew" in [w["code"] for w in Run("out/scene").manifest["warnings"]]
     assert "has no softening, and masses came within" in answer.err
     cure = copied(answer.err)
     assert any(".softening=" in word for word in cure)

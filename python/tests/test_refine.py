@@ -157,7 +157,9 @@ def test_paths_by_name_and_by_index(tmp_path: Path) -> None:
         "cloth.0.resolution": [0.2, 0.1, 0.05],
         "system.0.step": [0.004, 0.002, 0.001],
     }
-    assert len(notes) == 1 and '"hard"' in notes[0] and "--what system.1.substeps" in notes[0]
+    (note,) = notes
+    assert (note["code"], note["path"]) == ("unrefined-steps", 'system "hard"')
+    assert "--what system.1.substeps" in note["message"]
     (word,), notes = plan(scene, 3, ["system.hard.position_based.iterations"])
     assert (word.path, word.values, notes) == ("system.1.position_based.iterations", [1, 2, 4], [])
     assert word.at(2) == "system.1.position_based.iterations=4"

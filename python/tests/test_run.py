@@ -14,7 +14,7 @@ from hypothesis import strategies as st
 from runs import OBJECT, Killed, N, Tree, assert_same, half, kill_at, killed, truncate
 
 from tumble import ExportError, Run, Scene, SceneError, World, _engine
-from tumble.folder import LEDGER, cell, plain
+from tumble.folder import LEDGER, RunFolder, cell, plain, read_rows
 from tumble.run import simulate
 
 # What is in the folder
@@ -229,6 +229,14 @@ def empty_ledger(folder: Path) -> None:
     (folder / "ledger.csv").write_bytes(b"")
 
 
+def exchange_static(folder: Path) -> None:
+    shutil.copy(folder / "frames/000004.npz", folder / "static.npz")
+
+
+def damage_columns(folder: Path) -> None:
+    half(folder / "columns.json")
+
+
 def lose_static(folder: Path) -> None:
     (folder / "static.npz").unlink()
 
@@ -255,6 +263,8 @@ def leave_temporary_files(folder: Path) -> None:
         cut_ledger,
         empty_ledger,
         lose_static,
+        exchange_static,
+        damage_columns,
         leave_temporary_files,
     ],
 )
@@ -263,7 +273,8 @@ def test_damage_is_survived(spring: Tree, tmp_path: Path, reference: Run, damage
     damage(folder)
     resumed = simulate(spring, folder, resume=True)
     assert_same(resumed, reference)
-    assert (folder / "static.npz").read_bytes() == (reference.folder / "static.npz").read_bytes()
+    for name in ("static.npz", "columns.json"):
+        assert (folder / name).read_bytes() == (reference.folder / name).read_bytes()
     assert not list(folder.rglob("frames/*.tmp"))
 
 
@@ -281,21 +292,59 @@ def test_a_file_cut_off_anywhere_is_survived(
     assert_same(simulate(spring, folder / "run", frames=13, resume=True), whole)
 
 
-def test_lost_trials_are_noticed_and_tried_again(spring: Tree, tmp_path: Path) -> None:
+def test_any_bit_of_a_frame_that_changes_is_noticed(spring: Tree, tmp_path: Path) -> None:
+    run = simulate(spring, tmp_path / "run", frames=2)
+    path, files = run.folder / "frames/000001.npz", RunFolder(run.folder)
+    whole = path.read_bytes()
+    assert len(whole) > 400
+    for bit in range(8 * len(whole)):
+        data = bytearray(whole)
+        data[bit // 8] ^= 1 << bit % 8
+        path.write_bytes(data)
+        with pytest.raises(ExportError, match=r"000001\.npz: is damaged \(.*--resume"):
+            files.check(1, run.hashes[1])
+        with pytest.raises(ExportError, match=r"000001\.npz: is damaged"):
+            run.frame(1)
+    for data in (whole + b"x", b"x" + whole, whole[:-1]):
+        path.write_bytes(data)
+        assert files.intact(read_rows(files.ledger, LEDGER)) == 1
+    path.write_bytes(whole)
+    assert files.intact(read_rows(files.ledger, LEDGER)) == 3
+
+
+def test_lost_lines_are_noticed(spring: Tree, tmp_path: Path, reference: Run) -> None:
+    path = reference.folder / "ledger.csv"
+    lines = path.read_bytes().splitlines(keepends=True)
+    for lost, kept in (
+        (lines[:5] + lines[6:], 4),
+        (lines[:-1], N),
+        ([*lines[:5], lines[5].replace(b",0,", b",nan,", 1), *lines[6:]], 4),
+    ):
+        path.write_bytes(b"".join(lost))
+        text = rf"ledger\.csv: has lost lines: {kept} of {N + 1} frames are there; --resume computes"
+        with pytest.raises(ExportError, match=text):
+            Run(reference.folder)
+        assert simulate(spring, reference.folder, resume=True).hashes == reference.hashes
+    for i in (N - 1, N):
+        (reference.folder / f"frames/{i:06}.npz").unlink()
+    with pytest.raises(ExportError, match=rf"{N - 1:06}\.npz: is missing: {N - 1} of {N + 1} frames"):
+        Run(reference.folder)
+    assert len(simulate(spring, reference.folder, resume=True).frame(N)) == 1
+
+
+def test_lost_trials_are_told_and_nothing_else_is_lost(spring: Tree, tmp_path: Path) -> None:
     spring["system"] = [{"integrator": "dormand_prince", "adaptive": {"tolerance": 1e-9}}]
     whole = simulate(spring, tmp_path / "whole")
-    lines = (whole.folder / "trials.csv").read_bytes().splitlines(keepends=True)
+    path = whole.folder / "trials.csv"
+    lines = path.read_bytes().splitlines(keepends=True)
     assert len(lines) > 2 * N and whole.ledger["tried"].sum() == len(lines) - 1
-    folder = killed(spring, tmp_path / "run", 23)
-    # One in the middle, the last, and half of a line.
-    for lost in (lines[:9] + lines[10:], lines[:-1], [*lines[:9], lines[9][:5]]):
-        (folder / "trials.csv").write_bytes(b"".join(lost))
-        run = simulate(spring, folder, resume=True)
+    # One in the middle, the last, half of a line, all.
+    for lost in (lines[:9] + lines[10:], lines[:-1], [*lines[:9], lines[9][:5]], []):
+        path.write_bytes(b"".join(lost))
+        run = simulate(spring, whole.folder, resume=True, progress=kill_at(N - 1))
         assert_same(run, whole)
-        assert all((run.trials[name] == whole.trials[name]).all() for name in whole.trials)
-    (folder / "trials.csv").write_bytes(b"".join(lines[:-1]))
-    with pytest.raises(ExportError, match=r"trials\.csv: is damaged \(of frame 25 .*--resume"):
-        _ = Run(folder).trials
+        with pytest.raises(ExportError, match=r"trials\.csv: is damaged \(of frame .* the ledger counts .*--force"):
+            _ = run.trials
 
 
 def test_what_came_after_the_checkpoint_is_dropped(spring: Tree, tmp_path: Path, reference: Run) -> None:

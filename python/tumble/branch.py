@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from tumble._engine import Scene, SceneError, StepError, World
+from tumble._engine import Scene, SceneError, StepError, TumbleError, World
 from tumble.folder import RunFolder, plain, refuse
 from tumble.lock import alone, ask
 from tumble.recorder import Recorder, describe
@@ -63,6 +63,8 @@ def branch(
             recorder = Recorder(files, world, threads, earlier, descent)
             return record(recorder, lambda: begin(recorder.go_on), progress, broke=broke)
         _take_over(world, parent, k, threads)
+        for i in range(k):
+            RunFolder(parent.folder).check(i, parent.hashes[i])
         if files.is_run():
             files.clear()
         recorder = Recorder(files, world, threads, None, descent)
@@ -129,7 +131,7 @@ def family(run: Run) -> list[Run]:
             continue
         try:
             other = Run(manifest.parent)
-        except SceneError:
+        except TumbleError:
             continue
         if own in [os.path.realpath(path) for path in lineage(other)]:
             found.append(other)

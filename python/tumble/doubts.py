@@ -1,8 +1,11 @@
 """What the books of a run are doubtful about; docs/warnings.md lists the codes."""
 
 import math
-from collections.abc import Iterator
-from typing import TYPE_CHECKING
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+from tumble import energy
 
 if TYPE_CHECKING:
     from tumble.run import Run
@@ -10,10 +13,60 @@ if TYPE_CHECKING:
 _COURANT = 2.0
 """Cells that a fluid passes in a step, over what was asked for, that are worth telling."""
 
+_GAINS = ("forward_euler", "modified_euler", "midpoint", "heun")
+"""Integrators that gain energy of oscillations at any step."""
+
 
 def of_books(run: "Run") -> list[dict[str, str]]:
     """Code, path and message of each doubt."""
-    return [{"code": code, "path": "", "message": message} for code, message in (*_unconverged(run), *_too_fast(run))]
+    found = (*_grew(run), *_unconverged(run), *_too_fast(run)) if run.n_frames else ()
+    return [{"code": code, "path": "", "message": message} for code, message in found]
+
+
+@dataclass(frozen=True)
+class Remedy:
+    """What keeps energy from growing out of nowhere: what was seen and its likely cause, and what to change."""
+
+    text: str
+    changes: list[str]
+
+
+def remedy(run: "Run") -> Remedy | None:
+    """None where no energy came from nowhere."""
+    grown = energy.from_nowhere(run)
+    if grown is None:
+        return None
+    plans = run.scene["system"]
+    k = next((i for i, plan in enumerate(plans) if plan["method"] == "dynamics"), 0)
+    plan: Mapping[str, Any] = plans[k] if plans else {"integrator": "symplectic_euler"}
+    step = float(run.ledger["largest_step"][grown.frame])
+    met = energy.encounters(run, range(grown.frame - 2, grown.frame + 1), step)
+    own = plan["integrator"]
+    if met:
+        cause, changes = "; ".join(map(energy.told, met)), energy.changes(run.scene, met, k)
+    elif own in _GAINS:
+        cause, changes = f"{own} gains energy where things oscillate", [f"system.{k}.integrator=symplectic_euler"]
+    elif own in energy.ADAPTIVE:
+        tolerance = 0.01 * plan["adaptive"]["tolerance"]
+        cause, changes = "the tolerance is too coarse", [f"system.{k}.adaptive.tolerance={tolerance:.1e}"]
+    else:
+        n = math.ceil(4.0 / run.fps / run.scene["time"]["exchanges"] / step)
+        shorter = f"step={step / 4.0:.2g}" if plan.get("step") else f"substeps={n}"
+        cause, changes = f"steps of {step:.2e} s are too long", [f"system.{k}.{shorter}"]
+    text = (
+        f"the energy grew by {grown.times:.3g} times its scale, from frame {grown.frame} on, and nothing in the scene gives "
+        f"any: {cause}. Try {' '.join(changes)}"
+    )
+    return Remedy(text, changes)
+
+
+def _grew(run: "Run") -> Iterator[tuple[str, str]]:
+    """Energy from nowhere."""
+    if (found := remedy(run)) is not None:
+        yield (
+            "energy-grew",
+            found.text,
+        )
 
 
 def _unconverged(run: "Run") -> Iterator[tuple[str, str]]:

@@ -11,6 +11,7 @@ import math
 import os
 import textwrap
 import zipfile
+import zlib
 from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
@@ -45,6 +46,15 @@ rows of trials.csv."""
 
 TRIALS = ["time", "step", "error", "accepted", "frame"]
 """Columns of trials.csv, one row per step that an adaptive integrator tried on the way to `frame`, the first 65536 of each."""
+
+COUNTS = {
+    *("frame", "intersections", "contacts", "broken", "steps", "rejected", "tried", "newton", "linear", "unconverged"),
+    "accepted",
+}
+"""Columns of tables that hold whole numbers; those of `frame` in the ledger count its rows."""
+
+STATIC = "static"
+"""What the archive of what does not change says of itself."""
 
 LOCK = ".lock"
 """Says who writes here, while somebody does."""
@@ -127,26 +137,30 @@ class RunFolder:
             for file in [*late, *self.path.glob("frames/*.tmp"), *self.path.glob("checkpoints/*.tmp")]:
                 file.unlink()
 
+    def check(self, i: int, state: str) -> None:
+        """Raises ExportError unless the file of this frame, which had this hash, is whole to the last bit."""
+        # An archive that is half opened complains when it is collected.
+        with held(), _opened(self.frame(i), marked(i, state), whole=True):
+            pass
+
     def intact(self, rows: Sequence[Sequence[str]]) -> int:
-        """How many frames of these rows of the ledger, counted from the start, are there whole, to the last bit."""
-        _, limit = self.tried(rows)
-        for i in range(limit):
+        """How many frames of these rows of the ledger, counted from the start, are whole."""
+        for i, row in enumerate(rows):
             try:
-                # An archive that is half opened complains when it is collected.
-                with held(), _opened(self.frame(i), marked(i, rows[i][-1])) as archive:
-                    if archive.testzip() is not None:
-                        return i
+                self.check(i, row[-1])
             except ExportError:
                 return i
-        return limit
+        return len(rows)
 
-    def tried(self, rows: Sequence[Sequence[str]]) -> tuple[list[list[str]], int]:
-        """The rows of trials.csv, and how many frames of these rows of the ledger, from the start, have all of theirs."""
+    def tried(self, rows: Sequence[Sequence[str]]) -> list[list[str]]:
+        """The rows of trials.csv. Raises ExportError where the rows of the ledger count others."""
         trials = read_rows(self.trials, TRIALS)
-        found = Counter(float(row[-1]) for row in trials)
+        found = Counter(int(row[-1]) for row in trials)
         column = LEDGER.index("tried")
-        whole = (i for i, row in enumerate(rows) if found[i] != float(row[column]))
-        return trials, next(whole, len(rows))
+        if (lost := next((i for i, row in enumerate(rows) if found[i] != int(row[column])), None)) is not None:
+            text = f"is damaged (of frame {lost} it has {found[lost]} rows, and the ledger counts {rows[lost][column]})"
+            raise ExportError(f"{self.trials}: {text}; simulate again with --force where they are needed")
+        return trials
 
 
 def refuse(path: Path, text: str) -> SceneError:
@@ -230,15 +244,20 @@ def write_columns(path: Path, columns: Columns, mark: str = "") -> None:
         raise ExportError(f"{path}: the name of an object has a NUL in it, where names in archives end; rename it")
     buffer = io.BytesIO()
     np.savez(buffer, **arrays)  # type: ignore[arg-type]
-    with zipfile.ZipFile(buffer, "a") as archive:
-        archive.comment = mark.encode()
-    write_whole(path, buffer.getvalue())
+    write_whole(path, sealed(buffer.getvalue(), mark))
+
+
+def sealed(archive: bytes, mark: str) -> bytes:
+    """An archive without a comment, with one: its mark, and a sum over all bytes before."""
+    start = f"{mark}, sum ".encode()
+    before = archive[:-2] + (len(start) + 8).to_bytes(2, "little")
+    return before + start + f"{zlib.crc32(before):08x}".encode()
 
 
 def read_columns(path: Path, mark: str = "") -> Columns:
     """The columns of an .npz, which must have the mark."""
     columns: Columns = {}
-    with _opened(path, mark) as archive:
+    with _opened(path, mark, whole=True) as archive:
         for key in archive.namelist():
             name, _, column = key.removesuffix(".npy").rpartition("/")
             columns.setdefault(name, {})[column] = _array(archive, key)
@@ -253,21 +272,36 @@ def read_column(path: Path, name: str, column: str, mark: str = "") -> npt.NDArr
 
 
 @contextmanager
-def _opened(path: Path, mark: str) -> Iterator[zipfile.ZipFile]:
-    """An .npz that has this mark, for reading; whatever is wrong with it is an ExportError."""
+def _opened(path: Path, mark: str, whole: bool = False) -> Iterator[zipfile.ZipFile]:
+    """An .npz for reading; whatever is wrong with it is an ExportError. Where a mark is given it must have that, and be
+    `whole` by its sum."""
     try:
-        with zipfile.ZipFile(path) as archive:
+        with path.open("rb") as file, zipfile.ZipFile(file) as archive:
+            size = path.stat().st_size
             # Members of ours are not compressed: others could take any amount of memory.
-            if sum(member.file_size for member in archive.infolist()) > path.stat().st_size:
+            if sum(member.file_size for member in archive.infolist()) > size:
                 raise ValueError("it holds less than it says")
-            if archive.comment != mark.encode():
-                raise ValueError(f"it should be {mark or 'no frame'}")
+            if mark:
+                found, _, total = archive.comment.decode(errors="replace").rpartition(", sum ")
+                if found != mark:
+                    raise ValueError(f"it should be {mark}")
+                if whole and total != f"{_sum(file, size - len(archive.comment)):08x}":
+                    raise ValueError("its bytes are not those that were written")
             yield archive
     except FileNotFoundError:
         raise ExportError(f"{path}: is missing; --resume computes again what is lost") from None
     except Exception as error:  # Neither zipfile nor NumPy says what it may raise.
         why = textwrap.shorten(str(error), 200) or type(error).__name__
         raise ExportError(f"{path}: is damaged ({why}); --resume computes again what is lost") from error
+
+
+def _sum(file: IO[bytes], size: int) -> int:
+    """Over the first bytes of a file."""
+    total = 0
+    file.seek(0)
+    while size > 0 and (piece := file.read(min(size, 1 << 20))):
+        total, size = zlib.crc32(piece, total), size - len(piece)
+    return total
 
 
 def _array(archive: zipfile.ZipFile, key: str) -> npt.NDArray[Any]:
@@ -328,29 +362,31 @@ def cell(value: str | int | float) -> str:
 
 
 def read_rows(path: Path, header: Sequence[str]) -> list[list[str]]:
-    """The complete rows of a table; reading stops at the first that is not. Only the ledger's `hash` is no number."""
+    """The complete rows of a table; reading stops at the first that is not. Only the ledger's `hash` is no number, and its
+    frames count its rows."""
     try:
         lines = path.read_text(encoding="utf-8", errors="replace").splitlines(keepends=True)
     except OSError:
         return []
     if not lines or lines[0].rstrip("\n").split(",") != list(header):
         return []
-    rows = []
+    rows: list[list[str]] = []
     for line in lines[1:]:
         fields = line.rstrip("\n").split(",")
-        numbers = fields[:-1] if header[-1] == "hash" else fields
-        if not line.endswith("\n") or len(fields) != len(header) or not all(map(_is_number, numbers)):
+        sound = line.endswith("\n") and len(fields) == len(header) and all(map(_fits, header, fields))
+        if not sound or (header[0] == "frame" and fields[0] != str(len(rows))):
             break
         rows.append(fields)
     return rows
 
 
-def _is_number(text: str) -> bool:
+def _fits(column: str, text: str) -> bool:
+    if column in COUNTS:
+        return text.isascii() and text.isdigit()
     try:
-        float(text)
+        return column == "hash" or float(text) is not None
     except ValueError:
         return False
-    return True
 
 
 class Table:

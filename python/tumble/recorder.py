@@ -16,6 +16,7 @@ from tumble._engine import ExportError, StepError, TumbleError, World
 from tumble.folder import (
     FORMAT,
     LEDGER,
+    STATIC,
     TRIALS,
     Columns,
     RunFolder,
@@ -120,8 +121,11 @@ class Recorder:
     def _make(self) -> None:
         self.files.make()
         self._write_manifest()
+        self._describe()
+
+    def _describe(self) -> None:
         topology, columns = self.world.topology, self.world.frame
-        write_columns(self.files.static, topology)
+        write_columns(self.files.static, topology, STATIC)
         write_json(self.files.columns, describe(self.world.units, topology, columns))
 
     def go_on(self) -> None:
@@ -129,13 +133,15 @@ class Recorder:
         frame = self.world.frame_index
         rows = read_rows(self.files.ledger, LEDGER)[: frame + 1]
         trials = _until(frame, self.files)
-        self.files.drop_after(frame)
-        self._open(rows, trials)
         self.hashes.extend(r[-1] for r in rows)
         self.written = frame
         for row in rows:
             self.bounds.add(expect.numbers(row))
+        # First, so that it counts no frames that are being dropped.
         self._write_manifest()
+        self.files.drop_after(frame)
+        self._open(rows, trials)
+        self._describe()
 
     def _open(self, rows: list[list[str]], trials: list[list[str]]) -> None:
         self.ledger = Table(self.files.ledger, LEDGER, rows)
@@ -199,9 +205,12 @@ class Recorder:
         """Notes what is doubtful about the books of this run, the expectations that were broken, and who broke those on
         curves, which the world is still at."""
         found = [expect.blamed(b, self.world) for b in expect.check(run)]
-        self.manifest["warnings"] = [*self.world.warnings, *doubts.of_books(run)]
+        self._doubt(run)
         self.manifest["expectations"] = [b.to_dict() for b in found]
         self._write_manifest()
+
+    def _doubt(self, run: "Run") -> None:
+        self.manifest["warnings"] = [*self.world.warnings, *doubts.of_books(run)]
 
     def fail(self, error: StepError, explain: bool = True) -> None:
         """Notes why the physics broke, then, if asked to `explain` it, tries what would have helped, and looks for a minimal
@@ -276,6 +285,10 @@ class Recorder:
         self.manifest["status"] = status
         if message is not None:
             self.manifest["failure"] = {"message": message, "report": report or {}, "frame": self.written, "cures": []}
+            from tumble.run import Run
+
+            with suppress(Exception):
+                self._doubt(Run(self.files.path))
         for write in (self.checkpoint, self._write_manifest):
             with suppress(ExportError, OSError):
                 write()
@@ -294,7 +307,7 @@ class Recorder:
 
 def _until(frame: int, files: RunFolder) -> list[list[str]]:
     """The rows of trials.csv up to a frame."""
-    return [row for row in read_rows(files.trials, TRIALS) if float(row[-1]) <= frame]
+    return [row for row in read_rows(files.trials, TRIALS) if int(row[-1]) <= frame]
 
 
 def ledger_row(

@@ -120,7 +120,7 @@ class Study:
     scene: Scene
     folder: Path
     refined: list[Refined]
-    notes: list[str]
+    notes: list[dict[str, str]]
     runs: list[Run | None]
     """The run of each level; None where it broke."""
     failures: dict[int, str]
@@ -236,8 +236,8 @@ def _too_long(world: World) -> list[str]:
 # What is refined
 
 
-def plan(scene: Scene, levels: int, what: Sequence[str] = ()) -> tuple[list[Refined], list[str]]:
-    """The words that are refined, with their values at each level, and what is to be said about them.
+def plan(scene: Scene, levels: int, what: Sequence[str] = ()) -> tuple[list[Refined], list[dict[str, str]]]:
+    """The words that are refined, with their values at each level, and warnings of what is not: code, path and message.
 
     `what` are paths such as "system.0.substeps" or "rope.rope.segments". Counts are doubled; masses along the sides of
     sheets and blocks are 2 n - 1, so that their distances are halved; lengths, times and tolerances are halved.
@@ -273,7 +273,11 @@ def plan(scene: Scene, levels: int, what: Sequence[str] = ()) -> tuple[list[Refi
         paths = [f"system.{i}.substeps" for i in range(count)]
     else:
         notes = [
-            f'the steps of system "{system["name"]}" are its own at every level; --what system.{i}.substeps refines them, too'
+            {
+                "code": "unrefined-steps",
+                "path": f'system "{system["name"]}"',
+                "message": f"its steps are its own at every level; --what system.{i}.substeps refines them, too",
+            }
             for i, system in own
         ]
     return [_refined(scene, tree, path, levels) for path in paths], notes

@@ -17,6 +17,7 @@ from tumble._engine import ExportError, Scene, SceneError, StepError, World
 from tumble.folder import (
     FORMAT,
     LEDGER,
+    STATIC,
     TRIALS,
     Columns,
     RunFolder,
@@ -182,8 +183,6 @@ def admit(
 def return_to_checkpoint(world: World, files: RunFolder) -> bool:
     """Goes to the newest checkpoint that is sound and before which every frame can be read."""
     rows = read_rows(files.ledger, LEDGER)
-    if not files.static.is_file() or not files.columns.is_file():
-        return False
     intact = files.intact(rows)
     for frame in reversed([k for k in files.checkpoints() if k < intact]):
         try:
@@ -215,8 +214,8 @@ def read_manifest(files: RunFolder) -> dict[str, Any]:
     if not isinstance(manifest, dict) or not isinstance(manifest.get("scene"), dict):
         raise refuse(files.path, "run.json is not that of a run")
     if manifest.get("format") != FORMAT:
-        text = f"is a run of format {manifest.get('format')}; this tumble reads format {FORMAT}"
-        raise refuse(files.path, text)
+        text = f"is a run of format {manifest.get('format')}, by tumble {manifest.get('tumble')}, and this one reads {FORMAT}"
+        raise refuse(files.path, f"{text}: simulate again with --force, or read it with the other")
     if fault := fault_of_manifest(manifest):
         raise ExportError(f"{files.manifest}: is damaged ({fault}); simulate again with --force")
     return manifest
@@ -226,7 +225,7 @@ class Run:
     """A run folder, to be read. Frames that were finished can be read whatever happened after them."""
 
     def __init__(self, path: str | os.PathLike[str]) -> None:
-        """Raises SceneError if there is no run at `path`."""
+        """Raises SceneError if there is no run at `path`, and ExportError where frames are lost that were there."""
         files = RunFolder(path)
         if not files.is_run():
             what = "there is no such folder" if not files.path.exists() else "there is no run.json in it"
@@ -237,8 +236,14 @@ class Run:
         self.scene: dict[str, Any] = self.manifest["scene"]
         """The resolved scene."""
         self._rows = read_rows(files.ledger, LEDGER)
+        lost = files.ledger
         while self._rows and not files.frame(len(self._rows) - 1).is_file():
+            lost = files.frame(len(self._rows) - 1)
             self._rows.pop()
+        if self.n_frames < (n := len(self.manifest.get("hashes", []))):
+            what = "has lost lines" if lost is files.ledger else "is missing"
+            text = f"{self.n_frames} of {n} frames are there; --resume computes again what is lost"
+            raise ExportError(f"{lost}: {what}: {text}")
 
     @classmethod
     def open(cls, path: str | os.PathLike[str]) -> "Run":
@@ -275,7 +280,7 @@ class Run:
     @cached_property
     def static(self) -> Columns:
         """What does not change: masses, links, triangles, colliders; see `World.topology`."""
-        return self._sound(read_columns(self._files.static), "static", self._files.static)
+        return self._sound(read_columns(self._files.static, STATIC), "static", self._files.static)
 
     @cached_property
     def columns(self) -> dict[str, dict[str, dict[str, Any]]]:
@@ -331,11 +336,7 @@ class Run:
     def trials(self) -> dict[str, npt.NDArray[np.float64]]:
         """The steps that adaptive integrators tried: time [s], step [s], error over tolerance, accepted, frame; the first
         65536 of each frame. Raises ExportError where some are lost."""
-        trials, whole = self._files.tried(self._rows)
-        if whole < len(self._rows):
-            why = f"of frame {whole} the ledger counts others"
-            raise ExportError(f"{self._files.trials}: is damaged ({why}); --resume computes again what is lost")
-        return _numbers(trials, TRIALS)
+        return _numbers(self._files.tried(self._rows), TRIALS)
 
 
 def _numbers(rows: list[list[str]], header: list[str]) -> dict[str, npt.NDArray[np.float64]]:

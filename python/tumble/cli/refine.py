@@ -83,7 +83,7 @@ def refine(
         found = study(checked, folder, levels, what or (), measure or (), resume, force, threads, shown, warn_of)
     for line in _told(found):
         say(line)
-    warn_of({"code": "unrefined-steps", "path": "", "message": note} for note in found.notes)
+    warn_of(found.notes)
     for k, text in found.failures.items():
         complain(f"level {k} failed: {text}; `tumble run` with its words says more: {_words(found, k)}")
     if found.measures and any(run is not None for run in found.runs):

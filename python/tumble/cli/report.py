@@ -18,9 +18,6 @@ _MOST = 0.5
 """Growth or loss of the energy over its scale beyond which a change that was tried is not recommended, unless something in the
 scene may give or take that much."""
 
-_GAINS = ("forward_euler", "modified_euler", "midpoint", "heun")
-"""Integrators that gain energy of oscillations at any step."""
-
 _EMPTY: Mapping[str, Any] = {}
 
 _RESULTS = ["film.mp4", "scene.usda", "ply", "energy.png", "stills"]
@@ -153,35 +150,14 @@ def _advice(scene: Mapping[str, Any], report: Mapping[str, Any] = _EMPTY) -> str
 
 
 def gained(run: "Run", scene: str, overrides: Sequence[str], again: Sequence[str] = ()) -> str | None:
-    """A warning if the energy grew and nothing gave any, with the likely cause and its cure."""
-    from tumble import energy
+    """How to try what the warning about energy from nowhere advises, if there is one."""
+    from tumble.doubts import remedy
 
-    grown = energy.from_nowhere(run)
-    if grown is None:
+    if (found := remedy(run)) is None:
         return None
-    plans = run.scene["system"]
-    k = next((i for i, plan in enumerate(plans) if plan["method"] == "dynamics"), 0)
-    plan: Mapping[str, Any] = plans[k] if plans else {"integrator": "symplectic_euler"}
-    names = [plan["name"] for plan in plans] or ["main"]
-    step = float(run.ledger["largest_step"][grown.frame])
-    met = energy.encounters(run, range(grown.frame - 2, grown.frame + 1), step)
-    own = plan["integrator"]
-    if met:
-        cause, changes = "; ".join(map(energy.told, met)), energy.changes(run.scene, met, k)
-    elif own in _GAINS:
-        cause, changes = f"{own} gains energy where things oscillate", [f"system.{k}.integrator=symplectic_euler"]
-    elif own in energy.ADAPTIVE:
-        tolerance = 0.01 * plan["adaptive"]["tolerance"]
-        cause, changes = "the tolerance is too coarse", [f"system.{k}.adaptive.tolerance={tolerance:.1e}"]
-    else:
-        n = math.ceil(4.0 / run.fps / run.scene["time"]["exchanges"] / step)
-        shorter = f"step={step / 4.0:.2g}" if plan.get("step") else f"substeps={n}"
-        cause, changes = f"steps of {seconds(step)} are too long", [f"system.{k}.{shorter}"]
-    sets = [*without(overrides, changes, names), *changes]
-    return (
-        f"the energy grew by {grown.times:.3g} times its scale, from frame {grown.frame} on, and nothing in the scene gives "
-        f"any: {cause}. Try\n  {command('run', scene, sets, *again, '--force')}"
-    )
+    names = [plan["name"] for plan in run.scene["system"]] or ["main"]
+    sets = [*without(overrides, found.changes, names), *found.changes]
+    return f"To try what keeps the energy:\n  {command('run', scene, sets, *again, '--force')}"
 
 
 def _headline(report: Mapping[str, Any]) -> str:

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from tumble.cli import find, report
-from tumble.cli.console import Progress, broke, complain, counted, say, stopped, warn, warn_of
+from tumble.cli.console import Progress, broke, complain, counted, say, stopped, warn_of
 
 if TYPE_CHECKING:
     from tumble import Run, TumbleError
@@ -85,7 +85,7 @@ def run(
 
     failures = present(done, asked, frames_to_draw, renderer)
     if text := report.gained(done, scene, overrides, [*(["--out", str(out)] if out else []), *_flags(flags, renderer)]):
-        warn("energy-grew", text)
+        print(text, file=sys.stderr)
     judge(done, failures)
 
 
