@@ -220,7 +220,9 @@ def _drop_levels(goal: Path, levels: int) -> None:
 def _too_long(world: World) -> list[str]:
     """Systems whose steps are longer than what is usable by estimate."""
     found = []
+    names = [system["name"] for system in world.scene.to_dict()["system"]]
     for about in world.stability():
+        k = names.index(about["system"]) if about["system"] in names else 0
         usable = next(
             (float(at["usable"]) for at in about["limits"] if at["integrator"] == about["integrator"]), math.inf
         )
@@ -228,7 +230,7 @@ def _too_long(world: World) -> list[str]:
             found.append(
                 f'system "{about["system"]}" takes steps of {about["step"]:.3g} s, usable are {usable:.3g} s by estimate: '
                 "it is likely to break. Halved distances ask for half the step, with internal damping for a quarter: take more "
-                "substeps, or refine them with --what system.0.substeps*4"
+                f"substeps, or refine them with --what system.{k}.substeps*4"
             )
     return found
 
