@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from tumble import Run
-from tumble.folder import sealed
+from tumble.folder import seal
 from tumble.run import simulate
 
 Tree = dict[str, Any]
@@ -64,7 +64,8 @@ def repack(path: Path, arrays: Mapping[str, Any]) -> None:
         mark = archive.comment.decode().rpartition(", sum ")[0]
     buffer = io.BytesIO()
     np.savez(buffer, **arrays)
-    path.write_bytes(sealed(buffer.getvalue(), mark))
+    seal(buffer, mark)
+    path.write_bytes(buffer.getvalue())
 
 
 def half(path: Path) -> None:

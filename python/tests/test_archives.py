@@ -142,6 +142,18 @@ def test_what_is_missing_is_told_as_such(tmp_path: Path) -> None:
     assert read_column(path, "p", "y") is None and np.asarray(read_column(path, "p", "x")).shape == (2, 3)
 
 
+def test_the_sum_is_over_all_of_a_large_frame(tmp_path: Path) -> None:
+    path = tmp_path / "f.npz"
+    numbers = np.arange(1 << 19, dtype=np.float64)
+    write_columns(path, {"p": {"x": numbers}}, "large")
+    np.testing.assert_array_equal(read_columns(path, "large")["p"]["x"], numbers)
+    data = bytearray(path.read_bytes())
+    data[-300] ^= 1
+    path.write_bytes(data)
+    with pytest.raises(ExportError, match="its bytes are not those that were written"):
+        read_columns(path, "large")
+
+
 def test_frames_that_cannot_be_opened_are_computed_again(spring: Tree, tmp_path: Path) -> None:
     """An archive of a version that is still to come is no error of the system, nor one of the archive."""
     run = simulate(spring | {"output": {"plot": False, "checkpoint": 2}}, tmp_path / "run", frames=6)

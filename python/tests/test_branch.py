@@ -184,6 +184,11 @@ def test_a_damaged_parent_is_named_before_anything_is_lost(reference: Run, sprin
     assert_same(healed, branch(parent, 13, tmp_path / "whole", [SOFTER]))
 
 
+def test_what_a_branch_is_given_is_no_energy_from_nowhere(reference: Run, tmp_path: Path) -> None:
+    found = branch(reference, 6, tmp_path / "stiff", ["particles.p.spring.0.stiffness=5000"])
+    assert found.ledger["energy"].max() > 2.0 * found.ledger["energy"][5] and found.manifest["warnings"] == []
+
+
 def test_a_branch_is_never_begun_anew_from_the_start(reference: Run, spring: Tree, tmp_path: Path) -> None:
     """`tumble run --resume` with the branch's very scene would simulate another history."""
     found = branch(reference, 13, tmp_path / "softer", [SOFTER])

@@ -1,21 +1,26 @@
 """The run folder: what is in it, and that a stopped run goes on to the same bits."""
 
 import copy
+import errno
 import json
 import math
 import shutil
+import warnings
 from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
+from conftest import Answer
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from runs import OBJECT, Killed, N, Tree, assert_same, half, kill_at, killed, truncate
 
 from tumble import ExportError, Run, Scene, SceneError, World, _engine
+from tumble.branch import branch
 from tumble.folder import LEDGER, RunFolder, cell, plain, read_rows
-from tumble.run import simulate
+from tumble.run import LostFrames, simulate
 
 # What is in the folder
 
@@ -312,7 +317,7 @@ def test_any_bit_of_a_frame_that_changes_is_noticed(spring: Tree, tmp_path: Path
     assert files.intact(read_rows(files.ledger, LEDGER)) == 3
 
 
-def test_lost_lines_are_noticed(spring: Tree, tmp_path: Path, reference: Run) -> None:
+def test_lost_lines_are_noticed(spring: Tree, tmp_path: Path, reference: Run, tumble: Callable[..., Answer]) -> None:
     path = reference.folder / "ledger.csv"
     lines = path.read_bytes().splitlines(keepends=True)
     for lost, kept in (
@@ -321,15 +326,90 @@ def test_lost_lines_are_noticed(spring: Tree, tmp_path: Path, reference: Run) ->
         ([*lines[:5], lines[5].replace(b",0,", b",nan,", 1), *lines[6:]], 4),
     ):
         path.write_bytes(b"".join(lost))
-        text = rf"ledger\.csv: has lost lines: {kept} of {N + 1} frames are there; --resume computes"
-        with pytest.raises(ExportError, match=text):
-            Run(reference.folder)
+        text = rf"ledger\.csv: has lost lines: {kept} of {N + 1} frames can be read; --resume computes"
+        with pytest.warns(LostFrames, match=text):
+            assert Run(reference.folder).n_frames == kept
+        answer = tumble("plot", reference.folder, "--out", "plot.png")
+        assert answer.code == 0 and "warning[lost-frames]: " in answer.err
         assert simulate(spring, reference.folder, resume=True).hashes == reference.hashes
     for i in (N - 1, N):
         (reference.folder / f"frames/{i:06}.npz").unlink()
-    with pytest.raises(ExportError, match=rf"{N - 1:06}\.npz: is missing: {N - 1} of {N + 1} frames"):
-        Run(reference.folder)
+    with pytest.warns(LostFrames, match=rf"{N - 1:06}\.npz: is missing: {N - 1} of {N + 1} frames"):
+        assert len(Run(reference.folder).frame(N - 2)) == 1
     assert len(simulate(spring, reference.folder, resume=True).frame(N)) == 1
+
+
+def test_a_kill_while_frames_are_dropped_is_no_loss(
+    spring: Tree, tmp_path: Path, reference: Run, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    half(reference.folder / "frames/000021.npz")
+
+    def kill(*_: object) -> None:
+        raise Killed
+
+    for place in ("tumble.folder.RunFolder.drop_after", "tumble.recorder.Table"):
+        with monkeypatch.context() as patch:
+            patch.setattr(place, kill)
+            with pytest.raises(Killed):
+                simulate(spring, reference.folder, resume=True)
+        with warnings.catch_warnings(action="error"):
+            assert Run(reference.folder).n_frames >= 21
+    assert_same(simulate(spring, reference.folder, resume=True), reference)
+
+
+def test_what_the_system_refuses_to_read_is_no_damage(
+    spring: Tree, tmp_path: Path, reference: Run, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    before = {f: f.read_bytes() for f in reference.folder.rglob("*") if f.is_file()}
+    opened = Path.open
+
+    def refuse(path: Path, *arguments: Any, **more: Any) -> Any:
+        if path.name == "000003.npz":
+            raise OSError(errno.EMFILE, "Too many open files")
+        return opened(path, *arguments, **more)
+
+    with monkeypatch.context() as patch:
+        patch.setattr(Path, "open", refuse)
+        with pytest.raises(ExportError, match=r"000003\.npz: cannot be read \(Too many open files"):
+            simulate(spring, reference.folder, resume=True)
+    assert {f: f.read_bytes() for f in reference.folder.rglob("*") if f.is_file()} == before
+
+
+def test_static_columns_of_torn_cloth_are_those_of_its_start(sheet: Tree, tmp_path: Path) -> None:
+    sheet["sheet"][0] |= {"resolution": [6, 6], "pin": ["edge x-"], "tear": {"strain": 0.001}}
+    sheet["system"] = [{"method": "position_based", "substeps": 4}]
+    sheet["output"] = {"plot": False, "checkpoint": 3}
+    whole = simulate(sheet, tmp_path / "whole", frames=8)
+    assert whole.ledger["broken"][4] > 0
+    resumed = simulate(sheet, killed(sheet, tmp_path / "run", 6), frames=8, resume=True)
+    branched = branch(whole, 5, tmp_path / "branch")
+    for name in ("static.npz", "columns.json"):
+        assert (resumed.folder / name).read_bytes() == (whole.folder / name).read_bytes()
+        assert (branched.folder / name).read_bytes() == (whole.folder / name).read_bytes()
+    assert_same(branch(branched, 6, tmp_path / "second"), whole)
+
+
+def test_static_columns_are_no_frame(reference: Run) -> None:
+    exchange_static(reference.folder)
+    with pytest.raises(ExportError, match=r"static\.npz: is damaged \(it should be static\)"):
+        _ = reference.static
+
+
+def test_doubts_of_runs_that_were_stopped_are_kept(spring: Tree, tmp_path: Path) -> None:
+    def interrupt(done: int, total: int) -> None:
+        if done == 7:
+            raise KeyboardInterrupt
+
+    solver = {"newton_iterations": 1, "newton_tolerance": 1e-9}
+    spring["system"] = [{"integrator": "implicit_euler", "substeps": 1, "solver": solver}]
+    with pytest.raises(KeyboardInterrupt):
+        simulate(spring, tmp_path / "run", progress=interrupt)
+    assert [w["code"] for w in Run(tmp_path / "run").manifest["warnings"]] == ["unconverged"]
+
+
+def test_fewer_frames_than_there_are_is_finished(spring: Tree, reference: Run) -> None:
+    fewer = simulate(spring, reference.folder, frames=8, resume=True)
+    assert (fewer.status, fewer.n_frames) == ("finished", N + 1)
 
 
 def test_lost_trials_are_told_and_nothing_else_is_lost(spring: Tree, tmp_path: Path) -> None:

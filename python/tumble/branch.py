@@ -12,7 +12,7 @@ import numpy as np
 from tumble._engine import Scene, SceneError, StepError, TumbleError, World
 from tumble.folder import RunFolder, plain, refuse
 from tumble.lock import alone, ask
-from tumble.recorder import Recorder, describe
+from tumble.recorder import Recorder, Unchanging, describe
 from tumble.run import Broke, Progress, Run, admit, record, return_to_checkpoint
 
 Descent = list[dict[str, Any]]
@@ -51,6 +51,7 @@ def branch(
     descent = _descent(parent, k, files.path, changes)
     admit(files, scene, resume, overwrite, descent)
     world = World(scene, threads)
+    unchanging = Unchanging.of(world)
     with alone(files.path):
         earlier = admit(files, scene, resume, overwrite, descent)
 
@@ -60,14 +61,14 @@ def branch(
                 world.reconsider()
 
         if earlier is not None and return_to_checkpoint(world, files):
-            recorder = Recorder(files, world, threads, earlier, descent)
+            recorder = Recorder(files, world, unchanging, threads, earlier, descent)
             return record(recorder, lambda: begin(recorder.go_on), progress, broke=broke)
         _take_over(world, parent, k, threads)
         for i in range(k):
             RunFolder(parent.folder).check(i, parent.hashes[i])
         if files.is_run():
             files.clear()
-        recorder = Recorder(files, world, threads, None, descent)
+        recorder = Recorder(files, world, unchanging, threads, None, descent)
         return record(recorder, lambda: begin(lambda: recorder.branch_off(parent)), progress, broke=broke)
 
 
@@ -91,7 +92,7 @@ def world_at(run: Run, frame: int, threads: int | None = None) -> World:
         if run.descent:
             try:
                 parent = Run(lineage(run)[-1])
-            except SceneError as error:
+            except TumbleError as error:
                 raise refuse(
                     run.folder, f"frame {k} has to be made from the run that this is a branch of: {error}"
                 ) from error
@@ -125,17 +126,18 @@ def family(run: Run) -> list[Run]:
     """The runs beside a run that branch off from it, and those that it branches off from; the oldest first."""
     home = with_name(run.folder)
     own = os.path.realpath(home)
-    found = [Run(path) for path in lineage(run) if RunFolder(path).is_run()]
-    for manifest in sorted(home.parent.glob("*/run.json")):
-        if os.path.realpath(manifest.parent) == own:
-            continue
-        try:
-            other = Run(manifest.parent)
-        except TumbleError:
-            continue
-        if own in [os.path.realpath(path) for path in lineage(other)]:
-            found.append(other)
+    older = [other for path in lineage(run) if (other := _readable(path))]
+    beside = [path.parent for path in sorted(home.parent.glob("*/run.json")) if os.path.realpath(path.parent) != own]
+    others = [other for path in beside if (other := _readable(path))]
+    found = older + [other for other in others if own in map(os.path.realpath, lineage(other))]
     return sorted(found, key=lambda other: len(other.descent))
+
+
+def _readable(path: Path) -> Run | None:
+    try:
+        return Run(path)
+    except TumbleError:
+        return None
 
 
 def with_name(folder: Path) -> Path:
@@ -148,7 +150,8 @@ def is_branch(folder: Path, parent: Run, frame: int, changes: Sequence[str]) -> 
     if not RunFolder(folder).is_run():
         return False
     wanted: Descent = json.loads(json.dumps(plain(_descent(parent, frame, folder, changes))))
-    return bool(Run(folder).descent == wanted)
+    found = _readable(folder)
+    return found is not None and found.descent == wanted
 
 
 def _version() -> str:

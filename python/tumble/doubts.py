@@ -40,6 +40,8 @@ def remedy(run: "Run") -> Remedy | None:
     k = next((i for i, plan in enumerate(plans) if plan["method"] == "dynamics"), 0)
     plan: Mapping[str, Any] = plans[k] if plans else {"integrator": "symplectic_euler"}
     step = float(run.ledger["largest_step"][grown.frame])
+    if not 1e-18 < step < math.inf:
+        return None
     met = energy.encounters(run, range(grown.frame - 2, grown.frame + 1), step)
     own = plan["integrator"]
     if met:

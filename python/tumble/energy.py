@@ -141,7 +141,10 @@ def from_nowhere(run: "Run") -> Growth | None:
     given = sources({**scene, "emitter": [e for e in scene["emitter"] if e not in steady]})
     if fluids or given or run.n_frames < 2 or not run.ledger["mass"].any():
         return None
-    found = growth(run.ledger)
+    # What a branch was given at its start is no growth.
+    start = run.descent[-1]["frame"] if run.descent else 0
+    found = growth({name: column[start:] for name, column in run.ledger.items()})
+    found = Growth(found.times, start + found.frame)
     return found if found.times > TOO_MUCH else None
 
 

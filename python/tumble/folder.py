@@ -73,6 +73,10 @@ _FOLDERS = ("frames", "checkpoints", "stills", "usd", "ply", "volumes", "slices"
 """Where it writes them."""
 
 
+class DamageError(ExportError):
+    """A file of a run that is lost, or is not what was written."""
+
+
 class RunFolder:
     """Where everything is."""
 
@@ -92,7 +96,7 @@ class RunFolder:
 
     def _numbers(self, folder: str, ending: str) -> list[int]:
         files = (self.path / folder).glob(f"*{ending}")
-        return sorted(int(f.stem) for f in files if f.stem.isdigit())
+        return sorted(int(f.stem) for f in files if f.stem.isascii() and f.stem.isdigit())
 
     def checkpoints(self) -> list[int]:
         """Frames of which there is a checkpoint."""
@@ -138,7 +142,8 @@ class RunFolder:
                 file.unlink()
 
     def check(self, i: int, state: str) -> None:
-        """Raises ExportError unless the file of this frame, which had this hash, is whole to the last bit."""
+        """Raises DamageError unless the file of this frame, which had this hash, is whole to the last bit; ExportError where it
+        cannot be read."""
         # An archive that is half opened complains when it is collected.
         with held(), _opened(self.frame(i), marked(i, state), whole=True):
             pass
@@ -148,7 +153,7 @@ class RunFolder:
         for i, row in enumerate(rows):
             try:
                 self.check(i, row[-1])
-            except ExportError:
+            except DamageError:
                 return i
         return len(rows)
 
@@ -159,7 +164,7 @@ class RunFolder:
         column = LEDGER.index("tried")
         if (lost := next((i for i, row in enumerate(rows) if found[i] != int(row[column])), None)) is not None:
             text = f"is damaged (of frame {lost} it has {found[lost]} rows, and the ledger counts {rows[lost][column]})"
-            raise ExportError(f"{self.trials}: {text}; simulate again with --force where they are needed")
+            raise DamageError(f"{self.trials}: {text}; simulate again with --force where they are needed")
         return trials
 
 
@@ -202,7 +207,7 @@ def reason(error: OSError) -> str:
     return text
 
 
-def write_whole(path: Path, data: bytes) -> None:
+def write_whole(path: Path, data: bytes | memoryview) -> None:
     """Writes a file that is there either completely or not at all."""
     temporary = path.with_name(path.name + ".tmp")
     with writing(path):
@@ -244,14 +249,18 @@ def write_columns(path: Path, columns: Columns, mark: str = "") -> None:
         raise ExportError(f"{path}: the name of an object has a NUL in it, where names in archives end; rename it")
     buffer = io.BytesIO()
     np.savez(buffer, **arrays)  # type: ignore[arg-type]
-    write_whole(path, sealed(buffer.getvalue(), mark))
+    seal(buffer, mark)
+    write_whole(path, buffer.getbuffer())
 
 
-def sealed(archive: bytes, mark: str) -> bytes:
-    """An archive without a comment, with one: its mark, and a sum over all bytes before."""
+def seal(archive: io.BytesIO, mark: str) -> None:
+    """Gives an archive without a comment one: its mark, and a sum over all bytes before."""
     start = f"{mark}, sum ".encode()
-    before = archive[:-2] + (len(start) + 8).to_bytes(2, "little")
-    return before + start + f"{zlib.crc32(before):08x}".encode()
+    with archive.getbuffer() as data:
+        data[-2:] = (len(start) + 8).to_bytes(2, "little")
+        total = zlib.crc32(data)
+    archive.seek(0, io.SEEK_END)
+    archive.write(start + f"{total:08x}".encode())
 
 
 def read_columns(path: Path, mark: str = "") -> Columns:
@@ -273,8 +282,8 @@ def read_column(path: Path, name: str, column: str, mark: str = "") -> npt.NDArr
 
 @contextmanager
 def _opened(path: Path, mark: str, whole: bool = False) -> Iterator[zipfile.ZipFile]:
-    """An .npz for reading; whatever is wrong with it is an ExportError. Where a mark is given it must have that, and be
-    `whole` by its sum."""
+    """An .npz for reading; whatever is wrong with it is a DamageError, but what the system refuses an ExportError. Where a mark
+    is given it must have that, and be `whole` by its sum."""
     try:
         with path.open("rb") as file, zipfile.ZipFile(file) as archive:
             size = path.stat().st_size
@@ -289,10 +298,16 @@ def _opened(path: Path, mark: str, whole: bool = False) -> Iterator[zipfile.ZipF
                     raise ValueError("its bytes are not those that were written")
             yield archive
     except FileNotFoundError:
-        raise ExportError(f"{path}: is missing; --resume computes again what is lost") from None
+        raise DamageError(f"{path}: is missing; --resume computes again what is lost") from None
     except Exception as error:  # Neither zipfile nor NumPy says what it may raise.
+        if isinstance(error, OSError) and error.errno not in _OF_DAMAGE:
+            raise ExportError(f"{path}: cannot be read ({error.strerror or error})") from error
         why = textwrap.shorten(str(error), 200) or type(error).__name__
-        raise ExportError(f"{path}: is damaged ({why}); --resume computes again what is lost") from error
+        raise DamageError(f"{path}: is damaged ({why}); --resume computes again what is lost") from error
+
+
+_OF_DAMAGE = (None, errno.EINVAL, errno.EISDIR, errno.ENOTDIR)
+"""What the system says where an archive leads to places that are not there, or where there is something else."""
 
 
 def _sum(file: IO[bytes], size: int) -> int:
@@ -362,8 +377,8 @@ def cell(value: str | int | float) -> str:
 
 
 def read_rows(path: Path, header: Sequence[str]) -> list[list[str]]:
-    """The complete rows of a table; reading stops at the first that is not. Only the ledger's `hash` is no number, and its
-    frames count its rows."""
+    """The complete rows of a table. Only the ledger's `hash` is no number, and its frames count its rows: it ends at the first
+    that is not whole."""
     try:
         lines = path.read_text(encoding="utf-8", errors="replace").splitlines(keepends=True)
     except OSError:
@@ -374,15 +389,16 @@ def read_rows(path: Path, header: Sequence[str]) -> list[list[str]]:
     for line in lines[1:]:
         fields = line.rstrip("\n").split(",")
         sound = line.endswith("\n") and len(fields) == len(header) and all(map(_fits, header, fields))
-        if not sound or (header[0] == "frame" and fields[0] != str(len(rows))):
+        if header[0] == "frame" and not (sound and fields[0] == str(len(rows))):
             break
-        rows.append(fields)
+        if sound:
+            rows.append(fields)
     return rows
 
 
 def _fits(column: str, text: str) -> bool:
     if column in COUNTS:
-        return text.isascii() and text.isdigit()
+        return text.isascii() and text.isdigit() and len(text) < 19
     try:
         return column == "hash" or float(text) is not None
     except ValueError:

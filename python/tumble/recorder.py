@@ -5,9 +5,10 @@ import platform
 import shlex
 import sys
 import time
+import warnings
 from collections.abc import Mapping, Sequence
 from contextlib import suppress
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
@@ -44,6 +45,18 @@ IMPLICIT = ("implicit_euler", "implicit_midpoint", "bdf2")
 _EMPTY_REPORT: dict[str, Any] = {}
 
 
+class Unchanging(NamedTuple):
+    """What is written once, of a world at its start: later masses and links may be others, where cloth has torn."""
+
+    static: Columns
+    described: dict[str, dict[str, Any]]
+
+    @classmethod
+    def of(cls, world: World) -> "Unchanging":
+        topology = world.topology
+        return cls(topology, describe(world.units, topology, world.frame))
+
+
 class Recorder:
     """The open run folder of a world that is being simulated."""
 
@@ -51,6 +64,7 @@ class Recorder:
         self,
         files: RunFolder,
         world: World,
+        unchanging: Unchanging,
         threads: int | None,
         earlier: Mapping[str, Any] | None,
         descent: Sequence[Mapping[str, Any]] = (),
@@ -59,6 +73,7 @@ class Recorder:
         oldest first."""
         self.files = files
         self.world = world
+        self.unchanging = unchanging
         self.scene = world.scene.to_dict()
         self.hashes: list[str] = []
         self.tables: list[Table] = []
@@ -124,9 +139,8 @@ class Recorder:
         self._describe()
 
     def _describe(self) -> None:
-        topology, columns = self.world.topology, self.world.frame
-        write_columns(self.files.static, topology, STATIC)
-        write_json(self.files.columns, describe(self.world.units, topology, columns))
+        write_columns(self.files.static, self.unchanging.static, STATIC)
+        write_json(self.files.columns, self.unchanging.described)
 
     def go_on(self) -> None:
         """Opens the folder of a stopped run at the frame of the world; later frames are dropped."""
@@ -195,7 +209,7 @@ class Recorder:
 
     def finish(self) -> None:
         """Closes a run that went on to its last frame, or ends one of which a bound is broken."""
-        whole = self.written == self.manifest["frames"]
+        whole = self.written >= self.manifest["frames"]
         self.manifest["status"] = "finished" if whole else "failed"
         self.manifest["probes"] = expect.probes(self.world, self.scene) if whole else []
         self.checkpoint()
@@ -211,6 +225,13 @@ class Recorder:
 
     def _doubt(self, run: "Run") -> None:
         self.manifest["warnings"] = [*self.world.warnings, *doubts.of_books(run)]
+
+    def _doubt_so_far(self) -> None:
+        from tumble.run import Run
+
+        # Frames that have just been dropped may be counted still.
+        with suppress(Exception), warnings.catch_warnings(action="ignore"):
+            self._doubt(Run(self.files.path))
 
     def fail(self, error: StepError, explain: bool = True) -> None:
         """Notes why the physics broke, then, if asked to `explain` it, tries what would have helped, and looks for a minimal
@@ -285,11 +306,7 @@ class Recorder:
         self.manifest["status"] = status
         if message is not None:
             self.manifest["failure"] = {"message": message, "report": report or {}, "frame": self.written, "cures": []}
-            from tumble.run import Run
-
-            with suppress(Exception):
-                self._doubt(Run(self.files.path))
-        for write in (self.checkpoint, self._write_manifest):
+        for write in (self.checkpoint, self._doubt_so_far, self._write_manifest):
             with suppress(ExportError, OSError):
                 write()
 

@@ -4,6 +4,7 @@ import json
 import os
 import shlex
 import time
+import warnings
 from collections.abc import Callable, Mapping, Sequence
 from functools import cached_property
 from pathlib import Path
@@ -30,7 +31,7 @@ from tumble.folder import (
 )
 from tumble.interrupts import held
 from tumble.lock import alone, ask
-from tumble.recorder import Recorder, changed
+from tumble.recorder import Recorder, Unchanging, changed
 from tumble.soundness import fault_of_arrays, fault_of_columns, fault_of_manifest
 
 Progress = Callable[[int, int], None]
@@ -86,12 +87,13 @@ def _simulate(
     cures: bool,
     broke: Broke | None,
 ) -> "Run":
+    unchanging = Unchanging.of(world)
     if earlier is not None and not return_to_checkpoint(world, files):
         earlier, overwrite = None, True
         world = World(world.scene, threads)
     if earlier is None and overwrite and files.is_run():
         files.clear()
-    recorder = Recorder(files, world, threads, earlier)
+    recorder = Recorder(files, world, unchanging, threads, earlier)
     return record(recorder, recorder.start if earlier is None else recorder.go_on, progress, cures, broke)
 
 
@@ -221,11 +223,15 @@ def read_manifest(files: RunFolder) -> dict[str, Any]:
     return manifest
 
 
+class LostFrames(UserWarning):
+    """Frames of a run were there, and cannot be read."""
+
+
 class Run:
     """A run folder, to be read. Frames that were finished can be read whatever happened after them."""
 
     def __init__(self, path: str | os.PathLike[str]) -> None:
-        """Raises SceneError if there is no run at `path`, and ExportError where frames are lost that were there."""
+        """Raises SceneError if there is no run at `path`; warns of LostFrames where some were there that are not."""
         files = RunFolder(path)
         if not files.is_run():
             what = "there is no such folder" if not files.path.exists() else "there is no run.json in it"
@@ -236,14 +242,15 @@ class Run:
         self.scene: dict[str, Any] = self.manifest["scene"]
         """The resolved scene."""
         self._rows = read_rows(files.ledger, LEDGER)
-        lost = files.ledger
+        lost, what = files.ledger, "has lost lines"
         while self._rows and not files.frame(len(self._rows) - 1).is_file():
-            lost = files.frame(len(self._rows) - 1)
+            lost, what = files.frame(len(self._rows) - 1), "is missing"
             self._rows.pop()
         if self.n_frames < (n := len(self.manifest.get("hashes", []))):
-            what = "has lost lines" if lost is files.ledger else "is missing"
-            text = f"{self.n_frames} of {n} frames are there; --resume computes again what is lost"
-            raise ExportError(f"{lost}: {what}: {text}")
+            same = self.manifest.get("tumble") == _engine.version
+            cure = "--resume computes again what is lost" if same else "--force simulates it again"
+            text = f"{lost}: {what}: {self.n_frames} of {n} frames can be read; {cure}"
+            warnings.warn(text, LostFrames, stacklevel=2)
 
     @classmethod
     def open(cls, path: str | os.PathLike[str]) -> "Run":

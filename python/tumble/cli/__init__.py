@@ -13,7 +13,7 @@ import typer
 from typer.core import TyperGroup
 
 from tumble.cli import branch, check, diff, export, lab, plot, refine, render, run, scenes, view
-from tumble.cli.console import complain, heed_termination, stopped, survive_narrow_streams
+from tumble.cli.console import complain, heed_termination, lost_frames_told, stopped, survive_narrow_streams
 
 
 class Verbs(TyperGroup):
@@ -104,4 +104,5 @@ def main(arguments: Sequence[str] | None = None) -> None:
     """Runs the command line and exits."""
     survive_narrow_streams()
     heed_termination()
-    application()(args=arguments, prog_name="tumble")
+    with lost_frames_told():
+        application()(args=arguments, prog_name="tumble")

@@ -6,7 +6,9 @@ import signal
 import sys
 import threading
 import time
-from collections.abc import Iterable, Mapping
+import warnings
+from collections.abc import Iterable, Iterator, Mapping
+from contextlib import contextmanager
 from types import TracebackType
 from typing import TYPE_CHECKING, Any, Self
 
@@ -71,10 +73,26 @@ def warn(code: str, text: str) -> None:
     _mark(f"warning[{code}]: ", "33", text)
 
 
-def warn_of(warnings: Iterable[Mapping[str, str]]) -> None:
+@contextmanager
+def lost_frames_told() -> Iterator[None]:
+    """Says what `Run` warns of as the other warnings are said."""
+    with warnings.catch_warnings():
+        other = warnings.showwarning
+
+        def show(message: Warning | str, category: type[Warning], *rest: Any, **more: Any) -> None:
+            if category.__name__ == "LostFrames":
+                warn("lost-frames", str(message))
+            else:
+                other(message, category, *rest, **more)
+
+        warnings.showwarning = show
+        yield
+
+
+def warn_of(found: Iterable[Mapping[str, str]]) -> None:
     """Each code once: the first of its warnings in full, how many others there are, and where."""
     kinds: dict[str, list[Mapping[str, str]]] = {}
-    for warning in warnings:
+    for warning in found:
         kinds.setdefault(warning["code"], []).append(warning)
     for code, (first, *others) in kinds.items():
         text = ": ".join(filter(None, (first["path"], first["message"])))
