@@ -140,6 +140,7 @@ def show_layers():
 
 def show_dress():
     dress = tomllib.loads((Path(__file__).parent.parent / "python/tumble/scenes/cloth/dress.toml").read_text())
+    dress["system"][0].update(substeps=20, position_based={"iterations": 4, "tethers": 1.05})
     counts, costs = [], []
     for edge in EDGES:
         dress["cloth"][0]["resolution"] = edge
