@@ -357,6 +357,30 @@ def test_a_kill_while_frames_are_dropped_is_no_loss(
     assert_same(simulate(spring, reference.folder, resume=True), reference)
 
 
+@pytest.mark.parametrize("files", range(3, 40, 4))
+def test_a_kill_while_a_run_is_cleared_leaves_what_can_be_read(
+    spring: Tree, reference: Run, monkeypatch: pytest.MonkeyPatch, files: int
+) -> None:
+    left, unlink = [files], Path.unlink
+
+    def kill(path: Path, missing_ok: bool = False) -> None:
+        left[0] -= 1
+        if left[0] == 0:
+            raise Killed
+        unlink(path, missing_ok)
+
+    with monkeypatch.context() as patch:
+        patch.setattr(Path, "unlink", kill)
+        try:
+            simulate(spring, reference.folder, overwrite=True)
+        except Killed:
+            with warnings.catch_warnings(action="ignore"):
+                run = Run(reference.folder)
+            assert run.n_frames == len(list(run.folder.glob("frames/*.npz")))
+            assert all(run.frame(i) for i in range(run.n_frames))
+    assert_same(simulate(spring, reference.folder, overwrite=True), simulate(spring, reference.folder, resume=True))
+
+
 def test_what_the_system_refuses_to_read_is_no_damage(
     spring: Tree, tmp_path: Path, reference: Run, monkeypatch: pytest.MonkeyPatch
 ) -> None:

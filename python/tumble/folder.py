@@ -60,14 +60,15 @@ LOCK = ".lock"
 """Says who writes here, while somebody does."""
 
 _WRITTEN = """
-static.npz columns.json ledger.csv trials.csv frames/*.npz checkpoints/*.safetensors
+checkpoints/*.safetensors frames/*.npz ledger.csv trials.csv static.npz columns.json
 film.mp4 .film.mp4.part energy.png ledger.png stills/*.png columns.npz
 scene.usda usd/frame.*.usdc usd/manifest.usda usd/objects.usdc ply/*.ply
 volumes/*.vdb slices/*.png
 minimal.toml
 run.json
 """
-"""What a run writes and --force deletes: the manifest last, because a folder without it is not taken for a run."""
+"""What a run writes and --force deletes, in this order: a stop on the way leaves frames that can be read, and the manifest goes
+last, because a folder without it is not taken for a run."""
 
 _FOLDERS = ("frames", "checkpoints", "stills", "usd", "ply", "volumes", "slices")
 """Where it writes them."""
@@ -127,7 +128,8 @@ class RunFolder:
         """Deletes what a run writes; anything else stays."""
         with writing(self.path):
             for pattern in _WRITTEN.split():
-                for file in [*self.path.glob(pattern), *self.path.glob(pattern + ".tmp")]:
+                # The last frame first, so that no gap is left.
+                for file in sorted([*self.path.glob(pattern), *self.path.glob(pattern + ".tmp")], reverse=True):
                     file.unlink()
             for folder in _FOLDERS:
                 with suppress(OSError):
