@@ -402,9 +402,10 @@ def _fits(column: str, text: str) -> bool:
     if column in COUNTS:
         return text.isascii() and text.isdigit() and len(text) < 19
     try:
-        return column == "hash" or float(text) is not None
+        float("0" if column == "hash" else text)
     except ValueError:
         return False
+    return True
 
 
 class Table:
