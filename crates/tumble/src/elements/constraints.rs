@@ -9,7 +9,7 @@ use super::list::Members;
 use super::{Compliance, Element, Law, corrected, energy, project};
 use crate::geometry::Walls;
 use crate::math::parallel::{self, Tasks, fold, worst};
-use crate::math::simd::{Index, Kernel, Width, count, dispatch, packs};
+use crate::math::simd::{Index, Kernel, Sum, Width, dispatch, packs};
 use crate::math::{Lane, Quat, Real, Row, Vec3, xyz};
 use std::marker::PhantomData;
 use std::ops::Range;
@@ -29,7 +29,7 @@ pub use volume::{Volume, enclosed};
 /// Rows of a cluster: 64 KB in single precision.
 const CLUSTER: usize = 4096;
 /// Elements per task, of those between clusters.
-const TASK: usize = 2048;
+const TASK: usize = 1024;
 /// Compliance of what has broken, and of a damper without stiffness [m/N]: nothing that is there feels it.
 const LIMP: f64 = 1e18;
 
@@ -128,6 +128,9 @@ struct Columns<const N: usize, const D: usize, const P: usize> {
     damping: Vec<Real>,
     /// Inverse inertias of frames [1/(kg m²)]; empty for points.
     inverse: [Vec<Real>; N],
+    /// For every place of links, how many from there on, up to 255, have first nodes that lie one behind the other, and second ones that do,
+    /// as on lattices; empty of others.
+    runs: Vec<u8>,
     order: Order,
     /// For every place, which of the elements given stands there.
     given: Vec<u32>,
@@ -166,6 +169,7 @@ impl<const N: usize, const D: usize, const P: usize> Columns<N, D, P> {
         });
         let damped = members.iter().any(|m| m.damping != 0.0);
         Some(Self {
+            runs: runs(&nodes),
             nodes,
             rest: std::array::from_fn(|d| column(&|m| m.rest[d])),
             law: std::array::from_fn(|p| column(&|m| m.law[p])),
@@ -199,42 +203,29 @@ impl<const N: usize, const D: usize, const P: usize> Columns<N, D, P> {
     /// Nobody writes these rows, and `check` has been called on them.
     #[inline(always)]
     unsafe fn gather<W: Width>(&self, w: W, frames: usize, x: *const Row, e: usize) -> [[W::L; 4]; N] {
-        let mut out = [[w.splat(0.0); 4]; N];
-        for a in 0..N {
-            // SAFETY: see above.
-            out[a] = unsafe { w.gather_at(x, &self.nodes[a].get()[e..]) };
-        }
-        unit_frames(frames, out)
+        // SAFETY: see above.
+        unsafe { self.fetch::<W, false>(w, frames, x, e) }
     }
 
-    /// The same of a pack that is `consecutive`.
+    /// The same; of a pack that is a `RUN`, in its order.
     ///
     /// # Safety
     /// As of `gather`.
     #[inline(always)]
-    unsafe fn gather_run<W: Width>(&self, w: W, frames: usize, x: *const Row, e: usize) -> [[W::L; 4]; N] {
+    unsafe fn fetch<W: Width, const RUN: bool>(&self, w: W, frames: usize, x: *const Row, e: usize) -> [[W::L; 4]; N] {
         let mut out = [[w.splat(0.0); 4]; N];
         for a in 0..N {
+            let index = &self.nodes[a].get()[e..];
             // SAFETY: see above.
-            out[a] = unsafe { w.rows_at(x, self.nodes[a].get()[e]) };
+            out[a] = unsafe { if RUN { w.rows_at(x, index[0]) } else { w.gather_at(x, index) } };
         }
         unit_frames(frames, out)
     }
 
-    /// Whether the first nodes of a pack lie one behind the other, and so do the second ones: of links only, to which it happens on lattices.
+    /// Whether a pack is one run.
     #[inline(always)]
-    fn consecutive<W: Width>(&self, w: W, e: usize) -> bool {
-        N == 2 && w.consecutive(self.index(e))
-    }
-
-    /// The indices of a pack.
-    #[inline(always)]
-    fn index(&self, e: usize) -> [&[u32]; N] {
-        let mut index: [&[u32]; N] = [&[]; N];
-        for a in 0..N {
-            index[a] = &self.nodes[a].get()[e..];
-        }
-        index
+    fn is_run<W: Width>(&self, _w: W, e: usize) -> bool {
+        N == 2 && usize::from(self.runs[e]) >= W::N
     }
 
     /// Rest numbers and parameters of the law of a pack.
@@ -273,7 +264,7 @@ impl<const N: usize, const D: usize, const P: usize> Columns<N, D, P> {
                 let start = color.start + t * TASK;
                 start..(start + TASK).min(color.end)
             };
-            if color.len() <= 2 * TASK {
+            if color.len() <= TASK {
                 run(color.clone(), own);
             } else if each == 0 {
                 parallel::each(color.len().div_ceil(TASK), &|t| run(task(t), &mut []));
@@ -282,6 +273,19 @@ impl<const N: usize, const D: usize, const P: usize> Columns<N, D, P> {
             }
         }
     }
+}
+
+/// What `Columns` keep as `runs`.
+fn runs<const N: usize>(nodes: &[Index; N]) -> Vec<u8> {
+    let [first, second] = &nodes[..] else { return Vec::new() };
+    let (first, second) = (first.get(), second.get());
+    let mut runs = vec![1_u8; first.len()];
+    for e in (1..runs.len()).rev() {
+        if first[e - 1] + 1 == first[e] && second[e - 1] + 1 == second[e] {
+            runs[e - 1] = runs[e].saturating_add(1);
+        }
+    }
+    runs
 }
 
 /// Ranges of elements that share no node.
@@ -397,6 +401,12 @@ impl<E: Element<N, M, D>, Y: Law<P>, const N: usize, const M: usize, const D: us
     }
 }
 
+/// Numbers of a pack in the order of its rows.
+#[inline(always)]
+fn ordered<W: Width, const RUN: bool>(w: W, v: W::L) -> W::L {
+    if RUN { w.in_run(v) } else { v }
+}
+
 /// What is common to all elements of a sweep.
 #[derive(Clone, Copy)]
 struct Sweep<'a> {
@@ -422,60 +432,66 @@ impl<E: Element<N, M, D>, Y: Law<P>, const N: usize, const M: usize, const D: us
     for Project<'_, E, Y, N, M, D, P>
 {
     type Output = ();
-    #[allow(clippy::assign_op_pattern)] // lanes have no +=
     #[inline(always)]
-    fn run<W: Width>(self, w: W) {
-        let (columns, sweep, start, many) = (self.columns, self.sweep, self.range.start, !self.lambda.is_empty());
-        let inverse_h = 1.0 / sweep.h;
-        packs!(W, w, self.range, |e| {
-            let (rest, law) = columns.pack(w, e);
-            let (run, rows) = (columns.consecutive(w, e), sweep.x.rows());
-            // SAFETY: `check` has been called. Of elements that are projected at the same time none share a node: those of a colour by its
-            // making, those of two clusters since each has rows of its own.
-            let x = unsafe { if run { columns.gather_run(w, E::FRAMES, rows, e) } else { columns.gather(w, E::FRAMES, rows, e) } };
-            let mut weights = [w.splat(0.0); N];
-            for a in 0..N {
-                weights[a] = if a < N - E::FRAMES { x[a][3] } else { w.load(&columns.inverse[a][e..]) };
-            }
-            let (zero, one) = (w.splat(0.0), w.splat(1.0));
-            let soft = w.load(&columns.compliance[e..]);
-            let (mut alpha, mut share) = (soft * w.splat(inverse_h * inverse_h), zero);
-            let mut before = None;
-            if sweep.damped {
-                let ratio = soft * w.load(&columns.damping[e..]) * w.splat(inverse_h);
-                alpha = alpha / (one + ratio);
-                share = ratio / (one + ratio);
-                // SAFETY: as above.
-                before = Some(unsafe { columns.gather(w, E::FRAMES, sweep.before.as_ptr(), e) });
-            }
-            if sweep.plain.is_some() {
-                // What has broken stays so.
-                alpha = (soft - w.splat(0.5 * LIMP as Real)).positive(alpha, zero);
-            }
-            let lambda = if many && !sweep.first { w.load(&self.lambda[e - start..]) } else { zero };
-            let compliance = Compliance { alpha, lambda, share };
-            let (mut moves, delta) = project::<E, Y, _, N, M, D, P>(compliance, law, rest, x, before, weights);
-            if many {
-                w.store(lambda + delta, &mut self.lambda[e - start..]);
-            }
-            if let Some(part) = sweep.plain {
-                for a in 0..N {
-                    moves[a] = moves[a] * w.splat(part);
-                }
-            }
-            let x = corrected(E::FRAMES, x, moves);
-            if run {
-                for a in 0..N {
-                    // SAFETY: as above.
-                    unsafe { w.put_rows(x[a], rows, columns.nodes[a].get()[e]) };
-                }
-            } else {
-                for a in 0..N {
-                    // SAFETY: as above.
-                    unsafe { w.put(x[a], rows, &columns.nodes[a].get()[e..]) };
-                }
-            }
+    fn run<W: Width>(mut self, w: W) {
+        packs!(W, w, self.range.clone(), |e| {
+            if self.columns.is_run(w, e) { self.pack::<_, true>(w, e) } else { self.pack::<_, false>(w, e) }
         });
+    }
+}
+
+impl<E: Element<N, M, D>, Y: Law<P>, const N: usize, const M: usize, const D: usize, const P: usize> Project<'_, E, Y, N, M, D, P> {
+    /// Projects a pack; one that is a `RUN` in its order.
+    #[inline(always)]
+    fn pack<W: Width, const RUN: bool>(&mut self, w: W, e: usize) {
+        let (columns, sweep, start, many) = (self.columns, self.sweep, self.range.start, !self.lambda.is_empty());
+        let (rows, inverse_h) = (sweep.x.rows(), 1.0 / sweep.h);
+        let (mut rest, mut law) = columns.pack(w, e);
+        for d in 0..D {
+            rest[d] = ordered::<W, RUN>(w, rest[d]);
+        }
+        for p in 0..P {
+            law[p] = ordered::<W, RUN>(w, law[p]);
+        }
+        // SAFETY: `check` has been called. Of elements that are projected at the same time none share a node: those of a colour by its
+        // making, those of two clusters since each has rows of its own.
+        let x = unsafe { columns.fetch::<W, RUN>(w, E::FRAMES, rows, e) };
+        let mut weights = [w.splat(0.0); N];
+        for a in 0..N {
+            weights[a] = if a < N - E::FRAMES { x[a][3] } else { ordered::<W, RUN>(w, w.load(&columns.inverse[a][e..])) };
+        }
+        let (zero, one) = (w.splat(0.0), w.splat(1.0));
+        let soft = ordered::<W, RUN>(w, w.load(&columns.compliance[e..]));
+        let (mut alpha, mut share) = (soft * w.splat(inverse_h * inverse_h), zero);
+        let mut before = None;
+        if sweep.damped {
+            let ratio = soft * ordered::<W, RUN>(w, w.load(&columns.damping[e..])) * w.splat(inverse_h);
+            alpha = alpha / (one + ratio);
+            share = ratio / (one + ratio);
+            // SAFETY: as above.
+            before = Some(unsafe { columns.fetch::<W, RUN>(w, E::FRAMES, sweep.before.as_ptr(), e) });
+        }
+        if sweep.plain.is_some() {
+            // What has broken stays so.
+            alpha = (soft - w.splat(0.5 * LIMP as Real)).positive(alpha, zero);
+        }
+        let lambda = if many && !sweep.first { ordered::<W, RUN>(w, w.load(&self.lambda[e - start..])) } else { zero };
+        let compliance = Compliance { alpha, lambda, share };
+        let (mut moves, delta) = project::<E, Y, _, N, M, D, P>(compliance, law, rest, x, before, weights);
+        if many {
+            w.store(ordered::<W, RUN>(w, lambda + delta), &mut self.lambda[e - start..]);
+        }
+        if let Some(part) = sweep.plain {
+            for a in 0..N {
+                moves[a] = moves[a] * w.splat(part);
+            }
+        }
+        let x = corrected(E::FRAMES, x, moves);
+        for a in 0..N {
+            let index = &columns.nodes[a].get()[e..];
+            // SAFETY: as above.
+            unsafe { if RUN { w.put_rows(x[a], rows, index[0]) } else { w.put(x[a], rows, index) } };
+        }
     }
 }
 
@@ -492,20 +508,16 @@ impl<E: Element<N, M, D>, Y: Law<P>, const N: usize, const M: usize, const D: us
     type Output = f64;
     #[inline(always)]
     fn run<W: Width>(self, w: W) -> f64 {
-        let (columns, mut total, mut each) = (self.columns, 0.0, [0.0; 16]);
+        let (columns, mut sum, start) = (self.columns, Sum::default(), self.range.start);
         packs!(W, w, self.range, |e| {
             let (rest, law) = columns.pack(w, e);
             // SAFETY: `energy` has called `check`.
             let x = unsafe { columns.gather(w, E::FRAMES, self.x.as_ptr(), e) };
             let soft = w.load(&columns.compliance[e..]);
             let k = soft.positive(w.splat(1.0) / soft, w.splat(0.0));
-            w.store(energy::<E, Y, _, N, M, D, P>(k, law, rest, x), &mut each);
-            // One after the other, so that every width gives the same sum.
-            for one in &each[..count(w)] {
-                total += f64::from(*one);
-            }
+            sum.add(w, energy::<E, Y, _, N, M, D, P>(k, law, rest, x), e - start);
         });
-        total
+        sum.total()
     }
 }
 
@@ -656,6 +668,7 @@ impl<E: Element<N, M, D>, Y: Law<P>, const N: usize, const M: usize, const D: us
         for (element, node, row) in changes {
             self.columns.nodes[*node].set(places[*element as usize], *row);
         }
+        self.columns.runs = runs(&self.columns.nodes);
     }
 
     fn give_up(&mut self, elements: &[u32]) {
@@ -737,7 +750,13 @@ mod tests {
         let start: Vec<Row> = (0..n).map(|i| [(i % 64) as Real * 0.8, 0.6 * (i % 2) as Real, 0.1 * (i / 64) as Real, 1.0]).collect();
         let (given, _) = sorted(n as usize, &members);
         let columns = Columns::new(n as usize, n as usize, &[], &members).unwrap();
-        assert!((0..given.len() - 16).any(|e| columns.index(e).iter().all(|i| (1..16).all(|l| i[l] == i[0] + l as u32))));
+        let [first, second] = &columns.nodes;
+        let along = |e: usize, l: usize| [first, second].iter().all(|i| i.get()[e + l] == i.get()[e] + l as u32);
+        for e in 0..given.len() {
+            let run = (1..255.min(given.len() - e)).find(|l| !along(e, *l)).unwrap_or(255.min(given.len() - e));
+            assert_eq!(usize::from(columns.runs[e]), run);
+        }
+        assert!(columns.runs.iter().any(|run| *run >= 16));
         // One link after the other, in double precision: both ends go half of the way.
         let mut expected: Vec<[f64; 3]> = start.iter().map(|x| [0, 1, 2].map(|c| f64::from(x[c]))).collect();
         for e in given {

@@ -4,7 +4,7 @@
 use super::batch::Weights;
 use super::{Element, Law, energy, gauss_newton, hessian, tangents};
 use crate::math::parallel::{fold, worst};
-use crate::math::simd::{Index, Kernel, Scalar, Width, count, dispatch, largest, packs};
+use crate::math::simd::{Index, Kernel, Scalar, Sum, Width, dispatch, largest, packs};
 use crate::math::{Lane, Quat, Real, Row, Vec3};
 use std::marker::PhantomData;
 use std::ops::Range;
@@ -254,19 +254,13 @@ impl<E: Element<N, M, D>, Y: Law<P>, const N: usize, const M: usize, const D: us
     type Output = f64;
     #[inline(always)]
     fn run<W: Width>(self, w: W) -> f64 {
-        let mut total = 0.0;
+        let (mut sum, start) = (Sum::default(), self.range.start);
         packs!(W, w, self.range, |e| {
             let p = self.list.pack(w, e);
             let rows = self.list.rows(w, self.x, e);
-            let energies = energy::<E, Y, _, N, M, D, P>(p.stiffness, p.law, p.rest, rows);
-            let mut each = [0.0; 16];
-            w.store(energies, &mut each);
-            // One after the other, so that every width gives the same sum.
-            for one in &each[..count(w)] {
-                total += f64::from(*one);
-            }
+            sum.add(w, energy::<E, Y, _, N, M, D, P>(p.stiffness, p.law, p.rest, rows), e - start);
         });
-        total
+        sum.total()
     }
 }
 

@@ -128,16 +128,15 @@ impl Tethers {
     pub fn project(&self, x: &mut [Row]) {
         let held: Vec<Row> = self.held.iter().map(|i| x[*i as usize]).collect();
         x[self.rows.clone()].chunks_mut(CHUNK).enumerate().in_parallel(|(c, x)| {
-            for (index, length) in &self.groups {
-                dispatch(Pull { index: &index.get()[c * CHUNK..], length: &length[c * CHUNK..], held: &held, x });
-            }
+            dispatch(Pull { groups: &self.groups, start: c * CHUNK, held: &held, x });
         });
     }
 }
 
 struct Pull<'a> {
-    index: &'a [u32],
-    length: &'a [Real],
+    groups: &'a [(Index, Vec<Real>)],
+    /// Of the first point.
+    start: usize,
     held: &'a [Row],
     x: &'a mut [Row],
 }
@@ -147,15 +146,18 @@ impl Kernel for Pull<'_> {
     #[inline(always)]
     fn run<W: Width>(self, w: W) {
         packs!(W, w, (0..self.x.len()), |i| {
-            let [x, y, z, q] = w.rows(self.x, i);
-            // SAFETY: the index was made for as many rows as are held.
-            let [px, py, pz, _] = unsafe { w.gather_at(self.held.as_ptr(), &self.index[i..]) };
-            let d = Vec3 { x: x - px, y: y - py, z: z - pz };
-            let (size, most) = (d.norm(), w.load(&self.length[i..]));
-            let back = (size - most).positive((size - most) / size, w.splat(0.0));
-            // What is held stays.
-            let back = q.positive(back, w.splat(0.0));
-            w.scatter([x - d.x * back, y - d.y * back, z - d.z * back, q], self.x, i, 1);
+            let [mut x, mut y, mut z, q] = w.rows(self.x, i);
+            for (index, length) in self.groups {
+                // SAFETY: the index was made for as many rows as are held.
+                let [px, py, pz, _] = unsafe { w.gather_at(self.held.as_ptr(), &index.get()[self.start + i..]) };
+                let d = Vec3 { x: x - px, y: y - py, z: z - pz };
+                let (size, most) = (d.norm(), w.load(&length[self.start + i..]));
+                let back = (size - most).positive((size - most) / size, w.splat(0.0));
+                // What is held stays.
+                let back = q.positive(back, w.splat(0.0));
+                (x, y, z) = (x - d.x * back, y - d.y * back, z - d.z * back);
+            }
+            w.scatter([x, y, z, q], self.x, i, 1);
         });
     }
 }

@@ -10,7 +10,7 @@ use super::{Columns, Constraints, Members, Projection, Shared, compliance};
 use crate::elements::{Element, TetShear, TetVolume, energy, law::Linear, point};
 use crate::geometry::Walls;
 use crate::math::parallel::fold;
-use crate::math::simd::{Kernel, Scalar, Width, count, dispatch, packs};
+use crate::math::simd::{Kernel, Scalar, Sum, Width, dispatch, packs};
 use crate::math::{Lane, Real, Row, Vec3};
 use std::ops::Range;
 
@@ -128,19 +128,16 @@ impl Kernel for Energies<'_> {
     type Output = f64;
     #[inline(always)]
     fn run<W: Width>(self, w: W) -> f64 {
-        let (columns, mut total, mut each) = (self.columns, 0.0, [0.0; 16]);
+        let (columns, mut sum, start) = (self.columns, Sum::default(), self.range.start);
         packs!(W, w, self.range, |e| {
             let (rest, [soft2]) = columns.pack(w, e);
             // SAFETY: `energy` has called `check`.
             let x = unsafe { columns.gather(w, 0, self.x.as_ptr(), e) };
             let (k1, k2) = (w.splat(1.0) / w.load(&columns.compliance[e..]), w.splat(1.0) / soft2);
             let shear = energy::<TetShear, Linear, _, 4, 9, 9, 0>(k1, [], matrix(rest), x);
-            w.store(shear + energy::<TetVolume, Linear, _, 4, 1, 10, 0>(k2, [], rest, x), &mut each);
-            for one in &each[..count(w)] {
-                total += f64::from(*one);
-            }
+            sum.add(w, shear + energy::<TetVolume, Linear, _, 4, 1, 10, 0>(k2, [], rest, x), e - start);
         });
-        total
+        sum.total()
     }
 }
 

@@ -87,14 +87,14 @@ pub trait Width: Copy + Send + Sync {
     /// # Safety
     /// There are rows at every index, all different, and nobody else reads or writes them.
     unsafe fn put(self, v: [Self::L; 4], rows: *mut Row, index: &[u32]);
-    /// Whether all of these, `index[..N]`, are numbers one behind the other, as on lattices: then `rows_at` is faster than `gather_at`.
-    fn consecutive<const A: usize>(self, index: [&[u32]; A]) -> bool;
-    /// What `gather_at` loads of the rows `start..start + N`.
+    /// Numbers from the order in which they were loaded into that of `rows_at`, and back.
+    fn in_run(self, v: Self::L) -> Self::L;
+    /// What `gather_at` loads of the rows `start..start + N`, faster, and in an order of its own.
     ///
     /// # Safety
     /// There are such rows, and nobody writes them.
     unsafe fn rows_at(self, rows: *const Row, start: u32) -> [Self::L; 4];
-    /// What `put` does with the rows `start..start + N`.
+    /// What `put` does with the rows `start..start + N`, from the order of `rows_at`.
     ///
     /// # Safety
     /// There are such rows, and nobody else reads or writes them.
@@ -142,6 +142,29 @@ pub const GUESS: u64 = 0x5fde_58d4_c7b5_3800;
 #[inline(always)]
 pub fn count<W: Width>(_w: W) -> usize {
     W::N
+}
+
+/// The sum of numbers in an order that does not depend on the width: every sixteenth of them, then the sixteen sums.
+#[derive(Default)]
+pub struct Sum([f64; 16]);
+
+impl Sum {
+    /// Adds a pack whose first number is number `at` of all.
+    #[inline(always)]
+    pub fn add<W: Width>(&mut self, w: W, lanes: W::L, at: usize) {
+        let mut each = [0.0; 16];
+        w.store(lanes, &mut each);
+        let start = at % 16;
+        for (sum, one) in self.0[start..start + W::N].iter_mut().zip(&each[..W::N]) {
+            *sum += f64::from(*one);
+        }
+    }
+
+    /// All of it.
+    #[inline(always)]
+    pub fn total(self) -> f64 {
+        self.0.iter().sum()
+    }
 }
 
 /// The largest of `most` and of all lanes; NaN is never the larger.
@@ -240,8 +263,8 @@ impl Width for Scalar {
         unsafe { *rows.add(index[0] as usize) = v };
     }
     #[inline(always)]
-    fn consecutive<const A: usize>(self, _index: [&[u32]; A]) -> bool {
-        true
+    fn in_run(self, v: Real) -> Real {
+        v
     }
     #[inline(always)]
     unsafe fn rows_at(self, rows: *const Row, start: u32) -> [Real; 4] {
@@ -618,51 +641,38 @@ mod tests {
         }
     }
 
-    /// Moves rows to three places behind: where they lie one behind the other as whole registers, else one by one.
+    /// Moves rows to three places behind, and adds numbers to their last one.
     struct Shifts<'a> {
         from: &'a [Row],
-        index: &'a Index,
+        numbers: &'a [Real],
         to: &'a mut [Row],
     }
 
     impl Kernel for Shifts<'_> {
-        type Output = (usize, usize);
+        type Output = ();
         #[inline(always)]
-        fn run<W: Width>(self, w: W) -> (usize, usize) {
-            let mut runs = 0;
+        fn run<W: Width>(self, w: W) {
             for start in (0..64).step_by(W::N) {
-                let index = &self.index.get()[start..];
-                let mut behind = [0; 16];
-                for l in 0..W::N {
-                    behind[l] = index[l] + 3;
-                }
-                let run = w.consecutive([index, &behind[..]]);
-                runs += usize::from(run);
-                // SAFETY: all indices are below 64, of 67 rows.
+                // SAFETY: there are 67 rows.
                 unsafe {
-                    if run {
-                        w.put_rows(w.rows_at(self.from.as_ptr(), index[0]), self.to.as_mut_ptr(), behind[0]);
-                    } else {
-                        w.put(w.gather_at(self.from.as_ptr(), index), self.to.as_mut_ptr(), &behind);
-                    }
+                    let mut rows = w.rows_at(self.from.as_ptr(), start as u32);
+                    rows[3] = rows[3] + w.in_run(w.load(&self.numbers[start..]));
+                    w.put_rows(rows, self.to.as_mut_ptr(), start as u32 + 3);
                 }
             }
-            (W::N, runs)
         }
     }
 
     #[test]
     fn every_width_moves_rows_that_lie_one_behind_the_other() {
         let from: Vec<Row> = (0..67).map(|i| [i as Real, 0.1 * i as Real, -(i as Real), 100.0 + i as Real]).collect();
-        // All but two lie one behind the other.
-        let mut order: Vec<u32> = (0..64).collect();
-        order.swap(30, 31);
-        let index = Index::new(order, 64).unwrap();
+        let numbers: Vec<Real> = (0..64).map(|i| 0.5 * (i * i % 11) as Real).collect();
         for level in Level::available() {
             let mut to = vec![[0.0; 4]; 67];
-            let (width, runs) = dispatch_at(level, Shifts { from: &from, index: &index, to: &mut to });
-            assert_eq!(&to[3..], &from[..64], "{level:?}");
-            assert_eq!(runs, 64 / width - usize::from(width > 1), "{level:?}");
+            dispatch_at(level, Shifts { from: &from, numbers: &numbers, to: &mut to });
+            for (i, [x, y, z, w]) in from[..64].iter().copied().enumerate() {
+                assert_eq!(to[i + 3], [x, y, z, w + numbers[i]], "{level:?}");
+            }
         }
     }
 

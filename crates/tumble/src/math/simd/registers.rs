@@ -50,29 +50,18 @@ macro_rules! width {
                 }
             }
             #[inline(always)]
-            fn consecutive<const A: usize>(self, index: [&[u32]; A]) -> bool {
-                let mut off = [0; $n];
-                for a in 0..A {
-                    let index = &index[a][..$n];
-                    for i in 0..$n {
-                        off[i] |= index[i] ^ index[0].wrapping_add(i as u32);
-                    }
-                }
-                let mut any = 0;
-                for i in 0..$n {
-                    any |= off[i];
-                }
-                any == 0
+            fn in_run(self, v: Self::L) -> Self::L {
+                self.in_run_order(v)
             }
             #[inline(always)]
             unsafe fn rows_at(self, rows: *const Row, start: u32) -> [Self::L; 4] {
                 // SAFETY: the caller has checked the place; arrays of numbers are aligned as one of them.
                 let run = unsafe { *rows.add(start as usize).cast::<[[Real; $n]; 4]>() };
-                self.transpose_run(four_packs!(self, [run[0], run[1], run[2], run[3]]))
+                self.transpose_run_in_order(four_packs!(self, [run[0], run[1], run[2], run[3]]))
             }
             #[inline(always)]
             unsafe fn put_rows(self, v: [Self::L; 4], rows: *mut Row, start: u32) {
-                let [a, b, c, d] = self.untranspose_run(v);
+                let [a, b, c, d] = self.untranspose_run_in_order(v);
                 // SAFETY: as above.
                 unsafe { *rows.add(start as usize).cast::<[[Real; $n]; 4]>() = [cast(a.v), cast(b.v), cast(c.v), cast(d.v)] };
             }
@@ -174,6 +163,21 @@ pub trait Transpose: Simd {
     fn untranspose(self, v: [Pack<Self>; 4]) -> Self::Rows;
     fn transpose_run(self, run: [Pack<Self>; 4]) -> [Pack<Self>; 4];
     fn untranspose_run(self, v: [Pack<Self>; 4]) -> [Pack<Self>; 4];
+    /// From the order of rows to the one that is cheapest for a run, and back.
+    #[inline(always)]
+    fn in_run_order(self, v: Pack<Self>) -> Pack<Self> {
+        v
+    }
+    /// `transpose_run` into that order.
+    #[inline(always)]
+    fn transpose_run_in_order(self, run: [Pack<Self>; 4]) -> [Pack<Self>; 4] {
+        self.transpose_run(run)
+    }
+    /// `untranspose_run` from that order.
+    #[inline(always)]
+    fn untranspose_run_in_order(self, v: [Pack<Self>; 4]) -> [Pack<Self>; 4] {
+        self.untranspose_run(v)
+    }
 }
 
 macro_rules! four_packs {

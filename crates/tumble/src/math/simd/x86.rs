@@ -282,24 +282,30 @@ mod single {
             rows
         }
         #[inline(always)]
-        fn transpose_run(self, [a, b, c, d]: [Pack<Self>; 4]) -> [Pack<Self>; 4] {
-            let s = self.avx512f;
-            let (a, b, c, d) = (cast(a.v), cast(b.v), cast(c.v), cast(d.v));
-            let mut p = four_by_four!(s, _mm512_unpacklo_ps, _mm512_unpackhi_ps, _mm512_shuffle_ps, [a, b, c, d]);
-            for i in 0..4 {
-                p[i] = s._mm512_permutexvar_ps(cast(CROSSED), p[i]);
-            }
-            four_packs!(self, [p[0], p[1], p[2], p[3]])
+        fn transpose_run(self, run: [Pack<Self>; 4]) -> [Pack<Self>; 4] {
+            let [x, y, z, w] = self.transpose_run_in_order(run);
+            [self.in_run_order(x), self.in_run_order(y), self.in_run_order(z), self.in_run_order(w)]
         }
         #[inline(always)]
         fn untranspose_run(self, v: [Pack<Self>; 4]) -> [Pack<Self>; 4] {
+            let [x, y, z, w] = v;
+            self.untranspose_run_in_order([self.in_run_order(x), self.in_run_order(y), self.in_run_order(z), self.in_run_order(w)])
+        }
+        #[inline(always)]
+        fn in_run_order(self, v: Pack<Self>) -> Pack<Self> {
+            Pack { simd: self, v: cast(self.avx512f._mm512_permutexvar_ps(cast(CROSSED), cast(v.v))) }
+        }
+        #[inline(always)]
+        fn transpose_run_in_order(self, [a, b, c, d]: [Pack<Self>; 4]) -> [Pack<Self>; 4] {
             let s = self.avx512f;
-            let mut p = [cast(v[0].v); 4];
-            for i in 0..4 {
-                p[i] = s._mm512_permutexvar_ps(cast(CROSSED), cast(v[i].v));
-            }
-            let [a, b, c, d] = four_by_four!(s, _mm512_unpacklo_ps, _mm512_unpackhi_ps, _mm512_shuffle_ps, [p[0], p[1], p[2], p[3]]);
-            four_packs!(self, [a, b, c, d])
+            let (a, b, c, d) = (cast(a.v), cast(b.v), cast(c.v), cast(d.v));
+            let [x, y, z, w] = four_by_four!(s, _mm512_unpacklo_ps, _mm512_unpackhi_ps, _mm512_shuffle_ps, [a, b, c, d]);
+            four_packs!(self, [x, y, z, w])
+        }
+        #[inline(always)]
+        fn untranspose_run_in_order(self, v: [Pack<Self>; 4]) -> [Pack<Self>; 4] {
+            // A block of four rows transposes itself.
+            self.transpose_run_in_order(v)
         }
     }
 }
