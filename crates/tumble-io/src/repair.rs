@@ -4,7 +4,7 @@
 //! belongs there, nobody knows. Where several ways are right, the order in the file decides.
 //! Verified by `tests/repair.rs`.
 
-use std::collections::HashMap;
+use std::collections::{HashMap, HashSet};
 use tumble_interface::Mesh;
 use tumble_interface::mesh::SLIVER;
 
@@ -45,6 +45,7 @@ impl Repairs {
 /// 6. closed pieces that face inward are turned, but not hollows within others.
 ///
 /// Vertices that are nearly at one place ([`Mesh::places`]) count as being there; the first stays where it is. Those of no triangle go.
+/// An edge that is divided on both sides at the same place stays whole, but may come open where more is broken around it.
 /// A mesh whose triangles all have no area comes back without any. Surfaces with one side only stay as they are.
 pub fn repair(mesh: &Mesh) -> (Mesh, Repairs) {
     let (mut work, mut done) = (Work::of(mesh), Repairs { unused: mesh.unused, ..Repairs::default() });
@@ -130,6 +131,17 @@ fn dot(a: [f64; 3], b: [f64; 3]) -> f64 {
     a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 }
 
+fn sorted(mut t: [u32; 3]) -> [u32; 3] {
+    t.sort_unstable();
+    t
+}
+
+/// The sides of a triangle as (low vertex, high vertex).
+fn sides(t: [u32; 3]) -> [[u32; 2]; 3] {
+    let [a, b, c] = sorted(t);
+    [[a, b], [b, c], [a, c]]
+}
+
 /// Equal for equal positions; -0 equals 0.
 fn key(x: [f64; 3]) -> [u64; 3] {
     x.map(|x| (x + 0.0).to_bits())
@@ -211,33 +223,41 @@ impl Work {
         pieces
     }
 
+    /// How many triangles with different vertices meet at each edge; those with a vertex twice do not count.
+    fn meeting(&self) -> HashMap<[u32; 2], usize> {
+        let mut meeting = HashMap::new();
+        let different: HashSet<[u32; 3]> = self.triangles.iter().filter(|t| !t.repeats()).map(|t| sorted(t.at)).collect();
+        different.into_iter().flat_map(sides).for_each(|ends| *meeting.entry(ends).or_default() += 1);
+        meeting
+    }
+
     /// Keeps the first of triangles that lie at the same three places and face the same way; of those that share their vertices it also keeps
     /// one only, however they face, or none where the surface goes on without them. Returns how many are gone.
     fn drop_repeated(&mut self) -> usize {
-        let mut drop = vec![false; self.triangles.len()];
-        let mut seen = HashMap::new();
-        for (i, t) in self.triangles.iter().enumerate() {
-            let mut places = t.at.map(|i| key(self.at(i)));
-            let least = (0..3).fold(0, |l, k| if places[k] < places[l] { k } else { l });
-            places.rotate_left(least);
-            drop[i] = seen.insert(places, i).is_some();
-        }
-        let repeated = self.drop(&drop);
-        let mut copies: HashMap<[u32; 3], Vec<usize>> = HashMap::new();
-        let mut sheets: HashMap<[u32; 2], usize> = HashMap::new();
-        for (i, t) in self.triangles.iter().enumerate() {
-            let mut nodes = t.at;
-            nodes.sort_unstable();
-            let [a, b, c] = nodes;
-            let all = copies.entry(nodes).or_default();
-            all.push(i);
-            if all.len() == 1 {
-                [[a, b], [b, c], [a, c]].into_iter().for_each(|ends| *sheets.entry(ends).or_default() += 1);
+        let mut repeated = 0;
+        for slivers in [false, true] {
+            // Where an edge is divided on both sides, two slivers of the surface lie at the same places.
+            let meeting = self.meeting();
+            let belongs = |t: [u32; 3]| sides(t).iter().all(|ends| meeting.get(ends) == Some(&2));
+            let mut drop = vec![false; self.triangles.len()];
+            let mut seen = HashMap::new();
+            for (i, t) in self.triangles.iter().enumerate().filter(|(_, t)| self.sliver(t.at).is_some() == slivers) {
+                let mut places = t.at.map(|i| key(self.at(i)));
+                let least = (0..3).fold(0, |l, k| if places[k] < places[l] { k } else { l });
+                places.rotate_left(least);
+                let first = *seen.entry(places).or_insert(i);
+                drop[i] = first != i && !(slivers && belongs(t.at) && belongs(self.triangles[first].at));
             }
+            repeated += self.drop(&drop);
+        }
+        let meeting = self.meeting();
+        let mut copies: HashMap<[u32; 3], Vec<usize>> = HashMap::new();
+        for (i, t) in self.triangles.iter().enumerate() {
+            copies.entry(sorted(t.at)).or_default().push(i);
         }
         let mut drop = vec![false; self.triangles.len()];
-        for ([a, b, c], all) in copies.iter().filter(|(_, all)| all.len() > 1) {
-            let goes_on = [[*a, *b], [*b, *c], [*a, *c]].iter().all(|ends| sheets.get(ends).is_some_and(|n| *n > 2));
+        for (t, all) in copies.iter().filter(|(_, all)| all.len() > 1) {
+            let goes_on = sides(*t).iter().all(|ends| meeting.get(ends).is_some_and(|n| *n > 2));
             all.iter().skip(usize::from(!goes_on)).for_each(|i| drop[*i] = true);
         }
         repeated + self.drop(&drop)

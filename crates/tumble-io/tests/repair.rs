@@ -312,6 +312,18 @@ fn surfaces_that_share_an_edge_come_apart() {
 }
 
 #[test]
+fn an_edge_that_is_divided_on_both_sides_at_the_same_place_stays_closed() {
+    // The cube, whose edge from 0 to 3 has a vertex in the middle for each side, and one of these another at three quarters.
+    let mut broken = cube();
+    broken.vertices.extend([[0.0, 0.5, 0.0], [0.0, 0.5, 0.0], [0.0, 0.75, 0.0]]);
+    broken.triangles.retain(|t| !(t.contains(&0) && t.contains(&3)));
+    broken.triangles.extend([[0, 9, 2], [9, 3, 2], [8, 0, 4], [10, 8, 4], [3, 10, 4], [3, 8, 0], [0, 3, 9], [3, 8, 10]]);
+    let (found, _) = repair(&broken);
+    assert_eq!(found.defects(), Defects::default());
+    assert!((volume(&found) - 1.0).abs() < 1e-12);
+}
+
+#[test]
 fn what_is_written_is_read_again() {
     let mut thing = moved(&cube(), [0.1, 1e-17, -3e20]);
     thing.texture = thing.triangles.iter().enumerate().map(|(t, c)| (t != 3).then(|| c.map(|i| [f64::from(i) / 3.0, -0.1]))).collect();
@@ -347,7 +359,11 @@ fn damaged() -> impl Strategy<Value = Mesh> {
                     if alone.defects().degenerate > 0 {
                         continue;
                     }
-                    let middle = std::array::from_fn(|m| 0.5 * (mesh.vertices[a as usize][m] + mesh.vertices[b as usize][m]));
+                    let middle: [f64; 3] = std::array::from_fn(|m| 0.5 * (mesh.vertices[a as usize][m] + mesh.vertices[b as usize][m]));
+                    // Divided there from both sides, what is damaged further may stay open; the edge alone has a test of its own.
+                    if mesh.vertices.contains(&middle) {
+                        continue;
+                    }
                     let new = mesh.vertices.len() as u32;
                     mesh.vertices.push(middle);
                     mesh.triangles[t] = [a, new, c];
