@@ -136,8 +136,8 @@ fn sorted(mut t: [u32; 3]) -> [u32; 3] {
     t
 }
 
-/// The sides of a triangle as (low vertex, high vertex).
-fn sides(t: [u32; 3]) -> [[u32; 2]; 3] {
+/// The edges of a triangle as (low vertex, high vertex).
+fn edges_of(t: [u32; 3]) -> [[u32; 2]; 3] {
     let [a, b, c] = sorted(t);
     [[a, b], [b, c], [a, c]]
 }
@@ -227,7 +227,7 @@ impl Work {
     fn meeting(&self) -> HashMap<[u32; 2], usize> {
         let mut meeting = HashMap::new();
         let different: HashSet<[u32; 3]> = self.triangles.iter().filter(|t| !t.repeats()).map(|t| sorted(t.at)).collect();
-        different.into_iter().flat_map(sides).for_each(|ends| *meeting.entry(ends).or_default() += 1);
+        different.into_iter().flat_map(edges_of).for_each(|ends| *meeting.entry(ends).or_default() += 1);
         meeting
     }
 
@@ -238,7 +238,7 @@ impl Work {
         for slivers in [false, true] {
             // Where an edge is divided on both sides, two slivers of the surface lie at the same places.
             let meeting = self.meeting();
-            let belongs = |t: [u32; 3]| sides(t).iter().all(|ends| meeting.get(ends) == Some(&2));
+            let belongs = |t: [u32; 3]| edges_of(t).iter().all(|ends| meeting.get(ends) == Some(&2));
             let mut drop = vec![false; self.triangles.len()];
             let mut seen = HashMap::new();
             for (i, t) in self.triangles.iter().enumerate().filter(|(_, t)| self.sliver(t.at).is_some() == slivers) {
@@ -257,7 +257,7 @@ impl Work {
         }
         let mut drop = vec![false; self.triangles.len()];
         for (t, all) in copies.iter().filter(|(_, all)| all.len() > 1) {
-            let goes_on = sides(*t).iter().all(|ends| meeting.get(ends).is_some_and(|n| *n > 2));
+            let goes_on = edges_of(*t).iter().all(|ends| meeting.get(ends).is_some_and(|n| *n > 2));
             all.iter().skip(usize::from(!goes_on)).for_each(|i| drop[*i] = true);
         }
         repeated + self.drop(&drop)
