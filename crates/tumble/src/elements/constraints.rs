@@ -744,7 +744,11 @@ mod tests {
         // A zigzag over three clusters, whose links are to be shorter than they are; and links between its rows of 64, of which packs have
         // nodes one behind the other.
         let n = 3 * CLUSTER as u32;
-        let link = |nodes, rest| Members { nodes, rest: [rest], law: [], stiffness: f64::INFINITY, damping: 0.0 };
+        let h = 0.01;
+        let link = |nodes: [u32; 2], rest| {
+            let stiffness = if nodes[0] % 5 == 0 { f64::INFINITY } else { 1e4 * f64::from(nodes[0] % 5) };
+            Members { nodes, rest: [rest], law: [], stiffness, damping: 0.0 }
+        };
         let across = (0..n - 64).map(|i| link([i, i + 64], if i % 2 == 0 { 0.3 } else { 0.05 }));
         let members: Vec<_> = (0..n - 1).map(|i| link([i, i + 1], 0.7)).chain(across).collect();
         let start: Vec<Row> = (0..n).map(|i| [(i % 64) as Real * 0.8, 0.6 * (i % 2) as Real, 0.1 * (i / 64) as Real, 1.0]).collect();
@@ -757,24 +761,27 @@ mod tests {
             assert_eq!(usize::from(columns.runs[e]), run);
         }
         assert!(columns.runs.iter().any(|run| *run >= 16));
-        // One link after the other, in double precision: both ends go half of the way.
-        let mut expected: Vec<[f64; 3]> = start.iter().map(|x| [0, 1, 2].map(|c| f64::from(x[c]))).collect();
-        for e in given {
-            let Members { nodes: [a, b], rest: [rest], .. } = members[e as usize];
-            let [a, b] = [a as usize, b as usize];
-            let d: [f64; 3] = std::array::from_fn(|c| expected[b][c] - expected[a][c]);
-            let length = d.iter().map(|d| d * d).sum::<f64>().sqrt();
-            for c in 0..3 {
-                let half = 0.5 * (1.0 - rest / length) * d[c];
-                expected[a][c] += half;
-                expected[b][c] -= half;
-            }
-        }
         for iterations in [1, 2] {
             let mut x = start.clone();
             let mut links = Projected::<Distance, Linear, 2, 1, 1, 0>::new(n as usize, n as usize, &[], &members, &[]).unwrap();
-            let step = Projection { h: 0.01, before: &start, iteration: 0, iterations, plain: None, walls: Walls::default() };
-            links.project(&mut x, &step);
+            // One link after the other, in double precision, by (elements.5) with masses of 1.
+            let mut expected: Vec<[f64; 3]> = start.iter().map(|x| [0, 1, 2].map(|c| f64::from(x[c]))).collect();
+            let mut lambda = vec![0.0; given.len()];
+            for iteration in 0..iterations {
+                links.project(&mut x, &Projection { h, before: &start, iteration, iterations, plain: None, walls: Walls::default() });
+                for (e, lambda) in given.iter().zip(&mut lambda) {
+                    let Members { nodes: [a, b], rest: [rest], stiffness, .. } = members[*e as usize];
+                    let ([a, b], alpha) = ([a as usize, b as usize], 1.0 / (stiffness * h * h));
+                    let d: [f64; 3] = std::array::from_fn(|c| expected[b][c] - expected[a][c]);
+                    let length = d.iter().map(|d| d * d).sum::<f64>().sqrt();
+                    let step = -(length - rest + alpha * *lambda) / (2.0 + alpha);
+                    *lambda += step;
+                    for c in 0..3 {
+                        expected[a][c] -= step * d[c] / length;
+                        expected[b][c] += step * d[c] / length;
+                    }
+                }
+            }
             let off = |(x, e): (&Row, &[f64; 3])| (0..3).map(|c| (f64::from(x[c]) - e[c]).abs()).fold(0.0, f64::max);
             let most = x.iter().zip(&expected).map(off).fold(0.0, f64::max);
             // Some roundings of numbers up to 51.

@@ -641,25 +641,37 @@ mod tests {
         }
     }
 
-    /// Moves rows to three places behind, and adds numbers to their last one.
+    /// Moves rows to three places behind and adds numbers to their last one, as runs and one by one; sums these numbers.
     struct Shifts<'a> {
         from: &'a [Row],
         numbers: &'a [Real],
-        to: &'a mut [Row],
+        index: &'a Index,
+        to: [&'a mut [Row]; 2],
     }
 
     impl Kernel for Shifts<'_> {
-        type Output = ();
+        type Output = f64;
         #[inline(always)]
-        fn run<W: Width>(self, w: W) {
+        fn run<W: Width>(self, w: W) -> f64 {
+            let ([run, apart], mut sum) = (self.to, Sum::default());
             for start in (0..64).step_by(W::N) {
-                // SAFETY: there are 67 rows.
+                let (numbers, index) = (w.load(&self.numbers[start..]), &self.index.get()[start..]);
+                sum.add(w, numbers, start);
+                let mut behind = [0; 16];
+                for l in 0..W::N {
+                    behind[l] = index[l] + 3;
+                }
+                // SAFETY: there are 67 rows, and all indices are below 64.
                 unsafe {
                     let mut rows = w.rows_at(self.from.as_ptr(), start as u32);
-                    rows[3] = rows[3] + w.in_run(w.load(&self.numbers[start..]));
-                    w.put_rows(rows, self.to.as_mut_ptr(), start as u32 + 3);
+                    rows[3] = rows[3] + w.in_run(numbers);
+                    w.put_rows(rows, run.as_mut_ptr(), start as u32 + 3);
+                    let mut rows = w.gather_at(self.from.as_ptr(), index);
+                    rows[3] = rows[3] + numbers;
+                    w.put(rows, apart.as_mut_ptr(), &behind);
                 }
             }
+            sum.total()
         }
     }
 
@@ -667,11 +679,16 @@ mod tests {
     fn every_width_moves_rows_that_lie_one_behind_the_other() {
         let from: Vec<Row> = (0..67).map(|i| [i as Real, 0.1 * i as Real, -(i as Real), 100.0 + i as Real]).collect();
         let numbers: Vec<Real> = (0..64).map(|i| 0.5 * (i * i % 11) as Real).collect();
+        let index = Index::new((0..64).map(|i| i * 37 % 64).collect(), 64).unwrap();
         for level in Level::available() {
-            let mut to = vec![[0.0; 4]; 67];
-            dispatch_at(level, Shifts { from: &from, numbers: &numbers, to: &mut to });
-            for (i, [x, y, z, w]) in from[..64].iter().copied().enumerate() {
-                assert_eq!(to[i + 3], [x, y, z, w + numbers[i]], "{level:?}");
+            let (mut run, mut apart) = (vec![[0.0; 4]; 67], vec![[0.0; 4]; 67]);
+            let sum = dispatch_at(level, Shifts { from: &from, numbers: &numbers, index: &index, to: [&mut run, &mut apart] });
+            // Halves: exact in any order.
+            assert_eq!(sum, numbers.iter().map(|n| f64::from(*n)).sum::<f64>(), "{level:?}");
+            for (i, number) in numbers.iter().enumerate() {
+                let at = index.get()[i] as usize;
+                let plus = |[x, y, z, w]: Row| [x, y, z, w + number];
+                assert_eq!([run[i + 3], apart[at + 3]], [plus(from[i]), plus(from[at])], "{level:?}");
             }
         }
     }
