@@ -788,4 +788,15 @@ mod tests {
             assert!(most < 200.0 * f64::from(Real::EPSILON), "{iterations}: {most}");
         }
     }
+    #[test]
+    fn a_link_that_got_another_row_moves_that_one() {
+        // Sixteen links side by side, whole packs of which lie one behind the other; one of them then ends elsewhere.
+        let link = |i| Members { nodes: [i, i + 16], rest: [0.5], law: [], stiffness: f64::INFINITY, damping: 0.0 };
+        let mut links = Projected::<Distance, Linear, 2, 1, 1, 0>::new(64, 64, &[], &(0..16).map(link).collect::<Vec<_>>(), &[]).unwrap();
+        links.rewire(&[(3, 1, 40)]);
+        let mut x: Vec<Row> = (0..64).map(|i| [0.0, (i / 16) as Real, 0.0, 1.0]).collect();
+        let step = Projection { h: 0.01, before: &[], iteration: 0, iterations: 1, plain: None, walls: Walls::default() };
+        links.project(&mut x, &step);
+        assert_eq!([2, 18, 3, 40, 19].map(|i| x[i][1]), [0.25, 0.75, 0.75, 1.25, 1.0]);
+    }
 }

@@ -182,5 +182,9 @@ mod tests {
         let both = Tethers::new(0..5, &links, &|i| i == 0 || i == 4, 1.0).unwrap();
         assert_eq!(both.groups.len(), 2);
         assert_eq!((both.groups[0].1[1], both.groups[1].1[1]), (1.0, 3.0));
+        // The nearest pulls first, the other last.
+        let mut x: Vec<Row> = (0..5).map(|i| [2.0 * i as Real, 0.0, 0.0, if i % 4 == 0 { 0.0 } else { 1.0 }]).collect();
+        both.project(&mut x);
+        assert_eq!(x.iter().map(|x| x[0]).collect::<Vec<_>>(), [0.0, 5.0, 6.0, 3.0, 8.0]);
     }
 }
