@@ -746,7 +746,7 @@ mod tests {
         let n = 3 * CLUSTER as u32;
         let h = 0.01;
         let link = |nodes: [u32; 2], rest| {
-            let stiffness = if nodes[0] % 5 == 0 { f64::INFINITY } else { 1e4 * f64::from(nodes[0] % 5) };
+            let stiffness = if nodes[0].is_multiple_of(5) { f64::INFINITY } else { 1e4 * f64::from(nodes[0] % 5) };
             Members { nodes, rest: [rest], law: [], stiffness, damping: 0.0 }
         };
         let across = (0..n - 64).map(|i| link([i, i + 64], if i % 2 == 0 { 0.3 } else { 0.05 }));
