@@ -61,8 +61,11 @@ openvdb:
 		|| { command -v apt-get >/dev/null && apt-get update -qq && apt-get install -qq -y --no-install-recommends python3-openvdb; } \
 		|| echo "no python3-openvdb here: tests of VDB files need it where there is apt, and are skipped elsewhere"
 
+# A worker per core: most tests keep one busy.
+PYTEST := $(BIN)/python -m pytest -n auto --dist worksteal
+
 test-python: setup openvdb wasm
-	$(BIN)/python -m pytest
+	$(PYTEST)
 
 web: python/tumble/web/index.html
 
@@ -135,7 +138,7 @@ validate-rust:
 	cargo test --workspace --exclude tumble-python --release --quiet --no-fail-fast -- --include-ignored --nocapture
 
 validate-python:
-	$(BIN)/python -m pytest -s -m ""
+	$(PYTEST) -m "" -rfEP
 
 validate-matrix:
 	$(BIN)/python python/tests/matrix.py --all
