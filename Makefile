@@ -52,8 +52,9 @@ lint: setup
 	$(BIN)/ruff check --quiet python benchmarks
 	$(BIN)/mypy
 
+# Of the same packages as the build for Python, which shares the engine with these; those for WebAssembly have no tests.
 test-rust:
-	cargo test --workspace --exclude tumble-python --release --quiet
+	cargo test --workspace --exclude tumble-wasm --release --quiet
 
 # What VDB files are checked against: Debian's OpenVDB, for the system's Python; there is no wheel.
 openvdb:
@@ -135,7 +136,7 @@ validate: setup openvdb wasm
 	if test -n "$$failed"; then echo "FAILED:$$failed"; exit 1; fi
 
 validate-rust:
-	cargo test --workspace --exclude tumble-python --release --quiet --no-fail-fast -- --include-ignored --nocapture
+	cargo test --workspace --exclude tumble-wasm --release --quiet --no-fail-fast -- --include-ignored --nocapture
 
 validate-python:
 	$(PYTEST) -m "" -rfEP
