@@ -72,6 +72,7 @@ SLOW = {
     "cloth/pile",
     "cloth/torn-flag",
     "cloth/twist",
+    "cloth/washing-line",
     "gas/ball_in_a_tank",
     "gas/fire",
     "gas/flag_in_a_jet",

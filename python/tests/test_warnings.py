@@ -153,6 +153,8 @@ TRACERS: Tree = {"name": "t", "method": "tracers", "integrator": "rk4"}
 SWIRL: Tree = {"field": [{"kind": "vortex", "center": [0, 0, 0], "axis": [0, 0, 1], "swirl": 1}]}
 AIR: Tree = {"force": [{"kind": "air"}]}
 MAGNET: Tree = {"force": [{"kind": "magnetic", "field": [0, 0, 1]}]}
+WIRE: Tree = {"name": "wire", "shape": {"capsule": {"from": [0, -1, -1], "to": [0, 1, -1], "radius": 0.1}}}
+MEETING: Tree = {"method": "position_based", "self_contact": {"thickness": 0.01}}
 TWO: Tree = {"system": [{"name": "a"}, {"name": "b"}]}
 
 
@@ -189,6 +191,12 @@ VAIN: list[tuple[str, str, Tree, Tree]] = [
     ),
     (
         "unfelt",
+        'collider "wire".edges',
+        {"sheet": [SHEET], "collider": [WIRE | {"edges": True}]},
+        {"sheet": [SHEET], "collider": [WIRE | {"edges": True}], "system": [MEETING]},
+    ),
+    (
+        "unfelt",
         "collider",
         {"particles": [POINT], "system": [TRACERS], **SWIRL, **FLOOR},
         {"particles": [POINT], **FLOOR},
@@ -209,6 +217,12 @@ VAIN: list[tuple[str, str, Tree, Tree]] = [
         {"particles": [POINT], "time": {"frames": 2}, "output": {"stills": [2]}},
     ),
     ("thin-region", 'emitter "e".kill[0].inside', killed_within(0.1), killed_within(1.0)),
+    (
+        "thin-collider",
+        'collider "wire"',
+        {"sheet": [SHEET], "collider": [WIRE]},
+        {"sheet": [SHEET], "collider": [WIRE | {"edges": True}], "system": [MEETING]},
+    ),
     ("late-carrier", 'system "t"', carried("t", "g"), carried("g", "t")),
     (
         "starts-inside",

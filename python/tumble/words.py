@@ -33,7 +33,8 @@ name = "bunny"
 shape = { mesh = { path = "bunny.ply" } }
 ```
 
-Only masses collide: between two masses a sheet may cut into a sharp edge."""
+Only masses collide with solids: between two masses a sheet may cut into a sharp edge, and what is thin may pass. Where
+that matters, give the collider `edges = true` and the system `self_contact`."""
 
 
 def page() -> str:

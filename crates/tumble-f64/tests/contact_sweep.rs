@@ -355,7 +355,17 @@ fn thin_walls_hold() {
 }
 
 fn solid(shape: Shape, inside: bool, thickness: f64) -> Collider {
-    Collider { shape, inside, thickness, friction: Default::default(), restitution: 0.0, belt: Vector::default(), motion: None, rig: None }
+    Collider {
+        shape,
+        inside,
+        thickness,
+        friction: Default::default(),
+        restitution: 0.0,
+        belt: Vector::default(),
+        motion: None,
+        rig: None,
+        edges: None,
+    }
 }
 
 fn facets(mesh: &Mesh) -> Facets {

@@ -175,6 +175,7 @@ fn a_sweep_goes_down_the_energy_of_liquid_between_walls() {
         belt: Vector::default(),
         motion: None,
         rig: None,
+        edges: None,
     };
     let half = vector(0.5, 0.5, 0.5);
     let tank = solid(Shape::Box { center: half, half, turn: rotation::from_degrees([0.0; 3]) }, true, 0.01);

@@ -49,6 +49,7 @@ mod rod_loops;
 mod rods_position_based;
 mod sheets;
 mod single_steps;
+mod solid_edges;
 mod solids;
 mod stability_estimate;
 mod statics;

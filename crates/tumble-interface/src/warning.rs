@@ -43,6 +43,8 @@ codes! {
     NoBirths = "no-births",
     /// A region that fast particles may pass unseen.
     ThinRegion = "thin-region",
+    /// A solid that masses may pass on both sides of.
+    ThinCollider = "thin-collider",
     /// An expectation of what the scene has not.
     IdleExpectation = "idle-expectation",
     /// A picture of a frame beyond the last.

@@ -108,6 +108,13 @@ fn scenes() -> Vec<(&'static str, String, usize)> {
             sheet("method = \"position_based\"\nsubsteps = 12\nself_contact.thickness = 0.004", ripping) + air,
             12,
         ),
+        (
+            "sheet, edges of a moving solid",
+            sheet("method = \"position_based\"\nsubsteps = 8\nself_contact = { thickness = 0.004, friction = 0.2 }", hinges)
+                + "[[collider]]\nname = \"wire\"\nedges = true\nfriction = 0.4\nthickness = 0.002\nmotion = { velocity = [0, 0, 0.4], spin = [0, 0, 2] }\n\
+                   shape.capsule = { from = [-0.6, 0.1, 0.28], to = [0.6, 0.1, 0.28], radius = 0.002 }\n",
+            8,
+        ),
         ("sheet, ripping", sheet("integrator = \"velocity_verlet\"\nsubsteps = 30", ripping) + air, 12),
         ("sheet, membrane", sheet("method = \"position_based\"\nsubsteps = 8", surface), 10),
         (

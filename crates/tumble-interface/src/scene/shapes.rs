@@ -31,6 +31,11 @@ pub struct Collider {
     /// Turned inside out: a container that keeps masses in. Not for planes and shells.
     #[serde(default)]
     pub inside: bool,
+    /// Whether its edges and corners meet those of soft surfaces and curves, too, in systems with `self_contact`: for what is sharp, or
+    /// thinner than the mesh of what falls on it. All then keep off it by its `thickness`, at least 0.6 of that of `self_contact`; edges do
+    /// not bounce. Not for planes.
+    #[serde(default)]
+    pub edges: bool,
     /// Velocity of the surface itself, as of a conveyor belt; the shape stays, and turns this along when it turns.
     #[serde(default)]
     #[schemars(extend("x-unit" = "m/s"))]

@@ -3,6 +3,7 @@
 use super::motion::{Pose, Twist};
 use super::{Motion, Rig, Shape, Vector};
 use std::sync::Arc;
+use tumble_interface::Mesh;
 
 /// A solid turns less than this while the way of a mass past it counts as straight [rad].
 const TURN: f64 = 0.25;
@@ -28,6 +29,17 @@ pub struct Collider {
     pub motion: Option<Motion>,
     /// Its bones, if it is a figure.
     pub rig: Option<Arc<Rig>>,
+    /// What edges meet; `None` if masses alone meet it.
+    pub edges: Option<Arc<Surface>>,
+}
+
+/// A surface whose edges and triangles meet those of what is soft.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Surface {
+    /// Name of the collider.
+    pub name: String,
+    /// Where it is when t = 0, before its motion.
+    pub mesh: Mesh,
 }
 
 /// Coefficients of Coulomb friction.
@@ -221,6 +233,22 @@ impl Collider {
             (a, before) = (b, time);
         }
         None
+    }
+
+    /// Corners of its surface at time t [m], if edges meet it.
+    pub fn corners(&self, t: f64) -> Vec<Vector> {
+        let Some(surface) = &self.edges else { return Vec::new() };
+        let pose = self.pose(Carrier::Whole, t);
+        let place = |v: &[f64; 3]| pose.out(Vector::from(*v));
+        match &self.shape {
+            Shape::Animated { facets, .. } => facets.vertices(t).iter().map(place).collect(),
+            _ => surface.mesh.vertices.iter().map(place).collect(),
+        }
+    }
+
+    /// How fast its surface moves along itself at time t [m/s].
+    pub fn slip(&self, t: f64) -> Vector {
+        self.pose(Carrier::Whole, t).turn.turn(self.belt)
     }
 
     /// Names of its bones; none if it is no figure.

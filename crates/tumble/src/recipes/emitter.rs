@@ -228,6 +228,7 @@ fn bounds(shape: &Solid) -> Collider {
         restitution: 0.0,
         color: None,
         inside: false,
+        edges: false,
         belt: [0.0; 3],
         motion: None,
     }

@@ -22,6 +22,7 @@ fn shape(words: &Words) -> Result<Shape, String> {
         friction_static: None,
         restitution: 0.0,
         inside: false,
+        edges: false,
         belt: [0.0; 3],
         motion: None,
         color: None,

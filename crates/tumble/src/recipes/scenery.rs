@@ -1,7 +1,7 @@
 //! Colliders: the solids that masses feel, and the meshes that pictures show.
 
 use crate::geometry::motion::Key;
-use crate::geometry::{Collider, Facets, Friction, GridSdf, Motion, Rig, Shape, Vector, surface};
+use crate::geometry::{Collider, Facets, Friction, GridSdf, Motion, Rig, Shape, Surface, Vector, surface};
 use crate::math::rotation::from_degrees;
 use std::sync::Arc;
 use tumble_interface::Mesh;
@@ -107,6 +107,16 @@ pub fn solid(thing: &Thing, meshes: &[Mesh], figure: Option<(Arc<Rig>, Facets)>)
             Shape::Animated { facets, shell }
         }
     };
+    let mesh = match &shape {
+        _ if !thing.edges => None,
+        Shape::Plane { .. } => {
+            return wrong(".edges", "true, but a plane has none: what its masses keep off, all between them does; leave it out".into());
+        }
+        Shape::Animated { facets, .. } => {
+            Some(Mesh { vertices: facets.vertices(0.0), triangles: facets.triangles().to_vec(), ..Mesh::default() })
+        }
+        _ => Some(scenery(thing, meshes, None)),
+    };
     let shell = matches!(shape, Shape::Mesh { shell: true, .. } | Shape::Animated { shell: true, .. });
     if thing.inside && (shell || matches!(shape, Shape::Plane { .. })) {
         let what = if shell { "a shell has no inside" } else { "a plane has two sides alike; reverse its normal" };
@@ -121,6 +131,7 @@ pub fn solid(thing: &Thing, meshes: &[Mesh], figure: Option<(Arc<Rig>, Facets)>)
         belt: thing.belt.into(),
         motion: thing.motion.as_ref().map(motion).transpose()?,
         rig,
+        edges: mesh.map(|mesh| Arc::new(Surface { name: thing.name.clone(), mesh })),
     })
 }
 

@@ -26,7 +26,8 @@ use std::borrow::Cow;
 use std::sync::Arc;
 use tumble_interface::check::short;
 use tumble_interface::scene::{
-    Animated, Bits, Field as Stream, Force as Words, Hair, Integrator, MeshFile, Method, Plane, Scene, Shape, System as Plan, Vicsek,
+    Animated, Bits, Collider as Thing, Field as Stream, Force as Words, Hair, Integrator, MeshFile, Method, Plane, Scene, Shape,
+    System as Plan, Vicsek,
 };
 use tumble_interface::warning::Code;
 use tumble_interface::{Column, Data, Issue, Mesh, SceneError, Warning};
@@ -255,7 +256,15 @@ fn gravity(scene: &Scene) -> [f64; 3] {
 
 fn solids(scene: &Scene, assets: &Assets, issues: &mut Vec<Issue>) -> (Vec<Collider>, Vec<Column>, Vec<Mesh>) {
     let (mut colliders, mut scenery, mut surfaces) = (Vec::new(), Vec::new(), Vec::new());
+    // What meets edges keeps off faces by more than half of its own thickness.
+    let thickness = scene.system.iter().filter_map(|s| s.self_contact.as_ref()).map(|words| 0.6 * words.thickness).fold(0.0, f64::max);
     for thing in &scene.collider {
+        let thick = Thing { thickness: thing.thickness.max(thickness), ..thing.clone() };
+        let thing = if thing.edges { &thick } else { thing };
+        if thing.edges && scene.dimension == 2 {
+            let message = "true, but a plane has no edges that could meet: masses alone collide in scenes of two dimensions; leave it out";
+            issues.push(Issue::new(format!("collider \"{}\".edges", thing.name), message));
+        }
         let meshes: Vec<Mesh> = match &thing.shape {
             Shape::Mesh(file) => assets.get(&file.path).map(|mesh| recipes::placed(mesh, file)).into_iter().collect(),
             Shape::AnimatedMesh(frames) => {

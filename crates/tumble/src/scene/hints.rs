@@ -2,9 +2,10 @@
 
 use super::checks::{objects, place};
 use tumble_interface::Warning;
-use tumble_interface::check::plain;
+use tumble_interface::check::{plain, short};
 use tumble_interface::scene::{
-    Animated, AnimatedVector, Component, Emitter, Event, Force as Words, Kill, Method, Particles, Scene, Shape, Source, System as Plan,
+    Animated, AnimatedVector, Collider, Component, Emitter, Event, Force as Words, Kill, Method, Particles, Rope, Scene, Shape, Source,
+    System as Plan,
 };
 use tumble_interface::warning::Code;
 
@@ -39,6 +40,12 @@ pub fn unused(scene: &Scene, plans: &[Plan]) -> Vec<Warning> {
             }
         }
     }
+    let meets = plans.iter().any(|plan| plan.method == Method::Dynamics && plan.self_contact.is_some());
+    for thing in scene.collider.iter().filter(|thing| thing.edges && !meets) {
+        let message = "edges meet in systems with self_contact, and there is none; add it, or leave edges out";
+        warnings.push(Warning::new(Code::Unfelt, format!("collider \"{}\".edges", thing.name), message));
+    }
+    warnings.extend(thin(scene));
     for (i, force) in scene.force.iter().enumerate() {
         let at = || format!("force[{i}]");
         let reached = |name: &String| force.on().is_none_or(|on| on.contains(name));
@@ -95,6 +102,36 @@ pub fn unused(scene: &Scene, plans: &[Plan]) -> Vec<Warning> {
         warnings.push(Warning::new(Code::NoSuchFrame, "output.stills", message));
     }
     warnings
+}
+
+/// Solids that masses may pass on both sides of.
+fn thin(scene: &Scene) -> Vec<Warning> {
+    let along = |size: f64, n: u32| size / f64::from(n.max(2) - 1);
+    let sheets = scene.sheet.iter().map(|t| (&t.name, along(t.size[0], t.resolution[0]).max(along(t.size[1], t.resolution[1]))));
+    let cloths = scene.cloth.iter().map(|t| (&t.name, t.resolution));
+    let way = |t: &Rope| (0..3).map(|k| (t.to[k] - t.from[k]).powi(2)).sum::<f64>().sqrt();
+    let ropes = scene.rope.iter().map(|t| (&t.name, way(t) / f64::from(t.segments)));
+    let Some((name, apart)) = sheets.chain(cloths).chain(ropes).max_by(|a, b| a.1.total_cmp(&b.1)) else { return Vec::new() };
+    let doubt = |thing: &Collider| {
+        let across = match &thing.shape {
+            Shape::Sphere { radius, .. } | Shape::Capsule { radius, .. } => 2.0 * radius,
+            Shape::Box { size, .. } => {
+                let mut size = *size;
+                size.sort_by(f64::total_cmp);
+                size[1]
+            }
+            _ => return None,
+        } + 2.0 * thing.thickness;
+        let message = format!(
+            "is {} m across with its thickness, and the masses of \"{name}\" are {} m apart: they may pass on both sides of it, since masses \
+             alone meet it; set edges = true, and self_contact in their system",
+            short(across),
+            short(apart)
+        );
+        (across < apart && !thing.edges && !thing.inside)
+            .then(|| Warning::new(Code::ThinCollider, format!("collider \"{}\"", thing.name), message))
+    };
+    scene.collider.iter().filter_map(doubt).collect()
 }
 
 /// Bounds of what the scene has not, and what that is.

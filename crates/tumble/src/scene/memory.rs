@@ -15,6 +15,9 @@ const LINK: f64 = 260.0;
 /// Bytes for a tetrahedron with its two or three laws.
 const TETRAHEDRON: f64 = 1400.0;
 
+/// Bytes for a corner of a solid whose edges meet those of what is soft: its rows, features, their boxes, and pairs.
+const CORNER: f64 = 2000.0;
+
 /// Bytes for a cell of a body that conducts heat: temperatures twice and in the snapshot; materials; multigrid of implicit schemes;
 /// in double precision.
 const WARM: [f64; 3] = [24.0, 48.0, 160.0];
@@ -131,6 +134,9 @@ pub fn memory(scene: &Scene, assets: &Assets) -> f64 {
             let size = if file.rotate == [0.0; 3] { size } else { [size.iter().map(|s| s * s).sum::<f64>().sqrt(); 3] };
             bytes += GridSdf::bytes(size, file.resolution, thing.thickness);
         }
+        if thing.edges {
+            bytes += corners(&thing.shape, assets) * CORNER;
+        }
         let end = scene.frame_time() * f64::from(scene.time.frames);
         bytes += match &thing.shape {
             Shape::Mannequin(words) => {
@@ -149,6 +155,22 @@ pub fn memory(scene: &Scene, assets: &Assets) -> f64 {
         }
     }
     bytes
+}
+
+/// Corners of the surface of a solid, where its edges meet those of what is soft.
+fn corners(shape: &Shape, assets: &Assets) -> f64 {
+    let of = |path: &String| assets.get(path).map_or(0.0, |mesh| mesh.vertices.len() as f64);
+    match shape {
+        Shape::Sphere { .. } => 1026.0,
+        Shape::Capsule { .. } => 514.0,
+        Shape::Box { .. } => 8.0,
+        Shape::Plane { .. } | Shape::Floor { .. } => 0.0,
+        Shape::Lathe { profile, sides, .. } => profile.len() as f64 * f64::from(*sides),
+        Shape::Mesh(file) => of(&file.path),
+        Shape::AnimatedMesh(words) => words.frames.first().map_or(0.0, |frame| of(&frame.path)),
+        Shape::Character(words) => assets.character(&words.path).map_or(0.0, |file| file.mesh.vertices.len() as f64),
+        Shape::Mannequin(_) => crate::recipes::MANNEQUIN as f64,
+    }
 }
 
 /// Particles of each emitter that may live at once until the last frame of the scene.

@@ -28,6 +28,8 @@ pub struct Topology {
     /// Whether there are any at all.
     has_welds: bool,
     has_fixed: bool,
+    /// The first corner of what is no soft object.
+    first_corner: Option<u32>,
     rest: Vec<Vector>,
     /// Triangles at each edge: those of edge e are `wings[wing[e]..wing[e + 1]]`.
     wing: Vec<u32>,
@@ -112,6 +114,12 @@ impl Topology {
         }
     }
 
+    /// Says that all vertices from here on are corners of solids. Features that hang on a fixed vertex pass these: pins may lie on solids, or in
+    /// them.
+    pub fn end_soft(&mut self, first: u32) {
+        self.first_corner = Some(first);
+    }
+
     /// The state without stress: features of one object that are nearer than its thickness there, as in a fine mesh, touch only
     /// when they are nearer than that. `x` has a row for each vertex, else there is none.
     pub fn set_rest(&mut self, x: &[Row]) {
@@ -149,9 +157,10 @@ impl Topology {
         self.fixed.get(vertex as usize).is_some_and(|f| *f)
     }
 
-    /// The largest distance [m] at which any two features are in contact.
+    /// The largest distance [m] at which any two features are in contact; solids do not meet each other.
     pub fn largest_thickness(&self) -> f64 {
-        2.0 * self.owners.iter().map(|o| o.radius).fold(0.0, f64::max)
+        let largest = |soft: bool| self.owners.iter().filter(|o| !soft || o.itself).map(|o| o.radius).fold(0.0, f64::max);
+        if self.first_corner.is_some() { largest(true) + largest(false) } else { 2.0 * largest(false) }
     }
 
     /// Whether the features a and b can meet: they share no vertex, one can move, and their objects touch.
@@ -172,7 +181,11 @@ impl Topology {
             return false;
         }
         let fixed = |v: &u32| self.fixed[*v as usize];
-        !(self.has_fixed && a.iter().all(fixed) && b.iter().all(fixed))
+        if !self.has_fixed {
+            return true;
+        }
+        let hangs = |solid: u32, soft: &[u32]| self.first_corner.is_some_and(|first| solid >= first) && soft.iter().any(fixed);
+        !(a.iter().all(fixed) && b.iter().all(fixed) || hangs(a[0], &b) || hangs(b[0], &a))
     }
 
     /// Whether two features share a vertex, seams counted as one.

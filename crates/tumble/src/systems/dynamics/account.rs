@@ -1,6 +1,7 @@
 //! Who has how much of the books, and where the worst numbers in them are. Asked for where a bound is broken, not in every frame.
 
 use super::Dynamics;
+use super::layers::{Crossing, Other};
 use crate::math::parallel::worst;
 use crate::math::xyz64;
 use crate::state::Object;
@@ -33,14 +34,17 @@ impl Dynamics {
         let strained =
             self.laws.batches.iter().filter_map(|b| b.most_strained(x)).chain(self.constraints.iter().filter_map(|c| c.most_strained(x)));
         let strained = strained.max_by(|a, b| a.0.total_cmp(&b.0));
-        let crossing = self.layers.as_ref().or(self.judge.as_ref()).and_then(|layers| layers.crossing(x));
+        let crossing = self.layers.as_ref().or(self.judge.as_ref()).and_then(|layers| layers.crossing(x, t));
         let mut all = Vec::new();
         all.extend(fastest.map(|(i, speed)| self.blame("speed", speed, &[i as u32])));
         all.extend(deepest.filter(|(_, depth)| *depth > 0.0).map(|(i, depth)| self.blame("penetration", depth, &[i as u32])));
         all.extend(strained.map(|(strain, rows)| self.blame("stretch", strain + 1.0, &rows)));
-        all.extend(crossing.map(|(count, edge, triangle)| Worst {
-            other: Some(self.whose(triangle[0] as usize).0),
-            ..self.blame("intersections", count as f64, &edge)
+        all.extend(crossing.map(|Crossing { count, vertices, other }| {
+            let other = match other {
+                Other::Soft(vertex) => self.whose(vertex as usize).0,
+                Other::Solid(name) => name,
+            };
+            Worst { other: Some(other), ..self.blame("intersections", count as f64, &vertices) }
         }));
         all
     }

@@ -301,7 +301,7 @@ impl Dynamics {
             external: self.between(false, t) + self.laws.external_energy(t, x, v) - Vec3::from(self.laws.gravity).dot(total.first_moment),
             stretch,
             penetration: if touching { max(n, |range| range.flat_map(depths).fold(0.0, f64::max)).max(0.0) } else { 0.0 },
-            intersections: self.layers.as_ref().or(self.judge.as_ref()).map_or(0, |layers| layers.intersections(x)),
+            intersections: self.layers.as_ref().or(self.judge.as_ref()).map_or(0, |layers| layers.intersections(x, t)),
             speed: total.speed_sq.sqrt(),
             contacts: if touching { sum(n, |range| range.filter(|i| depths(*i).next().is_some()).count() as f64) as u64 } else { 0 },
             broken: self.broken,

@@ -602,10 +602,11 @@ impl Parts {
             }
         }
         let sewn = self.vector.members.iter().map(|m| m.nodes);
-        let meeting = |words: &SelfContact| Layers::new(words, &objects, sewn.clone(), &state);
-        let layers = settings.self_contact.as_ref().and_then(meeting);
+        let meeting = |words: &SelfContact, solids: &Arc<Vec<Collider>>| Layers::new(words, &objects, sewn.clone(), &state, solids);
+        let layers = settings.self_contact.as_ref().and_then(|words| meeting(words, &settings.colliders));
         let counted = settings.counted && settings.self_contact.is_none();
-        let judge = counted.then_some(SelfContact { thickness: 0.0, friction: 0.0, friction_static: None }).as_ref().and_then(meeting);
+        let nothing = SelfContact { thickness: 0.0, friction: 0.0, friction_static: None };
+        let judge = if counted { meeting(&nothing, &Arc::default()) } else { None };
         let coats = self.coats.into_iter().map(|(i, words)| Coat::new(objects[places[i]].points.clone(), words, &state.x)).collect();
         let placed = |on: Vec<usize>| -> Vec<usize> { on.into_iter().map(|i| places[i]).collect() };
         let rows_of = |on: &[usize]| -> Vec<Range<usize>> { on.iter().map(|i| objects[*i].points.clone()).collect() };

@@ -294,6 +294,7 @@ impl Penalty {
     }
 }
 
-fn real(v: Vector) -> crate::math::Vec3<Real> {
+/// A vector in the precision of states.
+pub fn real(v: Vector) -> crate::math::Vec3<Real> {
     crate::math::Vec3 { x: v.x as Real, y: v.y as Real, z: v.z as Real }
 }

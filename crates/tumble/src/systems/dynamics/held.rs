@@ -1,6 +1,7 @@
 //! Points and frames that are held and follow a collider, one of its bones, or its surface: functions of time alone, and so in no snapshot.
 
 use super::Dynamics;
+use super::contact::real;
 use crate::geometry::motion::Pose;
 use crate::geometry::{Carrier, Collider, Vector};
 use crate::math::{Quat, Real, row, xyz64};
@@ -63,8 +64,4 @@ impl Dynamics {
             }
         }
     }
-}
-
-fn real(v: Vector) -> crate::math::Vec3<Real> {
-    crate::math::Vec3 { x: v.x as Real, y: v.y as Real, z: v.z as Real }
 }

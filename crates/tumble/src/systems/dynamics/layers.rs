@@ -5,11 +5,13 @@
 //!   C = n . Σ w_i x_i - thickness >= 0,   dx_i = m_i^-1 w_i n max(0, -C)/Σ_j m_j^-1 w_j²            (positions.4)
 
 use super::Dynamics;
+use super::corners::Corners;
 use super::tear::Tear;
 use crate::geometry::mesh_contact::{Detector, Owner, Pair, Topology, intersections, tangled, untangle_directions};
-use crate::geometry::{Friction, Vector};
+use crate::geometry::{Collider, Friction, Vector};
 use crate::math::{Real, Row, Vec3, axpy, row, sub, xyz, xyz64};
 use crate::state::{Object, State};
+use std::sync::Arc;
 use tumble_interface::scene::SelfContact;
 use tumble_interface::warning::{Code, Warning};
 
@@ -35,23 +37,54 @@ pub struct Layers {
     rest: Vec<Row>,
     /// Where vertices are about to go in a sub-step [m].
     ways: Vec<Vector>,
+    /// Solids that they meet, too.
+    corners: Corners,
+}
+
+/// What passes through each other.
+pub struct Crossing {
+    /// How many edges pass through triangles.
+    pub count: usize,
+    /// Of the first two: the vertices of the soft one, or of the edge.
+    pub vertices: Vec<u32>,
+    /// And the other one.
+    pub other: Other,
+}
+
+/// What something soft passes through.
+pub enum Other {
+    /// Something soft, with this vertex.
+    Soft(u32),
+    /// This collider.
+    Solid(String),
 }
 
 impl Layers {
-    /// All triangles and curves of the objects; `sewn` points count as one. `None` if there is nothing that could meet.
-    pub fn new(words: &SelfContact, objects: &[Object], sewn: impl Iterator<Item = [u32; 2]>, state: &State) -> Option<Self> {
+    /// All triangles and curves of the objects, and those of solids that have edges; `sewn` points count as one. `None` if there is
+    /// nothing that could meet.
+    pub fn new(
+        words: &SelfContact,
+        objects: &[Object],
+        sewn: impl Iterator<Item = [u32; 2]>,
+        state: &State,
+        colliders: &Arc<Vec<Collider>>,
+    ) -> Option<Self> {
         let points = objects.iter().map(|o| o.points.end).max()?;
+        let corners = Corners::new(colliders, points);
         let mut layers = Self {
             topology: Topology::default(),
             detector: Detector::new(),
             friction: Friction { sliding: words.friction, resting: words.friction_static.unwrap_or(words.friction) },
             thickness: words.thickness,
             sewn: sewn.collect(),
-            rest: state.x[..points].to_vec(),
+            rest: corners.joined(&state.x, 0.0).into_owned(),
             ways: Vec::new(),
+            corners,
         };
+        layers.rest.truncate(layers.corners.vertices());
         layers.topology = layers.meeting(objects, &[]);
-        (!layers.topology.points().is_empty()).then_some(layers)
+        let soft = layers.topology.points().first().is_some_and(|i| (*i as usize) < points);
+        soft.then_some(layers)
     }
 
     /// Takes up what has torn.
@@ -63,14 +96,16 @@ impl Layers {
     /// What can meet. Copies of a vertex count as one where features that share it are told from others: both sides of a tear start
     /// from the same place.
     fn meeting(&self, objects: &[Object], tears: &[Tear]) -> Topology {
-        let points = self.rest.len();
-        let mut topology = Topology::new(points);
+        let vertices = self.rest.len();
+        let mut topology = Topology::new(vertices);
         for (index, object) in objects.iter().enumerate().filter(|(_, o)| o.stream.is_none()) {
             let first = object.points.start as u32;
             let torn = tears.iter().find(|tear| tear.object() == index);
             let whole = || object.triangles.iter().map(|t| t.map(|i| i + first)).collect();
             let triangles: Vec<[u32; 3]> = torn.map_or_else(whole, |tear| tear.triangles().to_vec());
-            let segments: Vec<[u32; 2]> = object.curve.windows(2).map(|c| [c[0] + first, c[1] + first]).collect();
+            let strand = if object.curve_points > 0 { object.curve_points as usize } else { object.curve.len().max(1) };
+            let strands = object.curve.chunks(strand);
+            let segments: Vec<[u32; 2]> = strands.flat_map(|s| s.windows(2)).map(|c| [c[0] + first, c[1] + first]).collect();
             topology.add(Owner { radius: 0.5 * self.thickness, itself: true }, &triangles, &segments, &[]);
         }
         self.sewn.iter().for_each(|[a, b]| topology.weld(*a, *b));
@@ -79,38 +114,57 @@ impl Layers {
             topology.weld(copy, of);
             rest[copy as usize] = self.rest[of as usize];
         }
-        (0..points).filter(|i| rest[*i][3] == 0.0).for_each(|i| topology.fix(i as u32, true));
+        self.corners.add_to(&mut topology, self.thickness);
+        // Corners weigh nothing, as what is held.
+        (0..vertices).filter(|i| rest[*i][3] == 0.0).for_each(|i| topology.fix(i as u32, true));
         topology.set_rest(&rest);
         topology
     }
 
-    /// Edges that pass through triangles.
-    pub fn intersections(&self, x: &[Row]) -> u64 {
-        intersections(&self.topology, x).len() as u64
+    /// Edges that pass through triangles, when points are at x at time t.
+    pub fn intersections(&self, x: &[Row], t: f64) -> u64 {
+        intersections(&self.topology, &self.corners.joined(x, t)).len() as u64
     }
 
-    /// How many edges pass through triangles, and the first two that do.
-    pub fn crossing(&self, x: &[Row]) -> Option<(usize, [u32; 2], [u32; 3])> {
-        let all = intersections(&self.topology, x);
+    /// What passes through each other.
+    pub fn crossing(&self, x: &[Row], t: f64) -> Option<Crossing> {
+        let all = intersections(&self.topology, &self.corners.joined(x, t));
         let (edge, triangle) = *all.first()?;
-        Some((all.len(), self.topology.edges()[edge as usize], self.topology.triangles()[triangle as usize]))
+        let (edge, triangle) = (self.topology.edges()[edge as usize], self.topology.triangles()[triangle as usize]);
+        let solid = |vertices: &[u32]| Some(self.corners.name(self.corners.collider(vertices)?));
+        let (vertices, other) = match (solid(&edge), solid(&triangle)) {
+            (Some(name), _) => (triangle.to_vec(), Other::Solid(name)),
+            (_, Some(name)) => (edge.to_vec(), Other::Solid(name)),
+            _ => (edge.to_vec(), Other::Soft(triangle[0])),
+        };
+        Some(Crossing { count: all.len(), vertices, other })
     }
 
-    /// How many edges pass through triangles, which objects are the first two, and where [m]; `None` if there are none.
-    fn tangles(&self, objects: &[Object], x: &[Row]) -> Option<(usize, [usize; 2], Vector)> {
-        let (count, edge, triangle) = self.crossing(x)?;
-        let owner = |vertex: u32| objects.iter().position(|o| o.points.contains(&(vertex as usize)));
-        let place = triangle.iter().fold(Vector::default(), |sum, i| sum + xyz64(x[*i as usize])) * (1.0 / 3.0);
-        Some((count, [owner(edge[0])?, owner(triangle[0])?], place))
+    /// How many edges pass through triangles at the start, what the first two are, and where [m]; `None` if there are none.
+    fn tangles(&self, objects: &[Object], x: &[Row]) -> Option<(usize, [String; 2], Vector)> {
+        let Crossing { count, vertices, other } = self.crossing(x, 0.0)?;
+        let place = vertices.iter().fold(Vector::default(), |sum, i| sum + xyz64(x[*i as usize])) * (1.0 / vertices.len() as f64);
+        let other = match other {
+            Other::Soft(vertex) => self.name(objects, vertex)?,
+            Other::Solid(name) => name,
+        };
+        Some((count, [self.name(objects, vertices[0])?, other], place))
+    }
+
+    /// What a vertex belongs to.
+    fn name(&self, objects: &[Object], vertex: u32) -> Option<String> {
+        let soft = || objects.iter().find(|o| o.points.contains(&(vertex as usize))).map(|o| o.name.clone());
+        self.corners.collider(&[vertex]).map(|i| self.corners.name(i)).or_else(soft)
     }
 
     /// Parts what is nearer than its thickness, all at rest: a push within a step would be a speed.
-    fn part(&mut self, x: &mut [Row]) {
+    fn part(&mut self, x: &mut [Row], corners: &Corners) {
         let thickness = self.topology.largest_thickness();
         for _ in 0..PARTINGS {
             self.detector.detect(&self.topology, x, REACH.0 * thickness);
             let start = x.to_vec();
-            self.detector.pairs().iter().for_each(|pair| push(pair, Friction::default(), x, &start));
+            let pairs = self.detector.pairs().iter().filter(|pair| !corners.is_mass(pair));
+            pairs.for_each(|pair| push(pair, Friction::default(), x, |i| start[i]));
             self.detector.hold(&self.topology, x);
             if *x == start[..] {
                 break;
@@ -119,7 +173,8 @@ impl Layers {
     }
 
     /// How many vertices that could move lie exactly where others do, whose objects the first two are, and where [m]; `None` if none do.
-    fn twins(&self, objects: &[Object], x: &[Row]) -> Option<(usize, [usize; 2], Vector)> {
+    fn twins(&self, objects: &[Object], x: &[Row]) -> Option<(usize, [String; 2], Vector)> {
+        let x = &*self.corners.joined(x, 0.0);
         let mut points = self.topology.points().to_vec();
         let place = |i: u32| [0, 1, 2].map(|k| (x[i as usize][k] + 0.0).to_bits());
         points.sort_unstable_by_key(|i| (place(*i), *i));
@@ -127,15 +182,16 @@ impl Layers {
         let same = |two: &[u32]| place(two[0]) == place(two[1]) && (free(two[0]) || free(two[1])) && self.topology.meet([two[0]], [two[1]]);
         let twins: Vec<&[u32]> = points.windows(2).filter(|two| same(two)).collect();
         let first = *twins.first()?;
-        let owner = |vertex: u32| objects.iter().position(|o| o.points.contains(&(vertex as usize)));
-        Some((twins.len(), [owner(first[0])?, owner(first[1])?], xyz64(x[first[0] as usize])))
+        Some((twins.len(), [self.name(objects, first[0])?, self.name(objects, first[1])?], xyz64(x[first[0] as usize])))
     }
 
-    /// Untangles what has passed, before an interval; what is still tangled is left alone until it is out.
-    fn untangle(&mut self, x: &mut [Row]) {
+    /// Untangles what has passed, before an interval; what is still tangled, or `inside` a solid, is left alone until it is out.
+    fn untangle(&mut self, x: &mut [Row], inside: &[bool]) {
         for round in 0..=ROUNDS {
             let crossings = self.detector.intersections(&self.topology, x);
-            let loose = if crossings.is_empty() { Vec::new() } else { tangled(&self.topology, &crossings, 1) };
+            let mut loose = if crossings.is_empty() { Vec::new() } else { tangled(&self.topology, &crossings, 1) };
+            loose.resize(loose.len().max(inside.len()), false);
+            loose.iter_mut().zip(inside).for_each(|(loose, inside)| *loose |= inside);
             self.detector.set_loose(loose);
             if crossings.is_empty() || round == ROUNDS {
                 break;
@@ -153,8 +209,7 @@ impl Dynamics {
     /// Surfaces that pass through each other as they are, or lie in each other, as a sentence with the place; `None` if none do, or may.
     pub fn tangles(&self) -> Option<Warning> {
         let layers = self.layers.as_ref()?;
-        let told = |(n, [one, other], place): (usize, [usize; 2], Vector), passing: bool| {
-            let (one, other) = (&self.objects[one].name, &self.objects[other].name);
+        let told = |(n, [one, other], place): (usize, [String; 2], Vector), passing: bool| {
             let other = if one == other { "itself".to_string() } else { format!("\"{other}\"") };
             let place = <[f64; 3]>::from(place).map(|x| format!("{x:.4}")).join(", ");
             let message = if passing {
@@ -176,26 +231,38 @@ impl Dynamics {
 
     /// Before an interval from t on: what is tangled, and at the start what is too near.
     pub(super) fn untangle(&mut self, t: f64) {
-        if let Some(layers) = &mut self.layers {
-            layers.untangle(&mut self.state.x);
+        let Some(layers) = &mut self.layers else { return };
+        let mut corners = std::mem::take(&mut layers.corners);
+        self.unclamped.clone_from(&self.state.x);
+        corners.place(t, 0.0);
+        corners.with_end(&mut self.state.x, |corners, x| {
+            let inside = corners.inside(&layers.topology, x, t);
+            layers.untangle(x, &inside);
             if t == 0.0 {
-                layers.part(&mut self.state.x);
+                corners.lift(&layers.topology, x, t);
+                layers.part(x, corners);
             }
-        }
+        });
+        layers.corners = corners;
+        // What has been moved has another past.
+        self.memory.ready &= self.state.x == self.unclamped;
     }
 
-    /// Before a sub-step of length h [s]: who is near whom.
-    pub(super) fn find_pairs(&mut self, h: f64) {
+    /// Before a sub-step from t on of length h [s]: who is near whom.
+    pub(super) fn find_pairs(&mut self, t: f64, h: f64) {
         let Some(layers) = &mut self.layers else { return };
-        let n = layers.topology.vertices();
+        let n = layers.corners.points();
         let gravity = Vector::from(self.laws.gravity) * h;
         let (x, v) = (&self.state.x[..n], &self.state.v[..n]);
         layers.ways.clear();
         layers.ways.extend(x.iter().zip(v).map(|(x, v)| (xyz64(*v) + if x[3] > 0.0 { gravity } else { Vector::default() }) * h));
+        layers.corners.place(t, h);
+        layers.ways.extend(layers.corners.ways());
         let farthest = layers.ways.iter().map(|w| w.norm_sq()).fold(0.0, f64::max).sqrt();
         let thickness = layers.topology.largest_thickness();
         let reach = (thickness + ASIDE * farthest).clamp(REACH.0 * thickness, REACH.1 * thickness);
-        layers.detector.detect_along(&layers.topology, x, &layers.ways, reach);
+        layers.detector.detect_along(&layers.topology, &layers.corners.at_start(x), &layers.ways, reach);
+        layers.corners.run_belts(t, h);
     }
 
     /// The step [s] in which those that are about to meet in h [s] go half of their thickness past each other; infinite if none are.
@@ -212,18 +279,22 @@ impl Dynamics {
 
     /// In a sweep: pushes pairs apart that are too near, with friction on what they slide in the sub-step.
     pub(super) fn push_apart(&mut self) {
-        let Some(layers) = &mut self.layers else { return };
-        let (x, before) = (&mut self.state.x, &self.before);
-        for pair in layers.detector.pairs() {
-            push(pair, layers.friction, x, before);
-        }
+        let Some(Layers { detector, friction, corners, .. }) = &mut self.layers else { return };
+        let (before, points) = (&self.before, corners.points());
+        corners.with_end(&mut self.state.x, |corners, x| {
+            for pair in detector.pairs().iter().filter(|pair| !corners.is_mass(pair)) {
+                let friction = corners.friction(pair).unwrap_or(*friction);
+                push(pair, friction, x, |i| if i < points { before[i] } else { corners.start[i - points] });
+            }
+        });
     }
 
-    /// After a step of length h [s] of a scheme without sweeps: pushes pairs apart. Velocities change by as much as positions in h.
-    pub(super) fn part_layers(&mut self, h: f64) {
-        if self.layers.is_none() {
-            return;
-        }
+    /// After a step from t on of length h [s] of a scheme without sweeps: pushes pairs apart. Velocities change by as much as positions in h.
+    pub(super) fn part_layers(&mut self, t: f64, h: f64) {
+        let Some(layers) = &mut self.layers else { return };
+        // The step may be shorter than the one for which pairs were looked for.
+        layers.corners.place(t, h);
+        layers.corners.run_belts(t, h);
         self.unclamped.clone_from(&self.state.x);
         (0..ROUNDS).for_each(|_| self.push_apart());
         self.take_along(h);
@@ -233,7 +304,7 @@ impl Dynamics {
     fn take_along(&mut self, h: f64) {
         let Some(layers) = &self.layers else { return };
         let inverse_h = (1.0 / h) as Real;
-        for ((x, old), v) in self.state.x.iter().zip(&self.unclamped).zip(&mut self.state.v).take(layers.topology.vertices()) {
+        for ((x, old), v) in self.state.x.iter().zip(&self.unclamped).zip(&mut self.state.v).take(layers.corners.points()) {
             let change = sub(*x, *old);
             if change[..3] != [0.0; 3] && x[3] > 0.0 {
                 *v = axpy(*v, inverse_h, [change[0], change[1], change[2], 0.0]);
@@ -245,16 +316,17 @@ impl Dynamics {
     /// After a sub-step of length h [s]: holds back what would pass through something.
     pub(super) fn hold_layers(&mut self, h: f64) {
         let Some(layers) = &mut self.layers else { return };
-        let x = &mut self.state.x;
-        self.unclamped.clone_from(x);
-        if layers.detector.hold(&layers.topology, x).held > 0 {
+        self.unclamped.clone_from(&self.state.x);
+        let (topology, detector) = (&layers.topology, &mut layers.detector);
+        let held = layers.corners.with_end(&mut self.state.x, |_, x| detector.hold(topology, x).held);
+        if held > 0 {
             self.take_along(h);
         }
     }
 }
 
 /// Projects one pair.
-fn push(pair: &Pair, friction: Friction, x: &mut [Row], before: &[Row]) {
+fn push(pair: &Pair, friction: Friction, x: &mut [Row], before: impl Fn(usize) -> Row) {
     let at = pair.vertices.map(|v| v as usize);
     let n = Vec3::from(pair.normal);
     let (mut d, mut weight) = (n * 0.0, 0.0);
@@ -268,7 +340,7 @@ fn push(pair: &Pair, friction: Friction, x: &mut [Row], before: &[Row]) {
     }
     let mut slid = d;
     for k in 0..4 {
-        slid = slid - xyz(before[at[k]]) * pair.weights[k];
+        slid = slid - xyz(before(at[k])) * pair.weights[k];
     }
     let slid = slid - n * n.dot(slid);
     // All or a part of the way; the bits of one coefficient are those of its product with the depth.

@@ -7,6 +7,7 @@ mod books;
 mod build;
 mod coat;
 mod contact;
+mod corners;
 mod held;
 mod implicit;
 mod laws;
@@ -190,7 +191,7 @@ impl Dynamics {
         let (x, v) = (&self.state.x, &mut self.state.v);
         self.coats.iter_mut().for_each(|coat| coat.act(h, x, v));
         self.lead_held(t, h);
-        self.remember(h);
+        self.remember(t, h);
         self.memory.ready &= self.held.is_empty() && self.coats.is_empty();
         let mut user = self.user.take();
         let result = match &mut user {
@@ -211,9 +212,9 @@ impl Dynamics {
     }
 
     /// Keeps what contact and clamp compare with in a step of at most h [s]; who may meet whom in it, for schemes that do not ask themselves.
-    fn remember(&mut self, h: f64) {
+    fn remember(&mut self, t: f64, h: f64) {
         if self.integrator != Integrator::PositionBased {
-            self.find_pairs(h);
+            self.find_pairs(t, h);
         }
         // Where positions are predicted, they are kept then.
         let predicted = self.integrator == Integrator::PositionBased && self.user.is_none();
@@ -254,7 +255,7 @@ impl Dynamics {
             }
         }
         if self.integrator != Integrator::PositionBased {
-            self.part_layers(h);
+            self.part_layers(t, h);
         }
         if !self.laws.colliders.is_empty() {
             let heeded = self.pool.heeded();
@@ -416,11 +417,12 @@ impl Dynamics {
         let mut report = StepReport::default();
         let end = t + dt;
         let mut unborn = self.pool.conceive(&self.name, t, dt)?;
+        self.untangle(t);
         if self.integrator.is_adaptive() && self.user.is_none() {
             let (mut done, mut last) = (0.0, dt);
             while done < dt && go_on() {
                 self.lead_held(t + done, dt - done);
-                self.remember(dt - done);
+                self.remember(t + done, dt - done);
                 let (begun, left) = (done, dt - done);
                 // The error of a step knows nothing of contact.
                 let longest = self.longest_among_pairs(left).max(self.adaptive.smallest * dt).min(left);
@@ -453,7 +455,6 @@ impl Dynamics {
             }
             return Ok(report);
         }
-        self.untangle(t);
         let substeps = self.substeps(dt, go_on);
         if substeps > MOST_SUBSTEPS {
             return Err(StepError::StepTooSmall { system: self.name.clone(), time: t, step: dt / substeps });

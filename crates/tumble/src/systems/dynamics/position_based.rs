@@ -67,7 +67,7 @@ impl Dynamics {
     /// A sub-step without contact, which follows; `before` holds where it starts from.
     pub(super) fn project_step(&mut self, t: f64, h: f64, report: &mut StepReport) -> Result<(), StepError> {
         // Who may meet whom.
-        self.find_pairs(h);
+        self.find_pairs(t, h);
         self.predict(t, h)?;
         self.place_held(t + h);
         // Sweeps over all elements.
