@@ -5,7 +5,7 @@
 
 use crate::common;
 
-use common::{Vector, every, positions, run, simulation, step, vector, velocities};
+use common::{Vector, every, positions, run, simulation, solid, step, vector, velocities};
 use proptest::prelude::*;
 use std::collections::HashMap;
 use std::sync::Arc;
@@ -351,20 +351,6 @@ fn thin_walls_hold() {
                 }
             }
         }
-    }
-}
-
-fn solid(shape: Shape, inside: bool, thickness: f64) -> Collider {
-    Collider {
-        shape,
-        inside,
-        thickness,
-        friction: Default::default(),
-        restitution: 0.0,
-        belt: Vector::default(),
-        motion: None,
-        rig: None,
-        edges: None,
     }
 }
 

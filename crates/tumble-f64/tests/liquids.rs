@@ -4,10 +4,10 @@
 
 use crate::common;
 
-use common::{Numbers, Vector, positions, run, simulation, vector, velocities, write};
+use common::{Numbers, Vector, positions, run, simulation, solid, vector, velocities, write};
 use std::f64::consts::PI;
 use tumble_f64::elements::{Constraints, Density, Projection, behind, spline};
-use tumble_f64::geometry::{Collider, Shape, Walls};
+use tumble_f64::geometry::{Shape, Walls};
 use tumble_f64::math::{Row, rotation, xyz};
 use tumble_interface::Engine;
 
@@ -166,17 +166,6 @@ fn behind_a_wall_is_what_the_kernel_has_there() {
 /// Soft liquid moves down its energy: dx = -w h²/2 dE/dx, with walls, in corners and beside solids.
 #[test]
 fn a_sweep_goes_down_the_energy_of_liquid_between_walls() {
-    let solid = |shape: Shape, inside: bool, thickness: f64| Collider {
-        shape,
-        inside,
-        thickness,
-        friction: Default::default(),
-        restitution: 0.0,
-        belt: Vector::default(),
-        motion: None,
-        rig: None,
-        edges: None,
-    };
     let half = vector(0.5, 0.5, 0.5);
     let tank = solid(Shape::Box { center: half, half, turn: rotation::from_degrees([0.0; 3]) }, true, 0.01);
     let colliders = [tank, solid(Shape::Sphere { center: vector(0.35, 0.3, 0.3), radius: 0.12 }, false, 0.0)];

@@ -2,6 +2,7 @@
 
 #![allow(dead_code)] // every test is a crate of its own and uses a part of this
 
+use tumble_f64::geometry::{Collider, Friction, Shape};
 use tumble_f64::scene::Simulation;
 use tumble_f64::state::{Field, Grid, Place};
 use tumble_interface::engine::StepReport;
@@ -55,6 +56,12 @@ pub fn grid(sim: &Simulation, object: &str, name: &str) -> (Vec<f64>, Vec<usize>
         Data::F64(numbers) => (numbers.clone(), column.points.clone()),
         other => panic!("{object}.{name} is {other:?}"),
     }
+}
+
+/// A solid at rest, without friction or restitution, that masses alone meet.
+pub fn solid(shape: Shape, inside: bool, thickness: f64) -> Collider {
+    let (friction, belt) = (Friction::default(), Vector::default());
+    Collider { shape, inside, thickness, friction, restitution: 0.0, belt, motion: None, rig: None, edges: None }
 }
 
 /// The largest magnitude.
