@@ -620,6 +620,7 @@ fn intersections_are_all_there_are() {
     let mut topology = Topology::new(x.len());
     topology.add(THIN, &triangles, &[], &[]);
     let found = intersections(&topology, &x);
+    assert_eq!(tumble_f64::geometry::mesh_contact::crossed(&topology, &x), (found.len(), found.first().copied()));
     let mut all = Vec::new();
     for (i, e) in topology.edges().iter().enumerate() {
         for (j, t) in topology.triangles().iter().enumerate() {

@@ -39,8 +39,31 @@ pub fn intersections(topology: &Topology, x: &[Row]) -> Vec<(u32, u32)> {
     crossings(topology, x, &mut Tree::default(), &mut Tree::default())
 }
 
-/// The same with trees for edges and triangles.
+/// How many there are, and the first of them: of surfaces that are crushed everything passes through everything, and no list is made.
+pub fn crossed(topology: &Topology, x: &[Row]) -> (usize, Option<(u32, u32)>) {
+    let count = |(count, first): &mut (usize, Option<(u32, u32)>), pair: (u32, u32)| {
+        *count += 1;
+        *first = Some(first.map_or(pair, |before| before.min(pair)));
+    };
+    let tasks = visit(topology, x, &mut Tree::default(), &mut Tree::default(), count);
+    (tasks.iter().map(|(count, _)| count).sum(), tasks.iter().filter_map(|(_, first)| *first).min())
+}
+
+/// The list, with trees for edges and triangles.
 pub(super) fn crossings(topology: &Topology, x: &[Row], edges: &mut Tree, triangles: &mut Tree) -> Vec<(u32, u32)> {
+    let mut all = visit(topology, x, edges, triangles, |found: &mut Vec<_>, pair| found.push(pair)).concat();
+    all.sort_unstable();
+    all
+}
+
+/// What each task gathers of the crossings that it finds, in any order.
+fn visit<T: Default + Send>(
+    topology: &Topology,
+    x: &[Row],
+    edges: &mut Tree,
+    triangles: &mut Tree,
+    gather: impl Fn(&mut T, (u32, u32)) + Sync,
+) -> Vec<T> {
     if x.len() < topology.vertices() {
         return Vec::new();
     }
@@ -53,7 +76,7 @@ pub(super) fn crossings(topology: &Topology, x: &[Row], edges: &mut Tree, triang
     triangles.fit(topology.triangles.len(), |i| around(three(topology.triangles[i as usize]), origin));
     let (edges, triangles) = (&*edges, &*triangles);
     let task = |task: usize| {
-        let (mut found, mut leaves) = (Vec::new(), Vec::new());
+        let (mut found, mut leaves) = (T::default(), Vec::new());
         for leaf in task * TASK..((task + 1) * TASK).min(edges.n_leaves()) {
             leaves.clear();
             triangles.walk(&whole(edges, leaf), 0, |l| leaves.push(l));
@@ -65,7 +88,7 @@ pub(super) fn crossings(topology: &Topology, x: &[Row], edges: &mut Tree, triang
                         let j = triangles.features(*l as usize)[mask.trailing_zeros() as usize % LEAF];
                         let t = topology.triangles[j as usize];
                         if topology.meet(e, t) && passes(two(e), three(t)) {
-                            found.push((*i, j));
+                            gather(&mut found, (*i, j));
                         }
                         mask &= mask - 1;
                     }
@@ -74,10 +97,7 @@ pub(super) fn crossings(topology: &Topology, x: &[Row], edges: &mut Tree, triang
         }
         found
     };
-    let tasks: Vec<Vec<(u32, u32)>> = (0..edges.n_leaves().div_ceil(TASK)).map_in_parallel(task);
-    let mut all = tasks.concat();
-    all.sort_unstable();
-    all
+    (0..edges.n_leaves().div_ceil(TASK)).map_in_parallel(task)
 }
 
 /// A flag for each vertex of an edge or a triangle that takes part in a crossing, and of their neighbours so many edges away.

@@ -2,7 +2,7 @@
 //! and what has passed through what. Pure geometry; positions are rows of a column, everything inside is in double precision.
 //!
 //! A solver finds pairs (`Detector::detect`), moves vertices, holds them back where they went too far (`Detector::hold`), and
-//! finds pairs anew where many were held. `intersections` is the judge. docs/theory/contact.md.
+//! finds pairs anew where many were held. `intersections` and `crossed` are the judges. docs/theory/contact.md.
 
 mod crossing;
 mod detect;
@@ -12,7 +12,7 @@ mod tangle;
 mod topology;
 mod tree;
 
-pub use crossing::{intersections, passes, tangled};
+pub use crossing::{crossed, intersections, passes, tangled};
 pub use detect::{Detector, GAMMA, Held, Kind, Pair, truncate};
 pub use distance::{Nearest, edge_edge, point_triangle};
 pub use impact::{edge_edge_impact, point_triangle_impact};

@@ -7,7 +7,7 @@
 use super::Dynamics;
 use super::corners::Corners;
 use super::tear::Tear;
-use crate::geometry::mesh_contact::{Detector, Owner, Pair, Topology, intersections, tangled, untangle_directions};
+use crate::geometry::mesh_contact::{Detector, Owner, Pair, Topology, crossed, tangled, untangle_directions};
 use crate::geometry::{Collider, Friction, Vector};
 use crate::math::{Real, Row, Vec3, axpy, row, sub, xyz, xyz64};
 use crate::state::{Object, State};
@@ -123,13 +123,13 @@ impl Layers {
 
     /// Edges that pass through triangles, when points are at x at time t.
     pub fn intersections(&self, x: &[Row], t: f64) -> u64 {
-        intersections(&self.topology, &self.corners.joined(x, t)).len() as u64
+        crossed(&self.topology, &self.corners.joined(x, t)).0 as u64
     }
 
     /// What passes through each other.
     pub fn crossing(&self, x: &[Row], t: f64) -> Option<Crossing> {
-        let all = intersections(&self.topology, &self.corners.joined(x, t));
-        let (edge, triangle) = *all.first()?;
+        let (count, first) = crossed(&self.topology, &self.corners.joined(x, t));
+        let (edge, triangle) = first?;
         let (edge, triangle) = (self.topology.edges()[edge as usize], self.topology.triangles()[triangle as usize]);
         let solid = |vertices: &[u32]| Some(self.corners.name(self.corners.collider(vertices)?));
         let (vertices, other) = match (solid(&edge), solid(&triangle)) {
@@ -137,7 +137,7 @@ impl Layers {
             (_, Some(name)) => (edge.to_vec(), Other::Solid(name)),
             _ => (edge.to_vec(), Other::Soft(triangle[0])),
         };
-        Some(Crossing { count: all.len(), vertices, other })
+        Some(Crossing { count, vertices, other })
     }
 
     /// How many edges pass through triangles at the start, what the first two are, and where [m]; `None` if there are none.
@@ -215,7 +215,7 @@ impl Dynamics {
             let message = if passing {
                 format!(
                     "{n} edges pass through triangles at the start; at [{place}] \"{one}\" passes through {other}. They are pushed out as \
-                     far as that succeeds; start without"
+                     far as that succeeds; move one of them so that none passes"
                 )
             } else {
                 format!(
