@@ -3,8 +3,10 @@
 use crate::common;
 
 use common::{Vector, positions, simulation, step, vector, velocities};
+use std::collections::HashMap;
 use tumble_f64::math::rotation::from_degrees;
-use tumble_interface::Engine;
+use tumble_f64::scene::Simulation;
+use tumble_interface::{Assets, Engine, Scene};
 
 const G: f64 = 9.8;
 const LINKS: &str = "links = { structural = { modulus = 200, damping = 0.05 }, shear = 60 }\nhinge = 1e-5\ndensity = 0.2";
@@ -141,4 +143,77 @@ fn steps_from_a_24th_to_a_2000th_of_a_second_hold() {
         );
         holds(&format!("steps of 1/{} s", fps * substeps), fps, &text, 0.35);
     }
+}
+
+/// docs/theory/positions.md, "Compliant elements": what long steps leave unsolved.
+#[test]
+fn one_sweep_in_a_long_step_leaves_cloth_too_long() {
+    let most = |substeps: u32| {
+        let mut sim = simulation(&format!(
+            "precision = \"double\"\ntime.fps = 24\n[[system]]\nmethod = \"position_based\"\nsubsteps = {substeps}\nself_contact.thickness = 0.004\n\
+             [[sheet]]\nname = \"s\"\nsize = [1, 1]\nresolution = [26, 26]\ncenter = [0.1, 0, 0.6]\nrotate = [10, 5, 0]\ndensity = 0.2\n\
+             [[collider]]\nname = \"ball\"\nfriction = 0.3\nthickness = 0.005\nshape.sphere = {{ center = [0, 0, 0.2], radius = 0.2 }}\n\
+             [[collider]]\nname = \"floor\"\nfriction = 0.4\nthickness = 0.005\nshape.floor = {{}}\n"
+        ));
+        (0..48).fold(0.0_f64, |most, _| {
+            step(&mut sim);
+            most.max(sim.ledger().stretch)
+        })
+    };
+    let (one, eight) = (most(1), most(8));
+    println!("stretched to {one:.2} in one sub-step a frame, {eight:.3} in eight");
+    assert!(one > 5.0 && eight < 1.7, "{one} {eight}");
+}
+
+/// Ten sweeps leave what hangs too long; tethers hold it, whatever it is made of.                                  (positions.3)
+#[test]
+fn tethers_hold_what_hangs() {
+    let sheet = "[[sheet]]\nname = \"s\"\nsize = [1, 1]\nresolution = [41, 41]\nrotate = [90, 0, 0]\npin = [\"edge y+\"]\n";
+    let rope = "[[rope]]\nname = \"s\"\nfrom = [0, 0, 0]\nto = [0, 0, -1]\nsegments = 40\npin = [\"start\"]\n";
+    for what in [
+        format!("{sheet}density = 0.2\nlinks.structural = 500\n"),
+        format!("{sheet}density = 0.2\nlinks = {{}}\nmembrane.warp = 500\n"),
+        format!("{sheet}fabric = \"interlock\"\n"),
+        format!("{rope}links.structural = 50\n"),
+        format!("{rope}rod = {{ stretch = 10, bend = 1e-3 }}\n"),
+    ] {
+        let longest = |words: &str| {
+            let text = format!(
+                "version = 1\nprecision = \"double\"\ntime.fps = 24\n[[system]]\nmethod = \"position_based\"\nsubsteps = 2\n\
+                 position_based = {{ iterations = 2{words} }}\n{what}"
+            );
+            let fabrics = HashMap::from(["interlock".to_string()].map(|name| (name.clone(), tumble_io::shipped(&name).unwrap())));
+            let assets = Assets::default().with_fabrics(fabrics);
+            let mut sim = Simulation::new(Scene::from_toml(&text).unwrap(), assets).unwrap_or_else(|e| panic!("{e}\n{text}"));
+            assert_eq!(sim.warnings(), []);
+            let top = positions(&sim, "s").iter().map(|x| x.z).fold(f64::NEG_INFINITY, f64::max);
+            (0..24).fold(0.0_f64, |most, _| {
+                step(&mut sim);
+                positions(&sim, "s").iter().map(|x| top - x.z).fold(most, f64::max)
+            })
+        };
+        let (tied, free) = (longest(", tethers = 1.01"), longest(""));
+        println!("{tied:.4} m long with tethers, {free:.3} m without: {}", what.lines().last().unwrap());
+        assert!(tied < 1.01 + 1e-9 && free > 1.03, "{what}: {tied} {free}");
+    }
+}
+
+#[test]
+fn tethers_that_tie_nothing_or_hold_what_breaks_are_told() {
+    let scene = |words: &str| {
+        let text = format!("version = 1\n[[system]]\nmethod = \"position_based\"\nposition_based.tethers = 1.01\n{words}");
+        Simulation::new(Scene::from_toml(&text).unwrap(), Default::default())
+    };
+    let rope = "[[rope]]\nname = \"r\"\nfrom = [0, 0, 0]\nto = [1, 0, 0]\nsegments = 4\n";
+    let told = |words: &str| scene(words).unwrap().warnings().iter().map(|w| format!("{}: {w}", w.code.name())).collect::<String>();
+    let idle = told(&format!("{rope}links.structural = 10\n"));
+    assert!(idle.contains("unfelt") && idle.contains("system \"main\".position_based.tethers"), "{idle}");
+    assert_eq!(told(&format!("{rope}links.structural = 10\npin = [\"start\"]\n")), "");
+    let error = |words: &str| scene(words).err().unwrap().to_string();
+    let breaks = error(&format!("{rope}links.structural = {{ modulus = 10, break_strain = 0.1 }}\npin = [\"start\"]\n"));
+    assert!(breaks.contains("position_based.tethers: would hold what has broken off"), "{breaks}");
+    let tears = error(
+        "[[sheet]]\nname = \"s\"\nsize = [1, 1]\nresolution = [5, 5]\ndensity = 0.2\nlinks.structural = 10\npin = [\"edge y+\"]\ntear.strain = 0.2\n",
+    );
+    assert!(tears.contains("would hold what has torn off"), "{tears}");
 }

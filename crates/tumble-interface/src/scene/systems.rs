@@ -17,7 +17,7 @@ pub struct System {
     #[serde(default)]
     pub integrator: Integrator,
     /// Sub-steps per exchange. Without `substeps` and `step`, explicit integrators take as many as 0.7 of their
-    /// estimated usable step asks for, implicit ones take one.
+    /// estimated usable step asks for, implicit ones take one, and position_based ones as many as keep each within 1 ms.
     #[serde(default)]
     #[schemars(range(min = 1, max = 10_000_000))]
     pub substeps: Option<u32>,
@@ -305,8 +305,8 @@ pub struct PositionBased {
     /// Sweeps end early when none moves a point farther than this.
     #[schemars(extend("x-unit" = "m", "exclusiveMinimum" = 0.0))]
     pub tolerance: Option<f64>,
-    /// Points are kept within this many times the shortest way along links to what is pinned: for large things that hang, which few
-    /// sweeps leave too long. Below what a stiffness would give, it wins over it.
+    /// Points are kept within this many times the shortest way to what is pinned, along links, rods and edges of cloth: for large things
+    /// that hang, which few sweeps leave too long. Below what a stiffness would give, it wins over it. Not beside what tears or breaks.
     #[schemars(range(min = 1.0), extend("x-unit" = "1"))]
     pub tethers: Option<f64>,
     /// What a sweep does to an element.

@@ -31,6 +31,12 @@ impl Membrane {
         (inverse.iter().all(|b| b.is_finite()) && det > 0.0).then_some((inverse, 0.5 * det))
     }
 
+    /// Rest lengths of the edges from x0 to x1, from x0 to x2 and from x1 to x2, from B.
+    pub fn lengths([b0, b1, b2, b3]: [f64; 4]) -> [f64; 3] {
+        let det = (b0 * b3 - b1 * b2).abs();
+        [[b3, b2], [b1, b0], [b1 + b3, b0 + b2]].map(|[u, v]| (u * u + v * v).sqrt() / det)
+    }
+
     /// Directions of warp and weft in a triangle. `warp` counts as far as it lies in the triangle, or the y axis if none of it does, turned by
     /// `angle` [rad]. Not finite if the triangle has no area.
     pub fn grain(x: [Vector; 3], warp: Vector, angle: f64) -> (Vector, Vector) {

@@ -1,5 +1,5 @@
 //! Tethers: what hangs from held points stays within reach of them, whatever the sweeps have left undone. Each point is tied to the nearest
-//! point of some groups of held ones, by the length of the shortest way along links, and is pulled back when it is farther away.
+//! point of some groups of held ones, by the length of the shortest way along links and edges, and is pulled back when it is farther away.
 //!
 //!   x = p + (x - p) min(1, s l/|x - p|)                                (positions.3)
 //!

@@ -174,6 +174,7 @@ pub fn build(scene: &Scene, assets: &Assets) -> Result<Built, SceneError> {
         let mut system = parts.build(settings).map_err(|e| placed(scene, e))?;
         warnings.extend(system.tangles());
         warnings.extend(system.round_off(dt));
+        warnings.extend(system.idle_tethers());
         if exchange.ports_of(index).next().is_some() {
             system.expect_pushes();
         }
@@ -262,7 +263,7 @@ fn solids(scene: &Scene, assets: &Assets, issues: &mut Vec<Issue>) -> (Vec<Colli
         let thick = Thing { thickness: thing.thickness.max(thickness), ..thing.clone() };
         let thing = if thing.edges { &thick } else { thing };
         if thing.edges && scene.dimension == 2 {
-            let message = "true, but a plane has no edges that could meet: masses alone collide in scenes of two dimensions; leave it out";
+            let message = "true, but masses alone collide in scenes of two dimensions; leave it out";
             issues.push(Issue::new(format!("collider \"{}\".edges", thing.name), message));
         }
         let meshes: Vec<Mesh> = match &thing.shape {

@@ -438,6 +438,20 @@ impl Parts {
         self.points.is_empty() && self.frames.is_empty() && self.emitters.is_empty()
     }
 
+    /// Tethers of every object that has held points: ways go along links, seams, pieces of rods and the edges of membranes and fabrics.
+    fn reach(&self, slack: f64, state: &State) -> Vec<Tethers> {
+        let links = self.linear.members.iter().map(|m| (m.nodes, m.rest[0]));
+        let links = links.chain(self.nonlinear.members.iter().map(|m| (m.nodes, m.rest[0])));
+        let seams = self.vector.members.iter().map(|m| (m.nodes, 0.0));
+        let rods = self.stretches.iter().map(|m| ([m.nodes[0], m.nodes[1]], m.rest[0]));
+        let edges = |[a, b, c]: [u32; 3], inverse| [[a, b], [a, c], [b, c]].into_iter().zip(Membrane::lengths(inverse));
+        let membranes = self.membranes.iter().flat_map(|m| edges(m.nodes, std::array::from_fn(|k| m.rest[k])));
+        let woven = self.woven.iter().flat_map(|m| edges(m.nodes, std::array::from_fn(|k| m.rest[k])));
+        let ways: Vec<_> = links.chain(seams).chain(rods).chain(membranes).chain(woven).collect();
+        let held = |i: usize| state.x[i][3] == 0.0;
+        self.objects.iter().filter_map(|draft| Tethers::new(draft.object.points.clone(), &ways, &held, slack)).collect()
+    }
+
     /// Whether every number survives the engine's scalar: neither infinite nor, where it must not be, zero.
     fn check_range(&self) -> Result<(), SceneError> {
         let fits = |x: f64| (x as Real).is_finite() && (x == 0.0 || x as Real != 0.0);
@@ -492,6 +506,11 @@ impl Parts {
         {
             let message = "tethers of the system would hold what has torn off; leave out one of them";
             return Err(SceneError::one(part.path.as_str(), message));
+        }
+        let mut limits = self.linear.limits.iter().chain(&self.nonlinear.limits).chain(&self.vector.limits).chain(&self.rod_limits);
+        if limits.any(|l| l.is_finite()) && settings.sweeps.tethers.is_some() && settings.integrator == Integrator::PositionBased {
+            let message = "would hold what has broken off, and something in the system has a break_strain; leave out one of them";
+            return Err(SceneError::one(format!("system \"{}\".position_based.tethers", settings.name), message));
         }
         if settings.integrator.is_adaptive() && !self.coats.is_empty() {
             let message = "hair that acts on itself needs steps of equal length; set another integrator";
@@ -574,7 +593,8 @@ impl Parts {
             return Err(lost());
         }
         let next: Vec<[usize; 3]> = self.objects.iter().skip(1).map(|d| d.links).chain([end]).collect();
-        let reach = reach(&settings, &self.objects, (&self.linear.members, &self.nonlinear.members, &self.vector.members), &state);
+        let tethers = settings.sweeps.tethers.filter(|_| projected);
+        let reach = tethers.map_or_else(Vec::new, |slack| self.reach(slack, &state));
         let mut objects = Vec::new();
         let mut places = Vec::new();
         let torn: Vec<(usize, TearPart)> =
@@ -720,20 +740,6 @@ impl Parts {
         system.begin_life(settings.interval).map_err(|e| SceneError::one(format!("system \"{}\"", settings.name), e.to_string()))?;
         Ok(system)
     }
-}
-
-/// Tethers of every object that has held points, where the scene asks for them.
-fn reach(
-    settings: &Settings,
-    objects: &[Draft],
-    (linear, nonlinear, seams): (&[Members<2, 1, 0>], &[Members<2, 1, 2>], &[Members<2, 0, 0>]),
-    state: &State,
-) -> Vec<Tethers> {
-    let Some(slack) = settings.sweeps.tethers.filter(|_| settings.integrator == Integrator::PositionBased) else { return Vec::new() };
-    let links = linear.iter().map(|m| (m.nodes, m.rest[0])).chain(nonlinear.iter().map(|m| (m.nodes, m.rest[0])));
-    let links: Vec<_> = links.chain(seams.iter().map(|m| (m.nodes, 0.0))).collect();
-    let held = |i: usize| state.x[i][3] == 0.0;
-    objects.iter().filter_map(|draft| Tethers::new(draft.object.points.clone(), &links, &held, slack)).collect()
 }
 
 /// Whether triangles enclose something: each way along an edge comes once, and so does the way back.

@@ -64,6 +64,16 @@ impl Dynamics {
         soft.into_iter().chain(lost).collect()
     }
 
+    /// Tethers that the scene asks for, where nothing is pinned, or no way leads from a pin to anything.
+    pub fn idle_tethers(&self) -> Option<Warning> {
+        let idle = self.sweeps.tethers.is_some() && self.integrator == Integrator::PositionBased && self.reach.is_empty();
+        idle.then(|| {
+            let message = "tie what hangs from pins by links, rods, membranes or fabric, and the system has nothing that does; pin some of \
+                           it, or leave tethers out";
+            Warning::new(Code::Unfelt, format!("system \"{}\".position_based.tethers", self.name), message)
+        })
+    }
+
     /// A sub-step without contact, which follows; `before` holds where it starts from.
     pub(super) fn project_step(&mut self, t: f64, h: f64, report: &mut StepReport) -> Result<(), StepError> {
         // Who may meet whom.
