@@ -155,7 +155,16 @@ AIR: Tree = {"force": [{"kind": "air"}]}
 MAGNET: Tree = {"force": [{"kind": "magnetic", "field": [0, 0, 1]}]}
 WIRE: Tree = {"name": "wire", "shape": {"capsule": {"from": [0, -1, -1], "to": [0, 1, -1], "radius": 0.1}}}
 MEETING: Tree = {"method": "position_based", "self_contact": {"thickness": 0.01}}
+TIED: Tree = {"system": [{"method": "position_based", "position_based": {"tethers": 1.1}}]}
 TWO: Tree = {"system": [{"name": "a"}, {"name": "b"}]}
+
+
+def haired(segments: int) -> Tree:
+    ball = {"name": "ball", "shape": {"sphere": {"center": [0, 0, 3], "radius": 1}}}
+    return SOFT | {
+        "hair": [{"name": "h", "on": "ball", "count": 1, "length": 1, "segments": segments}],
+        "collider": [ball, WIRE],
+    }
 
 
 def anchored(stiffness: float) -> Tree:
@@ -223,6 +232,19 @@ VAIN: list[tuple[str, str, Tree, Tree]] = [
         {"sheet": [SHEET], "collider": [WIRE]},
         {"sheet": [SHEET], "collider": [WIRE | {"edges": True}], "system": [MEETING]},
     ),
+    (
+        "thin-collider",
+        'collider "wire"',
+        {"rope": [ROPE | {"segments": 8, "length": 2}], "collider": [WIRE]},
+        {"rope": [ROPE | {"segments": 8}], "collider": [WIRE]},
+    ),
+    ("thin-collider", 'collider "wire"', haired(2), haired(8)),
+    (
+        "unfelt",
+        'system "main".position_based.tethers',
+        {"rope": [ROPE], **TIED},
+        {"rope": [ROPE | {"pin": ["start"]}], **TIED},
+    ),
     ("late-carrier", 'system "t"', carried("t", "g"), carried("g", "t")),
     (
         "starts-inside",
@@ -249,6 +271,11 @@ def test_what_a_scene_says_in_vain_is_told(code: str, path: str, vain: Tree, hee
         ("max_stretch", GAS, {"rope": [ROPE]}),
         ("max_penetration", {"rope": [ROPE]}, {"rope": [ROPE], **FLOOR}),
         ("max_intersections", {"rope": [ROPE]}, {"sheet": [SHEET]}),
+        (
+            "max_intersections",
+            {"rope": [ROPE]},
+            {"rope": [ROPE], "collider": [WIRE | {"edges": True}], "system": [MEETING]},
+        ),
         ("max_volume_error", {"sheet": [SHEET]}, {"block": [BLOCK]}),
         ("max_divergence", {"rope": [ROPE]}, GAS),
         ("max_heat_error", GAS, WARM),

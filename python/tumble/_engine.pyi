@@ -127,8 +127,8 @@ class World:
     @property
     def ledger(self) -> dict[str, Any]:
         """The books: time, mass, momentum (3), angular_momentum (3), kinetic, elastic, external, energy [J], stretch,
-        penetration [m], intersections, speed [m/s], contacts, broken, heat and heat_in [J], volume [m³],
-        divergence [1/s]."""
+        penetration [m], intersections (0 where neither self_contact nor expect.max_intersections asks for them), speed [m/s],
+        contacts, broken, heat and heat_in [J], volume [m³], divergence [1/s]."""
 
     def account(self) -> dict[str, Any]:
         """Who has how much of the books, and where their worst numbers are: `systems` as (name, ledger), `shares` with system,

@@ -117,7 +117,8 @@ pub struct Ledger {
     pub stretch: f64,
     /// Deepest mass inside a collider or its thickness [m], of those that are not held.
     pub penetration: f64,
-    /// Edges of soft surfaces that pass through triangles, where `self_contact` is on or `max_intersections` is expected.
+    /// Edges of soft surfaces that pass through triangles, those of solids with `edges` among them; 0 where neither `self_contact` nor
+    /// `max_intersections` asks for it.
     pub intersections: u64,
     /// Fastest mass [m/s].
     pub speed: f64,

@@ -227,8 +227,8 @@ impl World {
     }
 
     /// The books: time, mass, momentum (3), angular_momentum (3), kinetic, elastic, external, energy [J], stretch,
-    /// penetration [m], intersections, speed [m/s], contacts, broken, heat and heat_in [J], volume [m³],
-    /// divergence [1/s].
+    /// penetration [m], intersections (0 where neither self_contact nor expect.max_intersections asks for them), speed [m/s],
+    /// contacts, broken, heat and heat_in [J], volume [m³], divergence [1/s].
     #[getter]
     fn ledger<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
         let (engine, pool) = (&self.engine, self.pool.as_ref());

@@ -126,7 +126,8 @@ pub struct HairCollisions {
     #[serde(default)]
     #[schemars(range(min = 0.0), extend("x-unit" = "1/s"))]
     pub friction: f64,
-    /// Pressure at twice the rest density: p = pressure (density/rest density - 1), none below.
+    /// Pressure at twice the rest density: p = pressure (density/rest density - 1), none below. Sub-steps must be well below
+    /// cell sqrt(rest density/pressure).
     #[serde(default)]
     #[schemars(range(min = 0.0), extend("x-unit" = "Pa"))]
     pub pressure: f64,

@@ -90,7 +90,8 @@ pub struct Expect {
     /// Deepest mass inside a collider or its thickness, of those that are not held.
     #[schemars(range(min = 0.0), extend("x-unit" = "m"))]
     pub max_penetration: Option<f64>,
-    /// Edges of soft surfaces that pass through triangles of their system; they are counted with or without `self_contact`.
+    /// Edges of soft surfaces that pass through triangles of their system; they are counted with or without `self_contact`. With it, edges and
+    /// triangles of colliders with `edges` count, too.
     pub max_intersections: Option<u64>,
     /// Fastest mass.
     #[schemars(range(min = 0.0), extend("x-unit" = "m/s"))]

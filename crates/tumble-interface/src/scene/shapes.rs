@@ -33,7 +33,7 @@ pub struct Collider {
     pub inside: bool,
     /// Whether its edges and corners meet those of soft surfaces and curves, too, in systems with `self_contact`: for what is sharp, or
     /// thinner than the mesh of what falls on it. All then keep off it by its `thickness`, at least 0.6 of that of `self_contact`; edges do
-    /// not bounce. Not for planes.
+    /// not bounce. Neither for planes nor in scenes of two dimensions.
     #[serde(default)]
     pub edges: bool,
     /// Velocity of the surface itself, as of a conveyor belt; the shape stays, and turns this along when it turns.

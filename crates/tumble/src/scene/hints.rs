@@ -62,7 +62,11 @@ pub fn unused(scene: &Scene, plans: &[Plan]) -> Vec<Warning> {
                 .chain(scene.block.iter().map(|t| &t.name))
                 .any(reached)
         {
-            warnings.push(Warning::new(Code::NoSurface, at(), "nothing in its reach has a surface; give it a sheet, a net or cloth"));
+            warnings.push(Warning::new(
+                Code::NoSurface,
+                at(),
+                "nothing in its reach has a surface; give it a sheet, a net, cloth or a block",
+            ));
         }
         if matches!(force, Words::Magnetic { .. } | Words::Electric { .. } | Words::Electrostatics { .. }) && !any {
             warnings.push(Warning::new(Code::NoCharge, at(), "nothing in its reach has a charge; give particles a charge"));
@@ -110,8 +114,10 @@ fn thin(scene: &Scene) -> Vec<Warning> {
     let sheets = scene.sheet.iter().map(|t| (&t.name, along(t.size[0], t.resolution[0]).max(along(t.size[1], t.resolution[1]))));
     let cloths = scene.cloth.iter().map(|t| (&t.name, t.resolution));
     let way = |t: &Rope| (0..3).map(|k| (t.to[k] - t.from[k]).powi(2)).sum::<f64>().sqrt();
-    let ropes = scene.rope.iter().map(|t| (&t.name, way(t) / f64::from(t.segments)));
-    let Some((name, apart)) = sheets.chain(cloths).chain(ropes).max_by(|a, b| a.1.total_cmp(&b.1)) else { return Vec::new() };
+    let ropes = scene.rope.iter().map(|t| (&t.name, t.length.unwrap_or_else(|| way(t)) / f64::from(t.segments)));
+    let hair = scene.hair.iter().map(|t| (&t.name, t.length / f64::from(t.segments)));
+    let all = sheets.chain(cloths).chain(ropes).chain(hair);
+    let Some((name, apart)) = all.max_by(|a, b| a.1.total_cmp(&b.1)) else { return Vec::new() };
     let doubt = |thing: &Collider| {
         let across = match &thing.shape {
             Shape::Sphere { radius, .. } | Shape::Capsule { radius, .. } => 2.0 * radius,
@@ -138,12 +144,13 @@ fn thin(scene: &Scene) -> Vec<Warning> {
 fn idle_bounds(scene: &Scene) -> Vec<(&'static str, &'static str)> {
     let expect = &scene.expect;
     let (bodies, surfaces) = (!scene.block.is_empty(), !(scene.sheet.is_empty() && scene.net.is_empty() && scene.cloth.is_empty()));
+    let curved = !(scene.rope.is_empty() && scene.hair.is_empty()) && scene.collider.iter().any(|thing| thing.edges);
     let linked = scene.particles.iter().any(|thing| !thing.spring.is_empty()) || !(scene.rope.is_empty() && scene.hair.is_empty());
     let warm = !scene.heat.is_empty() || scene.gas.iter().any(|gas| gas.fire.is_some());
     [
         ("max_stretch", expect.max_stretch.is_some(), linked || bodies || surfaces, "nothing that has links"),
         ("max_penetration", expect.max_penetration.is_some(), !scene.collider.is_empty(), "no collider"),
-        ("max_intersections", expect.max_intersections.is_some(), bodies || surfaces, "no soft surface"),
+        ("max_intersections", expect.max_intersections.is_some(), bodies || surfaces || curved, "no soft surface"),
         ("max_volume_error", expect.max_volume_error.is_some(), bodies || !scene.net.is_empty(), "no closed surface of soft matter"),
         ("max_divergence", expect.max_divergence.is_some(), !scene.gas.is_empty(), "no gas"),
         ("max_heat_error", expect.max_heat_error.is_some(), warm, "neither a body that conducts heat nor fire"),
