@@ -104,6 +104,10 @@ fn a_block_hangs_alike_for_all_sweeps_steps_and_rates() {
     let order = |i: usize, j: usize, ratio: f64| (left[i] / left[j]).ln() / ratio.ln();
     let orders = [order(1, 2, 2.5), order(2, 3, 2.0)];
     println!("orders in the length of sub-steps {orders:.2?}");
+    // As the page says, in per cent; the default is the first of those above.
+    for (found, told) in left[1..].iter().zip([3.5, 1.0, 0.3]) {
+        assert!((-100.0 * found / told - 1.0).abs() < 0.2, "{found} {told}");
+    }
     // Measured: 1.40 and 1.80, on the way to 2.
     assert!(orders.iter().all(|o| *o > 1.2 && *o < 2.2) && orders[1] > orders[0], "{orders:?}");
 }

@@ -146,7 +146,7 @@ fn elastica(length: f64, weight: f64, curvature: &dyn Fn(f64) -> f64) -> f64 {
 }
 
 /// The same from a simulated strip that is cut at an angle to the warp.
-fn strip(fabric: &Fabric, length: f64, angle: f64, (n, m): (u32, u32), system: &str) -> f64 {
+fn strip(fabric: &Fabric, length: f64, angle: f64, (n, m): (u32, u32), (system, still): (&str, f64)) -> f64 {
     // Hinges stand for half a segment to either side: the clamp is half a segment before the last held row.
     let d = length / (f64::from(n) + 0.5);
     let pins: Vec<String> = (0..2).flat_map(|i| (0..m).map(move |j| format!("\"vertex {i} {j}\""))).collect();
@@ -164,8 +164,7 @@ fn strip(fabric: &Fabric, length: f64, angle: f64, (n, m): (u32, u32), system: &
     run(&mut sim, 100);
     let x = positions(&sim, "s");
     let (row, speed) = ((n + 2) as usize, sim.ledger().speed);
-    // Sweeps of position-based dynamics let it creep.
-    assert!(speed < 0.03, "still moves at {speed} m/s");
+    assert!(speed < still, "still moves at {speed} m/s");
     let middle = row * (m / 2) as usize;
     let (clamp, tip) = (x[middle + 1], x[middle + row - 1]);
     (clamp.z - tip.z) / (tip.x - clamp.x + 0.5 * d)
@@ -195,7 +194,7 @@ fn strips_of_all_fabrics_hang_at_the_angle_of_the_cantilever_test() {
             let mut fabric = record(name);
             fabric.bending = fabric.bending.map(|row| [row[0]; 5]);
             let c = (across(&fabric, angle)[0] / (fabric.density * G)).cbrt();
-            let found = strip(&fabric, 2.0 * c, angle, (16, 7), IMPLICIT);
+            let found = strip(&fabric, 2.0 * c, angle, (16, 7), (IMPLICIT, 1e-3));
             println!("{name} at {angle}: overhang {:.2} cm, tangent {found:.4}, {:.2} %", 200.0 * c, 100.0 * (found / target - 1.0));
             assert!((found / target - 1.0).abs() < 0.05, "{name} at {angle}: {found}");
         }
@@ -209,10 +208,6 @@ fn strips_of_whole_records_hang_like_the_elastica_with_their_moments() {
         for (angle, mesh, system) in
             [(0.0, (16, 7), IMPLICIT), (90.0, (16, 7), IMPLICIT), (90.0, (12, 5), "method = \"position_based\"\nsubsteps = 300")]
         {
-            // Twenty times as stiff as knitwear and as light, it keeps trembling at 0.07 m/s under position-based dynamics.
-            if name == "tablecloth" && system != IMPLICIT {
-                continue;
-            }
             let fabric = record(name);
             let b = across(&fabric, angle);
             let length = 1.6 * (b[0] / (fabric.density * G)).cbrt();
@@ -229,7 +224,15 @@ fn strips_of_whole_records_hang_like_the_elastica_with_their_moments() {
             // A wide strip has the stiffness of the record, one whose sides are free to rise 8/9 of it.
             let exact = elastica(length, fabric.density * G, &curvature);
             let free = elastica(length, fabric.density * G, &|m| curvature(m * 9.0 / 8.0));
-            let found = strip(&fabric, length, angle, mesh, system);
+            // Sweeps of position-based dynamics let it creep, and what is twenty times as stiff as knitwear and as light tremble.
+            let still = if system == IMPLICIT {
+                1e-3
+            } else if name == "tablecloth" {
+                0.15
+            } else {
+                0.03
+            };
+            let found = strip(&fabric, length, angle, mesh, (system, still));
             println!("{name} at {angle}, {system:?}: tangent {found:.4}, between {exact:.4} and {free:.4}");
             // Measured: 5.5 % outside at most, where the record changes fast; hinges see 3/4 of the curvature only on the mean.
             assert!(found > 0.94 * exact && found < 1.03 * free, "{name} at {angle}: {found} {exact} {free}");

@@ -5,24 +5,26 @@
 use crate::common;
 
 use common::{Vector, positions, run, simulation, step, vector, write};
-use tumble_interface::Engine;
+use std::collections::HashMap;
+use tumble_f64::scene::Simulation;
+use tumble_interface::scene::Integrator;
+use tumble_interface::{Assets, Engine, Mesh, Scene};
 
 const LINKS: &str = "links = { structural = { modulus = 100, damping = 0.02 }, shear = 30 }\nhinge = 1e-5\ndensity = 0.2";
 
 /// Self-contact may do what it likes with positions and velocities, but not with momentum; whatever the scheme.
 #[test]
 fn sheets_that_meet_keep_momentum_and_do_not_pass() {
-    for (scheme, steps) in [
-        ("position_based", "substeps = 10"),
-        ("symplectic_euler", "substeps = 40"),
-        ("velocity_verlet", "substeps = 40"),
-        ("rk4", "substeps = 40"),
-        ("dormand_prince", "adaptive.tolerance = 1e-4"),
-        ("adaptive_euler", "adaptive.tolerance = 1e-5"),
-        ("implicit_euler", "substeps = 10"),
-        ("implicit_midpoint", "substeps = 10"),
-        ("bdf2", "substeps = 10"),
-    ] {
+    for scheme in common::every() {
+        let steps = match scheme {
+            Integrator::DormandPrince => "adaptive.tolerance = 1e-4",
+            Integrator::AdaptiveEuler => "adaptive.tolerance = 1e-5",
+            // Those amplify what swings.
+            Integrator::ForwardEuler | Integrator::ModifiedEuler | Integrator::Midpoint | Integrator::Heun => "substeps = 400",
+            _ if scheme.is_implicit() || scheme == Integrator::PositionBased => "substeps = 10",
+            _ => "substeps = 40",
+        };
+        let scheme = scheme.name();
         let mut sim = simulation(&format!(
             "precision = \"double\"\ntime.fps = 60\nworld.gravity = [0, 0, 0]\n[[system]]\nintegrator = \"{scheme}\"\n{steps}\nself_contact = {{ thickness = 0.01, friction = 0.3 }}\n\
              [[sheet]]\nname = \"a\"\nsize = [1, 1]\nresolution = [14, 14]\n{LINKS}\n\
@@ -91,8 +93,12 @@ fn a_pile_of_sheets_stays_apart_at_every_step_length() {
 
 #[test]
 fn a_bad_start_is_untangled_without_launching_anything() {
+    ["method = \"position_based\"\nsubsteps = 5", "integrator = \"dormand_prince\""].into_iter().for_each(untangle);
+}
+
+fn untangle(scheme: &str) {
     let mut sim = simulation(&format!(
-        "precision = \"double\"\ntime.fps = 60\nworld.gravity = [0, 0, 0]\n[[system]]\nmethod = \"position_based\"\nsubsteps = 5\nself_contact = {{ thickness = 0.02 }}\n\
+        "precision = \"double\"\ntime.fps = 60\nworld.gravity = [0, 0, 0]\n[[system]]\n{scheme}\nself_contact = {{ thickness = 0.02 }}\n\
          [[sheet]]\nname = \"a\"\nsize = [1, 1]\nresolution = [11, 11]\n{LINKS}\n\
          [[sheet]]\nname = \"b\"\nsize = [0.6, 0.6]\nresolution = [8, 8]\ncenter = [0.1, 0, 0.25]\nrotate = [0, 60, 20]\n{LINKS}\n"
     ));
@@ -109,7 +115,7 @@ fn a_bad_start_is_untangled_without_launching_anything() {
         fastest = fastest.max(sim.ledger().speed);
         frames += 1;
     }
-    println!("{start} crossings, gone after {frames} frames; fastest {fastest:.2} m/s");
+    println!("{scheme:?}: {start} crossings, gone after {frames} frames; fastest {fastest:.2} m/s");
     assert!(start > 3 && sim.ledger().intersections == 0, "{start} {}", sim.ledger().intersections);
     assert!(fastest < 3.0, "{fastest}");
     run(&mut sim, 30);
@@ -119,19 +125,32 @@ fn a_bad_start_is_untangled_without_launching_anything() {
 /// A sheet on another that is held sticks below atan(mu) and slides above it with g (sin a - mu cos a), as on a solid.
 #[test]
 fn a_sheet_on_a_sheet_slides_from_the_angle_of_friction_on() {
-    let mu: f64 = 0.4;
-    let limit = mu.atan().to_degrees();
+    slides(0.4, 0.4, &[1.0, 10.0]);
+}
+
+/// With a coefficient of its own what rests stays farther up, and slides by the lesser one.                        (contact.22)
+#[test]
+fn a_sheet_on_a_sheet_rests_up_to_the_angle_of_what_rests() {
+    slides(0.3, 0.45, &[1.0]);
+    let text = "version = 1\n[[system]]\nself_contact = { thickness = 0.01, friction = 0.3, friction_static = 0.2 }\n\
+                [[sheet]]\nname = \"s\"\nsize = [1, 1]\nresolution = [3, 3]\nlinks.structural = 1\n";
+    let told = Simulation::new(Scene::from_toml(text).unwrap(), Default::default()).err().unwrap().to_string();
+    assert!(told.contains("system \"main\".self_contact.friction_static: 0.2, expected >= 0.3"), "{told}");
+}
+
+fn slides(mu: f64, resting: f64, beyond: &[f64]) {
+    let limit = resting.atan().to_degrees();
     let way = |degrees: f64| {
         let a = degrees.to_radians();
         let mut sim = simulation(&format!(
             "precision = \"double\"\ntime.fps = 50\nworld.gravity = [{:e}, 0, {:e}]\n[[system]]\nmethod = \"position_based\"\nsubsteps = 20\n\
-             self_contact = {{ thickness = 0.01, friction = {mu} }}\n\
+             self_contact = {{ thickness = 0.01, friction = {mu}, friction_static = {resting} }}\n\
              [[sheet]]\nname = \"held\"\nsize = [2, 0.6]\nresolution = [41, 13]\npin = [\"all\"]\n{LINKS}\n\
-             [[sheet]]\nname = \"free\"\nsize = [0.3, 0.3]\nresolution = [7, 7]\ncenter = [-0.6, 0, 0.0101]\n{LINKS}\n",
+             [[sheet]]\nname = \"free\"\nsize = [0.3, 0.3]\nresolution = [7, 7]\ncenter = [-0.6, 0, 0.01]\n{LINKS}\n",
             9.8 * a.sin(),
             -9.8 * a.cos()
         ));
-        let middle = |sim: &tumble_f64::scene::Simulation| positions(sim, "free").iter().map(|x| x.x).sum::<f64>() / 49.0;
+        let middle = |sim: &Simulation| positions(sim, "free").iter().map(|x| x.x).sum::<f64>() / 49.0;
         // It settles first.
         run(&mut sim, 10);
         let start = middle(&sim);
@@ -144,7 +163,7 @@ fn a_sheet_on_a_sheet_slides_from_the_angle_of_friction_on() {
     let (start, half, end) = way(limit - 1.0);
     println!("1 degree below: {:.1e} m in 0.6 s", end - start);
     assert!((end - start).abs() < 1e-3, "{} {} {}", start, half, end);
-    for beyond in [1.0, 10.0] {
+    for beyond in beyond {
         let a = (limit + beyond).to_radians();
         let exact = 9.8 * (a.sin() - mu * a.cos());
         let (start, _, end) = way(limit + beyond);
@@ -176,4 +195,38 @@ fn a_rope_hangs_over_a_rope() {
     // Its axis lies a thickness above that of the other, and its ends hang down.
     assert!(top > 0.01 && top < 0.06 && end < -0.2, "{top} {end}");
     assert!(through < -0.5, "{through}");
+}
+
+/// Strands are curves of their own: no edge leads from the tip of one to the root of the next.
+#[test]
+fn the_tip_of_a_strand_is_not_joined_to_the_next_root() {
+    let scene = |rope: &str| {
+        let plate = Mesh {
+            vertices: vec![[0.0; 3], [0.4, 0.0, 0.0], [0.4, 0.4, 0.0], [0.0, 0.4, 0.0]],
+            triangles: vec![[0, 1, 2], [0, 2, 3]],
+            ..Mesh::default()
+        };
+        let text = format!(
+            "version = 1\nprecision = \"double\"\ntime.fps = 60\nworld.gravity = [0, 0, 0]\n[[system]]\nmethod = \"position_based\"\n\
+             self_contact.thickness = 0.01\n[[hair]]\nname = \"h\"\nmesh.path = \"plate\"\ncount = 2\nlength = 0.1\nsegments = 10\n{rope}"
+        );
+        let assets = Assets::new(HashMap::from([("plate".to_string(), plate)]), HashMap::new());
+        Simulation::new(Scene::from_toml(&text).unwrap(), assets).unwrap()
+    };
+    let hair = positions(&scene(""), "h");
+    let (tip, root) = (hair[10], hair[11]);
+    let aside = vector(root.x - tip.x, root.y - tip.y, 0.0);
+    assert!(aside.norm() > 0.05, "strands have room for a rope between them: {aside:?}");
+    // A rope across the plane of both strands.
+    let across = aside.normalized().cross(vector(0.0, 0.0, 1.0)) * 0.05;
+    let way = |middle: Vector| {
+        let (from, to) = (<[f64; 3]>::from(middle - across), <[f64; 3]>::from(middle + across));
+        let mut sim = scene(&format!("[[rope]]\nname = \"r\"\nfrom = {from:?}\nto = {to:?}\nsegments = 1\nlinks.structural = 100\n"));
+        // The rope is heavier by far.
+        step(&mut sim);
+        positions(&sim, "h").iter().zip(&hair).map(|(x, start)| (*x - *start).norm()).fold(0.0, f64::max)
+    };
+    let (between, beside) = (way((tip + root) * 0.5), way((hair[5] + hair[6]) * 0.5 + aside.normalized() * 0.002));
+    println!("a rope between strands moves them by {between:.1e} m, one at a strand by {beside:.1e} m");
+    assert!(between < 1e-9 && beside > 1e-3, "{between} {beside}");
 }

@@ -5,11 +5,10 @@
 use crate::common;
 
 use common::{positions, run, simulation, vector, velocities, write};
-use tumble_interface::scene::Integrator;
 
 #[test]
 fn a_pinned_mass_stays_whatever_velocity_is_written() {
-    for scheme in Integrator::ALL {
+    for scheme in common::every() {
         let mut sim = simulation(&format!(
             "[[system]]\nintegrator = \"{}\"\n[[rope]]\nname = \"rope\"\nfrom = [0, 0, 0]\nto = [1, 0, 0]\nsegments = 4\npin = [\"start\"]\n\
              links = {{ structural = {{ modulus = 50, damping = 1 }} }}\n",

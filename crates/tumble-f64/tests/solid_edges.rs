@@ -3,9 +3,10 @@
 use crate::common;
 
 use common::{Vector, positions, simulation, step, vector, velocities};
+use std::collections::HashMap;
 use tumble_f64::math::rotation::from_degrees;
 use tumble_f64::scene::Simulation;
-use tumble_interface::{Engine, Scene};
+use tumble_interface::{Assets, Engine, Mesh, Scene};
 
 const G: f64 = 9.8;
 /// Of the collider; that of `self_contact` is 0.008.
@@ -97,14 +98,50 @@ fn cloth_stays_on_a_wire_that_passes_between_its_masses() {
 fn a_rope_stays_on_a_wire_that_passes_between_its_masses() {
     let rope = "[[rope]]\nname = \"cloth\"\nfrom = [-0.26, 0, 0.03]\nto = [0.24, 0, 0.03]\nsegments = 11\ndensity = 0.05\nlinks = { structural = 500, bend = 1 }\n";
     let scene = |edges: bool| simulation(&format!("{}{rope}{}", position_based(), solid(WIRE, edges, "")));
-    let (mut with, mut without) = (scene(true), scene(false));
+    let (mut with, mut without, mut crossed) = (scene(true), scene(false), 0);
     for _ in 0..30 {
-        step(&mut with);
+        frame(&mut with, &mut crossed);
         step(&mut without);
     }
     let [on, gone] = [&with, &without].map(|sim| positions(sim, "cloth"));
     println!("on the wire {:.4} to {:.4} m, without edges {:.4} m", lowest(&on), highest(&on), highest(&gone));
+    assert_eq!(crossed, 0);
     assert!((0.0..0.03).contains(&highest(&on)) && lowest(&on) > -0.32 && highest(&gone) < -1.0);
+}
+
+/// Whatever shape has corners: a thin prism as a mesh, as a shell without its ends and as a mesh that rises, and a small ball under the middle
+/// of four masses.
+#[test]
+fn edges_of_every_kind_of_solid_are_met() {
+    let prism = |ends: bool, z: f64| {
+        let section = [[-0.003, -0.003], [0.003, -0.003], [0.0, 0.003]];
+        let corner = |y: f64| move |[x, h]: [f64; 2]| [x, y, h + z];
+        let mut triangles: Vec<[u32; 3]> = (0..3).flat_map(|i| [[i, i + 3, (i + 1) % 3], [(i + 1) % 3, i + 3, (i + 1) % 3 + 3]]).collect();
+        triangles.extend([[0, 1, 2], [3, 5, 4]].into_iter().filter(|_| ends));
+        Mesh { vertices: section.map(corner(-0.3)).into_iter().chain(section.map(corner(0.3))).collect(), triangles, ..Mesh::default() }
+    };
+    let meshes = [("solid", prism(true, 0.0)), ("open", prism(false, 0.0)), ("higher", prism(true, 0.1))];
+    let assets = Assets::new(meshes.map(|(name, mesh)| (name.to_string(), mesh)).into(), HashMap::new());
+    for (shape, above, at) in [
+        ("mesh = { path = \"solid\" }", ABOVE_WIRE, 0.0),
+        ("mesh = { path = \"open\", shell = true }", ABOVE_WIRE, 0.0),
+        ("animated_mesh = { frames = [{ time = 0, path = \"solid\" }, { time = 0.5, path = \"higher\" }] }", ABOVE_WIRE, 0.1),
+        ("sphere = { center = [0, 0, 0], radius = 0.002 }", "center = [0.01, 0.01, 0.02]", 0.0),
+    ] {
+        let scene = |edges: bool| {
+            let text = format!("version = 1\n{}{}{}", position_based(), sheet(above), solid(shape, edges, ""));
+            Simulation::new(Scene::from_toml(&text).unwrap(), assets.clone()).unwrap_or_else(|e| panic!("{e}\n{text}"))
+        };
+        let (mut with, mut without, mut crossed) = (scene(true), scene(false), 0);
+        for _ in 0..30 {
+            frame(&mut with, &mut crossed);
+            step(&mut without);
+        }
+        let [on, gone] = [&with, &without].map(|sim| positions(sim, "cloth"));
+        println!("{shape}: {:.4} m, without edges {:.4} m", highest(&on), highest(&gone));
+        assert_eq!(crossed, 0, "{shape}");
+        assert!((at..at + 0.03).contains(&highest(&on)) && highest(&gone) < -0.5, "{shape}");
+    }
 }
 
 /// Where masses alone meet it, links cut through the corner.
@@ -335,6 +372,9 @@ fn words_about_edges_name_the_solid() {
     let through = simulation(&format!("{}{}{}", position_based(), sheet("rotate = [0, 90, 0]"), solid(WIRE, true, "")));
     let told = through.warnings().iter().map(ToString::to_string).collect::<String>();
     assert!(told.contains("\"cloth\" passes through \"solid\""), "{told}");
+    let account = through.account();
+    let crossing = account.worst.iter().find(|worst| worst.measure == "intersections").unwrap();
+    assert!(crossing.object == "cloth" && crossing.other.as_deref() == Some("solid") && crossing.value > 0.0, "{crossing:?}");
     let text = format!("version = 1\n{}{}{}", position_based(), sheet(""), solid("floor.height = -1", true, ""));
     let error = Simulation::new(Scene::from_toml(&text).unwrap(), Default::default()).err().unwrap().to_string();
     assert!(error.contains("collider \"solid\".edges") && error.contains("a plane has none"), "{error}");
