@@ -136,6 +136,10 @@ fn a_sheet_on_a_sheet_rests_up_to_the_angle_of_what_rests() {
                 [[sheet]]\nname = \"s\"\nsize = [1, 1]\nresolution = [3, 3]\nlinks.structural = 1\n";
     let told = Simulation::new(Scene::from_toml(text).unwrap(), Default::default()).err().unwrap().to_string();
     assert!(told.contains("system \"main\".self_contact.friction_static: 0.2, expected >= 0.3"), "{told}");
+    // Millimetres taken for metres: each feature would be a pair of each other.
+    let text = text.replace("thickness = 0.01, friction = 0.3, friction_static = 0.2", "thickness = 30");
+    let told = Simulation::new(Scene::from_toml(&text).unwrap(), Default::default()).err().unwrap().to_string();
+    assert!(told.contains("system \"main\".self_contact.thickness: 30 m, expected at most 32 times the longest edge"), "{told}");
 }
 
 fn slides(mu: f64, resting: f64, beyond: &[f64]) {

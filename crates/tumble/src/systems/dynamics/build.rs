@@ -18,8 +18,12 @@ use crate::pool::{Emitter, Pool};
 use crate::state::{Masses, Object, State};
 use std::ops::Range;
 use std::sync::Arc;
+use tumble_interface::check::short;
 use tumble_interface::scene::{Adaptive, Force as Words, HairCollisions, Hessian, Integrator, PositionBased, SelfContact, Solver};
 use tumble_interface::{Issue, SceneError};
+
+/// Thickest surfaces that meet, over the longest of their edges.
+const WIDEST: f64 = 32.0;
 
 /// How a system steps.
 pub struct Settings {
@@ -624,6 +628,17 @@ impl Parts {
         let sewn = self.vector.members.iter().map(|m| m.nodes);
         let meeting = |words: &SelfContact, solids: &Arc<Vec<Collider>>| Layers::new(words, &objects, sewn.clone(), &state, solids);
         let layers = settings.self_contact.as_ref().and_then(|words| meeting(words, &settings.colliders));
+        if let (Some(layers), Some(words)) = (&layers, &settings.self_contact) {
+            let longest = layers.longest_edge();
+            if longest > 0.0 && words.thickness > WIDEST * longest {
+                let message = format!(
+                    "{} m, expected at most {WIDEST} times the longest edge, {} m: everything would be near everything",
+                    short(words.thickness),
+                    short(longest)
+                );
+                return Err(SceneError::one(format!("system \"{}\".self_contact.thickness", settings.name), message));
+            }
+        }
         let counted = settings.counted && settings.self_contact.is_none();
         let nothing = SelfContact { thickness: 0.0, friction: 0.0, friction_static: None };
         let judge = if counted { meeting(&nothing, &Arc::default()) } else { None };

@@ -87,6 +87,13 @@ impl Layers {
         soft.then_some(layers)
     }
 
+    /// The longest edge of what is soft, where it starts [m].
+    pub fn longest_edge(&self) -> f64 {
+        let soft = |e: &&[u32; 2]| (e[0].max(e[1]) as usize) < self.corners.points();
+        let length = |[a, b]: &[u32; 2]| (xyz64(self.rest[*a as usize]) - xyz64(self.rest[*b as usize])).norm();
+        self.topology.edges().iter().filter(soft).map(length).fold(0.0, f64::max)
+    }
+
     /// Takes up what has torn.
     pub fn renew(&mut self, objects: &[Object], tears: &[Tear]) {
         self.topology = self.meeting(objects, tears);
