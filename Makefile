@@ -4,17 +4,15 @@ VENV := .venv
 BIN := $(VENV)/bin
 RUST := $(wildcard Cargo.toml Cargo.lock crates/*/Cargo.toml) $(shell find crates -name '*.rs')
 
-# A test that panics has failed, which is what tests are for.
-TESTS_MAY := -A clippy::unwrap_used -A clippy::expect_used -A clippy::panic
-
-# The browser's engine: the tool must have the version of the crate.
-BINDGEN := target/tools/wasm-bindgen-$(shell sed -n 's/^wasm-bindgen = "=\([0-9.]*\)".*/\1/p' Cargo.toml)/bin/wasm-bindgen
+# The browser's engine, and the profile it is built in: `web` ships, `tested` is built faster and has the same bits.
 PKG := web/src/engine/pkg
+WASM_PROFILE ?= web
+MODULES := $(PKG)/single_bg.wasm $(PKG)/double_bg.wasm
 VERSION := $(shell sed -n 's/^version = "\(.*\)"/\1/p' Cargo.toml | head -n 1)
 WEB := $(shell find web -path web/node_modules -prune -o -path web/dist -prune -o -path $(PKG) -prune -o -type f -print) \
 	$(shell find python/tumble/scenes docs/theory -type f)
 
-.PHONY: help setup demo test lint test-rust test-python test-web web wasm wasm-target wheel chromium openvdb validate validate-rust validate-python validate-matrix validate-native audit bench clean
+.PHONY: help setup demo test prepare lint lint-rust test-rust test-python test-web web wasm wasm-target wheel debian chromium openvdb validate validate-rust validate-python validate-matrix validate-native audit bench clean
 
 help:
 	@echo "make demo      set up, let a dress dance, show where the film is"
@@ -33,7 +31,14 @@ $(VENV)/.python: pyproject.toml
 	$(BIN)/python -m pip install --quiet --upgrade pip "maturin>=1.9,<2"
 	@touch $@
 
-# The engine and the package, editable, with everything that pictures and tests need.
+# What the package, pictures and tests import: installed while the engine is built.
+$(VENV)/.imports: $(VENV)/.python
+	$(BIN)/python -c 'import tomllib; p = tomllib.load(open("pyproject.toml", "rb"))["project"]; \
+		print(*p["dependencies"], *sum(p["optional-dependencies"].values(), []), sep="\n")' > $(VENV)/imports.txt
+	$(BIN)/python -m pip install --quiet -r $(VENV)/imports.txt
+	@touch $@
+
+# The engine and the package, editable.
 $(VENV)/.engine: $(VENV)/.python $(RUST)
 	$(BIN)/maturin develop --release --quiet --extras pictures,dev
 	@touch $@
@@ -41,20 +46,35 @@ $(VENV)/.engine: $(VENV)/.python $(RUST)
 demo: setup
 	$(BIN)/tumble run cloth/dress --usd --out out/demo --force
 
-test: setup lint test-rust test-python test-web
-	@echo "All tests passed."
+# Each part in turn, and a table of their seconds.
+PARTS := prepare lint test-rust test-python test-web
+test: export WASM_PROFILE := tested
+test:
+	@mkdir -p target; rm -f target/seconds; \
+	for part in $(PARTS); do \
+		echo "== $$part"; start=$$(date +%s); \
+		$(MAKE) --no-print-directory $$part || exit 1; \
+		echo "$$part $$(($$(date +%s) - start))" >> target/seconds; done; \
+	echo "All tests passed."; \
+	awk '{ printf "%-12s %5d s\n", $$1, $$2; sum += $$2 } END { printf "%-12s %5d s\n", "all", sum }' target/seconds
 
-lint: setup
+# Builds and downloads, side by side: none of them keeps two cores busy all the time.
+prepare:
+	@$(MAKE) --no-print-directory -j 4 debian web/node_modules/.ready $(VENV)/.imports $(VENV)/.engine lint-rust wasm
+	@cargo test --workspace --exclude tumble-wasm --exclude tumble-bindgen --release --tests --no-run --quiet
+
+lint-rust:
 	cargo fmt --all --check
-	cargo clippy --workspace --quiet -- -D warnings
-	cargo clippy --workspace --tests --quiet -- -D warnings $(TESTS_MAY)
+	cargo clippy --workspace --all-targets --quiet -- -D warnings
+
+lint: setup lint-rust
 	$(BIN)/ruff format --quiet --check python benchmarks
 	$(BIN)/ruff check --quiet python benchmarks
 	$(BIN)/mypy
 
 # Of the same packages as the build for Python, which shares the engine with these; those for WebAssembly have no tests.
 test-rust:
-	cargo test --workspace --exclude tumble-wasm --release --quiet
+	cargo test --workspace --exclude tumble-wasm --exclude tumble-bindgen --release --tests --quiet
 
 # What VDB files are checked against: Debian's OpenVDB, for the system's Python; there is no wheel.
 openvdb:
@@ -63,7 +83,7 @@ openvdb:
 		|| echo "no python3-openvdb here: tests of VDB files need it where there is apt, and are skipped elsewhere"
 
 # A worker per core: most tests keep one busy.
-PYTEST := $(BIN)/python -m pytest -n auto --dist worksteal
+PYTEST := $(BIN)/python -m pytest -n auto --dist worksteal --durations 10
 
 test-python: setup openvdb wasm
 	$(PYTEST)
@@ -71,7 +91,7 @@ test-python: setup openvdb wasm
 web: python/tumble/web/index.html
 
 # A static folder, with the versions that were built there before; this one ships in the wheel.
-python/tumble/web/index.html: $(PKG)/single_bg.wasm $(PKG)/double_bg.wasm web/node_modules/.ready $(WEB)
+python/tumble/web/index.html: $(MODULES) web/node_modules/.ready $(WEB)
 	cd web && npm run --silent build
 	rm -rf python/tumble/web
 	mkdir -p python/tumble/web/v
@@ -85,7 +105,7 @@ wheel: setup web
 
 # The browser's engine, where there is a Node that its bits can be compared in.
 wasm:
-	@if command -v node >/dev/null; then $(MAKE) --no-print-directory -j 2 $(PKG)/single_bg.wasm $(PKG)/double_bg.wasm; \
+	@if command -v node >/dev/null; then $(MAKE) --no-print-directory $(MODULES); \
 		else echo "no Node here: the bits of WebAssembly are not compared"; fi
 
 web/node_modules/.ready: web/package-lock.json
@@ -93,27 +113,28 @@ web/node_modules/.ready: web/package-lock.json
 	cd web && npm ci --silent --no-audit --no-fund
 	@touch $@
 
-$(BINDGEN):
-	cargo install --quiet wasm-bindgen-cli --version =$(patsubst target/tools/wasm-bindgen-%/bin/wasm-bindgen,%,$@) --root $(patsubst %/bin/wasm-bindgen,%,$@)
-
 wasm-target:
 	@if command -v rustup >/dev/null; then rustup --quiet target add wasm32-unknown-unknown; \
 		else echo "no rustup here: the build needs Rust's target wasm32-unknown-unknown"; fi
 
-# In each precision, at the same time: most of a build is one thread of link-time optimisation.
-$(PKG)/single_bg.wasm: $(BINDGEN) $(RUST) | wasm-target
+# Modules of another profile are made anew.
+$(PKG)/.$(WASM_PROFILE):
+	@mkdir -p $(PKG) && rm -f $(PKG)/.web $(PKG)/.tested && touch $@
+
+$(PKG)/single_bg.wasm: $(PKG)/.$(WASM_PROFILE) $(RUST) | wasm-target
 	$(call wasm-module,single,)
 
-$(PKG)/double_bg.wasm: $(BINDGEN) $(RUST) | wasm-target
+$(PKG)/double_bg.wasm: $(PKG)/.$(WASM_PROFILE) $(RUST) | wasm-target $(PKG)/single_bg.wasm
 	$(call wasm-module,double,--features double)
 
 define wasm-module
-cargo build --quiet --profile web -p tumble-wasm --target wasm32-unknown-unknown --target-dir target/wasm-$(1) $(2)
-$(BINDGEN) --target web --remove-name-section --remove-producers-section --out-name $(1) --out-dir $(PKG) \
-	target/wasm-$(1)/wasm32-unknown-unknown/web/tumble_wasm.wasm
+cargo build --quiet --profile $(WASM_PROFILE) -p tumble-wasm --target wasm32-unknown-unknown --target-dir target/wasm $(2)
+cargo run --quiet -p tumble-bindgen --target-dir target/wasm target/wasm/wasm32-unknown-unknown/$(WASM_PROFILE)/tumble_wasm.wasm $(1) $(PKG)
 endef
 
-chromium:
+debian: openvdb chromium
+
+chromium: | openvdb # apt does one thing at a time
 	@command -v chromium chromium-browser google-chrome >/dev/null \
 		|| { command -v apt-get >/dev/null && apt-get update -qq && apt-get install -qq -y --no-install-recommends chromium; } \
 		|| echo "no Chromium here, and no apt to install it: the tests of the browser laboratory need one"
@@ -136,7 +157,8 @@ validate: setup openvdb wasm
 	if test -n "$$failed"; then echo "FAILED:$$failed"; exit 1; fi
 
 validate-rust:
-	cargo test --workspace --exclude tumble-wasm --release --quiet --no-fail-fast -- --include-ignored --nocapture
+	cargo test --workspace --exclude tumble-wasm --exclude tumble-bindgen --release --tests --quiet --no-fail-fast -- --include-ignored --nocapture
+	cargo test -p tumble --features double --lib --release --quiet --no-fail-fast
 
 validate-python:
 	$(PYTEST) -m "" -rfEP

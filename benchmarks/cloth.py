@@ -1,11 +1,12 @@
 """Position-based cloth: constraints projected a second, on sheets hung by two corners from level, 10 sub-steps of one sweep
 in 1/60 s.
 
-taichi runs the same constraints by the same algorithm, coloured by hand. newton has one thread, and sums the corrections of all
-constraints of a particle, so that it flies apart unless they are soft: they are made as stiff as it bears. pyPBD has a mesh of
-its own (distances along edges, isometric bending), about as many constraints. tumble has tethers beside, whose time is in its
-figure. All are timed in turn, round after round, so that a slow spell of the machine is theirs alike. Beside it counts how far
-each is stretched at the same late frame: the largest edge over its rest length, shown with the 99.9 % quantile and the mean.
+taichi runs the same constraints by the same algorithm, coloured by hand. pyPBD has a mesh of its own (distances along edges,
+isometric bending), about as many constraints. tumble has tethers beside, whose time is in its figure. newton is left out: its
+solver sums the corrections of all constraints of a particle, and at 10 sweeps a frame the sheet of 128² is stretched 230 times
+and more at any stiffness (1.8.0). All are timed in turn, so that a slow spell of the machine is theirs alike.
+Beside it counts how far each is stretched at the same late frame: the largest edge over its rest length, shown with the 99.9 %
+quantile and the mean. A peer that diverges is left out, with a line that says so.
 
 python cloth.py [threads [size ...]]"""
 
@@ -19,6 +20,7 @@ from common import THREADS, show
 FPS = 60
 SUBSTEPS = 10
 LATE = 120  # frame at which stretch is compared
+DIVERGED = 10.0  # a largest stretch that no sheet under its own weight has
 ROUNDS = 7
 SIZES = [int(n) for n in sys.argv[2:]] or [128, 256]
 MODULUS = {"structural": 1e4, "shear": 2e3, "bend": 200.0}
@@ -47,6 +49,11 @@ def stretch(x, edges, rest):
     return ratio.max(), np.quantile(ratio, 0.999), ratio.mean()
 
 
+def diverged(found):
+    """Whether a stretch is that of a simulation that flew apart, or is no number."""
+    return not found[0] < DIVERGED
+
+
 def lattice(n):
     """Positions, inverse masses, ends, compliances and rest lengths, from the scene's own rule."""
     dx = 1.0 / (n - 1)
@@ -72,8 +79,7 @@ def lattice(n):
         k.append((MODULUS[family] * share / ((a * a + c * c) * dx * dx)).ravel())
     ends = np.concatenate(ends).astype(np.int32)
     rest = np.linalg.norm(x[ends[:, 1]] - x[ends[:, 0]], axis=1)
-    structural = 2 * n * (n - 1)
-    return x, inverse, ends, 1.0 / np.concatenate(k), rest, structural
+    return x, inverse, ends, 1.0 / np.concatenate(k), rest, 2 * n * (n - 1)
 
 
 def bench_tumble(n, edges, rest):
@@ -187,36 +193,6 @@ def bench_pypbd(n):
     return count, frame, stretch(end, edges, np.linalg.norm(start[edges[:, 1]] - start[edges[:, 0]], axis=1))
 
 
-def bench_newton(x0, inverse, ends, soft, rest):
-    import newton
-    import warp as wp
-
-    wp.config.quiet = True
-    builder = newton.ModelBuilder(up_axis="Z", gravity=(0.0, 0.0, -9.8))
-    for place, w in zip(x0.tolist(), inverse.tolist(), strict=True):
-        builder.add_particle(place, (0.0, 0.0, 0.0), 1.0 / w if w else 0.0, radius=1e-4)
-    # At 0.2 m/h² it diverges, at 64², whatever its relaxation, which is not for springs.
-    mass = 1.0 / inverse[ends].max(axis=1)
-    for (i, j), k in zip(
-        ends.tolist(), np.minimum(1.0 / soft, 0.15 * mass * (FPS * SUBSTEPS) ** 2).tolist(), strict=True
-    ):
-        builder.add_spring(i, j, k, 0.0, 0)
-    model = builder.finalize(device="cpu")
-    model.spring_rest_length.assign(rest.astype(np.float32))
-    solver = newton.solvers.SolverXPBD(model, iterations=1)
-    states, control = [model.state(), model.state()], model.control()
-
-    def frame():
-        for _ in range(SUBSTEPS):
-            states[0].clear_forces()
-            solver.step(states[0], states[1], control, None, 1.0 / (FPS * SUBSTEPS))
-            states.reverse()
-
-    for _ in range(LATE):
-        frame()
-    return frame, states[0].particle_q.numpy()
-
-
 def seconds_a_frame(frames):
     """Median times of a frame, all measured in every round, each for a quarter of a second or for one frame."""
     times = {who: [] for who in frames}
@@ -240,10 +216,12 @@ def main():
         edges, lengths = ends[:structural], rest[:structural]
         found = {"tumble": bench_tumble(n, edges, lengths)}
         assert found["tumble"][0] == len(ends), (found["tumble"][0], len(ends))
-        for who, bench in [("taichi", bench_taichi), ("newton", bench_newton)]:
-            frame, end = bench(x0, inverse, ends, soft, rest)
-            found[who] = len(ends), frame, stretch(end, edges, lengths)
+        frame, end = bench_taichi(x0, inverse, ends, soft, rest)
+        found["taichi"] = len(ends), frame, stretch(end, edges, lengths)
         found["pypbd"] = bench_pypbd(n)
+        for who in [who for who, (_, _, end) in found.items() if diverged(end)]:
+            print(f"cloth {n}: {who} diverged to a stretch of {found.pop(who)[2][0]:.3g}, left out", file=sys.stderr)
+        assert "tumble" in found, "tumble diverged"
         seconds = seconds_a_frame({who: frame for who, (_, frame, _) in found.items()})
         rates = {who: SUBSTEPS * count / seconds[who] for who, (count, _, _) in found.items()}
         for who, (count, _, _) in found.items():

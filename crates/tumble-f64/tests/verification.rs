@@ -2,6 +2,8 @@
 //!
 //! `cargo test --release -p tumble-f64 --test verification hair::` runs one file of them.
 
+#![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)] // a test fails by panicking
+
 mod common;
 
 mod advection;

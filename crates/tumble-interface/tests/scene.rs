@@ -1,5 +1,7 @@
 //! A wrong scene gives all its errors at once, each with line, path, value, unit and range.
 
+#![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)] // a test fails by panicking
+
 use tumble_interface::Scene;
 use tumble_interface::scene::{Animated, AnimatedVector, Component, Force, Integrator, Interpolation, Shape};
 

@@ -1,5 +1,7 @@
 //! The bunny that the package carries is what `python/tumble/scenes/assets/README.md` says.
 
+#![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)] // a test fails by panicking
+
 use tumble_interface::mesh::Defects;
 use tumble_io::{Format, mesh};
 

@@ -1,7 +1,7 @@
 //! The same scene gives the same bits: on any count of threads, after saving and restoring, beside an unrelated object, and after a
 //! failed or abandoned step. `crates/tumble-f64/tests/determinism.rs` runs this file again in double precision.
 
-#![allow(clippy::unwrap_used, clippy::panic)] // helpers of tests fail by panicking, too
+#![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)] // a test fails by panicking
 
 use std::fmt::Write;
 use tumble::scene::Simulation;

@@ -1,7 +1,7 @@
 //! The layers of the engine: a module imports only modules of lower layers, and no module in `systems/` imports a sibling
 //! (ARCHITECTURE.md).
 
-#![allow(clippy::unwrap_used, clippy::panic)] // helpers of tests fail by panicking, too
+#![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)] // a test fails by panicking
 
 use std::fs;
 use std::path::{Path, PathBuf};
