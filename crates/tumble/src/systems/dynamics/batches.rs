@@ -169,7 +169,7 @@ impl Batches {
     }
 
     /// Adds what acts on whole bodies; `None` if a node is not a row. There are some only where elements are constraints.
-    pub fn wholes(
+    pub fn global_constraints(
         &mut self,
         points: &[Point],
         closed: Vec<(String, Closed)>,

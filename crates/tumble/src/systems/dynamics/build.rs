@@ -1,14 +1,15 @@
 //! From the parts that recipes collect to a system.
 
 use super::batches::{Batches, between};
-use super::coat::Coat;
-use super::held::Held;
+use super::followers::Follower;
+use super::hair_continuum::HairContinuum;
 use super::laws::Acting;
-use super::layers::Layers;
+use super::self_contact::SelfContact;
 use super::tear::{Edges, Kind, Tear, TearPart};
-use super::{Dynamics, Stepping, books};
+use super::{Dynamics, Stepping, ledger};
 use crate::elements::{
-    Area, Distance, Hinge, IsometricBend, Linear, Members, Membrane, Moment, Nonlinear, Projected, TetStrain, Tethers, Vector, Woven,
+    Area, Distance, Hinge, IsometricBend, Linear, LongRangeAttachments, Members, Membrane, Moment, Nonlinear, Projected, TetStrain, Vector,
+    Woven,
 };
 use crate::forces::{Air, Force, Sails};
 use crate::geometry::{Carrier, Collider};
@@ -19,7 +20,8 @@ use crate::state::{Masses, Object, State};
 use std::ops::Range;
 use std::sync::Arc;
 use tumble_interface::check::short;
-use tumble_interface::scene::{Adaptive, Force as Words, HairCollisions, Hessian, Integrator, PositionBased, SelfContact, Solver};
+use tumble_interface::scene;
+use tumble_interface::scene::{Adaptive, Force as Words, HairCollisions, Hessian, Integrator, PositionBased, Solver};
 use tumble_interface::{Issue, SceneError};
 
 /// Thickest surfaces that meet, over the longest of their edges.
@@ -44,7 +46,7 @@ pub struct Settings {
     /// Of position-based dynamics.
     pub sweeps: PositionBased,
     /// Contact of surfaces with each other.
-    pub self_contact: Option<SelfContact>,
+    pub self_contact: Option<scene::SelfContact>,
     /// Whether what passes through each other is counted without it, too.
     pub counted: bool,
     /// Springs longer than this many times their rest length are shortened.
@@ -160,13 +162,13 @@ pub struct Parts {
     stretches: Vec<Members<3, 2, 0>>,
     bends: Vec<Members<2, 6, 0>>,
     /// Hair that acts on itself, by object.
-    coats: Vec<(usize, HairCollisions)>,
+    hair: Vec<(usize, HairCollisions)>,
     /// Strains at which segments of rods break.
     rod_limits: Vec<f64>,
     energy_at_rest: [f64; 2],
     /// Points that follow colliders, by their places in the world at t = 0, and those whose places in what they follow are known.
-    held: Vec<Held>,
-    carried: Vec<Held>,
+    followers: Vec<Follower>,
+    carried: Vec<Follower>,
     objects: Vec<Draft>,
     emitters: Vec<Emitter>,
     /// Forces on each mass by itself, with the objects that they act on, counted from the first that was begun.
@@ -307,7 +309,7 @@ impl Parts {
 
     /// Lets a point that is held follow a collider, counted from the first.
     pub fn follow(&mut self, point: u32, collider: usize, carrier: Carrier) {
-        self.held.push(Held { row: point as usize, collider, carrier, place: self.position(point), frame: None });
+        self.followers.push(Follower { row: point as usize, collider, carrier, place: self.position(point), frame: None });
     }
 
     /// Holds a frame.
@@ -418,12 +420,12 @@ impl Parts {
 
     /// A collider carries a point, which is at `x` [m] in it, and a frame, whose turn in it is `q`. Both must be held.
     pub fn carry(&mut self, (collider, carrier): (usize, Carrier), point: u32, x: Vec3<f64>, frame: u32, q: Quat<f64>) {
-        self.carried.push(Held { row: point as usize, collider, carrier, place: x, frame: Some((frame as usize, q)) });
+        self.carried.push(Follower { row: point as usize, collider, carrier, place: x, frame: Some((frame as usize, q)) });
     }
 
     /// Makes the object under construction act on itself as a continuum.
-    pub fn coat(&mut self, words: HairCollisions) {
-        self.coats.push((self.objects.len() - 1, words));
+    pub fn hair_continuum(&mut self, words: HairCollisions) {
+        self.hair.push((self.objects.len() - 1, words));
     }
 
     /// Adds the stretch and shear of a rod segment between two points, with its frame and the strain at which it breaks.
@@ -442,8 +444,8 @@ impl Parts {
         self.points.is_empty() && self.frames.is_empty() && self.emitters.is_empty()
     }
 
-    /// Tethers of every object that has held points: ways go along links, seams, pieces of rods and the edges of membranes and fabrics.
-    fn reach(&self, slack: f64, state: &State) -> Vec<Tethers> {
+    /// Long-range attachments of every object that has held points: ways go along links, seams, pieces of rods and the edges of membranes and fabrics.
+    fn attachments(&self, slack: f64, state: &State) -> Vec<LongRangeAttachments> {
         let links = self.linear.members.iter().map(|m| (m.nodes, m.rest[0]));
         let links = links.chain(self.nonlinear.members.iter().map(|m| (m.nodes, m.rest[0])));
         let seams = self.vector.members.iter().map(|m| (m.nodes, 0.0));
@@ -453,7 +455,7 @@ impl Parts {
         let woven = self.woven.iter().flat_map(|m| edges(m.nodes, std::array::from_fn(|k| m.rest[k])));
         let ways: Vec<_> = links.chain(seams).chain(rods).chain(membranes).chain(woven).collect();
         let held = |i: usize| state.x[i][3] == 0.0;
-        self.objects.iter().filter_map(|draft| Tethers::new(draft.object.points.clone(), &ways, &held, slack)).collect()
+        self.objects.iter().filter_map(|draft| LongRangeAttachments::new(draft.object.points.clone(), &ways, &held, slack)).collect()
     }
 
     /// Whether every number survives the engine's scalar: neither infinite nor, where it must not be, zero.
@@ -516,7 +518,7 @@ impl Parts {
             let message = "would hold what has broken off, and something in the system has a break_strain; leave out one of them";
             return Err(SceneError::one(format!("system \"{}\".position_based.tethers", settings.name), message));
         }
-        if settings.integrator.is_adaptive() && !self.coats.is_empty() {
+        if settings.integrator.is_adaptive() && !self.hair.is_empty() {
             let message = "hair that acts on itself needs steps of equal length; set another integrator";
             return Err(SceneError::one(format!("system \"{}\".integrator", settings.name), message));
         }
@@ -591,14 +593,14 @@ impl Parts {
             batches.solids(&self.shears, &self.volumes, self.energy_at_rest),
             batches.add::<TetStrain, 4, 6, 9>(&self.strains, 0.0).map(|_| ()),
             batches.rods(&self.stretches, &mut self.bends, &self.rod_limits),
-            batches.wholes(&self.points, std::mem::take(&mut self.closed), &self.shapes, &self.liquids),
+            batches.global_constraints(&self.points, std::mem::take(&mut self.closed), &self.shapes, &self.liquids),
         ];
         if made.contains(&None) || kinds.contains(&None) || surfaces.contains(&None) {
             return Err(lost());
         }
         let next: Vec<[usize; 3]> = self.objects.iter().skip(1).map(|d| d.links).chain([end]).collect();
         let tethers = settings.sweeps.tethers.filter(|_| projected);
-        let reach = tethers.map_or_else(Vec::new, |slack| self.reach(slack, &state));
+        let attachments = tethers.map_or_else(Vec::new, |slack| self.attachments(slack, &state));
         let mut objects = Vec::new();
         let mut places = Vec::new();
         let torn: Vec<(usize, TearPart)> =
@@ -607,7 +609,7 @@ impl Parts {
             let mut object = draft.object;
             object.frames = object.frames.start + points..object.frames.end + points;
             for kind in 0..3 {
-                // An anchor is an object without masses: its spring is in the books, but in no frame.
+                // An anchor is an object without masses: its spring is in the ledger, but in no frame.
                 if object.points.is_empty() {
                     break;
                 }
@@ -626,10 +628,11 @@ impl Parts {
             }
         }
         let sewn = self.vector.members.iter().map(|m| m.nodes);
-        let meeting = |words: &SelfContact, solids: &Arc<Vec<Collider>>| Layers::new(words, &objects, sewn.clone(), &state, solids);
-        let layers = settings.self_contact.as_ref().and_then(|words| meeting(words, &settings.colliders));
-        if let (Some(layers), Some(words)) = (&layers, &settings.self_contact) {
-            let longest = layers.longest_edge();
+        let meeting =
+            |words: &scene::SelfContact, solids: &Arc<Vec<Collider>>| SelfContact::new(words, &objects, sewn.clone(), &state, solids);
+        let self_contact = settings.self_contact.as_ref().and_then(|words| meeting(words, &settings.colliders));
+        if let (Some(contact), Some(words)) = (&self_contact, &settings.self_contact) {
+            let longest = contact.longest_edge();
             if longest > 0.0 && words.thickness > WIDEST * longest {
                 let message = format!(
                     "{} m, expected at most {WIDEST} times the longest edge, {} m: everything would be near everything",
@@ -640,9 +643,9 @@ impl Parts {
             }
         }
         let counted = settings.counted && settings.self_contact.is_none();
-        let nothing = SelfContact { thickness: 0.0, friction: 0.0, friction_static: None };
-        let judge = if counted { meeting(&nothing, &Arc::default()) } else { None };
-        let coats = self.coats.into_iter().map(|(i, words)| Coat::new(objects[places[i]].points.clone(), words, &state.x)).collect();
+        let nothing = scene::SelfContact { thickness: 0.0, friction: 0.0, friction_static: None };
+        let intersection_counter = if counted { meeting(&nothing, &Arc::default()) } else { None };
+        let hair = self.hair.into_iter().map(|(i, words)| HairContinuum::new(objects[places[i]].points.clone(), words, &state.x)).collect();
         let placed = |on: Vec<usize>| -> Vec<usize> { on.into_iter().map(|i| places[i]).collect() };
         let rows_of = |on: &[usize]| -> Vec<Range<usize>> { on.iter().map(|i| objects[*i].points.clone()).collect() };
         let mut pairs = Vec::new();
@@ -727,23 +730,23 @@ impl Parts {
             state,
             laws,
             objects,
-            tethers: Vec::new(),
+            anchors: Vec::new(),
             clamp: clamp.flatten(),
-            coats,
+            hair,
             constraints: batches.constraints,
             sweeps: settings.sweeps.clone(),
             rates: Vec::new(),
-            reach,
-            layers,
-            judge,
+            attachments,
+            self_contact,
+            intersection_counter,
             tears,
-            held: Held::at_rest(self.held, &settings.colliders).into_iter().chain(self.carried).collect(),
+            followers: Follower::at_rest(self.followers, &settings.colliders).into_iter().chain(self.carried).collect(),
             user: None,
             scratch: Default::default(),
             before: Vec::new(),
             before_v: Vec::new(),
             unclamped: Vec::new(),
-            scale: books::Scale::default(),
+            scale: ledger::Scale::default(),
             broken: 0,
             pushed: false,
             watched: false,

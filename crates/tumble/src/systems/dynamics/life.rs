@@ -19,7 +19,7 @@ use tumble_interface::engine::StepReport;
 const PIECES: f64 = 1000.0;
 
 /// Newborn of one emitter at a later time.
-struct Grown {
+struct Newborn {
     x: Vec<Row>,
     v: Vec<Row>,
     /// Solids that they met, with the place of each in the list of births.
@@ -29,18 +29,18 @@ struct Grown {
 impl Dynamics {
     /// Those who are there at the start.
     pub(super) fn begin_life(&mut self, dt: f64) -> Result<(), StepError> {
-        let mut unborn = self.pool.conceive(&self.name, -dt, dt)?;
-        self.deliver(&mut unborn, 0.0, dt, 0.0)
+        let mut unborn = self.pool.schedule_births(&self.name, -dt, dt)?;
+        self.insert_births(&mut unborn, 0.0, dt, 0.0)
     }
 
     /// Takes those born by the time `until`, where a sub-step of length h [s] ends, into the system. The interval ends at
     /// `end`.
-    pub(super) fn deliver(&mut self, unborn: &mut [Vec<Birth>], until: f64, h: f64, end: f64) -> Result<(), StepError> {
+    pub(super) fn insert_births(&mut self, unborn: &mut [Vec<Birth>], until: f64, h: f64, end: f64) -> Result<(), StepError> {
         for (s, unborn) in unborn.iter_mut().enumerate() {
             let births = due(unborn, until, end);
             if !births.is_empty() {
-                let grown = self.grow(s, &births, (until, h, 0))?;
-                self.settle(s, &births, grown, (until, end));
+                let grown = self.advance_newborn(s, &births, (until, h, 0))?;
+                self.insert_newborn(s, &births, grown, (until, end));
             }
         }
         Ok(())
@@ -48,16 +48,16 @@ impl Dynamics {
 
     /// Takes those born in an interval of sub-steps (t, h, count) into a system in which no mass feels another, all at its
     /// end.
-    pub(super) fn deliver_grown(&mut self, unborn: Vec<Vec<Birth>>, (t, h, count): (f64, f64, u32)) -> Result<(), StepError> {
+    pub(super) fn insert_births_of_interval(&mut self, unborn: Vec<Vec<Birth>>, (t, h, count): (f64, f64, u32)) -> Result<(), StepError> {
         let end = t + h * f64::from(count);
         for (s, births) in unborn.into_iter().enumerate() {
-            let mut all: Option<Grown> = None;
+            let mut all: Option<Newborn> = None;
             let mut first = 0;
             for k in 1..=count {
                 let until = t + f64::from(k) * h;
                 let last = if k == count { births.len() } else { births.partition_point(|b| b.time <= until) };
                 if last > first {
-                    let grown = self.grow(s, &births[first..last], (until, h, count - k))?;
+                    let grown = self.advance_newborn(s, &births[first..last], (until, h, count - k))?;
                     match &mut all {
                         None => all = Some(grown),
                         Some(all) => {
@@ -70,14 +70,14 @@ impl Dynamics {
                 }
             }
             if let Some(grown) = all {
-                self.settle(s, &births, grown, (end, end));
+                self.insert_newborn(s, &births, grown, (end, end));
             }
         }
         Ok(())
     }
 
     /// The newborn at the time `until`, where the sub-step that they are born in ends, and so many sub-steps later.
-    fn grow(&self, s: usize, births: &[Birth], (until, h, more): (f64, f64, u32)) -> Result<Grown, StepError> {
+    fn advance_newborn(&self, s: usize, births: &[Birth], (until, h, more): (f64, f64, u32)) -> Result<Newborn, StepError> {
         let masses = weigh(&self.pool, s, births.iter().map(|b| b.id), !self.laws.masses.charge.is_empty());
         let object = self.objects.iter().position(|o| o.stream == Some(s));
         let row = |p: Vec3<f64>, w: Real| [p.x as Real, p.y as Real, p.z as Real, w];
@@ -139,7 +139,7 @@ impl Dynamics {
         let blocks = x.chunks_mut(BLOCK).zip(v.chunks_mut(BLOCK)).zip(births.chunks(BLOCK)).enumerate();
         let done: Vec<Result<Vec<_>, StepError>> = blocks.map_in_parallel(|(c, ((x, v), births))| one(c * BLOCK, births, x, v));
         let hits = done.into_iter().collect::<Result<Vec<_>, StepError>>()?.concat();
-        Ok(Grown { x, v, hits })
+        Ok(Newborn { x, v, hits })
     }
 
     /// How fast the forces on single masses change the motion of the first of some newborn [1/s]: steps of half of its inverse are
@@ -154,7 +154,7 @@ impl Dynamics {
     }
 
     /// Gives the newborn of an emitter their rows at the time `now`; their ages will be right at the time `end`.
-    fn settle(&mut self, s: usize, births: &[Birth], grown: Grown, (now, end): (f64, f64)) {
+    fn insert_newborn(&mut self, s: usize, births: &[Birth], grown: Newborn, (now, end): (f64, f64)) {
         let v = |row: usize| self.state.v[row];
         let surplus = self.pool.surplus(s, births, (now, end), &self.state.x, &v);
         let start = self.pool.rows(s).start;
@@ -182,14 +182,14 @@ impl Dynamics {
 
     /// At the time t, where an interval of length dt [s] ends: the dead leave, and children of the dead and of the living come.
     /// Parents stand before their children, so that who is born here may bear, and die, here.
-    pub(super) fn bury(&mut self, t: f64, dt: f64, h: f64) -> Result<(), StepError> {
+    pub(super) fn remove_dead(&mut self, t: f64, dt: f64, h: f64) -> Result<(), StepError> {
         let n = self.pool.len();
         let mut born: Vec<Vec<Birth>> = vec![Vec::new(); n];
         for s in 0..n {
             let births = std::mem::take(&mut born[s]);
             if !births.is_empty() {
-                let grown = self.grow(s, &births, (t, h, 0))?;
-                self.settle(s, &births, grown, (t, t));
+                let grown = self.advance_newborn(s, &births, (t, h, 0))?;
+                self.insert_newborn(s, &births, grown, (t, t));
             }
             let colliders = &self.laws.colliders;
             let near = |p: Vec3<f64>, distance: f64| colliders.iter().any(|c| c.distance(p, t, distance).0 < distance);

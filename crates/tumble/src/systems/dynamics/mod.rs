@@ -3,24 +3,24 @@
 
 mod account;
 mod batches;
-mod books;
 mod build;
-mod coat;
 mod contact;
-mod corners;
-mod held;
+mod followers;
+mod hair_continuum;
 mod implicit;
 mod laws;
-mod layers;
+mod ledger;
 mod life;
 mod modes;
 mod position_based;
+mod self_contact;
+mod solid_features;
 mod tear;
 
 pub use build::{Closed, Liquid, Parts, Settings, SpringPart};
 pub use tear::TearPart;
 
-use crate::elements::{Constraints, Limit, Linear, Projected, Projection, Tethers};
+use crate::elements::{Constraints, Limit, Linear, LongRangeAttachments, Projected, Projection};
 use crate::exchange::{Exchange, Port};
 use crate::geometry::{Vector, Walls};
 use crate::integrators::{self, Equation, Memory, Scratch, Step, adaptive_step};
@@ -29,9 +29,9 @@ use crate::math::{Real, Row, Vec3, ZERO, axpy, row, sub, xyz64};
 use crate::pool::{Hit, Pool};
 use crate::state::{Object, State};
 use crate::system::{Archive, Part, System};
-use held::Held;
+use followers::Follower;
 use laws::{Laws, Local, flat};
-use layers::Layers;
+use self_contact::SelfContact;
 use tumble_interface::engine::{Ledger, Share, Stability, StepReport, UserForce, UserIntegrator, Worst};
 use tumble_interface::scene::{Adaptive, Integrator, PositionBased};
 use tumble_interface::{Column, StepError};
@@ -71,20 +71,20 @@ pub struct Dynamics {
     pool: Pool,
     /// Batches between masses of some objects, with these objects and others that they name.
     between: Vec<(usize, Vec<usize>, Option<Vec<usize>>)>,
-    tethers: Vec<Tether>,
+    anchors: Vec<Anchor>,
     clamp: Option<Projected<Limit, Linear, 2, 1, 1, 0>>,
     /// Elements of a position-based system, which are no forces there.
     constraints: Vec<Box<dyn Constraints>>,
     sweeps: PositionBased,
-    reach: Vec<Tethers>,
-    layers: Option<Layers>,
+    attachments: Vec<LongRangeAttachments>,
+    self_contact: Option<SelfContact>,
     /// What counts as passing through each other where nothing keeps it from doing so, if that is asked for.
-    judge: Option<Layers>,
+    intersection_counter: Option<SelfContact>,
     /// Surfaces that tear.
     tears: Vec<tear::Tear>,
     /// Points that follow colliders.
-    held: Vec<Held>,
-    coats: Vec<coat::Coat>,
+    followers: Vec<Follower>,
+    hair: Vec<hair_continuum::HairContinuum>,
     user: Option<Box<dyn UserIntegrator>>,
     memory: Memory,
     scratch: Scratch,
@@ -96,7 +96,7 @@ pub struct Dynamics {
     /// Accelerations of the predicted velocities; scratch.
     rates: Vec<Row>,
     /// What the energy is measured against, and the energy at the start [J].
-    scale: books::Scale,
+    scale: ledger::Scale,
     broken: u64,
     /// Whether other systems push masses of this one.
     pushed: bool,
@@ -107,7 +107,7 @@ pub struct Dynamics {
 
 /// A damped spring to a port of another system, as impulses at the start of each sub-step.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Tether {
+pub struct Anchor {
     /// The mass of this system.
     pub row: usize,
     /// The mass of the other.
@@ -122,8 +122,8 @@ pub struct Tether {
 
 impl Dynamics {
     /// Hangs a mass of this system on a mass of another.
-    pub fn tether(&mut self, tether: Tether) {
-        self.tethers.push(tether);
+    pub fn add_anchor(&mut self, anchor: Anchor) {
+        self.anchors.push(anchor);
         self.pushed = true;
     }
 
@@ -163,19 +163,19 @@ impl Dynamics {
 
     /// Springs to other systems: half of the interaction that this system owns. Each is an impulse h f, so what one side
     /// gets the other loses, whatever the integrator.
-    fn pull_tethers(&mut self, h: f64, exchange: &mut Exchange) {
-        for k in 0..self.tethers.len() {
-            let tether = self.tethers[k];
-            let other = exchange.port(tether.port);
-            let (x, v) = (xyz64(self.state.x[tether.row]), xyz64(self.state.v[tether.row]));
-            // The state as published: carrying it on to t would deliver a partner's kick an interval late.
+    fn apply_anchors(&mut self, h: f64, exchange: &mut Exchange) {
+        for k in 0..self.anchors.len() {
+            let anchor = self.anchors[k];
+            let other = exchange.port(anchor.port);
+            let (x, v) = (xyz64(self.state.x[anchor.row]), xyz64(self.state.v[anchor.row]));
+            // The state as published: carrying it on to t would insert_births a partner's kick an interval late.
             let d = other.position - x;
             let length = d.norm();
             let n = d.normalized();
-            let pull = tether.stiffness * (length - tether.rest_length) + tether.damping * n.dot(other.velocity - v);
+            let pull = anchor.stiffness * (length - anchor.rest_length) + anchor.damping * n.dot(other.velocity - v);
             let impulse = n * (h * pull);
-            exchange.post(tether.port, -impulse);
-            self.push(tether.row, impulse);
+            exchange.post(anchor.port, -impulse);
+            self.push(anchor.row, impulse);
         }
     }
 
@@ -189,10 +189,10 @@ impl Dynamics {
     /// One sub-step of a scheme with a fixed step, contact, clamp and breaking included.
     fn substep(&mut self, t: f64, h: f64, report: &mut StepReport) -> Result<(), StepError> {
         let (x, v) = (&self.state.x, &mut self.state.v);
-        self.coats.iter_mut().for_each(|coat| coat.act(h, x, v));
-        self.lead_held(t, h);
+        self.hair.iter_mut().for_each(|continuum| continuum.act(h, x, v));
+        self.lead_followers(t, h);
         self.remember(t, h);
-        self.memory.ready &= self.held.is_empty() && self.coats.is_empty();
+        self.memory.ready &= self.followers.is_empty() && self.hair.is_empty();
         let mut user = self.user.take();
         let result = match &mut user {
             Some(user) => self.user_step(user.as_mut(), t, h),
@@ -218,7 +218,7 @@ impl Dynamics {
         }
         // Where positions are predicted, they are kept then.
         let predicted = self.integrator == Integrator::PositionBased && self.user.is_none();
-        if !predicted && (!self.laws.colliders.is_empty() || self.layers.is_some()) {
+        if !predicted && (!self.laws.colliders.is_empty() || self.self_contact.is_some()) {
             self.before.resize(self.state.x.len(), ZERO);
             self.before.copy_from_slice(&self.state.x);
         }
@@ -230,7 +230,7 @@ impl Dynamics {
 
     /// What follows a step of length h from t on: clamp, contact, breaking. Whatever it changes, the scheme starts anew from.
     fn after(&mut self, t: f64, h: f64, report: &mut StepReport) {
-        self.place_held(t + h);
+        self.place_followers(t + h);
         if let Some(clamp) = self.clamp.as_mut().filter(|_| self.integrator != Integrator::PositionBased) {
             let masses = &self.laws.masses;
             let one = |v: &[Row], i: usize| 0.5 * f64::from(masses.mass[i]) * xyz64(v[i]).norm_sq();
@@ -255,7 +255,7 @@ impl Dynamics {
             }
         }
         if self.integrator != Integrator::PositionBased {
-            self.part_layers(t, h);
+            self.separate(t, h);
         }
         if !self.laws.colliders.is_empty() {
             let heeded = self.pool.heeded();
@@ -289,7 +289,7 @@ impl Dynamics {
                 hits.into_iter().for_each(|(row, hit)| self.pool.note_row(row, hit));
             }
         }
-        self.hold_layers(h);
+        self.limit_impacts(h);
         let x = &self.state.x;
         let broken: u64 = self.laws.batches.iter_mut().map(|b| b.break_links(x)).sum::<u64>()
             + self.constraints.iter_mut().map(|c| c.break_links(x)).sum::<u64>();
@@ -385,7 +385,7 @@ impl Dynamics {
     }
 
     /// What a constant force over the next interval gives in all [N s].
-    fn lean(&mut self, row: usize, impulse: Vector) {
+    fn push_steadily(&mut self, row: usize, impulse: Vector) {
         let steady = &mut self.laws.steady;
         match steady.binary_search_by_key(&row, |(row, _)| *row) {
             Ok(at) => steady[at].1 = steady[at].1 + impulse,
@@ -416,12 +416,12 @@ impl Dynamics {
     fn intervals(&mut self, t: f64, dt: f64, exchange: &mut Exchange, go_on: &(dyn Fn() -> bool + Sync)) -> Result<StepReport, StepError> {
         let mut report = StepReport::default();
         let end = t + dt;
-        let mut unborn = self.pool.conceive(&self.name, t, dt)?;
+        let mut unborn = self.pool.schedule_births(&self.name, t, dt)?;
         self.untangle(t);
         if self.integrator.is_adaptive() && self.user.is_none() {
             let (mut done, mut last) = (0.0, dt);
             while done < dt && go_on() {
-                self.lead_held(t + done, dt - done);
+                self.lead_followers(t + done, dt - done);
                 self.remember(t + done, dt - done);
                 let (begun, left) = (done, dt - done);
                 // The error of a step knows nothing of contact.
@@ -444,14 +444,14 @@ impl Dynamics {
                 done = if h == left { dt } else { done + h };
                 report.stepped(h);
                 // The step's length is known only now.
-                self.pull_tethers(h, exchange);
+                self.apply_anchors(h, exchange);
                 self.after(t + begun, h, &mut report);
-                self.deliver(&mut unborn, t + done, h, end)?;
+                self.insert_births(&mut unborn, t + done, h, end)?;
                 last = h;
                 self.look(t + done)?;
             }
             if done == dt {
-                self.bury(end, dt, last)?;
+                self.remove_dead(end, dt, last)?;
             }
             return Ok(report);
         }
@@ -462,17 +462,17 @@ impl Dynamics {
         let (substeps, h) = (substeps as u32, dt / substeps);
         let each = self.laws.is_local()
             && self.constraints.is_empty()
-            && self.layers.is_none()
-            && self.tethers.is_empty()
-            && self.held.is_empty()
+            && self.self_contact.is_none()
+            && self.anchors.is_empty()
+            && self.followers.is_empty()
             && self.user.is_none()
             && self.clamp.is_none()
             && !self.integrator.is_implicit()
             && !self.watched;
         if each {
             self.advance_local(t, h, substeps, go_on).map_err(|e| e.in_system(&self.name))?;
-            self.deliver_grown(unborn, (t, h, substeps))?;
-            self.bury(end, dt, h)?;
+            self.insert_births_of_interval(unborn, (t, h, substeps))?;
+            self.remove_dead(end, dt, h)?;
             report.steps = u64::from(substeps);
             report.step_range = Some((h, h));
             return Ok(report);
@@ -483,12 +483,12 @@ impl Dynamics {
             }
             let time = t + f64::from(k) * h;
             self.witness(time);
-            self.pull_tethers(h, exchange);
+            self.apply_anchors(h, exchange);
             self.substep(time, h, &mut report).map_err(|e| e.in_system(&self.name))?;
-            self.deliver(&mut unborn, if k + 1 == substeps { end } else { time + h }, h, end)?;
+            self.insert_births(&mut unborn, if k + 1 == substeps { end } else { time + h }, h, end)?;
             self.look(time + h)?;
         }
-        self.bury(end, dt, h)?;
+        self.remove_dead(end, dt, h)?;
         Ok(report)
     }
 
@@ -499,7 +499,7 @@ impl Dynamics {
 
     /// While watched: the first breakdown as an error.
     fn look(&self, t: f64) -> Result<(), StepError> {
-        if self.watched { self.checked_books(t).map(|_| ()) } else { Ok(()) }
+        if self.watched { self.checked_ledger(t).map(|_| ()) } else { Ok(()) }
     }
 }
 
@@ -511,7 +511,7 @@ impl System for Dynamics {
     fn absorb(&mut self, exchange: &mut Exchange) {
         for push in exchange.take(self.index) {
             if push.steady {
-                self.lean(push.row, push.impulse);
+                self.push_steadily(push.row, push.impulse);
             } else {
                 self.push(push.row, push.impulse);
             }
@@ -548,7 +548,7 @@ impl System for Dynamics {
     }
 
     fn ledger(&self, t: f64) -> Ledger {
-        self.books(t)
+        self.ledger_at(t)
     }
 
     fn shares(&self, t: f64) -> Vec<Share> {
@@ -560,9 +560,9 @@ impl System for Dynamics {
     }
 
     fn breakdown(&mut self, t: f64) -> Option<StepError> {
-        match self.checked_books(t) {
-            Ok(books) => {
-                self.rescale(&books);
+        match self.checked_ledger(t) {
+            Ok(ledger) => {
+                self.rescale(&ledger);
                 None
             }
             Err(error) => Some(error),
@@ -626,7 +626,7 @@ impl System for Dynamics {
         (self.memory.ready, self.memory.next_step, self.memory.last_error) = (*ready == 1.0, *next_step, *last_error);
         (self.automatic, self.measured) = (*automatic as u32, *measured as usize);
         self.broken = *broken as u64;
-        self.scale = books::Scale::from_numbers(scale)?;
+        self.scale = ledger::Scale::from_numbers(scale)?;
         for tear in &mut self.tears {
             tear.set(&archive.indices("triangles")?)?;
         }

@@ -64,9 +64,9 @@ impl Dynamics {
         soft.into_iter().chain(lost).collect()
     }
 
-    /// Tethers that the scene asks for, where nothing is pinned, or no way leads from a pin to anything.
-    pub fn idle_tethers(&self) -> Option<Warning> {
-        let idle = self.sweeps.tethers.is_some() && self.integrator == Integrator::PositionBased && self.reach.is_empty();
+    /// A warning of long-range attachments that attach nothing: nothing is pinned, or no way leads from a pin to anything.
+    pub fn idle_attachments(&self) -> Option<Warning> {
+        let idle = self.sweeps.tethers.is_some() && self.integrator == Integrator::PositionBased && self.attachments.is_empty();
         idle.then(|| {
             let message = "tie what hangs from pins by links, rods, membranes or fabric, and the system has nothing that does; pin some of \
                            it, or leave tethers out";
@@ -79,7 +79,7 @@ impl Dynamics {
         // Who may meet whom.
         self.find_pairs(t, h);
         self.predict(t, h)?;
-        self.place_held(t + h);
+        self.place_followers(t + h);
         // Sweeps over all elements.
         let words = self.sweeps.clone();
         // n sweeps that each take back 1 - (1 - k)^(1/n) leave 1 - k of an error.
@@ -96,7 +96,7 @@ impl Dynamics {
             if let Some(clamp) = &mut self.clamp {
                 clamp.project(x, &projection);
             }
-            self.reach.iter().for_each(|tethers| tethers.project(x));
+            self.attachments.iter().for_each(|attachments| attachments.project(x));
             self.push_apart();
             report.sweeps += 1;
             let x = &self.state.x;

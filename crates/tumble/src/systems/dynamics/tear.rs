@@ -494,8 +494,8 @@ impl Dynamics {
                 }
             }
         }
-        for layers in self.layers.iter_mut().chain(&mut self.judge) {
-            layers.renew(&self.objects, &self.tears);
+        for self_contact in self.self_contact.iter_mut().chain(&mut self.intersection_counter) {
+            self_contact.renew(&self.objects, &self.tears);
         }
     }
 }

@@ -8,7 +8,7 @@ use crate::math::{Quat, Real, row, xyz64};
 
 /// A point that follows.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Held {
+pub struct Follower {
     /// Its row.
     pub row: usize,
     /// The collider, counted from the first.
@@ -21,29 +21,29 @@ pub struct Held {
     pub frame: Option<(usize, Quat<f64>)>,
 }
 
-impl Held {
+impl Follower {
     /// Points whose places are those at t = 0 in the world.
-    pub fn at_rest(mut points: Vec<Held>, colliders: &[Collider]) -> Vec<Held> {
+    pub fn at_rest(mut points: Vec<Follower>, colliders: &[Collider]) -> Vec<Follower> {
         points.iter_mut().for_each(|p| p.place = colliders[p.collider].pose(p.carrier, 0.0).back(p.place));
         points
     }
 }
 
 impl Dynamics {
-    /// Held points, and where what they follow is at t; those of one carrier stand side by side.
-    fn poses(&self, t: f64) -> Vec<(Held, Pose)> {
-        let mut last: Option<(Held, Pose)> = None;
-        let one = |held: &Held| {
+    /// Followers, and the pose of their carriers at t; followers of one carrier stand side by side.
+    fn poses(&self, t: f64) -> Vec<(Follower, Pose)> {
+        let mut last: Option<(Follower, Pose)> = None;
+        let one = |held: &Follower| {
             let same = last.filter(|(other, _)| (other.collider, other.carrier) == (held.collider, held.carrier));
             let pose = same.map_or_else(|| self.laws.colliders[held.collider].pose(held.carrier, t), |(_, pose)| pose);
             last = Some((*held, pose));
             (*held, pose)
         };
-        self.held.iter().map(one).collect()
+        self.followers.iter().map(one).collect()
     }
 
     /// Gives held points the velocity that takes them to where they have to be at t + h.
-    pub(super) fn lead_held(&mut self, t: f64, h: f64) {
+    pub(super) fn lead_followers(&mut self, t: f64, h: f64) {
         for (held, pose) in self.poses(t + h) {
             let to = pose.out(held.place);
             let v = (to - xyz64(self.state.x[held.row])) * (1.0 / h);
@@ -52,7 +52,7 @@ impl Dynamics {
     }
 
     /// Puts held points to where they have to be at t.
-    pub(super) fn place_held(&mut self, t: f64) {
+    pub(super) fn place_followers(&mut self, t: f64) {
         for (held, pose) in self.poses(t) {
             let x = pose.out(held.place);
             self.state.x[held.row] = row(real(x), 0.0);

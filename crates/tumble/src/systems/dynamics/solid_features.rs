@@ -25,7 +25,7 @@ struct Solid {
 
 /// All of them.
 #[derive(Default)]
-pub struct Corners {
+pub struct SolidFeatures {
     colliders: Arc<Vec<Collider>>,
     /// Points of the system; corners come after them.
     points: usize,
@@ -40,7 +40,7 @@ pub struct Corners {
     rows: Vec<Row>,
 }
 
-impl Corners {
+impl SolidFeatures {
     /// Those of the colliders whose edges meet anything.
     pub fn new(colliders: &Arc<Vec<Collider>>, points: usize) -> Self {
         let mut all = Self { colliders: colliders.clone(), points, ..Self::default() };

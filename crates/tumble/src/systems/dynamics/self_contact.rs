@@ -5,14 +5,14 @@
 //!   C = n . Σ w_i x_i - thickness >= 0,   dx_i = m_i^-1 w_i n max(0, -C)/Σ_j m_j^-1 w_j²            (positions.4)
 
 use super::Dynamics;
-use super::corners::Corners;
+use super::solid_features::SolidFeatures;
 use super::tear::Tear;
 use crate::geometry::mesh_contact::{Detector, Owner, Pair, Topology, crossed, tangled, untangle_directions};
 use crate::geometry::{Collider, Friction, Vector};
 use crate::math::{Real, Row, Vec3, axpy, row, sub, xyz, xyz64};
 use crate::state::{Object, State};
 use std::sync::Arc;
-use tumble_interface::scene::SelfContact;
+use tumble_interface::scene;
 use tumble_interface::warning::{Code, Warning};
 
 /// Pairs are looked for along the ways that vertices are about to go, within the thickness and this many times the way of the fastest
@@ -27,7 +27,7 @@ const ROUNDS: usize = 4;
 const PARTINGS: usize = 16;
 
 /// Surfaces of a system, and who is near whom.
-pub struct Layers {
+pub struct SelfContact {
     topology: Topology,
     detector: Detector,
     friction: Friction,
@@ -38,7 +38,7 @@ pub struct Layers {
     /// Where vertices are about to go in a sub-step [m].
     ways: Vec<Vector>,
     /// Solids that they meet, too.
-    corners: Corners,
+    features: SolidFeatures,
 }
 
 /// What passes through each other.
@@ -59,37 +59,37 @@ pub enum Other {
     Solid(String),
 }
 
-impl Layers {
+impl SelfContact {
     /// All triangles and curves of the objects, and those of solids that have edges; `sewn` points count as one. `None` if there is
     /// nothing that could meet.
     pub fn new(
-        words: &SelfContact,
+        words: &scene::SelfContact,
         objects: &[Object],
         sewn: impl Iterator<Item = [u32; 2]>,
         state: &State,
         colliders: &Arc<Vec<Collider>>,
     ) -> Option<Self> {
         let points = objects.iter().map(|o| o.points.end).max()?;
-        let corners = Corners::new(colliders, points);
-        let mut layers = Self {
+        let features = SolidFeatures::new(colliders, points);
+        let mut self_contact = Self {
             topology: Topology::default(),
             detector: Detector::new(),
             friction: Friction { sliding: words.friction, resting: words.friction_static.unwrap_or(words.friction) },
             thickness: words.thickness,
             sewn: sewn.collect(),
-            rest: corners.joined(&state.x, 0.0).into_owned(),
+            rest: features.joined(&state.x, 0.0).into_owned(),
             ways: Vec::new(),
-            corners,
+            features,
         };
-        layers.rest.truncate(layers.corners.vertices());
-        layers.topology = layers.meeting(objects, &[]);
-        let soft = layers.topology.points().first().is_some_and(|i| (*i as usize) < points);
-        soft.then_some(layers)
+        self_contact.rest.truncate(self_contact.features.vertices());
+        self_contact.topology = self_contact.meeting(objects, &[]);
+        let soft = self_contact.topology.points().first().is_some_and(|i| (*i as usize) < points);
+        soft.then_some(self_contact)
     }
 
     /// The longest edge of what is soft, where it starts [m].
     pub fn longest_edge(&self) -> f64 {
-        let soft = |e: &&[u32; 2]| (e[0].max(e[1]) as usize) < self.corners.points();
+        let soft = |e: &&[u32; 2]| (e[0].max(e[1]) as usize) < self.features.points();
         let length = |[a, b]: &[u32; 2]| (xyz64(self.rest[*a as usize]) - xyz64(self.rest[*b as usize])).norm();
         self.topology.edges().iter().filter(soft).map(length).fold(0.0, f64::max)
     }
@@ -121,8 +121,8 @@ impl Layers {
             topology.weld(copy, of);
             rest[copy as usize] = self.rest[of as usize];
         }
-        self.corners.add_to(&mut topology, self.thickness);
-        // Corners weigh nothing, as what is held.
+        self.features.add_to(&mut topology, self.thickness);
+        // Solid features weigh nothing, as held points.
         (0..vertices).filter(|i| rest[*i][3] == 0.0).for_each(|i| topology.fix(i as u32, true));
         topology.set_rest(&rest);
         topology
@@ -130,15 +130,15 @@ impl Layers {
 
     /// Edges that pass through triangles, when points are at x at time t.
     pub fn intersections(&self, x: &[Row], t: f64) -> u64 {
-        crossed(&self.topology, &self.corners.joined(x, t)).0 as u64
+        crossed(&self.topology, &self.features.joined(x, t)).0 as u64
     }
 
     /// What passes through each other.
     pub fn crossing(&self, x: &[Row], t: f64) -> Option<Crossing> {
-        let (count, first) = crossed(&self.topology, &self.corners.joined(x, t));
+        let (count, first) = crossed(&self.topology, &self.features.joined(x, t));
         let (edge, triangle) = first?;
         let (edge, triangle) = (self.topology.edges()[edge as usize], self.topology.triangles()[triangle as usize]);
-        let solid = |vertices: &[u32]| Some(self.corners.name(self.corners.collider(vertices)?));
+        let solid = |vertices: &[u32]| Some(self.features.name(self.features.collider(vertices)?));
         let (vertices, other) = match (solid(&edge), solid(&triangle)) {
             (Some(name), _) => (triangle.to_vec(), Other::Solid(name)),
             (_, Some(name)) => (edge.to_vec(), Other::Solid(name)),
@@ -161,16 +161,16 @@ impl Layers {
     /// What a vertex belongs to.
     fn name(&self, objects: &[Object], vertex: u32) -> Option<String> {
         let soft = || objects.iter().find(|o| o.points.contains(&(vertex as usize))).map(|o| o.name.clone());
-        self.corners.collider(&[vertex]).map(|i| self.corners.name(i)).or_else(soft)
+        self.features.collider(&[vertex]).map(|i| self.features.name(i)).or_else(soft)
     }
 
     /// Parts what is nearer than its thickness, all at rest: a push within a step would be a speed.
-    fn part(&mut self, x: &mut [Row], corners: &Corners) {
+    fn part(&mut self, x: &mut [Row], features: &SolidFeatures) {
         let thickness = self.topology.largest_thickness();
         for _ in 0..PARTINGS {
             self.detector.detect(&self.topology, x, REACH.0 * thickness);
             let start = x.to_vec();
-            let pairs = self.detector.pairs().iter().filter(|pair| !corners.is_mass(pair));
+            let pairs = self.detector.pairs().iter().filter(|pair| !features.is_mass(pair));
             pairs.for_each(|pair| push(pair, Friction::default(), x, |i| start[i]));
             self.detector.hold(&self.topology, x);
             if *x == start[..] {
@@ -181,7 +181,7 @@ impl Layers {
 
     /// How many vertices that could move lie exactly where others do, whose objects the first two are, and where [m]; `None` if none do.
     fn twins(&self, objects: &[Object], x: &[Row]) -> Option<(usize, [String; 2], Vector)> {
-        let x = &*self.corners.joined(x, 0.0);
+        let x = &*self.features.joined(x, 0.0);
         let mut points = self.topology.points().to_vec();
         let place = |i: u32| [0, 1, 2].map(|k| (x[i as usize][k] + 0.0).to_bits());
         points.sort_unstable_by_key(|i| (place(*i), *i));
@@ -215,7 +215,7 @@ impl Layers {
 impl Dynamics {
     /// Surfaces that pass through each other as they are, or lie in each other, as a sentence with the place; `None` if none do, or may.
     pub fn tangles(&self) -> Option<Warning> {
-        let layers = self.layers.as_ref()?;
+        let self_contact = self.self_contact.as_ref()?;
         let told = |(n, [one, other], place): (usize, [String; 2], Vector), passing: bool| {
             let other = if one == other { "itself".to_string() } else { format!("\"{other}\"") };
             let place = <[f64; 3]>::from(place).map(|x| format!("{x:.4}")).join(", ");
@@ -232,76 +232,76 @@ impl Dynamics {
             };
             Warning::new(Code::TangledStart, format!("system \"{}\"", self.name), message)
         };
-        let passing = layers.tangles(&self.objects, &self.state.x).map(|found| told(found, true));
-        passing.or_else(|| layers.twins(&self.objects, &self.state.x).map(|found| told(found, false)))
+        let passing = self_contact.tangles(&self.objects, &self.state.x).map(|found| told(found, true));
+        passing.or_else(|| self_contact.twins(&self.objects, &self.state.x).map(|found| told(found, false)))
     }
 
     /// Before an interval from t on: what is tangled, and at the start what is too near.
     pub(super) fn untangle(&mut self, t: f64) {
-        let Some(layers) = &mut self.layers else { return };
-        let mut corners = std::mem::take(&mut layers.corners);
+        let Some(self_contact) = &mut self.self_contact else { return };
+        let mut features = std::mem::take(&mut self_contact.features);
         self.unclamped.clone_from(&self.state.x);
-        corners.place(t, 0.0);
-        corners.with_end(&mut self.state.x, |corners, x| {
-            let inside = corners.inside(&layers.topology, x, t);
-            layers.untangle(x, &inside);
+        features.place(t, 0.0);
+        features.with_end(&mut self.state.x, |features, x| {
+            let inside = features.inside(&self_contact.topology, x, t);
+            self_contact.untangle(x, &inside);
             if t == 0.0 {
-                corners.lift(&layers.topology, x, t);
-                layers.part(x, corners);
+                features.lift(&self_contact.topology, x, t);
+                self_contact.part(x, features);
             }
         });
-        layers.corners = corners;
+        self_contact.features = features;
         // What has been moved has another past.
         self.memory.ready &= self.state.x == self.unclamped;
     }
 
     /// Before a sub-step from t on of length h [s]: who is near whom.
     pub(super) fn find_pairs(&mut self, t: f64, h: f64) {
-        let Some(layers) = &mut self.layers else { return };
-        let n = layers.corners.points();
+        let Some(self_contact) = &mut self.self_contact else { return };
+        let n = self_contact.features.points();
         let gravity = Vector::from(self.laws.gravity) * h;
         let (x, v) = (&self.state.x[..n], &self.state.v[..n]);
-        layers.ways.clear();
-        layers.ways.extend(x.iter().zip(v).map(|(x, v)| (xyz64(*v) + if x[3] > 0.0 { gravity } else { Vector::default() }) * h));
-        layers.corners.place(t, h);
-        layers.ways.extend(layers.corners.ways());
-        let farthest = layers.ways.iter().map(|w| w.norm_sq()).fold(0.0, f64::max).sqrt();
-        let thickness = layers.topology.largest_thickness();
+        self_contact.ways.clear();
+        self_contact.ways.extend(x.iter().zip(v).map(|(x, v)| (xyz64(*v) + if x[3] > 0.0 { gravity } else { Vector::default() }) * h));
+        self_contact.features.place(t, h);
+        self_contact.ways.extend(self_contact.features.ways());
+        let farthest = self_contact.ways.iter().map(|w| w.norm_sq()).fold(0.0, f64::max).sqrt();
+        let thickness = self_contact.topology.largest_thickness();
         let reach = (thickness + ASIDE * farthest).clamp(REACH.0 * thickness, REACH.1 * thickness);
-        layers.detector.detect_along(&layers.topology, &layers.corners.at_start(x), &layers.ways, reach);
-        layers.corners.run_belts(t, h);
+        self_contact.detector.detect_along(&self_contact.topology, &self_contact.features.at_start(x), &self_contact.ways, reach);
+        self_contact.features.run_belts(t, h);
     }
 
     /// The step [s] in which those that are about to meet in h [s] go half of their thickness past each other; infinite if none are.
     /// (contact.21)
     pub(super) fn longest_among_pairs(&self, h: f64) -> f64 {
-        let Some(layers) = &self.layers else { return f64::INFINITY };
+        let Some(self_contact) = &self.self_contact else { return f64::INFINITY };
         let passing = |pair: &Pair| {
             let parts = pair.vertices.iter().zip(pair.weights);
-            let way = parts.fold(Vector::default(), |sum, (v, w)| sum + layers.ways[*v as usize] * f64::from(w));
+            let way = parts.fold(Vector::default(), |sum, (v, w)| sum + self_contact.ways[*v as usize] * f64::from(w));
             way.norm() / f64::from(pair.thickness)
         };
-        0.5 * h / layers.detector.pairs().iter().map(passing).fold(0.0, f64::max)
+        0.5 * h / self_contact.detector.pairs().iter().map(passing).fold(0.0, f64::max)
     }
 
     /// In a sweep: pushes pairs apart that are too near, with friction on what they slide in the sub-step.
     pub(super) fn push_apart(&mut self) {
-        let Some(Layers { detector, friction, corners, .. }) = &mut self.layers else { return };
-        let (before, points) = (&self.before, corners.points());
-        corners.with_end(&mut self.state.x, |corners, x| {
-            for pair in detector.pairs().iter().filter(|pair| !corners.is_mass(pair)) {
-                let friction = corners.friction(pair).unwrap_or(*friction);
-                push(pair, friction, x, |i| if i < points { before[i] } else { corners.start[i - points] });
+        let Some(SelfContact { detector, friction, features, .. }) = &mut self.self_contact else { return };
+        let (before, points) = (&self.before, features.points());
+        features.with_end(&mut self.state.x, |features, x| {
+            for pair in detector.pairs().iter().filter(|pair| !features.is_mass(pair)) {
+                let friction = features.friction(pair).unwrap_or(*friction);
+                push(pair, friction, x, |i| if i < points { before[i] } else { features.start[i - points] });
             }
         });
     }
 
     /// After a step from t on of length h [s] of a scheme without sweeps: pushes pairs apart. Velocities change by as much as positions in h.
-    pub(super) fn part_layers(&mut self, t: f64, h: f64) {
-        let Some(layers) = &mut self.layers else { return };
+    pub(super) fn separate(&mut self, t: f64, h: f64) {
+        let Some(self_contact) = &mut self.self_contact else { return };
         // The step may be shorter than the one for which pairs were looked for.
-        layers.corners.place(t, h);
-        layers.corners.run_belts(t, h);
+        self_contact.features.place(t, h);
+        self_contact.features.run_belts(t, h);
         self.unclamped.clone_from(&self.state.x);
         (0..ROUNDS).for_each(|_| self.push_apart());
         self.take_along(h);
@@ -309,9 +309,9 @@ impl Dynamics {
 
     /// Velocities follow what has moved away from `unclamped`.
     fn take_along(&mut self, h: f64) {
-        let Some(layers) = &self.layers else { return };
+        let Some(self_contact) = &self.self_contact else { return };
         let inverse_h = (1.0 / h) as Real;
-        for ((x, old), v) in self.state.x.iter().zip(&self.unclamped).zip(&mut self.state.v).take(layers.corners.points()) {
+        for ((x, old), v) in self.state.x.iter().zip(&self.unclamped).zip(&mut self.state.v).take(self_contact.features.points()) {
             let change = sub(*x, *old);
             if change[..3] != [0.0; 3] && x[3] > 0.0 {
                 *v = axpy(*v, inverse_h, [change[0], change[1], change[2], 0.0]);
@@ -321,11 +321,11 @@ impl Dynamics {
     }
 
     /// After a sub-step of length h [s]: holds back what would pass through something.
-    pub(super) fn hold_layers(&mut self, h: f64) {
-        let Some(layers) = &mut self.layers else { return };
+    pub(super) fn limit_impacts(&mut self, h: f64) {
+        let Some(self_contact) = &mut self.self_contact else { return };
         self.unclamped.clone_from(&self.state.x);
-        let (topology, detector) = (&layers.topology, &mut layers.detector);
-        let held = layers.corners.with_end(&mut self.state.x, |_, x| detector.hold(topology, x).held);
+        let (topology, detector) = (&self_contact.topology, &mut self_contact.detector);
+        let held = self_contact.features.with_end(&mut self.state.x, |_, x| detector.hold(topology, x).held);
         if held > 0 {
             self.take_along(h);
         }

@@ -17,7 +17,7 @@ const NODES: f64 = (1 << 21) as f64;
 
 /// The hair of one object.
 #[derive(Debug, Clone)]
-pub struct Coat {
+pub struct HairContinuum {
     rows: Range<usize>,
     words: HairCollisions,
     /// Density above which it pushes [kg/m³].
@@ -69,19 +69,19 @@ impl Lattice {
     }
 }
 
-impl Coat {
+impl HairContinuum {
     /// The hair in these rows, as it is at the start.
     pub fn new(rows: Range<usize>, words: HairCollisions, x: &[Row]) -> Self {
-        let mut coat = Self { rows, rest: words.rest_density.unwrap_or(1.0), words, scratch: Scratch::default() };
-        if coat.words.rest_density.is_none()
-            && let Some(lattice) = coat.splat(x, &vec![[0.0; 4]; x.len()])
+        let mut continuum = Self { rows, rest: words.rest_density.unwrap_or(1.0), words, scratch: Scratch::default() };
+        if continuum.words.rest_density.is_none()
+            && let Some(lattice) = continuum.splat(x, &vec![[0.0; 4]; x.len()])
         {
             // The mean over the mass.
             let volume = lattice.cell.powi(3);
-            let (mass, square) = coat.scratch.nodes.iter().fold((0.0, 0.0), |(a, b), n| (a + n[3], b + n[3] * n[3]));
-            coat.rest = (square / mass / volume).max(f64::MIN_POSITIVE);
+            let (mass, square) = continuum.scratch.nodes.iter().fold((0.0, 0.0), |(a, b), n| (a + n[3], b + n[3] * n[3]));
+            continuum.rest = (square / mass / volume).max(f64::MIN_POSITIVE);
         }
-        coat
+        continuum
     }
 
     fn is_idle(&self) -> bool {

@@ -29,11 +29,11 @@ pub struct Scale {
 }
 
 impl Scale {
-    /// The scale of a system that starts with these books, which could gain `fall` [J] by falling through its own height.
+    /// The scale of a system that starts with this ledger, which could gain `fall` [J] by falling through its own height.
     /// Energies up to `noise` [J] are no scale.
-    pub fn new(books: &Ledger, fall: f64, noise: f64) -> Self {
-        let mut scale = Self { start: books.energy(), external: books.external, size: fall };
-        scale.widen(books.kinetic.max(books.elastic), noise);
+    pub fn new(ledger: &Ledger, fall: f64, noise: f64) -> Self {
+        let mut scale = Self { start: ledger.energy(), external: ledger.external, size: fall };
+        scale.widen(ledger.kinetic.max(ledger.elastic), noise);
         scale
     }
 
@@ -72,8 +72,8 @@ impl Scale {
     }
 
     /// Growth of the energy over its scale; `None` while there is no scale.
-    fn growth(self, books: &Ledger) -> Option<f64> {
-        (self.size > 0.0).then(|| (books.energy() - self.start) / self.size)
+    fn growth(self, ledger: &Ledger) -> Option<f64> {
+        (self.size > 0.0).then(|| (ledger.energy() - self.start) / self.size)
     }
 }
 
@@ -283,7 +283,7 @@ impl Dynamics {
         enclosed(&object.triangles, |i| xyz64(self.state.x[object.points.start + i as usize]))
     }
 
-    pub(super) fn books(&self, t: f64) -> Ledger {
+    pub(super) fn ledger_at(&self, t: f64) -> Ledger {
         let (x, v, masses) = (&self.state.x, &self.state.v, &self.laws.masses);
         let n = masses.points;
         let total = self.sums(0..n, n..x.len());
@@ -301,7 +301,11 @@ impl Dynamics {
             external: self.between(false, t) + self.laws.external_energy(t, x, v) - Vec3::from(self.laws.gravity).dot(total.first_moment),
             stretch,
             penetration: if touching { max(n, |range| range.flat_map(depths).fold(0.0, f64::max)).max(0.0) } else { 0.0 },
-            intersections: self.layers.as_ref().or(self.judge.as_ref()).map_or(0, |layers| layers.intersections(x, t)),
+            intersections: self
+                .self_contact
+                .as_ref()
+                .or(self.intersection_counter.as_ref())
+                .map_or(0, |self_contact| self_contact.intersections(x, t)),
             speed: total.speed_sq.sqrt(),
             contacts: if touching { sum(n, |range| range.filter(|i| depths(*i).next().is_some()).count() as f64) as u64 } else { 0 },
             broken: self.broken,
@@ -314,19 +318,19 @@ impl Dynamics {
     /// gravitation.
     pub(super) fn set_scale(&mut self) {
         let n = self.laws.masses.points;
-        let books = self.books(0.0);
+        let ledger = self.ledger_at(0.0);
         let far = |a: Vec3<f64>, b: Vec3<f64>| (a - b).norm();
         let first = self.state.x.first().map(|x| xyz64(*x)).unwrap_or_default();
         let size = max(n, |range| range.map(|i| far(xyz64(self.state.x[i]), first)).fold(0.0, f64::max)).max(0.0);
-        let fall = books.mass * Vec3::from(self.laws.gravity).norm() * size;
+        let fall = ledger.mass * Vec3::from(self.laws.gravity).norm() * size;
         // What holds masses together is a scale, too, even if they start at rest.
         // So is what a driving force may bring them to.
         let driven: f64 = self.laws.batches.iter().filter_map(|b| b.drives()).sum();
         // What a moving solid hits leaves with at most twice its velocity.
         let reach = self.laws.colliders.iter().filter_map(|c| c.motion.as_ref()).map(|m| far(m.pivot, first)).fold(size, |a, b| a + b);
         let fastest = self.laws.colliders.iter().map(|c| c.fastest(reach)).fold(0.0, f64::max);
-        let hit = 2.0 * books.mass * fastest * fastest;
-        self.scale = Scale::new(&books, fall.max(self.between(false, 0.0).abs()).max(hit).max(driven), self.noise());
+        let hit = 2.0 * ledger.mass * fastest * fastest;
+        self.scale = Scale::new(&ledger, fall.max(self.between(false, 0.0).abs()).max(hit).max(driven), self.noise());
     }
 
     /// Energy [J] that a thing at rest may seem to hold: a thousand times what its links store because positions are rounded.
@@ -336,14 +340,14 @@ impl Dynamics {
         1e3 * sum(grip.len(), |range| range.map(|i| f64::from(grip[i]) * rounding(i) * rounding(i)).sum())
     }
 
-    /// Takes the scale of the energy from the books of a good frame. Energy that came from nowhere does not count, or a slow
+    /// Takes the scale of the energy from the ledger of a good frame. Energy that came from nowhere does not count, or a slow
     /// explosion would carry its scale along; where others push, nobody knows where energy came from.
-    pub(super) fn rescale(&mut self, books: &Ledger) {
+    pub(super) fn rescale(&mut self, ledger: &Ledger) {
         let drives = self.laws.colliders.iter().any(|c| c.moves()) || self.laws.batches.iter().any(|b| b.drives().is_some());
-        let driven = self.pushed || !self.held.is_empty() || drives || !self.laws.user.is_empty();
-        let gain = if driven { 0.0 } else { (books.energy() - self.scale.start).max(0.0) };
-        let external = (books.external - self.scale.external).abs();
-        let energy = books.kinetic.max(books.elastic).max(external) - gain;
+        let driven = self.pushed || !self.followers.is_empty() || drives || !self.laws.user.is_empty();
+        let gain = if driven { 0.0 } else { (ledger.energy() - self.scale.start).max(0.0) };
+        let external = (ledger.external - self.scale.external).abs();
+        let energy = ledger.kinetic.max(ledger.elastic).max(external) - gain;
         if !self.pool.is_empty() {
             // What has left is no scale for what is there.
             self.scale.fade();
@@ -353,19 +357,19 @@ impl Dynamics {
         }
     }
 
-    /// The books at time t [s], or what has broken down.
-    pub(super) fn checked_books(&self, t: f64) -> Result<Ledger, StepError> {
+    /// The ledger at time t [s], or what has broken down.
+    pub(super) fn checked_ledger(&self, t: f64) -> Result<Ledger, StepError> {
         let state = &self.state;
-        let books = self.books(t);
+        let ledger = self.ledger_at(t);
         // One number that is not finite makes these sums so.
-        let finite = books.kinetic.is_finite() && books.angular_momentum.iter().all(|l| l.is_finite());
+        let finite = ledger.kinetic.is_finite() && ledger.angular_momentum.iter().all(|l| l.is_finite());
         let bad = |rows: &[Row]| fold(rows.len(), |mut range| range.find(|i| !is_finite(rows[*i]))).into_iter().flatten().next();
         let columns = [("position", &state.x), ("velocity", &state.v)];
         let search = || columns.into_iter().find_map(|(column, rows)| Some((column, bad(rows)?, None)));
         let mut found = if finite { None } else { search() };
         if found.is_none() {
             // What a sweep leaves undone is no energy that anything will feel.
-            let mut felt = books.clone();
+            let mut felt = ledger.clone();
             if self.integrator == Integrator::PositionBased {
                 felt.elastic = 0.0;
             }
@@ -376,8 +380,8 @@ impl Dynamics {
                 found = Some(("velocity", fastest.unwrap_or(0), Some(ratio)));
             }
         }
-        let Some((column, i, energy_ratio)) = found else { return Ok(books) };
-        let (object, index) = self.whose(i);
+        let Some((column, i, energy_ratio)) = found else { return Ok(ledger) };
+        let (object, index) = self.owner_of(i);
         let breakdown = Box::new(Breakdown {
             system: self.name().into(),
             object,
@@ -390,13 +394,13 @@ impl Dynamics {
             step: 0.0,
             stable_step: if self.integrator == Integrator::PositionBased { f64::INFINITY } else { 0.0 },
             energy_ratio,
-            cause: self.culprit(i),
+            cause: self.failing_force(i),
         });
         Err(if energy_ratio.is_none() { StepError::NotFinite(breakdown) } else { StepError::Exploded(breakdown) })
     }
 
     /// The force that is not finite on a row as it was before the sub-step that broke it.
-    fn culprit(&self, i: usize) -> Option<String> {
+    fn failing_force(&self, i: usize) -> Option<String> {
         let (t, x, v) = self.witness.as_ref()?;
         let (x, v) = (x.get(i..=i)?, v.get(i..=i)?);
         let is_bad = |acting: &&Acting| {
@@ -409,7 +413,7 @@ impl Dynamics {
     }
 
     /// Object and index within it of a row.
-    pub(super) fn whose(&self, i: usize) -> (String, usize) {
+    pub(super) fn owner_of(&self, i: usize) -> (String, usize) {
         let owner = |o: &&crate::state::Object| o.points.contains(&i) || o.frames.contains(&i);
         self.objects
             .iter()
@@ -443,7 +447,7 @@ impl Dynamics {
             frequency: modes.stiffest.frequency,
             damping: modes.stiffest.damping,
             damping_max: modes.most_damped.damping,
-            culprit: modes.culprit.map(|i| self.whose(i)),
+            culprit: modes.culprit.map(|i| self.owner_of(i)),
             limits,
         })
     }
