@@ -97,7 +97,7 @@ pub trait Constraints: Send + Sync {
     /// Puts nodes of elements, as (element, node), onto other rows.
     fn rewire(&mut self, _changes: &[(u32, usize, u32)]) {}
     /// Breaks elements for good.
-    fn give_up(&mut self, _elements: &[u32]) {}
+    fn break_elements(&mut self, _elements: &[u32]) {}
     /// Mends all links, then breaks these.
     fn set_broken(&mut self, _broken: &[u32]) {}
 }
@@ -671,7 +671,7 @@ impl<E: Element<N, M, D>, Y: Law<P>, const N: usize, const M: usize, const D: us
         self.columns.runs = runs(&self.columns.nodes);
     }
 
-    fn give_up(&mut self, elements: &[u32]) {
+    fn break_elements(&mut self, elements: &[u32]) {
         if elements.is_empty() {
             return;
         }

@@ -26,14 +26,14 @@ mod vector;
 mod woven;
 
 pub use crate::linalg::blocks::Block;
-pub use batch::{Batch, Elements, Incidence, Weights};
+pub use batch::{Batch, Elements, Incidence};
 pub use bend::Hinge;
 pub use constraints::{Constraints, Density, Neohookean, Projected, Projection, Shape, Strands, Volume, behind, enclosed, spline};
 pub use contact::PointPlane;
 pub use distance::{Distance, Limit};
 pub use isometric::IsometricBend;
 pub use law::{Law, Linear, Nonlinear};
-pub use list::Members;
+pub use list::{Members, Weights};
 pub use long_range_attachments::LongRangeAttachments;
 pub use membrane::{Area, Membrane};
 pub use pairs::{Pair, Pairs};

@@ -1,7 +1,8 @@
 //! Points and frames that are held and follow a collider, one of its bones, or its surface: functions of time alone, and so in no snapshot.
 
-use super::Dynamics;
 use super::contact::real;
+use super::core::Core;
+use super::feature::{Feature, Span};
 use crate::geometry::motion::Pose;
 use crate::geometry::{Carrier, Collider, Vector};
 use crate::math::{Quat, Real, row, xyz64};
@@ -13,54 +14,66 @@ pub struct Follower {
     pub row: usize,
     /// The collider, counted from the first.
     pub collider: usize,
-    /// What of it.
+    /// The part of it that carries the point.
     pub carrier: Carrier,
-    /// Where it is in what it follows [m].
+    /// Its place in the frame of the carrier [m].
     pub place: Vector,
-    /// A held frame that follows with it, and its turn in what it follows.
+    /// A held frame that follows with it, and its turn in the frame of the carrier.
     pub frame: Option<(usize, Quat<f64>)>,
 }
 
-impl Follower {
-    /// Points whose places are those at t = 0 in the world.
-    pub fn at_rest(mut points: Vec<Follower>, colliders: &[Collider]) -> Vec<Follower> {
-        points.iter_mut().for_each(|p| p.place = colliders[p.collider].pose(p.carrier, 0.0).back(p.place));
-        points
+/// All followers of a system.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct Followers(Vec<Follower>);
+
+impl Followers {
+    /// Followers given by their places in the world at t = 0, and others `carried` at places in the frames of their carriers.
+    pub fn new(mut given: Vec<Follower>, carried: Vec<Follower>, colliders: &[Collider]) -> Self {
+        given.iter_mut().for_each(|p| p.place = colliders[p.collider].pose(p.carrier, 0.0).back(p.place));
+        given.extend(carried);
+        Self(given)
+    }
+
+    /// Whether there are none.
+    pub fn is_empty(&self) -> bool {
+        self.0.is_empty()
+    }
+
+    /// Followers, and the pose of their carriers at t; followers of one carrier stand side by side.
+    fn poses(&self, colliders: &[Collider], t: f64) -> Vec<(Follower, Pose)> {
+        let mut last: Option<(Follower, Pose)> = None;
+        let one = |follower: &Follower| {
+            let same = last.filter(|(other, _)| (other.collider, other.carrier) == (follower.collider, follower.carrier));
+            let pose = same.map_or_else(|| colliders[follower.collider].pose(follower.carrier, t), |(_, pose)| pose);
+            last = Some((*follower, pose));
+            (*follower, pose)
+        };
+        self.0.iter().map(one).collect()
     }
 }
 
-impl Dynamics {
-    /// Followers, and the pose of their carriers at t; followers of one carrier stand side by side.
-    fn poses(&self, t: f64) -> Vec<(Follower, Pose)> {
-        let mut last: Option<(Follower, Pose)> = None;
-        let one = |held: &Follower| {
-            let same = last.filter(|(other, _)| (other.collider, other.carrier) == (held.collider, held.carrier));
-            let pose = same.map_or_else(|| self.laws.colliders[held.collider].pose(held.carrier, t), |(_, pose)| pose);
-            last = Some((*held, pose));
-            (*held, pose)
-        };
-        self.followers.iter().map(one).collect()
-    }
-
-    /// Gives held points the velocity that takes them to where they have to be at t + h.
-    pub(super) fn lead_followers(&mut self, t: f64, h: f64) {
-        for (held, pose) in self.poses(t + h) {
-            let to = pose.out(held.place);
-            let v = (to - xyz64(self.state.x[held.row])) * (1.0 / h);
-            self.state.v[held.row] = row(real(v), 0.0);
+impl Feature for Followers {
+    /// Gives followers the velocity that takes them to their places at the end of the sub-step.
+    fn before(&mut self, core: &mut Core, step: Span) {
+        for (follower, pose) in self.poses(&core.laws.colliders, step.end()) {
+            let to = pose.out(follower.place);
+            let v = (to - xyz64(core.state.x[follower.row])) * (1.0 / step.h);
+            core.state.v[follower.row] = row(real(v), 0.0);
         }
+        core.memory.ready &= self.is_empty();
     }
 
-    /// Puts held points to where they have to be at t.
-    pub(super) fn place_followers(&mut self, t: f64) {
-        for (held, pose) in self.poses(t) {
-            let x = pose.out(held.place);
-            self.state.x[held.row] = row(real(x), 0.0);
-            if let Some((frame, q)) = held.frame {
-                // Of the two that are the same turn, the one that is nearer to the last.
+    /// Puts followers where their carriers are.
+    fn moved(&mut self, core: &mut Core, step: Span) {
+        let state = &mut core.state;
+        for (follower, pose) in self.poses(&core.laws.colliders, step.end()) {
+            let x = pose.out(follower.place);
+            state.x[follower.row] = row(real(x), 0.0);
+            if let Some((frame, q)) = follower.frame {
+                // Of the two quaternions of one turn, the one nearer to the last.
                 let turned = pose.turn * q;
-                let same = turned.dot(Quat::from_row(self.state.x[frame].map(f64::from))) >= 0.0;
-                self.state.x[frame] = if same { turned } else { -turned }.row().map(|q| q as Real);
+                let same = turned.dot(Quat::from_row(state.x[frame].map(f64::from))) >= 0.0;
+                state.x[frame] = if same { turned } else { -turned }.row().map(|q| q as Real);
             }
         }
     }

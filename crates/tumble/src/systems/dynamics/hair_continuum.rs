@@ -3,9 +3,11 @@
 //!   M_i = sum_p m_p w_ip,   V_i = sum_p m_p w_ip v_p/M_i,   v_p += (1 - exp(-friction h)) (sum_i w_ip V_i - v_p)     (hair.5)
 //!
 //! w is trilinear. Pressure goes through the faces between nodes, the lesser of both: what one node gets its neighbour loses, and momentum
-//! is kept to round-off (hair.6). What is held takes no part. Sources: [petrovic2005], [mcadams2009]. Differs: no projection to zero divergence, hair
+//! is kept to round-off (hair.6). Held points take no part. Sources: [petrovic2005], [mcadams2009]. Differs: no projection to zero divergence, hair
 //! may thin out. Breaks: h sqrt(pressure/rest density) above a cell. Verified in `tests/hair.rs`.
 
+use super::core::Core;
+use super::feature::{Feature, Span};
 use crate::math::functions::exp;
 use crate::math::parallel::{Tasks, chunks, fold};
 use crate::math::{Real, Row, Vec3, xyz64};
@@ -160,8 +162,8 @@ impl HairContinuum {
         Some(lattice)
     }
 
-    /// What the hair does to itself in a step of length h [s].
-    pub fn act(&mut self, h: f64, x: &[Row], v: &mut [Row]) {
+    /// Friction and pressure of the hair in a step of length h [s].
+    fn act(&mut self, h: f64, x: &[Row], v: &mut [Row]) {
         if self.is_idle() {
             return;
         }
@@ -214,5 +216,12 @@ impl HairContinuum {
         };
         let x = &x[self.rows.clone()];
         chunks(&mut v[self.rows.clone()], |start, v| v.iter_mut().zip(&x[start..]).for_each(|(v, x)| stir(v, x)));
+    }
+}
+
+impl Feature for HairContinuum {
+    fn before(&mut self, core: &mut Core, step: Span) {
+        self.act(step.h, &core.state.x, &mut core.state.v);
+        core.memory.ready = false;
     }
 }
