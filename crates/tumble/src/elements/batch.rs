@@ -143,7 +143,7 @@ pub struct Elements<E, Y, const N: usize, const M: usize, const D: usize, const 
     incidence: Incidence,
     slots: Vec<Row>,
     energy_at_rest: f64,
-    /// What has broken: element, stiffness and damping that would mend it.
+    /// Broken elements, with the stiffness and damping that would mend each.
     broken: Vec<(u32, Real, Real)>,
 }
 

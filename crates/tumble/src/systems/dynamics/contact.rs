@@ -39,7 +39,7 @@ impl Step {
     }
 }
 
-/// What a scheme leaves to the pass.
+/// The part of contact that a scheme leaves to the pass.
 #[derive(Debug, Clone, Copy)]
 pub struct Response {
     /// The velocity of its path is v + lead h a.

@@ -1,4 +1,4 @@
-//! What acts on whole columns of masses beside a scheme: the stages of a sub-step at which a feature may act, in their order.
+//! Features act on whole columns of masses beside a scheme. Their trait names the stages of a sub-step at which they may, in order.
 
 use super::core::Core;
 use crate::system::Archive;

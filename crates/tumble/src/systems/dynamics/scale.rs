@@ -2,7 +2,7 @@
 
 use tumble_interface::engine::Ledger;
 
-/// What the growth of the energy is compared with.
+/// Energies with which a growth of the energy is compared.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Scale {
     /// Energy at the start [J].

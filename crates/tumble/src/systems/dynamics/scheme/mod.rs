@@ -39,10 +39,10 @@ pub trait Scheme: Send + Sync {
         Ok(rest.h)
     }
 
-    /// Corrects positions after a step that knew forces alone.
-    fn correct(&mut self, _core: &mut Core, _features: &mut Features, _step: Span, _report: &mut StepReport) {}
+    /// Corrects positions after a step, before contact with solids.
+    fn correct(&mut self, core: &mut Core, features: &mut Features, step: Span, report: &mut StepReport);
 
-    /// What it leaves to the contact pass.
+    /// The part of contact that it leaves to the contact pass.
     fn response(&self, core: &Core) -> Response;
 
     /// Whether masses that feel no other may be stepped block by block.

@@ -150,6 +150,11 @@ impl Scheme for Projected {
         Ok(())
     }
 
+    /// Puts followers back, whose frames sweeps have scaled to length 1.
+    fn correct(&mut self, core: &mut Core, features: &mut Features, step: Span, _: &mut StepReport) {
+        features.moved(core, step);
+    }
+
     fn response(&self, core: &Core) -> Response {
         Response { lead: integrators::lead(core.integrator), penalty: false }
     }
