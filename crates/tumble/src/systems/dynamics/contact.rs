@@ -25,7 +25,7 @@ pub struct Step {
     pub t: f64,
     /// Its length [s].
     pub h: f64,
-    /// Speed of approach below which nothing bounces [m/s]: what gravity gives in two steps.
+    /// Speed of approach below which nothing bounces [m/s]: the speed that gravity gives in two steps.
     pub resting: f64,
     /// Of the scheme: the velocity of the path is v + lead h a.                                    (contact.14)
     pub lead: f64,
@@ -84,16 +84,16 @@ impl Pass<'_> {
 /// Moves one mass out of the solids and gives it the velocity after the impact; says whether it touched one. `before` is
 /// where it was when the step began, and its velocity then.
 ///
-/// First what it met on its way, impact by impact; then, where it ended too deep, position: out along the normal; of the
+/// First the solids on its way, impact by impact; then, where it ended too deep, position: out along the normal; of the
 /// way made along the surface as much is taken back as friction allows, mu times the depth. Velocity: v_n -> -e v_n, and
-/// v_t loses at most mu times the change of v_n, all relative to the surface. `hits` is told what it hits faster than
+/// v_t loses at most mu times the change of v_n, all relative to the surface. `hits` is told of impacts faster than
 /// `resting`.                                                                        (contact.2, contact.3)
 fn resolve(colliders: &[Collider], step: &Step, before: (Row, Row), x: &mut Row, v: &mut Row, mut hits: impl FnMut(Hit)) -> bool {
     let pull = (xyz64(*v) - xyz64(before.1)) * (1.0 / step.h);
     let ahead = pull * (step.lead * step.h);
     let mut touched = meet(colliders, step, before, (pull, ahead), x, v, &mut hits);
     for collider in colliders {
-        // A container bends towards what goes along its wall, and has corners where three walls meet.
+        // A container bends towards masses that go along its wall, and has corners where three walls meet.
         for _ in 0..if collider.inside { 3 } else { 1 } {
             let (position, velocity) = (xyz64(*x), xyz64(*v));
             let Some(Touch { depth, normal, velocity: surface }) = collider.touch(position, step.end()) else { break };
@@ -171,7 +171,7 @@ fn meet(
         let rest = step.h - gone;
         let (press, lift) = (pull.dot(n), start.dot(n) + ahead.dot(n).min(0.0));
         if lift <= 0.01 * step.resting && press < 0.0 {
-            // It stays on the surface, which takes what presses, and rubs.
+            // It stays on the surface, which takes the pressing part, and rubs.
             let free = start + (pull - n * press) * rest;
             let slide = free - n * free.dot(n);
             let after = free - rubbed(slide, collider.friction, -press * rest);
@@ -282,7 +282,7 @@ pub struct Penalty {
 impl Penalty {
     /// The contacts of a mass at x with velocity v, with this penalty stiffness [N/m]. Friction takes its normal force from
     /// `start`, where the mass was when the stage began: with that force held fixed friction has a convex potential, and
-    /// Newton's method converges. So does it with the coefficient of what rests or slides then, faster than `resting`.
+    /// Newton's method converges. So does it with the coefficient of rest or of sliding, faster than `resting`, at that time.
     ///
     /// `times` are those of the start and of the end of the stage.
     pub fn of(

@@ -1,4 +1,4 @@
-//! State and laws of a system of masses: what schemes and features act on.
+//! State and laws of a system of masses, on which schemes and features act.
 
 use super::contact::{Pass, Response, Step};
 use super::feature::Span;

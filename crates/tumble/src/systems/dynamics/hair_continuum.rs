@@ -2,7 +2,7 @@
 //!
 //!   M_i = sum_p m_p w_ip,   V_i = sum_p m_p w_ip v_p/M_i,   v_p += (1 - exp(-friction h)) (sum_i w_ip V_i - v_p)     (hair.5)
 //!
-//! w is trilinear. Pressure goes through the faces between nodes, the lesser of both: what one node gets its neighbour loses, and momentum
+//! w is trilinear. Pressure goes through the faces between nodes, the lesser of both: one node gains its neighbour's loss, and momentum
 //! is kept to round-off (hair.6). Held points take no part. Sources: [petrovic2005], [mcadams2009]. Differs: no projection to zero divergence, hair
 //! may thin out. Breaks: h sqrt(pressure/rest density) above a cell. Verified in `tests/hair.rs`.
 

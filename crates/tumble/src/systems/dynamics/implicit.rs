@@ -67,7 +67,7 @@ pub struct Motion<'a> {
     pub implicit: &'a mut Implicit,
 }
 
-/// The matrix as an operator, with block Jacobi: a pinned row gets 0, so that what the residual holds there never matters.
+/// The matrix as an operator, with block Jacobi: a pinned row gets 0, so that its residual never matters.
 struct Matrix<'a> {
     batches: &'a mut [Box<dyn Batch>],
     x: &'a [Row],

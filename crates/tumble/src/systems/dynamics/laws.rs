@@ -1,4 +1,4 @@
-//! The right-hand side: what accelerates the masses at (t, x, v).
+//! The right-hand side: accelerations of the masses at (t, x, v).
 
 use crate::elements::Batch;
 use crate::forces::{Force, Group};
@@ -166,7 +166,7 @@ pub fn flat(rows: &[Row]) -> Vec<f64> {
     rows.iter().flat_map(|r| [f64::from(r[0]), f64::from(r[1]), f64::from(r[2])]).collect()
 }
 
-/// f/m + g; what is pinned does not fall.
+/// f/m + g; pinned masses do not fall.
 struct Weigh;
 
 impl Each for Weigh {

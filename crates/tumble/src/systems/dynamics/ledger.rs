@@ -44,7 +44,7 @@ impl Dynamics {
         }
     }
 
-    /// Takes the scale of the energy from the start: what moves and stretches, a fall by the system's own size, and
+    /// Takes the scale of the energy from the start: kinetic and elastic energy, a fall by the system's own size, and
     /// gravitation.
     pub(super) fn set_scale(&mut self) {
         let n = self.core.laws.masses.points;
@@ -63,7 +63,7 @@ impl Dynamics {
     }
 
     /// Takes the scale of the energy from the ledger of a good frame. Energy that came from nowhere does not count, or a slow
-    /// explosion would carry its scale along; where others push, nobody knows where energy came from.
+    /// explosion would carry its scale along; pushes of other systems bring energy of unknown origin.
     pub(super) fn rescale(&mut self, ledger: &Ledger) {
         let drives = self.core.laws.colliders.iter().any(|c| c.moves()) || self.core.laws.batches.iter().any(|b| b.drives().is_some());
         let driven = self.pushed || !self.features.followers.is_empty() || drives || !self.core.laws.user.is_empty();
@@ -79,7 +79,7 @@ impl Dynamics {
         }
     }
 
-    /// The ledger at time t [s], or what has broken down.
+    /// The ledger at time t [s], or the breakdown.
     pub(super) fn checked_ledger(&self, t: f64) -> Result<Ledger, StepError> {
         let state = &self.core.state;
         let ledger = self.ledger_at(t);

@@ -2,7 +2,7 @@
 //!
 //! A particle is born at its own moment: it takes one step of its own length to the end of the sub-step that it is born in, by
 //! the midpoint rule (more where that is too long a step for the forces), under the forces on single masses; from there on it goes with all others. The dead leave when the
-//! exchange interval ends, and who is born of them is born where and when they died.              (particles.11)
+//! exchange interval ends, and their children are born where and when they died.              (particles.11)
 
 use super::contact::{Pass, Step as Contact};
 use super::core::{BLOCK, Between, Core};
@@ -30,7 +30,7 @@ struct Newborn {
 }
 
 impl Core {
-    /// Those who are there at the start.
+    /// Births at the start.
     pub fn begin_life(&mut self, dt: f64) -> Result<(), StepError> {
         let mut unborn = self.pool.schedule_births(&self.name, -dt, dt)?;
         self.insert_births(&mut unborn, 0.0, dt, 0.0)
@@ -105,7 +105,7 @@ impl Core {
             let pieces = (longest / h * (1.0 - 1e-9)).max(2.0 * longest * rate).ceil().clamp(1.0, PIECES);
             let tau = |i: usize| (span(i) / pieces) as Real;
             for k in 0..pieces as usize {
-                // The time of the one who goes the longest way; all end at the same.
+                // The time of the earliest birth; all end at the same.
                 let time = until - longest * (1.0 - k as f64 / pieces);
                 motion.rate(time, x, v, &mut a)?;
                 for i in 0..n {
@@ -180,7 +180,7 @@ impl Core {
     }
 
     /// At the time t, where an interval of length dt [s] ends: the dead leave, and children of the dead and of the living come.
-    /// Parents stand before their children, so that who is born here may bear, and die, here.
+    /// Parents stand before their children, so that newborn may have children, and die, here.
     pub fn remove_dead(&mut self, t: f64, dt: f64, h: f64) -> Result<(), StepError> {
         let n = self.pool.len();
         let mut born: Vec<Vec<Birth>> = vec![Vec::new(); n];

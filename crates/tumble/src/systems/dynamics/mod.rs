@@ -154,8 +154,8 @@ impl Dynamics {
         }
     }
 
-    /// Anchors to other systems: half of the interaction that this system owns. Each is an impulse h f, so what one side
-    /// gets the other loses, whatever the integrator.
+    /// Anchors to other systems: half of the interaction that this system owns. Each is an impulse h f, so one side
+    /// gains exactly the other's loss, whatever the integrator.
     fn apply_anchors(&mut self, h: f64, exchange: &mut Exchange) {
         for anchor in &self.anchors {
             let (other, state) = (exchange.port(anchor.port), &self.core.state);

@@ -119,7 +119,7 @@ pub struct Parts {
     /// Strains at which segments of rods break.
     pub(super) rod_limits: Vec<f64>,
     pub(super) energy_at_rest: [f64; 2],
-    /// Points that follow colliders, by their places in the world at t = 0, and those whose places in what they follow are known.
+    /// Points that follow colliders: by their places in the world at t = 0, and by places in the frames of their carriers.
     pub(super) followers: Vec<Follower>,
     pub(super) carried: Vec<Follower>,
     pub(super) objects: Vec<Draft>,
@@ -142,7 +142,7 @@ pub(super) struct Draft {
 }
 
 impl Parts {
-    /// Begins an object; what is added from here on belongs to it.
+    /// Begins an object, to which all later additions belong.
     pub fn begin(&mut self, name: &str, radius: f64) {
         let (p, f) = (self.points.len(), self.frames.len());
         let object = Object { name: name.into(), points: p..p, frames: f..f, radius, ..Object::default() };

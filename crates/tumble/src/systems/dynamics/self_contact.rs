@@ -22,11 +22,11 @@ use tumble_interface::warning::{Code, Warning};
 const ASIDE: f64 = 0.5;
 /// That reach over the thickness, at least and at most.
 const REACH: (f64, f64) = (1.5, 8.0);
-/// Rounds in which a bad start, or what the fastest have passed, is untangled before each exchange interval; and in which pairs are pushed apart
-/// after a step of a scheme that has no sweeps.
+/// Rounds in which a bad start, or a passage of the fastest, is untangled before each exchange interval; and in which pairs are pushed
+/// apart after a step of a scheme that has no sweeps.
 const ROUNDS: usize = 4;
-/// Rounds in which what starts too near is parted.
-const PARTINGS: usize = 16;
+/// Rounds in which surfaces that start too near are separated.
+const SEPARATIONS: usize = 16;
 
 /// Surfaces of a system, and the pairs of features that are near each other.
 pub struct SelfContact {
@@ -92,14 +92,14 @@ impl SelfContact {
         soft.then_some(contact)
     }
 
-    /// The longest edge of what is soft, where it starts [m].
+    /// The longest edge of soft surfaces at the start [m].
     pub fn longest_edge(&self) -> f64 {
         let soft = |e: &&[u32; 2]| (e[0].max(e[1]) as usize) < self.features.points();
         let length = |[a, b]: &[u32; 2]| (xyz64(self.rest[*a as usize]) - xyz64(self.rest[*b as usize])).norm();
         self.topology.edges().iter().filter(soft).map(length).fold(0.0, f64::max)
     }
 
-    /// Takes up what has torn.
+    /// Follows surfaces that have torn.
     pub fn renew(&mut self, objects: &[Object], tears: &[Tear]) {
         self.topology = self.meeting(objects, tears);
         self.detector = Detector::new();
@@ -152,7 +152,7 @@ impl SelfContact {
         Some(Crossing { count, vertices, other })
     }
 
-    /// How many edges pass through triangles at the start, what the first two are, and where [m]; `None` if there are none.
+    /// The number of edges that pass through triangles at the start, the objects of the first, and its place [m]; `None` if there are none.
     fn tangles(&self, objects: &[Object], x: &[Row]) -> Option<(usize, [String; 2], Vector)> {
         let Crossing { count, vertices, other } = self.crossing(x, 0.0)?;
         let place = vertices.iter().fold(Vector::default(), |sum, i| sum + xyz64(x[*i as usize])) * (1.0 / vertices.len() as f64);
@@ -172,7 +172,7 @@ impl SelfContact {
     /// Separates surfaces nearer than their thickness, all at rest: a push within a step would be a speed.
     fn separate(&mut self, x: &mut [Row], features: &SolidFeatures) {
         let thickness = self.topology.largest_thickness();
-        for _ in 0..PARTINGS {
+        for _ in 0..SEPARATIONS {
             self.detector.detect(&self.topology, x, REACH.0 * thickness);
             let start = x.to_vec();
             let pairs = self.detector.pairs().iter().filter(|pair| !features.is_mass(pair));
@@ -184,7 +184,7 @@ impl SelfContact {
         }
     }
 
-    /// How many vertices that could move lie exactly where others do, whose objects the first two are, and where [m]; `None` if none do.
+    /// The number of vertices that could move and lie exactly where others do, the objects of the first, and its place [m]; `None` if none do.
     fn coincident_vertices(&self, objects: &[Object], x: &[Row]) -> Option<(usize, [String; 2], Vector)> {
         let x = &*self.features.joined(x, 0.0);
         let mut points = self.topology.points().to_vec();
@@ -300,7 +300,7 @@ impl Feature for SelfContact {
         self.features.run_belts(step);
     }
 
-    /// Pushes pairs apart that are too near, with friction on what they slide in the sub-step.
+    /// Pushes pairs apart that are too near, with friction on their slide in the sub-step.
     fn sweep(&mut self, core: &mut Core) {
         let Self { detector, friction, features, .. } = self;
         let (before, points) = (&core.before, features.points());

@@ -42,7 +42,7 @@ pub struct SolidFeatures {
 }
 
 impl SolidFeatures {
-    /// Those of the colliders whose edges meet anything.
+    /// Features of the colliders that have edges.
     pub fn new(colliders: &Arc<Vec<Collider>>, points: usize) -> Self {
         let mut all = Self { colliders: colliders.clone(), points, ..Self::default() };
         let mut first = 0;
@@ -71,7 +71,7 @@ impl SolidFeatures {
         self.list.iter().flat_map(move |solid| self.colliders[solid.collider].corners(t)).map(|x| row(real(x), 0.0))
     }
 
-    /// Adds them to what can meet, beside what is soft with this `thickness` [m].                                  (contact.23)
+    /// Adds them to the topology, beside soft surfaces of this `thickness` [m].                                  (contact.23)
     pub fn add_to(&self, topology: &mut Topology, thickness: f64) {
         for solid in &self.list {
             let collider = &self.colliders[solid.collider];
@@ -195,7 +195,7 @@ impl SolidFeatures {
     }
 }
 
-/// Whether what is so deep below the thickness of a solid is beyond its surface, too.
+/// Whether a point so deep below the thickness of a solid is beyond its surface, too.
 fn is_inside(collider: &Collider, depth: f64, at: Vector) -> bool {
     depth > collider.thickness + TOUCH * (1.0 + at.norm())
 }

@@ -125,7 +125,7 @@ impl Core {
         enclosed(&object.triangles, |i| xyz64(self.state.x[object.points.start + i as usize]))
     }
 
-    /// Energy [J] that a thing at rest may seem to hold: a thousand times what its links store because positions are rounded.
+    /// Energy [J] that a thing at rest may seem to hold: a thousand times the energy of its links from rounded positions.
     pub fn noise(&self) -> f64 {
         let (x, grip) = (&self.state.x, &self.laws.grip);
         let rounding = |i: usize| f64::from(Real::EPSILON) * xyz64(x[i]).norm();

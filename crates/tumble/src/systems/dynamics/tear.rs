@@ -1,6 +1,6 @@
 //! Surfaces that tear. Where an edge is stretched beyond its strength, one of its two vertices comes apart: the triangles around it that
-//! lie ahead of the plane through it, across the edge, go to a copy of it; each copy weighs what its triangles brought along, and
-//! moves on with the same velocity. What then hangs together by a vertex alone comes apart, too.
+//! lie ahead of the plane through it, across the edge, go to a copy of it; each copy has the mass of its triangles, and moves on
+//! with the same velocity. Pieces that then hang together by a vertex alone come apart, too.
 //!
 //! The triangles say everything: masses, and between which rows every element acts, follow from them, so that they are all that a
 //! snapshot needs. Strength is (cloth.3). An element of a triangle goes with it; one across an edge breaks where the edge has opened. Links along an edge
@@ -114,7 +114,7 @@ impl<'a> Edges<'a> {
         self.of.get(&sorted(a, b)).map_or(&[], |c| &c[..])
     }
 
-    /// The corners of an edge and of what lies opposite to it on either side, and those that are the ends of the edge on both sides.
+    /// The corners of an edge and those opposite to it on either side, and those that are the ends of the edge on both sides.
     fn hinge(&self, [a, b, c, d]: [u32; 4]) -> Option<([u32; 4], [[u32; 2]; 2])> {
         let with = |row: u32| self.at([a, b]).iter().copied().find(|at| self.corner(*at, row).is_some());
         let [t, u] = [with(c)?, with(d)?];
@@ -207,7 +207,7 @@ pub struct Tear {
     /// Mass of each corner, and of each vertex at the start [kg].
     share: Vec<[f64; 3]>,
     mass: Vec<Real>,
-    /// The inverse masses of vertices at the start; 0 for what is held.
+    /// The inverse masses of vertices at the start; 0 for held ones.
     inverse: Vec<Real>,
     ties: Vec<Ties>,
 }
@@ -357,7 +357,8 @@ impl Tear {
         parts
     }
 
-    /// Takes a vertex apart across a direction; `None` if all of its triangles lie on one side or no copy is left. Returns who was touched.
+    /// Takes a vertex apart across a direction; `None` if all of its triangles lie on one side or no copy is left. Returns the number of
+    /// splits and the vertices touched.
     fn split(&mut self, row: u32, across: Vec3<f64>, x: &mut [Row], v: &mut [Row]) -> Option<(u64, Vec<u32>)> {
         let fan = self.fan(row);
         let here = xyz64(x[row as usize]);
@@ -381,7 +382,7 @@ impl Tear {
         Some((splits, touched))
     }
 
-    /// Takes apart what is strained too much; returns how many vertices came apart.
+    /// Splits vertices of edges beyond their strength; returns how many came apart.
     pub fn split_strained(&mut self, x: &mut [Row], v: &mut [Row]) -> u64 {
         let (mut done, mut touched): (u64, Vec<u32>) = (0, Vec::new());
         for corner in self.strained(x) {

@@ -1,4 +1,4 @@
-//! Forces under an integrator: x'' = f(x, v, t)/m. Whatever must hold of positions alone is corrected after the step.
+//! Forces under an integrator: x'' = f(x, v, t)/m. Conditions on positions alone are corrected after the step.
 
 use super::super::contact::Response;
 use super::super::core::Core;
@@ -19,7 +19,7 @@ use tumble_interface::engine::{StepReport, UserIntegrator};
 use tumble_interface::scene::{Adaptive, Integrator};
 use tumble_interface::{SceneError, StepError};
 
-/// An integrator, the user's in its place, and what both need between steps.
+/// An integrator, or the user's in its place, with their storage between steps.
 pub struct Forces {
     adaptive: Adaptive,
     implicit: Implicit,
@@ -29,7 +29,7 @@ pub struct Forces {
     unclamped: Vec<Row>,
 }
 
-/// Refuses what only projected elements can be.
+/// Refuses parts that only projected elements can be.
 pub fn check(parts: &Parts, settings: &Settings) -> Result<(), SceneError> {
     if let Some(path) = parts.global_constraint() {
         let message = "a constraint on all masses at once, which only position-based dynamics knows; set method = \"position_based\"";

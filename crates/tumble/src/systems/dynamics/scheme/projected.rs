@@ -1,10 +1,10 @@
 //! Position-based dynamics: elements are no forces but constraints on positions, satisfied one after the other. The lines of a step are
-//! those of Algorithm 1 of [bender2015]; what a constraint is and how far it is satisfied stands in `elements/constraints.rs`.
+//! those of Algorithm 1 of [bender2015]; constraints, and how far they are satisfied, are defined in `elements/constraints.rs`.
 //!
 //!   v += h f_ext/m,   x = x_old + h v,   n times: x += dx of each element,   v = (x - x_old)/h       (positions.1)
 //!
-//! One sweep over compliant elements a sub-step is a step of implicit Euler to first order in h [macklin2019]; what is not satisfied yet
-//! makes things softer, and in steps much longer than the default shakes stiff sheets. Verified in `tests/position_based.rs`.
+//! One sweep over compliant elements a sub-step is a step of implicit Euler to first order in h [macklin2019]; unsatisfied elements
+//! make things softer, and in steps much longer than the default shake stiff sheets. Verified in `tests/position_based.rs`.
 
 use super::super::contact::Response;
 use super::super::core::{BLOCK, Core};
@@ -27,7 +27,7 @@ use tumble_interface::scene::{PositionBased, Projection as ProjectionMode};
 use tumble_interface::warning::{Code, Warning};
 use tumble_interface::{SceneError, StepError};
 
-/// How far rods may be softer than they should, and of what share of gravity positions may know nothing, before that is told.
+/// Softening of rods by round-off, and the share of gravity that positions may lose to it, beyond which a scene is warned.
 const SOFTER: f64 = 1.05;
 const UNKNOWN: f64 = 0.1;
 
@@ -215,7 +215,7 @@ impl Scheme for Projected {
     }
 }
 
-/// v + ((x - x_old)/h - v) of points, as the change of what was predicted.
+/// v + ((x - x_old)/h - v) of points, as the change of the predicted velocity.
 struct Velocities<'a> {
     v: &'a mut [Row],
     x: &'a [Row],
