@@ -87,7 +87,8 @@ impl Core {
         let mut x: Vec<Row> = births.iter().map(|b| row(b.x, (1.0 / self.pool.emitter(s).mass(b.id)) as Real)).collect();
         let mut v: Vec<Row> = births.iter().map(|b| row(b.v, 0.0)).collect();
         let (laws, colliders, resting) = (&self.laws, &self.laws.colliders[..], self.resting_speed(h));
-        let observed: &[Range<usize>] = if self.pool.heeds_hits(s) { &[0..usize::MAX] } else { &[] };
+        let every = 0..usize::MAX;
+        let observed: &[Range<usize>] = if self.pool.heeds_hits(s) { std::slice::from_ref(&every) } else { &[] };
         let touch =
             |i: usize, (t, h, lead): (f64, f64, f64), before: (Row, Row), x: &mut Row, v: &mut Row, hits: &mut Vec<(usize, Hit)>| {
                 let pass = Pass { colliders, step: Contact { t, h, resting, lead, observed: false }, penalty: false, observed };
