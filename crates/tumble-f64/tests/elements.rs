@@ -284,10 +284,10 @@ fn largest<E: Element<N, M, D>, const N: usize, const M: usize, const D: usize>(
     lost: &[u32],
 ) -> [f64; 2] {
     let mut batch = Elements::<E, Linear, N, M, D, 0>::new(x.len(), members).unwrap();
-    batch.give_up(lost);
+    batch.break_elements(lost);
     let inverse = vec![1.0; x.len() - points];
     let mut constraints = Projected::<E, Linear, N, M, D, 0>::new(x.len(), points, &inverse, members, &[]).unwrap();
-    constraints.give_up(lost);
+    constraints.break_elements(lost);
     [batch.largest_strain(x), constraints.largest_strain(x)]
 }
 

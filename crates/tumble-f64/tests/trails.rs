@@ -24,7 +24,7 @@ fn turn(integrator: Integrator, n: u32, flat: Option<usize>) -> f64 {
     let u = Vectors::of(grid, "m/s", |x| [x[2] - 0.05, 0.0, -(x[0] - 0.1)]).unwrap();
     let mut exchange = Exchange::default();
     exchange.listen("air");
-    exchange.blow("air", 0.0, &u);
+    exchange.publish_velocities("air", 0.0, &u);
     let flow = Flow { fields: vec![Current::OnGrid(OnGrid { fluid: "air".into(), ..OnGrid::default() })], flat };
     let settings = Settings { name: "dust".into(), integrator, substeps: Some(n), step: None, adaptive: Default::default() };
     let start = [0.8, 0.0, -0.3];

@@ -135,9 +135,9 @@ impl Exchange {
         self.send(Letter { port, impulse, steady: false });
     }
 
-    /// Posts an impulse [N s] to a port: that of a constant force while it moves through its next interval. What balances another
-    /// constant force has to come so: as a kick it would move what rests.                                       (coupling.6)
-    pub fn lean(&mut self, port: Port, impulse: Vector) {
+    /// Posts an impulse [N s] to a port: that of a constant force while it moves through its next interval. Post reaction
+    /// forces as steady: as a kick they would set resting bodies in motion.                                     (coupling.6)
+    pub fn post_steady(&mut self, port: Port, impulse: Vector) {
         self.send(Letter { port, impulse, steady: true });
     }
 
@@ -186,7 +186,7 @@ impl Exchange {
     }
 
     /// The velocities of a fluid on faces [m/s] at time t [s], if anybody wants to know.
-    pub fn blow(&mut self, fluid: &str, t: f64, u: &Vectors) {
+    pub fn publish_velocities(&mut self, fluid: &str, t: f64, u: &Vectors) {
         if let Some(wind) = self.winds.iter_mut().find(|wind| wind.fluid == fluid) {
             wind.states.retain(|(time, _)| *time < t);
             wind.states.push((t, Arc::new(u.clone())));
@@ -255,7 +255,7 @@ mod tests {
         assert_eq!((exchange.fluxes()[0].heat, exchange.fluxes()[0].mass), (2.0, 1.0));
         exchange.post(a, [1.0, 0.0, 0.0].into());
         exchange.post(b, [0.0, 2.0, 0.0].into());
-        exchange.lean(b, [0.0, 0.0, 3.0].into());
+        exchange.post_steady(b, [0.0, 0.0, 3.0].into());
         let mut copy = exchange.clone();
         copy.take(0);
         copy.enter(surface, 9.0, 9.0);

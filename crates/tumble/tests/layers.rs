@@ -227,7 +227,7 @@ fn the_test_sees_what_it_forbids() {
     assert_eq!(check(&["systems", "dynamics"], "use super::tracers::Tracers;\nuse crate::systems::tracers;"), 2);
     assert_eq!(check(&["systems", "dynamics"], "mod tests { use super::*; use super::super::tracers; }"), 1);
     assert_eq!(
-        check(&["systems", "dynamics", "books"], "use super::Dynamics; use super::super::dynamics::laws; use super::super::tracers;"),
+        check(&["systems", "dynamics", "ledger"], "use super::Dynamics; use super::super::dynamics::laws; use super::super::tracers;"),
         1
     );
     assert_eq!(check(&["systems"], "use crate::systems::dynamics::Parts;"), 0);

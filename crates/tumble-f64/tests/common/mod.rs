@@ -48,6 +48,14 @@ pub fn column(sim: &Simulation, object: &str, name: &str) -> Vec<Vector> {
     }
 }
 
+/// Intersections that are counted once the first `moved` vertices of an object have gone so far: the sign that the counter is alive. The
+/// state of the simulation is lost.
+pub fn intersections_after(sim: &mut Simulation, object: &str, moved: usize, by: impl Fn(Vector) -> Vector) -> u64 {
+    let x = positions(sim, object).into_iter().enumerate().map(|(i, x)| if i < moved { x + by(x) } else { x });
+    write(sim, object, "position", &x.collect::<Vec<_>>());
+    sim.ledger().intersections
+}
+
 /// A column of a grid, and its points along each axis.
 pub fn grid(sim: &Simulation, object: &str, name: &str) -> (Vec<f64>, Vec<usize>) {
     let frame = sim.frame(&[name]);

@@ -1,24 +1,12 @@
 //! Many elements of one kind behind one small trait, so that no system knows which kinds there are.
 
-use super::list::{List, Members};
+use super::list::{List, Members, Weights};
 use super::{Element, Law};
 use crate::linalg::blocks::Block;
 use crate::math::parallel::{CHUNK, Tasks, chunks, fold};
 use crate::math::simd::{Index, Kernel, Width, dispatch, packs};
 use crate::math::{Real, Row, ZERO, add};
 use std::ops::Range;
-use tumble_interface::scene::Hessian;
-
-/// How much of the stiffness matrix K and of the damping matrix D a product holds.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Weights {
-    /// Factor of K.
-    pub stiffness: Real,
-    /// Factor of D [1/s].
-    pub damping: Real,
-    /// Which K.
-    pub hessian: Hessian,
-}
 
 /// Elements of one kind. Rows of `x` are points and frames; rows of everything else hold three numbers per node.
 pub trait Batch: Send + Sync {
@@ -90,7 +78,7 @@ pub trait Batch: Send + Sync {
     /// Puts nodes of elements, as (element, node), onto other rows.
     fn rewire(&mut self, _changes: &[(u32, usize, u32)]) {}
     /// Breaks elements for good.
-    fn give_up(&mut self, _elements: &[u32]) {}
+    fn break_elements(&mut self, _elements: &[u32]) {}
     /// Mends all links, then breaks these.
     fn set_broken(&mut self, _broken: &[u32]) {}
 }
@@ -155,7 +143,7 @@ pub struct Elements<E, Y, const N: usize, const M: usize, const D: usize, const 
     incidence: Incidence,
     slots: Vec<Row>,
     energy_at_rest: f64,
-    /// What has broken: element, stiffness and damping that would mend it.
+    /// Broken elements, with the stiffness and damping that would mend each.
     broken: Vec<(u32, Real, Real)>,
 }
 
@@ -309,7 +297,7 @@ impl<E: Element<N, M, D>, Y: Law<P>, const N: usize, const M: usize, const D: us
         self.incidence = Incidence::new(&self.list.nodes);
     }
 
-    fn give_up(&mut self, elements: &[u32]) {
+    fn break_elements(&mut self, elements: &[u32]) {
         for e in elements {
             let (k, b) = (&mut self.list.stiffness[*e as usize], &mut self.list.damping[*e as usize]);
             if *k != 0.0 || *b != 0.0 {
@@ -327,6 +315,6 @@ impl<E: Element<N, M, D>, Y: Law<P>, const N: usize, const M: usize, const D: us
         for (e, stiffness, damping) in std::mem::take(&mut self.broken) {
             (self.list.stiffness[e as usize], self.list.damping[e as usize]) = (stiffness, damping);
         }
-        self.give_up(broken);
+        self.break_elements(broken);
     }
 }

@@ -1,7 +1,6 @@
 //! Elements of one kind as columns, with everything about them that needs no scratch: energies, products of single
 //! elements.
 
-use super::batch::Weights;
 use super::{Element, Law, energy, gauss_newton, hessian, tangents};
 use crate::math::parallel::{fold, worst};
 use crate::math::simd::{Index, Kernel, Scalar, Sum, Width, dispatch, largest, packs};
@@ -25,6 +24,17 @@ pub struct Members<const N: usize, const D: usize, const P: usize> {
     pub damping: f64,
 }
 
+/// How much of the stiffness matrix K and of the damping matrix D a product holds.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Weights {
+    /// Factor of K.
+    pub stiffness: Real,
+    /// Factor of D [1/s].
+    pub damping: Real,
+    /// Which K.
+    pub hessian: Hessian,
+}
+
 /// Elements E with the law Y over N nodes, with M measures, D rest numbers and P law parameters, as columns.
 pub struct List<E, Y, const N: usize, const M: usize, const D: usize, const P: usize> {
     pub nodes: [Index; N],
@@ -37,7 +47,7 @@ pub struct List<E, Y, const N: usize, const M: usize, const D: usize, const P: u
     kind: PhantomData<(E, Y)>,
 }
 
-/// What one pack of elements loads.
+/// The numbers of one pack of elements.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Pack<L, const D: usize, const P: usize> {
     pub rest: [L; D],

@@ -16,28 +16,28 @@ mod distance;
 mod isometric;
 mod law;
 mod list;
+mod long_range_attachments;
 mod membrane;
 mod neighbours;
 mod pairs;
 mod rod;
-mod tethers;
 mod tetrahedron;
 mod vector;
 mod woven;
 
 pub use crate::linalg::blocks::Block;
-pub use batch::{Batch, Elements, Incidence, Weights};
+pub use batch::{Batch, Elements, Incidence};
 pub use bend::Hinge;
 pub use constraints::{Constraints, Density, Neohookean, Projected, Projection, Shape, Strands, Volume, behind, enclosed, spline};
 pub use contact::PointPlane;
 pub use distance::{Distance, Limit};
 pub use isometric::IsometricBend;
 pub use law::{Law, Linear, Nonlinear};
-pub use list::Members;
+pub use list::{Members, Weights};
+pub use long_range_attachments::LongRangeAttachments;
 pub use membrane::{Area, Membrane};
 pub use pairs::{Pair, Pairs};
 pub use rod::{BendTwist, StretchShear};
-pub use tethers::Tethers;
 pub use tetrahedron::{TetShear, TetStrain, TetVolume, rest_matrix};
 pub use vector::Vector;
 pub use woven::{Moment, Woven};
@@ -67,7 +67,7 @@ pub trait Element<const N: usize, const M: usize, const D: usize>: Send + Sync +
     fn lengthening<L: Lane>(_rest: [L; D], _x: [[L; 4]; N]) -> Option<L> {
         None
     }
-    /// What tension adds to the product of the definite Hessian with u: the part of y d²r/dx² that is never negative. y is the stress.
+    /// The share of tension in the product of the definite Hessian with u: the part of y d²r/dx² that is never negative. y is the stress.
     #[inline(always)]
     fn tension<L: Lane>(_rest: [L; D], _x: [[L; 4]; N], _y: [L; M], _u: [Vec3<L>; N]) -> Option<[Vec3<L>; N]> {
         None
@@ -235,7 +235,7 @@ pub fn tangents<E: Element<N, M, D>, Y: Law<P>, L: Lane, const N: usize, const M
     r
 }
 
-/// What the projection of an element knows beside its positions.
+/// Numbers that the projection of an element takes beside its positions.
 #[derive(Clone, Copy)]
 pub struct Compliance<L> {
     /// 1/((k + b/h) h²), 0 for a rigid element.

@@ -1,8 +1,8 @@
 //! Elements between two points, gathered: every point sums over its own list of neighbours. Each spring is evaluated from
 //! both ends, which costs arithmetic and saves the pass through memory, and the two evaluations are exact opposites.
 
-use super::batch::{Batch, Weights};
-use super::list::{List, Members};
+use super::batch::Batch;
+use super::list::{List, Members, Weights};
 use super::neighbours::{Columns, Neighbours, SLICE};
 use super::{Distance, Element, Law, Vector};
 use crate::linalg::blocks::Block;
@@ -486,7 +486,7 @@ impl<E: Pair<M, D>, Y: Law<P>, const M: usize, const D: usize, const P: usize> B
         }
     }
 
-    fn give_up(&mut self, elements: &[u32]) {
+    fn break_elements(&mut self, elements: &[u32]) {
         for e in elements {
             if self.list.stiffness[*e as usize] != 0.0 || self.list.damping[*e as usize] != 0.0 {
                 self.tear(*e);

@@ -170,9 +170,9 @@ impl Pool {
         Some(&column[rows.start - self.first..rows.end - self.first])
     }
 
-    /// Everyone grows older by dt [s]; tells who of each emitter will be born in (t, t + dt] by itself, in the order of their
-    /// birth. `system` is the name of the pool's.
-    pub fn conceive(&mut self, system: &str, t: f64, dt: f64) -> Result<Vec<Vec<Birth>>, StepError> {
+    /// Ages everyone by dt [s]; returns the births of each emitter in (t, t + dt], children of particles left out, in order. `system` is
+    /// the name of the pool's.
+    pub fn schedule_births(&mut self, system: &str, t: f64, dt: f64) -> Result<Vec<Vec<Birth>>, StepError> {
         self.interval = dt;
         let older = dt as Real;
         chunks(&mut self.age, |_, ages| ages.iter_mut().for_each(|age| *age += older));

@@ -92,7 +92,7 @@ pub fn hair(site: &mut Site<'_>, thing: &Hair, seed: u32, ground: &Ground<'_>) {
         object.curve_points = n;
     }
     if let Some(words) = &thing.collisions {
-        site.parts.coat(words.clone());
+        site.parts.hair_continuum(words.clone());
     }
 }
 

@@ -174,7 +174,7 @@ pub fn build(scene: &Scene, assets: &Assets) -> Result<Built, SceneError> {
         let mut system = parts.build(settings).map_err(|e| placed(scene, e))?;
         warnings.extend(system.tangles());
         warnings.extend(system.round_off(dt));
-        warnings.extend(system.idle_tethers());
+        warnings.extend(system.idle_attachments());
         if exchange.ports_of(index).next().is_some() {
             system.expect_pushes();
         }

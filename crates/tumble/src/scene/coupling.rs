@@ -3,7 +3,7 @@
 use super::checks::{objects, place};
 use crate::exchange::Exchange;
 use crate::geometry::Vector;
-use crate::systems::dynamics::{Dynamics, Parts, Tether};
+use crate::systems::dynamics::{self, Dynamics, Parts};
 use crate::systems::gas::{Body, Sheet};
 use tumble_interface::check::suggestion;
 use tumble_interface::scene::{Anchor, Gas, Method, Scene, System as Plan};
@@ -150,7 +150,13 @@ pub fn hang(system: &mut Dynamics, index: usize, anchor: &Link, dt: f64, exchang
         return;
     }
     let port = exchange.open(t, b as usize);
-    system.tether(Tether { row: a as usize, port, stiffness: anchor.stiffness, damping: anchor.damping, rest_length: anchor.rest_length });
+    system.add_anchor(dynamics::Anchor {
+        row: a as usize,
+        port,
+        stiffness: anchor.stiffness,
+        damping: anchor.damping,
+        rest_length: anchor.rest_length,
+    });
     let turn = dt * (anchor.stiffness * anchor.inverse_mass).sqrt();
     let damp = dt * anchor.damping * anchor.inverse_mass;
     if turn > 0.5 || damp > 0.5 {

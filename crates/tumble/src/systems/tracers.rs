@@ -56,7 +56,7 @@ impl Tracers {
 
     /// Those who are there at the start; an exchange interval has the length dt [s].
     pub fn begin_life(&mut self, dt: f64) -> Result<(), StepError> {
-        let mut unborn = self.pool.conceive(&self.settings.name, -dt, dt)?;
+        let mut unborn = self.pool.schedule_births(&self.settings.name, -dt, dt)?;
         self.deliver(&mut unborn, 0.0, 0.0);
         Ok(())
     }
@@ -96,7 +96,7 @@ impl Tracers {
     }
 
     /// At the time t, where an interval of length dt [s] ends: the dead leave, and children of the dead and of the living come.
-    fn bury(&mut self, t: f64, dt: f64) -> Result<(), StepError> {
+    fn remove_dead(&mut self, t: f64, dt: f64) -> Result<(), StepError> {
         let n = self.pool.len();
         let mut born: Vec<Vec<Birth>> = vec![Vec::new(); n];
         for s in 0..n {
@@ -185,7 +185,7 @@ impl System for Tracers {
     fn advance(&mut self, t: f64, dt: f64, _exchange: &mut Exchange, go_on: &(dyn Fn() -> bool + Sync)) -> Result<StepReport, StepError> {
         let mut report = StepReport::default();
         let (integrator, end) = (self.settings.integrator, t + dt);
-        let mut unborn = self.pool.conceive(&self.settings.name, t, dt)?;
+        let mut unborn = self.pool.schedule_births(&self.settings.name, t, dt)?;
         if integrator.is_adaptive() {
             let mut done = 0.0;
             while done < dt && go_on() {
@@ -208,7 +208,7 @@ impl System for Tracers {
                 self.deliver(&mut unborn, if done == dt { end } else { t + done }, end);
             }
             if done == dt {
-                self.bury(end, dt)?;
+                self.remove_dead(end, dt)?;
                 self.time = end;
             }
             return Ok(report);
@@ -228,7 +228,7 @@ impl System for Tracers {
             report.stepped(h);
             self.deliver(&mut unborn, if k + 1 == n { end } else { time + h }, end);
         }
-        self.bury(end, dt)?;
+        self.remove_dead(end, dt)?;
         self.time = end;
         Ok(report)
     }

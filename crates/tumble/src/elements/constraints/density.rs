@@ -15,7 +15,7 @@ use crate::math::{Lane, Real, Row, xyz64};
 use std::f64::consts::PI;
 use std::ops::Range;
 
-/// What a sweep takes back of what each particle alone would need.                                   (liquids.5)
+/// Share that a sweep takes back of the correction that each particle alone would need.                                   (liquids.5)
 const PART: Real = 0.5;
 
 /// How far beyond the outermost layer of particles, half a spacing off a wall, the liquid behind it begins, over s: that layer of a cubic
@@ -52,7 +52,7 @@ pub struct Density {
     sums: Vec<[Real; 5]>,
     pushed: Vec<[Real; 4]>,
     moves: Vec<[Real; 3]>,
-    /// What walls add to the density of each, s times its gradient, and what they would add to the last of the sums over others.
+    /// Share of walls in the density of each particle, s times its gradient, and their share in the last of the sums over others.
     against: Vec<[Real; 5]>,
     /// Multipliers so far, and what this sweep adds.
     lambda: Vec<Real>,
@@ -126,8 +126,8 @@ impl Density {
         grid.gather(&Sums { inverse: 1.0 / self.spacing }, points, sums);
     }
 
-    /// What walls add. Where several are near, the liquid between them is what none of them takes.
-    fn lean(&self, x: &[Row], walls: Walls<'_>, against: &mut Vec<[Real; 5]>) {
+    /// Adds the share of walls. Where several are near, the liquid between them is the part that none of them takes.
+    fn add_walls(&self, x: &[Row], walls: Walls<'_>, against: &mut Vec<[Real; 5]>) {
         against.clear();
         against.resize(x.len(), [0.0; 5]);
         if walls.colliders.is_empty() {
@@ -171,7 +171,7 @@ impl Constraints for Density {
         let (mut grid, mut points, mut sums) = (Neighbours::new(2.0 * self.spacing), Vec::new(), Vec::new());
         let (x, mut against) = (&x[self.rows.clone()], Vec::new());
         self.gather(&mut grid, x, &mut points, &mut sums);
-        self.lean(x, walls, &mut against);
+        self.add_walls(x, walls, &mut against);
         let of = |i: usize| grid.place(i).map_or(0.0, |place| f64::from(excess(&sums[place], &against[i])).max(0.0));
         sum(x.len(), |range| range.map(|i| 0.5 * of(i) * of(i) / self.compliance).sum())
     }
@@ -182,7 +182,7 @@ impl Constraints for Density {
         let (mut points, mut sums) = (std::mem::take(&mut self.points), std::mem::take(&mut self.sums));
         let mut against = std::mem::take(&mut self.against);
         self.gather(&mut grid, rows, &mut points, &mut sums);
-        self.lean(rows, step.walls, &mut against);
+        self.add_walls(rows, step.walls, &mut against);
         (self.grid, self.points, self.sums, self.against) = (grid, points, sums, against);
         if step.iteration == 0 || self.lambda.len() != rows.len() {
             self.lambda.clear();

@@ -15,7 +15,7 @@ use std::ops::Range;
 
 type Vector = Vec3<f64>;
 
-/// What a held mass of a rigid shape weighs in the fit, over the mass of all: each sweep leaves one part in so many of how far it is off its
+/// Weight of a held mass of a rigid shape in the fit, over the mass of all: each sweep leaves one part in so many of how far it is off its
 /// place. By its own mass a corner of a block would lead as little as it weighs.                               (shapes.4)
 const HELD: f64 = 1e4;
 
@@ -28,7 +28,7 @@ pub struct Shape {
     rest: Vec<Vector>,
     /// kappa [1/s²]; infinite if rigid.
     kappa: f64,
-    /// What each has been moved by in this sub-step [m]; empty for one sweep.
+    /// Ways of the masses in this sub-step [m]; empty for one sweep.
     moved: Vec<Vector>,
 }
 

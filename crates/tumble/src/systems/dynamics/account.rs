@@ -1,7 +1,7 @@
-//! Who has how much of the books, and where the worst numbers in them are. Asked for where a bound is broken, not in every frame.
+//! The ledger by object, and the rows of its worst numbers: asked for where a bound is broken, not in every frame.
 
 use super::Dynamics;
-use super::layers::{Crossing, Other};
+use super::self_contact::{Crossing, Other};
 use crate::math::parallel::worst;
 use crate::math::xyz64;
 use crate::state::Object;
@@ -10,11 +10,11 @@ use tumble_interface::engine::{Ledger, Share, Worst};
 
 impl Dynamics {
     pub(super) fn shares_at(&self, t: f64) -> Vec<Share> {
-        self.objects.iter().map(|o| Share { system: self.name().into(), object: o.name.clone(), ledger: self.share(o, t) }).collect()
+        self.core.objects.iter().map(|o| Share { system: self.name().into(), object: o.name.clone(), ledger: self.share(o, t) }).collect()
     }
 
     fn share(&self, object: &Object, t: f64) -> Ledger {
-        let sums = self.sums(object.points.clone(), object.frames.clone());
+        let sums = self.core.sums(object.points.clone(), object.frames.clone());
         Ledger {
             time: t,
             mass: sums.mass,
@@ -22,39 +22,44 @@ impl Dynamics {
             angular_momentum: sums.angular.into(),
             kinetic: sums.kinetic,
             speed: sums.speed_sq.sqrt(),
-            volume: if object.closed { self.volume_in(object) } else { 0.0 },
+            volume: if object.closed { self.core.volume_in(object) } else { 0.0 },
             ..Ledger::default()
         }
     }
 
     pub(super) fn worst_at(&self, t: f64) -> Vec<Worst> {
-        let (x, v, points) = (&self.state.x, &self.state.v, self.laws.masses.points);
+        let (x, v, points) = (&self.core.state.x, &self.core.state.v, self.core.laws.masses.points);
         let fastest = worst(points, |i| xyz64(v[i]).norm());
-        let deepest = worst(points, |i| self.depths(i, t).fold(f64::NEG_INFINITY, f64::max));
-        let strained =
-            self.laws.batches.iter().filter_map(|b| b.most_strained(x)).chain(self.constraints.iter().filter_map(|c| c.most_strained(x)));
+        let deepest = worst(points, |i| self.core.depths(i, t).fold(f64::NEG_INFINITY, f64::max));
+        let strained = self
+            .core
+            .laws
+            .batches
+            .iter()
+            .filter_map(|b| b.most_strained(x))
+            .chain(self.core.constraints.iter().filter_map(|c| c.most_strained(x)));
         let strained = strained.max_by(|a, b| a.0.total_cmp(&b.0));
-        let crossing = self.layers.as_ref().or(self.judge.as_ref()).and_then(|layers| layers.crossing(x, t));
+        let crossing = self.features.surfaces().and_then(|surfaces| surfaces.crossing(x, t));
         let mut all = Vec::new();
-        all.extend(fastest.map(|(i, speed)| self.blame("speed", speed, &[i as u32])));
-        all.extend(deepest.filter(|(_, depth)| *depth > 0.0).map(|(i, depth)| self.blame("penetration", depth, &[i as u32])));
-        all.extend(strained.map(|(strain, rows)| self.blame("stretch", strain + 1.0, &rows)));
+        all.extend(fastest.map(|(i, speed)| self.worst_of("speed", speed, &[i as u32])));
+        all.extend(deepest.filter(|(_, depth)| *depth > 0.0).map(|(i, depth)| self.worst_of("penetration", depth, &[i as u32])));
+        all.extend(strained.map(|(strain, rows)| self.worst_of("stretch", strain + 1.0, &rows)));
         all.extend(crossing.map(|Crossing { count, vertices, other }| {
             let other = match other {
-                Other::Soft(vertex) => self.whose(vertex as usize).0,
+                Other::Soft(vertex) => self.owner_of(vertex as usize).0,
                 Other::Solid(name) => name,
             };
-            Worst { other: Some(other), ..self.blame("intersections", count as f64, &vertices) }
+            Worst { other: Some(other), ..self.worst_of("intersections", count as f64, &vertices) }
         }));
         all
     }
 
     /// A number of these rows, which are of one object; those of another are left out.
-    fn blame(&self, measure: &'static str, value: f64, rows: &[u32]) -> Worst {
-        let owners: Vec<(String, usize)> = rows.iter().map(|i| self.whose(*i as usize)).collect();
+    fn worst_of(&self, measure: &'static str, value: f64, rows: &[u32]) -> Worst {
+        let owners: Vec<(String, usize)> = rows.iter().map(|i| self.owner_of(*i as usize)).collect();
         let object = owners.first().map_or(String::new(), |(name, _)| name.clone());
         let particles = owners.into_iter().filter(|(name, _)| *name == object).map(|(_, i)| i).collect();
-        let id = rows.first().and_then(|i| self.pool.id_of(*i as usize));
+        let id = rows.first().and_then(|i| self.core.pool.id_of(*i as usize));
         Worst { measure, value, object, other: None, particles, id, cell: None }
     }
 }

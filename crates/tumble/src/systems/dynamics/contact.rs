@@ -6,6 +6,7 @@ use crate::elements::{Block, Linear, PointPlane, forces};
 use crate::geometry::{Collider, Friction, Impact, Touch, Vector};
 use crate::math::{Real, Row, row, xyz64};
 use crate::pool::Hit;
+use std::ops::Range;
 
 /// Penalty stiffness over m/h²: a resting mass sinks in by g h²/30, 0.006 mm at 240 steps a second.
 const PENALTY: f64 = 30.0;
@@ -24,12 +25,12 @@ pub struct Step {
     pub t: f64,
     /// Its length [s].
     pub h: f64,
-    /// Speed of approach below which nothing bounces [m/s]: what gravity gives in two steps.
+    /// Speed of approach below which nothing bounces [m/s]: the speed that gravity gives in two steps.
     pub resting: f64,
     /// Of the scheme: the velocity of the path is v + lead h a.                                    (contact.14)
     pub lead: f64,
-    /// Whether anybody heeds who hits what.
-    pub heeded: bool,
+    /// Whether impacts are observed.
+    pub observed: bool,
 }
 
 impl Step {
@@ -38,19 +39,61 @@ impl Step {
     }
 }
 
+/// The part of contact that a scheme leaves to the pass.
+#[derive(Debug, Clone, Copy)]
+pub struct Response {
+    /// The velocity of its path is v + lead h a.
+    pub lead: f64,
+    /// Whether its stages have seen the solids as penalties.
+    pub penalty: bool,
+}
+
+/// The contact pass over masses after a step.
+pub struct Pass<'a> {
+    /// Solids.
+    pub colliders: &'a [Collider],
+    /// The step; whether impacts are observed depends on the row.
+    pub step: Step,
+    /// Whether the stages of the scheme have seen the solids as penalties.
+    pub penalty: bool,
+    /// Rows whose impacts are observed.
+    pub observed: &'a [Range<usize>],
+}
+
+impl Pass<'_> {
+    /// Resolves the contacts of one mass, `before` being its position and velocity when the step began; says whether it touched a solid.
+    pub fn mass(&self, row: usize, before: (Row, Row), x: &mut Row, v: &mut Row, hits: &mut Vec<(usize, Hit)>) -> bool {
+        if x[3] <= 0.0 {
+            return false;
+        }
+        let step = Step { observed: self.observed.iter().any(|rows| rows.contains(&row)), ..self.step };
+        let hits = |hit| hits.push((row, hit));
+        if self.penalty { bounce(self.colliders, &step, before, x, v, hits) } else { resolve(self.colliders, &step, before, x, v, hits) }
+    }
+
+    /// The same of the rows from `start` on.
+    pub fn rows(&self, start: usize, before: [&[Row]; 2], x: &mut [Row], v: &mut [Row], hits: &mut Vec<(usize, Hit)>) -> bool {
+        let mut touched = false;
+        for (k, (x, v)) in x.iter_mut().zip(v).enumerate() {
+            touched |= self.mass(start + k, (before[0][k], before[1][k]), x, v, hits);
+        }
+        touched
+    }
+}
+
 /// Moves one mass out of the solids and gives it the velocity after the impact; says whether it touched one. `before` is
 /// where it was when the step began, and its velocity then.
 ///
-/// First what it met on its way, impact by impact; then, where it ended too deep, position: out along the normal; of the
+/// First the solids on its way, impact by impact; then, where it ended too deep, position: out along the normal; of the
 /// way made along the surface as much is taken back as friction allows, mu times the depth. Velocity: v_n -> -e v_n, and
-/// v_t loses at most mu times the change of v_n, all relative to the surface. `hits` is told what it hits faster than
+/// v_t loses at most mu times the change of v_n, all relative to the surface. `hits` is told of impacts faster than
 /// `resting`.                                                                        (contact.2, contact.3)
-pub fn resolve(colliders: &[Collider], step: &Step, before: (Row, Row), x: &mut Row, v: &mut Row, mut hits: impl FnMut(Hit)) -> bool {
+fn resolve(colliders: &[Collider], step: &Step, before: (Row, Row), x: &mut Row, v: &mut Row, mut hits: impl FnMut(Hit)) -> bool {
     let pull = (xyz64(*v) - xyz64(before.1)) * (1.0 / step.h);
     let ahead = pull * (step.lead * step.h);
     let mut touched = meet(colliders, step, before, (pull, ahead), x, v, &mut hits);
     for collider in colliders {
-        // A container bends towards what goes along its wall, and has corners where three walls meet.
+        // A container bends towards masses that go along its wall, and has corners where three walls meet.
         for _ in 0..if collider.inside { 3 } else { 1 } {
             let (position, velocity) = (xyz64(*x), xyz64(*v));
             let Some(Touch { depth, normal, velocity: surface }) = collider.touch(position, step.end()) else { break };
@@ -61,7 +104,7 @@ pub fn resolve(colliders: &[Collider], step: &Step, before: (Row, Row), x: &mut 
             let position = position + normal * depth - along.normalized() * back;
             let approach = (velocity - surface).dot(normal);
             let velocity = rebound(collider, velocity - surface, ahead, normal, step.resting) + surface;
-            if step.heeded && approach < -step.resting {
+            if step.observed && approach < -step.resting {
                 hits(Hit { time: step.end(), x: position, v: velocity, normal });
             }
             *x = row(real(position), x[3]);
@@ -80,7 +123,7 @@ fn rebound(collider: &Collider, velocity: Vector, ahead: Vector, normal: Vector,
     slide - rubbed(slide, collider.friction, after - approach) + normal * after
 }
 
-/// What friction takes of a slide.
+/// The part of a slide that friction takes.
 fn rubbed(slide: Vector, friction: Friction, press: f64) -> Vector {
     slide.normalized() * friction.takes(slide.norm(), press)
 }
@@ -122,13 +165,13 @@ fn meet(
         gone += left * s;
         let arriving = start + pull * (left * s) - surface;
         start = rebound(collider, arriving, ahead, n, step.resting);
-        if step.heeded && arriving.dot(n) < -step.resting {
+        if step.observed && arriving.dot(n) < -step.resting {
             hits(Hit { time: step.t + gone, x: from, v: start + surface, normal: n });
         }
         let rest = step.h - gone;
         let (press, lift) = (pull.dot(n), start.dot(n) + ahead.dot(n).min(0.0));
         if lift <= 0.01 * step.resting && press < 0.0 {
-            // It stays on the surface, which takes what presses, and rubs.
+            // It stays on the surface, which takes the pressing part, and rubs.
             let free = start + (pull - n * press) * rest;
             let slide = free - n * free.dot(n);
             let after = free - rubbed(slide, collider.friction, -press * rest);
@@ -170,26 +213,26 @@ fn on_parabola(part: f64, fall: f64, bend: f64) -> f64 {
 
 /// After an implicit step: a mass that came in faster than `resting` leaves with e times its speed. One that the penalty
 /// could not hold, deeper than gravity takes it in two steps or beyond the solid, is caught on its way.
-pub fn bounce(colliders: &[Collider], step: &Step, before: (Row, Row), x: &mut Row, v: &mut Row, mut hits: impl FnMut(Hit)) -> bool {
+fn bounce(colliders: &[Collider], step: &Step, before: (Row, Row), x: &mut Row, v: &mut Row, mut hits: impl FnMut(Hit)) -> bool {
     let (from, to) = (xyz64(before.0), xyz64(*x));
-    // What the penalty slows down over some steps is one impact.
-    let fresh = |collider: &Collider| step.heeded && collider.touch(from, step.t).is_none();
+    // An impact that the penalty slows down over some steps is one.
+    let fresh = |collider: &Collider| step.observed && collider.touch(from, step.t).is_none();
     for collider in colliders {
         let deep = collider.touch(to, step.end());
         if deep.is_some_and(|t| t.depth > collider.thickness + step.resting * step.h && t.depth < -2.0 * step.h * approach(&t, before.1)) {
             // As if nothing had held it.
             *v = before.1;
             *x = row(real(from + xyz64(*v) * step.h), x[3]);
-            return resolve(colliders, &Step { heeded: fresh(collider), ..*step }, before, x, v, hits);
+            return resolve(colliders, &Step { observed: fresh(collider), ..*step }, before, x, v, hits);
         }
         if let Some(hit) = collider.sweep(from, to, step.t, step.end())
             && !deep.is_some_and(|t| t.normal.dot(hit.normal) > 0.0)
         {
-            return resolve(colliders, &Step { heeded: fresh(collider), ..*step }, before, x, v, hits);
+            return resolve(colliders, &Step { observed: fresh(collider), ..*step }, before, x, v, hits);
         }
     }
     let mut touched = false;
-    for collider in colliders.iter().filter(|c| c.restitution > 0.0 || step.heeded) {
+    for collider in colliders.iter().filter(|c| c.restitution > 0.0 || step.observed) {
         let Some(touch) = collider.touch(xyz64(*x), step.end()) else { continue };
         let approach = approach(&touch, before.1);
         let (normal, velocity) = (touch.normal, xyz64(*v));
@@ -215,7 +258,7 @@ pub fn stiffness(mass: Real, grip: Real, gh: f64) -> f64 {
 }
 
 /// mu times the depth of a mass at time t.
-fn held(collider: &Collider, t: f64, (x, v): (Row, Row), resting: f64) -> f64 {
+fn friction_depth(collider: &Collider, t: f64, (x, v): (Row, Row), resting: f64) -> f64 {
     let Friction { sliding, resting: still } = collider.friction;
     if still == 0.0 {
         return 0.0;
@@ -239,7 +282,7 @@ pub struct Penalty {
 impl Penalty {
     /// The contacts of a mass at x with velocity v, with this penalty stiffness [N/m]. Friction takes its normal force from
     /// `start`, where the mass was when the stage began: with that force held fixed friction has a convex potential, and
-    /// Newton's method converges. So does it with the coefficient of what rests or slides then, faster than `resting`.
+    /// Newton's method converges. So does it with the coefficient of rest or of sliding, faster than `resting`, at that time.
     ///
     /// `times` are those of the start and of the end of the stage.
     pub fn of(
@@ -258,7 +301,7 @@ impl Penalty {
             Some(Penalty {
                 rest: [n.x, n.y, n.z, n.dot(position) + touch.depth],
                 stiffness,
-                friction: stiffness * held(collider, times.0, start, resting),
+                friction: stiffness * friction_depth(collider, times.0, start, resting),
                 slide: velocity - n * velocity.dot(n),
                 touch,
             })

@@ -6,20 +6,24 @@ use crate::elements::{Batch, Weights};
 use crate::forces::Group;
 use crate::geometry::Vector;
 use crate::integrators::newton::{self, Linear, Stiff};
+use crate::integrators::{Equation, Kinematics, Stage};
 use crate::linalg::blocks::{Block, Blocks};
 use crate::linalg::cholesky::{Assembly, Cholesky};
 use crate::linalg::pcg::{self, Operator, Params};
 use crate::math::parallel::{chunks, sum};
 use crate::math::{Real, Row, ZERO};
 use tumble_interface::StepError;
+use tumble_interface::engine::StepReport;
 use tumble_interface::scene::{Hessian, Linear as Method, Solver};
 
-/// Storage of the implicit schemes, kept between steps.
+/// Settings and storage of the implicit schemes, kept between steps.
 #[derive(Default)]
 pub struct Implicit {
-    pub newton: newton::Workspace,
-    /// 1/mass of every row, 0 for what is held.
-    pub weights: Vec<Real>,
+    solver: Solver,
+    contact: Penalties,
+    newton: newton::Workspace,
+    /// 1/mass of every row, 0 for held ones.
+    weights: Vec<Real>,
     pcg: pcg::Workspace,
     cholesky: Cholesky,
     /// Per row: mass, forces on each mass by itself and contact.
@@ -30,7 +34,40 @@ pub struct Implicit {
     inverse_columns: Blocks,
 }
 
-/// The matrix as an operator, with block Jacobi: a pinned row gets 0, so that what the residual holds there never matters.
+/// The solids as implicit stages see them.
+#[derive(Default)]
+struct Penalties {
+    /// Whether they do.
+    seen: bool,
+    /// Positions and velocities at the start of the stage.
+    start: [Vec<Row>; 2],
+}
+
+impl Penalties {
+    /// Whether the stages of these laws meet any.
+    fn act(&self, laws: &Laws) -> bool {
+        self.seen && !laws.colliders.is_empty()
+    }
+
+    /// The contacts of mass i, at x with velocity v, in a stage of length gh that ends at t.
+    fn of(&self, laws: &Laws, i: usize, t: f64, gh: f64, x: Row, v: Row) -> impl Iterator<Item = Penalty> {
+        let stiffness = contact::stiffness(laws.masses.mass[i], laws.grip.get(i).copied().unwrap_or(0.0), gh);
+        let [start_x, start_v] = &self.start;
+        // Masses at rest have no normal force in the first stage yet: a speed that gravity gives in two stages is no slide.
+        let resting = 2.0 * gh * Vector::from(laws.gravity).norm();
+        Penalty::of(&laws.colliders, (t - gh, t), stiffness, (x, v), (start_x[i], start_v[i]), resting)
+    }
+}
+
+/// The equation of motion of a whole system.
+pub struct Motion<'a> {
+    /// Its laws.
+    pub laws: &'a mut Laws,
+    /// Settings and storage of implicit stages.
+    pub implicit: &'a mut Implicit,
+}
+
+/// The matrix as an operator, with block Jacobi: a pinned row gets 0, so that its residual never matters.
 struct Matrix<'a> {
     batches: &'a mut [Box<dyn Batch>],
     x: &'a [Row],
@@ -68,13 +105,23 @@ fn inverse(b: &Block) -> Block {
 }
 
 impl Implicit {
+    /// For stages with these settings; `penalty` says whether they see the solids.
+    pub fn new(solver: Solver, penalty: bool) -> Self {
+        Self { solver, contact: Penalties { seen: penalty, ..Penalties::default() }, ..Self::default() }
+    }
+
+    /// Whether stages see the solids as penalties.
+    pub fn sees_solids(&self) -> bool {
+        self.contact.seen
+    }
+
     /// Fills `local` with mass over gh², forces and contact, prepares the batches, and inverts the diagonal blocks.
     /// Returns the round-off of the forces in the norm sqrt(sum |.|²/m).
     fn linearize(&mut self, laws: &mut Laws, t: f64, x: &[Row], v: &[Row], gh: f64, hessian: Hessian) -> f64 {
         let n = x.len();
         self.local.resize(n, [0.0; 6]);
         self.inverse.resize(n, [0.0; 6]);
-        let (all, masses) = (&*laws, &laws.masses);
+        let (all, masses, contact) = (&*laws, &laws.masses, &self.contact);
         let group = Group::new(masses, 0, x, v);
         // The stiffness of everything, without mass.
         chunks(&mut self.local, |start, local| {
@@ -87,8 +134,8 @@ impl Implicit {
                     add_block(&mut local[i - start], d, (1.0 / gh) as Real);
                 }
             }
-            for i in start..if all.touches() { end.min(masses.points) } else { start } {
-                for touch in all.penalties(i, t, gh, x[i], v[i]) {
+            for i in start..if contact.act(all) { end.min(masses.points) } else { start } {
+                for touch in contact.of(all, i, t, gh, x[i], v[i]) {
                     add_block(&mut local[i - start], touch.matrix(gh), 1.0);
                 }
             }
@@ -154,38 +201,49 @@ fn add_block(to: &mut Block, b: Block, c: Real) {
     }
 }
 
-impl Laws {
-    /// Whether implicit stages see solids.
-    fn touches(&self) -> bool {
-        self.penalty && !self.colliders.is_empty()
+impl Equation for Motion<'_> {
+    fn kinematics(&self) -> Kinematics {
+        self.laws.kinematics()
     }
 
-    /// The contacts of mass i, at x with velocity v, in an implicit stage of length gh that ends at t.
-    fn penalties(&self, i: usize, t: f64, gh: f64, x: Row, v: Row) -> impl Iterator<Item = Penalty> {
-        let stiffness = contact::stiffness(self.masses.mass[i], self.grip.get(i).copied().unwrap_or(0.0), gh);
-        let [start_x, start_v] = &self.start;
-        // As much as gravity gives in two stages is no slide: the first stage of what lies has no normal force yet.
-        let resting = 2.0 * gh * Vector::from(self.gravity).norm();
-        Penalty::of(&self.colliders, (t - gh, t), stiffness, (x, v), (start_x[i], start_v[i]), resting)
+    fn rate(&mut self, t: f64, x: &[Row], v: &[Row], out: &mut [Row]) -> Result<(), StepError> {
+        self.laws.rate(t, x, v, out)
+    }
+
+    fn solve(&mut self, stage: &Stage<'_>, x: &mut [Row], v: &mut [Row], report: &mut StepReport) -> Result<(), StepError> {
+        if !self.laws.colliders.is_empty() {
+            for (start, now) in self.implicit.contact.start.iter_mut().zip([&*x, &*v]) {
+                start.clear();
+                start.extend_from_slice(now);
+            }
+        }
+        let masses = &self.laws.masses;
+        self.implicit.weights.clear();
+        self.implicit.weights.extend((0..x.len()).map(|i| masses.inverse(i, x)));
+        let mut work = std::mem::take(&mut self.implicit.newton);
+        let solver = self.implicit.solver.clone();
+        let result = newton::solve(self, stage, x, v, &solver, &mut work, report);
+        self.implicit.newton = work;
+        result
     }
 }
 
-impl Stiff for Laws {
+impl Stiff for Motion<'_> {
     fn inverse_mass(&self) -> &[Real] {
         &self.implicit.weights
     }
 
     fn force(&mut self, t: f64, x: &[Row], v: &[Row], gh: f64, out: &mut [Row]) -> Result<(), StepError> {
-        self.forces(t, x, v, out)?;
-        if !self.touches() {
+        self.laws.forces(t, x, v, out)?;
+        let (laws, contact) = (&*self.laws, &self.implicit.contact);
+        if !contact.act(laws) {
             return Ok(());
         }
-        let laws = &*self;
         chunks(out, |start, out| {
             for (k, f) in out.iter_mut().enumerate() {
                 let i = start + k;
                 if i < laws.masses.points && x[i][3] > 0.0 {
-                    for touch in laws.penalties(i, t, gh, x[i], v[i]) {
+                    for touch in contact.of(laws, i, t, gh, x[i], v[i]) {
                         let push = touch.force(x[i]);
                         *f = [f[0] + push.x as Real, f[1] + push.y as Real, f[2] + push.z as Real, 0.0];
                     }
@@ -196,18 +254,12 @@ impl Stiff for Laws {
     }
 
     fn linearize(&mut self, t: f64, x: &[Row], v: &[Row], gh: f64, hessian: Hessian) -> f64 {
-        let mut implicit = std::mem::take(&mut self.implicit);
-        let noise = implicit.linearize(self, t, x, v, gh, hessian);
-        self.implicit = implicit;
-        noise
+        self.implicit.linearize(self.laws, t, x, v, gh, hessian)
     }
 
     fn solve_linear(&mut self, x: &[Row], rhs: &[Row], out: &mut [Row], settings: &Solver) -> Linear {
         out.fill(ZERO);
-        let mut implicit = std::mem::take(&mut self.implicit);
-        let info = implicit.solve(self, x, rhs, out, settings);
-        self.implicit = implicit;
-        info
+        self.implicit.solve(self.laws, x, rhs, out, settings)
     }
 }
 

@@ -1,10 +1,9 @@
-//! The right-hand side: what accelerates the masses at (t, x, v).
+//! The right-hand side: accelerations of the masses at (t, x, v).
 
-use super::implicit::Implicit;
 use crate::elements::Batch;
 use crate::forces::{Force, Group};
 use crate::geometry::{Collider, Vector};
-use crate::integrators::{Equation, Kinematics, Stage, newton};
+use crate::integrators::{Equation, Kinematics, Stage};
 use crate::math::parallel::{chunks, sum};
 use crate::math::rows::{self, Each};
 use crate::math::{Lane, Real, Row, ZERO, add};
@@ -13,11 +12,10 @@ use std::ops::Range;
 use std::sync::Arc;
 use tumble_interface::StepError;
 use tumble_interface::engine::{StepReport, UserForce};
-use tumble_interface::scene::Solver;
 
-/// A force on each mass by itself, and on whose.
+/// A force on each mass by itself, and the masses that it acts on.
 pub struct Acting {
-    /// Where the scene says it.
+    /// Its place in the scene.
     pub name: String,
     /// The force.
     pub law: Box<dyn Force>,
@@ -40,20 +38,12 @@ pub struct Laws {
     pub steady: Vec<(usize, Vector)>,
     /// Gravity on points [m/s²].
     pub gravity: [f64; 3],
-    /// What each row weighs.
+    /// Masses and moments of inertia of the rows.
     pub masses: Masses,
     /// Solids.
     pub colliders: Arc<Vec<Collider>>,
-    /// Whether implicit stages see the solids as penalties.
-    pub penalty: bool,
     /// Stiffness with which the elements hold each row at the start [N/m]; emitted particles have none.
     pub grip: Vec<Real>,
-    /// Positions and velocities at the start of the implicit stage.
-    pub start: [Vec<Row>; 2],
-    /// Settings of implicit stages.
-    pub solver: Solver,
-    /// Storage of implicit stages.
-    pub implicit: Implicit,
     /// Users' forces, three numbers a point; scratch.
     pub pushes: Vec<f64>,
 }
@@ -124,6 +114,22 @@ impl Laws {
         rows::each(frames, &masses.inverse_inertia[first..first + x_frames.len()], x_frames, ZERO, Weigh);
     }
 
+    /// Points and frames.
+    pub fn kinematics(&self) -> Kinematics {
+        Kinematics { points: self.masses.points, second_order: true }
+    }
+
+    /// Accelerations at (t, x, v) [m/s², rad/s²].
+    pub fn rate(&mut self, t: f64, x: &[Row], v: &[Row], out: &mut [Row]) -> Result<(), StepError> {
+        self.begin(t, x, v)?;
+        let laws = &*self;
+        chunks(out, |start, out| {
+            laws.sum(t, start, x, v, out);
+            laws.accelerate(&laws.masses, start, &x[start..start + out.len()], out);
+        });
+        Ok(())
+    }
+
     /// Accelerations of the rows from `start` on, where no mass feels another.
     pub fn rate_alone(&self, t: f64, start: usize, x: &[Row], v: &[Row], out: &mut [Row]) {
         out.fill(ZERO);
@@ -160,7 +166,7 @@ pub fn flat(rows: &[Row]) -> Vec<f64> {
     rows.iter().flat_map(|r| [f64::from(r[0]), f64::from(r[1]), f64::from(r[2])]).collect()
 }
 
-/// f/m + g; what is pinned does not fall.
+/// f/m + g; pinned masses do not fall.
 struct Weigh;
 
 impl Each for Weigh {
@@ -170,44 +176,11 @@ impl Each for Weigh {
     }
 }
 
-impl Equation for Laws {
-    fn kinematics(&self) -> Kinematics {
-        Kinematics { points: self.masses.points, second_order: true }
-    }
-
-    fn rate(&mut self, t: f64, x: &[Row], v: &[Row], out: &mut [Row]) -> Result<(), StepError> {
-        self.begin(t, x, v)?;
-        let laws = &*self;
-        chunks(out, |start, out| {
-            laws.sum(t, start, x, v, out);
-            laws.accelerate(&laws.masses, start, &x[start..start + out.len()], out);
-        });
-        Ok(())
-    }
-
-    fn solve(&mut self, stage: &Stage<'_>, x: &mut [Row], v: &mut [Row], report: &mut StepReport) -> Result<(), StepError> {
-        if !self.colliders.is_empty() {
-            for (start, now) in self.start.iter_mut().zip([&*x, &*v]) {
-                start.clear();
-                start.extend_from_slice(now);
-            }
-        }
-        let masses = &self.masses;
-        self.implicit.weights.clear();
-        self.implicit.weights.extend((0..x.len()).map(|i| masses.inverse(i, x)));
-        let mut work = std::mem::take(&mut self.implicit.newton);
-        let solver = self.solver.clone();
-        let result = newton::solve(self, stage, x, v, &solver, &mut work, report);
-        self.implicit.newton = work;
-        result
-    }
-}
-
 /// The equation of motion of some masses that feel no other: rows of a system, or newborn that are not in it yet.
 pub struct Local<'a> {
     /// The laws of the whole system.
     pub laws: &'a Laws,
-    /// What they weigh.
+    /// Their masses.
     pub masses: &'a Masses,
     /// First of their rows in `masses`.
     pub start: usize,

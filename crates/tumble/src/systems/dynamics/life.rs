@@ -1,46 +1,49 @@
-//! Birth and death within a system: create new particles, compute forces, update, remove the dead.
+//! Birth and death within a system: create new particles, compute forces, update, remove dead ones.
 //!
 //! A particle is born at its own moment: it takes one step of its own length to the end of the sub-step that it is born in, by
 //! the midpoint rule (more where that is too long a step for the forces), under the forces on single masses; from there on it goes with all others. The dead leave when the
-//! exchange interval ends, and who is born of them is born where and when they died.              (particles.11)
+//! exchange interval ends, and their children are born where and when they died.              (particles.11)
 
+use super::contact::{Pass, Step as Contact};
+use super::core::{BLOCK, Between, Core};
 use super::laws::Local;
-use super::{BLOCK, Dynamics, contact};
 use crate::forces::One;
 use crate::integrators::{self, Equation, Memory, Scratch, Step};
 use crate::math::parallel::Tasks;
 use crate::math::{Real, Row, Vec3, ZERO, axpy, xyz64};
 use crate::pool::{Birth, Columns, Hit, Pool, due};
 use crate::state::Masses;
+use std::ops::Range;
 use tumble_interface::StepError;
 use tumble_interface::engine::StepReport;
+use tumble_interface::scene::Integrator;
 
 /// Pieces that the first step of a life is cut into at most.
 const PIECES: f64 = 1000.0;
 
 /// Newborn of one emitter at a later time.
-struct Grown {
+struct Newborn {
     x: Vec<Row>,
     v: Vec<Row>,
     /// Solids that they met, with the place of each in the list of births.
     hits: Vec<(usize, Hit)>,
 }
 
-impl Dynamics {
-    /// Those who are there at the start.
-    pub(super) fn begin_life(&mut self, dt: f64) -> Result<(), StepError> {
-        let mut unborn = self.pool.conceive(&self.name, -dt, dt)?;
-        self.deliver(&mut unborn, 0.0, dt, 0.0)
+impl Core {
+    /// Births at the start.
+    pub fn begin_life(&mut self, dt: f64) -> Result<(), StepError> {
+        let mut unborn = self.pool.schedule_births(&self.name, -dt, dt)?;
+        self.insert_births(&mut unborn, 0.0, dt, 0.0)
     }
 
     /// Takes those born by the time `until`, where a sub-step of length h [s] ends, into the system. The interval ends at
     /// `end`.
-    pub(super) fn deliver(&mut self, unborn: &mut [Vec<Birth>], until: f64, h: f64, end: f64) -> Result<(), StepError> {
+    pub fn insert_births(&mut self, unborn: &mut [Vec<Birth>], until: f64, h: f64, end: f64) -> Result<(), StepError> {
         for (s, unborn) in unborn.iter_mut().enumerate() {
             let births = due(unborn, until, end);
             if !births.is_empty() {
-                let grown = self.grow(s, &births, (until, h, 0))?;
-                self.settle(s, &births, grown, (until, end));
+                let grown = self.advance_newborn(s, &births, (until, h, 0))?;
+                self.insert_newborn(s, &births, grown, (until, end));
             }
         }
         Ok(())
@@ -48,16 +51,16 @@ impl Dynamics {
 
     /// Takes those born in an interval of sub-steps (t, h, count) into a system in which no mass feels another, all at its
     /// end.
-    pub(super) fn deliver_grown(&mut self, unborn: Vec<Vec<Birth>>, (t, h, count): (f64, f64, u32)) -> Result<(), StepError> {
+    pub fn insert_births_of_interval(&mut self, unborn: Vec<Vec<Birth>>, (t, h, count): (f64, f64, u32)) -> Result<(), StepError> {
         let end = t + h * f64::from(count);
         for (s, births) in unborn.into_iter().enumerate() {
-            let mut all: Option<Grown> = None;
+            let mut all: Option<Newborn> = None;
             let mut first = 0;
             for k in 1..=count {
                 let until = t + f64::from(k) * h;
                 let last = if k == count { births.len() } else { births.partition_point(|b| b.time <= until) };
                 if last > first {
-                    let grown = self.grow(s, &births[first..last], (until, h, count - k))?;
+                    let grown = self.advance_newborn(s, &births[first..last], (until, h, count - k))?;
                     match &mut all {
                         None => all = Some(grown),
                         Some(all) => {
@@ -70,31 +73,29 @@ impl Dynamics {
                 }
             }
             if let Some(grown) = all {
-                self.settle(s, &births, grown, (end, end));
+                self.insert_newborn(s, &births, grown, (end, end));
             }
         }
         Ok(())
     }
 
     /// The newborn at the time `until`, where the sub-step that they are born in ends, and so many sub-steps later.
-    fn grow(&self, s: usize, births: &[Birth], (until, h, more): (f64, f64, u32)) -> Result<Grown, StepError> {
+    fn advance_newborn(&self, s: usize, births: &[Birth], (until, h, more): (f64, f64, u32)) -> Result<Newborn, StepError> {
         let masses = weigh(&self.pool, s, births.iter().map(|b| b.id), !self.laws.masses.charge.is_empty());
         let object = self.objects.iter().position(|o| o.stream == Some(s));
         let row = |p: Vec3<f64>, w: Real| [p.x as Real, p.y as Real, p.z as Real, w];
         let mut x: Vec<Row> = births.iter().map(|b| row(b.x, (1.0 / self.pool.emitter(s).mass(b.id)) as Real)).collect();
         let mut v: Vec<Row> = births.iter().map(|b| row(b.v, 0.0)).collect();
         let (laws, colliders, resting) = (&self.laws, &self.laws.colliders[..], self.resting_speed(h));
-        let heeded = self.pool.heeds_hits(s);
-        let touch = |t: f64, h: f64, lead: f64, before: (Row, Row), x: &mut Row, v: &mut Row, hits: &mut dyn FnMut(Hit)| {
-            let step = contact::Step { t, h, resting, lead, heeded };
-            !colliders.is_empty() && h > 0.0 && contact::resolve(colliders, &step, before, x, v, hits)
-        };
+        let every = 0..usize::MAX;
+        let observed: &[Range<usize>] = if self.pool.heeds_hits(s) { std::slice::from_ref(&every) } else { &[] };
+        let touch =
+            |i: usize, (t, h, lead): (f64, f64, f64), before: (Row, Row), x: &mut Row, v: &mut Row, hits: &mut Vec<(usize, Hit)>| {
+                let pass = Pass { colliders, step: Contact { t, h, resting, lead, observed: false }, penalty: false, observed };
+                !colliders.is_empty() && h > 0.0 && pass.mass(i, before, x, v, hits)
+            };
         let rate = self.stiffness_of(object, births, &masses);
-        let scheme = if self.integrator.is_implicit() || self.integrator.is_adaptive() {
-            tumble_interface::scene::Integrator::Midpoint
-        } else {
-            self.integrator
-        };
+        let scheme = if self.integrator.is_implicit() || self.integrator.is_adaptive() { Integrator::Midpoint } else { self.integrator };
         let one = |start: usize, births: &[Birth], x: &mut [Row], v: &mut [Row]| -> Result<Vec<(usize, Hit)>, StepError> {
             let mut hits = Vec::new();
             let mut motion = Local { laws, masses: &masses, start, newborn: object };
@@ -105,7 +106,7 @@ impl Dynamics {
             let pieces = (longest / h * (1.0 - 1e-9)).max(2.0 * longest * rate).ceil().clamp(1.0, PIECES);
             let tau = |i: usize| (span(i) / pieces) as Real;
             for k in 0..pieces as usize {
-                // The time of the one who goes the longest way; all end at the same.
+                // The time of the earliest birth; all end at the same.
                 let time = until - longest * (1.0 - k as f64 / pieces);
                 motion.rate(time, x, v, &mut a)?;
                 for i in 0..n {
@@ -118,7 +119,7 @@ impl Dynamics {
                     x[i] = axpy(x[i], tau(i), vm[i]);
                     v[i] = axpy(v[i], tau(i), a[i]);
                     let begun = until - span(i) * (1.0 - k as f64 / pieces);
-                    touch(begun, f64::from(tau(i)), 0.0, before, &mut x[i], &mut v[i], &mut |hit| hits.push((start + i, hit)));
+                    touch(start + i, (begun, f64::from(tau(i)), 0.0), before, &mut x[i], &mut v[i], &mut hits);
                 }
             }
             let mut memory = Memory::new(scheme, n);
@@ -130,8 +131,7 @@ impl Dynamics {
                 integrators::step(scheme, Step { equation, t, h, x, v, memory, ready, scratch, report })?;
                 ready = true;
                 for i in 0..n {
-                    ready &=
-                        !touch(t, h, integrators::lead(scheme), before[i], &mut x[i], &mut v[i], &mut |hit| hits.push((start + i, hit)));
+                    ready &= !touch(start + i, (t, h, integrators::lead(scheme)), before[i], &mut x[i], &mut v[i], &mut hits);
                 }
             }
             Ok(hits)
@@ -139,7 +139,7 @@ impl Dynamics {
         let blocks = x.chunks_mut(BLOCK).zip(v.chunks_mut(BLOCK)).zip(births.chunks(BLOCK)).enumerate();
         let done: Vec<Result<Vec<_>, StepError>> = blocks.map_in_parallel(|(c, ((x, v), births))| one(c * BLOCK, births, x, v));
         let hits = done.into_iter().collect::<Result<Vec<_>, StepError>>()?.concat();
-        Ok(Grown { x, v, hits })
+        Ok(Newborn { x, v, hits })
     }
 
     /// How fast the forces on single masses change the motion of the first of some newborn [1/s]: steps of half of its inverse are
@@ -154,13 +154,13 @@ impl Dynamics {
     }
 
     /// Gives the newborn of an emitter their rows at the time `now`; their ages will be right at the time `end`.
-    fn settle(&mut self, s: usize, births: &[Birth], grown: Grown, (now, end): (f64, f64)) {
+    fn insert_newborn(&mut self, s: usize, births: &[Birth], grown: Newborn, (now, end): (f64, f64)) {
         let v = |row: usize| self.state.v[row];
         let surplus = self.pool.surplus(s, births, (now, end), &self.state.x, &v);
         let start = self.pool.rows(s).start;
         self.count_energy(-1.0, surplus.iter().map(|k| start + *k as usize));
         self.pool.remove(s, &surplus, owned(&mut self.state.x, &mut self.state.v, &mut self.laws.masses, &mut self.memory));
-        // Where even the newborn are too many, the last of them live.
+        // If even the newborn are too many, the last of them live.
         let most = self.pool.emitter(s).most().unwrap_or(usize::MAX);
         let skip = births.len().saturating_sub(most);
         for (i, hit) in grown.hits {
@@ -181,15 +181,15 @@ impl Dynamics {
     }
 
     /// At the time t, where an interval of length dt [s] ends: the dead leave, and children of the dead and of the living come.
-    /// Parents stand before their children, so that who is born here may bear, and die, here.
-    pub(super) fn bury(&mut self, t: f64, dt: f64, h: f64) -> Result<(), StepError> {
+    /// Parents stand before their children, so that newborn may have children, and die, here.
+    pub fn remove_dead(&mut self, t: f64, dt: f64, h: f64) -> Result<(), StepError> {
         let n = self.pool.len();
         let mut born: Vec<Vec<Birth>> = vec![Vec::new(); n];
         for s in 0..n {
             let births = std::mem::take(&mut born[s]);
             if !births.is_empty() {
-                let grown = self.grow(s, &births, (t, h, 0))?;
-                self.settle(s, &births, grown, (t, t));
+                let grown = self.advance_newborn(s, &births, (t, h, 0))?;
+                self.insert_newborn(s, &births, grown, (t, t));
             }
             let colliders = &self.laws.colliders;
             let near = |p: Vec3<f64>, distance: f64| colliders.iter().any(|c| c.distance(p, t, distance).0 < distance);
@@ -233,13 +233,13 @@ impl Dynamics {
             }
         }
         let rows = |objects: &Vec<usize>| objects.iter().map(|o| self.objects[*o].points.clone()).collect();
-        for (batch, on, others) in &self.between {
-            self.laws.batches[*batch].renew(rows(on), others.as_ref().map(rows), &self.laws.masses);
+        for Between { batch, objects, others } in &self.between {
+            self.laws.batches[*batch].renew(rows(objects), others.as_ref().map(rows), &self.laws.masses);
         }
     }
 
-    /// After the pool was read back: room for its rows, and what they weigh.
-    pub(super) fn take_pool(&mut self) {
+    /// After the pool was read back: room for its rows, and their masses.
+    pub fn take_pool(&mut self) {
         let rows = self.pool.end();
         let charged = !self.laws.masses.charge.is_empty();
         let columns = owned(&mut self.state.x, &mut self.state.v, &mut self.laws.masses, &mut self.memory);
@@ -260,7 +260,7 @@ impl Dynamics {
     }
 }
 
-/// What newborn weigh.
+/// Masses of newborn.
 fn weigh(pool: &Pool, s: usize, ids: impl Iterator<Item = u32>, charged: bool) -> Masses {
     let emitter = pool.emitter(s);
     let mass: Vec<f64> = ids.map(|id| emitter.mass(id)).collect();

@@ -1,10 +1,10 @@
 //! The stiffest and the most damped mode of a system, by Lanczos' method on M^-1/2 A M^-1/2.
 
-use super::Dynamics;
+use super::core::Core;
 use super::laws::Acting;
 use crate::elements::Weights;
 use crate::forces::Group;
-use crate::integrators::stability::Mode;
+use crate::integrators::stability::{Mode, limits};
 use crate::math::parallel::chunks;
 use crate::math::{Real, Row, ZERO, bisect, dot, scale};
 use tumble_interface::scene::Hessian;
@@ -12,7 +12,7 @@ use tumble_interface::scene::Hessian;
 /// Lanczos steps; the largest eigenvalue of a sheet is then within 1e-3 of its limit.
 const STEPS: usize = 48;
 
-/// What the stability of a step depends on.
+/// The modes on which the stability of a step depends.
 pub struct Modes {
     /// The mode of highest frequency.
     pub stiffest: Mode,
@@ -31,9 +31,17 @@ impl Modes {
     }
 }
 
-impl Dynamics {
+impl Core {
+    /// Largest usable step of the integrator [s].
+    pub fn usable_step(&mut self, go_on: &(dyn Fn() -> bool + Sync)) -> f64 {
+        if self.integrator.is_implicit() {
+            return f64::INFINITY;
+        }
+        self.modes(go_on).map_or(f64::INFINITY, |modes| limits(self.integrator, &modes.list()).1)
+    }
+
     /// The modes of the system as it is now.
-    pub(super) fn modes(&mut self, go_on: &(dyn Fn() -> bool + Sync)) -> Option<Modes> {
+    pub fn modes(&mut self, go_on: &(dyn Fn() -> bool + Sync)) -> Option<Modes> {
         let (k, shape) = self.largest(1.0, 0.0, go_on)?;
         let (d, damped_shape) = self.largest(0.0, 1.0, go_on)?;
         let rate_in = |system: &mut Self, shape: &[Row], (stiffness, damping)| system.rayleigh(shape, stiffness, damping).max(0.0);

@@ -1,6 +1,6 @@
 //! Surfaces that tear. Where an edge is stretched beyond its strength, one of its two vertices comes apart: the triangles around it that
-//! lie ahead of the plane through it, across the edge, go to a copy of it; each copy weighs what its triangles brought along, and
-//! moves on with the same velocity. What then hangs together by a vertex alone comes apart, too.
+//! lie ahead of the plane through it, across the edge, go to a copy of it; each copy has the mass of its triangles, and moves on
+//! with the same velocity. Pieces that then hang together by a vertex alone come apart, too.
 //!
 //! The triangles say everything: masses, and between which rows every element acts, follow from them, so that they are all that a
 //! snapshot needs. Strength is (cloth.3). An element of a triangle goes with it; one across an edge breaks where the edge has opened. Links along an edge
@@ -9,13 +9,11 @@
 //! Source: [mueller2007], section 4.4. Differs: vertices at a rim come apart first, so that tears run on from their tips; a vertex and its
 //! neighbours come apart once in a sub-step; and no two pieces are left hanging by a vertex.   Verified in tests/tear.rs.
 
-use super::Dynamics;
 use crate::elements::Members;
 use crate::math::parallel::fold;
 use crate::math::{Real, Row, Vec3, xyz64};
 use crate::state::Object;
 use std::collections::BTreeMap;
-use tumble_interface::engine::StepReport;
 
 /// How a surface tears, as a recipe gives it.
 #[derive(Debug, Clone, PartialEq, Default)]
@@ -30,9 +28,9 @@ pub struct TearPart {
     pub limit: Vec<[f64; 3]>,
 }
 
-/// Elements that may have nodes in surfaces that tear.
+/// A list of elements that may have nodes in surfaces that tear.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub enum Kind {
+pub enum ElementList {
     /// The batch of forces of that index.
     Batch(usize),
     /// The constraints of that index.
@@ -52,9 +50,9 @@ pub struct Tie {
     same: [[u32; 2]; 2],
 }
 
-/// Elements of one kind that go with triangles.
+/// Elements of one list that go with triangles.
 pub struct Ties {
-    kind: Kind,
+    elements: ElementList,
     ties: Vec<Tie>,
 }
 
@@ -116,7 +114,7 @@ impl<'a> Edges<'a> {
         self.of.get(&sorted(a, b)).map_or(&[], |c| &c[..])
     }
 
-    /// The corners of an edge and of what lies opposite to it on either side, and those that are the ends of the edge on both sides.
+    /// The corners of an edge and those opposite to it on either side, and those that are the ends of the edge on both sides.
     fn hinge(&self, [a, b, c, d]: [u32; 4]) -> Option<([u32; 4], [[u32; 2]; 2])> {
         let with = |row: u32| self.at([a, b]).iter().copied().find(|at| self.corner(*at, row).is_some());
         let [t, u] = [with(c)?, with(d)?];
@@ -124,7 +122,7 @@ impl<'a> Edges<'a> {
         Some((corners, [[corners[0], self.corner(u, a)?], [corners[1], self.corner(u, b)?]]))
     }
 
-    /// Where an element belongs; `half` says to which triangle of its edge a link goes. `None` if it goes with no triangle.
+    /// The triangles of an element; `half` says to which triangle of its edge a link goes. `None` if it goes with no triangle.
     fn tie<const N: usize>(&self, element: u32, nodes: [u32; N], half: usize, x: &[Row]) -> Option<Tie> {
         let (mut corners, mut same) = ([NONE; 4], [[0; 2]; 2]);
         match nodes[..] {
@@ -169,10 +167,10 @@ impl<'a> Edges<'a> {
         Some(Tie { element, corners, same })
     }
 
-    /// The ties of all elements of a kind, the first of which has the index `first`. Equal links that follow each other are the halves of one.
+    /// The ties of all elements of a list, the first of which has the index `first`. Equal links that follow each other are the halves of one.
     pub fn ties<const N: usize, const D: usize, const P: usize>(
         &self,
-        kind: Option<Kind>,
+        elements: Option<ElementList>,
         members: &[Members<N, D, P>],
         first: usize,
         x: &[Row],
@@ -181,13 +179,13 @@ impl<'a> Edges<'a> {
         let mine = |m: &Members<N, D, P>| m.nodes.iter().all(|i| self.around.contains_key(i));
         let all = members.iter().enumerate().filter(|(_, m)| mine(m));
         let ties: Vec<Tie> = all.filter_map(|(e, m)| self.tie((first + e) as u32, m.nodes, half(e), x)).collect();
-        kind.filter(|_| !ties.is_empty()).map(|kind| Ties { kind, ties })
+        elements.filter(|_| !ties.is_empty()).map(|elements| Ties { elements, ties })
     }
 
     /// The ties of elements that are the triangles themselves.
-    pub fn own(&self, kind: Kind, first: usize) -> Ties {
+    pub fn own(&self, elements: ElementList, first: usize) -> Ties {
         let tie = |t: u32| Tie { element: first as u32 + t, corners: [3 * t, 3 * t + 1, 3 * t + 2, NONE], same: [[0; 2]; 2] };
-        Ties { kind, ties: (0..self.triangles.len() as u32).map(tie).collect() }
+        Ties { elements, ties: (0..self.triangles.len() as u32).map(tie).collect() }
     }
 }
 
@@ -206,10 +204,10 @@ pub struct Tear {
     original: Vec<[u32; 3]>,
     rest: Vec<[Real; 3]>,
     limit: Vec<[Real; 3]>,
-    /// What each corner weighs [kg], and each vertex at the start.
+    /// Mass of each corner, and of each vertex at the start [kg].
     share: Vec<[f64; 3]>,
     mass: Vec<Real>,
-    /// The inverse masses of vertices at the start; 0 for what is held.
+    /// The inverse masses of vertices at the start; 0 for held ones.
     inverse: Vec<Real>,
     ties: Vec<Ties>,
 }
@@ -328,7 +326,7 @@ impl Tear {
     }
 
     /// Gives some corners of a vertex to a copy of it.
-    fn give(&mut self, corners: &[u32], x: &mut [Row], v: &mut [Row]) -> bool {
+    fn move_to_copy(&mut self, corners: &[u32], x: &mut [Row], v: &mut [Row]) -> bool {
         if self.used == self.spare || corners.is_empty() {
             return false;
         }
@@ -359,13 +357,14 @@ impl Tear {
         parts
     }
 
-    /// Takes a vertex apart across a direction; `None` if all of its triangles lie on one side or no copy is left. Returns who was touched.
+    /// Takes a vertex apart across a direction; `None` if all of its triangles lie on one side or no copy is left. Returns the number of
+    /// splits and the vertices touched.
     fn split(&mut self, row: u32, across: Vec3<f64>, x: &mut [Row], v: &mut [Row]) -> Option<(u64, Vec<u32>)> {
         let fan = self.fan(row);
         let here = xyz64(x[row as usize]);
         let ahead = |c: &u32| self.others(*c).iter().map(|i| (xyz64(x[*i as usize]) - here).dot(across)).sum::<f64>() > 0.0;
         let (go, stay): (Vec<u32>, Vec<u32>) = fan.iter().copied().partition(|c| ahead(c));
-        if go.is_empty() || stay.is_empty() || !self.give(&go, x, v) {
+        if go.is_empty() || stay.is_empty() || !self.move_to_copy(&go, x, v) {
             return None;
         }
         let mut splits = 1;
@@ -377,14 +376,14 @@ impl Tear {
                 continue;
             }
             for part in self.parts(&self.fan(near)).into_iter().skip(1) {
-                splits += u64::from(self.give(&part, x, v));
+                splits += u64::from(self.move_to_copy(&part, x, v));
             }
         }
         Some((splits, touched))
     }
 
-    /// Takes apart what is strained too much; returns how many vertices came apart.
-    fn rip(&mut self, x: &mut [Row], v: &mut [Row]) -> u64 {
+    /// Splits vertices of edges beyond their strength; returns how many came apart.
+    pub fn split_strained(&mut self, x: &mut [Row], v: &mut [Row]) -> u64 {
         let (mut done, mut touched): (u64, Vec<u32>) = (0, Vec::new());
         for corner in self.strained(x) {
             let [a, b] = [self.triangles[corner as usize / 3][corner as usize % 3], self.others(corner)[0]];
@@ -409,8 +408,8 @@ impl Tear {
         done
     }
 
-    /// What every vertex weighs: that of a whole one is not summed up anew, so that it keeps its bits.
-    fn weigh(&self, mass: &mut [Real], x: &mut [Row]) {
+    /// Sets the mass of every vertex: that of a whole one is not summed up anew, so that it keeps its bits.
+    pub fn weigh(&self, mass: &mut [Real], x: &mut [Row]) {
         let n = self.vertices + self.spare;
         let (mut sums, mut counts, mut whole) = (vec![0.0; n], vec![0_u32; n], vec![0_u32; n]);
         for (t, share) in self.triangles.iter().zip(&self.share) {
@@ -430,8 +429,8 @@ impl Tear {
         }
     }
 
-    /// New rows for nodes of elements of a kind, as (element, node, row), and the elements that no longer hold.
-    fn changes(&mut self) -> Vec<(Kind, Vec<(u32, usize, u32)>, Vec<u32>)> {
+    /// New rows for nodes of the elements of each list, as (element, node, row), and the elements that no longer hold.
+    pub fn changes(&mut self) -> Vec<(ElementList, Vec<(u32, usize, u32)>, Vec<u32>)> {
         let row = |triangles: &[[u32; 3]], c: u32| triangles[c as usize / 3][c as usize % 3];
         let (now, before) = (&self.triangles, &self.known);
         let of = |ties: &Ties| {
@@ -446,56 +445,10 @@ impl Tear {
                     lost.push(tie.element);
                 }
             }
-            (ties.kind, moved, lost)
+            (ties.elements, moved, lost)
         };
         let found = self.ties.iter().map(of).collect();
         self.known.clone_from(&self.triangles);
         found
-    }
-}
-
-impl Dynamics {
-    /// After a sub-step: what is strained too much tears.
-    pub(super) fn tear(&mut self, report: &mut StepReport) {
-        let mut done = 0;
-        for k in 0..self.tears.len() {
-            done += self.tears[k].rip(&mut self.state.x, &mut self.state.v);
-        }
-        if done > 0 {
-            report.broken += done;
-            self.broken += done;
-            self.memory.ready = false;
-            self.follow_tears();
-        }
-    }
-
-    /// Masses, elements and contact follow the triangles.
-    pub(super) fn follow_tears(&mut self) {
-        for tear in &mut self.tears {
-            tear.weigh(&mut self.laws.masses.mass, &mut self.state.x);
-            for (kind, moved, lost) in tear.changes() {
-                match kind {
-                    Kind::Batch(i) => {
-                        let batch = &mut self.laws.batches[i];
-                        batch.rewire(&moved);
-                        batch.give_up(&lost);
-                    }
-                    Kind::Constraints(i) => {
-                        self.constraints[i].rewire(&moved);
-                        self.constraints[i].give_up(&lost);
-                    }
-                    Kind::Clamp => {
-                        if let Some(clamp) = &mut self.clamp {
-                            use crate::elements::Constraints;
-                            clamp.rewire(&moved);
-                            clamp.give_up(&lost);
-                        }
-                    }
-                }
-            }
-        }
-        for layers in self.layers.iter_mut().chain(&mut self.judge) {
-            layers.renew(&self.objects, &self.tears);
-        }
     }
 }

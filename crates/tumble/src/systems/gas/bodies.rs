@@ -101,7 +101,7 @@ impl Body {
 
     /// Gives its system what the fluid has given it.
     pub(super) fn tell(&mut self, exchange: &mut Exchange) {
-        exchange.lean(self.port, std::mem::take(&mut self.impulse));
+        exchange.post_steady(self.port, std::mem::take(&mut self.impulse));
     }
 
     fn push(&mut self, impulse: Vector) {

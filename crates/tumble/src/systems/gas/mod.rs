@@ -132,7 +132,7 @@ impl System for Gas {
         for fluid in &mut self.fluids {
             // What is beyond the sides is in no snapshot.
             hold(&mut fluid.u, &fluid.settings.sides, t);
-            exchange.blow(&fluid.name, t, &fluid.u);
+            exchange.publish_velocities(&fluid.name, t, &fluid.u);
         }
     }
 

@@ -62,7 +62,7 @@ impl Sheet {
     /// Gives its system what the fluid has given it.
     pub(super) fn tell(&mut self, exchange: &mut Exchange) {
         for (port, mass) in self.ports.iter().zip(&self.masses) {
-            exchange.lean(*port, mass.impulse);
+            exchange.post_steady(*port, mass.impulse);
         }
     }
 

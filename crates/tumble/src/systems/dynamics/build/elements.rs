@@ -1,91 +1,28 @@
-//! Elements and forces between masses as batches, in the order in which they act.
+//! Elements of the parts: as batches of forces, or as constraints.
 
-use super::build::{Closed, Liquid, Point, Settings, Springs};
+use super::super::parts::{Closed, Liquid, Parts, Point, Springs};
 use crate::elements::{
-    Batch, BendTwist, Constraints, Density, Element, Elements, Law, Linear, Members, Neohookean, Pair, Pairs, Projected, Shape, Strands,
-    StretchShear, TetShear, TetVolume, Volume,
+    Area, Batch, BendTwist, Constraints, Density, Distance, Element, Elements, Hinge, IsometricBend, Law, Linear, Members, Membrane,
+    Moment, Neohookean, Nonlinear, Pair, Pairs, Projected, Shape, Strands, StretchShear, TetShear, TetStrain, TetVolume, Vector, Volume,
+    Weights, Woven,
 };
-use crate::forces::{Attractor, Cohesion, DirectSum, Flock, Goal, Habits, Halos, LennardJones, Near, Newtonian, Repulsion, Viscosity};
-use crate::math::{Real, functions};
+use crate::forces::{Near, Newtonian};
+use crate::math::{Real, Row};
 use crate::state::Masses;
 use std::ops::Range;
-use tumble_interface::scene::Force as Words;
+use tumble_interface::scene::Hessian;
 
-/// The batches of a force between masses.
-pub fn between(
-    words: Words,
-    on: Vec<Range<usize>>,
-    others: Option<Vec<Range<usize>>>,
-    masses: &Masses,
-    halos: &[(u32, f64)],
-    settings: &Settings,
-) -> Vec<Box<dyn Batch>> {
-    vec![match words {
-        Words::Gravitation { constant, softening, .. } => {
-            let attractor = Attractor::Mass(constant);
-            let points: Box<dyn Batch> = Box::new(DirectSum::new(attractor, softening, settings.native, halos, on.clone(), masses));
-            if halos.is_empty() {
-                return vec![points];
-            }
-            return vec![Box::new(Halos::new(constant, softening, halos, &on, masses)), points];
-        }
-        Words::Electrostatics { constant, softening, .. } => {
-            Box::new(DirectSum::new(Attractor::Charge(-constant), softening, settings.native, &[], on, masses))
-        }
-        Words::LennardJones { epsilon, sigma, cutoff, smooth, .. } => {
-            Box::new(Near::new(LennardJones::new(epsilon, sigma, cutoff.unwrap_or(2.5 * sigma), smooth), on, others))
-        }
-        Words::Repulsion { stiffness, distance, exponent, .. } => {
-            Box::new(Near::new(Repulsion { stiffness, distance, exponent }, on, others))
-        }
-        Words::Cohesion { strength, radius, .. } => Box::new(Near::new(Cohesion { strength, radius }, on, others)),
-        Words::Viscosity { coefficient, radius, central, .. } => {
-            Box::new(Near::new(Viscosity { coefficient, radius, central }, on, others))
-        }
-        Words::Flock {
-            radius,
-            nearest,
-            view,
-            cohesion,
-            alignment,
-            separation,
-            spacing,
-            speed,
-            propulsion,
-            max_acceleration,
-            goal,
-            avoidance,
-            clearance,
-            fear,
-            fear_radius,
-            chase,
-            predator_speed,
-            ..
-        } => {
-            let habits = Habits {
-                radius,
-                nearest: nearest.unwrap_or(0) as usize,
-                view: if view < 360.0 { functions::cos((0.5 * view).to_radians()) } else { -2.0 },
-                cohesion,
-                alignment,
-                separation,
-                spacing: spacing.unwrap_or(0.5 * radius),
-                speed,
-                propulsion,
-                limit: max_acceleration.unwrap_or(0.0),
-                goals: goal.into_iter().map(|g| Goal { point: g.point.into(), strength: g.strength }).collect(),
-                avoidance,
-                clearance: clearance.unwrap_or(radius),
-                fear,
-                fear_radius: fear_radius.unwrap_or(3.0 * radius),
-                chase,
-                predator_speed: predator_speed.unwrap_or(speed),
-            };
-            Box::new(Flock::new(habits, on, others.unwrap_or_default(), masses, settings.colliders.clone()))
-        }
-        // Forces on each mass by itself, and on surfaces.
-        _ => return Vec::new(),
-    }]
+/// The lists of elements that surfaces and links are made of, as indices of batches or constraints; `None` where a kind has no elements.
+#[derive(Debug, Clone, Copy)]
+pub struct Lists {
+    /// Linear springs, nonlinear ones, those of no rest length.
+    pub springs: [Option<usize>; 3],
+    pub hinges: Option<usize>,
+    pub isometric: Option<usize>,
+    pub membranes: Option<usize>,
+    pub areas: Option<usize>,
+    pub woven: Option<usize>,
+    pub creases: Option<usize>,
 }
 
 /// Elements in the order in which they act: as forces, or as constraints.
@@ -103,8 +40,52 @@ pub struct Batches {
 }
 
 impl Batches {
+    /// No elements yet between the rows of these masses; `projects` says whether they will be constraints.
+    pub fn new(masses: &Masses, projects: bool) -> Self {
+        Self {
+            rows: masses.mass.len(),
+            points: masses.points,
+            projected: projects.then(|| masses.inverse_inertia.clone()),
+            list: Vec::new(),
+            constraints: Vec::new(),
+        }
+    }
+
+    /// Adds all elements of some parts, whose nodes are rows; `None` if one is not.
+    pub fn fill(&mut self, parts: &mut Parts) -> Option<Lists> {
+        let springs = [
+            self.springs::<Distance, Linear, 1, 1, 0>(&parts.linear)?,
+            self.springs::<Distance, Nonlinear, 1, 1, 2>(&parts.nonlinear)?,
+            self.springs::<Vector, Linear, 3, 0, 0>(&parts.vector)?,
+        ];
+        self.add::<Distance, 2, 1, 1>(&parts.dampers, 0.0)?;
+        let hinges = self.add::<Hinge, 4, 1, 1>(&parts.hinges, 0.0)?;
+        let isometric = self.add::<IsometricBend, 4, 3, 3>(&parts.isometric, 0.0)?;
+        let membranes = self.add::<Membrane, 3, 3, 8>(&parts.membranes, 0.0)?;
+        let areas = self.add::<Area, 3, 1, 1>(&parts.areas, 0.0)?;
+        let woven = self.add::<Woven, 3, 3, 28>(&parts.woven, 0.0)?;
+        let creases = self.add_with::<Hinge, Moment, 4, 1, 1, 8>(&parts.creases, 0.0)?;
+        self.solids(&parts.shears, &parts.volumes, parts.energy_at_rest)?;
+        self.add::<TetStrain, 4, 6, 9>(&parts.strains, 0.0)?;
+        self.rods(&parts.stretches, &mut parts.bends, &parts.rod_limits)?;
+        self.global_constraints(&parts.points, std::mem::take(&mut parts.closed), &parts.shapes, &parts.liquids)?;
+        Some(Lists { springs, hinges, isometric, membranes, areas, woven, creases })
+    }
+
+    /// The stiffness with which elements hold each row [N/m].
+    pub fn grip(&mut self, x: &[Row]) -> Vec<Real> {
+        let mut stiffness = vec![[0.0; 6]; self.rows];
+        for batch in &mut self.list {
+            batch.linearize(x, Weights { stiffness: 1.0, damping: 0.0, hessian: Hessian::Definite });
+            batch.add_diagonal(x, &mut stiffness);
+        }
+        let mut grip: Vec<Real> = stiffness.iter().map(|k| (k[0] + k[1] + k[2]) / 3.0).collect();
+        self.constraints.iter().for_each(|c| c.add_grip(x, &mut grip));
+        grip
+    }
+
     /// Adds springs, if there are any; `None` if one is not between rows, else the index of the batch.
-    pub fn springs<E: Pair<M, D>, Y: Law<P>, const M: usize, const D: usize, const P: usize>(
+    fn springs<E: Pair<M, D>, Y: Law<P>, const M: usize, const D: usize, const P: usize>(
         &mut self,
         springs: &Springs<D, P>,
     ) -> Option<Option<usize>> {
@@ -121,7 +102,7 @@ impl Batches {
     }
 
     /// Adds elements, if there are any; `None` if a node is not a row, else the index of the batch.
-    pub fn add<E: Element<N, M, D>, const N: usize, const M: usize, const D: usize>(
+    fn add<E: Element<N, M, D>, const N: usize, const M: usize, const D: usize>(
         &mut self,
         members: &[Members<N, D, 0>],
         energy_at_rest: f64,
@@ -130,7 +111,7 @@ impl Batches {
     }
 
     /// The same with a law of their own.
-    pub fn add_with<E: Element<N, M, D>, Y: Law<P>, const N: usize, const M: usize, const D: usize, const P: usize>(
+    fn add_with<E: Element<N, M, D>, Y: Law<P>, const N: usize, const M: usize, const D: usize, const P: usize>(
         &mut self,
         members: &[Members<N, D, P>],
         energy_at_rest: f64,
@@ -149,7 +130,7 @@ impl Batches {
     }
 
     /// Adds rods, if there are any: as constraints, chains are solved as a whole.
-    pub fn rods(&mut self, stretches: &[Members<3, 2, 0>], bends: &mut Vec<Members<2, 6, 0>>, limits: &[f64]) -> Option<()> {
+    fn rods(&mut self, stretches: &[Members<3, 2, 0>], bends: &mut Vec<Members<2, 6, 0>>, limits: &[f64]) -> Option<()> {
         let strands = self.projected.as_ref().and_then(|inverse| Strands::new(self.rows, self.points, inverse, stretches, bends, limits));
         match strands {
             Some(strands) => self.constraints.push(Box::new(strands)),
@@ -159,7 +140,7 @@ impl Batches {
     }
 
     /// Adds both laws of solids, if there are any; `None` if a node is not a row.
-    pub fn solids(&mut self, shears: &[Members<4, 9, 0>], volumes: &[Members<4, 10, 0>], energy_at_rest: [f64; 2]) -> Option<()> {
+    fn solids(&mut self, shears: &[Members<4, 9, 0>], volumes: &[Members<4, 10, 0>], energy_at_rest: [f64; 2]) -> Option<()> {
         if self.projected.is_none() || shears.is_empty() {
             self.add::<TetShear, 4, 9, 9>(shears, energy_at_rest[0])?;
             return self.add::<TetVolume, 4, 1, 10>(volumes, energy_at_rest[1]).map(|_| ());
@@ -168,8 +149,8 @@ impl Batches {
         Some(())
     }
 
-    /// Adds what acts on whole bodies; `None` if a node is not a row. There are some only where elements are constraints.
-    pub fn wholes(
+    /// Adds constraints on whole bodies; `None` if a node is not a row. There are some only where elements are constraints.
+    fn global_constraints(
         &mut self,
         points: &[Point],
         closed: Vec<(String, Closed)>,

@@ -1,5 +1,6 @@
-//! Tethers: what hangs from held points stays within reach of them, whatever the sweeps have left undone. Each point is tied to the nearest
-//! point of some groups of held ones, by the length of the shortest way along links and edges, and is pulled back when it is farther away.
+//! Long-range attachments: points that hang from held ones stay within reach of them, whatever the sweeps have left undone. Each point is
+//! attached to the nearest point of some groups of held ones, by the length of the shortest way along links and edges, and is pulled back
+//! when it is farther away.
 //!
 //!   x = p + (x - p) min(1, s l/|x - p|)                                (positions.3)
 //!
@@ -12,15 +13,15 @@ use std::cmp::Reverse;
 use std::collections::BinaryHeap;
 use std::ops::Range;
 
-/// Groups that tie a point at most.
+/// Most groups to which a point is attached.
 const GROUPS: usize = 4;
 
-/// Tethers of a run of rows.
-pub struct Tethers {
+/// Long-range attachments of a run of rows.
+pub struct LongRangeAttachments {
     rows: Range<usize>,
     /// Rows of the held points.
     held: Vec<u32>,
-    /// For each of some groups, which of them every row is tied to, and the length of the tether [m], infinite where there is none.
+    /// For each of some groups, the held point to which every row is attached, and the length of the attachment [m], infinite where there is none.
     groups: Vec<(Index, Vec<Real>)>,
 }
 
@@ -42,9 +43,9 @@ impl Ord for Reached {
     }
 }
 
-impl Tethers {
-    /// Tethers of the points of a run of rows with these links, as ends and rest lengths [m]: `slack` times the shortest way to what `held`
-    /// says. `None` if nothing is held, or nothing else is.
+impl LongRangeAttachments {
+    /// Attachments of the points of a run of rows with these links, as ends and rest lengths [m]: `slack` times the shortest way to the points
+    /// that are `held`. `None` if nothing is held, or nothing else is.
     pub fn new(rows: Range<usize>, links: &[([u32; 2], f64)], held: &dyn Fn(usize) -> bool, slack: f64) -> Option<Self> {
         let n = rows.len();
         let mut start = vec![0_u32; n + 1];
@@ -124,7 +125,7 @@ impl Tethers {
         Some(Self { rows, held, groups })
     }
 
-    /// Pulls every point back to the length of its tethers.
+    /// Pulls every point back to the length of its attachments.
     pub fn project(&self, x: &mut [Row]) {
         let held: Vec<Row> = self.held.iter().map(|i| x[*i as usize]).collect();
         x[self.rows.clone()].chunks_mut(CHUNK).enumerate().in_parallel(|(c, x)| {
@@ -153,7 +154,7 @@ impl Kernel for Pull<'_> {
                 let d = Vec3 { x: x - px, y: y - py, z: z - pz };
                 let (size, most) = (d.norm(), w.load(&length[self.start + i..]));
                 let back = (size - most).positive((size - most) / size, w.splat(0.0));
-                // What is held stays.
+                // Held points stay.
                 let back = q.positive(back, w.splat(0.0));
                 (x, y, z) = (x - d.x * back, y - d.y * back, z - d.z * back);
             }
@@ -167,19 +168,19 @@ mod tests {
     use super::*;
 
     #[test]
-    fn points_are_tied_to_what_is_held_by_the_shortest_way() {
+    fn points_are_attached_to_held_ones_by_the_shortest_way() {
         // A line of five links, held at both ends, with a loose end at 4; slack 1.
         let links: Vec<([u32; 2], f64)> = (0..4).map(|i| ([i, i + 1], 1.0)).collect();
-        let tethers = Tethers::new(0..5, &links, &|i| i == 0, 1.0).unwrap();
+        let attachments = LongRangeAttachments::new(0..5, &links, &|i| i == 0, 1.0).unwrap();
         let mut x: Vec<Row> = (0..5).map(|i| [2.0 * i as Real, 0.0, 0.0, if i == 0 { 0.0 } else { 1.0 }]).collect();
-        tethers.project(&mut x);
+        attachments.project(&mut x);
         assert_eq!(x.iter().map(|x| x[0]).collect::<Vec<_>>(), [0.0, 1.0, 2.0, 3.0, 4.0]);
         let before = x.clone();
-        tethers.project(&mut x);
+        attachments.project(&mut x);
         assert_eq!(x, before);
-        assert!(Tethers::new(0..5, &links, &|_| false, 1.0).is_none());
+        assert!(LongRangeAttachments::new(0..5, &links, &|_| false, 1.0).is_none());
         // Two groups: each point is as near to each as the way to it is long.
-        let both = Tethers::new(0..5, &links, &|i| i == 0 || i == 4, 1.0).unwrap();
+        let both = LongRangeAttachments::new(0..5, &links, &|i| i == 0 || i == 4, 1.0).unwrap();
         assert_eq!(both.groups.len(), 2);
         assert_eq!((both.groups[0].1[1], both.groups[1].1[1]), (1.0, 3.0));
         // The nearest pulls first, the other last.

@@ -2,10 +2,12 @@
 //!
 //!   M_i = sum_p m_p w_ip,   V_i = sum_p m_p w_ip v_p/M_i,   v_p += (1 - exp(-friction h)) (sum_i w_ip V_i - v_p)     (hair.5)
 //!
-//! w is trilinear. Pressure goes through the faces between nodes, the lesser of both: what one node gets its neighbour loses, and momentum
-//! is kept to round-off (hair.6). What is held takes no part. Sources: [petrovic2005], [mcadams2009]. Differs: no projection to zero divergence, hair
+//! w is trilinear. Pressure goes through the faces between nodes, the lesser of both: one node gains its neighbour's loss, and momentum
+//! is kept to round-off (hair.6). Held points take no part. Sources: [petrovic2005], [mcadams2009]. Differs: no projection to zero divergence, hair
 //! may thin out. Breaks: h sqrt(pressure/rest density) above a cell. Verified in `tests/hair.rs`.
 
+use super::core::Core;
+use super::feature::{Feature, Span};
 use crate::math::functions::exp;
 use crate::math::parallel::{Tasks, chunks, fold};
 use crate::math::{Real, Row, Vec3, xyz64};
@@ -17,7 +19,7 @@ const NODES: f64 = (1 << 21) as f64;
 
 /// The hair of one object.
 #[derive(Debug, Clone)]
-pub struct Coat {
+pub struct HairContinuum {
     rows: Range<usize>,
     words: HairCollisions,
     /// Density above which it pushes [kg/m³].
@@ -69,19 +71,19 @@ impl Lattice {
     }
 }
 
-impl Coat {
+impl HairContinuum {
     /// The hair in these rows, as it is at the start.
     pub fn new(rows: Range<usize>, words: HairCollisions, x: &[Row]) -> Self {
-        let mut coat = Self { rows, rest: words.rest_density.unwrap_or(1.0), words, scratch: Scratch::default() };
-        if coat.words.rest_density.is_none()
-            && let Some(lattice) = coat.splat(x, &vec![[0.0; 4]; x.len()])
+        let mut continuum = Self { rows, rest: words.rest_density.unwrap_or(1.0), words, scratch: Scratch::default() };
+        if continuum.words.rest_density.is_none()
+            && let Some(lattice) = continuum.splat(x, &vec![[0.0; 4]; x.len()])
         {
             // The mean over the mass.
             let volume = lattice.cell.powi(3);
-            let (mass, square) = coat.scratch.nodes.iter().fold((0.0, 0.0), |(a, b), n| (a + n[3], b + n[3] * n[3]));
-            coat.rest = (square / mass / volume).max(f64::MIN_POSITIVE);
+            let (mass, square) = continuum.scratch.nodes.iter().fold((0.0, 0.0), |(a, b), n| (a + n[3], b + n[3] * n[3]));
+            continuum.rest = (square / mass / volume).max(f64::MIN_POSITIVE);
         }
-        coat
+        continuum
     }
 
     fn is_idle(&self) -> bool {
@@ -160,8 +162,8 @@ impl Coat {
         Some(lattice)
     }
 
-    /// What the hair does to itself in a step of length h [s].
-    pub fn act(&mut self, h: f64, x: &[Row], v: &mut [Row]) {
+    /// Friction and pressure of the hair in a step of length h [s].
+    fn act(&mut self, h: f64, x: &[Row], v: &mut [Row]) {
         if self.is_idle() {
             return;
         }
@@ -214,5 +216,12 @@ impl Coat {
         };
         let x = &x[self.rows.clone()];
         chunks(&mut v[self.rows.clone()], |start, v| v.iter_mut().zip(&x[start..]).for_each(|(v, x)| stir(v, x)));
+    }
+}
+
+impl Feature for HairContinuum {
+    fn before(&mut self, core: &mut Core, step: Span) {
+        self.act(step.h, &core.state.x, &mut core.state.v);
+        core.memory.ready = false;
     }
 }

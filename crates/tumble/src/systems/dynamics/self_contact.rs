@@ -4,15 +4,17 @@
 //!
 //!   C = n . Σ w_i x_i - thickness >= 0,   dx_i = m_i^-1 w_i n max(0, -C)/Σ_j m_j^-1 w_j²            (positions.4)
 
-use super::Dynamics;
-use super::corners::Corners;
+use super::core::Core;
+use super::feature::{Feature, Span};
+use super::solid_features::SolidFeatures;
 use super::tear::Tear;
 use crate::geometry::mesh_contact::{Detector, Owner, Pair, Topology, crossed, tangled, untangle_directions};
 use crate::geometry::{Collider, Friction, Vector};
 use crate::math::{Real, Row, Vec3, axpy, row, sub, xyz, xyz64};
 use crate::state::{Object, State};
 use std::sync::Arc;
-use tumble_interface::scene::SelfContact;
+use tumble_interface::engine::StepReport;
+use tumble_interface::scene;
 use tumble_interface::warning::{Code, Warning};
 
 /// Pairs are looked for along the ways that vertices are about to go, within the thickness and this many times the way of the fastest
@@ -20,14 +22,14 @@ use tumble_interface::warning::{Code, Warning};
 const ASIDE: f64 = 0.5;
 /// That reach over the thickness, at least and at most.
 const REACH: (f64, f64) = (1.5, 8.0);
-/// Rounds in which a bad start, or what the fastest have passed, is untangled before each exchange interval; and in which pairs are pushed apart
-/// after a step of a scheme that has no sweeps.
+/// Rounds in which a bad start, or a passage of the fastest, is untangled before each exchange interval; and in which pairs are pushed
+/// apart after a step of a scheme that has no sweeps.
 const ROUNDS: usize = 4;
-/// Rounds in which what starts too near is parted.
-const PARTINGS: usize = 16;
+/// Rounds in which surfaces that start too near are separated.
+const SEPARATIONS: usize = 16;
 
-/// Surfaces of a system, and who is near whom.
-pub struct Layers {
+/// Surfaces of a system, and the pairs of features that are near each other.
+pub struct SelfContact {
     topology: Topology,
     detector: Detector,
     friction: Friction,
@@ -35,13 +37,15 @@ pub struct Layers {
     sewn: Vec<[u32; 2]>,
     /// Places at the start, for surfaces that tear.
     rest: Vec<Row>,
-    /// Where vertices are about to go in a sub-step [m].
+    /// Displacements of vertices predicted for a sub-step [m].
     ways: Vec<Vector>,
+    /// Positions before they are corrected; scratch.
+    old: Vec<Row>,
     /// Solids that they meet, too.
-    corners: Corners,
+    features: SolidFeatures,
 }
 
-/// What passes through each other.
+/// An intersection of surfaces.
 pub struct Crossing {
     /// How many edges pass through triangles.
     pub count: usize,
@@ -51,7 +55,7 @@ pub struct Crossing {
     pub other: Other,
 }
 
-/// What something soft passes through.
+/// The other part of an intersection, beside a soft one.
 pub enum Other {
     /// Something soft, with this vertex.
     Soft(u32),
@@ -59,48 +63,49 @@ pub enum Other {
     Solid(String),
 }
 
-impl Layers {
+impl SelfContact {
     /// All triangles and curves of the objects, and those of solids that have edges; `sewn` points count as one. `None` if there is
     /// nothing that could meet.
     pub fn new(
-        words: &SelfContact,
+        words: &scene::SelfContact,
         objects: &[Object],
-        sewn: impl Iterator<Item = [u32; 2]>,
+        sewn: &[[u32; 2]],
         state: &State,
         colliders: &Arc<Vec<Collider>>,
     ) -> Option<Self> {
         let points = objects.iter().map(|o| o.points.end).max()?;
-        let corners = Corners::new(colliders, points);
-        let mut layers = Self {
+        let features = SolidFeatures::new(colliders, points);
+        let mut contact = Self {
             topology: Topology::default(),
             detector: Detector::new(),
             friction: Friction { sliding: words.friction, resting: words.friction_static.unwrap_or(words.friction) },
             thickness: words.thickness,
-            sewn: sewn.collect(),
-            rest: corners.joined(&state.x, 0.0).into_owned(),
+            sewn: sewn.to_vec(),
+            rest: features.joined(&state.x, 0.0).into_owned(),
             ways: Vec::new(),
-            corners,
+            old: Vec::new(),
+            features,
         };
-        layers.rest.truncate(layers.corners.vertices());
-        layers.topology = layers.meeting(objects, &[]);
-        let soft = layers.topology.points().first().is_some_and(|i| (*i as usize) < points);
-        soft.then_some(layers)
+        contact.rest.truncate(contact.features.vertices());
+        contact.topology = contact.meeting(objects, &[]);
+        let soft = contact.topology.points().first().is_some_and(|i| (*i as usize) < points);
+        soft.then_some(contact)
     }
 
-    /// The longest edge of what is soft, where it starts [m].
+    /// The longest edge of soft surfaces at the start [m].
     pub fn longest_edge(&self) -> f64 {
-        let soft = |e: &&[u32; 2]| (e[0].max(e[1]) as usize) < self.corners.points();
+        let soft = |e: &&[u32; 2]| (e[0].max(e[1]) as usize) < self.features.points();
         let length = |[a, b]: &[u32; 2]| (xyz64(self.rest[*a as usize]) - xyz64(self.rest[*b as usize])).norm();
         self.topology.edges().iter().filter(soft).map(length).fold(0.0, f64::max)
     }
 
-    /// Takes up what has torn.
+    /// Follows surfaces that have torn.
     pub fn renew(&mut self, objects: &[Object], tears: &[Tear]) {
         self.topology = self.meeting(objects, tears);
         self.detector = Detector::new();
     }
 
-    /// What can meet. Copies of a vertex count as one where features that share it are told from others: both sides of a tear start
+    /// Features that can meet. Copies of a vertex count as one where features that share it are told from others: both sides of a tear start
     /// from the same place.
     fn meeting(&self, objects: &[Object], tears: &[Tear]) -> Topology {
         let vertices = self.rest.len();
@@ -121,8 +126,8 @@ impl Layers {
             topology.weld(copy, of);
             rest[copy as usize] = self.rest[of as usize];
         }
-        self.corners.add_to(&mut topology, self.thickness);
-        // Corners weigh nothing, as what is held.
+        self.features.add_to(&mut topology, self.thickness);
+        // Solid features weigh nothing, as held points.
         (0..vertices).filter(|i| rest[*i][3] == 0.0).for_each(|i| topology.fix(i as u32, true));
         topology.set_rest(&rest);
         topology
@@ -130,15 +135,15 @@ impl Layers {
 
     /// Edges that pass through triangles, when points are at x at time t.
     pub fn intersections(&self, x: &[Row], t: f64) -> u64 {
-        crossed(&self.topology, &self.corners.joined(x, t)).0 as u64
+        crossed(&self.topology, &self.features.joined(x, t)).0 as u64
     }
 
-    /// What passes through each other.
+    /// The first intersection, and the count of all.
     pub fn crossing(&self, x: &[Row], t: f64) -> Option<Crossing> {
-        let (count, first) = crossed(&self.topology, &self.corners.joined(x, t));
+        let (count, first) = crossed(&self.topology, &self.features.joined(x, t));
         let (edge, triangle) = first?;
         let (edge, triangle) = (self.topology.edges()[edge as usize], self.topology.triangles()[triangle as usize]);
-        let solid = |vertices: &[u32]| Some(self.corners.name(self.corners.collider(vertices)?));
+        let solid = |vertices: &[u32]| Some(self.features.name(self.features.collider(vertices)?));
         let (vertices, other) = match (solid(&edge), solid(&triangle)) {
             (Some(name), _) => (triangle.to_vec(), Other::Solid(name)),
             (_, Some(name)) => (edge.to_vec(), Other::Solid(name)),
@@ -147,7 +152,7 @@ impl Layers {
         Some(Crossing { count, vertices, other })
     }
 
-    /// How many edges pass through triangles at the start, what the first two are, and where [m]; `None` if there are none.
+    /// The number of edges that pass through triangles at the start, the objects of the first, and its place [m]; `None` if there are none.
     fn tangles(&self, objects: &[Object], x: &[Row]) -> Option<(usize, [String; 2], Vector)> {
         let Crossing { count, vertices, other } = self.crossing(x, 0.0)?;
         let place = vertices.iter().fold(Vector::default(), |sum, i| sum + xyz64(x[*i as usize])) * (1.0 / vertices.len() as f64);
@@ -158,19 +163,19 @@ impl Layers {
         Some((count, [self.name(objects, vertices[0])?, other], place))
     }
 
-    /// What a vertex belongs to.
+    /// The object or solid of a vertex.
     fn name(&self, objects: &[Object], vertex: u32) -> Option<String> {
         let soft = || objects.iter().find(|o| o.points.contains(&(vertex as usize))).map(|o| o.name.clone());
-        self.corners.collider(&[vertex]).map(|i| self.corners.name(i)).or_else(soft)
+        self.features.collider(&[vertex]).map(|i| self.features.name(i)).or_else(soft)
     }
 
-    /// Parts what is nearer than its thickness, all at rest: a push within a step would be a speed.
-    fn part(&mut self, x: &mut [Row], corners: &Corners) {
+    /// Separates surfaces nearer than their thickness, all at rest: a push within a step would be a speed.
+    fn separate(&mut self, x: &mut [Row], features: &SolidFeatures) {
         let thickness = self.topology.largest_thickness();
-        for _ in 0..PARTINGS {
+        for _ in 0..SEPARATIONS {
             self.detector.detect(&self.topology, x, REACH.0 * thickness);
             let start = x.to_vec();
-            let pairs = self.detector.pairs().iter().filter(|pair| !corners.is_mass(pair));
+            let pairs = self.detector.pairs().iter().filter(|pair| !features.is_mass(pair));
             pairs.for_each(|pair| push(pair, Friction::default(), x, |i| start[i]));
             self.detector.hold(&self.topology, x);
             if *x == start[..] {
@@ -179,20 +184,20 @@ impl Layers {
         }
     }
 
-    /// How many vertices that could move lie exactly where others do, whose objects the first two are, and where [m]; `None` if none do.
-    fn twins(&self, objects: &[Object], x: &[Row]) -> Option<(usize, [String; 2], Vector)> {
-        let x = &*self.corners.joined(x, 0.0);
+    /// The number of vertices that could move and lie exactly where others do, the objects of the first, and its place [m]; `None` if none do.
+    fn coincident_vertices(&self, objects: &[Object], x: &[Row]) -> Option<(usize, [String; 2], Vector)> {
+        let x = &*self.features.joined(x, 0.0);
         let mut points = self.topology.points().to_vec();
         let place = |i: u32| [0, 1, 2].map(|k| (x[i as usize][k] + 0.0).to_bits());
         points.sort_unstable_by_key(|i| (place(*i), *i));
         let free = |i: u32| x[i as usize][3] > 0.0;
         let same = |two: &[u32]| place(two[0]) == place(two[1]) && (free(two[0]) || free(two[1])) && self.topology.meet([two[0]], [two[1]]);
-        let twins: Vec<&[u32]> = points.windows(2).filter(|two| same(two)).collect();
-        let first = *twins.first()?;
-        Some((twins.len(), [self.name(objects, first[0])?, self.name(objects, first[1])?], xyz64(x[first[0] as usize])))
+        let coincident: Vec<&[u32]> = points.windows(2).filter(|two| same(two)).collect();
+        let first = *coincident.first()?;
+        Some((coincident.len(), [self.name(objects, first[0])?, self.name(objects, first[1])?], xyz64(x[first[0] as usize])))
     }
 
-    /// Untangles what has passed, before an interval; what is still tangled, or `inside` a solid, is left alone until it is out.
+    /// Untangles surfaces that have passed; those still tangled, or `inside` a solid, are left alone until they are out.
     fn untangle(&mut self, x: &mut [Row], inside: &[bool]) {
         for round in 0..=ROUNDS {
             let crossings = self.detector.intersections(&self.topology, x);
@@ -212,10 +217,9 @@ impl Layers {
     }
 }
 
-impl Dynamics {
+impl SelfContact {
     /// Surfaces that pass through each other as they are, or lie in each other, as a sentence with the place; `None` if none do, or may.
-    pub fn tangles(&self) -> Option<Warning> {
-        let layers = self.layers.as_ref()?;
+    pub fn tangled_start(&self, core: &Core) -> Option<Warning> {
         let told = |(n, [one, other], place): (usize, [String; 2], Vector), passing: bool| {
             let other = if one == other { "itself".to_string() } else { format!("\"{other}\"") };
             let place = <[f64; 3]>::from(place).map(|x| format!("{x:.4}")).join(", ");
@@ -230,104 +234,101 @@ impl Dynamics {
                      to, so that they stay in each other: move one of them by a little"
                 )
             };
-            Warning::new(Code::TangledStart, format!("system \"{}\"", self.name), message)
+            Warning::new(Code::TangledStart, format!("system \"{}\"", core.name), message)
         };
-        let passing = layers.tangles(&self.objects, &self.state.x).map(|found| told(found, true));
-        passing.or_else(|| layers.twins(&self.objects, &self.state.x).map(|found| told(found, false)))
+        let passing = self.tangles(&core.objects, &core.state.x).map(|found| told(found, true));
+        passing.or_else(|| self.coincident_vertices(&core.objects, &core.state.x).map(|found| told(found, false)))
     }
 
-    /// Before an interval from t on: what is tangled, and at the start what is too near.
-    pub(super) fn untangle(&mut self, t: f64) {
-        let Some(layers) = &mut self.layers else { return };
-        let mut corners = std::mem::take(&mut layers.corners);
-        self.unclamped.clone_from(&self.state.x);
-        corners.place(t, 0.0);
-        corners.with_end(&mut self.state.x, |corners, x| {
-            let inside = corners.inside(&layers.topology, x, t);
-            layers.untangle(x, &inside);
-            if t == 0.0 {
-                corners.lift(&layers.topology, x, t);
-                layers.part(x, corners);
-            }
-        });
-        layers.corners = corners;
-        // What has been moved has another past.
-        self.memory.ready &= self.state.x == self.unclamped;
-    }
-
-    /// Before a sub-step from t on of length h [s]: who is near whom.
-    pub(super) fn find_pairs(&mut self, t: f64, h: f64) {
-        let Some(layers) = &mut self.layers else { return };
-        let n = layers.corners.points();
-        let gravity = Vector::from(self.laws.gravity) * h;
-        let (x, v) = (&self.state.x[..n], &self.state.v[..n]);
-        layers.ways.clear();
-        layers.ways.extend(x.iter().zip(v).map(|(x, v)| (xyz64(*v) + if x[3] > 0.0 { gravity } else { Vector::default() }) * h));
-        layers.corners.place(t, h);
-        layers.ways.extend(layers.corners.ways());
-        let farthest = layers.ways.iter().map(|w| w.norm_sq()).fold(0.0, f64::max).sqrt();
-        let thickness = layers.topology.largest_thickness();
-        let reach = (thickness + ASIDE * farthest).clamp(REACH.0 * thickness, REACH.1 * thickness);
-        layers.detector.detect_along(&layers.topology, &layers.corners.at_start(x), &layers.ways, reach);
-        layers.corners.run_belts(t, h);
-    }
-
-    /// The step [s] in which those that are about to meet in h [s] go half of their thickness past each other; infinite if none are.
+    /// The step [s] in which pairs that are about to meet in h [s] go half of their thickness past each other; infinite if none are.
     /// (contact.21)
-    pub(super) fn longest_among_pairs(&self, h: f64) -> f64 {
-        let Some(layers) = &self.layers else { return f64::INFINITY };
+    pub fn longest_step(&self, h: f64) -> f64 {
         let passing = |pair: &Pair| {
             let parts = pair.vertices.iter().zip(pair.weights);
-            let way = parts.fold(Vector::default(), |sum, (v, w)| sum + layers.ways[*v as usize] * f64::from(w));
+            let way = parts.fold(Vector::default(), |sum, (v, w)| sum + self.ways[*v as usize] * f64::from(w));
             way.norm() / f64::from(pair.thickness)
         };
-        0.5 * h / layers.detector.pairs().iter().map(passing).fold(0.0, f64::max)
+        0.5 * h / self.detector.pairs().iter().map(passing).fold(0.0, f64::max)
     }
 
-    /// In a sweep: pushes pairs apart that are too near, with friction on what they slide in the sub-step.
-    pub(super) fn push_apart(&mut self) {
-        let Some(Layers { detector, friction, corners, .. }) = &mut self.layers else { return };
-        let (before, points) = (&self.before, corners.points());
-        corners.with_end(&mut self.state.x, |corners, x| {
-            for pair in detector.pairs().iter().filter(|pair| !corners.is_mass(pair)) {
-                let friction = corners.friction(pair).unwrap_or(*friction);
-                push(pair, friction, x, |i| if i < points { before[i] } else { corners.start[i - points] });
-            }
-        });
-    }
-
-    /// After a step from t on of length h [s] of a scheme without sweeps: pushes pairs apart. Velocities change by as much as positions in h.
-    pub(super) fn part_layers(&mut self, t: f64, h: f64) {
-        let Some(layers) = &mut self.layers else { return };
-        // The step may be shorter than the one for which pairs were looked for.
-        layers.corners.place(t, h);
-        layers.corners.run_belts(t, h);
-        self.unclamped.clone_from(&self.state.x);
-        (0..ROUNDS).for_each(|_| self.push_apart());
-        self.take_along(h);
-    }
-
-    /// Velocities follow what has moved away from `unclamped`.
-    fn take_along(&mut self, h: f64) {
-        let Some(layers) = &self.layers else { return };
-        let inverse_h = (1.0 / h) as Real;
-        for ((x, old), v) in self.state.x.iter().zip(&self.unclamped).zip(&mut self.state.v).take(layers.corners.points()) {
+    /// Velocities follow the changes of positions since `old`; says whether there were any.
+    fn carry_velocities(&self, State { x, v }: &mut State, h: f64) -> bool {
+        let (inverse_h, mut moved) = ((1.0 / h) as Real, false);
+        for ((x, old), v) in x.iter().zip(&self.old).zip(v).take(self.features.points()) {
             let change = sub(*x, *old);
             if change[..3] != [0.0; 3] && x[3] > 0.0 {
                 *v = axpy(*v, inverse_h, [change[0], change[1], change[2], 0.0]);
-                self.memory.ready = false;
+                moved = true;
             }
         }
+        moved
+    }
+}
+
+impl Feature for SelfContact {
+    /// Untangles surfaces and, at the start of a run, separates those that are too near.
+    fn begin(&mut self, core: &mut Core, t: f64) {
+        let mut features = std::mem::take(&mut self.features);
+        self.old.clone_from(&core.state.x);
+        features.place(Span { t, h: 0.0 });
+        features.with_end(&mut core.state.x, |features, x| {
+            let inside = features.inside(&self.topology, x, t);
+            self.untangle(x, &inside);
+            if t == 0.0 {
+                features.lift(&self.topology, x, t);
+                self.separate(x, features);
+            }
+        });
+        self.features = features;
+        // Points that have been moved have another past.
+        core.memory.ready &= core.state.x == self.old;
     }
 
-    /// After a sub-step of length h [s]: holds back what would pass through something.
-    pub(super) fn hold_layers(&mut self, h: f64) {
-        let Some(layers) = &mut self.layers else { return };
-        self.unclamped.clone_from(&self.state.x);
-        let (topology, detector) = (&layers.topology, &mut layers.detector);
-        let held = layers.corners.with_end(&mut self.state.x, |_, x| detector.hold(topology, x).held);
+    /// Finds pairs of near features.
+    fn before(&mut self, core: &mut Core, step: Span) {
+        let n = self.features.points();
+        let gravity = Vector::from(core.laws.gravity) * step.h;
+        let (x, v) = (&core.state.x[..n], &core.state.v[..n]);
+        self.ways.clear();
+        self.ways.extend(x.iter().zip(v).map(|(x, v)| (xyz64(*v) + if x[3] > 0.0 { gravity } else { Vector::default() }) * step.h));
+        self.features.place(step);
+        self.ways.extend(self.features.ways());
+        let farthest = self.ways.iter().map(|w| w.norm_sq()).fold(0.0, f64::max).sqrt();
+        let thickness = self.topology.largest_thickness();
+        let reach = (thickness + ASIDE * farthest).clamp(REACH.0 * thickness, REACH.1 * thickness);
+        self.detector.detect_along(&self.topology, &self.features.at_start(x), &self.ways, reach);
+        self.features.run_belts(step);
+    }
+
+    /// Pushes pairs apart that are too near, with friction on their slide in the sub-step.
+    fn sweep(&mut self, core: &mut Core) {
+        let Self { detector, friction, features, .. } = self;
+        let (before, points) = (&core.before, features.points());
+        features.with_end(&mut core.state.x, |features, x| {
+            for pair in detector.pairs().iter().filter(|pair| !features.is_mass(pair)) {
+                let friction = features.friction(pair).unwrap_or(*friction);
+                push(pair, friction, x, |i| if i < points { before[i] } else { features.start[i - points] });
+            }
+        });
+    }
+
+    /// Pushes pairs apart; velocities change by as much as positions in the sub-step.
+    fn relax(&mut self, core: &mut Core, step: Span) {
+        // The step may be shorter than the one for which pairs were looked for.
+        self.features.place(step);
+        self.features.run_belts(step);
+        self.old.clone_from(&core.state.x);
+        (0..ROUNDS).for_each(|_| self.sweep(core));
+        core.memory.ready &= !self.carry_velocities(&mut core.state, step.h);
+    }
+
+    /// Holds back whatever would pass through something.
+    fn after(&mut self, core: &mut Core, step: Span, _: &mut StepReport) {
+        self.old.clone_from(&core.state.x);
+        let (topology, detector) = (&self.topology, &mut self.detector);
+        let held = self.features.with_end(&mut core.state.x, |_, x| detector.hold(topology, x).held);
         if held > 0 {
-            self.take_along(h);
+            core.memory.ready &= !self.carry_velocities(&mut core.state, step.h);
         }
     }
 }

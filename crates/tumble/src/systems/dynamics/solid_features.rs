@@ -2,6 +2,7 @@
 //! system, held and of no mass; where they are is a function of time alone, and so in no snapshot.                  (contact.23)
 
 use super::contact::real;
+use super::feature::Span;
 use crate::geometry::mesh_contact::{Kind, Owner, Pair, Topology};
 use crate::geometry::{Collider, Friction, Vector};
 use crate::math::{Row, axpy, row, xyz64};
@@ -9,7 +10,7 @@ use std::borrow::Cow;
 use std::ops::Range;
 use std::sync::Arc;
 
-/// What is no deeper than this in a solid lies on it [m], 1 m from the origin.
+/// Depth in a solid up to which a point lies on it [m], 1 m from the origin.
 const TOUCH: f64 = 1e-6;
 
 /// Edges keep off a solid by this part of its thickness: where masses lie on a face, edges between them are left alone.
@@ -25,23 +26,23 @@ struct Solid {
 
 /// All of them.
 #[derive(Default)]
-pub struct Corners {
+pub struct SolidFeatures {
     colliders: Arc<Vec<Collider>>,
     /// Points of the system; corners come after them.
     points: usize,
     list: Vec<Solid>,
     /// Whether any of them ever moves.
     moving: bool,
-    /// Where corners end in the sub-step.
+    /// Places of corners at the end of the sub-step.
     pub end: Vec<Row>,
-    /// Where they start from, less what belts carry along: what friction compares with.
+    /// Their places at its start, less the way of belts: friction compares with these.
     pub start: Vec<Row>,
     /// Rows of points and corners.
     rows: Vec<Row>,
 }
 
-impl Corners {
-    /// Those of the colliders whose edges meet anything.
+impl SolidFeatures {
+    /// Features of the colliders that have edges.
     pub fn new(colliders: &Arc<Vec<Collider>>, points: usize) -> Self {
         let mut all = Self { colliders: colliders.clone(), points, ..Self::default() };
         let mut first = 0;
@@ -65,12 +66,12 @@ impl Corners {
         self.points + self.list.last().map_or(0, |solid| solid.corners.end)
     }
 
-    /// Where corners are at time t [m].
+    /// Places of corners at time t [m].
     fn at(&self, t: f64) -> impl Iterator<Item = Row> {
         self.list.iter().flat_map(move |solid| self.colliders[solid.collider].corners(t)).map(|x| row(real(x), 0.0))
     }
 
-    /// Adds them to what can meet, beside what is soft with this `thickness` [m].                                  (contact.23)
+    /// Adds them to the topology, beside soft surfaces of this `thickness` [m].                                  (contact.23)
     pub fn add_to(&self, topology: &mut Topology, thickness: f64) {
         for solid in &self.list {
             let collider = &self.colliders[solid.collider];
@@ -108,11 +109,11 @@ impl Corners {
         result
     }
 
-    /// Where corners start from and end in a sub-step from t on of length h [s].
-    pub fn place(&mut self, t: f64, h: f64) {
+    /// Finds the places of corners at both ends of a sub-step; belts, which friction compares with, have not run yet.
+    pub fn place(&mut self, step: Span) {
         if self.moving || self.end.is_empty() {
-            self.start = self.at(t).collect();
-            self.end = self.at(t + h).collect();
+            self.start = self.at(step.t).collect();
+            self.end = self.at(step.end()).collect();
         }
     }
 
@@ -126,10 +127,10 @@ impl Corners {
         if self.list.is_empty() { Cow::Borrowed(x) } else { Cow::Owned([&x[..self.points], &self.start].concat()) }
     }
 
-    /// Takes from the start what belts carry along in a sub-step from t on of length h [s].
-    pub fn run_belts(&mut self, t: f64, h: f64) {
+    /// Takes the way that belts carry along in a sub-step from the start.
+    pub fn run_belts(&mut self, step: Span) {
         for solid in &self.list {
-            let slip = self.colliders[solid.collider].slip(t + h) * h;
+            let slip = self.colliders[solid.collider].slip(step.end()) * step.h;
             if slip != Vector::default() {
                 let back = |x: &mut Row| *x = row(real(xyz64(*x) - slip), 0.0);
                 self.start[solid.corners.clone()].iter_mut().for_each(back);
@@ -137,7 +138,7 @@ impl Corners {
         }
     }
 
-    /// What lies on a solid at time t, or nearer than its thickness, is put where the thickness ends.
+    /// Puts points that lie on a solid at time t, or nearer than its thickness, to the end of the thickness.
     pub fn lift(&self, topology: &Topology, x: &mut [Row], t: f64) {
         for collider in self.list.iter().map(|solid| &self.colliders[solid.collider]) {
             for i in self.soft(topology) {
@@ -194,7 +195,7 @@ impl Corners {
     }
 }
 
-/// Whether what is so deep below the thickness of a solid is beyond its surface, too.
+/// Whether a point so deep below the thickness of a solid is beyond its surface, too.
 fn is_inside(collider: &Collider, depth: f64, at: Vector) -> bool {
     depth > collider.thickness + TOUCH * (1.0 + at.norm())
 }

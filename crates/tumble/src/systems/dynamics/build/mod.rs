@@ -1,0 +1,190 @@
+//! From the parts that recipes collect to a system.
+
+mod between;
+mod contact;
+mod elements;
+mod objects;
+mod tears;
+
+use super::Dynamics;
+use super::core::{Between, Clamp, Core};
+use super::features::Features;
+use super::followers::Followers;
+use super::fracture::Fracture;
+use super::hair_continuum::HairContinuum;
+use super::laws::{Acting, Laws};
+use super::parts::Parts;
+use super::scale::Scale;
+use super::scheme::{self, Forces, Projected, Scheme};
+use super::settings::Settings;
+use crate::elements::{LongRangeAttachments, Members};
+use crate::forces::Sails;
+use crate::geometry::{Carrier, Collider};
+use crate::integrators::Memory;
+use crate::math::Real;
+use crate::pool::Pool;
+use crate::state::{Masses, State};
+use between::between;
+use elements::Batches;
+use objects::Objects;
+use tears::Tied;
+use tumble_interface::SceneError;
+
+impl Parts {
+    /// The system.
+    pub fn build(mut self, settings: Settings) -> Result<Dynamics, SceneError> {
+        self.check_range()?;
+        self.check_emitters(&settings.name)?;
+        scheme::check(&self, &settings)?;
+        if self.tearing_surface().is_some() {
+            self.halve_links();
+        }
+        self.count_rows(&settings.colliders);
+        let lost = || SceneError::one(format!("system \"{}\"", settings.name), "an element refers to a mass that is not there");
+        let projects = scheme::projects(&settings);
+        let (state, masses) = self.state();
+        let (points, rows) = (masses.points, masses.mass.len());
+        let mut batches = Batches::new(&masses, projects);
+        let clamp = settings.clamp.and_then(|ratio| self.clamp(ratio, rows));
+        let lists = batches.fill(&mut self).ok_or_else(lost)?;
+        let scheme = self.scheme(&settings, &state);
+        let objects = Objects::new(std::mem::take(&mut self.objects), self.counts(), lists.springs, points);
+        let sewn: Vec<[u32; 2]> = self.vector.members.iter().map(|m| m.nodes).collect();
+        let (self_contact, intersection_counter) = contact::surfaces(&settings, &objects.list, &sewn, &state)?;
+        let between = self.between(&objects, &masses, &settings, &mut batches);
+        let sails = self.sails(&objects, &state, &masses, &mut batches).ok_or_else(lost)?;
+        let tied = Tied { parts: &self, lists, projects, clamped: clamp.is_some(), sails: &sails };
+        let tears = tied.tears(&objects, &masses.mass, &state.x[..points]);
+        let grip = batches.grip(&state.x);
+        let hair = |(draft, words)| HairContinuum::new(objects.points_of(draft), words, &state.x);
+        let features = Features {
+            hair: self.hair.drain(..).map(hair).collect(),
+            followers: Followers::new(self.followers, self.carried, &settings.colliders),
+            self_contact,
+            fracture: Fracture::new(tears),
+            intersection_counter,
+        };
+        let forces = self.forces.into_iter().map(|(name, law, on)| {
+            let on = objects.placed(&on);
+            Acting { name, law, ranges: objects.rows(&on), objects: on }
+        });
+        let laws = Laws {
+            grip,
+            batches: batches.list,
+            forces: forces.collect(),
+            gravity: settings.gravity,
+            masses,
+            colliders: settings.colliders.clone(),
+            ..Default::default()
+        };
+        let core = Core {
+            name: settings.name.clone(),
+            integrator: settings.integrator,
+            state,
+            laws,
+            constraints: batches.constraints,
+            clamp,
+            objects: objects.list,
+            pool: Pool::new(points, self.emitters),
+            between,
+            memory: Memory::new(settings.integrator, rows),
+            before: Vec::new(),
+            before_v: Vec::new(),
+            scale: Scale::default(),
+            broken: 0,
+        };
+        Dynamics::new(core, scheme, features, &settings)
+    }
+
+    /// Frames must be the last rows, and so must emitted particles.
+    fn check_emitters(&self, system: &str) -> Result<(), SceneError> {
+        if self.emitters.is_empty() || self.frames.is_empty() {
+            return Ok(());
+        }
+        let message = "it holds rods and emitters; rods have frames, which must come last: give one of them a system of its own";
+        Err(SceneError::one(format!("system \"{system}\""), message))
+    }
+
+    /// Counts the frames of elements and followers from the first row of all, as the system does; leaves out followers of solids at rest.
+    fn count_rows(&mut self, colliders: &[Collider]) {
+        let points = self.points.len();
+        self.carried.retain(|held| colliders.get(held.collider).is_some_and(|c| held.carrier != Carrier::Whole || c.motion.is_some()));
+        self.carried.iter_mut().filter_map(|held| held.frame.as_mut()).for_each(|(frame, _)| *frame += points);
+        for nodes in self.stretches.iter_mut().map(|m| &mut m.nodes) {
+            nodes[2] += points as u32;
+        }
+        for node in self.bends.iter_mut().flat_map(|m| &mut m.nodes) {
+            *node += points as u32;
+        }
+    }
+
+    /// Rows of points and frames, and their masses.
+    fn state(&self) -> (State, Masses) {
+        let points = self.points.len();
+        let (mut state, mut masses) = (State::default(), Masses { points, ..Masses::default() });
+        for (x, v, mass, pinned) in &self.points {
+            let w = if *pinned || *mass == 0.0 { 0.0 } else { 1.0 / mass };
+            state.x.push([x.x as Real, x.y as Real, x.z as Real, w as Real]);
+            state.v.push(if *pinned { [0.0; 4] } else { [v.x as Real, v.y as Real, v.z as Real, 0.0] });
+            masses.mass.push(*mass as Real);
+        }
+        for (q, inertia, pinned) in &self.frames {
+            state.x.push(q.map(|q| q as Real));
+            state.v.push([0.0; 4]);
+            masses.mass.push(*inertia as Real);
+            masses.inverse_inertia.push(if *pinned { 0.0 } else { (1.0 / inertia) as Real });
+        }
+        if !self.charges.is_empty() || self.emitters.iter().any(|e| e.words().charge != 0.0) {
+            masses.charge = vec![0.0; points + self.frames.len()];
+            for (i, charge) in &self.charges {
+                masses.charge[*i as usize] = *charge as Real;
+            }
+        }
+        (state, masses)
+    }
+
+    /// Limits springs to `ratio` times their rest length; `None` if one is not between rows.
+    fn clamp(&self, ratio: f64, rows: usize) -> Option<Clamp> {
+        let short = |m: &Members<2, 1, 0>| Members { rest: [m.rest[0] * ratio], stiffness: f64::INFINITY, damping: 0.0, ..*m };
+        let linear = self.linear.members.iter().map(short);
+        let others = self.nonlinear.members.iter();
+        let others = others.map(|m| short(&Members { nodes: m.nodes, rest: m.rest, law: [], stiffness: 0.0, damping: 0.0 }));
+        Clamp::new(rows, rows, &[], &linear.chain(others).collect::<Vec<_>>(), &[])
+    }
+
+    /// The scheme of the settings.
+    fn scheme(&self, settings: &Settings, state: &State) -> Box<dyn Scheme> {
+        if !scheme::projects(settings) {
+            return Box::new(Forces::new(settings));
+        }
+        let attachments: Vec<LongRangeAttachments> = settings.sweeps.tethers.map_or_else(Vec::new, |slack| self.attachments(slack, state));
+        Box::new(Projected::new(settings, attachments))
+    }
+
+    /// Adds the forces between masses.
+    fn between(&mut self, objects: &Objects, masses: &Masses, settings: &Settings, batches: &mut Batches) -> Vec<Between> {
+        let mut added = Vec::new();
+        for (words, on, others) in std::mem::take(&mut self.between) {
+            let (on, others) = (objects.placed(&on), others.map(|others| objects.placed(&others)));
+            for batch in between(words, objects.rows(&on), others.as_deref().map(|o| objects.rows(o)), masses, &self.halos, settings) {
+                added.push(Between { batch: batches.list.len(), objects: on.clone(), others: others.clone() });
+                batches.list.push(batch);
+            }
+        }
+        added
+    }
+
+    /// Adds the air around surfaces, and returns each batch with its objects; `None` if a triangle has no rows.
+    fn sails(&mut self, objects: &Objects, state: &State, masses: &Masses, batches: &mut Batches) -> Option<Vec<(usize, Vec<usize>)>> {
+        let mut added = Vec::new();
+        for (air, on) in std::mem::take(&mut self.airs) {
+            let on = objects.placed(&on);
+            let triangles: Vec<[u32; 3]> = on.iter().flat_map(|i| objects.triangles(*i)).collect();
+            if !triangles.is_empty() {
+                added.push((batches.list.len(), on));
+                batches.list.push(Box::new(Sails::new(air, &triangles, &state.x[..masses.points], &masses.mass, &self.times)?));
+            }
+        }
+        Some(added)
+    }
+}

@@ -1,0 +1,152 @@
+//! State and laws of a system of masses, on which schemes and features act.
+
+use super::contact::{Pass, Response, Step};
+use super::feature::Span;
+use super::laws::Laws;
+use super::scale::Scale;
+use crate::elements::{Constraints, Limit, Linear, Projected};
+use crate::geometry::{Collider, Vector};
+use crate::integrators::Memory;
+use crate::math::parallel::{CHUNK, Tasks};
+use crate::math::{Real, Row, Vec3, ZERO, axpy, row};
+use crate::pool::{Hit, Pool};
+use crate::state::{Object, State};
+use tumble_interface::scene::Integrator;
+
+/// Rows of masses that do not feel each other which are stepped together: 24 KB in single precision, with accelerations.
+pub const BLOCK: usize = 512;
+
+/// Springs longer than a multiple of their rest length, which are shortened to it.
+pub type Clamp = Projected<Limit, Linear, 2, 1, 1, 0>;
+
+/// A force between masses of some objects.
+pub struct Between {
+    /// Its batch.
+    pub batch: usize,
+    /// The objects on which it acts.
+    pub objects: Vec<usize>,
+    /// Other objects that it names.
+    pub others: Option<Vec<usize>>,
+}
+
+/// Masses, the laws between them, and the memory of their integrator.
+pub struct Core {
+    /// Name of the system in the scene.
+    pub name: String,
+    /// Scheme, as the scene names it.
+    pub integrator: Integrator,
+    /// Positions and velocities.
+    pub state: State,
+    /// Forces.
+    pub laws: Laws,
+    /// Elements that are no forces but constraints.
+    pub constraints: Vec<Box<dyn Constraints>>,
+    /// Limit of the length of springs.
+    pub clamp: Option<Clamp>,
+    /// Rows and topology of every object.
+    pub objects: Vec<Object>,
+    /// Particles that are born and die; their rows are the last.
+    pub pool: Pool,
+    /// Forces between masses of some objects.
+    pub between: Vec<Between>,
+    /// Columns that the integrator keeps from step to step.
+    pub memory: Memory,
+    /// Positions and velocities at the start of a sub-step, for contact.
+    pub before: Vec<Row>,
+    pub before_v: Vec<Row>,
+    /// Scale of the energy.
+    pub scale: Scale,
+    /// Links and vertices broken so far.
+    pub broken: u64,
+}
+
+impl Core {
+    /// Speed that gravity gives in two steps: slower impacts do not bounce.
+    pub fn resting_speed(&self, h: f64) -> f64 {
+        2.0 * h * Vec3::from(self.laws.gravity).norm()
+    }
+
+    /// Whether no mass feels another.
+    pub fn is_local(&self) -> bool {
+        self.laws.is_local() && self.constraints.is_empty() && self.clamp.is_none()
+    }
+
+    /// Kicks a mass with an impulse [N s].
+    pub fn kick(&mut self, i: usize, impulse: Vec3<f64>) {
+        let w = f64::from(self.laws.masses.inverse(i, &self.state.x));
+        let dv = impulse * w;
+        self.state.v[i] = axpy(self.state.v[i], 1.0, row(Vec3 { x: dv.x as Real, y: dv.y as Real, z: dv.z as Real }, 0.0));
+        self.memory.ready = false;
+    }
+
+    /// Adds the impulse of a constant force over the next interval [N s].
+    pub fn push_steadily(&mut self, row: usize, impulse: Vector) {
+        let steady = &mut self.laws.steady;
+        match steady.binary_search_by_key(&row, |(row, _)| *row) {
+            Ok(at) => steady[at].1 = steady[at].1 + impulse,
+            Err(at) => steady.insert(at, (row, impulse)),
+        }
+        self.memory.ready = false;
+    }
+
+    /// The normal of the nearest solid that a point leans on, zero if there is none.
+    pub fn contact_normal(&self, x: Vector, t: f64) -> Vector {
+        let gap = |collider: &Collider| {
+            let thick = collider.thickness;
+            let (distance, normal) = collider.distance(x, t, 2.0 * thick);
+            (distance <= thick * (1.0 + 1e-3)).then_some((distance - thick, normal))
+        };
+        let nearest = self.laws.colliders.iter().filter_map(gap).reduce(|a, b| if b.0 < a.0 { b } else { a });
+        nearest.map_or(Vector::default(), |(_, normal)| normal)
+    }
+
+    /// Accelerations at time t [m/s²]; none where a user's force fails, which the next step reports.
+    pub fn accelerations(&mut self, t: f64) -> Vec<Row> {
+        let mut out = vec![ZERO; self.state.x.len()];
+        let done = self.laws.rate(t, &self.state.x, &self.state.v, &mut out);
+        done.map_or(Vec::new(), |()| out)
+    }
+
+    /// Keeps the positions at the start of a sub-step.
+    pub fn keep_positions(&mut self) {
+        self.before.resize(self.state.x.len(), ZERO);
+        self.before.copy_from_slice(&self.state.x);
+    }
+
+    /// Keeps the velocities at the start of a sub-step, if contact will ask for them.
+    pub fn keep_velocities(&mut self) {
+        if !self.laws.colliders.is_empty() {
+            self.before_v.resize(self.state.x.len(), ZERO);
+            self.before_v.copy_from_slice(&self.state.v);
+        }
+    }
+
+    /// The contact pass after a sub-step.
+    pub fn resolve_contact(&mut self, Span { t, h }: Span, Response { lead, penalty }: Response) {
+        if self.laws.colliders.is_empty() {
+            return;
+        }
+        let observed = self.pool.heeded();
+        let step = Step { t, h, resting: self.resting_speed(h), lead, observed: false };
+        let pass = Pass { colliders: &self.laws.colliders, step, penalty, observed: &observed };
+        let points = self.laws.masses.points;
+        let (before, before_v) = (&self.before[..points], &self.before_v[..points]);
+        let chunks = self.state.x[..points].chunks_mut(CHUNK).zip(self.state.v[..points].chunks_mut(CHUNK));
+        let chunks = chunks.zip(before.chunks(CHUNK).zip(before_v.chunks(CHUNK))).enumerate();
+        let touched: Vec<(bool, Vec<(usize, Hit)>)> = chunks.map_in_parallel(|(c, ((x, v), (before, before_v)))| {
+            let mut hits = Vec::new();
+            (pass.rows(c * CHUNK, [before, before_v], x, v, &mut hits), hits)
+        });
+        for (any, hits) in touched {
+            self.memory.ready &= !any;
+            hits.into_iter().for_each(|(row, hit)| self.pool.note_row(row, hit));
+        }
+    }
+
+    /// Breaks the links that are strained beyond their limit; returns how many.
+    pub fn break_links(&mut self) -> u64 {
+        let x = &self.state.x;
+        self.laws.batches.iter_mut().map(|b| b.break_links(x)).sum::<u64>()
+            + self.constraints.iter_mut().map(|c| c.break_links(x)).sum::<u64>()
+    }
+}

@@ -1,0 +1,187 @@
+//! Forces under an integrator: x'' = f(x, v, t)/m. Conditions on positions alone are corrected after the step.
+
+use super::super::contact::Response;
+use super::super::core::Core;
+use super::super::feature::Span;
+use super::super::features::Features;
+use super::super::implicit::{Implicit, Motion};
+use super::super::laws::flat;
+use super::super::parts::Parts;
+use super::super::settings::Settings;
+use super::Scheme;
+use crate::elements::{Constraints, Projection};
+use crate::geometry::Walls;
+use crate::integrators::{self, Scratch, Step, adaptive_step};
+use crate::math::parallel::sum;
+use crate::math::{Real, Row, ZERO, axpy, sub, xyz64};
+use crate::state::State;
+use tumble_interface::engine::{StepReport, UserIntegrator};
+use tumble_interface::scene::{Adaptive, Integrator};
+use tumble_interface::{SceneError, StepError};
+
+/// An integrator, or the user's in its place, with their storage between steps.
+pub struct Forces {
+    adaptive: Adaptive,
+    implicit: Implicit,
+    user: Option<Box<dyn UserIntegrator>>,
+    scratch: Scratch,
+    /// Positions before the clamp.
+    unclamped: Vec<Row>,
+}
+
+/// Refuses parts that only projected elements can be.
+pub fn check(parts: &Parts, settings: &Settings) -> Result<(), SceneError> {
+    if let Some(path) = parts.global_constraint() {
+        let message = "a constraint on all masses at once, which only position-based dynamics knows; set method = \"position_based\"";
+        return Err(SceneError::one(path, message));
+    }
+    if settings.integrator.is_adaptive() && parts.has_hair_continuum() {
+        let message = "hair that acts on itself needs steps of equal length; set another integrator";
+        return Err(SceneError::one(format!("system \"{}\".integrator", settings.name), message));
+    }
+    if parts.has_breakable_rods() {
+        let message = "rods with a break_strain break in position-based systems only; set integrator = \"position_based\"";
+        return Err(SceneError::one(format!("system \"{}\".integrator", settings.name), message));
+    }
+    Ok(())
+}
+
+impl Forces {
+    /// The integrator of these settings.
+    pub fn new(settings: &Settings) -> Self {
+        Self {
+            adaptive: settings.adaptive.clone(),
+            implicit: Implicit::new(settings.solver.clone(), settings.integrator == Integrator::ImplicitEuler),
+            user: None,
+            scratch: Scratch::default(),
+            unclamped: Vec::new(),
+        }
+    }
+
+    /// Keeps the start of a step for contact.
+    fn keep_start(core: &mut Core, features: &Features) {
+        if !core.laws.colliders.is_empty() || features.self_contact.is_some() {
+            core.keep_positions();
+        }
+        core.keep_velocities();
+    }
+
+    /// Shortens springs that are too long; velocities follow.
+    fn clamp(&mut self, core: &mut Core, h: f64, report: &mut StepReport) {
+        let Core { state, laws, clamp: Some(clamp), memory, .. } = core else { return };
+        let masses = &laws.masses;
+        let one = |v: &[Row], i: usize| 0.5 * f64::from(masses.mass[i]) * xyz64(v[i]).norm_sq();
+        let kinetic = |v: &[Row]| sum(masses.points, |range| range.map(|i| one(v, i)).sum());
+        let energy = |state: &State| kinetic(&state.v) + laws.batches.iter().map(|b| b.energy(&state.x)).sum::<f64>();
+        let was = energy(state);
+        self.unclamped.clone_from(&state.x);
+        let projection = Projection { h, before: &self.unclamped, iteration: 0, iterations: 1, plain: None, walls: Walls::default() };
+        clamp.project(&mut state.x, &projection);
+        let inverse_h = (1.0 / h) as Real;
+        let mut moved = false;
+        for i in 0..masses.points {
+            let change = sub(state.x[i], self.unclamped[i]);
+            if change != ZERO {
+                state.v[i] = axpy(state.v[i], inverse_h, change);
+                moved = true;
+            }
+        }
+        if moved {
+            memory.ready = false;
+            report.clamped += was - energy(state);
+        }
+    }
+}
+
+impl Scheme for Forces {
+    fn step(&mut self, core: &mut Core, features: &mut Features, step: Span, report: &mut StepReport) -> Result<(), StepError> {
+        Self::keep_start(core, features);
+        if let Some(user) = &mut self.user {
+            user_step(user.as_mut(), core, step)?;
+        } else {
+            let Core { integrator, laws, state, memory, .. } = core;
+            let equation = &mut Motion { laws, implicit: &mut self.implicit };
+            let (Span { t, h }, ready, scratch) = (step, memory.ready, &mut self.scratch);
+            let (x, v, memory) = (&mut state.x[..], &mut state.v[..], &mut memory.slices()[..]);
+            integrators::step(*integrator, Step { equation, t, h, x, v, memory, ready, scratch, report })?;
+        }
+        core.memory.ready = true;
+        Ok(())
+    }
+
+    fn is_adaptive(&self, core: &Core) -> bool {
+        core.integrator.is_adaptive() && self.user.is_none()
+    }
+
+    fn adaptive_step(
+        &mut self,
+        core: &mut Core,
+        features: &Features,
+        rest: Span,
+        dt: f64,
+        report: &mut StepReport,
+    ) -> Result<f64, StepError> {
+        Self::keep_start(core, features);
+        // The error of a step knows nothing of contact.
+        let apart = features.self_contact.as_ref().map_or(f64::INFINITY, |contact| contact.longest_step(rest.h));
+        let times = (rest.t, apart.max(self.adaptive.smallest * dt).min(rest.h), dt);
+        let Core { integrator, laws, state, memory, .. } = core;
+        let mut motion = Motion { laws, implicit: &mut self.implicit };
+        let y = (&mut state.x[..], &mut state.v[..]);
+        adaptive_step(*integrator, &self.adaptive, &mut motion, times, y, memory, &mut self.scratch, report)
+    }
+
+    fn correct(&mut self, core: &mut Core, features: &mut Features, step: Span, report: &mut StepReport) {
+        features.moved(core, step);
+        self.clamp(core, step.h, report);
+        features.relax(core, step);
+    }
+
+    fn response(&self, core: &Core) -> Response {
+        let penalty = self.implicit.sees_solids();
+        // The path under a user's scheme is unknown, and masses that the penalty pushes have no constant acceleration.
+        let lead = if self.user.is_some() || penalty { 0.0 } else { integrators::lead(core.integrator) };
+        Response { lead, penalty: penalty && self.user.is_none() }
+    }
+
+    fn steps_alone(&self, core: &Core) -> bool {
+        self.user.is_none() && !core.integrator.is_implicit()
+    }
+
+    fn has_stability_limit(&self) -> bool {
+        true
+    }
+
+    fn replace(&mut self, integrator: Box<dyn UserIntegrator>) -> bool {
+        self.user = Some(integrator);
+        true
+    }
+}
+
+/// A step of a user's integrator, which knows points alone.
+fn user_step(user: &mut dyn UserIntegrator, core: &mut Core, Span { t, h }: Span) -> Result<(), StepError> {
+    let Core { state, laws, .. } = core;
+    let n = laws.masses.points;
+    let (mut x, mut v) = (flat(&state.x[..n]), flat(&state.v[..n]));
+    let mut acceleration = |t: f64, x: &[f64], v: &[f64]| -> Result<Vec<f64>, String> {
+        if x.len() != 3 * n || v.len() != 3 * n {
+            return Err(format!("acceleration takes {n} rows of three numbers"));
+        }
+        let rows = |from: &[f64], old: &[Row]| -> Vec<Row> {
+            let new = from.chunks_exact(3).zip(old).map(|(p, o)| [p[0] as Real, p[1] as Real, p[2] as Real, o[3]]);
+            new.chain(old[n..].iter().copied()).collect()
+        };
+        let mut out = vec![ZERO; state.x.len()];
+        laws.rate(t, &rows(x, &state.x), &rows(v, &state.v), &mut out).map_err(|e| e.to_string())?;
+        Ok(flat(&out[..n]))
+    };
+    user.step(t, h, &mut x, &mut v, &mut acceleration).map_err(StepError::User)?;
+    for i in 0..n {
+        if state.x[i][3] > 0.0 {
+            let take = |from: &[f64], w: Real| [from[3 * i] as Real, from[3 * i + 1] as Real, from[3 * i + 2] as Real, w];
+            state.x[i] = take(&x, state.x[i][3]);
+            state.v[i] = take(&v, 0.0);
+        }
+    }
+    Ok(())
+}
