@@ -614,7 +614,7 @@ def _piece(thing: Object, before: Columns, after: Columns) -> tuple[Floats, Floa
 def _leap(scene: Mapping[str, Any], entry: Mapping[str, Any]) -> float:
     """Half the side of the square that an object moves in, if it repeats itself."""
     own = [s for s in scene.get("system", ()) if s["name"] == entry.get("system")]
-    words = own[0]["vicsek"] if own else None
+    words = own[0].get("vicsek") if own else None
     return float(words["side"]) / 2 if words else float("inf")
 
 

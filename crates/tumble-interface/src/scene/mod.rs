@@ -82,7 +82,7 @@ pub struct Scene {
     /// What acts everywhere.
     #[serde(default)]
     pub world: WorldSettings,
-    /// Numerical methods; without any, one `dynamics` system holds every object.
+    /// Numerical methods; without any, each method that objects need has one system, named `main` (`dynamics`) or as the method.
     #[serde(default)]
     pub system: Vec<System>,
     /// Free masses and springs between them, listed one by one.
