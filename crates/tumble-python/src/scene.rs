@@ -82,8 +82,7 @@ impl Scene {
         Self::from_node(py, node, self.folder.clone())
     }
 
-    /// The resolved scene: every default written out, systems and the one of each object among them, mesh files with the hash of their
-    /// content.
+    /// The resolved scene: every default written out, systems included, mesh files with the hash of their content.
     fn to_dict<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
         Ok(pythonize::pythonize(py, &self.scene.to_json())?)
     }

@@ -1,6 +1,6 @@
 //! Gases that sound runs through.
 
-use super::{MethodRules, place};
+use super::{MethodRules, is_in};
 use crate::math::formula::Of;
 use crate::math::{Real, Vec3, VectorSignal};
 use crate::scene::Assets;
@@ -45,9 +45,8 @@ impl MethodRules for Rules {
 
     fn build(&self, builder: &mut Builder<'_>, index: usize) -> Option<Box<dyn System>> {
         let (scene, plan, gravity) = (builder.scene, builder.plan(index), builder.gravity);
-        let here = |words: &&Words| place(&scene.system, "compressible", words.system.as_deref()) == Some(index);
         let mut gases = Vec::new();
-        for words in scene.compressible.iter().filter(here) {
+        for words in scene.compressible.iter().filter(|words| is_in(&words.system, plan)) {
             let path = format!("compressible \"{}\"", words.name);
             let mut wrong = |key: &str, message: String| builder.issues.push(Issue::new(format!("{path}{key}"), message));
             gases.extend(gas(words, flat(scene), gravity, &mut wrong));

@@ -1,6 +1,6 @@
 //! Masses under forces, and position-based dynamics.
 
-use super::{MethodRules, place};
+use super::{MethodRules, is_in};
 use crate::geometry::motion::Pose;
 use crate::geometry::{Carrier, Collider, Vector};
 use crate::math::parallel::fold;
@@ -132,26 +132,26 @@ impl MethodRules for Rules {
 /// The objects of a system, kind by kind, in the order of the scene.
 fn fill(builder: &mut Builder<'_>, index: usize, parts: &mut Parts) {
     let (scene, assets) = (builder.scene, builder.assets);
-    let here = |kind, system: &Option<String>| place(&scene.system, kind, system.as_deref()) == Some(index);
+    let plan = builder.plan(index);
     // Issues leave colliders out, and then nothing is built.
     let solids = (builder.named.len() == scene.collider.len()).then_some(&builder.named[..]);
     let mut site = Site { parts, issues: &mut builder.issues, hints: &mut builder.warnings, up: builder.up, solids, assets };
-    scene.particles.iter().filter(|t| here("particles", &t.system)).for_each(|t| recipes::particles(&mut site, t));
-    scene.emitter.iter().filter(|t| here("emitter", &t.system)).for_each(|t| emit(&mut site, scene, t));
-    scene.rope.iter().filter(|t| here("rope", &t.system)).for_each(|t| recipes::rope(&mut site, t));
-    for thing in scene.hair.iter().filter(|t| here("hair", &t.system)) {
+    scene.particles.iter().filter(|t| is_in(&t.system, plan)).for_each(|t| recipes::particles(&mut site, t));
+    scene.emitter.iter().filter(|t| is_in(&t.system, plan)).for_each(|t| emit(&mut site, scene, t));
+    scene.rope.iter().filter(|t| is_in(&t.system, plan)).for_each(|t| recipes::rope(&mut site, t));
+    for thing in scene.hair.iter().filter(|t| is_in(&t.system, plan)) {
         planted(&mut site, scene, thing, assets, (&builder.colliders, &builder.surfaces));
     }
-    scene.sheet.iter().filter(|t| here("sheet", &t.system)).for_each(|t| recipes::sheet(&mut site, t));
-    scene.block.iter().filter(|t| here("block", &t.system)).for_each(|t| recipes::block(&mut site, t));
-    for thing in scene.net.iter().filter(|t| here("net", &t.system)) {
+    scene.sheet.iter().filter(|t| is_in(&t.system, plan)).for_each(|t| recipes::sheet(&mut site, t));
+    scene.block.iter().filter(|t| is_in(&t.system, plan)).for_each(|t| recipes::block(&mut site, t));
+    for thing in scene.net.iter().filter(|t| is_in(&t.system, plan)) {
         match assets.get(&thing.mesh.path) {
             Some(mesh) => recipes::net(&mut site, thing, &recipes::placed(mesh, &thing.mesh)),
             None => site.issues.push(Issue::new(format!("net \"{}\".mesh", thing.name), "the mesh has not been loaded")),
         }
     }
-    scene.cloth.iter().filter(|t| here("cloth", &t.system)).for_each(|t| recipes::cloth(&mut site, t));
-    for thing in scene.galaxy.iter().filter(|t| here("galaxy", &t.system)) {
+    scene.cloth.iter().filter(|t| is_in(&t.system, plan)).for_each(|t| recipes::cloth(&mut site, t));
+    for thing in scene.galaxy.iter().filter(|t| is_in(&t.system, plan)) {
         let pull = scene.force.iter().find(|f| matches!(f, Words::Gravitation { .. }) && f.on().is_none_or(|on| on.contains(&thing.name)));
         match pull {
             Some(Words::Gravitation { constant, softening, .. }) => recipes::galaxy(&mut site, thing, scene.seed, *constant, *softening),

@@ -1,6 +1,6 @@
 //! Stable Fluids: from the words of a fluid to the fluid, and what it moves.
 
-use super::{MethodRules, place, rules};
+use super::{MethodRules, is_in, place, rules};
 use crate::geometry::Collider;
 use crate::linalg::poisson::{Excess, Method as Solve, Params, Target};
 use crate::math::formula::{Formula, Of};
@@ -96,9 +96,8 @@ impl MethodRules for Rules {
 
     fn build(&self, builder: &mut Builder<'_>, index: usize) -> Option<Box<dyn System>> {
         let (scene, plan, gravity) = (builder.scene, builder.plan(index), builder.gravity);
-        let here = |words: &&Words| place(&scene.system, "gas", words.system.as_deref()) == Some(index);
         let mut fluids = Vec::new();
-        for words in scene.gas.iter().filter(here) {
+        for words in scene.gas.iter().filter(|words| is_in(&words.system, plan)) {
             let (bodies, sheets) = moved(builder, words);
             let reader = Reader::new(scene, &mut builder.issues);
             let path = format!("gas \"{}\"", words.name);

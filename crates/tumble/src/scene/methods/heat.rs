@@ -1,6 +1,6 @@
 //! Heat in bodies: words to materials, boundaries and sources.
 
-use super::{MethodRules, place};
+use super::{MethodRules, is_in};
 use crate::geometry::{Shape, Vector};
 use crate::math::parallel::fold;
 use crate::math::{Real, Signal};
@@ -66,9 +66,8 @@ impl MethodRules for Rules {
 
     fn build(&self, builder: &mut Builder<'_>, index: usize) -> Option<Box<dyn System>> {
         let (scene, plan) = (builder.scene, builder.plan(index));
-        let here = |words: &&Words| place(&scene.system, "heat", words.system.as_deref()) == Some(index);
         let mut bodies = Vec::new();
-        for words in scene.heat.iter().filter(here) {
+        for words in scene.heat.iter().filter(|words| is_in(&words.system, plan)) {
             let path = format!("heat \"{}\"", words.name);
             let (mut unread, mut faults) = (Vec::new(), Vec::new());
             let mut reader = Reader::new(scene, &mut unread);

@@ -17,7 +17,7 @@ use tumble_interface::{Issue, Warning};
 pub static METHODS: [&dyn MethodRules; 6] =
     [&dynamics::Rules, &tracers::Rules, &vicsek::Rules, &gas::Rules, &heat::Rules, &compressible::Rules];
 
-/// What the scene layer knows of a method. Scenes are resolved, except where `default_system` and `leads` are asked.
+/// What the scene layer knows of a method. Scenes that it is given are resolved, but for `leads`.
 pub trait MethodRules: Sync {
     /// Its word in scenes, and other words for it.
     fn words(&self) -> &'static [Method];
@@ -99,6 +99,11 @@ pub fn default_of(kind: &str) -> &'static dyn MethodRules {
 /// The system that moves an object of this kind: the one it names, else the first that can.
 pub fn place(systems: &[Plan], kind: &str, named: Option<&str>) -> Option<usize> {
     systems.iter().position(|s| rules(s.method).kinds().contains(&kind) && named.is_none_or(|name| s.name == name))
+}
+
+/// Whether an object of a resolved scene is in a system.
+pub fn is_in(system: &Option<String>, plan: &Plan) -> bool {
+    system.as_ref() == Some(&plan.name)
 }
 
 /// The methods that move objects of the scene.

@@ -1,6 +1,6 @@
 //! Tracers: massless particles that velocity fields carry.
 
-use super::{MethodRules, place, present};
+use super::{MethodRules, is_in, place, present};
 use crate::geometry::Vector;
 use crate::recipes::Site;
 use crate::scene::Assets;
@@ -70,17 +70,16 @@ impl MethodRules for Rules {
 
     fn build(&self, builder: &mut Builder<'_>, index: usize) -> Option<Box<dyn System>> {
         let (scene, plan) = (builder.scene, builder.plan(index));
-        let here = |kind, system: &Option<String>| place(&scene.system, kind, system.as_deref()) == Some(index);
         fluids(scene).for_each(|of| builder.exchange.listen(of));
         let (mut x, mut all) = (Vec::new(), Vec::new());
-        for thing in scene.particles.iter().filter(|t| here("particles", &t.system)) {
+        for thing in scene.particles.iter().filter(|t| is_in(&t.system, plan)) {
             let first = x.len();
             refuse_masses(thing, &mut builder.issues);
             x.extend(thing.position.iter().map(|x| Vector::from(*x)));
             all.push(Object { name: thing.name.clone(), points: first..x.len(), radius: thing.radius, ..Object::default() });
         }
         let mut parts = Parts::default();
-        for thing in scene.emitter.iter().filter(|t| here("emitter", &t.system)) {
+        for thing in scene.emitter.iter().filter(|t| is_in(&t.system, plan)) {
             refuse_motion(thing, &mut builder.issues);
             let mut site = Site {
                 parts: &mut parts,

@@ -1,6 +1,6 @@
 //! The model of Vicsek.
 
-use super::{MethodRules, place};
+use super::{MethodRules, is_in};
 use crate::geometry::Vector;
 use crate::scene::Assets;
 use crate::scene::build::Builder;
@@ -60,7 +60,7 @@ impl MethodRules for Rules {
     fn build(&self, builder: &mut Builder<'_>, index: usize) -> Option<Box<dyn System>> {
         let (scene, plan) = (builder.scene, builder.plan(index));
         let (mut points, mut all) = (Vec::new(), Vec::new());
-        for thing in scene.particles.iter().filter(|t| place(&scene.system, "particles", t.system.as_deref()) == Some(index)) {
+        for thing in scene.particles.iter().filter(|t| is_in(&t.system, plan)) {
             let first = points.len();
             points.extend(walkers(thing, &mut builder.issues));
             all.push(Object { name: thing.name.clone(), points: first..points.len(), radius: thing.radius, ..Object::default() });
