@@ -236,14 +236,13 @@ fn the_test_sees_what_it_forbids() {
 
 /// Places in which the name of a method may stand besides its system, its methods file, its schema, its scenes, its pages of theory and
 /// lab, and tests: lines of each file, and why.
-const PLACES: [(&str, usize, &str); 16] = [
+const PLACES: [(&str, usize, &str); 15] = [
     ("crates/tumble/src/systems/mod.rs", 1, "declares the module"),
     ("crates/tumble/src/scene/methods/mod.rs", 2, "declares the module; the table"),
     ("crates/tumble-interface/src/scene/mod.rs", 3, "declares the module; the table of a scene"),
     ("crates/tumble-interface/src/scene/objects.rs", 1, "the list of kinds"),
     ("crates/tumble-interface/src/scene/systems.rs", 2, "the word of the method"),
     ("python/tumble/causes.py", 1, "a list of kinds on grids"),
-    ("python/tumble/cli/check.py", 1, "a list of kinds on grids"),
     ("python/tumble/cli/lab.py", 5, "the command of its lab page"),
     ("python/tumble/cli/run.py", 1, "a list of kinds on grids"),
     ("python/tumble/cures.py", 4, "cures of its own"),

@@ -172,11 +172,10 @@ def _take_worse(estimates: list[dict[str, Any]], others: list[dict[str, Any]]) -
 def _cells(tree: dict[str, Any]) -> float:
     """Cells of all grids, each as much work as several masses."""
     total = 0.0
-    for kind in ("gas", "heat", "compressible"):
-        for thing in tree[kind]:
-            box = thing["box"]
-            edges = sorted(box["size"])[1 if tree["dimension"] == 2 else 0 :]
-            total += 20.0 * math.prod(edge / edges[-1] * box["resolution"] for edge in edges)
+    things = [thing for kind in tree.values() if isinstance(kind, list) for thing in kind if isinstance(thing, dict)]
+    for box in (thing["box"] for thing in things if "box" in thing):
+        edges = sorted(box["size"])[1 if tree["dimension"] == 2 else 0 :]
+        total += 20.0 * math.prod(edge / edges[-1] * box["resolution"] for edge in edges)
     return total
 
 
