@@ -170,6 +170,17 @@ def test_check_tells_tracers_from_particles(tumble: Command, scene_file: SceneFi
     assert '"q": 1 tracer' in answer.out
 
 
+def test_check_names_the_system_that_moves_an_emitter(tumble: Command, scene_file: SceneFile) -> None:
+    flow = {"name": "flow", "method": "tracers", "integrator": "rk4"}
+    first = {"name": "soft", "method": "position_based"}
+    for systems, tracers in (([first, flow], False), ([flow, first], True)):
+        scene = emitting({**POINT, "rate": 10}, system=systems, field=[{"kind": "uniform", "velocity": [1, 0, 0]}])
+        # Something for the other system, which would be idle.
+        scene["rope"] = [{"name": "r", "from": [5, 0, 0], "to": [6, 0, 0], "segments": 2}]
+        answer = tumble("check", scene_file(scene))
+        assert f'"p"{" (tracers)" if tracers else ""}: 20 born in 2 s' in answer.out, answer
+
+
 def test_check_says_who_is_never_born(tumble: Command, scene_file: SceneFile) -> None:
     late = {**POINT, "burst": [{"time": 50, "count": 9}]}
     answer = tumble("check", scene_file(emitting(late)))

@@ -457,6 +457,17 @@ def test_liquids_have_causes_and_cures(tmp_path: Path) -> None:
     assert np.isfinite(world.frame["w"]["position"]).all()
 
 
+def test_default_systems_have_the_cures_of_written_ones(tmp_path: Path) -> None:
+    scene = {**CASES["fluid"], "system": [{"name": "gas", "method": "gas"}]}
+    # Steps that are chosen come ever closer to it, a fourth of an interval passes it.
+    source = {"shape": BALL, "velocity": ["1/(t-0.51)", 0, 0]}
+    scene["gas"] = [{"name": "g", "box": BOX, "source": [source]}]
+    written = failed(scene, tmp_path / "written")["cures"]
+    assert {cure["set"]: cure["survived"] for cure in written}["system.0.substeps=4"]
+    left_out = failed({key: value for key, value in scene.items() if key != "system"}, tmp_path / "left out")["cures"]
+    assert left_out == written
+
+
 def test_formulas_of_heat_are_named_and_too_large_numbers_cured(tmp_path: Path) -> None:
     failure = failed(CASES["heat"], tmp_path / "pole")
     assert failure["causes"][0].startswith('heat "h".source[1].power = "1e6/(t-25)" ')

@@ -20,8 +20,9 @@ from tumble.film import film
 from tumble.pictures import Studio, framing, picture, render, renderers, resolve, surfaces
 from tumble.pictures.denoise import denoise
 from tumble.pictures.drawn import Ground, Mesh, Spheres, Tubes
-from tumble.pictures.things import Stage
+from tumble.pictures.things import Recording, Stage
 from tumble.plots import energy, ledger, unit
+from tumble.run import simulate
 from tumble.style import display, linear, rgb
 
 SIZE = (160, 90)
@@ -257,7 +258,7 @@ def test_objects_without_a_colour_get_different_ones() -> None:
     assert len({t.color for t in Stage(run).things(0)}) == 6
 
 
-def grounds(run: fake_run.FakeRun) -> list[str]:
+def grounds(run: Recording) -> list[str]:
     return [t.name for t in Studio(run, PLAIN, SIZE).things(0) if isinstance(t, Ground)]
 
 
@@ -269,6 +270,24 @@ def test_a_neutral_ground_only_where_there_is_none() -> None:
     assert grounds(fake_run.one("p", "particles", mass, x, world={"gravity": [0.0, 0.0, 0.0]})) == []
     assert grounds(fake_run.one("p", "particles", mass, x, dimension=2)) == []
     assert grounds(fake_run.one("p", "particles", {}, x)) == []  # Tracers do not fall.
+
+
+@pytest.mark.parametrize(
+    ("systems", "falls"),
+    [
+        ([], True),
+        ([{"name": "main"}], True),
+        ([{"name": "soft", "method": "position_based"}], True),
+        ([{"name": "flow", "method": "tracers", "integrator": "rk4"}], False),
+    ],
+)
+def test_what_is_emitted_has_a_ground_where_it_falls(
+    systems: list[dict[str, Any]], falls: bool, tmp_path: Path
+) -> None:
+    spray = {"name": "p", "from": {"point": {}}, "rate": 100, "velocity": [0, 0, 0] if not falls else [0, 0, 1]}
+    tree = {"version": 1, "time": {"fps": 10, "frames": 2}, "system": systems, "emitter": [spray]}
+    run = simulate(tree, tmp_path / "run")
+    assert grounds(run) == [""] * falls
 
 
 def test_a_ground_that_the_camera_is_inside_of_is_not_drawn() -> None:
@@ -294,7 +313,7 @@ def test_particles_with_a_trail_show_where_they_have_been() -> None:
 def test_a_trail_does_not_cross_the_square_where_a_particle_leaves_it() -> None:
     run = fake_run.FakeRun(
         fake_run.scene(
-            particles=[{"name": "p", "trail": 0.4}],
+            particles=[{"name": "p", "system": "main", "trail": 0.4}],
             system=[
                 {"name": "main", "method": "vicsek", "vicsek": {"side": 2.0, "radius": 1.0, "speed": 1, "noise": 0}}
             ],

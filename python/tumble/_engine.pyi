@@ -51,7 +51,7 @@ class Scene:
         """A copy with keys overridden, as in `load`. Raises SceneError."""
 
     def to_dict(self) -> dict[str, Any]:
-        """The resolved scene: every default written out, mesh files with the hash of their content."""
+        """The resolved scene: every default written out, systems included, mesh files with the hash of their content."""
 
     @property
     def memory(self) -> float:

@@ -10,9 +10,6 @@ from tumble._engine import World
 COST = (50.0, 20_000.0)
 """A trial may take so many times the sub-steps of the run that failed, and so many more, as in the engine."""
 
-_OWN = ("heat", "compressible", "gas", "vicsek")
-"""Methods that have no integrator."""
-
 _SHORTER = (4, 16)
 """How many times as many sub-steps are tried where no limit is known."""
 
@@ -22,8 +19,6 @@ def cures(world: World, scene: Mapping[str, Any], report: Mapping[str, Any]) -> 
     energy_ratio."""
     k, plan = system(scene, report)
     found = world.cures()
-    if plan["method"] in _OWN:
-        found = [cure for cure in found if ".integrator=" not in cure["set"]]
     if any(cure["survived"] for cure in found):
         return found
     known = {cure["set"] for cure in found}
@@ -41,7 +36,7 @@ def others(scene: Mapping[str, Any], k: int, plan: Mapping[str, Any], report: Ma
     found: list[list[str]] = []
     if (i := index["heat"]) is not None and scene["heat"][i]["scheme"] in ("explicit", "trapezoid"):
         found.append([f"heat.{i}.scheme=implicit"])
-    liquid = "position_based" in (plan["method"], plan["integrator"])
+    liquid = plan["integrator"] == "position_based"
     if liquid or plan["method"] in ("gas", "tracers"):
         counts = {factor * now for factor in _SHORTER}
         limit = min((viscous_limit(thing) for thing in scene["particles"]), default=math.inf) if liquid else math.inf
@@ -69,7 +64,8 @@ def viscous_limit(thing: Mapping[str, Any]) -> float:
 
 
 def system(scene: Mapping[str, Any], report: Mapping[str, Any]) -> tuple[int, Mapping[str, Any]]:
-    plans = scene["system"] or [{"name": "main", "method": "dynamics", "integrator": "symplectic_euler"}]
+    """The system that failed: its index and its words."""
+    plans = scene["system"]
     k = next((i for i, plan in enumerate(plans) if plan["name"] == report.get("system")), 0)
     return k, plans[k]
 

@@ -38,7 +38,7 @@ def remedy(run: "Run") -> Remedy | None:
         return None
     plans = run.scene["system"]
     k = next((i for i, plan in enumerate(plans) if plan["method"] == "dynamics"), 0)
-    plan: Mapping[str, Any] = plans[k] if plans else {"integrator": "symplectic_euler"}
+    plan: Mapping[str, Any] = plans[k]
     step = float(run.ledger["largest_step"][grown.frame])
     if not 1e-18 < step < math.inf:
         return None

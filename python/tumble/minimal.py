@@ -136,7 +136,7 @@ def write(found: Minimal, path: Path, command: str) -> None:
     is another scene."""
     tree = _moved(found.tree, Path(found.folder), path.parent)
     whole = Scene(tree, path.parent).to_dict()
-    for form in (slim(tree), _without_nulls(tree)):
+    for form in (slim(_without_systems(tree)), slim(tree), _without_nulls(tree)):
         text = f"# `{command}` {_one_line(told(found.report))}\n{toml(form)}"
         write_whole(path, text.encode())
         with suppress(SceneError):
@@ -650,6 +650,15 @@ def _optional(thing: Tree, kind: str | None) -> list[str]:
     node = _meant(schema["properties"][kind]["items"] if kind else schema, thing)
     properties, needed = node.get("properties", {}), node.get("required", ())
     return [k for k, v in thing.items() if k in properties and k not in needed and v != properties[k].get("default")]
+
+
+def _without_systems(tree: Tree) -> Tree:
+    """The same, its systems left to defaults."""
+    kept = {key: value for key, value in tree.items() if key != "system"}
+    return kept | {
+        kind: [{key: value for key, value in thing.items() if key != "system"} for thing in tree.get(kind, ())]
+        for kind in _THINGS
+    }
 
 
 def _without_nulls(value: Any) -> Any:

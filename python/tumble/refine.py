@@ -222,7 +222,7 @@ def _too_long(world: World) -> list[str]:
     found = []
     names = [system["name"] for system in world.scene.to_dict()["system"]]
     for about in world.stability():
-        k = names.index(about["system"]) if about["system"] in names else 0
+        k = names.index(about["system"])
         usable = next(
             (float(at["usable"]) for at in about["limits"] if at["integrator"] == about["integrator"]), math.inf
         )
@@ -271,8 +271,7 @@ def plan(scene: Scene, levels: int, what: Sequence[str] = ()) -> tuple[list[Refi
             raise _wrong(
                 f"system.{adaptive[0]}", f"its steps follow a tolerance, which is not refined by default; {cure}"
             )
-        count = max(1, len(tree["system"]))
-        paths = [f"system.{i}.substeps" for i in range(count)]
+        paths = [f"system.{i}.substeps" for i in range(len(tree["system"]))]
     else:
         notes = [
             {
@@ -348,10 +347,6 @@ def _named(tree: Mapping[str, Any], path: str) -> str:
             node = node[word]
         elif isinstance(node, list):
             names = [item.get("name") if isinstance(item, Mapping) else None for item in node]
-            if words == ["system"] and not node and word in ("0", "main"):
-                node = {"substeps": None}
-                words.append("0")
-                continue
             index = names.index(word) if word in names else int(word) if word.isdigit() else len(node)
             if index >= len(node):
                 there = ", ".join(str(name) for name in names if name) or "none"
@@ -375,8 +370,7 @@ def _at(tree: Any, path: str) -> Any:
 def _own_substeps(scene: Scene, tree: Mapping[str, Any], path: str) -> int:
     """How many sub-steps a system takes that may choose."""
     index = int(path.split(".")[1])
-    systems = tree["system"]
-    name = systems[index]["name"] if systems else "main"
+    name = tree["system"][index]["name"]
     interval = 1.0 / tree["time"]["fps"] / tree["time"]["exchanges"]
     steps = [float(about["step"]) for about in World(scene).stability() if about["system"] == name]
     return max(1, math.ceil(interval / steps[0] - 1e-6)) if steps and steps[0] > 0.0 else 1

@@ -16,6 +16,7 @@ use twox_hash::XxHash3_64;
 #[pyclass(frozen, skip_from_py_object, module = "tumble")]
 #[derive(Clone)]
 pub struct Scene {
+    /// Resolved.
     pub scene: tumble_interface::Scene,
     pub assets: Assets,
     pub folder: PathBuf,
@@ -29,7 +30,7 @@ impl Scene {
             let mut scene = tumble_interface::Scene::from_tree(&node)?;
             let assets = load_assets(&mut scene, &folder)?;
             let assets = Assets::new(assets.meshes, assets.characters).with_fabrics(load_fabrics(&mut scene, &folder)?);
-            Ok(Self { scene, assets, folder, node: node.clone() })
+            Ok(Self { scene: tumble::scene::resolve(scene), assets, folder, node: node.clone() })
         });
         result.map_err(|e| scene_error(py, &with_lines(e, &node)))
     }
@@ -66,7 +67,7 @@ impl Scene {
         let node = if is_json { Node::from_json(&text) } else { Node::from_toml(&text) };
         let mut node = node.map_err(|e| scene_error(py, &e))?;
         for assignment in set {
-            node.set_text(&assignment).map_err(|e| scene_error(py, &e))?;
+            tumble::scene::set_text(&mut node, &assignment).map_err(|e| scene_error(py, &e))?;
         }
         Self::from_node(py, node, path.parent().map(Path::to_path_buf).unwrap_or_default())
     }
@@ -76,12 +77,12 @@ impl Scene {
     fn replace(&self, py: Python<'_>, overrides: Vec<String>) -> PyResult<Self> {
         let mut node = self.node.clone();
         for assignment in overrides {
-            node.set_text(&assignment).map_err(|e| scene_error(py, &e))?;
+            tumble::scene::set_text(&mut node, &assignment).map_err(|e| scene_error(py, &e))?;
         }
         Self::from_node(py, node, self.folder.clone())
     }
 
-    /// The resolved scene: every default written out, mesh files with the hash of their content.
+    /// The resolved scene: every default written out, systems included, mesh files with the hash of their content.
     fn to_dict<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
         Ok(pythonize::pythonize(py, &self.scene.to_json())?)
     }

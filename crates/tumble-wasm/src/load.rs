@@ -1,6 +1,6 @@
 //! From text and bytes to a world, within what a browser can hold.
 
-use crate::engine::scene::{Simulation, memory};
+use crate::engine::scene::{Simulation, memory, resolve, set, set_text};
 use crate::failure::Failure;
 use serde::Serialize;
 use std::collections::HashMap;
@@ -47,7 +47,7 @@ type Files = Arc<HashMap<String, Read>>;
 /// The tree of a scene, in TOML or JSON, with its overrides.
 pub fn tree(text: &str, overrides: &[String]) -> Result<Node, SceneError> {
     let mut node = if text.trim_start().starts_with('{') { Node::from_json(text)? } else { Node::from_toml(text)? };
-    overrides.iter().try_for_each(|assignment| node.set_text(assignment))?;
+    overrides.iter().try_for_each(|assignment| set_text(&mut node, assignment))?;
     Ok(node)
 }
 
@@ -84,7 +84,7 @@ impl Loaded {
     /// The same with another value at a path.
     pub fn changed(&self, path: &str, value: Node) -> Result<Self, Failure> {
         let mut node = self.node.clone();
-        node.set(path, value)?;
+        set(&mut node, path, value)?;
         Self::build(node, self.files.clone())
     }
 
@@ -103,6 +103,7 @@ impl Loaded {
             )));
         }
         let assets = assets(&mut scene, &files).map_err(|(error, missing)| lines(error).missing(missing))?;
+        let scene = resolve(scene);
         let bytes = memory(&scene, &assets);
         let gibibytes = bytes / 1024.0_f64.powi(3);
         if gibibytes > MOST_MEMORY {
@@ -131,10 +132,11 @@ impl Loaded {
 
     /// JSON of `SceneInfo`.
     pub fn info(&self) -> impl Serialize + '_ {
-        let objects = self.world.objects();
+        let objects = self.scene.objects().into_iter();
+        let objects = objects.map(|o| Object { name: o.name.into(), kind: o.kind, system: o.system.map(Into::into) });
         let colliders = self.scene.collider.iter().map(|c| Object { name: c.name.clone(), kind: "collider", system: None });
-        let systems = self.world.plans().into_iter().map(|plan| System {
-            name: plan.name,
+        let systems = self.scene.system.iter().map(|plan| System {
+            name: plan.name.clone(),
             method: plan.method.name(),
             integrator: plan.integrator.name(),
         });
@@ -146,7 +148,7 @@ impl Loaded {
             dimension: self.scene.dimension,
             plane: &self.scene.plane,
             precision: &self.scene.precision,
-            objects: objects.into_iter().map(|(kind, name, system)| Object { name, kind, system }).chain(colliders).collect(),
+            objects: objects.chain(colliders).collect(),
             systems: systems.collect(),
             columns: &self.scene.output.columns,
             scene: self.scene.to_json(),

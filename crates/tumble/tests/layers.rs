@@ -233,3 +233,82 @@ fn the_test_sees_what_it_forbids() {
     assert_eq!(check(&["systems"], "use crate::systems::dynamics::Parts;"), 0);
     assert_eq!(check(&["math"], "use crate::lost::Thing;"), 1);
 }
+
+/// Places in which the name of a method may stand besides its system, its methods file, its schema, its scenes, its pages of theory and
+/// lab, and tests: lines of each file, and why.
+const PLACES: [(&str, usize, &str); 15] = [
+    ("crates/tumble/src/systems/mod.rs", 1, "declares the module"),
+    ("crates/tumble/src/scene/methods/mod.rs", 2, "declares the module; the table"),
+    ("crates/tumble-interface/src/scene/mod.rs", 3, "declares the module; the table of a scene"),
+    ("crates/tumble-interface/src/scene/objects.rs", 1, "the list of kinds"),
+    ("crates/tumble-interface/src/scene/systems.rs", 2, "the word of the method"),
+    ("python/tumble/causes.py", 1, "a list of kinds on grids"),
+    ("python/tumble/cli/lab.py", 5, "the command of its lab page"),
+    ("python/tumble/cli/run.py", 1, "a list of kinds on grids"),
+    ("python/tumble/cures.py", 4, "cures of its own"),
+    ("python/tumble/energy.py", 1, "a list of kinds on grids"),
+    ("python/tumble/minimal.py", 3, "lists of kinds and of their counts"),
+    ("python/tumble/refine.py", 1, "the word for its fineness"),
+    ("web/src/engine/protocol.ts", 1, "a list of kinds"),
+    ("web/src/theory.ts", 1, "the page of its equations"),
+    ("web/src/view/scenery.ts", 1, "a list of kinds on grids"),
+];
+
+/// What belongs to the method.
+const OWN: [&str; 4] = [
+    "crates/tumble/src/systems/compressible.rs",
+    "crates/tumble/src/scene/methods/compressible.rs",
+    "crates/tumble-interface/src/scene/compressible.rs",
+    "python/tumble/lab/compressible.py",
+];
+
+/// Lines of code and comments in which a word stands, without citations of equations such as (compressible.3).
+fn lines_with(word: &str, text: &str) -> usize {
+    let is_word = |c: char| c.is_alphanumeric() || c == '_';
+    let names = |line: &str| {
+        let line = line.to_lowercase();
+        line.match_indices(word).any(|(i, _)| {
+            let (before, after) = (&line[..i], &line[i + word.len()..]);
+            let cited = after.starts_with('.') && after[1..].starts_with(|c: char| c.is_ascii_digit());
+            !before.ends_with(is_word) && !after.starts_with(is_word) && !cited
+        })
+    };
+    text.lines().filter(|line| names(line)).count()
+}
+
+fn texts(folder: &Path, found: &mut Vec<PathBuf>) {
+    for path in fs::read_dir(folder).unwrap().map(|e| e.unwrap().path()) {
+        let name = path.file_name().unwrap().to_str().unwrap();
+        if path.is_dir() && !["pkg", "scenes", "__pycache__", "node_modules"].contains(&name) {
+            texts(&path, found);
+        } else if ["rs", "py", "ts", "pyi"].iter().any(|e| path.extension().is_some_and(|found| found == *e)) {
+            found.push(path);
+        }
+    }
+}
+
+#[test]
+fn a_method_is_named_in_few_places() {
+    let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("../..");
+    let crates = fs::read_dir(root.join("crates")).unwrap().map(|e| e.unwrap().path().join("src"));
+    let folders = crates.filter(|f| !f.is_symlink()).chain(["python/tumble", "web/src"].map(|f| root.join(f)));
+    let mut found = Vec::new();
+    folders.filter(|f| f.is_dir()).for_each(|folder| texts(&folder, &mut found));
+    let (mut total, mut wrong) = (0, Vec::new());
+    for path in found {
+        let name = path.strip_prefix(&root).unwrap().to_str().unwrap().replace('\\', "/");
+        if OWN.contains(&name.as_str()) {
+            continue;
+        }
+        let n = lines_with("compressible", &fs::read_to_string(&path).unwrap());
+        let allowed = PLACES.iter().find(|p| p.0 == name).map_or(0, |p| p.1);
+        total += n;
+        if n > allowed {
+            wrong.push(format!("{name}: {n} lines, expected {allowed} at most"));
+        }
+    }
+    println!("{total} places");
+    assert!(total >= 9, "the test sees no places");
+    assert!(wrong.is_empty(), "a method is named outside its own files:\n{}", wrong.join("\n"));
+    assert_eq!(lines_with("heat", "heat::Heat\nheated\n(heat.3) x\nHEAT, preheat\n// of heat."), 3);
+}

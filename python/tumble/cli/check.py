@@ -109,7 +109,7 @@ def _judge(
 
     from tumble import StepError
 
-    whose = _systems(tree, world)
+    whose = {e["name"]: e["system"] for e in tree["emitter"]}
     held = {e["system"]: [f for f in expected if whose[f.name] == e["system"]] for e in estimates}
     held = {system: own for system, own in held.items() if own}
     if not held:
@@ -172,18 +172,11 @@ def _take_worse(estimates: list[dict[str, Any]], others: list[dict[str, Any]]) -
 def _cells(tree: dict[str, Any]) -> float:
     """Cells of all grids, each as much work as several masses."""
     total = 0.0
-    for kind in ("gas", "heat", "compressible"):
-        for thing in tree[kind]:
-            box = thing["box"]
-            edges = sorted(box["size"])[1 if tree["dimension"] == 2 else 0 :]
-            total += 20.0 * math.prod(edge / edges[-1] * box["resolution"] for edge in edges)
+    things = [thing for kind in tree.values() if isinstance(kind, list) for thing in kind if isinstance(thing, dict)]
+    for box in (thing["box"] for thing in things if "box" in thing):
+        edges = sorted(box["size"])[1 if tree["dimension"] == 2 else 0 :]
+        total += 20.0 * math.prod(edge / edges[-1] * box["resolution"] for edge in edges)
     return total
-
-
-def _systems(tree: dict[str, Any], world: "World") -> dict[str, str]:
-    """The system of each emitter: the one that it names, or the first that can."""
-    moves = [s["name"] for s in tree["system"] if s.get("method") in ("dynamics", "tracers")] or world.systems[:1]
-    return {e["name"]: e["system"] or moves[0] for e in tree["emitter"] if e["system"] or moves}
 
 
 def _holds(expected: "Forecast", duration: float) -> str:
@@ -271,11 +264,8 @@ def _disk(world: "World", expected: "list[Forecast]", frames: int, fps: float) -
 
 def _is_of(tree: dict[str, Any], name: str, method: str) -> bool:
     """Whether a system of this method moves an object."""
-    things = [t for kind in ("particles", "emitter") for t in tree[kind] if t["name"] == name]
-    named = next((t["system"] for t in things), None)
-    systems = [s for s in tree["system"] if s["method"] in ("dynamics", "tracers", "vicsek")]
-    own = [s for s in systems if named is None or s["name"] == named]
-    return bool(own) and own[0]["method"] == method
+    systems = {t["system"] for kind in ("particles", "emitter") for t in tree[kind] if t["name"] == name}
+    return any(s["name"] in systems and s["method"] == method for s in tree["system"])
 
 
 def _memory() -> float:

@@ -112,7 +112,7 @@ def failure(
     kept = f"Kept: {counted(run.n_frames, 'frame')} in {run.folder}"
     if best is not None:
         changes = best["set"].split()
-        systems = [system["name"] for system in run.scene["system"]] or ["main"]
+        systems = [system["name"] for system in run.scene["system"]]
         sets = [*without(overrides, changes, systems), *changes]
         lines.append(f"{kept}. Try\n  {command(verb, scene, sets, *again, '--force')}")
     elif cures:
@@ -155,7 +155,7 @@ def gained(run: "Run", scene: str, overrides: Sequence[str], again: Sequence[str
 
     if (found := remedy(run)) is None:
         return None
-    names = [plan["name"] for plan in run.scene["system"]] or ["main"]
+    names = [plan["name"] for plan in run.scene["system"]]
     sets = [*without(overrides, found.changes, names), *found.changes]
     return f"To try what keeps the energy:\n  {command('run', scene, sets, *again, '--force')}"
 

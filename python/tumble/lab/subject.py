@@ -181,13 +181,6 @@ def subject(scene: Scene) -> Subject:
     tree["precision"] = "double"
     tree["output"] = {"columns": ["position"], "plot": False}
     tree["expect"] = {}
-    if not tree["system"]:
-        tree["system"] = [{"name": "main", "method": "dynamics", "integrator": "symplectic_euler"}]
-    for system in tree["system"]:
-        system.setdefault("method", "dynamics")
-        if system["method"] == "position_based":
-            system |= {"method": "dynamics", "integrator": "position_based"}
-        system["adaptive"] = dict(system.get("adaptive") or {})
     methods = {system["method"] for system in tree["system"]}
     if methods == {"vicsek"}:
         raise SceneError("the model of Vicsek is a map and has no integrator; there is nothing to compare")

@@ -613,9 +613,8 @@ def _piece(thing: Object, before: Columns, after: Columns) -> tuple[Floats, Floa
 
 def _leap(scene: Mapping[str, Any], entry: Mapping[str, Any]) -> float:
     """Half the side of the square that an object moves in, if it repeats itself."""
-    named = entry.get("system")
-    systems = [s for s in scene.get("system") or [] if named in (None, s.get("name", "main"))]
-    words = systems[0].get("vicsek") if systems else None
+    own = [s for s in scene.get("system", ()) if s["name"] == entry.get("system")]
+    words = own[0].get("vicsek") if own else None
     return float(words["side"]) / 2 if words else float("inf")
 
 

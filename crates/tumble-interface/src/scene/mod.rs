@@ -11,11 +11,13 @@ mod gas;
 mod grids;
 mod hair;
 mod heat;
+mod objects;
 mod output;
 mod shapes;
 mod structures;
 mod surfaces;
 mod systems;
+mod vicsek;
 
 pub use animated::{Animated, AnimatedVector, Component, Interpolation, Keys, VectorKeys};
 pub use cloth::{Cloth, Dress, Panel, Seam, Side};
@@ -30,6 +32,7 @@ pub use gas::{
 pub use grids::GridBox;
 pub use hair::{Clump, Curl, Hair, HairCollisions};
 pub use heat::{Heat, HeatRegion, HeatScheme, HeatSide, HeatSides, HeatSource};
+pub use objects::{KINDS, Object};
 pub use output::{Camera, Expect, Look, Output, Probe};
 pub use shapes::{Collider, Figure, Mannequin, MeshFile, MeshFrame, MeshFrames, MeshRef, Motion, Moves, Pace, Pose, Shape};
 pub use structures::{
@@ -37,9 +40,8 @@ pub use structures::{
     Region, Rod, Rope, Sheet, Spring,
 };
 pub use surfaces::{Fill, Fluid, Inflation, Membrane, ShapeMatching, Tear, Weak};
-pub use systems::{
-    Adaptive, Hessian, Integrator, Linear, Method, OnFailure, PositionBased, Projection, SelfContact, Solver, System, Vicsek,
-};
+pub use systems::{Adaptive, Hessian, Integrator, Linear, Method, OnFailure, PositionBased, Projection, SelfContact, Solver, System};
+pub use vicsek::Vicsek;
 
 use crate::check::check;
 use crate::error::{Issue, SceneError};
@@ -80,7 +82,7 @@ pub struct Scene {
     /// What acts everywhere.
     #[serde(default)]
     pub world: WorldSettings,
-    /// Numerical methods; without any, one `dynamics` system holds every object.
+    /// Numerical methods; without any, each method that objects need has one system, named `main` (`dynamics`) or as the method.
     #[serde(default)]
     pub system: Vec<System>,
     /// Free masses and springs between them, listed one by one.

@@ -32,13 +32,12 @@ const TAKEN: [&str; 19] = [
     "green",
 ];
 
-/// Adds an emitter. `mesh` finds the mesh of a file; `flat` is the axis that is missing in two dimensions, and `tracers` whether
-/// the particles go with the flow.
+/// Adds an emitter. `mesh` finds the mesh of a file; `flat` is the axis that is missing in two dimensions.
 pub fn emitter<'a>(
     site: &mut Site<'_>,
     words: &Words,
     course: Course,
-    (seed, flat, tracers): (u32, Option<usize>, bool),
+    (seed, flat): (u32, Option<usize>),
     mesh: &dyn Fn(&MeshFile) -> Option<&'a Mesh>,
 ) {
     let path = format!("emitter \"{}\"", words.name);
@@ -66,9 +65,6 @@ pub fn emitter<'a>(
             })
         };
         let key = |key: &str| format!(".from.particles.{key}");
-        if *at == Event::Bounce && tracers {
-            wrong(&key("at"), "tracers meet no colliders; leave it out, or use a dynamics system");
-        }
         if *at == Event::Bounce && !cause.is_empty() {
             wrong(&key("cause"), "a bounce is no death; leave it out");
         } else if let Some(i) = cause.iter().position(|c| !dies(c)) {
@@ -77,18 +73,6 @@ pub fn emitter<'a>(
         if (*at != Event::Death || !cause.is_empty()) && words.burst.iter().all(|b| b.count == 0) {
             wrong(".burst", "missing: at and cause say when a burst is born; give one with a count");
         }
-    }
-    let given = [
-        (".velocity", words.velocity.constant() != Some([0.0; 3])),
-        (".speed", words.speed != 0.0),
-        (".mass", words.mass != 1.0 || words.mass_spread != 0.0),
-        (".charge", words.charge != 0.0),
-    ];
-    if tracers && words.kill.iter().any(|rule| matches!(rule, Rule::NearCollider(_))) {
-        wrong(".kill", "tracers see no colliders; use inside or outside");
-    }
-    for (key, _) in given.iter().filter(|(_, given)| tracers && *given) {
-        wrong(key, "tracers have no mass and go with the flow; leave it out, or use a dynamics system");
     }
     if words.end.is_some_and(|end| end <= words.start) {
         wrong(".end", "it is not after start");

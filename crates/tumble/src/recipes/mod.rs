@@ -6,20 +6,16 @@
 
 mod block;
 mod cloth;
-mod compressible;
 mod cut;
 mod dress;
 mod emitter;
 mod figures;
 mod galaxy;
-mod grid;
 mod hair;
-mod heat;
 mod lattice;
 mod net;
 mod particles;
 mod pins;
-mod places;
 mod rope;
 mod scenery;
 mod sheet;
@@ -27,15 +23,12 @@ mod surface;
 
 pub use block::block;
 pub use cloth::cloth;
-pub use compressible::compressible;
 pub use emitter::{emitter, region};
 pub use figures::{MANNEQUIN, bytes as figure_bytes, character, mannequin};
 pub use galaxy::galaxy;
-pub use grid::grid;
 pub use hair::{Ground, hair};
-pub use heat::heat;
 pub use net::net;
-pub use particles::{Tracer, draw_cloud, particles, tracers, walkers};
+pub use particles::{draw_cloud, particles};
 pub use rope::rope;
 pub use scenery::{animated, placed, scenery, solid};
 pub use sheet::sheet;

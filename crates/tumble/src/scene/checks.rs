@@ -1,11 +1,12 @@
 //! What the schema cannot say: things that depend on several values together.
 
 use super::laws::off_plane;
+use super::methods::{METHODS, default_of, place, rules};
 use crate::systems::dynamics::MOST_SUBSTEPS;
 use std::collections::HashSet;
 use tumble_interface::Issue;
 use tumble_interface::check::suggestion;
-use tumble_interface::scene::{Field, Force, Integrator, Method, Plane, Scene, Shape, Source, System};
+use tumble_interface::scene::{Force, KINDS, Object, Plane, Scene, Shape, Source, System};
 
 /// Column names that a frame may hold.
 pub const COLUMNS: [&str; 16] = [
@@ -27,37 +28,18 @@ pub const COLUMNS: [&str; 16] = [
     "force",
 ];
 
-/// Names of objects, with the kind of each.
-pub fn objects(scene: &Scene) -> Vec<(&'static str, &str, Option<&str>)> {
-    let particles = scene.particles.iter().map(|o| ("particles", o.name.as_str(), o.system.as_deref()));
-    let ropes = scene.rope.iter().map(|o| ("rope", o.name.as_str(), o.system.as_deref()));
-    let sheets = scene.sheet.iter().map(|o| ("sheet", o.name.as_str(), o.system.as_deref()));
-    let hairs = scene.hair.iter().map(|o| ("hair", o.name.as_str(), o.system.as_deref()));
-    let blocks = scene.block.iter().map(|o| ("block", o.name.as_str(), o.system.as_deref()));
-    let nets = scene.net.iter().map(|o| ("net", o.name.as_str(), o.system.as_deref()));
-    let cloths = scene.cloth.iter().map(|o| ("cloth", o.name.as_str(), o.system.as_deref()));
-    let emitters = scene.emitter.iter().map(|o| ("emitter", o.name.as_str(), o.system.as_deref()));
-    let galaxies = scene.galaxy.iter().map(|o| ("galaxy", o.name.as_str(), o.system.as_deref()));
-    let gases = scene.gas.iter().map(|o| ("gas", o.name.as_str(), o.system.as_deref()));
-    let bodies = scene.heat.iter().map(|o| ("heat", o.name.as_str(), o.system.as_deref()));
-    let sounding = scene.compressible.iter().map(|o| ("compressible", o.name.as_str(), o.system.as_deref()));
-    let things = particles.chain(emitters).chain(ropes).chain(hairs).chain(sheets).chain(blocks).chain(nets).chain(cloths).chain(galaxies);
-    things.chain(gases).chain(bodies).chain(sounding).collect()
-}
-
-/// Everything wrong that can be seen before anything is built; `systems` are those of the scene, or the default one.
-pub fn check(scene: &Scene, systems: &[System]) -> Vec<Issue> {
+/// Everything wrong that can be seen in a resolved scene before anything is built.
+pub fn check(scene: &Scene) -> Vec<Issue> {
     let mut issues = Vec::new();
+    METHODS.into_iter().for_each(|method| method.check(scene, &mut issues));
     let mut wrong = |path: String, message: String| issues.push(Issue::new(path, message));
-    let objects = objects(scene);
+    let (objects, systems) = (scene.objects(), &scene.system);
     if objects.is_empty() {
-        let message = "nothing to simulate: add particles, an emitter, a rope, hair, a sheet, a block, a net, cloth, a galaxy, a gas, heat or a \
-                       compressible gas";
-        wrong(String::new(), message.into());
+        wrong(String::new(), format!("nothing to simulate: there is no object of any kind ({})", KINDS.join(", ")));
     }
     let colliders = scene.collider.iter().map(|c| ("collider", c.name.as_str()));
     let mut names = HashSet::new();
-    for (kind, name) in objects.iter().map(|(k, n, _)| (*k, *n)).chain(colliders) {
+    for (kind, name) in objects.iter().map(|o| (o.kind, o.name)).chain(colliders) {
         if name.is_empty() || name.contains('/') {
             wrong(format!("{kind} \"{name}\".name"), "expected a name that is not empty and has no slash".into());
         }
@@ -72,9 +54,6 @@ pub fn check(scene: &Scene, systems: &[System]) -> Vec<Issue> {
             wrong(format!("{path}.name"), "another system has this name; names must differ".into());
         }
         check_system(system, &path, &mut wrong);
-        if system.method == Method::Vicsek && scene.dimension != 2 {
-            wrong("dimension".into(), format!("{}, but system \"{}\" moves in a plane; set dimension = 2", scene.dimension, system.name));
-        }
         let interval = scene.frame_time() / f64::from(scene.time.exchanges);
         if let Some(step) = system.step.filter(|step| interval / step > MOST_SUBSTEPS) {
             wrong(
@@ -98,51 +77,34 @@ pub fn check(scene: &Scene, systems: &[System]) -> Vec<Issue> {
     }
     for anchor in &scene.anchor {
         let path = format!("anchor \"{}\"", anchor.name);
-        if objects.iter().any(|(_, name, _)| *name == anchor.name) {
+        if objects.iter().any(|o| o.name == anchor.name) {
             wrong(format!("{path}.name"), "an object has this name; names must differ".into());
         }
         if anchor.between[0].split_whitespace().eq(anchor.between[1].split_whitespace()) {
             wrong(format!("{path}.between"), "both ends are the same mass".into());
         }
     }
-    let known = || systems.iter().map(|s| s.name.as_str());
-    for (kind, name, system) in &objects {
-        match (system, place(systems, kind, *system)) {
-            (Some(given), None) if !known().any(|s| s == *given) => {
-                let hint = suggestion(given, known());
-                let list = known().collect::<Vec<_>>().join(", ");
-                wrong(format!("{kind} \"{name}\".system"), format!("there is no system \"{given}\"{hint} (systems: {list})"));
-            }
-            (given, None) if *kind == "gas" => {
-                let given = given.map_or_else(|| "no system".into(), |s| format!("system \"{s}\", which"));
-                wrong(format!("gas \"{name}\".system"), format!("{given} moves no fluid; add a [[system]] with method = \"gas\""));
-            }
-            (Some(given), None) => wrong(
-                format!("{kind} \"{name}\".system"),
-                if matches!(*kind, "heat" | "compressible") {
-                    format!("system \"{given}\" has another method; this needs a system with method = \"{kind}\"")
-                } else {
-                    format!("system \"{given}\" moves particles without mass; this needs a dynamics system")
-                },
-            ),
-            (None, None) => {
-                let method = if matches!(*kind, "heat" | "compressible") { kind } else { "dynamics" };
-                wrong(format!("{kind} \"{name}\".system"), format!("no system can move it: add a [[system]] with method = \"{method}\""));
-            }
-            _ => {}
+    for object in &objects {
+        if let Some(message) = unplaced(systems, object) {
+            wrong(format!("{} \"{}\".system", object.kind, object.name), message);
         }
     }
     for (i, force) in scene.force.iter().enumerate() {
         let (key, others) = others(force).unwrap_or(("", &[]));
         let on = force.on().into_iter().flatten().map(|on| ("on", on));
         for (key, on) in on.chain(others.iter().map(|other| (key, other))) {
-            if !objects.iter().any(|(_, name, _)| name == on) {
-                let hint = suggestion(on, objects.iter().map(|o| o.1));
-                wrong(format!("force[{i}].{key}"), format!("there is no object \"{on}\"{hint}"));
-            } else if let Some(what) =
-                objects.iter().find(|(_, name, _)| name == on).and_then(|(kind, _, system)| massless(systems, kind, *system))
-            {
-                wrong(format!("force[{i}].{key}"), format!("\"{on}\" are {what}, which feel no force; put them into a dynamics system"));
+            match objects.iter().find(|o| o.name == on) {
+                None => {
+                    let hint = suggestion(on, objects.iter().map(|o| o.name));
+                    wrong(format!("force[{i}].{key}"), format!("there is no object \"{on}\"{hint}"));
+                }
+                Some(object) => {
+                    let method = place(systems, object.kind, object.system).map(|i| rules(systems[i].method));
+                    if let Some(what) = method.and_then(|method| method.massless()) {
+                        let message = format!("\"{on}\" are {what}, which feel no force; put them into a dynamics system");
+                        wrong(format!("force[{i}].{key}"), message);
+                    }
+                }
             }
         }
         if let Force::Flock { predators, on: Some(on), .. } = force
@@ -160,33 +122,26 @@ pub fn check(scene: &Scene, systems: &[System]) -> Vec<Issue> {
             wrong(format!("{path}.friction_static"), message);
         }
     }
-    for (i, field) in scene.field.iter().enumerate() {
-        if let Field::Gas { of } = field
-            && !scene.gas.iter().any(|gas| gas.name == *of)
-        {
-            let hint = suggestion(of, scene.gas.iter().map(|gas| gas.name.as_str()));
-            wrong(format!("field[{i}].of"), format!("there is no gas \"{of}\"{hint}"));
-        }
-    }
     for (i, column) in scene.output.columns.iter().enumerate() {
         if !COLUMNS.contains(&column.as_str()) {
             let hint = suggestion(column, COLUMNS);
             wrong(format!("output.columns[{i}]"), format!("\"{column}\", expected one of {}{hint}", COLUMNS.join(", ")));
         }
     }
-    if scene.output.ply && !objects.iter().any(|(kind, ..)| matches!(*kind, "particles" | "emitter" | "galaxy")) {
+    if scene.output.ply && !objects.iter().any(|o| matches!(o.kind, "particles" | "emitter" | "galaxy")) {
         let message = "true, but there are no particles to write: no [[particles]], [[emitter]] or [[galaxy]]; \
                        leave it out, output.usd writes everything else";
         wrong("output.ply".into(), message.into());
     }
-    if scene.output.vdb && !objects.iter().any(|(kind, ..)| matches!(*kind, "gas" | "heat" | "compressible")) {
-        let message =
-            "true, but nothing lies on a grid: no [[gas]], [[heat]] or [[compressible]]; leave it out, output.usd writes everything else";
-        wrong("output.vdb".into(), message.into());
+    let on_grids: Vec<&str> = METHODS.into_iter().filter(|m| m.is_on_grids()).flat_map(|m| m.kinds().iter().copied()).collect();
+    if scene.output.vdb && !objects.iter().any(|o| on_grids.contains(&o.kind)) {
+        let kinds = on_grids.join("]] or [[");
+        let message = format!("true, but nothing lies on a grid: no [[{kinds}]]; leave it out, output.usd writes everything else");
+        wrong("output.vdb".into(), message);
     }
     for (i, probe) in scene.expect.probe.iter().enumerate() {
-        if !objects.iter().any(|(_, name, _)| *name == probe.object) {
-            let hint = suggestion(&probe.object, objects.iter().map(|o| o.1));
+        if !objects.iter().any(|o| o.name == probe.object) {
+            let hint = suggestion(&probe.object, objects.iter().map(|o| o.name));
             wrong(format!("expect.probe[{i}].object"), format!("there is no object \"{}\"{hint}", probe.object));
         }
         if !scene.output.columns.contains(&probe.column) {
@@ -199,27 +154,25 @@ pub fn check(scene: &Scene, systems: &[System]) -> Vec<Issue> {
     issues
 }
 
-/// The system that moves an object of this kind: the one it names, else the first that can.
-pub fn place(systems: &[System], kind: &str, named: Option<&str>) -> Option<usize> {
-    let can = |s: &System| match s.method {
-        Method::Dynamics | Method::PositionBased => !matches!(kind, "gas" | "heat" | "compressible"),
-        Method::Gas | Method::Heat | Method::Compressible => kind == s.method.name(),
-        Method::Tracers => matches!(kind, "particles" | "emitter"),
-        Method::Vicsek => kind == "particles",
-    };
-    systems.iter().position(|s| can(s) && named.is_none_or(|name| s.name == name))
-}
-
-/// What an object is, if it is nothing that forces move.
-fn massless(systems: &[System], kind: &str, named: Option<&str>) -> Option<&'static str> {
-    match systems[place(systems, kind, named)?].method {
-        Method::Dynamics | Method::PositionBased => None,
-        Method::Tracers => Some("tracers"),
-        Method::Vicsek => Some("particles of a vicsek system"),
-        Method::Heat => Some("bodies on grids"),
-        Method::Compressible => Some("gases on grids"),
-        Method::Gas => Some("cells of a fluid"),
+/// Why no system can move an object; `None` if one can.
+fn unplaced(systems: &[System], object: &Object<'_>) -> Option<String> {
+    if place(systems, object.kind, object.system).is_some() {
+        return None;
     }
+    let method = default_of(object.kind).name();
+    let Some(given) = object.system else {
+        return Some(format!("no system can move it: add a [[system]] with method = \"{method}\""));
+    };
+    let known = || systems.iter().map(|s| s.name.as_str());
+    Some(match systems.iter().find(|s| s.name == given) {
+        Some(system) => {
+            format!("system \"{given}\" has method \"{}\"; this needs a system with method = \"{method}\"", system.method.name())
+        }
+        None => {
+            let hint = suggestion(given, known());
+            format!("there is no system \"{given}\"{hint} (systems: {})", known().collect::<Vec<_>>().join(", "))
+        }
+    })
 }
 
 /// The objects that a force names beside its targets, with the word for them.
@@ -242,44 +195,8 @@ fn check_system(system: &System, path: &str, wrong: &mut impl FnMut(String, Stri
         let message = format!("{} chooses its own steps; leave out substeps and step, or set adaptive.tolerance", integrator.name());
         wrong(format!("{path}.integrator"), message);
     }
-    if system.method == Method::Tracers && integrator.needs_velocities() {
-        let known: Vec<&str> = Integrator::ALL.into_iter().filter(|i| !i.needs_velocities()).map(Integrator::name).collect();
-        let message = format!("{} needs velocities, and tracers have none; expected one of {}", integrator.name(), known.join(", "));
+    if let Some(message) = rules(system.method).refusal(integrator) {
         wrong(format!("{path}.integrator"), message);
-    }
-    if system.method == Method::Vicsek && integrator != Integrator::default() {
-        wrong(format!("{path}.integrator"), "the model of Vicsek is a map and has no integrator; leave it out".into());
-    }
-    if system.method == Method::Heat && integrator != Integrator::default() {
-        wrong(
-            format!("{path}.integrator"),
-            "each [[heat]] body has a scheme of its own, and the system no integrator; leave it out".into(),
-        );
-    }
-    if system.method == Method::Compressible && integrator != Integrator::default() {
-        wrong(format!("{path}.integrator"), "a compressible gas is stepped by symplectic_euler; leave it out".into());
-    }
-    if system.method == Method::Gas && integrator != Integrator::default() {
-        wrong(format!("{path}.integrator"), "Stable Fluids have no integrator; leave it out".into());
-    }
-    match (&system.vicsek, system.method) {
-        (None, Method::Vicsek) => wrong(format!("{path}.vicsek"), "missing, expected side, radius, speed and noise".into()),
-        (Some(words), Method::Vicsek) if 2.0 * words.radius > words.side => {
-            wrong(format!("{path}.vicsek.radius"), format!("{} m, expected at most half the side, {} m", words.radius, 0.5 * words.side));
-        }
-        (Some(_), method) if method != Method::Vicsek => {
-            wrong(
-                format!("{path}.vicsek"),
-                format!("given with method \"{}\"; leave it out, or set method = \"vicsek\"", system.method.name()),
-            );
-        }
-        _ => {}
-    }
-    if system.clamp.is_some()
-        && (system.method != Method::Dynamics
-            || !matches!(integrator, Integrator::ModifiedEuler | Integrator::Verlet | Integrator::PositionBased))
-    {
-        wrong(format!("{path}.clamp"), "the position clamp goes with modified_euler, verlet or position_based".into());
     }
 }
 

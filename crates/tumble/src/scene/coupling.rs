@@ -1,90 +1,14 @@
-//! What joins systems: anchors between masses, and masses that a fluid moves.
+//! What joins systems: anchors between masses.
 
-use super::checks::{objects, place};
+use super::build::Builder;
+use super::methods::place;
 use crate::exchange::Exchange;
 use crate::geometry::Vector;
-use crate::systems::dynamics::{self, Dynamics, Parts};
-use crate::systems::gas::{Body, Sheet};
+use crate::systems::dynamics::{self, Dynamics, Parts, SpringPart};
 use tumble_interface::check::suggestion;
-use tumble_interface::scene::{Anchor, Gas, Method, Scene, System as Plan};
+use tumble_interface::scene::{Anchor, Scene};
 use tumble_interface::warning::Code;
 use tumble_interface::{Issue, Warning};
-
-/// Balls that one fluid moves at most.
-const MOST_BODIES: usize = 256;
-
-/// What a fluid moves.
-pub type Moved = (Vec<Body>, Vec<Sheet>);
-
-/// The balls and sheets that a fluid moves.
-pub fn moved(scene: &Scene, plans: &[Plan], words: &Gas, parts: &[Parts], exchange: &mut Exchange, issues: &mut Vec<Issue>) -> Moved {
-    let (mut bodies, mut sheets) = (Vec::new(), Vec::new());
-    for (i, name) in words.bodies.iter().enumerate() {
-        let mut wrong = |message: String| issues.push(Issue::new(format!("gas \"{}\".bodies[{i}]", words.name), message));
-        let Some(system) = moved_by(scene, plans, words, name, &mut wrong) else { continue };
-        let Some(thing) = scene.particles.iter().find(|thing| thing.name == *name) else {
-            wrong(format!("\"{name}\" is no object of [[particles]], whose masses could be balls"));
-            continue;
-        };
-        let range = parts[system].ranges().find(|(n, _)| n == name).map_or(0..0, |(_, range)| range);
-        if bodies.len() + range.len() > MOST_BODIES {
-            wrong(format!("\"{name}\" has {} masses; a fluid moves {MOST_BODIES} balls at most", range.len()));
-            continue;
-        }
-        for row in range {
-            let mut body = Body::new(name.clone(), exchange.open_body(system, row), thing.radius);
-            body.position = parts[system].position(row as u32);
-            body.velocity = parts[system].velocity(row as u32);
-            body.inverse_mass = parts[system].inverse_mass(row as u32);
-            bodies.push(body);
-        }
-    }
-    for (i, sheet) in words.sheet.iter().enumerate() {
-        let name = &sheet.object;
-        let mut wrong = |message: String| issues.push(Issue::new(format!("gas \"{}\".sheet[{i}].object", words.name), message));
-        let Some(system) = moved_by(scene, plans, words, name, &mut wrong) else { continue };
-        let Some(object) = parts[system].named(name) else { continue };
-        let curve = object.curve.windows(2).map(|ends| [ends[0], ends[1]]).collect();
-        let (triangles, pieces) = if scene.dimension == 2 { (Vec::new(), curve) } else { (object.triangles.clone(), Vec::new()) };
-        if triangles.is_empty() && pieces.is_empty() {
-            let what = if scene.dimension == 2 { "curve, which a sheet in the plane is" } else { "surface of triangles" };
-            wrong(format!("\"{name}\" has no {what}"));
-            continue;
-        }
-        let ports = object.points.clone().map(|row| exchange.open(system, row)).collect();
-        sheets.push(Sheet::new(name.clone(), ports, triangles, pieces, [sheet.resistance, sheet.friction]));
-    }
-    (bodies, sheets)
-}
-
-/// The system of an object that a fluid is to move.
-fn moved_by(scene: &Scene, plans: &[Plan], words: &Gas, name: &str, wrong: &mut dyn FnMut(String)) -> Option<usize> {
-    let all = objects(scene);
-    let Some((kind, _, system)) = all.iter().find(|(_, n, _)| *n == name) else {
-        let hint = suggestion(name, all.iter().map(|o| o.1));
-        wrong(format!("there is no object \"{name}\"{hint}"));
-        return None;
-    };
-    let all = scene.gas.iter().flat_map(|gas| gas.bodies.iter().chain(gas.sheet.iter().map(|sheet| &sheet.object)));
-    if all.filter(|other| *other == name).count() > 1 {
-        wrong(format!("\"{name}\" is named more than once; one fluid moves it, as a ball or as a sheet"));
-        return None;
-    }
-    let (own, other) = (place(plans, "gas", words.system.as_deref())?, place(plans, kind, *system)?);
-    if plans[other].method != Method::Dynamics {
-        wrong(format!("\"{name}\" is in a system of method {}; a fluid moves masses of dynamics", plans[other].method.name()));
-        return None;
-    }
-    if other < own {
-        // Otherwise the masses would fall for an interval before they feel the fluid.
-        wrong(format!(
-            "system \"{}\" of \"{name}\" comes before the fluid that moves it; put [[system]] \"{}\" first",
-            plans[other].name, plans[own].name
-        ));
-        return None;
-    }
-    Some(other)
-}
 
 /// An anchor whose ends have been found: system and point of each.
 pub struct Link {
@@ -97,8 +21,29 @@ pub struct Link {
     inverse_mass: f64,
 }
 
+/// Finds the ends of all anchors; within a system they are springs of its own.
+pub fn fasten(builder: &mut Builder<'_>) {
+    let (scene, masses) = (builder.scene, &mut builder.masses);
+    builder.anchors = scene.anchor.iter().filter_map(|anchor| link(scene, anchor, masses, &mut builder.issues)).collect();
+    for anchor in &builder.anchors {
+        let [(s, a), (t, b)] = anchor.ends;
+        if s == t {
+            masses[s].begin(&anchor.name, 0.0);
+            masses[s].spring(SpringPart {
+                ends: [a, b],
+                stiffness: anchor.stiffness,
+                damping: anchor.damping,
+                rest: anchor.rest_length,
+                hardening: 0.0,
+                tension_only: false,
+                break_strain: None,
+            });
+        }
+    }
+}
+
 /// The two ends of an anchor.
-pub fn link(scene: &Scene, plans: &[Plan], anchor: &Anchor, parts: &[Parts], issues: &mut Vec<Issue>) -> Option<Link> {
+fn link(scene: &Scene, anchor: &Anchor, parts: &[Parts], issues: &mut Vec<Issue>) -> Option<Link> {
     let mut end = |k: usize| -> Option<(usize, u32, Vector, f64)> {
         let path = format!("anchor \"{}\".between[{k}]", anchor.name);
         let words = &anchor.between[k];
@@ -107,17 +52,17 @@ pub fn link(scene: &Scene, plans: &[Plan], anchor: &Anchor, parts: &[Parts], iss
             wrong(format!("\"{words}\", expected an object and an index: \"flag 3\""));
             return None;
         };
-        let Some((kind, _, system)) = objects(scene).into_iter().find(|(_, n, _)| *n == name) else {
-            let hint = suggestion(name, objects(scene).iter().map(|o| o.1));
+        let Some(object) = scene.objects().into_iter().find(|o| o.name == name) else {
+            let hint = suggestion(name, scene.objects().iter().map(|o| o.name));
             wrong(format!("there is no object \"{name}\"{hint}"));
             return None;
         };
-        let s = place(plans, kind, system)?;
+        let s = place(&scene.system, object.kind, object.system)?;
         let Some(range) = parts[s].ranges().find(|(n, _)| *n == name).map(|(_, r)| r) else {
             wrong(format!("\"{name}\" has no masses to pull"));
             return None;
         };
-        if kind == "emitter" {
+        if object.kind == "emitter" {
             wrong(format!("the particles of emitter \"{name}\" come and go; an anchor needs a mass that stays"));
             return None;
         }

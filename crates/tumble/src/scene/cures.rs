@@ -1,6 +1,7 @@
 //! After a failure: changes of step or integrator, each tried.
 
 use super::Assets;
+use super::methods::rules;
 use super::simulation::Simulation;
 use crate::systems::dynamics::MOST_SUBSTEPS;
 use tumble_interface::engine::{BLOW_UP, Cure, Engine};
@@ -9,7 +10,7 @@ use tumble_interface::scene::{Integrator, Scene};
 /// A trial may take this many times the sub-steps of the run that failed, and this many more [steps].
 const COST: (f64, f64) = (50.0, 20_000.0);
 
-/// Tries changes of the system that failed from the start of the scene to two frames beyond the failure.
+/// Tries changes of the system that failed from the start of the resolved scene to two frames beyond the failure.
 ///
 /// `failed` is the frame that failed, counted from 1; `system` the index of the system, with the step it used and the
 /// usable steps of other integrators, as estimated before the failure.
@@ -23,7 +24,8 @@ pub fn cures(
     go_on: &(dyn Fn() -> bool + Sync),
 ) -> Vec<Cure> {
     let dt = scene.frame_time() / f64::from(scene.time.exchanges);
-    let own = super::build::plans(scene)[system].integrator;
+    let plan = &scene.system[system];
+    let (own, method) = (plan.integrator, rules(plan.method));
     let usable_step = |i: Integrator| usable.iter().find(|(integrator, _)| *integrator == i).map_or(0.0, |(_, step)| *step);
     let substeps = |limit: f64| (limit > 0.0).then(|| (dt / (0.7 * limit)).ceil().clamp(1.0, MOST_SUBSTEPS) as u32);
     let mut trials: Vec<(Integrator, u32)> = Vec::new();
@@ -36,6 +38,7 @@ pub fn cures(
         if let Some(n) = n
             && (integrator, n) != (own, now)
             && !trials.contains(&(integrator, n))
+            && method.refusal(integrator).is_none()
         {
             trials.push((integrator, n));
         }
@@ -55,7 +58,6 @@ fn attempt(
     go_on: &(dyn Fn() -> bool + Sync),
 ) -> Cure {
     let mut changed = scene.clone();
-    changed.system = super::build::plans(scene);
     let plan = &mut changed.system[system];
     let mut set = Vec::new();
     if plan.integrator != integrator {

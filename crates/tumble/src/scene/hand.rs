@@ -35,10 +35,11 @@ impl Held {
         go_on: &(dyn Fn() -> bool + Sync),
     ) -> Result<(String, Self), SceneError> {
         let wrong = |message: &str| SceneError::one(object, message);
-        let objects = simulation.objects();
-        let system = objects.iter().find(|(_, name, _)| name == object).and_then(|(_, _, system)| system.clone());
-        let system = system.ok_or_else(|| wrong("there is no such object to hold"))?;
-        let beside: Vec<&String> = objects.iter().filter(|o| o.2.as_ref() == Some(&system)).map(|(_, name, _)| name).collect();
+        let objects = simulation.scene().objects();
+        let held = objects.iter().find(|o| o.name == object).ok_or_else(|| wrong("there is no such object to hold"))?;
+        let system = held.system.unwrap_or_default().to_string();
+        let loose = matches!(held.kind, "particles" | "galaxy");
+        let beside: Vec<&str> = objects.iter().filter(|o| o.system == held.system).map(|o| o.name).collect();
         let topology = simulation.topology();
         let frame = simulation.frame(&["position"]);
         let column = |all: &'_ [Column], name: &str| all.iter().find(|c| c.object == object && c.name == name).map(|c| c.data.numbers());
@@ -49,7 +50,7 @@ impl Held {
             return Err(wrong("there is no such mass"));
         }
         // Masses stand in the order of the objects of their system.
-        let before = topology.iter().filter(|c| c.name == "mass" && beside.contains(&&c.object)).take_while(|c| c.object != object);
+        let before = topology.iter().filter(|c| c.name == "mass" && beside.contains(&c.object.as_str())).take_while(|c| c.object != object);
         let first: usize = before.map(|c| c.data.len()).sum();
         let pinned = topology.iter().find(|c| c.object == object && c.name == "pinned");
         let pinned = pinned.map(|c| if let Data::U32(rows) = &c.data { rows.clone() } else { Vec::new() }).unwrap_or_default();
@@ -57,11 +58,7 @@ impl Held {
         let (low, high) = (0..mass.len()).map(at).fold(([f64::INFINITY; 3], [f64::NEG_INFINITY; 3]), |(low, high), p| {
             (std::array::from_fn(|a| low[a].min(p[a])), std::array::from_fn(|a| high[a].max(p[a])))
         });
-        let radius = if objects.iter().any(|(kind, name, _)| name == object && matches!(*kind, "particles" | "galaxy")) {
-            0.0
-        } else {
-            GRIP * distance(low, high)
-        };
+        let radius = if loose { 0.0 } else { GRIP * distance(low, high) };
         let center = at(row);
         let near: Vec<usize> = (0..mass.len()).filter(|i| distance(at(*i), center) <= radius && !pinned.contains(&(*i as u32))).collect();
         let total: f64 = mass.iter().sum();

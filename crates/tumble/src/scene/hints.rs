@@ -1,51 +1,27 @@
 //! What a scene says in vain, and what it hardly means.
 
-use super::checks::{objects, place};
+use super::methods::{METHODS, present};
 use tumble_interface::Warning;
 use tumble_interface::check::{plain, short};
 use tumble_interface::scene::{
-    Animated, AnimatedVector, Collider, Component, Emitter, Event, Force as Words, Kill, Method, Particles, Rope, Scene, Shape, Source,
-    System as Plan,
+    Animated, AnimatedVector, Collider, Component, Emitter, Event, Force as Words, Kill, Particles, Rope, Scene, Shape, Source,
 };
 use tumble_interface::warning::Code;
 
-/// What the scene says and nothing heeds.
-pub fn unused(scene: &Scene, plans: &[Plan]) -> Vec<Warning> {
-    let carried = |(kind, _, system): &(&str, &str, Option<&str>)| place(plans, kind, *system).map(|i| plans[i].method);
-    let methods: Vec<Method> = objects(scene).iter().filter_map(carried).collect();
-    let mut warnings = Vec::new();
-    if !scene.field.is_empty() && !methods.contains(&Method::Tracers) {
-        warnings.push(Warning::new(
-            Code::IdleFields,
-            "field",
-            "no object is moved by a system of tracers, so that nothing follows the fields",
-        ));
-    }
-    if scene.field.is_empty() && methods.contains(&Method::Tracers) {
-        warnings.push(Warning::new(Code::IdleTracers, "", "tracers have no [[field]] to follow, and stay where they are; add one"));
-    }
-    if !methods.contains(&Method::Dynamics) {
-        let on_grids = |m: &Method| matches!(m, Method::Heat | Method::Compressible);
-        let solids = !scene.collider.is_empty() && !methods.contains(&Method::Gas);
+/// What a resolved scene says and nothing heeds.
+pub fn unused(scene: &Scene) -> Vec<Warning> {
+    let mut warnings: Vec<Warning> = METHODS.into_iter().flat_map(|method| method.hints(scene)).collect();
+    let present = present(scene);
+    let massless: Option<Vec<&str>> = present.iter().map(|method| method.massless()).collect();
+    if let Some(natures) = massless {
+        let solids = !scene.collider.is_empty() && !present.iter().any(|method| method.meets_colliders());
         for (key, words, given) in [("force", "forces", !scene.force.is_empty()), ("collider", "colliders", solids)] {
             if given {
-                let kind = if methods.contains(&Method::Tracers) {
-                    "tracers"
-                } else if methods.iter().all(on_grids) {
-                    "on grids"
-                } else {
-                    "in a vicsek system"
-                };
-                warnings.push(Warning::new(Code::Unfelt, key, format!("all objects are {kind}, which feel no {words}")));
+                let message = format!("all objects are {}, which feel no {words}", natures.join(" or "));
+                warnings.push(Warning::new(Code::Unfelt, key, message));
             }
         }
     }
-    let meets = plans.iter().any(|plan| plan.method == Method::Dynamics && plan.self_contact.is_some());
-    for thing in scene.collider.iter().filter(|thing| thing.edges && !meets) {
-        let message = "edges meet in systems with self_contact, and there is none; add it, or leave edges out";
-        warnings.push(Warning::new(Code::Unfelt, format!("collider \"{}\".edges", thing.name), message));
-    }
-    warnings.extend(thin(scene));
     for (i, force) in scene.force.iter().enumerate() {
         let at = || format!("force[{i}]");
         let reached = |name: &String| force.on().is_none_or(|on| on.contains(name));
@@ -74,12 +50,6 @@ pub fn unused(scene: &Scene, plans: &[Plan]) -> Vec<Warning> {
     }
     if scene.collider.is_empty() {
         let mut alone = |path: String, message: &str| warnings.push(Warning::new(Code::NoCollider, path, message));
-        for gas in scene.gas.iter().filter(|gas| !gas.bodies.is_empty()) {
-            alone(
-                format!("gas \"{}\".bodies", gas.name),
-                "the sides of the box are no obstacle to balls, and there is no collider; add one of its shape with inside = true",
-            );
-        }
         for emitter in &scene.emitter {
             if let Some(i) = emitter.kill.iter().position(|rule| matches!(rule, Kill::NearCollider(_))) {
                 let name = &emitter.name;
@@ -109,7 +79,7 @@ pub fn unused(scene: &Scene, plans: &[Plan]) -> Vec<Warning> {
 }
 
 /// Solids that masses may pass on both sides of.
-fn thin(scene: &Scene) -> Vec<Warning> {
+pub fn thin(scene: &Scene) -> Vec<Warning> {
     let along = |size: f64, n: u32| size / f64::from(n.max(2) - 1);
     let sheets = scene.sheet.iter().map(|t| (&t.name, along(t.size[0], t.resolution[0]).max(along(t.size[1], t.resolution[1]))));
     let cloths = scene.cloth.iter().map(|t| (&t.name, t.resolution));
@@ -142,21 +112,34 @@ fn thin(scene: &Scene) -> Vec<Warning> {
 
 /// Bounds of what the scene has not, and what that is.
 fn idle_bounds(scene: &Scene) -> Vec<(&'static str, &'static str)> {
-    let expect = &scene.expect;
-    let (bodies, surfaces) = (!scene.block.is_empty(), !(scene.sheet.is_empty() && scene.net.is_empty() && scene.cloth.is_empty()));
-    let curved = !(scene.rope.is_empty() && scene.hair.is_empty()) && scene.collider.iter().any(|thing| thing.edges);
-    let linked = scene.particles.iter().any(|thing| !thing.spring.is_empty()) || !(scene.rope.is_empty() && scene.hair.is_empty());
-    let warm = !scene.heat.is_empty() || scene.gas.iter().any(|gas| gas.fire.is_some());
+    let (expect, measured) = (&scene.expect, METHODS.into_iter().flat_map(|method| method.measured(scene)).collect::<Vec<_>>());
     [
-        ("max_stretch", expect.max_stretch.is_some(), linked || bodies || surfaces, "nothing that has links"),
-        ("max_penetration", expect.max_penetration.is_some(), !scene.collider.is_empty(), "no collider"),
-        ("max_intersections", expect.max_intersections.is_some(), bodies || surfaces || curved, "no soft surface"),
-        ("max_volume_error", expect.max_volume_error.is_some(), bodies || !scene.net.is_empty(), "no closed surface of soft matter"),
-        ("max_divergence", expect.max_divergence.is_some(), !scene.gas.is_empty(), "no gas"),
-        ("max_heat_error", expect.max_heat_error.is_some(), warm, "neither a body that conducts heat nor fire"),
+        ("max_stretch", expect.max_stretch, "nothing that has links"),
+        ("max_penetration", expect.max_penetration, "no collider"),
+        ("max_intersections", expect.max_intersections.map(|n| n as f64), "no soft surface"),
+        ("max_volume_error", expect.max_volume_error, "no closed surface of soft matter"),
+        ("max_divergence", expect.max_divergence, "no gas"),
+        ("max_heat_error", expect.max_heat_error, "neither a body that conducts heat nor fire"),
     ]
     .into_iter()
-    .filter_map(|(word, bound, measured, what)| (bound && !measured).then_some((word, what)))
+    .filter_map(|(word, bound, what)| (bound.is_some() && !measured.contains(&word)).then_some((word, what)))
+    .collect()
+}
+
+/// Bounds that masses and their elements are measured for.
+pub fn measured_of_masses(scene: &Scene) -> Vec<&'static str> {
+    let (bodies, surfaces) = (!scene.block.is_empty(), !(scene.sheet.is_empty() && scene.net.is_empty() && scene.cloth.is_empty()));
+    let curves = !(scene.rope.is_empty() && scene.hair.is_empty());
+    let edges = curves && scene.collider.iter().any(|thing| thing.edges);
+    let linked = curves || scene.particles.iter().any(|thing| !thing.spring.is_empty());
+    [
+        ("max_stretch", linked || bodies || surfaces),
+        ("max_penetration", !scene.collider.is_empty()),
+        ("max_intersections", bodies || surfaces || edges),
+        ("max_volume_error", bodies || !scene.net.is_empty()),
+    ]
+    .into_iter()
+    .filter_map(|(word, measured)| measured.then_some(word))
     .collect()
 }
 

@@ -1,9 +1,10 @@
 //! How much memory a scene will take, told before any is taken.
 
 use super::Assets;
+use super::methods::METHODS;
 use crate::geometry::GridSdf;
 use crate::math::Signal;
-use tumble_interface::scene::{Diagonals, Dress, Emitter, Fluid, GridBox, HeatScheme, Linear, Shape, Source, System};
+use tumble_interface::scene::{Diagonals, Dress, Emitter, Fluid, Linear, Shape, Source, System};
 use tumble_interface::{Mesh, Scene};
 
 /// Bytes for a mass: its rows in state, scratch, snapshot and history, in double precision.
@@ -18,18 +19,17 @@ const TETRAHEDRON: f64 = 1400.0;
 /// Bytes for a corner of a solid whose edges meet those of what is soft: its rows, features, their boxes, and pairs.
 const CORNER: f64 = 2000.0;
 
-/// Bytes for a cell of a body that conducts heat: temperatures twice and in the snapshot; materials; multigrid of implicit schemes;
-/// in double precision.
-const WARM: [f64; 3] = [24.0, 48.0, 160.0];
-/// Bytes for a cell of a compressible gas, density and three components of velocity in all that a step keeps of them: measured, 44 numbers
-/// in either precision.
-const SOUND: f64 = 46.0 * std::mem::size_of::<crate::math::Real>() as f64;
 /// Bytes for a mass of the factors of a direct solver: along curves, on surfaces, and in bodies for each mass along an edge of the smaller
 /// cross-section. Measured: 1.9 kB in ropes, 13.3 to 14.5 kB in sheets of 100 to 400 masses along a side, 2.0 to 2.7 kB in bodies of 10 to 30.
 const FACTORS: [f64; 3] = [2.5e3, 16e3, 2.8e3];
 
-/// An upper estimate of the bytes that the scene's objects and colliders need.
+/// An upper estimate of the bytes that the objects and colliders of a resolved scene need.
 pub fn memory(scene: &Scene, assets: &Assets) -> f64 {
+    METHODS.into_iter().map(|method| method.memory(scene, assets)).sum::<f64>() + solids(scene, assets)
+}
+
+/// Of particles and of things that are made of masses.
+pub fn masses(scene: &Scene, assets: &Assets) -> f64 {
     let diagonals = |d: &Diagonals| if *d == Diagonals::Both { 2.0 } else { 1.0 };
     // What a direct solver takes, of the objects that it may have to solve for.
     let factors = |system: &Option<String>, each: f64| {
@@ -51,18 +51,6 @@ pub fn memory(scene: &Scene, assets: &Assets) -> f64 {
         bytes += count * (BORN + 32.0 * thing.columns.len() as f64);
     }
     bytes += scene.galaxy.iter().map(|thing| f64::from(thing.stars) * MASS).sum::<f64>();
-    let flat = super::laws::flat(scene);
-    let cells = |words: &GridBox| {
-        let long = (0..3).filter(|a| flat != Some(*a)).map(|a| words.size[a]).fold(0.0, f64::max);
-        let along = |a: usize| if flat == Some(a) { 3.0 } else { (words.size[a] / long * f64::from(words.resolution)).round() + 2.0 };
-        along(0) * along(1) * along(2)
-    };
-    for thing in &scene.heat {
-        let implicit = matches!(thing.scheme, HeatScheme::Implicit | HeatScheme::Trapezoid);
-        let own = WARM[0] + if thing.region.is_empty() { 0.0 } else { WARM[1] } + if implicit { WARM[2] } else { 0.0 };
-        bytes += cells(&thing.grid) * (own + 16.0 * thing.source.len() as f64);
-    }
-    bytes += scene.compressible.iter().map(|thing| cells(&thing.grid) * SOUND).sum::<f64>();
     for thing in &scene.rope {
         let links = if thing.rod.is_some() { 6.0 } else { 2.0 };
         bytes += (f64::from(thing.segments) + 1.0) * (2.0 * MASS + links * LINK + factors(&thing.system, FACTORS[0]));
@@ -124,7 +112,12 @@ pub fn memory(scene: &Scene, assets: &Assets) -> f64 {
         let each = MASS + woven(thing.fabric.is_some()) * LINK + factors(&thing.system, FACTORS[1]);
         bytes += 1.5 * area / (thing.resolution * thing.resolution) * each;
     }
-    bytes += scene.gas.iter().map(|thing| super::gas::bytes(thing, super::laws::flat(scene), !scene.collider.is_empty())).sum::<f64>();
+    bytes
+}
+
+/// Of colliders.
+fn solids(scene: &Scene, assets: &Assets) -> f64 {
+    let mut bytes = 0.0;
     for thing in &scene.collider {
         if let Shape::Mesh(file) = &thing.shape
             && let Some((low, high)) = assets.get(&file.path).and_then(|mesh| mesh.bounds())

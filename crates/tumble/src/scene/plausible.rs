@@ -63,21 +63,12 @@ pub fn implausible(scene: &Scene, assets: &Assets) -> Vec<Warning> {
 
     let blocks = scene.block.iter().map(|t| (format!("block \"{}\".density", t.name), t.density, AEROGEL));
     let hair = scene.hair.iter().map(|t| (format!("hair \"{}\".density", t.name), t.density, AEROGEL));
-    let heat = scene.heat.iter().map(|t| (format!("heat \"{}\".density", t.name), t.density, 0.0));
     let liquids = scene
         .particles
         .iter()
         .filter_map(|t| Some((format!("particles \"{}\".fluid.density", t.name), t.fluid.as_ref()?.density, HYDROGEN)));
-    for (path, density, least) in blocks.chain(hair).chain(heat).chain(liquids) {
-        let than = if density > OSMIUM {
-            format!("{} times as much as osmium, the densest element", short(density / OSMIUM))
-        } else if density < least {
-            format!("less than {} kg/m³, the lightest there is", plain(least))
-        } else {
-            continue;
-        };
-        doubt(Code::ImplausibleDensity, path, format!("{} kg/m³ is {than}; water has 1000", plain(density)));
-    }
+    warnings.extend(blocks.chain(hair).chain(liquids).filter_map(|(path, density, least)| odd_density(path, density, least)));
+    let mut doubt = |code, path: String, message: String| warnings.push(Warning::new(code, path, message));
 
     for block in &scene.block {
         if let Some(young) = block.material.as_ref().map(|m| m.young).filter(|young| *young > DIAMOND) {
@@ -109,6 +100,19 @@ pub fn implausible(scene: &Scene, assets: &Assets) -> Vec<Warning> {
         }
     }
     warnings
+}
+
+/// A density that no material has; `least` is that of the lightest of its kind [kg/m³].
+pub fn odd_density(path: String, density: f64, least: f64) -> Option<Warning> {
+    let than = if density > OSMIUM {
+        format!("{} times as much as osmium, the densest element", short(density / OSMIUM))
+    } else if density < least {
+        format!("less than {} kg/m³, the lightest there is", plain(least))
+    } else {
+        return None;
+    };
+    let message = format!("{} kg/m³ is {than}; water has 1000", plain(density));
+    Some(Warning::new(Code::ImplausibleDensity, path, message))
 }
 
 /// The longest edge of the box around points [m].

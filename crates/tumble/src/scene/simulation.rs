@@ -1,14 +1,14 @@
 //! A scene in motion: what fronts hold in their hands.
 
 use super::Assets;
-use super::build::{build, plans};
-use super::checks::{objects, place};
+use super::build::build;
 use super::cures;
+use super::methods::resolve;
 use crate::geometry::{Collider, Shape};
 use crate::world::World;
 use std::sync::Arc;
 use tumble_interface::engine::{Account, Cure, Engine, Inside, Ledger, Stability, StepReport, UserForce, UserIntegrator};
-use tumble_interface::scene::{Integrator, System};
+use tumble_interface::scene::Integrator;
 use tumble_interface::{Column, Frame, Issue, Scene, SceneError, StepError, Warning};
 
 /// A world together with the scene that it was built from.
@@ -26,6 +26,7 @@ pub struct Simulation {
 impl Simulation {
     /// Builds a scene. Meshes that it names are in `assets`, by their path.
     pub fn new(scene: Scene, assets: Assets) -> Result<Self, SceneError> {
+        let scene = resolve(scene);
         let built = build(&scene, &assets)?;
         Ok(Self {
             scene,
@@ -38,21 +39,9 @@ impl Simulation {
         })
     }
 
-    /// The scene that it was built from.
+    /// The scene that it was built from, resolved.
     pub fn scene(&self) -> &Scene {
         &self.scene
-    }
-
-    /// The systems, with their defaults written out.
-    pub fn plans(&self) -> Vec<System> {
-        plans(&self.scene)
-    }
-
-    /// Kind and name of every object, with the name of the system that moves it.
-    pub fn objects(&self) -> Vec<(&'static str, String, Option<String>)> {
-        let plans = self.plans();
-        let system = |kind, named| place(&plans, kind, named).map(|i| plans[i].name.clone());
-        objects(&self.scene).into_iter().map(|(kind, name, named)| (kind, name.into(), system(kind, named))).collect()
     }
 
     fn system_error(&self, system: &str, message: &str) -> SceneError {
@@ -164,7 +153,7 @@ impl Engine for Simulation {
 
     fn cures(&mut self, go_on: &(dyn Fn() -> bool + Sync)) -> Vec<Cure> {
         let Some((system, step)) = self.failure else { return Vec::new() };
-        let plan = &plans(&self.scene)[system];
+        let plan = &self.scene.system[system];
         // The estimate is that of the start, where the trials begin.
         let Ok(mut start) = Self::new(self.scene.clone(), self.assets.clone()) else { return Vec::new() };
         let stability = start.stability(go_on).into_iter().find(|s| s.system == plan.name);

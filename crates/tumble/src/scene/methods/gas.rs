@@ -1,23 +1,27 @@
-//! From the words of a fluid to the fluid.
+//! Stable Fluids: from the words of a fluid to the fluid, and what it moves.
 
-use super::checks::place;
-use super::coupling::Moved;
-use super::laws::{Reader, flat, off_plane};
+use super::{MethodRules, is_in, place, rules};
 use crate::geometry::Collider;
 use crate::linalg::poisson::{Excess, Method as Solve, Params, Target};
 use crate::math::formula::{Formula, Of};
 use crate::math::{Vec3, VectorSignal};
 use crate::operators::{Advection, Interpolation, Trace};
-use crate::recipes;
+use crate::recipes::region;
+use crate::scene::Assets;
+use crate::scene::build::Builder;
+use crate::scene::grids::grid;
+use crate::scene::laws::{Reader, flat, off_plane};
 use crate::state::{Field, Grid, Place, Vectors};
+use crate::system::System;
 use crate::systems::gas::{Beyond, Body, Fire, Fluid, Gas, Settings, Sheet, Solids, Source};
 use std::sync::Arc;
-use tumble_interface::check::plain;
+use tumble_interface::check::{plain, suggestion};
 use tumble_interface::scene::{
-    Carriage, Component, Densities, ExcessFlow, Gas as Words, GasSide, GridInterpolation, PathTrace, PressureMethod, Scene, Shape, Solid,
-    System as Plan, Temperature,
+    Carriage, Component, Densities, ExcessFlow, Field as Flow, Gas as Words, GasSide, GridInterpolation, Integrator, Method, PathTrace,
+    PressureMethod, Scene, Shape, Solid, Temperature,
 };
-use tumble_interface::{Issue, SceneError};
+use tumble_interface::warning::Code;
+use tumble_interface::{Issue, Warning};
 
 /// Largest |div u| dx over the fastest velocity.
 #[cfg(not(feature = "double"))]
@@ -28,6 +32,82 @@ const TOLERANCE: f64 = 1e-10;
 
 /// Radius of a ball in cells at least: what is smaller may close no face.
 const LEAST_RADIUS: f64 = 1.5;
+
+/// Balls that one fluid moves at most.
+const MOST_BODIES: usize = 256;
+
+pub struct Rules;
+
+impl MethodRules for Rules {
+    fn words(&self) -> &'static [Method] {
+        &[Method::Gas]
+    }
+
+    fn kinds(&self) -> &'static [&'static str] {
+        &["gas"]
+    }
+
+    /// What a fluid moves comes after it.
+    fn leads(&self, scene: &Scene) -> bool {
+        scene.gas.iter().any(|gas| !gas.bodies.is_empty() || !gas.sheet.is_empty())
+    }
+
+    fn massless(&self) -> Option<&'static str> {
+        Some("cells of a fluid")
+    }
+
+    fn meets_colliders(&self) -> bool {
+        true
+    }
+
+    fn is_on_grids(&self) -> bool {
+        true
+    }
+
+    fn refusal(&self, integrator: Integrator) -> Option<String> {
+        (integrator != Integrator::default()).then(|| "Stable Fluids have no integrator; leave it out".into())
+    }
+
+    fn measured(&self, scene: &Scene) -> Vec<&'static str> {
+        let fire = scene.gas.iter().any(|gas| gas.fire.is_some()).then_some("max_heat_error");
+        (!scene.gas.is_empty()).then_some("max_divergence").into_iter().chain(fire).collect()
+    }
+
+    fn check(&self, scene: &Scene, issues: &mut Vec<Issue>) {
+        for (i, field) in scene.field.iter().enumerate() {
+            if let Flow::Gas { of } = field
+                && !scene.gas.iter().any(|gas| gas.name == *of)
+            {
+                let hint = suggestion(of, scene.gas.iter().map(|gas| gas.name.as_str()));
+                issues.push(Issue::new(format!("field[{i}].of"), format!("there is no gas \"{of}\"{hint}")));
+            }
+        }
+    }
+
+    fn hints(&self, scene: &Scene) -> Vec<Warning> {
+        let alone = scene.gas.iter().filter(|gas| scene.collider.is_empty() && !gas.bodies.is_empty());
+        let message = "the sides of the box are no obstacle to balls, and there is no collider; add one of its shape with inside = true";
+        alone.map(|gas| Warning::new(Code::NoCollider, format!("gas \"{}\".bodies", gas.name), message)).collect()
+    }
+
+    fn memory(&self, scene: &Scene, _assets: &Assets) -> f64 {
+        scene.gas.iter().map(|thing| bytes(thing, flat(scene), !scene.collider.is_empty())).sum()
+    }
+
+    fn build(&self, builder: &mut Builder<'_>, index: usize) -> Option<Box<dyn System>> {
+        let (scene, plan, gravity) = (builder.scene, builder.plan(index), builder.gravity);
+        let mut fluids = Vec::new();
+        for words in scene.gas.iter().filter(|words| is_in(&words.system, plan)) {
+            let (bodies, sheets) = moved(builder, words);
+            let reader = Reader::new(scene, &mut builder.issues);
+            let path = format!("gas \"{}\"", words.name);
+            let names = scene.collider.iter().map(|c| c.name.clone()).collect();
+            fluids
+                .extend(Read { words, path, reader, flat: flat(scene), solids: &builder.colliders, names, bodies, sheets }.fluid(gravity));
+        }
+        Some(Box::new(Gas::new(plan.name.clone(), plan.substeps, plan.step, fluids)))
+    }
+}
 
 /// A number of places and nothing else, or what is wrong with it.
 fn scalar(words: &Component) -> Result<Formula, String> {
@@ -157,7 +237,7 @@ impl Read<'_, '_> {
                 self.wrong(&key("shape"), "a mesh or a solid of revolution, expected sphere, box, plane, floor or capsule");
                 continue;
             }
-            let region = match recipes::region(&words.shape) {
+            let region = match region(&words.shape) {
                 Ok(region) => region,
                 Err((at, message)) => {
                     self.wrong(&key(&format!("shape{at}")), message);
@@ -288,7 +368,7 @@ impl Read<'_, '_> {
         let words = self.words;
         let before = self.reader.issues.len();
         let periodic = [&words.sides.x, &words.sides.y, &words.sides.z].map(|s| s[0] == GasSide::Periodic);
-        let grid = match recipes::grid(&words.cells, self.flat, periodic) {
+        let grid = match grid(&words.cells, self.flat, periodic) {
             Ok(grid) => grid,
             Err(error) => {
                 self.wrong(".box", error.to_string());
@@ -400,35 +480,81 @@ impl Read<'_, '_> {
     }
 }
 
-/// A system with its fluids, or what is wrong with them; `moved` is what each fluid of the scene moves.
-pub fn gas(
-    scene: &Scene,
-    plans: &[Plan],
-    index: usize,
-    gravity: [f64; 3],
-    solids: &Arc<Vec<Collider>>,
-    moved: &mut [Moved],
-) -> Result<Gas, SceneError> {
-    let (mut issues, mut fluids) = (Vec::new(), Vec::new());
-    let here = |g: &Words| place(plans, "gas", g.system.as_deref()) == Some(index);
-    for (words, moved) in scene.gas.iter().zip(moved).filter(|(words, _)| here(words)) {
-        let reader = Reader::new(scene, &mut issues);
-        let (bodies, sheets) = std::mem::take(moved);
-        let path = format!("gas \"{}\"", words.name);
-        let names = scene.collider.iter().map(|c| c.name.clone()).collect();
-        fluids.extend(Read { words, path, reader, flat: flat(scene), solids, names, bodies, sheets }.fluid(gravity));
+/// The balls and sheets that a fluid moves.
+fn moved(builder: &mut Builder<'_>, words: &Words) -> (Vec<Body>, Vec<Sheet>) {
+    let (scene, parts, exchange, issues) = (builder.scene, &builder.masses, &mut builder.exchange, &mut builder.issues);
+    let (mut bodies, mut sheets) = (Vec::new(), Vec::new());
+    for (i, name) in words.bodies.iter().enumerate() {
+        let mut wrong = |message: String| issues.push(Issue::new(format!("gas \"{}\".bodies[{i}]", words.name), message));
+        let Some(system) = moved_by(scene, words, name, &mut wrong) else { continue };
+        let Some(thing) = scene.particles.iter().find(|thing| thing.name == *name) else {
+            wrong(format!("\"{name}\" is no object of [[particles]], whose masses could be balls"));
+            continue;
+        };
+        let range = parts[system].ranges().find(|(n, _)| n == name).map_or(0..0, |(_, range)| range);
+        if bodies.len() + range.len() > MOST_BODIES {
+            wrong(format!("\"{name}\" has {} masses; a fluid moves {MOST_BODIES} balls at most", range.len()));
+            continue;
+        }
+        for row in range {
+            let mut body = Body::new(name.clone(), exchange.open_body(system, row), thing.radius);
+            body.position = parts[system].position(row as u32);
+            body.velocity = parts[system].velocity(row as u32);
+            body.inverse_mass = parts[system].inverse_mass(row as u32);
+            bodies.push(body);
+        }
     }
-    if issues.is_empty() {
-        let plan = &plans[index];
-        return Ok(Gas::new(plan.name.clone(), plan.substeps, plan.step, fluids));
+    for (i, sheet) in words.sheet.iter().enumerate() {
+        let name = &sheet.object;
+        let mut wrong = |message: String| issues.push(Issue::new(format!("gas \"{}\".sheet[{i}].object", words.name), message));
+        let Some(system) = moved_by(scene, words, name, &mut wrong) else { continue };
+        let Some(object) = parts[system].named(name) else { continue };
+        let curve = object.curve.windows(2).map(|ends| [ends[0], ends[1]]).collect();
+        let (triangles, pieces) = if scene.dimension == 2 { (Vec::new(), curve) } else { (object.triangles.clone(), Vec::new()) };
+        if triangles.is_empty() && pieces.is_empty() {
+            let what = if scene.dimension == 2 { "curve, which a sheet in the plane is" } else { "surface of triangles" };
+            wrong(format!("\"{name}\" has no {what}"));
+            continue;
+        }
+        let ports = object.points.clone().map(|row| exchange.open(system, row)).collect();
+        sheets.push(Sheet::new(name.clone(), ports, triangles, pieces, [sheet.resistance, sheet.friction]));
     }
-    Err(SceneError { issues })
+    (bodies, sheets)
+}
+
+/// The system of an object that a fluid is to move.
+fn moved_by(scene: &Scene, words: &Words, name: &str, wrong: &mut dyn FnMut(String)) -> Option<usize> {
+    let (all, plans) = (scene.objects(), &scene.system);
+    let Some(object) = all.iter().find(|o| o.name == name) else {
+        let hint = suggestion(name, all.iter().map(|o| o.name));
+        wrong(format!("there is no object \"{name}\"{hint}"));
+        return None;
+    };
+    let all = scene.gas.iter().flat_map(|gas| gas.bodies.iter().chain(gas.sheet.iter().map(|sheet| &sheet.object)));
+    if all.filter(|other| *other == name).count() > 1 {
+        wrong(format!("\"{name}\" is named more than once; one fluid moves it, as a ball or as a sheet"));
+        return None;
+    }
+    let (own, other) = (place(plans, "gas", words.system.as_deref())?, place(plans, object.kind, object.system)?);
+    if rules(plans[other].method).massless().is_some() {
+        wrong(format!("\"{name}\" is in a system of method {}; a fluid moves masses of dynamics", plans[other].method.name()));
+        return None;
+    }
+    if other < own {
+        // Otherwise the masses would fall for an interval before they feel the fluid.
+        wrong(format!(
+            "system \"{}\" of \"{name}\" comes before the fluid that moves it; put [[system]] \"{}\" first",
+            plans[other].name, plans[own].name
+        ));
+        return None;
+    }
+    Some(other)
 }
 
 /// Bytes for a cell of a fluid: velocities, what is carried, and what steps and solvers need; a snapshot of the state.
-pub fn bytes(words: &Words, flat: Option<usize>, solids: bool) -> f64 {
+fn bytes(words: &Words, flat: Option<usize>, solids: bool) -> f64 {
     let real = std::mem::size_of::<crate::math::Real>() as f64;
-    let cells = recipes::grid(&words.cells, flat, [false; 3]).map_or_else(
+    let cells = grid(&words.cells, flat, [false; 3]).map_or_else(
         |_| {
             let long = (0..3).filter(|a| flat != Some(*a)).map(|a| words.cells.size[a]).fold(0.0, f64::max);
             let count =

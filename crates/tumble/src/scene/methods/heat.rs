@@ -1,33 +1,117 @@
-//! Bodies that conduct heat: words to materials, boundaries and sources.
+//! Heat in bodies: words to materials, boundaries and sources.
 
-use super::places::{Map, fill, middle};
-use super::{grid, solid};
+use super::{MethodRules, is_in};
 use crate::geometry::{Shape, Vector};
 use crate::math::parallel::fold;
 use crate::math::{Real, Signal};
+use crate::recipes::region;
+use crate::scene::Assets;
+use crate::scene::build::Builder;
+use crate::scene::grids::{Map, cells, fill, grid, middle};
+use crate::scene::laws::{Reader, flat};
+use crate::scene::plausible::odd_density;
 use crate::state::{Field, Place};
-use crate::systems::heat::{Body, Boundary, Material, Plan, Source};
-use tumble_interface::scene::{Animated, Collider, Component, Heat, HeatScheme, HeatSide, Shape as Words};
+use crate::system::System;
+use crate::systems::dynamics::MOST_SUBSTEPS;
+use crate::systems::heat::{Body, Boundary, Heat, Material, Plan, SAFE, Settings, Source};
+use tumble_interface::check::short;
+use tumble_interface::scene::{
+    Animated, Component, Heat as Words, HeatScheme, HeatSide, Integrator, Method, Scene, Shape as Solid, System as Stepping,
+};
+use tumble_interface::{Issue, Warning};
+
+/// Bytes for a cell in double precision: temperatures twice and in the snapshot; materials; multigrid of implicit schemes.
+const CELL: [f64; 3] = [24.0, 48.0, 160.0];
+
+pub struct Rules;
+
+impl MethodRules for Rules {
+    fn words(&self) -> &'static [Method] {
+        &[Method::Heat]
+    }
+
+    fn kinds(&self) -> &'static [&'static str] {
+        &["heat"]
+    }
+
+    fn massless(&self) -> Option<&'static str> {
+        Some("bodies on grids")
+    }
+
+    fn is_on_grids(&self) -> bool {
+        true
+    }
+
+    fn refusal(&self, integrator: Integrator) -> Option<String> {
+        let message = || "each [[heat]] body has a scheme of its own, and the system no integrator; leave it out".into();
+        (integrator != Integrator::default()).then(message)
+    }
+
+    fn measured(&self, scene: &Scene) -> Vec<&'static str> {
+        if scene.heat.is_empty() { Vec::new() } else { vec!["max_heat_error"] }
+    }
+
+    fn hints(&self, scene: &Scene) -> Vec<Warning> {
+        scene.heat.iter().filter_map(|t| odd_density(format!("heat \"{}\".density", t.name), t.density, 0.0)).collect()
+    }
+
+    fn memory(&self, scene: &Scene, _assets: &Assets) -> f64 {
+        let of = |thing: &Words| {
+            let implicit = matches!(thing.scheme, HeatScheme::Implicit | HeatScheme::Trapezoid);
+            let own = CELL[0] + if thing.region.is_empty() { 0.0 } else { CELL[1] } + if implicit { CELL[2] } else { 0.0 };
+            cells(&thing.grid, flat(scene)) * (own + 16.0 * thing.source.len() as f64)
+        };
+        scene.heat.iter().map(of).sum()
+    }
+
+    fn build(&self, builder: &mut Builder<'_>, index: usize) -> Option<Box<dyn System>> {
+        let (scene, plan) = (builder.scene, builder.plan(index));
+        let mut bodies = Vec::new();
+        for words in scene.heat.iter().filter(|words| is_in(&words.system, plan)) {
+            let path = format!("heat \"{}\"", words.name);
+            let (mut unread, mut faults) = (Vec::new(), Vec::new());
+            let mut reader = Reader::new(scene, &mut unread);
+            let mut signal = |key: &str, value: &Animated| reader.signal(&format!("{path}{key}"), value, f64::NEG_INFINITY);
+            let made = body(words, flat(scene), &mut signal, &mut |key, message| faults.push((key.to_string(), message)));
+            builder.issues.extend(unread);
+            builder.issues.extend(faults.into_iter().map(|(key, message)| Issue::new(format!("{path}{key}"), message)));
+            if let Some(made) = made {
+                check_steps(words, plan, builder.interval, made.limit(), &mut builder.issues);
+                bodies.push(made);
+            }
+        }
+        let settings = Settings { name: plan.name.clone(), index, substeps: plan.substeps, step: plan.step };
+        Some(Box::new(Heat::new(settings, bodies, &mut builder.exchange)))
+    }
+}
+
+/// Explicit steps up to `limit` [s] do not grow.
+fn check_steps(words: &Words, plan: &Stepping, interval: f64, limit: f64, issues: &mut Vec<Issue>) {
+    let step = plan.substeps.map(|n| interval / f64::from(n)).or(plan.step.map(|step| step.min(interval)));
+    if let Some(h) = step.filter(|h| *h > limit * (1.0 + 1e-9)) {
+        let key = if plan.substeps.is_some() { "substeps" } else { "step" };
+        let message = format!(
+            "steps of {} s, but explicit diffusion in \"{}\" grows beyond {} s: leave out {key} to have as many as it needs, \
+             or set scheme = \"implicit\"",
+            short(h),
+            words.name,
+            short(limit)
+        );
+        issues.push(Issue::new(format!("system \"{}\".{key}", plan.name), message));
+    }
+    let needed = interval / (SAFE * limit);
+    if step.is_none() && needed > MOST_SUBSTEPS {
+        let message = format!("an interval would take {needed:.0e} explicit steps; set scheme = \"implicit\", or lower the resolution");
+        issues.push(Issue::new(format!("heat \"{}\".scheme", words.name), message));
+    }
+}
 
 /// A solid without a mesh.
-fn shape(words: &Words) -> Result<Shape, String> {
-    if matches!(words, Words::Lathe { .. } | Words::Mesh(_) | Words::AnimatedMesh(_) | Words::Character(_) | Words::Mannequin(_)) {
+fn shape(words: &Solid) -> Result<Shape, String> {
+    if matches!(words, Solid::Lathe { .. } | Solid::Mesh(_) | Solid::AnimatedMesh(_) | Solid::Character(_) | Solid::Mannequin(_)) {
         return Err("a mesh or a solid of revolution, expected a sphere, box, plane, floor or capsule".into());
     }
-    let thing = Collider {
-        name: String::new(),
-        shape: words.clone(),
-        thickness: 0.0,
-        friction: 0.0,
-        friction_static: None,
-        restitution: 0.0,
-        inside: false,
-        edges: false,
-        belt: [0.0; 3],
-        motion: None,
-        color: None,
-    };
-    solid(&thing, &[], None).map(|solid| solid.shape).map_err(|(_, message)| message)
+    region(words).map(|solid| solid.shape).map_err(|(_, message)| message)
 }
 
 fn contains(shape: &Shape, x: [f64; 3]) -> bool {
@@ -36,8 +120,8 @@ fn contains(shape: &Shape, x: [f64; 3]) -> bool {
 
 /// A body, or what is wrong with it: `wrong(key, message)`. `signal` reads values that change in time, `flat` is the axis across
 /// the plane of a scene of two dimensions.
-pub fn heat(
-    words: &Heat,
+fn body(
+    words: &Words,
     flat: Option<usize>,
     signal: &mut dyn FnMut(&str, &Animated) -> Signal,
     wrong: &mut dyn FnMut(&str, String),

@@ -1,0 +1,287 @@
+//! Masses under forces, and position-based dynamics.
+
+use super::{MethodRules, is_in};
+use crate::geometry::motion::Pose;
+use crate::geometry::{Carrier, Collider, Vector};
+use crate::math::parallel::fold;
+use crate::recipes::{self, Site};
+use crate::scene::build::{Builder, emit};
+use crate::scene::checks::others;
+use crate::scene::laws::Reader;
+use crate::scene::{Assets, coupling, hints, memory};
+use crate::system::System;
+use crate::systems::dynamics::{Parts, Settings, Stepping};
+use tumble_interface::check::short;
+use tumble_interface::scene::{Bits, Force as Words, Hair, Integrator, Method, Scene, Shape, System as Plan};
+use tumble_interface::warning::Code;
+use tumble_interface::{Issue, Mesh, SceneError, Warning};
+
+/// Births that are looked at before a run.
+const TRIALS: usize = 64;
+
+/// Longest sub-step of position-based dynamics where a scene says nothing [s].
+const POSITION_BASED_STEP: f64 = 1e-3;
+
+pub struct Rules;
+
+impl MethodRules for Rules {
+    fn words(&self) -> &'static [Method] {
+        &[Method::Dynamics, Method::PositionBased]
+    }
+
+    fn kinds(&self) -> &'static [&'static str] {
+        &["particles", "emitter", "rope", "hair", "sheet", "block", "net", "cloth", "galaxy"]
+    }
+
+    fn default_system(&self) -> Plan {
+        Plan::default()
+    }
+
+    fn normalize(&self, plan: &mut Plan) {
+        if plan.method == Method::PositionBased {
+            (plan.method, plan.integrator) = (Method::Dynamics, Integrator::PositionBased);
+        }
+    }
+
+    fn meets_colliders(&self) -> bool {
+        true
+    }
+
+    fn measured(&self, scene: &Scene) -> Vec<&'static str> {
+        hints::measured_of_masses(scene)
+    }
+
+    fn check(&self, scene: &Scene, issues: &mut Vec<Issue>) {
+        for plan in scene.system.iter().filter(|plan| plan.clamp.is_some()) {
+            let clamped = matches!(plan.integrator, Integrator::ModifiedEuler | Integrator::Verlet | Integrator::PositionBased);
+            if plan.method != Method::Dynamics || !clamped {
+                let message = "the position clamp goes with modified_euler, verlet or position_based";
+                issues.push(Issue::new(format!("system \"{}\".clamp", plan.name), message));
+            }
+        }
+        // What is wrong with a force is told even where it acts on nothing.
+        let mut reader = Reader::new(scene, issues);
+        for (i, force) in scene.force.iter().enumerate() {
+            reader.law(&format!("force[{i}]"), force);
+            reader.air(&format!("force[{i}]"), force);
+        }
+    }
+
+    fn hints(&self, scene: &Scene) -> Vec<Warning> {
+        let meets = scene.system.iter().any(|plan| plan.method == Method::Dynamics && plan.self_contact.is_some());
+        let idle = scene.collider.iter().filter(|thing| thing.edges && !meets);
+        let message = "edges meet in systems with self_contact, and there is none; add it, or leave edges out";
+        let idle = idle.map(|thing| Warning::new(Code::Unfelt, format!("collider \"{}\".edges", thing.name), message));
+        idle.chain(hints::thin(scene)).collect()
+    }
+
+    fn memory(&self, scene: &Scene, assets: &Assets) -> f64 {
+        memory::masses(scene, assets)
+    }
+
+    fn fill(&self, builder: &mut Builder<'_>, index: usize) {
+        let mut parts = std::mem::take(&mut builder.masses[index]);
+        fill(builder, index, &mut parts);
+        act(builder, &mut parts);
+        builder.masses[index] = parts;
+    }
+
+    fn build(&self, builder: &mut Builder<'_>, index: usize) -> Option<Box<dyn System>> {
+        if !builder.sound {
+            return None;
+        }
+        let (scene, plan, interval) = (builder.scene, builder.plan(index), builder.interval);
+        let parts = std::mem::take(&mut builder.masses[index]);
+        let settings = Settings {
+            name: plan.name.clone(),
+            index,
+            interval,
+            integrator: plan.integrator,
+            stepping: stepping(plan),
+            adaptive: plan.adaptive.clone(),
+            solver: plan.solver.clone(),
+            sweeps: plan.position_based.clone(),
+            self_contact: plan.self_contact.clone(),
+            counted: scene.expect.max_intersections.is_some(),
+            clamp: plan.clamp,
+            gravity: builder.gravity,
+            native: scene.bits == Bits::Native,
+            colliders: builder.colliders.clone(),
+        };
+        builder.warnings.extend(buried(scene, &parts, &builder.colliders));
+        let mut system = match parts.build(settings) {
+            Ok(system) => system,
+            Err(error) => {
+                builder.issues.extend(placed(scene, error).issues);
+                return None;
+            }
+        };
+        builder.warnings.extend(system.tangles());
+        builder.warnings.extend(system.round_off(interval));
+        builder.warnings.extend(system.idle_attachments());
+        if builder.exchange.ports_of(index).next().is_some() {
+            system.expect_pushes();
+        }
+        for anchor in &builder.anchors {
+            coupling::hang(&mut system, index, anchor, interval, &mut builder.exchange, &mut builder.warnings);
+        }
+        Some(Box::new(system))
+    }
+}
+
+/// The objects of a system, kind by kind, in the order of the scene.
+fn fill(builder: &mut Builder<'_>, index: usize, parts: &mut Parts) {
+    let (scene, assets) = (builder.scene, builder.assets);
+    let plan = builder.plan(index);
+    // Issues leave colliders out, and then nothing is built.
+    let solids = (builder.named.len() == scene.collider.len()).then_some(&builder.named[..]);
+    let mut site = Site { parts, issues: &mut builder.issues, hints: &mut builder.warnings, up: builder.up, solids, assets };
+    scene.particles.iter().filter(|t| is_in(&t.system, plan)).for_each(|t| recipes::particles(&mut site, t));
+    scene.emitter.iter().filter(|t| is_in(&t.system, plan)).for_each(|t| emit(&mut site, scene, t));
+    scene.rope.iter().filter(|t| is_in(&t.system, plan)).for_each(|t| recipes::rope(&mut site, t));
+    for thing in scene.hair.iter().filter(|t| is_in(&t.system, plan)) {
+        planted(&mut site, scene, thing, assets, (&builder.colliders, &builder.surfaces));
+    }
+    scene.sheet.iter().filter(|t| is_in(&t.system, plan)).for_each(|t| recipes::sheet(&mut site, t));
+    scene.block.iter().filter(|t| is_in(&t.system, plan)).for_each(|t| recipes::block(&mut site, t));
+    for thing in scene.net.iter().filter(|t| is_in(&t.system, plan)) {
+        match assets.get(&thing.mesh.path) {
+            Some(mesh) => recipes::net(&mut site, thing, &recipes::placed(mesh, &thing.mesh)),
+            None => site.issues.push(Issue::new(format!("net \"{}\".mesh", thing.name), "the mesh has not been loaded")),
+        }
+    }
+    scene.cloth.iter().filter(|t| is_in(&t.system, plan)).for_each(|t| recipes::cloth(&mut site, t));
+    for thing in scene.galaxy.iter().filter(|t| is_in(&t.system, plan)) {
+        let pull = scene.force.iter().find(|f| matches!(f, Words::Gravitation { .. }) && f.on().is_none_or(|on| on.contains(&thing.name)));
+        match pull {
+            Some(Words::Gravitation { constant, softening, .. }) => recipes::galaxy(&mut site, thing, scene.seed, *constant, *softening),
+            _ => {
+                let message = "nothing holds it together: add a [[force]] with kind = \"gravitation\" on it";
+                site.issues.push(Issue::new(format!("galaxy \"{}\"", thing.name), message));
+            }
+        }
+    }
+}
+
+/// The forces on the objects of a system.
+fn act(builder: &mut Builder<'_>, parts: &mut Parts) {
+    let scene = builder.scene;
+    let mut reader = Reader::new(scene, &mut builder.issues);
+    for (i, force) in scene.force.iter().enumerate() {
+        let (path, others) = (format!("force[{i}]"), others(force));
+        let other = |name: &str| others.is_some_and(|(_, others)| others.iter().any(|o| o == name));
+        // A flock without a list are all but its predators.
+        let spared = |name: &str| matches!(force, Words::Flock { .. }) && other(name);
+        let on = |name: &str| force.on().map_or(!spared(name), |on| on.iter().any(|o| o == name));
+        let bodies = |of: &dyn Fn(&str) -> bool| -> Vec<usize> { parts.bodies().filter(|(_, name)| of(name)).map(|(i, _)| i).collect() };
+        let (on, others) = (bodies(&on), others.map(|_| bodies(&other)));
+        if let Some(air) = reader.air(&path, force) {
+            parts.times = reader.times().to_vec();
+            parts.airs.push((air, on));
+            continue;
+        }
+        match reader.law(&path, force) {
+            _ if on.is_empty() => {}
+            Some(law) => parts.forces.push((path, law, on)),
+            None => parts.between.push((force.clone(), on, others)),
+        }
+    }
+}
+
+/// Hair on its mesh or collider.
+fn planted(site: &mut Site<'_>, scene: &Scene, thing: &Hair, assets: &Assets, (colliders, surfaces): (&[Collider], &[Mesh])) {
+    let path = format!("hair \"{}\"", thing.name);
+    let mut wrong = |key: &str, message: String| site.issues.push(Issue::new(format!("{path}{key}"), message));
+    if thing.count.is_some() == thing.per_area.is_some() {
+        return wrong(".count", "expected either a count of strands or per_area, strands per area".into());
+    }
+    match (&thing.mesh, &thing.on) {
+        (Some(file), None) => match assets.get(&file.path) {
+            Some(mesh) => {
+                let mesh = recipes::placed(mesh, file);
+                recipes::hair(site, thing, scene.seed, &recipes::Ground { mesh: &mesh, pose: Pose::default(), solid: None });
+            }
+            None => wrong(".mesh", "the mesh has not been loaded".into()),
+        },
+        (None, Some(name)) => {
+            let Some(k) = scene.collider.iter().position(|c| c.name == *name) else {
+                return wrong(".on", format!("there is no collider \"{name}\""));
+            };
+            if let Shape::Plane { .. } | Shape::Floor { .. } = scene.collider[k].shape {
+                return wrong(".on", format!("collider \"{name}\" has no end; let hair grow on another"));
+            }
+            // What is wrong with the collider is told elsewhere.
+            let (true, Some(mesh)) = (colliders.len() == scene.collider.len(), surfaces.get(k)) else { return };
+            let (solid, bones) = (&colliders[k], colliders[k].bones());
+            if solid.inside {
+                let message =
+                    format!("collider \"{name}\" is a container, and hair grows outwards; let it grow on a mesh that faces inwards");
+                return wrong(".on", message);
+            }
+            let bone = match &thing.bone {
+                Some(bone) if bones.is_empty() => {
+                    return wrong(".bone", format!("collider \"{name}\" has no bones; leave out bone (\"{bone}\")"));
+                }
+                Some(bone) => match solid.bone(bone) {
+                    Some(bone) => Some(bone),
+                    None => return wrong(".bone", format!("collider \"{name}\" has no bone \"{bone}\"; known are {}", bones.join(", "))),
+                },
+                None => None,
+            };
+            let ground = recipes::Ground { mesh, pose: solid.pose(Carrier::Whole, 0.0), solid: Some((solid, k, bone)) };
+            recipes::hair(site, thing, scene.seed, &ground);
+        }
+        _ => wrong(".on", "expected either the name of a collider, or a mesh".into()),
+    }
+}
+
+/// What starts inside a collider.
+fn buried(scene: &Scene, parts: &Parts, colliders: &[Collider]) -> Vec<Warning> {
+    type Start = (f64, Vector);
+    let deeper = |a: (f64, f64, usize), b: (f64, f64, usize)| if b.0 > a.0 { b } else { a };
+    let deepest = |start: &(dyn Fn(usize) -> Option<Start> + Sync), n: usize, spare: f64| {
+        let one = |i: usize| {
+            let (t, x) = start(i)?;
+            let depth = |(k, c): (usize, &Collider)| Some((c.touch(x, t)?.depth - c.thickness, t, k));
+            colliders.iter().enumerate().filter_map(depth).filter(|found| found.0 > spare).reduce(deeper)
+        };
+        fold(n, |range| range.filter_map(one).reduce(deeper)).into_iter().flatten().reduce(deeper)
+    };
+    let end = scene.frame_time() * f64::from(scene.time.frames);
+    let masses = parts.ranges().map(|(name, range)| {
+        let free = |i: usize| (parts.inverse_mass(i as u32) > 0.0).then(|| (0.0, parts.position(i as u32)));
+        (name, deepest(&|i| free(range.start + i), range.len(), 1e-6))
+    });
+    // A source may touch a surface: particles are not deep in it before they are all in it.
+    let sources = parts.emitters().map(|e| (e.words().name.as_str(), deepest(&|k| e.trial(k, TRIALS, end), TRIALS, e.words().radius)));
+    let told = |(name, found): (&str, Option<(f64, f64, usize)>)| {
+        let (deep, t, k) = found?;
+        let (deep, solid) = (short(deep), &scene.collider[k].name);
+        let when = if t > 0.0 { format!(" at t = {} s", short(t)) } else { String::new() };
+        let message =
+            format!("masses start{when} up to {deep} m inside collider \"{solid}\", and will be thrown out of it; move one of them");
+        Some(Warning::new(Code::StartsInside, format!("\"{name}\""), message))
+    };
+    masses.chain(sources).filter_map(told).collect()
+}
+
+/// The issues of objects, at their places in the scene.
+fn placed(scene: &Scene, mut error: SceneError) -> SceneError {
+    for issue in &mut error.issues {
+        if let Some(object) = scene.objects().into_iter().find(|o| o.name == issue.path) {
+            issue.path = format!("{} \"{}\"", object.kind, object.name);
+        }
+    }
+    error
+}
+
+fn stepping(plan: &Plan) -> Stepping {
+    match (plan.substeps, plan.step) {
+        (Some(n), _) => Stepping::Substeps(n),
+        (None, Some(step)) => Stepping::Step(step),
+        (None, None) if plan.integrator == Integrator::PositionBased => Stepping::Step(POSITION_BASED_STEP),
+        // An implicit scheme needs no more than one step an interval.
+        (None, None) if plan.integrator.is_implicit() => Stepping::Substeps(1),
+        (None, None) => Stepping::Automatic,
+    }
+}

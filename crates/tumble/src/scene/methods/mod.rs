@@ -1,0 +1,141 @@
+//! Methods: each file holds all that the scene layer knows of one, and `METHODS` is the table of them.
+
+mod compressible;
+mod dynamics;
+mod gas;
+mod heat;
+mod tracers;
+mod vicsek;
+
+use super::Assets;
+use super::build::Builder;
+use crate::system::System;
+use tumble_interface::scene::{Integrator, Method, Scene, System as Plan};
+use tumble_interface::{Issue, Warning};
+
+/// All methods. Where several can move a kind of objects, the first is its default.
+pub static METHODS: [&dyn MethodRules; 6] =
+    [&dynamics::Rules, &tracers::Rules, &vicsek::Rules, &gas::Rules, &heat::Rules, &compressible::Rules];
+
+/// What the scene layer knows of a method. Scenes that it is given are resolved, but for `leads`.
+pub trait MethodRules: Sync {
+    /// Its word in scenes, and other words for it.
+    fn words(&self) -> &'static [Method];
+
+    /// Kinds of objects that it can move.
+    fn kinds(&self) -> &'static [&'static str];
+
+    /// Its main word.
+    fn name(&self) -> &'static str {
+        self.words()[0].name()
+    }
+
+    /// Its system in scenes that list none.
+    fn default_system(&self) -> Plan {
+        Plan { name: self.name().into(), method: self.words()[0], ..Plan::default() }
+    }
+
+    /// Whether its default system must come before those of other methods.
+    fn leads(&self, _scene: &Scene) -> bool {
+        false
+    }
+
+    /// Writes out what another word for it means.
+    fn normalize(&self, _plan: &mut Plan) {}
+
+    /// What its objects are, if they are no masses, which forces move.
+    fn massless(&self) -> Option<&'static str> {
+        None
+    }
+
+    /// Whether its objects meet colliders.
+    fn meets_colliders(&self) -> bool {
+        false
+    }
+
+    /// Whether its objects lie on grids.
+    fn is_on_grids(&self) -> bool {
+        false
+    }
+
+    /// Why it cannot be stepped by an integrator; `None` if it can.
+    fn refusal(&self, _integrator: Integrator) -> Option<String> {
+        None
+    }
+
+    /// Bounds of `[expect]` that its objects in the scene are measured for.
+    fn measured(&self, _scene: &Scene) -> Vec<&'static str> {
+        Vec::new()
+    }
+
+    /// What is wrong with its words, before anything is built.
+    fn check(&self, _scene: &Scene, _issues: &mut Vec<Issue>) {}
+
+    /// What is doubtful about its words.
+    fn hints(&self, _scene: &Scene) -> Vec<Warning> {
+        Vec::new()
+    }
+
+    /// Bytes that its objects need, an upper estimate; those of kinds whose default is another method are counted there.
+    fn memory(&self, scene: &Scene, assets: &Assets) -> f64;
+
+    /// Adds masses and elements to a system, before any system is built: other systems may hold on to them.
+    fn fill(&self, _builder: &mut Builder<'_>, _index: usize) {}
+
+    /// Builds a system; what is wrong with its objects goes to the builder's issues.
+    fn build(&self, builder: &mut Builder<'_>, index: usize) -> Option<Box<dyn System>>;
+}
+
+/// The rules of a method.
+pub fn rules(method: Method) -> &'static dyn MethodRules {
+    METHODS.into_iter().find(|m| m.words().contains(&method)).unwrap_or(METHODS[0])
+}
+
+/// The method that moves a kind of objects by default.
+pub fn default_of(kind: &str) -> &'static dyn MethodRules {
+    METHODS.into_iter().find(|m| m.kinds().contains(&kind)).unwrap_or(METHODS[0])
+}
+
+/// The system that moves an object of this kind: the one it names, else the first that can.
+pub fn place(systems: &[Plan], kind: &str, named: Option<&str>) -> Option<usize> {
+    systems.iter().position(|s| rules(s.method).kinds().contains(&kind) && named.is_none_or(|name| s.name == name))
+}
+
+/// Whether an object of a resolved scene is in a system.
+pub fn is_in(system: &Option<String>, plan: &Plan) -> bool {
+    system.as_ref() == Some(&plan.name)
+}
+
+/// The methods that move objects of the scene.
+pub fn present(scene: &Scene) -> Vec<&'static dyn MethodRules> {
+    let moved = |o: &tumble_interface::scene::Object<'_>| place(&scene.system, o.kind, o.system).map(|i| scene.system[i].method);
+    let moving: Vec<Method> = scene.objects().iter().filter_map(moved).collect();
+    METHODS.into_iter().filter(|m| m.words().iter().any(|word| moving.contains(word))).collect()
+}
+
+/// The scene with its systems, and the system of each object, written out.
+pub fn resolve(mut scene: Scene) -> Scene {
+    let mut systems = std::mem::take(&mut scene.system);
+    if systems.is_empty() {
+        systems = default_systems(&scene);
+    }
+    systems.iter_mut().for_each(|plan| rules(plan.method).normalize(plan));
+    for (kind, system) in scene.object_systems_mut() {
+        if let Some(i) = place(&systems, kind, system.as_deref()) {
+            *system = Some(systems[i].name.clone());
+        }
+    }
+    scene.system = systems;
+    scene
+}
+
+/// A system for each method that objects of the scene need.
+fn default_systems(scene: &Scene) -> Vec<Plan> {
+    let needed: Vec<&str> = scene.objects().iter().map(|o| default_of(o.kind).name()).collect();
+    let mut methods: Vec<_> = METHODS.into_iter().filter(|m| needed.contains(&m.name())).collect();
+    if methods.is_empty() {
+        methods.push(METHODS[0]);
+    }
+    methods.sort_by_key(|m| !m.leads(scene));
+    methods.iter().map(|m| m.default_system()).collect()
+}
