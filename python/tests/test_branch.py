@@ -356,7 +356,7 @@ def test_a_change_without_effect_is_told(spring: Tree, scene_file: SceneFile, tu
     assert tumble("run", scene_file(spring)).code == 0
     answer = tumble("branch", "scene@13", "--set", "particles.p.velocity=[[0, 0, 0], [9, 0, 0]]")
     assert answer.code == 0
-    assert "the change did nothing in 12 frames" in answer.err
+    assert "the change had no effect in 12 frames" in answer.err
 
 
 def test_a_branch_that_breaks_ends_with_1_and_a_command_for_branches(

@@ -46,10 +46,7 @@ def test_a_broken_mesh_is_mended_beside_the_original(
     assert refused.code == 2 and "inconsistent edges" in refused.err
     answer = tumble("check", scene, "--repair")
     assert answer.code == 0, answer.err
-    assert (
-        "2 triangles dropped that stood there already, 1 triangle dropped that had no area, 2 triangles turned"
-        in answer.out
-    )
+    assert "2 triangles dropped as duplicates, 1 triangle dropped for having no area, 2 triangles flipped" in answer.out
     new = tmp_path / "meshes" / "cube.repaired.obj"
     assert 'collider "a.cube".shape.mesh.path = "meshes/cube.repaired.obj"' in answer.out
     vertices, triangles = load_mesh(new)
@@ -83,9 +80,9 @@ def test_lines_to_change_are_told(tumble: Command, tmp_path: Path) -> None:
 def test_a_sound_mesh_is_left_alone(spring: Tree, scene_file: SceneFile, tumble: Command, tmp_path: Path) -> None:
     write(tmp_path, obj(FACES))
     answer = tumble("check", scene_file(with_cube(spring)), "--repair")
-    assert answer.code == 0 and "nothing to mend" in answer.out
+    assert answer.code == 0 and "nothing to repair" in answer.out
     assert [p.name for p in (tmp_path / "meshes").iterdir()] == ["cube.obj"]
-    assert "names no mesh file" in tumble("check", scene_file(spring, "other.json"), "--repair").out
+    assert "has no mesh files" in tumble("check", scene_file(spring, "other.json"), "--repair").out
 
 
 def test_what_is_still_wrong_is_told(spring: Tree, scene_file: SceneFile, tumble: Command, tmp_path: Path) -> None:
@@ -126,7 +123,7 @@ def test_an_unsound_net_is_told_by_check_and_run(scene_file: SceneFile, tumble: 
         )
         assert answer.err.count('net "n".mesh') == 1
     answer = tumble("check", scene, "--repair")
-    assert answer.code == 0 and "warning" not in answer.err and "1 vertex of no triangle left out" in answer.out, answer
+    assert answer.code == 0 and "warning" not in answer.err and "1 vertex of no triangle dropped" in answer.out, answer
     # What the command at its end runs has nothing to be told of.
     write(tmp_path, obj(FACES))
     assert 'net "n"' not in tumble("check", scene).err

@@ -380,7 +380,7 @@ def test_trouble_on_the_way_leaves_the_error_as_it_was(
     assert answer.code == 1
     for word in ("FAILED", "Likely causes", "<- recommended", "Kept: "):
         assert word in answer.err, word
-    assert "A small scene" not in answer.err and "Traceback" not in answer.err
+    assert "A minimal scene" not in answer.err and "Traceback" not in answer.err
     # What broke is said before anything is looked for.
     assert answer.err.index("energy exploded") < answer.err.index("Looking for") < answer.err.index("FAILED")
     failure = Run("out/scene").manifest["failure"]
