@@ -123,7 +123,7 @@ def test_a_spring_too_stiff_for_any_step_is_cured_by_an_implicit_scheme(
     spring["particles"][0]["spring"][0]["stiffness"] = 1e20
     answer = tumble("run", scene_file(spring))
     assert answer.code == 1
-    for word in ("the step that is needed became too small", "implicit integrator", "<- recommended"):
+    for word in ("the required step became too small", "implicit integrator", "<- recommended"):
         assert word in answer.err, word
     cure = copied(answer.err, "run")
     assert "system.0.integrator=implicit_euler" in cure

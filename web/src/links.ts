@@ -6,9 +6,9 @@ export type Family = (typeof FAMILIES)[number];
 
 /** What each resists, after docs/theory/structures.md. */
 export const RESISTS: Record<Family, string> = {
-  structural: "links lie between neighbours and resist stretching.",
-  shear: "links lie along diagonals and resist shear, which the others let through.",
-  bend: "links skip a mass, or cross an edge of triangles, and resist folding, weakly.",
+  structural: "links connect neighbours and resist stretching.",
+  shear: "links run along diagonals and resist shear, which the others do not.",
+  bend: "links skip a mass, or cross a triangle edge, and weakly resist folding.",
 };
 
 type Settings = Record<string, Value | null>;

@@ -92,7 +92,7 @@ export class Panel {
     private readonly set: (path: string, value: Value) => Promise<void>,
   ) {
     this.element.append(
-      h("div", { class: "panel-head" }, check("Every word, with defaults", false, (on) => {
+      h("div", { class: "panel-head" }, check("All keys, with defaults", false, (on) => {
         this.everything = on;
         this.draw();
       })),
@@ -147,7 +147,7 @@ export class Panel {
       }
     }
     this.groups.replaceChildren(...groups);
-    if (!groups.length) this.groups.append(h("p", { class: "muted" }, "This scene leaves everything at its defaults."));
+    if (!groups.length) this.groups.append(h("p", { class: "muted" }, "This scene uses only defaults."));
   }
 
   /** The values that one would like to turn first. */

@@ -95,7 +95,7 @@ export async function cards(list: Topic[]): Promise<HTMLElement[]> {
         h("p", { class: "muted" }, question(text)),
         ...parts.map((e) => h("pre", { class: "equation", tabindex: 0 }, e)),
         files.length ? h("p", { class: "files" }, "In the engine: ", ...files.flatMap((f, i) => [i ? ", " : "", h("code", {}, f)])) : null,
-        h("p", {}, h("a", { href: `#/theory/${page}` }, `Read on: ${heading(text).toLowerCase()}`)),
+        h("p", {}, h("a", { href: `#/theory/${page}` }, `Read more: ${heading(text).toLowerCase()}`)),
       );
     }),
   );

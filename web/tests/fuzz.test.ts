@@ -167,7 +167,7 @@ test("what unpacks to more than there may be is left off early", async () => {
     // Below the limit it is what is in it that is refused.
     await assert.rejects(open(holds), (error: Error) => !!error.message && !/more than a scene/.test(error.message));
     const { refused } = await tried(`${kind}, bombs`, sizes.length * 3, (d) => open(d.one(sizes)).catch((error) => {
-      assert.match(error.message, /it holds more than a scene may have/);
+      assert.match(error.message, /it contains more than a scene may have/);
       throw error;
     }));
     const taken = process.resourceUsage().maxRSS / 1024 - before;

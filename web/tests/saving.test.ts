@@ -63,7 +63,7 @@ describe("downloads", () => {
     const { page, errors } = await open("structures/rope");
     await page.click('[aria-label="Record a film (WebM)"]');
     await frame(page, 24);
-    const path = await taken(page, "End the film and save it");
+    const path = await taken(page, "Stop the film and save it");
     assert.match(path, /rope\.webm$/);
     const film = readFileSync(path);
     assert.deepEqual([...film.subarray(0, 4)], [0x1a, 0x45, 0xdf, 0xa3]);
@@ -98,7 +98,7 @@ describe("downloads", () => {
     it(`are numbers, in the order and with the bits of Python's: ${id}`, { skip }, async () => {
       const { page, errors } = await open(id);
       await page.evaluate(() => (window as any).tumble.session.goto(2));
-      const path = await taken(page, "Download the kept frames (NPZ)");
+      const path = await taken(page, "Download the stored frames (NPZ)");
       const code = `
 import sys, numpy as np, tumble
 from tumble.cli import find

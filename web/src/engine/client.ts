@@ -16,7 +16,7 @@ export class EngineError extends Error {
 /** Milliseconds after which a worker that does not answer is taken for dead. */
 const PATIENCE = { load: 30_000, step: 60_000, cures: 60_000, other: 30_000 };
 
-const GONE: Failure = { kind: "scene", message: "this way is no longer kept", issues: [] };
+const GONE: Failure = { kind: "scene", message: "this branch is no longer stored", issues: [] };
 const CLOSED: Failure = { kind: "crash", message: "the engine was closed", issues: [] };
 
 interface Waiting {
@@ -232,7 +232,7 @@ export class Engine {
     if (!first) return;
     const { type } = first.question;
     const patience = type === "load" || type === "step" || type === "cures" ? PATIENCE[type] : PATIENCE.other;
-    this.watch = setTimeout(() => this.died(`the engine gave no answer for ${patience / 1000} s and was stopped`), patience);
+    this.watch = setTimeout(() => this.died(`the engine did not respond for ${patience / 1000} s and was stopped`), patience);
   }
 
   private failAll(failure: Failure): void {

@@ -116,7 +116,7 @@ function park(at: Running): Parked {
 async function take(request: Request & { type: "take" }): Promise<SceneInfo> {
   const at = running(request.world ?? 0);
   const parked = at.parked.get(request.from);
-  if (!parked) throw new Asked("this way is no longer kept");
+  if (!parked) throw new Asked("this branch is no longer stored");
   const world = await build(request.toml, request.overrides, request.files);
   try {
     world.restore(parked.end);
