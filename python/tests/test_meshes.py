@@ -114,7 +114,7 @@ def with_net(**words: Any) -> Tree:
 def test_an_unsound_net_is_told_by_check_and_run(scene_file: SceneFile, tumble: Command, tmp_path: Path) -> None:
     write(tmp_path, obj([*FACES[:5], FACES[0], [2, 6, 8, 4], [1, 1, 2]]) + "v 9 9 9\n")
     scene = scene_file(with_net())
-    told = 'net "n".mesh: 2 triangles are there already, 1 triangle has no area'
+    told = 'net "n".mesh: 2 triangles are duplicates, 1 triangle has no area'
     for verb in ("check", "run"):
         answer = tumble(verb, scene)
         assert answer.code == 0, answer.err
@@ -135,9 +135,9 @@ def test_vertices_that_rounding_moved_apart_are_sewn(
 ) -> None:
     file = write(tmp_path, quads(4, off))
     scene = scene_file(with_net())
-    assert 'net "n".mesh: 48 open edges lie on others' in tumble("check", scene).err
+    assert 'net "n".mesh: 48 open edges coincide with others' in tumble("check", scene).err
     answer = tumble("check", scene, "--repair")
-    assert answer.code == 0 and "39 vertices sewn to others" in answer.out and "lie on others" not in answer.err
+    assert answer.code == 0 and "39 vertices sewn to others" in answer.out and "coincide with others" not in answer.err
     vertices, triangles = load_mesh(file.with_name("cube.repaired.obj"))
     assert len(vertices) == 25 and len(triangles) == 32 and vertices.max() <= 1 + 2 * off
 

@@ -51,7 +51,7 @@ export class FamilySwitches {
     // Whatever comes of it, the switch shows it.
     this.drawn = "";
     const settings = on ? (this.had.get(`${o.path}.${family}`) ?? this.written(o, family)) : null;
-    await this.set(o.path, changed(o, family, settings), `${name}: ${family} links ${on ? "on" : "off"}`);
+    await this.set(o.path, changed(o, family, settings), `${name} ${on ? "with" : "without"} ${family} links`);
   }
 
   /** What the text of the scene says, for one that was off when it came; else what a sheet starts with. */

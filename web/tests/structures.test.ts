@@ -177,7 +177,7 @@ describe("scenes", () => {
     await flag.getByLabel("shear").focus();
     await page.keyboard.press("Space");
     await page.waitForFunction(() => (window as any).tumble.session.info.scene.sheet[0].links.shear.modulus === 0);
-    await page.locator(".panel .note", { hasText: "flag goes without its shear links: goes on from frame 5" }).waitFor();
+    await page.locator(".panel .note", { hasText: "flag without shear links: continues from frame 5" }).waitFor();
     assert.equal(await page.evaluate(() => document.activeElement?.closest("[data-family]")?.getAttribute("data-family")), "sheet.0.links.shear");
     // The others keep what they had, those that are written short, too.
     const links = () => page.evaluate(() => (window as any).tumble.session.info.scene.sheet[0].links);

@@ -147,7 +147,7 @@ impl<'a> Checker<'a> {
             let alone = |b: &Schema| b["properties"].as_object().is_some_and(|all| all.len() == 1);
             let given: Vec<&str> = entries.iter().map(|(key, _)| key.as_str()).filter(|key| keys.iter().any(|k| k == key)).collect();
             if given.len() > 1 && resolved.iter().all(|b| alone(b) || single(b).is_none()) {
-                return self.report(node, path, format!("{}: only one of them", given.join(" and ")));
+                return self.report(node, path, format!("{}: only one is allowed", given.join(" and ")));
             }
             let chosen = fitting.iter().find(|i| single(resolved[**i]).is_some_and(|k| entries.iter().any(|(key, _)| *key == k)));
             return match chosen {

@@ -173,9 +173,9 @@ impl fmt::Display for Breakdown {
             let place = place.map(short);
             write!(f, "system \"{system}\" at t = {} s: first bad {column} in \"{object}\", cell {cell:?} at {place:?} m", short(*time))?;
             if *stable_step > 0.0 && stable_step.is_finite() {
-                write!(f, ", with steps of {step:.3e} s by {integrator}, the largest stable of which is {stable_step:.3e} s")?;
+                write!(f, ", with steps of {step:.3e} s by {integrator}, whose largest stable step is {stable_step:.3e} s")?;
             }
-            return write!(f, ". Take smaller sub-steps, or look at sources and formulas there");
+            return write!(f, ". Use smaller sub-steps, or check sources and formulas there");
         }
         let step = if *step > 0.0 { format!(", step {step:.3e} s") } else { String::new() };
         write!(f, "system \"{system}\" ({integrator}{step}) at t = {} s: ", short(*time))?;
@@ -191,7 +191,7 @@ impl fmt::Display for Breakdown {
         } else if stable_step.is_finite() {
             write!(f, "Largest stable step by estimate: {stable_step:.3e} s")
         } else {
-            write!(f, "The linear estimate finds every step stable")
+            write!(f, "By the linear estimate every step is stable")
         }
     }
 }

@@ -62,11 +62,11 @@ impl Flaws {
 impl std::fmt::Display for Flaws {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         let kinds = [
-            (self.repeated, "triangle is there already", "triangles are there already"),
+            (self.repeated, "triangle is a duplicate", "triangles are duplicates"),
             (self.degenerate, "triangle has no area", "triangles have no area"),
             (self.turned, "edge is between triangles that face different ways", "edges are between triangles that face different ways"),
             (self.crowded, "edge has more than two triangles", "edges have more than two triangles"),
-            (self.unsewn, "open edge lies on another", "open edges lie on others"),
+            (self.unsewn, "open edge coincides with another", "open edges coincide with others"),
             (self.unused, "vertex belongs to no triangle", "vertices belong to no triangle"),
         ];
         let said = kinds.iter().filter(|(n, ..)| *n > 0);

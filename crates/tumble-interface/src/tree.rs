@@ -108,11 +108,10 @@ impl Node {
                     let i = i.or_else(|| key.parse().ok().filter(|i| *i < items.len()));
                     // An item without a name has the default one.
                     let i = i.or_else(|| items.iter().position(|n| key == "main" && n.entry("name").is_none()));
-                    let i =
-                        i.ok_or_else(|| error(format!("there is no \"{key}\"; there are {} items: {}", items.len(), names.join(", "))))?;
+                    let i = i.ok_or_else(|| error(format!("no \"{key}\" among {} items: {}", items.len(), names.join(", "))))?;
                     &mut items[i]
                 }
-                _ => return Err(error(format!("\"{key}\" stands below a value, not a table"))),
+                _ => return Err(error(format!("\"{key}\" is below a value, not a table"))),
             };
         }
         *node = value;

@@ -48,7 +48,7 @@ impl<'a> Reader<'a> {
             let rest = rest(node);
             let numbers = rest.translation.iter().chain(&rest.rotation).chain(&rest.scale);
             if numbers.into_iter().any(|x| !x.is_finite()) {
-                return Err(format!("node {n} has a place that is not finite; {DAMAGED}"));
+                return Err(format!("node {n} has a transform that is not finite; {DAMAGED}"));
             }
             self.joint_of[n] = Some(i as u32);
             self.character.joints.push(Joint { name: node.name.clone().unwrap_or_default(), parent: parent.map(|p| p as u32), rest });
@@ -89,7 +89,7 @@ impl<'a> Reader<'a> {
             }
         }
         if !skinned {
-            return Err("no mesh has a skin: nothing binds it to joints; export it with its armature, or use shape.mesh".to_owned());
+            return Err("no mesh has a skin: nothing is bound to joints; export it with its armature, or use shape.mesh".to_owned());
         }
         Ok(())
     }
@@ -228,7 +228,7 @@ impl<'a> Reader<'a> {
             return Err(format!("{} values for {} times, expected {needed}; {DAMAGED}", values.count, times.len()));
         }
         if times.iter().any(|t| !t.is_finite()) || times.windows(2).any(|t| t[1] <= t[0]) {
-            return Err("times that do not rise; export the animation again".to_owned());
+            return Err("times that do not increase; export the animation again".to_owned());
         }
         let value = |i: usize| std::array::from_fn(|k| if k < width { values.number(i, k) } else { 0.0 });
         let values: Vec<[f64; 4]> = (0..values.count).map(value).collect();

@@ -165,7 +165,7 @@ fn every_flaw_of_a_soft_surface_is_told() {
     net.unused = 2;
     let flaws = net.flaws();
     assert_eq!(flaws, Flaws { repeated: 1, degenerate: 1, turned: 3, crowded: 1, unsewn: 0, unused: 2 });
-    let told = "1 triangle is there already, 1 triangle has no area, 3 edges are between triangles that face different ways, \
+    let told = "1 triangle is a duplicate, 1 triangle has no area, 3 edges are between triangles that face different ways, \
                 1 edge has more than two triangles, 2 vertices belong to no triangle";
     assert_eq!(flaws.to_string(), told);
     // A triangle the other way round, too; and what the readers leave out.
