@@ -207,7 +207,7 @@ def test_what_a_trial_may_gain_and_lose() -> None:
 def test_advice_fits_the_scene(spring: Tree) -> None:
     from tumble import Scene
 
-    assert "springs far too stiff" in report._advice(Scene(spring).to_dict())
+    assert "springs that are much too stiff" in report._advice(Scene(spring).to_dict())
     assert "spring" not in report._advice(resolved())
     assert "softening" in report._advice(resolved(force=[{"kind": "gravitation"}]))
 

@@ -146,7 +146,7 @@ fn the_largest_step_is_the_predicted_one_in_one_two_and_three_dimensions() {
 
 #[test]
 fn where_some_air_rests_the_limit_is_that_of_rest() {
-    // What a flow damps allows longer steps, but only where it flows.
+    // Damping by a flow allows longer steps, but only where there is flow.
     let grid = Grid::new([16, 16, 1], 0.1, [0.0; 3]).unwrap();
     let rho = Field::of(grid, Place::Cell, "kg/m³", |_| 1.2).unwrap();
     let u = Vectors::of(grid, "m/s", |x| [x[1].sin(), 0.0, 0.0]).unwrap();

@@ -204,8 +204,8 @@ fn pairs_and_bounds_are_those_of_brute_force() {
     assert!(compare(&topology, &x, 0.15) > 1000);
 }
 
-/// What shares a vertex or a seam, is fixed on both sides, or belongs to an object that does not touch itself, does not meet; and
-/// nothing is thicker than it is at rest.
+/// Features that share a vertex or a seam, are both fixed, or belong to an object without self-contact form no pair; no thickness exceeds the rest
+/// distance.
 #[test]
 fn some_pairs_never_meet() {
     let two = |itself: bool| {

@@ -24,7 +24,7 @@ pub struct Mesh {
     pub unused: usize,
 }
 
-/// What a linter finds in a mesh.
+/// Findings of the mesh checker.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct Defects {
     /// Edges with one triangle only: the mesh is open there.
@@ -35,7 +35,7 @@ pub struct Defects {
     pub degenerate: usize,
 }
 
-/// What makes a mesh doubtful as a soft surface, where open edges are no fault: what mending it would change.
+/// Defects of a mesh as a soft surface, where open edges are allowed: the changes that a repair would make.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct Flaws {
     /// Triangles that are there already.

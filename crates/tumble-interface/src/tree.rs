@@ -31,7 +31,7 @@ pub enum Value {
     Table(Vec<(String, Node)>),
 }
 
-/// What is said of deeper ones.
+/// Message for deeper trees.
 pub(crate) const TOO_DEEP: &str = "nested too deeply to be a scene";
 
 /// Deepest nesting that is read; a scene needs about eight levels.

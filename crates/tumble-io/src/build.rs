@@ -1,4 +1,4 @@
-//! What all readers share: fans, welding and the last check.
+//! Shared by all readers: fans, welding and the final check.
 
 use std::collections::HashMap;
 use tumble_interface::Mesh;

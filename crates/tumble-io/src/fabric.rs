@@ -11,11 +11,11 @@ const SHIPPED: [(&str, &str); 3] = [
     ("tablecloth", include_str!("../../../python/tumble/fabrics/tablecloth.toml")),
 ];
 
-/// What the files of our own format may hold.
+/// Keys of our own file format.
 const KEYS: [&str; 6] = ["name", "composition", "source", "density", "stretching", "bending"];
-/// What each row of stretching is.
+/// Meaning of each row of stretching.
 const STRETCHED: [&str; 6] = ["small strain", "0°", "22.5°", "45°", "67.5°", "90°"];
-/// What each row of bending is.
+/// Meaning of each row of bending.
 const CREASED: [&str; 3] = ["0°", "45°", "90°"];
 
 /// The record of a shipped fabric.

@@ -143,7 +143,7 @@ impl<'a> Scene<'a> {
             return Err("a primitive without POSITION; export the mesh with its vertices".to_owned());
         };
         let positions = self.column(positions.value(), Type::Vec3, &[ComponentType::F32])?;
-        // What is wrong with texture coordinates only leaves them out.
+        // Invalid texture coordinates are ignored.
         let texture = primitive.attributes.get(&Checked::Valid(Semantic::TexCoords(0)));
         let texture = texture
             .and_then(|column| self.column(column.value(), Type::Vec2, &[ComponentType::F32, ComponentType::U8, ComponentType::U16]).ok());

@@ -185,7 +185,7 @@ impl<'a> Reader<'a> {
             let mut clip = Clip { name, tracks: Vec::new() };
             for (c, channel) in animation.channels.iter().enumerate() {
                 let wrong = |e: String| format!("animation {a}, channel {c}: {e}");
-                // What moves something that is not shown, or no joint, moves nothing here.
+                // Channels of hidden nodes or of nodes that are not joints have no effect.
                 let node = channel.target.node.value();
                 let part = match channel.target.path {
                     Checked::Valid(Property::Translation) => Part::Translation,
@@ -284,7 +284,7 @@ fn four(all: impl Iterator<Item = (usize, f64)>, first: u32, count: u32) -> Resu
     Ok(std::array::from_fn(|k| of(k).unwrap_or_default()))
 }
 
-/// Where a node is in its parent. A matrix is taken apart; shear, which glTF forbids, is lost.
+/// Transform of a node in its parent. A matrix is decomposed; shear, which glTF forbids, is lost.
 fn rest(node: &Node) -> Transform {
     if node.matrix.is_none() {
         let wide = |v: [f32; 3]| v.map(f64::from);

@@ -8,7 +8,7 @@
 
 use half::f16;
 
-/// What the numbers are, for programs that must know.
+/// Grid class, for programs that need it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Class {
     /// Nothing in particular.
@@ -43,7 +43,7 @@ pub struct Volume<'a> {
     pub name: &'a str,
     /// Unit of the values, kept as metadata.
     pub unit: &'a str,
-    /// What the numbers are.
+    /// Grid class.
     pub class: Class,
     /// The numbers, x fastest, those of a vector together.
     pub values: &'a [f32],
@@ -137,7 +137,7 @@ fn check(volume: &Volume<'_>) -> Result<(), String> {
 /// Active voxels of 8³.
 struct Leaf {
     mask: [u64; 8],
-    /// Where its values begin.
+    /// Offset of its values.
     start: usize,
     count: usize,
 }

@@ -1,4 +1,4 @@
-//! What each format gives, and what each fault says.
+//! Results of each format, and messages of each error.
 
 mod files;
 

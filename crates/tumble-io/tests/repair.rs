@@ -1,4 +1,4 @@
-//! What mending a mesh does, and leaves alone.
+//! Effects of a mesh repair, and what it does not change.
 
 mod files;
 
@@ -117,7 +117,7 @@ fn vertices_that_rounding_moved_apart_become_one() {
         // Each vertex is one of those that were there.
         assert!(found.vertices.iter().all(|x| broken.vertices.contains(x)));
     }
-    // What is farther apart is a slit: single precision would know.
+    // A larger gap is a slit: single precision could resolve it.
     let beside = |gap: f64| repair(&and(&sheet(2), &moved(&sheet(2), [2.0 + gap, 0.0, 0.0]))).1.welded;
     assert_eq!([0.0, 1e-9, 3e-6, 1e-5, 1e-3].map(beside), [3, 3, 3, 0, 0]);
     // A copy that rounding moved stands there already; two closed bodies that nearly touch stay two, where they are.

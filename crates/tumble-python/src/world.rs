@@ -24,7 +24,7 @@ pub struct World {
     scene: Py<Scene>,
     engine: Box<dyn Engine + Sync>,
     pool: Option<Arc<rayon::ThreadPool>>,
-    /// What users' functions have raised.
+    /// Exceptions of custom functions.
     raised: user::Raised,
 }
 

@@ -1,4 +1,4 @@
-//! What a run writes, from where it is seen, and what it must keep.
+//! Output, camera and expectations of a run.
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};

@@ -155,7 +155,7 @@ pub struct Elements<E, Y, const N: usize, const M: usize, const D: usize, const 
     incidence: Incidence,
     slots: Vec<Row>,
     energy_at_rest: f64,
-    /// What has broken: element, stiffness and damping that would mend it.
+    /// Broken elements: index, and the stiffness and damping that would restore it.
     broken: Vec<(u32, Real, Real)>,
 }
 

@@ -46,7 +46,7 @@ pub struct Projection<'a> {
     pub iterations: u32,
     /// Of plain elements, whatever their stiffness, the share of the error that a sweep takes back.
     pub plain: Option<Real>,
-    /// What liquids meet, at its end.
+    /// Walls for liquids, at the end of the sub-step.
     pub walls: Walls<'a>,
 }
 
@@ -275,7 +275,7 @@ impl<const N: usize, const D: usize, const P: usize> Columns<N, D, P> {
     }
 }
 
-/// What `Columns` keep as `runs`.
+/// The `runs` of `Columns`.
 fn runs<const N: usize>(nodes: &[Index; N]) -> Vec<u8> {
     let [first, second] = &nodes[..] else { return Vec::new() };
     let (first, second) = (first.get(), second.get());
@@ -407,7 +407,7 @@ fn ordered<W: Width, const RUN: bool>(w: W, v: W::L) -> W::L {
     if RUN { w.in_run(v) } else { v }
 }
 
-/// What is common to all elements of a sweep.
+/// Parameters common to all elements of a sweep.
 #[derive(Clone, Copy)]
 struct Sweep<'a> {
     h: Real,
@@ -472,7 +472,7 @@ impl<E: Element<N, M, D>, Y: Law<P>, const N: usize, const M: usize, const D: us
             before = Some(unsafe { columns.fetch::<W, RUN>(w, E::FRAMES, sweep.before.as_ptr(), e) });
         }
         if sweep.plain.is_some() {
-            // What has broken stays so.
+            // Broken elements stay broken.
             alpha = (soft - w.splat(0.5 * LIMP as Real)).positive(alpha, zero);
         }
         let lambda = if many && !sweep.first { ordered::<W, RUN>(w, w.load(&self.lambda[e - start..])) } else { zero };

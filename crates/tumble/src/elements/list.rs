@@ -37,7 +37,7 @@ pub struct List<E, Y, const N: usize, const M: usize, const D: usize, const P: u
     kind: PhantomData<(E, Y)>,
 }
 
-/// What one pack of elements loads.
+/// Load pattern of one pack of elements.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Pack<L, const D: usize, const P: usize> {
     pub rest: [L; D],

@@ -74,7 +74,7 @@ fn deformation<L: Lane>(rest: [L; 8], x: [[L; 4]; 3]) -> [Vec3<L>; 2] {
     [d1 * rest[0] + d2 * rest[2], d1 * rest[1] + d2 * rest[3]]
 }
 
-/// What belongs to the Green strain, L y.
+/// The stress conjugate to the Green strain, L y.
 #[inline(always)]
 fn stress<L: Lane>(rest: [L; 8], [y1, y2, y3]: [L; 3]) -> [L; 3] {
     [rest[4] * y1, rest[5] * y1 + rest[6] * y2, rest[7] * y3]

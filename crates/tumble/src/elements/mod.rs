@@ -67,7 +67,7 @@ pub trait Element<const N: usize, const M: usize, const D: usize>: Send + Sync +
     fn lengthening<L: Lane>(_rest: [L; D], _x: [[L; 4]; N]) -> Option<L> {
         None
     }
-    /// What tension adds to the product of the definite Hessian with u: the part of y d²r/dx² that is never negative. y is the stress.
+    /// Contribution of tension to the product of the definite Hessian with u: the positive semidefinite part of y d²r/dx². y is the stress.
     #[inline(always)]
     fn tension<L: Lane>(_rest: [L; D], _x: [[L; 4]; N], _y: [L; M], _u: [Vec3<L>; N]) -> Option<[Vec3<L>; N]> {
         None
@@ -235,7 +235,7 @@ pub fn tangents<E: Element<N, M, D>, Y: Law<P>, L: Lane, const N: usize, const M
     r
 }
 
-/// What the projection of an element knows beside its positions.
+/// Inputs of the projection of an element besides its positions.
 #[derive(Clone, Copy)]
 pub struct Compliance<L> {
     /// 1/((k + b/h) h²), 0 for a rigid element.

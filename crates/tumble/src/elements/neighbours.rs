@@ -24,7 +24,7 @@ const KINDS: usize = 64;
 /// Sixteen entries side by side.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Slot {
-    /// Where its run starts, counted from the first row.
+    /// Start of its run, counted from the first row.
     run: u32,
     /// Which of the kinds its sixteen springs are. They are then not read one by one: on a sheet three quarters of what a pass over the
     /// springs reads from memory.
@@ -37,7 +37,7 @@ pub struct Neighbours<const D: usize, const P: usize> {
     pub first: usize,
     /// Count of rows.
     pub rows: usize,
-    /// Where each slice starts, in entries; one more than there are slices.
+    /// Start of each slice, in entries; one more than there are slices.
     pub start: Vec<u32>,
     slots: Vec<Slot>,
     /// Whether any slot is a run.
@@ -182,7 +182,7 @@ impl<const D: usize, const P: usize> Neighbours<D, P> {
         entries.step_by(SLICE).zip(slots.iter().copied())
     }
 
-    /// What a pack of entries of a slot is made of.
+    /// Content of a pack of entries of a slot.
     #[inline(always)]
     pub fn pack<W: Width>(&self, w: W, slot: Slot, entry: usize) -> Pack<W::L, D, P> {
         let zero = w.splat(0.0);

@@ -153,7 +153,7 @@ impl Kernel for Pull<'_> {
                 let d = Vec3 { x: x - px, y: y - py, z: z - pz };
                 let (size, most) = (d.norm(), w.load(&length[self.start + i..]));
                 let back = (size - most).positive((size - most) / size, w.splat(0.0));
-                // What is held stays.
+                // Held points stay.
                 let back = q.positive(back, w.splat(0.0));
                 (x, y, z) = (x - d.x * back, y - d.y * back, z - d.z * back);
             }

@@ -93,7 +93,7 @@ fn strain<L: Lane>([f1, f2]: [Vec3<L>; 2]) -> [L; 3] {
     [(f1.norm_sq() - one) * half, (f2.norm_sq() - one) * half, f1.dot(f2)]
 }
 
-/// What of the strain the coefficients depend on: the weight m and the direction c, with their slopes.
+/// Arguments of the coefficients: the weight m and the direction c, with their derivatives.
 struct Place<L> {
     m: L,
     c: L,
@@ -109,7 +109,7 @@ fn place<L: Lane>([e1, e2, e3]: [L; 3]) -> Place<L> {
     let (d, sum) = (e1 - e2, e1 + e2);
     let q = (d * d + e3 * e3).sqrt();
     let (g1, g2) = ((sum + q) * half, (sum - q) * half);
-    // What is far below rounding counts as no strain: its inverse squared would be beyond single precision.
+    // Strains far below rounding count as zero: their inverse square would exceed single precision.
     let counts = |strain: L| strain - e1.like(NO_STRAIN);
     let (cos, sin) = (counts(q).positive(d / q, zero), counts(q).positive(e3 / q, zero));
     let dg1 = [(one + cos) * half, (one - cos) * half, sin * half];
@@ -162,7 +162,7 @@ fn root<L: Lane>(rest: &[L; 28], m: L, value: &[L; 4]) -> [L; 4] {
     [l11, l21, (c(2) - l21 * l21).above_zero().sqrt(), c(3).above_zero().sqrt()]
 }
 
-/// What belongs to the Green strain where y belongs to r.
+/// The vector conjugate to the Green strain, for y conjugate to r.
 #[inline(always)]
 fn stress<L: Lane>(rest: &[L; 28], f: [Vec3<L>; 2], [y1, y2, y3]: [L; 3]) -> [L; 3] {
     let e = strain(f);
@@ -170,7 +170,7 @@ fn stress<L: Lane>(rest: &[L; 28], f: [Vec3<L>; 2], [y1, y2, y3]: [L; 3]) -> [L;
     let (value, slope) = direction(rest, at.c);
     let [l11, l21, l22, l33] = root(rest, at.m, &value);
     let (zero, half) = (y1.zero(), y1.like(0.5));
-    // What y says about the entries of L, then of C.
+    // Derivatives by the entries of L, then of C, from y.
     let over = |a: L, l: L| l.positive(a * half / l, zero);
     let c22 = over(y2 * e[1], l22);
     let in21 = y1 * e[1] - c22 * l21 * y1.like(2.0);

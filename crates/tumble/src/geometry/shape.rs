@@ -57,7 +57,7 @@ pub enum Shape {
     },
 }
 
-/// What is near a point: signed distance [m], outward unit normal (zero where there is none), velocity of the surface [m/s].
+/// The surface near a point: signed distance [m], outward unit normal (zero if undefined), velocity of the surface [m/s].
 pub type Near = (f64, Vector, Vector);
 
 /// Corrections of Newton's method on the way to a contact; each at least halves what is left.

@@ -28,7 +28,7 @@ pub struct Shape {
     rest: Vec<Vector>,
     /// kappa [1/s²]; infinite if rigid.
     kappa: f64,
-    /// What each has been moved by in this sub-step [m]; empty for one sweep.
+    /// Displacement of each in this sub-step [m]; empty for one sweep.
     moved: Vec<Vector>,
 }
 

@@ -58,7 +58,7 @@ struct Group {
     damped: bool,
     /// 3 (2 n + 1) a strand; empty for one sweep.
     lambda: Vec<Real>,
-    /// What is taken out of `stretch` and `bend` where a segment broke.
+    /// Values removed from `stretch` and `bend` where a segment broke.
     whole: Option<Box<([Vec<Real>; 5], [Vec<Real>; 9])>>,
 }
 
@@ -104,7 +104,7 @@ impl Strands {
         for chain in &mut chains {
             chain.bends = vec![None; chain.segments.len() + 1];
         }
-        // Where a bend belongs: between neighbours, or between an end and a frame that is held.
+        // Position of a bend: between neighbours, or between an end and a held frame.
         let mut taken = vec![false; bends.len()];
         for (e, m) in bends.iter().enumerate() {
             let [a, b] = m.nodes;
@@ -191,7 +191,7 @@ impl Group {
             }));
         }
         group.inertia = frames.iter().map(|f| weight(*f)).collect();
-        // What is held, or stands for nothing, does not move.
+        // Held nodes and padding do not move.
         group.inertia[..count].fill(0.0);
         group.inertia[(n + 1) * count..].fill(0.0);
         (group.points, group.frames) = (Index::new(points, rows)?, Index::new(frames, rows)?);
@@ -365,7 +365,7 @@ impl<L: Lane> Factor<L> {
     }
 }
 
-/// What both elements are at a place of a pack of strands.
+/// Both elements at a position of a pack of strands.
 #[derive(Clone, Copy)]
 struct Bent<L> {
     r: [L; 3],
@@ -621,8 +621,7 @@ impl Solve<'_> {
             let (own, next) = factor.split_at_mut(k + 3);
             own[k + 2].back([&next[0], &next[1]]);
         }
-        // What moves and turns by how much, kept in place of the factor.
-        // SAFETY: as above.
+        // Moves and rotations, stored in place of the factor. SAFETY: as above.
         let (mut q, mut p) = unsafe { (group.frame(w, x, 1, s), group.point(w, x, 0, s)) };
         // SAFETY: as above.
         let held = unsafe { group.frame(w, x, 0, s) };

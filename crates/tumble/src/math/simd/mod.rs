@@ -222,7 +222,7 @@ pub fn ask_behind(rows: &[Row], at: usize, count: usize) {
 
 /// A kernel, generic over the register width.
 pub trait Kernel {
-    /// What it returns.
+    /// Its result.
     type Output;
     /// Does the work.
     fn run<W: Width>(self, w: W) -> Self::Output;
@@ -339,7 +339,7 @@ type Mask<S> = <S as Simd>::m32s;
 #[cfg(feature = "double")]
 type Mask<S> = <S as Simd>::m64s;
 
-/// What the registers of an instruction set can do beyond pulp.
+/// Operations of an instruction set's registers beyond pulp.
 pub trait Registers: Simd {
     /// Whether any lane of a mask is set.
     fn any(self, mask: Mask<Self>) -> bool;

@@ -35,7 +35,7 @@ pub struct Body {
     pub inverse_mass: f64,
     /// The normal of a solid of its own system that it rests on: along it, the ball is held.
     rests: Option<Vector>,
-    /// What the fluid has given it in this interval [N s].
+    /// Impulse from the fluid in this interval [N s].
     pub impulse: Vector,
     /// Of each axis, the numbers of faces' cells and their closed shares.
     pub(super) faces: [Vec<(u32, Real)>; 3],
