@@ -33,7 +33,7 @@ SYSTEMS: dict[str, Tree] = {
 """Emitters with adaptive steps, cloth on positions and on forces, a gas, and systems side by side."""
 
 HANGING = "particles.p.spring.0.rest_length=0.5"
-"""What the engine would else derive from where the masses start."""
+"""Settings that the engine would otherwise derive from the initial positions."""
 
 
 @pytest.mark.parametrize("frame", [0, 1, 13, 20, 24])
@@ -86,7 +86,7 @@ def test_a_branch_is_the_changed_world_in_the_old_state(reference: Run, spring: 
     assert (difference.frame, difference.seen) == (13, 14)
     assert difference.columns[0].column == "elastic"
     assert found.ledger["elastic"][13] == pytest.approx(reference.ledger["elastic"][13] / 2, rel=1e-6)
-    # What it took to come there was the parent's.
+    # The cost up to there belongs to the parent.
     np.testing.assert_array_equal(found.ledger["steps"][:14], reference.ledger["steps"][:14])
 
 

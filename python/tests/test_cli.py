@@ -108,7 +108,7 @@ def test_a_cure_also_works_where_the_scene_lists_no_system(
     )
     assert answer.code == 1
     cure = copied(answer.err, "run")
-    # What it changes is not said twice.
+    # Its changes are not repeated.
     assert sum("integrator" in word for word in cure) == 1
     assert tumble(*cure).code == 0
     (system,) = Run("out/scene").scene["system"]

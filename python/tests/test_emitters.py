@@ -59,7 +59,7 @@ def test_what_breaks_is_named_by_its_id() -> None:
     assert report["index"] < 7
 
 
-# What is told before a run
+# Messages before a run
 
 
 def emitting(*emitters: dict[str, Any], frames: int = 48, **more: Any) -> dict[str, Any]:

@@ -124,7 +124,7 @@ def test_an_unsound_net_is_told_by_check_and_run(scene_file: SceneFile, tumble: 
         assert answer.err.count('net "n".mesh') == 1
     answer = tumble("check", scene, "--repair")
     assert answer.code == 0 and "warning" not in answer.err and "1 vertex of no triangle dropped" in answer.out, answer
-    # What the command at its end runs has nothing to be told of.
+    # The command at its end runs without warnings.
     write(tmp_path, obj(FACES))
     assert 'net "n"' not in tumble("check", scene).err
 

@@ -195,7 +195,7 @@ def _scene(parent: Run, changes: Sequence[str], frame: int, frames: int | None) 
 
 
 def _instead_of_links(own: Scene, scene: Scene) -> Scene:
-    """What a surface resists stretch with comes instead of links that nobody gave, as it does in a scene's file; the resolved
+    """The stretch model of a surface replaces links that were not given, as it does in a scene's file; the resolved
     scene of a run has those written out."""
     before, after = own.to_dict(), scene.to_dict()
     changed = False

@@ -1,4 +1,4 @@
-"""What the books of a run are doubtful about; docs/warnings.md lists the codes."""
+"""Warnings about the ledger of a run; docs/warnings.md lists the codes."""
 
 import math
 from collections.abc import Iterator, Mapping
@@ -25,7 +25,7 @@ def of_books(run: "Run") -> list[dict[str, str]]:
 
 @dataclass(frozen=True)
 class Remedy:
-    """What keeps energy from growing out of nowhere: what was seen and its likely cause, and what to change."""
+    """Advice against energy growth without a source: the observation, its likely cause, and the change."""
 
     text: str
     changes: list[str]

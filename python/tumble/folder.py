@@ -54,7 +54,7 @@ COUNTS = {
 """Columns of tables that hold whole numbers; those of `frame` in the ledger count its rows."""
 
 STATIC = "static"
-"""What the archive of what does not change says of itself."""
+"""Header of the archive of constant columns."""
 
 LOCK = ".lock"
 """Says who writes here, while somebody does."""
@@ -67,11 +67,11 @@ volumes/*.vdb slices/*.png
 minimal.toml
 run.json
 """
-"""What a run writes and --force deletes, in this order: a stop on the way leaves frames that can be read, and the manifest goes
-last, because a folder without it is not taken for a run."""
+"""Files that a run writes and --force deletes, in this order: a stop on the way leaves frames that can be read, and
+the manifest goes last, because a folder without it is not taken for a run."""
 
 _FOLDERS = ("frames", "checkpoints", "stills", "usd", "ply", "volumes", "slices")
-"""Where it writes them."""
+"""Folder of the output."""
 
 
 class DamageError(ExportError):
@@ -79,7 +79,7 @@ class DamageError(ExportError):
 
 
 class RunFolder:
-    """Where everything is."""
+    """Paths of all files."""
 
     def __init__(self, path: str | os.PathLike[str]) -> None:
         self.path = Path(path)
@@ -240,7 +240,7 @@ def share(source: Path, path: Path) -> None:
 
 
 def marked(frame: int, state: str) -> str:
-    """What the archive of a frame says of itself."""
+    """Header of the archive of a frame."""
     return f"frame {frame}, state {state}"
 
 
@@ -309,7 +309,7 @@ def _opened(path: Path, mark: str, whole: bool = False) -> Iterator[zipfile.ZipF
 
 
 _OF_DAMAGE = (None, errno.EINVAL, errno.EISDIR, errno.ENOTDIR)
-"""What the system says where an archive leads to places that are not there, or where there is something else."""
+"""Errors of the system for archives that point to missing or wrong positions."""
 
 
 def _sum(file: IO[bytes], size: int) -> int:
@@ -333,7 +333,7 @@ def _array(archive: zipfile.ZipFile, key: str) -> npt.NDArray[Any]:
             or dtype.itemsize * math.prod(shape) != archive.getinfo(key).file_size - file.tell()
         ):
             raise ValueError(f"{key!r} is no array of {shape} numbers")
-    with archive.open(key) as file:  # Where one goes back in a member, newer Pythons no longer check its sum.
+    with archive.open(key) as file:  # After seeking back in a member, newer Pythons no longer check its sum.
         return np.asarray(np.lib.format.read_array(file))
 
 

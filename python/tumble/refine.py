@@ -78,7 +78,7 @@ class Measure:
     order: float = math.nan
     """With the three finest."""
     limit: float = math.nan
-    """Where it tends to: the finest value, less its estimated error."""
+    """Its limit: the finest value less its estimated error."""
     error: float = math.nan
     """Estimated error of the finest value, positive."""
     verdict: str = ""
@@ -115,7 +115,7 @@ class Measure:
 
 @dataclass
 class Study:
-    """What refining a scene showed."""
+    """Result of refining a scene."""
 
     scene: Scene
     folder: Path
@@ -235,7 +235,7 @@ def _too_long(world: World) -> list[str]:
     return found
 
 
-# What is refined
+# Refined keys
 
 
 def plan(scene: Scene, levels: int, what: Sequence[str] = ()) -> tuple[list[Refined], list[dict[str, str]]]:
@@ -388,7 +388,7 @@ def _wrong(path: str, text: str) -> SceneError:
     return error
 
 
-# What is measured
+# Measures
 
 
 _OVER_TIME: dict[str, Callable[["npt.NDArray[np.float64]"], Any]] = {
@@ -463,7 +463,7 @@ def _order(before: float, after: float, factor: float) -> float:
     return math.log(ratio) / math.log(factor)
 
 
-# What is written
+# Output
 
 
 def write(found: Study) -> list[Path]:

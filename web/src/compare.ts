@@ -20,7 +20,7 @@ const told = ({ path, from, to, frame }: Change): string => `${path ? `${path}: 
 const names = (objects: SceneInfo["objects"]): string[] => objects.map((o) => o.name);
 
 export class Comparison {
-  /** What was changed, and what can be done with the old way. */
+  /** The changes, and the actions on the previous branch. */
   readonly bar = h("section", { class: "before", "aria-label": "Previous and current branch", hidden: true });
   /** How far apart, against time. */
   readonly chart: HTMLElement;

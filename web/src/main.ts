@@ -24,7 +24,7 @@ function theme(wish: string | null): void {
   document.documentElement.dataset.theme = wish ?? (system.matches ? "dark" : "light");
   dispatchEvent(new Event("themechange"));
 }
-/** What a person said; nothing where the browser keeps nothing. */
+/** The user's choice; nothing if the browser stores nothing. */
 function wished(): string | null {
   try {
     return localStorage.getItem("theme");

@@ -1,4 +1,4 @@
-/** What a person takes away: pictures, films, numbers, surfaces. */
+/** Downloads: pictures, films, numbers, surfaces. */
 import { iconButton, saveAs, say, setIcon } from "./dom";
 import { npz } from "./npz";
 import type { Session } from "./session";

@@ -1,4 +1,4 @@
-/** What is shared: a scene with all of its values, what was changed while it ran, and the bits that came of it; as a link or as a file. */
+/** Sharing: a scene with all of its values, what was changed while it ran, and the bits that came of it; as a link or as a file. */
 import type { Files, Value } from "./engine/protocol";
 
 export interface Shared {
@@ -19,14 +19,14 @@ export interface Shared {
 
 /** Longer links are cut by some programs that pass them on. */
 export const LONGEST = 30_000;
-/** What a link or a file may unpack to [bytes]; python/tumble/cli/view.py has the first one, too. */
+/** Limits of the unpacked size of a link or a file [bytes]; python/tumble/cli/view.py has the first one, too. */
 const LARGEST = { link: 2_000_000, file: 96 * 2 ** 20 };
 /** Meshes of a file [bytes]; the engine takes no more. */
 const MESHES = 64 * 2 ** 20;
 const CHANGES = 10_000;
 const FRAMES = 1_000_000;
 
-/** Where all versions of the laboratory lie on this host. */
+/** Folder of all versions of the laboratory on this host. */
 export const root = (): string => location.origin + location.pathname.replace(/[^/]*$/, "").replace(/v\/[^/]+\/$/, "");
 
 /** The address that opens a packed scene with the version that made it. */
@@ -73,7 +73,7 @@ function checked(found: unknown): Shared {
   return { version, text, overrides, scene, changes, frame: last, hash } as Shared;
 }
 
-/** What stands behind "#/s/". */
+/** The address after "#/s/". */
 export async function pack(shared: Shared): Promise<string> {
   const bytes = await through(new TextEncoder().encode(JSON.stringify(tree(shared))), new CompressionStream("deflate-raw"));
   return base64(bytes).replace(/\+/g, "-").replace(/\//g, "_").replace(/=+$/, "");

@@ -1,4 +1,4 @@
-/** What a page of a scene starts from: a scene that ships, a file, a link; and how it is opened. */
+/** Start of a scene page: a bundled scene, a file, a link; and how it is opened. */
 import { opened } from "./drop";
 import { EngineError } from "./engine/client";
 import type { Files, Value } from "./engine/protocol";

@@ -34,7 +34,7 @@ const FORCES: Record<string, Topic> = {
   viscosity: { page: "neighbours", tags: ["neighbours.9"] },
 };
 
-/** What a scene is about, the most special first. */
+/** Topics of a scene, the most specific first. */
 export function topics(info: SceneInfo): Topic[] {
   const found: Topic[] = [];
   const scene = info.scene as Record<string, any>;

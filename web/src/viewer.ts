@@ -1,4 +1,4 @@
-/** What all pages of one world share: its picture, what went wrong with it, and what ends with the page. */
+/** Shared by all pages of one world: its picture, failures, and cleanup. */
 import { h } from "./dom";
 import { EngineError } from "./engine/client";
 import type { Failure, FailureKind } from "./engine/protocol";
@@ -35,7 +35,7 @@ export class Viewer {
     label: string,
     /** Whether pointers and keys turn the camera. */
     turns = true,
-    /** What can be done about a failure. */
+    /** Actions for a failure. */
     private readonly remedy: (failure: Failure) => Node | null = () => null,
   ) {
     main.className = "lab-page";

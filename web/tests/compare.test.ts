@@ -137,7 +137,7 @@ describe("branches", () => {
     await branch(page, "gas.0.viscosity", 5);
     const values = (await apart(page, 10)) as number[];
     assert.deepEqual(values.slice(0, 5), Array(5).fill(0));
-    // What viscosity does to the velocity, the density feels a step later.
+    // Viscosity acts on the velocity now, on the density a step later.
     assert.ok(values.slice(6).every((v, i) => v > values[5 + i]), `${values}`);
     assert.match((await page.textContent(".apart"))!, /kg\/m³.*density/);
     const hash = await page.evaluate(() => (window as any).tumble.session.hash());

@@ -300,7 +300,7 @@ describe("text and values", () => {
     await field.locator("input[type=number]").fill("0.4");
     await field.locator("input[type=number]").press("Enter");
     await page.waitForFunction(() => (window as any).tumble.session.info.scene.rope[0].density === 0.4);
-    // What the schema refuses leaves the value as it was, with the reason.
+    // A value refused by the schema is left unchanged, with the reason.
     await page.locator('[data-path="rope.0.density"] input[type=number]').fill("-1");
     await page.locator('[data-path="rope.0.density"] input[type=number]').press("Enter");
     await page.waitForSelector(".note.bad");

@@ -1,4 +1,4 @@
-/** What a person takes away, read by other programs. Numbers and surfaces need the native engine: make setup. */
+/** Downloads, read by other programs. Numbers and surfaces need the native engine: make setup. */
 import assert from "node:assert/strict";
 import { execFileSync } from "node:child_process";
 import { existsSync, mkdtempSync, readFileSync } from "node:fs";
@@ -33,7 +33,7 @@ async function taken(page: Page, label: string): Promise<string> {
   return path;
 }
 
-/** What Python says of files. */
+/** Python's description of files. */
 const python = (code: string, ...words: string[]) => execFileSync(PYTHON, ["-c", code, ...words], { encoding: "utf8", cwd: join(ROOT, "python"), stdio: ["ignore", "pipe", "inherit"] }).trim();
 
 describe("downloads", () => {
@@ -79,7 +79,7 @@ describe("downloads", () => {
       video.currentTime = 1e6;
       await new Promise((done) => (video.onseeked = done));
       const seconds = video.currentTime;
-      // Where it lets something through, that is seen.
+      // Through its gaps the background is visible.
       const image = await createImageBitmap(video);
       const context = new OffscreenCanvas(image.width, image.height).getContext("2d")!;
       context.fillStyle = "#f0f";

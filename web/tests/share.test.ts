@@ -126,7 +126,7 @@ describe("links", () => {
     await ready(other.page);
     await other.page.waitForFunction((h) => document.querySelector(".hash-line .hash")!.textContent === `${h} as in the link`, made.hash);
     assert.equal(await other.page.textContent(".scene-id"), `from a link of tumble 0.0.1; opened with ${VERSION}: bits may differ; defaults have changed since, so all keys are written out`);
-    // Where the bits do differ, it is said.
+    // A difference in bits is reported.
     const wrong = await own.open(`s/${await pack({ ...shared, hash: "0123456789abcdef" })}`, STILL);
     await ready(wrong.page);
     await wrong.page.waitForFunction((h) => document.querySelector(".hash-line .hash")!.textContent === `${h} the link says 0123456789abcdef`, made.hash);
@@ -178,7 +178,7 @@ describe("links", () => {
       await page.waitForSelector("text=The scene cannot be opened").catch(() => assert.fail(`${what}: it was opened`));
       assert.match((await page.textContent("#main"))!, /The link is damaged: it|The link is damaged: .+\./, what);
     }
-    // What the engine refuses: its message, and nothing executed.
+    // Refused by the engine: its message, and nothing executed.
     const markup = "<img src=x onerror=window.hit=1>";
     const hostile = [
       { text: `version = 1\ntitle = "${markup}"\n`, overrides: ["__proto__.polluted=1", `${markup}=1`] },
@@ -203,7 +203,7 @@ describe("links", () => {
 });
 
 describe("files", () => {
-  /** What the page saves instead of a link. */
+  /** File saved instead of a link. */
   const saved = async (page: Page) => {
     const [download] = await Promise.all([page.waitForEvent("download"), page.click("text=Copy link")]);
     return { name: download.suggestedFilename(), data: readFileSync(await download.path()) };
@@ -253,7 +253,7 @@ describe("files", () => {
     const { data } = await saved(page);
     await told(page, /contain custom meshes/);
     const inside = JSON.parse(gunzipSync(data).toString());
-    // What ships with tumble is not in it.
+    // Bundled meshes are not in it.
     assert.deepEqual(Object.keys(inside.meshes), ["tent.obj"]);
     const second = await dropped("camp.tumble", data);
     await ready(second.page);

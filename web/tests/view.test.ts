@@ -36,7 +36,7 @@ test("a scene with a mesh of its own opens", { skip: skip || (!CHROMIUM && "no C
     await page.goto(address);
     await frame(page, 0);
     assert.match(await page.title(), /A tent/);
-    // What the command line resolved is what the page does.
+    // The page uses the scene resolved by the command line.
     const version = /\/v\/([^/]+)\/\?view#\/s\//.exec(address)![1];
     await page.waitForFunction((v) => document.querySelector(".scene-id")!.textContent === `from a link of tumble ${v}`, version);
     // A mesh of one's own goes into a file.

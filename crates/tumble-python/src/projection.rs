@@ -111,7 +111,7 @@ impl Projection {
         PyTuple::new(py, all)
     }
 
-    /// Whose gradient was taken: the step times the pressure over the density [m²/s].
+    /// The potential of the removed gradient: the step times the pressure over the density [m²/s].
     #[getter]
     fn potential(&self) -> Field {
         Field { field: self.potential.clone() }

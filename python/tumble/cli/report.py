@@ -94,7 +94,7 @@ def failure(
         lines.append("Likely causes, most likely first:")
         lines += [f"  {i}. {text}" for i, text in enumerate(likely, 1)]
     if cures:
-        # What is tried begins at the start of the scene, not where a branch does.
+        # Trials begin at the start of the scene, not at that of a branch.
         lines.append("Trials, from the start of the changed scene:" if verb == "branch" else "Trials:")
     for cure in sorted(cures, key=lambda cure: cure is not best):
         change = " ".join(settings(cure["set"].split()))
@@ -213,7 +213,7 @@ def _ranked(cures: Sequence[Mapping[str, Any]]) -> list[Mapping[str, Any]]:
         if not cure["survived"]:
             return math.inf
         if ".softening=" in cure["set"] and not abs(growth) > _MOST:
-            return -1.0  # What was wrong with the scene, where other changes only take the steps that happen to last.
+            return -1.0  # The fault of the scene; other changes only find steps that happen to survive.
         return max(growth, _NO_GAIN) if math.isfinite(growth) else sys.float_info.max
 
     return sorted(cures, key=rank)

@@ -5,7 +5,7 @@ import type {
   Answer, Cure, Failure, Files, Frame, Notice, Question, SceneInfo, Stability, Value, Vector,
 } from "./protocol";
 
-/** What a question was answered with when it could not be done. */
+/** Answer to a failed request. */
 export class EngineError extends Error {
   constructor(readonly failure: Failure) {
     super(failure.message);
@@ -25,7 +25,7 @@ interface Waiting {
   fail: (error: EngineError) => void;
 }
 
-/** What a world was made from, to make it again. */
+/** Source of a world, to rebuild it. */
 interface Made {
   toml: string;
   overrides: string[];
@@ -50,7 +50,7 @@ export class Engine {
   private next = 1;
   private readonly waiting = new Map<number, Waiting>();
   private readonly made = new Map<number, Made>();
-  /** What ways that are parked were made from. */
+  /** Sources of parked branches. */
   private readonly parked = new Map<number, Made & { world: number }>();
   private watch: ReturnType<typeof setTimeout> | undefined;
   private reviving: Promise<void> | undefined;

@@ -22,7 +22,7 @@ interface System {
   /** Axes of the path or phase: position and velocity of the last mass. */
   phase(x: ArrayLike<number>, v: ArrayLike<number> | undefined): [number, number];
   axes: [string, string];
-  /** Where the last mass is, exactly. */
+  /** Exact position of the last mass. */
   exact?(t: number): [number, number, number];
   /** Added to the energy, so that it starts above zero [J]. */
   zero: number;
@@ -429,7 +429,7 @@ export const page: Page = async (main) => {
     return [context, w, hgt];
   };
 
-  /** What the masses do, small. */
+  /** Small picture of the masses. */
   const sketch = (run: Run, color: string) => {
     const s = SYSTEMS[system];
     const x = run.frame?.columns[s.object]?.position?.data;

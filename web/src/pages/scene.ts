@@ -125,7 +125,7 @@ export const page: Page = async (main, rest) => {
 
   // The picture follows the world.
   let hashWait = 0;
-  /** What a shared scene is, as long as nobody has changed it. */
+  /** A shared scene, until it is changed. */
   let recipe = "";
   const origin = rest.startsWith("s/") ? "link" : "file";
   const tellHash = () => {
@@ -321,7 +321,7 @@ export const page: Page = async (main, rest) => {
     }
   };
 
-  // What is shown.
+  // Display options.
   const drawLook = (info: SceneInfo) => {
     const look = stage.look;
     const grids = gridsOf(info);
@@ -397,7 +397,7 @@ export const page: Page = async (main, rest) => {
 
   const offPointers = pointers(canvas, stage, session);
 
-  // What leaves the page.
+  // Sharing and saving.
   const share = async () => {
     const { version } = engine();
     const made = await toShare(session, version).catch((error) => ({ failed: String(error.message ?? error) }));
@@ -436,7 +436,7 @@ export const page: Page = async (main, rest) => {
         const here = engine().version;
         sceneId.textContent = [`from a ${origin} of tumble ${version}`, version === here ? "" : `opened with ${here}: bits may differ`, told].filter(Boolean).join("; ");
       }
-      // Where somebody shared a moment, one stands at it, with its hash.
+      // A shared moment opens at its frame, with its hash.
       if (start.shared?.hash) tellHash();
       else if (!reducedMotion()) session.play();
     })

@@ -46,7 +46,7 @@ const THICK = 0.3;
 const ROUND = 0.22;
 const RAD = Math.PI / 180;
 const PUSH = 0.55;
-/** What is thin bends at a touch: the springs are softer by this. */
+/** Thin structures bend easily: softening factor of the springs. */
 export const SOFT = 30;
 const SHEAR = 28 * RAD;
 
@@ -77,7 +77,7 @@ export const start = (kind: Kind): Choices => {
 type Point = [number, number, number];
 
 interface Plan {
-  /** Where its masses start, x fastest, as the recipes of the engine order them. */
+  /** Initial positions of its masses, x fastest, as the recipes of the engine order them. */
   points: Point[];
   /** Two rows of masses at either end: one would be a hinge. */
   pinned: number[];
@@ -122,7 +122,7 @@ function tube(n: number): Plan {
   return { points, triangles, resolution: [n, rings], pinned: all.filter((i) => i < 2 * n), held: all.filter((i) => i >= (rings - 2) * n) };
 }
 
-/** Where a point of the end goes. */
+/** Target of a point of the end. */
 function moved([x, y, z]: Point, deed: Deed, { bend, twist }: Build): Point {
   const half = 0.5 * LENGTH;
   if (deed === "stretch") return [x + 0.3 * LENGTH, y, z];
@@ -201,7 +201,7 @@ ${shape}
 links = ${literal(links(c))}
 pin = [${pins}]
 
-# Where the hand takes the masses that it holds: ${b.deeds.map((d) => `${held.length} to ${d}`).join(", ")}.
+# Targets of the masses held by the hand: ${b.deeds.map((d) => `${held.length} to ${d}`).join(", ")}.
 [[particles]]
 name = "places"
 position = [
