@@ -71,7 +71,7 @@ run.json
 the manifest goes last, because a folder without it is not taken for a run."""
 
 _FOLDERS = ("frames", "checkpoints", "stills", "usd", "ply", "volumes", "slices")
-"""Folder of the output."""
+"""Subfolders of a run."""
 
 
 class DamageError(ExportError):
