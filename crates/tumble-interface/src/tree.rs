@@ -284,7 +284,7 @@ mod tests {
         let json = node.to_json().unwrap();
         assert_eq!(json["sheet"][1]["size"][1], 4);
         assert_eq!(json["sheet"][0]["name"], "c");
-        assert!(node.set_text("sheet.z.size=1").unwrap_err().to_string().contains("there is no \"z\""));
+        assert!(node.set_text("sheet.z.size=1").unwrap_err().to_string().contains("no \"z\" among"));
         assert!(node.set_text("time.fps.x=1").is_err());
         assert!(node.set_text("nothing").is_err());
         let mut node = Node::from_toml("version = 1").unwrap();
