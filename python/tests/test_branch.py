@@ -292,7 +292,7 @@ def test_a_state_that_cannot_be_made_again_is_refused(reference: Run, tmp_path: 
     ledger.write_text(ledger.read_text().replace(reference.hashes[13], "0" * 16))
     run = Run(reference.folder)
     assert world_at(run, 12).hash() == reference.hashes[12]
-    with pytest.raises(SceneError, match=r"frame 13 cannot be made again to the same bits.*with a checkpoint: 20, 25"):
+    with pytest.raises(SceneError, match=r"frame 13 cannot be recomputed to the same bits.*with a checkpoint: 20, 25"):
         branch(run, 13, tmp_path / "b", [SOFTER])
 
 
@@ -307,7 +307,7 @@ def test_a_branch_of_a_branch_needs_the_first_run_only_before_it(reference: Run,
     for frame in (4, 13, 17):
         assert world_at(child, frame).hash() == child.hashes[frame]
     shutil.rmtree(reference.folder)
-    with pytest.raises(SceneError, match="frame 17 has to be made from the run that this is a branch of"):
+    with pytest.raises(SceneError, match="frame 17 must be recomputed from the parent run"):
         world_at(child, 17)
 
 

@@ -67,7 +67,7 @@ def _too_long(world: World, scene: Mapping[str, Any], report: Mapping[str, Any])
         return
     step, stable = float(report["step"]), float(report["stable_step"])
     if stable == 0.0 < step:
-        yield f"{report['integrator']} has no stable step for this system: it gains energy at any"
+        yield f"{report['integrator']} gains energy on this system at any step"
     elif step > stable:
         text = f"steps of {_seconds(step)} are {step / stable:.3g} times the largest stable one, {_seconds(stable)}"
         about = next((s for s in world.stability() if s["system"] == report["system"]), None)

@@ -156,7 +156,7 @@ def _alike(a: "Run", b: "Run") -> list[str]:
     """Columns stored by only one of them, as text. Refuses runs of different objects."""
     if a.fps != b.fps:
         raise refuse(
-            b.folder, f"has {b.fps:g} frames a second, {a.folder} has {a.fps:g}: no two frames are of one time"
+            b.folder, f"has {b.fps:g} frames per second, {a.folder} has {a.fps:g}: their frames are at different times"
         )
     mine, theirs = a.columns, b.columns
     for here, there, run, other in ((mine, theirs, a, b), (theirs, mine, b, a)):
@@ -170,14 +170,12 @@ def _alike(a: "Run", b: "Run") -> list[str]:
         for column in dict.fromkeys([*table, *theirs[name]]):
             if column not in table or column not in theirs[name]:
                 where = a.folder if column in table else b.folder
-                unlike.append(f'{column} of "{name}" is kept in {where} alone')
+                unlike.append(f'{column} of "{name}" is stored only in {where}')
                 continue
             one, other = table[column]["shape"], theirs[name][column]["shape"]
             if one != other:
                 text = f'{column} of "{name}" is {_shape(other)}, in {a.folder} {_shape(one)}'
-                raise refuse(
-                    b.folder, f"{text}: the runs differ in resolution, element by element there is nothing to compare"
-                )
+                raise refuse(b.folder, f"{text}: the runs differ in resolution and cannot be compared by element")
     return unlike
 
 

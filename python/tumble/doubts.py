@@ -56,7 +56,7 @@ def remedy(run: "Run") -> Remedy | None:
         shorter = f"step={step / 4.0:.2g}" if plan.get("step") else f"substeps={n}"
         cause, changes = f"steps of {step:.2e} s are too long", [f"system.{k}.{shorter}"]
     text = (
-        f"the energy grew by {grown.times:.3g} times its scale, from frame {grown.frame} on, and nothing in the scene gives "
+        f"the energy grew by {grown.times:.3g} times its scale, from frame {grown.frame} on, and nothing in the scene adds "
         f"any: {cause}. Try {' '.join(changes)}"
     )
     return Remedy(text, changes)

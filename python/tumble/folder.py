@@ -195,11 +195,11 @@ def reason(error: OSError) -> str:
     kept = "; what was finished before is readable"
     match error.errno:
         case errno.ENOSPC | errno.EDQUOT:
-            text = f"no space left on the disk{kept}: free some, then go on with --resume"
+            text = f"no space left on the disk{kept}: free some, then continue with --resume"
         case errno.EACCES | errno.EPERM | errno.EROFS:
             text = f"this place cannot be written ({error.strerror}); choose another one with --out"
         case errno.ENAMETOOLONG | errno.ELOOP | errno.EINVAL:
-            text = f"this is no place for a folder ({error.strerror}); choose another one with --out"
+            text = f"this location cannot hold a folder ({error.strerror}); choose another one with --out"
         case errno.ENOENT:
             text = "the folder has vanished, or cannot be made; choose another one with --out"
         case errno.ENOTDIR | errno.EEXIST:
@@ -248,7 +248,7 @@ def write_columns(path: Path, columns: Columns, mark: str = "") -> None:
     """Columns as an uncompressed .npz with keys `object/column`, and a mark by which it is known."""
     arrays = {f"{name}/{column}": array for name, table in columns.items() for column, array in table.items()}
     if any("\0" in key for key in arrays):
-        raise ExportError(f"{path}: the name of an object has a NUL in it, where names in archives end; rename it")
+        raise ExportError(f"{path}: the name of an object contains a NUL, which ends names in archives; rename it")
     buffer = io.BytesIO()
     np.savez(buffer, **arrays)  # type: ignore[arg-type]
     seal(buffer, mark)
@@ -291,7 +291,7 @@ def _opened(path: Path, mark: str, whole: bool = False) -> Iterator[zipfile.ZipF
             size = path.stat().st_size
             # Members of ours are not compressed: others could take any amount of memory.
             if sum(member.file_size for member in archive.infolist()) > size:
-                raise ValueError("it holds less than it says")
+                raise ValueError("it contains less than it declares")
             if mark:
                 found, _, total = archive.comment.decode(errors="replace").rpartition(", sum ")
                 if found != mark:

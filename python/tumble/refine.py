@@ -229,7 +229,7 @@ def _too_long(world: World) -> list[str]:
         if float(about["step"]) > usable:
             found.append(
                 f'system "{about["system"]}" takes steps of {about["step"]:.3g} s, usable are {usable:.3g} s by estimate: '
-                "it is likely to break. Halved distances ask for half the step, with internal damping for a quarter: take more "
+                "it is likely to fail. Half the spacing needs half the step, with internal damping a quarter: use more "
                 f"substeps, or refine them with --what system.{k}.substeps*4"
             )
     return found
@@ -278,7 +278,7 @@ def plan(scene: Scene, levels: int, what: Sequence[str] = ()) -> tuple[list[Refi
             {
                 "code": "unrefined-steps",
                 "path": f'system "{system["name"]}"',
-                "message": f"its steps are its own at every level; --what system.{i}.substeps refines them, too",
+                "message": f"its steps are the same at every level; --what system.{i}.substeps refines them, too",
             }
             for i, system in own
         ]
