@@ -256,7 +256,7 @@ def test_copies_where_the_disk_has_no_links(reference: Run, tmp_path: Path, monk
         (["time.fps=30"], "time.fps: 30"),
         (["time.frames=13"], "--frames"),
         (["precision=double"], "another precision"),
-        (["system.0.integrator=bdf2"], "integrators that keep the same state"),
+        (["system.0.integrator=bdf2"], "integrators with the same state"),
         (["particles.p.pin=[]"], "pins of"),
         (["particles.p.mass=[2.0]"], "masses of"),
         (['output.columns=["position"]'], "velocity of"),
