@@ -324,7 +324,7 @@ fn truncation_brings_back_what_went_too_far() {
     }
 }
 
-/// Where it is known which way all go, long ways are free, any parts of them and what leaves them are safe, and what goes
+/// With predicted motion, long paths are free, any fraction of them and small deviations are safe, and what goes
 /// together is no pair.                                                                                          (contact.20)
 #[test]
 fn nothing_passes_beside_the_ways() {

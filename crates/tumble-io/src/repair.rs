@@ -330,7 +330,7 @@ impl Work {
         self.drop(&drop)
     }
 
-    /// Where the middle corner b of a triangle without area lies on a side of a neighbour, that is cut in two there, and the triangle is gone.
+    /// If the middle corner b of a triangle without area lies on a side of a neighbour, the side is cut there, and the triangle is gone.
     /// Triangles with a vertex twice go as well. Returns how often something was done, and how many triangles are gone.
     ///
     /// ```text

@@ -14,7 +14,7 @@ pub struct Emitter {
     /// System that moves them. Default: the first that can.
     #[serde(default)]
     pub system: Option<String>,
-    /// Where particles are born.
+    /// Source of the particles.
     pub from: Source,
     /// Particles per second; for a source of particles, children of each per second.
     #[serde(default = "nothing")]
@@ -122,7 +122,7 @@ pub struct Emitter {
     pub when_full: WhenFull,
 }
 
-/// Where particles are born.
+/// Source of the particles.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case", deny_unknown_fields)]
 pub enum Source {

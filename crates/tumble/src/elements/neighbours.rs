@@ -1,4 +1,4 @@
-//! Who pulls on whom: for every row its neighbours along springs, laid out for wide registers.
+//! Spring neighbours of every row, laid out for wide registers.
 //!
 //! Sliced ELL: slices of sixteen rows; a slot holds one neighbour of each of them, sixteen entries side by side. On
 //! regular structures the neighbours in a slot are consecutive rows (a run), which load as whole registers from columns of

@@ -1,4 +1,4 @@
-//! Who is near whom: points sorted by cell, and sums over all pairs of points in cells that touch.
+//! Neighbour search: points sorted by cell, and sums over all pairs of points in adjacent cells.
 //!
 //! A cell is as wide as the reach of what is asked for, so that whoever is within reach lies in one of 27 cells. Points are sorted
 //! by cell, z first and x last, and by index within a cell; three cells in a row along x are then one run of places, and 27 cells

@@ -14,7 +14,7 @@ pub struct Reach {
     pub ghost: Option<(Real, Real)>,
 }
 
-/// Where the value at point m along an axis comes from, inside or beyond the walls.                 (grids.2)
+/// Source of the value at point m along an axis, inside or beyond the walls.                     (grids.2)
 pub fn reach(f: &Field, axis: usize, m: isize) -> Reach {
     let (n, points) = (f.grid.n[axis] as isize, f.points()[axis] as isize);
     if f.grid.periodic[axis] {

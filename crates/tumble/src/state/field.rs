@@ -4,7 +4,7 @@ use super::grid::{Grid, GridError, Place};
 use crate::math::{Column, Real};
 use std::borrow::Cow;
 
-/// What a field is beyond a wall of its grid; periodic axes have no walls. Values c are mirrored in the wall, at distance s
+/// Boundary condition of a field beyond a wall of its grid; periodic axes have no walls. Values c are mirrored in the wall, at distance s
 /// from their image:
 ///
 /// ```text

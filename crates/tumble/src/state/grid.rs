@@ -132,7 +132,7 @@ impl Grid {
     }
 }
 
-/// Where on a grid a field has its numbers.
+/// Location of a field's numbers on a grid.
 ///
 /// ```text
 ///     node ---- edge along x ---- node

@@ -15,7 +15,7 @@ use crate::math::{Lane, Real, Row, xyz64};
 use std::f64::consts::PI;
 use std::ops::Range;
 
-/// What a sweep takes back of what each particle alone would need.                                   (liquids.5)
+/// Fraction of each particle's own correction made by a sweep.                                       (liquids.5)
 const PART: Real = 0.5;
 
 /// How far beyond the outermost layer of particles, half a spacing off a wall, the liquid behind it begins, over s: that layer of a cubic
@@ -52,7 +52,7 @@ pub struct Density {
     sums: Vec<[Real; 5]>,
     pushed: Vec<[Real; 4]>,
     moves: Vec<[Real; 3]>,
-    /// What walls add to the density of each, s times its gradient, and what they would add to the last of the sums over others.
+    /// Contribution of walls to the density of each, s times its gradient, and their contribution to the last of the sums over others.
     against: Vec<[Real; 5]>,
     /// Multipliers so far, and what this sweep adds.
     lambda: Vec<Real>,
@@ -126,7 +126,7 @@ impl Density {
         grid.gather(&Sums { inverse: 1.0 / self.spacing }, points, sums);
     }
 
-    /// What walls add. Where several are near, the liquid between them is what none of them takes.
+    /// Contribution of walls. If several are near, the liquid between them is the part that none of them covers.
     fn lean(&self, x: &[Row], walls: Walls<'_>, against: &mut Vec<[Real; 5]>) {
         against.clear();
         against.resize(x.len(), [0.0; 5]);

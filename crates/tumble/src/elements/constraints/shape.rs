@@ -15,7 +15,7 @@ use std::ops::Range;
 
 type Vector = Vec3<f64>;
 
-/// What a held mass of a rigid shape weighs in the fit, over the mass of all: each sweep leaves one part in so many of how far it is off its
+/// Weight of a held mass of a rigid shape in the fit, relative to the total mass: each sweep leaves one part in so many of how far it is off its
 /// place. By its own mass a corner of a block would lead as little as it weighs.                               (shapes.4)
 const HELD: f64 = 1e4;
 

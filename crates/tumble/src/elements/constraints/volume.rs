@@ -1,4 +1,4 @@
-//! What a closed surface encloses: one constraint on all its points.
+//! Volume enclosed by a closed surface: one constraint on all its points.
 //!
 //!   V = sum over triangles of x0 . (x1 x x2)/6,   E = K/(2 V0) (V - V1)²                          (membranes.7)
 //!

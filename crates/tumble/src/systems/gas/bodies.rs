@@ -125,7 +125,7 @@ impl Body {
         [(n.into(), false), (first.into(), true), (n.cross(first).into(), true)]
     }
 
-    /// What is not the pressure's, for h seconds: other forces, and the weight of the fluid that it displaces.      (gas.17)
+    /// Forces besides the pressure, for h seconds: other forces, and the weight of the fluid that it displaces.      (gas.17)
     pub(super) fn fall(&mut self, h: f64, gravity: [f64; 3], density: f64, grid: &Grid) {
         if self.inverse_mass == 0.0 {
             return;
