@@ -30,7 +30,7 @@ CASES = [
     "heat",
     "web",
 ]
-# What is aimed at: (case, ours, theirs, at least this ratio), or at most for costs.
+# Targets: (case, ours, theirs, least ratio), or the largest ratio for costs.
 TARGETS = {
     ("springs", "taichi"): (5.0, "at least"),
     ("springs", "numba"): (3.0, "at least"),
@@ -90,7 +90,7 @@ def set_up() -> Path:
 
 
 def versions(python: Path) -> str:
-    """What the peers are, in a line."""
+    """The peers, in one line."""
     names = [peer.split("==")[0] for peer in PEERS]
     code = f"from importlib.metadata import version; print(', '.join(f'{{n}} {{version(n)}}' for n in {names}))"
     return subprocess.run([python, "-c", code], check=True, capture_output=True, text=True).stdout.strip()

@@ -1,4 +1,4 @@
-"""What the cases share."""
+"""Helpers of the cases."""
 
 import json
 import statistics

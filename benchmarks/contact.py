@@ -1,4 +1,4 @@
-"""What cloth costs beside its projections: memory of a particle, contact of layers with each other, the dress on its dancer.
+"""Cost of cloth besides its projections: memory per particle, self-contact, the dress on its dancer.
 
 There is no peer in it. Shown are the bytes that a sheet of 512² holds, by the allocator's own count, and those that stay
 resident, with what the allocator keeps of the memory in which it was made; the time that self-contact adds to six layers
@@ -64,7 +64,7 @@ def sheet(n, bending):
 
 
 def memory(bending, n=512):
-    """What a world with a sheet takes beside another one, for each particle: allocated and resident [bytes]."""
+    """Memory of a world with a sheet beyond another one, per particle: allocated and resident [bytes]."""
     import tumble
 
     other = tumble.World(sheet(n, bending), threads=THREADS)

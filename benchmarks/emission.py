@@ -41,7 +41,7 @@ def world(count, emitter):
 
 
 def main():
-    # What any world takes, threads and code.
+    # Memory of any world: threads and code.
     small = world(1000, {"burst": [{"count": 1000}]})
     small.step(2)
     before = resident()

@@ -38,7 +38,7 @@ def tumble_case(x, mass, precision, bits):
     world = tumble.World(scene, threads=THREADS)
     world.step()
     velocity = world.columns("velocity")["b"]["velocity"].copy()
-    # What a frame adds (an energy, which is a sum over all pairs, too) is part of the time.
+    # Work per frame (an energy, also a sum over all pairs) is part of the time.
     return world.step, velocity
 
 

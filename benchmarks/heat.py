@@ -21,7 +21,7 @@ def mode():
 
 
 def left(plane_means, taken):
-    """What is left of the mode, over what should be."""
+    """Remaining amplitude of the mode relative to the exact one."""
     m = mode().astype(float)
     amplitude = plane_means.astype(float) @ m / (m @ m)
     return amplitude / (1.0 - 4.0 * Z * np.sin(np.pi / (2 * N)) ** 2) ** taken

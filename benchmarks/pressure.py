@@ -77,7 +77,7 @@ def residual(w, q, b, fluid):
 
 
 def ours(w, b, method, how, runs=5):
-    """What the engine reports, and its solution."""
+    """The engine's report and solution."""
     n = b.shape[0]
     program = ROOT / "target/release/examples/pressure_file"
     with tempfile.TemporaryDirectory() as folder:

@@ -154,7 +154,7 @@ def bench_taichi(n, case, ours):
 
     @ti.func
     def back(x, h):
-        """Where the fluid at x was h ago: the midpoint rule."""
+        """Departure point of the fluid at x over h, by the midpoint rule."""
         return x - h / dx * speed(x - 0.5 * h / dx * speed(x))
 
     @ti.kernel
@@ -375,7 +375,7 @@ def bench_phiflow(n, case, ours):
 
 
 def bench_stages(n, bandwidth):
-    """What a part costs: a step less one without it. Bytes are those that its passes over memory cannot do without."""
+    """Cost of a part: a step less one without it. Bytes are the minimum of its passes over memory."""
 
     def seconds(**words):
         # Two lengths of frames differ by steps alone.

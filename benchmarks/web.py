@@ -72,13 +72,13 @@ KERNELS = {
         advection={"velocity": {"corrected": True}, "scalars": {"corrected": True}},
     ),
 }
-"""What the browser's engine is compared on: nearly all of a frame is one kind of kernel."""
+"""Scenes for comparing the browser's engine: nearly all of a frame is one kind of kernel."""
 TASKS = {
     "fluid 256² to 1e-3": (gas(256, 60, pressure={"tolerance": 1e-3}), 60),
     "sheet 128², 10 sub-steps": (sheet(128, 10, 60, 50), 60),
     "1e6 ballistic particles": (BALLISTIC, 60),
 }
-"""What a tab is to do in real time: a scene, and frames a second."""
+"""Real-time targets of a tab: a scene, and frames per second."""
 
 
 def native() -> dict[str, float]:

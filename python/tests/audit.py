@@ -22,7 +22,7 @@ OWN = ROOT / ".venv-audit"
 
 @dataclass(frozen=True)
 class Finding:
-    """What came of a question: `bad` is None where it could not be asked."""
+    """Result of a query: `bad` is None if it could not be made."""
 
     subject: str
     bad: bool | None

@@ -1,4 +1,4 @@
-"""What the tests share: small scenes, and the command line."""
+"""Shared by the tests: small scenes, and the command line."""
 
 import copy
 import json
@@ -76,7 +76,7 @@ def scene_file(tmp_path: Path) -> Callable[..., Path]:
 
 @dataclass(frozen=True)
 class Answer:
-    """What a command said and how it ended."""
+    """Output and exit code of a command."""
 
     code: int
     out: str

@@ -1,4 +1,4 @@
-"""What tests count: `note` for those that do, and after them a table of it all.
+"""Counts of tests: `note` records them, and a table follows the tests.
 
     TUMBLE_COUNTS=FILE python -m pytest ... && python python/tests/counts.py FILE
 

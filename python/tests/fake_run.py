@@ -184,7 +184,7 @@ def fountain(color: bool = True, radius: bool = True, frames: int = 6) -> FakeRu
 
 
 def on_grid(cells: tuple[int, ...], flat: int, spacing: float, origin: tuple[float, float, float]) -> dict[str, Array]:
-    """What does not change of an object on a grid."""
+    """Constant columns of a grid object."""
     return {
         "grid_cells": np.array(cells, dtype=np.uint32),
         "grid_spacing": np.array([spacing], dtype=np.float32),

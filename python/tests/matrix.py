@@ -62,7 +62,7 @@ NATIVE = [
     Case("gravity/encounter", 3, 1, ("galaxy.0.stars=2000", "galaxy.1.stars=2000"), "native"),
     Case("gravity/figure-of-eight", 61, bits="native"),
 ]
-"""What has bits of its own where `bits = "native"`: `make validate`."""
+"""Scenes with bits of their own under `bits = "native"`: `make validate`."""
 
 SLOW = {
     "cloth/drapes",
@@ -111,7 +111,7 @@ def states(world: World, frames: int, visit: Callable[[World], None] = lambda _:
 
 @dataclass
 class Row:
-    """What was found of a scene: the states of the reference, and where a way to compute them differs."""
+    """Findings of a scene: the reference states, and where another way to compute them differs."""
 
     case: Case
     reference: list[str]
@@ -163,7 +163,7 @@ def native(case: Case, folder: Path) -> tuple[Row, list[Path]]:
 
 
 def why_no_wasm() -> str | None:
-    """What stands in the way of the columns of WebAssembly."""
+    """Obstacle to the columns of WebAssembly."""
     if shutil.which("node") is None:
         return "no Node here"
     if not all(file.is_file() for file in WASM):

@@ -45,7 +45,7 @@ class Nursery:
     def ask(
         self, tree: Any, folder: str = ".", frames: int = 1, probe: bool = False, patience: float = PATIENCE[0]
     ) -> dict[str, Any]:
-        """What becomes of a scene in its first frames, or if it is only probed, before them.
+        """Outcome of a scene in its first frames, or if it is only probed, before them.
 
         `end` is refused, built, broke, stopped, raised, died or hangs.
         """

@@ -1,4 +1,4 @@
-"""What OpenVDB reads from a file, for tests; run by the system's python3, which has Debian's python3-openvdb.
+"""Content of a file as read by OpenVDB, for tests; run by the system's python3, which has Debian's python3-openvdb.
 
 `openvdb_reader.py FILE.vdb OUT.npz INDEX...` writes for each grid the values in the box of voxels that starts at the
 first three indices and is as long as the last three say.

@@ -1,4 +1,4 @@
-"""What tests do to runs: kill them, damage them, compare them."""
+"""Operations of tests on runs: kill, damage, compare."""
 
 import io
 import zipfile

@@ -215,7 +215,7 @@ def overwrite(path: Path, data: bytes) -> None:
 
 
 def looked_at(path: Path, length: int) -> str:
-    """What becomes of an .npz."""
+    """Outcome of reading an .npz."""
     end = "refused"
     for read in READERS:
         try:
@@ -256,7 +256,7 @@ def test_changed_frames_are_read_or_refused(tmp_path: Path) -> None:
     note("random cases", "frames, changed", cases=cases, **ends, slowest=f"{slowest:.2f} s")
     assert not failures, "\n".join(failures[:20])
     assert ends["read"] > cases / 50 and ends["refused"] > cases / 5
-    # What Python takes for archives, headers and errors, whatever the length: measured, 200 KiB.
+    # Memory of Python for archives, headers and errors, independent of length: measured, 200 KiB.
     assert most < 2 * len(whole) / 1024 + 512 and slowest < SLOWEST
 
 
@@ -297,7 +297,7 @@ def load_changed(tree: Tree, cases: int, folder: Path) -> tuple[Counter[str], fl
                 failures.append(f"seed {seed}: {error}")
         except Exception as error:
             failures.append(f"seed {seed}: {type(error).__name__}: {error}")
-        # What breaks goes back to what was loaded, whatever that was.
+        # A failure rolls back to the loaded state, whatever it was.
         arrays = [a for table in world.frame.values() for a in table.values()]
         largest = max(largest, sum(a.nbytes for a in arrays))
         found = [a for a in arrays if a.dtype.kind == "f"]

@@ -33,7 +33,7 @@ SYSTEMS: dict[str, Tree] = {
 """Emitters with adaptive steps, cloth on positions and on forces, a gas, and systems side by side."""
 
 HANGING = "particles.p.spring.0.rest_length=0.5"
-"""What the engine would else derive from where the masses start."""
+"""Settings that the engine would otherwise derive from the initial positions."""
 
 
 @pytest.mark.parametrize("frame", [0, 1, 13, 20, 24])
@@ -86,7 +86,7 @@ def test_a_branch_is_the_changed_world_in_the_old_state(reference: Run, spring: 
     assert (difference.frame, difference.seen) == (13, 14)
     assert difference.columns[0].column == "elastic"
     assert found.ledger["elastic"][13] == pytest.approx(reference.ledger["elastic"][13] / 2, rel=1e-6)
-    # What it took to come there was the parent's.
+    # The cost up to there belongs to the parent.
     np.testing.assert_array_equal(found.ledger["steps"][:14], reference.ledger["steps"][:14])
 
 
@@ -256,7 +256,7 @@ def test_copies_where_the_disk_has_no_links(reference: Run, tmp_path: Path, monk
         (["time.fps=30"], "time.fps: 30"),
         (["time.frames=13"], "--frames"),
         (["precision=double"], "another precision"),
-        (["system.0.integrator=bdf2"], "integrators that keep the same state"),
+        (["system.0.integrator=bdf2"], "integrators with the same state"),
         (["particles.p.pin=[]"], "pins of"),
         (["particles.p.mass=[2.0]"], "masses of"),
         (['output.columns=["position"]'], "velocity of"),
@@ -292,7 +292,7 @@ def test_a_state_that_cannot_be_made_again_is_refused(reference: Run, tmp_path: 
     ledger.write_text(ledger.read_text().replace(reference.hashes[13], "0" * 16))
     run = Run(reference.folder)
     assert world_at(run, 12).hash() == reference.hashes[12]
-    with pytest.raises(SceneError, match=r"frame 13 cannot be made again to the same bits.*with a checkpoint: 20, 25"):
+    with pytest.raises(SceneError, match=r"frame 13 cannot be recomputed to the same bits.*with a checkpoint: 20, 25"):
         branch(run, 13, tmp_path / "b", [SOFTER])
 
 
@@ -307,7 +307,7 @@ def test_a_branch_of_a_branch_needs_the_first_run_only_before_it(reference: Run,
     for frame in (4, 13, 17):
         assert world_at(child, frame).hash() == child.hashes[frame]
     shutil.rmtree(reference.folder)
-    with pytest.raises(SceneError, match="frame 17 has to be made from the run that this is a branch of"):
+    with pytest.raises(SceneError, match="frame 17 must be recomputed from the parent run"):
         world_at(child, 17)
 
 
@@ -356,7 +356,7 @@ def test_a_change_without_effect_is_told(spring: Tree, scene_file: SceneFile, tu
     assert tumble("run", scene_file(spring)).code == 0
     answer = tumble("branch", "scene@13", "--set", "particles.p.velocity=[[0, 0, 0], [9, 0, 0]]")
     assert answer.code == 0
-    assert "the change did nothing in 12 frames" in answer.err
+    assert "the change had no effect in 12 frames" in answer.err
 
 
 def test_a_branch_that_breaks_ends_with_1_and_a_command_for_branches(

@@ -1,4 +1,4 @@
-"""What is counted stands in a table, and too little of it is an error."""
+"""Counts are listed in a table, and too low ones are errors."""
 
 import json
 import subprocess

@@ -185,7 +185,7 @@ def test_runs_of_other_things_are_refused(pair: tuple[Run, Run], sheet: Tree, tm
     for tree, name, word in (
         (named, "named", '"sheet"'),
         (finer, "finer", "resolution"),
-        (faster, "faster", "frames a second"),
+        (faster, "faster", "frames per second"),
     ):
         other = simulate(tree, tmp_path / name, frames=1)
         with pytest.raises(SceneError, match=word):
@@ -204,7 +204,7 @@ def test_columns_that_one_run_alone_keeps_are_named(
     less = simulate(sheet, tmp_path / "less")
     found = compare(pair[0], less)
     assert found.frame is None
-    assert found.unlike == [f'velocity of "sheet" is kept in {pair[0].folder} alone']
+    assert found.unlike == [f'velocity of "sheet" is stored only in {pair[0].folder}']
     answer = tumble("diff", pair[0].folder, less.folder)
     assert answer.code == 0 and "velocity" in answer.out
 

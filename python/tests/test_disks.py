@@ -1,4 +1,4 @@
-"""What stands in the way of a run: folders of others, full disks, broken physics, damaged files."""
+"""Obstacles to a run: foreign folders, full disks, failing physics, damaged files."""
 
 import errno
 import shutil

@@ -59,7 +59,7 @@ def test_what_breaks_is_named_by_its_id() -> None:
     assert report["index"] < 7
 
 
-# What is told before a run
+# Messages before a run
 
 
 def emitting(*emitters: dict[str, Any], frames: int = 48, **more: Any) -> dict[str, Any]:
@@ -185,7 +185,7 @@ def test_check_says_who_is_never_born(tumble: Command, scene_file: SceneFile) ->
     late = {**POINT, "burst": [{"time": 50, "count": 9}]}
     answer = tumble("check", scene_file(emitting(late)))
     assert '"p": 0 born in 2 s, the first after 50 s' in answer.out
-    assert "no particle is born in the time of the scene" in answer.out
+    assert "no particle is born within the duration of the scene" in answer.out
     assert answer.code == 0 and "fine" not in answer.out and "stable\n" not in answer.out
 
 

@@ -34,7 +34,7 @@ def test_the_growth_of_energy_is_over_what_is_not_from_nowhere() -> None:
     assert (found.times, found.frame) == (pytest.approx(3.0), 4)
     # Bound by 100 J: these are a scale from the start.
     assert energy.growth(books(kinetic=[0, 150], external=[-100, -100])).times == pytest.approx(1.5)
-    # What is gained by rounding is none.
+    # Gains by rounding do not count.
     assert energy.growth(books(kinetic=[0, 0.5], external=[1000, 1000])).times == 0.0
 
 
@@ -44,7 +44,7 @@ def test_births_and_deaths_are_no_growth() -> None:
     assert energy.growth(books(kinetic=[1, 100, 400, 400], mass=[1, 2, 2, 2])).times == pytest.approx(3.0)
 
 
-# What may give and take
+# Sources and sinks
 
 
 def resolved(**words: Any) -> Tree:
@@ -207,7 +207,7 @@ def test_what_a_trial_may_gain_and_lose() -> None:
 def test_advice_fits_the_scene(spring: Tree) -> None:
     from tumble import Scene
 
-    assert "springs far too stiff" in report._advice(Scene(spring).to_dict())
+    assert "springs that are much too stiff" in report._advice(Scene(spring).to_dict())
     assert "spring" not in report._advice(resolved())
     assert "softening" in report._advice(resolved(force=[{"kind": "gravitation"}]))
 

@@ -153,7 +153,7 @@ def test_a_broken_bound_ends_the_run_there(spring: Tree, tmp_path: Path, referen
     scene = spring | {"expect": {"max_speed": bound, "max_final_kinetic": 0.0, "broken_links": 7}}
     run = simulate(scene, tmp_path / "run")
     assert run.status == "failed" and run.n_frames == first + 1 and run.hashes == reference.hashes[: first + 1]
-    # What only the end can break is not judged.
+    # Bounds that only the end can violate are not judged.
     assert [(b["name"], b["frame"]) for b in run.manifest["expectations"]] == [("max_speed", first)]
     # It goes on no further, and with another bound to the bits of the whole.
     again = simulate(scene, run.folder, resume=True)
@@ -190,7 +190,7 @@ def test_what_broke_a_bound_is_named(tmp_path: Path) -> None:
         assert found == {"system": "main", "object": "fast"} and text.endswith(', by "fast"')
     found, text = culprit(landing, folder, max_energy_drift=0.1)
     assert found["system"] == "main" and text.endswith(f'; fastest there "{found["fastest"]["object"]}", particle 0')
-    # What starts within the floor's thickness is in it.
+    # A start within the floor's thickness counts as penetration.
     deep = moving | {"collider": [floor | {"shape": {"floor": {"height": 0.95}}}]}
     found, _ = culprit(
         deep | {"particles": [ball("still", 0, 2, 0), ball("deep", 2, 1, 0)]}, folder, max_penetration=0.04

@@ -74,7 +74,7 @@ def test_the_stretch_of_fabrics_and_membranes_is_held_to_what_is_expected(
     # By its own weight the first row is longer by 1e-4 at least, and by no tenth.
     for most, code in ((1.00001, 1), (1.1, 0)):
         answer = tumble("run", scene_file(tree | {"expect": {"max_stretch": most}}), "--force")
-        assert answer.code == code and ("broken expectation: max_stretch" in answer.err) == (code == 1), answer.err
+        assert answer.code == code and ("violated expectation: max_stretch" in answer.err) == (code == 1), answer.err
 
 
 def test_the_elastica_of_the_lab_is_that_of_the_cantilever_test() -> None:

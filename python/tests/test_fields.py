@@ -192,7 +192,7 @@ def test_the_projection_of_velocities_is_the_nearest_in_the_metric_of_masses() -
     assert abs(inner(tuple(change), pb.velocity, shares)) < 1e-9 * size
     kept, lost = inner(pa.velocity, pa.velocity, shares), inner(tuple(change), tuple(change), shares)
     assert abs(size - kept - lost) < 1e-9 * size and 0.5 * size < kept < 0.8 * size  # 2/3: two of three directions
-    # What is taken is the gradient of the potential.
+    # The removed part is the gradient of the potential.
     slope = gradient(pa.potential)
     open_ = shares[1].array > 0
     open_[:, 0] = open_[:, -1] = False

@@ -129,7 +129,7 @@ def changed(which: Path, seed: int, others: list[Tree]) -> Tree:
 
 
 def wrong(answer: dict[str, Any]) -> str | None:
-    """What is wrong with the end of a case."""
+    """Fault in the outcome of a case."""
     if answer["end"] not in ("refused", "built", "broke", "stopped"):
         return str(answer["text"])
     if answer["end"] == "refused":

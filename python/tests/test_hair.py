@@ -47,7 +47,7 @@ def test_strands_lie_between_those_that_were_simulated() -> None:
     assert shown.weights.min() >= 0.0
     curves = shown.of(x)
     np.testing.assert_array_equal(curves[:COUNT].reshape(-1, 3), x)
-    # What all strands have in common, those between have, too.
+    # Properties common to all strands hold for interpolated ones, too.
     np.testing.assert_allclose(curves[:, -1] - curves[:, 0], np.tile([0.0, 0.0, 0.2], (6 * COUNT, 1)), atol=1e-12)
     # They fill the gaps: the same mean density everywhere, and nothing far away from its guides.
     apart = np.linalg.norm(x.reshape(-1, POINTS, 3)[shown.guides][:, :, 0] - curves[:, None, 0], axis=-1)

@@ -146,7 +146,7 @@ def test_wrong_input_ends_with_2_and_leaves_nothing(
         ("version = 2\n", "version: 2, expected 1\n"),
         (
             "version = 1\n[[emitter]]\nname = 'e'\nfrom = { point = {}, disk = { radius = 1 } }\n",
-            "point and disk: only one of them",
+            "point and disk: only one is allowed",
         ),
         (
             "version = 1\n[[emitter]]\nname = 'e'\nfrom = { point = {} }\nburst = [{ count = 1 }]\ncolor = [255, 128, 0]\n",

@@ -1,4 +1,4 @@
-"""What stops a process waits for what must be whole."""
+"""Stop signals wait for critical sections."""
 
 import signal
 from concurrent.futures import ThreadPoolExecutor
@@ -31,7 +31,7 @@ def test_what_is_held_is_done_before_the_stop(number: signal.Signals, monkeypatc
             raise OSError
         with pytest.raises(KeyboardInterrupt):
             signal.raise_signal(number)
-        # Where nothing heeds a signal, holding changes nothing.
+        # If a signal is ignored, holding has no effect.
         signal.signal(number, signal.SIG_IGN)
         with held():
             assert signal.getsignal(number) is signal.SIG_IGN

@@ -112,7 +112,7 @@ def killed_often(kind: str, kills: int, seed: int, folder: Path) -> Counter[str]
     return where
 
 
-# What such kills have found.
+# Found by such kills.
 
 
 @pytest.mark.parametrize("more", [{}, {"resume": True}, {"overwrite": True}])
@@ -125,7 +125,7 @@ def test_a_run_killed_before_its_manifest_is_in_nobodys_way(
     (folder / ".lock").write_text("1")
     (folder / "run.json.tmp").write_text("{")
     assert simulate(spring, folder, frames=3, **more).n_frames == 4
-    # What is not of a run is never taken over.
+    # Files that do not belong to a run are never taken over.
     other = tmp_path / "other"
     (other / "frames").mkdir(parents=True)
     (other / "frames" / "mine.txt").touch()

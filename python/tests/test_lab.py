@@ -460,7 +460,7 @@ def test_a_hanging_chain_converges_to_its_compliance_at_every_frame_rate() -> No
     assert slope([abs(positions.error(False, False, work)) for work in (1, 2, 4, 8, 16)]) == pytest.approx(
         -1.0, abs=0.05
     )
-    # What counts is the length of a sub-step, not of a frame: 1/7680 s, 0.420 % at 60 as at 120 frames a second.
+    # Only the length of a sub-step counts, not of a frame: 1/7680 s, 0.420 % at 60 as at 120 frames a second.
     at_60, at_120 = positions.error(False, True, 128, 60), positions.error(False, True, 64, 120)
     assert 0.003 < at_60 < 0.005 and at_120 == pytest.approx(at_60, rel=1e-3)
     # Sweeps that are enough converge to the same length: 2.7e-7.

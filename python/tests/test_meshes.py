@@ -46,10 +46,7 @@ def test_a_broken_mesh_is_mended_beside_the_original(
     assert refused.code == 2 and "inconsistent edges" in refused.err
     answer = tumble("check", scene, "--repair")
     assert answer.code == 0, answer.err
-    assert (
-        "2 triangles dropped that stood there already, 1 triangle dropped that had no area, 2 triangles turned"
-        in answer.out
-    )
+    assert "2 triangles dropped as duplicates, 1 triangle dropped for having no area, 2 triangles flipped" in answer.out
     new = tmp_path / "meshes" / "cube.repaired.obj"
     assert 'collider "a.cube".shape.mesh.path = "meshes/cube.repaired.obj"' in answer.out
     vertices, triangles = load_mesh(new)
@@ -83,9 +80,9 @@ def test_lines_to_change_are_told(tumble: Command, tmp_path: Path) -> None:
 def test_a_sound_mesh_is_left_alone(spring: Tree, scene_file: SceneFile, tumble: Command, tmp_path: Path) -> None:
     write(tmp_path, obj(FACES))
     answer = tumble("check", scene_file(with_cube(spring)), "--repair")
-    assert answer.code == 0 and "nothing to mend" in answer.out
+    assert answer.code == 0 and "nothing to repair" in answer.out
     assert [p.name for p in (tmp_path / "meshes").iterdir()] == ["cube.obj"]
-    assert "names no mesh file" in tumble("check", scene_file(spring, "other.json"), "--repair").out
+    assert "has no mesh files" in tumble("check", scene_file(spring, "other.json"), "--repair").out
 
 
 def test_what_is_still_wrong_is_told(spring: Tree, scene_file: SceneFile, tumble: Command, tmp_path: Path) -> None:
@@ -117,7 +114,7 @@ def with_net(**words: Any) -> Tree:
 def test_an_unsound_net_is_told_by_check_and_run(scene_file: SceneFile, tumble: Command, tmp_path: Path) -> None:
     write(tmp_path, obj([*FACES[:5], FACES[0], [2, 6, 8, 4], [1, 1, 2]]) + "v 9 9 9\n")
     scene = scene_file(with_net())
-    told = 'net "n".mesh: 2 triangles are there already, 1 triangle has no area'
+    told = 'net "n".mesh: 2 triangles are duplicates, 1 triangle has no area'
     for verb in ("check", "run"):
         answer = tumble(verb, scene)
         assert answer.code == 0, answer.err
@@ -126,8 +123,8 @@ def test_an_unsound_net_is_told_by_check_and_run(scene_file: SceneFile, tumble: 
         )
         assert answer.err.count('net "n".mesh') == 1
     answer = tumble("check", scene, "--repair")
-    assert answer.code == 0 and "warning" not in answer.err and "1 vertex of no triangle left out" in answer.out, answer
-    # What the command at its end runs has nothing to be told of.
+    assert answer.code == 0 and "warning" not in answer.err and "1 vertex of no triangle dropped" in answer.out, answer
+    # The command at its end runs without warnings.
     write(tmp_path, obj(FACES))
     assert 'net "n"' not in tumble("check", scene).err
 
@@ -138,9 +135,9 @@ def test_vertices_that_rounding_moved_apart_are_sewn(
 ) -> None:
     file = write(tmp_path, quads(4, off))
     scene = scene_file(with_net())
-    assert 'net "n".mesh: 48 open edges lie on others' in tumble("check", scene).err
+    assert 'net "n".mesh: 48 open edges coincide with others' in tumble("check", scene).err
     answer = tumble("check", scene, "--repair")
-    assert answer.code == 0 and "39 vertices sewn to others" in answer.out and "lie on others" not in answer.err
+    assert answer.code == 0 and "39 vertices sewn to others" in answer.out and "coincide with others" not in answer.err
     vertices, triangles = load_mesh(file.with_name("cube.repaired.obj"))
     assert len(vertices) == 25 and len(triangles) == 32 and vertices.max() <= 1 + 2 * off
 

@@ -190,7 +190,7 @@ FIRST = {
     "tracers": ("p", 1),
     "emitter": ("e", 0),
 }
-"""What breaks, and how many masses and cells are left at most, which is what was measured."""
+"""The failing object, and the measured upper bounds of remaining masses and cells."""
 
 
 def broken(scene: Scene, frames: int) -> tuple[dict[str, Any], int]:
@@ -264,7 +264,7 @@ def test_what_makes_a_break_another_one() -> None:
         assert report[key] != value
         assert search._fault({**report, key: value}, tree) != fault, key
     assert search._fault({**report, "step": 1.0, "stable_step": 0.5}, tree) != fault
-    # Where and when, and what the index is now.
+    # Place, time and the new index.
     moved = re.sub(r"at \[.*?\]", "at [9, 9, 9]", report["cause"]).replace("force[2]", "force[1]")
     assert moved != report["cause"]
     fewer = {**tree, "force": tree["force"][1:]}
@@ -327,7 +327,7 @@ class Counted:
 
 
 def test_trials_are_counted(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Where nothing can be left out, which is the dearest that there is."""
+    """A scene from which nothing can be removed, the most expensive case."""
     tree = copy.deepcopy(CASES["springs"])
     tree["collider"] = [{"name": f"c{i}", "shape": {"sphere": {"radius": 0.1, "center": [9, 9, i]}}} for i in range(60)]
     scene = Scene(tree)
@@ -380,8 +380,8 @@ def test_trouble_on_the_way_leaves_the_error_as_it_was(
     assert answer.code == 1
     for word in ("FAILED", "Likely causes", "<- recommended", "Kept: "):
         assert word in answer.err, word
-    assert "A small scene" not in answer.err and "Traceback" not in answer.err
-    # What broke is said before anything is looked for.
+    assert "A minimal scene" not in answer.err and "Traceback" not in answer.err
+    # The failure is printed before the search.
     assert answer.err.index("energy exploded") < answer.err.index("Looking for") < answer.err.index("FAILED")
     failure = Run("out/scene").manifest["failure"]
     assert "minimal" not in failure and any(cure["survived"] for cure in failure["cures"])
@@ -472,7 +472,7 @@ def test_formulas_of_heat_are_named_and_too_large_numbers_cured(tmp_path: Path) 
     failure = failed(CASES["heat"], tmp_path / "pole")
     assert failure["causes"][0].startswith('heat "h".source[1].power = "1e6/(t-25)" ')
     assert {cure["set"] for cure in failure["cures"]} == {"heat.0.scheme=implicit", "precision=double"}
-    # What only a double can hold.
+    # A value that only double precision can hold.
     tree = cluttered(
         time={"fps": 0.1, "frames": 4},
         system=[{"name": "warm", "method": "heat"}],

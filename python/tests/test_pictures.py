@@ -150,7 +150,7 @@ def test_what_cannot_be_drawn_is_told() -> None:
 
 @pytest.fixture
 def forgetful() -> Iterator[None]:
-    """What was found out about renderers does not outlive the test."""
+    """Cached results about renderers do not outlive the test."""
     tumble.pictures._works.cache_clear()
     yield
     tumble.pictures._works.cache_clear()
@@ -466,7 +466,7 @@ def test_display_and_linear_are_inverse() -> None:
 
 
 def decoded(path: Path) -> tuple[dict[str, Any], list[Any]]:
-    """What a film says of itself, and its pictures."""
+    """Metadata and pictures of a film."""
     import imageio_ffmpeg
 
     reader = imageio_ffmpeg.read_frames(str(path))

@@ -134,7 +134,7 @@ def test_single_precision_ends_in_round_off() -> None:
     assert "precision=double" in measure.verdict
 
 
-# What is refined and measured
+# Refined keys and measures
 
 
 def test_paths_by_name_and_by_index(tmp_path: Path) -> None:

@@ -102,7 +102,7 @@ def test_a_pendulum_that_cannot_swing_is_told(place: float, substeps: int) -> No
     (told,) = doubts(pendulum(place, substeps))
     assert "from the origin" in told and 'precision = "double"' in told
     assert not doubts(pendulum(place, substeps, "double"))
-    # What it says helps.
+    # Its advice helps.
     if "at most" in told:
         fewer = int(told.split("at most ")[1].split()[0])
         assert fewer < substeps and (fewer == 1 or not doubts(pendulum(place, fewer)))

@@ -22,7 +22,7 @@ from tumble.branch import branch
 from tumble.folder import LEDGER, RunFolder, cell, plain, read_rows
 from tumble.run import LostFrames, simulate
 
-# What is in the folder
+# Content of the folder
 
 
 def test_the_folder_holds_what_the_design_says(reference: Run) -> None:

@@ -265,7 +265,7 @@ def test_fire_in_a_plane_glows() -> None:
 
 
 def test_waves_in_a_fluid_are_seen_though_they_start_as_a_bang() -> None:
-    """What 98 % of the cells of a frame keep is in the colours, both ways from rest."""
+    """The range of 98 % of the cells of a frame is covered by the colours, both ways from rest."""
     run = fake_run.ink("xz", 20)
     x = np.arange(40)[:, None] + 0 * np.arange(20)
     bang = 1.2 + np.where(x == 20, 0.1, 0.0) * (np.arange(20) == 10)

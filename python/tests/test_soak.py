@@ -101,7 +101,7 @@ MIXED: Tree = {
 
 @dataclass
 class Soak:
-    """What a run took, by tenths: memory at their end [bytes], time of the processor [s], sub-steps a frame, most particles of
+    """Cost of a run, by tenths: memory at their end [bytes], time of the processor [s], sub-steps a frame, most particles of
     the spray."""
 
     memory: list[int] = field(default_factory=list)
@@ -178,7 +178,7 @@ def soak(work: Callable[..., Soak], frames: int, *arguments: object, timed: bool
     )
     pace = {"ms a frame at first": each[1], "at last": each[-1]}
     note("soak", work.__name__.replace("_", " "), cases=frames, growth=f"{grown:.1f} MiB", **pace)
-    # What is freed may be given out in other pieces, and a run keeps the hash of each frame: measured, 0.1 and 0.7 MiB.
+    # Freed memory may be reused in other pieces, and a run keeps the hash of each frame: measured, 0.1 and 0.7 MiB.
     assert grown < 4, f"{grown:.1f} MiB more after the last tenth than after the first"
     assert took.works[1:] == [took.works[1]] * 9
     # Through the files of a run nobody looks at them.

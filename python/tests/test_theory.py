@@ -77,7 +77,7 @@ def texts() -> dict[str, str]:
         text = path.read_text(encoding="utf-8")
         if THEORY in path.parents:
             formulas, prose = fences(text)
-            # What ends a line of a formula is a definition; a tag before that cites.
+            # A tag at the end of a formula line is a definition; any before it cites.
             cited = [DEFINITION.sub("", line) for line in formulas.splitlines()]
             text = prose + "\n" + "\n".join(cited)
         out[path] = text

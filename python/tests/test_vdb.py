@@ -189,9 +189,9 @@ def test_errors_name_the_grid_and_the_cure() -> None:
     wrong = [
         (volume(ones, points=[2, 2, 3]), r'VDB: "g": 8 numbers, expected 1 for each of \[2, 2, 3\] voxels'),
         (volume(ones, spacing=0.0), "spacing 0 m"),
-        (volume(70_000 * ones, half=True), "70000, half precision ends at 65504; write single precision"),
-        (volume(ones, corner=[2**31 - 2, 0, 0]), "beyond the indices"),
-        (volume(ones, width=2), "2 numbers a voxel, expected 1 or 3"),
+        (volume(70_000 * ones, half=True), "70000 exceeds the range of half precision, 65504; write single precision"),
+        (volume(ones, corner=[2**31 - 2, 0, 0]), "exceed the index range"),
+        (volume(ones, width=2), "2 numbers per voxel, expected 1 or 3"),
         (volume(ones, **{"class": "fog"}), 'no class "fog"'),
     ]
     for given, text in wrong:

@@ -1,4 +1,4 @@
-"""What lies on grids, as VDB files and USD volumes: read back by OpenVDB and by the USD library."""
+"""Grids as VDB files and USD volumes: read back by OpenVDB and by the USD library."""
 
 from pathlib import Path
 

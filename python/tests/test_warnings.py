@@ -50,7 +50,7 @@ ROPE = {"name": "r", "from": [0, 0, 0], "to": [1, 0, 0], "segments": 2}
 LIQUID = {"spacing": 0.1, "fill": [{"center": [0, 0, 0], "size": [0.3, 0.3, 0.3]}]}
 SOFT = {"system": [{"method": "position_based"}]}
 DOUBTS: list[tuple[Tree, Tree, str, str, str]] = [
-    # What is doubtful, what is not, code, place, figure.
+    # Suspicious tree, sound tree, code, path, figure.
     (
         {"sheet": [SHEET | {"density": 8.1}]},
         {"sheet": [SHEET | {"density": 7.9}]},

@@ -93,7 +93,7 @@ class World:
 
     @property
     def warnings(self) -> list[dict[str, str]]:
-        """What is doubtful about the scene: code (as listed in docs/warnings.md), path and message of each."""
+        """Warnings about the scene: code (as listed in docs/warnings.md), path and message of each."""
 
     def step(self, frames: int = 1) -> dict[str, Any]:
         """Simulates frames; returns what they took: steps, rejected, step_range [s], newton, linear, residual, unconverged,
@@ -120,7 +120,7 @@ class World:
 
     @property
     def topology(self) -> Columns:
-        """What does not change. Objects: mass [kg] n, pinned (indices), triangles m x 3, links l x 2, curve (indices in
+        """Constant columns. Objects: mass [kg] n, pinned (indices), triangles m x 3, links l x 2, curve (indices in
         order), radius [m] 1. Colliders: position [m] n x 3, triangles m x 3; of moving ones frames hold
         translation [m] 3 and turn 4, x = turn p + translation, or position of vertices that move by themselves."""
 
@@ -131,7 +131,7 @@ class World:
         contacts, broken, heat and heat_in [J], volume [m³], divergence [1/s]."""
 
     def account(self) -> dict[str, Any]:
-        """Who has how much of the books, and where their worst numbers are: `systems` as (name, ledger), `shares` with system,
+        """Breakdown of the ledger, and the places of its worst numbers: `systems` as (name, ledger), `shares` with system,
         object and ledger, `worst` with measure (a number of the ledger), value, object, other, particles, id, cell. For the
         moment when a bound is broken: it takes longer than the ledger."""
 
@@ -306,14 +306,14 @@ def advect(
     corrected: bool = False,
     turning: bool = False,
 ) -> tuple[Field, ...]:
-    """What a field, or vectors on faces, become when a velocity carries them for h seconds. `trace` is how paths are followed,
+    """A field, or vectors on faces, advected by a velocity for h seconds. `trace` is how paths are followed,
     in `substeps` pieces; `corrected` adds MacCormack's correction, limited; `turning` turns vectors with the fluid."""
 
 @overload
 def diffuse(field: Field, kappa: float, duration: float) -> Field: ...
 @overload
 def diffuse(field: Vectors, kappa: float, duration: float) -> tuple[Field, ...]:
-    """What a field, or each component of vectors, becomes when it diffuses for a duration [s] with kappa [m²/s], in as many
+    """A field, or each component of vectors, diffused for a duration [s] with kappa [m²/s], in as many
     explicit steps as it takes."""
 
 def diffusion_limit(grid: Grid, kappa: float) -> float:
@@ -328,7 +328,7 @@ class Projection:
 
     @property
     def potential(self) -> Field:
-        """Whose gradient was taken: the step times the pressure over the density [m²/s]."""
+        """The potential of the removed gradient: the step times the pressure over the density [m²/s]."""
 
     @property
     def residuals(self) -> Array:

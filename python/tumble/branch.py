@@ -93,9 +93,7 @@ def world_at(run: Run, frame: int, threads: int | None = None) -> World:
             try:
                 parent = Run(lineage(run)[-1])
             except TumbleError as error:
-                raise refuse(
-                    run.folder, f"frame {k} has to be made from the run that this is a branch of: {error}"
-                ) from error
+                raise refuse(run.folder, f"frame {k} must be recomputed from the parent run: {error}") from error
             _load(world, parent, min(k, start), threads)
     if k > world.frame_index:
         if world.frame_index == start and run.descent and run.descent[-1]["set"]:
@@ -103,7 +101,7 @@ def world_at(run: Run, frame: int, threads: int | None = None) -> World:
         try:
             world.step(k - world.frame_index)
         except StepError as error:
-            raise refuse(run.folder, f"frame {k} cannot be made again: {error}") from error
+            raise refuse(run.folder, f"frame {k} cannot be recomputed: {error}") from error
     if world.hash() != run.hashes[k]:
         made, own = run.manifest.get("tumble"), _version()
         why = (
@@ -112,7 +110,7 @@ def world_at(run: Run, frame: int, threads: int | None = None) -> World:
             else "its bits hold for another machine"
         )
         there = ", ".join(map(str, files.checkpoints())) or "none"
-        text = f"frame {k} cannot be made again to the same bits: {why}; frames with a checkpoint: {there}"
+        text = f"frame {k} cannot be recomputed to the same bits: {why}; frames with a checkpoint: {there}"
         raise refuse(run.folder, text)
     return world
 
@@ -184,18 +182,16 @@ def _scene(parent: Run, changes: Sequence[str], frame: int, frames: int | None) 
     scene = _instead_of_links(own, own.replace(*changes, *more))
     tree = scene.to_dict()
     if tree["time"]["fps"] != parent.fps:
-        text = f"{tree['time']['fps']:g}, the frames so far were {parent.fps:g} a second; leave time.fps as it is"
+        text = f"{tree['time']['fps']:g}, earlier frames have {parent.fps:g} per second; leave time.fps unchanged"
         raise _wrong("time.fps", text)
     if tree["time"]["frames"] <= frame:
         last = tree["time"]["frames"]
-        raise _wrong(
-            "time.frames", f"{last}, nothing is left to simulate after frame {frame}; ask for more with --frames"
-        )
+        raise _wrong("time.frames", f"{last}, no frames are left after frame {frame}; request more with --frames")
     return scene
 
 
 def _instead_of_links(own: Scene, scene: Scene) -> Scene:
-    """What a surface resists stretch with comes instead of links that nobody gave, as it does in a scene's file; the resolved
+    """The stretch model of a surface replaces links that were not given, as it does in a scene's file; the resolved
     scene of a run has those written out."""
     before, after = own.to_dict(), scene.to_dict()
     changed = False
@@ -260,9 +256,9 @@ def _load(world: World, parent: Run, frame: int, threads: int | None) -> None:
             world.load(path)
         except SceneError as error:
             text = (
-                f"the state of frame {frame} does not fit into the changed scene ({error}). A branch can change what acts and "
-                "how strongly: forces, stiffness, damping, colliders, steps, and integrators that keep the same state; not how "
-                "many things there are, nor precision. For that, run the scene anew with `tumble run`"
+                f"the state of frame {frame} does not fit into the changed scene ({error}). A branch can change forces, "
+                "stiffness, damping, colliders, steps, and integrators with the same state, but neither the number of objects "
+                "nor precision. For that, run the changed scene with `tumble run`"
             )
             raise refuse(parent.folder, text) from error
 

@@ -18,7 +18,7 @@ GRIDS = ("heat", "compressible", "gas")
 """Things that lie on grids."""
 
 _UNSAFE = re.compile(r"/|\^|\b(sqrt|ln|log10|pow|exp|tan|asin|acos|sinh|cosh|mod)\b")
-"""What in a formula may give no finite number."""
+"""Parts of a formula that may give non-finite numbers."""
 
 _STRETCHED = 1.05
 """Stretch of links at the start that is worth telling."""
@@ -36,7 +36,7 @@ _GROWN = 0.1
 def likely(
     world: World, scene: Mapping[str, Any], report: Mapping[str, Any], run: "Run", near: Sequence[str] = ()
 ) -> list[str]:
-    """What may have caused a break, in words with figures, the likeliest first. `world` stands at its last good frame, `run`
+    """Possible causes of a failure, as text with figures, the likeliest first. `world` stands at its last good frame, `run`
     has the frames so far, and `near` tells of masses that came too near each other."""
     found = [str(report["cause"])] if report.get("cause") else []
     found += _too_long(world, scene, report)
@@ -67,7 +67,7 @@ def _too_long(world: World, scene: Mapping[str, Any], report: Mapping[str, Any])
         return
     step, stable = float(report["step"]), float(report["stable_step"])
     if stable == 0.0 < step:
-        yield f"{report['integrator']} has no stable step for this system: it gains energy at any"
+        yield f"{report['integrator']} gains energy on this system at any step"
     elif step > stable:
         text = f"steps of {_seconds(step)} are {step / stable:.3g} times the largest stable one, {_seconds(stable)}"
         about = next((s for s in world.stability() if s["system"] == report["system"]), None)
@@ -118,7 +118,7 @@ def _texts(path: str, value: Any) -> Iterator[tuple[str, str]]:
 
 
 def _started(scene: Mapping[str, Any], run: "Run") -> Iterator[str]:
-    """What was wrong at the start."""
+    """Faults at the start."""
     start = {key: float(run.ledger[key][0]) for key in ("stretch", "penetration", "intersections")}
     if start["intersections"]:
         yield f"surfaces started with {start['intersections']:.0f} edges through triangles"

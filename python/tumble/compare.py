@@ -1,4 +1,4 @@
-"""Where two runs stop being the same: the first frame, object, column and element whose bits differ."""
+"""Comparison of two runs: the first frame, object, column and element whose bits differ."""
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
@@ -64,7 +64,7 @@ class ColumnDifference:
 
 @dataclass(frozen=True)
 class Comparison:
-    """What comparing two runs found."""
+    """Result of comparing two runs."""
 
     runs: tuple[Path, Path]
     frames: tuple[int, int]
@@ -82,12 +82,12 @@ class Comparison:
     hashes: tuple[str, str] | None
     """The states' hashes there; None where they are the same."""
     columns: list[ColumnDifference] = field(default_factory=list)
-    """What differs there, in the order of columns; columns of the ledger belong to the object "ledger". Empty where only the
+    """Differences there, in the order of columns; columns of the ledger belong to the object "ledger". Empty where only the
     hashes differ: what does is not among the columns that are kept."""
     seen: int | None = None
     """The first frame at which a column of an object differs."""
     seen_columns: list[ColumnDifference] = field(default_factory=list)
-    """What differs there."""
+    """Differences there."""
     unlike: list[str] = field(default_factory=list)
     """Objects and columns that only one of the runs keeps, in words."""
     scenes: str | None = None
@@ -153,10 +153,10 @@ def at(a: "Run", b: "Run", frame: int) -> list[ColumnDifference]:
 
 
 def _alike(a: "Run", b: "Run") -> list[str]:
-    """What only one of them keeps, in words. Refuses runs of different things."""
+    """Columns stored by only one of them, as text. Refuses runs of different objects."""
     if a.fps != b.fps:
         raise refuse(
-            b.folder, f"has {b.fps:g} frames a second, {a.folder} has {a.fps:g}: no two frames are of one time"
+            b.folder, f"has {b.fps:g} frames per second, {a.folder} has {a.fps:g}: their frames are at different times"
         )
     mine, theirs = a.columns, b.columns
     for here, there, run, other in ((mine, theirs, a, b), (theirs, mine, b, a)):
@@ -170,14 +170,12 @@ def _alike(a: "Run", b: "Run") -> list[str]:
         for column in dict.fromkeys([*table, *theirs[name]]):
             if column not in table or column not in theirs[name]:
                 where = a.folder if column in table else b.folder
-                unlike.append(f'{column} of "{name}" is kept in {where} alone')
+                unlike.append(f'{column} of "{name}" is stored only in {where}')
                 continue
             one, other = table[column]["shape"], theirs[name][column]["shape"]
             if one != other:
                 text = f'{column} of "{name}" is {_shape(other)}, in {a.folder} {_shape(one)}'
-                raise refuse(
-                    b.folder, f"{text}: the runs differ in resolution, element by element there is nothing to compare"
-                )
+                raise refuse(b.folder, f"{text}: the runs differ in resolution and cannot be compared by element")
     return unlike
 
 
@@ -261,7 +259,7 @@ def _differ(name: str, column: str, unit: str, a: Array, b: Array, ids: Array | 
 
 
 def _unequal(a: Array, b: Array) -> npt.NDArray[np.bool_]:
-    """Where the bits differ; of numbers in two precisions, those of the lower one."""
+    """Mask of differing bits; for numbers in two precisions, in the lower one."""
     if a.dtype != b.dtype and a.dtype.kind == b.dtype.kind == "f":
         lower = min(a.dtype, b.dtype, key=lambda kind: kind.itemsize)
         with np.errstate(over="ignore"):

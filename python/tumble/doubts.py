@@ -1,4 +1,4 @@
-"""What the books of a run are doubtful about; docs/warnings.md lists the codes."""
+"""Warnings about the ledger of a run; docs/warnings.md lists the codes."""
 
 import math
 from collections.abc import Iterator, Mapping
@@ -25,7 +25,7 @@ def of_books(run: "Run") -> list[dict[str, str]]:
 
 @dataclass(frozen=True)
 class Remedy:
-    """What keeps energy from growing out of nowhere: what was seen and its likely cause, and what to change."""
+    """Advice against energy growth without a source: the observation, its likely cause, and the change."""
 
     text: str
     changes: list[str]
@@ -56,7 +56,7 @@ def remedy(run: "Run") -> Remedy | None:
         shorter = f"step={step / 4.0:.2g}" if plan.get("step") else f"substeps={n}"
         cause, changes = f"steps of {step:.2e} s are too long", [f"system.{k}.{shorter}"]
     text = (
-        f"the energy grew by {grown.times:.3g} times its scale, from frame {grown.frame} on, and nothing in the scene gives "
+        f"the energy grew by {grown.times:.3g} times its scale, from frame {grown.frame} on, and nothing in the scene adds "
         f"any: {cause}. Try {' '.join(changes)}"
     )
     return Remedy(text, changes)

@@ -24,7 +24,7 @@ PIECES = 1000
 
 @dataclass
 class Forecast:
-    """What an emitter is expected to hold, at the times `t` [s]."""
+    """Expected numbers of an emitter, at the times `t` [s]."""
 
     name: str
     words: Tree

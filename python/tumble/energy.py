@@ -31,7 +31,7 @@ _TAKE = {"drag", "wind", "air", "viscosity", "flock", "propulsion"}
 
 
 def sources(scene: Tree) -> list[str]:
-    """What may give energy to masses, beside springs, gravity and each other, which are in the books."""
+    """Possible sources of energy besides springs, gravity and mutual forces, which are in the ledger."""
     found = [f"force.{i} ({f['kind']})" for i, f in enumerate(scene["force"]) if f["kind"] in _GIVE or _open(f)]
     found += [f'collider "{c["name"]}"' for c in scene["collider"] if _moves(c)]
     found += [f'emitter "{e["name"]}"' for e in scene["emitter"]]
@@ -42,7 +42,7 @@ def sources(scene: Tree) -> list[str]:
 
 
 def sinks(scene: Tree) -> list[str]:
-    """What takes energy from masses."""
+    """Sinks of energy."""
     found = [f"force.{i} ({f['kind']})" for i, f in enumerate(scene["force"]) if f["kind"] in _TAKE or _open(f)]
     found += [f'collider "{c["name"]}"' for c in scene["collider"]]
     found += [f'emitter "{e["name"]}"' for e in scene["emitter"] if e["lifetime"] is not None or e["kill"]]
@@ -141,7 +141,7 @@ def from_nowhere(run: "Run") -> Growth | None:
     given = sources({**scene, "emitter": [e for e in scene["emitter"] if e not in steady]})
     if fluids or given or run.n_frames < 2 or not run.ledger["mass"].any():
         return None
-    # What a branch was given at its start is no growth.
+    # Energy given to a branch at its start is not growth.
     start = run.descent[-1]["frame"] if run.descent else 0
     found = growth({name: column[start:] for name, column in run.ledger.items()})
     found = Growth(found.times, start + found.frame)
@@ -175,7 +175,7 @@ class Encounter:
 
 
 def encounters(run: "Run", frames: Iterable[int], step: float) -> list[Encounter]:
-    """What came too near for steps of so many seconds, in some frames of a run."""
+    """Masses that came too near for a given step, in some frames of a run."""
     found: dict[int, Encounter] = {}
     columns = [run.frame(i) for i in frames if 0 <= i < run.n_frames]
     for i in unsoftened(run.scene):
@@ -265,7 +265,7 @@ def attempt(scene: Scene, sets: Sequence[str], frames: int) -> dict[str, Any]:
 
 
 def told(one: Encounter) -> str:
-    """What came near, in words."""
+    """The near masses, as text."""
     whom = "its centre" if one.kind == "attraction" else "each other"
     return f"force.{one.force} ({one.kind}) has no softening, and masses came within {one.distance:.2g} m of {whom}"
 

@@ -34,7 +34,7 @@ class Broken:
     text: str
     """All of that in a sentence, with the culprit."""
     culprit: dict[str, Any] = field(default_factory=dict)
-    """Who broke it, as far as is known: system, object, other, particles, id, cell."""
+    """The violator, as far as known: system, object, other, particles, id, cell."""
 
     def to_dict(self) -> dict[str, Any]:
         return asdict(self)
@@ -69,7 +69,7 @@ _KEPT = {
     "max_energy_drift": "energy",
     "max_energy_growth": "energy",
 }
-"""What must be kept, and the number of the ledger that has it."""
+"""Conserved quantities, and their numbers in the ledger."""
 
 
 def count(scene: Mapping[str, Any]) -> int:
@@ -96,7 +96,7 @@ class _Relative:
 
 
 class Measures:
-    """What bounds on curves are for, frame by frame."""
+    """Values of the bounded curves, frame by frame."""
 
     def __init__(self) -> None:
         self._first: Row | None = None
@@ -217,7 +217,7 @@ def _changed(account: Mapping[str, Any], start: Mapping[str, Any], name: str) ->
 
     if name != "energy":
         return _most(account, change, start)
-    # What stretches between objects, or acts on them, is the system's.
+    # Anchors between objects and forces on them belong to the system.
     culprit = _most({**account, "shares": []}, change, start)
     fastest = _worst(account, "speed")
     return culprit | {"fastest": fastest} if culprit and fastest else culprit

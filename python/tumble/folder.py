@@ -54,7 +54,7 @@ COUNTS = {
 """Columns of tables that hold whole numbers; those of `frame` in the ledger count its rows."""
 
 STATIC = "static"
-"""What the archive of what does not change says of itself."""
+"""Header of the archive of constant columns."""
 
 LOCK = ".lock"
 """Says who writes here, while somebody does."""
@@ -67,11 +67,11 @@ volumes/*.vdb slices/*.png
 minimal.toml
 run.json
 """
-"""What a run writes and --force deletes, in this order: a stop on the way leaves frames that can be read, and the manifest goes
-last, because a folder without it is not taken for a run."""
+"""Files that a run writes and --force deletes, in this order: a stop on the way leaves frames that can be read, and
+the manifest goes last, because a folder without it is not taken for a run."""
 
 _FOLDERS = ("frames", "checkpoints", "stills", "usd", "ply", "volumes", "slices")
-"""Where it writes them."""
+"""Subfolders of a run."""
 
 
 class DamageError(ExportError):
@@ -79,7 +79,7 @@ class DamageError(ExportError):
 
 
 class RunFolder:
-    """Where everything is."""
+    """Paths of all files."""
 
     def __init__(self, path: str | os.PathLike[str]) -> None:
         self.path = Path(path)
@@ -195,11 +195,11 @@ def reason(error: OSError) -> str:
     kept = "; what was finished before is readable"
     match error.errno:
         case errno.ENOSPC | errno.EDQUOT:
-            text = f"no space left on the disk{kept}: free some, then go on with --resume"
+            text = f"no space left on the disk{kept}: free some, then continue with --resume"
         case errno.EACCES | errno.EPERM | errno.EROFS:
             text = f"this place cannot be written ({error.strerror}); choose another one with --out"
         case errno.ENAMETOOLONG | errno.ELOOP | errno.EINVAL:
-            text = f"this is no place for a folder ({error.strerror}); choose another one with --out"
+            text = f"this location cannot hold a folder ({error.strerror}); choose another one with --out"
         case errno.ENOENT:
             text = "the folder has vanished, or cannot be made; choose another one with --out"
         case errno.ENOTDIR | errno.EEXIST:
@@ -240,7 +240,7 @@ def share(source: Path, path: Path) -> None:
 
 
 def marked(frame: int, state: str) -> str:
-    """What the archive of a frame says of itself."""
+    """Header of the archive of a frame."""
     return f"frame {frame}, state {state}"
 
 
@@ -248,7 +248,7 @@ def write_columns(path: Path, columns: Columns, mark: str = "") -> None:
     """Columns as an uncompressed .npz with keys `object/column`, and a mark by which it is known."""
     arrays = {f"{name}/{column}": array for name, table in columns.items() for column, array in table.items()}
     if any("\0" in key for key in arrays):
-        raise ExportError(f"{path}: the name of an object has a NUL in it, where names in archives end; rename it")
+        raise ExportError(f"{path}: the name of an object contains a NUL, which ends names in archives; rename it")
     buffer = io.BytesIO()
     np.savez(buffer, **arrays)  # type: ignore[arg-type]
     seal(buffer, mark)
@@ -291,7 +291,7 @@ def _opened(path: Path, mark: str, whole: bool = False) -> Iterator[zipfile.ZipF
             size = path.stat().st_size
             # Members of ours are not compressed: others could take any amount of memory.
             if sum(member.file_size for member in archive.infolist()) > size:
-                raise ValueError("it holds less than it says")
+                raise ValueError("it contains less than it declares")
             if mark:
                 found, _, total = archive.comment.decode(errors="replace").rpartition(", sum ")
                 if found != mark:
@@ -309,7 +309,7 @@ def _opened(path: Path, mark: str, whole: bool = False) -> Iterator[zipfile.ZipF
 
 
 _OF_DAMAGE = (None, errno.EINVAL, errno.EISDIR, errno.ENOTDIR)
-"""What the system says where an archive leads to places that are not there, or where there is something else."""
+"""Errors of the system for archives that point to missing or wrong positions."""
 
 
 def _sum(file: IO[bytes], size: int) -> int:
@@ -333,7 +333,7 @@ def _array(archive: zipfile.ZipFile, key: str) -> npt.NDArray[Any]:
             or dtype.itemsize * math.prod(shape) != archive.getinfo(key).file_size - file.tell()
         ):
             raise ValueError(f"{key!r} is no array of {shape} numbers")
-    with archive.open(key) as file:  # Where one goes back in a member, newer Pythons no longer check its sum.
+    with archive.open(key) as file:  # After seeking back in a member, newer Pythons no longer check its sum.
         return np.asarray(np.lib.format.read_array(file))
 
 

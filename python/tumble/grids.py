@@ -1,4 +1,4 @@
-"""What objects on grids keep in a run: where the grid lies, what each column is, and what follows from columns.
+"""Grid objects in a run: position of the grid, kinds of columns, and derived columns.
 
 Columns lie on the cells, in arrays of the shape (nx, ny, nz) or (nx, ny, nz, width), without the flat axis in a plane;
 `velocity_x` and so on lie on the faces of their axis. Everything here is given with three axes: a plane is one cell thick.
@@ -61,7 +61,7 @@ class Box:
         return np.stack(np.meshgrid(*zip(low, high, strict=True), indexing="ij"), axis=-1).reshape(-1, 3)
 
     def points(self, axis: int) -> Floats:
-        """Where the middles of the cells lie along an axis [m]."""
+        """Positions of the cell centres along an axis [m]."""
         return np.asarray(self.origin[axis] + self.spacing * (np.arange(self.cells[axis]) + 0.5), dtype=float)
 
     def holds(self, array: Array) -> bool:

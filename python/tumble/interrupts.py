@@ -9,7 +9,7 @@ from types import FrameType
 
 @contextmanager
 def held() -> Iterator[None]:
-    """What is within is done to its end, and only then stopped by a signal that came meanwhile. Where it raises, its error is
+    """Completes the enclosed block before acting on a signal that came meanwhile. Where it raises, its error is
     told."""
     # Others than Python's own handlers stop nothing in the midst of a file, and only the main thread is stopped by those.
     former = {s: h for s in (signal.SIGTERM, signal.SIGINT) if callable(h := signal.getsignal(s))}

@@ -56,7 +56,7 @@ _THINGS = (
 _LISTS = (*_THINGS, "collider", "anchor", "field", "force", "system")
 
 _TOLD = ("title", "output", "camera", "expect")
-"""What changes nothing of what is simulated."""
+"""Keys without effect on the simulation."""
 
 _PAINT = ("color", "trail")
 
@@ -94,7 +94,7 @@ class Minimal:
     """Of its breakdown."""
     trials: int
     sizes: dict[str, tuple[int, int]]
-    """What became smaller, from what: things, elements and frames as (now, before)."""
+    """Reductions: objects, elements and frames as (now, before)."""
 
     @property
     def text(self) -> str:
@@ -147,7 +147,7 @@ def write(found: Minimal, path: Path, command: str) -> None:
 
 
 def told(report: Mapping[str, Any]) -> str:
-    """What breaks, in a line."""
+    """The failure, in one line."""
     kind = str(report.get("kind", "")).replace("_", " ")
     where = f'{report["column"]} of "{report["object"]}"' if "object" in report else f'system "{report.get("system")}"'
     when = f" at t = {report['time']:.6g} s" if isinstance(report.get("time"), float) else ""
@@ -189,7 +189,7 @@ class _Search:
         }
         self.kept |= {("system", i) for i, s in enumerate(full["system"]) if s["name"] == report.get("system")}
 
-    # What is tried
+    # Trials
 
     def leave_out_things(self) -> None:
         """All but the culprit and its system; else halves, quarters and so on of the rest."""
@@ -406,7 +406,7 @@ class _Search:
         return None
 
     def _fault(self, report: Mapping[str, Any], tree: Tree) -> tuple[Any, ...]:
-        """What must stay the same of a break (breakdown.4)."""
+        """Invariants of a failure (breakdown.4)."""
         step, stable = float(report.get("step") or 0.0), float(report.get("stable_step", math.inf))
         long = step > stable
         cause = report.get("cause") or report.get("message") or ""

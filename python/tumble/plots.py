@@ -204,7 +204,7 @@ def _expanded(run: Recording, name: str) -> list[str]:
 
 
 def _label(names: Sequence[str], symbol: str) -> str:
-    """What an axis shows: a column, or the vector whose parts they are; of several, only the unit."""
+    """Label of an axis: a column, or the vector whose parts they are; of several, only the unit."""
     stems = {name[:-2] if name.endswith(("_x", "_y", "_z")) else name for name in names}
     words = stems.pop().replace("_", " ") if len(stems) == 1 else "" if symbol else "count"
     return f"{words} [{symbol}]".strip() if symbol else words

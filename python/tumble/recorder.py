@@ -46,7 +46,7 @@ _EMPTY_REPORT: dict[str, Any] = {}
 
 
 class Unchanging(NamedTuple):
-    """What is written once, of a world at its start: later masses and links may be others, where cloth has torn."""
+    """Data written once, of a world at its start: later masses and links may be others, where cloth has torn."""
 
     static: Columns
     described: dict[str, dict[str, Any]]

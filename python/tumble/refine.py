@@ -78,7 +78,7 @@ class Measure:
     order: float = math.nan
     """With the three finest."""
     limit: float = math.nan
-    """Where it tends to: the finest value, less its estimated error."""
+    """Its limit: the finest value less its estimated error."""
     error: float = math.nan
     """Estimated error of the finest value, positive."""
     verdict: str = ""
@@ -115,7 +115,7 @@ class Measure:
 
 @dataclass
 class Study:
-    """What refining a scene showed."""
+    """Result of refining a scene."""
 
     scene: Scene
     folder: Path
@@ -229,13 +229,13 @@ def _too_long(world: World) -> list[str]:
         if float(about["step"]) > usable:
             found.append(
                 f'system "{about["system"]}" takes steps of {about["step"]:.3g} s, usable are {usable:.3g} s by estimate: '
-                "it is likely to break. Halved distances ask for half the step, with internal damping for a quarter: take more "
+                "it is likely to fail. Half the spacing needs half the step, with internal damping a quarter: use more "
                 f"substeps, or refine them with --what system.{k}.substeps*4"
             )
     return found
 
 
-# What is refined
+# Refined keys
 
 
 def plan(scene: Scene, levels: int, what: Sequence[str] = ()) -> tuple[list[Refined], list[dict[str, str]]]:
@@ -277,7 +277,7 @@ def plan(scene: Scene, levels: int, what: Sequence[str] = ()) -> tuple[list[Refi
             {
                 "code": "unrefined-steps",
                 "path": f'system "{system["name"]}"',
-                "message": f"its steps are its own at every level; --what system.{i}.substeps refines them, too",
+                "message": f"its steps are the same at every level; --what system.{i}.substeps refines them, too",
             }
             for i, system in own
         ]
@@ -382,7 +382,7 @@ def _wrong(path: str, text: str) -> SceneError:
     return error
 
 
-# What is measured
+# Measures
 
 
 _OVER_TIME: dict[str, Callable[["npt.NDArray[np.float64]"], Any]] = {
@@ -457,7 +457,7 @@ def _order(before: float, after: float, factor: float) -> float:
     return math.log(ratio) / math.log(factor)
 
 
-# What is written
+# Output
 
 
 def write(found: Study) -> list[Path]:

@@ -286,7 +286,7 @@ class Run:
 
     @cached_property
     def static(self) -> Columns:
-        """What does not change: masses, links, triangles, colliders; see `World.topology`."""
+        """Constant columns: masses, links, triangles, colliders; see `World.topology`."""
         return self._sound(read_columns(self._files.static, STATIC), "static", self._files.static)
 
     @cached_property
@@ -317,7 +317,7 @@ class Run:
         return self._sound(read_columns(path, self.mark(i)), "frames", path)
 
     def mark(self, i: int) -> str:
-        """What the file of a frame says of itself."""
+        """Header of the file of a frame."""
         return marked(self._index(i), self._rows[i][-1])
 
     def time(self, i: int) -> float:

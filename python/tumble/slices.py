@@ -1,4 +1,4 @@
-"""What lies on a grid, in a plane: one picture for each column, with its colours and its unit.
+"""Slices of grids: one picture for each column, with its colours and its unit.
 
 slices(run, "slice.png")                                    everything that the last frame has
 slices(run, "slice.png", ["pressure"], frame=10, axis="z", at=0.5)
@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
 ORDER = ("density", "temperature", "fuel", "speed", "pressure", "vorticity", "divergence")
-"""What is drawn if nothing is asked for, as far as the frame has it; then all else."""
+"""Default columns, as far as the frame has them; then all others."""
 
 AXES = "xyz"
 
@@ -101,7 +101,7 @@ def _object(run: Recording, thing: str | None) -> tuple[str, Box]:
 
 
 def _place(grid: Box, across: int, at: float | None) -> tuple[float, float]:
-    """Where the plane is, in cells above the middle of the first one, and in metres."""
+    """Position of the plane, in cells above the centre of the first one, and in metres."""
     low, high = float(grid.origin[across]), float(grid.origin[across] + grid.size[across])
     if grid.flat < 3 or at is None:
         at = round(0.5 * (low + high) / grid.spacing, 3) * grid.spacing

@@ -29,7 +29,7 @@ _INDICES = ("pinned", "triangles", "links", "curve")
 
 
 def fault_of_manifest(manifest: Mapping[str, Any]) -> str | None:
-    """What is wrong with a manifest."""
+    """Fault in a manifest."""
     for key, kind in _MANIFEST.items():
         if key in manifest and (not isinstance(manifest[key], kind) or isinstance(manifest[key], bool)):
             return f'"{key}" is {manifest[key]!r}'
@@ -63,7 +63,7 @@ def _missing(whole: Any, tree: Any, path: str = "") -> str | None:
 
 
 def fault_of_columns(described: Any) -> str | None:
-    """What is wrong with the description of the columns."""
+    """Fault in the description of the columns."""
     if not isinstance(described, dict):
         return "it is no table of objects"
     for name, table in described.items():
@@ -83,7 +83,7 @@ def fault_of_columns(described: Any) -> str | None:
 def fault_of_arrays(
     columns: Mapping[str, Mapping[str, npt.NDArray[Any]]], described: Mapping[str, Any], place: str
 ) -> str | None:
-    """What is wrong with the arrays of a file. Particles come and go, and surfaces that tear get more points."""
+    """Fault in the arrays of a file. Numbers of particles vary, and tearing surfaces get more points."""
     for name, table in described.items():
         count = columns[name]["id"].size if place == "frames" and "id" in columns.get(name, {}) else None
         for column, entry in table.items():

@@ -6,10 +6,10 @@ from tumble._engine import Scene
 
 Schema = dict[str, Any]
 
-HEAD = """# Every word of a scene
+HEAD = """# Scene reference
 
 Generated from the schema by `python -m tumble.words`; a test keeps it up to date. A scene is a TOML or JSON file or a
-Python dict. Lengths are in metres, z is up; a key without a default must be given.
+Python dict. Lengths are in metres, z is up; a key without a default is required.
 
 ```toml
 version = 1
@@ -23,17 +23,17 @@ resolution = [20, 12]                          # masses along each side, x first
 links = { structural = 500.0, shear = { modulus = 200.0, damping = 0.1 }, bend = 5.0 }
 pin = ["corner 0 0", "edge x-", { center = [0.5, 0.3, 0.0], radius = 0.1 }]
 [[force]]
-kind = "drag"                                  # forces and fields are told apart by their kind
+kind = "drag"                                  # `kind` selects the type of a force or field
 rate = 0.2
 [[collider]]
 name = "ball"
-shape = { sphere = { radius = 0.3 } }          # shapes by their one key
+shape = { sphere = { radius = 0.3 } }          # the single key selects the type of a shape
 [[collider]]
 name = "bunny"
 shape = { mesh = { path = "bunny.ply" } }
 ```
 
-Only masses collide with solids: between two masses a sheet may cut into a sharp edge, and what is thin may pass. Where
+Only masses collide with solids: between two masses a sheet may cut into a sharp edge, and thin objects may pass through. Where
 that matters, give the collider `edges = true` and the system `self_contact`."""
 
 
@@ -101,7 +101,7 @@ def _branch(branch: Schema, definitions: dict[str, Schema]) -> list[str]:
 
 def _table(schema: Schema, definitions: dict[str, Schema]) -> list[str]:
     required = schema.get("required", [])
-    lines = ["| key | what | type | default |", "|---|---|---|---|"]
+    lines = ["| key | description | type | default |", "|---|---|---|---|"]
     for key, value in schema.get("properties", {}).items():
         if key == "kind" and "const" in value:
             continue

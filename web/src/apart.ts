@@ -28,7 +28,7 @@ export function ofPositions(objects: string[]): Measure {
   };
 }
 
-/** What is shown of a grid, as numbers, and in which unit. */
+/** Values of a grid that are shown, and their unit. */
 function shown(columns: Record<string, Column>, field: string): { values: Numbers; column: Column } | null {
   const column = columns[field] ?? (field === "speed" ? columns.velocity : undefined);
   return column ? { values: scalars(column), column } : null;

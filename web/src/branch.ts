@@ -10,7 +10,7 @@ export interface Change {
   to: Value | null;
 }
 
-/** What a world began with: what is set beside its text, all of its values, and the hash of its first state. */
+/** Start of a world: overrides of its text, all of its values, and the hash of its first state. */
 export interface Start {
   overrides: Map<string, Value>;
   scene: Record<string, unknown>;
@@ -28,7 +28,7 @@ export interface Branch {
   overrides: Map<string, Value>;
   start: Start;
   history: Change[];
-  /** What was changed since, each value once, and from which frame on the ways are two. */
+  /** Later changes, each value once, and the frame at which the branches separate. */
   changes: Change[];
   at: number;
 }
@@ -44,7 +44,7 @@ export function gather(history: Change[], change: Change): Change[] {
   return [...history.filter((c) => c.path !== change.path || c.frame !== change.frame), change];
 }
 
-/** What was changed in all, each value once: from what it was first to what it is now. */
+/** All changes, each value once: from its first to its current value. */
 export function merged(changes: Change[], change: Change): Change[] {
   const first = changes.find((c) => c.path === change.path);
   return first ? changes.map((c) => (c === first ? { ...c, to: change.to } : c)) : [...changes, change];

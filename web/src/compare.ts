@@ -20,13 +20,13 @@ const told = ({ path, from, to, frame }: Change): string => `${path ? `${path}: 
 const names = (objects: SceneInfo["objects"]): string[] => objects.map((o) => o.name);
 
 export class Comparison {
-  /** What was changed, and what can be done with the old way. */
-  readonly bar = h("section", { class: "before", "aria-label": "Before and now", hidden: true });
+  /** The changes, and the actions on the previous branch. */
+  readonly bar = h("section", { class: "before", "aria-label": "Previous and current branch", hidden: true });
   /** How far apart, against time. */
   readonly chart: HTMLElement;
   private readonly plot: Plot;
   private readonly title = h("h2", {});
-  private readonly value = h("output", { class: "value", "aria-label": "How far apart now", "aria-live": "off" });
+  private readonly value = h("output", { class: "value", "aria-label": "Current distance", "aria-live": "off" });
   private readonly what = h("span", {});
   private readonly ghost: Ghost;
   private seen: "now" | "before" | "difference" = "now";
@@ -42,7 +42,7 @@ export class Comparison {
     private readonly drawn: () => void,
   ) {
     this.ghost = new Ghost(stage.scene);
-    this.plot = new Plot([{ label: "apart", color: 4, width: 2, spans: true }], { label: "How far the two ways are apart, against time", x: "time [s]", height: 140, mark: () => session.shown?.time ?? null });
+    this.plot = new Plot([{ label: "apart", color: 4, width: 2, spans: true }], { label: "Distance between the branches against time", x: "time [s]", height: 140, mark: () => session.shown?.time ?? null });
     this.chart = h("div", { class: "energy apart", hidden: true }, this.title, h("ul", { class: "curves" }, h("li", {}, this.what, this.value)), this.plot.element);
     session.on("before", () => this.open());
     session.on("loaded", () => this.open());
@@ -121,31 +121,31 @@ export class Comparison {
     if (changes.length > 3) changes.splice(3, changes.length, `and ${before.changes.length - 3} more`);
     const parts: (HTMLElement | null)[] = [
       massesOf(before.info).length
-        ? check("Ghost of the old way", this.ghostly, (on) => {
+        ? check("Ghost of the previous branch", this.ghostly, (on) => {
             this.ghostly = on;
             this.again();
           })
         : null,
       fits
-        ? choice("Way seen", [["now", "that of now"], ["before", "the old one"], ["difference", "difference"]], this.seen, (v) => {
+        ? choice("Branch shown", [["now", "current"], ["before", "previous"], ["difference", "difference"]], this.seen, (v) => {
             this.seen = v as typeof this.seen;
             this.again();
           })
         : null,
       masses.length && grids.length
-        ? choice("Apart in", [["positions", "positions"], ["field", "field"]], this.measured, (v) => {
+        ? choice("Distance in", [["positions", "positions"], ["field", "field"]], this.measured, (v) => {
             this.measured = v as typeof this.measured;
             this.draw();
           })
         : null,
       this.shorter ? this.runButton() : null,
-      h("button", { type: "button", class: "button", onclick: () => void this.session.takeBefore() }, "Take the old one again"),
-      h("button", { type: "button", class: "button", onclick: () => void this.session.forgetBefore() }, "Forget it"),
+      h("button", { type: "button", class: "button", onclick: () => void this.session.takeBefore() }, "Return to the previous branch"),
+      h("button", { type: "button", class: "button", onclick: () => void this.session.forgetBefore() }, "Discard it"),
     ];
     this.bar.replaceChildren(
-      h("div", { class: "before-head" }, h("h2", {}, "Before and now"), h("p", { class: "changes" }, changes.join("; "))),
+      h("div", { class: "before-head" }, h("h2", {}, "Previous and current branch"), h("p", { class: "changes" }, changes.join("; "))),
       h("div", { class: "before-acts" }, ...parts),
-      h("p", { class: "muted" }, `The old way stands at frame ${before.way.last}, hash `, h("code", {}, before.hash)),
+      h("p", { class: "muted" }, `The previous branch is at frame ${before.way.last}, hash `, h("code", {}, before.hash)),
     );
     this.draw();
   }
@@ -157,7 +157,7 @@ export class Comparison {
   }
 
   private runButton(): HTMLButtonElement {
-    const button = h("button", { type: "button", class: "button catch-up" }, "Run the old one as far");
+    const button = h("button", { type: "button", class: "button catch-up" }, "Advance the previous branch as far");
     button.onclick = () => {
       if (this.running) {
         this.running = false;
@@ -215,7 +215,7 @@ export class Comparison {
     this.plot.set([times, times.map((_, i) => this.at(i, field))]);
     const now = session.shown ? this.at(session.shown.index, field) : null;
     this.title.replaceChildren("Apart", h("span", { class: "unit" }, field ? field.unit : "m"));
-    this.what.textContent = !this.alike ? "frames of other lengths: not compared" : field ? `rms difference of ${field.name}` : "rms distance of the same masses";
+    this.what.textContent = !this.alike ? "frame sizes differ: not compared" : field ? `rms difference of ${field.name}` : "rms distance of corresponding masses";
     this.value.textContent = show(now, 3);
   }
 

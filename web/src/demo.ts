@@ -30,4 +30,4 @@ export async function asScene(toml: string, frames: number): Promise<void> {
 }
 
 export const asSceneButton = (act: () => Promise<void>): HTMLButtonElement =>
-  h("button", { type: "button", class: "button", title: "With its text and all its values", onclick: () => void act() }, "As a scene");
+  h("button", { type: "button", class: "button", title: "With its text and all values", onclick: () => void act() }, "Open as a scene");

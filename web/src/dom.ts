@@ -99,6 +99,6 @@ export function saveAs(blob: Blob, name: string): void {
   setTimeout(() => URL.revokeObjectURL(link.href), 10_000);
 }
 
-/** What a page must end when it is left. */
+/** Cleanup when a page is left. */
 export type Leave = () => void;
 export type Page = (main: HTMLElement, rest: string) => Leave | Promise<Leave>;

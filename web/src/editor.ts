@@ -49,7 +49,7 @@ export class Editor {
           syntaxHighlighting(style),
           EditorView.lineWrapping,
           look,
-          EditorView.contentAttributes.of({ "aria-label": "Text of the scene, TOML", tabindex: "0" }),
+          EditorView.contentAttributes.of({ "aria-label": "Scene text, TOML", tabindex: "0" }),
           // Tab leaves the editor, as everywhere on the page.
           keymap.of([{ key: "Mod-Enter", run: () => (run(), true) }, ...defaultKeymap, ...historyKeymap]),
         ],

@@ -8,7 +8,7 @@ type Settings = Record<string, Value | null>;
 
 export class FamilySwitches {
   readonly element = h("div", { class: "families" });
-  /** What a family that is off had, by its path. */
+  /** Settings of families that are off, by path. */
   private had = new Map<string, Settings>();
   private toml = "";
   private info: SceneInfo | null = null;
@@ -51,10 +51,10 @@ export class FamilySwitches {
     // Whatever comes of it, the switch shows it.
     this.drawn = "";
     const settings = on ? (this.had.get(`${o.path}.${family}`) ?? this.written(o, family)) : null;
-    await this.set(o.path, changed(o, family, settings), `${name} ${on ? "has its" : "goes without its"} ${family} links${on ? " again" : ""}`);
+    await this.set(o.path, changed(o, family, settings), `${name} ${on ? "with" : "without"} ${family} links`);
   }
 
-  /** What the text of the scene says, for one that was off when it came; else what a sheet starts with. */
+  /** Settings in the scene's text for a family that was off at load; otherwise the defaults of a sheet. */
   private written(o: Linked, family: Family): Settings {
     const usual: Settings = { modulus: { structural: 500, shear: 200, bend: 10 }[family] };
     try {

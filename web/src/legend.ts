@@ -1,4 +1,4 @@
-/** What the colours of a picture mean. */
+/** Legend of the colours of a picture. */
 import { h, show } from "./dom";
 import { gradient, mapOf } from "./view/colors";
 import type { Stage } from "./view/stage";

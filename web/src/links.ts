@@ -4,11 +4,11 @@ import type { Column, ObjectInfo, SceneInfo, Value } from "./engine/protocol";
 export const FAMILIES = ["structural", "shear", "bend"] as const;
 export type Family = (typeof FAMILIES)[number];
 
-/** What each resists, after docs/theory/structures.md. */
+/** Resistance of each family, after docs/theory/structures.md. */
 export const RESISTS: Record<Family, string> = {
-  structural: "links lie between neighbours and resist stretching.",
-  shear: "links lie along diagonals and resist shear, which the others let through.",
-  bend: "links skip a mass, or cross an edge of triangles, and resist folding, weakly.",
+  structural: "links connect neighbours and resist stretching.",
+  shear: "links run along diagonals and resist shear, which the others do not.",
+  bend: "links skip a mass, or cross a triangle edge, and weakly resist folding.",
 };
 
 type Settings = Record<string, Value | null>;
@@ -17,7 +17,7 @@ type Entry = Record<string, any>;
 /** An object with families of links. */
 export interface Linked {
   name: string;
-  /** Where its links stand: "sheet.0.links". */
+  /** Path of its links: "sheet.0.links". */
   path: string;
   /** The families that it has, with all their settings. */
   families: Partial<Record<Family, Settings>>;

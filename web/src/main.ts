@@ -24,7 +24,7 @@ function theme(wish: string | null): void {
   document.documentElement.dataset.theme = wish ?? (system.matches ? "dark" : "light");
   dispatchEvent(new Event("themechange"));
 }
-/** What a person said; nothing where the browser keeps nothing. */
+/** The user's choice; nothing if the browser stores nothing. */
 function wished(): string | null {
   try {
     return localStorage.getItem("theme");
@@ -35,7 +35,7 @@ function wished(): string | null {
 system.addEventListener("change", () => theme(wished()));
 theme(wished());
 document.getElementById("tools")!.append(
-  iconButton("theme", "Light or dark", () => {
+  iconButton("theme", "Toggle light and dark", () => {
     const next = document.documentElement.dataset.theme === "dark" ? "light" : "dark";
     try {
       localStorage.setItem("theme", next);
@@ -82,7 +82,7 @@ async function go(): Promise<void> {
       if (own !== visit) return;
       const webgl = document.createElement("canvas").getContext("webgl2");
       main.className = "";
-      main.replaceChildren(h("div", { class: "narrow" }, h("h1", {}, "This page could not be shown"), h("p", {}, webgl ? String((error as Error)?.message ?? error) : "It draws with WebGL 2, which this browser does not offer.")));
+      main.replaceChildren(h("div", { class: "narrow" }, h("h1", {}, "This page could not be shown"), h("p", {}, webgl ? String((error as Error)?.message ?? error) : "It requires WebGL 2, which this browser does not support.")));
       console.error(error);
       return;
     }
@@ -91,7 +91,7 @@ async function go(): Promise<void> {
     return;
   }
   document.title = "tumble";
-  main.append(h("div", { class: "narrow" }, h("h1", {}, "There is no such page"), h("p", {}, h("a", { href: "#/" }, "To the gallery"))));
+  main.append(h("div", { class: "narrow" }, h("h1", {}, "Page not found"), h("p", {}, h("a", { href: "#/" }, "To the gallery"))));
 }
 
 // The address is that of the page: it must not become "#main".

@@ -6,7 +6,7 @@ import { check, h } from "./dom";
 type Schema = Record<string, any>;
 type Tree = Record<string, any>;
 
-/** What panels leave to the text. */
+/** Keys that panels leave to the text. */
 const LEFT_OUT = new Set(["version", "title", "output", "expect", "camera", "name", "precision", "bits", "dimension", "plane", "color", "color_to", "color_end"]);
 
 /** The most telling words of what moves particles, by table and kind: they come first. */
@@ -92,7 +92,7 @@ export class Panel {
     private readonly set: (path: string, value: Value) => Promise<void>,
   ) {
     this.element.append(
-      h("div", { class: "panel-head" }, check("Every word, with defaults", false, (on) => {
+      h("div", { class: "panel-head" }, check("All keys, with defaults", false, (on) => {
         this.everything = on;
         this.draw();
       })),
@@ -147,7 +147,7 @@ export class Panel {
       }
     }
     this.groups.replaceChildren(...groups);
-    if (!groups.length) this.groups.append(h("p", { class: "muted" }, "This scene leaves everything at its defaults."));
+    if (!groups.length) this.groups.append(h("p", { class: "muted" }, "This scene uses only defaults."));
   }
 
   /** The values that one would like to turn first. */
@@ -191,7 +191,7 @@ export class Panel {
     return rows.length ? this.details(path, title, kind, rows) : null;
   }
 
-  /** What can be folded away, and stays as a person left it. */
+  /** A collapsible section that remembers its state. */
   private details(path: string, title: string, kind: string, rows: HTMLElement[]): HTMLElement {
     const open = this.opened.has(path) || (!this.closed.has(path) && !["collider", "camera", "time"].includes(path.split(".")[0]));
     const details = h("details", { open, class: "group" }, h("summary", {}, h("span", { class: "group-title" }, title), kind ? h("span", { class: "group-kind" }, kind) : null), ...rows);

@@ -1,4 +1,4 @@
-/** What pointers do to a world: they pull masses by a spring, and stir gases. Fingers work side by side. */
+/** Pointer interaction with a world: pointers pull masses by a spring, and stir gases. Fingers work side by side. */
 import type { Vector3 } from "three";
 import type { Vector } from "./engine/protocol";
 import type { Session } from "./session";

@@ -1,4 +1,4 @@
-/** What a person takes away: pictures, films, numbers, surfaces. */
+/** Downloads: pictures, films, numbers, surfaces. */
 import { iconButton, saveAs, say, setIcon } from "./dom";
 import { npz } from "./npz";
 import type { Session } from "./session";
@@ -14,7 +14,7 @@ export function saving(session: Session, stage: Stage, name: string): { buttons:
   const frames = () => saveAs(npz(session.kept.map((i) => session.frame(i)!)), `${name}.npz`);
   const glb = async () => {
     const { surfaces } = stage;
-    if (!surfaces.length) return say("There is no surface in this scene.");
+    if (!surfaces.length) return say("This scene has no surface.");
     const { glb: made } = await import("./view/glb");
     saveAs(await made(surfaces), `${file()}.glb`);
   };
@@ -41,7 +41,7 @@ export function saving(session: Session, stage: Stage, name: string): { buttons:
       saveAs(new Blob(parts, { type: mimeType }), `${name}.${mimeType?.includes("mp4") ? "mp4" : "webm"}`);
     };
     recorder.start();
-    setIcon(record, "stop", "End the film and save it");
+    setIcon(record, "stop", "Stop the film and save it");
     record.classList.add("live");
     session.play();
   };
@@ -50,7 +50,7 @@ export function saving(session: Session, stage: Stage, name: string): { buttons:
     buttons: [
       pictureButton(stage, file),
       record,
-      iconButton("down", "Download the kept frames (NPZ)", frames),
+      iconButton("down", "Download the stored frames (NPZ)", frames),
       iconButton("cube", "Save the surfaces (GLB)", () => void glb()),
     ],
     close: () => recorder?.stop(),

@@ -29,7 +29,7 @@ export const ROW_TITLES: Record<string, string> = {
   gravity: "Gravity",
   gas: "Gas and smoke",
   heat: "Heat",
-  failures: "What goes wrong",
+  failures: "Failures",
 };
 
 export const SCENES: Shipped[] = Object.entries(texts)

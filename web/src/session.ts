@@ -38,7 +38,7 @@ type Events = {
   before: Branch | null;
 };
 
-/** What was done to let the world go another way: settled when it does, undone when it cannot. */
+/** Preparation of a new branch: committed when it succeeds, undone when it fails. */
 interface Parting {
   branch: Branch | null;
   /** The frame that it went back to, and the kept one before it from which it stepped. */
@@ -59,7 +59,7 @@ export class Session {
   /** The frame that is shown. */
   shown: Frame | null = null;
   report: StepReport | null = null;
-  /** What the world began with, and what was changed since, in order. */
+  /** Start of the world, and later changes, in order. */
   start: Start = { overrides: new Map(), scene: {}, hash: "" };
   history: Change[] = [];
   /** Keeps the way that was left for a change, to compare. */
@@ -452,7 +452,7 @@ export class Session {
       }
       const { info, live } = changed;
       this.overrides = new Map(this.overrides);
-      // What was changed below this place is gone, and in the order of changes this one is the last.
+      // Earlier changes below this path are dropped, and this change becomes the last one.
       for (const old of [...this.overrides.keys()]) if (`${old}.`.startsWith(`${path}.`)) this.overrides.delete(old);
       this.overrides.set(path, value);
       this.settle(parting, { frame: live ? at : 0, path, from, to: value });
@@ -543,7 +543,7 @@ export class Session {
   }
 
   /**
-   * What leads to the frame that is shown, and the hash of its state, to share it. What the pointer did nobody can repeat: then it is the
+   * History of the shown frame, and its state hash, for sharing. Pointer interaction cannot be replayed: then it is the
    * first frame.
    */
   moment(): Promise<{ frame: number; hash: string; changes: Change[] }> {

@@ -1,4 +1,4 @@
-/** What is shared: a scene with all of its values, what was changed while it ran, and the bits that came of it; as a link or as a file. */
+/** Sharing: a scene with all of its values, what was changed while it ran, and the bits that came of it; as a link or as a file. */
 import type { Files, Value } from "./engine/protocol";
 
 export interface Shared {
@@ -19,14 +19,14 @@ export interface Shared {
 
 /** Longer links are cut by some programs that pass them on. */
 export const LONGEST = 30_000;
-/** What a link or a file may unpack to [bytes]; python/tumble/cli/view.py has the first one, too. */
+/** Limits of the unpacked size of a link or a file [bytes]; python/tumble/cli/view.py has the first one, too. */
 const LARGEST = { link: 2_000_000, file: 96 * 2 ** 20 };
 /** Meshes of a file [bytes]; the engine takes no more. */
 const MESHES = 64 * 2 ** 20;
 const CHANGES = 10_000;
 const FRAMES = 1_000_000;
 
-/** Where all versions of the laboratory lie on this host. */
+/** Folder of all versions of the laboratory on this host. */
 export const root = (): string => location.origin + location.pathname.replace(/[^/]*$/, "").replace(/v\/[^/]+\/$/, "");
 
 /** The address that opens a packed scene with the version that made it. */
@@ -42,7 +42,7 @@ async function through(data: Uint8Array, stream: CompressionStream | Decompressi
     size += value.length;
     if (size > most) {
       await reader.cancel();
-      throw new Error("it holds more than a scene may have");
+      throw new Error("it contains more than a scene may have");
     }
     parts.push(value);
   }
@@ -63,17 +63,17 @@ const frame = (x: unknown): x is number => Number.isInteger(x) && (x as number) 
 
 /** Checks a tree that anyone may have written. */
 function checked(found: unknown): Shared {
-  if (!table(found)) throw new Error("it does not hold a scene");
+  if (!table(found)) throw new Error("it does not contain a scene");
   const { tumble: version, text, overrides, scene, changes, frame: last, hash } = found;
   const whole =
     typeof version === "string" && typeof text === "string" && typeof hash === "string" && frame(last) && table(scene) &&
     Array.isArray(overrides) && overrides.every((o) => typeof o === "string") &&
     Array.isArray(changes) && changes.length <= CHANGES && changes.every((c) => table(c) && frame(c.frame) && c.frame <= last && typeof c.path === "string" && c.value !== null && c.value !== undefined);
-  if (!whole) throw new Error("it does not hold a scene");
+  if (!whole) throw new Error("it does not contain a scene");
   return { version, text, overrides, scene, changes, frame: last, hash } as Shared;
 }
 
-/** What stands behind "#/s/". */
+/** The address after "#/s/". */
 export async function pack(shared: Shared): Promise<string> {
   const bytes = await through(new TextEncoder().encode(JSON.stringify(tree(shared))), new CompressionStream("deflate-raw"));
   return base64(bytes).replace(/\+/g, "-").replace(/\//g, "_").replace(/=+$/, "");
@@ -81,7 +81,7 @@ export async function pack(shared: Shared): Promise<string> {
 
 /** Throws where a link is damaged. */
 export async function unpack(link: string): Promise<Shared> {
-  if (link.length > 20 * LONGEST) throw new Error("it is longer than a link may be");
+  if (link.length > 20 * LONGEST) throw new Error("it exceeds the maximum length of a link");
   const bytes = bytesOf(link.replace(/-/g, "+").replace(/_/g, "/"));
   return checked(JSON.parse(new TextDecoder().decode(await through(bytes, new DecompressionStream("deflate-raw"), LARGEST.link))));
 }
@@ -89,7 +89,7 @@ export async function unpack(link: string): Promise<Shared> {
 /** The same as a file, with meshes that no other machine has: JSON, packed as gzip does. */
 export async function toFile(shared: Shared, meshes: Files): Promise<Blob> {
   const size = Object.values(meshes).reduce((sum, bytes) => sum + bytes.length, 0);
-  if (size > MESHES) throw new Error(`the meshes have ${Math.ceil(size / 2 ** 20)} MiB; a file holds ${MESHES / 2 ** 20} MiB`);
+  if (size > MESHES) throw new Error(`the meshes have ${Math.ceil(size / 2 ** 20)} MiB; a file can hold ${MESHES / 2 ** 20} MiB`);
   const held = Object.fromEntries(Object.entries(meshes).map(([path, bytes]) => [path, base64(bytes)]));
   const packed = await through(new TextEncoder().encode(JSON.stringify({ ...tree(shared), meshes: held })), new CompressionStream("gzip"));
   return new Blob([packed as Uint8Array<ArrayBuffer>], { type: "application/gzip" });
@@ -100,7 +100,7 @@ export async function fromFile(data: Uint8Array): Promise<{ shared: Shared; mesh
   const found: unknown = JSON.parse(new TextDecoder().decode(await through(data, new DecompressionStream("gzip"), LARGEST.file)));
   const shared = checked(found);
   const { meshes } = found as { meshes?: unknown };
-  if (!table(meshes) || !Object.values(meshes).every((text) => typeof text === "string")) throw new Error("it does not hold its meshes");
+  if (!table(meshes) || !Object.values(meshes).every((text) => typeof text === "string")) throw new Error("it does not contain its meshes");
   return { shared, meshes: Object.fromEntries(Object.entries(meshes as Record<string, string>).map(([path, text]) => [path, bytesOf(text)])) };
 }
 

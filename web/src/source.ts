@@ -1,4 +1,4 @@
-/** What a page of a scene starts from: a scene that ships, a file, a link; and how it is opened. */
+/** Start of a scene page: a bundled scene, a file, a link; and how it is opened. */
 import { opened } from "./drop";
 import { EngineError } from "./engine/client";
 import type { Files, Value } from "./engine/protocol";
@@ -36,7 +36,7 @@ export async function source(rest: string): Promise<Source> {
   const file = /^file\/(\d+)$/.exec(rest);
   if (file) {
     const own = opened[Number(file[1]) - 1];
-    if (!own) throw new Error("This file was opened in another visit; open it again.");
+    if (!own) throw new Error("This file was opened in an earlier session; open it again.");
     const name = own.name.replace(/\.\w+$/, "");
     return own.shared ? sharedSource(own.shared, own.files, name) : { text: own.toml, overrides: [], files: own.files, shared: null, name, id: null };
   }
@@ -45,7 +45,7 @@ export async function source(rest: string): Promise<Source> {
   return { text: await known.text(), overrides: [], files: {}, shared: null, name: known.name, id: known.id };
 }
 
-const STOPPED = "stopped before the frame that was shared";
+const STOPPED = "stopped before the shared frame";
 
 /**
  * Loads a source and brings it to where it was shared. The text counts where it still means the scene that was shared; where defaults have
@@ -56,7 +56,7 @@ export async function begin(session: Session, start: Source, progress: (frame: n
   let told = "";
   const load = async () => {
     await session.load(written(shared!.scene), [], start.files);
-    told = "defaults have changed since, so every word is written out";
+    told = "defaults have changed since, so all keys are written out";
   };
   try {
     const info = await session.load(start.text, start.overrides, start.files);
@@ -102,7 +102,7 @@ export async function toShare(session: Session, version: string): Promise<{ link
     hash,
   };
   const meshes = await session.meshes();
-  if (Object.keys(meshes).length) return { file: await toFile(whole, meshes), reason: "A link cannot hold a mesh of your own" };
+  if (Object.keys(meshes).length) return { file: await toFile(whole, meshes), reason: "A link cannot contain custom meshes" };
   const link = await pack(whole);
   return link.length <= LONGEST ? { link } : { file: await toFile(whole, {}), reason: "The scene is too large for a link" };
 }

@@ -34,7 +34,7 @@ const FORCES: Record<string, Topic> = {
   viscosity: { page: "neighbours", tags: ["neighbours.9"] },
 };
 
-/** What a scene is about, the most special first. */
+/** Topics of a scene, the most specific first. */
 export function topics(info: SceneInfo): Topic[] {
   const found: Topic[] = [];
   const scene = info.scene as Record<string, any>;
@@ -95,7 +95,7 @@ export async function cards(list: Topic[]): Promise<HTMLElement[]> {
         h("p", { class: "muted" }, question(text)),
         ...parts.map((e) => h("pre", { class: "equation", tabindex: 0 }, e)),
         files.length ? h("p", { class: "files" }, "In the engine: ", ...files.flatMap((f, i) => [i ? ", " : "", h("code", {}, f)])) : null,
-        h("p", {}, h("a", { href: `#/theory/${page}` }, `Read on: ${heading(text).toLowerCase()}`)),
+        h("p", {}, h("a", { href: `#/theory/${page}` }, `Read more: ${heading(text).toLowerCase()}`)),
       );
     }),
   );

@@ -10,7 +10,7 @@ export function literal(value: Value): string {
   return String(value);
 }
 
-/** What stands right of an "=": TOML, or a bare word. */
+/** The right side of an "=": TOML, or a bare word. */
 export function valueOf(text: string): Value {
   try {
     return parse(`x = ${text}`).x as Value;
@@ -19,7 +19,7 @@ export function valueOf(text: string): Value {
   }
 }
 
-/** What stands in a resolved scene at a path such as "sheet.flag.size" or "system.0.substeps"; null where nothing does. */
+/** Value in a resolved scene at a path such as "sheet.flag.size" or "system.0.substeps"; null if there is none. */
 export function valueAt(scene: unknown, path: string): Value | null {
   let at: unknown = scene;
   for (const key of path.split(".")) {

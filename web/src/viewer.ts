@@ -1,4 +1,4 @@
-/** What all pages of one world share: its picture, what went wrong with it, and what ends with the page. */
+/** Shared by all pages of one world: its picture, failures, and cleanup. */
 import { h } from "./dom";
 import { EngineError } from "./engine/client";
 import type { Failure, FailureKind } from "./engine/protocol";
@@ -8,10 +8,10 @@ import { keys } from "./transport";
 import { Stage } from "./view/stage";
 
 const HEADS: Record<FailureKind, string> = {
-  scene: "The scene has a mistake; the one before goes on.",
+  scene: "The scene has an error; the previous one continues.",
   step: "The simulation failed.",
-  limit: "Too much for this tab.",
-  crash: "The engine was started anew.",
+  limit: "Too large for this tab.",
+  crash: "The engine was restarted.",
 };
 
 export const reducedMotion = (): boolean => matchMedia("(prefers-reduced-motion: reduce)").matches;
@@ -35,7 +35,7 @@ export class Viewer {
     label: string,
     /** Whether pointers and keys turn the camera. */
     turns = true,
-    /** What can be done about a failure. */
+    /** Actions for a failure. */
     private readonly remedy: (failure: Failure) => Node | null = () => null,
   ) {
     main.className = "lab-page";
@@ -56,7 +56,7 @@ export class Viewer {
   }
 
   private readonly restarted = (message: string): void => {
-    this.complain({ kind: "crash", message: `${message}\nThe scene stands at its start again.`, issues: [] });
+    this.complain({ kind: "crash", message: `${message}\nThe scene is back at its start.`, issues: [] });
     void this.session.revived();
   };
 
@@ -64,7 +64,7 @@ export class Viewer {
     const { alert } = this;
     alert.hidden = false;
     alert.dataset.kind = failure.kind;
-    alert.replaceChildren(h("strong", {}, failure.kind === "scene" && !this.session.info ? "The scene has a mistake." : HEADS[failure.kind]), h("pre", {}, failure.message.split("\n").slice(0, 12).join("\n")));
+    alert.replaceChildren(h("strong", {}, failure.kind === "scene" && !this.session.info ? "The scene has an error." : HEADS[failure.kind]), h("pre", {}, failure.message.split("\n").slice(0, 12).join("\n")));
     const remedy = this.remedy(failure);
     if (remedy) alert.append(remedy);
   }

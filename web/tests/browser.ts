@@ -33,7 +33,7 @@ export async function lab(): Promise<Lab> {
       const errors: string[] = [];
       page.on("pageerror", (e) => errors.push(String(e)));
       page.on("console", (m) => {
-        // What software rendering has to say about itself is no error of ours.
+        // Messages of software rendering are not our errors.
         if (m.type() === "error" && !/GPU stall|GL Driver|WebGL-0x/.test(m.text())) errors.push(m.text());
       });
       await page.goto(`${address}#/${path}`);
@@ -46,7 +46,7 @@ export async function lab(): Promise<Lab> {
   };
 }
 
-/** Where scenes live, and all that ship, as ROW/NAME. */
+/** Folder of the scenes, and all bundled ones, as ROW/NAME. */
 export const SCENES = "../python/tumble/scenes";
 export const shipped = (): string[] =>
   readdirSync(SCENES, { withFileTypes: true })
@@ -60,7 +60,7 @@ export const STILL = { reducedMotion: "reduce" } as const;
 /** Waits until a page has its world, or has failed to get it. */
 export const ready = (page: Page) => page.waitForFunction(() => document.getElementById("main")!.dataset.ready);
 
-/** What axe-core finds that is serious or worse. The page must have been opened with `bypassCSP`. */
+/** Serious findings of axe-core. The page must have been opened with `bypassCSP`. */
 export async function serious(page: Page): Promise<string[]> {
   await page.evaluate(readFileSync(createRequire(import.meta.url).resolve("axe-core/axe.min.js"), "utf8"));
   return page.evaluate(async () => {

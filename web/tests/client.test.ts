@@ -4,7 +4,7 @@ import { beforeEach, mock, test } from "node:test";
 import { Engine, EngineError } from "../src/engine/client";
 import type { Answer, Request } from "../src/engine/protocol";
 
-/** What the workers do: answers to requests; nothing for those that hang. */
+/** Behaviour of the workers: answers to requests; nothing for those that hang. */
 let act: (request: Request, worker: number) => Record<string, unknown> | undefined;
 let started: FakeWorker[] = [];
 let starts = true;

@@ -31,7 +31,7 @@ const branch = (page: Page, path: string, value: number) =>
     return hash as string;
   }, [path, value] as const);
 
-describe("two ways", () => {
+describe("branches", () => {
   it("of the same value are one", async () => {
     const { page, errors } = await open("structures/rope");
     assert.equal(await page.isVisible(".before"), false);
@@ -60,7 +60,7 @@ describe("two ways", () => {
     const now = await page.evaluate(() => (window as any).tumble.session.hash());
     assert.notEqual(now, old);
 
-    await page.click("text=Take the old one again");
+    await page.click("text=Return to the previous branch");
     await page.waitForFunction((h) => document.querySelector(".hash-line .hash")!.textContent === h, old);
     const taken = await page.evaluate(() => {
       const { session } = (window as any).tumble;
@@ -80,7 +80,7 @@ describe("two ways", () => {
       return [hash, await session.hash()];
     });
     assert.equal(on[0], on[1]);
-    await page.click("text=Forget it");
+    await page.click("text=Discard it");
     await page.waitForSelector(".before", { state: "hidden" });
     assert.deepEqual(errors, []);
     await page.context().close();
@@ -97,7 +97,7 @@ describe("two ways", () => {
     });
     assert.deepEqual((await apart(page, 8)).slice(3), [0, null, null, null, null, null]);
     const now = await page.evaluate(() => (window as any).tumble.session.hash());
-    await page.click("text=Run the old one as far");
+    await page.click("text=Advance the previous branch as far");
     await page.waitForSelector(".catch-up", { state: "detached" });
     const lengths = (await apart(page, 8)) as number[];
     assert.equal(lengths[3], 0);
@@ -137,15 +137,15 @@ describe("two ways", () => {
     await branch(page, "gas.0.viscosity", 5);
     const values = (await apart(page, 10)) as number[];
     assert.deepEqual(values.slice(0, 5), Array(5).fill(0));
-    // What viscosity does to the velocity, the density feels a step later.
+    // Viscosity acts on the velocity now, on the density a step later.
     assert.ok(values.slice(6).every((v, i) => v > values[5 + i]), `${values}`);
     assert.match((await page.textContent(".apart"))!, /kg\/m³.*density/);
     const hash = await page.evaluate(() => (window as any).tumble.session.hash());
-    await page.locator("label:has-text('Way seen') select").selectOption("difference");
+    await page.locator("label:has-text('Branch shown') select").selectOption("difference");
     const legend = await page.evaluate(() => (window as any).tumble.stage.legend);
     assert.equal(legend.name, "difference");
     assert.ok(legend.high > 0 && legend.low === -legend.high, JSON.stringify(legend));
-    await page.locator("label:has-text('Way seen') select").selectOption("before");
+    await page.locator("label:has-text('Branch shown') select").selectOption("before");
     assert.equal(await page.evaluate(() => {
       const { session, stage } = (window as any).tumble;
       return stage.frame === session.before.way.frame(10);
@@ -167,7 +167,7 @@ describe("two ways", () => {
     });
     assert.equal(old.live, false);
     assert.deepEqual(await apart(page, 5), Array(6).fill(null));
-    await page.click("text=Take the old one again");
+    await page.click("text=Return to the previous branch");
     await page.waitForFunction((h) => document.querySelector(".hash-line .hash")!.textContent === h, old.hash);
     assert.deepEqual(errors, []);
     await page.context().close();

@@ -114,7 +114,7 @@ const base64url = (data: Uint8Array) => Buffer.from(data).toString("base64url");
 async function link(text: string): Promise<void> {
   const found = await unpack(text);
   assert.ok(whole(found), JSON.stringify(found).slice(0, 300));
-  // What is read is packed again to the same.
+  // The result is packed again to the same.
   assert.ok(alike(JSON.parse(JSON.stringify(await unpack(await pack(found)))), JSON.parse(JSON.stringify(found))));
 }
 
@@ -155,7 +155,7 @@ function bomb(beginning: string, size: number): Buffer {
 }
 
 test("what unpacks to more than there may be is left off early", async () => {
-  // What is before it is sound: it is the length that is refused.
+  // The content before is sound: the length is refused.
   const beginning = '{"tumble":"0.1.0","text":"';
   const head = gzipSync("").subarray(0, 10);
   const bombs = [
@@ -167,7 +167,7 @@ test("what unpacks to more than there may be is left off early", async () => {
     // Below the limit it is what is in it that is refused.
     await assert.rejects(open(holds), (error: Error) => !!error.message && !/more than a scene/.test(error.message));
     const { refused } = await tried(`${kind}, bombs`, sizes.length * 3, (d) => open(d.one(sizes)).catch((error) => {
-      assert.match(error.message, /it holds more than a scene may have/);
+      assert.match(error.message, /it contains more than a scene may have/);
       throw error;
     }));
     const taken = process.resourceUsage().maxRSS / 1024 - before;

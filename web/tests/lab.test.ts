@@ -173,7 +173,7 @@ describe("scenes", () => {
     const h = dt / substeps;
     times.forEach((t, k) => assert.ok(Math.abs(t - (2 * dt + (k + 1) * h)) < 1e-9, `${k}: ${t}`));
     // The last one makes the frame whole.
-    await page.click("[aria-label='One sub-step on']");
+    await page.click("[aria-label='One sub-step forward']");
     await page.waitForFunction(() => (window as any).tumble.session.shown.index === 3);
     assert.equal(await page.evaluate(() => (window as any).tumble.session.hash()), straight);
     // Back from between two frames is to the one before.
@@ -300,7 +300,7 @@ describe("text and values", () => {
     await field.locator("input[type=number]").fill("0.4");
     await field.locator("input[type=number]").press("Enter");
     await page.waitForFunction(() => (window as any).tumble.session.info.scene.rope[0].density === 0.4);
-    // What the schema refuses leaves the value as it was, with the reason.
+    // A value refused by the schema is left unchanged, with the reason.
     await page.locator('[data-path="rope.0.density"] input[type=number]').fill("-1");
     await page.locator('[data-path="rope.0.density"] input[type=number]').press("Enter");
     await page.waitForSelector(".note.bad");
@@ -377,10 +377,10 @@ describe("files", () => {
     const { page, errors } = await own.open("scene/failures/stiff-sheet", STILL);
     await ready(page);
     await page.evaluate(() => (window as any).tumble.session.goto(5).catch(() => {}));
-    await page.click("text=Look for a cure");
+    await page.click("text=Search for a cure");
     await page.waitForSelector(".cures li");
     const cures = await page.$$eval(".cures li", (all) => all.map((l) => l.textContent ?? ""));
-    assert.ok(cures.some((c) => /implicit|symplectic|step/.test(c) && /Take it/.test(c)), cures.join("; "));
+    assert.ok(cures.some((c) => /implicit|symplectic|step/.test(c) && /Apply and restart/.test(c)), cures.join("; "));
     await page.locator(".cures button").first().click();
     await frame(page, 4);
     assert.ok(await page.evaluate(() => (window as any).tumble.session.overrides.size > 0 && (document.querySelector('.alert') as HTMLElement).hidden));
@@ -457,7 +457,7 @@ describe("fluid", () => {
         return { light, dark };
       });
     assert.deepEqual(await seen(), { light: true, dark: false });
-    await page.click("[aria-label='Light or dark']");
+    await page.click("[aria-label='Toggle light and dark']");
     assert.deepEqual(await seen(), { light: false, dark: true });
     assert.deepEqual(errors, []);
     await page.context().close();

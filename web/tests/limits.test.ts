@@ -37,7 +37,7 @@ test("a mistake has its line and its cure", () => {
   assert.equal(found.path, "time.fps");
   assert.match(found.message, /expected > 0/);
   assert.equal(failure(() => made("version = 1\nx = = 2\n")).line, 2);
-  // What is seen only when it is built, too.
+  // Errors found only when it is built, too.
   assert.equal(failure(() => made(SHEET.replace("corner 0 0", "corner 7 7"))).line, 8);
 });
 

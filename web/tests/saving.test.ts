@@ -1,4 +1,4 @@
-/** What a person takes away, read by other programs. Numbers and surfaces need the native engine: make setup. */
+/** Downloads, read by other programs. Numbers and surfaces need the native engine: make setup. */
 import assert from "node:assert/strict";
 import { execFileSync } from "node:child_process";
 import { existsSync, mkdtempSync, readFileSync } from "node:fs";
@@ -33,7 +33,7 @@ async function taken(page: Page, label: string): Promise<string> {
   return path;
 }
 
-/** What Python says of files. */
+/** Python's description of files. */
 const python = (code: string, ...words: string[]) => execFileSync(PYTHON, ["-c", code, ...words], { encoding: "utf8", cwd: join(ROOT, "python"), stdio: ["ignore", "pipe", "inherit"] }).trim();
 
 describe("downloads", () => {
@@ -63,7 +63,7 @@ describe("downloads", () => {
     const { page, errors } = await open("structures/rope");
     await page.click('[aria-label="Record a film (WebM)"]');
     await frame(page, 24);
-    const path = await taken(page, "End the film and save it");
+    const path = await taken(page, "Stop the film and save it");
     assert.match(path, /rope\.webm$/);
     const film = readFileSync(path);
     assert.deepEqual([...film.subarray(0, 4)], [0x1a, 0x45, 0xdf, 0xa3]);
@@ -79,7 +79,7 @@ describe("downloads", () => {
       video.currentTime = 1e6;
       await new Promise((done) => (video.onseeked = done));
       const seconds = video.currentTime;
-      // Where it lets something through, that is seen.
+      // Through its gaps the background is visible.
       const image = await createImageBitmap(video);
       const context = new OffscreenCanvas(image.width, image.height).getContext("2d")!;
       context.fillStyle = "#f0f";
@@ -98,7 +98,7 @@ describe("downloads", () => {
     it(`are numbers, in the order and with the bits of Python's: ${id}`, { skip }, async () => {
       const { page, errors } = await open(id);
       await page.evaluate(() => (window as any).tumble.session.goto(2));
-      const path = await taken(page, "Download the kept frames (NPZ)");
+      const path = await taken(page, "Download the stored frames (NPZ)");
       const code = `
 import sys, numpy as np, tumble
 from tumble.cli import find

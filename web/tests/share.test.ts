@@ -65,8 +65,8 @@ describe("links", () => {
     const stopped = await latest();
     await page.waitForTimeout(300);
     assert.equal(await latest(), stopped);
-    assert.match((await page.textContent(".scene-id")) ?? "", /stopped before the frame that was shared/);
-    await page.click("[aria-label='One frame on']");
+    assert.match((await page.textContent(".scene-id")) ?? "", /stopped before the shared frame/);
+    await page.click("[aria-label='One frame forward']");
     await page.waitForFunction((n) => (window as any).tumble.session.latest === n + 1, stopped);
     assert.deepEqual([...first.errors, ...errors], []);
     await first.page.context().close();
@@ -125,8 +125,8 @@ describe("links", () => {
     const other = await own.open(`s/${await pack(shared)}`, STILL);
     await ready(other.page);
     await other.page.waitForFunction((h) => document.querySelector(".hash-line .hash")!.textContent === `${h} as in the link`, made.hash);
-    assert.equal(await other.page.textContent(".scene-id"), `from a link of tumble 0.0.1; opened with ${VERSION}: bits may differ; defaults have changed since, so every word is written out`);
-    // Where the bits do differ, it is said.
+    assert.equal(await other.page.textContent(".scene-id"), `from a link of tumble 0.0.1; opened with ${VERSION}: bits may differ; defaults have changed since, so all keys are written out`);
+    // A difference in bits is reported.
     const wrong = await own.open(`s/${await pack({ ...shared, hash: "0123456789abcdef" })}`, STILL);
     await ready(wrong.page);
     await wrong.page.waitForFunction((h) => document.querySelector(".hash-line .hash")!.textContent === `${h} the link says 0123456789abcdef`, made.hash);
@@ -175,10 +175,10 @@ describe("links", () => {
         document.getElementById("main")!.replaceChildren();
         location.hash = `#/s/${to}`;
       }, link);
-      await page.waitForSelector("text=This cannot be opened").catch(() => assert.fail(`${what}: it was opened`));
+      await page.waitForSelector("text=The scene cannot be opened").catch(() => assert.fail(`${what}: it was opened`));
       assert.match((await page.textContent("#main"))!, /The link is damaged: it|The link is damaged: .+\./, what);
     }
-    // What the engine refuses: its message, and nothing executed.
+    // Refused by the engine: its message, and nothing executed.
     const markup = "<img src=x onerror=window.hit=1>";
     const hostile = [
       { text: `version = 1\ntitle = "${markup}"\n`, overrides: ["__proto__.polluted=1", `${markup}=1`] },
@@ -203,7 +203,7 @@ describe("links", () => {
 });
 
 describe("files", () => {
-  /** What the page saves instead of a link. */
+  /** File saved instead of a link. */
   const saved = async (page: Page) => {
     const [download] = await Promise.all([page.waitForEvent("download"), page.click("text=Copy link")]);
     return { name: download.suggestedFilename(), data: readFileSync(await download.path()) };
@@ -251,9 +251,9 @@ describe("files", () => {
       return session.hash();
     });
     const { data } = await saved(page);
-    await told(page, /mesh of your own/);
+    await told(page, /contain custom meshes/);
     const inside = JSON.parse(gunzipSync(data).toString());
-    // What ships with tumble is not in it.
+    // Bundled meshes are not in it.
     assert.deepEqual(Object.keys(inside.meshes), ["tent.obj"]);
     const second = await dropped("camp.tumble", data);
     await ready(second.page);
@@ -329,7 +329,7 @@ describe("a site", () => {
     const link = await copied(first.page);
     const packed = link.split("#/s/")[1];
     const { page } = await visit(`${place}v/9.8.7/#/s/${packed}`);
-    assert.equal(await page.textContent("h1"), "tumble 9.8.7 is not kept here");
+    assert.equal(await page.textContent("h1"), "tumble 9.8.7 is not available here");
     const hash = await first.page.evaluate(() => (window as any).tumble.session.hash());
     await page.click(`text=Open the scene with version ${VERSION}`);
     await ready(page);
@@ -337,9 +337,9 @@ describe("a site", () => {
     await page.waitForFunction((h) => document.querySelector(".hash-line .hash")!.textContent === `${h} as in the link`, hash);
     // Anything else that is not there has no way to lead astray.
     await page.goto(`${place}v/<img src=x onerror=alert(1)>/`);
-    assert.equal(await page.textContent("h1"), "tumble <img src=x onerror=alert(1)> is not kept here");
+    assert.equal(await page.textContent("h1"), "tumble <img src=x onerror=alert(1)> is not available here");
     await page.goto(`${place}nothing`);
-    assert.equal(await page.textContent("h1"), "There is no such page");
+    assert.equal(await page.textContent("h1"), "Page not found");
     assert.equal(await page.isVisible("#way"), false);
     await first.page.context().close();
     await page.context().close();

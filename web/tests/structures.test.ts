@@ -159,7 +159,7 @@ describe("structures", () => {
       }
     }
     const way = await page.evaluate(() => document.getElementById("way")!.dataset.value);
-    await page.click("text=As a scene");
+    await page.click("text=Open as a scene");
     await page.waitForFunction(() => /^#\/s\//.test(location.hash) && document.getElementById("main")!.dataset.ready);
     assert.equal(await page.textContent("h1"), "A sheet in the hand");
     assert.ok(Number(way) > 0);
@@ -177,7 +177,7 @@ describe("scenes", () => {
     await flag.getByLabel("shear").focus();
     await page.keyboard.press("Space");
     await page.waitForFunction(() => (window as any).tumble.session.info.scene.sheet[0].links.shear.modulus === 0);
-    await page.locator(".panel .note", { hasText: "flag goes without its shear links: goes on from frame 5" }).waitFor();
+    await page.locator(".panel .note", { hasText: "flag without shear links: continues from frame 5" }).waitFor();
     assert.equal(await page.evaluate(() => document.activeElement?.closest("[data-family]")?.getAttribute("data-family")), "sheet.0.links.shear");
     // The others keep what they had, those that are written short, too.
     const links = () => page.evaluate(() => (window as any).tumble.session.info.scene.sheet[0].links);
@@ -188,7 +188,7 @@ describe("scenes", () => {
     const drawn = () => page.evaluate(() => (window as any).tumble.stage.things.find((t: any) => t.name === "flag").links.object.geometry.instanceCount);
     const [structural, bend] = [24 * 19 + 25 * 18, 23 * 19 + 25 * 17];
     assert.equal(await drawn(), structural + bend);
-    await page.getByRole("group", { name: "Families of links that are drawn" }).getByLabel("bend").uncheck();
+    await page.getByRole("group", { name: "Families of links shown" }).getByLabel("bend").uncheck();
     assert.equal(await drawn(), structural);
     assert.match((await page.textContent(".legend")) ?? "", /strain/);
     await flag.getByLabel("shear").check();
@@ -219,11 +219,11 @@ describe("scenes", () => {
     await rate.locator("input[type=number]").press("Enter");
     await page.waitForFunction(() => (window as any).tumble.session.info.scene.emitter[0].rate === 500);
     assert.equal(await page.evaluate(() => (window as any).tumble.session.latest), 6);
-    await page.getByRole("navigation", { name: "Scenes like this one" }).getByText("flock").click();
+    await page.getByRole("navigation", { name: "Similar scenes" }).getByText("flock").click();
     await page.waitForSelector('.play [data-path="force.0.cohesion"]');
     // How a galaxy starts is seen only from its start.
     await page.evaluate(() => delete document.getElementById("main")!.dataset.ready);
-    await page.getByRole("navigation", { name: "Scenes like this one" }).getByText("galaxy").click();
+    await page.getByRole("navigation", { name: "Similar scenes" }).getByText("galaxy").click();
     await ready(page);
     const stars = page.locator('.play [data-path="galaxy.0.stars"] input[type=number]');
     await stars.fill("500");
@@ -250,7 +250,7 @@ describe("scenes", () => {
       const { session } = (window as any).tumble;
       await session.load('version = 1\n[[sheet]]\nname = "s"\nsize = [1, 1]\nresolution = [4, 4]\npin = ["edge x-"]\n');
     });
-    await page.getByLabel("Every word, with defaults").check();
+    await page.getByLabel("All keys, with defaults").check();
     const shear = page.locator('[data-path="sheet.0.links.shear.modulus"] input[type=number]');
     await shear.fill("90");
     await shear.press("Enter");

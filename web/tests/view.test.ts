@@ -36,7 +36,7 @@ test("a scene with a mesh of its own opens", { skip: skip || (!CHROMIUM && "no C
     await page.goto(address);
     await frame(page, 0);
     assert.match(await page.title(), /A tent/);
-    // What the command line resolved is what the page does.
+    // The page uses the scene resolved by the command line.
     const version = /\/v\/([^/]+)\/\?view#\/s\//.exec(address)![1];
     await page.waitForFunction((v) => document.querySelector(".scene-id")!.textContent === `from a link of tumble ${v}`, version);
     // A mesh of one's own goes into a file.
@@ -46,7 +46,7 @@ test("a scene with a mesh of its own opens", { skip: skip || (!CHROMIUM && "no C
     // Another version is not here: the server says so, and what to do.
     const answer = await page.goto(address.replace(`/v/${version}/`, "/v/0.0.1/"));
     assert.equal(answer!.status(), 404);
-    assert.equal(await page.textContent("h1"), "tumble 0.0.1 is not kept here");
+    assert.equal(await page.textContent("h1"), "tumble 0.0.1 is not available here");
     await page.click(`text=Open the scene with version ${version}`);
     await frame(page, 0);
     assert.match(await page.title(), /A tent/);

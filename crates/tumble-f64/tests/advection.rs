@@ -237,7 +237,7 @@ fn zalesaks_disk_keeps_its_area() {
         (Advection { interpolation: Interpolation::Cubic, corrected: true, ..how }, 100, 1.0, 0.02),
         (Advection { interpolation: Interpolation::Cubic, corrected: true, ..how }, 628, 1.0, 0.02),
         (Advection { interpolation: Interpolation::MonotoneCubic, ..how }, 100, 1.0, 0.02),
-        // What linear interpolation keeps, corrected and bare: 0.9673 and 0.5445.
+        // Remaining amplitude of linear interpolation, corrected and plain: 0.9673 and 0.5445.
         (Advection { corrected: true, ..how }, 628, 0.967, 0.01),
         (how, 628, 0.545, 0.02),
     ] {
@@ -365,7 +365,7 @@ fn paths_stay_within_walls() {
                 assert!((out.value(at) - wanted).abs() < 1e-12, "{how:?} {at:?} {} {wanted}", out.value(at));
             }
         }
-        // What is not a number must not lead astray either.
+        // Non-finite values must not lead out of bounds either.
         let wild = Vectors::of(g, "m/s", |x| [f64::NAN, f64::INFINITY, if x[0] > 0.3 { -1e300 } else { f64::NEG_INFINITY }]).unwrap();
         for how in ways() {
             for grid in [g, g.periodic([true; 3])] {

@@ -45,7 +45,7 @@ fn the_force_on_a_plate_is_that_of_the_formula() {
     }
 }
 
-/// What goes with the air feels nothing, and what rests in still air stays.
+/// A surface that moves with the air feels no force, and one at rest in still air stays.
 #[test]
 fn nothing_acts_on_what_moves_with_the_air() {
     for scheme in ["velocity_verlet", "implicit_euler", "position_based"] {

@@ -13,7 +13,7 @@ const B: f64 = 0.6;
 /// kg/m³
 const FLUID: f64 = 2.0;
 
-/// Where the ball is: at no cell in particular.
+/// Position of the ball, off the cell centres.
 const AT: &str = "[0.013, 0.007, -0.011]";
 
 /// A ball, or a disk, of so many times the fluid's density amid a round cavity; `head` stands before it, `rest` after it.

@@ -96,7 +96,7 @@ fn what_is_wrong_with_a_pattern_is_told_with_its_place() {
     assert!(boneless.contains("has no bones"), "{boneless}");
 }
 
-/// What nobody means is refused, and it is the word at fault that is named.
+/// Nonsensical values are errors that name the key at fault.
 #[test]
 fn measures_beyond_sense_are_refused_with_the_word_at_fault() {
     let two = "name = \"c\"\nresolution = RES\npanels = [{ name = \"a\", outline = [[0, 0], [1, 0], [1, HIGH], [0, HIGH]] },\n\

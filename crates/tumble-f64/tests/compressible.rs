@@ -146,7 +146,7 @@ fn the_largest_step_is_the_predicted_one_in_one_two_and_three_dimensions() {
 
 #[test]
 fn where_some_air_rests_the_limit_is_that_of_rest() {
-    // What a flow damps allows longer steps, but only where it flows.
+    // Damping by a flow allows longer steps, but only where there is flow.
     let grid = Grid::new([16, 16, 1], 0.1, [0.0; 3]).unwrap();
     let rho = Field::of(grid, Place::Cell, "kg/m³", |_| 1.2).unwrap();
     let u = Vectors::of(grid, "m/s", |x| [x[1].sin(), 0.0, 0.0]).unwrap();
@@ -235,10 +235,7 @@ fn a_step_too_long_ends_with_an_explanation() {
     let limit = stability.limits[0].stable;
     assert!((limit / (1.0 / 16.0 / (C * 2.0_f64.sqrt())) - 1.0).abs() < 1e-9 && stability.step > limit, "{stability:?}");
     let error = (0..100).find_map(|_| sim.step(&|| true).err()).unwrap().to_string();
-    assert!(
-        error.contains("symplectic_euler") && error.contains("\"g\"") && error.contains("the largest stable of which is 1.4"),
-        "{error}"
-    );
+    assert!(error.contains("symplectic_euler") && error.contains("\"g\"") && error.contains("whose largest stable step is 1.4"), "{error}");
     let cures = sim.cures(&|| true);
     assert!(cures.iter().any(|cure| cure.survived), "{cures:?}");
 }

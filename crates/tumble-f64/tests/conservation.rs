@@ -1,4 +1,4 @@
-//! What internal forces must not change: momentum, angular momentum, and, where a scheme promises it, energy.
+//! Invariants of internal forces: momentum, angular momentum, and, for some schemes, energy.
 
 #![allow(clippy::unwrap_used, clippy::panic)] // helpers of tests fail by panicking, too
 

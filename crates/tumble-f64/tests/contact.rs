@@ -169,7 +169,7 @@ fn a_resting_mass_rests() {
             // Measured: 0 for all but implicit Euler, which sinks in by g h²/30.
             assert!(low > -G * h * h / 20.0, "{} sinks to {low:e}", scheme.name());
             assert!(high < G * h * h / 20.0, "{} jumps to {high:e}", scheme.name());
-            // What gravity gives in half a step.
+            // The speed gained from gravity in half a step.
             assert!(speed < 0.5 * G * h, "{} has {speed:e} m/s", scheme.name());
         }
     }

@@ -220,7 +220,7 @@ fn a_belt_drags() {
     }
 }
 
-/// What an elastic bat hits leaves with 2u - v, whatever the scheme; also where the bat turns, and where it is fast.
+/// A mass hit by an elastic bat leaves with 2u - v under every scheme; also for a rotating and for a fast bat.
 #[test]
 fn a_bat_hits() {
     for scheme in every() {
@@ -447,7 +447,7 @@ proptest! {
     }
 }
 
-/// Where two walls of a room meet each pushes along its own normal: energy stays, and so does the velocity along a wall.
+/// In the corner of a room each wall pushes along its own normal: energy and the velocity along a wall are conserved.
 #[test]
 fn a_room_has_corners() {
     for y in ["0.5", "0.4999"] {
@@ -466,7 +466,7 @@ fn a_room_has_corners() {
     }
 }
 
-/// What is pinned to a surface that changes its shape goes with its nearest triangle, at the same weights of the corners and the same height.
+/// A mass pinned to a deforming surface follows its nearest triangle, with constant barycentric weights and height.
 #[test]
 fn what_follows_a_surface_goes_with_its_triangle() {
     // In 1 s (x, y) goes to (-y, 2 x), and all by 1 m upwards.

@@ -1,5 +1,5 @@
-//! What position-based dynamics converges to does not depend on the way there, sweeps, sub-steps or frames a second: of rods and of solids.
-//! Chains and sheets have theirs in `position_based.rs`.
+//! The converged result of position-based dynamics is independent of sweeps, sub-steps and frame rate: for rods and solids. Chains and sheets are in
+//! `position_based.rs`.
 
 #![allow(clippy::unwrap_used, clippy::panic)] // helpers of tests fail by panicking, too
 

@@ -65,8 +65,8 @@ fn energy(sim: &Simulation) -> f64 {
     (r * r + speed * speed / (W * W)) / 0.01
 }
 
-/// What the exchange has posted and delivered [N s], and the momentum in the mail, from a snapshot: ports (14 numbers each),
-/// posted, delivered, then the mail as port, kind and impulse.
+/// Posted and delivered impulses of the exchange [N s] and the momentum in transit, from a snapshot: ports (14 numbers each), posted, delivered, then
+/// the mail as port, kind and impulse.
 fn exchange(sim: &Simulation) -> ([f64; 3], [f64; 3], [f64; 3]) {
     let bytes = sim.save(&[]);
     let tensors = SafeTensors::deserialize(&bytes).unwrap();
@@ -207,7 +207,7 @@ fn row_of_four(schemes: [&str; 2], swapped: bool, exchanges: u32) -> Simulation 
 const SPRING: f64 = 40.0;
 const TIE: f64 = 50.0;
 
-/// Where they are after 1 s: by fourth-order Runge-Kutta in 20 000 steps, whose error is below 1e-13 m.
+/// Positions after 1 s, by fourth-order Runge-Kutta in 20 000 steps, with an error below 1e-13 m.
 fn row_exactly() -> [f64; 4] {
     let slope = |y: [f64; 8]| {
         let pull = |i: usize, k: f64| k * (y[i + 1] - y[i] - 1.0);
@@ -226,7 +226,7 @@ fn row_exactly() -> [f64; 4] {
     [y[0], y[1], y[2], y[3]]
 }
 
-/// What is projected on either side of an anchor keeps momentum to round-off, and is of order one.
+/// Projected systems on both sides of an anchor conserve momentum to round-off, with order one.
 #[test]
 fn projected_springs_on_an_anchor_keep_momentum_and_have_order_one() {
     let exact = row_exactly();

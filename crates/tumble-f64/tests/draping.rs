@@ -83,7 +83,7 @@ fn measures(x: &[Vector]) -> [f64; 3] {
     [depth, radius, corners]
 }
 
-/// What is measured of ever finer drapes, each from the shape of the one before, changes less and less from one to the next: at least by half.
+/// Measures of successively finer drapes, each started from the previous shape, converge: each change is at most half of the last.
 fn drapes_converge(cells: &[usize], way: &Way) {
     let mut x = Vec::new();
     let found: Vec<[f64; 3]> = cells

@@ -530,7 +530,7 @@ fn the_force_of_a_gathered_spring_is_the_derived_one() {
     }
 }
 
-/// What a triangle without area does, and lengths from micrometres to a hundred kilometres.
+/// Triangles without area, and lengths from micrometres to a hundred kilometres.
 #[test]
 fn hinges_work_at_every_size_and_a_triangle_without_area_bends_nothing() {
     let fold = |size: f64, tip: [f64; 3]| {

@@ -520,7 +520,7 @@ fn emitters_keep_to_the_plane() {
     assert!(message.contains("force[0].goal[1].point: y = 3, expected 0"), "{message}");
 }
 
-/// What starts in a solid is told with its name and that of the solid; what is pinned there, or touches it, is not.
+/// Objects that start in a solid give a warning with both names; pinned masses and mere contact do not.
 #[test]
 fn what_starts_inside_a_collider_is_told() {
     let warnings = |things: &str| {
@@ -761,7 +761,7 @@ fn splashes_are_born_where_and_when_drops_bounce() {
         run(&mut sim, 8);
         assert_eq!(ids(&sim, "splash").len(), 3 * 4, "{system}");
     }
-    // What stays on the floor has met it once, under every scheme; one that sees the impact at the end of its step only is late by that.
+    // A mass that stays on the floor has hit it once, under every scheme; schemes that see the impact at the end of the step are late by that.
     for integrator in Integrator::ALL {
         let steps = if integrator.is_adaptive() { "" } else { "substeps = 10" };
         let mut sim = simulation(&text(&format!("integrator = \"{}\"\n{steps}", integrator.name()), 0.0));

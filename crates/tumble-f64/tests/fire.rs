@@ -45,7 +45,7 @@ fn fuel_burns_down_by_its_exponential_and_warms_by_what_has_burnt() {
         let left = (-0.2 * f64::from(frame) / 0.4).exp();
         let (now, (hot, _), (smoke, _)) = (fuel(&sim), grid(&sim, "air", "temperature"), grid(&sim, "air", "density"));
         for i in 0..now.len() {
-            // What is at 300 K does not burn. 5e7 J/kg over 1.25 kg/m³ and 1000 J/(kg K) are 4e4 K m³/kg.
+            // Gas at 300 K does not burn. 5e7 J/kg over 1.25 kg/m³ and 1000 J/(kg K) are 4e4 K m³/kg.
             let burnt = if warm[i] > 800.0 { start[i] * (1.0 - left) } else { 0.0 };
             worst[0] = worst[0].max((now[i] - (start[i] - burnt)).abs() / start[i]);
             worst[1] = worst[1].max((hot[i] - warm[i] - 4e4 * burnt).abs() / 1200.0);

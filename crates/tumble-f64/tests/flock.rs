@@ -129,7 +129,7 @@ fn a_hawk_chases_and_its_prey_flees() {
     assert!(fled == 200, "{fled}");
 }
 
-/// Who gets up and flies has more energy than before, and has not exploded.
+/// A bird that takes off gains energy without a blow-up.
 #[test]
 fn a_flock_that_takes_off_is_no_explosion() {
     let mut sim = simulation(

@@ -431,7 +431,7 @@ fn faults_of_formulas_have_a_place() {
     ] {
         assert!(found.contains(expected), "{expected}\nnot in\n{found}");
     }
-    // What is not finite for one mass only ends the run with a clear error.
+    // A value that is not finite for a single mass ends the run with a clear error.
     let mut sim = simulation(
         "[[particles]]\nname = \"p\"\nposition = [[1, 0, 0], [0, 0, 0]]\n[[force]]\nkind = \"acceleration\"\nvalue = \"[1/x, 0, 0]\"\n[[system]]\nintegrator = \"rk4\"\nsubsteps = 4",
     );

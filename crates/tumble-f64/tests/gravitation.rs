@@ -101,7 +101,7 @@ fn two_bodies_go_round_a_thousand_times() {
     let start = sim.ledger();
     let (mut energy, mut turned) = (0.0_f64, 0.0_f64);
     let momentum = |v: &[Vector]| v[0] * 3.0 + v[1];
-    // Where the common centre, times the mass, should be: the integral of the momentum.
+    // Expected centre of mass times the mass: the integral of the momentum.
     let mut centre = Vector::default();
     for _ in 0..1000 {
         let before = momentum(&velocities(&sim, "b"));

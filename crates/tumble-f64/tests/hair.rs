@@ -115,7 +115,7 @@ fn roots_are_no_penetration() {
         let books = sim.ledger();
         assert!(books.penetration == 0.0 && books.contacts == 0, "{} {}", books.penetration, books.contacts);
         run(&mut sim, 2);
-        // What hangs onto the ball is moved out of it at the end of each sub-step.
+        // Hair that touches the ball is moved out of it at the end of each sub-step.
         assert!(sim.ledger().penetration < 1e-6, "{}", sim.ledger().penetration);
         let x: Vec<Vector> = positions(&sim, "h").iter().map(|x| vector(x.x, x.y, x.z - 0.05)).collect();
         common::write(&mut sim, "h", "position", &x);

@@ -204,8 +204,8 @@ fn pairs_and_bounds_are_those_of_brute_force() {
     assert!(compare(&topology, &x, 0.15) > 1000);
 }
 
-/// What shares a vertex or a seam, is fixed on both sides, or belongs to an object that does not touch itself, does not meet; and
-/// nothing is thicker than it is at rest.
+/// Features that share a vertex or a seam, are both fixed, or belong to an object without self-contact form no pair; no thickness exceeds the rest
+/// distance.
 #[test]
 fn some_pairs_never_meet() {
     let two = |itself: bool| {
@@ -324,7 +324,7 @@ fn truncation_brings_back_what_went_too_far() {
     }
 }
 
-/// Where it is known which way all go, long ways are free, any parts of them and what leaves them are safe, and what goes
+/// With predicted motion, long paths are free, any fraction of them and small deviations are safe, and what goes
 /// together is no pair.                                                                                          (contact.20)
 #[test]
 fn nothing_passes_beside_the_ways() {

@@ -294,7 +294,7 @@ fn an_unsound_mesh_is_told_once() {
     };
     assert!(told(&|_| ()).is_empty());
     for (change, words) in [
-        ((|m| m.triangles.push(m.triangles[4])) as fn(&mut Mesh), "1 triangle is there already"),
+        ((|m| m.triangles.push(m.triangles[4])) as fn(&mut Mesh), "1 triangle is a duplicate"),
         (|m| m.triangles[30].swap(0, 1), "3 edges are between triangles that face different ways"),
         (|m| m.triangles.push([3, 3, 4]), "1 triangle has no area"),
         (|m| m.triangles.push([14, 27, 45]), "1 edge has more than two triangles"),

@@ -267,7 +267,7 @@ fn an_unloaded_block_stays_at_rest() {
     }
 }
 
-/// What is converged does not depend on the way there.
+/// The converged result does not depend on the path to it.
 #[test]
 fn the_converged_sag_is_the_same_for_all_steps_and_rates() {
     let sag = |fps: u32, substeps: u32, iterations: u32| {

@@ -35,7 +35,7 @@ fn meeting(at: [f64; 3], turn: f64) -> String {
     )
 }
 
-/// What is moved and turned does the same there, up to rounding that contact amplifies.
+/// A translated and rotated scene gives the same motion, up to rounding that contact amplifies.
 #[test]
 fn a_scene_that_is_moved_and_turned_does_the_same_there() {
     let (at, turn) = ([3.0, -2.0, 1.0], 37.0);

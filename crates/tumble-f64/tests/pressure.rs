@@ -335,7 +335,7 @@ fn pockets_keep_their_own_means() {
         assert!(info.converged && info.pockets == 1 && info.iterations < 80, "{} {info:?}", method.name());
         assert_eq!(q[lone], 0.0);
     }
-    // What is left is a constant in each of the two spaces.
+    // The remainder is a constant in each of the two components.
     let mut r = vec![0.0; b.len()];
     solver.residual(&b, &q, &mut r);
     let (mut inside, mut outside) = (Vec::new(), Vec::new());

@@ -37,7 +37,7 @@ impl Chain {
         Self { rest, links: Box::new(links) }
     }
 
-    /// What is left of a displacement when all links have had their turn, again and again.
+    /// The remainder of a displacement after repeated sweeps over all links.
     fn project(&mut self, d: &Displacement, sweeps: usize) -> Displacement {
         let mut x: Vec<Row> =
             self.rest.iter().zip(d).map(|(r, d)| [r[0] + SMALL * d[0], r[1] + SMALL * d[1], r[2] + SMALL * d[2], r[3]]).collect();

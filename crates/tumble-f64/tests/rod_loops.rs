@@ -19,7 +19,7 @@ fn least(x: &[Vector], within: f64) -> (f64, usize) {
 /// Thickness of the rod [m].
 const THICKNESS: f64 = 0.01;
 
-/// What a rod is like that stood on its end on a floor and has fallen.
+/// State of a rod that stood on its end on a floor and has fallen.
 struct Heap {
     /// Distance of the nearest segments in any frame, and at the end [m].
     nearest: [f64; 2],
@@ -65,6 +65,6 @@ fn a_rod_that_falls_on_itself_keeps_off_itself() {
     // the axis of the upper one is half of one and a whole thickness above the floor.
     assert!(nearest > 0.75 * THICKNESS && end > 0.98 * THICKNESS && end < 1.05 * THICKNESS, "{nearest} {end}");
     assert!(touching >= 8 && top > 0.014 && top < 0.03 && speed < 0.05, "{touching} {top} {speed}");
-    // What does not know itself passes, and lies flat.
+    // Without self-contact the rod passes through itself and lies flat.
     assert!(through.nearest[0] < 0.1 * THICKNESS && through.top < 0.006, "{} {}", through.nearest[0], through.top);
 }

@@ -38,7 +38,7 @@ fn a_cantilever_bends_as_the_elastica() {
         (20.0, 0.829881, 0.445232),
         (100.0, 0.937524, 0.159223),
     ] {
-        // Where the rod hangs almost straight down and reaches a sixth of its length, 16 segments are too few: 3.3 % and 4.1 % off.
+        // For a rod that hangs almost straight down and reaches out by a sixth of its length, 16 segments are too few: errors of 3.3 % and 4.1 %.
         let divisions: &[u32] = if gamma < 50.0 { &[16, 32, 64] } else { &[32, 64] };
         for &segments in divisions {
             let x = cantilever(gamma, segments, "");
@@ -447,7 +447,7 @@ fn a_foot_needs_the_friction_of_the_elastica() {
             strip.relax(0.05, 20, |i| vector(if i < n { aside } else { 0.0 }, 0.0, 0.0));
         }
         strip.relax(0.05, 4000, |_| Vector::default());
-        // What the last segment does to the foot.
+        // The force of the last segment on the foot.
         let (l, nodes) = (1.0 / n as f64, [strip.x[n - 1], strip.x[n], strip.x[n + n]]);
         let y = StretchShear::residual([l, 1.0], nodes).map(|r| 1e5 * l * r);
         let [_, pull, _] = StretchShear::pullback([l, 1.0], nodes, y);
@@ -508,7 +508,7 @@ fn a_rod_breaks_where_it_is_pulled_too_far() {
     let x = positions(&torn, "r");
     println!("{} broke; the tip is at {:.2} m, without limit at {:.2} m", report.broken, x[10].z, positions(&whole, "r")[10].z);
     assert!(report.broken >= 1 && x[10].z < -3.0 && positions(&whole, "r")[10].z > -1.2);
-    // What is restored is torn, too.
+    // The restored world is torn, too.
     let (state, mut again) = (torn.save(&[]), simulation(&scene(", break_strain = 0.03", "position_based")));
     again.restore(&state).unwrap();
     run(&mut torn, 3);

@@ -65,7 +65,7 @@ fn a_free_net_and_the_fluid_come_to_one_velocity() {
     let errors = [200, 400].map(|fps| {
         let mut sim = simulation(&tube(fps, fps, 4.0, ""));
         step(&mut sim);
-        // What one loses the other gets.
+        // One gains what the other loses.
         assert!((sim.ledger().momentum[0] - 2.4).abs() < 1e-13, "{:?}", sim.ledger().momentum);
         run(&mut sim, fps - 1);
         let net = column(&sim, "net", "velocity")[8].x;

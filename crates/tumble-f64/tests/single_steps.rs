@@ -201,7 +201,7 @@ fn a_twisted_strand_turns_back_as_computed_by_hand() {
     assert!(x[..3].iter().zip(&start).all(|(x, s)| (xyz(*x) - xyz(*s)).norm() < 1e-15), "{x:?}");
 }
 
-/// What sews: without length, as a vector. Stiff or not, both ends go straight to each other by their inverse masses, and meet if it is rigid.
+/// Sewing springs, of zero length, as a vector. Stiff or not, both ends move straight towards each other by their inverse masses, and meet if rigid.
 #[test]
 fn a_projected_seam_closes_as_computed_by_hand() {
     let (w, k, h) = ([1.0, 0.25], 20.0, 0.2);

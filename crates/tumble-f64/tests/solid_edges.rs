@@ -144,7 +144,7 @@ fn edges_of_every_kind_of_solid_are_met() {
     }
 }
 
-/// Where masses alone meet it, links cut through the corner.
+/// If only masses collide with it, links cut through the corner.
 #[test]
 fn nothing_cuts_into_the_edge_of_a_box() {
     let scene = |edges: bool| {
@@ -276,7 +276,7 @@ fn what_starts_in_a_solid_comes_out() {
     assert!(lowest(&x) > 0.95 * THICKNESS && highest(&x) < 1.05 * THICKNESS);
 }
 
-/// What is pinned inside a solid is no tangle with it, and hangs as where masses alone meet it.
+/// Masses pinned inside a solid are not tangled with it, and hang as with contact of masses only.
 #[test]
 fn what_is_nailed_to_a_solid_hangs_from_it() {
     let pole = "capsule = { from = [-0.2, 0, -1], to = [-0.2, 0, 1], radius = 0.01 }";
@@ -340,7 +340,7 @@ fn wires_that_move_carry_what_lies_on_them() {
     let x = positions(&sim, "cloth");
     println!("lifted to {:.4} m, edges at least {nearest:.5} m from the axis", highest(&x));
     assert!((0.5..0.53).contains(&highest(&x)) && crossed == 0, "{} {crossed}", highest(&x));
-    // Where the wire is at the end of a step, 0.7 mm above where it was at its start (contact.23).
+    // Position of the wire at the end of a step, 0.7 mm above its start (contact.23).
     assert!(nearest > 0.003 + 0.9 * THICKNESS - 1e-4, "{nearest}");
 
     let bar = "capsule = { from = [-0.3, -0.05, -0.11], to = [0.3, -0.05, -0.11], radius = 0.003 }";
@@ -366,7 +366,7 @@ fn belts_take_along_what_lies_on_them() {
     assert!((v / 0.3 - 1.0).abs() < 0.01, "{v}");
 }
 
-/// What starts through a solid is told by its name, and so is what a plane has not.
+/// A start through a solid gives a warning with its name, and so do edges of a plane.
 #[test]
 fn words_about_edges_name_the_solid() {
     let through = simulation(&format!("{}{}{}", position_based(), sheet("rotate = [0, 90, 0]"), solid(WIRE, true, "")));

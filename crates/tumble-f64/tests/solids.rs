@@ -93,7 +93,7 @@ acceleration = [3, 0, 0]
     let given = 2.0 * 3.0 * h * volume;
     let has = sim.ledger().momentum[0];
     println!("given {given} has {has} ball {}", force[0] * h);
-    // What a free ball in a stream that is pushed feels is its added mass times the push, 0.5 2 V 3 = 0.196 N; walls are near.
+    // The force on a free ball in an accelerated stream is its added mass times the acceleration, 0.5 2 V 3 = 0.196 N; walls are near.
     assert!(force[0] > 0.15 && force[0] < 0.2, "{force:?}");
     assert!((has + force[0] * h - given).abs() < 1e-9 * given, "{has} + {} is not {given}", force[0] * h);
 }

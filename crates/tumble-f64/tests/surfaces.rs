@@ -255,7 +255,7 @@ fn a_ball_swells_until_tension_holds_its_pressure() {
     // Nothing else pushes: momentum stays zero.
     let p = Vector::from(sim.ledger().momentum);
     assert!(p.norm() < 1e-10 && Vector::from(start.momentum).norm() == 0.0, "{p:?}");
-    // What cannot be is told.
+    // Impossible input is an error.
     let mut open = mesh.clone();
     open.triangles.pop();
     let told = |text: &str, mesh: Mesh| with_mesh(text, mesh).err().unwrap();

@@ -135,7 +135,7 @@ fn a_tear_moves_nothing() {
     }
 }
 
-/// What has come apart is joined by no element any more: each piece keeps its momentum.
+/// Separated pieces share no element: each conserves its momentum.
 #[test]
 fn torn_pieces_exert_nothing_on_each_other() {
     let mut sim = sheet("symplectic_euler", 40, ALL, "tear = { strain = 0.3, spread = 0.2 }");
@@ -225,7 +225,7 @@ fn a_whole_surface_is_as_stiff_as_one_that_cannot_tear() {
     }
 }
 
-/// What has torn stays so, and a snapshot holds all of it.
+/// Tears are permanent, and a snapshot contains them.
 #[test]
 fn a_torn_surface_is_saved_and_restored() {
     for (scheme, substeps) in [("velocity_verlet", 40), ("implicit_euler", 4), ("position_based", 10)] {
@@ -254,7 +254,7 @@ fn a_torn_surface_is_saved_and_restored() {
     }
 }
 
-/// Where nothing is left to come apart with, it holds; what is weaker tears there first.
+/// Without spare vertices nothing tears; weak regions tear first.
 #[test]
 fn spare_vertices_run_out_and_weak_places_tear_first() {
     let mut sim = sheet("position_based", 10, ALL, "tear = { strain = 0.3, spare = 3 }");

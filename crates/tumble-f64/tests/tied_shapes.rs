@@ -12,8 +12,8 @@ use tumble_interface::Engine;
 const G: f64 = 9.8;
 const FPS: u32 = 100;
 
-/// What swings through zero twice a period: from its samples of position and speed, and the largest change of a distance between masses of
-/// "block" over their own.
+/// Oscillation with two zero crossings per period, from samples of position and speed, and the largest relative change of a distance between masses
+/// of "block".
 fn swing(sim: &mut Simulation, seconds: f64, along: impl Fn(&Simulation) -> (f64, f64)) -> (f64, f64) {
     let start = positions(sim, "block");
     let (mut samples, mut bent) = (Vec::new(), 0.0_f64);

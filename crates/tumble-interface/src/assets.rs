@@ -1,4 +1,4 @@
-//! What a scene takes from files.
+//! Assets of a scene from files.
 
 use crate::{Character, Fabric, Mesh};
 use std::collections::HashMap;

@@ -11,7 +11,7 @@ pub struct Character {
     pub joints: Vec<Joint>,
     /// Ways in which joints carry vertices.
     pub binds: Vec<Bind>,
-    /// What carries each vertex, len = vertices; the weights of a vertex add up to 1.
+    /// Bones of each vertex, len = vertices; the weights of a vertex sum to 1.
     pub skin: Vec<[Influence; 4]>,
     /// Movements.
     pub clips: Vec<Clip>,
@@ -24,7 +24,7 @@ pub struct Joint {
     pub name: String,
     /// Index of the joint that carries it, less than its own.
     pub parent: Option<u32>,
-    /// Where it is in its parent when no clip moves it.
+    /// Transform in its parent without a clip.
     pub rest: Transform,
 }
 
@@ -45,7 +45,7 @@ impl Default for Transform {
     }
 }
 
-/// What takes vertices into a joint: there they stay.
+/// Bind matrix: takes vertices into the frame of a joint.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Bind {
     /// The joint.
@@ -83,11 +83,11 @@ pub struct Track {
     pub times: Vec<f64>,
     /// Values; of a cubic track three for each key: rate before, value, rate after. The fourth number counts for rotations alone.
     pub values: Vec<[f64; 4]>,
-    /// What happens between keys.
+    /// Interpolation between keys.
     pub between: Between,
 }
 
-/// What of a joint changes.
+/// Animated property of a joint.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Part {
     /// Its movement [m].
@@ -98,7 +98,7 @@ pub enum Part {
     Scale,
 }
 
-/// What happens between keys.
+/// Interpolation between keys.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Between {
     /// It stays until the next key.

@@ -147,7 +147,7 @@ impl<'a> Checker<'a> {
             let alone = |b: &Schema| b["properties"].as_object().is_some_and(|all| all.len() == 1);
             let given: Vec<&str> = entries.iter().map(|(key, _)| key.as_str()).filter(|key| keys.iter().any(|k| k == key)).collect();
             if given.len() > 1 && resolved.iter().all(|b| alone(b) || single(b).is_none()) {
-                return self.report(node, path, format!("{}: only one of them", given.join(" and ")));
+                return self.report(node, path, format!("{}: only one is allowed", given.join(" and ")));
             }
             let chosen = fitting.iter().find(|i| single(resolved[**i]).is_some_and(|k| entries.iter().any(|(key, _)| *key == k)));
             return match chosen {
@@ -181,7 +181,7 @@ impl<'a> Checker<'a> {
         }
     }
 
-    /// What a schema accepts, in words: `a number > 0 N/m`.
+    /// The input that a schema accepts, as text: `a number > 0 N/m`.
     fn describe(&self, schema: &'a Schema, unit: Option<&str>) -> String {
         let schema = self.resolve(schema);
         if let Some(branches) = schema["oneOf"].as_array().or(schema["anyOf"].as_array()) {
@@ -217,7 +217,7 @@ impl<'a> Checker<'a> {
         }
     }
 
-    /// What any of some schemas accepts, in words; tables that differ in their only key, or in their kind, are one.
+    /// The input that any of several schemas accepts, as text; tables that differ only in their single key, or in their kind, are merged.
     fn alternatives(&self, branches: &'a [Schema], unit: Option<&str>) -> String {
         let (mut parts, mut keys, mut kinds) = (Vec::new(), Vec::new(), Vec::new());
         for branch in branches {
@@ -297,7 +297,7 @@ fn number(node: &Node) -> f64 {
 
 fn bounds(schema: &Schema) -> [Option<f64>; 4] {
     let [low, high, above, below] = ["minimum", "maximum", "exclusiveMinimum", "exclusiveMaximum"].map(|k| schema[k].as_f64());
-    // Where the schema says nothing, whole numbers end where those of the machine do.
+    // Without limits in the schema, integers have the range of the machine type.
     let most = match schema["format"].as_str() {
         Some("uint8") => Some(f64::from(u8::MAX)),
         Some("uint32") => Some(f64::from(u32::MAX)),

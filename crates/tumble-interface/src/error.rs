@@ -5,11 +5,11 @@ use std::fmt;
 /// One thing wrong with a scene.
 #[derive(Debug, Clone, PartialEq, Eq, serde::Serialize)]
 pub struct Issue {
-    /// Where, in the words of the scene: `sheet "flag".links.bend`.
+    /// Path in the scene: `sheet "flag".links.bend`.
     pub path: String,
     /// Line of the scene file, counted from 1, where known.
     pub line: Option<usize>,
-    /// What is wrong and what would be right.
+    /// The error and the expected value.
     pub message: String,
 }
 
@@ -119,7 +119,7 @@ pub enum StepError {
         system: String,
         /// Simulated time [s].
         time: f64,
-        /// What ran out, and the cure.
+        /// The exhausted resource, and the remedy.
         what: String,
     },
     /// A user's force or integrator failed.
@@ -137,14 +137,14 @@ impl StepError {
     }
 }
 
-/// Where and when the physics broke.
+/// Place and time of a physical failure.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Breakdown {
     /// System that broke.
     pub system: String,
     /// Object that holds the culprit.
     pub object: String,
-    /// What broke first: `position` or `velocity`.
+    /// The column that failed first: `position` or `velocity`.
     pub column: String,
     /// Index of the particle within its object.
     pub index: usize,
@@ -162,7 +162,7 @@ pub struct Breakdown {
     pub stable_step: f64,
     /// Energy over its scale, where it could be computed.
     pub energy_ratio: Option<f64>,
-    /// What made it so, if that is known: `force[0] gives no finite number at [0, 0, 1] m`.
+    /// The cause, if known: `force[0] gives no finite number at [0, 0, 1] m`.
     pub cause: Option<String>,
 }
 
@@ -173,9 +173,9 @@ impl fmt::Display for Breakdown {
             let place = place.map(short);
             write!(f, "system \"{system}\" at t = {} s: first bad {column} in \"{object}\", cell {cell:?} at {place:?} m", short(*time))?;
             if *stable_step > 0.0 && stable_step.is_finite() {
-                write!(f, ", with steps of {step:.3e} s by {integrator}, the largest stable of which is {stable_step:.3e} s")?;
+                write!(f, ", with steps of {step:.3e} s by {integrator}, whose largest stable step is {stable_step:.3e} s")?;
             }
-            return write!(f, ". Take smaller sub-steps, or look at sources and formulas there");
+            return write!(f, ". Use smaller sub-steps, or check sources and formulas there");
         }
         let step = if *step > 0.0 { format!(", step {step:.3e} s") } else { String::new() };
         write!(f, "system \"{system}\" ({integrator}{step}) at t = {} s: ", short(*time))?;
@@ -191,7 +191,7 @@ impl fmt::Display for Breakdown {
         } else if stable_step.is_finite() {
             write!(f, "Largest stable step by estimate: {stable_step:.3e} s")
         } else {
-            write!(f, "The linear estimate finds every step stable")
+            write!(f, "By the linear estimate every step is stable")
         }
     }
 }

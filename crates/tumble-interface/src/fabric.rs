@@ -5,9 +5,9 @@
 pub struct Fabric {
     /// Its name, which may be empty.
     pub name: String,
-    /// What it is made of, which may be empty.
+    /// Composition; may be empty.
     pub composition: String,
-    /// Who measured it, which may be empty.
+    /// Source of the measurement; may be empty.
     pub source: String,
     /// Mass per area [kg/m²].
     pub density: f64,

@@ -24,7 +24,7 @@ pub struct Mesh {
     pub unused: usize,
 }
 
-/// What a linter finds in a mesh.
+/// Findings of the mesh checker.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct Defects {
     /// Edges with one triangle only: the mesh is open there.
@@ -35,7 +35,7 @@ pub struct Defects {
     pub degenerate: usize,
 }
 
-/// What makes a mesh doubtful as a soft surface, where open edges are no fault: what mending it would change.
+/// Defects of a mesh as a soft surface, where open edges are allowed: the changes that a repair would make.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct Flaws {
     /// Triangles that are there already.
@@ -62,11 +62,11 @@ impl Flaws {
 impl std::fmt::Display for Flaws {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         let kinds = [
-            (self.repeated, "triangle is there already", "triangles are there already"),
+            (self.repeated, "triangle is a duplicate", "triangles are duplicates"),
             (self.degenerate, "triangle has no area", "triangles have no area"),
             (self.turned, "edge is between triangles that face different ways", "edges are between triangles that face different ways"),
             (self.crowded, "edge has more than two triangles", "edges have more than two triangles"),
-            (self.unsewn, "open edge lies on another", "open edges lie on others"),
+            (self.unsewn, "open edge coincides with another", "open edges coincide with others"),
             (self.unused, "vertex belongs to no triangle", "vertices belong to no triangle"),
         ];
         let said = kinds.iter().filter(|(n, ..)| *n > 0);

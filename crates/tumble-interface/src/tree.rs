@@ -31,7 +31,7 @@ pub enum Value {
     Table(Vec<(String, Node)>),
 }
 
-/// What is said of deeper ones.
+/// Message for deeper trees.
 pub(crate) const TOO_DEEP: &str = "nested too deeply to be a scene";
 
 /// Deepest nesting that is read; a scene needs about eight levels.
@@ -108,11 +108,10 @@ impl Node {
                     let i = i.or_else(|| key.parse().ok().filter(|i| *i < items.len()));
                     // An item without a name has the default one.
                     let i = i.or_else(|| items.iter().position(|n| key == "main" && n.entry("name").is_none()));
-                    let i =
-                        i.ok_or_else(|| error(format!("there is no \"{key}\"; there are {} items: {}", items.len(), names.join(", "))))?;
+                    let i = i.ok_or_else(|| error(format!("no \"{key}\" among {} items: {}", items.len(), names.join(", "))))?;
                     &mut items[i]
                 }
-                _ => return Err(error(format!("\"{key}\" stands below a value, not a table"))),
+                _ => return Err(error(format!("\"{key}\" is below a value, not a table"))),
             };
         }
         *node = value;
@@ -285,7 +284,7 @@ mod tests {
         let json = node.to_json().unwrap();
         assert_eq!(json["sheet"][1]["size"][1], 4);
         assert_eq!(json["sheet"][0]["name"], "c");
-        assert!(node.set_text("sheet.z.size=1").unwrap_err().to_string().contains("there is no \"z\""));
+        assert!(node.set_text("sheet.z.size=1").unwrap_err().to_string().contains("no \"z\" among"));
         assert!(node.set_text("time.fps.x=1").is_err());
         assert!(node.set_text("nothing").is_err());
         let mut node = Node::from_toml("version = 1").unwrap();

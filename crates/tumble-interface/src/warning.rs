@@ -1,4 +1,4 @@
-//! What is doubtful about a scene that can be simulated all the same.
+//! Warnings about a scene that can be simulated nevertheless.
 
 use crate::error::Issue;
 use serde::Serialize;
@@ -6,7 +6,7 @@ use std::fmt;
 
 macro_rules! codes {
     ($($(#[$doc:meta])* $variant:ident = $name:literal,)*) => {
-        /// What a warning is about; docs/warnings.md tells what to do about each.
+        /// Subject of a warning; docs/warnings.md gives the remedy for each.
         #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
         pub enum Code {
             $($(#[$doc])* #[serde(rename = $name)] $variant,)*
@@ -80,11 +80,11 @@ codes! {
 /// Something doubtful about a scene.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize)]
 pub struct Warning {
-    /// What it is about.
+    /// Subject.
     pub code: Code,
-    /// Where, in the words of the scene; empty where it is about all of it.
+    /// Path in the scene; empty if it concerns the whole scene.
     pub path: String,
-    /// What is doubtful, and what to do.
+    /// The problem and its remedy.
     pub message: String,
 }
 

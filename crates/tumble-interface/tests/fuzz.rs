@@ -414,7 +414,7 @@ fn edited(text: &str, edits: &[(Index, usize, String)]) -> String {
 }
 
 fn judge_text(text: &str, read: fn(&str) -> Result<Node, SceneError>) -> Outcome {
-    // What a parser makes of a text beside the tree.
+    // Memory of a parser besides the tree.
     let expected = (1 << 16) + 100 * text.len();
     let (tree, taken) = weighed(|| read(text));
     match tree {

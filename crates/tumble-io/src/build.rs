@@ -1,4 +1,4 @@
-//! What all readers share: fans, welding and the last check.
+//! Shared by all readers: fans, welding and the final check.
 
 use std::collections::HashMap;
 use tumble_interface::Mesh;
@@ -87,7 +87,7 @@ pub fn finish(mesh: Mesh) -> Result<Mesh, String> {
 pub const DAMAGED: &str = "the file is damaged, export it again";
 
 fn too_many(n: usize) -> String {
-    format!("{n} vertices are more than indices can tell apart ({}); decimate the mesh", u32::MAX)
+    format!("{n} vertices exceed the index range ({}); decimate the mesh", u32::MAX)
 }
 
 /// The four bytes at `start`, if there are so many.

@@ -11,11 +11,11 @@ const SHIPPED: [(&str, &str); 3] = [
     ("tablecloth", include_str!("../../../python/tumble/fabrics/tablecloth.toml")),
 ];
 
-/// What the files of our own format may hold.
+/// Keys of our own file format.
 const KEYS: [&str; 6] = ["name", "composition", "source", "density", "stretching", "bending"];
-/// What each row of stretching is.
+/// Meaning of each row of stretching.
 const STRETCHED: [&str; 6] = ["small strain", "0°", "22.5°", "45°", "67.5°", "90°"];
-/// What each row of bending is.
+/// Meaning of each row of bending.
 const CREASED: [&str; 3] = ["0°", "45°", "90°"];
 
 /// The record of a shipped fabric.
@@ -27,7 +27,7 @@ pub fn shipped(name: &str) -> Result<Fabric, String> {
     let Some((_, text)) = SHIPPED.iter().find(|(known, _)| *known == name) else {
         let hint = suggestion(name, names());
         let list = names().collect::<Vec<_>>().join(", ");
-        return Err(format!("there is no fabric \"{name}\"{hint} (shipped: {list}; others by {{ path = \"...\" }})"));
+        return Err(format!("there is no fabric \"{name}\"{hint} (bundled: {list}; others by {{ path = \"...\" }})"));
     };
     fabric(text.as_bytes(), false)
 }
@@ -48,7 +48,7 @@ pub fn fabric(bytes: &[u8], json: bool) -> Result<Fabric, String> {
 }
 
 fn read(bytes: &[u8], json: bool) -> Result<Fabric, String> {
-    let text = std::str::from_utf8(bytes).map_err(|_| "it is no text in UTF-8; a fabric is a TOML or JSON file".to_owned())?;
+    let text = std::str::from_utf8(bytes).map_err(|_| "not UTF-8 text; a fabric is a TOML or JSON file".to_owned())?;
     let first = |e: SceneError| {
         e.issues.first().map_or_else(String::new, |i| i.line.map_or(String::new(), |line| format!("line {line}: ")) + &i.message)
     };
@@ -71,15 +71,17 @@ fn read(bytes: &[u8], json: bool) -> Result<Fabric, String> {
     for (i, [c11, c12, c22, _]) in stretching.iter().enumerate() {
         let (place, c12) = (format!("stretching row {} ({})", i + 1, STRETCHED[i]), c12.max(0.0));
         if *c11 <= 0.0 || *c22 <= 0.0 {
-            return Err(format!("{place}: C11 = {c11} and C22 = {c22}, expected both > 0 N/m; nothing would hold its threads"));
+            return Err(format!("{place}: C11 = {c11} and C22 = {c22}, expected both > 0 N/m; the threads would have no stiffness"));
         }
         if c12 * c12 >= c11 * c22 {
             let most = (c11 * c22).sqrt();
-            return Err(format!("{place}: C12 = {c12}, expected < sqrt(C11 C22) = {most:.4}; some stretch would give energy"));
+            return Err(format!(
+                "{place}: C12 = {c12}, expected < sqrt(C11 C22) = {most:.4}; otherwise some stretch would have negative energy"
+            ));
         }
     }
     if let Some(i) = bending.iter().position(|row| row[0] <= 0.0) {
-        return Err(format!("bending row {} ({}): begins with {}, expected > 0 N m", i + 1, CREASED[i], bending[i][0]));
+        return Err(format!("bending row {} ({}): starts with {}, expected > 0 N m", i + 1, CREASED[i], bending[i][0]));
     }
     Ok(Fabric { name: word("name"), composition: word("composition"), source: word("source"), density, stretching, bending })
 }

@@ -24,7 +24,7 @@ pub const VALUES: usize = 1 << 24;
 
 pub fn read(bytes: &[u8]) -> Result<Mesh, String> {
     if bytes.trim_ascii_start().starts_with(b"{") {
-        return Err("this is the text form of glTF (.gltf), not the binary one; export it as one .glb file".to_owned());
+        return Err("this is the text form of glTF (.gltf), not binary; export a single .glb file".to_owned());
     }
     let file = framed(bytes)?;
     let glb = gltf::Glb::from_slice(file).map_err(|e| format!("{e}; {DAMAGED}"))?;
@@ -38,11 +38,11 @@ pub fn read(bytes: &[u8]) -> Result<Mesh, String> {
 /// The bytes of the file as its header counts them.
 fn framed(bytes: &[u8]) -> Result<&[u8], String> {
     if !bytes.starts_with(b"glTF") {
-        return Err("the file does not begin with \"glTF\"; check the file extension".to_owned());
+        return Err("the file does not start with \"glTF\"; check the file extension".to_owned());
     }
     let length = word(bytes, 8).map_or(0, u32::from_le_bytes) as usize;
     bytes.get(..length).filter(|file| file.len() >= HEADERS).ok_or_else(|| {
-        format!("the header declares {length} bytes, there are {}; the file is cut off or damaged, export it again", bytes.len())
+        format!("the header declares {length} bytes, but there are {}; the file is truncated or damaged, export it again", bytes.len())
     })
 }
 
@@ -92,7 +92,7 @@ fn base64(text: &str) -> Option<Vec<u8>> {
 fn parse(json: &[u8]) -> Result<Root, String> {
     let root = Root::from_slice(json).map_err(|e| format!("JSON: {e}; {DAMAGED}"))?;
     if let Some(name) = root.extensions_required.iter().find(|name| !HARMLESS.iter().any(|start| name.starts_with(start))) {
-        return Err(format!("the file requires the extension {name}, which is not read; export it without (no compression)"));
+        return Err(format!("the file requires the extension {name}, which is not supported; export without it (no compression)"));
     }
     Ok(root)
 }
@@ -143,7 +143,7 @@ impl<'a> Scene<'a> {
             return Err("a primitive without POSITION; export the mesh with its vertices".to_owned());
         };
         let positions = self.column(positions.value(), Type::Vec3, &[ComponentType::F32])?;
-        // What is wrong with texture coordinates only leaves them out.
+        // Invalid texture coordinates are ignored.
         let texture = primitive.attributes.get(&Checked::Valid(Semantic::TexCoords(0)));
         let texture = texture
             .and_then(|column| self.column(column.value(), Type::Vec2, &[ComponentType::F32, ComponentType::U8, ComponentType::U16]).ok());
@@ -210,13 +210,13 @@ impl<'a> Scene<'a> {
         let accessor = self.root.accessors.get(a).ok_or_else(|| damaged("does not exist"))?;
         let component = match accessor.component_type {
             Checked::Valid(accessor::GenericComponentType(component)) if components.contains(&component) => component,
-            _ => return Err(fault("holds another type of numbers than expected; export the mesh without quantization")),
+            _ => return Err(fault("has an unexpected number type; export the mesh without quantization")),
         };
         if accessor.type_ != Checked::Valid(type_) {
-            return Err(damaged("holds another type of values than expected"));
+            return Err(damaged("has an unexpected value type"));
         }
         if accessor.sparse.is_some() {
-            return Err(fault("is sparse, which is not read; export the mesh without sparse accessors"));
+            return Err(fault("is sparse, which is not supported; export the mesh without sparse accessors"));
         }
         let view = accessor.buffer_view.and_then(|view| self.root.buffer_views.get(view.value()));
         let view = view.ok_or_else(|| fault("has no data in the file; export the mesh without compression"))?;
@@ -224,7 +224,7 @@ impl<'a> Scene<'a> {
         // The chunk of a binary file is the buffer without an address.
         let inside = |uri: &Option<String>| uri.as_ref().is_none_or(|uri| uri.starts_with("data:"));
         let Some((_, Some(buffer))) = buffer.filter(|(words, _)| inside(&words.uri)) else {
-            return Err(fault("has its data in another file; export one .glb file with everything inside"));
+            return Err(fault("has its data in another file; export a single .glb file with everything embedded"));
         };
         let outside = || damaged("reaches beyond the end of its data");
         let offset = view.byte_offset.unwrap_or_default().0;
@@ -249,7 +249,7 @@ impl<'a> Scene<'a> {
     /// Counts `n` values as read.
     pub fn spend(&mut self, n: usize) -> Result<(), String> {
         let rest = self.values.checked_sub(n);
-        self.values = rest.ok_or("the nodes show their meshes too often to unfold them all; export fewer instances, or one")?;
+        self.values = rest.ok_or("the nodes instantiate their meshes too often to expand them all; export fewer instances")?;
         Ok(())
     }
 }

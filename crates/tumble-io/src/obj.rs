@@ -46,7 +46,7 @@ pub fn read(bytes: &[u8]) -> Result<Mesh, String> {
                 polygon.clear();
                 for word in words {
                     let i = position(word, mesh.vertices.len()).ok_or_else(|| {
-                        format!("line {number}: \"{word}\" names no vertex (the first is 1, the latest is -1); {DAMAGED}")
+                        format!("line {number}: \"{word}\" is not a vertex index (the first is 1, the latest is -1); {DAMAGED}")
                     })?;
                     if i > largest.0 {
                         largest = (i, number);
@@ -70,7 +70,7 @@ pub fn read(bytes: &[u8]) -> Result<Mesh, String> {
     }
     if largest.0 as usize > n {
         let (i, number) = largest;
-        return Err(format!("line {number}: the face uses vertex {i}, but the file has {n}; it is cut off or damaged, export it again"));
+        return Err(format!("line {number}: the face uses vertex {i}, but the file has {n}; it is truncated or damaged, export it again"));
     }
     // Lines may be in any order.
     let mut corners = corners.into_iter().map(|i| texture.get(i?).copied());

@@ -7,9 +7,9 @@ use tumble_interface::Mesh;
 
 pub fn read(bytes: &[u8]) -> Result<Mesh, String> {
     if !bytes.starts_with(b"ply") {
-        return Err("the file does not begin with \"ply\"; check the file extension".to_owned());
+        return Err("the file does not start with \"ply\"; check the file extension".to_owned());
     }
-    let end = header_length(bytes).ok_or("the header has no end (a line \"end_header\"); the file is cut off, export it again")?;
+    let end = header_length(bytes).ok_or("the header has no end (a line \"end_header\"); the file is truncated, export it again")?;
     let (header, payload) = bytes.split_at(end);
     // The parser wants UTF-8; comments may be in any encoding.
     let header: Vec<u8> = header.iter().map(|b| if b.is_ascii() { *b } else { b'?' }).collect();
@@ -21,7 +21,7 @@ pub fn read(bytes: &[u8]) -> Result<Mesh, String> {
     if least > payload.len() as u128 + 1 {
         let counts: Vec<_> = header.elements.values().map(|e| format!("{} {}", e.count, e.name)).collect();
         return Err(format!(
-            "the header declares {} elements, at least {least} bytes, but {} follow; the file is cut off or damaged, export it again",
+            "the header declares {} elements, at least {least} bytes, but {} follow; the file is truncated or damaged, export it again",
             counts.join(" + "),
             payload.len()
         ));
@@ -63,7 +63,7 @@ pub fn read(bytes: &[u8]) -> Result<Mesh, String> {
         match &polygon.corners {
             None => return Err(format!("face {f} has no list \"vertex_indices\" of numbers 0, 1, 2, ...; {DAMAGED}")),
             Some(corners) if corners.len() < 3 => {
-                return Err(format!("face {f} has {} vertices, it needs 3; {DAMAGED}", corners.len()));
+                return Err(format!("face {f} has {} vertices, at least 3 are needed; {DAMAGED}", corners.len()));
             }
             Some(corners) => {
                 fan(&mut mesh.triangles, corners);
@@ -78,7 +78,7 @@ pub fn read(bytes: &[u8]) -> Result<Mesh, String> {
         weld(&mut mesh)?;
     }
     if mesh.triangles.is_empty() && header.elements.contains_key("tristrips") {
-        return Err("the file has triangle strips, which are not read; export it with faces".to_owned());
+        return Err("the file has triangle strips, which are not supported; export it with faces".to_owned());
     }
     Ok(mesh)
 }

@@ -11,7 +11,7 @@ use tumble_interface::mesh::SLIVER;
 /// Rounds of all steps, and of the first of them; a few are enough for all but contrived meshes.
 const ROUNDS: usize = 32;
 
-/// What has been done to a mesh.
+/// Repairs of a mesh.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct Repairs {
     /// Vertices that became one with another at the same place.
@@ -76,7 +76,7 @@ pub fn repair(mesh: &Mesh) -> (Mesh, Repairs) {
     if done.is_none() {
         return (mesh.clone(), done);
     }
-    // What did not become one with another is where it was.
+    // Vertices that were not merged keep their position.
     work.vertices[..mesh.vertices.len()].copy_from_slice(&mesh.vertices);
     (work.finish(!mesh.texture.is_empty()), done)
 }
@@ -236,7 +236,7 @@ impl Work {
     fn drop_repeated(&mut self) -> usize {
         let mut repeated = 0;
         for slivers in [false, true] {
-            // Where an edge is divided on both sides, two slivers of the surface lie at the same places.
+            // If an edge is divided on both sides, two slivers of the surface coincide.
             let meeting = self.meeting();
             let belongs = |t: [u32; 3]| edges_of(t).iter().all(|ends| meeting.get(ends) == Some(&2));
             let mut drop = vec![false; self.triangles.len()];
@@ -316,7 +316,7 @@ impl Work {
         })
     }
 
-    /// Where the longest side of a triangle without area begins; `None` if it has one.
+    /// Start of the longest side of a triangle without area; `None` if it has area.
     fn sliver(&self, t: [u32; 3]) -> Option<usize> {
         let sides = self.sides(t);
         let longest = (0..3).fold(0, |l, k| if sides[k] > sides[l] { k } else { l });
@@ -330,7 +330,7 @@ impl Work {
         self.drop(&drop)
     }
 
-    /// Where the middle corner b of a triangle without area lies on a side of a neighbour, that is cut in two there, and the triangle is gone.
+    /// If the middle corner b of a triangle without area lies on a side of a neighbour, the side is cut there, and the triangle is gone.
     /// Triangles with a vertex twice go as well. Returns how often something was done, and how many triangles are gone.
     ///
     /// ```text
@@ -539,8 +539,8 @@ impl Work {
         sheets
     }
 
-    /// Where surfaces still share an edge because they hang together around both of its ends, all but the first get a vertex in its middle.
-    /// `sheets` are by edges of the vertices `origin`.
+    /// If surfaces still share an edge because they are connected around both of its ends, all but the first get a vertex at its midpoint. `sheets`
+    /// are by edges of the vertices `origin`.
     fn divide(&mut self, sheets: &HashMap<[u32; 2], Vec<Vec<usize>>>, origin: &[u32]) {
         let mut busy = vec![false; self.triangles.len()];
         for ([a, b], faces) in self.edges() {

@@ -48,7 +48,7 @@ impl<'a> Reader<'a> {
             let rest = rest(node);
             let numbers = rest.translation.iter().chain(&rest.rotation).chain(&rest.scale);
             if numbers.into_iter().any(|x| !x.is_finite()) {
-                return Err(format!("node {n} has a place that is not finite; {DAMAGED}"));
+                return Err(format!("node {n} has a transform that is not finite; {DAMAGED}"));
             }
             self.joint_of[n] = Some(i as u32);
             self.character.joints.push(Joint { name: node.name.clone().unwrap_or_default(), parent: parent.map(|p| p as u32), rest });
@@ -89,7 +89,7 @@ impl<'a> Reader<'a> {
             }
         }
         if !skinned {
-            return Err("no mesh has a skin: nothing binds it to joints; export it with its armature, or use shape.mesh".to_owned());
+            return Err("no mesh has a skin: nothing is bound to joints; export it with its armature, or use shape.mesh".to_owned());
         }
         Ok(())
     }
@@ -185,7 +185,7 @@ impl<'a> Reader<'a> {
             let mut clip = Clip { name, tracks: Vec::new() };
             for (c, channel) in animation.channels.iter().enumerate() {
                 let wrong = |e: String| format!("animation {a}, channel {c}: {e}");
-                // What moves something that is not shown, or no joint, moves nothing here.
+                // Channels of hidden nodes or of nodes that are not joints have no effect.
                 let node = channel.target.node.value();
                 let part = match channel.target.path {
                     Checked::Valid(Property::Translation) => Part::Translation,
@@ -228,7 +228,7 @@ impl<'a> Reader<'a> {
             return Err(format!("{} values for {} times, expected {needed}; {DAMAGED}", values.count, times.len()));
         }
         if times.iter().any(|t| !t.is_finite()) || times.windows(2).any(|t| t[1] <= t[0]) {
-            return Err("times that do not rise; export the animation again".to_owned());
+            return Err("times that do not increase; export the animation again".to_owned());
         }
         let value = |i: usize| std::array::from_fn(|k| if k < width { values.number(i, k) } else { 0.0 });
         let values: Vec<[f64; 4]> = (0..values.count).map(value).collect();
@@ -284,7 +284,7 @@ fn four(all: impl Iterator<Item = (usize, f64)>, first: u32, count: u32) -> Resu
     Ok(std::array::from_fn(|k| of(k).unwrap_or_default()))
 }
 
-/// Where a node is in its parent. A matrix is taken apart; shear, which glTF forbids, is lost.
+/// Transform of a node in its parent. A matrix is decomposed; shear, which glTF forbids, is lost.
 fn rest(node: &Node) -> Transform {
     if node.matrix.is_none() {
         let wide = |v: [f32; 3]| v.map(f64::from);

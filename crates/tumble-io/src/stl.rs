@@ -37,11 +37,11 @@ pub fn read(bytes: &[u8]) -> Result<Mesh, String> {
         return Ok(mesh);
     }
     let (Some(n), Some(expected)) = (declared, expected) else {
-        return Err("shorter than an STL header, and no \"solid\" at the start; is this an STL file, and all of it?".to_owned());
+        return Err("shorter than an STL header, and no \"solid\" at the start; is this a complete STL file?".to_owned());
     };
     if (bytes.len() as u64) < expected {
         return Err(format!(
-            "the header declares {n} triangles, {expected} bytes, but there are {}; the file is cut off or not STL, export it again",
+            "the header declares {n} triangles, {expected} bytes, but there are {}; the file is truncated or not STL, export it again",
             bytes.len()
         ));
     }
@@ -78,7 +78,7 @@ fn ascii(text: &str, add: &mut impl FnMut([[f64; 3]; 3]) -> Result<(), String>) 
         }
     }
     if open || !corners.is_empty() {
-        return Err("the text ends before \"endsolid\"; the file is cut off, export it again".to_owned());
+        return Err("the text ends before \"endsolid\"; the file is truncated, export it again".to_owned());
     }
     Ok(())
 }

@@ -8,7 +8,7 @@
 
 use half::f16;
 
-/// What the numbers are, for programs that must know.
+/// Grid class, for programs that need it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Class {
     /// Nothing in particular.
@@ -43,7 +43,7 @@ pub struct Volume<'a> {
     pub name: &'a str,
     /// Unit of the values, kept as metadata.
     pub unit: &'a str,
-    /// What the numbers are.
+    /// Grid class.
     pub class: Class,
     /// The numbers, x fastest, those of a vector together.
     pub values: &'a [f32],
@@ -113,7 +113,7 @@ pub fn vdb(volumes: &[Volume<'_>], zip: bool) -> Result<Vec<u8>, String> {
 fn check(volume: &Volume<'_>) -> Result<(), String> {
     let Volume { width, points, values, .. } = volume;
     if !matches!(width, 1 | 3) {
-        return Err(format!("{width} numbers a voxel, expected 1 or 3"));
+        return Err(format!("{width} numbers per voxel, expected 1 or 3"));
     }
     let wanted = points.iter().try_fold(*width, |n, m| n.checked_mul(*m));
     if wanted != Some(values.len()) {
@@ -124,12 +124,12 @@ fn check(volume: &Volume<'_>) -> Result<(), String> {
     }
     let room = |(corner, n): (&i32, &usize)| i64::try_from(*n).is_ok_and(|n| i64::from(*corner) + n <= i64::from(i32::MAX) - UPPER);
     if !volume.corner.iter().zip(points).all(room) || volume.corner.iter().any(|c| i64::from(*c) < i64::from(i32::MIN) + UPPER) {
-        return Err(format!("{points:?} voxels from {:?} on, which are beyond the indices of the format", volume.corner));
+        return Err(format!("{points:?} voxels from {:?} on exceed the index range of the format", volume.corner));
     }
     if volume.half
         && let Some(large) = values.iter().find(|v| v.is_finite() && !f16::from_f32(**v).is_finite())
     {
-        return Err(format!("{large}, half precision ends at 65504; write single precision"));
+        return Err(format!("{large} exceeds the range of half precision, 65504; write single precision"));
     }
     Ok(())
 }
@@ -137,7 +137,7 @@ fn check(volume: &Volume<'_>) -> Result<(), String> {
 /// Active voxels of 8³.
 struct Leaf {
     mask: [u64; 8],
-    /// Where its values begin.
+    /// Offset of its values.
     start: usize,
     count: usize,
 }

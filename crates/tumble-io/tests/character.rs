@@ -87,7 +87,7 @@ fn faults_name_the_place_and_the_cure() {
             &["animation 1", "2 values", "expected 6"],
         ),
         (r#""count": 2, "type": "SCALAR""#, r#""count": 3, "type": "SCALAR""#, &["accessor 5", "beyond"]),
-        (r#""byteOffset": 500, "byteLength": 8"#, r#""byteOffset": 504, "byteLength": 8"#, &["animation 0", "rise"]),
+        (r#""byteOffset": 500, "byteLength": 8"#, r#""byteOffset": 504, "byteLength": 8"#, &["animation 0", "increase"]),
         (r#""buffers": [{"#, r#""buffers": [{"uri": "arm.bin", "#, &["another file", ".glb"]),
     ] {
         assert!(json.contains(from), "{from}");

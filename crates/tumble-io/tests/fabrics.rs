@@ -53,7 +53,7 @@ fn bad_records_are_told_with_place_and_cure() {
         (swap("[2.0, 0.5, 2.0, 1.0]", "[2.0, 2.5, 2.0, 1.0]"), &["row 1", "C12 = 2.5", "< sqrt(C11 C22) = 2.0000"]),
         (swap("[2.0, 0.5, 2.0, 1.0]", "[-2.0, 0.5, 2.0, 1.0]"), &["row 1", "C11 = -2", "> 0"]),
         (swap("[1e-5, 1e-5, 1e-5, 1e-5, 1e-5],\n", ""), &["2 rows, expected 3", "90°) is missing"]),
-        (swap("[1e-5,", "[0,"), &["bending row 1 (0°)", "begins with 0", "> 0"]),
+        (swap("[1e-5,", "[0,"), &["bending row 1 (0°)", "starts with 0", "> 0"]),
         (swap("bending = [\n", "bending = 3\nx = [\n"), &["unknown key \"x\""]),
         (swap("stretching", "streching"), &["unknown key \"streching\"", "did you mean \"stretching\"?"]),
         ("density = = 3".into(), &["line 1", "not TOML"]),

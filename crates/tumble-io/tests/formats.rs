@@ -1,4 +1,4 @@
-//! What each format gives, and what each fault says.
+//! Results of each format, and messages of each error.
 
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)] // a test fails by panicking
 
@@ -209,7 +209,7 @@ fn ply_faults_name_the_place() {
         (replaced("int vertex_indices", "int corners"), &["face 0", "vertex_indices"]),
         (replaced("int vertex_indices", "float vertex_indices"), &["face 0"]),
         (replaced("element face 6", "element face 0"), &["no triangles", "8 vertices"]),
-        (replaced("end_header", "end"), &["end_header", "cut off"]),
+        (replaced("end_header", "end"), &["end_header", "truncated"]),
         (replaced("format ascii", "format utf8"), &["header", "Line 2"]),
     ];
     for (file, parts) in &faults {
@@ -234,7 +234,7 @@ fn ply_counts_are_believed_no_further_than_the_file_is_long() {
                 let name = element.split(' ').next().unwrap();
                 let at = bytes.windows(element.len()).position(|w| w == element.as_bytes()).unwrap();
                 bytes.splice(at..at + element.len(), format!("{name} {count}").into_bytes());
-                rejects(&bytes, Format::Ply, &["declares", count, "cut off"]);
+                rejects(&bytes, Format::Ply, &["declares", count, "truncated"]);
             }
             let empty = format!("ply\nformat {format} 1.0\nelement nothing {count}\nend_header\n");
             rejects(empty.as_bytes(), Format::Ply, &["declares", count]);
@@ -313,7 +313,7 @@ fn stl_faults_name_the_place() {
         ("vertex 1 0 0", "vertex 1 0 zero", &["line 6", "\"zero\""]),
         ("vertex 1 0 0", "vertex 1 0 inf", &["vertex 2", "not finite"]),
         ("      vertex 1 0 0\n", "", &["line 6", "2 vertices"]),
-        ("endsolid", "", &["endsolid", "cut off"]),
+        ("endsolid", "", &["endsolid", "truncated"]),
     ];
     for (from, to, parts) in faults {
         let file = ascii.replacen(from, to, 1);
@@ -327,7 +327,7 @@ fn stl_faults_name_the_place() {
     binary[84 + 12 + 12..][..4].copy_from_slice(&f32::NAN.to_le_bytes());
     rejects(&binary, Format::Stl, &["vertex 1", "NaN", "not finite"]);
     binary[80..84].copy_from_slice(&u32::MAX.to_le_bytes());
-    rejects(&binary, Format::Stl, &["declares 4294967295 triangles", "cut off"]);
+    rejects(&binary, Format::Stl, &["declares 4294967295 triangles", "truncated"]);
     rejects(&[0; 50], Format::Stl, &["shorter than an STL header"]);
 }
 

@@ -97,7 +97,7 @@ fn read_fabric(bytes: &[u8], json: bool) -> Outcome {
     outcome
 }
 
-/// What became of a case of several readings.
+/// Outcome of a case of several readings.
 fn all(outcomes: impl IntoIterator<Item = Outcome>) -> Outcome {
     let worse = |a: Outcome, b: Outcome| {
         let read = a.read || b.read;
@@ -116,7 +116,7 @@ enum Change {
     Insert(Index, &'static str),
 }
 
-/// What tends to be believed: signs, ends of number ranges, key words.
+/// Tokens that parsers tend to trust: signs, ends of number ranges, keywords.
 const TOKENS: [&str; 16] =
     ["-", "0", "99999999999999999999", "1e999", "nan", "\n", "\r", " ", "/", "\\\n", "\"", "[", "}", "null", "list", "\u{e9}"];
 

@@ -1,4 +1,4 @@
-//! What mending a mesh does, and leaves alone.
+//! Effects of a mesh repair, and what it does not change.
 
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)] // a test fails by panicking
 
@@ -119,7 +119,7 @@ fn vertices_that_rounding_moved_apart_become_one() {
         // Each vertex is one of those that were there.
         assert!(found.vertices.iter().all(|x| broken.vertices.contains(x)));
     }
-    // What is farther apart is a slit: single precision would know.
+    // A larger gap is a slit: single precision could resolve it.
     let beside = |gap: f64| repair(&and(&sheet(2), &moved(&sheet(2), [2.0 + gap, 0.0, 0.0]))).1.welded;
     assert_eq!([0.0, 1e-9, 3e-6, 1e-5, 1e-3].map(beside), [3, 3, 3, 0, 0]);
     // A copy that rounding moved stands there already; two closed bodies that nearly touch stay two, where they are.
@@ -167,7 +167,7 @@ fn every_flaw_of_a_soft_surface_is_told() {
     net.unused = 2;
     let flaws = net.flaws();
     assert_eq!(flaws, Flaws { repeated: 1, degenerate: 1, turned: 3, crowded: 1, unsewn: 0, unused: 2 });
-    let told = "1 triangle is there already, 1 triangle has no area, 3 edges are between triangles that face different ways, \
+    let told = "1 triangle is a duplicate, 1 triangle has no area, 3 edges are between triangles that face different ways, \
                 1 edge has more than two triangles, 2 vertices belong to no triangle";
     assert_eq!(flaws.to_string(), told);
     // A triangle the other way round, too; and what the readers leave out.

@@ -89,7 +89,7 @@ pub fn step_error(py: Python<'_>, error: &tumble_interface::StepError) -> PyErr 
     }
 }
 
-/// What went wrong with a file.
+/// Error of a file.
 pub fn file_error(path: &std::path::Path, error: &std::io::Error) -> String {
     match error.kind() {
         std::io::ErrorKind::NotFound => format!("there is no file \"{}\"", path.display()),

@@ -376,7 +376,7 @@ pub fn sample<'py>(py: Python<'py>, field: &Any<'py>, points: &Any<'py>, interpo
     Ok(PyArray1::from_vec(py, values))
 }
 
-/// What a field, or vectors on faces, become when a velocity carries them for h seconds.
+/// A field, or vectors on faces, advected by a velocity for h seconds.
 #[pyfunction]
 #[pyo3(signature = (field, velocity, h, trace="rk2", substeps=1, interpolation="linear", corrected=false, turning=false))]
 pub fn advect<'py>(
@@ -415,7 +415,7 @@ pub fn advect<'py>(
     handed(py, out)
 }
 
-/// What a field, or each component of vectors, becomes when it diffuses for a duration [s] with kappa [m²/s].
+/// A field, or each component of vectors, diffused for a duration [s] with kappa [m²/s].
 #[pyfunction]
 pub fn diffuse<'py>(py: Python<'py>, field: &Any<'py>, kappa: f64, duration: f64) -> PyResult<Any<'py>> {
     let mut f = parts(field, "diffused field")?;

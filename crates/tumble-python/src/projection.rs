@@ -29,7 +29,7 @@ fn now() -> f64 {
     START.get_or_init(Instant::now).elapsed().as_secs_f64()
 }
 
-/// What a solver is asked for; columns lie as on the lattice.
+/// Request to a solver; columns are laid out as on the lattice.
 struct Asked<'a> {
     grid: &'a state::Grid,
     open: &'a [Vec<u8>; 3],
@@ -39,7 +39,7 @@ struct Asked<'a> {
     iterations: usize,
 }
 
-/// What it found.
+/// Its result.
 struct Found {
     q: Vec<f64>,
     history: Vec<f64>,
@@ -64,7 +64,7 @@ macro_rules! solver {
                 method: Method::ALL[asked.method],
                 target: Target::Largest(asked.largest),
                 iterations: asked.iterations,
-                // What flows into a closed space flows out of it, but for rounding.
+                // The net flow into a closed region is zero up to rounding.
                 excess: Excess::Remove,
             };
             let mut q = vec![0.0; b.len()];
@@ -111,7 +111,7 @@ impl Projection {
         PyTuple::new(py, all)
     }
 
-    /// Whose gradient was taken: the step times the pressure over the density [m²/s].
+    /// The potential of the removed gradient: the step times the pressure over the density [m²/s].
     #[getter]
     fn potential(&self) -> Field {
         Field { field: self.potential.clone() }

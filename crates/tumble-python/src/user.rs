@@ -5,7 +5,7 @@ use pyo3::prelude::*;
 use std::sync::{Arc, Mutex};
 use tumble_interface::engine::{Acceleration, UserForce, UserIntegrator};
 
-/// What a user's function has raised last: the cause of the StepError that follows.
+/// The last exception of a custom function: the cause of the StepError that follows.
 #[derive(Clone, Default)]
 pub struct Raised(Arc<Mutex<Option<PyErr>>>);
 
@@ -59,7 +59,7 @@ impl UserForce for Force {
                 let result = self.0.bind(py).call1((t, array(py, x)?, array(py, v)?, PyArray1::from_slice(py, mass)))?;
                 let values = numbers(&result, mass.len(), "what it returned")?;
                 let bad = values.iter().position(|f| !f.is_finite());
-                // Where the state itself has blown up the report of the engine says more.
+                // If the state itself has blown up, the report of the engine is more informative.
                 if let Some(i) = bad.filter(|_| x.iter().chain(v).all(|y| y.is_finite())) {
                     let text = format!("what it returned is {} for particle {}, expected finite numbers", values[i], i / 3);
                     return Err(pyo3::exceptions::PyValueError::new_err(text));

@@ -24,7 +24,7 @@ pub struct World {
     scene: Py<Scene>,
     engine: Box<dyn Engine + Sync>,
     pool: Option<Arc<rayon::ThreadPool>>,
-    /// What users' functions have raised.
+    /// Exceptions of custom functions.
     raised: user::Raised,
 }
 
@@ -139,7 +139,7 @@ impl World {
         self.engine.systems()
     }
 
-    /// What is doubtful about the scene: code (as listed in docs/warnings.md), path and message of each.
+    /// Warnings about the scene: code (as listed in docs/warnings.md), path and message of each.
     #[getter]
     fn warnings<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
         Ok(pythonize::pythonize(py, self.engine.warnings())?)
@@ -218,7 +218,7 @@ impl World {
         arrays::units(py, &all)
     }
 
-    /// What does not change. Objects: mass [kg] n, pinned (indices), triangles m x 3, links l x 2, curve (indices in
+    /// Constant columns. Objects: mass [kg] n, pinned (indices), triangles m x 3, links l x 2, curve (indices in
     /// order), radius [m] 1. Colliders: position [m] n x 3, triangles m x 3; of moving ones frames hold
     /// translation [m] 3 and turn 4, x = turn p + translation, or position of vertices that move by themselves.
     #[getter]
@@ -236,7 +236,7 @@ impl World {
         books(py, &ledger)
     }
 
-    /// Who has how much of the books, and where their worst numbers are: `systems` as (name, ledger), `shares` with system,
+    /// Breakdown of the ledger, and the places of its worst numbers: `systems` as (name, ledger), `shares` with system,
     /// object and ledger, `worst` with measure (a number of the ledger), value, object, other, particles, id, cell. For the
     /// moment when a bound is broken: it takes longer than the ledger.
     fn account<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {

@@ -1,4 +1,4 @@
-//! What goes wrong, as the page reads it.
+//! Failures, as read by the page.
 
 use serde::Serialize;
 use tumble_interface::{Issue, SceneError, StepError};

@@ -18,7 +18,7 @@ use tumble_interface::engine::{Engine, Ledger};
 use tumble_interface::tree::Node;
 use wasm_bindgen::prelude::*;
 
-/// What goes out as JSON or as an error.
+/// Results as JSON, or errors.
 type Answer<T> = Result<T, JsValue>;
 
 #[wasm_bindgen]
@@ -79,7 +79,7 @@ impl World {
         Ok(World { loaded, hand: Hand::default() })
     }
 
-    /// What is there: JSON of `SceneInfo`, without the topology.
+    /// JSON of `SceneInfo`, without the topology.
     pub fn info(&self) -> String {
         json(&self.loaded.info())
     }

@@ -33,7 +33,7 @@ pub struct Loaded {
     memory: f64,
 }
 
-/// What is in a file: a mesh or the reason why there is none, for glTF also a character, or the record of a fabric, and the hash of its content.
+/// Content of a file: a mesh or the reason why there is none, for glTF also a character, or a fabric record, and the hash of its bytes.
 struct Read {
     mesh: Result<Mesh, String>,
     character: Result<Character, String>,
@@ -120,7 +120,7 @@ impl Loaded {
         self.scene.to_json() == other.scene.to_json()
     }
 
-    /// What the index of a frame means: its length and its exchanges.
+    /// Duration of a frame and its number of exchanges.
     pub fn clock(&self) -> (f64, u32) {
         (self.scene.time.fps, self.scene.time.exchanges)
     }

@@ -1,6 +1,5 @@
-//! What it costs to find the contacts of a folded sheet with itself: milliseconds for each stage, and how much was found.
-//!
-//! `cargo run --release -p tumble --example mesh_contact -- [squares per side] [threads]`
+//! Cost of finding the self-contacts of a folded sheet: milliseconds per stage, and the numbers of pairs found. `cargo run --release -p tumble
+//! --example mesh_contact -- [squares per side] [threads]`
 
 #![allow(clippy::unwrap_used)]
 

@@ -66,7 +66,7 @@ pub struct Push {
     pub steady: bool,
 }
 
-/// What has passed through a surface of a system.
+/// Flux through a surface of a system.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Flux {
     /// System that it has entered.
@@ -168,7 +168,7 @@ impl Exchange {
         (flux.heat, flux.mass) = (flux.heat + heat, flux.mass + mass);
     }
 
-    /// What has passed through all surfaces.
+    /// Fluxes through all surfaces.
     pub fn fluxes(&self) -> &[Flux] {
         &self.fluxes
     }
@@ -195,7 +195,7 @@ impl Exchange {
         }
     }
 
-    /// What a fluid has published.
+    /// Published velocities of a fluid.
     pub fn wind(&self, fluid: &str) -> &[(f64, Arc<Vectors>)] {
         self.winds.iter().find(|wind| wind.fluid == fluid).map_or(&[], |wind| &wind.states)
     }

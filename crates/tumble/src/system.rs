@@ -25,24 +25,23 @@ pub trait System: Send + Sync {
     /// The named columns of its objects.
     fn columns(&self, names: &[&str], out: &mut Vec<Column>);
 
-    /// What does not change about its objects.
+    /// Constant columns of its objects.
     fn topology(&self, out: &mut Vec<Column>);
 
     /// Its books at time t [s].
     fn ledger(&self, t: f64) -> Ledger;
 
-    /// What each of its objects has of them; none where it cannot tell.
+    /// Share of each of its objects; none if unknown.
     fn shares(&self, _t: f64) -> Vec<Share> {
         Vec::new()
     }
 
-    /// Where the worst numbers of its books are, as far as it knows.
+    /// Places of the worst numbers of its ledger, as far as known.
     fn worst(&self, _t: f64) -> Vec<Worst> {
         Vec::new()
     }
 
-    /// What has broken, if anything: a number that is not finite, or an energy beyond its scale. Of a state without fault
-    /// the scale is taken.
+    /// The failure, if any: a non-finite number, or an energy beyond its scale. A healthy state updates the scale.
     fn breakdown(&mut self, t: f64) -> Option<StepError>;
 
     /// While watched, a system looks for a breakdown after every sub-step and returns the first as an error.
@@ -92,7 +91,7 @@ pub enum Part {
 pub struct Archive {
     /// Names and parts.
     pub parts: Vec<(String, Part)>,
-    /// Where reading or writing goes on.
+    /// Position of reading or writing.
     next: usize,
 }
 

@@ -236,7 +236,7 @@ impl World {
         out
     }
 
-    /// What does not change about every object.
+    /// Constant columns of all objects.
     pub fn topology(&self) -> Vec<Column> {
         let mut out = Vec::new();
         self.systems.iter().for_each(|s| s.topology(&mut out));
@@ -274,7 +274,7 @@ impl World {
         total
     }
 
-    /// Who has how much of the books, and where the worst is.
+    /// Breakdown of the ledger by object, and the places of the worst values.
     pub fn account(&self) -> Account {
         let (time, systems) = (self.time(), &self.systems);
         Account {
@@ -284,7 +284,7 @@ impl World {
         }
     }
 
-    /// What systems chose from another scene is chosen anew.
+    /// Drops cached choices of the systems (sub-step count, energy scale) after loading another scene's state.
     pub fn reconsider(&mut self) {
         self.systems.iter_mut().for_each(|s| s.reconsider());
     }

@@ -373,7 +373,7 @@ fn a_look_at_what_breaks_is_an_error_with_the_sub_step() {
     assert_eq!(sim.hash(), start);
 }
 
-/// Who dies in a frame dies at its end: inside of it all are still there.
+/// Particles die at the end of a frame: inside of it all still exist.
 #[test]
 fn a_look_inside_a_frame_buries_nobody() {
     for system in [

@@ -172,7 +172,7 @@ fn without_comments_and_strings(text: &str) -> String {
     out
 }
 
-/// What is wrong with the imports of a module.
+/// Violations in the imports of a module.
 fn faults(order: &[String], of: &[String], imports: &[Import]) -> Vec<String> {
     let place = |name: &String| order.iter().position(|m| m == name);
     let Some(own) = of.first().and_then(place) else { return Vec::new() };

@@ -17,7 +17,7 @@ from tumble.cli.console import complain, heed_termination, lost_frames_told, sto
 
 
 class Verbs(TyperGroup):
-    """Turns whatever a verb raises into one clear message and an exit code."""
+    """Turns any exception of a verb into one clear message and an exit code."""
 
     def invoke(self, ctx: Any) -> Any:
         try:
@@ -26,7 +26,7 @@ class Verbs(TyperGroup):
             complain("stopped")
             raise typer.Exit(stopped(stop)) from None
         except MemoryError:
-            complain("out of memory: the scene needs more than this machine has; take a lower resolution")
+            complain("out of memory: the scene needs more than this machine has; lower its resolution")
             raise typer.Exit(1) from None
         except OSError as error:
             if error.errno == errno.EPIPE:
@@ -59,16 +59,16 @@ def _root(
     """Simulates masses, springs, cloth, ropes and solids.
 
     \b
-    A first round:
-      tumble scenes                     what is there
+    First steps:
+      tumble scenes                     list the bundled scenes
       tumble check sheet-on-bunny       is the step small enough?
       tumble run sheet-on-bunny         simulate into out/sheet-on-bunny
-      tumble render sheet-on-bunny      look at the last frame
-      tumble view sheet-on-ball         play with it in a browser
+      tumble render sheet-on-bunny      draw the last frame
+      tumble view sheet-on-ball         explore it in a browser
 
     \b
-    Exit codes: 0 fine; 1 the simulation failed or broke an expectation;
-    2 the input is wrong; 130 stopped with Ctrl-C, 143 by a signal to terminate.
+    Exit codes: 0 success; 1 the simulation failed or violated an expectation;
+    2 invalid input; 130 stopped by Ctrl-C, 143 by SIGTERM.
     """
 
 

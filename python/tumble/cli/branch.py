@@ -1,4 +1,4 @@
-"""`tumble branch`: go on from a frame of a run, another way."""
+"""`tumble branch`: continue from a frame of a run with a changed scene."""
 
 import sys
 from pathlib import Path
@@ -29,21 +29,21 @@ def branch(
         int | None,
         typer.Option(metavar="N", min=1, help="Frames to simulate after FRAME.", show_default="to the scene's last"),
     ] = None,
-    resume: Annotated[bool, typer.Option("--resume", help="Go on where the branch in the folder was stopped.")] = False,
+    resume: Annotated[bool, typer.Option("--resume", help="Continue the stopped branch in the folder.")] = False,
     force: Annotated[bool, typer.Option("--force", help="Replace the run in the folder.")] = False,
     threads: Annotated[
-        int | None, typer.Option(min=1, metavar="N", help="Processor cores to use; the result does not depend on it.")
+        int | None, typer.Option(min=1, metavar="N", help="Processor cores to use; results do not depend on it.")
     ] = None,
 ) -> None:
-    """Go on from a frame of a run with a changed scene, as a new run.
+    """Continue from a frame of a run with a changed scene, as a new run.
 
-    FRAME is any frame that the run has; -1 is the last. Where it has no checkpoint, the state is made again from the nearest
-    one before it, or from the start, and its hash is checked. The branch begins with the frames of its parent (as links, where
-    the disk can), so that it can be plotted, rendered, compared and branched again like any run. Its run.json keeps the line
-    of descent: each parent, frame, hash of the state there and what was changed.
+    FRAME is any frame of the run; -1 is the last. If it has no checkpoint, the state is recomputed from the nearest
+    earlier one, or from the start, and its hash is checked. The branch begins with the frames of its parent (as links, if
+    the disk supports them), so it can be plotted, rendered, compared and branched like any run. Its run.json lists its
+    ancestors: each parent, frame, state hash and changes.
 
-    What acts can be changed: forces, stiffness, damping, colliders, steps. What the state holds cannot: masses, what is
-    pinned, how many things there are. Where things start changes nothing; a branch whose change does nothing says so.
+    Forces, stiffness, damping, colliders and steps can be changed. Properties held in the state cannot: masses, pins,
+    numbers of objects. Initial positions have no effect; a branch whose changes have no effect gives a warning.
 
     \b
     Examples:
@@ -78,7 +78,7 @@ def branch(
     except KeyboardInterrupt as stop:
         # Before the branch has begun, the folder may hold another run, or none.
         how = ["--resume"] if is_branch(folder, parent, k, changes) else ["--force"] if force else []
-        complain(f"stopped. Go on with\n  {find.command('branch', at, changes, *again, *how)}")
+        complain(f"stopped. Continue with\n  {find.command('branch', at, changes, *again, *how)}")
         raise typer.Exit(stopped(stop)) from None
     wanted = done.scene["output"]
     asked = {name: wanted[name] for name in ("film", "usd", "ply", "vdb", "plot")}
@@ -91,7 +91,7 @@ def branch(
 
 
 def _origin(argument: str) -> "tuple[Run, int]":
-    """The run and the frame that RUN@FRAME means."""
+    """The run and the frame of RUN@FRAME."""
     name, mark, number = argument.rpartition("@")
     try:
         frame = int(number)
@@ -103,7 +103,7 @@ def _origin(argument: str) -> "tuple[Run, int]":
 
 
 def _idle(done: "Run", parent: "Run", frame: int) -> str | None:
-    """A warning if what was changed has changed nothing."""
+    """A warning if the changes had no effect."""
     from tumble.compare import compare
 
     n = min(done.n_frames, parent.n_frames)
@@ -111,6 +111,6 @@ def _idle(done: "Run", parent: "Run", frame: int) -> str | None:
     if n <= frame + 1 or compare(parent, done, until=n - 1).seen is not None:
         return None
     return (
-        f"the change did nothing in {counted(n - 1 - frame, 'frame')}: the states are those of {parent.folder}; where things "
-        "start is part of the state, which a branch takes over"
+        f"the change had no effect in {counted(n - 1 - frame, 'frame')}: the states are those of {parent.folder}; initial "
+        "positions are part of the state, which a branch takes from its parent"
     )

@@ -1,4 +1,4 @@
-"""`tumble check`: is the scene right, and will its steps be stable?"""
+"""`tumble check`: is the scene valid, and are its steps stable?"""
 
 import math
 import time
@@ -15,13 +15,13 @@ if TYPE_CHECKING:
     from tumble.emitters import Forecast
 
 _SAFETY = 0.7
-"""Of its largest stable step, what an explicit integrator is advised to take."""
+"""Recommended fraction of the largest stable step of an explicit integrator."""
 
 _WORK = 1e6
-"""Frames times masses, cells and particles that are simulated to see how stable particles are that are not yet born."""
+"""Limit of frames times masses, cells and particles simulated to judge the stability of emitted particles."""
 
 _PATIENCE = 5.0
-"""And seconds, at most, where forces are dear."""
+"""Time limit in seconds, for expensive forces."""
 
 
 def check(
@@ -29,20 +29,21 @@ def check(
     set: find.SetOption = None,
     threads: Annotated[int | None, typer.Option(min=1, metavar="N", help="Processor cores to use.")] = None,
     repair: Annotated[
-        bool, typer.Option("--repair", help="Mend the scene's mesh files, into new ones beside them.")
+        bool, typer.Option("--repair", help="Repair the scene's mesh files into new files beside them.")
     ] = False,
-    force: Annotated[bool, typer.Option("--force", help="With --repair: replace files of an earlier repair.")] = False,
+    force: Annotated[
+        bool, typer.Option("--force", help="With --repair: overwrite files of an earlier repair.")
+    ] = False,
 ) -> None:
     """Check a scene, and estimate which steps are stable.
 
-    Where there are emitters, the scene is simulated, for seconds at most, until many of their particles are there. Ends
-    with code 1 if a system is predicted to explode, or does, 2 if the scene is wrong.
+    A scene with emitters is simulated, for a few seconds at most, until many particles are alive. Exits with code 1 if
+    a system is predicted to explode, or does, 2 if the scene is invalid.
 
-    With --repair, meshes that are not sound are mended: rims that lie on each other, or did before numbers were rounded,
-    are sewn, triangles that stand there twice or have no area go, as do vertices of no triangle, all are made to face one
-    way, outward where a mesh is closed, and edges of more than two triangles come apart. NAME.ply becomes
-    NAME.repaired.obj beside it, the lines of the scene to change are told, and the scene is checked as if they had been.
-    Originals and the scene's file stay as they are; holes stay open.
+    --repair mends defective meshes: coincident rims (up to rounding) are sewn; duplicate and zero-area triangles and
+    unused vertices are dropped; triangles are oriented consistently, outward if the mesh is closed; edges of more than
+    two triangles are split. NAME.ply becomes NAME.repaired.obj beside it, the scene lines to change are printed, and the
+    scene is checked with them. The original meshes and the scene file are not modified; holes stay open.
 
     \b
     Examples:
@@ -80,9 +81,9 @@ def check(
     say()
     warn_of(world.warnings)
     if fault is not None:
-        say(f"will break down {fault}\nwhat would help, {find.command('run', scene, set)} tries and tells")
+        say(f"will break down {fault}\n{find.command('run', scene, set)} searches for changes that help")
     if cures:
-        say("will explode. Any of these helps, by the estimate:")
+        say("will explode. By the estimate, any of these helps:")
         for cure in cures:
             say(f"  {find.command('run', scene, [*find.without(set or (), cure, world.systems), *cure])}")
     if cures or fault is not None:
@@ -94,7 +95,7 @@ def check(
 
 @dataclass
 class _When:
-    """When the stability of a system with emitters was judged."""
+    """Time at which the stability of a system with emitters was judged."""
 
     judged: bool
     text: str
@@ -103,8 +104,8 @@ class _When:
 def _judge(
     tree: dict[str, Any], world: "World", expected: "list[Forecast]", estimates: list[dict[str, Any]]
 ) -> "tuple[dict[str, _When], str | None]":
-    """Steps the world until many of the particles of each system are there, as far as the work is bounded, and puts the
-    worst estimate on the way in place of that of the start. Returns when systems with emitters were judged, and what broke."""
+    """Steps the world until many particles of each system are alive, within the limit of work, and replaces the initial
+    estimates by the worst on the way. Returns when systems with emitters were judged, and the failure, if any."""
     import numpy as np
 
     from tumble import StepError
@@ -151,11 +152,11 @@ def _judge(
 def _when(seen: list[tuple[int, int]], counts: Any, own: "list[Forecast]", fps: float) -> _When:
     if not seen:
         if counts.max() < 0.5 and all(f.known for f in own):
-            return _When(False, "no particle is born in the time of the scene")
-        return _When(False, "cannot be judged: no particle was born in the frames that were tried")
+            return _When(False, "no particle is born within the duration of the scene")
+        return _When(False, "cannot be judged: no particle was born in the frames tried")
     frame, n = seen[-1]
     most = max(n, math.floor(float(counts.max()) + 0.01))
-    share = "" if n >= most else f" of about {most} that will be there"
+    share = "" if n >= most else f" of about {most} expected"
     return _When(True, f"judged up to frame {frame} (t = {frame / fps:.4g} s), with {counted(n, 'particle')}{share}")
 
 
@@ -170,7 +171,7 @@ def _take_worse(estimates: list[dict[str, Any]], others: list[dict[str, Any]]) -
 
 
 def _cells(tree: dict[str, Any]) -> float:
-    """Cells of all grids, each as much work as several masses."""
+    """Work of all grid cells, each equal to several masses."""
     total = 0.0
     things = [thing for kind in tree.values() if isinstance(kind, list) for thing in kind if isinstance(thing, dict)]
     for box in (thing["box"] for thing in things if "box" in thing):
@@ -180,7 +181,7 @@ def _cells(tree: dict[str, Any]) -> float:
 
 
 def _holds(expected: "Forecast", duration: float) -> str:
-    """What an emitter will hold."""
+    """Expected numbers of an emitter."""
     words = expected.words
     source = words["from"].get("particles")
     parts = []
@@ -193,7 +194,7 @@ def _holds(expected: "Forecast", duration: float) -> str:
     if not expected.known:
         more = "bounce" if source and source["at"] == "bounce" else "death"
         count = sum(burst["count"] for burst in words["burst"])
-        parts.append(f"{count} at each {more}" if count else "how many, nobody knows before")
+        parts.append(f"{count} at each {more}" if count else "number not known in advance")
     if words["most"] is not None:
         parts.append(f"at most {words['most']}")
     if words["kill"] and expected.total:
@@ -235,7 +236,7 @@ def _contents(scene: "Scene", world: "World", expected: "list[Forecast]") -> str
     totals = [counted(masses, "mass"), counted(links, "link"), counted(len(world.systems), "system")]
     if most := sum(f.largest for f in expected):
         totals.insert(1, f"up to {counted(most, 'emitted particle')}")
-    lines.append(f"in all     {', '.join(totals)}")
+    lines.append(f"total      {', '.join(totals)}")
     taken = _memory()
     memory = f"{size(taken)} in use, " if taken else ""
     lines.append(
@@ -246,7 +247,7 @@ def _contents(scene: "Scene", world: "World", expected: "list[Forecast]") -> str
 
 
 def _disk(world: "World", expected: "list[Forecast]", frames: int, fps: float) -> str:
-    """What frames will take on disk."""
+    """Disk space of the frames."""
     import numpy as np
 
     born = {f.name for f in expected}
@@ -259,7 +260,7 @@ def _disk(world: "World", expected: "list[Forecast]", frames: int, fps: float) -
     if all(f.known for f in expected):
         return f"a frame takes {'up to ' if born else ''}{size(sizes.max())} on disk, the run {size(sizes.sum())}"
     blind = ", ".join(f'"{f.name}"' for f in expected if not f.known)
-    return f"a frame takes {size(sizes.max())} on disk, the run {size(sizes.sum())}, without what comes of {blind}"
+    return f"a frame takes {size(sizes.max())} on disk, the run {size(sizes.sum())}, without {blind}"
 
 
 def _is_of(tree: dict[str, Any], name: str, method: str) -> bool:
@@ -269,7 +270,7 @@ def _is_of(tree: dict[str, Any], name: str, method: str) -> bool:
 
 
 def _memory() -> float:
-    """Largest memory that this process has had so far, in bytes; 0 where the system does not tell."""
+    """Peak memory of this process in bytes; 0 if the system does not provide it."""
     try:
         import resource
     except ImportError:
@@ -296,7 +297,7 @@ def _verdict(step: float, stable: float, usable: float) -> tuple[int, str]:
     if step <= usable:
         return 1, "gains energy, but slowly: by less than 1000 times in 100 periods of the stiffest mode"
     if stable == 0.0:
-        return 2, "will explode: no step is stable, and this one gains energy fast"
+        return 2, "will explode: no step is stable, and this one gains energy quickly"
     return 2, f"will explode: {step / stable:.3g} times the largest stable step"
 
 
@@ -306,7 +307,7 @@ def _table(scene: "Scene", estimate: dict[str, Any], when: _When | None = None) 
     where = f', most at particle {estimate["culprit"][1]} of "{estimate["culprit"][0]}"' if estimate["culprit"] else ""
     period = f" (period {seconds(2 * math.pi / frequency)})" if frequency > 0 else ""
     fixed = estimate["integrator"] in _limits(estimate)
-    steps = f"{seconds(step)}, {round(frame / step)} per frame" if fixed else "chosen as it goes"
+    steps = f"{seconds(step)}, {round(frame / step)} per frame" if fixed else "adaptive"
     level, verdict = predict(estimate)
     if when is not None and not when.judged and level < 2:
         verdict = "not judged"
@@ -331,7 +332,7 @@ def _table(scene: "Scene", estimate: dict[str, Any], when: _When | None = None) 
 
 
 def _cures(tree: dict[str, Any], estimate: dict[str, Any]) -> list[list[str]]:
-    """Changes that the estimate finds stable: of the step alone, where that is enough, or of the integrator."""
+    """Changes that are stable by the estimate: of the step alone, if that suffices, or of the integrator."""
     limits, system = _limits(estimate), estimate["system"]
     plan: dict[str, Any] = next((s for s in tree["system"] if s["name"] == system), {})
     interval = 1.0 / tree["time"]["fps"] / tree["time"]["exchanges"]

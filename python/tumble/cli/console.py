@@ -1,4 +1,4 @@
-"""What is said to people: text that survives pipes and narrow encodings, progress as a bar or as plain lines."""
+"""Console output: text that survives pipes and narrow encodings, progress as a bar or as plain lines."""
 
 import codecs
 import math
@@ -27,7 +27,7 @@ def _transliterate(error: UnicodeError) -> tuple[str, int]:
 
 
 def survive_narrow_streams() -> None:
-    """Where a stream cannot say m/s², it says m/s^2."""
+    """Replaces characters that a stream cannot encode: m/s² by m/s^2."""
     codecs.register_error("tumble", _transliterate)
     for stream in (sys.stdout, sys.stderr):
         reconfigure = getattr(stream, "reconfigure", None)
@@ -36,15 +36,15 @@ def survive_narrow_streams() -> None:
 
 
 _PLACES = 4
-"""Places of further warnings that are named."""
+"""Number of further warnings whose paths are listed."""
 
 
 class Terminated(KeyboardInterrupt):
-    """Somebody wants the process to end: as with Ctrl-C, what was finished is kept."""
+    """A request to terminate: as with Ctrl-C, finished work is kept."""
 
 
 def heed_termination() -> None:
-    """Has a signal to terminate stop things as Ctrl-C does."""
+    """Makes SIGTERM stop the program as Ctrl-C does."""
 
     def stop(*_: object) -> None:
         raise Terminated
@@ -54,12 +54,12 @@ def heed_termination() -> None:
 
 
 def stopped(stop: KeyboardInterrupt) -> int:
-    """The exit code of who was stopped."""
+    """The exit code after a stop."""
     return 128 + (signal.SIGTERM if isinstance(stop, Terminated) else signal.SIGINT)
 
 
 def say(text: object = "", end: str = "\n") -> None:
-    """A result, on stdout. (typer.echo would write UTF-8 where the stream says that it takes ASCII.)"""
+    """A result, on stdout. (typer.echo would write UTF-8 to an ASCII stream.)"""
     print(text, end=end, flush=True)
 
 
@@ -69,13 +69,13 @@ def complain(text: str) -> None:
 
 
 def warn(code: str, text: str) -> None:
-    """Something doubtful, on stderr. docs/warnings.md lists the codes."""
+    """A warning, on stderr. docs/warnings.md lists the codes."""
     _mark(f"warning[{code}]: ", "33", text)
 
 
 @contextmanager
 def lost_frames_told() -> Iterator[None]:
-    """Says what `Run` warns of as the other warnings are said."""
+    """Prints the warnings of `Run` like all others."""
     with warnings.catch_warnings():
         other = warnings.showwarning
 
@@ -90,7 +90,7 @@ def lost_frames_told() -> Iterator[None]:
 
 
 def warn_of(found: Iterable[Mapping[str, str]]) -> None:
-    """Each code once: the first of its warnings in full, how many others there are, and where."""
+    """Prints each code once: its first warning in full, the number of the others and their paths."""
     kinds: dict[str, list[Mapping[str, str]]] = {}
     for warning in found:
         kinds.setdefault(warning["code"], []).append(warning)
@@ -105,9 +105,9 @@ def warn_of(found: Iterable[Mapping[str, str]]) -> None:
 
 
 def broke(error: Exception) -> None:
-    """What went wrong, said while it is being explained."""
+    """Prints the error before the search for its cause."""
     first = str(error).splitlines()[0]
-    text = f"{first}\nLooking for causes, cures and a small scene that breaks as well; Ctrl-C ends that."
+    text = f"{first}\nLooking for causes, cures and a minimal failing scene; Ctrl-C ends the search."
     print(text, file=sys.stderr, flush=True)
 
 
@@ -116,7 +116,7 @@ def _mark(word: str, color: str, text: str) -> None:
 
 
 def seconds(value: float) -> str:
-    """A step or a limit on it, for people: `2.08e-03 s`."""
+    """A step or a limit on it, readable: `2.08e-03 s`."""
     if value == 0.0:
         return "none"
     if math.isinf(value):
@@ -125,7 +125,7 @@ def seconds(value: float) -> str:
 
 
 def size(n: float) -> str:
-    """Bytes, for people."""
+    """Bytes, readable."""
     for unit in ("B", "kB", "MB", "GB"):
         if n < 999.5:
             return f"{n:.3g} {unit}"
@@ -139,7 +139,7 @@ def counted(n: int, word: str) -> str:
 
 
 class Progress:
-    """Shows how far something is: `with Progress("simulate") as progress: progress(done, total)`.
+    """Shows progress: `with Progress("simulate") as progress: progress(done, total)`.
 
     A bar on a terminal; elsewhere a line at the start, then one per tenth of the whole or per five seconds.
     """

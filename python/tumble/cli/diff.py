@@ -1,4 +1,4 @@
-"""`tumble diff`: where two runs stop being the same."""
+"""`tumble diff`: the first difference between two runs."""
 
 import math
 from typing import TYPE_CHECKING, Annotated
@@ -13,7 +13,7 @@ if TYPE_CHECKING:
 
 LEDGER_OBJECT = "ledger"
 _LISTED = 8
-"""Columns that are listed at the frame at which runs part."""
+"""Number of columns listed at the first differing frame."""
 
 
 def diff(
@@ -21,26 +21,26 @@ def diff(
     b: Annotated[str, typer.Argument(metavar="RUN", help="Another one of the same scene.")],
     until: Annotated[
         int | None,
-        typer.Option(metavar="I", min=0, help="Last frame to compare.", show_default="all that both have"),
+        typer.Option(metavar="I", min=0, help="Last frame to compare.", show_default="the last common one"),
     ] = None,
     deep: Annotated[
         bool,
-        typer.Option("--deep", help="Read every frame, also where the hashes of the states are the same."),
+        typer.Option("--deep", help="Read every frame, even if the state hashes agree."),
     ] = False,
 ) -> None:
-    """Say where two runs stop being the same bits.
+    """Find the first difference between two runs, to the last bit.
 
-    Names the first frame, object, column and element that differ, both values, how far apart they are, in units and in ulps
-    (numbers of that precision that lie between), and how many numbers differ there. Then, how far they have come apart by
-    the last frame that both have.
+    Prints the first frame, object, column and element that differ, both values, their distance in units and in ulps
+    (steps between adjacent numbers of that precision), and the number of differing elements. Then their distance at the
+    last common frame.
 
-    Each frame of a run has the hash of its state in run.json and ledger.csv, so only the frame at which runs part is read.
-    --deep reads all, and so finds files that were changed or damaged afterwards.
+    run.json and ledger.csv hold a state hash per frame, so only the first differing frame is read.
+    --deep reads all frames, and so finds files that were changed or damaged later.
 
     \b
-    Exit codes: 0 the same bits, and as many frames; 1 they differ, or one is
-    longer (--until compares only what comes before); 2 these are no runs of
-    the same things: other objects, another resolution, other frames a second.
+    Exit codes: 0 identical, with equal length; 1 they differ, or one is longer
+    (--until compares only the frames up to it); 2 the runs are not comparable:
+    different objects, resolution or frame rate.
 
     \b
     Examples:
@@ -58,13 +58,13 @@ def diff(
     last = found.compared - 1
     if found.frame is not None and found.seen is not None and last > found.seen:
         apart = at(one, other, last)
-        say(f"  by frame {last}  {_farthest(apart)}" if apart else f"  by frame {last}  they are the same again")
+        say(f"  by frame {last}  {_farthest(apart)}" if apart else f"  by frame {last}  identical again")
     if not found.same:
         raise typer.Exit(1)
 
 
 def _told(found: "Comparison") -> list[str]:
-    """The comparison in words."""
+    """The comparison as text."""
     a, b = found.runs
     lines = [f"  note      {text}" for text in found.unlike]
     frames = counted(found.compared, "frame")
@@ -86,17 +86,17 @@ def _told(found: "Comparison") -> list[str]:
     books = [column for column in found.columns if column.object == LEDGER_OBJECT]
     if books and found.seen != found.frame:
         one = books[0]
-        lines.append(f"  books     {one.column}: {one.values[0]!r} and {one.values[1]!r}")
+        lines.append(f"  ledger    {one.column}: {one.values[0]!r} and {one.values[1]!r}")
     if found.seen is None:
         until = found.compared - 1
-        lines.append(f"  columns   none of an object differs by frame {until}; --set 'output.columns=[...]' keeps more")
+        lines.append(f"  columns   no object column differs by frame {until}; --set 'output.columns=[...]' stores more")
         return lines + _background(found)
     if found.seen != found.frame:
-        lines.append(f"  columns   of objects differ from frame {found.seen} on; what differs before is not kept")
+        lines.append(f"  columns   of objects differ from frame {found.seen} on; the earlier difference is not stored")
     lines += _first(found, found.seen_columns[0])
-    lines += [f"  in all    {_many(column)}" for column in found.seen_columns[:_LISTED]]
+    lines += [f"  total     {_many(column)}" for column in found.seen_columns[:_LISTED]]
     if len(found.seen_columns) > _LISTED:
-        lines.append(f"            and {len(found.seen_columns) - _LISTED} columns more")
+        lines.append(f"            and {len(found.seen_columns) - _LISTED} more columns")
     return lines + _background(found)
 
 
@@ -127,12 +127,12 @@ def _ulps(ulps: float) -> str:
 
 
 def _many(column: "ColumnDifference") -> str:
-    """How many numbers of a column differ, and by how much."""
+    """The number of differing elements of a column, and their largest distance."""
     what = f"{column.column} of {_object(column)}"
     if column.lengths[0] != column.lengths[1]:
         what += f" ({column.lengths[0]} elements and {column.lengths[1]})"
     if not column.count:
-        return f"{what}: nothing but the number of elements"
+        return f"{what}: only the number of elements"
     return f"{what}: {column.count} of {column.size} numbers differ, {_most(column)}"
 
 
@@ -142,13 +142,13 @@ def _most(column: "ColumnDifference") -> str:
 
 
 def _farthest(columns: "list[ColumnDifference]") -> str:
-    """How far runs have come apart: their first column, which is the position where that is kept."""
+    """The distance of two runs in their first column, the position if it is stored."""
     first = next((column for column in columns if column.count), columns[0])
     return _many(first)
 
 
 def _background(found: "Comparison") -> list[str]:
-    """What could be the cause."""
+    """Possible causes."""
     lines = []
     if found.scenes is not None:
         lines.append(f"  scenes    {found.scenes}")

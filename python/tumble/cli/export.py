@@ -1,4 +1,4 @@
-"""`tumble export`: a run in the formats of other programs."""
+"""`tumble export`: converts a run to the formats of other programs."""
 
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -23,15 +23,15 @@ def export(
     ply: Annotated[bool, typer.Option("--ply", help="ply/NAME.FRAME.ply: the particles of each frame.")] = False,
     vdb: Annotated[
         bool,
-        typer.Option("--vdb", help="volumes/NAME.FRAME.vdb: what lies on grids, as OpenVDB; --usd refers to them."),
+        typer.Option("--vdb", help="volumes/NAME.FRAME.vdb: grids as OpenVDB; --usd refers to them."),
     ] = False,
     half: Annotated[bool, typer.Option("--half", help="VDB in half precision.")] = False,
-    zip: Annotated[bool, typer.Option("--zip", help="VDB packed, but for densities.")] = False,
+    zip: Annotated[bool, typer.Option("--zip", help="VDB compressed, except densities.")] = False,
     out: Annotated[
         Path | None, typer.Option(metavar="DIR", help="Folder to write into.", show_default="that of the run")
     ] = None,
 ) -> None:
-    """Write a run in the formats of other programs.
+    """Convert a run to the formats of other programs.
 
     \b
     Examples:
@@ -69,7 +69,7 @@ def export(
 def stack(run: "Run", folder: Path, progress: Progress) -> Path:
     """Writes columns.npz: keys `time` [s] and `object/column`, frames x rows x width.
 
-    Of particles that come and go, the rows of all frames follow each other, rows x width: those of frame i are
+    For particles with birth and death, the rows of all frames are concatenated, rows x width: those of frame i are
     `first[i]` to `first[i + 1]` of the key `object/first`.
     """
     import zipfile
@@ -115,7 +115,7 @@ def stack(run: "Run", folder: Path, progress: Progress) -> Path:
 
 
 def _starts(run: "Run", name: str) -> list[int]:
-    """At which row each frame of an object starts, and the number of all rows."""
+    """The first row of each frame of an object, and the total number of rows."""
     starts = [0]
     for i in range(run.n_frames):
         starts.append(starts[-1] + len(run.frame(i)[name]["id"]))

@@ -1,4 +1,4 @@
-"""What an argument means: a scene by file or by name, a run by folder or by name, overrides."""
+"""Resolution of arguments: a scene by file or by name, a run by folder or by name, overrides."""
 
 import difflib
 import shlex
@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     from tumble import Run, Scene
 
 SCENES = Path(__file__).resolve().parent.parent / "scenes"
-"""The scenes that come with tumble, ROW/NAME.toml."""
+"""The bundled scenes, ROW/NAME.toml."""
 
 OUT = Path("out")
 
@@ -27,19 +27,19 @@ RunArgument = Annotated[
 SetOption = Annotated[
     list[str] | None,
     typer.Option(
-        "--set", metavar="KEY=VALUE", help="Override a key of the scene, as time.fps=30 or sheet.flag.size='[1, 2]'."
+        "--set", metavar="KEY=VALUE", help="Override a key of the scene, e.g. time.fps=30 or sheet.flag.size='[1, 2]'."
     ),
 ]
 
 
 def shipped() -> dict[str, Path]:
-    """The scenes that come with tumble, by `row/name`."""
+    """The bundled scenes, by `row/name`."""
     files = sorted(SCENES.glob("*/*.toml"))
     return {f"{f.parent.name}/{f.stem}": f for f in files}
 
 
 def title(file: Path) -> str:
-    """The title of a scene file, empty if it has none that can be read."""
+    """The title of a scene file, empty if it has none or cannot be read."""
     try:
         return str(tomllib.loads(file.read_text(encoding="utf-8")).get("title", ""))
     except (OSError, ValueError):
@@ -56,7 +56,7 @@ def near(name: str, known: Sequence[str]) -> str:
 
 
 def scene_file(argument: str) -> Path:
-    """The file that a scene argument means. Raises SceneError, with near names, if there is none."""
+    """The file of a scene argument. Raises SceneError, with similar names, if there is none."""
     from tumble import SceneError
 
     path = Path(argument)
@@ -92,9 +92,8 @@ def scene(argument: str, overrides: Sequence[str] | None) -> "Scene":
 
 @contextmanager
 def naming(file: Path, besides: Path | None = None, scene: "Scene | None" = None) -> Iterator[None]:
-    """Puts the name of the scene's file before what is wrong with the scene, also if that is found only when it is built.
-    What is wrong with the folder `besides` is not the scene's fault. Where it asks for too much memory, the emitter that asks
-    for most is named."""
+    """Prefixes errors of the scene, including those found when it is built, with the name of its file. Errors of the folder
+    `besides` are not the scene's. If the scene needs too much memory, the emitter that needs most is named."""
     from tumble import SceneError
 
     try:
@@ -138,7 +137,7 @@ def command(verb: str, argument: str, overrides: Sequence[str] | None = None, *m
 
 
 def without(overrides: Sequence[str], changes: Sequence[str], systems: Sequence[str]) -> list[str]:
-    """The overrides that the changes do not replace; a system is meant by its index or by its name, of `systems`."""
+    """The overrides that the changes do not replace; a system is given by its index or by its name in `systems`."""
 
     def key(override: str) -> str:
         words = override.split("=", 1)[0].strip().split(".")

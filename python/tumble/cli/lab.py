@@ -1,4 +1,4 @@
-"""`tumble lab`: experiments that show how the methods behave, as pages to read."""
+"""`tumble lab`: experiments on the behaviour of the methods, as HTML pages."""
 
 from pathlib import Path
 from typing import Annotated
@@ -15,7 +15,7 @@ OutOption = Annotated[Path | None, typer.Option(metavar="DIR", help="Folder of t
 
 @app.callback()
 def lab() -> None:
-    """Experiments on methods, as pages to read.
+    """Experiments on the numerical methods, as HTML pages.
 
     \b
     Examples:
@@ -34,17 +34,17 @@ def integrators(
     scene: find.SceneArgument,
     set: find.SetOption = None,
     integrator: Annotated[
-        list[str] | None, typer.Option(metavar="NAME", help="Only this one. Repeatable.", show_default="all that can")
+        list[str] | None, typer.Option(metavar="NAME", help="Only this one. Repeatable.", show_default="all applicable")
     ] = None,
     step: Annotated[
         list[float] | None,
         typer.Option(metavar="S", help="A sub-step to try [s]. Repeatable.", show_default="around the limits"),
     ] = None,
     duration: Annotated[
-        float | None, typer.Option(metavar="S", help="Simulated time over which errors are compared [s].")
+        float | None, typer.Option(metavar="S", help="Simulated time for the comparison of errors [s].")
     ] = None,
     budget: Annotated[
-        float, typer.Option(metavar="S", help="Time after which longer experiments are left out [s].")
+        float, typer.Option(metavar="S", help="Time after which longer experiments are skipped [s].")
     ] = 45.0,
     out: OutOption = None,
 ) -> None:
@@ -82,7 +82,7 @@ def integrators(
 
 @app.command()
 def structures(out: OutOption = None) -> None:
-    """Pull on sheets and blocks whose links differ.
+    """Pull on sheets and blocks with different families of links.
 
     \b
     Example:
@@ -97,7 +97,7 @@ def structures(out: OutOption = None) -> None:
 
 @app.command()
 def operators(out: OutOption = None) -> None:
-    """Show each operator on a grid, and why velocities stand on faces.
+    """Show each grid operator, and why velocities are stored on faces.
 
     \b
     Example:
@@ -123,7 +123,7 @@ def compressible(out: OutOption = None) -> None:
 
 @app.command()
 def positions(out: OutOption = None) -> None:
-    """Show how soon position-based dynamics obeys a stiffness, by sub-steps and by sweeps.
+    """Show how fast position-based dynamics converges to a given stiffness, by sub-steps and by sweeps.
 
     \b
     Example:
@@ -138,13 +138,15 @@ def positions(out: OutOption = None) -> None:
 def fabric(
     fabrics: Annotated[
         list[str] | None,
-        typer.Argument(metavar="[NAME|FILE]...", help="Shipped fabrics or records.", show_default="all that ship"),
+        typer.Argument(
+            metavar="[NAME|FILE]...", help="Bundled fabrics or record files.", show_default="all bundled ones"
+        ),
     ] = None,
     out: OutOption = None,
 ) -> None:
-    """Pull, hang and drape measured fabrics, beside what their records say.
+    """Pull, hang and drape measured fabrics, and compare with their records.
 
-    Each fabric takes minutes: strips and a round of 15 cm are simulated until they rest. Name one to have only that.
+    Each fabric takes minutes: strips and a disk of 15 cm radius are simulated until they rest. Name one to run only that.
 
     \b
     Examples:
@@ -161,12 +163,12 @@ def fabric(
 
 @app.command()
 def pressure(
-    cells: Annotated[int, typer.Option(metavar="N", min=16, max=256, help="Along a side of the cube.")] = 48,
-    single: Annotated[bool, typer.Option("--single", help="In single precision, as scenes are run.")] = False,
+    cells: Annotated[int, typer.Option(metavar="N", min=16, max=256, help="Cells along a side of the cube.")] = 48,
+    single: Annotated[bool, typer.Option("--single", help="Use single precision, as scenes do by default.")] = False,
     budget: Annotated[float, typer.Option(metavar="S", help="Time after which a method is stopped [s].")] = 20.0,
     out: OutOption = None,
 ) -> None:
-    """Climb the ladder of pressure solvers: what each leaves, over time and over iterations.
+    """Compare pressure solvers: residuals against time and iterations.
 
     \b
     Examples:

@@ -1,4 +1,4 @@
-"""`tumble plot`: curves of a run, and slices through what lies on grids."""
+"""`tumble plot`: curves of a run, and slices through grids."""
 
 import os
 from pathlib import Path
@@ -19,34 +19,34 @@ def plot(
         list[str] | None,
         typer.Argument(
             metavar="[COLUMN]...",
-            help="Columns of ledger.csv, or momentum for its three; without any, the energies. With --slice, columns on a "
-            "grid; without any, all.",
+            help="Columns of ledger.csv, or momentum for all three components; default: the energies. With --slice, grid "
+            "columns; default: all.",
         ),
     ] = None,
-    slice: Annotated[bool, typer.Option("--slice", help="Draw what lies on a grid, in a plane.")] = False,
+    slice: Annotated[bool, typer.Option("--slice", help="Draw a plane slice of a grid.")] = False,
     frame: Annotated[int, typer.Option(metavar="I", help="Frame of the slice; -1 is the last.")] = -1,
-    axis: Annotated[str, typer.Option(metavar="x|y|z", help="Axis across the slice.")] = "y",
+    axis: Annotated[str, typer.Option(metavar="x|y|z", help="Axis normal to the slice.")] = "y",
     at: Annotated[
-        float | None, typer.Option(metavar="M", help="Where on that axis [m].", show_default="the middle")
+        float | None, typer.Option(metavar="M", help="Position on that axis [m].", show_default="the middle")
     ] = None,
     thing: Annotated[
-        str | None, typer.Option("--object", metavar="NAME", help="Whose grid.", show_default="the first")
+        str | None, typer.Option("--object", metavar="NAME", help="Object with the grid.", show_default="the first")
     ] = None,
     beside: Annotated[
         list[str] | None,
-        typer.Option("--with", metavar="RUN", help="Draw this run in the same picture. Repeatable."),
+        typer.Option("--with", metavar="RUN", help="Draw this run in the same plot. Repeatable."),
     ] = None,
     branches: Annotated[
-        bool, typer.Option("--branches", help="Draw the run's branches beside it, and what it branched off from.")
+        bool, typer.Option("--branches", help="Draw the run's branches and its ancestors, too.")
     ] = False,
     out: Annotated[
         Path | None, typer.Option(metavar="FILE", help="The picture to write.", show_default="in the run")
     ] = None,
 ) -> None:
-    """Draw curves of a run over time, or slices through what lies on a grid.
+    """Draw curves of a run over time, or slices through its grids.
 
-    Without columns, the energies. With --with or --branches, one pair of axes for each column and one curve for each run, with
-    its name; the curve of a branch begins at its frame, at a line.
+    By default the energies. With --with or --branches, one pair of axes per column and one named curve per run; the
+    curve of a branch starts at its frame, marked by a line.
 
     \b
     Examples:
@@ -98,7 +98,7 @@ def _compare(found: "Run", others: "list[Run]", branches: bool, names: list[str]
         kin = family(found)
         if not kin:
             cure = f"`tumble branch {found.folder}@FRAME --set KEY=VALUE` makes one"
-            raise SceneError(f"{found.folder}: there is no branch of it beside it; {cure}")
+            raise SceneError(f"{found.folder}: has no branches beside it; {cure}")
         older = [run for run in kin if len(run.descent) < len(found.descent)]
         runs = [*older, found, *(run for run in kin if run not in older), *others]
     shown = {os.path.realpath(run.folder): run for run in runs}

@@ -1,4 +1,4 @@
-"""`tumble refine`: the same scene at several resolutions, and what its measures tend to."""
+"""`tumble refine`: a scene at several resolutions, and the limits of its measures."""
 
 import json
 import math
@@ -17,49 +17,47 @@ if TYPE_CHECKING:
 
 def refine(
     scene: find.SceneArgument,
-    levels: Annotated[int, typer.Option(metavar="N", min=3, max=12, help="Resolutions, the scene's own included.")] = 4,
+    levels: Annotated[
+        int, typer.Option(metavar="N", min=3, max=12, help="Number of resolutions, including the scene's own.")
+    ] = 4,
     what: Annotated[
         list[str] | None,
-        typer.Option(metavar="PATH", help="A word to refine, as system.0.substeps or rope.rope.segments. Repeatable."),
+        typer.Option(metavar="PATH", help="A key to refine, e.g. system.0.substeps or rope.rope.segments. Repeatable."),
     ] = None,
     measure: Annotated[
         list[str] | None,
-        typer.Option(
-            metavar="NAME[@HOW]", help="What is measured. Repeatable.", show_default="energies, stretch, heat"
-        ),
+        typer.Option(metavar="NAME[@HOW]", help="A measure. Repeatable.", show_default="energies, stretch, heat"),
     ] = None,
     set: find.SetOption = None,
     frames: Annotated[int | None, typer.Option(metavar="N", help="Frames to simulate, instead of the scene's.")] = None,
     out: Annotated[
         Path | None, typer.Option(metavar="DIR", help="Folder of the study.", show_default="out/refine/NAME")
     ] = None,
-    resume: Annotated[
-        bool, typer.Option("--resume", help="Keep levels that are finished, go on with the others.")
-    ] = False,
+    resume: Annotated[bool, typer.Option("--resume", help="Keep finished levels, compute the others.")] = False,
     force: Annotated[bool, typer.Option("--force", help="Replace the runs in the folder.")] = False,
     threads: Annotated[
-        int | None, typer.Option(min=1, metavar="N", help="Processor cores to use; the result does not depend on it.")
+        int | None, typer.Option(min=1, metavar="N", help="Processor cores to use; results do not depend on it.")
     ] = None,
 ) -> None:
-    """Run a scene at several resolutions, and say how fast it converges and to what.
+    """Run a scene at several resolutions, and estimate its order of convergence and limit.
 
-    Level 0 is the scene as it is; each further level is twice as fine. Without --what, that is how finely each thing is
-    divided (segments, resolution) and the substeps or step of each system that has one; where a scene has none of them, the
-    substeps. Counts are doubled; the masses along the sides of sheets and blocks become 2 n - 1, which halves their distances;
-    lengths, times and tolerances are halved. PATH*F and PATH/F say another factor; orders count doublings all the same.
+    Level 0 is the scene itself; each further level is twice as fine. By default the resolutions of all objects (segments,
+    resolution) and the substeps or step of each system that has one are refined; if a scene has none of them, the
+    substeps. Counts are doubled; the masses along the sides of sheets and blocks become 2 n - 1, which halves their spacing;
+    lengths, times and tolerances are halved. PATH*F and PATH/F set another factor; orders still refer to doubling.
 
     A measure is a column of ledger.csv at the end, or its largest, smallest or mean value over the frames: energy, speed@max.
-    Or a column of an object in the last frame, over its elements or of one: rope.position.z@min, p.position.x@1.
+    Or a column of an object in the last frame, over all elements or for one: rope.position.z@min, p.position.x@1.
 
-    From three levels comes the order p (errors shrink by 2^p a level); with it, the value at infinite resolution and the error
-    of the finest level (Richardson). Orders that agree over two triples of levels are trusted, others are said to have not
+    Three levels give the order p (errors shrink by 2^p per level), the limit at infinite resolution and the error
+    of the finest level (Richardson). Orders that agree for two triples of levels are accepted; others are reported as not
     settled. In single precision fine levels soon differ by round-off: --set precision=double.
 
     Each level is a run in out/refine/NAME/level-K; beside them are convergence.csv and convergence.png.
 
     \b
-    Exit codes: 0 all levels were simulated, whatever they show; 1 one of them
-    failed; 2 the scene, a path or a measure is wrong.
+    Exit codes: 0 all levels were simulated, whatever the result; 1 one of them
+    failed; 2 the scene, a path or a measure is invalid.
 
     \b
     Examples:
@@ -85,7 +83,7 @@ def refine(
         say(line)
     warn_of(found.notes)
     for k, text in found.failures.items():
-        complain(f"level {k} failed: {text}; `tumble run` with its words says more: {_words(found, k)}")
+        complain(f"level {k} failed: {text}; for details: `tumble run` with {_words(found, k)}")
     if found.measures and any(run is not None for run in found.runs):
         for path in write(found):
             say(f"  {path}")
@@ -128,7 +126,7 @@ def _share(error: float, limit: float) -> str:
 
 
 def _digits(limit: float, error: float) -> str:
-    """A limit, with as many digits as its error leaves, and one more."""
+    """A limit, with the digits that its error supports and one more."""
     if math.isnan(limit):
         return ""
     if not error or not limit:

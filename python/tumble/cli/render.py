@@ -15,22 +15,22 @@ if TYPE_CHECKING:
 def render(
     run: find.RunArgument,
     frame: Annotated[
-        list[int] | None, typer.Option(metavar="I", help="Frame of which to draw a still; -1 is the last. Repeatable.")
+        list[int] | None, typer.Option(metavar="I", help="Frame to draw as a still; -1 is the last. Repeatable.")
     ] = None,
     as_film: Annotated[bool, typer.Option("--film", help="Draw all frames into an .mp4.")] = False,
     renderer: Annotated[
         str,
         typer.Option(
-            metavar="NAME", help="What draws; `auto` takes the best that is here; `mitsuba-smoke` traces smoke, too."
+            metavar="NAME", help="Renderer; `auto` takes the best one installed; `mitsuba-smoke` traces smoke, too."
         ),
     ] = "auto",
     every: Annotated[int, typer.Option(min=1, metavar="N", help="Only every Nth frame of the film.")] = 1,
     size: Annotated[str | None, typer.Option(metavar="WxH", help="Pixels, instead of the scene's.")] = None,
     out: Annotated[Path | None, typer.Option(metavar="FILE", help="The .png or .mp4 to write.")] = None,
 ) -> None:
-    """Draw a run: stills, or a film.
+    """Draw stills or a film of a run.
 
-    Without options, a still of the last frame.
+    By default a still of the last frame.
 
     \b
     Examples:
@@ -60,7 +60,7 @@ def render(
 
 
 def look_for(renderer: str) -> None:
-    """Refuses the name of no renderer. (One that does not work on this machine says so when it is to draw.)"""
+    """Rejects unknown renderers. (One that does not work on this machine fails when it draws.)"""
     from tumble.pictures import RENDERERS, TRACED
 
     known = ["auto", *RENDERERS, TRACED]
@@ -71,7 +71,7 @@ def look_for(renderer: str) -> None:
 
 def _ending(path: Path | None, ending: str) -> None:
     if path is not None and path.suffix.lower() != ending:
-        raise typer.BadParameter(f"{path}, expected a name that ends with {ending}", param_hint="--out")
+        raise typer.BadParameter(f"{path}, expected a name ending in {ending}", param_hint="--out")
 
 
 def _pixels(text: str | None) -> tuple[int, int] | None:
@@ -83,13 +83,13 @@ def _pixels(text: str | None) -> tuple[int, int] | None:
         width = height = 0
     if not (16 <= width <= 8192 and 16 <= height <= 8192):
         raise typer.BadParameter(
-            f"{text!r}, expected WIDTHxHEIGHT of 16 to 8192 each, as 1280x720", param_hint="--size"
+            f"{text!r}, expected WIDTHxHEIGHT of 16 to 8192 each, such as 1280x720", param_hint="--size"
         )
     return width, height
 
 
 def film(run: "Run", path: Path, renderer: str = "auto", every: int = 1, size: tuple[int, int] | None = None) -> None:
-    """Writes a film, showing how far it is."""
+    """Writes a film, showing progress."""
     from tumble.film import film as write
 
     with Progress("film") as progress:
@@ -99,7 +99,7 @@ def film(run: "Run", path: Path, renderer: str = "auto", every: int = 1, size: t
 def still(
     run: "Run", i: int, path: Path | None = None, renderer: str = "auto", size: tuple[int, int] | None = None
 ) -> Path:
-    """Writes a picture of a frame, stills/NNNNNN.png if not told otherwise."""
+    """Writes a picture of a frame, by default to stills/NNNNNN.png."""
     import io
 
     from matplotlib.image import imsave

@@ -1,4 +1,4 @@
-"""The meshes of a scene mended, for `tumble check --repair`."""
+"""Repair of the meshes of a scene, for `tumble check --repair`."""
 
 import json
 import os
@@ -14,22 +14,22 @@ if TYPE_CHECKING:
 _ENDING = ".repaired.obj"
 
 _DONE = {
-    "welded": ("vertex", "vertices", "sewn to others at the same place"),
-    "repeated": ("triangle", "triangles", "dropped that stood there already"),
-    "degenerate": ("triangle", "triangles", "dropped that had no area"),
-    "turned": ("triangle", "triangles", "turned around"),
-    "split": ("edge", "edges", "of more than two triangles taken apart"),
-    "unused": ("vertex", "vertices", "of no triangle left out"),
+    "welded": ("vertex", "vertices", "sewn to others at the same position"),
+    "repeated": ("triangle", "triangles", "dropped as duplicates"),
+    "degenerate": ("triangle", "triangles", "dropped for having no area"),
+    "turned": ("triangle", "triangles", "flipped"),
+    "split": ("edge", "edges", "of more than two triangles split"),
+    "unused": ("vertex", "vertices", "of no triangle dropped"),
 }
 _LEFT = {
     "open": ("edge is", "edges are", "still open"),
-    "odd": ("edge is", "edges are", "still odd: a surface with one side"),
+    "odd": ("edge is", "edges are", "still inconsistent: a one-sided surface"),
 }
 
 
 def mend(file: Path, scene: "Scene", force: bool) -> list[str]:
-    """Mends the mesh files of a scene, says what was done, and returns the settings that use the new ones. Raises SceneError
-    where a file of that name is there, unless `force` replaces it."""
+    """Repairs the mesh files of a scene, prints the repairs, and returns the settings that use the new files. Raises
+    SceneError if a new file exists, unless `force` overwrites it."""
     from tumble import SceneError, repair_mesh
 
     changes: dict[str, Path] = {}
@@ -43,11 +43,11 @@ def mend(file: Path, scene: "Scene", force: bool) -> list[str]:
         text, counts = repair_mesh(old)
         left = _words(_LEFT, counts)
         if text is None:
-            say(f"{old}: nothing to mend" + (f"; {left}" if left else ""))
+            say(f"{old}: nothing to repair" + (f"; {left}" if left else ""))
             continue
         new = old.with_name(old.name.removesuffix(old.suffix) + _ENDING)
         if new.exists() and not force:
-            raise SceneError(f"{new}: is there already; take it, delete it, or replace it with --force")
+            raise SceneError(f"{new}: exists already; use it, delete it, or overwrite it with --force")
         say(f"{old}: {_words(_DONE, counts)}" + (f"; {left}" if left else ""))
         part = new.with_name(f".{new.name}.{os.getpid()}.part")
         try:
@@ -58,7 +58,7 @@ def mend(file: Path, scene: "Scene", force: bool) -> list[str]:
         say(f"  written to {new}")
         changes[path] = new.relative_to(scene.folder) if new.is_relative_to(scene.folder) else new
     if not seen:
-        say("the scene names no mesh file")
+        say("the scene has no mesh files")
     tree, settings = scene.to_dict(), []
     for place, line, path in places:
         if path in changes:
@@ -79,7 +79,7 @@ def _words(words: dict[str, tuple[str, str, str]], counts: dict[str, int]) -> st
 
 
 def _key(place: str, tree: dict[str, Any]) -> str:
-    """A place of an error, `net "n".mesh.path`, as a key of a setting: `net.0.mesh.path`."""
+    """The path of an error, `net "n".mesh.path`, as a key of a setting: `net.0.mesh.path`."""
     kind, name, rest = re.fullmatch(r'(\w+) "(.*)"(\..*)', place, re.S).groups()  # type: ignore[union-attr]
     index = next(i for i, thing in enumerate(tree[kind]) if thing["name"] == name)
     return f"{kind}.{index}" + re.sub(r"\[(\d+)\]", r".\1", rest)

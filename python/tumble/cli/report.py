@@ -1,4 +1,4 @@
-"""How a run went, in words: the summary of one that finished, the report of one whose physics broke."""
+"""Reports as text: the summary of a finished run, the failure report of a broken one."""
 
 import math
 import sys
@@ -12,11 +12,11 @@ if TYPE_CHECKING:
     from tumble import Run, StepError
 
 _NO_GAIN = 0.1
-"""Growth of the energy over its scale below which a change counts as gaining none."""
+"""Energy growth relative to its scale below which a change counts as gaining none."""
 
 _MOST = 0.5
-"""Growth or loss of the energy over its scale beyond which a change that was tried is not recommended, unless something in the
-scene may give or take that much."""
+"""Growth or loss of the energy over its scale beyond which a trial is not recommended, unless something in the scene may add or
+remove that much."""
 
 _EMPTY: Mapping[str, Any] = {}
 
@@ -24,7 +24,7 @@ _RESULTS = ["film.mp4", "scene.usda", "ply", "energy.png", "stills"]
 
 
 def summary(run: "Run") -> str:
-    """Where the results are and what they took."""
+    """The location and cost of the results."""
     from tumble import expect
 
     ledger, last = run.ledger, run.n_frames - 1
@@ -41,15 +41,15 @@ def summary(run: "Run") -> str:
     broken = len(run.manifest["expectations"])
     if last < run.manifest["frames"]:
         lines.append(
-            f"  expectations: {broken} broken, where the run ends: at frame {last} of {run.manifest['frames']}"
+            f"  expectations: {broken} violated; the run ends there, at frame {last} of {run.manifest['frames']}"
         )
     elif asked := expect.count(run.scene):
-        lines.append(f"  expectations: {asked - broken} of {asked} kept")
+        lines.append(f"  expectations: {asked - broken} of {asked} met")
     return "\n".join(lines)
 
 
 def _pace(run: "Run") -> str:
-    """How much faster than the run its film plays."""
+    """Playback speed of the film relative to the run."""
     from tumble.film import rate
 
     faster = rate(run) / float(run.scene["time"]["fps"])
@@ -59,7 +59,7 @@ def _pace(run: "Run") -> str:
 
 
 def _particles(run: "Run") -> list[str]:
-    """How many particles there were, of each emitter."""
+    """Numbers of particles per emitter."""
     from tumble.emitters import born
 
     counts = born(run)
@@ -79,8 +79,8 @@ def failure(
     again: Sequence[str] = (),
     verb: str = "run",
 ) -> str:
-    """What broke, where and when, the step against its limit, and what was tried; `again` ends the command to copy, which
-    begins with `verb`."""
+    """The failure: what, where and when, the step against its limit, and the trials. The command to copy begins with `verb`
+    and ends with `again`."""
     report = getattr(error, "report", {})
     trouble = run.manifest["failure"]
     cures = _ranked(trouble["cures"])
@@ -91,11 +91,11 @@ def failure(
     else:
         lines.append(f"  {error}")
     if likely := trouble.get("causes"):
-        lines.append("Likely causes, the likeliest first:")
+        lines.append("Likely causes, most likely first:")
         lines += [f"  {i}. {text}" for i, text in enumerate(likely, 1)]
     if cures:
-        # What is tried begins at the start of the scene, not where a branch does.
-        lines.append("What was tried, from the start of the changed scene:" if verb == "branch" else "What was tried:")
+        # Trials begin at the start of the scene, not at that of a branch.
+        lines.append("Trials, from the start of the changed scene:" if verb == "branch" else "Trials:")
     for cure in sorted(cures, key=lambda cure: cure is not best):
         change = " ".join(settings(cure["set"].split()))
         growth = float(cure["energy_ratio"])
@@ -107,7 +107,7 @@ def failure(
     if small := trouble.get("minimal"):
         path = run.folder / small
         lines.append(
-            f"A small scene that breaks in the same way ({trouble['smaller']}):\n  {command('run', str(path))}"
+            f"A minimal scene that fails in the same way ({trouble['smaller']}):\n  {command('run', str(path))}"
         )
     kept = f"Kept: {counted(run.n_frames, 'frame')} in {run.folder}"
     if best is not None:
@@ -116,14 +116,14 @@ def failure(
         sets = [*without(overrides, changes, systems), *changes]
         lines.append(f"{kept}. Try\n  {command(verb, scene, sets, *again, '--force')}")
     elif cures:
-        lines.append(f"{kept}. None of this helped: {_advice(run.scene, report)}")
+        lines.append(f"{kept}. None of these helped: {_advice(run.scene, report)}")
     else:
         lines.append(f"{kept}.")
     return "\n".join(lines)
 
 
 def _keeps_energy(cure: Mapping[str, Any], scene: Mapping[str, Any]) -> bool:
-    """Whether what a trial gained or lost of its energy may be right."""
+    """Whether the energy change of a trial is plausible."""
     from tumble import energy
 
     growth = float(cure["energy_ratio"])
@@ -136,28 +136,28 @@ def _keeps_energy(cure: Mapping[str, Any], scene: Mapping[str, Any]) -> bool:
 
 
 def _advice(scene: Mapping[str, Any], report: Mapping[str, Any] = _EMPTY) -> str:
-    """Where to look when no change of the steps helps."""
+    """Advice if no change of the steps helps."""
     from tumble import energy
 
     if _on_grid(scene, report):
         return f'look at the sources and formulas of "{report["object"]}"'
     if found := energy.unsoftened(scene):
         which = ", ".join(f"force.{i}" for i in found)
-        return f"{which} grows without bound where masses come near; give it a softening"
+        return f"{which} grows without bound as masses approach; give it a softening"
     if energy.has_springs(scene):
-        return "look for masses that are far too light or springs far too stiff"
-    return "take far smaller steps, or look for forces that are far too strong for such light masses"
+        return "look for masses that are much too light or springs that are much too stiff"
+    return "take much smaller steps, or look for forces that are much too strong for such light masses"
 
 
 def gained(run: "Run", scene: str, overrides: Sequence[str], again: Sequence[str] = ()) -> str | None:
-    """How to try what the warning about energy from nowhere advises, if there is one."""
+    """The command to try the advice of the warning about energy growth, if there is one."""
     from tumble.doubts import remedy
 
     if (found := remedy(run)) is None:
         return None
     names = [plan["name"] for plan in run.scene["system"]]
     sets = [*without(overrides, found.changes, names), *found.changes]
-    return f"To try what keeps the energy:\n  {command('run', scene, sets, *again, '--force')}"
+    return f"To try a change that conserves energy:\n  {command('run', scene, sets, *again, '--force')}"
 
 
 def _headline(report: Mapping[str, Any]) -> str:
@@ -165,8 +165,8 @@ def _headline(report: Mapping[str, Any]) -> str:
         "not_finite": "a number stopped being finite",
         "exploded": "the energy exploded",
         "solve": "the solver did not converge",
-        "step_too_small": "the step that is needed became too small",
-        "user": "a force or integrator of yours raised an error",
+        "step_too_small": "the required step became too small",
+        "user": "a custom force or integrator raised an error",
     }.get(str(report.get("kind")), "the simulation broke")
     when = f" at t = {report['time']:.6g} s" if isinstance(report.get("time"), float) else ""
     return f"FAILED: {what}{when}"
@@ -182,7 +182,7 @@ def _on_grid(scene: Mapping[str, Any], report: Mapping[str, Any]) -> bool:
 def _place(report: Mapping[str, Any], scene: Mapping[str, Any]) -> list[str]:
     integrator, stable = report["integrator"], float(report["stable_step"])
     if stable == 0.0:
-        limit = f"none: {integrator} has no stable step for this system, it gains energy at any"
+        limit = f"none: {integrator} gains energy on this system at any step"
     elif stable == float("inf"):
         limit = "any, by the linear estimate"
     else:
@@ -206,14 +206,14 @@ def _place(report: Mapping[str, Any], scene: Mapping[str, Any]) -> list[str]:
 
 
 def _ranked(cures: Sequence[Mapping[str, Any]]) -> list[Mapping[str, Any]]:
-    """The best first: those that helped and gained no energy, in the order in which they were tried."""
+    """Best first: trials that helped and gained no energy, in order of the attempts."""
 
     def rank(cure: Mapping[str, Any]) -> float:
         growth = float(cure["energy_ratio"])
         if not cure["survived"]:
             return math.inf
         if ".softening=" in cure["set"] and not abs(growth) > _MOST:
-            return -1.0  # What was wrong with the scene, where other changes only take the steps that happen to last.
+            return -1.0  # The fault of the scene; other changes only find steps that happen to survive.
         return max(growth, _NO_GAIN) if math.isfinite(growth) else sys.float_info.max
 
     return sorted(cures, key=rank)

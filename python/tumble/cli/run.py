@@ -18,22 +18,22 @@ def run(
     set: find.SetOption = None,
     out: Annotated[Path | None, typer.Option(metavar="DIR", help="Folder of the run.", show_default="out/NAME")] = None,
     frames: Annotated[int | None, typer.Option(metavar="N", help="Frames to simulate, instead of the scene's.")] = None,
-    resume: Annotated[bool, typer.Option("--resume", help="Go on where the run in the folder was stopped.")] = False,
+    resume: Annotated[bool, typer.Option("--resume", help="Continue the stopped run in the folder.")] = False,
     force: Annotated[bool, typer.Option("--force", help="Replace the run in the folder.")] = False,
     threads: Annotated[
-        int | None, typer.Option(min=1, metavar="N", help="Processor cores to use; the result does not depend on it.")
+        int | None, typer.Option(min=1, metavar="N", help="Processor cores to use; results do not depend on it.")
     ] = None,
     film: Annotated[bool | None, typer.Option(help="Write film.mp4.", show_default="as the scene says")] = None,
     usd: Annotated[bool | None, typer.Option(help="Write scene.usda.", show_default="as the scene says")] = None,
     ply: Annotated[bool | None, typer.Option(help="Write ply/.", show_default="as the scene says")] = None,
     vdb: Annotated[bool | None, typer.Option(help="Write volumes/.", show_default="as the scene says")] = None,
     plot: Annotated[bool | None, typer.Option(help="Write energy.png.", show_default="as the scene says")] = None,
-    stills: Annotated[bool, typer.Option(help="Write the stills that the scene asks for.")] = True,
-    renderer: Annotated[str, typer.Option(metavar="NAME", help="What draws film and stills.")] = "auto",
+    stills: Annotated[bool, typer.Option(help="Write the stills requested by the scene.")] = True,
+    renderer: Annotated[str, typer.Option(metavar="NAME", help="Renderer of film and stills.")] = "auto",
 ) -> None:
     """Simulate a scene into a folder, out/NAME by default.
 
-    A run that was stopped goes on with --resume, to the same bits. A run that breaks its scene's [expect] table ends
+    --resume continues a stopped run to the same bits. A run that violates its scene's [expect] table exits
     with code 1.
 
     \b
@@ -90,7 +90,7 @@ def run(
 
 
 def _refuse_empty(scene: dict[str, Any], ply: bool | None, vdb: bool | None) -> None:
-    """Raises BadParameter where an option asks for files of what is not there; where the scene asks, the engine says so."""
+    """Raises BadParameter if an option requests files without content; requests in the scene are checked by the engine."""
     for option, given, kinds, what in (
         ("--ply", ply, ("particles", "emitter", "galaxy"), "there are no particles"),
         ("--vdb", vdb, ("gas", "heat", "compressible"), "nothing lies on a grid"),
@@ -98,13 +98,13 @@ def _refuse_empty(scene: dict[str, Any], ply: bool | None, vdb: bool | None) -> 
         if given and not any(scene[kind] for kind in kinds):
             sections = ", ".join(f"[[{kind}]]" for kind in kinds)
             raise typer.BadParameter(
-                f"{what} to write, as {sections} would be; leave it out, --usd writes everything else",
+                f"{what} to write, such as {sections}; leave it out, --usd writes everything else",
                 param_hint=option,
             )
 
 
 def present(done: "Run", asked: dict[str, bool], stills: list[int], renderer: str) -> "list[TumbleError]":
-    """Says what a finished run warns of, writes what it is asked for, and sums it up; returns what could not be written."""
+    """Prints the warnings of a finished run, writes the requested output and a summary; returns the outputs that failed."""
     from tumble.lock import alone
 
     warn_of(done.manifest["warnings"])
@@ -121,18 +121,18 @@ def present(done: "Run", asked: dict[str, bool], stills: list[int], renderer: st
 
 
 def judge(done: "Run", failures: "list[TumbleError]") -> None:
-    """Ends with 1 where something could not be written or an expectation is broken."""
+    """Exits with 1 if an output failed or an expectation is violated."""
     for failure in failures:
         complain(str(failure))
     broken = done.manifest["expectations"]
     for expectation in broken:
-        complain(f"broken expectation: {expectation['text']}")
+        complain(f"violated expectation: {expectation['text']}")
     if broken or failures:
         raise typer.Exit(1)
 
 
 def _flags(asked: dict[str, bool | None], renderer: str) -> list[str]:
-    """The options on results, as they were given."""
+    """The output options, as given."""
     flags = [f"--{'' if wanted else 'no-'}{name}" for name, wanted in asked.items() if wanted is not None]
     return [*flags, *(["--renderer", renderer] if renderer != "auto" else [])]
 
@@ -145,11 +145,11 @@ def _say_what_is_kept(folder: Path, cure: str) -> None:
     except TumbleError:
         complain("stopped before anything was written")
         return
-    complain(f"stopped; {counted(kept, 'frame')} in {folder} can be read. Go on with\n  {cure}")
+    complain(f"stopped; {counted(kept, 'frame')} in {folder} can be read. Continue with\n  {cure}")
 
 
 def write_results(run: "Run", asked: dict[str, bool], stills: list[int], renderer: str) -> "list[TumbleError]":
-    """Writes what the scene asks for. What fails does not keep the rest from being written."""
+    """Writes the output requested by the scene. A failure does not prevent the rest."""
     from tumble import TumbleError
     from tumble.cli.render import film, still
 

@@ -1,4 +1,4 @@
-"""`tumble scenes`: the scenes that come with tumble."""
+"""`tumble scenes`: the bundled scenes."""
 
 from itertools import groupby
 from typing import Annotated
@@ -12,7 +12,7 @@ from tumble.cli.console import say
 def scenes(
     name: Annotated[str | None, typer.Argument(metavar="[NAME]", help="Scene whose file to print.")] = None,
 ) -> None:
-    """List the scenes that come with tumble, or print one.
+    """List the bundled scenes, or print one.
 
     \b
     Examples:

@@ -1,4 +1,4 @@
-"""`tumble view`: the browser laboratory, served from this machine, with a scene opened."""
+"""`tumble view`: the browser laboratory, served from this machine, with a scene open."""
 
 import base64
 import json
@@ -19,13 +19,13 @@ if TYPE_CHECKING:
     from tumble import Scene
 
 BUILT = Path(__file__).resolve().parent.parent / "web"
-"""What `make web` builds."""
+"""Output folder of `make web`."""
 
 LARGEST = 2_000_000
-"""Bytes that a link may unpack to; web/src/share.ts has the same."""
+"""Limit of the unpacked bytes of a link; web/src/share.ts has the same."""
 
 LONGEST = 100_000
-"""Characters of an address that a program takes as an argument."""
+"""Limit of the characters of an address as a program argument."""
 
 _TYPES = {".js": "text/javascript", ".wasm": "application/wasm", ".css": "text/css", ".webp": "image/webp"}
 
@@ -35,16 +35,16 @@ def view(
         str | None,
         typer.Argument(
             metavar="[SCENE]",
-            help="A .toml or .json file, or the name of a scene from `tumble scenes`; without it, the gallery.",
+            help="A .toml or .json file, or the name of a scene from `tumble scenes`. Default: the gallery.",
         ),
     ] = None,
     set: find.SetOption = None,
     port: Annotated[int, typer.Option(min=0, max=65535, metavar="N", help="Port; 0 takes any free one.")] = 0,
     open: Annotated[bool, typer.Option("--open/--no-open", help="Open a browser.")] = True,
 ) -> None:
-    """Run a scene in a browser, with everything to change by hand.
+    """Run a scene in a browser with live controls.
 
-    Nothing leaves this machine. Ctrl-C ends it.
+    Nothing leaves this machine. Ctrl-C stops the server.
 
     \b
     Examples:
@@ -54,7 +54,9 @@ def view(
     from tumble import TumbleError, __version__
 
     if not (BUILT / "v" / __version__ / "index.html").is_file():
-        raise TumbleError(f"{BUILT} does not hold the browser laboratory of tumble {__version__}; `make web` builds it")
+        raise TumbleError(
+            f"{BUILT} does not contain the browser laboratory of tumble {__version__}; `make web` builds it"
+        )
     fragment, meshes = ("", {}) if scene is None else address(scene, set)
     with server(port, meshes) as served:
         url = f"http://127.0.0.1:{served.server_port}/v/{__version__}/?view#/{fragment}"
@@ -70,7 +72,7 @@ def view(
 
 
 def address(argument: str, overrides: list[str] | None) -> tuple[str, dict[str, Path]]:
-    """What stands behind `#/` to open a scene, and the files of its meshes by the paths in it."""
+    """The part of the address after `#/` that opens a scene, and the files of its meshes by path."""
     from tumble import SceneError
 
     file = find.scene_file(argument)
@@ -83,8 +85,8 @@ def address(argument: str, overrides: list[str] | None) -> tuple[str, dict[str, 
     tree = shared(text, overrides or [], checked.to_dict())
     if len(tree) > LARGEST:
         raise SceneError(
-            f"{file}: as text, and with every default written out, the scene has {len(tree) / 1e6:.1f} MB; "
-            f"the browser takes up to {LARGEST // 1_000_000} MB"
+            f"{file}: with all defaults filled in, the scene has {len(tree) / 1e6:.1f} MB; "
+            f"the browser accepts up to {LARGEST // 1_000_000} MB"
         )
     packed = link(tree)
     if len(packed) > LONGEST:
@@ -96,7 +98,7 @@ def address(argument: str, overrides: list[str] | None) -> tuple[str, dict[str, 
 
 
 def shared(text: str, overrides: list[str], resolved: dict[str, Any]) -> bytes:
-    """A scene as web/src/share.ts reads it: as it was written, and what it means."""
+    """A scene as web/src/share.ts reads it: its text and its resolved form."""
     from tumble import __version__
 
     tree: dict[str, Any] = {"tumble": __version__, "text": text, "overrides": overrides, "scene": resolved}
@@ -105,13 +107,13 @@ def shared(text: str, overrides: list[str], resolved: dict[str, Any]) -> bytes:
 
 
 def link(tree: bytes) -> str:
-    """What stands behind `#/s/`."""
+    """The part of the address after `#/s/`."""
     packer = zlib.compressobj(9, wbits=-15)
     return base64.urlsafe_b64encode(packer.compress(tree) + packer.flush()).decode().rstrip("=")
 
 
 def mesh_paths(scene: "Scene") -> list[str]:
-    """Paths of the mesh files that a scene names."""
+    """Paths of the mesh files of a scene."""
 
     def walk(node: Any) -> list[str]:
         if isinstance(node, dict):
@@ -123,7 +125,7 @@ def mesh_paths(scene: "Scene") -> list[str]:
 
 
 def server(port: int, meshes: Mapping[str, Path]) -> ThreadingHTTPServer:
-    """Serves the laboratory, and at view/PATH the meshes, to this machine alone."""
+    """Serves the laboratory, and the meshes at view/PATH, to this machine only."""
     files = {f"/view/{quote(path, safe='')}": file for path, file in meshes.items()}
 
     class Handler(SimpleHTTPRequestHandler):

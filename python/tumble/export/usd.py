@@ -73,7 +73,7 @@ class Part:
     """Points of each curve."""
     radius: float = 0.0
     cut: tuple[npt.NDArray[np.int64], npt.NDArray[np.int64]] | None = None
-    """What `surfaces.split` says of a solid that has sharp edges."""
+    """Result of `surfaces.split` for a solid with sharp edges."""
     taper: npt.NDArray[np.float64] | None = None
     """Radius of each point of a strand of hair."""
     trail: bool = False
@@ -262,7 +262,7 @@ def _array(values: Numbers) -> Any:
 
 
 def _values(part: Part, columns: Columns, ways: Ways) -> Iterator[tuple[str, str, Numbers]]:
-    """What a frame says of a part: attribute, type and values."""
+    """Data of a part in a frame: attribute, type and values."""
     if part.trail:
         points, counts = ways[part.thing.name]
         yield "points", "point3f[]", points
@@ -359,7 +359,7 @@ def _manifest(parts: list[Part], start: Columns, ways: Ways) -> Any:
 
 
 def _objects(run: Recording, parts: list[Part], start: Columns, ways: Ways) -> Any:
-    """What does not change, and the start."""
+    """Constant data and the initial state."""
     from pxr import Gf, Sdf, Usd, UsdGeom, UsdShade, Vt
 
     layer = Sdf.Layer.CreateAnonymous(".usdc")

@@ -1,4 +1,4 @@
-"""What lies on grids as OpenVDB files: volumes/NAME.000000.vdb and so on, one for each object and frame.
+"""Grids as OpenVDB files: volumes/NAME.000000.vdb and so on, one for each object and frame.
 
 In each file a grid for each column, under its name: `density` (a fog volume), `temperature`, `pressure`, `velocity`
 (vectors, at the middles of cells) and whatever else the frames have; where they have the velocities on faces, also these,
@@ -23,7 +23,7 @@ from tumble.grids import UNITS, Box, box, columns, faces
 from tumble.pictures.things import Recording
 
 TOLERANCE = 1e-4
-"""What differs less from the background is not stored; in largest differences of the frame."""
+"""Smallest stored difference from the background, relative to the largest of the frame."""
 
 FOG = ("density", "fuel")
 """Columns that are densities."""

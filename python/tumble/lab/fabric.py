@@ -40,7 +40,7 @@ Tick = Callable[[], None]
 
 @dataclass
 class Measured:
-    """What the three tests say about a fabric."""
+    """Results of the three tests of a fabric."""
 
     name: str
     record: Record
@@ -76,7 +76,7 @@ def overhang(samples: Floats, density: float, chord: float = float(CHORD)) -> fl
     angles there."""
     kappa = np.linspace(0.0, 3000.0, 60_001)
     moments = moment(np.array(samples), kappa)
-    # Where the moment is constant, any curvature will do: the least.
+    # For a constant moment any curvature will do: the least.
     moments = np.maximum.accumulate(moments) + 1e-12 * kappa
     scale = float((samples[0] / (density * GRAVITY)) ** (1 / 3))
     step = scale / 800
@@ -202,7 +202,7 @@ def drape(fabric: Words, *, edge: float = EDGE, frames: int = 75) -> tuple[Float
         "name": "cloth", "panels": [{"name": "disk", "outline": outline, "up": [0, 1, 0]}], "resolution": edge,
         "fabric": fabric, "pin": [{"center": [0, 0, 0], "radius": SUPPORT}],
     }  # fmt: skip
-    # What is flat would stay so: a breath from one side.
+    # A flat strip would stay flat: a breath from one side.
     breath = {"kind": "acceleration", "value": "[0, 0, 2*sin(40*x)*cos(34*y + 1)*(1 - smoothstep(0, 0.4, t))]"}
     # Looser, folds of soft cloth explode.
     scene = _scene({"substeps": 4, "solver": {"newton_tolerance": 1e-3, "linear_tolerance": 0.03}}, 3.0, cloth=[cloth])

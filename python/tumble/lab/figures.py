@@ -238,7 +238,7 @@ def _names(axes: Axes, results: Results, ends: list[tuple[Scheme, float, float]]
 
 
 def _fan(axes: Axes, span: tuple[float, float], drawn: list[tuple[float, float]]) -> None:
-    """What slopes mean, in the lower right corner, if that is empty."""
+    """Legend of slopes, in the lower right corner if it is empty."""
     decades = np.log10(span[1] / span[0])
     (x0, x1), bottom = np.log10(axes.get_xlim()), np.log10(span[0])
     foot = np.array([x1 - 0.3 * (x1 - x0), bottom + 0.05 * decades])

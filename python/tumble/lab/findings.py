@@ -1,4 +1,4 @@
-"""What the measurements say: observed orders, costs, and sentences."""
+"""Findings of the measurements: observed orders, costs, and sentences."""
 
 from dataclasses import dataclass, replace
 from itertools import pairwise
@@ -15,7 +15,7 @@ TARGET = 0.01
 
 @dataclass(frozen=True)
 class Cost:
-    """What one simulated second takes."""
+    """Cost of one simulated second."""
 
     evaluations: float
     seconds: float

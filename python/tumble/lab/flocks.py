@@ -1,4 +1,4 @@
-"""What a flock does under each integrator: it has no energy to keep, but an order, a density and a speed."""
+"""A flock under each integrator: it has no conserved energy, but an order, a density and a speed."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass, field
@@ -167,7 +167,7 @@ def late(observed: Observed, word: str) -> Floats | None:
 
 
 def headlines(results: Results) -> list[str]:
-    """What a flock keeps, in a sentence for each step."""
+    """Order, density and speed of a flock, one sentence per step."""
     lines = []
     for observed in results.observed:
         true = late(observed, "")

@@ -1,4 +1,4 @@
-"""What each operator on a grid makes of a known field, and the checkerboard that a grid without staggering leaves."""
+"""Each grid operator on a known field, and the checkerboard that a grid without staggering leaves."""
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
@@ -139,7 +139,7 @@ def boards(n: int = 24) -> Boards:
     for name, one in (("staggered", compact), ("collocated", wide)):
         symbol = one[:, None] + one[None]
         seen = np.abs(symbol) > 1e-9 * np.abs(symbol).max()
-        # What the operator does not see is left out: the least pressure that serves.
+        # The null space of the operator is removed: the smallest sufficient pressure.
         inverse = np.where(seen, 1 / np.where(seen, symbol, 1.0), 0.0)
         solved[name] = np.fft.ifft2(np.fft.fft2(source) * inverse).real
     return Boards(p.array, np.hypot(*(c.array for c in central)), np.hypot(*sizes), solved)

@@ -1,4 +1,4 @@
-"""What link patterns resist: a sheet and a block are deformed by hand, and their elastic energy is read.
+"""Resistance of link patterns: a sheet and a block are deformed by hand, and their elastic energy is read.
 
 Energies are those of the bulk: the energy of n x n cells is w n² + rim n + corners, so w is the leading coefficient of
 the polynomial through the energies at three sizes (four in a block); rims and corners drop out exactly.
@@ -56,7 +56,7 @@ class Deformation:
 
 @dataclass
 class Measured:
-    """What a pattern does against a deformation."""
+    """Resistance of a pattern to a deformation."""
 
     pattern: Pattern
     deformation: Deformation

@@ -195,7 +195,7 @@ def run(
 
 @dataclass(frozen=True)
 class Theory:
-    """What is known of a plain cube of n³ cells."""
+    """Theory for a plain cube of n³ cells."""
 
     n: int
 
@@ -365,7 +365,7 @@ def page(
 
 
 def lessons(seen: Study) -> list[str]:
-    """What the measurements say, in sentences."""
+    """Findings of the measurements, as sentences."""
     box, lines = NAMES[0], []
     runs = {word: seen.of(box, word) for word in BY_WORD}
     slow, best = runs["jacobi"], runs["multigrid_gradients"]

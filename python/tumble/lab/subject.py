@@ -1,4 +1,4 @@
-"""What the lab tests: a scene whose integrator, step and length can be changed at will."""
+"""Subject of the lab: a scene whose integrator, step and length can be changed at will."""
 
 from dataclasses import dataclass, field
 from typing import Any

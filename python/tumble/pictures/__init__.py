@@ -42,7 +42,7 @@ PROBES = {
     "pyvista": "import pyvista as pv; p = pv.Plotter(off_screen=True, window_size=[32, 32]); p.add_mesh(pv.Sphere()); "
     "assert p.screenshot(return_img=True).std() > 0",
 }
-"""What must work for a renderer to be there. It is tried in a process of its own: without EGL, VTK ends the process."""
+"""Requirements of a renderer. They are tried in a separate process: without EGL, VTK ends the process."""
 
 SAMPLES = 16
 """Samples per pixel of stills."""
@@ -101,7 +101,7 @@ class Studio:
         return render(self.renderer, self.things(i), self.camera.unit(), self.samples, self.stage.night)
 
     def things(self, i: int) -> list[Thing]:
-        """What is to be drawn of frame i, moved and scaled for `Camera.unit`."""
+        """Drawables of frame i, moved and scaled for `Camera.unit`."""
         if not 0 <= i < self.run.n_frames:
             raise ExportError(f"there is no frame {i}; there are frames 0 to {self.run.n_frames - 1}")
         things = self.stage.things(i, THINNEST * self.camera.width)

@@ -1,6 +1,5 @@
-"""What renderers draw: meshes, spheres, tubes, strands and grounds with colours, clouds that `splats` paints over the picture,
-smoke and images that `volumes` paints. They know nothing of scenes; `things` makes them of a run.
-"""
+"""Drawables of renderers: meshes, spheres, tubes, strands and grounds with colours, clouds that `splats` paints over
+the picture, smoke and images that `volumes` paints. They know nothing of scenes; `things` makes them of a run."""
 
 from dataclasses import dataclass, replace
 
@@ -75,7 +74,7 @@ class Cloud:
 
 @dataclass(frozen=True)
 class Smoke:
-    """What takes light away and scatters or sends out some, on a grid of cubic cells."""
+    """An absorbing, scattering or emitting medium on a grid of cubic cells."""
 
     name: str
     low: Floats

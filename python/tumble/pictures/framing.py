@@ -48,7 +48,7 @@ class Camera:
     target: Floats
     up: Floats
     width: float
-    """What the picture spans from left to right at the target [m]."""
+    """Width of the picture at the target [m]."""
     size: tuple[int, int]
     """Width and height of the picture [pixel]."""
     parallel: bool = False
@@ -60,7 +60,7 @@ class Camera:
 
     @property
     def height(self) -> float:
-        """What the picture spans from bottom to top at the target [m]."""
+        """Height of the picture at the target [m]."""
         return self.width * self.size[1] / self.size[0]
 
     @property
@@ -77,7 +77,7 @@ class Camera:
 
     @property
     def eye(self) -> Floats:
-        """Where the rays of sight meet; far away if they are parallel."""
+        """Centre of projection; far away for parallel rays."""
         return self.position - 1e4 * self.distance * self.axes[2] if self.parallel else self.position
 
     @property
@@ -86,7 +86,7 @@ class Camera:
         return self.width / self.size[0]
 
     def project(self, points: Floats) -> Floats:
-        """Where points are in the picture: pixels from the left, pixels from the top, distance along the view [m]."""
+        """Points in the picture: pixels from the left, pixels from the top, distance along the view [m]."""
         right, up, forward = self.axes
         d = np.asarray(points, dtype=float) - self.position
         depth = d @ forward

@@ -1,4 +1,4 @@
-"""What all renderers share of the light: background, key light, the ground's fading and, for plain ones, its shadow.
+"""Lighting shared by all renderers: background, key light, the ground's fading and, for plain ones, its shadow.
 
 Cameras and things here are those of `Camera.unit`: target at the origin, camera at distance 1.
 """

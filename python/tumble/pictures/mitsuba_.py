@@ -245,7 +245,7 @@ def _foot(thing: Ground, camera: Camera) -> Floats:
 
 
 def _haze(grounds: list[Ground], camera: Camera) -> tuple[Floats, npt.NDArray[np.bool_]]:
-    """What must be added to the light of the ground for it to fade into the background, and where it has done so.
+    """Light to add to the ground so that it fades into the background, and the mask where it has.
 
     Only the difference between the open ground and the background is added, so that no edge in front of it changes.
     """

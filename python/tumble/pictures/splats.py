@@ -292,7 +292,7 @@ class Shade:
         return np.where(inside, np.exp(-total), 1.0)
 
     def on(self, depth: Floats, camera: Camera) -> Floats:
-        """What is left of the light of the scenery, height x width."""
+        """Transmittance in front of the scenery, height x width."""
         left = np.ones(depth.shape)
         if not self.empty:
             rays, start = sights(camera)
@@ -406,7 +406,7 @@ def glow(light: Floats | None, depth: Floats, things: list[Thing], clouds: list[
     bright = np.maximum(sum_.max(axis=2, keepdims=True), 1e-9)
     curve = np.arcsinh(CONTRAST * bright) / np.arcsinh(CONTRAST * WHITEST)
     shining = sum_ * (curve / bright)
-    # What is brighter than a screen can be turns white.
+    # Colours brighter than the screen turn white.
     over = np.maximum(shining.max(axis=2, keepdims=True) - 0.9, 0.0)
     shining = shining + 0.6 * over
     return np.asarray(shown * np.maximum(1 - curve, 0.0) + shining)

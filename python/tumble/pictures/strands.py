@@ -47,7 +47,7 @@ class Strands:
         return np.asarray(np.einsum("mk,mkpc->mpc", self.weights, curves[self.guides]))
 
     def hair(self, name: str, x: Floats, radius: float, color: Rgb) -> Hair:
-        """What is drawn of them, with this radius at the roots."""
+        """Drawables of the strands, with this radius at the roots."""
         taper = 1.0 - 0.8 * np.linspace(0.0, 1.0, self.points) ** 2
         return Hair(name, self.of(x), radius * taper, color)
 

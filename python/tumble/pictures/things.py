@@ -1,4 +1,4 @@
-"""What there is to see in a run: its objects, and for each frame what renderers draw of them (`drawn`).
+"""Visible content of a run: its objects, and for each frame what renderers draw of them (`drawn`).
 
 Ropes and anchors become tubes, sheets, blocks and nets meshes, floors
 grounds; particles spheres, or, where many come and go, a cloud that `splats` paints over the picture; what lies on grids smoke
@@ -28,11 +28,11 @@ Columns = Mapping[str, Mapping[str, Array]]
 
 
 class Recording(Protocol):
-    """What pictures, films, plots and exports read of a run."""
+    """Interface of a run for pictures, films, plots and exports."""
 
     @property
     def folder(self) -> Path:
-        """Where the run is on disk."""
+        """Folder of the run."""
 
     @property
     def scene(self) -> Mapping[str, Any]:
@@ -40,7 +40,7 @@ class Recording(Protocol):
 
     @property
     def static(self) -> Columns:
-        """What does not change: triangles, links, curve, radius; position of colliders [m]."""
+        """Constant columns: triangles, links, curve, radius; position of colliders [m]."""
 
     @property
     def n_frames(self) -> int:
@@ -87,7 +87,7 @@ class Object:
     container: bool = False
     """Whether masses are inside, so that it is drawn as its edges."""
     grid: Box | None = None
-    """Where its numbers lie, if it is on a grid."""
+    """Its grid, if any."""
 
 
 MANY = 2_000
@@ -97,7 +97,7 @@ FINER = 0.6
 """Particles of clouds may be this much thinner than the thinnest."""
 
 SHOWN = ("density", "fuel", "temperature", "vorticity", "speed", "pressure", "divergence")
-"""What is shown of an object on a grid: the first of these that is in the frames and not the same everywhere."""
+"""Column shown of a grid object: the first of these that is in the frames and not uniform."""
 
 DENSE = 0.5
 """A density that is nowhere less than this part of its largest is that of the fluid itself, not of smoke in it."""
@@ -109,7 +109,7 @@ SMOKE: Rgb = (0.52, 0.53, 0.56)
 """Colour of smoke that has none of its own."""
 
 LIQUID = 100.0
-"""What floats in a fluid as dense as this [kg/m³] is dye, and has a colour of its own."""
+"""Fluid density [kg/m³] from which smoke counts as dye, with a colour of its own."""
 
 GLOWING = 1000.0
 """A gas that gets hotter than this [K] in a run is seen to glow."""
@@ -162,7 +162,7 @@ def objects(run: Recording) -> list[Object]:
     }
     found: list[Object] = []
     colors = 0
-    # What varies from particle to particle is in the frames; an object may have nothing else.
+    # Per-particle values are in the frames; an object may have nothing else.
     start = run.frame(0) if run.n_frames else {}
     for name, columns in {**{n: {} for n in start if n not in run.static}, **run.static}.items():
         section, entry = words.get(name, ("", {}))
@@ -286,7 +286,7 @@ class Stage:
         self._hottest: dict[str, float] = {}
 
     def things(self, i: int, thinnest: float = 0.0) -> list[Thing]:
-        """What is to be drawn of frame i. Nothing is thinner than the radius `thinnest` [m]."""
+        """Drawables of frame i. Nothing is thinner than the radius `thinnest` [m]."""
         columns = self.run.frame(i)
         drawn: list[Thing] = []
         for thing in self.objects:
@@ -372,7 +372,7 @@ class Stage:
         return min(thick, DEEP / reach) if reach > 0.0 else thick
 
     def _range(self, thing: Object, grid: Box) -> tuple[str, float, float] | None:
-        """What is shown of an object on a grid, from where to where; nothing if there is nothing to see."""
+        """Column shown of a grid object and its range; nothing if there is nothing to see."""
         looks = np.unique(np.linspace(0, self.run.n_frames - 1, LOOKED_AT).astype(int)).tolist()
         tables = [self.run.frame(i).get(thing.name, {}) for i in looks]
         for name in SHOWN:
@@ -429,7 +429,7 @@ class Stage:
         return Cloud(thing.name, x, r, colors(columns, thing), ways, np.concatenate(shades), faded)
 
     def _way(self, thing: Object, i: int, columns: Columns, thinnest: float) -> Tubes | None:
-        """Where the particles have been, up to frame i."""
+        """Trails of the particles up to frame i."""
         first = i
         while first > 0 and self.run.time(first - 1) >= self.run.time(i) - thing.trail - 1e-9:
             first -= 1
@@ -543,7 +543,7 @@ def _image(
     holes: npt.NDArray[np.bool_],
     glow: npt.NDArray[np.float32] | None = None,
 ) -> Image:
-    """What lies in a plane: dye in the object's colour, a gas that glows in its own light, all else in a map of colours."""
+    """A 2D grid: dye in the object's colour, a gas that glows in its own light, all else in a map of colours."""
     import matplotlib
 
     a, b = grid.axes

@@ -61,7 +61,7 @@ def smoke(light: Floats, depth: Floats, clouds: list[Smoke], camera: Camera, nig
 
 
 def lit(extinction: Array, spacing: float, direction: Floats) -> Array:
-    """What is left in the middle of each cell of light that comes from a direction, 0 to 1."""
+    """Transmittance of light from a direction to each cell centre, 0 to 1."""
     axis = int(np.argmax(np.abs(direction)))
     e = np.moveaxis(extinction, axis, 0)
     if direction[axis] > 0:
@@ -71,7 +71,7 @@ def lit(extinction: Array, spacing: float, direction: Floats) -> Array:
     depth = np.empty_like(e)
     before = np.zeros(e.shape[1:], dtype=np.float32)
     for k in range(len(e)):
-        # What lies between the slices: half of one and half of the other.
+        # Between slices: half of one and half of the other.
         depth[k] = _shifted(before, slope) + step * e[k]
         before = depth[k] + step * e[k]
     if direction[axis] > 0:
@@ -220,7 +220,7 @@ def _soft(values: Array) -> Array:
 
 
 def _between(slices: npt.NDArray[Any], k: float) -> npt.NDArray[Any]:
-    """What lies at a place between slices; beyond the ends as at them."""
+    """Value at a position between slices; constant beyond the ends."""
     low = min(max(int(np.floor(k)), 0), len(slices) - 1)
     part = np.float32(k - low)
     if part <= 0 or low + 1 == len(slices):
@@ -244,7 +244,7 @@ def _seen(low: Floats, size: Floats, camera: Camera) -> npt.NDArray[np.bool_]:
 
 
 def _shadow(cloud: Smoke, depth: Floats, camera: Camera) -> Floats:
-    """What smoke leaves of the light of the scenery, height x width."""
+    """Transmittance of smoke in front of the scenery, height x width."""
     part = _filled(cloud)
     if part is None:
         return np.ones(depth.shape)

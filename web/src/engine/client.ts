@@ -5,7 +5,7 @@ import type {
   Answer, Cure, Failure, Files, Frame, Notice, Question, SceneInfo, Stability, Value, Vector,
 } from "./protocol";
 
-/** What a question was answered with when it could not be done. */
+/** Answer to a failed request. */
 export class EngineError extends Error {
   constructor(readonly failure: Failure) {
     super(failure.message);
@@ -16,7 +16,7 @@ export class EngineError extends Error {
 /** Milliseconds after which a worker that does not answer is taken for dead. */
 const PATIENCE = { load: 30_000, step: 60_000, cures: 60_000, other: 30_000 };
 
-const GONE: Failure = { kind: "scene", message: "this way is no longer kept", issues: [] };
+const GONE: Failure = { kind: "scene", message: "this branch is no longer stored", issues: [] };
 const CLOSED: Failure = { kind: "crash", message: "the engine was closed", issues: [] };
 
 interface Waiting {
@@ -25,7 +25,7 @@ interface Waiting {
   fail: (error: EngineError) => void;
 }
 
-/** What a world was made from, to make it again. */
+/** Source of a world, to rebuild it. */
 interface Made {
   toml: string;
   overrides: string[];
@@ -50,7 +50,7 @@ export class Engine {
   private next = 1;
   private readonly waiting = new Map<number, Waiting>();
   private readonly made = new Map<number, Made>();
-  /** What ways that are parked were made from. */
+  /** Sources of parked branches. */
   private readonly parked = new Map<number, Made & { world: number }>();
   private watch: ReturnType<typeof setTimeout> | undefined;
   private reviving: Promise<void> | undefined;
@@ -232,7 +232,7 @@ export class Engine {
     if (!first) return;
     const { type } = first.question;
     const patience = type === "load" || type === "step" || type === "cures" ? PATIENCE[type] : PATIENCE.other;
-    this.watch = setTimeout(() => this.died(`the engine gave no answer for ${patience / 1000} s and was stopped`), patience);
+    this.watch = setTimeout(() => this.died(`the engine did not respond for ${patience / 1000} s and was stopped`), patience);
   }
 
   private failAll(failure: Failure): void {

@@ -45,7 +45,7 @@ export class Kept {
     let found = 0;
     for (const kept of this.states.keys()) if (kept <= frame && kept > found) found = kept;
     const state = this.states.get(found);
-    if (!state) throw new Error("the first frame was not kept");
+    if (!state) throw new Error("the first frame was not stored");
     return state;
   }
 

@@ -1,5 +1,5 @@
 /**
- * What page and worker say to each other. The page asks with an id, the worker answers each request once, with the same id.
+ * Messages between page and worker. The page asks with an id, the worker answers each request once, with the same id.
  * Worlds are numbered by the page, so that one worker runs several side by side (integrator lab, time branches).
  */
 
@@ -46,11 +46,11 @@ export interface SceneInfo {
   systems: { name: string; method: string; integrator: string }[];
   /** Columns that the scene asks for, those of each frame unless others are asked for. */
   columns: string[];
-  /** What does not change: triangles, links, curve, radius, mass, grid_cells, grid_origin, grid_spacing, grid_flat, mesh of colliders. */
+  /** Constant columns: triangles, links, curve, radius, mass, grid_cells, grid_origin, grid_spacing, grid_flat, mesh of colliders. */
   topology: Columns;
   /** The resolved scene: every default written out. */
   scene: Record<string, unknown>;
-  /** What is doubtful; docs/warnings.md lists the codes. */
+  /** Warnings; docs/warnings.md lists the codes. */
   warnings: { code: string; path: string; message: string }[];
   /** State hash, 16 hexadecimal digits, as `tumble` prints it natively. */
   hash: string;
@@ -81,7 +81,7 @@ export interface Ledger {
   divergence: number;
 }
 
-/** What the frames of one answer took, together. */
+/** Total cost of the frames of one answer. */
 export interface StepReport {
   steps: number;
   rejected: number;
@@ -111,7 +111,7 @@ export interface Frame {
   ms: number;
   /** Frames that `restore` can go to, rising. */
   kept: number[];
-  /** Where this is a look inside the frame that comes after `index`: how many sub-steps in, whose the last one was, and its length [s]. */
+  /** For a view inside the frame after `index`: number of sub-steps, system of the last one, and its length [s]. */
   inside?: { substeps: number; system: string; step: number };
 }
 
@@ -148,7 +148,7 @@ export type Files = Record<string, Uint8Array>;
 
 export type Vector = [number, number, number];
 
-/** What a slider, a field or a file gives: numbers, words, lists. */
+/** Value of a slider, a field or a file: numbers, words, lists. */
 export type Value = number | string | boolean | Value[] | { [key: string]: Value };
 
 interface Asked {
@@ -214,7 +214,7 @@ type Without<T, K extends PropertyKey> = T extends unknown ? Omit<T, K> : never;
 /** A request without its id, as the page writes it. */
 export type Question = Without<Request, "id">;
 
-/** What went wrong: the scene, a step, a limit of the browser, or the engine itself (the worker was started anew). */
+/** Source of a failure: the scene, a step, a limit of the browser, or the engine itself (the worker was started anew). */
 export type FailureKind = "scene" | "step" | "limit" | "crash";
 
 export interface Failure {

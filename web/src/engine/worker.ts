@@ -116,7 +116,7 @@ function park(at: Running): Parked {
 async function take(request: Request & { type: "take" }): Promise<SceneInfo> {
   const at = running(request.world ?? 0);
   const parked = at.parked.get(request.from);
-  if (!parked) throw new Asked("this way is no longer kept");
+  if (!parked) throw new Asked("this branch is no longer stored");
   const world = await build(request.toml, request.overrides, request.files);
   try {
     world.restore(parked.end);
@@ -197,7 +197,7 @@ async function answer(request: Request): Promise<Answer> {
       const at = running(number);
       const live = at.world.set(request.path, JSON.stringify(request.value));
       at.info = info(at.world);
-      // What was kept after this moment is no future of it any more; the moment itself is kept as it is now.
+      // Frames stored after this moment are no longer its future; the moment itself is stored as it is now.
       if (live) at.kept.cut(at.world.index());
       else at.kept = new Kept(KEEP);
       keep(at);
@@ -244,7 +244,7 @@ async function answer(request: Request): Promise<Answer> {
   }
 }
 
-/** What the engine threw: its own failures are JSON; anything else has killed it. */
+/** Exception of the engine: its own failures are JSON; anything else has killed it. */
 function failure(thrown: unknown): Failure {
   if (typeof thrown === "string") return readable(JSON.parse(thrown) as Failure);
   if (thrown instanceof Asked) return { kind: "scene", message: thrown.message, issues: [] };

@@ -1,4 +1,4 @@
-/** What of a wrong scene's failure and files is worth its way. */
+/** Limits of failures and files sent to the page. */
 import type { Failure, Files } from "./protocol";
 
 /** More mistakes than this nobody reads; a page that lists all of a hostile scene's stands still. */

@@ -12,9 +12,9 @@ import { transport } from "../transport";
 import { reducedMotion, Viewer } from "../viewer";
 import { Vector3 } from "three";
 
-const VIEWS: [string, string][] = [["density", "Dye"], ["pressure", "Pressure"], ["speed", "Speed, with arrows"], ["vorticity", "Vorticity"], ["divergence", "Residual: divergence that is left"]];
+const VIEWS: [string, string][] = [["density", "Dye"], ["pressure", "Pressure"], ["speed", "Speed with arrows"], ["vorticity", "Vorticity"], ["divergence", "Residual divergence"]];
 const SOLVERS: [string, string][] = [
-  ["jacobi", "Jacobi"], ["gauss_seidel", "Gauss–Seidel, red and black"], ["sor", "Over-relaxation"], ["conjugate_gradients", "Conjugate gradients"],
+  ["jacobi", "Jacobi"], ["gauss_seidel", "Red-black Gauss–Seidel"], ["sor", "Over-relaxation"], ["conjugate_gradients", "Conjugate gradients"],
   ["incomplete_cholesky", "… with incomplete Cholesky"], ["modified_incomplete_cholesky", "… with MIC(0)"], ["multigrid", "Multigrid"], ["multigrid_gradients", "Multigrid gradients"], ["cosine", "Cosine transform"],
 ];
 const OBSTACLES: Record<string, string> = {
@@ -117,8 +117,8 @@ export const page: Page = async (main) => {
   viewer.box.classList.add("stirs");
   viewer.box.append(ring);
   const energy = new Plot([{ label: "kinetic energy", color: 0, width: 2 }], { label: "Kinetic energy against time", x: "time [s]", height: 130 });
-  const residual = new Plot([{ label: "residual", color: 1, width: 2 }], { label: "Residual of the pressure after each iteration, on a logarithmic scale", x: "iteration", log: true, height: 130 });
-  const figures = { left: figure("Divergence", "residual"), iterations: figure("Iterations", "iterations"), cost: figure("Engine, a step"), courant: figure("Courant number"), kinetic: figure("Kinetic energy") };
+  const residual = new Plot([{ label: "residual", color: 1, width: 2 }], { label: "Residual of the pressure per iteration, on a logarithmic scale", x: "iteration", log: true, height: 130 });
+  const figures = { left: figure("Divergence", "residual"), iterations: figure("Iterations", "iterations"), cost: figure("Engine time per step"), courant: figure("Courant number"), kinetic: figure("Kinetic energy") };
   const advice = h("p", { class: "doc", role: "status" });
 
   const rerun = async () => {
@@ -153,7 +153,7 @@ export const page: Page = async (main) => {
     cells.querySelector("select")!.replaceChildren(...list.map((n) => h("option", { value: n, selected: n === String(choices.cells) }, n)));
   };
   fillCells();
-  const sliceAt = slide("Place of the slice", 0, 1, 0.5, (v) => `${show((v - 0.5) * SPACE.depth, 2)} m`, (v) => {
+  const sliceAt = slide("Position of the slice", 0, 1, 0.5, (v) => `${show((v - 0.5) * SPACE.depth, 2)} m`, (v) => {
     stage.look.sliceAt = v;
     stage.again();
   });
@@ -162,7 +162,7 @@ export const page: Page = async (main) => {
   const clear = h("button", { type: "button", class: "button", onclick: () => {
     choices.walls = [];
     void set("collider", solids(choices) as Value);
-  } }, "Clear the walls");
+  } }, "Remove the walls");
   const cellsShown = check("Cells", false, (on) => {
     stage.look.cells = on;
     stage.again();
@@ -171,7 +171,7 @@ export const page: Page = async (main) => {
     stage.look.arrows = on;
     void session.refresh().then(() => stage.again());
   });
-  const space = choice("Fluid", [["plane", "in a plane"], ["slice", "in space, cut by a slice"], ["smoke", "in space, its smoke"]], choices.space, (v) => {
+  const space = choice("Fluid", [["plane", "2D"], ["slice", "3D, slice"], ["smoke", "3D, smoke"]], choices.space, (v) => {
     choices.space = v as Choices["space"];
     const plane = v === "plane";
     // Walls are drawn in a plane.
@@ -197,7 +197,7 @@ export const page: Page = async (main) => {
         choices.method = v;
         void set("gas.0.pressure.method", v);
       }),
-      slide("Iterations at most", 0, 3, Math.log10(choices.iterations), (v) => String(Math.round(10 ** v)), (v) => {
+      slide("Maximum iterations", 0, 3, Math.log10(choices.iterations), (v) => String(Math.round(10 ** v)), (v) => {
         choices.iterations = Math.round(10 ** v);
         void set("gas.0.pressure.iterations", choices.iterations);
       }),
@@ -205,17 +205,17 @@ export const page: Page = async (main) => {
         choices.tolerance = Number((10 ** v).toPrecision(1));
         void set("gas.0.pressure.tolerance", choices.tolerance);
       }),
-      h("p", { class: "muted plot-title" }, "Residual over the first, by iteration"),
+      h("p", { class: "muted plot-title" }, "Relative residual by iteration"),
       residual.element,
       h("div", { class: "figures" }, figures.left.row, figures.iterations.row),
       advice,
     ),
     h("section", { class: "card" }, h("h2", {}, "Fluid"),
-      choice("Carried by", [["linear", "linear interpolation"], ["corrected", "MacCormack's correction"], ["cubic", "cubics and correction"]], choices.advection, (v) => {
+      choice("Advection", [["linear", "linear interpolation"], ["corrected", "MacCormack correction"], ["cubic", "cubic with correction"]], choices.advection, (v) => {
         choices.advection = v as Choices["advection"];
         void set("gas.0.advection.velocity", v === "linear" ? { interpolation: "linear", corrected: false } : v === "corrected" ? { interpolation: "linear", corrected: true } : { interpolation: "monotone_cubic", corrected: true });
       }),
-      h("p", { class: "doc" }, "Each step looks up where the fluid came from. Linear interpolation there smooths it, as a viscosity would: watch the kinetic energy."),
+      h("p", { class: "doc" }, "Each step reads values at the point where the fluid came from. Linear interpolation smooths them like a viscosity: watch the kinetic energy."),
       slide("Viscosity [Pa s]", thick.low, thick.high, thick.low, (v) => show(thick.of(v), 2), (v) => {
         choices.viscosity = thick.of(v);
         void set("gas.0.viscosity", choices.viscosity);
@@ -235,7 +235,7 @@ export const page: Page = async (main) => {
       clear,
     ),
     h("section", { class: "card" }, h("h2", {}, "Particles"),
-      check("Particles go with the flow", choices.particles, (on) => {
+      check("Tracer particles", choices.particles, (on) => {
         choices.particles = on;
         void rerun();
       }),
@@ -243,7 +243,7 @@ export const page: Page = async (main) => {
         choices.lifetime = v;
         void rerun();
       }),
-      slide("Length of trails [s]", 0, 1, choices.trail, (v) => show(v, 2), (v) => {
+      slide("Trail length [s]", 0, 1, choices.trail, (v) => show(v, 2), (v) => {
         choices.trail = v;
         void rerun();
       }),
@@ -256,7 +256,7 @@ export const page: Page = async (main) => {
       h("section", { class: "view", "aria-label": "Fluid" },
         h("div", { class: "lab-head" },
           h("div", {}, h("h1", {}, "A fluid to stir"), h("p", { class: "muted" }, "Drag through it, or draw walls.")),
-          h("div", { class: "actions" }, view, pictureButton(stage, () => "fluid"), iconButton("reset", "From the start, with these settings", () => void rerun()), asSceneButton(() => asScene(scene(choices), 900)))),
+          h("div", { class: "actions" }, view, pictureButton(stage, () => "fluid"), iconButton("reset", "Restart with these settings", () => void rerun()), asSceneButton(() => asScene(scene(choices), 900)))),
         viewer.alert, viewer.box, transport(session),
         h("div", { class: "energy" }, h("h2", {}, "Kinetic energy", h("span", { class: "unit" }, "J")), h("div", { class: "figures in-line" }, figures.kinetic.row, figures.courant.row, figures.cost.row), energy.element),
       ),
@@ -286,7 +286,7 @@ export const page: Page = async (main) => {
       if (performance.now() - book > 150) {
         book = performance.now();
         residual.set([[0, ...list.map((_, i) => i + 1)], [1, ...list.map((r) => (r > 0 ? r : null))]]);
-        advice.textContent = report.unconverged ? "The pressure has not met its tolerance. What is left of the divergence makes the fluid swell and shrink: look at its view." : "Largest divergence times the size of a cell, over the fastest velocity; the tolerance bounds it.";
+        advice.textContent = report.unconverged ? "The pressure has not met its tolerance. The residual divergence makes the fluid expand and contract: see its view." : "Largest divergence times the cell size, relative to the fastest velocity; bounded by the tolerance.";
         const books = session.ledgers.slice(Math.max(0, session.ledgers.length - 1200));
         energy.set([books.map((l) => l.time), books.map((l) => l.kinetic)]);
       }

@@ -29,7 +29,7 @@ export const page: Page = async (main) => {
       return own.length ? h("section", {}, h("h2", {}, ROW_TITLES[row] ?? row), h("ul", { class: "tiles" }, ...own.map(({ s, i }) => card(s, titleOf(texts[i]))))) : null;
     });
     list.replaceChildren(...sections.filter((s) => s !== null));
-    if (!list.childElementCount) list.append(h("p", { class: "muted" }, "No scene has these words."));
+    if (!list.childElementCount) list.append(h("p", { class: "muted" }, "No scene matches."));
   };
   const file = h("input", { type: "file", accept: ".toml,.json,.tumble,.ply,.obj,.stl,.glb", multiple: true, class: "visually-hidden", id: "file", onchange: () => void acceptFiles([...(file.files ?? [])]).catch((e) => say(String(e.message ?? e))) });
   main.append(
@@ -40,7 +40,7 @@ export const page: Page = async (main) => {
         "div",
         { class: "hero" },
         h("h1", {}, "Physics you can take apart"),
-        h("p", { class: "lead" }, "Cloth, particles, orbits, smoke and the numerical methods behind them. The whole engine runs in this tab: nothing is sent anywhere, and the same scene gives the same bits as on the command line."),
+        h("p", { class: "lead" }, "Cloth, particles, orbits, smoke and the numerical methods behind them. The whole engine runs in this tab: nothing is uploaded, and results are bit-identical to those of the command line."),
         h(
           "div",
           { class: "hero-actions" },

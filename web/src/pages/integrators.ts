@@ -22,7 +22,7 @@ interface System {
   /** Axes of the path or phase: position and velocity of the last mass. */
   phase(x: ArrayLike<number>, v: ArrayLike<number> | undefined): [number, number];
   axes: [string, string];
-  /** Where the last mass is, exactly. */
+  /** Exact position of the last mass. */
   exact?(t: number): [number, number, number];
   /** Added to the energy, so that it starts above zero [J]. */
   zero: number;
@@ -43,7 +43,7 @@ const W = 2 * Math.PI;
 
 const SYSTEMS: Record<string, System> = {
   spring: {
-    name: "Spring", about: "One mass on a spring, one swing a second, no damping. Its energy should stay what it is, its phase should be a circle.",
+    name: "Spring", about: "One mass on a spring, one oscillation per second, no damping. Its energy should be constant and its phase plot a circle.",
     field: false, omega: W, steps: [0.002, 0.5], end: 20, object: "spring", zero: 0, axes: ["extension [m]", "v/ω [m]"],
     // A spring without a rest length is linear however far it goes.
     toml: (s, h) => `${head("A mass on a spring", h, dynamics(s))}[world]\ngravity = [0, 0, 0]\n[[particles]]\nname = "spring"\nposition = [[0, 0, 0], [0.5, 0, 0]]\nmass = [1]\nradius = 0.08\npin = ["vertex 0"]\nspring = [{ between = [0, 1], stiffness = ${W * W}, rest_length = 0 }]\n[output]\ncolumns = ["position", "velocity"]\n`,
@@ -52,7 +52,7 @@ const SYSTEMS: Record<string, System> = {
     theory: { page: "oscillator", tags: ["oscillator.1", "oscillator.2"] },
   },
   rusty: {
-    name: "Rusty spring", about: "The same spring with internal damping: the swing dies, and with it the energy. A scheme should lose as much as the spring does, no more.",
+    name: "Rusty spring", about: "The same spring with internal damping: the oscillation and its energy decay. A scheme should lose exactly as much energy as the spring.",
     field: false, omega: W, steps: [0.002, 0.5], end: 12, object: "spring", zero: 0, axes: ["extension [m]", "v/ω [m]"],
     toml: (s, h) => `${head("A rusty spring", h, dynamics(s))}[world]\ngravity = [0, 0, 0]\n[[particles]]\nname = "spring"\nposition = [[0, 0, 0], [1.5, 0, 0]]\nmass = [1]\nradius = 0.08\npin = ["vertex 0"]\nspring = [{ between = [0, 1], stiffness = ${W * W}, rest_length = 1, damping = 0.6 }]\n[output]\ncolumns = ["position", "velocity"]\n`,
     phase: (x, v) => [x[3] - 1, (v?.[3] ?? 0) / W],
@@ -64,14 +64,14 @@ const SYSTEMS: Record<string, System> = {
     theory: { page: "oscillator", tags: ["oscillator.2", "oscillator.3"] },
   },
   pendulum: {
-    name: "Pendulum", about: "A mass on a stiff thread, let go from the side. The thread, not the swing, says how long a step may be.",
+    name: "Pendulum", about: "A mass on a stiff thread, released from the side. The thread, not the swing, limits the step.",
     field: false, omega: 30, steps: [0.001, 0.2], end: 20, object: "bob", zero: 9.8 * 1.1, axes: ["x [m]", "z [m]"],
     toml: (s, h) => `${head("A pendulum", h, dynamics(s))}[[particles]]\nname = "bob"\nposition = [[0, 0, 0], [1, 0, 0]]\nmass = [1]\nradius = 0.06\npin = ["vertex 0"]\nspring = [{ between = [0, 1], stiffness = 900, rest_length = 1 }]\n[output]\ncolumns = ["position", "velocity"]\n`,
     phase: (x) => [x[3], x[5]],
     theory: { page: "springs", tags: ["springs.1"] },
   },
   orbit: {
-    name: "Orbit", about: "A planet on an ellipse of eccentricity 0.5, once round in 2π seconds. Near the sun it needs short steps, far away it could take long ones.",
+    name: "Orbit", about: "A planet on an ellipse of eccentricity 0.5, with a period of 2π seconds. It needs short steps near the sun and could take long ones far away.",
     field: false, omega: 4, steps: [0.005, 0.5], end: 63, object: "planet", zero: 0, axes: ["x [m]", "y [m]"],
     toml: (s, h) => `${head("An orbit", h, dynamics(s))}[world]\ngravity = [0, 0, 0]\n[[particles]]\nname = "planet"\nposition = [[0.5, 0, 0]]\nvelocity = [[0, 1.7320508075688772, 0]]\nradius = 0.05\n[[force]]\nkind = "attraction"\ngm = 1\n[output]\ncolumns = ["position", "velocity"]\n`,
     phase: (x) => [x[0], x[1]],
@@ -83,7 +83,7 @@ const SYSTEMS: Record<string, System> = {
     theory: { page: "orbits", tags: ["orbits.1", "orbits.2"] },
   },
   swirl: {
-    name: "Swirl", about: "A particle in a flow that turns once in 2π seconds. Its path is a circle; forward Euler steps along the tangent, and ends outside.",
+    name: "Swirl", about: "A particle in a flow that rotates once in 2π seconds. Its path is a circle; forward Euler steps along the tangent and leaves it.",
     field: true, omega: 1, steps: [0.01, 2.5], end: 25, object: "walker", zero: 0, axes: ["x [m]", "y [m]"],
     toml: (s, h) => `${head("A swirl", h, tracers(s))}[[particles]]\nname = "walker"\nposition = [[1, 0, 0]]\nradius = 0.04\n[[field]]\nkind = "swirl"\nrate = 1\n[output]\ncolumns = ["position"]\n`,
     phase: (x) => [x[0], x[1]],
@@ -91,7 +91,7 @@ const SYSTEMS: Record<string, System> = {
     theory: { page: "integrators", tags: ["integrators.1"] },
   },
   sink: {
-    name: "Sink", about: "A particle in a flow that falls to the centre by exp(−t) and never passes it. A step longer than 1 jumps over it, one longer than 2 explodes.",
+    name: "Sink", about: "A particle in a flow towards the centre, which it approaches as exp(−t) and never passes. A step longer than 1 overshoots, one longer than 2 diverges.",
     field: true, omega: 1, steps: [0.05, 3], end: 16, object: "drop", zero: 0, axes: ["x [m]", "y [m]"],
     toml: (s, h) => `${head("A sink", h, tracers(s))}[[particles]]\nname = "drop"\nposition = [[0.8, 0.6, 0]]\nradius = 0.04\n[[field]]\nkind = "sink"\nrate = 1\n[output]\ncolumns = ["position"]\n`,
     phase: (x) => [x[0], x[1]],
@@ -99,7 +99,7 @@ const SYSTEMS: Record<string, System> = {
     theory: { page: "integrators", tags: ["integrators.1"] },
   },
   sheet: {
-    name: "Sheet", about: "A square of cloth, held at two corners. Of its many modes the stiffest says how long a step may be.",
+    name: "Sheet", about: "A square of cloth held at two corners. The stiffest of its many modes limits the step.",
     field: false, omega: 60, steps: [0.001, 0.1], end: 6, object: "sheet", zero: 0.2 * 9.8 * 0.5, axes: ["y [m]", "z [m]"],
     toml: (s, h) => `${head("A sheet", h, dynamics(s), "single")}[[sheet]]\nname = "sheet"\nsize = [1, 1]\nresolution = [11, 11]\ncenter = [0, 0, 0]\nlinks = { structural = 60, shear = 20, bend = 1 }\npin = ["corner 0 0", "corner 1 0"]\n[output]\ncolumns = ["position", "velocity"]\n`,
     phase: (x) => [x[x.length - 2], x[x.length - 1]],
@@ -176,17 +176,17 @@ export const page: Page = async (main) => {
   const play = iconButton("play", "Play", () => (playing ? pause() : start()), { class: "icon-button primary" });
   const curves = (): Curve[] => runs.map((r, k) => ({ label: plain(r.scheme), color: k, width: 2 }));
   const make = (label: string, log: boolean) => new Plot([], { label, x: "time [s]", log, height: 190 });
-  let energy = make("Energy over the first energy, against time", log);
-  const error = make("Distance from the exact solution, against time", true);
+  let energy = make("Energy relative to the initial energy against time", log);
+  const error = make("Distance from the exact solution against time", true);
   const energyTitle = h("h2", {}, "Energy");
   const energyBox = h("div", { class: "chart" }, h("div", { class: "chart-head" }, energyTitle, check("Logarithmic", log, (on) => {
     log = on;
     rescale();
   })), energy.element);
-  const phase = h("canvas", { class: "phase", role: "img", "aria-label": "Paths of all integrators, and the exact one" });
+  const phase = h("canvas", { class: "phase", role: "img", "aria-label": "Paths of all integrators and the exact path" });
   const phaseTitle = h("h2", {}, "Phase");
   const phaseBox = h("div", { class: "chart" }, h("div", { class: "chart-head" }, phaseTitle, h("span", { class: "muted axes" })), phase);
-  const errorBox = h("div", { class: "chart" }, h("div", { class: "chart-head" }, h("h2", {}, "Error"), h("span", { class: "muted axes" }, "from the exact one [m]")), error.element);
+  const errorBox = h("div", { class: "chart" }, h("div", { class: "chart-head" }, h("h2", {}, "Error"), h("span", { class: "muted axes" }, "distance from the exact solution [m]")), error.element);
   const stepOut = h("output", { id: "step" });
   const slider = h("input", { type: "range", min: 0, max: 1, step: 0.001, id: "h", "aria-label": "Step h", oninput: () => {
     const [low, high] = SYSTEMS[system].steps;
@@ -208,8 +208,8 @@ export const page: Page = async (main) => {
     if (schemes.length < 2) schemes = ["forward_euler", "rk4"];
     void restart();
   });
-  const boxes = h("fieldset", { class: "schemes" }, h("legend", {}, "Integrators, two to six"));
-  const lecture = h("ul", { class: "lecture", "aria-label": "Pictures of the lecture" }, ...LECTURE.map(([name, set], k) => h("li", {}, h("button", { type: "button", class: "button", "data-set": k, onclick: () => {
+  const boxes = h("fieldset", { class: "schemes" }, h("legend", {}, "Integrators (two to six)"));
+  const lecture = h("ul", { class: "lecture", "aria-label": "Presets from the lecture" }, ...LECTURE.map(([name, set], k) => h("li", {}, h("button", { type: "button", class: "button", "data-set": k, onclick: () => {
     ({ system, h: step } = set);
     schemes = [...set.schemes];
     which.querySelector("select")!.value = system;
@@ -240,7 +240,7 @@ export const page: Page = async (main) => {
       const box = check(plain(s), schemes.includes(s), (on) => {
         const next = on ? [...schemes, s] : schemes.filter((x) => x !== s);
         if (next.length < 2 || next.length > 6) {
-          note.textContent = "Two at least, six at most.";
+          note.textContent = "Select two to six.";
           (box.querySelector("input") as HTMLInputElement).checked = !on;
           return;
         }
@@ -268,12 +268,12 @@ export const page: Page = async (main) => {
     });
     marks.replaceChildren(...placed);
     const z = limits.length && system === "spring" ? `ω h = ${show(W * step, 3)}. ` : "";
-    limitText.textContent = z + (placed.length ? "The marks are the largest usable steps that the engine predicts from the stiffest mode: less than a thousandfold energy in a hundred periods." : "");
+    limitText.textContent = z + (placed.length ? "The marks are the largest usable steps, predicted from the stiffest mode: energy grows less than a thousandfold in a hundred periods." : "");
   };
 
   const judge = (scheme: string): string => {
     const limit = limitOf(scheme);
-    if (ADAPTIVE.has(scheme)) return "chooses its own steps";
+    if (ADAPTIVE.has(scheme)) return "adaptive";
     if (!limit) return SYSTEMS[system].field ? "" : "no prediction";
     if (limit.stable === null) return "stable for every step";
     if (step <= limit.stable * (1 + 1e-9)) return `stable below ${show(limit.stable, 3)} s`;
@@ -309,7 +309,7 @@ export const page: Page = async (main) => {
       const ratio = h("output", { class: "big", "data-ratio": scheme, "aria-live": "off" }, "1");
       const verdict = h("p", { class: "verdict" });
       const predicted = h("p", { class: "muted predicted" });
-      const card = h("article", { class: "run", "data-scheme": scheme, style: `--curve:${curveStyle(k)}` }, h("div", { class: "run-head" }, h("h2", {}, plain(scheme)), h("button", { type: "button", class: "as-scene", "aria-label": `Open ${plain(scheme)} as a scene`, title: "Open as a scene, with its text and values", onclick: () => void openScene(scheme) }, "↗")), canvas, h("div", { class: "run-figure" }, h("span", { class: "muted" }, s.field ? "r / r₀" : "E / E₀"), ratio), predicted, verdict);
+      const card = h("article", { class: "run", "data-scheme": scheme, style: `--curve:${curveStyle(k)}` }, h("div", { class: "run-head" }, h("h2", {}, plain(scheme)), h("button", { type: "button", class: "as-scene", "aria-label": `Open ${plain(scheme)} as a scene`, title: "Open as a scene, with text and values", onclick: () => void openScene(scheme) }, "↗")), canvas, h("div", { class: "run-figure" }, h("span", { class: "muted" }, s.field ? "r / r₀" : "E / E₀"), ratio), predicted, verdict);
       return { world: 10 + k, scheme, info: null, frame: null, n: 0, quantity: [], error: [], path: [], first: 0, dead: "", steps: 0, shortest: Infinity, canvas, ratio, verdict, predicted, card };
     });
     board.replaceChildren(...runs.map((r) => r.card));
@@ -333,7 +333,7 @@ export const page: Page = async (main) => {
       if (own !== age) return;
       if (!(e instanceof EngineError)) throw e;
       alert.hidden = false;
-      alert.replaceChildren(h("strong", {}, "This does not work."), h("pre", {}, e.failure.message));
+      alert.replaceChildren(h("strong", {}, "This failed."), h("pre", {}, e.failure.message));
       return;
     }
     if (own !== age) return;
@@ -347,7 +347,7 @@ export const page: Page = async (main) => {
   const rescale = () => {
     energy.close();
     energy.element.remove();
-    energy = make("Energy over the first energy, against time", log);
+    energy = make("Energy relative to the initial energy against time", log);
     energyBox.append(energy.element);
     energy.setCurves(curves());
     draw();
@@ -395,7 +395,7 @@ export const page: Page = async (main) => {
       const predict = system === "spring" ? PREDICTED[run.scheme] : undefined;
       const z = W * step;
       run.predicted.textContent = predict ? `formula: ${show(predict(z, run.n), 4)}` : "";
-      run.verdict.textContent = run.dead || (ADAPTIVE.has(run.scheme) && run.steps ? `chose ${run.steps} steps so far, the shortest ${show(run.shortest, 2)} s` : judge(run.scheme));
+      run.verdict.textContent = run.dead || (ADAPTIVE.has(run.scheme) && run.steps ? `${run.steps} steps so far, the shortest ${show(run.shortest, 2)} s` : judge(run.scheme));
       run.verdict.classList.toggle("bad", !!run.dead || /too long|no step/.test(run.verdict.textContent));
       sketch(run, curveColor(k));
     });
@@ -429,7 +429,7 @@ export const page: Page = async (main) => {
     return [context, w, hgt];
   };
 
-  /** What the masses do, small. */
+  /** Small picture of the masses. */
   const sketch = (run: Run, color: string) => {
     const s = SYSTEMS[system];
     const x = run.frame?.columns[s.object]?.position?.data;
@@ -578,7 +578,7 @@ export const page: Page = async (main) => {
         } catch (e) {
           if (own !== age) return;
           if (!(e instanceof EngineError)) throw e;
-          run.dead = `blew up in step ${run.n + 1}, at ${show((run.n + 1) * step, 3)} s: the engine stopped it at a thousandfold energy`;
+          run.dead = `blew up in step ${run.n + 1}, at ${show((run.n + 1) * step, 3)} s: the engine stops at a thousandfold energy`;
           run.card.dataset.dead = "true";
           if (e.failure.kind !== "step") run.dead = e.failure.message.split("\n")[0];
         }

@@ -33,29 +33,29 @@ export const page: Page = async (main, rest) => {
     start = await source(rest);
   } catch (error) {
     document.title = "tumble";
-    main.append(h("div", { class: "narrow" }, h("h1", {}, "This cannot be opened"), h("p", {}, String((error as Error).message ?? error)), h("p", {}, h("a", { href: "#/" }, "To the gallery"))));
+    main.append(h("div", { class: "narrow" }, h("h1", {}, "The scene cannot be opened"), h("p", {}, String((error as Error).message ?? error)), h("p", {}, h("a", { href: "#/" }, "To the gallery"))));
     return () => {};
   }
 
   // Left before its text came.
   if (!main.isConnected) return () => {};
 
-  const viewer = new Viewer(main, "Picture of the scene. Space plays, comma and point go by frames, semicolon by sub-steps, arrows turn the view, plus and minus zoom, 0 brings the view back.", true, (failure) => {
+  const viewer = new Viewer(main, "Picture of the scene. Space plays and pauses, comma and period step by frames, semicolon by sub-steps, arrows rotate the view, plus and minus zoom, 0 resets the view.", true, (failure) => {
     if (failure.kind !== "step") return null;
-    const button: HTMLButtonElement = h("button", { type: "button", class: "button", onclick: () => void cures(button) }, "Look for a cure");
+    const button: HTMLButtonElement = h("button", { type: "button", class: "button", onclick: () => void cures(button) }, "Search for a cure");
     return button;
   });
   const { session, stage, canvas, alert } = viewer;
   session.each = session.compares = true;
   const sceneId = h("p", { class: "scene-id" }, start.id ?? start.name);
   const title = h("h1", {}, titleOf(start.text) || start.name);
-  const lookBar = h("div", { class: "look", role: "group", "aria-label": "What is shown" });
+  const lookBar = h("div", { class: "look", role: "group", "aria-label": "Display options" });
   const energyCurves: Curve[] = [
     { label: "kinetic", color: 1 },
     { label: "elastic", color: 2 },
     { label: "external", color: 3 },
     { label: "total", color: 0, width: 2.25 },
-    { label: "total, old way", color: 0, dash: [4, 4], width: 1.25 },
+    { label: "total, previous branch", color: 0, dash: [4, 4], width: 1.25 },
   ];
   const energy = new Plot(energyCurves, { label: "Energies against time", x: "time [s]", height: 140, mark: () => session.shown?.time ?? null });
   const energyKey = legend(energyCurves);
@@ -106,16 +106,16 @@ export const page: Page = async (main, rest) => {
           "div",
           { class: "lab-head" },
           h("div", {}, title, sceneId),
-          h("div", { class: "actions" }, shareButton, ...saved.buttons, iconButton("frame", "View of the scene's camera", () => stage.goHome())),
+          h("div", { class: "actions" }, shareButton, ...saved.buttons, iconButton("frame", "Reset to the scene's camera", () => stage.goHome())),
         ),
         alert,
-        others.length > 1 ? h("nav", { class: "others", "aria-label": "Scenes like this one" }, ...others.map((s) => h("a", { href: `#/scene/${s.id}`, "aria-current": s.id === start.id ? "page" : false }, s.name.replace(/[_-]/g, " ")))) : null,
+        others.length > 1 ? h("nav", { class: "others", "aria-label": "Similar scenes" }, ...others.map((s) => h("a", { href: `#/scene/${s.id}`, "aria-current": s.id === start.id ? "page" : false }, s.name.replace(/[_-]/g, " ")))) : null,
         viewer.box,
         transport(session),
         lookBar,
         comparison.bar,
         h("div", { class: "books" }, h("div", { class: "energy" }, h("h2", {}, "Energy", h("span", { class: "unit" }, "J")), energyKey.element, energy.element), comparison.chart),
-        h("p", { class: "hash-line" }, "State hash ", hashBox, h("span", { class: "muted" }, " the same on every machine, in a tab and on the command line")),
+        h("p", { class: "hash-line" }, "State hash ", hashBox, h("span", { class: "muted" }, " identical on every machine, in a tab and on the command line")),
       ),
       h("aside", { class: "side", "aria-label": "The scene" }, h("div", { class: "tabs", role: "tablist", "aria-label": "The scene" }, ...buttons), ...tabs.map((t) => t[2])),
     ),
@@ -125,7 +125,7 @@ export const page: Page = async (main, rest) => {
 
   // The picture follows the world.
   let hashWait = 0;
-  /** What a shared scene is, as long as nobody has changed it. */
+  /** A shared scene, until it is changed. */
   let recipe = "";
   const origin = rest.startsWith("s/") ? "link" : "file";
   const tellHash = () => {
@@ -207,7 +207,7 @@ export const page: Page = async (main, rest) => {
                 session.play();
               });
             };
-            return h("li", {}, h("code", {}, c.set), c.survived ? h("button", { type: "button", class: "button", onclick: act }, "Take it, from the start") : " does not help");
+            return h("li", {}, h("code", {}, c.set), c.survived ? h("button", { type: "button", class: "button", onclick: act }, "Apply and restart") : " does not help");
           }),
         ),
       );
@@ -223,13 +223,13 @@ export const page: Page = async (main, rest) => {
       if (STARTS.test(path)) {
         await session.load(session.toml, [...session.overrides, [path, value]]);
         alert.hidden = true;
-        panel?.say(`${what}: says how the scene starts, so it starts anew.`);
+        panel?.say(`${what}: affects the initial state, so the scene restarts.`);
         if (editor) syncText();
         return;
       }
       const live = await session.set(path, value);
       alert.hidden = true;
-      panel?.say(live ? `${what}: goes on from frame ${session.latest}; the way before is kept beside it.` : `${what}: sizes have changed, so the scene starts anew.`);
+      panel?.say(live ? `${what}: continues from frame ${session.latest}; the previous branch is kept for comparison.` : `${what}: sizes have changed, so the scene restarts.`);
       if (editor) syncText();
     } catch (error) {
       if (error instanceof EngineError) {
@@ -251,7 +251,7 @@ export const page: Page = async (main, rest) => {
   const changedNote = h("p", { class: "note" });
   const syncText = () => {
     const list = [...session.overrides].map(([p, v]) => `${p} = ${literal(v)}`);
-    changedNote.textContent = list.length ? `Changed by the panel, beside the text: ${list.join("; ")}` : "";
+    changedNote.textContent = list.length ? `Changed in the panel, in addition to the text: ${list.join("; ")}` : "";
   };
   textTab.append(h("div", { class: "text-head" }, run, h("span", { class: "muted" }, "Ctrl + Enter")), editorBox, issuesBox, changedNote);
   const openEditor = () =>
@@ -291,21 +291,21 @@ export const page: Page = async (main, rest) => {
     const info = session.info;
     if (!info || factsTab.hidden) return;
     const rows: [string, string][] = [
-      ["Frames", `${info.frames} at ${show(info.fps)} a second`],
+      ["Frames", `${info.frames} at ${show(info.fps)} per second`],
       ["Precision", info.precision],
       ["Objects", info.objects.map((o) => `${o.name} (${o.kind})`).join(", ")],
       ["Systems", info.systems.map((s) => `${s.name}: ${s.method}${s.integrator ? `, ${s.integrator}` : ""}`).join("; ")],
-      ["Memory, at most", `${show(info.memory / 2 ** 20, 3)} MiB`],
+      ["Memory limit", `${show(info.memory / 2 ** 20, 3)} MiB`],
     ];
     const report = session.report;
-    if (report) rows.push(["Last answer", `${report.steps} steps, ${report.newton} Newton and ${report.linear} linear iterations`]);
+    if (report) rows.push(["Last frame", `${report.steps} steps, ${report.newton} Newton and ${report.linear} linear iterations`]);
     const body: HTMLElement[] = rows.flatMap(([k, v]) => [h("dt", {}, k), h("dd", {}, v)]);
-    if (info.warnings.length) body.push(h("dt", {}, "Doubtful"), h("dd", {}, info.warnings.map((w) => `${w.path ? `${w.path}: ` : ""}${w.message} [${w.code}]`).join("\n")));
+    if (info.warnings.length) body.push(h("dt", {}, "Warnings"), h("dd", {}, info.warnings.map((w) => `${w.path ? `${w.path}: ` : ""}${w.message} [${w.code}]`).join("\n")));
     facts.replaceChildren(...body);
     const list = await session.stability().catch(() => []);
     const found = new Set(list.map((s) => s.system));
     for (const s of info.systems) {
-      if (s.method === "dynamics" && !found.has(s.name)) facts.append(h("dt", {}, `Largest steps of "${s.name}"`), h("dd", {}, "take too long to find here; `tumble check` finds them"));
+      if (s.method === "dynamics" && !found.has(s.name)) facts.append(h("dt", {}, `Largest steps of "${s.name}"`), h("dd", {}, "take too long to compute here; use `tumble check`"));
     }
     const stable = list.filter((s) => s.limits.length);
     for (const s of stable) {
@@ -321,7 +321,7 @@ export const page: Page = async (main, rest) => {
     }
   };
 
-  // What is shown.
+  // Display options.
   const drawLook = (info: SceneInfo) => {
     const look = stage.look;
     const grids = gridsOf(info);
@@ -358,11 +358,11 @@ export const page: Page = async (main, rest) => {
           again();
         }));
       } else {
-        const at = h("input", { type: "range", min: 0, max: 1, step: 0.005, value: look.sliceAt, "aria-label": "Place of the slice", hidden: look.slice === null, oninput: () => {
+        const at = h("input", { type: "range", min: 0, max: 1, step: 0.005, value: look.sliceAt, "aria-label": "Position of the slice", hidden: look.slice === null, oninput: () => {
           look.sliceAt = Number(at.value);
           comparison.again();
         } });
-        parts.push(choice("See", [["", "smoke"], ["0", "slice across x"], ["1", "slice across y"], ["2", "slice across z"]], look.slice === null ? "" : String(look.slice), (v) => {
+        parts.push(choice("See", [["", "smoke"], ["0", "slice normal to x"], ["1", "slice normal to y"], ["2", "slice normal to z"]], look.slice === null ? "" : String(look.slice), (v) => {
           look.slice = v === "" ? null : Number(v);
           at.hidden = look.slice === null;
           again();
@@ -371,13 +371,13 @@ export const page: Page = async (main, rest) => {
     }
     if (masses) {
       const linked = Object.values(info.topology).some((t) => t.links?.data.length);
-      parts.push(choice("Colour", [["object", "of the object"], ["speed", "speed"], ...(linked ? [["strain", "strain of links"] as [string, string]] : [])], look.color, (v) => {
+      parts.push(choice("Colour", [["object", "object"], ["speed", "speed"], ...(linked ? [["strain", "strain of links"] as [string, string]] : [])], look.color, (v) => {
         look.color = v as typeof look.color;
         again();
       }));
       if (linked) {
         const there = new Set(info.objects.flatMap((o) => [...(familiesOf(info, o) ?? [])]));
-        const families = h("span", { class: "sights", role: "group", "aria-label": "Families of links that are drawn", hidden: !look.links }, ...(there.size > 1 ? FAMILIES.filter((_, i) => there.has(i)) : []).map((f) => check(f, !look.unseen.includes(f), (on) => {
+        const families = h("span", { class: "sights", role: "group", "aria-label": "Families of links shown", hidden: !look.links }, ...(there.size > 1 ? FAMILIES.filter((_, i) => there.has(i)) : []).map((f) => check(f, !look.unseen.includes(f), (on) => {
           look.unseen = on ? look.unseen.filter((u) => u !== f) : [...look.unseen, f];
           again();
         })));
@@ -397,7 +397,7 @@ export const page: Page = async (main, rest) => {
 
   const offPointers = pointers(canvas, stage, session);
 
-  // What leaves the page.
+  // Sharing and saving.
   const share = async () => {
     const { version } = engine();
     const made = await toShare(session, version).catch((error) => ({ failed: String(error.message ?? error) }));
@@ -405,16 +405,16 @@ export const page: Page = async (main, rest) => {
     const pulled = session.history.some((c) => !c.path) ? " What the pointer did is not in it: it begins at the first frame." : "";
     if ("file" in made) {
       saveAs(made.file, `${start.name}.tumble`);
-      return say(`${made.reason}: it was saved as a file, which opens when it is dropped on this page.${pulled}`);
+      return say(`${made.reason}: it was saved as a file; drop it on this page to open it.${pulled}`);
     }
     const address = addressOf(version, made.link);
     main.dataset.link = address;
     try {
       await navigator.clipboard.writeText(address);
-      say(`The link is copied. It holds the scene with all of its values, its seed and the version.${pulled}`);
+      say(`Link copied. It contains the scene with all values, its seed and the version.${pulled}`);
     } catch {
       history.replaceState(null, "", address);
-      say(`The address of this page now holds the scene.${pulled}`);
+      say(`The address of this page now contains the scene.${pulled}`);
     }
   };
   const theme = () => comparison.theme();
@@ -436,7 +436,7 @@ export const page: Page = async (main, rest) => {
         const here = engine().version;
         sceneId.textContent = [`from a ${origin} of tumble ${version}`, version === here ? "" : `opened with ${here}: bits may differ`, told].filter(Boolean).join("; ");
       }
-      // Where somebody shared a moment, one stands at it, with its hash.
+      // A shared moment opens at its frame, with its hash.
       if (start.shared?.hash) tellHash();
       else if (!reducedMotion()) session.play();
     })

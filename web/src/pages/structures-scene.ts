@@ -46,26 +46,26 @@ const THICK = 0.3;
 const ROUND = 0.22;
 const RAD = Math.PI / 180;
 const PUSH = 0.55;
-/** What is thin bends at a touch: the springs are softer by this. */
+/** Thin structures bend easily: softening factor of the springs. */
 export const SOFT = 30;
 const SHEAR = 28 * RAD;
 
 export const BUILDS: Record<Kind, Build> = {
   rope: {
-    name: "Rope", about: "A chain of masses. Its structural links resist stretching and nothing else; bend links, from each mass to the next but one, keep it from folding.",
+    name: "Rope", about: "A chain of masses. Its structural links resist only stretching; bend links, which skip one mass, keep it from folding.",
     families: ["structural", "bend"], modulus: { structural: 60, shear: 0, bend: 20 }, unit: "N", fineness: [6, 16, 60], pieces: "Segments", hand: 40, deeds: ["bend", "stretch"], bend: 0, twist: 0,
   },
   sheet: {
-    name: "Sheet", about: "A grid of masses. Without shear links each of its squares is a hinged parallelogram; without bend links it folds wherever it likes.",
-    families: ["structural", "shear", "bend"], modulus: { structural: 500, shear: 300, bend: 100 }, unit: "N/m", fineness: [6, 14, 36], pieces: "Squares along it", hand: 120, deeds: ["shear", "bend", "twist", "stretch"], bend: 0, twist: 110 * RAD,
+    name: "Sheet", about: "A grid of masses. Without shear links each square is a hinged parallelogram; without bend links it folds freely.",
+    families: ["structural", "shear", "bend"], modulus: { structural: 500, shear: 300, bend: 100 }, unit: "N/m", fineness: [6, 14, 36], pieces: "Squares along its length", hand: 120, deeds: ["shear", "bend", "twist", "stretch"], bend: 0, twist: 110 * RAD,
   },
   block: {
-    name: "Block", about: "A box of masses with the three families along and across its three axes. Its structural links alone carry no shear: it is the diagonals that make it a solid.",
-    families: ["structural", "shear", "bend"], modulus: { structural: 3000, shear: 4000, bend: 1000 }, unit: "Pa", fineness: [6, 9, 16], pieces: "Cubes along it", hand: 200, deeds: ["shear", "bend", "twist", "stretch"], bend: 70 * RAD, twist: 90 * RAD,
+    name: "Block", about: "A box of masses with the three families along and across its three axes. Structural links alone carry no shear: the diagonals make it a solid.",
+    families: ["structural", "shear", "bend"], modulus: { structural: 3000, shear: 4000, bend: 1000 }, unit: "Pa", fineness: [6, 9, 16], pieces: "Cubes along its length", hand: 200, deeds: ["shear", "bend", "twist", "stretch"], bend: 70 * RAD, twist: 90 * RAD,
   },
   net: {
-    name: "Net", about: "A tube of triangles with a link along each edge. A triangle has no other shape, so it resists shear without a family for that; bend links cross each edge and keep it round.",
-    families: ["structural", "bend"], modulus: { structural: 300, shear: 0, bend: 100 }, unit: "N/m", fineness: [7, 12, 24], pieces: "Triangles round it", hand: 150, deeds: ["shear", "bend", "twist", "stretch"], bend: 70 * RAD, twist: 90 * RAD,
+    name: "Net", about: "A tube of triangles with a link along each edge. A triangle is rigid, so it resists shear without shear links; bend links cross each edge and keep the tube round.",
+    families: ["structural", "bend"], modulus: { structural: 300, shear: 0, bend: 100 }, unit: "N/m", fineness: [7, 12, 24], pieces: "Triangles around it", hand: 150, deeds: ["shear", "bend", "twist", "stretch"], bend: 70 * RAD, twist: 90 * RAD,
   },
 };
 
@@ -77,7 +77,7 @@ export const start = (kind: Kind): Choices => {
 type Point = [number, number, number];
 
 interface Plan {
-  /** Where its masses start, x fastest, as the recipes of the engine order them. */
+  /** Initial positions of its masses, x fastest, as the recipes of the engine order them. */
   points: Point[];
   /** Two rows of masses at either end: one would be a hinge. */
   pinned: number[];
@@ -122,7 +122,7 @@ function tube(n: number): Plan {
   return { points, triangles, resolution: [n, rings], pinned: all.filter((i) => i < 2 * n), held: all.filter((i) => i >= (rings - 2) * n) };
 }
 
-/** Where a point of the end goes. */
+/** Target of a point of the end. */
 function moved([x, y, z]: Point, deed: Deed, { bend, twist }: Build): Point {
   const half = 0.5 * LENGTH;
   if (deed === "stretch") return [x + 0.3 * LENGTH, y, z];
@@ -201,7 +201,7 @@ ${shape}
 links = ${literal(links(c))}
 pin = [${pins}]
 
-# Where the hand takes the masses that it holds: ${b.deeds.map((d) => `${held.length} to ${d}`).join(", ")}.
+# Targets of the masses held by the hand: ${b.deeds.map((d) => `${held.length} to ${d}`).join(", ")}.
 [[particles]]
 name = "places"
 position = [

@@ -18,14 +18,14 @@ const capital = (text: string) => text.charAt(0).toUpperCase() + text.slice(1);
 export const page: Page = async (main) => {
   document.title = "Structures · tumble";
   let c: Choices = start("sheet");
-  const viewer = new Viewer(main, "The structure. Drag a mass to pull it; space plays, arrows turn the view, plus and minus zoom, 0 brings the view back.");
+  const viewer = new Viewer(main, "The structure. Drag a mass to pull it; space plays and pauses, arrows rotate the view, plus and minus zoom, 0 resets the view.");
   const { session, stage, canvas } = viewer;
   session.endless = true;
   Object.assign(stage.look, { links: true, color: "strain", hidden: ["places"] });
   session.wanted = () => [...new Set([...stage.wanted, "link_strain"])];
   const about = h("p", { class: "doc", id: "about" });
   const plot = new Plot([{ label: "energy of the links", color: 0, width: 2 }], { label: "Elastic energy of the links against time", x: "time [s]", height: 130 });
-  const figures = { strain: figure("Largest strain", "strain"), energy: figure("Energy of the links", "energy"), way: figure("The end gave way", "way"), pull: figure("The hand pulls", "pull") };
+  const figures = { strain: figure("Largest strain", "strain"), energy: figure("Energy of the links", "energy"), way: figure("Displacement of the end", "way"), pull: figure("Force of the hand", "pull") };
 
   const rebuild = () => {
     if (c.kind === "net") dropped[MESH] = mesh(c);
@@ -52,11 +52,11 @@ export const page: Page = async (main) => {
     void viewer.attempt(rebuild);
   });
   which.querySelector("select")!.id = "structure";
-  const deeds = h("div", { class: "deeds", role: "group", "aria-label": "What the hand does" });
+  const deeds = h("div", { class: "deeds", role: "group", "aria-label": "Motion of the hand" });
   const build = h("section", { class: "card" });
   const families = h("section", { class: "card" });
   const hand = h("section", { class: "card" });
-  const sights = h("div", { class: "sights", role: "group", "aria-label": "Families of links that are drawn" });
+  const sights = h("div", { class: "sights", role: "group", "aria-label": "Families of links shown" });
   const strainBox = check("Colour by strain", true, (on) => {
     stage.look.color = on ? "strain" : "object";
     again();
@@ -109,7 +109,7 @@ export const page: Page = async (main) => {
     hand.replaceChildren(h("h2", {}, "Hand"), factor("Springs of the hand", "N/m", b.hand, c.hand, (v) => {
       c.hand = v;
       void hold();
-    }), h("p", { class: "doc" }, "Springs pull the masses of one end to where the hand wants them; the other end is pinned. What is left of the way is what the structure resists.", b.bend ? "" : ` To bend what is so thin, 1/${SOFT} of them are enough.`));
+    }), h("p", { class: "doc" }, "Springs pull the masses of one end to the hand's target; the other end is pinned. The remaining distance shows the resistance of the structure.", b.bend ? "" : ` To bend such a thin structure, 1/${SOFT} of their stiffness is enough.`));
     sights.replaceChildren(...b.families.map((family) => check(`Show ${family}`, !stage.look.unseen.includes(family), (on) => {
       stage.look.unseen = on ? stage.look.unseen.filter((f) => f !== family) : [...stage.look.unseen, family];
       again();
@@ -121,8 +121,8 @@ export const page: Page = async (main) => {
     h("div", { class: "lab" },
       h("section", { class: "view", "aria-label": "Structure" },
         h("div", { class: "lab-head" },
-          h("div", {}, h("h1", {}, "Structures in the hand"), h("p", { class: "muted" }, "Take a family of links away, and see what it was for.")),
-          h("div", { class: "actions" }, pictureButton(stage, () => c.kind), iconButton("frame", "View from the start", () => stage.goHome()), asSceneButton(() => asScene(scene(c), 600)))),
+          h("div", {}, h("h1", {}, "Structures in the hand"), h("p", { class: "muted" }, "Remove a family of links to see its effect.")),
+          h("div", { class: "actions" }, pictureButton(stage, () => c.kind), iconButton("frame", "Reset the view", () => stage.goHome()), asSceneButton(() => asScene(scene(c), 600)))),
         viewer.alert, viewer.box, deeds, transport(session),
         h("div", { class: "figures in-line" }, figures.way.row, figures.pull.row, figures.energy.row, figures.strain.row),
         h("div", { class: "energy" }, h("h2", {}, "Energy of the links", h("span", { class: "unit" }, "J")), plot.element),

@@ -24,7 +24,7 @@ export const page: Page = async (main, rest) => {
   }
   const text = theoryNames.includes(name) ? await theoryText(name) : null;
   if (!text) {
-    main.append(h("div", { class: "narrow" }, h("h1", {}, "There is no such page"), h("p", {}, h("a", { href: "#/theory" }, "All pages of theory"))));
+    main.append(h("div", { class: "narrow" }, h("h1", {}, "Page not found"), h("p", {}, h("a", { href: "#/theory" }, "All pages of theory"))));
     return () => {};
   }
   document.title = `${heading(text)} · tumble`;

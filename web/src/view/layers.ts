@@ -248,7 +248,7 @@ export class Surface implements Layer {
   }
 }
 
-/** Where a grid lies. */
+/** Position of a grid. */
 export interface Grid {
   cells: [number, number, number];
   spacing: number;

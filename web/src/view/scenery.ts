@@ -1,4 +1,4 @@
-/** What stands in a scene, in the terms of pictures. */
+/** Scenery of a scene, as drawables. */
 import * as THREE from "three";
 import type { Column, Numbers, SceneInfo, Vector } from "../engine/protocol";
 import { table } from "./colors";
@@ -12,7 +12,7 @@ const GRIDS = ["gas", "heat", "compressible"];
 export const gridsOf = (info: SceneInfo): SceneInfo["objects"] => info.objects.filter((o) => GRIDS.includes(o.kind));
 export const massesOf = (info: SceneInfo): SceneInfo["objects"] => info.objects.filter((o) => ![...GRIDS, "collider"].includes(o.kind));
 
-/** What is shown of a grid where nobody says: the first of these that there is, and that is not the same everywhere. */
+/** Default column of a grid: the first existing one of these that is not uniform. */
 const SHOWN = ["density", "fuel", "temperature", "vorticity", "speed", "pressure", "divergence"];
 
 /** The column of a grid that is shown where `chosen` is asked for; a difference before all. */

@@ -12,7 +12,7 @@ export interface Legend {
   high: number;
 }
 
-/** What is coloured. */
+/** Coloured column. */
 export interface Shaded {
   name: string;
   kind: string;

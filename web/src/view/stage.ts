@@ -414,7 +414,7 @@ export class Stage {
     const aspect = w / hgt;
     if (this.camera instanceof THREE.OrthographicCamera) {
       const half = 0.5 * Math.max(this.home.width, 1e-9);
-      // What is as wide as the box may be taller than the window.
+      // An element as wide as the box may be taller than the window.
       const box = this.bounds().getSize(new THREE.Vector3());
       const tall = this.info?.plane === "xy" ? box.y : box.z;
       const grids = this.things.some((t) => t.grid);
@@ -698,7 +698,7 @@ export class Stage {
     return new Promise((resolve, reject) => flat.toBlob((b) => (b ? resolve(b) : reject(new Error("no picture"))), type, quality));
   }
 
-  /** What was just drawn, on its background, which is no part of the canvas itself. */
+  /** The current picture on its background, which is not part of the canvas. */
   copy(flat: HTMLCanvasElement): void {
     const context = flat.getContext("2d")!;
     const [top, bottom] = this.background;
@@ -710,7 +710,7 @@ export class Stage {
     context.drawImage(this.canvas, 0, 0, flat.width, flat.height);
   }
 
-  /** What is drawn as triangles. */
+  /** Objects drawn as triangles. */
   get surfaces(): { name: string; mesh: THREE.Mesh }[] {
     return this.things.flatMap((t) => (t.body instanceof Surface ? [{ name: t.name, mesh: t.body.object }] : []));
   }

@@ -1,4 +1,4 @@
-/** Where particles have been. */
+/** Trails of particles. */
 import type { Frame } from "../engine/protocol";
 import type { Pieces, Rgb } from "./layers";
 import { matched } from "./scenery";

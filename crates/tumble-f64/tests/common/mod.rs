@@ -1,4 +1,4 @@
-//! What the verification tests share: scenes from text, columns as vectors, observed orders.
+//! Helpers of the verification tests: scenes from text, columns as vectors, observed orders.
 
 #![allow(dead_code)] // every test is a crate of its own and uses a part of this
 

@@ -7,7 +7,7 @@ use serde::{Deserialize, Serialize};
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(untagged)]
 pub enum Animated {
-    /// The same at all times.
+    /// A constant.
     Value(f64),
     /// A formula.
     Formula(#[schemars(extend("x-meaning" = "a formula"))] String),
@@ -31,48 +31,48 @@ pub enum AnimatedVector {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(untagged)]
 pub enum Component {
-    /// The same at all times.
+    /// A constant.
     Value(f64),
     /// A formula.
     Formula(#[schemars(extend("x-meaning" = "a formula"))] String),
 }
 
-/// Values at some times; the first holds before them, the last after them.
+/// Values at given times; constant before the first and after the last.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 #[schemars(extend("x-meaning" = "keyframes"))]
 pub struct Keys {
-    /// Pairs of a time and the value there; times ascend.
+    /// Pairs of time and value; times must increase.
     #[schemars(length(min = 1), extend("x-unit" = "s, then the unit of the value"))]
     pub keys: Vec<[f64; 2]>,
-    /// What lies between them.
+    /// Interpolation between the keys.
     #[serde(default)]
     pub interpolation: Interpolation,
 }
 
-/// Vectors at some times; the first holds before them, the last after them.
+/// Vectors at given times; constant before the first and after the last.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 #[schemars(extend("x-meaning" = "keyframes"))]
 pub struct VectorKeys {
-    /// A time, then the three components there; times ascend.
+    /// Time, then three components; times must increase.
     #[schemars(length(min = 1), extend("x-unit" = "s, then the unit of the value"))]
     pub keys: Vec<[f64; 4]>,
-    /// What lies between them.
+    /// Interpolation between the keys.
     #[serde(default)]
     pub interpolation: Interpolation,
 }
 
-/// What lies between keyframes.
+/// Interpolation between keyframes.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Interpolation {
-    /// Straight lines.
+    /// Piecewise linear.
     #[default]
     Linear,
-    /// Cubics that meet with the same slope and never overshoot a key.
+    /// Piecewise cubic with continuous slope, without overshoot.
     Smooth,
-    /// The value of the last key.
+    /// The value of the previous key.
     Step,
 }
 

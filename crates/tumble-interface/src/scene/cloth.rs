@@ -1,4 +1,4 @@
-//! Cloth that is cut from flat panels and sewn.
+//! Cloth cut from flat panels and sewn.
 
 use super::fabrics::FabricWords;
 use super::structures::{Link, LinkSettings, Links, Pin};
@@ -6,98 +6,98 @@ use super::surfaces::{Membrane, Tear};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-/// Cloth: flat panels, cut into triangles, hung where they are told to and sewn together. At rest it is as flat as the panels were.
+/// Cloth: flat panels, triangulated, placed and sewn together. Its rest shape is flat, like the panels.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Cloth {
     /// Name in frames.
     pub name: String,
-    /// System that moves it; without it, the first that can.
+    /// System that moves it. Default: the first that can.
     #[serde(default)]
     pub system: Option<String>,
     /// The panels.
     #[serde(default)]
     pub panels: Vec<Panel>,
-    /// Which sides of panels are sewn together.
+    /// Seams: pairs of panel sides.
     #[serde(default)]
     pub seams: Vec<Seam>,
-    /// The panels and seams of a dress, instead.
+    /// The panels and seams of a dress, instead of `panels` and `seams`.
     #[serde(default)]
     pub dress: Option<Dress>,
-    /// Length of the edges of triangles.
+    /// Edge length of the triangles.
     #[serde(default = "resolution")]
     #[schemars(extend("x-unit" = "m", "exclusiveMinimum" = 0.0))]
     pub resolution: f64,
-    /// Mass per area. Without it, that of the fabric, or 0.2.
+    /// Mass per area. Default: that of the fabric, or 0.2.
     #[serde(default)]
     #[schemars(extend("x-unit" = "kg/m²", "exclusiveMinimum" = 0.0))]
     pub density: Option<f64>,
-    /// Spring families, modulus in N/m: `structural` along edges, `bend` across them. Without it, structural 500 with damping 0.5.
+    /// Spring families, modulus in N/m: `structural` along edges, `bend` across them. Default: structural 500 with damping 0.5.
     #[serde(default)]
     pub links: Option<Links>,
-    /// Dihedral bending stiffness between neighbouring triangles. Without it 1e-5, beside a fabric 0.
+    /// Dihedral bending stiffness between neighbouring triangles. Default: 1e-5, or 0 with a fabric.
     #[serde(default)]
     #[schemars(range(min = 0.0), extend("x-unit" = "N m"))]
     pub hinge: Option<f64>,
-    /// The same beside it, quadratic in the positions and flat at rest, whatever the shape of the mesh: cheaper than a hinge, and equal to it where
-    /// nothing is stretched.
+    /// Additional bending stiffness, quadratic in the positions and flat at rest for any mesh: cheaper than a hinge, and equal to it for inextensible
+    /// surfaces.
     #[serde(default)]
     #[schemars(range(min = 0.0), extend("x-unit" = "N m"))]
     pub isometric: f64,
-    /// Resistance against stretch as of a woven membrane; links are then left out unless they are given.
+    /// Stretch resistance of a woven membrane; it replaces the default links.
     #[serde(default)]
     pub membrane: Option<Membrane>,
-    /// Measured fabric, by the name of a shipped one or the path of its record: stretch, bending and, unless given, density. Links are then left
-    /// out unless they are given.
+    /// Measured fabric, the name of a bundled one or the path of its record: stretch, bending and, by default, density. It replaces the default
+    /// links.
     #[serde(default)]
     pub fabric: Option<FabricWords>,
-    /// How it tears; without it, it does not.
+    /// Tearing. Default: none.
     #[serde(default)]
     pub tear: Option<Tear>,
-    /// Stiffness of each triangle against changes of its area: tension over relative change.
+    /// Area stiffness of each triangle: tension per relative change of area.
     #[serde(default)]
     #[schemars(range(min = 0.0), extend("x-unit" = "N/m"))]
     pub area: f64,
-    /// Stiffness of seams, springs without length: force per length of a seam over the gap in it.
+    /// Stiffness of seams, springs of zero length: force per seam length per gap.
     #[serde(default = "thread")]
     #[schemars(extend("x-unit" = "N/m²", "exclusiveMinimum" = 0.0))]
     pub thread: f64,
-    /// Masses that stay where they are, or follow a collider.
+    /// Masses that are fixed, or follow a collider.
     #[serde(default)]
     pub pin: Vec<Pin>,
-    /// Red, green and blue in pictures, 0 to 1, in linear light (a half is sRGB's 188 of 255).
+    /// Red, green and blue in pictures, 0 to 1, in linear light (0.5 is 188 of 255 in sRGB).
     #[serde(default)]
     #[schemars(inner(range(min = 0.0, max = 1.0)))]
     pub color: Option<[f64; 3]>,
 }
 
-/// A flat piece of cloth, and where it hangs at the start.
+/// A flat piece of cloth and its initial placement.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Panel {
-    /// Name for seams.
+    /// Name, used by seams.
     pub name: String,
-    /// Its corners in its own plane, in order around it. Side 0 goes from corner 0 to corner 1.
+    /// Corners in the plane of the panel, in order. Side 0 runs from corner 0 to corner 1.
     #[schemars(length(min = 3), extend("x-unit" = "m"))]
     pub outline: Vec<[f64; 2]>,
-    /// Where its origin is.
+    /// Position of its origin.
     #[serde(default)]
     #[schemars(extend("x-unit" = "m"))]
     pub origin: [f64; 3],
     /// Direction of its first axis.
     #[serde(default = "right")]
     pub right: [f64; 3],
-    /// Direction of its second axis, as far as that is across the first.
+    /// Direction of its second axis, orthogonalized against the first.
     #[serde(default = "up")]
     pub up: [f64; 3],
-    /// Radius of the cylinder, along `up`, that it is laid around at the start: it touches it at the origin, from the side where
-    /// `right` points to the right. Without it, the panel starts flat.
+    /// Radius of a cylinder along `up` around which the panel is wrapped at the start; it touches the cylinder at its origin, on the side where
+    /// `right` points to the right. Default: the panel starts flat.
     #[serde(default)]
     #[schemars(extend("x-unit" = "m", "exclusiveMinimum" = 0.0))]
     pub around: Option<f64>,
 }
 
-/// Two sides of panels that are sewn together. They must be of one length, to a fiftieth.
+/// Two panel sides that are sewn together. Their lengths must agree to a fiftieth.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Seam {
@@ -105,7 +105,7 @@ pub struct Seam {
     pub from: Side,
     /// The other.
     pub to: Side,
-    /// Begin with begin, instead of begin with end: for panels that are seen from different sides.
+    /// Joins start to start instead of start to end: for panels seen from different sides.
     #[serde(default)]
     pub flip: bool,
 }
@@ -116,16 +116,16 @@ pub struct Seam {
 pub struct Side {
     /// Name of the panel.
     pub panel: String,
-    /// Which of its sides; side 0 goes from corner 0 to corner 1.
+    /// Index of the side; side 0 runs from corner 0 to corner 1.
     pub side: u32,
 }
 
-/// A dress with a bodice on two straps and a skirt that is a full circle, hung around a body that stands upright at the start, its front
-/// towards -y. It fits the mannequin of 1.7 m as it is.
+/// A dress with a bodice on two straps and a full-circle skirt, placed around a body that stands upright and faces -y at the start. By default it
+/// fits the mannequin of 1.7 m.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct Dress {
-    /// Where the middle of the waist is.
+    /// Centre of the waist.
     #[schemars(extend("x-unit" = "m"))]
     pub waist: [f64; 3],
     /// Girth at the waist.
@@ -134,13 +134,13 @@ pub struct Dress {
     /// Girth below the arms.
     #[schemars(extend("x-unit" = "m", "exclusiveMinimum" = 0.0))]
     pub bust_girth: f64,
-    /// From the waist up to below the arms.
+    /// Height from the waist to below the arms.
     #[schemars(extend("x-unit" = "m", "exclusiveMinimum" = 0.0))]
     pub bodice: f64,
-    /// From below the arms up and over to the top of the shoulders, along the cloth.
+    /// Length from below the arms to the top of the shoulders, along the cloth.
     #[schemars(extend("x-unit" = "m", "exclusiveMinimum" = 0.0))]
     pub shoulder: f64,
-    /// Distance of the middles of both straps.
+    /// Distance between the centres of the straps.
     #[schemars(extend("x-unit" = "m", "exclusiveMinimum" = 0.0))]
     pub strap_distance: f64,
     /// Width of a strap.
@@ -152,7 +152,7 @@ pub struct Dress {
     /// Depth of the body over its width.
     #[schemars(range(min = 0.2, max = 1.0), extend("x-unit" = "1"))]
     pub depth: f64,
-    /// How steeply the skirt falls at the start, below the horizontal.
+    /// Initial slope of the skirt below the horizontal.
     #[schemars(range(min = 0.0, max = 80.0), extend("x-unit" = "°"))]
     pub fall: f64,
 }

@@ -5,43 +5,42 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 
-/// A source of particles. They are born at moments within a frame, live for a while, and have ids that are never used
-/// again.
+/// A source of particles. They are born at times within a frame, have a lifetime, and get ids that are never reused.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Emitter {
     /// Name of the particles in frames.
     pub name: String,
-    /// System that moves them; without it, the first that can.
+    /// System that moves them. Default: the first that can.
     #[serde(default)]
     pub system: Option<String>,
-    /// Where they are born.
+    /// Source of the particles.
     pub from: Source,
-    /// Particles a second; from other particles, children of each a second.
+    /// Particles per second; for a source of particles, children of each per second.
     #[serde(default = "nothing")]
     #[schemars(extend("x-unit" = "1/s"))]
     pub rate: Animated,
-    /// Particles born at once; from other particles, `count` children of each when it dies, or bounces.
+    /// Particles born at once; for a source of particles, `count` children of each when it dies or bounces.
     #[serde(default)]
     pub burst: Vec<Burst>,
-    /// When the rate begins.
+    /// Start of the rate.
     #[serde(default)]
     #[schemars(range(min = 0.0), extend("x-unit" = "s"))]
     pub start: f64,
-    /// When the rate ends; without it, never.
+    /// End of the rate. Default: never.
     #[serde(default)]
     #[schemars(range(min = 0.0), extend("x-unit" = "s"))]
     pub end: Option<f64>,
-    /// How irregular the moments of birth are: 0 is a metronome, 1 draws each anywhere in its exchange interval. The
-    /// number born in an interval is the same.
+    /// Irregularity of birth times: 0 is regular, 1 draws each at random within its exchange interval. The number of births per interval is
+    /// unchanged.
     #[serde(default)]
     #[schemars(range(min = 0.0, max = 1.0), extend("x-unit" = "1"))]
     pub jitter: f64,
-    /// Way of the source from where `from` puts it.
+    /// Displacement of the source from the position given by `from`.
     #[serde(default = "origin")]
     #[schemars(extend("x-unit" = "m"))]
     pub path: AnimatedVector,
-    /// Velocity that all of them get.
+    /// Initial velocity of all particles.
     #[serde(default = "origin")]
     #[schemars(extend("x-unit" = "m/s"))]
     pub velocity: AnimatedVector,
@@ -49,41 +48,41 @@ pub struct Emitter {
     #[serde(default)]
     #[schemars(extend("x-unit" = "m/s"))]
     pub speed: f64,
-    /// Random part of the speed: it lies between speed (1 - this) and speed (1 + this).
+    /// Random variation of the speed, between speed (1 - this) and speed (1 + this).
     #[serde(default)]
     #[schemars(range(min = 0.0, max = 1.0), extend("x-unit" = "1"))]
     pub speed_spread: f64,
-    /// Direction of the speed, of any length; without it, out of the source: its normal, or up where it has none.
+    /// Direction of the speed, of any length. Default: the normal of the source, or up if it has none.
     #[serde(default)]
     pub direction: Option<[f64; 3]>,
-    /// Half the angle of the cone in which directions lie, evenly over its solid angle; 180 is every direction.
+    /// Half-angle of the cone of directions, uniform over its solid angle; 180 is all directions.
     #[serde(default)]
     #[schemars(range(min = 0.0, max = 180.0), extend("x-unit" = "°"))]
     pub cone: f64,
-    /// Share of the velocity of the parent, or of the moving source, that a particle gets.
+    /// Fraction of the velocity of the parent, or of the moving source, that a particle inherits.
     #[serde(default)]
     #[schemars(extend("x-unit" = "1"))]
     pub inherit: f64,
-    /// Age at which they die; without it, they live on.
+    /// Age at which particles die. Default: never.
     #[serde(default)]
     #[schemars(extend("x-unit" = "s", "exclusiveMinimum" = 0.0))]
     pub lifetime: Option<f64>,
-    /// Random part of the lifetime: it lies between lifetime (1 - this) and lifetime (1 + this).
+    /// Random variation of the lifetime, between lifetime (1 - this) and lifetime (1 + this).
     #[serde(default)]
     #[schemars(range(min = 0.0, max = 1.0), extend("x-unit" = "1"))]
     pub lifetime_spread: f64,
-    /// What else they die of; any one is enough.
+    /// Further causes of death; any one suffices.
     #[serde(default)]
     pub kill: Vec<Kill>,
-    /// Mass of each.
+    /// Mass of each particle.
     #[serde(default = "one")]
     #[schemars(extend("x-unit" = "kg", "exclusiveMinimum" = 0.0))]
     pub mass: f64,
-    /// Random part of the mass: it lies between mass (1 - this) and mass (1 + this).
+    /// Random variation of the mass, between mass (1 - this) and mass (1 + this).
     #[serde(default)]
     #[schemars(range(min = 0.0), extend("x-unit" = "1", "exclusiveMaximum" = 1.0))]
     pub mass_spread: f64,
-    /// Electric charge of each.
+    /// Electric charge of each particle.
     #[serde(default)]
     #[schemars(extend("x-unit" = "C"))]
     pub charge: f64,
@@ -91,56 +90,56 @@ pub struct Emitter {
     #[serde(default = "centimetre")]
     #[schemars(extend("x-unit" = "m", "exclusiveMinimum" = 0.0))]
     pub radius: f64,
-    /// Random part of the radius: it lies between radius (1 - this) and radius (1 + this).
+    /// Random variation of the radius, between radius (1 - this) and radius (1 + this).
     #[serde(default)]
     #[schemars(range(min = 0.0), extend("x-unit" = "1", "exclusiveMaximum" = 1.0))]
     pub radius_spread: f64,
-    /// Red, green and blue in pictures, 0 to 1, in linear light (a half is sRGB's 188 of 255).
+    /// Red, green and blue in pictures, 0 to 1, in linear light (0.5 is 188 of 255 in sRGB).
     #[serde(default)]
     #[schemars(inner(range(min = 0.0, max = 1.0)))]
     pub color: Option<[f64; 3]>,
-    /// Each particle has a colour between `color` and this one.
+    /// Each particle has a random colour between `color` and this one.
     #[serde(default)]
     #[schemars(inner(range(min = 0.0, max = 1.0)))]
     pub color_to: Option<[f64; 3]>,
-    /// Colour that it has faded to at the end of its life; needs a `lifetime`.
+    /// Colour at the end of life; needs a `lifetime`.
     #[serde(default)]
     #[schemars(inner(range(min = 0.0, max = 1.0)))]
     pub color_end: Option<[f64; 3]>,
-    /// How much of the way behind each is drawn in pictures.
+    /// Duration of the trail drawn behind each particle in pictures.
     #[serde(default)]
     #[schemars(range(min = 0.0), extend("x-unit" = "s"))]
     pub trail: f64,
-    /// Numbers of your own that each particle carries and frames hold: `columns = { heat = { from = 300, to = 400 } }`.
+    /// Custom values per particle, written to frames: `columns = { heat = { from = 300, to = 400 } }`.
     #[serde(default)]
     pub columns: BTreeMap<String, Between>,
-    /// Particles alive at most; without it, as many as are born.
+    /// Maximum number of living particles. Default: unlimited.
     #[serde(default)]
     #[schemars(range(min = 1))]
     pub most: Option<u32>,
-    /// What happens when there are as many as that.
+    /// Behaviour at that maximum.
     #[serde(default)]
     pub when_full: WhenFull,
 }
 
-/// Where particles are born.
+/// Source of the particles.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case", deny_unknown_fields)]
 pub enum Source {
     /// A point.
     Point {
-        /// Where it is.
+        /// Its position.
         #[serde(default)]
         #[schemars(extend("x-unit" = "m"))]
         at: [f64; 3],
     },
-    /// Straight pieces between points, evenly along their length.
+    /// A polyline, uniform along its length.
     Curve {
         /// The points.
         #[schemars(length(min = 2), extend("x-unit" = "m"))]
         points: Vec<[f64; 3]>,
     },
-    /// A round disk, evenly over its area.
+    /// A disk, uniform over its area.
     Disk {
         /// Its centre.
         #[serde(default)]
@@ -153,7 +152,7 @@ pub enum Source {
         #[schemars(extend("x-unit" = "m", "exclusiveMinimum" = 0.0))]
         radius: f64,
     },
-    /// A ball, evenly over its volume, or its surface; in a scene of dimension 2 its points are put onto the plane.
+    /// A ball, uniform over its volume or its surface; in a scene of dimension 2 its points are projected onto the plane.
     Sphere {
         /// Its centre.
         #[serde(default)]
@@ -166,7 +165,7 @@ pub enum Source {
         #[serde(default)]
         surface: bool,
     },
-    /// A box, evenly over its volume. An edge may be 0: a wall or a line.
+    /// A box, uniform over its volume. An edge may be 0: a rectangle or a line.
     Box {
         /// Its centre.
         #[serde(default)]
@@ -175,41 +174,41 @@ pub enum Source {
         /// Its edges.
         #[schemars(inner(range(min = 0.0)), extend("x-unit" = "m"))]
         size: [f64; 3],
-        /// Turn about x, then y, then z.
+        /// Rotation about x, then y, then z.
         #[serde(default)]
         #[schemars(extend("x-unit" = "°"))]
         rotate: [f64; 3],
     },
-    /// The triangles of a mesh, evenly over their area.
+    /// The triangles of a mesh, uniform over their area.
     MeshSurface(MeshFile),
-    /// The inside of a closed mesh, evenly over its volume.
+    /// The interior of a closed mesh, uniform over its volume.
     MeshVolume(MeshFile),
-    /// Other emitted particles: `rate` makes children while the parent lives, `burst` when it dies, or each time it bounces.
+    /// Other emitted particles: `rate` creates children while the parent lives, `burst` when it dies or each time it bounces.
     Particles {
         /// Name of the emitter of the parents.
         of: String,
-        /// What makes a `burst`.
+        /// Event that triggers a `burst`.
         #[serde(default)]
         at: Event,
-        /// Deaths that make one; without any, all do.
+        /// Causes of death that trigger one. Default: all.
         #[serde(default)]
         cause: Vec<Cause>,
     },
 }
 
-/// What in the life of a parent makes a burst of children.
+/// Event in the life of a parent that triggers a burst of children.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Event {
-    /// Its death; children fly on as it did, unless they have a direction.
+    /// Its death; children continue its motion unless they have a direction.
     #[default]
     Death,
-    /// Each impact on a collider that is faster than what gravity gives in two steps: a splash. Children fly off the surface,
-    /// unless they have a direction.
+    /// Each impact on a collider faster than the speed gained from gravity in two steps: a splash. Children leave along the surface normal unless
+    /// they have a direction.
     Bounce,
 }
 
-/// What a particle dies of.
+/// Cause of death of a particle.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Cause {
@@ -225,7 +224,7 @@ pub enum Cause {
     SlowerThan,
     /// The rule `faster_than`.
     FasterThan,
-    /// It was the oldest, and made room where `when_full` is `replace_oldest`.
+    /// It was the oldest and was replaced (`when_full = "replace_oldest"`).
     Replaced,
 }
 
@@ -233,21 +232,21 @@ pub enum Cause {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Burst {
-    /// When; not for children, which are born when the parent dies or bounces.
+    /// Time; not for children, which are born when the parent dies or bounces.
     #[serde(default)]
     #[schemars(range(min = 0.0), extend("x-unit" = "s"))]
     pub time: f64,
-    /// How many.
+    /// Count.
     pub count: u32,
 }
 
-/// A rule by which particles die, looked at when an exchange interval ends.
+/// A rule by which particles die, checked at the end of each exchange interval.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case", deny_unknown_fields)]
 pub enum Kill {
-    /// In a solid: `{ inside = { sphere = { radius = 1.0 } } }`; a floor is everything below it.
+    /// Inside a solid: `{ inside = { sphere = { radius = 1.0 } } }`; a floor is everything below it.
     Inside(Shape),
-    /// Out of a solid.
+    /// Outside a solid.
     Outside(Shape),
     /// Nearer to a collider than this.
     NearCollider(#[schemars(range(min = 0.0), extend("x-unit" = "m"))] f64),
@@ -257,25 +256,25 @@ pub enum Kill {
     FasterThan(#[schemars(range(min = 0.0), extend("x-unit" = "m/s"))] f64),
 }
 
-/// A number drawn evenly between two.
+/// A uniform random number between two bounds.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Between {
-    /// The smallest.
+    /// Lower bound.
     pub from: f64,
-    /// The largest; without it, all are the same.
+    /// Upper bound. Default: the lower bound.
     #[serde(default)]
     pub to: Option<f64>,
 }
 
-/// What happens when an emitter has as many particles as it may.
+/// Behaviour of an emitter at its maximum number of particles.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum WhenFull {
-    /// No more are born until some have died.
+    /// Births pause until particles have died.
     #[default]
     Wait,
-    /// The oldest die as others are born, and may bear children as they do.
+    /// The oldest die as new ones are born, and may have children as they do.
     ReplaceOldest,
     /// The run ends with an error.
     Error,

@@ -7,54 +7,54 @@ use serde::{Deserialize, Serialize};
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(untagged)]
 pub enum FabricWords {
-    /// The name of a shipped one: `"denim"`, `"interlock"`, `"tablecloth"`.
+    /// The name of a bundled fabric: `"denim"`, `"interlock"`, `"tablecloth"`.
     Name(String),
-    /// A name or a path, and how it is used.
+    /// A name or a path, with settings.
     Use(FabricUse),
 }
 
-/// A measured fabric and how it is used.
+/// A measured fabric with settings.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct FabricUse {
-    /// The name of a shipped one.
+    /// Name of a bundled fabric.
     #[serde(default)]
     pub name: Option<String>,
-    /// The file of its record instead, TOML or JSON; relative to the scene.
+    /// Alternatively the file of its record, TOML or JSON, relative to the scene.
     #[serde(default)]
     pub path: Option<String>,
-    /// Turn of the warp in the surface, counter-clockwise seen from outside. At 0 it is the first axis of a sheet or of a panel, on a net the
-    /// x axis as far as it lies in a triangle, or u in the plane of its pattern.
+    /// Rotation of the warp in the surface, counter-clockwise seen from outside. At 0 the warp is the first axis of a sheet or panel; on a net it is
+    /// the x axis projected into a triangle, or u in the plane of its pattern.
     #[serde(default)]
     #[schemars(extend("x-unit" = "°"))]
     pub angle: f64,
-    /// Factor of density, stretching and bending: so many layers.
+    /// Factor on density, stretching and bending: the number of layers.
     #[serde(default = "one")]
     #[schemars(extend("x-unit" = "1", "exclusiveMinimum" = 0.0))]
     pub thicken: f64,
-    /// Factor of bending alone. At 1 the record is moment over curvature; 0.25 is what ARCSim makes of it.
+    /// Factor on bending alone. At 1 the record is moment over curvature; 0.25 reproduces ARCSim.
     #[serde(default = "one")]
     #[schemars(extend("x-unit" = "1", "exclusiveMinimum" = 0.0))]
     pub bending: f64,
-    /// Damping as a time: damping = time x stiffness. No record tells it.
+    /// Damping as a time: damping = time x stiffness. Records do not contain it.
     #[serde(default)]
     #[schemars(range(min = 0.0), extend("x-unit" = "s"))]
     pub damping: f64,
-    /// Hash of the file's content, as the manifest of a run notes it; another content is refused.
+    /// Hash of the file's content, as in the manifest of a run; other content is an error.
     #[serde(default)]
     pub hash: Option<String>,
 }
 
-/// A place in a scene that names a fabric.
+/// A reference to a fabric in a scene.
 pub struct FabricRef<'a> {
-    /// Path of the place.
+    /// Path within the scene.
     pub place: String,
-    /// What stands there.
+    /// The value.
     pub words: &'a mut FabricWords,
 }
 
 impl FabricWords {
-    /// How it is used.
+    /// The settings.
     pub fn settings(&self) -> FabricUse {
         match self {
             Self::Name(name) => {
@@ -72,10 +72,7 @@ impl FabricWords {
         }
     }
 
-    /// The path, if it is not a name that it says.
-    ///
-    /// # Errors
-    /// Neither or both.
+    /// The path, or `None` for a name.
     pub fn choice(&self) -> Result<Option<&str>, String> {
         match self {
             Self::Name(_) => Ok(None),
@@ -85,12 +82,12 @@ impl FabricWords {
         }
     }
 
-    /// Where below its place the name stands.
+    /// Key of the name, relative to the fabric's path.
     pub fn name_key(&self) -> &'static str {
         if matches!(self, Self::Name(_)) { "" } else { ".name" }
     }
 
-    /// Where the hash of its file stands.
+    /// The hash of the file.
     pub fn hash_mut(&mut self) -> Option<&mut Option<String>> {
         match self {
             Self::Name(_) => None,

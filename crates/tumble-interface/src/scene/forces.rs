@@ -10,25 +10,25 @@ use serde::{Deserialize, Serialize};
 pub enum Force {
     /// Viscous and quadratic damping f = -(k_d + c |v|) v.
     Drag {
-        /// k_d, for each mass.
+        /// k_d of each mass.
         #[serde(default)]
         #[schemars(range(min = 0.0), extend("x-unit" = "N s/m"))]
         coefficient: f64,
-        /// k_d per kilogram: independent of how finely an object is divided.
+        /// k_d per kilogram: independent of the resolution of an object.
         #[serde(default)]
         #[schemars(range(min = 0.0), extend("x-unit" = "1/s"))]
         rate: f64,
-        /// c, in front of the square of the speed.
+        /// c, the coefficient of the squared speed.
         #[serde(default)]
         #[schemars(range(min = 0.0), extend("x-unit" = "kg/m"))]
         quadratic: f64,
-        /// Names of objects; without it, all.
+        /// Names of objects. Default: all.
         #[serde(default)]
         on: Option<Vec<String>>,
     },
-    /// Drag in air that moves: f = -(k_d + c |v - u|) (v - u).
+    /// Drag in moving air: f = -(k_d + c |v - u|) (v - u).
     Wind {
-        /// k_d, for each mass.
+        /// k_d of each mass.
         #[serde(default)]
         #[schemars(range(min = 0.0), extend("x-unit" = "N s/m"))]
         coefficient: f64,
@@ -36,39 +36,39 @@ pub enum Force {
         #[serde(default)]
         #[schemars(range(min = 0.0), extend("x-unit" = "1/s"))]
         rate: f64,
-        /// c, in front of the square of the relative speed.
+        /// c, the coefficient of the squared relative speed.
         #[serde(default)]
         #[schemars(range(min = 0.0), extend("x-unit" = "kg/m"))]
         quadratic: f64,
-        /// Velocity fields of the air; they add up.
+        /// Velocity fields of the air; they are summed.
         air: Vec<Field>,
-        /// Names of objects; without it, all.
+        /// Names of objects. Default: all.
         #[serde(default)]
         on: Option<Vec<String>>,
     },
-    /// Air around the triangles of sheets, nets and cloth: drag along its velocity relative to each, lift across it, friction in the surface,
-    /// F = rho/2 A (C_D |s| w + C_L (s |w| n - s²/|w| w) + C_F |w| (w - s n)), w = u - v, s = w . n.
+    /// Air on the triangles of sheets, nets and cloth: drag along the relative velocity, lift normal to it, friction along the surface, F = rho/2 A
+    /// (C_D |s| w + C_L (s |w| n - s²/|w| w) + C_F |w| (w - s n)), w = u - v, s = w . n.
     Air {
         /// rho.
         #[serde(default = "air_density")]
         #[schemars(range(min = 0.0), extend("x-unit" = "kg/m³"))]
         density: f64,
-        /// C_D, for the area that the air sees.
+        /// C_D, for the projected area.
         #[serde(default = "plate")]
         #[schemars(range(min = 0.0), extend("x-unit" = "1"))]
         drag: f64,
-        /// C_L: the lift is C_L sin a cos a at the angle a between air and surface. As large as `drag`, it is that of a plate that turns the air.
+        /// C_L: the lift is C_L sin a cos a at the angle of attack a. Equal to `drag`, it is that of a plate that deflects the air.
         #[serde(default = "plate")]
         #[schemars(range(min = 0.0), extend("x-unit" = "1"))]
         lift: f64,
-        /// C_F, of both faces together.
+        /// C_F, for both faces together.
         #[serde(default = "skin")]
         #[schemars(range(min = 0.0), extend("x-unit" = "1"))]
         friction: f64,
-        /// Velocity fields of the air; they add up. Without one, it is still.
+        /// Velocity fields of the air; they are summed. Default: air at rest.
         #[serde(default)]
         wind: Vec<Field>,
-        /// Names of objects; without it, all that have triangles.
+        /// Names of objects. Default: all that have triangles.
         #[serde(default)]
         on: Option<Vec<String>>,
     },
@@ -81,24 +81,23 @@ pub enum Force {
         /// Strength: with power 2 the gravitational parameter G M; may change in time.
         #[schemars(extend("x-unit" = "m³/s²"))]
         gm: Animated,
-        /// The force falls with this power of the distance: 2 gravity, 1 a line, 0 constant, -1 a spring. The unit of gm is
-        /// then m^(power + 1)/s².
+        /// The force falls with this power of the distance: 2 gravity, 1 a line, 0 constant, -1 a spring. The unit of gm is m^(power + 1)/s².
         #[serde(default = "two")]
         #[schemars(range(min = -4.0, max = 12.0), extend("x-unit" = "1"))]
         power: f64,
-        /// Softening length: no singularity at the point.
+        /// Softening length, which removes the singularity.
         #[serde(default)]
         #[schemars(range(min = 0.0), extend("x-unit" = "m"))]
         softening: f64,
-        /// Fades out towards this distance and ends there; without it, it has no end.
+        /// Distance at which the force has faded to zero. Default: unlimited.
         #[serde(default)]
         #[schemars(extend("x-unit" = "m", "exclusiveMinimum" = 0.0))]
         radius: Option<f64>,
-        /// Names of objects; without it, all.
+        /// Names of objects. Default: all.
         #[serde(default)]
         on: Option<Vec<String>>,
     },
-    /// Newton's gravitation of every mass on every other of the same system, F = G m1 m2 / d².
+    /// Newton's gravitation between all masses of the same system, F = G m1 m2 / d².
     Gravitation {
         /// G.
         #[serde(default = "newton")]
@@ -108,33 +107,33 @@ pub enum Force {
         #[serde(default)]
         #[schemars(range(min = 0.0), extend("x-unit" = "m"))]
         softening: f64,
-        /// Names of objects that pull each other; without it, all.
+        /// Names of objects that attract each other. Default: all.
         #[serde(default)]
         on: Option<Vec<String>>,
     },
-    /// Molecules of Lennard-Jones: E = 4 epsilon ((sigma/r)^12 - (sigma/r)^6) for each pair.
+    /// Lennard-Jones potential: E = 4 epsilon ((sigma/r)^12 - (sigma/r)^6) for each pair.
     LennardJones {
-        /// Depth of the well.
+        /// Depth of the potential well.
         #[schemars(range(min = 0.0), extend("x-unit" = "J"))]
         epsilon: f64,
         /// Distance at which the energy is zero.
         #[schemars(extend("x-unit" = "m", "exclusiveMinimum" = 0.0))]
         sigma: f64,
-        /// Distance at which it ends, with zero energy; without it, 2.5 sigma.
+        /// Cut-off distance, with zero energy. Default: 2.5 sigma.
         #[serde(default)]
         #[schemars(extend("x-unit" = "m", "exclusiveMinimum" = 0.0))]
         cutoff: Option<f64>,
-        /// Whether the force, too, ends with zero; else it jumps there.
+        /// Whether the force, too, vanishes at the cut-off; otherwise it jumps there.
         #[serde(default = "yes")]
         smooth: bool,
-        /// Names of objects; without it, all.
+        /// Names of objects. Default: all.
         #[serde(default)]
         on: Option<Vec<String>>,
-        /// Names of objects that those of `on` feel, and which need not feel them; without it, those of `on` feel each other.
+        /// Names of objects that act on those in `on`, without reaction. Default: objects in `on` act on each other.
         #[serde(default)]
         from: Option<Vec<String>>,
     },
-    /// Pushes masses apart that are closer than a distance, f = k (d - r)^p for each pair.
+    /// Repulsion of masses closer than a distance, f = k (d - r)^p for each pair.
     Repulsion {
         /// k.
         #[schemars(range(min = 0.0), extend("x-unit" = "N/m^exponent"))]
@@ -146,25 +145,25 @@ pub enum Force {
         #[serde(default = "linear")]
         #[schemars(range(min = 1, max = 4))]
         exponent: u8,
-        /// Names of objects; without it, all.
+        /// Names of objects. Default: all.
         #[serde(default)]
         on: Option<Vec<String>>,
-        /// Names of objects that those of `on` feel, and which need not feel them; without it, those of `on` feel each other.
+        /// Names of objects that act on those in `on`, without reaction. Default: objects in `on` act on each other.
         #[serde(default)]
         from: Option<Vec<String>>,
     },
-    /// Pulls neighbours together: zero in the same place and from the radius on, largest at 0.45 of it.
+    /// Attraction of neighbours: zero at zero distance and beyond the radius, largest at 0.45 of it.
     Cohesion {
         /// The largest force of a pair.
         #[schemars(range(min = 0.0), extend("x-unit" = "N"))]
         strength: f64,
-        /// Distance up to which masses are neighbours.
+        /// Neighbour distance.
         #[schemars(extend("x-unit" = "m", "exclusiveMinimum" = 0.0))]
         radius: f64,
-        /// Names of objects; without it, all.
+        /// Names of objects. Default: all.
         #[serde(default)]
         on: Option<Vec<String>>,
-        /// Names of objects that those of `on` feel, and which need not feel them; without it, those of `on` feel each other.
+        /// Names of objects that act on those in `on`, without reaction. Default: objects in `on` act on each other.
         #[serde(default)]
         from: Option<Vec<String>>,
     },
@@ -176,92 +175,92 @@ pub enum Force {
         /// R.
         #[schemars(extend("x-unit" = "m", "exclusiveMinimum" = 0.0))]
         radius: f64,
-        /// Only along the line between the two, which keeps angular momentum, too.
+        /// Only along the line between the two, which conserves angular momentum, too.
         #[serde(default)]
         central: bool,
-        /// Names of objects; without it, all.
+        /// Names of objects. Default: all.
         #[serde(default)]
         on: Option<Vec<String>>,
-        /// Names of objects that those of `on` feel, and which need not feel them; without it, those of `on` feel each other.
+        /// Names of objects that act on those in `on`, without reaction. Default: objects in `on` act on each other.
         #[serde(default)]
         from: Option<Vec<String>>,
     },
-    /// A flock: each steers by its neighbours, keeps a speed, seeks goals, shuns colliders and flees from predators.
+    /// A flock: each member steers by its neighbours, keeps a speed, seeks goals, avoids colliders and flees from predators.
     Flock {
-        /// Distance up to which others are seen.
+        /// Distance of sight.
         #[schemars(extend("x-unit" = "m", "exclusiveMinimum" = 0.0))]
         radius: f64,
-        /// Heeds only so many, the nearest, as starlings do with 7; without it, all within the radius.
+        /// Number of nearest neighbours considered; starlings use 7. Default: all within the radius.
         #[serde(default)]
         #[schemars(range(min = 1, max = 1000))]
         nearest: Option<u32>,
-        /// Field of view around the direction of motion; 360 sees all around.
+        /// Field of view around the direction of motion; 360 is unlimited.
         #[serde(default = "full_turn")]
         #[schemars(range(min = 1.0, max = 360.0), extend("x-unit" = "°"))]
         view: f64,
-        /// Towards the centre of the neighbours, per metre of the way.
+        /// Acceleration towards the centre of the neighbours, per metre of distance.
         #[serde(default)]
         #[schemars(range(min = 0.0), extend("x-unit" = "1/s²"))]
         cohesion: f64,
-        /// Rate at which the neighbours' velocity is taken up.
+        /// Rate of adaptation to the neighbours' velocity.
         #[serde(default)]
         #[schemars(range(min = 0.0), extend("x-unit" = "1/s"))]
         alignment: f64,
-        /// Away from each neighbour that is closer than `spacing`.
+        /// Acceleration away from each neighbour closer than `spacing`.
         #[serde(default)]
         #[schemars(range(min = 0.0), extend("x-unit" = "m/s²"))]
         separation: f64,
-        /// Distance that is kept; without it, half the radius.
+        /// Preferred distance. Default: half the radius.
         #[serde(default)]
         #[schemars(extend("x-unit" = "m", "exclusiveMinimum" = 0.0))]
         spacing: Option<f64>,
-        /// Cruising speed; 0 drives nobody.
+        /// Cruising speed; 0 is no propulsion.
         #[serde(default)]
         #[schemars(range(min = 0.0), extend("x-unit" = "m/s"))]
         speed: f64,
-        /// Rate at which the cruising speed is taken up.
+        /// Rate of approach to the cruising speed.
         #[serde(default = "rate")]
         #[schemars(range(min = 0.0), extend("x-unit" = "1/s"))]
         propulsion: f64,
-        /// Bound of the acceleration; without it, none.
+        /// Limit of the acceleration. Default: none.
         #[serde(default)]
         #[schemars(extend("x-unit" = "m/s²", "exclusiveMinimum" = 0.0))]
         max_acceleration: Option<f64>,
-        /// Places that attract.
+        /// Points that attract.
         #[serde(default)]
         goal: Vec<Goal>,
-        /// Away from colliders that are closer than `clearance`; 0 shuns none.
+        /// Acceleration away from colliders closer than `clearance`; 0 is no avoidance.
         #[serde(default)]
         #[schemars(range(min = 0.0), extend("x-unit" = "m/s²"))]
         avoidance: f64,
-        /// Distance that is kept from colliders; without it, the radius.
+        /// Distance kept from colliders. Default: the radius.
         #[serde(default)]
         #[schemars(extend("x-unit" = "m", "exclusiveMinimum" = 0.0))]
         clearance: Option<f64>,
-        /// Names of objects that hunt the flock.
+        /// Names of objects that are predators of the flock.
         #[serde(default)]
         predators: Vec<String>,
-        /// Away from predators that are closer than `fear_radius`.
+        /// Acceleration away from predators closer than `fear_radius`.
         #[serde(default)]
         #[schemars(range(min = 0.0), extend("x-unit" = "m/s²"))]
         fear: f64,
-        /// Distance at which predators are noticed; without it, three times the radius.
+        /// Distance at which predators are noticed. Default: three times the radius.
         #[serde(default)]
         #[schemars(extend("x-unit" = "m", "exclusiveMinimum" = 0.0))]
         fear_radius: Option<f64>,
-        /// Of predators, towards the prey.
+        /// Acceleration of predators towards the prey.
         #[serde(default)]
         #[schemars(range(min = 0.0), extend("x-unit" = "m/s²"))]
         chase: f64,
-        /// Cruising speed of predators; without it, that of the flock.
+        /// Cruising speed of predators. Default: that of the flock.
         #[serde(default)]
         #[schemars(range(min = 0.0), extend("x-unit" = "m/s"))]
         predator_speed: Option<f64>,
-        /// Names of objects; without it, all but the predators.
+        /// Names of objects. Default: all but the predators.
         #[serde(default)]
         on: Option<Vec<String>>,
     },
-    /// Coulomb's force between all charged masses of the same system, F = k q1 q2 / d²: like charges push each other.
+    /// Coulomb's force between all charged masses of the same system, F = k q1 q2 / d²: like charges repel.
     Electrostatics {
         /// k.
         #[serde(default = "coulomb")]
@@ -271,39 +270,39 @@ pub enum Force {
         #[serde(default)]
         #[schemars(range(min = 0.0), extend("x-unit" = "m"))]
         softening: f64,
-        /// Names of objects whose charges feel each other; without it, all.
+        /// Names of objects whose charges interact. Default: all.
         #[serde(default)]
         on: Option<Vec<String>>,
     },
-    /// An acceleration beside the world's gravity: uniform, changing in time, or a formula of t, x, y, z, vx, vy, vz.
+    /// An acceleration in addition to gravity: uniform, time-dependent, or a formula of t, x, y, z, vx, vy, vz.
     Acceleration {
         /// The acceleration.
         #[schemars(extend("x-unit" = "m/s²"))]
         value: AnimatedVector,
-        /// Names of objects; without it, all.
+        /// Names of objects. Default: all.
         #[serde(default)]
         on: Option<Vec<String>>,
     },
     /// A magnetic field: f = q v x B on charged particles.
     Magnetic {
-        /// B: uniform, changing in time, or a formula of t, x, y, z.
+        /// B: uniform, time-dependent, or a formula of t, x, y, z.
         #[schemars(extend("x-unit" = "T"))]
         field: AnimatedVector,
-        /// Names of objects; without it, all.
+        /// Names of objects. Default: all.
         #[serde(default)]
         on: Option<Vec<String>>,
     },
     /// An electric field: f = q E on charged particles.
     Electric {
-        /// E: uniform, changing in time, or a formula of t, x, y, z.
+        /// E: uniform, time-dependent, or a formula of t, x, y, z.
         #[schemars(extend("x-unit" = "V/m"))]
         field: AnimatedVector,
-        /// Names of objects; without it, all.
+        /// Names of objects. Default: all.
         #[serde(default)]
         on: Option<Vec<String>>,
     },
-    /// A vortex: acceleration around, towards and along an axis, largest around it at the core radius c and falling as 1/r
-    /// outside. It speeds things up for ever: add drag, or blow with a `vortex` in the air of a `wind`.
+    /// A vortex: acceleration around, towards and along an axis, largest around it at the core radius c and falling as 1/r outside. It accelerates
+    /// without limit: add drag, or use a `vortex` in the air of a `wind`.
     Vortex {
         /// A point of the axis; may change in time.
         #[serde(default = "origin")]
@@ -327,11 +326,11 @@ pub enum Force {
         #[serde(default = "nothing")]
         #[schemars(extend("x-unit" = "m/s²"))]
         lift: Animated,
-        /// Names of objects; without it, all.
+        /// Names of objects. Default: all.
         #[serde(default)]
         on: Option<Vec<String>>,
     },
-    /// Random acceleration that swirls and neither gathers nor scatters: curl noise.
+    /// Random, divergence-free acceleration: curl noise.
     Turbulence {
         /// Root mean square.
         #[schemars(extend("x-unit" = "m/s²"))]
@@ -340,62 +339,62 @@ pub enum Force {
         #[serde(default = "one")]
         #[schemars(extend("x-unit" = "m", "exclusiveMinimum" = 0.0))]
         scale: f64,
-        /// How many sizes of swirls, each half as large as the one before.
+        /// Number of swirl sizes, each half as large as the one before.
         #[serde(default = "three")]
         #[schemars(range(min = 1, max = 12))]
         octaves: u32,
-        /// Strength of each size over that of the one before.
+        /// Strength of each size relative to the one before.
         #[serde(default = "half")]
         #[schemars(range(min = 0.0, max = 1.0), extend("x-unit" = "1"))]
         roughness: f64,
-        /// How often it changes.
+        /// Rate of change in time.
         #[serde(default)]
         #[schemars(range(min = 0.0), extend("x-unit" = "1/s"))]
         rate: f64,
-        /// Chooses one of many fields, beside the seed of the scene.
+        /// Selects the random field, together with the seed of the scene.
         #[serde(default)]
         seed: u32,
-        /// Names of objects; without it, all.
+        /// Names of objects. Default: all.
         #[serde(default)]
         on: Option<Vec<String>>,
     },
-    /// Thrust along the direction of motion: f = (thrust + m (speed - |v|)/time) v/|v|. What is at rest stays.
+    /// Thrust along the direction of motion: f = (thrust + m (speed - |v|)/time) v/|v|; zero at rest.
     Propulsion {
         /// Constant thrust; negative brakes.
         #[serde(default = "nothing")]
         #[schemars(extend("x-unit" = "N"))]
         thrust: Animated,
-        /// Desired speed; without it, thrust alone.
+        /// Desired speed. Default: thrust alone.
         #[serde(default)]
         #[schemars(extend("x-unit" = "m/s"))]
         speed: Option<Animated>,
-        /// Time in which the difference to the desired speed falls to 1/e.
+        /// Time in which the difference from the desired speed falls to 1/e.
         #[serde(default = "one")]
         #[schemars(extend("x-unit" = "s", "exclusiveMinimum" = 0.0))]
         time: f64,
-        /// Names of objects; without it, all.
+        /// Names of objects. Default: all.
         #[serde(default)]
         on: Option<Vec<String>>,
     },
 }
 
-/// A place that attracts a flock.
+/// A point that attracts a flock.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Goal {
-    /// The place.
+    /// The point.
     #[schemars(extend("x-unit" = "m"))]
     pub point: [f64; 3],
-    /// Acceleration towards it from afar.
+    /// Acceleration towards it at large distance.
     #[schemars(extend("x-unit" = "m/s²"))]
     pub strength: f64,
 }
 
-/// A velocity field; the fields of a scene add up.
+/// A velocity field; the fields of a scene are summed.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(tag = "kind", rename_all = "snake_case", deny_unknown_fields)]
 pub enum Field {
-    /// The velocity of a gas: its particles go with it.
+    /// The velocity of a gas.
     Gas {
         /// Name of the gas.
         of: String,
@@ -406,7 +405,7 @@ pub enum Field {
         #[schemars(extend("x-unit" = "m/s"))]
         velocity: AnimatedVector,
     },
-    /// Turning about an axis: u = rate axis x (x - center). Exact paths are circles.
+    /// Rotation about an axis: u = rate axis x (x - center). Exact paths are circles.
     Swirl {
         /// A point of the axis.
         #[serde(default)]
@@ -429,7 +428,7 @@ pub enum Field {
         #[schemars(extend("x-unit" = "1/s"))]
         rate: Animated,
     },
-    /// A vortex that turns as a solid in its core and as 1/r outside, with an inflow and an updraft.
+    /// A vortex that rotates rigidly in its core and as 1/r outside, with an inflow and an updraft.
     Vortex {
         /// A point of the axis; may change in time.
         #[serde(default = "origin")]
@@ -454,7 +453,7 @@ pub enum Field {
         #[schemars(extend("x-unit" = "m/s"))]
         lift: Animated,
     },
-    /// Random flow without sources: curl noise.
+    /// Random, divergence-free flow: curl noise.
     Turbulence {
         /// Root mean square of the velocity.
         #[schemars(extend("x-unit" = "m/s"))]
@@ -463,19 +462,19 @@ pub enum Field {
         #[serde(default = "one")]
         #[schemars(extend("x-unit" = "m", "exclusiveMinimum" = 0.0))]
         scale: f64,
-        /// How many sizes of swirls, each half as large as the one before.
+        /// Number of swirl sizes, each half as large as the one before.
         #[serde(default = "three")]
         #[schemars(range(min = 1, max = 12))]
         octaves: u32,
-        /// Strength of each size over that of the one before.
+        /// Strength of each size relative to the one before.
         #[serde(default = "half")]
         #[schemars(range(min = 0.0, max = 1.0), extend("x-unit" = "1"))]
         roughness: f64,
-        /// How often it changes.
+        /// Rate of change in time.
         #[serde(default)]
         #[schemars(range(min = 0.0), extend("x-unit" = "1/s"))]
         rate: f64,
-        /// Chooses one of many fields, beside the seed of the scene.
+        /// Selects the random field, together with the seed of the scene.
         #[serde(default)]
         seed: u32,
     },
@@ -487,7 +486,7 @@ pub enum Field {
     },
 }
 
-/// A spring between two masses of any objects, also of different systems.
+/// A spring between two masses of any objects, possibly in different systems.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Anchor {
@@ -502,7 +501,7 @@ pub struct Anchor {
     #[serde(default)]
     #[schemars(range(min = 0.0), extend("x-unit" = "N s/m"))]
     pub damping: f64,
-    /// Rest length; without it, the distance at the start.
+    /// Rest length. Default: the initial distance.
     #[serde(default)]
     #[schemars(range(min = 0.0), extend("x-unit" = "m"))]
     pub rest_length: Option<f64>,
@@ -573,7 +572,7 @@ fn up() -> [f64; 3] {
 }
 
 impl Force {
-    /// The objects that it acts on; `None` for all.
+    /// The objects on which it acts; `None` for all.
     pub fn on(&self) -> Option<&Vec<String>> {
         match self {
             Self::Drag { on, .. }

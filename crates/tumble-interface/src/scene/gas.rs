@@ -4,79 +4,79 @@ use super::{AnimatedVector, Component, GridBox, OnFailure, Shape};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-/// An incompressible fluid that fills a box of cells, with smoke and warmth that it carries.
+/// An incompressible fluid that fills a box of cells, and advects smoke and heat.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Gas {
     /// Name in frames and pictures.
     pub name: String,
-    /// System that moves it; without it, the first of method `gas`.
+    /// System that moves it. Default: the first of method `gas`.
     #[serde(default)]
     pub system: Option<String>,
     /// The cells.
     #[serde(rename = "box")]
     pub cells: GridBox,
-    /// What is beyond the sides of the box.
+    /// Boundary conditions of the box.
     #[serde(default)]
     pub sides: GasSides,
     /// Density of the fluid without smoke, at its ambient temperature.
     #[serde(default = "air")]
     #[schemars(extend("x-unit" = "kg/m³", "exclusiveMinimum" = 0.0))]
     pub fluid_density: f64,
-    /// What differences of density do.
+    /// Effect of density differences.
     #[serde(default)]
     pub densities: Densities,
-    /// Dynamic viscosity; without it, none but that of the advection.
+    /// Dynamic viscosity. Default: none but the numerical one of advection.
     #[serde(default)]
     #[schemars(range(min = 0.0), extend("x-unit" = "Pa s"))]
     pub viscosity: Option<f64>,
-    /// How viscosity is stepped.
+    /// Time integration of viscosity.
     #[serde(default)]
     pub viscous: Viscous,
-    /// Velocity at the start; a formula may use x, y, z.
+    /// Initial velocity; may be a formula of x, y, z.
     #[serde(default = "still")]
     #[schemars(extend("x-unit" = "m/s"))]
     pub velocity: AnimatedVector,
-    /// Acceleration of the fluid everywhere; a formula may use t, x, y, z. Gravity acts through differences of density alone.
+    /// Acceleration of the fluid; may be a formula of t, x, y, z. Gravity acts only through density differences.
     #[serde(default = "still")]
     #[schemars(extend("x-unit" = "m/s²"))]
     pub acceleration: AnimatedVector,
-    /// Smoke that the fluid carries, column `density`.
+    /// Smoke advected by the fluid, column `density`.
     #[serde(default)]
     pub smoke: Option<Smoke>,
-    /// Warmth that the fluid carries, column `temperature`.
+    /// Heat advected by the fluid, column `temperature`.
     #[serde(default)]
     pub temperature: Option<Temperature>,
-    /// Fuel that the fluid carries and that burns where it is hot, column `fuel`; needs `temperature`.
+    /// Fuel advected by the fluid, which burns where it is hot, column `fuel`; needs `temperature`.
     #[serde(default)]
     pub fire: Option<Fire>,
-    /// Where smoke, warmth, fuel and velocity come from.
+    /// Sources of smoke, heat, fuel and velocity.
     #[serde(default)]
     pub source: Vec<GasSource>,
-    /// What the fluid does at colliders: each fills what it covers of the box.
+    /// Boundary condition at colliders, which block the part of the box that they cover.
     #[serde(default)]
     pub solids: Solid,
-    /// Objects of [[particles]] in a system of dynamics whose masses are balls of their radius (in the plane: disks, a metre thick)
-    /// that the fluid moves and that move it.
+    /// Objects of [[particles]] in a system of dynamics whose masses are balls of their radius (in 2D: disks, a metre thick) with two-way coupling to
+    /// the fluid.
     #[serde(default)]
     pub bodies: Vec<String>,
-    /// Objects that hang in the fluid: cloth and other surfaces, in the plane curves.
+    /// Objects immersed in the fluid: cloth and other surfaces, in 2D curves.
     #[serde(default)]
     pub sheet: Vec<GasSheet>,
-    /// Vorticity confinement: gives small eddies back what advection takes from them.
+    /// Vorticity confinement: restores small eddies that advection dissipates.
     #[serde(default)]
     #[schemars(range(min = 0.0), extend("x-unit" = "1"))]
     pub confinement: f64,
     /// Order of the four parts of a step.
     #[serde(default)]
     pub order: Order,
-    /// How velocities and scalars are carried.
+    /// Advection of velocities and scalars.
     #[serde(default)]
     pub advection: Advections,
-    /// How the pressure is found.
+    /// Pressure solver.
     #[serde(default)]
     pub pressure: Pressure,
-    /// Cells that the fastest fluid passes in a sub-step, where the system has neither `substeps` nor `step`.
+    /// Cells that the fastest fluid crosses in a sub-step, if the system has neither `substeps` nor `step`.
     #[serde(default = "five")]
     #[schemars(extend("x-unit" = "1", "exclusiveMinimum" = 0.0))]
     pub courant: f64,
@@ -94,18 +94,18 @@ fn still() -> AnimatedVector {
     [0.0; 3].into()
 }
 
-/// A surface of masses that lets the fluid through, against a resistance: it is blown along, and the fluid is held back.
+/// A permeable surface of masses with a flow resistance: the fluid drags it along and is slowed by it.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct GasSheet {
     /// The object, in a system of dynamics.
     pub object: String,
-    /// Loss of pressure across it, over half the density times the square of the speed through it. A net has 1, a dense fabric 100; what
-    /// is above 2 over the Courant number of a sub-step acts like that.
+    /// Pressure loss across it, in units of half the density times the square of the speed through it. A net has 1, a dense fabric 100; values above
+    /// 2 over the Courant number of a sub-step act like that limit.
     #[serde(default = "ten")]
     #[schemars(range(min = 0.0), extend("x-unit" = "1"))]
     pub resistance: f64,
-    /// Friction along it, both faces together, over half the density times the square of the speed.
+    /// Friction along it, both faces together, in units of half the density times the square of the speed.
     #[serde(default = "hundredth")]
     #[schemars(range(min = 0.0), extend("x-unit" = "1"))]
     pub friction: f64,
@@ -131,7 +131,7 @@ pub struct GasSides {
     pub z: [GasSide; 2],
 }
 
-/// What is beyond a side of a box of fluid.
+/// Boundary condition of a side of a box of fluid.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case", deny_unknown_fields)]
 pub enum GasSide {
@@ -140,83 +140,83 @@ pub enum GasSide {
     FreeSlip,
     /// A wall to which the fluid sticks.
     NoSlip,
-    /// Nothing: the fluid comes and goes, at pressure zero. What comes in has no smoke and the ambient temperature.
+    /// Open: in- and outflow at zero pressure. Inflow has no smoke and the ambient temperature.
     Open,
-    /// The opposite side, which must say the same.
+    /// Connected to the opposite side, which must be periodic, too.
     Periodic,
-    /// A wall to which the fluid sticks, and which moves along itself.
+    /// A no-slip wall that moves within its plane.
     Wall {
-        /// Velocity of the wall; its part across the wall must be zero.
+        /// Velocity of the wall; its normal component must be zero.
         #[schemars(extend("x-unit" = "m/s"))]
         velocity: AnimatedVector,
     },
-    /// Fluid comes in with this velocity (or leaves, where it points out of the box).
+    /// Inflow with a given velocity (or outflow, where it points out of the box).
     Inflow {
         /// Velocity of the fluid there.
         #[schemars(extend("x-unit" = "m/s"))]
         velocity: AnimatedVector,
-        /// Density of the smoke that comes in.
+        /// Smoke density of the inflow.
         #[serde(default)]
         #[schemars(range(min = 0.0), extend("x-unit" = "kg/m³"))]
         density: f64,
-        /// Density of the fuel that comes in.
+        /// Fuel density of the inflow.
         #[serde(default)]
         #[schemars(range(min = 0.0), extend("x-unit" = "kg/m³"))]
         fuel: f64,
-        /// Temperature of what comes in; without it, the ambient one.
+        /// Temperature of the inflow. Default: the ambient one.
         #[serde(default)]
         #[schemars(range(min = 0.0), extend("x-unit" = "K"))]
         temperature: Option<f64>,
     },
 }
 
-/// What a fluid does at the surface of a collider.
+/// Boundary condition at the surface of a collider.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Solid {
-    /// It slips along the surface.
+    /// The fluid slips along the surface.
     #[default]
     FreeSlip,
-    /// It sticks to the surface.
+    /// The fluid sticks to the surface.
     NoSlip,
 }
 
-/// What differences of density do. Density is fluid_density/(1 + temperature.expansion (T - ambient)) + smoke.weight times smoke.
+/// Effect of density differences. Density is fluid_density/(1 + temperature.expansion (T - ambient)) + smoke.weight times smoke.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Densities {
-    /// They push, but have no inertia: for small ones.
+    /// Weight without inertia: for small differences.
     #[default]
     Boussinesq,
-    /// They push and have inertia; every step has a pressure equation of its own.
+    /// Weight and inertia; the pressure equation is rebuilt in every step.
     Variable,
 }
 
-/// How viscosity is stepped.
+/// Time integration of viscosity.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Viscous {
     /// Implicit Euler: stable for every step.
     #[default]
     Implicit,
-    /// Explicit Euler, in as many parts as its limit asks for.
+    /// Explicit Euler, in as many sub-steps as stability needs.
     Explicit,
 }
 
-/// Smoke that a fluid carries.
+/// Smoke advected by a fluid.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct Smoke {
-    /// Density at the start, a number or a formula of x, y, z.
+    /// Initial density, a number or a formula of x, y, z.
     #[schemars(extend("x-unit" = "kg/m³"))]
     pub initial: Component,
-    /// Share that vanishes in a second: density falls as exp(-rate t).
+    /// Rate of decay: density falls as exp(-rate t).
     #[schemars(range(min = 0.0), extend("x-unit" = "1/s"))]
     pub dissipation: f64,
-    /// How fast it spreads by itself.
+    /// Diffusion coefficient.
     #[schemars(range(min = 0.0), extend("x-unit" = "m²/s"))]
     pub diffusivity: f64,
-    /// Share of its own weight that pulls the fluid down; 0 is smoke as light as the fluid.
+    /// Fraction of its weight that acts on the fluid; 0 is neutrally buoyant smoke.
     #[schemars(extend("x-unit" = "1"))]
     pub weight: f64,
 }
@@ -227,29 +227,29 @@ impl Default for Smoke {
     }
 }
 
-/// Warmth that a fluid carries.
+/// Heat advected by a fluid.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct Temperature {
-    /// Temperature at which the fluid neither rises nor sinks.
+    /// Temperature of neutral buoyancy.
     #[schemars(extend("x-unit" = "K", "exclusiveMinimum" = 0.0))]
     pub ambient: f64,
-    /// Temperature at the start, a number or a formula of x, y, z; without it, the ambient one.
+    /// Initial temperature, a number or a formula of x, y, z. Default: the ambient one.
     #[schemars(extend("x-unit" = "K"))]
     pub initial: Option<Component>,
-    /// How fast it falls back to the ambient one: the difference falls as exp(-rate t).
+    /// Rate of cooling: the difference from the ambient temperature falls as exp(-rate t).
     #[schemars(range(min = 0.0), extend("x-unit" = "1/s"))]
     pub cooling: f64,
-    /// How fast heat radiates away where the fluid is 1000 K above the ambient temperature; by the fourth power of the difference.
+    /// Rate of radiative cooling at 1000 K above the ambient temperature; proportional to the fourth power of the difference.
     #[schemars(range(min = 0.0), extend("x-unit" = "K/s"))]
     pub radiation: f64,
-    /// How fast it spreads by itself.
+    /// Diffusion coefficient.
     #[schemars(range(min = 0.0), extend("x-unit" = "m²/s"))]
     pub diffusivity: f64,
     /// Heat capacity of the fluid.
     #[schemars(extend("x-unit" = "J/(kg K)", "exclusiveMinimum" = 0.0))]
     pub specific_heat: f64,
-    /// Share by which a volume grows per kelvin; without it, that of an ideal gas, 1/ambient.
+    /// Thermal expansion coefficient. Default: that of an ideal gas, 1/ambient.
     #[schemars(extend("x-unit" = "1/K"))]
     pub expansion: Option<f64>,
 }
@@ -260,27 +260,26 @@ impl Default for Temperature {
     }
 }
 
-/// Fuel that a fluid carries. Where it is hot enough it burns: a share exp(-t/burn_time) is left after a time t.
+/// Fuel advected by a fluid. Where it is hot enough it burns: the fraction exp(-t/burn_time) is left after a time t.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct Fire {
-    /// Density of the fuel at the start, a number or a formula of x, y, z.
+    /// Initial density of the fuel, a number or a formula of x, y, z.
     #[schemars(extend("x-unit" = "kg/m³"))]
     pub initial: Component,
-    /// Temperature above which it burns.
+    /// Ignition temperature.
     #[schemars(range(min = 0.0), extend("x-unit" = "K"))]
     pub ignition: f64,
-    /// Time in which it burns down to 1/e of itself.
+    /// Time in which it burns down to 1/e.
     #[schemars(extend("x-unit" = "s", "exclusiveMinimum" = 0.0))]
     pub burn_time: f64,
-    /// Heat that it gives off: the fluid warms by fuel heat/(fluid_density specific_heat).
+    /// Heat of combustion: the fluid warms by fuel heat/(fluid_density specific_heat).
     #[schemars(range(min = 0.0), extend("x-unit" = "J/kg"))]
     pub heat: f64,
-    /// Share of it that becomes smoke; needs `smoke`.
+    /// Fraction that becomes smoke; needs `smoke`.
     #[schemars(range(min = 0.0), extend("x-unit" = "1"))]
     pub soot: f64,
-    /// Volume by which the fluid grows: div u = expansion fuel/burn_time. The box needs an open side, or
-    /// pressure.excess = "remove".
+    /// Volume added per mass of fuel burnt: div u = expansion fuel/burn_time. The box needs an open side, or pressure.excess = "remove".
     #[schemars(range(min = 0.0), extend("x-unit" = "m³/kg"))]
     pub expansion: f64,
 }
@@ -291,130 +290,129 @@ impl Default for Fire {
     }
 }
 
-/// A region that gives smoke, warmth, fuel and velocity to the fluid in it.
+/// A region that is a source of smoke, heat, fuel and velocity.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct GasSource {
-    /// Where; not a mesh.
+    /// Shape of the region; not a mesh.
     pub shape: Shape,
-    /// Smoke that it gives off.
+    /// Smoke emitted.
     #[serde(default)]
     #[schemars(extend("x-unit" = "kg/(m³ s)"))]
     pub smoke: f64,
-    /// Smoke density that it holds there.
+    /// Fixed smoke density.
     #[serde(default)]
     #[schemars(range(min = 0.0), extend("x-unit" = "kg/m³"))]
     pub density: Option<f64>,
-    /// Temperature that it holds there.
+    /// Fixed temperature.
     #[serde(default)]
     #[schemars(range(min = 0.0), extend("x-unit" = "K"))]
     pub temperature: Option<f64>,
-    /// Warming of the fluid there.
+    /// Heating rate.
     #[serde(default)]
     #[schemars(extend("x-unit" = "K/s"))]
     pub heating: f64,
-    /// Fuel that it gives off.
+    /// Fuel emitted.
     #[serde(default)]
     #[schemars(range(min = 0.0), extend("x-unit" = "kg/(m³ s)"))]
     pub fuel: f64,
-    /// Fuel density that it holds there.
+    /// Fixed fuel density.
     #[serde(default)]
     #[schemars(range(min = 0.0), extend("x-unit" = "kg/m³"))]
     pub fuel_density: Option<f64>,
-    /// Velocity that it gives the fluid there, before the projection.
+    /// Fixed velocity, before the projection.
     #[serde(default)]
     #[schemars(extend("x-unit" = "m/s"))]
     pub velocity: Option<AnimatedVector>,
-    /// When it begins.
+    /// Start time.
     #[serde(default)]
     #[schemars(extend("x-unit" = "s"))]
     pub start: f64,
-    /// When it ends; without it, never.
+    /// End time. Default: never.
     #[serde(default)]
     #[schemars(extend("x-unit" = "s"))]
     pub end: Option<f64>,
 }
 
-/// Order of the four parts of a step. Both go through the same circle; they differ in where a step begins.
+/// Order of the four parts of a step. Both are the same cycle with different starting points.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Order {
-    /// Advection, forces, viscosity, projection: what leaves is free of divergence.
+    /// Advection, forces, viscosity, projection: the result is divergence-free.
     #[default]
     ProjectLast,
-    /// Forces, viscosity, projection, advection; at the end of each exchange one more projection.
+    /// Forces, viscosity, projection, advection; one more projection at the end of each exchange.
     AdvectLast,
 }
 
-/// How velocities and scalars are carried.
+/// Advection of velocities and scalars.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct Advections {
-    /// How the velocity carries itself.
+    /// Advection of the velocity.
     pub velocity: Carriage,
-    /// How smoke and warmth are carried.
+    /// Advection of smoke, fuel and temperature.
     pub scalars: Carriage,
 }
 
-/// How something is carried: semi-Lagrangian, the value is that from where the fluid came.
+/// Semi-Lagrangian advection: the value is that at the departure point.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct Carriage {
-    /// Values between points.
+    /// Interpolation between points.
     pub interpolation: GridInterpolation,
-    /// MacCormack's correction, limited: second order. Without the word, smoke and warmth have it and velocities do not.
+    /// Limited MacCormack correction: second order. Default: on for scalars, off for velocities.
     pub corrected: Option<bool>,
-    /// How the path back is traced.
+    /// Backtracing scheme.
     pub trace: PathTrace,
-    /// Pieces that the path is cut into; without it, one.
+    /// Sub-steps of the path. Default: one.
     #[schemars(range(min = 1, max = 1000))]
     pub pieces: Option<u32>,
-    /// Vectors turn with the fluid; for velocities alone.
+    /// Vectors rotate with the fluid; for velocities only.
     pub turning: bool,
 }
 
-/// Values between the points of a grid.
+/// Interpolation between the points of a grid.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum GridInterpolation {
     /// Bilinear or trilinear.
     #[default]
     Linear,
-    /// Through four points along each axis.
+    /// Cubic through four points along each axis.
     Cubic,
     /// The same without new extrema.
     MonotoneCubic,
 }
 
-/// How the path of the fluid is traced.
+/// Scheme that traces the path of the fluid.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum PathTrace {
-    /// One velocity, that at the start.
+    /// One velocity, at the start of the path.
     Euler,
-    /// The velocity in the middle.
+    /// The midpoint velocity.
     #[default]
     Rk2,
     /// Three velocities.
     Rk3,
 }
 
-/// How the pressure is found.
+/// Pressure solver.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct Pressure {
     /// The solver.
     pub method: PressureMethod,
-    /// Largest divergence that may be left, times dx, over the fastest velocity before the projection. Default 1e-5 (single),
-    /// 1e-10 (double).
+    /// Largest residual divergence, times dx, relative to the fastest velocity before the projection. Default: 1e-5 (single), 1e-10 (double).
     #[schemars(extend("x-unit" = "1", "exclusiveMinimum" = 0.0))]
     pub tolerance: Option<f64>,
-    /// Iterations at most.
+    /// Maximum number of iterations.
     #[schemars(range(min = 1, max = 1_000_000))]
     pub iterations: u32,
-    /// What happens when more flows into a closed space than out of it.
+    /// Behaviour when the net flow into a closed region is not zero.
     pub excess: ExcessFlow,
-    /// What happens when the tolerance is not met.
+    /// Behaviour when the tolerance is not met.
     pub on_failure: OnFailure,
 }
 
@@ -434,34 +432,34 @@ impl Default for Pressure {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum PressureMethod {
-    /// Every cell from its neighbours of before.
+    /// Jacobi iteration.
     Jacobi,
-    /// Red cells, then black ones.
+    /// Red-black Gauss-Seidel.
     GaussSeidel,
     /// Successive over-relaxation.
     Sor,
     /// Conjugate gradients.
     ConjugateGradients,
-    /// With incomplete Cholesky factors.
+    /// Conjugate gradients with incomplete Cholesky, IC(0).
     IncompleteCholesky,
-    /// With modified incomplete Cholesky factors, MIC(0).
+    /// Conjugate gradients with modified incomplete Cholesky, MIC(0).
     ModifiedIncompleteCholesky,
-    /// V-cycles alone.
+    /// Multigrid V-cycles alone.
     Multigrid,
-    /// Conjugate gradients with a V-cycle before each step.
+    /// Conjugate gradients preconditioned by a V-cycle.
     #[default]
     MultigridGradients,
     /// The cosine transform, for closed boxes.
     Cosine,
 }
 
-/// What happens when more flows into a closed space than out of it.
+/// Behaviour when the net flow into a closed region is not zero.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum ExcessFlow {
     /// The run ends with an error.
     #[default]
     Error,
-    /// The mean of the divergence is left in the flow.
+    /// The mean divergence remains in the flow.
     Remove,
 }

@@ -7,11 +7,10 @@ use serde::{Deserialize, Serialize};
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct GridBox {
-    /// Lengths of its sides; in a scene of two dimensions the one across the plane does not matter. Each is rounded to whole
-    /// cells.
+    /// Side lengths; in a 2D scene the one normal to the plane is ignored. Each is rounded to whole cells.
     #[schemars(inner(range(min = 1e-9)), extend("x-unit" = "m"))]
     pub size: [f64; 3],
-    /// Its middle.
+    /// Centre.
     #[serde(default)]
     #[schemars(extend("x-unit" = "m"))]
     pub center: [f64; 3],

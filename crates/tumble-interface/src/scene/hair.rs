@@ -1,59 +1,59 @@
-//! Hair: strands that are planted on a surface.
+//! Hair: strands on a surface.
 
 use super::MeshFile;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-/// Strands planted on a surface, each a rod that is clamped at its root. They are at rest as they are groomed.
+/// Strands on a surface, each a rod clamped at its root. The groomed shape is the rest shape.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Hair {
-    /// Name in frames; with the scene's seed, the key of its random numbers.
+    /// Name in frames; with the scene's seed, it determines the random numbers.
     pub name: String,
-    /// System that moves it; without it, the first that can.
+    /// System that moves it. Default: the first that can.
     #[serde(default)]
     pub system: Option<String>,
-    /// Collider on whose surface it grows, and with which its roots move. This or `mesh`.
+    /// Collider on which the hair grows and with which its roots move. Alternative: `mesh`.
     #[serde(default)]
     pub on: Option<String>,
-    /// Which bone carries the roots, where `on` is a mannequin or a character: hair on its head, with `above`, follows `head`. Without it,
-    /// each root follows its place on the surface.
+    /// Bone that the roots follow, if `on` is a mannequin or a character: hair on its head, with `above`, follows `head`. Default: each root follows
+    /// its point on the surface.
     #[serde(default)]
     pub bone: Option<String>,
-    /// Mesh on which it grows; its roots stay. This or `on`.
+    /// Mesh on which the hair grows; its roots are fixed. Alternative: `on`.
     #[serde(default)]
     pub mesh: Option<MeshFile>,
-    /// Count of strands. This or `per_area`.
+    /// Number of strands. Alternative: `per_area`.
     #[serde(default)]
     #[schemars(range(min = 1, max = 10_000_000))]
     pub count: Option<u32>,
-    /// Strands per area. This or `count`.
+    /// Strands per area. Alternative: `count`.
     #[serde(default)]
     #[schemars(extend("x-unit" = "1/m²", "exclusiveMinimum" = 0.0))]
     pub per_area: Option<f64>,
-    /// Only where a root is above this height.
+    /// Minimum height of roots.
     #[serde(default)]
     #[schemars(extend("x-unit" = "m"))]
     pub above: Option<f64>,
     /// Length of a strand.
     #[schemars(range(min = 1e-6, max = 1000.0), extend("x-unit" = "m"))]
     pub length: f64,
-    /// By what share of it a strand may be shorter, at random.
+    /// Largest fraction by which a strand is shortened at random.
     #[serde(default)]
     #[schemars(range(min = 0.0, max = 0.95), extend("x-unit" = "1"))]
     pub spread: f64,
-    /// Straight pieces of a strand; there is one mass more.
+    /// Segments per strand; there is one more mass.
     #[serde(default = "sixteen")]
     #[schemars(range(min = 1, max = 10_000))]
     pub segments: u32,
-    /// Added to the normal of the surface, which has length 1, for the direction in which strands grow.
+    /// Vector added to the unit normal of the surface to give the growth direction.
     #[serde(default)]
     #[schemars(extend("x-unit" = "1"))]
     pub lean: [f64; 3],
-    /// Turns strands into spirals.
+    /// Curls strands into helices.
     #[serde(default)]
     pub curl: Option<Curl>,
-    /// Draws strands together.
+    /// Gathers strands into clumps.
     #[serde(default)]
     pub clump: Option<Clump>,
     /// Radius of a strand.
@@ -76,62 +76,62 @@ pub struct Hair {
     #[serde(default)]
     #[schemars(range(min = 0.0), extend("x-unit" = "s"))]
     pub damping: f64,
-    /// How strands act on each other; without it, they do not.
+    /// Interaction between strands. Default: none.
     #[serde(default)]
     pub collisions: Option<HairCollisions>,
-    /// Strands in pictures and exports for each one that is simulated, between its nearest neighbours.
+    /// Strands in pictures and exports per simulated strand, interpolated between nearest neighbours.
     #[serde(default = "one")]
     #[schemars(range(min = 1, max = 1000))]
     pub render: u32,
-    /// Red, green and blue in pictures, 0 to 1, in linear light (a half is sRGB's 188 of 255).
+    /// Red, green and blue in pictures, 0 to 1, in linear light (0.5 is 188 of 255 in sRGB).
     #[serde(default)]
     #[schemars(inner(range(min = 0.0, max = 1.0)))]
     pub color: Option<[f64; 3]>,
 }
 
-/// The spiral that a strand is.
+/// The helix of a strand.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Curl {
-    /// Radius of the spiral.
+    /// Radius of the helix.
     #[schemars(range(min = 1e-6, max = 1000.0), extend("x-unit" = "m"))]
     pub radius: f64,
-    /// Height of a turn; 0 is a ring.
+    /// Height of one turn; 0 is a ring.
     #[serde(default)]
     #[schemars(range(min = 0.0), extend("x-unit" = "m"))]
     pub pitch: f64,
 }
 
-/// Strands that are drawn together.
+/// Strands gathered into clumps.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Clump {
-    /// Count of clumps: the first strands are their middles.
+    /// Number of clumps; the first strands are their centres.
     #[schemars(range(min = 1, max = 10_000_000))]
     pub count: u32,
-    /// Share of the way to the middle that the tips are drawn; the root is not.
+    /// Fraction of the distance to the clump's centre by which tips are moved; roots stay.
     #[serde(default = "half")]
     #[schemars(range(min = 0.0, max = 1.0), extend("x-unit" = "1"))]
     pub strength: f64,
 }
 
-/// Strands as a continuum: their mass and velocity on a grid.
+/// Strand interaction as a continuum: mass and velocity on a grid.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct HairCollisions {
     /// Spacing of the grid.
     #[schemars(extend("x-unit" = "m", "exclusiveMinimum" = 0.0))]
     pub cell: f64,
-    /// Rate at which velocities go over to those of the hair around.
+    /// Rate at which velocities approach those of the surrounding hair.
     #[serde(default)]
     #[schemars(range(min = 0.0), extend("x-unit" = "1/s"))]
     pub friction: f64,
-    /// Pressure at twice the rest density: p = pressure (density/rest density - 1), none below. Sub-steps must be well below
-    /// cell sqrt(rest density/pressure).
+    /// Pressure at twice the rest density: p = pressure (density/rest density - 1), zero below rest density. Sub-steps must be well below cell
+    /// sqrt(rest density/pressure).
     #[serde(default)]
     #[schemars(range(min = 0.0), extend("x-unit" = "Pa"))]
     pub pressure: f64,
-    /// Density of the hair, as mass per volume of the grid, above which it pushes; without it, the mean where hair is at the start.
+    /// Hair density, as mass per volume of the grid, above which there is pressure. Default: the initial mean where there is hair.
     #[serde(default)]
     #[schemars(extend("x-unit" = "kg/m³", "exclusiveMinimum" = 0.0))]
     pub rest_density: Option<f64>,

@@ -12,10 +12,10 @@ use serde::{Deserialize, Serialize};
 pub struct Heat {
     /// Name in frames and pictures.
     pub name: String,
-    /// The `heat` system that steps it; without it, the first one.
+    /// The `heat` system that steps it. Default: the first one.
     #[serde(default)]
     pub system: Option<String>,
-    /// Its box and cells.
+    /// Box and cells.
     #[serde(rename = "box")]
     pub grid: GridBox,
     /// Conductivity k.
@@ -24,52 +24,51 @@ pub struct Heat {
     /// Density.
     #[schemars(extend("x-unit" = "kg/m³", "exclusiveMinimum" = 0.0))]
     pub density: f64,
-    /// Heat capacity c of a mass.
+    /// Specific heat capacity c.
     #[schemars(extend("x-unit" = "J/(kg K)", "exclusiveMinimum" = 0.0))]
     pub heat_capacity: f64,
-    /// Temperature at the start: a number or a formula of x, y, z.
+    /// Initial temperature, a number or a formula of x, y, z.
     #[schemars(extend("x-unit" = "K"))]
     pub temperature: Component,
-    /// How time is stepped.
+    /// Time integration scheme.
     #[serde(default)]
     pub scheme: HeatScheme,
-    /// What is beyond its sides. A side without words is insulated.
+    /// Boundary conditions. A side that is not given is insulated.
     #[serde(default)]
     pub sides: HeatSides,
-    /// Axes along which the last cell borders on the first.
+    /// Periodic axes.
     #[serde(default)]
     pub periodic: [bool; 3],
-    /// Parts of other materials, or holes; of several at one place the last counts.
+    /// Regions of other materials, or holes; where they overlap the last one applies.
     #[serde(default)]
     pub region: Vec<HeatRegion>,
-    /// Heat that arises inside.
+    /// Heat sources.
     #[serde(default)]
     pub source: Vec<HeatSource>,
-    /// Residual at which the linear solver of the implicit schemes stops, relative to the first. Default 1e-5 (single),
-    /// 1e-11 (double).
+    /// Residual at which the linear solver of the implicit schemes stops, relative to the initial one. Default: 1e-5 (single), 1e-11 (double).
     #[serde(default)]
     #[schemars(extend("x-unit" = "1", "exclusiveMinimum" = 0.0, "exclusiveMaximum" = 1.0))]
     pub tolerance: Option<f64>,
 }
 
-/// How the diffusion equation is stepped.
+/// Time integration scheme of the diffusion equation.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum HeatScheme {
-    /// Forward Euler. Order 1; no step longer than dx²/(2 d kappa), with kappa = k/(density c) in d dimensions: without
-    /// `substeps` and `step` as many as 0.7 of that asks for, and a longer one is refused.
+    /// Forward Euler. Order 1; steps are at most dx²/(2 d kappa), with kappa = k/(density c) in d dimensions: longer ones are an error, and 0.7 of
+    /// this limit is the default without `substeps` and `step`.
     Explicit,
-    /// Backward Euler. Order 1; every step is stable and makes no new extremes.
+    /// Backward Euler. Order 1; stable for every step, without new extrema.
     #[default]
     Implicit,
-    /// Crank and Nicolson's trapezoid. Order 2; every step is stable, but jumps swing for long after large ones.
+    /// Crank-Nicolson (trapezoidal rule). Order 2; stable for every step, but with large steps jumps oscillate for long.
     Trapezoid,
-    /// Cosine series: exact in time, and in space for what they can show. For insulated boxes of one material, whose
-    /// counts of cells are products of 2, 3 and 5.
+    /// Cosine series: exact in time, and in space for resolved modes. For insulated boxes of one material whose cell counts are products of 2, 3 and
+    /// 5.
     Spectral,
 }
 
-/// What is beyond the sides of a box.
+/// Boundary conditions of a box.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct HeatSides {
@@ -88,7 +87,7 @@ pub struct HeatSides {
 }
 
 impl HeatSides {
-    /// The sides with their words.
+    /// The sides with their keys.
     pub fn all(&self) -> [(&'static str, &Option<HeatSide>); 6] {
         [
             ("x_low", &self.x_low),
@@ -101,15 +100,15 @@ impl HeatSides {
     }
 }
 
-/// What a surface borders on: `{ temperature = 300 }` holds it at a temperature, `{ flux = 100 }` lets heat in, and
-/// `{ temperature = 300, coefficient = 10 }` cools it by a fluid, with a flux besides if there is one.
+/// Boundary condition: `{ temperature = 300 }` fixes the temperature, `{ flux = 100 }` supplies heat, and `{ temperature = 300, coefficient = 10 }`
+/// cools by a fluid, optionally with an additional flux.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct HeatSide {
-    /// Temperature of the surface, or, with a coefficient, of what flows along it.
+    /// Temperature of the surface or, with a coefficient, of the adjacent fluid.
     #[schemars(extend("x-unit" = "K"))]
     pub temperature: Option<Animated>,
-    /// Heat that passes from what flows along the surface, for each kelvin of difference.
+    /// Heat transfer coefficient of the adjacent fluid.
     #[schemars(extend("x-unit" = "W/(m² K)", "exclusiveMinimum" = 0.0))]
     pub coefficient: Option<f64>,
     /// Heat that enters through the surface.
@@ -117,45 +116,44 @@ pub struct HeatSide {
     pub flux: Option<Animated>,
 }
 
-/// A part of another material, or a hole.
+/// A region of another material, or a hole.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct HeatRegion {
-    /// The cells whose middle is in it; no mesh.
+    /// Shape of the region: it contains the cells whose centres are inside. Not a mesh.
     pub shape: Shape,
-    /// Conductivity, if another.
+    /// Conductivity. Default: that of the body.
     #[serde(default)]
     #[schemars(extend("x-unit" = "W/(m K)", "exclusiveMinimum" = 0.0))]
     pub conductivity: Option<f64>,
-    /// Density, if another.
+    /// Density. Default: that of the body.
     #[serde(default)]
     #[schemars(extend("x-unit" = "kg/m³", "exclusiveMinimum" = 0.0))]
     pub density: Option<f64>,
-    /// Heat capacity of a mass, if another.
+    /// Specific heat capacity. Default: that of the body.
     #[serde(default)]
     #[schemars(extend("x-unit" = "J/(kg K)", "exclusiveMinimum" = 0.0))]
     pub heat_capacity: Option<f64>,
-    /// Temperature at the start, if another: a number or a formula of x, y, z.
+    /// Initial temperature, a number or a formula of x, y, z. Default: that of the body.
     #[serde(default)]
     #[schemars(extend("x-unit" = "K"))]
     pub temperature: Option<Component>,
-    /// With it the region is a hole, no part of the body, and this is what the surface around it borders on; `{}`
-    /// insulates.
+    /// Makes the region a hole in the body, with this boundary condition on its surface; `{}` insulates.
     #[serde(default)]
     pub hole: Option<HeatSide>,
 }
 
-/// Heat that arises in a body.
+/// A heat source in a body.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct HeatSource {
-    /// The cells whose middle is in it, no mesh; without it, all.
+    /// Shape of the source: it contains the cells whose centres are inside. Not a mesh. Default: all cells.
     #[serde(default)]
     pub shape: Option<Shape>,
-    /// Power of a volume.
+    /// Power per volume.
     #[schemars(extend("x-unit" = "W/m³"))]
     pub power: Animated,
-    /// What the power is multiplied by from place to place: a formula of x, y, z.
+    /// Spatial factor on the power: a formula of x, y, z.
     #[serde(default = "everywhere")]
     #[schemars(extend("x-unit" = "1"))]
     pub profile: Component,

@@ -1,5 +1,5 @@
-//! The scene: every word that a scene file may hold, with unit, default and range. These structs are the
-//! schema; JSON Schema, the reference page and the Python stubs are generated from them.
+//! The scene: every key of a scene file, with unit, default and range. These structs are the schema; JSON Schema, the reference page and the Python
+//! stubs are generated from them.
 
 mod animated;
 mod cloth;
@@ -50,26 +50,26 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use std::sync::LazyLock;
 
-/// A whole simulation: what is there, how it moves, what is written out.
+/// A complete simulation: objects, methods and output.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Scene {
     /// Version of the scene language; this is 1.
     #[schemars(range(min = 1, max = 1))]
     pub version: u32,
-    /// One line for people.
+    /// One-line title.
     #[serde(default)]
     pub title: String,
-    /// Seed of every random number.
+    /// Seed of all random numbers.
     #[serde(default)]
     pub seed: u32,
     /// Scalar type of the engine.
     #[serde(default)]
     pub precision: Precision,
-    /// What may differ from machine to machine.
+    /// Scope of bit-identity.
     #[serde(default)]
     pub bits: Bits,
-    /// 2 keeps everything in `plane`; 3 is space.
+    /// 2 restricts everything to `plane`; 3 is full 3D.
     #[serde(default = "three")]
     #[schemars(range(min = 2, max = 3))]
     pub dimension: u8,
@@ -79,13 +79,13 @@ pub struct Scene {
     /// Frames and their rate.
     #[serde(default)]
     pub time: Time,
-    /// What acts everywhere.
+    /// Global settings.
     #[serde(default)]
     pub world: WorldSettings,
-    /// Numerical methods; without any, each method that objects need has one system, named `main` (`dynamics`) or as the method.
+    /// Numerical methods. Default: one system for each method that the objects need, named `main` (`dynamics`) or after the method.
     #[serde(default)]
     pub system: Vec<System>,
-    /// Free masses and springs between them, listed one by one.
+    /// Individually listed masses and springs between them.
     #[serde(default)]
     pub particles: Vec<Particles>,
     /// Sources of particles that are born and die.
@@ -94,13 +94,13 @@ pub struct Scene {
     /// Chains of springs, or rods.
     #[serde(default)]
     pub rope: Vec<Rope>,
-    /// Strands planted on surfaces.
+    /// Strands on surfaces.
     #[serde(default)]
     pub hair: Vec<Hair>,
-    /// Lattices of springs in a rectangle.
+    /// Rectangular lattices of springs.
     #[serde(default)]
     pub sheet: Vec<Sheet>,
-    /// Lattices of springs, or tetrahedra, in a box.
+    /// Box-shaped lattices of springs, or of tetrahedra.
     #[serde(default)]
     pub block: Vec<Block>,
     /// Springs along the edges of any mesh.
@@ -109,13 +109,13 @@ pub struct Scene {
     /// Cloth cut from panels and sewn.
     #[serde(default)]
     pub cloth: Vec<Cloth>,
-    /// Stars, placed at random and set going so that they hold together; needs a force of gravitation.
+    /// Stars at random positions, in dynamical equilibrium; needs a force of gravitation.
     #[serde(default)]
     pub galaxy: Vec<Galaxy>,
     /// Bodies that conduct heat.
     #[serde(default)]
     pub heat: Vec<Heat>,
-    /// Gases that sound runs through.
+    /// Compressible gases.
     #[serde(default)]
     pub compressible: Vec<Compressible>,
     /// Fluids that fill a box, moved by systems of method `gas`.
@@ -124,22 +124,22 @@ pub struct Scene {
     /// Forces on the masses of `dynamics` systems.
     #[serde(default)]
     pub force: Vec<Force>,
-    /// Velocity fields that carry the particles of `tracers` systems.
+    /// Velocity fields that advect the particles of `tracers` systems.
     #[serde(default)]
     pub field: Vec<Field>,
-    /// Solid things that masses cannot enter.
+    /// Solids that masses cannot enter.
     #[serde(default)]
     pub collider: Vec<Collider>,
-    /// Springs between objects, also of different systems.
+    /// Springs between objects, possibly in different systems.
     #[serde(default)]
     pub anchor: Vec<Anchor>,
-    /// What a run writes.
+    /// Output of a run.
     #[serde(default)]
     pub output: Output,
-    /// From where pictures are taken.
+    /// Camera of pictures.
     #[serde(default)]
     pub camera: Camera,
-    /// Bounds that a run must keep; a run that breaks one ends with exit code 1.
+    /// Bounds that a run must keep; violating one ends the run with exit code 1.
     #[serde(default)]
     pub expect: Expect,
 }
@@ -151,19 +151,19 @@ pub enum Precision {
     /// 32-bit numbers: fast, seven digits.
     #[default]
     Single,
-    /// 64-bit numbers: for orders of convergence and long orbits.
+    /// 64-bit numbers: for convergence studies and long orbits.
     Double,
 }
 
-/// What may differ from machine to machine.
+/// Scope of bit-identity.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Bits {
     /// Nothing: the same scene gives the same bits on every machine.
     #[default]
     Portable,
-    /// Forces between all masses use the fastest arithmetic of the machine (fused, estimated roots): the same bits on any
-    /// count of threads and after restoring, on machines with the same instructions.
+    /// Forces between all masses use the fastest arithmetic of the machine (fused, estimated roots): the same bits for any number of threads and
+    /// after a restore, on machines with the same instruction set.
     Native,
 }
 
@@ -199,14 +199,14 @@ impl Default for Time {
     }
 }
 
-/// What acts everywhere.
+/// Global settings.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct WorldSettings {
     /// Gravity, z up.
     #[schemars(extend("x-unit" = "m/s²"))]
     pub gravity: [f64; 3],
-    /// A scene that would need more memory than this is refused before any is taken.
+    /// Memory limit: a scene that needs more is refused before allocation.
     #[schemars(extend("x-unit" = "GiB", "exclusiveMinimum" = 0.0))]
     pub memory_limit: f64,
 }
@@ -234,8 +234,8 @@ impl Scene {
         schemars::schema_for!(Scene).into()
     }
 
-    /// Checks a tree and gives it meaning. Reports everything wrong with the words, types, units and ranges at once;
-    /// what depends on several values together (a pin on a missing corner) is checked when the world is built.
+    /// Checks and interprets a tree. Reports all errors of keys, types, units and ranges at once; conditions on several values (a pin on a missing
+    /// corner) are checked when the world is built.
     pub fn from_tree(tree: &Node) -> Result<Scene, SceneError> {
         if tree.too_deep() {
             return Err(SceneError::one("", TOO_DEEP));
@@ -255,7 +255,7 @@ impl Scene {
         Self::from_tree(&Node::from_toml(text)?)
     }
 
-    /// The scene as JSON, every default written out.
+    /// The scene as JSON, with all defaults filled in.
     pub fn to_json(&self) -> serde_json::Value {
         let mut full = self.clone();
         full.rope.iter_mut().filter(|o| o.rod.is_none()).for_each(|o| o.links = Some(o.links()));
@@ -270,7 +270,7 @@ impl Scene {
         1.0 / self.time.fps
     }
 
-    /// Records of fabrics that the scene names, in order of appearance.
+    /// References to fabric records, in order of appearance.
     pub fn fabrics_mut(&mut self) -> Vec<FabricRef<'_>> {
         let sheets = self.sheet.iter_mut().map(|o| ("sheet", &o.name, &mut o.fabric));
         let nets = self.net.iter_mut().map(|o| ("net", &o.name, &mut o.fabric));
@@ -280,7 +280,7 @@ impl Scene {
             .collect()
     }
 
-    /// Meshes and characters that the scene names, in order of appearance.
+    /// References to meshes and characters, in order of appearance.
     pub fn mesh_files_mut(&mut self) -> Vec<MeshRef<'_>> {
         fn one(place: String, file: &mut MeshFile) -> MeshRef<'_> {
             MeshRef { skinned: false, place, path: &file.path, hash: &mut file.hash }

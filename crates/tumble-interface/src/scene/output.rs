@@ -1,15 +1,15 @@
-//! What a run writes, from where it is seen, and what it must keep.
+//! Output, camera and expectations of a run.
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-/// What a run writes.
+/// Output of a run.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct Output {
-    /// Columns of the frames, of each object that has them. Of particles: `position`, `velocity`, `orientation`, `angular_velocity`,
-    /// `link_strain`; of grids: `density`, `temperature`, `fuel`, `flux`, `pressure`, `velocity`, `vorticity`, `divergence`, on faces
-    /// `velocity_x`, `velocity_y`, `velocity_z`, and of each solid in a gas the `force` on it.
+    /// Columns of the frames, for each object that has them. Particles: `position`, `velocity`, `orientation`, `angular_velocity`, `link_strain`;
+    /// grids: `density`, `temperature`, `fuel`, `flux`, `pressure`, `velocity`, `vorticity`, `divergence`, on faces `velocity_x`, `velocity_y`,
+    /// `velocity_z`; solids in a gas: the `force` on each.
     pub columns: Vec<String>,
     /// Write `film.mp4`.
     pub film: bool,
@@ -17,13 +17,13 @@ pub struct Output {
     pub usd: bool,
     /// Write `ply/`: the particles of each object at each frame.
     pub ply: bool,
-    /// Write `volumes/`: what lies on the grid of each object, at each frame.
+    /// Write `volumes/`: the grids of each object at each frame.
     pub vdb: bool,
     /// Write `energy.png`.
     pub plot: bool,
-    /// Frames of which to write a still picture.
+    /// Frames to write as still pictures.
     pub stills: Vec<u32>,
-    /// Frames between checkpoints; a run that is stopped goes on from the last one.
+    /// Frames between checkpoints; a stopped run resumes from the last one.
     #[schemars(range(min = 1))]
     pub checkpoint: u32,
 }
@@ -43,14 +43,14 @@ impl Default for Output {
     }
 }
 
-/// From where pictures are taken.
+/// Camera of pictures.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct Camera {
-    /// Where it stands; without it, far enough to see everything.
+    /// Position. Default: far enough away to see everything.
     #[schemars(extend("x-unit" = "m"))]
     pub position: Option<[f64; 3]>,
-    /// What it looks at; without it, the middle of everything.
+    /// Point that it looks at. Default: the centre of the scene.
     #[schemars(extend("x-unit" = "m"))]
     pub target: Option<[f64; 3]>,
     /// Horizontal angle of view.
@@ -59,7 +59,7 @@ pub struct Camera {
     /// Width and height of pictures.
     #[schemars(inner(range(min = 16, max = 8192)), extend("x-unit" = "pixel"))]
     pub resolution: [u32; 2],
-    /// How pictures are lit.
+    /// Lighting of pictures.
     pub look: Look,
 }
 
@@ -69,7 +69,7 @@ impl Default for Camera {
     }
 }
 
-/// How pictures are lit.
+/// Lighting of pictures.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Look {
@@ -80,50 +80,50 @@ pub enum Look {
     Night,
 }
 
-/// Bounds that every frame must keep.
+/// Bounds on every frame.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct Expect {
-    /// Longest link, piece of a rod or edge of a membrane or fabric over its rest length.
+    /// Largest stretch, length over rest length, of links, rod segments and edges of membranes and fabrics.
     #[schemars(extend("x-unit" = "1", "exclusiveMinimum" = 0.0))]
     pub max_stretch: Option<f64>,
-    /// Deepest mass inside a collider or its thickness, of those that are not held.
+    /// Largest depth of a free mass inside a collider or its thickness.
     #[schemars(range(min = 0.0), extend("x-unit" = "m"))]
     pub max_penetration: Option<f64>,
-    /// Edges of soft surfaces that pass through triangles of their system; they are counted with or without `self_contact`. With it, edges and
+    /// Number of edges of soft surfaces that pass through triangles of their system, counted with or without `self_contact`. With it, edges and
     /// triangles of colliders with `edges` count, too.
     pub max_intersections: Option<u64>,
     /// Fastest mass.
     #[schemars(range(min = 0.0), extend("x-unit" = "m/s"))]
     pub max_speed: Option<f64>,
-    /// |E - E_0| over the largest kinetic or potential energy so far.
+    /// |E - E_0| relative to the largest kinetic or potential energy so far.
     #[schemars(range(min = 0.0), extend("x-unit" = "1"))]
     pub max_energy_drift: Option<f64>,
-    /// Growth of the energy over the largest kinetic or potential energy so far.
+    /// Growth of the energy relative to the largest kinetic or potential energy so far.
     #[schemars(range(min = 0.0), extend("x-unit" = "1"))]
     pub max_energy_growth: Option<f64>,
     /// Kinetic energy at the last frame.
     #[schemars(range(min = 0.0), extend("x-unit" = "J"))]
     pub max_final_kinetic: Option<f64>,
-    /// |m - m_0| over the mass at the start.
+    /// |m - m_0| relative to the initial mass.
     #[schemars(range(min = 0.0), extend("x-unit" = "1"))]
     pub max_mass_error: Option<f64>,
-    /// |P - P_0|, how far the momentum is from that at the start.
+    /// |P - P_0|, the change of momentum since the start.
     #[schemars(range(min = 0.0), extend("x-unit" = "kg m/s"))]
     pub max_momentum_change: Option<f64>,
-    /// |L - L_0|, how far the angular momentum about the origin is from that at the start.
+    /// |L - L_0|, the change of angular momentum about the origin since the start.
     #[schemars(range(min = 0.0), extend("x-unit" = "kg m²/s"))]
     pub max_angular_momentum_change: Option<f64>,
-    /// |V - V_0| over the volume inside closed surfaces at the start.
+    /// |V - V_0| relative to the initial volume inside closed surfaces.
     #[schemars(range(min = 0.0), extend("x-unit" = "1"))]
     pub max_volume_error: Option<f64>,
-    /// Largest divergence of the velocity of gases in any cell; of one that burns, with what fire swells.
+    /// Largest divergence of the velocity of gases in any cell, including expansion by fire.
     #[schemars(range(min = 0.0), extend("x-unit" = "1/s"))]
     pub max_divergence: Option<f64>,
-    /// Heat that bodies have gained less heat that came in, over the largest of both so far.
+    /// Heat gained by bodies less heat supplied, relative to the largest of both so far.
     #[schemars(range(min = 0.0), extend("x-unit" = "1"))]
     pub max_heat_error: Option<f64>,
-    /// Links that have broken by the last frame.
+    /// Number of broken links at the last frame.
     pub broken_links: Option<u32>,
     /// Values of single masses at the last frame.
     pub probe: Vec<Probe>,
@@ -140,9 +140,9 @@ pub struct Probe {
     pub column: String,
     /// Index of the mass within the object, or of the cell within its grid, the first axis fastest.
     pub index: u32,
-    /// The value expected; of a single number the first counts.
+    /// Expected value; for a scalar column only the first number counts.
     pub value: [f64; 3],
-    /// How far off it may be, as a distance.
+    /// Largest allowed distance from the value.
     #[schemars(extend("exclusiveMinimum" = 0.0))]
     pub tolerance: f64,
 }

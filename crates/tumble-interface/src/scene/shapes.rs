@@ -4,7 +4,7 @@ use super::items_above_zero;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-/// A solid thing that masses cannot enter.
+/// A solid that masses cannot enter.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Collider {
@@ -12,15 +12,15 @@ pub struct Collider {
     pub name: String,
     /// Its shape.
     pub shape: Shape,
-    /// Masses are kept this far from the surface.
+    /// Distance kept between masses and the surface.
     #[serde(default)]
     #[schemars(range(min = 0.0), extend("x-unit" = "m"))]
     pub thickness: f64,
-    /// Coulomb friction coefficient of what slides.
+    /// Kinetic friction coefficient (Coulomb).
     #[serde(default)]
     #[schemars(range(min = 0.0), extend("x-unit" = "1"))]
     pub friction: f64,
-    /// Coulomb friction coefficient of what rests, at least `friction`; without it, the same.
+    /// Static friction coefficient, at least `friction`. Default: equal to `friction`.
     #[serde(default)]
     #[schemars(range(min = 0.0), extend("x-unit" = "1"))]
     pub friction_static: Option<f64>,
@@ -28,44 +28,43 @@ pub struct Collider {
     #[serde(default)]
     #[schemars(range(min = 0.0, max = 1.0), extend("x-unit" = "1"))]
     pub restitution: f64,
-    /// Turned inside out: a container that keeps masses in. Not for planes and shells.
+    /// Inverted: a container that keeps masses inside. Not for planes and shells.
     #[serde(default)]
     pub inside: bool,
-    /// Whether its edges and corners meet those of soft surfaces and curves, too, in systems with `self_contact`: for what is sharp, or
-    /// thinner than the mesh of what falls on it. All then keep off it by its `thickness`, at least 0.6 of that of `self_contact`; edges do
-    /// not bounce. Neither for planes nor in scenes of two dimensions.
+    /// Whether its edges and corners collide with soft surfaces and curves, too, in systems with `self_contact`: for sharp solids, or ones thinner
+    /// than the mesh spacing of soft objects. The distance kept is then its `thickness`, at least 0.6 of that of `self_contact`; edges have no
+    /// restitution. Not for planes, and not in 2D scenes.
     #[serde(default)]
     pub edges: bool,
-    /// Velocity of the surface itself, as of a conveyor belt; the shape stays, and turns this along when it turns.
+    /// Velocity of the surface, as of a conveyor belt; the shape does not move with it, but its rotation rotates this velocity.
     #[serde(default)]
     #[schemars(extend("x-unit" = "m/s"))]
     pub belt: [f64; 3],
-    /// How it moves, as a rigid whole; without it, it stays.
+    /// Rigid motion. Default: none.
     #[serde(default)]
     pub motion: Option<Motion>,
-    /// Red, green and blue in pictures, 0 to 1, in linear light (a half is sRGB's 188 of 255).
+    /// Red, green and blue in pictures, 0 to 1, in linear light (0.5 is 188 of 255 in sRGB).
     #[serde(default)]
     #[schemars(inner(range(min = 0.0, max = 1.0)))]
     pub color: Option<[f64; 3]>,
 }
 
-/// A rigid motion: along keyframes, then on at constant velocity and spin. At t = 0, without keyframes, the thing is where
-/// its shape says.
+/// A rigid motion: along keyframes, then at constant velocity and spin. Without keyframes, the solid is at the position of its shape at t = 0.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct Motion {
     /// Velocity of the pivot.
     #[schemars(extend("x-unit" = "m/s"))]
     pub velocity: [f64; 3],
-    /// Angular velocity about the pivot: its direction is the axis, after the right hand.
+    /// Angular velocity about the pivot, along the axis by the right-hand rule.
     #[schemars(extend("x-unit" = "rad/s"))]
     pub spin: [f64; 3],
-    /// The point about which spin and keyframes turn, where it is without motion.
+    /// Centre of rotation for spin and keyframes, in the position without motion.
     #[schemars(extend("x-unit" = "m"))]
     pub pivot: [f64; 3],
-    /// Places at rising times; before the first and after the last it stays.
+    /// Poses at increasing times; constant before the first and after the last.
     pub keys: Vec<Pose>,
-    /// What happens between keyframes.
+    /// Interpolation between keyframes.
     pub interpolation: Pace,
 }
 
@@ -76,24 +75,24 @@ pub struct Pose {
     /// When.
     #[schemars(extend("x-unit" = "s"))]
     pub time: f64,
-    /// Movement away from where the shape says.
+    /// Translation relative to the shape's position.
     #[serde(default)]
     #[schemars(extend("x-unit" = "m"))]
     pub translate: [f64; 3],
-    /// Turn about x, then y, then z. The way to the next keyframe is the shorter one: below 180°.
+    /// Rotation about x, then y, then z. The rotation to the next keyframe takes the shorter arc, below 180°.
     #[serde(default)]
     #[schemars(extend("x-unit" = "°"))]
     pub rotate: [f64; 3],
 }
 
-/// What happens between keyframes.
+/// Interpolation between keyframes.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Pace {
     /// Constant velocity from one to the next.
     #[default]
     Linear,
-    /// From rest to rest: s² (3 - 2 s) of the way.
+    /// Eased from rest to rest: s² (3 - 2 s).
     Smooth,
 }
 
@@ -111,7 +110,7 @@ pub enum Shape {
         #[schemars(extend("x-unit" = "m", "exclusiveMinimum" = 0.0))]
         radius: f64,
     },
-    /// A box with edges along the axes, turned if asked.
+    /// A box, axis-aligned unless rotated.
     Box {
         /// Its centre.
         #[serde(default)]
@@ -120,7 +119,7 @@ pub enum Shape {
         /// Its edges.
         #[schemars(transform = items_above_zero, extend("x-unit" = "m"))]
         size: [f64; 3],
-        /// Turn about x, then y, then z.
+        /// Rotation about x, then y, then z.
         #[serde(default)]
         #[schemars(extend("x-unit" = "°"))]
         rotate: [f64; 3],
@@ -141,7 +140,7 @@ pub enum Shape {
         #[schemars(extend("x-unit" = "m"))]
         height: f64,
     },
-    /// A cylinder with round ends: everything closer than its radius to a segment.
+    /// A cylinder with round ends: all points closer than its radius to a segment.
     Capsule {
         /// One end of the segment.
         #[schemars(extend("x-unit" = "m"))]
@@ -155,26 +154,25 @@ pub enum Shape {
     },
     /// A solid of revolution about an axis along z: funnels, bowls, vases, cones.
     Lathe {
-        /// Where the axis has z = 0.
+        /// Point of the axis with z = 0 in `profile`.
         #[serde(default)]
         #[schemars(extend("x-unit" = "m"))]
         center: [f64; 3],
-        /// Corners of half the cut through it, in order around: distance from the axis and height of each.
+        /// Corners of half the cross-section, in order: distance from the axis and height of each.
         #[schemars(length(min = 3), extend("x-unit" = "m"))]
         profile: Vec<[f64; 2]>,
-        /// Flat sides around.
+        /// Number of flat sides around the axis.
         #[serde(default = "around")]
         #[schemars(range(min = 3, max = 1000))]
         sides: u32,
     },
     /// A triangle mesh from a file.
     Mesh(MeshFile),
-    /// A triangle mesh whose vertices move, from a file for each of some times.
+    /// A triangle mesh with moving vertices, from one file per keyframe.
     AnimatedMesh(MeshFrames),
-    /// A skinned figure from a glTF file that one of its clips moves.
+    /// A skinned figure from a glTF file, animated by one of its clips.
     Character(Figure),
-    /// A figure that is made here: an artist's mannequin that stands, walks, twirls or dances. It looks along -y, its left is +x, its
-    /// soles are at z = 0.
+    /// A generated figure: an artist's mannequin that stands, walks, twirls or dances. It faces -y, its left is +x, its soles are at z = 0.
     Mannequin(Mannequin),
 }
 
@@ -182,78 +180,78 @@ fn around() -> u32 {
     64
 }
 
-/// A skinned, animated figure from a GLB or glTF file. Between frames of `rate` its vertices move straight.
+/// A skinned, animated figure from a GLB or glTF file. Its vertices move linearly between frames of `rate`.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Figure {
     /// File, relative to the scene file.
     pub path: String,
-    /// Hash of the file's content; without it, any content will do.
+    /// Hash of the file's content. Default: any content is accepted.
     #[serde(default)]
     pub hash: Option<String>,
-    /// Name of the movement; without it, the first of the file.
+    /// Name of the animation clip. Default: the first in the file.
     #[serde(default)]
     pub clip: Option<String>,
-    /// Whether the clip starts again after its end; else the figure stays in its last pose.
+    /// Whether the clip repeats; otherwise the figure stays in its last pose.
     #[serde(default = "yes")]
     pub repeat: bool,
-    /// Factor on the size.
+    /// Scale factor.
     #[serde(default = "one")]
     #[schemars(extend("x-unit" = "1", "exclusiveMinimum" = 0.0))]
     pub scale: f64,
-    /// Turn about x, then y, then z. Without it the y axis of the file, up in glTF, becomes the z axis: [90, 0, 0].
+    /// Rotation about x, then y, then z. The default [90, 0, 0] turns the y axis of the file, up in glTF, into the z axis.
     #[serde(default = "upright")]
     #[schemars(extend("x-unit" = "°"))]
     pub rotate: [f64; 3],
-    /// Movement after scaling and turning.
+    /// Translation after scaling and rotation.
     #[serde(default)]
     #[schemars(extend("x-unit" = "m"))]
     pub translate: [f64; 3],
-    /// When the movement begins; before, the figure is in its pose without clips.
+    /// Start of the motion; before, the figure is in its pose without clips.
     #[serde(default)]
     #[schemars(range(min = 0.0), extend("x-unit" = "s"))]
     pub start: f64,
-    /// Time for the way from that pose into the movement. 0 is at once.
+    /// Duration of the transition from that pose into the motion. 0 is immediate.
     #[serde(default = "one")]
     #[schemars(range(min = 0.0), extend("x-unit" = "s"))]
     pub settle: f64,
-    /// Frames a second into which the movement is divided for collisions.
+    /// Keyframes per second of the motion for collisions.
     #[serde(default = "sixty")]
     #[schemars(range(min = 1.0, max = 1000.0), extend("x-unit" = "1/s"))]
     pub rate: f64,
-    /// Treat the surface as a shell without an inside; for figures that are not closed (needs a thickness).
+    /// Treats the surface as a shell without an inside; for figures that are not closed (needs a thickness).
     #[serde(default)]
     pub shell: bool,
 }
 
-/// A mannequin. Its bones, which pins follow: `hips`, `spine`, `chest`, `neck`, `head`; on its left `shoulder_l`, `upper_arm_l`, `forearm_l`,
-/// `hand_l`, `thigh_l`, `shin_l`, `foot_l`, `toes_l`; and on its right the same with `_r`.
+/// A mannequin. Its bones, which pins can follow: `hips`, `spine`, `chest`, `neck`, `head`; on its left `shoulder_l`, `upper_arm_l`, `forearm_l`,
+/// `hand_l`, `thigh_l`, `shin_l`, `foot_l`, `toes_l`; on its right the same with `_r`.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct Mannequin {
-    /// What it does.
+    /// Its motion.
     pub motion: Moves,
     /// Its height.
     #[schemars(extend("x-unit" = "m", "exclusiveMinimum" = 0.0))]
     pub height: f64,
-    /// Factor on the pace of its movement.
+    /// Speed factor of its motion.
     #[schemars(extend("x-unit" = "1", "exclusiveMinimum" = 0.0))]
     pub pace: f64,
-    /// Whether a walk goes forward; else it is one on the spot.
+    /// Whether a walk moves forward; otherwise it is on the spot.
     pub travel: bool,
-    /// Turn about x, then y, then z.
+    /// Rotation about x, then y, then z.
     #[schemars(extend("x-unit" = "°"))]
     pub rotate: [f64; 3],
-    /// Movement after turning.
+    /// Translation after rotation.
     #[schemars(extend("x-unit" = "m"))]
     pub translate: [f64; 3],
-    /// When the movement begins; before, the mannequin stands with its arms held out downwards at 45°.
+    /// Start of the motion; before, the mannequin stands with its arms held out downwards at 45°.
     #[schemars(range(min = 0.0), extend("x-unit" = "s"))]
     pub start: f64,
-    /// Time for the way from that pose into the movement. 0 is at once.
+    /// Duration of the transition from that pose into the motion. 0 is immediate.
     #[schemars(range(min = 0.0), extend("x-unit" = "s"))]
     pub settle: f64,
-    /// Frames a second into which the movement is divided for collisions.
+    /// Keyframes per second of the motion for collisions.
     #[schemars(range(min = 1.0, max = 1000.0), extend("x-unit" = "1/s"))]
     pub rate: f64,
 }
@@ -274,16 +272,16 @@ impl Default for Mannequin {
     }
 }
 
-/// What a mannequin does.
+/// Motion of a mannequin.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Moves {
-    /// It stays in the pose in which it is dressed.
+    /// It stays in the dressing pose.
     Bind,
     /// It stands at ease and breathes.
     #[default]
     Stand,
-    /// It walks, a step of 0.55 m in 0.55 s at a height of 1.7 m.
+    /// It walks, with steps of 0.55 m in 0.55 s at a height of 1.7 m.
     Walk,
     /// It turns about the vertical on the balls of its feet, arms held out, once in 1.6 s.
     Twirl,
@@ -291,25 +289,25 @@ pub enum Moves {
     Dance,
 }
 
-/// A mesh for each of some times, linear in time between them. All have the same triangles.
+/// Meshes at given times, linearly interpolated. All have the same triangles.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct MeshFrames {
-    /// The meshes, at rising times; before the first and after the last nothing moves.
+    /// The meshes, at increasing times; constant before the first and after the last.
     pub frames: Vec<MeshFrame>,
-    /// Factor on the size.
+    /// Scale factor.
     #[serde(default = "one")]
     #[schemars(extend("x-unit" = "1", "exclusiveMinimum" = 0.0))]
     pub scale: f64,
-    /// Turn about x, then y, then z.
+    /// Rotation about x, then y, then z.
     #[serde(default)]
     #[schemars(extend("x-unit" = "°"))]
     pub rotate: [f64; 3],
-    /// Movement after scaling and turning.
+    /// Translation after scaling and rotation.
     #[serde(default)]
     #[schemars(extend("x-unit" = "m"))]
     pub translate: [f64; 3],
-    /// Treat the mesh as a shell without an inside; for meshes that are not closed (needs a thickness).
+    /// Treats the mesh as a shell without an inside; for meshes that are not closed (needs a thickness).
     #[serde(default)]
     pub shell: bool,
 }
@@ -323,15 +321,15 @@ pub struct MeshFrame {
     pub time: f64,
     /// File, relative to the scene file.
     pub path: String,
-    /// Hash of the file's content; without it, any content will do.
+    /// Hash of the file's content. Default: any content is accepted.
     #[serde(default)]
     pub hash: Option<String>,
 }
 
-/// A file that a scene names: its place in the scene, its path, and the hash of its content.
+/// A reference to a file: its place in the scene, its path, and the hash of its content.
 #[derive(Debug)]
 pub struct MeshRef<'a> {
-    /// Whether it is a character, and not a mesh alone.
+    /// Whether it is a character, not just a mesh.
     pub skinned: bool,
     /// Place in the scene, for messages.
     pub place: String,
@@ -341,24 +339,24 @@ pub struct MeshRef<'a> {
     pub hash: &'a mut Option<String>,
 }
 
-/// A triangle mesh from an OBJ, PLY, STL or GLB file, or outside the browser from USD, placed in the world: scaled, turned, then moved.
+/// A triangle mesh from an OBJ, PLY, STL or GLB file, or outside the browser from USD; scaled, rotated, then translated.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct MeshFile {
     /// File, relative to the scene file.
     pub path: String,
-    /// Hash of the file's content; without it, any content will do.
+    /// Hash of the file's content. Default: any content is accepted.
     #[serde(default)]
     pub hash: Option<String>,
-    /// Factor on the size.
+    /// Scale factor.
     #[serde(default = "one")]
     #[schemars(extend("x-unit" = "1", "exclusiveMinimum" = 0.0))]
     pub scale: f64,
-    /// Turn about x, then y, then z.
+    /// Rotation about x, then y, then z.
     #[serde(default)]
     #[schemars(extend("x-unit" = "°"))]
     pub rotate: [f64; 3],
-    /// Movement after scaling and turning.
+    /// Translation after scaling and rotation.
     #[serde(default)]
     #[schemars(extend("x-unit" = "m"))]
     pub translate: [f64; 3],
@@ -366,7 +364,7 @@ pub struct MeshFile {
     #[serde(default = "ninety_six")]
     #[schemars(range(min = 8, max = 512))]
     pub resolution: u32,
-    /// Treat the mesh as a shell without an inside; for meshes that are not closed (colliders only; needs a thickness).
+    /// Treats the mesh as a shell without an inside; for meshes that are not closed (colliders only; needs a thickness).
     #[serde(default)]
     pub shell: bool,
 }

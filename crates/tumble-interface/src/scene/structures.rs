@@ -1,5 +1,4 @@
-//! Structures of masses and links. Stiffness is given so that it does not depend on how finely an
-//! object is divided: k_s = modulus x (length, area or volume that the link stands for) / l0².
+//! Structures of masses and links. Stiffness is independent of resolution: k_s = modulus x (length, area or volume that the link represents) / l0².
 
 use super::fabrics::FabricWords;
 use super::surfaces::{Fluid, Inflation, Membrane, ShapeMatching, Tear};
@@ -7,23 +6,23 @@ use super::{MeshFile, items_above_zero};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-/// Free masses, and springs between chosen ones.
+/// Free masses, and springs between selected ones.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Particles {
     /// Name in frames.
     pub name: String,
-    /// System that moves it; without it, the first that can.
+    /// System that moves it. Default: the first that can.
     #[serde(default)]
     pub system: Option<String>,
-    /// Where the masses start; this or `cloud`.
+    /// Initial positions. Alternative: `cloud`.
     #[serde(default)]
     #[schemars(extend("x-unit" = "m"))]
     pub position: Vec<[f64; 3]>,
-    /// Masses at random places; this or `position`.
+    /// Masses at random positions. Alternative: `position`.
     #[serde(default)]
     pub cloud: Option<Cloud>,
-    /// How fast they start: one velocity each, or a single one for all.
+    /// Initial velocities: one each, or a single one for all.
     #[serde(default)]
     #[schemars(extend("x-unit" = "m/s"))]
     pub velocity: Vec<[f64; 3]>,
@@ -35,63 +34,63 @@ pub struct Particles {
     #[serde(default)]
     #[schemars(extend("x-unit" = "C"))]
     pub charge: Vec<f64>,
-    /// Masses that stay where they are.
+    /// Fixed masses.
     #[serde(default)]
     pub pin: Vec<Pin>,
     /// Springs between them.
     #[serde(default)]
     pub spring: Vec<Spring>,
-    /// Makes it a liquid that fills boxes at the start, instead of `position`, `cloud` and `mass`. Position-based dynamics only.
+    /// A liquid that fills boxes at the start, instead of `position`, `cloud` and `mass`. Position-based dynamics only.
     #[serde(default)]
     pub fluid: Option<Fluid>,
-    /// Keeps the whole in shape. Position-based dynamics only.
+    /// Shape matching of the whole object. Position-based dynamics only.
     #[serde(default)]
     pub shape_matching: Option<ShapeMatching>,
     /// Radius in pictures.
     #[serde(default = "centimetre")]
     #[schemars(extend("x-unit" = "m", "exclusiveMinimum" = 0.0))]
     pub radius: f64,
-    /// How much of the way behind each is drawn in pictures.
+    /// Duration of the trail drawn behind each particle in pictures.
     #[serde(default)]
     #[schemars(range(min = 0.0), extend("x-unit" = "s"))]
     pub trail: f64,
-    /// Red, green and blue in pictures, 0 to 1, in linear light (a half is sRGB's 188 of 255).
+    /// Red, green and blue in pictures, 0 to 1, in linear light (0.5 is 188 of 255 in sRGB).
     #[serde(default)]
     #[schemars(inner(range(min = 0.0, max = 1.0)))]
     pub color: Option<[f64; 3]>,
 }
 
-/// Masses at random places, the same for the same seed and name.
+/// Masses at random positions, determined by seed and name.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Cloud {
-    /// How many.
+    /// Count.
     #[schemars(range(min = 1, max = 100_000_000))]
     pub count: u32,
-    /// The middle.
+    /// Centre.
     #[serde(default)]
     #[schemars(extend("x-unit" = "m"))]
     pub center: [f64; 3],
-    /// Edges of the box, or diameters of the sphere; zero along one axis makes it flat.
+    /// Edges of the box, or diameters of the ellipsoid; zero along one axis makes it flat.
     #[schemars(inner(range(min = 0.0)), extend("x-unit" = "m"))]
     pub size: [f64; 3],
-    /// What is filled.
+    /// Shape of the cloud.
     #[serde(default)]
     pub shape: CloudShape,
-    /// Speed into directions drawn at random, in the plane of a flat cloud; it adds to `velocity`.
+    /// Speed in random directions, within the plane of a flat cloud; added to `velocity`.
     #[serde(default)]
     #[schemars(range(min = 0.0), extend("x-unit" = "m/s"))]
     pub speed: f64,
 }
 
-/// What a cloud fills.
+/// Shape of a cloud.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum CloudShape {
     /// A box.
     #[default]
     Box,
-    /// A ball, or what a ball becomes with three different diameters.
+    /// A ball, or an ellipsoid for unequal diameters.
     Sphere,
 }
 
@@ -104,11 +103,11 @@ pub struct Spring {
     /// Spring constant k_s.
     #[schemars(range(min = 0.0), extend("x-unit" = "N/m"))]
     pub stiffness: f64,
-    /// Rest length; 0 makes f = k_s (b - a); without it, the distance at the start.
+    /// Rest length; 0 gives f = k_s (b - a). Default: the initial distance.
     #[serde(default)]
     #[schemars(range(min = 0.0), extend("x-unit" = "m"))]
     pub rest_length: Option<f64>,
-    /// Internal damping: force along the spring per speed of lengthening.
+    /// Internal damping: force along the spring per rate of extension.
     #[serde(default)]
     #[schemars(range(min = 0.0), extend("x-unit" = "N s/m"))]
     pub damping: f64,
@@ -119,92 +118,92 @@ pub struct Spring {
     /// Pulls but does not push, like a thread.
     #[serde(default)]
     pub tension_only: bool,
-    /// Breaks for good when |r| / l0 exceeds this.
+    /// Breaks permanently when |r| / l0 exceeds this.
     #[serde(default)]
     #[schemars(extend("x-unit" = "1", "exclusiveMinimum" = 0.0))]
     pub break_strain: Option<f64>,
 }
 
-/// Stars, placed at random and set going so that they hold together under the gravitation of the scene.
+/// Stars at random positions, in dynamical equilibrium under the gravitation of the scene.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Galaxy {
-    /// Name in frames; with the scene's seed, the key of its random numbers.
+    /// Name in frames; with the scene's seed, it determines the random numbers.
     pub name: String,
-    /// System that moves it; without it, the first that can.
+    /// System that moves it. Default: the first that can.
     #[serde(default)]
     pub system: Option<String>,
-    /// How the stars lie.
+    /// Distribution of the stars.
     #[serde(default)]
     pub profile: Profile,
-    /// Count of stars.
+    /// Number of stars.
     #[serde(default = "many")]
     #[schemars(range(min = 1, max = 100_000_000))]
     pub stars: u32,
-    /// Mass of all stars together.
+    /// Total mass of the stars.
     #[schemars(extend("x-unit" = "kg", "exclusiveMinimum" = 0.0))]
     pub mass: f64,
     /// Scale length: of the disk's exponential, or a of Plummer's sphere.
     #[schemars(extend("x-unit" = "m", "exclusiveMinimum" = 0.0))]
     pub length: f64,
-    /// Height z0 of the disk over its scale length; its density is in proportion to sech²(z/z0).
+    /// Height z0 of the disk relative to its scale length; its density is proportional to sech²(z/z0).
     #[serde(default = "tenth")]
     #[schemars(range(min = 0.0), extend("x-unit" = "1"))]
     pub thickness: f64,
-    /// Toomre's Q: speeds at random, in units of those at which a disk just does not fall apart into lumps.
+    /// Toomre's Q: velocity dispersion in units of the one at which a disk is marginally stable against fragmentation.
     #[serde(default = "stable")]
     #[schemars(range(min = 0.0), extend("x-unit" = "1"))]
     pub toomre: f64,
-    /// Dark matter round the stars of a disk; it is one mass more, the last one.
+    /// Dark matter around the stars of a disk: one additional mass, the last one.
     #[serde(default)]
     pub halo: Option<Halo>,
-    /// Where its centre starts.
+    /// Initial position of its centre.
     #[serde(default)]
     #[schemars(extend("x-unit" = "m"))]
     pub center: [f64; 3],
-    /// How fast its centre starts.
+    /// Initial velocity of its centre.
     #[serde(default)]
     #[schemars(extend("x-unit" = "m/s"))]
     pub velocity: [f64; 3],
-    /// Turned about x, y and z, in this order; a disk lies in the plane of x and y before.
+    /// Rotation about x, then y, then z; a disk is in the x-y plane before.
     #[serde(default)]
     #[schemars(extend("x-unit" = "degree"))]
     pub rotate: [f64; 3],
-    /// Turns clockwise as seen from above, before `rotate`.
+    /// Rotates clockwise as seen from above, before `rotate`.
     #[serde(default)]
     pub clockwise: bool,
     /// Radius of a star in pictures.
     #[schemars(extend("x-unit" = "m", "exclusiveMinimum" = 0.0))]
     pub radius: f64,
-    /// How much of the way behind each is drawn in pictures.
+    /// Duration of the trail drawn behind each particle in pictures.
     #[serde(default)]
     #[schemars(range(min = 0.0), extend("x-unit" = "s"))]
     pub trail: f64,
-    /// Red, green and blue in pictures, 0 to 1, in linear light (a half is sRGB's 188 of 255).
+    /// Red, green and blue in pictures, 0 to 1, in linear light (0.5 is 188 of 255 in sRGB).
     #[serde(default)]
     #[schemars(inner(range(min = 0.0, max = 1.0)))]
     pub color: Option<[f64; 3]>,
 }
 
-/// How the stars of a galaxy lie.
+/// Distribution of the stars of a galaxy.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Profile {
-    /// A disk whose density falls exponentially, turning almost in circles.
+    /// An exponential disk with nearly circular orbits.
     #[default]
     Disk,
     /// Plummer's sphere in equilibrium.
     Plummer,
 }
 
-/// A halo: a mass that is spread out as Plummer's sphere, and moves as one body.
+/// A halo: a Plummer sphere that moves as one mass.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Halo {
     /// Its mass.
     #[schemars(extend("x-unit" = "kg", "exclusiveMinimum" = 0.0))]
     pub mass: f64,
-    /// Its radius b: 35 % of the mass are within.
+    /// Its radius b, which encloses 35 % of the mass.
     #[schemars(extend("x-unit" = "m", "exclusiveMinimum" = 0.0))]
     pub radius: f64,
 }
@@ -215,41 +214,40 @@ pub struct Halo {
 pub struct Rope {
     /// Name in frames.
     pub name: String,
-    /// System that moves it; without it, the first that can.
+    /// System that moves it. Default: the first that can.
     #[serde(default)]
     pub system: Option<String>,
-    /// Where it starts.
+    /// Position of its start.
     #[schemars(extend("x-unit" = "m"))]
     pub from: [f64; 3],
-    /// Where it ends.
+    /// Position of its end.
     #[schemars(extend("x-unit" = "m"))]
     pub to: [f64; 3],
-    /// Rest length; without it, the distance between the ends. A longer rope starts as a circular arc hanging down.
+    /// Rest length. Default: the distance between the ends. A longer rope starts as a circular arc hanging down.
     #[serde(default)]
     #[schemars(extend("x-unit" = "m", "exclusiveMinimum" = 0.0))]
     pub length: Option<f64>,
-    /// Straight pieces; there is one mass more.
+    /// Segments; there is one more mass.
     #[schemars(range(min = 1, max = 1_000_000_000))]
     pub segments: u32,
     /// Mass per length.
     #[serde(default = "tenth")]
     #[schemars(extend("x-unit" = "kg/m", "exclusiveMinimum" = 0.0))]
     pub density: f64,
-    /// Spring families, modulus in N: `structural` between neighbours, `bend` between next-nearest ones. Not with `rod`.
-    /// Without it, structural 1000.
+    /// Spring families, modulus in N: `structural` between neighbours, `bend` between next-nearest ones. Not with `rod`. Default: structural 1000.
     #[serde(default)]
     pub links: Option<Links>,
-    /// Makes it a rod with orientation frames, which bends and twists.
+    /// Makes it a Cosserat rod, which resists bending and twist.
     #[serde(default)]
     pub rod: Option<Rod>,
-    /// Masses that stay where they are: `"start"`, `"end"`, `"vertex 3"`. A pinned end of a rod is clamped.
+    /// Fixed masses: `"start"`, `"end"`, `"vertex 3"`. A pinned end of a rod is clamped.
     #[serde(default)]
     pub pin: Vec<Pin>,
     /// Radius in pictures.
     #[serde(default = "centimetre")]
     #[schemars(extend("x-unit" = "m", "exclusiveMinimum" = 0.0))]
     pub radius: f64,
-    /// Red, green and blue in pictures, 0 to 1, in linear light (a half is sRGB's 188 of 255).
+    /// Red, green and blue in pictures, 0 to 1, in linear light (0.5 is 188 of 255 in sRGB).
     #[serde(default)]
     #[schemars(inner(range(min = 0.0, max = 1.0)))]
     pub color: Option<[f64; 3]>,
@@ -262,35 +260,35 @@ pub struct Rod {
     /// Stretching stiffness E A.
     #[schemars(extend("x-unit" = "N", "exclusiveMinimum" = 0.0))]
     pub stretch: f64,
-    /// Shearing stiffness k G A; without it, that of stretching.
+    /// Shearing stiffness k G A. Default: that of stretching.
     #[serde(default)]
     #[schemars(extend("x-unit" = "N", "exclusiveMinimum" = 0.0))]
     pub shear: Option<f64>,
     /// Bending stiffness E I.
     #[schemars(range(min = 0.0), extend("x-unit" = "N m²"))]
     pub bend: f64,
-    /// Bending stiffness towards `side`, as of a flat strip in its own plane; without it, `bend` in all directions.
+    /// Bending stiffness towards `side`, as of a flat strip in its own plane. Default: `bend`.
     #[serde(default)]
     #[schemars(range(min = 0.0), extend("x-unit" = "N m²"))]
     pub bend_side: Option<f64>,
-    /// Direction in which `bend_side` resists: the width of a flat strip at its start, made perpendicular to the rod. Without it, horizontal, so
-    /// that a strip lies flat, and along y where the rod starts vertically.
+    /// Direction in which `bend_side` resists: the width of a flat strip at its start, orthogonalized against the rod. Default: horizontal, so that a
+    /// strip lies flat, or along y where the rod starts vertically.
     #[serde(default)]
     #[schemars(extend("x-unit" = "1"))]
     pub side: Option<[f64; 3]>,
-    /// Twisting stiffness G J; without it, that of bending.
+    /// Twisting stiffness G J. Default: that of bending.
     #[serde(default)]
     #[schemars(range(min = 0.0), extend("x-unit" = "N m²"))]
     pub twist: Option<f64>,
-    /// Rotational inertia per length, the same about every axis; without it, that of a round wire of the picture radius.
+    /// Rotational inertia per length, the same about every axis. Default: that of a round wire of the picture radius.
     #[serde(default)]
     #[schemars(extend("x-unit" = "kg m", "exclusiveMinimum" = 0.0))]
     pub inertia: Option<f64>,
-    /// Damping of all, as a time: damping = time x stiffness.
+    /// Damping of all strains, as a time: damping = time x stiffness.
     #[serde(default)]
     #[schemars(range(min = 0.0), extend("x-unit" = "s"))]
     pub damping: f64,
-    /// A segment breaks for good when its length is off by more than this share; only in position-based systems.
+    /// Strain at which a segment breaks permanently; only in position-based systems.
     #[serde(default)]
     #[schemars(extend("x-unit" = "1", "exclusiveMinimum" = 0.0))]
     pub break_strain: Option<f64>,
@@ -302,7 +300,7 @@ pub struct Rod {
 pub struct Sheet {
     /// Name in frames.
     pub name: String,
-    /// System that moves it; without it, the first that can.
+    /// System that moves it. Default: the first that can.
     #[serde(default)]
     pub system: Option<String>,
     /// Lengths of its sides.
@@ -311,48 +309,47 @@ pub struct Sheet {
     /// Masses along each side.
     #[schemars(inner(range(min = 2, max = 1_000_000_000)))]
     pub resolution: [u32; 2],
-    /// Its middle.
+    /// Centre.
     #[serde(default)]
     #[schemars(extend("x-unit" = "m"))]
     pub center: [f64; 3],
-    /// Turn about x, then y, then z, from lying flat in the plane z = 0.
+    /// Rotation about x, then y, then z, from the plane z = 0.
     #[serde(default)]
     #[schemars(extend("x-unit" = "°"))]
     pub rotate: [f64; 3],
-    /// Mass per area. Without it, that of the fabric, or 0.2.
+    /// Mass per area. Default: that of the fabric, or 0.2.
     #[serde(default)]
     #[schemars(extend("x-unit" = "kg/m²", "exclusiveMinimum" = 0.0))]
     pub density: Option<f64>,
-    /// Spring families, modulus in N/m. Without it, structural 500, shear 200 and bend 10.
+    /// Spring families, modulus in N/m. Default: structural 500, shear 200 and bend 10.
     #[serde(default)]
     pub links: Option<Links>,
     /// Dihedral bending stiffness between neighbouring triangles.
     #[serde(default)]
     #[schemars(range(min = 0.0), extend("x-unit" = "N m"))]
     pub hinge: f64,
-    /// The same beside it as of a plate, alike in all directions; quadratic in the positions and cheaper than hinges, and exact where nothing is
-    /// stretched.
+    /// Additional isotropic plate bending stiffness; quadratic in the positions, cheaper than hinges, and exact for inextensible sheets.
     #[serde(default)]
     #[schemars(range(min = 0.0), extend("x-unit" = "N m"))]
     pub isometric: f64,
-    /// Resistance against stretch as of a woven membrane; links are then left out unless they are given.
+    /// Stretch resistance of a woven membrane; it replaces the default links.
     #[serde(default)]
     pub membrane: Option<Membrane>,
-    /// Measured fabric, by the name of a shipped one or the path of its record: stretch, bending and, unless given, density. Links are then left
-    /// out unless they are given.
+    /// Measured fabric, the name of a bundled one or the path of its record: stretch, bending and, by default, density. It replaces the default
+    /// links.
     #[serde(default)]
     pub fabric: Option<FabricWords>,
-    /// How it tears; without it, it does not.
+    /// Tearing. Default: none.
     #[serde(default)]
     pub tear: Option<Tear>,
-    /// Stiffness of each triangle against changes of its area: tension over relative change.
+    /// Area stiffness of each triangle: tension per relative change of area.
     #[serde(default)]
     #[schemars(range(min = 0.0), extend("x-unit" = "N/m"))]
     pub area: f64,
-    /// Masses that stay where they are: `"corner 0 0"`, `"vertex 3 4"`, `"edge x-"`.
+    /// Fixed masses: `"corner 0 0"`, `"vertex 3 4"`, `"edge x-"`.
     #[serde(default)]
     pub pin: Vec<Pin>,
-    /// Red, green and blue in pictures, 0 to 1, in linear light (a half is sRGB's 188 of 255).
+    /// Red, green and blue in pictures, 0 to 1, in linear light (0.5 is 188 of 255 in sRGB).
     #[serde(default)]
     #[schemars(inner(range(min = 0.0, max = 1.0)))]
     pub color: Option<[f64; 3]>,
@@ -364,7 +361,7 @@ pub struct Sheet {
 pub struct Block {
     /// Name in frames.
     pub name: String,
-    /// System that moves it; without it, the first that can.
+    /// System that moves it. Default: the first that can.
     #[serde(default)]
     pub system: Option<String>,
     /// Lengths of its edges.
@@ -373,11 +370,11 @@ pub struct Block {
     /// Masses along each edge.
     #[schemars(inner(range(min = 2, max = 1_000_000_000)))]
     pub resolution: [u32; 3],
-    /// Its middle.
+    /// Centre.
     #[serde(default)]
     #[schemars(extend("x-unit" = "m"))]
     pub center: [f64; 3],
-    /// Turn about x, then y, then z.
+    /// Rotation about x, then y, then z.
     #[serde(default)]
     #[schemars(extend("x-unit" = "°"))]
     pub rotate: [f64; 3],
@@ -388,16 +385,16 @@ pub struct Block {
     /// Spring families, modulus in Pa. Not with `material`.
     #[serde(default)]
     pub links: Option<Links>,
-    /// Fills it with elastic tetrahedra.
+    /// Elastic tetrahedra instead of springs.
     #[serde(default)]
     pub material: Option<Material>,
-    /// Keeps the whole in shape. Position-based dynamics only.
+    /// Shape matching of the whole object. Position-based dynamics only.
     #[serde(default)]
     pub shape_matching: Option<ShapeMatching>,
-    /// Masses that stay where they are: `"corner 0 0 0"`, `"vertex 1 2 3"`, `"face z-"`.
+    /// Fixed masses: `"corner 0 0 0"`, `"vertex 1 2 3"`, `"face z-"`.
     #[serde(default)]
     pub pin: Vec<Pin>,
-    /// Red, green and blue in pictures, 0 to 1, in linear light (a half is sRGB's 188 of 255).
+    /// Red, green and blue in pictures, 0 to 1, in linear light (0.5 is 188 of 255 in sRGB).
     #[serde(default)]
     #[schemars(inner(range(min = 0.0, max = 1.0)))]
     pub color: Option<[f64; 3]>,
@@ -425,55 +422,55 @@ pub struct Material {
 pub struct Net {
     /// Name in frames.
     pub name: String,
-    /// System that moves it; without it, the first that can.
+    /// System that moves it. Default: the first that can.
     #[serde(default)]
     pub system: Option<String>,
     /// The mesh.
     pub mesh: MeshFile,
-    /// The texture coordinates of the mesh are the flat pattern that it is made from: where nothing is strained, and the direction of the warp,
-    /// along u. Without it, nothing is strained at the start.
+    /// Takes the texture coordinates of the mesh as its flat sewing pattern: the rest shape, with the warp along u. Default: the initial shape is the
+    /// rest shape.
     #[serde(default)]
     pub pattern: Option<Pattern>,
-    /// Mass per area. Without it, that of the fabric, or 0.2.
+    /// Mass per area. Default: that of the fabric, or 0.2.
     #[serde(default)]
     #[schemars(extend("x-unit" = "kg/m²", "exclusiveMinimum" = 0.0))]
     pub density: Option<f64>,
-    /// Spring families, modulus in N/m: `structural` along edges, `bend` across them. Without it, structural 500 and bend 10.
+    /// Spring families, modulus in N/m: `structural` along edges, `bend` across them. Default: structural 500 and bend 10.
     #[serde(default)]
     pub links: Option<Links>,
     /// Dihedral bending stiffness between neighbouring triangles.
     #[serde(default)]
     #[schemars(range(min = 0.0), extend("x-unit" = "N m"))]
     pub hinge: f64,
-    /// The same beside it, quadratic in the positions and flat at rest, whatever the shape of the mesh: cheaper than a hinge, and equal to it where
-    /// nothing is stretched.
+    /// Additional bending stiffness, quadratic in the positions and flat at rest for any mesh: cheaper than a hinge, and equal to it for inextensible
+    /// surfaces.
     #[serde(default)]
     #[schemars(range(min = 0.0), extend("x-unit" = "N m"))]
     pub isometric: f64,
-    /// Resistance against stretch as of a woven membrane; links are then left out unless they are given.
+    /// Stretch resistance of a woven membrane; it replaces the default links.
     #[serde(default)]
     pub membrane: Option<Membrane>,
-    /// Measured fabric, by the name of a shipped one or the path of its record: stretch, bending and, unless given, density. Links are then left
-    /// out unless they are given.
+    /// Measured fabric, the name of a bundled one or the path of its record: stretch, bending and, by default, density. It replaces the default
+    /// links.
     #[serde(default)]
     pub fabric: Option<FabricWords>,
-    /// How it tears; without it, it does not.
+    /// Tearing. Default: none.
     #[serde(default)]
     pub tear: Option<Tear>,
-    /// Stiffness of each triangle against changes of its area: tension over relative change.
+    /// Area stiffness of each triangle: tension per relative change of area.
     #[serde(default)]
     #[schemars(range(min = 0.0), extend("x-unit" = "N/m"))]
     pub area: f64,
-    /// Volume and pressure of what it encloses; the mesh must be closed. Position-based dynamics only.
+    /// Enclosed volume and pressure; the mesh must be closed. Position-based dynamics only.
     #[serde(default)]
     pub pressure: Option<Inflation>,
-    /// Keeps the whole in shape; links are then left out unless they are given. Position-based dynamics only.
+    /// Shape matching of the whole object; it replaces the default links. Position-based dynamics only.
     #[serde(default)]
     pub shape_matching: Option<ShapeMatching>,
-    /// Masses that stay where they are: `"vertex 3"`, or all within a radius of a point.
+    /// Fixed masses: `"vertex 3"`, or all within a radius of a point.
     #[serde(default)]
     pub pin: Vec<Pin>,
-    /// Red, green and blue in pictures, 0 to 1, in linear light (a half is sRGB's 188 of 255).
+    /// Red, green and blue in pictures, 0 to 1, in linear light (0.5 is 188 of 255 in sRGB).
     #[serde(default)]
     #[schemars(inner(range(min = 0.0, max = 1.0)))]
     pub color: Option<[f64; 3]>,
@@ -488,7 +485,7 @@ pub struct Pattern {
     pub scale: f64,
 }
 
-/// Families of links. A family that is left out is not there.
+/// Families of links. A family that is not given does not exist.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct Links {
@@ -502,11 +499,11 @@ pub struct Links {
     pub diagonals: Diagonals,
 }
 
-/// Which diagonals the shear family has.
+/// Diagonals of the shear family.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Diagonals {
-    /// One of each cell: stiffer one way than the other.
+    /// One per cell: stiffer in one direction than in the other.
     One,
     /// Both.
     #[default]
@@ -551,35 +548,35 @@ pub struct LinkSettings {
     /// Pulls but does not push, like a thread.
     #[serde(default)]
     pub tension_only: bool,
-    /// Breaks for good when |r| / l0 exceeds this.
+    /// Breaks permanently when |r| / l0 exceeds this.
     #[serde(default)]
     #[schemars(extend("x-unit" = "1", "exclusiveMinimum" = 0.0))]
     pub break_strain: Option<f64>,
 }
 
-/// Masses that stay where they are.
+/// Fixed masses.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(untagged)]
 pub enum Pin {
-    /// In words: `"all"`, `"start"`, `"corner 0 1"`, `"vertex 3 4"`, `"edge x-"`, `"face z+"`.
+    /// By name: `"all"`, `"start"`, `"corner 0 1"`, `"vertex 3 4"`, `"edge x-"`, `"face z+"`.
     Words(String),
-    /// All within a radius of a point, or in words with what they follow.
+    /// All within a radius of a point, or by name; optionally following a collider.
     Region(Region),
 }
 
-/// What pinned masses follow, as if they were part of it.
+/// Collider that pinned masses follow, as if they were part of it.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Follow {
     /// Name of a collider.
     pub collider: String,
-    /// Which of its bones: one of a mannequin, or the name of a joint in the file of a character. Without it, the nearest place of
-    /// a surface that moves by itself, or else the collider as a rigid whole.
+    /// Bone: one of a mannequin, or the name of a joint in the file of a character. Default: the nearest point of a deforming surface, otherwise the
+    /// collider as a rigid body.
     #[serde(default)]
     pub bone: Option<String>,
 }
 
-/// All masses within a radius of a point at the start, or those that words name.
+/// All masses within a radius of a point at the start, or given by name.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Region {
@@ -591,10 +588,10 @@ pub struct Region {
     #[serde(default)]
     #[schemars(extend("x-unit" = "m", "exclusiveMinimum" = 0.0))]
     pub radius: Option<f64>,
-    /// The words instead of a point and a radius: `"edge y+"`.
+    /// A name instead of a point and a radius: `"edge y+"`.
     #[serde(default)]
     pub which: Option<String>,
-    /// What they follow; without it, they stay where they are.
+    /// Collider that they follow. Default: they are fixed.
     #[serde(default)]
     pub follow: Option<Follow>,
 }

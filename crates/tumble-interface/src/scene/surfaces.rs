@@ -5,24 +5,23 @@ use super::{Cloth, Net, Rope, Sheet};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-/// An orthotropic elastic membrane: woven cloth, or with its default numbers rubber. Strains are measured along two directions of the
-/// rest shape, the warp and the weft across it.
+/// An orthotropic elastic membrane: woven cloth, or rubber with the defaults. Strains are measured along two directions of the rest shape, warp and
+/// weft.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Membrane {
-    /// Stiffness along the warp: force per width over strain, Young's modulus times thickness.
+    /// Stiffness along the warp: force per width per strain, Young's modulus times thickness.
     #[schemars(extend("x-unit" = "N/m", "exclusiveMinimum" = 0.0))]
     pub warp: f64,
-    /// The same along the weft; without it, that of the warp.
+    /// Stiffness along the weft. Default: that of the warp.
     #[serde(default)]
     #[schemars(extend("x-unit" = "N/m", "exclusiveMinimum" = 0.0))]
     pub weft: Option<f64>,
-    /// Poisson's ratio: how much it narrows along the weft over how much it is stretched along the warp. Its square must be below
-    /// warp/weft.
+    /// Poisson's ratio: contraction along the weft per stretch along the warp. Its square must be below warp/weft.
     #[serde(default = "third")]
     #[schemars(range(min = 0.0), extend("x-unit" = "1"))]
     pub poisson: f64,
-    /// Stiffness against shear; without it, sqrt(warp weft)/(2 (1 + poisson sqrt(weft/warp))), that of an isotropic sheet if both are alike.
+    /// Shear stiffness. Default: sqrt(warp weft)/(2 (1 + poisson sqrt(weft/warp))), that of an isotropic sheet if warp and weft are equal.
     #[serde(default)]
     #[schemars(extend("x-unit" = "N/m", "exclusiveMinimum" = 0.0))]
     pub shear: Option<f64>,
@@ -30,8 +29,8 @@ pub struct Membrane {
     #[serde(default)]
     #[schemars(range(min = 0.0), extend("x-unit" = "s"))]
     pub damping: f64,
-    /// Turn of the warp in the surface, counter-clockwise seen from outside. At 0 it is the first axis of a sheet or of a panel, on a net the
-    /// x axis as far as it lies in a triangle, or u in the plane of its pattern.
+    /// Rotation of the warp in the surface, counter-clockwise seen from outside. At 0 the warp is the first axis of a sheet or panel; on a net it is
+    /// the x axis projected into a triangle, or u in the plane of its pattern.
     #[serde(default)]
     #[schemars(extend("x-unit" = "°"))]
     pub angle: f64,
@@ -43,125 +42,124 @@ impl Membrane {
         self.weft.unwrap_or(self.warp)
     }
 
-    /// Stiffness against shear [N/m].
+    /// Shear stiffness [N/m].
     pub fn shear(&self) -> f64 {
         let ratio = (self.weft() / self.warp).sqrt();
         self.shear.unwrap_or((self.warp * self.weft()).sqrt() / (2.0 * (1.0 + self.poisson * ratio)))
     }
 }
 
-/// How a surface tears: where an edge of a triangle is stretched too much, one of its ends comes apart, for good.
+/// Tearing of a surface: where a triangle edge is stretched too far, one of its ends splits permanently.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Tear {
-    /// Lengthening over rest length at which an edge gives way.
+    /// Strain at which an edge tears.
     #[schemars(extend("x-unit" = "1", "exclusiveMinimum" = 0.0))]
     pub strain: f64,
-    /// How much stronger or weaker single edges are, at most, over that strain.
+    /// Largest random variation of the strength of single edges, relative to that strain.
     #[serde(default)]
     #[schemars(range(min = 0.0, max = 0.99), extend("x-unit" = "1"))]
     pub spread: f64,
-    /// Where it is weaker: a seam that has worn out, a notch.
+    /// Weak regions: a worn seam, a notch.
     #[serde(default)]
     pub weak: Vec<Weak>,
-    /// How many times a vertex can come apart; so many masses are kept ready, at the end of its columns. Without it, half as many as there are
-    /// triangles.
+    /// Maximum number of vertex splits; that many spare masses are kept at the end of its columns. Default: half the number of triangles.
     #[serde(default)]
     #[schemars(range(max = 10_000_000))]
     pub spare: Option<u32>,
 }
 
-/// A ball in which a surface is weaker, as it lies at the start.
+/// A ball in which a surface is weaker, in its initial position.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Weak {
-    /// Its middle.
+    /// Centre.
     #[schemars(extend("x-unit" = "m"))]
     pub center: [f64; 3],
     /// Its radius.
     #[schemars(extend("x-unit" = "m", "exclusiveMinimum" = 0.0))]
     pub radius: f64,
-    /// Strain at which edges give way there.
+    /// Strain at which edges tear there.
     #[schemars(range(min = 0.0), extend("x-unit" = "1"))]
     pub strain: f64,
 }
 
-/// What a closed net holds in.
+/// Pressure inside a closed net.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Inflation {
-    /// Volume at which nothing presses, over that of the mesh.
+    /// Volume at zero pressure, relative to that of the mesh.
     #[serde(default = "one")]
     #[schemars(extend("x-unit" = "1", "exclusiveMinimum" = 0.0))]
     pub volume: f64,
-    /// Bulk modulus: pressure over the relative change of volume. Without it the volume is kept, whatever it takes.
+    /// Bulk modulus: pressure per relative change of volume. Default: constant volume.
     #[serde(default)]
     #[schemars(extend("x-unit" = "Pa", "exclusiveMinimum" = 0.0))]
     pub stiffness: Option<f64>,
 }
 
-/// Keeps all masses of an object near the place that they have in the rest shape, moved and turned as fits them best.
+/// Pulls all masses of an object towards their positions in the rest shape, which is translated and rotated to the best fit.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct ShapeMatching {
-    /// Frequency at which every deformation oscillates. Without it the shape is rigid.
+    /// Frequency at which every deformation oscillates. Default: a rigid shape.
     #[serde(default)]
     #[schemars(extend("x-unit" = "Hz", "exclusiveMinimum" = 0.0))]
     pub frequency: Option<f64>,
 }
 
-/// A liquid of particles that keeps its density.
+/// A liquid of particles with a density constraint.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Fluid {
-    /// Distance of particles at rest; each has the mass density x spacing³.
+    /// Particle spacing at rest; each particle has the mass density x spacing³.
     #[schemars(extend("x-unit" = "m", "exclusiveMinimum" = 0.0))]
     pub spacing: f64,
     /// Density.
     #[serde(default = "water")]
     #[schemars(extend("x-unit" = "kg/m³", "exclusiveMinimum" = 0.0))]
     pub density: f64,
-    /// Boxes that it fills at the start.
+    /// Boxes filled at the start.
     #[schemars(length(min = 1))]
     pub fill: Vec<Fill>,
-    /// Viscosity; an explicit force, so that steps must be shorter than about density x spacing²/(8 viscosity).
+    /// Viscosity; an explicit force, so steps must be shorter than about density x spacing²/(8 viscosity).
     #[serde(default)]
     #[schemars(range(min = 0.0), extend("x-unit" = "Pa s"))]
     pub viscosity: f64,
-    /// Bulk modulus: pressure over relative compression. Without it the density is kept as well as the steps allow.
+    /// Bulk modulus: pressure per relative compression. Default: incompressible, as far as the steps allow.
     #[serde(default)]
     #[schemars(extend("x-unit" = "Pa", "exclusiveMinimum" = 0.0))]
     pub stiffness: Option<f64>,
 }
 
-/// A box that is filled with particles.
+/// A box filled with particles.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Fill {
-    /// Its middle.
+    /// Centre.
     #[schemars(extend("x-unit" = "m"))]
     pub center: [f64; 3],
-    /// Lengths of its edges; as many particles as fit best.
+    /// Edge lengths; the number of particles is the best fit.
     #[schemars(transform = super::items_above_zero, extend("x-unit" = "m"))]
     pub size: [f64; 3],
 }
 
 impl Rope {
-    /// Its springs: those given, else stiff ones between neighbours. Not of a rod, which has none.
+    /// Its springs: those given, otherwise stiff ones between neighbours. Not for a rod, which has none.
     pub fn links(&self) -> Links {
         links(&self.links, self.rod.is_some(), super::structures::rope_links)
     }
 }
 
 impl Sheet {
-    /// Its springs: those given, else the default ones if nothing else makes it elastic.
+    /// Its springs: those given, otherwise the default ones if nothing else makes it elastic.
     pub fn links(&self) -> Links {
         links(&self.links, self.membrane.is_some() || self.fabric.is_some(), super::structures::sheet_links)
     }
 }
 
 impl Net {
-    /// Its springs: those given, else the default ones if nothing else makes it elastic.
+    /// Its springs: those given, otherwise the default ones if nothing else makes it elastic.
     pub fn links(&self) -> Links {
         let elastic = self.membrane.is_some() || self.fabric.is_some() || self.shape_matching.is_some();
         links(&self.links, elastic, super::structures::net_links)
@@ -169,7 +167,7 @@ impl Net {
 }
 
 impl Cloth {
-    /// Its springs: those given, else the default ones if nothing else makes it elastic.
+    /// Its springs: those given, otherwise the default ones if nothing else makes it elastic.
     pub fn links(&self) -> Links {
         links(&self.links, self.membrane.is_some() || self.fabric.is_some(), super::cloth::links)
     }

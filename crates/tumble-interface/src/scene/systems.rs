@@ -4,21 +4,21 @@ use super::vicsek::Vicsek;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-/// A numerical method and how it steps.
+/// A numerical method and its time stepping.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct System {
-    /// Objects name it with `system = "..."`.
+    /// Name; objects refer to it with `system = "..."`.
     #[serde(default = "main")]
     pub name: String,
-    /// Which method.
+    /// Method.
     #[serde(default)]
     pub method: Method,
-    /// How y' = f(y, t) is stepped.
+    /// Integrator of y' = f(y, t).
     #[serde(default)]
     pub integrator: Integrator,
-    /// Sub-steps per exchange. Without `substeps` and `step`, explicit integrators take as many as 0.7 of their
-    /// estimated usable step asks for, implicit ones take one, and position_based ones as many as keep each within 1 ms.
+    /// Sub-steps per exchange. Without `substeps` and `step`, explicit integrators use 0.7 of their estimated usable step, implicit ones take one
+    /// sub-step, and position_based ones sub-steps of at most 1 ms.
     #[serde(default)]
     #[schemars(range(min = 1, max = 10_000_000))]
     pub substeps: Option<u32>,
@@ -29,8 +29,8 @@ pub struct System {
     /// Settings of `adaptive_euler` and `dormand_prince`.
     #[serde(default)]
     pub adaptive: Adaptive,
-    /// Springs longer than this many times their rest length are shortened to it after each step
-    /// (`modified_euler` and `verlet`), or in each iteration (`position_based`).
+    /// Springs longer than this multiple of their rest length are shortened to it after each step (`modified_euler` and `verlet`), or in each
+    /// iteration (`position_based`).
     #[serde(default)]
     #[schemars(extend("x-unit" = "1", "exclusiveMinimum" = 1.0))]
     pub clamp: Option<f64>,
@@ -40,10 +40,10 @@ pub struct System {
     /// Settings of `position_based`.
     #[serde(default)]
     pub position_based: PositionBased,
-    /// Surfaces and curves keep off themselves and each other: in the sweeps of `position_based`, else after each step.
+    /// Contact of surfaces and curves with themselves and each other: in the sweeps of `position_based`, otherwise after each step.
     #[serde(default)]
     pub self_contact: Option<SelfContact>,
-    /// The numbers of the `vicsek` method, which needs them.
+    /// Parameters of the `vicsek` method, which requires them.
     #[serde(default)]
     pub vicsek: Option<Vicsek>,
 }
@@ -77,16 +77,16 @@ pub enum Method {
     /// Masses under forces: x'' = f(x, v, t) / m.
     #[default]
     Dynamics,
-    /// Another word for `dynamics` with `integrator = "position_based"`.
+    /// Synonym for `dynamics` with `integrator = "position_based"`.
     PositionBased,
-    /// Massless particles carried by velocity fields: x' = u(x, t).
+    /// Massless particles advected by velocity fields: x' = u(x, t).
     Tracers,
-    /// The model of Vicsek: particles of constant speed that take the mean direction of all within a radius, and err. A map:
-    /// each sub-step is one step of it (one an exchange without `substeps` and `step`), and there is no integrator.
+    /// Vicsek's model: particles of constant speed that take the mean direction of all within a radius, plus noise. A map: each sub-step is one step
+    /// of it (one per exchange without `substeps` and `step`), and there is no integrator.
     Vicsek,
-    /// Heat in bodies on grids; each body says how it is stepped, and there is no integrator.
+    /// Heat in bodies on grids; each body has its own scheme, and there is no integrator.
     Heat,
-    /// A gas whose pressure follows from its density, stepped explicitly by `symplectic_euler`: sound limits the step.
+    /// A gas whose pressure follows from its density, stepped explicitly by `symplectic_euler`: the speed of sound limits the step.
     Compressible,
     /// Stable Fluids: incompressible fluids that fill boxes of cells, `[[gas]]`. There is no integrator.
     Gas,
@@ -134,17 +134,17 @@ pub enum Integrator {
     VelocityVerlet,
     /// Implicit (backward) Euler. Order 1; damps, stable for every step.
     ImplicitEuler,
-    /// Implicit midpoint. Order 2; keeps quadratic invariants.
+    /// Implicit midpoint. Order 2; conserves quadratic invariants.
     ImplicitMidpoint,
     /// Two-step backward differentiation. Order 2; damps high frequencies.
     Bdf2,
-    /// Position-based dynamics: positions are predicted without the elements, then moved until each element is satisfied; velocities
-    /// follow. Iterated to convergence it is implicit Euler; swept once a sub-step it wants sub-steps of a few ms. Order 1; damps.
+    /// Position-based dynamics: positions are predicted without the elements, then moved until each element is satisfied; velocities follow. Iterated
+    /// to convergence it is implicit Euler; with one sweep per sub-step it needs sub-steps of a few ms. Order 1; damps.
     PositionBased,
 }
 
 impl Integrator {
-    /// All that step any y' = f(y, t), from the simplest on: not `position_based`, which needs elements.
+    /// All integrators of general y' = f(y, t), simplest first: without `position_based`, which needs elements.
     pub const ALL: [Integrator; 13] = [
         Self::ForwardEuler,
         Self::SymplecticEuler,
@@ -212,7 +212,7 @@ impl Integrator {
     }
 }
 
-/// Settings of the integrators that choose their own steps.
+/// Settings of the adaptive integrators.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct Adaptive {
@@ -223,10 +223,10 @@ pub struct Adaptive {
     /// Relative part of the weight (`dormand_prince`).
     #[schemars(range(min = 0.0), extend("x-unit" = "1"))]
     pub relative: f64,
-    /// First step tried; without it, a hundredth of the exchange interval.
+    /// First step tried. Default: a hundredth of the exchange interval.
     #[schemars(extend("x-unit" = "s", "exclusiveMinimum" = 0.0))]
     pub first_step: Option<f64>,
-    /// A step below this many times the exchange interval ends the run with an error.
+    /// Smallest step relative to the exchange interval; a smaller one ends the run with an error.
     #[schemars(extend("x-unit" = "1", "exclusiveMinimum" = 0.0))]
     pub smallest: f64,
 }
@@ -241,25 +241,25 @@ impl Default for Adaptive {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct Solver {
-    /// How the linear systems of Newton's method are solved.
+    /// Solver of the linear systems of Newton's method.
     pub linear: Linear,
-    /// Which second derivatives the matrix holds.
+    /// Second derivatives in the matrix.
     pub hessian: Hessian,
-    /// Residual at which Newton's method stops, relative to the first. Default 1e-3 (single), 1e-10 (double).
+    /// Residual at which Newton's method stops, relative to the initial one. Default: 1e-3 (single), 1e-10 (double).
     #[schemars(extend("x-unit" = "1", "exclusiveMinimum" = 0.0, "exclusiveMaximum" = 1.0))]
     pub newton_tolerance: Option<f64>,
-    /// Newton iterations at most.
+    /// Maximum number of Newton iterations.
     #[schemars(range(min = 1, max = 1000))]
     pub newton_iterations: u32,
-    /// Residual at which the linear solver stops, relative to the right-hand side. Default 1e-2 (single), 1e-6 (double).
+    /// Residual at which the linear solver stops, relative to the right-hand side. Default: 1e-2 (single), 1e-6 (double).
     #[schemars(extend("x-unit" = "1", "exclusiveMinimum" = 0.0, "exclusiveMaximum" = 1.0))]
     pub linear_tolerance: Option<f64>,
-    /// Iterations of the linear solver at most.
+    /// Maximum number of iterations of the linear solver.
     #[schemars(range(min = 1, max = 1_000_000))]
     pub linear_iterations: u32,
-    /// Take one linearized step (one Newton iteration, no line search).
+    /// Takes one linearized step (one Newton iteration, no line search).
     pub linearized: bool,
-    /// What happens when Newton's method does not reach its tolerance.
+    /// Behaviour when Newton's method does not reach its tolerance.
     pub on_failure: OnFailure,
 }
 
@@ -282,19 +282,20 @@ impl Default for Solver {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct PositionBased {
-    /// Sweeps over all elements in a sub-step. More sub-steps are worth more than more iterations.
+    /// Sweeps over all elements per sub-step. More sub-steps help more than more iterations.
     #[schemars(range(min = 1, max = 100_000))]
     pub iterations: u32,
     /// Sweeps end early when none moves a point farther than this.
     #[schemars(extend("x-unit" = "m", "exclusiveMinimum" = 0.0))]
     pub tolerance: Option<f64>,
-    /// Points are kept within this many times the shortest way to what is pinned, along links, rods and edges of cloth: for large things
-    /// that hang, which few sweeps leave too long. Below what a stiffness would give, it wins over it. Not beside what tears or breaks.
+    /// Long-range attachments: points stay within this multiple of the shortest path to a pin along links, rods and edges of cloth. For large hanging
+    /// objects, which few sweeps leave too long. Overrides the stiffness of the material if that would stretch farther. Not with objects that tear or
+    /// break.
     #[schemars(range(min = 1.0), extend("x-unit" = "1"))]
     pub tethers: Option<f64>,
-    /// What a sweep does to an element.
+    /// Projection of an element in a sweep.
     pub projection: Projection,
-    /// Share of its error that a plain element has lost after all iterations of a sub-step (`plain` only).
+    /// Fraction of an element's error removed by all iterations of a sub-step (`plain` only).
     #[schemars(range(max = 1.0), extend("x-unit" = "1", "exclusiveMinimum" = 0.0))]
     pub stiffness: f64,
 }
@@ -309,28 +310,26 @@ impl Default for PositionBased {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct SelfContact {
-    /// Distance at which surfaces touch. Less than the length of edges; it is also the scale of the safe distance that nothing passes, so
-    /// that larger is faster.
+    /// Distance at which surfaces touch, less than the edge length. It also scales the safe motion per search, so larger values are faster.
     #[schemars(extend("x-unit" = "m", "exclusiveMinimum" = 0.0))]
     pub thickness: f64,
-    /// Coulomb friction coefficient of what slides.
+    /// Kinetic friction coefficient (Coulomb).
     #[serde(default)]
     #[schemars(range(min = 0.0), extend("x-unit" = "1"))]
     pub friction: f64,
-    /// Coulomb friction coefficient of what rests, at least `friction`; without it, the same.
+    /// Static friction coefficient, at least `friction`. Default: equal to `friction`.
     #[serde(default)]
     #[schemars(range(min = 0.0), extend("x-unit" = "1"))]
     pub friction_static: Option<f64>,
 }
 
-/// How an element is satisfied.
+/// Projection of elements.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Projection {
-    /// As far as its stiffness in SI units asks for (XPBD): the converged motion does not depend on iterations, and that of short
-    /// sub-steps not on their count.
+    /// By its stiffness in SI units (XPBD): the converged motion is independent of iterations and, for short sub-steps, of their number.
     Compliant,
-    /// Its error is taken back whatever its stiffness (PBD): how soft things are depends on iterations and sub-steps.
+    /// Regardless of its stiffness (PBD): the apparent stiffness depends on iterations and sub-steps.
     Plain,
 }
 
@@ -350,15 +349,15 @@ pub enum Linear {
 pub enum Hessian {
     /// Exact second derivatives; may be indefinite under compression.
     Exact,
-    /// The negative part of each element left out: always positive definite.
+    /// Without the negative part of each element: always positive definite.
     Definite,
 }
 
-/// What to do when a solver stops early.
+/// Behaviour when a solver stops early.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum OnFailure {
-    /// Go on and count it in the report.
+    /// Continue, and count it in the report.
     Warn,
     /// Stop the run.
     Error,

@@ -57,7 +57,7 @@ pub fn weighed<T>(task: impl FnOnce() -> T) -> (T, usize) {
     (result, (MOST.get() - before).max(0) as usize)
 }
 
-/// What became of a case.
+/// Outcome of a case.
 pub struct Outcome {
     /// Whether it was read, or else refused.
     pub read: bool,

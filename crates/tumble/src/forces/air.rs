@@ -14,7 +14,7 @@ use crate::math::parallel::{CHUNK, Tasks, chunks};
 use crate::math::simd::Index;
 use crate::math::{Lane, Real, Row, Vec3, ZERO, add, row, xyz64};
 
-/// What the air does to a surface.
+/// Air force on a surface.
 pub struct Air {
     /// Density of the air [kg/m³].
     pub density: f64,
@@ -149,7 +149,7 @@ impl Batch for Sails {
         false
     }
 
-    /// What moves at twice the speed of the air.
+    /// Twice the speed of the air.
     fn drives(&self) -> Option<f64> {
         self.fastest.map(|u| 2.0 * self.mass * u * u)
     }

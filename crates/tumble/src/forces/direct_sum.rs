@@ -9,7 +9,7 @@ use crate::state::Masses;
 use std::ops::Range;
 use tumble_interface::scene::Hessian;
 
-/// What pulls.
+/// The source of attraction.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Attractor {
     /// Masses, by G [N m²/kg²].
@@ -49,7 +49,7 @@ pub struct DirectSum {
     forces: Vec<[Real; 3]>,
     sums: Vec<Real>,
     positions: Columns,
-    /// What a product is taken with.
+    /// Directions of the product.
     directions: Columns,
     weights: Weights,
 }
@@ -583,7 +583,7 @@ impl DirectSum {
     }
 }
 
-/// What the sums of [`Tile`] are multiplied with.
+/// Factor on the sums of [`Tile`].
 struct Unit<const NATIVE: bool>;
 
 impl<const NATIVE: bool> Kernel for Unit<NATIVE> {

@@ -18,7 +18,7 @@ pub struct Halos {
     radii: Vec<(u32, f64)>,
     /// Every mass that pulls or is pulled: its row, mass [kg] and b² [m²].
     bodies: Vec<Body>,
-    /// Where the halos are among the bodies.
+    /// Indices of the halos among the bodies.
     halos: Vec<usize>,
     weights: Weights,
     /// Positions and directions of the bodies.
@@ -72,7 +72,7 @@ impl Halos {
         }
     }
 
-    /// What pulls body i: all others if it is a halo, else the halos.
+    /// Partners of body i: all others if it is a halo, otherwise the halos.
     fn partners(&self, i: usize) -> impl Iterator<Item = usize> {
         let (all, some) = if self.bodies[i].extent_sq > 0.0 { (self.bodies.len(), &[][..]) } else { (0, &self.halos[..]) };
         (0..all).filter(move |j| *j != i).chain(some.iter().copied())

@@ -23,7 +23,7 @@ pub struct LennardJones {
     core: [f64; 3],
 }
 
-/// Where the parabola begins, over sigma.
+/// Start of the parabola, relative to sigma.
 const CORE: f64 = 0.2;
 
 impl LennardJones {

@@ -144,7 +144,7 @@ impl<P: PairLaw> Meet<8, 3> for Product<'_, P> {
     fn meet<L: Lane>(&self, here: [L; 8], there: [L; 8], sum: [L; 3]) -> [L; 3] {
         let (d, r_sq, near) = apart(self.0, [here[0], here[1], here[2]], [there[0], there[1], there[2]]);
         let (a, b) = matrix(self.0, &self.1, r_sq);
-        // What does not feel back counts as held, so that the matrix is symmetric.
+        // Masses without reaction count as held, so that the matrix is symmetric.
         let mutual = here[3] * there[4];
         let u = Vec3 { x: here[5] - there[5] * mutual, y: here[6] - there[6] * mutual, z: here[7] - there[7] * mutual };
         let along = near.positive(a * d.dot(u) * there[3], near.zero());

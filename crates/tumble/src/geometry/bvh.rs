@@ -180,7 +180,7 @@ fn box_distance_sq(node: &Node, p: Vector) -> f64 {
     d[0] * d[0] + d[1] * d[1] + d[2] * d[2]
 }
 
-/// What the closest point lies on; edge k runs from corner k to corner k + 1.
+/// Feature that contains the closest point; edge k runs from corner k to corner k + 1.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Feature {
     Face,

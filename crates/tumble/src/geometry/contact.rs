@@ -1,4 +1,4 @@
-//! Where masses touch solids. Candidates come from here for every method; each method resolves them its own way.
+//! Contact of masses with solids. Every method gets its candidates here and resolves them in its own way.
 
 use super::motion::{Pose, Twist};
 use super::{Motion, Rig, Shape, Vector};
@@ -29,7 +29,7 @@ pub struct Collider {
     pub motion: Option<Motion>,
     /// Its bones, if it is a figure.
     pub rig: Option<Arc<Rig>>,
-    /// What edges meet; `None` if masses alone meet it.
+    /// Surface for contact with edges; `None` for contact with masses only.
     pub edges: Option<Arc<Surface>>,
 }
 
@@ -38,7 +38,7 @@ pub struct Collider {
 pub struct Surface {
     /// Name of the collider.
     pub name: String,
-    /// Where it is when t = 0, before its motion.
+    /// The shape at t = 0, before its motion.
     pub mesh: Mesh,
 }
 
@@ -59,7 +59,7 @@ impl Friction {
     }
 }
 
-/// What of a collider carries what is tied to it.
+/// The part of a collider that attached points follow.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Carrier {
     /// The collider as a rigid whole.
@@ -115,7 +115,7 @@ impl Walls<'_> {
                     break;
                 }
                 f(distance - thickness + normal.dot(p - from), normal);
-                // Where that surface is out of reach, whatever the rounding.
+                // A point from which that surface is out of reach, whatever the rounding.
                 from = from + normal * (1.01 * reach - distance);
             }
         }
@@ -127,7 +127,7 @@ impl Collider {
         self.motion.as_ref().map(|m| m.at(t))
     }
 
-    /// Where it is at time t as a rigid whole, or where one of its bones or triangles is.
+    /// Pose at time t of the rigid whole, or of one of its bones or triangles.
     pub fn pose(&self, carrier: Carrier, t: f64) -> Pose {
         let whole = self.at(t).map_or(Pose::default(), |(pose, _)| pose);
         match (carrier, &self.shape) {
@@ -140,7 +140,7 @@ impl Collider {
         }
     }
 
-    /// What carries a thing that is at p when t = 0: the nearest place of a surface that moves by itself, or the whole.
+    /// The carrier of a point that is at p when t = 0: the nearest point of a deforming surface, or the rigid whole.
     pub fn carrier(&self, p: Vector) -> Carrier {
         let Shape::Animated { facets, .. } = &self.shape else { return Carrier::Whole };
         let local = self.at(0.0).map_or(p, |(pose, _)| pose.back(p));
@@ -189,8 +189,8 @@ impl Collider {
         if self.inside { (-distance, -normal, velocity) } else { (distance - thick, normal, velocity) }
     }
 
-    /// Where a mass first meets the solid that goes straight from `from` at time t0 to `to` at t1. One that starts in
-    /// touch meets it at once if it goes in; one that starts deeper is no matter of a way.
+    /// First contact with the solid of a mass that moves straight from `from` at time t0 to `to` at t1. A mass that starts touching hits at once if
+    /// it moves inward; deeper starts are not handled here.
     pub fn sweep(&self, from: Vector, to: Vector, t0: f64, t1: f64) -> Option<Impact> {
         self.passage(from, to, t0, t1).or_else(|| self.landing(from, to, t0, t1))
     }
@@ -261,8 +261,8 @@ impl Collider {
         self.rig.as_ref()?.bone(name)
     }
 
-    /// Where a bone is at time t, and how it moves: what is tied to it at p0 when t = 0 is at `pose.out(start.back(p0))`, with the velocity
-    /// `twist.at` there. A function of time alone.
+    /// Pose and motion of a bone at time t: a point attached at p0 when t = 0 is at `pose.out(start.back(p0))`, with the velocity `twist.at` there. A
+    /// function of time alone.
     pub fn bone_pose(&self, bone: usize, t: f64) -> Option<(Pose, Twist)> {
         let (pose, twist) = self.rig.as_ref()?.moving(bone, t)?;
         let Some((whole, course)) = self.at(t) else { return Some((pose, twist)) };

@@ -26,11 +26,11 @@ pub struct Facets {
     frames: Vec<Vec<Vector>>,
     /// Of each interval where nothing of the mesh comes, and nothing is within it.
     apart: Vec<Apart>,
-    /// Where the last keyframe goes on: a time among `times`, and how far everything has gone from there [m].
+    /// Continuation after the last keyframe: a time among `times`, and the displacement since [m].
     back: Option<(f64, Vector)>,
 }
 
-/// Where a time lies among the keyframes.
+/// Position of a time among the keyframes.
 #[derive(Debug, Clone, Copy)]
 struct Moment {
     interval: usize,
@@ -234,7 +234,7 @@ impl Facets {
         ways.map(speed).fold(0.0, f64::max)
     }
 
-    /// Where a point lies in a triangle: weights of the corners.
+    /// Barycentric weights of a point in a triangle.
     fn weights(p: Vector, [a, b, c]: [Vector; 3]) -> [f64; 3] {
         let (u, v, w) = (b - a, c - a, p - a);
         let (uu, uv, vv, wu, wv) = (u.dot(u), u.dot(v), v.dot(v), w.dot(u), w.dot(v));

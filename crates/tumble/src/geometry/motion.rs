@@ -6,7 +6,7 @@ use super::Vector;
 use crate::math::Quat;
 use crate::math::functions::{atan2, cos, sin};
 
-/// Where a rigid thing is: x = turn p + shift.
+/// Pose of a rigid body: x = turn p + shift.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Pose {
     /// Its turn.
@@ -97,7 +97,7 @@ fn vector(q: Quat<f64>) -> Vector {
 }
 
 impl Motion {
-    /// Where it is at time t, and how it moves there.
+    /// Pose and motion at time t.
     pub fn at(&self, t: f64) -> (Pose, Twist) {
         let (key, rate) = self.key(t);
         let spun = turn(self.spin * t);

@@ -1,4 +1,4 @@
-//! Who is near whom: points sorted by cell, and sums over all pairs of points in cells that touch.
+//! Neighbour search: points sorted by cell, and sums over all pairs of points in adjacent cells.
 //!
 //! A cell is as wide as the reach of what is asked for, so that whoever is within reach lies in one of 27 cells. Points are sorted
 //! by cell, z first and x last, and by index within a cell; three cells in a row along x are then one run of places, and 27 cells
@@ -15,7 +15,7 @@ use crate::math::{Lane, Real, Row, ZERO};
 use rayon::prelude::*;
 use std::sync::atomic::{AtomicU32, AtomicU64, Ordering::Relaxed};
 
-/// What a point adds up over its neighbours: N numbers of each point, the first three its place, make M sums.
+/// Sums of a point over its neighbours: from N numbers per point, the first three its position, to M sums.
 pub trait Meet<const N: usize, const M: usize>: Sync {
     /// The sums of `here`, with what `there` adds to them. It is called for many points beyond the reach, too, and for the point
     /// itself; there it must add zeros.

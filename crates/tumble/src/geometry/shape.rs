@@ -57,7 +57,7 @@ pub enum Shape {
     },
 }
 
-/// What is near a point: signed distance [m], outward unit normal (zero where there is none), velocity of the surface [m/s].
+/// The surface near a point: signed distance [m], outward unit normal (zero if undefined), velocity of the surface [m/s].
 pub type Near = (f64, Vector, Vector);
 
 /// Corrections of Newton's method on the way to a contact; each at least halves what is left.
@@ -110,7 +110,7 @@ impl Shape {
         (q[axis], turn.turn(n.into()), Vector::default())
     }
 
-    /// Where a mass that goes straight from a to b while time goes from t0 to t1 first comes within `thickness` of the
+    /// First contact of a mass that moves straight from a to b during t0 to t1: where it comes within `thickness` of the
     /// surface from outside (from within, if `inside`): part of the way, normal towards the mass, velocity of the surface.
     ///
     /// The distance to a convex solid is a convex function along the way, so that Newton's method comes closer from one

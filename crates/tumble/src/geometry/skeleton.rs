@@ -83,14 +83,14 @@ impl Clock {
     }
 }
 
-/// What a figure does.
+/// Motion of a figure.
 #[derive(Debug, Clone)]
 pub enum Act {
     /// A clip from a file, again and again if it has a period [s].
     Clip {
         /// The joints at rest.
         joints: Vec<Joint>,
-        /// What moves them.
+        /// The clip that moves them.
         clip: Clip,
         /// Time until it starts again.
         period: Option<f64>,
@@ -108,17 +108,17 @@ pub struct Rig {
     pub vertices: Vec<Vector>,
     /// Their triangles.
     pub triangles: Vec<[u32; 3]>,
-    /// What carries each vertex.
+    /// Bones of each vertex.
     pub skin: Vec<[Influence; 4]>,
     /// Bones of the binds, and the inverses of their places then.
     pub binds: Vec<(u32, Affine)>,
-    /// What it does.
+    /// Its motion.
     pub act: Act,
     /// When.
     pub clock: Clock,
     /// Factor on its size.
     pub scale: f64,
-    /// Where it stands.
+    /// Its placement.
     pub place: Pose,
 }
 
@@ -149,7 +149,7 @@ impl Rig {
         Pose { turn: self.place.turn * pose.turn, shift: self.place.out(pose.shift * self.scale) }
     }
 
-    /// Where a bone is at time t: its joint and its axes, without scale.
+    /// Pose of a bone at time t: its joint and axes, without scale.
     pub fn pose(&self, bone: usize, t: f64) -> Option<Pose> {
         self.joints(t).get(bone).map(|(pose, _)| self.placed(pose))
     }

@@ -84,7 +84,7 @@ pub struct Stage<'a> {
     pub v: &'a [Row],
 }
 
-/// What a scheme keeps from step to step: columns of rows, and whether they are up to date with (x, v).
+/// Memory of a scheme between steps: columns of rows, and whether they are up to date with (x, v).
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Memory {
     /// Rows of earlier steps; how many columns and what they hold is the scheme's business.
@@ -162,7 +162,7 @@ pub fn lead(scheme: Integrator) -> f64 {
 
 /// A step of a scheme with a fixed step: x and v from t to t + h.
 pub struct Step<'a, 'm> {
-    /// What moves.
+    /// The equation of motion.
     pub equation: &'a mut dyn Equation,
     /// Its start [s].
     pub t: f64,
@@ -178,7 +178,7 @@ pub struct Step<'a, 'm> {
     pub ready: bool,
     /// Rows for one step.
     pub scratch: &'a mut Scratch,
-    /// What is reported of it.
+    /// Its report.
     pub report: &'a mut StepReport,
 }
 

@@ -175,7 +175,7 @@ fn evaluate(equation: &mut dyn Stiff, stage: &Stage<'_>, x: &[Row], v: &[Row], r
 fn shift(v: &mut [Row], d: &mut [Row], c: Real) {
     chunks2(v, d, |_, v, d| {
         for (v, d) in v.iter_mut().zip(d) {
-            // Where a linear solve overflows, its fourth numbers are no numbers: rows of x would never lose them, whose inverse mass that is.
+            // If a linear solve overflows, its fourth components are NaN; in rows of x they would permanently overwrite the inverse mass.
             let [x, y, z, _] = axpy(*v, c, *d);
             *v = [x, y, z, 0.0];
         }

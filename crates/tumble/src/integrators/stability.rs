@@ -145,7 +145,7 @@ pub fn limits(scheme: Integrator, modes: &[Mode]) -> (f64, f64) {
             2.0 * ln(m.growth(scheme, h).max(1e-300)) * steps <= ln(BLOW_UP)
         })
     };
-    // Where nothing damps, a weak growth such as Heun's (w h)^4/8 must not hide in round-off: start at w h = 0.01.
+    // Without damping, weak growth such as Heun's (w h)^4/8 must not hide in round-off: start at w h = 0.01.
     let undamped = modes.iter().any(|m| m.damping <= 1e-6 * m.frequency);
     (first_failure(rate, if undamped { -2 } else { -6 }, &stable), first_failure(rate, -3, &usable))
 }

@@ -1,4 +1,4 @@
-//! What a kernel computes with: a number, a register of numbers, or either with a derivative.
+//! Number types of kernels: a number, a register of numbers, or either with a derivative.
 
 use std::ops::{Add, Div, Mul, Neg, Sub};
 

@@ -1,4 +1,4 @@
-//! Where the numbers of a grid lie in memory.
+//! Memory layout of grids.
 
 /// The layout of numbers at the cells, faces, edges or nodes of a grid of n[0] x n[1] x n[2] cells, x fastest: one layout for all
 /// places, so that cell (i, j, k) and its lower faces, edges and node have one number.

@@ -30,7 +30,7 @@ pub trait Tasks: Iterator<Item: Send> + Sized {
         });
     }
 
-    /// What `f` gives for each, in their order.
+    /// Results of `f` for each, in order.
     fn map_in_parallel<R: Send>(self, f: impl Fn(Self::Item) -> R + Sync) -> Vec<R> {
         let mut results: Vec<Option<R>> = Vec::new();
         let tasks: Vec<_> = self.collect();
@@ -82,7 +82,7 @@ pub fn max(n: usize, f: impl Fn(Range<usize>) -> f64 + Sync) -> f64 {
     fold(n, f).into_iter().fold(f64::NEG_INFINITY, |a, b| if a >= b || a.is_nan() { a } else { b })
 }
 
-/// Where in 0..n the largest of `f(i)` is, the first if there are several, and that; `None` where nothing is above negative infinity.
+/// Index in 0..n and value of the largest `f(i)`, the first if there are several; `None` if nothing is above negative infinity.
 pub fn worst(n: usize, f: impl Fn(usize) -> f64 + Sync) -> Option<(usize, f64)> {
     let larger = |most: (usize, f64), one: (usize, f64)| if one.1 > most.1 { one } else { most };
     let none = (0, f64::NEG_INFINITY);

@@ -22,7 +22,7 @@ const T: f64 = 4.0 * T1 * T1 * T1 * (1.0 - 0.9e-6);
 /// a, b, c of the polynomial of the native cube in double precision.
 const FACTORS: [f64; 3] = [0.752_863_051_671_532_6, 0.052_139_911_117_565_475, 0.604_487_290_187_232_5];
 
-/// What the following start from: an estimate of 1/sqrt(x), or a guess.
+/// Initial estimate of 1/sqrt(x).
 #[inline(always)]
 pub fn first_guess<W: Width, const NATIVE: bool>(w: W, x: W::L) -> W::L {
     if NATIVE { w.estimate(x) } else { w.guess(x) }
@@ -71,7 +71,7 @@ pub fn inverse_cube<W: Width, const NATIVE: bool>(w: W, x: W::L, guess: W::L, we
     ((weight * y) * (y * y)) * p
 }
 
-/// What a sum over [`inverse_cube`] is multiplied with.
+/// Factor on a sum over [`inverse_cube`].
 pub fn cube_unit<W: Width, const NATIVE: bool>(_w: W) -> f64 {
     if NATIVE && W::ESTIMATES {
         return if cfg!(feature = "double") { 35.0 / 16.0 } else { 1.5 };
@@ -93,7 +93,7 @@ pub fn inverse_root<W: Width, const NATIVE: bool>(w: W, x: W::L) -> W::L {
     y * parabola::<W, NATIVE>(w, t, 5.0 / 3.0 * T, T * T * (5.0 - 25.0 / 9.0))
 }
 
-/// What a sum over [`inverse_root`] is multiplied with.
+/// Factor on a sum over [`inverse_root`].
 pub fn root_unit<W: Width, const NATIVE: bool>(_w: W) -> f64 {
     if NATIVE && W::ESTIMATES { 1.0 } else { 3.0 / 8.0 / (T * T * T.sqrt()) }
 }

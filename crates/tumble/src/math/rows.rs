@@ -3,7 +3,7 @@
 use super::simd::{Kernel, Width, ask_behind, count, dispatch, packs};
 use super::{Lane, Real, Row};
 
-/// What becomes of one number `out` of a row, given one number of each row in hand.
+/// Update of one number `out` of a row from one number of each input row.
 pub trait Each {
     /// `of_row` belongs to the whole row, `a` and `out` stand at the same place in it, and so does `constant`.
     fn at<L: Lane>(&self, of_row: L, a: L, constant: L, out: L) -> L;

@@ -181,7 +181,7 @@ impl<'a> Flow<'a> {
     }
 }
 
-/// What a task works with.
+/// Workspace of a task.
 struct Work {
     d: Ways,
     p: Ways,
@@ -201,8 +201,7 @@ impl Work {
     }
 }
 
-/// What fields that stand at one place become when the flow u carries them for h seconds, in columns of `spare`. They share their
-/// paths.
+/// Fields at one location after advection by the flow u for h seconds, in columns of `spare`. They share their paths.
 pub fn advect(fields: &[&Field], u: &Vectors, h: f64, how: &Advection, spare: &mut Spare) -> Result<Vec<Field>, GridError> {
     let flow = Flow::new(u, h, how)?;
     let Some(first) = fields.first() else { return Ok(Vec::new()) };
@@ -298,8 +297,7 @@ fn carry(flow: &Flow, views: &[View], start: Start, rows: &mut [&mut [Real]], ce
     }
 }
 
-/// What vectors on faces become, component by component or, if `turning`, turned with the fluid as a whole; then they are not
-/// corrected.
+/// Vectors on faces after advection, component by component or, if `turning`, rotated with the fluid as a whole; then they are not corrected.
 pub fn advect_vectors(vectors: &Vectors, u: &Vectors, h: f64, how: &Advection, spare: &mut Spare) -> Result<Vectors, GridError> {
     let grid = vectors.on_faces("advected vectors")?;
     if !how.turning {

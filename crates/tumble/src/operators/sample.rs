@@ -34,7 +34,7 @@ const FAR: f64 = 1_048_576.0;
 
 #[derive(Debug, Clone, Copy, PartialEq)]
 struct Axis {
-    /// Where positions must lie, counted from the first point in cells.
+    /// Range of positions, counted from the first point in cells.
     low: Real,
     high: Real,
     /// The last point that has a next one.
@@ -126,7 +126,7 @@ fn padded(f: &Field, points: [usize; 3], there: [bool; 3], pad: usize) -> (Vec<R
     (data, first as i32, strides)
 }
 
-/// Where a run of points starts on the grid: point (i, j, k) of a place, with its offsets.
+/// Start of a run of points on the grid: point (i, j, k) of a location, with its offsets.
 #[derive(Clone, Copy)]
 pub(super) struct Start {
     /// The first point.
@@ -234,7 +234,7 @@ pub(super) fn locate(view: &View, start: Start, d: &[Lot<Real>; 3], count: usize
     dispatch(Locate { view, start, d, count, spots });
 }
 
-/// Where one position on an axis is: its point and the way to the next one, as `Locate` finds them.
+/// One position on an axis: its point and the fraction of the way to the next one, as found by `Locate`.
 fn spot(axis: &Axis, i: Real, shift: Real) -> (Real, Real) {
     if axis.period > 0.0 {
         let cell = shift.floor() + i;
@@ -387,7 +387,7 @@ impl Read<'_, '_> {
             let mut index = [0_i32; 16];
             index[..W::N].copy_from_slice(&spots.index[e..e + W::N]);
             let cells = Cells::new::<W>(index);
-            // What the next rows need, if their paths are like these.
+            // Data for the next rows, if their paths are similar.
             for z in 0..nz as i32 {
                 let next = index[0] + AHEAD * view.axes[1].stride + z * view.axes[2].stride;
                 ask(view.data.get(next as usize..next as usize + 1).unwrap_or(&[]));
@@ -463,7 +463,7 @@ pub(super) fn read(view: &View, spots: &Spots, count: usize, out: &mut Lot<Real>
     dispatch(Read { view, spots, count, out });
 }
 
-/// Where the cells of a pack are.
+/// Cells of a pack.
 struct Cells {
     index: [i32; 16],
     /// Paths that are alike lead to cells that lie side by side.

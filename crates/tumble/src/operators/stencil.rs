@@ -14,7 +14,7 @@ pub struct Reach {
     pub ghost: Option<(Real, Real)>,
 }
 
-/// Where the value at point m along an axis comes from, inside or beyond the walls.                 (grids.2)
+/// Source of the value at point m along an axis, inside or beyond the walls.                     (grids.2)
 pub fn reach(f: &Field, axis: usize, m: isize) -> Reach {
     let (n, points) = (f.grid.n[axis] as isize, f.points()[axis] as isize);
     if f.grid.periodic[axis] {
@@ -113,7 +113,7 @@ pub fn each_row_with<T>(
     }
 }
 
-/// What is made of two neighbours.
+/// Combination of two neighbours.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Kind {
     /// Their difference, halfway between them.
@@ -130,7 +130,7 @@ pub struct Term<'a> {
     pub of: &'a Field,
     /// Along which axis.
     pub axis: usize,
-    /// What.
+    /// Kind.
     pub kind: Kind,
     /// Times which factor.
     pub scale: f64,
@@ -273,7 +273,7 @@ pub fn second(out: &mut Field, f: &Field, keep: bool, scale: f64) {
     let scale = scale as Real;
     let (points, lattice) = (f.points(), f.grid.lattice());
     let inside = |j: isize, k: isize| (0..points[1] as isize).contains(&j) && (0..points[2] as isize).contains(&k);
-    // Where the neighbours of the first and of the last point along x come from.
+    // Sources of the neighbours of the first and the last point along x.
     let ends = [reach(f, 0, -1), reach(f, 0, points[0] as isize)];
     each_row(out, |j, k, row| {
         let (j, k) = (j as isize, k as isize);

@@ -6,8 +6,8 @@ use crate::math::parallel::fold;
 use crate::math::{Random, Real, Row, Signal, VectorSignal, xyz64};
 use tumble_interface::scene::{Between, Cause, Emitter as Words, Event, Source, WhenFull};
 
-/// What random numbers are drawn for: the moment of birth, mass, radius and colour; the direction and speed; users' columns; the
-/// place. The lifetime has a quick number of its own.
+/// Purposes of random numbers: time of birth, mass, radius and colour; direction and speed; custom columns; position. The lifetime has a fast
+/// generator of its own.
 const MOMENT: u32 = 0;
 const MOTION: u32 = 1;
 const LIFETIME: u32 = 0;
@@ -21,7 +21,7 @@ const BY_AGE: f64 = 1e-3;
 /// Of an interval: what ages may have lost by rounding, at most.
 const SLACK: f64 = 0.25;
 
-/// Where an emitter's particles come from.
+/// Source of an emitter's particles.
 pub enum Origin {
     /// A place in space.
     Place(Sampler),
@@ -46,7 +46,7 @@ pub enum Kill {
 /// Whether a point is nearer to a collider than a distance [m].
 pub type Near<'a> = dyn Fn(Vector, f64) -> bool + Sync + 'a;
 
-/// What of an emitter may change in time.
+/// Time-dependent settings of an emitter.
 pub struct Course {
     /// Particles a second.
     pub rate: Signal,
@@ -63,7 +63,7 @@ pub struct Emitter {
     words: Words,
     course: Course,
     random: Random,
-    /// Where they come from.
+    /// Their source.
     pub from: Origin,
     kill: Vec<Kill>,
     /// Direction that counts as up.
@@ -77,11 +77,11 @@ pub struct Emitter {
 pub struct Birth {
     /// When [s].
     pub time: f64,
-    /// Where [m].
+    /// Position [m].
     pub x: Vector,
     /// How fast [m/s].
     pub v: Vector,
-    /// Who.
+    /// Identity.
     pub id: u32,
 }
 
@@ -114,7 +114,7 @@ impl Emitter {
         Self { random: Random::new(seed, &words.name), words, course, from, kill, up, flat }
     }
 
-    /// What the scene says about it.
+    /// Its settings in the scene.
     pub fn words(&self) -> &Words {
         &self.words
     }
@@ -131,7 +131,7 @@ impl Emitter {
     /// About how many will live at once.
     pub fn expected(&self) -> usize {
         let rate = if self.course.rate.is_constant() { self.course.rate.value(0.0) } else { 0.0 };
-        // Who lives for longer than the scene is not followed by as many as lifetime and rate say.
+        // If the lifetime exceeds the scene, fewer particles exist than lifetime times rate.
         let life = (self.words.lifetime.unwrap_or(0.0) * (1.0 + self.words.lifetime_spread)).min(self.course.end);
         let bursts: f64 = self.words.burst.iter().map(|b| f64::from(b.count)).sum();
         (1.05 * rate * life + bursts).min(4e9) as usize
@@ -237,10 +237,10 @@ impl Emitter {
         }
     }
 
-    /// What a particle is to die of at time t, where an interval of length dt [s] ends; `None` if it lives on.
+    /// Cause of death of a particle at time t, the end of an interval of length dt [s]; `None` if it survives.
     #[inline]
     pub fn dies(&self, (t, dt): (f64, f64), (id, age): (u32, f64), (x, v): (Row, Row), near: &Near<'_>) -> Option<Cause> {
-        // What a sum of intervals may have lost by rounding.
+        // Possible rounding error of a sum of intervals.
         let age = age + (age * age * (f64::from(Real::EPSILON) / dt)).min(SLACK * dt);
         if age >= self.youngest() && age >= self.lifetime(id) {
             return Some(Cause::Lifetime);
@@ -360,7 +360,7 @@ impl Emitter {
         Some(fold(count, |range| range.map(one).collect::<Vec<_>>()).concat())
     }
 
-    /// Where the source is at a time, and how fast it moves.
+    /// Position and velocity of the source at a time.
     fn source(&self, t: f64) -> (Vector, Vector) {
         (self.course.path.value(t), self.course.path.velocity(t))
     }

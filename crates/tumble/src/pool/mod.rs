@@ -34,7 +34,7 @@ struct Stream {
 pub struct Hit {
     /// When [s].
     pub time: f64,
-    /// Where [m].
+    /// Position [m].
     pub x: Vector,
     /// How fast it leaves [m/s].
     pub v: Vector,
@@ -315,8 +315,8 @@ impl Pool {
         }
     }
 
-    /// Who of an emitter is to die, and of what, at time t, where an interval of length dt [s] ends, counted from its first row, in
-    /// order. x and v are all rows of the system; `near` tells whether a point is near a collider.
+    /// Particles of an emitter that die at time t, the end of an interval of length dt [s], with the cause; counted from its first row, in order. x
+    /// and v are all rows of the system; `near` tells whether a point is near a collider.
     pub fn dead(&self, s: usize, t: (f64, f64), x: &[Row], v: &[Row], near: &Near<'_>) -> Vec<(u32, Cause)> {
         let (rows, emitter) = (self.rows(s), &self.streams[s].emitter);
         if emitter.is_immortal() {

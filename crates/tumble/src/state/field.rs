@@ -4,7 +4,7 @@ use super::grid::{Grid, GridError, Place};
 use crate::math::{Column, Real};
 use std::borrow::Cow;
 
-/// What a field is beyond a wall of its grid; periodic axes have no walls. Values c are mirrored in the wall, at distance s
+/// Boundary condition of a field beyond a wall of its grid; periodic axes have no walls. Values c are mirrored in the wall, at distance s
 /// from their image:
 ///
 /// ```text
@@ -33,9 +33,9 @@ pub type Sides = [[Side; 2]; 3];
 pub struct Field {
     /// The grid.
     pub grid: Grid,
-    /// Where the numbers belong to.
+    /// Location of the numbers.
     pub place: Place,
-    /// What is beyond the walls.
+    /// Boundary conditions.
     pub sides: Sides,
     /// SI unit.
     pub unit: Cow<'static, str>,
@@ -49,7 +49,7 @@ impl Field {
         Self::over(grid, place, unit, Column::zeros(grid.lattice().len()))
     }
 
-    /// What a column of the lattice's length holds, between closed walls.
+    /// A field over a column of the lattice's length, between closed walls.
     pub fn over(grid: Grid, place: Place, unit: impl Into<Cow<'static, str>>, data: Column) -> Result<Self, GridError> {
         let place = grid.place(place)?;
         Ok(Self { grid, place, sides: Sides::default(), unit: unit.into(), data })

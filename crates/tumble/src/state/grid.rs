@@ -114,7 +114,7 @@ impl Grid {
         std::array::from_fn(|a| if self.on_walls(place, a) { 0.0 } else { 0.5 })
     }
 
-    /// What pictures and files need to know about the grid of an object.
+    /// Grid description of an object for pictures and files.
     pub fn columns(&self, object: &str) -> Vec<Column> {
         let column = |name: &str, unit, data| Column { object: object.into(), name: name.into(), unit, width: 1, points: Vec::new(), data };
         vec![
@@ -132,7 +132,7 @@ impl Grid {
     }
 }
 
-/// Where on a grid a field has its numbers.
+/// Location of a field's numbers on a grid.
 ///
 /// ```text
 ///     node ---- edge along x ---- node
@@ -165,7 +165,7 @@ impl fmt::Display for Place {
     }
 }
 
-/// What is wrong with a grid or with fields that are brought together.
+/// Errors of grids and of combinations of fields.
 #[derive(Debug, Clone, PartialEq)]
 pub enum GridError {
     /// No cells, or too many.
@@ -175,7 +175,7 @@ pub enum GridError {
     },
     /// No length.
     Spacing {
-        /// What was given [m].
+        /// The given value [m].
         dx: f64,
     },
     /// More than one cell along a flat axis.
@@ -196,9 +196,9 @@ pub enum GridError {
     Mixed {
         /// Which field of which operator.
         what: &'static str,
-        /// Where it must be.
+        /// The expected location.
         expected: Place,
-        /// Where it is.
+        /// The actual location.
         found: Place,
     },
     /// Fields of different grids.

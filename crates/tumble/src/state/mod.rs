@@ -11,7 +11,7 @@ use crate::math::{Real, Row};
 use std::ops::Range;
 use tumble_interface::{Column, Data};
 
-/// What moves: points, then frames.
+/// Moving state: points, then frames.
 #[derive(Debug, Clone, Default)]
 pub struct State {
     /// Points [x, y, z, 1/m] [m, 1/kg], then unit quaternions.

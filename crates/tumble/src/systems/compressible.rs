@@ -24,7 +24,7 @@ use tumble_interface::{Column, Data, StepError};
 /// Part of the longest stable step that is taken where the scene names none.
 pub const SAFE: f64 = 0.7;
 
-/// What a gas is.
+/// Properties of a gas.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Fluid {
     /// Speed of sound [m/s].
@@ -37,7 +37,7 @@ pub struct Fluid {
     pub gravity: [f64; 3],
 }
 
-/// What limits the steps of a uniform flow of such a gas [1/s].
+/// Rates that limit the steps of a uniform flow of such a gas [1/s].
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Rates {
     /// c/dx.
@@ -190,7 +190,7 @@ impl Gas {
             }
         }
         self.hold_walls();
-        // What has been pushed is carried, not what was before: sound that a flow carries would grow.
+        // Advects the accelerated velocities, not the previous ones: advected sound would grow.
         let carried: Result<Vec<Field>, GridError> = self
             .velocity
             .parts
@@ -290,7 +290,7 @@ impl Gas {
         books
     }
 
-    /// What has broken: the column, the cell, and the growth of the energy.
+    /// The failure: column, cell, and growth of the energy.
     fn fault(&self) -> Option<(&'static str, [usize; 3], Option<f64>)> {
         let points = self.density.points();
         let good = |rho: Real| rho.is_finite() && rho > 0.0;

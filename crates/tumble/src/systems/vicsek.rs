@@ -60,7 +60,7 @@ impl Meet<4, 2> for Mean {
     }
 }
 
-// What random numbers are drawn for.
+// Purposes of random numbers.
 const START: u32 = 0;
 const NOISE: u32 = 1;
 

@@ -20,7 +20,7 @@ const CELL: f64 = 0.024;
 pub struct Body {
     /// Its surface, closed.
     pub mesh: Mesh,
-    /// What carries each vertex; binds are bones.
+    /// Bones of each vertex; binds are bones.
     pub skin: Vec<[Influence; 4]>,
     /// Bones, and what takes vertices into them.
     pub binds: Vec<(u32, Affine)>,
@@ -39,7 +39,7 @@ const fn flesh(bone: usize, from: [f64; 3], to: [f64; 3], radii: [f64; 2], flat:
     Flesh { bone, from, to, radii, flat }
 }
 
-/// What is joined with what, and over which width [m]. Of what is on a side, the left.
+/// Connected parts and the blend width [m]. For paired parts, the left one.
 const TRUNK: [Flesh; 9] = [
     flesh(0, [0.0, 0.008, -0.02], [0.0, 0.006, 0.06], [0.130, 0.118], [1.0, 0.80]),
     flesh(0, [0.058, 0.01, -0.02], [0.068, 0.012, -0.085], [0.090, 0.086], [1.0, 1.0]),

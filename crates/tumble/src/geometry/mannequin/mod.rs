@@ -89,7 +89,7 @@ pub fn parent(bone: usize) -> usize {
 /// A movement of the mannequin.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Dance {
-    /// What it does.
+    /// Its motion.
     pub moves: Moves,
     /// Whether a walk goes forward.
     pub travel: bool,
@@ -161,7 +161,7 @@ fn leg(hip: Vector, ankle: Vector, ahead: Vector) -> (Pose, Pose, Vector) {
     let way = ankle - hip;
     let (length, e) = (way.norm(), way.normalized());
     let (easy, most) = (EASY * (THIGH + SHIN), STRETCH * (THIGH + SHIN));
-    // Where the ankle is out of reach it is left behind, without a kink.
+    // An ankle out of reach falls short, without a kink.
     let room = most - easy;
     let d = if length <= easy { length } else { easy + room * (1.0 - crate::math::functions::exp(-(length - easy) / room)) };
     let d = d.max(0.2 * THIGH);

@@ -1,9 +1,9 @@
-//! What the mannequin does, as smooth functions of time: turns of trunk and arms, ways of hips and feet.
+//! Motions of the mannequin, as smooth functions of time: rotations of trunk and arms, paths of hips and feet.
 
 use crate::geometry::Vector;
 use crate::math::functions::{cos, floor, sin};
 
-/// What it does.
+/// Its motion.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Moves {
     /// The pose of dressing.
@@ -47,7 +47,7 @@ impl Moves {
 
 /// Which numbers of a stance stand for what.
 pub mod part {
-    /// Where the hips are [m].
+    /// Position of the hips [m].
     pub const HIPS: usize = 0;
     /// Turns about x, then y, then z [degrees].
     pub const PELVIS: usize = 1;
@@ -231,7 +231,7 @@ impl Stance {
             (1, 7.4, 7.9, [0.26, 0.0]),
         ];
         let mut s = Self::bind();
-        // What begins before the dance does, or ends after it.
+        // Terms that start before the dance, or end after it.
         let around = |a: f64, b: f64| bump(t - DANCE, a, b) + bump(t, a, b) + bump(t + DANCE, a, b);
         let spin = bump(t, 4.6, 7.0);
         let mut balls = [[0.09, -super::BALL], [-0.09, -super::BALL]];

@@ -56,7 +56,7 @@ pub(super) fn crossings(topology: &Topology, x: &[Row], edges: &mut Tree, triang
     all
 }
 
-/// What each task gathers of the crossings that it finds, in any order.
+/// Accumulator of each task for the crossings that it finds, in any order.
 fn visit<T: Default + Send>(
     topology: &Topology,
     x: &[Row],

@@ -20,14 +20,14 @@ use std::sync::atomic::{AtomicU64, Ordering::Relaxed};
 
 /// The part of a distance that each side may use up; below 1/2, so that something is left of it.
 pub const GAMMA: f64 = 0.45;
-/// What is always left of a distance, as a part of how far from the origin it is: below, planes would be noise.
+/// Least remaining distance, relative to the distance from the origin: below it, planes would be noise.
 const LEAST: f64 = 64.0 * f64::EPSILON;
 /// Leaves per task.
 const TASK: usize = 32;
 /// Vertices per task.
 const CHUNK: usize = 1024;
 
-/// What a pair is made of.
+/// Kind of a pair.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Kind {
     /// The first vertex is a point, the others a triangle.
@@ -39,7 +39,7 @@ pub enum Kind {
 /// Two features that are near each other.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Pair {
-    /// What it is made of.
+    /// Its kind.
     pub kind: Kind,
     /// The vertices of both features.
     pub vertices: [u32; 4],
@@ -54,7 +54,7 @@ pub struct Pair {
     pub thickness: Real,
 }
 
-/// What `hold` did.
+/// Result of `hold`.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct Held {
     /// Vertices that were held back.
@@ -68,7 +68,7 @@ pub struct Held {
 pub struct Detector {
     reach: f64,
     at: Vec<Vector>,
-    /// Where the vertices are about to go from there; empty if nowhere.
+    /// Predicted displacements of the vertices; empty if none.
     ways: Vec<Vector>,
     points: Tree,
     edges: Tree,
@@ -80,7 +80,7 @@ pub struct Detector {
     /// Pairs of each vertex: those of v are `lists[start[v]..start[v + 1]]`. Empty until `hold` needs them.
     start: Vec<u32>,
     lists: Vec<u32>,
-    /// What `hold` works in: who went too far, and the plane of each pair.
+    /// Workspace of `hold`: vertices that went too far, and the plane of each pair.
     far: Vec<bool>,
     chosen: Vec<Plane>,
     nearest: Vec<AtomicU64>,
@@ -108,7 +108,7 @@ impl Detector {
         &self.bounds
     }
 
-    /// Where the vertices were [m].
+    /// Former positions of the vertices [m].
     pub fn at(&self) -> &[Vector] {
         &self.at
     }
@@ -143,7 +143,7 @@ impl Detector {
         self.bound(n);
     }
 
-    /// What `intersections` finds, in less time: with the trees of this.
+    /// The result of `intersections`, faster, with the trees of this detector.
     pub fn intersections(&mut self, topology: &Topology, x: &[Row]) -> Vec<(u32, u32)> {
         crossings(topology, x, &mut self.edges, &mut self.triangles)
     }
@@ -159,7 +159,7 @@ impl Detector {
         self.triangles.fit(triangles.len(), |i| swept(triangles[i as usize], at, ways, origin));
     }
 
-    /// Where some vertices are. Not `array::map`, which would be a call.
+    /// Positions of some vertices. Not `array::map`, which would be a call.
     #[inline(always)]
     fn two([a, b]: [u32; 2], x: &[Vector]) -> [Vector; 2] {
         [x[a as usize], x[b as usize]]
@@ -307,7 +307,7 @@ impl Detector {
             let way = xyz64(x[v]) - self.at[v];
             let (length_sq, radius) = (way.norm_sq(), GAMMA * self.reach);
             let off = || !self.ways.is_empty() && (way - self.on_way(v, way)).norm_sq() > radius * radius;
-            // What is not finite stays so, for others to find.
+            // Non-finite values are left for other checks to find.
             length_sq.is_finite() && (length_sq > self.bounds[v] * self.bounds[v] || off())
         };
         chunks(&mut far, |start, far| far.iter_mut().enumerate().for_each(|(k, far)| *far = is_far(start + k)));
@@ -494,7 +494,7 @@ struct Plane {
 }
 
 impl Plane {
-    /// What it is to the vertex at a place of the pair.
+    /// The wall for the vertex at a position of the pair.
     fn wall(&self, pair: &Pair, place: usize) -> Wall {
         let first = place == 0 || place == 1 && pair.kind == Kind::EdgeEdge;
         Wall { normal: if first { self.normal } else { -self.normal }, room: self.room[place] }

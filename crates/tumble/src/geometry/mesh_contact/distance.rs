@@ -2,8 +2,8 @@
 
 use crate::geometry::Vector;
 
-/// Where two features are nearest: signed weights of their four vertices, whose sum is zero, so that the sum of weights times
-/// vertices leads from the second feature to the first.
+/// Closest points of two features: signed weights of their four vertices, which sum to zero, so that the sum of weights times vertices points from
+/// the second feature to the first.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Nearest {
     /// Weights: of the first feature's points positive, of the second one's negative.

@@ -28,7 +28,7 @@ pub fn edge_edge_impact(from: [Vector; 4], to: [Vector; 4], thickness: f64) -> O
 /// FIRST vertices are those of the first feature.
 fn impact<const FIRST: usize>(from: [Vector; 4], to: [Vector; 4], thickness: f64, distance_sq: impl Fn([Vector; 4]) -> f64) -> Option<f64> {
     let mut way = [0, 1, 2, 3].map(|i| to[i] - from[i]);
-    // What all do together does not bring them nearer.
+    // Common motion does not bring them nearer.
     let mean = (way[0] + way[1] + way[2] + way[3]) * 0.25;
     way = way.map(|w| w - mean);
     let longest = |ways: &[Vector]| ways.iter().map(|w| w.norm()).fold(0.0, f64::max);

@@ -24,7 +24,7 @@ struct Crossing {
     of_triangle: Vector,
     /// Length of the lines that begin here, half of each [m].
     length: f64,
-    /// Where the lines end: the crossing, and whether edge and triangle change sides there.
+    /// Ends of the lines: the crossing, and whether edge and triangle change sides there.
     ends: [Option<(usize, bool)>; 2],
 }
 
@@ -98,7 +98,7 @@ impl Lines<'_> {
     }
 }
 
-/// What can be said of a list of crossings, as `intersections` gives it, with these positions; nothing of such that do not fit.
+/// Intersection lines of a list of crossings, as returned by `intersections`, at these positions; crossings that do not fit are left out.
 fn lines<'a>(topology: &'a Topology, x: &'a [Row], crossings: &'a [(u32, u32)]) -> Option<(Lines<'a>, Vec<Crossing>)> {
     let fits = |(e, t): &(u32, u32)| (*e as usize) < topology.edges.len() && (*t as usize) < topology.triangles.len();
     if x.len() < topology.vertices() || !crossings.iter().all(fits) {

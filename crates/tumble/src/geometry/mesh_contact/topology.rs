@@ -1,4 +1,4 @@
-//! What meets what: triangles, edges and points of all soft meshes together, and which pairs of them are never in contact.
+//! Topology of contact: triangles, edges and points of all soft meshes, and the pairs that are never in contact.
 
 use crate::geometry::Vector;
 use crate::math::{Row, xyz64};

@@ -109,7 +109,7 @@ impl Tree {
         chunks(&mut centres, |start, centres| {
             for (k, centre) in centres.iter_mut().enumerate() {
                 let [l, h] = bounds((start + k) as u32);
-                // What is not finite lies anywhere.
+                // Non-finite points are placed anywhere.
                 *centre = [0, 1, 2].map(|k| if (l[k] + h[k]).is_finite() { l[k] + h[k] } else { 0.0 });
             }
         });

@@ -51,7 +51,7 @@ impl Axis {
         Some(Self { n, radices, twiddles, quarter, eigenvalue })
     }
 
-    /// Where place i goes: even ones forward, odd ones back.
+    /// Target of index i: even ones forward, odd ones backward.
     #[inline(always)]
     fn place(&self, i: usize) -> usize {
         if i.is_multiple_of(2) { i / 2 } else { self.n - 1 - i / 2 }
@@ -135,7 +135,7 @@ impl Cosine {
     }
 }
 
-/// What the modes are multiplied by.
+/// Factors on the modes.
 #[derive(Debug, Clone)]
 enum Scale {
     /// One over the eigenvalue; 0 for the mean.
@@ -180,7 +180,7 @@ impl Series {
         Ok(Self { cosine: Cosine { axes: [x, y, w] }, lattice, decay: Scale::Factors(factors), gain })
     }
 
-    /// What a column has become after the step.
+    /// A column after the step.
     pub fn decay(&self, column: &mut [Real]) {
         self.cosine.transform(self.lattice, column, &self.decay, Registers::Avx512);
     }
@@ -196,7 +196,7 @@ fn loss(x: f64) -> f64 {
     if x < 1e-3 { x * (1.0 - x / 2.0 * (1.0 - x / 3.0 * (1.0 - x / 4.0 * (1.0 - x / 5.0)))) } else { 1.0 - exp(-x) }
 }
 
-/// What is done along an axis.
+/// Operation along an axis.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Kind {
     Forward,

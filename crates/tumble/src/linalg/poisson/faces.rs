@@ -21,7 +21,7 @@ pub trait Weight: Copy + Default + PartialEq + Send + Sync + std::fmt::Debug + '
     fn load<W: Width>(w: W, from: &[Self; LANES], i: usize) -> W::L;
 }
 
-/// What 1/OPEN is: 127 and 254 of it are exactly 1 and 2, in both precisions.
+/// 1/OPEN: 127 and 254 times it are exactly 1 and 2 in both precisions.
 const PART: Real = 1.0 / 127.0;
 
 impl Weight for u8 {

@@ -1,4 +1,4 @@
-//! What joins many cells at once: a rigid thing that yields to the pressure around it.
+//! Couplings of many cells: a rigid body moved by the pressure around it.
 //!
 //!   A + sum over joints of weight j jᵀ                                                              (pressure.15)
 //!

@@ -10,7 +10,7 @@ use super::report::{Info, Params};
 use crate::math::Real;
 use crate::math::simd::{Level as Registers, Width, ask};
 
-/// What stands in front of the residual.
+/// The preconditioner.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Before {
     /// The residual itself.

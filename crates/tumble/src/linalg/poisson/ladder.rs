@@ -61,7 +61,7 @@ pub(super) fn relax<T: Weight>(solver: &mut Solver<T>, x: &mut [Real], params: &
         let half = |x: &[Real], out: &mut [Real], colour: Option<usize>, norms: bool| {
             run(n, registers, &Half { grid, x, out: Rows::of(out), weight, colour, norms })
         };
-        // What is left by the sweeps so far is known when the next one begins.
+        // The residual after a sweep is known when the next one starts.
         let colours = params.method != Method::Jacobi;
         let [rr, _, _, most] = half(x, &mut other, colours.then_some(0), true);
         if start == 0.0 {

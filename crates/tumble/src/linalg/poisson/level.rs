@@ -30,9 +30,9 @@ pub(super) struct Grid<T> {
     pub periodic: [bool; 3],
     /// Weights of lower faces; those of upper faces are a stride further on.
     pub w: [Vec<T>; 3],
-    /// What is added to the diagonal, if anything is.
+    /// Extra diagonal, if any.
     pub extra: Option<Vec<Real>>,
-    /// What every block is.
+    /// Kind of every block.
     pub kinds: Vec<Kind>,
     edges: [Edge; 4],
     /// One cell along z, whose faces across it are closed.
@@ -62,7 +62,7 @@ pub(super) enum Kind {
     Walls([bool; 2]),
 }
 
-/// What stands for the weights of a block with walls at its ends.
+/// Substitute for the weights of a block with walls at its ends.
 #[derive(Debug, Clone, Copy)]
 struct Edge {
     lower: Block,
@@ -248,7 +248,7 @@ impl<'a> Near<'a> {
     }
 }
 
-/// What is made of (A v)_i, 1/A_ii (zero if A_ii is), v_i and b_i; `lane` counts from the first cell of a block.
+/// Result from (A v)_i, 1/A_ii (zero if A_ii is), v_i and b_i; `lane` counts from the first cell of a block.
 pub(super) trait Finish {
     /// The number to store.
     fn at<W: Width>(&self, w: W, lane: usize, product: W::L, inverse: W::L, v: W::L, b: W::L) -> W::L;
@@ -442,7 +442,7 @@ impl Norm {
         self.most = if here > self.most { here } else { self.most };
     }
 
-    /// What a pass returns.
+    /// Result of a pass.
     #[inline(always)]
     pub fn sums(&self) -> [f64; 4] {
         [self.squares, 0.0, 0.0, self.most]

@@ -37,7 +37,7 @@ use level::Grid;
 use multigrid::{Coarsest, FEW};
 use pockets::Pockets;
 
-/// What lies beyond a side of the box.
+/// Boundary condition of a side of the box.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Side {
     /// A wall: nothing passes.
@@ -63,7 +63,7 @@ pub struct Solver<T> {
     cosine: Option<Cosine>,
     /// The direction of conjugate gradients, or the other of two iterates.
     p: Column,
-    /// What its columns are taken from while it works.
+    /// Source of its temporary columns.
     pub spare: Spare,
     registers: Registers,
     clock: report::Clock,
@@ -284,7 +284,7 @@ impl<T: Weight> Solver<T> {
                 ..*params
             };
             let part = self.solve_loaded(correction, &inner)?;
-            // What rounding adds to a mean is no fault of the caller's.
+            // Rounding errors of the mean are not the caller's fault.
             left(self, Some(&*correction), Excess::Remove)?;
             let [after, most] = self.norms();
             let scale = (now / start).sqrt();
@@ -383,7 +383,7 @@ impl<T: Weight> Solver<T> {
 /// Rows per task of what is left.
 const LINES: usize = 16;
 
-/// What is left of a row, in double precision.
+/// Residual of a row, in double precision.
 struct Left<'a, T> {
     out: &'a mut [Real],
     b: &'a [Real],

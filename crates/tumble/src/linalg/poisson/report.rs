@@ -1,4 +1,4 @@
-//! What a solve is asked for, how it ended, and what cannot be solved.
+//! Parameters of a solve, its report, and its errors.
 
 use std::fmt;
 
@@ -69,7 +69,7 @@ pub enum Target {
     Largest(f64),
 }
 
-/// What to do with a right-hand side that no pressure can balance.
+/// Treatment of a right-hand side that no pressure can balance.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Excess {
     /// An error: more flows in than out.
@@ -78,7 +78,7 @@ pub enum Excess {
     Remove,
 }
 
-/// What a solve is asked for.
+/// Parameters of a solve.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Params {
     /// By which method.
@@ -87,7 +87,7 @@ pub struct Params {
     pub target: Target,
     /// Iterations at most.
     pub iterations: usize,
-    /// What to do about a mean.
+    /// Treatment of a mean.
     pub excess: Excess,
 }
 
@@ -119,7 +119,7 @@ pub struct Info {
     pub(super) clock: Clock,
 }
 
-/// What tells the time [s]: the engine has no clock of its own. All are equal.
+/// Clock [s], as the engine has none of its own. All clocks compare equal.
 #[derive(Debug, Clone, Copy, Default)]
 pub(super) struct Clock(pub Option<fn() -> f64>);
 
@@ -205,7 +205,7 @@ pub enum Fault {
     Method {
         /// Which.
         method: Method,
-        /// What stands in its way.
+        /// The obstacle.
         because: String,
     },
 }

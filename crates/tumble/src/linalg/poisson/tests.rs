@@ -1,4 +1,4 @@
-//! What holds in both precisions: bits, symmetry, refinement.
+//! Tests for both precisions: bits, symmetry, refinement.
 
 use super::*;
 use crate::math::Random;
@@ -174,7 +174,7 @@ fn refinement_reaches_what_the_recursion_only_says() {
     assert!((better / refined.residual() - 1.0).abs() < 0.01);
     #[cfg(not(feature = "double"))]
     assert!(plain > 3e-5 && refined.refinements >= 2, "{plain:e} {refined:?}");
-    // What rounding of the evaluation forbids is not claimed.
+    // Accuracy below the rounding of the evaluation is not claimed.
     let never = Params { target: Target::Relative(1e-22), ..Params::default() };
     let given_up = solver.solve_double(&b, &mut double, &never).unwrap();
     assert!(!given_up.converged && given_up.iterations <= 200 && given_up.residual() > 1e-22, "{given_up:?}");

@@ -48,7 +48,7 @@ enum Instruction {
     Three(fn(f64, f64, f64) -> f64),
 }
 
-/// What a value depends on.
+/// Dependency of a value.
 #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 enum Kind {
     Constant,

@@ -1,4 +1,4 @@
-//! What formulas may call. Every function has the same bits on every machine.
+//! Functions of formulas. Every function has the same bits on every machine.
 
 use crate::math::functions;
 

@@ -89,12 +89,12 @@ pub trait Width: Copy + Send + Sync {
     unsafe fn put(self, v: [Self::L; 4], rows: *mut Row, index: &[u32]);
     /// Numbers from the order in which they were loaded into that of `rows_at`, and back.
     fn in_run(self, v: Self::L) -> Self::L;
-    /// What `gather_at` loads of the rows `start..start + N`, faster, and in an order of its own.
+    /// The result of `gather_at` for the rows `start..start + N`, faster, and in an order of its own.
     ///
     /// # Safety
     /// There are such rows, and nobody writes them.
     unsafe fn rows_at(self, rows: *const Row, start: u32) -> [Self::L; 4];
-    /// What `put` does with the rows `start..start + N`, from the order of `rows_at`.
+    /// The effect of `put` on the rows `start..start + N`, from the order of `rows_at`.
     ///
     /// # Safety
     /// There are such rows, and nobody else reads or writes them.
@@ -131,10 +131,10 @@ pub trait Width: Copy + Send + Sync {
     fn estimate(self, x: Self::L) -> Self::L;
 }
 
-/// What `guess` starts from.                                          (orbits.15)
+/// Initial value of `guess`.                                          (orbits.15)
 #[cfg(not(feature = "double"))]
 pub const GUESS: u32 = 0x5ef2_c6a6;
-/// What `guess` starts from.                                          (orbits.15)
+/// Initial value of `guess`.                                          (orbits.15)
 #[cfg(feature = "double")]
 pub const GUESS: u64 = 0x5fde_58d4_c7b5_3800;
 
@@ -222,7 +222,7 @@ pub fn ask_behind(rows: &[Row], at: usize, count: usize) {
 
 /// A kernel, generic over the register width.
 pub trait Kernel {
-    /// What it returns.
+    /// Its result.
     type Output;
     /// Does the work.
     fn run<W: Width>(self, w: W) -> Self::Output;
@@ -339,7 +339,7 @@ type Mask<S> = <S as Simd>::m32s;
 #[cfg(feature = "double")]
 type Mask<S> = <S as Simd>::m64s;
 
-/// What the registers of an instruction set can do beyond pulp.
+/// Operations of an instruction set's registers beyond pulp.
 pub trait Registers: Simd {
     /// Whether any lane of a mask is set.
     fn any(self, mask: Mask<Self>) -> bool;

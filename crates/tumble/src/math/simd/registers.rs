@@ -1,4 +1,4 @@
-//! What all registers share: everything of [`Width`](super::Width) that does not depend on how rows are transposed.
+//! Common to all registers: everything of [`Width`](super::Width) that does not depend on how rows are transposed.
 
 use super::{Pack, Real};
 use pulp::Simd;

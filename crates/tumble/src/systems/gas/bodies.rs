@@ -35,7 +35,7 @@ pub struct Body {
     pub inverse_mass: f64,
     /// The normal of a solid of its own system that it rests on: along it, the ball is held.
     rests: Option<Vector>,
-    /// What the fluid has given it in this interval [N s].
+    /// Impulse from the fluid in this interval [N s].
     pub impulse: Vector,
     /// Of each axis, the numbers of faces' cells and their closed shares.
     pub(super) faces: [Vec<(u32, Real)>; 3],
@@ -125,7 +125,7 @@ impl Body {
         [(n.into(), false), (first.into(), true), (n.cross(first).into(), true)]
     }
 
-    /// What is not the pressure's, for h seconds: other forces, and the weight of the fluid that it displaces.      (gas.17)
+    /// Forces besides the pressure, for h seconds: other forces, and the weight of the fluid that it displaces.      (gas.17)
     pub(super) fn fall(&mut self, h: f64, gravity: [f64; 3], density: f64, grid: &Grid) {
         if self.inverse_mass == 0.0 {
             return;

@@ -1,4 +1,4 @@
-//! What leaves a fluid: columns, books, snapshots; and what has broken.
+//! Output of a fluid: columns, ledger, snapshots, failures.
 
 use super::fluid::Fluid;
 use super::projection::around;
@@ -82,7 +82,7 @@ impl Fluid {
         all
     }
 
-    /// Where its grid is.
+    /// Its grid.
     pub fn topology(&self, out: &mut Vec<Column>) {
         let grid = self.grid();
         let mut add = |name: &str, unit, data: Data| {

@@ -30,7 +30,7 @@ pub struct Fire {
     pub expansion: f64,
 }
 
-/// What a cell has: fuel, smoke [kg/m³].
+/// Content of a cell: fuel, smoke [kg/m³].
 #[derive(Debug, Clone, Copy, PartialEq)]
 struct Burnt {
     fuel: f64,

@@ -18,7 +18,7 @@ use tumble_interface::StepError;
 use tumble_interface::engine::StepReport;
 use tumble_interface::scene::{OnFailure, Order, Viscous};
 
-/// What does not change of a fluid.
+/// Constant settings of a fluid.
 pub struct Settings {
     /// Density [kg/m³].
     pub density: f64,
@@ -52,11 +52,11 @@ pub struct Settings {
     pub variable: bool,
     /// How fuel burns.
     pub fire: Option<Fire>,
-    /// Where smoke, warmth and velocity come from.
+    /// Sources of smoke, heat and velocity.
     pub sources: Vec<Source>,
     /// Vorticity confinement [1].
     pub confinement: f64,
-    /// Where a step begins.
+    /// Order of the parts of a step.
     pub order: Order,
     /// How the velocity is carried.
     pub velocity: Advection,
@@ -66,7 +66,7 @@ pub struct Settings {
     pub pressure: Params,
     /// Largest |div u| dx over the fastest velocity.
     pub tolerance: f64,
-    /// What to do where it is not met.
+    /// Behaviour if it is not met.
     pub on_failure: OnFailure,
     /// Cells that the fastest fluid passes in a sub-step.
     pub courant: f64,
@@ -76,7 +76,7 @@ pub struct Settings {
 pub struct Fluid {
     /// Name of the object.
     pub name: String,
-    /// What does not change.
+    /// Constant settings.
     pub settings: Settings,
     /// Velocity on faces [m/s].
     pub u: Vectors,
@@ -88,15 +88,15 @@ pub struct Fluid {
     pub flame: Option<Flame>,
     /// Pressure of the last projection at cells [Pa].
     pub pressure: Field,
-    /// Where densities vary.
+    /// Data for variable density.
     pub(super) densities: Option<Densities>,
     pub(super) solver: Solver<u8>,
     pub(super) solids: Option<Solids>,
-    /// What hangs in it.
+    /// Immersed sheets.
     pub sheets: Vec<Sheet>,
 }
 
-/// What stops a step.
+/// Errors that stop a step.
 #[derive(Debug)]
 pub enum Failure {
     /// Fields that do not fit: no scene reaches this.
@@ -109,7 +109,7 @@ pub enum Failure {
         iterations: usize,
         /// |div u| dx over the fastest velocity.
         reached: f64,
-        /// What was asked for.
+        /// The requested value.
         asked: f64,
     },
 }
@@ -139,7 +139,7 @@ impl std::fmt::Display for Failure {
 pub struct Failed {
     failure: Failure,
     fluid: String,
-    /// What is no finite number, if anything.
+    /// The non-finite value, if any.
     broken: Option<StepError>,
 }
 
@@ -232,7 +232,7 @@ impl Fluid {
         parts.map_err(|failure| self.failed(failure))
     }
 
-    /// What has to be done before a frame is taken.
+    /// Work before a frame is taken.
     pub fn finish(&mut self, t: f64, report: &mut StepReport) -> Result<(), Box<Failed>> {
         if self.settings.order == Order::ProjectLast {
             return Ok(());

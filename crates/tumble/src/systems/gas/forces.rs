@@ -1,4 +1,4 @@
-//! What pushes the fluid, and what feeds it: buoyancy, given accelerations, confinement, sources, and what fades.
+//! Forces and sources of the fluid: buoyancy, given accelerations, confinement, sources, decay.
 
 use super::confinement::confine;
 use super::fire::{excess, radiate};
@@ -175,7 +175,7 @@ impl Fluid {
         warmth.map_or(0.0, |warmth| excess(warmth, self.settings.ambient))
     }
 
-    /// What is hot enough burns.                                                                      (fire.1)
+    /// Burns fuel where it is hot enough. (fire.1)
     fn burn(&mut self, h: f64) {
         let ambient = self.settings.ambient;
         if let (Some(flame), Some(warmth)) = (&mut self.flame, &mut self.temperature) {

@@ -130,7 +130,7 @@ impl System for Gas {
 
     fn publish(&mut self, t: f64, exchange: &mut Exchange) {
         for fluid in &mut self.fluids {
-            // What is beyond the sides is in no snapshot.
+            // Values beyond the sides are in no snapshot.
             hold(&mut fluid.u, &fluid.settings.sides, t);
             exchange.publish_velocities(&fluid.name, t, &fluid.u);
         }

@@ -40,7 +40,7 @@ pub fn magnitude(a: &Field) -> f64 {
     largest(a, |at, n| a.data[at..at + n].iter().fold(0.0, |most, x| worse(most, f64::from(x.abs()))))
 }
 
-/// What lies on the two sides of a face.
+/// The two sides of a face.
 #[derive(Clone, Copy, PartialEq)]
 pub enum Face {
     /// Two cells, by their numbers in `data`.

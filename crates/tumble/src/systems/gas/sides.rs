@@ -1,10 +1,10 @@
-//! What the sides of a box mean for velocities, pressure and what is carried.
+//! Boundary conditions of a box for velocities, pressure and advected fields.
 
 use crate::linalg::poisson;
 use crate::math::{Real, Vec3, VectorSignal};
 use crate::state::{Field, Place, Side, Vectors};
 
-/// What is beyond a side.
+/// Boundary condition of a side.
 #[derive(Debug, Clone, Default)]
 pub enum Beyond {
     /// A wall along which the fluid slips.
@@ -30,7 +30,7 @@ pub enum Beyond {
 }
 
 impl Beyond {
-    /// What it is for the pressure.
+    /// Its condition for the pressure.
     pub fn pressure(&self) -> poisson::Side {
         match self {
             Self::Open => poisson::Side::Open,
@@ -44,7 +44,7 @@ impl Beyond {
         !matches!(self, Self::Open | Self::Periodic)
     }
 
-    /// What it is for a carried field, whose value is `ambient` outside, and `inflow` of density, temperature and fuel of what comes in.
+    /// Its condition for an advected field: `ambient` outside, and `inflow` of the density, temperature and fuel of the inflow.
     pub fn carried(&self, ambient: f64, inflow: impl Fn([f64; 3]) -> f64) -> Side {
         match self {
             Self::Open => Side::Ghost(ambient),
@@ -53,7 +53,7 @@ impl Beyond {
         }
     }
 
-    /// What it is for the component of the velocity along an axis, at the middle of the side.
+    /// Its condition for the velocity component along an axis, at the centre of the side.
     fn component(&self, t: f64, middle: Vec3<f64>, axis: usize) -> Side {
         let part = |v: &VectorSignal| <[f64; 3]>::from(v.at(t, middle, [0.0; 3].into()))[axis];
         match self {

@@ -57,7 +57,7 @@ struct Ghost {
     velocity: [Real; 3],
 }
 
-/// What one plane of cells or faces has.
+/// Lists of one plane of cells or faces.
 #[derive(Default)]
 struct Found {
     cuts: Vec<Cut>,
@@ -86,7 +86,7 @@ pub struct Solids {
     cuts: Vec<Cut>,
     closed: [Vec<Closed>; 3],
     ghosts: Vec<Ghost>,
-    /// What they were before the forces.
+    /// Their values before the forces.
     kept: Vec<Real>,
     dead: Vec<(u32, u32)>,
     shades: Vec<(u32, Spot)>,
@@ -264,7 +264,7 @@ impl Solids {
         }
     }
 
-    /// What bodies add to the matrix of the pressure; `density` is that of the fluid [kg/m³].
+    /// Contribution of bodies to the pressure matrix; `density` is that of the fluid [kg/m³].
     pub fn joints(&self, density: f64) -> Vec<Joint> {
         let mass = (0..self.grid.dimension()).fold(density, |m, _| m * self.grid.dx);
         self.bodies.iter().flat_map(|body| body.joints(mass)).collect()
@@ -458,7 +458,7 @@ impl Solids {
         let cells = cells.map(|c| c.filter(|c| self.alive(cell(*c))).map_or(NONE, |c| c as u32));
         let near = self.depth(Place::Face(axis), number as usize) < (DEPTH + 1.0) * grid.dx;
         if !near {
-            // What is deep does nothing but fill pictures.
+            // Deep faces only fill pictures.
             found.closed[axis].push(Closed { at: number, solid: NONE, velocity: 0.0 });
             return;
         }

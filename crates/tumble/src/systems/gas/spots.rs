@@ -4,7 +4,7 @@ use crate::geometry::Vector;
 use crate::math::Real;
 use crate::state::{Grid, Place};
 
-/// Where a value between points is read.
+/// Position of an interpolated value.
 #[derive(Clone, Copy, Default)]
 pub struct Spot {
     at: u32,

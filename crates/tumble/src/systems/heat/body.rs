@@ -8,7 +8,7 @@ use crate::state::{Field, Grid, GridError, Place};
 use tumble_interface::engine::StepReport;
 use tumble_interface::scene::HeatScheme;
 
-/// What a surface borders on.
+/// Boundary condition of a surface.
 #[derive(Debug, Clone)]
 pub struct Boundary {
     /// Its name among the fluxes.
@@ -37,7 +37,7 @@ pub struct Material {
 pub struct Source {
     /// Power of a volume [W/m³].
     pub power: Signal,
-    /// What it is multiplied by in each cell.
+    /// Its factor in each cell.
     pub profile: Option<Vec<Real>>,
 }
 
@@ -54,7 +54,7 @@ pub struct Plan {
     pub materials: Vec<Material>,
     /// The number of each cell's material, x fastest; empty if there is but one.
     pub material: Vec<u16>,
-    /// What it borders on.
+    /// Its boundary conditions.
     pub boundaries: Vec<Boundary>,
     /// The boundaries of its sides.
     pub sides: [[Option<usize>; 2]; 3],
@@ -96,7 +96,7 @@ struct Implicit {
 
 /// A body in motion.
 pub struct Body {
-    /// What it is.
+    /// Its description.
     pub plan: Plan,
     /// Temperatures less `reference` [K].
     pub t: Field,
@@ -480,7 +480,7 @@ impl Body {
             // Only numbers that are not finite are refused: the breakdown tells where they are.
             Err(_) => d.fill(Real::NAN),
         }
-        // What the solver has left is made up for by one number, so that no heat is lost: (heat.8).
+        // One number compensates the residual of the solver, so that heat is conserved: (heat.8).
         self.come = books;
         if let Some(last) = self.come.last_mut() {
             *last += arisen;
@@ -535,7 +535,7 @@ impl Body {
         let mut out = vec![0.0; axes.len() * self.t.points().iter().product::<usize>()];
         let beyond = self.beyond(&[time]);
         let k = self.own().conductivity / grid.dx;
-        // What passes through the links of each cell, low and high side of each axis, by which side they are on.
+        // Flow through the links of each cell, low and high side of each axis.
         let mut number = 0;
         for at in self.t.each() {
             let here = l.at(at[0], at[1], at[2]);

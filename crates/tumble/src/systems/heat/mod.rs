@@ -43,7 +43,7 @@ pub struct Settings {
 pub struct Heat {
     settings: Settings,
     bodies: Vec<Body>,
-    /// Where the fluxes of each body's boundaries begin in the exchange.
+    /// Index of the first flux of each body's boundaries in the exchange.
     surfaces: Vec<usize>,
     watched: bool,
 }

@@ -20,7 +20,7 @@ pub struct Cells {
     pub m: Vec<Real>,
 }
 
-/// What is done to the cells of a body.
+/// Operation on the cells of a body.
 #[derive(Clone, Copy)]
 pub struct Pass<'a> {
     /// How they lie.
@@ -59,7 +59,7 @@ impl Pass<'_> {
         }
     }
 
-    /// Where the row before or after row (j, k) along an axis starts; beyond a wall it is the row itself.
+    /// Start of the row before or after row (j, k) along an axis; beyond a wall it is the row itself.
     #[inline(always)]
     fn beside(&self, j: usize, k: usize, axis: usize, up: bool) -> usize {
         let mut at = [0, j, k];
