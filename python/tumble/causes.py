@@ -120,7 +120,7 @@ def _texts(path: str, value: Any) -> Iterator[tuple[str, str]]:
 def _started(scene: Mapping[str, Any], run: "Run") -> Iterator[str]:
     """What was wrong at the start."""
     start = {key: float(run.ledger[key][0]) for key in ("stretch", "penetration", "intersections")}
-    if start["intersections"]:
+    if start["intersections"] > 0.0:
         yield f"surfaces started with {start['intersections']:.0f} edges through triangles"
     if start["penetration"] > _DEEP:
         yield f"masses started up to {start['penetration']:.3g} m deep inside a collider"

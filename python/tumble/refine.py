@@ -393,9 +393,10 @@ def _wrong(path: str, text: str) -> SceneError:
 
 _OVER_TIME: dict[str, Callable[["npt.NDArray[np.float64]"], Any]] = {
     "end": lambda curve: curve[-1],
-    "max": np.max,
-    "min": np.min,
-    "mean": np.mean,
+    # Of the frames in which it is measured.
+    "max": np.fmax.reduce,
+    "min": np.fmin.reduce,
+    "mean": lambda curve: np.mean(curve[~np.isnan(curve)]) if not np.isnan(curve).all() else np.nan,
 }
 _OVER_ELEMENTS: dict[str, Callable[["npt.NDArray[np.float64]"], Any]] = {"max": np.max, "min": np.min, "mean": np.mean}
 

@@ -41,7 +41,7 @@ fn a_dress_weighs_what_its_pattern_says() {
         // Arcs are cut to polygons of about 60 sides, which lose 0.2 % of a circle.
         assert!(mass > 0.99 * least && mass < most);
         // At the start every edge is nearly as long as in the pattern: the dress hangs on the body as it is cut.
-        assert!(sim.ledger().stretch < 1.35, "{}", sim.ledger().stretch);
+        assert!(sim.ledger().stretch.unwrap() < 1.35, "{}", sim.ledger().stretch.unwrap());
         assert!(triangles(&sim, "dress").len() as f64 > 1.5 * mass / (resolution * resolution));
     }
 }
@@ -195,11 +195,20 @@ fn the_dress_needs_one_other_word_to_be_masses_and_springs() {
         let mut crossed = 0;
         for _ in 0..12 {
             step(&mut sim);
-            crossed += sim.ledger().intersections;
+            crossed += sim.ledger().intersections.unwrap();
         }
         let books = sim.ledger();
-        println!("{other}: stretch {:.3}, {crossed} crossings in 12 frames, {:.1e} m inside the dancer", books.stretch, books.penetration);
-        assert!(crossed == 0 && books.stretch < 1.35 && books.penetration < 0.005, "{crossed} {} {}", books.stretch, books.penetration);
+        println!(
+            "{other}: stretch {:.3}, {crossed} crossings in 12 frames, {:.1e} m inside the dancer",
+            books.stretch.unwrap(),
+            books.penetration.unwrap()
+        );
+        assert!(
+            crossed == 0 && books.stretch.unwrap() < 1.35 && books.penetration.unwrap() < 0.005,
+            "{crossed} {} {}",
+            books.stretch.unwrap(),
+            books.penetration.unwrap()
+        );
         // Measured: 1.26 at the start, where seams close, and 2.1 mm. Of the bodice; the skirt starts wider than it is cut, and how it swings from there depends on how much a method dampens.
         positions(&sim, "dress").into_iter().zip(start).filter(|(_, s)| s.z > 1.1).map(|(x, _)| x).collect::<Vec<_>>()
     });

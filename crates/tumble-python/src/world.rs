@@ -11,7 +11,7 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::{RecvTimeoutError, channel};
 use std::time::Duration;
-use tumble_interface::engine::{Engine, Ledger, StepReport};
+use tumble_interface::engine::{Engine, StepReport};
 use tumble_interface::scene::Precision;
 use tumble_interface::{Column, SceneError, StepError};
 
@@ -145,16 +145,15 @@ impl World {
         Ok(pythonize::pythonize(py, self.engine.warnings())?)
     }
 
-    /// Simulates frames; returns what they took: steps, rejected, step_range [s], newton, linear, residual, unconverged,
-    /// broken, clamped [J], trials (of adaptive integrators: time, step, error, accepted; the first 65536). Releases the GIL;
-    /// Ctrl-C goes back to the last frame and raises KeyboardInterrupt. Raises StepError.
+    /// Simulates frames; returns what they took. Releases the GIL; Ctrl-C goes back to the last frame and raises
+    /// KeyboardInterrupt. Raises StepError.
     #[pyo3(signature = (frames=1))]
     fn step<'py>(&mut self, py: Python<'py>, frames: u64) -> PyResult<Bound<'py, PyAny>> {
         let mut total = StepReport::default();
         for _ in 0..frames {
             let (engine, pool) = (&mut self.engine, self.pool.as_ref());
             match work(py, pool, |go_on| engine.step(go_on))? {
-                Ok(Some(report)) => total.add(&report),
+                Ok(Some(report)) => total.add_interval(&report),
                 Ok(None) => {}
                 Err(error) => {
                     let exception = step_error(py, &error);
@@ -206,7 +205,7 @@ impl World {
         about.set_item("system", &inside.system)?;
         about.set_item("step", inside.step)?;
         about.set_item("time", inside.frame.time)?;
-        about.set_item("ledger", books(py, &inside.ledger)?)?;
+        about.set_item("ledger", pythonize::pythonize(py, &inside.ledger)?)?;
         Ok(Some((arrays::columns(py, inside.frame.columns)?, about)))
     }
 
@@ -226,14 +225,12 @@ impl World {
         arrays::columns(py, self.engine.topology())
     }
 
-    /// The books: time, mass, momentum (3), angular_momentum (3), kinetic, elastic, external, energy [J], stretch,
-    /// penetration [m], intersections (0 where neither self_contact nor expect.max_intersections asks for them), speed [m/s],
-    /// contacts, broken, heat and heat_in [J], volume [m³], divergence [1/s].
+    /// The books, now; `tumble.measures.LEDGER` describes each number.
     #[getter]
     fn ledger<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
         let (engine, pool) = (&self.engine, self.pool.as_ref());
         let ledger = work(py, pool, |_| engine.ledger())?;
-        books(py, &ledger)
+        Ok(pythonize::pythonize(py, &ledger)?)
     }
 
     /// Who has how much of the books, and where their worst numbers are: `systems` as (name, ledger), `shares` with system,
@@ -334,13 +331,6 @@ impl World {
     fn __repr__(&self) -> String {
         format!("World(frame={}, time={})", self.engine.frame_index(), self.engine.time())
     }
-}
-
-/// A ledger with its sum.
-fn books<'py>(py: Python<'py>, ledger: &Ledger) -> PyResult<Bound<'py, PyAny>> {
-    let books = pythonize::pythonize(py, ledger)?;
-    books.set_item("energy", ledger.energy())?;
-    Ok(books)
 }
 
 fn callable(py: Python<'_>, value: &Py<PyAny>, what: &str) -> PyResult<()> {

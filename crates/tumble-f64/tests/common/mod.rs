@@ -35,7 +35,7 @@ pub fn step(sim: &mut Simulation) -> StepReport {
 /// Some frames, which must not fail; their reports together.
 pub fn run(sim: &mut Simulation, frames: usize) -> StepReport {
     let mut report = StepReport::default();
-    (0..frames).for_each(|_| report.add(&step(sim)));
+    (0..frames).for_each(|_| report.add_interval(&step(sim)));
     report
 }
 

@@ -96,10 +96,6 @@ pub fn unused(scene: &Scene, plans: &[Plan]) -> Vec<Warning> {
             alone(format!("force[{i}].avoidance"), "there is no collider to shun; add one, or leave it out");
         }
     }
-    for (word, what) in idle_bounds(scene) {
-        let message = format!("is kept whatever happens: there is {what} in the scene; leave it out");
-        warnings.push(Warning::new(Code::IdleExpectation, format!("expect.{word}"), message));
-    }
     scene.emitter.iter().for_each(|emitter| doubts(scene, emitter, &mut warnings));
     if let Some(last) = scene.output.stills.iter().find(|i| **i > scene.time.frames) {
         let message = format!("there is no frame {last}; the last one is {}", scene.time.frames);
@@ -138,26 +134,6 @@ fn thin(scene: &Scene) -> Vec<Warning> {
             .then(|| Warning::new(Code::ThinCollider, format!("collider \"{}\"", thing.name), message))
     };
     scene.collider.iter().filter_map(doubt).collect()
-}
-
-/// Bounds of what the scene has not, and what that is.
-fn idle_bounds(scene: &Scene) -> Vec<(&'static str, &'static str)> {
-    let expect = &scene.expect;
-    let (bodies, surfaces) = (!scene.block.is_empty(), !(scene.sheet.is_empty() && scene.net.is_empty() && scene.cloth.is_empty()));
-    let curved = !(scene.rope.is_empty() && scene.hair.is_empty()) && scene.collider.iter().any(|thing| thing.edges);
-    let linked = scene.particles.iter().any(|thing| !thing.spring.is_empty()) || !(scene.rope.is_empty() && scene.hair.is_empty());
-    let warm = !scene.heat.is_empty() || scene.gas.iter().any(|gas| gas.fire.is_some());
-    [
-        ("max_stretch", expect.max_stretch.is_some(), linked || bodies || surfaces, "nothing that has links"),
-        ("max_penetration", expect.max_penetration.is_some(), !scene.collider.is_empty(), "no collider"),
-        ("max_intersections", expect.max_intersections.is_some(), bodies || surfaces || curved, "no soft surface"),
-        ("max_volume_error", expect.max_volume_error.is_some(), bodies || !scene.net.is_empty(), "no closed surface of soft matter"),
-        ("max_divergence", expect.max_divergence.is_some(), !scene.gas.is_empty(), "no gas"),
-        ("max_heat_error", expect.max_heat_error.is_some(), warm, "neither a body that conducts heat nor fire"),
-    ]
-    .into_iter()
-    .filter_map(|(word, bound, measured, what)| (bound && !measured).then_some((word, what)))
-    .collect()
 }
 
 /// Whether an emitter has particles at all, and whether regions that kill them are thick enough for their speed.

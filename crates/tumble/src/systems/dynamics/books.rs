@@ -159,26 +159,26 @@ impl Dynamics {
         for (index, object) in self.objects.iter().enumerate() {
             let tear = self.tears.iter().find(|tear| tear.object() == index);
             for name in names {
-                let (unit, width, data): (_, _, Vec<Real>) = match *name {
+                let data: Vec<Real> = match *name {
                     "position" => {
                         let mut x = numbers(&self.state.x[object.points.clone()], 3);
                         // Spare vertices are where the first one is, out of nobody's picture.
                         for i in tear.iter().flat_map(|tear| tear.idle()) {
                             x.copy_within(0..3, 3 * (i - object.points.start));
                         }
-                        ("m", 3, x)
+                        x
                     }
-                    "velocity" => ("m/s", 3, numbers(&self.state.v[object.points.clone()], 3)),
-                    "orientation" if !object.frames.is_empty() => ("1", 4, numbers(&self.state.x[object.frames.clone()], 4)),
-                    "angular_velocity" if !object.frames.is_empty() => ("rad/s", 3, numbers(&self.state.v[object.frames.clone()], 3)),
-                    "link_strain" if !object.links.is_empty() => ("1", 1, self.link_strain(object)),
+                    "velocity" => numbers(&self.state.v[object.points.clone()], 3),
+                    "orientation" if !object.frames.is_empty() => numbers(&self.state.x[object.frames.clone()], 4),
+                    "angular_velocity" if !object.frames.is_empty() => numbers(&self.state.v[object.frames.clone()], 3),
+                    "link_strain" if !object.links.is_empty() => self.link_strain(object),
                     _ => continue,
                 };
-                out.push(object.column(name, unit, width, Data::from(data)));
+                out.push(object.column(name, data));
                 if let (Some(tear), &"position") = (tear, name) {
                     let first = object.points.start as u32;
                     let triangles = tear.triangles().iter().flatten().map(|i| i - first).collect();
-                    out.push(object.column("triangles", "1", 3, Data::U32(triangles)));
+                    out.push(object.column("triangles", Data::U32(triangles)));
                 }
             }
             if let Some(stream) = object.stream {
@@ -217,30 +217,30 @@ impl Dynamics {
 
     pub(super) fn write_topology(&self, out: &mut Vec<Column>) {
         for object in &self.objects {
-            let mut add = |name: &str, unit, width, data: Data| {
+            let mut add = |name: &str, data: Data| {
                 if !data.is_empty() {
-                    out.push(object.column(name, unit, width, data));
+                    out.push(object.column(name, data));
                 }
             };
             if let Some(stream) = object.stream {
                 if !self.pool.emitter(stream).has_radii() {
-                    add("radius", "m", 1, Data::F64(vec![object.radius]));
+                    add("radius", Data::F64(vec![object.radius]));
                 }
                 continue;
             }
-            add("mass", "kg", 1, Data::from(self.laws.masses.mass[object.points.clone()].to_vec()));
+            add("mass", Data::from(self.laws.masses.mass[object.points.clone()].to_vec()));
             let points = object.points.start..object.points.end - object.spare;
             let pinned = points.filter(|i| self.state.x[*i][3] == 0.0).map(|i| (i - object.points.start) as u32);
-            add("pinned", "1", 1, Data::U32(pinned.collect()));
-            add("triangles", "1", 3, Data::U32(object.triangles.concat()));
-            add("texture", "1", 6, Data::F32(object.texture.concat()));
-            add("links", "1", 2, Data::U32(self.link_ends(object)));
-            add("curve", "1", 1, Data::U32(object.curve.clone()));
+            add("pinned", Data::U32(pinned.collect()));
+            add("triangles", Data::U32(object.triangles.concat()));
+            add("texture", Data::F32(object.texture.concat()));
+            add("links", Data::U32(self.link_ends(object)));
+            add("curve", Data::U32(object.curve.clone()));
             if object.curve_points > 0 {
-                add("curve_points", "1", 1, Data::U32(vec![object.curve_points]));
+                add("curve_points", Data::U32(vec![object.curve_points]));
             }
             if object.radius > 0.0 {
-                add("radius", "m", 1, Data::F64(vec![object.radius]));
+                add("radius", Data::F64(vec![object.radius]));
             }
         }
     }
@@ -288,24 +288,25 @@ impl Dynamics {
         let n = masses.points;
         let total = self.sums(0..n, n..x.len());
         let strains = self.laws.batches.iter().map(|b| b.largest_strain(x)).chain(self.constraints.iter().map(|c| c.largest_strain(x)));
-        let stretch = strains.fold(0.0, |most, strain| f64::max(most, strain + 1.0));
+        let strain = strains.fold(f64::NEG_INFINITY, f64::max);
         let depths = |i: usize| self.depths(i, t);
         let touching = !self.laws.colliders.is_empty();
+        let closed = self.objects.iter().filter(|o| o.closed);
         Ledger {
             time: t,
             mass: total.mass,
             momentum: total.momentum.into(),
-            angular_momentum: total.angular.into(),
+            angular_momentum: Some(total.angular.into()),
             kinetic: total.kinetic,
             elastic: self.between(true, t),
             external: self.between(false, t) + self.laws.external_energy(t, x, v) - Vec3::from(self.laws.gravity).dot(total.first_moment),
-            stretch,
-            penetration: if touching { max(n, |range| range.flat_map(depths).fold(0.0, f64::max)).max(0.0) } else { 0.0 },
-            intersections: self.layers.as_ref().or(self.judge.as_ref()).map_or(0, |layers| layers.intersections(x, t)),
-            speed: total.speed_sq.sqrt(),
-            contacts: if touching { sum(n, |range| range.filter(|i| depths(*i).next().is_some()).count() as f64) as u64 } else { 0 },
-            broken: self.broken,
-            volume: self.objects.iter().filter(|o| o.closed).map(|o| self.volume_in(o)).sum(),
+            stretch: (strain > f64::NEG_INFINITY).then_some(strain + 1.0),
+            penetration: touching.then(|| max(n, |range| range.flat_map(depths).fold(0.0, f64::max)).max(0.0)),
+            intersections: self.layers.as_ref().or(self.judge.as_ref()).and_then(|layers| layers.intersections(x, t)),
+            speed: Some(total.speed_sq.sqrt()),
+            contacts: touching.then(|| sum(n, |range| range.filter(|i| depths(*i).next().is_some()).count() as f64) as u64),
+            broken: Some(self.broken),
+            volume: closed.clone().next().map(|_| closed.map(|o| self.volume_in(o)).sum()),
             ..Ledger::default()
         }
     }
@@ -358,7 +359,7 @@ impl Dynamics {
         let state = &self.state;
         let books = self.books(t);
         // One number that is not finite makes these sums so.
-        let finite = books.kinetic.is_finite() && books.angular_momentum.iter().all(|l| l.is_finite());
+        let finite = books.kinetic.is_finite() && books.angular_momentum.iter().flatten().all(|l| l.is_finite());
         let bad = |rows: &[Row]| fold(rows.len(), |mut range| range.find(|i| !is_finite(rows[*i]))).into_iter().flatten().next();
         let columns = [("position", &state.x), ("velocity", &state.v)];
         let search = || columns.into_iter().find_map(|(column, rows)| Some((column, bad(rows)?, None)));

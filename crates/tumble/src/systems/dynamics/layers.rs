@@ -128,9 +128,10 @@ impl Layers {
         topology
     }
 
-    /// Edges that pass through triangles, when points are at x at time t.
-    pub fn intersections(&self, x: &[Row], t: f64) -> u64 {
-        crossed(&self.topology, &self.corners.joined(x, t)).0 as u64
+    /// Edges that pass through triangles, when points are at x at time t; `None` where there are no triangles.
+    pub fn intersections(&self, x: &[Row], t: f64) -> Option<u64> {
+        let any = !self.topology.triangles().is_empty();
+        any.then(|| crossed(&self.topology, &self.corners.joined(x, t)).0 as u64)
     }
 
     /// What passes through each other.
