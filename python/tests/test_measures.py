@@ -2,11 +2,13 @@
 
 import math
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 
 from tumble import Scene, World, expect, measures
+from tumble.columns import BOUND, COLUMNS, GRIDS, KINDS, OBJECTS
 from tumble.folder import COUNTS, LEDGER, read_rows
 from tumble.run import Run, simulate
 
@@ -83,7 +85,8 @@ def test_a_ledger_of_an_earlier_version_is_read(projected: Run, tmp_path: Path) 
     rows = read_rows(older, LEDGER)
     assert len(rows) == len(now) == 5
     assert all(
-        row[at] == "nan" and [*row[:at], *row[at + 1 :]] == [*new[:at], *new[at + 1 :]] for row, new in zip(rows, now, strict=True)
+        row[at] == "nan" and [*row[:at], *row[at + 1 :]] == [*new[:at], *new[at + 1 :]]
+        for row, new in zip(rows, now, strict=True)
     )
     # A name that is none is damage, and so is another order.
     for wrong in ({"mass": "mess"}, {"kinetic": "elastic", "elastic": "kinetic"}):
@@ -106,3 +109,64 @@ def test_units_of_expectations_are_those_of_the_schema() -> None:
     assert {bound.name: bound.unit for bound in measures.BOUNDS} == {
         name: word.get("x-unit", "1") for name, word in words.items() if name != "probe"
     }
+
+
+def test_every_column_is_described() -> None:
+    ball = {"name": "ball", "shape": {"sphere": {"radius": 0.1}}, "motion": {"velocity": [0, 0, -1]}}
+    emitter = {
+        "name": "spray",
+        "from": {"point": {"at": [0, 0, 2]}},
+        "rate": 200.0,
+        "radius_spread": 0.5,
+        "mass_spread": 0.5,
+    }
+    hot = {
+        "name": "plate",
+        "box": GAS["box"],
+        "conductivity": 1.0,
+        "density": 1e3,
+        "heat_capacity": 1e3,
+        "temperature": 300.0,
+    }
+    scenes: list[dict[str, Any]] = [
+        {
+            "rope": [ROPE | {"pin": ["start"], "rod": {"stretch": 10.0, "bend": 0.1, "twist": 0.1}}],
+            "collider": [ball],
+            "emitter": [],
+        },
+        {"emitter": [emitter], "sheet": [{"name": "sheet", "size": [1, 1], "resolution": [3, 3]}]},
+        {"gas": [GAS | {"fire": {}, "temperature": {}}]},
+        {"heat": [hot]},
+        {"compressible": [GAS | {"sound_speed": 300.0, "density": 1.0}]},
+    ]
+    found: dict[str, set[str]] = {"static": set(), "frames": set()}
+    for words in scenes:
+        world = World(
+            {"version": 1, "output": {"columns": [column.name for column in COLUMNS.values() if column.asked]}} | words
+        )
+        world.step()
+        units = world.units
+        for place, table in (("static", world.topology), ("frames", world.frame)):
+            for thing, columns in table.items():
+                for name in columns:
+                    assert units[thing][name] == COLUMNS[name].unit, (thing, name)
+                    found[place].add(name)
+    assert found["frames"] >= {name for name, column in COLUMNS.items() if column.in_frames} - {"force", "color"}
+    assert found["static"] >= {name for name, column in COLUMNS.items() if not column.in_frames} - {
+        "texture",
+        "curve_points",
+    }
+
+
+def test_every_kind_is_described() -> None:
+    scene = Scene({"version": 1, "rope": [ROPE]}).to_dict()
+    definitions = Scene.schema()
+    for kind in KINDS.values():
+        assert isinstance(scene[kind.name], list)
+        name = definitions["properties"][kind.name]["items"]["$ref"].rpartition("/")[2]
+        words = definitions["$defs"][name]["properties"]
+        for word in (*kind.amounts, *filter(None, [kind.resolution])):
+            assert word.partition(".")[0] in words, (kind.name, word)
+        assert kind.surface <= ({"membrane", "fabric"} <= words.keys())
+        assert (kind.matter == "cells") == ("box" in words)
+    assert GRIDS == ("heat", "compressible", "gas") and "hair" in BOUND and "collider" not in OBJECTS

@@ -183,8 +183,7 @@ class World:
         """The columns that the scene's `output.columns` names, of every object that has them."""
 
     def columns(self, *names: str) -> Columns:
-        """The named columns: position [m] n x 3, velocity [m/s] n x 3, orientation n x 4 (x, y, z, w), angular_velocity
-        [rad/s] n x 3, link_strain n."""
+        """The named columns, of every object that has them; `tumble.columns.COLUMNS` describes each."""
 
     def inside(self, substeps: int, *names: str) -> tuple[Columns, dict[str, Any]] | None:
         """The named columns after so many sub-steps of the next frame, all systems in turn; the world itself stays where it
@@ -198,9 +197,8 @@ class World:
 
     @property
     def topology(self) -> Columns:
-        """What does not change. Objects: mass [kg] n, pinned (indices), triangles m x 3, links l x 2, curve (indices in
-        order), radius [m] 1. Colliders: position [m] n x 3, triangles m x 3; of moving ones frames hold
-        translation [m] 3 and turn 4, x = turn p + translation, or position of vertices that move by themselves."""
+        """What does not change; `tumble.columns.COLUMNS` describes each column. Of colliders that move frames hold translation
+        and turn, x = turn p + translation, or position of vertices that move by themselves."""
 
     @property
     def ledger(self) -> Ledger:

@@ -94,15 +94,15 @@ class Measures:
         )
 
     def add(self, row: Row) -> dict[str, float]:
-        """The bounded values at the next frame, of what is measured there."""
+        """The bounded values at the next frame; nan of what is not measured there."""
         growth = self.energy(row)
         first = self._first or row
         found: dict[str, float] = {}
         for bound in measures.BOUNDS:
             columns = _COLUMNS[bound.measure]
             now, start = ([float(frame[column]) for column in columns] for frame in (row, first))
-            if not any(map(math.isnan, now)):
-                found[bound.name] = self._value(bound.how, now, start, growth, row)
+            measured = not any(map(math.isnan, now))
+            found[bound.name] = self._value(bound.how, now, start, growth, row) if measured else math.nan
         return found
 
     def _value(self, how: str, now: Sequence[float], start: Sequence[float], growth: float, row: Row) -> float:
@@ -151,10 +151,11 @@ class Bounds:
         if not self._bounds:
             return
         values = self._measures.add(row)
-        self._idle -= values.keys()
+        self._idle -= {name for name, value in values.items() if not math.isnan(value)}
         for name, value in values.items():
             bound = self._bounds.get(name)
-            if bound is None or value <= bound or any(b.name == name for b in self.broken):
+            # A number that is none breaks the bound, unless there never was one.
+            if bound is None or value <= bound or name in self._idle or any(b.name == name for b in self.broken):
                 continue
             unit = _unit(name)
             text = f"{name}: {value:.6g}{unit} at frame {self._frame}, expected at most {bound:.6g}{unit}"
@@ -222,7 +223,9 @@ def _changed(account: Mapping[str, Any], start: Mapping[str, Any], name: str) ->
     def amount(ledger: Mapping[str, Any]) -> Any:
         if name == "energy":
             return ledger["kinetic"] + ledger["elastic"] + ledger["external"]
-        return ledger["heat"] - ledger["heat_in"] if name == "heat" else np.array(ledger[name])
+        if name == "heat":
+            return (ledger["heat"] or 0.0) - (ledger["heat_in"] or 0.0)
+        return 0.0 if ledger[name] is None else np.array(ledger[name])
 
     def change(now: Mapping[str, Any], before: Mapping[str, Any] | None) -> float:
         return float(np.linalg.norm(np.atleast_1d(amount(now) - (amount(before) if before else 0.0))))

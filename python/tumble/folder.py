@@ -33,7 +33,7 @@ FORMAT = 3
 
 LEDGER = ["frame", *measures.OF_COLUMN, "seconds", "hash"]
 """Columns of ledger.csv, one row per frame: SI units, nan for what nothing measured; `seconds` is the time that computing the
-frame took, `tried` counts its rows of trials.csv. New ones stand before `seconds`."""
+frame took, `tried` counts its rows of trials.csv. They are read by name."""
 
 TRIALS = ["time", "step", "error", "accepted", "frame"]
 """Columns of trials.csv, one row per step that an adaptive integrator tried on the way to `frame`, the first 65536 of each."""

@@ -16,6 +16,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from tumble._engine import Scene, SceneError, StepError, World
+from tumble.columns import KINDS
 from tumble.energy import ADAPTIVE
 from tumble.folder import LEDGER, Columns, RunFolder, cell, write_whole
 from tumble.lock import alone
@@ -36,16 +37,7 @@ SETTLED = 0.3
 _SHORTER = ("step", "resolution", "spacing", "tolerance", "first_step", "smallest")
 """Words whose values are lengths, times or errors where they are no counts: they are halved."""
 
-_WORDS = {
-    "rope": "segments",
-    "hair": "segments",
-    "sheet": "resolution",
-    "block": "resolution",
-    "cloth": "resolution",
-    "heat": "box.resolution",
-    "compressible": "box.resolution",
-    "gas": "box.resolution",
-}
+_WORDS = {kind.name: kind.resolution for kind in KINDS.values() if kind.resolution is not None}
 """The word of each kind of thing that says how finely it is divided."""
 
 _DEFAULTS = ("kinetic", "elastic", "external", "energy", "stretch@max", "heat")

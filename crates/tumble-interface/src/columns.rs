@@ -78,7 +78,7 @@ pub const COLUMNS: &[Described] = &[
     Described { name: "fuel", unit: "kg/m³", doc: "Mass of fuel that has not burnt, in a volume.", signed: false, fog: true, ..CELLS },
     Described { name: "flux", unit: "W/m²", doc: "Heat that is conducted through an area.", width: 3, ..CELLS },
     Described { name: "pressure", unit: "Pa", doc: "Pressure; of a gas that of the last solve.", ..CELLS },
-    Described { name: "vorticity", unit: "1/s", doc: "Curl of the velocity: in a plane the component across it.", width: 3, ..CELLS },
+    Described { name: "vorticity", unit: "1/s", doc: "Curl of the velocity: in a plane the component across it, in space three.", ..CELLS },
     Described { name: "divergence", unit: "1/s", doc: "Divergence of the velocity.", ..CELLS },
     Described { name: "velocity_x", unit: "m/s", doc: "Velocity along x, on the faces across x.", places: &[Place::Face], ..CELLS },
     Described { name: "velocity_y", unit: "m/s", doc: "Velocity along y, on the faces across y.", places: &[Place::Face], ..CELLS },

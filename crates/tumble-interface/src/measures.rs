@@ -414,9 +414,9 @@ impl Bound {
 
     /// What is wrong with a bound where the ledger has no such number.
     pub fn idle(&self) -> Issue {
-        let what = self.of().map_or("", |measure| measure.doc).trim_end_matches('.');
-        let what = what.chars().next().map_or(String::new(), |c| c.to_lowercase().chain(what.chars().skip(1)).collect());
-        Issue::new(format!("expect.{}", self.name), format!("{} bounds nothing here: there is no {what}; leave it out", self.name))
+        let message =
+            format!("{} bounds nothing here: the scene has nothing of which {} is measured; leave it out", self.name, self.measure);
+        Issue::new(format!("expect.{}", self.name), message)
     }
 }
 

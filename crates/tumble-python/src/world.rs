@@ -175,8 +175,7 @@ impl World {
         arrays::columns(py, self.output_columns(py))
     }
 
-    /// The named columns: position [m] n x 3, velocity [m/s] n x 3, orientation n x 4 (x, y, z, w), angular_velocity
-    /// [rad/s] n x 3, link_strain n.
+    /// The named columns, of every object that has them; `tumble.columns.COLUMNS` describes each.
     #[pyo3(signature = (*names))]
     fn columns<'py>(&self, py: Python<'py>, names: Vec<String>) -> PyResult<Bound<'py, PyDict>> {
         let names: Vec<&str> = names.iter().map(String::as_str).collect();
@@ -217,9 +216,8 @@ impl World {
         arrays::units(py, &all)
     }
 
-    /// What does not change. Objects: mass [kg] n, pinned (indices), triangles m x 3, links l x 2, curve (indices in
-    /// order), radius [m] 1. Colliders: position [m] n x 3, triangles m x 3; of moving ones frames hold
-    /// translation [m] 3 and turn 4, x = turn p + translation, or position of vertices that move by themselves.
+    /// What does not change; `tumble.columns.COLUMNS` describes each column. Of colliders that move frames hold translation
+    /// and turn, x = turn p + translation, or position of vertices that move by themselves.
     #[getter]
     fn topology<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
         arrays::columns(py, self.engine.topology())

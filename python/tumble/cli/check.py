@@ -171,12 +171,13 @@ def _take_worse(estimates: list[dict[str, Any]], others: list[dict[str, Any]]) -
 
 def _cells(tree: dict[str, Any]) -> float:
     """Cells of all grids, each as much work as several masses."""
+    from tumble.columns import on_grids
+
     total = 0.0
-    for kind in ("gas", "heat", "compressible"):
-        for thing in tree[kind]:
-            box = thing["box"]
-            edges = sorted(box["size"])[1 if tree["dimension"] == 2 else 0 :]
-            total += 20.0 * math.prod(edge / edges[-1] * box["resolution"] for edge in edges)
+    for _, thing in on_grids(tree):
+        box = thing["box"]
+        edges = sorted(box["size"])[1 if tree["dimension"] == 2 else 0 :]
+        total += 20.0 * math.prod(edge / edges[-1] * box["resolution"] for edge in edges)
     return total
 
 

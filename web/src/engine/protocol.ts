@@ -3,9 +3,9 @@
  * Worlds are numbered by the page, so that one worker runs several side by side (integrator lab, time branches).
  */
 
-import type { Ledger, StepReport } from "./measures";
+import type { Ledger, ObjectKind, StepReport } from "./measures";
 
-export type { Ledger, StepReport };
+export type { Ledger, ObjectKind, StepReport };
 
 /** Numbers of a column, transferred: the page owns them. */
 export type Numbers = Float32Array | Float64Array | Uint32Array;
@@ -22,10 +22,6 @@ export interface Column {
 
 /** object -> column -> numbers */
 export type Columns = Record<string, Record<string, Column>>;
-
-/** The kinds of objects that a scene can hold, as its tables are called. */
-export type ObjectKind =
-  | "particles" | "emitter" | "galaxy" | "rope" | "hair" | "sheet" | "block" | "net" | "cloth" | "gas" | "heat" | "compressible" | "collider";
 
 export interface ObjectInfo {
   name: string;

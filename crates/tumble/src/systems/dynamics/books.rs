@@ -290,6 +290,8 @@ impl Dynamics {
         let strains = self.laws.batches.iter().map(|b| b.largest_strain(x)).chain(self.constraints.iter().map(|c| c.largest_strain(x)));
         let strain = strains.fold(f64::NEG_INFINITY, f64::max);
         let depths = |i: usize| self.depths(i, t);
+        // Where all that can stretch has broken, nothing is stretched.
+        let stretch = if strain > f64::NEG_INFINITY { Some(strain + 1.0) } else { (self.broken > 0).then_some(0.0) };
         let touching = !self.laws.colliders.is_empty();
         let closed = self.objects.iter().filter(|o| o.closed);
         Ledger {
@@ -300,7 +302,7 @@ impl Dynamics {
             kinetic: total.kinetic,
             elastic: self.between(true, t),
             external: self.between(false, t) + self.laws.external_energy(t, x, v) - Vec3::from(self.laws.gravity).dot(total.first_moment),
-            stretch: (strain > f64::NEG_INFINITY).then_some(strain + 1.0),
+            stretch,
             penetration: touching.then(|| max(n, |range| range.flat_map(depths).fold(0.0, f64::max)).max(0.0)),
             intersections: self.layers.as_ref().or(self.judge.as_ref()).and_then(|layers| layers.intersections(x, t)),
             speed: Some(total.speed_sq.sqrt()),
