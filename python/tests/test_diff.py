@@ -170,10 +170,13 @@ def test_particles_that_come_and_go(tmp_path: Path) -> None:
     other["emitter"][0]["rate"] = 90.0
     runs = simulate(tree, tmp_path / "a"), simulate(other, tmp_path / "b")
     found = compare(*runs)
-    assert found.seen is not None
-    counts = [len(run.frame(found.seen)["e"]["position"]) for run in runs]
-    assert counts[0] != counts[1] or found.seen_columns[0].index
-    assert any(c.lengths == (counts[0], counts[1]) for c in found.seen_columns)
+    # 2.5 and 3.75 births by the first frame.
+    assert found.seen == 1 and [len(run.frame(1)["e"]["position"]) for run in runs] == [2, 3]
+    assert {c.column: c.lengths for c in found.seen_columns} == dict.fromkeys(
+        ("position", "velocity", "id", "age"), (2, 3)
+    )
+    # Both are born from 0 on, at the same place: what differs is when.
+    assert all(c.count > 0 and c.largest > 0.0 for c in found.seen_columns if c.column != "id")
 
 
 def test_runs_of_other_things_are_refused(pair: tuple[Run, Run], sheet: Tree, tmp_path: Path, tumble: Command) -> None:

@@ -63,11 +63,11 @@ def test_steps_that_are_far_too_long_are_told_once(tmp_path: Path) -> None:
     scene["gas"][0]["courant"] = 0.5
     free = simulate(scene, tmp_path / "free")
     assert not of_books(free)
-    assert 0 < free.ledger["courant"].max() < 1
+    assert 0 < np.nanmax(free.ledger["courant"]) < 1
     held = simulate({**scene, "system": [{"method": "gas", "substeps": 1}]}, tmp_path / "held")
     (told,) = of_books(held)
     assert told["code"] == "courant" and "cells in a step" in told["message"]
-    assert held.ledger["courant"].max() > 1
+    assert np.nanmax(held.ledger["courant"]) > 1
 
 
 FIRE: Tree = {
@@ -96,7 +96,7 @@ def test_a_fire_in_single_precision(densities: str, tmp_path: Path) -> None:
     scene["gas"][0]["densities"] = densities
     run = simulate(scene, tmp_path / "run")
     assert run.ledger["unconverged"].max() == 0
-    assert 0 < run.ledger["residual"].max() <= 1e-5
+    assert 0 < np.nanmax(run.ledger["residual"]) <= 1e-5
     table = run.frame(6)["fire"]
     # 0.05 kg/m³ of 4.5e7 J/kg warm 1.2 kg/m³ of 1005 J/(kg K) by 1866 K if it all burns at once; expansion thins it.
     assert 1200 < table["temperature"].max() < 900 + 1866

@@ -323,7 +323,7 @@ def test_lost_lines_are_noticed(spring: Tree, tmp_path: Path, reference: Run, tu
     for lost, kept in (
         (lines[:5] + lines[6:], 4),
         (lines[:-1], N),
-        ([*lines[:5], lines[5].replace(b",0,", b",nan,", 1), *lines[6:]], 4),
+        ([*lines[:5], lines[5].replace(b",0,0,", b",0,nan,", 1), *lines[6:]], 4),
     ):
         path.write_bytes(b"".join(lost))
         text = rf"ledger\.csv: has lost lines: {kept} of {N + 1} frames can be read; --resume computes"

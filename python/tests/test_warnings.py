@@ -10,7 +10,7 @@ import pytest
 from conftest import Answer
 from runs import Tree
 
-from tumble import World
+from tumble import SceneError, World
 
 ROOT = Path(__file__).parents[2]
 LISTED = re.findall(r"^### (\S+)$", (ROOT / "docs/warnings.md").read_text(encoding="utf-8"), re.MULTILINE)
@@ -281,13 +281,11 @@ def test_what_a_scene_says_in_vain_is_told(code: str, path: str, vain: Tree, hee
         ("max_heat_error", GAS, WARM),
     ],
 )
-def test_bounds_of_what_is_not_there_are_told(word: str, idle: Tree, used: Tree) -> None:
-    def told(words: Tree) -> list[tuple[str, str]]:
-        found = World({"version": 1, "expect": {word: 1}} | words).warnings
-        return [(warning["code"], warning["path"]) for warning in found]
-
-    assert told(idle) == [("idle-expectation", f"expect.{word}")]
-    assert told(used) == []
+def test_bounds_on_what_nothing_measures_are_errors(word: str, idle: Tree, used: Tree) -> None:
+    with pytest.raises(SceneError, match=f"{word} bounds nothing here") as caught:
+        World({"version": 1, "expect": {word: 1}} | idle)
+    assert [issue["path"] for issue in caught.value.issues] == [f"expect.{word}"]
+    assert World({"version": 1, "expect": {word: 1}} | used).warnings == []
 
 
 @pytest.mark.parametrize(("doubtful", "fine", "code", "path", "figure"), DOUBTS)

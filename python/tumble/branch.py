@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from tumble._engine import Scene, SceneError, StepError, TumbleError, World
+from tumble.columns import KINDS
 from tumble.folder import RunFolder, plain, refuse
 from tumble.lock import alone, ask
 from tumble.recorder import Recorder, Unchanging, describe
@@ -195,7 +196,7 @@ def _instead_of_links(own: Scene, scene: Scene) -> Scene:
     scene of a run has those written out."""
     before, after = own.to_dict(), scene.to_dict()
     changed = False
-    for kind in ("sheet", "net", "cloth"):
+    for kind in (kind.name for kind in KINDS.values() if kind.surface):
         for old, new in zip(before[kind], after[kind], strict=False):
             given = any(old[word] is None and new[word] is not None for word in ("membrane", "fabric"))
             if given and new["links"] == old["links"] == _default_links(own, kind, old):

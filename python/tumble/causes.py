@@ -8,14 +8,12 @@ import numpy as np
 
 from tumble import energy
 from tumble._engine import World
+from tumble.columns import BOUND, on_grids
 from tumble.cures import step_used, system, viscous_limit
 from tumble.doubts import of_books
 
 if TYPE_CHECKING:
     from tumble.run import Run
-
-GRIDS = ("heat", "compressible", "gas")
-"""Things that lie on grids."""
 
 _UNSAFE = re.compile(r"/|\^|\b(sqrt|ln|log10|pow|exp|tan|asin|acos|sinh|cosh|mod)\b")
 """Parts of a formula that may give non-finite numbers."""
@@ -97,12 +95,11 @@ def _formulas(scene: Mapping[str, Any], report: Mapping[str, Any]) -> Iterator[s
             for path, text in _texts("", field):
                 if _UNSAFE.search(text):
                     yield f'field.{i}{path} = "{text}" may give no finite number where a particle came'
-    for kind in GRIDS:
-        for thing in scene[kind]:
-            if thing["name"] == report["object"]:
-                for path, text in _texts("", thing):
-                    if _UNSAFE.search(text):
-                        yield f'{kind} "{thing["name"]}"{path} = "{text}" may give no finite number between frames'
+    for kind, thing in on_grids(scene):
+        if thing["name"] == report["object"]:
+            for path, text in _texts("", thing):
+                if _UNSAFE.search(text):
+                    yield f'{kind} "{thing["name"]}"{path} = "{text}" may give no finite number between frames'
 
 
 def _texts(path: str, value: Any) -> Iterator[tuple[str, str]]:
@@ -120,7 +117,7 @@ def _texts(path: str, value: Any) -> Iterator[tuple[str, str]]:
 def _started(scene: Mapping[str, Any], run: "Run") -> Iterator[str]:
     """Faults at the start."""
     start = {key: float(run.ledger[key][0]) for key in ("stretch", "penetration", "intersections")}
-    if start["intersections"]:
+    if start["intersections"] > 0.0:
         yield f"surfaces started with {start['intersections']:.0f} edges through triangles"
     if start["penetration"] > _DEEP:
         yield f"masses started up to {start['penetration']:.3g} m deep inside a collider"
@@ -142,7 +139,7 @@ def _started(scene: Mapping[str, Any], run: "Run") -> Iterator[str]:
 
 def _unlike(scene: Mapping[str, Any], report: Mapping[str, Any], run: "Run") -> Iterator[str]:
     """Light masses beside heavy ones."""
-    names = [thing["name"] for kind in energy.KINDS for thing in scene[kind] if _steps(scene, thing, report)]
+    names = [thing["name"] for kind in BOUND for thing in scene[kind] if _steps(scene, thing, report)]
     masses = {n: run.static[n]["mass"] for n in names if "mass" in run.static.get(n, {}) and len(run.static[n]["mass"])}
     if not masses or not energy.has_springs(scene):
         return

@@ -6,6 +6,7 @@ from typing import Any
 
 from tumble import energy
 from tumble._engine import World
+from tumble.columns import GRIDS
 
 COST = (50.0, 20_000.0)
 """A trial may take so many times the sub-steps of the run that failed, and so many more, as in the engine."""
@@ -32,7 +33,7 @@ def others(scene: Mapping[str, Any], k: int, plan: Mapping[str, Any], report: Ma
     step = step_used(plan, interval, report)
     now = max(1, round(interval / step))
     most = COST[0] * now + COST[1]
-    index = {kind: _index(scene, kind, report.get("object")) for kind in ("heat", "compressible", "gas")}
+    index = {kind: _index(scene, kind, report.get("object")) for kind in GRIDS}
     found: list[list[str]] = []
     if (i := index["heat"]) is not None and scene["heat"][i]["scheme"] in ("explicit", "trapezoid"):
         found.append([f"heat.{i}.scheme=implicit"])

@@ -5,6 +5,8 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
+
 from tumble import energy
 
 if TYPE_CHECKING:
@@ -74,7 +76,7 @@ def _grew(run: "Run") -> Iterator[tuple[str, str]]:
 def _unconverged(run: "Run") -> Iterator[tuple[str, str]]:
     """Steps of Newton's method that were given up."""
     if unconverged := int(run.ledger["unconverged"].sum()):
-        worst = float(run.ledger["residual"].max())
+        worst = float(np.fmax.reduce(run.ledger["residual"]))
         yield (
             "unconverged",
             f"{unconverged} of {int(run.ledger['steps'].sum())} steps stopped before Newton's method converged, at a residual "
@@ -86,7 +88,7 @@ def _too_fast(run: "Run") -> Iterator[tuple[str, str]]:
     """Steps that were given and let a fluid pass far more cells than its Courant number."""
     given = any(s["method"] == "gas" and (s.get("substeps") or s.get("step")) for s in run.scene["system"])
     asked = max((float(gas["courant"]) for gas in run.scene.get("gas", [])), default=math.inf)
-    reached = float(run.ledger["courant"].max())
+    reached = float(np.fmax.reduce(run.ledger["courant"]))
     if given and reached > _COURANT * asked:
         yield (
             "courant",

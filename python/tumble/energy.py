@@ -9,6 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from tumble._engine import Scene, SceneError, StepError, World
+from tumble.columns import BOUND, on_grids
 
 if TYPE_CHECKING:
     from tumble.run import Run
@@ -21,9 +22,6 @@ TOO_MUCH = 1.0
 
 NOISE = 1e-3
 """Of the largest energy of a kind, what may be gained by rounding."""
-
-KINDS = ("particles", "rope", "sheet", "block", "net", "cloth")
-"""Things that are made of masses and what binds them."""
 
 _GIVE = {"wind", "air", "flock", "acceleration", "electric", "vortex", "turbulence", "propulsion"}
 _ALIVE = {"animated_mesh", "character", "mannequin"}
@@ -68,7 +66,7 @@ def unsoftened(scene: Tree) -> list[int]:
 
 
 def _things(scene: Tree) -> list[tuple[str, Tree]]:
-    return [(kind, thing) for kind in KINDS for thing in scene[kind]]
+    return [(kind, thing) for kind in BOUND for thing in scene[kind]]
 
 
 def _damped(value: Any) -> bool:
@@ -136,7 +134,7 @@ def growth(ledger: Mapping[str, Floats]) -> Growth:
 def from_nowhere(run: "Run") -> Growth | None:
     """The growth of a run's energy, if it is too much and nothing in the scene gives any."""
     scene = run.scene
-    fluids = any(scene[kind] for kind in ("gas", "heat", "compressible"))
+    fluids = bool(on_grids(scene))
     steady = [e for e in scene["emitter"] if not _changes([e["velocity"], e["path"], e["rate"]])]
     given = sources({**scene, "emitter": [e for e in scene["emitter"] if e not in steady]})
     if fluids or given or run.n_frames < 2 or not run.ledger["mass"].any():

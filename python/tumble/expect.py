@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import numpy.typing as npt
 
+from tumble import measures
 from tumble._engine import SceneError, World
 from tumble.folder import LEDGER
 
@@ -40,34 +41,17 @@ class Broken:
         return asdict(self)
 
 
-_UNITS = {
-    "max_stretch": "",
-    "max_penetration": "m",
-    "max_intersections": "",
-    "max_speed": "m/s",
-    "max_energy_drift": "",
-    "max_energy_growth": "",
-    "max_final_kinetic": "J",
-    "max_mass_error": "",
-    "max_momentum_change": "kg m/s",
-    "max_angular_momentum_change": "kg m²/s",
-    "max_volume_error": "",
-    "max_divergence": "1/s",
-    "max_heat_error": "",
-    "broken_links": "",
-}
+_BOUNDS = {bound.name: bound for bound in measures.BOUNDS}
 
-_WORST = ("stretch", "penetration", "intersections", "speed", "divergence")
+_COLUMNS = {measure.name: measure.columns for measure in measures.LEDGER}
+
+_WORST = [bound.measure for bound in measures.BOUNDS if bound.how == "value"]
 """Numbers of the ledger that are those of the worst element."""
 
 _KEPT = {
-    "max_mass_error": "mass",
-    "max_momentum_change": "momentum",
-    "max_angular_momentum_change": "angular_momentum",
-    "max_volume_error": "volume",
-    "max_heat_error": "heat",
-    "max_energy_drift": "energy",
-    "max_energy_growth": "energy",
+    bound.name: bound.measure
+    for bound in measures.BOUNDS
+    if bound.how in ("change", "error", "drift", "growth", "balance")
 }
 """Conserved quantities, and their numbers in the ledger."""
 
@@ -75,7 +59,7 @@ _KEPT = {
 def count(scene: Mapping[str, Any]) -> int:
     """How many expectations a resolved scene has."""
     expect = scene.get("expect", {})
-    return sum(expect.get(name) is not None for name in _UNITS) + len(expect.get("probe", ()))
+    return sum(expect.get(name) is not None for name in _BOUNDS) + len(expect.get("probe", ()))
 
 
 def numbers(row: Sequence[str]) -> Row:
@@ -110,27 +94,32 @@ class Measures:
         )
 
     def add(self, row: Row) -> dict[str, float]:
-        """The measures at the next frame."""
+        """The bounded values at the next frame; nan of what is not measured there."""
         growth = self.energy(row)
         first = self._first or row
+        found: dict[str, float] = {}
+        for bound in measures.BOUNDS:
+            columns = _COLUMNS[bound.measure]
+            now, start = ([float(frame[column]) for column in columns] for frame in (row, first))
+            measured = not any(map(math.isnan, now))
+            found[bound.name] = self._value(bound.how, now, start, growth, row) if measured else math.nan
+        return found
 
-        def relative(name: str) -> float:
-            return float(abs(row[name] - first[name]) / max(abs(first[name]), 1e-300))
-
-        def change(name: str) -> float:
-            return math.hypot(*(row[f"{name}_{axis}"] - first[f"{name}_{axis}"] for axis in "xyz"))
-
-        return {
-            **{f"max_{name}": row[name] for name in _WORST},
-            "max_energy_drift": abs(growth),
-            "max_energy_growth": growth,
-            "max_mass_error": relative("mass"),
-            "max_momentum_change": change("momentum"),
-            "max_angular_momentum_change": change("angular_momentum"),
-            "max_volume_error": relative("volume"),
-            # |heat gained - heat that came in| over the largest of both.
-            "max_heat_error": self._heat(abs(row["heat"] - row["heat_in"]), row["heat"], row["heat_in"]),
-        }
+    def _value(self, how: str, now: Sequence[float], start: Sequence[float], growth: float, row: Row) -> float:
+        match how:
+            case "change":
+                return math.dist(now, start)
+            case "error":
+                return abs(now[0] - start[0]) / max(abs(start[0]), 1e-300)
+            case "drift":
+                return abs(growth)
+            case "growth":
+                return growth
+            case "balance":
+                # |heat gained - heat that came in| over the largest of both.
+                return self._heat(abs(row["heat"] - row["heat_in"]), row["heat"], row["heat_in"])
+            case _:
+                return now[0]
 
 
 def energy_changes(ledger: Mapping[str, npt.NDArray[Any]]) -> Curve:
@@ -145,7 +134,12 @@ class Bounds:
     """The bounds on curves that a run has to keep to in every frame."""
 
     def __init__(self, expect: Mapping[str, Any]) -> None:
-        self._bounds = {name: float(bound) for name, bound in expect.items() if name in _UNITS and bound is not None}
+        self._bounds = {
+            name: float(limit)
+            for name, limit in expect.items()
+            if name in _BOUNDS and _BOUNDS[name].how not in ("last", "exact") and limit is not None
+        }
+        self._idle = set(self._bounds)
         self._measures = Measures()
         self._frame = -1
         self.broken: list[Broken] = []
@@ -156,13 +150,32 @@ class Bounds:
         self._frame += 1
         if not self._bounds:
             return
-        for name, value in self._measures.add(row).items():
+        values = self._measures.add(row)
+        self._idle -= {name for name, value in values.items() if not math.isnan(value)}
+        for name, value in values.items():
             bound = self._bounds.get(name)
-            if bound is None or value <= bound or any(b.name == name for b in self.broken):
+            # A number that is none breaks the bound, unless there never was one.
+            if bound is None or value <= bound or name in self._idle or any(b.name == name for b in self.broken):
                 continue
-            unit = _UNITS[name] and f" {_UNITS[name]}"
+            unit = _unit(name)
             text = f"{name}: {value:.6g}{unit} at frame {self._frame}, expected at most {bound:.6g}{unit}"
-            self.broken.append(Broken(name, self._frame, value, bound, _UNITS[name], text))
+            self.broken.append(Broken(name, self._frame, value, bound, unit.strip(), text))
+
+    @property
+    def idle(self) -> list[Broken]:
+        """Those on what nothing has measured so far."""
+        return [_idle(name, self._frame, self._bounds[name]) for name in sorted(self._idle)]
+
+
+def _unit(name: str) -> str:
+    """The unit of a bound behind its number."""
+    unit = _BOUNDS[name].unit
+    return "" if unit == "1" else f" {unit}"
+
+
+def _idle(name: str, frame: int, bound: float) -> Broken:
+    text = f"{name} bounds nothing here: {_BOUNDS[name].measure} was not measured"
+    return Broken(name, frame, math.nan, bound, _unit(name).strip(), text)
 
 
 def check(run: "Run") -> list[Broken]:
@@ -174,7 +187,7 @@ def check(run: "Run") -> list[Broken]:
     for row in zip(*(run.ledger[name].tolist() for name in LEDGER[:-1]), strict=True):
         bounds.add(dict(zip(LEDGER, row, strict=False)))
     whole = run.n_frames > run.manifest["frames"]
-    return [*bounds.broken, *(b for b in (_at_the_end(run, expect) if whole else []) if b is not None)]
+    return [*bounds.broken, *bounds.idle, *(b for b in (_at_the_end(run, expect) if whole else []) if b is not None)]
 
 
 def blamed(broken: Broken, world: World) -> Broken:
@@ -201,7 +214,7 @@ def _worst(account: Mapping[str, Any], name: str) -> dict[str, Any]:
         return {
             key: worst[key] for key in ("object", "other", "particles", "id", "cell") if worst[key] not in (None, [])
         }
-    return _most(account, lambda ledger, _: abs(ledger[name]), account)
+    return _most(account, lambda ledger, _: abs(ledger[name] or 0.0), account)
 
 
 def _changed(account: Mapping[str, Any], start: Mapping[str, Any], name: str) -> dict[str, Any]:
@@ -210,7 +223,9 @@ def _changed(account: Mapping[str, Any], start: Mapping[str, Any], name: str) ->
     def amount(ledger: Mapping[str, Any]) -> Any:
         if name == "energy":
             return ledger["kinetic"] + ledger["elastic"] + ledger["external"]
-        return ledger["heat"] - ledger["heat_in"] if name == "heat" else np.array(ledger[name])
+        if name == "heat":
+            return (ledger["heat"] or 0.0) - (ledger["heat_in"] or 0.0)
+        return 0.0 if ledger[name] is None else np.array(ledger[name])
 
     def change(now: Mapping[str, Any], before: Mapping[str, Any] | None) -> float:
         return float(np.linalg.norm(np.atleast_1d(amount(now) - (amount(before) if before else 0.0))))
@@ -254,15 +269,18 @@ def _told(culprit: Mapping[str, Any]) -> str:
 def _at_the_end(run: "Run", expect: Mapping[str, Any]) -> list[Broken | None]:
     last = run.n_frames - 1
     broken: list[Broken | None] = []
-    kinetic = float(run.ledger["kinetic"][-1])
-    if (bound := expect.get("max_final_kinetic")) is not None and not kinetic <= bound:
-        text = f"max_final_kinetic: {kinetic:.6g} J at frame {last}, expected at most {bound:.6g} J"
-        broken.append(Broken("max_final_kinetic", last, kinetic, bound, "J", text))
-    if (bound := expect.get("broken_links")) is not None:
-        links = int(run.ledger["broken"][-1])
-        if links != bound:
-            text = f"broken_links: {links} by frame {last}, expected {bound}"
-            broken.append(Broken("broken_links", last, links, bound, "", text))
+    for name, how in ((b.name, b.how) for b in measures.BOUNDS if b.how in ("last", "exact")):
+        if (bound := expect.get(name)) is None:
+            continue
+        value, unit = float(run.ledger[_COLUMNS[_BOUNDS[name].measure][0]][-1]), _unit(name)
+        if math.isnan(value):
+            broken.append(_idle(name, last, bound))
+        elif how == "last" and not value <= bound:
+            text = f"{name}: {value:.6g}{unit} at frame {last}, expected at most {bound:.6g}{unit}"
+            broken.append(Broken(name, last, value, bound, unit.strip(), text))
+        elif how == "exact" and value != bound:
+            text = f"{name}: {value:.0f}{unit} by frame {last}, expected {bound}{unit}"
+            broken.append(Broken(name, last, value, bound, unit.strip(), text))
     probes = expect.get("probe", ())
     return broken + [_probe(p, v, last) for p, v in zip(probes, run.manifest.get("probes", ()), strict=False)]
 

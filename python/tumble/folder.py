@@ -21,6 +21,7 @@ from typing import IO, Any
 import numpy as np
 import numpy.typing as npt
 
+from tumble import measures
 from tumble._engine import ExportError, SceneError, World
 from tumble.interrupts import held
 
@@ -30,27 +31,18 @@ Columns = dict[str, dict[str, npt.NDArray[Any]]]
 FORMAT = 3
 """Version of the run folder."""
 
-# fmt: off
-LEDGER = [
-    "frame", "time", "mass",
-    "momentum_x", "momentum_y", "momentum_z",
-    "angular_momentum_x", "angular_momentum_y", "angular_momentum_z",
-    "kinetic", "elastic", "external", "energy",
-    "stretch", "penetration", "intersections", "speed", "contacts", "broken", "heat", "heat_in", "volume", "divergence",
-    "steps", "rejected", "tried", "newton", "linear", "residual", "unconverged", "clamped", "courant",
-    "smallest_step", "largest_step", "seconds", "hash",
-]
-# fmt: on
-"""Columns of ledger.csv, one row per frame: SI units; `seconds` is the time that computing the frame took, `tried` counts its
-rows of trials.csv."""
+LEDGER = ["frame", *measures.OF_COLUMN, "seconds", "hash"]
+"""Columns of ledger.csv, one row per frame: SI units, nan for what nothing measured; `seconds` is the time that computing the
+frame took, `tried` counts its rows of trials.csv. They are read by name."""
 
 TRIALS = ["time", "step", "error", "accepted", "frame"]
 """Columns of trials.csv, one row per step that an adaptive integrator tried on the way to `frame`, the first 65536 of each."""
 
-COUNTS = {
-    *("frame", "intersections", "contacts", "broken", "steps", "rejected", "tried", "newton", "linear", "unconverged"),
-    "accepted",
+_WHOLE = {
+    column: measure.optional for column, measure in measures.OF_COLUMN.items() if measure.shape in ("whole", "trials")
 }
+
+COUNTS = {"frame", "accepted", *_WHOLE}
 """Columns of tables that hold whole numbers; those of `frame` in the ledger count its rows."""
 
 STATIC = "static"
@@ -380,25 +372,33 @@ def cell(value: str | int | float) -> str:
 
 def read_rows(path: Path, header: Sequence[str]) -> list[list[str]]:
     """The complete rows of a table. Only the ledger's `hash` is no number, and its frames count its rows: it ends at the first
-    that is not whole."""
+    that is not whole. What an earlier version had no column for was not measured."""
     try:
         lines = path.read_text(encoding="utf-8", errors="replace").splitlines(keepends=True)
     except OSError:
         return []
-    if not lines or lines[0].rstrip("\n").split(",") != list(header):
+    found = lines[0].rstrip("\n").split(",") if lines else []
+    if (
+        not found
+        or [found[0], found[-1]] != [header[0], header[-1]]
+        or found != [name for name in header if name in found]
+    ):
         return []
     rows: list[list[str]] = []
     for line in lines[1:]:
         fields = line.rstrip("\n").split(",")
-        sound = line.endswith("\n") and len(fields) == len(header) and all(map(_fits, header, fields))
+        sound = line.endswith("\n") and len(fields) == len(found) and all(map(_fits, found, fields))
         if header[0] == "frame" and not (sound and fields[0] == str(len(rows))):
             break
         if sound:
-            rows.append(fields)
+            there = dict(zip(found, fields, strict=True))
+            rows.append([there.get(name, "nan") for name in header] if found != header else fields)
     return rows
 
 
 def _fits(column: str, text: str) -> bool:
+    if _WHOLE.get(column) and text == "nan":
+        return True
     if column in COUNTS:
         return text.isascii() and text.isdigit() and len(text) < 19
     try:

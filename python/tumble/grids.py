@@ -12,21 +12,20 @@ import numpy as np
 import numpy.typing as npt
 
 from tumble._engine import ExportError
+from tumble.columns import FACES
+from tumble.columns import unit as described
 
 Array = npt.NDArray[Any]
 Floats = npt.NDArray[np.float64]
 Table = Mapping[str, Array]
 
-# fmt: off
-UNITS = {
-    "density": "kg/m³", "temperature": "K", "pressure": "Pa", "velocity": "m/s", "speed": "m/s", "vorticity": "1/s",
-    "divergence": "1/s", "fuel": "kg/m³", "flux": "W/m²", "residual": "1/s",
-    "velocity_x": "m/s", "velocity_y": "m/s", "velocity_z": "m/s",
-}
-# fmt: on
-"""Units of what can lie on a grid; others are pure numbers."""
+FOLLOWS = {"speed": "m/s", "residual": "1/s"}
+"""What pictures make of columns, with units."""
 
-FACES = ("velocity_x", "velocity_y", "velocity_z")
+
+def unit(name: str) -> str:
+    """The unit of a column, or of what follows from one."""
+    return FOLLOWS.get(name) or described(name)
 
 
 @dataclass(frozen=True)

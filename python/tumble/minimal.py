@@ -16,6 +16,7 @@ from pathlib import Path
 from typing import Any, TypeVar
 
 from tumble._engine import Scene, SceneError, StepError, World
+from tumble.columns import KINDS, OBJECTS, on_grids
 from tumble.folder import write_whole
 from tumble.toml import toml
 
@@ -39,21 +40,7 @@ _OVERHEAD = 100
 _STEEPER = 4.0
 """Trials whose sub-steps are estimated to be more than so many times those of the run are left out."""
 
-_THINGS = (
-    "particles",
-    "emitter",
-    "rope",
-    "hair",
-    "sheet",
-    "block",
-    "net",
-    "cloth",
-    "galaxy",
-    "heat",
-    "compressible",
-    "gas",
-)
-_LISTS = (*_THINGS, "collider", "anchor", "field", "force", "system")
+_LISTS = (*KINDS, "anchor", "field", "force", "system")
 
 _TOLD = ("title", "output", "camera", "expect")
 """Keys without effect on the simulation."""
@@ -64,16 +51,9 @@ _NAMES = ("on", "from", "bodies", "predators", "sheet", "collider", "object", "o
 """Words that name other things."""
 
 _COUNTS = {
-    "rope": ("segments",),
-    "hair": ("count", "segments"),
-    "sheet": ("resolution",),
-    "block": ("resolution",),
-    "cloth": ("resolution",),
-    "galaxy": ("stars",),
-    "particles": ("cloud.count", "fluid.fill"),
-    "heat": ("box.resolution",),
-    "compressible": ("box.resolution",),
-    "gas": ("box.resolution",),
+    kind.name: (*kind.amounts, *([kind.resolution] if kind.resolution else []))
+    for kind in KINDS.values()
+    if kind.amounts or kind.resolution
 }
 """Counts that are lowered."""
 
@@ -185,7 +165,7 @@ class _Search:
         self.left = BUDGET[0] * self.work + BUDGET[1]
         self.tried: dict[str, bool] = {}
         self.kept = {
-            (kind, i) for kind in _THINGS for i, o in enumerate(full[kind]) if o["name"] == report.get("object")
+            (kind, i) for kind in OBJECTS for i, o in enumerate(full[kind]) if o["name"] == report.get("object")
         }
         self.kept |= {("system", i) for i, s in enumerate(full["system"]) if s["name"] == report.get("system")}
 
@@ -353,11 +333,7 @@ class _Search:
     def _without(self, full: Tree, gone: set[Unit]) -> Tree:
         """The tree without some things, and without what names them; what nothing is left of joins them."""
         while True:
-            lost = {
-                full[kind][i]["name"]
-                for kind, i in gone
-                if kind in (*_THINGS, "collider", "system") and "name" in full[kind][i]
-            }
+            lost = {full[kind][i]["name"] for kind, i in gone if kind in (*KINDS, "system") and "name" in full[kind][i]}
             tree = {key: value for key, value in full.items() if key not in _LISTS}
             more: set[Unit] = set()
             for kind in _LISTS:
@@ -443,9 +419,9 @@ def _sizes(tree: Tree, elements: int, frames: int) -> dict[str, int]:
 def _elements(world: World, tree: Tree) -> int:
     """Masses, particles and cells that are there now."""
     columns = world.columns("position")
-    names = [thing["name"] for kind in _THINGS for thing in tree[kind]]
+    names = [thing["name"] for kind in OBJECTS for thing in tree[kind]]
     masses = sum(len(columns[name]["position"]) for name in names if "position" in columns.get(name, {}))
-    boxes = [thing["box"] for kind in ("heat", "compressible", "gas") for thing in tree[kind]]
+    boxes = [thing["box"] for _, thing in on_grids(tree)]
     across = "xyz".index(next(axis for axis in "xyz" if axis not in tree["plane"])) if tree["dimension"] == 2 else None
     cells = 0
     for box in boxes:

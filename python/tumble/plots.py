@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import numpy.typing as npt
 
+from tumble import measures
 from tumble._engine import ExportError
 from tumble.expect import energy_changes
 from tumble.folder import writing
@@ -24,26 +25,6 @@ if TYPE_CHECKING:
     from tumble.refine import Study
 
 Floats = npt.NDArray[np.float64]
-
-UNITS = {
-    "time": "s",
-    "mass": "kg",
-    "momentum": "kg m/s",
-    "angular_momentum": "kg m²/s",
-    "kinetic": "J",
-    "elastic": "J",
-    "external": "J",
-    "energy": "J",
-    "stretch": "1",
-    "penetration": "m",
-    "speed": "m/s",
-    "residual": "1",
-    "clamped": "J",
-    "smallest_step": "s",
-    "largest_step": "s",
-    "seconds": "s",
-}
-"""Units of the ledger's columns; those not named here are counts. Columns of vectors end in _x, _y, _z."""
 
 ROW = 1.4
 """Height of a pair of axes [inch], times its share."""
@@ -185,8 +166,10 @@ def convergence(study: "Study", path: str | os.PathLike[str]) -> Path:
 
 def unit(column: str) -> str:
     """The unit of a column of the ledger; nothing for counts."""
-    stem = column[:-2] if column.endswith(("_x", "_y", "_z")) else column
-    return UNITS.get(stem, "")
+    if column == "seconds":
+        return "s"
+    measure = measures.OF_COLUMN.get(column)
+    return "" if measure is None or measure.shape in ("whole", "trials") else measure.unit
 
 
 def _column(run: Recording, name: str) -> Floats:

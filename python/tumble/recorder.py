@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from tumble import _engine, causes, cures, doubts, energy, expect, minimal
+from tumble import _engine, causes, cures, doubts, energy, expect, measures, minimal
 from tumble._engine import ExportError, StepError, TumbleError, World
 from tumble.folder import (
     FORMAT,
@@ -42,7 +42,10 @@ KEPT_CHECKPOINTS = 2
 IMPLICIT = ("implicit_euler", "implicit_midpoint", "bdf2")
 """Integrators that solve linear systems."""
 
-_EMPTY_REPORT: dict[str, Any] = {}
+_NOTHING: dict[str, measures.Cell] = {
+    column: np.nan if measure.optional else 0 for measure in measures.REPORT for column in measure.columns
+}
+"""What the start took, in the columns of the ledger."""
 
 
 class Unchanging(NamedTuple):
@@ -114,7 +117,7 @@ class Recorder:
         """Opens a new folder and writes the start, frame 0."""
         self._make()
         self._open([], [])
-        self._record(self.world.frame, _EMPTY_REPORT, 0.0)
+        self._record(self.world.frame, {}, 0.0)
 
     def branch_off(self, parent: "Run") -> None:
         """Opens a new folder that begins with the frames of another run, up to the one at which the world stands."""
@@ -128,9 +131,8 @@ class Recorder:
         for row in rows[:frame]:
             self.bounds.add(expect.numbers(row))
         # The books of this frame are kept by the changed scene; the way to it was the parent's.
-        way: dict[str, Any] = dict(zip(LEDGER, rows[frame], strict=True))
-        way["step_range"] = way["smallest_step"], way["largest_step"]
-        self._record(self.world.frame, way, way["seconds"])
+        way = dict(zip(LEDGER, rows[frame], strict=True))
+        self._record(self.world.frame, {column: way[column] for column in _NOTHING}, way["seconds"])
         self.checkpoint()
 
     def _make(self) -> None:
@@ -170,23 +172,28 @@ class Recorder:
         """Writes the frame at which the world is; `report` says what it took."""
         self.timings["simulate"] += seconds
         begin = time.perf_counter()
-        self._record(self.world.frame, report, seconds)
+        self._record(self.world.frame, measures.cells(measures.REPORT, report), seconds, report["trials"])
         if self.written % self.scene["output"]["checkpoint"] == 0 or self.written == self.manifest["frames"]:
             self.checkpoint()
         self.timings["write"] += time.perf_counter() - begin
         if time.perf_counter() > self.update_due:
             self._write_manifest()
 
-    def _record(self, columns: Columns, report: Mapping[str, Any], seconds: float | str) -> None:
+    def _record(
+        self,
+        columns: Columns,
+        took: Mapping[str, measures.Cell],
+        seconds: float | str,
+        trials: Sequence[Mapping[str, Any]] = (),
+    ) -> None:
         """The frame first and its line of the ledger last: a frame with a line is complete."""
         index = self.world.frame_index
         state = self.world.hash()
         write_columns(self.files.frame(index), columns, marked(index, state))
         if self.trials is not None:
-            trials = report.get("trials", ())
             self.trials.add([t["time"], t["step"], t["error"], int(t["accepted"]), index] for t in trials)
-            report = {"tried": len(trials), **report}
-        row = ledger_row(index, self.world.ledger, report, seconds, state)
+            took = {"tried": len(trials), **took}
+        row = ledger_row(index, self.world.ledger, took, seconds, state)
         self.ledger.add([row])
         self.hashes.append(state)
         self.written = index
@@ -328,16 +335,11 @@ def _until(frame: int, files: RunFolder) -> list[list[str]]:
 
 
 def ledger_row(
-    index: int, books: Mapping[str, Any], report: Mapping[str, Any], seconds: float | str, state: str
-) -> list[str | int | float]:
-    smallest, largest = report.get("step_range") or (np.nan, np.nan)
-    values: dict[str, str | int | float] = {"frame": index, "seconds": seconds, "hash": state}
-    values.update(smallest_step=smallest, largest_step=largest)
-    for name in ("momentum", "angular_momentum"):
-        values.update({f"{name}_{axis}": float(x) for axis, x in zip("xyz", books[name], strict=True)})
-    for name in LEDGER:
-        if name not in values:
-            values[name] = books[name] if name in books else report.get(name, 0)
+    index: int, books: Mapping[str, Any], took: Mapping[str, measures.Cell], seconds: float | str, state: str
+) -> list[measures.Cell]:
+    """A row of ledger.csv; `took` has columns of what the frame took."""
+    values: dict[str, measures.Cell] = {"frame": index, "seconds": seconds, "hash": state}
+    values |= measures.cells(measures.LEDGER, books) | _NOTHING | dict(took)
     return [values[name] for name in LEDGER]
 
 

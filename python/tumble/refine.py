@@ -16,6 +16,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from tumble._engine import Scene, SceneError, StepError, World
+from tumble.columns import KINDS
 from tumble.energy import ADAPTIVE
 from tumble.folder import LEDGER, Columns, RunFolder, cell, write_whole
 from tumble.lock import alone
@@ -36,16 +37,7 @@ SETTLED = 0.3
 _SHORTER = ("step", "resolution", "spacing", "tolerance", "first_step", "smallest")
 """Words whose values are lengths, times or errors where they are no counts: they are halved."""
 
-_WORDS = {
-    "rope": "segments",
-    "hair": "segments",
-    "sheet": "resolution",
-    "block": "resolution",
-    "cloth": "resolution",
-    "heat": "box.resolution",
-    "compressible": "box.resolution",
-    "gas": "box.resolution",
-}
+_WORDS = {kind.name: kind.resolution for kind in KINDS.values() if kind.resolution is not None}
 """The word of each kind of thing that says how finely it is divided."""
 
 _DEFAULTS = ("kinetic", "elastic", "external", "energy", "stretch@max", "heat")
@@ -387,9 +379,10 @@ def _wrong(path: str, text: str) -> SceneError:
 
 _OVER_TIME: dict[str, Callable[["npt.NDArray[np.float64]"], Any]] = {
     "end": lambda curve: curve[-1],
-    "max": np.max,
-    "min": np.min,
-    "mean": np.mean,
+    # Of the frames in which it is measured.
+    "max": np.fmax.reduce,
+    "min": np.fmin.reduce,
+    "mean": lambda curve: np.mean(curve[~np.isnan(curve)]) if not np.isnan(curve).all() else np.nan,
 }
 _OVER_ELEMENTS: dict[str, Callable[["npt.NDArray[np.float64]"], Any]] = {"max": np.max, "min": np.min, "mean": np.mean}
 

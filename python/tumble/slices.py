@@ -14,8 +14,9 @@ import numpy as np
 
 from tumble import grids
 from tumble._engine import ExportError
+from tumble.columns import SIGNED
 from tumble.grids import Box, Floats
-from tumble.pictures.things import SIGNED, Recording
+from tumble.pictures.things import Recording
 from tumble.plots import figure_title, save, settings
 from tumble.style import COLORS, FAINT
 
@@ -143,4 +144,4 @@ def _draw(figure: Any, ax: "Axes", grid: Box, axes: tuple[int, int], name: str, 
     ax.set_ylabel(f"{AXES[b]} [m]")
     bar = figure.colorbar(image, ax=ax, fraction=0.06, pad=0.03, aspect=18 * float(grid.size[b] / grid.size[a]))
     bar.outline.set_visible(False)
-    bar.set_label(f"{name.replace('_', ' ')} [{grids.UNITS.get(name, '1')}]")
+    bar.set_label(f"{name.replace('_', ' ')} [{grids.unit(name)}]")

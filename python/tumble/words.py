@@ -2,6 +2,7 @@
 
 from typing import Any
 
+from tumble import columns, measures
 from tumble._engine import Scene
 
 Schema = dict[str, Any]
@@ -50,7 +51,40 @@ def page() -> str:
         branches: list[Schema] = definition.get("oneOf") or definition.get("anyOf") or []
         for branch in branches:
             lines += _branch(branch, definitions)
+    lines += ["", *_books()]
     return "\n".join(line.rstrip() for line in lines) + "\n"
+
+
+def _books() -> list[str]:
+    """What comes out: the numbers of the ledger and the columns."""
+    lines = [
+        "## Numbers of the ledger",
+        "",
+        "What nothing in the scene measures is `nan` in `ledger.csv` and `None` in Python.",
+        "",
+    ]
+    lines += ["| number | what | unit |", "|---|---|---|"]
+    for measure in (*measures.LEDGER, *measures.REPORT):
+        if measure.columns:
+            names = ", ".join(f"`{column}`" for column in measure.columns)
+            lines.append(f"| {names} | {measure.doc} | {_unit(measure.unit)} |")
+    lines += [
+        "",
+        "## Columns",
+        "",
+        "Those of frames leave if `output.columns` names them, but for what is marked with *.",
+    ]
+    lines += ["", "| column | what | of each | unit | in |", "|---|---|---|---|---|"]
+    for column in columns.COLUMNS.values():
+        mark = "" if column.asked or not column.in_frames else "*"
+        where = "frames" if column.in_frames else "static"
+        places = ", ".join(column.places)
+        lines.append(f"| `{column.name}`{mark} | {column.doc} | {places} | {_unit(column.unit)} | {where} |")
+    return lines
+
+
+def _unit(unit: str) -> str:
+    return "–" if unit == "1" else unit
 
 
 def _order(schema: Schema, definitions: dict[str, Schema]) -> list[str]:

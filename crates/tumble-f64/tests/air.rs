@@ -132,7 +132,7 @@ fn light_cloth_in_a_storm_is_not_torn_off_by_round_numbers() {
         let report = run(&mut sim, 120);
         for _ in 0..60 {
             step(&mut sim);
-            fastest = fastest.max(sim.ledger().speed);
+            fastest = fastest.max(sim.ledger().speed.unwrap());
         }
         let far = positions(&sim, "s").iter().map(|x: &Vector| x.norm()).fold(0.0, f64::max);
         println!(

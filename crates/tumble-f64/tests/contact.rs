@@ -213,8 +213,8 @@ fn every_solid_holds_a_sheet() {
             for _ in 0..45 {
                 step(&mut sim);
                 let books = sim.ledger();
-                deepest = deepest.max(books.penetration);
-                contacts = contacts.max(books.contacts);
+                deepest = deepest.max(books.penetration.unwrap());
+                contacts = contacts.max(books.contacts.unwrap());
             }
             let x = positions(&sim, "sheet");
             let top = x.iter().map(|x| x.z).fold(f64::NEG_INFINITY, f64::max);

@@ -442,7 +442,7 @@ proptest! {
         for _ in 0..30 {
             step(&mut sim);
             prop_assert!(now(&sim).0.norm() < 1.7, "{shape} {:?}", now(&sim));
-            prop_assert!(sim.ledger().penetration < 0.021, "{shape} {}", sim.ledger().penetration);
+            prop_assert!(sim.ledger().penetration.unwrap() < 0.021, "{shape} {}", sim.ledger().penetration.unwrap());
         }
     }
 }

@@ -17,7 +17,7 @@ fn cantilever(gamma: f64, fps: u32, words: &str) -> [f64; 2] {
         1.0 / gamma
     ));
     run(&mut sim, 12 * fps as usize);
-    let speed = sim.ledger().speed;
+    let speed = sim.ledger().speed.unwrap();
     assert!(speed < 1e-3, "{fps} fps, {words}: still moving at {speed:e} m/s");
     let tip = positions(&sim, "r")[32];
     [-tip.z, tip.x]
@@ -55,7 +55,7 @@ fn hanging(fps: u32, words: &str) -> [f64; 2] {
     ));
     let start = positions(&sim, "b");
     run(&mut sim, 4 * fps as usize);
-    let speed = sim.ledger().speed;
+    let speed = sim.ledger().speed.unwrap();
     assert!(speed < 1e-3, "{fps} fps, {words}: still moving at {speed:e} m/s");
     let x = positions(&sim, "b");
     let foot: Vec<usize> = (0..x.len()).filter(|i| start[*i].z < -0.179).collect();

@@ -101,7 +101,7 @@ fn opposite_charges_orbit_each_other_and_keep_what_they_must() {
         step(&mut sim);
     }
     let (x, end) = (positions(&sim, "p"), sim.ledger());
-    let turned = (Vector::from(end.angular_momentum) - Vector::from(start.angular_momentum)).norm();
+    let turned = (Vector::from(end.angular_momentum.unwrap()) - Vector::from(start.angular_momentum.unwrap())).norm();
     let p = Vector::from(end.momentum).norm();
     println!("energy off by {:.1e}, momentum {p:.1e}, angular momentum {turned:.1e}, at {:?}", end.energy() / start.energy() - 1.0, x[0]);
     // With e = omega h, Verlet's own circle has the speed 1 - e²/8 and the rate 1 + e²/24; a start at the speed 1 makes a longer ellipse,

@@ -163,7 +163,7 @@ fn strip(fabric: &Fabric, length: f64, angle: f64, (n, m): (u32, u32), (system, 
     let mut sim = Simulation::new(scene, assets).unwrap_or_else(|e| panic!("{e}"));
     run(&mut sim, 100);
     let x = positions(&sim, "s");
-    let (row, speed) = ((n + 2) as usize, sim.ledger().speed);
+    let (row, speed) = ((n + 2) as usize, sim.ledger().speed.unwrap());
     assert!(speed < still, "still moves at {speed} m/s");
     let middle = row * (m / 2) as usize;
     let (clamp, tip) = (x[middle + 1], x[middle + row - 1]);

@@ -114,8 +114,8 @@ fn a_disk_stays_a_disk() {
     let (r, z) = shape(&sim);
     let end = sim.ledger();
     let p = (Vector::from(end.momentum) - Vector::from(start.momentum)).norm();
-    let l =
-        (Vector::from(end.angular_momentum) - Vector::from(start.angular_momentum)).norm() / Vector::from(start.angular_momentum).norm();
+    let l = (Vector::from(end.angular_momentum.unwrap()) - Vector::from(start.angular_momentum.unwrap())).norm()
+        / Vector::from(start.angular_momentum.unwrap()).norm();
     println!("quartiles {r0:.3?} -> {r:.3?}, height {z0:.3} -> {z:.3}, energy {drift:.1e}, momentum {p:.1e}, angular momentum {l:.1e}");
     // Measured: 7 %, 1 %, 1 %; height 0.093 to 0.123; energy 1.4e-6. Without speeds it would fall to a point within a quarter of a turn, without a pull it would be four times larger.
     for k in 0..3 {
@@ -123,7 +123,7 @@ fn a_disk_stays_a_disk() {
     }
     assert!(z < 0.2 && z0 > 0.05);
     assert!(drift < 2e-5 && p < 1e-12 && l < 1e-11);
-    assert!(Vector::from(start.angular_momentum).z > 0.5);
+    assert!(Vector::from(start.angular_momentum.unwrap()).z > 0.5);
 }
 
 #[test]
@@ -172,7 +172,7 @@ fn halos_pull_and_are_pulled() {
     let end = sim.ledger();
     let kept = |a: [f64; 3], b: [f64; 3]| (Vector::from(a) - Vector::from(b)).norm();
     println!("two halos: energy off by {:.1e}", end.energy() / start.energy() - 1.0);
-    assert!(kept(start.momentum, end.momentum) < 1e-12 && kept(start.angular_momentum, end.angular_momentum) < 1e-11);
+    assert!(kept(start.momentum, end.momentum) < 1e-12 && kept(start.angular_momentum.unwrap(), end.angular_momentum.unwrap()) < 1e-11);
     // Energy swings by order h² only.
     assert!((end.energy() / start.energy() - 1.0).abs() < 1e-5);
     assert!((end.kinetic / start.kinetic - 1.0).abs() > 0.1);

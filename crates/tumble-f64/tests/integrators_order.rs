@@ -271,7 +271,7 @@ fn the_log_of_trials_is_bounded() {
     assert!(report.steps > StepReport::MOST_TRIALS as u64);
     assert_eq!(report.trials.len(), StepReport::MOST_TRIALS);
     let mut total = report.clone();
-    total.add(&report);
+    total.add_interval(&report);
     assert_eq!((total.trials.len(), total.steps), (StepReport::MOST_TRIALS, 2 * report.steps));
 }
 

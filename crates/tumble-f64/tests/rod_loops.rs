@@ -45,7 +45,7 @@ fn heap(words: &str) -> Heap {
     }
     let x = positions(&sim, "r");
     let (end, touching) = least(&x, 1.05 * THICKNESS);
-    Heap { nearest: [nearest, end], touching, top: x.iter().map(|p| p.z).fold(0.0, f64::max), speed: sim.ledger().speed }
+    Heap { nearest: [nearest, end], touching, top: x.iter().map(|p| p.z).fold(0.0, f64::max), speed: sim.ledger().speed.unwrap() }
 }
 
 #[test]

@@ -2,6 +2,7 @@
 
 use crate::error::{SceneError, StepError};
 use crate::frame::{Column, Frame};
+pub use crate::measures::{Ledger, StepReport};
 use crate::scene::Integrator;
 use crate::warning::Warning;
 
@@ -19,121 +20,6 @@ pub struct Trial {
     pub error: f64,
     /// Whether it was kept.
     pub accepted: bool,
-}
-
-/// What one frame took.
-#[derive(Debug, Clone, PartialEq, Default, serde::Serialize)]
-pub struct StepReport {
-    /// Sub-steps taken, all systems together.
-    pub steps: u64,
-    /// Sub-steps tried and rejected by adaptive integrators.
-    pub rejected: u64,
-    /// Smallest and largest sub-step [s].
-    pub step_range: Option<(f64, f64)>,
-    /// Newton iterations.
-    pub newton: u64,
-    /// Iterations of the linear solver.
-    pub linear: u64,
-    /// Largest final residual of Newton's method, relative to the first of its step.
-    pub residual: f64,
-    /// Steps whose Newton iteration did not reach its tolerance.
-    pub unconverged: u64,
-    /// Sweeps over the elements of position-based systems.
-    pub sweeps: u64,
-    /// Links that broke.
-    pub broken: u64,
-    /// Energy taken out by the position clamp [J].
-    pub clamped: f64,
-    /// Steps tried by adaptive integrators, in order: the first `MOST_TRIALS`; `steps` and `rejected` count all.
-    pub trials: Vec<Trial>,
-    /// Cells that the fastest fluid on a grid passed in a sub-step, at most.
-    pub courant: f64,
-    /// Residuals of the last pressure solve after each iteration, relative to its start.
-    pub pressure: Vec<f64>,
-    /// Length of the last sub-step, and of all together [s]; for those who look inside a frame.
-    #[serde(skip)]
-    pub way: (f64, f64),
-}
-
-impl StepReport {
-    /// A tolerance that is far too small may take any number of them.
-    pub const MOST_TRIALS: usize = 1 << 16;
-
-    /// Logs a step that was tried.
-    pub fn tried(&mut self, trial: Trial) {
-        if self.trials.len() < Self::MOST_TRIALS {
-            self.trials.push(trial);
-        }
-    }
-
-    /// Counts a sub-step of length h [s].
-    pub fn stepped(&mut self, h: f64) {
-        self.steps += 1;
-        self.way = (h, self.way.1 + h);
-        self.step_range = Some(self.step_range.map_or((h, h), |(a, b)| (a.min(h), b.max(h))));
-    }
-
-    /// Adds what another step took.
-    pub fn add(&mut self, other: &StepReport) {
-        self.steps += other.steps;
-        self.rejected += other.rejected;
-        self.step_range = match (self.step_range, other.step_range) {
-            (Some(a), Some(b)) => Some((a.0.min(b.0), a.1.max(b.1))),
-            (a, b) => a.or(b),
-        };
-        self.newton += other.newton;
-        self.linear += other.linear;
-        self.residual = self.residual.max(other.residual);
-        self.unconverged += other.unconverged;
-        self.sweeps += other.sweeps;
-        self.broken += other.broken;
-        self.clamped += other.clamped;
-        other.trials.iter().for_each(|trial| self.tried(*trial));
-        self.courant = self.courant.max(other.courant);
-        if !other.pressure.is_empty() {
-            self.pressure.clone_from(&other.pressure);
-        }
-    }
-}
-
-/// The books of the world at one time.
-#[derive(Debug, Clone, PartialEq, Default, serde::Serialize)]
-pub struct Ledger {
-    /// Simulated time [s].
-    pub time: f64,
-    /// Mass [kg], pinned masses included.
-    pub mass: f64,
-    /// Momentum [kg m/s].
-    pub momentum: [f64; 3],
-    /// Angular momentum about the origin [kg m²/s].
-    pub angular_momentum: [f64; 3],
-    /// Kinetic energy [J].
-    pub kinetic: f64,
-    /// Potential energy of elements [J].
-    pub elastic: f64,
-    /// Potential energy of gravity and other forces that have one [J].
-    pub external: f64,
-    /// Longest link, piece of a rod or edge of a membrane or fabric over its rest length; 0 without any.
-    pub stretch: f64,
-    /// Deepest mass inside a collider or its thickness [m], of those that are not held.
-    pub penetration: f64,
-    /// Edges of soft surfaces that pass through triangles, those of solids with `edges` among them; 0 where neither `self_contact` nor
-    /// `max_intersections` asks for it.
-    pub intersections: u64,
-    /// Fastest mass [m/s].
-    pub speed: f64,
-    /// Masses that touch a collider.
-    pub contacts: u64,
-    /// Links broken so far.
-    pub broken: u64,
-    /// Heat in bodies, above that at the start [J]; in a plane for a metre across it.
-    pub heat: f64,
-    /// Heat that has come in through surfaces and from sources [J].
-    pub heat_in: f64,
-    /// Volume inside closed surfaces of soft objects [m³].
-    pub volume: f64,
-    /// Largest divergence of a gas's velocity in a cell [1/s].
-    pub divergence: f64,
 }
 
 /// Who has how much of the books, and where their worst numbers are: whoever is to blame where a bound is broken.
@@ -175,13 +61,6 @@ pub struct Worst {
     pub id: Option<u32>,
     /// Cell, on a grid.
     pub cell: Option<[usize; 3]>,
-}
-
-impl Ledger {
-    /// Kinetic plus potential energy [J].
-    pub fn energy(&self) -> f64 {
-        self.kinetic + self.elastic + self.external
-    }
 }
 
 /// What is seen between two sub-steps of a frame.

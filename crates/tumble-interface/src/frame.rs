@@ -1,5 +1,7 @@
 //! All that leaves the engine: named columns with a unit and a shape.
 
+use crate::columns;
+
 /// The numbers of a column.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Data {
@@ -80,6 +82,22 @@ pub struct Frame {
     pub index: u64,
     /// Columns, object by object in scene order.
     pub columns: Vec<Column>,
+}
+
+impl Column {
+    /// A column of a table, of the unit and width that [`columns`] says.
+    pub fn new(object: &str, name: &str, data: impl Into<Data>) -> Self {
+        let known = columns::of(name);
+        let (unit, width) = known.map_or(("1", 1), |known| (known.unit, known.width));
+        Self { object: object.into(), name: name.into(), unit, width, points: Vec::new(), data: data.into() }
+    }
+
+    /// A column on a grid with so many points along each axis, of the unit that [`columns`] says.
+    pub fn on_grid(object: &str, name: &str, points: Vec<usize>, data: impl Into<Data>) -> Self {
+        let data = data.into();
+        let width = data.len() / points.iter().product::<usize>().max(1);
+        Self { width, points, ..Self::new(object, name, data) }
+    }
 }
 
 impl Frame {

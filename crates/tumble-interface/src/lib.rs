@@ -6,10 +6,13 @@
 pub mod assets;
 pub mod character;
 pub mod check;
+pub mod columns;
 pub mod engine;
 pub mod error;
 pub mod fabric;
 pub mod frame;
+pub mod kinds;
+pub mod measures;
 pub mod mesh;
 pub mod scene;
 pub mod tree;

@@ -45,8 +45,6 @@ codes! {
     ThinRegion = "thin-region",
     /// A solid that masses may pass on both sides of.
     ThinCollider = "thin-collider",
-    /// An expectation of what the scene has not.
-    IdleExpectation = "idle-expectation",
     /// A picture of a frame beyond the last.
     NoSuchFrame = "no-such-frame",
     /// Tracers that are moved before the gas that carries them.

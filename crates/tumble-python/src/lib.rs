@@ -14,7 +14,7 @@ use pyo3::prelude::*;
 #[pymodule]
 mod _engine {
     use super::{PyResult, errors};
-    use pyo3::prelude::{Bound, PyModule, PyModuleMethods};
+    use pyo3::prelude::{Bound, PyAny, PyModule, PyModuleMethods, Python, pyfunction};
 
     #[pymodule_export]
     use super::fields::{
@@ -28,6 +28,12 @@ mod _engine {
     use super::vdb::write_vdb;
     #[pymodule_export]
     use super::world::World;
+
+    /// What the engine says of its numbers, each described once; see `tumble.measures`.
+    #[pyfunction]
+    fn tables(py: Python<'_>) -> PyResult<Bound<'_, PyAny>> {
+        Ok(pythonize::pythonize(py, &tumble_interface::measures::tables())?)
+    }
 
     #[pymodule_init]
     fn init(module: &Bound<'_, PyModule>) -> PyResult<()> {

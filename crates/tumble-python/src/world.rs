@@ -11,7 +11,7 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::{RecvTimeoutError, channel};
 use std::time::Duration;
-use tumble_interface::engine::{Engine, Ledger, StepReport};
+use tumble_interface::engine::{Engine, StepReport};
 use tumble_interface::scene::Precision;
 use tumble_interface::{Column, SceneError, StepError};
 
@@ -145,16 +145,15 @@ impl World {
         Ok(pythonize::pythonize(py, self.engine.warnings())?)
     }
 
-    /// Simulates frames; returns what they took: steps, rejected, step_range [s], newton, linear, residual, unconverged,
-    /// broken, clamped [J], trials (of adaptive integrators: time, step, error, accepted; the first 65536). Releases the GIL;
-    /// Ctrl-C goes back to the last frame and raises KeyboardInterrupt. Raises StepError.
+    /// Simulates frames; returns what they took. Releases the GIL; Ctrl-C goes back to the last frame and raises
+    /// KeyboardInterrupt. Raises StepError.
     #[pyo3(signature = (frames=1))]
     fn step<'py>(&mut self, py: Python<'py>, frames: u64) -> PyResult<Bound<'py, PyAny>> {
         let mut total = StepReport::default();
         for _ in 0..frames {
             let (engine, pool) = (&mut self.engine, self.pool.as_ref());
             match work(py, pool, |go_on| engine.step(go_on))? {
-                Ok(Some(report)) => total.add(&report),
+                Ok(Some(report)) => total.add_interval(&report),
                 Ok(None) => {}
                 Err(error) => {
                     let exception = step_error(py, &error);
@@ -176,8 +175,7 @@ impl World {
         arrays::columns(py, self.output_columns(py))
     }
 
-    /// The named columns: position [m] n x 3, velocity [m/s] n x 3, orientation n x 4 (x, y, z, w), angular_velocity
-    /// [rad/s] n x 3, link_strain n.
+    /// The named columns, of every object that has them; `tumble.columns.COLUMNS` describes each.
     #[pyo3(signature = (*names))]
     fn columns<'py>(&self, py: Python<'py>, names: Vec<String>) -> PyResult<Bound<'py, PyDict>> {
         let names: Vec<&str> = names.iter().map(String::as_str).collect();
@@ -206,7 +204,7 @@ impl World {
         about.set_item("system", &inside.system)?;
         about.set_item("step", inside.step)?;
         about.set_item("time", inside.frame.time)?;
-        about.set_item("ledger", books(py, &inside.ledger)?)?;
+        about.set_item("ledger", pythonize::pythonize(py, &inside.ledger)?)?;
         Ok(Some((arrays::columns(py, inside.frame.columns)?, about)))
     }
 
@@ -218,22 +216,19 @@ impl World {
         arrays::units(py, &all)
     }
 
-    /// Constant columns. Objects: mass [kg] n, pinned (indices), triangles m x 3, links l x 2, curve (indices in
-    /// order), radius [m] 1. Colliders: position [m] n x 3, triangles m x 3; of moving ones frames hold
-    /// translation [m] 3 and turn 4, x = turn p + translation, or position of vertices that move by themselves.
+    /// Constant columns; `tumble.columns.COLUMNS` describes each. Of moving colliders frames hold translation and turn,
+    /// x = turn p + translation, or position of vertices that move by themselves.
     #[getter]
     fn topology<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
         arrays::columns(py, self.engine.topology())
     }
 
-    /// The books: time, mass, momentum (3), angular_momentum (3), kinetic, elastic, external, energy [J], stretch,
-    /// penetration [m], intersections (0 where neither self_contact nor expect.max_intersections asks for them), speed [m/s],
-    /// contacts, broken, heat and heat_in [J], volume [m³], divergence [1/s].
+    /// The books, now; `tumble.measures.LEDGER` describes each number.
     #[getter]
     fn ledger<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
         let (engine, pool) = (&self.engine, self.pool.as_ref());
         let ledger = work(py, pool, |_| engine.ledger())?;
-        books(py, &ledger)
+        Ok(pythonize::pythonize(py, &ledger)?)
     }
 
     /// Breakdown of the ledger, and the places of its worst numbers: `systems` as (name, ledger), `shares` with system,
@@ -334,13 +329,6 @@ impl World {
     fn __repr__(&self) -> String {
         format!("World(frame={}, time={})", self.engine.frame_index(), self.engine.time())
     }
-}
-
-/// A ledger with its sum.
-fn books<'py>(py: Python<'py>, ledger: &Ledger) -> PyResult<Bound<'py, PyAny>> {
-    let books = pythonize::pythonize(py, ledger)?;
-    books.set_item("energy", ledger.energy())?;
-    Ok(books)
 }
 
 fn callable(py: Python<'_>, value: &Py<PyAny>, what: &str) -> PyResult<()> {

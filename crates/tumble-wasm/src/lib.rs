@@ -14,7 +14,7 @@ use failure::Failure;
 use load::Loaded;
 use serde::Serialize;
 use tumble_interface::SceneError;
-use tumble_interface::engine::{Engine, Ledger};
+use tumble_interface::engine::Engine;
 use tumble_interface::tree::Node;
 use wasm_bindgen::prelude::*;
 
@@ -123,7 +123,7 @@ impl World {
                     "system": inside.system,
                     "step": inside.step,
                     "time": inside.frame.time,
-                    "ledger": Books::of(inside.ledger),
+                    "ledger": inside.ledger,
                 });
                 Ok(Some(arrays::with_columns(inside.frame.columns, &about.to_string())))
             }
@@ -144,7 +144,7 @@ impl World {
 
     /// The books now, as JSON.
     pub fn ledger(&self) -> String {
-        json(&Books::of(self.loaded.world.ledger()))
+        json(&self.loaded.world.ledger())
     }
 
     /// Hash of everything that the next step depends on.
@@ -224,20 +224,6 @@ impl World {
 
 /// Milliseconds for the estimate of how stiff a hand may be.
 const GRAB_LIMIT: f64 = 1000.0;
-
-/// A ledger with its sum.
-#[derive(Serialize)]
-struct Books {
-    #[serde(flatten)]
-    ledger: Ledger,
-    energy: f64,
-}
-
-impl Books {
-    fn of(ledger: Ledger) -> Self {
-        Self { energy: ledger.energy(), ledger }
-    }
-}
 
 /// Tried steps of adaptive integrators that go out.
 const MOST_TRIALS: usize = 4096;

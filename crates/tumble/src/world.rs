@@ -81,13 +81,15 @@ impl World {
         for k in 0..u64::from(self.exchanges) {
             // From whole numbers, so that time does not drift.
             let [t, end] = [k, k + 1].map(|k| (self.frame * u64::from(self.exchanges) + k) as f64 * self.dt);
+            let mut interval = StepReport::default();
             for (i, system) in self.systems.iter_mut().enumerate() {
                 system.absorb(&mut self.exchange);
                 let turn = system.advance(t, self.dt, &mut self.exchange, go_on)?;
                 done(i, t, &turn);
-                report.add(&turn);
+                interval.add_system(&turn);
                 system.publish(end, &mut self.exchange);
             }
+            report.add_interval(&interval);
         }
         Ok(report)
     }
@@ -251,26 +253,7 @@ impl World {
     /// The same, of a state at this time [s].
     pub fn ledger_at(&self, time: f64) -> Ledger {
         let mut total = Ledger { time, ..Ledger::default() };
-        for books in self.systems.iter().map(|s| s.ledger(time)) {
-            total.mass += books.mass;
-            for a in 0..3 {
-                total.momentum[a] += books.momentum[a];
-                total.angular_momentum[a] += books.angular_momentum[a];
-            }
-            total.kinetic += books.kinetic;
-            total.elastic += books.elastic;
-            total.external += books.external;
-            total.stretch = total.stretch.max(books.stretch);
-            total.penetration = total.penetration.max(books.penetration);
-            total.intersections += books.intersections;
-            total.speed = total.speed.max(books.speed);
-            total.contacts += books.contacts;
-            total.broken += books.broken;
-            total.heat += books.heat;
-            total.heat_in += books.heat_in;
-            total.volume += books.volume;
-            total.divergence = total.divergence.max(books.divergence);
-        }
+        self.systems.iter().for_each(|s| total.add_system(&s.ledger(time)));
         total
     }
 

@@ -210,11 +210,11 @@ fn any_count_of_threads_gives_the_same_bits() {
         };
         let start = std::time::Instant::now();
         let one = hash(1);
-        println!("{name:22} {:016x} after {frames} frames, {} contacts, {} broken, {:.1?}", one.0, one.1, one.2, start.elapsed());
+        println!("{name:22} {:016x} after {frames} frames, {:?} contacts, {:?} broken, {:.1?}", one.0, one.1, one.2, start.elapsed());
         assert_eq!(one, hash(2), "{name}: 2 threads");
         assert_eq!(one, hash(8), "{name}: 8 threads");
-        assert!(!name.contains("torn") || one.2 > 0, "{name}: nothing tears");
-        assert!(!name.contains("sheet, implicit") || one.1 > 10, "{name}: no contact");
+        assert!(!name.contains("torn") || one.2 > Some(0), "{name}: nothing tears");
+        assert!(!name.contains("sheet, implicit") || one.1 > Some(10), "{name}: no contact");
     }
 }
 

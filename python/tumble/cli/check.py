@@ -172,9 +172,11 @@ def _take_worse(estimates: list[dict[str, Any]], others: list[dict[str, Any]]) -
 
 def _cells(tree: dict[str, Any]) -> float:
     """Work of all grid cells, each equal to several masses."""
+    from tumble.columns import on_grids
+
     total = 0.0
-    things = [thing for kind in tree.values() if isinstance(kind, list) for thing in kind if isinstance(thing, dict)]
-    for box in (thing["box"] for thing in things if "box" in thing):
+    for _, thing in on_grids(tree):
+        box = thing["box"]
         edges = sorted(box["size"])[1 if tree["dimension"] == 2 else 0 :]
         total += 20.0 * math.prod(edge / edges[-1] * box["resolution"] for edge in edges)
     return total

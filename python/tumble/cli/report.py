@@ -174,9 +174,9 @@ def _headline(report: Mapping[str, Any]) -> str:
 
 def _on_grid(scene: Mapping[str, Any], report: Mapping[str, Any]) -> bool:
     """Whether it broke in a cell."""
-    from tumble.causes import GRIDS
+    from tumble.columns import on_grids
 
-    return any(thing["name"] == report.get("object") for kind in GRIDS for thing in scene[kind])
+    return any(thing["name"] == report.get("object") for _, thing in on_grids(scene))
 
 
 def _place(report: Mapping[str, Any], scene: Mapping[str, Any]) -> list[str]:

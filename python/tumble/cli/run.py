@@ -91,9 +91,11 @@ def run(
 
 def _refuse_empty(scene: dict[str, Any], ply: bool | None, vdb: bool | None) -> None:
     """Raises BadParameter if an option requests files without content; requests in the scene are checked by the engine."""
+    from tumble.columns import GRIDS
+
     for option, given, kinds, what in (
         ("--ply", ply, ("particles", "emitter", "galaxy"), "there are no particles"),
-        ("--vdb", vdb, ("gas", "heat", "compressible"), "nothing lies on a grid"),
+        ("--vdb", vdb, GRIDS, "nothing lies on a grid"),
     ):
         if given and not any(scene[kind] for kind in kinds):
             sections = ", ".join(f"[[{kind}]]" for kind in kinds)

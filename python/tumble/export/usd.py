@@ -35,6 +35,7 @@ import numpy as np
 import numpy.typing as npt
 
 from tumble._engine import ExportError
+from tumble.columns import FOG
 from tumble.export import DIGITS, vdb
 from tumble.folder import writing
 from tumble.pictures.framing import camera
@@ -463,7 +464,7 @@ def _volume(stage: Any, part: Part, stem: str, run: Recording, table: Mapping[st
         field.CreateFieldNameAttr(name)
         field.CreateFieldDataTypeAttr("float" if width == 1 else "float3")
         field.CreateVectorDataRoleHintAttr("None" if width == 1 else "Vector")
-        if name in vdb.FOG:
+        if name in FOG:
             field.CreateFieldClassAttr("fogVolume")
         elif width == 3 and (name.endswith("_faces") or "velocity" not in table):
             field.CreateFieldClassAttr("staggered")

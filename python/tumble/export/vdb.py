@@ -17,16 +17,14 @@ import numpy as np
 import numpy.typing as npt
 
 from tumble._engine import ExportError, write_vdb
+from tumble.columns import FOG, unit
 from tumble.export import DIGITS, file_names
 from tumble.folder import write_whole, writing
-from tumble.grids import UNITS, Box, box, columns, faces
+from tumble.grids import Box, box, columns, faces
 from tumble.pictures.things import Recording
 
 TOLERANCE = 1e-4
 """Smallest stored difference from the background, relative to the largest of the frame."""
-
-FOG = ("density", "fuel")
-"""Columns that are densities."""
 
 
 def write(
@@ -111,7 +109,7 @@ def _volume(grid: Box, name: str, array: npt.NDArray[Any], what: str, half: bool
     most = float(off[np.isfinite(off)].max(initial=0.0))
     return {
         "name": name,
-        "unit": UNITS.get(name.removesuffix("_faces"), "1"),
+        "unit": unit(name.removesuffix("_faces")),
         "class": what,
         "values": values.ravel(),
         "width": 1 if array.ndim == 3 else 3,

@@ -1,7 +1,7 @@
 """One run of a scene under one integrator with one step: what it took and how it ended."""
 
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -100,7 +100,7 @@ def run(
     return cell
 
 
-def _add(cell: Cell, report: dict[str, Any]) -> None:
+def _add(cell: Cell, report: Mapping[str, Any]) -> None:
     cell.steps += int(report["steps"])
     cell.rejected += int(report["rejected"])
     cell.newton += int(report["newton"])

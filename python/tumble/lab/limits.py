@@ -1,8 +1,9 @@
 """The largest step that survives, by bisection, beside the predicted one."""
 
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 
@@ -132,14 +133,14 @@ def _bisect(rate: float, predicted: float, survives: Callable[[float], bool | No
 
 def _growth(subject: Subject) -> Callable[[World], bool]:
     """Says no when a world has grown a thousandfold."""
-    first: dict[str, float] = {}
+    first: Mapping[str, Any] = {}
     scale, extent = 0.0, subject.extent
     if subject.tracers:
         solution = subject.solution
         if solution is not None:
             extent = max(extent, float(np.abs(solution.at(np.pi / subject.rate) - subject.start).max()) / 2)
     else:
-        first.update(subject.world(BY_WORD["rk4"], 1.0, 1, 1).ledger)
+        first = subject.world(BY_WORD["rk4"], 1.0, 1, 1).ledger
         gravity = float(np.linalg.norm(subject.tree["world"]["gravity"]))
         scale = max(first["kinetic"], first["elastic"], first["mass"] * gravity * 2 * extent)
 

@@ -3,7 +3,7 @@
 import time
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -231,13 +231,12 @@ def energy(results: Results, tolerance: float, purse: Purse, tick: Tick) -> None
     truth: list[tuple[float, float]] = []
     scale = 0.0
     which = int(np.argmax(np.linalg.norm(subject.start - subject.start.mean(axis=0), axis=1))) if subject.tracers else 0
-    first: dict[str, float] = {}
+    first: Mapping[str, Any] = {}
 
     def books(world: World) -> tuple[float, float]:
-        nonlocal scale
+        nonlocal scale, first
         ledger = world.ledger
-        if not first:
-            first.update(ledger)
+        first = first or ledger
         scale = max(scale, ledger["kinetic"], ledger["elastic"], abs(ledger["external"] - first["external"]))
         return world.time, float(ledger["energy"])
 

@@ -15,6 +15,7 @@ import numpy.typing as npt
 
 from tumble import grids
 from tumble._engine import ExportError
+from tumble.columns import FOG, SIGNED
 from tumble.grids import Box
 from tumble.pictures.blackbody import developed, glow
 from tumble.pictures.drawn import Cloud, Ground, Image, Mesh, Smoke, Spheres, Thing, Tubes
@@ -337,7 +338,7 @@ class Stage:
             else:
                 if thing.name not in self._holes:
                     self._holes[thing.name] = _holes(self.run.scene, thing.name, grid)
-                dye = name in ("density", "fuel") and low == 0.0
+                dye = name in FOG and low == 0.0
                 drawn.append(_image(thing, grid, name, share, dye, self._holes[thing.name], glow))
         if grid.flat < 3:
             corners = grid.corners[[[0, 1, 3, 2], [0, 1, 5, 4], [0, 2, 6, 4]][grid.flat]]
@@ -385,7 +386,7 @@ class Stage:
             high = max((float(v.max()) for v in finite if v.size), default=0.0)
             if not high > low:
                 continue
-            if name in ("density", "fuel") and low < DENSE * high:
+            if name in FOG and low < DENSE * high:
                 return name, 0.0, high
             if name in SIGNED:
                 most = _far(finite, 0.0)
@@ -514,10 +515,6 @@ class Stage:
         if start is None or len(start) != len(strain):
             return none
         return np.ravel(np.isnan(strain) & ~np.isnan(start))
-
-
-SIGNED = ("vorticity", "pressure", "divergence")
-"""Shown around zero."""
 
 
 def _one_number(grid: Box, table: Mapping[str, Array], name: str) -> Floats:

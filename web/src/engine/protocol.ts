@@ -3,6 +3,10 @@
  * Worlds are numbered by the page, so that one worker runs several side by side (integrator lab, time branches).
  */
 
+import type { Ledger, ObjectKind, StepReport } from "./measures";
+
+export type { Ledger, ObjectKind, StepReport };
+
 /** Numbers of a column, transferred: the page owns them. */
 export type Numbers = Float32Array | Float64Array | Uint32Array;
 
@@ -18,10 +22,6 @@ export interface Column {
 
 /** object -> column -> numbers */
 export type Columns = Record<string, Record<string, Column>>;
-
-/** The kinds of objects that a scene can hold, as its tables are called. */
-export type ObjectKind =
-  | "particles" | "emitter" | "galaxy" | "rope" | "hair" | "sheet" | "block" | "net" | "cloth" | "gas" | "heat" | "compressible" | "collider";
 
 export interface ObjectInfo {
   name: string;
@@ -56,46 +56,6 @@ export interface SceneInfo {
   hash: string;
   /** Upper estimate of the memory that it needs [bytes]. */
   memory: number;
-}
-
-/** The books of the world at one time; SI. */
-export interface Ledger {
-  time: number;
-  mass: number;
-  momentum: [number, number, number];
-  angular_momentum: [number, number, number];
-  kinetic: number;
-  elastic: number;
-  external: number;
-  /** kinetic + elastic + external [J] */
-  energy: number;
-  stretch: number;
-  penetration: number;
-  intersections: number;
-  speed: number;
-  contacts: number;
-  broken: number;
-  heat: number;
-  heat_in: number;
-  volume: number;
-  divergence: number;
-}
-
-/** Total cost of the frames of one answer. */
-export interface StepReport {
-  steps: number;
-  rejected: number;
-  step_range: [number, number] | null;
-  newton: number;
-  linear: number;
-  residual: number;
-  unconverged: number;
-  broken: number;
-  clamped: number;
-  trials: { time: number; step: number; error: number; accepted: boolean }[];
-  courant: number;
-  /** Residuals of the last pressure solve after each iteration, relative to its start. */
-  pressure: number[];
 }
 
 export interface Frame {

@@ -2,6 +2,7 @@
 
 import type { Answer, Columns, Failure, Files, Frame, Ledger, Notice, Request, SceneInfo, StepReport } from "./protocol";
 import { Kept } from "./kept";
+import { together } from "./measures";
 import { readable } from "./worth";
 
 type Module = typeof import("./pkg/single");
@@ -62,27 +63,6 @@ function info(world: World): SceneInfo {
 
 function ledger(world: World): Ledger {
   return JSON.parse(world.ledger()) as Ledger;
-}
-
-function add(total: StepReport | null, next: StepReport): StepReport {
-  if (!total) return next;
-  const range = total.step_range && next.step_range;
-  return {
-    steps: total.steps + next.steps,
-    rejected: total.rejected + next.rejected,
-    step_range: range
-      ? [Math.min(total.step_range![0], next.step_range![0]), Math.max(total.step_range![1], next.step_range![1])]
-      : (total.step_range ?? next.step_range),
-    newton: total.newton + next.newton,
-    linear: total.linear + next.linear,
-    residual: Math.max(total.residual, next.residual),
-    unconverged: total.unconverged + next.unconverged,
-    broken: total.broken + next.broken,
-    clamped: total.clamped + next.clamped,
-    trials: total.trials.concat(next.trials),
-    courant: Math.max(total.courant, next.courant),
-    pressure: next.pressure.length ? next.pressure : total.pressure,
-  };
 }
 
 function frame(at: Running, asked: { columns?: string[]; hash?: boolean }, done?: Partial<Frame>): Frame {
@@ -152,7 +132,8 @@ function step(request: Request & { type: "step" }): Frame {
   const count = Math.max(1, Math.floor(request.frames ?? 1));
   for (let i = 0; i < count; i++) {
     if (i > 0 && performance.now() - start >= (request.budget ?? Infinity)) break;
-    report = add(report, JSON.parse(at.world.step(FRAME_LIMIT)) as StepReport);
+    const next = JSON.parse(at.world.step(FRAME_LIMIT)) as StepReport;
+    report = report ? together(report, next) : next;
     ledgers.push(ledger(at.world));
     keep(at);
   }

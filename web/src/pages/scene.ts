@@ -298,7 +298,7 @@ export const page: Page = async (main, rest) => {
       ["Memory limit", `${show(info.memory / 2 ** 20, 3)} MiB`],
     ];
     const report = session.report;
-    if (report) rows.push(["Last frame", `${report.steps} steps, ${report.newton} Newton and ${report.linear} linear iterations`]);
+    if (report) rows.push(["Last frame", `${report.steps} steps, ${report.newton} Newton and ${report.linear} linear iterations, ${report.sweeps} sweeps`]);
     const body: HTMLElement[] = rows.flatMap(([k, v]) => [h("dt", {}, k), h("dd", {}, v)]);
     if (info.warnings.length) body.push(h("dt", {}, "Warnings"), h("dd", {}, info.warnings.map((w) => `${w.path ? `${w.path}: ` : ""}${w.message} [${w.code}]`).join("\n")));
     facts.replaceChildren(...body);

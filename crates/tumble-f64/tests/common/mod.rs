@@ -35,7 +35,7 @@ pub fn step(sim: &mut Simulation) -> StepReport {
 /// Some frames, which must not fail; their reports together.
 pub fn run(sim: &mut Simulation, frames: usize) -> StepReport {
     let mut report = StepReport::default();
-    (0..frames).for_each(|_| report.add(&step(sim)));
+    (0..frames).for_each(|_| report.add_interval(&step(sim)));
     report
 }
 
@@ -53,7 +53,7 @@ pub fn column(sim: &Simulation, object: &str, name: &str) -> Vec<Vector> {
 pub fn intersections_after(sim: &mut Simulation, object: &str, moved: usize, by: impl Fn(Vector) -> Vector) -> u64 {
     let x = positions(sim, object).into_iter().enumerate().map(|(i, x)| if i < moved { x + by(x) } else { x });
     write(sim, object, "position", &x.collect::<Vec<_>>());
-    sim.ledger().intersections
+    sim.ledger().intersections.unwrap()
 }
 
 /// A column of a grid, and its points along each axis.

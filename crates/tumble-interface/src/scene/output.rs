@@ -7,9 +7,7 @@ use serde::{Deserialize, Serialize};
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct Output {
-    /// Columns of the frames, for each object that has them. Particles: `position`, `velocity`, `orientation`, `angular_velocity`, `link_strain`;
-    /// grids: `density`, `temperature`, `fuel`, `flux`, `pressure`, `velocity`, `vorticity`, `divergence`, on faces `velocity_x`, `velocity_y`,
-    /// `velocity_z`; solids in a gas: the `force` on each.
+    /// Columns of the frames, of each object that has them; the last section of this page lists them.
     pub columns: Vec<String>,
     /// Write `film.mp4`.
     pub film: bool,

@@ -126,7 +126,7 @@ pub fn solve(
         converged = size <= tolerance * first || size <= floor || (alpha == 1.0 && size > 0.5 * before && size <= 10.0 * floor);
     }
     let relative = if first > 0.0 { size / first } else { 0.0 };
-    report.residual = report.residual.max(relative);
+    report.left(relative);
     if !converged && size.is_finite() {
         report.unconverged += 1;
         if settings.on_failure == OnFailure::Error {

@@ -425,23 +425,21 @@ impl Pool {
     /// The columns that only emitted particles have. `mass` are the masses of all rows, where there are any.
     pub fn write(&self, s: usize, object: &str, mass: &[Real], out: &mut Vec<Column>) {
         let (ids, ages, emitter) = (self.ids(s), self.ages(s), self.emitter(s));
-        let mut add = |name: &str, unit, width, data| {
-            out.push(Column { object: object.into(), name: name.into(), unit, width, points: Vec::new(), data })
-        };
-        add("id", "1", 1, Data::U32(ids.to_vec()));
-        add("age", "s", 1, Data::from(ages.to_vec()));
+        let mut add = |name: &str, data| out.push(Column::new(object, name, data));
+        add("id", Data::U32(ids.to_vec()));
+        add("age", Data::from(ages.to_vec()));
         if emitter.has_radii() {
-            add("radius", "m", 1, Data::from(ids.iter().map(|id| emitter.radius(*id) as Real).collect::<Vec<Real>>()));
+            add("radius", Data::from(ids.iter().map(|id| emitter.radius(*id) as Real).collect::<Vec<Real>>()));
         }
         if let (true, Some(mass)) = (emitter.has_masses(), mass.get(self.rows(s))) {
-            add("mass", "kg", 1, Data::from(mass.to_vec()));
+            add("mass", Data::from(mass.to_vec()));
         }
         if emitter.has_colors() {
             let colors = ids.iter().zip(ages).flat_map(|(id, age)| emitter.color(*id, f64::from(*age)).unwrap_or_default());
-            add("color", "1", 3, Data::from(colors.map(|c| c as Real).collect::<Vec<Real>>()));
+            add("color", Data::from(colors.map(|c| c as Real).collect::<Vec<Real>>()));
         }
         for (name, _) in emitter.columns() {
-            add(name, "1", 1, Data::from(self.column(s, name).unwrap_or_default().to_vec()));
+            add(name, Data::from(self.column(s, name).unwrap_or_default().to_vec()));
         }
     }
 

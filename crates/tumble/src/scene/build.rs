@@ -186,14 +186,14 @@ fn solids(scene: &Scene, assets: &Assets, issues: &mut Vec<Issue>) -> (Vec<Colli
             Ok(collider) => colliders.push(collider),
             Err((key, message)) => issues.push(Issue::new(format!("collider \"{}\"{key}", thing.name), message)),
         }
-        let mut add = |name: &str, unit, width, data: Data| {
+        let mut add = |name: &str, data: Data| {
             if name != "texture" || !data.is_empty() {
-                scenery.push(Column { object: thing.name.clone(), name: name.into(), unit, width, points: Vec::new(), data });
+                scenery.push(Column::new(&thing.name, name, data));
             }
         };
-        add("position", "m", 3, Data::F64(surface.vertices.concat()));
-        add("triangles", "1", 3, Data::U32(surface.triangles.concat()));
-        add("texture", "1", 6, Data::F32(surface.drawn_texture().concat()));
+        add("position", Data::F64(surface.vertices.concat()));
+        add("triangles", Data::U32(surface.triangles.concat()));
+        add("texture", Data::F32(surface.drawn_texture().concat()));
         surfaces.push(surface);
     }
     (colliders, scenery, surfaces)

@@ -6,27 +6,8 @@ use crate::systems::dynamics::MOST_SUBSTEPS;
 use std::collections::HashSet;
 use tumble_interface::Issue;
 use tumble_interface::check::suggestion;
+use tumble_interface::columns::COLUMNS;
 use tumble_interface::scene::{Force, KINDS, Object, Plane, Scene, Shape, Source, System};
-
-/// Column names that a frame may hold.
-pub const COLUMNS: [&str; 16] = [
-    "position",
-    "velocity",
-    "orientation",
-    "angular_velocity",
-    "link_strain",
-    "density",
-    "temperature",
-    "fuel",
-    "flux",
-    "pressure",
-    "vorticity",
-    "divergence",
-    "velocity_x",
-    "velocity_y",
-    "velocity_z",
-    "force",
-];
 
 /// Everything wrong that can be seen in a resolved scene before anything is built.
 pub fn check(scene: &Scene) -> Vec<Issue> {
@@ -122,10 +103,11 @@ pub fn check(scene: &Scene) -> Vec<Issue> {
             wrong(format!("{path}.friction_static"), message);
         }
     }
+    let known: Vec<&str> = COLUMNS.iter().filter(|known| known.asked).map(|known| known.name).collect();
     for (i, column) in scene.output.columns.iter().enumerate() {
-        if !COLUMNS.contains(&column.as_str()) {
-            let hint = suggestion(column, COLUMNS);
-            wrong(format!("output.columns[{i}]"), format!("\"{column}\", expected one of {}{hint}", COLUMNS.join(", ")));
+        if !known.contains(&column.as_str()) {
+            let hint = suggestion(column, known.iter().copied());
+            wrong(format!("output.columns[{i}]"), format!("\"{column}\", expected one of {}{hint}", known.join(", ")));
         }
     }
     if scene.output.ply && !objects.iter().any(|o| matches!(o.kind, "particles" | "emitter" | "galaxy")) {

@@ -66,10 +66,6 @@ pub fn unused(scene: &Scene) -> Vec<Warning> {
             alone(format!("force[{i}].avoidance"), "there is no collider to shun; add one, or leave it out");
         }
     }
-    for (word, what) in idle_bounds(scene) {
-        let message = format!("is kept whatever happens: there is {what} in the scene; leave it out");
-        warnings.push(Warning::new(Code::IdleExpectation, format!("expect.{word}"), message));
-    }
     scene.emitter.iter().for_each(|emitter| doubts(scene, emitter, &mut warnings));
     if let Some(last) = scene.output.stills.iter().find(|i| **i > scene.time.frames) {
         let message = format!("there is no frame {last}; the last one is {}", scene.time.frames);
@@ -108,39 +104,6 @@ pub fn thin(scene: &Scene) -> Vec<Warning> {
             .then(|| Warning::new(Code::ThinCollider, format!("collider \"{}\"", thing.name), message))
     };
     scene.collider.iter().filter_map(doubt).collect()
-}
-
-/// Bounds of what the scene has not, and what that is.
-fn idle_bounds(scene: &Scene) -> Vec<(&'static str, &'static str)> {
-    let (expect, measured) = (&scene.expect, METHODS.into_iter().flat_map(|method| method.measured(scene)).collect::<Vec<_>>());
-    [
-        ("max_stretch", expect.max_stretch, "nothing that has links"),
-        ("max_penetration", expect.max_penetration, "no collider"),
-        ("max_intersections", expect.max_intersections.map(|n| n as f64), "no soft surface"),
-        ("max_volume_error", expect.max_volume_error, "no closed surface of soft matter"),
-        ("max_divergence", expect.max_divergence, "no gas"),
-        ("max_heat_error", expect.max_heat_error, "neither a body that conducts heat nor fire"),
-    ]
-    .into_iter()
-    .filter_map(|(word, bound, what)| (bound.is_some() && !measured.contains(&word)).then_some((word, what)))
-    .collect()
-}
-
-/// Bounds that masses and their elements are measured for.
-pub fn measured_of_masses(scene: &Scene) -> Vec<&'static str> {
-    let (bodies, surfaces) = (!scene.block.is_empty(), !(scene.sheet.is_empty() && scene.net.is_empty() && scene.cloth.is_empty()));
-    let curves = !(scene.rope.is_empty() && scene.hair.is_empty());
-    let edges = curves && scene.collider.iter().any(|thing| thing.edges);
-    let linked = curves || scene.particles.iter().any(|thing| !thing.spring.is_empty());
-    [
-        ("max_stretch", linked || bodies || surfaces),
-        ("max_penetration", !scene.collider.is_empty()),
-        ("max_intersections", bodies || surfaces || edges),
-        ("max_volume_error", bodies || !scene.net.is_empty()),
-    ]
-    .into_iter()
-    .filter_map(|(word, measured)| measured.then_some(word))
-    .collect()
 }
 
 /// Whether an emitter has particles at all, and whether regions that kill them are thick enough for their speed.

@@ -8,6 +8,7 @@ use crate::geometry::{Collider, Shape};
 use crate::world::World;
 use std::sync::Arc;
 use tumble_interface::engine::{Account, Cure, Engine, Inside, Ledger, Stability, StepReport, UserForce, UserIntegrator};
+use tumble_interface::measures::Bound;
 use tumble_interface::scene::Integrator;
 use tumble_interface::{Column, Frame, Issue, Scene, SceneError, StepError, Warning};
 
@@ -28,6 +29,7 @@ impl Simulation {
     pub fn new(scene: Scene, assets: Assets) -> Result<Self, SceneError> {
         let scene = resolve(scene);
         let built = build(&scene, &assets)?;
+        idle_bounds(&scene, &built.world)?;
         Ok(Self {
             scene,
             assets,
@@ -54,20 +56,29 @@ impl Simulation {
     }
 }
 
+/// Bounds on what nothing measures are errors: they would be kept whatever happens.
+fn idle_bounds(scene: &Scene, world: &World) -> Result<(), SceneError> {
+    let bounds: Vec<_> = Bound::asked(&scene.expect).filter(|bound| bound.of().is_some_and(|measure| measure.optional)).collect();
+    if bounds.is_empty() {
+        return Ok(());
+    }
+    let books = world.ledger();
+    let issues: Vec<Issue> = bounds.iter().filter(|bound| !books.measures(bound.measure)).map(|bound| bound.idle()).collect();
+    if issues.is_empty() { Ok(()) } else { Err(SceneError { issues }) }
+}
+
 /// Where the moving colliders are: `translation` and `turn` of the mesh in the topology, x = turn p + translation, and
 /// `position` of vertices that move by themselves.
 fn places(scene: &Scene, colliders: &[Collider], time: f64, out: &mut Vec<Column>) {
     for (thing, collider) in scene.collider.iter().zip(colliders) {
-        let mut add = |name: &str, unit, width, data: Vec<f64>| {
-            out.push(Column { object: thing.name.clone(), name: name.into(), unit, width, points: Vec::new(), data: data.into() });
-        };
+        let mut add = |name: &str, data: Vec<f64>| out.push(Column::new(&thing.name, name, data));
         if let Shape::Animated { facets, .. } = &collider.shape {
-            add("position", "m", 3, facets.vertices(time).concat());
+            add("position", facets.vertices(time).concat());
         }
         if let Some(motion) = &collider.motion {
             let (pose, _) = motion.at(time);
-            add("translation", "m", 3, <[f64; 3]>::from(pose.shift).to_vec());
-            add("turn", "1", 4, pose.turn.row().to_vec());
+            add("translation", <[f64; 3]>::from(pose.shift).to_vec());
+            add("turn", pose.turn.row().to_vec());
         }
     }
 }

@@ -2,7 +2,7 @@
 
 use crate::math::Lattice;
 use std::fmt;
-use tumble_interface::{Column, Data};
+use tumble_interface::Column;
 
 /// A box of cubic cells. A plane is a grid one cell thick, along whose flat axis nothing is differentiated or interpolated.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -116,12 +116,11 @@ impl Grid {
 
     /// Grid description of an object for pictures and files.
     pub fn columns(&self, object: &str) -> Vec<Column> {
-        let column = |name: &str, unit, data| Column { object: object.into(), name: name.into(), unit, width: 1, points: Vec::new(), data };
         vec![
-            column("grid_cells", "1", Data::U32(self.axes().map(|a| self.n[a] as u32).collect())),
-            column("grid_spacing", "m", Data::F64(vec![self.dx])),
-            column("grid_origin", "m", Data::F64(self.origin.to_vec())),
-            column("grid_flat", "1", Data::U32(vec![self.flat.unwrap_or(3) as u32])),
+            Column::new(object, "grid_cells", self.axes().map(|a| self.n[a] as u32).collect::<Vec<u32>>()),
+            Column::new(object, "grid_spacing", vec![self.dx]),
+            Column::new(object, "grid_origin", self.origin.to_vec()),
+            Column::new(object, "grid_flat", vec![self.flat.unwrap_or(3) as u32]),
         ]
     }
 

@@ -72,12 +72,12 @@ pub struct Object {
 
 impl Object {
     /// A column of its own.
-    pub fn column(&self, name: &str, unit: &'static str, width: usize, data: Data) -> Column {
-        Column { object: self.name.clone(), name: name.into(), unit, width, points: Vec::new(), data }
+    pub fn column(&self, name: &str, data: impl Into<Data>) -> Column {
+        Column::new(&self.name, name, data)
     }
 
     /// Its radius as a column.
     pub fn one_radius(&self) -> Column {
-        self.column("radius", "m", 1, Data::F64(vec![self.radius]))
+        self.column("radius", vec![self.radius])
     }
 }

@@ -19,7 +19,7 @@ use crate::system::{Archive, System};
 use tumble_interface::engine::{BLOW_UP, Ledger, Limit, Share, Stability, StepReport};
 use tumble_interface::error::Breakdown;
 use tumble_interface::scene::Integrator;
-use tumble_interface::{Column, Data, StepError};
+use tumble_interface::{Column, StepError};
 
 /// Part of the longest stable step that is taken where the scene names none.
 pub const SAFE: f64 = 0.7;
@@ -286,7 +286,7 @@ impl Gas {
                 }
             }
         }
-        books.speed = self.speeds().iter().map(|s| s[1] * s[1]).sum::<f64>().sqrt();
+        books.speed = Some(self.speeds().iter().map(|s| s[1] * s[1]).sum::<f64>().sqrt());
         books
     }
 
@@ -421,43 +421,42 @@ impl System for Compressible {
         for gas in &self.gases {
             let grid = gas.grid();
             for name in names {
-                let found: Result<Option<(&'static str, Vec<Field>)>, GridError> = (|| {
+                let found: Result<Option<Vec<Field>>, GridError> = (|| {
                     Ok(Some(match *name {
-                        "density" => ("kg/m³", vec![gas.density.clone()]),
+                        "density" => vec![gas.density.clone()],
                         "pressure" => {
                             let mut gas = gas.clone();
                             gas.find_pressure();
-                            ("Pa", vec![gas.pressure])
+                            vec![gas.pressure]
                         }
                         "velocity" => {
                             let parts = gas.velocity.parts.iter().map(|part| average(part, Place::Cell));
-                            ("m/s", parts.collect::<Result<_, _>>()?)
+                            parts.collect::<Result<_, _>>()?
                         }
                         "velocity_x" | "velocity_y" | "velocity_z" => {
                             let axis = ["velocity_x", "velocity_y", "velocity_z"].iter().position(|n| n == name).unwrap_or(0);
                             let Some(part) = gas.velocity.part(axis) else { return Ok(None) };
-                            ("m/s", vec![part.clone()])
+                            vec![part.clone()]
                         }
                         "vorticity" => {
                             let mut turn = Vectors::edges(grid, "1/s")?;
                             curl(&gas.velocity, &mut turn)?;
-                            ("1/s", turn.parts.iter().map(|part| average(part, Place::Cell)).collect::<Result<_, _>>()?)
+                            turn.parts.iter().map(|part| average(part, Place::Cell)).collect::<Result<_, _>>()?
                         }
                         "divergence" => {
                             let mut sum = Field::new(grid, Place::Cell, "1/s")?;
                             divergence(&gas.velocity, &mut sum)?;
-                            ("1/s", vec![sum])
+                            vec![sum]
                         }
                         _ => return Ok(None),
                     }))
                 })();
-                let Ok(Some((unit, parts))) = found else { continue };
+                let Ok(Some(parts)) = found else { continue };
                 let Some(first) = parts.first() else { continue };
                 let points = first.points();
                 let data: Vec<Real> = first.each().flat_map(|at| parts.iter().map(move |part| part.value(at))).collect();
                 let points = grid.axes().map(|a| points[a]).collect();
-                let name = (*name).to_string();
-                out.push(Column { object: gas.name.clone(), name, unit, width: parts.len(), points, data: Data::from(data) });
+                out.push(Column::on_grid(&gas.name, name, points, data));
             }
         }
     }
@@ -470,14 +469,7 @@ impl System for Compressible {
 
     fn ledger(&self, t: f64) -> Ledger {
         let mut total = Ledger { time: t, ..Ledger::default() };
-        for books in self.gases.iter().map(|gas| gas.books(t)) {
-            total.mass += books.mass;
-            (0..3).for_each(|a| total.momentum[a] += books.momentum[a]);
-            total.kinetic += books.kinetic;
-            total.elastic += books.elastic;
-            total.external += books.external;
-            total.speed = total.speed.max(books.speed);
-        }
+        self.gases.iter().for_each(|gas| total.add_system(&gas.books(t)));
         total
     }
 

@@ -11,7 +11,7 @@ use crate::system::{Archive, Part, System};
 use tumble_interface::engine::{Ledger, Stability, StepReport};
 use tumble_interface::error::Breakdown;
 use tumble_interface::scene::{Adaptive, Integrator};
-use tumble_interface::{Column, Data, StepError};
+use tumble_interface::{Column, StepError};
 
 /// How a system of tracers steps.
 #[derive(Debug, Clone)]
@@ -239,16 +239,16 @@ impl System for Tracers {
         for object in &self.objects {
             for name in names {
                 let rows = &self.x[object.points.clone()];
-                let (unit, rows): (_, Vec<[Real; 3]>) = match *name {
-                    "position" => ("m", rows.iter().map(|x| [x[0], x[1], x[2]]).collect()),
-                    "velocity" => ("m/s", {
+                let rows: Vec<[Real; 3]> = match *name {
+                    "position" => rows.iter().map(|x| [x[0], x[1], x[2]]).collect(),
+                    "velocity" => {
                         let mut u = vec![ZERO; rows.len()];
                         self.flow.velocities(self.time, rows, &mut u);
                         u.iter().map(|u| [u[0], u[1], u[2]]).collect()
-                    }),
+                    }
                     _ => continue,
                 };
-                out.push(object.column(name, unit, 3, Data::from(rows.concat())));
+                out.push(object.column(name, rows.concat()));
             }
             if let Some(stream) = object.stream {
                 self.pool.write(stream, &object.name, &[], out);
@@ -264,7 +264,7 @@ impl System for Tracers {
 
     fn ledger(&self, t: f64) -> Ledger {
         let speed = self.x.iter().map(|x| self.flow.at(t, xyz64(*x)).norm()).fold(0.0, f64::max);
-        Ledger { time: t, speed, ..Ledger::default() }
+        Ledger { time: t, speed: Some(speed), ..Ledger::default() }
     }
 
     /// A tracer is lost when it is not finite, or a million times as far out as the farthest at the start.

@@ -16,7 +16,7 @@ use crate::state::Object;
 use crate::system::{Archive, Part, System};
 use tumble_interface::engine::{Ledger, Stability, StepReport};
 use tumble_interface::scene;
-use tumble_interface::{Column, Data, StepError};
+use tumble_interface::{Column, StepError};
 
 /// Points and their directions.
 pub struct Vicsek {
@@ -203,18 +203,18 @@ impl System for Swarm {
         for object in &self.objects {
             let points = object.points.clone();
             for name in names {
-                let (unit, rows): (_, Vec<[Real; 3]>) = match *name {
-                    "position" => ("m", {
+                let rows: Vec<[Real; 3]> = match *name {
+                    "position" => {
                         let place = |x: &Row| self.in_space([x[0], x[1]].map(|x| (f64::from(x) - half) as Real));
                         self.model.x[points.clone()].iter().map(place).collect()
-                    }),
-                    "velocity" => ("m/s", {
+                    }
+                    "velocity" => {
                         let v = |theta: &f64| self.in_space([cos(*theta), sin(*theta)].map(|part| (self.speed * part) as Real));
                         self.model.theta[points.clone()].iter().map(v).collect()
-                    }),
+                    }
                     _ => continue,
                 };
-                out.push(object.column(name, unit, 3, Data::from(rows.concat())));
+                out.push(object.column(name, rows.concat()));
             }
         }
     }
@@ -224,7 +224,7 @@ impl System for Swarm {
     }
 
     fn ledger(&self, t: f64) -> Ledger {
-        Ledger { time: t, speed: self.speed, ..Ledger::default() }
+        Ledger { time: t, speed: Some(self.speed), ..Ledger::default() }
     }
 
     /// Nothing can: places stay in the square.

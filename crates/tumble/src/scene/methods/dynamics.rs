@@ -47,10 +47,6 @@ impl MethodRules for Rules {
         true
     }
 
-    fn measured(&self, scene: &Scene) -> Vec<&'static str> {
-        hints::measured_of_masses(scene)
-    }
-
     fn check(&self, scene: &Scene, issues: &mut Vec<Issue>) {
         for plan in scene.system.iter().filter(|plan| plan.clamp.is_some()) {
             let clamped = matches!(plan.integrator, Integrator::ModifiedEuler | Integrator::Verlet | Integrator::PositionBased);

@@ -68,11 +68,6 @@ impl MethodRules for Rules {
         (integrator != Integrator::default()).then(|| "Stable Fluids have no integrator; leave it out".into())
     }
 
-    fn measured(&self, scene: &Scene) -> Vec<&'static str> {
-        let fire = scene.gas.iter().any(|gas| gas.fire.is_some()).then_some("max_heat_error");
-        (!scene.gas.is_empty()).then_some("max_divergence").into_iter().chain(fire).collect()
-    }
-
     fn check(&self, scene: &Scene, issues: &mut Vec<Issue>) {
         for (i, field) in scene.field.iter().enumerate() {
             if let Flow::Gas { of } = field

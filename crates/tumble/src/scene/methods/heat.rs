@@ -47,10 +47,6 @@ impl MethodRules for Rules {
         (integrator != Integrator::default()).then(message)
     }
 
-    fn measured(&self, scene: &Scene) -> Vec<&'static str> {
-        if scene.heat.is_empty() { Vec::new() } else { vec!["max_heat_error"] }
-    }
-
     fn hints(&self, scene: &Scene) -> Vec<Warning> {
         scene.heat.iter().filter_map(|t| odd_density(format!("heat \"{}\".density", t.name), t.density, 0.0)).collect()
     }

@@ -63,11 +63,6 @@ pub trait MethodRules: Sync {
         None
     }
 
-    /// Bounds of `[expect]` that its objects in the scene are measured for.
-    fn measured(&self, _scene: &Scene) -> Vec<&'static str> {
-        Vec::new()
-    }
-
     /// What is wrong with its words, before anything is built.
     fn check(&self, _scene: &Scene, _issues: &mut Vec<Issue>) {}
 

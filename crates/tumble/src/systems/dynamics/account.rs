@@ -19,10 +19,10 @@ impl Dynamics {
             time: t,
             mass: sums.mass,
             momentum: sums.momentum.into(),
-            angular_momentum: sums.angular.into(),
+            angular_momentum: Some(sums.angular.into()),
             kinetic: sums.kinetic,
-            speed: sums.speed_sq.sqrt(),
-            volume: if object.closed { self.core.volume_in(object) } else { 0.0 },
+            speed: Some(sums.speed_sq.sqrt()),
+            volume: object.closed.then(|| self.core.volume_in(object)),
             ..Ledger::default()
         }
     }

@@ -12,26 +12,26 @@ impl Dynamics {
         for (index, object) in self.core.objects.iter().enumerate() {
             let tear = self.features.fracture.tears().iter().find(|tear| tear.object() == index);
             for name in names {
-                let (unit, width, data): (_, _, Vec<Real>) = match *name {
+                let data: Vec<Real> = match *name {
                     "position" => {
                         let mut x = numbers(&self.core.state.x[object.points.clone()], 3);
                         // Spare vertices are where the first one is, out of every picture.
                         for i in tear.iter().flat_map(|tear| tear.idle()) {
                             x.copy_within(0..3, 3 * (i - object.points.start));
                         }
-                        ("m", 3, x)
+                        x
                     }
-                    "velocity" => ("m/s", 3, numbers(&self.core.state.v[object.points.clone()], 3)),
-                    "orientation" if !object.frames.is_empty() => ("1", 4, numbers(&self.core.state.x[object.frames.clone()], 4)),
-                    "angular_velocity" if !object.frames.is_empty() => ("rad/s", 3, numbers(&self.core.state.v[object.frames.clone()], 3)),
-                    "link_strain" if !object.links.is_empty() => ("1", 1, self.link_strain(object)),
+                    "velocity" => numbers(&self.core.state.v[object.points.clone()], 3),
+                    "orientation" if !object.frames.is_empty() => numbers(&self.core.state.x[object.frames.clone()], 4),
+                    "angular_velocity" if !object.frames.is_empty() => numbers(&self.core.state.v[object.frames.clone()], 3),
+                    "link_strain" if !object.links.is_empty() => self.link_strain(object),
                     _ => continue,
                 };
-                out.push(object.column(name, unit, width, Data::from(data)));
+                out.push(object.column(name, Data::from(data)));
                 if let (Some(tear), &"position") = (tear, name) {
                     let first = object.points.start as u32;
                     let triangles = tear.triangles().iter().flatten().map(|i| i - first).collect();
-                    out.push(object.column("triangles", "1", 3, Data::U32(triangles)));
+                    out.push(object.column("triangles", Data::U32(triangles)));
                 }
             }
             if let Some(stream) = object.stream {
@@ -70,30 +70,30 @@ impl Dynamics {
 
     pub(super) fn write_topology(&self, out: &mut Vec<Column>) {
         for object in &self.core.objects {
-            let mut add = |name: &str, unit, width, data: Data| {
+            let mut add = |name: &str, data: Data| {
                 if !data.is_empty() {
-                    out.push(object.column(name, unit, width, data));
+                    out.push(object.column(name, data));
                 }
             };
             if let Some(stream) = object.stream {
                 if !self.core.pool.emitter(stream).has_radii() {
-                    add("radius", "m", 1, Data::F64(vec![object.radius]));
+                    add("radius", Data::F64(vec![object.radius]));
                 }
                 continue;
             }
-            add("mass", "kg", 1, Data::from(self.core.laws.masses.mass[object.points.clone()].to_vec()));
+            add("mass", Data::from(self.core.laws.masses.mass[object.points.clone()].to_vec()));
             let points = object.points.start..object.points.end - object.spare;
             let pinned = points.filter(|i| self.core.state.x[*i][3] == 0.0).map(|i| (i - object.points.start) as u32);
-            add("pinned", "1", 1, Data::U32(pinned.collect()));
-            add("triangles", "1", 3, Data::U32(object.triangles.concat()));
-            add("texture", "1", 6, Data::F32(object.texture.concat()));
-            add("links", "1", 2, Data::U32(self.link_ends(object)));
-            add("curve", "1", 1, Data::U32(object.curve.clone()));
+            add("pinned", Data::U32(pinned.collect()));
+            add("triangles", Data::U32(object.triangles.concat()));
+            add("texture", Data::F32(object.texture.concat()));
+            add("links", Data::U32(self.link_ends(object)));
+            add("curve", Data::U32(object.curve.clone()));
             if object.curve_points > 0 {
-                add("curve_points", "1", 1, Data::U32(vec![object.curve_points]));
+                add("curve_points", Data::U32(vec![object.curve_points]));
             }
             if object.radius > 0.0 {
-                add("radius", "m", 1, Data::F64(vec![object.radius]));
+                add("radius", Data::F64(vec![object.radius]));
             }
         }
     }

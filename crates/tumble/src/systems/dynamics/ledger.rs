@@ -21,25 +21,28 @@ impl Dynamics {
         let total = self.core.sums(0..n, n..x.len());
         let strains =
             self.core.laws.batches.iter().map(|b| b.largest_strain(x)).chain(self.core.constraints.iter().map(|c| c.largest_strain(x)));
-        let stretch = strains.fold(0.0, |most, strain| f64::max(most, strain + 1.0));
+        let strain = strains.fold(f64::NEG_INFINITY, f64::max);
+        // Where every element that can stretch has broken, nothing is stretched.
+        let stretch = if strain > f64::NEG_INFINITY { Some(strain + 1.0) } else { (self.core.broken > 0).then_some(0.0) };
         let depths = |i: usize| self.core.depths(i, t);
         let touching = !self.core.laws.colliders.is_empty();
+        let closed = self.core.objects.iter().filter(|o| o.closed);
         Ledger {
             time: t,
             mass: total.mass,
             momentum: total.momentum.into(),
-            angular_momentum: total.angular.into(),
+            angular_momentum: Some(total.angular.into()),
             kinetic: total.kinetic,
             elastic: self.core.energy_between(true, t),
             external: self.core.energy_between(false, t) + self.core.laws.external_energy(t, x, v)
                 - Vec3::from(self.core.laws.gravity).dot(total.first_moment),
             stretch,
-            penetration: if touching { max(n, |range| range.flat_map(depths).fold(0.0, f64::max)).max(0.0) } else { 0.0 },
-            intersections: self.features.surfaces().map_or(0, |surfaces| surfaces.intersections(x, t)),
-            speed: total.speed_sq.sqrt(),
-            contacts: if touching { sum(n, |range| range.filter(|i| depths(*i).next().is_some()).count() as f64) as u64 } else { 0 },
-            broken: self.core.broken,
-            volume: self.core.objects.iter().filter(|o| o.closed).map(|o| self.core.volume_in(o)).sum(),
+            penetration: touching.then(|| max(n, |range| range.flat_map(depths).fold(0.0, f64::max)).max(0.0)),
+            intersections: self.features.surfaces().and_then(|surfaces| surfaces.intersections(x, t)),
+            speed: Some(total.speed_sq.sqrt()),
+            contacts: touching.then(|| sum(n, |range| range.filter(|i| depths(*i).next().is_some()).count() as f64) as u64),
+            broken: Some(self.core.broken),
+            volume: closed.clone().next().map(|_| closed.map(|o| self.core.volume_in(o)).sum()),
             ..Ledger::default()
         }
     }
@@ -84,7 +87,7 @@ impl Dynamics {
         let state = &self.core.state;
         let ledger = self.ledger_at(t);
         // One number that is not finite makes these sums so.
-        let finite = ledger.kinetic.is_finite() && ledger.angular_momentum.iter().all(|l| l.is_finite());
+        let finite = ledger.kinetic.is_finite() && ledger.angular_momentum.iter().flatten().all(|l| l.is_finite());
         let bad = |rows: &[Row]| fold(rows.len(), |mut range| range.find(|i| !is_finite(rows[*i]))).into_iter().flatten().next();
         let columns = [("position", &state.x), ("velocity", &state.v)];
         let search = || columns.into_iter().find_map(|(column, rows)| Some((column, bad(rows)?, None)));

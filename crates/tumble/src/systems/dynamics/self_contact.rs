@@ -133,9 +133,10 @@ impl SelfContact {
         topology
     }
 
-    /// Edges that pass through triangles, when points are at x at time t.
-    pub fn intersections(&self, x: &[Row], t: f64) -> u64 {
-        crossed(&self.topology, &self.features.joined(x, t)).0 as u64
+    /// Edges that pass through triangles, when points are at x at time t; `None` where there are no triangles.
+    pub fn intersections(&self, x: &[Row], t: f64) -> Option<u64> {
+        let any = !self.topology.triangles().is_empty();
+        any.then(|| crossed(&self.topology, &self.features.joined(x, t)).0 as u64)
     }
 
     /// The first intersection, and the count of all.

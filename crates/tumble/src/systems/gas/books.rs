@@ -11,12 +11,12 @@ use crate::state::{Field, GridError, Place, Vectors};
 use crate::system::{Archive, Part};
 use tumble_interface::engine::{Ledger, Worst};
 use tumble_interface::error::Breakdown;
-use tumble_interface::{Column, Data, StepError};
+use tumble_interface::{Column, StepError};
 
 const FACES: [&str; 3] = ["velocity_x", "velocity_y", "velocity_z"];
 
 impl Fluid {
-    fn column(&self, name: &str, unit: &'static str, fields: &[Field]) -> Column {
+    fn column(&self, name: &str, fields: &[Field]) -> Column {
         let points = fields.first().map_or([0; 3], Field::points);
         let lists: Vec<Vec<Real>> = fields.iter().map(Field::values).collect();
         let data: Vec<Real> = match &lists[..] {
@@ -24,7 +24,7 @@ impl Fluid {
             _ => (0..points.iter().product()).flat_map(|i| lists.iter().map(move |list| list[i])).collect(),
         };
         let points = self.grid().axes().map(|a| points[a]).collect();
-        Column { object: self.name.clone(), name: name.into(), unit, width: fields.len(), points, data: Data::from(data) }
+        Column::on_grid(&self.name, name, points, data)
     }
 
     /// The named columns that it has.
@@ -34,20 +34,20 @@ impl Fluid {
     }
 
     fn named(&self, name: &str) -> Result<Option<Column>, GridError> {
-        let one = |unit: &'static str, field: &Field| Some(self.column(name, unit, std::slice::from_ref(field)));
+        let one = |field: &Field| Some(self.column(name, std::slice::from_ref(field)));
         Ok(match name {
-            "density" => self.smoke.as_ref().and_then(|f| one("kg/m³", f)),
-            "temperature" => self.temperature.as_ref().and_then(|f| one("K", f)),
-            "fuel" => self.flame.as_ref().and_then(|flame| one("kg/m³", &flame.fuel)),
-            "pressure" => one("Pa", &self.pressure),
-            "velocity" => Some(self.column(name, "m/s", &self.at_cells(&self.u)?)),
+            "density" => self.smoke.as_ref().and_then(one),
+            "temperature" => self.temperature.as_ref().and_then(one),
+            "fuel" => self.flame.as_ref().and_then(|flame| one(&flame.fuel)),
+            "pressure" => one(&self.pressure),
+            "velocity" => Some(self.column(name, &self.at_cells(&self.u)?)),
             "vorticity" => {
                 let mut spin = Vectors::edges(self.grid(), "1/s")?;
                 curl(&self.u, &mut spin)?;
-                Some(self.column(name, "1/s", &self.at_cells(&spin)?))
+                Some(self.column(name, &self.at_cells(&spin)?))
             }
-            "divergence" => one("1/s", &self.divergence()?),
-            _ => FACES.iter().position(|face| *face == name).and_then(|axis| one("m/s", self.u.part(axis)?)),
+            "divergence" => one(&self.divergence()?),
+            _ => FACES.iter().position(|face| *face == name).and_then(|axis| one(self.u.part(axis)?)),
         })
     }
 
@@ -84,14 +84,7 @@ impl Fluid {
 
     /// Its grid.
     pub fn topology(&self, out: &mut Vec<Column>) {
-        let grid = self.grid();
-        let mut add = |name: &str, unit, data: Data| {
-            out.push(Column { object: self.name.clone(), name: name.into(), unit, width: 1, points: Vec::new(), data });
-        };
-        add("grid_cells", "1", Data::U32(grid.axes().map(|a| grid.n[a] as u32).collect()));
-        add("grid_spacing", "m", Data::F64(vec![grid.dx]));
-        add("grid_origin", "m", Data::F64(grid.origin.to_vec()));
-        add("grid_flat", "1", Data::U32(vec![grid.flat.unwrap_or(3) as u32]));
+        out.extend(self.grid().columns(&self.name));
     }
 
     /// The volume of a cell [m³]; in the plane, of one metre across it.
@@ -115,17 +108,17 @@ impl Fluid {
         rows::largest(first, |at, n| (at..at + n).map(sq).fold(0.0, rows::worse)).sqrt()
     }
 
-    /// Adds its mass of smoke and fuel, momentum, kinetic energy, speed and divergence of the fluid, and the heat of one that burns. A face
+    /// Mass of smoke and fuel; momentum, kinetic energy, speed and divergence of the fluid; the heat of one that burns. A face
     /// on a side of the box counts half, one that is open in part by its share.
-    pub fn count(&self, books: &mut Ledger) {
+    pub fn books(&self, t: f64) -> Ledger {
         let grid = self.grid();
         let mass = self.volume() * self.settings.density;
-        books.mass += self.carried_mass();
+        let mut books = Ledger { time: t, mass: self.carried_mass(), ..Ledger::default() };
         if let Some(flame) = &self.flame {
             let capacity = mass * self.settings.specific_heat;
             let [start, came] = flame.books;
-            books.heat += capacity * (self.excess() - start);
-            books.heat_in += capacity * came;
+            books.heat = Some(capacity * (self.excess() - start));
+            books.heat_in = Some(capacity * came);
         }
         for (index, part) in self.u.parts.iter().enumerate() {
             let Place::Face(axis) = part.place else { continue };
@@ -154,9 +147,10 @@ impl Fluid {
             books.momentum[axis] += mass * weighed(1);
             books.kinetic += 0.5 * mass * weighed(2);
         }
-        books.speed = books.speed.max(self.speed());
+        books.speed = Some(self.speed());
         // Only fields of another grid could fail here.
-        books.divergence = books.divergence.max(self.divergence().map_or(0.0, |field| rows::magnitude(&field)));
+        books.divergence = self.divergence().ok().map(|field| rows::magnitude(&field));
+        books
     }
 
     /// The cells of the largest divergence and of the fastest flow.

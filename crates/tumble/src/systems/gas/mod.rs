@@ -34,7 +34,7 @@ use crate::exchange::Exchange;
 use crate::integrators::equal_steps;
 use crate::system::{Archive, System};
 use tumble_interface::engine::{Ledger, Share, Stability, StepReport, Worst};
-use tumble_interface::{Column, Data, StepError};
+use tumble_interface::{Column, StepError};
 
 /// Sub-steps of an exchange interval at most.
 const MOST_STEPS: f64 = 1e6;
@@ -63,15 +63,7 @@ impl Gas {
                 None => all.push((name, forces)),
             }
         }
-        let column = |(name, forces): (&str, Vec<f64>)| Column {
-            object: name.into(),
-            name: "force".into(),
-            unit: "N",
-            width: 3,
-            points: Vec::new(),
-            data: Data::F64(forces),
-        };
-        all.into_iter().map(column).collect()
+        all.into_iter().map(|(name, forces)| Column::new(name, "force", forces)).collect()
     }
 
     /// The next sub-step [s] with this much of an interval dt left.
@@ -149,16 +141,12 @@ impl System for Gas {
 
     fn ledger(&self, t: f64) -> Ledger {
         let mut total = Ledger { time: t, ..Ledger::default() };
-        self.fluids.iter().for_each(|fluid| fluid.count(&mut total));
+        self.fluids.iter().for_each(|fluid| total.add_system(&fluid.books(t)));
         total
     }
 
     fn shares(&self, t: f64) -> Vec<Share> {
-        let share = |fluid: &Fluid| {
-            let mut ledger = Ledger { time: t, ..Ledger::default() };
-            fluid.count(&mut ledger);
-            Share { system: self.name.clone(), object: fluid.name.clone(), ledger }
-        };
+        let share = |fluid: &Fluid| Share { system: self.name.clone(), object: fluid.name.clone(), ledger: fluid.books(t) };
         self.fluids.iter().map(share).collect()
     }
 

@@ -171,7 +171,7 @@ impl Fluid {
         report.linear += info.iterations as u64;
         report.pressure = info.residuals;
         let reached = if fastest > 0.0 { info.largest / (dx * fastest) } else { 0.0 };
-        report.residual = rows::worse(report.residual, reached);
+        report.left(reached);
         if !info.converged {
             if settings.on_failure == OnFailure::Error {
                 return Err(Failure::Unconverged { iterations: info.iterations, reached, asked: settings.tolerance });

@@ -474,7 +474,7 @@ impl Body {
         match info {
             Ok(info) => {
                 report.linear += info.iterations as u64;
-                report.residual = report.residual.max(info.residual());
+                report.left(info.residual());
                 report.unconverged += u64::from(!info.converged);
             }
             // Only numbers that are not finite are refused: the breakdown tells where they are.

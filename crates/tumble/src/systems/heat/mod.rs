@@ -21,7 +21,7 @@ use crate::system::{Archive, Part, System};
 use tumble_interface::engine::{Ledger, Limit, Share, Stability, StepReport};
 use tumble_interface::error::Breakdown;
 use tumble_interface::scene::{HeatScheme, Integrator};
-use tumble_interface::{Column, Data, StepError};
+use tumble_interface::{Column, StepError};
 
 /// Part of the longest stable step that is taken where the scene names none.
 pub const SAFE: f64 = 0.7;
@@ -150,17 +150,14 @@ impl System for Heat {
         for body in &self.bodies {
             let grid = body.plan.grid;
             let points: Vec<usize> = grid.axes().map(|a| grid.n[a]).collect();
-            let mut add = |name: &str, unit, width, data: Vec<Real>| {
-                let data = Data::from(data);
-                out.push(Column { object: body.plan.name.clone(), name: name.into(), unit, width, points: points.clone(), data });
-            };
+            let mut add = |name: &str, data: Vec<Real>| out.push(Column::on_grid(&body.plan.name, name, points.clone(), data));
             for name in names {
                 match *name {
                     "temperature" => {
                         let whole = |t: Real| (f64::from(t) + body.reference) as Real;
-                        add("temperature", "K", 1, body.t.each().map(|at| whole(body.t.value(at))).collect());
+                        add("temperature", body.t.each().map(|at| whole(body.t.value(at))).collect());
                     }
-                    "flux" => add("flux", "W/m²", points.len(), body.flux(body.time)),
+                    "flux" => add("flux", body.flux(body.time)),
                     _ => {}
                 }
             }
@@ -174,17 +171,13 @@ impl System for Heat {
     }
 
     fn ledger(&self, t: f64) -> Ledger {
-        let heat = self.bodies.iter().map(Body::stored).sum();
-        let heat_in = self.bodies.iter().flat_map(|body| &body.come).sum();
-        Ledger { time: t, heat, heat_in, ..Ledger::default() }
+        let mut total = Ledger { time: t, ..Ledger::default() };
+        self.bodies.iter().for_each(|body| total.add_system(&books(body, t)));
+        total
     }
 
     fn shares(&self, t: f64) -> Vec<Share> {
-        let share = |body: &Body| Share {
-            system: self.settings.name.clone(),
-            object: body.plan.name.clone(),
-            ledger: Ledger { time: t, heat: body.stored(), heat_in: body.come.iter().sum(), ..Ledger::default() },
-        };
+        let share = |body: &Body| Share { system: self.settings.name.clone(), object: body.plan.name.clone(), ledger: books(body, t) };
         self.bodies.iter().map(share).collect()
     }
 
@@ -243,4 +236,8 @@ impl System for Heat {
         let values: Vec<Real> = values.iter().map(|t| (t - reference) as Real).collect();
         Some(column == "temperature" && Field::set(&mut body.t, &values).is_ok())
     }
+}
+
+fn books(body: &Body, t: f64) -> Ledger {
+    Ledger { time: t, heat: Some(body.stored()), heat_in: Some(body.come.iter().sum()), ..Ledger::default() }
 }
