@@ -2,7 +2,8 @@
 
 #![allow(clippy::unwrap_used)] // helpers of tests fail by panicking, too
 
-use tumble::scene::{Simulation, resolve};
+use tumble::scene::{Simulation, resolve, set_text};
+use tumble_interface::tree::Node;
 use tumble_interface::{Assets, Scene};
 
 fn scene(text: &str) -> Scene {
@@ -81,4 +82,17 @@ fn resolving_keeps_the_bits() {
     }
     let hash = |world: &Simulation| tumble_interface::engine::Engine::hash(world);
     assert_eq!(hash(&written), hash(&resolved));
+}
+
+#[test]
+fn overrides_reach_default_systems() {
+    for path in ["system.0.substeps=7", "system.gas.substeps=7"] {
+        let mut node = Node::from_toml(&format!("version = 1\n{GAS}")).unwrap();
+        set_text(&mut node, path).unwrap();
+        let scene = Scene::from_tree(&node).unwrap();
+        assert_eq!(scene.system.len(), 1);
+        assert_eq!((scene.system[0].method.name(), scene.system[0].substeps), ("gas", Some(7)), "{path}");
+    }
+    let mut node = Node::from_toml(&format!("version = 1\n{GAS}")).unwrap();
+    assert!(set_text(&mut node, "system.main.substeps=7").unwrap_err().to_string().contains("gas"));
 }

@@ -30,22 +30,3 @@ fn list_systems(node: &mut Node, path: &str) {
     // A scene is a table, so that this cannot fail.
     let _ = node.set("system", Value::List(systems).into());
 }
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn overrides_reach_default_systems() {
-        let gas = "version = 1\n[[gas]]\nname = 'air'\nbox = { size = [1, 1, 1], resolution = 8 }\n";
-        for path in ["system.0.substeps=7", "system.gas.substeps=7"] {
-            let mut node = Node::from_toml(gas).unwrap();
-            set_text(&mut node, path).unwrap();
-            let scene = Scene::from_tree(&node).unwrap();
-            assert_eq!(scene.system.len(), 1);
-            assert_eq!((scene.system[0].method.name(), scene.system[0].substeps), ("gas", Some(7)), "{path}");
-        }
-        let mut node = Node::from_toml(gas).unwrap();
-        assert!(set_text(&mut node, "system.main.substeps=7").unwrap_err().to_string().contains("gas"));
-    }
-}
