@@ -10,9 +10,9 @@ function sources(): Plugin {
   const name = "virtual:sources";
   return {
     name: "sources",
-    resolveId: (id) => (id === name ? "\0" + name : undefined),
+    resolveId: (id) => (id === name ? `\0${name}` : undefined),
     load(id) {
-      if (id !== "\0" + name) return;
+      if (id !== `\0${name}`) return;
       const found: Record<string, string[]> = {};
       const folder = join(root, "crates/tumble/src");
       for (const entry of readdirSync(folder, { recursive: true, withFileTypes: true })) {
@@ -45,7 +45,7 @@ function site(): Plugin {
       const dist = resolve(dir!, "../..");
       writeFileSync(join(dist, "index.html"), first.replaceAll('="./assets/', `="./v/${version}/assets/`));
       const lost = readFileSync(join(import.meta.dirname, "404.html"), "utf8").replace('"VERSION"', JSON.stringify(version));
-      const script = /<script>([^]*)<\/script>/.exec(lost)![1];
+      const script = /<script>([\s\S]*)<\/script>/.exec(lost)![1];
       writeFileSync(join(dist, "404.html"), lost.replace("SCRIPT", `sha256-${createHash("sha256").update(script).digest("base64")}`));
     },
   };

@@ -2,6 +2,7 @@
 
 import copy
 import json
+import os
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
@@ -9,9 +10,13 @@ from typing import Any
 
 import pytest
 
-from tumble import Run
-from tumble.cli import main
-from tumble.run import simulate
+if "PYTEST_XDIST_WORKER" in os.environ:
+    # A worker keeps a core busy; threads of the engine would wait for those of the other workers.
+    os.environ.setdefault("RAYON_NUM_THREADS", "1")
+
+from tumble import Run  # noqa: E402
+from tumble.cli import main  # noqa: E402
+from tumble.run import simulate  # noqa: E402
 
 Tree = dict[str, Any]
 

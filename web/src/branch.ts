@@ -35,7 +35,10 @@ export interface Branch {
 
 /** The history of a world that went back to a frame: values stay as they are, and the pointer's work is undone. */
 export function back(history: Change[], frame: number): Change[] {
-  return history.filter((c) => c.path || c.frame <= frame).map((c) => ({ ...c, frame: Math.min(c.frame, frame) })).reduce(gather, []);
+  return history
+    .filter((c) => c.path || c.frame <= frame)
+    .map((c) => ({ ...c, frame: Math.min(c.frame, frame) }))
+    .reduce(gather, []);
 }
 
 /** A history with one change more. Of several of one value at one frame the last counts, of the pointer's the first. */

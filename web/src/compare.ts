@@ -1,5 +1,5 @@
 /** Two ways that time went, compared: what was changed, how far they are apart, the old one as a ghost, and the way back to it. */
-import { difference, fieldOf, ofField, ofPositions, type Measure } from "./apart";
+import { difference, fieldOf, type Measure, ofField, ofPositions } from "./apart";
 import type { Change } from "./branch";
 import { check, choice, h, show } from "./dom";
 import type { Frame, SceneInfo, Value } from "./engine/protocol";
@@ -15,7 +15,8 @@ function short(value: Value | null): string {
   return text.length > 60 ? `${text.slice(0, 57)} …` : text;
 }
 
-const told = ({ path, from, to, frame }: Change): string => `${path ? `${path}: ${short(from)} → ${short(to)}` : "by the pointer"}, from frame ${frame}`;
+const told = ({ path, from, to, frame }: Change): string =>
+  `${path ? `${path}: ${short(from)} → ${short(to)}` : "by the pointer"}, from frame ${frame}`;
 
 const names = (objects: SceneInfo["objects"]): string[] => objects.map((o) => o.name);
 
@@ -42,8 +43,19 @@ export class Comparison {
     private readonly drawn: () => void,
   ) {
     this.ghost = new Ghost(stage.scene);
-    this.plot = new Plot([{ label: "apart", color: 4, width: 2, spans: true }], { label: "Distance between the branches against time", x: "time [s]", height: 140, mark: () => session.shown?.time ?? null });
-    this.chart = h("div", { class: "energy apart", hidden: true }, this.title, h("ul", { class: "curves" }, h("li", {}, this.what, this.value)), this.plot.element);
+    this.plot = new Plot([{ label: "apart", color: 4, width: 2, spans: true }], {
+      label: "Distance between the branches against time",
+      x: "time [s]",
+      height: 140,
+      mark: () => session.shown?.time ?? null,
+    });
+    this.chart = h(
+      "div",
+      { class: "energy apart", hidden: true },
+      this.title,
+      h("ul", { class: "curves" }, h("li", {}, this.what, this.value)),
+      this.plot.element,
+    );
     session.on("before", () => this.open());
     session.on("loaded", () => this.open());
   }
@@ -80,7 +92,8 @@ export class Comparison {
   }
 
   /** A kept frame of the way that is shown. */
-  readonly past = (index: number): Frame | undefined => (this.seen === "before" ? this.session.before?.way.frame(index) : undefined) ?? this.session.frame(index);
+  readonly past = (index: number): Frame | undefined =>
+    (this.seen === "before" ? this.session.before?.way.frame(index) : undefined) ?? this.session.frame(index);
 
   /** Total energies of the old way at these times, from its start on [J]. */
   energies(times: number[]): (number | null)[] {
@@ -114,7 +127,13 @@ export class Comparison {
     }
     const grids = names(gridsOf(info));
     const masses = massesOf(info);
-    const fits = grids.length > 0 && grids.every((name) => JSON.stringify([...(before.info.topology[name]?.grid_cells?.data ?? [])]) === JSON.stringify([...(info.topology[name]?.grid_cells?.data ?? [])]));
+    const fits =
+      grids.length > 0 &&
+      grids.every(
+        (name) =>
+          JSON.stringify([...(before.info.topology[name]?.grid_cells?.data ?? [])]) ===
+          JSON.stringify([...(info.topology[name]?.grid_cells?.data ?? [])]),
+      );
     if (!fits) this.seen = "now";
     if (!masses.length || !grids.length) this.measured = grids.length ? "field" : "positions";
     const changes = before.changes.map(told);
@@ -127,16 +146,33 @@ export class Comparison {
           })
         : null,
       fits
-        ? choice("Branch shown", [["now", "current"], ["before", "previous"], ["difference", "difference"]], this.seen, (v) => {
-            this.seen = v as typeof this.seen;
-            this.again();
-          })
+        ? choice(
+            "Branch shown",
+            [
+              ["now", "current"],
+              ["before", "previous"],
+              ["difference", "difference"],
+            ],
+            this.seen,
+            (v) => {
+              this.seen = v as typeof this.seen;
+              this.again();
+            },
+          )
         : null,
       masses.length && grids.length
-        ? choice("Distance in", [["positions", "positions"], ["field", "field"]], this.measured, (v) => {
-            this.measured = v as typeof this.measured;
-            this.draw();
-          })
+        ? choice(
+            "Distance in",
+            [
+              ["positions", "positions"],
+              ["field", "field"],
+            ],
+            this.measured,
+            (v) => {
+              this.measured = v as typeof this.measured;
+              this.draw();
+            },
+          )
         : null,
       this.shorter ? this.runButton() : null,
       h("button", { type: "button", class: "button", onclick: () => void this.session.takeBefore() }, "Return to the previous branch"),
@@ -215,7 +251,11 @@ export class Comparison {
     this.plot.set([times, times.map((_, i) => this.at(i, field))]);
     const now = session.shown ? this.at(session.shown.index, field) : null;
     this.title.replaceChildren("Apart", h("span", { class: "unit" }, field ? field.unit : "m"));
-    this.what.textContent = !this.alike ? "frame sizes differ: not compared" : field ? `rms difference of ${field.name}` : "rms distance of corresponding masses";
+    this.what.textContent = !this.alike
+      ? "frame sizes differ: not compared"
+      : field
+        ? `rms difference of ${field.name}`
+        : "rms distance of corresponding masses";
     this.value.textContent = show(now, 3);
   }
 

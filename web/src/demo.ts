@@ -3,11 +3,25 @@ import { h } from "./dom";
 import { addressed } from "./source";
 
 /** A slider that tells its value as `text`, and acts when it comes to rest. */
-export function slide(label: string, low: number, high: number, value: number, text: (v: number) => string, act: (v: number) => void, step = (high - low) / 100): HTMLLabelElement {
+export function slide(
+  label: string,
+  low: number,
+  high: number,
+  value: number,
+  text: (v: number) => string,
+  act: (v: number) => void,
+  step = (high - low) / 100,
+): HTMLLabelElement {
   const out = h("output", {}, text(value));
   let timer = 0;
   const input = h("input", {
-    type: "range", min: low, max: high, step, value, "aria-label": label, "aria-valuetext": text(value),
+    type: "range",
+    min: low,
+    max: high,
+    step,
+    value,
+    "aria-label": label,
+    "aria-valuetext": text(value),
     oninput: () => {
       out.textContent = text(Number(input.value));
       input.setAttribute("aria-valuetext", text(Number(input.value)));

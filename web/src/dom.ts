@@ -38,8 +38,10 @@ export const ICONS = {
   back: "M16 3.5v13L7.5 10zM4 3.5h2.5v13H4z",
   reset: "M10 4V1L5.5 5 10 9V6a4.5 4.5 0 1 1-4.5 4.5h-2A6.5 6.5 0 1 0 10 4z",
   substep: "M4 5h2v10H4zm5 2.5 5 2.5-5 2.5zM15.5 8.6a1.4 1.4 0 1 1 0 2.8 1.4 1.4 0 0 1 0-2.8z",
-  share: "M14 2.5a2.5 2.5 0 0 0-2.4 3.1L7.7 8a2.5 2.5 0 1 0 0 4l3.9 2.4A2.5 2.5 0 1 0 12.6 13L8.9 10.6a2.6 2.6 0 0 0 0-1.2L12.6 7A2.5 2.5 0 1 0 14 2.5z",
-  camera: "M7 3.5 5.8 5.5H3A1.5 1.5 0 0 0 1.5 7v8A1.5 1.5 0 0 0 3 16.5h14a1.5 1.5 0 0 0 1.5-1.5V7A1.5 1.5 0 0 0 17 5.5h-2.8L13 3.5zM10 7.5a3.5 3.5 0 1 1 0 7 3.5 3.5 0 0 1 0-7z",
+  share:
+    "M14 2.5a2.5 2.5 0 0 0-2.4 3.1L7.7 8a2.5 2.5 0 1 0 0 4l3.9 2.4A2.5 2.5 0 1 0 12.6 13L8.9 10.6a2.6 2.6 0 0 0 0-1.2L12.6 7A2.5 2.5 0 1 0 14 2.5z",
+  camera:
+    "M7 3.5 5.8 5.5H3A1.5 1.5 0 0 0 1.5 7v8A1.5 1.5 0 0 0 3 16.5h14a1.5 1.5 0 0 0 1.5-1.5V7A1.5 1.5 0 0 0 17 5.5h-2.8L13 3.5zM10 7.5a3.5 3.5 0 1 1 0 7 3.5 3.5 0 0 1 0-7z",
   record: "M10 4a6 6 0 1 1 0 12 6 6 0 0 1 0-12z",
   stop: "M5 5h10v10H5z",
   down: "M9 2.5h2v7.7l2.8-2.8 1.4 1.4L10 14 4.8 8.8l1.4-1.4L9 10.2zM3.5 15.5h13v2h-13z",
@@ -61,7 +63,11 @@ export function setIcon(button: HTMLButtonElement, icon: keyof typeof ICONS, lab
 
 /** A select with a visible label. */
 export function choice(label: string, options: [string, string][], value: string, act: (value: string) => void): HTMLLabelElement {
-  const list = h("select", { onchange: () => act(list.value) }, ...options.map(([v, text]) => h("option", { value: v, selected: v === value }, text)));
+  const list = h(
+    "select",
+    { onchange: () => act(list.value) },
+    ...options.map(([v, text]) => h("option", { value: v, selected: v === value }, text)),
+  );
   return h("label", { class: "choice" }, h("span", {}, label), list);
 }
 
@@ -80,7 +86,20 @@ export function show(value: number | null | undefined, digits = 4): string {
   return text.replace("-", "−").replace(/e\+?(−?)(-?)(\d+)/, (_, a, b, d) => ` × 10${power(`${a || (b ? "−" : "")}${d}`)}`);
 }
 
-const RAISED: Record<string, string> = { "−": "⁻", "-": "⁻", "0": "⁰", "1": "¹", "2": "²", "3": "³", "4": "⁴", "5": "⁵", "6": "⁶", "7": "⁷", "8": "⁸", "9": "⁹" };
+const RAISED: Record<string, string> = {
+  "−": "⁻",
+  "-": "⁻",
+  "0": "⁰",
+  "1": "¹",
+  "2": "²",
+  "3": "³",
+  "4": "⁴",
+  "5": "⁵",
+  "6": "⁶",
+  "7": "⁷",
+  "8": "⁸",
+  "9": "⁹",
+};
 const power = (text: string): string => [...text].map((c) => RAISED[c] ?? c).join("");
 
 /** A message at the foot of the window, read aloud. */

@@ -1,8 +1,8 @@
 /** Files that a person brings: scenes, and meshes. */
 import { stringify } from "smol-toml";
 import { say } from "./dom";
-import { asked } from "./engine/worth";
 import type { Files } from "./engine/protocol";
+import { asked } from "./engine/worth";
 import { dropped } from "./session";
 import { fromFile, type Shared } from "./share";
 

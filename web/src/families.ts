@@ -2,7 +2,7 @@
 import { parse } from "smol-toml";
 import { check, h } from "./dom";
 import type { SceneInfo, Value } from "./engine/protocol";
-import { changed, FAMILIES, isOn, linked, RESISTS, type Family, type Linked } from "./links";
+import { changed, FAMILIES, type Family, isOn, type Linked, linked, RESISTS } from "./links";
 
 type Settings = Record<string, Value | null>;
 
@@ -23,14 +23,21 @@ export class FamilySwitches {
     this.info = info;
     const objects = linked(info);
     for (const { path, families } of objects) for (const f of FAMILIES) if (isOn(families[f])) this.had.set(`${path}.${f}`, families[f]!);
-    const rows = objects.map((o) => ({ o, own: FAMILIES.filter((f) => o.families[f] || this.had.has(`${o.path}.${f}`)) })).filter(({ own }) => own.length);
+    const rows = objects
+      .map((o) => ({ o, own: FAMILIES.filter((f) => o.families[f] || this.had.has(`${o.path}.${f}`)) }))
+      .filter(({ own }) => own.length);
     // Switches in use are not made anew under the fingers.
     const drawn = JSON.stringify(rows.map(({ o, own }) => [o.name, o.path, o.clamped, own.map((f) => [f, isOn(o.families[f])])]));
     if (drawn === this.drawn) return;
     this.drawn = drawn;
     const focused = document.activeElement?.closest<HTMLElement>("[data-family]")?.dataset.family;
     const all = FAMILIES.filter((f) => rows.some(({ own }) => own.includes(f)));
-    const say = h("p", { class: "doc", id: "families-say" }, ...all.flatMap((f, i) => [i ? " " : "", h("strong", {}, f), ` ${RESISTS[f]}`]), " A family that is off exerts no force; the world goes on from where it stands.");
+    const say = h(
+      "p",
+      { class: "doc", id: "families-say" },
+      ...all.flatMap((f, i) => [i ? " " : "", h("strong", {}, f), ` ${RESISTS[f]}`]),
+      " A family that is off exerts no force; the world goes on from where it stands.",
+    );
     this.element.replaceChildren(...rows.map(({ o, own }) => this.group(o, own)), ...(rows.length ? [say] : []));
     if (focused) this.element.querySelector<HTMLElement>(`[data-family="${CSS.escape(focused)}"] input`)?.focus();
   }

@@ -12,7 +12,13 @@ export function legendBox(stage: () => Stage): { element: HTMLElement; update: (
     element.replaceChildren(
       h("span", { class: "legend-name" }, l.unit && l.unit !== "1" ? `${l.name}, ${l.unit}` : l.name),
       h("i", { style: `background:${gradient(mapOf(l.name))}` }),
-      h("span", { class: "legend-ends" }, h("span", {}, show(l.low, 3)), l.low === -l.high ? h("span", {}, "0") : null, h("span", {}, show(l.high, 3))),
+      h(
+        "span",
+        { class: "legend-ends" },
+        h("span", {}, show(l.low, 3)),
+        l.low === -l.high ? h("span", {}, "0") : null,
+        h("span", {}, show(l.high, 3)),
+      ),
     );
   };
   return { element, update };

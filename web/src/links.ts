@@ -41,20 +41,36 @@ export function linked(info: SceneInfo): Linked[] {
     const [entry, index] = entryOf(info, object) ?? [];
     if (!entry || entry.rod || entry.material) return [];
     const links: Entry = entry.links ?? {};
-    const families = Object.fromEntries(FAMILIES.flatMap((f) => (links[f] === null || links[f] === undefined ? [] : [[f, (typeof links[f] === "number" ? { modulus: links[f] } : links[f]) as Settings]])));
+    const families = Object.fromEntries(
+      FAMILIES.flatMap((f) =>
+        links[f] === null || links[f] === undefined
+          ? []
+          : [[f, (typeof links[f] === "number" ? { modulus: links[f] } : links[f]) as Settings]],
+      ),
+    );
     const systems = (info.scene.system ?? []) as Entry[];
-    return [{ name: object.name, path: `${object.kind}.${index}.links`, families, diagonals: links.diagonals ?? "both", clamped: systems.some((s) => s.name === object.system && s.clamp) }];
+    return [
+      {
+        name: object.name,
+        path: `${object.kind}.${index}.links`,
+        families,
+        diagonals: links.diagonals ?? "both",
+        clamped: systems.some((s) => s.name === object.system && s.clamp),
+      },
+    ];
   });
 }
 
-export const isOn = (settings: Settings | undefined): boolean => !!settings && (Number(settings.modulus) > 0 || Number(settings.damping ?? 0) > 0);
+export const isOn = (settings: Settings | undefined): boolean =>
+  !!settings && (Number(settings.modulus) > 0 || Number(settings.damping ?? 0) > 0);
 
 /** All links of an object, as its scene should have them, with other settings of one family; `null` takes it away. */
 export function changed({ families, diagonals, clamped }: Linked, family: Family, settings: Settings | null): Value {
   const all: Entry = { ...families, [family]: settings ?? (clamped ? undefined : { ...families[family], modulus: 0, damping: 0 }) };
   // Links without a force keep their places in the state: a broken one stays broken.
   const table: Entry = { diagonals };
-  for (const [name, own] of Object.entries(all)) if (own) table[name] = Object.fromEntries(Object.entries(own as Entry).filter(([, v]) => v !== null));
+  for (const [name, own] of Object.entries(all))
+    if (own) table[name] = Object.fromEntries(Object.entries(own as Entry).filter(([, v]) => v !== null));
   return table;
 }
 
@@ -65,7 +81,10 @@ export function familiesOf(info: SceneInfo, object: ObjectInfo): Uint8Array | nu
   if (!entry || !topology.links) return null;
   const pairs = topology.links.data;
   const out = new Uint8Array(pairs.length / 2);
-  const between = object.kind === "net" ? onEdges(topology.triangles, !entry.links?.structural) : onLattice(object.kind === "rope" ? [entry.segments + 1] : entry.resolution);
+  const between =
+    object.kind === "net"
+      ? onEdges(topology.triangles, !entry.links?.structural)
+      : onLattice(object.kind === "rope" ? [entry.segments + 1] : entry.resolution);
   for (let i = 0; i < out.length; i++) out[i] = between(pairs[2 * i], pairs[2 * i + 1]);
   return out;
 }
@@ -89,6 +108,12 @@ function onEdges(triangles: Column | undefined, bendAlone: boolean): (a: number,
   const key = (a: number, b: number) => Math.min(a, b) * 2 ** 26 + Math.max(a, b);
   const edges = new Set<number>();
   const t = triangles?.data ?? [];
-  for (let i = 0; i + 2 < t.length && !bendAlone; i += 3) for (const [j, k] of [[0, 1], [1, 2], [2, 0]]) edges.add(key(t[i + j], t[i + k]));
+  for (let i = 0; i + 2 < t.length && !bendAlone; i += 3)
+    for (const [j, k] of [
+      [0, 1],
+      [1, 2],
+      [2, 0],
+    ])
+      edges.add(key(t[i + j], t[i + k]));
   return (a, b) => (edges.has(key(a, b)) ? 0 : 2);
 }

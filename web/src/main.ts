@@ -1,5 +1,5 @@
 import "./style.css";
-import { h, iconButton, say, type Leave, type Page } from "./dom";
+import { h, iconButton, type Leave, type Page, say } from "./dom";
 
 /** Each visit has its own, so that a page that is left before it has come appears nowhere. */
 let main = document.getElementById("main")!;
@@ -63,7 +63,8 @@ async function go(): Promise<void> {
   main.replaceWith(fresh);
   main = fresh;
   // The engine comes while the page does.
-  if (/^(scene|s|fluid|integrators|structures)\b/.test(address)) void import("./session").then(({ engine }) => engine().schema()).catch(() => {});
+  if (/^(scene|s|fluid|integrators|structures)\b/.test(address))
+    void import("./session").then(({ engine }) => engine().schema()).catch(() => {});
   const section = address.split("/")[0];
   for (const link of nav.querySelectorAll("a")) {
     if (link.getAttribute("href") === `#/${section === "scene" ? "" : section}`) link.setAttribute("aria-current", "page");
@@ -82,7 +83,14 @@ async function go(): Promise<void> {
       if (own !== visit) return;
       const webgl = document.createElement("canvas").getContext("webgl2");
       main.className = "";
-      main.replaceChildren(h("div", { class: "narrow" }, h("h1", {}, "This page could not be shown"), h("p", {}, webgl ? String((error as Error)?.message ?? error) : "It requires WebGL 2, which this browser does not support.")));
+      main.replaceChildren(
+        h(
+          "div",
+          { class: "narrow" },
+          h("h1", {}, "This page could not be shown"),
+          h("p", {}, webgl ? String((error as Error)?.message ?? error) : "It requires WebGL 2, which this browser does not support."),
+        ),
+      );
       console.error(error);
       return;
     }
@@ -105,7 +113,8 @@ addEventListener("dragover", (event) => event.preventDefault());
 addEventListener("drop", (event) => {
   event.preventDefault();
   const files = [...(event.dataTransfer?.files ?? [])];
-  if (files.length) void import("./drop").then(({ acceptFiles }) => acceptFiles(files)).catch((error) => say(String(error.message ?? error)));
+  if (files.length)
+    void import("./drop").then(({ acceptFiles }) => acceptFiles(files)).catch((error) => say(String(error.message ?? error)));
 });
 
 addEventListener("hashchange", () => void go());

@@ -16,7 +16,7 @@ function crc(data: Uint8Array): number {
 function npy(data: Numbers, shape: number[]): Uint8Array {
   const kind = data instanceof Float64Array ? "<f8" : data instanceof Uint32Array ? "<u4" : "<f4";
   const words = `{'descr': '${kind}', 'fortran_order': False, 'shape': (${shape.join(", ")}${shape.length === 1 ? "," : ""}), }`;
-  const padded = words.padEnd(64 * Math.ceil((words.length + 11) / 64) - 11) + "\n";
+  const padded = `${words.padEnd(64 * Math.ceil((words.length + 11) / 64) - 11)}\n`;
   const out = new Uint8Array(10 + padded.length + data.byteLength);
   out.set([0x93, 0x4e, 0x55, 0x4d, 0x50, 0x59, 1, 0, padded.length & 255, padded.length >> 8]);
   out.set(new TextEncoder().encode(padded), 10);
@@ -33,10 +33,12 @@ function array({ data, width, points }: Column): [Numbers, number[]] {
   const out = data.slice();
   const [nx, ny, nz = 1] = points;
   let to = 0;
-  for (let i = 0; i < nx; i++) for (let j = 0; j < ny; j++) for (let k = 0; k < nz; k++) {
-    const from = width * (i + nx * (j + ny * k));
-    for (let d = 0; d < width; d++) out[to++] = data[from + d];
-  }
+  for (let i = 0; i < nx; i++)
+    for (let j = 0; j < ny; j++)
+      for (let k = 0; k < nz; k++) {
+        const from = width * (i + nx * (j + ny * k));
+        for (let d = 0; d < width; d++) out[to++] = data[from + d];
+      }
   return [out, shape];
 }
 
@@ -64,7 +66,10 @@ export function npz(frames: Frame[]): Blob {
     const local = head(0x04034b50, 30);
     const central = head(0x02014b50, 46);
     central.setUint16(4, 20, true);
-    for (const [view, base] of [[local, 4], [central, 6]] as const) {
+    for (const [view, base] of [
+      [local, 4],
+      [central, 6],
+    ] as const) {
       view.setUint16(base, 20, true);
       view.setUint16(base + 2, 0x0800, true);
       view.setUint16(base + 8, 0x21, true);

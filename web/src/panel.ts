@@ -1,13 +1,27 @@
 /** Controls for the values of a scene, made from its schema: label, unit, range, what the word means. */
 import { parse } from "smol-toml";
-import type { SceneInfo, Value } from "./engine/protocol";
 import { check, h } from "./dom";
+import type { SceneInfo, Value } from "./engine/protocol";
 
 type Schema = Record<string, any>;
 type Tree = Record<string, any>;
 
 /** Keys that panels leave to the text. */
-const LEFT_OUT = new Set(["version", "title", "output", "expect", "camera", "name", "precision", "bits", "dimension", "plane", "color", "color_to", "color_end"]);
+const LEFT_OUT = new Set([
+  "version",
+  "title",
+  "output",
+  "expect",
+  "camera",
+  "name",
+  "precision",
+  "bits",
+  "dimension",
+  "plane",
+  "color",
+  "color_to",
+  "color_end",
+]);
 
 /** The most telling words of what moves particles, by table and kind: they come first. */
 const TELLING: Record<string, string[]> = {
@@ -92,10 +106,14 @@ export class Panel {
     private readonly set: (path: string, value: Value) => Promise<void>,
   ) {
     this.element.append(
-      h("div", { class: "panel-head" }, check("All keys, with defaults", false, (on) => {
-        this.everything = on;
-        this.draw();
-      })),
+      h(
+        "div",
+        { class: "panel-head" },
+        check("All keys, with defaults", false, (on) => {
+          this.everything = on;
+          this.draw();
+        }),
+      ),
       this.groups,
       this.note,
     );
@@ -157,7 +175,9 @@ export class Panel {
       entries.push([table === "emitter" || table === "galaxy" ? table : `${table}.${entry.kind}`, path, entry, schema]);
       const air = (entry.air ?? []) as Tree[];
       const own = air.length ? branch(schema, entry, this.schema) : null;
-      air.forEach((field, i) => take("field", `${path}.air.${i}`, field, resolve(resolve(own!.properties.air, this.schema).items, this.schema)));
+      air.forEach((field, i) =>
+        take("field", `${path}.air.${i}`, field, resolve(resolve(own!.properties.air, this.schema).items, this.schema)),
+      );
     };
     for (const table of ["galaxy", "force", "field", "emitter"]) {
       const list = (scene[table] ?? []) as Tree[];
@@ -165,7 +185,10 @@ export class Panel {
       list.forEach((entry, i) => take(table, `${table}.${i}`, entry, items));
     }
     const systems = resolve(resolve(this.schema.properties.system, this.schema).items, this.schema);
-    (scene.system as Tree[]).forEach((s, i) => s.vicsek && entries.push(["system.vicsek", `system.${i}.vicsek`, s.vicsek, resolve(systems.properties.vicsek, this.schema)]));
+    (scene.system as Tree[]).forEach(
+      (s, i) =>
+        s.vicsek && entries.push(["system.vicsek", `system.${i}.vicsek`, s.vicsek, resolve(systems.properties.vicsek, this.schema)]),
+    );
     const sets: HTMLElement[] = [];
     for (const [kind, path, entry, schema] of entries) {
       const own = schema.properties ? schema : branch(schema, entry, this.schema);
@@ -178,7 +201,15 @@ export class Panel {
         rows.push(row);
         this.shown.add(`${path}.${key}`);
       }
-      if (rows.length) sets.push(h("fieldset", { class: "sub" }, h("legend", {}, capital(plain(String(entry.name ?? entry.kind ?? kind.split(".").pop())))), ...rows));
+      if (rows.length)
+        sets.push(
+          h(
+            "fieldset",
+            { class: "sub" },
+            h("legend", {}, capital(plain(String(entry.name ?? entry.kind ?? kind.split(".").pop())))),
+            ...rows,
+          ),
+        );
     }
     if (!sets.length) return null;
     const group = this.details("play", "Play with", "", sets);
@@ -194,7 +225,12 @@ export class Panel {
   /** A collapsible section that remembers its state. */
   private details(path: string, title: string, kind: string, rows: HTMLElement[]): HTMLElement {
     const open = this.opened.has(path) || (!this.closed.has(path) && !["collider", "camera", "time"].includes(path.split(".")[0]));
-    const details = h("details", { open, class: "group" }, h("summary", {}, h("span", { class: "group-title" }, title), kind ? h("span", { class: "group-kind" }, kind) : null), ...rows);
+    const details = h(
+      "details",
+      { open, class: "group" },
+      h("summary", {}, h("span", { class: "group-title" }, title), kind ? h("span", { class: "group-kind" }, kind) : null),
+      ...rows,
+    );
     details.addEventListener("toggle", () => {
       (details.open ? this.opened : this.closed).add(path);
       (details.open ? this.closed : this.opened).delete(path);
@@ -222,8 +258,9 @@ export class Panel {
     const unit = schema["x-unit"] && schema["x-unit"] !== "1" ? String(schema["x-unit"]) : "";
     let kind = schema;
     if (schema.oneOf || schema.anyOf) {
-      const words: string[] = (schema.oneOf ?? schema.anyOf).flatMap((b: Schema) => ("const" in b ? [String(b.const)] : b.enum ?? []));
-      if (typeof value === "string" && words.includes(value)) return this.field(path, key, schema, "", (id) => this.select(id, path, value, schema));
+      const words: string[] = (schema.oneOf ?? schema.anyOf).flatMap((b: Schema) => ("const" in b ? [String(b.const)] : (b.enum ?? [])));
+      if (typeof value === "string" && words.includes(value))
+        return this.field(path, key, schema, "", (id) => this.select(id, path, value, schema));
       const found = branch(schema, value, this.schema);
       if (!found) return null;
       kind = { ...found, description: schema.description ?? found.description, "x-unit": schema["x-unit"] ?? found["x-unit"] };
@@ -231,16 +268,23 @@ export class Panel {
     const type = typeOf(kind);
     const units = unit || (kind["x-unit"] && kind["x-unit"] !== "1" ? String(kind["x-unit"]) : "");
     if (typeof value === "boolean") return this.field(path, key, kind, "", (id) => this.toggle(id, path, value));
-    if (typeof value === "number") return this.field(path, key, kind, units, (id) => this.number(id, path, value, kind, type === "integer"));
+    if (typeof value === "number")
+      return this.field(path, key, kind, units, (id) => this.number(id, path, value, kind, type === "integer"));
     if (typeof value === "string") {
-      if (Array.isArray(kind.enum)) return this.field(path, key, kind, "", (id) => this.select(id, path, value, { oneOf: kind.enum.map((c: string) => ({ const: c })) }));
+      if (Array.isArray(kind.enum))
+        return this.field(path, key, kind, "", (id) =>
+          this.select(id, path, value, { oneOf: kind.enum.map((c: string) => ({ const: c })) }),
+        );
       return this.field(path, key, kind, units, (id) => this.text(id, path, value));
     }
     if (Array.isArray(value)) {
-      if (value.length && value.length <= 4 && value.every((v) => typeof v === "number" || typeof v === "string")) return this.field(path, key, kind, units, (id) => this.vector(id, path, value));
+      if (value.length && value.length <= 4 && value.every((v) => typeof v === "number" || typeof v === "string"))
+        return this.field(path, key, kind, units, (id) => this.vector(id, path, value));
       if (value.length && value.every((v) => v && typeof v === "object" && !Array.isArray(v))) {
         const item = resolve(kind.items ?? {}, this.schema);
-        const groups = value.map((v, i) => this.group(`${path}.${i}`, v, item, explicit?.[i], v.name ?? v.kind ?? `${plain(key)} ${i + 1}`, "")).filter((g) => g !== null);
+        const groups = value
+          .map((v, i) => this.group(`${path}.${i}`, v, item, explicit?.[i], v.name ?? v.kind ?? `${plain(key)} ${i + 1}`, ""))
+          .filter((g) => g !== null);
         return groups.length ? h("div", { class: "nested" }, ...groups) : null;
       }
       return null;
@@ -255,7 +299,9 @@ export class Panel {
 
   private field(path: string, key: string, schema: Schema, unit: string, control: (id: string) => HTMLElement): HTMLElement {
     const id = `v${++count}`;
-    const doc = String(schema.description ?? "").replace(/\s+/g, " ").replace(/`/g, "");
+    const doc = String(schema.description ?? "")
+      .replace(/\s+/g, " ")
+      .replace(/`/g, "");
     const body = control(id);
     if (doc) body.querySelector(`#${id}`)!.setAttribute("aria-describedby", `${id}d`);
     return h(
@@ -286,12 +332,34 @@ export class Panel {
   private number(id: string, path: string, value: number, schema: Schema, whole: boolean): HTMLElement {
     const low = schema.minimum ?? schema.exclusiveMinimum;
     const high = schema.maximum ?? schema.exclusiveMaximum;
-    const input = h("input", { id, type: "number", value: String(value), step: "any", min: schema.minimum ?? false, max: schema.maximum ?? false, inputmode: whole ? "numeric" : "decimal" });
+    const input = h("input", {
+      id,
+      type: "number",
+      value: String(value),
+      step: "any",
+      min: schema.minimum ?? false,
+      max: schema.maximum ?? false,
+      inputmode: whole ? "numeric" : "decimal",
+    });
     // Short ranges are straight; long ones of positive numbers run by factors around the value.
     const straight = low !== undefined && high !== undefined && high - low <= 1000 && high / Math.max(Math.abs(value), 1e-9) < 1e3;
     const positive = !straight && value > 0;
-    const [from, to] = straight ? [low, high] : positive ? [Math.log10(value) - 1, Math.log10(value) + 1] : value === 0 ? [low === undefined ? -1 : 0, 1] : [-2 * Math.abs(value), 2 * Math.abs(value)];
-    const slider = h("input", { type: "range", min: from, max: to, step: (to - from) / 200, value: positive ? Math.log10(value) : value, tabindex: -1, "aria-hidden": "true" });
+    const [from, to] = straight
+      ? [low, high]
+      : positive
+        ? [Math.log10(value) - 1, Math.log10(value) + 1]
+        : value === 0
+          ? [low === undefined ? -1 : 0, 1]
+          : [-2 * Math.abs(value), 2 * Math.abs(value)];
+    const slider = h("input", {
+      type: "range",
+      min: from,
+      max: to,
+      step: (to - from) / 200,
+      value: positive ? Math.log10(value) : value,
+      tabindex: -1,
+      "aria-hidden": "true",
+    });
     let timer = 0;
     slider.addEventListener("input", () => {
       let v = positive ? 10 ** Number(slider.value) : Number(slider.value);
@@ -312,7 +380,9 @@ export class Panel {
   }
 
   private select(id: string, path: string, value: string, schema: Schema): HTMLElement {
-    const branches = ((schema.oneOf ?? schema.anyOf) as Schema[]).flatMap((b): [string, string][] => ("const" in b ? [[String(b.const), String(b.description ?? "")]] : (b.enum ?? []).map((e: string): [string, string] => [e, ""])));
+    const branches = ((schema.oneOf ?? schema.anyOf) as Schema[]).flatMap((b): [string, string][] =>
+      "const" in b ? [[String(b.const), String(b.description ?? "")]] : (b.enum ?? []).map((e: string): [string, string] => [e, ""]),
+    );
     const says = h("p", { class: "doc says" });
     const tell = (v: string) => (says.textContent = (branches.find((b) => b[0] === v)?.[1] ?? "").replace(/\s+/g, " "));
     const list = h(
@@ -350,7 +420,9 @@ export class Panel {
         value: typeof v === "number" ? String(Number(v.toPrecision(7))) : v,
         "aria-label": i ? `component ${i + 1}` : false,
         onchange: () => {
-          const next = inputs.map((el, k) => (el.value.trim() !== "" && Number.isFinite(Number(el.value)) ? Number(el.value) : words ? el.value : value[k]));
+          const next = inputs.map((el, k) =>
+            el.value.trim() !== "" && Number.isFinite(Number(el.value)) ? Number(el.value) : words ? el.value : value[k],
+          );
           void this.send(path, next as Value);
         },
       }),
@@ -381,4 +453,3 @@ function mark(tree: Tree, path: string[], value: Value): void {
     else at = at[key];
   }
 }
-

@@ -100,12 +100,25 @@ export class Plot {
         padding: [8, 8, 0, 0],
         scales: {
           x: { time: false },
-          y: { distr: log ? 3 : 1, range: log ? (_u, low, high) => (low > 0 && high > 0 ? [low / 1.2, Math.max(high * 1.2, low * 10)] : [0.1, 10]) : undefined },
+          y: {
+            distr: log ? 3 : 1,
+            range: log ? (_u, low, high) => (low > 0 && high > 0 ? [low / 1.2, Math.max(high * 1.2, low * 10)] : [0.1, 10]) : undefined,
+          },
         },
         axes: [axis(2), axis(3)],
         series: [
           { label: x ?? "" },
-          ...this.curves.map((c): uPlot.Series => ({ label: c.label, stroke: curveColor(c.color), width: c.width ?? 1.75, dash: c.dash, spanGaps: c.spans, points: { show: false }, value: (_u, v) => show(v) })),
+          ...this.curves.map(
+            (c): uPlot.Series => ({
+              label: c.label,
+              stroke: curveColor(c.color),
+              width: c.width ?? 1.75,
+              dash: c.dash,
+              spanGaps: c.spans,
+              points: { show: false },
+              value: (_u, v) => show(v),
+            }),
+          ),
         ],
         hooks: mark
           ? {
@@ -164,7 +177,9 @@ export function legend(curves: Curve[]): { element: HTMLElement; set: (values: s
   const element = h(
     "ul",
     { class: "curves" },
-    ...curves.map((c, i) => h("li", {}, h("i", { class: c.dash ? "dash" : false, style: `--curve:${curveStyle(c.color)}` }), h("span", {}, c.label), values[i])),
+    ...curves.map((c, i) =>
+      h("li", {}, h("i", { class: c.dash ? "dash" : false, style: `--curve:${curveStyle(c.color)}` }), h("span", {}, c.label), values[i]),
+    ),
   );
   return { element, set: (texts) => texts.forEach((t, i) => (values[i].textContent = t)) };
 }

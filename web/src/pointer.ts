@@ -31,7 +31,12 @@ export function pointers(canvas: HTMLCanvasElement, stage: Stage, session: Sessi
     event.stopPropagation();
     canvas.setPointerCapture(event.pointerId);
     stage.turning = false;
-    held.set(event.pointerId, { mass: near ?? undefined, last: stage.under(event, near?.point ?? gas?.through), time: performance.now(), busy: false });
+    held.set(event.pointerId, {
+      mass: near ?? undefined,
+      last: stage.under(event, near?.point ?? gas?.through),
+      time: performance.now(),
+      busy: false,
+    });
     void session.branch().catch(() => {});
     if (!session.playing) session.play();
   };
@@ -47,16 +52,25 @@ export function pointers(canvas: HTMLCanvasElement, stage: Stage, session: Sessi
       if (x) stage.spring(point.clone().set(x[3 * row], x[3 * row + 1], x[3 * row + 2]), at);
       if (own.busy) return;
       own.busy = true;
-      void session.grab(object, row, at.toArray() as Vector).catch(() => {}).finally(() => (own.busy = false));
+      void session
+        .grab(object, row, at.toArray() as Vector)
+        .catch(() => {})
+        .finally(() => (own.busy = false));
       return;
     }
     if (!gas || own.busy || !own.last) return;
     const seconds = Math.max((performance.now() - own.time) / 1000, 0.004);
-    const push = at.clone().sub(own.last).multiplyScalar(SHARE / seconds);
+    const push = at
+      .clone()
+      .sub(own.last)
+      .multiplyScalar(SHARE / seconds);
     own.last = at;
     own.time = performance.now();
     own.busy = true;
-    void session.stir(gas.name, at.toArray() as Vector, push.toArray() as Vector, stage.width * (size?.() ?? 1 / 30), dye?.()).catch(() => {}).finally(() => (own.busy = false));
+    void session
+      .stir(gas.name, at.toArray() as Vector, push.toArray() as Vector, stage.width * (size?.() ?? 1 / 30), dye?.())
+      .catch(() => {})
+      .finally(() => (own.busy = false));
   };
   const up = (event: PointerEvent) => {
     const own = held.get(event.pointerId);

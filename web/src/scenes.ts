@@ -1,8 +1,15 @@
 /** The scenes that ship with tumble, from the one place where they live, and the pages of theory. */
 import { root } from "./share";
 
-const texts = import.meta.glob("../../python/tumble/scenes/*/*.toml", { query: "?raw", import: "default" }) as Record<string, () => Promise<string>>;
-const assets = import.meta.glob("../../python/tumble/scenes/assets/*.{ply,obj,stl,glb}", { query: "?url", import: "default", eager: true }) as Record<string, string>;
+const texts = import.meta.glob("../../python/tumble/scenes/*/*.toml", { query: "?raw", import: "default" }) as Record<
+  string,
+  () => Promise<string>
+>;
+const assets = import.meta.glob("../../python/tumble/scenes/assets/*.{ply,obj,stl,glb}", {
+  query: "?url",
+  import: "default",
+  eager: true,
+}) as Record<string, string>;
 const pictures = import.meta.glob("../pictures/*.webp", { query: "?url", import: "default", eager: true }) as Record<string, string>;
 const pages = import.meta.glob("../../docs/theory/*.md", { query: "?raw", import: "default" }) as Record<string, () => Promise<string>>;
 
@@ -15,7 +22,12 @@ export interface Shipped {
   text: () => Promise<string>;
 }
 
-const idOf = (path: string) => path.split("/").slice(-2).join("/").replace(/\.toml$/, "");
+const idOf = (path: string) =>
+  path
+    .split("/")
+    .slice(-2)
+    .join("/")
+    .replace(/\.toml$/, "");
 
 /** Rows in the order in which a newcomer would look. */
 const ROWS = ["drape", "springs", "structures", "integrators", "contact", "particles", "gravity", "gas", "heat", "failures"];

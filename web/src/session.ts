@@ -1,8 +1,8 @@
 /** A world as the page sees it: plays, keeps frames, goes back, branches. It never waits for the screen, nor the screen for it. */
-import { back, gather, merged, turned, type Branch, type Change, type Start } from "./branch";
+import { type Branch, back, type Change, gather, merged, type Start, turned } from "./branch";
 import { Engine, EngineError } from "./engine/client";
-import { asked } from "./engine/worth";
 import type { Failure, Files, Frame, Ledger, SceneInfo, Stability, StepReport, Value, Vector } from "./engine/protocol";
+import { asked } from "./engine/worth";
 import { shipped, viewed } from "./scenes";
 import { literal, meshesOf, valueAt } from "./values";
 import { Way } from "./way";
@@ -457,7 +457,8 @@ export class Session {
       this.overrides.set(path, value);
       this.settle(parting, { frame: live ? at : 0, path, from, to: value });
       if (live) {
-        const shape = (i: SceneInfo | null) => JSON.stringify([i?.objects, i && Object.values(i.topology).map((t) => t.links?.data.length)]);
+        const shape = (i: SceneInfo | null) =>
+          JSON.stringify([i?.objects, i && Object.values(i.topology).map((t) => t.links?.data.length)]);
         const same = shape(this.info) === shape(info);
         this.info = info;
         this.tell(same ? "changed" : "loaded", info);
@@ -550,7 +551,8 @@ export class Session {
     const shown = this.shown?.index ?? 0;
     return this.queue(async () => {
       const frame = Math.min(shown, this.latest);
-      if (this.history.some((c) => !c.path && c.frame < frame)) return { frame: 0, hash: this.start.hash, changes: back(this.history, 0).filter((c) => c.path) };
+      if (this.history.some((c) => !c.path && c.frame < frame))
+        return { frame: 0, hash: this.start.hash, changes: back(this.history, 0).filter((c) => c.path) };
       const changes = this.history.filter((c) => c.path && c.frame <= frame);
       if (frame === this.latest) return { frame, changes, hash: await this.engine.hash(this.world) };
       const parting = await this.part(frame, false);
@@ -595,7 +597,9 @@ export class Session {
     this.age++;
     this.left = null;
     this.compare(null);
-    await this.queue(async () => this.restart(await this.engine.read({ columns: this.wanted() }, this.world))).catch((error) => this.fail(error));
+    await this.queue(async () => this.restart(await this.engine.read({ columns: this.wanted() }, this.world))).catch((error) =>
+      this.fail(error),
+    );
   }
 
   close(): void {

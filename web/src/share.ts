@@ -66,9 +66,18 @@ function checked(found: unknown): Shared {
   if (!table(found)) throw new Error("it does not contain a scene");
   const { tumble: version, text, overrides, scene, changes, frame: last, hash } = found;
   const whole =
-    typeof version === "string" && typeof text === "string" && typeof hash === "string" && frame(last) && table(scene) &&
-    Array.isArray(overrides) && overrides.every((o) => typeof o === "string") &&
-    Array.isArray(changes) && changes.length <= CHANGES && changes.every((c) => table(c) && frame(c.frame) && c.frame <= last && typeof c.path === "string" && c.value !== null && c.value !== undefined);
+    typeof version === "string" &&
+    typeof text === "string" &&
+    typeof hash === "string" &&
+    frame(last) &&
+    table(scene) &&
+    Array.isArray(overrides) &&
+    overrides.every((o) => typeof o === "string") &&
+    Array.isArray(changes) &&
+    changes.length <= CHANGES &&
+    changes.every(
+      (c) => table(c) && frame(c.frame) && c.frame <= last && typeof c.path === "string" && c.value !== null && c.value !== undefined,
+    );
   if (!whole) throw new Error("it does not contain a scene");
   return { version, text, overrides, scene, changes, frame: last, hash } as Shared;
 }
@@ -101,7 +110,10 @@ export async function fromFile(data: Uint8Array): Promise<{ shared: Shared; mesh
   const shared = checked(found);
   const { meshes } = found as { meshes?: unknown };
   if (!table(meshes) || !Object.values(meshes).every((text) => typeof text === "string")) throw new Error("it does not contain its meshes");
-  return { shared, meshes: Object.fromEntries(Object.entries(meshes as Record<string, string>).map(([path, text]) => [path, bytesOf(text)])) };
+  return {
+    shared,
+    meshes: Object.fromEntries(Object.entries(meshes as Record<string, string>).map(([path, text]) => [path, bytesOf(text)])),
+  };
 }
 
 function base64(bytes: Uint8Array): string {

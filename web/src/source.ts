@@ -4,8 +4,8 @@ import { EngineError } from "./engine/client";
 import type { Files, Value } from "./engine/protocol";
 import { sceneOf } from "./scenes";
 import { engine, resolved, type Session } from "./session";
-import { LONGEST, pack, toFile, unpack, type Shared } from "./share";
-import { alike, literal, valueOf, written } from "./values";
+import { LONGEST, pack, type Shared, toFile, unpack } from "./share";
+import { alike, literal, valueIn, written } from "./values";
 
 export interface Source {
   text: string;
@@ -20,10 +20,17 @@ export interface Source {
 
 const assigned = (text: string): [string, Value] => {
   const cut = text.indexOf("=");
-  return [text.slice(0, cut), valueOf(text.slice(cut + 1))];
+  return [text.slice(0, cut), valueIn(text.slice(cut + 1))];
 };
 
-const sharedSource = (shared: Shared, files: Files, name: string): Source => ({ text: shared.text, overrides: shared.overrides.map(assigned), files, shared, name, id: null });
+const sharedSource = (shared: Shared, files: Files, name: string): Source => ({
+  text: shared.text,
+  overrides: shared.overrides.map(assigned),
+  files,
+  shared,
+  name,
+  id: null,
+});
 
 /** From the address behind "#/scene/" or "#/". Throws where there is nothing. */
 export async function source(rest: string): Promise<Source> {
@@ -38,7 +45,9 @@ export async function source(rest: string): Promise<Source> {
     const own = opened[Number(file[1]) - 1];
     if (!own) throw new Error("This file was opened in an earlier session; open it again.");
     const name = own.name.replace(/\.\w+$/, "");
-    return own.shared ? sharedSource(own.shared, own.files, name) : { text: own.toml, overrides: [], files: own.files, shared: null, name, id: null };
+    return own.shared
+      ? sharedSource(own.shared, own.files, name)
+      : { text: own.toml, overrides: [], files: own.files, shared: null, name, id: null };
   }
   const known = sceneOf(rest);
   if (!known) throw new Error(`There is no scene "${rest}".`);

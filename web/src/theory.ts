@@ -1,7 +1,7 @@
 /** The theory beside each page: equations by their tags, where they are explained, and the files that implement them. */
 import sources from "virtual:sources";
-import type { SceneInfo } from "./engine/protocol";
 import { h } from "./dom";
+import type { SceneInfo } from "./engine/protocol";
 import { theoryText } from "./scenes";
 
 interface Topic {
@@ -11,8 +11,19 @@ interface Topic {
 
 /** Integrators, and the equations of docs/theory/integrators.md that they are. */
 export const SCHEMES: Record<string, string> = {
-  forward_euler: "1", symplectic_euler: "2", modified_euler: "3", midpoint: "5", heun: "5", rk4: "5", verlet: "6", velocity_verlet: "7",
-  adaptive_euler: "8", dormand_prince: "9", implicit_euler: "10", implicit_midpoint: "11", bdf2: "12",
+  forward_euler: "1",
+  symplectic_euler: "2",
+  modified_euler: "3",
+  midpoint: "5",
+  heun: "5",
+  rk4: "5",
+  verlet: "6",
+  velocity_verlet: "7",
+  adaptive_euler: "8",
+  dormand_prince: "9",
+  implicit_euler: "10",
+  implicit_midpoint: "11",
+  bdf2: "12",
 };
 
 const FORCES: Record<string, Topic> = {
@@ -44,10 +55,16 @@ export function topics(info: SceneInfo): Topic[] {
   if (has("heat")) found.push({ page: "heat", tags: ["heat.1"] });
   if (has("compressible")) found.push({ page: "compressible", tags: ["compressible.1"] });
   if (info.systems.some((s) => s.method === "vicsek")) found.push({ page: "flocks", tags: ["flocks.1"] });
-  for (const force of [...(scene.force ?? []), ...(scene.field ?? [])]) if (FORCES[force.kind] && force.kind !== "drag") found.push(FORCES[force.kind]);
+  for (const force of [...(scene.force ?? []), ...(scene.field ?? [])])
+    if (FORCES[force.kind] && force.kind !== "drag") found.push(FORCES[force.kind]);
   if ((scene.rope ?? []).some((r: any) => r.rod)) found.push({ page: "rods", tags: ["rods.1"] });
   if ((scene.block ?? []).some((b: any) => b.material)) found.push({ page: "solids", tags: ["solids.1", "solids.4"] });
-  if (["sheet", "block", "net"].some(has) || (scene.rope ?? []).some((r: any) => !r.rod) || (scene.particles ?? []).some((p: any) => p.spring?.length)) found.push({ page: "springs", tags: ["springs.1", "springs.2"] });
+  if (
+    ["sheet", "block", "net"].some(has) ||
+    (scene.rope ?? []).some((r: any) => !r.rod) ||
+    (scene.particles ?? []).some((p: any) => p.spring?.length)
+  )
+    found.push({ page: "springs", tags: ["springs.1", "springs.2"] });
   if (has("collider") && !has("gas")) found.push({ page: "contact", tags: ["contact.1"] });
   // Almost every scene has some drag; none is about it.
   if ((scene.force ?? []).some((f: any) => f.kind === "drag")) found.push(FORCES.drag);
@@ -71,7 +88,11 @@ export function equation(text: string, tag: string): string | null {
     if (end < 0) continue;
     let start = end;
     while (start > 0 && lines[start - 1].trim() && !/\([a-z]+\.\d+\)\s*$/.test(lines[start - 1])) start--;
-    return lines.slice(start, end + 1).map((l) => l.replace(/\s+(\([a-z]+\.\d+\))\s*$/, "    $1")).join("\n").trim();
+    return lines
+      .slice(start, end + 1)
+      .map((l) => l.replace(/\s+(\([a-z]+\.\d+\))\s*$/, "    $1"))
+      .join("\n")
+      .trim();
   }
   return null;
 }
@@ -85,7 +106,12 @@ export async function cards(list: Topic[]): Promise<HTMLElement[]> {
     list.map(async ({ page, tags }) => {
       const text = await theoryText(page);
       if (!text) return null;
-      const known = tags.length ? tags : [...text.matchAll(/\(([a-z]+\.\d+)\)\s*$/gm)].map((m) => m[1]).filter((t) => t.startsWith(`${page}.`)).slice(0, 2);
+      const known = tags.length
+        ? tags
+        : [...text.matchAll(/\(([a-z]+\.\d+)\)\s*$/gm)]
+            .map((m) => m[1])
+            .filter((t) => t.startsWith(`${page}.`))
+            .slice(0, 2);
       const parts = known.map((tag) => equation(text, tag)).filter((e) => e !== null);
       const files = [...new Set(known.flatMap((tag) => sources[tag] ?? []))].slice(0, 4);
       return h(

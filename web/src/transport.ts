@@ -4,7 +4,16 @@ import type { Session } from "./session";
 
 export function transport(session: Session): HTMLElement {
   const play = iconButton("play", "Play", () => session.toggle(), { class: "icon-button primary" });
-  const slider = h("input", { type: "range", min: 0, max: 1, step: 1, value: 0, "aria-label": "Frame", class: "scrub", oninput: () => session.scrub(Number(slider.value)) });
+  const slider = h("input", {
+    type: "range",
+    min: 0,
+    max: 1,
+    step: 1,
+    value: 0,
+    "aria-label": "Frame",
+    class: "scrub",
+    oninput: () => session.scrub(Number(slider.value)),
+  });
   const clock = h("output", { class: "clock", "aria-label": "Frame and time", "aria-live": "off" });
   const cost = h("span", { class: "cost" });
   const update = () => {
@@ -37,7 +46,19 @@ export function transport(session: Session): HTMLElement {
     iconButton("reset", "Back to the start", () => void session.reset()),
     slider,
     clock,
-    choice("Speed", [["0.1", "0.1 ×"], ["0.25", "0.25 ×"], ["0.5", "0.5 ×"], ["1", "1 ×"], ["2", "2 ×"], ["4", "4 ×"]], "1", (v) => (session.speed = Number(v))),
+    choice(
+      "Speed",
+      [
+        ["0.1", "0.1 ×"],
+        ["0.25", "0.25 ×"],
+        ["0.5", "0.5 ×"],
+        ["1", "1 ×"],
+        ["2", "2 ×"],
+        ["4", "4 ×"],
+      ],
+      "1",
+      (v) => (session.speed = Number(v)),
+    ),
     cost,
   );
 }
@@ -46,7 +67,13 @@ export function transport(session: Session): HTMLElement {
 export function keys(session: Session, stage?: { nudge(dx: number, dy: number, zoom: number): void; goHome(): void }): () => void {
   const act = (event: KeyboardEvent) => {
     const target = event.target as HTMLElement;
-    if (event.ctrlKey || event.metaKey || event.altKey || target.closest("input:not([type=checkbox]), select, textarea, [contenteditable], [role=tab], button, a, summary")) return;
+    if (
+      event.ctrlKey ||
+      event.metaKey ||
+      event.altKey ||
+      target.closest("input:not([type=checkbox]), select, textarea, [contenteditable], [role=tab], button, a, summary")
+    )
+      return;
     const steps: Record<string, () => void> = {
       " ": () => session.toggle(),
       ".": () => void session.next(),

@@ -6,12 +6,16 @@ import type { Value } from "./engine/protocol";
 export function literal(value: Value): string {
   if (typeof value === "string") return JSON.stringify(value);
   if (Array.isArray(value)) return `[${value.map(literal).join(", ")}]`;
-  if (typeof value === "object") return `{ ${Object.entries(value).filter(([, v]) => v !== null).map(([k, v]) => `${/^[\w-]+$/.test(k) ? k : JSON.stringify(k)} = ${literal(v)}`).join(", ")} }`;
+  if (typeof value === "object")
+    return `{ ${Object.entries(value)
+      .filter(([, v]) => v !== null)
+      .map(([k, v]) => `${/^[\w-]+$/.test(k) ? k : JSON.stringify(k)} = ${literal(v)}`)
+      .join(", ")} }`;
   return String(value);
 }
 
 /** The right side of an "=": TOML, or a bare word. */
-export function valueOf(text: string): Value {
+export function valueIn(text: string): Value {
   try {
     return parse(`x = ${text}`).x as Value;
   } catch {
@@ -23,7 +27,8 @@ export function valueOf(text: string): Value {
 export function valueAt(scene: unknown, path: string): Value | null {
   let at: unknown = scene;
   for (const key of path.split(".")) {
-    if (Array.isArray(at)) at = /^\d+$/.test(key) ? at[Number(key)] : at.find((entry) => (entry as { name?: unknown } | null)?.name === key);
+    if (Array.isArray(at))
+      at = /^\d+$/.test(key) ? at[Number(key)] : at.find((entry) => (entry as { name?: unknown } | null)?.name === key);
     else if (at && typeof at === "object" && Object.hasOwn(at, key)) at = (at as Record<string, unknown>)[key];
     else return null;
   }
@@ -50,6 +55,14 @@ export function alike(a: unknown, b: unknown): boolean {
 /** A resolved scene as text. TOML has no word for nothing: what is not set is left out. */
 export function written(scene: Record<string, unknown>): string {
   const whole = (node: unknown): unknown =>
-    Array.isArray(node) ? node.map(whole) : node && typeof node === "object" ? Object.fromEntries(Object.entries(node).filter(([, v]) => v !== null).map(([k, v]) => [k, whole(v)])) : node;
+    Array.isArray(node)
+      ? node.map(whole)
+      : node && typeof node === "object"
+        ? Object.fromEntries(
+            Object.entries(node)
+              .filter(([, v]) => v !== null)
+              .map(([k, v]) => [k, whole(v)]),
+          )
+        : node;
   return stringify(whole(scene) as Record<string, unknown>);
 }

@@ -64,7 +64,10 @@ export class Viewer {
     const { alert } = this;
     alert.hidden = false;
     alert.dataset.kind = failure.kind;
-    alert.replaceChildren(h("strong", {}, failure.kind === "scene" && !this.session.info ? "The scene has an error." : HEADS[failure.kind]), h("pre", {}, failure.message.split("\n").slice(0, 12).join("\n")));
+    alert.replaceChildren(
+      h("strong", {}, failure.kind === "scene" && !this.session.info ? "The scene has an error." : HEADS[failure.kind]),
+      h("pre", {}, failure.message.split("\n").slice(0, 12).join("\n")),
+    );
     const remedy = this.remedy(failure);
     if (remedy) alert.append(remedy);
   }
@@ -88,7 +91,8 @@ export class Viewer {
     this.far ??= h("span", {});
     this.far.textContent = text;
     // One button for all of the way: it must not go away under the finger.
-    if (!this.far.isConnected) this.wait.replaceChildren(this.far, h("button", { type: "button", class: "button", onclick: stop }, "Stop here"));
+    if (!this.far.isConnected)
+      this.wait.replaceChildren(this.far, h("button", { type: "button", class: "button", onclick: stop }, "Stop here"));
   }
 
   /** The same with the first scene: after it the page is ready. */

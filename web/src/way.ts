@@ -1,7 +1,8 @@
 /** A way that time went: the frames that are kept of it, within a bound of memory, and the books of all. */
 import type { Frame, Ledger } from "./engine/protocol";
 
-const sizeOf = (frame: Frame): number => Object.values(frame.columns).reduce((s, o) => s + Object.values(o).reduce((t, c) => t + c.data.byteLength, 0), 0);
+const sizeOf = (frame: Frame): number =>
+  Object.values(frame.columns).reduce((s, o) => s + Object.values(o).reduce((t, c) => t + c.data.byteLength, 0), 0);
 
 export class Way {
   ledgers: Ledger[] = [];

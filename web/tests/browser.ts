@@ -1,11 +1,13 @@
 /** Debian's Chromium and the built folder, for tests and pictures. */
 import { existsSync, readdirSync, readFileSync } from "node:fs";
 import { createRequire } from "node:module";
-import { chromium, type Browser, type BrowserContextOptions, type Page } from "playwright-core";
-import { preview, type PreviewServer } from "vite";
+import { type Browser, type BrowserContextOptions, chromium, type Page } from "playwright-core";
+import { type PreviewServer, preview } from "vite";
 
 /** The browser, if there is one. */
-export const CHROMIUM = [process.env.CHROMIUM, "/usr/bin/chromium", "/usr/bin/chromium-browser", "/usr/bin/google-chrome"].find((p) => p && existsSync(p));
+export const CHROMIUM = [process.env.CHROMIUM, "/usr/bin/chromium", "/usr/bin/chromium-browser", "/usr/bin/google-chrome"].find(
+  (p) => p && existsSync(p),
+);
 
 export interface Lab {
   address: string;
@@ -21,7 +23,11 @@ export async function lab(): Promise<Lab> {
   if (!existsSync(`${outDir}/index.html`)) throw new Error("nothing is built: make web");
   const server: PreviewServer = await preview({ build: { outDir }, preview: { port: 0, host: "127.0.0.1" }, logLevel: "error" });
   const address = server.resolvedUrls!.local[0];
-  const browser = await chromium.launch({ executablePath: CHROMIUM, headless: true, args: ["--no-sandbox", "--use-gl=angle", "--use-angle=swiftshader", "--enable-unsafe-swiftshader"] });
+  const browser = await chromium.launch({
+    executablePath: CHROMIUM,
+    headless: true,
+    args: ["--no-sandbox", "--use-gl=angle", "--use-angle=swiftshader", "--enable-unsafe-swiftshader"],
+  });
   return {
     address,
     browser,
@@ -51,7 +57,11 @@ export const SCENES = "../python/tumble/scenes";
 export const shipped = (): string[] =>
   readdirSync(SCENES, { withFileTypes: true })
     .filter((row) => row.isDirectory() && row.name !== "assets")
-    .flatMap((row) => readdirSync(`${SCENES}/${row.name}`).filter((f) => f.endsWith(".toml")).map((f) => `${row.name}/${f.slice(0, -5)}`))
+    .flatMap((row) =>
+      readdirSync(`${SCENES}/${row.name}`)
+        .filter((f) => f.endsWith(".toml"))
+        .map((f) => `${row.name}/${f.slice(0, -5)}`),
+    )
     .sort();
 
 /** Options of pages that play nothing by themselves. */
@@ -66,7 +76,13 @@ export async function serious(page: Page): Promise<string[]> {
   return page.evaluate(async () => {
     const { violations } = await (window as any).axe.run(document, { resultTypes: ["violations"] });
     const bad = violations.filter((v: any) => ["serious", "critical"].includes(v.impact));
-    return bad.map((v: any) => `${v.id}: ${v.nodes.slice(0, 3).map((n: any) => `${n.target.join(" ")} ${n.any[0]?.message ?? ""}`).join("; ")}`);
+    return bad.map(
+      (v: any) =>
+        `${v.id}: ${v.nodes
+          .slice(0, 3)
+          .map((n: any) => `${n.target.join(" ")} ${n.any[0]?.message ?? ""}`)
+          .join("; ")}`,
+    );
   });
 }
 

@@ -64,7 +64,12 @@ test("after a crash every world is made again, with its changed values", async (
   assert.ok(started[0].ended && !started[1].ended);
   assert.deepEqual(
     started[1].heard.map((r) => [r.type, r.world, r.type === "load" ? r.toml : r.type === "set" ? r.value : null]),
-    [["load", 0, "a"], ["set", 0, [0, 0, -2]], ["load", 1, "b"], ["step", 0, null]],
+    [
+      ["load", 0, "a"],
+      ["set", 0, [0, 0, -2]],
+      ["load", 1, "b"],
+      ["step", 0, null],
+    ],
   );
   assert.deepEqual(restarts, ["the engine stopped: index out of bounds"]);
   engine.close();
@@ -76,7 +81,10 @@ test("a scene that kills the engine leaves the one before it", async () => {
   act = (request) => (request.type === "load" && request.toml === "bad" ? crash : fine(request));
   await failed(engine.load("bad"), "crash");
   await engine.step();
-  assert.deepEqual(started[1].heard.map((r) => (r.type === "load" ? r.toml : r.type)), ["good", "step"]);
+  assert.deepEqual(
+    started[1].heard.map((r) => (r.type === "load" ? r.toml : r.type)),
+    ["good", "step"],
+  );
   // One that dies again while it is made again is let go.
   act = (request) => (request.type === "load" || request.type === "step" ? crash : fine(request));
   await failed(engine.step(), "crash");

@@ -2,7 +2,7 @@
 import assert from "node:assert/strict";
 import { after, before, describe, it } from "node:test";
 import type { Page } from "playwright-core";
-import { lab, ready, serious, STILL, type Lab } from "./browser.ts";
+import { type Lab, lab, ready, STILL, serious } from "./browser.ts";
 
 let own: Lab;
 before(async () => {
@@ -17,19 +17,23 @@ const open = async (id: string) => {
 };
 
 /** How far the two ways are apart, frame by frame. */
-const apart = (page: Page, last: number) => page.evaluate((end) => Array.from({ length: end + 1 }, (_, i) => (window as any).tumble.comparison.at(i) as number | null), last);
+const apart = (page: Page, last: number) =>
+  page.evaluate((end) => Array.from({ length: end + 1 }, (_, i) => (window as any).tumble.comparison.at(i) as number | null), last);
 
 /** To frame 10, back to frame 4, another value, to frame 10 again. Answers with the hash of the first way. */
 const branch = (page: Page, path: string, value: number) =>
-  page.evaluate(async ([where, what]) => {
-    const { session } = (window as any).tumble;
-    await session.goto(10);
-    const hash = await session.hash();
-    session.scrub(4);
-    await session.set(where, what);
-    await session.goto(10);
-    return hash as string;
-  }, [path, value] as const);
+  page.evaluate(
+    async ([where, what]) => {
+      const { session } = (window as any).tumble;
+      await session.goto(10);
+      const hash = await session.hash();
+      session.scrub(4);
+      await session.set(where, what);
+      await session.goto(10);
+      return hash as string;
+    },
+    [path, value] as const,
+  );
 
 describe("branches", () => {
   it("of the same value are one", async () => {
@@ -101,7 +105,10 @@ describe("branches", () => {
     await page.waitForSelector(".catch-up", { state: "detached" });
     const lengths = (await apart(page, 8)) as number[];
     assert.equal(lengths[3], 0);
-    assert.ok(lengths.slice(4).every((l, i) => l > lengths[3 + i]), `${lengths}`);
+    assert.ok(
+      lengths.slice(4).every((l, i) => l > lengths[3 + i]),
+      `${lengths}`,
+    );
     assert.equal(await page.evaluate(() => (window as any).tumble.session.hash()), now);
     assert.match((await page.textContent(".before .changes"))!, /rate: 1 → 5, from frame 3$/);
     // The old one is what it would have been.
@@ -123,7 +130,10 @@ describe("branches", () => {
       await session.goto(6);
       const hash = await session.hash();
       session.scrub(2);
-      const message = await session.set("force.0.rate", "nonsense").then(() => "taken", (e: Error) => e.message);
+      const message = await session.set("force.0.rate", "nonsense").then(
+        () => "taken",
+        (e: Error) => e.message,
+      );
       return { message, before: session.before, latest: session.latest, same: hash === (await session.hash()) };
     });
     assert.notEqual(seen.message, "taken");
@@ -138,7 +148,10 @@ describe("branches", () => {
     const values = (await apart(page, 10)) as number[];
     assert.deepEqual(values.slice(0, 5), Array(5).fill(0));
     // Viscosity acts on the velocity now, on the density a step later.
-    assert.ok(values.slice(6).every((v, i) => v > values[5 + i]), `${values}`);
+    assert.ok(
+      values.slice(6).every((v, i) => v > values[5 + i]),
+      `${values}`,
+    );
     assert.match((await page.textContent(".apart"))!, /kg\/m³.*density/);
     const hash = await page.evaluate(() => (window as any).tumble.session.hash());
     await page.locator("label:has-text('Branch shown') select").selectOption("difference");
@@ -146,10 +159,13 @@ describe("branches", () => {
     assert.equal(legend.name, "difference");
     assert.ok(legend.high > 0 && legend.low === -legend.high, JSON.stringify(legend));
     await page.locator("label:has-text('Branch shown') select").selectOption("before");
-    assert.equal(await page.evaluate(() => {
-      const { session, stage } = (window as any).tumble;
-      return stage.frame === session.before.way.frame(10);
-    }), true);
+    assert.equal(
+      await page.evaluate(() => {
+        const { session, stage } = (window as any).tumble;
+        return stage.frame === session.before.way.frame(10);
+      }),
+      true,
+    );
     assert.equal(await page.evaluate(() => (window as any).tumble.session.hash()), hash);
     assert.deepEqual(errors, []);
     await page.context().close();

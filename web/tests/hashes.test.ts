@@ -11,9 +11,21 @@ const PYTHON = resolve(ROOT, ".venv/bin/python");
 const FRAMES = 100;
 /** Every method, explicit, implicit and adaptive steps, contact, both precisions; cheap ones. */
 const NAMES = [
-  "springs/stiffening", "springs/rusty", "structures/rope", "structures/rod", "integrators/kepler", "integrators/spiral", "contact/bounce",
-  "contact/moving", "particles/fountain", "particles/vicsek", "particles/charged", "particles/lennard-jones", "heat/finned_plate",
-  "gas/cavity", "gas/bad_solver",
+  "springs/stiffening",
+  "springs/rusty",
+  "structures/rope",
+  "structures/rod",
+  "integrators/kepler",
+  "integrators/spiral",
+  "contact/bounce",
+  "contact/moving",
+  "particles/fountain",
+  "particles/vicsek",
+  "particles/charged",
+  "particles/lennard-jones",
+  "heat/finned_plate",
+  "gas/cavity",
+  "gas/bad_solver",
 ];
 
 const NATIVE = `
@@ -30,7 +42,12 @@ for name in sys.argv[2:]:
 
 test("states in a tab have the native engine's bits", { skip: !existsSync(PYTHON) && "no native engine here: make setup" }, async () => {
   const native = execFileSync(PYTHON, ["-c", NATIVE, String(FRAMES), ...NAMES], { encoding: "utf8", cwd: ROOT });
-  const lines = new Map(native.trim().split("\n").map((line) => [line.split(" ")[0], line.split(" ").slice(1)]));
+  const lines = new Map(
+    native
+      .trim()
+      .split("\n")
+      .map((line) => [line.split(" ")[0], line.split(" ").slice(1)]),
+  );
   const own = await lab();
   try {
     const { page, errors } = await own.open("scene/springs/forever", STILL);

@@ -1,10 +1,10 @@
 /** The laboratory in a real browser. Needs `dist` (make web) and Chromium. */
 import assert from "node:assert/strict";
 import { readFileSync } from "node:fs";
-import { gzipSync } from "node:zlib";
 import { after, before, describe, it } from "node:test";
+import { gzipSync } from "node:zlib";
 import type { Page } from "playwright-core";
-import { frame, lab, ready, SCENES, serious, shipped, STILL, type Lab } from "./browser.ts";
+import { frame, type Lab, lab, ready, SCENES, STILL, serious, shipped } from "./browser.ts";
 
 const ids = shipped();
 
@@ -25,10 +25,15 @@ const visit = async (page: Page, path: string) => {
 
 describe("theory", () => {
   it("is cited by tags that stand in docs", () => {
-    const cited = ["src/theory.ts", "src/pages/fluid.ts", "src/pages/integrators.ts"].flatMap((f) => [...readFileSync(f, "utf8").matchAll(/"([a-z]+)\.(\d+)"/g)].map((m) => [m[1], m[2]]));
+    const cited = ["src/theory.ts", "src/pages/fluid.ts", "src/pages/integrators.ts"].flatMap((f) =>
+      [...readFileSync(f, "utf8").matchAll(/"([a-z]+)\.(\d+)"/g)].map((m) => [m[1], m[2]]),
+    );
     const text = (page: string) => readFileSync(`../docs/theory/${page}.md`, "utf8");
     assert.ok(cited.length > 30);
-    assert.deepEqual(cited.filter(([page, k]) => !text(page).includes(`(${page}.${k})`)), []);
+    assert.deepEqual(
+      cited.filter(([page, k]) => !text(page).includes(`(${page}.${k})`)),
+      [],
+    );
   });
 });
 
@@ -36,9 +41,18 @@ describe("gallery", () => {
   it("shows every scene that ships, with a picture", async () => {
     const { page, errors } = await own.open("");
     await page.waitForSelector(".tile");
-    const tiles = await page.$$eval(".tile", (all) => all.map((t) => ({ id: t.querySelector(".tile-id")!.textContent, title: t.querySelector(".tile-title")!.textContent, picture: !!t.querySelector("img") })));
+    const tiles = await page.$$eval(".tile", (all) =>
+      all.map((t) => ({
+        id: t.querySelector(".tile-id")!.textContent,
+        title: t.querySelector(".tile-title")!.textContent,
+        picture: !!t.querySelector("img"),
+      })),
+    );
     assert.deepEqual(tiles.map((t) => t.id).sort(), ids);
-    assert.deepEqual(tiles.filter((t) => !t.picture || !t.title).map((t) => t.id), []);
+    assert.deepEqual(
+      tiles.filter((t) => !t.picture || !t.title).map((t) => t.id),
+      [],
+    );
     await page.fill("input[type=search]", "bunny");
     const found = await page.$$eval(".tile-id", (all) => all.map((t) => t.textContent));
     assert.ok(found.length > 0 && found.length < ids.length && found.includes("drape/sheet-on-bunny"), `found ${found}`);
@@ -54,7 +68,13 @@ describe("gallery", () => {
       const page = await context.newPage();
       const sizes: Promise<number>[] = [];
       context.on("response", (r) => {
-        if (r.ok()) sizes.push(r.body().then((b) => gzipSync(b).length, () => 0));
+        if (r.ok())
+          sizes.push(
+            r.body().then(
+              (b) => gzipSync(b).length,
+              () => 0,
+            ),
+          );
       });
       const start = Date.now();
       await page.goto(`${own.address}#/scene/drape/clamped-sheet`);
@@ -81,7 +101,7 @@ describe("pages", () => {
       const { load, play } = prototype;
       (window as any).playing = [];
       prototype.load = function (...words: unknown[]) {
-        return load.apply(this, words).then((info: unknown) => ((window as any).loaded = (window as any).loaded + 1 || 1, info));
+        return load.apply(this, words).then((info: unknown) => (((window as any).loaded = (window as any).loaded + 1 || 1), info));
       };
       prototype.play = function () {
         play.call(this);
@@ -98,7 +118,11 @@ describe("pages", () => {
     });
     await page.waitForSelector(".contents");
     await page.waitForFunction(() => (window as any).loaded && (window as any).playing.length);
-    const left = await page.evaluate(() => ({ playing: (window as any).playing.some((s: any) => s.playing), ready: document.getElementById("main")!.dataset.ready, heads: [...document.querySelectorAll("h1")].map((e) => e.textContent) }));
+    const left = await page.evaluate(() => ({
+      playing: (window as any).playing.some((s: any) => s.playing),
+      ready: document.getElementById("main")!.dataset.ready,
+      heads: [...document.querySelectorAll("h1")].map((e) => e.textContent),
+    }));
     assert.deepEqual(left, { playing: false, ready: undefined, heads: ["Theory"] });
     await page.focus(".skip");
     await page.keyboard.press("Enter");
@@ -134,16 +158,24 @@ describe("scenes", () => {
         const { data } = context.getImageData(0, 0, 160, 90);
         // Pixels that are not the background, whose colours run from top to bottom alone.
         let drawn = 0;
-        for (let y = 0; y < 90; y++) for (let x = 1; x < 160; x++) {
-          const [p, q] = [4 * (160 * y + x), 4 * 160 * y];
-          if (Math.abs(data[p] - data[q]) + Math.abs(data[p + 1] - data[q + 1]) + Math.abs(data[p + 2] - data[q + 2]) > 8) drawn++;
-        }
-        return { moved: before !== after, index: session.shown.index, drawn, finite: Number.isFinite(session.ledgers[end]?.energy), alert: document.querySelector<HTMLElement>(".alert:not([hidden])")?.dataset.kind };
+        for (let y = 0; y < 90; y++)
+          for (let x = 1; x < 160; x++) {
+            const [p, q] = [4 * (160 * y + x), 4 * 160 * y];
+            if (Math.abs(data[p] - data[q]) + Math.abs(data[p + 1] - data[q + 1]) + Math.abs(data[p + 2] - data[q + 2]) > 8) drawn++;
+          }
+        return {
+          moved: before !== after,
+          index: session.shown.index,
+          drawn,
+          finite: Number.isFinite(session.ledgers[end]?.energy),
+          alert: document.querySelector<HTMLElement>(".alert:not([hidden])")?.dataset.kind,
+        };
       }, LATER[id] ?? 1);
       if (FAILING.includes(id)) {
         if (seen.alert !== "step") failures.push(`${id}: does not say that it failed`);
       } else if ("error" in seen) failures.push(`${id}: ${seen.error}`);
-      else if (!seen.moved || seen.index !== (LATER[id] ?? 1) || seen.alert || !seen.finite || seen.drawn < 3) failures.push(`${id}: ${JSON.stringify(seen)}`);
+      else if (!seen.moved || seen.index !== (LATER[id] ?? 1) || seen.alert || !seen.finite || seen.drawn < 3)
+        failures.push(`${id}: ${JSON.stringify(seen)}`);
       if (process.env.VERBOSE) console.log(`# ${id} ${Date.now() - start} ms ${JSON.stringify(seen)}`);
     }
     assert.deepEqual(failures, []);
@@ -181,7 +213,10 @@ describe("scenes", () => {
     await page.keyboard.press(";");
     await page.waitForFunction(() => (window as any).tumble.session.shown.inside);
     await page.click("[aria-label='One frame back']");
-    assert.deepEqual(await page.evaluate(() => [(window as any).tumble.session.shown.index, !!(window as any).tumble.session.shown.inside]), [3, false]);
+    assert.deepEqual(
+      await page.evaluate(() => [(window as any).tumble.session.shown.index, !!(window as any).tumble.session.shown.inside]),
+      [3, false],
+    );
     assert.deepEqual(errors, []);
     await page.context().close();
   });
@@ -244,7 +279,11 @@ describe("scenes", () => {
     const at = await page.evaluate(() => {
       const { stage, session } = (window as any).tumble;
       const x = session.shown.columns.spring.position.data;
-      const p = stage.under({ clientX: 0, clientY: 0 }).clone().set(x[3], x[4], x[5]).project((stage as any).camera);
+      const p = stage
+        .under({ clientX: 0, clientY: 0 })
+        .clone()
+        .set(x[3], x[4], x[5])
+        .project((stage as any).camera);
       const box = document.querySelector(".stage canvas")!.getBoundingClientRect();
       return { x: box.left + (0.5 + 0.5 * p.x) * box.width, y: box.top + (0.5 - 0.5 * p.y) * box.height };
     });
@@ -317,9 +356,24 @@ describe("text and values", () => {
       const text: string = session.toml;
       await session.load(text.replace(/title = .*/, 'title = "<img src=x onerror=window.hit=1><b>x</b>"'));
       const title = document.querySelector("h1")!;
-      const huge = await session.load('version = 1\n[[block]]\nname = "b"\nsize = [1, 1, 1]\nresolution = [5000, 5000, 5000]\nlinks = { structural = 1 }\n').then(() => "loaded", (e: any) => e.failure.message);
-      const deep = await session.load(`version = 1\nx = ${"[".repeat(20000)}`).then(() => "loaded", (e: any) => e.failure.message);
-      return { text: title.textContent, children: title.childElementCount, hit: (window as any).hit, huge, deep, alive: await session.hash() };
+      const huge = await session
+        .load('version = 1\n[[block]]\nname = "b"\nsize = [1, 1, 1]\nresolution = [5000, 5000, 5000]\nlinks = { structural = 1 }\n')
+        .then(
+          () => "loaded",
+          (e: any) => e.failure.message,
+        );
+      const deep = await session.load(`version = 1\nx = ${"[".repeat(20000)}`).then(
+        () => "loaded",
+        (e: any) => e.failure.message,
+      );
+      return {
+        text: title.textContent,
+        children: title.childElementCount,
+        hit: (window as any).hit,
+        huge,
+        deep,
+        alive: await session.hash(),
+      };
     });
     assert.equal(result.text, "<img src=x onerror=window.hit=1><b>x</b>");
     assert.equal(result.children, 0);
@@ -337,7 +391,11 @@ describe("files", () => {
     const { page, errors } = await own.open("", STILL);
     await page.setInputFiles("#file", { name: "notes.txt", mimeType: "text/plain", buffer: Buffer.from("x") });
     await page.waitForFunction(() => /neither a scene/.test(document.getElementById("say")?.textContent ?? ""));
-    await page.setInputFiles("#file", { name: "one.json", mimeType: "application/json", buffer: Buffer.from(JSON.stringify({ version: 1, title: "one mass", particles: [{ name: "p", position: [[0, 0, 1]] }] })) });
+    await page.setInputFiles("#file", {
+      name: "one.json",
+      mimeType: "application/json",
+      buffer: Buffer.from(JSON.stringify({ version: 1, title: "one mass", particles: [{ name: "p", position: [[0, 0, 1]] }] })),
+    });
     await ready(page);
     assert.equal(await page.evaluate(() => (window as any).tumble.session.info.title), "one mass");
     await page.evaluate(() => {
@@ -349,23 +407,30 @@ describe("files", () => {
     await ready(page);
     const info = await page.evaluate(() => (window as any).tumble.session.info);
     assert.match(info.title, /falls on bunny\.ply/);
-    assert.deepEqual(info.objects.map((o: any) => o.kind), ["sheet", "collider", "collider"]);
+    assert.deepEqual(
+      info.objects.map((o: any) => o.kind),
+      ["sheet", "collider", "collider"],
+    );
     assert.deepEqual(errors, []);
     await page.context().close();
   });
 
   it("that a scene misses are dropped on its page, which then goes on", async () => {
     const { page, errors } = await own.open("", STILL);
-    const text = 'version = 1\ntitle = "waits"\n[[particles]]\nname = "p"\nposition = [[0, 0, 1]]\n[[collider]]\nname = "b"\nshape.mesh.path = "meshes/one.ply"\n';
+    const text =
+      'version = 1\ntitle = "waits"\n[[particles]]\nname = "p"\nposition = [[0, 0, 1]]\n[[collider]]\nname = "b"\nshape.mesh.path = "meshes/one.ply"\n';
     await page.setInputFiles("#file", { name: "waits.toml", mimeType: "application/toml", buffer: Buffer.from(text) });
     await page.waitForFunction(() => document.getElementById("main")!.dataset.ready === "failed");
     assert.match((await page.textContent(".alert")) ?? "", /no file "meshes\/one\.ply"; drop it on the page/);
     const drop = (name: string) =>
-      page.evaluate(([bytes, as]) => {
-        const dataTransfer = new DataTransfer();
-        dataTransfer.items.add(new File([new Uint8Array(bytes as number[])], as as string));
-        dispatchEvent(new DragEvent("drop", { dataTransfer, cancelable: true }));
-      }, [[...readFileSync(`${SCENES}/assets/bunny.ply`)], name] as const);
+      page.evaluate(
+        ([bytes, as]) => {
+          const dataTransfer = new DataTransfer();
+          dataTransfer.items.add(new File([new Uint8Array(bytes as number[])], as as string));
+          dispatchEvent(new DragEvent("drop", { dataTransfer, cancelable: true }));
+        },
+        [[...readFileSync(`${SCENES}/assets/bunny.ply`)], name] as const,
+      );
     await drop("one.ply");
     await page.waitForFunction(() => document.getElementById("main")!.dataset.ready === "true");
     assert.equal(await page.evaluate(() => (window as any).tumble.session.info.title), "waits");
@@ -380,10 +445,17 @@ describe("files", () => {
     await page.click("text=Search for a cure");
     await page.waitForSelector(".cures li");
     const cures = await page.$$eval(".cures li", (all) => all.map((l) => l.textContent ?? ""));
-    assert.ok(cures.some((c) => /implicit|symplectic|step/.test(c) && /Apply and restart/.test(c)), cures.join("; "));
+    assert.ok(
+      cures.some((c) => /implicit|symplectic|step/.test(c) && /Apply and restart/.test(c)),
+      cures.join("; "),
+    );
     await page.locator(".cures button").first().click();
     await frame(page, 4);
-    assert.ok(await page.evaluate(() => (window as any).tumble.session.overrides.size > 0 && (document.querySelector('.alert') as HTMLElement).hidden));
+    assert.ok(
+      await page.evaluate(
+        () => (window as any).tumble.session.overrides.size > 0 && (document.querySelector(".alert") as HTMLElement).hidden,
+      ),
+    );
     assert.deepEqual(errors, []);
     await page.context().close();
   });
@@ -449,9 +521,13 @@ describe("fluid", () => {
         await new Promise((done) => setTimeout(done, 100));
         const canvas = document.querySelector<HTMLCanvasElement>(".energy canvas")!;
         const { data } = canvas.getContext("2d")!.getImageData(0, 0, canvas.width, canvas.height);
-        const [light, dark] = [[0x2a, 0x6f, 0x97], [0x6d, 0xb6, 0xe3]].map(([r, g, b]) => {
+        const [light, dark] = [
+          [0x2a, 0x6f, 0x97],
+          [0x6d, 0xb6, 0xe3],
+        ].map(([r, g, b]) => {
           let n = 0;
-          for (let i = 0; i < data.length; i += 4) if (data[i + 3] > 200 && Math.abs(data[i] - r) + Math.abs(data[i + 1] - g) + Math.abs(data[i + 2] - b) < 12) n++;
+          for (let i = 0; i < data.length; i += 4)
+            if (data[i + 3] > 200 && Math.abs(data[i] - r) + Math.abs(data[i + 1] - g) + Math.abs(data[i + 2] - b) < 12) n++;
           return n > 10;
         });
         return { light, dark };
@@ -479,16 +555,19 @@ describe("fluid", () => {
     assert.ok(low < 0 && low === -high, `${low} to ${high}`);
     const box = (await page.locator(".stage").boundingBox())!;
     const before = await page.evaluate(() => (window as any).tumble.session.hash());
-    const at = await page.evaluate(([x, y]) => {
-      const { session, stage } = (window as any).tumble;
-      const all: number[][] = [];
-      const stir = session.stir.bind(session);
-      session.stir = (gas: string, position: number[], ...rest: unknown[]) => (all.push(position), stir(gas, position, ...rest));
-      session.play = () => {};
-      (window as any).stirred = all;
-      stage.look.sliceAt = 0.75;
-      return stage.under({ clientX: x, clientY: y }, stage.stirred.through).toArray();
-    }, [box.x + 0.6 * box.width, box.y + 0.5 * box.height] as const);
+    const at = await page.evaluate(
+      ([x, y]) => {
+        const { session, stage } = (window as any).tumble;
+        const all: number[][] = [];
+        const stir = session.stir.bind(session);
+        session.stir = (gas: string, position: number[], ...rest: unknown[]) => (all.push(position), stir(gas, position, ...rest));
+        session.play = () => {};
+        (window as any).stirred = all;
+        stage.look.sliceAt = 0.75;
+        return stage.under({ clientX: x, clientY: y }, stage.stirred.through).toArray();
+      },
+      [box.x + 0.6 * box.width, box.y + 0.5 * box.height] as const,
+    );
     assert.ok(Math.abs(at[1] - 0.125) < 1e-6, `${at}`);
     await page.mouse.move(box.x + 0.4 * box.width, box.y + 0.5 * box.height);
     await page.mouse.down();
@@ -518,7 +597,8 @@ describe("fluid", () => {
     });
     const box = (await page.locator(".stage").boundingBox())!;
     const touch = await page.context().newCDPSession(page);
-    const fingers = (k: number) => [0.25, 0.75].map((x, id) => ({ x: box.x + (x + 0.02 * k) * box.width, y: box.y + 0.5 * box.height, id }));
+    const fingers = (k: number) =>
+      [0.25, 0.75].map((x, id) => ({ x: box.x + (x + 0.02 * k) * box.width, y: box.y + 0.5 * box.height, id }));
     await touch.send("Input.dispatchTouchEvent", { type: "touchStart", touchPoints: fingers(0) });
     for (let k = 1; k < 5; k++) await touch.send("Input.dispatchTouchEvent", { type: "touchMove", touchPoints: fingers(k) });
     await touch.send("Input.dispatchTouchEvent", { type: "touchEnd", touchPoints: [] });
@@ -552,10 +632,17 @@ describe("integrators", () => {
     const { page, errors } = await own.open("integrators");
     await page.click("text=Implicit damping");
     const shown = (scheme: string, steps: number) =>
-      page.waitForFunction(([s, n]) => {
-        const out = document.querySelector(`[data-ratio=${s}]`) as HTMLElement | null;
-        return out && Number(out.dataset.steps) >= Number(n) ? { ratio: Number(out.dataset.value), steps: Number(out.dataset.steps) } : false;
-      }, [scheme, steps] as const).then((handle) => handle.jsonValue() as Promise<{ ratio: number; steps: number }>);
+      page
+        .waitForFunction(
+          ([s, n]) => {
+            const out = document.querySelector(`[data-ratio=${s}]`) as HTMLElement | null;
+            return out && Number(out.dataset.steps) >= Number(n)
+              ? { ratio: Number(out.dataset.value), steps: Number(out.dataset.steps) }
+              : false;
+          },
+          [scheme, steps] as const,
+        )
+        .then((handle) => handle.jsonValue() as Promise<{ ratio: number; steps: number }>);
     // z = 2π 0.05: implicit Euler keeps 1/(1 + z²) of the energy a step.
     const z = 2 * Math.PI * 0.05;
     const implicit = await shown("implicit_euler", 20);

@@ -6,7 +6,7 @@ import { tmpdir } from "node:os";
 import { join, resolve } from "node:path";
 import { after, before, describe, it } from "node:test";
 import type { Page } from "playwright-core";
-import { frame, lab, ready, STILL, type Lab } from "./browser.ts";
+import { frame, type Lab, lab, ready, STILL } from "./browser.ts";
 
 const ROOT = resolve(import.meta.dirname, "../..");
 const PYTHON = resolve(ROOT, ".venv/bin/python");
@@ -34,26 +34,37 @@ async function taken(page: Page, label: string): Promise<string> {
 }
 
 /** Python's description of files. */
-const python = (code: string, ...words: string[]) => execFileSync(PYTHON, ["-c", code, ...words], { encoding: "utf8", cwd: join(ROOT, "python"), stdio: ["ignore", "pipe", "inherit"] }).trim();
+const python = (code: string, ...words: string[]) =>
+  execFileSync(PYTHON, ["-c", code, ...words], {
+    encoding: "utf8",
+    cwd: join(ROOT, "python"),
+    stdio: ["ignore", "pipe", "inherit"],
+  }).trim();
 
 describe("downloads", () => {
   it("are pictures, as large as the one on the page", async () => {
     const { page, errors } = await open("structures/rope");
     const path = await taken(page, "Save the picture (PNG)");
     assert.match(path, /rope-0\.png$/);
-    const seen = await page.evaluate(async (bytes) => {
-      const image = await createImageBitmap(new Blob([Uint8Array.from(bytes)]));
-      const context = new OffscreenCanvas(image.width, image.height).getContext("2d")!;
-      context.drawImage(image, 0, 0);
-      const { data } = context.getImageData(0, 0, image.width, image.height);
-      const canvas = document.querySelector("canvas")!;
-      let least = 255;
-      for (let i = 0; i < data.length; i += 4) least = Math.min(least, data[i] + data[i + 1] + data[i + 2]);
-      return { size: [image.width, image.height], canvas: [canvas.width, canvas.height], corner: [...data.slice(0, 4)], least };
-    }, [...readFileSync(path)]);
+    const seen = await page.evaluate(
+      async (bytes) => {
+        const image = await createImageBitmap(new Blob([Uint8Array.from(bytes)]));
+        const context = new OffscreenCanvas(image.width, image.height).getContext("2d")!;
+        context.drawImage(image, 0, 0);
+        const { data } = context.getImageData(0, 0, image.width, image.height);
+        const canvas = document.querySelector("canvas")!;
+        let least = 255;
+        for (let i = 0; i < data.length; i += 4) least = Math.min(least, data[i] + data[i + 1] + data[i + 2]);
+        return { size: [image.width, image.height], canvas: [canvas.width, canvas.height], corner: [...data.slice(0, 4)], least };
+      },
+      [...readFileSync(path)],
+    );
     assert.deepEqual([...readFileSync(path).subarray(0, 4)], [0x89, 0x50, 0x4e, 0x47]);
     assert.deepEqual(seen.size, seen.canvas);
-    assert.ok(seen.corner.every((c) => c > 230), `the background is ${seen.corner}`);
+    assert.ok(
+      seen.corner.every((c) => c > 230),
+      `the background is ${seen.corner}`,
+    );
     assert.ok(seen.least < 500, "there is no rope in it");
     assert.deepEqual(errors, []);
     await page.context().close();
@@ -89,7 +100,10 @@ describe("downloads", () => {
     }, film.toString("base64"));
     assert.deepEqual(seen.size, canvas);
     assert.ok(seen.seconds > 0.5 && seen.seconds < 600, `${seen.seconds} s`);
-    assert.ok(seen.corner.every((c) => c > 225), `the background is ${seen.corner}`);
+    assert.ok(
+      seen.corner.every((c) => c > 225),
+      `the background is ${seen.corner}`,
+    );
     assert.deepEqual(errors, []);
     await page.context().close();
   });
@@ -135,7 +149,11 @@ print(seen, max(file[name].ndim for name in file.files))
       const { session, stage } = (window as any).tumble;
       const x: number[] = [...session.shown.columns[stage.surfaces[0].name].position.data];
       const span = [0, 1, 2].map((d) => Math.max(...x.filter((_, i) => i % 3 === d)) - Math.min(...x.filter((_, i) => i % 3 === d)));
-      return { triangles: stage.surfaces.reduce((sum: number, s: any) => sum + s.mesh.geometry.index.count / 3, 0), vertices: x.length / 3, span };
+      return {
+        triangles: stage.surfaces.reduce((sum: number, s: any) => sum + s.mesh.geometry.index.count / 3, 0),
+        vertices: x.length / 3,
+        span,
+      };
     });
     const code = `
 import json, sys, tumble
@@ -146,7 +164,10 @@ print(json.dumps([len(world.topology["n"]["triangles"]), len(x), (x.max(axis=0) 
     // In the file y is up.
     const [triangles, vertices, [x, z, y]] = JSON.parse(python(code, path)) as [number, number, number[]];
     assert.deepEqual([triangles, vertices], [here.triangles, here.vertices]);
-    assert.ok([x, y, z].every((s, d) => Math.abs(s - here.span[d]) < 1e-5), `${[x, y, z]} instead of ${here.span}`);
+    assert.ok(
+      [x, y, z].every((s, d) => Math.abs(s - here.span[d]) < 1e-5),
+      `${[x, y, z]} instead of ${here.span}`,
+    );
     assert.deepEqual(errors, []);
     await page.context().close();
   });

@@ -7,10 +7,10 @@ import { join, resolve } from "node:path";
 import { after, before, describe, it } from "node:test";
 import { gunzipSync, gzipSync } from "node:zlib";
 import type { Page } from "playwright-core";
-import { lab, type Lab } from "./browser.ts";
 import type { SceneInfo } from "../src/engine/protocol";
-import { fromFile, pack, toFile, unpack, type Shared } from "../src/share";
+import { fromFile, pack, type Shared, toFile, unpack } from "../src/share";
 import { alike, meshesOf, written } from "../src/values";
+import { type Lab, lab } from "./browser.ts";
 
 const STILL = { reducedMotion: "reduce" } as const;
 const VERSION = /^version = "([^"]+)"/m.exec(readFileSync("../Cargo.toml", "utf8"))![1];
@@ -24,7 +24,11 @@ before(async () => {
 after(() => own?.close());
 
 const ready = (page: Page) => page.waitForFunction(() => document.getElementById("main")!.dataset.ready);
-const told = (page: Page, what: RegExp) => page.waitForFunction(([source, flags]) => new RegExp(source, flags).test(document.getElementById("say")?.textContent ?? ""), [what.source, what.flags]);
+const told = (page: Page, what: RegExp) =>
+  page.waitForFunction(
+    ([source, flags]) => new RegExp(source, flags).test(document.getElementById("say")?.textContent ?? ""),
+    [what.source, what.flags],
+  );
 
 const scene = async (id: string) => {
   const { page, errors } = await own.open(`scene/${id}`, STILL);
@@ -56,7 +60,10 @@ const dropped = async (name: string, buffer: Buffer) => {
 describe("links", () => {
   it("to a frame that is far away can be stopped", async () => {
     const first = await scene("springs/forever");
-    const { text, resolved } = await first.page.evaluate(() => ({ text: (window as any).tumble.session.toml, resolved: (window as any).tumble.session.info.scene }));
+    const { text, resolved } = await first.page.evaluate(() => ({
+      text: (window as any).tumble.session.toml,
+      resolved: (window as any).tumble.session.info.scene,
+    }));
     const link = await pack({ version: VERSION, text, overrides: [], scene: resolved, changes: [], frame: 100_000, hash: "0".repeat(16) });
     const { page, errors } = await visit(`${own.address}v/${VERSION}/#/s/${link}`);
     await page.click("text=Stop here");
@@ -89,15 +96,24 @@ describe("links", () => {
     const inside = await unpack(link.split("#/s/")[1]);
     assert.equal(inside.version, VERSION);
     assert.equal(inside.hash, hashes.twelve);
-    assert.deepEqual(inside.changes, [{ frame: 0, path: "force.0.rate", value: 2.5 }, { frame: 6, path: "world.gravity", value: [0, 0, -3] }]);
+    assert.deepEqual(inside.changes, [
+      { frame: 0, path: "force.0.rate", value: 2.5 },
+      { frame: 6, path: "world.gravity", value: [0, 0, -3] },
+    ]);
     assert.equal(inside.scene.seed, 0);
     const second = await visit(link);
     await ready(second.page);
-    await second.page.waitForFunction((h) => document.querySelector(".hash-line .hash")!.textContent === `${h} as in the link`, hashes.twelve);
-    assert.deepEqual(await second.page.evaluate(() => {
-      const { session } = (window as any).tumble;
-      return [session.shown.index, session.info.scene.force[0].rate, session.info.scene.world.gravity, session.before];
-    }), [12, 2.5, [0, 0, -3], null]);
+    await second.page.waitForFunction(
+      (h) => document.querySelector(".hash-line .hash")!.textContent === `${h} as in the link`,
+      hashes.twelve,
+    );
+    assert.deepEqual(
+      await second.page.evaluate(() => {
+        const { session } = (window as any).tumble;
+        return [session.shown.index, session.info.scene.force[0].rate, session.info.scene.world.gravity, session.before];
+      }),
+      [12, 2.5, [0, 0, -3], null],
+    );
     assert.equal(await second.page.textContent(".scene-id"), `from a link of tumble ${VERSION}`);
     // A link of the link is the same link.
     assert.equal(await copied(second.page), link);
@@ -125,11 +141,17 @@ describe("links", () => {
     const other = await own.open(`s/${await pack(shared)}`, STILL);
     await ready(other.page);
     await other.page.waitForFunction((h) => document.querySelector(".hash-line .hash")!.textContent === `${h} as in the link`, made.hash);
-    assert.equal(await other.page.textContent(".scene-id"), `from a link of tumble 0.0.1; opened with ${VERSION}: bits may differ; defaults have changed since, so all keys are written out`);
+    assert.equal(
+      await other.page.textContent(".scene-id"),
+      `from a link of tumble 0.0.1; opened with ${VERSION}: bits may differ; defaults have changed since, so all keys are written out`,
+    );
     // A difference in bits is reported.
     const wrong = await own.open(`s/${await pack({ ...shared, hash: "0123456789abcdef" })}`, STILL);
     await ready(wrong.page);
-    await wrong.page.waitForFunction((h) => document.querySelector(".hash-line .hash")!.textContent === `${h} the link says 0123456789abcdef`, made.hash);
+    await wrong.page.waitForFunction(
+      (h) => document.querySelector(".hash-line .hash")!.textContent === `${h} the link says 0123456789abcdef`,
+      made.hash,
+    );
     assert.deepEqual([...errors, ...other.errors, ...wrong.errors], []);
     for (const p of [page, other.page, wrong.page]) await p.context().close();
   });
@@ -154,7 +176,15 @@ describe("links", () => {
   });
 
   it("that are damaged or hostile are refused in words, or do no harm", async () => {
-    const good: Shared = { version: VERSION, text: readFileSync(`${SCENES}/structures/rope.toml`, "utf8"), overrides: [], scene: {}, changes: [], frame: 0, hash: "" };
+    const good: Shared = {
+      version: VERSION,
+      text: readFileSync(`${SCENES}/structures/rope.toml`, "utf8"),
+      overrides: [],
+      scene: {},
+      changes: [],
+      frame: 0,
+      hash: "",
+    };
     const tree = (changed: object) => pack({ ...good, ...changed } as Shared);
     const bad = {
       "no link": "bm90IGEgbGluaw",
@@ -194,7 +224,11 @@ describe("links", () => {
         location.hash = `#/s/${to}`;
       }, link);
       await ready(page);
-      const seen = await page.evaluate(() => ({ hit: (window as any).hit, polluted: ({} as any).polluted, images: document.querySelectorAll("img[src=x]").length }));
+      const seen = await page.evaluate(() => ({
+        hit: (window as any).hit,
+        polluted: ({} as any).polluted,
+        images: document.querySelectorAll("img[src=x]").length,
+      }));
       assert.deepEqual(seen, { hit: undefined, polluted: undefined, images: 0 });
     }
     assert.deepEqual(errors, []);
@@ -242,7 +276,13 @@ describe("files", () => {
     const { page, errors } = await own.open("", STILL);
     await page.setInputFiles("#file", [
       { name: "tent.obj", mimeType: "text/plain", buffer: tent },
-      { name: "camp.toml", mimeType: "text/plain", buffer: Buffer.from('version = 1\n[[net]]\nname = "n"\nmesh = { path = "tent.obj" }\npin = ["vertex 0"]\n[[collider]]\nname = "b"\nshape = { mesh = { path = "bunny.ply" } }\n') },
+      {
+        name: "camp.toml",
+        mimeType: "text/plain",
+        buffer: Buffer.from(
+          'version = 1\n[[net]]\nname = "n"\nmesh = { path = "tent.obj" }\npin = ["vertex 0"]\n[[collider]]\nname = "b"\nshape = { mesh = { path = "bunny.ply" } }\n',
+        ),
+      },
     ]);
     await ready(page);
     const hash = await page.evaluate(async () => {
@@ -296,7 +336,13 @@ describe("a site", () => {
   let server: Server;
   let place = "";
   before(async () => {
-    const types: Record<string, string> = { html: "text/html", js: "text/javascript", css: "text/css", wasm: "application/wasm", webp: "image/webp" };
+    const types: Record<string, string> = {
+      html: "text/html",
+      js: "text/javascript",
+      css: "text/css",
+      wasm: "application/wasm",
+      webp: "image/webp",
+    };
     server = createServer((request, response) => {
       const path = new URL(request.url!, "http://x").pathname.replace(/^\/some\/place\//, "");
       let file = join(DIST, path.endsWith("/") || !path ? `${path}index.html` : path);
@@ -312,7 +358,12 @@ describe("a site", () => {
 
   it("holds each version once, and works at any place", async () => {
     assert.equal(readdirSync(join(DIST, "v", VERSION, "assets")).filter((f) => /^single_bg.*wasm$/.test(f)).length, 1);
-    assert.deepEqual(readdirSync(DIST).filter((f) => f !== "v").sort(), ["404.html", "index.html"]);
+    assert.deepEqual(
+      readdirSync(DIST)
+        .filter((f) => f !== "v")
+        .sort(),
+      ["404.html", "index.html"],
+    );
     for (const where of ["", `v/${VERSION}/`]) {
       const { page, errors } = await visit(`${place}${where}#/scene/structures/rope`);
       await ready(page);
@@ -354,12 +405,21 @@ describe("scenes that ship", () => {
     double.initSync({ module: readFileSync(`${pkg}/double_bg.wasm`) });
     const ids = readdirSync(SCENES, { withFileTypes: true })
       .filter((row) => row.isDirectory() && row.name !== "assets")
-      .flatMap((row) => readdirSync(`${SCENES}/${row.name}`).filter((f) => f.endsWith(".toml")).map((f) => `${row.name}/${f}`));
+      .flatMap((row) =>
+        readdirSync(`${SCENES}/${row.name}`)
+          .filter((f) => f.endsWith(".toml"))
+          .map((f) => `${row.name}/${f}`),
+      );
     const failures: string[] = [];
     let meshes = 0;
     for (const id of ids) {
       const text = readFileSync(`${SCENES}/${id}`, "utf8");
-      const files = new Map([...text.matchAll(/path = "(\.\.\/assets\/[^"]+)"/g)].map(([, path]) => [path, new Uint8Array(readFileSync(join(SCENES, "x", path)))]));
+      const files = new Map(
+        [...text.matchAll(/path = "(\.\.\/assets\/[^"]+)"/g)].map(([, path]) => [
+          path,
+          new Uint8Array(readFileSync(join(SCENES, "x", path))),
+        ]),
+      );
       const engine = single.precision(text, []) === "double" ? double : single;
       const made = (words: string) => {
         const world = new engine.World(words, [], files);

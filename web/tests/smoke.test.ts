@@ -1,7 +1,7 @@
 /** Smoke veils what lies in it, and nothing that stands before it. */
 import assert from "node:assert/strict";
 import { after, before, it } from "node:test";
-import { lab, type Lab } from "./browser.ts";
+import { type Lab, lab } from "./browser.ts";
 
 let own: Lab;
 before(async () => {
@@ -13,7 +13,17 @@ after(() => own?.close());
 const SCENE = {
   version: 1,
   gas: [{ name: "air", box: { size: [1, 1, 1], resolution: 16 }, smoke: { initial: "1", weight: 0 } }],
-  particles: [{ name: "balls", position: [[-0.3, -0.4, 0.25], [0.3, 0.34, 0.25]], radius: 0.07, color: [1, 0.1, 0] }],
+  particles: [
+    {
+      name: "balls",
+      position: [
+        [-0.3, -0.4, 0.25],
+        [0.3, 0.34, 0.25],
+      ],
+      radius: 0.07,
+      color: [1, 0.1, 0],
+    },
+  ],
   collider: [
     { name: "near", shape: { sphere: { center: [-0.3, -0.4, -0.25], radius: 0.07 } }, color: [1, 0.1, 0] },
     { name: "far", shape: { sphere: { center: [0.3, 0.34, -0.25], radius: 0.07 } }, color: [1, 0.1, 0] },
@@ -29,17 +39,27 @@ it("smoke veils what lies in it by as much as lies before it", async () => {
   const seen = await page.evaluate(async () => {
     const { stage } = (window as any).tumble;
     const { smoke } = stage.things.find((t: any) => t.body?.smoke).body;
-    const places = [[-0.3, -0.47, 0.25], [0.3, 0.27, 0.25], [-0.3, -0.47, -0.25], [0.3, 0.27, -0.25]];
+    const places = [
+      [-0.3, -0.47, 0.25],
+      [0.3, 0.27, 0.25],
+      [-0.3, -0.47, -0.25],
+      [0.3, 0.27, -0.25],
+    ];
     const out: number[][][] = [];
     for (const visible of [false, true]) {
       smoke.visible = visible;
       const image = await createImageBitmap(await stage.picture());
       const context = new OffscreenCanvas(image.width, image.height).getContext("2d")!;
       context.drawImage(image, 0, 0);
-      out.push(places.map((place) => {
-        const p = smoke.position.clone().set(...place).project(stage.camera);
-        return [...context.getImageData((0.5 + 0.5 * p.x) * image.width, (0.5 - 0.5 * p.y) * image.height, 1, 1).data.slice(0, 3)];
-      }));
+      out.push(
+        places.map((place) => {
+          const p = smoke.position
+            .clone()
+            .set(...place)
+            .project(stage.camera);
+          return [...context.getImageData((0.5 + 0.5 * p.x) * image.width, (0.5 - 0.5 * p.y) * image.height, 1, 1).data.slice(0, 3)];
+        }),
+      );
     }
     return { bare: out[0], veiled: out[1] };
   });

@@ -6,7 +6,7 @@ import { after, before, describe, it } from "node:test";
 import type { Page } from "playwright-core";
 import type { SceneInfo } from "../src/engine/protocol";
 import { changed, familiesOf, linked } from "../src/links";
-import { lab, ready, serious, STILL, type Lab } from "./browser.ts";
+import { type Lab, lab, ready, STILL, serious } from "./browser.ts";
 
 let own: Lab;
 before(async () => {
@@ -28,16 +28,31 @@ describe("families of links", async () => {
   it("are told by what their links connect", () => {
     const links = "links = { structural = 5, shear = { modulus = 3, hardening = 1 }, bend = { modulus = 1, tension_only = true } }";
     // Other laws are kept in other lists, so that the order of links does not tell families.
-    assert.deepEqual(count(`[[sheet]]\nname = "a"\nsize = [1, 1]\nresolution = [5, 4]\n${links}`), [4 * 4 + 5 * 3, 2 * 4 * 3, 3 * 4 + 5 * 2]);
-    assert.deepEqual(count(`[[sheet]]\nname = "a"\nsize = [1, 1]\nresolution = [5, 4]\n${links.replace("links = {", 'links = { diagonals = "one",')}`)[1], 4 * 3);
-    assert.deepEqual(count(`[[block]]\nname = "a"\nsize = [1, 1, 1]\nresolution = [4, 3, 2]\n${links}`), [3 * 6 + 4 * 2 * 2 + 12, 2 * (3 * 2 * 2 + 4 * 2 + 3 * 3), 2 * 6 + 4 * 1 * 2]);
-    assert.deepEqual(count(`[[rope]]\nname = "a"\nfrom = [0, 0, 0]\nto = [1, 0, 0]\nsegments = 6\nlinks = { structural = 5, bend = 1 }`), [6, 0, 5]);
+    assert.deepEqual(count(`[[sheet]]\nname = "a"\nsize = [1, 1]\nresolution = [5, 4]\n${links}`), [
+      4 * 4 + 5 * 3,
+      2 * 4 * 3,
+      3 * 4 + 5 * 2,
+    ]);
+    assert.deepEqual(
+      count(`[[sheet]]\nname = "a"\nsize = [1, 1]\nresolution = [5, 4]\n${links.replace("links = {", 'links = { diagonals = "one",')}`)[1],
+      4 * 3,
+    );
+    assert.deepEqual(count(`[[block]]\nname = "a"\nsize = [1, 1, 1]\nresolution = [4, 3, 2]\n${links}`), [
+      3 * 6 + 4 * 2 * 2 + 12,
+      2 * (3 * 2 * 2 + 4 * 2 + 3 * 3),
+      2 * 6 + 4 * 1 * 2,
+    ]);
+    assert.deepEqual(
+      count(`[[rope]]\nname = "a"\nfrom = [0, 0, 0]\nto = [1, 0, 0]\nsegments = 6\nlinks = { structural = 5, bend = 1 }`),
+      [6, 0, 5],
+    );
     const mesh = new Map([["m.obj", new TextEncoder().encode("v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nf 1 2 3\nf 1 3 4\n")]]);
     assert.deepEqual(count(`[[net]]\nname = "a"\nmesh = { path = "m.obj" }`, mesh), [5, 0, 1]);
   });
 
   it("are turned off without a change of state, and come back as they were", () => {
-    const toml = (clamp: string) => `version = 1\n[[system]]\nintegrator = "verlet"\nsubsteps = 60\n${clamp}\n[[sheet]]\nname = "a"\nsize = [1, 1]\nresolution = [6, 6]\nrotate = [90, 0, 0]\npin = ["edge x-"]\nlinks = { structural = 60, shear = { modulus = 40, damping = 0.05 }, bend = 1 }\n`;
+    const toml = (clamp: string) =>
+      `version = 1\n[[system]]\nintegrator = "verlet"\nsubsteps = 60\n${clamp}\n[[sheet]]\nname = "a"\nsize = [1, 1]\nresolution = [6, 6]\nrotate = [90, 0, 0]\npin = ["edge x-"]\nlinks = { structural = 60, shear = { modulus = 40, damping = 0.05 }, bend = 1 }\n`;
     for (const clamp of ["", "clamp = 1.05"]) {
       /** How much longer one diagonal of a cell is than the other, at most. */
       const sheared = (on: boolean) => {
@@ -54,7 +69,9 @@ describe("families of links", async () => {
         assert.deepEqual(linked(info(world))[0].families.shear, sheet.families.shear);
         const x = world.columns(["position"]).a.position.data;
         const far = (a: number, b: number) => Math.hypot(x[3 * a] - x[3 * b], x[3 * a + 1] - x[3 * b + 1], x[3 * a + 2] - x[3 * b + 2]);
-        return Math.max(...Array.from({ length: 25 }, (_, k) => k + Math.floor(k / 5)).map((i) => Math.abs(Math.log(far(i, i + 7) / far(i + 1, i + 6)))));
+        return Math.max(
+          ...Array.from({ length: 25 }, (_, k) => k + Math.floor(k / 5)).map((i) => Math.abs(Math.log(far(i, i + 7) / far(i + 1, i + 6)))),
+        );
       };
       const [held, free] = [sheared(true), sheared(false)];
       assert.ok(held > 0.001 && free > 3 * held, `${clamp}: cells are sheared by ${free} without shear links, by ${held} with them`);
@@ -69,7 +86,10 @@ const numbers = async (page: Page, frames = 150) => {
     session.pause();
     await session.goto(session.latest + n);
   }, frames);
-  return Object.fromEntries(await page.$$eval(".figure output", (all) => all.map((o) => [o.id, Number(o.dataset.value)]))) as Record<"way" | "pull" | "energy" | "strain", number>;
+  return Object.fromEntries(await page.$$eval(".figure output", (all) => all.map((o) => [o.id, Number(o.dataset.value)]))) as Record<
+    "way" | "pull" | "energy" | "strain",
+    number
+  >;
 };
 const held = (page: Page) => page.waitForFunction(() => (window as any).tumble.session.info.scene.anchor[0].stiffness > 0);
 const free = (page: Page) => page.waitForFunction(() => (window as any).tumble.session.info.scene.anchor[0].stiffness === 0);
@@ -129,7 +149,9 @@ describe("structures", () => {
       // The sharpest turn along the middle row, and how high it stands.
       const [n, row] = [15, 5];
       const way = (i: number) => [0, 1, 2].map((k) => x[3 * (row * n + i + 1) + k] - x[3 * (row * n + i) + k]);
-      const turns = Array.from({ length: n - 5 }, (_, i) => [way(i + 1), way(i + 2)]).map(([a, b]) => Math.acos(Math.min(Math.max(a.reduce((s, v, k) => s + v * b[k], 0) / Math.hypot(...a) / Math.hypot(...b), -1), 1)));
+      const turns = Array.from({ length: n - 5 }, (_, i) => [way(i + 1), way(i + 2)]).map(([a, b]) =>
+        Math.acos(Math.min(Math.max(a.reduce((s, v, k) => s + v * b[k], 0) / Math.hypot(...a) / Math.hypot(...b), -1), 1)),
+      );
       bent.push({ sharpest: Math.max(...turns), highest: Math.max(...x.filter((_, i) => i % 3 === 2)) });
     }
     const [curved, crumpled] = bent;
@@ -153,7 +175,10 @@ describe("structures", () => {
           await page.click(`[data-deed=${deed}]`);
           await held(page);
           const found = await numbers(page, 30);
-          assert.ok(found.way > 0.001 && Number.isFinite(found.energy + found.pull + found.strain), `${kind}, ${deed}: ${JSON.stringify(found)}`);
+          assert.ok(
+            found.way > 0.001 && Number.isFinite(found.energy + found.pull + found.strain),
+            `${kind}, ${deed}: ${JSON.stringify(found)}`,
+          );
         }
         assert.equal(await page.locator(".alert:visible").count(), 0);
       }
@@ -178,14 +203,18 @@ describe("scenes", () => {
     await page.keyboard.press("Space");
     await page.waitForFunction(() => (window as any).tumble.session.info.scene.sheet[0].links.shear.modulus === 0);
     await page.locator(".panel .note", { hasText: "flag without shear links: continues from frame 5" }).waitFor();
-    assert.equal(await page.evaluate(() => document.activeElement?.closest("[data-family]")?.getAttribute("data-family")), "sheet.0.links.shear");
+    assert.equal(
+      await page.evaluate(() => document.activeElement?.closest("[data-family]")?.getAttribute("data-family")),
+      "sheet.0.links.shear",
+    );
     // The others keep what they had, those that are written short, too.
     const links = () => page.evaluate(() => (window as any).tumble.session.info.scene.sheet[0].links);
     assert.equal((await links()).structural.modulus, 500);
     assert.equal((await links()).bend.modulus, 2);
     await page.getByLabel("Colour").selectOption("strain");
     await page.getByLabel("Links", { exact: true }).check();
-    const drawn = () => page.evaluate(() => (window as any).tumble.stage.things.find((t: any) => t.name === "flag").links.object.geometry.instanceCount);
+    const drawn = () =>
+      page.evaluate(() => (window as any).tumble.stage.things.find((t: any) => t.name === "flag").links.object.geometry.instanceCount);
     const [structural, bend] = [24 * 19 + 25 * 18, 23 * 19 + 25 * 17];
     assert.equal(await drawn(), structural + bend);
     await page.getByRole("group", { name: "Families of links shown" }).getByLabel("bend").uncheck();
@@ -232,13 +261,16 @@ describe("scenes", () => {
     const start = await page.evaluate(async () => {
       const { session } = (window as any).tumble;
       await session.goto(2);
-      return [...session.frame(0).columns.galaxy.velocity?.data ?? session.frame(0).columns.galaxy.position.data].slice(0, 30);
+      return [...(session.frame(0).columns.galaxy.velocity?.data ?? session.frame(0).columns.galaxy.position.data)].slice(0, 30);
     });
     const toomre = page.locator('.play [data-path="galaxy.0.thickness"] input[type=number]');
     await toomre.fill("0.5");
     await toomre.press("Enter");
     await page.waitForFunction(() => (window as any).tumble.session.latest === 0);
-    assert.notDeepEqual(await page.evaluate(() => [...(window as any).tumble.session.shown.columns.galaxy.position.data].slice(0, 30)), start);
+    assert.notDeepEqual(
+      await page.evaluate(() => [...(window as any).tumble.session.shown.columns.galaxy.position.data].slice(0, 30)),
+      start,
+    );
     assert.deepEqual(errors, []);
     await page.context().close();
   });
@@ -284,7 +316,10 @@ describe("everyone", () => {
     for (const path of PAGES) {
       const { page, errors } = await own.open(path, { ...STILL, viewport: { width: 390, height: 844 }, hasTouch: true, isMobile: true });
       await ready(page);
-      const wide = await page.evaluate(() => [document.documentElement.scrollWidth, document.getElementById("nav")!.scrollWidth - document.getElementById("nav")!.clientWidth]);
+      const wide = await page.evaluate(() => [
+        document.documentElement.scrollWidth,
+        document.getElementById("nav")!.scrollWidth - document.getElementById("nav")!.clientWidth,
+      ]);
       assert.deepEqual([path, wide], [path, [390, 0]]);
       if (path === "structures") {
         await page.tap("[data-deed=stretch]");
@@ -301,6 +336,9 @@ describe("theory", () => {
   it("is cited by tags that stand in docs", () => {
     const cited = [...readFileSync("src/pages/structures.ts", "utf8").matchAll(/"([a-z]+)\.(\d+)"/g)].map((m) => [m[1], m[2]]);
     assert.ok(cited.length >= 5);
-    assert.deepEqual(cited.filter(([page, k]) => !readFileSync(`../docs/theory/${page}.md`, "utf8").includes(`(${page}.${k})`)), []);
+    assert.deepEqual(
+      cited.filter(([page, k]) => !readFileSync(`../docs/theory/${page}.md`, "utf8").includes(`(${page}.${k})`)),
+      [],
+    );
   });
 });

@@ -6,8 +6,8 @@ import { tmpdir } from "node:os";
 import { join, resolve } from "node:path";
 import { test } from "node:test";
 import { chromium } from "playwright-core";
-import { CHROMIUM, frame } from "./browser";
 import { fromFile, unpack } from "../src/share";
+import { CHROMIUM, frame } from "./browser";
 
 const ROOT = resolve(import.meta.dirname, "../..");
 const PYTHON = resolve(ROOT, ".venv/bin/python");
@@ -29,9 +29,14 @@ test("a scene with a mesh of its own opens", { skip: skip || (!CHROMIUM && "no C
   writeFileSync(join(folder, "scene.toml"), words);
   const run = ["-c", "from tumble.cli import main; main()", "view", join(folder, "scene.toml"), "--no-open"];
   const served = spawn(PYTHON, run, { cwd: ROOT, stdio: ["ignore", "pipe", "inherit"] });
-  const browser = await chromium.launch({ executablePath: CHROMIUM, args: ["--no-sandbox", "--use-angle=swiftshader", "--enable-unsafe-swiftshader"] });
+  const browser = await chromium.launch({
+    executablePath: CHROMIUM,
+    args: ["--no-sandbox", "--use-angle=swiftshader", "--enable-unsafe-swiftshader"],
+  });
   try {
-    const address = await new Promise<string>((found) => served.stdout.once("data", (text: Buffer) => found(text.toString().split("\n")[0])));
+    const address = await new Promise<string>((found) =>
+      served.stdout.once("data", (text: Buffer) => found(text.toString().split("\n")[0])),
+    );
     const page = await browser.newPage();
     await page.goto(address);
     await frame(page, 0);

@@ -1,9 +1,7 @@
 /** The page's side: questions as promises, and a new worker where the old one died or hangs. */
 
 import { literal } from "../values";
-import type {
-  Answer, Cure, Failure, Files, Frame, Notice, Question, SceneInfo, Stability, Value, Vector,
-} from "./protocol";
+import type { Answer, Cure, Failure, Files, Frame, Notice, Question, SceneInfo, Stability, Value, Vector } from "./protocol";
 
 /** Answer to a failed request. */
 export class EngineError extends Error {

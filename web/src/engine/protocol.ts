@@ -118,8 +118,8 @@ interface Asked {
 }
 
 export type Request = Asked &
+  /** Checks and builds a scene. Overrides: "time.fps=30", "sheet.flag.size=[1, 2]". -> loaded */
   (
-    /** Checks and builds a scene. Overrides: "time.fps=30", "sheet.flag.size=[1, 2]". -> loaded */
     | { type: "load"; toml: string; overrides?: string[]; files?: Files }
     /**
      * Steps; answers with the last frame. Stops early, after whole frames, when `budget` [ms] is spent. -> frame
@@ -190,19 +190,18 @@ export interface Failure {
   missing?: string[];
 }
 
-export type Answer = { id: number } &
-  (
-    | { type: "loaded"; info: SceneInfo }
-    | { type: "changed"; info: SceneInfo; live: boolean }
-    | { type: "frame"; frame: Frame }
-    | { type: "hash"; hash: string }
-    | { type: "stability"; stability: Stability[] }
-    | { type: "cures"; cures: Cure[] }
-    | { type: "schema"; schema: Record<string, unknown> }
-    | { type: "done" }
-    /** The world that stood before keeps running. */
-    | { type: "failed"; failure: Failure }
-  );
+export type Answer = { id: number } & (
+  | { type: "loaded"; info: SceneInfo }
+  | { type: "changed"; info: SceneInfo; live: boolean }
+  | { type: "frame"; frame: Frame }
+  | { type: "hash"; hash: string }
+  | { type: "stability"; stability: Stability[] }
+  | { type: "cures"; cures: Cure[] }
+  | { type: "schema"; schema: Record<string, unknown> }
+  | { type: "done" }
+  /** The world that stood before keeps running. */
+  | { type: "failed"; failure: Failure }
+);
 
 /** Without an id: the worker is ready, with its version; or it will never be. */
 export type Notice = { type: "ready"; version: string } | { type: "broken"; message: string };

@@ -1,8 +1,8 @@
 /** The engine's side: worlds in WebAssembly, asked by messages, one at a time. It computes only when asked. */
 
-import type { Answer, Columns, Failure, Files, Frame, Ledger, Notice, Request, SceneInfo, StepReport } from "./protocol";
 import { Kept } from "./kept";
 import { together } from "./measures";
+import type { Answer, Columns, Failure, Files, Frame, Ledger, Notice, Request, SceneInfo, StepReport } from "./protocol";
 import { readable } from "./worth";
 
 type Module = typeof import("./pkg/single");
@@ -143,7 +143,9 @@ function step(request: Request & { type: "step" }): Frame {
 function inside(request: Request & { type: "inside" }): Frame | null {
   const at = running(request.world ?? 0);
   const start = performance.now();
-  const found = at.world.inside(request.substeps, request.columns ?? at.info.columns, FRAME_LIMIT) as { columns: Columns; about: string } | undefined;
+  const found = at.world.inside(request.substeps, request.columns ?? at.info.columns, FRAME_LIMIT) as
+    | { columns: Columns; about: string }
+    | undefined;
   if (!found) return null;
   const { system, step, time, ledger } = JSON.parse(found.about) as { system: string; step: number; time: number; ledger: Ledger };
   return {

@@ -16,7 +16,9 @@ export function readable(failure: Failure): Failure {
     ...failure,
     message: `${cut(lines.join("\n"), LONGEST.all)}${issues.length > MOST_ISSUES ? "\n… and more" : ""}`,
     path: failure.path && cut(failure.path, LONGEST.one),
-    issues: issues.slice(0, MOST_ISSUES).map((issue) => ({ ...issue, path: cut(issue.path, LONGEST.one), message: cut(issue.message, LONGEST.one) })),
+    issues: issues
+      .slice(0, MOST_ISSUES)
+      .map((issue) => ({ ...issue, path: cut(issue.path, LONGEST.one), message: cut(issue.message, LONGEST.one) })),
   };
 }
 

@@ -1,7 +1,7 @@
 /** All scenes that ship, with pictures. */
-import { h, say, type Page } from "../dom";
-import { ROW_TITLES, SCENES, titleOf, type Shipped } from "../scenes";
+import { h, type Page, say } from "../dom";
 import { acceptFiles } from "../drop";
+import { ROW_TITLES, SCENES, type Shipped, titleOf } from "../scenes";
 
 export const page: Page = async (main) => {
   document.title = "tumble · a physics engine in a browser tab";
@@ -13,7 +13,9 @@ export const page: Page = async (main) => {
       h(
         "a",
         { class: "tile", href: `#/scene/${s.id}` },
-        s.picture ? h("img", { src: s.picture, alt: "", width: 480, height: 270, loading: "lazy", decoding: "async" }) : h("span", { class: "no-picture" }),
+        s.picture
+          ? h("img", { src: s.picture, alt: "", width: 480, height: 270, loading: "lazy", decoding: "async" })
+          : h("span", { class: "no-picture" }),
         h("span", { class: "tile-title" }, title || s.name),
         h("span", { class: "tile-id" }, s.id),
       ),
@@ -26,12 +28,26 @@ export const page: Page = async (main) => {
     const hit = (s: Shipped, i: number) => words.every((w) => `${s.id} ${texts[i]} ${ROW_TITLES[s.row] ?? ""}`.toLowerCase().includes(w));
     const sections = rows.map((row) => {
       const own = SCENES.map((s, i) => ({ s, i })).filter(({ s, i }) => s.row === row && hit(s, i));
-      return own.length ? h("section", {}, h("h2", {}, ROW_TITLES[row] ?? row), h("ul", { class: "tiles" }, ...own.map(({ s, i }) => card(s, titleOf(texts[i]))))) : null;
+      return own.length
+        ? h(
+            "section",
+            {},
+            h("h2", {}, ROW_TITLES[row] ?? row),
+            h("ul", { class: "tiles" }, ...own.map(({ s, i }) => card(s, titleOf(texts[i])))),
+          )
+        : null;
     });
     list.replaceChildren(...sections.filter((s) => s !== null));
     if (!list.childElementCount) list.append(h("p", { class: "muted" }, "No scene matches."));
   };
-  const file = h("input", { type: "file", accept: ".toml,.json,.tumble,.ply,.obj,.stl,.glb", multiple: true, class: "visually-hidden", id: "file", onchange: () => void acceptFiles([...(file.files ?? [])]).catch((e) => say(String(e.message ?? e))) });
+  const file = h("input", {
+    type: "file",
+    accept: ".toml,.json,.tumble,.ply,.obj,.stl,.glb",
+    multiple: true,
+    class: "visually-hidden",
+    id: "file",
+    onchange: () => void acceptFiles([...(file.files ?? [])]).catch((e) => say(String(e.message ?? e))),
+  });
   main.append(
     h(
       "div",
@@ -40,7 +56,11 @@ export const page: Page = async (main) => {
         "div",
         { class: "hero" },
         h("h1", {}, "Physics you can take apart"),
-        h("p", { class: "lead" }, "Cloth, particles, orbits, smoke and the numerical methods behind them. The whole engine runs in this tab: nothing is uploaded, and results are bit-identical to those of the command line."),
+        h(
+          "p",
+          { class: "lead" },
+          "Cloth, particles, orbits, smoke and the numerical methods behind them. The whole engine runs in this tab: nothing is uploaded, and results are bit-identical to those of the command line.",
+        ),
         h(
           "div",
           { class: "hero-actions" },

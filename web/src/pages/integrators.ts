@@ -1,9 +1,9 @@
 /** One system under two to six integrators, side by side: energy, phase, error, and the step that each can take. */
 import { asScene } from "../demo";
-import { check, choice, h, iconButton, setIcon, show, type Page } from "../dom";
+import { check, choice, h, iconButton, type Page, setIcon, show } from "../dom";
 import { EngineError } from "../engine/client";
 import type { Frame, Ledger, SceneInfo, Stability } from "../engine/protocol";
-import { curveColor, curveStyle, isDark, Plot, type Curve } from "../plot";
+import { type Curve, curveColor, curveStyle, isDark, Plot } from "../plot";
 import { engine } from "../session";
 import { cards, SCHEMES } from "../theory";
 
@@ -36,25 +36,43 @@ precision = "${precision}"
 fps = ${1 / h}
 frames = 1000000
 ${method}`;
-const dynamics = (scheme: string) => `[[system]]\nintegrator = "${scheme}"\n${ADAPTIVE.has(scheme) ? "adaptive = { tolerance = 1e-4 }" : "substeps = 1"}\n`;
+const dynamics = (scheme: string) =>
+  `[[system]]\nintegrator = "${scheme}"\n${ADAPTIVE.has(scheme) ? "adaptive = { tolerance = 1e-4 }" : "substeps = 1"}\n`;
 const tracers = (scheme: string) => dynamics(scheme).replace("[[system]]", '[[system]]\nmethod = "tracers"');
 const ADAPTIVE = new Set(["adaptive_euler", "dormand_prince"]);
 const W = 2 * Math.PI;
 
 const SYSTEMS: Record<string, System> = {
   spring: {
-    name: "Spring", about: "One mass on a spring, one oscillation per second, no damping. Its energy should be constant and its phase plot a circle.",
-    field: false, omega: W, steps: [0.002, 0.5], end: 20, object: "spring", zero: 0, axes: ["extension [m]", "v/ω [m]"],
+    name: "Spring",
+    about: "One mass on a spring, one oscillation per second, no damping. Its energy should be constant and its phase plot a circle.",
+    field: false,
+    omega: W,
+    steps: [0.002, 0.5],
+    end: 20,
+    object: "spring",
+    zero: 0,
+    axes: ["extension [m]", "v/ω [m]"],
     // A spring without a rest length is linear however far it goes.
-    toml: (s, h) => `${head("A mass on a spring", h, dynamics(s))}[world]\ngravity = [0, 0, 0]\n[[particles]]\nname = "spring"\nposition = [[0, 0, 0], [0.5, 0, 0]]\nmass = [1]\nradius = 0.08\npin = ["vertex 0"]\nspring = [{ between = [0, 1], stiffness = ${W * W}, rest_length = 0 }]\n[output]\ncolumns = ["position", "velocity"]\n`,
+    toml: (s, h) =>
+      `${head("A mass on a spring", h, dynamics(s))}[world]\ngravity = [0, 0, 0]\n[[particles]]\nname = "spring"\nposition = [[0, 0, 0], [0.5, 0, 0]]\nmass = [1]\nradius = 0.08\npin = ["vertex 0"]\nspring = [{ between = [0, 1], stiffness = ${W * W}, rest_length = 0 }]\n[output]\ncolumns = ["position", "velocity"]\n`,
     phase: (x, v) => [x[3], (v?.[3] ?? 0) / W],
     exact: (t) => [0.5 * Math.cos(W * t), 0, 0],
     theory: { page: "oscillator", tags: ["oscillator.1", "oscillator.2"] },
   },
   rusty: {
-    name: "Rusty spring", about: "The same spring with internal damping: the oscillation and its energy decay. A scheme should lose exactly as much energy as the spring.",
-    field: false, omega: W, steps: [0.002, 0.5], end: 12, object: "spring", zero: 0, axes: ["extension [m]", "v/ω [m]"],
-    toml: (s, h) => `${head("A rusty spring", h, dynamics(s))}[world]\ngravity = [0, 0, 0]\n[[particles]]\nname = "spring"\nposition = [[0, 0, 0], [1.5, 0, 0]]\nmass = [1]\nradius = 0.08\npin = ["vertex 0"]\nspring = [{ between = [0, 1], stiffness = ${W * W}, rest_length = 1, damping = 0.6 }]\n[output]\ncolumns = ["position", "velocity"]\n`,
+    name: "Rusty spring",
+    about:
+      "The same spring with internal damping: the oscillation and its energy decay. A scheme should lose exactly as much energy as the spring.",
+    field: false,
+    omega: W,
+    steps: [0.002, 0.5],
+    end: 12,
+    object: "spring",
+    zero: 0,
+    axes: ["extension [m]", "v/ω [m]"],
+    toml: (s, h) =>
+      `${head("A rusty spring", h, dynamics(s))}[world]\ngravity = [0, 0, 0]\n[[particles]]\nname = "spring"\nposition = [[0, 0, 0], [1.5, 0, 0]]\nmass = [1]\nradius = 0.08\npin = ["vertex 0"]\nspring = [{ between = [0, 1], stiffness = ${W * W}, rest_length = 1, damping = 0.6 }]\n[output]\ncolumns = ["position", "velocity"]\n`,
     phase: (x, v) => [x[3] - 1, (v?.[3] ?? 0) / W],
     exact: (t) => {
       const d = 0.3;
@@ -64,16 +82,33 @@ const SYSTEMS: Record<string, System> = {
     theory: { page: "oscillator", tags: ["oscillator.2", "oscillator.3"] },
   },
   pendulum: {
-    name: "Pendulum", about: "A mass on a stiff thread, released from the side. The thread, not the swing, limits the step.",
-    field: false, omega: 30, steps: [0.001, 0.2], end: 20, object: "bob", zero: 9.8 * 1.1, axes: ["x [m]", "z [m]"],
-    toml: (s, h) => `${head("A pendulum", h, dynamics(s))}[[particles]]\nname = "bob"\nposition = [[0, 0, 0], [1, 0, 0]]\nmass = [1]\nradius = 0.06\npin = ["vertex 0"]\nspring = [{ between = [0, 1], stiffness = 900, rest_length = 1 }]\n[output]\ncolumns = ["position", "velocity"]\n`,
+    name: "Pendulum",
+    about: "A mass on a stiff thread, released from the side. The thread, not the swing, limits the step.",
+    field: false,
+    omega: 30,
+    steps: [0.001, 0.2],
+    end: 20,
+    object: "bob",
+    zero: 9.8 * 1.1,
+    axes: ["x [m]", "z [m]"],
+    toml: (s, h) =>
+      `${head("A pendulum", h, dynamics(s))}[[particles]]\nname = "bob"\nposition = [[0, 0, 0], [1, 0, 0]]\nmass = [1]\nradius = 0.06\npin = ["vertex 0"]\nspring = [{ between = [0, 1], stiffness = 900, rest_length = 1 }]\n[output]\ncolumns = ["position", "velocity"]\n`,
     phase: (x) => [x[3], x[5]],
     theory: { page: "springs", tags: ["springs.1"] },
   },
   orbit: {
-    name: "Orbit", about: "A planet on an ellipse of eccentricity 0.5, with a period of 2π seconds. It needs short steps near the sun and could take long ones far away.",
-    field: false, omega: 4, steps: [0.005, 0.5], end: 63, object: "planet", zero: 0, axes: ["x [m]", "y [m]"],
-    toml: (s, h) => `${head("An orbit", h, dynamics(s))}[world]\ngravity = [0, 0, 0]\n[[particles]]\nname = "planet"\nposition = [[0.5, 0, 0]]\nvelocity = [[0, 1.7320508075688772, 0]]\nradius = 0.05\n[[force]]\nkind = "attraction"\ngm = 1\n[output]\ncolumns = ["position", "velocity"]\n`,
+    name: "Orbit",
+    about:
+      "A planet on an ellipse of eccentricity 0.5, with a period of 2π seconds. It needs short steps near the sun and could take long ones far away.",
+    field: false,
+    omega: 4,
+    steps: [0.005, 0.5],
+    end: 63,
+    object: "planet",
+    zero: 0,
+    axes: ["x [m]", "y [m]"],
+    toml: (s, h) =>
+      `${head("An orbit", h, dynamics(s))}[world]\ngravity = [0, 0, 0]\n[[particles]]\nname = "planet"\nposition = [[0.5, 0, 0]]\nvelocity = [[0, 1.7320508075688772, 0]]\nradius = 0.05\n[[force]]\nkind = "attraction"\ngm = 1\n[output]\ncolumns = ["position", "velocity"]\n`,
     phase: (x) => [x[0], x[1]],
     exact: (t) => {
       let e = t;
@@ -83,25 +118,51 @@ const SYSTEMS: Record<string, System> = {
     theory: { page: "orbits", tags: ["orbits.1", "orbits.2"] },
   },
   swirl: {
-    name: "Swirl", about: "A particle in a flow that rotates once in 2π seconds. Its path is a circle; forward Euler steps along the tangent and leaves it.",
-    field: true, omega: 1, steps: [0.01, 2.5], end: 25, object: "walker", zero: 0, axes: ["x [m]", "y [m]"],
-    toml: (s, h) => `${head("A swirl", h, tracers(s))}[[particles]]\nname = "walker"\nposition = [[1, 0, 0]]\nradius = 0.04\n[[field]]\nkind = "swirl"\nrate = 1\n[output]\ncolumns = ["position"]\n`,
+    name: "Swirl",
+    about:
+      "A particle in a flow that rotates once in 2π seconds. Its path is a circle; forward Euler steps along the tangent and leaves it.",
+    field: true,
+    omega: 1,
+    steps: [0.01, 2.5],
+    end: 25,
+    object: "walker",
+    zero: 0,
+    axes: ["x [m]", "y [m]"],
+    toml: (s, h) =>
+      `${head("A swirl", h, tracers(s))}[[particles]]\nname = "walker"\nposition = [[1, 0, 0]]\nradius = 0.04\n[[field]]\nkind = "swirl"\nrate = 1\n[output]\ncolumns = ["position"]\n`,
     phase: (x) => [x[0], x[1]],
     exact: (t) => [Math.cos(t), Math.sin(t), 0],
     theory: { page: "integrators", tags: ["integrators.1"] },
   },
   sink: {
-    name: "Sink", about: "A particle in a flow towards the centre, which it approaches as exp(−t) and never passes. A step longer than 1 overshoots, one longer than 2 diverges.",
-    field: true, omega: 1, steps: [0.05, 3], end: 16, object: "drop", zero: 0, axes: ["x [m]", "y [m]"],
-    toml: (s, h) => `${head("A sink", h, tracers(s))}[[particles]]\nname = "drop"\nposition = [[0.8, 0.6, 0]]\nradius = 0.04\n[[field]]\nkind = "sink"\nrate = 1\n[output]\ncolumns = ["position"]\n`,
+    name: "Sink",
+    about:
+      "A particle in a flow towards the centre, which it approaches as exp(−t) and never passes. A step longer than 1 overshoots, one longer than 2 diverges.",
+    field: true,
+    omega: 1,
+    steps: [0.05, 3],
+    end: 16,
+    object: "drop",
+    zero: 0,
+    axes: ["x [m]", "y [m]"],
+    toml: (s, h) =>
+      `${head("A sink", h, tracers(s))}[[particles]]\nname = "drop"\nposition = [[0.8, 0.6, 0]]\nradius = 0.04\n[[field]]\nkind = "sink"\nrate = 1\n[output]\ncolumns = ["position"]\n`,
     phase: (x) => [x[0], x[1]],
     exact: (t) => [0.8 * Math.exp(-t), 0.6 * Math.exp(-t), 0],
     theory: { page: "integrators", tags: ["integrators.1"] },
   },
   sheet: {
-    name: "Sheet", about: "A square of cloth held at two corners. The stiffest of its many modes limits the step.",
-    field: false, omega: 60, steps: [0.001, 0.1], end: 6, object: "sheet", zero: 0.2 * 9.8 * 0.5, axes: ["y [m]", "z [m]"],
-    toml: (s, h) => `${head("A sheet", h, dynamics(s), "single")}[[sheet]]\nname = "sheet"\nsize = [1, 1]\nresolution = [11, 11]\ncenter = [0, 0, 0]\nlinks = { structural = 60, shear = 20, bend = 1 }\npin = ["corner 0 0", "corner 1 0"]\n[output]\ncolumns = ["position", "velocity"]\n`,
+    name: "Sheet",
+    about: "A square of cloth held at two corners. The stiffest of its many modes limits the step.",
+    field: false,
+    omega: 60,
+    steps: [0.001, 0.1],
+    end: 6,
+    object: "sheet",
+    zero: 0.2 * 9.8 * 0.5,
+    axes: ["y [m]", "z [m]"],
+    toml: (s, h) =>
+      `${head("A sheet", h, dynamics(s), "single")}[[sheet]]\nname = "sheet"\nsize = [1, 1]\nresolution = [11, 11]\ncenter = [0, 0, 0]\nlinks = { structural = 60, shear = 20, bend = 1 }\npin = ["corner 0 0", "corner 1 0"]\n[output]\ncolumns = ["position", "velocity"]\n`,
     phase: (x) => [x[x.length - 2], x[x.length - 1]],
     theory: { page: "springs", tags: ["springs.1", "springs.2"] },
   },
@@ -121,7 +182,16 @@ const LECTURE: [string, { system: string; schemes: string[]; h: number }][] = [
   ["A sheet that explodes", { system: "sheet", schemes: ["forward_euler", "symplectic_euler", "implicit_euler"], h: 0.0125 }],
 ];
 
-const plain = (scheme: string) => scheme.replace(/_/g, " ").replace("euler", "Euler").replace("heun", "Heun").replace("rk4", "RK4").replace("verlet", "Verlet").replace("dormand prince", "Dormand–Prince").replace("bdf2", "BDF2").replace(/^./, (c) => c.toUpperCase());
+const plain = (scheme: string) =>
+  scheme
+    .replace(/_/g, " ")
+    .replace("euler", "Euler")
+    .replace("heun", "Heun")
+    .replace("rk4", "RK4")
+    .replace("verlet", "Verlet")
+    .replace("dormand prince", "Dormand–Prince")
+    .replace("bdf2", "BDF2")
+    .replace(/^./, (c) => c.toUpperCase());
 
 /** Energy after n steps over that at the start, on an undamped spring with z = ω h, where a formula is exact. */
 const PREDICTED: Record<string, (z: number, n: number) => number> = {
@@ -179,77 +249,176 @@ export const page: Page = async (main) => {
   let energy = make("Energy relative to the initial energy against time", log);
   const error = make("Distance from the exact solution against time", true);
   const energyTitle = h("h2", {}, "Energy");
-  const energyBox = h("div", { class: "chart" }, h("div", { class: "chart-head" }, energyTitle, check("Logarithmic", log, (on) => {
-    log = on;
-    rescale();
-  })), energy.element);
+  const energyBox = h(
+    "div",
+    { class: "chart" },
+    h(
+      "div",
+      { class: "chart-head" },
+      energyTitle,
+      check("Logarithmic", log, (on) => {
+        log = on;
+        rescale();
+      }),
+    ),
+    energy.element,
+  );
   const phase = h("canvas", { class: "phase", role: "img", "aria-label": "Paths of all integrators and the exact path" });
   const phaseTitle = h("h2", {}, "Phase");
   const phaseBox = h("div", { class: "chart" }, h("div", { class: "chart-head" }, phaseTitle, h("span", { class: "muted axes" })), phase);
-  const errorBox = h("div", { class: "chart" }, h("div", { class: "chart-head" }, h("h2", {}, "Error"), h("span", { class: "muted axes" }, "distance from the exact solution [m]")), error.element);
+  const errorBox = h(
+    "div",
+    { class: "chart" },
+    h("div", { class: "chart-head" }, h("h2", {}, "Error"), h("span", { class: "muted axes" }, "distance from the exact solution [m]")),
+    error.element,
+  );
   const stepOut = h("output", { id: "step" });
-  const slider = h("input", { type: "range", min: 0, max: 1, step: 0.001, id: "h", "aria-label": "Step h", oninput: () => {
-    const [low, high] = SYSTEMS[system].steps;
-    step = Number((low * (high / low) ** Number(slider.value)).toPrecision(3));
-    stepOut.textContent = `${show(step)} s`;
-    slider.setAttribute("aria-valuetext", `${show(step)} seconds`);
-    drawMarks();
-    clearTimeout(timer);
-    timer = window.setTimeout(() => void restart(), 200);
-  } });
+  const slider = h("input", {
+    type: "range",
+    min: 0,
+    max: 1,
+    step: 0.001,
+    id: "h",
+    "aria-label": "Step h",
+    oninput: () => {
+      const [low, high] = SYSTEMS[system].steps;
+      step = Number((low * (high / low) ** Number(slider.value)).toPrecision(3));
+      stepOut.textContent = `${show(step)} s`;
+      slider.setAttribute("aria-valuetext", `${show(step)} seconds`);
+      drawMarks();
+      clearTimeout(timer);
+      timer = window.setTimeout(() => void restart(), 200);
+    },
+  });
   let timer = 0;
   const marks = h("div", { class: "marks", "aria-hidden": "true" });
   const limitText = h("p", { class: "doc" });
-  const which = choice("System", Object.entries(SYSTEMS).map(([k, s]) => [k, s.name]), system, (v) => {
-    system = v;
-    const [low, high] = SYSTEMS[v].steps;
-    step = Number(Math.sqrt(low * high).toPrecision(2));
-    schemes = schemes.filter((s) => allowed(s));
-    if (schemes.length < 2) schemes = ["forward_euler", "rk4"];
-    void restart();
-  });
+  const which = choice(
+    "System",
+    Object.entries(SYSTEMS).map(([k, s]) => [k, s.name]),
+    system,
+    (v) => {
+      system = v;
+      const [low, high] = SYSTEMS[v].steps;
+      step = Number(Math.sqrt(low * high).toPrecision(2));
+      schemes = schemes.filter((s) => allowed(s));
+      if (schemes.length < 2) schemes = ["forward_euler", "rk4"];
+      void restart();
+    },
+  );
   const boxes = h("fieldset", { class: "schemes" }, h("legend", {}, "Integrators (two to six)"));
-  const lecture = h("ul", { class: "lecture", "aria-label": "Presets from the lecture" }, ...LECTURE.map(([name, set], k) => h("li", {}, h("button", { type: "button", class: "button", "data-set": k, onclick: () => {
-    ({ system, h: step } = set);
-    schemes = [...set.schemes];
-    which.querySelector("select")!.value = system;
-    void restart();
-  } }, name))));
+  const lecture = h(
+    "ul",
+    { class: "lecture", "aria-label": "Presets from the lecture" },
+    ...LECTURE.map(([name, set], k) =>
+      h(
+        "li",
+        {},
+        h(
+          "button",
+          {
+            type: "button",
+            class: "button",
+            "data-set": k,
+            onclick: () => {
+              ({ system, h: step } = set);
+              schemes = [...set.schemes];
+              which.querySelector("select")!.value = system;
+              void restart();
+            },
+          },
+          name,
+        ),
+      ),
+    ),
+  );
   const theory = h("section", { class: "beside", "aria-label": "Theory" });
   const note = h("p", { class: "note", role: "status" });
 
   main.append(
-    h("div", { class: "lab" },
-      h("section", { class: "view", "aria-label": "Runs" },
-        h("div", { class: "lab-head" }, h("h1", {}, "Integrators side by side"),
-          h("div", { class: "actions" }, play, iconButton("reset", "Back to the start", () => void restart()), choice("Speed", [["0.25", "0.25 ×"], ["1", "1 ×"], ["4", "4 ×"]], "1", (v) => (speed = Number(v))), clock)),
-        about, lecture, alert, board,
-        h("div", { class: "charts" }, energyBox, phaseBox, errorBox)),
-      h("aside", { class: "side scrolls", "aria-label": "Settings", tabindex: 0 },
-        h("div", { class: "controls" },
-          h("section", { class: "card" }, h("h2", {}, "System and step"), which,
-            h("div", { class: "slide" }, h("div", { class: "slide-head" }, h("label", { for: "h" }, "Step h"), stepOut), slider, marks, limitText)),
-          h("section", { class: "card" }, boxes, note))),
-      theory),
+    h(
+      "div",
+      { class: "lab" },
+      h(
+        "section",
+        { class: "view", "aria-label": "Runs" },
+        h(
+          "div",
+          { class: "lab-head" },
+          h("h1", {}, "Integrators side by side"),
+          h(
+            "div",
+            { class: "actions" },
+            play,
+            iconButton("reset", "Back to the start", () => void restart()),
+            choice(
+              "Speed",
+              [
+                ["0.25", "0.25 ×"],
+                ["1", "1 ×"],
+                ["4", "4 ×"],
+              ],
+              "1",
+              (v) => (speed = Number(v)),
+            ),
+            clock,
+          ),
+        ),
+        about,
+        lecture,
+        alert,
+        board,
+        h("div", { class: "charts" }, energyBox, phaseBox, errorBox),
+      ),
+      h(
+        "aside",
+        { class: "side scrolls", "aria-label": "Settings", tabindex: 0 },
+        h(
+          "div",
+          { class: "controls" },
+          h(
+            "section",
+            { class: "card" },
+            h("h2", {}, "System and step"),
+            which,
+            h(
+              "div",
+              { class: "slide" },
+              h("div", { class: "slide-head" }, h("label", { for: "h" }, "Step h"), stepOut),
+              slider,
+              marks,
+              limitText,
+            ),
+          ),
+          h("section", { class: "card" }, boxes, note),
+        ),
+      ),
+      theory,
+    ),
   );
 
   const allowed = (scheme: string) => !SYSTEMS[system].field || FOR_FIELDS.has(scheme);
 
   const drawBoxes = () => {
-    boxes.replaceChildren(boxes.firstElementChild!, ...Object.keys(SCHEMES).filter(allowed).map((s) => {
-      const box = check(plain(s), schemes.includes(s), (on) => {
-        const next = on ? [...schemes, s] : schemes.filter((x) => x !== s);
-        if (next.length < 2 || next.length > 6) {
-          note.textContent = "Select two to six.";
-          (box.querySelector("input") as HTMLInputElement).checked = !on;
-          return;
-        }
-        note.textContent = "";
-        schemes = Object.keys(SCHEMES).filter((x) => next.includes(x));
-        void restart();
-      });
-      return box;
-    }));
+    boxes.replaceChildren(
+      boxes.firstElementChild!,
+      ...Object.keys(SCHEMES)
+        .filter(allowed)
+        .map((s) => {
+          const box = check(plain(s), schemes.includes(s), (on) => {
+            const next = on ? [...schemes, s] : schemes.filter((x) => x !== s);
+            if (next.length < 2 || next.length > 6) {
+              note.textContent = "Select two to six.";
+              (box.querySelector("input") as HTMLInputElement).checked = !on;
+              return;
+            }
+            note.textContent = "";
+            schemes = Object.keys(SCHEMES).filter((x) => next.includes(x));
+            void restart();
+          });
+          return box;
+        }),
+    );
   };
 
   const openScene = (scheme: string) => asScene(SYSTEMS[system].toml(scheme, step), Math.max(1, Math.ceil(SYSTEMS[system].end / step)));
@@ -264,11 +433,20 @@ export const page: Page = async (main) => {
       if (!limit) return [];
       const at = Math.log(limit / low) / Math.log(high / low);
       if (!(at >= 0 && at <= 1)) return [];
-      return [h("i", { style: `left:calc(${at} * (100% - 1rem) + 0.5rem);background:${curveStyle(k)}`, title: `${plain(r.scheme)}: ${show(limit, 3)} s` })];
+      return [
+        h("i", {
+          style: `left:calc(${at} * (100% - 1rem) + 0.5rem);background:${curveStyle(k)}`,
+          title: `${plain(r.scheme)}: ${show(limit, 3)} s`,
+        }),
+      ];
     });
     marks.replaceChildren(...placed);
     const z = limits.length && system === "spring" ? `ω h = ${show(W * step, 3)}. ` : "";
-    limitText.textContent = z + (placed.length ? "The marks are the largest usable steps, predicted from the stiffest mode: energy grows less than a thousandfold in a hundred periods." : "");
+    limitText.textContent =
+      z +
+      (placed.length
+        ? "The marks are the largest usable steps, predicted from the stiffest mode: energy grows less than a thousandfold in a hundred periods."
+        : "");
   };
 
   const judge = (scheme: string): string => {
@@ -277,8 +455,11 @@ export const page: Page = async (main) => {
     if (!limit) return SYSTEMS[system].field ? "" : "no prediction";
     if (limit.stable === null) return "stable for every step";
     if (step <= limit.stable * (1 + 1e-9)) return `stable below ${show(limit.stable, 3)} s`;
-    if (limit.stable === 0 && (limit.usable === null || step <= limit.usable)) return `grows slowly; usable below ${show(limit.usable, 3)} s`;
-    return limit.stable === 0 ? `no step is stable; usable below ${show(limit.usable, 3)} s` : `too long: stable below ${show(limit.stable, 3)} s`;
+    if (limit.stable === 0 && (limit.usable === null || step <= limit.usable))
+      return `grows slowly; usable below ${show(limit.usable, 3)} s`;
+    return limit.stable === 0
+      ? `no step is stable; usable below ${show(limit.usable, 3)} s`
+      : `too long: stable below ${show(limit.stable, 3)} s`;
   };
 
   const quantityOf = (run: Run, ledger: Ledger | undefined, frame: Frame | null): number | null => {
@@ -303,14 +484,58 @@ export const page: Page = async (main) => {
     }
     drawBoxes();
     alert.hidden = true;
-    for (const old of runs) void engine().drop(old.world).catch(() => {});
+    for (const old of runs)
+      void engine()
+        .drop(old.world)
+        .catch(() => {});
     runs = schemes.map((scheme, k) => {
       const canvas = h("canvas", { "aria-hidden": "true" });
       const ratio = h("output", { class: "big", "data-ratio": scheme, "aria-live": "off" }, "1");
       const verdict = h("p", { class: "verdict" });
       const predicted = h("p", { class: "muted predicted" });
-      const card = h("article", { class: "run", "data-scheme": scheme, style: `--curve:${curveStyle(k)}` }, h("div", { class: "run-head" }, h("h2", {}, plain(scheme)), h("button", { type: "button", class: "as-scene", "aria-label": `Open ${plain(scheme)} as a scene`, title: "Open as a scene, with text and values", onclick: () => void openScene(scheme) }, "↗")), canvas, h("div", { class: "run-figure" }, h("span", { class: "muted" }, s.field ? "r / r₀" : "E / E₀"), ratio), predicted, verdict);
-      return { world: 10 + k, scheme, info: null, frame: null, n: 0, quantity: [], error: [], path: [], first: 0, dead: "", steps: 0, shortest: Infinity, canvas, ratio, verdict, predicted, card };
+      const card = h(
+        "article",
+        { class: "run", "data-scheme": scheme, style: `--curve:${curveStyle(k)}` },
+        h(
+          "div",
+          { class: "run-head" },
+          h("h2", {}, plain(scheme)),
+          h(
+            "button",
+            {
+              type: "button",
+              class: "as-scene",
+              "aria-label": `Open ${plain(scheme)} as a scene`,
+              title: "Open as a scene, with text and values",
+              onclick: () => void openScene(scheme),
+            },
+            "↗",
+          ),
+        ),
+        canvas,
+        h("div", { class: "run-figure" }, h("span", { class: "muted" }, s.field ? "r / r₀" : "E / E₀"), ratio),
+        predicted,
+        verdict,
+      );
+      return {
+        world: 10 + k,
+        scheme,
+        info: null,
+        frame: null,
+        n: 0,
+        quantity: [],
+        error: [],
+        path: [],
+        first: 0,
+        dead: "",
+        steps: 0,
+        shortest: Infinity,
+        canvas,
+        ratio,
+        verdict,
+        predicted,
+        card,
+      };
     });
     board.replaceChildren(...runs.map((r) => r.card));
     energyTitle.textContent = s.field ? "Radius, r / r₀" : "Energy, E / E₀";
@@ -320,15 +545,23 @@ export const page: Page = async (main) => {
     rescale();
     error.setCurves(curves());
     try {
-      await Promise.all(runs.map(async (run) => {
-        run.info = await engine().load(s.toml(run.scheme, step), { world: run.world });
-        const frame = await engine().read({}, run.world);
-        if (own !== age) return;
-        run.first = frame.ledgers[0]?.energy ?? 0;
-        take(run, frame);
-      }));
+      await Promise.all(
+        runs.map(async (run) => {
+          run.info = await engine().load(s.toml(run.scheme, step), { world: run.world });
+          const frame = await engine().read({}, run.world);
+          if (own !== age) return;
+          run.first = frame.ledgers[0]?.energy ?? 0;
+          take(run, frame);
+        }),
+      );
       if (own !== age) return;
-      limits = s.field ? flowLimits(system) : (await engine().stability(runs[0].world).catch(() => []))[0]?.limits ?? [];
+      limits = s.field
+        ? flowLimits(system)
+        : ((
+            await engine()
+              .stability(runs[0].world)
+              .catch(() => [])
+          )[0]?.limits ?? []);
     } catch (e) {
       if (own !== age) return;
       if (!(e instanceof EngineError)) throw e;
@@ -339,7 +572,9 @@ export const page: Page = async (main) => {
     if (own !== age) return;
     drawMarks();
     draw();
-    void cards([s.theory, { page: "integrators", tags: [...new Set(schemes.map((x) => `integrators.${SCHEMES[x]}`))] }]).then((made) => own === age && theory.replaceChildren(...made));
+    void cards([s.theory, { page: "integrators", tags: [...new Set(schemes.map((x) => `integrators.${SCHEMES[x]}`))] }]).then(
+      (made) => own === age && theory.replaceChildren(...made),
+    );
     main.dataset.ready = "true";
     if (!still && !closed) start();
   };
@@ -395,7 +630,9 @@ export const page: Page = async (main) => {
       const predict = system === "spring" ? PREDICTED[run.scheme] : undefined;
       const z = W * step;
       run.predicted.textContent = predict ? `formula: ${show(predict(z, run.n), 4)}` : "";
-      run.verdict.textContent = run.dead || (ADAPTIVE.has(run.scheme) && run.steps ? `${run.steps} steps so far, the shortest ${show(run.shortest, 2)} s` : judge(run.scheme));
+      run.verdict.textContent =
+        run.dead ||
+        (ADAPTIVE.has(run.scheme) && run.steps ? `${run.steps} steps so far, the shortest ${show(run.shortest, 2)} s` : judge(run.scheme));
       run.verdict.classList.toggle("bad", !!run.dead || /too long|no step/.test(run.verdict.textContent));
       sketch(run, curveColor(k));
     });
@@ -404,13 +641,14 @@ export const page: Page = async (main) => {
       const stride = Math.max(1, Math.ceil(most / 1500));
       const rows = Math.floor(most / stride) + 1;
       const xs = Array.from({ length: rows }, (_, i) => i * stride * step);
-      const thin = (list: (number | null)[], scale: number) => xs.map((_, i) => {
-        for (let j = i * stride; j < (i + 1) * stride; j++) {
-          const v = list[j];
-          if (v !== null && v !== undefined && Number.isFinite(v) && (!log || scale === 0 || v / scale > 0)) return scale ? v / scale : v;
-        }
-        return undefined as unknown as null;
-      });
+      const thin = (list: (number | null)[], scale: number) =>
+        xs.map((_, i) => {
+          for (let j = i * stride; j < (i + 1) * stride; j++) {
+            const v = list[j];
+            if (v !== null && v !== undefined && Number.isFinite(v) && (!log || scale === 0 || v / scale > 0)) return scale ? v / scale : v;
+          }
+          return undefined as unknown as null;
+        });
       energy.set([xs, ...runs.map((r) => thin(r.quantity, r.quantity[0] || 1))]);
       if (s.exact) error.set([xs, ...runs.map((r) => thin(r.error, 0))]);
       drawPhase();
@@ -436,9 +674,17 @@ export const page: Page = async (main) => {
     const [c, w, hgt] = fit(run.canvas);
     if (!x || !w) return;
     const up = system === "pendulum" || system === "sheet" ? 2 : 1;
-    const frames: Record<string, [number, number, number]> = { spring: [-0.2, 0, 0.95], rusty: [0.8, 0, 0.95], pendulum: [0, -0.45, 1.35], orbit: [-0.5, 0, 1.35], swirl: [0, 0, 1.7], sink: [0, 0, 1.3], sheet: [0, -0.35, 0.95] };
+    const frames: Record<string, [number, number, number]> = {
+      spring: [-0.2, 0, 0.95],
+      rusty: [0.8, 0, 0.95],
+      pendulum: [0, -0.45, 1.35],
+      orbit: [-0.5, 0, 1.35],
+      swirl: [0, 0, 1.7],
+      sink: [0, 0, 1.3],
+      sheet: [0, -0.35, 0.95],
+    };
     const [mx, my, half] = frames[system];
-    const scale = Math.min(w, hgt * 1.6) / (2 * half) / (hgt < w ? Math.max(1, (w / hgt) / 1.6) : 1);
+    const scale = Math.min(w, hgt * 1.6) / (2 * half) / (hgt < w ? Math.max(1, w / hgt / 1.6) : 1);
     const put = (i: number): [number, number] => {
       const side = system === "sheet" ? x[3 * i] + 0.45 * x[3 * i + 1] : x[3 * i];
       return [w / 2 + (side - mx) * scale, hgt / 2 - (x[3 * i + up] - my) * scale];
@@ -449,7 +695,8 @@ export const page: Page = async (main) => {
       c.strokeStyle = color;
       c.globalAlpha = 0.5;
       c.beginPath();
-      for (const [i, p] of run.path.slice(-400).entries()) c[i ? "lineTo" : "moveTo"](w / 2 + (p[0] - mx) * scale, hgt / 2 - (p[1] - my) * scale);
+      for (const [i, p] of run.path.slice(-400).entries())
+        c[i ? "lineTo" : "moveTo"](w / 2 + (p[0] - mx) * scale, hgt / 2 - (p[1] - my) * scale);
       c.stroke();
       c.globalAlpha = 1;
       c.fillStyle = ink;
@@ -469,10 +716,11 @@ export const page: Page = async (main) => {
         c.moveTo(...a);
         for (let i = 1; i < 16; i++) c.lineTo(a[0] + ((b[0] - a[0]) * i) / 16, a[1] + (i % 2 ? 6 : -6));
         c.lineTo(...b);
-      } else for (let i = 0; i < links.length; i += 2) {
-        c.moveTo(...put(links[i]));
-        c.lineTo(...put(links[i + 1]));
-      }
+      } else
+        for (let i = 0; i < links.length; i += 2) {
+          c.moveTo(...put(links[i]));
+          c.lineTo(...put(links[i + 1]));
+        }
       c.stroke();
       c.globalAlpha = 1;
     }
@@ -495,7 +743,8 @@ export const page: Page = async (main) => {
     if (!w) return;
     const exact: [number, number][] = [];
     if (s.exact && s.field) for (let i = 0; i <= 240; i++) exact.push(s.exact((i / 240) * 6.3).slice(0, 2) as [number, number]);
-    else if (s.exact && system === "orbit") for (let i = 0; i <= 240; i++) exact.push(s.exact((i / 240) * 6.2832).slice(0, 2) as [number, number]);
+    else if (s.exact && system === "orbit")
+      for (let i = 0; i <= 240; i++) exact.push(s.exact((i / 240) * 6.2832).slice(0, 2) as [number, number]);
     else if (system === "spring") for (let i = 0; i <= 120; i++) exact.push([0.5 * Math.cos(i / 19), -0.5 * Math.sin(i / 19)]);
     // As large as what is of interest; a blow-up leaves the picture.
     const size = (list: [number, number][]) => list.reduce((m, [a, b]) => Math.max(m, Math.abs(a), Math.abs(b)), 0);
@@ -507,13 +756,31 @@ export const page: Page = async (main) => {
       c.lineWidth = width;
       c.setLineDash(dash);
       c.beginPath();
-      list.forEach(([a, b], i) => Number.isFinite(a + b) && c[i ? "lineTo" : "moveTo"](w / 2 + Math.max(-9e3, Math.min(9e3, a * scale)), hgt / 2 - Math.max(-9e3, Math.min(9e3, b * scale))));
+      list.forEach(
+        ([a, b], i) =>
+          Number.isFinite(a + b) &&
+          c[i ? "lineTo" : "moveTo"](w / 2 + Math.max(-9e3, Math.min(9e3, a * scale)), hgt / 2 - Math.max(-9e3, Math.min(9e3, b * scale))),
+      );
       c.stroke();
       c.setLineDash([]);
     };
     const grid = getComputedStyle(document.documentElement).getPropertyValue("--line");
-    line([[-half * 9, 0], [half * 9, 0]], grid, 1);
-    line([[0, -half * 9], [0, half * 9]], grid, 1);
+    line(
+      [
+        [-half * 9, 0],
+        [half * 9, 0],
+      ],
+      grid,
+      1,
+    );
+    line(
+      [
+        [0, -half * 9],
+        [0, half * 9],
+      ],
+      grid,
+      1,
+    );
     runs.forEach((r, k) => line(r.path.slice(-1200), curveColor(k), 1.5));
     line(exact, isDark() ? "#ffffff" : "#000000", 1, [2, 4]);
     runs.forEach((r, k) => {
@@ -570,19 +837,21 @@ export const page: Page = async (main) => {
     // Paths want every step where steps are long.
     const each = s.field || step > 0.02 ? 1 : frames;
     for (let done = 0; done < frames && own === age; done += each) {
-      await Promise.all(runs.map(async (run) => {
-        if (run.dead) return;
-        try {
-          const frame = await engine().step({ frames: Math.min(each, frames - done) }, run.world);
-          if (own === age) take(run, frame);
-        } catch (e) {
-          if (own !== age) return;
-          if (!(e instanceof EngineError)) throw e;
-          run.dead = `blew up in step ${run.n + 1}, at ${show((run.n + 1) * step, 3)} s: the engine stops at a thousandfold energy`;
-          run.card.dataset.dead = "true";
-          if (e.failure.kind !== "step") run.dead = e.failure.message.split("\n")[0];
-        }
-      }));
+      await Promise.all(
+        runs.map(async (run) => {
+          if (run.dead) return;
+          try {
+            const frame = await engine().step({ frames: Math.min(each, frames - done) }, run.world);
+            if (own === age) take(run, frame);
+          } catch (e) {
+            if (own !== age) return;
+            if (!(e instanceof EngineError)) throw e;
+            run.dead = `blew up in step ${run.n + 1}, at ${show((run.n + 1) * step, 3)} s: the engine stops at a thousandfold energy`;
+            run.card.dataset.dead = "true";
+            if (e.failure.kind !== "step") run.dead = e.failure.message.split("\n")[0];
+          }
+        }),
+      );
     }
     busy = false;
     if (own === age) draw(false);
@@ -612,13 +881,17 @@ export const page: Page = async (main) => {
     sized.disconnect();
     energy.close();
     error.close();
-    for (const run of runs) void engine().drop(run.world).catch(() => {});
+    for (const run of runs)
+      void engine()
+        .drop(run.world)
+        .catch(() => {});
   };
 };
 
 /** Limits on the two flows, which are linear: |1 + h λ| and its like. */
 function flowLimits(system: string): Stability["limits"] {
-  const stable: Record<string, number> = system === "sink" ? { forward_euler: 2, midpoint: 2, heun: 2, rk4: 2.785 } : { forward_euler: 0, midpoint: 0, heun: 0, rk4: 2.828 };
+  const stable: Record<string, number> =
+    system === "sink" ? { forward_euler: 2, midpoint: 2, heun: 2, rk4: 2.785 } : { forward_euler: 0, midpoint: 0, heun: 0, rk4: 2.828 };
   const usable: Record<string, number> = system === "sink" ? stable : { forward_euler: 0.011, midpoint: 0.353, heun: 0.353, rk4: 2.828 };
   return Object.keys(stable).map((integrator) => ({ integrator, stable: stable[integrator], usable: usable[integrator] }));
 }

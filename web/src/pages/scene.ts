@@ -1,28 +1,36 @@
 /** One scene: picture, playback, energy, its values, its text, its theory. */
 import { Comparison } from "../compare";
-import { check, choice, h, iconButton, saveAs, say, show, svg, ICONS, type Page } from "../dom";
+import { check, choice, h, ICONS, iconButton, type Page, saveAs, say, show, svg } from "../dom";
 import { want } from "../drop";
+import type { Editor } from "../editor";
 import { EngineError } from "../engine/client";
 import type { Cure, SceneInfo, Value } from "../engine/protocol";
 import { FamilySwitches } from "../families";
-import { familiesOf, FAMILIES } from "../links";
+import { FAMILIES, familiesOf } from "../links";
 import { Panel } from "../panel";
-import { legend, Plot, type Curve } from "../plot";
+import { type Curve, legend, Plot } from "../plot";
+import { pointers } from "../pointer";
 import { saving } from "../saving";
-import { engine } from "../session";
-import { literal, valueOf } from "../values";
 import { beside, titleOf } from "../scenes";
+import { engine } from "../session";
 import { addressOf } from "../share";
-import { begin, source, toShare, type Source } from "../source";
+import { begin, type Source, source, toShare } from "../source";
 import { cards, topics } from "../theory";
 import { transport } from "../transport";
-import { pointers } from "../pointer";
+import { literal, valueIn } from "../values";
 import { gridsOf, massesOf } from "../view/scenery";
 import { reducedMotion, Viewer } from "../viewer";
-import type { Editor } from "../editor";
 
 /** Columns of grids that can be shown, and how they are called. */
-const FIELDS: [string, string][] = [["density", "Density"], ["temperature", "Temperature"], ["pressure", "Pressure"], ["speed", "Speed"], ["vorticity", "Vorticity"], ["divergence", "Divergence"], ["fuel", "Fuel"]];
+const FIELDS: [string, string][] = [
+  ["density", "Density"],
+  ["temperature", "Temperature"],
+  ["pressure", "Pressure"],
+  ["speed", "Speed"],
+  ["vorticity", "Vorticity"],
+  ["divergence", "Divergence"],
+  ["fuel", "Fuel"],
+];
 
 /** Values that only say how a scene starts: a world that goes on would never look at them. */
 const STARTS = /^(galaxy\.|particles\.\d+\.(position|velocity|cloud)|(sheet|block)\.\d+\.(center|rotate))/;
@@ -33,18 +41,35 @@ export const page: Page = async (main, rest) => {
     start = await source(rest);
   } catch (error) {
     document.title = "tumble";
-    main.append(h("div", { class: "narrow" }, h("h1", {}, "The scene cannot be opened"), h("p", {}, String((error as Error).message ?? error)), h("p", {}, h("a", { href: "#/" }, "To the gallery"))));
+    main.append(
+      h(
+        "div",
+        { class: "narrow" },
+        h("h1", {}, "The scene cannot be opened"),
+        h("p", {}, String((error as Error).message ?? error)),
+        h("p", {}, h("a", { href: "#/" }, "To the gallery")),
+      ),
+    );
     return () => {};
   }
 
   // Left before its text came.
   if (!main.isConnected) return () => {};
 
-  const viewer = new Viewer(main, "Picture of the scene. Space plays and pauses, comma and period step by frames, semicolon by sub-steps, arrows rotate the view, plus and minus zoom, 0 resets the view.", true, (failure) => {
-    if (failure.kind !== "step") return null;
-    const button: HTMLButtonElement = h("button", { type: "button", class: "button", onclick: () => void cures(button) }, "Search for a cure");
-    return button;
-  });
+  const viewer = new Viewer(
+    main,
+    "Picture of the scene. Space plays and pauses, comma and period step by frames, semicolon by sub-steps, arrows rotate the view, plus and minus zoom, 0 resets the view.",
+    true,
+    (failure) => {
+      if (failure.kind !== "step") return null;
+      const button: HTMLButtonElement = h(
+        "button",
+        { type: "button", class: "button", onclick: () => void cures(button) },
+        "Search for a cure",
+      );
+      return button;
+    },
+  );
   const { session, stage, canvas, alert } = viewer;
   session.each = session.compares = true;
   const sceneId = h("p", { class: "scene-id" }, start.id ?? start.name);
@@ -57,7 +82,12 @@ export const page: Page = async (main, rest) => {
     { label: "total", color: 0, width: 2.25 },
     { label: "total, previous branch", color: 0, dash: [4, 4], width: 1.25 },
   ];
-  const energy = new Plot(energyCurves, { label: "Energies against time", x: "time [s]", height: 140, mark: () => session.shown?.time ?? null });
+  const energy = new Plot(energyCurves, {
+    label: "Energies against time",
+    x: "time [s]",
+    height: 140,
+    mark: () => session.shown?.time ?? null,
+  });
   const energyKey = legend(energyCurves);
   const hashBox = h("output", { class: "hash", "aria-label": "State hash" }, "–");
   const facts = h("dl", { class: "facts" });
@@ -69,16 +99,30 @@ export const page: Page = async (main, rest) => {
   const textTab = h("div", { id: "tab-text", role: "tabpanel", "aria-labelledby": "t-text", hidden: true, class: "text-tab" });
   const theoryTab = h("div", { id: "tab-theory", role: "tabpanel", "aria-labelledby": "t-theory", hidden: true });
   const factsTab = h("div", { id: "tab-facts", role: "tabpanel", "aria-labelledby": "t-facts", hidden: true }, facts);
-  const tabs: [string, string, HTMLElement][] = [["values", "Values", valuesTab], ["text", "Text", textTab], ["theory", "Theory", theoryTab], ["facts", "Facts", factsTab]];
+  const tabs: [string, string, HTMLElement][] = [
+    ["values", "Values", valuesTab],
+    ["text", "Text", textTab],
+    ["theory", "Theory", theoryTab],
+    ["facts", "Facts", factsTab],
+  ];
   const buttons = tabs.map(([id, label], k) =>
-    h("button", {
-      id: `t-${id}`, type: "button", role: "tab", "aria-selected": k === 0 ? "true" : "false", "aria-controls": `tab-${id}`, tabindex: k === 0 ? 0 : -1,
-      onclick: () => choose(k),
-      onkeydown: (event: KeyboardEvent) => {
-        const step = event.key === "ArrowRight" ? 1 : event.key === "ArrowLeft" ? -1 : 0;
-        if (step) choose((k + step + tabs.length) % tabs.length, true);
+    h(
+      "button",
+      {
+        id: `t-${id}`,
+        type: "button",
+        role: "tab",
+        "aria-selected": k === 0 ? "true" : "false",
+        "aria-controls": `tab-${id}`,
+        tabindex: k === 0 ? 0 : -1,
+        onclick: () => choose(k),
+        onkeydown: (event: KeyboardEvent) => {
+          const step = event.key === "ArrowRight" ? 1 : event.key === "ArrowLeft" ? -1 : 0;
+          if (step) choose((k + step + tabs.length) % tabs.length, true);
+        },
       },
-    }, label),
+      label,
+    ),
   );
   const choose = (k: number, focus = false) => {
     tabs.forEach(([, , panel], i) => {
@@ -106,18 +150,48 @@ export const page: Page = async (main, rest) => {
           "div",
           { class: "lab-head" },
           h("div", {}, title, sceneId),
-          h("div", { class: "actions" }, shareButton, ...saved.buttons, iconButton("frame", "Reset to the scene's camera", () => stage.goHome())),
+          h(
+            "div",
+            { class: "actions" },
+            shareButton,
+            ...saved.buttons,
+            iconButton("frame", "Reset to the scene's camera", () => stage.goHome()),
+          ),
         ),
         alert,
-        others.length > 1 ? h("nav", { class: "others", "aria-label": "Similar scenes" }, ...others.map((s) => h("a", { href: `#/scene/${s.id}`, "aria-current": s.id === start.id ? "page" : false }, s.name.replace(/[_-]/g, " ")))) : null,
+        others.length > 1
+          ? h(
+              "nav",
+              { class: "others", "aria-label": "Similar scenes" },
+              ...others.map((s) =>
+                h("a", { href: `#/scene/${s.id}`, "aria-current": s.id === start.id ? "page" : false }, s.name.replace(/[_-]/g, " ")),
+              ),
+            )
+          : null,
         viewer.box,
         transport(session),
         lookBar,
         comparison.bar,
-        h("div", { class: "books" }, h("div", { class: "energy" }, h("h2", {}, "Energy", h("span", { class: "unit" }, "J")), energyKey.element, energy.element), comparison.chart),
-        h("p", { class: "hash-line" }, "State hash ", hashBox, h("span", { class: "muted" }, " identical on every machine, in a tab and on the command line")),
+        h(
+          "div",
+          { class: "books" },
+          h("div", { class: "energy" }, h("h2", {}, "Energy", h("span", { class: "unit" }, "J")), energyKey.element, energy.element),
+          comparison.chart,
+        ),
+        h(
+          "p",
+          { class: "hash-line" },
+          "State hash ",
+          hashBox,
+          h("span", { class: "muted" }, " identical on every machine, in a tab and on the command line"),
+        ),
       ),
-      h("aside", { class: "side", "aria-label": "The scene" }, h("div", { class: "tabs", role: "tablist", "aria-label": "The scene" }, ...buttons), ...tabs.map((t) => t[2])),
+      h(
+        "aside",
+        { class: "side", "aria-label": "The scene" },
+        h("div", { class: "tabs", role: "tablist", "aria-label": "The scene" }, ...buttons),
+        ...tabs.map((t) => t[2]),
+      ),
     ),
   );
 
@@ -139,7 +213,9 @@ export const page: Page = async (main, rest) => {
         hashBox.dataset.frame = String(at);
         if (start.shared?.hash && start.shared.frame === at && session.recipe === recipe) {
           const same = start.shared.hash === hash;
-          hashBox.append(h("span", { class: same ? "good" : "bad" }, same ? ` as in the ${origin}` : ` the ${origin} says ${start.shared.hash}`));
+          hashBox.append(
+            h("span", { class: same ? "good" : "bad" }, same ? ` as in the ${origin}` : ` the ${origin} says ${start.shared.hash}`),
+          );
         }
       }
     }, 120);
@@ -152,10 +228,24 @@ export const page: Page = async (main, rest) => {
     const times = Array.from({ length: count }, (_, i) => books[i]?.time ?? i * dt);
     const pad = (list: (number | null)[]) => times.map((_, i) => (Number.isFinite(list[i]) ? list[i] : null));
     const old = comparison.energies(times);
-    energy.set([times, pad(books.map((l) => l.kinetic)), pad(books.map((l) => l.elastic)), pad(books.map((l) => l.external - external0)), pad(books.map((l) => l.energy - external0)), old]);
+    energy.set([
+      times,
+      pad(books.map((l) => l.kinetic)),
+      pad(books.map((l) => l.elastic)),
+      pad(books.map((l) => l.external - external0)),
+      pad(books.map((l) => l.energy - external0)),
+      old,
+    ]);
     (energyKey.element.lastElementChild as HTMLElement).hidden = !session.before;
     const now = session.shown?.inside ? session.shown.ledgers[0] : books[session.shown?.index ?? books.length - 1];
-    if (now) energyKey.set([show(now.kinetic, 3), show(now.elastic, 3), show(now.external - external0, 3), show(now.energy - external0, 3), show(old[session.shown?.index ?? 0], 3)]);
+    if (now)
+      energyKey.set([
+        show(now.kinetic, 3),
+        show(now.elastic, 3),
+        show(now.external - external0, 3),
+        show(now.energy - external0, 3),
+        show(old[session.shown?.index ?? 0], 3),
+      ]);
   };
   let opening = true;
   session.on("loaded", (info) => {
@@ -199,7 +289,9 @@ export const page: Page = async (main, rest) => {
           { class: "cures" },
           ...(good.length ? good : found).map((c) => {
             // One or more, with blanks between: "system.0.integrator=rk4 system.0.substeps=161".
-            const changes = c.set.split(/ (?=[\w.]+=)/).map((one): [string, Value] => [one.slice(0, one.indexOf("=")), valueOf(one.slice(one.indexOf("=") + 1))]);
+            const changes = c.set
+              .split(/ (?=[\w.]+=)/)
+              .map((one): [string, Value] => [one.slice(0, one.indexOf("=")), valueIn(one.slice(one.indexOf("=") + 1))]);
             const act = () => {
               alert.hidden = true;
               void session.load(session.toml, [...session.overrides, ...changes]).then(() => {
@@ -207,7 +299,12 @@ export const page: Page = async (main, rest) => {
                 session.play();
               });
             };
-            return h("li", {}, h("code", {}, c.set), c.survived ? h("button", { type: "button", class: "button", onclick: act }, "Apply and restart") : " does not help");
+            return h(
+              "li",
+              {},
+              h("code", {}, c.set),
+              c.survived ? h("button", { type: "button", class: "button", onclick: act }, "Apply and restart") : " does not help",
+            );
           }),
         ),
       );
@@ -229,7 +326,11 @@ export const page: Page = async (main, rest) => {
       }
       const live = await session.set(path, value);
       alert.hidden = true;
-      panel?.say(live ? `${what}: continues from frame ${session.latest}; the previous branch is kept for comparison.` : `${what}: sizes have changed, so the scene restarts.`);
+      panel?.say(
+        live
+          ? `${what}: continues from frame ${session.latest}; the previous branch is kept for comparison.`
+          : `${what}: sizes have changed, so the scene restarts.`,
+      );
       if (editor) syncText();
     } catch (error) {
       if (error instanceof EngineError) {
@@ -280,7 +381,16 @@ export const page: Page = async (main, rest) => {
       want(failure.missing ?? [], () => void apply());
       viewer.complain(failure);
       editor.issues(failure.issues);
-      issuesBox.replaceChildren(...failure.issues.map((i) => h("li", {}, i.line ? h("button", { type: "button", class: "line", onclick: () => editor?.goto(i.line!) }, `Line ${i.line}`) : null, h("span", {}, `${i.path ? `${i.path}: ` : ""}${i.message}`))));
+      issuesBox.replaceChildren(
+        ...failure.issues.map((i) =>
+          h(
+            "li",
+            {},
+            i.line ? h("button", { type: "button", class: "line", onclick: () => editor?.goto(i.line!) }, `Line ${i.line}`) : null,
+            h("span", {}, `${i.path ? `${i.path}: ` : ""}${i.message}`),
+          ),
+        ),
+      );
     } finally {
       run.disabled = false;
     }
@@ -298,14 +408,23 @@ export const page: Page = async (main, rest) => {
       ["Memory limit", `${show(info.memory / 2 ** 20, 3)} MiB`],
     ];
     const report = session.report;
-    if (report) rows.push(["Last frame", `${report.steps} steps, ${report.newton} Newton and ${report.linear} linear iterations, ${report.sweeps} sweeps`]);
+    if (report)
+      rows.push([
+        "Last frame",
+        `${report.steps} steps, ${report.newton} Newton and ${report.linear} linear iterations, ${report.sweeps} sweeps`,
+      ]);
     const body: HTMLElement[] = rows.flatMap(([k, v]) => [h("dt", {}, k), h("dd", {}, v)]);
-    if (info.warnings.length) body.push(h("dt", {}, "Warnings"), h("dd", {}, info.warnings.map((w) => `${w.path ? `${w.path}: ` : ""}${w.message} [${w.code}]`).join("\n")));
+    if (info.warnings.length)
+      body.push(
+        h("dt", {}, "Warnings"),
+        h("dd", {}, info.warnings.map((w) => `${w.path ? `${w.path}: ` : ""}${w.message} [${w.code}]`).join("\n")),
+      );
     facts.replaceChildren(...body);
     const list = await session.stability().catch(() => []);
     const found = new Set(list.map((s) => s.system));
     for (const s of info.systems) {
-      if (s.method === "dynamics" && !found.has(s.name)) facts.append(h("dt", {}, `Largest steps of "${s.name}"`), h("dd", {}, "take too long to compute here; use `tumble check`"));
+      if (s.method === "dynamics" && !found.has(s.name))
+        facts.append(h("dt", {}, `Largest steps of "${s.name}"`), h("dd", {}, "take too long to compute here; use `tumble check`"));
     }
     const stable = list.filter((s) => s.limits.length);
     for (const s of stable) {
@@ -315,7 +434,38 @@ export const page: Page = async (main, rest) => {
           "dd",
           {},
           h("p", {}, `now ${s.integrator.replace(/_/g, " ")}, ${show(s.step, 3)} s; stiffest mode ${show(s.frequency, 3)} rad/s`),
-          h("div", { class: "scroll", tabindex: 0 }, h("table", {}, h("thead", {}, h("tr", {}, h("th", { scope: "col" }, "integrator"), h("th", { scope: "col" }, "stable [s]"), h("th", { scope: "col" }, "usable [s]"))), h("tbody", {}, ...s.limits.map((l) => h("tr", { class: l.integrator === s.integrator ? "now" : false }, h("th", { scope: "row" }, l.integrator.replace(/_/g, " ")), h("td", {}, l.stable === null ? "any" : l.stable === 0 ? "none" : show(l.stable, 3)), h("td", {}, l.usable === null ? "any" : l.usable === 0 ? "none" : show(l.usable, 3))))))),
+          h(
+            "div",
+            { class: "scroll", tabindex: 0 },
+            h(
+              "table",
+              {},
+              h(
+                "thead",
+                {},
+                h(
+                  "tr",
+                  {},
+                  h("th", { scope: "col" }, "integrator"),
+                  h("th", { scope: "col" }, "stable [s]"),
+                  h("th", { scope: "col" }, "usable [s]"),
+                ),
+              ),
+              h(
+                "tbody",
+                {},
+                ...s.limits.map((l) =>
+                  h(
+                    "tr",
+                    { class: l.integrator === s.integrator ? "now" : false },
+                    h("th", { scope: "row" }, l.integrator.replace(/_/g, " ")),
+                    h("td", {}, l.stable === null ? "any" : l.stable === 0 ? "none" : show(l.stable, 3)),
+                    h("td", {}, l.usable === null ? "any" : l.usable === 0 ? "none" : show(l.usable, 3)),
+                  ),
+                ),
+              ),
+            ),
+          ),
         ),
       );
     }
@@ -336,61 +486,111 @@ export const page: Page = async (main, rest) => {
       const scene = info.scene as Record<string, any>;
       const gas = (scene.gas ?? [])[0];
       const there = FIELDS.filter(([name]) => {
-        if (kinds.has("gas")) return name === "density" ? gas?.smoke : name === "temperature" ? gas?.temperature : name === "fuel" ? gas?.fire : true;
+        if (kinds.has("gas"))
+          return name === "density" ? gas?.smoke : name === "temperature" ? gas?.temperature : name === "fuel" ? gas?.fire : true;
         if (kinds.has("heat")) return name === "temperature";
         return ["density", "speed", "vorticity"].includes(name);
       });
-      parts.push(choice("Shown", [["", "by itself"], ...there], look.field ?? "", (v) => {
-        look.field = v || null;
-        again();
-      }));
+      parts.push(
+        choice("Shown", [["", "by itself"], ...there], look.field ?? "", (v) => {
+          look.field = v || null;
+          again();
+        }),
+      );
       const space = info.dimension === 3;
       if (!space) {
-        parts.push(check("Arrows", look.arrows, (on) => {
-          look.arrows = on;
-          again();
-        }), check("Cells", look.cells, (on) => {
-          look.cells = on;
-          again();
-        }));
-        if (gas?.smoke) parts.push(check("Dye", look.dye, (on) => {
-          look.dye = on;
-          again();
-        }));
+        parts.push(
+          check("Arrows", look.arrows, (on) => {
+            look.arrows = on;
+            again();
+          }),
+          check("Cells", look.cells, (on) => {
+            look.cells = on;
+            again();
+          }),
+        );
+        if (gas?.smoke)
+          parts.push(
+            check("Dye", look.dye, (on) => {
+              look.dye = on;
+              again();
+            }),
+          );
       } else {
-        const at = h("input", { type: "range", min: 0, max: 1, step: 0.005, value: look.sliceAt, "aria-label": "Position of the slice", hidden: look.slice === null, oninput: () => {
-          look.sliceAt = Number(at.value);
-          comparison.again();
-        } });
-        parts.push(choice("See", [["", "smoke"], ["0", "slice normal to x"], ["1", "slice normal to y"], ["2", "slice normal to z"]], look.slice === null ? "" : String(look.slice), (v) => {
-          look.slice = v === "" ? null : Number(v);
-          at.hidden = look.slice === null;
-          again();
-        }), at);
+        const at = h("input", {
+          type: "range",
+          min: 0,
+          max: 1,
+          step: 0.005,
+          value: look.sliceAt,
+          "aria-label": "Position of the slice",
+          hidden: look.slice === null,
+          oninput: () => {
+            look.sliceAt = Number(at.value);
+            comparison.again();
+          },
+        });
+        parts.push(
+          choice(
+            "See",
+            [
+              ["", "smoke"],
+              ["0", "slice normal to x"],
+              ["1", "slice normal to y"],
+              ["2", "slice normal to z"],
+            ],
+            look.slice === null ? "" : String(look.slice),
+            (v) => {
+              look.slice = v === "" ? null : Number(v);
+              at.hidden = look.slice === null;
+              again();
+            },
+          ),
+          at,
+        );
       }
     }
     if (masses) {
       const linked = Object.values(info.topology).some((t) => t.links?.data.length);
-      parts.push(choice("Colour", [["object", "object"], ["speed", "speed"], ...(linked ? [["strain", "strain of links"] as [string, string]] : [])], look.color, (v) => {
-        look.color = v as typeof look.color;
-        again();
-      }));
+      parts.push(
+        choice(
+          "Colour",
+          [["object", "object"], ["speed", "speed"], ...(linked ? [["strain", "strain of links"] as [string, string]] : [])],
+          look.color,
+          (v) => {
+            look.color = v as typeof look.color;
+            again();
+          },
+        ),
+      );
       if (linked) {
         const there = new Set(info.objects.flatMap((o) => [...(familiesOf(info, o) ?? [])]));
-        const families = h("span", { class: "sights", role: "group", "aria-label": "Families of links shown", hidden: !look.links }, ...(there.size > 1 ? FAMILIES.filter((_, i) => there.has(i)) : []).map((f) => check(f, !look.unseen.includes(f), (on) => {
-          look.unseen = on ? look.unseen.filter((u) => u !== f) : [...look.unseen, f];
-          again();
-        })));
-        parts.push(check("Links", look.links, (on) => {
-          look.links = on;
-          families.hidden = !on;
-          again();
-        }), families);
+        const families = h(
+          "span",
+          { class: "sights", role: "group", "aria-label": "Families of links shown", hidden: !look.links },
+          ...(there.size > 1 ? FAMILIES.filter((_, i) => there.has(i)) : []).map((f) =>
+            check(f, !look.unseen.includes(f), (on) => {
+              look.unseen = on ? look.unseen.filter((u) => u !== f) : [...look.unseen, f];
+              again();
+            }),
+          ),
+        );
+        parts.push(
+          check("Links", look.links, (on) => {
+            look.links = on;
+            families.hidden = !on;
+            again();
+          }),
+          families,
+        );
       }
-      if (stage.trails) parts.push(check("Trails", look.trails, (on) => {
-        look.trails = on;
-        again();
-      }));
+      if (stage.trails)
+        parts.push(
+          check("Trails", look.trails, (on) => {
+            look.trails = on;
+            again();
+          }),
+        );
     }
     lookBar.replaceChildren(...parts);
   };
@@ -434,7 +634,13 @@ export const page: Page = async (main, rest) => {
       if (start.shared) {
         const { version } = start.shared;
         const here = engine().version;
-        sceneId.textContent = [`from a ${origin} of tumble ${version}`, version === here ? "" : `opened with ${here}: bits may differ`, told].filter(Boolean).join("; ");
+        sceneId.textContent = [
+          `from a ${origin} of tumble ${version}`,
+          version === here ? "" : `opened with ${here}: bits may differ`,
+          told,
+        ]
+          .filter(Boolean)
+          .join("; ");
       }
       // A shared moment opens at its frame, with its hash.
       if (start.shared?.hash) tellHash();
@@ -461,4 +667,3 @@ export const page: Page = async (main, rest) => {
     viewer.close();
   };
 };
-

@@ -3,9 +3,10 @@
  * that stand where the end should go. What is done to a structure is which of those places the springs lead to, so that it can be changed
  * while the world goes on, and stands in the scene.
  */
+
+import type { Value } from "../engine/protocol";
 import { FAMILIES, type Family } from "../links";
 import { literal } from "../values";
-import type { Value } from "../engine/protocol";
 
 export type Kind = "rope" | "sheet" | "block" | "net";
 
@@ -52,26 +53,71 @@ const SHEAR = 28 * RAD;
 
 export const BUILDS: Record<Kind, Build> = {
   rope: {
-    name: "Rope", about: "A chain of masses. Its structural links resist only stretching; bend links, which skip one mass, keep it from folding.",
-    families: ["structural", "bend"], modulus: { structural: 60, shear: 0, bend: 20 }, unit: "N", fineness: [6, 16, 60], pieces: "Segments", hand: 40, deeds: ["bend", "stretch"], bend: 0, twist: 0,
+    name: "Rope",
+    about: "A chain of masses. Its structural links resist only stretching; bend links, which skip one mass, keep it from folding.",
+    families: ["structural", "bend"],
+    modulus: { structural: 60, shear: 0, bend: 20 },
+    unit: "N",
+    fineness: [6, 16, 60],
+    pieces: "Segments",
+    hand: 40,
+    deeds: ["bend", "stretch"],
+    bend: 0,
+    twist: 0,
   },
   sheet: {
-    name: "Sheet", about: "A grid of masses. Without shear links each square is a hinged parallelogram; without bend links it folds freely.",
-    families: ["structural", "shear", "bend"], modulus: { structural: 500, shear: 300, bend: 100 }, unit: "N/m", fineness: [6, 14, 36], pieces: "Squares along its length", hand: 120, deeds: ["shear", "bend", "twist", "stretch"], bend: 0, twist: 110 * RAD,
+    name: "Sheet",
+    about: "A grid of masses. Without shear links each square is a hinged parallelogram; without bend links it folds freely.",
+    families: ["structural", "shear", "bend"],
+    modulus: { structural: 500, shear: 300, bend: 100 },
+    unit: "N/m",
+    fineness: [6, 14, 36],
+    pieces: "Squares along its length",
+    hand: 120,
+    deeds: ["shear", "bend", "twist", "stretch"],
+    bend: 0,
+    twist: 110 * RAD,
   },
   block: {
-    name: "Block", about: "A box of masses with the three families along and across its three axes. Structural links alone carry no shear: the diagonals make it a solid.",
-    families: ["structural", "shear", "bend"], modulus: { structural: 3000, shear: 4000, bend: 1000 }, unit: "Pa", fineness: [6, 9, 16], pieces: "Cubes along its length", hand: 200, deeds: ["shear", "bend", "twist", "stretch"], bend: 70 * RAD, twist: 90 * RAD,
+    name: "Block",
+    about:
+      "A box of masses with the three families along and across its three axes. Structural links alone carry no shear: the diagonals make it a solid.",
+    families: ["structural", "shear", "bend"],
+    modulus: { structural: 3000, shear: 4000, bend: 1000 },
+    unit: "Pa",
+    fineness: [6, 9, 16],
+    pieces: "Cubes along its length",
+    hand: 200,
+    deeds: ["shear", "bend", "twist", "stretch"],
+    bend: 70 * RAD,
+    twist: 90 * RAD,
   },
   net: {
-    name: "Net", about: "A tube of triangles with a link along each edge. A triangle is rigid, so it resists shear without shear links; bend links cross each edge and keep the tube round.",
-    families: ["structural", "bend"], modulus: { structural: 300, shear: 0, bend: 100 }, unit: "N/m", fineness: [7, 12, 24], pieces: "Triangles around it", hand: 150, deeds: ["shear", "bend", "twist", "stretch"], bend: 70 * RAD, twist: 90 * RAD,
+    name: "Net",
+    about:
+      "A tube of triangles with a link along each edge. A triangle is rigid, so it resists shear without shear links; bend links cross each edge and keep the tube round.",
+    families: ["structural", "bend"],
+    modulus: { structural: 300, shear: 0, bend: 100 },
+    unit: "N/m",
+    fineness: [7, 12, 24],
+    pieces: "Triangles around it",
+    hand: 150,
+    deeds: ["shear", "bend", "twist", "stretch"],
+    bend: 70 * RAD,
+    twist: 90 * RAD,
   },
 };
 
 export const start = (kind: Kind): Choices => {
   const b = BUILDS[kind];
-  return { kind, fineness: b.fineness[1], on: { structural: true, shear: true, bend: true }, modulus: { ...b.modulus }, hand: b.hand, deed: null };
+  return {
+    kind,
+    fineness: b.fineness[1],
+    on: { structural: true, shear: true, bend: true },
+    modulus: { ...b.modulus },
+    hand: b.hand,
+    deed: null,
+  };
 };
 
 type Point = [number, number, number];
@@ -95,11 +141,13 @@ function plan({ kind, fineness: n }: Choices): Plan {
   const size = [LENGTH, kind === "sheet" ? WIDTH : THICK, THICK];
   const points: Point[] = [];
   const ends: [number[], number[]] = [[], []];
-  for (let k = 0; k < resolution[2]; k++) for (let j = 0; j < resolution[1]; j++) for (let i = 0; i <= n; i++) {
-    if (i < 2) ends[0].push(points.length);
-    if (i > n - 2) ends[1].push(points.length);
-    points.push([along(i, n + 1, size[0]), along(j, resolution[1], size[1]), along(k, resolution[2], size[2])]);
-  }
+  for (let k = 0; k < resolution[2]; k++)
+    for (let j = 0; j < resolution[1]; j++)
+      for (let i = 0; i <= n; i++) {
+        if (i < 2) ends[0].push(points.length);
+        if (i > n - 2) ends[1].push(points.length);
+        points.push([along(i, n + 1, size[0]), along(j, resolution[1], size[1]), along(k, resolution[2], size[2])]);
+      }
   return { points, pinned: ends[0], held: ends[1], resolution, triangles: [] };
 }
 
@@ -109,15 +157,16 @@ function tube(n: number): Plan {
   const rings = Math.max(Math.round(LENGTH / (0.866 * side)), 4) + 1;
   const points: Point[] = [];
   const triangles: Plan["triangles"] = [];
-  for (let r = 0; r < rings; r++) for (let j = 0; j < n; j++) {
-    const angle = (2 * Math.PI * (j + 0.5 * (r % 2))) / n;
-    points.push([along(r, rings, LENGTH), ROUND * Math.cos(angle), ROUND * Math.sin(angle)]);
-    if (r === 0) continue;
-    const [a, b] = [(r - 1) * n, r * n];
-    const next = (j + 1) % n;
-    if (r % 2) triangles.push([a + j, a + next, b + j], [a + next, b + next, b + j]);
-    else triangles.push([a + j, b + next, b + j], [a + j, a + next, b + next]);
-  }
+  for (let r = 0; r < rings; r++)
+    for (let j = 0; j < n; j++) {
+      const angle = (2 * Math.PI * (j + 0.5 * (r % 2))) / n;
+      points.push([along(r, rings, LENGTH), ROUND * Math.cos(angle), ROUND * Math.sin(angle)]);
+      if (r === 0) continue;
+      const [a, b] = [(r - 1) * n, r * n];
+      const next = (j + 1) % n;
+      if (r % 2) triangles.push([a + j, a + next, b + j], [a + next, b + next, b + j]);
+      else triangles.push([a + j, b + next, b + j], [a + j, a + next, b + next]);
+    }
   const all = points.map((_, i) => i);
   return { points, triangles, resolution: [n, rings], pinned: all.filter((i) => i < 2 * n), held: all.filter((i) => i >= (rings - 2) * n) };
 }
@@ -165,14 +214,22 @@ export function links(c: Choices): Value {
 export const MESH = "tube.obj";
 export function mesh(c: Choices): Uint8Array {
   const { points, triangles } = plan(c);
-  const lines = [...points.map((p) => `v ${p.map((v) => v.toFixed(7)).join(" ")}`), ...triangles.map((t) => `f ${t.map((i) => i + 1).join(" ")}`)];
+  const lines = [
+    ...points.map((p) => `v ${p.map((v) => v.toFixed(7)).join(" ")}`),
+    ...triangles.map((t) => `f ${t.map((i) => i + 1).join(" ")}`),
+  ];
   return new TextEncoder().encode(`${lines.join("\n")}\n`);
 }
 
 export function scene(c: Choices): string {
   const b = BUILDS[c.kind];
   const { points, pinned, held, resolution } = plan(c);
-  const node = (i: number) => (c.kind === "sheet" ? [i % resolution[0], Math.floor(i / resolution[0])] : c.kind === "block" ? [i % resolution[0], Math.floor(i / resolution[0]) % resolution[1], Math.floor(i / resolution[0] / resolution[1])] : [i]);
+  const node = (i: number) =>
+    c.kind === "sheet"
+      ? [i % resolution[0], Math.floor(i / resolution[0])]
+      : c.kind === "block"
+        ? [i % resolution[0], Math.floor(i / resolution[0]) % resolution[1], Math.floor(i / resolution[0] / resolution[1])]
+        : [i];
   const pins = pinned.map((i) => `"vertex ${node(i).join(" ")}"`).join(", ");
   const numbers = (p: Point) => `[${p.map((v) => Number(v.toFixed(6))).join(", ")}]`;
   const shape = {
@@ -218,7 +275,14 @@ pin = ["all"]
 radius = 0.011
 color = [0.2, 0.21, 0.23]
 
-${springs(c).map((s) => `[[anchor]]\n${Object.entries(s as Record<string, Value>).map(([k, v]) => `${k} = ${literal(v)}`).join("\n")}\n`).join("\n")}
+${springs(c)
+  .map(
+    (s) =>
+      `[[anchor]]\n${Object.entries(s as Record<string, Value>)
+        .map(([k, v]) => `${k} = ${literal(v)}`)
+        .join("\n")}\n`,
+  )
+  .join("\n")}
 [[force]]
 kind = "drag"
 rate = 3

@@ -1,9 +1,10 @@
 /** The pages of docs/theory, as they are. */
-import { marked } from "marked";
+
 import sources from "virtual:sources";
+import { marked } from "marked";
 import { h, type Page } from "../dom";
-import { heading, question } from "../theory";
 import { theoryNames, theoryText } from "../scenes";
+import { heading, question } from "../theory";
 
 export const page: Page = async (main, rest) => {
   const name = rest.split("#")[0];
@@ -17,14 +18,22 @@ export const page: Page = async (main, rest) => {
         { class: "narrow" },
         h("h1", {}, "Theory"),
         h("p", { class: "lead" }, "One page for each method. Every equation has a number, which the engine's source cites."),
-        h("ul", { class: "contents" }, ...texts.map(({ n, text }) => h("li", {}, h("a", { href: `#/theory/${n}` }, heading(text)), h("span", { class: "muted" }, question(text))))),
+        h(
+          "ul",
+          { class: "contents" },
+          ...texts.map(({ n, text }) =>
+            h("li", {}, h("a", { href: `#/theory/${n}` }, heading(text)), h("span", { class: "muted" }, question(text))),
+          ),
+        ),
       ),
     );
     return () => {};
   }
   const text = theoryNames.includes(name) ? await theoryText(name) : null;
   if (!text) {
-    main.append(h("div", { class: "narrow" }, h("h1", {}, "Page not found"), h("p", {}, h("a", { href: "#/theory" }, "All pages of theory"))));
+    main.append(
+      h("div", { class: "narrow" }, h("h1", {}, "Page not found"), h("p", {}, h("a", { href: "#/theory" }, "All pages of theory"))),
+    );
     return () => {};
   }
   document.title = `${heading(text)} · tumble`;
@@ -44,7 +53,26 @@ export const page: Page = async (main, rest) => {
     cited.sort((a, b) => Number(a[0].split(".")[1]) - Number(b[0].split(".")[1]));
     article.append(
       h("h2", {}, "In the engine"),
-      h("div", { class: "scroll", tabindex: 0 }, h("table", {}, h("tbody", {}, ...cited.map(([tag, files]) => h("tr", {}, h("th", { scope: "row" }, `(${tag})`), h("td", {}, ...files.flatMap((f, i) => [i ? h("br") : "", h("code", {}, f)]))))))),
+      h(
+        "div",
+        { class: "scroll", tabindex: 0 },
+        h(
+          "table",
+          {},
+          h(
+            "tbody",
+            {},
+            ...cited.map(([tag, files]) =>
+              h(
+                "tr",
+                {},
+                h("th", { scope: "row" }, `(${tag})`),
+                h("td", {}, ...files.flatMap((f, i) => [i ? h("br") : "", h("code", {}, f)])),
+              ),
+            ),
+          ),
+        ),
+      ),
     );
   }
   for (const table of article.querySelectorAll(":scope > table")) {

@@ -28,7 +28,10 @@ export class Depths {
     if (!smoke || !solid.length) return;
     if (!this.target || this.target.width !== size.x || this.target.height !== size.y) {
       this.target?.dispose();
-      this.target = new THREE.WebGLRenderTarget(size.x, size.y, { format: THREE.RedFormat, depthTexture: new THREE.DepthTexture(size.x, size.y, THREE.UnsignedIntType) });
+      this.target = new THREE.WebGLRenderTarget(size.x, size.y, {
+        format: THREE.RedFormat,
+        depthTexture: new THREE.DepthTexture(size.x, size.y, THREE.UnsignedIntType),
+      });
     }
     const own = solid.map((mesh) => mesh.material);
     for (const mesh of solid) if ((mesh.material as THREE.MeshStandardMaterial).isMeshStandardMaterial) mesh.material = this.plain;

@@ -1,7 +1,7 @@
 /** How things stood on another way that time went: seen through, in one colour, beside what there is now. */
 import * as THREE from "three";
 import type { Column, Frame, SceneInfo } from "../engine/protocol";
-import { Pieces, Points, Surface, type Layer, type Rgb } from "./layers";
+import { type Layer, Pieces, Points, type Rgb, Surface } from "./layers";
 import { massesOf } from "./scenery";
 
 interface Shade {

@@ -2,7 +2,7 @@
 import * as THREE from "three";
 import { toCreasedNormals } from "three/examples/jsm/utils/BufferGeometryUtils.js";
 import type { Column, Numbers } from "../engine/protocol";
-import { mapOf, table, type MapName } from "./colors";
+import { type MapName, mapOf, table } from "./colors";
 import { SOLIDS } from "./depths";
 import { BALLS, PIECES, PLANE, SPACE } from "./shaders";
 
@@ -383,7 +383,12 @@ export class PlaneField implements Layer {
     this.object.renderOrder = -1;
   }
 
-  set(name: string, values: Numbers, range: [number, number], { dye, smoothly, lines }: { dye: boolean; smoothly: boolean; lines: boolean }): void {
+  set(
+    name: string,
+    values: Numbers,
+    range: [number, number],
+    { dye, smoothly, lines }: { dye: boolean; smoothly: boolean; lines: boolean },
+  ): void {
     const data = this.texture.image.data as Float32Array;
     if (values.length !== data.length) return;
     data.set(values);
@@ -439,7 +444,12 @@ export class SpaceField implements Layer {
     this.heat = volume();
     this.low = new THREE.Vector3(...grid.origin);
     this.extent = new THREE.Vector3(nx, ny, nz).multiplyScalar(grid.spacing);
-    const shared = { values: { value: this.texture }, low: { value: this.low }, extent: { value: this.extent }, ink: { value: new THREE.Vector3(...ink) } };
+    const shared = {
+      values: { value: this.texture },
+      low: { value: this.low },
+      extent: { value: this.extent },
+      ink: { value: new THREE.Vector3(...ink) },
+    };
     const mean = (this.extent.x + this.extent.y + this.extent.z) / 3;
     const box = new THREE.BoxGeometry(this.extent.x, this.extent.y, this.extent.z);
     this.smoke = new THREE.Mesh(
@@ -447,7 +457,17 @@ export class SpaceField implements Layer {
       new THREE.ShaderMaterial({
         vertexShader: SPACE.vertex,
         fragmentShader: SPACE.smoke,
-        uniforms: { ...shared, ...SOLIDS, size: PIXELS, unproject: { value: this.unproject }, viewer: { value: this.viewer }, parallel: { value: this.parallel }, thick: { value: 40 / mean }, fire: { value: false }, heat: { value: this.heat } },
+        uniforms: {
+          ...shared,
+          ...SOLIDS,
+          size: PIXELS,
+          unproject: { value: this.unproject },
+          viewer: { value: this.viewer },
+          parallel: { value: this.parallel },
+          thick: { value: 40 / mean },
+          fire: { value: false },
+          heat: { value: this.heat },
+        },
         transparent: true,
         // The way through it ends where something solid begins; its far sides are seen from within, too.
         depthWrite: false,
@@ -470,11 +490,20 @@ export class SpaceField implements Layer {
       new THREE.ShaderMaterial({
         vertexShader: SPACE.vertex,
         fragmentShader: SPACE.slice,
-        uniforms: { ...shared, stored: { value: new THREE.Vector2(0, 1) }, range: { value: new THREE.Vector2(0, 1) }, map: { value: mapTexture("viridis") }, dye: { value: false } },
+        uniforms: {
+          ...shared,
+          stored: { value: new THREE.Vector2(0, 1) },
+          range: { value: new THREE.Vector2(0, 1) },
+          map: { value: mapTexture("viridis") },
+          dye: { value: false },
+        },
         side: THREE.DoubleSide,
       }),
     );
-    const edges = new THREE.LineSegments(new THREE.EdgesGeometry(box), new THREE.LineBasicMaterial({ color: 0x808890, transparent: true, opacity: 0.45 }));
+    const edges = new THREE.LineSegments(
+      new THREE.EdgesGeometry(box),
+      new THREE.LineBasicMaterial({ color: 0x808890, transparent: true, opacity: 0.45 }),
+    );
     edges.position.copy(this.smoke.position);
     this.object.add(edges, this.smoke, this.slice);
     for (const mesh of [this.smoke, this.slice]) mesh.frustumCulled = false;

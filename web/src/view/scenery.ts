@@ -2,7 +2,7 @@
 import * as THREE from "three";
 import type { Column, Numbers, SceneInfo, Vector } from "../engine/protocol";
 import { table } from "./colors";
-import { scalars, type Grid, type Pieces, type Rgb } from "./layers";
+import { type Grid, type Pieces, type Rgb, scalars } from "./layers";
 
 type Entry = Record<string, any>;
 
@@ -80,7 +80,8 @@ export function countOf(entry: Entry): number {
 export function planeOf(shape: unknown): [THREE.Vector3, THREE.Vector3] | undefined {
   const s = (shape ?? {}) as Entry;
   if ("floor" in s) return [new THREE.Vector3(0, 0, Number(s.floor?.height ?? 0)), new THREE.Vector3(0, 0, 1)];
-  if ("plane" in s) return [new THREE.Vector3(...((s.plane.point ?? [0, 0, 0]) as Vector)), new THREE.Vector3(...(s.plane.normal as Vector)).normalize()];
+  if ("plane" in s)
+    return [new THREE.Vector3(...((s.plane.point ?? [0, 0, 0]) as Vector)), new THREE.Vector3(...(s.plane.normal as Vector)).normalize()];
   return undefined;
 }
 
@@ -101,7 +102,12 @@ export function carry(columns: Record<string, Column>, point: THREE.Vector3, nor
 /** A line around a grid in a plane. */
 export function outline(line: Pieces, grid: Grid): void {
   const [a, b] = [0, 1, 2].filter((axis) => axis !== grid.flat);
-  const corners = [[0, 0], [1, 0], [1, 1], [0, 1]].flatMap(([u, v]) => {
+  const corners = [
+    [0, 0],
+    [1, 0],
+    [1, 1],
+    [0, 1],
+  ].flatMap(([u, v]) => {
     const p = grid.origin.map((o, axis) => o + 0.5 * grid.cells[axis] * grid.spacing);
     p[a] = grid.origin[a] + u * grid.cells[a] * grid.spacing;
     p[b] = grid.origin[b] + v * grid.cells[b] * grid.spacing;
@@ -116,8 +122,15 @@ export function sharp(x: Numbers, triangles: Numbers): Uint32Array {
   const point = (i: number) => new THREE.Vector3(x[3 * i], x[3 * i + 1], x[3 * i + 2]);
   for (let t = 0; t < triangles.length; t += 3) {
     const [a, b, c] = [triangles[t], triangles[t + 1], triangles[t + 2]];
-    const normal = point(b).sub(point(a)).cross(point(c).sub(point(a))).normalize();
-    for (const [p, q] of [[a, b], [b, c], [c, a]]) {
+    const normal = point(b)
+      .sub(point(a))
+      .cross(point(c).sub(point(a)))
+      .normalize();
+    for (const [p, q] of [
+      [a, b],
+      [b, c],
+      [c, a],
+    ]) {
       const key = `${Math.min(p, q)} ${Math.max(p, q)}`;
       faces.set(key, [...(faces.get(key) ?? []), normal]);
     }
@@ -148,7 +161,8 @@ export function palette(name: Parameters<typeof table>[0]): Float32Array {
     const bytes = table(name);
     const c = new THREE.Color();
     known = new Float32Array(256 * 3);
-    for (let i = 0; i < 256; i++) known.set(c.setRGB(bytes[4 * i] / 255, bytes[4 * i + 1] / 255, bytes[4 * i + 2] / 255, THREE.SRGBColorSpace).toArray(), 3 * i);
+    for (let i = 0; i < 256; i++)
+      known.set(c.setRGB(bytes[4 * i] / 255, bytes[4 * i + 1] / 255, bytes[4 * i + 2] / 255, THREE.SRGBColorSpace).toArray(), 3 * i);
     PALETTES.set(name, known);
   }
   return known;
@@ -162,5 +176,10 @@ export function pick(map: Float32Array, share: number): Rgb {
 /** Object and row of both ends of each anchor. One without stiffness holds nothing. */
 export function endsOf(info: SceneInfo): [string, number][] {
   const anchors = Array.isArray(info.scene.anchor) ? (info.scene.anchor as Entry[]).filter((a) => a.stiffness > 0) : [];
-  return anchors.flatMap((a) => (a.between as string[]).map((end): [string, number] => [end.slice(0, end.lastIndexOf(" ")), Number(end.slice(end.lastIndexOf(" ") + 1))]));
+  return anchors.flatMap((a) =>
+    (a.between as string[]).map((end): [string, number] => [
+      end.slice(0, end.lastIndexOf(" ")),
+      Number(end.slice(end.lastIndexOf(" ") + 1)),
+    ]),
+  );
 }

@@ -253,4 +253,3 @@ export const SPACE = {
       #include <colorspace_fragment>
     }`,
 };
-

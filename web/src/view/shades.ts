@@ -2,7 +2,7 @@
 import type { Column, Frame, Numbers } from "../engine/protocol";
 import { FAMILIES, type Family } from "../links";
 import { mapOf } from "./colors";
-import { Range, scalars, type Rgb } from "./layers";
+import { Range, type Rgb, scalars } from "./layers";
 import { palette, pick } from "./scenery";
 
 export interface Legend {

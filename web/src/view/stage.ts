@@ -2,12 +2,12 @@
 import * as THREE from "three";
 import { OrbitControls } from "three/examples/jsm/controls/OrbitControls.js";
 import type { Column, Frame, Numbers, SceneInfo, Vector } from "../engine/protocol";
-import { FAMILIES, familiesOf, isOn, linked, type Family } from "../links";
+import { FAMILIES, type Family, familiesOf, isOn, linked } from "../links";
 import { PALETTE, SIGNED } from "./colors";
 import { Depths } from "./depths";
-import { gridOf, PIXELS, PlaneField, Pieces, Points, Range, scalars, SpaceField, Surface, type Grid, type Layer, type Rgb } from "./layers";
+import { type Grid, gridOf, type Layer, PIXELS, Pieces, PlaneField, Points, Range, type Rgb, SpaceField, Surface, scalars } from "./layers";
 import { arrows, carry, countOf, endsOf, leapOf, outline, planeOf, sharp, shownOf } from "./scenery";
-import { isLeft, Shades, type Legend, type Shaded } from "./shades";
+import { isLeft, type Legend, type Shaded, Shades } from "./shades";
 import { trails } from "./trails";
 
 /** How fields and objects are shown; of all objects together. */
@@ -30,7 +30,19 @@ export interface Look {
   trails: boolean;
 }
 
-export const LOOK: Look = { field: null, dye: true, arrows: false, cells: false, slice: null, sliceAt: 0.5, links: false, unseen: [], hidden: [], color: "object", trails: true };
+export const LOOK: Look = {
+  field: null,
+  dye: true,
+  arrows: false,
+  cells: false,
+  slice: null,
+  sliceAt: 0.5,
+  links: false,
+  unseen: [],
+  hidden: [],
+  color: "object",
+  trails: true,
+};
 
 const SMOKE: Rgb = [0.52, 0.53, 0.56];
 const SOLID: Rgb = [0.42, 0.41, 0.39];
@@ -88,7 +100,13 @@ export class Stage {
     /** Whether pointers may turn the camera; where they do not, there is nothing to throw a shadow. */
     private readonly turns = true,
   ) {
-    this.renderer = new THREE.WebGLRenderer({ canvas, antialias: true, alpha: true, preserveDrawingBuffer: false, powerPreference: "high-performance" });
+    this.renderer = new THREE.WebGLRenderer({
+      canvas,
+      antialias: true,
+      alpha: true,
+      preserveDrawingBuffer: false,
+      powerPreference: "high-performance",
+    });
     this.renderer.shadowMap.enabled = turns;
     this.renderer.shadowMap.type = THREE.PCFShadowMap;
     this.renderer.toneMapping = THREE.NoToneMapping;
@@ -203,7 +221,9 @@ export class Stage {
     const entries = new Map<string, Entry>();
     for (const list of Object.values(info.scene)) {
       if (!Array.isArray(list)) continue;
-      for (const entry of list) if (entry && typeof entry === "object" && typeof (entry as Entry).name === "string") entries.set((entry as Entry).name, entry as Entry);
+      for (const entry of list)
+        if (entry && typeof entry === "object" && typeof (entry as Entry).name === "string")
+          entries.set((entry as Entry).name, entry as Entry);
     }
     this.shades = new Shades();
     let colors = 0;
@@ -220,9 +240,34 @@ export class Stage {
       else if (solid) color = at ? [0.82, 0.82, 0.82] : SOLID;
       else if (grid?.flat === 3) color = SMOKE;
       else color = linear(PALETTE[colors++ % PALETTE.length]);
-      const kind: Thing["kind"] = grid ? (grid.flat === 3 ? "space" : "plane") : solid ? (at ? "ground" : "solid") : topology.triangles?.data.length ? "surface" : topology.curve?.data.length ? "curve" : "points";
+      const kind: Thing["kind"] = grid
+        ? grid.flat === 3
+          ? "space"
+          : "plane"
+        : solid
+          ? at
+            ? "ground"
+            : "solid"
+          : topology.triangles?.data.length
+            ? "surface"
+            : topology.curve?.data.length
+              ? "curve"
+              : "points";
       const radius = topology.radius?.data.length ? topology.radius.data[0] : 0.01;
-      const thing: Thing = { name: object.name, kind, color, radius, trail: Number(entry.trail ?? 0), leap: leapOf(info, object.system), topology, grid, families: familiesOf(info, object), acting: [], ranges: new Map(), at };
+      const thing: Thing = {
+        name: object.name,
+        kind,
+        color,
+        radius,
+        trail: Number(entry.trail ?? 0),
+        leap: leapOf(info, object.system),
+        topology,
+        grid,
+        families: familiesOf(info, object),
+        acting: [],
+        ranges: new Map(),
+        at,
+      };
       if (kind === "plane" && grid) thing.body = new PlaneField(grid, color);
       else if (kind === "space" && grid) thing.body = new SpaceField(grid, color);
       else if (kind === "solid" && topology.position && topology.triangles && !entry.inside) {
@@ -239,7 +284,13 @@ export class Stage {
         this.ground(thing);
       }
       if (thing.body) this.add(thing.body);
-      if (topology.links?.data.length) this.add((thing.links = new Pieces(kind === "points" ? 0.25 * radius : 0, { thinnest: kind === "curve" ? 2 : kind === "points" || topology.links.data.length < 8000 ? 1.2 : 0.7, lit: kind === "points" })));
+      if (topology.links?.data.length)
+        this.add(
+          (thing.links = new Pieces(kind === "points" ? 0.25 * radius : 0, {
+            thinnest: kind === "curve" ? 2 : kind === "points" || topology.links.data.length < 8000 ? 1.2 : 0.7,
+            lit: kind === "points",
+          })),
+        );
       if (kind === "plane" && grid) {
         this.add((thing.way = new Pieces(0, { lit: false, thinnest: 0.6 })));
         outline(thing.way, grid);
@@ -289,10 +340,15 @@ export class Stage {
   private ground(thing: Thing): void {
     const material = new THREE.MeshStandardMaterial({ roughness: 1, transparent: true, side: THREE.FrontSide });
     material.onBeforeCompile = (shader) => {
-      shader.vertexShader = shader.vertexShader.replace("#include <common>", "#include <common>\nvarying vec2 vAway;").replace("#include <begin_vertex>", "#include <begin_vertex>\nvAway = position.xy;");
+      shader.vertexShader = shader.vertexShader
+        .replace("#include <common>", "#include <common>\nvarying vec2 vAway;")
+        .replace("#include <begin_vertex>", "#include <begin_vertex>\nvAway = position.xy;");
       shader.fragmentShader = shader.fragmentShader
         .replace("#include <common>", "#include <common>\nvarying vec2 vAway;")
-        .replace("#include <alphamap_fragment>", "#include <alphamap_fragment>\ndiffuseColor.a *= 1.0 - smoothstep(0.30, 1.0, length(vAway));");
+        .replace(
+          "#include <alphamap_fragment>",
+          "#include <alphamap_fragment>\ndiffuseColor.a *= 1.0 - smoothstep(0.30, 1.0, length(vAway));",
+        );
     };
     thing.plane = new THREE.Mesh(new THREE.CircleGeometry(1, 96), material);
     thing.plane.receiveShadow = true;
@@ -305,7 +361,8 @@ export class Stage {
     const box = new THREE.Box3();
     const point = new THREE.Vector3();
     const take = (x: Numbers) => {
-      for (let i = 0; i + 2 < x.length; i += 3) if (Number.isFinite(x[i] + x[i + 1] + x[i + 2])) box.expandByPoint(point.set(x[i], x[i + 1], x[i + 2]));
+      for (let i = 0; i + 2 < x.length; i += 3)
+        if (Number.isFinite(x[i] + x[i + 1] + x[i + 2])) box.expandByPoint(point.set(x[i], x[i + 1], x[i + 2]));
     };
     const columns = this.frame?.columns ?? {};
     for (const thing of this.things) {
@@ -359,7 +416,11 @@ export class Stage {
       // With grids all of them must be seen, as large as they can.
       const grids = this.things.some((t) => t.grid);
       const width = wish && !grids ? 2 * tan * wish.distanceTo(goal) : Math.max(across, (tall * w) / hgt) * (grids ? 1.02 : 1.12);
-      this.home = { position: goal.clone().add(top ? new THREE.Vector3(0, 0, 10 * this.reach + 1) : new THREE.Vector3(0, -10 * this.reach - 1, 0)), target: goal.clone(), width };
+      this.home = {
+        position: goal.clone().add(top ? new THREE.Vector3(0, 0, 10 * this.reach + 1) : new THREE.Vector3(0, -10 * this.reach - 1, 0)),
+        target: goal.clone(),
+        width,
+      };
     } else {
       this.camera.up.set(0, 0, 1);
       let position = wish;
@@ -371,7 +432,8 @@ export class Stage {
       if (position.distanceTo(goal) < 1e-9) position.y -= 1;
       // Straight from above there is no up; a hair beside it there is.
       const down = goal.clone().sub(position);
-      if (Math.hypot(down.x, down.y) < 1e-6 * down.length()) position = position.clone().add(new THREE.Vector3(0, -1e-3 * down.length(), 0));
+      if (Math.hypot(down.x, down.y) < 1e-6 * down.length())
+        position = position.clone().add(new THREE.Vector3(0, -1e-3 * down.length(), 0));
       const distance = position.distanceTo(goal);
       this.home = { position: position.clone(), target: goal.clone(), width: 2 * tan * distance };
       (this.camera as THREE.PerspectiveCamera).near = distance * 0.01;
@@ -388,8 +450,15 @@ export class Stage {
     const shine = this.home.target;
     const span = Math.max(this.home.width * 0.75, 1e-6);
     const away = this.home.position.clone().sub(shine);
-    const left = new THREE.Vector3().crossVectors(new THREE.Vector3(0, 0, 1), away).normalize().negate();
-    this.light.position.copy(shine).addScaledVector(left, span * 1.1).add(new THREE.Vector3(0, 0, span * 1.7)).addScaledVector(away.normalize(), span * 0.45);
+    const left = new THREE.Vector3()
+      .crossVectors(new THREE.Vector3(0, 0, 1), away)
+      .normalize()
+      .negate();
+    this.light.position
+      .copy(shine)
+      .addScaledVector(left, span * 1.1)
+      .add(new THREE.Vector3(0, 0, span * 1.7))
+      .addScaledVector(away.normalize(), span * 0.45);
     this.light.target.position.copy(shine);
     const s = this.light.shadow.camera;
     s.left = s.bottom = -span;
@@ -543,7 +612,12 @@ export class Stage {
       }
       thing.body.cut(this.look.slice, this.look.sliceAt);
       if (this.look.slice === null) this.legend = null;
-      thing.body.set(name, values, name === "temperature" && this.look.slice === null ? [Math.min(low + 0.02 * (high - low), high - 1e-9), high] : [low, high], this.look.slice === null ? hot : undefined);
+      thing.body.set(
+        name,
+        values,
+        name === "temperature" && this.look.slice === null ? [Math.min(low + 0.02 * (high - low), high - 1e-9), high] : [low, high],
+        this.look.slice === null ? hot : undefined,
+      );
     }
     if (!thing.arrows) return;
     thing.arrows.object.visible = this.look.arrows && !!columns.velocity;
@@ -565,14 +639,20 @@ export class Stage {
     const broken = (piece: number) => !!strain && !!start && Number.isNaN(strain[piece]) && !Number.isNaN(start[piece]);
     const left = (piece: number) => broken(piece) || isLeft(thing, piece, this.look.unseen);
     const torn = new Set<number>();
-    if (strain && start && links) for (let i = 0; i < strain.length; i++) if (broken(i)) torn.add(Math.min(links[2 * i], links[2 * i + 1]) * n + Math.max(links[2 * i], links[2 * i + 1]));
-    const ofPiece = (pairs: Numbers) => (piece: number): Rgb => {
-      const p = 3 * pairs[2 * piece];
-      return [colors![p], colors![p + 1], colors![p + 2]];
-    };
+    if (strain && start && links)
+      for (let i = 0; i < strain.length; i++)
+        if (broken(i)) torn.add(Math.min(links[2 * i], links[2 * i + 1]) * n + Math.max(links[2 * i], links[2 * i + 1]));
+    const ofPiece =
+      (pairs: Numbers) =>
+      (piece: number): Rgb => {
+        const p = 3 * pairs[2 * piece];
+        return [colors![p], colors![p + 1], colors![p + 2]];
+      };
     if (thing.kind === "surface") {
       if (!thing.body) {
-        thing.body = new Surface(x, thing.topology.triangles.data, thing.color, { flat: this.info?.objects.find((o) => o.name === thing.name)?.kind === "block" });
+        thing.body = new Surface(x, thing.topology.triangles.data, thing.color, {
+          flat: this.info?.objects.find((o) => o.name === thing.name)?.kind === "block",
+        });
         this.add(thing.body);
       }
       const surface = thing.body as Surface;
@@ -584,7 +664,8 @@ export class Stage {
       const curve = thing.topology.curve.data;
       const pairs = new Uint32Array(2 * Math.max(curve.length - 1, 0));
       for (let i = 0; i + 1 < curve.length; i++) pairs.set([curve[i], curve[i + 1]], 2 * i);
-      const gone = (piece: number) => torn.has(Math.min(pairs[2 * piece], pairs[2 * piece + 1]) * n + Math.max(pairs[2 * piece], pairs[2 * piece + 1]));
+      const gone = (piece: number) =>
+        torn.has(Math.min(pairs[2 * piece], pairs[2 * piece + 1]) * n + Math.max(pairs[2 * piece], pairs[2 * piece + 1]));
       (thing.body as Pieces).pairs(x, pairs, colors ? ofPiece(pairs) : thing.color, gone);
       thing.body!.object.visible = !this.look.links || !links;
     } else {
@@ -600,12 +681,21 @@ export class Stage {
       const shown = thing.kind === "points" || this.look.links || (this.flat && thing.kind !== "curve");
       thing.links.object.visible = shown;
       const shade = thing.color.map((c) => c * (thing.kind === "points" ? 0.6 : this.look.links ? 1 : 0.35)) as Rgb;
-      if (shown) thing.links.pairs(x, links, colors && this.look.color === "strain" && strain ? (piece) => this.shades.link(strain[piece]) : colors ? ofPiece(links) : shade, left);
+      if (shown)
+        thing.links.pairs(
+          x,
+          links,
+          colors && this.look.color === "strain" && strain ? (piece) => this.shades.link(strain[piece]) : colors ? ofPiece(links) : shade,
+          left,
+        );
     }
   }
 
   /** The mass nearest to a point of the window, within some pixels. */
-  nearest(event: { clientX: number; clientY: number }, within = 28): { object: string; row: number; point: THREE.Vector3; mass: number } | null {
+  nearest(
+    event: { clientX: number; clientY: number },
+    within = 28,
+  ): { object: string; row: number; point: THREE.Vector3; mass: number } | null {
     if (!this.frame) return null;
     const box = this.canvas.getBoundingClientRect();
     const mx = event.clientX - box.left;
@@ -630,7 +720,12 @@ export class Stage {
         if (d < best - 25 || (d < best + 25 && d < within ** 2 && p.z < depth)) {
           best = Math.min(best, d);
           depth = p.z;
-          found = { object: thing.name, row: i, point: new THREE.Vector3(x[3 * i], x[3 * i + 1], x[3 * i + 2]), mass: masses ? masses[Math.min(i, masses.length - 1)] : 1 };
+          found = {
+            object: thing.name,
+            row: i,
+            point: new THREE.Vector3(x[3 * i], x[3 * i + 1], x[3 * i + 2]),
+            mass: masses ? masses[Math.min(i, masses.length - 1)] : 1,
+          };
         }
       }
     }
@@ -720,4 +815,3 @@ export class Stage {
     return document.documentElement.dataset.theme === "dark" ? ["#1b2027", "#14181d"] : ["#f6f8fa", "#e3e8ee"];
   }
 }
-
