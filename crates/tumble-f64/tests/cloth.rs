@@ -204,9 +204,11 @@ fn the_dress_needs_one_other_word_to_be_masses_and_springs() {
         println!("{other}: stretch {stretch:.3}, {crossed} crossings in 12 frames, {depth:.1e} m inside the dancer");
         assert!(crossed == 0 && stretch < 1.35 && depth < 0.005, "{crossed} {stretch} {depth}");
         // Measured: 1.26 at the start, where seams close, and 2.1 mm.
-        assert!(stretch > 1.01 && depth > 0.0, "neither cloth nor body: {stretch} {depth}");
         // Of the bodice; the skirt starts wider than it is cut, and how it swings from there depends on how much a method dampens.
         let end = positions(&sim, "dress");
+        // Without her it would have fallen by 1.2 m. Measured: 4 mm and 7 cm.
+        let sunk = start.iter().zip(&end).map(|(s, x)| s.z - x.z).sum::<f64>() / end.len() as f64;
+        assert!(stretch > 1.01 && sunk < 0.4, "neither cloth nor body: {stretch} {sunk}");
         // The counter sees a vertex that is pulled through the dancer to her other side.
         let across = |x: Vector| vector(-3.0 * x.x, -3.0 * x.y, 0.0);
         assert!(intersections_after(&mut sim, "dress", 1, across) > 0);
