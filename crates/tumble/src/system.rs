@@ -76,8 +76,6 @@ pub trait System: Send + Sync {
 /// A part of a snapshot.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Part {
-    /// Rows in the engine's scalar.
-    Rows(Vec<Row>),
     /// Numbers in the engine's scalar, so many to a row.
     Table(usize, Vec<Real>),
     /// Numbers in double precision.
@@ -106,19 +104,13 @@ impl Archive {
         self.next += 1;
     }
 
-    /// Writes rows, into the memory of the old ones if they have the same name: a snapshot is taken at every frame, and
-    /// new memory would cost more than the copy.
+    /// Writes rows.
     pub fn push_rows(&mut self, name: &str, rows: &[Row]) {
-        match self.parts.get_mut(self.next) {
-            Some((old, Part::Rows(into))) if old == name => {
-                rows.clone_into(into);
-                self.next += 1;
-            }
-            _ => self.push(name, Part::Rows(rows.to_vec())),
-        }
+        self.table(name, 4, rows.len(), 0).copy_from_slice(bytemuck::cast_slice(rows));
     }
 
-    /// A table to fill, in the memory of the old one; new memory has room for `room` rows.
+    /// A table to fill, in the memory of the old one if it has the same name: a snapshot is taken at every frame, and new
+    /// memory would cost more than the copy. New memory has room for `room` rows.
     fn table(&mut self, name: &str, width: usize, rows: usize, room: usize) -> &mut [Real] {
         let old = match self.parts.get_mut(self.next) {
             Some((old, Part::Table(_, into))) if old == name => std::mem::take(into),
@@ -188,8 +180,8 @@ impl Archive {
     /// Reads rows into a column of the same length.
     pub fn rows(&mut self, name: &str, into: &mut [Row]) -> Option<()> {
         match self.pop(name)? {
-            Part::Rows(rows) if rows.len() == into.len() => {
-                into.copy_from_slice(rows);
+            Part::Table(4, numbers) if numbers.len() == 4 * into.len() => {
+                into.copy_from_slice(bytemuck::cast_slice(numbers));
                 Some(())
             }
             _ => None,

@@ -1,7 +1,6 @@
 //! L6: systems in order, the exchange, the clock: THE stepping loop. Knows no concrete system.
 
 use crate::exchange::Exchange;
-use crate::math::{Real, Row};
 use crate::system::{Archive, Part, System};
 use safetensors::tensor::{Dtype, SafeTensors, TensorView, serialize};
 use std::collections::HashMap;
@@ -200,7 +199,6 @@ impl World {
             .enumerate()
             .filter_map(|(k, (name, part))| {
                 let (dtype, shape) = match part {
-                    Part::Rows(rows) => (REAL, vec![rows.len(), 4]),
                     Part::Table(width, numbers) => (REAL, vec![numbers.len() / width, *width]),
                     Part::Numbers(numbers) => (Dtype::F64, vec![numbers.len()]),
                     Part::Indices(indices) => (Dtype::U32, vec![indices.len()]),
@@ -310,7 +308,6 @@ const REAL: Dtype = Dtype::F64;
 
 fn bytes(part: &Part) -> &[u8] {
     match part {
-        Part::Rows(rows) => bytemuck::cast_slice(rows),
         Part::Table(_, numbers) => bytemuck::cast_slice(numbers),
         Part::Numbers(numbers) => bytemuck::cast_slice(numbers),
         Part::Indices(indices) => bytemuck::cast_slice(indices),
@@ -320,13 +317,25 @@ fn bytes(part: &Part) -> &[u8] {
 fn part(tensor: &TensorView<'_>) -> Option<Part> {
     let data = tensor.data();
     Some(match (tensor.dtype(), tensor.shape()) {
-        (dtype, [_, 4]) if dtype == REAL => {
-            let numbers: Vec<Real> = bytemuck::allocation::pod_collect_to_vec(data);
-            Part::Rows(numbers.chunks_exact(4).map(|r| [r[0], r[1], r[2], r[3]]).collect::<Vec<Row>>())
-        }
         (dtype, [_, width]) if dtype == REAL => Part::Table(*width, bytemuck::allocation::pod_collect_to_vec(data)),
         (Dtype::F64, [_]) => Part::Numbers(bytemuck::allocation::pod_collect_to_vec(data)),
         (Dtype::U32, [_]) => Part::Indices(bytemuck::allocation::pod_collect_to_vec(data)),
         _ => return None,
     })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::math::Real;
+
+    #[test]
+    fn a_part_of_any_width_is_read_as_it_was_written() {
+        for width in 1..=6 {
+            let numbers: Vec<Real> = (0..width * 5).map(|i| i as Real).collect();
+            let written = Part::Table(width, numbers);
+            let view = TensorView::new(REAL, vec![5, width], bytes(&written)).unwrap();
+            assert_eq!(part(&view), Some(written));
+        }
+    }
 }
