@@ -45,6 +45,8 @@ export const LOOK: Look = {
 };
 
 const SMOKE: Rgb = [0.52, 0.53, 0.56];
+/** Fluid density [kg/m³] from which smoke counts as dye, with a colour of its own; as in python/tumble/pictures/things.py. */
+const LIQUID = 100;
 const SOLID: Rgb = [0.42, 0.41, 0.39];
 const GLOWING = 1000;
 
@@ -238,7 +240,7 @@ export class Stage {
       let color: Rgb;
       if (Array.isArray(entry.color)) color = entry.color as Rgb;
       else if (solid) color = at ? [0.82, 0.82, 0.82] : SOLID;
-      else if (grid?.flat === 3) color = SMOKE;
+      else if (grid?.flat === 3 && Number(entry.fluid_density ?? 0) < LIQUID) color = SMOKE;
       else color = linear(PALETTE[colors++ % PALETTE.length]);
       const kind: Thing["kind"] = grid
         ? grid.flat === 3
