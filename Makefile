@@ -62,7 +62,7 @@ test:
 # Builds and downloads, side by side: none of them keeps two cores busy all the time.
 prepare:
 	@$(MAKE) --no-print-directory -j 4 debian web/node_modules/.ready $(VENV)/.imports $(VENV)/.engine lint-rust wasm
-	@cargo test --workspace --exclude tumble-wasm --exclude tumble-bindgen --release --tests --no-run --quiet
+	@cargo test $(RUST_TESTS) --no-run --quiet
 
 lint-rust:
 	cargo fmt --all --check
@@ -76,8 +76,14 @@ lint: setup lint-rust
 		else echo "no Node here: the source of the browser laboratory is not checked"; fi
 
 # Of the same packages as the build for Python, which shares the engine with these; those for WebAssembly have no tests.
+RUST_TESTS := --workspace --exclude tumble-wasm --exclude tumble-bindgen --release --tests
+
+# Tests tell their time only where RUSTC_BOOTSTRAP is set, as it is here when they run, not when they are built.
 test-rust:
-	cargo test --workspace --exclude tumble-wasm --exclude tumble-bindgen --release --tests --quiet
+	@mkdir -p target; cargo test $(RUST_TESTS) --config 'target."cfg(all())".runner = ["env", "RUSTC_BOOTSTRAP=1"]' \
+		-- -Zunstable-options --report-time > target/rust-tests.txt 2>&1 || { cat target/rust-tests.txt; exit 1; }
+	@grep "^test result" target/rust-tests.txt; echo "the ten longest"; \
+		sed -n 's/^test \(.*\) \.\.\. ok <\(.*\)s>$$/\2 s  \1/p' target/rust-tests.txt | sort -rn | head -n 10
 
 # What VDB files are checked against: Debian's OpenVDB, for the system's Python; there is no wheel.
 openvdb:
@@ -160,7 +166,7 @@ validate: setup openvdb wasm
 	if test -n "$$failed"; then echo "FAILED:$$failed"; exit 1; fi
 
 validate-rust:
-	cargo test --workspace --exclude tumble-wasm --exclude tumble-bindgen --release --tests --quiet --no-fail-fast -- --include-ignored --nocapture
+	cargo test $(RUST_TESTS) --quiet --no-fail-fast -- --include-ignored --nocapture
 	cargo test -p tumble --features double --lib --release --quiet --no-fail-fast
 
 validate-python:

@@ -14,9 +14,9 @@ if "PYTEST_XDIST_WORKER" in os.environ:
     # A worker keeps a core busy; threads of the engine would wait for those of the other workers.
     os.environ.setdefault("RAYON_NUM_THREADS", "1")
 
-from tumble import Run  # noqa: E402
-from tumble.cli import main  # noqa: E402
-from tumble.run import simulate  # noqa: E402
+from tumble import Run
+from tumble.cli import main
+from tumble.run import simulate
 
 Tree = dict[str, Any]
 

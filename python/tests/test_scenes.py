@@ -44,8 +44,13 @@ def keeps_what_it_expects(name: str, frames: int | None, folder: Path) -> None:
     run = simulate(scene, folder, frames=frames)
     assert run.n_frames == (frames or words["time"]["frames"]) + 1
     assert run.manifest["status"] == "finished"
-    assert run.manifest["expectations"] == []
-    assert run.manifest["warnings"] == []
+    broken, warnings = run.manifest["expectations"], run.manifest["warnings"]
+    if frames is not None:
+        # Probes and the count of what has torn are of the last frame, and stills may be of frames that do not come.
+        broken = [bound for bound in broken if bound["name"].startswith("max_")]
+        warnings = [warning for warning in warnings if warning["code"] != "no-such-frame"]
+    assert broken == []
+    assert warnings == []
 
 
 @pytest.mark.parametrize("name", sorted(GOOD, key=lambda name: name not in BEGINNINGS))

@@ -633,7 +633,7 @@ def _without_systems(tree: Tree) -> Tree:
     kept = {key: value for key, value in tree.items() if key != "system"}
     return kept | {
         kind: [{key: value for key, value in thing.items() if key != "system"} for thing in tree.get(kind, ())]
-        for kind in _THINGS
+        for kind in OBJECTS
     }
 
 

@@ -236,20 +236,17 @@ fn the_test_sees_what_it_forbids() {
 
 /// Places in which the name of a method may stand besides its system, its methods file, its schema, its scenes, its pages of theory and
 /// lab, and tests: lines of each file, and why.
-const PLACES: [(&str, usize, &str); 15] = [
+const PLACES: [(&str, usize, &str); 12] = [
     ("crates/tumble/src/systems/mod.rs", 1, "declares the module"),
     ("crates/tumble/src/scene/methods/mod.rs", 2, "declares the module; the table"),
-    ("crates/tumble-interface/src/scene/mod.rs", 3, "declares the module; the table of a scene"),
-    ("crates/tumble-interface/src/scene/objects.rs", 1, "the list of kinds"),
+    ("crates/tumble-interface/src/scene/mod.rs", 4, "declares the module; the table of a scene"),
+    ("crates/tumble-interface/src/scene/objects.rs", 1, "its objects, for the list of all"),
     ("crates/tumble-interface/src/scene/systems.rs", 2, "the word of the method"),
-    ("python/tumble/causes.py", 1, "a list of kinds on grids"),
+    ("crates/tumble-interface/src/kinds.rs", 1, "the table of kinds"),
+    ("crates/tumble-interface/src/columns.rs", 1, "the table of columns"),
     ("python/tumble/cli/lab.py", 5, "the command of its lab page"),
-    ("python/tumble/cli/run.py", 1, "a list of kinds on grids"),
-    ("python/tumble/cures.py", 4, "cures of its own"),
-    ("python/tumble/energy.py", 1, "a list of kinds on grids"),
-    ("python/tumble/minimal.py", 3, "lists of kinds and of their counts"),
-    ("python/tumble/refine.py", 1, "the word for its fineness"),
-    ("web/src/engine/protocol.ts", 1, "a list of kinds"),
+    ("python/tumble/cures.py", 3, "cures of its own"),
+    ("web/src/engine/measures.ts", 1, "generated from the table of kinds"),
     ("web/src/theory.ts", 1, "the page of its equations"),
     ("web/src/view/scenery.ts", 1, "a list of kinds on grids"),
 ];
