@@ -11,7 +11,7 @@ fn source() -> PathBuf {
 }
 
 /// The modules of the engine, the lowest first: each imports only those before it.
-const LAYERS: [&str; 16] = [
+const LAYERS: [&str; 17] = [
     "math",
     "geometry",
     "linalg",
@@ -22,6 +22,7 @@ const LAYERS: [&str; 16] = [
     "forces",
     "integrators",
     "exchange",
+    "fluids",
     "system",
     "pool",
     "systems",

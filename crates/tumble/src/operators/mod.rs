@@ -9,9 +9,11 @@ pub mod differences;
 pub mod diffuse;
 pub mod sample;
 mod stencil;
+mod transfer;
 
 pub use advect::{Advection, Trace, advect, advect_vectors};
 pub use differences::{average, curl, directional, divergence, gradient, laplacian, upwind, vector_laplacian};
 pub use diffuse::{diffuse, diffuse_step, diffusion_limit};
 pub use sample::{Interpolation, sample};
 pub use stencil::{each_row, each_row_of, ghosted};
+pub use transfer::Spot;

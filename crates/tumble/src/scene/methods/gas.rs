@@ -1,6 +1,7 @@
 //! Stable Fluids: from the words of a fluid to the fluid, and what it moves.
 
 use super::{MethodRules, is_in, place, rules};
+use crate::fluids::{Beyond, Body, Sheet, Solids, hold};
 use crate::geometry::Collider;
 use crate::linalg::poisson::{Excess, Method as Solve, Params, Target};
 use crate::math::formula::{Formula, Of};
@@ -13,7 +14,7 @@ use crate::scene::grids::grid;
 use crate::scene::laws::{Reader, flat, off_plane};
 use crate::state::{Field, Grid, Place, Vectors};
 use crate::system::System;
-use crate::systems::gas::{Beyond, Body, Fire, Fluid, Gas, Settings, Sheet, Solids, Source};
+use crate::systems::gas::{Fire, Fluid, Gas, Settings, Source};
 use std::sync::Arc;
 use tumble_interface::check::{plain, suggestion};
 use tumble_interface::scene::{
@@ -387,7 +388,7 @@ impl Read<'_, '_> {
         if u.parts.iter().any(|p| p.each().any(|at| !p.value(at).is_finite())) {
             self.wrong(".velocity", "not a finite number everywhere in the box");
         }
-        crate::systems::gas::hold(&mut u, &sides, 0.0);
+        hold(&mut u, &sides, 0.0);
         self.check_flow(&sides, &u);
         if words.advection.scalars.turning {
             self.wrong(".advection.scalars.turning", "true, expected false: numbers have no direction");

@@ -1,9 +1,9 @@
 //! Output of a fluid: columns, ledger, snapshots, failures.
 
 use super::fluid::Fluid;
-use super::projection::around;
-use super::rows::{self, sum};
-use super::solids::Solids;
+use crate::fluids::Solids;
+use crate::fluids::projection::around;
+use crate::fluids::rows::{self, sum};
 use crate::linalg::poisson::Weight;
 use crate::math::Real;
 use crate::operators::{average, curl, divergence};

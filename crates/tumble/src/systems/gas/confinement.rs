@@ -4,7 +4,7 @@
 //!
 //! Source: [fedkiw2001], eq. 11.   Degenerate: grad |w| = 0 -> no force.
 
-use super::rows::{Face, runs};
+use crate::fluids::rows::{Face, runs};
 use crate::math::Real;
 use crate::operators::{average, curl, each_row};
 use crate::state::{Field, GridError, Place, Vectors};

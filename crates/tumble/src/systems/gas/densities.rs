@@ -5,9 +5,9 @@
 //! rho_f of a face is the mean of the two cells beside it, on a side of the box that of the cell beside it.
 //! Tests: crates/tumble-f64/tests/densities.rs. Limits: the kinematic viscosity is the same everywhere.
 
-use super::fluid::{Failure, Settings};
-use super::rows::{Face, runs};
-use crate::linalg::poisson::Weight;
+use super::settings::Settings;
+use crate::fluids::Failure;
+use crate::fluids::rows::{Face, runs};
 use crate::math::Real;
 use crate::operators::each_row;
 use crate::state::{Field, Grid, Place, Vectors};
@@ -84,15 +84,5 @@ impl Densities {
                 });
             }
         }
-    }
-
-    /// The weights of the pressure equation: open shares times rho_0/rho_f.                                  (gas.13)
-    pub fn weights(&self, open: Option<&[Vec<u8>; 3]>) -> [Vec<Real>; 3] {
-        std::array::from_fn(|axis| {
-            let light = self.light.part(axis);
-            let len = self.ratio.data.len();
-            let share = |i: usize| open.map_or(1.0, |open| open[axis][i].value());
-            light.map_or_else(|| vec![1.0; len], |light| light.data.iter().enumerate().map(|(i, light)| share(i) * light).collect())
-        })
     }
 }

@@ -6,8 +6,8 @@
 //! Both are solved exactly over a step, cell by cell. Sources: [feldman2003] (fuel, soot, divergence), [nguyen2002] (radiation).
 //! Tests: crates/tumble-f64/tests/fire.rs. Limits: nothing asks for oxygen; without an open side there is no room to take.
 
-use super::fluid::Failure;
-use super::rows::sum;
+use crate::fluids::Failure;
+use crate::fluids::rows::sum;
 use crate::math::{Real, functions};
 use crate::operators::{each_row, each_row_of};
 use crate::state::{Field, Grid, Place};

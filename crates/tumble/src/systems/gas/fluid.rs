@@ -1,76 +1,19 @@
 //! A fluid in a box: its state, and the step that the lecture draws.
 
-use super::bodies::Body;
 use super::densities::Densities;
-use super::fire::{Fire, Flame};
-use super::forces::Source;
-use super::rows::{magnitude, worse};
-use super::sheets::Sheet;
-use super::sides::{Beyond, hold};
-use super::solids::Solids;
+use super::fire::Flame;
+use super::settings::Settings;
 use crate::exchange::Exchange;
+use crate::fluids::rows::{largest, worse};
+use crate::fluids::{Beyond, Body, Failure, Projection, Sheet, Solids, Viscosity, hold, projection, spread};
 use crate::geometry::Vector;
-use crate::linalg::poisson::{Fault, Params, Solver};
-use crate::math::{Real, VectorSignal};
-use crate::operators::{Advection, advect, advect_vectors};
-use crate::state::{Field, Grid, GridError, Place, Side, Vectors};
+use crate::linalg::poisson::Solver;
+use crate::math::Real;
+use crate::operators::{advect, advect_vectors};
+use crate::state::{Field, Grid, Place, Side, Vectors};
 use tumble_interface::StepError;
 use tumble_interface::engine::StepReport;
-use tumble_interface::scene::{OnFailure, Order, Viscous};
-
-/// Constant settings of a fluid.
-pub struct Settings {
-    /// Density [kg/m³].
-    pub density: f64,
-    /// Dynamic viscosity [Pa s].
-    pub viscosity: f64,
-    /// How it is stepped.
-    pub viscous: Viscous,
-    /// The lower and the upper side of each axis.
-    pub sides: [[Beyond; 2]; 3],
-    /// Gravity [m/s²], in the plane.
-    pub gravity: [f64; 3],
-    /// Acceleration [m/s²] by time and place.
-    pub acceleration: VectorSignal,
-    /// Diffusivity of smoke and of warmth [m²/s].
-    pub diffusivity: [f64; 2],
-    /// Rate at which smoke vanishes [1/s].
-    pub dissipation: f64,
-    /// Share of its weight that smoke has.
-    pub weight: f64,
-    /// Temperature without buoyancy [K].
-    pub ambient: f64,
-    /// Rate at which differences of temperature vanish [1/s].
-    pub cooling: f64,
-    /// Radiation where the fluid is 1000 K above ambient [K/s].
-    pub radiation: f64,
-    /// Heat capacity [J/(kg K)].
-    pub specific_heat: f64,
-    /// Growth of a volume with temperature [1/K].
-    pub expansion: f64,
-    /// Whether differences of density have inertia.
-    pub variable: bool,
-    /// How fuel burns.
-    pub fire: Option<Fire>,
-    /// Sources of smoke, heat and velocity.
-    pub sources: Vec<Source>,
-    /// Vorticity confinement [1].
-    pub confinement: f64,
-    /// Order of the parts of a step.
-    pub order: Order,
-    /// How the velocity is carried.
-    pub velocity: Advection,
-    /// How smoke and warmth are carried.
-    pub scalars: Advection,
-    /// The pressure solver; its target is the tolerance.
-    pub pressure: Params,
-    /// Largest |div u| dx over the fastest velocity.
-    pub tolerance: f64,
-    /// Behaviour if it is not met.
-    pub on_failure: OnFailure,
-    /// Cells that the fastest fluid passes in a sub-step.
-    pub courant: f64,
-}
+use tumble_interface::scene::Order;
 
 /// A fluid in a box.
 pub struct Fluid {
@@ -94,44 +37,6 @@ pub struct Fluid {
     pub(super) solids: Option<Solids>,
     /// Immersed sheets.
     pub sheets: Vec<Sheet>,
-}
-
-/// Errors that stop a step.
-#[derive(Debug)]
-pub enum Failure {
-    /// Fields that do not fit: no scene reaches this.
-    Grid(GridError),
-    /// The pressure cannot be found.
-    Pressure(Fault),
-    /// The pressure was not found well enough.
-    Unconverged {
-        /// Iterations made.
-        iterations: usize,
-        /// |div u| dx over the fastest velocity.
-        reached: f64,
-        /// The requested value.
-        asked: f64,
-    },
-}
-
-impl From<GridError> for Failure {
-    fn from(error: GridError) -> Self {
-        Self::Grid(error)
-    }
-}
-
-impl std::fmt::Display for Failure {
-    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        match self {
-            Self::Grid(error) => error.fmt(f),
-            Self::Pressure(fault) => fault.fmt(f),
-            Self::Unconverged { iterations, reached, asked } => write!(
-                f,
-                "the pressure solver stopped after {iterations} iterations at |div u| dx/|u| = {reached:.2e}, asked for {asked:.2e}; raise \
-                 pressure.iterations or pressure.tolerance, or set pressure.on_failure = \"warn\""
-            ),
-        }
-    }
 }
 
 /// A failure and the fluid that it happened to.
@@ -323,6 +228,48 @@ impl Fluid {
         Ok(())
     }
 
+    /// Viscosity of the velocity, and diffusion of smoke and warmth, for h seconds from t on.             (gas.3)
+    pub fn viscosity(&mut self, t: f64, h: f64, report: &mut StepReport) -> Result<(), Failure> {
+        let spare = &mut self.solver.spare;
+        for (carried, kappa) in [&mut self.smoke, &mut self.temperature].into_iter().zip(self.settings.diffusivity) {
+            if let Some(carried) = carried
+                && kappa > 0.0
+            {
+                if let Some(solids) = &self.solids {
+                    solids.shade(carried);
+                }
+                spread(carried, kappa, h, spare)?;
+            }
+        }
+        self.clear();
+        let viscosity = Viscosity { nu: self.settings.viscosity / self.settings.density, method: self.settings.viscous };
+        if viscosity.nu == 0.0 {
+            return Ok(());
+        }
+        hold(&mut self.u, &self.settings.sides, t + h);
+        viscosity.act(&mut self.u, self.solids.as_ref(), h, &mut self.solver.spare, report)
+    }
+
+    /// Makes the velocity at time t free of divergence, but for what fire swells; h [s] only scales the pressure that it takes.          (gas.4)
+    pub fn projection(&mut self, t: f64, h: f64, report: &mut StepReport) -> Result<(), Failure> {
+        self.weigh();
+        let Self { u, pressure, solver, solids, settings, flame, densities, .. } = self;
+        let projection = Projection {
+            u,
+            pressure,
+            solver,
+            solids: solids.as_mut(),
+            sides: &settings.sides,
+            density: settings.density,
+            light: densities.as_ref().map(|densities| &densities.light),
+            swelling: flame.as_ref().filter(|flame| flame.fire.expansion > 0.0).map(|flame| &flame.swelling),
+            params: settings.pressure,
+            tolerance: settings.tolerance,
+            on_failure: settings.on_failure,
+        };
+        projection.run(t, h, report)
+    }
+
     /// Makes its bodies a part of the pressure's matrix.
     fn join(&mut self) {
         if let Some(solids) = &self.solids {
@@ -352,8 +299,7 @@ impl Fluid {
 
     /// The largest component of the velocity on any face [m/s]; bodies count by their speed.
     pub fn fastest(&self) -> f64 {
-        let bodies = self.solids.as_ref().map_or(0.0, Solids::fastest);
-        self.u.parts.iter().map(magnitude).fold(bodies, worse)
+        projection::fastest(&self.u, self.solids.as_ref())
     }
 
     /// The largest step [s] of the Courant number, within `left` [s]: forces speed the fluid up on the way.
@@ -362,7 +308,7 @@ impl Fluid {
         let most = |f: &Option<Field>, around: f64| {
             f.as_ref().map_or(0.0, |f| {
                 let far = |x: &Real| (f64::from(*x) - around).abs();
-                super::rows::largest(f, |at, n| f.data[at..at + n].iter().map(far).fold(0.0, worse))
+                largest(f, |at, n| f.data[at..at + n].iter().map(far).fold(0.0, worse))
             })
         };
         let g = settings.gravity.iter().map(|g| g * g).sum::<f64>().sqrt();

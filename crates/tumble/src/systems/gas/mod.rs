@@ -7,30 +7,22 @@
 //! Source: [stam1999]; tests: crates/tumble-f64/tests/gas.rs; limits: large steps damp (grids.17), and the split is of first order
 //! in the step.
 
-mod bodies;
 mod books;
 mod confinement;
 mod densities;
 mod fire;
 mod fluid;
 mod forces;
-mod projection;
-mod rows;
-mod sheets;
-mod sides;
-mod solids;
-mod spots;
-mod viscosity;
+mod settings;
+mod sources;
 
-pub use bodies::Body;
 pub use fire::{Fire, Flame};
-pub use fluid::{Failed, Failure, Fluid, Settings};
-pub use forces::{Cover, Source};
-pub use sheets::Sheet;
-pub use sides::{Beyond, hold};
-pub use solids::Solids;
+pub use fluid::{Failed, Fluid};
+pub use settings::Settings;
+pub use sources::{Cover, Source};
 
 use crate::exchange::Exchange;
+use crate::fluids::hold;
 use crate::integrators::equal_steps;
 use crate::system::{Archive, System};
 use tumble_interface::engine::{Ledger, Share, Stability, StepReport, Worst};

@@ -5,12 +5,12 @@
 //!
 //! What the sides of the box hold stays as it is, and so do the faces of open sides.
 
-use super::fluid::{Failure, Fluid};
+use super::failure::Failure;
 use super::rows::dot;
 use super::solids::Solids;
 use crate::math::{Real, Spare};
 use crate::operators::{diffuse, each_row, laplacian};
-use crate::state::{Field, Place, Side};
+use crate::state::{Field, Place, Side, Vectors};
 use tumble_interface::engine::StepReport;
 use tumble_interface::scene::Viscous;
 
@@ -42,8 +42,8 @@ fn free(part: &mut Field) {
     }
 }
 
-/// x(t + h) = (1 + h kappa lap) x(t)
-fn explicit(x: &mut Field, kappa: f64, h: f64, spare: &mut Spare) -> Result<(), Failure> {
+/// Diffusion for h seconds: x(t + h) = (1 + h kappa lap) x(t), with kappa [m²/s].                        (gas.3)
+pub fn spread(x: &mut Field, kappa: f64, h: f64, spare: &mut Spare) -> Result<(), Failure> {
     let mut next = spare.field(x.grid, x.place, "")?;
     let done = diffuse(x, kappa, h, &mut next);
     spare.keep(next);
@@ -94,36 +94,26 @@ fn conjugate_gradients(x: &mut Field, c: f64, solids: Option<&Solids>, [r, p, pr
     Ok((ITERATIONS, rr <= enough))
 }
 
-impl Fluid {
-    /// Viscosity of the velocity, and diffusion of smoke and warmth, for h seconds from t on.             (gas.3)
-    pub fn viscosity(&mut self, t: f64, h: f64, report: &mut StepReport) -> Result<(), Failure> {
-        let spare = &mut self.solver.spare;
-        for (carried, spread) in [(&mut self.smoke, 0), (&mut self.temperature, 1)] {
-            let diffusivity = self.settings.diffusivity[spread];
-            if let Some(carried) = carried
-                && diffusivity > 0.0
-            {
-                if let Some(solids) = &self.solids {
-                    solids.shade(carried);
-                }
-                explicit(carried, diffusivity, h, spare)?;
-            }
+/// Viscosity of a velocity, and how it is stepped.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Viscosity {
+    /// Kinematic viscosity nu [m²/s].
+    pub nu: f64,
+    /// The scheme.
+    pub method: Viscous,
+}
+
+impl Viscosity {
+    /// Acts for h seconds on a velocity whose sides are held, around solids whose images were kept before the forces.      (gas.3)
+    pub fn act(&self, u: &mut Vectors, solids: Option<&Solids>, h: f64, spare: &mut Spare, report: &mut StepReport) -> Result<(), Failure> {
+        if let Some(solids) = solids {
+            solids.recall(u);
         }
-        self.clear();
-        let nu = self.settings.viscosity / self.settings.density;
-        if nu == 0.0 {
-            return Ok(());
-        }
-        super::sides::hold(&mut self.u, &self.settings.sides, t + h);
-        if let Some(solids) = &self.solids {
-            solids.recall(&mut self.u);
-        }
-        for axis in 0..self.u.parts.len() {
-            let part = &mut self.u.parts[axis];
-            match self.settings.viscous {
-                Viscous::Explicit => explicit(part, nu, h, &mut self.solver.spare)?,
+        for part in &mut u.parts {
+            match self.method {
+                Viscous::Explicit => spread(part, self.nu, h, spare)?,
                 Viscous::Implicit => {
-                    let (iterations, converged) = implicit(part, h * nu, self.solids.as_ref(), &mut self.solver.spare)?;
+                    let (iterations, converged) = implicit(part, h * self.nu, solids, spare)?;
                     report.linear += iterations as u64;
                     report.unconverged += u64::from(!converged);
                 }

@@ -88,7 +88,7 @@ impl Body {
     }
 
     /// Takes its state from its system. What is pressed against a solid and does not leave it rests on it.
-    pub(super) fn listen(&mut self, exchange: &Exchange, gravity: [f64; 3], density: f64, grid: &Grid) {
+    pub fn listen(&mut self, exchange: &Exchange, gravity: [f64; 3], density: f64, grid: &Grid) {
         let port = exchange.port(self.port);
         (self.position, self.velocity, self.acceleration) = (port.position, port.velocity, port.acceleration);
         self.inverse_mass = port.inverse_mass;
@@ -100,7 +100,7 @@ impl Body {
     }
 
     /// Gives its system what the fluid has given it.
-    pub(super) fn tell(&mut self, exchange: &mut Exchange) {
+    pub fn tell(&mut self, exchange: &mut Exchange) {
         exchange.post_steady(self.port, std::mem::take(&mut self.impulse));
     }
 
@@ -126,7 +126,7 @@ impl Body {
     }
 
     /// Forces besides the pressure, for h seconds: other forces, and the weight of the fluid that it displaces.      (gas.17)
-    pub(super) fn fall(&mut self, h: f64, gravity: [f64; 3], density: f64, grid: &Grid) {
+    pub fn fall(&mut self, h: f64, gravity: [f64; 3], density: f64, grid: &Grid) {
         if self.inverse_mass == 0.0 {
             return;
         }

@@ -1,7 +1,8 @@
 //! The projection: takes from a velocity the gradient that makes it free of divergence.               (gas.4, pressure.1)
 
-use super::fluid::{Failure, Fluid};
+use super::failure::Failure;
 use super::rows::{self, Face, runs};
+use super::sides::{Beyond, hold};
 use super::solids::Solids;
 use crate::linalg::poisson::{Excess, Fault, Info, Params, Solver, Target, Weight};
 use crate::math::parallel::chunks;
@@ -107,41 +108,78 @@ fn refine<T: Weight>(
     info
 }
 
-impl Fluid {
-    /// Makes the velocity at time t free of divergence, but for what fire swells; h [s] only scales the pressure that it takes.          (gas.4)
-    pub fn projection(&mut self, t: f64, h: f64, report: &mut StepReport) -> Result<(), Failure> {
-        super::sides::hold(&mut self.u, &self.settings.sides, t);
-        self.weigh();
-        if let Some(solids) = &self.solids {
-            solids.close(&mut self.u);
+/// The weights of the pressure equation: open shares times rho_0/rho_f.                                  (gas.13)
+fn weights(light: &Vectors, open: Option<&[Vec<u8>; 3]>, len: usize) -> [Vec<Real>; 3] {
+    std::array::from_fn(|axis| {
+        let share = |i: usize| open.map_or(1.0, |open| open[axis][i].value());
+        let light = light.part(axis);
+        light.map_or_else(|| vec![1.0; len], |light| light.data.iter().enumerate().map(|(i, light)| share(i) * light).collect())
+    })
+}
+
+/// The largest component of a velocity on any face [m/s]; bodies count by their speed.
+pub fn fastest(u: &Vectors, solids: Option<&Solids>) -> f64 {
+    let bodies = solids.map_or(0.0, Solids::fastest);
+    u.parts.iter().map(rows::magnitude).fold(bodies, rows::worse)
+}
+
+/// A projection of the velocity of a fluid: what it changes, what it is given, and how exact it is.
+pub struct Projection<'a> {
+    /// Velocity on faces [m/s].
+    pub u: &'a mut Vectors,
+    /// Pressure at cells [Pa], taken anew.
+    pub pressure: &'a mut Field,
+    /// The pressure equation around the solids.
+    pub solver: &'a mut Solver<u8>,
+    /// Solids in the fluid; bodies take the impulse of the pressure.
+    pub solids: Option<&'a mut Solids>,
+    /// The lower and the upper side of each axis.
+    pub sides: &'a [[Beyond; 2]; 3],
+    /// Density rho_0 [kg/m³].
+    pub density: f64,
+    /// Density rho_0 over that of the fluid at faces, where it varies.
+    pub light: Option<&'a Vectors>,
+    /// Divergence S at cells, where it is not zero [1/s].
+    pub swelling: Option<&'a Field>,
+    /// The pressure solver; its target is the tolerance.
+    pub params: Params,
+    /// Largest |div u - S| dx over the fastest velocity.
+    pub tolerance: f64,
+    /// Behaviour if it is not met.
+    pub on_failure: OnFailure,
+}
+
+impl Projection<'_> {
+    /// Gives the velocity at time t the divergence S; h [s] only scales the pressure that it takes.          (gas.4)
+    pub fn run(self, t: f64, h: f64, report: &mut StepReport) -> Result<(), Failure> {
+        let Self { u, pressure, solver, mut solids, sides, density, light, swelling, params, tolerance, on_failure } = self;
+        hold(u, sides, t);
+        if let Some(solids) = &solids {
+            solids.close(u);
         }
-        let mut fastest = self.fastest();
-        let Self { u, pressure, settings, solver, solids, flame, densities, .. } = self;
-        let swelling = flame.as_ref().filter(|flame| flame.fire.expansion > 0.0).map(|flame| &flame.swelling);
-        let mass = settings.density * solids.as_ref().map_or(0.0, Solids::area);
+        let mut fastest = fastest(u, solids.as_deref());
+        let mass = density * solids.as_deref().map_or(0.0, Solids::area);
         let grid = pressure.grid;
         let dx = grid.dx;
         if let Some(swelling) = swelling {
             // A fluid at rest is moved by nothing else.
             fastest = rows::worse(fastest, dx * rows::magnitude(swelling));
         }
-        let asked = settings.tolerance * dx * fastest;
-        let mut params = Params { target: Target::Largest(asked), ..settings.pressure };
-        if solids.as_ref().is_some_and(Solids::moves) {
+        let asked = tolerance * dx * fastest;
+        let mut params = Params { target: Target::Largest(asked), ..params };
+        if solids.as_deref().is_some_and(Solids::moves) {
             // Walls that come closer press out what no pressure can hold.
             params.excess = Excess::Remove;
         }
-        let open = settings.sides.each_ref().map(|sides| sides.each_ref().map(|s| matches!(s, super::Beyond::Open)));
+        let open = sides.each_ref().map(|ends| ends.each_ref().map(|side| matches!(side, Beyond::Open)));
         pressure.data.fill(0.0);
-        let to_pressure = (settings.density / h) as Real;
-        let densities = densities.as_ref();
-        let light = densities.map(|densities| &densities.light);
+        let to_pressure = (density / h) as Real;
         // Another equation in every step.
-        let varying = densities.map(|densities| {
-            let weights = densities.weights(solids.as_ref().map(|solids| &solids.open));
-            let sides = settings.sides.each_ref().map(|ends| ends.each_ref().map(super::Beyond::pressure));
+        let varying = light.map(|light| {
+            let weights = weights(light, solids.as_deref().map(|solids| &solids.open), pressure.data.len());
+            let sides = sides.each_ref().map(|ends| ends.each_ref().map(Beyond::pressure));
             let mut varying = Solver::new(solver.lattice(), sides, weights.each_ref().map(Vec::as_slice), None)?;
-            varying.join(solids.as_ref().map_or(Vec::new(), |solids| solids.joints(settings.density)));
+            varying.join(solids.as_deref().map_or(Vec::new(), |solids| solids.joints(density)));
             varying.spare = std::mem::take(&mut solver.spare);
             Ok(varying)
         });
@@ -149,7 +187,7 @@ impl Fluid {
         let mut take = |yielded: &dyn Fn(&[Real]) -> Vec<f64>, q: Option<&[Real]>, b: &mut Column| {
             if let Some(q) = q {
                 subtract_gradient(u, q, open, light);
-                if let Some(solids) = solids {
+                if let Some(solids) = &mut solids {
                     solids.bodies.iter_mut().zip(yielded(q).chunks(3)).for_each(|(body, products)| body.yield_to(products, mass));
                     solids.follow();
                     solids.close(u);
@@ -157,7 +195,7 @@ impl Fluid {
                 chunks(&mut pressure.data, |start, p| p.iter_mut().zip(&q[start..]).for_each(|(p, q)| *p += to_pressure * q));
             }
             let mut left = Field { grid, place: Place::Cell, sides: Default::default(), unit: "m²/s".into(), data: std::mem::take(b) };
-            around(u, solids.as_ref(), swelling, &mut left);
+            around(u, solids.as_deref(), swelling, &mut left);
             *b = left.data;
         };
         let info = match &mut varying {
@@ -173,8 +211,8 @@ impl Fluid {
         let reached = if fastest > 0.0 { info.largest / (dx * fastest) } else { 0.0 };
         report.left(reached);
         if !info.converged {
-            if settings.on_failure == OnFailure::Error {
-                return Err(Failure::Unconverged { iterations: info.iterations, reached, asked: settings.tolerance });
+            if on_failure == OnFailure::Error {
+                return Err(Failure::Unconverged { iterations: info.iterations, reached, asked: tolerance });
             }
             report.unconverged += 1;
         }

@@ -13,11 +13,11 @@
 use super::bodies::Body;
 use super::rows::{Face, beside};
 use super::sides::Beyond;
-use super::spots::Spot;
 use crate::geometry::{Collider, Vector};
 use crate::linalg::poisson::{Joint, Weight, byte};
 use crate::math::Real;
 use crate::math::parallel::Tasks;
+use crate::operators::Spot;
 use crate::state::{Field, Grid, Place, Vectors};
 use std::sync::Arc;
 
@@ -79,10 +79,10 @@ pub struct Solids {
     /// Sides of the box that are held.
     held: [[bool; 2]; 3],
     /// When they are here [s].
-    pub(super) time: f64,
+    pub time: f64,
     nodes: Vec<Real>,
     /// Open shares of the lower faces of all cells.
-    pub(super) open: [Vec<u8>; 3],
+    pub open: [Vec<u8>; 3],
     cuts: Vec<Cut>,
     closed: [Vec<Closed>; 3],
     ghosts: Vec<Ghost>,

@@ -10,10 +10,10 @@
 //! is lost.
 //! Tests: crates/tumble-f64/tests/sheets.rs.
 
-use super::spots::Spot;
 use crate::exchange::{Exchange, Port};
 use crate::geometry::Vector;
 use crate::math::Real;
+use crate::operators::Spot;
 use crate::state::{Grid, Place, Vectors};
 
 /// A sheet; in the plane a curve, of one metre across it.
@@ -50,7 +50,7 @@ impl Sheet {
     }
 
     /// Takes its state from its system.
-    pub(super) fn listen(&mut self, exchange: &Exchange) {
+    pub fn listen(&mut self, exchange: &Exchange) {
         self.masses.clear();
         let mass = |port: &Port| {
             let state = exchange.port(*port);
@@ -60,7 +60,7 @@ impl Sheet {
     }
 
     /// Gives its system what the fluid has given it.
-    pub(super) fn tell(&mut self, exchange: &mut Exchange) {
+    pub fn tell(&mut self, exchange: &mut Exchange) {
         for (port, mass) in self.ports.iter().zip(&self.masses) {
             exchange.post_steady(*port, mass.impulse);
         }
@@ -85,7 +85,7 @@ impl Sheet {
     }
 
     /// Exchanges momentum with a fluid of this density [kg/m³] for h seconds, mass by mass.                    (gas.18)
-    pub(super) fn trade(&mut self, u: &mut Vectors, grid: &Grid, density: f64, h: f64) {
+    pub fn trade(&mut self, u: &mut Vectors, grid: &Grid, density: f64, h: f64) {
         self.share_areas(grid.flat);
         let stride = grid.lattice().stride;
         let cell = (0..grid.dimension()).fold(density, |m, _| m * grid.dx);
