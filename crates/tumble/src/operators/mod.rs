@@ -1,4 +1,4 @@
-//! L3: the verbs on grids. One code for two and three dimensions: what a plane does not have is left out of sums over axes.
+//! L3: the verbs on grids, and between grids and particles. One code for two and three dimensions: what a plane does not have is left out of sums over axes.
 //!
 //! Fields know their places and what is beyond their walls; an operator refuses fields at other places. The caller owns the
 //! results. Sums have a fixed order and every row is worked out for itself: the same bits on any number of threads and any width
@@ -16,4 +16,4 @@ pub use differences::{average, curl, directional, divergence, gradient, laplacia
 pub use diffuse::{diffuse, diffuse_step, diffusion_limit};
 pub use sample::{Interpolation, sample};
 pub use stencil::{each_row, each_row_of, ghosted};
-pub use transfer::Spot;
+pub use transfer::{Nodes, Spot, Transfer};

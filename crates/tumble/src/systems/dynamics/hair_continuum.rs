@@ -10,7 +10,8 @@ use super::core::Core;
 use super::feature::{Feature, Span};
 use crate::math::functions::exp;
 use crate::math::parallel::{Tasks, chunks, fold};
-use crate::math::{Real, Row, Vec3, xyz64};
+use crate::math::{Real, Row, xyz64};
+use crate::operators::{Nodes, Transfer};
 use std::ops::Range;
 use tumble_interface::scene::HairCollisions;
 
@@ -29,46 +30,12 @@ pub struct HairContinuum {
 
 #[derive(Debug, Clone, Default)]
 struct Scratch {
-    /// The cell of every free point, where the points of a cell end, and the points cell by cell.
-    cells: Vec<u32>,
-    starts: Vec<u32>,
-    /// Of each, how far into the cell it is; momentum and mass [kg m/s, kg].
-    order: Vec<([f64; 3], [f64; 4])>,
-    /// Momentum, then mass [kg m/s, kg]; then velocity, and density over rest density.
+    /// Momentum and mass of the free points, cell by cell [kg m/s, kg].
+    transfer: Transfer<4>,
+    /// Momentum, then mass [kg m/s, kg].
     nodes: Vec<[f64; 4]>,
     /// Velocities that pressure gives [m/s].
     kicks: Vec<[f64; 3]>,
-}
-
-/// A box of nodes.
-#[derive(Debug, Clone, Copy)]
-struct Lattice {
-    low: [f64; 3],
-    cell: f64,
-    n: [usize; 3],
-}
-
-impl Lattice {
-    /// The lowest node of the cell of a point, and how far into the cell it is on each axis.
-    fn place(&self, x: Vec3<f64>) -> ([usize; 3], [f64; 3]) {
-        let (mut at, mut part) = ([0; 3], [0.0; 3]);
-        let x: [f64; 3] = x.into();
-        for a in 0..3 {
-            let s = ((x[a] - self.low[a]) / self.cell).clamp(0.0, (self.n[a] - 2) as f64);
-            at[a] = (s as usize).min(self.n[a] - 2);
-            part[a] = s - at[a] as f64;
-        }
-        (at, part)
-    }
-
-    fn node(&self, [i, j, k]: [usize; 3]) -> usize {
-        (k * self.n[1] + j) * self.n[0] + i
-    }
-
-    fn weight(part: [f64; 3], corner: usize) -> f64 {
-        let one = |a: usize| if corner >> a & 1 == 1 { part[a] } else { 1.0 - part[a] };
-        one(0) * one(1) * one(2)
-    }
 }
 
 impl HairContinuum {
@@ -91,7 +58,7 @@ impl HairContinuum {
     }
 
     /// Mass and momentum on nodes; `None` if nothing is free.
-    fn splat(&mut self, x: &[Row], v: &[Row]) -> Option<Lattice> {
+    fn splat(&mut self, x: &[Row], v: &[Row]) -> Option<Nodes> {
         let (x, v) = (&x[self.rows.clone()], &v[self.rows.clone()]);
         let least = |a: [f64; 3], b: [f64; 3]| [a[0].min(b[0]), a[1].min(b[1]), a[2].min(b[2])];
         // The lowest corner, and the highest with its sign turned.
@@ -111,54 +78,15 @@ impl HairContinuum {
         // Nodes stand at multiples of the spacing, wherever the hair is.
         let low = low.map(|x| (x / cell).floor() * cell);
         let n = std::array::from_fn(|a| ((-high[a] - low[a]) / cell) as usize + 2);
-        let lattice = Lattice { low, cell, n };
-        let Scratch { cells, starts, order, nodes, .. } = &mut self.scratch;
-        // Points sorted by cell, within a cell in their order.
-        cells.resize(x.len(), 0);
-        chunks(cells, |start, cells| {
-            for (cell, x) in cells.iter_mut().zip(&x[start..]) {
-                *cell = if x[3] > 0.0 { lattice.node(lattice.place(xyz64(*x)).0) as u32 } else { u32::MAX };
-            }
-        });
-        let total = n[0] * n[1] * n[2];
-        starts.clear();
-        starts.resize(total + 1, 0);
-        cells.iter().filter(|c| **c != u32::MAX).for_each(|c| starts[*c as usize + 1] += 1);
-        for c in 0..total {
-            starts[c + 1] += starts[c];
-        }
-        order.resize(x.len(), ([0.0; 3], [0.0; 4]));
-        for (i, c) in cells.iter().enumerate().filter(|(_, c)| **c != u32::MAX) {
+        let lattice = Nodes { low, cell, n };
+        let Scratch { transfer, nodes, .. } = &mut self.scratch;
+        let position = |i: usize| (x[i][3] > 0.0).then(|| xyz64(x[i]));
+        let carried = |i: usize| {
             let m = 1.0 / f64::from(x[i][3]);
             let [u, v, w] = [0, 1, 2].map(|a| m * f64::from(v[i][a]));
-            order[starts[*c as usize] as usize] = (lattice.place(xyz64(x[i])).1, [u, v, w, m]);
-            starts[*c as usize] += 1;
-        }
-        // `starts` are ends now: a cell begins where the one before ends.
-        nodes.resize(total, [0.0; 4]);
-        let (starts, order) = (&*starts, &*order);
-        nodes.chunks_mut(n[0] * n[1]).enumerate().in_parallel(|(k, slab)| {
-            for (s, node) in slab.iter_mut().enumerate() {
-                let (i, j) = (s % n[0], s / n[0]);
-                let mut sum = [0.0; 4];
-                for corner in 0..8 {
-                    // The node is that corner of the cell.
-                    let [di, dj, dk] = [corner & 1, corner >> 1 & 1, corner >> 2];
-                    if di > i || dj > j || dk > k {
-                        continue;
-                    }
-                    let c = lattice.node([i - di, j - dj, k - dk]);
-                    let begin = if c == 0 { 0 } else { starts[c - 1] };
-                    for (part, carried) in &order[begin as usize..starts[c] as usize] {
-                        let w = Lattice::weight(*part, corner);
-                        for a in 0..4 {
-                            sum[a] += w * carried[a];
-                        }
-                    }
-                }
-                *node = sum;
-            }
-        });
+            [u, v, w, m]
+        };
+        transfer.to_nodes(&lattice, x.len(), position, carried, nodes);
         Some(lattice)
     }
 
@@ -168,7 +96,7 @@ impl HairContinuum {
             return;
         }
         let Some(lattice) = self.splat(x, v) else { return };
-        let (Lattice { cell, n, .. }, words, rest) = (lattice, &self.words, self.rest);
+        let (Nodes { cell, n, .. }, words, rest) = (lattice, &self.words, self.rest);
         let Scratch { nodes, kicks, .. } = &mut self.scratch;
         kicks.resize(nodes.len(), [0.0; 3]);
         let full = rest * cell.powi(3);
@@ -196,11 +124,8 @@ impl HairContinuum {
             if x[3] == 0.0 {
                 return;
             }
-            let (at, part) = lattice.place(xyz64(*x));
             let (mut around, mut kick) = ([0.0; 3], [0.0; 3]);
-            for corner in 0..8 {
-                let w = Lattice::weight(part, corner);
-                let node = lattice.node([at[0] + (corner & 1), at[1] + (corner >> 1 & 1), at[2] + (corner >> 2)]);
+            lattice.around(xyz64(*x), |node, w| {
                 let mass = nodes[node][3];
                 if mass > 0.0 {
                     for a in 0..3 {
@@ -208,7 +133,7 @@ impl HairContinuum {
                         kick[a] += w * kicks[node][a];
                     }
                 }
-            }
+            });
             for a in 0..3 {
                 let own = f64::from(v[a]);
                 v[a] = (own + share * (around[a] - own) + kick[a]) as Real;
