@@ -24,7 +24,7 @@ N = 9
 
 @dataclass
 class FakeRun:
-    """Has what `tumble.run.Run` has, as far as pictures and exports read it."""
+    """Has what `tumble.Run` has, as far as pictures and exports read it."""
 
     scene: dict[str, Any]
     static: Columns

@@ -10,7 +10,8 @@ import pytest
 from tumble import Scene, World, expect, measures
 from tumble.columns import BOUND, COLUMNS, GRIDS, KINDS, OBJECTS
 from tumble.folder import COUNTS, LEDGER, read_rows
-from tumble.run import Run, simulate
+from tumble.reader import Run
+from tumble.run import simulate
 
 ROOT = Path(__file__).parents[2]
 ROPE = {"name": "rope", "from": [0, 0, 1], "to": [1, 0, 1], "segments": 4, "density": 1.0}

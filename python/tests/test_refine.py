@@ -12,7 +12,8 @@ from conftest import Answer
 from runs import Tree
 
 from tumble import Run, Scene, SceneError
-from tumble.refine import Measure, Study, plan, study, value, write
+from tumble.plots import convergence
+from tumble.refine import Measure, Study, plan, study, value
 
 Command = Callable[..., Answer]
 SceneFile = Callable[..., Path]
@@ -325,7 +326,7 @@ def test_the_picture_shows_every_measure(oscillator: Tree, tmp_path: Path, monke
     found = study(Scene(copy.deepcopy(oscillator)), tmp_path, 3, measures=["elastic", "p.position.z@1"])
     drawn = []
     monkeypatch.setattr("tumble.plots.save", lambda figure, path: drawn.append(figure) or path)
-    write(found)
+    convergence(found, tmp_path / "convergence.png")
     above, below = drawn[0].axes
     assert len(above.lines) == 3
     np.testing.assert_array_equal(above.lines[2].get_ydata(), found.runs[2].ledger["elastic"])  # type: ignore[union-attr]

@@ -20,7 +20,8 @@ from runs import OBJECT, Killed, N, Tree, assert_same, half, kill_at, killed, tr
 from tumble import ExportError, Run, Scene, SceneError, World, _engine
 from tumble.branch import branch
 from tumble.folder import LEDGER, RunFolder, cell, plain, read_rows
-from tumble.run import LostFrames, simulate
+from tumble.reader import LostFrames
+from tumble.run import simulate
 
 # Content of the folder
 

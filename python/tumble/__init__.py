@@ -21,7 +21,7 @@ if TYPE_CHECKING:
         load_mesh,
         repair_mesh,
     )
-    from tumble.run import Run
+    from tumble.reader import Run
 
     __version__: str
 
@@ -41,7 +41,7 @@ __all__ = [
 
 # Looked up when first used: `import tumble` alone loads neither the engine nor NumPy.
 _HOMES = {name: ("tumble._engine", name) for name in __all__}
-_HOMES["Run"] = ("tumble.run", "Run")
+_HOMES["Run"] = ("tumble.reader", "Run")
 _HOMES["__version__"] = ("tumble._engine", "version")
 
 

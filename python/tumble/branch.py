@@ -13,8 +13,9 @@ from tumble._engine import Scene, SceneError, StepError, TumbleError, World
 from tumble.columns import KINDS
 from tumble.folder import RunFolder, plain, refuse
 from tumble.lock import alone, ask
+from tumble.reader import Run
 from tumble.recorder import Recorder, Unchanging, describe
-from tumble.run import Broke, Progress, Run, admit, record, return_to_checkpoint
+from tumble.run import Broke, Progress, admit, record, return_to_checkpoint
 
 Descent = list[dict[str, Any]]
 

@@ -13,7 +13,7 @@ from tumble.cures import step_used, system, viscous_limit
 from tumble.doubts import of_books
 
 if TYPE_CHECKING:
-    from tumble.run import Run
+    from tumble.reader import Run
 
 _UNSAFE = re.compile(r"/|\^|\b(sqrt|ln|log10|pow|exp|tan|asin|acos|sinh|cosh|mod)\b")
 """Parts of a formula that may give non-finite numbers."""

@@ -13,7 +13,7 @@ from tumble.folder import Columns, refuse
 from tumble.recorder import changed
 
 if TYPE_CHECKING:
-    from tumble.run import Run
+    from tumble.reader import Run
 
 Array = npt.NDArray[Any]
 

@@ -10,7 +10,7 @@ import numpy as np
 from tumble import energy
 
 if TYPE_CHECKING:
-    from tumble.run import Run
+    from tumble.reader import Run
 
 _COURANT = 2.0
 """Cells that a fluid passes in a step, over what was asked for, that are worth telling."""

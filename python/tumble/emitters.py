@@ -13,7 +13,7 @@ from tumble._engine import ExportError, SceneError, StepError, World
 from tumble.folder import RunFolder, read_column
 
 if TYPE_CHECKING:
-    from tumble.run import Run
+    from tumble.reader import Run
 
 Floats = npt.NDArray[np.float64]
 Tree = Mapping[str, Any]

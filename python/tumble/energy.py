@@ -12,7 +12,7 @@ from tumble._engine import Scene, SceneError, StepError, World
 from tumble.columns import BOUND, on_grids
 
 if TYPE_CHECKING:
-    from tumble.run import Run
+    from tumble.reader import Run
 
 Floats = npt.NDArray[np.float64]
 Tree = Mapping[str, Any]

@@ -13,7 +13,7 @@ from tumble._engine import SceneError, World
 from tumble.folder import LEDGER
 
 if TYPE_CHECKING:
-    from tumble.run import Run
+    from tumble.reader import Run
 
 Curve = npt.NDArray[np.float64]
 Row = Mapping[str, Any]

@@ -8,7 +8,7 @@ import time
 import warnings
 from collections.abc import Mapping, Sequence
 from contextlib import suppress
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -29,9 +29,7 @@ from tumble.folder import (
     write_columns,
     write_json,
 )
-
-if TYPE_CHECKING:
-    from tumble.run import Run
+from tumble.reader import Run
 
 MANIFEST_INTERVAL = 5.0
 """Seconds between updates of run.json while a run goes on; more where the list of hashes is so long that writing takes
@@ -222,7 +220,7 @@ class Recorder:
         self.checkpoint()
         self._write_manifest()
 
-    def judge(self, run: "Run") -> None:
+    def judge(self, run: Run) -> None:
         """Notes what is doubtful about the books of this run, the expectations that were broken, and who broke those on
         curves, which the world is still at."""
         found = [expect.blamed(b, self.world) for b in expect.check(run)]
@@ -230,12 +228,10 @@ class Recorder:
         self.manifest["expectations"] = [b.to_dict() for b in found]
         self._write_manifest()
 
-    def _doubt(self, run: "Run") -> None:
+    def _doubt(self, run: Run) -> None:
         self.manifest["warnings"] = [*self.world.warnings, *doubts.of_books(run)]
 
     def _doubt_so_far(self) -> None:
-        from tumble.run import Run
-
         # Frames that have just been dropped may be counted still.
         with suppress(Exception), warnings.catch_warnings(action="ignore"):
             self._doubt(Run(self.files.path))
@@ -261,15 +257,11 @@ class Recorder:
 
     def _explain(self, failure: dict[str, Any]) -> None:
         """Notes the likely causes."""
-        from tumble.run import Run
-
         with suppress(Exception):
             run = Run(self.files.path)
             failure["causes"] = causes.likely(self.world, self.scene, failure["report"], run, failure.get("near", ()))
 
     def _minimize(self, failure: dict[str, Any]) -> None:
-        from tumble.run import Run
-
         path = self.files.path / minimal.FILE
         with suppress(OSError):
             path.unlink()
@@ -289,8 +281,6 @@ class Recorder:
 
     def _soften(self, failure: dict[str, Any]) -> None:
         """Tries to soften what came too near for the steps, and puts that before the other cures."""
-        from tumble.run import Run
-
         report = failure["report"]
         names = [system["name"] for system in self.scene["system"]]
         interval = 1.0 / self.scene["time"]["fps"] / self.scene["time"]["exchanges"]

@@ -20,7 +20,8 @@ from tumble.columns import KINDS
 from tumble.energy import ADAPTIVE
 from tumble.folder import LEDGER, Columns, RunFolder, cell, write_whole
 from tumble.lock import alone
-from tumble.run import Run, simulate
+from tumble.reader import Run
+from tumble.run import simulate
 
 if TYPE_CHECKING:
     import numpy.typing as npt
@@ -453,10 +454,8 @@ def _order(before: float, after: float, factor: float) -> float:
 # Output
 
 
-def write(found: Study) -> list[Path]:
-    """Writes the table and the picture into the folder of the study. Raises ExportError."""
-    from tumble.plots import convergence
-
+def write(found: Study) -> Path:
+    """Writes the table into the folder of the study. Raises ExportError."""
     header = ["measure", *(f"level_{k}" for k in range(found.levels)), "order", "limit", "error", "verdict"]
     lines = [header]
     for m in found.measures:
@@ -464,4 +463,4 @@ def write(found: Study) -> list[Path]:
         lines.append([m.name, *map(cell, numbers), '"' + m.verdict + '"'])
     table = found.folder / "convergence.csv"
     write_whole(table, "".join(",".join(line) + "\n" for line in lines).encode())
-    return [table, convergence(found, found.folder / "convergence.png")]
+    return table

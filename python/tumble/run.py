@@ -1,38 +1,20 @@
-"""A run: simulated frame by frame into a folder, and read from it."""
+"""Simulates a scene frame by frame into a run folder."""
 
 import json
 import os
 import shlex
 import time
-import warnings
 from collections.abc import Callable, Mapping, Sequence
-from functools import cached_property
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-import numpy.typing as npt
-
 from tumble import _engine, expect
 from tumble._engine import ExportError, Scene, SceneError, StepError, World
-from tumble.folder import (
-    FORMAT,
-    LEDGER,
-    STATIC,
-    TRIALS,
-    Columns,
-    RunFolder,
-    marked,
-    plain,
-    read_columns,
-    read_rows,
-    reason,
-    refuse,
-)
+from tumble.folder import LEDGER, RunFolder, plain, read_rows, reason, refuse
 from tumble.interrupts import held
 from tumble.lock import alone, ask
+from tumble.reader import Run, read_manifest
 from tumble.recorder import Recorder, Unchanging, changed
-from tumble.soundness import fault_of_arrays, fault_of_columns, fault_of_manifest
 
 Progress = Callable[[int, int], None]
 """Called with frames done and frames in all."""
@@ -51,7 +33,7 @@ def simulate(
     overwrite: bool = False,
     cures: bool = True,
     broke: Broke | None = None,
-) -> "Run":
+) -> Run:
     """Simulates a scene into a folder.
 
     `frames` overrides the scene's. `resume` goes on where an earlier run in the folder was stopped, to the same bits as
@@ -86,7 +68,7 @@ def _simulate(
     overwrite: bool,
     cures: bool,
     broke: Broke | None,
-) -> "Run":
+) -> Run:
     unchanging = Unchanging.of(world)
     if earlier is not None and not return_to_checkpoint(world, files):
         earlier, overwrite = None, True
@@ -103,7 +85,7 @@ def record(
     progress: Progress | None,
     cures: bool = True,
     broke: Broke | None = None,
-) -> "Run":
+) -> Run:
     """Begins to record, and simulates to the last frame. Where that fails, `broke` is told and `cures` are tried."""
     files, world = recorder.files, recorder.world
     try:
@@ -203,149 +185,3 @@ def go_on(path: Path, manifest: Mapping[str, Any]) -> str:
     sets = [word for text in last["set"] for word in ("--set", text)]
     frames = ["--frames", str(manifest["frames"] - last["frame"])]
     return shlex.join(["tumble", "branch", f"{parent}@{last['frame']}", *sets, *frames, "--out", str(path), "--resume"])
-
-
-def read_manifest(files: RunFolder) -> dict[str, Any]:
-    """run.json, if it can be understood."""
-    try:
-        manifest: dict[str, Any] = json.loads(files.manifest.read_bytes())
-    except OSError as error:
-        raise ExportError(f"{files.manifest}: cannot be read ({error.strerror})") from error
-    except ValueError as error:
-        raise ExportError(f"{files.manifest}: is damaged ({error}); simulate again with --force") from error
-    if not isinstance(manifest, dict) or not isinstance(manifest.get("scene"), dict):
-        raise refuse(files.path, "run.json is not that of a run")
-    if manifest.get("format") != FORMAT:
-        text = f"is a run of format {manifest.get('format')}, by tumble {manifest.get('tumble')}, and this one reads {FORMAT}"
-        raise refuse(files.path, f"{text}: simulate again with --force, or read it with the other")
-    if fault := fault_of_manifest(manifest):
-        raise ExportError(f"{files.manifest}: is damaged ({fault}); simulate again with --force")
-    return manifest
-
-
-class LostFrames(UserWarning):
-    """Frames of a run were there, and cannot be read."""
-
-
-class Run:
-    """A run folder, to be read. Frames that were finished can be read whatever happened after them."""
-
-    def __init__(self, path: str | os.PathLike[str]) -> None:
-        """Raises SceneError if there is no run at `path`; warns of LostFrames where some were there that are not."""
-        files = RunFolder(path)
-        if not files.is_run():
-            what = "there is no such folder" if not files.path.exists() else "there is no run.json in it"
-            raise refuse(files.path, f"is not a run: {what}; `tumble run SCENE --out {files.path}` makes one")
-        self._files = files
-        self.folder: Path = files.path
-        self.manifest: dict[str, Any] = read_manifest(files)
-        self.scene: dict[str, Any] = self.manifest["scene"]
-        """The resolved scene."""
-        self._rows = read_rows(files.ledger, LEDGER)
-        lost, what = files.ledger, "has lost lines"
-        while self._rows and not files.frame(len(self._rows) - 1).is_file():
-            lost, what = files.frame(len(self._rows) - 1), "is missing"
-            self._rows.pop()
-        if self.n_frames < (n := len(self.manifest.get("hashes", []))):
-            same = self.manifest.get("tumble") == _engine.version
-            cure = "--resume computes again what is lost" if same else "--force simulates it again"
-            text = f"{lost}: {what}: {self.n_frames} of {n} frames can be read; {cure}"
-            warnings.warn(text, LostFrames, stacklevel=2)
-
-    @classmethod
-    def open(cls, path: str | os.PathLike[str]) -> "Run":
-        """The run in a folder. Raises SceneError if there is none."""
-        return cls(path)
-
-    def __repr__(self) -> str:
-        return f"Run({str(self.folder)!r}: {self.n_frames} frames, {self.status})"
-
-    def __len__(self) -> int:
-        return self.n_frames
-
-    @property
-    def status(self) -> str:
-        """running (or killed), finished, failed or interrupted."""
-        return str(self.manifest["status"])
-
-    @property
-    def n_frames(self) -> int:
-        """Frames that can be read; frame 0 is the start."""
-        return len(self._rows)
-
-    @property
-    def descent(self) -> list[dict[str, Any]]:
-        """The runs that this one branches off from, the oldest first: `run` (its folder, seen from here), `name`, `frame`,
-        `time` [s], `hash` of the state there, and what was `set`. Empty for a run that began at its start."""
-        return list(self.manifest.get("descent", []))
-
-    @property
-    def fps(self) -> float:
-        """Frames per second."""
-        return float(self.scene["time"]["fps"])
-
-    @cached_property
-    def static(self) -> Columns:
-        """Constant columns: masses, links, triangles, colliders; see `World.topology`."""
-        return self._sound(read_columns(self._files.static, STATIC), "static", self._files.static)
-
-    @cached_property
-    def columns(self) -> dict[str, dict[str, dict[str, Any]]]:
-        """Object -> column -> unit, shape, dtype, and the file it is `in`: frames or static. Of particles that come and
-        go the first length is None; their column `id` says which is which."""
-        try:
-            described: dict[str, dict[str, dict[str, Any]]] = json.loads(self._files.columns.read_bytes())
-        except (OSError, ValueError) as error:
-            raise ExportError(f"{self._files.columns}: cannot be read ({error})") from error
-        if fault := fault_of_columns(described):
-            raise ExportError(f"{self._files.columns}: is damaged ({fault}); simulate again with --force")
-        return described
-
-    def _sound(self, columns: Columns, place: str, path: Path) -> Columns:
-        """The columns of a file, if they are as described; where the description is lost, as they are."""
-        try:
-            described = self.columns
-        except ExportError:
-            return columns
-        if fault := fault_of_arrays(columns, described, place):
-            raise ExportError(f"{path}: is damaged ({fault}); simulate again with --force")
-        return columns
-
-    def frame(self, i: int) -> Columns:
-        """The columns of a frame, by object; -1 is the last. Raises IndexError, or ExportError if a file is damaged."""
-        path = self._files.frame(self._index(i))
-        return self._sound(read_columns(path, self.mark(i)), "frames", path)
-
-    def mark(self, i: int) -> str:
-        """Header of the file of a frame."""
-        return marked(self._index(i), self._rows[i][-1])
-
-    def time(self, i: int) -> float:
-        """Simulated time of a frame [s]."""
-        return float(self._rows[self._index(i)][LEDGER.index("time")])
-
-    def _index(self, i: int) -> int:
-        if not -self.n_frames <= i < self.n_frames:
-            raise IndexError(f"frame {i} of a run with {self.n_frames} frames")
-        return i % self.n_frames
-
-    @cached_property
-    def ledger(self) -> dict[str, npt.NDArray[np.float64]]:
-        """The books, one number per frame: the columns of ledger.csv."""
-        return _numbers([row[:-1] for row in self._rows], LEDGER[:-1])
-
-    @property
-    def hashes(self) -> list[str]:
-        """Hash of the state at each frame."""
-        return [row[-1] for row in self._rows]
-
-    @cached_property
-    def trials(self) -> dict[str, npt.NDArray[np.float64]]:
-        """The steps that adaptive integrators tried: time [s], step [s], error over tolerance, accepted, frame; the first
-        65536 of each frame. Raises ExportError where some are lost."""
-        return _numbers(self._files.tried(self._rows), TRIALS)
-
-
-def _numbers(rows: list[list[str]], header: list[str]) -> dict[str, npt.NDArray[np.float64]]:
-    table = np.array(rows, dtype=np.float64).reshape(len(rows), len(header))
-    return dict(zip(header, table.T, strict=True))

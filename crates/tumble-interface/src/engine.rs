@@ -2,25 +2,12 @@
 
 use crate::error::{SceneError, StepError};
 use crate::frame::{Column, Frame};
-pub use crate::measures::{Ledger, StepReport};
+pub use crate::measures::{Ledger, StepReport, Trial};
 use crate::scene::Integrator;
 use crate::warning::Warning;
 
 /// Growth of the energy over its scale at which a run is stopped.
 pub const BLOW_UP: f64 = 1000.0;
-
-/// A step that an adaptive integrator tried.
-#[derive(Debug, Clone, Copy, PartialEq, serde::Serialize)]
-pub struct Trial {
-    /// Simulated time at its start [s].
-    pub time: f64,
-    /// Its length [s].
-    pub step: f64,
-    /// Its estimated error over the tolerance.
-    pub error: f64,
-    /// Whether it was kept.
-    pub accepted: bool,
-}
 
 /// Who has how much of the books, and where their worst numbers are: whoever is to blame where a bound is broken.
 #[derive(Debug, Clone, PartialEq, Default, serde::Serialize)]

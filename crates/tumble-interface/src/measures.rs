@@ -6,7 +6,6 @@
 //! numbers alone, has `nan`. Sums over what there is (mass, energies, counts of steps) are never absent: over nothing they are 0.
 
 use crate::columns::COLUMNS;
-use crate::engine::Trial;
 use crate::error::Issue;
 use crate::kinds::KINDS;
 use crate::scene::Expect;
@@ -176,6 +175,19 @@ impl Value for Vec<f64> {
             self.clone_from(other);
         }
     }
+}
+
+/// A step that an adaptive integrator tried.
+#[derive(Debug, Clone, Copy, PartialEq, serde::Serialize)]
+pub struct Trial {
+    /// Simulated time at its start [s].
+    pub time: f64,
+    /// Its length [s].
+    pub step: f64,
+    /// Its estimated error over the tolerance.
+    pub error: f64,
+    /// Whether it was kept.
+    pub accepted: bool,
 }
 
 impl Value for Vec<Trial> {

@@ -1,8 +1,9 @@
-//! The layers of the engine: a module imports only modules of lower layers, and no module in `systems/` imports a sibling
-//! (ARCHITECTURE.md).
+//! The layers of the engine: a module imports only modules of lower layers, and no module in `systems/` imports a sibling;
+//! modules of one folder import each other in no circle (ARCHITECTURE.md).
 
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)] // a test fails by panicking
 
+use std::collections::{BTreeMap, BTreeSet};
 use std::fs;
 use std::path::{Path, PathBuf};
 
@@ -52,9 +53,9 @@ fn files(folder: &Path) -> Vec<PathBuf> {
     found
 }
 
-/// The path of the module in a file: systems/dynamics/mod.rs -> [systems, dynamics].
-fn module(file: &Path) -> Vec<String> {
-    let relative = file.strip_prefix(source()).unwrap().with_extension("");
+/// The path of the module in a file below `source`: systems/dynamics/mod.rs -> [systems, dynamics].
+fn module(source: &Path, file: &Path) -> Vec<String> {
+    let relative = file.strip_prefix(source).unwrap().with_extension("");
     let mut path: Vec<String> = relative.iter().map(|p| p.to_str().unwrap().to_string()).collect();
     if path.last().is_some_and(|p| p == "mod" || p == "lib") {
         path.pop();
@@ -202,7 +203,7 @@ fn modules_import_only_lower_layers() {
     assert_eq!(known, there, "a module of lib.rs has no layer, or a layer no module");
     let (mut seen, mut wrong) = (0, Vec::new());
     for file in files(&source()) {
-        let of = module(&file);
+        let of = module(&source(), &file);
         let imports = imports(&of, &fs::read_to_string(&file).unwrap());
         seen += imports.iter().filter(|(_, path)| path.first() != of.first()).count();
         wrong.extend(faults(&order, &of, &imports));
@@ -233,6 +234,100 @@ fn the_test_sees_what_it_forbids() {
     );
     assert_eq!(check(&["systems"], "use crate::systems::dynamics::Parts;"), 0);
     assert_eq!(check(&["math"], "use crate::lost::Thing;"), 1);
+}
+
+/// Imports between siblings that close a circle: crate, folder, module, the sibling that it imports, and why.
+const ACCEPTED: [(&str, &str, &str, &str, &str); 9] = [
+    ("tumble", "scene", "build", "methods", "walks the table of methods, which build with its Builder"),
+    ("tumble", "scene", "checks", "methods", "walks the table of methods, which use its checks"),
+    ("tumble", "scene", "coupling", "methods", "asks the table for the system of an object; dynamics hangs its anchors"),
+    ("tumble", "scene", "hints", "methods", "walks the table of methods; dynamics uses its hints"),
+    ("tumble", "scene", "memory", "methods", "walks the table of methods; dynamics uses its estimate"),
+    ("tumble", "systems/dynamics", "core", "feature", "names the span of a step; features are given the core"),
+    ("tumble", "systems/gas", "densities", "fluid", "takes settings and failures of the step"),
+    ("tumble", "systems/gas", "fire", "fluid", "takes failures of the step"),
+    ("tumble", "systems/gas", "forces", "fluid", "acts on the fluid, which holds its sources"),
+];
+
+/// Folder -> module -> the siblings in that folder that it imports, itself or in modules inside it. A name that a folder
+/// exports counts as the module that it comes from.
+type Siblings = BTreeMap<String, BTreeMap<String, BTreeSet<String>>>;
+
+fn siblings(texts: &[(Vec<String>, String)]) -> Siblings {
+    let mut modules: BTreeSet<Vec<String>> = BTreeSet::new();
+    let mut exported: BTreeMap<Vec<String>, String> = BTreeMap::new();
+    for (of, text) in texts {
+        modules.extend((1..=of.len()).map(|n| of[..n].to_vec()));
+        for (at, _) in text.match_indices("\npub use ") {
+            for leaf in leaves(&text[at + "\npub use ".len()..]).iter().filter(|leaf| leaf.len() > 1) {
+                exported.insert([of.as_slice(), &leaf[leaf.len() - 1..]].concat(), leaf[0].clone());
+            }
+        }
+    }
+    let mut found = Siblings::new();
+    for (of, text) in texts {
+        // Unit tests may look at what stands above their module.
+        let text = text.split("#[cfg(test)]\nmod tests {").next().unwrap();
+        for (_, path) in imports(of, text) {
+            let common = of.iter().zip(&path).take_while(|(a, b)| a == b).count();
+            let (Some(own), Some(other)) = (of.get(common), path.get(common)) else { continue };
+            let other = exported.get(&path[..=common]).unwrap_or(other);
+            if own != other && modules.contains(&[&of[..common], std::slice::from_ref(other)].concat()) {
+                found.entry(of[..common].join("/")).or_default().entry(own.clone()).or_default().insert(other.clone());
+            }
+        }
+    }
+    found
+}
+
+/// What is left of a graph without modules that import none of the rest and those that none of the rest imports, again and
+/// again: circles, and the ways between them.
+fn circles(graph: &BTreeMap<String, BTreeSet<String>>) -> Vec<String> {
+    let mut edges: Vec<(&String, &String)> = graph.iter().flat_map(|(a, others)| others.iter().map(move |b| (a, b))).collect();
+    loop {
+        let inner = |(a, b): &(&String, &String)| edges.iter().any(|e| e.0 == *b) && edges.iter().any(|e| e.1 == *a);
+        let left: Vec<_> = edges.iter().filter(|e| inner(e)).copied().collect();
+        if left.len() == edges.len() {
+            return left.iter().map(|(a, b)| format!("{a} imports {b}")).collect();
+        }
+        edges = left;
+    }
+}
+
+#[test]
+fn modules_of_one_folder_import_each_other_in_no_circle() {
+    let crates = Path::new(env!("CARGO_MANIFEST_DIR")).join("..");
+    let (mut seen, mut wrong) = (0, Vec::new());
+    for name in ["tumble", "tumble-interface", "tumble-io", "tumble-python", "tumble-wasm"] {
+        let source = crates.join(name).join("src");
+        let texts: Vec<_> = files(&source).iter().map(|f| (module(&source, f), fs::read_to_string(f).unwrap())).collect();
+        for (folder, mut graph) in siblings(&texts) {
+            seen += graph.values().map(BTreeSet::len).sum::<usize>();
+            for (_, _, module, other, _) in ACCEPTED.iter().filter(|a| (a.0, a.1) == (name, folder.as_str())) {
+                if !graph.get_mut(*module).is_some_and(|others| others.remove(*other)) {
+                    println!("{name}/src/{folder}: {module} does not import {other} any more; ACCEPTED can do without");
+                }
+            }
+            wrong.extend(circles(&graph).iter().map(|text| format!("{name}/src/{folder}: {text}")));
+        }
+    }
+    println!("{seen} imports between siblings");
+    assert!(seen > 100, "the test sees no imports");
+    assert!(wrong.is_empty(), "{}", wrong.join("\n"));
+}
+
+#[test]
+fn the_test_sees_circles() {
+    let check = |files: &[(&[&str], &str)]| {
+        let texts: Vec<_> = files.iter().map(|(of, text)| (of.iter().map(|s| s.to_string()).collect(), format!("\n{text}"))).collect();
+        siblings(&texts).values().flat_map(circles).collect::<Vec<_>>()
+    };
+    let there: (&[&str], &str) = (&["a", "b"], "use super::c::C;");
+    assert!(check(&[there, (&["a", "c"], "use crate::d::D;"), (&["d"], "")]).is_empty());
+    assert_eq!(check(&[there, (&["a", "c"], "fn f() { crate::a::b::f() }")]), ["b imports c", "c imports b"]);
+    assert_eq!(check(&[there, (&["a", "c"], "use super::d::D;"), (&["a", "d", "e"], "use crate::a::b;")]).len(), 3);
+    // What a folder exports counts as the module that it comes from.
+    assert_eq!(check(&[there, (&["a"], "pub use b::{A, B};"), (&["a", "c"], "use super::{B, C};")]).len(), 2);
 }
 
 /// Places in which the name of a method may stand besides its system, its methods file, its schema, its scenes, its pages of theory and

@@ -65,6 +65,7 @@ def refine(
       tumble refine rope --measure rope.position.z@min --frames 24
       tumble refine my.toml --what system.0.substeps*4 --what sheet.flag.resolution
     """
+    from tumble.plots import convergence
     from tumble.refine import study, write
 
     if resume and force:
@@ -85,7 +86,7 @@ def refine(
     for k, text in found.failures.items():
         complain(f"level {k} failed: {text}; for details: `tumble run` with {_words(found, k)}")
     if found.measures and any(run is not None for run in found.runs):
-        for path in write(found):
+        for path in (write(found), convergence(found, found.folder / "convergence.png")):
             say(f"  {path}")
     if found.failures:
         raise typer.Exit(1)

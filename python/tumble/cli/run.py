@@ -43,7 +43,8 @@ def run(
       tumble run my.toml --resume
     """
     from tumble import StepError
-    from tumble.run import Run, simulate
+    from tumble.reader import Run
+    from tumble.run import simulate
 
     if resume and force:
         raise typer.BadParameter("--resume goes on with a run and --force replaces it; choose one")

@@ -1,7 +1,6 @@
 """A flock under each integrator: it has no conserved energy, but an order, a density and a speed."""
 
 from collections.abc import Iterator
-from dataclasses import dataclass, field
 from functools import partial
 from typing import Any
 
@@ -9,10 +8,10 @@ import numpy as np
 from matplotlib.figure import FigureBase
 
 from tumble._engine import World
-from tumble.lab.cells import BLEW_UP, SURVIVED, Cell, Purse, run
+from tumble.lab.cells import BLEW_UP, SURVIVED, Purse, run
 from tumble.lab.exact import Floats
 from tumble.lab.findings import number, seconds
-from tumble.lab.measure import Results, Tick
+from tumble.lab.measure import Observed, Results, Tick
 from tumble.lab.page import Section
 from tumble.lab.schemes import BY_WORD, FAMILIES
 from tumble.lab.subject import Subject
@@ -23,17 +22,6 @@ SMALL, LARGE = 0.3, 2.4
 
 NAMES = ("polarization", "distance", "speed")
 LABELS = ("polarization |mean v/|v||", "nearest neighbour [m]", "mean speed [m/s]")
-
-
-@dataclass
-class Observed:
-    """A flock over time, under every integrator with one step."""
-
-    step: float
-    times: dict[str, Floats] = field(default_factory=dict)
-    values: dict[str, Floats] = field(default_factory=dict)
-    """Polarization, mean distance of nearest neighbours [m], mean speed [m/s]; a row for each time. Of "" the truth."""
-    cells: dict[str, Cell] = field(default_factory=dict)
 
 
 def birds(subject: Subject, world: World) -> list[str]:

@@ -3,7 +3,7 @@
 import time
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -13,9 +13,6 @@ from tumble.lab.exact import Floats
 from tumble.lab.limits import Found
 from tumble.lab.schemes import BY_WORD, Scheme
 from tumble.lab.subject import GROWTH, Subject, rms
-
-if TYPE_CHECKING:
-    from tumble.lab.flocks import Observed
 
 SAMPLES = 8
 """Times at which positions are compared."""
@@ -35,6 +32,17 @@ class Reference:
 
 
 @dataclass
+class Observed:
+    """A flock over time, under every integrator with one step."""
+
+    step: float
+    times: dict[str, Floats] = field(default_factory=dict)
+    values: dict[str, Floats] = field(default_factory=dict)
+    """Polarization, mean distance of nearest neighbours [m], mean speed [m/s]; a row for each time. Of "" the truth."""
+    cells: dict[str, Cell] = field(default_factory=dict)
+
+
+@dataclass
 class Results:
     """All that was measured."""
 
@@ -50,7 +58,7 @@ class Results:
     """Times [s], and energies over the true ones (of tracers: the path of one)."""
     energy_cells: dict[str, Cell] = field(default_factory=dict)
     true_path: Floats | None = None
-    observed: list["Observed"] = field(default_factory=list)
+    observed: list[Observed] = field(default_factory=list)
     """Of flocks."""
     found: dict[str, Found] = field(default_factory=dict)
     notes: list[str] = field(default_factory=list)

@@ -1,7 +1,7 @@
 //! Cloth cut from flat panels and sewn.
 
 use super::fabrics::FabricWords;
-use super::structures::{Link, LinkSettings, Links, Pin};
+use super::links::{Links, Pin, cloth_links, given_or};
 use super::surfaces::{Membrane, Tear};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -69,6 +69,18 @@ pub struct Cloth {
     #[serde(default)]
     #[schemars(inner(range(min = 0.0, max = 1.0)))]
     pub color: Option<[f64; 3]>,
+}
+
+impl Cloth {
+    /// Its springs: those given, otherwise the default ones if nothing else makes it elastic.
+    pub fn links(&self) -> Links {
+        given_or(&self.links, self.membrane.is_some() || self.fabric.is_some(), cloth_links)
+    }
+
+    /// Its dihedral bending stiffness [N m].
+    pub fn hinge(&self) -> f64 {
+        self.hinge.unwrap_or(if self.fabric.is_some() { 0.0 } else { 1e-5 })
+    }
 }
 
 /// A flat piece of cloth and its initial placement.
@@ -188,9 +200,4 @@ fn right() -> [f64; 3] {
 
 fn up() -> [f64; 3] {
     [0.0, 0.0, 1.0]
-}
-
-pub(super) fn links() -> Links {
-    let structural = Some(Link::Settings(LinkSettings { modulus: 500.0, damping: 0.5, ..LinkSettings::default() }));
-    Links { structural, ..Links::default() }
 }

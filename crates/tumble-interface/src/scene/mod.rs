@@ -11,6 +11,7 @@ mod gas;
 mod grids;
 mod hair;
 mod heat;
+mod links;
 mod objects;
 mod output;
 mod shapes;
@@ -32,13 +33,11 @@ pub use gas::{
 pub use grids::GridBox;
 pub use hair::{Clump, Curl, Hair, HairCollisions};
 pub use heat::{Heat, HeatRegion, HeatScheme, HeatSide, HeatSides, HeatSource};
+pub use links::{Diagonals, Follow, Link, LinkSettings, Links, Pin, Region};
 pub use objects::{KINDS, Object};
 pub use output::{Camera, Expect, Look, Output, Probe};
 pub use shapes::{Collider, Figure, Mannequin, MeshFile, MeshFrame, MeshFrames, MeshRef, Motion, Moves, Pace, Pose, Shape};
-pub use structures::{
-    Block, Cloud, CloudShape, Diagonals, Follow, Galaxy, Halo, Link, LinkSettings, Links, Material, Net, Particles, Pattern, Pin, Profile,
-    Region, Rod, Rope, Sheet, Spring,
-};
+pub use structures::{Block, Cloud, CloudShape, Galaxy, Halo, Material, Net, Particles, Pattern, Profile, Rod, Rope, Sheet, Spring};
 pub use surfaces::{Fill, Fluid, Inflation, Membrane, ShapeMatching, Tear, Weak};
 pub use systems::{Adaptive, Hessian, Integrator, Linear, Method, OnFailure, PositionBased, Projection, SelfContact, Solver, System};
 pub use vicsek::Vicsek;

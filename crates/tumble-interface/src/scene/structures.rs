@@ -1,6 +1,7 @@
 //! Structures of masses and links. Stiffness is independent of resolution: k_s = modulus x (length, area or volume that the link represents) / l0².
 
 use super::fabrics::FabricWords;
+use super::links::{Links, Pin, given_or, net_links, rope_links, sheet_links};
 use super::surfaces::{Fluid, Inflation, Membrane, ShapeMatching, Tear};
 use super::{MeshFile, items_above_zero};
 use schemars::JsonSchema;
@@ -485,128 +486,26 @@ pub struct Pattern {
     pub scale: f64,
 }
 
-/// Families of links. A family that is not given does not exist.
-#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize, JsonSchema)]
-#[serde(deny_unknown_fields, default)]
-pub struct Links {
-    /// Between nearest neighbours.
-    pub structural: Option<Link>,
-    /// Along diagonals.
-    pub shear: Option<Link>,
-    /// Between next-nearest neighbours (skip one); a fiftieth of the structural modulus is a good start.
-    pub bend: Option<Link>,
-    /// One diagonal of each cell, or both.
-    pub diagonals: Diagonals,
-}
-
-/// Diagonals of the shear family.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, JsonSchema)]
-#[serde(rename_all = "snake_case")]
-pub enum Diagonals {
-    /// One per cell: stiffer in one direction than in the other.
-    One,
-    /// Both.
-    #[default]
-    Both,
-}
-
-/// A link family: its modulus alone, or all its settings.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
-#[serde(untagged)]
-pub enum Link {
-    /// Modulus: N for a rope, N/m for a sheet, Pa for a block.
-    Modulus(#[schemars(range(min = 0.0), extend("x-unit" = "N, N/m or Pa"))] f64),
-    /// All settings.
-    Settings(LinkSettings),
-}
-
-impl Link {
-    /// All settings, defaults filled in.
-    pub fn settings(&self) -> LinkSettings {
-        match self {
-            Self::Modulus(modulus) => LinkSettings { modulus: *modulus, ..LinkSettings::default() },
-            Self::Settings(settings) => settings.clone(),
-        }
+impl Rope {
+    /// Its springs: those given, otherwise stiff ones between neighbours. Not for a rod, which has none.
+    pub fn links(&self) -> Links {
+        given_or(&self.links, self.rod.is_some(), rope_links)
     }
 }
 
-/// Settings of a link family.
-#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize, JsonSchema)]
-#[serde(deny_unknown_fields)]
-pub struct LinkSettings {
-    /// Elastic modulus: N for a rope, N/m for a sheet, Pa for a block.
-    #[schemars(range(min = 0.0), extend("x-unit" = "N, N/m or Pa"))]
-    pub modulus: f64,
-    /// Internal damping along the link: N s for a rope, N s/m for a sheet, Pa s for a block.
-    #[serde(default)]
-    #[schemars(range(min = 0.0), extend("x-unit" = "modulus x s"))]
-    pub damping: f64,
-    /// Stiffening: force k_s r (1 + hardening (r / l0)²) at the extension r.
-    #[serde(default)]
-    #[schemars(range(min = 0.0), extend("x-unit" = "1"))]
-    pub hardening: f64,
-    /// Pulls but does not push, like a thread.
-    #[serde(default)]
-    pub tension_only: bool,
-    /// Breaks permanently when |r| / l0 exceeds this.
-    #[serde(default)]
-    #[schemars(extend("x-unit" = "1", "exclusiveMinimum" = 0.0))]
-    pub break_strain: Option<f64>,
+impl Sheet {
+    /// Its springs: those given, otherwise the default ones if nothing else makes it elastic.
+    pub fn links(&self) -> Links {
+        given_or(&self.links, self.membrane.is_some() || self.fabric.is_some(), sheet_links)
+    }
 }
 
-/// Fixed masses.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
-#[serde(untagged)]
-pub enum Pin {
-    /// By name: `"all"`, `"start"`, `"corner 0 1"`, `"vertex 3 4"`, `"edge x-"`, `"face z+"`.
-    Words(String),
-    /// All within a radius of a point, or by name; optionally following a collider.
-    Region(Region),
-}
-
-/// Collider that pinned masses follow, as if they were part of it.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
-#[serde(deny_unknown_fields)]
-pub struct Follow {
-    /// Name of a collider.
-    pub collider: String,
-    /// Bone: one of a mannequin, or the name of a joint in the file of a character. Default: the nearest point of a deforming surface, otherwise the
-    /// collider as a rigid body.
-    #[serde(default)]
-    pub bone: Option<String>,
-}
-
-/// All masses within a radius of a point at the start, or given by name.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
-#[serde(deny_unknown_fields)]
-pub struct Region {
-    /// The point.
-    #[serde(default)]
-    #[schemars(extend("x-unit" = "m"))]
-    pub center: Option<[f64; 3]>,
-    /// The radius.
-    #[serde(default)]
-    #[schemars(extend("x-unit" = "m", "exclusiveMinimum" = 0.0))]
-    pub radius: Option<f64>,
-    /// A name instead of a point and a radius: `"edge y+"`.
-    #[serde(default)]
-    pub which: Option<String>,
-    /// Collider that they follow. Default: they are fixed.
-    #[serde(default)]
-    pub follow: Option<Follow>,
-}
-
-pub(super) fn rope_links() -> Links {
-    Links { structural: Some(Link::Settings(LinkSettings { modulus: 1000.0, ..LinkSettings::default() })), ..Links::default() }
-}
-
-pub(super) fn sheet_links() -> Links {
-    let family = |modulus| Some(Link::Settings(LinkSettings { modulus, ..LinkSettings::default() }));
-    Links { structural: family(500.0), shear: family(200.0), bend: family(10.0), diagonals: Diagonals::Both }
-}
-
-pub(super) fn net_links() -> Links {
-    Links { shear: None, ..sheet_links() }
+impl Net {
+    /// Its springs: those given, otherwise the default ones if nothing else makes it elastic.
+    pub fn links(&self) -> Links {
+        let elastic = self.membrane.is_some() || self.fabric.is_some() || self.shape_matching.is_some();
+        given_or(&self.links, elastic, net_links)
+    }
 }
 
 fn one_each() -> Vec<f64> {

@@ -1,7 +1,5 @@
 //! Elastic surfaces, what they enclose, and bodies that keep their shape.
 
-use super::structures::Links;
-use super::{Cloth, Net, Rope, Sheet};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -142,44 +140,6 @@ pub struct Fill {
     /// Edge lengths; the number of particles is the best fit.
     #[schemars(transform = super::items_above_zero, extend("x-unit" = "m"))]
     pub size: [f64; 3],
-}
-
-impl Rope {
-    /// Its springs: those given, otherwise stiff ones between neighbours. Not for a rod, which has none.
-    pub fn links(&self) -> Links {
-        links(&self.links, self.rod.is_some(), super::structures::rope_links)
-    }
-}
-
-impl Sheet {
-    /// Its springs: those given, otherwise the default ones if nothing else makes it elastic.
-    pub fn links(&self) -> Links {
-        links(&self.links, self.membrane.is_some() || self.fabric.is_some(), super::structures::sheet_links)
-    }
-}
-
-impl Net {
-    /// Its springs: those given, otherwise the default ones if nothing else makes it elastic.
-    pub fn links(&self) -> Links {
-        let elastic = self.membrane.is_some() || self.fabric.is_some() || self.shape_matching.is_some();
-        links(&self.links, elastic, super::structures::net_links)
-    }
-}
-
-impl Cloth {
-    /// Its springs: those given, otherwise the default ones if nothing else makes it elastic.
-    pub fn links(&self) -> Links {
-        links(&self.links, self.membrane.is_some() || self.fabric.is_some(), super::cloth::links)
-    }
-
-    /// Its dihedral bending stiffness [N m].
-    pub fn hinge(&self) -> f64 {
-        self.hinge.unwrap_or(if self.fabric.is_some() { 0.0 } else { 1e-5 })
-    }
-}
-
-fn links(given: &Option<Links>, elastic: bool, default: fn() -> Links) -> Links {
-    given.clone().unwrap_or_else(|| if elastic { Links::default() } else { default() })
 }
 
 fn water() -> f64 {

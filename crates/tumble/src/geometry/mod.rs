@@ -1,5 +1,6 @@
 //! L1: shapes, meshes and what is near them. Always in double precision.
 
+mod affine;
 pub mod bvh;
 pub mod contact;
 pub mod facets;
@@ -14,6 +15,7 @@ pub mod shape;
 pub mod skeleton;
 pub mod surface;
 
+pub use affine::Affine;
 pub use bvh::Bvh;
 pub use contact::{Carrier, Collider, Friction, Impact, Surface, Touch, Walls};
 pub use facets::Facets;

@@ -1,8 +1,9 @@
 //! Figures: mannequins, and characters from files, as colliders with bones.
 
+use crate::geometry::Affine;
 use crate::geometry::mannequin::{self, Dance, Moves};
 use crate::geometry::motion::Pose;
-use crate::geometry::skeleton::{Act, Affine, Clock};
+use crate::geometry::skeleton::{Act, Clock};
 use crate::geometry::{Facets, Rig};
 use crate::math::rotation::from_degrees;
 use std::sync::Arc;

@@ -95,7 +95,7 @@ pub fn build(scene: &Scene, assets: &Assets) -> Result<Built, SceneError> {
     methods.iter().enumerate().for_each(|(index, method)| method.fill(&mut builder, index));
     builder.named = Vec::new();
     Reader::new(scene, &mut builder.issues).flow("field", &scene.field);
-    coupling::fasten(&mut builder);
+    builder.anchors = coupling::fasten(builder.scene, &mut builder.masses, &mut builder.issues);
     builder.sound = builder.issues.is_empty();
     let systems: Vec<Option<Box<dyn System>>> =
         methods.iter().enumerate().map(|(index, method)| method.build(&mut builder, index)).collect();

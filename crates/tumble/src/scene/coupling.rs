@@ -1,6 +1,5 @@
 //! What joins systems: anchors between masses.
 
-use super::build::Builder;
 use super::methods::place;
 use crate::exchange::Exchange;
 use crate::geometry::Vector;
@@ -22,10 +21,9 @@ pub struct Link {
 }
 
 /// Finds the ends of all anchors; within a system they are springs of its own.
-pub fn fasten(builder: &mut Builder<'_>) {
-    let (scene, masses) = (builder.scene, &mut builder.masses);
-    builder.anchors = scene.anchor.iter().filter_map(|anchor| link(scene, anchor, masses, &mut builder.issues)).collect();
-    for anchor in &builder.anchors {
+pub fn fasten(scene: &Scene, masses: &mut [Parts], issues: &mut Vec<Issue>) -> Vec<Link> {
+    let anchors: Vec<Link> = scene.anchor.iter().filter_map(|anchor| link(scene, anchor, masses, issues)).collect();
+    for anchor in &anchors {
         let [(s, a), (t, b)] = anchor.ends;
         if s == t {
             masses[s].begin(&anchor.name, 0.0);
@@ -40,6 +38,7 @@ pub fn fasten(builder: &mut Builder<'_>) {
             });
         }
     }
+    anchors
 }
 
 /// The two ends of an anchor.

@@ -1,9 +1,8 @@
 //! After a failure: changes of step or integrator, each tried.
 
-use super::Assets;
 use super::methods::rules;
-use super::simulation::Simulation;
 use crate::systems::dynamics::MOST_SUBSTEPS;
+use tumble_interface::SceneError;
 use tumble_interface::engine::{BLOW_UP, Cure, Engine};
 use tumble_interface::scene::{Integrator, Scene};
 
@@ -13,10 +12,10 @@ const COST: (f64, f64) = (50.0, 20_000.0);
 /// Tries changes of the system that failed from the start of the resolved scene to two frames beyond the failure.
 ///
 /// `failed` is the frame that failed, counted from 1; `system` the index of the system, with the step it used and the
-/// usable steps of other integrators, as estimated before the failure.
-pub fn cures(
+/// usable steps of other integrators, as estimated before the failure. `begin` starts a trial.
+pub fn cures<E: Engine>(
     scene: &Scene,
-    assets: &Assets,
+    begin: &dyn Fn(Scene) -> Result<E, SceneError>,
     failed: u64,
     system: usize,
     step: f64,
@@ -45,12 +44,12 @@ pub fn cures(
     }
     let budget = COST.0 * f64::from(now) + COST.1;
     trials.retain(|(_, n)| f64::from(*n) <= budget);
-    trials.into_iter().map(|(integrator, n)| attempt(scene, assets, failed, system, integrator, n, go_on)).collect()
+    trials.into_iter().map(|(integrator, n)| attempt(scene, begin, failed, system, integrator, n, go_on)).collect()
 }
 
-fn attempt(
+fn attempt<E: Engine>(
     scene: &Scene,
-    assets: &Assets,
+    begin: &dyn Fn(Scene) -> Result<E, SceneError>,
     failed: u64,
     system: usize,
     integrator: Integrator,
@@ -76,7 +75,7 @@ fn attempt(
         plan.clamp = None;
     }
     let mut cure = Cure { set: set.join(" "), survived: false, energy_ratio: f64::NAN };
-    let Ok(mut trial) = Simulation::new(changed, assets.clone()) else { return cure };
+    let Ok(mut trial) = begin(changed) else { return cure };
     let start = trial.ledger();
     let mut scale = start.kinetic.max(start.elastic);
     for _ in 0..failed + 2 {

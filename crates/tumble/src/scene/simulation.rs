@@ -170,7 +170,8 @@ impl Engine for Simulation {
         let stability = start.stability(go_on).into_iter().find(|s| s.system == plan.name);
         let usable: Vec<(Integrator, f64)> = stability.iter().flat_map(|s| s.limits.iter().map(|l| (l.integrator, l.usable))).collect();
         let step = if step > 0.0 { step } else { stability.map_or(self.scene.frame_time(), |s| s.step) };
-        cures::cures(&self.scene, &self.assets, self.world.frame_index() + 1, system, step, &usable, go_on)
+        let begin = |scene| Self::new(scene, self.assets.clone());
+        cures::cures(&self.scene, &begin, self.world.frame_index() + 1, system, step, &usable, go_on)
     }
 
     fn warnings(&self) -> &[Warning] {

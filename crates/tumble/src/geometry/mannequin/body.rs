@@ -5,8 +5,8 @@
 //! joins two distances over a width k [m]. Source: [quilez2013].
 
 use super::{BONES, HEIGHT, MIDDLE, SIDE, bind, parent};
+use crate::geometry::Affine;
 use crate::geometry::motion::Pose;
-use crate::geometry::skeleton::Affine;
 use crate::geometry::{Vector, nets};
 use std::sync::OnceLock;
 use tumble_interface::Mesh;

@@ -4,8 +4,9 @@
 //! two real lines make one complex line. Sixteen such pairs stand side by side in registers, so that the transform is written as for
 //! one, and every width has the same bits. The Fourier transform sorts itself (Stockham), with radices 4, 2, 3, 5.
 
+use super::block::{Block, LANES};
 use super::faces::Weight;
-use super::level::{Block, Grid, LANES, Rows};
+use super::level::{Grid, Rows};
 use crate::math::functions::{cos, exp, sin};
 use crate::math::parallel::each;
 use crate::math::simd::{Kernel, Level as Registers, Width, dispatch_at};

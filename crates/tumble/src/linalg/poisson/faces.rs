@@ -1,6 +1,6 @@
 //! How open faces are, as the matrix stores them.
 
-use super::level::LANES;
+use super::block::LANES;
 use crate::math::Real;
 use crate::math::simd::Width;
 

@@ -186,7 +186,7 @@ impl<T: Weight> Pass for Direction<'_, T> {
 impl<T: Weight> Direction<'_, T> {
     #[inline(always)]
     fn combine<W: Width>(&self, w: W, at: usize, out: &mut [Real]) {
-        use super::level::{LANES, blocks};
+        use super::block::{LANES, blocks};
         let (out, z, p) = (out.as_chunks_mut::<LANES>().0, blocks(self.grid.row(self.z, at)), blocks(self.grid.row(self.p, at)));
         let (z, p) = (&z[..out.len()], &p[..out.len()]);
         let (mean, beta) = (w.splat(self.mean), w.splat(self.beta));

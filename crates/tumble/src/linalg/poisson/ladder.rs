@@ -5,8 +5,9 @@
 //!
 //! Source: [young1971] for the factor of successive over-relaxation.
 
+use super::block::{Block, LANES};
 use super::faces::Weight;
-use super::level::{Block, Finish, Grid, LANES, Norm, Pass, Relax, Residual, Rows, Tile, run, sweep};
+use super::level::{Finish, Grid, Norm, Pass, Relax, Residual, Rows, Tile, run, sweep};
 use super::report::{Fault, Info, Method, Params};
 use super::{Side, Solver};
 use crate::math::Real;

@@ -4,24 +4,13 @@
 //! faces are all open, but perhaps for a wall at its ends, needs no weights, and gives the same bits as the one that reads them. Tiles have a fixed shape and compute
 //! the rows around them anew, so that neither the number of threads nor the width of registers shows in a result.
 
+use super::block::{Block, LANES, blocks};
 use super::faces::Weight;
 use crate::math::parallel::Tasks;
 use crate::math::simd::{Kernel, Level as Registers, Width, ask, dispatch_at};
 use crate::math::{Column, Lane, Lattice, Real};
 use std::cell::RefCell;
 use std::marker::PhantomData;
-
-/// Cells of a block: the widest register.
-pub(super) const LANES: usize = 16;
-
-/// Numbers of a block of cells.
-pub(super) type Block = [Real; LANES];
-
-/// The blocks of a row.
-#[inline(always)]
-pub(super) fn blocks(row: &[Real]) -> &[Block] {
-    row.as_chunks().0
-}
 
 /// A grid, its matrix and, while it is worked on, three columns.
 #[derive(Debug, Clone)]

@@ -9,6 +9,7 @@
 //!
 //! Verified by `crates/tumble-f64/tests/pressure.rs`.
 
+mod block;
 mod cosine;
 mod faces;
 mod incomplete;

@@ -4,8 +4,9 @@
 //! cannot meet. Both are removed component by component: what a mean over all cells would leave in a pocket grows without end.
 //!                                                                                                       (pressure.4)
 
+use super::block::LANES;
 use super::faces::Weight;
-use super::level::{Grid, Kind, LANES, Rows};
+use super::level::{Grid, Kind, Rows};
 use super::report::{Excess, Fault};
 use crate::math::Real;
 use crate::math::parallel::Tasks;
