@@ -274,8 +274,9 @@ fn the_books_know_how_far_triangles_are_stretched() {
                 let x: Vec<Vector> =
                     start.iter().map(|x| Vector { x: factors[0] * x.x, y: factors[1] * x.y, z: factors[2] * x.z }).collect();
                 write(&mut sim, "n", "position", &x);
-                let (found, exact) = (sim.ledger().stretch.unwrap(), if counts { longest(&x, &rest) } else { 0.0 });
-                assert!((found - exact).abs() < 1e-12, "{words} {factors:?}: {found}, {exact}");
+                let (found, exact) = (sim.ledger().stretch, longest(&x, &rest));
+                assert_eq!(found.is_some(), counts, "{words}");
+                assert!(found.is_none_or(|found| (found - exact).abs() < 1e-12), "{words} {factors:?}: {found:?}, {exact}");
             }
         }
     }
