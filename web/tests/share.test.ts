@@ -316,8 +316,8 @@ describe("files", () => {
       ["not packed", Buffer.from("{}"), /x\.tumble is damaged/],
       ["cut off", good.subarray(0, good.length - 12), /x\.tumble is damaged/],
       ["empty", Buffer.alloc(0), /x\.tumble is damaged/],
-      ["no scene", gzipSync("[]"), /does not hold a scene/],
-      ["no meshes", gzipSync(gunzipSync(good).toString().replace('"meshes":{}', '"meshes":[1]')), /does not hold its meshes/],
+      ["no scene", gzipSync("[]"), /does not contain a scene/],
+      ["no meshes", gzipSync(gunzipSync(good).toString().replace('"meshes":{}', '"meshes":[1]')), /does not contain its meshes/],
       ["a bomb", gzipSync(Buffer.alloc(200 * 2 ** 20)), /more than a scene may have/],
     ];
     for (const [, buffer, message] of bad) {
@@ -325,7 +325,7 @@ describe("files", () => {
       await page.setInputFiles("#file", { name: "x.tumble", mimeType: "application/gzip", buffer });
       await told(page, message);
     }
-    await assert.rejects(toFile(whole, { "a.ply": new Uint8Array(65 * 2 ** 20) }), /65 MiB; a file holds 64/);
+    await assert.rejects(toFile(whole, { "a.ply": new Uint8Array(65 * 2 ** 20) }), /65 MiB; a file can hold 64/);
     assert.deepEqual(errors, []);
     await page.context().close();
   });
