@@ -213,16 +213,19 @@ describe("scenes", () => {
     assert.equal((await links()).bend.modulus, 2);
     await page.getByLabel("Colour").selectOption("strain");
     await page.getByLabel("Links", { exact: true }).check();
-    const drawn = () =>
-      page.evaluate(() => (window as any).tumble.stage.things.find((t: any) => t.name === "flag").links.object.geometry.instanceCount);
+    const drawn = (count: number) =>
+      page.waitForFunction(
+        (n) => (window as any).tumble.stage.things.find((t: any) => t.name === "flag").links.object.geometry.instanceCount === n,
+        count,
+      );
     const [structural, bend] = [24 * 19 + 25 * 18, 23 * 19 + 25 * 17];
-    assert.equal(await drawn(), structural + bend);
+    await drawn(structural + bend);
     await page.getByRole("group", { name: "Families of links shown" }).getByLabel("bend").uncheck();
-    assert.equal(await drawn(), structural);
+    await drawn(structural);
     assert.match((await page.textContent(".legend")) ?? "", /strain/);
     await flag.getByLabel("shear").check();
     await page.waitForFunction(() => (window as any).tumble.session.info.scene.sheet[0].links.shear.modulus === 100);
-    assert.equal(await drawn(), structural + 2 * 24 * 18);
+    await drawn(structural + 2 * 24 * 18);
     // Made anew from its changes, the world has the last of them.
     const last = await page.evaluate(async () => {
       const { session } = (window as any).tumble;
