@@ -2,47 +2,14 @@
 import * as THREE from "three";
 import { OrbitControls } from "three/examples/jsm/controls/OrbitControls.js";
 import type { Column, Frame, Numbers, SceneInfo, Vector } from "../engine/protocol";
-import { FAMILIES, type Family, familiesOf, isOn, linked } from "../links";
+import { FAMILIES, familiesOf, isOn, linked } from "../links";
 import { PALETTE, SIGNED } from "./colors";
 import { Depths } from "./depths";
 import { type Grid, gridOf, type Layer, PIXELS, Pieces, PlaneField, Points, Range, type Rgb, SpaceField, Surface, scalars } from "./layers";
+import { LOOK, type Look } from "./look";
 import { arrows, carry, countOf, endsOf, leapOf, outline, planeOf, sharp, shownOf } from "./scenery";
 import { isLeft, type Legend, type Shaded, Shades } from "./shades";
 import { trails } from "./trails";
-
-/** How fields and objects are shown; of all objects together. */
-export interface Look {
-  /** Column of grids; without it the first of what there is to see. */
-  field: string | null;
-  /** Dye in the object's colour instead of a map of colours. */
-  dye: boolean;
-  arrows: boolean;
-  cells: boolean;
-  /** Axis across which a field in space is cut; null shows smoke. */
-  slice: number | null;
-  sliceAt: number;
-  links: boolean;
-  /** Families of links that are not drawn. */
-  unseen: Family[];
-  /** Objects that are not drawn. */
-  hidden: string[];
-  color: "object" | "speed" | "strain";
-  trails: boolean;
-}
-
-export const LOOK: Look = {
-  field: null,
-  dye: true,
-  arrows: false,
-  cells: false,
-  slice: null,
-  sliceAt: 0.5,
-  links: false,
-  unseen: [],
-  hidden: [],
-  color: "object",
-  trails: true,
-};
 
 const SMOKE: Rgb = [0.52, 0.53, 0.56];
 /** Fluid density [kg/m³] from which smoke counts as dye, with a colour of its own; as in python/tumble/pictures/things.py. */
