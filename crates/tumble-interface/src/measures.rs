@@ -2,7 +2,7 @@
 //! Python stub and the TypeScript types come from here; docs say how to add one (CONTRIBUTING, "Add a measure").
 //!
 //! What may be absent is an `Option`: zero is a value, `None` says that nothing in the world measures it. Types keep them apart wherever
-//! numbers are merged, where a NaN would vanish in the first `max`. Fronts get `null` and `None`; `ledger.csv`, which holds
+//! numbers are merged; a NaN is a number that went wrong, and stays in every maximum. Fronts get `null` and `None`; `ledger.csv`, which holds
 //! numbers alone, has `nan`. Sums over what there is (mass, energies, counts of steps) are never absent: over nothing they are 0.
 
 use crate::columns::COLUMNS;
@@ -120,7 +120,7 @@ impl Value for f64 {
     fn merge(&mut self, other: &Self, how: Merge) {
         *self = match how {
             Merge::Sum => *self + other,
-            Merge::Max => self.max(*other),
+            Merge::Max => larger(*self, *other),
             Merge::Last => *other,
         };
     }
@@ -476,7 +476,10 @@ impl StepReport {
 }
 
 fn worst(most: &mut Option<f64>, value: f64) {
-    if most.is_none_or(|most| value > most || value.is_nan()) {
-        *most = Some(value);
-    }
+    *most = Some(most.map_or(value, |most| larger(most, value)));
+}
+
+/// The larger of two numbers; NaN is larger than any.
+fn larger(a: f64, b: f64) -> f64 {
+    if b > a || b.is_nan() { b } else { a }
 }

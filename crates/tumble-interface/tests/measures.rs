@@ -37,6 +37,11 @@ fn a_residual_that_is_no_number_stays() {
     let mut report = StepReport::default();
     [1e-3, f64::NAN, 1e-2].into_iter().for_each(|residual| report.left(residual));
     assert!(report.residual.is_some_and(f64::is_nan));
+    for (first, second) in [(1e-2, f64::NAN), (f64::NAN, 1e-2)] {
+        let [mut total, later] = [first, second].map(|residual| StepReport { residual: Some(residual), ..StepReport::default() });
+        total.add_interval(&later);
+        assert!(total.residual.is_some_and(f64::is_nan), "{first} and {second}");
+    }
     report.passed(0.5);
     assert_eq!(report.courant, Some(0.5));
 }

@@ -10,7 +10,7 @@ mod vicsek;
 use super::Assets;
 use super::build::Builder;
 use crate::system::System;
-use tumble_interface::scene::{Integrator, Method, Scene, System as Plan};
+use tumble_interface::scene::{Integrator, Method, Particles, Scene, System as Plan};
 use tumble_interface::{Issue, Warning};
 
 /// All methods. Where several can move a kind of objects, the first is its default.
@@ -99,6 +99,19 @@ pub fn place(systems: &[Plan], kind: &str, named: Option<&str>) -> Option<usize>
 /// Whether an object of a resolved scene is in a system.
 pub fn is_in(system: &Option<String>, plan: &Plan) -> bool {
     system.as_ref() == Some(&plan.name)
+}
+
+/// Words of particles that only masses have, and that are given.
+fn words_of_masses(thing: &Particles) -> impl Iterator<Item = &'static str> {
+    let given = [
+        ("mass", thing.mass != [1.0]),
+        ("charge", !thing.charge.is_empty()),
+        ("pin", !thing.pin.is_empty()),
+        ("spring", !thing.spring.is_empty()),
+        ("shape_matching", thing.shape_matching.is_some()),
+        ("fluid", thing.fluid.is_some()),
+    ];
+    given.into_iter().filter_map(|(key, given)| given.then_some(key))
 }
 
 /// The methods that move objects of the scene.

@@ -1,6 +1,6 @@
 //! Tracers: massless particles that velocity fields carry.
 
-use super::{MethodRules, is_in, place, present};
+use super::{MethodRules, is_in, place, present, words_of_masses};
 use crate::geometry::Vector;
 use crate::recipes::Site;
 use crate::scene::Assets;
@@ -122,17 +122,9 @@ fn fluids(scene: &Scene) -> impl Iterator<Item = &String> {
 
 /// What only masses can have.
 fn refuse_masses(thing: &Particles, issues: &mut Vec<Issue>) {
-    let given = [
-        ("velocity", !thing.velocity.is_empty()),
-        ("mass", thing.mass != [1.0]),
-        ("charge", !thing.charge.is_empty()),
-        ("pin", !thing.pin.is_empty()),
-        ("spring", !thing.spring.is_empty()),
-        ("shape_matching", thing.shape_matching.is_some()),
-        ("fluid", thing.fluid.is_some()),
-    ];
-    let given = given.into_iter().filter(|(_, given)| *given);
-    issues.extend(given.map(|(key, _)| Issue::new(format!("particles \"{}\".{key}", thing.name), NO_MASS)));
+    let velocity = (!thing.velocity.is_empty()).then_some("velocity");
+    let given = velocity.into_iter().chain(words_of_masses(thing));
+    issues.extend(given.map(|key| Issue::new(format!("particles \"{}\".{key}", thing.name), NO_MASS)));
 }
 
 /// What only masses can be born with, and what only they meet.

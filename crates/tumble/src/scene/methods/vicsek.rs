@@ -1,6 +1,6 @@
 //! The model of Vicsek.
 
-use super::{MethodRules, is_in};
+use super::{MethodRules, is_in, words_of_masses};
 use crate::geometry::Vector;
 use crate::scene::Assets;
 use crate::scene::build::Builder;
@@ -73,15 +73,7 @@ impl MethodRules for Rules {
 /// Positions and velocities of an object; what only masses can have is wrong.
 fn walkers(thing: &Particles, issues: &mut Vec<Issue>) -> Vec<[Vector; 2]> {
     let n = thing.position.len();
-    let given = [
-        ("mass", thing.mass != [1.0]),
-        ("charge", !thing.charge.is_empty()),
-        ("pin", !thing.pin.is_empty()),
-        ("spring", !thing.spring.is_empty()),
-        ("shape_matching", thing.shape_matching.is_some()),
-        ("fluid", thing.fluid.is_some()),
-    ];
-    for (key, _) in given.into_iter().filter(|(_, given)| *given) {
+    for key in words_of_masses(thing) {
         let message = "particles of a vicsek system have a direction and no mass; leave it out, or use a dynamics system";
         issues.push(Issue::new(format!("particles \"{}\".{key}", thing.name), message));
     }
