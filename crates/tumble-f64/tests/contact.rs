@@ -229,3 +229,19 @@ fn every_solid_holds_a_sheet() {
         }
     }
 }
+
+/// Of masses in a row, all that are below the floor count, wherever they stand in the row.
+#[test]
+fn the_ledger_counts_the_masses_that_touch_a_solid() {
+    for below in [[0, 1, 2], [2, 3, 6], [4, 5, 6]] {
+        let height = |i: usize| below.iter().position(|b| *b == i).map_or(0.5, |k| -0.01 * (k + 1) as f64);
+        let rows: Vec<String> = (0..7).map(|i| format!("[{i}, 0, {}]", height(i))).collect();
+        let sim = simulation(&format!(
+            "[[particles]]\nname = \"p\"\nposition = [{}]\n[[collider]]\nname = \"floor\"\nshape.floor.height = 0\n",
+            rows.join(", ")
+        ));
+        let ledger = sim.ledger();
+        assert_eq!(ledger.contacts, Some(3), "{below:?}");
+        assert!((ledger.penetration.unwrap() - 0.03).abs() < 1e-12, "{below:?}: {:?}", ledger.penetration);
+    }
+}
