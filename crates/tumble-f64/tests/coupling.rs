@@ -32,12 +32,22 @@ fn systems([first, second]: [&str; 2], swapped: bool, substeps: u32) -> String {
     if swapped { second + &first } else { first + &second }
 }
 
+/// The same with intervals that are repeated, of z = w dt each, in sub-steps of 1e-4 s.
+fn repeated(swapped: bool, z: f64, coupling: &str) -> Simulation {
+    let dt = z / W;
+    with(SCHEMES[0], 1, swapped, (dt / 1e-4).ceil() as u32, 1.0 / dt, coupling)
+}
+
 /// Masses "a" and "b", each in a system of its own, on an anchor of length 1 m that is stretched by 0.1 m and belongs to a's system;
 /// they also move together. `swapped` lets b's system go first.
 fn pair(schemes: [&str; 2], exchanges: u32, swapped: bool, substeps: u32, fps: f64) -> Simulation {
+    with(schemes, exchanges, swapped, substeps, fps, "")
+}
+
+fn with(schemes: [&str; 2], exchanges: u32, swapped: bool, substeps: u32, fps: f64, more: &str) -> Simulation {
     let systems = systems(schemes, swapped, substeps);
     simulation(&format!(
-        "time = {{ fps = {fps:e}, exchanges = {exchanges} }}\nworld.gravity = [0, 0, 0]\n{systems}\
+        "time = {{ fps = {fps:e}, exchanges = {exchanges} }}\nworld.gravity = [0, 0, 0]\n{more}\n{systems}\
          [[particles]]\nname = \"a\"\nsystem = \"first\"\nposition = [[0, 0, 0]]\nvelocity = [[0, 0.5, 0]]\nmass = [{}]\n\
          [[particles]]\nname = \"b\"\nsystem = \"second\"\nposition = [[1.1, 0, 0]]\nvelocity = [[0, 0.5, 0]]\nmass = [{}]\n\
          [[anchor]]\nname = \"tie\"\nbetween = [\"a 0\", \"b 0\"]\nrest_length = 1.0\nstiffness = {:e}\n",
@@ -65,17 +75,17 @@ fn energy(sim: &Simulation) -> f64 {
     (r * r + speed * speed / (W * W)) / 0.01
 }
 
-/// Posted and delivered impulses of the exchange [N s] and the momentum in transit, from a snapshot: ports (14 numbers each), posted, delivered, then
-/// the mail as port, kind and impulse.
+/// Posted and delivered impulses of the exchange [N s] and the momentum in transit, from a snapshot: the number of bodies, posted, delivered, then
+/// letters of ten numbers, the impulse from the fourth on.
 fn exchange(sim: &Simulation) -> ([f64; 3], [f64; 3], [f64; 3]) {
     let bytes = sim.save(&[]);
     let tensors = SafeTensors::deserialize(&bytes).unwrap();
     let name = tensors.names().into_iter().find(|n| n.ends_with(" exchange")).unwrap().to_string();
     let numbers: Vec<f64> =
         tensors.tensor(&name).unwrap().data().chunks_exact(8).map(|b| f64::from_le_bytes(b.try_into().unwrap())).collect();
-    let rest = &numbers[1 + 14 * numbers[0] as usize..];
+    let rest = &numbers[1..];
     let three = |s: &[f64]| [s[0], s[1], s[2]];
-    let mail = rest[6..].chunks_exact(5).fold([0.0; 3], |sum, m| [sum[0] + m[2], sum[1] + m[3], sum[2] + m[4]]);
+    let mail = rest[6..].chunks_exact(10).fold([0.0; 3], |sum, m| [sum[0] + m[3], sum[1] + m[4], sum[2] + m[5]]);
     (three(rest), three(&rest[3..]), mail)
 }
 
@@ -253,4 +263,88 @@ fn projected_springs_on_an_anchor_keep_momentum_and_have_order_one() {
         // 0.95 to 1.01.
         assert!(lost < 1e-10, "{lost:e}");
     }
+}
+
+/// Largest error of either mass [m] after the time at which z n intervals end.
+fn off(sim: &Simulation) -> f64 {
+    let exact = Oscillator { frequency: W, damping: 0.0, x0: 0.1, v0: 0.0 };
+    let t = sim.time();
+    let r = exact.at(t).0 - 0.1;
+    let (a, b) = (positions(sim, "a")[0], positions(sim, "b")[0]);
+    (a - vector(-r * M / MASSES[0], 0.5 * t, 0.0)).norm().max((b - vector(1.1 + r * M / MASSES[1], 0.5 * t, 0.0)).norm())
+}
+
+/// (coupling.7): repeated intervals have order two, with one system's sub-steps far below the interval.
+#[test]
+fn repeated_intervals_have_order_two_whichever_system_goes_first() {
+    for swapped in [false, true] {
+        let errors: Vec<f64> = [16_u32, 32, 64]
+            .map(|n| {
+                // Half of a period and a bit, in n intervals.
+                let mut sim = repeated(swapped, 4.0 / f64::from(n), "world.coupling = { tolerance = 1e-9, iterations = 50 }");
+                run(&mut sim, n as usize);
+                off(&sim)
+            })
+            .to_vec();
+        let observed = orders(&errors);
+        println!("swapped {swapped}: errors {}, orders {observed:.3?}", common::show(&errors));
+        assert!(observed.iter().all(|p| (p - 2.0).abs() < 0.3) && errors[2] > 1e-7, "{errors:?} {observed:?}");
+    }
+}
+
+/// Intervals in which the pair turns by two radians: taken once they explode, repeated they stay near the exact motion, and lose no momentum.
+#[test]
+fn repeated_intervals_hold_where_explicit_exchange_explodes() {
+    for swapped in [false, true] {
+        let z = 2.0;
+        let mut once = repeated(swapped, z, "");
+        let mut agreed = repeated(swapped, z, "world.coupling = { tolerance = 1e-6, iterations = 100 }");
+        let mut worst = (0.0_f64, 0.0_f64);
+        for _ in 0..30 {
+            let _ = once.step(&|| true);
+            let report = agreed.step(&|| true).unwrap().unwrap();
+            assert!(report.passes > 2 && report.disagreement.is_some_and(|gap| gap <= 1e-6), "{report:?}");
+            let ((posted, delivered, mail), p) = (exchange(&agreed), agreed.ledger().momentum);
+            for a in 0..3 {
+                worst.0 = worst.0.max((posted[a] - delivered[a] - mail[a]).abs()).max((p[a] + mail[a] - [0.0, 1.5, 0.0][a]).abs());
+            }
+            worst.1 = worst.1.max(energy(&agreed));
+        }
+        println!(
+            "swapped {swapped}: momentum kept to {:.1e} N s, energy at most x {:.3}; taken once x {:.1e}",
+            worst.0,
+            worst.1,
+            energy(&once)
+        );
+        assert!(worst.0 < 1e-12 && worst.1 < 1.5, "{worst:?}");
+        assert!(energy(&once) > 100.0 || once.frame_index() < 30, "{}", energy(&once));
+        assert_eq!(agreed.warnings(), []);
+    }
+}
+
+#[test]
+fn systems_that_do_not_agree_are_named_and_nothing_is_lost() {
+    let mut sim = repeated(true, 2.0, "world.coupling = { tolerance = 1e-12, iterations = 3 }");
+    for _ in 0..3 {
+        let report = step(&mut sim);
+        assert!(report.passes == 3 && report.disagreement.is_some_and(|gap| gap > 1e-12), "{report:?}");
+        let ((_, _, mail), p) = (exchange(&sim), sim.ledger().momentum);
+        (0..3).for_each(|a| assert!((p[a] + mail[a] - [0.0, 1.5, 0.0][a]).abs() < 1e-12));
+    }
+    let named: Vec<String> = sim.warnings().iter().map(|warning| format!("{} {}", warning.path, warning.message)).collect();
+    assert!(named.len() == 1 && named[0].starts_with("system \"second\" what others do to it still changes by"), "{named:?}");
+}
+
+#[test]
+fn a_restored_run_repeats_with_the_same_bits() {
+    let words = "world.coupling = { tolerance = 1e-3, iterations = 4 }";
+    let mut whole = repeated(true, 1.0, words);
+    run(&mut whole, 3);
+    let saved = whole.save(&[]);
+    run(&mut whole, 3);
+    let mut again = repeated(true, 1.0, words);
+    again.restore(&saved).unwrap();
+    run(&mut again, 3);
+    assert_eq!(again.hash(), whole.hash());
+    assert!(stretch(&whole).0.abs() > 1e-6);
 }

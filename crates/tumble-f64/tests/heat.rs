@@ -359,16 +359,18 @@ fn fluxes_of_the_exchange_sum_up_to_the_ledger() {
     };
     let body = Body::new(plan, Field::new(grid, Place::Cell, "K").unwrap(), 0.0).unwrap();
     let mut exchange = Exchange::default();
-    let mut system = Heat::new(Settings { name: "s".into(), index: 3, ..Settings::default() }, vec![body], &mut exchange);
+    exchange.enter("other");
+    let id = exchange.enter("s");
+    let mut system = Heat::new(Settings { name: "s".into(), ..Settings::default() }, vec![body], id, &mut exchange);
     for i in 0..40 {
-        system.advance(f64::from(i), 1.0, &mut exchange, &|| true).unwrap();
+        system.advance(f64::from(i), 1.0, &mut exchange.turn(id), &|| true).unwrap();
     }
     let fluxes = exchange.fluxes().to_vec();
-    assert_eq!((fluxes[0].name.as_str(), fluxes[1].name.as_str(), fluxes[0].system), ("plate x_low", "plate x_high", 3));
+    assert_eq!((fluxes[0].name.as_str(), fluxes[1].name.as_str(), fluxes[0].system), ("plate x_low", "plate x_high", id));
     let books = system.ledger(40.0);
     assert!((fluxes[0].heat + fluxes[1].heat - books.heat.unwrap()).abs() < 1e-9 * books.heat.unwrap(), "{fluxes:?} {books:?}");
     // Steady at last: 20 K along 1 m, 2 W/(m K) and 0.16 m² pass 6.4 W.
-    system.advance(40.0, 1.0, &mut exchange, &|| true).unwrap();
+    system.advance(40.0, 1.0, &mut exchange.turn(id), &|| true).unwrap();
     let passed = exchange.fluxes()[0].heat - fluxes[0].heat;
     assert!((passed - 6.4).abs() < 1e-4, "{passed}");
 }

@@ -23,17 +23,19 @@ fn turn(integrator: Integrator, n: u32, flat: Option<usize>) -> f64 {
     // About the y axis through (0.1, ., 0.05), once in 2 pi seconds; linear interpolation is exact for it.
     let u = Vectors::of(grid, "m/s", |x| [x[2] - 0.05, 0.0, -(x[0] - 0.1)]).unwrap();
     let mut exchange = Exchange::default();
-    exchange.listen("air");
-    exchange.publish_velocities("air", 0.0, &u);
+    let (air, dust) = (exchange.enter("air"), exchange.enter("dust"));
+    exchange.ask("air", "velocity");
+    exchange.turn(air).publish_field("air", "velocity", 0.0, &u);
     let flow = Flow { fields: vec![Current::OnGrid(OnGrid { fluid: "air".into(), ..OnGrid::default() })], flat };
     let settings = Settings { name: "dust".into(), integrator, substeps: Some(n), step: None, adaptive: Default::default() };
     let start = [0.8, 0.0, -0.3];
     let object = Object { name: "dust".into(), points: 0..1, ..Object::default() };
     let mut tracers = Tracers::new(settings, flow, &[start.into()], vec![object], Vec::new());
-    tracers.absorb(&mut exchange);
-    tracers.advance(0.0, 2.0 * std::f64::consts::PI, &mut exchange, &|| true).unwrap();
+    tracers.absorb(&mut exchange.turn(dust));
+    let end = 2.0 * std::f64::consts::PI;
+    tracers.advance(0.0, end, &mut exchange.turn(dust), &|| true).unwrap();
     let mut columns = Vec::new();
-    tracers.columns(&["position"], &mut columns);
+    tracers.columns(end, &["position"], &mut columns);
     let Data::F64(x) = &columns[0].data else { panic!() };
     (0..3).map(|a| (x[a] - start[a]).powi(2)).sum::<f64>().sqrt()
 }

@@ -341,6 +341,10 @@ measures! {
         step_range: Option<(f64, f64)> = Measure { unit: "s", about: About::Step, columns: &["smallest_step", "largest_step"], ..WORST };
         /// Sweeps over the elements of position-based systems.
         sweeps: u64 = Measure { columns: &["sweeps"], ..EFFORT };
+        /// Passes through exchange intervals that `world.coupling` repeats.
+        passes: u64 = Measure { columns: &["passes"], ..EFFORT };
+        /// Change of the impulses on a system in the last pass through an interval, relative to them, at most.
+        disagreement: Option<f64> = Measure { columns: &["disagreement"], ..WORST };
         /// Links that broke.
         broken: u64 = EFFORT;
         /// Residuals of the last pressure solve after each iteration, relative to its start.
@@ -467,6 +471,11 @@ impl StepReport {
     /// Notes the final residual of a solver. NaN stays.
     pub fn left(&mut self, residual: f64) {
         worst(&mut self.residual, residual);
+    }
+
+    /// Notes how far systems are from agreeing. NaN stays.
+    pub fn disagree(&mut self, gap: f64) {
+        worst(&mut self.disagreement, gap);
     }
 
     /// Notes how many cells a fluid passed in a sub-step. NaN stays.

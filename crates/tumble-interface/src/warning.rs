@@ -55,6 +55,8 @@ codes! {
     TangledStart = "tangled-start",
     /// An anchor too stiff for the rate at which systems exchange impulses.
     StiffAnchor = "stiff-anchor",
+    /// Systems that do not come to agree about the impulses between them.
+    Disagreement = "disagreement",
     /// A pattern of another area than its mesh.
     PatternScale = "pattern-scale",
     /// A pattern that lies over itself.

@@ -1,6 +1,6 @@
 //! L4: what the world asks of a system, and the archive that snapshots are made of.
 
-use crate::exchange::Exchange;
+use crate::exchange::Turn;
 use crate::math::parallel::{CHUNK, Tasks, rows};
 use crate::math::{Real, Row};
 use crate::state::Field;
@@ -12,18 +12,23 @@ pub trait System: Send + Sync {
     /// Name in the scene.
     fn name(&self) -> &str;
 
+    /// Whether the scene lists it; what is a function of time alone has no words there.
+    fn is_listed(&self) -> bool {
+        true
+    }
+
     /// Takes what was posted to it since its last turn.
-    fn absorb(&mut self, exchange: &mut Exchange);
+    fn absorb(&mut self, exchange: &mut Turn<'_>);
 
     /// Goes from t to t + dt [s] with its own sub-steps. `go_on` is asked between them; `false` ends the work, and the
     /// state is then to be thrown away.
-    fn advance(&mut self, t: f64, dt: f64, exchange: &mut Exchange, go_on: &(dyn Fn() -> bool + Sync)) -> Result<StepReport, StepError>;
+    fn advance(&mut self, t: f64, dt: f64, exchange: &mut Turn<'_>, go_on: &(dyn Fn() -> bool + Sync)) -> Result<StepReport, StepError>;
 
     /// Publishes its state at its new time t [s].
-    fn publish(&mut self, t: f64, exchange: &mut Exchange);
+    fn publish(&mut self, t: f64, exchange: &mut Turn<'_>);
 
-    /// The named columns of its objects.
-    fn columns(&self, names: &[&str], out: &mut Vec<Column>);
+    /// The named columns of its objects at time t [s].
+    fn columns(&self, t: f64, names: &[&str], out: &mut Vec<Column>);
 
     /// Constant columns of its objects.
     fn topology(&self, out: &mut Vec<Column>);
@@ -52,6 +57,28 @@ pub trait System: Send + Sync {
 
     /// Largest stable steps from its stiffest modes now; `None` if it has none to tell, or if `go_on` says no.
     fn stability(&mut self, dt: f64, go_on: &(dyn Fn() -> bool + Sync)) -> Option<Stability>;
+
+    /// Version of the parts that it saves: raise it with their meaning, so that no state of another meaning is read.
+    fn version(&self) -> u32 {
+        1
+    }
+
+    /// Keeps its state in `kept` to roll back to, as [`save`](Self::save) writes it; at every frame and every repeated interval, so in the
+    /// memory that `kept` has already.
+    fn keep(&self, kept: &mut Archive) {
+        kept.rewind();
+        kept.begin(self.version());
+        self.save(kept);
+        kept.end();
+    }
+
+    /// Goes back to a state that it has kept.
+    fn roll_back(&mut self, kept: &mut Archive) {
+        kept.rewind();
+        kept.begin(self.version());
+        // A state of this very system always fits.
+        let _ = self.restore(kept);
+    }
 
     /// Writes everything that the next step depends on.
     fn save(&self, archive: &mut Archive);
@@ -82,24 +109,41 @@ pub enum Part {
     Numbers(Vec<f64>),
     /// Indices.
     Indices(Vec<u32>),
+    /// Whatever a library writes.
+    Bytes(Vec<u8>),
 }
 
-/// Parts in the order in which they were written, each with a name.
+/// A part with its name, and the version of what it means.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Entry {
+    /// Its name.
+    pub name: String,
+    /// Version of its writer.
+    pub version: u32,
+    /// What it holds.
+    pub part: Part,
+}
+
+/// Parts in the order in which they were written.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Archive {
-    /// Names and parts.
-    pub parts: Vec<(String, Part)>,
+    /// All of them.
+    pub parts: Vec<Entry>,
     /// Position of reading or writing.
     next: usize,
+    /// Version of who reads or writes.
+    version: u32,
+    /// A part of another version than that.
+    pub outdated: Option<Entry>,
 }
 
 impl Archive {
     /// Writes a part, over the old one at this place.
     pub fn push(&mut self, name: impl Into<String>, part: Part) {
-        let named = (name.into(), part);
+        let entry = Entry { name: name.into(), version: self.version, part };
         match self.parts.get_mut(self.next) {
-            Some(old) => *old = named,
-            None => self.parts.push(named),
+            Some(old) => *old = entry,
+            None => self.parts.push(entry),
         }
         self.next += 1;
     }
@@ -113,7 +157,7 @@ impl Archive {
     /// memory would cost more than the copy. New memory has room for `room` rows.
     fn table(&mut self, name: &str, width: usize, rows: usize, room: usize) -> &mut [Real] {
         let old = match self.parts.get_mut(self.next) {
-            Some((old, Part::Table(_, into))) if old == name => std::mem::take(into),
+            Some(Entry { name: old, part: Part::Table(_, into), .. }) if old == name => std::mem::take(into),
             _ => Vec::new(),
         };
         let mut numbers = old;
@@ -122,7 +166,7 @@ impl Archive {
         }
         numbers.resize(width * rows, 0.0);
         self.push(name, Part::Table(width, numbers));
-        match &mut self.parts[self.next - 1].1 {
+        match &mut self.parts[self.next - 1].part {
             Part::Table(_, numbers) => numbers,
             _ => &mut [],
         }
@@ -158,7 +202,7 @@ impl Archive {
     #[allow(clippy::ptr_arg)] // for its capacity
     pub fn push_indices(&mut self, name: &str, indices: &Vec<u32>) {
         match self.parts.get_mut(self.next) {
-            Some((old, Part::Indices(into))) if old == name => {
+            Some(Entry { name: old, part: Part::Indices(into), version }) if old == name && *version == self.version => {
                 if into.capacity() < indices.len() {
                     *into = Vec::with_capacity(indices.capacity());
                 }
@@ -169,12 +213,16 @@ impl Archive {
         }
     }
 
-    /// Reads the next part if it has this name.
+    /// Reads the next part if it has this name and the version of the reader.
     fn pop(&mut self, name: &str) -> Option<&Part> {
-        let (found, part) = self.parts.get(self.next)?;
-        (found == name).then_some(())?;
+        let entry = self.parts.get(self.next)?;
+        (entry.name == name).then_some(())?;
+        if entry.version != self.version {
+            self.outdated = Some(Entry { name: entry.name.clone(), version: entry.version, part: Part::Bytes(Vec::new()) });
+            return None;
+        }
         self.next += 1;
-        Some(part)
+        Some(&entry.part)
     }
 
     /// Reads rows into a column of the same length.
@@ -234,6 +282,24 @@ impl Archive {
             Part::Indices(indices) => Some(indices.clone()),
             _ => None,
         }
+    }
+
+    /// Reads bytes.
+    pub fn bytes(&mut self, name: &str) -> Option<&[u8]> {
+        match self.pop(name)? {
+            Part::Bytes(bytes) => Some(bytes),
+            _ => None,
+        }
+    }
+
+    /// Reads or writes parts of this version from here on.
+    pub fn begin(&mut self, version: u32) {
+        self.version = version;
+    }
+
+    /// Whether everything has been read.
+    pub fn is_read(&self) -> bool {
+        self.next == self.parts.len()
     }
 
     /// Forgets what lies beyond the part that was written last.

@@ -1,37 +1,74 @@
 //! L6: systems in order, the exchange, the clock: THE stepping loop. Knows no concrete system.
 
-use crate::exchange::Exchange;
-use crate::system::{Archive, Part, System};
+use crate::exchange::{Exchange, SystemId};
+use crate::system::{Archive, Entry, Part, System};
 use safetensors::tensor::{Dtype, SafeTensors, TensorView, serialize};
 use std::collections::HashMap;
 use std::hash::Hasher;
 use std::sync::atomic::{AtomicU64, Ordering};
 use tumble_interface::engine::{Account, Ledger, Stability, StepReport};
-use tumble_interface::{Column, SceneError, StepError};
+use tumble_interface::scene::Coupling;
+use tumble_interface::warning::Code;
+use tumble_interface::{Column, SceneError, StepError, Warning};
 use twox_hash::XxHash3_64;
+
+/// A system, and its number at the exchange.
+type Member = (SystemId, Box<dyn System>);
 
 /// Everything that moves.
 pub struct World {
-    systems: Vec<Box<dyn System>>,
+    systems: Vec<Member>,
     exchange: Exchange,
+    /// How intervals are repeated, if they are.
+    coupling: Option<Coupling>,
+    /// Systems that did not come to agree.
+    disagreements: Vec<Warning>,
     /// Length of an exchange interval [s].
     dt: f64,
     exchanges: u32,
     frame: u64,
-    /// The state at the last good frame.
-    good: Archive,
+    /// The state at the last good frame: of the world and the exchange, and of each system.
+    good: (Archive, Vec<Archive>),
+    /// The state of each system at the start of an interval that is repeated.
+    start: Vec<Archive>,
 }
+
+/// Version of the parts of world and exchange.
+const VERSION: u32 = 1;
 
 impl World {
     /// A world of systems at t = 0; a frame of `frame_time` [s] has `exchanges` exchange intervals.
-    pub fn new(systems: Vec<Box<dyn System>>, exchange: Exchange, frame_time: f64, exchanges: u32) -> Self {
+    pub fn new(systems: Vec<Member>, exchange: Exchange, frame_time: f64, exchanges: u32) -> Self {
         let dt = frame_time / f64::from(exchanges);
-        let mut world = Self { systems, exchange, dt, exchanges, frame: 0, good: Archive::default() };
-        for system in &mut world.systems {
-            system.publish(0.0, &mut world.exchange);
-        }
+        let (good, start) = ((Archive::default(), vec![Archive::default(); systems.len()]), vec![Archive::default(); systems.len()]);
+        let mut world = Self { systems, exchange, coupling: None, disagreements: Vec::new(), dt, exchanges, frame: 0, good, start };
+        world.publish(0.0);
         world.keep();
         world
+    }
+
+    /// Repeats each interval from now on until systems agree; `None`: takes it once.
+    pub fn repeat_until_agreed(&mut self, coupling: Option<Coupling>) {
+        self.coupling = coupling;
+    }
+
+    /// Warnings of systems that did not come to agree.
+    pub fn disagreements(&self) -> &[Warning] {
+        &self.disagreements
+    }
+
+    fn publish(&mut self, t: f64) {
+        for (id, system) in &mut self.systems {
+            system.publish(t, &mut self.exchange.turn(*id));
+        }
+    }
+
+    fn each(&self) -> impl Iterator<Item = &dyn System> {
+        self.systems.iter().map(|(_, system)| &**system)
+    }
+
+    fn each_mut(&mut self) -> impl Iterator<Item = &mut Box<dyn System>> {
+        self.systems.iter_mut().map(|(_, system)| system)
     }
 
     /// Simulated time [s].
@@ -61,7 +98,8 @@ impl World {
             }
         };
         let time = (self.frame + 1) as f64 * f64::from(self.exchanges) * self.dt;
-        if let Some(error) = self.systems.iter_mut().find_map(|s| s.breakdown(time)) {
+        let error = self.each_mut().find_map(|s| s.breakdown(time));
+        if let Some(error) = error {
             let error = self.first_breakdown().unwrap_or(error);
             return Err(self.explain(error, go_on));
         }
@@ -80,17 +118,80 @@ impl World {
         for k in 0..u64::from(self.exchanges) {
             // From whole numbers, so that time does not drift.
             let [t, end] = [k, k + 1].map(|k| (self.frame * u64::from(self.exchanges) + k) as f64 * self.dt);
-            let mut interval = StepReport::default();
-            for (i, system) in self.systems.iter_mut().enumerate() {
-                system.absorb(&mut self.exchange);
-                let turn = system.advance(t, self.dt, &mut self.exchange, go_on)?;
-                done(i, t, &turn);
-                interval.add_system(&turn);
-                system.publish(end, &mut self.exchange);
-            }
+            let interval = match self.coupling.clone() {
+                None => self.turns([t, end], go_on, &mut done)?,
+                Some(coupling) => self.passes([t, end], &coupling, go_on, &mut done)?,
+            };
             report.add_interval(&interval);
         }
         Ok(report)
+    }
+
+    /// Each system's turn in an interval [s].
+    fn turns(
+        &mut self,
+        [t, end]: [f64; 2],
+        go_on: &(dyn Fn() -> bool + Sync),
+        done: &mut impl FnMut(usize, f64, &StepReport),
+    ) -> Result<StepReport, StepError> {
+        let mut interval = StepReport::default();
+        for (i, (id, system)) in self.systems.iter_mut().enumerate() {
+            let exchange = &mut self.exchange.turn(*id);
+            system.absorb(exchange);
+            let turn = system.advance(t, self.dt, exchange, go_on)?;
+            done(i, t, &turn);
+            interval.add_system(&turn);
+            system.publish(end, exchange);
+            self.exchange.passed(*id);
+        }
+        Ok(interval)
+    }
+
+    /// Passes through an interval [s] until systems agree about the impulses between them. The report is that of the last pass. (coupling.7)
+    fn passes(
+        &mut self,
+        [t, end]: [f64; 2],
+        coupling: &Coupling,
+        go_on: &(dyn Fn() -> bool + Sync),
+        done: &mut impl FnMut(usize, f64, &StepReport),
+    ) -> Result<StepReport, StepError> {
+        self.systems.iter().zip(&mut self.start).for_each(|((_, system), kept)| system.keep(kept));
+        self.exchange.begin_repeats(t, end);
+        let (mut report, mut passes) = (StepReport::default(), 0);
+        for pass in 0..coupling.iterations {
+            if pass > 0 {
+                self.systems.iter_mut().zip(&mut self.start).for_each(|((_, system), kept)| system.roll_back(kept));
+                self.exchange.repeat();
+            }
+            report = self.turns([t, end], go_on, done)?;
+            passes += 1;
+            if !go_on() || self.exchange.end_pass().is_some_and(|gap| gap <= coupling.tolerance) {
+                break;
+            }
+        }
+        report.passes = passes;
+        if let Some((gap, system)) = self.exchange.end_repeats() {
+            report.disagree(gap);
+            if gap > coupling.tolerance {
+                self.warn_of_disagreement(&system, gap, end, coupling);
+            }
+        }
+        Ok(report)
+    }
+
+    /// Once for each system.
+    fn warn_of_disagreement(&mut self, system: &str, gap: f64, t: f64, coupling: &Coupling) {
+        let path = format!("system \"{system}\"");
+        if self.disagreements.iter().any(|warning| warning.path == path) {
+            return;
+        }
+        let message = format!(
+            "what others do to it still changes by {:.1} % after {} passes through the interval that ends at t = {t:.4} s; raise \
+             world.coupling.iterations, or time.exchanges",
+            100.0 * gap,
+            coupling.iterations
+        );
+        self.disagreements.push(Warning::new(Code::Disagreement, path, message));
     }
 
     /// Goes back to the last good frame and steps again, watching every sub-step.
@@ -103,9 +204,9 @@ impl World {
 
     /// A frame sub-step by sub-step, each of which is looked at.
     fn watched(&mut self, go_on: &(dyn Fn() -> bool + Sync), done: impl FnMut(usize, f64, &StepReport)) -> Result<StepReport, StepError> {
-        self.systems.iter_mut().for_each(|s| s.watch(true));
+        self.each_mut().for_each(|s| s.watch(true));
         let result = self.intervals(go_on, done);
-        self.systems.iter_mut().for_each(|s| s.watch(false));
+        self.each_mut().for_each(|s| s.watch(false));
         result
     }
 
@@ -127,7 +228,7 @@ impl World {
         });
         let seen = match (&result, last) {
             (Ok(_), Some((system, time, step))) if asked.into_inner() > n && go_on() => {
-                Some(see(self, time, self.systems[system].name(), step))
+                Some(see(self, time, self.systems[system].1.name(), step))
             }
             _ => None,
         };
@@ -139,7 +240,7 @@ impl World {
     fn explain(&mut self, mut error: StepError, go_on: &(dyn Fn() -> bool + Sync)) -> StepError {
         if let StepError::NotFinite(b) | StepError::Exploded(b) = &mut error {
             let dt = self.dt;
-            let system = self.systems.iter_mut().find(|s| s.name() == b.system);
+            let system = self.each_mut().find(|s| s.name() == b.system);
             if let Some(stability) = system.and_then(|s| s.stability(dt, go_on)) {
                 b.step = stability.step;
                 b.stable_step = stability.limit(stability.integrator).map_or(f64::INFINITY, |l| l.stable);
@@ -148,42 +249,47 @@ impl World {
         error
     }
 
+    /// Goes to the last good frame.
     fn roll_back(&mut self) {
-        let mut good = std::mem::take(&mut self.good);
-        // A snapshot of this very world always fits.
-        let _ = self.read(&mut good);
-        self.good = good;
+        let (world, systems) = &mut self.good;
+        self.systems.iter_mut().zip(systems).for_each(|((_, system), kept)| system.roll_back(kept));
+        world.rewind();
+        // A state of this very world always fits.
+        let _ = read_world(&mut self.frame, &mut self.exchange, world);
+        self.publish(self.time());
     }
 
     /// Takes the state as the last good frame.
     fn keep(&mut self) {
-        let good = &mut self.good;
-        good.rewind();
-        good.push("world", Part::Numbers(vec![self.frame as f64]));
-        good.push("exchange", Part::Numbers(self.exchange.save()));
-        for system in &self.systems {
-            system.save(good);
-        }
-        good.end();
+        let (world, systems) = &mut self.good;
+        world.rewind();
+        world.begin(VERSION);
+        world.push("world", Part::Numbers(vec![self.frame as f64]));
+        world.push("exchange", Part::Numbers(self.exchange.save()));
+        world.end();
+        self.systems.iter().zip(systems).for_each(|((_, system), kept)| system.keep(kept));
     }
 
     fn read(&mut self, archive: &mut Archive) -> Option<()> {
-        archive.rewind();
-        let [frame] = archive.numbers("world")?[..] else { return None };
-        self.frame = frame as u64;
-        let posted = archive.numbers("exchange")?;
-        self.systems.iter_mut().try_for_each(|s| s.restore(archive))?;
-        if self.exchange.is_heard() {
-            let time = self.time();
-            self.systems.iter_mut().for_each(|s| s.publish(time, &mut self.exchange));
+        read_world(&mut self.frame, &mut self.exchange, archive)?;
+        for (_, system) in &mut self.systems {
+            archive.begin(system.version());
+            system.restore(archive)?;
         }
-        self.exchange.restore(&posted)
+        self.publish(self.time());
+        archive.is_read().then_some(())
+    }
+
+    /// Everything that the next step depends on, at the last good frame.
+    fn parts(&self) -> impl Iterator<Item = &Entry> {
+        let (world, systems) = &self.good;
+        world.parts.iter().chain(systems.iter().flat_map(|kept| &kept.parts))
     }
 
     /// Hash of everything that the next step depends on.
     pub fn hash(&self) -> u64 {
         let mut hasher = XxHash3_64::with_seed(0);
-        for (name, part) in &self.good.parts {
+        for Entry { name, part, .. } in self.parts() {
             hasher.write(name.as_bytes());
             hasher.write(bytes(part));
         }
@@ -193,17 +299,16 @@ impl World {
     /// The state of the last good frame as safetensors, with texts about it.
     pub fn save(&self, about: &[(&str, &str)]) -> Vec<u8> {
         let views: Vec<(String, TensorView<'_>)> = self
-            .good
-            .parts
-            .iter()
+            .parts()
             .enumerate()
-            .filter_map(|(k, (name, part))| {
+            .filter_map(|(k, Entry { name, version, part })| {
                 let (dtype, shape) = match part {
                     Part::Table(width, numbers) => (REAL, vec![numbers.len() / width, *width]),
                     Part::Numbers(numbers) => (Dtype::F64, vec![numbers.len()]),
                     Part::Indices(indices) => (Dtype::U32, vec![indices.len()]),
+                    Part::Bytes(bytes) => (Dtype::U8, vec![bytes.len()]),
                 };
-                Some((format!("{k:05} {name}"), TensorView::new(dtype, shape, bytes(part)).ok()?))
+                Some((format!("{k:05} {version} {name}"), TensorView::new(dtype, shape, bytes(part)).ok()?))
             })
             .collect();
         let about: HashMap<String, String> = about.iter().map(|(k, v)| ((*k).into(), (*v).into())).collect();
@@ -219,27 +324,33 @@ impl World {
         let mut archive = Archive::default();
         for (name, tensor) in &named {
             let part = part(tensor).ok_or_else(|| wrong("it was written by an engine of another precision"))?;
-            archive.push(name.split_once(' ').map_or("", |(_, n)| n), part);
+            let mut words = name.splitn(3, ' ').skip(1);
+            archive.begin(words.next().and_then(|version| version.parse().ok()).unwrap_or(0));
+            archive.push(words.next().unwrap_or_default(), part);
         }
-        if self.read(&mut archive).is_none() || archive.parts.len() != self.good.parts.len() {
+        archive.rewind();
+        if self.read(&mut archive).is_none() {
             self.roll_back();
-            return Err(wrong("it belongs to another scene: names or sizes differ"));
+            let outdated = archive.outdated.map(|entry| {
+                format!("\"{}\" in it has version {}, which this engine does not read; run the scene again", entry.name, entry.version)
+            });
+            return Err(wrong(outdated.as_deref().unwrap_or("it belongs to another scene: names or sizes differ")));
         }
         self.keep();
         Ok(())
     }
 
-    /// Columns of every object.
-    pub fn columns(&self, names: &[&str]) -> Vec<Column> {
+    /// Columns of every object, at time t [s].
+    pub fn columns(&self, t: f64, names: &[&str]) -> Vec<Column> {
         let mut out = Vec::new();
-        self.systems.iter().for_each(|s| s.columns(names, &mut out));
+        self.each().for_each(|s| s.columns(t, names, &mut out));
         out
     }
 
     /// Constant columns of all objects.
     pub fn topology(&self) -> Vec<Column> {
         let mut out = Vec::new();
-        self.systems.iter().for_each(|s| s.topology(&mut out));
+        self.each().for_each(|s| s.topology(&mut out));
         out
     }
 
@@ -251,46 +362,45 @@ impl World {
     /// The same, of a state at this time [s].
     pub fn ledger_at(&self, time: f64) -> Ledger {
         let mut total = Ledger { time, ..Ledger::default() };
-        self.systems.iter().for_each(|s| total.add_system(&s.ledger(time)));
+        self.each().for_each(|s| total.add_system(&s.ledger(time)));
         total
     }
 
     /// Breakdown of the ledger by object, and the places of the worst values.
     pub fn account(&self) -> Account {
-        let (time, systems) = (self.time(), &self.systems);
+        let (time, listed) = (self.time(), || self.each().filter(|s| s.is_listed()));
         Account {
-            systems: systems.iter().map(|s| (s.name().to_string(), s.ledger(time))).collect(),
-            shares: systems.iter().flat_map(|s| s.shares(time)).collect(),
-            worst: systems.iter().flat_map(|s| s.worst(time)).collect(),
+            systems: listed().map(|s| (s.name().to_string(), s.ledger(time))).collect(),
+            shares: listed().flat_map(|s| s.shares(time)).collect(),
+            worst: listed().flat_map(|s| s.worst(time)).collect(),
         }
     }
 
     /// Drops cached choices of the systems (sub-step count, energy scale) after loading another scene's state.
     pub fn reconsider(&mut self) {
-        self.systems.iter_mut().for_each(|s| s.reconsider());
+        self.each_mut().for_each(|s| s.reconsider());
     }
 
     /// The pre-flight estimate of every system that has one; none of those for which `go_on` says no.
     pub fn stability(&mut self, go_on: &(dyn Fn() -> bool + Sync)) -> Vec<Stability> {
         let dt = self.dt;
-        self.systems.iter_mut().filter_map(|s| s.stability(dt, go_on)).collect()
+        self.each_mut().filter_map(|s| s.stability(dt, go_on)).collect()
     }
 
     /// The system of that name.
     pub fn system(&mut self, name: &str) -> Option<&mut dyn System> {
-        self.systems.iter_mut().find(|s| s.name() == name).map(|s| &mut **s as &mut dyn System)
+        self.each_mut().find(|s| s.name() == name).map(|s| &mut **s as &mut dyn System)
     }
 
-    /// Names of the systems.
+    /// Names of the systems that the scene lists, in its order.
     pub fn names(&self) -> Vec<&str> {
-        self.systems.iter().map(|s| s.name()).collect()
+        self.each().filter(|s| s.is_listed()).map(|s| s.name()).collect()
     }
 
     /// Sets a column of an object; see [`System::write`].
     pub fn write(&mut self, object: &str, column: &str, values: &[f64]) -> Option<bool> {
-        let done = self.systems.iter_mut().find_map(|s| s.write(object, column, values))?;
-        let time = self.time();
-        self.systems.iter_mut().for_each(|s| s.publish(time, &mut self.exchange));
+        let done = self.each_mut().find_map(|s| s.write(object, column, values))?;
+        self.publish(self.time());
         self.keep();
         Some(done)
     }
@@ -311,7 +421,18 @@ fn bytes(part: &Part) -> &[u8] {
         Part::Table(_, numbers) => bytemuck::cast_slice(numbers),
         Part::Numbers(numbers) => bytemuck::cast_slice(numbers),
         Part::Indices(indices) => bytemuck::cast_slice(indices),
+        Part::Bytes(bytes) => bytes,
     }
+}
+
+/// Reads the number of the frame, and the exchange.
+fn read_world(frame: &mut u64, exchange: &mut Exchange, archive: &mut Archive) -> Option<()> {
+    archive.begin(VERSION);
+    let [number] = archive.numbers("world")?[..] else { return None };
+    let posted = archive.numbers("exchange")?;
+    exchange.restore(&posted)?;
+    *frame = number as u64;
+    Some(())
 }
 
 fn part(tensor: &TensorView<'_>) -> Option<Part> {
@@ -320,6 +441,7 @@ fn part(tensor: &TensorView<'_>) -> Option<Part> {
         (dtype, [_, width]) if dtype == REAL => Part::Table(*width, bytemuck::allocation::pod_collect_to_vec(data)),
         (Dtype::F64, [_]) => Part::Numbers(bytemuck::allocation::pod_collect_to_vec(data)),
         (Dtype::U32, [_]) => Part::Indices(bytemuck::allocation::pod_collect_to_vec(data)),
+        (Dtype::U8, [_]) => Part::Bytes(data.to_vec()),
         _ => return None,
     })
 }
@@ -337,5 +459,21 @@ mod tests {
             let view = TensorView::new(REAL, vec![5, width], bytes(&written)).unwrap();
             assert_eq!(part(&view), Some(written));
         }
+        let written = Part::Bytes(vec![0, 255, 7]);
+        let view = TensorView::new(Dtype::U8, vec![3], bytes(&written)).unwrap();
+        assert_eq!(part(&view), Some(written));
+    }
+
+    #[test]
+    fn a_part_of_another_version_is_not_read() {
+        let mut archive = Archive::default();
+        archive.begin(1);
+        archive.push("state", Part::Bytes(vec![1, 2]));
+        archive.rewind();
+        assert_eq!(archive.bytes("state"), Some(&[1, 2][..]));
+        archive.rewind();
+        archive.begin(2);
+        assert!(archive.bytes("state").is_none());
+        assert_eq!(archive.outdated.map(|entry| (entry.name, entry.version)), Some(("state".into(), 1)));
     }
 }

@@ -183,7 +183,8 @@ pub enum Source {
     MeshSurface(MeshFile),
     /// The interior of a closed mesh, uniform over its volume.
     MeshVolume(MeshFile),
-    /// Other emitted particles: `rate` creates children while the parent lives, `burst` when it dies or each time it bounces.
+    /// Other emitted particles: `rate` creates children while the parent lives, `burst` when it dies or each time it bounces. For bursts the parents may
+    /// be in another system that comes before that of the children.
     Particles {
         /// Name of the emitter of the parents.
         of: String,

@@ -208,11 +208,32 @@ pub struct WorldSettings {
     /// Memory limit: a scene that needs more is refused before allocation.
     #[schemars(extend("x-unit" = "GiB", "exclusiveMinimum" = 0.0))]
     pub memory_limit: f64,
+    /// Repeats every exchange interval until its systems agree about the impulses between them. Default: each interval is taken once, and
+    /// systems feel each other's reactions up to an interval late.
+    pub coupling: Option<Coupling>,
 }
 
 impl Default for WorldSettings {
     fn default() -> Self {
-        Self { gravity: [0.0, 0.0, -9.8], memory_limit: 8.0 }
+        Self { gravity: [0.0, 0.0, -9.8], memory_limit: 8.0, coupling: None }
+    }
+}
+
+/// Repetition of exchange intervals.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields, default)]
+pub struct Coupling {
+    /// Most passes through an interval.
+    #[schemars(range(min = 2, max = 1000))]
+    pub iterations: u32,
+    /// Change of the impulses on a system from pass to pass, relative to them, at which systems agree.
+    #[schemars(extend("x-unit" = "1", "exclusiveMinimum" = 0.0, "maximum" = 1.0))]
+    pub tolerance: f64,
+}
+
+impl Default for Coupling {
+    fn default() -> Self {
+        Self { iterations: 20, tolerance: 1e-3 }
     }
 }
 

@@ -36,6 +36,8 @@ pub trait Batch: Send + Sync {
     fn act_at_once(&mut self, _h: f64) {}
     /// The rows of the objects that it acts between have changed, those of the others that it names, and what they weigh.
     fn renew(&mut self, _on: Vec<Range<usize>>, _others: Option<Vec<Range<usize>>>, _masses: &crate::state::Masses) {}
+    /// The solids around it have changed.
+    fn take_surfaces(&mut self, _solids: &std::sync::Arc<Vec<crate::geometry::Collider>>) {}
     /// Prepares the forces at (t, x, v): what has to be known of all elements before rows can be summed.
     fn begin_forces(&mut self, _t: f64, _x: &[Row], _v: &[Row]) {}
     /// Adds the forces [N] and torques [N m], internal damping included, on the rows from `start` on, a multiple of CHUNK.

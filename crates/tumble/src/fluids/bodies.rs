@@ -9,7 +9,7 @@
 //! Limits: no torque and no skin friction comes back; a ball is a mass without spin.
 //! Tests: crates/tumble-f64/tests/bodies.rs.
 
-use crate::exchange::{Exchange, Port};
+use crate::exchange::{BodyRow, BodyState, Exchange, Turn};
 use crate::geometry::Vector;
 use crate::linalg::poisson::Joint;
 use crate::math::Real;
@@ -21,18 +21,12 @@ use std::f64::consts::PI;
 pub struct Body {
     /// The object that it belongs to.
     pub name: String,
-    /// The mass of another system that it is.
-    pub port: Port,
+    /// The row of another system that it is.
+    pub row: BodyRow,
     /// Radius [m].
     pub radius: f64,
-    /// Centre [m].
-    pub position: Vector,
-    /// Velocity [m/s].
-    pub velocity: Vector,
-    /// Acceleration by all but the fluid [m/s²].
-    pub acceleration: Vector,
-    /// 1/mass [1/kg]; 0 if it is held.
-    pub inverse_mass: f64,
+    /// A copy of its state, which takes every impulse at once.
+    pub state: BodyState,
     /// The normal of a solid of its own system that it rests on: along it, the ball is held.
     rests: Option<Vector>,
     /// Impulse from the fluid in this interval [N s].
@@ -43,24 +37,13 @@ pub struct Body {
 
 impl Body {
     /// A ball at rest.
-    pub fn new(name: String, port: Port, radius: f64) -> Self {
-        Self {
-            name,
-            port,
-            radius,
-            position: Vector::default(),
-            velocity: Vector::default(),
-            acceleration: Vector::default(),
-            inverse_mass: 0.0,
-            rests: None,
-            impulse: Vector::default(),
-            faces: Default::default(),
-        }
+    pub fn new(name: String, row: BodyRow, radius: f64) -> Self {
+        Self { name, row, radius, state: BodyState::default(), rests: None, impulse: Vector::default(), faces: Default::default() }
     }
 
     /// Signed distance [m] and direction of a point from the surface, of the nearest image across periodic sides.
     pub(super) fn near(&self, x: Vector, grid: &Grid) -> (f64, Vector) {
-        let mut way: [f64; 3] = (x - self.position).into();
+        let mut way: [f64; 3] = (x - self.state.position).into();
         for axis in 0..3 {
             if grid.flat == Some(axis) {
                 way[axis] = 0.0;
@@ -78,7 +61,7 @@ impl Body {
     fn displaced(&self, grid: &Grid) -> f64 {
         let r = self.radius;
         let whole = if grid.flat.is_some() { PI * r * r } else { 4.0 / 3.0 * PI * r * r * r };
-        let x: [f64; 3] = self.position.into();
+        let x: [f64; 3] = self.state.position.into();
         let share = |a: usize| {
             let (low, high) = (grid.origin[a], grid.origin[a] + grid.n[a] as f64 * grid.dx);
             let both = (x[a] + r).min(high) - (x[a] - r).max(low);
@@ -89,24 +72,23 @@ impl Body {
 
     /// Takes its state from its system. What is pressed against a solid and does not leave it rests on it.
     pub fn listen(&mut self, exchange: &Exchange, gravity: [f64; 3], density: f64, grid: &Grid) {
-        let port = exchange.port(self.port);
-        (self.position, self.velocity, self.acceleration) = (port.position, port.velocity, port.acceleration);
-        self.inverse_mass = port.inverse_mass;
-        let pressed = self.acceleration - Vector::from(gravity) * (density * self.displaced(grid) * self.inverse_mass);
-        let leaves = port.velocity.dot(port.normal) > 1e-3 * (pressed.norm() * self.radius).sqrt();
-        self.rests = (pressed.dot(port.normal) < 0.0 && !leaves).then_some(port.normal);
+        self.state = *exchange.state(self.row);
+        let BodyState { velocity, acceleration, normal, inverse_mass, .. } = self.state;
+        let pressed = acceleration - Vector::from(gravity) * (density * self.displaced(grid) * inverse_mass);
+        let leaves = velocity.dot(normal) > 1e-3 * (pressed.norm() * self.radius).sqrt();
+        self.rests = (pressed.dot(normal) < 0.0 && !leaves).then_some(normal);
         // A step that was cut short may have left some.
         self.impulse = Vector::default();
     }
 
     /// Gives its system what the fluid has given it.
-    pub fn tell(&mut self, exchange: &mut Exchange) {
-        exchange.post_steady(self.port, std::mem::take(&mut self.impulse));
+    pub fn tell(&mut self, exchange: &mut Turn<'_>) {
+        exchange.post_steady(self.row, self.state.position, std::mem::take(&mut self.impulse));
     }
 
     fn push(&mut self, impulse: Vector) {
         self.impulse = self.impulse + impulse;
-        self.velocity = self.velocity + self.free(impulse * self.inverse_mass);
+        self.state.velocity = self.state.velocity + self.free(impulse * self.state.inverse_mass);
     }
 
     /// The part of a change of velocity that nothing holds.
@@ -127,10 +109,10 @@ impl Body {
 
     /// Forces besides the pressure, for h seconds: other forces, and the weight of the fluid that it displaces.      (gas.17)
     pub fn fall(&mut self, h: f64, gravity: [f64; 3], density: f64, grid: &Grid) {
-        if self.inverse_mass == 0.0 {
+        if self.state.inverse_mass == 0.0 {
             return;
         }
-        self.velocity = self.velocity + self.free(self.acceleration * h);
+        self.state.velocity = self.state.velocity + self.free(self.state.acceleration * h);
         self.push(Vector::from(gravity) * (-h * density * self.displaced(grid)));
     }
 
@@ -138,13 +120,13 @@ impl Body {
     pub(super) fn joints(&self, mass: f64) -> impl Iterator<Item = Joint> + '_ {
         self.directions().into_iter().map(move |(way, free)| {
             let part = |a: usize| self.faces[a].iter().filter(move |_| way[a] != 0.0).map(move |(at, j)| (*at, *j * way[a] as Real));
-            Joint::new((0..3).flat_map(part).collect(), if free { mass * self.inverse_mass } else { 0.0 })
+            Joint::new((0..3).flat_map(part).collect(), if free { mass * self.state.inverse_mass } else { 0.0 })
         })
     }
 
     /// Takes the impulse of a pressure, from j . q of its rows [m²/s]; `mass` is rho dx^(d-1) [kg/m].
     pub(super) fn yield_to(&mut self, products: &[f64], mass: f64) {
-        if self.inverse_mass > 0.0 {
+        if self.state.inverse_mass > 0.0 {
             let all = self.directions().into_iter().zip(products);
             self.push(all.fold(Vector::default(), |sum, ((way, _), product)| sum + Vector::from(way) * (product * mass)));
         }

@@ -10,7 +10,7 @@
 //! is lost.
 //! Tests: crates/tumble-f64/tests/sheets.rs.
 
-use crate::exchange::{Exchange, Port};
+use crate::exchange::{BodyRow, Exchange, Turn};
 use crate::geometry::Vector;
 use crate::math::Real;
 use crate::operators::Spot;
@@ -21,7 +21,7 @@ use crate::state::{Grid, Place, Vectors};
 pub struct Sheet {
     /// The object that it is.
     pub name: String,
-    ports: Vec<Port>,
+    rows: Vec<BodyRow>,
     /// Over its masses, counted from its first.
     triangles: Vec<[u32; 3]>,
     /// Of a curve.
@@ -45,24 +45,30 @@ struct Mass {
 
 impl Sheet {
     /// These masses under that name; the resistance and the friction.
-    pub fn new(name: String, ports: Vec<Port>, triangles: Vec<[u32; 3]>, pieces: Vec<[u32; 2]>, [resistance, friction]: [f64; 2]) -> Self {
-        Self { name, ports, triangles, pieces, resistance, friction, masses: Vec::new() }
+    pub fn new(
+        name: String,
+        rows: Vec<BodyRow>,
+        triangles: Vec<[u32; 3]>,
+        pieces: Vec<[u32; 2]>,
+        [resistance, friction]: [f64; 2],
+    ) -> Self {
+        Self { name, rows, triangles, pieces, resistance, friction, masses: Vec::new() }
     }
 
     /// Takes its state from its system.
     pub fn listen(&mut self, exchange: &Exchange) {
         self.masses.clear();
-        let mass = |port: &Port| {
-            let state = exchange.port(*port);
+        let mass = |row: &BodyRow| {
+            let state = exchange.state(*row);
             Mass { x: state.position, v: state.velocity, inverse: state.inverse_mass, ..Mass::default() }
         };
-        self.masses.extend(self.ports.iter().map(mass));
+        self.masses.extend(self.rows.iter().map(mass));
     }
 
     /// Gives its system what the fluid has given it.
-    pub fn tell(&mut self, exchange: &mut Exchange) {
-        for (port, mass) in self.ports.iter().zip(&self.masses) {
-            exchange.post_steady(*port, mass.impulse);
+    pub fn tell(&mut self, exchange: &mut Turn<'_>) {
+        for (row, mass) in self.rows.iter().zip(&self.masses) {
+            exchange.post_steady(*row, mass.x, mass.impulse);
         }
     }
 

@@ -70,8 +70,6 @@ struct Found {
 /// Solids in the box of a fluid.
 pub struct Solids {
     colliders: Arc<Vec<Collider>>,
-    /// Their names.
-    pub names: Vec<String>,
     /// Solids that the fluid moves, counted after the colliders.
     pub bodies: Vec<Body>,
     stick: bool,
@@ -143,19 +141,11 @@ fn share(d: [f64; 4]) -> f64 {
 
 impl Solids {
     /// These colliders and bodies in a box; fluid sticks to them or slips along them.
-    pub fn new(
-        colliders: Arc<Vec<Collider>>,
-        names: Vec<String>,
-        bodies: Vec<Body>,
-        stick: bool,
-        grid: Grid,
-        sides: &[[Beyond; 2]; 3],
-    ) -> Self {
+    pub fn new(colliders: Arc<Vec<Collider>>, bodies: Vec<Body>, stick: bool, grid: Grid, sides: &[[Beyond; 2]; 3]) -> Self {
         let len = grid.lattice().len();
         let held = std::array::from_fn(|a| [0, 1].map(|end| grid.flat == Some(a) || sides[a][end].is_held()));
         Self {
             colliders,
-            names,
             bodies,
             stick,
             grid,
@@ -170,6 +160,21 @@ impl Solids {
             dead: Vec::new(),
             shades: Vec::new(),
         }
+    }
+
+    /// Takes the colliders anew; says whether they are others.
+    pub fn take_surfaces(&mut self, colliders: &Arc<Vec<Collider>>) -> bool {
+        let others = !Arc::ptr_eq(&self.colliders, colliders);
+        if others {
+            self.colliders = colliders.clone();
+            self.place(self.time);
+        }
+        others
+    }
+
+    /// Names of the colliders, then those of what the bodies belong to.
+    pub fn names(&self) -> impl Iterator<Item = &String> {
+        self.colliders.iter().map(|collider| &collider.name).chain(self.bodies.iter().map(|body| &body.name))
     }
 
     /// Whether any of them moves.
@@ -209,7 +214,7 @@ impl Solids {
         for (i, body) in self.bodies.iter().enumerate() {
             let (d, n) = body.near(x, &self.grid);
             if d < best.1 {
-                best = (self.colliders.len() + i, d, n, body.velocity);
+                best = (self.colliders.len() + i, d, n, body.state.velocity);
             }
         }
         best
@@ -252,7 +257,8 @@ impl Solids {
     pub fn follow(&mut self) {
         let first = self.colliders.len();
         let bodies = &self.bodies;
-        let of = |solid: u32| (solid as usize).checked_sub(first).and_then(|i| bodies.get(i)).map(|body| <[f64; 3]>::from(body.velocity));
+        let of =
+            |solid: u32| (solid as usize).checked_sub(first).and_then(|i| bodies.get(i)).map(|body| <[f64; 3]>::from(body.state.velocity));
         for cut in &mut self.cuts {
             of(cut.solid).iter().for_each(|v| cut.velocity = v[cut.axis] as Real);
         }
@@ -272,7 +278,7 @@ impl Solids {
 
     /// The speed of the fastest body [m/s].
     pub fn fastest(&self) -> f64 {
-        self.bodies.iter().map(|body| body.velocity.norm()).fold(0.0, f64::max)
+        self.bodies.iter().map(|body| body.state.velocity.norm()).fold(0.0, f64::max)
     }
 
     /// Signed distances at the nodes. Where all of a block is farther from the surface than its own size, one of them does for it.

@@ -345,6 +345,10 @@ impl Batch for Flock {
         "flock"
     }
 
+    fn take_surfaces(&mut self, solids: &Arc<Vec<Collider>>) {
+        self.colliders = solids.clone();
+    }
+
     fn renew(&mut self, on: Vec<Range<usize>>, others: Option<Vec<Range<usize>>>, masses: &Masses) {
         self.prey = Rows::new(on, None);
         self.predators = Rows::new(others.unwrap_or_default(), None);

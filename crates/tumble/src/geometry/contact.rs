@@ -13,6 +13,8 @@ const PIECES: f64 = 64.0;
 /// A solid with a surface.
 #[derive(Debug, Clone)]
 pub struct Collider {
+    /// Its name in the scene.
+    pub name: String,
     /// Its shape.
     pub shape: Shape,
     /// Whether it keeps masses in instead of out.
@@ -29,17 +31,8 @@ pub struct Collider {
     pub motion: Option<Motion>,
     /// Its bones, if it is a figure.
     pub rig: Option<Arc<Rig>>,
-    /// Surface for contact with edges; `None` for contact with masses only.
-    pub edges: Option<Arc<Surface>>,
-}
-
-/// A surface whose edges and triangles meet those of what is soft.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Surface {
-    /// Name of the collider.
-    pub name: String,
-    /// The shape at t = 0, before its motion.
-    pub mesh: Mesh,
+    /// Its mesh at t = 0, before its motion, where edges and triangles meet those of what is soft; `None` for contact with masses only.
+    pub edges: Option<Arc<Mesh>>,
 }
 
 /// Coefficients of Coulomb friction.
@@ -237,12 +230,12 @@ impl Collider {
 
     /// Corners of its surface at time t [m], if edges meet it.
     pub fn corners(&self, t: f64) -> Vec<Vector> {
-        let Some(surface) = &self.edges else { return Vec::new() };
+        let Some(mesh) = &self.edges else { return Vec::new() };
         let pose = self.pose(Carrier::Whole, t);
         let place = |v: &[f64; 3]| pose.out(Vector::from(*v));
         match &self.shape {
             Shape::Animated { facets, .. } => facets.vertices(t).iter().map(place).collect(),
-            _ => surface.mesh.vertices.iter().map(place).collect(),
+            _ => mesh.vertices.iter().map(place).collect(),
         }
     }
 

@@ -1,10 +1,11 @@
 //! When and where particles are born, with what they are born, and of what they die. Every number that a particle is born
 //! with is a function of the scene's seed, the emitter's name and the particle's id, so that nothing of it needs storing.
 
+use crate::exchange::{Event, Happening};
 use crate::geometry::{Collider, Sampler, Vector, sampling};
 use crate::math::parallel::fold;
 use crate::math::{Random, Real, Row, Signal, VectorSignal, xyz64};
-use tumble_interface::scene::{Between, Cause, Emitter as Words, Event, Source, WhenFull};
+use tumble_interface::scene::{Between, Cause, Emitter as Words, Event as At, Source, WhenFull};
 
 /// Purposes of random numbers: time of birth, mass, radius and colour; direction and speed; custom columns; position. The lifetime has a fast
 /// generator of its own.
@@ -27,6 +28,8 @@ pub enum Origin {
     Place(Sampler),
     /// The particles of the emitter with this index.
     Particles(usize),
+    /// The particles of an emitter of this name in another system.
+    Elsewhere(String),
 }
 
 /// A rule by which particles die.
@@ -100,6 +103,20 @@ pub struct Parent {
     pub age: f64,
     /// Age when the exchange interval began [s]; negative for one born in it.
     pub before: f64,
+}
+
+impl Parent {
+    /// The particle of an event.
+    pub fn of(event: &Event) -> Self {
+        let Event { time, position: x, velocity: v, normal, age, .. } = *event;
+        Self { time, x, v, normal, age, before: 0.0 }
+    }
+
+    /// What has happened to it, under this id.
+    pub fn event(&self, id: u32, what: Happening) -> Event {
+        let Self { time, x, v, normal, age, .. } = *self;
+        Event { what, id, time, position: x, velocity: v, normal, age }
+    }
 }
 
 /// A number between c (1 - spread) and c (1 + spread), where u in [0, 1) says.
@@ -228,11 +245,11 @@ impl Emitter {
         self.words.lifetime.unwrap_or(f64::INFINITY) * (1.0 - self.words.lifetime_spread)
     }
 
-    /// Whether what happens to a parent makes a burst: a death of this cause, or else a bounce.
-    pub fn is_stirred_by(&self, death: Option<Cause>) -> bool {
-        match (&self.words.from, death) {
-            (Source::Particles { at: Event::Death, cause, .. }, Some(death)) => cause.is_empty() || cause.contains(&death),
-            (Source::Particles { at, .. }, None) => *at == Event::Bounce,
+    /// Whether what happens to a parent makes a burst.
+    pub fn is_stirred_by(&self, what: Happening) -> bool {
+        match (&self.words.from, what) {
+            (Source::Particles { at: At::Death, cause, .. }, Happening::Death(death)) => cause.is_empty() || cause.contains(&death),
+            (Source::Particles { at, .. }, Happening::Contact) => *at == At::Bounce,
             _ => false,
         }
     }

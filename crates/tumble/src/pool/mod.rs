@@ -6,6 +6,7 @@ mod emitter;
 
 pub use emitter::{Birth, Course, Emitter, Kill, Near, Origin, Parent};
 
+use crate::exchange::{Event, Exchange, Happening, Turn};
 use crate::geometry::Vector;
 use crate::math::parallel::{Tasks, chunks, fold};
 use crate::math::{Real, Row, xyz64};
@@ -66,6 +67,12 @@ pub struct Pool {
     interval: f64,
     /// Parents that made room or bounced in it.
     stirred: Vec<Stirred>,
+    /// Of each emitter, whether other systems ask for its events, and if so, whether for contacts as well.
+    heard: Vec<Option<bool>>,
+    /// What other systems will hear: emitters and their events.
+    told: Vec<(usize, Event)>,
+    /// Of each emitter, parents in other systems.
+    parents: Vec<Vec<Parent>>,
 }
 
 /// How columns change when rows come or go.
@@ -188,9 +195,38 @@ impl Pool {
         let Stream { emitter, len, next, flow } = &mut self.streams[s];
         let before = *flow;
         *flow = emitter.flow(before, t, dt);
-        let births = emitter.births((t, dt), (before, *flow), *next, emitter.room(*len)?)?;
+        let births = match self.parents.get_mut(s).map(std::mem::take) {
+            Some(parents) if !parents.is_empty() => emitter.bursts(&parents, *next, emitter.room(*len)?)?,
+            _ => emitter.births((t, dt), (before, *flow), *next, emitter.room(*len)?)?,
+        };
         *next += births.len() as u64;
         Some(births)
+    }
+
+    /// Hears which events are asked for, and what has happened to parents in other systems.
+    pub fn listen(&mut self, exchange: &Exchange) {
+        let Self { streams, heard, told, parents, .. } = self;
+        // An interval may have been cut short.
+        told.clear();
+        heard.clear();
+        heard.extend(streams.iter().map(|stream| exchange.is_heard(&stream.emitter.words().name)));
+        parents.clear();
+        parents.extend(streams.iter().map(|Stream { emitter, .. }| match &emitter.from {
+            Origin::Elsewhere(object) => {
+                let stirs = |event: &&Event| emitter.is_stirred_by(event.what);
+                exchange.events(object).iter().filter(stirs).map(Parent::of).collect()
+            }
+            _ => Vec::new(),
+        }));
+    }
+
+    /// Tells other systems what has happened in the interval.
+    pub fn tell(&mut self, exchange: &mut Turn<'_>) {
+        for s in (0..self.len()).filter(|s| self.heard.get(*s).is_some_and(Option::is_some)) {
+            let events = self.told.iter().filter(|(stream, _)| *stream == s).map(|(_, event)| *event).collect();
+            exchange.tell(&self.streams[s].emitter.words().name, events);
+        }
+        self.told.clear();
     }
 
     /// Children, by emitter, of the particles of emitter `parent`, in an interval that ends at t [s], while these live and when they die
@@ -203,6 +239,10 @@ impl Pool {
         dead: &[(u32, Cause)],
         (x, v): (&[Row], &[Row]),
     ) -> Result<Vec<(usize, Vec<Birth>)>, StepError> {
+        if self.heard.get(parent).is_some_and(Option::is_some) {
+            let events = self.events(parent, t, dead, x, v);
+            self.told.extend(events.into_iter().map(|event| (parent, event)));
+        }
         let children: Vec<usize> = (parent + 1..self.len()).filter(|child| self.parent(*child) == Some(parent)).collect();
         let born = |s: usize| Ok((s, self.children(s, parent, t, dead, x, v).ok_or_else(|| self.full(s, system, t))?));
         children.into_iter().map(born).collect()
@@ -240,7 +280,7 @@ impl Pool {
     fn parent(&self, s: usize) -> Option<usize> {
         match self.streams[s].emitter.from {
             Origin::Particles(parent) => Some(parent),
-            Origin::Place(_) => None,
+            Origin::Place(_) | Origin::Elsewhere(_) => None,
         }
     }
 
@@ -352,7 +392,8 @@ impl Pool {
             all.select_nth_unstable_by(over - 1, older);
             all.truncate(over);
         }
-        if (0..self.len()).any(|child| self.parent(child) == Some(s)) {
+        let heard = self.heard.get(s).is_some_and(Option::is_some);
+        if heard || (0..self.len()).any(|child| self.parent(child) == Some(s)) {
             all.sort_unstable_by(older);
             let (room, start) = (most - stream.len, self.rows(s).start);
             let stirred = all.iter().zip(&births[room..]).map(|(k, birth)| {
@@ -367,9 +408,10 @@ impl Pool {
         all
     }
 
-    /// Whether the bounces of an emitter's particles bear others.
+    /// Whether the bounces of an emitter's particles bear others, or are asked for.
     pub fn heeds_hits(&self, s: usize) -> bool {
-        (0..self.len()).any(|child| self.parent(child) == Some(s) && self.emitter(child).is_stirred_by(None))
+        let bears = |child: usize| self.parent(child) == Some(s) && self.emitter(child).is_stirred_by(Happening::Contact);
+        self.heard.get(s).is_some_and(|contacts| *contacts == Some(true)) || (0..self.len()).any(bears)
     }
 
     /// The rows of particles whose bounces bear others.
@@ -408,18 +450,24 @@ impl Pool {
 
     /// Parents that bear bursts of an emitter, in the order of their death or bounce, where an interval ends at t.
     fn bearing(&self, child: usize, s: usize, t: f64, dead: &[(u32, Cause)], x: &[Row], v: &[Row]) -> Vec<Parent> {
-        let (emitter, start) = (&self.streams[child].emitter, self.rows(s).start);
-        let of = |(k, _): &(u32, Cause)| {
+        let emitter = &self.streams[child].emitter;
+        self.events(s, t, dead, x, v).iter().filter(|event| emitter.is_stirred_by(event.what)).map(Parent::of).collect()
+    }
+
+    /// What has happened to the particles of an emitter in an interval that ends at t, in the order of times.
+    fn events(&self, s: usize, t: f64, dead: &[(u32, Cause)], x: &[Row], v: &[Row]) -> Vec<Event> {
+        let (emitter, start) = (&self.streams[s].emitter, self.rows(s).start);
+        let died = dead.iter().map(|(k, cause)| {
             let (k, row) = (*k as usize, start + *k as usize);
-            (self.until(s, k, f64::INFINITY, (t, t), x[row], v[row]), self.ids(s)[k])
-        };
-        let died = dead.iter().filter(|(_, cause)| emitter.is_stirred_by(Some(*cause))).map(of);
+            self.until(s, k, f64::INFINITY, (t, t), x[row], v[row]).event(self.ids(s)[k], Happening::Death(*cause))
+        });
         // Whoever had died before it met the solid met none.
-        let lived = |e: &&Stirred| e.death.is_some() || e.parent.age - (t - e.parent.time) <= self.streams[s].emitter.lifetime(e.id);
-        let stirred = self.stirred.iter().filter(|e| e.stream == s && emitter.is_stirred_by(e.death)).filter(lived);
-        let mut all: Vec<(Parent, u32)> = died.chain(stirred.map(|e| (e.parent, e.id))).collect();
-        all.sort_by(|(a, i), (b, j)| a.time.total_cmp(&b.time).then(i.cmp(j)));
-        all.into_iter().map(|(parent, _)| parent).collect()
+        let lived = |e: &&Stirred| e.death.is_some() || e.parent.age - (t - e.parent.time) <= emitter.lifetime(e.id);
+        let stirred = self.stirred.iter().filter(|e| e.stream == s).filter(lived);
+        let stirred = stirred.map(|e| e.parent.event(e.id, e.death.map_or(Happening::Contact, Happening::Death)));
+        let mut all: Vec<Event> = died.chain(stirred).collect();
+        all.sort_by(|a, b| a.time.total_cmp(&b.time).then(a.id.cmp(&b.id)));
+        all
     }
 
     /// The columns that only emitted particles have. `mass` are the masses of all rows, where there are any.

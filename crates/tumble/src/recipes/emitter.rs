@@ -38,6 +38,7 @@ pub fn emitter<'a>(
     words: &Words,
     course: Course,
     (seed, flat): (u32, Option<usize>),
+    parent: Option<(&Words, bool)>,
     mesh: &dyn Fn(&MeshFile) -> Option<&'a Mesh>,
 ) {
     let path = format!("emitter \"{}\"", words.name);
@@ -55,8 +56,15 @@ pub fn emitter<'a>(
     if children && words.path.constant() != Some([0.0; 3]) {
         wrong(".path", "children are born where their parents are; leave it out");
     }
+    let elsewhere = parent.is_some_and(|(_, elsewhere)| elsewhere);
+    if elsewhere && words.rate.constant() != Some(0.0) {
+        wrong(
+            ".rate",
+            "children by rate follow living parents, and these are in another system; leave it out, or put both into one system",
+        );
+    }
     if let Source::Particles { of, at, cause } = &words.from {
-        let parent = site.parts.emitters().find(|e| e.words().name == *of).map(|e| e.words());
+        let parent = parent.map(|(words, _)| words);
         let dies = |cause: &Cause| {
             parent.is_none_or(|p| match cause {
                 Cause::Lifetime => p.lifetime.is_some(),
@@ -171,12 +179,17 @@ pub fn emitter<'a>(
     }
     let parent = match &words.from {
         Source::Particles { of, .. } => {
-            let parent = site.parts.stream(of);
+            let parent = match site.parts.stream(of) {
+                Some(stream) => Some(Origin::Particles(stream)),
+                None => elsewhere.then(|| Origin::Elsewhere(of.clone())),
+            };
             if parent.is_none() {
-                let message = format!("\"{of}\" is no emitter of the same system that stands before this one");
+                let message = format!(
+                    "\"{of}\" is no emitter of the same system that stands before this one, nor one of a system that comes before its own"
+                );
                 wrong(".from.particles.of", &message);
             }
-            parent.map(Origin::Particles)
+            parent
         }
         _ => None,
     };

@@ -49,7 +49,7 @@ pub struct Site<'a> {
     /// Direction that counts as up.
     pub up: Vector,
     /// The scene's colliders, for what follows them.
-    pub solids: Option<&'a [(String, Collider)]>,
+    pub solids: Option<&'a [Collider]>,
     /// What comes from files.
     pub assets: &'a Assets,
 }

@@ -31,7 +31,7 @@ pub fn pinned(site: &mut Site<'_>, thing: &Pinnable<'_>, pins: &[Pin]) -> Vec<u3
                 all.extend(found.iter().map(|p| p + thing.first));
                 if let Some((solid, bone)) = carrier {
                     for point in found.iter().map(|p| p + thing.first) {
-                        let nearest = |solids: &[(String, Collider)]| solids[solid].1.carrier(site.parts.position(point));
+                        let nearest = |solids: &[Collider]| solids[solid].carrier(site.parts.position(point));
                         let carrier = bone.map_or_else(|| site.solids.map_or(Carrier::Whole, nearest), Carrier::Bone);
                         site.parts.follow(point, solid, carrier);
                     }
@@ -46,13 +46,13 @@ pub fn pinned(site: &mut Site<'_>, thing: &Pinnable<'_>, pins: &[Pin]) -> Vec<u3
 }
 
 /// The collider that is followed, counted from the first, and its bone.
-fn carrier(solids: &[(String, Collider)], follow: &Follow) -> Result<(usize, Option<usize>), String> {
-    let Some(solid) = solids.iter().position(|(name, _)| *name == follow.collider) else {
-        let known: Vec<&str> = solids.iter().map(|(name, _)| name.as_str()).collect();
+fn carrier(solids: &[Collider], follow: &Follow) -> Result<(usize, Option<usize>), String> {
+    let Some(solid) = solids.iter().position(|solid| solid.name == follow.collider) else {
+        let known: Vec<&str> = solids.iter().map(|solid| solid.name.as_str()).collect();
         return Err(format!("there is no collider \"{}\" to follow; known are {}", follow.collider, known.join(", ")));
     };
     let Some(bone) = &follow.bone else { return Ok((solid, None)) };
-    let collider = &solids[solid].1;
+    let collider = &solids[solid];
     match collider.bone(bone) {
         Some(bone) => Ok((solid, Some(bone))),
         None if collider.bones().is_empty() => Err(format!("collider \"{}\" has no bones; leave out bone", follow.collider)),

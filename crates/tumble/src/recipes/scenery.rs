@@ -1,7 +1,7 @@
 //! Colliders: the solids that masses feel, and the meshes that pictures show.
 
 use crate::geometry::motion::Key;
-use crate::geometry::{Collider, Facets, Friction, GridSdf, Motion, Rig, Shape, Surface, Vector, surface};
+use crate::geometry::{Collider, Facets, Friction, GridSdf, Motion, Rig, Shape, Vector, surface};
 use crate::math::rotation::from_degrees;
 use std::sync::Arc;
 use tumble_interface::Mesh;
@@ -123,6 +123,7 @@ pub fn solid(thing: &Thing, meshes: &[Mesh], figure: Option<(Arc<Rig>, Facets)>)
         return wrong(".inside", format!("true, but {what}"));
     }
     Ok(Collider {
+        name: thing.name.clone(),
         shape,
         inside: thing.inside,
         thickness: thing.thickness,
@@ -131,7 +132,7 @@ pub fn solid(thing: &Thing, meshes: &[Mesh], figure: Option<(Arc<Rig>, Facets)>)
         belt: thing.belt.into(),
         motion: thing.motion.as_ref().map(motion).transpose()?,
         rig,
-        edges: mesh.map(|mesh| Arc::new(Surface { name: thing.name.clone(), mesh })),
+        edges: mesh.map(Arc::new),
     })
 }
 

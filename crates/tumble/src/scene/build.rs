@@ -6,25 +6,24 @@ use super::coupling;
 use super::hints::unused;
 use super::laws::{Reader, flat};
 use super::memory::memory;
-use super::methods::rules;
+use super::methods::{is_in, rules};
 use super::plausible::implausible;
-use crate::exchange::Exchange;
+use crate::exchange::{Exchange, Happening, SystemId};
 use crate::geometry::{Collider, Vector};
-use crate::pool::Course;
+use crate::pool::{self, Course, Origin};
 use crate::recipes::{self, Site};
 use crate::system::System;
 use crate::systems::dynamics::Parts;
+use crate::systems::scenery::Scenery;
 use crate::world::World;
 use std::borrow::Cow;
 use std::sync::Arc;
-use tumble_interface::scene::{Collider as Thing, Emitter, MeshFile, Plane, Scene, Shape, System as Plan};
+use tumble_interface::scene::{Collider as Thing, Emitter, Event, MeshFile, Plane, Scene, Shape, Source, System as Plan};
 use tumble_interface::{Column, Data, Issue, Mesh, SceneError, Warning};
 
-/// A world, the surfaces of its colliders, and what is doubtful about it.
+/// A world, and what is doubtful about it.
 pub struct Built {
     pub world: World,
-    pub scenery: Vec<Column>,
-    pub colliders: Arc<Vec<Collider>>,
     pub warnings: Vec<Warning>,
 }
 
@@ -41,15 +40,15 @@ pub struct Builder<'a> {
     pub interval: f64,
     /// Those without faults; what is made of them otherwise is dropped.
     pub colliders: Arc<Vec<Collider>>,
-    /// The same with their names.
-    pub named: Vec<(String, Collider)>,
     /// Their surfaces.
     pub surfaces: Vec<Mesh>,
     /// Masses and elements of each system that has some.
     pub masses: Vec<Parts>,
     /// Anchors whose ends have been found.
-    pub anchors: Vec<coupling::Link>,
+    pub anchors: Arc<Vec<coupling::Link>>,
     pub exchange: Exchange,
+    /// Of each system.
+    pub ids: Vec<SystemId>,
     pub issues: Vec<Issue>,
     pub warnings: Vec<Warning>,
     /// Whether masses and elements are free of issues, so that their systems can be built.
@@ -74,36 +73,41 @@ pub fn build(scene: &Scene, assets: &Assets) -> Result<Built, SceneError> {
     warnings.extend(implausible(scene, assets));
     let drawn = with_clouds(scene);
     let scene = &*drawn;
-    let (colliders, scenery, surfaces) = solids(scene, assets, &mut issues);
+    let (colliders, meshes, surfaces) = solids(scene, assets, &mut issues);
+    let colliders = Arc::new(colliders);
+    let mut exchange = Exchange::default();
+    let scenery = (exchange.enter("scenery"), Box::new(Scenery::new(colliders.clone(), meshes)) as Box<dyn System>);
+    let ids: Vec<SystemId> = scene.system.iter().map(|plan| exchange.enter(&plan.name)).collect();
     let mut builder = Builder {
         scene,
         assets,
         gravity: gravity(scene),
         up: if scene.dimension == 2 && scene.plane == Plane::Xy { [0.0, 1.0, 0.0] } else { [0.0, 0.0, 1.0] }.into(),
         interval: scene.frame_time() / f64::from(scene.time.exchanges),
-        named: scene.collider.iter().map(|c| c.name.clone()).zip(colliders.iter().cloned()).collect(),
-        colliders: Arc::new(colliders),
+        colliders,
         surfaces,
         masses: scene.system.iter().map(|_| Parts::default()).collect(),
-        anchors: Vec::new(),
-        exchange: Exchange::default(),
+        anchors: Arc::default(),
+        exchange,
+        ids,
         issues,
         warnings,
         sound: false,
     };
     let methods: Vec<_> = scene.system.iter().map(|plan| rules(plan.method)).collect();
     methods.iter().enumerate().for_each(|(index, method)| method.fill(&mut builder, index));
-    builder.named = Vec::new();
     Reader::new(scene, &mut builder.issues).flow("field", &scene.field);
-    builder.anchors = coupling::fasten(builder.scene, &mut builder.masses, &mut builder.issues);
+    builder.anchors = Arc::new(coupling::fasten(builder.scene, &mut builder.masses, &mut builder.issues));
     builder.sound = builder.issues.is_empty();
     let systems: Vec<Option<Box<dyn System>>> =
         methods.iter().enumerate().map(|(index, method)| method.build(&mut builder, index)).collect();
-    let Builder { colliders, exchange, issues, warnings, .. } = builder;
+    let Builder { ids, exchange, issues, warnings, .. } = builder;
     match systems.into_iter().collect::<Option<Vec<_>>>() {
         Some(systems) if issues.is_empty() => {
-            let world = World::new(systems, exchange, scene.frame_time(), scene.time.exchanges);
-            Ok(Built { world, scenery, colliders, warnings })
+            let systems = ids.into_iter().zip(systems).chain([scenery]).collect();
+            let mut world = World::new(systems, exchange, scene.frame_time(), scene.time.exchanges);
+            world.repeat_until_agreed(scene.world.coupling.clone());
+            Ok(Built { world, warnings })
         }
         _ => Err(SceneError { issues }),
     }
@@ -130,7 +134,31 @@ pub fn emit(site: &mut Site<'_>, scene: &Scene, thing: &Emitter) {
         path: reader.in_plane(&at("path"), &thing.path),
         end: scene.frame_time() * f64::from(scene.time.frames),
     };
-    recipes::emitter(site, thing, course, (scene.seed, flat(scene)), &|file: &MeshFile| assets.get(&file.path));
+    let parent = parent(scene, thing);
+    if let (Source::Particles { at: Event::Bounce, .. }, Some((words, _))) = (&thing.from, parent)
+        && !scene.system.iter().any(|plan| is_in(&words.system, plan) && rules(plan.method).meets_colliders())
+    {
+        let message = format!("\"{}\" meets no colliders; leave it out, or move \"{0}\" by a dynamics system", words.name);
+        site.issues.push(Issue::new(at("from.particles.at"), message));
+    }
+    recipes::emitter(site, thing, course, (scene.seed, flat(scene)), parent, &|file: &MeshFile| assets.get(&file.path));
+}
+
+/// The emitter of an emitter's parents, and whether it is in another system, which has its turn before.
+fn parent<'a>(scene: &'a Scene, thing: &Emitter) -> Option<(&'a Emitter, bool)> {
+    let Source::Particles { of, .. } = &thing.from else { return None };
+    let words = scene.emitter.iter().find(|other| other.name == *of)?;
+    let turn = |emitter: &Emitter| scene.system.iter().position(|plan| is_in(&emitter.system, plan));
+    Some((words, turn(words)? < turn(thing)?))
+}
+
+/// Asks for the events of parents in other systems.
+pub fn ask_for_events<'a>(exchange: &mut Exchange, emitters: impl Iterator<Item = &'a pool::Emitter>) {
+    for emitter in emitters {
+        if let Origin::Elsewhere(of) = &emitter.from {
+            exchange.listen(of, emitter.is_stirred_by(Happening::Contact));
+        }
+    }
 }
 
 /// The scene with the masses of its clouds drawn.

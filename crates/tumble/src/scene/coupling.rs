@@ -1,7 +1,7 @@
 //! What joins systems: anchors between masses.
 
+use super::build::Builder;
 use super::methods::place;
-use crate::exchange::Exchange;
 use crate::geometry::Vector;
 use crate::systems::dynamics::{self, Dynamics, Parts, SpringPart};
 use tumble_interface::check::suggestion;
@@ -84,31 +84,31 @@ fn link(scene: &Scene, anchor: &Anchor, parts: &[Parts], issues: &mut Vec<Issue>
     })
 }
 
-/// Between systems the one of the first end owns the spring; the other gives a port.
-pub fn hang(system: &mut Dynamics, index: usize, anchor: &Link, dt: f64, exchange: &mut Exchange, warnings: &mut Vec<Warning>) {
-    let [(s, a), (t, b)] = anchor.ends;
+/// Between systems the one of the first end owns the spring; the other gives a body.
+pub fn hang(system: &mut Dynamics, index: usize, anchor: &Link, builder: &mut Builder<'_>) {
+    let ([(s, a), (t, b)], dt) = (anchor.ends, builder.interval);
     if s != t && t == index {
         system.expect_pushes();
     }
     if s == t || s != index {
         return;
     }
-    let port = exchange.open(t, b as usize);
+    let other = builder.exchange.open(builder.ids[t], b as usize..b as usize + 1, false)[0];
     system.add_anchor(dynamics::Anchor {
         row: a as usize,
-        port,
+        other,
         stiffness: anchor.stiffness,
         damping: anchor.damping,
         rest_length: anchor.rest_length,
     });
     let turn = dt * (anchor.stiffness * anchor.inverse_mass).sqrt();
     let damp = dt * anchor.damping * anchor.inverse_mass;
-    if turn > 0.5 || damp > 0.5 {
+    if builder.scene.world.coupling.is_none() && (turn > 0.5 || damp > 0.5) {
         let times = (2.0 * turn.max(damp)).ceil();
         let message = format!(
             "omega dt = {turn:.2}, c dt/m = {damp:.2}; systems exchange impulses explicitly, which needs both below 0.5: \
-             raise time.exchanges {times} times, or put both objects into one system"
+             raise time.exchanges {times} times, repeat intervals with world.coupling = {{}}, or put both objects into one system"
         );
-        warnings.push(Warning::new(Code::StiffAnchor, format!("anchor \"{}\"", anchor.name), message));
+        builder.warnings.push(Warning::new(Code::StiffAnchor, format!("anchor \"{}\"", anchor.name), message));
     }
 }

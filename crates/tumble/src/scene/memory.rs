@@ -25,7 +25,9 @@ const FACTORS: [f64; 3] = [2.5e3, 16e3, 2.8e3];
 
 /// An upper estimate of the bytes that the objects and colliders of a resolved scene need.
 pub fn memory(scene: &Scene, assets: &Assets) -> f64 {
-    METHODS.into_iter().map(|method| method.memory(scene, assets)).sum::<f64>() + solids(scene, assets)
+    // Intervals that are repeated have a snapshot of their own; none is more than half of all.
+    let kept = if scene.world.coupling.is_some() { 1.5 } else { 1.0 };
+    METHODS.into_iter().map(|method| method.memory(scene, assets)).sum::<f64>() * kept + solids(scene, assets)
 }
 
 /// Of particles and of things that are made of masses.

@@ -4,9 +4,7 @@ use super::Assets;
 use super::build::build;
 use super::cures;
 use super::methods::resolve;
-use crate::geometry::{Collider, Shape};
 use crate::world::World;
-use std::sync::Arc;
 use tumble_interface::engine::{Account, Cure, Engine, Inside, Ledger, Stability, StepReport, UserForce, UserIntegrator};
 use tumble_interface::measures::Bound;
 use tumble_interface::scene::Integrator;
@@ -17,8 +15,6 @@ pub struct Simulation {
     scene: Scene,
     assets: Assets,
     world: World,
-    scenery: Vec<Column>,
-    colliders: Arc<Vec<Collider>>,
     warnings: Vec<Warning>,
     /// The failure of the last step: index and step of the system.
     failure: Option<(usize, f64)>,
@@ -30,15 +26,7 @@ impl Simulation {
         let scene = resolve(scene);
         let built = build(&scene, &assets)?;
         idle_bounds(&scene, &built.world)?;
-        Ok(Self {
-            scene,
-            assets,
-            world: built.world,
-            scenery: built.scenery,
-            colliders: built.colliders,
-            warnings: built.warnings,
-            failure: None,
-        })
+        Ok(Self { scene, assets, world: built.world, warnings: built.warnings, failure: None })
     }
 
     /// The scene that it was built from, resolved.
@@ -67,22 +55,6 @@ fn idle_bounds(scene: &Scene, world: &World) -> Result<(), SceneError> {
     if issues.is_empty() { Ok(()) } else { Err(SceneError { issues }) }
 }
 
-/// Where the moving colliders are: `translation` and `turn` of the mesh in the topology, x = turn p + translation, and
-/// `position` of vertices that move by themselves.
-fn places(scene: &Scene, colliders: &[Collider], time: f64, out: &mut Vec<Column>) {
-    for (thing, collider) in scene.collider.iter().zip(colliders) {
-        let mut add = |name: &str, data: Vec<f64>| out.push(Column::new(&thing.name, name, data));
-        if let Shape::Animated { facets, .. } = &collider.shape {
-            add("position", facets.vertices(time).concat());
-        }
-        if let Some(motion) = &collider.motion {
-            let (pose, _) = motion.at(time);
-            add("translation", <[f64; 3]>::from(pose.shift).to_vec());
-            add("turn", pose.turn.row().to_vec());
-        }
-    }
-}
-
 impl Engine for Simulation {
     fn time(&self) -> f64 {
         self.world.time()
@@ -95,6 +67,11 @@ impl Engine for Simulation {
     fn step(&mut self, go_on: &(dyn Fn() -> bool + Sync)) -> Result<Option<StepReport>, StepError> {
         self.failure = None;
         let result = self.world.step(go_on);
+        for warning in self.world.disagreements() {
+            if !self.warnings.contains(warning) {
+                self.warnings.push(warning.clone());
+            }
+        }
         if let Err(error) = &result {
             let (name, step) = match error {
                 StepError::NotFinite(b) | StepError::Exploded(b) => (b.system.as_str(), b.step),
@@ -107,26 +84,19 @@ impl Engine for Simulation {
     }
 
     fn frame(&self, columns: &[&str]) -> Frame {
-        let (time, mut all) = (self.world.time(), self.world.columns(columns));
-        // Whatever is asked for: a picture of anything has to show them where they are.
-        places(&self.scene, &self.colliders, time, &mut all);
-        Frame { time, index: self.world.frame_index(), columns: all }
+        let time = self.world.time();
+        Frame { time, index: self.world.frame_index(), columns: self.world.columns(time, columns) }
     }
 
     fn inside(&mut self, substeps: u64, columns: &[&str], go_on: &(dyn Fn() -> bool + Sync)) -> Result<Option<Inside>, StepError> {
-        let (scene, colliders) = (&self.scene, &self.colliders);
         self.world.inside(substeps, go_on, |world, time, system, step| {
-            let mut all = world.columns(columns);
-            places(scene, colliders, time, &mut all);
-            let frame = Frame { time, index: world.frame_index(), columns: all };
+            let frame = Frame { time, index: world.frame_index(), columns: world.columns(time, columns) };
             Inside { frame, ledger: world.ledger_at(time), system: system.into(), step }
         })
     }
 
     fn topology(&self) -> Vec<Column> {
-        let mut all = self.world.topology();
-        all.extend(self.scenery.iter().cloned());
-        all
+        self.world.topology()
     }
 
     fn ledger(&self) -> Ledger {

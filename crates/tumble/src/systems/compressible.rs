@@ -9,7 +9,7 @@
 //! Sound limits the step, c h sqrt(d)/dx <= 1 (compressible.6), and so do flow and friction: (compressible.5), (compressible.8).
 //! Verified by crates/tumble-f64/tests/compressible.rs.
 
-use crate::exchange::Exchange;
+use crate::exchange::Turn;
 use crate::integrators::equal_steps;
 use crate::math::functions::{cos, ln, sin};
 use crate::math::{Real, bisect};
@@ -389,9 +389,9 @@ impl System for Compressible {
         &self.settings.name
     }
 
-    fn absorb(&mut self, _exchange: &mut Exchange) {}
+    fn absorb(&mut self, _exchange: &mut Turn<'_>) {}
 
-    fn advance(&mut self, t: f64, dt: f64, _exchange: &mut Exchange, go_on: &(dyn Fn() -> bool + Sync)) -> Result<StepReport, StepError> {
+    fn advance(&mut self, t: f64, dt: f64, _exchange: &mut Turn<'_>, go_on: &(dyn Fn() -> bool + Sync)) -> Result<StepReport, StepError> {
         let mut report = StepReport::default();
         let n = self.steps(dt);
         if n.is_nan() || n > 1e7 {
@@ -415,9 +415,9 @@ impl System for Compressible {
         Ok(report)
     }
 
-    fn publish(&mut self, _t: f64, _exchange: &mut Exchange) {}
+    fn publish(&mut self, _t: f64, _exchange: &mut Turn<'_>) {}
 
-    fn columns(&self, names: &[&str], out: &mut Vec<Column>) {
+    fn columns(&self, _t: f64, names: &[&str], out: &mut Vec<Column>) {
         for gas in &self.gases {
             let grid = gas.grid();
             for name in names {

@@ -4,5 +4,6 @@ pub mod compressible;
 pub mod dynamics;
 pub mod gas;
 pub mod heat;
+pub mod scenery;
 pub mod tracers;
 pub mod vicsek;

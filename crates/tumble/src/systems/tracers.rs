@@ -1,6 +1,6 @@
 //! Massless particles carried by velocity fields: x' = u(x, t). The plain case of y' = f(y, t).
 
-use crate::exchange::Exchange;
+use crate::exchange::Turn;
 use crate::forces::Flow;
 use crate::integrators::{self, Equation, Kinematics, Memory, Scratch, Stage, Step, adaptive_step};
 use crate::math::parallel::chunks;
@@ -178,11 +178,12 @@ impl System for Tracers {
         &self.settings.name
     }
 
-    fn absorb(&mut self, exchange: &mut Exchange) {
-        self.flow.fluids().for_each(|fluid| fluid.states = exchange.wind(&fluid.fluid).to_vec());
+    fn absorb(&mut self, exchange: &mut Turn<'_>) {
+        self.pool.listen(exchange);
+        self.flow.fluids().for_each(|fluid| fluid.states = exchange.field(&fluid.fluid, "velocity").to_vec());
     }
 
-    fn advance(&mut self, t: f64, dt: f64, _exchange: &mut Exchange, go_on: &(dyn Fn() -> bool + Sync)) -> Result<StepReport, StepError> {
+    fn advance(&mut self, t: f64, dt: f64, exchange: &mut Turn<'_>, go_on: &(dyn Fn() -> bool + Sync)) -> Result<StepReport, StepError> {
         let mut report = StepReport::default();
         let (integrator, end) = (self.settings.integrator, t + dt);
         let mut unborn = self.pool.schedule_births(&self.settings.name, t, dt)?;
@@ -210,6 +211,7 @@ impl System for Tracers {
             if done == dt {
                 self.remove_dead(end, dt)?;
                 self.time = end;
+                self.pool.tell(exchange);
             }
             return Ok(report);
         }
@@ -230,12 +232,13 @@ impl System for Tracers {
         }
         self.remove_dead(end, dt)?;
         self.time = end;
+        self.pool.tell(exchange);
         Ok(report)
     }
 
-    fn publish(&mut self, _t: f64, _exchange: &mut Exchange) {}
+    fn publish(&mut self, _t: f64, _exchange: &mut Turn<'_>) {}
 
-    fn columns(&self, names: &[&str], out: &mut Vec<Column>) {
+    fn columns(&self, _t: f64, names: &[&str], out: &mut Vec<Column>) {
         for object in &self.objects {
             for name in names {
                 let rows = &self.x[object.points.clone()];

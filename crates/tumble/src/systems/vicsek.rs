@@ -7,7 +7,7 @@
 //!
 //! Source: [vicsek1995].
 
-use crate::exchange::Exchange;
+use crate::exchange::Turn;
 use crate::geometry::{Meet, Neighbours, Vector};
 use crate::integrators::equal_steps;
 use crate::math::functions::{atan2, cos, sin};
@@ -179,9 +179,9 @@ impl System for Swarm {
         &self.name
     }
 
-    fn absorb(&mut self, _exchange: &mut Exchange) {}
+    fn absorb(&mut self, _exchange: &mut Turn<'_>) {}
 
-    fn advance(&mut self, _t: f64, dt: f64, _exchange: &mut Exchange, go_on: &(dyn Fn() -> bool + Sync)) -> Result<StepReport, StepError> {
+    fn advance(&mut self, _t: f64, dt: f64, _exchange: &mut Turn<'_>, go_on: &(dyn Fn() -> bool + Sync)) -> Result<StepReport, StepError> {
         let mut report = StepReport::default();
         let n = self.substeps.or(self.step.map(|step| equal_steps(dt, step) as u32)).unwrap_or(1);
         let h = dt / f64::from(n);
@@ -196,9 +196,9 @@ impl System for Swarm {
         Ok(report)
     }
 
-    fn publish(&mut self, _t: f64, _exchange: &mut Exchange) {}
+    fn publish(&mut self, _t: f64, _exchange: &mut Turn<'_>) {}
 
-    fn columns(&self, names: &[&str], out: &mut Vec<Column>) {
+    fn columns(&self, _t: f64, names: &[&str], out: &mut Vec<Column>) {
         let half = 0.5 * self.model.side;
         for object in &self.objects {
             let points = object.points.clone();

@@ -5,7 +5,7 @@ use crate::geometry::motion::Pose;
 use crate::geometry::{Carrier, Collider, Vector};
 use crate::math::parallel::fold;
 use crate::recipes::{self, Site};
-use crate::scene::build::{Builder, emit};
+use crate::scene::build::{Builder, ask_for_events, emit};
 use crate::scene::checks::others;
 use crate::scene::laws::Reader;
 use crate::scene::{Assets, coupling, hints, memory};
@@ -88,9 +88,9 @@ impl MethodRules for Rules {
         }
         let (scene, plan, interval) = (builder.scene, builder.plan(index), builder.interval);
         let parts = std::mem::take(&mut builder.masses[index]);
+        ask_for_events(&mut builder.exchange, parts.emitters());
         let settings = Settings {
             name: plan.name.clone(),
-            index,
             interval,
             integrator: plan.integrator,
             stepping: stepping(plan),
@@ -115,11 +115,11 @@ impl MethodRules for Rules {
         builder.warnings.extend(system.tangles());
         builder.warnings.extend(system.round_off(interval));
         builder.warnings.extend(system.idle_attachments());
-        if builder.exchange.ports_of(index).next().is_some() {
+        if builder.exchange.has_bodies(builder.ids[index]) {
             system.expect_pushes();
         }
-        for anchor in &builder.anchors {
-            coupling::hang(&mut system, index, anchor, interval, &mut builder.exchange, &mut builder.warnings);
+        for anchor in builder.anchors.clone().iter() {
+            coupling::hang(&mut system, index, anchor, builder);
         }
         Some(Box::new(system))
     }
@@ -130,7 +130,7 @@ fn fill(builder: &mut Builder<'_>, index: usize, parts: &mut Parts) {
     let (scene, assets) = (builder.scene, builder.assets);
     let plan = builder.plan(index);
     // Issues leave colliders out, and then nothing is built.
-    let solids = (builder.named.len() == scene.collider.len()).then_some(&builder.named[..]);
+    let solids = (builder.colliders.len() == scene.collider.len()).then_some(&builder.colliders[..]);
     let mut site = Site { parts, issues: &mut builder.issues, hints: &mut builder.warnings, up: builder.up, solids, assets };
     scene.particles.iter().filter(|t| is_in(&t.system, plan)).for_each(|t| recipes::particles(&mut site, t));
     scene.emitter.iter().filter(|t| is_in(&t.system, plan)).for_each(|t| emit(&mut site, scene, t));

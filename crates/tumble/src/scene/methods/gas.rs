@@ -97,9 +97,7 @@ impl MethodRules for Rules {
             let (bodies, sheets) = moved(builder, words);
             let reader = Reader::new(scene, &mut builder.issues);
             let path = format!("gas \"{}\"", words.name);
-            let names = scene.collider.iter().map(|c| c.name.clone()).collect();
-            fluids
-                .extend(Read { words, path, reader, flat: flat(scene), solids: &builder.colliders, names, bodies, sheets }.fluid(gravity));
+            fluids.extend(Read { words, path, reader, flat: flat(scene), solids: &builder.colliders, bodies, sheets }.fluid(gravity));
         }
         Some(Box::new(Gas::new(plan.name.clone(), plan.substeps, plan.step, fluids)))
     }
@@ -152,7 +150,6 @@ struct Read<'a, 'b> {
     reader: Reader<'b>,
     flat: Option<usize>,
     solids: &'a Arc<Vec<Collider>>,
-    names: Vec<String>,
     bodies: Vec<Body>,
     sheets: Vec<Sheet>,
 }
@@ -400,7 +397,7 @@ impl Read<'_, '_> {
             return None;
         }
         let stick = words.solids == Solid::NoSlip;
-        let mut solids = Solids::new(self.solids.clone(), std::mem::take(&mut self.names), self.bodies(&grid), stick, grid, &sides);
+        let mut solids = Solids::new(self.solids.clone(), self.bodies(&grid), stick, grid, &sides);
         solids.place(0.0);
         if solids.fills() {
             self.wrong(".box", "colliders fill all of it; move them, or the box");
@@ -478,7 +475,8 @@ impl Read<'_, '_> {
 
 /// The balls and sheets that a fluid moves.
 fn moved(builder: &mut Builder<'_>, words: &Words) -> (Vec<Body>, Vec<Sheet>) {
-    let (scene, parts, exchange, issues) = (builder.scene, &builder.masses, &mut builder.exchange, &mut builder.issues);
+    let (scene, parts, ids) = (builder.scene, &builder.masses, &builder.ids);
+    let (exchange, issues) = (&mut builder.exchange, &mut builder.issues);
     let (mut bodies, mut sheets) = (Vec::new(), Vec::new());
     for (i, name) in words.bodies.iter().enumerate() {
         let mut wrong = |message: String| issues.push(Issue::new(format!("gas \"{}\".bodies[{i}]", words.name), message));
@@ -492,11 +490,11 @@ fn moved(builder: &mut Builder<'_>, words: &Words) -> (Vec<Body>, Vec<Sheet>) {
             wrong(format!("\"{name}\" has {} masses; a fluid moves {MOST_BODIES} balls at most", range.len()));
             continue;
         }
-        for row in range {
-            let mut body = Body::new(name.clone(), exchange.open_body(system, row), thing.radius);
-            body.position = parts[system].position(row as u32);
-            body.velocity = parts[system].velocity(row as u32);
-            body.inverse_mass = parts[system].inverse_mass(row as u32);
+        for (at, row) in exchange.open(ids[system], range.clone(), true).into_iter().zip(range) {
+            let mut body = Body::new(name.clone(), at, thing.radius);
+            body.state.position = parts[system].position(row as u32);
+            body.state.velocity = parts[system].velocity(row as u32);
+            body.state.inverse_mass = parts[system].inverse_mass(row as u32);
             bodies.push(body);
         }
     }
@@ -512,8 +510,8 @@ fn moved(builder: &mut Builder<'_>, words: &Words) -> (Vec<Body>, Vec<Sheet>) {
             wrong(format!("\"{name}\" has no {what}"));
             continue;
         }
-        let ports = object.points.clone().map(|row| exchange.open(system, row)).collect();
-        sheets.push(Sheet::new(name.clone(), ports, triangles, pieces, [sheet.resistance, sheet.friction]));
+        let rows = exchange.open(ids[system], object.points.clone(), false);
+        sheets.push(Sheet::new(name.clone(), rows, triangles, pieces, [sheet.resistance, sheet.friction]));
     }
     (bodies, sheets)
 }

@@ -76,8 +76,8 @@ impl MethodRules for Rules {
                 bodies.push(made);
             }
         }
-        let settings = Settings { name: plan.name.clone(), index, substeps: plan.substeps, step: plan.step };
-        Some(Box::new(Heat::new(settings, bodies, &mut builder.exchange)))
+        let settings = Settings { name: plan.name.clone(), substeps: plan.substeps, step: plan.step };
+        Some(Box::new(Heat::new(settings, bodies, builder.ids[index], &mut builder.exchange)))
     }
 }
 

@@ -4,13 +4,13 @@ use super::{MethodRules, is_in, place, present, words_of_masses};
 use crate::geometry::Vector;
 use crate::recipes::Site;
 use crate::scene::Assets;
-use crate::scene::build::{Builder, emit};
+use crate::scene::build::{Builder, ask_for_events, emit};
 use crate::scene::laws::Reader;
 use crate::state::Object;
 use crate::system::System;
 use crate::systems::dynamics::Parts;
 use crate::systems::tracers::{Settings, Tracers};
-use tumble_interface::scene::{Emitter, Event, Field, Integrator, Kill, Method, Particles, Scene, Source};
+use tumble_interface::scene::{Emitter, Field, Integrator, Kill, Method, Particles, Scene};
 use tumble_interface::warning::Code;
 use tumble_interface::{Issue, Warning};
 
@@ -70,7 +70,7 @@ impl MethodRules for Rules {
 
     fn build(&self, builder: &mut Builder<'_>, index: usize) -> Option<Box<dyn System>> {
         let (scene, plan) = (builder.scene, builder.plan(index));
-        fluids(scene).for_each(|of| builder.exchange.listen(of));
+        fluids(scene).for_each(|of| builder.exchange.ask(of, "velocity"));
         let (mut x, mut all) = (Vec::new(), Vec::new());
         for thing in scene.particles.iter().filter(|t| is_in(&t.system, plan)) {
             let first = x.len();
@@ -91,6 +91,7 @@ impl MethodRules for Rules {
             };
             emit(&mut site, scene, thing);
         }
+        ask_for_events(&mut builder.exchange, parts.emitters());
         let emitters = parts.take_emitters();
         for (stream, emitter) in emitters.iter().enumerate() {
             let (name, radius) = (emitter.words().name.clone(), emitter.words().radius);
@@ -130,9 +131,6 @@ fn refuse_masses(thing: &Particles, issues: &mut Vec<Issue>) {
 /// What only masses can be born with, and what only they meet.
 fn refuse_motion(thing: &Emitter, issues: &mut Vec<Issue>) {
     let mut wrong = |key: &str, message: &str| issues.push(Issue::new(format!("emitter \"{}\".{key}", thing.name), message));
-    if let Source::Particles { at: Event::Bounce, .. } = &thing.from {
-        wrong("from.particles.at", "tracers meet no colliders; leave it out, or use a dynamics system");
-    }
     if thing.kill.iter().any(|rule| matches!(rule, Kill::NearCollider(_))) {
         wrong("kill", "tracers see no colliders; use inside or outside");
     }

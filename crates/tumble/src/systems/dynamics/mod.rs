@@ -30,8 +30,8 @@ pub use parts::{Closed, Liquid, Parts, SpringPart};
 pub use settings::{Settings, Stepping};
 pub use tear::TearPart;
 
-use crate::exchange::{Exchange, Port};
-use crate::geometry::Vector;
+use crate::exchange::{BodyRow, Turn};
+use crate::geometry::{Collider, Vector};
 use crate::integrators;
 use crate::math::{Real, Row, xyz64};
 use crate::pool::Birth;
@@ -41,6 +41,7 @@ use feature::Span;
 use features::Features;
 use scale::Scale;
 use scheme::Scheme;
+use std::sync::Arc;
 use tumble_interface::engine::{Ledger, Share, Stability, StepReport, UserForce, UserIntegrator, Worst};
 use tumble_interface::{Column, SceneError, StepError, Warning};
 
@@ -49,7 +50,6 @@ pub const MOST_SUBSTEPS: f64 = 1e7;
 
 /// A system of masses.
 pub struct Dynamics {
-    index: usize,
     core: Core,
     scheme: Box<dyn Scheme>,
     features: Features,
@@ -66,13 +66,13 @@ pub struct Dynamics {
     witness: Option<(f64, Vec<Row>, Vec<Row>)>,
 }
 
-/// A damped spring to a port of another system, as impulses at the start of each sub-step.
+/// A damped spring to a body of another system, as impulses at the start of each sub-step.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Anchor {
     /// The mass of this system.
     pub row: usize,
-    /// The mass of the other.
-    pub port: Port,
+    /// The row of the other.
+    pub other: BodyRow,
     /// Spring constant [N/m].
     pub stiffness: f64,
     /// Damping along the spring [N s/m].
@@ -86,7 +86,6 @@ type GoOn<'a> = &'a (dyn Fn() -> bool + Sync);
 impl Dynamics {
     fn new(core: Core, scheme: Box<dyn Scheme>, features: Features, settings: &Settings) -> Result<Self, SceneError> {
         let mut system = Self {
-            index: settings.index,
             core,
             scheme,
             features,
@@ -113,6 +112,16 @@ impl Dynamics {
     /// Other systems will push masses of this one.
     pub fn expect_pushes(&mut self) {
         self.pushed = true;
+    }
+
+    /// Takes the solids that systems have published.
+    fn take_surfaces(&mut self, solids: &Arc<Vec<Collider>>) {
+        if Arc::ptr_eq(solids, &self.core.laws.colliders) {
+            return;
+        }
+        self.core.laws.colliders = solids.clone();
+        self.core.laws.batches.iter_mut().for_each(|batch| batch.take_surfaces(solids));
+        self.features.self_contact.iter_mut().for_each(|contact| contact.take_surfaces(solids));
     }
 
     /// A warning of surfaces that start in each other.
@@ -156,23 +165,26 @@ impl Dynamics {
 
     /// Anchors to other systems: half of the interaction that this system owns. Each is an impulse h f, so one side
     /// gains exactly the other's loss, whatever the integrator.
-    fn apply_anchors(&mut self, h: f64, exchange: &mut Exchange) {
+    fn apply_anchors(&mut self, Span { t, h }: Span, exchange: &mut Turn<'_>) {
         for anchor in &self.anchors {
-            let (other, state) = (exchange.port(anchor.port), &self.core.state);
+            let (other, state) = (exchange.state_at(anchor.other, t), &self.core.state);
             let (x, v) = (xyz64(state.x[anchor.row]), xyz64(state.v[anchor.row]));
-            // The state as published: carrying it on to t would deliver a partner's kick an interval late.
             let d = other.position - x;
             let length = d.norm();
             let n = d.normalized();
             let pull = anchor.stiffness * (length - anchor.rest_length) + anchor.damping * n.dot(other.velocity - v);
             let impulse = n * (h * pull);
-            exchange.post(anchor.port, -impulse);
+            if exchange.repeats() {
+                exchange.post_steady(anchor.other, other.position, -impulse);
+            } else {
+                exchange.post(anchor.other, other.position, -impulse);
+            }
             self.core.kick(anchor.row, impulse);
         }
     }
 
     /// All sub-steps of an interval.
-    fn advance_interval(&mut self, t: f64, dt: f64, exchange: &mut Exchange, go_on: GoOn<'_>) -> Result<StepReport, StepError> {
+    fn advance_interval(&mut self, t: f64, dt: f64, exchange: &mut Turn<'_>, go_on: GoOn<'_>) -> Result<StepReport, StepError> {
         let mut births = self.core.pool.schedule_births(&self.core.name, t, dt)?;
         self.features.begin(&mut self.core, t);
         if self.scheme.is_adaptive(&self.core) {
@@ -201,7 +213,7 @@ impl Dynamics {
         interval: Span,
         (substeps, h): (u32, f64),
         births: &mut [Vec<Birth>],
-        exchange: &mut Exchange,
+        exchange: &mut Turn<'_>,
         go_on: GoOn<'_>,
     ) -> Result<StepReport, StepError> {
         let (mut report, end) = (StepReport::default(), interval.end());
@@ -211,7 +223,7 @@ impl Dynamics {
             }
             let step = Span { t: interval.t + f64::from(k) * h, h };
             self.witness(step.t);
-            self.apply_anchors(h, exchange);
+            self.apply_anchors(step, exchange);
             self.features.before(&mut self.core, step);
             let taken = self.scheme.step(&mut self.core, &mut self.features, step, &mut report);
             taken.map_err(|e| e.in_system(&self.core.name))?;
@@ -229,7 +241,7 @@ impl Dynamics {
         &mut self,
         interval: Span,
         births: &mut [Vec<Birth>],
-        exchange: &mut Exchange,
+        exchange: &mut Turn<'_>,
         go_on: GoOn<'_>,
     ) -> Result<StepReport, StepError> {
         let (mut report, Span { t, h: dt }, end) = (StepReport::default(), interval, interval.end());
@@ -244,7 +256,7 @@ impl Dynamics {
             done = if h == rest.h { dt } else { done + h };
             report.stepped(h);
             // Anchors wait for the length of the step.
-            self.apply_anchors(h, exchange);
+            self.apply_anchors(Span { t: t + done, h }, exchange);
             self.finish(Span { t: rest.t, h }, &mut report);
             self.core.insert_births(births, t + done, h, end)?;
             last = h;
@@ -279,8 +291,10 @@ impl System for Dynamics {
         &self.core.name
     }
 
-    fn absorb(&mut self, exchange: &mut Exchange) {
-        for push in exchange.take(self.index) {
+    fn absorb(&mut self, exchange: &mut Turn<'_>) {
+        self.take_surfaces(exchange.surfaces());
+        self.core.pool.listen(exchange);
+        for push in exchange.take() {
             if push.steady {
                 self.core.push_steadily(push.row, push.impulse);
             } else {
@@ -289,28 +303,33 @@ impl System for Dynamics {
         }
     }
 
-    fn advance(&mut self, t: f64, dt: f64, exchange: &mut Exchange, go_on: &(dyn Fn() -> bool + Sync)) -> Result<StepReport, StepError> {
+    fn advance(&mut self, t: f64, dt: f64, exchange: &mut Turn<'_>, go_on: &(dyn Fn() -> bool + Sync)) -> Result<StepReport, StepError> {
         // Impulses until here.
         self.core.laws.steady.iter_mut().for_each(|(_, force)| *force = *force * (1.0 / dt));
         let report = self.advance_interval(t, dt, exchange, go_on);
         self.core.memory.ready &= self.core.laws.steady.is_empty();
         self.core.laws.steady.clear();
+        self.core.pool.tell(exchange);
         report
     }
 
-    fn publish(&mut self, t: f64, exchange: &mut Exchange) {
-        let asked = exchange.has_body(self.index);
+    fn publish(&mut self, t: f64, exchange: &mut Turn<'_>) {
+        let asked = exchange.bodies().any(|body| body.detailed);
         let rates = if asked { self.core.accelerations(t) } else { Vec::new() };
-        for port in exchange.ports_of(self.index) {
-            let i = port.owner.1;
-            (port.position, port.velocity, port.time) = (xyz64(self.core.state.x[i]), xyz64(self.core.state.v[i]), t);
-            port.acceleration = rates.get(i).map_or(Vector::default(), |a| xyz64(*a));
-            port.inverse_mass = f64::from(self.core.laws.masses.inverse(i, &self.core.state.x));
-            port.normal = if asked { self.core.contact_normal(port.position, t) } else { Vector::default() };
+        for body in exchange.bodies() {
+            body.time = t;
+            for (state, i) in body.states.iter_mut().zip(body.rows.clone()) {
+                (state.position, state.velocity) = (xyz64(self.core.state.x[i]), xyz64(self.core.state.v[i]));
+                state.inverse_mass = f64::from(self.core.laws.masses.inverse(i, &self.core.state.x));
+                if body.detailed {
+                    state.acceleration = rates.get(i).map_or(Vector::default(), |a| xyz64(*a));
+                    state.normal = self.core.contact_normal(state.position, t);
+                }
+            }
         }
     }
 
-    fn columns(&self, names: &[&str], out: &mut Vec<Column>) {
+    fn columns(&self, _t: f64, names: &[&str], out: &mut Vec<Column>) {
         self.write_columns(names, out);
     }
 

@@ -92,6 +92,11 @@ impl SelfContact {
         soft.then_some(contact)
     }
 
+    /// Takes the solids anew.
+    pub fn take_surfaces(&mut self, colliders: &Arc<Vec<Collider>>) {
+        self.features.take_surfaces(colliders);
+    }
+
     /// The longest edge of soft surfaces at the start [m].
     pub fn longest_edge(&self) -> f64 {
         let soft = |e: &&[u32; 2]| (e[0].max(e[1]) as usize) < self.features.points();

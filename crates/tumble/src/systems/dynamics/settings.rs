@@ -19,8 +19,6 @@ pub enum Stepping {
 pub struct Settings {
     /// Name in the scene.
     pub name: String,
-    /// Its place among the systems of the world.
-    pub index: usize,
     /// Length of an exchange interval [s].
     pub interval: f64,
     /// Scheme.

@@ -47,8 +47,8 @@ impl SolidFeatures {
         let mut all = Self { colliders: colliders.clone(), points, ..Self::default() };
         let mut first = 0;
         for (i, collider) in colliders.iter().enumerate() {
-            let Some(surface) = &collider.edges else { continue };
-            let corners = first..first + surface.mesh.vertices.len();
+            let Some(mesh) = &collider.edges else { continue };
+            let corners = first..first + mesh.vertices.len();
             first = corners.end;
             all.moving |= collider.moves();
             all.list.push(Solid { collider: i, corners });
@@ -75,9 +75,9 @@ impl SolidFeatures {
     pub fn add_to(&self, topology: &mut Topology, thickness: f64) {
         for solid in &self.list {
             let collider = &self.colliders[solid.collider];
-            let Some(surface) = &collider.edges else { continue };
+            let Some(mesh) = &collider.edges else { continue };
             let first = (self.points + solid.corners.start) as u32;
-            let triangles: Vec<[u32; 3]> = surface.mesh.triangles.iter().map(|t| t.map(|i| i + first)).collect();
+            let triangles: Vec<[u32; 3]> = mesh.triangles.iter().map(|t| t.map(|i| i + first)).collect();
             let radius = (NEARER * collider.thickness - 0.5 * thickness).max(0.0);
             topology.add(Owner { radius, itself: false }, &triangles, &[], &[]);
         }
@@ -181,7 +181,12 @@ impl SolidFeatures {
 
     /// The name of a collider.
     pub fn name(&self, collider: usize) -> String {
-        self.colliders[collider].edges.as_ref().map_or(String::new(), |surface| surface.name.clone())
+        self.colliders[collider].name.clone()
+    }
+
+    /// Takes the solids anew; those with edges stay in their places.
+    pub fn take_surfaces(&mut self, colliders: &Arc<Vec<Collider>>) {
+        self.colliders = colliders.clone();
     }
 
     /// Friction of a pair with one of them.

@@ -71,9 +71,8 @@ impl Fluid {
     /// The force of the last pressure on every solid [N], three numbers for a collider and for each ball of an object.
     pub fn forces_on(&self) -> Vec<(&str, Vec<f64>)> {
         let Some(solids) = &self.solids else { return Vec::new() };
-        let bodies = solids.bodies.iter().map(|body| &body.name);
         let mut all: Vec<(&str, Vec<f64>)> = Vec::new();
-        for (name, force) in solids.names.iter().chain(bodies).zip(solids.forces(&self.pressure)) {
+        for (name, force) in solids.names().zip(solids.forces(&self.pressure)) {
             match all.last_mut().filter(|(last, _)| last == name) {
                 Some((_, forces)) => forces.extend(force),
                 None => all.push((name, force.to_vec())),
@@ -224,7 +223,7 @@ impl Fluid {
             archive.push("burnt", Part::Numbers(flame.books.to_vec()));
         }
         if let Some(solids) = self.solids.as_ref().filter(|solids| solids.moves()) {
-            let bodies = solids.bodies.iter().flat_map(|body| [body.position, body.velocity]).flat_map(<[f64; 3]>::from);
+            let bodies = solids.bodies.iter().flat_map(|body| [body.state.position, body.state.velocity]).flat_map(<[f64; 3]>::from);
             archive.push("solids", Part::Numbers(std::iter::once(solids.time).chain(bodies).collect()));
         }
     }

@@ -3,14 +3,15 @@
 use super::densities::Densities;
 use super::fire::Flame;
 use super::settings::Settings;
-use crate::exchange::Exchange;
+use crate::exchange::{Exchange, Turn};
 use crate::fluids::rows::{largest, worse};
 use crate::fluids::{Beyond, Body, Failure, Projection, Sheet, Solids, Viscosity, hold, projection, spread};
-use crate::geometry::Vector;
+use crate::geometry::{Collider, Vector};
 use crate::linalg::poisson::Solver;
 use crate::math::Real;
 use crate::operators::{advect, advect_vectors};
 use crate::state::{Field, Grid, Place, Side, Vectors};
+use std::sync::Arc;
 use tumble_interface::StepError;
 use tumble_interface::engine::StepReport;
 use tumble_interface::scene::Order;
@@ -72,7 +73,8 @@ impl Fluid {
         let grid = u.on_faces("velocity of a fluid")?;
         let mut solids = solids;
         // At the start bodies have the velocity that they are given.
-        let masses: Vec<f64> = solids.iter_mut().flat_map(|s| &mut s.bodies).map(|body| std::mem::take(&mut body.inverse_mass)).collect();
+        let masses: Vec<f64> =
+            solids.iter_mut().flat_map(|s| &mut s.bodies).map(|body| std::mem::take(&mut body.state.inverse_mass)).collect();
         let solver = solver(grid, &settings, solids.as_ref())?;
         let sides = &settings.sides;
         let smoke = smoke.map(|f| carried(f, sides, 0.0, |[density, _, _]| density));
@@ -106,7 +108,7 @@ impl Fluid {
         hold(&mut fluid.u, &fluid.settings.sides, 0.0);
         fluid.clear();
         fluid.projection(0.0, 1.0, &mut StepReport::default())?;
-        fluid.bodies().iter_mut().zip(masses).for_each(|(body, mass)| body.inverse_mass = mass);
+        fluid.bodies().iter_mut().zip(masses).for_each(|(body, mass)| body.state.inverse_mass = mass);
         fluid.join();
         fluid.pressure.data.fill(0.0);
         Ok(fluid)
@@ -155,7 +157,7 @@ impl Fluid {
         // Sums of steps may end an ulp beside the next one's start.
         if solids.moves() && (solids.time - t).abs() > 1e-12 * t.abs() {
             let h = t - solids.time;
-            solids.bodies.iter_mut().for_each(|body| body.position = body.position + body.velocity * h);
+            solids.bodies.iter_mut().for_each(|body| body.state.position = body.state.position + body.state.velocity * h);
             solids.place(t);
             self.renew()?;
         }
@@ -179,7 +181,7 @@ impl Fluid {
         }
         let v = |s: &[f64]| Vector { x: s[0], y: s[1], z: s[2] };
         for (body, s) in solids.bodies.iter_mut().zip(bodies.chunks_exact(6)) {
-            (body.position, body.velocity) = (v(&s[..3]), v(&s[3..]));
+            (body.state.position, body.state.velocity) = (v(&s[..3]), v(&s[3..]));
         }
         solids.place(t);
         self.renew().ok()?;
@@ -202,7 +204,7 @@ impl Fluid {
         }
     }
 
-    fn failed(&self, failure: Failure) -> Box<Failed> {
+    pub(super) fn failed(&self, failure: Failure) -> Box<Failed> {
         Box::new(Failed { broken: self.broken("", 0.0), failure, fluid: self.name.clone() })
     }
 
@@ -277,6 +279,12 @@ impl Fluid {
         }
     }
 
+    /// Takes the solids around it.
+    pub fn take_surfaces(&mut self, colliders: &Arc<Vec<Collider>>) -> Result<(), Failure> {
+        let others = self.solids.as_mut().is_some_and(|solids| solids.take_surfaces(colliders));
+        if others { self.renew() } else { Ok(()) }
+    }
+
     /// Takes the state of what it moves.
     pub fn listen(&mut self, exchange: &Exchange) {
         let grid = self.grid();
@@ -287,7 +295,7 @@ impl Fluid {
     }
 
     /// Gives what it moves what it has got.
-    pub fn tell(&mut self, exchange: &mut Exchange) {
+    pub fn tell(&mut self, exchange: &mut Turn<'_>) {
         self.bodies().iter_mut().for_each(|body| body.tell(exchange));
         self.sheets.iter_mut().for_each(|sheet| sheet.tell(exchange));
     }

@@ -21,7 +21,7 @@ pub use fluid::{Failed, Fluid};
 pub use settings::Settings;
 pub use sources::{Cover, Source};
 
-use crate::exchange::Exchange;
+use crate::exchange::Turn;
 use crate::fluids::hold;
 use crate::integrators::equal_steps;
 use crate::system::{Archive, System};
@@ -84,11 +84,13 @@ impl System for Gas {
         &self.name
     }
 
-    fn absorb(&mut self, _exchange: &mut Exchange) {}
+    fn absorb(&mut self, _exchange: &mut Turn<'_>) {}
 
-    fn advance(&mut self, t: f64, dt: f64, exchange: &mut Exchange, go_on: &(dyn Fn() -> bool + Sync)) -> Result<StepReport, StepError> {
+    fn advance(&mut self, t: f64, dt: f64, exchange: &mut Turn<'_>, go_on: &(dyn Fn() -> bool + Sync)) -> Result<StepReport, StepError> {
         let mut report = StepReport::default();
         for f in 0..self.fluids.len() {
+            let taken = self.fluids[f].take_surfaces(exchange.surfaces());
+            taken.map_err(|failure| self.fluids[f].failed(failure).within(&self.name, t))?;
             self.fluids[f].listen(exchange);
             let mut done = 0.0;
             while dt - done > 1e-9 * dt {
@@ -112,15 +114,15 @@ impl System for Gas {
         Ok(report)
     }
 
-    fn publish(&mut self, t: f64, exchange: &mut Exchange) {
+    fn publish(&mut self, t: f64, exchange: &mut Turn<'_>) {
         for fluid in &mut self.fluids {
             // Values beyond the sides are in no snapshot.
             hold(&mut fluid.u, &fluid.settings.sides, t);
-            exchange.publish_velocities(&fluid.name, t, &fluid.u);
+            exchange.publish_field(&fluid.name, "velocity", t, &fluid.u);
         }
     }
 
-    fn columns(&self, names: &[&str], out: &mut Vec<Column>) {
+    fn columns(&self, _t: f64, names: &[&str], out: &mut Vec<Column>) {
         self.fluids.iter().for_each(|fluid| fluid.columns(names, out));
         if names.contains(&"force") {
             out.extend(self.forces());

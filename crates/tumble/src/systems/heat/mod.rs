@@ -12,7 +12,7 @@ mod pass;
 pub use body::{Body, Boundary, Material, Plan, Source};
 pub use pass::{Cells, Pass};
 
-use crate::exchange::Exchange;
+use crate::exchange::{Exchange, SystemId, Turn};
 use crate::integrators::equal_steps;
 use crate::integrators::stability::{Mode, limits};
 use crate::math::Real;
@@ -31,8 +31,6 @@ pub const SAFE: f64 = 0.7;
 pub struct Settings {
     /// Name in the scene.
     pub name: String,
-    /// Its place among the systems.
-    pub index: usize,
     /// Sub-steps of an interval.
     pub substeps: Option<u32>,
     /// Longest sub-step [s].
@@ -50,12 +48,12 @@ pub struct Heat {
 
 impl Heat {
     /// A system of bodies; their boundaries become surfaces of the exchange.
-    pub fn new(settings: Settings, bodies: Vec<Body>, exchange: &mut Exchange) -> Self {
+    pub fn new(settings: Settings, bodies: Vec<Body>, id: SystemId, exchange: &mut Exchange) -> Self {
         let mut surfaces = Vec::new();
         for body in &bodies {
             let mut first = None;
             for boundary in &body.plan.boundaries {
-                let at = exchange.surface(settings.index, format!("{} {}", body.plan.name, boundary.name));
+                let at = exchange.open_flux(id, format!("{} {}", body.plan.name, boundary.name));
                 first = first.or(Some(at));
             }
             surfaces.push(first.unwrap_or(0));
@@ -114,9 +112,9 @@ impl System for Heat {
         &self.settings.name
     }
 
-    fn absorb(&mut self, _exchange: &mut Exchange) {}
+    fn absorb(&mut self, _exchange: &mut Turn<'_>) {}
 
-    fn advance(&mut self, t: f64, dt: f64, exchange: &mut Exchange, go_on: &(dyn Fn() -> bool + Sync)) -> Result<StepReport, StepError> {
+    fn advance(&mut self, t: f64, dt: f64, exchange: &mut Turn<'_>, go_on: &(dyn Fn() -> bool + Sync)) -> Result<StepReport, StepError> {
         let mut report = StepReport::default();
         let n = self.steps(dt);
         let h = dt / f64::from(n);
@@ -138,15 +136,15 @@ impl System for Heat {
         }
         for ((body, before), first) in self.bodies.iter().zip(before).zip(&self.surfaces) {
             for i in 0..body.plan.boundaries.len() {
-                exchange.enter(first + i, body.come[i] - before[i], 0.0);
+                exchange.flow(first + i, body.come[i] - before[i], 0.0);
             }
         }
         Ok(report)
     }
 
-    fn publish(&mut self, _t: f64, _exchange: &mut Exchange) {}
+    fn publish(&mut self, _t: f64, _exchange: &mut Turn<'_>) {}
 
-    fn columns(&self, names: &[&str], out: &mut Vec<Column>) {
+    fn columns(&self, _t: f64, names: &[&str], out: &mut Vec<Column>) {
         for body in &self.bodies {
             let grid = body.plan.grid;
             let points: Vec<usize> = grid.axes().map(|a| grid.n[a]).collect();
