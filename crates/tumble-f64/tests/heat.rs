@@ -9,7 +9,7 @@ use std::f64::consts::PI;
 use tumble_f64::math::Signal;
 use tumble_f64::scene::Simulation;
 use tumble_f64::state::{Field, Grid, Place};
-use tumble_f64::systems::heat::{Body, Boundary, Material, Plan};
+use tumble_f64::systems::heat::{Boundary, HeatedBody, Material, Plan};
 use tumble_interface::engine::StepReport;
 use tumble_interface::scene::HeatScheme;
 use tumble_interface::{Data, Engine, Scene};
@@ -163,7 +163,7 @@ fn explicit_steps_grow_just_beyond_the_limit() {
                 let i = t.index(at);
                 t.data[i] = if (at[0] + at[1] + at[2]) % 2 == 0 { 1.0 } else { -1.0 };
             }
-            let mut body = Body::new(plan, t, 0.0).unwrap();
+            let mut body = HeatedBody::new(plan, t, 0.0).unwrap();
             let limit = body.limit();
             assert!((limit / (0.01 / (2.0 * d as f64 * 1.5)) - 1.0).abs() < 1e-12, "{d} {limit}");
             let mut report = StepReport::default();
@@ -357,7 +357,7 @@ fn fluxes_of_the_exchange_sum_up_to_the_ledger() {
         sources: Vec::new(),
         tolerance: 1e-12,
     };
-    let body = Body::new(plan, Field::new(grid, Place::Cell, "K").unwrap(), 0.0).unwrap();
+    let body = HeatedBody::new(plan, Field::new(grid, Place::Cell, "K").unwrap(), 0.0).unwrap();
     let mut exchange = Exchange::default();
     exchange.enter("other");
     let id = exchange.enter("s");

@@ -8,7 +8,7 @@ use crate::common;
 use common::{Vector, vector};
 use proptest::prelude::*;
 use tumble_f64::geometry::mesh_contact::{
-    Detector, GAMMA, Held, Kind, Owner, Topology, contour, edge_edge, edge_edge_impact, intersections, passes, point_triangle,
+    Detector, GAMMA, Held, Owner, PairKind, Topology, contour, edge_edge, edge_edge_impact, intersections, passes, point_triangle,
     point_triangle_impact, tangled, truncate, untangle_directions,
 };
 use tumble_f64::math::{Random, Row};
@@ -261,7 +261,7 @@ fn ways(detector: &Detector, n: usize, random: &mut Numbers, scale: f64) -> Vec<
     let mut nearest = vec![f64::INFINITY; n];
     for p in detector.pairs() {
         for (k, v) in p.vertices.iter().enumerate() {
-            let first = if p.kind == Kind::PointTriangle { 1 } else { 2 };
+            let first = if p.kind == PairKind::PointTriangle { 1 } else { 2 };
             if p.distance < nearest[*v as usize] && random.next() > -0.8 {
                 nearest[*v as usize] = p.distance;
                 ways[*v as usize] = Vector::from(p.normal) * if k < first { -1.0 } else { 1.0 };

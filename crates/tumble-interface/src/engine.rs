@@ -9,10 +9,10 @@ use crate::warning::Warning;
 /// Growth of the energy over its scale at which a run is stopped.
 pub const BLOW_UP: f64 = 1000.0;
 
-/// Who has how much of the books, and where their worst numbers are: whoever is to blame where a bound is broken.
+/// Who has how much of the ledger, and where their worst numbers are: whoever is to blame where a bound is broken.
 #[derive(Debug, Clone, PartialEq, Default, serde::Serialize)]
 pub struct Account {
-    /// The books of each system.
+    /// The ledger of each system.
     pub systems: Vec<(String, Ledger)>,
     /// What objects have of them, where a system can tell them apart: mass, momenta, kinetic energy, speed, heat and volume.
     pub shares: Vec<Share>,
@@ -20,18 +20,18 @@ pub struct Account {
     pub worst: Vec<Worst>,
 }
 
-/// What one object has of the books.
+/// What one object has of the ledger.
 #[derive(Debug, Clone, PartialEq, serde::Serialize)]
 pub struct Share {
     /// Its system.
     pub system: String,
     /// Its name.
     pub object: String,
-    /// Its own books.
+    /// Its own ledger.
     pub ledger: Ledger,
 }
 
-/// The worst of something in the books.
+/// The worst of something in the ledger.
 #[derive(Debug, Clone, PartialEq, serde::Serialize)]
 pub struct Worst {
     /// Of what: the name of a number in the ledger.
@@ -56,7 +56,7 @@ pub struct Inside {
     /// The state there. Systems go one after the other through an interval, so those whose turn has not come are still at its start.
     /// The index is that of the last whole frame.
     pub frame: Frame,
-    /// The books there.
+    /// The ledger there.
     pub ledger: Ledger,
     /// The system that took the last sub-step.
     pub system: String,
@@ -151,7 +151,7 @@ pub trait Engine: Send {
     /// What does not change: triangles, links, masses, rest positions, collider meshes.
     fn topology(&self) -> Vec<Column>;
 
-    /// The books, now.
+    /// The ledger, now.
     fn ledger(&self) -> Ledger;
 
     /// Who has how much of them, and where the worst is.

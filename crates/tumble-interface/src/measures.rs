@@ -266,7 +266,7 @@ const fn described<T: Value>(name: &'static str, doc: &'static str, how: Measure
 }
 
 measures! {
-    /// The books of the world at one time; `None`: nothing here measures it. [`LEDGER`] has units and rules.
+    /// The ledger of the world at one time; `None`: nothing here measures it. [`LEDGER`] has units and rules.
     Ledger in LEDGER {
         /// Simulated time.
         time: f64 = Measure { unit: "s", systems: Merge::Last, columns: &["time"], ..STATE };

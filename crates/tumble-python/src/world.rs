@@ -223,7 +223,7 @@ impl World {
         arrays::columns(py, self.engine.topology())
     }
 
-    /// The books, now; `tumble.measures.LEDGER` describes each number.
+    /// The ledger, now; `tumble.measures.LEDGER` describes each number.
     #[getter]
     fn ledger<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
         let (engine, pool) = (&self.engine, self.pool.as_ref());

@@ -142,7 +142,7 @@ impl World {
         self.loaded.world.time()
     }
 
-    /// The books now, as JSON.
+    /// The ledger now, as JSON.
     pub fn ledger(&self) -> String {
         json(&self.loaded.world.ledger())
     }

@@ -33,7 +33,7 @@ pub trait System: Send + Sync {
     /// Constant columns of its objects.
     fn topology(&self, out: &mut Vec<Column>);
 
-    /// Its books at time t [s].
+    /// Its ledger at time t [s].
     fn ledger(&self, t: f64) -> Ledger;
 
     /// Share of each of its objects; none if unknown.

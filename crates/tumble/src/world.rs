@@ -354,7 +354,7 @@ impl World {
         out
     }
 
-    /// The books of all systems together.
+    /// The ledger of all systems together.
     pub fn ledger(&self) -> Ledger {
         self.ledger_at(self.time())
     }

@@ -162,7 +162,7 @@ impl<E: Element<N, M, D>, Y: Law<P>, const N: usize, const M: usize, const D: us
         })
     }
 
-    /// Elements that hold this energy [J] at rest; it is left out of the books.
+    /// Elements that hold this energy [J] at rest; it is left out of the ledger.
     pub fn with_energy_at_rest(mut self, energy: f64) -> Self {
         self.energy_at_rest = energy;
         self

@@ -92,7 +92,7 @@ pub struct Flux {
 
 /// A quantity on a grid at the last two times [s] at which it was published. It is in no snapshot: its system publishes it anew.
 #[derive(Debug, Clone, PartialEq, Default)]
-struct Field {
+struct PublishedField {
     object: String,
     quantity: String,
     states: Vec<(f64, Arc<Vectors>)>,
@@ -104,7 +104,7 @@ pub struct Exchange {
     systems: Vec<String>,
     bodies: Vec<Body>,
     surfaces: Surfaces,
-    fields: Vec<Field>,
+    fields: Vec<PublishedField>,
     fluxes: Vec<Flux>,
     heard: Vec<Heard>,
     mail: Vec<Letter>,
@@ -205,7 +205,7 @@ impl Exchange {
     /// Asks for a quantity of an object.
     pub fn ask(&mut self, object: &str, quantity: &str) {
         if self.fields.iter().all(|field| (field.object.as_str(), field.quantity.as_str()) != (object, quantity)) {
-            self.fields.push(Field { object: object.into(), quantity: quantity.into(), states: Vec::new() });
+            self.fields.push(PublishedField { object: object.into(), quantity: quantity.into(), states: Vec::new() });
         }
     }
 

@@ -3,7 +3,7 @@
 //!
 //! A method owns its state and the order of the parts of its step; the parts take from here what does not depend on the method.
 
-mod bodies;
+mod balls;
 mod failure;
 pub mod projection;
 pub mod rows;
@@ -12,9 +12,9 @@ mod sides;
 mod solids;
 mod viscosity;
 
-pub use bodies::Body;
+pub use balls::Ball;
 pub use failure::Failure;
-pub use projection::Projection;
+pub use projection::PressureProjection;
 pub use sheets::Sheet;
 pub use sides::{Beyond, hold};
 pub use solids::Solids;

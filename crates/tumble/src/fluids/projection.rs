@@ -124,7 +124,7 @@ pub fn fastest(u: &Vectors, solids: Option<&Solids>) -> f64 {
 }
 
 /// A projection of the velocity of a fluid: what it changes, what it is given, and how exact it is.
-pub struct Projection<'a> {
+pub struct PressureProjection<'a> {
     /// Velocity on faces [m/s].
     pub u: &'a mut Vectors,
     /// Pressure at cells [Pa], taken anew.
@@ -149,7 +149,7 @@ pub struct Projection<'a> {
     pub on_failure: OnFailure,
 }
 
-impl Projection<'_> {
+impl PressureProjection<'_> {
     /// Gives the velocity at time t the divergence S; h [s] only scales the pressure that it takes.          (gas.4)
     pub fn run(self, t: f64, h: f64, report: &mut StepReport) -> Result<(), Failure> {
         let Self { u, pressure, solver, mut solids, sides, density, light, swelling, params, tolerance, on_failure } = self;

@@ -20,12 +20,8 @@ pub enum Beyond {
     Inflow {
         /// The velocity.
         velocity: VectorSignal,
-        /// Of the smoke [kg/m³].
-        density: f64,
-        /// Of the fluid [K].
-        temperature: f64,
-        /// Of the fuel [kg/m³].
-        fuel: f64,
+        /// What comes in with it, by the names and in the units of its columns.
+        carried: Vec<(&'static str, f64)>,
     },
 }
 
@@ -44,11 +40,13 @@ impl Beyond {
         !matches!(self, Self::Open | Self::Periodic)
     }
 
-    /// Its condition for an advected field: `ambient` outside, and `inflow` of the density, temperature and fuel of the inflow.
-    pub fn carried(&self, ambient: f64, inflow: impl Fn([f64; 3]) -> f64) -> Side {
+    /// Its condition for an advected quantity, which is `ambient` outside.
+    pub fn carried(&self, quantity: &str, ambient: f64) -> Side {
         match self {
             Self::Open => Side::Ghost(ambient),
-            Self::Inflow { density, temperature, fuel, .. } => Side::Ghost(inflow([*density, *temperature, *fuel])),
+            Self::Inflow { carried, .. } => {
+                Side::Ghost(carried.iter().find(|(name, _)| *name == quantity).map_or(ambient, |(_, value)| *value))
+            }
             _ => Side::Closed,
         }
     }

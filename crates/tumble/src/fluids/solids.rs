@@ -10,7 +10,7 @@
 //! side.
 //! Tests: crates/tumble-f64/tests/solids.rs.
 
-use super::bodies::Body;
+use super::balls::Ball;
 use super::rows::{Face, beside};
 use super::sides::Beyond;
 use crate::geometry::{Collider, Vector};
@@ -71,7 +71,7 @@ struct Found {
 pub struct Solids {
     colliders: Arc<Vec<Collider>>,
     /// Solids that the fluid moves, counted after the colliders.
-    pub bodies: Vec<Body>,
+    pub bodies: Vec<Ball>,
     stick: bool,
     grid: Grid,
     /// Sides of the box that are held.
@@ -141,7 +141,7 @@ fn share(d: [f64; 4]) -> f64 {
 
 impl Solids {
     /// These colliders and bodies in a box; fluid sticks to them or slips along them.
-    pub fn new(colliders: Arc<Vec<Collider>>, bodies: Vec<Body>, stick: bool, grid: Grid, sides: &[[Beyond; 2]; 3]) -> Self {
+    pub fn new(colliders: Arc<Vec<Collider>>, bodies: Vec<Ball>, stick: bool, grid: Grid, sides: &[[Beyond; 2]; 3]) -> Self {
         let len = grid.lattice().len();
         let held = std::array::from_fn(|a| [0, 1].map(|end| grid.flat == Some(a) || sides[a][end].is_held()));
         Self {

@@ -27,12 +27,12 @@ pub trait Stiff: Equation {
     fn linearize(&mut self, t: f64, x: &[Row], v: &[Row], gh: f64, hessian: Hessian) -> f64;
 
     /// Solves with that matrix; rows held still get 0.
-    fn solve_linear(&mut self, x: &[Row], rhs: &[Row], out: &mut [Row], settings: &Solver) -> Linear;
+    fn solve_linear(&mut self, x: &[Row], rhs: &[Row], out: &mut [Row], settings: &Solver) -> LinearSolve;
 }
 
 /// How a linear solve ended.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
-pub struct Linear {
+pub struct LinearSolve {
     /// Iterations made; 1 for a direct solver.
     pub iterations: usize,
     /// Whether the matrix turned out not to be positive definite.

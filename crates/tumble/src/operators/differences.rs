@@ -8,7 +8,7 @@
 //!    w--- v ---w        Source: [harlow1965], [lipnikov2014]; tests: crates/tumble-f64/tests/operators.rs
 //! ```
 
-use super::stencil::{Kind, Term, combine, each_row, fetch, ghosted, second};
+use super::stencil::{Combination, Term, combine, each_row, fetch, ghosted, second};
 use crate::math::Real;
 use crate::state::{Field, GridError, Place, Vectors};
 
@@ -17,7 +17,7 @@ pub fn gradient(f: &Field, out: &mut Vectors) -> Result<(), GridError> {
     f.expect(&f.grid, Place::Cell, "gradient of a field")?;
     out.check(&f.grid, f.grid.axes().map(Place::Face).collect(), "gradient")?;
     for (axis, part) in f.grid.axes().zip(&mut out.parts) {
-        combine(part, &[Term { of: f, axis, kind: Kind::Difference, scale: 1.0 / f.grid.dx }]);
+        combine(part, &[Term { of: f, axis, kind: Combination::Difference, scale: 1.0 / f.grid.dx }]);
     }
     Ok(())
 }
@@ -26,7 +26,7 @@ pub fn gradient(f: &Field, out: &mut Vectors) -> Result<(), GridError> {
 pub fn divergence(u: &Vectors, out: &mut Field) -> Result<(), GridError> {
     let grid = u.on_faces("divergence of vectors")?;
     out.expect(&grid, Place::Cell, "divergence")?;
-    let term = |(axis, of)| Term { of, axis, kind: Kind::Difference, scale: 1.0 / grid.dx };
+    let term = |(axis, of)| Term { of, axis, kind: Combination::Difference, scale: 1.0 / grid.dx };
     combine(out, &grid.axes().zip(&u.parts).map(term).collect::<Vec<_>>());
     Ok(())
 }
@@ -49,7 +49,7 @@ pub fn curl(u: &Vectors, out: &mut Vectors) -> Result<(), GridError> {
         let mut terms = Vec::new();
         for (axis, component, sign) in [(a, b, 1.0), (b, a, -1.0)] {
             if let (true, Some(of)) = (grid.flat != Some(axis), u.part(component)) {
-                terms.push(Term { of, axis, kind: Kind::Difference, scale: sign / grid.dx });
+                terms.push(Term { of, axis, kind: Combination::Difference, scale: sign / grid.dx });
             }
         }
         combine(part, &terms);
@@ -83,7 +83,7 @@ pub fn average(f: &Field, place: Place) -> Result<Field, GridError> {
         }
         let walls = std::array::from_fn(|a| grid.on_walls(if a == axis { place } else { here.place }, a));
         let mut there = Field { sides: f.sides, ..Field::new(grid, grid.place_on(walls), f.unit.clone())? };
-        combine(&mut there, &[Term { of: &here, axis, kind: Kind::Average, scale: 0.5 }]);
+        combine(&mut there, &[Term { of: &here, axis, kind: Combination::Average, scale: 0.5 }]);
         here = there;
     }
     Ok(here)
@@ -98,7 +98,7 @@ pub fn directional(u: &Vectors, f: &Field, out: &mut Field) -> Result<(), GridEr
     let mut slope = Field::new(grid, f.place, f.unit.clone())?;
     for (axis, part) in grid.axes().zip(&u.parts) {
         let speed = average(part, f.place)?;
-        combine(&mut slope, &[Term { of: f, axis, kind: Kind::Central, scale: 0.5 / grid.dx }]);
+        combine(&mut slope, &[Term { of: f, axis, kind: Combination::Central, scale: 0.5 / grid.dx }]);
         each_row(out, |j, k, row| {
             let at = slope.index([0, j, k]);
             for (i, out) in row.iter_mut().enumerate() {

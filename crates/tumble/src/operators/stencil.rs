@@ -115,7 +115,7 @@ pub fn each_row_with<T>(
 
 /// Combination of two neighbours.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Kind {
+pub enum Combination {
     /// Their difference, halfway between them.
     Difference,
     /// Their mean, halfway between them.
@@ -130,8 +130,8 @@ pub struct Term<'a> {
     pub of: &'a Field,
     /// Along which axis.
     pub axis: usize,
-    /// Kind.
-    pub kind: Kind,
+    /// Combination.
+    pub kind: Combination,
     /// Times which factor.
     pub scale: f64,
 }
@@ -189,11 +189,11 @@ pub fn combine(out: &mut Field, terms: &[Term]) {
         for (t, term) in terms.iter().enumerate() {
             let (f, axis) = (term.of, term.axis);
             let (high, low): (isize, isize) = match term.kind {
-                Kind::Central => (1, -1),
+                Combination::Central => (1, -1),
                 _ if f.grid.on_walls(f.place, axis) => (1, 0),
                 _ => (0, -1),
             };
-            let (scale, sum, add) = (term.scale as Real, term.kind == Kind::Average, t > 0);
+            let (scale, sum, add) = (term.scale as Real, term.kind == Combination::Average, t > 0);
             let (j, k) = (j as isize, k as isize);
             if axis != 0 {
                 let at = |m: isize| if axis == 1 { (j + m, k) } else { (j, k + m) };

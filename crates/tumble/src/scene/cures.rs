@@ -82,8 +82,8 @@ fn attempt<E: Engine>(
         if !matches!(trial.step(go_on), Ok(Some(_))) {
             return cure;
         }
-        let books = trial.ledger();
-        scale = scale.max(books.kinetic).max(books.elastic).max((books.external - start.external).abs());
+        let ledger = trial.ledger();
+        scale = scale.max(ledger.kinetic).max(ledger.elastic).max((ledger.external - start.external).abs());
     }
     let growth = if scale > 0.0 { (trial.ledger().energy() - start.energy()) / scale } else { 0.0 };
     cure.energy_ratio = growth;

@@ -50,8 +50,8 @@ fn idle_bounds(scene: &Scene, world: &World) -> Result<(), SceneError> {
     if bounds.is_empty() {
         return Ok(());
     }
-    let books = world.ledger();
-    let issues: Vec<Issue> = bounds.iter().filter(|bound| !books.measures(bound.measure)).map(|bound| bound.idle()).collect();
+    let ledger = world.ledger();
+    let issues: Vec<Issue> = bounds.iter().filter(|bound| !ledger.measures(bound.measure)).map(|bound| bound.idle()).collect();
     if issues.is_empty() { Ok(()) } else { Err(SceneError { issues }) }
 }
 

@@ -260,16 +260,16 @@ impl Gas {
     }
 
     /// Mass, momentum, kinetic energy and that of pressure; in a plane for a metre across it.
-    fn books(&self, t: f64) -> Ledger {
+    fn ledger(&self, t: f64) -> Ledger {
         let grid = self.grid();
         let volume = grid.dx.powi(grid.dimension() as i32);
         let (c2, rho0) = (self.fluid.sound_speed * self.fluid.sound_speed, self.fluid.density);
-        let mut books = Ledger { time: t, ..Ledger::default() };
+        let mut ledger = Ledger { time: t, ..Ledger::default() };
         for at in self.density.each() {
             let rho = f64::from(self.density.value(at));
-            books.mass += volume * rho;
-            books.elastic += volume * c2 * (rho * ln(rho / rho0) - (rho - rho0));
-            books.external -= volume * rho * (0..3).map(|a| self.fluid.gravity[a] * grid.point(Place::Cell, at)[a]).sum::<f64>();
+            ledger.mass += volume * rho;
+            ledger.elastic += volume * c2 * (rho * ln(rho / rho0) - (rho - rho0));
+            ledger.external -= volume * rho * (0..3).map(|a| self.fluid.gravity[a] * grid.point(Place::Cell, at)[a]).sum::<f64>();
         }
         for (axis, part) in grid.axes().zip(&self.velocity.parts) {
             for at in part.each() {
@@ -281,13 +281,13 @@ impl Gas {
                 let u = f64::from(part.value(at));
                 if u != 0.0 {
                     let mass = 0.5 * volume * f64::from(self.density.value(below) + self.density.value(above));
-                    books.momentum[axis] += mass * u;
-                    books.kinetic += 0.5 * mass * u * u;
+                    ledger.momentum[axis] += mass * u;
+                    ledger.kinetic += 0.5 * mass * u * u;
                 }
             }
         }
-        books.speed = Some(self.speeds().iter().map(|s| s[1] * s[1]).sum::<f64>().sqrt());
-        books
+        ledger.speed = Some(self.speeds().iter().map(|s| s[1] * s[1]).sum::<f64>().sqrt());
+        ledger
     }
 
     /// The failure: column, cell, and growth of the energy.
@@ -302,8 +302,8 @@ impl Gas {
                 return Some(("velocity", std::array::from_fn(|a| at[a].min(points[a] - 1)), None));
             }
         }
-        let books = self.books(0.0);
-        let ratio = (books.kinetic + books.elastic) / self.scale;
+        let ledger = self.ledger(0.0);
+        let ratio = (ledger.kinetic + ledger.elastic) / self.scale;
         if self.scale > 0.0 && ratio > BLOW_UP {
             let (mut worst, mut most) = ([0; 3], 0.0);
             for at in self.density.each() {
@@ -340,11 +340,11 @@ impl Compressible {
     /// A system of gases.
     pub fn new(settings: Settings, mut gases: Vec<Gas>) -> Self {
         for gas in &mut gases {
-            let books = gas.books(0.0);
+            let ledger = gas.ledger(0.0);
             // Gravity may set all of it going: as much as the fall of its mass through the box.
             let grid = gas.grid();
-            let fall = books.mass * (0..3).map(|a| gas.fluid.gravity[a].abs() * grid.n[a] as f64 * grid.dx).sum::<f64>();
-            gas.scale = books.kinetic + books.elastic + fall;
+            let fall = ledger.mass * (0..3).map(|a| gas.fluid.gravity[a].abs() * grid.n[a] as f64 * grid.dx).sum::<f64>();
+            gas.scale = ledger.kinetic + ledger.elastic + fall;
         }
         Self { settings, gases, watched: false }
     }
@@ -469,12 +469,12 @@ impl System for Compressible {
 
     fn ledger(&self, t: f64) -> Ledger {
         let mut total = Ledger { time: t, ..Ledger::default() };
-        self.gases.iter().for_each(|gas| total.add_system(&gas.books(t)));
+        self.gases.iter().for_each(|gas| total.add_system(&gas.ledger(t)));
         total
     }
 
     fn shares(&self, t: f64) -> Vec<Share> {
-        let share = |gas: &Gas| Share { system: self.settings.name.clone(), object: gas.name.clone(), ledger: gas.books(t) };
+        let share = |gas: &Gas| Share { system: self.settings.name.clone(), object: gas.name.clone(), ledger: gas.ledger(t) };
         self.gases.iter().map(share).collect()
     }
 

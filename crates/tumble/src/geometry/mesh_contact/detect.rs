@@ -27,9 +27,9 @@ const TASK: usize = 32;
 /// Vertices per task.
 const CHUNK: usize = 1024;
 
-/// Kind of a pair.
+/// PairKind of a pair.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Kind {
+pub enum PairKind {
     /// The first vertex is a point, the others a triangle.
     PointTriangle,
     /// The first two vertices are an edge, the others another one.
@@ -40,7 +40,7 @@ pub enum Kind {
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Pair {
     /// Its kind.
-    pub kind: Kind,
+    pub kind: PairKind,
     /// The vertices of both features.
     pub vertices: [u32; 4],
     /// Weights of the vertices, negative ones for the second feature, whose sum is zero: the sum of weights times vertices
@@ -182,7 +182,7 @@ impl Detector {
             if topology.meet([v], t) {
                 let near = point_triangle(self.at[v as usize], Self::three(t, &self.at));
                 let rest = |x: &[Vector]| point_triangle(x[v as usize], Self::three(t, x)).distance_sq.sqrt();
-                self.keep(topology, Kind::PointTriangle, [v, t[0], t[1], t[2]], near, rest, found);
+                self.keep(topology, PairKind::PointTriangle, [v, t[0], t[1], t[2]], near, rest, found);
             }
         })
     }
@@ -194,7 +194,7 @@ impl Detector {
             if topology.meet(e, f) {
                 let near = edge_edge(Self::two(e, &self.at), Self::two(f, &self.at));
                 let rest = |x: &[Vector]| edge_edge(Self::two(e, x), Self::two(f, x)).distance_sq.sqrt();
-                self.keep(topology, Kind::EdgeEdge, [e[0], e[1], f[0], f[1]], near, rest, found);
+                self.keep(topology, PairKind::EdgeEdge, [e[0], e[1], f[0], f[1]], near, rest, found);
             }
         })
     }
@@ -204,7 +204,7 @@ impl Detector {
     fn keep(
         &self,
         topology: &Topology,
-        kind: Kind,
+        kind: PairKind,
         vertices: [u32; 4],
         near: Nearest,
         rest: impl Fn(&[Vector]) -> f64,
@@ -220,8 +220,8 @@ impl Detector {
         let mut n = p[0] * w[0] + p[1] * w[1] + p[2] * w[2] + p[3] * w[3];
         if distance == 0.0 {
             n = match kind {
-                Kind::PointTriangle => (p[2] - p[1]).cross(p[3] - p[1]),
-                Kind::EdgeEdge => (p[1] - p[0]).cross(p[3] - p[2]),
+                PairKind::PointTriangle => (p[2] - p[1]).cross(p[3] - p[1]),
+                PairKind::EdgeEdge => (p[1] - p[0]).cross(p[3] - p[2]),
             };
         }
         let n = n.tamed().normalized();
@@ -240,14 +240,14 @@ impl Detector {
 
     /// How far the features of a pair could come towards each other along a direction from the second to the first [m].
     #[inline(always)]
-    fn approach(&self, kind: Kind, vertices: [u32; 4], n: Vector) -> f64 {
+    fn approach(&self, kind: PairKind, vertices: [u32; 4], n: Vector) -> f64 {
         if self.ways.is_empty() {
             return 0.0;
         }
         let [a, b, c, d] = vertices.map(|v| n.dot(self.ways[v as usize]));
         match kind {
-            Kind::PointTriangle => b.max(c).max(d).max(0.0) - a.min(0.0),
-            Kind::EdgeEdge => c.max(d).max(0.0) - a.min(b).min(0.0),
+            PairKind::PointTriangle => b.max(c).max(d).max(0.0) - a.min(0.0),
+            PairKind::EdgeEdge => c.max(d).max(0.0) - a.min(b).min(0.0),
         }
     }
 
@@ -259,11 +259,11 @@ impl Detector {
         if length_sq > 0.0 { *way * (gone.dot(*way) / length_sq).clamp(0.0, 1.0) } else { Vector::default() }
     }
 
-    fn is_tangled(&self, kind: Kind, v: [u32; 4]) -> bool {
+    fn is_tangled(&self, kind: PairKind, v: [u32; 4]) -> bool {
         let loose = |v: u32| self.loose.get(v as usize).is_some_and(|l| *l);
         match kind {
-            Kind::PointTriangle => loose(v[0]) && (loose(v[1]) || loose(v[2]) || loose(v[3])),
-            Kind::EdgeEdge => (loose(v[0]) || loose(v[1])) && (loose(v[2]) || loose(v[3])),
+            PairKind::PointTriangle => loose(v[0]) && (loose(v[1]) || loose(v[2]) || loose(v[3])),
+            PairKind::EdgeEdge => (loose(v[0]) || loose(v[1])) && (loose(v[2]) || loose(v[3])),
         }
     }
 
@@ -425,8 +425,8 @@ impl Detector {
         };
         let mut normal = match (choice, pair.kind) {
             (0, _) => across,
-            (1, Kind::PointTriangle) => (p[2] - p[1]).cross(p[3] - p[1]).normalized(),
-            (1, Kind::EdgeEdge) => {
+            (1, PairKind::PointTriangle) => (p[2] - p[1]).cross(p[3] - p[1]).normalized(),
+            (1, PairKind::EdgeEdge) => {
                 let (u, v) = ((p[1] - p[0]).normalized(), (p[3] - p[2]).normalized());
                 let both = u.cross(v);
                 if both.norm_sq() > 1e-6 { both.normalized() } else { u.cross(past()).normalized() }
@@ -442,8 +442,8 @@ impl Detector {
         // From one of them: differences of near places are exact.
         let along = [normal.dot(p[0] - p[3]), normal.dot(p[1] - p[3]), normal.dot(p[2] - p[3]), 0.0];
         let (low, high) = match pair.kind {
-            Kind::PointTriangle => (along[0], along[1].max(along[2]).max(along[3])),
-            Kind::EdgeEdge => (along[0].min(along[1]), along[2].max(along[3])),
+            PairKind::PointTriangle => (along[0], along[1].max(along[2]).max(along[3])),
+            PairKind::EdgeEdge => (along[0].min(along[1]), along[2].max(along[3])),
         };
         let d = usable(pair);
         let (gap, middle) = (low - high, 0.5 * (low + high));
@@ -451,7 +451,7 @@ impl Detector {
         let parts = d > 0.0 && gap >= if choice == 0 { 0.95 * d } else { 0.0 };
         let left = (0.5 * (gap - self.least(pair))).min(GAMMA * gap).max(0.0);
         let room = |k: usize, sign: f64| sign * (along[k] - middle) - 0.5 * gap + left;
-        let second = if pair.kind == Kind::PointTriangle { 1.0 } else { -1.0 };
+        let second = if pair.kind == PairKind::PointTriangle { 1.0 } else { -1.0 };
         match parts {
             true => Plane { normal, room: [room(0, 1.0), room(1, -second), room(2, -1.0), room(3, -1.0)] },
             false => {
@@ -496,7 +496,7 @@ struct Plane {
 impl Plane {
     /// The wall for the vertex at a position of the pair.
     fn wall(&self, pair: &Pair, place: usize) -> Wall {
-        let first = place == 0 || place == 1 && pair.kind == Kind::EdgeEdge;
+        let first = place == 0 || place == 1 && pair.kind == PairKind::EdgeEdge;
         Wall { normal: if first { self.normal } else { -self.normal }, room: self.room[place] }
     }
 }

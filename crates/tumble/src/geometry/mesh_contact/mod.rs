@@ -13,7 +13,7 @@ mod topology;
 mod tree;
 
 pub use crossing::{crossed, intersections, passes, tangled};
-pub use detect::{Detector, GAMMA, Held, Kind, Pair, truncate};
+pub use detect::{Detector, GAMMA, Held, Pair, PairKind, truncate};
 pub use distance::{Nearest, edge_edge, point_triangle};
 pub use impact::{edge_edge_impact, point_triangle_impact};
 pub use tangle::{contour, untangle_directions};

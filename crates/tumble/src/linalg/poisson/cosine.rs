@@ -114,7 +114,7 @@ impl Cosine {
         let rows = Rows::of(column);
         let width = n[0].next_multiple_of(LANES);
         let pairs = width.div_ceil(GROUP);
-        let group = |axis: usize, first: usize, other: usize, kind: Kind| {
+        let group = |axis: usize, first: usize, other: usize, kind: Transform| {
             let longest = n.iter().max().copied().unwrap_or(1);
             LINES.with_borrow_mut(|scratch| {
                 scratch.reserve(4 * longest * LANES);
@@ -123,15 +123,15 @@ impl Cosine {
             });
         };
         each(n[2], &|k| {
-            each(n[1].div_ceil(GROUP), &|g| group(0, g * GROUP, k, Kind::Forward));
-            each(pairs, &|g| group(1, g * GROUP, k, Kind::Forward));
+            each(n[1].div_ceil(GROUP), &|g| group(0, g * GROUP, k, Transform::Forward));
+            each(pairs, &|g| group(1, g * GROUP, k, Transform::Forward));
         });
         each(n[1], &|j| {
-            each(pairs, &|g| group(2, g * GROUP, j, Kind::Both));
+            each(pairs, &|g| group(2, g * GROUP, j, Transform::Both));
         });
         each(n[2], &|k| {
-            each(pairs, &|g| group(1, g * GROUP, k, Kind::Back));
-            each(n[1].div_ceil(GROUP), &|g| group(0, g * GROUP, k, Kind::Back));
+            each(pairs, &|g| group(1, g * GROUP, k, Transform::Back));
+            each(n[1].div_ceil(GROUP), &|g| group(0, g * GROUP, k, Transform::Back));
         });
     }
 }
@@ -199,7 +199,7 @@ fn loss(x: f64) -> f64 {
 
 /// Operation along an axis.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-enum Kind {
+enum Transform {
     Forward,
     Back,
     /// There, division by the eigenvalues, and back.
@@ -215,7 +215,7 @@ struct Lines<'a> {
     axis: usize,
     first: usize,
     other: usize,
-    kind: Kind,
+    kind: Transform,
     scale: &'a Scale,
     scratch: &'a mut [Block],
 }
@@ -231,7 +231,7 @@ impl Kernel for Lines<'_> {
         let (im, rest) = rest.split_at_mut(n);
         let (a, b) = rest.split_at_mut(n);
         // Going there the lines are sorted as they are read, coming back as they are written.
-        let sorted = self.kind != Kind::Back;
+        let sorted = self.kind != Transform::Back;
         self.read(axis, [re, im], sorted);
         if sorted {
             let inside = fourier(w, axis, [re, im], [a, b]);
@@ -241,7 +241,7 @@ impl Kernel for Lines<'_> {
                 cosines(w, axis, [re, im], [a, b]);
             }
             let (to, free) = if inside { ([re, im], [a, b]) } else { ([a, b], [re, im]) };
-            if self.kind == Kind::Forward {
+            if self.kind == Transform::Forward {
                 return self.write(axis, to, false);
             }
             let [to_re, to_im] = to;

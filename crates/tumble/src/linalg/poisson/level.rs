@@ -21,8 +21,8 @@ pub(super) struct Grid<T> {
     pub w: [Vec<T>; 3],
     /// Extra diagonal, if any.
     pub extra: Option<Vec<Real>>,
-    /// Kind of every block.
-    pub kinds: Vec<Kind>,
+    /// OpenFaces of every block.
+    pub kinds: Vec<OpenFaces>,
     edges: [Edge; 4],
     /// One cell along z, whose faces across it are closed.
     pub flat: bool,
@@ -42,7 +42,7 @@ pub(super) struct Grid<T> {
 
 /// Which faces of a block along x, y, and z unless the grid is flat, are open.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum Kind {
+pub(super) enum OpenFaces {
     /// Any of them, or something is added to the diagonal.
     Mixed,
     /// All.
@@ -98,9 +98,9 @@ impl<T: Weight> Grid<T> {
                         && is(2, z, here(lattice.stride[2]))
                         && extra.as_ref().is_none_or(|d| d[here(0)].iter().all(|d| *d == 0.0));
                     kinds.push(match (open, walls) {
-                        (false, _) => Kind::Mixed,
-                        (true, [false, false]) => Kind::Open,
-                        (true, walls) => Kind::Walls(walls),
+                        (false, _) => OpenFaces::Mixed,
+                        (true, [false, false]) => OpenFaces::Open,
+                        (true, walls) => OpenFaces::Walls(walls),
                     });
                 }
             }
@@ -210,7 +210,7 @@ impl<T: Weight> Grid<T> {
 pub(super) struct Faces<'a, T> {
     w: [[&'a [[T; LANES]]; 2]; 3],
     extra: Option<&'a [Block]>,
-    kinds: &'a [Kind],
+    kinds: &'a [OpenFaces],
     edges: &'a [Edge; 4],
     flat: bool,
 }
@@ -303,13 +303,13 @@ pub(super) fn sweep<W: Width, T: Weight, F: Finish>(w: W, faces: &Faces<T>, near
             let (zm, zp) = (w.load(&zm[e][i..]), w.load(&zp[e][i..]));
             let of_z = if faces.flat { w.splat(0.0) } else { zm + zp };
             let new = match kinds[e] {
-                Kind::Open => finish.at(w, i, d * v - (((xm + xp) + (ym + yp)) + of_z), inverse, v, b),
-                Kind::Walls(walls) => {
+                OpenFaces::Open => finish.at(w, i, d * v - (((xm + xp) + (ym + yp)) + of_z), inverse, v, b),
+                OpenFaces::Walls(walls) => {
                     let edge = faces.edge(walls);
                     let s = ((w.load(&edge.lower[i..]) * xm + w.load(&edge.upper[i..]) * xp) + (ym + yp)) + of_z;
                     finish.at(w, i, w.load(&edge.diagonal[i..]) * v - s, w.load(&edge.inverse[i..]), v, b)
                 }
-                Kind::Mixed => {
+                OpenFaces::Mixed => {
                     let [[x0, x1], [y0, y1], [z0, z1]] = weights(w, faces, e, i);
                     let s = ((x0 * xm + x1 * xp) + (y0 * ym + y1 * yp)) + (z0 * zm + z1 * zp);
                     let d = diagonal_of(w, faces, e, i, [[x0, x1], [y0, y1], [z0, z1]]);
@@ -352,9 +352,9 @@ pub(super) fn scale<W: Width, T: Weight>(w: W, faces: &Faces<T>, c: Real, b: &[R
         for part in 0..LANES / W::N {
             let i = part * W::N;
             let inverse = match kinds[e] {
-                Kind::Open => sixth,
-                Kind::Walls(walls) => w.load(&faces.edge(walls).inverse[i..]),
-                Kind::Mixed => {
+                OpenFaces::Open => sixth,
+                OpenFaces::Walls(walls) => w.load(&faces.edge(walls).inverse[i..]),
+                OpenFaces::Mixed => {
                     let d = diagonal_of(w, faces, e, i, weights(w, faces, e, i));
                     d.positive(d.like(1.0) / d, d.zero())
                 }

@@ -6,7 +6,7 @@
 
 use super::block::LANES;
 use super::faces::Weight;
-use super::level::{Grid, Kind, Rows};
+use super::level::{Grid, OpenFaces, Rows};
 use super::report::{Excess, Fault};
 use crate::math::Real;
 use crate::math::parallel::Tasks;
@@ -320,7 +320,7 @@ fn find<T: Weight>(grid: &Grid<T>) -> (Vec<Run>, Vec<usize>, Vec<bool>) {
         let mut joined = false;
         let mut i = 0;
         while i < n[0] {
-            let whole = i % LANES == 0 && grid.kinds[block + i / LANES] != Kind::Mixed;
+            let whole = i % LANES == 0 && grid.kinds[block + i / LANES] != OpenFaces::Mixed;
             let count = if whole { LANES } else { 1 };
             let alive = whole || (0..3).any(|a| open(a, at + i) || open(a, at + i + stride[a])) || holds(i);
             if alive {

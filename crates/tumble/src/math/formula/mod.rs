@@ -50,7 +50,7 @@ enum Instruction {
 
 /// Dependency of a value.
 #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
-enum Kind {
+enum DependsOn {
     Constant,
     Time,
     Mass,
@@ -84,8 +84,8 @@ impl Formula {
         for tree in &trees {
             let mut code = Vec::new();
             let kind = formula.emit(tree, of, &mut code).map_err(faulty)?;
-            formula.varies |= kind == Kind::Mass;
-            if kind == Kind::Time {
+            formula.varies |= kind == DependsOn::Mass;
+            if kind == DependsOn::Time {
                 code = vec![formula.slot(code)];
             }
             formula.components.push(code);
@@ -126,7 +126,7 @@ impl Formula {
     }
 
     /// Appends the instructions of a tree.
-    fn emit(&mut self, tree: &Tree, of: Of, code: &mut Vec<Instruction>) -> Result<Kind, String> {
+    fn emit(&mut self, tree: &Tree, of: Of, code: &mut Vec<Instruction>) -> Result<DependsOn, String> {
         match tree {
             Tree::Number(value) => constant(*value, code),
             Tree::Name(name) => {
@@ -140,14 +140,14 @@ impl Formula {
                     return Err(unknown(name, of));
                 };
                 code.push(Instruction::Variable(index));
-                Ok(if index == 0 { Kind::Time } else { Kind::Mass })
+                Ok(if index == 0 { DependsOn::Time } else { DependsOn::Mass })
             }
             Tree::Call(name, arguments) => self.call(name, arguments, of, code),
         }
     }
 
-    fn call(&mut self, name: &str, arguments: &[Tree], of: Of, code: &mut Vec<Instruction>) -> Result<Kind, String> {
-        let (start, mut parts, mut kind) = (code.len(), Vec::new(), Kind::Constant);
+    fn call(&mut self, name: &str, arguments: &[Tree], of: Of, code: &mut Vec<Instruction>) -> Result<DependsOn, String> {
+        let (start, mut parts, mut kind) = (code.len(), Vec::new(), DependsOn::Constant);
         for argument in arguments {
             let mut part = Vec::new();
             let own = self.emit(argument, of, &mut part)?;
@@ -159,7 +159,7 @@ impl Formula {
         for (k, (own, part)) in parts.into_iter().enumerate() {
             // A part that waits for time only, in what differs from mass to mass, is computed once for all.
             match (own, kind) {
-                (Kind::Time, Kind::Mass) => code.push(self.slot(part)),
+                (DependsOn::Time, DependsOn::Mass) => code.push(self.slot(part)),
                 _ => code.extend(part),
             }
             if pairs && k > 0 {
@@ -175,7 +175,7 @@ impl Formula {
             [one] => code.push(one),
             _ => {}
         }
-        if kind == Kind::Constant && depth(code) <= STACK {
+        if kind == DependsOn::Constant && depth(code) <= STACK {
             let value = scalar(&code[start..], &[0.0; 7], &[]);
             code.truncate(start);
             if !value.is_finite() {
@@ -215,16 +215,16 @@ impl Formula {
     }
 }
 
-fn constant(value: f64, code: &mut Vec<Instruction>) -> Result<Kind, String> {
+fn constant(value: f64, code: &mut Vec<Instruction>) -> Result<DependsOn, String> {
     if !value.is_finite() {
         return Err("a number that is too large".into());
     }
     code.push(Instruction::Constant(value));
-    Ok(Kind::Constant)
+    Ok(DependsOn::Constant)
 }
 
 /// The instructions of a call: one, or one after each argument but the first.
-fn operation(name: &str, arguments: &[(Kind, Vec<Instruction>)], of: Of) -> Result<Vec<Instruction>, String> {
+fn operation(name: &str, arguments: &[(DependsOn, Vec<Instruction>)], of: Of) -> Result<Vec<Instruction>, String> {
     let n = arguments.len();
     let one = match (name, n) {
         ("-", 1) => Some(Instruction::Negate),

@@ -1,7 +1,7 @@
 //! Stable Fluids: from the words of a fluid to the fluid, and what it moves.
 
 use super::{MethodRules, is_in, place, rules};
-use crate::fluids::{Beyond, Body, Sheet, Solids, hold};
+use crate::fluids::{Ball, Beyond, Sheet, Solids, hold};
 use crate::geometry::Collider;
 use crate::linalg::poisson::{Excess, Method as Solve, Params, Target};
 use crate::math::formula::{Formula, Of};
@@ -150,7 +150,7 @@ struct Read<'a, 'b> {
     reader: Reader<'b>,
     flat: Option<usize>,
     solids: &'a Arc<Vec<Collider>>,
-    bodies: Vec<Body>,
+    bodies: Vec<Ball>,
     sheets: Vec<Sheet>,
 }
 
@@ -209,9 +209,7 @@ impl Read<'_, '_> {
                     }
                     GasSide::Inflow { velocity, density, fuel, temperature } => Beyond::Inflow {
                         velocity: self.vector(&format!("{key}.inflow.velocity"), velocity, Of::Place),
-                        density: *density,
-                        fuel: *fuel,
-                        temperature: temperature.unwrap_or(ambient),
+                        carried: vec![("density", *density), ("fuel", *fuel), ("temperature", temperature.unwrap_or(ambient))],
                     },
                 };
             }
@@ -315,7 +313,7 @@ impl Read<'_, '_> {
     }
 
     /// The balls that it moves; each must cover some cells.
-    fn bodies(&mut self, grid: &Grid) -> Vec<Body> {
+    fn bodies(&mut self, grid: &Grid) -> Vec<Ball> {
         let bodies = std::mem::take(&mut self.bodies);
         let least = LEAST_RADIUS * grid.dx;
         for body in bodies.iter().filter(|body| body.radius < least) {
@@ -474,7 +472,7 @@ impl Read<'_, '_> {
 }
 
 /// The balls and sheets that a fluid moves.
-fn moved(builder: &mut Builder<'_>, words: &Words) -> (Vec<Body>, Vec<Sheet>) {
+fn moved(builder: &mut Builder<'_>, words: &Words) -> (Vec<Ball>, Vec<Sheet>) {
     let (scene, parts, ids) = (builder.scene, &builder.masses, &builder.ids);
     let (exchange, issues) = (&mut builder.exchange, &mut builder.issues);
     let (mut bodies, mut sheets) = (Vec::new(), Vec::new());
@@ -491,7 +489,7 @@ fn moved(builder: &mut Builder<'_>, words: &Words) -> (Vec<Body>, Vec<Sheet>) {
             continue;
         }
         for (at, row) in exchange.open(ids[system], range.clone(), true).into_iter().zip(range) {
-            let mut body = Body::new(name.clone(), at, thing.radius);
+            let mut body = Ball::new(name.clone(), at, thing.radius);
             body.state.position = parts[system].position(row as u32);
             body.state.velocity = parts[system].velocity(row as u32);
             body.state.inverse_mass = parts[system].inverse_mass(row as u32);

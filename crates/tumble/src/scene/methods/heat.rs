@@ -13,7 +13,7 @@ use crate::scene::plausible::odd_density;
 use crate::state::{Field, Place};
 use crate::system::System;
 use crate::systems::dynamics::MOST_SUBSTEPS;
-use crate::systems::heat::{Body, Boundary, Heat, Material, Plan, SAFE, Settings, Source};
+use crate::systems::heat::{Boundary, Heat, HeatedBody, Material, Plan, SAFE, Settings, Source};
 use tumble_interface::check::short;
 use tumble_interface::scene::{
     Animated, Component, Heat as Words, HeatScheme, HeatSide, Integrator, Method, Scene, Shape as Solid, System as Stepping,
@@ -121,7 +121,7 @@ fn body(
     flat: Option<usize>,
     signal: &mut dyn FnMut(&str, &Animated) -> Signal,
     wrong: &mut dyn FnMut(&str, String),
-) -> Option<Body> {
+) -> Option<HeatedBody> {
     let mut fine = true;
     let mut fault = |key: &str, message: String| {
         fine = false;
@@ -248,5 +248,5 @@ fn body(
     }
     let tolerance = words.tolerance.unwrap_or(if size_of::<Real>() == 4 { 1e-5 } else { 1e-11 });
     let plan = Plan { name: words.name.clone(), grid, scheme: words.scheme, materials, material, boundaries, sides, sources, tolerance };
-    Body::new(plan, t, reference).map_err(|e| wrong(".box", e.to_string())).ok()
+    HeatedBody::new(plan, t, reference).map_err(|e| wrong(".box", e.to_string())).ok()
 }

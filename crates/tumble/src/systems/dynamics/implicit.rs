@@ -5,7 +5,7 @@ use super::laws::{Acting, Laws};
 use crate::elements::{Batch, Weights};
 use crate::forces::Group;
 use crate::geometry::Vector;
-use crate::integrators::newton::{self, Linear, Stiff};
+use crate::integrators::newton::{self, LinearSolve, Stiff};
 use crate::integrators::{Equation, Kinematics, Stage};
 use crate::linalg::blocks::{Block, Blocks};
 use crate::linalg::cholesky::{Assembly, Cholesky};
@@ -14,7 +14,7 @@ use crate::math::parallel::{chunks, sum};
 use crate::math::{Real, Row, ZERO};
 use tumble_interface::StepError;
 use tumble_interface::engine::StepReport;
-use tumble_interface::scene::{Hessian, Linear as Method, Solver};
+use tumble_interface::scene::{Hessian, Linear as LinearMethod, Solver};
 
 /// Settings and storage of the implicit schemes, kept between steps.
 #[derive(Default)]
@@ -168,8 +168,8 @@ impl Implicit {
         noise.sqrt()
     }
 
-    fn solve(&mut self, laws: &mut Laws, x: &[Row], rhs: &[Row], out: &mut [Row], settings: &Solver) -> Linear {
-        if settings.linear == Method::Cholesky {
+    fn solve(&mut self, laws: &mut Laws, x: &[Row], rhs: &[Row], out: &mut [Row], settings: &Solver) -> LinearSolve {
+        if settings.linear == LinearMethod::Cholesky {
             let pinned = |i: usize| laws.masses.inverse(i, x) == 0.0;
             let mut assembly = Assembly::new(x.len());
             for (i, b) in self.local.iter().enumerate() {
@@ -185,13 +185,13 @@ impl Implicit {
             }
             let indefinite = self.cholesky.factorize(&assembly).is_err();
             self.cholesky.solve(rhs, out);
-            return Linear { iterations: 1, indefinite };
+            return LinearSolve { iterations: 1, indefinite };
         }
         let tolerance = settings.linear_tolerance.unwrap_or(if cfg!(feature = "double") { 1e-6 } else { 1e-2 });
         let params = Params { tolerance, iterations: settings.linear_iterations as usize };
         let mut matrix = Matrix { batches: &mut laws.batches, x, local: &self.local_columns, inverse: &self.inverse_columns };
         let info = pcg::solve(&mut matrix, rhs, out, params, &mut self.pcg);
-        Linear { iterations: info.iterations, indefinite: info.indefinite }
+        LinearSolve { iterations: info.iterations, indefinite: info.indefinite }
     }
 }
 
@@ -257,7 +257,7 @@ impl Stiff for Motion<'_> {
         self.implicit.linearize(self.laws, t, x, v, gh, hessian)
     }
 
-    fn solve_linear(&mut self, x: &[Row], rhs: &[Row], out: &mut [Row], settings: &Solver) -> Linear {
+    fn solve_linear(&mut self, x: &[Row], rhs: &[Row], out: &mut [Row], settings: &Solver) -> LinearSolve {
         out.fill(ZERO);
         self.implicit.solve(self.laws, x, rhs, out, settings)
     }

@@ -3,7 +3,7 @@
 
 use super::contact::real;
 use super::feature::Span;
-use crate::geometry::mesh_contact::{Kind, Owner, Pair, Topology};
+use crate::geometry::mesh_contact::{Owner, Pair, PairKind, Topology};
 use crate::geometry::{Collider, Friction, Vector};
 use crate::math::{Row, axpy, row, xyz64};
 use std::borrow::Cow;
@@ -196,7 +196,7 @@ impl SolidFeatures {
 
     /// Whether a pair is a mass with a triangle of a solid: masses meet solids as all do, with restitution and as their scheme has it.
     pub fn is_mass(&self, pair: &Pair) -> bool {
-        pair.kind == Kind::PointTriangle && pair.vertices[1] as usize >= self.points
+        pair.kind == PairKind::PointTriangle && pair.vertices[1] as usize >= self.points
     }
 }
 

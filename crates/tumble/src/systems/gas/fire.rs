@@ -69,7 +69,7 @@ pub struct Flame {
     /// Growth of volume S at cells [1/s].
     pub(super) swelling: Field,
     /// Sum of T - T0 over the cells at the start, and all that came in since [K].
-    pub(super) books: [f64; 2],
+    pub(super) heat: [f64; 2],
 }
 
 impl Flame {
@@ -77,12 +77,12 @@ impl Flame {
     pub fn new(fire: Fire, fuel: Field, grid: Grid, temperature: Option<&Field>, ambient: f64) -> Result<Self, Failure> {
         let swelling = Field::new(grid, Place::Cell, "1/s")?;
         let start = temperature.map_or(0.0, |warmth| excess(warmth, ambient));
-        Ok(Self { fire, fuel, swelling, books: [start, 0.0] })
+        Ok(Self { fire, fuel, swelling, heat: [start, 0.0] })
     }
 
     /// Burns for h seconds; `warmth` and `smoke` are those of the fluid.                                  (fire.1)
     pub(super) fn burn(&mut self, warmth: &mut Field, smoke: Option<&mut Field>, ambient: f64, h: f64) {
-        let Self { fire, fuel, swelling, books } = self;
+        let Self { fire, fuel, swelling, heat } = self;
         let left = functions::exp(-h / fire.burn_time);
         let ignition = fire.ignition as Real;
         let mut fields = vec![&mut *fuel, &mut *warmth, &mut *swelling];
@@ -107,7 +107,7 @@ impl Flame {
                 let one = |i: usize| f64::from(swelling.data[i]) * (f64::from(warmth.data[i]) - ambient);
                 (at..at + n).map(one).sum()
             };
-            books[1] += h * sum(swelling, more);
+            heat[1] += h * sum(swelling, more);
         }
     }
 }

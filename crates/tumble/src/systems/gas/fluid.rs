@@ -5,7 +5,7 @@ use super::fire::Flame;
 use super::settings::Settings;
 use crate::exchange::{Exchange, Turn};
 use crate::fluids::rows::{largest, worse};
-use crate::fluids::{Beyond, Body, Failure, Projection, Sheet, Solids, Viscosity, hold, projection, spread};
+use crate::fluids::{Ball, Beyond, Failure, PressureProjection, Sheet, Solids, Viscosity, hold, projection, spread};
 use crate::geometry::{Collider, Vector};
 use crate::linalg::poisson::Solver;
 use crate::math::Real;
@@ -77,11 +77,11 @@ impl Fluid {
             solids.iter_mut().flat_map(|s| &mut s.bodies).map(|body| std::mem::take(&mut body.state.inverse_mass)).collect();
         let solver = solver(grid, &settings, solids.as_ref())?;
         let sides = &settings.sides;
-        let smoke = smoke.map(|f| carried(f, sides, 0.0, |[density, _, _]| density));
-        let temperature = temperature.map(|f| carried(f, sides, settings.ambient, |[_, temperature, _]| temperature));
+        let smoke = smoke.map(|f| carried(f, sides, "density", 0.0));
+        let temperature = temperature.map(|f| carried(f, sides, "temperature", settings.ambient));
         let flame = match (settings.fire, fuel) {
             (Some(fire), Some(fuel)) => {
-                let fuel = carried(fuel, sides, 0.0, |[_, _, fuel]| fuel);
+                let fuel = carried(fuel, sides, "fuel", 0.0);
                 Some(Flame::new(fire, fuel, grid, temperature.as_ref(), settings.ambient)?)
             }
             _ => None,
@@ -256,7 +256,7 @@ impl Fluid {
     pub fn projection(&mut self, t: f64, h: f64, report: &mut StepReport) -> Result<(), Failure> {
         self.weigh();
         let Self { u, pressure, solver, solids, settings, flame, densities, .. } = self;
-        let projection = Projection {
+        let projection = PressureProjection {
             u,
             pressure,
             solver,
@@ -301,7 +301,7 @@ impl Fluid {
     }
 
     /// Solids that it moves.
-    fn bodies(&mut self) -> &mut [Body] {
+    fn bodies(&mut self) -> &mut [Ball] {
         self.solids.as_mut().map_or(&mut [], |solids| &mut solids.bodies)
     }
 
@@ -345,7 +345,7 @@ fn solver(grid: Grid, settings: &Settings, solids: Option<&Solids>) -> Result<So
 }
 
 /// A field that is carried, with what comes in through the sides of its box.
-fn carried(mut field: Field, sides: &[[Beyond; 2]; 3], ambient: f64, inflow: impl Fn([f64; 3]) -> f64 + Copy) -> Field {
-    field.sides = sides.each_ref().map(|ends| ends.each_ref().map(|side| side.carried(ambient, inflow)));
+fn carried(mut field: Field, sides: &[[Beyond; 2]; 3], quantity: &str, ambient: f64) -> Field {
+    field.sides = sides.each_ref().map(|ends| ends.each_ref().map(|side| side.carried(quantity, ambient)));
     field
 }

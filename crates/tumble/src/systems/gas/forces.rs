@@ -51,7 +51,7 @@ impl Fluid {
         self.clear();
         self.burn(h);
         let gained = self.excess() - before;
-        self.flame.iter_mut().for_each(|flame| flame.books[1] += gained);
+        self.flame.iter_mut().for_each(|flame| flame.heat[1] += gained);
         let grid = self.grid();
         if let Some(solids) = &mut self.solids {
             let settings = &self.settings;
@@ -112,7 +112,7 @@ impl Fluid {
         }
     }
 
-    /// The sum of T - T0, where there is a fire to keep books of [K].
+    /// The sum of T - T0, where there is a fire whose heat is counted [K].
     pub(super) fn excess(&self) -> f64 {
         let warmth = self.temperature.as_ref().filter(|_| self.flame.is_some());
         warmth.map_or(0.0, |warmth| excess(warmth, self.settings.ambient))

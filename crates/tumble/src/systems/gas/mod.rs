@@ -7,12 +7,12 @@
 //! Source: [stam1999]; tests: crates/tumble-f64/tests/gas.rs; limits: large steps damp (grids.17), and the split is of first order
 //! in the step.
 
-mod books;
 mod confinement;
 mod densities;
 mod fire;
 mod fluid;
 mod forces;
+mod ledger;
 mod settings;
 mod sources;
 
@@ -135,12 +135,12 @@ impl System for Gas {
 
     fn ledger(&self, t: f64) -> Ledger {
         let mut total = Ledger { time: t, ..Ledger::default() };
-        self.fluids.iter().for_each(|fluid| total.add_system(&fluid.books(t)));
+        self.fluids.iter().for_each(|fluid| total.add_system(&fluid.ledger(t)));
         total
     }
 
     fn shares(&self, t: f64) -> Vec<Share> {
-        let share = |fluid: &Fluid| Share { system: self.name.clone(), object: fluid.name.clone(), ledger: fluid.books(t) };
+        let share = |fluid: &Fluid| Share { system: self.name.clone(), object: fluid.name.clone(), ledger: fluid.ledger(t) };
         self.fluids.iter().map(share).collect()
     }
 

@@ -77,7 +77,7 @@ struct Link {
     share: Real,
 }
 
-enum Linear {
+enum WeightedSolver {
     Bytes(Solver<u8>),
     Numbers(Solver<Real>),
 }
@@ -85,7 +85,7 @@ enum Linear {
 /// A linear solver for steps of one length.
 struct Implicit {
     h: f64,
-    solver: Linear,
+    solver: WeightedSolver,
     /// phi c/(h k) of each cell, without boundaries: c' of (heat.6).
     inertia: Vec<Real>,
     /// Cells that no open face joins to another, with one over their diagonals.
@@ -95,7 +95,7 @@ struct Implicit {
 }
 
 /// A body in motion.
-pub struct Body {
+pub struct HeatedBody {
     /// Its description.
     pub plan: Plan,
     /// Temperatures less `reference` [K].
@@ -123,7 +123,7 @@ fn harmonic(a: f64, b: f64) -> f64 {
     2.0 * a * b / (a + b)
 }
 
-impl Body {
+impl HeatedBody {
     /// A body with these temperatures [K] less the reference.
     pub fn new(plan: Plan, t: Field, reference: f64) -> Result<Self, GridError> {
         t.expect(&plan.grid, Place::Cell, "temperature of a body")?;
@@ -322,7 +322,7 @@ impl Body {
         self.plan.boundaries.iter().map(each).collect()
     }
 
-    /// Calls `each(cell, net)` for what comes in through each link at the temperatures `t`, and books it: the net sums of heat.
+    /// Calls `each(cell, net)` for what comes in through each link at the temperatures `t`, and counts it: the net sums of heat.
     fn borders(&mut self, beyond: &[[f64; 2]], h: f64, t: impl Fn(usize) -> Real, mut each: impl FnMut(usize, Real)) {
         let joule = h * self.own().conductivity / (self.plan.grid.dx * self.plan.grid.dx) * self.volume();
         let held: Vec<[Real; 2]> = beyond.iter().map(|b| b.map(|b| b as Real)).collect();
@@ -338,7 +338,7 @@ impl Body {
         }
     }
 
-    /// Adds `factor` times what arises to a column, m times if `weighed`, and books it.
+    /// Adds `factor` times what arises to a column, m times if `weighed`, and counts it.
     fn arise(&mut self, powers: &[f64], h: f64, factor: f64, weighed: bool, out: &mut [Real]) {
         let (l, volume) = (self.plan.grid.lattice(), self.volume());
         let m = self.cells.as_ref().map(|c| &c.m[..]);
@@ -428,9 +428,11 @@ impl Body {
         let solver = match &self.cells {
             None => {
                 let open = vec![127_u8; l.len()];
-                Solver::new(l, sides, [&open[..]; 3], Some(&extra)).ok().map(Linear::Bytes)
+                Solver::new(l, sides, [&open[..]; 3], Some(&extra)).ok().map(WeightedSolver::Bytes)
             }
-            Some(cells) => Solver::new(l, sides, [&cells.w[0][..], &cells.w[1], &cells.w[2]], Some(&extra)).ok().map(Linear::Numbers),
+            Some(cells) => {
+                Solver::new(l, sides, [&cells.w[0][..], &cells.w[1], &cells.w[2]], Some(&extra)).ok().map(WeightedSolver::Numbers)
+            }
         };
         let faces = |at: usize| match &self.cells {
             None => (0..3).map(|a| if grid.n[a] > 1 { 2.0 } else { 0.0 }).sum::<Real>(),
@@ -451,10 +453,10 @@ impl Body {
         d.reserve(right.len());
         self.pass(None, &mut right);
         let (powers, beyond) = (self.powers(times), self.beyond(times));
-        let books = self.come.clone();
+        let counted = self.come.clone();
         let of_volume = self.plan.grid.dx * self.plan.grid.dx / self.own().conductivity;
         self.arise(&powers, h, of_volume, false, &mut right);
-        let arisen = self.come.last().copied().unwrap_or(0.0) - books.last().copied().unwrap_or(0.0);
+        let arisen = self.come.last().copied().unwrap_or(0.0) - counted.last().copied().unwrap_or(0.0);
         let old = std::mem::take(&mut self.t.data);
         self.borders(&beyond, h, |at| old[at], |at, net| right[at] += net);
         chunks(&mut right, |_, right| right.iter_mut().for_each(|r| *r *= phi as Real));
@@ -465,8 +467,8 @@ impl Body {
             excess: Excess::Remove,
         };
         let info = match &mut work.solver {
-            Linear::Bytes(solver) => solver.solve(&right, &mut d, &params),
-            Linear::Numbers(solver) => solver.solve(&right, &mut d, &params),
+            WeightedSolver::Bytes(solver) => solver.solve(&right, &mut d, &params),
+            WeightedSolver::Numbers(solver) => solver.solve(&right, &mut d, &params),
         };
         for (at, inverse) in &work.lonely {
             d[*at as usize] = right[*at as usize] * inverse;
@@ -481,7 +483,7 @@ impl Body {
             Err(_) => d.fill(Real::NAN),
         }
         // One number compensates the residual of the solver, so that heat is conserved: (heat.8).
-        self.come = books;
+        self.come = counted;
         if let Some(last) = self.come.last_mut() {
             *last += arisen;
         }

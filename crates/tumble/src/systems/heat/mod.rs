@@ -9,7 +9,7 @@
 mod body;
 mod pass;
 
-pub use body::{Body, Boundary, Material, Plan, Source};
+pub use body::{Boundary, HeatedBody, Material, Plan, Source};
 pub use pass::{Cells, Pass};
 
 use crate::exchange::{Exchange, SystemId, Turn};
@@ -40,7 +40,7 @@ pub struct Settings {
 /// Bodies that conduct heat.
 pub struct Heat {
     settings: Settings,
-    bodies: Vec<Body>,
+    bodies: Vec<HeatedBody>,
     /// Index of the first flux of each body's boundaries in the exchange.
     surfaces: Vec<usize>,
     watched: bool,
@@ -48,7 +48,7 @@ pub struct Heat {
 
 impl Heat {
     /// A system of bodies; their boundaries become surfaces of the exchange.
-    pub fn new(settings: Settings, bodies: Vec<Body>, id: SystemId, exchange: &mut Exchange) -> Self {
+    pub fn new(settings: Settings, bodies: Vec<HeatedBody>, id: SystemId, exchange: &mut Exchange) -> Self {
         let mut surfaces = Vec::new();
         for body in &bodies {
             let mut first = None;
@@ -63,7 +63,7 @@ impl Heat {
 
     /// Sub-steps of an interval dt [s]: those that the scene names, or as many as its explicit bodies need.
     fn steps(&self, dt: f64) -> u32 {
-        let limit = self.bodies.iter().map(Body::limit).fold(f64::INFINITY, f64::min);
+        let limit = self.bodies.iter().map(HeatedBody::limit).fold(f64::INFINITY, f64::min);
         match (self.settings.substeps, self.settings.step) {
             (Some(n), _) => n,
             (None, Some(step)) => equal_steps(dt, step) as u32,
@@ -170,12 +170,13 @@ impl System for Heat {
 
     fn ledger(&self, t: f64) -> Ledger {
         let mut total = Ledger { time: t, ..Ledger::default() };
-        self.bodies.iter().for_each(|body| total.add_system(&books(body, t)));
+        self.bodies.iter().for_each(|body| total.add_system(&ledger(body, t)));
         total
     }
 
     fn shares(&self, t: f64) -> Vec<Share> {
-        let share = |body: &Body| Share { system: self.settings.name.clone(), object: body.plan.name.clone(), ledger: books(body, t) };
+        let share =
+            |body: &HeatedBody| Share { system: self.settings.name.clone(), object: body.plan.name.clone(), ledger: ledger(body, t) };
         self.bodies.iter().map(share).collect()
     }
 
@@ -236,6 +237,6 @@ impl System for Heat {
     }
 }
 
-fn books(body: &Body, t: f64) -> Ledger {
+fn ledger(body: &HeatedBody, t: f64) -> Ledger {
     Ledger { time: t, heat: Some(body.stored()), heat_in: Some(body.come.iter().sum()), ..Ledger::default() }
 }

@@ -39,6 +39,10 @@ pub struct Batches {
     pub constraints: Vec<Box<dyn Constraints>>,
 }
 
+/// A node of an element that is no row of its system.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct NotARow;
+
 impl Batches {
     /// No elements yet between the rows of these masses; `projects` says whether they will be constraints.
     pub fn new(masses: &Masses, projects: bool) -> Self {
@@ -51,8 +55,8 @@ impl Batches {
         }
     }
 
-    /// Adds all elements of some parts, whose nodes are rows; `None` if one is not.
-    pub fn fill(&mut self, parts: &mut Parts) -> Option<Lists> {
+    /// Adds all elements of some parts.
+    pub fn fill(&mut self, parts: &mut Parts) -> Result<Lists, NotARow> {
         let springs = [
             self.springs::<Distance, Linear, 1, 1, 0>(&parts.linear)?,
             self.springs::<Distance, Nonlinear, 1, 1, 2>(&parts.nonlinear)?,
@@ -69,7 +73,7 @@ impl Batches {
         self.add::<TetStrain, 4, 6, 9>(&parts.strains, 0.0)?;
         self.rods(&parts.stretches, &mut parts.bends, &parts.rod_limits)?;
         self.global_constraints(&parts.points, std::mem::take(&mut parts.closed), &parts.shapes, &parts.liquids)?;
-        Some(Lists { springs, hinges, isometric, membranes, areas, woven, creases })
+        Ok(Lists { springs, hinges, isometric, membranes, areas, woven, creases })
     }
 
     /// The stiffness with which elements hold each row [N/m].
@@ -84,29 +88,30 @@ impl Batches {
         grip
     }
 
-    /// Adds springs, if there are any; `None` if one is not between rows, else the index of the batch.
+    /// Adds springs, if there are any; returns the index of the batch.
     fn springs<E: Pair<M, D>, Y: Law<P>, const M: usize, const D: usize, const P: usize>(
         &mut self,
         springs: &Springs<D, P>,
-    ) -> Option<Option<usize>> {
+    ) -> Result<Option<usize>, NotARow> {
         if springs.members.is_empty() {
-            return Some(None);
+            return Ok(None);
         }
         if let Some(inverse) = &self.projected {
-            let springs = Projected::<E, Y, 2, M, D, P>::new(self.rows, self.points, inverse, &springs.members, &springs.limits)?;
+            let springs =
+                Projected::<E, Y, 2, M, D, P>::new(self.rows, self.points, inverse, &springs.members, &springs.limits).ok_or(NotARow)?;
             self.constraints.push(Box::new(springs));
-            return Some(Some(self.constraints.len() - 1));
+            return Ok(Some(self.constraints.len() - 1));
         }
-        self.list.push(Box::new(Pairs::<E, Y, M, D, P>::new(self.rows, &springs.members, &springs.limits)?));
-        Some(Some(self.list.len() - 1))
+        self.list.push(Box::new(Pairs::<E, Y, M, D, P>::new(self.rows, &springs.members, &springs.limits).ok_or(NotARow)?));
+        Ok(Some(self.list.len() - 1))
     }
 
-    /// Adds elements, if there are any; `None` if a node is not a row, else the index of the batch.
+    /// Adds elements, if there are any; returns the index of the batch.
     fn add<E: Element<N, M, D>, const N: usize, const M: usize, const D: usize>(
         &mut self,
         members: &[Members<N, D, 0>],
         energy_at_rest: f64,
-    ) -> Option<Option<usize>> {
+    ) -> Result<Option<usize>, NotARow> {
         self.add_with::<E, Linear, N, M, D, 0>(members, energy_at_rest)
     }
 
@@ -115,22 +120,22 @@ impl Batches {
         &mut self,
         members: &[Members<N, D, P>],
         energy_at_rest: f64,
-    ) -> Option<Option<usize>> {
+    ) -> Result<Option<usize>, NotARow> {
         if members.is_empty() {
-            return Some(None);
+            return Ok(None);
         }
         if let Some(inverse) = &self.projected {
-            let elements = Projected::<E, Y, N, M, D, P>::new(self.rows, self.points, inverse, members, &[])?;
+            let elements = Projected::<E, Y, N, M, D, P>::new(self.rows, self.points, inverse, members, &[]).ok_or(NotARow)?;
             self.constraints.push(Box::new(elements));
-            return Some(Some(self.constraints.len() - 1));
+            return Ok(Some(self.constraints.len() - 1));
         }
-        let elements = Elements::<E, Y, N, M, D, P>::new(self.rows, members)?;
+        let elements = Elements::<E, Y, N, M, D, P>::new(self.rows, members).ok_or(NotARow)?;
         self.list.push(Box::new(elements.with_energy_at_rest(energy_at_rest)));
-        Some(Some(self.list.len() - 1))
+        Ok(Some(self.list.len() - 1))
     }
 
     /// Adds rods, if there are any: as constraints, chains are solved as a whole.
-    fn rods(&mut self, stretches: &[Members<3, 2, 0>], bends: &mut Vec<Members<2, 6, 0>>, limits: &[f64]) -> Option<()> {
+    fn rods(&mut self, stretches: &[Members<3, 2, 0>], bends: &mut Vec<Members<2, 6, 0>>, limits: &[f64]) -> Result<(), NotARow> {
         let strands = self.projected.as_ref().and_then(|inverse| Strands::new(self.rows, self.points, inverse, stretches, bends, limits));
         match strands {
             Some(strands) => self.constraints.push(Box::new(strands)),
@@ -139,30 +144,31 @@ impl Batches {
         self.add::<BendTwist, 2, 3, 6>(bends, 0.0).map(|_| ())
     }
 
-    /// Adds both laws of solids, if there are any; `None` if a node is not a row.
-    fn solids(&mut self, shears: &[Members<4, 9, 0>], volumes: &[Members<4, 10, 0>], energy_at_rest: [f64; 2]) -> Option<()> {
+    /// Adds both laws of solids, if there are any.
+    fn solids(&mut self, shears: &[Members<4, 9, 0>], volumes: &[Members<4, 10, 0>], energy_at_rest: [f64; 2]) -> Result<(), NotARow> {
         if self.projected.is_none() || shears.is_empty() {
             self.add::<TetShear, 4, 9, 9>(shears, energy_at_rest[0])?;
             return self.add::<TetVolume, 4, 1, 10>(volumes, energy_at_rest[1]).map(|_| ());
         }
-        self.constraints.push(Box::new(Neohookean::new(self.rows, shears, volumes, energy_at_rest[0] + energy_at_rest[1])?));
-        Some(())
+        self.constraints.push(Box::new(Neohookean::new(self.rows, shears, volumes, energy_at_rest[0] + energy_at_rest[1]).ok_or(NotARow)?));
+        Ok(())
     }
 
-    /// Adds constraints on whole bodies; `None` if a node is not a row. There are some only where elements are constraints.
+    /// Adds constraints on whole bodies. There are some only where elements are constraints.
     fn global_constraints(
         &mut self,
         points: &[Point],
         closed: Vec<(String, Closed)>,
         shapes: &[(String, Range<usize>, f64)],
         liquids: &[(String, Range<usize>, Liquid)],
-    ) -> Option<()> {
+    ) -> Result<(), NotARow> {
         for (_, Closed { triangles, target, stiffness }) in closed {
-            self.constraints.push(Box::new(Volume::new(self.points, triangles, target, stiffness)?));
+            self.constraints.push(Box::new(Volume::new(self.points, triangles, target, stiffness).ok_or(NotARow)?));
         }
         for (_, range, kappa) in shapes {
-            let (mass, places): (Vec<f64>, Vec<_>) = points.get(range.clone())?.iter().map(|(x, _, mass, _)| (*mass, *x)).unzip();
-            self.constraints.push(Box::new(Shape::new(range.clone(), mass, &places, *kappa)?));
+            let (mass, places): (Vec<f64>, Vec<_>) =
+                points.get(range.clone()).ok_or(NotARow)?.iter().map(|(x, _, mass, _)| (*mass, *x)).unzip();
+            self.constraints.push(Box::new(Shape::new(range.clone(), mass, &places, *kappa).ok_or(NotARow)?));
         }
         for (_, range, Liquid { spacing, bulk, viscosity }) in liquids {
             self.constraints.push(Box::new(Density::new(range.clone(), *spacing, *bulk)));
@@ -171,6 +177,6 @@ impl Batches {
                 self.list.push(Box::new(Near::new(law, vec![range.clone()], None)));
             }
         }
-        Some(())
+        Ok(())
     }
 }

@@ -46,7 +46,7 @@ impl Parts {
         let (points, rows) = (masses.points, masses.mass.len());
         let mut batches = Batches::new(&masses, projects);
         let clamp = settings.clamp.and_then(|ratio| self.clamp(ratio, rows));
-        let lists = batches.fill(&mut self).ok_or_else(lost)?;
+        let lists = batches.fill(&mut self).map_err(|_| lost())?;
         let scheme = self.scheme(&settings, &state);
         let objects = Objects::new(std::mem::take(&mut self.objects), self.counts(), lists.springs, points);
         let sewn: Vec<[u32; 2]> = self.vector.members.iter().map(|m| m.nodes).collect();

@@ -18,7 +18,7 @@ use std::f64::consts::PI;
 
 /// A ball, a disk of one metre thickness in the plane.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Body {
+pub struct Ball {
     /// The object that it belongs to.
     pub name: String,
     /// The row of another system that it is.
@@ -35,7 +35,7 @@ pub struct Body {
     pub(super) faces: [Vec<(u32, Real)>; 3],
 }
 
-impl Body {
+impl Ball {
     /// A ball at rest.
     pub fn new(name: String, row: BodyRow, radius: f64) -> Self {
         Self { name, row, radius, state: BodyState::default(), rests: None, impulse: Vector::default(), faces: Default::default() }

@@ -109,15 +109,15 @@ impl Fluid {
 
     /// Mass of smoke and fuel; momentum, kinetic energy, speed and divergence of the fluid; the heat of one that burns. A face
     /// on a side of the box counts half, one that is open in part by its share.
-    pub fn books(&self, t: f64) -> Ledger {
+    pub fn ledger(&self, t: f64) -> Ledger {
         let grid = self.grid();
         let mass = self.volume() * self.settings.density;
-        let mut books = Ledger { time: t, mass: self.carried_mass(), ..Ledger::default() };
+        let mut ledger = Ledger { time: t, mass: self.carried_mass(), ..Ledger::default() };
         if let Some(flame) = &self.flame {
             let capacity = mass * self.settings.specific_heat;
-            let [start, came] = flame.books;
-            books.heat = Some(capacity * (self.excess() - start));
-            books.heat_in = Some(capacity * came);
+            let [start, came] = flame.heat;
+            ledger.heat = Some(capacity * (self.excess() - start));
+            ledger.heat_in = Some(capacity * came);
         }
         for (index, part) in self.u.parts.iter().enumerate() {
             let Place::Face(axis) = part.place else { continue };
@@ -143,13 +143,13 @@ impl Fluid {
                     part.data[at..at + n].iter().enumerate().map(one).sum()
                 })
             };
-            books.momentum[axis] += mass * weighed(1);
-            books.kinetic += 0.5 * mass * weighed(2);
+            ledger.momentum[axis] += mass * weighed(1);
+            ledger.kinetic += 0.5 * mass * weighed(2);
         }
-        books.speed = Some(self.speed());
+        ledger.speed = Some(self.speed());
         // Only fields of another grid could fail here.
-        books.divergence = self.divergence().ok().map(|field| rows::magnitude(&field));
-        books
+        ledger.divergence = self.divergence().ok().map(|field| rows::magnitude(&field));
+        ledger
     }
 
     /// The cells of the largest divergence and of the fastest flow.
@@ -220,7 +220,7 @@ impl Fluid {
     pub fn save(&self, archive: &mut Archive) {
         self.kept().into_iter().for_each(|(name, field)| archive.push_field(name, field));
         if let Some(flame) = &self.flame {
-            archive.push("burnt", Part::Numbers(flame.books.to_vec()));
+            archive.push("burnt", Part::Numbers(flame.heat.to_vec()));
         }
         if let Some(solids) = self.solids.as_ref().filter(|solids| solids.moves()) {
             let bodies = solids.bodies.iter().flat_map(|body| [body.state.position, body.state.velocity]).flat_map(<[f64; 3]>::from);
@@ -238,7 +238,7 @@ impl Fluid {
         read("pressure", &mut self.pressure)?;
         if let Some(flame) = &mut self.flame {
             let [start, came] = archive.numbers("burnt")?[..] else { return None };
-            flame.books = [start, came];
+            flame.heat = [start, came];
         }
         self.weigh();
         if self.solids.as_ref().is_some_and(Solids::moves) {
