@@ -265,6 +265,20 @@ def test_what_a_scene_says_in_vain_is_told(code: str, path: str, vain: Tree, hee
     assert told(heeded) == []
 
 
+def test_systems_that_do_not_agree_are_told_once() -> None:
+    def told(coupling: Tree) -> list[tuple[str, str]]:
+        words = anchored(1e4)
+        words["particles"][0]["velocity"] = [[1, 0, 0]]
+        world = World({"version": 1, "world": {"coupling": coupling}} | words)
+        report = world.step(4)
+        assert report["passes"] >= 8 and report["disagreement"] is not None, report
+        return [(warning["code"], warning["path"]) for warning in world.warnings]
+
+    ((code, path),) = told({"iterations": 2, "tolerance": 1e-9})
+    assert code == "disagreement" and path.startswith("system "), path
+    assert told({"iterations": 100, "tolerance": 1e-3}) == []
+
+
 @pytest.mark.parametrize(
     ("word", "idle", "used"),
     [
