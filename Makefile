@@ -156,6 +156,7 @@ test-web: setup chromium
 # go on; at the end stands what was counted.
 COUNTS := $(CURDIR)/target/counts.jsonl
 validate: export TUMBLE_FUZZ = 30
+validate: export TUMBLE_WHOLE = 1
 validate: export TUMBLE_COUNTS = $(COUNTS)
 validate: setup openvdb wasm
 	@mkdir -p $(dir $(COUNTS)) && rm -f $(COUNTS)

@@ -15,30 +15,36 @@ NAMES = sorted(p.relative_to(SCENES).with_suffix("").as_posix() for p in SCENES.
 GOOD = [n for n in NAMES if not n.startswith("failures/")]
 
 BEGINNINGS = {
-    "cloth/drapes": 8,
-    "cloth/dress": 24,
-    "cloth/funnel": 60,
-    "cloth/hair-on-bunny": 8,
-    "cloth/mannequin": 40,
-    "cloth/pile": 12,
-    "cloth/torn-flag": 48,
-    "cloth/twist": 30,
-    "drape/sheet-on-bunny": 12,
-    "gas/fire": 16,
-    "gas/flag_in_a_jet": 40,
-    "gas/plume": 32,
-    "gas/vortex_street": 24,
+    "cloth/drapes": 6,
+    "cloth/dress": 12,
+    "cloth/funnel": 36,
+    "cloth/hair-on-bunny": 5,
+    "cloth/mannequin": 20,
+    "cloth/pile": 8,
+    "cloth/torn-flag": 24,
+    "cloth/twist": 15,
+    "drape/sheet-on-bunny": 8,
+    "gas/fire": 8,
+    "gas/flag_in_a_jet": 20,
+    "gas/plume": 16,
+    "gas/vortex_street": 12,
     "gravity/encounter": 48,
     "gravity/galaxy": 24,
-    "particles/pool": 30,
-    "particles/snow": 84,
-    "particles/tornado": 96,
+    "particles/pool": 16,
+    "particles/snow": 48,
+    "particles/tornado": 48,
 }
 """Frames of scenes that take more than ten seconds of a processor in full, as they do in `make validate`."""
 
+FEWER = {
+    "gravity/encounter": ["galaxy.0.stars=2000", "galaxy.1.stars=2000"],
+    "gravity/galaxy": ["galaxy.0.stars=4000"],
+}
+"""Of these scenes the beginning, too: the stable step is estimated from all pairs of stars."""
+
 
 def keeps_what_it_expects(name: str, frames: int | None, folder: Path) -> None:
-    scene = tumble.Scene.load(SCENES / f"{name}.toml")
+    scene = tumble.Scene.load(SCENES / f"{name}.toml", FEWER.get(name, []) if frames is not None else [])
     words = scene.to_dict()
     assert expect.count(words), f"{name} expects nothing"
     run = simulate(scene, folder, frames=frames)

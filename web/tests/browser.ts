@@ -64,6 +64,28 @@ export const shipped = (): string[] =>
     )
     .sort();
 
+/** All that is promised, as in `make validate`, and not the part of it that `make test` has time for. */
+export const WHOLE = !!process.env.TUMBLE_WHOLE;
+
+/** Scenes that take some seconds to be made and to take a step. What they show, others show, too. */
+const HEAVY = [
+  "cloth/drapes",
+  "cloth/dress",
+  "cloth/hair-on-bunny",
+  "gas/bunny",
+  "gas/vortex_street",
+  "gravity/encounter",
+  "gravity/galaxy",
+];
+
+/** All bundled scenes, or in `make test` all but the heavy ones. */
+export function tried(): string[] {
+  const all = shipped();
+  const missing = HEAVY.filter((id) => !all.includes(id));
+  if (missing.length) throw new Error(`no such scenes: ${missing}`);
+  return all.filter((id) => WHOLE || !HEAVY.includes(id));
+}
+
 /** Options of pages that play nothing by themselves. */
 export const STILL = { reducedMotion: "reduce" } as const;
 

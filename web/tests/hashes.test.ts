@@ -4,11 +4,11 @@ import { execFileSync } from "node:child_process";
 import { existsSync, readFileSync } from "node:fs";
 import { resolve } from "node:path";
 import { test } from "node:test";
-import { lab, ready, STILL } from "./browser.ts";
+import { lab, ready, STILL, WHOLE } from "./browser.ts";
 
 const ROOT = resolve(import.meta.dirname, "../..");
 const PYTHON = resolve(ROOT, ".venv/bin/python");
-const FRAMES = 100;
+const FRAMES = WHOLE ? 100 : 25;
 /** Every method, explicit, implicit and adaptive steps, contact, both precisions; cheap ones. */
 const NAMES = [
   "springs/stiffening",

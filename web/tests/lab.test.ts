@@ -4,7 +4,7 @@ import { readFileSync } from "node:fs";
 import { after, before, describe, it } from "node:test";
 import { gzipSync } from "node:zlib";
 import type { Page } from "playwright-core";
-import { frame, type Lab, lab, ready, SCENES, STILL, serious, shipped } from "./browser.ts";
+import { frame, type Lab, lab, ready, SCENES, STILL, serious, shipped, tried } from "./browser.ts";
 
 const ids = shipped();
 
@@ -139,12 +139,13 @@ const FAILING = ["failures/stiff-sheet"];
 
 describe("scenes", () => {
   it("all load, move, and are seen, without an error", async () => {
-    const { page, errors } = await own.open(`scene/${ids[0]}`, { ...STILL, viewport: { width: 640, height: 480 } });
+    const all = tried();
+    const { page, errors } = await own.open(`scene/${all[0]}`, { ...STILL, viewport: { width: 640, height: 480 } });
     await ready(page);
     const failures: string[] = [];
-    for (const id of ids) {
+    for (const id of all) {
       const start = Date.now();
-      if (id !== ids[0]) await visit(page, `scene/${id}`);
+      if (id !== all[0]) await visit(page, `scene/${id}`);
       const seen = await page.evaluate(async (end) => {
         const { session, stage } = (window as any).tumble;
         if (!session.info) return { error: document.querySelector(".alert")?.textContent ?? "nothing loaded" };

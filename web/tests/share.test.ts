@@ -10,7 +10,7 @@ import type { Page } from "playwright-core";
 import type { SceneInfo } from "../src/engine/protocol";
 import { fromFile, pack, type Shared, toFile, unpack } from "../src/share";
 import { alike, meshesOf, written } from "../src/values";
-import { type Lab, lab } from "./browser.ts";
+import { type Lab, lab, tried } from "./browser.ts";
 
 const STILL = { reducedMotion: "reduce" } as const;
 const VERSION = /^version = "([^"]+)"/m.exec(readFileSync("../Cargo.toml", "utf8"))![1];
@@ -403,17 +403,11 @@ describe("scenes that ship", () => {
     const [single, double] = await Promise.all(["single", "double"].map((name) => import(`${pkg}/${name}.js`)));
     single.initSync({ module: readFileSync(`${pkg}/single_bg.wasm`) });
     double.initSync({ module: readFileSync(`${pkg}/double_bg.wasm`) });
-    const ids = readdirSync(SCENES, { withFileTypes: true })
-      .filter((row) => row.isDirectory() && row.name !== "assets")
-      .flatMap((row) =>
-        readdirSync(`${SCENES}/${row.name}`)
-          .filter((f) => f.endsWith(".toml"))
-          .map((f) => `${row.name}/${f}`),
-      );
+    const ids = tried();
     const failures: string[] = [];
     let meshes = 0;
     for (const id of ids) {
-      const text = readFileSync(`${SCENES}/${id}`, "utf8");
+      const text = readFileSync(`${SCENES}/${id}.toml`, "utf8");
       const files = new Map(
         [...text.matchAll(/path = "(\.\.\/assets\/[^"]+)"/g)].map(([, path]) => [
           path,

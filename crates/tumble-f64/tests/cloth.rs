@@ -186,6 +186,7 @@ fn pins_follow_a_collider_under_every_integrator() {
 
 /// One word changed, the shipped dress is masses and springs under implicit Euler: it hangs on the dancer, and passes through nothing.
 #[test]
+#[ignore = "long: make validate"]
 fn the_dress_needs_one_other_word_to_be_masses_and_springs() {
     let shipped = include_str!("../../../python/tumble/scenes/cloth/dress.toml");
     let coarse = shipped.replace("resolution = 0.03", "resolution = 0.06").replace("version = 1\n", "");
