@@ -14,7 +14,8 @@ use tumble_interface::scene::{Integrator, Method, Particles, Scene, System as Pl
 use tumble_interface::{Issue, Warning};
 
 /// All methods. Where several can move a kind of objects, the first is its default.
-pub static METHODS: [&dyn MethodRules; 6] =
+/// A constant: as a static it would be compiled into the unit tests, with the whole engine behind it.
+pub const METHODS: [&dyn MethodRules; 6] =
     [&dynamics::Rules, &tracers::Rules, &vicsek::Rules, &gas::Rules, &heat::Rules, &compressible::Rules];
 
 /// What the scene layer knows of a method. Scenes that it is given are resolved, but for `leads`.
