@@ -103,6 +103,12 @@ impl Scene {
         places.map(|(place, path)| (place.clone(), self.node.line_of(&place), path)).collect()
     }
 
+    /// How its objects are drawn, in the order of their columns, and the ends of anchors; see `tumble.looks`.
+    #[getter]
+    fn looks<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
+        Ok(pythonize::pythonize(py, &tumble::scene::looks(&self.scene))?)
+    }
+
     /// JSON Schema of a scene; units are under "x-unit".
     #[staticmethod]
     fn schema(py: Python<'_>) -> PyResult<Bound<'_, PyAny>> {
@@ -155,6 +161,14 @@ fn to_node(value: &Bound<'_, PyAny>, path: &str, depth: usize) -> Result<Node, S
         return Err(wrong(format!("a {kind}, expected a dict, a list, a string, a number or a boolean")));
     };
     Ok(value_of.into())
+}
+
+/// How the objects of a scene are drawn, as `Scene.looks`; of its files none is read.
+#[pyfunction]
+pub fn looks<'py>(py: Python<'py>, tree: &Bound<'_, PyAny>) -> PyResult<Bound<'py, PyAny>> {
+    let scene = to_node(tree, "", 0).and_then(|node| tumble_interface::Scene::from_tree(&node));
+    let scene = scene.map_err(|e| scene_error(py, &e))?;
+    Ok(pythonize::pythonize(py, &tumble::scene::looks(&scene))?)
 }
 
 /// Suffixes of files that OpenUSD reads.

@@ -1,6 +1,6 @@
 //! From text and bytes to a world, within what a browser can hold.
 
-use crate::engine::scene::{Simulation, memory, resolve, set, set_text};
+use crate::engine::scene::{Simulation, looks, memory, resolve, set, set_text};
 use crate::failure::Failure;
 use serde::Serialize;
 use std::collections::HashMap;
@@ -150,6 +150,7 @@ impl Loaded {
             columns: &self.scene.output.columns,
             scene: self.scene.to_json(),
             warnings: self.world.warnings(),
+            looks: looks(&self.scene),
             hash: format!("{:016x}", self.world.hash()),
             memory: self.memory,
         }
@@ -185,6 +186,7 @@ struct Info<'a> {
     columns: &'a [String],
     scene: serde_json::Value,
     warnings: &'a [tumble_interface::Warning],
+    looks: tumble_interface::looks::Looks,
     hash: String,
     memory: f64,
 }
