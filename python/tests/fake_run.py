@@ -8,6 +8,9 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from tumble.looks import GROUND, SOLID, Look, Looks
+from tumble.style import PALETTE, rgb
+
 Array = npt.NDArray[Any]
 Columns = dict[str, dict[str, Array]]
 
@@ -18,6 +21,8 @@ BLUE = [0.05, 0.1, 0.6]
 BALL = np.array([0.0, 0.0, 0.3])
 BALL_RADIUS = 0.3
 RADIUS = 0.06
+FORMS = {"rope": "curve", "hair": "strands", "sheet": "surface", "net": "surface", "cloth": "surface", "block": "body"}
+FORMS["collider"] = "solid"
 N = 9
 """Vertices along each side of the sheet."""
 
@@ -40,6 +45,45 @@ class FakeRun:
         if not 0 <= i < self.n_frames:
             raise IndexError(i)
         return self.columns(self.time(i))
+
+    @property
+    def looks(self) -> Looks:
+        """What the engine would say, if its scene were whole."""
+        words = {
+            entry["name"]: (section, entry)
+            for section, entries in self.scene.items()
+            if isinstance(entries, list) and section not in ("system", "anchor")
+            for entry in entries
+        }
+        start = self.frame(0) if self.n_frames else {}
+        found: list[Look] = []
+        for name, columns in {**{name: {} for name in start if name not in self.static}, **self.static}.items():
+            section, entry = words.get(name, ("", {}))
+            shape = entry.get("shape", {})
+            form = "smoke" if self.scene["dimension"] == 3 else "image"
+            if "grid_cells" not in columns:
+                form = FORMS.get(section, "points")
+            if form == "solid":
+                form = (
+                    "ground" if "floor" in shape or "plane" in shape else "container" if entry.get("inside") else form
+                )
+            colors = {"smoke": (0.52, 0.53, 0.56), "solid": SOLID, "container": SOLID, "ground": GROUND}
+            color = colors.get(form, rgb(PALETTE[sum(look.form not in colors for look in found) % len(PALETTE)]))
+            if entry.get("color") is not None:
+                color = tuple(entry["color"])
+            plane = None
+            if form == "ground":
+                up = np.array(shape.get("plane", {}).get("normal", [0.0, 0.0, 1.0]))
+                point = shape.get("plane", {}).get("point", [0.0, 0.0, shape.get("floor", {}).get("height", 0.0)])
+                plane = tuple(point), tuple((up / np.linalg.norm(up)).tolist())
+            own = start.get(name, {})
+            few = "id" not in own and len(own.get("position", ())) < 200
+            side = next((s["vicsek"]["side"] for s in self.scene["system"] if "vicsek" in s), None)
+            radius = float(np.ravel(columns.get("radius", 0.01))[0])
+            trail = entry.get("trail", 0.0)
+            found.append(Look(name, form, color, radius, trail, side, plane, entry.get("render", 1), few))
+        ends = [[end.rsplit(" ", 1) for end in anchor["between"]] for anchor in self.scene.get("anchor", ())]
+        return Looks(tuple(found), tuple(((a, int(i)), (b, int(j))) for (a, i), (b, j) in ends))
 
     @property
     def ledger(self) -> dict[str, Array]:

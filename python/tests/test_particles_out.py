@@ -266,4 +266,4 @@ def test_particles_without_anything_static_are_found() -> None:
     run = fake_run.fountain()
     run.static.clear()
     (spray,) = objects(run)
-    assert (spray.name, spray.kind, spray.color) == ("spray", "points", tuple(fake_run.BLUE))
+    assert (spray.name, spray.form, spray.color) == ("spray", "points", tuple(fake_run.BLUE))

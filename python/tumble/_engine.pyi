@@ -145,6 +145,10 @@ class Scene:
         """The mesh files that it names: place of the name in the scene, its line or None, and the path as it stands there.
         Files of figures are left out."""
 
+    @property
+    def looks(self) -> dict[str, Any]:
+        """How its objects are drawn, in the order of their columns, and the ends of anchors; see `tumble.looks`."""
+
     @staticmethod
     def schema() -> dict[str, Any]:
         """JSON Schema of a scene; units are under "x-unit"."""
@@ -258,6 +262,9 @@ def write_vdb(volumes: Sequence[Mapping[str, Any]], zip: bool) -> bytes:
 def load_fabric(fabric: str) -> dict[str, Any]:
     """The record of a shipped fabric by name, or of a .toml or .json file: name, composition, source, density [kg/m²],
     stretching [N/m] and bending [N m]. Raises SceneError."""
+
+def looks(tree: Mapping[str, Any]) -> dict[str, Any]:
+    """How the objects of a scene are drawn, as `Scene.looks`; of its files none is read. Raises SceneError."""
 
 def load_mesh(path: Path) -> tuple[npt.NDArray[np.float64], npt.NDArray[np.uint32]]:
     """Vertices [file units] n x 3 and triangles m x 3 of an OBJ, PLY, STL, GLB or USD file. Raises SceneError."""

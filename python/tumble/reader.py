@@ -24,6 +24,8 @@ from tumble.folder import (
     read_rows,
     refuse,
 )
+from tumble.looks import Looks
+from tumble.looks import of as looks_of
 from tumble.soundness import fault_of_arrays, fault_of_columns, fault_of_manifest
 
 
@@ -100,6 +102,11 @@ class Run:
         """The runs that this one branches off from, the oldest first: `run` (its folder, seen from here), `name`, `frame`,
         `time` [s], `hash` of the state there, and what was `set`. Empty for a run that began at its start."""
         return list(self.manifest.get("descent", []))
+
+    @cached_property
+    def looks(self) -> Looks:
+        """How its objects are drawn. Raises SceneError where the words of its scene are those of another version."""
+        return looks_of(self.scene)
 
     @property
     def fps(self) -> float:

@@ -16,9 +16,10 @@ from tumble import grids
 from tumble._engine import ExportError
 from tumble.columns import SIGNED
 from tumble.grids import Box, Floats
+from tumble.looks import MAPS
 from tumble.pictures.things import Recording
 from tumble.plots import figure_title, save, settings
-from tumble.style import COLORS, FAINT
+from tumble.style import FAINT
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -135,7 +136,7 @@ def _draw(figure: Any, ax: "Axes", grid: Box, axes: tuple[int, int], name: str, 
     if not high > low:
         high = low + max(abs(low) * 1e-6, 1e-30)
     ends = [(float(grid.origin[k]), float(grid.origin[k] + grid.size[k])) for k in axes]
-    colors = matplotlib.colormaps[COLORS.get(name, "viridis")].with_extremes(bad=FAINT)
+    colors = matplotlib.colormaps[MAPS.get(name, "viridis")].with_extremes(bad=FAINT)
     image = ax.imshow(
         values.T, origin="lower", extent=(*ends[0], *ends[1]), cmap=colors, vmin=low, vmax=high, interpolation="nearest"
     )

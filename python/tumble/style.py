@@ -13,31 +13,12 @@ Rgb = tuple[float, float, float]
 """Red, green and blue, 0 to 1, in linear light."""
 
 PALETTE = ("#4477aa", "#ee6677", "#228833", "#ccbb44", "#66ccee", "#aa3377")
-"""Colours of objects and curves, in the order in which they are handed out."""
+"""Colours of curves, in the order in which they are handed out; the engine has the same for objects."""
 
 INK = "#22272e"
 FAINT = "#8a929c"
 GRID = "#e3e6ea"
 PAPER = "#ffffff"
-
-SOLID: Rgb = (0.42, 0.41, 0.39)
-"""Colliders that have no colour of their own."""
-
-GROUND: Rgb = (0.82, 0.82, 0.82)
-"""Floors and planes that have no colour of their own."""
-
-COLORS = {
-    "density": "cividis",
-    "fuel": "cividis",
-    "temperature": "inferno",
-    "vorticity": "RdBu_r",
-    "pressure": "PuOr_r",
-    "divergence": "PRGn",
-    "velocity_x": "RdBu_r",
-    "velocity_y": "RdBu_r",
-    "velocity_z": "RdBu_r",
-}
-"""Matplotlib's maps of colours for what lies on grids; all others in "viridis"."""
 
 RC: dict[str, Any] = {
     "figure.facecolor": PAPER,

@@ -12,6 +12,7 @@ pub mod error;
 pub mod fabric;
 pub mod frame;
 pub mod kinds;
+pub mod looks;
 pub mod measures;
 pub mod mesh;
 pub mod scene;

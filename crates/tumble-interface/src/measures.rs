@@ -8,6 +8,7 @@
 use crate::columns::COLUMNS;
 use crate::error::Issue;
 use crate::kinds::KINDS;
+use crate::looks;
 use crate::scene::Expect;
 use serde::ser::{Serialize, SerializeMap, Serializer};
 
@@ -436,11 +437,14 @@ impl Bound {
     }
 }
 
-/// All tables as they leave: `ledger`, `report`, `bounds` with their units, `columns` and `kinds`.
+/// All tables as they leave: `ledger`, `report`, `bounds` with their units, `columns` and `kinds`, `forms` and `looks`.
 pub fn tables() -> serde_json::Value {
     let bound = |bound: &Bound| serde_json::json!({ "name": bound.name, "measure": bound.measure, "how": bound.how, "unit": bound.unit() });
     let bounds: Vec<_> = BOUNDS.iter().map(bound).collect();
-    serde_json::json!({ "ledger": LEDGER, "report": REPORT, "bounds": bounds, "columns": COLUMNS, "kinds": KINDS })
+    let (forms, looks) = (looks::FORMS, looks::CONSTANTS);
+    serde_json::json!({
+        "ledger": LEDGER, "report": REPORT, "bounds": bounds, "columns": COLUMNS, "kinds": KINDS, "forms": forms, "looks": looks,
+    })
 }
 
 impl Ledger {

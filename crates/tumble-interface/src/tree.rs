@@ -129,6 +129,15 @@ impl Node {
         self.set(path.trim(), value)
     }
 
+    /// The error with the lines of its places, in their order.
+    pub fn located(&self, mut error: SceneError) -> SceneError {
+        for issue in &mut error.issues {
+            issue.line = issue.line.or_else(|| self.line_of(&issue.path));
+        }
+        error.issues.sort_by_key(|issue| issue.line);
+        error
+    }
+
     /// Line of the place that an issue names, `sheet "flag".pin[0]`, or of the nearest one around it.
     pub fn line_of(&self, path: &str) -> Option<usize> {
         let mut node = self;

@@ -1,5 +1,5 @@
-//! Bytes of a mesh file in, a [`Mesh`] or a [`Character`] out; of a record, a [`Fabric`](tumble_interface::Fabric); and volumes in, bytes of a VDB file out ([`vdb`]). Nothing here opens a file, so
-//! the browser uses it too.
+//! Bytes of a mesh file in, a [`Mesh`] or a [`Character`] out; of a record, a [`Fabric`](tumble_interface::Fabric); and volumes in, bytes
+//! of a VDB file out ([`vdb`]). [`assets`] does it for all that a scene names. Nothing here opens a file, so the browser uses it too.
 //!
 //! What is common to all formats of meshes: coordinates are taken as they stand in the file (no axis is turned, no unit
 //! converted); a polygon becomes the fan of triangles around its first corner, which is right for convex ones; objects,
@@ -8,6 +8,7 @@
 //! work and memory grow with the length of the file, not with the counts it declares (instances in a GLB have a limit).
 //! Verified by `tests/formats.rs` and `tests/fuzz.rs`.
 
+pub mod assets;
 mod build;
 mod fabric;
 mod glb;

@@ -4,13 +4,12 @@ use crate::errors::{self, scene_error};
 use numpy::{PyArray1, PyArray2, PyArrayMethods};
 use pyo3::prelude::*;
 use pyo3::types::{PyBool, PyDict, PyFloat, PyInt, PyList, PyString, PyTuple};
-use std::collections::HashMap;
 use std::path::{Path, PathBuf};
-use tumble_interface::scene::{FabricRef, MeshRef, Precision};
+use std::sync::Arc;
+use tumble_interface::scene::{MeshRef, Precision};
 use tumble_interface::tree::{Node, Value};
-use tumble_interface::{Assets, Character, Fabric, Issue, Mesh, SceneError};
-use tumble_io::Format;
-use twox_hash::XxHash3_64;
+use tumble_interface::{Assets, Mesh, SceneError};
+use tumble_io::assets::{File, Files, fabric_of, mesh_of};
 
 /// A checked scene: what is there, how it moves, what is written out.
 #[pyclass(frozen, skip_from_py_object, module = "tumble")]
@@ -28,25 +27,16 @@ impl Scene {
     fn from_node(py: Python<'_>, node: Node, folder: PathBuf) -> PyResult<Self> {
         let result = py.detach(|| -> Result<Self, SceneError> {
             let mut scene = tumble_interface::Scene::from_tree(&node)?;
-            let assets = load_assets(&mut scene, &folder)?;
-            let assets = Assets::new(assets.meshes, assets.characters).with_fabrics(load_fabrics(&mut scene, &folder)?);
+            let assets = tumble_io::assets::assets(&mut scene, &mut Folder(&folder))?;
             Ok(Self { scene: tumble::scene::resolve(scene), assets, folder, node: node.clone() })
         });
-        result.map_err(|e| scene_error(py, &with_lines(e, &node)))
+        result.map_err(|e| scene_error(py, &node.located(e)))
     }
 
     /// The error with the lines of its places.
     pub fn error(&self, py: Python<'_>, error: SceneError) -> PyErr {
-        scene_error(py, &with_lines(error, &self.node))
+        scene_error(py, &self.node.located(error))
     }
-}
-
-fn with_lines(mut error: SceneError, node: &Node) -> SceneError {
-    for issue in &mut error.issues {
-        issue.line = issue.line.or_else(|| node.line_of(&issue.path));
-    }
-    error.issues.sort_by_key(|issue| issue.line);
-    error
 }
 
 #[pymethods]
@@ -113,6 +103,12 @@ impl Scene {
         places.map(|(place, path)| (place.clone(), self.node.line_of(&place), path)).collect()
     }
 
+    /// How its objects are drawn, in the order of their columns, and the ends of anchors; see `tumble.looks`.
+    #[getter]
+    fn looks<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
+        Ok(pythonize::pythonize(py, &tumble::scene::looks(&self.scene))?)
+    }
+
     /// JSON Schema of a scene; units are under "x-unit".
     #[staticmethod]
     fn schema(py: Python<'_>) -> PyResult<Bound<'_, PyAny>> {
@@ -167,93 +163,47 @@ fn to_node(value: &Bound<'_, PyAny>, path: &str, depth: usize) -> Result<Node, S
     Ok(value_of.into())
 }
 
-/// The files that a scene names, by path.
-#[derive(Default)]
-struct Files {
-    meshes: HashMap<String, Mesh>,
-    characters: HashMap<String, Character>,
+/// How the objects of a scene are drawn, as `Scene.looks`; of its files none is read.
+#[pyfunction]
+pub fn looks<'py>(py: Python<'py>, tree: &Bound<'_, PyAny>) -> PyResult<Bound<'py, PyAny>> {
+    let scene = to_node(tree, "", 0).and_then(|node| tumble_interface::Scene::from_tree(&node));
+    let scene = scene.map_err(|e| scene_error(py, &e))?;
+    Ok(pythonize::pythonize(py, &tumble::scene::looks(&scene))?)
 }
 
-/// Reads every mesh file that the scene names, once, and notes the hash of its content.
-fn load_assets(scene: &mut tumble_interface::Scene, folder: &Path) -> Result<Files, SceneError> {
-    let (mut assets, mut hashes, mut issues) = (Files::default(), HashMap::new(), Vec::new());
-    for file in scene.mesh_files_mut() {
-        let (place, path) = (&file.place, folder.join(file.path));
-        let known = if file.skinned { assets.characters.contains_key(file.path) } else { assets.meshes.contains_key(file.path) };
-        if !known {
-            let read = if file.skinned {
-                read_character(&path).map(|(character, hash)| {
-                    assets.characters.insert(file.path.to_string(), character);
-                    hash
-                })
-            } else {
-                read_mesh(&path).map(|(mesh, hash)| {
-                    assets.meshes.insert(file.path.to_string(), mesh);
-                    hash
-                })
-            };
-            match read {
-                Ok(hash) => drop(hashes.insert(file.path.to_string(), hash)),
-                Err(message) => {
-                    issues.push(Issue::new(format!("{place}.path"), message));
-                    continue;
-                }
-            }
+/// Suffixes of files that OpenUSD reads.
+const USD: [&str; 4] = ["usd", "usda", "usdc", "usdz"];
+
+/// Files below a folder.
+struct Folder<'a>(&'a Path);
+
+impl Files for Folder<'_> {
+    const RESTORE: &'static str = "restore the file";
+    const CONVERTED: &'static [&'static str] = &USD;
+
+    fn open(&mut self, path: &str) -> Result<Arc<File>, String> {
+        let whole = self.0.join(path);
+        let bytes = std::fs::read(&whole).map_err(|e| errors::file_error(&whole, &e))?;
+        let file = File::new(path, bytes);
+        if !whole.extension().is_some_and(|e| USD.iter().any(|usd| e.eq_ignore_ascii_case(usd))) {
+            return Ok(Arc::new(file));
         }
-        let found = hashes.get(file.path).cloned();
-        if file.hash.is_some() && *file.hash != found {
-            let message =
-                format!("the content of \"{}\" has changed since this scene was resolved; restore the file, or leave out hash", file.path);
-            issues.push(Issue::new(format!("{place}.hash"), message));
-        }
-        *file.hash = found;
+        // OpenUSD is a library of Python.
+        let text = Python::attach(|py| -> PyResult<String> { py.import("tumble.usd")?.call_method1("as_obj", (&whole,))?.extract() });
+        let text = text.map_err(|e| format!("\"{}\": {}", whole.display(), Python::attach(|py| e.value(py).to_string())))?;
+        Ok(Arc::new(file.converted("USD", text)))
     }
-    if issues.is_empty() { Ok(assets) } else { Err(SceneError { issues }) }
-}
 
-/// Reads every record that the scene names, once, and notes the hash of its content.
-fn load_fabrics(scene: &mut tumble_interface::Scene, folder: &Path) -> Result<HashMap<String, Fabric>, SceneError> {
-    let (mut fabrics, mut issues) = (HashMap::new(), Vec::new());
-    for FabricRef { place, words } in scene.fabrics_mut() {
-        let key = words.key().to_string();
-        let read = match words.choice() {
-            Err(message) => Err((String::new(), message)),
-            Ok(None) => tumble_io::shipped(&key).map(|fabric| (fabric, None)).map_err(|e| (words.name_key().into(), e)),
-            Ok(Some(path)) => read_fabric(&folder.join(path)).map(|(fabric, hash)| (fabric, Some(hash))).map_err(|e| (".path".into(), e)),
-        };
-        match read {
-            Ok((fabric, found)) => {
-                if let Some(hash) = words.hash_mut() {
-                    if hash.is_some() && *hash != found {
-                        let message = format!(
-                            "the content of \"{key}\" has changed since this scene was resolved; restore the file, or leave out hash"
-                        );
-                        issues.push(Issue::new(format!("{place}.hash"), message));
-                    }
-                    *hash = found;
-                }
-                fabrics.insert(key, fabric);
-            }
-            Err((below, message)) => issues.push(Issue::new(format!("{place}{below}"), message)),
-        }
+    fn shown(&self, path: &str) -> String {
+        self.0.join(path).display().to_string()
     }
-    if issues.is_empty() { Ok(fabrics) } else { Err(SceneError { issues }) }
-}
-
-fn read_fabric(path: &Path) -> Result<(Fabric, String), String> {
-    let Some(json) = tumble_io::record_is_json(&path.to_string_lossy()) else {
-        return Err(format!("\"{}\" has none of the suffixes .toml, .json", path.display()));
-    };
-    let bytes = std::fs::read(path).map_err(|e| errors::file_error(path, &e))?;
-    let fabric = tumble_io::fabric(&bytes, json).map_err(|e| format!("\"{}\": {e}", path.display()))?;
-    Ok((fabric, format!("{:016x}", XxHash3_64::oneshot(&bytes))))
 }
 
 /// The record of a shipped fabric, or of a file, as a dict: name, composition, source, density, stretching and bending.
 #[pyfunction]
 pub fn load_fabric<'py>(py: Python<'py>, fabric: &str) -> PyResult<Bound<'py, PyDict>> {
     let read = match tumble_io::record_is_json(fabric) {
-        Some(_) => read_fabric(Path::new(fabric)).map(|(fabric, _)| fabric),
+        Some(_) => fabric_of(&mut Folder(Path::new("")), fabric).map(|(fabric, _)| fabric),
         None => tumble_io::shipped(fabric),
     };
     let record = read.map_err(|e| scene_error(py, &SceneError::one("", e)))?;
@@ -267,39 +217,17 @@ pub fn load_fabric<'py>(py: Python<'py>, fabric: &str) -> PyResult<Bound<'py, Py
     Ok(dict)
 }
 
-/// Suffixes of files that OpenUSD reads.
-const USD: [&str; 4] = ["usd", "usda", "usdc", "usdz"];
-
-fn read_mesh(path: &Path) -> Result<(Mesh, String), String> {
-    let is_usd = path.extension().is_some_and(|e| USD.iter().any(|usd| e.eq_ignore_ascii_case(usd)));
-    let format = if is_usd { Some(Format::Obj) } else { Format::from_path(&path.to_string_lossy()) };
-    let Some(format) = format else {
-        return Err(format!("\"{}\" has none of the suffixes .obj, .ply, .stl, .glb, .usd, .usda, .usdc, .usdz", path.display()));
-    };
-    let bytes = std::fs::read(path).map_err(|e| errors::file_error(path, &e))?;
-    let hash = format!("{:016x}", XxHash3_64::oneshot(&bytes));
-    let named = |e: String| format!("\"{}\": {e}", path.display());
-    if !is_usd {
-        return Ok((tumble_io::mesh(&bytes, format).map_err(named)?, hash));
-    }
-    // OpenUSD is a library of Python.
-    let text = Python::attach(|py| -> PyResult<String> { py.import("tumble.usd")?.call_method1("as_obj", (path,))?.extract() });
-    let text = text.map_err(|e| named(Python::attach(|py| e.value(py).to_string())))?;
-    let mesh = tumble_io::mesh(text.as_bytes(), format).map_err(|e| named(e.replacen("OBJ", "USD", 1)))?;
-    Ok((mesh, hash))
-}
-
-fn read_character(path: &Path) -> Result<(Character, String), String> {
-    let bytes = std::fs::read(path).map_err(|e| errors::file_error(path, &e))?;
-    let character = tumble_io::character(&bytes).map_err(|e| format!("\"{}\": {e}", path.display()))?;
-    Ok((character, format!("{:016x}", XxHash3_64::oneshot(&bytes))))
+/// The mesh of a file.
+fn read_mesh(py: Python<'_>, path: &Path) -> PyResult<Mesh> {
+    let read = mesh_of(&mut Folder(Path::new("")), &path.to_string_lossy());
+    read.map(|(mesh, _)| mesh).map_err(|e| scene_error(py, &SceneError::one("", e)))
 }
 
 /// Vertices n x 3 and triangles m x 3 of a mesh file.
 #[pyfunction]
 #[allow(clippy::type_complexity)]
 pub fn load_mesh(py: Python<'_>, path: PathBuf) -> PyResult<(Bound<'_, PyArray2<f64>>, Bound<'_, PyArray2<u32>>)> {
-    let (mesh, _) = read_mesh(&path).map_err(|e| scene_error(py, &SceneError::one("", e)))?;
+    let mesh = read_mesh(py, &path)?;
     let (n, m) = (mesh.vertices.len(), mesh.triangles.len());
     let vertices = PyArray1::from_vec(py, mesh.vertices.concat()).reshape([n, 3])?;
     Ok((vertices, PyArray1::from_vec(py, mesh.triangles.concat()).reshape([m, 3])?))
@@ -310,7 +238,7 @@ pub fn load_mesh(py: Python<'_>, path: PathBuf) -> PyResult<(Bound<'_, PyArray2<
 #[pyfunction]
 pub fn repair_mesh(py: Python<'_>, path: PathBuf) -> PyResult<(Option<String>, Bound<'_, PyDict>)> {
     let wrong = |e: String| scene_error(py, &SceneError::one("", e));
-    let (mesh, _) = read_mesh(&path).map_err(wrong)?;
+    let mesh = read_mesh(py, &path)?;
     let (mended, done, left) = py.detach(|| {
         let (mended, done) = tumble_io::repair(&mesh);
         let left = mended.defects();

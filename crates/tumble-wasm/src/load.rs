@@ -1,16 +1,14 @@
 //! From text and bytes to a world, within what a browser can hold.
 
-use crate::engine::scene::{Simulation, memory, resolve, set, set_text};
+use crate::engine::scene::{Simulation, looks, memory, resolve, set, set_text};
 use crate::failure::Failure;
 use serde::Serialize;
 use std::collections::HashMap;
 use std::sync::Arc;
 use tumble_interface::engine::Engine;
-use tumble_interface::scene::FabricRef;
 use tumble_interface::tree::Node;
-use tumble_interface::{Assets, Character, Fabric, Issue, Mesh, Scene, SceneError};
-use tumble_io::Format;
-use twox_hash::XxHash3_64;
+use tumble_interface::{Scene, SceneError};
+use tumble_io::assets::{File, Files, assets};
 
 /// Longest text of a scene [bytes].
 const MOST_TEXT: usize = 8 << 20;
@@ -29,20 +27,29 @@ pub struct Loaded {
     pub world: Simulation,
     node: Node,
     scene: Scene,
-    files: Files,
+    files: Given,
     memory: f64,
 }
 
-/// Content of a file: a mesh or the reason why there is none, for glTF also a character, or a fabric record, and the hash of its bytes.
-struct Read {
-    mesh: Result<Mesh, String>,
-    character: Result<Character, String>,
-    fabric: Result<Fabric, String>,
-    hash: String,
+/// The files of a page.
+type Given = Arc<HashMap<String, Arc<File>>>;
+
+/// Those that a scene asks for, and which it misses.
+struct Page {
+    files: Given,
+    missing: Vec<String>,
 }
 
-/// The files of a page.
-type Files = Arc<HashMap<String, Read>>;
+impl Files for Page {
+    const RESTORE: &'static str = "give the old file";
+
+    fn open(&mut self, path: &str) -> Result<Arc<File>, String> {
+        self.files.get(path).cloned().ok_or_else(|| {
+            self.missing.push(path.into());
+            format!("there is no file \"{path}\"; drop it on the page")
+        })
+    }
+}
 
 /// The tree of a scene, in TOML or JSON, with its overrides.
 pub fn tree(text: &str, overrides: &[String]) -> Result<Node, SceneError> {
@@ -61,24 +68,13 @@ impl Loaded {
         if size > MOST_FILES {
             return Err(Failure::limit(format!("the meshes have {} MiB, the limit here is {} MiB", size >> 20, MOST_FILES >> 20)));
         }
-        let mut meshes = HashMap::new();
+        let mut given = HashMap::new();
         for (path, bytes) in files {
-            let wrong = |message: String| SceneError::one("", format!("\"{path}\": {message}"));
-            let hash = format!("{:016x}", XxHash3_64::oneshot(&bytes));
-            let format = Format::from_path(&path);
-            let skinned = format == Some(Format::Glb) || path.to_lowercase().ends_with(".gltf");
-            let none = "it has none of the suffixes .obj, .ply, .stl, .glb";
-            let mesh = format.map_or_else(|| Err(none.into()), |format| tumble_io::mesh(&bytes, format));
-            let character = if skinned { tumble_io::character(&bytes) } else { Err("it has none of the suffixes .glb, .gltf".into()) };
-            let record = tumble_io::record_is_json(&path);
-            let fabric =
-                record.map_or_else(|| Err("it has none of the suffixes .toml, .json".into()), |json| tumble_io::fabric(&bytes, json));
-            if let (Err(e), Err(_), Err(of_record)) = (&mesh, &character, &fabric) {
-                return Err(wrong(if record.is_some() { of_record } else { e }.clone()).into());
-            }
-            meshes.insert(path, Read { mesh, character, fabric, hash });
+            let file = File::new(&path, bytes);
+            file.check(&path).map_err(|message| SceneError::one("", message))?;
+            given.insert(path, Arc::new(file));
         }
-        Self::build(tree(toml, overrides)?, Arc::new(meshes))
+        Self::build(tree(toml, overrides)?, Arc::new(given))
     }
 
     /// The same with another value at a path.
@@ -93,7 +89,7 @@ impl Loaded {
         Self::build(self.node.clone(), self.files.clone())
     }
 
-    fn build(node: Node, files: Files) -> Result<Self, Failure> {
+    fn build(node: Node, files: Given) -> Result<Self, Failure> {
         let lines = |error: SceneError| -> Failure { with_lines(error, &node).into() };
         let mut scene = Scene::from_tree(&node).map_err(lines)?;
         let colliders = scene.collider.len();
@@ -102,7 +98,8 @@ impl Loaded {
                 "the scene has {colliders} colliders, the limit in a browser is {MOST_COLLIDERS}; make one mesh of them, or run it with `tumble run`"
             )));
         }
-        let assets = assets(&mut scene, &files).map_err(|(error, missing)| lines(error).missing(missing))?;
+        let mut page = Page { files, missing: Vec::new() };
+        let assets = assets(&mut scene, &mut page).map_err(|error| lines(error).missing(page.missing))?;
         let scene = resolve(scene);
         let bytes = memory(&scene, &assets);
         let gibibytes = bytes / 1024.0_f64.powi(3);
@@ -112,7 +109,7 @@ impl Loaded {
             )));
         }
         let world = Simulation::new(scene.clone(), assets).map_err(lines)?;
-        Ok(Self { world, node, scene, files, memory: bytes })
+        Ok(Self { world, node, scene, files: page.files, memory: bytes })
     }
 
     /// Whether both are of scenes that say the same, defaults written out.
@@ -153,6 +150,7 @@ impl Loaded {
             columns: &self.scene.output.columns,
             scene: self.scene.to_json(),
             warnings: self.world.warnings(),
+            looks: looks(&self.scene),
             hash: format!("{:016x}", self.world.hash()),
             memory: self.memory,
         }
@@ -188,81 +186,14 @@ struct Info<'a> {
     columns: &'a [String],
     scene: serde_json::Value,
     warnings: &'a [tumble_interface::Warning],
+    looks: tumble_interface::looks::Looks,
     hash: String,
     memory: f64,
 }
 
-fn with_lines(mut error: SceneError, node: &Node) -> SceneError {
-    for issue in &mut error.issues {
-        issue.line = issue.line.or_else(|| node.line_of(&issue.path));
-    }
-    error.issues.sort_by_key(|issue| issue.line);
+fn with_lines(error: SceneError, node: &Node) -> SceneError {
+    let mut error = node.located(error);
     // Nobody reads more, and texts of hostile scenes have millions.
     error.issues.truncate(MOST_ISSUES);
     error
-}
-
-/// The meshes that the scene names, with the hashes of their content noted; or what is missing.
-fn assets(scene: &mut Scene, files: &Files) -> Result<Assets, (SceneError, Vec<String>)> {
-    let (mut meshes, mut characters, mut issues, mut missing) = (HashMap::new(), HashMap::new(), Vec::new(), Vec::new());
-    for file in scene.mesh_files_mut() {
-        let Some(Read { mesh, character, hash, .. }) = files.get(file.path) else {
-            issues.push(Issue::new(format!("{}.path", file.place), format!("there is no file \"{}\"; drop it on the page", file.path)));
-            if !missing.iter().any(|path| path == file.path) {
-                missing.push(file.path.to_string());
-            }
-            continue;
-        };
-        if file.hash.as_ref().is_some_and(|wanted| wanted != hash) {
-            let message =
-                format!("the content of \"{}\" has changed since this scene was resolved; give the old file, or leave out hash", file.path);
-            issues.push(Issue::new(format!("{}.hash", file.place), message));
-        }
-        *file.hash = Some(hash.clone());
-        let path = file.path.to_string();
-        let read = if file.skinned {
-            character.clone().map(|character| drop(characters.insert(path, character)))
-        } else {
-            mesh.clone().map(|mesh| drop(meshes.insert(path, mesh)))
-        };
-        if let Err(message) = read {
-            issues.push(Issue::new(format!("{}.path", file.place), format!("\"{}\": {message}", file.path)));
-        }
-    }
-    let mut fabrics = HashMap::new();
-    for FabricRef { place, words } in scene.fabrics_mut() {
-        let key = words.key().to_string();
-        let found = match words.choice() {
-            Err(message) => Err((String::new(), message)),
-            Ok(None) => tumble_io::shipped(&key).map(|fabric| (fabric, None)).map_err(|e| (words.name_key().into(), e)),
-            Ok(Some(path)) => match files.get(path) {
-                Some(Read { fabric, hash, .. }) => match fabric {
-                    Ok(fabric) => Ok((fabric.clone(), Some(hash.clone()))),
-                    Err(message) => Err((".path".into(), format!("\"{path}\": {message}"))),
-                },
-                None => {
-                    if !missing.iter().any(|known| known == path) {
-                        missing.push(path.to_string());
-                    }
-                    Err((".path".into(), format!("there is no file \"{path}\"; drop it on the page")))
-                }
-            },
-        };
-        match found {
-            Ok((fabric, found)) => {
-                if let Some(hash) = words.hash_mut() {
-                    if hash.is_some() && *hash != found {
-                        let message = format!(
-                            "the content of \"{key}\" has changed since this scene was resolved; give the old file, or leave out hash"
-                        );
-                        issues.push(Issue::new(format!("{place}.hash"), message));
-                    }
-                    *hash = found;
-                }
-                fabrics.insert(key, fabric);
-            }
-            Err((below, message)) => issues.push(Issue::new(format!("{place}{below}"), message)),
-        }
-    }
-    if issues.is_empty() { Ok(Assets::new(meshes, characters).with_fabrics(fabrics)) } else { Err((SceneError { issues }, missing)) }
 }

@@ -329,7 +329,7 @@ fn the_test_sees_circles() {
 
 /// Places in which the name of a method may stand besides its system, its methods file, its schema, its scenes, its pages of theory and
 /// lab, and tests: lines of each file, and why.
-const PLACES: [(&str, usize, &str); 12] = [
+const PLACES: [(&str, usize, &str); 11] = [
     ("crates/tumble/src/systems/mod.rs", 1, "declares the module"),
     ("crates/tumble/src/scene/methods/mod.rs", 2, "declares the module; the table"),
     ("crates/tumble-interface/src/scene/mod.rs", 4, "declares the module; the table of a scene"),
@@ -341,7 +341,6 @@ const PLACES: [(&str, usize, &str); 12] = [
     ("python/tumble/cures.py", 3, "cures of its own"),
     ("web/src/engine/measures.ts", 1, "generated from the table of kinds"),
     ("web/src/theory.ts", 1, "the page of its equations"),
-    ("web/src/view/scenery.ts", 1, "a list of kinds on grids"),
 ];
 
 /// What belongs to the method.

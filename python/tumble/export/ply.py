@@ -28,7 +28,7 @@ _OWN = ("position", "velocity", "id", "radius", "color")
 def write(run: Recording, folder: str | PathLike[str], progress: Callable[[int, int], None] | None = None) -> Path:
     """Writes ply/ into a folder and returns its path; `progress(done, total)` is called after each frame. Raises
     ExportError."""
-    clouds = [o for o in objects(run) if o.kind == "points"]
+    clouds = [o for o in objects(run) if o.form == "points"]
     if not clouds or run.n_frames < 1:
         raise ExportError("the run has no particles to write as PLY")
     goal = Path(folder) / "ply"

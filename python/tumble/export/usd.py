@@ -38,6 +38,7 @@ from tumble._engine import ExportError
 from tumble.columns import FOG
 from tumble.export import DIGITS, vdb
 from tumble.folder import writing
+from tumble.looks import SPRING, TRAIL
 from tumble.pictures.framing import camera
 from tumble.pictures.look import key_light
 from tumble.pictures.surfaces import normals, split
@@ -46,12 +47,6 @@ from tumble.pictures.things import Columns, Object, Recording, colors, objects, 
 ROOT = "/scene"
 SENSOR = 0.36
 """Width of the camera's sensor [tenth of a metre], the unit that USD takes for lenses."""
-
-TRAIL = 0.3
-"""Radius of trails over the radius of the points that leave them."""
-
-SPRING = 0.25
-"""Radius of springs over the radius of the masses that they join."""
 
 KNOWN = ("position", "velocity", "id", "radius", "color", "triangles")
 """Columns that become something else than a primvar of their name."""
@@ -89,7 +84,7 @@ class History:
     """The last frames of points that leave trails."""
 
     def __init__(self, things: list[Object]) -> None:
-        self.things = [t for t in things if t.kind == "points" and t.trail > 0.0]
+        self.things = [t for t in things if t.form == "points" and t.trail > 0.0]
         self.past: dict[str, list[tuple[float, npt.NDArray[np.int64], npt.NDArray[np.float64]]]] = {}
 
     def ways(self, time: float, columns: Columns) -> Ways:
@@ -190,9 +185,9 @@ def _parts(found: list[Object], start: Columns) -> list[Part]:
 
     parts = []
     for thing in found:
-        if thing.kind == "points":
+        if thing.form == "points":
             parts.append(Part(thing, path(thing.name), thing.name, "Points", radius=thing.radius))
-        elif thing.kind == "grid":
+        elif thing.grid is not None:
             parts.append(Part(thing, path(thing.name), thing.name, "Volume"))
         elif thing.strands is not None:
             shown = thing.strands
@@ -200,19 +195,19 @@ def _parts(found: list[Object], start: Columns) -> list[Part]:
             taper = thing.radius * np.sqrt(1.0 - 0.96 * np.linspace(0.0, 1.0, shown.points))
             where = path(thing.name)
             parts.append(Part(thing, where, thing.name, "BasisCurves", None, counts, thing.radius, taper=taper))
-        elif thing.kind == "curve":
+        elif thing.form == "curve":
             counts = np.array([len(thing.curve)])
             where = path(thing.name)
             parts.append(Part(thing, where, thing.name, "BasisCurves", thing.curve, counts, thing.radius))
         elif len(thing.triangles):
-            cut = None if thing.kind == "sheet" else split(_places(thing, start), thing.triangles)
+            cut = None if thing.form == "surface" else split(_places(thing, start), thing.triangles)
             parts.append(Part(thing, path(thing.name), thing.name, "Mesh", cut=cut))
     for thing in found:
-        if thing.kind == "points" and thing.trail > 0.0:
+        if thing.form == "points" and thing.trail > 0.0:
             title = f"{thing.name} trail"
             parts.append(Part(thing, path(title), title, "BasisCurves", radius=TRAIL * thing.radius, trail=True))
     for thing in found:
-        if thing.kind == "points" and len(thing.links):
+        if thing.form == "points" and len(thing.links):
             title = f"{thing.name} springs"
             counts = np.full(len(thing.links), 2)
             where = path(title)
@@ -424,7 +419,7 @@ def _objects(run: Recording, parts: list[Part], start: Columns, ways: Ways) -> A
             mesh.CreateFaceVertexIndicesAttr(Vt.IntArray.FromNumpy(np.ascontiguousarray(triangles.ravel())))
             mesh.CreateSubdivisionSchemeAttr(UsdGeom.Tokens.none)
             mesh.SetNormalsInterpolation(UsdGeom.Tokens.faceVarying if part.cut else UsdGeom.Tokens.vertex)
-            mesh.CreateDoubleSidedAttr(part.thing.kind == "sheet")
+            mesh.CreateDoubleSidedAttr(part.thing.form == "surface")
             texture = part.thing.texture
             if texture is not None and len(texture) == 3 * len(triangles):
                 st = UsdGeom.PrimvarsAPI(prim).CreatePrimvar(
@@ -442,7 +437,7 @@ def _objects(run: Recording, parts: list[Part], start: Columns, ways: Ways) -> A
             reader.CreateInput("varname", Sdf.ValueTypeNames.String).Set("displayColor")
             out = reader.CreateOutput("result", Sdf.ValueTypeNames.Float3)
             paint.ConnectToSource(reader.ConnectableAPI(), out.GetBaseName())
-        shader.CreateInput("roughness", Sdf.ValueTypeNames.Float).Set(0.8 if part.thing.kind == "sheet" else 0.4)
+        shader.CreateInput("roughness", Sdf.ValueTypeNames.Float).Set(0.8 if part.thing.form == "surface" else 0.4)
         look.CreateSurfaceOutput().ConnectToSource(shader.ConnectableAPI(), "surface")
         UsdShade.MaterialBindingAPI.Apply(prim).Bind(look)
     return layer

@@ -18,13 +18,14 @@ import numpy as np
 import numpy.typing as npt
 
 from tumble._engine import ExportError
+from tumble.looks import GROUND, SOLID
 from tumble.pictures import framing, splats, volumes
 from tumble.pictures.drawn import Body, Cloud, Ground, Image, Mesh, Smoke, Thing, placed
 from tumble.pictures.framing import Camera
 from tumble.pictures.pyvista_ import headless
 from tumble.pictures.surfaces import Floats, unit
 from tumble.pictures.things import Recording, Stage
-from tumble.style import GROUND, SOLID, display, linear
+from tumble.style import display, linear
 
 __all__ = ["RENDERERS", "TRACED", "Studio", "picture", "render", "renderers", "resolve"]
 

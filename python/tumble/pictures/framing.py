@@ -193,7 +193,7 @@ def together(x: Floats) -> Floats:
 def outline(run: Recording) -> Floats:
     """Points that must be in the picture; at least one."""
     found = objects(run)
-    radius = {o.name: o.radius if o.kind in ("points", "curve") else 0.0 for o in found}
+    radius = {o.name: o.radius if o.form in ("points", "curve", "strands") else 0.0 for o in found}
     parts = []
     some = {0, run.n_frames // 2, run.n_frames - 1} if run.n_frames else set()
     masses = max((sum(len(positions(run.frame(i), o)) for o in moving(found)) for i in some), default=0)
@@ -203,11 +203,13 @@ def outline(run: Recording) -> Floats:
         for o in moving(found):
             x = positions(columns, o)
             x = x[np.isfinite(x).all(axis=1)]
-            if o.kind == "points" and not len(o.links):
+            if o.form == "points" and not len(o.links):
                 x = together(x)
             if len(x):
                 parts.append(x[np.argmax(x @ DIRECTIONS.T, axis=0)] + radius[o.name] * DIRECTIONS)
-    bodies = [o.position for o in found if o.kind == "solid" and o.position is not None and len(o.position)]
+    bodies = [
+        o.position for o in found if o.form in ("solid", "container") and o.position is not None and len(o.position)
+    ]
     if parts:
         moved = np.concatenate(parts)
         low, high = moved.min(axis=0), moved.max(axis=0)

@@ -8,7 +8,7 @@ or an image that `volumes` paints. Where a link broke, triangle or rope is left 
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Any, Literal, Protocol
+from typing import Any, Protocol
 
 import numpy as np
 import numpy.typing as npt
@@ -17,11 +17,12 @@ from tumble import grids
 from tumble._engine import ExportError
 from tumble.columns import FOG, SIGNED
 from tumble.grids import Box
+from tumble.looks import CELLS, DRAWN_ON, GLOWING, MAPS, MASSES, SHADE, SHOWN, SOLID, SPRING, TRAIL, Looks
 from tumble.pictures.blackbody import developed, glow
 from tumble.pictures.drawn import Cloud, Ground, Image, Mesh, Smoke, Spheres, Thing, Tubes
 from tumble.pictures.strands import Strands, strands
 from tumble.pictures.surfaces import Floats, Indices, normals, outward, split
-from tumble.style import COLORS, GROUND, PALETTE, SOLID, Rgb, linear, rgb
+from tumble.style import Rgb, linear
 
 Array = npt.NDArray[Any]
 Columns = Mapping[str, Mapping[str, Array]]
@@ -38,6 +39,10 @@ class Recording(Protocol):
     @property
     def scene(self) -> Mapping[str, Any]:
         """The resolved scene."""
+
+    @property
+    def looks(self) -> Looks:
+        """How its objects are drawn."""
 
     @property
     def static(self) -> Columns:
@@ -58,20 +63,19 @@ class Recording(Protocol):
         """Time of a frame [s]."""
 
 
-Kind = Literal["points", "curve", "sheet", "block", "solid", "ground", "grid"]
-
-
 @dataclass(frozen=True)
 class Object:
-    """A thing that the scene names."""
+    """A thing that the scene names: its look, and what does not change of it."""
 
     name: str
-    kind: Kind
+    form: str
     color: Rgb
     radius: float = 0.01
     """Radius in pictures [m], of points and curves."""
     trail: float = 0.0
     """How much of the way behind points is drawn [s]."""
+    few: bool = False
+    """Whether it is drawn thicker."""
     leap: float = float("inf")
     """A step farther than this [m] is none: the point has left a square that repeats itself on the other side."""
     triangles: Indices = field(default_factory=lambda: np.zeros((0, 3), dtype=np.int64))
@@ -85,8 +89,6 @@ class Object:
     """Vertices [m] of what does not move."""
     plane: tuple[Floats, Floats] | None = None
     """A point and the unit normal of a ground."""
-    container: bool = False
-    """Whether masses are inside, so that it is drawn as its edges."""
     grid: Box | None = None
     """Its grid, if any."""
 
@@ -97,23 +99,11 @@ MANY = 2_000
 FINER = 0.6
 """Particles of clouds may be this much thinner than the thinnest."""
 
-SHOWN = ("density", "fuel", "temperature", "vorticity", "speed", "pressure", "divergence")
-"""Column shown of a grid object: the first of these that is in the frames and not uniform."""
-
 DENSE = 0.5
 """A density that is nowhere less than this part of its largest is that of the fluid itself, not of smoke in it."""
 
 LOOKED_AT = 9
 """Frames at which the range of what lies on a grid is taken, at most."""
-
-SMOKE: Rgb = (0.52, 0.53, 0.56)
-"""Colour of smoke that has none of its own."""
-
-LIQUID = 100.0
-"""Fluid density [kg/m³] from which smoke counts as dye, with a colour of its own."""
-
-GLOWING = 1000.0
-"""A gas that gets hotter than this [K] in a run is seen to glow."""
 
 EXPOSURE = 60.0
 """Light of soot at the highest temperature of a run that hides all behind it; 1 is nearly white."""
@@ -142,75 +132,40 @@ SOOT: Rgb = (0.02, 0.02, 0.025)
 DYE = 3.0
 """Optical depth of the thickest dye in a plane."""
 
-FEW = 200
-"""An object of fewer masses than these is drawn at least three times as thick as the thinnest."""
+FEW = 3
+"""An object of few masses is drawn at least this many times as thick as the thinnest."""
 
 HAIR = 0.3
 """Radius of the thinnest strand, over that of the thinnest of other things."""
 
-SYSTEMS = ("system", "anchor", "force", "field")
-"""Sections of a scene whose names are not names of objects."""
-
 
 def objects(run: Recording) -> list[Object]:
     """The objects of a run, in its order."""
-    words: dict[str, tuple[str, Mapping[str, Any]]] = {
-        entry["name"]: (section, entry)
-        for section, entries in run.scene.items()
-        if section not in SYSTEMS and isinstance(entries, list)
-        for entry in entries
-        if isinstance(entry, Mapping) and "name" in entry
-    }
-    found: list[Object] = []
-    colors = 0
-    # Per-particle values are in the frames; an object may have nothing else.
     start = run.frame(0) if run.n_frames else {}
-    for name, columns in {**{n: {} for n in start if n not in run.static}, **run.static}.items():
-        section, entry = words.get(name, ("", {}))
-        grid = grids.box(columns)
-        solid = grid is None and (section == "collider" or "position" in columns)
-        plane = _plane(entry.get("shape")) if solid else None
-        color: Rgb
-        if entry.get("color") is not None:
-            r, g, b = (float(c) for c in entry["color"])
-            color = (r, g, b)
-        elif solid:
-            color = SOLID if plane is None else GROUND
-        elif grid is not None and grid.flat == 3 and float(entry.get("fluid_density", 0.0)) < LIQUID:
-            color = SMOKE
-        else:
-            color = rgb(PALETTE[colors % len(PALETTE)])
-            colors += 1
+    found: list[Object] = []
+    for look in run.looks.objects:
+        columns = run.static.get(look.object, {})
         per_strand = int(np.ravel(columns.get("curve_points", 0))[0])
         tufts = None
-        if per_strand > 0 and "position" in start.get(name, {}):
-            tufts = strands(start[name]["position"], per_strand, int(entry.get("render", 1)))
-        kind: Kind = "points"
-        if grid is not None:
-            kind = "grid"
-        elif solid:
-            kind = "solid" if plane is None else "ground"
-        elif len(columns.get("triangles", ())):
-            kind = "block" if section == "block" else "sheet"
-        elif len(columns.get("curve", ())):
-            kind = "curve"
+        if per_strand > 0 and "position" in start.get(look.object, {}):
+            tufts = strands(start[look.object]["position"], per_strand, look.strands)
         found.append(
             Object(
-                name=name,
-                kind=kind,
-                color=color,
-                radius=float(np.ravel(columns["radius"])[0]) if len(columns.get("radius", ())) else 0.01,
-                trail=float(entry.get("trail", 0.0)),
-                leap=_leap(run.scene, entry),
+                name=look.object,
+                form=look.form,
+                color=look.color,
+                radius=look.radius,
+                trail=look.trail,
+                few=look.few,
+                leap=float("inf") if look.period is None else look.period / 2,
                 triangles=_indices(columns, "triangles", 3),
                 texture=np.asarray(columns["texture"]).reshape(-1, 2) if "texture" in columns else None,
                 links=_indices(columns, "links", 2),
                 curve=_indices(columns, "curve", 1).ravel(),
                 strands=tufts,
                 position=np.asarray(columns["position"], dtype=float).reshape(-1, 3) if "position" in columns else None,
-                plane=plane,
-                container=bool(entry.get("inside", False)),
-                grid=grid,
+                plane=None if look.plane is None else (np.array(look.plane[0]), np.array(look.plane[1])),
+                grid=grids.box(columns) if look.form in CELLS else None,
             )
         )
     return found
@@ -218,7 +173,7 @@ def objects(run: Recording) -> list[Object]:
 
 def moving(found: list[Object]) -> list[Object]:
     """Those whose positions are in the frames."""
-    return [o for o in found if o.kind not in ("solid", "ground", "grid")]
+    return [o for o in found if o.form in MASSES]
 
 
 def positions(columns: Columns, thing: Object) -> Floats:
@@ -273,11 +228,11 @@ class Stage:
         self.flat: str | None = str(run.scene.get("plane", "xz")) if run.scene.get("dimension", 3) == 2 else None
         self.objects = objects(run)
         self._start: Columns = run.frame(0) if run.n_frames else {}
-        bodies = {o.name: o for o in self.objects if o.kind in ("solid", "block") and len(o.triangles)}
+        bodies = {o.name: o for o in self.objects if o.form in ("solid", "container", "body") and len(o.triangles)}
         starts = {name: self._start_of(o) for name, o in bodies.items()}
         self._cuts = {name: split(starts[name], o.triangles) for name, o in bodies.items()}
         self._closed = {name for name, o in bodies.items() if outward(starts[name], o.triangles)}
-        self._anchors = [_ends(anchor["between"]) for anchor in run.scene.get("anchor", ())]
+        self._anchors = run.looks.anchors
         self.night = run.scene.get("camera", {}).get("look") == "night"
         self._ways: dict[tuple[str, int], Floats] = {}
         self._pieces: dict[tuple[str, int], tuple[Floats, Floats]] = {}
@@ -297,10 +252,10 @@ class Stage:
                 drawn.append(Ground(thing.name, tip[0], tip[1] - tip[0], thing.color))
             elif thing.grid is not None:
                 drawn += self._on_grid(thing, thing.grid, columns, thinnest)
-            elif thing.kind == "solid":
+            elif thing.form in ("solid", "container"):
                 if thing.position is not None and len(thing.triangles):
                     x = carried(thing, columns, thing.position)
-                    if not thing.container:
+                    if thing.form == "solid":
                         drawn.append(self._mesh(thing, x, thing.triangles))
                     else:
                         drawn.append(self._edges(thing, x, thinnest))
@@ -404,15 +359,14 @@ class Stage:
 
     def _is_cloud(self, thing: Object, columns: Columns) -> bool:
         """Whether an object is drawn by `splats`."""
-        if thing.kind != "points" or len(thing.links):
+        if thing.form != "points" or len(thing.links):
             return False
         table = columns.get(thing.name, {})
         return self.night or "id" in table or len(table.get("position", ())) > MANY
 
     def _cloud(self, thing: Object, i: int, columns: Columns, thinnest: float) -> Cloud:
         x = positions(columns, thing)
-        few = 3 if len(x) < FEW and "id" not in columns[thing.name] else 1
-        r = np.maximum(radii(columns, thing), FINER * few * thinnest)
+        r = np.maximum(radii(columns, thing), FINER * (FEW if thing.few else 1) * thinnest)
         pieces, shades, ages = [np.zeros((0, 2, 3))], [np.zeros((0, 3))], [np.zeros(0)]
         now, k = self.run.time(i), i - 1
         while thing.trail > 0.0 and k >= 0 and self.run.time(k) >= now - thing.trail - 1e-9:
@@ -443,36 +397,36 @@ class Stage:
         if len(frames) < 2:
             return None
         way = np.stack([self._ways[thing.name, k] for k in frames], axis=1)
-        shade = (thing.color[0] * 0.6, thing.color[1] * 0.6, thing.color[2] * 0.6)
+        shade = _darker(thing.color, SHADE)
         # Each way in pieces: the last of a piece is the last of all, or leaps.
         last = np.ones(way.shape[:2], dtype=bool)
         last[:, :-1] = np.linalg.norm(np.diff(way, axis=1), axis=2) > thing.leap
         counts = np.diff(np.flatnonzero(last), prepend=-1)
         way, counts = way.reshape(-1, 3)[np.repeat(counts > 1, counts)], counts[counts > 1]
-        return Tubes(f"{thing.name} trail", way, counts, max(0.3 * thing.radius, thinnest), shade)
+        return Tubes(f"{thing.name} trail", way, counts, max(TRAIL * thing.radius, thinnest), shade)
 
     def _moving(self, thing: Object, columns: Columns, thinnest: float) -> list[Thing]:
         x = positions(columns, thing)
         broken = self._broken(thing, columns)
         if thing.strands is not None:
             return [thing.strands.hair(thing.name, x, max(thing.radius, HAIR * thinnest), thing.color)]
-        thing = replace(thing, radius=max(thing.radius, thinnest * (3 if len(x) < FEW else 1)))
-        if thing.kind in ("sheet", "block"):
+        thing = replace(thing, radius=max(thing.radius, thinnest * (FEW if thing.few else 1)))
+        if thing.form in ("surface", "body"):
             now = torn(columns, thing)
             triangles = _without(thing.triangles, thing.links[broken]) if now is None else now
             shown: list[Thing] = [self._mesh(thing, x, triangles)]
             if self.flat is not None and len(thing.links):
-                shade = (thing.color[0] * 0.35, thing.color[1] * 0.35, thing.color[2] * 0.35)
+                shade = _darker(thing.color, DRAWN_ON)
                 # In front of the surface; seen in parallel, they stay in place.
                 front = np.array([0.0, 0.0, 1.0] if self.flat == "xy" else [0.0, -1.0, 0.0]) * 4 * thinnest
                 shown.append(_springs(thing, x + front, thing.links[~broken], thinnest, shade))
             return shown
-        if thing.kind == "curve":
+        if thing.form == "curve":
             return _pieces(thing, x, thing.links[broken])
         shown = [Spheres(thing.name, x, np.full(len(x), thing.radius), thing.color)]
         if len(thing.links):
-            shade = (thing.color[0] * 0.6, thing.color[1] * 0.6, thing.color[2] * 0.6)
-            shown.append(_springs(thing, x, thing.links[~broken], max(0.25 * thing.radius, thinnest), shade))
+            radius = max(SPRING * thing.radius, thinnest)
+            shown.append(_springs(thing, x, thing.links[~broken], radius, _darker(thing.color, SHADE)))
         return shown
 
     def _mesh(self, thing: Object, x: Floats, triangles: Indices) -> Mesh:
@@ -481,7 +435,7 @@ class Stage:
             source, triangles = self._cuts[thing.name]
             x = x[source]
         closed = whole and thing.name in self._closed
-        return Mesh(thing.name, x, triangles, normals(x, triangles), thing.color, thing.kind == "sheet", closed)
+        return Mesh(thing.name, x, triangles, normals(x, triangles), thing.color, thing.form == "surface", closed)
 
     def _edges(self, thing: Object, x: Floats, thinnest: float) -> Tubes:
         """The sharp edges of a container; of a round one a few of its rings."""
@@ -515,6 +469,10 @@ class Stage:
         if start is None or len(start) != len(strain):
             return none
         return np.ravel(np.isnan(strain) & ~np.isnan(start))
+
+
+def _darker(color: Rgb, by: float) -> Rgb:
+    return color[0] * by, color[1] * by, color[2] * by
 
 
 def _one_number(grid: Box, table: Mapping[str, Array], name: str) -> Floats:
@@ -553,7 +511,7 @@ def _image(
             light = light + developed(np.squeeze(glow, axis=grid.flat))
     else:
         cover = np.ones(share.shape)
-        light = linear(matplotlib.colormaps[COLORS.get(name, "viridis")](share)[..., :3])
+        light = linear(matplotlib.colormaps[MAPS.get(name, "viridis")](share)[..., :3])
     cover = np.where(np.squeeze(holes, axis=grid.flat), 0.0, cover)
     return Image(thing.name, corner, sides[a], sides[b], np.asarray(light, dtype=float), cover)
 
@@ -606,19 +564,6 @@ def _piece(thing: Object, before: Columns, after: Columns) -> tuple[Floats, Floa
     near = ~(np.linalg.norm(y - x, axis=1) > thing.leap)
     x, y, shade = x[near], y[near], shade[near]
     return np.stack([x, y], axis=1), shade
-
-
-def _leap(scene: Mapping[str, Any], entry: Mapping[str, Any]) -> float:
-    """Half the side of the square that an object moves in, if it repeats itself."""
-    own = [s for s in scene.get("system", ()) if s["name"] == entry.get("system")]
-    words = own[0].get("vicsek") if own else None
-    return float(words["side"]) / 2 if words else float("inf")
-
-
-def _ends(between: list[str]) -> list[tuple[str, int]]:
-    """Object and index of each end of an anchor: "flag 3"."""
-    pairs = [words.rsplit(" ", 1) for words in between]
-    return [(name.strip(), int(index)) for name, index in pairs]
 
 
 def _indices(columns: Mapping[str, Array], name: str, width: int) -> Indices:

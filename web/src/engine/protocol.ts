@@ -3,9 +3,10 @@
  * Worlds are numbered by the page, so that one worker runs several side by side (integrator lab, time branches).
  */
 
+import type { Form } from "./looks";
 import type { Ledger, ObjectKind, StepReport } from "./measures";
 
-export type { Ledger, ObjectKind, StepReport };
+export type { Form, Ledger, ObjectKind, StepReport };
 
 /** Numbers of a column, transferred: the page owns them. */
 export type Numbers = Float32Array | Float64Array | Uint32Array;
@@ -30,6 +31,25 @@ export interface ObjectInfo {
   system?: string;
 }
 
+/** How an object is drawn. */
+export interface Look {
+  object: string;
+  form: Form;
+  /** Where its parts have none of their own; linear light. */
+  color: Vector;
+  /** Of points and curves [m]. */
+  radius: number;
+  /** How long points leave a trail behind them [s]. */
+  trail: number;
+  /** Side of a square that repeats itself [m]. */
+  period: number | null;
+  /** A point and the unit normal of a ground, where it is not turned or moved. */
+  plane: [Vector, Vector] | null;
+  strands: number;
+  /** Whether its masses are so few that it is drawn thicker. */
+  few: boolean;
+}
+
 /** A checked scene, built and standing at frame 0 (or, after a live `set`, at the frame where it stood). */
 export interface SceneInfo {
   title: string;
@@ -48,6 +68,8 @@ export interface SceneInfo {
   columns: string[];
   /** Constant columns: triangles, links, curve, radius, mass, grid_cells, grid_origin, grid_spacing, grid_flat, mesh of colliders. */
   topology: Columns;
+  /** How the objects are drawn, in the order of their columns, and object and row of both ends of each anchor that pulls. */
+  looks: { objects: Look[]; anchors: [[string, number], [string, number]][] };
   /** The resolved scene: every default written out. */
   scene: Record<string, unknown>;
   /** Warnings; docs/warnings.md lists the codes. */

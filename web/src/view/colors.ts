@@ -1,3 +1,5 @@
+import { MAPS as OF } from "../engine/looks";
+
 /** Maps of colours, as in the pictures that `tumble render` makes: seventeen colours each (sRGB), linear between them. */
 const MAPS = {
   viridis: "440154 48186a 472d7b 424086 3b528b 33638d 2c728e 26828e 21918c 1fa088 28ae80 3fbc73 5ec962 84d44b addc30 d8e219 fde725",
@@ -12,25 +14,10 @@ const MAPS = {
 
 export type MapName = keyof typeof MAPS;
 
-/** Colours of columns; all others in viridis. */
-const OF: Record<string, MapName> = {
-  density: "cividis",
-  fuel: "cividis",
-  temperature: "inferno",
-  vorticity: "RdBu_r",
-  pressure: "PuOr_r",
-  divergence: "PRGn",
-  difference: "RdBu_r",
-  strain: "strain",
-};
+/** Colours of what only a page shows. */
+const OWN: Record<string, MapName> = { difference: "RdBu_r", strain: "strain" };
 
-/** Shown around zero. */
-export const SIGNED = ["vorticity", "pressure", "divergence", "difference"];
-
-/** Colours of objects, in the order in which they are handed out: Paul Tol's "bright" scheme. */
-export const PALETTE = ["#4477aa", "#ee6677", "#228833", "#ccbb44", "#66ccee", "#aa3377"];
-
-export const mapOf = (column: string): MapName => OF[column] ?? "viridis";
+export const mapOf = (column: string): MapName => OWN[column] ?? (OF[column] as MapName | undefined) ?? "viridis";
 
 function stops(name: MapName): number[][] {
   return MAPS[name].split(" ").map((code) => [0, 2, 4].map((i) => parseInt(code.slice(i, i + 2), 16)));

@@ -1,12 +1,12 @@
 /** How things stood on another way that time went: seen through, in one colour, beside what there is now. */
 import * as THREE from "three";
-import type { Column, Frame, SceneInfo } from "../engine/protocol";
+import { MATTER } from "../engine/looks";
+import type { Column, Frame, Look, SceneInfo } from "../engine/protocol";
 import { type Layer, Pieces, Points, type Rgb, Surface } from "./layers";
-import { massesOf } from "./scenery";
+import { along } from "./scenery";
 
 interface Shade {
   name: string;
-  topology: Record<string, Column>;
   body: Layer;
   set: (x: Frame["columns"][string]) => void;
 }
@@ -29,20 +29,18 @@ export class Ghost {
     this.info = info;
     this.dark = dark;
     const color: Rgb = dark ? [0.75, 0.82, 0.95] : [0.02, 0.03, 0.06];
-    for (const object of info ? massesOf(info) : []) {
-      const topology = info!.topology[object.name] ?? {};
-      const radius = topology.radius?.data[0] ?? 0.01;
-      const shade = this.shade(topology, color, radius);
-      this.shades.push({ name: object.name, topology, ...shade });
+    for (const look of info?.looks.objects ?? []) {
+      if (MATTER[look.form] !== "masses") continue;
+      const shade = this.shade(info!.topology[look.object] ?? {}, look, color);
+      this.shades.push({ name: look.object, ...shade });
       shade.body.object.renderOrder = 2;
       this.group.add(shade.body.object);
     }
   }
 
-  private shade(topology: Record<string, Column>, color: Rgb, radius: number): Pick<Shade, "body" | "set"> {
-    const triangles = topology.triangles?.data;
-    const curve = topology.curve?.data;
-    if (triangles?.length) {
+  private shade(topology: Record<string, Column>, { form, radius }: Look, color: Rgb): Pick<Shade, "body" | "set"> {
+    if (form === "surface" || form === "body") {
+      const triangles = topology.triangles.data;
       let made: Surface | undefined;
       const body: Layer = { object: new THREE.Group(), dispose: () => made?.dispose() };
       return {
@@ -55,9 +53,8 @@ export class Ghost {
         },
       };
     }
-    if (curve?.length) {
-      const pairs = new Uint32Array(2 * Math.max(curve.length - 1, 0));
-      for (let i = 0; i + 1 < curve.length; i++) pairs.set([curve[i], curve[i + 1]], 2 * i);
+    if (form === "curve" || form === "strands") {
+      const pairs = along(topology.curve.data, topology.curve_points?.data[0]);
       const body = new Pieces(radius, { thinnest: 1.5, lit: false });
       body.veil(0.4);
       return { body, set: ({ position }) => body.pairs(position.data, pairs, color) };

@@ -1,19 +1,18 @@
 /** Scenery of a scene, as drawables. */
 import * as THREE from "three";
+import { MATTER, SHOWN } from "../engine/looks";
 import type { Column, Numbers, SceneInfo, Vector } from "../engine/protocol";
 import { table } from "./colors";
 import { type Grid, type Pieces, type Rgb, scalars } from "./layers";
 
-type Entry = Record<string, any>;
-
-const GRIDS = ["gas", "heat", "compressible"];
+function made(info: SceneInfo, of: string): SceneInfo["objects"] {
+  const names = new Set(info.looks.objects.filter((look) => MATTER[look.form] === of).map((look) => look.object));
+  return info.objects.filter((o) => names.has(o.name));
+}
 
 /** Objects that lie on grids, and those that are made of masses. */
-export const gridsOf = (info: SceneInfo): SceneInfo["objects"] => info.objects.filter((o) => GRIDS.includes(o.kind));
-export const massesOf = (info: SceneInfo): SceneInfo["objects"] => info.objects.filter((o) => ![...GRIDS, "collider"].includes(o.kind));
-
-/** Default column of a grid: the first existing one of these that is not uniform. */
-const SHOWN = ["density", "fuel", "temperature", "vorticity", "speed", "pressure", "divergence"];
+export const gridsOf = (info: SceneInfo): SceneInfo["objects"] => made(info, "cells");
+export const massesOf = (info: SceneInfo): SceneInfo["objects"] => made(info, "masses");
 
 /** The column of a grid that is shown where `chosen` is asked for; a difference before all. */
 export function shownOf(columns: Record<string, Column>, chosen: string | null): string | undefined {
@@ -71,25 +70,11 @@ export function arrows(pieces: Pieces, grid: Grid, velocity: Column, fastest: nu
   pieces.done(k);
 }
 
-/** How many masses an object of particles has, about. */
-export function countOf(entry: Entry): number {
-  if (Array.isArray(entry.position)) return entry.position.length;
-  return Number(entry.cloud?.count ?? entry.stars ?? 1e6);
-}
-
-export function planeOf(shape: unknown): [THREE.Vector3, THREE.Vector3] | undefined {
-  const s = (shape ?? {}) as Entry;
-  if ("floor" in s) return [new THREE.Vector3(0, 0, Number(s.floor?.height ?? 0)), new THREE.Vector3(0, 0, 1)];
-  if ("plane" in s)
-    return [new THREE.Vector3(...((s.plane.point ?? [0, 0, 0]) as Vector)), new THREE.Vector3(...(s.plane.normal as Vector)).normalize()];
-  return undefined;
-}
-
-/** A step farther than this is none: the particle has left a square that repeats itself on the other side. */
-export function leapOf(info: SceneInfo, system: string | undefined): number {
-  const systems = (Array.isArray(info.scene.system) ? info.scene.system : []) as Entry[];
-  const side = systems.find((s) => s.name === system)?.vicsek?.side;
-  return side ? Number(side) / 2 : Infinity;
+/** Pairs of masses along a curve, or along many of so many masses each. */
+export function along(curve: Numbers, each = Infinity): Uint32Array {
+  const pairs: number[] = [];
+  for (let i = 0; i + 1 < curve.length; i++) if ((i + 1) % each) pairs.push(curve[i], curve[i + 1]);
+  return Uint32Array.from(pairs);
 }
 
 export function carry(columns: Record<string, Column>, point: THREE.Vector3, normal: THREE.Vector3): void {
@@ -171,15 +156,4 @@ export function palette(name: Parameters<typeof table>[0]): Float32Array {
 export function pick(map: Float32Array, share: number): Rgb {
   const i = 3 * Math.round(255 * Math.min(Math.max(share || 0, 0), 1));
   return [map[i], map[i + 1], map[i + 2]];
-}
-
-/** Object and row of both ends of each anchor. One without stiffness holds nothing. */
-export function endsOf(info: SceneInfo): [string, number][] {
-  const anchors = Array.isArray(info.scene.anchor) ? (info.scene.anchor as Entry[]).filter((a) => a.stiffness > 0) : [];
-  return anchors.flatMap((a) =>
-    (a.between as string[]).map((end): [string, number] => [
-      end.slice(0, end.lastIndexOf(" ")),
-      Number(end.slice(end.lastIndexOf(" ") + 1)),
-    ]),
-  );
 }

@@ -1,5 +1,5 @@
 /** Colours of masses and links by what they do: one scale for all objects of a picture, so that its legend holds for each. */
-import type { Column, Frame, Numbers } from "../engine/protocol";
+import type { Column, Form, Frame, Numbers } from "../engine/protocol";
 import { FAMILIES, type Family } from "../links";
 import { mapOf } from "./colors";
 import { Range, type Rgb, scalars } from "./layers";
@@ -15,7 +15,7 @@ export interface Legend {
 /** Coloured column. */
 export interface Shaded {
   name: string;
-  kind: string;
+  form: Form;
   topology: Record<string, Column>;
   /** Of each link, an index into `FAMILIES`; which of them act. */
   families: Uint8Array | null;
@@ -73,7 +73,7 @@ export class Shades {
       } else if (by === "strain" && link_strain && position && links) {
         const own = link_strain.data.map((e, i) => (isLeft(thing, i, unseen) ? NaN : e));
         values.set(thing.name, means(own, links, position.data.length / 3));
-        seen.push(linksAreSeen || thing.kind === "points" ? own : values.get(thing.name)!);
+        seen.push(linksAreSeen || thing.form === "points" ? own : values.get(thing.name)!);
       }
     }
     if (!seen.length) return;

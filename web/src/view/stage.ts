@@ -1,24 +1,18 @@
 /** The picture of a world: objects in layers, a camera, light. It draws when something has changed, never by itself. */
 import * as THREE from "three";
 import { OrbitControls } from "three/examples/jsm/controls/OrbitControls.js";
-import type { Column, Frame, Numbers, SceneInfo, Vector } from "../engine/protocol";
+import { DRAWN_ON, FOG, GLOWING, GROUND, MATTER, SHADE, SIGNED, SOLID, SPRING, TRAIL } from "../engine/looks";
+import type { Column, Form, Frame, Numbers, SceneInfo, Vector } from "../engine/protocol";
 import { FAMILIES, familiesOf, isOn, linked } from "../links";
-import { PALETTE, SIGNED } from "./colors";
 import { Depths } from "./depths";
 import { type Grid, gridOf, type Layer, PIXELS, Pieces, PlaneField, Points, Range, type Rgb, SpaceField, Surface, scalars } from "./layers";
 import { LOOK, type Look } from "./look";
-import { arrows, carry, countOf, endsOf, leapOf, outline, planeOf, sharp, shownOf } from "./scenery";
+import { along, arrows, carry, outline, sharp, shownOf } from "./scenery";
 import { isLeft, type Legend, type Shaded, Shades } from "./shades";
 import { trails } from "./trails";
 
-const SMOKE: Rgb = [0.52, 0.53, 0.56];
-/** Fluid density [kg/m³] from which smoke counts as dye, with a colour of its own; as in python/tumble/pictures/things.py. */
-const LIQUID = 100;
-const SOLID: Rgb = [0.42, 0.41, 0.39];
-const GLOWING = 1000;
-
 interface Thing extends Shaded {
-  kind: "points" | "curve" | "surface" | "solid" | "ground" | "plane" | "space";
+  form: Form;
   color: Rgb;
   radius: number;
   trail: number;
@@ -35,10 +29,9 @@ interface Thing extends Shaded {
 
 type Entry = Record<string, any>;
 
-const linear = (code: string): Rgb => {
-  const c = new THREE.Color(code);
-  return [c.r, c.g, c.b];
-};
+const isLine = (form: Form) => form === "curve" || form === "strands";
+const isSkin = (form: Form) => form === "surface" || form === "body";
+const isSolid = (form: Form) => form === "solid" || form === "container";
 
 export class Stage {
   readonly renderer: THREE.WebGLRenderer;
@@ -172,7 +165,7 @@ export class Stage {
       if (thing.grid) {
         if (this.look.arrows || this.look.field === "speed") names.add("velocity");
         if (this.look.field && this.look.field !== "speed") names.add(this.look.field);
-      } else if (thing.kind !== "solid" && thing.kind !== "ground") {
+      } else if (MATTER[thing.form] === "masses") {
         names.add("position");
         if (this.look.color === "speed") names.add("velocity");
         if (this.look.color === "strain") names.add("link_strain");
@@ -187,84 +180,54 @@ export class Stage {
     this.info = info;
     this.past = past;
     this.frame = null;
-    const entries = new Map<string, Entry>();
-    for (const list of Object.values(info.scene)) {
-      if (!Array.isArray(list)) continue;
-      for (const entry of list)
-        if (entry && typeof entry === "object" && typeof (entry as Entry).name === "string")
-          entries.set((entry as Entry).name, entry as Entry);
-    }
     this.shades = new Shades();
-    let colors = 0;
-    for (const object of info.objects) {
-      // Names of systems are no names of objects.
-      const list = info.scene[object.kind];
-      const entry: Entry = (Array.isArray(list) && list.find((e) => (e as Entry).name === object.name)) || entries.get(object.name) || {};
-      const topology = info.topology[object.name] ?? {};
-      const grid = gridOf(topology);
-      const solid = object.kind === "collider";
-      const at = solid ? planeOf(entry.shape) : undefined;
-      let color: Rgb;
-      if (Array.isArray(entry.color)) color = entry.color as Rgb;
-      else if (solid) color = at ? [0.82, 0.82, 0.82] : SOLID;
-      else if (grid?.flat === 3 && Number(entry.fluid_density ?? 0) < LIQUID) color = SMOKE;
-      else color = linear(PALETTE[colors++ % PALETTE.length]);
-      const kind: Thing["kind"] = grid
-        ? grid.flat === 3
-          ? "space"
-          : "plane"
-        : solid
-          ? at
-            ? "ground"
-            : "solid"
-          : topology.triangles?.data.length
-            ? "surface"
-            : topology.curve?.data.length
-              ? "curve"
-              : "points";
-      const radius = topology.radius?.data.length ? topology.radius.data[0] : 0.01;
+    for (const { object: name, form, color, radius, trail, period, plane, few } of info.looks.objects) {
+      const object = info.objects.find((o) => o.name === name);
+      const topology = info.topology[name] ?? {};
       const thing: Thing = {
-        name: object.name,
-        kind,
+        name,
+        form,
         color,
         radius,
-        trail: Number(entry.trail ?? 0),
-        leap: leapOf(info, object.system),
+        trail,
+        leap: period ? period / 2 : Infinity,
         topology,
-        grid,
-        families: familiesOf(info, object),
+        grid: gridOf(topology),
+        families: object ? familiesOf(info, object) : null,
         acting: [],
         ranges: new Map(),
-        at,
+        at: plane ? [new THREE.Vector3(...plane[0]), new THREE.Vector3(...plane[1])] : undefined,
       };
-      if (kind === "plane" && grid) thing.body = new PlaneField(grid, color);
-      else if (kind === "space" && grid) thing.body = new SpaceField(grid, color);
-      else if (kind === "solid" && topology.position && topology.triangles && !entry.inside) {
-        thing.body = new Surface(topology.position.data, topology.triangles.data, color, { moving: false, plain: info.dimension === 2 });
-      } else if (kind === "solid" && topology.position && topology.triangles) {
+      const { grid } = thing;
+      const { position, triangles } = topology;
+      if (form === "image" && grid) thing.body = new PlaneField(grid, color);
+      else if (form === "smoke" && grid) thing.body = new SpaceField(grid, color);
+      else if (form === "solid" && position && triangles) {
+        thing.body = new Surface(position.data, triangles.data, color, { moving: false, plain: info.dimension === 2 });
+      } else if (form === "container" && position && triangles) {
         thing.body = new Pieces(0, { thinnest: 1, lit: false });
-        thing.body.pairs(topology.position.data, sharp(topology.position.data, topology.triangles.data), color);
-      } else if (kind === "points") {
-        thing.body = new Points(this.night, countOf(entry) < 200 ? 3.5 : 1.5);
-        if (thing.trail > 0) this.add((thing.way = new Pieces(0.3 * radius, { lit: false, glow: this.night, thinnest: 0.8 })));
-      } else if (kind === "curve") {
+        thing.body.pairs(position.data, sharp(position.data, triangles.data), color);
+      } else if (form === "points") {
+        thing.body = new Points(this.night, few ? 3.5 : 1.5);
+        if (trail > 0) this.add((thing.way = new Pieces(TRAIL * radius, { lit: false, glow: this.night, thinnest: 0.8 })));
+      } else if (isLine(form)) {
         thing.body = new Pieces(radius, { thinnest: 1.5 });
-      } else if (at) {
+      } else if (form === "ground") {
         this.ground(thing);
       }
       if (thing.body) this.add(thing.body);
       if (topology.links?.data.length)
         this.add(
-          (thing.links = new Pieces(kind === "points" ? 0.25 * radius : 0, {
-            thinnest: kind === "curve" ? 2 : kind === "points" || topology.links.data.length < 8000 ? 1.2 : 0.7,
-            lit: kind === "points",
+          (thing.links = new Pieces(form === "points" ? SPRING * radius : 0, {
+            thinnest: isLine(form) ? 2 : form === "points" || topology.links.data.length < 8000 ? 1.2 : 0.7,
+            lit: form === "points",
           })),
         );
-      if (kind === "plane" && grid) {
+      if (form === "image" && grid) {
         this.add((thing.way = new Pieces(0, { lit: false, thinnest: 0.6 })));
         outline(thing.way, grid);
       }
-      if (kind === "plane") this.add((thing.arrows = new Pieces(0, { lit: false, thinnest: 1.1, front: true })));
+      if (form === "image") this.add((thing.arrows = new Pieces(0, { lit: false, thinnest: 1.1, front: true })));
       this.things.push(thing);
     }
     this.changed(info);
@@ -277,7 +240,7 @@ export class Stage {
     this.info = info;
     const own = linked(info);
     for (const thing of this.things) thing.acting = FAMILIES.map((f) => isOn(own.find((l) => l.name === thing.name)?.families[f]));
-    const ends = endsOf(info);
+    const ends = info.looks.anchors.flat();
     if (!this.anchors && ends.length) this.add((this.anchors = { pieces: new Pieces(0, { thinnest: 1.5 }), ends }).pieces);
     if (this.anchors) this.anchors.ends = ends;
   }
@@ -295,7 +258,7 @@ export class Stage {
     for (const thing of this.things) {
       if (!thing.plane) continue;
       const m = thing.plane.material as THREE.MeshStandardMaterial;
-      const own = thing.color.some((c) => Math.abs(c - 0.82) > 1e-6);
+      const own = thing.color.some((c, i) => Math.abs(c - GROUND[i]) > 1e-6);
       if (dark && !own) m.color.setRGB(0.06, 0.066, 0.075, THREE.LinearSRGBColorSpace);
       else m.color.setRGB(...thing.color, THREE.LinearSRGBColorSpace);
     }
@@ -345,7 +308,7 @@ export class Stage {
           high.setComponent(flat, middle);
         }
         box.expandByPoint(low).expandByPoint(high);
-      } else if (thing.kind === "solid" && thing.topology.position) {
+      } else if (isSolid(thing.form) && thing.topology.position) {
         take(thing.topology.position.data);
       } else {
         const x = columns[thing.name]?.position;
@@ -510,7 +473,7 @@ export class Stage {
         thing.plane.position.copy(foot);
         thing.plane.quaternion.setFromUnitVectors(new THREE.Vector3(0, 0, 1), n);
         thing.plane.scale.setScalar(far);
-      } else if (thing.kind === "solid") this.solid(thing, columns);
+      } else if (isSolid(thing.form)) this.solid(thing, columns);
       else if (thing.grid) this.field(thing, thing.grid, columns);
       else if (!this.look.hidden.includes(thing.name)) this.masses(thing, columns, frame);
     }
@@ -555,7 +518,7 @@ export class Stage {
     const name = shownOf(columns, this.look.field);
     if (!name) return;
     const column = columns[name] ?? columns.velocity;
-    const signed = SIGNED.includes(name) && column.width === 1;
+    const signed = (SIGNED.includes(name) || name === "difference") && column.width === 1;
     let values = scalars(column);
     // There is no less smoke than none.
     const sizes = grid.flat === 3 && signed && this.look.slice === null;
@@ -567,7 +530,7 @@ export class Stage {
     const [low, high] = range.pair;
     this.legend = { name, unit: column.unit, low, high };
     if (thing.body instanceof PlaneField) {
-      const dye = this.look.dye && (name === "density" || name === "fuel") && low === 0;
+      const dye = this.look.dye && FOG.includes(name) && low === 0;
       if (dye) this.legend = null;
       thing.body.set(name, values, [low, high], { dye, smoothly: !this.look.cells, lines: this.look.cells });
     } else if (thing.body instanceof SpaceField) {
@@ -617,10 +580,10 @@ export class Stage {
         const p = 3 * pairs[2 * piece];
         return [colors![p], colors![p + 1], colors![p + 2]];
       };
-    if (thing.kind === "surface") {
+    if (isSkin(thing.form)) {
       if (!thing.body) {
         thing.body = new Surface(x, thing.topology.triangles.data, thing.color, {
-          flat: this.info?.objects.find((o) => o.name === thing.name)?.kind === "block",
+          flat: thing.form === "body",
         });
         this.add(thing.body);
       }
@@ -629,10 +592,8 @@ export class Stage {
       surface.paint(colors);
       surface.tint(colors ? [1, 1, 1] : thing.color);
       surface.object.visible = !this.look.links;
-    } else if (thing.kind === "curve") {
-      const curve = thing.topology.curve.data;
-      const pairs = new Uint32Array(2 * Math.max(curve.length - 1, 0));
-      for (let i = 0; i + 1 < curve.length; i++) pairs.set([curve[i], curve[i + 1]], 2 * i);
+    } else if (isLine(thing.form)) {
+      const pairs = along(thing.topology.curve.data, thing.topology.curve_points?.data[0]);
       const gone = (piece: number) =>
         torn.has(Math.min(pairs[2 * piece], pairs[2 * piece + 1]) * n + Math.max(pairs[2 * piece], pairs[2 * piece + 1]));
       (thing.body as Pieces).pairs(x, pairs, colors ? ofPiece(pairs) : thing.color, gone);
@@ -647,9 +608,9 @@ export class Stage {
       }
     }
     if (thing.links && links) {
-      const shown = thing.kind === "points" || this.look.links || (this.flat && thing.kind !== "curve");
+      const shown = thing.form === "points" || this.look.links || (this.flat && !isLine(thing.form));
       thing.links.object.visible = shown;
-      const shade = thing.color.map((c) => c * (thing.kind === "points" ? 0.6 : this.look.links ? 1 : 0.35)) as Rgb;
+      const shade = thing.color.map((c) => c * (thing.form === "points" ? SHADE : this.look.links ? 1 : DRAWN_ON)) as Rgb;
       if (shown)
         thing.links.pairs(
           x,
@@ -675,7 +636,7 @@ export class Stage {
     let depth = Infinity;
     let found: { object: string; row: number; point: THREE.Vector3; mass: number } | null = null;
     for (const thing of this.things) {
-      if (!["points", "curve", "surface"].includes(thing.kind) || this.look.hidden.includes(thing.name)) continue;
+      if (MATTER[thing.form] !== "masses" || this.look.hidden.includes(thing.name)) continue;
       const x = this.frame.columns[thing.name]?.position?.data;
       if (!x) continue;
       const masses = thing.topology.mass?.data;

@@ -130,6 +130,13 @@ pub struct Fluid {
     pub stiffness: Option<f64>,
 }
 
+impl Fluid {
+    /// How many particles there are, about.
+    pub fn count(&self) -> f64 {
+        self.fill.iter().map(|b| b.size.iter().map(|s| (s / self.spacing).round().max(1.0)).product::<f64>()).sum()
+    }
+}
+
 /// A box filled with particles.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]

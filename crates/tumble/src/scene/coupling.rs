@@ -41,13 +41,18 @@ pub fn fasten(scene: &Scene, masses: &mut [Parts], issues: &mut Vec<Issue>) -> V
     anchors
 }
 
+/// Object and index of an end: "flag 3".
+pub fn named(words: &str) -> Option<(&str, usize)> {
+    words.rsplit_once(' ').and_then(|(name, index)| Some((name.trim(), index.parse().ok()?)))
+}
+
 /// The two ends of an anchor.
 fn link(scene: &Scene, anchor: &Anchor, parts: &[Parts], issues: &mut Vec<Issue>) -> Option<Link> {
     let mut end = |k: usize| -> Option<(usize, u32, Vector, f64)> {
         let path = format!("anchor \"{}\".between[{k}]", anchor.name);
         let words = &anchor.between[k];
         let mut wrong = |message: String| issues.push(Issue::new(path.clone(), message));
-        let Some((name, index)) = words.rsplit_once(' ').and_then(|(n, i)| Some((n.trim(), i.parse::<usize>().ok()?))) else {
+        let Some((name, index)) = named(words) else {
             wrong(format!("\"{words}\", expected an object and an index: \"flag 3\""));
             return None;
         };

@@ -41,9 +41,7 @@ pub fn masses(scene: &Scene, assets: &Assets) -> f64 {
     };
     let mut bytes = 0.0;
     for thing in &scene.particles {
-        let filled =
-            |f: &Fluid| f.fill.iter().map(|b| b.size.iter().map(|s| (s / f.spacing).round().max(1.0)).product::<f64>()).sum::<f64>();
-        let liquid = thing.fluid.as_ref().map_or(0.0, filled);
+        let liquid = thing.fluid.as_ref().map_or(0.0, Fluid::count);
         // A particle of a liquid has sums over its neighbours and a place among them besides.
         bytes += liquid * 3.0 * MASS;
         bytes += (thing.position.len() as f64 + thing.cloud.as_ref().map_or(0.0, |c| f64::from(c.count))) * MASS

@@ -8,12 +8,14 @@ mod grids;
 pub mod hand;
 mod hints;
 mod laws;
+mod looks;
 mod memory;
 mod methods;
 mod overrides;
 mod plausible;
 mod simulation;
 
+pub use looks::looks;
 pub use memory::memory;
 pub use methods::resolve;
 pub use overrides::{set, set_text};

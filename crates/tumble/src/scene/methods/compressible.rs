@@ -1,6 +1,6 @@
 //! Gases that sound runs through.
 
-use super::{MethodRules, is_in};
+use super::{MethodRules, is_in, on_grid};
 use crate::math::formula::Of;
 use crate::math::{Real, Vec3, VectorSignal};
 use crate::scene::Assets;
@@ -11,7 +11,8 @@ use crate::state::{Field, Place, Vectors};
 use crate::system::System;
 use crate::systems::compressible::{Compressible, Fluid, Gas, Settings};
 use tumble_interface::Issue;
-use tumble_interface::scene::{Compressible as Words, Integrator, Method, Scene};
+use tumble_interface::looks::{Colors, Look};
+use tumble_interface::scene::{Compressible as Words, Integrator, Method, Scene, System as Plan};
 
 /// Bytes for a cell, density and three components of velocity in all that a step keeps of them: measured, 44 numbers in either precision.
 const CELL: f64 = 46.0 * size_of::<Real>() as f64;
@@ -37,6 +38,11 @@ impl MethodRules for Rules {
 
     fn refusal(&self, integrator: Integrator) -> Option<String> {
         (integrator != Integrator::default()).then(|| "a compressible gas is stepped by symplectic_euler; leave it out".into())
+    }
+
+    fn looks(&self, scene: &Scene, plan: &Plan, colors: &mut Colors) -> Vec<Look> {
+        let own = scene.compressible.iter().filter(|thing| is_in(&thing.system, plan));
+        own.map(|thing| on_grid(&thing.name, scene, 0.0, colors)).collect()
     }
 
     fn memory(&self, scene: &Scene, _assets: &Assets) -> f64 {

@@ -1,6 +1,6 @@
 //! Masses under forces, and position-based dynamics.
 
-use super::{MethodRules, is_in};
+use super::{MethodRules, emitted, is_in, particles};
 use crate::geometry::motion::Pose;
 use crate::geometry::{Carrier, Collider, Vector};
 use crate::math::parallel::fold;
@@ -12,6 +12,7 @@ use crate::scene::{Assets, coupling, hints, memory};
 use crate::system::System;
 use crate::systems::dynamics::{Parts, Settings, Stepping};
 use tumble_interface::check::short;
+use tumble_interface::looks::{Colors, FEW, Form, Look, Rgb};
 use tumble_interface::scene::{Bits, Force as Words, Hair, Integrator, Method, Scene, Shape, System as Plan};
 use tumble_interface::warning::Code;
 use tumble_interface::{Issue, Mesh, SceneError, Warning};
@@ -71,6 +72,10 @@ impl MethodRules for Rules {
         idle.chain(hints::thin(scene)).collect()
     }
 
+    fn looks(&self, scene: &Scene, plan: &Plan, colors: &mut Colors) -> Vec<Look> {
+        drawn(scene, plan, colors)
+    }
+
     fn memory(&self, scene: &Scene, assets: &Assets) -> f64 {
         memory::masses(scene, assets)
     }
@@ -123,6 +128,30 @@ impl MethodRules for Rules {
         }
         Some(Box::new(system))
     }
+}
+
+/// How the objects of a system are drawn; what emitters make comes last.
+fn drawn(scene: &Scene, plan: &Plan, colors: &mut Colors) -> Vec<Look> {
+    let mut all = Vec::new();
+    let form = |name: &str, form: Form, color: Option<Rgb>, colors: &mut Colors| Look::new(name, form, colors.pick(color));
+    all.extend(scene.particles.iter().filter(|t| is_in(&t.system, plan)).map(|t| particles(t, colors)));
+    for t in scene.rope.iter().filter(|t| is_in(&t.system, plan)) {
+        let few = f64::from(t.segments) + 1.0 < FEW;
+        all.push(Look { few, ..form(&t.name, Form::Curve, t.color, colors).with_radius(t.radius) });
+    }
+    for t in scene.hair.iter().filter(|t| is_in(&t.system, plan)) {
+        all.push(Look { strands: t.render, ..form(&t.name, Form::Strands, t.color, colors).with_radius(t.radius) });
+    }
+    all.extend(scene.sheet.iter().filter(|t| is_in(&t.system, plan)).map(|t| form(&t.name, Form::Surface, t.color, colors)));
+    all.extend(scene.block.iter().filter(|t| is_in(&t.system, plan)).map(|t| form(&t.name, Form::Body, t.color, colors)));
+    all.extend(scene.net.iter().filter(|t| is_in(&t.system, plan)).map(|t| form(&t.name, Form::Surface, t.color, colors)));
+    all.extend(scene.cloth.iter().filter(|t| is_in(&t.system, plan)).map(|t| form(&t.name, Form::Surface, t.color, colors)));
+    for t in scene.galaxy.iter().filter(|t| is_in(&t.system, plan)) {
+        let look = form(&t.name, Form::Points, t.color, colors).with_radius(t.radius);
+        all.push(Look { trail: t.trail, few: f64::from(t.stars) < FEW, ..look });
+    }
+    all.extend(scene.emitter.iter().filter(|t| is_in(&t.system, plan)).map(|t| emitted(t, colors)));
+    all
 }
 
 /// The objects of a system, kind by kind, in the order of the scene.

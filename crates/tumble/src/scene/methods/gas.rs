@@ -1,6 +1,6 @@
 //! Stable Fluids: from the words of a fluid to the fluid, and what it moves.
 
-use super::{MethodRules, is_in, place, rules};
+use super::{MethodRules, is_in, on_grid, place, rules};
 use crate::fluids::{Ball, Beyond, Sheet, Solids, hold};
 use crate::geometry::Collider;
 use crate::linalg::poisson::{Excess, Method as Solve, Params, Target};
@@ -17,9 +17,10 @@ use crate::system::System;
 use crate::systems::gas::{Fire, Fluid, Gas, Settings, Source};
 use std::sync::Arc;
 use tumble_interface::check::{plain, suggestion};
+use tumble_interface::looks::{Colors, Look};
 use tumble_interface::scene::{
     Carriage, Component, Densities, ExcessFlow, Field as Flow, Gas as Words, GasSide, GridInterpolation, Integrator, Method, PathTrace,
-    PressureMethod, Scene, Shape, Solid, Temperature,
+    PressureMethod, Scene, Shape, Solid, System as Plan, Temperature,
 };
 use tumble_interface::warning::Code;
 use tumble_interface::{Issue, Warning};
@@ -84,6 +85,11 @@ impl MethodRules for Rules {
         let alone = scene.gas.iter().filter(|gas| scene.collider.is_empty() && !gas.bodies.is_empty());
         let message = "the sides of the box are no obstacle to balls, and there is no collider; add one of its shape with inside = true";
         alone.map(|gas| Warning::new(Code::NoCollider, format!("gas \"{}\".bodies", gas.name), message)).collect()
+    }
+
+    fn looks(&self, scene: &Scene, plan: &Plan, colors: &mut Colors) -> Vec<Look> {
+        let own = scene.gas.iter().filter(|thing| is_in(&thing.system, plan));
+        own.map(|thing| on_grid(&thing.name, scene, thing.fluid_density, colors)).collect()
     }
 
     fn memory(&self, scene: &Scene, _assets: &Assets) -> f64 {

@@ -1,6 +1,6 @@
 //! Heat in bodies: words to materials, boundaries and sources.
 
-use super::{MethodRules, is_in};
+use super::{MethodRules, is_in, on_grid};
 use crate::geometry::{Shape, Vector};
 use crate::math::parallel::fold;
 use crate::math::{Real, Signal};
@@ -15,6 +15,7 @@ use crate::system::System;
 use crate::systems::dynamics::MOST_SUBSTEPS;
 use crate::systems::heat::{Boundary, Heat, HeatedBody, Material, Plan, SAFE, Settings, Source};
 use tumble_interface::check::short;
+use tumble_interface::looks::{Colors, Look};
 use tumble_interface::scene::{
     Animated, Component, Heat as Words, HeatScheme, HeatSide, Integrator, Method, Scene, Shape as Solid, System as Stepping,
 };
@@ -49,6 +50,11 @@ impl MethodRules for Rules {
 
     fn hints(&self, scene: &Scene) -> Vec<Warning> {
         scene.heat.iter().filter_map(|t| odd_density(format!("heat \"{}\".density", t.name), t.density, 0.0)).collect()
+    }
+
+    fn looks(&self, scene: &Scene, plan: &Stepping, colors: &mut Colors) -> Vec<Look> {
+        let own = scene.heat.iter().filter(|thing| is_in(&thing.system, plan));
+        own.map(|thing| on_grid(&thing.name, scene, 0.0, colors)).collect()
     }
 
     fn memory(&self, scene: &Scene, _assets: &Assets) -> f64 {

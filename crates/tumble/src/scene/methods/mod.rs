@@ -9,8 +9,10 @@ mod vicsek;
 
 use super::Assets;
 use super::build::Builder;
+use super::laws::flat;
 use crate::system::System;
-use tumble_interface::scene::{Integrator, Method, Particles, Scene, System as Plan};
+use tumble_interface::looks::{Colors, FEW, Form, LIQUID, Look, RADIUS, SMOKE};
+use tumble_interface::scene::{Emitter, Integrator, Method, Particles, Scene, System as Plan};
 use tumble_interface::{Issue, Warning};
 
 /// All methods. Where several can move a kind of objects, the first is its default.
@@ -72,6 +74,9 @@ pub trait MethodRules: Sync {
         Vec::new()
     }
 
+    /// How the objects of one of its systems are drawn, in the order of its columns.
+    fn looks(&self, scene: &Scene, plan: &Plan, colors: &mut Colors) -> Vec<Look>;
+
     /// Bytes that its objects need, an upper estimate; those of kinds whose default is another method are counted there.
     fn memory(&self, scene: &Scene, assets: &Assets) -> f64;
 
@@ -113,6 +118,28 @@ fn words_of_masses(thing: &Particles) -> impl Iterator<Item = &'static str> {
         ("fluid", thing.fluid.is_some()),
     ];
     given.into_iter().filter_map(|(key, given)| given.then_some(key))
+}
+
+/// Particles, as all methods draw them.
+fn particles(thing: &Particles, colors: &mut Colors) -> Look {
+    let liquid = thing.fluid.as_ref().map_or(0.0, |fluid| fluid.count());
+    let count = thing.position.len() as f64 + thing.cloud.as_ref().map_or(0.0, |c| f64::from(c.count)) + liquid;
+    let look = Look::new(&thing.name, Form::Points, colors.pick(thing.color)).with_radius(thing.radius);
+    Look { trail: thing.trail, few: count < FEW, ..look }
+}
+
+/// Emitted particles, as all methods draw them.
+fn emitted(thing: &Emitter, colors: &mut Colors) -> Look {
+    let radius = if thing.radius_spread > 0.0 { RADIUS } else { thing.radius };
+    Look { trail: thing.trail, ..Look::new(&thing.name, Form::Points, colors.pick(thing.color)).with_radius(radius) }
+}
+
+/// What lies on a grid: an image in a plane, smoke in space, which has a colour of its own in a liquid only.
+fn on_grid(name: &str, scene: &Scene, density: f64, colors: &mut Colors) -> Look {
+    match flat(scene) {
+        Some(_) => Look::new(name, Form::Image, colors.pick(None)),
+        None => Look::new(name, Form::Smoke, if density < LIQUID { SMOKE } else { colors.pick(None) }),
+    }
 }
 
 /// The methods that move objects of the scene.

@@ -1,6 +1,6 @@
 //! Tracers: massless particles that velocity fields carry.
 
-use super::{MethodRules, is_in, place, present, words_of_masses};
+use super::{MethodRules, emitted, is_in, particles, place, present, words_of_masses};
 use crate::geometry::Vector;
 use crate::recipes::Site;
 use crate::scene::Assets;
@@ -10,7 +10,8 @@ use crate::state::Object;
 use crate::system::System;
 use crate::systems::dynamics::Parts;
 use crate::systems::tracers::{Settings, Tracers};
-use tumble_interface::scene::{Emitter, Field, Integrator, Kill, Method, Particles, Scene};
+use tumble_interface::looks::{Colors, Look};
+use tumble_interface::scene::{Emitter, Field, Integrator, Kill, Method, Particles, Scene, System as Plan};
 use tumble_interface::warning::Code;
 use tumble_interface::{Issue, Warning};
 
@@ -61,6 +62,13 @@ impl MethodRules for Rules {
             }
         }
         warnings
+    }
+
+    fn looks(&self, scene: &Scene, plan: &Plan, colors: &mut Colors) -> Vec<Look> {
+        let all = scene.particles.iter().filter(|t| is_in(&t.system, plan)).map(|t| particles(t, colors));
+        let mut all: Vec<Look> = all.collect();
+        all.extend(scene.emitter.iter().filter(|t| is_in(&t.system, plan)).map(|t| emitted(t, colors)));
+        all
     }
 
     /// Particles are counted as masses.

@@ -1,6 +1,6 @@
 //! The model of Vicsek.
 
-use super::{MethodRules, is_in, words_of_masses};
+use super::{MethodRules, is_in, particles, words_of_masses};
 use crate::geometry::Vector;
 use crate::scene::Assets;
 use crate::scene::build::Builder;
@@ -8,7 +8,8 @@ use crate::state::Object;
 use crate::system::System;
 use crate::systems::vicsek::Swarm;
 use tumble_interface::Issue;
-use tumble_interface::scene::{Integrator, Method, Particles, Plane, Scene};
+use tumble_interface::looks::{Colors, Look};
+use tumble_interface::scene::{Integrator, Method, Particles, Plane, Scene, System as Plan};
 
 pub struct Rules;
 
@@ -50,6 +51,12 @@ impl MethodRules for Rules {
                 _ => {}
             }
         }
+    }
+
+    fn looks(&self, scene: &Scene, plan: &Plan, colors: &mut Colors) -> Vec<Look> {
+        let period = plan.vicsek.as_ref().map(|words| words.side);
+        let own = scene.particles.iter().filter(|t| is_in(&t.system, plan));
+        own.map(|t| Look { period, ..particles(t, colors) }).collect()
     }
 
     /// Particles are counted as masses.

@@ -1,0 +1,215 @@
+//! The files that a scene names, resolved for every front: what is read of each, the hash of its content, and all that is wrong with them.
+//! Where bytes come from is the front's ([`Files`]). Verified by `tests/assets.rs`.
+
+use crate::{Format, character, fabric, mesh, record_is_json, shipped};
+use std::collections::HashMap;
+use std::sync::{Arc, OnceLock};
+use tumble_interface::scene::FabricRef;
+use tumble_interface::{Assets, Character, Fabric, Issue, Mesh, Scene, SceneError};
+use twox_hash::XxHash3_64;
+
+/// Where a front finds the files of a scene.
+pub trait Files {
+    /// What to do about a file whose content has changed.
+    const RESTORE: &'static str;
+    /// Suffixes of meshes, beside those of [`Format`], that it converts ([`File::converted`]).
+    const CONVERTED: &'static [&'static str] = &[];
+
+    /// The file of a path, as it stands in the scene; or one line that says why there is none.
+    fn open(&mut self, path: &str) -> Result<Arc<File>, String>;
+
+    /// The path as messages show it.
+    fn shown(&self, path: &str) -> String {
+        path.into()
+    }
+}
+
+/// A file. What it holds is read when it is first asked for, and once.
+#[derive(Debug)]
+pub struct File {
+    bytes: Vec<u8>,
+    hash: String,
+    format: Option<Format>,
+    /// Name of the format that it was converted from.
+    converted: Option<&'static str>,
+    json: Option<bool>,
+    mesh: OnceLock<Result<Mesh, String>>,
+    character: OnceLock<Result<Character, String>>,
+    fabric: OnceLock<Result<Fabric, String>>,
+}
+
+impl File {
+    /// A file of this path and content.
+    pub fn new(path: &str, bytes: Vec<u8>) -> Self {
+        Self {
+            hash: format!("{:016x}", XxHash3_64::oneshot(&bytes)),
+            bytes,
+            format: Format::from_path(path),
+            converted: None,
+            json: record_is_json(path),
+            mesh: OnceLock::new(),
+            character: OnceLock::new(),
+            fabric: OnceLock::new(),
+        }
+    }
+
+    /// The same, where its mesh was written out as OBJ from a format of that name.
+    pub fn converted(self, name: &'static str, obj: String) -> Self {
+        Self { bytes: obj.into_bytes(), format: Some(Format::Obj), converted: Some(name), ..self }
+    }
+
+    /// Hash of its content.
+    pub fn hash(&self) -> &str {
+        &self.hash
+    }
+
+    /// Its mesh; or what is wrong, in one line.
+    pub fn mesh(&self) -> Result<&Mesh, &str> {
+        let read = || {
+            let format = self.format.ok_or_else(|| format!("it has none of the suffixes {}", suffixes(&[])))?;
+            mesh(&self.bytes, format).map_err(|e| self.converted.map_or_else(|| e.clone(), |name| e.replacen(format.name(), name, 1)))
+        };
+        self.mesh.get_or_init(read).as_ref().map_err(String::as_str)
+    }
+
+    /// Its figure; or what is wrong, in one line.
+    pub fn character(&self) -> Result<&Character, &str> {
+        self.character.get_or_init(|| character(&self.bytes)).as_ref().map_err(String::as_str)
+    }
+
+    /// Its record of a fabric; or what is wrong, in one line.
+    pub fn fabric(&self) -> Result<&Fabric, &str> {
+        let read = || fabric(&self.bytes, self.json.ok_or_else(|| format!("it has none of the suffixes {RECORDS}"))?);
+        self.fabric.get_or_init(read).as_ref().map_err(String::as_str)
+    }
+
+    /// Reads whatever its suffix promises; an error where it is nothing that a scene can name.
+    pub fn check(&self, path: &str) -> Result<(), String> {
+        let figure = self.format == Some(Format::Glb) || path.to_lowercase().ends_with(".gltf");
+        let read = match (self.json, self.mesh()) {
+            (Some(_), _) => self.fabric().map(drop),
+            (None, Err(e)) if figure => self.character().map(drop).map_err(|_| e),
+            (None, mesh) => mesh.map(drop),
+        };
+        read.map_err(|e| format!("\"{path}\": {e}"))
+    }
+}
+
+/// Suffixes of records of fabrics.
+const RECORDS: &str = ".toml, .json";
+
+/// Suffixes of meshes.
+fn suffixes(more: &[&str]) -> String {
+    let own = Format::ALL.map(|format| format.name().to_lowercase());
+    let all: Vec<String> = own.iter().map(String::as_str).chain(more.iter().copied()).map(|suffix| format!(".{suffix}")).collect();
+    all.join(", ")
+}
+
+/// The mesh of a path, and the file.
+///
+/// # Errors
+/// One line: what is wrong with the file, and what to do.
+pub fn mesh_of<F: Files>(files: &mut F, path: &str) -> Result<(Mesh, Arc<File>), String> {
+    let shown = files.shown(path);
+    let suffix = path.rsplit_once('.').map_or("", |(_, suffix)| suffix);
+    if Format::from_path(path).is_none() && !F::CONVERTED.iter().any(|known| known.eq_ignore_ascii_case(suffix)) {
+        return Err(format!("\"{shown}\" has none of the suffixes {}", suffixes(F::CONVERTED)));
+    }
+    let file = files.open(path)?;
+    let mesh = file.mesh().map_err(|e| format!("\"{shown}\": {e}"))?.clone();
+    Ok((mesh, file))
+}
+
+/// The record of a path, and the file.
+///
+/// # Errors
+/// One line: what is wrong with the file, and what to do.
+pub fn fabric_of<F: Files>(files: &mut F, path: &str) -> Result<(Fabric, Arc<File>), String> {
+    let shown = files.shown(path);
+    if record_is_json(path).is_none() {
+        return Err(format!("\"{shown}\" has none of the suffixes {RECORDS}"));
+    }
+    let file = files.open(path)?;
+    let fabric = file.fabric().map_err(|e| format!("\"{shown}\": {e}"))?.clone();
+    Ok((fabric, file))
+}
+
+/// All that a scene names, each file opened once; the hashes of their content are noted in the scene.
+///
+/// # Errors
+/// All that is wrong with them, at their places in the scene.
+pub fn assets<F: Files>(scene: &mut Scene, files: &mut F) -> Result<Assets, SceneError> {
+    let mut files = Once { files, known: HashMap::new() };
+    let mut issues = Vec::new();
+    let (mut meshes, mut characters, mut fabrics) = (HashMap::new(), HashMap::new(), HashMap::new());
+    for file in scene.mesh_files_mut() {
+        let path = file.path;
+        let read = if file.skinned {
+            files.open(path).and_then(|read| {
+                if !characters.contains_key(path) {
+                    let figure = read.character().map_err(|e| format!("\"{}\": {e}", files.shown(path)))?;
+                    characters.insert(path.to_string(), figure.clone());
+                }
+                Ok(read)
+            })
+        } else {
+            mesh_of(&mut files, path).map(|(mesh, read)| {
+                meshes.insert(path.to_string(), mesh);
+                read
+            })
+        };
+        match read {
+            Ok(read) => issues.extend(noted::<F>(&file.place, path, file.hash, Some(read.hash().into()))),
+            Err(message) => issues.push(Issue::new(format!("{}.path", file.place), message)),
+        }
+    }
+    for FabricRef { place, words } in scene.fabrics_mut() {
+        let key = words.key().to_string();
+        let read = match words.choice() {
+            Err(message) => Err((String::new(), message)),
+            Ok(None) => shipped(&key).map(|fabric| (fabric, None)).map_err(|e| (words.name_key().into(), e)),
+            Ok(Some(path)) => {
+                let read = fabric_of(&mut files, path).map_err(|e| (".path".into(), e));
+                read.map(|(fabric, file)| (fabric, Some(file.hash().to_string())))
+            }
+        };
+        match read {
+            Ok((fabric, found)) => {
+                issues.extend(words.hash_mut().and_then(|hash| noted::<F>(&place, &key, hash, found)));
+                fabrics.insert(key, fabric);
+            }
+            Err((below, message)) => issues.push(Issue::new(format!("{place}{below}"), message)),
+        }
+    }
+    if issues.is_empty() { Ok(Assets::new(meshes, characters).with_fabrics(fabrics)) } else { Err(SceneError { issues }) }
+}
+
+/// Notes the hash that was found; an issue where another stands there.
+fn noted<F: Files>(place: &str, path: &str, hash: &mut Option<String>, found: Option<String>) -> Option<Issue> {
+    let message = || format!("the content of \"{path}\" has changed since this scene was resolved; {}, or leave out hash", F::RESTORE);
+    let issue = (hash.is_some() && *hash != found).then(|| Issue::new(format!("{place}.hash"), message()));
+    *hash = found;
+    issue
+}
+
+/// Opens each file once.
+struct Once<'a, F> {
+    files: &'a mut F,
+    known: HashMap<String, Result<Arc<File>, String>>,
+}
+
+impl<F: Files> Files for Once<'_, F> {
+    const RESTORE: &'static str = F::RESTORE;
+    const CONVERTED: &'static [&'static str] = F::CONVERTED;
+
+    fn open(&mut self, path: &str) -> Result<Arc<File>, String> {
+        if !self.known.contains_key(path) {
+            self.known.insert(path.into(), self.files.open(path));
+        }
+        self.known[path].clone()
+    }
+
+    fn shown(&self, path: &str) -> String {
+        self.files.shown(path)
+    }
+}
