@@ -12,7 +12,7 @@ VERSION := $(shell sed -n 's/^version = "\(.*\)"/\1/p' Cargo.toml | head -n 1)
 WEB := $(shell find web -path web/node_modules -prune -o -path web/dist -prune -o -path $(PKG) -prune -o -type f -print) \
 	$(shell find python/tumble/scenes docs/theory -type f)
 
-.PHONY: help setup demo test prepare lint lint-rust test-rust test-python test-web web wasm wasm-target wheel debian chromium openvdb validate validate-rust validate-python validate-matrix validate-native audit bench clean
+.PHONY: help setup demo test prepare rust-tests lint lint-rust test-rust test-python test-web web wasm wasm-target wheel debian chromium openvdb validate validate-rust validate-python validate-matrix validate-native audit bench clean
 
 help:
 	@echo "make demo      set up, let a dress dance, show where the film is"
@@ -61,7 +61,10 @@ test:
 
 # Builds and downloads, side by side: none of them keeps two cores busy all the time.
 prepare:
-	@$(MAKE) --no-print-directory -j 4 debian web/node_modules/.ready $(VENV)/.imports $(VENV)/.engine lint-rust wasm
+	@$(MAKE) --no-print-directory -j 5 debian web/node_modules/.ready $(VENV)/.imports rust-tests lint-rust wasm
+
+# The longest chain of builds, beside those of clippy and of the browser's modules.
+rust-tests: $(VENV)/.engine
 	@cargo test $(RUST_TESTS) --no-run --quiet
 
 lint-rust:

@@ -87,6 +87,10 @@ class StepReport(TypedDict):
     """Smallest and largest sub-step [s]."""
     sweeps: int
     """Sweeps over the elements of position-based systems."""
+    passes: int
+    """Passes through exchange intervals that `world.coupling` repeats."""
+    disagreement: float | None
+    """Change of the impulses on a system in the last pass through an interval, relative to them, at most."""
     broken: int
     """Links that broke."""
     pressure: list[float]

@@ -292,11 +292,11 @@ fn repeated_intervals_have_order_two_whichever_system_goes_first() {
     }
 }
 
-/// Intervals in which the pair turns by two radians: taken once they explode, repeated they stay near the exact motion, and lose no momentum.
+/// Intervals in which the pair swings almost once: taken once they explode, repeated they keep the energy, and lose no momentum.
 #[test]
 fn repeated_intervals_hold_where_explicit_exchange_explodes() {
     for swapped in [false, true] {
-        let z = 2.0;
+        let z = 6.0;
         let mut once = repeated(swapped, z, "");
         let mut agreed = repeated(swapped, z, "world.coupling = { tolerance = 1e-6, iterations = 100 }");
         let mut worst = (0.0_f64, 0.0_f64);
@@ -316,8 +316,9 @@ fn repeated_intervals_hold_where_explicit_exchange_explodes() {
             worst.1,
             energy(&once)
         );
-        assert!(worst.0 < 1e-12 && worst.1 < 1.5, "{worst:?}");
-        assert!(energy(&once) > 100.0 || once.frame_index() < 30, "{}", energy(&once));
+        // Measured: 1.0, and 4e18 and 1e26 times the energy taken once.
+        assert!(worst.0 < 1e-11 && worst.1 < 1.05 && worst.1 > 0.5, "{worst:?}");
+        assert!(energy(&once) > 1e6 || once.frame_index() < 30, "{}", energy(&once));
         assert_eq!(agreed.warnings(), []);
     }
 }

@@ -788,7 +788,7 @@ fn events_of_one_system_bear_particles_of_another() {
         simulation(&format!(
             "time = {{ fps = 24, exchanges = 2 }}\n[[system]]\nname = \"rain\"\nintegrator = \"verlet\"\nsubsteps = 4\n\
              [[system]]\nname = \"water\"\nintegrator = \"rk4\"\nsubsteps = 4\n\
-             [[system]]\nname = \"ink\"\nmethod = \"tracers\"\nsubsteps = 4\n[[field]]\nkind = \"uniform\"\nvelocity = [0, 0, 2]\n\
+             [[system]]\nname = \"ink\"\nmethod = \"tracers\"\nintegrator = \"rk4\"\nsubsteps = 4\n[[field]]\nkind = \"uniform\"\nvelocity = [0, 0, 2]\n\
              [[emitter]]\nname = \"drop\"\nsystem = \"rain\"\nrate = 20\njitter = 1\nlifetime = 0.9\nlifetime_spread = 0.2\nfrom.disk = {{ center = [0, 0, 1], radius = 0.3 }}\n\
              {}{}{}{}\
              [[emitter]]\nname = \"stain\"\nsystem = \"ink\"\nburst = [{{ count = 2 }}]\nfrom.particles = {{ of = \"drop\", at = \"bounce\" }}\n\
@@ -827,7 +827,7 @@ fn events_of_one_system_bear_particles_of_another() {
 fn parents_in_other_systems_come_first_and_meet_what_children_ask_for() {
     let refused = |systems: [&str; 2], child: &str| {
         let text = format!(
-            "version = 1\n[[system]]\nname = \"{}\"\n[[system]]\nname = \"{}\"\n[[system]]\nname = \"dust\"\nmethod = \"tracers\"\n\
+            "version = 1\n[[system]]\nname = \"{}\"\n[[system]]\nname = \"{}\"\n[[system]]\nname = \"dust\"\nmethod = \"tracers\"\nintegrator = \"rk4\"\n\
              [[field]]\nkind = \"uniform\"\nvelocity = [0, 0, 2]\n[[collider]]\nname = \"f\"\nshape.floor.height = 0\n\
              [[emitter]]\nname = \"p\"\nsystem = \"a\"\nrate = 1\nlifetime = 1\nfrom.point = {{}}\n\
              [[emitter]]\nname = \"s\"\nsystem = \"dust\"\nrate = 1\nlifetime = 1\nfrom.point = {{}}\n\

@@ -67,6 +67,10 @@ export interface StepReport {
   step_range: [number, number] | null;
   /** Sweeps over the elements of position-based systems. */
   sweeps: number;
+  /** Passes through exchange intervals that `world.coupling` repeats. */
+  passes: number;
+  /** Change of the impulses on a system in the last pass through an interval, relative to them, at most. */
+  disagreement: number | null;
   /** Links that broke. */
   broken: number;
   /** Residuals of the last pressure solve after each iteration, relative to its start. */
@@ -87,6 +91,8 @@ export function together(a: StepReport, b: StepReport): StepReport {
     courant: largest(a.courant, b.courant),
     step_range: widest(a.step_range, b.step_range),
     sweeps: a.sweeps + b.sweeps,
+    passes: a.passes + b.passes,
+    disagreement: largest(a.disagreement, b.disagreement),
     broken: a.broken + b.broken,
     pressure: b.pressure.length ? b.pressure : a.pressure,
   };
