@@ -210,7 +210,7 @@ class World:
 
     @property
     def ledger(self) -> Ledger:
-        """The books, now; `tumble.measures.LEDGER` describes each number."""
+        """The ledger, now; `tumble.measures.LEDGER` describes each number."""
 
     def account(self) -> dict[str, Any]:
         """Breakdown of the ledger, and the places of its worst numbers: `systems` as (name, ledger), `shares` with system,

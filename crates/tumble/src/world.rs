@@ -212,7 +212,7 @@ impl World {
 
     /// Lets `see` look at the world after `n` sub-steps of the next frame, at the time [s] of the system that took the last one, with
     /// the name of that system and the length of the sub-step [s]; then the world is back at its last good frame. `None`: the frame
-    /// has no more sub-steps, or `go_on` said no.
+    /// has no more sub-steps, or `go_on` said no. Where intervals are repeated, the sub-steps of all passes count, one after the other.
     pub fn inside<T>(
         &mut self,
         n: u64,
