@@ -1,13 +1,11 @@
 //! What joins systems: anchors between masses.
 
-use super::build::Builder;
 use super::methods::place;
 use crate::geometry::Vector;
-use crate::systems::dynamics::{self, Dynamics, Parts, SpringPart};
+use crate::systems::dynamics::{Parts, SpringPart};
+use tumble_interface::Issue;
 use tumble_interface::check::suggestion;
 use tumble_interface::scene::{Anchor, Scene};
-use tumble_interface::warning::Code;
-use tumble_interface::{Issue, Warning};
 
 /// An anchor whose ends have been found: system and point of each.
 pub struct Link {
@@ -17,7 +15,7 @@ pub struct Link {
     pub damping: f64,
     pub rest_length: f64,
     /// 1/m1 + 1/m2 [1/kg].
-    inverse_mass: f64,
+    pub inverse_mass: f64,
 }
 
 /// Finds the ends of all anchors; within a system they are springs of its own.
@@ -87,33 +85,4 @@ fn link(scene: &Scene, anchor: &Anchor, parts: &[Parts], issues: &mut Vec<Issue>
         rest_length: anchor.rest_length.unwrap_or((a.2 - b.2).norm()),
         inverse_mass: a.3 + b.3,
     })
-}
-
-/// Between systems the one of the first end owns the spring; the other gives a body.
-pub fn hang(system: &mut Dynamics, index: usize, anchor: &Link, builder: &mut Builder<'_>) {
-    let ([(s, a), (t, b)], dt) = (anchor.ends, builder.interval);
-    if s != t && t == index {
-        system.expect_pushes();
-    }
-    if s == t || s != index {
-        return;
-    }
-    let other = builder.exchange.open(builder.ids[t], b as usize..b as usize + 1, false)[0];
-    system.add_anchor(dynamics::Anchor {
-        row: a as usize,
-        other,
-        stiffness: anchor.stiffness,
-        damping: anchor.damping,
-        rest_length: anchor.rest_length,
-    });
-    let turn = dt * (anchor.stiffness * anchor.inverse_mass).sqrt();
-    let damp = dt * anchor.damping * anchor.inverse_mass;
-    if builder.scene.world.coupling.is_none() && (turn > 0.5 || damp > 0.5) {
-        let times = (2.0 * turn.max(damp)).ceil();
-        let message = format!(
-            "omega dt = {turn:.2}, c dt/m = {damp:.2}; systems exchange impulses explicitly, which needs both below 0.5: \
-             raise time.exchanges {times} times, repeat intervals with world.coupling = {{}}, or put both objects into one system"
-        );
-        builder.warnings.push(Warning::new(Code::StiffAnchor, format!("anchor \"{}\"", anchor.name), message));
-    }
 }

@@ -7,10 +7,11 @@ use crate::math::parallel::fold;
 use crate::recipes::{self, Site};
 use crate::scene::build::{Builder, ask_for_events, emit};
 use crate::scene::checks::others;
+use crate::scene::coupling::Link;
 use crate::scene::laws::Reader;
-use crate::scene::{Assets, coupling, hints, memory};
+use crate::scene::{Assets, hints, memory};
 use crate::system::System;
-use crate::systems::dynamics::{Parts, Settings, Stepping};
+use crate::systems::dynamics::{Anchor, Dynamics, Parts, Settings, Stepping};
 use tumble_interface::check::short;
 use tumble_interface::looks::{Colors, FEW, Form, Look, Rgb};
 use tumble_interface::scene::{Bits, Force as Words, Hair, Integrator, Method, Scene, Shape, System as Plan};
@@ -124,7 +125,7 @@ impl MethodRules for Rules {
             system.expect_pushes();
         }
         for anchor in builder.anchors.clone().iter() {
-            coupling::hang(&mut system, index, anchor, builder);
+            hang(&mut system, index, anchor, builder);
         }
         Some(Box::new(system))
     }
@@ -288,6 +289,35 @@ fn buried(scene: &Scene, parts: &Parts, colliders: &[Collider]) -> Vec<Warning> 
         Some(Warning::new(Code::StartsInside, format!("\"{name}\""), message))
     };
     masses.chain(sources).filter_map(told).collect()
+}
+
+/// Between systems the one of the first end owns the spring; the other gives a body.
+fn hang(system: &mut Dynamics, index: usize, anchor: &Link, builder: &mut Builder<'_>) {
+    let ([(s, a), (t, b)], dt) = (anchor.ends, builder.interval);
+    if s != t && t == index {
+        system.expect_pushes();
+    }
+    if s == t || s != index {
+        return;
+    }
+    let other = builder.exchange.open(builder.ids[t], b as usize..b as usize + 1, false)[0];
+    system.add_anchor(Anchor {
+        row: a as usize,
+        other,
+        stiffness: anchor.stiffness,
+        damping: anchor.damping,
+        rest_length: anchor.rest_length,
+    });
+    let turn = dt * (anchor.stiffness * anchor.inverse_mass).sqrt();
+    let damp = dt * anchor.damping * anchor.inverse_mass;
+    if builder.scene.world.coupling.is_none() && (turn > 0.5 || damp > 0.5) {
+        let times = (2.0 * turn.max(damp)).ceil();
+        let message = format!(
+            "omega dt = {turn:.2}, c dt/m = {damp:.2}; systems exchange impulses explicitly, which needs both below 0.5: \
+             raise time.exchanges {times} times, repeat intervals with world.coupling = {{}}, or put both objects into one system"
+        );
+        builder.warnings.push(Warning::new(Code::StiffAnchor, format!("anchor \"{}\"", anchor.name), message));
+    }
 }
 
 /// The issues of objects, at their places in the scene.
