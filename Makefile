@@ -12,7 +12,7 @@ VERSION := $(shell sed -n 's/^version = "\(.*\)"/\1/p' Cargo.toml | head -n 1)
 WEB := $(shell find web -path web/node_modules -prune -o -path web/dist -prune -o -path $(PKG) -prune -o -type f -print) \
 	$(shell find python/tumble/scenes docs/theory -type f)
 
-.PHONY: help setup demo test prepare rust-tests lint lint-rust test-rust test-python test-web web wasm wasm-target wheel debian chromium openvdb validate validate-rust validate-python validate-matrix validate-native audit bench clean
+.PHONY: help setup demo test prepare rust-tests behind lint lint-rust test-rust test-python test-web web wasm wasm-target wheel debian chromium openvdb validate validate-rust validate-python validate-matrix validate-native audit bench clean
 
 help:
 	@echo "make demo      set up, let a dress dance, show where the film is"
@@ -61,9 +61,12 @@ test:
 
 # Builds and downloads, side by side: none of them keeps two cores busy all the time.
 prepare:
-	@$(MAKE) --no-print-directory -j 5 debian web/node_modules/.ready $(VENV)/.imports rust-tests lint-rust wasm
+	@$(MAKE) --no-print-directory -j 5 debian web/node_modules/.ready $(VENV)/.imports rust-tests behind
 
-# The longest chain of builds, beside those of clippy and of the browser's modules.
+# What can wait for the longest chain of builds: that of the Rust tests.
+behind:
+	@nice -n 15 $(MAKE) --no-print-directory -j 2 lint-rust wasm
+
 rust-tests: $(VENV)/.engine
 	@cargo test $(RUST_TESTS) --no-run --quiet
 

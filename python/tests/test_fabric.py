@@ -125,7 +125,7 @@ def test_strips_of_all_that_ships_pull_as_their_records_say(
 
 
 BENDING = {"broad": 11.57e-6, "tropical": 6.57e-6, "faille": 1.863e-6}
-"""Bending stiffnesses of shared/validation, 2.4 [N m]: the stiffest first."""
+"""Bending stiffnesses of section 2.4 of the reference figures [N m], the stiffest first."""
 
 
 def drape_coefficients(folder: Path, names: list[str], frames: int) -> list[float]:

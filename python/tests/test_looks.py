@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from tumble import Scene, SceneError, World, looks
+from tumble import Run, Scene, SceneError, World, looks
 from tumble.columns import KINDS
 from tumble.pictures.drawn import Tubes
 from tumble.pictures.things import Stage, objects
@@ -84,12 +84,21 @@ def test_a_run_says_how_its_objects_are_drawn(tmp_path: Path) -> None:
     assert (p.form, p.radius, p.color, p.trail, p.few) == ("points", 0.3, (0.1, 0.2, 0.3), 1.0, True)
     assert (q.object, floor.form, floor.plane) == ("q", "ground", ((0.0, 0.0, -9.0), (0.0, 0.0, 1.0)))
     assert [thing.name for thing in objects(run)] == ["p", "q", "floor"]
-    # One without stiffness holds nothing, and is not drawn.
+    # One without stiffness and damping does nothing, and is not drawn.
     assert run.looks.anchors == ((("q", 0), ("p", 0)),)
     (tube,) = (t for t in Stage(run).things(0) if isinstance(t, Tubes) and t.name == "anchors")
     np.testing.assert_allclose(tube.points, [[1, 0, 0], [0, 0, 0]])
 
 
-def test_words_of_another_version_are_told() -> None:
+def test_words_of_another_version_are_told(tmp_path: Path) -> None:
     with pytest.raises(SceneError, match="partikles"):
         looks.of(words(partikles=[]))
+    run = simulate(Scene(words(particles=[{"name": "p", "position": [[0, 0, 0]]}])), tmp_path / "run")
+    run.manifest["tumble"] = "0.0.1"
+    run.manifest["scene"]["expect"] = {"max_oddness": 1}
+    assert run.looks.objects[0].object == "p"
+    old = Run(tmp_path / "run")
+    old.manifest["tumble"] = "0.0.1"
+    old.manifest["scene"]["partikles"] = []
+    with pytest.raises(SceneError, match=r"a run of tumble 0\.0\.1, whose scene this version cannot read .*partikles"):
+        _ = old.looks

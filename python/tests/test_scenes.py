@@ -40,7 +40,7 @@ FEWER = {
     "gravity/encounter": ["galaxy.0.stars=2000", "galaxy.1.stars=2000"],
     "gravity/galaxy": ["galaxy.0.stars=4000"],
 }
-"""Of these scenes the beginning, too: the stable step is estimated from all pairs of stars."""
+"""Words of beginnings: with fewer stars, for the stable step is estimated from all pairs of them."""
 
 
 def keeps_what_it_expects(name: str, frames: int | None, folder: Path) -> None:

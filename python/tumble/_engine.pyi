@@ -149,10 +149,6 @@ class Scene:
         """The mesh files that it names: place of the name in the scene, its line or None, and the path as it stands there.
         Files of figures are left out."""
 
-    @property
-    def looks(self) -> dict[str, Any]:
-        """How its objects are drawn, in the order of their columns, and the ends of anchors; see `tumble.looks`."""
-
     @staticmethod
     def schema() -> dict[str, Any]:
         """JSON Schema of a scene; units are under "x-unit"."""
@@ -268,7 +264,8 @@ def load_fabric(fabric: str) -> dict[str, Any]:
     stretching [N/m] and bending [N m]. Raises SceneError."""
 
 def looks(tree: Mapping[str, Any]) -> dict[str, Any]:
-    """How the objects of a scene are drawn, as `Scene.looks`; of its files none is read. Raises SceneError."""
+    """How the objects of a scene are drawn, in the order of their columns, and the ends of anchors; see `tumble.looks`. None of
+    its files is read. Raises SceneError."""
 
 def load_mesh(path: Path) -> tuple[npt.NDArray[np.float64], npt.NDArray[np.uint32]]:
     """Vertices [file units] n x 3 and triangles m x 3 of an OBJ, PLY, STL, GLB or USD file. Raises SceneError."""

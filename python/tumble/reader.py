@@ -11,7 +11,7 @@ import numpy as np
 import numpy.typing as npt
 
 from tumble import _engine
-from tumble._engine import ExportError
+from tumble._engine import ExportError, SceneError
 from tumble.folder import (
     FORMAT,
     LEDGER,
@@ -106,7 +106,19 @@ class Run:
     @cached_property
     def looks(self) -> Looks:
         """How its objects are drawn. Raises SceneError where the words of its scene are those of another version."""
-        return looks_of(self.scene)
+        # What is bounded and written out changes no picture.
+        drawn = {key: value for key, value in self.scene.items() if key not in ("expect", "output")}
+        try:
+            return looks_of(drawn)
+        except SceneError as error:
+            made = self.manifest.get("tumble")
+            if made == _engine.version:
+                raise
+            text = (
+                f"a run of tumble {made}, whose scene this version cannot read ({error}); draw it with that version, or "
+                "simulate it again"
+            )
+            raise refuse(self.folder, text) from None
 
     @property
     def fps(self) -> float:

@@ -67,7 +67,7 @@ export const shipped = (): string[] =>
 /** All that is promised, as in `make validate`, and not the part of it that `make test` has time for. */
 export const WHOLE = !!process.env.TUMBLE_WHOLE;
 
-/** Scenes that take some seconds to be made and to take a step. What they show, others show, too. */
+/** Scenes that take some seconds to be made and to take a step: strands, fabrics and galaxies of full size are tried in `make validate`. */
 const HEAVY = [
   "cloth/drapes",
   "cloth/dress",

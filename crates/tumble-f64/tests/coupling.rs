@@ -7,6 +7,7 @@ use crate::common;
 
 use common::{orders, positions, run, simulation, slope, step, vector, velocities};
 use safetensors::SafeTensors;
+use std::sync::atomic::{AtomicU64, Ordering};
 use tumble_f64::reference::Oscillator;
 use tumble_f64::scene::Simulation;
 use tumble_interface::Engine;
@@ -32,19 +33,20 @@ fn systems([first, second]: [&str; 2], swapped: bool, substeps: u32) -> String {
     if swapped { second + &first } else { first + &second }
 }
 
-/// The same with intervals that are repeated, of z = w dt each, in sub-steps of 1e-4 s.
+/// The pair of [`pair`] in intervals of z = w dt each, in sub-steps of 1e-4 s; `coupling` may repeat them.
 fn repeated(swapped: bool, z: f64, coupling: &str) -> Simulation {
     let dt = z / W;
-    with(SCHEMES[0], 1, swapped, (dt / 1e-4).ceil() as u32, 1.0 / dt, coupling)
+    pair_with(SCHEMES[0], 1, swapped, (dt / 1e-4).ceil() as u32, 1.0 / dt, coupling)
 }
 
 /// Masses "a" and "b", each in a system of its own, on an anchor of length 1 m that is stretched by 0.1 m and belongs to a's system;
 /// they also move together. `swapped` lets b's system go first.
 fn pair(schemes: [&str; 2], exchanges: u32, swapped: bool, substeps: u32, fps: f64) -> Simulation {
-    with(schemes, exchanges, swapped, substeps, fps, "")
+    pair_with(schemes, exchanges, swapped, substeps, fps, "")
 }
 
-fn with(schemes: [&str; 2], exchanges: u32, swapped: bool, substeps: u32, fps: f64, more: &str) -> Simulation {
+/// The same with more words.
+fn pair_with(schemes: [&str; 2], exchanges: u32, swapped: bool, substeps: u32, fps: f64, more: &str) -> Simulation {
     let systems = systems(schemes, swapped, substeps);
     simulation(&format!(
         "time = {{ fps = {fps:e}, exchanges = {exchanges} }}\nworld.gravity = [0, 0, 0]\n{more}\n{systems}\
@@ -265,7 +267,7 @@ fn projected_springs_on_an_anchor_keep_momentum_and_have_order_one() {
     }
 }
 
-/// Largest error of either mass [m] after the time at which z n intervals end.
+/// Largest error of either mass now [m].
 fn off(sim: &Simulation) -> f64 {
     let exact = Oscillator { frequency: W, damping: 0.0, x0: 0.1, v0: 0.0 };
     let t = sim.time();
@@ -334,6 +336,34 @@ fn systems_that_do_not_agree_are_named_and_nothing_is_lost() {
     }
     let named: Vec<String> = sim.warnings().iter().map(|warning| format!("{} {}", warning.path, warning.message)).collect();
     assert!(named.len() == 1 && named[0].starts_with("system \"second\" what others do to it still changes by"), "{named:?}");
+}
+
+/// A front that says no within any pass leaves no trace: neither in what follows, nor as a warning.
+#[test]
+fn an_interval_that_is_cut_short_leaves_nothing_behind() {
+    let words = "world.coupling = { tolerance = 1e-3, iterations = 9 }";
+    let mut whole = repeated(true, 1.0, words);
+    let asked = AtomicU64::new(0);
+    let report = whole.step(&|| asked.fetch_add(1, Ordering::Relaxed) < u64::MAX).unwrap().unwrap();
+    let (asked, passes) = (asked.into_inner(), report.passes);
+    assert!(passes > 2 && asked > 2000, "{passes} {asked}");
+    let mut cut = repeated(true, 1.0, words);
+    let start = cut.hash();
+    for n in [1, asked / passes, asked / passes + 1, 2 * asked / passes + 7, asked - 2] {
+        let left = AtomicU64::new(0);
+        assert!(cut.step(&|| left.fetch_add(1, Ordering::Relaxed) < n).unwrap().is_none(), "{n}");
+        assert_eq!((cut.hash(), cut.warnings().len()), (start, 0), "{n}");
+    }
+    step(&mut cut);
+    assert_eq!(cut.hash(), whole.hash());
+    // Looks inside see the sub-steps of the first pass, then the interval that follows.
+    let per_system = report.steps / 2;
+    let times: Vec<f64> = [1, per_system, 2 * per_system, 2 * per_system + 1]
+        .map(|n| whole.inside(n, &["position"], &|| true).unwrap().map_or(f64::NAN, |inside| inside.frame.time))
+        .to_vec();
+    let dt = 1.0 / W;
+    assert!(times[0] > dt && times[0] < 1.01 * dt && (times[1] - 2.0 * dt).abs() < 1e-9 && (times[2] - 2.0 * dt).abs() < 1e-9, "{times:?}");
+    assert!(times[3].is_nan(), "{times:?}");
 }
 
 #[test]

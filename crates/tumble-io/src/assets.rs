@@ -3,7 +3,7 @@
 
 use crate::{Format, character, fabric, mesh, record_is_json, shipped};
 use std::collections::HashMap;
-use std::sync::{Arc, OnceLock};
+use std::sync::{Arc, Mutex, OnceLock, PoisonError};
 use tumble_interface::scene::FabricRef;
 use tumble_interface::{Assets, Character, Fabric, Issue, Mesh, Scene, SceneError};
 use twox_hash::XxHash3_64;
@@ -27,8 +27,11 @@ pub trait Files {
 /// A file. What it holds is read when it is first asked for, and once.
 #[derive(Debug)]
 pub struct File {
-    bytes: Vec<u8>,
+    /// Empty once they have been read, but for figures, which are meshes, too.
+    bytes: Mutex<Vec<u8>>,
     hash: String,
+    /// Whether it may hold a figure.
+    figure: bool,
     format: Option<Format>,
     /// Name of the format that it was converted from.
     converted: Option<&'static str>,
@@ -43,7 +46,8 @@ impl File {
     pub fn new(path: &str, bytes: Vec<u8>) -> Self {
         Self {
             hash: format!("{:016x}", XxHash3_64::oneshot(&bytes)),
-            bytes,
+            bytes: Mutex::new(bytes),
+            figure: Format::from_path(path) == Some(Format::Glb) || path.to_lowercase().ends_with(".gltf"),
             format: Format::from_path(path),
             converted: None,
             json: record_is_json(path),
@@ -55,7 +59,7 @@ impl File {
 
     /// The same, where its mesh was written out as OBJ from a format of that name.
     pub fn converted(self, name: &'static str, obj: String) -> Self {
-        Self { bytes: obj.into_bytes(), format: Some(Format::Obj), converted: Some(name), ..self }
+        Self { bytes: Mutex::new(obj.into_bytes()), format: Some(Format::Obj), converted: Some(name), ..self }
     }
 
     /// Hash of its content.
@@ -63,32 +67,45 @@ impl File {
         &self.hash
     }
 
+    /// Reads its bytes, and lets go of them.
+    fn read<T>(&self, read: impl FnOnce(&[u8]) -> T) -> T {
+        let mut bytes = self.bytes.lock().unwrap_or_else(PoisonError::into_inner);
+        let value = read(&bytes);
+        if !self.figure {
+            *bytes = Vec::new();
+        }
+        value
+    }
+
     /// Its mesh; or what is wrong, in one line.
     pub fn mesh(&self) -> Result<&Mesh, &str> {
         let read = || {
             let format = self.format.ok_or_else(|| format!("it has none of the suffixes {}", suffixes(&[])))?;
-            mesh(&self.bytes, format).map_err(|e| self.converted.map_or_else(|| e.clone(), |name| e.replacen(format.name(), name, 1)))
+            self.read(|bytes| mesh(bytes, format))
+                .map_err(|e| self.converted.map_or_else(|| e.clone(), |name| e.replacen(format.name(), name, 1)))
         };
         self.mesh.get_or_init(read).as_ref().map_err(String::as_str)
     }
 
     /// Its figure; or what is wrong, in one line.
     pub fn character(&self) -> Result<&Character, &str> {
-        self.character.get_or_init(|| character(&self.bytes)).as_ref().map_err(String::as_str)
+        self.character.get_or_init(|| self.read(character)).as_ref().map_err(String::as_str)
     }
 
     /// Its record of a fabric; or what is wrong, in one line.
     pub fn fabric(&self) -> Result<&Fabric, &str> {
-        let read = || fabric(&self.bytes, self.json.ok_or_else(|| format!("it has none of the suffixes {RECORDS}"))?);
+        let read = || {
+            let json = self.json.ok_or_else(|| format!("it has none of the suffixes {RECORDS}"))?;
+            self.read(|bytes| fabric(bytes, json))
+        };
         self.fabric.get_or_init(read).as_ref().map_err(String::as_str)
     }
 
     /// Reads whatever its suffix promises; an error where it is nothing that a scene can name.
     pub fn check(&self, path: &str) -> Result<(), String> {
-        let figure = self.format == Some(Format::Glb) || path.to_lowercase().ends_with(".gltf");
         let read = match (self.json, self.mesh()) {
             (Some(_), _) => self.fabric().map(drop),
-            (None, Err(e)) if figure => self.character().map(drop).map_err(|_| e),
+            (None, Err(e)) if self.figure => self.character().map(drop).map_err(|_| e),
             (None, mesh) => mesh.map(drop),
         };
         read.map_err(|e| format!("\"{path}\": {e}"))
@@ -105,19 +122,25 @@ fn suffixes(more: &[&str]) -> String {
     all.join(", ")
 }
 
-/// The mesh of a path, and the file.
+/// The mesh of a path, and the hash of the file.
 ///
 /// # Errors
 /// One line: what is wrong with the file, and what to do.
-pub fn mesh_of<F: Files>(files: &mut F, path: &str) -> Result<(Mesh, Arc<File>), String> {
+pub fn mesh_of<F: Files>(files: &mut F, path: &str) -> Result<(Mesh, String), String> {
     let shown = files.shown(path);
     let suffix = path.rsplit_once('.').map_or("", |(_, suffix)| suffix);
     if Format::from_path(path).is_none() && !F::CONVERTED.iter().any(|known| known.eq_ignore_ascii_case(suffix)) {
         return Err(format!("\"{shown}\" has none of the suffixes {}", suffixes(F::CONVERTED)));
     }
     let file = files.open(path)?;
-    let mesh = file.mesh().map_err(|e| format!("\"{shown}\": {e}"))?.clone();
-    Ok((mesh, file))
+    let hash = file.hash().to_string();
+    file.mesh().map_err(|e| format!("\"{shown}\": {e}"))?;
+    // Nobody needs a second copy where the front keeps none.
+    let mesh = match Arc::try_unwrap(file) {
+        Ok(File { mesh, .. }) => mesh.into_inner().unwrap_or_else(|| Ok(Mesh::default())),
+        Err(kept) => kept.mesh().cloned().map_err(str::to_string),
+    };
+    Ok((mesh?, hash))
 }
 
 /// The record of a path, and the file.
@@ -134,33 +157,31 @@ pub fn fabric_of<F: Files>(files: &mut F, path: &str) -> Result<(Fabric, Arc<Fil
     Ok((fabric, file))
 }
 
-/// All that a scene names, each file opened once; the hashes of their content are noted in the scene.
+/// All that a scene names, each mesh and figure opened once; the hashes of their content are noted in the scene.
 ///
 /// # Errors
 /// All that is wrong with them, at their places in the scene.
 pub fn assets<F: Files>(scene: &mut Scene, files: &mut F) -> Result<Assets, SceneError> {
-    let mut files = Once { files, known: HashMap::new() };
     let mut issues = Vec::new();
+    // Of what has been opened, whether as a figure: its hash, or what is wrong with it.
+    let mut opened: HashMap<(bool, String), Result<String, String>> = HashMap::new();
     let (mut meshes, mut characters, mut fabrics) = (HashMap::new(), HashMap::new(), HashMap::new());
     for file in scene.mesh_files_mut() {
         let path = file.path;
-        let read = if file.skinned {
-            files.open(path).and_then(|read| {
-                if !characters.contains_key(path) {
-                    let figure = read.character().map_err(|e| format!("\"{}\": {e}", files.shown(path)))?;
-                    characters.insert(path.to_string(), figure.clone());
-                }
-                Ok(read)
-            })
-        } else {
-            mesh_of(&mut files, path).map(|(mesh, read)| {
-                meshes.insert(path.to_string(), mesh);
-                read
-            })
+        let open = || {
+            if file.skinned {
+                let read = files.open(path)?;
+                let figure = read.character().map_err(|e| format!("\"{}\": {e}", files.shown(path)))?;
+                characters.insert(path.to_string(), figure.clone());
+                return Ok(read.hash().to_string());
+            }
+            let (mesh, hash) = mesh_of(files, path)?;
+            meshes.insert(path.to_string(), mesh);
+            Ok(hash)
         };
-        match read {
-            Ok(read) => issues.extend(noted::<F>(&file.place, path, file.hash, Some(read.hash().into()))),
-            Err(message) => issues.push(Issue::new(format!("{}.path", file.place), message)),
+        match opened.entry((file.skinned, path.to_string())).or_insert_with(open) {
+            Ok(hash) => issues.extend(noted::<F>(&file.place, path, file.hash, Some(hash.clone()))),
+            Err(message) => issues.push(Issue::new(format!("{}.path", file.place), message.clone())),
         }
     }
     for FabricRef { place, words } in scene.fabrics_mut() {
@@ -169,7 +190,7 @@ pub fn assets<F: Files>(scene: &mut Scene, files: &mut F) -> Result<Assets, Scen
             Err(message) => Err((String::new(), message)),
             Ok(None) => shipped(&key).map(|fabric| (fabric, None)).map_err(|e| (words.name_key().into(), e)),
             Ok(Some(path)) => {
-                let read = fabric_of(&mut files, path).map_err(|e| (".path".into(), e));
+                let read = fabric_of(files, path).map_err(|e| (".path".into(), e));
                 read.map(|(fabric, file)| (fabric, Some(file.hash().to_string())))
             }
         };
@@ -190,26 +211,4 @@ fn noted<F: Files>(place: &str, path: &str, hash: &mut Option<String>, found: Op
     let issue = (hash.is_some() && *hash != found).then(|| Issue::new(format!("{place}.hash"), message()));
     *hash = found;
     issue
-}
-
-/// Opens each file once.
-struct Once<'a, F> {
-    files: &'a mut F,
-    known: HashMap<String, Result<Arc<File>, String>>,
-}
-
-impl<F: Files> Files for Once<'_, F> {
-    const RESTORE: &'static str = F::RESTORE;
-    const CONVERTED: &'static [&'static str] = F::CONVERTED;
-
-    fn open(&mut self, path: &str) -> Result<Arc<File>, String> {
-        if !self.known.contains_key(path) {
-            self.known.insert(path.into(), self.files.open(path));
-        }
-        self.known[path].clone()
-    }
-
-    fn shown(&self, path: &str) -> String {
-        self.files.shown(path)
-    }
 }

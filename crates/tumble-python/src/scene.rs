@@ -103,12 +103,6 @@ impl Scene {
         places.map(|(place, path)| (place.clone(), self.node.line_of(&place), path)).collect()
     }
 
-    /// How its objects are drawn, in the order of their columns, and the ends of anchors; see `tumble.looks`.
-    #[getter]
-    fn looks<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
-        Ok(pythonize::pythonize(py, &tumble::scene::looks(&self.scene))?)
-    }
-
     /// JSON Schema of a scene; units are under "x-unit".
     #[staticmethod]
     fn schema(py: Python<'_>) -> PyResult<Bound<'_, PyAny>> {
@@ -163,7 +157,7 @@ fn to_node(value: &Bound<'_, PyAny>, path: &str, depth: usize) -> Result<Node, S
     Ok(value_of.into())
 }
 
-/// How the objects of a scene are drawn, as `Scene.looks`; of its files none is read.
+/// How the objects of a scene are drawn, in the order of their columns, and the ends of anchors; see `tumble.looks`. None of its files is read.
 #[pyfunction]
 pub fn looks<'py>(py: Python<'py>, tree: &Bound<'_, PyAny>) -> PyResult<Bound<'py, PyAny>> {
     let scene = to_node(tree, "", 0).and_then(|node| tumble_interface::Scene::from_tree(&node));
@@ -219,7 +213,8 @@ pub fn load_fabric<'py>(py: Python<'py>, fabric: &str) -> PyResult<Bound<'py, Py
 
 /// The mesh of a file.
 fn read_mesh(py: Python<'_>, path: &Path) -> PyResult<Mesh> {
-    let read = mesh_of(&mut Folder(Path::new("")), &path.to_string_lossy());
+    let name = path.to_str().ok_or_else(|| format!("\"{}\" is no name in UTF-8; rename the file", path.display()));
+    let read = name.and_then(|name| mesh_of(&mut Folder(Path::new("")), name));
     read.map(|(mesh, _)| mesh).map_err(|e| scene_error(py, &SceneError::one("", e)))
 }
 

@@ -5,8 +5,9 @@ use crate::system::{Archive, Entry, Part, System};
 use safetensors::tensor::{Dtype, SafeTensors, TensorView, serialize};
 use std::collections::HashMap;
 use std::hash::Hasher;
-use std::sync::atomic::{AtomicU64, Ordering};
-use tumble_interface::engine::{Account, Ledger, Stability, StepReport};
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
+use tumble_interface::engine::{Account, Ledger, Stability, StepReport, UserForce};
 use tumble_interface::scene::Coupling;
 use tumble_interface::warning::Code;
 use tumble_interface::{Column, SceneError, StepError, Warning};
@@ -23,6 +24,8 @@ pub struct World {
     coupling: Option<Coupling>,
     /// Systems that did not come to agree.
     disagreements: Vec<Warning>,
+    /// Whether an interval is taken once more, in the sub-steps of which nobody looks.
+    repeating: Arc<AtomicBool>,
     /// Length of an exchange interval [s].
     dt: f64,
     exchanges: u32,
@@ -41,7 +44,18 @@ impl World {
     pub fn new(systems: Vec<Member>, exchange: Exchange, frame_time: f64, exchanges: u32) -> Self {
         let dt = frame_time / f64::from(exchanges);
         let (good, start) = ((Archive::default(), vec![Archive::default(); systems.len()]), vec![Archive::default(); systems.len()]);
-        let mut world = Self { systems, exchange, coupling: None, disagreements: Vec::new(), dt, exchanges, frame: 0, good, start };
+        let mut world = Self {
+            systems,
+            exchange,
+            coupling: None,
+            disagreements: Vec::new(),
+            repeating: Arc::default(),
+            dt,
+            exchanges,
+            frame: 0,
+            good,
+            start,
+        };
         world.publish(0.0);
         world.keep();
         world
@@ -158,37 +172,48 @@ impl World {
         self.systems.iter().zip(&mut self.start).for_each(|((_, system), kept)| system.keep(kept));
         self.exchange.begin_repeats(t, end);
         let (mut report, mut passes) = (StepReport::default(), 0);
+        let cut = AtomicBool::new(false);
+        let asked = || {
+            let goes_on = go_on();
+            cut.fetch_or(!goes_on, Ordering::Relaxed);
+            goes_on
+        };
         for pass in 0..coupling.iterations {
+            self.repeating.store(pass > 0, Ordering::Relaxed);
             if pass > 0 {
                 self.systems.iter_mut().zip(&mut self.start).for_each(|((_, system), kept)| system.roll_back(kept));
                 self.exchange.repeat();
             }
-            report = self.turns([t, end], go_on, done)?;
+            report = self.turns([t, end], &asked, done)?;
+            if cut.load(Ordering::Relaxed) {
+                // The state is about to be thrown away.
+                return Ok(report);
+            }
             passes += 1;
-            if !go_on() || self.exchange.end_pass().is_some_and(|gap| gap <= coupling.tolerance) {
+            if self.exchange.end_pass().is_some_and(|gap| gap <= coupling.tolerance) {
                 break;
             }
         }
+        self.repeating.store(false, Ordering::Relaxed);
         report.passes = passes;
-        if let Some((gap, system)) = self.exchange.end_repeats() {
+        if let Some((gap, pair)) = self.exchange.end_repeats() {
             report.disagree(gap);
-            if gap > coupling.tolerance {
-                self.warn_of_disagreement(&system, gap, end, coupling);
+            if gap > coupling.tolerance || gap.is_nan() {
+                self.warn_of_disagreement(&pair, gap, end, coupling);
             }
         }
         Ok(report)
     }
 
-    /// Once for each system.
-    fn warn_of_disagreement(&mut self, system: &str, gap: f64, t: f64, coupling: &Coupling) {
+    /// Once for each system that is pushed.
+    fn warn_of_disagreement(&mut self, [system, sender]: &[String; 2], gap: f64, t: f64, coupling: &Coupling) {
         let path = format!("system \"{system}\"");
         if self.disagreements.iter().any(|warning| warning.path == path) {
             return;
         }
         let message = format!(
-            "what others do to it still changes by {:.1} % after {} passes through the interval that ends at t = {t:.4} s; raise \
-             world.coupling.iterations, or time.exchanges",
-            100.0 * gap,
+            "what \"{sender}\" does to it still changes by {gap:.1e} of itself after {} passes through the interval that ends at t = {t:.4} s; \
+             raise world.coupling.iterations, or time.exchanges",
             coupling.iterations
         );
         self.disagreements.push(Warning::new(Code::Disagreement, path, message));
@@ -212,7 +237,7 @@ impl World {
 
     /// Lets `see` look at the world after `n` sub-steps of the next frame, at the time [s] of the system that took the last one, with
     /// the name of that system and the length of the sub-step [s]; then the world is back at its last good frame. `None`: the frame
-    /// has no more sub-steps, or `go_on` said no. Where intervals are repeated, the sub-steps of all passes count, one after the other.
+    /// has no more sub-steps, or `go_on` said no. Of an interval that is repeated, the sub-steps of the first pass count.
     pub fn inside<T>(
         &mut self,
         n: u64,
@@ -220,7 +245,8 @@ impl World {
         see: impl FnOnce(&Self, f64, &str, f64) -> T,
     ) -> Result<Option<T>, StepError> {
         let (asked, dt, mut last) = (AtomicU64::new(0), self.dt, None);
-        let counted = || asked.fetch_add(1, Ordering::Relaxed) < n && go_on();
+        let repeating = self.repeating.clone();
+        let counted = || (repeating.load(Ordering::Relaxed) || asked.fetch_add(1, Ordering::Relaxed) < n) && go_on();
         let result = self.watched(&counted, |system, t, turn| {
             if turn.steps > 0 {
                 last = Some((system, t + turn.way.1.min(dt), turn.way.0));
@@ -256,6 +282,7 @@ impl World {
         world.rewind();
         // A state of this very world always fits.
         let _ = read_world(&mut self.frame, &mut self.exchange, world);
+        self.repeating.store(false, Ordering::Relaxed);
         self.publish(self.time());
     }
 
@@ -385,6 +412,14 @@ impl World {
     pub fn stability(&mut self, go_on: &(dyn Fn() -> bool + Sync)) -> Vec<Stability> {
         let dt = self.dt;
         self.each_mut().filter_map(|s| s.stability(dt, go_on)).collect()
+    }
+
+    /// Adds a user's force to the system of that name; see [`System::add_force`].
+    pub fn add_force(&mut self, name: &str, force: Box<dyn UserForce>) -> Option<bool> {
+        let added = self.system(name)?.add_force(force);
+        // Accelerations of bodies are others now.
+        self.publish(self.time());
+        Some(added)
     }
 
     /// The system of that name.

@@ -37,6 +37,12 @@ system = "soft"
 position = [[0, 0, 1], [1, 0, 1]]
 radius = 0.05
 trail = 0.25
+[[emitter]]
+name = "spray"
+system = "soft"
+from = { point = {} }
+rate = 10
+radius = 0.1
 [[rope]]
 name = "rope"
 from = [0, 0, 2]
@@ -78,6 +84,11 @@ stiffness = 0
 name = "pulling"
 between = ["masses 1", "rope 4"]
 stiffness = 10
+[[anchor]]
+name = "damping"
+between = ["masses 0", "rope 2"]
+stiffness = 0
+damping = 2
 "#;
 
 fn scene(text: &str) -> Scene {
@@ -88,7 +99,7 @@ fn scene(text: &str) -> Scene {
 fn looks_come_in_the_order_of_columns_and_say_what_the_scene_says() {
     let said = looks(&scene(MANY));
     let names: Vec<&str> = said.objects.iter().map(|look| look.object.as_str()).collect();
-    assert_eq!(names, ["dust", "sparks", "drops", "masses", "rope", "sheet", "block", "floor", "slope", "ball", "tank"]);
+    assert_eq!(names, ["dust", "sparks", "drops", "masses", "spray", "rope", "sheet", "block", "floor", "slope", "ball", "tank"]);
     // What has constant columns has them in this order.
     let world = Simulation::new(scene(MANY), Assets::default()).unwrap();
     let mut columns: Vec<String> = world.topology().into_iter().map(|column| column.object).collect();
@@ -100,9 +111,10 @@ fn looks_come_in_the_order_of_columns_and_say_what_the_scene_says() {
         Look { trail: 0.5, ..Look::new("sparks", Form::Points, PALETTE[1]) },
         Look::new("drops", Form::Points, PALETTE[2]).with_radius(0.2),
         Look { trail: 0.25, few: true, ..Look::new("masses", Form::Points, PALETTE[3]).with_radius(0.05) },
-        Look { few: true, ..Look::new("rope", Form::Curve, PALETTE[4]) },
+        Look::new("spray", Form::Points, PALETTE[4]).with_radius(0.1),
+        Look { few: true, ..Look::new("rope", Form::Curve, PALETTE[5]) },
         Look::new("sheet", Form::Surface, [0.1, 0.2, 0.3]),
-        Look::new("block", Form::Body, PALETTE[5]),
+        Look::new("block", Form::Body, PALETTE[0]),
         Look { plane: Some([[0.0, 0.0, -1.0], [0.0, 0.0, 1.0]]), ..Look::new("floor", Form::Ground, GROUND) },
         Look { plane: Some([[0.0, 0.0, -9.0], [0.0, 0.0, 1.0]]), ..Look::new("slope", Form::Ground, [0.5, 0.4, 0.3]) },
         Look::new("ball", Form::Solid, SOLID),
@@ -110,8 +122,9 @@ fn looks_come_in_the_order_of_columns_and_say_what_the_scene_says() {
     ];
     assert_eq!(said.objects, expected);
     assert_eq!(expected[1].radius, RADIUS);
-    // One without stiffness holds nothing.
-    assert_eq!(said.anchors, [[("masses".to_string(), 1), ("rope".to_string(), 4)]]);
+    // One without stiffness and damping does nothing.
+    let end = |name: &str, row| (name.to_string(), row);
+    assert_eq!(said.anchors, [[end("masses", 1), end("rope", 4)], [end("masses", 0), end("rope", 2)]]);
 }
 
 #[test]

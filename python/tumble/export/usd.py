@@ -195,7 +195,7 @@ def _parts(found: list[Object], start: Columns) -> list[Part]:
             taper = thing.radius * np.sqrt(1.0 - 0.96 * np.linspace(0.0, 1.0, shown.points))
             where = path(thing.name)
             parts.append(Part(thing, where, thing.name, "BasisCurves", None, counts, thing.radius, taper=taper))
-        elif thing.form == "curve":
+        elif thing.form in ("curve", "strands"):
             counts = np.array([len(thing.curve)])
             where = path(thing.name)
             parts.append(Part(thing, where, thing.name, "BasisCurves", thing.curve, counts, thing.radius))

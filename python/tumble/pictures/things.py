@@ -132,7 +132,7 @@ SOOT: Rgb = (0.02, 0.02, 0.025)
 DYE = 3.0
 """Optical depth of the thickest dye in a plane."""
 
-FEW = 3
+THICKER = 3
 """An object of few masses is drawn at least this many times as thick as the thinnest."""
 
 HAIR = 0.3
@@ -366,7 +366,7 @@ class Stage:
 
     def _cloud(self, thing: Object, i: int, columns: Columns, thinnest: float) -> Cloud:
         x = positions(columns, thing)
-        r = np.maximum(radii(columns, thing), FINER * (FEW if thing.few else 1) * thinnest)
+        r = np.maximum(radii(columns, thing), FINER * (THICKER if thing.few else 1) * thinnest)
         pieces, shades, ages = [np.zeros((0, 2, 3))], [np.zeros((0, 3))], [np.zeros(0)]
         now, k = self.run.time(i), i - 1
         while thing.trail > 0.0 and k >= 0 and self.run.time(k) >= now - thing.trail - 1e-9:
@@ -410,7 +410,7 @@ class Stage:
         broken = self._broken(thing, columns)
         if thing.strands is not None:
             return [thing.strands.hair(thing.name, x, max(thing.radius, HAIR * thinnest), thing.color)]
-        thing = replace(thing, radius=max(thing.radius, thinnest * (FEW if thing.few else 1)))
+        thing = replace(thing, radius=max(thing.radius, thinnest * (THICKER if thing.few else 1)))
         if thing.form in ("surface", "body"):
             now = torn(columns, thing)
             triangles = _without(thing.triangles, thing.links[broken]) if now is None else now

@@ -1,6 +1,6 @@
 /** Scenery of a scene, as drawables. */
 import * as THREE from "three";
-import { MATTER, SHOWN } from "../engine/looks";
+import { MATTER, SHOWN, SOLID } from "../engine/looks";
 import type { Column, Numbers, SceneInfo, Vector } from "../engine/protocol";
 import { table } from "./colors";
 import { type Grid, type Pieces, type Rgb, scalars } from "./layers";
@@ -98,7 +98,7 @@ export function outline(line: Pieces, grid: Grid): void {
     p[b] = grid.origin[b] + v * grid.cells[b] * grid.spacing;
     return p;
   });
-  line.pairs(Float32Array.from(corners), Uint32Array.from([0, 1, 1, 2, 2, 3, 3, 0]), [0.35, 0.37, 0.4]);
+  line.pairs(Float32Array.from(corners), Uint32Array.from([0, 1, 1, 2, 2, 3, 3, 0]), SOLID);
 }
 
 /** Pairs of vertices along sharp edges of a mesh; of a round one all. */

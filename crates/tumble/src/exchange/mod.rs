@@ -186,7 +186,7 @@ impl Exchange {
         self.repeat.is_some()
     }
 
-    /// Solids that systems have published, those of the scenery first.
+    /// Solids that systems have published, in the order in which systems have entered: the scenery is the first.
     pub fn surfaces(&self) -> &Arc<Vec<Collider>> {
         &self.surfaces.all
     }
@@ -237,7 +237,7 @@ impl Exchange {
     pub fn begin_repeats(&mut self, start: f64, end: f64) {
         let states = self.bodies.iter().map(|body| body.states.clone()).collect();
         let carried = std::mem::take(&mut self.mail);
-        self.repeat = Some(Repeat::new([start, end], states, carried, self.posted));
+        self.repeat = Some(Repeat::new([start, end], states, carried, self.posted, self.fluxes.clone()));
     }
 
     /// A system has had its turn.
@@ -245,7 +245,7 @@ impl Exchange {
         self.repeat.iter_mut().for_each(|repeat| repeat.passed(system));
     }
 
-    /// Ends a pass through an interval; says how far systems disagree, in all but the first pass.
+    /// Ends a pass through an interval; says how far systems disagree, in the first pass only if nothing was posted.
     pub fn end_pass(&mut self) -> Option<f64> {
         let Self { repeat, mail, bodies, .. } = self;
         let ends = bodies.iter().map(|body| body.states.clone()).collect();
@@ -254,9 +254,10 @@ impl Exchange {
 
     /// Goes back to the start of the interval, for another pass.
     pub fn repeat(&mut self) {
-        let Self { repeat, bodies, posted, .. } = self;
+        let Self { repeat, bodies, posted, fluxes, .. } = self;
         let Some(repeat) = repeat else { return };
         (repeat.gap, *posted) = (None, repeat.posted);
+        fluxes.clone_from(&repeat.fluxes);
         for (body, start) in bodies.iter_mut().zip(&repeat.start) {
             body.states.clone_from(start);
             body.time = repeat.span[0];
@@ -264,14 +265,16 @@ impl Exchange {
     }
 
     /// After the last pass: what systems have not taken is mail for the next interval. Returns how far the system that is furthest from agreement
-    /// is from it, and its name.
-    pub fn end_repeats(&mut self) -> Option<(f64, String)> {
+    /// is from it, its name, and that of the system that has posted most to it.
+    pub fn end_repeats(&mut self) -> Option<(f64, [String; 2])> {
         let repeat = self.repeat.take()?;
         let bodies = &self.bodies;
         self.mail = repeat.leftovers(self.systems.len(), |letter| bodies[letter.address.0.body].system);
         let impulses = |letters: &[Letter]| letters.iter().fold(Vector::default(), |sum, letter| sum + letter.wrench.impulse);
         self.delivered = self.posted - impulses(&self.mail);
-        repeat.gap.map(|(gap, system)| (gap, self.systems.get(system.0).cloned().unwrap_or_default()))
+        let name = |system: SystemId| self.systems.get(system.0).cloned().unwrap_or_default();
+        let sender = |to| repeat.sender(to, |letter| bodies[letter.address.0.body].system).map_or_else(String::new, name);
+        repeat.gap.map(|(gap, system)| (gap, [name(system), sender(system)]))
     }
 
     /// Everything as numbers, for a snapshot: the number of bodies, sums, fluxes, then the mail. Bodies are published anew.
@@ -382,7 +385,9 @@ impl Turn<'_> {
 
     /// Tells the events of an object since its last turn, in the order of their times.
     pub fn tell(&mut self, object: &str, events: Vec<Event>) {
-        self.exchange.heard.iter_mut().filter(|heard| heard.object == object).for_each(|heard| heard.events.clone_from(&events));
+        if let Some(heard) = self.exchange.heard.iter_mut().find(|heard| heard.object == object) {
+            heard.events = events;
+        }
     }
 
     /// Heat [J] and mass [kg] have entered through a surface.

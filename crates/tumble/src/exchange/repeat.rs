@@ -9,7 +9,7 @@
 //!
 //! Source: [kuttler2008].
 
-use super::{Address, BodyState, Letter, SystemId, Wrench};
+use super::{Address, BodyState, Flux, Letter, SystemId, Wrench};
 use crate::geometry::Vector;
 use std::collections::BTreeMap;
 
@@ -35,6 +35,8 @@ pub struct Repeat {
     pub carried: Vec<Letter>,
     /// Sum of all impulses ever posted, at its start [N s].
     pub posted: Vector,
+    /// Fluxes at its start.
+    pub fluxes: Vec<Flux>,
     /// Mail of the pass before.
     last: Vec<Letter>,
     /// Systems that have had their turn in this pass.
@@ -65,9 +67,9 @@ fn dot(a: &Sums, b: &Sums) -> f64 {
 }
 
 impl Repeat {
-    /// An interval [s], with the states of bodies, the mail and the sum of all impulses ever posted at its start.
-    pub fn new(span: [f64; 2], start: Vec<Vec<BodyState>>, carried: Vec<Letter>, posted: Vector) -> Self {
-        Self { span, start, carried, posted, ..Self::default() }
+    /// An interval [s], with the states of bodies, the mail, the sum of all impulses ever posted and the fluxes at its start.
+    pub fn new(span: [f64; 2], start: Vec<Vec<BodyState>>, carried: Vec<Letter>, posted: Vector, fluxes: Vec<Flux>) -> Self {
+        Self { span, start, carried, posted, fluxes, ..Self::default() }
     }
 
     /// What a system takes at its turn, `mail` being what has been posted in this pass so far.
@@ -75,10 +77,10 @@ impl Repeat {
         let mine = |letter: &&Letter| owner(letter) == system;
         let late = self.last.iter().filter(|letter| !self.done.contains(&letter.from));
         let posted = sum(late.chain(mail).filter(mine), sum(self.carried.iter().filter(mine), Sums::new()));
-        let taken = match self.taken.get(&system).filter(|_| self.passes > 0) {
+        let taken = match self.taken.remove(&system).filter(|_| self.passes > 0) {
             None => posted,
             Some(before) => {
-                let left = combined(&posted, -1.0, before);
+                let left = combined(&posted, -1.0, &before);
                 let relaxed = match self.residuals.get(&system) {
                     None => FIRST,
                     Some((other, w)) => {
@@ -87,8 +89,11 @@ impl Repeat {
                         if square > 0.0 { (-w * dot(other, &change) / square).clamp(LEAST, MOST) } else { *w }
                     }
                 };
-                let taken = combined(before, relaxed, &left);
-                self.note(system, (dot(&left, &left) / dot(&posted, &posted)).sqrt());
+                let taken = combined(&before, relaxed, &left);
+                // What was posted in the pass before has been noted at its end.
+                if mail.iter().any(|letter| owner(letter) == system) {
+                    self.note(system, &left, &posted, &before);
+                }
                 self.residuals.insert(system, (left, relaxed));
                 taken
             }
@@ -102,14 +107,17 @@ impl Repeat {
         self.done.push(system);
     }
 
-    fn note(&mut self, system: SystemId, gap: f64) {
-        // 0/0: nothing is posted, and nothing was.
-        if gap.is_finite() && self.gap.is_none_or(|(most, _)| gap > most) {
+    /// Notes what is left over what is posted or taken, whichever is larger. NaN stays.
+    fn note(&mut self, system: SystemId, left: &Sums, posted: &Sums, taken: &Sums) {
+        let whole = dot(posted, posted).max(dot(taken, taken)).sqrt();
+        let gap = if whole == 0.0 { 0.0 } else { dot(left, left).sqrt() / whole };
+        if self.gap.is_none_or(|(most, _)| gap > most || gap.is_nan()) {
             self.gap = Some((gap, system));
         }
     }
 
-    /// Ends a pass in which `mail` was posted, with the states of bodies at its end; says how far systems disagree, in all but the first pass.
+    /// Ends a pass in which `mail` was posted, with the states of bodies at its end; says how far systems disagree, in the first pass only if
+    /// nothing was posted.
     pub fn end_pass(&mut self, mail: Vec<Letter>, end: Vec<Vec<BodyState>>, owner: impl Fn(&Letter) -> SystemId) -> Option<f64> {
         (self.last, self.end) = (mail, end);
         self.done.clear();
@@ -117,10 +125,20 @@ impl Repeat {
         let receivers: Vec<SystemId> = self.taken.keys().copied().collect();
         for system in receivers {
             let (left, posted) = self.left(system, &owner);
-            self.note(system, (dot(&left, &left) / dot(&posted, &posted)).sqrt());
+            let taken = self.taken.get(&system).cloned().unwrap_or_default();
+            self.note(system, &left, &posted, &taken);
         }
         let gap = self.gap.map_or(0.0, |(gap, _)| gap);
-        (self.passes > 1).then_some(gap)
+        (self.passes > 1 || self.carried.is_empty() && self.last.is_empty()).then_some(gap)
+    }
+
+    /// The system that has posted most to a system in the last pass.
+    pub fn sender(&self, to: SystemId, owner: impl Fn(&Letter) -> SystemId) -> Option<SystemId> {
+        let mut all: BTreeMap<SystemId, f64> = BTreeMap::new();
+        for letter in self.last.iter().filter(|letter| owner(letter) == to) {
+            *all.entry(letter.from).or_default() += letter.wrench.impulse.norm();
+        }
+        all.into_iter().max_by(|a, b| a.1.total_cmp(&b.1)).map(|(from, _)| from)
     }
 
     /// What a system has been posted less what it has taken, and the former.
@@ -133,6 +151,7 @@ impl Repeat {
     /// Mail for the next interval: what is left of all systems.
     pub fn leftovers(&self, systems: usize, owner: impl Fn(&Letter) -> SystemId) -> Vec<Letter> {
         let of = |system: usize| {
+            // Nobody asks for the sender of what is carried.
             let letter = move |(address, wrench): (Address, Wrench)| Letter { address, wrench, from: SystemId(system) };
             self.left(SystemId(system), &owner).0.into_iter().map(letter)
         };

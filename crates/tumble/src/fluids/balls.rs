@@ -88,7 +88,8 @@ impl Ball {
 
     fn push(&mut self, impulse: Vector) {
         self.impulse = self.impulse + impulse;
-        self.state.velocity = self.state.velocity + self.free(impulse * self.state.inverse_mass);
+        let (change, _) = self.state.response(self.state.position, impulse);
+        self.state.velocity = self.state.velocity + self.free(change);
     }
 
     /// The part of a change of velocity that nothing holds.

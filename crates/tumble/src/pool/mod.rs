@@ -414,7 +414,7 @@ impl Pool {
         self.heard.get(s).is_some_and(|contacts| *contacts == Some(true)) || (0..self.len()).any(bears)
     }
 
-    /// The rows of particles whose bounces bear others.
+    /// The rows of particles whose bounces bear others, or are asked for.
     pub fn heeded(&self) -> Vec<Range<usize>> {
         (0..self.len()).filter(|s| self.heeds_hits(*s)).map(|s| self.rows(s)).collect()
     }

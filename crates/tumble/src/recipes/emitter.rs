@@ -32,6 +32,48 @@ const TAKEN: [&str; 19] = [
     "green",
 ];
 
+/// What is wrong with the words of children: of which emitter, at which event and causes.
+fn refuse_births(
+    words: &Words,
+    course: &Course,
+    (of, at, cause): (&str, Event, &[Cause]),
+    parent: Option<(&Words, bool)>,
+    wrong: &mut impl FnMut(&str, &str),
+) {
+    if let Some(i) = words.burst.iter().position(|b| b.time != 0.0) {
+        wrong(&format!(".burst[{i}].time"), "children are born when the parent dies or bounces; leave it out");
+    }
+    if !course.rate.is_constant() {
+        wrong(".rate", "the rate of children goes by the age of each parent and is constant");
+    }
+    if words.path.constant() != Some([0.0; 3]) {
+        wrong(".path", "children are born where their parents are; leave it out");
+    }
+    if parent.is_some_and(|(_, elsewhere)| elsewhere) && words.rate.constant() != Some(0.0) {
+        wrong(
+            ".rate",
+            "children by rate follow living parents, and these are in another system; leave it out, or put both into one system",
+        );
+    }
+    let parent = parent.map(|(words, _)| words);
+    let dies = |cause: &Cause| {
+        parent.is_none_or(|p| match cause {
+            Cause::Lifetime => p.lifetime.is_some(),
+            Cause::Replaced => p.when_full == WhenFull::ReplaceOldest,
+            _ => p.kill.iter().any(|rule| cause_of(rule) == *cause),
+        })
+    };
+    let key = |key: &str| format!(".from.particles.{key}");
+    if at == Event::Bounce && !cause.is_empty() {
+        wrong(&key("cause"), "a bounce is no death; leave it out");
+    } else if let Some(i) = cause.iter().position(|c| !dies(c)) {
+        wrong(&key(&format!("cause[{i}]")), &format!("nothing of \"{of}\" dies of that; give it such a rule, or leave it out"));
+    }
+    if (at != Event::Death || !cause.is_empty()) && words.burst.iter().all(|b| b.count == 0) {
+        wrong(".burst", "missing: at and cause say when a burst is born; give one with a count");
+    }
+}
+
 /// Adds an emitter. `mesh` finds the mesh of a file; `flat` is the axis that is missing in two dimensions.
 pub fn emitter<'a>(
     site: &mut Site<'_>,
@@ -43,44 +85,11 @@ pub fn emitter<'a>(
 ) {
     let path = format!("emitter \"{}\"", words.name);
     let mut wrong = |key: &str, message: &str| site.issues.push(tumble_interface::Issue::new(format!("{path}{key}"), message));
-    let children = matches!(words.from, Source::Particles { .. });
     if words.rate.constant() == Some(0.0) && words.burst.iter().all(|b| b.count == 0) {
         wrong("", "it makes no particles; give it a rate, or a burst with a count");
     }
-    if let (true, Some(i)) = (children, words.burst.iter().position(|b| b.time != 0.0)) {
-        wrong(&format!(".burst[{i}].time"), "children are born when the parent dies or bounces; leave it out");
-    }
-    if children && !course.rate.is_constant() {
-        wrong(".rate", "the rate of children goes by the age of each parent and is constant");
-    }
-    if children && words.path.constant() != Some([0.0; 3]) {
-        wrong(".path", "children are born where their parents are; leave it out");
-    }
-    let elsewhere = parent.is_some_and(|(_, elsewhere)| elsewhere);
-    if elsewhere && words.rate.constant() != Some(0.0) {
-        wrong(
-            ".rate",
-            "children by rate follow living parents, and these are in another system; leave it out, or put both into one system",
-        );
-    }
     if let Source::Particles { of, at, cause } = &words.from {
-        let parent = parent.map(|(words, _)| words);
-        let dies = |cause: &Cause| {
-            parent.is_none_or(|p| match cause {
-                Cause::Lifetime => p.lifetime.is_some(),
-                Cause::Replaced => p.when_full == WhenFull::ReplaceOldest,
-                _ => p.kill.iter().any(|rule| cause_of(rule) == *cause),
-            })
-        };
-        let key = |key: &str| format!(".from.particles.{key}");
-        if *at == Event::Bounce && !cause.is_empty() {
-            wrong(&key("cause"), "a bounce is no death; leave it out");
-        } else if let Some(i) = cause.iter().position(|c| !dies(c)) {
-            wrong(&key(&format!("cause[{i}]")), &format!("nothing of \"{of}\" dies of that; give it such a rule, or leave it out"));
-        }
-        if (*at != Event::Death || !cause.is_empty()) && words.burst.iter().all(|b| b.count == 0) {
-            wrong(".burst", "missing: at and cause say when a burst is born; give one with a count");
-        }
+        refuse_births(words, &course, (of, *at, cause), parent, &mut wrong);
     }
     if words.end.is_some_and(|end| end <= words.start) {
         wrong(".end", "it is not after start");
@@ -181,7 +190,7 @@ pub fn emitter<'a>(
         Source::Particles { of, .. } => {
             let parent = match site.parts.stream(of) {
                 Some(stream) => Some(Origin::Particles(stream)),
-                None => elsewhere.then(|| Origin::Elsewhere(of.clone())),
+                None => parent.filter(|(_, elsewhere)| *elsewhere).map(|_| Origin::Elsewhere(of.clone())),
             };
             if parent.is_none() {
                 let message = format!(

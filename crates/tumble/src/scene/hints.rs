@@ -1,5 +1,6 @@
 //! What a scene says in vain, and what it hardly means.
 
+use super::coupling::named;
 use super::methods::{METHODS, present};
 use tumble_interface::Warning;
 use tumble_interface::check::{plain, short};
@@ -7,6 +8,17 @@ use tumble_interface::scene::{
     Animated, AnimatedVector, Collider, Component, Emitter, Event, Force as Words, Kill, Particles, Rope, Scene, Shape, Source,
 };
 use tumble_interface::warning::Code;
+
+/// Intervals that are repeated where no anchor joins two systems.
+pub fn coupled(scene: &Scene) -> Option<Warning> {
+    let of = |end: &str| {
+        let (name, _) = named(end)?;
+        scene.objects().into_iter().find(|object| object.name == name)?.system.map(str::to_string)
+    };
+    let joins = scene.anchor.iter().any(|anchor| of(&anchor.between[0]) != of(&anchor.between[1]));
+    let message = "no anchor joins two systems, so that each interval is taken again for nothing; leave it out";
+    (scene.world.coupling.is_some() && !joins).then(|| Warning::new(Code::Unfelt, "world.coupling", message))
+}
 
 /// What a resolved scene says and nothing heeds.
 pub fn unused(scene: &Scene) -> Vec<Warning> {

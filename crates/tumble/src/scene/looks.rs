@@ -14,8 +14,8 @@ pub fn looks(scene: &Scene) -> Looks {
     let moved = scene.system.iter().flat_map(|plan| rules(plan.method).looks(scene, plan, &mut colors));
     let mut objects: Vec<Look> = moved.collect();
     objects.extend(scene.collider.iter().map(solid));
-    // One without stiffness holds nothing.
-    let pulling = scene.anchor.iter().filter(|anchor| anchor.stiffness > 0.0);
+    // One without stiffness and damping does nothing.
+    let pulling = scene.anchor.iter().filter(|anchor| anchor.stiffness > 0.0 || anchor.damping > 0.0);
     let ends = pulling.filter_map(|anchor| Some([named(&anchor.between[0])?, named(&anchor.between[1])?]));
     let anchors = ends.map(|ends| ends.map(|(name, index)| (name.to_string(), index))).collect();
     Looks { objects, anchors }

@@ -149,7 +149,7 @@ impl Engine for Simulation {
     }
 
     fn add_force(&mut self, system: &str, force: Box<dyn UserForce>) -> Result<(), SceneError> {
-        match self.world.system(system).map(|s| s.add_force(force)) {
+        match self.world.add_force(system, force) {
             Some(true) => Ok(()),
             _ => Err(self.system_error(system, "it moves particles without mass, which feel no force")),
         }

@@ -27,7 +27,7 @@ const TASK: usize = 32;
 /// Vertices per task.
 const CHUNK: usize = 1024;
 
-/// PairKind of a pair.
+/// Kind of a pair.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum PairKind {
     /// The first vertex is a point, the others a triangle.

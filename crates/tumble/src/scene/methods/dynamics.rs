@@ -70,7 +70,7 @@ impl MethodRules for Rules {
         let idle = scene.collider.iter().filter(|thing| thing.edges && !meets);
         let message = "edges meet in systems with self_contact, and there is none; add it, or leave edges out";
         let idle = idle.map(|thing| Warning::new(Code::Unfelt, format!("collider \"{}\".edges", thing.name), message));
-        idle.chain(hints::thin(scene)).collect()
+        idle.chain(hints::thin(scene)).chain(hints::coupled(scene)).collect()
     }
 
     fn looks(&self, scene: &Scene, plan: &Plan, colors: &mut Colors) -> Vec<Look> {
@@ -131,11 +131,12 @@ impl MethodRules for Rules {
     }
 }
 
-/// How the objects of a system are drawn; what emitters make comes last.
+/// How the objects of a system are drawn, in the order in which `fill` makes them.
 fn drawn(scene: &Scene, plan: &Plan, colors: &mut Colors) -> Vec<Look> {
     let mut all = Vec::new();
     let form = |name: &str, form: Form, color: Option<Rgb>, colors: &mut Colors| Look::new(name, form, colors.pick(color));
     all.extend(scene.particles.iter().filter(|t| is_in(&t.system, plan)).map(|t| particles(t, colors)));
+    all.extend(scene.emitter.iter().filter(|t| is_in(&t.system, plan)).map(|t| emitted(t, colors)));
     for t in scene.rope.iter().filter(|t| is_in(&t.system, plan)) {
         let few = f64::from(t.segments) + 1.0 < FEW;
         all.push(Look { few, ..form(&t.name, Form::Curve, t.color, colors).with_radius(t.radius) });
@@ -151,7 +152,6 @@ fn drawn(scene: &Scene, plan: &Plan, colors: &mut Colors) -> Vec<Look> {
         let look = form(&t.name, Form::Points, t.color, colors).with_radius(t.radius);
         all.push(Look { trail: t.trail, few: f64::from(t.stars) < FEW, ..look });
     }
-    all.extend(scene.emitter.iter().filter(|t| is_in(&t.system, plan)).map(|t| emitted(t, colors)));
     all
 }
 

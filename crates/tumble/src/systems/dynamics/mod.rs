@@ -121,7 +121,8 @@ impl Dynamics {
         }
         self.core.laws.colliders = solids.clone();
         self.core.laws.batches.iter_mut().for_each(|batch| batch.take_surfaces(solids));
-        self.features.self_contact.iter_mut().for_each(|contact| contact.take_surfaces(solids));
+        let surfaces = self.features.self_contact.iter_mut().chain(&mut self.features.intersection_counter);
+        surfaces.for_each(|contact| contact.take_surfaces(solids));
     }
 
     /// A warning of surfaces that start in each other.

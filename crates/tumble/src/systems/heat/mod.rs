@@ -47,7 +47,7 @@ pub struct Heat {
 }
 
 impl Heat {
-    /// A system of bodies; their boundaries become surfaces of the exchange.
+    /// A system of bodies; what enters through their boundaries is told to the exchange as fluxes.
     pub fn new(settings: Settings, bodies: Vec<HeatedBody>, id: SystemId, exchange: &mut Exchange) -> Self {
         let mut surfaces = Vec::new();
         for body in &bodies {
