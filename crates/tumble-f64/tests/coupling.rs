@@ -327,15 +327,16 @@ fn repeated_intervals_hold_where_explicit_exchange_explodes() {
 
 #[test]
 fn systems_that_do_not_agree_are_named_and_nothing_is_lost() {
-    let mut sim = repeated(true, 2.0, "world.coupling = { tolerance = 1e-12, iterations = 3 }");
+    // A third pass would find the only impulse of this linear pair by its secant.
+    let mut sim = repeated(true, 2.0, "world.coupling = { tolerance = 1e-12, iterations = 2 }");
     for _ in 0..3 {
         let report = step(&mut sim);
-        assert!(report.passes == 3 && report.disagreement.is_some_and(|gap| gap > 1e-12), "{report:?}");
+        assert!(report.passes == 2 && report.disagreement.is_some_and(|gap| gap > 1e-12), "{report:?}");
         let ((_, _, mail), p) = (exchange(&sim), sim.ledger().momentum);
         (0..3).for_each(|a| assert!((p[a] + mail[a] - [0.0, 1.5, 0.0][a]).abs() < 1e-12));
     }
     let named: Vec<String> = sim.warnings().iter().map(|warning| format!("{} {}", warning.path, warning.message)).collect();
-    assert!(named.len() == 1 && named[0].starts_with("system \"second\" what others do to it still changes by"), "{named:?}");
+    assert!(named.len() == 1 && named[0].starts_with("system \"second\" what \"first\" does to it still changes by"), "{named:?}");
 }
 
 /// A front that says no within any pass leaves no trace: neither in what follows, nor as a warning.
@@ -356,13 +357,14 @@ fn an_interval_that_is_cut_short_leaves_nothing_behind() {
     }
     step(&mut cut);
     assert_eq!(cut.hash(), whole.hash());
-    // Looks inside see the sub-steps of the first pass, then the interval that follows.
+    // Looks inside see the sub-steps of the first pass but the last, after which the frame ends.
     let per_system = report.steps / 2;
-    let times: Vec<f64> = [1, per_system, 2 * per_system, 2 * per_system + 1]
+    let times: Vec<f64> = [1, per_system, 2 * per_system - 1, 2 * per_system]
         .map(|n| whole.inside(n, &["position"], &|| true).unwrap().map_or(f64::NAN, |inside| inside.frame.time))
         .to_vec();
     let dt = 1.0 / W;
-    assert!(times[0] > dt && times[0] < 1.01 * dt && (times[1] - 2.0 * dt).abs() < 1e-9 && (times[2] - 2.0 * dt).abs() < 1e-9, "{times:?}");
+    assert!(times[0] > dt && times[0] < 1.01 * dt && (times[1] - 2.0 * dt).abs() < 1e-9, "{times:?}");
+    assert!(times[2] > 1.99 * dt && times[2] < 2.0 * dt - 1e-9, "{times:?}");
     assert!(times[3].is_nan(), "{times:?}");
 }
 

@@ -345,7 +345,7 @@ measures! {
         /// Passes through exchange intervals that `world.coupling` repeats.
         passes: u64 = Measure { columns: &["passes"], ..EFFORT };
         /// Change of the impulses on a system in the last pass through an interval, relative to them, at most.
-        disagreement: Option<f64> = Measure { columns: &["disagreement"], ..WORST };
+        disagreement: Option<f64> = Measure { systems: Merge::Last, columns: &["disagreement"], ..WORST };
         /// Links that broke.
         broken: u64 = EFFORT;
         /// Residuals of the last pressure solve after each iteration, relative to its start.
