@@ -138,7 +138,7 @@ test("values change in a running world, or start it anew", () => {
   assert.equal(world.set("world.gravity", "[0, 0, -1]"), true);
   assert.equal(world.index(), 5);
   assert.equal(world.hash(), state);
-  assert.deepEqual((JSON.parse(world.info()) as SceneInfo).scene.world, { gravity: [0, 0, -1], memory_limit: 8 });
+  assert.deepEqual((JSON.parse(world.info()) as SceneInfo).scene.world, { gravity: [0, 0, -1], memory_limit: 8, coupling: null });
   assert.equal(world.set("sheet.s.resolution", "[9, 9]"), false);
   assert.equal(world.index(), 0);
   assert.equal(failure(() => world.set("sheet.s.resolution", "[1, 9]")).kind, "scene");
