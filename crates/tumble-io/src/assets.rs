@@ -157,7 +157,7 @@ pub fn fabric_of<F: Files>(files: &mut F, path: &str) -> Result<(Fabric, Arc<Fil
     Ok((fabric, file))
 }
 
-/// All that a scene names, each mesh and figure opened once; the hashes of their content are noted in the scene.
+/// All that a scene names, each file opened once for what it is; the hashes of their content are noted in the scene.
 ///
 /// # Errors
 /// All that is wrong with them, at their places in the scene.
@@ -184,22 +184,28 @@ pub fn assets<F: Files>(scene: &mut Scene, files: &mut F) -> Result<Assets, Scen
             Err(message) => issues.push(Issue::new(format!("{}.path", file.place), message.clone())),
         }
     }
+    let mut records: HashMap<String, Result<Option<String>, String>> = HashMap::new();
     for FabricRef { place, words } in scene.fabrics_mut() {
         let key = words.key().to_string();
-        let read = match words.choice() {
-            Err(message) => Err((String::new(), message)),
-            Ok(None) => shipped(&key).map(|fabric| (fabric, None)).map_err(|e| (words.name_key().into(), e)),
-            Ok(Some(path)) => {
-                let read = fabric_of(files, path).map_err(|e| (".path".into(), e));
-                read.map(|(fabric, file)| (fabric, Some(file.hash().to_string())))
+        let choice = match words.choice() {
+            Err(message) => {
+                issues.push(Issue::new(place, message));
+                continue;
             }
+            Ok(choice) => choice,
         };
-        match read {
-            Ok((fabric, found)) => {
-                issues.extend(words.hash_mut().and_then(|hash| noted::<F>(&place, &key, hash, found)));
-                fabrics.insert(key, fabric);
-            }
-            Err((below, message)) => issues.push(Issue::new(format!("{place}{below}"), message)),
+        let below = if choice.is_some() { ".path" } else { words.name_key() };
+        let open = || {
+            let (fabric, hash) = match choice {
+                None => (shipped(&key)?, None),
+                Some(path) => fabric_of(files, path).map(|(fabric, file)| (fabric, Some(file.hash().to_string())))?,
+            };
+            fabrics.insert(key.clone(), fabric);
+            Ok(hash)
+        };
+        match records.entry(key.clone()).or_insert_with(open) {
+            Ok(found) => issues.extend(words.hash_mut().and_then(|hash| noted::<F>(&place, &key, hash, found.clone()))),
+            Err(message) => issues.push(Issue::new(format!("{place}{below}"), message.clone())),
         }
     }
     if issues.is_empty() { Ok(Assets::new(meshes, characters).with_fabrics(fabrics)) } else { Err(SceneError { issues }) }
