@@ -7,6 +7,7 @@ use crate::common;
 use common::{column, run, show, simulation, step};
 use std::f64::consts::PI;
 use tumble_interface::Engine;
+use tumble_interface::engine::UserForce;
 
 const R: f64 = 0.25;
 const B: f64 = 0.6;
@@ -262,4 +263,33 @@ fn a_restored_ball_goes_on_with_the_same_bits() {
     other.restore(&saved).unwrap();
     run(&mut other, 2);
     assert_eq!(other.hash(), hash);
+}
+
+struct Lift;
+
+impl UserForce for Lift {
+    fn force(&mut self, _t: f64, _x: &[f64], _v: &[f64], _mass: &[f64], force: &mut [f64]) -> Result<(), String> {
+        force[2] += 0.7;
+        Ok(())
+    }
+}
+
+/// A fluid knows of a user's force on its ball from the first interval on: also where the force comes after a restore.
+#[test]
+fn a_restored_run_with_a_users_force_goes_on_to_the_same_bits() {
+    let build = || simulation(&cavity(10, false, 2.0, [1, 2], "", ""));
+    let mut whole = build();
+    whole.add_force("solid", Box::new(Lift)).unwrap();
+    run(&mut whole, 2);
+    let saved = whole.save(&[]);
+    run(&mut whole, 2);
+    let mut again = build();
+    again.restore(&saved).unwrap();
+    again.add_force("solid", Box::new(Lift)).unwrap();
+    run(&mut again, 2);
+    assert_eq!(again.hash(), whole.hash());
+    let mut without = build();
+    without.restore(&saved).unwrap();
+    run(&mut without, 2);
+    assert_ne!(without.hash(), whole.hash());
 }

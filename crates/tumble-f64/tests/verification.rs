@@ -24,6 +24,7 @@ mod draping;
 mod electrostatics;
 mod elements;
 mod emission;
+mod events;
 mod fabrics;
 mod fire;
 mod flock;

@@ -429,6 +429,34 @@ mod tests {
     }
 
     #[test]
+    fn what_passes_of_one_interval_say_counts_once() {
+        let mut exchange = Exchange::default();
+        let (first, second) = (exchange.enter("first"), exchange.enter("second"));
+        let body = exchange.open(first, 0..1, false)[0];
+        let flux = exchange.open_flux(second, "plate x_low".into());
+        exchange.turn(second).flow(flux, 5.0, 1.0);
+        exchange.begin_repeats(0.0, 1.0);
+        // A partner that answers x with 3 - x/3: the secant through 0 and 3 meets x at 2.25.
+        for (pass, pushed) in [3.0, 2.0, 2.25].into_iter().enumerate() {
+            if pass > 0 {
+                exchange.repeat();
+            }
+            let taken = exchange.turn(first).take().iter().map(|push| push.impulse.x).sum::<f64>();
+            assert_eq!(taken, [0.0, 3.0, 2.25][pass]);
+            exchange.passed(first);
+            exchange.turn(second).flow(flux, 2.0, 0.5);
+            exchange.turn(second).post(body, Vector::default(), [pushed, 0.0, 0.0].into());
+            exchange.passed(second);
+            // The first pass has taken nothing, the second what the first posted, the third what both agree about.
+            let gap = exchange.end_pass();
+            assert_eq!(gap, [None, Some(1.0 / 3.0), Some(0.0)][pass]);
+        }
+        assert_eq!(exchange.end_repeats(), Some((0.0, ["first".into(), "second".into()])));
+        assert_eq!((exchange.fluxes()[0].heat, exchange.fluxes()[0].mass), (7.0, 1.5));
+        assert_eq!((exchange.posted.x, exchange.delivered.x, exchange.turn(first).take().len()), (2.25, 2.25, 0));
+    }
+
+    #[test]
     fn surfaces_stand_in_the_order_of_their_systems() {
         let mut exchange = Exchange::default();
         let (first, second) = (exchange.enter("first"), exchange.enter("second"));
