@@ -9,6 +9,7 @@ use tumble_f64::integrators::{Equation, Kinematics, Memory, Scratch, Stage, adap
 use tumble_f64::math::{Row, ZERO};
 use tumble_f64::reference::Kepler;
 use tumble_f64::reference::orbits::{arenstorf, pleiades};
+use tumble_f64::state::Frames;
 use tumble_interface::StepError;
 use tumble_interface::engine::StepReport;
 use tumble_interface::scene::{Adaptive, Integrator};
@@ -85,7 +86,7 @@ impl<F: FnMut(&[Row], &[Row], &mut [Row])> Motion<F> {
 
 impl<F: FnMut(&[Row], &[Row], &mut [Row])> Equation for Motion<F> {
     fn kinematics(&self) -> Kinematics {
-        Kinematics { points: usize::MAX, second_order: true }
+        Kinematics { frames: Frames::default(), second_order: true }
     }
 
     fn rate(&mut self, _: f64, x: &[Row], v: &[Row], out: &mut [Row]) -> Result<(), StepError> {

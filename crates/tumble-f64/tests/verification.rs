@@ -49,6 +49,7 @@ mod position_based_scenes;
 mod pressure;
 mod projections;
 mod rod_loops;
+mod rods_and_emitters;
 mod rods_position_based;
 mod sheets;
 mod single_steps;

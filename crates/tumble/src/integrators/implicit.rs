@@ -23,7 +23,7 @@ pub(super) fn midpoint(mut step: Step<'_, '_>) -> Result<(), StepError> {
     let Step { equation, h, x, v, scratch, .. } = step;
     let (kinematics, [x0, v0]) = (equation.kinematics(), scratch.take(x.len()));
     for i in 0..x.len() {
-        x[i] = if i < kinematics.points { sub(scale(x[i], 2.0), x0[i]) } else { kinematics.moved(i, x[i], v[i], h as Real) };
+        x[i] = if kinematics.frames.contains(i) { kinematics.moved(i, x[i], v[i], h as Real) } else { sub(scale(x[i], 2.0), x0[i]) };
     }
     for (v, v0) in v.iter_mut().zip(v0) {
         *v = sub(scale(*v, 2.0), *v0);
@@ -44,10 +44,13 @@ pub(super) fn bdf2(Step { equation, t, h, x, v, memory, ready, scratch, report }
         x0[i] = x[i];
         if ready {
             // A quaternion and its negative are one orientation: take the nearer.
-            let before =
-                if i >= kinematics.points && Quat::from_row(x[i]).dot(Quat::from_row(x1[i])) < 0.0 { scale(x1[i], -1.0) } else { x1[i] };
+            let before = if kinematics.frames.contains(i) && Quat::from_row(x[i]).dot(Quat::from_row(x1[i])) < 0.0 {
+                scale(x1[i], -1.0)
+            } else {
+                x1[i]
+            };
             x0[i] = axpy(x[i], third, sub(x[i], before));
-            if i >= kinematics.points {
+            if kinematics.frames.contains(i) {
                 x0[i] = Quat::from_row(x0[i]).normalized().row();
             }
         }

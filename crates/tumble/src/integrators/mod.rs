@@ -15,6 +15,7 @@ pub use adaptive::adaptive_step;
 pub use runge_kutta::{DORMAND_PRINCE, Tableau, tableau};
 
 use crate::math::{Real, Row, ZERO, axpy, rotation, rows, xyz};
+use crate::state::Frames;
 use tumble_interface::StepError;
 use tumble_interface::engine::StepReport;
 use tumble_interface::scene::Integrator;
@@ -22,8 +23,8 @@ use tumble_interface::scene::Integrator;
 /// How positions follow velocities.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Kinematics {
-    /// Rows below this are points, the others frames.
-    pub points: usize,
+    /// Which rows are frames; the others are points.
+    pub frames: Frames,
     /// Whether there are velocities: x' = v and v' = rate; else x' = rate.
     pub second_order: bool,
 }
@@ -31,9 +32,11 @@ pub struct Kinematics {
 impl Kinematics {
     /// Moves the rows from `start` on along v for the time h: points straight, frames turning at constant rate.
     pub fn drift(self, start: usize, x: &mut [Row], v: &[Row], h: Real) {
-        let points = self.points.saturating_sub(start).min(x.len());
-        rows::axpy(&mut x[..points], h, &v[..points]);
-        for (x, v) in x.iter_mut().zip(v).skip(points) {
+        let [before, frames, after] = self.frames.cut(start, x.len());
+        for points in [before, after] {
+            rows::axpy(&mut x[points.clone()], h, &v[points]);
+        }
+        for (x, v) in x[frames.clone()].iter_mut().zip(&v[frames]) {
             *x = rotation::turn(*x, xyz(*v) * h);
         }
     }
@@ -41,18 +44,19 @@ impl Kinematics {
     /// One row of [`Kinematics::drift`].
     #[inline(always)]
     pub fn moved(self, i: usize, x: Row, v: Row, h: Real) -> Row {
-        if i < self.points { axpy(x, h, v) } else { rotation::turn(x, xyz(v) * h) }
+        if self.frames.contains(i) { rotation::turn(x, xyz(v) * h) } else { axpy(x, h, v) }
     }
 
     /// x' of one row of an equation of second order.
     #[inline(always)]
     fn rate(self, i: usize, x: Row, v: Row) -> Row {
-        if i < self.points { v } else { rotation::rate(x, xyz(v)) }
+        if self.frames.contains(i) { rotation::rate(x, xyz(v)) } else { v }
     }
 
     /// Scales frames back to length 1.
     fn normalize(self, x: &mut [Row]) {
-        for q in x.iter_mut().skip(self.points) {
+        let [_, frames, _] = self.frames.cut(0, x.len());
+        for q in &mut x[frames] {
             *q = crate::math::Quat::from_row(*q).normalized().row();
         }
     }

@@ -48,7 +48,6 @@ pub(super) fn verlet(Step { equation, t, h, x, v, memory, ready, scratch, .. }: 
     let kinematics = equation.kinematics();
     let [guess] = scratch.take(x.len());
     let (half, h) = ((h / 2.0) as Real, h as Real);
-    let points = kinematics.points;
     let time = t + f64::from(h);
     if !ready {
         equation.rate(t, x, v, a)?;
@@ -65,11 +64,11 @@ pub(super) fn verlet(Step { equation, t, h, x, v, memory, ready, scratch, .. }: 
         chunks2(x, way, |start, x, way| {
             for (i, (x, d)) in x.iter_mut().zip(way).enumerate() {
                 let i = start + i;
-                if i < points {
+                if kinematics.frames.contains(i) {
+                    *x = kinematics.moved(i, *x, axpy(v[i], half, a[i]), h);
+                } else {
                     *d = axpy(*d, h * h, a[i]);
                     *x = add(*x, *d);
-                } else {
-                    *x = kinematics.moved(i, *x, axpy(v[i], half, a[i]), h);
                 }
             }
         });
@@ -80,7 +79,7 @@ pub(super) fn verlet(Step { equation, t, h, x, v, memory, ready, scratch, .. }: 
         chunks2(v, guess, |start, v, guess| {
             for (i, (v, guess)) in v.iter_mut().zip(guess).enumerate() {
                 let i = start + i;
-                *v = if i < points { scale(way[i], 1.0 / h) } else { axpy(*v, half, a[i]) };
+                *v = if kinematics.frames.contains(i) { axpy(*v, half, a[i]) } else { scale(way[i], 1.0 / h) };
                 *guess = axpy(*v, half, a[i]);
             }
         });

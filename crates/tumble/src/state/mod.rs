@@ -11,13 +11,44 @@ use crate::math::{Real, Row};
 use std::ops::Range;
 use tumble_interface::{Column, Data};
 
-/// Moving state: points, then frames.
+/// Moving state: points and frames.
 #[derive(Debug, Clone, Default)]
 pub struct State {
-    /// Points [x, y, z, 1/m] [m, 1/kg], then unit quaternions.
+    /// Points [x, y, z, 1/m] [m, 1/kg]; frames are unit quaternions.
     pub x: Vec<Row>,
     /// Velocities [m/s] of points, angular velocities in their own axes [rad/s] of frames; the fourth number is 0.
     pub v: Vec<Row>,
+}
+
+/// The rows of frames: they follow the points that are there from the start, and come before the points that are born. All others are
+/// points.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub struct Frames {
+    /// The first.
+    pub start: usize,
+    /// One past the last.
+    pub end: usize,
+}
+
+impl Frames {
+    /// Whether a row is a frame.
+    #[inline(always)]
+    pub fn contains(self, i: usize) -> bool {
+        self.start <= i && i < self.end
+    }
+
+    /// Rows counted from `first` on: points, frames, points.
+    pub fn cut(self, first: usize, rows: usize) -> [Range<usize>; 3] {
+        let at = |i: usize| i.saturating_sub(first).min(rows);
+        // Without frames, all points are one range.
+        let (start, end) = if self.start == self.end { (rows, rows) } else { (at(self.start), at(self.end)) };
+        [0..start, start..end, end..rows]
+    }
+
+    /// The frames among rows counted from `first` on.
+    pub fn from(self, first: usize) -> Self {
+        Self { start: self.start.saturating_sub(first), end: self.end.saturating_sub(first) }
+    }
 }
 
 /// How much each row weighs.
@@ -29,15 +60,26 @@ pub struct Masses {
     pub inverse_inertia: Vec<Real>,
     /// Electric charges [C]; empty where nothing is charged.
     pub charge: Vec<Real>,
-    /// Count of points; the rows after them are frames.
-    pub points: usize,
+    /// Which rows are frames.
+    pub frames: Frames,
 }
 
 impl Masses {
     /// 1/mass or 1/inertia of row i, 0 for what is held; x are all rows.
     #[inline(always)]
     pub fn inverse(&self, i: usize, x: &[Row]) -> Real {
-        if i < self.points { x[i][3] } else { self.inverse_inertia[i - self.points] }
+        if self.frames.contains(i) { self.inverse_inertia[i - self.frames.start] } else { x[i][3] }
+    }
+
+    /// The first three numbers of the rows of points, one after the other.
+    pub fn flat(&self, rows: &[Row]) -> Vec<f64> {
+        self.points().flat_map(|points| &rows[points]).flat_map(|r| [f64::from(r[0]), f64::from(r[1]), f64::from(r[2])]).collect()
+    }
+
+    /// The rows of points, in one or two ranges.
+    pub fn points(&self) -> impl Iterator<Item = Range<usize>> + Clone {
+        let [a, _, b] = self.frames.cut(0, self.mass.len());
+        [a, b].into_iter().filter(|range| !range.is_empty())
     }
 }
 

@@ -6,7 +6,7 @@ use crate::integrators::{self, Equation, Kinematics, Memory, Scratch, Stage, Ste
 use crate::math::parallel::chunks;
 use crate::math::{Real, Row, Vec3, ZERO, is_finite, xyz64};
 use crate::pool::{Birth, Columns, Emitter, Pool, due};
-use crate::state::Object;
+use crate::state::{Frames, Object};
 use crate::system::{Archive, Part, System};
 use tumble_interface::engine::{Ledger, Stability, StepReport};
 use tumble_interface::error::Breakdown;
@@ -134,7 +134,7 @@ struct Carried<'a>(&'a Flow);
 
 impl Equation for Carried<'_> {
     fn kinematics(&self) -> Kinematics {
-        Kinematics { points: usize::MAX, second_order: false }
+        Kinematics { frames: Frames::default(), second_order: false }
     }
 
     fn rate(&mut self, t: f64, x: &[Row], _v: &[Row], out: &mut [Row]) -> Result<(), StepError> {

@@ -14,7 +14,7 @@ impl Dynamics {
     }
 
     fn share(&self, object: &Object, t: f64) -> Ledger {
-        let sums = self.core.sums(object.points.clone(), object.frames.clone());
+        let sums = self.core.sums(std::iter::once(object.points.clone()), object.frames.clone());
         Ledger {
             time: t,
             mass: sums.mass,
@@ -28,9 +28,9 @@ impl Dynamics {
     }
 
     pub(super) fn worst_at(&self, t: f64) -> Vec<Worst> {
-        let (x, v, points) = (&self.core.state.x, &self.core.state.v, self.core.laws.masses.points);
-        let fastest = worst(points, |i| xyz64(v[i]).norm());
-        let deepest = worst(points, |i| self.core.depths(i, t).fold(f64::NEG_INFINITY, f64::max));
+        let (x, v, frames) = (&self.core.state.x, &self.core.state.v, self.core.laws.masses.frames);
+        let fastest = worst(x.len(), |i| if frames.contains(i) { 0.0 } else { xyz64(v[i]).norm() });
+        let deepest = worst(x.len(), |i| self.core.depths(i, t).fold(f64::NEG_INFINITY, f64::max));
         let strained = self
             .core
             .laws

@@ -129,17 +129,18 @@ impl Core {
         let observed = self.pool.heeded();
         let step = Step { t, h, resting: self.resting_speed(h), lead, observed: false };
         let pass = Pass { colliders: &self.laws.colliders, step, penalty, observed: &observed };
-        let points = self.laws.masses.points;
-        let (before, before_v) = (&self.before[..points], &self.before_v[..points]);
-        let chunks = self.state.x[..points].chunks_mut(CHUNK).zip(self.state.v[..points].chunks_mut(CHUNK));
-        let chunks = chunks.zip(before.chunks(CHUNK).zip(before_v.chunks(CHUNK))).enumerate();
-        let touched: Vec<(bool, Vec<(usize, Hit)>)> = chunks.map_in_parallel(|(c, ((x, v), (before, before_v)))| {
-            let mut hits = Vec::new();
-            (pass.rows(c * CHUNK, [before, before_v], x, v, &mut hits), hits)
-        });
-        for (any, hits) in touched {
-            self.memory.ready &= !any;
-            hits.into_iter().for_each(|(row, hit)| self.pool.note_row(row, hit));
+        for points in self.laws.masses.points() {
+            let (before, before_v) = (&self.before[points.clone()], &self.before_v[points.clone()]);
+            let chunks = self.state.x[points.clone()].chunks_mut(CHUNK).zip(self.state.v[points.clone()].chunks_mut(CHUNK));
+            let chunks = chunks.zip(before.chunks(CHUNK).zip(before_v.chunks(CHUNK))).enumerate();
+            let touched: Vec<(bool, Vec<(usize, Hit)>)> = chunks.map_in_parallel(|(c, ((x, v), (before, before_v)))| {
+                let mut hits = Vec::new();
+                (pass.rows(points.start + c * CHUNK, [before, before_v], x, v, &mut hits), hits)
+            });
+            for (any, hits) in touched {
+                self.memory.ready &= !any;
+                hits.into_iter().for_each(|(row, hit)| self.pool.note_row(row, hit));
+            }
         }
     }
 

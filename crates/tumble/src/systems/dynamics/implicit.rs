@@ -134,7 +134,7 @@ impl Implicit {
                     add_block(&mut local[i - start], d, (1.0 / gh) as Real);
                 }
             }
-            for i in start..if contact.act(all) { end.min(masses.points) } else { start } {
+            for i in (start..if contact.act(all) { end } else { start }).filter(|i| !masses.frames.contains(*i)) {
                 for touch in contact.of(all, i, t, gh, x[i], v[i]) {
                     add_block(&mut local[i - start], touch.matrix(gh), 1.0);
                 }
@@ -242,7 +242,7 @@ impl Stiff for Motion<'_> {
         chunks(out, |start, out| {
             for (k, f) in out.iter_mut().enumerate() {
                 let i = start + k;
-                if i < laws.masses.points && x[i][3] > 0.0 {
+                if !laws.masses.frames.contains(i) && x[i][3] > 0.0 {
                     for touch in contact.of(laws, i, t, gh, x[i], v[i]) {
                         let push = touch.force(x[i]);
                         *f = [f[0] + push.x as Real, f[1] + push.y as Real, f[2] + push.z as Real, 0.0];

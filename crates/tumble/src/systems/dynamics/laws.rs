@@ -44,8 +44,8 @@ pub struct Laws {
     pub colliders: Arc<Vec<Collider>>,
     /// Stiffness with which the elements hold each row at the start [N/m]; emitted particles have none.
     pub grip: Vec<Real>,
-    /// Users' forces, three numbers a point; scratch.
-    pub pushes: Vec<f64>,
+    /// Users' forces on the rows; scratch.
+    pub pushes: Vec<[f64; 3]>,
 }
 
 impl Laws {
@@ -62,13 +62,17 @@ impl Laws {
         if self.user.is_empty() {
             return Ok(());
         }
-        let n = self.masses.points;
-        let (x, v) = (flat(&x[..n]), flat(&v[..n]));
-        let mass: Vec<f64> = self.masses.mass[..n].iter().map(|m| f64::from(*m)).collect();
-        self.pushes.clear();
-        self.pushes.resize(x.len(), 0.0);
+        let masses = &self.masses;
+        let (xs, vs) = (masses.flat(x), masses.flat(v));
+        let mass: Vec<f64> = masses.points().flat_map(|points| &masses.mass[points]).map(|m| f64::from(*m)).collect();
+        let mut pushes = vec![0.0; xs.len()];
         for user in &mut self.user {
-            user.force(t, &x, &v, &mass, &mut self.pushes).map_err(StepError::User)?;
+            user.force(t, &xs, &vs, &mass, &mut pushes).map_err(StepError::User)?;
+        }
+        self.pushes.clear();
+        self.pushes.resize(x.len(), [0.0; 3]);
+        for (i, push) in masses.points().flatten().zip(pushes.as_chunks().0) {
+            self.pushes[i] = *push;
         }
         Ok(())
     }
@@ -80,7 +84,7 @@ impl Laws {
         for batch in &self.batches {
             batch.add_forces(x, v, start, out);
         }
-        for (f, push) in out.iter_mut().zip(self.pushes.get(3 * start..).unwrap_or_default().chunks_exact(3)) {
+        for (f, push) in out.iter_mut().zip(self.pushes.get(start..).unwrap_or_default()) {
             *f = add(*f, [push[0] as Real, push[1] as Real, push[2] as Real, 0.0]);
         }
         self.add_local(t, start, &x[start..end], &v[start..end], out);
@@ -107,16 +111,20 @@ impl Laws {
     /// Turns the forces on the rows from `start` on into accelerations.
     fn accelerate(&self, masses: &Masses, start: usize, x: &[Row], out: &mut [Row]) {
         let [gx, gy, gz] = self.gravity.map(|g| g as Real);
-        let (points, frames) = out.split_at_mut(masses.points.saturating_sub(start).min(x.len()));
-        let (x_points, x_frames) = x.split_at(points.len());
-        rows::each_by_last(points, x_points, [gx, gy, gz, 0.0], Weigh);
-        let first = start + x_points.len() - masses.points.min(start + x_points.len());
-        rows::each(frames, &masses.inverse_inertia[first..first + x_frames.len()], x_frames, ZERO, Weigh);
+        let [before, frames, after] = masses.frames.cut(start, x.len());
+        for points in [before, after] {
+            rows::each_by_last(&mut out[points.clone()], &x[points], [gx, gy, gz, 0.0], Weigh);
+        }
+        if !frames.is_empty() {
+            let first = start + frames.start - masses.frames.start;
+            let inverse = &masses.inverse_inertia[first..first + frames.len()];
+            rows::each(&mut out[frames.clone()], inverse, &x[frames], ZERO, Weigh);
+        }
     }
 
     /// Points and frames.
     pub fn kinematics(&self) -> Kinematics {
-        Kinematics { points: self.masses.points, second_order: true }
+        Kinematics { frames: self.masses.frames, second_order: true }
     }
 
     /// Accelerations at (t, x, v) [m/s², rad/s²].
@@ -141,10 +149,12 @@ impl Laws {
     pub fn forces(&mut self, t: f64, x: &[Row], v: &[Row], out: &mut [Row]) -> Result<(), StepError> {
         self.begin(t, x, v)?;
         let laws = &*self;
-        let (g, points) = (self.gravity.map(|g| g as Real), self.masses.points);
+        let g = self.gravity.map(|g| g as Real);
         chunks(out, |start, out| {
             laws.sum(t, start, x, v, out);
-            for (f, m) in out.iter_mut().zip(&laws.masses.mass[start..]).take(points.saturating_sub(start)) {
+            let [before, _, after] = laws.masses.frames.cut(start, out.len());
+            for i in before.chain(after) {
+                let (f, m) = (&mut out[i], laws.masses.mass[start + i]);
                 *f = [f[0] + m * g[0], f[1] + m * g[1], f[2] + m * g[2], 0.0];
             }
         });
@@ -159,11 +169,6 @@ impl Laws {
         let all = self.forces.iter().flat_map(|f| f.ranges.iter().map(|range| (f.law.as_ref(), range)));
         all.filter(has_one).map(|(law, range)| sum(range.len(), |part| part.filter_map(|k| of(law, range.start + k)).sum())).sum()
     }
-}
-
-/// The first three numbers of each row, one after the other.
-pub fn flat(rows: &[Row]) -> Vec<f64> {
-    rows.iter().flat_map(|r| [f64::from(r[0]), f64::from(r[1]), f64::from(r[2])]).collect()
 }
 
 /// f/m + g; pinned masses do not fall.
@@ -190,7 +195,7 @@ pub struct Local<'a> {
 
 impl Equation for Local<'_> {
     fn kinematics(&self) -> Kinematics {
-        Kinematics { points: self.masses.points.saturating_sub(self.start), second_order: true }
+        Kinematics { frames: self.masses.frames.from(self.start), second_order: true }
     }
 
     fn rate(&mut self, t: f64, x: &[Row], v: &[Row], out: &mut [Row]) -> Result<(), StepError> {

@@ -9,6 +9,7 @@ use crate::math::parallel::{fold, max, sum};
 use crate::math::{Row, Vec3, ZERO, is_finite, xyz64};
 use crate::state::Object;
 use crate::system::System;
+use std::ops::Range;
 use tumble_interface::StepError;
 use tumble_interface::engine::{BLOW_UP, Ledger, Limit, Stability};
 use tumble_interface::error::Breakdown;
@@ -16,9 +17,8 @@ use tumble_interface::scene::Integrator;
 
 impl Dynamics {
     pub(super) fn ledger_at(&self, t: f64) -> Ledger {
-        let (x, v, masses) = (&self.core.state.x, &self.core.state.v, &self.core.laws.masses);
-        let n = masses.points;
-        let total = self.core.sums(0..n, n..x.len());
+        let (x, v) = (&self.core.state.x, &self.core.state.v);
+        let total = self.core.total();
         let strains =
             self.core.laws.batches.iter().map(|b| b.largest_strain(x)).chain(self.core.constraints.iter().map(|c| c.largest_strain(x)));
         let strain = strains.fold(f64::NEG_INFINITY, f64::max);
@@ -37,10 +37,10 @@ impl Dynamics {
             external: self.core.energy_between(false, t) + self.core.laws.external_energy(t, x, v)
                 - Vec3::from(self.core.laws.gravity).dot(total.first_moment),
             stretch,
-            penetration: touching.then(|| max(n, |range| range.flat_map(depths).fold(0.0, f64::max)).max(0.0)),
+            penetration: touching.then(|| max(x.len(), |range| range.flat_map(depths).fold(0.0, f64::max)).max(0.0)),
             intersections: self.features.surfaces().and_then(|surfaces| surfaces.intersections(x, t)),
             speed: Some(total.speed_sq.sqrt()),
-            contacts: touching.then(|| sum(n, |range| range.filter(|i| depths(*i).next().is_some()).count() as f64) as u64),
+            contacts: touching.then(|| sum(x.len(), |range| range.filter(|i| depths(*i).next().is_some()).count() as f64) as u64),
             broken: Some(self.core.broken),
             volume: closed.clone().next().map(|_| closed.map(|o| self.core.volume_in(o)).sum()),
             ..Ledger::default()
@@ -50,11 +50,13 @@ impl Dynamics {
     /// Takes the scale of the energy from the start: kinetic and elastic energy, a fall by the system's own size, and
     /// gravitation.
     pub(super) fn set_scale(&mut self) {
-        let n = self.core.laws.masses.points;
         let ledger = self.ledger_at(0.0);
         let far = |a: Vec3<f64>, b: Vec3<f64>| (a - b).norm();
         let first = self.core.state.x.first().map(|x| xyz64(*x)).unwrap_or_default();
-        let size = max(n, |range| range.map(|i| far(xyz64(self.core.state.x[i]), first)).fold(0.0, f64::max)).max(0.0);
+        let rows = &self.core.state.x[..];
+        let span =
+            |points: Range<usize>| max(points.len(), |range| range.map(|i| far(xyz64(rows[points.start + i]), first)).fold(0.0, f64::max));
+        let size = self.core.laws.masses.points().map(span).fold(0.0, f64::max);
         let fall = ledger.mass * Vec3::from(self.core.laws.gravity).norm() * size;
         // The energy that holds masses together is a scale, too, even if they start at rest, and so is that of driving forces.
         let driven: f64 = self.core.laws.batches.iter().filter_map(|b| b.drives()).sum();
@@ -95,8 +97,8 @@ impl Dynamics {
         if found.is_none() {
             let ratio = self.core.scale.growth(&self.scheme.felt(&ledger)).filter(|g| *g > BLOW_UP || g.is_nan());
             if let Some(ratio) = ratio {
-                let fastest =
-                    (0..self.core.laws.masses.points).max_by(|a, b| xyz64(state.v[*a]).norm_sq().total_cmp(&xyz64(state.v[*b]).norm_sq()));
+                let points = self.core.laws.masses.points().flatten();
+                let fastest = points.max_by(|a, b| xyz64(state.v[*a]).norm_sq().total_cmp(&xyz64(state.v[*b]).norm_sq()));
                 found = Some(("velocity", fastest.unwrap_or(0), Some(ratio)));
             }
         }

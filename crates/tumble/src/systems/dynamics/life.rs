@@ -12,7 +12,7 @@ use crate::integrators::{self, Equation, Memory, Scratch, Step};
 use crate::math::parallel::Tasks;
 use crate::math::{Real, Row, Vec3, ZERO, axpy, xyz64};
 use crate::pool::{Birth, Columns, Hit, Pool, due};
-use crate::state::Masses;
+use crate::state::{Frames, Masses};
 use std::ops::Range;
 use tumble_interface::StepError;
 use tumble_interface::engine::StepReport;
@@ -223,8 +223,6 @@ impl Core {
 
     /// Tells everything that counts rows how many there are now.
     fn count_rows(&mut self) {
-        let rows = self.pool.end();
-        self.laws.masses.points = rows;
         self.memory.ready = false;
         self.pool.place(&mut self.objects);
         for force in &mut self.laws.forces {
@@ -268,7 +266,7 @@ fn weigh(pool: &Pool, s: usize, ids: impl Iterator<Item = u32>, charged: bool) -
         mass: mass.iter().map(|m| *m as Real).collect(),
         inverse_inertia: Vec::new(),
         charge: if charged { vec![emitter.words().charge as Real; mass.len()] } else { Vec::new() },
-        points: mass.len(),
+        frames: Frames::default(),
     }
 }
 

@@ -37,7 +37,7 @@ impl Core {
             let moved = blocks.iter_mut().map(|(c, ((x, v), memory))| {
                 let start = *c * BLOCK;
                 let mut motion = Local { laws, masses: &laws.masses, start, newborn: None };
-                let points = motion.kinematics().points.min(x.len());
+                let [first, _, last] = motion.kinematics().frames.cut(0, x.len());
                 let (mut ready, mut before, mut before_v, mut hits) = (was_ready, Vec::new(), Vec::new(), Vec::new());
                 for k in 0..substeps {
                     if k % 64 == 63 && !go_on() {
@@ -55,7 +55,11 @@ impl Core {
                     if !colliders.is_empty() {
                         let step = Contact { t, h, resting, lead: response.lead, observed: false };
                         let pass = Pass { colliders, step, penalty: response.penalty, observed: &observed };
-                        ready = !pass.rows(start, [&before, &before_v], &mut x[..points], &mut v[..points], &mut hits);
+                        for points in [&first, &last] {
+                            let starts = [&before[points.clone()], &before_v[points.clone()]];
+                            let (x, v) = (&mut x[points.clone()], &mut v[points.clone()]);
+                            ready &= !pass.rows(start + points.start, starts, x, v, &mut hits);
+                        }
                     }
                 }
                 Ok((ready, hits))

@@ -378,9 +378,12 @@ impl System for Dynamics {
         if !self.core.pool.is_empty() {
             self.core.pool.save(archive);
         }
-        let points = self.core.laws.masses.points;
-        archive.push_points("x", &self.core.state.x[..points], self.core.state.x.capacity());
-        archive.push_rows("turn", &self.core.state.x[points..]);
+        let [points, frames, born] = self.core.laws.masses.frames.cut(0, self.core.state.x.len());
+        archive.push_points("x", &self.core.state.x[points], self.core.state.x.capacity());
+        archive.push_rows("turn", &self.core.state.x[frames]);
+        if !born.is_empty() {
+            archive.push_points("born", &self.core.state.x[born], self.core.state.x.capacity());
+        }
         archive.push_points("v", &self.core.state.v, self.core.state.v.capacity());
         for column in &self.core.memory.columns {
             archive.push_rows("memory", column);
@@ -403,9 +406,12 @@ impl System for Dynamics {
             self.core.pool.restore(archive)?;
             self.core.take_pool();
         }
-        let points = self.core.laws.masses.points;
-        archive.points("x", &mut self.core.state.x[..points])?;
-        archive.rows("turn", &mut self.core.state.x[points..])?;
+        let [points, frames, born] = self.core.laws.masses.frames.cut(0, self.core.state.x.len());
+        archive.points("x", &mut self.core.state.x[points])?;
+        archive.rows("turn", &mut self.core.state.x[frames])?;
+        if !born.is_empty() {
+            archive.points("born", &mut self.core.state.x[born])?;
+        }
         archive.points("v", &mut self.core.state.v)?;
         for column in &mut self.core.memory.columns {
             archive.rows("memory", column)?;

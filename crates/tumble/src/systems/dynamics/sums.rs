@@ -97,11 +97,13 @@ impl Core {
     }
 
     /// Sums over some points and frames.
-    pub fn sums(&self, points: Range<usize>, frames: Range<usize>) -> Sums {
-        let (x, v, masses) = (&self.state.x[points.clone()], &self.state.v[points.clone()], &self.laws.masses.mass[points.clone()]);
+    pub fn sums(&self, points: impl Iterator<Item = Range<usize>>, frames: Range<usize>) -> Sums {
         let mut total = Sums::default();
-        for part in fold(points.len(), |range| dispatch(Summation { mass: &masses[range.clone()], x: &x[range.clone()], v: &v[range] })) {
-            total.add(&part);
+        for rows in points {
+            let (x, v, mass) = (&self.state.x[rows.clone()], &self.state.v[rows.clone()], &self.laws.masses.mass[rows.clone()]);
+            for part in fold(rows.len(), |range| dispatch(Summation { mass: &mass[range.clone()], x: &x[range.clone()], v: &v[range] })) {
+                total.add(&part);
+            }
         }
         for i in frames {
             let (inertia, turning) = (f64::from(self.laws.masses.mass[i]), xyz64(self.state.v[i]));
@@ -111,11 +113,17 @@ impl Core {
         total
     }
 
-    /// How deep a point is in each collider that it touches at time t [s]. No solid moves held points, such as the
+    /// Sums over all points and frames.
+    pub fn total(&self) -> Sums {
+        let masses = &self.laws.masses;
+        self.sums(masses.points(), masses.frames.start..masses.frames.end)
+    }
+
+    /// How deep a point is in each collider that it touches at time t [s]; frames are in none. No solid moves held points, such as the
     /// roots of hair.
     pub fn depths(&self, i: usize, t: f64) -> impl Iterator<Item = f64> {
         let (x, masses) = (&self.state.x, &self.laws.masses);
-        let colliders = if masses.mass[i] > 0.0 && x[i][3] > 0.0 { &self.laws.colliders[..] } else { &[] };
+        let colliders = if masses.mass[i] > 0.0 && x[i][3] > 0.0 && !masses.frames.contains(i) { &self.laws.colliders[..] } else { &[] };
         let p = xyz64(x[i]);
         colliders.iter().filter_map(move |c| c.touch(p, t)).map(|t| t.depth)
     }

@@ -48,7 +48,7 @@ impl Batches {
     pub fn new(masses: &Masses, projects: bool) -> Self {
         Self {
             rows: masses.mass.len(),
-            points: masses.points,
+            points: masses.frames.start,
             projected: projects.then(|| masses.inverse_inertia.clone()),
             list: Vec::new(),
             constraints: Vec::new(),

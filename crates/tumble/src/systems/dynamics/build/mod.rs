@@ -23,7 +23,7 @@ use crate::geometry::{Carrier, Collider};
 use crate::integrators::Memory;
 use crate::math::Real;
 use crate::pool::Pool;
-use crate::state::{Masses, State};
+use crate::state::{Frames, Masses, State};
 use between::between;
 use elements::Batches;
 use objects::Objects;
@@ -34,7 +34,6 @@ impl Parts {
     /// The system.
     pub fn build(mut self, settings: Settings) -> Result<Dynamics, SceneError> {
         self.check_range()?;
-        self.check_emitters(&settings.name)?;
         scheme::check(&self, &settings)?;
         if self.tearing_surface().is_some() {
             self.halve_links();
@@ -43,7 +42,7 @@ impl Parts {
         let lost = || SceneError::one(format!("system \"{}\"", settings.name), "an element refers to a mass that is not there");
         let projects = scheme::projects(&settings);
         let (state, masses) = self.state();
-        let (points, rows) = (masses.points, masses.mass.len());
+        let (points, rows) = (masses.frames.start, masses.mass.len());
         let mut batches = Batches::new(&masses, projects);
         let clamp = settings.clamp.and_then(|ratio| self.clamp(ratio, rows));
         let lists = batches.fill(&mut self).map_err(|_| lost())?;
@@ -85,7 +84,7 @@ impl Parts {
             constraints: batches.constraints,
             clamp,
             objects: objects.list,
-            pool: Pool::new(points, self.emitters),
+            pool: Pool::new(rows, self.emitters),
             between,
             memory: Memory::new(settings.integrator, rows),
             before: Vec::new(),
@@ -94,15 +93,6 @@ impl Parts {
             broken: 0,
         };
         Dynamics::new(core, scheme, features, &settings)
-    }
-
-    /// Frames must be the last rows, and so must emitted particles.
-    fn check_emitters(&self, system: &str) -> Result<(), SceneError> {
-        if self.emitters.is_empty() || self.frames.is_empty() {
-            return Ok(());
-        }
-        let message = "it holds rods and emitters; rods have frames, which must come last: give one of them a system of its own";
-        Err(SceneError::one(format!("system \"{system}\""), message))
     }
 
     /// Counts the frames of elements and followers from the first row of all, as the system does; leaves out followers of solids at rest.
@@ -121,7 +111,8 @@ impl Parts {
     /// Rows of points and frames, and their masses.
     fn state(&self) -> (State, Masses) {
         let points = self.points.len();
-        let (mut state, mut masses) = (State::default(), Masses { points, ..Masses::default() });
+        let (mut state, mut masses) =
+            (State::default(), Masses { frames: Frames { start: points, end: points + self.frames.len() }, ..Masses::default() });
         for (x, v, mass, pinned) in &self.points {
             let w = if *pinned || *mass == 0.0 { 0.0 } else { 1.0 / mass };
             state.x.push([x.x as Real, x.y as Real, x.z as Real, w as Real]);
@@ -182,7 +173,7 @@ impl Parts {
             let triangles: Vec<[u32; 3]> = on.iter().flat_map(|i| objects.triangles(*i)).collect();
             if !triangles.is_empty() {
                 added.push((batches.list.len(), on));
-                batches.list.push(Box::new(Sails::new(air, &triangles, &state.x[..masses.points], &masses.mass, &self.times)?));
+                batches.list.push(Box::new(Sails::new(air, &triangles, &state.x[..masses.frames.start], &masses.mass, &self.times)?));
             }
         }
         Some(added)

@@ -5,7 +5,6 @@ use super::super::core::Core;
 use super::super::feature::Span;
 use super::super::features::Features;
 use super::super::implicit::{Implicit, Motion};
-use super::super::laws::flat;
 use super::super::parts::Parts;
 use super::super::settings::Settings;
 use super::Scheme;
@@ -71,7 +70,8 @@ impl Forces {
         let Core { state, laws, clamp: Some(clamp), memory, .. } = core else { return };
         let masses = &laws.masses;
         let one = |v: &[Row], i: usize| 0.5 * f64::from(masses.mass[i]) * xyz64(v[i]).norm_sq();
-        let kinetic = |v: &[Row]| sum(masses.points, |range| range.map(|i| one(v, i)).sum());
+        let kinetic =
+            |v: &[Row]| masses.points().map(|points| sum(points.len(), |range| range.map(|i| one(v, points.start + i)).sum())).sum::<f64>();
         let energy = |state: &State| kinetic(&state.v) + laws.batches.iter().map(|b| b.energy(&state.x)).sum::<f64>();
         let was = energy(state);
         self.unclamped.clone_from(&state.x);
@@ -79,7 +79,7 @@ impl Forces {
         clamp.project(&mut state.x, &projection);
         let inverse_h = (1.0 / h) as Real;
         let mut moved = false;
-        for i in 0..masses.points {
+        for i in masses.points().flatten() {
             let change = sub(state.x[i], self.unclamped[i]);
             if change != ZERO {
                 state.v[i] = axpy(state.v[i], inverse_h, change);
@@ -161,26 +161,30 @@ impl Scheme for Forces {
 /// A step of a user's integrator, which knows points alone.
 fn user_step(user: &mut dyn UserIntegrator, core: &mut Core, Span { t, h }: Span) -> Result<(), StepError> {
     let Core { state, laws, .. } = core;
-    let n = laws.masses.points;
-    let (mut x, mut v) = (flat(&state.x[..n]), flat(&state.v[..n]));
+    let points: Vec<usize> = laws.masses.points().flatten().collect();
+    let n = points.len();
+    let (mut x, mut v) = (laws.masses.flat(&state.x), laws.masses.flat(&state.v));
     let mut acceleration = |t: f64, x: &[f64], v: &[f64]| -> Result<Vec<f64>, String> {
         if x.len() != 3 * n || v.len() != 3 * n {
             return Err(format!("acceleration takes {n} rows of three numbers"));
         }
         let rows = |from: &[f64], old: &[Row]| -> Vec<Row> {
-            let new = from.chunks_exact(3).zip(old).map(|(p, o)| [p[0] as Real, p[1] as Real, p[2] as Real, o[3]]);
-            new.chain(old[n..].iter().copied()).collect()
+            let mut rows = old.to_vec();
+            for (i, p) in points.iter().zip(from.chunks_exact(3)) {
+                rows[*i] = [p[0] as Real, p[1] as Real, p[2] as Real, old[*i][3]];
+            }
+            rows
         };
         let mut out = vec![ZERO; state.x.len()];
         laws.rate(t, &rows(x, &state.x), &rows(v, &state.v), &mut out).map_err(|e| e.to_string())?;
-        Ok(flat(&out[..n]))
+        Ok(laws.masses.flat(&out))
     };
     user.step(t, h, &mut x, &mut v, &mut acceleration).map_err(StepError::User)?;
-    for i in 0..n {
-        if state.x[i][3] > 0.0 {
-            let take = |from: &[f64], w: Real| [from[3 * i] as Real, from[3 * i + 1] as Real, from[3 * i + 2] as Real, w];
-            state.x[i] = take(&x, state.x[i][3]);
-            state.v[i] = take(&v, 0.0);
+    for ((i, x), v) in points.iter().zip(x.chunks_exact(3)).zip(v.chunks_exact(3)) {
+        let w = state.x[*i][3];
+        if w > 0.0 {
+            state.x[*i] = [x[0] as Real, x[1] as Real, x[2] as Real, w];
+            state.v[*i] = [v[0] as Real, v[1] as Real, v[2] as Real, 0.0];
         }
     }
     Ok(())

@@ -128,10 +128,11 @@ fn set_velocities(core: &mut Core, h: Real) {
     chunks(v, |start, v| {
         let rows = start..start + v.len();
         let (x, before) = (&x[rows.clone()], &before[rows]);
-        let (points, frames) = v.split_at_mut(kinematics.points.saturating_sub(start).min(v.len()));
-        let first = points.len();
-        dispatch(Velocities { v: points, x, before, h });
-        for ((v, x), before) in frames.iter_mut().zip(&x[first..]).zip(&before[first..]) {
+        let [first, frames, last] = kinematics.frames.cut(start, v.len());
+        for points in [first, last] {
+            dispatch(Velocities { v: &mut v[points.clone()], x: &x[points.clone()], before: &before[points], h });
+        }
+        for ((v, x), before) in v[frames.clone()].iter_mut().zip(&x[frames.clone()]).zip(&before[frames]) {
             if rotation::turn(*before, xyz(*v) * h) != *x {
                 *v = turning(*before, *x, h);
             }
@@ -189,7 +190,8 @@ impl Scheme for Projected {
                 short(softening)
             ))
         });
-        let far = core.state.x[..core.laws.kinematics().points].iter().filter(|x| x[3] > 0.0).map(|x| xyz64(*x).norm()).fold(0.0, f64::max);
+        let points = core.laws.masses.points().flat_map(|points| &core.state.x[points]);
+        let far = points.filter(|x| x[3] > 0.0).map(|x| xyz64(*x).norm()).fold(0.0, f64::max);
         let unknown = 0.5 * f64::from(Real::EPSILON) * far / (h * h);
         let gravity = Vec3::from(core.laws.gravity).norm();
         let lost = (gravity > 0.0 && unknown > UNKNOWN * gravity).then(|| {
