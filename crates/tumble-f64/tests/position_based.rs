@@ -196,10 +196,9 @@ fn a_pendulum_keeps_time() {
     }
 }
 
-/// Forces act between the ends as they are after a step, at lever arms from before it: momentum is kept, angular momentum to the order of
-/// implicit Euler, which is 1.
+/// Corrections act between the ends as they are after a step, at lever arms from before it; free bodies get back what that takes.
 #[test]
-fn elements_keep_momentum_and_in_the_limit_angular_momentum() {
+fn elements_keep_momentum_and_angular_momentum() {
     // A jelly and a sheet with hinges that fly and turn freely.
     let lost = |substeps: u32| {
         let mut sim = simulation(&format!(
@@ -222,12 +221,9 @@ fn elements_keep_momentum_and_in_the_limit_angular_momentum() {
         assert!(after.energy() < before.energy() && after.kinetic > 0.1 * before.kinetic);
         ((Vector::from(after.momentum) - p).norm() / p.norm(), (Vector::from(after.angular_momentum.unwrap()) - l).norm() / l.norm())
     };
-    let found = [100, 200, 400, 800].map(lost);
+    let found = [5, 100, 400].map(lost);
     println!("momentum and angular momentum lost: {found:?}");
-    // Thousands of corrections in 4000 sub-steps, each rounded to 1e-16 m over h.
-    assert!(found.iter().all(|(p, _)| *p < 1e-10));
-    let orders = common::orders(&found.map(|(_, l)| l));
-    assert!(found[0].1 > 1e-6 && orders.iter().all(|o| (o - 1.0).abs() < 0.2), "{orders:?}");
+    assert!(found.iter().all(|(p, l)| *p < 1e-12 && *l < 1e-12), "{found:?}");
 }
 
 /// The trap of two successive projections: the shear law alone would shrink the block.

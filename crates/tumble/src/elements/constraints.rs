@@ -60,6 +60,12 @@ pub trait Constraints: Send + Sync {
     fn is_empty(&self) -> bool {
         self.len() == 0
     }
+    /// Calls `join` with pairs of rows that connect all rows of each element; what has broken connects none.
+    fn connect(&self, join: &mut dyn FnMut(u32, u32));
+    /// One of its rows, where solids have pushed them in the sweeps of this sub-step.
+    fn leans(&self) -> Option<usize> {
+        None
+    }
     /// Potential energy [J], zero at rest; nothing of rigid elements.
     fn energy(&self, x: &[Row], walls: Walls<'_>) -> f64;
     /// Corrects points and frames once, element by element; x[i][3] are inverse masses of points.
@@ -190,6 +196,13 @@ impl<const N: usize, const D: usize, const P: usize> Columns<N, D, P> {
         let mut places = vec![0; self.len()];
         self.given.iter().enumerate().for_each(|(place, given)| places[*given as usize] = place);
         places
+    }
+
+    /// Joins the nodes of each element that has not broken.
+    fn connect(&self, join: &mut dyn FnMut(u32, u32)) {
+        for e in (0..self.len()).filter(|e| self.compliance[*e] < LIMP as Real) {
+            (1..N).for_each(|a| join(self.nodes[0].get()[e], self.nodes[a].get()[e]));
+        }
     }
 
     /// Panics unless there are rows for the unchecked loads.
@@ -568,6 +581,10 @@ impl<E: Element<N, M, D>, Y: Law<P>, const N: usize, const M: usize, const D: us
 
     fn len(&self) -> usize {
         self.columns.len()
+    }
+
+    fn connect(&self, join: &mut dyn FnMut(u32, u32)) {
+        self.columns.connect(join);
     }
 
     fn energy(&self, x: &[Row], _: Walls<'_>) -> f64 {

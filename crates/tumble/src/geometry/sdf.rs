@@ -1,4 +1,5 @@
-//! Signed distance on a grid: exact at the nodes near the surface, trilinear between them.
+//! Signed distance on a grid: exact at the nodes near the surface, trilinear between them. Cells in which that is too far off, such as
+//! those that a shell or a thin part runs through, are marked.
 
 use super::{Bvh, Vector};
 use crate::math::parallel::Tasks;
@@ -6,6 +7,9 @@ use tumble_interface::Mesh;
 
 /// Nodes along the side of a tile.
 const TILE: usize = 8;
+/// Interpolated distances may be off by this part of a cell, at the middle of it and at four places about that.
+const ROUGH: f64 = 0.03;
+const PROBES: [[f64; 3]; 5] = [[0.5; 3], [0.2, 0.2, 0.8], [0.2, 0.8, 0.2], [0.8, 0.2, 0.2], [0.8; 3]];
 
 /// Signed distance to a mesh on a grid [m].
 #[derive(Debug, Clone)]
@@ -14,6 +18,8 @@ pub struct GridSdf {
     dx: f64,
     n: [usize; 3],
     values: Vec<f32>,
+    /// One bit for each node: whether the cell above it is too coarse for the surface.
+    rough: Vec<u64>,
 }
 
 impl GridSdf {
@@ -55,11 +61,48 @@ impl GridSdf {
                 }
             }
         }
-        Some(Self { origin, dx, n, values })
+        let mut grid = Self { origin, dx, n, values, rough: Vec::new() };
+        grid.rough = grid.check(shell, distance);
+        Some(grid)
     }
 
-    /// Signed distance [m] and its gradient at p; outside the grid a lower bound of the distance.
-    pub fn sample(&self, p: Vector) -> (f64, Vector) {
+    /// The cells that are too coarse: all of a shell that the surface may run through, for its distance has a crease there, and of a solid
+    /// those in which the distance is off.
+    fn check(&self, shell: bool, distance: impl Fn(Vector) -> f64 + Sync) -> Vec<u64> {
+        let n = self.n;
+        let word = |w: usize| -> u64 {
+            let is_rough = |i: usize| {
+                let at = [i % n[0], i / n[0] % n[1], i / n[0] / n[1]];
+                if (0..3).any(|a| at[a] + 1 >= n[a]) {
+                    return false;
+                }
+                let corner = |k: usize| f64::from(self.values[i + (k & 1) + n[0] * ((k >> 1 & 1) + n[1] * (k >> 2))]);
+                // The surface is nearer than the diagonal of a cell that it runs through.
+                let reach = 3.0_f64.sqrt() * self.dx;
+                if !(0..8).any(|k| corner(k).abs() <= reach) {
+                    return false;
+                }
+                shell
+                    || PROBES.into_iter().any(|[x, y, z]| {
+                        let p = self.origin + Vector { x: at[0] as f64 + x, y: at[1] as f64 + y, z: at[2] as f64 + z } * self.dx;
+                        (self.interpolate(p).0 - distance(p)).abs() > ROUGH * self.dx
+                    })
+            };
+            (0..64).fold(0, |bits, b| bits | u64::from(64 * w + b < self.values.len() && is_rough(64 * w + b)) << b)
+        };
+        (0..self.values.len().div_ceil(64)).map_in_parallel(word)
+    }
+
+    /// Signed distance [m] and its gradient at p, `None` where the grid is too coarse for the surface; outside the grid a lower bound of
+    /// the distance.
+    pub fn sample(&self, p: Vector) -> Option<(f64, Vector)> {
+        let q: [f64; 3] = ((p - self.origin) * (1.0 / self.dx)).into();
+        let cell: [usize; 3] = std::array::from_fn(|a| (q[a].max(0.0) as usize).min(self.n[a] - 2));
+        let i = cell[0] + self.n[0] * (cell[1] + self.n[1] * cell[2]);
+        if self.rough[i / 64] >> (i % 64) & 1 == 1 { None } else { Some(self.interpolate(p)) }
+    }
+
+    fn interpolate(&self, p: Vector) -> (f64, Vector) {
         let q: [f64; 3] = ((p - self.origin) * (1.0 / self.dx)).into();
         let (mut cell, mut f, mut out) = ([0; 3], [0.0; 3], [0.0; 3]);
         for a in 0..3 {
@@ -99,14 +142,16 @@ impl GridSdf {
 
 #[cfg(test)]
 mod tests {
+    use super::super::surface;
     use super::*;
+    use crate::math::rotation::from_degrees;
 
     #[test]
     fn the_grid_follows_the_distance_of_a_sphere() {
         let sdf = GridSdf::new(&super::super::bvh::tests::sphere(4), 48, 0.1, false).unwrap();
         let mut near = 0;
         for p in super::super::bvh::tests::points() {
-            let (phi, gradient) = sdf.sample(p);
+            let (phi, gradient) = sdf.sample(p).unwrap();
             let exact = p.norm() - 1.0;
             if exact.abs() < 0.12 {
                 near += 1;
@@ -119,13 +164,22 @@ mod tests {
         assert!(near > 30, "{near}");
     }
 
+    /// Cells that a shell or a plate thinner than a cell runs through are marked; a ball of many cells has none.
     #[test]
-    fn a_shell_has_no_inside() {
+    fn what_the_grid_cannot_resolve_is_marked() {
         let mut open = super::super::bvh::tests::sphere(3);
+        assert!((0..20).all(|k| GridSdf::new(&open, 48, 0.1, false).unwrap().sample([0.0, 0.05 * f64::from(k), 0.95].into()).is_some()));
         open.triangles.truncate(open.triangles.len() / 2);
         let sdf = GridSdf::new(&open, 32, 0.1, true).unwrap();
-        for p in [[0.0, 0.0, 0.5], [0.0, 0.0, 0.0], [0.1, 0.2, 0.9]] {
-            assert!(sdf.sample(p.into()).0 >= 0.0);
+        assert!(sdf.sample([0.1, 0.2, 0.9].into()).is_none_or(|(d, _)| d >= 0.0) && sdf.sample([0.0; 3].into()).unwrap().0 > 0.5);
+        assert!(sdf.sample(open.vertices[open.triangles[0][0] as usize].into()).is_none());
+        let half = |thick: f64| Vector { x: 0.5, y: 0.5, z: 0.5 * thick };
+        for (thick, marked) in [(0.01, true), (0.003, true), (0.5, false)] {
+            let plate = surface::cuboid(Vector::default(), half(thick), from_degrees([0.0; 3]));
+            let sdf = GridSdf::new(&plate, 20, 0.0, false).unwrap();
+            for z in [0.4, 0.6, -0.4] {
+                assert_eq!(sdf.sample([0.11, 0.07, z * thick].into()).is_none(), marked, "{thick} {z}");
+            }
         }
     }
 }

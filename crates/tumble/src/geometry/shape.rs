@@ -1,6 +1,6 @@
 //! Solids by their signed distance: negative inside.
 
-use super::facets::Sides;
+use super::facets::{Nearest, Sides};
 use super::{Facets, GridSdf, Vector};
 use crate::math::Quat;
 
@@ -63,6 +63,14 @@ pub type Near = (f64, Vector, Vector);
 /// Corrections of Newton's method on the way to a contact; each at least halves what is left.
 const CORRECTIONS: usize = 100;
 
+/// The surface near p by its nearest point; a shell has two outsides.
+fn signed(p: Vector, found: &Nearest, shell: bool) -> Near {
+    let way = p - found.point;
+    let sign = if !shell && way.dot(found.normal) < 0.0 { -1.0 } else { 1.0 };
+    let normal = if found.distance > 0.0 { way * (sign / found.distance) } else { found.normal.normalized() };
+    (sign * found.distance, normal, found.velocity)
+}
+
 impl Shape {
     /// Signed distance [m] at p and time t, the outward normal, and the velocity of the surface. What is farther than
     /// `within` [m] may be told too near.
@@ -79,20 +87,20 @@ impl Shape {
                 let along = (p - *from).dot(axis) / axis.norm_sq().max(f64::MIN_POSITIVE);
                 ball(p - *from - axis * along.clamp(0.0, 1.0), *radius)
             }
-            Self::Mesh { grid, .. } => {
-                let (d, gradient) = grid.sample(p);
-                (d, gradient.normalized())
-            }
+            Self::Mesh { grid, facets, shell } => match grid.sample(p) {
+                // Where the grid is too coarse, the triangles are asked.
+                None => {
+                    let found = facets.nearest(p, 0.0, 4.0 * grid.cell()).or_else(|| facets.nearest(p, 0.0, f64::INFINITY));
+                    return found.map_or((within, Vector::default(), Vector::default()), |found| signed(p, &found, *shell));
+                }
+                Some((d, gradient)) => (d, gradient.normalized()),
+            },
             Self::Animated { facets, shell } => {
                 // Far inside a solid there may be nothing near, too.
                 let near = facets.nearest(p, t, within);
                 let deep = || if *shell || facets.apart(p, t) { None } else { facets.nearest(p, t, f64::INFINITY) };
-                let Some(found) = near.or_else(deep) else { return (within, Vector::default(), Vector::default()) };
-                let way = p - found.point;
-                let inside = !shell && way.dot(found.normal) < 0.0;
-                let sign = if inside { -1.0 } else { 1.0 };
-                let normal = if found.distance > 0.0 { way * (sign / found.distance) } else { found.normal.normalized() };
-                return (sign * found.distance, normal, found.velocity);
+                let found = near.or_else(deep);
+                return found.map_or((within, Vector::default(), Vector::default()), |found| signed(p, &found, *shell));
             }
         };
         (d, n, Vector::default())
@@ -121,8 +129,7 @@ impl Shape {
         let (facets, sides) = match self {
             Self::Mesh { facets, shell, grid } => {
                 // The grid's distance is off by less than two of its cells.
-                let (far, _) = grid.sample(b);
-                if far.abs() > d.norm() + thickness + 2.0 * grid.cell() {
+                if grid.sample(b).is_some_and(|(far, _)| far.abs() > d.norm() + thickness + 2.0 * grid.cell()) {
                     return None;
                 }
                 (facets, sides(*shell, inside))

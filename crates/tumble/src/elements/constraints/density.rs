@@ -57,6 +57,8 @@ pub struct Density {
     /// Multipliers so far, and what this sweep adds.
     lambda: Vec<Real>,
     delta: Vec<Real>,
+    /// Whether walls have pushed in this sub-step.
+    leans: bool,
 }
 
 /// x, w -> V sum of W, s V sum of grad W, s² V² sum of w |grad W|², over all others.
@@ -116,6 +118,7 @@ impl Density {
             against: Vec::new(),
             lambda: Vec::new(),
             delta: Vec::new(),
+            leans: false,
         }
     }
 
@@ -164,6 +167,14 @@ impl Constraints for Density {
         self.rows.len()
     }
 
+    fn connect(&self, join: &mut dyn FnMut(u32, u32)) {
+        self.rows.clone().skip(1).for_each(|i| join(self.rows.start as u32, i as u32));
+    }
+
+    fn leans(&self) -> Option<usize> {
+        self.leans.then_some(self.rows.start)
+    }
+
     fn energy(&self, x: &[Row], walls: Walls<'_>) -> f64 {
         if self.compliance == 0.0 {
             return 0.0;
@@ -183,6 +194,7 @@ impl Constraints for Density {
         let mut against = std::mem::take(&mut self.against);
         self.gather(&mut grid, rows, &mut points, &mut sums);
         self.add_walls(rows, step.walls, &mut against);
+        self.leans = (step.iteration > 0 && self.leans) || against.iter().any(|a| a[0] > 0.0);
         (self.grid, self.points, self.sums, self.against) = (grid, points, sums, against);
         if step.iteration == 0 || self.lambda.len() != rows.len() {
             self.lambda.clear();

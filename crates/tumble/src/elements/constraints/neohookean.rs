@@ -150,6 +150,10 @@ impl Constraints for Neohookean {
         self.columns.len()
     }
 
+    fn connect(&self, join: &mut dyn FnMut(u32, u32)) {
+        self.columns.connect(join);
+    }
+
     fn energy(&self, x: &[Row], _: Walls<'_>) -> f64 {
         self.columns.check(x);
         let columns = &self.columns;

@@ -154,6 +154,10 @@ impl Constraints for Shape {
         1
     }
 
+    fn connect(&self, join: &mut dyn FnMut(u32, u32)) {
+        self.rows.clone().skip(1).for_each(|i| join(self.rows.start as u32, i as u32));
+    }
+
     fn energy(&self, x: &[Row], _: Walls<'_>) -> f64 {
         if self.kappa.is_infinite() {
             return 0.0;

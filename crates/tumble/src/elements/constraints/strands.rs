@@ -686,6 +686,19 @@ impl Constraints for Strands {
         self.places.len()
     }
 
+    fn connect(&self, join: &mut dyn FnMut(u32, u32)) {
+        for group in &self.groups {
+            let (points, frames, next) = (group.points.get(), group.frames.get(), group.count);
+            for at in (0..group.n * next).filter(|at| group.stretch[2][*at] > 0.0) {
+                join(points[at], points[at + next]);
+                join(points[at], frames[at + next]);
+            }
+            for at in (0..(group.n + 1) * next).filter(|at| group.bend[6][*at] > 0.0) {
+                join(frames[at], frames[at + next]);
+            }
+        }
+    }
+
     fn softening(&self, h: f64) -> f64 {
         self.groups.iter().map(|group| group.softening(h)).fold(1.0, f64::max)
     }

@@ -81,6 +81,10 @@ impl Constraints for Volume {
         1
     }
 
+    fn connect(&self, join: &mut dyn FnMut(u32, u32)) {
+        self.points.iter().skip(1).for_each(|i| join(self.points[0], *i));
+    }
+
     fn energy(&self, x: &[Row], _: Walls<'_>) -> f64 {
         if self.compliance == 0.0 {
             return 0.0;

@@ -421,6 +421,7 @@ impl System for Dynamics {
         (self.core.memory.ready, self.core.memory.next_step, self.core.memory.last_error) = (*ready == 1.0, *next_step, *last_error);
         (self.automatic, self.measured) = (*automatic as u32, *measured as usize);
         self.core.broken = *broken as u64;
+        self.core.restored += 1;
         self.core.scale = Scale::from_numbers(scale)?;
         self.features.restore(&mut self.core, archive)
     }

@@ -97,7 +97,7 @@ impl Core {
     }
 
     /// Sums over some points and frames.
-    pub fn sums(&self, points: impl Iterator<Item = Range<usize>>, frames: Range<usize>) -> Sums {
+    pub fn sums(&self, points: impl Iterator<Item = Range<usize>>, frames: impl Iterator<Item = usize>) -> Sums {
         let mut total = Sums::default();
         for rows in points {
             let (x, v, mass) = (&self.state.x[rows.clone()], &self.state.v[rows.clone()], &self.laws.masses.mass[rows.clone()]);

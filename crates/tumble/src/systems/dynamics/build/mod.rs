@@ -91,6 +91,7 @@ impl Parts {
             before_v: Vec::new(),
             scale: Scale::default(),
             broken: 0,
+            restored: 0,
         };
         Dynamics::new(core, scheme, features, &settings)
     }

@@ -1,6 +1,7 @@
 //! How a sub-step finds positions and velocities: from forces, by an integrator, or by projecting predicted positions.
 
 mod forces;
+mod free_bodies;
 mod projected;
 
 pub use forces::Forces;

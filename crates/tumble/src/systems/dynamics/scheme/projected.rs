@@ -1,5 +1,5 @@
 //! Position-based dynamics: elements are no forces but constraints on positions, satisfied one after the other. The lines of a step are
-//! those of Algorithm 1 of [bender2015]; constraints, and how far they are satisfied, are defined in `elements/constraints.rs`.
+//! those of Algorithm 1 of [bender2015], and free bodies keep their momenta (`free_bodies.rs`); constraints, and how far they are satisfied, are defined in `elements/constraints.rs`.
 //!
 //!   v += h f_ext/m,   x = x_old + h v,   n times: x += dx of each element,   v = (x - x_old)/h       (positions.1)
 //!
@@ -13,6 +13,7 @@ use super::super::features::Features;
 use super::super::parts::Parts;
 use super::super::settings::Settings;
 use super::Scheme;
+use super::free_bodies::FreeBodies;
 use crate::elements::{Constraints, LongRangeAttachments, Projection};
 use crate::geometry::Walls;
 use crate::integrators;
@@ -39,6 +40,9 @@ pub struct Projected {
     rates: Vec<Row>,
     /// Positions before a sweep; scratch.
     old: Vec<Row>,
+    /// Positions before contact between surfaces; scratch.
+    unpushed: Vec<Row>,
+    free_bodies: FreeBodies,
 }
 
 /// Refuses long-range attachments that would hold broken pieces.
@@ -60,7 +64,14 @@ pub fn check(parts: &Parts, settings: &Settings) -> Result<(), SceneError> {
 impl Projected {
     /// The sweeps of these settings, with long-range attachments.
     pub fn new(settings: &Settings, attachments: Vec<LongRangeAttachments>) -> Self {
-        Self { words: settings.sweeps.clone(), attachments, rates: Vec::new(), old: Vec::new() }
+        Self {
+            words: settings.sweeps.clone(),
+            attachments,
+            rates: Vec::new(),
+            old: Vec::new(),
+            unpushed: Vec::new(),
+            free_bodies: FreeBodies::default(),
+        }
     }
 
     /// Forces that are no elements, predicted velocities and positions; `before` keeps where they start from.
@@ -110,7 +121,13 @@ impl Projected {
                 clamp.project(x, &projection);
             }
             self.attachments.iter().for_each(|attachments| attachments.project(x));
-            features.sweep(core);
+            if features.self_contact.is_some() && !self.free_bodies.is_empty() {
+                self.unpushed.clone_from(&core.state.x);
+                features.sweep(core);
+                self.free_bodies.add_contact(core, &self.unpushed, step.h);
+            } else {
+                features.sweep(core);
+            }
             report.sweeps += 1;
             let (x, old) = (&core.state.x, &self.old);
             let way = |i: usize| xyz64(sub(x[i], old[i])).norm();
@@ -144,9 +161,11 @@ impl Scheme for Projected {
     fn step(&mut self, core: &mut Core, features: &mut Features, step: Span, report: &mut StepReport) -> Result<(), StepError> {
         core.keep_velocities();
         self.predict(core, step)?;
+        self.free_bodies.begin(core);
         features.moved(core, step);
         self.sweep(core, features, step, report);
         set_velocities(core, step.h as Real);
+        self.free_bodies.restore(core);
         core.memory.ready = true;
         Ok(())
     }
