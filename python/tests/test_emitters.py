@@ -80,6 +80,8 @@ POINT = {"name": "p", "from": {"point": {"at": [0, 0, 1]}}}
         ({"rate": 100, "most": 30}, 200, 30),
         ({"rate": "100*t"}, 200, 200),
         ({"rate": {"keys": [[0, 0], [1, 100]]}}, 150, 150),
+        ({"rate": {"keys": [[0, 96], [0.5, 0], [1.0, 48]], "interpolation": "step"}}, 96, 96),
+        ({"rate": {"keys": [[0.33, 300], [0.777, 0], [0.9, 50]], "interpolation": "step"}, "start": 0.1}, 258, 258),
         ({"burst": [{"time": 0.5, "count": 70}, {"time": 1.5, "count": 30}, {"time": 3, "count": 9}]}, 100, 100),
         ({"burst": [{"time": 0.5, "count": 70}, {"time": 1.5, "count": 30}], "lifetime": 0.8}, 100, 70),
         ({"rate": 100, "start": 5}, 0, 0),

@@ -54,12 +54,27 @@ def resolved(**words: Any) -> Tree:
     return Scene({"version": 1, "particles": points, **words}).to_dict()
 
 
-def test_what_gives_energy_and_what_takes_it() -> None:
+def tetrahedron(folder: Path) -> str:
+    path = folder / "tetrahedron.obj"
+    path.write_text("v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 3 2\nf 1 2 4\nf 2 3 4\nf 1 4 3\n")
+    return str(path)
+
+
+def test_what_gives_energy_and_what_takes_it(tmp_path: Path) -> None:
     def force(**words: Any) -> Tree:
         return resolved(force=[words])
 
     def solid(**words: Any) -> Tree:
         return resolved(collider=[{"name": "c", "shape": {"floor": {}}, **words}])
+
+    def balloon(**pressure: Any) -> Tree:
+        net = {"name": "n", "mesh": {"path": tetrahedron(tmp_path)}, "pressure": pressure}
+        return resolved(net=[net], system=[{"name": "s", "method": "position_based"}])
+
+    def tied(**words: Any) -> Tree:
+        points = [{"name": name, "system": name, "position": [[0, 0, float(name == "b")]]} for name in "ab"]
+        anchor = {"name": "tie", "between": ["a 0", "b 0"], "stiffness": 10, **words}
+        return resolved(particles=points, anchor=[anchor], system=[{"name": "a"}, {"name": "b"}])
 
     for scene in (resolved(), force(kind="attraction", gm=1)):
         assert (energy.sources(scene), energy.sinks(scene)) == ([], [])
@@ -71,6 +86,11 @@ def test_what_gives_energy_and_what_takes_it() -> None:
     assert energy.sources(force(kind="repulsion", stiffness=1, distance=1, on=["p"], **{"from": ["p"]}))
     assert energy.sources(solid(belt=[1, 0, 0])) and energy.sources(solid(motion={"velocity": [1, 0, 0]}))
     assert not energy.sources(solid()) and energy.sinks(solid())
+    # Inflation to another volume is the work of a constraint; a bulk modulus and the volume of the start are in the ledger.
+    assert energy.sources(balloon(volume=1.5)) and not energy.sources(balloon(volume=1.5, stiffness=100))
+    assert not energy.sources(balloon())
+    # Anchors are in the ledger, also between systems.
+    assert (energy.sources(tied()), energy.sinks(tied())) == ([], []) and energy.sinks(tied(damping=1))
     assert energy.sinks(force(kind="drag", rate=1)) and not energy.sources(force(kind="drag", rate=1))
 
 
@@ -155,6 +175,15 @@ def test_no_warning_where_something_gives_energy(tumble: Command, scene_file: Sc
     spring["force"] = [{"kind": "acceleration", "value": [100, 0, 0]}]
     answer = tumble("run", scene_file(spring))
     assert (answer.code, "warning" in answer.err) == (0, False)
+
+
+def test_inflation_is_no_energy_from_nowhere(tumble: Command, scene_file: SceneFile, tmp_path: Path) -> None:
+    net = {"name": "n", "mesh": {"path": tetrahedron(tmp_path)}, "membrane": {"warp": 200}, "pressure": {"volume": 1.5}}
+    scene = {"version": 1, "world": FLOATING, "time": {"frames": 24}, "net": [net], "output": {"plot": False}}
+    answer = tumble("run", scene_file(scene | {"system": [{"method": "position_based", "substeps": 20}]}))
+    assert (answer.code, "energy-grew" in answer.err) == (0, False), answer.err
+    ledger = Run("out/scene").ledger
+    assert ledger["elastic"][-1] > 10.0 * ledger["energy"][0]
 
 
 # Changes that were tried

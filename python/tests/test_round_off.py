@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from tumble import Scene, World
+from tumble import Scene, SceneError, World
 
 FALLING = (
     "symplectic_euler",
@@ -106,3 +106,65 @@ def test_a_pendulum_that_cannot_swing_is_told(place: float, substeps: int) -> No
     if "at most" in told:
         fewer = int(told.split("at most ")[1].split()[0])
         assert fewer < substeps and (fewer == 1 or not doubts(pendulum(place, fewer)))
+
+
+SOFT = {"young": 1e4, "poisson": 0.3}
+FAR = [4.3e5, 5.4e6, 300.0]
+"""A place in the coordinates of a map [m], where single precision knows positions to 0.25 m."""
+
+
+@pytest.mark.parametrize(
+    "thing",
+    [
+        {"sheet": [{"name": "far", "size": [4, 4], "resolution": [21, 21], "center": FAR}]},
+        {"block": [{"name": "far", "size": [1, 1, 1], "resolution": [4, 4, 4], "center": FAR, "material": SOFT}]},
+        {"rope": [{"name": "far", "from": FAR, "to": [FAR[0] + 1, *FAR[1:]], "segments": 10}]},
+        {"net": [{"name": "far", "mesh": {"path": "mesh.obj", "translate": FAR}}]},
+        {"hair": [{"name": "far", "mesh": {"path": "mesh.obj", "translate": FAR}, "count": 3, "length": 0.2}]},
+        {"particles": [{"name": "far", "position": [FAR, [FAR[0] + 1, *FAR[1:]]]}]},
+        {"particles": [{"name": "far", "fluid": {"spacing": 0.1, "fill": [{"center": FAR, "size": [1, 1, 1]}]}}]},
+    ],
+    ids=["sheet", "block", "rope", "net", "hair", "particles", "liquid"],
+)
+def test_what_lies_where_its_lengths_are_lost_is_refused(tmp_path: Path, thing: dict[str, Any]) -> None:
+    (tmp_path / "mesh.obj").write_text("v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nf 1 2 3\nf 1 3 4\n")
+    tree: dict[str, Any] = {"version": 1, "time": {"frames": 1}, **thing}
+    if "fluid" in str(thing) or "hair" in thing:
+        tree["system"] = [{"method": "position_based"}]
+    with pytest.raises(SceneError, match=r'"far".* from the origin to 0\.\d* m, .* take precision = "double"'):
+        World(Scene(tree, tmp_path))
+    there = World(Scene(tree | {"precision": "double"}, tmp_path))
+    assert not [w for w in there.warnings if w["code"] == "round-off"]
+
+
+@pytest.mark.parametrize("distance", [0.0, 5e3, 4e4, 4e6])
+def test_the_loss_is_told_in_metres(distance: float) -> None:
+    """A sheet with edges of 0.1 m: half a unit in the last place, 2⁻²⁴ of the distance, is 0.3 %, 2.4 % and more of it."""
+    tree = {"version": 1, "sheet": [{"name": "s", "size": [2, 2], "resolution": [21, 21], "center": [distance, 0, 0]}]}
+    if distance > 1e6:
+        with pytest.raises(SceneError, match="precision"):
+            World(tree)
+        return
+    told = doubts(World(tree))
+    assert len(told) == (1 if distance > 0 else 0)
+    if told:
+        lost = float(told[0].split(" from the origin to ")[1].split(" m,")[0])
+        assert lost == pytest.approx((distance + 1.0) * 2**-24, rel=0.1)
+
+
+def test_solids_where_their_size_is_lost_are_told(tmp_path: Path) -> None:
+    (tmp_path / "mesh.obj").write_text("v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 3 2\nf 1 2 4\nf 2 3 4\nf 1 4 3\n")
+    for shape in (
+        {"sphere": {"center": FAR, "radius": 1}},
+        {"box": {"center": FAR, "size": [9, 9, 0.5]}},
+        {"capsule": {"from": FAR, "to": [FAR[0], FAR[1], 310], "radius": 0.5}},
+        {"mesh": {"path": "mesh.obj", "translate": FAR}},
+    ):
+        tree = {
+            "version": 1,
+            "particles": [{"name": "p", "position": [[0, 0, 0]]}],
+            "collider": [{"name": "c", "shape": shape}],
+        }
+        told = [w for w in World(Scene(tree, tmp_path)).warnings if w["code"] == "round-off"]
+        assert [w["path"] for w in told] == ['collider "c"'], shape
+        assert not World(Scene(tree | {"precision": "double"}, tmp_path)).warnings

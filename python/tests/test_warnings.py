@@ -167,6 +167,34 @@ def haired(segments: int) -> Tree:
     }
 
 
+def ball(center: list[float]) -> Tree:
+    return {"name": "ball", "shape": {"sphere": {"center": center, "radius": 1}}}
+
+
+def sprung(end: list[float], rest_length: float, **words: Any) -> Tree:
+    spring = {"between": [0, 1], "stiffness": 10, "rest_length": rest_length, **words}
+    return {"particles": [{"name": "p", "position": [[0, 0, 1], end], "spring": [spring]}]}
+
+
+def together(x: float, **words: Any) -> Tree:
+    scene = anchored(1.0)
+    scene["particles"][1]["position"] = [[x, 0, 0]]
+    scene["anchor"][0] |= words
+    return scene
+
+
+def charged(charge: float, free: float = 0.0) -> Tree:
+    """Two charges at one place, and one elsewhere."""
+    points = {"name": "p", "position": [[0, 0, 1], [1, 0, 1], [0, 0, 1]], "charge": [1e-6, free, charge]}
+    return {"particles": [points], "force": [{"kind": "electrostatics", "softening": 0.01}]}
+
+
+def atoms(x: float) -> Tree:
+    """Atoms of two objects."""
+    points = [{"name": name, "position": [[i * x, 0, 1]]} for i, name in enumerate("ab")]
+    return {"particles": points, "force": [{"kind": "lennard_jones", "epsilon": 1e-3, "sigma": 0.1}]}
+
+
 def anchored(stiffness: float) -> Tree:
     ends = [{"name": name, "system": name, "position": [[i, 0, 0]], "mass": [1]} for i, name in enumerate("ab")]
     anchor = {"name": "tie", "between": ["a 0", "b 0"], "stiffness": stiffness}
@@ -253,6 +281,18 @@ VAIN: list[tuple[str, str, Tree, Tree]] = [
         {"particles": [POINT], **FLOOR},
     ),
     ("stiff-anchor", 'anchor "tie"', anchored(1e6), anchored(1.0)),
+    ("round-off", '"s"', {"sheet": [SHEET | {"center": [4e4, 0, 1]}]}, {"sheet": [SHEET | {"center": [100, 0, 1]}]}),
+    (
+        "round-off",
+        'collider "ball"',
+        {"particles": [POINT], "collider": [ball([0, 9e5, 0])]},
+        {"particles": [POINT], "collider": [ball([0, 0, -9])]},
+    ),
+    ("coincident", 'anchor "tie"', together(0.0, rest_length=1), together(0.5, rest_length=1)),
+    ("coincident", '"p"', sprung([0, 0, 1], 0.3), sprung([0, 0, 1.1], 0.3)),
+    ("coincident", '"p"', sprung([0, 0, 1], 0.3, hardening=2), sprung([0, 1, 1], 0.3, hardening=2)),
+    ("coincident", "force[0]", charged(1e-6), charged(0.0, free=1e-6)),
+    ("coincident", "force[0]", atoms(0.0), atoms(1.0)),
 ]
 
 

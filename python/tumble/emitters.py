@@ -117,10 +117,21 @@ def _evaluated(value: Any, t: Floats) -> Floats:
 def _rated(words: Tree, t: Floats) -> Floats:
     """Born of the rate until each time."""
     end = t[-1] if words["end"] is None else words["end"]
+    at, sums = _sums(words, t)
+    until = np.interp(np.clip(t, words["start"], max(end, words["start"])), at, sums)
+    return np.asarray(until - np.interp(words["start"], at, sums))
+
+
+def _sums(words: Tree, t: Floats) -> tuple[Floats, Floats]:
+    """Times [s], and the integral of the rate until each, linear between them."""
+    value = words["rate"]
+    if isinstance(value, Mapping) and value["interpolation"] == "step":
+        # From the first to the last time: jumps lie at keys, not at t.
+        keys = np.array(value["keys"], dtype=float)
+        at = np.concatenate([[min(t[0], keys[0, 0])], keys[1:, 0], [max(t[-1], keys[-1, 0])]])
+        return at, np.concatenate([[0.0], np.cumsum(np.maximum(keys[:, 1], 0.0) * np.diff(at))])
     rates = np.maximum(np.nan_to_num(rate(words, t)), 0.0)
-    sums = np.concatenate([[0.0], np.cumsum(0.5 * (rates[1:] + rates[:-1]) * np.diff(t))])
-    until = np.interp(np.clip(t, words["start"], max(end, words["start"])), t, sums)
-    return np.asarray(until - np.interp(words["start"], t, sums))
+    return t, np.concatenate([[0.0], np.cumsum(0.5 * (rates[1:] + rates[:-1]) * np.diff(t))])
 
 
 def _survived(words: Tree, t: Floats, born: Floats) -> Floats:

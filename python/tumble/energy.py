@@ -34,9 +34,18 @@ def sources(scene: Tree) -> list[str]:
     found += [f'collider "{c["name"]}"' for c in scene["collider"] if _moves(c)]
     found += [f'emitter "{e["name"]}"' for e in scene["emitter"]]
     found += [f'gas "{g["name"]}"' for g in scene["gas"] if g.get("bodies") or g.get("sheet")]
-    if len(scene["system"]) > 1:
-        found += [f'anchor "{a["name"]}"' for a in scene["anchor"]]
+    found += [f"{kind} {thing['name']}" for kind, thing in _things(scene) if _inflates(thing.get("pressure"))]
     return found
+
+
+def _inflates(pressure: Tree | None) -> bool:
+    """Whether a closed surface is kept at another volume than it starts with, by a constraint that has no potential."""
+    return pressure is not None and pressure["stiffness"] is None and pressure["volume"] != 1.0
+
+
+def joined(scene: Tree) -> bool:
+    """Whether anchors join systems."""
+    return len(scene["system"]) > 1 and bool(scene["anchor"])
 
 
 def sinks(scene: Tree) -> list[str]:
@@ -45,7 +54,7 @@ def sinks(scene: Tree) -> list[str]:
     found += [f'collider "{c["name"]}"' for c in scene["collider"]]
     found += [f'emitter "{e["name"]}"' for e in scene["emitter"] if e["lifetime"] is not None or e["kill"]]
     found += [f"{kind} {thing['name']}" for kind, thing in _things(scene) if _damped(thing)]
-    return found + [f'anchor "{a["name"]}"' for a in scene["anchor"] if a["damping"] or len(scene["system"]) > 1]
+    return found + [f'anchor "{a["name"]}"' for a in scene["anchor"] if a["damping"]]
 
 
 def has_springs(scene: Tree) -> bool:

@@ -116,6 +116,29 @@ fn every_impulse_is_delivered_and_momentum_is_kept() {
     }
 }
 
+/// The ledger holds the energy of anchors between systems, whoever owns them and whatever the scheme: what masses lose is there.
+#[test]
+fn the_ledger_holds_what_joins_systems() {
+    for (schemes, swapped) in all() {
+        let mut sim = pair(schemes, 4, swapped, 1, 40.0);
+        // Both move together across, with 0.5 m/s.
+        let drift = 0.5 * 0.25 * (MASSES[0] + MASSES[1]);
+        let whole = 0.5 * M * W * W * 0.01;
+        let mut swing = (f64::INFINITY, 0.0_f64);
+        for _ in 0..40 {
+            step(&mut sim);
+            let (r, speed) = stretch(&sim);
+            let ledger = sim.ledger();
+            assert!((ledger.elastic - 0.5 * M * W * W * r * r).abs() < 1e-12 * whole, "{schemes:?} {swapped}");
+            // Impulses that wait for their turn are missing from what moves.
+            let moving = ledger.kinetic - drift - 0.5 * M * speed * speed;
+            assert!(moving.abs() < if swapped { 0.1 * whole } else { 1e-9 * whole }, "{schemes:?} {swapped}: {moving}");
+            swing = (swing.0.min(ledger.elastic / whole), swing.1.max(ledger.elastic / whole));
+        }
+        assert!(swing.0 < 0.05 && swing.1 > 0.9, "the spring works: {swing:?}");
+    }
+}
+
 /// (coupling.2): together the two are one symplectic Euler, with the energy between (1 - z/2)/(1 + z/2) and its inverse.
 #[test]
 fn the_energy_stays() {

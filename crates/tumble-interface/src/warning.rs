@@ -51,6 +51,8 @@ codes! {
     LateCarrier = "late-carrier",
     /// Masses that start inside a collider.
     StartsInside = "starts-inside",
+    /// Masses at one place that a force cannot part.
+    Coincident = "coincident",
     /// Surfaces that start passing through each other.
     TangledStart = "tangled-start",
     /// An anchor too stiff for the rate at which systems exchange impulses.

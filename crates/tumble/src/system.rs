@@ -1,6 +1,6 @@
 //! L4: what the world asks of a system, and the archive that snapshots are made of.
 
-use crate::exchange::Turn;
+use crate::exchange::{Exchange, Turn};
 use crate::math::parallel::{CHUNK, Tasks, rows};
 use crate::math::{Real, Row};
 use crate::state::Field;
@@ -35,6 +35,11 @@ pub trait System: Send + Sync {
 
     /// Its ledger at time t [s].
     fn ledger(&self, t: f64) -> Ledger;
+
+    /// Elastic energy [J] of what connects it with other systems at time t [s], where it owns that; their bodies are as published.
+    fn energy_between(&self, _t: f64, _exchange: &Exchange) -> f64 {
+        0.0
+    }
 
     /// Share of each of its objects; none if unknown.
     fn shares(&self, _t: f64) -> Vec<Share> {

@@ -389,15 +389,22 @@ impl World {
     /// The same, of a state at this time [s].
     pub fn ledger_at(&self, time: f64) -> Ledger {
         let mut total = Ledger { time, ..Ledger::default() };
-        self.each().for_each(|s| total.add_system(&s.ledger(time)));
+        self.each().for_each(|s| total.add_system(&self.ledger_of(s, time)));
         total
+    }
+
+    /// The ledger of a system, with what it owns between systems.
+    fn ledger_of(&self, system: &dyn System, time: f64) -> Ledger {
+        let mut ledger = system.ledger(time);
+        ledger.elastic += system.energy_between(time, &self.exchange);
+        ledger
     }
 
     /// Breakdown of the ledger by object, and the places of the worst values.
     pub fn account(&self) -> Account {
         let (time, listed) = (self.time(), || self.each().filter(|s| s.is_listed()));
         Account {
-            systems: listed().map(|s| (s.name().to_string(), s.ledger(time))).collect(),
+            systems: listed().map(|s| (s.name().to_string(), self.ledger_of(s, time))).collect(),
             shares: listed().flat_map(|s| s.shares(time)).collect(),
             worst: listed().flat_map(|s| s.worst(time)).collect(),
         }

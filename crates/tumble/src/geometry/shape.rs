@@ -211,6 +211,14 @@ impl Shape {
         None
     }
 
+    /// Lower and upper corner of a mesh at all times [m]; `None` for other shapes.
+    pub fn bounds(&self) -> Option<(Vector, Vector)> {
+        match self {
+            Self::Mesh { facets, .. } | Self::Animated { facets, .. } => Some(facets.bounds()),
+            _ => None,
+        }
+    }
+
     /// Largest distance of its points from p [m]; infinite for a plane.
     pub fn reach(&self, p: Vector) -> f64 {
         let corners = |l: Vector, h: Vector| ((l - p).norm()).max((h - p).norm()) + (h - l).norm();

@@ -2,7 +2,9 @@
 
 use super::Assets;
 use super::checks::check;
+use super::coincident;
 use super::coupling;
+use super::far;
 use super::hints::unused;
 use super::laws::{Reader, flat};
 use super::memory::memory;
@@ -96,8 +98,12 @@ pub fn build(scene: &Scene, assets: &Assets) -> Result<Built, SceneError> {
     };
     let methods: Vec<_> = scene.system.iter().map(|plan| rules(plan.method)).collect();
     methods.iter().enumerate().for_each(|(index, method)| method.fill(&mut builder, index));
+    if builder.colliders.len() == scene.collider.len() && methods.iter().any(|method| method.meets_colliders()) {
+        builder.warnings.extend(far::solids(scene, &builder.colliders));
+    }
     Reader::new(scene, &mut builder.issues).flow("field", &scene.field);
     builder.anchors = Arc::new(coupling::fasten(builder.scene, &mut builder.masses, &mut builder.issues));
+    builder.warnings.extend(builder.anchors.iter().filter_map(|link| coincident::anchor(&builder.masses, link)));
     builder.sound = builder.issues.is_empty();
     let systems: Vec<Option<Box<dyn System>>> =
         methods.iter().enumerate().map(|(index, method)| method.build(&mut builder, index)).collect();

@@ -2,8 +2,10 @@
 
 mod build;
 mod checks;
+mod coincident;
 mod coupling;
 mod cures;
+mod far;
 mod grids;
 pub mod hand;
 mod hints;

@@ -9,7 +9,7 @@ use crate::scene::build::{Builder, ask_for_events, emit};
 use crate::scene::checks::others;
 use crate::scene::coupling::Link;
 use crate::scene::laws::Reader;
-use crate::scene::{Assets, hints, memory};
+use crate::scene::{Assets, coincident, far, hints, memory};
 use crate::system::System;
 use crate::systems::dynamics::{Anchor, Dynamics, Parts, Settings, Stepping};
 use tumble_interface::check::short;
@@ -111,6 +111,14 @@ impl MethodRules for Rules {
             colliders: builder.colliders.clone(),
         };
         builder.warnings.extend(buried(scene, &parts, &builder.colliders));
+        builder.warnings.extend(coincident::springs(&parts));
+        let known = builder.issues.len();
+        far::objects(&parts, &mut builder.issues, &mut builder.warnings);
+        if builder.issues.len() > known {
+            let issues = builder.issues.split_off(known);
+            builder.issues.extend(placed(scene, SceneError { issues }).issues);
+            return None;
+        }
         let mut system = match parts.build(settings) {
             Ok(system) => system,
             Err(error) => {
@@ -209,7 +217,10 @@ fn act(builder: &mut Builder<'_>, parts: &mut Parts) {
         match reader.law(&path, force) {
             _ if on.is_empty() => {}
             Some(law) => parts.forces.push((path, law, on)),
-            None => parts.between.push((force.clone(), on, others)),
+            None => {
+                builder.warnings.extend(coincident::forces(parts, &path, force, &on, others.as_deref()));
+                parts.between.push((force.clone(), on, others));
+            }
         }
     }
 }

@@ -30,7 +30,7 @@ pub use parts::{Closed, Liquid, Parts, SpringPart};
 pub use settings::{Settings, Stepping};
 pub use tear::TearPart;
 
-use crate::exchange::{BodyRow, Turn};
+use crate::exchange::{BodyRow, Exchange, Turn};
 use crate::geometry::{Collider, Vector};
 use crate::integrators;
 use crate::math::{Real, Row, xyz64};
@@ -340,6 +340,14 @@ impl System for Dynamics {
 
     fn ledger(&self, t: f64) -> Ledger {
         self.ledger_at(t)
+    }
+
+    fn energy_between(&self, t: f64, exchange: &Exchange) -> f64 {
+        let of = |anchor: &Anchor| {
+            let length = (exchange.state_at(anchor.other, t).position - xyz64(self.core.state.x[anchor.row])).norm();
+            0.5 * anchor.stiffness * (length - anchor.rest_length).powi(2)
+        };
+        self.anchors.iter().map(of).sum()
     }
 
     fn shares(&self, t: f64) -> Vec<Share> {

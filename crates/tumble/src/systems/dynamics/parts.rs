@@ -8,6 +8,7 @@ use crate::geometry::Carrier;
 use crate::math::{Quat, Real, Vec3};
 use crate::pool::Emitter;
 use crate::state::{Object, State};
+use std::collections::HashMap;
 use std::ops::Range;
 use tumble_interface::scene::{Force as Words, HairCollisions};
 use tumble_interface::{Issue, SceneError};
@@ -225,6 +226,43 @@ impl Parts {
         self.objects.iter().map(|d| (d.object.name.as_str(), d.object.points.clone()))
     }
 
+    /// Of every object, the shortest of its edges, links, pieces of curves and spacings, infinite where it has none, and the diagonal of the box
+    /// around it [m].
+    pub fn lengths(&self) -> Vec<(f64, f64)> {
+        let x = |i: u32| self.points[i as usize].0;
+        let mut shortest = vec![f64::INFINITY; self.objects.len()];
+        let mut take = |[a, b]: [u32; 2]| {
+            let length = (x(a) - x(b)).norm();
+            // Objects have their points one after the other.
+            let at = self.objects.partition_point(|d| d.object.points.end <= a as usize);
+            let same = self.objects.get(at).is_some_and(|d| d.object.points.contains(&(b as usize)));
+            if same && length > 0.0 {
+                shortest[at] = shortest[at].min(length);
+            }
+        };
+        self.linear.members.iter().map(|m| m.nodes).for_each(&mut take);
+        self.nonlinear.members.iter().map(|m| m.nodes).for_each(&mut take);
+        self.stretches.iter().map(|m| [m.nodes[0], m.nodes[1]]).for_each(&mut take);
+        for nodes in self.strains.iter().map(|m| m.nodes).chain(self.shears.iter().map(|m| m.nodes)) {
+            (1..4).for_each(|k| take([nodes[0], nodes[k]]));
+        }
+        for Draft { object, .. } in &self.objects {
+            let first = object.points.start as u32;
+            object.triangles.iter().for_each(|t| (0..3).for_each(|k| take([first + t[k], first + t[(k + 1) % 3]])));
+        }
+        for (_, range, liquid) in &self.liquids {
+            let at = self.objects.partition_point(|d| d.object.points.end <= range.start);
+            shortest[at] = shortest[at].min(liquid.spacing);
+        }
+        let size = |d: &Draft| {
+            let places = self.points[d.object.points.clone()].iter().map(|p| <[f64; 3]>::from(p.0));
+            let least = places.clone().reduce(|a, b| std::array::from_fn(|k| a[k].min(b[k])));
+            let most = places.reduce(|a, b| std::array::from_fn(|k| a[k].max(b[k])));
+            least.zip(most).map_or(0.0, |(l, h)| (Vec3::from(h) - Vec3::from(l)).norm())
+        };
+        shortest.into_iter().zip(self.objects.iter().map(size)).collect()
+    }
+
     /// Adds a mass [kg] at x [m] with velocity v [m/s]; returns its index.
     pub fn point(&mut self, x: Vec3<f64>, v: Vec3<f64>, mass: f64) -> u32 {
         self.points.push((x, v, mass, false));
@@ -248,6 +286,18 @@ impl Parts {
     /// Gives a point an electric charge [C].
     pub fn charge(&mut self, point: u32, charge: f64) {
         self.charges.push((point, charge));
+    }
+
+    /// Electric charges of points [C].
+    pub fn charges(&self) -> HashMap<u32, f64> {
+        self.charges.iter().copied().collect()
+    }
+
+    /// Ends of the springs that have a rest length.
+    pub fn springs_with_rest_length(&self) -> impl Iterator<Item = [u32; 2]> {
+        let linear = self.linear.members.iter().map(|m| (m.nodes, m.rest));
+        let all = linear.chain(self.nonlinear.members.iter().map(|m| (m.nodes, m.rest)));
+        all.filter(|(_, [rest])| *rest > 0.0).map(|(nodes, _)| nodes)
     }
 
     /// Spreads a point out as Plummer's sphere of a radius [m].

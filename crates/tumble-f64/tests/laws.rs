@@ -1,0 +1,37 @@
+//! The verification tests in double precision of forces, elements, integrators, and fields on grids, in one program:
+//! many small ones take minutes to link. Those of structures, cloth, hair, rods, solids, contact and particles are in `verification.rs`; two
+//! programs keep both cores busy.
+//!
+//! `cargo test --release -p tumble-f64 --test laws heat::` runs one file of them.
+
+#![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)] // a test fails by panicking
+
+mod common;
+
+mod advection;
+mod air;
+mod bodies;
+mod compressible;
+mod conservation;
+mod coupling;
+mod damping;
+mod densities;
+mod electrostatics;
+mod elements;
+mod fire;
+mod flock;
+mod forces;
+mod galaxy;
+mod gas;
+mod gravitation;
+mod heat;
+mod integrators_order;
+mod integrators_oscillator;
+mod neighbours;
+mod operators;
+mod pressure;
+mod projections;
+mod sheets;
+mod single_steps;
+mod solids;
+mod stability_estimate;
