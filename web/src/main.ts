@@ -75,7 +75,10 @@ async function go(): Promise<void> {
     if (!match) continue;
     let end: Leave;
     try {
-      const { page } = await open();
+      const { page } = await open().catch((error) => {
+        console.error(error);
+        throw new Error("A part of the laboratory could not be fetched. Once the connection is back, reload the page.");
+      });
       if (own !== visit) return;
       scrollTo(0, 0);
       end = await page(fresh, match[1] ?? "");

@@ -29,10 +29,10 @@ const idOf = (path: string) =>
     .join("/")
     .replace(/\.toml$/, "");
 
-/** Rows in the order in which a newcomer would look. */
-const ROWS = ["drape", "springs", "structures", "integrators", "contact", "particles", "gravity", "gas", "heat", "failures"];
-export const ROW_TITLES: Record<string, string> = {
-  drape: "Cloth",
+/** Titles of the rows, in the order in which a newcomer would look. */
+const ROWS: Record<string, string> = {
+  cloth: "Cloth and hair",
+  drape: "Draped sheets",
   springs: "Springs",
   structures: "Structures",
   integrators: "Integrators",
@@ -44,6 +44,8 @@ export const ROW_TITLES: Record<string, string> = {
   failures: "Failures",
 };
 
+export const rowTitle = (row: string): string => ROWS[row] ?? row;
+
 export const SCENES: Shipped[] = Object.entries(texts)
   .map(([path, text]) => {
     const id = idOf(path);
@@ -53,8 +55,8 @@ export const SCENES: Shipped[] = Object.entries(texts)
   .sort((a, b) => order(a.row) - order(b.row) || a.name.localeCompare(b.name));
 
 function order(row: string): number {
-  const k = ROWS.indexOf(row);
-  return k < 0 ? ROWS.length : k;
+  const rows = Object.keys(ROWS);
+  return rows.includes(row) ? rows.indexOf(row) : rows.length;
 }
 
 /** Scenes to go on to from another: those of its row; what flies by itself and what gravitation holds are one. */

@@ -7,7 +7,6 @@ const AT: Record<string, number> = {
   "contact/bounce": 30,
   "drape/sheet-on-bunny": 40,
   "drape/sheet-on-ball": 40,
-  "failures/stiff-sheet": 8,
   "gas/bad_solver": 18,
   "gas/bunny": 50,
   "gas/fire": 45,
@@ -25,10 +24,22 @@ const AT: Record<string, number> = {
   "cloth/torn-flag": 60,
   "cloth/twist": 60,
   "integrators/overshoot": 5,
-  "springs/rusty": 33,
+  "springs/rusty": 28,
   "structures/blocks": 16,
   "structures/others": 40,
   "gas/vortex_street": 100,
+};
+
+/** Cameras, position and target, of scenes that are small in their own picture. */
+const NEARER: Record<string, [number[], number[]]> = {
+  "contact/slider": [
+    [1.6, -3.2, 1.6],
+    [1.1, 0, -0.35],
+  ],
+  "springs/rusty": [
+    [0, -11, -5.1],
+    [0, 0, -5.1],
+  ],
 };
 
 const asked = process.argv.slice(2);
@@ -42,10 +53,32 @@ for (const id of ids) {
   try {
     await page.waitForFunction(() => document.getElementById("main")!.dataset.ready, null, { timeout: 120_000 });
     const data = await page.evaluate(
-      async (at) => {
+      async ({ at, nearer }) => {
         const { session, stage } = (window as any).tumble;
+        if (nearer) {
+          stage.camera.position.set(...nearer[0]);
+          stage.controls.target.set(...nearer[1]);
+          stage.controls.update();
+        }
         await session.goto(at).catch(() => {});
         stage.again();
+        // From as far away as shows all masses whole. Of loose ones some few may be anywhere.
+        const { camera, controls } = stage;
+        const point = controls.target.clone();
+        for (let tries = 0; tries < 16; tries++) {
+          let whole = true;
+          for (const { name, form } of stage.things) {
+            const x = form === "solid" || form === "container" ? null : session.shown.columns[name]?.position?.data;
+            let outside = 0;
+            for (let i = 0; i < (x?.length ?? 0); i += 3) {
+              point.set(x[i], x[i + 1], x[i + 2]).project(camera);
+              if (Math.abs(point.x) > 0.94 || Math.abs(point.y) > 0.92) outside++;
+            }
+            if (outside > (form === "points" && x.length > 90 ? 0.01 * x.length : 0)) whole = false;
+          }
+          if (whole) break;
+          stage.nudge(0, 0, 1 / 1.06);
+        }
         const blob: Blob = await stage.picture("image/png");
         const image = await createImageBitmap(blob);
         const small = new OffscreenCanvas(480, 270);
@@ -62,7 +95,7 @@ for (const id of ids) {
         const webp = await small.convertToBlob({ type: "image/webp", quality: 0.72 });
         return [...new Uint8Array(await webp.arrayBuffer())];
       },
-      AT[id] ?? Math.round((2 * frames) / 3),
+      { at: AT[id] ?? Math.round((2 * frames) / 3), nearer: NEARER[id] },
     );
     writeFileSync(`pictures/${id.replace("/", "-")}.webp`, Uint8Array.from(data));
     console.log(id, data.length);

@@ -119,8 +119,9 @@ export class Engine {
     return ((await this.ask({ type: "hash", world })) as Answer & { type: "hash" }).hash;
   }
 
-  async stability(world = 0): Promise<Stability[]> {
-    return ((await this.ask({ type: "stability", world })) as Answer & { type: "stability" }).stability;
+  /** Of those systems for which it is found within `budget` [ms]. */
+  async stability(world = 0, budget?: number): Promise<Stability[]> {
+    return ((await this.ask({ type: "stability", world, budget })) as Answer & { type: "stability" }).stability;
   }
 
   async cures(world = 0): Promise<Cure[]> {

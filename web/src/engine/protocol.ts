@@ -171,8 +171,8 @@ export type Request = Asked &
     | { type: "stir"; gas: string; position: Vector; velocity: Vector; radius: number; density?: number }
     /** -> hash */
     | { type: "hash" }
-    /** -> stability, of those systems for which it is found in some seconds; takes about as long as some steps */
-    | { type: "stability" }
+    /** -> stability, of those systems for which it is found within `budget` [ms], or some seconds; takes about as long as some steps */
+    | { type: "stability"; budget?: number }
     /** After a failed step. -> cures; takes long */
     | { type: "cures" }
     /** JSON schema of scenes: docs, defaults, ranges; units are under "x-unit". -> schema */

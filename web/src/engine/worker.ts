@@ -205,7 +205,7 @@ async function answer(request: Request): Promise<Answer> {
     case "hash":
       return { id, type: "hash", hash: running(number).world.hash() };
     case "stability":
-      return { id, type: "stability", stability: JSON.parse(running(number).world.stability(STABILITY_LIMIT)) };
+      return { id, type: "stability", stability: JSON.parse(running(number).world.stability(request.budget ?? STABILITY_LIMIT)) };
     case "cures":
       return { id, type: "cures", cures: JSON.parse(running(number).world.cures(CURE_LIMIT)) };
     case "schema":
@@ -228,8 +228,8 @@ async function answer(request: Request): Promise<Answer> {
 }
 
 /** Exception of the engine: its own failures are JSON; anything else has killed it. */
-function failure(thrown: unknown): Failure {
-  if (typeof thrown === "string") return readable(JSON.parse(thrown) as Failure);
+function failure(thrown: unknown, toml?: string): Failure {
+  if (typeof thrown === "string") return readable(JSON.parse(thrown) as Failure, toml);
   if (thrown instanceof Asked) return { kind: "scene", message: thrown.message, issues: [] };
   const panic = (globalThis as { tumblePanic?: string }).tumblePanic;
   const message = panic ?? (thrown instanceof Error ? thrown.message : String(thrown));
@@ -251,7 +251,7 @@ addEventListener("message", (event: MessageEvent<Request>) => {
     try {
       reply = await answer(event.data);
     } catch (thrown) {
-      reply = { id: event.data.id, type: "failed", failure: failure(thrown) };
+      reply = { id: event.data.id, type: "failed", failure: failure(thrown, event.data.type === "load" ? event.data.toml : "") };
     }
     postMessage(reply, { transfer: buffers(reply) });
   });

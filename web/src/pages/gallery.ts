@@ -1,7 +1,7 @@
 /** All scenes that ship, with pictures. */
 import { h, type Page, say } from "../dom";
 import { acceptFiles } from "../drop";
-import { ROW_TITLES, SCENES, type Shipped, titleOf } from "../scenes";
+import { rowTitle, SCENES, type Shipped, titleOf } from "../scenes";
 
 export const page: Page = async (main) => {
   document.title = "tumble · a physics engine in a browser tab";
@@ -25,16 +25,11 @@ export const page: Page = async (main) => {
   const filter = h("input", { type: "search", placeholder: "cloth, smoke, orbit …", "aria-label": "Find a scene", oninput: () => draw() });
   const draw = () => {
     const words = filter.value.toLowerCase().split(/\s+/).filter(Boolean);
-    const hit = (s: Shipped, i: number) => words.every((w) => `${s.id} ${texts[i]} ${ROW_TITLES[s.row] ?? ""}`.toLowerCase().includes(w));
+    const hit = (s: Shipped, i: number) => words.every((w) => `${s.id} ${texts[i]} ${rowTitle(s.row)}`.toLowerCase().includes(w));
     const sections = rows.map((row) => {
       const own = SCENES.map((s, i) => ({ s, i })).filter(({ s, i }) => s.row === row && hit(s, i));
       return own.length
-        ? h(
-            "section",
-            {},
-            h("h2", {}, ROW_TITLES[row] ?? row),
-            h("ul", { class: "tiles" }, ...own.map(({ s, i }) => card(s, titleOf(texts[i])))),
-          )
+        ? h("section", {}, h("h2", {}, rowTitle(row)), h("ul", { class: "tiles" }, ...own.map(({ s, i }) => card(s, titleOf(texts[i])))))
         : null;
     });
     list.replaceChildren(...sections.filter((s) => s !== null));
