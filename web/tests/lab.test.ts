@@ -683,6 +683,54 @@ describe("fluid", () => {
     await page.waitForFunction(() => (window as any).tumble.stage.legend?.name === "pressure");
     const pressure = await picture();
     assert.ok(differ(stirred, pressure) > 0.1, `the view of the pressure changed ${differ(stirred, pressure)}`);
+    // Cells are seen there by themselves, at every resolution, and go at once, also while nothing moves.
+    const edges = () =>
+      page.evaluate(async () => {
+        const image = await createImageBitmap(await (window as any).tumble.stage.picture());
+        const { width, height } = image;
+        const context = new OffscreenCanvas(width, height).getContext("2d")!;
+        context.drawImage(image, 0, 0);
+        const { data } = context.getImageData(0, Math.round(height / 2) - 10, width, 20);
+        let jumps = 0;
+        // Of a smooth field the second differences are small.
+        for (let p = 8; p < data.length; p += 4)
+          for (let c = 0; c < 3; c++) jumps += Math.abs(data[p + c] - 2 * data[p + c - 4] + data[p + c - 8]);
+        return jumps / data.length;
+      });
+    const switched = page.locator("label:has-text('Cells') input[type=checkbox]");
+    for (const n of ["64", "192", "384"]) {
+      await page.locator("label:has-text('Cells along') select").selectOption(n);
+      await page.waitForFunction((k) => (window as any).tumble.session.info.scene.gas[0].box.resolution === Number(k), n);
+      await page.evaluate(async () => {
+        const { session } = (window as any).tumble;
+        session.pause();
+        await session.next();
+      });
+      assert.equal(await switched.isChecked(), true);
+      const ruled = await edges();
+      await switched.uncheck();
+      const smooth = await edges();
+      await switched.check();
+      assert.ok(ruled > 2 * smooth && ruled - smooth > 0.5, `${n}: ${ruled} with cells, ${smooth} without`);
+    }
+    // A pointer that passes over stirs while it plays, and not while it rests.
+    const passes = async () => {
+      await page.evaluate(() => {
+        const { session } = (window as any).tumble;
+        const stir = Object.getPrototypeOf(session).stir;
+        (window as any).passed = [];
+        session.stir = (...words: unknown[]) => ((window as any).passed.push(words), stir.apply(session, words));
+      });
+      for (let i = 0; i < 8; i++) await page.mouse.move(box.x + (0.3 + 0.04 * i) * box.width, box.y + 0.5 * box.height);
+      return page.evaluate(() => (window as any).passed);
+    };
+    assert.deepEqual(await passes(), []);
+    await page.locator("label:has-text('Cells along') select").selectOption("64");
+    await page.waitForFunction(() => (window as any).tumble.session.info.scene.gas[0].box.resolution === 64);
+    await page.waitForFunction(() => (window as any).tumble.session.playing);
+    const stirring = await passes();
+    assert.ok(stirring.length && stirring.every((w: any) => w[2][0] > 0 && w[4] === 0), JSON.stringify(stirring));
+    await page.evaluate(() => (window as any).tumble.session.pause());
     // Few iterations of Jacobi leave much more than multigrid does.
     const left = await page.evaluate(async () => {
       const { session } = (window as any).tumble;

@@ -530,6 +530,11 @@ export const page: Page = async (main, rest) => {
             }),
           );
       } else {
+        const ruled = check("Cells", look.cells, (on) => {
+          look.cells = on;
+          comparison.again();
+        });
+        ruled.hidden = look.slice === null;
         const at = h("input", {
           type: "range",
           min: 0,
@@ -555,11 +560,12 @@ export const page: Page = async (main, rest) => {
             look.slice === null ? "" : String(look.slice),
             (v) => {
               look.slice = v === "" ? null : Number(v);
-              at.hidden = look.slice === null;
+              at.hidden = ruled.hidden = look.slice === null;
               again();
             },
           ),
           at,
+          ruled,
         );
       }
     }

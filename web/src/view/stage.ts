@@ -562,7 +562,7 @@ export class Stage {
         heat.look(warm.data);
         if (heat.high > GLOWING) hot = { values: warm.data, low: 0, high: Math.max(heat.high, 1) };
       }
-      thing.body.cut(this.look.slice, this.look.sliceAt);
+      thing.body.cut(this.look.slice, this.look.sliceAt, this.look.cells);
       if (this.look.slice === null) this.legend = null;
       thing.body.set(
         name,
