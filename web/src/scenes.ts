@@ -1,4 +1,5 @@
 /** The scenes that ship with tumble, from the one place where they live, and the pages of theory. */
+import index from "virtual:scenes";
 import { root } from "./share";
 
 const texts = import.meta.glob("../../python/tumble/scenes/*/*.toml", { query: "?raw", import: "default" }) as Record<
@@ -18,6 +19,8 @@ export interface Shipped {
   id: string;
   row: string;
   name: string;
+  title: string;
+  precision: "single" | "double";
   picture: string | null;
   text: () => Promise<string>;
 }
@@ -50,7 +53,7 @@ export const SCENES: Shipped[] = Object.entries(texts)
   .map(([path, text]) => {
     const id = idOf(path);
     const [row, name] = id.split("/");
-    return { id, row, name, text, picture: pictures[`../pictures/${row}-${name}.webp`] ?? null };
+    return { id, row, name, ...index[id], text, picture: pictures[`../pictures/${row}-${name}.webp`] ?? null };
   })
   .sort((a, b) => order(a.row) - order(b.row) || a.name.localeCompare(b.name));
 

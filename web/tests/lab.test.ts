@@ -39,8 +39,16 @@ describe("theory", () => {
 
 describe("gallery", () => {
   it("shows every scene that ships, with a picture", async () => {
-    const { page, errors } = await own.open("");
+    const { page, errors } = await own.open("", { reducedMotion: "reduce" });
     await page.waitForSelector(".tile");
+    // Titles come without the texts of scenes, and without an engine.
+    const first = await page.evaluate(() => performance.getEntriesByType("resource").map((r) => r.name.split("/").pop()!));
+    const texts = ids.map((id) => `${id.split("/")[1]}-`);
+    assert.ok(first.some((name) => /^gallery-.*js$/.test(name)));
+    assert.deepEqual(
+      first.filter((name) => name.endsWith(".wasm") || (name.endsWith(".js") && texts.some((text) => name.startsWith(text)))),
+      [],
+    );
     const tiles = await page.$$eval(".tile", (all) =>
       all.map((t) => ({
         id: t.querySelector(".tile-id")!.textContent,
@@ -63,6 +71,9 @@ describe("gallery", () => {
     await page.fill("input[type=search]", "bunny");
     const found = await page.$$eval(".tile-id", (all) => all.map((t) => t.textContent));
     assert.ok(found.length > 0 && found.length < ids.length && found.includes("drape/sheet-on-bunny"), `found ${found}`);
+    // A word of a text alone.
+    await page.fill("input[type=search]", "forward_euler");
+    await page.waitForFunction(() => [...document.querySelectorAll(".tile-id")].some((t) => t.textContent === "failures/stiff-sheet"));
     assert.deepEqual(errors, []);
     await page.context().close();
   });
@@ -105,6 +116,28 @@ describe("gallery", () => {
     assert.ok(seen.find((s) => s.id === "failures/stiff-sheet")!.drawn > 0.05);
     assert.deepEqual(errors, []);
     await page.context().close();
+  });
+
+  it("fetches the engine of the precision that a scene has, and no other", async () => {
+    for (const [path, precision] of [
+      ["scene/contact/bounce", "double"],
+      ["scene/structures/rope", "single"],
+      ["integrators", "double"],
+    ]) {
+      const context = await own.browser.newContext({ ...STILL });
+      const page = await context.newPage();
+      const used = new Set<string>();
+      context.on("request", (r) => {
+        const [, name] = /(single|double)_bg.*wasm$/.exec(r.url()) ?? [];
+        if (name) used.add(name);
+      });
+      await page.goto(`${own.address}#/${path}`);
+      await ready(page);
+      // The panel asks the engine that is there.
+      if (path.startsWith("scene")) await page.waitForSelector(".panel .field", { state: "attached" });
+      assert.deepEqual([...used], [precision], path);
+      await context.close();
+    }
   });
 
   it("shows the first picture of a scene after less than 3 MB and 3 s, with nothing in the cache", async () => {

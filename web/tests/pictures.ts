@@ -1,4 +1,7 @@
-/** Pictures of the gallery: each scene by the app itself, at a frame that shows what it is about. `npm run pictures [ROW/NAME ...]` */
+/**
+ * Pictures of the gallery: each scene by the app itself, at a frame that shows what it is about; and those of `public`, which others show of the
+ * laboratory: `site`. `npm run pictures [ROW/NAME ...] [site]`
+ */
 import { mkdirSync, readFileSync, writeFileSync } from "node:fs";
 import { lab, SCENES, shipped } from "./browser.ts";
 
@@ -103,5 +106,34 @@ for (const id of ids) {
     console.log(id, "FAILED", String(error).slice(0, 200));
   }
   await page.context().close();
+}
+if (!asked.length || asked.includes("site")) {
+  const shot = await own.open("scene/particles/fountain", {
+    viewport: { width: 1700, height: 1100 },
+    reducedMotion: "reduce",
+    colorScheme: "light",
+  });
+  await shot.page.waitForFunction(() => document.getElementById("main")!.dataset.ready, null, { timeout: 120_000 });
+  const preview = await shot.page.evaluate(async () => {
+    const { session, stage } = (window as any).tumble;
+    await session.goto(50);
+    stage.again();
+    const image = await createImageBitmap(await stage.picture("image/png"));
+    const whole = new OffscreenCanvas(1200, 630);
+    const scale = Math.max(1200 / image.width, 630 / image.height);
+    const [w, h] = [scale * image.width, scale * image.height];
+    whole.getContext("2d")!.drawImage(image, 600 - w / 2, 315 - h / 2, w, h);
+    const blob = await whole.convertToBlob({ type: "image/jpeg", quality: 0.82 });
+    return [...new Uint8Array(await blob.arrayBuffer())];
+  });
+  writeFileSync("public/preview.jpg", Uint8Array.from(preview));
+  for (const size of [192, 512]) {
+    await shot.page.setViewportSize({ width: size, height: size });
+    await shot.page.setContent(
+      `<style>body { margin: 0 } svg { display: block; width: 100vw }</style>${readFileSync("public/icon.svg", "utf8")}`,
+    );
+    await shot.page.screenshot({ path: `public/icon-${size}.png` });
+  }
+  await shot.page.context().close();
 }
 await own.close();

@@ -348,6 +348,8 @@ describe("a site", () => {
       css: "text/css",
       wasm: "application/wasm",
       webp: "image/webp",
+      svg: "image/svg+xml",
+      webmanifest: "application/manifest+json",
     };
     server = createServer((request, response) => {
       const path = new URL(request.url!, "http://x").pathname.replace(/^\/some\/place\//, "");
@@ -378,6 +380,30 @@ describe("a site", () => {
       assert.equal(await page.evaluate(() => (window as any).tumble.engine.version), VERSION);
       assert.deepEqual(errors, []);
       await page.context().close();
+    }
+  });
+
+  it("has a picture, icons and a manifest for those who show or keep its links", () => {
+    const size = (file: string) => {
+      const data = readFileSync(file);
+      if (file.endsWith(".png")) return [data.readUInt32BE(16), data.readUInt32BE(20)];
+      // The frame header of a JPEG.
+      const at = data.indexOf(Buffer.from([0xff, 0xc0]));
+      return [data.readUInt16BE(at + 7), data.readUInt16BE(at + 5)];
+    };
+    for (const folder of [DIST, join(DIST, "v", VERSION)]) {
+      const page = readFileSync(join(folder, "index.html"), "utf8");
+      const of = (pattern: RegExp) => join(folder, pattern.exec(page)?.[1] ?? assert.fail(`no ${pattern} in ${folder}`));
+      assert.deepEqual(size(of(/property="og:image" content="([^"]+)"/)), [1200, 630]);
+      assert.deepEqual(size(of(/rel="apple-touch-icon" href="([^"]+)"/)), [192, 192]);
+      assert.match(readFileSync(of(/rel="icon" href="([^"]+)"/), "utf8"), /<svg/);
+      const manifest = of(/rel="manifest" href="([^"]+)"/);
+      const { icons, start_url } = JSON.parse(readFileSync(manifest, "utf8"));
+      assert.ok(existsSync(join(manifest, "..", start_url, "index.html")));
+      for (const { src, sizes } of icons.filter((i: any) => i.type === "image/png"))
+        assert.equal(size(join(manifest, "..", src)).join("x"), sizes);
+      assert.equal(icons.length, 3);
+      for (const word of ["title", "description", "image:alt"]) assert.match(page, new RegExp(`property="og:${word}" content="[^"]{6,}"`));
     }
   });
 

@@ -128,6 +128,11 @@ export class Engine {
     return ((await this.ask({ type: "cures", world })) as Answer & { type: "cures" }).cures;
   }
 
+  /** Fetches the engine of a precision before a scene needs it. */
+  async warm(precision: "single" | "double"): Promise<void> {
+    await this.ask({ type: "warm", precision });
+  }
+
   async schema(): Promise<Record<string, unknown>> {
     return ((await this.ask({ type: "schema" })) as Answer & { type: "schema" }).schema;
   }

@@ -638,15 +638,17 @@ export const page: Page = async (main, rest) => {
   };
   const theme = () => comparison.theme();
   addEventListener("themechange", theme);
-  void engine()
-    .schema()
-    .then((found) => {
-      panel = new Panel(found, change);
-      valuesTab.append(panel.element);
-      if (session.info) panel.open(session.info, session.toml, session.overrides);
+  const makePanel = async () => {
+    try {
+      const made = new Panel(await engine().schema(), change);
+      panel = made;
+      valuesTab.append(made.element);
+      if (session.info) made.open(session.info, session.toml, session.overrides);
       if (session.info) void tellLimits();
-    })
-    .catch((error) => valuesTab.append(h("p", {}, String(error.message ?? error))));
+    } catch (error) {
+      valuesTab.append(h("p", {}, String((error as Error).message)));
+    }
+  };
   void viewer
     .begin(async () => {
       const told = await begin(session, start, (i) => viewer.waiting(`frame ${i} of ${start.shared!.frame}`, () => session.stop()));
@@ -667,6 +669,8 @@ export const page: Page = async (main, rest) => {
       else if (!reducedMotion()) session.play();
     })
     .then((failure) => {
+      // After the scene, whose engine knows it, too.
+      void makePanel();
       if (!failure) return;
       want(failure.missing ?? [], () => dispatchEvent(new Event("hashchange")));
       choose(1);
