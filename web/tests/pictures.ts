@@ -36,14 +36,17 @@ const AT: Record<string, number> = {
 /** Cameras, position and target, of scenes that are small in their own picture. */
 const NEARER: Record<string, [number[], number[]]> = {
   "contact/slider": [
-    [1.6, -3.2, 1.6],
-    [1.1, 0, -0.35],
+    [1.2, -2.6, 2.6],
+    [1.2, 1.6, 0],
   ],
   "springs/rusty": [
     [0, -11, -5.1],
     [0, 0, -5.1],
   ],
 };
+
+/** Scenes of which pieces fly away. */
+const LOOSE = ["cloth/torn-flag"];
 
 const asked = process.argv.slice(2);
 const ids = shipped().filter((id) => !asked.length || asked.includes(id));
@@ -56,31 +59,41 @@ for (const id of ids) {
   try {
     await page.waitForFunction(() => document.getElementById("main")!.dataset.ready, null, { timeout: 120_000 });
     const data = await page.evaluate(
-      async ({ at, nearer }) => {
+      async ({ at, nearer: sight, loose }) => {
         const { session, stage } = (window as any).tumble;
-        if (nearer) {
-          stage.camera.position.set(...nearer[0]);
-          stage.controls.target.set(...nearer[1]);
+        if (sight) {
+          stage.camera.position.set(...sight[0]);
+          stage.controls.target.set(...sight[1]);
           stage.controls.update();
         }
         await session.goto(at).catch(() => {});
         stage.again();
-        // From as far away as shows all masses whole. Of loose ones some few may be anywhere.
-        const { camera, controls } = stage;
+        // From as near as shows all masses whole, and the bodies around which a tall picture is made. Of loose ones some few may be anywhere.
+        const { camera, controls, home } = stage;
+        const tall = !stage.flat && home.shape < 1.5;
         const point = controls.target.clone();
-        for (let tries = 0; tries < 16; tries++) {
+        const moved = point.clone();
+        for (let [tries, nearer] = [0, tall]; tries < 40; tries++) {
+          const edge = nearer ? 0.8 : 0.94;
           let whole = true;
-          for (const { name, form } of stage.things) {
-            const x = form === "solid" || form === "container" ? null : session.shown.columns[name]?.position?.data;
+          camera.updateMatrixWorld();
+          for (const { name, form, topology, body } of stage.things) {
+            const solid = form === "solid" || form === "container";
+            const x = solid ? tall && topology.position?.data : session.shown.columns[name]?.position?.data;
+            if (!x) continue;
             let outside = 0;
-            for (let i = 0; i < (x?.length ?? 0); i += 3) {
-              point.set(x[i], x[i + 1], x[i + 2]).project(camera);
-              if (Math.abs(point.x) > 0.94 || Math.abs(point.y) > 0.92) outside++;
+            for (let i = 0; i < x.length; i += 3) {
+              point.set(x[i], x[i + 1], x[i + 2]);
+              if (solid) point.applyMatrix4(body.object.matrixWorld);
+              if (solid && moved.copy(point).sub(home.target).length() > home.width) continue;
+              point.project(camera);
+              if (Math.abs(point.x) > edge || Math.abs(point.y) > edge) outside++;
             }
-            if (outside > (form === "points" && x.length > 90 ? 0.01 * x.length : 0)) whole = false;
+            if (outside > (loose || (form === "points" && x.length > 90) ? 0.01 * x.length : 0)) whole = false;
           }
-          if (whole) break;
-          stage.nudge(0, 0, 1 / 1.06);
+          if (whole && !nearer) break;
+          if (!whole) nearer = false;
+          stage.nudge(0, 0, nearer ? 1.05 : 1 / 1.05);
         }
         const blob: Blob = await stage.picture("image/png");
         const image = await createImageBitmap(blob);
@@ -98,7 +111,7 @@ for (const id of ids) {
         const webp = await small.convertToBlob({ type: "image/webp", quality: 0.72 });
         return [...new Uint8Array(await webp.arrayBuffer())];
       },
-      { at: AT[id] ?? Math.round((2 * frames) / 3), nearer: NEARER[id] },
+      { at: AT[id] ?? Math.round((2 * frames) / 3), nearer: NEARER[id], loose: LOOSE.includes(id) },
     );
     writeFileSync(`pictures/${id.replace("/", "-")}.webp`, Uint8Array.from(data));
     console.log(id, data.length);
