@@ -966,6 +966,8 @@ describe("everyone", () => {
       // The narrowest is a window of 320 with a bar that scrolls.
       for (const width of [390, 305]) {
         await page.setViewportSize({ width, height: 844 });
+        // Plots follow the window a moment later.
+        await page.waitForFunction((w) => document.documentElement.scrollWidth <= w, width, { timeout: 5000 }).catch(() => {});
         const wide = await page.evaluate(() => document.documentElement.scrollWidth);
         assert.ok(wide <= width, `${path} is ${wide} pixels wide, of ${width}`);
       }
