@@ -43,6 +43,15 @@ thickness = 0.01
 friction = 0.5
 `;
 
+/** JSON as TOML, which the editor shows; the engine tells where a damaged one is wrong. */
+function written(json: string): string {
+  try {
+    return stringify(JSON.parse(json) as Record<string, unknown>);
+  } catch {
+    return json;
+  }
+}
+
 /** Meshes that the scene of the page misses, and what is done when they are there. */
 let wanted: { paths: string[]; then: () => void } | null = null;
 
@@ -60,7 +69,7 @@ export async function acceptFiles(files: File[]): Promise<void> {
       scene = { name: file.name, toml: await file.text(), files: {} };
     } else if (/\.json$/i.test(file.name)) {
       if (file.size > LARGEST.scene) throw new Error(`${file.name} is larger than a scene may be (1 MB)`);
-      scene = { name: file.name, toml: stringify(JSON.parse(await file.text()) as Record<string, unknown>), files: {} };
+      scene = { name: file.name, toml: written(await file.text()), files: {} };
     } else if (/\.(ply|obj|stl|glb)$/i.test(file.name)) {
       if (file.size > LARGEST.mesh) throw new Error(`${file.name} is larger than a mesh may be (64 MiB)`);
       dropped[file.name] = new Uint8Array(await file.arrayBuffer());
@@ -68,7 +77,7 @@ export async function acceptFiles(files: File[]): Promise<void> {
     } else if (/\.tumble$/i.test(file.name)) {
       if (file.size > LARGEST.shared) throw new Error(`${file.name} is larger than a shared scene may be (64 MiB)`);
       const { shared, meshes } = await fromFile(new Uint8Array(await file.arrayBuffer())).catch((error) => {
-        throw new Error(`${file.name} is damaged: ${error.message ?? error}`);
+        throw new Error(`${file.name} is damaged: ${error.message}`);
       });
       scene = { name: file.name, toml: shared.text, files: meshes, shared };
     } else throw new Error(`${file.name} is neither a scene (.toml, .json, .tumble) nor a mesh (.ply, .obj, .stl, .glb)`);

@@ -49,6 +49,15 @@ document.getElementById("tools")!.append(
 let leave: Leave = () => {};
 let visit = 0;
 
+/** The engine of a page, where its precision is known from the address. */
+async function warm(address: string): Promise<void> {
+  const [page, ...rest] = address.split("/");
+  if (!["scene", "fluid", "integrators", "structures"].includes(page)) return;
+  const [{ engine }, { sceneOf }] = await Promise.all([import("./session"), import("./scenes")]);
+  const precision = page === "scene" ? sceneOf(rest.join("/"))?.precision : page === "integrators" ? "double" : "single";
+  if (precision) await engine().warm(precision);
+}
+
 async function go(): Promise<void> {
   const own = ++visit;
   let address = location.hash.replace(/^#\/?/, "");
@@ -63,8 +72,7 @@ async function go(): Promise<void> {
   main.replaceWith(fresh);
   main = fresh;
   // The engine comes while the page does.
-  if (/^(scene|s|fluid|integrators|structures)\b/.test(address))
-    void import("./session").then(({ engine }) => engine().schema()).catch(() => {});
+  void warm(address).catch(() => {});
   const section = address.split("/")[0];
   for (const link of nav.querySelectorAll("a")) {
     if (link.getAttribute("href") === `#/${section === "scene" ? "" : section}`) link.setAttribute("aria-current", "page");
@@ -75,7 +83,10 @@ async function go(): Promise<void> {
     if (!match) continue;
     let end: Leave;
     try {
-      const { page } = await open();
+      const { page } = await open().catch((error) => {
+        console.error(error);
+        throw new Error("A part of the laboratory could not be fetched. Once the connection is back, reload the page.");
+      });
       if (own !== visit) return;
       scrollTo(0, 0);
       end = await page(fresh, match[1] ?? "");

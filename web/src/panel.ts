@@ -1,7 +1,10 @@
 /** Controls for the values of a scene, made from its schema: label, unit, range, what the word means. */
 import { parse } from "smol-toml";
-import { check, h } from "./dom";
-import type { SceneInfo, Value } from "./engine/protocol";
+import { check, h, show } from "./dom";
+import type { SceneInfo, Stability, Value } from "./engine/protocol";
+import { ofSteps, type Range, range } from "./ranges";
+import { chosen, label, told, unitOf, word } from "./texts";
+import { valueAt } from "./values";
 
 type Schema = Record<string, any>;
 type Tree = Record<string, any>;
@@ -43,6 +46,31 @@ const TELLING: Record<string, string[]> = {
   "field.sink": ["rate"],
   "field.uniform": ["velocity"],
 };
+/** Methods that can move the same objects. */
+const ALIKE = ["dynamics", "position_based", "tracers"];
+
+/** The method in force: `position_based` stands under either key. */
+const methodOf = ({ method, integrator }: Tree): string => (method === "dynamics" && integrator === "position_based" ? integrator : method);
+
+/** Whether a word of a system means anything under its method and integrator. */
+function inForce(key: string, system: Tree): boolean {
+  const { integrator } = system;
+  const method = methodOf(system);
+  const masses = method === "dynamics" || method === "position_based";
+  const positions = method === "position_based";
+  const stepped = method === "dynamics" || method === "tracers";
+  const rules: Record<string, boolean> = {
+    integrator: stepped,
+    adaptive: stepped && ["adaptive_euler", "dormand_prince"].includes(integrator),
+    solver: stepped && ["implicit_euler", "implicit_midpoint", "bdf2"].includes(integrator),
+    clamp: positions || (stepped && ["modified_euler", "verlet"].includes(integrator)),
+    position_based: positions,
+    self_contact: masses,
+    vicsek: method === "vicsek",
+  };
+  return rules[key] ?? true;
+}
+
 /** So many of them, at most, so that the rest stays in sight. */
 const MOST_TELLING = 9;
 
@@ -85,7 +113,6 @@ function branch(schema: Schema, value: any, all: Schema): Schema | null {
 
 const typeOf = (schema: Schema): string => (Array.isArray(schema.type) ? schema.type.find((t: string) => t !== "null") : schema.type) ?? "";
 const plain = (key: string): string => key.replace(/_/g, " ");
-const capital = (text: string): string => text.charAt(0).toUpperCase() + text.slice(1);
 
 let count = 0;
 
@@ -100,6 +127,10 @@ export class Panel {
   private closed = new Set<string>();
   private info: SceneInfo | null = null;
   private explicit: Tree = {};
+  private toml = "";
+  /** Of sliders, as the scene was opened: they do not move with the value. */
+  private ranges = new Map<string, Range>();
+  private stability: Stability[] = [];
 
   constructor(
     private readonly schema: Schema,
@@ -125,12 +156,51 @@ export class Panel {
     } catch {
       this.explicit = {};
     }
+    if (toml !== this.toml) this.ranges.clear();
+    this.toml = toml;
     for (const [path, value] of overrides) mark(this.explicit, path.split("."), value);
     const same = this.info && JSON.stringify(shape(this.info.scene)) === JSON.stringify(shape(info.scene));
     this.info = info;
     // A panel in use is not made anew under the fingers.
     if (same && this.groups.contains(document.activeElement)) return;
+    const path = document.activeElement?.closest<HTMLElement>("[data-path]")?.dataset.path;
     this.draw();
+    if (path) this.groups.querySelector<HTMLElement>(`[data-path="${CSS.escape(path)}"] :is(select, input:not([tabindex]))`)?.focus();
+  }
+
+  /** Which steps are stable. */
+  limits(list: Stability[]): void {
+    this.stability = list;
+    const stepped = /^system\.\d+\.(step|substeps)$/;
+    for (const path of [...this.ranges.keys()]) if (stepped.test(path)) this.ranges.delete(path);
+    for (const row of this.groups.querySelectorAll<HTMLElement>("[data-path]")) {
+      const path = row.dataset.path!;
+      const value = valueAt(this.info?.scene, path);
+      if (!stepped.test(path) || typeof value !== "number" || row.contains(document.activeElement)) continue;
+      const item = resolve(resolve(this.schema.properties.system, this.schema).items, this.schema);
+      const key = path.split(".").pop()!;
+      row.replaceWith(this.row(path, value, resolve(item.properties[key], this.schema), key)!);
+    }
+  }
+
+  /** Steps of a system that are stable: the longest [s], and how many of them make an interval. */
+  private stable(path: string): { says: string; step: [number, number]; substeps: [number, number] } | null {
+    const scene = this.info?.scene as Tree;
+    const system = valueAt(scene, path.split(".").slice(0, 2).join(".")) as Tree;
+    const interval = 1 / scene.time.fps / scene.time.exchanges;
+    const found = this.stability.find((s) => s.system === system.name);
+    const limit = found?.limits.find((l) => l.integrator === found.integrator)?.usable;
+    if (limit === 0) return { says: "No step is stable with this integrator.", step: [interval / 1000, interval], substeps: ofSteps(1000) };
+    if (!limit) {
+      const says = found && limit === null ? "Stable at every step." : "";
+      return { says, step: [interval / 100, interval], substeps: ofSteps(Math.max(interval / 1e-3, 10)) };
+    }
+    const steps = Math.max(Math.ceil(interval / limit - 1e-6), 1);
+    return {
+      says: `Stable from ${steps} sub-step${steps > 1 ? "s" : ""} on, each of ${show(interval / steps, 3)} s.`,
+      step: [Math.min(limit / 20, interval), Math.min(4 * limit, interval)],
+      substeps: ofSteps(steps),
+    };
   }
 
   say(text: string, bad = false): void {
@@ -153,11 +223,11 @@ export class Panel {
         value.forEach((entry, i) => {
           const item = resolve(schema.items ?? {}, this.schema);
           const name = entry?.name ?? entry?.kind ?? String(i + 1);
-          const group = this.group(`${key}.${i}`, entry, item, this.explicit[key]?.[i], `${name}`, capital(plain(key)));
+          const group = this.group(`${key}.${i}`, entry, item, this.explicit[key]?.[i], `${name}`, label(key));
           if (group) groups.push(group);
         });
       } else if (typeof value === "object") {
-        const group = this.group(key, value, schema, this.explicit[key], capital(plain(key)), "");
+        const group = this.group(key, value, schema, this.explicit[key], label(key), "");
         if (group) groups.push(group);
       } else if (key in this.explicit || this.everything) {
         const row = this.row(key, value, schema, key);
@@ -203,12 +273,7 @@ export class Panel {
       }
       if (rows.length)
         sets.push(
-          h(
-            "fieldset",
-            { class: "sub" },
-            h("legend", {}, capital(plain(String(entry.name ?? entry.kind ?? kind.split(".").pop())))),
-            ...rows,
-          ),
+          h("fieldset", { class: "sub" }, h("legend", {}, label(String(entry.name ?? entry.kind ?? kind.split(".").pop()))), ...rows),
         );
     }
     if (!sets.length) return null;
@@ -242,13 +307,20 @@ export class Panel {
     const own = schema.properties ? schema : branch(schema, value, this.schema);
     if (!own?.properties) return [];
     const rows: HTMLElement[] = [];
+    const system = /^system\.\d+$/.test(path);
     for (const [key, raw] of Object.entries(own.properties as Record<string, Schema>)) {
-      if (LEFT_OUT.has(key) || key === "kind" || key === "system" || key === "method") continue;
+      if (LEFT_OUT.has(key) || key === "kind" || key === "system" || (system && !inForce(key, value))) continue;
       const inner = value?.[key];
       if (inner === null || inner === undefined) continue;
-      const said = explicit?.[key] !== undefined;
+      const said = explicit?.[key] !== undefined || (system && (key === "method" || key === "integrator"));
       if ((!said && !this.everything) || this.shown.has(`${path}.${key}`)) continue;
-      const row = this.row(`${path}.${key}`, inner, resolve(raw as Schema, this.schema), key, explicit?.[key]);
+      const row = this.row(
+        `${path}.${key}`,
+        system && key === "method" ? methodOf(value) : inner,
+        resolve(raw as Schema, this.schema),
+        key,
+        explicit?.[key],
+      );
       if (row) rows.push(row);
     }
     return rows;
@@ -292,25 +364,46 @@ export class Panel {
     if (typeof value === "object") {
       const rows = this.rows(path, value, kind, typeof explicit === "object" ? explicit : undefined);
       if (!rows.length) return null;
-      return h("fieldset", { class: "sub" }, h("legend", {}, capital(plain(key))), ...rows);
+      return h("fieldset", { class: "sub" }, h("legend", {}, label(key)), ...rows);
     }
     return null;
   }
 
   private field(path: string, key: string, schema: Schema, unit: string, control: (id: string) => HTMLElement): HTMLElement {
     const id = `v${++count}`;
-    const doc = String(schema.description ?? "")
-      .replace(/\s+/g, " ")
-      .replace(/`/g, "");
+    // A choice says itself what it means.
+    const doc = schema.oneOf ? "" : told(this.owner(path), key, String(schema.description ?? ""));
+    const stepped = /^system\.\d+\.(step|substeps)$/.test(path) ? this.stable(path)?.says : "";
     const body = control(id);
-    if (doc) body.querySelector(`#${id}`)!.setAttribute("aria-describedby", `${id}d`);
+    if (doc || stepped) body.querySelector(`#${id}`)!.setAttribute("aria-describedby", `${id}d`);
     return h(
       "div",
       { class: "field", "data-path": path },
-      h("div", { class: "field-head" }, h("label", { for: id }, capital(plain(key))), unit ? h("span", { class: "unit" }, unit) : null),
+      h(
+        "div",
+        { class: "field-head" },
+        h("label", { for: id }, label(key)),
+        unit ? h("span", { class: "unit" }, unitOf(path, unit)) : null,
+      ),
       body,
-      doc ? h("p", { class: "doc", id: `${id}d` }, doc) : null,
+      doc || stepped ? h("p", { class: "doc", id: `${id}d` }, [doc, stepped].filter(Boolean).join(" ")) : null,
     );
+  }
+
+  /** The table that a value stands in, or its kind. */
+  private owner(path: string): string {
+    const keys = path.split(".").slice(0, -1);
+    const entry = keys.length ? (valueAt(this.info?.scene, keys.join(".")) as Tree | null) : null;
+    return String(entry?.kind ?? keys.findLast((k) => !/^\d+$/.test(k)) ?? "");
+  }
+
+  /** Another method; what is written as an integrator would otherwise stay in force. */
+  private async method(path: string, value: string): Promise<void> {
+    const system = path.replace(/method$/, "");
+    const said = valueAt(this.explicit, system.slice(0, -1)) as Tree | null;
+    const written = said?.integrator === "position_based";
+    if (!written || value !== "dynamics" || (said?.method ?? "dynamics") !== "dynamics") await this.set(path, value);
+    if (written && value !== "position_based") await this.set(`${system}integrator`, "implicit_euler");
   }
 
   /** A value below a table that the text leaves out is set with all of its table, so that the rest keeps its value. */
@@ -330,8 +423,6 @@ export class Panel {
   }
 
   private number(id: string, path: string, value: number, schema: Schema, whole: boolean): HTMLElement {
-    const low = schema.minimum ?? schema.exclusiveMinimum;
-    const high = schema.maximum ?? schema.exclusiveMaximum;
     const input = h("input", {
       id,
       type: "number",
@@ -341,28 +432,28 @@ export class Panel {
       max: schema.maximum ?? false,
       inputmode: whole ? "numeric" : "decimal",
     });
-    // Short ranges are straight; long ones of positive numbers run by factors around the value.
-    const straight = low !== undefined && high !== undefined && high - low <= 1000 && high / Math.max(Math.abs(value), 1e-9) < 1e3;
-    const positive = !straight && value > 0;
-    const [from, to] = straight
-      ? [low, high]
-      : positive
-        ? [Math.log10(value) - 1, Math.log10(value) + 1]
-        : value === 0
-          ? [low === undefined ? -1 : 0, 1]
-          : [-2 * Math.abs(value), 2 * Math.abs(value)];
+    const key = path.split(".").pop()!;
+    let span = this.ranges.get(path);
+    if (!span || value < span.low || value > span.high) {
+      const known = /^system\.\d+\.(step|substeps)$/.test(path) ? this.stable(path)?.[key as "step" | "substeps"] : undefined;
+      this.ranges.set(path, (span = range(value, key, String(schema["x-unit"] ?? ""), schema, whole, known)));
+    }
+    const { log } = span;
+    const [from, to] = log ? [Math.log10(span.low), Math.log10(span.high)] : [span.low, span.high];
     const slider = h("input", {
       type: "range",
       min: from,
       max: to,
       step: (to - from) / 200,
-      value: positive ? Math.log10(value) : value,
+      value: log ? Math.log10(Math.max(value, span.low)) : value,
       tabindex: -1,
       "aria-hidden": "true",
     });
     let timer = 0;
     slider.addEventListener("input", () => {
-      let v = positive ? 10 ** Number(slider.value) : Number(slider.value);
+      let v = log ? 10 ** Number(slider.value) : Number(slider.value);
+      // What runs by factors ends at nothing, where it may be nothing.
+      if (log && schema.minimum === 0 && Number(slider.value) <= from + 1e-9) v = 0;
       v = whole ? Math.round(v) : Number(v.toPrecision(3));
       if (schema.exclusiveMinimum !== undefined && v <= schema.exclusiveMinimum) return;
       if (schema.minimum !== undefined) v = Math.max(v, schema.minimum);
@@ -373,28 +464,35 @@ export class Panel {
     input.addEventListener("change", () => {
       const v = Number(input.value);
       if (input.value === "" || !Number.isFinite(v)) return void (input.value = String(value));
-      slider.value = String(positive && v > 0 ? Math.log10(v) : v);
+      slider.value = String(log ? Math.log10(Math.max(v, 1e-300)) : v);
       void this.send(path, whole ? Math.round(v) : v);
     });
     return h("div", { class: "control" }, slider, input);
   }
 
   private select(id: string, path: string, value: string, schema: Schema): HTMLElement {
-    const branches = ((schema.oneOf ?? schema.anyOf) as Schema[]).flatMap((b): [string, string][] =>
-      "const" in b ? [[String(b.const), String(b.description ?? "")]] : (b.enum ?? []).map((e: string): [string, string] => [e, ""]),
-    );
+    const method = /^system\.\d+\.method$/.test(path);
+    const may = (v: string) =>
+      method
+        ? v === value || (ALIKE.includes(v) && ALIKE.includes(value))
+        : v === value || !/^system\.\d+\.integrator$/.test(path) || v !== "position_based";
+    const branches = ((schema.oneOf ?? schema.anyOf) as Schema[])
+      .flatMap((b): [string, string][] =>
+        "const" in b ? [[String(b.const), String(b.description ?? "")]] : (b.enum ?? []).map((e: string): [string, string] => [e, ""]),
+      )
+      .filter(([v]) => may(v));
     const says = h("p", { class: "doc says" });
-    const tell = (v: string) => (says.textContent = (branches.find((b) => b[0] === v)?.[1] ?? "").replace(/\s+/g, " "));
+    const tell = (v: string) => (says.textContent = chosen(v, branches.find((b) => b[0] === v)?.[1] ?? ""));
     const list = h(
       "select",
       {
         id,
         onchange: () => {
           tell(list.value);
-          void this.send(path, list.value);
+          void (method ? this.method(path, list.value) : this.send(path, list.value));
         },
       },
-      ...branches.map(([v]) => h("option", { value: v, selected: v === value }, plain(v))),
+      ...branches.map(([v]) => h("option", { value: v, selected: v === value }, word(v))),
     );
     tell(value);
     return h("div", { class: "control wide" }, list, says);
@@ -438,8 +536,10 @@ function full(tree: any): Value {
   return Object.fromEntries(Object.entries(tree).flatMap(([k, v]) => (v === null ? [] : [[k, full(v)]])));
 }
 
-/** Which keys there are, without their values. */
+/** Which keys there are, without their values; what decides about others counts. */
 function shape(tree: any): any {
+  if (tree && typeof tree === "object" && "method" in tree && "integrator" in tree)
+    return [tree.method, tree.integrator, ...Object.keys(tree)];
   if (Array.isArray(tree)) return tree.length > 8 ? tree.length : tree.map(shape);
   if (tree && typeof tree === "object") return Object.fromEntries(Object.entries(tree).map(([k, v]) => [k, shape(v)]));
   return typeof tree;

@@ -16,12 +16,19 @@ interface Stirring {
   dye?: () => number;
   /** Radius over the width of the picture. */
   size?: () => number;
+  /** Whether a pointer stirs while it plays that only passes over, without dye. */
+  hovers?: boolean;
 }
 
 /** A pass over a point is some events long; each gives a part of the pointer's velocity. */
 const SHARE = 0.22;
 
-export function pointers(canvas: HTMLCanvasElement, stage: Stage, session: Session, { dye, size }: Stirring = {}): () => void {
+export function pointers(
+  canvas: HTMLCanvasElement,
+  stage: Stage,
+  session: Session,
+  { dye, size, hovers = false }: Stirring = {},
+): () => void {
   const held = new Map<number, Held>();
   const down = (event: PointerEvent) => {
     if (event.button !== 0 || !session.info) return;
@@ -40,8 +47,16 @@ export function pointers(canvas: HTMLCanvasElement, stage: Stage, session: Sessi
     void session.branch().catch(() => {});
     if (!session.playing) session.play();
   };
+  /** A pointer without a button. */
+  let over: Held | null = null;
+  const passing = (event: PointerEvent): Held | null => {
+    const stirs = hovers && session.playing && !event.buttons && event.pointerType !== "touch";
+    over = stirs ? (over ?? { last: null, time: 0, busy: false }) : null;
+    return over;
+  };
+  const leave = () => (over = null);
   const move = (event: PointerEvent) => {
-    const own = held.get(event.pointerId);
+    const own = held.get(event.pointerId) ?? passing(event);
     if (!own) return;
     const gas = stage.stirred;
     const at = stage.under(event, own.mass?.point ?? gas?.through);
@@ -58,7 +73,12 @@ export function pointers(canvas: HTMLCanvasElement, stage: Stage, session: Sessi
         .finally(() => (own.busy = false));
       return;
     }
-    if (!gas || own.busy || !own.last) return;
+    if (!gas || own.busy) return;
+    if (!own.last) {
+      own.last = at;
+      own.time = performance.now();
+      return;
+    }
     const seconds = Math.max((performance.now() - own.time) / 1000, 0.004);
     const push = at
       .clone()
@@ -68,7 +88,7 @@ export function pointers(canvas: HTMLCanvasElement, stage: Stage, session: Sessi
     own.time = performance.now();
     own.busy = true;
     void session
-      .stir(gas.name, at.toArray() as Vector, push.toArray() as Vector, stage.width * (size?.() ?? 1 / 30), dye?.())
+      .stir(gas.name, at.toArray() as Vector, push.toArray() as Vector, stage.width * (size?.() ?? 1 / 30), own === over ? 0 : dye?.())
       .catch(() => {})
       .finally(() => (own.busy = false));
   };
@@ -85,10 +105,12 @@ export function pointers(canvas: HTMLCanvasElement, stage: Stage, session: Sessi
   canvas.addEventListener("pointermove", move);
   canvas.addEventListener("pointerup", up);
   canvas.addEventListener("pointercancel", up);
+  canvas.addEventListener("pointerleave", leave);
   return () => {
     canvas.removeEventListener("pointerdown", down, { capture: true });
     canvas.removeEventListener("pointermove", move);
     canvas.removeEventListener("pointerup", up);
     canvas.removeEventListener("pointercancel", up);
+    canvas.removeEventListener("pointerleave", leave);
   };
 }

@@ -6,7 +6,12 @@ import type { Stage } from "./view/stage";
 
 /** A button that saves the picture; `name` without a suffix. */
 export const pictureButton = (stage: Stage, name: () => string): HTMLButtonElement =>
-  iconButton("camera", "Save the picture (PNG)", () => void stage.picture().then((picture) => saveAs(picture, `${name()}.png`)));
+  iconButton("camera", "Save the picture (PNG)", () => {
+    stage.picture().then(
+      (picture) => saveAs(picture, `${name()}.png`),
+      (error) => say(error.message),
+    );
+  });
 
 /** Buttons, and what ends them. Files are called after `name`. */
 export function saving(session: Session, stage: Stage, name: string): { buttons: HTMLElement[]; close: () => void } {

@@ -1,4 +1,5 @@
 /** The scenes that ship with tumble, from the one place where they live, and the pages of theory. */
+import index from "virtual:scenes";
 import { root } from "./share";
 
 const texts = import.meta.glob("../../python/tumble/scenes/*/*.toml", { query: "?raw", import: "default" }) as Record<
@@ -18,6 +19,8 @@ export interface Shipped {
   id: string;
   row: string;
   name: string;
+  title: string;
+  precision: "single" | "double";
   picture: string | null;
   text: () => Promise<string>;
 }
@@ -29,10 +32,10 @@ const idOf = (path: string) =>
     .join("/")
     .replace(/\.toml$/, "");
 
-/** Rows in the order in which a newcomer would look. */
-const ROWS = ["drape", "springs", "structures", "integrators", "contact", "particles", "gravity", "gas", "heat", "failures"];
-export const ROW_TITLES: Record<string, string> = {
-  drape: "Cloth",
+/** Titles of the rows, in the order in which a newcomer would look. */
+const ROWS: Record<string, string> = {
+  cloth: "Cloth and hair",
+  drape: "Draped sheets",
   springs: "Springs",
   structures: "Structures",
   integrators: "Integrators",
@@ -44,17 +47,19 @@ export const ROW_TITLES: Record<string, string> = {
   failures: "Failures",
 };
 
+export const rowTitle = (row: string): string => ROWS[row] ?? row;
+
 export const SCENES: Shipped[] = Object.entries(texts)
   .map(([path, text]) => {
     const id = idOf(path);
     const [row, name] = id.split("/");
-    return { id, row, name, text, picture: pictures[`../pictures/${row}-${name}.webp`] ?? null };
+    return { id, row, name, ...index[id], text, picture: pictures[`../pictures/${row}-${name}.webp`] ?? null };
   })
   .sort((a, b) => order(a.row) - order(b.row) || a.name.localeCompare(b.name));
 
 function order(row: string): number {
-  const k = ROWS.indexOf(row);
-  return k < 0 ? ROWS.length : k;
+  const rows = Object.keys(ROWS);
+  return rows.includes(row) ? rows.indexOf(row) : rows.length;
 }
 
 /** Scenes to go on to from another: those of its row; what flies by itself and what gravitation holds are one. */

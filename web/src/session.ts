@@ -27,6 +27,10 @@ export async function resolved(toml: string): Promise<Record<string, unknown>> {
 /** Numbers of kept frames take at most this much [bytes]. */
 const MEMORY = 192 * 2 ** 20;
 
+/** Frame rates [1/s] at which a scene plays in its own time, and the rate of all others; python/tumble/film.py has them, too. */
+const PLAYED = [10, 60];
+const WATCHED = 24;
+
 type Events = {
   loaded: SceneInfo;
   /** Other values, the same objects. */
@@ -66,7 +70,7 @@ export class Session {
   compares = false;
   /** That way. */
   before: Branch | null = null;
-  /** Simulated time over time, as far as the machine keeps up. */
+  /** Of the pace at which the scene is watched, as far as the machine keeps up. */
   speed = 1;
   playing = false;
   /** Goes on after the last frame of the scene. */
@@ -217,11 +221,17 @@ export class Session {
     else this.play();
   }
 
+  /** Frames a second at which the scene is played: its own, if those can be watched. */
+  get rate(): number {
+    const fps = this.info?.fps ?? WATCHED;
+    return this.speed * (fps >= PLAYED[0] && fps <= PLAYED[1] ? fps : WATCHED);
+  }
+
   private readonly tick = (now: number): void => {
     if (!this.playing || !this.info) return;
     this.ticking = requestAnimationFrame(this.tick);
     // Frames that should have been shown by now; what the machine cannot do is not made up for.
-    this.due = Math.min(this.due + ((now - this.clock) / 1000) * this.info.fps * this.speed, 4 + this.speed);
+    this.due = Math.min(this.due + ((now - this.clock) / 1000) * this.rate, 4 + this.speed);
     this.clock = now;
     if (this.busy || this.due < 1) return;
     if (this.atEnd) {
@@ -581,8 +591,8 @@ export class Session {
     return found;
   }
 
-  stability(): Promise<Stability[]> {
-    return this.queue(() => this.engine.stability(this.world));
+  stability(budget?: number): Promise<Stability[]> {
+    return this.queue(() => this.engine.stability(this.world, budget));
   }
 
   /** Reads the frame again where its columns have changed. */

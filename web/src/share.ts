@@ -32,6 +32,9 @@ export const root = (): string => location.origin + location.pathname.replace(/[
 /** The address that opens a packed scene with the version that made it. */
 export const addressOf = (version: string, packed: string): string => `${root()}v/${version}/#/s/${packed}`;
 
+/** What is wrong with a link or a file, in words that follow "it is damaged: ". */
+class Damage extends Error {}
+
 async function through(data: Uint8Array, stream: CompressionStream | DecompressionStream, most = Infinity): Promise<Uint8Array> {
   const reader = new Blob([data as Uint8Array<ArrayBuffer>]).stream().pipeThrough(stream).getReader();
   const parts: Uint8Array[] = [];
@@ -42,7 +45,7 @@ async function through(data: Uint8Array, stream: CompressionStream | Decompressi
     size += value.length;
     if (size > most) {
       await reader.cancel();
-      throw new Error("it contains more than a scene may have");
+      throw new Damage("it contains more than a scene may have");
     }
     parts.push(value);
   }
@@ -58,14 +61,23 @@ async function through(data: Uint8Array, stream: CompressionStream | Decompressi
 /** The tree of what is shared; the version stands where one looks first. */
 const tree = ({ version, ...rest }: Shared) => ({ tumble: version, ...rest });
 
+/** What a reader of packed bytes found; those of the browser fail in words of their own. */
+async function whole<T>(read: () => Promise<T>): Promise<T> {
+  try {
+    return await read();
+  } catch (error) {
+    throw error instanceof Damage ? error : new Damage("part of it is missing or has been changed");
+  }
+}
+
 const table = (x: unknown): x is Record<string, unknown> => !!x && typeof x === "object" && !Array.isArray(x);
 const frame = (x: unknown): x is number => Number.isInteger(x) && (x as number) >= 0 && (x as number) <= FRAMES;
 
 /** Checks a tree that anyone may have written. */
 function checked(found: unknown): Shared {
-  if (!table(found)) throw new Error("it does not contain a scene");
+  if (!table(found)) throw new Damage("it does not contain a scene");
   const { tumble: version, text, overrides, scene, changes, frame: last, hash } = found;
-  const whole =
+  const complete =
     typeof version === "string" &&
     typeof text === "string" &&
     typeof hash === "string" &&
@@ -78,7 +90,7 @@ function checked(found: unknown): Shared {
     changes.every(
       (c) => table(c) && frame(c.frame) && c.frame <= last && typeof c.path === "string" && c.value !== null && c.value !== undefined,
     );
-  if (!whole) throw new Error("it does not contain a scene");
+  if (!complete) throw new Damage("it does not contain a scene");
   return { version, text, overrides, scene, changes, frame: last, hash } as Shared;
 }
 
@@ -90,9 +102,11 @@ export async function pack(shared: Shared): Promise<string> {
 
 /** Throws where a link is damaged. */
 export async function unpack(link: string): Promise<Shared> {
-  if (link.length > 20 * LONGEST) throw new Error("it exceeds the maximum length of a link");
-  const bytes = bytesOf(link.replace(/-/g, "+").replace(/_/g, "/"));
-  return checked(JSON.parse(new TextDecoder().decode(await through(bytes, new DecompressionStream("deflate-raw"), LARGEST.link))));
+  if (link.length > 20 * LONGEST) throw new Damage("it exceeds the maximum length of a link");
+  return whole(async () => {
+    const bytes = bytesOf(link.replace(/-/g, "+").replace(/_/g, "/"));
+    return checked(JSON.parse(new TextDecoder().decode(await through(bytes, new DecompressionStream("deflate-raw"), LARGEST.link))));
+  });
 }
 
 /** The same as a file, with meshes that no other machine has: JSON, packed as gzip does. */
@@ -105,15 +119,18 @@ export async function toFile(shared: Shared, meshes: Files): Promise<Blob> {
 }
 
 /** Throws where a file is damaged. */
-export async function fromFile(data: Uint8Array): Promise<{ shared: Shared; meshes: Files }> {
-  const found: unknown = JSON.parse(new TextDecoder().decode(await through(data, new DecompressionStream("gzip"), LARGEST.file)));
-  const shared = checked(found);
-  const { meshes } = found as { meshes?: unknown };
-  if (!table(meshes) || !Object.values(meshes).every((text) => typeof text === "string")) throw new Error("it does not contain its meshes");
-  return {
-    shared,
-    meshes: Object.fromEntries(Object.entries(meshes as Record<string, string>).map(([path, text]) => [path, bytesOf(text)])),
-  };
+export function fromFile(data: Uint8Array): Promise<{ shared: Shared; meshes: Files }> {
+  return whole(async () => {
+    const found: unknown = JSON.parse(new TextDecoder().decode(await through(data, new DecompressionStream("gzip"), LARGEST.file)));
+    const shared = checked(found);
+    const { meshes } = found as { meshes?: unknown };
+    if (!table(meshes) || !Object.values(meshes).every((text) => typeof text === "string"))
+      throw new Damage("it does not contain its meshes");
+    return {
+      shared,
+      meshes: Object.fromEntries(Object.entries(meshes as Record<string, string>).map(([path, text]) => [path, bytesOf(text)])),
+    };
+  });
 }
 
 function base64(bytes: Uint8Array): string {

@@ -36,7 +36,7 @@ const sharedSource = (shared: Shared, files: Files, name: string): Source => ({
 export async function source(rest: string): Promise<Source> {
   if (rest.startsWith("s/")) {
     const shared = await unpack(rest.slice(2)).catch((error) => {
-      throw new Error(`The link is damaged: ${error.message ?? error}.`);
+      throw new Error(`The link is damaged: ${error.message}. Copy all of it once more.`);
     });
     return sharedSource(shared, {}, "shared");
   }

@@ -16,6 +16,18 @@ export function transport(session: Session): HTMLElement {
   });
   const clock = h("output", { class: "clock", "aria-label": "Frame and time", "aria-live": "off" });
   const cost = h("span", { class: "cost" });
+  const pace = h("p", { class: "pace" });
+  /** Of a scene that is not played in its own time: how many frames, and how much of its time, a second shows. */
+  const tellPace = () => {
+    const { info, rate } = session;
+    if (!info) return;
+    const times = rate / info.fps;
+    const own = Math.abs(times / session.speed - 1) < 1e-9;
+    pace.hidden = own;
+    pace.textContent = own
+      ? ""
+      : `Plays ${show(rate, 3)} frames a second; the scene has ${show(info.fps, 3)}: one second shows ${show(times, 3)} s of its time.`;
+  };
   const update = () => {
     const frame = session.shown;
     const info = session.info;
@@ -35,6 +47,7 @@ export function transport(session: Session): HTMLElement {
   };
   session.on("frame", update);
   session.on("loaded", update);
+  session.on("loaded", tellPace);
   session.on("playing", (on) => setIcon(play, on ? "pause" : "play", on ? "Pause" : "Play"));
   return h(
     "div",
@@ -57,9 +70,13 @@ export function transport(session: Session): HTMLElement {
         ["4", "4 ×"],
       ],
       "1",
-      (v) => (session.speed = Number(v)),
+      (v) => {
+        session.speed = Number(v);
+        tellPace();
+      },
     ),
     cost,
+    pace,
   );
 }
 

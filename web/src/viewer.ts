@@ -8,7 +8,7 @@ import { keys } from "./transport";
 import { Stage } from "./view/stage";
 
 const HEADS: Record<FailureKind, string> = {
-  scene: "The scene has an error; the previous one continues.",
+  scene: "The scene has an error; the previous one is still here.",
   step: "The simulation failed.",
   limit: "Too large for this tab.",
   crash: "The engine was restarted.",
@@ -25,6 +25,12 @@ export class Viewer {
   readonly alert = h("div", { class: "alert", role: "alert", hidden: true });
   readonly tellLegend: () => void;
   private readonly wait = h("div", { class: "wait" }, "Loading the engine …");
+  private readonly gone = h(
+    "div",
+    { class: "wait gone", role: "alert", hidden: true },
+    h("p", {}, "The browser has taken the graphics away from this page. The picture comes back when the browser gives them back."),
+    h("button", { type: "button", class: "button", onclick: () => location.reload() }, "Reload the page"),
+  );
   private far: HTMLElement | null = null;
   private readonly offKeys: () => void;
   private readonly theme = () => this.stage.theme();
@@ -41,9 +47,17 @@ export class Viewer {
     main.className = "lab-page";
     const legend = legendBox(() => this.stage);
     this.tellLegend = legend.update;
-    this.box = h("div", { class: "stage", tabindex: 0, role: "group", "aria-label": label }, this.canvas, legend.element, this.wait);
+    this.box = h(
+      "div",
+      { class: "stage", tabindex: 0, role: "group", "aria-label": label },
+      this.canvas,
+      legend.element,
+      this.wait,
+      this.gone,
+    );
     const { session } = this;
     const stage = (this.stage = new Stage(this.canvas, turns));
+    stage.onlost = (lost) => (this.gone.hidden = !lost);
     session.wanted = () => stage.wanted;
     session.on("loaded", () => (this.wait.hidden = true));
     session.on("frame", (frame) => (main.dataset.frame = String(frame.index)));

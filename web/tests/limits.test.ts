@@ -6,6 +6,8 @@ import { test } from "node:test";
 import { Kept } from "../src/engine/kept";
 import type { Failure, SceneInfo } from "../src/engine/protocol";
 import { asked, readable } from "../src/engine/worth";
+import { ofSteps, range } from "../src/ranges";
+import { TEXTS, told } from "../src/texts";
 import { Way } from "../src/way";
 
 const PKG = resolve(import.meta.dirname, "../src/engine/pkg");
@@ -271,8 +273,63 @@ test("a failure of a hostile scene is short enough to be shown", () => {
   assert.deepEqual(readable(short), { ...short, path: short.path });
 });
 
+test("a key that is there twice is named, with the first place", () => {
+  const said = (text: string) => {
+    const found = readable(
+      failure(() => made(text)),
+      text,
+    );
+    assert.equal(found.message, `line ${found.line}: ${found.issues[0].message}`);
+    return found.issues[0].message;
+  };
+  assert.match(said("version = 1\n[time]\nfps = 24\n\nfps = 30\n"), /duplicate key: "fps", first in line 3$/);
+  assert.match(said("version = 1\n[time]\nfps = 24\n[time]\nframes = 2\n"), /duplicate key: the table "time", first in line 2$/);
+  assert.match(said('version = 1\n[[sheet]]\nname = "a"\n[sheet]\n'), /the table "sheet", first in line 2$/);
+  assert.match(said("version = 1\ntime.fps = 2\n[time]\nframes = 3\n"), /the table "time"$/);
+  assert.match(said('version = 1\nx = { a = "b = 1, b = 2", c = 1, c = 2 }\n'), /"c"$/);
+  assert.match(said('version = 1\n"a b" = 1\n"a b" = 2\n'), /"a b", first in line 2$/);
+});
+
 test("of the files that were brought only those count that a scene names", () => {
   const [mesh, other] = [new Uint8Array([1]), new Uint8Array([2])];
   assert.deepEqual(asked(["meshes/a.obj", "b.obj", "__proto__"], { "a.obj": mesh, "c.obj": other }), new Map([["meshes/a.obj", mesh]]));
   assert.deepEqual(asked(["x/a.obj"], { "a.obj": other, "x/a.obj": mesh }), new Map([["x/a.obj", mesh]]));
+});
+
+test("what the panel says is in words for people, of every word of scenes", () => {
+  const { $defs } = JSON.parse(engine.schema()) as { $defs: Record<string, any> };
+  const tables = Object.values($defs).flatMap((d) => [d, ...(d.oneOf ?? []), ...(d.anyOf ?? [])]);
+  const all: [string, string][] = tables.flatMap((t) => Object.entries<any>(t.properties ?? {}).map(([k, p]) => [k, p.description ?? ""]));
+  const said = all.map(([key, text]) => told("", key, text)).filter(Boolean);
+  assert.ok(all.length > 400 && said.length > all.length / 2, `${said.length} of ${all.length}`);
+  for (const text of [...said, ...Object.values(TEXTS)]) {
+    assert.doesNotMatch(text, /[`"[\]{}=]|Default|Alternative|[a-z]_[a-z]/, text);
+    assert.match(text, /^[A-Z0-9].*\.$/);
+    assert.ok(text.length <= 141, text);
+  }
+  const keys = new Set(all.map(([key]) => key));
+  assert.deepEqual(
+    Object.keys(TEXTS).filter((name) => !keys.has(name.split(".").pop()!)),
+    [],
+  );
+});
+
+test("sliders run over what a quantity may be, not around its value", () => {
+  const of = (value: number, key: string, unit = "1", limits = {}, whole = false, known?: [number, number]) => {
+    const { low, high, log } = range(value, key, unit, limits, whole, known);
+    assert.ok(low <= value && value <= high && low < high, `${value}: ${low} to ${high}`);
+    assert.ok(!log || low > 0);
+    return [low, high];
+  };
+  for (const friction of [0, 0.1, 0.4, 1.2]) assert.deepEqual(of(friction, "friction", "1", { minimum: 0 }), [0, 1.5]);
+  for (const density of [0.05, 0.2, 2]) assert.deepEqual(of(density, "density", "kg/m²", { exclusiveMinimum: 0 }), [0.01, 10]);
+  assert.deepEqual(of(0.3, "restitution", "1", { minimum: 0, maximum: 1 }), [0, 1]);
+  assert.deepEqual(of(300, "view", "°", { minimum: 1, maximum: 360 }), [1, 360]);
+  assert.deepEqual(of(10, "substeps", "", { minimum: 1, maximum: 1e7 }, true, ofSteps(12)), [1, 50]);
+  assert.deepEqual(of(80, "substeps", "", { minimum: 1, maximum: 1e7 }, true, ofSteps(12)), [1, 100]);
+  // Beyond what is usual, and of either sign.
+  assert.deepEqual(of(1e30, "mass", "kg", { minimum: 0 }), [0, 2e30]);
+  assert.deepEqual(of(-0.7, "height", "m"), [-2, 2]);
+  assert.deepEqual(of(3e-5, "hinge", "N m", { minimum: 0 }), of(1e-3, "hinge", "N m", { minimum: 0 }));
+  assert.deepEqual(of(0.5, "tolerance", "1", { exclusiveMinimum: 0, maximum: 0.6 }), [0, 0.6]);
 });

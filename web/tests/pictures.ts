@@ -1,4 +1,7 @@
-/** Pictures of the gallery: each scene by the app itself, at a frame that shows what it is about. `npm run pictures [ROW/NAME ...]` */
+/**
+ * Pictures of the gallery: each scene by the app itself, at a frame that shows what it is about; and those of `public`, which others show of the
+ * laboratory: `site`. `npm run pictures [ROW/NAME ...] [site]`
+ */
 import { mkdirSync, readFileSync, writeFileSync } from "node:fs";
 import { lab, SCENES, shipped } from "./browser.ts";
 
@@ -7,7 +10,6 @@ const AT: Record<string, number> = {
   "contact/bounce": 30,
   "drape/sheet-on-bunny": 40,
   "drape/sheet-on-ball": 40,
-  "failures/stiff-sheet": 8,
   "gas/bad_solver": 18,
   "gas/bunny": 50,
   "gas/fire": 45,
@@ -25,11 +27,26 @@ const AT: Record<string, number> = {
   "cloth/torn-flag": 60,
   "cloth/twist": 60,
   "integrators/overshoot": 5,
-  "springs/rusty": 33,
+  "springs/rusty": 28,
   "structures/blocks": 16,
   "structures/others": 40,
   "gas/vortex_street": 100,
 };
+
+/** Cameras, position and target, of scenes that are small in their own picture. */
+const NEARER: Record<string, [number[], number[]]> = {
+  "contact/slider": [
+    [1.2, -2.6, 2.6],
+    [1.2, 1.6, 0],
+  ],
+  "springs/rusty": [
+    [0, -11, -5.1],
+    [0, 0, -5.1],
+  ],
+};
+
+/** Scenes of which pieces fly away. */
+const LOOSE = ["cloth/torn-flag"];
 
 const asked = process.argv.slice(2);
 const ids = shipped().filter((id) => !asked.length || asked.includes(id));
@@ -42,10 +59,42 @@ for (const id of ids) {
   try {
     await page.waitForFunction(() => document.getElementById("main")!.dataset.ready, null, { timeout: 120_000 });
     const data = await page.evaluate(
-      async (at) => {
+      async ({ at, nearer: sight, loose }) => {
         const { session, stage } = (window as any).tumble;
+        if (sight) {
+          stage.camera.position.set(...sight[0]);
+          stage.controls.target.set(...sight[1]);
+          stage.controls.update();
+        }
         await session.goto(at).catch(() => {});
         stage.again();
+        // From as near as shows all masses whole, and the bodies around which a tall picture is made. Of loose ones some few may be anywhere.
+        const { camera, controls, home } = stage;
+        const tall = !stage.flat && home.shape < 1.5;
+        const point = controls.target.clone();
+        const moved = point.clone();
+        for (let [tries, nearer] = [0, tall]; tries < 40; tries++) {
+          const edge = nearer ? 0.8 : 0.94;
+          let whole = true;
+          camera.updateMatrixWorld();
+          for (const { name, form, topology, body } of stage.things) {
+            const solid = form === "solid" || form === "container";
+            const x = solid ? tall && topology.position?.data : session.shown.columns[name]?.position?.data;
+            if (!x) continue;
+            let outside = 0;
+            for (let i = 0; i < x.length; i += 3) {
+              point.set(x[i], x[i + 1], x[i + 2]);
+              if (solid) point.applyMatrix4(body.object.matrixWorld);
+              if (solid && moved.copy(point).sub(home.target).length() > home.width) continue;
+              point.project(camera);
+              if (Math.abs(point.x) > edge || Math.abs(point.y) > edge) outside++;
+            }
+            if (outside > (loose || (form === "points" && x.length > 90) ? 0.01 * x.length : 0)) whole = false;
+          }
+          if (whole && !nearer) break;
+          if (!whole) nearer = false;
+          stage.nudge(0, 0, nearer ? 1.05 : 1 / 1.05);
+        }
         const blob: Blob = await stage.picture("image/png");
         const image = await createImageBitmap(blob);
         const small = new OffscreenCanvas(480, 270);
@@ -62,7 +111,7 @@ for (const id of ids) {
         const webp = await small.convertToBlob({ type: "image/webp", quality: 0.72 });
         return [...new Uint8Array(await webp.arrayBuffer())];
       },
-      AT[id] ?? Math.round((2 * frames) / 3),
+      { at: AT[id] ?? Math.round((2 * frames) / 3), nearer: NEARER[id], loose: LOOSE.includes(id) },
     );
     writeFileSync(`pictures/${id.replace("/", "-")}.webp`, Uint8Array.from(data));
     console.log(id, data.length);
@@ -70,5 +119,34 @@ for (const id of ids) {
     console.log(id, "FAILED", String(error).slice(0, 200));
   }
   await page.context().close();
+}
+if (!asked.length || asked.includes("site")) {
+  const shot = await own.open("scene/particles/fountain", {
+    viewport: { width: 1700, height: 1100 },
+    reducedMotion: "reduce",
+    colorScheme: "light",
+  });
+  await shot.page.waitForFunction(() => document.getElementById("main")!.dataset.ready, null, { timeout: 120_000 });
+  const preview = await shot.page.evaluate(async () => {
+    const { session, stage } = (window as any).tumble;
+    await session.goto(50);
+    stage.again();
+    const image = await createImageBitmap(await stage.picture("image/png"));
+    const whole = new OffscreenCanvas(1200, 630);
+    const scale = Math.max(1200 / image.width, 630 / image.height);
+    const [w, h] = [scale * image.width, scale * image.height];
+    whole.getContext("2d")!.drawImage(image, 600 - w / 2, 315 - h / 2, w, h);
+    const blob = await whole.convertToBlob({ type: "image/jpeg", quality: 0.82 });
+    return [...new Uint8Array(await blob.arrayBuffer())];
+  });
+  writeFileSync("public/preview.jpg", Uint8Array.from(preview));
+  for (const size of [192, 512]) {
+    await shot.page.setViewportSize({ width: size, height: size });
+    await shot.page.setContent(
+      `<style>body { margin: 0 } svg { display: block; width: 100vw }</style>${readFileSync("public/icon.svg", "utf8")}`,
+    );
+    await shot.page.screenshot({ path: `public/icon-${size}.png` });
+  }
+  await shot.page.context().close();
 }
 await own.close();

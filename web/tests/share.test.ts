@@ -206,7 +206,12 @@ describe("links", () => {
         location.hash = `#/s/${to}`;
       }, link);
       await page.waitForSelector("text=The scene cannot be opened").catch(() => assert.fail(`${what}: it was opened`));
-      assert.match((await page.textContent("#main"))!, /The link is damaged: it|The link is damaged: .+\./, what);
+      const words = (await page.textContent("#main"))!;
+      assert.match(
+        words,
+        /The link is damaged: (it (contains more|does not contain|exceeds)|part of it is missing).+\. Copy all of it/,
+        what,
+      );
     }
     // Refused by the engine: its message, and nothing executed.
     const markup = "<img src=x onerror=window.hit=1>";
@@ -313,9 +318,10 @@ describe("files", () => {
     assert.deepEqual((await fromFile(good)).shared, whole);
     const { page, errors } = await own.open("", STILL);
     const bad: [string, Buffer, RegExp][] = [
-      ["not packed", Buffer.from("{}"), /x\.tumble is damaged/],
-      ["cut off", good.subarray(0, good.length - 12), /x\.tumble is damaged/],
-      ["empty", Buffer.alloc(0), /x\.tumble is damaged/],
+      ["not packed", Buffer.from("{}"), /x\.tumble is damaged: part of it/],
+      ["cut off", good.subarray(0, good.length - 12), /x\.tumble is damaged: part of it/],
+      ["empty", Buffer.alloc(0), /x\.tumble is damaged: part of it/],
+      ["a mesh that is none", gzipSync(gunzipSync(good).toString().replace('"meshes":{}', '"meshes":{"a":"%"}')), /damaged: part of it/],
       ["no scene", gzipSync("[]"), /does not contain a scene/],
       ["no meshes", gzipSync(gunzipSync(good).toString().replace('"meshes":{}', '"meshes":[1]')), /does not contain its meshes/],
       ["a bomb", gzipSync(Buffer.alloc(200 * 2 ** 20)), /more than a scene may have/],
@@ -342,6 +348,8 @@ describe("a site", () => {
       css: "text/css",
       wasm: "application/wasm",
       webp: "image/webp",
+      svg: "image/svg+xml",
+      webmanifest: "application/manifest+json",
     };
     server = createServer((request, response) => {
       const path = new URL(request.url!, "http://x").pathname.replace(/^\/some\/place\//, "");
@@ -372,6 +380,30 @@ describe("a site", () => {
       assert.equal(await page.evaluate(() => (window as any).tumble.engine.version), VERSION);
       assert.deepEqual(errors, []);
       await page.context().close();
+    }
+  });
+
+  it("has a picture, icons and a manifest for those who show or keep its links", () => {
+    const size = (file: string) => {
+      const data = readFileSync(file);
+      if (file.endsWith(".png")) return [data.readUInt32BE(16), data.readUInt32BE(20)];
+      // The frame header of a JPEG.
+      const at = data.indexOf(Buffer.from([0xff, 0xc0]));
+      return [data.readUInt16BE(at + 7), data.readUInt16BE(at + 5)];
+    };
+    for (const folder of [DIST, join(DIST, "v", VERSION)]) {
+      const page = readFileSync(join(folder, "index.html"), "utf8");
+      const of = (pattern: RegExp) => join(folder, pattern.exec(page)?.[1] ?? assert.fail(`no ${pattern} in ${folder}`));
+      assert.deepEqual(size(of(/property="og:image" content="([^"]+)"/)), [1200, 630]);
+      assert.deepEqual(size(of(/rel="apple-touch-icon" href="([^"]+)"/)), [192, 192]);
+      assert.match(readFileSync(of(/rel="icon" href="([^"]+)"/), "utf8"), /<svg/);
+      const manifest = of(/rel="manifest" href="([^"]+)"/);
+      const { icons, start_url } = JSON.parse(readFileSync(manifest, "utf8"));
+      assert.ok(existsSync(join(manifest, "..", start_url, "index.html")));
+      for (const { src, sizes } of icons.filter((i: any) => i.type === "image/png"))
+        assert.equal(size(join(manifest, "..", src)).join("x"), sizes);
+      assert.equal(icons.length, 3);
+      for (const word of ["title", "description", "image:alt"]) assert.match(page, new RegExp(`property="og:${word}" content="[^"]{6,}"`));
     }
   });
 

@@ -27,7 +27,13 @@ LARGEST = 2_000_000
 LONGEST = 100_000
 """Limit of the characters of an address as a program argument."""
 
-_TYPES = {".js": "text/javascript", ".wasm": "application/wasm", ".css": "text/css", ".webp": "image/webp"}
+_TYPES = {
+    ".js": "text/javascript",
+    ".wasm": "application/wasm",
+    ".css": "text/css",
+    ".webp": "image/webp",
+    ".webmanifest": "application/manifest+json",
+}
 
 
 def view(

@@ -119,12 +119,18 @@ export class Engine {
     return ((await this.ask({ type: "hash", world })) as Answer & { type: "hash" }).hash;
   }
 
-  async stability(world = 0): Promise<Stability[]> {
-    return ((await this.ask({ type: "stability", world })) as Answer & { type: "stability" }).stability;
+  /** Of those systems for which it is found within `budget` [ms]. */
+  async stability(world = 0, budget?: number): Promise<Stability[]> {
+    return ((await this.ask({ type: "stability", world, budget })) as Answer & { type: "stability" }).stability;
   }
 
   async cures(world = 0): Promise<Cure[]> {
     return ((await this.ask({ type: "cures", world })) as Answer & { type: "cures" }).cures;
+  }
+
+  /** Fetches the engine of a precision before a scene needs it. */
+  async warm(precision: "single" | "double"): Promise<void> {
+    await this.ask({ type: "warm", precision });
   }
 
   async schema(): Promise<Record<string, unknown>> {

@@ -171,10 +171,12 @@ export type Request = Asked &
     | { type: "stir"; gas: string; position: Vector; velocity: Vector; radius: number; density?: number }
     /** -> hash */
     | { type: "hash" }
-    /** -> stability, of those systems for which it is found in some seconds; takes about as long as some steps */
-    | { type: "stability" }
+    /** -> stability, of those systems for which it is found within `budget` [ms], or some seconds; takes about as long as some steps */
+    | { type: "stability"; budget?: number }
     /** After a failed step. -> cures; takes long */
     | { type: "cures" }
+    /** Fetches the engine of a precision before a scene needs it. -> done */
+    | { type: "warm"; precision: "single" | "double" }
     /** JSON schema of scenes: docs, defaults, ranges; units are under "x-unit". -> schema */
     | { type: "schema" }
     /** Keeps the way that the world went, as it stands, under a number of the page's: the world may then go another. -> hash */

@@ -37,14 +37,26 @@ interface Running {
 const worlds = new Map<number, Running>();
 const modules: Partial<Record<"single" | "double", Promise<Module>>> = {};
 
-/** The engine of a precision; the double one is another module, fetched when a scene first asks for it. */
+/** The engine of a precision: a module of its own, fetched when it is first needed. */
 function engine(precision: "single" | "double"): Promise<Module> {
   modules[precision] ??= (async () => {
-    const module = precision === "single" ? await import("./pkg/single") : ((await import("./pkg/double")) as unknown as Module);
-    await module.default();
-    return module;
+    try {
+      const module = precision === "single" ? await import("./pkg/single") : ((await import("./pkg/double")) as unknown as Module);
+      await module.default();
+      postMessage({ type: "ready", version: module.version() } satisfies Notice);
+      return module;
+    } catch (error) {
+      postMessage({ type: "broken", message: String(error) } satisfies Notice);
+      throw error;
+    }
   })();
   return modules[precision];
+}
+
+/** What a text seems to ask for, before an engine is here that reads it. */
+function seeming(toml: string, overrides: string[]): "single" | "double" {
+  const set = overrides.findLast((o) => /^\s*precision\s*=/.test(o));
+  return /^\s*"?precision"?\s*[=:]\s*["']?double\b/m.test(set ?? toml) ? "double" : "single";
 }
 
 function running(world: number): Running {
@@ -84,8 +96,9 @@ function keep({ world, kept }: Running): void {
 }
 
 async function build(toml: string, overrides: string[], files: Files): Promise<World> {
-  const single = await engine("single");
-  const module = single.precision(toml, overrides) === "double" ? await engine("double") : single;
+  const first = seeming(toml, overrides);
+  const precision = (await engine(first)).precision(toml, overrides) === "double" ? "double" : "single";
+  const module = await engine(precision);
   return new module.World(toml, overrides, new Map(Object.entries(files)));
 }
 
@@ -205,11 +218,14 @@ async function answer(request: Request): Promise<Answer> {
     case "hash":
       return { id, type: "hash", hash: running(number).world.hash() };
     case "stability":
-      return { id, type: "stability", stability: JSON.parse(running(number).world.stability(STABILITY_LIMIT)) };
+      return { id, type: "stability", stability: JSON.parse(running(number).world.stability(request.budget ?? STABILITY_LIMIT)) };
     case "cures":
       return { id, type: "cures", cures: JSON.parse(running(number).world.cures(CURE_LIMIT)) };
+    case "warm":
+      await engine(request.precision);
+      return { id, type: "done" };
     case "schema":
-      return { id, type: "schema", schema: JSON.parse((await engine("single")).schema()) };
+      return { id, type: "schema", schema: JSON.parse((await (modules.single ?? modules.double ?? engine("single"))).schema()) };
     case "park": {
       const at = running(number);
       at.parked.set(request.as, park(at));
@@ -228,8 +244,8 @@ async function answer(request: Request): Promise<Answer> {
 }
 
 /** Exception of the engine: its own failures are JSON; anything else has killed it. */
-function failure(thrown: unknown): Failure {
-  if (typeof thrown === "string") return readable(JSON.parse(thrown) as Failure);
+function failure(thrown: unknown, toml?: string): Failure {
+  if (typeof thrown === "string") return readable(JSON.parse(thrown) as Failure, toml);
   if (thrown instanceof Asked) return { kind: "scene", message: thrown.message, issues: [] };
   const panic = (globalThis as { tumblePanic?: string }).tumblePanic;
   const message = panic ?? (thrown instanceof Error ? thrown.message : String(thrown));
@@ -251,13 +267,8 @@ addEventListener("message", (event: MessageEvent<Request>) => {
     try {
       reply = await answer(event.data);
     } catch (thrown) {
-      reply = { id: event.data.id, type: "failed", failure: failure(thrown) };
+      reply = { id: event.data.id, type: "failed", failure: failure(thrown, event.data.type === "load" ? event.data.toml : "") };
     }
     postMessage(reply, { transfer: buffers(reply) });
   });
 });
-
-engine("single").then(
-  (module) => postMessage({ type: "ready", version: module.version() } satisfies Notice),
-  (error: unknown) => postMessage({ type: "broken", message: String(error) } satisfies Notice),
-);

@@ -154,7 +154,11 @@ export const page: Page = async (main) => {
   document.title = "Fluid · tumble";
   const choices: Choices = { ...START };
   let drawing = false;
-  const viewer = new Viewer(main, "The fluid. Drag to stir; with the keyboard, arrows stir around the ring, space plays.", false);
+  const viewer = new Viewer(
+    main,
+    "The fluid. Move the pointer to stir, drag to add dye; with the keyboard, arrows stir around the ring, space plays.",
+    false,
+  );
   const { session, stage, canvas } = viewer;
   session.endless = true;
   stage.look.field = "density";
@@ -193,15 +197,29 @@ export const page: Page = async (main) => {
   const showView = (v: string) => {
     const space = choices.space !== "plane";
     stage.look.field = v;
-    stage.look.arrows = v === "speed" && !space;
-    stage.look.cells = v !== "density" && choices.cells <= 128 && !space;
+    arrowsShown.querySelector("input")!.checked = stage.look.arrows = v === "speed" && !space;
     stage.look.dye = v === "density";
     // Only smoke can be looked through.
     stage.look.slice = choices.space === "slice" || (space && v !== "density") ? 1 : null;
+    // The pressure and its like are one number for each cell.
+    showCells(v !== "density");
     void session.refresh().then(() => {
       stage.again();
       viewer.tellLegend();
     });
+  };
+  const cellsShown = check("Cells", false, (on) => {
+    stage.look.cells = on;
+    stage.again();
+  });
+  const arrowsShown = check("Arrows", false, (on) => {
+    stage.look.arrows = on;
+    void session.refresh().then(() => stage.again());
+  });
+  const showCells = (on: boolean) => {
+    cellsShown.querySelector("input")!.checked = stage.look.cells = on;
+    // Smoke in space is looked through.
+    cellsShown.hidden = choices.space !== "plane" && stage.look.slice === null;
   };
   const cells = choice("Cells along", [], "", (v) => {
     choices.cells = Number(v);
@@ -246,14 +264,6 @@ export const page: Page = async (main) => {
     },
     "Remove the walls",
   );
-  const cellsShown = check("Cells", false, (on) => {
-    stage.look.cells = on;
-    stage.again();
-  });
-  const arrowsShown = check("Arrows", false, (on) => {
-    stage.look.arrows = on;
-    void session.refresh().then(() => stage.again());
-  });
   const space = choice(
     "Fluid",
     [
@@ -267,7 +277,7 @@ export const page: Page = async (main) => {
       const plane = v === "plane";
       // Walls are drawn in a plane.
       if (!plane) choices.walls = [];
-      for (const part of [dragging, clear, cellsShown, arrowsShown]) part.hidden = !plane;
+      for (const part of [dragging, clear, arrowsShown]) part.hidden = !plane;
       sliceAt.hidden = plane;
       if (!plane && drawing) {
         drawing = false;
@@ -421,7 +431,6 @@ export const page: Page = async (main) => {
         },
       ),
     ),
-    h("section", { class: "card" }, h("h2", {}, "Picture"), cellsShown, arrowsShown),
   );
   const theory = h("section", { class: "beside", "aria-label": "Theory" });
   main.append(
@@ -434,11 +443,13 @@ export const page: Page = async (main) => {
         h(
           "div",
           { class: "lab-head" },
-          h("div", {}, h("h1", {}, "A fluid to stir"), h("p", { class: "muted" }, "Drag through it, or draw walls.")),
+          h("div", {}, h("h1", {}, "A fluid to stir"), h("p", { class: "muted" }, "Move the pointer to stir it; drag to add dye.")),
           h(
             "div",
             { class: "actions" },
             view,
+            cellsShown,
+            arrowsShown,
             pictureButton(stage, () => "fluid"),
             iconButton("reset", "Restart with these settings", () => void rerun()),
             asSceneButton(() => asScene(scene(choices), 900)),
@@ -524,7 +535,7 @@ export const page: Page = async (main) => {
   for (const name of ["pointerdown", "pointermove", "pointerup", "pointercancel"] as const)
     canvas.addEventListener(name, draw, { capture: true });
   // After those that draw, which may keep an event from it.
-  const offPointers = pointers(canvas, stage, session, { dye: () => 0.2, size: () => 1 / 24 });
+  const offPointers = pointers(canvas, stage, session, { dye: () => 0.2, size: () => 1 / 24, hovers: true });
 
   // By keys: a ring that goes along.
   const cursor = new Vector3();

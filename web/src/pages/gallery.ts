@@ -1,12 +1,20 @@
 /** All scenes that ship, with pictures. */
 import { h, type Page, say } from "../dom";
 import { acceptFiles } from "../drop";
-import { ROW_TITLES, SCENES, type Shipped, titleOf } from "../scenes";
+import { rowTitle, SCENES, type Shipped } from "../scenes";
 
 export const page: Page = async (main) => {
   document.title = "tumble · a physics engine in a browser tab";
-  const texts = await Promise.all(SCENES.map((s) => s.text()));
-  const card = (s: Shipped, title: string) =>
+  // Only those who search wait for the texts.
+  let texts: string[] = [];
+  let asked = false;
+  const fetchTexts = async () => {
+    if (asked) return;
+    asked = true;
+    texts = await Promise.all(SCENES.map((s) => s.text().catch(() => "")));
+    draw();
+  };
+  const card = (s: Shipped) =>
     h(
       "li",
       {},
@@ -16,26 +24,25 @@ export const page: Page = async (main) => {
         s.picture
           ? h("img", { src: s.picture, alt: "", width: 480, height: 270, loading: "lazy", decoding: "async" })
           : h("span", { class: "no-picture" }),
-        h("span", { class: "tile-title" }, title || s.name),
+        h("span", { class: "tile-title" }, s.title || s.name),
         h("span", { class: "tile-id" }, s.id),
       ),
     );
   const rows = [...new Set(SCENES.map((s) => s.row))];
   const list = h("div", { class: "rows" });
-  const filter = h("input", { type: "search", placeholder: "cloth, smoke, orbit …", "aria-label": "Find a scene", oninput: () => draw() });
+  const filter = h("input", {
+    type: "search",
+    placeholder: "cloth, smoke, orbit …",
+    "aria-label": "Find a scene",
+    oninput: () => (draw(), void fetchTexts()),
+  });
   const draw = () => {
     const words = filter.value.toLowerCase().split(/\s+/).filter(Boolean);
-    const hit = (s: Shipped, i: number) => words.every((w) => `${s.id} ${texts[i]} ${ROW_TITLES[s.row] ?? ""}`.toLowerCase().includes(w));
+    const hit = (s: Shipped, i: number) =>
+      words.every((w) => `${s.id} ${s.title} ${texts[i] ?? ""} ${rowTitle(s.row)}`.toLowerCase().includes(w));
     const sections = rows.map((row) => {
       const own = SCENES.map((s, i) => ({ s, i })).filter(({ s, i }) => s.row === row && hit(s, i));
-      return own.length
-        ? h(
-            "section",
-            {},
-            h("h2", {}, ROW_TITLES[row] ?? row),
-            h("ul", { class: "tiles" }, ...own.map(({ s, i }) => card(s, titleOf(texts[i])))),
-          )
-        : null;
+      return own.length ? h("section", {}, h("h2", {}, rowTitle(row)), h("ul", { class: "tiles" }, ...own.map(({ s }) => card(s)))) : null;
     });
     list.replaceChildren(...sections.filter((s) => s !== null));
     if (!list.childElementCount) list.append(h("p", { class: "muted" }, "No scene matches."));

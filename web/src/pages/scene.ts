@@ -260,11 +260,13 @@ export const page: Page = async (main, rest) => {
     hashBox.textContent = info.hash;
     hashBox.dataset.frame = String(session.latest);
     void cards(topics(info)).then((made) => theoryTab.replaceChildren(...made));
+    void tellLimits();
     void tellFacts();
   });
   session.on("changed", (info) => {
     stage.changed(info);
     panel?.open(info, session.toml, session.overrides);
+    void tellLimits();
     switches.open(info, session.toml);
   });
   session.on("frame", (frame) => {
@@ -315,6 +317,17 @@ export const page: Page = async (main, rest) => {
 
   // Values.
   let panel: Panel | null = null;
+  /** Scenes whose stable steps take longer to find would wait for them. */
+  const QUICK = 250;
+  let tooLong = "";
+  const tellLimits = async () => {
+    if (tooLong === session.toml || !panel) return;
+    const { toml } = session;
+    const start = performance.now();
+    const list = await session.stability(QUICK).catch(() => []);
+    if (!list.length && performance.now() - start > QUICK) tooLong = toml;
+    panel?.limits(list);
+  };
   const change = async (path: string, value: Value, what = `${path} = ${literal(value)}`) => {
     try {
       if (STARTS.test(path)) {
@@ -366,15 +379,14 @@ export const page: Page = async (main, rest) => {
     if (!editor) return;
     const text = editor.text;
     run.disabled = true;
+    const was = session.playing;
+    session.pause();
     try {
-      const was = session.playing;
-      session.pause();
       await session.load(text);
       editor.issues([]);
       issuesBox.replaceChildren();
       alert.hidden = true;
       syncText();
-      if (was) session.play();
     } catch (error) {
       if (!(error instanceof EngineError)) throw error;
       const { failure } = error;
@@ -393,6 +405,7 @@ export const page: Page = async (main, rest) => {
       );
     } finally {
       run.disabled = false;
+      if (was) session.play();
     }
   };
 
@@ -401,10 +414,10 @@ export const page: Page = async (main, rest) => {
     const info = session.info;
     if (!info || factsTab.hidden) return;
     const rows: [string, string][] = [
-      ["Frames", `${info.frames} at ${show(info.fps)} per second`],
+      ["Frames", `${info.frames}, ${show(info.fps)} for each second of the scene's time`],
       ["Precision", info.precision],
       ["Objects", info.objects.map((o) => `${o.name} (${o.kind})`).join(", ")],
-      ["Systems", info.systems.map((s) => `${s.name}: ${s.method}${s.integrator ? `, ${s.integrator}` : ""}`).join("; ")],
+      ["Systems", info.systems.map((s) => `${s.name}: ${[...new Set([s.method, s.integrator])].filter(Boolean).join(", ")}`).join("; ")],
       ["Memory limit", `${show(info.memory / 2 ** 20, 3)} MiB`],
     ];
     const report = session.report;
@@ -517,6 +530,11 @@ export const page: Page = async (main, rest) => {
             }),
           );
       } else {
+        const ruled = check("Cells", look.cells, (on) => {
+          look.cells = on;
+          comparison.again();
+        });
+        ruled.hidden = look.slice === null;
         const at = h("input", {
           type: "range",
           min: 0,
@@ -542,11 +560,12 @@ export const page: Page = async (main, rest) => {
             look.slice === null ? "" : String(look.slice),
             (v) => {
               look.slice = v === "" ? null : Number(v);
-              at.hidden = look.slice === null;
+              at.hidden = ruled.hidden = look.slice === null;
               again();
             },
           ),
           at,
+          ruled,
         );
       }
     }
@@ -619,14 +638,17 @@ export const page: Page = async (main, rest) => {
   };
   const theme = () => comparison.theme();
   addEventListener("themechange", theme);
-  void engine()
-    .schema()
-    .then((found) => {
-      panel = new Panel(found, change);
-      valuesTab.append(panel.element);
-      if (session.info) panel.open(session.info, session.toml, session.overrides);
-    })
-    .catch((error) => valuesTab.append(h("p", {}, String(error.message ?? error))));
+  const makePanel = async () => {
+    try {
+      const made = new Panel(await engine().schema(), change);
+      panel = made;
+      valuesTab.append(made.element);
+      if (session.info) made.open(session.info, session.toml, session.overrides);
+      if (session.info) void tellLimits();
+    } catch (error) {
+      valuesTab.append(h("p", {}, String((error as Error).message)));
+    }
+  };
   void viewer
     .begin(async () => {
       const told = await begin(session, start, (i) => viewer.waiting(`frame ${i} of ${start.shared!.frame}`, () => session.stop()));
@@ -647,6 +669,8 @@ export const page: Page = async (main, rest) => {
       else if (!reducedMotion()) session.play();
     })
     .then((failure) => {
+      // After the scene, whose engine knows it, too.
+      void makePanel();
       if (!failure) return;
       want(failure.missing ?? [], () => dispatchEvent(new Event("hashchange")));
       choose(1);

@@ -493,6 +493,8 @@ export class SpaceField implements Layer {
         uniforms: {
           ...shared,
           stored: { value: new THREE.Vector2(0, 1) },
+          cells: { value: new THREE.Vector3(nx, ny, nz) },
+          lines: { value: false },
           range: { value: new THREE.Vector2(0, 1) },
           map: { value: mapTexture("viridis") },
           dye: { value: false },
@@ -510,8 +512,9 @@ export class SpaceField implements Layer {
     this.cut(null, 0.5);
   }
 
-  /** Shows a slice across an axis, at a share of its length; without an axis the smoke. */
-  cut(axis: number | null, share: number): void {
+  /** Shows a slice across an axis, at a share of its length, with its cells or smooth; without an axis the smoke. */
+  cut(axis: number | null, share: number, cells = false): void {
+    this.slice.material.uniforms.lines.value = cells;
     this.smoke.visible = axis === null;
     this.slice.visible = axis !== null;
     if (axis === null) return;

@@ -124,6 +124,18 @@ const LOOK_UP = /* glsl */ `
       return vec4(texture2D(map, vec2(clamp(share, 0.0, 1.0) * 255.0 / 256.0 + 0.5 / 256.0, 0.5)).rgb, 1.0);
     }`;
 
+/** Lines between cells: a pixel wide, or a quarter of a cell where those are small; none where a cell is hardly a pixel. `p` counts cells. */
+const LINES = /* glsl */ `
+  vec3 ruled(vec3 color, vec3 p) {
+    vec3 px = fwidth(p);
+    // Along an axis that does not change there are none.
+    vec3 near = mix(abs(fract(p - 0.5) - 0.5) / max(px, vec3(1e-6)), vec3(1e3), vec3(lessThan(px, vec3(1e-6))));
+    float most = max(px.x, max(px.y, px.z));
+    float thick = min(0.5, 0.125 / most);
+    float line = clamp(thick + 0.5 - min(near.x, min(near.y, near.z)), 0.0, 1.0) * smoothstep(0.8, 0.55, most);
+    return mix(color, vec3(0.5), 0.45 * line);
+  }`;
+
 /** A field in a plane: cells as they are, or smooth between their middles; lines between cells where they are wide enough. */
 export const PLANE = {
   vertex: /* glsl */ `
@@ -141,6 +153,7 @@ export const PLANE = {
     uniform bool lines;
     varying vec2 place;
     ${LOOK_UP}
+    ${LINES}
     float cell(ivec2 k) { return texelFetch(values, clamp(k, ivec2(0), ivec2(cells) - 1), 0).r; }
     void main() {
       vec2 p = place * cells;
@@ -155,12 +168,7 @@ export const PLANE = {
       } else value = cell(ivec2(floor(p)));
       if (isnan(value)) discard;
       gl_FragColor = paint(value);
-      if (lines) {
-        vec2 px = fwidth(p);
-        vec2 near = abs(fract(p - 0.5) - 0.5) / px;
-        float line = (1.0 - min(min(near.x, near.y), 1.0)) * smoothstep(0.25, 0.12, max(px.x, px.y));
-        gl_FragColor.rgb = mix(gl_FragColor.rgb, vec3(0.5), 0.35 * line);
-      }
+      if (lines) gl_FragColor.rgb = ruled(gl_FragColor.rgb, vec3(p, 0.0));
       #include <colorspace_fragment>
     }`,
 };
@@ -246,10 +254,16 @@ export const SPACE = {
     precision highp sampler3D;
     uniform sampler3D values;
     uniform vec2 stored;
+    uniform vec3 cells;
+    uniform bool lines;
     varying vec3 inside;
     ${LOOK_UP}
+    ${LINES}
     void main() {
-      gl_FragColor = paint(mix(stored.x, stored.y, texture(values, inside).r));
+      vec3 p = inside * cells;
+      vec3 at = lines ? (min(floor(p), cells - 1.0) + 0.5) / cells : inside;
+      gl_FragColor = paint(mix(stored.x, stored.y, texture(values, at).r));
+      if (lines) gl_FragColor.rgb = ruled(gl_FragColor.rgb, p);
       #include <colorspace_fragment>
     }`,
 };

@@ -43,7 +43,8 @@ export class Stage {
   private frame: Frame | null = null;
   private past: (index: number) => Frame | undefined = () => undefined;
   private reach = 1;
-  private home = { position: new THREE.Vector3(), target: new THREE.Vector3(), width: 1 };
+  /** The scene's camera: where it stands, what it looks at, the width that its picture shows there [m], and that over its height. */
+  private home = { position: new THREE.Vector3(), target: new THREE.Vector3(), width: 1, shape: 16 / 9 };
   private dirty = false;
   private readonly light = new THREE.DirectionalLight(0xffffff, 2.1);
   private readonly sky = new THREE.HemisphereLight(0xffffff, 0xb8b2a8, 1.25);
@@ -56,6 +57,9 @@ export class Stage {
   legend: Legend | null = null;
   /** Called after each picture. */
   drawn: () => void = () => {};
+  /** Called when the browser takes the graphics away, and when it gives them back. */
+  onlost: (lost: boolean) => void = () => {};
+  private lost = false;
 
   constructor(
     readonly canvas: HTMLCanvasElement,
@@ -79,9 +83,17 @@ export class Stage {
     this.light.shadow.normalBias = 0.02;
     this.scene.add(this.light, this.light.target, this.sky, this.handle.object);
     this.controls = this.controlled();
+    canvas.addEventListener("webglcontextlost", this.losing);
+    canvas.addEventListener("webglcontextrestored", this.losing);
     this.observer = new ResizeObserver(() => this.resize());
     this.observer.observe(canvas.parentElement ?? canvas);
   }
+
+  private readonly losing = (event: Event): void => {
+    this.lost = event.type === "webglcontextlost";
+    this.onlost(this.lost);
+    this.touch();
+  };
 
   private controlled(): OrbitControls {
     const controls = new OrbitControls(this.camera, this.canvas);
@@ -93,6 +105,7 @@ export class Stage {
 
   dispose(): void {
     this.observer.disconnect();
+    for (const name of ["webglcontextlost", "webglcontextrestored"]) this.canvas.removeEventListener(name, this.losing);
     this.clear();
     this.handle.dispose();
     this.depths.dispose();
@@ -332,6 +345,8 @@ export class Stage {
     const goal = Array.isArray(words.target) ? new THREE.Vector3(...(words.target as Vector)) : middle;
     const flat = this.info.dimension === 2;
     const [w, hgt] = this.size();
+    const [across, down] = (words.resolution ?? [16, 9]) as [number, number];
+    const shape = across / down;
     const wasFlat = (this.camera as THREE.OrthographicCamera).isOrthographicCamera;
     if (keep && !!wasFlat === flat) return;
     if (!!wasFlat !== flat) {
@@ -343,31 +358,31 @@ export class Stage {
     if (flat) {
       const top = this.info.plane === "xy";
       this.camera.up.set(0, top ? 1 : 0, top ? 0 : 1);
-      const across = size.x;
       const tall = top ? size.y : size.z;
       // With grids all of them must be seen, as large as they can.
       const grids = this.things.some((t) => t.grid);
-      const width = wish && !grids ? 2 * tan * wish.distanceTo(goal) : Math.max(across, (tall * w) / hgt) * (grids ? 1.02 : 1.12);
+      const width = wish && !grids ? 2 * tan * wish.distanceTo(goal) : Math.max(size.x, (tall * w) / hgt) * (grids ? 1.02 : 1.12);
       this.home = {
         position: goal.clone().add(top ? new THREE.Vector3(0, 0, 10 * this.reach + 1) : new THREE.Vector3(0, -10 * this.reach - 1, 0)),
         target: goal.clone(),
         width,
+        // What is fitted is fitted to this window.
+        shape: wish && !grids ? shape : w / hgt,
       };
     } else {
       this.camera.up.set(0, 0, 1);
       let position = wish;
       if (!position) {
         const from = new THREE.Vector3(0.42, -1, 0.4).normalize();
-        const distance = (1.12 * Math.max(size.x * 0.55 + size.y * 0.25, (size.z * 0.55 + size.y * 0.2) * (16 / 9))) / tan + 0.35 * size.y;
+        const distance = (1.12 * Math.max(size.x * 0.55 + size.y * 0.25, (size.z * 0.55 + size.y * 0.2) * shape)) / tan + 0.35 * size.y;
         position = goal.clone().addScaledVector(from, Math.max(distance, 1e-6));
       }
       if (position.distanceTo(goal) < 1e-9) position.y -= 1;
       // Straight from above there is no up; a hair beside it there is.
-      const down = goal.clone().sub(position);
-      if (Math.hypot(down.x, down.y) < 1e-6 * down.length())
-        position = position.clone().add(new THREE.Vector3(0, -1e-3 * down.length(), 0));
+      const way = goal.clone().sub(position);
+      if (Math.hypot(way.x, way.y) < 1e-6 * way.length()) position = position.clone().add(new THREE.Vector3(0, -1e-3 * way.length(), 0));
       const distance = position.distanceTo(goal);
-      this.home = { position: position.clone(), target: goal.clone(), width: 2 * tan * distance };
+      this.home = { position: position.clone(), target: goal.clone(), width: 2 * tan * distance, shape };
       (this.camera as THREE.PerspectiveCamera).near = distance * 0.01;
       (this.camera as THREE.PerspectiveCamera).far = distance * 60;
     }
@@ -380,7 +395,7 @@ export class Stage {
     this.controls.target.copy(this.home.target);
     this.camera.zoom = 1;
     const shine = this.home.target;
-    const span = Math.max(this.home.width * 0.75, 1e-6);
+    const span = Math.max(this.seen * 0.75, 1e-6);
     const away = this.home.position.clone().sub(shine);
     const left = new THREE.Vector3()
       .crossVectors(new THREE.Vector3(0, 0, 1), away)
@@ -402,6 +417,12 @@ export class Stage {
     this.resize();
   }
 
+  /** Width that the window shows at the target [m]: all of the scene's picture, whose shape may be another. */
+  private get seen(): number {
+    const [w, hgt] = this.size();
+    return this.home.width * Math.max(1, w / hgt / this.home.shape);
+  }
+
   private size(): [number, number] {
     const host = this.canvas.parentElement ?? this.canvas;
     return [Math.max(host.clientWidth, 16), Math.max(host.clientHeight, 16)];
@@ -414,7 +435,7 @@ export class Stage {
     this.renderer.setSize(w, hgt, false);
     const aspect = w / hgt;
     if (this.camera instanceof THREE.OrthographicCamera) {
-      const half = 0.5 * Math.max(this.home.width, 1e-9);
+      const half = 0.5 * Math.max(this.seen, 1e-9);
       // An element as wide as the box may be taller than the window.
       const box = this.bounds().getSize(new THREE.Vector3());
       const tall = this.info?.plane === "xy" ? box.y : box.z;
@@ -427,10 +448,8 @@ export class Stage {
       this.camera.near = -1e3 * this.reach;
       this.camera.far = 1e3 * this.reach + 100;
     } else {
-      const tan = (0.5 * this.home.width) / Math.max(this.home.position.distanceTo(this.home.target), 1e-9);
-      // The scene's angle holds for pictures of 16:9; taller windows see as much from left to right, wider ones as much from top to bottom.
-      const tall = (tan * 9) / 16;
-      this.camera.fov = (2 * Math.atan(aspect > 16 / 9 ? tall : tan / aspect) * 180) / Math.PI;
+      const tan = (0.5 * this.seen) / Math.max(this.home.position.distanceTo(this.home.target), 1e-9);
+      this.camera.fov = (2 * Math.atan(tan / aspect) * 180) / Math.PI;
       this.camera.aspect = aspect;
     }
     this.camera.updateProjectionMatrix();
@@ -449,6 +468,7 @@ export class Stage {
 
   render(): void {
     this.dirty = false;
+    if (this.lost) return;
     this.renderer.getDrawingBufferSize(PIXELS.value);
     this.depths.draw(this.renderer, this.scene, this.camera, PIXELS.value);
     this.renderer.render(this.scene, this.camera);
@@ -461,7 +481,7 @@ export class Stage {
     this.frame = frame;
     this.shades.take(this.things, frame, this.look.color, this.look.unseen, this.look.links);
     this.legend = this.shades.legend;
-    const far = Math.max(this.home.width * 1.6, 1e-6);
+    const far = Math.max(this.seen * 1.6, 1e-6);
     for (const thing of this.things) {
       const columns = frame.columns[thing.name] ?? {};
       if (thing.plane && thing.at) {
@@ -542,7 +562,7 @@ export class Stage {
         heat.look(warm.data);
         if (heat.high > GLOWING) hot = { values: warm.data, low: 0, high: Math.max(heat.high, 1) };
       }
-      thing.body.cut(this.look.slice, this.look.sliceAt);
+      thing.body.cut(this.look.slice, this.look.sliceAt, this.look.cells);
       if (this.look.slice === null) this.legend = null;
       thing.body.set(
         name,
@@ -675,7 +695,7 @@ export class Stage {
 
   /** Width of what is seen [m]. */
   get width(): number {
-    return this.home.width / this.camera.zoom;
+    return this.seen / this.camera.zoom;
   }
 
   /** Whether the pointer turns the camera now; never where it may not at all. */
@@ -715,6 +735,7 @@ export class Stage {
 
   /** The picture as it is, with its background. */
   async picture(type = "image/png", quality?: number): Promise<Blob> {
+    if (this.lost) throw new Error("There is no picture: the browser has taken the graphics away.");
     this.render();
     const flat = document.createElement("canvas");
     flat.width = this.canvas.width;
