@@ -15,7 +15,7 @@ import pytest
 from conftest import Answer
 from runs import Tree
 
-from tumble import ExportError, Run, _engine
+from tumble import ExportError, Run, _engine, bundled
 from tumble.cli import find, report
 from tumble.cli.console import Progress, seconds, size
 
@@ -314,7 +314,7 @@ def test_scenes_are_run_by_name(shelf: Path, tumble: Command) -> None:
 
 
 def test_shipped_scenes_are_right(tumble: Command) -> None:
-    for name in find.shipped():
+    for name in bundled.shipped():
         assert find.scene(name, None).to_dict()["title"], name
 
 
