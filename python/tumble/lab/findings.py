@@ -162,6 +162,8 @@ def off(share: float, signed: bool = False) -> str:
     sign = ("+" if share >= 0 else "−") if signed else ""
     if abs(share) > 1.0:
         return f"{sign}{number(abs(share), 2)} times the right value"
+    if 0 < abs(share) < 1e-5:
+        return "less than 0.001\u00a0%"
     return f"{sign}{number(100.0 * abs(share), 2)}\u00a0%"
 
 

@@ -129,7 +129,7 @@ def _leave_out(results: Results, words: list[str] | None) -> None:
         except SceneError as error:
             results.left_out[scheme.word] = str(error)
     if not able:
-        raise SceneError(f"no integrator can move this scene: {next(iter(results.left_out.values()))}")
+        raise SceneError(f"no integrator can move this scene: {results.left_out[results.schemes[0].word]}")
     results.schemes = able
 
 
