@@ -21,8 +21,7 @@ from pathlib import Path
 
 from counts import note
 
-from tumble import Scene, StepError, World
-from tumble.cli import find
+from tumble import Scene, StepError, World, bundled
 from tumble.cli.view import mesh_paths
 
 ROOT = Path(__file__).parents[2]
@@ -84,12 +83,12 @@ SLOW = {
 
 
 def every_scene() -> list[Case]:
-    return [Case(name, 21 if name in SLOW else 61) for name in find.shipped()]
+    return [Case(name, 21 if name in SLOW else 61) for name in bundled.shipped()]
 
 
 def scene_of(case: Case) -> Scene:
     """The scene as it ships, on the tier of the case: portable bits are promised everywhere."""
-    return Scene.load(find.scene_file(case.name), _overrides(case))
+    return Scene.load(bundled.scene_file(case.name), _overrides(case))
 
 
 def _overrides(case: Case) -> list[str]:
@@ -187,7 +186,7 @@ def wasm(rows: Sequence[tuple[Row, list[Path]]]) -> None:
         scene = scene_of(row.case)
         job = {
             "name": row.case.name,
-            "text": find.scene_file(row.case.name).read_text(encoding="utf-8"),
+            "text": bundled.scene_file(row.case.name).read_text(encoding="utf-8"),
             "overrides": _overrides(row.case),
             "files": {path: str(Path(scene.folder) / path) for path in mesh_paths(scene)},
             "frames": row.case.frames,

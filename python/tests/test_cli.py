@@ -15,7 +15,7 @@ import pytest
 from conftest import Answer
 from runs import Tree
 
-from tumble import ExportError, Run, _engine
+from tumble import ExportError, Run, _engine, bundled
 from tumble.cli import find, report
 from tumble.cli.console import Progress, seconds, size
 
@@ -282,7 +282,7 @@ def shelf(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, spring: Tree) -> Path
         (folder / name).parent.mkdir(parents=True, exist_ok=True)
         head = f'version = 1\ntitle = "The {name}"\noutput.plot = false\n'
         (folder / f"{name}.toml").write_text(f'{head}[[particles]]\nname = "p"\nposition = [[0, 0, 0]]\n')
-    monkeypatch.setattr(find, "SCENES", folder)
+    monkeypatch.setattr(bundled, "SCENES", folder)
     return folder
 
 
@@ -314,7 +314,7 @@ def test_scenes_are_run_by_name(shelf: Path, tumble: Command) -> None:
 
 
 def test_shipped_scenes_are_right(tumble: Command) -> None:
-    for name in find.shipped():
+    for name in bundled.shipped():
         assert find.scene(name, None).to_dict()["title"], name
 
 
@@ -531,6 +531,7 @@ def test_every_verb_teaches_by_example(tumble: Command) -> None:
         "refine",
         "lab",
         "scenes",
+        "schema",
         "view",
     }
     for verb in [[v] for v in verbs] + [["lab", "integrators"], ["lab", "structures"]]:

@@ -8,7 +8,8 @@ from pathlib import Path
 import pytest
 import typer.main
 
-from tumble.cli import application, find
+from tumble import bundled
+from tumble.cli import application
 
 ROOT = Path(__file__).parents[2]
 PAGE = ROOT / "docs" / "guarantees.md"
@@ -122,13 +123,13 @@ def test_a_command_can_be_given(command: str) -> None:
                 assert re.search(rf"^{target}:", makefile, re.M)
             case ["tumble", verb, scene, *options]:
                 known = {name for option in verbs[verb].params for name in option.opts}
-                assert find.scene_file(scene).is_file()
+                assert bundled.scene_file(scene).is_file()
                 assert {word for word in options if word.startswith("-")} <= known
             case [".venv/bin/python", *rest]:
                 files = [ROOT / word for word in rest if word.endswith(".py")]
                 assert files and all(file.is_file() for file in files)
                 scenes = [word for word in rest if "/" in word and not word.endswith(".py")]
-                assert all(find.scene_file(scene).is_file() for scene in scenes)
+                assert all(bundled.scene_file(scene).is_file() for scene in scenes)
             case ["cd", folder]:
                 assert (ROOT / folder).is_dir()
             case ["node", "--import", "tsx", "--test", file]:

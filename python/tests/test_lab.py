@@ -2,6 +2,8 @@
 
 import csv
 import math
+import re
+import time
 from collections.abc import Callable
 from itertools import pairwise
 from pathlib import Path
@@ -11,7 +13,7 @@ import numpy as np
 import pytest
 from matplotlib.image import imread
 
-from tumble import Scene, SceneError
+from tumble import Scene, SceneError, World
 from tumble.lab import exact, findings, flocks, integrators, patterns, positions, pressure, structures
 from tumble.lab.cells import Purse
 from tumble.lab.limits import Found, largest_steps, stiffest_mode
@@ -681,3 +683,84 @@ def whole(path: Path) -> str:
 def table(path: Path) -> list[dict[str, str]]:
     with path.with_suffix(".csv").open(encoding="utf-8") as file:
         return list(csv.DictReader(file))
+
+
+# What the lab refuses, leaves out, and says
+
+
+@pytest.mark.parametrize(
+    ("name", "said"),
+    [
+        ("finned_plate", "heat in bodies, .* heat.0.scheme"),
+        ("obstacle", "Stable Fluids, which is stepped by a scheme of its own.*tumble lab pressure"),
+        ("bad_solver", "the compressible gas, .*tumble lab compressible"),
+        ("flag_in_a_jet", "Stable Fluids"),
+        ("pool", 'a liquid, particles "water", which position-based dynamics alone can move.*tumble lab positions'),
+    ],
+)
+def test_scenes_without_integrators_to_compare_are_refused_with_what_to_do(name: str, said: str) -> None:
+    with pytest.raises(SceneError, match=said):
+        integrators.study(Scene.load(name))
+
+
+def test_what_runs_under_no_other_integrator_is_refused() -> None:
+    tree: Tree = {
+        "version": 1,
+        "system": [{"method": "position_based"}],
+        "block": [{"name": "b", "size": [1, 1, 1], "resolution": [2, 2, 2], "links": {}, "shape_matching": {}}],
+    }
+    try:
+        World(tree)
+    except SceneError as error:
+        pytest.fail(f"the scene itself is wrong: {error}")
+    with pytest.raises(SceneError, match=r"under no integrator but its own.*tumble refine"):
+        subject(Scene(tree))
+
+
+def test_schemes_that_are_left_out_are_named_with_the_reason(tmp_path: Path) -> None:
+    text = whole(integrators.page(Scene.load("spiral"), tmp_path, budget=1.0))
+    assert re.search(
+        r"Left out: modified_euler, symplectic_euler, .*: need velocities, which tracers do not have", text
+    )
+    results = studied(oscillator(), integrators=["rk4", "verlet"])
+    assert {s.word for s in results.schemes} == {"rk4", "verlet"}
+    assert results.left_out["heun"] == "not asked for" and len(results.left_out) == len(BY_WORD) - 2
+    with pytest.raises(ValueError, match="verlet needs velocities, which tracers do not have"):
+        integrators.study(Scene.load("spiral"), integrators=["verlet"])
+
+
+def test_a_scheme_that_cannot_move_the_scene_is_left_out(monkeypatch: pytest.MonkeyPatch) -> None:
+    own = Subject.world
+
+    def world(self: Subject, scheme: Any, *rest: Any, **more: Any) -> World:
+        if scheme.word == "bdf2":
+            raise SceneError("force[0]: it has no derivative")
+        return own(self, scheme, *rest, **more)
+
+    monkeypatch.setattr(Subject, "world", world)
+    results = studied(oscillator(), integrators=["rk4", "bdf2"])
+    assert [s.word for s in results.schemes] == ["rk4"]
+    assert results.left_out["bdf2"] == "force[0]: it has no derivative"
+    with pytest.raises(SceneError, match=r"no integrator can move this scene: .*no derivative"):
+        studied(oscillator(), integrators=["bdf2"])
+
+
+def test_the_budget_bounds_every_experiment() -> None:
+    """A sheet whose first run alone would take minutes."""
+    sheet = {"name": "s", "size": [1, 1], "resolution": [60, 60], "pin": ["corner 0 0"], "links": {"structural": 1e5}}
+    scene = Scene({"version": 1, "time": {"frames": 240}, "sheet": [sheet]})
+    begin = time.process_time()
+    results = integrators.study(scene, budget=1.0, integrators=["rk4", "implicit_euler", "dormand_prince"])
+    # Threads of this process are counted, too: it has two cores at least for some of it. A single run takes minutes.
+    assert time.process_time() - begin < 20.0
+    assert findings.skipped(results)
+
+
+def test_figures_are_said_properly() -> None:
+    assert findings.per_second(0.0256).replace("\u00a0", " ") == "1 in 39.1 s"
+    assert findings.per_second(1234.0) == "1\u202f230"
+    assert findings.off(13.4) == "13 times the right value"
+    assert findings.off(0.0314) == "3.1\u00a0%" and findings.off(-0.5, signed=True) == "−50\u00a0%"
+    assert findings.off(2e-7) == "less than 0.001\u00a0%" and findings.off(0.0) == "0\u00a0%"
+    for share in (1e-9, 3e-3, 0.7, 20.0, 4e5):
+        assert "e+" not in findings.off(share) and "e-" not in findings.off(share)

@@ -13,8 +13,7 @@ import pytest
 from conftest import Answer
 from runs import Tree
 
-from tumble import Run, Scene, StepError, World, minimal
-from tumble.cli import find
+from tumble import Run, Scene, StepError, World, bundled, minimal
 from tumble.run import simulate
 from tumble.toml import toml
 
@@ -395,10 +394,10 @@ def test_it_goes_with_the_run(exploding: Tree, scene_file: SceneFile, tumble: Co
     assert not file.exists()
 
 
-@pytest.mark.parametrize("name", find.shipped())
+@pytest.mark.parametrize("name", bundled.shipped())
 def test_scenes_are_written_in_few_words(name: str) -> None:
     """Without what goes without saying, and with nothing lost."""
-    file = find.shipped()[name]
+    file = bundled.shipped()[name]
     scene = Scene.load(file).to_dict()
     text = toml(minimal.slim(scene))
     assert Scene(tomllib.loads(text), file.parent).to_dict() == scene

@@ -18,8 +18,8 @@ import pytest
 from conftest import Answer
 from runs import Tree
 
-from tumble import Scene, __version__
-from tumble.cli import find, view
+from tumble import Scene, __version__, bundled
+from tumble.cli import view
 
 Command = Callable[..., Answer]
 SceneFile = Callable[..., Path]
@@ -92,7 +92,7 @@ def test_other_names_and_odd_paths_are_refused(site: str, capfd: pytest.CaptureF
 def test_a_scene_that_ships_is_opened_by_name(built: Path) -> None:
     fragment, meshes = view.address("sheet-on-bunny", None)
     assert fragment == "scene/drape/sheet-on-bunny"
-    assert [path.resolve() for path in meshes.values()] == [find.SCENES / "assets" / "bunny.ply"]
+    assert [path.resolve() for path in meshes.values()] == [bundled.SCENES / "assets" / "bunny.ply"]
 
 
 def test_any_other_scene_is_in_the_link(built: Path, spring: Tree, scene_file: SceneFile) -> None:

@@ -1,9 +1,16 @@
-"""tumble simulates masses, springs, cloth, ropes and solids for computer animation, and for learning how it is done.
+"""tumble simulates masses, springs, cloth, ropes, solids and fluids for computer animation, and for learning how it is done.
 
-from tumble import Scene, World
-world = World(Scene.load("scenes/sheet.toml"))
-world.step()
-world.frame["sheet"]["position"]
+>>> import tumble
+>>> world = tumble.World(tumble.Scene.load("sheet-on-ball"))
+>>> report = world.step()
+>>> world.frame["sheet"]["position"].shape
+(2401, 3)
+
+A run folder holds the frames, for films, plots and other programs:
+
+>>> run = tumble.simulate(tumble.Scene.load("rope"), "out/rope", frames=3)
+>>> run.frame(-1)["rope"]["position"].shape
+(61, 3)
 """
 
 import importlib
@@ -22,6 +29,7 @@ if TYPE_CHECKING:
         repair_mesh,
     )
     from tumble.reader import Run
+    from tumble.run import simulate
 
     __version__: str
 
@@ -37,15 +45,26 @@ __all__ = [
     "load_fabric",
     "load_mesh",
     "repair_mesh",
+    "simulate",
 ]
+
+_MODULES = (
+    "branch", "columns", "compare", "emitters", "expect", "export", "fields", "film", "looks", "measures", "pictures", "plots",
+    "reader", "refine", "run", "slices",
+)  # fmt: skip
+"""Modules for users."""
+
 
 # Looked up when first used: `import tumble` alone loads neither the engine nor NumPy.
 _HOMES = {name: ("tumble._engine", name) for name in __all__}
 _HOMES["Run"] = ("tumble.reader", "Run")
+_HOMES["simulate"] = ("tumble.run", "simulate")
 _HOMES["__version__"] = ("tumble._engine", "version")
 
 
 def __getattr__(name: str) -> Any:
+    if name in _MODULES:
+        return importlib.import_module(f"tumble.{name}")
     if name not in _HOMES:
         raise AttributeError(f"module 'tumble' has no attribute {name!r}")
     module, attribute = _HOMES[name]
@@ -55,4 +74,4 @@ def __getattr__(name: str) -> Any:
 
 
 def __dir__() -> list[str]:
-    return sorted({*globals(), *__all__})
+    return sorted({*globals(), *__all__, *_MODULES})

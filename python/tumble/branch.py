@@ -10,12 +10,13 @@ from typing import Any
 import numpy as np
 
 from tumble._engine import Scene, SceneError, StepError, TumbleError, World
+from tumble.arguments import whole, wrong
 from tumble.columns import KINDS
 from tumble.folder import RunFolder, plain, refuse
 from tumble.lock import alone, ask
 from tumble.reader import Run
 from tumble.recorder import Recorder, Unchanging, describe
-from tumble.run import Broke, Progress, admit, record, return_to_checkpoint
+from tumble.run import Broke, Prepare, Progress, admit, record, return_to_checkpoint, told_custom
 
 Descent = list[dict[str, Any]]
 
@@ -31,13 +32,16 @@ def branch(
     progress: Progress | None = None,
     overwrite: bool = False,
     broke: Broke | None = None,
+    prepare: Prepare | None = None,
 ) -> Run:
     """Goes on from a frame of a run (-1 is the last) in another folder, with changes to its scene ("world.gravity=[0, 0, 0]").
 
     The folder begins with the parent's frames, so that it is a run like any other; its `descent` says where it comes from. The
     state is read from the nearest checkpoint before the frame, or made anew from the start, and simulated on to the frame.
     `frames` is how many to simulate; without it, to the scene's last. Masses and pins cannot change, and where things start has
-    no effect: they are part of the state. `resume`, `overwrite` and `broke` are those of `simulate`.
+    no effect: they are part of the state. `resume`, `overwrite` and `broke` are those of `simulate`. `prepare` is called with
+    each world that is built and gives it the custom forces and integrators of the branch; where the parent had some, they must
+    be those.
 
     Raises SceneError if frame, changes or folder are wrong; StepError if the physics breaks; ExportError if a file cannot be
     written.
@@ -51,11 +55,13 @@ def branch(
         )
     ask(files.path)
     descent = _descent(parent, k, files.path, changes)
-    admit(files, scene, resume, overwrite, descent)
-    world = World(scene, threads)
+    world = _prepared(World(scene, threads), prepare)
+    _has_those_of(world, parent)
+    admit(files, scene, resume, overwrite, descent, world.custom)
     unchanging = Unchanging.of(world)
     with alone(files.path):
-        earlier = admit(files, scene, resume, overwrite, descent)
+        earlier = admit(files, scene, resume, overwrite, descent, world.custom)
+        meant = int(parent.manifest.get("whole_frames", parent.manifest["frames"]))
 
         def begin(how: Callable[[], None]) -> None:
             how()
@@ -63,22 +69,30 @@ def branch(
                 world.reconsider()
 
         if earlier is not None and return_to_checkpoint(world, files):
-            recorder = Recorder(files, world, unchanging, threads, earlier, descent)
+            recorder = Recorder(files, world, unchanging, threads, earlier, descent, whole=meant)
             return record(recorder, lambda: begin(recorder.go_on), progress, broke=broke)
-        _take_over(world, parent, k, threads)
+        _take_over(world, parent, k, threads, prepare)
         for i in range(k):
             RunFolder(parent.folder).check(i, parent.hashes[i])
         if files.is_run():
             files.clear()
-        recorder = Recorder(files, world, unchanging, threads, None, descent)
+        recorder = Recorder(files, world, unchanging, threads, None, descent, whole=meant)
         return record(recorder, lambda: begin(lambda: recorder.branch_off(parent)), progress, broke=broke)
 
 
-def world_at(run: Run, frame: int, threads: int | None = None) -> World:
+def world_at(run: Run, frame: int, threads: int | None = None, prepare: Prepare | None = None) -> World:
     """The world of a run at one of its frames (-1 is the last): from the nearest checkpoint before it, or from the start,
-    simulated on to the frame. Raises SceneError if that is not the state that the run had."""
+    simulated on to the frame. `prepare` gives it the custom forces and integrators that the run had. Raises SceneError if that
+    is not the state that the run had."""
     k = _frame(run, frame)
-    world = World(_own_scene(run), threads)
+    own = run.manifest.get("custom", [])
+
+    def new() -> World:
+        # Those of a branch may not be those of its parent.
+        return _prepared(World(_own_scene(run), threads), prepare if own else None)
+
+    world = new()
+    _has_those_of(world, run)
     files = RunFolder(run.folder)
     # Before that frame its scene was another one.
     start = int(run.descent[-1]["frame"]) if run.descent else 0
@@ -90,13 +104,13 @@ def world_at(run: Run, frame: int, threads: int | None = None) -> World:
         if world.frame_index == kept and world.hash() == run.hashes[kept]:
             break
     else:
-        world = World(world.scene, threads)
+        world = new()
         if run.descent:
             try:
                 parent = Run(lineage(run)[-1])
             except TumbleError as error:
                 raise refuse(run.folder, f"frame {k} must be recomputed from the parent run: {error}") from error
-            _load(world, parent, min(k, start), threads)
+            _load(world, parent, min(k, start), threads, prepare)
     if k > world.frame_index:
         if world.frame_index == start and run.descent and run.descent[-1]["set"]:
             world.reconsider()
@@ -115,6 +129,20 @@ def world_at(run: Run, frame: int, threads: int | None = None) -> World:
         text = f"frame {k} cannot be recomputed to the same bits: {why}; frames with a checkpoint: {there}"
         raise refuse(run.folder, text)
     return world
+
+
+def _prepared(world: World, prepare: Prepare | None) -> World:
+    if prepare is not None:
+        prepare(world)
+    return world
+
+
+def _has_those_of(world: World, run: Run) -> None:
+    """Refuses a world without the custom functions that a run had: it would not go on alike."""
+    missing = [one for one in run.manifest.get("custom", []) if one not in world.custom]
+    if missing:
+        cure = "give `prepare`, a function of a world that adds it, to tumble.branch.branch"
+        raise refuse(run.folder, f"was simulated with {told_custom(missing)}, which no file holds; {cure}")
 
 
 def lineage(run: Run) -> list[Path]:
@@ -162,7 +190,7 @@ def _version() -> str:
 
 def _frame(run: Run, frame: int) -> int:
     n = run.n_frames
-    if not -n <= frame < n:
+    if not -n <= whole(frame, "frame") < n:
         raise refuse(run.folder, f"has no frame {frame}; it has 0 to {n - 1}")
     return frame % n
 
@@ -179,16 +207,16 @@ def _own_scene(run: Run) -> Scene:
 
 def _scene(parent: Run, changes: Sequence[str], frame: int, frames: int | None) -> Scene:
     """The scene of the branch."""
-    more = [] if frames is None else [f"time.frames={frame + frames}"]
+    more = [] if frames is None else [f"time.frames={frame + whole(frames, 'frames', 1)}"]
     own = _own_scene(parent)
     scene = _instead_of_links(own, own.replace(*changes, *more))
     tree = scene.to_dict()
     if tree["time"]["fps"] != parent.fps:
         text = f"{tree['time']['fps']:g}, earlier frames have {parent.fps:g} per second; leave time.fps unchanged"
-        raise _wrong("time.fps", text)
+        raise wrong("time.fps", text)
     if tree["time"]["frames"] <= frame:
         last = tree["time"]["frames"]
-        raise _wrong("time.frames", f"{last}, no frames are left after frame {frame}; request more with --frames")
+        raise wrong("time.frames", f"{last}, no frames are left after frame {frame}; request more with --frames")
     return scene
 
 
@@ -209,12 +237,6 @@ def _instead_of_links(own: Scene, scene: Scene) -> Scene:
 def _default_links(own: Scene, kind: str, surface: Mapping[str, Any]) -> Any:
     alone = {"version": 1, kind: [{**surface, "links": None, "system": None, "pin": []}]}
     return Scene(alone, own.folder).to_dict()[kind][0]["links"]
-
-
-def _wrong(path: str, text: str) -> SceneError:
-    error = SceneError(f"{path}: {text}")
-    error.issues = [{"path": path, "line": None, "message": text}]
-    return error
 
 
 def _descent(parent: Run, frame: int, folder: Path, changes: Sequence[str]) -> Descent:
@@ -242,20 +264,20 @@ def _changes(parent: Run, changes: Sequence[str]) -> bool:
     return bool(after != before)
 
 
-def _take_over(world: World, parent: Run, frame: int, threads: int | None) -> None:
+def _take_over(world: World, parent: Run, frame: int, threads: int | None, prepare: Prepare | None) -> None:
     """Puts the state of the parent's frame into the world of the changed scene."""
     _same_masses(world, parent)
-    _load(world, parent, frame, threads)
+    _load(world, parent, frame, threads, prepare)
     _same_columns(world, parent)
 
 
-def _load(world: World, parent: Run, frame: int, threads: int | None) -> None:
+def _load(world: World, parent: Run, frame: int, threads: int | None, prepare: Prepare | None) -> None:
     """Goes to the state of another run's frame."""
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "state.safetensors"
-        world_at(parent, frame, threads).save(path)
+        world_at(parent, frame, threads, prepare).save(path)
         try:
-            world.load(path)
+            world.load(path, others=True)
         except SceneError as error:
             text = (
                 f"the state of frame {frame} does not fit into the changed scene ({error}). A branch can change forces, "

@@ -9,6 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from tumble._engine import ExportError
+from tumble.arguments import whole
 from tumble.folder import Columns, refuse
 from tumble.recorder import changed
 
@@ -117,7 +118,7 @@ def compare(a: "Run", b: "Run", until: int | None = None, deep: bool = False) ->
     """
     unlike = _alike(a, b)
     n = min(a.n_frames, b.n_frames)
-    n = n if until is None else min(n, until + 1)
+    n = n if until is None else min(n, whole(until, "until", 0) + 1)
     # Hashes of states in two precisions say nothing: then columns alone do.
     mixed = a.scene["precision"] != b.scene["precision"]
     frame, columns = _first(a, b, n, deep or mixed, mixed)

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from tumble import energy
+from tumble import energy, expect
 
 if TYPE_CHECKING:
     from tumble.reader import Run
@@ -21,7 +21,7 @@ _GAINS = ("forward_euler", "modified_euler", "midpoint", "heun")
 
 def of_books(run: "Run") -> list[dict[str, str]]:
     """Code, path and message of each doubt."""
-    found = (*_grew(run), *_unconverged(run), *_too_fast(run)) if run.n_frames else ()
+    found = (*_grew(run), *_unconverged(run), *_too_fast(run), *_other_end(run)) if run.n_frames else ()
     return [{"code": code, "path": "", "message": message} for code, message in found]
 
 
@@ -97,4 +97,15 @@ def _too_fast(run: "Run") -> Iterator[tuple[str, str]]:
             "courant",
             f"the fluid passed up to {reached:.3g} cells in a step, courant is {asked:.3g}: such steps smear; take more "
             "substeps, or leave substeps and step out",
+        )
+
+
+def _other_end(run: "Run") -> Iterator[tuple[str, str]]:
+    """Expectations at the end of runs that were asked to end elsewhere."""
+    if n := expect.skipped(run):
+        frames, meant = run.manifest["frames"], run.manifest["whole_frames"]
+        what = "1 expectation is not checked: it is" if n == 1 else f"{n} expectations are not checked: they are"
+        yield (
+            "other-end",
+            f"{what} meant for frame {meant}, the last of the scene, and this run ends with frame {frames}",
         )

@@ -3,7 +3,7 @@
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, field, replace
-from typing import TYPE_CHECKING, Any
+from typing import Any, Protocol
 
 import numpy as np
 import numpy.typing as npt
@@ -12,12 +12,29 @@ from tumble import measures
 from tumble._engine import SceneError, World
 from tumble.folder import LEDGER
 
-if TYPE_CHECKING:
-    from tumble.reader import Run
-
 Curve = npt.NDArray[np.float64]
 Row = Mapping[str, Any]
 """The numbers of a frame in ledger.csv."""
+
+
+class Recorded(Protocol):
+    """What is judged of a run."""
+
+    @property
+    def manifest(self) -> Mapping[str, Any]:
+        """What run.json says."""
+
+    @property
+    def scene(self) -> Mapping[str, Any]:
+        """The resolved scene."""
+
+    @property
+    def n_frames(self) -> int:
+        """Frames there are; frame 0 is the start."""
+
+    @property
+    def ledger(self) -> Mapping[str, npt.NDArray[Any]]:
+        """Books, one row per frame."""
 
 
 @dataclass(frozen=True)
@@ -178,7 +195,7 @@ def _idle(name: str, frame: int, bound: float) -> Broken:
     return Broken(name, frame, math.nan, bound, _unit(name).strip(), text)
 
 
-def check(run: "Run") -> list[Broken]:
+def check(run: Recorded) -> list[Broken]:
     """The expectations that a run broke: by its frames, and if it went on to its last one, there."""
     expect = run.scene.get("expect", {})
     if not run.n_frames:
@@ -186,8 +203,23 @@ def check(run: "Run") -> list[Broken]:
     bounds = Bounds(expect)
     for row in zip(*(run.ledger[name].tolist() for name in LEDGER[:-1]), strict=True):
         bounds.add(dict(zip(LEDGER, row, strict=False)))
-    whole = run.n_frames > run.manifest["frames"]
+    whole = run.n_frames > run.manifest["frames"] and ends_as_meant(run.manifest)
     return [*bounds.broken, *bounds.idle, *(b for b in (_at_the_end(run, expect) if whole else []) if b is not None)]
+
+
+def ends_as_meant(manifest: Mapping[str, Any]) -> bool:
+    """Whether a run is to end with the frame that expectations at the end are meant for, and not earlier or later."""
+    frames = manifest.get("frames")
+    return bool(frames == manifest.get("whole_frames", frames))
+
+
+def skipped(run: Recorded) -> int:
+    """How many expectations at the end are not looked at, because the run was asked to end elsewhere."""
+    if ends_as_meant(run.manifest):
+        return 0
+    expect = run.scene.get("expect", {})
+    ends = [bound.name for bound in measures.BOUNDS if bound.how in ("last", "exact")]
+    return sum(expect.get(name) is not None for name in ends) + len(expect.get("probe", ()))
 
 
 def blamed(broken: Broken, world: World) -> Broken:
@@ -266,7 +298,7 @@ def _told(culprit: Mapping[str, Any]) -> str:
     return words
 
 
-def _at_the_end(run: "Run", expect: Mapping[str, Any]) -> list[Broken | None]:
+def _at_the_end(run: Recorded, expect: Mapping[str, Any]) -> list[Broken | None]:
     last = run.n_frames - 1
     broken: list[Broken | None] = []
     for name, how in ((b.name, b.how) for b in measures.BOUNDS if b.how in ("last", "exact")):

@@ -1,9 +1,11 @@
 """Fields on grids and the verbs on them, for learning and for checking: what fluids and heat are computed with.
 
-grid = Grid((64, 64), spacing=1 / 64)
-heat = grid.field(lambda x, y: x * y, "cell", unit="K")
-slope_x, slope_y = gradient(heat)
-slope_x.array, slope_x.place
+>>> from tumble.fields import Grid, gradient
+>>> grid = Grid((64, 64), spacing=1 / 64)
+>>> heat = grid.field(lambda x, y: x * y, "cell", unit="K")
+>>> slope_x, slope_y = gradient(heat)
+>>> slope_x.array.shape, slope_x.place, slope_x.unit
+((65, 64), 'face x', 'K/m')
 
 A field knows its place: "cell", "face x", "edge x" (or y, z) or "node"; mixing places raises TumbleError. Vectors are the
 fields of their components, on faces or on edges. Results lie between closed walls; advect and diffuse keep the sides of what

@@ -24,6 +24,7 @@ from typing import IO
 import numpy as np
 
 from tumble._engine import ExportError
+from tumble.arguments import whole
 from tumble.folder import reason, writing
 from tumble.pictures import Picture, Studio, render
 from tumble.pictures.drawn import Thing
@@ -60,13 +61,13 @@ def film(
     Odd sizes grow by a pixel, because of yuv420p. `progress(done, total)` is called after each picture. The file
     appears when it is complete. Raises ExportError.
     """
-    if every < 1:
-        raise ExportError(f"every: {every}, expected >= 1")
+    every = whole(every, "every", 1, ExportError)
     studio = Studio(run, renderer, size)
     width, height = (n + n % 2 for n in studio.camera.size)
     if (width, height) != studio.camera.size:
         studio = Studio(run, studio.renderer, (width, height))
     frames = range(0, run.n_frames, every)
+    processes = None if processes is None else whole(processes, "processes", 1, ExportError)
     pace = rate(run) / every
     goal = Path(path)
     unfinished = goal.with_name(f".{goal.name}.part")

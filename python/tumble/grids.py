@@ -12,6 +12,7 @@ import numpy as np
 import numpy.typing as npt
 
 from tumble._engine import ExportError
+from tumble.bundled import unknown
 from tumble.columns import FACES
 from tumble.columns import unit as described
 
@@ -128,8 +129,8 @@ def shown(grid: Box, table: Table, name: str) -> Array:
     if name in ("speed", "vorticity") and "velocity" in known:
         return np.asarray(_speed(known["velocity"]) if name == "speed" else _curl(grid, known["velocity"]))
     follows = ["speed", "vorticity"] if "velocity" in known else []
-    there = ", ".join(dict.fromkeys([*known, *follows])) or "none"
-    raise ExportError(f'no "{name}" on the grid in this run; there are: {there} (see output.columns of the scene)')
+    there = dict.fromkeys([*known, *follows])
+    raise ExportError(f"{unknown('column on the grid', name, there)} (see output.columns of the scene)")
 
 
 def _speed(velocity: Array) -> Floats:

@@ -6,13 +6,14 @@ import textwrap
 from collections.abc import Iterator, Mapping, Sequence
 from itertools import pairwise
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
 import numpy.typing as npt
 
 from tumble import measures
 from tumble._engine import ExportError
+from tumble.bundled import unknown
 from tumble.expect import energy_changes
 from tumble.folder import writing
 from tumble.pictures.things import Recording
@@ -22,9 +23,24 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-    from tumble.refine import Study
-
 Floats = npt.NDArray[np.float64]
+
+
+class Refined(Protocol):
+    """What is drawn of a scene at several resolutions."""
+
+    @property
+    def runs(self) -> Sequence[Recording | None]:
+        """The run of each level; None where it broke."""
+
+    @property
+    def measures(self) -> Sequence[Any]:
+        """Names, and values at each level."""
+
+    @property
+    def levels(self) -> int:
+        """How many there are."""
+
 
 ROW = 1.4
 """Height of a pair of axes [inch], times its share."""
@@ -113,7 +129,7 @@ def beside(
         return save(figure, path)
 
 
-def convergence(study: "Study", path: str | os.PathLike[str]) -> Path:
+def convergence(study: Refined, path: str | os.PathLike[str]) -> Path:
     """Plots the first measure of the ledger over time at every level, and below it how much each measure changes from one
     level to the next, over its size, beside slopes of order 1, 2 and 4. Raises ExportError."""
     from matplotlib.ticker import NullLocator
@@ -177,7 +193,7 @@ def _column(run: Recording, name: str) -> Floats:
     if name not in books and name == "energy":
         return np.asarray(np.sum([_column(run, part) for part in ENERGIES], axis=0))
     if name not in books:
-        raise ExportError(f'the ledger has no column "{name}"; it has {", ".join(books)}')
+        raise ExportError(unknown("column", name, books))
     return np.asarray(books[name], dtype=float)
 
 

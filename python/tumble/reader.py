@@ -3,6 +3,7 @@
 import json
 import os
 import warnings
+from collections.abc import Iterable
 from functools import cached_property
 from pathlib import Path
 from typing import Any
@@ -10,8 +11,9 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from tumble import _engine
+from tumble import _engine, notebook, tables
 from tumble._engine import ExportError, SceneError
+from tumble.arguments import whole
 from tumble.folder import (
     FORMAT,
     LEDGER,
@@ -27,6 +29,7 @@ from tumble.folder import (
 from tumble.looks import Looks
 from tumble.looks import of as looks_of
 from tumble.soundness import fault_of_arrays, fault_of_columns, fault_of_manifest
+from tumble.tables import Stack
 
 
 def read_manifest(files: RunFolder) -> dict[str, Any]:
@@ -36,7 +39,7 @@ def read_manifest(files: RunFolder) -> dict[str, Any]:
     except OSError as error:
         raise ExportError(f"{files.manifest}: cannot be read ({error.strerror})") from error
     except ValueError as error:
-        raise ExportError(f"{files.manifest}: is damaged ({error}); simulate again with --force") from error
+        raise ExportError(f"{files.manifest}: is damaged ({_unread(error)}); simulate again with --force") from error
     if not isinstance(manifest, dict) or not isinstance(manifest.get("scene"), dict):
         raise refuse(files.path, "run.json is not that of a run")
     if manifest.get("format") != FORMAT:
@@ -45,6 +48,14 @@ def read_manifest(files: RunFolder) -> dict[str, Any]:
     if fault := fault_of_manifest(manifest):
         raise ExportError(f"{files.manifest}: is damaged ({fault}); simulate again with --force")
     return manifest
+
+
+def _unread(error: Exception) -> str:
+    """Why a file of JSON cannot be read, in words for people."""
+    if isinstance(error, OSError):
+        return str(error.strerror or error)
+    line = f" from line {error.lineno} on" if isinstance(error, json.JSONDecodeError) else ""
+    return f"it is no JSON{line}"
 
 
 class LostFrames(UserWarning):
@@ -137,7 +148,7 @@ class Run:
         try:
             described: dict[str, dict[str, dict[str, Any]]] = json.loads(self._files.columns.read_bytes())
         except (OSError, ValueError) as error:
-            raise ExportError(f"{self._files.columns}: cannot be read ({error})") from error
+            raise ExportError(f"{self._files.columns}: cannot be read ({_unread(error)})") from error
         if fault := fault_of_columns(described):
             raise ExportError(f"{self._files.columns}: is damaged ({fault}); simulate again with --force")
         return described
@@ -157,6 +168,26 @@ class Run:
         path = self._files.frame(self._index(i))
         return self._sound(read_columns(path, self.mark(i)), "frames", path)
 
+    def stack(self, thing: str, column: str) -> Stack:
+        """A column of an object over all frames, shape (frames, ...), of which a frame is read when it is looked at:
+        `run.stack("rope", "position")[:, -1]`. Raises ExportError for names that are not there, and for particles that come and
+        go."""
+        return tables.stack(self, thing, column)
+
+    def to_pandas(self, thing: str | None = None, columns: Iterable[str] | None = None) -> Any:
+        """A pandas.DataFrame of the ledger by frame and time, or of an object by frame, time and element, or id; units are in
+        `attrs["units"]`. Raises ExportError, also where pandas is not installed."""
+        return tables.to_pandas(self, thing, columns)
+
+    def to_xarray(self, things: Iterable[str] | None = None, columns: Iterable[str] | None = None) -> Any:
+        """An xarray.Dataset of the ledger (`energy`) and the columns of objects (`rope.position`) over time, with units. Raises
+        ExportError, also where xarray is not installed."""
+        return tables.to_xarray(self, things, columns)
+
+    def _repr_html_(self) -> str:
+        """What notebooks show."""
+        return notebook.page(self)
+
     def mark(self, i: int) -> str:
         """Header of the file of a frame."""
         return marked(self._index(i), self._rows[i][-1])
@@ -166,7 +197,7 @@ class Run:
         return float(self._rows[self._index(i)][LEDGER.index("time")])
 
     def _index(self, i: int) -> int:
-        if not -self.n_frames <= i < self.n_frames:
+        if not -self.n_frames <= whole(i, "frame") < self.n_frames:
             raise IndexError(f"frame {i} of a run with {self.n_frames} frames")
         return i % self.n_frames
 

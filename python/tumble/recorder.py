@@ -69,13 +69,19 @@ class Recorder:
         threads: int | None,
         earlier: Mapping[str, Any] | None,
         descent: Sequence[Mapping[str, Any]] = (),
+        frames: int | None = None,
+        whole: int | None = None,
+        altered: bool = False,
     ) -> None:
         """`earlier` is the manifest of the run that goes on; `descent` are the runs that this one branches off from, the
-        oldest first."""
+        oldest first. `frames` are simulated instead of the scene's, of which expectations at the end are meant for the one
+        after `whole`. Of a world with an `altered` start its scene alone makes no other."""
         self.files = files
         self.world = world
         self.unchanging = unchanging
         self.scene = world.scene.to_dict()
+        if frames is not None:
+            self.scene["time"]["frames"] = frames
         self.hashes: list[str] = []
         self.tables: list[Table] = []
         self.written = -1
@@ -89,10 +95,12 @@ class Recorder:
         self.manifest: dict[str, Any] = {
             "format": FORMAT,
             "tumble": _engine.version,
+            "commit": _engine.commit,
             "name": files.path.resolve().name,
             "status": "running",
             "failure": None,
             "frames": self.scene["time"]["frames"],
+            "whole_frames": world.scene.whole_frames if whole is None else whole,
             "fps": self.scene["time"]["fps"],
             "seed": self.scene["seed"],
             "precision": self.scene["precision"],
@@ -100,6 +108,8 @@ class Recorder:
             "resumed": int((earlier or {}).get("resumed", -1)) + 1,
             "machine": machine(threads),
             "timings": self.timings,
+            "custom": world.custom,
+            "altered": altered,
             "warnings": world.warnings,
             # Of the state that the run began with.
             "stability": world.stability() if earlier is None else earlier.get("stability", []),
@@ -116,6 +126,8 @@ class Recorder:
         self._make()
         self._open([], [])
         self._record(self.world.frame, {}, 0.0)
+        if self.manifest["altered"]:
+            self.checkpoint()
 
     def branch_off(self, parent: "Run") -> None:
         """Opens a new folder that begins with the frames of another run, up to the one at which the world stands."""
@@ -205,7 +217,7 @@ class Recorder:
         if not path.exists():
             write_checkpoint(self.world, path)
         descent = self.manifest["descent"]
-        start = descent[-1]["frame"] if descent else None
+        start = descent[-1]["frame"] if descent else 0 if self.manifest["altered"] else None
         for old in self.files.checkpoints()[:-KEPT_CHECKPOINTS]:
             if old == start:
                 continue
@@ -216,7 +228,8 @@ class Recorder:
         """Closes a run that went on to its last frame, or ends one of which a bound is broken."""
         whole = self.written >= self.manifest["frames"]
         self.manifest["status"] = "finished" if whole else "failed"
-        self.manifest["probes"] = expect.probes(self.world, self.scene) if whole else []
+        ends = whole and expect.ends_as_meant(self.manifest)
+        self.manifest["probes"] = expect.probes(self.world, self.scene) if ends else []
         self.checkpoint()
         self._write_manifest()
 
@@ -229,7 +242,9 @@ class Recorder:
         self._write_manifest()
 
     def _doubt(self, run: Run) -> None:
-        self.manifest["warnings"] = [*self.world.warnings, *doubts.of_books(run)]
+        # The books know of all frames, the world of those that it has stepped.
+        own = [warning for warning in self.world.warnings if warning["code"] != "unconverged"]
+        self.manifest["warnings"] = [*own, *doubts.of_books(run)]
 
     def _doubt_so_far(self) -> None:
         # Frames that have just been dropped may be counted still.
@@ -238,7 +253,7 @@ class Recorder:
 
     def fail(self, error: StepError, explain: bool = True) -> None:
         """Notes why the physics broke, then, if asked to `explain` it, tries what would have helped, and looks for a minimal
-        scene that breaks in the same way."""
+        scene that breaks in the same way; not of a world that is more than its scene, which no trial would be like."""
         self.stop("failed", str(error), getattr(error, "report", {}))
         if not explain:
             return
@@ -246,14 +261,19 @@ class Recorder:
         # The failure is worth more than its cures, and both more than a smaller scene.
         with suppress(KeyboardInterrupt):
             self._explain(failure)
-            failure["cures"] = cures.cures(self.world, self.scene, failure["report"])
-            with suppress(TumbleError, OSError):
-                self._soften(failure)
-            self._explain(failure)
-            self.stop("failed")
-            with suppress(Exception):
-                self._minimize(failure)
+            if not (self.manifest["custom"] or self.manifest["altered"]):
+                self._cure(failure)
         self.stop("failed")
+
+    def _cure(self, failure: dict[str, Any]) -> None:
+        """Tries changes of the scene, and looks for a smaller one."""
+        failure["cures"] = cures.cures(self.world, self.scene, failure["report"])
+        with suppress(TumbleError, OSError):
+            self._soften(failure)
+        self._explain(failure)
+        self.stop("failed")
+        with suppress(Exception):
+            self._minimize(failure)
 
     def _explain(self, failure: dict[str, Any]) -> None:
         """Notes the likely causes."""

@@ -16,12 +16,14 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from tumble._engine import Scene, SceneError, StepError, World
+from tumble.arguments import whole, wrong
+from tumble.bundled import unknown
 from tumble.columns import KINDS
 from tumble.energy import ADAPTIVE
 from tumble.folder import LEDGER, Columns, RunFolder, cell, write_whole
 from tumble.lock import alone
 from tumble.reader import Run
-from tumble.run import simulate
+from tumble.run import Prepare, simulate
 
 if TYPE_CHECKING:
     import numpy.typing as npt
@@ -136,15 +138,18 @@ def study(
     threads: int | None = None,
     progress: Named | None = None,
     warn: Callable[[list[dict[str, str]]], object] | None = None,
+    prepare: Prepare | None = None,
 ) -> Study:
     """Runs a scene at several resolutions, in `folder`/level-0, level-1 and so on, each twice as fine as the one before, and
     looks where its measures tend to.
 
     `what` names the words that are refined, as `plan` has it, and `measures` what is measured, as `value` has it. `resume`
     keeps levels that were finished, `overwrite` replaces them. `warn` is told, before anything is simulated, which levels have
-    steps that are too long by estimate: code, path and message of each. Raises SceneError if the scene, a path or a measure is
+    steps that are too long by estimate: code, path and message of each. `prepare` is called with the world of each level and
+    gives it custom forces and integrators. Raises SceneError if the scene, a path or a measure is
     wrong.
     """
+    levels = whole(levels, "levels", 3)
     refined, notes = plan(scene, levels, what)
     goal = Path(folder)
     scenes = [scene.replace(*(word.at(k) for word in refined)) for k in range(levels)]
@@ -157,7 +162,7 @@ def study(
     for name in names:
         thing = next((thing for thing in divided if name.startswith(f"{thing}.")), None)
         if thing is not None and re.search(r"@[0-9]+$", name):
-            raise _wrong(
+            raise wrong(
                 name,
                 f'"{thing}" is refined, so that an index is another place at each level; expected max, min or mean',
             )
@@ -167,7 +172,9 @@ def study(
         try:
             too_long = _too_long(World(finer, threads))
         except SceneError as error:
-            raise _wrong(f"level {k}", str(error)) from error
+            if k == 0:
+                raise
+            raise wrong(f"level {k}", str(error)) from error
         doubts += [{"code": "long-steps", "path": f"level {k}", "message": text} for text in too_long]
     if warn is not None:
         warn(doubts)
@@ -179,9 +186,12 @@ def study(
         place = goal / f"level-{k}"
         try:
             shown = progress(f"level {k}") if progress else None
-            done = simulate(
-                finer, place, resume=resume, threads=threads, progress=shown, overwrite=overwrite, cures=False
-            )
+            world: World | Scene = finer
+            if prepare is not None:
+                world = World(finer, threads)
+                prepare(world)
+            own = threads if prepare is None else None
+            done = simulate(world, place, resume=resume, threads=own, progress=shown, overwrite=overwrite, cures=False)
             runs.append(done)
         except StepError as error:
             failures[k] = str(error).splitlines()[0]
@@ -261,7 +271,7 @@ def plan(scene: Scene, levels: int, what: Sequence[str] = ()) -> tuple[list[Refi
         adaptive = [i for i, system in own if system["integrator"] in ADAPTIVE]
         if adaptive:
             cure = f"--what system.{adaptive[0]}.adaptive.tolerance refines it"
-            raise _wrong(
+            raise wrong(
                 f"system.{adaptive[0]}", f"its steps follow a tolerance, which is not refined by default; {cure}"
             )
         paths = [f"system.{i}.substeps" for i in range(len(tree["system"]))]
@@ -284,7 +294,7 @@ def _refined(scene: Scene, tree: Mapping[str, Any], text: str, levels: int) -> R
     except ValueError:
         factor = math.nan
     if number and not 1.0 < factor < 1e6:
-        raise _wrong(text, f"a factor of {number}, expected more than 1")
+        raise wrong(text, f"a factor of {number}, expected more than 1")
     place = _named(tree, path)
     start = _at(tree, place)
     if start is None and place.endswith(".substeps"):
@@ -298,10 +308,10 @@ def _refined(scene: Scene, tree: Mapping[str, Any], text: str, levels: int) -> R
 def _scaled(value: Any, times: str, factor: float, told: str) -> Any:
     """A number times a factor that was given, or divided by it."""
     if isinstance(value, bool) or not isinstance(value, int | float):
-        raise _wrong(told, f"{value!r}, expected a number to refine by a factor")
+        raise wrong(told, f"{value!r}, expected a number to refine by a factor")
     new = value * factor if times == "*" else value / factor
     if isinstance(value, int) and new != round(new):
-        raise _wrong(told, f"{value} is a count, and {new:g} is none")
+        raise wrong(told, f"{value} is a count, and {new:g} is none")
     return int(new) if isinstance(value, int) else new
 
 
@@ -323,7 +333,7 @@ def _finer(path: str, value: Any, told: str) -> Any:
         case list() if value and all(isinstance(n, int) for n in value):
             return [2 * n - 1 if masses else 2 * n for n in value]
     text = f"{value!r}, expected a count, or a length, time or tolerance ({', '.join(_SHORTER)}) to refine"
-    raise _wrong(told, text)
+    raise wrong(told, text)
 
 
 def _named(tree: Mapping[str, Any], path: str) -> str:
@@ -334,19 +344,16 @@ def _named(tree: Mapping[str, Any], path: str) -> str:
         so_far = ".".join(words)
         if isinstance(node, Mapping):
             if word not in node:
-                raise _wrong(
-                    path, f'there is no "{word}"{f" in {so_far}" if so_far else ""}; there are {", ".join(node)}'
-                )
+                raise wrong(path, unknown(f"key{f' of {so_far}' if so_far else ''}", word, node))
             node = node[word]
         elif isinstance(node, list):
             names = [item.get("name") if isinstance(item, Mapping) else None for item in node]
             index = names.index(word) if word in names else int(word) if word.isdigit() else len(node)
             if index >= len(node):
-                there = ", ".join(str(name) for name in names if name) or "none"
-                raise _wrong(path, f'there is no {so_far} "{word}"; there are {there}')
+                raise wrong(path, unknown(so_far, word, [str(name) for name in names if name]))
             node, word = node[index], str(index)
         else:
-            raise _wrong(path, f"{so_far} is {node!r}, there is nothing in it")
+            raise wrong(path, f"{so_far} is {node!r}, there is nothing in it")
         words.append(word)
     return ".".join(words)
 
@@ -367,12 +374,6 @@ def _own_substeps(scene: Scene, tree: Mapping[str, Any], path: str) -> int:
     interval = 1.0 / tree["time"]["fps"] / tree["time"]["exchanges"]
     steps = [float(about["step"]) for about in World(scene).stability() if about["system"] == name]
     return max(1, math.ceil(interval / steps[0] - 1e-6)) if steps and steps[0] > 0.0 else 1
-
-
-def _wrong(path: str, text: str) -> SceneError:
-    error = SceneError(f"{path}: {text}")
-    error.issues = [{"path": path, "line": None, "message": text}]
-    return error
 
 
 # Measures
@@ -402,23 +403,23 @@ def _measured(measure: str, ledger: Mapping[str, "npt.NDArray[np.float64]"], col
     how = how or "end"
     known = [column for column in LEDGER if column not in ("frame", "hash")]
     if name not in known:
-        raise _wrong(measure, f'no column "{name}" of the ledger; there are {", ".join(known)}, and OBJECT.COLUMN')
+        raise wrong(measure, f"{unknown('column of the ledger', name, known)}; or OBJECT.COLUMN")
     if how not in _OVER_TIME:
-        raise _wrong(measure, f'"{how}", expected {", ".join(_OVER_TIME)}')
+        raise wrong(measure, unknown("such value over time", how, _OVER_TIME))
     return float(_OVER_TIME[how](ledger[name]))
 
 
 def _of_object(columns: Columns, measure: str, name: str, how: str) -> float:
     thing = next((known for known in columns if name.startswith(f"{known}.")), None)
     if thing is None:
-        raise _wrong(measure, f"no object of that name; there are {', '.join(columns)}")
+        raise wrong(measure, unknown("object", name.partition(".")[0], columns))
     column, _, axis = name.removeprefix(f"{thing}.").partition(".")
     if column not in columns[thing]:
-        raise _wrong(measure, f'"{thing}" keeps no "{column}"; it keeps {", ".join(columns[thing])}')
+        raise wrong(measure, unknown(f'kept column of "{thing}"', column, columns[thing]))
     array = np.asarray(columns[thing][column], dtype=np.float64)
     if axis:
         if axis not in list("xyzw"[: array.shape[-1]]) or array.ndim < 2:
-            raise _wrong(measure, f'"{axis}" is no part of {column}, which is {array.shape}')
+            raise wrong(measure, f'"{axis}" is no part of {column}, which is {array.shape}')
         array = array[..., "xyzw".index(axis)]
     elif array.ndim == 2 and array.shape[1] <= 4:
         array = np.linalg.norm(array, axis=1)
@@ -426,10 +427,10 @@ def _of_object(columns: Columns, measure: str, name: str, how: str) -> float:
         if not array.size:
             return math.nan
         if int(how) >= array.size:
-            raise _wrong(measure, f"element {how}, expected < {array.size}")
+            raise wrong(measure, f"element {how}, expected < {array.size}")
         return float(array.reshape(-1)[int(how)])
     if how not in _OVER_ELEMENTS:
-        raise _wrong(measure, f'"{how}", expected {", ".join(_OVER_ELEMENTS)} or the index of an element')
+        raise wrong(measure, f'"{how}", expected {", ".join(_OVER_ELEMENTS)} or the index of an element')
     return float(_OVER_ELEMENTS[how](array)) if array.size else math.nan
 
 

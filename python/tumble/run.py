@@ -1,5 +1,6 @@
 """Simulates a scene frame by frame into a run folder."""
 
+import copy
 import json
 import os
 import shlex
@@ -10,6 +11,7 @@ from typing import Any
 
 from tumble import _engine, expect
 from tumble._engine import ExportError, Scene, SceneError, StepError, World
+from tumble.arguments import whole, wrong
 from tumble.folder import LEDGER, RunFolder, plain, read_rows, reason, refuse
 from tumble.interrupts import held
 from tumble.lock import alone, ask
@@ -23,8 +25,12 @@ Broke = Callable[[StepError], None]
 """Called with why the physics broke, before cures are tried."""
 
 
+Prepare = Callable[[World], object]
+"""Adds custom forces and integrators to a world that was built from a scene."""
+
+
 def simulate(
-    scene: Scene | Mapping[str, Any],
+    scene: World | Scene | Mapping[str, Any],
     folder: str | os.PathLike[str],
     frames: int | None = None,
     resume: bool = False,
@@ -34,49 +40,60 @@ def simulate(
     cures: bool = True,
     broke: Broke | None = None,
 ) -> Run:
-    """Simulates a scene into a folder.
+    """Simulates a scene, or a world as it stands at its start, into a folder.
 
-    `frames` overrides the scene's. `resume` goes on where an earlier run in the folder was stopped, to the same bits as
-    if it had not been; without an earlier run it starts one. `overwrite` replaces an earlier run.
-    Where the physics breaks, `cures` are tried and a minimal scene that breaks as well is looked for, which takes as long as
-    many such runs; `broke` is told before.
+    A world is recorded with its custom forces and integrators, with what was written into it, on its own threads, and is at
+    the last frame afterwards. The run says what was custom (`manifest["custom"]`), for no file holds the functions: to go on
+    with it, hand over a world that has them again.
+
+    `frames` overrides the scene's. `resume` goes on where an earlier run in the folder was stopped, to the same bits as if it
+    had not been; without an earlier run it starts one. `overwrite` replaces an earlier run. Where the physics breaks, `cures`
+    are tried and a minimal scene that breaks as well is looked for, which takes as long as many such runs; `broke` is told
+    before. Neither is done for a world that is more than its scene.
 
     Raises SceneError if the scene or the folder is wrong, before anything is written; StepError if the physics breaks;
     ExportError if a file cannot be written. Whatever was finished by then can be read with `Run.open`. A bound of [expect] that
     is broken ends the run after that frame, with status "failed" and the bound and its culprit in `manifest["expectations"]`.
     """
-    scene = scene if isinstance(scene, Scene) else Scene(scene)
-    if frames is not None:
+    frames = None if frames is None else whole(frames, "frames", 1)
+    threads = None if threads is None else whole(threads, "threads", 1)
+    given = None
+    if isinstance(scene, World):
+        given, scene = scene, scene.scene
+        _at_start(given, threads)
+    elif not isinstance(scene, Scene):
+        scene = Scene(scene)
+    if frames is not None and given is None:
         scene = scene.replace(f"time.frames={frames}")
     files = RunFolder(folder)
     ask(files.path)
-    admit(files, scene, resume, overwrite)
-    world = World(scene, threads)
+    admit(files, scene, resume, overwrite, custom=() if given is None else given.custom)
+    world = World(scene, threads) if given is None else given
     expect.probes(world, scene.to_dict())
+    altered = given is not None and World(scene).hash() != given.hash()
     with alone(files.path):
         # Another run may have come and gone meanwhile.
-        earlier = admit(files, scene, resume, overwrite)
-        return _simulate(files, world, threads, progress, earlier, overwrite, cures, broke)
+        earlier = admit(files, scene, resume, overwrite, custom=world.custom)
+        unchanging = Unchanging.of(world)
+        start = None if earlier is None or given is None else copy.copy(given)
+        if earlier is not None and not return_to_checkpoint(world, files):
+            earlier, overwrite = None, True
+            world = World(scene, threads) if start is None else start
+        if earlier is None and overwrite and files.is_run():
+            files.clear()
+        altered = altered or bool((earlier or {}).get("altered"))
+        recorder = Recorder(files, world, unchanging, threads, earlier, frames=frames, altered=altered)
+        return record(recorder, recorder.start if earlier is None else recorder.go_on, progress, cures, broke)
 
 
-def _simulate(
-    files: RunFolder,
-    world: World,
-    threads: int | None,
-    progress: Progress | None,
-    earlier: dict[str, Any] | None,
-    overwrite: bool,
-    cures: bool,
-    broke: Broke | None,
-) -> Run:
-    unchanging = Unchanging.of(world)
-    if earlier is not None and not return_to_checkpoint(world, files):
-        earlier, overwrite = None, True
-        world = World(world.scene, threads)
-    if earlier is None and overwrite and files.is_run():
-        files.clear()
-    recorder = Recorder(files, world, unchanging, threads, earlier)
-    return record(recorder, recorder.start if earlier is None else recorder.go_on, progress, cures, broke)
+def _at_start(world: World, threads: int | None) -> None:
+    """Refuses a world that is on its way, and threads that it cannot take."""
+    if world.frame_index:
+        raise wrong(
+            "world", f"stands at frame {world.frame_index}; a run is recorded from the start, hand over a new one"
+        )
+    if threads is not None:
+        raise wrong("threads", f"{threads}, but the world has threads of its own; say World(scene, threads={threads})")
 
 
 def record(
@@ -127,10 +144,15 @@ def _advance(world: World, recorder: Recorder, progress: Progress | None) -> Non
 
 
 def admit(
-    files: RunFolder, scene: Scene, resume: bool, overwrite: bool, descent: Sequence[Mapping[str, Any]] = ()
+    files: RunFolder,
+    scene: Scene,
+    resume: bool,
+    overwrite: bool,
+    descent: Sequence[Mapping[str, Any]] = (),
+    custom: Sequence[Mapping[str, str]] = (),
 ) -> dict[str, Any] | None:
     """The manifest of the run to go on with, if any; refuses a folder in which something else is. `descent` is that of the
-    branch to be."""
+    branch to be, `custom` the custom functions of the world."""
     try:
         if files.is_free():
             return None
@@ -156,12 +178,22 @@ def admit(
             parent = os.path.normpath(files.path / found[-1]["run"])
             what = f"is a branch of {parent} at frame {found[-1]['frame']}; go on with `{go_on(files.path, manifest)}`"
         raise refuse(files.path, f"{what}, replace it with --force, or choose another folder with --out")
+    if (had := manifest.get("custom", [])) != list(custom):
+        text = f"was simulated with {told_custom(had)}, and is to go on with {told_custom(custom)}"
+        cure = "go on from Python with tumble.simulate(world, folder, resume=True) and a world that has the same"
+        raise refuse(files.path, f"{text}; {cure}")
     # Both scenes as JSON has them, so that 1 and 1.0, lists and tuples compare as equal.
     difference = changed(manifest["scene"], json.loads(json.dumps(plain(scene.to_dict()))))
     if difference is not None:
         text = f"the scene has changed since the run was started: {difference}"
         raise refuse(files.path, f"{text}; start again with --force, or choose another folder with --out")
     return manifest
+
+
+def told_custom(custom: Sequence[Mapping[str, str]]) -> str:
+    """Custom functions in words: `the force pull on system "main"`."""
+    told = [f'the {one["what"]} {one["name"]} on system "{one["system"]}"' for one in custom]
+    return " and ".join(told) or "no custom force or integrator"
 
 
 def return_to_checkpoint(world: World, files: RunFolder) -> bool:

@@ -1,7 +1,11 @@
 """Slices of grids: one picture for each column, with its colours and its unit.
 
-slices(run, "slice.png")                                    everything that the last frame has
-slices(run, "slice.png", ["pressure"], frame=10, axis="z", at=0.5)
+>>> import tumble
+>>> run = tumble.simulate(tumble.Scene.load("finned_plate"), "out/plate", frames=2)
+>>> tumble.slices.slices(run, "slice.png").name          # everything that the last frame has
+'slice.png'
+>>> tumble.slices.slices(run, "start.png", ["temperature"], frame=0).name
+'start.png'
 """
 
 import os
@@ -14,6 +18,8 @@ import numpy as np
 
 from tumble import grids
 from tumble._engine import ExportError
+from tumble.arguments import whole
+from tumble.bundled import unknown
 from tumble.columns import SIGNED
 from tumble.grids import Box, Floats
 from tumble.looks import MAPS
@@ -45,12 +51,12 @@ def slices(
     """Draws columns of an object on a grid in the plane across an axis at a place [m], the middle if not given; those of
     a plane scene lie in one already. `speed` and `vorticity` follow from `velocity`; of the vorticity in space the part
     across the plane is drawn, of other vectors the length. Between cells, values are blended. Raises ExportError."""
-    if not -run.n_frames <= frame < run.n_frames:
+    if not -run.n_frames <= whole(frame, "frame", error=ExportError) < run.n_frames:
         raise ExportError(f"there is no frame {frame}; there are frames 0 to {run.n_frames - 1}")
     frame %= run.n_frames
     name, grid = _object(run, thing)
     if grid.flat == 3 and axis not in AXES:
-        raise ExportError(f'axis: "{axis}", expected "x", "y" or "z"')
+        raise ExportError(unknown("axis", axis, AXES))
     across = AXES.index(axis) if grid.flat == 3 else grid.flat
     place, where = _place(grid, across, at)
     table = run.frame(frame).get(name, {})
@@ -98,7 +104,7 @@ def _object(run: Recording, thing: str | None) -> tuple[str, Box]:
         raise ExportError("the run has nothing on a grid to cut through")
     name = next(iter(found)) if thing is None else thing
     if name not in found:
-        raise ExportError(f'no "{name}" on a grid in this run; there are: {", ".join(found)}')
+        raise ExportError(unknown("object on a grid", name, found))
     return name, found[name]
 
 

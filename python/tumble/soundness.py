@@ -33,7 +33,7 @@ def fault_of_manifest(manifest: Mapping[str, Any]) -> str | None:
     for key, kind in _MANIFEST.items():
         if key in manifest and (not isinstance(manifest[key], kind) or isinstance(manifest[key], bool)):
             return f'"{key}" is {manifest[key]!r}'
-    for key in ("descent", "expectations", "stability"):
+    for key in ("custom", "descent", "expectations", "stability"):
         if not all(isinstance(item, dict) for item in manifest.get(key, [])):
             return f'"{key}" holds something else than tables'
     if any(type(seconds) not in (int, float) for seconds in manifest.get("timings", {}).values()):

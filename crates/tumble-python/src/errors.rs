@@ -2,9 +2,9 @@
 
 use pyo3::exceptions::PyException;
 use pyo3::prelude::*;
-use pyo3::types::PyDict;
+use pyo3::types::{PyDict, PyList};
 use pyo3::{create_exception, types::PyModule};
-use tumble_interface::error::Breakdown;
+use tumble_interface::error::{Breakdown, Issue};
 
 create_exception!(tumble, TumbleError, PyException, "Anything that tumble reports.");
 create_exception!(tumble, SceneError, TumbleError, "The input is wrong. Its text names every place and its cure; `issues` lists them.");
@@ -31,6 +31,25 @@ pub fn scene_error(py: Python<'_>, error: &tumble_interface::SceneError) -> PyEr
         Ok(()) => exception,
         Err(other) => other,
     }
+}
+
+/// A SceneError with the words that overrode a key in the place of a line, where they are to blame: `set` in its issues. Those of the
+/// scene come first.
+pub fn of_overrides(py: Python<'_>, issues: &[(Issue, Option<&str>)]) -> PyErr {
+    let lines = issues.iter().map(|(issue, set)| set.map_or_else(|| issue.to_string(), |set| format!("set {set}: {issue}")));
+    let exception = SceneError::new_err(lines.collect::<Vec<_>>().join("\n"));
+    let fill = || -> PyResult<()> {
+        let list = PyList::empty(py);
+        for (issue, set) in issues {
+            let entry = pythonize::pythonize(py, issue)?.cast_into::<PyDict>()?;
+            if let Some(set) = set {
+                entry.set_item("set", set)?;
+            }
+            list.append(entry)?;
+        }
+        exception.value(py).setattr("issues", list)
+    };
+    fill().err().unwrap_or(exception)
 }
 
 /// A StepError with its report.

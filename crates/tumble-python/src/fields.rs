@@ -1,5 +1,6 @@
 //! Grids, fields and the verbs on them, in double precision.
 
+use crate::arguments::{count, unknown};
 use crate::errors::TumbleError;
 use numpy::{AllowTypeChange, PyArray1, PyArrayDyn, PyArrayLike2, PyArrayLikeDyn, PyArrayMethods, PyUntypedArrayMethods};
 use pyo3::prelude::*;
@@ -33,7 +34,10 @@ fn place(name: &str) -> PyResult<Place> {
         Some(("edge", a)) => axis(a).map(Place::Edge),
         _ => None,
     };
-    found.ok_or_else(|| wrong(format!("place: \"{name}\", expected \"cell\", \"face x\", \"edge x\" (or y, z) or \"node\"")))
+    found.ok_or_else(|| {
+        let known = ["cell", "node", "face x", "face y", "face z", "edge x", "edge y", "edge z"];
+        wrong(unknown("place", name, &known))
+    })
 }
 
 /// A box of cubic cells, with two numbers of cells in a plane, with three in space. Lengths in metres.
@@ -54,13 +58,15 @@ impl Grid {
 impl Grid {
     #[new]
     #[pyo3(signature = (cells, spacing, origin=None, plane="xy", periodic=""))]
-    fn new(cells: Vec<usize>, spacing: f64, origin: Option<Vec<f64>>, plane: &str, periodic: &str) -> PyResult<Self> {
+    fn new(cells: &Any, spacing: f64, origin: Option<Vec<f64>>, plane: &str, periodic: &str) -> PyResult<Self> {
+        let cells = cells.try_iter().map_err(|_| wrong(format!("cells: {}, expected two whole numbers (a plane) or three", cells.get_type())))?;
+        let cells = cells.map(|n| count(&n?, "cells", 1)).collect::<PyResult<Vec<_>>>()?;
         let flat = match (cells.len(), plane) {
             (3, _) => None,
             (2, "xy") => Some(2),
             (2, "xz") => Some(1),
             (2, "yz") => Some(0),
-            (2, other) => return Err(wrong(format!("plane: \"{other}\", expected \"xy\", \"xz\" or \"yz\""))),
+            (2, other) => return Err(wrong(unknown("plane", other, &["xy", "xz", "yz"]))),
             (n, _) => return Err(wrong(format!("cells: {n} numbers, expected two (a plane) or three"))),
         };
         let axes: Vec<usize> = (0..3).filter(|a| flat != Some(*a)).collect();
@@ -351,7 +357,7 @@ fn interpolation(name: &str) -> PyResult<Interpolation> {
         "linear" => Ok(Interpolation::Linear),
         "cubic" => Ok(Interpolation::Cubic),
         "monotone" => Ok(Interpolation::MonotoneCubic),
-        _ => Err(wrong(format!("interpolation: \"{name}\", expected \"linear\", \"cubic\" or \"monotone\""))),
+        _ => Err(wrong(unknown("interpolation", name, &["linear", "cubic", "monotone"]))),
     }
 }
 
@@ -378,27 +384,29 @@ pub fn sample<'py>(py: Python<'py>, field: &Any<'py>, points: &Any<'py>, interpo
 
 /// A field, or vectors on faces, advected by a velocity for h seconds.
 #[pyfunction]
-#[pyo3(signature = (field, velocity, h, trace="rk2", substeps=1, interpolation="linear", corrected=false, turning=false))]
+#[pyo3(signature = (field, velocity, h, trace="rk2", substeps=None, interpolation="linear", corrected=false, turning=false),
+    text_signature = "(field, velocity, h, trace='rk2', substeps=1, interpolation='linear', corrected=False, turning=False)")]
 pub fn advect<'py>(
     py: Python<'py>,
     field: &Any<'py>,
     velocity: &Any<'py>,
     h: f64,
     trace: &str,
-    substeps: usize,
+    substeps: Option<&Any<'py>>,
     interpolation: &str,
     corrected: bool,
     turning: bool,
 ) -> PyResult<Any<'py>> {
+    let substeps = substeps.map_or(Ok(1), |n| count(n, "substeps", 1))?;
     let (f, u) = (parts(field, "advected field")?, parts(velocity, "velocity of an advection")?);
     let trace = match trace {
         "euler" => Trace::Euler,
         "rk2" => Trace::Rk2,
         "rk3" => Trace::Rk3,
-        _ => return Err(wrong(format!("trace: \"{trace}\", expected \"euler\", \"rk2\" or \"rk3\""))),
+        _ => return Err(wrong(unknown("trace", trace, &["euler", "rk2", "rk3"]))),
     };
-    if substeps == 0 || !h.is_finite() {
-        return Err(wrong(format!("advection by {h} s in {substeps} pieces, expected a finite time in 1 or more")));
+    if !h.is_finite() {
+        return Err(wrong(format!("advection by {h} s, expected a finite time")));
     }
     let how = Advection { trace, substeps, interpolation: self::interpolation(interpolation)?, corrected, turning };
     let out = py.detach(|| {

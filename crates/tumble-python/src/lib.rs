@@ -1,5 +1,6 @@
 //! The binding: Scene, World, Frame -> NumPy, and the error tree. No physics.
 
+mod arguments;
 mod arrays;
 mod errors;
 mod fields;
@@ -38,6 +39,7 @@ mod _engine {
     #[pymodule_init]
     fn init(module: &Bound<'_, PyModule>) -> PyResult<()> {
         module.add("version", env!("CARGO_PKG_VERSION"))?;
+        module.add("commit", option_env!("TUMBLE_COMMIT"))?;
         // To compare with the engine of browsers, which has no wider registers.
         if std::env::var("TUMBLE_REGISTERS").is_ok_and(|bits| bits == "128") {
             tumble::math::simd::hold_to(tumble::math::simd::Level::Narrow);

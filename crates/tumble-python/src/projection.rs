@@ -1,5 +1,6 @@
 //! The projection of a velocity by every rung of the ladder, with what was left when.
 
+use crate::arguments::{count, unknown};
 use crate::fields::{Field, checked, parts, wrong};
 use numpy::PyArray1;
 use pyo3::prelude::*;
@@ -168,26 +169,28 @@ impl Projection {
 
 /// The velocity without divergence that is nearest to a given one between walls at rest.                     (pressure.1)
 #[pyfunction]
-#[pyo3(signature = (velocity, open=None, method="multigrid_gradients", tolerance=1e-5, iterations=1000, precision="double"))]
+#[pyo3(signature = (velocity, open=None, method="multigrid_gradients", tolerance=1e-5, iterations=None, precision="double"),
+    text_signature = "(velocity, open=None, method='multigrid_gradients', tolerance=1e-05, iterations=1000, precision='double')")]
 pub fn project(
     py: Python<'_>,
     velocity: &Bound<'_, PyAny>,
     open: Option<&Bound<'_, PyAny>>,
     method: &str,
     tolerance: f64,
-    iterations: usize,
+    iterations: Option<&Bound<'_, PyAny>>,
     precision: &str,
 ) -> PyResult<Projection> {
+    let iterations = iterations.map_or(Ok(1000), |n| count(n, "iterations", 1))?;
     let Some(of_all) = METHODS.iter().position(|m| *m == method) else {
-        return Err(wrong(format!("method: \"{method}\", expected one of \"{}\"", METHODS.join("\", \""))));
+        return Err(wrong(unknown("method", method, &METHODS)));
     };
-    if !(tolerance > 0.0 && iterations > 0) {
-        return Err(wrong(format!("tolerance {tolerance} and {iterations} iterations, expected a tolerance > 0 and 1 iteration or more")));
+    if !(tolerance > 0.0) {
+        return Err(wrong(format!("tolerance: {tolerance}, expected > 0")));
     }
     let solve = match precision {
         "single" => single,
         "double" => double,
-        _ => return Err(wrong(format!("precision: \"{precision}\", expected \"single\" or \"double\""))),
+        _ => return Err(wrong(unknown("precision", precision, &["single", "double"]))),
     };
     let mut u = parts(velocity, "projected velocity")?;
     let grid = checked(u.on_faces("projected velocity"))?;

@@ -1,14 +1,16 @@
 //! Scene: words in, checked; mesh files read.
 
+use crate::arguments::{path_of, text};
 use crate::errors::{self, scene_error};
 use numpy::{PyArray1, PyArray2, PyArrayMethods};
 use pyo3::prelude::*;
-use pyo3::types::{PyBool, PyDict, PyFloat, PyInt, PyList, PyString, PyTuple};
+use pyo3::types::{PyBool, PyDict, PyFloat, PyInt, PyList, PyString, PyTuple, PyType};
+use std::hash::{Hash, Hasher};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use tumble_interface::scene::{MeshRef, Precision};
 use tumble_interface::tree::{Node, Value};
-use tumble_interface::{Assets, Mesh, SceneError};
+use tumble_interface::{Assets, Issue, Mesh, SceneError};
 use tumble_io::assets::{File, Files, fabric_of, mesh_of};
 
 /// A checked scene: what is there, how it moves, what is written out.
@@ -21,21 +23,149 @@ pub struct Scene {
     pub folder: PathBuf,
     /// The tree as it was given, for overrides and for the lines of issues.
     node: Node,
+    /// What overrode its keys; nodes that the k-th has made are on line `SET + k`.
+    sets: Vec<String>,
+    /// Its frames before anything was overridden.
+    frames: u64,
 }
 
+/// Lines from here on are no lines.
+const SET: usize = usize::MAX / 2;
+
 impl Scene {
-    fn from_node(py: Python<'_>, node: Node, folder: PathBuf) -> PyResult<Self> {
-        let result = py.detach(|| -> Result<Self, SceneError> {
-            let mut scene = tumble_interface::Scene::from_tree(&node)?;
-            let assets = tumble_io::assets::assets(&mut scene, &mut Folder(&folder))?;
-            Ok(Self { scene: tumble::scene::resolve(scene), assets, folder, node: node.clone() })
-        });
-        result.map_err(|e| scene_error(py, &node.located(e)))
+    /// The scene of a tree.
+    fn checked(node: &Node, folder: PathBuf, sets: Vec<String>, frames: Option<u64>) -> Result<Self, SceneError> {
+        let mut scene = tumble_interface::Scene::from_tree(node)?;
+        let assets = tumble_io::assets::assets(&mut scene, &mut Folder(&folder))?;
+        let frames = frames.unwrap_or(u64::from(scene.time.frames));
+        Ok(Self { scene: tumble::scene::resolve(scene), assets, folder, node: node.clone(), sets, frames })
+    }
+
+    /// The tree with keys overridden; raises all that is wrong with either. `sets` has overridden keys of it before.
+    fn overridden(
+        py: Python<'_>,
+        mut node: Node,
+        folder: PathBuf,
+        mut sets: Vec<String>,
+        more: Vec<String>,
+        frames: Option<u64>,
+    ) -> PyResult<Self> {
+        let mut issues = Vec::new();
+        for assignment in more {
+            let path = assignment.split('=').next().unwrap_or_default().trim().to_string();
+            let (there, line) = (known(&node, &path), SET + sets.len());
+            match tumble::scene::set_text(&mut node, &assignment) {
+                Ok(()) => mark(&mut node, &path, there, line),
+                Err(error) => issues.extend(error.issues.into_iter().map(|issue| Issue { line: Some(line), ..issue })),
+            }
+            sets.push(assignment);
+        }
+        match py.detach(|| Self::checked(&node, folder, sets.clone(), frames)) {
+            Ok(scene) if issues.is_empty() => return Ok(scene),
+            Ok(_) => {}
+            Err(error) => issues.extend(error.issues),
+        }
+        Err(blamed(py, &node, &sets, SceneError { issues }))
     }
 
     /// The error with the lines of its places.
     pub fn error(&self, py: Python<'_>, error: SceneError) -> PyErr {
-        scene_error(py, &self.node.located(error))
+        blamed(py, &self.node, &self.sets, error)
+    }
+}
+
+/// What is wrong with a text that is no TOML or JSON, in words for those who wrote it, and the line.
+fn unread(text: &str, is_json: bool, mut error: SceneError) -> SceneError {
+    for issue in &mut error.issues {
+        let Some(line) = issue.line else { continue };
+        let said = issue.message.clone();
+        let of = |words: &[&str]| words.iter().any(|word| said.contains(word));
+        let what = match (is_json, of(&["EOF"]), of(&["duplicate key"]), of(&["unclosed"]), of(&["must be quoted"])) {
+            (true, true, ..) => "the file ends before everything that was opened with {, [ or \" is closed".into(),
+            (true, ..) => "this cannot be read as JSON: keys and text stand in double quotes, parts are separated by single commas".to_string(),
+            (_, _, true, ..) => "this key stands here for the second time; leave one of both out".into(),
+            (_, _, _, true, _) => "what is opened here with [, { or a quotation mark is not closed".into(),
+            (.., true) => "text stands in quotation marks: \"text\"; only numbers, true and false do without".into(),
+            _ => "this cannot be read as TOML, which is key = value, [table] and [[item of a list]]".into(),
+        };
+        let shown = text.lines().nth(line.saturating_sub(1)).map(str::trim).filter(|shown| !shown.is_empty());
+        let shown = shown.map(|shown| format!(": {}", shown.chars().take(80).collect::<String>())).unwrap_or_default();
+        *issue = Issue::on(Some(line), "", format!("{what}{shown}"));
+    }
+    error
+}
+
+/// The error with the lines of its places, or with the overrides that stand there.
+fn blamed(py: Python<'_>, node: &Node, sets: &[String], mut error: SceneError) -> PyErr {
+    second_of_a_name(node, &mut error.issues);
+    let issues = node.located(error).issues.into_iter().map(|issue| match issue.line.and_then(|line| line.checked_sub(SET)) {
+        Some(k) => (Issue { line: None, ..issue }, sets.get(k).map(String::as_str)),
+        None => (issue, None),
+    });
+    errors::of_overrides(py, &issues.collect::<Vec<_>>())
+}
+
+/// Puts what is wrong with a name that is there already on the line of the later one: a path alone leads to the first.
+fn second_of_a_name(node: &Node, issues: &mut [Issue]) {
+    let mut seen: Vec<String> = Vec::new();
+    let all: Vec<String> = issues.iter().filter(|issue| issue.message.contains("has this name")).map(|issue| issue.path.clone()).collect();
+    for issue in issues.iter_mut().filter(|issue| issue.message.contains("has this name")) {
+        let Some((kind, name)) = issue.path.strip_suffix("\".name").and_then(|path| path.split_once(" \"")) else { continue };
+        let Some(Node { value: Value::List(items), .. }) = node.entry(kind) else { continue };
+        let lines: Vec<_> = items.iter().filter(|n| n.text("name") == Some(name)).map(|n| n.entry("name").and_then(|n| n.line)).collect();
+        let count = |paths: &[String]| paths.iter().filter(|path| **path == issue.path).count();
+        let at = (lines.len() + count(&seen)).checked_sub(count(&all));
+        issue.line = at.and_then(|at| lines.get(at).copied().flatten());
+        seen.push(issue.path.clone());
+    }
+}
+
+/// The node under a key, or the item of a list by its name or number, as `Node::set` finds it.
+fn step<'a>(node: &'a mut Node, key: &str) -> Option<&'a mut Node> {
+    match &mut node.value {
+        Value::Table(entries) => entries.iter_mut().find(|(k, _)| k == key).map(|(_, n)| n),
+        Value::List(items) => {
+            let named = items.iter().position(|n| n.text("name") == Some(key)).or_else(|| key.parse().ok());
+            let i = named.or_else(|| items.iter().position(|n| key == "main" && n.entry("name").is_none()))?;
+            items.get_mut(i)
+        }
+        _ => None,
+    }
+}
+
+/// How many of the keys of a path are there.
+fn known(node: &Node, path: &str) -> usize {
+    let mut node = node.clone();
+    let mut at = &mut node;
+    for (n, key) in path.split('.').enumerate() {
+        match step(at, key) {
+            Some(next) => at = next,
+            None => return n,
+        }
+    }
+    path.split('.').count()
+}
+
+/// Puts what an override has made, below the keys that were there before, on a line.
+fn mark(node: &mut Node, path: &str, known: usize, line: usize) {
+    let mut at = node;
+    let last = path.split('.').count() - 1;
+    for (n, key) in path.split('.').enumerate() {
+        let Some(next) = step(at, key) else { return };
+        at = next;
+        if n >= known.min(last) {
+            return whole(at, line);
+        }
+    }
+}
+
+/// Puts a node and all below it on a line.
+fn whole(node: &mut Node, line: usize) {
+    node.line = Some(line);
+    match &mut node.value {
+        Value::List(items) => items.iter_mut().for_each(|n| whole(n, line)),
+        Value::Table(entries) => entries.iter_mut().for_each(|(_, n)| whole(n, line)),
+        _ => {}
     }
 }
 
@@ -45,31 +175,29 @@ impl Scene {
     #[pyo3(signature = (tree, folder=None))]
     fn new(py: Python<'_>, tree: &Bound<'_, PyAny>, folder: Option<PathBuf>) -> PyResult<Self> {
         let node = to_node(tree, "", 0).map_err(|e| scene_error(py, &e))?;
-        Self::from_node(py, node, folder.unwrap_or_default())
+        Self::overridden(py, node, folder.unwrap_or_default(), Vec::new(), Vec::new(), None)
     }
 
-    /// Reads a .toml or .json file. `set` overrides keys: "time.fps=30", "sheet.flag.size=[1, 2]". Raises SceneError.
+    /// Reads a .toml or .json file, or a scene that comes with tumble, by its name: "rope". `set` overrides keys:
+    /// "time.fps=30", "sheet.flag.size=[1, 2]". Raises SceneError.
     #[staticmethod]
     #[pyo3(signature = (path, set=Vec::new()))]
     fn load(py: Python<'_>, path: PathBuf, set: Vec<String>) -> PyResult<Self> {
+        let path: PathBuf =
+            if path.is_file() { path } else { py.import("tumble.bundled")?.call_method1("scene_file", (path,))?.extract()? };
         let text = std::fs::read_to_string(&path).map_err(|e| scene_error(py, &SceneError::one("", errors::file_error(&path, &e))))?;
         let is_json = path.extension().is_some_and(|e| e.eq_ignore_ascii_case("json"));
         let node = if is_json { Node::from_json(&text) } else { Node::from_toml(&text) };
-        let mut node = node.map_err(|e| scene_error(py, &e))?;
-        for assignment in set {
-            tumble::scene::set_text(&mut node, &assignment).map_err(|e| scene_error(py, &e))?;
-        }
-        Self::from_node(py, node, path.parent().map(Path::to_path_buf).unwrap_or_default())
+        let node = node.map_err(|e| scene_error(py, &unread(&text, is_json, e)))?;
+        // An error there is told with those of the overrides.
+        let frames = tumble_interface::Scene::from_tree(&node).ok().map(|scene| u64::from(scene.time.frames));
+        Self::overridden(py, node, path.parent().map(Path::to_path_buf).unwrap_or_default(), Vec::new(), set, frames)
     }
 
     /// A copy with keys overridden, as in `load`. Raises SceneError.
     #[pyo3(signature = (*overrides))]
     fn replace(&self, py: Python<'_>, overrides: Vec<String>) -> PyResult<Self> {
-        let mut node = self.node.clone();
-        for assignment in overrides {
-            tumble::scene::set_text(&mut node, &assignment).map_err(|e| scene_error(py, &e))?;
-        }
-        Self::from_node(py, node, self.folder.clone())
+        Self::overridden(py, self.node.clone(), self.folder.clone(), self.sets.clone(), overrides, Some(self.frames))
     }
 
     /// The resolved scene: every default written out, systems included, mesh files with the hash of their content.
@@ -100,7 +228,13 @@ impl Scene {
         let files = scene.mesh_files_mut();
         let place = |file: &MeshRef<'_>| (format!("{}.path", file.place), file.path.to_string());
         let places = files.iter().filter(|file| !file.skinned).map(place);
-        places.map(|(place, path)| (place.clone(), self.node.line_of(&place), path)).collect()
+        places.map(|(place, path)| (place.clone(), self.node.line_of(&place).filter(|line| *line < SET), path)).collect()
+    }
+
+    /// Its frames before any were overridden: what its expectations at the end are meant for.
+    #[getter]
+    fn whole_frames(&self) -> u64 {
+        self.frames
     }
 
     /// JSON Schema of a scene; units are under "x-unit".
@@ -111,6 +245,30 @@ impl Scene {
 
     fn __repr__(&self) -> String {
         format!("Scene(title={:?})", self.scene.title)
+    }
+
+    /// Equal scenes have the same words, defaults written out, and meshes with the same content.
+    fn __eq__(&self, other: &Self) -> bool {
+        self.scene.to_json() == other.scene.to_json()
+    }
+
+    fn __hash__(&self) -> u64 {
+        let mut hasher = std::hash::DefaultHasher::new();
+        (&self.scene.title, self.scene.seed, self.scene.time.frames).hash(&mut hasher);
+        hasher.finish()
+    }
+
+    fn __copy__(slf: Py<Self>) -> Py<Self> {
+        slf
+    }
+
+    fn __deepcopy__(slf: Py<Self>, _memo: &Bound<'_, PyAny>) -> Py<Self> {
+        slf
+    }
+
+    fn __reduce__<'py>(slf: &Bound<'py, Self>) -> PyResult<(Bound<'py, PyType>, (Bound<'py, PyAny>, String))> {
+        let scene = slf.get();
+        Ok((slf.get_type(), (scene.to_dict(slf.py())?, scene.folder())))
     }
 }
 
@@ -148,6 +306,8 @@ fn to_node(value: &Bound<'_, PyAny>, path: &str, depth: usize) -> Result<Node, S
             items.push(to_node(&below, &format!("{path}[{i}]"), depth + 1)?);
         }
         Value::List(items)
+    } else if let Some(path) = path_of(value) {
+        Value::Text(path)
     } else if let Ok(list) = value.call_method0("tolist") {
         return to_node(&list, path, depth + 1);
     } else {
@@ -195,7 +355,8 @@ impl Files for Folder<'_> {
 
 /// The record of a shipped fabric, or of a file, as a dict: name, composition, source, density, stretching and bending.
 #[pyfunction]
-pub fn load_fabric<'py>(py: Python<'py>, fabric: &str) -> PyResult<Bound<'py, PyDict>> {
+pub fn load_fabric(py: Python<'_>, fabric: PathBuf) -> PyResult<Bound<'_, PyDict>> {
+    let fabric = text(py, &fabric)?;
     let read = match tumble_io::record_is_json(fabric) {
         Some(_) => fabric_of(&mut Folder(Path::new("")), fabric).map(|(fabric, _)| fabric),
         None => tumble_io::shipped(fabric),
@@ -213,8 +374,7 @@ pub fn load_fabric<'py>(py: Python<'py>, fabric: &str) -> PyResult<Bound<'py, Py
 
 /// The mesh of a file.
 fn read_mesh(py: Python<'_>, path: &Path) -> PyResult<Mesh> {
-    let name = path.to_str().ok_or_else(|| format!("\"{}\" is no name in UTF-8; rename the file", path.display()));
-    let read = name.and_then(|name| mesh_of(&mut Folder(Path::new("")), name));
+    let read = mesh_of(&mut Folder(Path::new("")), text(py, path)?);
     read.map(|(mesh, _)| mesh).map_err(|e| scene_error(py, &SceneError::one("", e)))
 }
 

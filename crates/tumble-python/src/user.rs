@@ -17,7 +17,7 @@ impl Raised {
 
     /// Keeps the error, and says who failed and how.
     fn keep(&self, py: Python<'_>, who: &str, function: &Bound<'_, PyAny>, error: PyErr) -> String {
-        let function = function.getattr("__name__").and_then(|n| n.extract::<String>()).unwrap_or_else(|_| "without a name".into());
+        let function = name_of(function);
         let kind = error.get_type(py).name().map_or_else(|_| "error".into(), |n| n.to_string());
         let text = format!("the user's {who} {function} failed: {kind}: {}", error.value(py));
         if let Ok(mut raised) = self.0.lock() {
@@ -25,6 +25,12 @@ impl Raised {
         }
         text
     }
+}
+
+/// The name of a function, or of the class of what is called like one.
+pub fn name_of(function: &Bound<'_, PyAny>) -> String {
+    let own = function.getattr("__name__").and_then(|n| n.extract::<String>());
+    own.unwrap_or_else(|_| function.get_type().name().map_or_else(|_| "without a name".into(), |n| n.to_string()))
 }
 
 /// force(t, x, v, mass) -> n x 3.

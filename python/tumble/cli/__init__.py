@@ -4,43 +4,14 @@ Exit codes: 0 fine, 1 the simulation failed or broke an expectation, 2 the input
 stopped by a signal to terminate.
 """
 
-import errno
-import sys
 from collections.abc import Sequence
-from typing import Annotated, Any
+from typing import Annotated
 
 import typer
-from typer.core import TyperGroup
 
-from tumble.cli import branch, check, diff, export, lab, plot, refine, render, run, scenes, view
-from tumble.cli.console import complain, heed_termination, lost_frames_told, stopped, survive_narrow_streams
-
-
-class Verbs(TyperGroup):
-    """Turns any exception of a verb into one clear message and an exit code."""
-
-    def invoke(self, ctx: Any) -> Any:
-        try:
-            return super().invoke(ctx)
-        except KeyboardInterrupt as stop:
-            complain("stopped")
-            raise typer.Exit(stopped(stop)) from None
-        except MemoryError:
-            complain("out of memory: the scene needs more than this machine has; lower its resolution")
-            raise typer.Exit(1) from None
-        except OSError as error:
-            if error.errno == errno.EPIPE:
-                raise
-            where = f"{error.filename}: " if error.filename else ""
-            complain(f"{where}{error.strerror or error}")
-            raise typer.Exit(1) from None
-        except Exception as error:
-            # The engine is not loaded for `--help`; its errors can only come from it.
-            engine = sys.modules.get("tumble._engine")
-            if engine is None or not isinstance(error, engine.TumbleError):
-                raise
-            complain(str(error))
-            raise typer.Exit(2 if isinstance(error, engine.SceneError) else 1) from None
+from tumble.cli import branch, check, diff, export, lab, plot, refine, render, run, scenes, schema, view
+from tumble.cli.console import heed_termination, lost_frames_told, survive_narrow_streams
+from tumble.cli.verbs import Root, Verb
 
 
 def _version(asked: bool) -> None:
@@ -76,7 +47,7 @@ def application() -> typer.Typer:
     """All verbs."""
     app = typer.Typer(
         name="tumble",
-        cls=Verbs,
+        cls=Root,
         callback=_root,
         no_args_is_help=True,
         rich_markup_mode=None,  # rich would take longer to load than everything else
@@ -93,9 +64,10 @@ def application() -> typer.Typer:
         branch.branch,
         diff.diff,
         scenes.scenes,
+        schema.schema,
         view.view,
     ):
-        app.command()(verb)
+        app.command(cls=Verb)(verb)
     app.add_typer(lab.app, name="lab")
     return app
 

@@ -27,7 +27,13 @@ def branch(
     ] = None,
     frames: Annotated[
         int | None,
-        typer.Option(metavar="N", min=1, help="Frames to simulate after FRAME.", show_default="to the scene's last"),
+        typer.Option(
+            metavar="N",
+            min=1,
+            max=find.FRAMES,
+            help="Frames to simulate after FRAME.",
+            show_default="to the scene's last",
+        ),
     ] = None,
     resume: Annotated[bool, typer.Option("--resume", help="Continue the stopped branch in the folder.")] = False,
     force: Annotated[bool, typer.Option("--force", help="Replace the run in the folder.")] = False,

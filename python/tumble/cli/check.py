@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from tumble.bundled import scene_file
 from tumble.cli import find
 from tumble.cli.console import counted, say, seconds, size, warn_of
 
@@ -34,6 +35,7 @@ def check(
     force: Annotated[
         bool, typer.Option("--force", help="With --repair: overwrite files of an earlier repair.")
     ] = False,
+    json: find.JsonOption = False,
 ) -> None:
     """Check a scene, and estimate which steps are stable.
 
@@ -50,31 +52,36 @@ def check(
       tumble check my.toml
       tumble check my.toml --set system.soft.integrator=forward_euler
       tumble check my.toml --repair
+      tumble check my.toml --json
     """
     from tumble import World
     from tumble.emitters import forecast
     from tumble.expect import probes
 
-    checked = find.scene(scene, set)
-    if repair:
-        from tumble.cli.repair import mend
-
-        set = [*(set or ()), *mend(find.scene_file(scene), checked, force)]
+    with find.told_as_json(json):
         checked = find.scene(scene, set)
-    with find.naming(find.scene_file(scene), scene=checked):
-        world = World(checked, threads)
-        probes(world, checked.to_dict())
+        if repair:
+            from tumble.cli.repair import mend
+
+            set = [*(set or ()), *mend(scene_file(scene), checked, force)]
+            checked = find.scene(scene, set)
+        with find.naming(scene_file(scene), scene=checked):
+            world = World(checked, threads)
+            probes(world, checked.to_dict())
     tree = checked.to_dict()
     expected = forecast(tree)
-    say(_contents(checked, world, expected))
+    if not json:
+        say(_contents(checked, world, expected))
     estimates = world.stability()
     judged, fault = _judge(tree, world, expected, estimates)
-    cures: list[list[str]] = []
+    cures = [cure for estimate in estimates if predict(estimate)[0] == 2 for cure in _cures(tree, estimate)]
+    if json:
+        find.say_json(_as_tree(scene, world, estimates, judged, fault, cures))
+        warn_of(world.warnings)
+        raise typer.Exit(1 if cures or fault is not None else 0)
     for estimate in estimates:
         say()
         say(_table(checked, estimate, judged.get(estimate["system"])))
-        if predict(estimate)[0] == 2:
-            cures += _cures(tree, estimate)
     without = [name for name in world.systems if name not in {e["system"] for e in estimates}]
     if without:
         say(f"\nno estimate for: {', '.join(without)}")
@@ -91,6 +98,32 @@ def check(
     blind = [system for system, when in judged.items() if not when.judged]
     word = f"not judged ({', '.join(blind)})" if blind else "fine"
     say(f"{word}: {find.command('run', scene, set)}")
+
+
+def _as_tree(
+    scene: str,
+    world: "World",
+    estimates: list[dict[str, Any]],
+    judged: "dict[str, _When]",
+    fault: str | None,
+    cures: list[list[str]],
+) -> dict[str, Any]:
+    """What is printed, for programs: `systems` are the estimates of `World.stability`, each with a verdict."""
+    systems = []
+    for estimate in estimates:
+        level, verdict = predict(estimate)
+        when = judged.get(estimate["system"])
+        told = {"level": ("ok", "gains energy", "explodes")[level], "verdict": verdict}
+        systems.append(estimate | told | ({"judged": when.judged, "particles": when.text} if when else {}))
+    return {
+        "ok": not cures and fault is None,
+        "file": scene_file(scene),
+        "title": world.scene.to_dict()["title"],
+        "systems": systems,
+        "fault": fault,
+        "cures": cures,
+        "warnings": world.warnings,
+    }
 
 
 @dataclass

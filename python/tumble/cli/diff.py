@@ -1,6 +1,7 @@
 """`tumble diff`: the first difference between two runs."""
 
 import math
+from dataclasses import asdict
 from typing import TYPE_CHECKING, Annotated
 
 import typer
@@ -27,6 +28,7 @@ def diff(
         bool,
         typer.Option("--deep", help="Read every frame, even if the state hashes agree."),
     ] = False,
+    json: find.JsonOption = False,
 ) -> None:
     """Find the first difference between two runs, to the last bit.
 
@@ -48,11 +50,16 @@ def diff(
       tumble run sheet-on-ball --out out/b --threads 2
       tumble diff out/a out/b
       tumble diff out/a out/b --until 20 --deep
+      tumble diff out/a out/b --json
     """
-    one, other = find.run(a), find.run(b)
     from tumble.compare import at, compare
 
-    found = compare(one, other, until, deep)
+    with find.told_as_json(json):
+        one, other = find.run(a), find.run(b)
+        found = compare(one, other, until, deep)
+    if json:
+        find.say_json({"same": found.same, "longer": found.longer, **asdict(found)})
+        raise typer.Exit(0 if found.same else 1)
     for line in _told(found):
         say(line)
     last = found.compared - 1

@@ -1,22 +1,33 @@
 """Resolution of arguments: a scene by file or by name, a run by folder or by name, overrides."""
 
-import difflib
 import shlex
 import tomllib
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
+
+from tumble.bundled import near, scene_file
+from tumble.cli.console import say
+from tumble.cli.verbs import told
 
 if TYPE_CHECKING:
     from tumble import Run, Scene
 
-SCENES = Path(__file__).resolve().parent.parent / "scenes"
-"""The bundled scenes, ROW/NAME.toml."""
-
 OUT = Path("out")
+
+FRAMES = 100_000_000
+"""The most frames that a scene may have."""
+
+FramesOption = Annotated[
+    int | None,
+    typer.Option(min=1, max=FRAMES, metavar="N", help="Frames to simulate, instead of the scene's."),
+]
+JsonOption = Annotated[
+    bool, typer.Option("--json", help="Print the result as JSON on stdout; messages stay on stderr.")
+]
 
 SceneArgument = Annotated[
     str, typer.Argument(metavar="SCENE", help="A .toml or .json file, or the name of a scene from `tumble scenes`.")
@@ -32,53 +43,12 @@ SetOption = Annotated[
 ]
 
 
-def shipped() -> dict[str, Path]:
-    """The bundled scenes, by `row/name`."""
-    files = sorted(SCENES.glob("*/*.toml"))
-    return {f"{f.parent.name}/{f.stem}": f for f in files}
-
-
 def title(file: Path) -> str:
     """The title of a scene file, empty if it has none or cannot be read."""
     try:
         return str(tomllib.loads(file.read_text(encoding="utf-8")).get("title", ""))
     except (OSError, ValueError):
         return ""
-
-
-def near(name: str, known: Sequence[str]) -> str:
-    """`; did you mean a, b?`, or nothing."""
-    short = {k.rsplit("/", 1)[-1]: k for k in reversed(known)}
-    found = difflib.get_close_matches(name, known, 3, 0.6) or [
-        short[s] for s in difflib.get_close_matches(name.rsplit("/", 1)[-1], list(short), 3, 0.6)
-    ]
-    return f"; did you mean {' or '.join(found)}?" if found else ""
-
-
-def scene_file(argument: str) -> Path:
-    """The file of a scene argument. Raises SceneError, with similar names, if there is none."""
-    from tumble import SceneError
-
-    path = Path(argument)
-    if path.is_file():
-        return path
-    known = shipped()
-    name = argument.removesuffix(".toml")
-    if name in known:
-        return known[name]
-    matches = [k for k in known if k.endswith(f"/{name}")]
-    if len(matches) == 1:
-        return known[matches[0]]
-    if matches:
-        raise SceneError(f"{argument}: more than one scene has this name: {', '.join(matches)}")
-    if path.is_dir():
-        raise SceneError(f"{argument}: is a folder, expected a scene file")
-    if path.suffix in (".toml", ".json"):
-        beside = [str(f) for ending in ("toml", "json") for f in path.parent.glob(f"*.{ending}")]
-        hint = near(argument, beside) or near(name, list(known))
-        raise SceneError(f"{argument}: there is no such file{hint}")
-    hint = near(name, list(known)) or "; `tumble scenes` lists those that come with tumble"
-    raise SceneError(f"{argument}: there is no such file or scene{hint}")
 
 
 def scene(argument: str, overrides: Sequence[str] | None) -> "Scene":
@@ -88,6 +58,30 @@ def scene(argument: str, overrides: Sequence[str] | None) -> "Scene":
     file = scene_file(argument)
     with naming(file):
         return Scene.load(file, list(overrides or ()))
+
+
+@contextmanager
+def told_as_json(asked: bool) -> Iterator[None]:
+    """If asked, prints errors as JSON, too: {"ok": false, "errors": [{"path", "line", "message"}]}."""
+    from tumble import StepError, TumbleError
+
+    try:
+        yield
+    except TumbleError as error:
+        # A run that broke is told as a run.
+        if asked and not isinstance(error, StepError):
+            issues = getattr(error, "issues", None) or [{"path": "", "line": None, "message": str(error)}]
+            say_json({"ok": False, "errors": issues})
+        raise
+
+
+def say_json(tree: Mapping[str, Any]) -> None:
+    """A result for programs, on stdout; infinities and nan are "inf", "-inf" and "nan"."""
+    import json
+
+    from tumble.folder import plain
+
+    say(json.dumps(plain(tree), indent=1, allow_nan=False))
 
 
 @contextmanager
@@ -101,13 +95,17 @@ def naming(file: Path, besides: Path | None = None, scene: "Scene | None" = None
     except SceneError as error:
         if any(issue["path"] == str(besides) for issue in getattr(error, "issues", ())):
             raise
-        lines = str(error).splitlines()
+        lines = told(error).splitlines()
         if scene is not None and any(issue["path"] == "world.memory_limit" for issue in getattr(error, "issues", ())):
             from tumble.emitters import largest
 
             lines += largest(scene.to_dict())
-        text = f"{file}: {lines[0]}" if len(lines) == 1 else "\n  ".join([f"{file}:", *lines])
-        named = SceneError(text)
+        # What was overridden is not the file's fault.
+        typed = [line for line in lines if line.startswith("--set ")]
+        lines = [line for line in lines if line not in typed]
+        if lines:
+            lines = [f"{file}: {lines[0]}"] if len(lines) == 1 else [f"{file}:", *(f"  {line}" for line in lines)]
+        named = SceneError("\n".join([*lines, *typed]))
         named.issues = getattr(error, "issues", [])
         raise named from None
 

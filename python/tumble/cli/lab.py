@@ -5,10 +5,12 @@ from typing import Annotated
 
 import typer
 
+from tumble.bundled import scene_file, unknown
 from tumble.cli import find
 from tumble.cli.console import Progress, say
+from tumble.cli.verbs import Verb, Verbs
 
-app = typer.Typer(no_args_is_help=True, rich_markup_mode=None)
+app = typer.Typer(cls=Verbs, no_args_is_help=True, rich_markup_mode=None)
 
 OutOption = Annotated[Path | None, typer.Option(metavar="DIR", help="Folder of the page.", show_default="out/lab/...")]
 
@@ -29,7 +31,7 @@ def lab() -> None:
     """
 
 
-@app.command()
+@app.command(cls=Verb)
 def integrators(
     scene: find.SceneArgument,
     set: find.SetOption = None,
@@ -59,14 +61,13 @@ def integrators(
         if any(value is not None and not 0 < value < float("inf") for value in values):
             raise typer.BadParameter("expected > 0 s", param_hint=name)
     checked = find.scene(scene, set)
-    folder = out or find.OUT / "lab" / f"integrators-{find.scene_file(scene).stem}"
+    folder = out or find.OUT / "lab" / f"integrators-{scene_file(scene).stem}"
     from tumble.lab.integrators import page
     from tumble.lab.schemes import BY_WORD
 
     for name in integrator or ():
         if name not in BY_WORD:
-            text = f"no integrator {name!r}{find.near(name, list(BY_WORD)) or '; there are ' + ', '.join(BY_WORD)}"
-            raise typer.BadParameter(text, param_hint="--integrator")
+            raise typer.BadParameter(unknown("integrator", name, BY_WORD), param_hint="--integrator")
     with Progress("lab") as progress:
         written = page(
             checked,
@@ -80,7 +81,7 @@ def integrators(
     say(written)
 
 
-@app.command()
+@app.command(cls=Verb)
 def structures(out: OutOption = None) -> None:
     """Pull on sheets and blocks with different families of links.
 
@@ -95,7 +96,7 @@ def structures(out: OutOption = None) -> None:
     say(written)
 
 
-@app.command()
+@app.command(cls=Verb)
 def operators(out: OutOption = None) -> None:
     """Show each grid operator, and why velocities are stored on faces.
 
@@ -108,7 +109,7 @@ def operators(out: OutOption = None) -> None:
     say(page(out or find.OUT / "lab" / "operators"))
 
 
-@app.command()
+@app.command(cls=Verb)
 def compressible(out: OutOption = None) -> None:
     """Show the largest step of the bad solver, and Stable Fluids at a hundred times that.
 
@@ -121,7 +122,7 @@ def compressible(out: OutOption = None) -> None:
     say(page(out or find.OUT / "lab" / "compressible"))
 
 
-@app.command()
+@app.command(cls=Verb)
 def positions(out: OutOption = None) -> None:
     """Show how fast position-based dynamics converges to a given stiffness, by sub-steps and by sweeps.
 
@@ -134,7 +135,7 @@ def positions(out: OutOption = None) -> None:
     say(page(out or find.OUT / "lab" / "positions"))
 
 
-@app.command()
+@app.command(cls=Verb)
 def fabric(
     fabrics: Annotated[
         list[str] | None,
@@ -161,7 +162,7 @@ def fabric(
     say(written)
 
 
-@app.command()
+@app.command(cls=Verb)
 def pressure(
     cells: Annotated[int, typer.Option(metavar="N", min=16, max=256, help="Cells along a side of the cube.")] = 48,
     single: Annotated[bool, typer.Option("--single", help="Use single precision, as scenes do by default.")] = False,

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from tumble.bundled import unknown
 from tumble.cli import find
 from tumble.cli.console import say
 
@@ -73,9 +74,7 @@ def plot(
     vectors = [key.removesuffix("_x") for key in known if key.endswith("_x")]
     for name in names:
         if name not in known and name not in vectors:
-            hint = find.near(name, [*known, *vectors])
-            text = f"no column {name!r}{hint or '; there are ' + ', '.join([*vectors, *known])}"
-            raise typer.BadParameter(text, param_hint="COLUMN")
+            raise typer.BadParameter(unknown("column", name, [*vectors, *known]), param_hint="COLUMN")
     if beside or branches:
         say(_compare(found, [find.run(name) for name in beside or ()], branches, names, out))
         return

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from tumble.bundled import scene_file
 from tumble.cli import find
 from tumble.cli.console import Progress, complain, counted, say, warn_of
 
@@ -29,7 +30,7 @@ def refine(
         typer.Option(metavar="NAME[@HOW]", help="A measure. Repeatable.", show_default="energies, stretch, heat"),
     ] = None,
     set: find.SetOption = None,
-    frames: Annotated[int | None, typer.Option(metavar="N", help="Frames to simulate, instead of the scene's.")] = None,
+    frames: find.FramesOption = None,
     out: Annotated[
         Path | None, typer.Option(metavar="DIR", help="Folder of the study.", show_default="out/refine/NAME")
     ] = None,
@@ -72,7 +73,7 @@ def refine(
         raise typer.BadParameter("--resume keeps what is finished and --force replaces it; choose one")
     overrides = [*(set or ()), *([f"time.frames={frames}"] if frames is not None else [])]
     checked = find.scene(scene, overrides)
-    folder = out if out is not None else find.OUT / "refine" / find.scene_file(scene).stem
+    folder = out if out is not None else find.OUT / "refine" / scene_file(scene).stem
     with ExitStack() as stack:
 
         def shown(level: str) -> Progress:

@@ -5,6 +5,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from tumble.bundled import unknown
 from tumble.cli import find
 from tumble.cli.console import Progress, say
 
@@ -65,8 +66,7 @@ def look_for(renderer: str) -> None:
 
     known = ["auto", *RENDERERS, TRACED]
     if renderer not in known:
-        text = f"no renderer {renderer!r}{find.near(renderer, known) or '; there are ' + ', '.join(known)}"
-        raise typer.BadParameter(text, param_hint="--renderer")
+        raise typer.BadParameter(unknown("renderer", renderer, known), param_hint="--renderer")
 
 
 def _ending(path: Path | None, ending: str) -> None:

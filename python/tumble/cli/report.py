@@ -43,9 +43,28 @@ def summary(run: "Run") -> str:
         lines.append(
             f"  expectations: {broken} violated; the run ends there, at frame {last} of {run.manifest['frames']}"
         )
-    elif asked := expect.count(run.scene):
+    elif asked := expect.count(run.scene) - expect.skipped(run):
         lines.append(f"  expectations: {asked - broken} of {asked} met")
     return "\n".join(lines)
+
+
+def as_tree(run: "Run", failures: Sequence[Exception] = ()) -> dict[str, Any]:
+    """A run for programs: where it is, how it ended, what is doubtful, broken or failed, and what was written."""
+    manifest, last = run.manifest, run.n_frames - 1
+    return {
+        "ok": manifest["status"] == "finished" and not manifest["expectations"] and not failures,
+        "folder": run.folder,
+        "status": manifest["status"],
+        "frames": run.n_frames,
+        "time": run.time(last),
+        "hash": run.hashes[last],
+        "warnings": manifest["warnings"],
+        "expectations": manifest["expectations"],
+        "failure": manifest["failure"],
+        "errors": [{"path": "", "line": None, "message": str(failure)} for failure in failures],
+        "timings": manifest["timings"],
+        "files": [run.folder / name for name in _RESULTS if (run.folder / name).exists()],
+    }
 
 
 def _pace(run: "Run") -> str:

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from tumble.bundled import scene_file
 from tumble.cli import find, report
 from tumble.cli.console import Progress, broke, complain, counted, say, stopped, warn_of
 
@@ -17,7 +18,7 @@ def run(
     scene: find.SceneArgument,
     set: find.SetOption = None,
     out: Annotated[Path | None, typer.Option(metavar="DIR", help="Folder of the run.", show_default="out/NAME")] = None,
-    frames: Annotated[int | None, typer.Option(metavar="N", help="Frames to simulate, instead of the scene's.")] = None,
+    frames: find.FramesOption = None,
     resume: Annotated[bool, typer.Option("--resume", help="Continue the stopped run in the folder.")] = False,
     force: Annotated[bool, typer.Option("--force", help="Replace the run in the folder.")] = False,
     threads: Annotated[
@@ -30,6 +31,7 @@ def run(
     plot: Annotated[bool | None, typer.Option(help="Write energy.png.", show_default="as the scene says")] = None,
     stills: Annotated[bool, typer.Option(help="Write the stills requested by the scene.")] = True,
     renderer: Annotated[str, typer.Option(metavar="NAME", help="Renderer of film and stills.")] = "auto",
+    json: find.JsonOption = False,
 ) -> None:
     """Simulate a scene into a folder, out/NAME by default.
 
@@ -41,6 +43,7 @@ def run(
       tumble run sheet-on-bunny
       tumble run my.toml --frames 48 --set system.soft.step=0.001 --film
       tumble run my.toml --resume
+      tumble run my.toml --json
     """
     from tumble import StepError
     from tumble.reader import Run
@@ -55,8 +58,9 @@ def run(
     from tumble.pictures import resolve
 
     look_for(renderer)
-    checked = find.scene(scene, overrides)
-    folder = out if out is not None else find.OUT / find.scene_file(scene).stem
+    with find.told_as_json(json):
+        checked = find.scene(scene, overrides)
+    folder = out if out is not None else find.OUT / scene_file(scene).stem
     wanted = checked.to_dict()["output"]
     asked = {
         "film": wanted["film"] if film is None else film,
@@ -71,20 +75,26 @@ def run(
     if renderer != "auto" and (asked["film"] or frames_to_draw):
         resolve(renderer)  # Says now, rather than after the simulation, if it does not work here.
     try:
-        with find.naming(find.scene_file(scene), folder, checked), Progress("simulate") as progress:
+        with (
+            find.told_as_json(json),
+            find.naming(scene_file(scene), folder, checked),
+            Progress("simulate") as progress,
+        ):
             done = simulate(
                 checked, folder, resume=resume, threads=threads, progress=progress, overwrite=force, broke=broke
             )
     except StepError as error:
         again = [*(["--out", str(out)] if out else []), *_flags(flags, renderer)]
         print(report.failure(Run(folder), error, scene, overrides, again), file=sys.stderr)
+        if json:
+            find.say_json(report.as_tree(Run(folder)))
         raise typer.Exit(1) from None
     except KeyboardInterrupt as stop:
         again = [*(["--out", str(out)] if out else []), "--resume", *_flags(flags, renderer)]
         _say_what_is_kept(folder, find.command("run", scene, overrides, *again))
         raise typer.Exit(stopped(stop)) from None
 
-    failures = present(done, asked, frames_to_draw, renderer)
+    failures = present(done, asked, frames_to_draw, renderer, json)
     if text := report.gained(done, scene, overrides, [*(["--out", str(out)] if out else []), *_flags(flags, renderer)]):
         print(text, file=sys.stderr)
     judge(done, failures)
@@ -106,7 +116,9 @@ def _refuse_empty(scene: dict[str, Any], ply: bool | None, vdb: bool | None) -> 
             )
 
 
-def present(done: "Run", asked: dict[str, bool], stills: list[int], renderer: str) -> "list[TumbleError]":
+def present(
+    done: "Run", asked: dict[str, bool], stills: list[int], renderer: str, json: bool = False
+) -> "list[TumbleError]":
     """Prints the warnings of a finished run, writes the requested output and a summary; returns the outputs that failed."""
     from tumble.lock import alone
 
@@ -119,7 +131,10 @@ def present(done: "Run", asked: dict[str, bool], stills: list[int], renderer: st
             f"stopped; the simulation in {done.folder} is complete, see `tumble render --help` and `tumble export --help`"
         )
         raise typer.Exit(stopped(stop)) from None
-    say(report.summary(done))
+    if json:
+        find.say_json(report.as_tree(done, failures))
+    else:
+        say(report.summary(done))
     return failures
 
 

@@ -5,6 +5,7 @@ from typing import Annotated
 
 import typer
 
+from tumble.bundled import scene_file, shipped
 from tumble.cli import find
 from tumble.cli.console import say
 
@@ -20,9 +21,9 @@ def scenes(
       tumble scenes sheet-on-bunny > my.toml
     """
     if name is not None:
-        say(find.scene_file(name).read_text(encoding="utf-8"), end="")
+        say(scene_file(name).read_text(encoding="utf-8"), end="")
         return
-    known = find.shipped()
+    known = shipped()
     width = max((len(file.stem) for file in known.values()), default=0)
     for row, files in groupby(known.values(), key=lambda file: file.parent.name):
         say(row)

@@ -12,6 +12,7 @@ from urllib.parse import quote, unquote, urlsplit
 
 import typer
 
+from tumble.bundled import scene_file, shipped
 from tumble.cli import find
 from tumble.cli.console import say
 
@@ -81,12 +82,12 @@ def address(argument: str, overrides: list[str] | None) -> tuple[str, dict[str, 
     """The part of the address after `#/` that opens a scene, and the files of its meshes by path."""
     from tumble import SceneError
 
-    file = find.scene_file(argument)
+    file = scene_file(argument)
     checked = find.scene(argument, overrides)
     meshes = {path: Path(checked.folder) / path for path in mesh_paths(checked)}
-    shipped = {path: name for name, path in find.shipped().items()}
-    if file in shipped and not overrides:
-        return f"scene/{shipped[file]}", meshes
+    bundled = {path: name for name, path in shipped().items()}
+    if file in bundled and not overrides:
+        return f"scene/{bundled[file]}", meshes
     text = file.read_text(encoding="utf-8")
     tree = shared(text, overrides or [], checked.to_dict())
     if len(tree) > LARGEST:

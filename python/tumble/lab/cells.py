@@ -80,8 +80,10 @@ def run(
     try:
         for k in range(frames * parts):
             begin = time.perf_counter()
-            report = world.step()
-            cell.seconds += time.perf_counter() - begin
+            try:
+                report = world.step(patience=max(patience - cell.seconds, 0.05))
+            finally:
+                cell.seconds += time.perf_counter() - begin
             _add(cell, report)
             cell.reached = world.time
             if (k + 1) % parts == 0 and not each(world):
@@ -90,6 +92,8 @@ def run(
             if cell.seconds > patience:
                 cell.outcome = SKIPPED
                 break
+    except TimeoutError:
+        cell.outcome = SKIPPED
     except StepError as error:
         blown = error.report.get("kind") in ("not_finite", "exploded")
         cell.outcome = BLEW_UP if blown else STOPPED

@@ -12,6 +12,7 @@ from matplotlib.figure import FigureBase
 
 from tumble._engine import World, load_fabric
 from tumble.lab.exact import Floats
+from tumble.lab.findings import off
 from tumble.lab.page import Section, table, write
 from tumble.style import FAINT, INK, PALETTE
 
@@ -291,7 +292,7 @@ def page(folder: Path, fabrics: list[str], *, progress: Callable[[int, int], Non
     ]
     worst = max(abs(m.hung[a][2] / m.hung[a][1] - 1) for m in found for a in ANGLES)
     points = [
-        f"Overhangs of simulated strips are off by {100 * worst:.2g} % at most from those of the elastica with the moments "
+        f"Overhangs of simulated strips are off by {off(worst)} at most from those of the elastica with the moments "
         "of the record.",
         "Drape coefficients: " + ", ".join(f"{m.name} {100 * m.coefficient:.0f} %" for m in found) + ".",
     ]
@@ -340,7 +341,7 @@ def _hung(found: list[Measured]) -> str:
         for a in ANGLES:
             twice, exact, simulated, b = m.hung[a]
             numbers = [f"{1e6 * b:.2f}", f"{100 * twice:.2f}", f"{100 * exact:.2f}", f"{100 * simulated:.2f}"]
-            rows.append([m.name, f"{a}°", *numbers, f"{100 * (simulated / exact - 1):+.1f} %"])
+            rows.append([m.name, f"{a}°", *numbers, off(simulated / exact - 1, signed=True)])
     return table(head, rows, [0], range(0, len(rows), len(ANGLES)))
 
 

@@ -9,7 +9,7 @@ from matplotlib.ticker import LogLocator, NullLocator
 
 from tumble.lab import findings
 from tumble.lab.cells import BLEW_UP, SURVIVED, Cell
-from tumble.lab.findings import TARGET, number, seconds
+from tumble.lab.findings import TARGET, number, per_second, seconds
 from tumble.lab.measure import Results
 from tumble.lab.schemes import FAMILIES, Scheme
 from tumble.style import FAINT, GRID, INK
@@ -348,7 +348,7 @@ def _costs(axes: Axes, results: Results, rows: dict[str, float]) -> None:
             axes.plot(survive.evaluations, y, "o", ms=6.5, mfc="white", mec=scheme.color, mew=1.5, zorder=3)
         if target:
             axes.plot(target.evaluations, y, "o", ms=6.5, color=scheme.color, zorder=4)
-            text = f"{'≈ ' if target.estimated else ''}{number(target.evaluations, 2)}"
+            text = f"{'≈ ' if target.estimated else ''}{per_second(target.evaluations)}"
             axes.annotate(
                 text,
                 (target.evaluations, y),

@@ -119,6 +119,13 @@ def blew_up(results: Results, scheme: Scheme) -> Cell | None:
     return min(told or broken, key=lambda c: c.step, default=None)
 
 
+def _evaluations(each: float) -> str:
+    """`1 200 force evaluations per simulated second`."""
+    if each < 0.995:
+        return f"one force evaluation in {seconds(1.0 / each)} of simulated time"
+    return f"{number(each, 2)} force evaluations per simulated second"
+
+
 def skipped(results: Results) -> list[Cell]:
     """Runs that did not fit into the time allowed."""
     all_cells = [*results.accuracy, *results.energy_cells.values()]
@@ -139,6 +146,25 @@ def number(value: float, digits: int = 3) -> str:
         return f"{round(value, places):,.{places}f}".replace(",", "\u202f")
     mantissa, exponent = f"{value:.{digits - 1}e}".split("e")
     return f"{mantissa} × 10{_raised(int(exponent))}"
+
+
+def per_second(evaluations: float) -> str:
+    """How many fall on a simulated second: 1 200; or 1 in 39 s, where that is less than one."""
+    if not 0 < evaluations < 0.995:
+        return number(evaluations)
+    return f"1 in {seconds(1.0 / evaluations)}"
+
+
+def off(share: float, signed: bool = False) -> str:
+    """How far something is off the right value, as a share of that: 0.3 %, +12 %, 14 times the right value."""
+    if not np.isfinite(share):
+        return "not known"
+    sign = ("+" if share >= 0 else "−") if signed else ""
+    if abs(share) > 1.0:
+        return f"{sign}{number(abs(share), 2)} times the right value"
+    if 0 < abs(share) < 1e-5:
+        return "less than 0.001\u00a0%"
+    return f"{sign}{number(100.0 * abs(share), 2)}\u00a0%"
 
 
 def _raised(n: int) -> str:
@@ -162,8 +188,8 @@ def headlines(results: Results) -> list[str]:
         worst = max(costs, key=lambda s: costs[s].evaluations)
         factor = costs[worst].evaluations / costs[best].evaluations
         lines.append(
-            f"<b>Accuracy.</b> An error of 1 % costs {best.word} {number(costs[best].evaluations, 2)} force "
-            f"evaluations per simulated second, and {worst.word} {number(factor, 2)} times as many."
+            f"<b>Accuracy.</b> An error of 1 % costs {best.word} {_evaluations(costs[best].evaluations)}, and "
+            f"{worst.word} {number(factor, 2)} times as many."
         )
     lines += _stability(results)
     ends = {w: e for w, (_, e) in results.traces.items() if e.ndim == 1 and np.isfinite(e[-1])}

@@ -11,11 +11,11 @@ import numpy as np
 from tumble._engine import Scene, SceneError
 from tumble.lab import figures, findings, flocks, measure
 from tumble.lab.cells import STOPPED, Cell, Purse
-from tumble.lab.findings import Cost, number, seconds
+from tumble.lab.findings import Cost, number, per_second, seconds
 from tumble.lab.limits import largest_steps
 from tumble.lab.measure import Results
 from tumble.lab.page import Section, colored, table, write
-from tumble.lab.schemes import Scheme, chosen
+from tumble.lab.schemes import NEEDS_VELOCITIES, SCHEMES, Scheme, chosen
 from tumble.lab.subject import PERIODS, subject
 
 DECADES = {"adaptive_euler": (-1, -2, -3, -4, -5, -6), "dormand_prince": (-1, -3, -5, -7, -9, -11)}
@@ -68,8 +68,10 @@ def study(
     budget: float = 45.0,
 ) -> Results:
     """The measurements of a page."""
-    tested = subject(scene)
-    results = Results(tested, chosen(list(integrators) if integrators else None, tested.tracers))
+    tested = subject(scene, 0.1 * budget)
+    words = list(integrators) if integrators else None
+    results = Results(tested, chosen(words, tested.tracers))
+    _leave_out(results, words)
     given = duration
     if tested.crowded and duration is None:
         given = results.horizon = measure.horizon(tested, Purse(0.1 * budget))
@@ -108,6 +110,35 @@ def study(
     if progress is not None:
         progress(total, total)
     return results
+
+
+def _leave_out(results: Results, words: list[str] | None) -> None:
+    """Leaves out the integrators that cannot move the scene, and keeps why."""
+    tested = results.subject
+    if words:
+        rest = [s.word for s in SCHEMES if s.word not in words]
+        results.left_out |= dict.fromkeys(rest, "not asked for")
+    if tested.tracers:
+        stopped = [s.word for s in SCHEMES if s.needs_velocities and s.word not in results.left_out]
+        results.left_out |= dict.fromkeys(stopped, f"need {NEEDS_VELOCITIES}")
+    able = []
+    for scheme in results.schemes:
+        try:
+            tested.world(scheme, 1.0 / float(tested.tree["time"]["fps"]), 1, 1, 1e-3 * tested.extent)
+            able.append(scheme)
+        except SceneError as error:
+            results.left_out[scheme.word] = str(error)
+    if not able:
+        raise SceneError(f"no integrator can move this scene: {results.left_out[results.schemes[0].word]}")
+    results.schemes = able
+
+
+def _told_left_out(results: Results) -> list[str]:
+    """Which integrators are not on the page, and why."""
+    reasons: dict[str, list[str]] = {}
+    for word, why in results.left_out.items():
+        reasons.setdefault(why, []).append(word)
+    return [f"Left out: {', '.join(words)}: {escape(why)}." for why, words in reasons.items()]
 
 
 def _lead(results: Results) -> str:
@@ -215,8 +246,8 @@ def _table_section(results: Results) -> Section:
         family = scheme.family
         rows.append(_table_row(results, scheme))
     text = (
-        "<p>Costs are those of one simulated second; evaluations of implicit schemes include the products of the "
-        "linear solver.</p>"
+        "<p>Costs are those of one simulated second, or, where less than one evaluation falls on it, of the time that one "
+        "lasts; evaluations of implicit schemes include the products of the linear solver.</p>"
     )
     return Section("In numbers", text, table=table(head, rows, (0, len(head) - 1), groups))
 
@@ -240,7 +271,7 @@ def _table_row(results: Results, scheme: Scheme) -> list[str]:
             cells.append(_limit(value) + (f" ({value / found.predicted:.2f})" if sound else ""))
     for cost in (findings.to_survive(results, scheme), findings.to_target(results, scheme)):
         mark = "≈ " if cost and cost.estimated else ""
-        cells += [mark + number(cost.evaluations), mark + seconds(cost.seconds)] if cost else [none, none]
+        cells += [mark + per_second(cost.evaluations), mark + seconds(cost.seconds)] if cost else [none, none]
     return [*cells, _story(results, findings.blew_up(results, scheme))]
 
 
@@ -266,7 +297,7 @@ def _story(results: Results, cell: Cell | None) -> str:
 
 
 def _notes(results: Results) -> list[str]:
-    notes = list(results.subject.notes)
+    notes = [*results.subject.notes, *_told_left_out(results)]
     truth = results.reference
     if results.horizon is not None:
         notes.append(

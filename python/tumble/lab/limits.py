@@ -45,7 +45,9 @@ def largest_steps(
     results: dict[str, Found] = {}
     if not subject.limited or not fixed:
         return results
-    mode = stiffest_mode(subject)
+    begin = time.perf_counter()
+    mode = stiffest_mode(subject, 0.2 * purse.left)
+    purse.left -= time.perf_counter() - begin
     for rest, scheme in zip(range(len(fixed), 0, -1), fixed, strict=True):
         tick()
         part = purse.part(rest)
@@ -157,8 +159,8 @@ def _growth(subject: Subject) -> Callable[[World], bool]:
     return fine
 
 
-def stiffest_mode(subject: Subject) -> Floats | None:
-    """Displacements n x 3 in the stiffest mode, of length 1; None if there is none.
+def stiffest_mode(subject: Subject, patience: float = np.inf) -> Floats | None:
+    """Displacements n x 3 in the stiffest mode, of length 1; None if there is none, or it takes longer than `patience` [s].
 
     By power iteration: a step of symplectic Euler from rest leaves the velocities h a(x), so that two of them, from x
     and from x + u, show what the stiffness matrix makes of u.
@@ -168,11 +170,12 @@ def stiffest_mode(subject: Subject) -> Floats | None:
     h, size = 1e-3 / subject.rate, 1e-6 * subject.extent
     world = subject.world(BY_WORD["symplectic_euler"], h, 1, 1)
     rest = np.zeros_like(subject.start)
+    end = time.perf_counter() + patience
 
     def push(x: Floats) -> Floats:
         subject.write(world, "position", x)
         subject.write(world, "velocity", rest)
-        world.step()
+        world.step(patience=max(end - time.perf_counter(), 0.0))
         return subject.velocities(world)
 
     try:
@@ -182,7 +185,7 @@ def stiffest_mode(subject: Subject) -> Floats | None:
             u = push(subject.start + size * u / np.linalg.norm(u)) - still
             if not np.linalg.norm(u) > 0:
                 return None
-    except StepError:
+    except (StepError, TimeoutError):
         return None
     return np.asarray(u / np.linalg.norm(u))
 
@@ -209,8 +212,11 @@ def _calm(subject: Subject, scheme: Scheme, mode: Floats, purse: Purse, h: float
             return None
         begin = time.perf_counter()
         try:
-            plain.step()
-            struck.step()
+            plain.step(patience=purse.left)
+            struck.step(patience=purse.left)
+        except TimeoutError:
+            purse.left = 0.0
+            return None
         except StepError:
             return False
         purse.left -= time.perf_counter() - begin
@@ -229,7 +235,8 @@ def _autopsy(subject: Subject, scheme: Scheme, found: Found, weak: bool, purse: 
         last = found.survivors[-1] if found.survivors else None
         if last is None or last.seconds / max(1, last.steps) * steps > max(purse.left, 0.1):
             return cell
-        cell = purse.spend(run(subject, scheme, "breakdown", h * steps, 1, steps))
+        patience = max(purse.left, 0.1)
+        cell = purse.spend(run(subject, scheme, "breakdown", h * steps, 1, steps, patience=patience))
         if cell.outcome == BLEW_UP:
             return cell
     return cell

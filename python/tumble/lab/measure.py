@@ -61,7 +61,8 @@ class Results:
     observed: list[Observed] = field(default_factory=list)
     """Of flocks."""
     found: dict[str, Found] = field(default_factory=dict)
-    notes: list[str] = field(default_factory=list)
+    left_out: dict[str, str] = field(default_factory=dict)
+    """Integrators that are not compared, and why."""
 
 
 Tick = Callable[[], None]
@@ -94,9 +95,13 @@ def horizon(subject: Subject, purse: Purse) -> float | None:
     for k in range(parts):
         try:
             for world in worlds:
-                world.step()
+                world.step(patience=purse.left - (time.perf_counter() - begin))
         except StepError:
             return interval * k or interval
+        except TimeoutError:
+            subject.notes.append("There was no time to see how soon paths drift apart over the whole length.")
+            purse.left = 0.0
+            return interval * max(k, 1)
         subject.consider(worlds[0])
         spent = time.perf_counter() - begin
         if rms(subject.positions(worlds[1]) - subject.positions(worlds[0])) > APART * first:
@@ -154,6 +159,8 @@ def _positions(
         positions.append(subject.positions(world))
         return True
 
+    if patience <= 0.0:
+        return None
     cell = purse.spend(run(subject, BY_WORD[word], "reference", interval, SAMPLES, n, tolerance, patience, keep))
     return positions if cell.outcome == SURVIVED else None
 

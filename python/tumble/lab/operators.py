@@ -7,12 +7,16 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from matplotlib.axes import Axes
 from matplotlib.figure import FigureBase
 
 from tumble.fields import Field, Grid, average, curl, directional, divergence, gradient, laplacian
 from tumble.lab.exact import Floats
 from tumble.lab.page import Section, write
 from tumble.style import INK, PALETTE
+
+Extent = tuple[float, float, float, float]
+"""Left, right, bottom, top [m]."""
 
 SIZES = (12, 24, 48, 96)
 """Cells along a side of the square of 1 m."""
@@ -62,11 +66,15 @@ class Shown:
         return float(np.sqrt(np.mean((self.field.array - exact)[inside] ** 2) / np.mean(exact[inside] ** 2)))
 
 
+def fields(n: int) -> tuple[Field, tuple[Field, Field]]:
+    """The field and the flow that are differentiated, on n x n cells of a square of 1 m."""
+    grid = Grid((n, n), 1 / n)
+    return grid.field(_f, "cell"), (grid.field(_u, "face x"), grid.field(_v, "face y"))
+
+
 def shown(n: int) -> list[Shown]:
     """Every operator on n x n cells."""
-    grid = Grid((n, n), 1 / n)
-    f = grid.field(_f, "cell")
-    u = (grid.field(_u, "face x"), grid.field(_v, "face y"))
+    f, u = fields(n)
     slope = gradient(f)
     turn: Field = curl(u)
     return [
@@ -154,11 +162,15 @@ def page(folder: Path) -> Path:
     sections = [
         Section(
             "Each operator on a known field",
-            f"<p>f = sin(2π x) cos(4 y) and a flow (u, v) on {SHOWN} × {SHOWN} cells of a square of 1 m. On closed walls the "
-            "gradient across them is 0 by rule, whatever f is: pale rows at the rim, and dark ones of the Laplacian.</p>",
+            f"<p>Above, f = sin(2π x) cos(4 y), its slope, and a flow (u, v), on {SHOWN} × {SHOWN} cells of a square of 1 m, "
+            "the frame; below, what the operators make of them. All images lie in the same square: values on faces and nodes "
+            "stand half a cell beside those in cells, and reach beyond the frame by as much. The gradient is large where f "
+            "changes fast, and red where f rises along the axis; the divergence is red where arrows part, the curl where "
+            "they turn to the left. On closed walls the gradient across them is 0 by rule, whatever f is: pale rows at the "
+            "rim, and dark ones of the Laplacian.</p>",
             partial(_operators, all_shown=shown(SHOWN)),
-            7.6,
-            "Results of six operators",
+            11.4,
+            "A field, a flow, and the results of six operators",
         ),
         Section(
             "Errors",
@@ -201,22 +213,65 @@ def _rows(errors: dict[int, list[float]]) -> Iterator[dict[str, Any]]:
             yield {"operator": one.name, "cells": n, "relative_error": error}
 
 
-def _image(figure: FigureBase, at: Any, values: Floats, title: str, signed: bool = True) -> None:
+def _image(
+    figure: FigureBase, at: Any, values: Floats, title: str, signed: bool = True, extent: Extent | None = None
+) -> Axes:
+    """An image; `extent` is where it lies [m]: left, right, bottom, top."""
     axes = figure.add_subplot(at)
     top = float(np.abs(values).max())
     low, colours = (-top, "RdBu_r") if signed else (0.0, "Blues")
-    image = axes.imshow(values.T, origin="lower", interpolation="nearest", vmin=low, vmax=top, cmap=colours)
+    image = axes.imshow(
+        values.T, origin="lower", interpolation="nearest", vmin=low, vmax=top, cmap=colours, extent=extent
+    )
     axes.set_title(title)
     axes.grid(False)
     axes.set_xticks([])
     axes.set_yticks([])
     figure.colorbar(image, ax=axes, shrink=0.85)
+    return axes
+
+
+def around(field: Field) -> Extent:
+    """Where the image of a field lies [m]: each value in the middle of its pixel, so that images of all places agree."""
+    half = field.grid.spacing / 2
+    x, y = field.grid.points(field.place)
+    return float(x.min() - half), float(x.max() + half), float(y.min() - half), float(y.max() + half)
+
+
+def _placed(figure: FigureBase, at: Any, field: Field, title: str) -> Axes:
+    """An image in the square of 1 m, a pixel beyond which may show what lies on its rim."""
+    axes = _image(figure, at, field.array, title, extent=around(field))
+    rim = field.grid.spacing
+    axes.set_xlim(-rim, 1 + rim)
+    axes.set_ylim(-rim, 1 + rim)
+    axes.plot([0, 1, 1, 0, 0], [0, 0, 1, 1, 0], color=INK, lw=0.8)
+    return axes
+
+
+def _arrows(axes: Axes, vectors: tuple[Field, ...], every: int = 2) -> None:
+    """Vectors on faces as arrows in the middle of cells."""
+    u, v = (average(part, "cell") for part in vectors)
+    x, y = u.grid.points("cell")
+    cut = (slice(every // 2, None, every),) * 2
+    axes.quiver(x[cut], y[cut], u.array[cut], v.array[cut], color=INK, angles="xy", width=0.006, pivot="mid")
 
 
 def _operators(figure: FigureBase, all_shown: list[Shown]) -> None:
-    places = figure.add_gridspec(2, 3)
+    f, u = fields(SHOWN)
+    places = figure.add_gridspec(3, 3)
+    _placed(figure, places[0, 0], f, "the field f")
+    axes = _placed(figure, places[0, 1], f, "f, and its gradient as arrows")
+    _arrows(axes, gradient(f))
+    speed = f.grid.field(np.hypot(*(average(part, "cell").array for part in u)), "cell")
+    axes = _image(
+        figure, places[0, 2], speed.array, "the flow: arrows, and its speed", signed=False, extent=around(speed)
+    )
+    axes.set_xlim(-f.grid.spacing, 1 + f.grid.spacing)
+    axes.set_ylim(-f.grid.spacing, 1 + f.grid.spacing)
+    axes.plot([0, 1, 1, 0, 0], [0, 0, 1, 1, 0], color=INK, lw=0.8)
+    _arrows(axes, u)
     for i, one in enumerate(all_shown):
-        _image(figure, places[i // 3, i % 3], one.field.array, f"{one.name}   ({one.meaning})")
+        _placed(figure, places[1 + i // 3, i % 3], one.field, f"{one.name}   ({one.meaning})")
 
 
 def _errors(figure: FigureBase, errors: dict[int, list[float]]) -> None:

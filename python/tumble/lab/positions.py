@@ -12,6 +12,7 @@ from matplotlib.figure import FigureBase
 
 from tumble._engine import World
 from tumble.lab.exact import Floats
+from tumble.lab.findings import off
 from tumble.lab.page import Section, write
 from tumble.style import INK, PALETTE
 
@@ -108,11 +109,10 @@ def page(folder: Path) -> Path:
     by_steps, by_sweeps, plain_steps, plain_sweeps = (way.errors for way in ways[:4])
     few, many = WORK.index(32), WORK.index(512)
     points = [
-        f"With {WORK[few]} projections of each link in a frame the compliant chain is off by {100 * by_steps[few]:.2g} % in "
-        f"sub-steps, by {100 * by_sweeps[few]:.2g} % in sweeps; with {WORK[many]} by {100 * by_steps[many]:.2g} % and "
-        f"{100 * by_sweeps[many]:.2g} %.",
-        f"Plain, with {WORK[many]}: {100 * plain_steps[many]:.3g} % and {100 * plain_sweeps[many]:.3g} %, whatever the "
-        "stiffness.",
+        f"The lengthening of the compliant chain, against the right one: with {WORK[few]} projections of each link in a frame "
+        f"the error is {off(by_steps[few])} in sub-steps and {off(by_sweeps[few])} in sweeps; with {WORK[many]} it is "
+        f"{off(by_steps[many])} and {off(by_sweeps[many])}.",
+        f"Plain, with {WORK[many]}: {off(plain_steps[many])} and {off(plain_sweeps[many])}, whatever the stiffness.",
     ]
     return write(
         folder,
@@ -128,8 +128,8 @@ def page(folder: Path) -> Path:
 
 def _rows(ways: list[Way]) -> Iterator[dict[str, Any]]:
     for way in ways:
-        for work, off in zip(WORK, way.errors, strict=True):
-            yield {"way": way.title, "frames a second": way.rate, "projections": work, "error": off}
+        for work, relative in zip(WORK, way.errors, strict=True):
+            yield {"way": way.title, "frames a second": way.rate, "projections": work, "error": relative}
 
 
 def _errors(figure: FigureBase, ways: list[Way]) -> None:

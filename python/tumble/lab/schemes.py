@@ -2,6 +2,7 @@
 
 from dataclasses import dataclass
 
+from tumble.bundled import unknown
 from tumble.style import INK
 
 
@@ -89,8 +90,19 @@ BY_WORD = {s.word: s for s in SCHEMES}
 
 
 def chosen(words: list[str] | None, tracers: bool) -> list[Scheme]:
-    """The integrators named, or all; for tracers only those that need no velocities. Raises ValueError."""
-    unknown = [w for w in words or [] if w not in BY_WORD]
-    if unknown:
-        raise ValueError(f"no such integrator: {', '.join(unknown)}; expected some of {', '.join(BY_WORD)}")
-    return [s for s in SCHEMES if (not words or s.word in words) and not (tracers and s.needs_velocities)]
+    """The integrators named, or all; for tracers only those that need no velocities. Raises ValueError, also where none is
+    left."""
+    strange = [unknown("integrator", w, BY_WORD) for w in words or [] if w not in BY_WORD]
+    if strange:
+        raise ValueError("\n".join(strange))
+    asked = [s for s in SCHEMES if not words or s.word in words]
+    able = [s for s in asked if not (tracers and s.needs_velocities)]
+    if not able:
+        raise ValueError(
+            f"{', '.join(s.word for s in asked)} {'need' if len(asked) > 1 else 'needs'} {NEEDS_VELOCITIES}"
+        )
+    return able
+
+
+NEEDS_VELOCITIES = "velocities, which tracers do not have: a field gives them"
+"""Why an integrator does not move tracers."""

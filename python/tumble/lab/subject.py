@@ -1,5 +1,6 @@
 """Subject of the lab: a scene whose integrator, step and length can be changed at will."""
 
+import time
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -15,6 +16,9 @@ GROWTH = 1000.0
 
 CROWD = 100
 """Birds of a cloud that take part."""
+
+PRODUCTS = 60
+"""Products of a vector with the stiffness matrix by which the stiffest mode is found, about."""
 
 PERIODS = 100.0
 """Periods of the stiffest mode within which it counts."""
@@ -109,7 +113,7 @@ class Subject:
         systems = []
         for system in self.tree["system"]:
             own = dict(system)
-            if (own["method"] == "tracers") == self.tracers:
+            if own["method"] == ("tracers" if self.tracers else "dynamics"):
                 own |= {"integrator": scheme.word, "substeps": substeps, "step": None}
                 if scheme.adaptive:
                     own |= {
@@ -169,9 +173,38 @@ class Subject:
             done += n
 
 
-def subject(scene: Scene) -> Subject:
-    """Makes a scene ready for testing."""
+_FLUIDS = {"gas": "Stable Fluids", "compressible": "the compressible gas", "heat": "heat in bodies"}
+"""Methods whose grids are stepped by schemes of their own."""
+
+
+def _refuse(tree: Tree) -> None:
+    """Refuses what has no integrators to compare, and says what to look at instead."""
+    methods = {system["method"] for system in tree["system"]}
+    title = f"“{tree['title']}”" if tree["title"] else "this scene"
+    if "vicsek" in methods:
+        raise SceneError("the model of Vicsek is a map and has no integrator; there is nothing to compare")
+    for method in (method for method in _FLUIDS if method in methods):
+        instead = {
+            "gas": "`tumble lab pressure` compares its solvers, and `tumble refine` shows how a scene converges",
+            "compressible": "`tumble lab compressible` shows its largest step",
+            "heat": "its schemes are heat.0.scheme=explicit, implicit and trapezoid; `tumble refine` shows how they converge",
+        }[method]
+        raise SceneError(
+            f"{title} has {_FLUIDS[method]}, which is stepped by a scheme of its own: the lab compares the integrators of "
+            f"masses and tracers, and takes scenes of nothing else; {instead}"
+        )
+    if liquid := next((thing["name"] for thing in tree["particles"] if thing.get("fluid")), None):
+        raise SceneError(
+            f'{title} has a liquid, particles "{liquid}", which position-based dynamics alone can move: no other integrator is '
+            "there to compare; `tumble lab positions` shows how that one converges, and `tumble refine` how a scene does"
+        )
+
+
+def subject(scene: Scene, patience: float = np.inf) -> Subject:
+    """Makes a scene ready for testing; its limits are looked for no longer than `patience` [s]. Raises SceneError for one
+    without integrators to compare."""
     tree = scene.to_dict()
+    _refuse(tree)
     if tree["emitter"]:
         raise SceneError(
             f'emitter "{tree["emitter"][0]["name"]}": the lab compares paths and energies of masses that are there from '
@@ -182,8 +215,6 @@ def subject(scene: Scene) -> Subject:
     tree["output"] = {"columns": ["position"], "plot": False}
     tree["expect"] = {}
     methods = {system["method"] for system in tree["system"]}
-    if methods == {"vicsek"}:
-        raise SceneError("the model of Vicsek is a map and has no integrator; there is nothing to compare")
     tracers = "tracers" in methods and "dynamics" not in methods
     notes = _thin(tree)
     if {"tracers", "dynamics"} <= methods:
@@ -193,7 +224,14 @@ def subject(scene: Scene) -> Subject:
             "The position clamp goes with modified_euler, verlet and position_based only; the others run without it."
         )
     bare = Subject(tree, scene.folder, tracers, 0.0, 0.0, 0.0, None, {}, None, np.zeros((0, 3)), None, notes)
-    world = bare.world(BY_WORD["rk4"], 1.0 / float(tree["time"]["fps"]), 1, substeps=1)
+    try:
+        world = bare.world(BY_WORD["rk4"], 1.0 / float(tree["time"]["fps"]), 1, substeps=1)
+    except SceneError as error:
+        World(scene)  # Where it is wrong anyway, that is what is to be said.
+        raise SceneError(
+            f"this scene runs under no integrator but its own, so that there is nothing to compare ({error}); `tumble refine` "
+            "shows how it converges"
+        ) from error
     bare.start = bare.positions(world)
     bare.threads = 1 if len(bare.start) <= 4096 else None
     if tracers:
@@ -201,7 +239,18 @@ def subject(scene: Scene) -> Subject:
         _tracer_limits(bare)
     else:
         bare.solution = exact.springs(tree, world)
-        _mass_limits(bare, world.stability())
+        try:
+            # A product of its matrix takes about as long as an evaluation of forces, and is not interrupted.
+            if len(bare.start) > CROWD:
+                begin = time.perf_counter()
+                bare.world(BY_WORD["rk4"], 1e-9, 1, substeps=1).step(patience=patience)
+                if PRODUCTS / 4 * (time.perf_counter() - begin) > patience:
+                    raise TimeoutError
+            _mass_limits(bare, world.stability(patience))
+        except TimeoutError:
+            notes.append(
+                "There was no time to find the stiffest mode, and so no limits of steps are predicted or measured."
+            )
         # Elements that are constraints have no mode that could grow.
         bare.limits["position_based"] = Limits(np.inf, np.inf)
     return bare

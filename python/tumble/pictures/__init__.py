@@ -18,6 +18,8 @@ import numpy as np
 import numpy.typing as npt
 
 from tumble._engine import ExportError
+from tumble.arguments import whole
+from tumble.bundled import unknown
 from tumble.looks import GROUND, SOLID
 from tumble.pictures import framing, splats, volumes
 from tumble.pictures.drawn import Body, Cloud, Ground, Image, Mesh, Smoke, Thing, placed
@@ -65,7 +67,7 @@ def resolve(renderer: str = "auto") -> str:
     if renderer == "auto":
         return next(name for name in RENDERERS if _works(name))
     if renderer not in (*RENDERERS, TRACED):
-        raise ExportError(f'no renderer "{renderer}"; there are: auto, {", ".join((*RENDERERS, TRACED))}')
+        raise ExportError(unknown("renderer", renderer, ("auto", *RENDERERS, TRACED)))
     if not _works("mitsuba" if renderer == TRACED else renderer):
         cure = "pip install 'tumble[pictures]'"
         if renderer == "pyvista" and importlib.util.find_spec("pyvista"):
@@ -103,7 +105,7 @@ class Studio:
 
     def things(self, i: int) -> list[Thing]:
         """Drawables of frame i, moved and scaled for `Camera.unit`."""
-        if not 0 <= i < self.run.n_frames:
+        if not 0 <= whole(i, "frame", error=ExportError) < self.run.n_frames:
             raise ExportError(f"there is no frame {i}; there are frames 0 to {self.run.n_frames - 1}")
         things = self.stage.things(i, THINNEST * self.camera.width)
         if self.stage.flat:
