@@ -4,7 +4,7 @@
 
 use crate::common;
 
-use common::{Numbers, Vector, positions, run, simulation, solid, vector, velocities, write};
+use common::{Numbers, Vector, positions, run, simulation, solid, step, vector, velocities, write};
 use std::f64::consts::PI;
 use tumble_f64::elements::{Constraints, Density, Projection, behind, spline};
 use tumble_f64::geometry::{Shape, Walls};
@@ -146,6 +146,42 @@ fn water_at_rest_has_its_density() {
     // neighbours, have moved closer: measured, by 0.026 m. Without what walls add it would be 0.15 m.
     assert!((top - 0.475).abs() < 0.75 * spacing && sim.ledger().speed.unwrap() < 0.2, "{top}");
     assert!(x.iter().all(|x| x.x.abs() < 0.26 && x.y.abs() < 0.26 && x.z > -0.01));
+}
+
+/// A container of any width is its five walls: water in one moves as between planes, and stays where it rests.
+#[test]
+fn narrow_tanks_are_planes() {
+    let spacing = 0.05;
+    for layers in [1.0, 2.0, 3.0, 4.6, 7.0] {
+        let size = [0.6, layers * spacing, 0.3];
+        let boxed = tank(spacing, size, 0.0, "substeps = 10");
+        let planes: String = [
+            ([size[0] / 2.0, 0.0, 0.0], [-1.0, 0.0, 0.0]),
+            ([-size[0] / 2.0, 0.0, 0.0], [1.0, 0.0, 0.0]),
+            ([0.0, size[1] / 2.0, 0.0], [0.0, -1.0, 0.0]),
+            ([0.0, -size[1] / 2.0, 0.0], [0.0, 1.0, 0.0]),
+            ([0.0, 0.0, 0.0], [0.0, 0.0, 1.0]),
+        ]
+        .iter()
+        .enumerate()
+        .map(|(k, (at, n))| format!("[[collider]]\nname = \"plane {k}\"\nshape.plane = {{ point = {at:?}, normal = {n:?} }}\n"))
+        .collect();
+        let cut = boxed.find("[[collider]]").unwrap();
+        let (mut tank, mut slab) = (simulation(&boxed), simulation(&format!("{}{planes}", &boxed[..cut])));
+        assert!(positions(&tank, "water").len() >= 72);
+        let start = tank.ledger();
+        for frame in 0..25 {
+            step(&mut tank);
+            step(&mut slab);
+            let far = positions(&tank, "water").iter().zip(positions(&slab, "water")).map(|(a, b)| (*a - b).norm()).fold(0.0, f64::max);
+            assert!(frame > 1 || far < 1e-9, "{layers}: {far:e}");
+        }
+        let (a, b) = (tank.ledger(), slab.ledger());
+        // It settles by no more than a spacing and is at rest but for its surface.
+        let sunk = (start.external - a.external) / (9.8 * a.mass);
+        println!("{layers} layers: {:.3} m/s, {:.3} m/s between planes, sunk by {sunk:.4} m", a.speed.unwrap(), b.speed.unwrap());
+        assert!(a.kinetic < 0.06 * a.mass && sunk.abs() < spacing, "{layers}: {} J, {sunk}", a.kinetic);
+    }
 }
 
 #[test]

@@ -96,11 +96,17 @@ pub struct Walls<'a> {
 
 impl Walls<'_> {
     /// Calls `f` with the distance [m] of p from where masses are stopped, and the direction away from there, of every surface that is
-    /// nearer than `within` [m]: of a solid the nearest one, of a container up to three, as if each were flat. Solids count as having a
-    /// thickness of at least `thickness` [m].
+    /// nearer than `within` [m]: of a solid the nearest one, of a box that contains each of its walls, of another container up to three, as if
+    /// each were flat. Solids count as having a thickness of at least `thickness` [m].
     pub fn near(&self, p: Vector, thickness: f64, within: f64, mut f: impl FnMut(f64, Vector)) {
         for collider in self.colliders {
             let (mut from, thickness) = (p, thickness.max(collider.thickness));
+            if let Some(walls) = collider.walls(p, self.t) {
+                for (distance, normal) in walls.into_iter().filter(|(distance, _)| *distance < within + thickness) {
+                    f(distance - thickness, normal);
+                }
+                continue;
+            }
             for _ in 0..if collider.inside { 3 } else { 1 } {
                 let reach = within + thickness;
                 let (distance, normal) = collider.distance(from, self.t, reach);
@@ -138,6 +144,23 @@ impl Collider {
         let Shape::Animated { facets, .. } = &self.shape else { return Carrier::Whole };
         let local = self.at(0.0).map_or(p, |(pose, _)| pose.back(p));
         facets.carrier(local).map_or(Carrier::Whole, |(triangle, weights)| Carrier::Facet(triangle, weights))
+    }
+
+    /// Distance [m] of a point from every wall of a box that contains, and the direction away from it, the nearest first.
+    fn walls(&self, p: Vector, t: f64) -> Option<[(f64, Vector); 6]> {
+        let Shape::Box { center, half, turn } = &self.shape else { return None };
+        if !self.inside {
+            return None;
+        }
+        let pose = self.at(t).map_or(Pose::default(), |(pose, _)| pose);
+        let (q, half): ([f64; 3], [f64; 3]) = (turn.conj().turn(pose.back(p) - *center).into(), (*half).into());
+        let mut walls = [0, 1, 2, 3, 4, 5].map(|k| {
+            let (axis, side) = (k / 2, if k % 2 == 0 { 1.0 } else { -1.0 });
+            let inward: [f64; 3] = std::array::from_fn(|a| if a == axis { side } else { 0.0 });
+            (half[axis] + side * q[axis], pose.turn.turn(turn.turn(inward.into())))
+        });
+        walls.sort_by(|a, b| a.0.total_cmp(&b.0));
+        Some(walls)
     }
 
     fn near(&self, local: Vector, t: f64, within: f64) -> (f64, Vector, Vector) {
