@@ -59,7 +59,8 @@ impl Grid {
     #[new]
     #[pyo3(signature = (cells, spacing, origin=None, plane="xy", periodic=""))]
     fn new(cells: &Any, spacing: f64, origin: Option<Vec<f64>>, plane: &str, periodic: &str) -> PyResult<Self> {
-        let cells = cells.try_iter().map_err(|_| wrong(format!("cells: {}, expected two whole numbers (a plane) or three", cells.get_type())))?;
+        let cells =
+            cells.try_iter().map_err(|_| wrong(format!("cells: {}, expected two whole numbers (a plane) or three", cells.get_type())))?;
         let cells = cells.map(|n| count(&n?, "cells", 1)).collect::<PyResult<Vec<_>>>()?;
         let flat = match (cells.len(), plane) {
             (3, _) => None,

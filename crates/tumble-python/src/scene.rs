@@ -82,7 +82,9 @@ fn unread(text: &str, is_json: bool, mut error: SceneError) -> SceneError {
         let of = |words: &[&str]| words.iter().any(|word| said.contains(word));
         let what = match (is_json, of(&["EOF"]), of(&["duplicate key"]), of(&["unclosed"]), of(&["must be quoted"])) {
             (true, true, ..) => "the file ends before everything that was opened with {, [ or \" is closed".into(),
-            (true, ..) => "this cannot be read as JSON: keys and text stand in double quotes, parts are separated by single commas".to_string(),
+            (true, ..) => {
+                "this cannot be read as JSON: keys and text stand in double quotes, parts are separated by single commas".to_string()
+            }
             (_, _, true, ..) => "this key stands here for the second time; leave one of both out".into(),
             (_, _, _, true, _) => "what is opened here with [, { or a quotation mark is not closed".into(),
             (.., true) => "text stands in quotation marks: \"text\"; only numbers, true and false do without".into(),
