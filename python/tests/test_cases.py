@@ -1,6 +1,7 @@
 """What people report of other programs: small inputs, each with the value that is right."""
 
 import math
+from collections.abc import Callable
 from itertools import pairwise
 from pathlib import Path
 from typing import Any
@@ -128,3 +129,78 @@ def test_a_map_s_coordinates_are_refused_in_single_precision(tmp_path: Path) -> 
         world.step(5)
     moved = far.frame["tarp"]["position"] - near.frame["tarp"]["position"]
     assert np.abs(moved - [431255.0, 5411805.0, 0.0]).max() < 1e-6
+
+
+BOX: Tree = {"size": [1, 1, 1], "resolution": 8}
+SOFT_MATTER: Tree = {"young": 1e5, "poisson": 0.3}
+BAR: Tree = {"name": "b", "box": BOX, "conductivity": 400, "density": 8960, "heat_capacity": 385, "temperature": 300}
+
+
+def gas(**words: Any) -> Tree:
+    return {"gas": [{"name": "g", "box": BOX, **words}]}
+
+
+def liquid(**words: Any) -> Tree:
+    return {"compressible": [{"name": "c", "box": BOX, "sound_speed": 10, "density": 1, **words}]}
+
+
+@pytest.mark.parametrize(
+    ("scene", "refused", "taken"),
+    [
+        (lambda f: {"heat": [BAR | {"temperature": f}]}, "300 + t", "300 + x"),
+        (
+            lambda f: {"heat": [BAR | {"region": [{"shape": {"sphere": {"radius": 0.3}}, "temperature": f}]}]},
+            "t*x",
+            "x",
+        ),
+        (lambda f: {"heat": [BAR | {"source": [{"power": 5, "profile": f}]}]}, "exp(-t)", "exp(-x)"),
+        (lambda f: gas(velocity=[f, 0, 0]), "sin(t)", "sin(x)"),
+        (lambda f: gas(velocity=f), {"keys": [[0, 0, 0, 0], [1, 1, 0, 0]]}, [1, 0, 0]),
+        (lambda f: gas(smoke={"initial": f}), "t", "0.1"),
+        (lambda f: gas(temperature={"initial": f}), "300 + 10*t", "300 + 10*y"),
+        (lambda f: liquid(initial_density=f), "1 + t", "1 + 0.1*x"),
+        (lambda f: liquid(velocity=f), "[t, 0, 0]", "[x, 0, 0]"),
+    ],
+)
+def test_time_at_the_start_is_refused(scene: Callable[[Any], Tree], refused: Any, taken: Any) -> None:
+    with pytest.raises(tumble.SceneError, match="no meaning in a value that does not change; give"):
+        World({"version": 1, **scene(refused)})
+    World({"version": 1, **scene(taken)})
+
+
+@pytest.mark.parametrize(
+    "thing",
+    [
+        {"rope": [{"name": "o", "from": [0, 0, 0], "to": [1, 0, 0], "segments": 8}]},
+        {
+            "rope": [
+                {"name": "o", "from": [0, 0, 0], "to": [1, 0, 0], "segments": 8, "rod": {"stretch": 500, "bend": 0.01}}
+            ]
+        },
+        {"sheet": [{"name": "o", "size": [1, 1], "resolution": [5, 5]}]},
+        {"block": [{"name": "o", "size": [1, 1, 1], "resolution": [3, 3, 3], "material": SOFT_MATTER}]},
+        {"net": [{"name": "o", "mesh": {"path": "plate.obj"}}]},
+        {"cloth": [{"name": "o", "panels": [{"name": "p", "outline": [[0, 0], [1, 0], [1, 1], [0, 1]]}], "resolution": 0.2}]},
+    ],
+    ids=["rope", "rod", "sheet", "block", "net", "cloth"],
+)
+@pytest.mark.parametrize("integrator", ["velocity_verlet", "position_based"])
+def test_things_can_be_thrown(tmp_path: Path, thing: Tree, integrator: str) -> None:
+    plate(tmp_path)
+    ((kind, [words]),) = thing.items()
+    velocity = [1.5, -0.5, 2.0]
+    tree = {"version": 1, "world": {"gravity": [0, 0, 0]}, "system": [{"integrator": integrator}]}
+    world = World(Scene(tree | {kind: [words | {"velocity": velocity}]}, tmp_path))
+    start = world.frame["o"]["position"]
+    assert np.allclose(world.ledger["momentum"], world.ledger["mass"] * np.array(velocity), rtol=1e-5)
+    world.step(12)
+    # Half a second: all of it flies, and nothing else happens to it.
+    assert np.abs(world.frame["o"]["position"] - start - 0.5 * np.array(velocity)).max() < 1e-4
+
+
+def test_what_is_held_is_not_thrown() -> None:
+    rope = {"name": "o", "from": [0, 0, 0], "to": [1, 0, 0], "segments": 8, "velocity": [0, 0, 2], "pin": ["start"]}
+    world = World({"version": 1, "rope": [rope]})
+    world.step(3)
+    x = world.frame["o"]["position"]
+    assert np.array_equal(x[0], [0, 0, 0]) and x[-1][2] > 0.1

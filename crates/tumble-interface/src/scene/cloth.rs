@@ -65,6 +65,10 @@ pub struct Cloth {
     /// Masses that are fixed, or follow a collider.
     #[serde(default)]
     pub pin: Vec<Pin>,
+    /// Initial velocity.
+    #[serde(default)]
+    #[schemars(extend("x-unit" = "m/s"))]
+    pub velocity: [f64; 3],
     /// Red, green and blue in pictures, 0 to 1, in linear light (0.5 is 188 of 255 in sRGB).
     #[serde(default)]
     #[schemars(inner(range(min = 0.0, max = 1.0)))]

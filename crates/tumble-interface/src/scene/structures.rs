@@ -248,6 +248,10 @@ pub struct Rope {
     #[serde(default = "centimetre")]
     #[schemars(extend("x-unit" = "m", "exclusiveMinimum" = 0.0))]
     pub radius: f64,
+    /// Initial velocity.
+    #[serde(default)]
+    #[schemars(extend("x-unit" = "m/s"))]
+    pub velocity: [f64; 3],
     /// Red, green and blue in pictures, 0 to 1, in linear light (0.5 is 188 of 255 in sRGB).
     #[serde(default)]
     #[schemars(inner(range(min = 0.0, max = 1.0)))]
@@ -350,6 +354,10 @@ pub struct Sheet {
     /// Fixed masses: `"corner 0 0"`, `"vertex 3 4"`, `"edge x-"`.
     #[serde(default)]
     pub pin: Vec<Pin>,
+    /// Initial velocity.
+    #[serde(default)]
+    #[schemars(extend("x-unit" = "m/s"))]
+    pub velocity: [f64; 3],
     /// Red, green and blue in pictures, 0 to 1, in linear light (0.5 is 188 of 255 in sRGB).
     #[serde(default)]
     #[schemars(inner(range(min = 0.0, max = 1.0)))]
@@ -395,6 +403,10 @@ pub struct Block {
     /// Fixed masses: `"corner 0 0 0"`, `"vertex 1 2 3"`, `"face z-"`.
     #[serde(default)]
     pub pin: Vec<Pin>,
+    /// Initial velocity.
+    #[serde(default)]
+    #[schemars(extend("x-unit" = "m/s"))]
+    pub velocity: [f64; 3],
     /// Red, green and blue in pictures, 0 to 1, in linear light (0.5 is 188 of 255 in sRGB).
     #[serde(default)]
     #[schemars(inner(range(min = 0.0, max = 1.0)))]
@@ -471,6 +483,10 @@ pub struct Net {
     /// Fixed masses: `"vertex 3"`, or all within a radius of a point.
     #[serde(default)]
     pub pin: Vec<Pin>,
+    /// Initial velocity.
+    #[serde(default)]
+    #[schemars(extend("x-unit" = "m/s"))]
+    pub velocity: [f64; 3],
     /// Red, green and blue in pictures, 0 to 1, in linear light (0.5 is 188 of 255 in sRGB).
     #[serde(default)]
     #[schemars(inner(range(min = 0.0, max = 1.0)))]

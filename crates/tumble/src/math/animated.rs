@@ -92,6 +92,9 @@ impl VectorSignal {
         Ok(match words {
             AnimatedVector::Components([x, y, z]) => Self::Formula(Formula::joined([part(x)?, part(y)?, part(z)?])),
             AnimatedVector::Formula(text) => Self::Formula(Formula::new(text, 3, of)?),
+            AnimatedVector::Keys(_) if of == Of::Start => {
+                return Err("keyframes have no meaning in a value that does not change; give numbers, or formulas of x, y, z".into());
+            }
             AnimatedVector::Keys(keys) => {
                 Self::Keys(Curve::new(keys.keys.iter().map(|[t, x, y, z]| (*t, [*x, *y, *z])).collect(), keys.interpolation)?)
             }

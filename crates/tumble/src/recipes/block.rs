@@ -24,6 +24,7 @@ pub fn block(site: &mut Site<'_>, thing: &Block) {
     let first = lattice.index([0; 3]);
     let pins = pinned(site, &Pinnable { path: &path, n: &lattice.n, first, is_lattice: true }, &thing.pin);
     pins.iter().for_each(|p| site.parts.pin(*p));
+    site.parts.launch(thing.velocity);
     if let Some(words) = &thing.shape_matching {
         let count: usize = lattice.n.iter().map(|n| *n as usize).product();
         site.shape(first as usize..first as usize + count, words, &path);

@@ -161,6 +161,7 @@ pub fn cloth(site: &mut Site<'_>, thing: &Cloth) {
     let first = first.unwrap_or(0);
     let pins = pinned(site, &Pinnable { path: &path, n: &[all.vertices.len() as u32], first, is_lattice: false }, &thing.pin);
     pins.iter().for_each(|p| site.parts.pin(*p));
+    site.parts.launch(thing.velocity);
     let places: Vec<_> = all.triangles.iter().map(|t| t.map(|i| Vector::from(all.vertices[i as usize]))).collect();
     if let Some(object) = site.parts.object() {
         object.triangles = all.triangles;

@@ -84,6 +84,7 @@ pub fn net(site: &mut Site<'_>, thing: &Net, mesh: &Mesh) {
     }
     let pins = pinned(site, &Pinnable { path: &path, n: &[mesh.vertices.len() as u32], first, is_lattice: false }, &thing.pin);
     pins.iter().for_each(|p| site.parts.pin(*p));
+    site.parts.launch(thing.velocity);
     if let Some(object) = site.parts.object() {
         object.triangles.clone_from(&mesh.triangles);
         object.texture = mesh.drawn_texture();

@@ -34,6 +34,7 @@ pub fn rope(site: &mut Site<'_>, thing: &Rope) {
     }
     let pins = pinned(site, &Pinnable { path: &path, n: &[n + 1], first, is_lattice: true }, &thing.pin);
     pins.iter().for_each(|p| site.parts.pin(*p));
+    site.parts.launch(thing.velocity);
     match (&thing.rod, &thing.links) {
         (Some(_), Some(_)) => site.wrong(format!("{path}.links"), "a rod has no links; leave out links or rod"),
         (Some(rod), None) => {

@@ -37,6 +37,7 @@ pub fn sheet(site: &mut Site<'_>, thing: &Sheet) {
     }
     let pins = pinned(site, &Pinnable { path: &path, n: &lattice.n[..2], first, is_lattice: true }, &thing.pin);
     pins.iter().for_each(|p| site.parts.pin(*p));
+    site.parts.launch(thing.velocity);
     if thing.isometric > 0.0 {
         lattice.plate(site, thing.isometric);
     }

@@ -246,7 +246,7 @@ fn check_plane(scene: &Scene, wrong: &mut impl FnMut(String, String)) {
         }
     }
     for thing in &scene.rope {
-        for (key, p) in [("from", thing.from), ("to", thing.to)] {
+        for (key, p) in [("from", thing.from), ("to", thing.to), ("velocity", thing.velocity)] {
             if p[axis] != 0.0 {
                 wrong(format!("rope \"{}\".{key}", thing.name), off_plane(axis, p[axis]));
             }

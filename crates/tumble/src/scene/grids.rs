@@ -38,7 +38,7 @@ impl Map {
     pub fn new(words: &Component) -> Result<Self, String> {
         Ok(match words {
             Component::Value(value) => Self::Value(*value),
-            Component::Formula(text) => Self::Formula(Formula::new(text, 1, Of::Place)?),
+            Component::Formula(text) => Self::Formula(Formula::new(text, 1, Of::Start)?),
         })
     }
 

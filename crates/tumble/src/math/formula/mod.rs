@@ -9,6 +9,7 @@ mod table;
 
 use super::{Row, Vec3};
 use parse::{Tree, parse};
+use std::ops::Range;
 use table::{CONSTANTS, FUNCTIONS, Function};
 use tumble_interface::check::suggestion;
 
@@ -19,11 +20,25 @@ const VARIABLES: [&str; 7] = ["t", "x", "y", "z", "vx", "vy", "vz"];
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Of {
     /// t.
-    Time = 1,
+    Time,
+    /// x, y, z: what a scene begins with, or what does not change.
+    Start,
     /// t, x, y, z.
-    Place = 4,
+    Place,
     /// t, x, y, z, vx, vy, vz.
-    Motion = 7,
+    Motion,
+}
+
+impl Of {
+    /// Which of all variables.
+    fn range(self) -> Range<usize> {
+        match self {
+            Self::Time => 0..1,
+            Self::Start => 1..4,
+            Self::Place => 0..4,
+            Self::Motion => 0..7,
+        }
+    }
 }
 
 /// Masses that an operation takes at a time.
@@ -136,7 +151,10 @@ impl Formula {
                 if FUNCTIONS.iter().any(|(function, _)| function == name) {
                     return Err(format!("\"{name}\" is a function; write {name}(...)"));
                 }
-                let Some(index) = VARIABLES[..of as usize].iter().position(|v| v == name) else {
+                if of == Of::Start && name == "t" {
+                    return Err("t has no meaning in a value that does not change; give a number, or a formula of x, y, z".into());
+                }
+                let Some(index) = of.range().find(|i| VARIABLES[*i] == name) else {
                     return Err(unknown(name, of));
                 };
                 code.push(Instruction::Variable(index));
@@ -267,7 +285,7 @@ fn called(name: &str) -> String {
 
 fn unknown(name: &str, of: Of) -> String {
     let known = || {
-        let names = VARIABLES[..of as usize].iter().copied();
+        let names = VARIABLES[of.range()].iter().copied();
         names.chain(CONSTANTS.iter().map(|c| c.0)).chain(FUNCTIONS.iter().map(|f| f.0))
     };
     let hint = suggestion(name, known());

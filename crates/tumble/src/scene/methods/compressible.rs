@@ -73,7 +73,7 @@ fn gas(words: &Words, flat: Option<usize>, gravity: [f64; 3], wrong: &mut dyn Fn
         wrong(".initial_density", format!("{} kg/m³ at {:?} m, expected > 0", density.value(at), middle(&grid, at)));
         return None;
     }
-    let velocity = VectorSignal::new(&words.velocity, Of::Place).map_err(|message| wrong(".velocity", message)).ok()?;
+    let velocity = VectorSignal::new(&words.velocity, Of::Start).map_err(|message| wrong(".velocity", message)).ok()?;
     let velocity = Vectors::of(grid, "m/s", |mut x| {
         if let Some(flat) = flat {
             x[flat] = grid.origin[flat];

@@ -113,7 +113,7 @@ impl MethodRules for Rules {
 fn scalar(words: &Component) -> Result<Formula, String> {
     match words {
         Component::Value(value) => Ok(Formula::constant(*value)),
-        Component::Formula(text) => Formula::new(text, 1, Of::Place),
+        Component::Formula(text) => Formula::new(text, 1, Of::Start),
     }
 }
 
@@ -376,7 +376,7 @@ impl Read<'_, '_> {
         let smoke = words.smoke.clone().unwrap_or_default();
         let sides = self.sides(warmth.ambient);
         let sources = self.sources(&grid);
-        let velocity = self.vector(".velocity", &words.velocity, Of::Place);
+        let velocity = self.vector(".velocity", &words.velocity, Of::Start);
         let acceleration = self.vector(".acceleration", &words.acceleration, Of::Place);
         let density = words.smoke.as_ref().and_then(|s| self.cells(".smoke.initial", &s.initial, &grid, "kg/m³", 0.0));
         let ambient = Component::Value(warmth.ambient);

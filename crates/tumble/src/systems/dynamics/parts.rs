@@ -190,6 +190,12 @@ impl Parts {
         self.objects.last_mut().map(|d| &mut d.object)
     }
 
+    /// Gives all masses of the object under construction a velocity [m/s]; those that are held keep still.
+    pub fn launch(&mut self, velocity: [f64; 3]) {
+        let range = self.objects.last().map_or(0..0, |d| d.object.points.clone());
+        self.points[range].iter_mut().for_each(|point| point.1 = Vec3::from(velocity));
+    }
+
     /// Begins an object whose particles an emitter makes.
     pub fn emitter(&mut self, emitter: Emitter) {
         self.begin(&emitter.words().name.clone(), emitter.words().radius);
