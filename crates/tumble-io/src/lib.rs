@@ -2,7 +2,7 @@
 //! of a VDB file out ([`vdb`]). [`assets`] does it for all that a scene names. Nothing here opens a file, so the browser uses it too.
 //!
 //! What is common to all formats of meshes: coordinates are taken as they stand in the file (no axis is turned, no unit
-//! converted); a polygon becomes the fan of triangles around its first corner, which is right for convex ones; objects,
+//! converted); a polygon becomes the fan of triangles around its first corner where that covers it, and others that do where not; objects,
 //! groups and materials are merged; normals, colours and images are dropped, texture coordinates kept; vertices that no triangle
 //! uses are dropped, the others keep their order. Any bytes give a mesh or a one-line message that names the cure, never a panic;
 //! work and memory grow with the length of the file, not with the counts it declares (instances in a GLB have a limit).
@@ -14,9 +14,11 @@ mod fabric;
 mod glb;
 mod obj;
 mod ply;
+mod polygon;
 mod repair;
 mod skin;
 mod stl;
+mod text;
 mod vdb;
 
 use tumble_interface::{Character, Mesh};
