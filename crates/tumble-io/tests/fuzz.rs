@@ -29,6 +29,7 @@ fn valid() -> Vec<(Vec<u8>, Format)> {
         (ply_textured(&skirt(), ["s", "t"]), Format::Ply),
         (ply_wedges(&skirt()), Format::Ply),
         (glb_textured(&skirt()), Format::Glb),
+        (arm(), Format::Glb),
         (tumble_io::obj(&skirt()).into_bytes(), Format::Obj),
     ]
 }
