@@ -2,6 +2,7 @@
 //! dict all become this tree, so that one checker serves them.
 
 use crate::error::{Issue, SceneError};
+use std::borrow::Cow;
 
 /// A value and the line it stands on.
 #[derive(Debug, Clone, PartialEq)]
@@ -62,18 +63,25 @@ impl Node {
 
     /// Reads TOML text.
     pub fn from_toml(text: &str) -> Result<Node, SceneError> {
-        let lines = Lines::of(text);
-        let table = toml::de::DeTable::parse(text).map_err(|e| match e.message() {
+        let text = plain(text);
+        let lines = Lines::of(&text);
+        let table = toml::de::DeTable::parse(&text).map_err(|e| match e.message() {
             "recursion limit" => SceneError::one("", TOO_DEEP),
-            message => SceneError { issues: vec![Issue::on(e.span().map(|s| lines.at(s.start)), "", format!("not TOML: {message}"))] },
+            message => {
+                let line = e.span().map(|s| lines.at(s.start));
+                SceneError { issues: vec![Issue::on(line, "", format!("not TOML: {message}{}", decimal(&text, line)))] }
+            }
         })?;
         Ok(Node { value: convert_table(table.get_ref(), &lines), line: Some(1) })
     }
 
     /// Reads JSON text.
     pub fn from_json(text: &str) -> Result<Node, SceneError> {
-        let value: serde_json::Value =
-            serde_json::from_str(text).map_err(|e| SceneError { issues: vec![Issue::on(Some(e.line()), "", format!("not JSON: {e}"))] })?;
+        let text = plain(text);
+        let value: serde_json::Value = serde_json::from_str(&text).map_err(|e| {
+            let hint = decimal(&text, Some(e.line()));
+            SceneError { issues: vec![Issue::on(Some(e.line()), "", format!("not JSON: {e}{hint}"))] }
+        })?;
         Ok(Self::from_value(&value))
     }
 
@@ -209,6 +217,23 @@ fn forget_lines(node: &mut Node) {
     }
 }
 
+/// Text without a byte order mark, with lines that end in a line feed.
+fn plain(text: &str) -> Cow<'_, str> {
+    let text = text.strip_prefix('\u{feff}').unwrap_or(text);
+    if text.contains('\r') { text.replace("\r\n", "\n").replace('\r', "\n").into() } else { text.into() }
+}
+
+/// A hint where a value of a line that cannot be read is a number with a decimal comma.
+fn decimal(text: &str, line: Option<usize>) -> &'static str {
+    let line = line.and_then(|line| text.lines().nth(line.checked_sub(1)?)).unwrap_or_default();
+    let has_comma = |value: &str| {
+        let number = value.trim_start().trim_start_matches(['-', '+']);
+        let rest = number.trim_start_matches(|c: char| c.is_ascii_digit());
+        rest.len() < number.len() && rest.strip_prefix(',').is_some_and(|rest| rest.starts_with(|c: char| c.is_ascii_digit()))
+    };
+    if line.split(['=', ':']).skip(1).any(has_comma) { "; numbers have a decimal point, not a comma: 0.5" } else { "" }
+}
+
 /// Byte offsets at which lines start.
 struct Lines(Vec<usize>);
 
@@ -278,6 +303,19 @@ mod tests {
 
     #[test]
     fn a_toml_error_has_its_line() {
+        for text in ["version = 1\r\nmass = 0,5\r\n", "version = 1\rpoint = { mass = -0,5 }\r"] {
+            let error = Node::from_toml(text).unwrap_err();
+            assert_eq!(error.issues[0].line, Some(2));
+            assert!(error.issues[0].message.contains("decimal point, not a comma"), "{error}");
+        }
+        let error = Node::from_json("{\"version\": 1,\n\"mass\": 0,5}").unwrap_err();
+        assert!(error.issues[0].line == Some(2) && error.issues[0].message.contains("decimal point, not a comma"), "{error}");
+        let error = Node::from_toml("version = 1\nx = [1,2] 3\n").unwrap_err();
+        assert!(!error.issues[0].message.contains("comma:"), "{error}");
+        for text in ["version = 1\nx = 2\n", "\u{feff}version = 1\rx = 2"] {
+            assert_eq!(Node::from_toml(text).unwrap().entry("x").map(|x| (x.value.clone(), x.line)), Some((Value::Int(2), Some(2))));
+        }
+        assert!(Node::from_json("\u{feff}{\"version\": 1}").is_ok());
         let error = Node::from_toml("version = 1\nx = = 2\n").unwrap_err();
         assert_eq!(error.issues[0].line, Some(2));
     }

@@ -1,24 +1,10 @@
-//! Shared by all readers: fans, welding and the final check.
+//! Shared by all readers: welding and the final check.
 
 use std::collections::HashMap;
 use tumble_interface::Mesh;
 
-/// Appends the fan of triangles around the first corner of a polygon: (0, 1, 2), (0, 2, 3), ...
-pub fn fan(triangles: &mut Vec<[u32; 3]>, polygon: &[u32]) {
-    if let [first, rest @ ..] = polygon {
-        triangles.extend(rest.windows(2).map(|pair| [*first, pair[0], pair[1]]));
-    }
-}
-
 /// Texture coordinates of the corners of a triangle, if all of them have some.
 pub type Texture = Option<[[f64; 2]; 3]>;
-
-/// Appends the texture coordinates of the same fan.
-pub fn texture_fan(texture: &mut Vec<Texture>, polygon: &[Option<[f64; 2]>]) {
-    if let [first, rest @ ..] = polygon {
-        texture.extend(rest.windows(2).map(|pair| Some([(*first)?, pair[0]?, pair[1]?])));
-    }
-}
 
 /// Numbers positions so that equal ones get the same number. Equal means equal bits, but -0 equals 0.
 #[derive(Default)]

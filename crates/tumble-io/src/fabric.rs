@@ -48,7 +48,8 @@ pub fn fabric(bytes: &[u8], json: bool) -> Result<Fabric, String> {
 }
 
 fn read(bytes: &[u8], json: bool) -> Result<Fabric, String> {
-    let text = std::str::from_utf8(bytes).map_err(|_| "not UTF-8 text; a fabric is a TOML or JSON file".to_owned())?;
+    let bytes = crate::text::unmarked(bytes);
+    let text = std::str::from_utf8(&bytes).map_err(|_| "not UTF-8 text; a fabric is a TOML or JSON file".to_owned())?;
     let first = |e: SceneError| {
         e.issues.first().map_or_else(String::new, |i| i.line.map_or(String::new(), |line| format!("line {line}: ")) + &i.message)
     };

@@ -2,6 +2,7 @@
 //! own accessors believe counts and offsets and panic on wrong ones.
 
 use crate::build::{DAMAGED, Weld, word};
+use crate::text::unmarked;
 use gltf::Semantic;
 use gltf::json::accessor::{ComponentType, Type};
 use gltf::json::mesh::{Mode, Primitive};
@@ -12,18 +13,34 @@ use std::borrow::Cow;
 use std::collections::BTreeSet;
 use tumble_interface::Mesh;
 
+/// Sets of four joints that a vertex may have; the four largest weights count.
+const SETS: u32 = 4;
+
+pub const INDICES: [ComponentType; 3] = [ComponentType::U8, ComponentType::U16, ComponentType::U32];
+const WEIGHTS: [ComponentType; 3] = [ComponentType::F32, ComponentType::U8, ComponentType::U16];
+
+/// The square of the length of a unit quaternion in single precision is that close to 1.
+const ROUNDING: f64 = 1e-6;
+
 /// Bytes of the file header and the header of the first chunk.
 const HEADERS: usize = 20;
 
 /// Extensions that a file may require and that do not touch the geometry.
 const HARMLESS: [&str; 5] = ["KHR_materials_", "KHR_texture_", "EXT_texture_", "KHR_lights_", "KHR_xmp"];
 
+/// Extensions that change what is shown where, also where a file only uses them and does not require them.
+const MOVING: [(&str, &str); 3] = [
+    ("EXT_mesh_gpu_instancing", "copies of meshes would be missing; export it again with its instances made real"),
+    ("KHR_node_visibility", "hidden objects would appear; export it again without them"),
+    ("CESIUM_RTC", "the mesh would be elsewhere; export it again with plain coordinates"),
+];
+
 /// Nodes may show one mesh, and primitives one accessor, many times over; so many values may be read from any file
 /// (a second or two), and more from a file that has more bytes than that.
 pub const VALUES: usize = 1 << 24;
 
 pub fn read(bytes: &[u8]) -> Result<Mesh, String> {
-    if bytes.trim_ascii_start().starts_with(b"{") {
+    if is_text(bytes) {
         return Err("this is the text form of glTF (.gltf), not binary; export a single .glb file".to_owned());
     }
     let file = framed(bytes)?;
@@ -32,7 +49,9 @@ pub fn read(bytes: &[u8]) -> Result<Mesh, String> {
     let buffers = [glb.bin];
     let mut scene = Scene { root: &root, buffers: &buffers, values: VALUES.max(bytes.len()), mesh: Mesh::default() };
     scene.walk()?;
-    Ok(scene.mesh)
+    // From y up to z up.
+    let vertices = scene.mesh.vertices.iter().map(|[x, y, z]| [*x, 0.0 - z, *y]).collect();
+    Ok(Mesh { vertices, ..scene.mesh })
 }
 
 /// The bytes of the file as its header counts them.
@@ -51,8 +70,8 @@ pub type Open<'a> = (Root, Vec<Option<Cow<'a, [u8]>>>);
 
 /// Opens a binary file, or the text form with its buffers inside.
 pub fn open(bytes: &[u8]) -> Result<Open<'_>, String> {
-    if bytes.trim_ascii_start().starts_with(b"{") {
-        let root = parse(bytes)?;
+    if is_text(bytes) {
+        let root = parse(&unmarked(bytes))?;
         let inside = |uri: &String| {
             let (_, data) = uri.strip_prefix("data:")?.split_once(";base64,")?;
             base64(data).map(Cow::Owned)
@@ -90,11 +109,20 @@ fn base64(text: &str) -> Option<Vec<u8>> {
 }
 
 fn parse(json: &[u8]) -> Result<Root, String> {
-    let root = Root::from_slice(json).map_err(|e| format!("JSON: {e}; {DAMAGED}"))?;
+    let root = Root::from_slice(json.strip_prefix(b"\xef\xbb\xbf").unwrap_or(json)).map_err(|e| format!("JSON: {e}; {DAMAGED}"))?;
     if let Some(name) = root.extensions_required.iter().find(|name| !HARMLESS.iter().any(|start| name.starts_with(start))) {
         return Err(format!("the file requires the extension {name}, which is not supported; export without it (no compression)"));
     }
+    let told = root.extensions_used.iter().find_map(|name| MOVING.iter().find(|(known, _)| name == known));
+    if let Some((name, cure)) = told {
+        return Err(format!("the file uses the extension {name}, which is not supported: {cure}"));
+    }
     Ok(root)
+}
+
+/// What starts with the text form of glTF.
+fn is_text(bytes: &[u8]) -> bool {
+    unmarked(bytes).trim_ascii_start().starts_with(b"{")
 }
 
 /// The file, and what of it has been read.
@@ -109,31 +137,90 @@ pub struct Scene<'a> {
 impl<'a> Scene<'a> {
     /// Appends the meshes of all nodes of the default scene, or of the first one, or of all nodes if there is no scene.
     fn walk(&mut self) -> Result<(), String> {
-        let mut places: Vec<Affine> = Vec::new();
-        for (n, parent) in nodes(self.root)? {
-            let node = &self.root.nodes[n];
-            let transform = parent.map_or(Affine::IDENTITY, |p| places[p]).after(Affine::of(node));
-            places.push(transform);
-            if let Some(mesh) = node.mesh {
-                self.add_mesh(mesh.value(), transform)?;
-            }
+        let all = nodes(self.root)?;
+        let mut places: Vec<Affine> = Vec::with_capacity(all.len());
+        let mut place_of = vec![None; self.root.nodes.len()];
+        for (n, parent) in &all {
+            let place = parent.map_or(Affine::IDENTITY, |p| places[p]).after(Affine::of(&self.root.nodes[*n]));
+            places.push(place);
+            place_of[*n] = Some(place);
+        }
+        for ((n, _), place) in all.iter().zip(places) {
+            let node = &self.root.nodes[*n];
+            let Some(mesh) = node.mesh else { continue };
+            let bones = match node.skin {
+                Some(skin) => Some(self.bones(skin.value(), &place_of)?),
+                None => None,
+            };
+            self.add_mesh(mesh.value(), place, bones.as_deref())?;
         }
         Ok(())
     }
 
-    /// Appends a mesh as one node shows it.
-    fn add_mesh(&mut self, m: usize, transform: Affine) -> Result<(), String> {
+    /// What each joint of a skin, where its node stands, does to the vertices.
+    fn bones(&mut self, s: usize, place_of: &[Option<Affine>]) -> Result<Vec<Affine>, String> {
+        let bone = |(node, inverse): (usize, [[f64; 4]; 3])| {
+            let place = place_of.get(node).copied().flatten().ok_or_else(|| not_in_scene(node))?;
+            Ok(place.after(Affine { m: inverse.map(|[a, b, c, _]| [a, b, c]), t: inverse.map(|row| row[3]) }))
+        };
+        self.joints(s)?.into_iter().map(bone).collect()
+    }
+
+    /// The joints of a skin: their nodes, and the inverse bind matrices.
+    pub fn joints(&mut self, s: usize) -> Result<Vec<(usize, [[f64; 4]; 3])>, String> {
+        let skin = self.root.skins.get(s).ok_or_else(|| format!("skin {s} does not exist; {DAMAGED}"))?;
+        self.spend(skin.joints.len())?;
+        let inverses = match skin.inverse_bind_matrices {
+            Some(column) => Some(self.column(column.value(), Type::Mat4, &[ComponentType::F32])?),
+            None => None,
+        };
+        if let Some(inverses) = inverses.as_ref().filter(|c| c.count < skin.joints.len()) {
+            return Err(format!("skin {s} has {} matrices for {} joints; {DAMAGED}", inverses.count, skin.joints.len()));
+        }
+        let joint = |(i, node): (usize, usize)| {
+            let entry = |r: usize, c: usize| inverses.as_ref().map_or(f64::from(u8::from(r == c)), |m| m.number(i, 4 * c + r));
+            let inverse = [0, 1, 2].map(|r| [0, 1, 2, 3].map(|c| entry(r, c)));
+            if inverse.as_flattened().iter().any(|x| !x.is_finite()) {
+                return Err(format!("matrix {i} of skin {s} is not finite; {DAMAGED}"));
+            }
+            if inverse.iter().all(|row| row[..3] == [0.0; 3]) {
+                return Err(format!("matrix {i} of skin {s} is zero; {DAMAGED}"));
+            }
+            Ok((node, inverse))
+        };
+        skin.joints.iter().map(|joint| joint.value()).enumerate().map(joint).collect()
+    }
+
+    /// Joints and weights of the `n` vertices of a primitive that has a skin.
+    pub fn weights(&mut self, primitive: &Primitive, n: usize) -> Result<Weights<'a>, String> {
+        let attribute = |semantic| primitive.attributes.get(&Checked::Valid(semantic)).map(|a| a.value());
+        let mut sets = Vec::new();
+        for set in 0..SETS {
+            let (Some(joints), Some(weights)) = (attribute(Semantic::Joints(set)), attribute(Semantic::Weights(set))) else { break };
+            let joints = self.column(joints, Type::Vec4, &INDICES[..2])?;
+            let weights = self.column(weights, Type::Vec4, &WEIGHTS)?;
+            if joints.count != n || weights.count != n {
+                return Err(format!("{n} positions, but {} joints and {} weights; {DAMAGED}", joints.count, weights.count));
+            }
+            sets.push((joints, weights));
+        }
+        if sets.is_empty() {
+            return Err("a primitive of a skin without JOINTS_0 and WEIGHTS_0; export it with its weights".to_owned());
+        }
+        Ok(Weights(sets))
+    }
+
+    /// Appends a mesh as one node shows it, where it stands or where its bones do.
+    fn add_mesh(&mut self, m: usize, place: Affine, bones: Option<&[Affine]>) -> Result<(), String> {
         let mesh = self.root.meshes.get(m).ok_or_else(|| format!("mesh {m} does not exist; {DAMAGED}"))?;
-        // A mirrored mesh would be inside out: the order of its corners is reversed (glTF 2.0, 3.7.4).
-        let mirrored = transform.determinant() < 0.0;
         let mut weld = Weld::default();
         for primitive in &mesh.primitives {
-            self.add_primitive(primitive, transform, mirrored, &mut weld).map_err(|e| format!("mesh {m}: {e}"))?;
+            self.add_primitive(primitive, place, bones, &mut weld).map_err(|e| format!("mesh {m}: {e}"))?;
         }
         Ok(())
     }
 
-    fn add_primitive(&mut self, primitive: &Primitive, transform: Affine, mirrored: bool, weld: &mut Weld) -> Result<(), String> {
+    fn add_primitive(&mut self, primitive: &Primitive, place: Affine, bones: Option<&[Affine]>, weld: &mut Weld) -> Result<(), String> {
         self.spend(1)?;
         let Checked::Valid(mode) = primitive.mode else { return Err(format!("unknown kind of primitive; {DAMAGED}")) };
         if !matches!(mode, Mode::Triangles | Mode::TriangleStrip | Mode::TriangleFan) {
@@ -143,13 +230,16 @@ impl<'a> Scene<'a> {
             return Err("a primitive without POSITION; export the mesh with its vertices".to_owned());
         };
         let positions = self.column(positions.value(), Type::Vec3, &[ComponentType::F32])?;
+        let weights = match bones {
+            Some(_) => Some(self.weights(primitive, positions.count)?),
+            None => None,
+        };
         // Invalid texture coordinates are ignored.
         let texture = primitive.attributes.get(&Checked::Valid(Semantic::TexCoords(0)));
         let texture = texture
             .and_then(|column| self.column(column.value(), Type::Vec2, &[ComponentType::F32, ComponentType::U8, ComponentType::U16]).ok());
-        let indices = [ComponentType::U8, ComponentType::U16, ComponentType::U32];
         let indices = match primitive.indices {
-            Some(column) => Some(self.column(column.value(), Type::Scalar, &indices)?),
+            Some(column) => Some(self.column(column.value(), Type::Scalar, &INDICES)?),
             None => None,
         };
 
@@ -158,10 +248,19 @@ impl<'a> Scene<'a> {
             let x = positions.vector(i);
             let number = weld.number(x, self.mesh.vertices.len())?;
             if number as usize == self.mesh.vertices.len() {
-                self.mesh.vertices.push(transform.apply(x));
+                let place = match (bones, &weights) {
+                    (Some(bones), Some(weights)) => {
+                        let four = weights.four(i, bones.len()).map_err(|e| format!("vertex {i}: {e}"))?;
+                        Affine::mean(four.map(|(joint, weight)| (bones.get(joint).copied().unwrap_or(Affine::IDENTITY), weight)))
+                    }
+                    _ => place,
+                };
+                self.mesh.vertices.push(place.apply(x));
             }
             numbers.push(number);
         }
+        // A mirrored mesh would be inside out: the order of its corners is reversed (glTF 2.0, 3.7.4).
+        let mirrored = bones.and_then(|bones| bones.first()).unwrap_or(&place).determinant() < 0.0;
         // In glTF v points down.
         let texture: Vec<_> = texture.iter().flat_map(|c| (0..c.count).map(|i| [c.number(i, 0), 1.0 - c.number(i, 1)])).collect();
         self.add_triangles(mode, indices.as_ref(), &numbers, &texture, mirrored)
@@ -274,10 +373,43 @@ pub fn nodes(root: &Root) -> Result<Vec<(usize, Option<usize>)>, String> {
         if std::mem::replace(&mut seen[n], true) {
             return Err(format!("node {n} has two parents or is its own ancestor; {DAMAGED}"));
         }
+        if let Some(q) = node.rotation.filter(|q| node.matrix.is_none() && (q.0 == [0.0; 4] || q.0.iter().any(|x| !x.is_finite()))) {
+            return Err(format!("node {n} has the rotation {:?}, which is none; {DAMAGED}", q.0));
+        }
         all.push((n, parent));
         todo.extend(children(node).map(|child| (child, Some(all.len() - 1))));
     }
     Ok(all)
+}
+
+/// Of a joint that the scene does not show.
+pub fn not_in_scene(node: usize) -> String {
+    format!("node {node} is used but not in the scene; {DAMAGED}")
+}
+
+/// Joints and weights of vertices, in sets of four.
+pub struct Weights<'a>(Vec<(Column<'a>, Column<'a>)>);
+
+impl Weights<'_> {
+    /// The four largest weights of a vertex with their joints, of which there are `joints`, made to add up to 1.
+    pub fn four(&self, i: usize, joints: usize) -> Result<[(usize, f64); 4], String> {
+        let mut found: Vec<(usize, f64)> = Vec::new();
+        for (joint, weight) in self.0.iter().flat_map(|(joints, weights)| (0..4).map(|k| (joints.index(i, k), weights.number(i, k)))) {
+            if !(0.0..=1e6).contains(&weight) {
+                return Err(format!("a weight of {weight}, expected 0 to 1; export the mesh again"));
+            }
+            if weight > 0.0 && joint >= joints {
+                return Err(format!("joint {joint} of {joints} (counted from 0); {DAMAGED}"));
+            }
+            found.push((joint, weight));
+        }
+        found.sort_by(|a, b| b.1.total_cmp(&a.1).then(a.0.cmp(&b.0)));
+        let sum: f64 = found.iter().take(4).map(|f| f.1).sum();
+        if sum <= 0.0 {
+            return Err("no weight above 0; bind every vertex to a bone and export it again".to_owned());
+        }
+        Ok(std::array::from_fn(|k| found.get(k).filter(|f| f.1 > 0.0).map_or((0, 0.0), |f| (f.0, f.1 / sum))))
+    }
 }
 
 fn children(node: &Node) -> impl Iterator<Item = usize> {
@@ -348,7 +480,10 @@ impl Affine {
             let entry = |row: usize, column: usize| f64::from(columns[4 * column + row]);
             return Self { m: [0, 1, 2].map(|r| [0, 1, 2].map(|c| entry(r, c))), t: [0, 1, 2].map(|r| entry(r, 3)) };
         }
-        let [x, y, z, w] = node.rotation.unwrap_or_default().0.map(f64::from);
+        let q = node.rotation.unwrap_or_default().0.map(f64::from);
+        let length_sq: f64 = q.iter().map(|x| x * x).sum();
+        // Beyond what rounding leaves of 1.
+        let [x, y, z, w] = if (length_sq - 1.0).abs() > ROUNDING { q.map(|x| x / length_sq.sqrt()) } else { q };
         let s = node.scale.map_or([1.0; 3], |s| s.map(f64::from));
         // Unit quaternion to matrix.
         let r = [
@@ -357,6 +492,12 @@ impl Affine {
             [2.0 * (x * z - w * y), 2.0 * (y * z + w * x), 1.0 - 2.0 * (x * x + y * y)],
         ];
         Self { m: r.map(|row| [row[0] * s[0], row[1] * s[1], row[2] * s[2]]), t: node.translation.map_or([0.0; 3], |t| t.map(f64::from)) }
+    }
+
+    /// The mean of four, by weights.
+    fn mean(all: [(Self, f64); 4]) -> Self {
+        let sum = |of: &dyn Fn(&Self) -> f64| all.iter().map(|(place, weight)| weight * of(place)).sum();
+        Self { m: [0, 1, 2].map(|r| [0, 1, 2].map(|c| sum(&|p| p.m[r][c]))), t: [0, 1, 2].map(|r| sum(&|p| p.t[r])) }
     }
 
     /// `inner` first, then `self`.

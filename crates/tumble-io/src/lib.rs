@@ -1,12 +1,12 @@
 //! Bytes of a mesh file in, a [`Mesh`] or a [`Character`] out; of a record, a [`Fabric`](tumble_interface::Fabric); and volumes in, bytes
 //! of a VDB file out ([`vdb`]). [`assets`] does it for all that a scene names. Nothing here opens a file, so the browser uses it too.
 //!
-//! What is common to all formats of meshes: coordinates are taken as they stand in the file (no axis is turned, no unit
-//! converted); a polygon becomes the fan of triangles around its first corner, which is right for convex ones; objects,
+//! What is common to all formats of meshes: coordinates are taken as they stand in the file (no unit is converted, and an axis turned
+//! in GLB only, which says where up is); a polygon becomes the fan of triangles around its first corner where that covers it, and others that do where not; objects,
 //! groups and materials are merged; normals, colours and images are dropped, texture coordinates kept; vertices that no triangle
-//! uses are dropped, the others keep their order. Any bytes give a mesh or a one-line message that names the cure, never a panic;
+//! uses are dropped, the others keep their order. Text may begin with a byte order mark and end its lines in any way. Any bytes give a mesh or a one-line message that names the cure, never a panic;
 //! work and memory grow with the length of the file, not with the counts it declares (instances in a GLB have a limit).
-//! Verified by `tests/formats.rs` and `tests/fuzz.rs`.
+//! Verified by `tests/formats.rs`, `tests/text.rs`, `tests/polygons.rs` and `tests/fuzz.rs`.
 
 pub mod assets;
 mod build;
@@ -14,9 +14,11 @@ mod fabric;
 mod glb;
 mod obj;
 mod ply;
+mod polygon;
 mod repair;
 mod skin;
 mod stl;
+mod text;
 mod vdb;
 
 use tumble_interface::{Character, Mesh};
@@ -36,9 +38,10 @@ pub enum Format {
     Ply,
     /// STL, ASCII or binary. The format repeats each vertex in each triangle: equal positions are welded.
     Stl,
-    /// Binary glTF 2.0 with its buffer inside, node transforms applied. **glTF is y-up**; the coordinates are left so.
+    /// Binary glTF 2.0 with its buffer inside, node transforms applied, turned from y up to z up: (x, y, z) becomes (x, -z, y).
     /// The format splits vertices at seams of normals and texture coordinates: within one mesh of one node, equal
-    /// positions are welded. Skins, morph targets and animations are ignored: [`character`] reads them.
+    /// positions are welded. A skin stands where the nodes of its joints do, in the bind pose if they were left in it, whatever moves the node
+    /// of the mesh. Morph targets and animations are ignored: [`character`] reads the latter.
     Glb,
 }
 

@@ -5,79 +5,111 @@
 //! object, group and material (a closed mesh comes out open along their borders), does not tell the line of an error,
 //! and overflows on texture indices out of range.
 
-use crate::build::{DAMAGED, fan, texture_fan};
+use crate::build::DAMAGED;
+use crate::polygon::Polygons;
+use crate::text::{comma, lines_of, number, unmarked};
 use tumble_interface::Mesh;
 
 pub fn read(bytes: &[u8]) -> Result<Mesh, String> {
+    let bytes = unmarked(bytes);
     if bytes.contains(&0) {
         return Err("this is a binary file, not an OBJ text; check the file extension".to_owned());
     }
-    let text = String::from_utf8_lossy(bytes); // names and comments may be in any encoding
-    let mut mesh = Mesh::default();
-    let mut largest = (0, 0); // index in the file, counted from 1, and its line
-    let mut polygon = Vec::new();
-    let mut texture: Vec<[f64; 2]> = Vec::new();
-    let mut corners: Vec<Option<usize>> = Vec::new(); // of all polygons, into it
-    let mut sizes = Vec::new();
+    let mut found = Found::default();
     let mut joined = String::new();
-    for (number, line) in (1_usize..).zip(text.lines().chain([""])) {
-        // A line that ends in a backslash goes on in the next.
-        if let Some(start) = line.strip_suffix('\\') {
-            joined.push_str(start);
+    for (n, line) in (1_usize..).zip(lines_of(&bytes).lines().chain([""])) {
+        let (said, comment) = line.split_once('#').map_or((line, false), |(said, _)| (said, true));
+        joined.push_str(said.trim_end());
+        // What ends in a backslash goes on in the next line; but comments end with theirs, and so do names, which may end in one: D:\maps\.
+        let key = joined.split([' ', '\t', '\\']).find(|word| !word.is_empty());
+        if !comment && matches!(key, None | Some("v" | "vt" | "f")) && joined.ends_with('\\') {
+            joined.pop();
             joined.push(' ');
             continue;
         }
-        joined.push_str(line);
-        let mut words = joined.split('#').next().unwrap_or_default().split_ascii_whitespace();
+        found.statement(&joined, n).map_err(|e| format!("line {n}: {e}"))?;
+        joined.clear();
+    }
+    found.finish()
+}
+
+/// What the file says, in the order of its lines.
+#[derive(Default)]
+struct Found {
+    mesh: Mesh,
+    /// Of each face how many corners it has, and the line.
+    faces: Vec<(usize, usize)>,
+    /// Vertices of all corners of all faces.
+    corners: Vec<u32>,
+    texture: Vec<[f64; 2]>,
+    /// Of all corners, into it.
+    textured: Vec<Option<u32>>,
+    /// Largest index in the file, counted from 1, and its line.
+    largest: (u32, usize),
+}
+
+impl Found {
+    fn statement(&mut self, said: &str, line: usize) -> Result<(), String> {
+        let mut words = said.split_ascii_whitespace();
         match words.next() {
             Some("v") => {
                 let mut x = [0.0; 3]; // a weight or a colour may follow
                 for x in &mut x {
-                    let word = words.next().ok_or_else(|| format!("line {number}: a vertex needs 3 coordinates; {DAMAGED}"))?;
-                    *x = word.parse().map_err(|_| format!("line {number}: \"{word}\" is not a number; {DAMAGED}"))?;
+                    *x = number(words.next().ok_or_else(|| format!("a vertex needs 3 coordinates; {DAMAGED}"))?)?;
                 }
-                mesh.vertices.push(x);
+                self.mesh.vertices.push(x);
             }
             Some("vt") => {
+                if let Some(word) = words.clone().find(|word| comma(word).is_some()) {
+                    number(word)?;
+                }
                 let mut next = || words.next().and_then(|word| word.parse().ok()).unwrap_or(f64::NAN);
-                texture.push([next(), next()]);
+                self.texture.push([next(), next()]);
             }
             Some("f") => {
-                polygon.clear();
+                let before = self.corners.len();
                 for word in words {
-                    let i = position(word, mesh.vertices.len()).ok_or_else(|| {
-                        format!("line {number}: \"{word}\" is not a vertex index (the first is 1, the latest is -1); {DAMAGED}")
-                    })?;
-                    if i > largest.0 {
-                        largest = (i, number);
+                    let i = position(word, self.mesh.vertices.len())
+                        .ok_or_else(|| format!("\"{word}\" is not a vertex index (the first is 1, the latest is -1); {DAMAGED}"))?;
+                    if i > self.largest.0 {
+                        self.largest = (i, line);
                     }
-                    polygon.push(i - 1);
-                    corners.push(counted(word.split('/').nth(1), texture.len()).and_then(|i| usize::try_from(i - 1).ok()));
+                    self.corners.push(i - 1);
+                    self.textured.push(counted(word.split('/').nth(1), self.texture.len()).map(|i| i - 1));
                 }
-                if polygon.len() < 3 {
-                    return Err(format!("line {number}: a face needs 3 vertices, this one has {}; {DAMAGED}", polygon.len()));
+                let n = self.corners.len() - before;
+                if n < 3 {
+                    return Err(format!("a face needs 3 vertices, this one has {n}; {DAMAGED}"));
                 }
-                fan(&mut mesh.triangles, &polygon);
-                sizes.push(polygon.len());
+                self.faces.push((n, line));
             }
             _ => {}
         }
-        joined.clear();
+        Ok(())
     }
-    let n = mesh.vertices.len();
-    if n == 0 && mesh.triangles.is_empty() {
-        return Err("neither vertices (lines \"v x y z\") nor faces (\"f i j k\") found; is this an OBJ file?".to_owned());
+
+    /// Triangles of the faces, which may come before their vertices.
+    fn finish(self) -> Result<Mesh, String> {
+        let Self { mut mesh, faces, corners, texture, textured, largest } = self;
+        let n = mesh.vertices.len();
+        if n == 0 && faces.is_empty() {
+            return Err("neither vertices (lines \"v x y z\") nor faces (\"f i j k\") found; is this an OBJ file?".to_owned());
+        }
+        if largest.0 as usize > n {
+            let (i, line) = largest;
+            return Err(format!(
+                "line {line}: the face uses vertex {i}, but the file has {n}; it is truncated or damaged, export it again"
+            ));
+        }
+        let mut polygons = Polygons::default();
+        let mut first = 0;
+        for (n, line) in faces {
+            let at = |k: usize| texture.get(textured[first + k]? as usize).copied();
+            polygons.add(&mut mesh, &corners[first..first + n], at).map_err(|e| format!("line {line}: {e}"))?;
+            first += n;
+        }
+        Ok(mesh)
     }
-    if largest.0 as usize > n {
-        let (i, number) = largest;
-        return Err(format!("line {number}: the face uses vertex {i}, but the file has {n}; it is truncated or damaged, export it again"));
-    }
-    // Lines may be in any order.
-    let mut corners = corners.into_iter().map(|i| texture.get(i?).copied());
-    for n in sizes {
-        texture_fan(&mut mesh.texture, &corners.by_ref().take(n).collect::<Vec<_>>());
-    }
-    Ok(mesh)
 }
 
 /// The text of an OBJ file of a mesh, with its texture coordinates; what [`mesh`](crate::mesh) reads from it is the same, bit by bit, if it has no

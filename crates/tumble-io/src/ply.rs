@@ -1,19 +1,36 @@
 //! Stanford PLY, by the crate `ply-rs-bw`. What it would believe unseen is checked first: the declared counts.
 
-use crate::build::{DAMAGED, Weld, fan, texture_fan};
+use crate::build::{DAMAGED, Weld};
+use crate::polygon::Polygons;
+use crate::text::{comma, lines_of, unmarked};
 use ply_rs_bw::parser::{ParseError, Parser, Reader};
 use ply_rs_bw::ply::{ElementDef, Encoding, Property, PropertyAccess, PropertyAccessResult, PropertyType, ScalarType};
 use tumble_interface::Mesh;
 
 pub fn read(bytes: &[u8]) -> Result<Mesh, String> {
+    let bytes = unmarked(bytes);
     if !bytes.starts_with(b"ply") {
         return Err("the file does not start with \"ply\"; check the file extension".to_owned());
     }
-    let end = header_length(bytes).ok_or("the header has no end (a line \"end_header\"); the file is truncated, export it again")?;
+    let end = header_length(&bytes).ok_or("the header has no end (a line \"end_header\"); the file is truncated, export it again")?;
     let (header, payload) = bytes.split_at(end);
-    // The parser wants UTF-8; comments may be in any encoding.
-    let header: Vec<u8> = header.iter().map(|b| if b.is_ascii() { *b } else { b'?' }).collect();
-    let mut reader = Reader::new(std::io::Read::chain(&header[..], payload));
+    // The parser wants UTF-8, line feeds and single blanks; comments may be in any encoding.
+    let header: String = lines_of(header).lines().map(|line| line.split_ascii_whitespace().collect::<Vec<_>>().join(" ") + "\n").collect();
+    let lines = header.lines().count();
+    let plain;
+    let payload = if header.lines().any(|line| line.starts_with("format ascii ")) {
+        let text = lines_of(payload);
+        let is_loose = text.starts_with('\n') || text.contains("\n\n");
+        plain = if is_loose { text.lines().filter(|line| !line.is_empty()).flat_map(|line| [line, "\n"]).collect() } else { text };
+        let word = |line: &str| line.split_ascii_whitespace().find_map(|word| Some(format!("\"{word}\" {}", comma(word)?)));
+        if let Some((n, told)) = (1 + lines..).zip(plain.lines()).find_map(|(n, line)| Some((n, word(line)?))) {
+            return Err(format!("line {n}: {told}"));
+        }
+        plain.as_bytes()
+    } else {
+        payload
+    };
+    let mut reader = Reader::new(std::io::Read::chain(header.as_bytes(), payload));
     let header = Parser::<Skipped>::new().read_header(&mut reader).map_err(|e| format!("header: {e}"))?;
 
     let least: u128 = header.elements.values().map(|e| e.count as u128 * least_bytes(e, header.encoding) as u128).sum();
@@ -59,6 +76,7 @@ pub fn read(bytes: &[u8]) -> Result<Mesh, String> {
             }
         }
     }
+    let mut triangles = Polygons::default();
     for (f, polygon) in polygons.iter().enumerate() {
         match &polygon.corners {
             None => return Err(format!("face {f} has no list \"vertex_indices\" of numbers 0, 1, 2, ...; {DAMAGED}")),
@@ -66,11 +84,10 @@ pub fn read(bytes: &[u8]) -> Result<Mesh, String> {
                 return Err(format!("face {f} has {} vertices, at least 3 are needed; {DAMAGED}", corners.len()));
             }
             Some(corners) => {
-                fan(&mut mesh.triangles, corners);
                 let own = |k: usize| Some([*polygon.texture.get(2 * k)?, *polygon.texture.get(2 * k + 1)?]);
                 let of_vertex = |i: u32| texture.get(i as usize).copied();
-                let all: Vec<_> = corners.iter().enumerate().map(|(k, i)| own(k).or_else(|| of_vertex(*i))).collect();
-                texture_fan(&mut mesh.texture, &all);
+                let at = |k: usize| own(k).or_else(|| of_vertex(corners[k]));
+                triangles.add(&mut mesh, corners, at).map_err(|e| format!("face {f}: {e}"))?;
             }
         }
     }
@@ -83,12 +100,16 @@ pub fn read(bytes: &[u8]) -> Result<Mesh, String> {
     Ok(mesh)
 }
 
-/// Bytes up to and with the line `end_header`.
+/// Bytes up to and with the line `end_header`. Where lines end in a carriage return alone, a line feed after the last is data.
 fn header_length(bytes: &[u8]) -> Option<usize> {
-    let end = b"\nend_header";
-    let line = 1 + bytes.windows(end.len()).position(|window| window == end)?;
-    let length = bytes[line..].iter().position(|b| *b == b'\n')?;
-    Some(line + length + 1)
+    let end = b"end_header";
+    let starts = |at: &usize| matches!(bytes[at - 1], b'\n' | b'\r') && bytes[*at..].starts_with(end);
+    let line = (1..bytes.len()).find(starts)?;
+    let length = line + bytes[line..].iter().position(|b| matches!(b, b'\n' | b'\r'))?;
+    let first = bytes.iter().position(|b| matches!(b, b'\n' | b'\r'))?;
+    let is_pair = |at: usize| bytes[at..].starts_with(b"\r\n");
+    let alone = bytes[first] == b'\r' && !is_pair(first);
+    Some(length + if is_pair(length) && !alone { 2 } else { 1 })
 }
 
 /// Fewest bytes one row of an element can take; at least one, so that a count is bounded by the length of the file.

@@ -1,7 +1,7 @@
 //! Skins and movements of glTF 2.0. Every node is a joint; what no skin binds hangs on its node.
 
 use crate::build::{self, DAMAGED, Weld};
-use crate::glb::{Affine, Scene, VALUES, nodes, open};
+use crate::glb::{Affine, INDICES, Scene, VALUES, nodes, not_in_scene, open};
 use gltf::Semantic;
 use gltf::animation::{Interpolation, Property};
 use gltf::json::accessor::{ComponentType, Type};
@@ -11,11 +11,6 @@ use gltf::json::validation::Checked;
 use tumble_interface::Mesh;
 use tumble_interface::character::{Between, Bind, Character, Clip, Influence, Joint, Part, Track, Transform};
 
-/// Sets of four joints that a vertex may have; the four largest weights count.
-const SETS: u32 = 4;
-
-const INDICES: [ComponentType; 3] = [ComponentType::U8, ComponentType::U16, ComponentType::U32];
-const WEIGHTS: [ComponentType; 3] = [ComponentType::F32, ComponentType::U8, ComponentType::U16];
 const ROTATIONS: [ComponentType; 5] = [ComponentType::F32, ComponentType::I8, ComponentType::U8, ComponentType::I16, ComponentType::U16];
 
 pub fn read(bytes: &[u8]) -> Result<Character, String> {
@@ -57,7 +52,7 @@ impl<'a> Reader<'a> {
     }
 
     fn joint(&self, node: usize) -> Result<u32, String> {
-        self.joint_of.get(node).copied().flatten().ok_or_else(|| format!("node {node} is used but not in the scene; {DAMAGED}"))
+        self.joint_of.get(node).copied().flatten().ok_or_else(|| not_in_scene(node))
     }
 
     fn surfaces(&mut self) -> Result<(), String> {
@@ -95,27 +90,8 @@ impl<'a> Reader<'a> {
     }
 
     fn skin(&mut self, s: usize) -> Result<Vec<Bind>, String> {
-        let skin = self.scene.root.skins.get(s).ok_or_else(|| format!("skin {s} does not exist; {DAMAGED}"))?;
-        self.scene.spend(skin.joints.len())?;
-        let inverses = match skin.inverse_bind_matrices {
-            Some(column) => Some(self.scene.column(column.value(), Type::Mat4, &[ComponentType::F32])?),
-            None => None,
-        };
-        if let Some(inverses) = inverses.as_ref().filter(|c| c.count < skin.joints.len()) {
-            return Err(format!("skin {s} has {} matrices for {} joints; {DAMAGED}", inverses.count, skin.joints.len()));
-        }
-        let bind = |(i, node): (usize, usize)| {
-            let entry = |r: usize, c: usize| inverses.as_ref().map_or(IDENTITY[r][c], |m| m.number(i, 4 * c + r));
-            let inverse = [0, 1, 2].map(|r| [0, 1, 2, 3].map(|c| entry(r, c)));
-            if inverse.as_flattened().iter().any(|x| !x.is_finite()) {
-                return Err(format!("matrix {i} of skin {s} is not finite; {DAMAGED}"));
-            }
-            if inverse.iter().all(|row| row[..3] == [0.0; 3]) {
-                return Err(format!("matrix {i} of skin {s} is zero; {DAMAGED}"));
-            }
-            Ok(Bind { joint: self.joint(node)?, inverse })
-        };
-        skin.joints.iter().map(|joint| joint.value()).enumerate().map(bind).collect()
+        let joints = self.scene.joints(s)?;
+        joints.into_iter().map(|(node, inverse)| Ok(Bind { joint: self.joint(node)?, inverse })).collect()
     }
 
     /// Appends a primitive. A skin has its binds and their count; without one all hangs on bind `first`.
@@ -141,36 +117,26 @@ impl<'a> Reader<'a> {
             Some(column) => Some(self.scene.column(column.value(), Type::Scalar, &INDICES)?),
             None => None,
         };
-        let mut sets = Vec::new();
-        if skin.is_some() {
-            for set in 0..SETS {
-                let (Some(joints), Some(weights)) = (attribute(Semantic::Joints(set)), attribute(Semantic::Weights(set))) else { break };
-                let joints = self.scene.column(joints, Type::Vec4, &INDICES[..2])?;
-                let weights = self.scene.column(weights, Type::Vec4, &WEIGHTS)?;
-                if joints.count != positions.count || weights.count != positions.count {
-                    return Err(format!(
-                        "{} positions, but {} joints and {} weights; {DAMAGED}",
-                        positions.count, joints.count, weights.count
-                    ));
-                }
-                sets.push((joints, weights));
-            }
-            if sets.is_empty() {
-                return Err("a primitive of a skin without JOINTS_0 and WEIGHTS_0; export it with its weights".to_owned());
-            }
-        }
+        let weights = match skin {
+            Some(_) => Some(self.scene.weights(primitive, positions.count)?),
+            None => None,
+        };
         let mut numbers = Vec::with_capacity(positions.count); // bounded by the buffer's length
         for i in 0..positions.count {
             let x = positions.vector(i);
             let number = weld.number(x, self.scene.mesh.vertices.len())?;
             if number as usize == self.scene.mesh.vertices.len() {
                 self.scene.mesh.vertices.push(x);
-                self.character.skin.push(match skin {
-                    None => [Influence { bind: first, weight: 1.0 }, Influence::default(), Influence::default(), Influence::default()],
-                    Some((first, count)) => {
-                        let all = sets.iter().flat_map(|(joints, weights)| (0..4).map(|k| (joints.index(i, k), weights.number(i, k))));
-                        four(all, first, count).map_err(|e| format!("vertex {i}: {e}"))?
+                self.character.skin.push(match (skin, &weights) {
+                    (Some((first, count)), Some(weights)) => {
+                        let four = weights.four(i, count as usize).map_err(|e| format!("vertex {i}: {e}"))?;
+                        four.map(
+                            |(joint, weight)| {
+                                if weight > 0.0 { Influence { bind: first + joint as u32, weight } } else { Influence::default() }
+                            },
+                        )
                     }
+                    _ => [Influence { bind: first, weight: 1.0 }, Influence::default(), Influence::default(), Influence::default()],
                 });
             }
             numbers.push(number);
@@ -259,30 +225,6 @@ impl<'a> Reader<'a> {
 }
 
 const IDENTITY: [[f64; 4]; 3] = [[1.0, 0.0, 0.0, 0.0], [0.0, 1.0, 0.0, 0.0], [0.0, 0.0, 1.0, 0.0]];
-
-/// The four largest of all weights, made to add up to 1.
-fn four(all: impl Iterator<Item = (usize, f64)>, first: u32, count: u32) -> Result<[Influence; 4], String> {
-    let mut found: Vec<(usize, f64)> = Vec::new();
-    for (joint, weight) in all {
-        if !(0.0..=1e6).contains(&weight) {
-            return Err(format!("a weight of {weight}, expected 0 to 1; export the mesh again"));
-        }
-        if weight > 0.0 && joint >= count as usize {
-            return Err(format!("joint {joint} of {count} (counted from 0); {DAMAGED}"));
-        }
-        found.push((joint, weight));
-    }
-    found.sort_by(|a, b| b.1.total_cmp(&a.1).then(a.0.cmp(&b.0)));
-    let sum: f64 = found.iter().take(4).map(|f| f.1).sum();
-    if sum <= 0.0 {
-        return Err("no weight above 0; bind every vertex to a bone and export it again".to_owned());
-    }
-    let of = |k: usize| {
-        let (joint, weight) = found.get(k).copied().filter(|f| f.1 > 0.0)?;
-        Some(Influence { bind: first + joint as u32, weight: weight / sum })
-    };
-    Ok(std::array::from_fn(|k| of(k).unwrap_or_default()))
-}
 
 /// Transform of a node in its parent. A matrix is decomposed; shear, which glTF forbids, is lost.
 fn rest(node: &Node) -> Transform {

@@ -4,6 +4,7 @@
 //! silently at the end of the first of several solids, and wants the ASCII in lower case with a name after "solid".
 
 use crate::build::{DAMAGED, Weld, word};
+use crate::text::{lines_of, number, unmarked};
 use tumble_interface::Mesh;
 
 /// Bytes before the first triangle of a binary file: an 80-byte comment and the number of triangles.
@@ -12,7 +13,8 @@ const HEADER: usize = 84;
 const TRIANGLE: usize = 50;
 
 pub fn read(bytes: &[u8]) -> Result<Mesh, String> {
-    let text = bytes.trim_ascii_start();
+    let unmarked = unmarked(bytes);
+    let text = unmarked.trim_ascii_start();
     let says_solid = text.get(..5).is_some_and(|word| word.eq_ignore_ascii_case(b"solid"));
     let mut mesh = Mesh::default();
     let mut weld = Weld::default();
@@ -32,8 +34,8 @@ pub fn read(bytes: &[u8]) -> Result<Mesh, String> {
     // are more than 2^24 triangles; then the length decides.
     let declared = word(bytes, HEADER - 4).map(u32::from_le_bytes);
     let expected = declared.map(|n| HEADER as u64 + TRIANGLE as u64 * u64::from(n));
-    if says_solid && !bytes.iter().take(HEADER).any(|b| *b == 0) && expected != Some(bytes.len() as u64) {
-        ascii(&String::from_utf8_lossy(text), &mut add)?;
+    if says_solid && !text.iter().take(HEADER).any(|b| *b == 0) && expected != Some(bytes.len() as u64) {
+        ascii(&lines_of(text), &mut add)?;
         return Ok(mesh);
     }
     let (Some(n), Some(expected)) = (declared, expected) else {
@@ -56,7 +58,7 @@ pub fn read(bytes: &[u8]) -> Result<Mesh, String> {
 fn ascii(text: &str, add: &mut impl FnMut([[f64; 3]; 3]) -> Result<(), String>) -> Result<(), String> {
     let mut corners = Vec::new();
     let mut open = false;
-    for (number, line) in (1_usize..).zip(text.lines()) {
+    for (n, line) in (1_usize..).zip(text.lines()) {
         let mut words = line.split_ascii_whitespace();
         match words.next().unwrap_or_default().to_ascii_lowercase().as_str() {
             "solid" => open = true,
@@ -64,14 +66,14 @@ fn ascii(text: &str, add: &mut impl FnMut([[f64; 3]; 3]) -> Result<(), String>) 
             "vertex" => {
                 let mut x = [0.0; 3];
                 for x in &mut x {
-                    let word = words.next().ok_or_else(|| format!("line {number}: a vertex needs 3 coordinates; {DAMAGED}"))?;
-                    *x = word.parse().map_err(|_| format!("line {number}: \"{word}\" is not a number; {DAMAGED}"))?;
+                    let word = words.next().ok_or_else(|| format!("line {n}: a vertex needs 3 coordinates; {DAMAGED}"))?;
+                    *x = number(word).map_err(|e| format!("line {n}: {e}"))?;
                 }
                 corners.push(x);
             }
             "endloop" => {
                 let found = corners.len();
-                add(corners[..].try_into().map_err(|_| format!("line {number}: a facet with {found} vertices, not 3; {DAMAGED}"))?)?;
+                add(corners[..].try_into().map_err(|_| format!("line {n}: a facet with {found} vertices, not 3; {DAMAGED}"))?)?;
                 corners.clear();
             }
             _ => {}

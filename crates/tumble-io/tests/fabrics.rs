@@ -71,7 +71,7 @@ fn bad_records_are_told_with_place_and_cure() {
         let message = fabric(text.as_bytes(), true).unwrap_err();
         assert!(message.contains(part), "{part}: {message}");
     }
-    assert!(fabric(&[0xff, 0xfe], true).unwrap_err().contains("UTF-8"));
+    assert!(fabric(&[0xff, 0xfd], true).unwrap_err().contains("UTF-8"));
     let unknown = shipped("denimm").unwrap_err();
     assert!(unknown.contains("did you mean \"denim\"?") && unknown.contains("interlock, tablecloth"), "{unknown}");
 }

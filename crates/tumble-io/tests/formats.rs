@@ -333,14 +333,24 @@ fn stl_faults_name_the_place() {
 
 // ---- GLB
 
+/// The mesh in the axes of the file, y up.
+fn written(bytes: &[u8]) -> Mesh {
+    let found = mesh(bytes, Format::Glb).unwrap();
+    Mesh { vertices: found.vertices.iter().map(|[x, y, z]| [*x, *z, -y]).collect(), ..found }
+}
+
 #[test]
-fn glb_is_read_as_it_stands() {
-    assert_eq!(mesh(&glb_tetrahedron(r#"{"mesh": 0}"#, "0"), Format::Glb).unwrap(), tetrahedron());
+fn glb_stands_with_its_y_axis_up() {
+    let found = mesh(&glb_tetrahedron(r#"{"mesh": 0}"#, "0"), Format::Glb).unwrap();
+    let turned = tetrahedron().vertices.iter().map(|[x, y, z]| [*x, 0.0 - z, *y]).collect();
+    assert_eq!(found, Mesh { vertices: turned, ..tetrahedron() });
+    assert_eq!((volume(&found), found.bounds().unwrap().1[2]), (volume(&tetrahedron()), 2.0));
+    assert!(found.vertices.iter().flatten().all(|x| *x != 0.0 || x.is_sign_positive()));
 }
 
 #[test]
 fn glb_nodes_translate_scale_and_turn() {
-    let at = |nodes: &str, scene: &str| mesh(&glb_tetrahedron(nodes, scene), Format::Glb).unwrap();
+    let at = |nodes: &str, scene: &str| written(&glb_tetrahedron(nodes, scene));
     let map = |f: fn([f64; 3]) -> [f64; 3]| tetrahedron().vertices.into_iter().map(f).collect::<Vec<_>>();
 
     let moved = at(r#"{"mesh": 0, "translation": [10, 20, 30], "scale": [2, 3, 4]}"#, "0");
@@ -361,6 +371,64 @@ fn glb_nodes_translate_scale_and_turn() {
 }
 
 #[test]
+fn glb_rotations_have_the_length_of_one_whatever_is_written() {
+    let at = |rotation: &str| written(&glb_tetrahedron(&format!(r#"{{"mesh": 0, "rotation": {rotation}}}"#), "0"));
+    // A quarter turn about x, at length 3, 0.01 and with four digits.
+    for rotation in ["[2.1213203, 0, 0, 2.1213203]", "[-0.0070710677, 0, 0, -0.0070710677]", "[0.7071, 0, 0, 0.7071]"] {
+        let found = at(rotation);
+        for (found, right) in found.vertices.iter().flatten().zip(tetrahedron().vertices.iter().flat_map(|[x, y, z]| [*x, -z, *y])) {
+            assert!((found - right).abs() < 1e-6, "{rotation}: {found} {right}"); // measured 2e-7: single precision
+        }
+        assert!((volume(&found) - 1.0).abs() < 1e-6);
+    }
+    rejects(&glb_tetrahedron(r#"{"mesh": 0, "rotation": [0, 0, 0, 0]}"#, "0"), Format::Glb, &["node 0", "rotation"]);
+    let nested = r#"{"children": [1], "rotation": [0, 0, 0, 0]}, {"mesh": 0}"#;
+    rejects(&glb_tetrahedron(nested, "0"), Format::Glb, &["node 0", "rotation"]);
+}
+
+#[test]
+fn glb_extensions_that_move_what_is_shown_are_refused_where_they_are_used() {
+    for name in ["EXT_mesh_gpu_instancing", "KHR_node_visibility", "CESIUM_RTC"] {
+        for list in ["extensionsUsed", "extensionsRequired"] {
+            let json = glb_json(r#"{"mesh": 0}"#, "0").replacen('{', &format!(r#"{{"{list}": ["KHR_materials_unlit", "{name}"], "#), 1);
+            rejects(&glb(&json, &glb_buffer()), Format::Glb, &[name, "not supported", "export"]);
+        }
+    }
+    let json = glb_json(r#"{"mesh": 0}"#, "0").replacen('{', r#"{"extensionsUsed": ["KHR_texture_transform"], "#, 1);
+    assert_eq!(written(&glb(&json, &glb_buffer())), tetrahedron());
+}
+
+#[test]
+fn glb_skins_stand_where_their_bones_do() {
+    // The node of the mesh is moved by 9, and so would be its parent.
+    let at = |json: String| written(&glb(&json, &arm_buffer()));
+    let bound = at(arm_json(""));
+    let right = tumble_io::character(&arm()).unwrap().mesh;
+    assert_eq!(bound.vertices, right.vertices);
+    assert_eq!(bound.triangles, right.triangles);
+    let scaled = arm_json("").replace(r#""skin": 0, "translation": [9, 9, 9]"#, r#""skin": 0, "scale": [5, -5, 5]"#);
+    assert_eq!(at(scaled), bound);
+    // What moves the bones moves the skin: their parent, here mirrored and half as large, ...
+    let small = at(arm_json("").replace(r#""name": "figure""#, r#""name": "figure", "scale": [-0.5, 0.5, 0.5], "translation": [1, 0, 0]"#));
+    assert_eq!(small.vertices, bound.vertices.iter().map(|[x, y, z]| [1.0 - 0.5 * x, 0.5 * y, 0.5 * z]).collect::<Vec<_>>());
+    assert!((volume(&small) - volume(&bound) / 8.0).abs() < 1e-9, "{}", volume(&small));
+    // ... or the pose they were left in: the elbow one further out, its ring half of that.
+    let posed = at(arm_json("").replace(r#""translation": [0, 0, 1]"#, r#""translation": [1, 0, 1]"#));
+    for (i, (found, rest)) in posed.vertices.iter().zip(&bound.vertices).enumerate() {
+        assert_eq!(*found, [rest[0] + [0.0, 0.5, 1.0][i / 3], rest[1], rest[2]]);
+    }
+    let damaged = [
+        (r#""joints": [0, 1]"#, r#""joints": [0]"#, "joint 1 of 1"),
+        (r#""joints": [0, 1]"#, r#""joints": [0, 7]"#, "node 7"),
+        (r#", "WEIGHTS_0": 3"#, "", "WEIGHTS_0"),
+        (r#""skin": 0"#, r#""skin": 3"#, "skin 3"),
+    ];
+    for (from, to, part) in damaged {
+        rejects(&glb(&arm_json("").replacen(from, to, 1), &arm_buffer()), Format::Glb, &[part]);
+    }
+}
+
+#[test]
 fn glb_mirrored_meshes_stay_right_side_out() {
     let mirrored = mesh(&glb_tetrahedron(r#"{"mesh": 0, "scale": [1, 1, -2]}"#, "0"), Format::Glb).unwrap();
     assert!((volume(&mirrored) - 2.0).abs() < 1e-15, "{}", volume(&mirrored)); // 1 · 2 · 3 / 6, doubled
@@ -370,7 +438,7 @@ fn glb_mirrored_meshes_stay_right_side_out() {
 #[test]
 fn glb_instances_are_merged_in_order_and_kept_apart() {
     let nodes = r#"{"mesh": 0}, {"mesh": 0, "translation": [0, 0, 9]}, {"mesh": 0, "translation": [0, 0, 99]}"#;
-    let two = mesh(&glb_tetrahedron(nodes, "1, 0"), Format::Glb).unwrap(); // node 2 is in no scene
+    let two = written(&glb_tetrahedron(nodes, "1, 0")); // node 2 is in no scene
     assert_eq!((two.vertices.len(), two.triangles.len()), (8, 8));
     assert_eq!((two.vertices[0], two.vertices[4]), ([0.0, 0.0, 9.0], [0.0; 3]));
     let same = mesh(&glb_tetrahedron(r#"{"mesh": 0}, {"mesh": 0}"#, "0, 1"), Format::Glb).unwrap();
@@ -466,7 +534,7 @@ fn glb_node_graphs_end() {
     // Deeper than any call stack.
     let n = 200_000;
     let chain: String = (1..n).map(|i| format!(r#"{{"translation": [1, 0, 0], "children": [{i}]}}, "#)).collect();
-    let deep = mesh(&glb_tetrahedron(&(chain + r#"{"mesh": 0}"#), "0"), Format::Glb).unwrap();
+    let deep = written(&glb_tetrahedron(&(chain + r#"{"mesh": 0}"#), "0"));
     assert_eq!(deep.vertices[0], [f64::from(n - 1), 0.0, 0.0]);
     let nested = "[".repeat(200_000);
     self::rejects(

@@ -16,6 +16,10 @@ use tumble_io::{Format, character, fabric, mesh, repair};
 fn valid() -> Vec<(Vec<u8>, Format)> {
     vec![
         (obj(), Format::Obj),
+        (
+            b"v 2 0 0\nv 2 1 0\nv 1 1 0\nv 1 2 0\nv 0 2 0\nv 0 0 0\nf 1 2 3 4 5 6\nf -1 -2 -4 \\\n-3 -5 # a comment \\\n".to_vec(),
+            Format::Obj,
+        ),
         (ply("ascii"), Format::Ply),
         (ply("binary_little_endian"), Format::Ply),
         (ply("binary_big_endian"), Format::Ply),
@@ -25,6 +29,7 @@ fn valid() -> Vec<(Vec<u8>, Format)> {
         (ply_textured(&skirt(), ["s", "t"]), Format::Ply),
         (ply_wedges(&skirt()), Format::Ply),
         (glb_textured(&skirt()), Format::Glb),
+        (arm(), Format::Glb),
         (tumble_io::obj(&skirt()).into_bytes(), Format::Obj),
     ]
 }

@@ -141,7 +141,7 @@ pub fn ply_wedges(mesh: &Mesh) -> Vec<u8> {
     text.into_bytes()
 }
 
-/// The same as GLB, whose v points down.
+/// The same as GLB, whose y points up and v down.
 pub fn glb_textured(mesh: &Mesh) -> Vec<u8> {
     glb_placed(mesh, "")
 }
@@ -151,7 +151,7 @@ pub fn glb_placed(mesh: &Mesh, words: &str) -> Vec<u8> {
     let (vertices, triangles) = split(mesh);
     let (n, m) = (vertices.len(), triangles.len());
     let floats = |all: Vec<f64>| all.into_iter().flat_map(|x| (x as f32).to_le_bytes());
-    let mut buffer: Vec<u8> = floats(vertices.iter().flat_map(|v| v.0).collect()).collect();
+    let mut buffer: Vec<u8> = floats(vertices.iter().flat_map(|([x, y, z], _)| [*x, *z, 0.0 - y]).collect()).collect();
     buffer.extend(floats(vertices.iter().flat_map(|v| [v.1[0], 1.0 - v.1[1]]).collect()));
     buffer.extend(triangles.as_flattened().iter().flat_map(|i| (*i as u16).to_le_bytes()));
     let json = format!(
