@@ -184,7 +184,7 @@ pub fn project(
     let Some(of_all) = METHODS.iter().position(|m| *m == method) else {
         return Err(wrong(unknown("method", method, &METHODS)));
     };
-    if !(tolerance > 0.0) {
+    if tolerance.is_nan() || tolerance <= 0.0 {
         return Err(wrong(format!("tolerance: {tolerance}, expected > 0")));
     }
     let solve = match precision {
