@@ -22,6 +22,8 @@ pub struct Mesh {
     pub texture: Vec<Option<[[f64; 2]; 3]>>,
     /// Vertices of the file that belong to no triangle and were left out, so that the numbers of those behind them have changed.
     pub unused: usize,
+    /// The first vertex, from 0, that has another number here than in the file: that one, and this.
+    pub renumbered: Option<[u32; 2]>,
 }
 
 /// Findings of the mesh checker.
@@ -109,7 +111,13 @@ impl Mesh {
 
     /// Counts what would make an inside and an outside doubtful.
     pub fn defects(&self) -> Defects {
+        self.doubtful().0
+    }
+
+    /// The same, with the ends of the first open edge and of the first bad one.
+    pub(crate) fn doubtful(&self) -> (Defects, [Option<[u32; 2]>; 2]) {
         let mut defects = Defects::default();
+        let mut first = [None; 2];
         for t in &self.triangles {
             let [a, b, c] = t.map(|i| self.vertices[i as usize]);
             let n = cross(sub(b, a), sub(c, a));
@@ -120,12 +128,18 @@ impl Mesh {
         for ([a, b], faces) in self.edges() {
             let forward = faces.iter().filter(|t| runs(self.triangles[**t as usize], a, b)).count();
             match (faces.len(), forward) {
-                (1, _) => defects.open_edges += 1,
+                (1, _) => {
+                    defects.open_edges += 1;
+                    first[0] = first[0].or(Some([a, b]));
+                }
                 (2, 1) => {}
-                _ => defects.bad_edges += 1,
+                _ => {
+                    defects.bad_edges += 1;
+                    first[1] = first[1].or(Some([a, b]));
+                }
             }
         }
-        defects
+        (defects, first)
     }
 
     /// Texture coordinates of the corners of all triangles, as pictures want them, 0 where there are none; empty if there are none at all.
@@ -186,6 +200,17 @@ impl Mesh {
 
     /// Counts what mending would change in a soft surface.
     pub fn flaws(&self) -> Flaws {
+        self.flawed().0
+    }
+
+    /// The same, with the vertices at the first place of any, if it has one.
+    pub(crate) fn flawed(&self) -> (Flaws, Vec<u32>) {
+        let mut first = Vec::new();
+        let mut note = |at: &[u32]| {
+            if first.is_empty() {
+                first.extend(at);
+            }
+        };
         let mut flaws = Flaws { unused: self.unused, ..Flaws::default() };
         let places = self.places();
         let place = |i: u32| places[i as usize];
@@ -196,6 +221,7 @@ impl Mesh {
             let mut at = t.map(place);
             if at[0] == at[1] || at[1] == at[2] || at[2] == at[0] || self.is_sliver(*t) {
                 flaws.degenerate += 1;
+                note(t);
                 continue;
             }
             let mut nodes = *t;
@@ -203,7 +229,12 @@ impl Mesh {
             let least = (0..3).fold(0, |l, k| if at[k] < at[l] { k } else { l });
             at.rotate_left(least);
             let seen = [nodes_seen.insert(nodes, ()), places_seen.insert(at, ())];
-            if seen.iter().any(Option::is_some) { flaws.repeated += 1 } else { kept.push(*t) }
+            if seen.iter().any(Option::is_some) {
+                flaws.repeated += 1;
+                note(t);
+            } else {
+                kept.push(*t);
+            }
         }
         let kept = Self { triangles: kept, ..Self::default() };
         // Open edges by their places: how many run from the lower to the higher, and how many back.
@@ -215,12 +246,23 @@ impl Mesh {
                     let back = (place(a) > place(b)) == forward(&t);
                     rims.entry([place(a).min(place(b)), place(a).max(place(b))]).or_default()[usize::from(back)] += 1;
                 }
-                [t, u] => flaws.turned += usize::from(forward(&t) == forward(&u)),
-                _ => flaws.crowded += 1,
+                [t, u] if forward(&t) != forward(&u) => {}
+                [_, _] => {
+                    flaws.turned += 1;
+                    note(&[a, b]);
+                }
+                _ => {
+                    flaws.crowded += 1;
+                    note(&[a, b]);
+                }
             }
         }
-        flaws.unsewn = rims.values().filter(|n| n[0] > 0 && n[1] > 0 || n[0] + n[1] == 2).map(|n| n[0] + n[1]).sum();
-        flaws
+        let coincide = rims.iter().filter(|(_, n)| n[0] > 0 && n[1] > 0 || n[0] + n[1] == 2);
+        flaws.unsewn = coincide.clone().map(|(_, n)| n[0] + n[1]).sum();
+        if let Some((ends, _)) = coincide.min() {
+            note(ends);
+        }
+        (flaws, first)
     }
 
     /// Whether a triangle has no area.

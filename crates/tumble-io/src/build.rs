@@ -27,7 +27,7 @@ impl Weld {
 
 /// Checks that the mesh is one, and drops vertices that no triangle uses and texture coordinates that are no numbers.
 pub fn finish(mesh: Mesh) -> Result<Mesh, String> {
-    let Mesh { vertices, mut triangles, texture, .. } = mesh;
+    let Mesh { vertices, mut triangles, texture, mut renumbered, .. } = mesh;
     let n = vertices.len();
     if triangles.is_empty() {
         return Err(format!("no triangles in the file ({n} vertices); export a surface mesh, not points or curves"));
@@ -53,7 +53,7 @@ pub fn finish(mesh: Mesh) -> Result<Mesh, String> {
         texture.clear();
     }
     if used.iter().all(|used| *used) {
-        return Ok(Mesh { vertices, triangles, texture, unused: 0 });
+        return Ok(Mesh { vertices, triangles, texture, unused: 0, renumbered });
     }
     let mut kept = 0;
     let mut new = vec![0; n];
@@ -61,12 +61,19 @@ pub fn finish(mesh: Mesh) -> Result<Mesh, String> {
         *new = kept;
         kept += u32::from(*used);
     }
+    let moved = (0..n).find(|i| used[*i] && new[*i] as usize != *i).map(|i| [i as u32, new[i]]);
+    renumbered = match (renumbered, moved) {
+        // Numbers changed before, but not up to there.
+        (Some([before, _]), Some(moved)) if moved[0] < before => Some(moved),
+        (Some([before, after]), _) => Some([before, new[after as usize]]),
+        (None, moved) => moved,
+    };
     for i in triangles.as_flattened_mut() {
         *i = new[*i as usize];
     }
     let vertices: Vec<_> = vertices.into_iter().zip(used).filter_map(|(v, used)| used.then_some(v)).collect();
     let unused = n - vertices.len();
-    Ok(Mesh { vertices, triangles, texture, unused })
+    Ok(Mesh { vertices, triangles, texture, unused, renumbered })
 }
 
 /// Cure for a file whose parts contradict each other.

@@ -2,10 +2,11 @@
 //! of a VDB file out ([`vdb`]). [`assets`] does it for all that a scene names. Nothing here opens a file, so the browser uses it too.
 //!
 //! What is common to all formats of meshes: coordinates are taken as they stand in the file (no unit is converted, and an axis turned
-//! in GLB only, which says where up is); a polygon becomes the fan of triangles around its first corner where that covers it, and others that do where not; objects,
-//! groups and materials are merged; normals, colours and images are dropped, texture coordinates kept; vertices that no triangle
-//! uses are dropped, the others keep their order. Text may begin with a byte order mark and end its lines in any way. Any bytes give a mesh or a one-line message that names the cure, never a panic;
-//! work and memory grow with the length of the file, not with the counts it declares (instances in a GLB have a limit).
+//! in GLB only, which says where up is); a polygon becomes the fan of triangles around its first corner where that covers it, and others
+//! that do where not; objects, groups and materials are merged; normals, colours and images are dropped, texture coordinates kept;
+//! vertices that no triangle uses are dropped, the others keep their order. Text may begin with a byte order mark and end its lines in any
+//! way. Any bytes give a mesh or a one-line message that names the cure, never a panic; work and memory grow with the length of the file,
+//! not with the counts it declares (instances in a GLB have a limit).
 //! Verified by `tests/formats.rs`, `tests/text.rs`, `tests/polygons.rs` and `tests/fuzz.rs`.
 
 pub mod assets;
@@ -15,7 +16,6 @@ mod glb;
 mod obj;
 mod ply;
 mod polygon;
-mod repair;
 mod skin;
 mod stl;
 mod text;
@@ -25,7 +25,7 @@ use tumble_interface::{Character, Mesh};
 
 pub use fabric::{fabric, record_is_json, shipped};
 pub use obj::write as obj;
-pub use repair::{Repairs, repair};
+pub use tumble_interface::repair::{Repairs, repair};
 pub use vdb::{Class, Volume, vdb};
 
 /// A mesh file format.
@@ -84,7 +84,7 @@ pub fn mesh(bytes: &[u8], format: Format) -> Result<Mesh, String> {
     let mut found = read.and_then(build::finish).map_err(|message| format!("{}: {}", format.name(), one_line(&message)))?;
     if format == Format::Glb {
         // Parts of a GLB share their vertices with each other; their numbers mean nothing to anybody.
-        found.unused = 0;
+        (found.unused, found.renumbered) = (0, None);
     }
     Ok(found)
 }

@@ -154,6 +154,7 @@ fn weld(mesh: &mut Mesh) -> Result<(), String> {
         *i = new.ok_or_else(|| format!("a face uses vertex {i}, but there are {n} (counted from 0); {DAMAGED}"))?;
     }
     mesh.vertices = kept;
+    mesh.renumbered = (0..).zip(&numbers).find(|(i, number)| i != *number).map(|(i, number)| [i, *number]);
     Ok(())
 }
 

@@ -401,7 +401,7 @@ proptest! {
         let n = vertices.len() as u32;
         let triangles: Vec<_> = triangles.into_iter().map(|t| t.map(|i| i % n)).collect();
         let texture = if textured { triangles.iter().map(|t| Some(t.map(|i| [f64::from(i), 0.5]))).collect() } else { Vec::new() };
-        let (found, done) = repair(&Mesh { vertices, triangles, texture, unused: 0 });
+        let (found, done) = repair(&Mesh { vertices, triangles, texture, ..Mesh::default() });
         prop_assert_eq!(found.defects().degenerate, 0);
         prop_assert!(found.edges().iter().all(|(_, faces)| faces.len() <= 2), "{:?}", done);
         prop_assert!(found.triangles.iter().flatten().all(|i| (*i as usize) < found.vertices.len()));

@@ -339,7 +339,7 @@ pub struct MeshRef<'a> {
     pub hash: &'a mut Option<String>,
 }
 
-/// A triangle mesh from an OBJ, PLY, STL or GLB file, or outside the browser from USD; scaled, rotated, then translated.
+/// A triangle mesh from an OBJ, PLY, STL or GLB file (y up becomes z up in GLB), or outside the browser from USD; scaled, rotated, then translated.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct MeshFile {

@@ -7,6 +7,7 @@ use crate::math::rotation::{from_degrees, from_z_to};
 use crate::pool::{Course, Emitter, Kill, Origin};
 use tumble_interface::Mesh;
 use tumble_interface::check::plain;
+use tumble_interface::fault::Fault;
 use tumble_interface::scene::{Cause, Collider, Emitter as Words, Event, Kill as Rule, MeshFile, Shape as Solid, Source, WhenFull};
 
 /// Names that frames and files need for themselves.
@@ -149,14 +150,13 @@ pub fn emitter<'a>(
         Source::Box { center, size, rotate } => Some(Sampler::Box(vector(center), vector(size), from_degrees(*rotate))),
         Source::MeshSurface(file) => sampled(".from.mesh_surface", file, Sampler::surface, "the mesh has no triangle with an area"),
         Source::MeshVolume(file) => {
-            let open = mesh(file).is_some_and(|mesh| {
-                let defects = mesh.defects();
-                defects.open_edges + defects.bad_edges > 0
-            });
             let nothing = "the mesh has no inside; close it, turn its triangles outward, or use mesh_surface";
             let closed = |mesh: &Mesh| Sampler::volume(mesh);
-            if open {
-                wrong(".from.mesh_volume", nothing);
+            if let Some(Fault { defects, place, cure }) = mesh(file).and_then(Mesh::fault) {
+                let n = defects.open_edges + defects.bad_edges;
+                let message =
+                    format!("the mesh has no inside: {n} edges are open or inconsistent, for example {place}; {cure}, or use mesh_surface");
+                wrong(".from.mesh_volume", &message);
                 None
             } else {
                 sampled(".from.mesh_volume", file, closed, nothing)

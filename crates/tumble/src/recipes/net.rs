@@ -4,7 +4,8 @@ use super::Site;
 use super::pins::{Pinnable, pinned};
 use super::surface::{Rest, Surface};
 use crate::geometry::Vector;
-use tumble_interface::scene::{Net, Pattern};
+use tumble_interface::fault::place;
+use tumble_interface::scene::{Net, Pattern, Pin};
 use tumble_interface::warning::Code;
 use tumble_interface::{Mesh, Warning};
 
@@ -22,6 +23,7 @@ pub fn net(site: &mut Site<'_>, thing: &Net, mesh: &Mesh) {
     let path = format!("net \"{}\"", thing.name);
     site.parts.begin(&thing.name, 0.0);
     site.hints.extend(unsound(mesh, &path));
+    site.hints.extend(renumbered(mesh, &thing.pin, &path));
     let Some((fabric, density)) = site.fabric(&path, thing.fabric.as_ref(), thing.density) else { return };
     let Ok(panels) = thing.pattern.as_ref().map(|words| pattern(site, words, mesh, &path)).transpose() else { return };
     // The triangles' own planes have no axes in common; the x axis has a direction in most.
@@ -36,8 +38,9 @@ pub fn net(site: &mut Site<'_>, thing: &Net, mesh: &Mesh) {
         return site.wrong(
             format!("{path}.mesh"),
             format!(
-                "vertex {i} has no triangle with an area, so it would have no mass; remove it from the mesh, or mend that with \
-                 `tumble check SCENE --repair`"
+                "vertex {i} at {} has no triangle with an area, so it would have no mass; remove it from the mesh, or mend that with \
+                 `tumble check SCENE --repair`",
+                place(mesh.vertices[i])
             ),
         );
     }
@@ -103,10 +106,24 @@ pub fn net(site: &mut Site<'_>, thing: &Net, mesh: &Mesh) {
 
 /// What is wrong with the mesh of a soft surface, though it can be simulated.
 fn unsound(mesh: &Mesh, path: &str) -> Option<Warning> {
-    let flaws = mesh.flaws();
-    let told =
-        || Warning::new(Code::UnsoundMesh, format!("{path}.mesh"), format!("{flaws}; mend the file with `tumble check SCENE --repair`"));
-    (!flaws.is_none()).then(told)
+    mesh.unsound().map(|told| Warning::new(Code::UnsoundMesh, format!("{path}.mesh"), told))
+}
+
+/// That pins by number do not mean the numbers of the file, where those are others.
+fn renumbered(mesh: &Mesh, pins: &[Pin], path: &str) -> Option<Warning> {
+    let [before, after] = mesh.renumbered?;
+    let is_number = |pin: &Pin| match pin {
+        Pin::Words(words) => words.trim_start().starts_with("vertex"),
+        Pin::Region(region) => region.which.as_ref().is_some_and(|words| words.trim_start().starts_with("vertex")),
+    };
+    let told = |i: usize| {
+        let message = format!(
+            "vertices are counted from 0 without those of no triangle, and those of a seam once: vertex {before} of the file is vertex \
+             {after} here, and so on; pin by center and radius, or by these numbers, which `tumble check SCENE --repair` writes"
+        );
+        Warning::new(Code::UnsoundMesh, format!("{path}.pin[{i}]"), message)
+    };
+    pins.iter().position(is_number).map(told)
 }
 
 fn area([a, b, c]: [Vector; 3]) -> f64 {

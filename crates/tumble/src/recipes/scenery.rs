@@ -5,6 +5,8 @@ use crate::geometry::{Collider, Facets, Friction, GridSdf, Motion, Rig, Shape, V
 use crate::math::rotation::from_degrees;
 use std::sync::Arc;
 use tumble_interface::Mesh;
+use tumble_interface::fault::Fault;
+use tumble_interface::repair::repair;
 use tumble_interface::scene::{Collider as Thing, MeshFile, MeshFrames, Motion as Moves, Pace, Shape as Words};
 
 /// Half the side of the square that stands for an endless plane in pictures [m].
@@ -181,16 +183,20 @@ fn motion(words: &Moves) -> Result<Motion, Wrong> {
 /// Whether a mesh has an inside, or needs none.
 fn whole(mesh: &Mesh, key: &str, shell: bool, thickness: f64) -> Result<(), Wrong> {
     let wrong = |key: &str, message: String| Err((key.to_string(), message));
-    let defects = mesh.defects();
-    if defects.open_edges + defects.bad_edges > 0 && !shell {
+    if !shell && let Some(Fault { defects, place, cure }) = mesh.fault() {
         let message = format!(
-            "the mesh has {} open and {} inconsistent edges, so it has no inside; close it, or set shell = true with a thickness",
+            "the mesh has {} open and {} inconsistent edges, for example {place}, so it has no inside; {cure}, or set shell = true with a \
+             thickness",
             defects.open_edges, defects.bad_edges
         );
         return wrong(key, message);
     }
     if !shell && volume(mesh) < 0.0 {
-        return wrong(key, "the triangles face inward; reverse them, or set shell = true with a thickness".into());
+        let cure = match volume(&repair(mesh).0) > 0.0 {
+            true => "mend the file with `tumble check SCENE --repair`",
+            false => "reverse them",
+        };
+        return wrong(key, format!("the triangles face inward; {cure}, or set shell = true with a thickness"));
     }
     if shell && thickness == 0.0 {
         return wrong(".thickness", "0 m, expected > 0 m for a shell, which has no inside".into());

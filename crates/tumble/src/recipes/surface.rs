@@ -6,6 +6,8 @@ use crate::geometry::Vector;
 use crate::math::functions;
 use crate::systems::dynamics::{Closed, TearPart};
 use std::ops::Range;
+use tumble_interface::fault::Fault;
+use tumble_interface::repair::repair;
 use tumble_interface::scene::{FabricUse, FabricWords, Inflation, Membrane as Words, ShapeMatching, Tear};
 use tumble_interface::{Fabric, Mesh};
 
@@ -280,17 +282,22 @@ impl Site<'_> {
     /// The volume inside a closed mesh, whose vertices are points from `first` on.
     pub(super) fn inflate(&mut self, mesh: &Mesh, first: u32, words: &Inflation, path: &str) {
         let path = format!("{path}.pressure");
-        let found = mesh.defects();
-        if found.open_edges + found.bad_edges > 0 {
+        if let Some(Fault { defects, place, cure }) = mesh.fault() {
             let message = format!(
-                "the mesh encloses nothing: {} edges have one triangle only, {} more than two or such as turn against each other",
-                found.open_edges, found.bad_edges
+                "the mesh encloses nothing: {} edges have one triangle only, {} more than two or such as turn against each other, for \
+                 example {place}; {cure}",
+                defects.open_edges, defects.bad_edges
             );
             return self.wrong(path, message);
         }
-        let volume = enclosed(&mesh.triangles, |i| Vector::from(mesh.vertices[i as usize]));
+        let volume_of = |mesh: &Mesh| enclosed(&mesh.triangles, |i| Vector::from(mesh.vertices[i as usize]));
+        let volume = volume_of(mesh);
         if volume.is_nan() || volume <= 0.0 {
-            return self.wrong(path, "the mesh is inside out; turn its triangles to be counter-clockwise from outside");
+            let cure = match volume_of(&repair(mesh).0) > 0.0 {
+                true => "mend the file with `tumble check SCENE --repair`",
+                false => "turn its triangles to be counter-clockwise from outside",
+            };
+            return self.wrong(path, format!("the mesh is inside out or flat, with a volume of {volume} m³; {cure}"));
         }
         let triangles = mesh.triangles.iter().map(|t| t.map(|i| i + first)).collect();
         let stiffness = words.stiffness.map_or(f64::INFINITY, |modulus| modulus / volume);

@@ -2,11 +2,11 @@
 //!
 //! Every step does nothing to a mesh that does not need it, so that a sound one comes back as it is, bit by bit. Holes are left open: what
 //! belongs there, nobody knows. Where several ways are right, the order in the file decides.
-//! Verified by `tests/repair.rs`.
+//! Verified by `tests/repair.rs` of `tumble-io`.
 
+use crate::Mesh;
+use crate::mesh::SLIVER;
 use std::collections::{HashMap, HashSet};
-use tumble_interface::Mesh;
-use tumble_interface::mesh::SLIVER;
 
 /// Rounds of all steps, and of the first of them; a few are enough for all but contrived meshes.
 const ROUNDS: usize = 32;
@@ -640,7 +640,7 @@ impl Work {
             vertices: self.vertices.into_iter().zip(used).filter_map(|(x, used)| used.then_some(x)).collect(),
             triangles: self.triangles.iter().map(|t| t.at.map(|i| new[i as usize])).collect(),
             texture: if has_texture { self.triangles.iter().map(|t| t.texture).collect() } else { Vec::new() },
-            unused: 0,
+            ..Mesh::default()
         }
     }
 }
