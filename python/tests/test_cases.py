@@ -180,7 +180,11 @@ def test_time_at_the_start_is_refused(scene: Callable[[Any], Tree], refused: Any
         {"sheet": [{"name": "o", "size": [1, 1], "resolution": [5, 5]}]},
         {"block": [{"name": "o", "size": [1, 1, 1], "resolution": [3, 3, 3], "material": SOFT_MATTER}]},
         {"net": [{"name": "o", "mesh": {"path": "plate.obj"}}]},
-        {"cloth": [{"name": "o", "panels": [{"name": "p", "outline": [[0, 0], [1, 0], [1, 1], [0, 1]]}], "resolution": 0.2}]},
+        {
+            "cloth": [
+                {"name": "o", "panels": [{"name": "p", "outline": [[0, 0], [1, 0], [1, 1], [0, 1]]}], "resolution": 0.2}
+            ]
+        },
     ],
     ids=["rope", "rod", "sheet", "block", "net", "cloth"],
 )
