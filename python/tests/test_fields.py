@@ -118,7 +118,7 @@ def test_errors_name_the_place_and_the_cure() -> None:
         (lambda: grid.field(0.0, sides=("value", "high")), ["sides", "closed"]),
         (lambda: grid.field(0.0, sides={"z": "closed"}), ['"z"', "axis"]),
         (lambda: Grid((4, 4), 0.1, periodic="x").field(0.0, sides={"x": "closed"}), ["periodic"]),
-        (lambda: Grid((0, 4), 0.1), ["0 x 4", "expected"]),
+        (lambda: Grid((0, 4), 0.1), ["cells: 0", ">= 1", "expected"]),
         (lambda: Grid((9999, 9999, 9999), 0.1), ["9999", "expected"]),
         (lambda: Grid((4,), 0.1), ["cells", "two"]),
         (lambda: Grid((4, 4), -1.0), ["-1", "> 0"]),
@@ -234,7 +234,7 @@ def test_what_cannot_be_projected_is_told() -> None:
     for wrong, text in [
         (lambda: project(u, method="magic"), "expected one of"),  # type: ignore[arg-type]
         (lambda: project(u, shares, "cosine"), "cosine transform cannot solve this"),
-        (lambda: project(u, tolerance=0.0), "expected a tolerance > 0"),
+        (lambda: project(u, tolerance=0.0), "tolerance: 0, expected > 0"),
         (lambda: project(u, precision="half"), "precision"),  # type: ignore[arg-type]
         (lambda: project(u[:2]), "velocity"),
         (lambda: project(u, tuple(grid.field(2.0, f.place) for f in u)), "expected 0 to 1"),

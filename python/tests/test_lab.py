@@ -255,7 +255,7 @@ def test_page_of_an_oscillator(tmp_path: Path) -> None:
     assert "An oscillator" in text
     for word in ("forward_euler", "verlet", "rk4", "implicit_euler", "dormand_prince"):
         assert word in text
-    assert "bdf2" not in text
+    assert "bdf2" not in {row["integrator"] for row in table(path)} and "bdf2" in text.split("not asked for")[0]
     assert "p, particle 1" in text
     assert told[0][0] == 0
     assert told[-1][0] == told[-1][1] > 10
@@ -270,9 +270,9 @@ def test_page_of_an_oscillator(tmp_path: Path) -> None:
 
 def test_page_of_tracers(tmp_path: Path) -> None:
     path = integrators.page(Scene(swirl()), tmp_path, steps=[0.1, 0.05, 0.025], budget=10.0)
-    text = whole(path)
+    tried = {row["integrator"] for row in table(path)}
     for scheme in SCHEMES:
-        assert (scheme.word in text) != scheme.needs_velocities, scheme.word
+        assert (scheme.word in tried) != scheme.needs_velocities, scheme.word
 
 
 def birds(**flock: Any) -> Tree:
@@ -691,10 +691,10 @@ def table(path: Path) -> list[dict[str, str]]:
 @pytest.mark.parametrize(
     ("name", "said"),
     [
-        ("finned_plate", "heat in bodies, .* heat.0.scheme"),
-        ("obstacle", "Stable Fluids, which is stepped by a scheme of its own.*tumble lab pressure"),
-        ("bad_solver", "the compressible gas, .*tumble lab compressible"),
-        ("flag_in_a_jet", "Stable Fluids"),
+        ("finned_plate", "heat .*, which is .* heat.0.scheme"),
+        ("obstacle", "gas .*, which is stepped by a scheme of its own.*tumble lab pressure"),
+        ("bad_solver", "compressible .*, which is .*tumble lab compressible"),
+        ("flag_in_a_jet", "gas .*, which is"),
         ("pool", 'a liquid, particles "water", which position-based dynamics alone can move.*tumble lab positions'),
     ],
 )

@@ -606,7 +606,7 @@ def test_a_vector_stands_for_its_columns(monkeypatch: pytest.MonkeyPatch) -> Non
 
 
 def test_a_column_that_does_not_exist(tmp_path: Path) -> None:
-    with pytest.raises(ExportError, match='"sped"; it has frame, time'):
+    with pytest.raises(ExportError, match="'sped'; did you mean speed"):
         ledger(fake_run.studio(), "sped", tmp_path / "x.png")
     with pytest.raises(ExportError, match="nope"):
         energy(fake_run.studio(), tmp_path / "x.nope")

@@ -188,9 +188,9 @@ def test_sub_steps_that_a_system_chose_are_where_it_begins(oscillator: Tree) -> 
 @pytest.mark.parametrize(
     ("path", "words"),
     [
-        ("system.0.foo", 'no "foo"'),
-        ("sytem.0.substeps", 'no "sytem"'),
-        ("particles.q.radius", 'no particles "q"'),
+        ("system.0.foo", "'foo'; there are name, method"),
+        ("sytem.0.substeps", "'sytem'; did you mean system"),
+        ("particles.q.radius", "no particles 'q'"),
         ("particles.p.name", "expected a count"),
         ("particles.p.mass", "expected a count"),
         ("world.gravity", "expected a count"),
@@ -215,10 +215,10 @@ def test_paths_that_cannot_be_refined(
 @pytest.mark.parametrize(
     ("measure", "words"),
     [
-        ("enrgy", 'no column "enrgy"'),
-        ("energy@last", "expected end, max, min, mean"),
+        ("enrgy", "'enrgy'; did you mean energy"),
+        ("energy@last", "there are end, max, min, mean"),
         ("q.position", "there are p"),
-        ("p.color", 'keeps no "color"'),
+        ("p.color", 'no kept column of "p"'),
         ("p.position.w", '"w" is no part of position'),
         ("p.position.z@2", "expected < 2"),
         ("p.position.z@median", "or the index"),
@@ -254,9 +254,10 @@ def test_levels_of_an_earlier_study_that_went_further_are_dropped(oscillator: Tr
     study(Scene(oscillator), tmp_path / "study", 4)
     (tmp_path / "study" / "level-9").mkdir()
     (tmp_path / "study" / "level-9" / "mine.txt").write_text("mine")
-    study(Scene(oscillator), tmp_path / "study", 2, overwrite=True)
+    study(Scene(oscillator), tmp_path / "study", 3, overwrite=True)
     assert sorted(p.name for p in (tmp_path / "study").glob("level-*/*") if p.name in ("run.json", "mine.txt")) == [
         "mine.txt",
+        "run.json",
         "run.json",
         "run.json",
     ]

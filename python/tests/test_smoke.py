@@ -333,11 +333,11 @@ def test_slices_are_drawn(tmp_path: Path) -> None:
 def test_slices_say_what_is_wrong(tmp_path: Path) -> None:
     run, path = fake_run.plume(8), tmp_path / "slice.png"
     for words, text in (
-        ({"columns": ["smoke"]}, 'no "smoke" on the grid in this run; there are: density, temperature'),
+        ({"columns": ["smoke"]}, "no column on the grid 'smoke'; there are density, temperature"),
         ({"at": 7.0, "axis": "z"}, "at: 7 m, expected 0 to 2 m, the sides of the box along z"),
-        ({"axis": "w"}, 'axis: "w"'),
+        ({"axis": "w"}, "no axis 'w'; there are x, y, z"),
         ({"frame": 9}, "there is no frame 9; there are frames 0 to 4"),
-        ({"thing": "fire"}, 'no "fire" on a grid in this run; there are: smoke'),
+        ({"thing": "fire"}, "'fire'; there are smoke"),
     ):
         with pytest.raises(ExportError, match=text):
             slices(run, path, **words)  # type: ignore[arg-type]

@@ -28,7 +28,16 @@ PLATE: Tree = {
     "version": 1,
     "dimension": 2,
     "time": {"fps": 10, "frames": 2},
-    "heat": [{"name": "h", "box": {"size": [0.4, 0, 0.2], "resolution": 4}, "temperature": 300, "diffusivity": 1e-4}],
+    "heat": [
+        {
+            "name": "h",
+            "box": {"size": [0.4, 0.2, 0.2], "resolution": 4},
+            "conductivity": 1,
+            "density": 1000,
+            "heat_capacity": 1000,
+            "temperature": "300 + x",
+        }
+    ],
     "output": {"columns": ["temperature"]},
 }
 

@@ -54,7 +54,7 @@ def test_what_breaks_inside_a_frame_is_told() -> None:
     with pytest.raises(StepError):
         for n in range(1, 30):
             world.inside(n)
-    with pytest.raises(SceneError, match="expected >= 1"):
+    with pytest.raises(SceneError, match="expected a whole number >= 1"):
         world.inside(0)
 
 

@@ -22,6 +22,9 @@ _MANIFEST: dict[str, type | tuple[type, ...]] = {
     "failure": (dict, str, type(None)),
     "resumed": int,
     "folder": (str, type(None)),
+    "custom": list,
+    "whole_frames": int,
+    "commit": (str, type(None)),
 }
 
 _INDICES = ("pinned", "triangles", "links", "curve")

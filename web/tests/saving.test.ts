@@ -163,8 +163,8 @@ world = tumble.World({"version": 1, "net": [{"name": "n", "mesh": {"path": sys.a
 x = world.columns("position")["n"]["position"]
 print(json.dumps([len(world.topology["n"]["triangles"]), len(x), (x.max(axis=0) - x.min(axis=0)).tolist()]))
 `;
-    // In the file y is up.
-    const [triangles, vertices, [x, z, y]] = JSON.parse(python(code, path)) as [number, number, number[]];
+    // In the file y is up, and it is read so.
+    const [triangles, vertices, [x, y, z]] = JSON.parse(python(code, path)) as [number, number, number[]];
     assert.deepEqual([triangles, vertices], [here.triangles, here.vertices]);
     assert.ok(
       [x, y, z].every((s, d) => Math.abs(s - here.span[d]) < 1e-5),

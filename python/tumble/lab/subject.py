@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 
 from tumble._engine import Scene, SceneError, World
+from tumble.columns import on_grids
 from tumble.lab import exact
 from tumble.lab.exact import Floats, Linear, Tree
 from tumble.lab.schemes import BY_WORD, Scheme
@@ -173,8 +174,11 @@ class Subject:
             done += n
 
 
-_FLUIDS = {"gas": "Stable Fluids", "compressible": "the compressible gas", "heat": "heat in bodies"}
-"""Methods whose grids are stepped by schemes of their own."""
+_INSTEAD = {
+    "gas": "`tumble lab pressure` compares its solvers, and `tumble refine` shows how a scene converges",
+    "heat": "its schemes are heat.0.scheme=explicit, implicit and trapezoid; `tumble refine` shows how they converge",
+}
+"""What to do with grids, which are stepped by schemes of their own."""
 
 
 def _refuse(tree: Tree) -> None:
@@ -183,15 +187,11 @@ def _refuse(tree: Tree) -> None:
     title = f"“{tree['title']}”" if tree["title"] else "this scene"
     if "vicsek" in methods:
         raise SceneError("the model of Vicsek is a map and has no integrator; there is nothing to compare")
-    for method in (method for method in _FLUIDS if method in methods):
-        instead = {
-            "gas": "`tumble lab pressure` compares its solvers, and `tumble refine` shows how a scene converges",
-            "compressible": "`tumble lab compressible` shows its largest step",
-            "heat": "its schemes are heat.0.scheme=explicit, implicit and trapezoid; `tumble refine` shows how they converge",
-        }[method]
+    for kind, thing in on_grids(tree):
+        instead = _INSTEAD.get(kind, f"see `tumble lab {kind}`")
         raise SceneError(
-            f"{title} has {_FLUIDS[method]}, which is stepped by a scheme of its own: the lab compares the integrators of "
-            f"masses and tracers, and takes scenes of nothing else; {instead}"
+            f'{title} has {kind} "{thing["name"]}", which is stepped by a scheme of its own: the lab compares the integrators '
+            f"of masses and tracers, and takes scenes of nothing else; {instead}"
         )
     if liquid := next((thing["name"] for thing in tree["particles"] if thing.get("fluid")), None):
         raise SceneError(
