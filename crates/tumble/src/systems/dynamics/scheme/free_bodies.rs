@@ -54,16 +54,17 @@ impl FreeBodies {
         self.bodies.is_empty()
     }
 
-    /// Adds what contact between surfaces has moved since x was `old`, in a sub-step of length h [s].
+    /// Adds what contact between surfaces has moved since x was `old`, in a sub-step of length h [s], at the lever arms with which velocities take it:
+    /// where the sub-step began.
     pub fn add_contact(&mut self, core: &Core, old: &[Row], h: f64) {
-        let Core { state, laws, .. } = core;
+        let Core { state, laws, before, .. } = core;
         for body in &mut self.bodies {
             for range in &body.points {
                 let parts = fold(range.len(), |part| {
                     let mut sums = [Vector::default(); 2];
                     for i in range.start + part.start..range.start + part.end {
                         let push = xyz64(sub(state.x[i], old[i])) * (f64::from(laws.masses.mass[i]) / h);
-                        sums = [sums[0] + push, sums[1] + xyz64(state.x[i]).cross(push)];
+                        sums = [sums[0] + push, sums[1] + xyz64(before[i]).cross(push)];
                     }
                     sums
                 });
