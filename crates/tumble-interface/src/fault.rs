@@ -3,6 +3,7 @@
 use crate::Mesh;
 use crate::mesh::Defects;
 use crate::repair::repair;
+use crate::triples::{dot, sub};
 
 /// What a mesh is mended with.
 const REPAIR: &str = "mend the file with `tumble check SCENE --repair`";
@@ -101,12 +102,4 @@ pub fn place(x: [f64; 3]) -> String {
     let largest = x.iter().fold(0.0_f64, |largest, x| largest.max(x.abs()));
     let short = x.map(|x| if x.abs() < 1e-9 * largest { 0.0 } else { format!("{x:.8e}").parse().unwrap_or(x) + 0.0 });
     format!("({}, {}, {})", short[0], short[1], short[2])
-}
-
-fn dot(a: [f64; 3], b: [f64; 3]) -> f64 {
-    a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
-}
-
-fn sub(a: [f64; 3], b: [f64; 3]) -> [f64; 3] {
-    [a[0] - b[0], a[1] - b[1], a[2] - b[2]]
 }

@@ -19,6 +19,7 @@ pub mod mesh;
 pub mod repair;
 pub mod scene;
 pub mod tree;
+pub mod triples;
 pub mod warning;
 
 pub use assets::Assets;

@@ -1,5 +1,6 @@
 //! A triangle mesh as data; reading one from bytes is the work of `tumble-io`.
 
+use crate::triples::{cross, dot, sub};
 use std::collections::HashMap;
 
 /// Vertices closer than this part of the largest coordinate may be one that was rounded: it is eight units in the last place of single
@@ -272,18 +273,6 @@ impl Mesh {
         let longest_sq = [sub(b, a), sub(c, b), sub(a, c)].iter().map(|s| dot(*s, *s)).fold(0.0, f64::max);
         dot(n, n).sqrt() <= SLIVER * longest_sq
     }
-}
-
-fn cross(a: [f64; 3], b: [f64; 3]) -> [f64; 3] {
-    [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
-}
-
-fn dot(a: [f64; 3], b: [f64; 3]) -> f64 {
-    a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
-}
-
-fn sub(a: [f64; 3], b: [f64; 3]) -> [f64; 3] {
-    [a[0] - b[0], a[1] - b[1], a[2] - b[2]]
 }
 
 /// Whether the triangle runs from a to b.

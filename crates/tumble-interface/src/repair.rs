@@ -6,6 +6,7 @@
 
 use crate::Mesh;
 use crate::mesh::SLIVER;
+use crate::triples::{cross, dot, sub};
 use std::collections::{HashMap, HashSet};
 
 /// Rounds of all steps, and of the first of them; a few are enough for all but contrived meshes.
@@ -117,18 +118,6 @@ impl Triangle {
     fn opposite(&self, a: u32, b: u32) -> usize {
         self.at.iter().position(|i| *i != a && *i != b).unwrap_or(0)
     }
-}
-
-fn sub(a: [f64; 3], b: [f64; 3]) -> [f64; 3] {
-    [a[0] - b[0], a[1] - b[1], a[2] - b[2]]
-}
-
-fn cross(a: [f64; 3], b: [f64; 3]) -> [f64; 3] {
-    [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
-}
-
-fn dot(a: [f64; 3], b: [f64; 3]) -> f64 {
-    a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 }
 
 fn sorted(mut t: [u32; 3]) -> [u32; 3] {

@@ -12,6 +12,7 @@ use gltf::json::{Root, accessor};
 use std::borrow::Cow;
 use std::collections::BTreeSet;
 use tumble_interface::Mesh;
+use tumble_interface::triples::dot;
 
 /// Sets of four joints that a vertex may have; the four largest weights count.
 const SETS: u32 = 4;
@@ -514,8 +515,4 @@ impl Affine {
         let [a, b, c] = self.m;
         dot(a, [b[1] * c[2] - b[2] * c[1], b[2] * c[0] - b[0] * c[2], b[0] * c[1] - b[1] * c[0]])
     }
-}
-
-fn dot(a: [f64; 3], b: [f64; 3]) -> f64 {
-    a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 }

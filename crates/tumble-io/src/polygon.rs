@@ -6,6 +6,7 @@
 use spade::{ConstrainedDelaunayTriangulation, Point2, Triangulation};
 use std::collections::HashMap;
 use tumble_interface::Mesh;
+use tumble_interface::triples::{cross, dot, sub};
 
 /// Parts of the square of the extent of a polygon that count as no area.
 const FLAT: f64 = 1e-12;
@@ -129,16 +130,4 @@ fn delaunay(ring: &[Point2<f64>]) -> Option<Vec<[usize; 3]>> {
     }
     triangles.sort_unstable();
     (triangles.len() + 2 == n).then_some(triangles)
-}
-
-fn sub(a: [f64; 3], b: [f64; 3]) -> [f64; 3] {
-    [a[0] - b[0], a[1] - b[1], a[2] - b[2]]
-}
-
-fn cross(a: [f64; 3], b: [f64; 3]) -> [f64; 3] {
-    [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
-}
-
-fn dot(a: [f64; 3], b: [f64; 3]) -> f64 {
-    a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 }
