@@ -1,4 +1,4 @@
-"""Exact solutions of linear scenes, y' = G y + b: springs of rest length zero, and tracers in fields."""
+"""Exact solutions of linear scenes, y' = G y + b: springs of rest length zero, and particles in fields."""
 
 from dataclasses import dataclass
 from typing import Any
@@ -79,8 +79,8 @@ def _is_constant(value: Any) -> bool:
     return all(isinstance(part, int | float) for part in parts)
 
 
-def tracers(fields: list[Tree], positions: Floats) -> Linear | None:
-    """The paths of tracers in linear fields."""
+def carried(fields: list[Tree], positions: Floats) -> Linear | None:
+    """The paths of massless particles in linear fields."""
     matrix = field_matrix(fields)
     if matrix is None:
         return None

@@ -67,18 +67,18 @@ def _label(axes: Axes, scheme: Scheme, text: str, end: tuple[float, float], plac
 
 
 def draw_energy(figure: FigureBase, results: Results) -> None:
-    """Energy over time, a panel per family; for tracers, paths."""
+    """Energy over time, a panel per family; for massless particles, paths."""
     families = [f for f in FAMILIES if any(s.family is f and s.word in results.traces for s in results.schemes)]
     if not families:
         figure.text(0.05, 0.5, "No energies: nothing moves, or nothing fitted into the time allowed.", color=FAINT)
         return
-    shared = not results.subject.tracers
+    shared = not results.subject.massless
     panels = figure.subplots(1, len(families), sharex=shared, sharey=shared, squeeze=False)[0]
     for axes, family in zip(panels, families, strict=True):
         axes.set_title(family.title, color=family.ink, fontsize=10.5)
         schemes = [s for s in results.schemes if s.family is family and s.word in results.traces]
-        (_path if results.subject.tracers else _energies)(axes, results, schemes)
-    if results.subject.tracers:
+        (_path if results.subject.massless else _energies)(axes, results, schemes)
+    if results.subject.massless:
         panels[0].set_ylabel("position [m]")
     else:
         panels[0].set_ylabel("energy, 1 = right")

@@ -70,7 +70,7 @@ def study(
     """The measurements of a page."""
     tested = subject(scene, 0.1 * budget)
     words = list(integrators) if integrators else None
-    results = Results(tested, chosen(words, tested.tracers))
+    results = Results(tested, chosen(words, tested.massless))
     _leave_out(results, words)
     given = duration
     if tested.crowded and duration is None:
@@ -118,7 +118,7 @@ def _leave_out(results: Results, words: list[str] | None) -> None:
     if words:
         rest = [s.word for s in SCHEMES if s.word not in words]
         results.left_out |= dict.fromkeys(rest, "not asked for")
-    if tested.tracers:
+    if tested.massless:
         stopped = [s.word for s in SCHEMES if s.needs_velocities and s.word not in results.left_out]
         results.left_out |= dict.fromkeys(stopped, f"need {NEEDS_VELOCITIES}")
     able = []
@@ -143,9 +143,9 @@ def _told_left_out(results: Results) -> list[str]:
 
 def _lead(results: Results) -> str:
     tested = results.subject
-    n, words = len(tested.start), ("tracer", "tracers") if tested.tracers else ("mass", "masses")
+    n, words = len(tested.start), ("tracer", "tracers") if tested.massless else ("mass", "masses")
     what = f"{n} {words[n != 1]}"
-    if tested.tracers:
+    if tested.massless:
         mode = (
             f"the field's highest rate is {number(tested.rate)}/s"
             if tested.rate
@@ -169,7 +169,7 @@ def _energy_section(results: Results) -> Section:
     h, rate = results.common_step, results.subject.rate
     relative = f" (h × highest rate = {number(h * rate, 2)})" if rate > 0 and h > 0 else ""
     title = f"The same step for all, h = {seconds(h)}" if h > 0 else "The same step for all"
-    if results.subject.tracers:
+    if results.subject.massless:
         text = (
             f"<p>The path of one tracer, every step a dot{relative}. A tangent leaves a circle on the outside and the "
             "next step starts there; implicit Euler, the same step backward, falls inside. The adaptive schemes have a "
@@ -212,7 +212,7 @@ def _limits_section(results: Results) -> Section:
         text = "<p>Nothing here pulls back or brakes, so no step explodes; being accurate is all that costs.</p>"
         draw = partial(figures.draw_limits, results=results)
         return Section("What accuracy costs", text, draw, figures.HEIGHTS["limits"], "Costs")
-    if results.subject.tracers:
+    if results.subject.massless:
         grown = "the squared distance from the true place passes a thousand times the squared size"
     else:
         grown = "the energy grows a thousandfold"

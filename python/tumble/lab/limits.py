@@ -39,7 +39,7 @@ class Found:
 def largest_steps(
     subject: Subject, schemes: Sequence[Scheme], purse: Purse, tick: Callable[[], None]
 ) -> dict[str, Found]:
-    """The largest step of every integrator, by bisection: the energy (of tracers: the squared distance from the true
+    """The largest step of every integrator, by bisection: the energy (without masses: the squared distance from the true
     place) must not grow a thousandfold within a hundred periods of the stiffest mode."""
     fixed = [s for s in schemes if not s.adaptive]
     results: dict[str, Found] = {}
@@ -58,7 +58,7 @@ def largest_steps(
         else:
             _search(subject, scheme, found, mode, part)
         tick()
-        if 0 < found.measured < np.inf and not subject.tracers and not scheme.implicit:
+        if 0 < found.measured < np.inf and not subject.massless and not scheme.implicit:
             found.autopsy = _autopsy(subject, scheme, found, limits is not None and limits.stable == 0, part)
         purse.settle(part)
     return results
@@ -137,7 +137,7 @@ def _growth(subject: Subject) -> Callable[[World], bool]:
     """Says no when a world has grown a thousandfold."""
     first: Mapping[str, Any] = {}
     scale, extent = 0.0, subject.extent
-    if subject.tracers:
+    if subject.massless:
         solution = subject.solution
         if solution is not None:
             extent = max(extent, float(np.abs(solution.at(np.pi / subject.rate) - subject.start).max()) / 2)
@@ -148,7 +148,7 @@ def _growth(subject: Subject) -> Callable[[World], bool]:
 
     def fine(world: World) -> bool:
         with np.errstate(over="ignore", invalid="ignore"):
-            if subject.tracers:
+            if subject.massless:
                 if subject.solution is None:
                     return True
                 off = np.abs(subject.positions(world) - subject.solution.at(world.time)).max()
@@ -165,7 +165,7 @@ def stiffest_mode(subject: Subject, patience: float = np.inf) -> Floats | None:
     By power iteration: a step of symplectic Euler from rest leaves the velocities h a(x), so that two of them, from x
     and from x + u, show what the stiffness matrix makes of u.
     """
-    if subject.tracers or subject.frequency <= 0:
+    if subject.massless or subject.frequency <= 0:
         return None
     h, size = 1e-3 / subject.rate, 1e-6 * subject.extent
     world = subject.world(BY_WORD["symplectic_euler"], h, 1, 1)

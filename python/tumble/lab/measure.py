@@ -55,7 +55,7 @@ class Results:
     accuracy: list[Cell] = field(default_factory=list)
     common_step: float = 0.0
     traces: dict[str, tuple[Floats, Floats]] = field(default_factory=dict)
-    """Times [s], and energies over the true ones (of tracers: the path of one)."""
+    """Times [s], and energies over the true ones (without masses: the path of one)."""
     energy_cells: dict[str, Cell] = field(default_factory=dict)
     true_path: Floats | None = None
     observed: list[Observed] = field(default_factory=list)
@@ -228,24 +228,26 @@ def _compared(
 
 
 def energy(results: Results, tolerance: float, purse: Purse, tick: Tick) -> None:
-    """All integrators with one step: their energy over the true one, or for tracers the path of the one that goes
+    """All integrators with one step: their energy over the true one, or without masses the path of the one that goes
     farthest."""
     subject = results.subject
     if subject.rate > 0:
         periods = 2 * np.pi / subject.rate
         length = max(20 * periods, min(subject.duration, 120 * periods))
         h = 0.3 / subject.rate
-        if subject.tracers:
+        if subject.massless:
             length, h = 1.6 * periods, 0.35 / subject.rate
     else:
         length, h = subject.duration, subject.duration / 64
-    per_frame = 1 if subject.tracers else max(1, round(length / 240 / h))
+    per_frame = 1 if subject.massless else max(1, round(length / 240 / h))
     interval = per_frame * h
     frames = max(2, round(length / interval))
     results.common_step = h
     truth: list[tuple[float, float]] = []
     scale = 0.0
-    which = int(np.argmax(np.linalg.norm(subject.start - subject.start.mean(axis=0), axis=1))) if subject.tracers else 0
+    which = (
+        int(np.argmax(np.linalg.norm(subject.start - subject.start.mean(axis=0), axis=1))) if subject.massless else 0
+    )
     first: Mapping[str, Any] = {}
 
     def books(world: World) -> tuple[float, float]:
@@ -256,7 +258,7 @@ def energy(results: Results, tolerance: float, purse: Purse, tick: Tick) -> None
         return world.time, float(ledger["energy"])
 
     fine = BY_WORD["rk4"]
-    if subject.tracers:
+    if subject.massless:
         solution, turn = subject.solution, np.linspace(0.0, interval * frames, 400)
         results.true_path = np.array([solution.at(float(t))[which] for t in turn]) if solution is not None else None
     else:
@@ -270,10 +272,10 @@ def energy(results: Results, tolerance: float, purse: Purse, tick: Tick) -> None
     for rest, scheme in zip(range(len(results.schemes), 0, -1), results.schemes, strict=True):
         tick()
         part = purse.part(rest)
-        points: list[Floats] = [subject.start[which]] if subject.tracers else [np.array([0.0, 1.0])]
+        points: list[Floats] = [subject.start[which]] if subject.massless else [np.array([0.0, 1.0])]
 
         def follow(world: World, points: list[Floats] = points) -> bool:
-            if subject.tracers:
+            if subject.massless:
                 points.append(subject.positions(world)[which])
                 return True
             k = len(points)
@@ -285,9 +287,9 @@ def energy(results: Results, tolerance: float, purse: Purse, tick: Tick) -> None
         knob = tolerance if scheme.adaptive else None
         cell = run(subject, scheme, "energy", interval, frames, per_frame, knob, part.left, follow)
         results.energy_cells[scheme.word] = purse.spend(cell)
-        if cell.outcome == BLEW_UP and not subject.tracers:
+        if cell.outcome == BLEW_UP and not subject.massless:
             points.append(np.array([cell.reached, 10 * GROWTH]))
         if len(points) > 1:
             path = np.array(points)
             times = (np.arange(len(path)) * interval).astype(float)
-            results.traces[scheme.word] = (times, path) if subject.tracers else (path[:, 0], path[:, 1])
+            results.traces[scheme.word] = (times, path) if subject.massless else (path[:, 0], path[:, 1])

@@ -89,14 +89,14 @@ SCHEMES: tuple[Scheme, ...] = (
 BY_WORD = {s.word: s for s in SCHEMES}
 
 
-def chosen(words: list[str] | None, tracers: bool) -> list[Scheme]:
-    """The integrators named, or all; for tracers only those that need no velocities. Raises ValueError, also where none is
+def chosen(words: list[str] | None, massless: bool) -> list[Scheme]:
+    """The integrators named, or all; without masses only those that need no velocities. Raises ValueError, also where none is
     left."""
     strange = [unknown("integrator", w, BY_WORD) for w in words or [] if w not in BY_WORD]
     if strange:
         raise ValueError("\n".join(strange))
     asked = [s for s in SCHEMES if not words or s.word in words]
-    able = [s for s in asked if not (tracers and s.needs_velocities)]
+    able = [s for s in asked if not (massless and s.needs_velocities)]
     if not able:
         raise ValueError(
             f"{', '.join(s.word for s in asked)} {'need' if len(asked) > 1 else 'needs'} {NEEDS_VELOCITIES}"
@@ -105,4 +105,4 @@ def chosen(words: list[str] | None, tracers: bool) -> list[Scheme]:
 
 
 NEEDS_VELOCITIES = "velocities, which tracers do not have: a field gives them"
-"""Why an integrator does not move tracers."""
+"""Why an integrator moves nothing that has no mass."""

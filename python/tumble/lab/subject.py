@@ -44,7 +44,7 @@ class Subject:
 
     tree: Tree
     folder: str
-    tracers: bool
+    massless: bool
     """Whether it is velocity fields, not forces, that move it."""
     rate: float
     """Highest rate of anything in it, max(w, c) of the stiffest and the most damped mode [rad/s]; 0 without any."""
@@ -76,13 +76,13 @@ class Subject:
     @property
     def flock(self) -> bool:
         """Whether it steers, which no energy drives and no energy tells about."""
-        return not self.tracers and any(force["kind"] == "flock" for force in self.tree["force"])
+        return not self.massless and any(force["kind"] == "flock" for force in self.tree["force"])
 
     @property
     def crowded(self) -> bool:
         """Whether many push each other at short range: paths that begin close do not stay so."""
         kinds = {"flock", "lennard_jones", "repulsion", "cohesion"}
-        return not self.tracers and any(force["kind"] in kinds for force in self.tree["force"])
+        return not self.massless and any(force["kind"] in kinds for force in self.tree["force"])
 
     def consider(self, world: World) -> None:
         """Lets the state that a run has come to count for the limits, too."""
@@ -96,7 +96,7 @@ class Subject:
     @property
     def limited(self) -> bool:
         """Whether something in it pulls back or brakes, so that a step can be too long."""
-        if self.tracers:
+        if self.massless:
             return self.rate > 0
         things = [kind for kind in ("rope", "sheet", "block", "net", "cloth", "anchor") if self.tree[kind]]
         springs = any(thing["spring"] for thing in self.tree["particles"])
@@ -114,7 +114,7 @@ class Subject:
         systems = []
         for system in self.tree["system"]:
             own = dict(system)
-            if own["method"] == ("tracers" if self.tracers else "dynamics"):
+            if own["method"] == ("tracers" if self.massless else "dynamics"):
                 own |= {"integrator": scheme.word, "substeps": substeps, "step": None}
                 if scheme.adaptive:
                     own |= {
@@ -150,7 +150,7 @@ class Subject:
     def objects(self, world: World) -> list[str]:
         """Names of the objects under test."""
         topology = world.topology
-        return [name for name in world.columns("position") if ("mass" in topology.get(name, {})) != self.tracers]
+        return [name for name in world.columns("position") if ("mass" in topology.get(name, {})) != self.massless]
 
     def positions(self, world: World) -> Floats:
         """Positions [m] of all that is under test, n x 3."""
@@ -215,7 +215,7 @@ def subject(scene: Scene, patience: float = np.inf) -> Subject:
     tree["output"] = {"columns": ["position"], "plot": False}
     tree["expect"] = {}
     methods = {system["method"] for system in tree["system"]}
-    tracers = "tracers" in methods and "dynamics" not in methods
+    massless = "tracers" in methods and "dynamics" not in methods
     notes = _thin(tree)
     if {"tracers", "dynamics"} <= methods:
         notes.append("Tracers move as the scene says; what is compared here are the masses.")
@@ -223,7 +223,7 @@ def subject(scene: Scene, patience: float = np.inf) -> Subject:
         notes.append(
             "The position clamp goes with modified_euler, verlet and position_based only; the others run without it."
         )
-    bare = Subject(tree, scene.folder, tracers, 0.0, 0.0, 0.0, None, {}, None, np.zeros((0, 3)), None, notes)
+    bare = Subject(tree, scene.folder, massless, 0.0, 0.0, 0.0, None, {}, None, np.zeros((0, 3)), None, notes)
     try:
         world = bare.world(BY_WORD["rk4"], 1.0 / float(tree["time"]["fps"]), 1, substeps=1)
     except SceneError as error:
@@ -234,8 +234,8 @@ def subject(scene: Scene, patience: float = np.inf) -> Subject:
         ) from error
     bare.start = bare.positions(world)
     bare.threads = 1 if len(bare.start) <= 4096 else None
-    if tracers:
-        bare.solution = exact.tracers(tree["field"], bare.start)
+    if massless:
+        bare.solution = exact.carried(tree["field"], bare.start)
         _tracer_limits(bare)
     else:
         bare.solution = exact.springs(tree, world)
@@ -317,7 +317,7 @@ def _tracer_limits(subject: Subject) -> None:
     subject.damping = max((-v.real for v in values), default=0.0)
     if not values or max(v.real for v in values) > 1e-12 * subject.rate:
         if values:
-            subject.notes.append("The field itself drives tracers apart, so growth says nothing about the steps.")
+            subject.notes.append("The field itself drives particles apart, so growth says nothing about the steps.")
             subject.rate = 0.0
         return
 
