@@ -208,3 +208,72 @@ def test_what_is_held_is_not_thrown() -> None:
     world.step(3)
     x = world.frame["o"]["position"]
     assert np.array_equal(x[0], [0, 0, 0]) and x[-1][2] > 0.1
+
+
+ROOM = {
+    "version": 1,
+    "dimension": 2,
+    "time": {"frames": 48},
+    "system": [{"method": "gas"}],
+    "gas": [
+        {
+            "name": "room",
+            "box": {"size": [2, 1, 1], "center": [0, 0, 0.5], "resolution": 64},
+            "smoke": {"weight": 0},
+            "source": [
+                {
+                    "shape": {"box": {"center": [-0.7, 0, 0.3], "size": [0.2, 1, 0.2]}},
+                    "density": 1,
+                    "velocity": [3, 0, 0],
+                }
+            ],
+        }
+    ],
+}
+
+
+@pytest.mark.parametrize(
+    "wall",
+    [
+        {"center": [0.0, 0, 0.5], "size": [0.01, 2, 1.2]},
+        {"center": [0.01, 0, 0.5], "size": [0.02, 2, 1.6], "rotate": [0, 30, 0]},
+        {"center": [-0.1, 0, 0.5], "size": [0.003, 2, 1.6], "rotate": [0, -17, 0]},
+    ],
+)
+def test_a_wall_thinner_than_a_cell_blocks_a_gas(wall: Tree) -> None:
+    world = World(Scene({**ROOM, "collider": [{"name": "wall", "shape": {"box": wall}}]}))
+    world.step(48)
+    smoke = world.frame["room"]["density"]
+    x, z = np.meshgrid((np.arange(64) + 0.5) / 32 - 1, (np.arange(32) + 0.5) / 32 - 0.5)
+    lean = math.radians(wall.get("rotate", [0, 0, 0])[1])
+    beyond = (x - wall["center"][0]) * math.cos(lean) - z * math.sin(lean) > 2 / 32
+    smoke = smoke.reshape(32, 64)
+    assert smoke[~beyond].max() > 0.5
+    assert smoke[beyond].max() < 1e-12
+
+
+@pytest.mark.parametrize(("stop", "rate"), [(0.5, 2.0), (1.25, 0.8)])
+def test_a_source_of_a_gas_works_as_its_keys_say(stop: float, rate: float) -> None:
+    """The smoke that is there when the source has stopped: rate x time x its part of the room, and not more later."""
+    room = ROOM["gas"][0]  # type: ignore[index]
+    words = {"shape": room["source"][0]["shape"], "smoke": {"keys": [[0, rate], [stop, 0]], "interpolation": "step"}}
+    world = World(Scene({**ROOM, "gas": [{**room, "source": [words]}]}))
+    world.step(48)
+    assert world.ledger.mass == pytest.approx(rate * stop * 0.2 * 0.2, rel=0.02)
+
+
+def test_pins_let_go_when_their_time_is_over() -> None:
+    tree = {
+        "version": 1,
+        "time": {"frames": 48},
+        "sheet": [{"name": "curtain", "size": [1, 1], "resolution": [10, 10], "pin": [{"which": "edge y+", "until": 1.0}]}],
+    }
+    world = World(Scene(tree))
+    world.step(24)
+    edge = world.frame["curtain"]["position"][-11:, 2]
+    assert np.ptp(edge) == 0
+    world.step(24)
+    fallen = edge - world.frame["curtain"]["position"][-11:, 2]
+    # The cloth below pulls the edge down with it: faster than a stone at first.
+    assert fallen.min() > 0.5 * 9.8 / 2
+    assert fallen.max() < 1.5 * 9.8

@@ -294,6 +294,33 @@ end = 1.0
 }
 
 #[test]
+fn sources_give_what_their_keys_and_formulas_integrate_to() {
+    // A region of 0.4 x 0.4 x 0.4 m in a box at rest, and its rates over a second.
+    let given = |words: &str| {
+        let mut sim = simulation(&format!(
+            "time = {{ fps = 10, frames = 10 }}\nworld.gravity = [0, 0, 0]\n[[gas]]\nname = \"air\"\nbox = {{ size = [1, 1, 1], resolution = 20 }}\nsmoke = {{}}\ntemperature.ambient = \
+             300\nfire = {{ ignition = 1e4 }}\n[[gas.source]]\nshape.box.size = [0.4, 0.4, 0.4]\n{words}\n"
+        ));
+        run(&mut sim, 10);
+        let middle = |column: &str| grid(&sim, "air", column).0[10 + 20 * 10 + 400 * 10];
+        [middle("density"), middle("temperature") - 300.0, middle("fuel")]
+    };
+    // The jump of the steps lies within a step of time.
+    for (words, exact) in [
+        ("smoke = { keys = [[0, 2], [0.55, 0]], interpolation = \"step\" }", [1.1, 0.0, 0.0]),
+        ("smoke = { keys = [[0.25, 0], [0.75, 4]] }", [0.5 * 0.5 * 4.0 + 0.25 * 4.0, 0.0, 0.0]),
+        ("smoke = \"3*t^2\"\nheating = \"10*t\"", [1.0, 5.0, 0.0]),
+        ("fuel = { keys = [[0, 1], [1, 0]] }", [0.0, 0.0, 0.5]),
+        ("heating = { keys = [[0, 0], [0.5, 8], [1, 0]] }\nstart = 0.25", [0.0, 3.5, 0.0]),
+        // Held values are those at the end.
+        ("density = { keys = [[0, 1], [1, 3]] }\ntemperature = \"300 + 7*t\"\nfuel_density = \"t/4\"", [3.0, 7.0, 0.25]),
+    ] {
+        let given = given(words);
+        assert!(given.iter().zip(exact).all(|(a, b)| (a - b).abs() < 1e-9), "{words}: {given:?} {exact:?}");
+    }
+}
+
+#[test]
 fn a_shift_by_whole_cells_changes_nothing() {
     let plume = |shift: f64| {
         let mut sim = simulation(&format!(

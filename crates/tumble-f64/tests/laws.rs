@@ -35,3 +35,4 @@ mod sheets;
 mod single_steps;
 mod solids;
 mod stability_estimate;
+mod thin_walls;

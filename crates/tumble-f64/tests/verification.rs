@@ -25,6 +25,7 @@ mod liquids;
 mod mesh_contact;
 mod pattern;
 mod pinned_velocity;
+mod pins_in_time;
 mod position_based;
 mod position_based_scenes;
 mod rod_loops;

@@ -1,6 +1,6 @@
 //! Gases and liquids that fill a box: Stable Fluids.
 
-use super::{AnimatedVector, Component, GridBox, OnFailure, Shape};
+use super::{Animated, AnimatedVector, Component, GridBox, OnFailure, Shape};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -297,29 +297,29 @@ pub struct GasSource {
     /// Shape of the region; not a mesh.
     pub shape: Shape,
     /// Smoke emitted.
-    #[serde(default)]
+    #[serde(default = "nothing")]
     #[schemars(extend("x-unit" = "kg/(m³ s)"))]
-    pub smoke: f64,
+    pub smoke: Animated,
     /// Fixed smoke density.
     #[serde(default)]
-    #[schemars(range(min = 0.0), extend("x-unit" = "kg/m³"))]
-    pub density: Option<f64>,
+    #[schemars(extend("x-unit" = "kg/m³"))]
+    pub density: Option<Animated>,
     /// Fixed temperature.
     #[serde(default)]
-    #[schemars(range(min = 0.0), extend("x-unit" = "K"))]
-    pub temperature: Option<f64>,
+    #[schemars(extend("x-unit" = "K"))]
+    pub temperature: Option<Animated>,
     /// Heating rate.
-    #[serde(default)]
+    #[serde(default = "nothing")]
     #[schemars(extend("x-unit" = "K/s"))]
-    pub heating: f64,
+    pub heating: Animated,
     /// Fuel emitted.
-    #[serde(default)]
-    #[schemars(range(min = 0.0), extend("x-unit" = "kg/(m³ s)"))]
-    pub fuel: f64,
+    #[serde(default = "nothing")]
+    #[schemars(extend("x-unit" = "kg/(m³ s)"))]
+    pub fuel: Animated,
     /// Fixed fuel density.
     #[serde(default)]
-    #[schemars(range(min = 0.0), extend("x-unit" = "kg/m³"))]
-    pub fuel_density: Option<f64>,
+    #[schemars(extend("x-unit" = "kg/m³"))]
+    pub fuel_density: Option<Animated>,
     /// Fixed velocity, before the projection.
     #[serde(default)]
     #[schemars(extend("x-unit" = "m/s"))]
@@ -332,6 +332,10 @@ pub struct GasSource {
     #[serde(default)]
     #[schemars(extend("x-unit" = "s"))]
     pub end: Option<f64>,
+}
+
+fn nothing() -> Animated {
+    Animated::Value(0.0)
 }
 
 /// Order of the four parts of a step. Both are the same cycle with different starting points.

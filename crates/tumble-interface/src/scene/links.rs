@@ -78,7 +78,7 @@ pub struct LinkSettings {
 pub enum Pin {
     /// By name: `"all"`, `"start"`, `"corner 0 1"`, `"vertex 3 4"`, `"edge x-"`, `"face z+"`.
     Words(String),
-    /// All within a radius of a point, or by name; optionally following a collider.
+    /// All within a radius of a point, or by name; optionally following a collider, or for some time.
     Region(Region),
 }
 
@@ -112,6 +112,14 @@ pub struct Region {
     /// Collider that they follow. Default: they are fixed.
     #[serde(default)]
     pub follow: Option<Follow>,
+    /// Time from which they are held, where they are then. Default: from the start.
+    #[serde(default)]
+    #[schemars(range(min = 0.0), extend("x-unit" = "s"))]
+    pub from: Option<f64>,
+    /// Time at which they are let go. Default: never.
+    #[serde(default)]
+    #[schemars(extend("x-unit" = "s", "exclusiveMinimum" = 0.0))]
+    pub until: Option<f64>,
 }
 
 /// The springs that are given; otherwise none if something else makes the object elastic, or the default ones.

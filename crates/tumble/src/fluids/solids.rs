@@ -6,8 +6,10 @@
 //! velocity is that of the image in it, with its part across (free slip) or all of it (no slip) reversed as seen from the solid,
 //! and what is carried is that of the image (gas.11).
 //!
-//! Source: [ng2009]. Degenerate: bodies thinner than a cell leak; a solid that leaves a periodic box does not come back on the other
-//! side.
+//! A wall through which a cell would reach counts as thicker, to both sides alike, so that it lets nothing through wherever it lies
+//! (gas.19).
+//!
+//! Source: [ng2009]. Degenerate: a solid that leaves a periodic box does not come back on the other side.
 //! Tests: crates/tumble-f64/tests/solids.rs.
 
 use super::balls::Ball;
@@ -25,6 +27,8 @@ use std::sync::Arc;
 const BLOCK: usize = 8;
 /// How deep in a solid velocities and what is carried are known [cells].
 const DEPTH: f64 = 2.5;
+/// The least thickness of a wall, in widths of a cell along its normal: from no side a stencil of eight cells reaches past its middle.
+const WALL: f64 = 2.0;
 /// How often images are read: those close to the surface read each other.
 const PASSES: usize = 4;
 /// No cell.
@@ -202,11 +206,24 @@ impl Solids {
         x.into()
     }
 
+    /// The nearest surface of a collider, no wall of it thinner than a cell needs.                              (gas.19)
+    fn thickened(&self, collider: &Collider, x: Vector, t: f64, within: f64) -> (f64, Vector, Vector) {
+        let (d, n, v) = collider.surface(x, t, within);
+        let through: f64 = self.grid.axes().map(|a| <[f64; 3]>::from(n)[a].abs()).sum();
+        let least = WALL * self.grid.dx * through;
+        if d.abs() > (DEPTH + 1.0) * self.grid.dx || least == 0.0 {
+            return (d, n, v);
+        }
+        // As far behind the surface, the way back to the wall is what it lacks.
+        let behind = collider.surface(x - n * (d + least), t, least).0;
+        (d - 0.5 * behind.max(0.0), n, v)
+    }
+
     /// The nearest surface: whose, its distance [m], the direction away from it, its velocity [m/s].
     fn nearest(&self, x: Vector, t: f64, within: f64) -> (usize, f64, Vector, Vector) {
         let mut best = (0, f64::INFINITY, Vector::default(), Vector::default());
         for (i, collider) in self.colliders.iter().enumerate() {
-            let (d, n, v) = collider.surface(x, t, within);
+            let (d, n, v) = self.thickened(collider, x, t, within);
             if d < best.1 {
                 best = (i, d, n, v);
             }

@@ -2,7 +2,7 @@
 
 use super::Site;
 use super::lattice::Lattice;
-use super::pins::{Pinnable, pinned};
+use super::pins::{Pinnable, pin};
 use crate::elements::rest_matrix;
 use tumble_interface::scene::{Block, Material};
 
@@ -22,8 +22,7 @@ pub fn block(site: &mut Site<'_>, thing: &Block) {
         (None, None) => site.wrong(path.as_str(), "expected links (springs), material (tetrahedra) or shape_matching"),
     }
     let first = lattice.index([0; 3]);
-    let pins = pinned(site, &Pinnable { path: &path, n: &lattice.n, first, is_lattice: true }, &thing.pin);
-    pins.iter().for_each(|p| site.parts.pin(*p));
+    pin(site, &Pinnable { path: &path, n: &lattice.n, first, is_lattice: true }, &thing.pin);
     site.parts.launch(thing.velocity);
     if let Some(words) = &thing.shape_matching {
         let count: usize = lattice.n.iter().map(|n| *n as usize).product();

@@ -4,7 +4,7 @@
 use super::Site;
 use super::cut::{Cut, Stitch, cut};
 use super::dress::{beyond_sense, dress};
-use super::pins::{Pinnable, pinned};
+use super::pins::{Pinnable, pin};
 use super::surface::{Rest, Surface};
 use crate::geometry::Vector;
 use crate::math::functions;
@@ -159,8 +159,7 @@ pub fn cloth(site: &mut Site<'_>, thing: &Cloth) {
         }
     }
     let first = first.unwrap_or(0);
-    let pins = pinned(site, &Pinnable { path: &path, n: &[all.vertices.len() as u32], first, is_lattice: false }, &thing.pin);
-    pins.iter().for_each(|p| site.parts.pin(*p));
+    pin(site, &Pinnable { path: &path, n: &[all.vertices.len() as u32], first, is_lattice: false }, &thing.pin);
     site.parts.launch(thing.velocity);
     let places: Vec<_> = all.triangles.iter().map(|t| t.map(|i| Vector::from(all.vertices[i as usize]))).collect();
     if let Some(object) = site.parts.object() {

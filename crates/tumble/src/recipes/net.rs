@@ -1,7 +1,7 @@
 //! Masses at the vertices of a mesh, springs along its edges.
 
 use super::Site;
-use super::pins::{Pinnable, pinned};
+use super::pins::{Pinnable, pin};
 use super::surface::{Rest, Surface};
 use crate::geometry::Vector;
 use tumble_interface::fault::place;
@@ -85,8 +85,7 @@ pub fn net(site: &mut Site<'_>, thing: &Net, mesh: &Mesh) {
     if let Some(words) = &thing.shape_matching {
         site.shape(first as usize..first as usize + mesh.vertices.len(), words, &path);
     }
-    let pins = pinned(site, &Pinnable { path: &path, n: &[mesh.vertices.len() as u32], first, is_lattice: false }, &thing.pin);
-    pins.iter().for_each(|p| site.parts.pin(*p));
+    pin(site, &Pinnable { path: &path, n: &[mesh.vertices.len() as u32], first, is_lattice: false }, &thing.pin);
     site.parts.launch(thing.velocity);
     if let Some(object) = site.parts.object() {
         object.triangles.clone_from(&mesh.triangles);

@@ -1,7 +1,7 @@
 //! Free masses, and springs between chosen ones.
 
 use super::Site;
-use super::pins::{Pinnable, pinned};
+use super::pins::{Pinnable, pin};
 use crate::geometry::Vector;
 use crate::math::Random;
 use crate::math::functions::{cos, pow, sin};
@@ -100,9 +100,7 @@ pub fn particles(site: &mut Site<'_>, thing: &Particles) {
             first = index;
         }
     }
-    for pin in pinned(site, &Pinnable { path: &path, n: &[n as u32], first, is_lattice: false }, &thing.pin) {
-        site.parts.pin(pin);
-    }
+    pin(site, &Pinnable { path: &path, n: &[n as u32], first, is_lattice: false }, &thing.pin);
     if let Some(words) = &thing.shape_matching {
         site.shape(first as usize..first as usize + n, words, &path);
     }

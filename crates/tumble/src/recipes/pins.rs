@@ -2,6 +2,8 @@
 
 use super::Site;
 use crate::geometry::{Carrier, Collider, Vector};
+use crate::systems::dynamics::Times;
+use tumble_interface::check::plain;
 use tumble_interface::scene::{Follow, Pin, Region};
 
 /// What a thing offers to pin.
@@ -16,33 +18,56 @@ pub struct Pinnable<'a> {
     pub is_lattice: bool,
 }
 
-/// The masses that the pins mean, in order, each once.
-pub fn pinned(site: &mut Site<'_>, thing: &Pinnable<'_>, pins: &[Pin]) -> Vec<u32> {
-    let mut all = Vec::new();
+/// The masses that pins hold for ever, in order, each once; those that they hold for some time are noted, with the times.
+pub struct Pinned {
+    /// For ever.
+    pub always: Vec<u32>,
+    /// For some time.
+    pub passing: Vec<(u32, Times)>,
+}
+
+/// Holds the masses that the pins mean.
+pub fn pin(site: &mut Site<'_>, thing: &Pinnable<'_>, pins: &[Pin]) -> Pinned {
+    let mut all = Pinned { always: Vec::new(), passing: Vec::new() };
     for (i, pin) in pins.iter().enumerate() {
-        let (found, follow) = match pin {
-            Pin::Words(words) => (in_words(thing, words), None),
-            Pin::Region(region) => (in_table(site, thing, region), region.follow.as_ref()),
+        let (found, follow, times) = match pin {
+            Pin::Words(words) => (in_words(thing, words), None, Ok(None)),
+            Pin::Region(region) => (in_table(site, thing, region), region.follow.as_ref(), times(region)),
         };
         // What is wrong with a collider is told elsewhere.
         let carrier = follow.zip(site.solids).map(|(follow, solids)| carrier(solids, follow)).transpose();
-        match found.and_then(|found| Ok((found, carrier?))) {
-            Ok((found, carrier)) => {
-                all.extend(found.iter().map(|p| p + thing.first));
-                if let Some((solid, bone)) = carrier {
-                    for point in found.iter().map(|p| p + thing.first) {
-                        let nearest = |solids: &[Collider]| solids[solid].carrier(site.parts.position(point));
-                        let carrier = bone.map_or_else(|| site.solids.map_or(Carrier::Whole, nearest), Carrier::Bone);
-                        site.parts.follow(point, solid, carrier);
-                    }
+        match found.and_then(|found| Ok((found, carrier?, times?))) {
+            Ok((found, carrier, times)) => {
+                let found = found.iter().map(|p| p + thing.first);
+                match times {
+                    None => all.always.extend(found.clone()),
+                    Some(times) => all.passing.extend(found.clone().map(|point| (point, times))),
+                }
+                let Some((solid, bone)) = carrier else { continue };
+                for point in found {
+                    let nearest = |solids: &[Collider]| solids[solid].carrier(site.parts.position(point));
+                    let carrier = bone.map_or_else(|| site.solids.map_or(Carrier::Whole, nearest), Carrier::Bone);
+                    site.parts.follow(point, solid, carrier, times.unwrap_or(Times::ALWAYS));
                 }
             }
             Err(message) => site.wrong(format!("{}.pin[{i}]", thing.path), message),
         }
     }
-    all.sort_unstable();
-    all.dedup();
+    all.always.sort_unstable();
+    all.always.dedup();
+    all.always.iter().for_each(|point| site.parts.pin(*point));
+    all.passing.retain(|(point, _)| all.always.binary_search(point).is_err());
+    all.passing.iter().for_each(|(point, times)| site.parts.hold(*point, *times));
     all
+}
+
+/// When a region is held, if not always.
+fn times(region: &Region) -> Result<Option<Times>, String> {
+    let times = Times { from: region.from.unwrap_or(0.0), until: region.until.unwrap_or(f64::INFINITY) };
+    if times.until <= times.from {
+        return Err(format!("held from {} s until {} s, expected an end after the start", plain(times.from), plain(times.until)));
+    }
+    Ok((times != Times::ALWAYS).then_some(times))
 }
 
 /// The collider that is followed, counted from the first, and its bone.

@@ -1,11 +1,12 @@
 //! A chain of springs, or a rod, between two points.
 
 use super::Site;
-use super::pins::{Pinnable, pinned};
+use super::pins::{Pinnable, Pinned, pin};
 use crate::geometry::Vector;
 use crate::math::functions::{cos, sin};
 use crate::math::rotation::from_z_to;
 use crate::math::{Quat, bisect};
+use crate::systems::dynamics::Times;
 use tumble_interface::scene::{Links, Rod, Rope};
 
 /// Adds the masses, and links or rod elements.
@@ -32,13 +33,12 @@ pub fn rope(site: &mut Site<'_>, thing: &Rope) {
     if let Some(object) = site.parts.object() {
         object.curve = (0..=n).collect();
     }
-    let pins = pinned(site, &Pinnable { path: &path, n: &[n + 1], first, is_lattice: true }, &thing.pin);
-    pins.iter().for_each(|p| site.parts.pin(*p));
+    let pins = pin(site, &Pinnable { path: &path, n: &[n + 1], first, is_lattice: true }, &thing.pin);
     site.parts.launch(thing.velocity);
     match (&thing.rod, &thing.links) {
         (Some(_), Some(_)) => site.wrong(format!("{path}.links"), "a rod has no links; leave out links or rod"),
         (Some(rod), None) => {
-            let ends = [pins.contains(&first), pins.contains(&(first + n))];
+            let ends = [first, first + n].map(|end| Held::of(&pins, end));
             frames(site, thing, rod, &places, first, ends, spacing);
         }
         (None, _) => {
@@ -63,7 +63,7 @@ fn chain(site: &mut Site<'_>, links: &Links, first: u32, n: u32, spacing: f64) {
 
 /// A frame per segment, its third axis along the segment, carried on from the first without twist; the first axis of the first is where
 /// `bend_side` resists.                                                                                   (rods.8)
-fn frames(site: &mut Site<'_>, thing: &Rope, rod: &Rod, places: &[Vector], first: u32, clamped: [bool; 2], spacing: f64) {
+fn frames(site: &mut Site<'_>, thing: &Rope, rod: &Rod, places: &[Vector], first: u32, ends: [Held; 2], spacing: f64) {
     let (side, twist) = (rod.bend_side.unwrap_or(rod.bend), rod.twist.unwrap_or(rod.bend));
     if rod.bend == 0.0 && side.max(twist) > 0.0 {
         let what = if twist > 0.0 { "twist" } else { "bending to one side" };
@@ -84,9 +84,9 @@ fn frames(site: &mut Site<'_>, thing: &Rope, rod: &Rod, places: &[Vector], first
             turn = shortest(turn.axis_z(), d) * turn;
         }
         let frame = site.parts.frame(turn.row(), inertia);
-        for end in [(i == 0 && clamped[0]), (i + 1 == n && clamped[1])] {
-            if end {
-                clamp(site, rod, frame, turn, spacing, ratios);
+        for (end, here) in ends.iter().zip([i == 0, i + 1 == n]) {
+            if here {
+                clamp(site, rod, end, (frame, inertia, turn), spacing, ratios);
             }
         }
         let k = rod.stretch * spacing;
@@ -127,13 +127,32 @@ fn first_frame(rod: &Rod, d: Vector, up: Vector) -> Option<Quat<f64>> {
 
 /// Holds a frame at the very end of the rod, half a segment from that of its last segment: holding the latter itself would
 /// clamp the rod half a segment too far along, an error of order 1.    (rods.5)
-fn clamp(site: &mut Site<'_>, rod: &Rod, frame: u32, turn: Quat<f64>, spacing: f64, ratios: [f64; 2]) {
-    if rod.bend > 0.0 {
-        let held = site.parts.frame(turn.row(), 1.0);
-        site.parts.clamp_frame(held);
+fn clamp(site: &mut Site<'_>, rod: &Rod, end: &Held, (frame, inertia, turn): (u32, f64, Quat<f64>), spacing: f64, ratios: [f64; 2]) {
+    let mut held = frame;
+    let free = matches!(end, Held::At(times) if times.is_empty());
+    if rod.bend > 0.0 && !free {
+        // Of a frame that is let go the inertia of half a segment remains.
+        held = site.parts.frame(turn.row(), if matches!(end, Held::Always) { 1.0 } else { inertia / 2.0 });
         bend(site, rod, [held, frame], spacing / 2.0, ratios);
-    } else {
-        site.parts.clamp_frame(frame);
+    }
+    match end {
+        Held::Always => site.parts.clamp_frame(held),
+        Held::At(times) => times.iter().for_each(|times| site.parts.hold_frame(held, *times)),
+    }
+}
+
+/// When an end is held.
+enum Held {
+    Always,
+    At(Vec<Times>),
+}
+
+impl Held {
+    fn of(pins: &Pinned, point: u32) -> Self {
+        if pins.always.contains(&point) {
+            return Self::Always;
+        }
+        Self::At(pins.passing.iter().filter(|(held, _)| *held == point).map(|(_, times)| *times).collect())
     }
 }
 

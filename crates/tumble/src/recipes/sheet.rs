@@ -2,7 +2,7 @@
 
 use super::Site;
 use super::lattice::Lattice;
-use super::pins::{Pinnable, pinned};
+use super::pins::{Pinnable, pin};
 use super::surface::{Rest, Surface};
 use tumble_interface::Mesh;
 use tumble_interface::scene::Sheet;
@@ -35,8 +35,7 @@ pub fn sheet(site: &mut Site<'_>, thing: &Sheet) {
             }
         }
     }
-    let pins = pinned(site, &Pinnable { path: &path, n: &lattice.n[..2], first, is_lattice: true }, &thing.pin);
-    pins.iter().for_each(|p| site.parts.pin(*p));
+    pin(site, &Pinnable { path: &path, n: &lattice.n[..2], first, is_lattice: true }, &thing.pin);
     site.parts.launch(thing.velocity);
     if thing.isometric > 0.0 {
         lattice.plate(site, thing.isometric);

@@ -19,8 +19,8 @@ use std::sync::Arc;
 use tumble_interface::check::{plain, suggestion};
 use tumble_interface::looks::{Colors, Look};
 use tumble_interface::scene::{
-    Carriage, Component, Densities, ExcessFlow, Field as Flow, Gas as Words, GasSide, GridInterpolation, Integrator, Method, PathTrace,
-    PressureMethod, Scene, Shape, Solid, System as Plan, Temperature,
+    Animated, Carriage, Component, Densities, ExcessFlow, Field as Flow, Gas as Words, GasSide, GridInterpolation, Integrator, Method,
+    PathTrace, PressureMethod, Scene, Shape, Solid, System as Plan, Temperature,
 };
 use tumble_interface::warning::Code;
 use tumble_interface::{Issue, Warning};
@@ -242,25 +242,35 @@ impl Read<'_, '_> {
                 }
             };
             let velocity = words.velocity.as_ref().map(|v| self.vector(&key("velocity"), v, Of::Time));
+            let mut rate =
+                |word: &str, words: &Animated, least: f64| self.reader.signal(&format!("{}{}", self.path, key(word)), words, least);
+            let smoke = rate("smoke", &words.smoke, f64::NEG_INFINITY);
+            let heating = rate("heating", &words.heating, f64::NEG_INFINITY);
+            let fuel = rate("fuel", &words.fuel, 0.0);
+            let mut held = |word: &str, words: &Option<Animated>| words.as_ref().map(|words| rate(word, words, 0.0));
+            let density = held("density", &words.density);
+            let temperature = held("temperature", &words.temperature);
+            let fuel_density = held("fuel_density", &words.fuel_density);
+            let none = |words: &Animated| words.constant() == Some(0.0);
             for (word, given, there) in [
-                ("smoke", words.smoke != 0.0 || words.density.is_some(), self.words.smoke.is_some()),
-                ("fire", words.fuel != 0.0 || words.fuel_density.is_some(), self.words.fire.is_some()),
-                ("temperature", words.heating != 0.0 || words.temperature.is_some(), self.words.temperature.is_some()),
+                ("smoke", !none(&words.smoke) || words.density.is_some(), self.words.smoke.is_some()),
+                ("fire", !none(&words.fuel) || words.fuel_density.is_some(), self.words.fire.is_some()),
+                ("temperature", !none(&words.heating) || words.temperature.is_some(), self.words.temperature.is_some()),
             ] {
                 if given && !there {
                     self.wrong(&format!(".{word}"), format!("missing, but source {i} gives it; add {word} = {{}}"));
                 }
             }
             let source = Source {
-                smoke: words.smoke,
-                density: words.density,
-                temperature: words.temperature,
-                heating: words.heating,
-                fuel: words.fuel,
-                fuel_density: words.fuel_density,
+                smoke,
+                density,
+                temperature,
+                heating,
+                fuel,
+                fuel_density,
                 velocity,
                 times: [words.start, words.end.unwrap_or(f64::INFINITY)],
-                ..Source::default()
+                covers: Vec::new(),
             }
             .covering(&region, grid);
             if source.is_empty() {

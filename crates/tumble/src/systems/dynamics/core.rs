@@ -58,8 +58,8 @@ pub struct Core {
     pub scale: Scale,
     /// Links and vertices broken so far.
     pub broken: u64,
-    /// How often another state has been read, so that what follows from broken links is found anew.
-    pub restored: u64,
+    /// How often another state has been read, or something has been held or let go, so that what is free is found anew.
+    pub regrouped: u64,
 }
 
 impl Core {

@@ -5,6 +5,7 @@ use super::feature::{Feature, Span};
 use super::followers::Followers;
 use super::fracture::Fracture;
 use super::hair_continuum::HairContinuum;
+use super::holds::Holds;
 use super::self_contact::SelfContact;
 use crate::system::Archive;
 use tumble_interface::engine::StepReport;
@@ -13,6 +14,8 @@ use tumble_interface::engine::StepReport;
 pub struct Features {
     /// Hair that acts on itself, by object.
     pub hair: Vec<HairContinuum>,
+    /// Points and frames that are held for some time.
+    pub holds: Holds,
     /// Points and frames that follow colliders.
     pub followers: Followers,
     /// Contact of surfaces with each other.
@@ -25,15 +28,15 @@ pub struct Features {
 
 impl Features {
     fn each(&mut self) -> impl Iterator<Item = &mut dyn Feature> {
-        let Self { hair, followers, self_contact, fracture, .. } = self;
+        let Self { hair, holds, followers, self_contact, fracture, .. } = self;
         let hair = hair.iter_mut().map(|f| f as &mut dyn Feature);
         let contact = self_contact.iter_mut().map(|f| f as &mut dyn Feature);
-        hair.chain([followers as &mut dyn Feature]).chain(contact).chain([fracture as &mut dyn Feature])
+        hair.chain([holds as &mut dyn Feature, followers as &mut dyn Feature]).chain(contact).chain([fracture as &mut dyn Feature])
     }
 
     /// Whether none acts on masses without elements.
     pub fn are_idle(&self) -> bool {
-        self.hair.is_empty() && self.followers.is_empty() && self.self_contact.is_none()
+        self.hair.is_empty() && self.holds.is_empty() && self.followers.is_empty() && self.self_contact.is_none()
     }
 
     /// Surfaces whose intersections are counted.
@@ -74,6 +77,8 @@ impl Features {
 
     /// Writes their state.
     pub fn save(&self, core: &Core, archive: &mut Archive) {
+        self.holds.save(core, archive);
+        self.followers.save(core, archive);
         self.fracture.save(core, archive);
     }
 

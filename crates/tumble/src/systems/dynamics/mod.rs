@@ -11,6 +11,7 @@ mod features;
 mod followers;
 mod fracture;
 mod hair_continuum;
+mod holds;
 mod implicit;
 mod laws;
 mod ledger;
@@ -26,6 +27,7 @@ mod solid_features;
 mod sums;
 mod tear;
 
+pub use holds::Times;
 pub use parts::{Closed, Liquid, Parts, SpringPart};
 pub use settings::{Settings, Stepping};
 pub use tear::TearPart;
@@ -248,13 +250,15 @@ impl Dynamics {
         let (mut report, Span { t, h: dt }, end) = (StepReport::default(), interval, interval.end());
         let (mut done, mut last) = (0.0, dt);
         while done < dt && go_on() {
-            let rest = Span { t: t + done, h: dt - done };
+            // No step goes past a time at which something is held or let go.
+            let stop = (self.features.holds.next_change(t + done) - t).min(dt);
+            let rest = Span { t: t + done, h: stop - done };
             self.features.before(&mut self.core, rest);
             self.witness(rest.t);
             let taken = self.scheme.adaptive_step(&mut self.core, &self.features, rest, dt, &mut report);
             let h = taken.map_err(|e| e.in_system(&self.core.name))?;
-            // The last step ends exactly at dt.
-            done = if h == rest.h { dt } else { done + h };
+            // The last step ends exactly there.
+            done = if h == rest.h { stop } else { done + h };
             report.stepped(h);
             // Anchors wait for the length of the step.
             self.apply_anchors(Span { t: t + done, h }, exchange);
@@ -429,7 +433,7 @@ impl System for Dynamics {
         (self.core.memory.ready, self.core.memory.next_step, self.core.memory.last_error) = (*ready == 1.0, *next_step, *last_error);
         (self.automatic, self.measured) = (*automatic as u32, *measured as usize);
         self.core.broken = *broken as u64;
-        self.core.restored += 1;
+        self.core.regrouped += 1;
         self.core.scale = Scale::from_numbers(scale)?;
         self.features.restore(&mut self.core, archive)
     }

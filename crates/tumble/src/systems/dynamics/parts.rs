@@ -1,13 +1,14 @@
 //! Masses and elements of a system, as recipes collect them.
 
 use super::followers::Follower;
+use super::holds::Times;
 use super::tear::{Edges, TearPart};
 use crate::elements::{LongRangeAttachments, Members, Membrane};
 use crate::forces::{Air, Force};
 use crate::geometry::Carrier;
 use crate::math::{Quat, Real, Vec3};
 use crate::pool::Emitter;
-use crate::state::{Object, State};
+use crate::state::Object;
 use std::collections::HashMap;
 use std::ops::Range;
 use tumble_interface::scene::{Force as Words, HairCollisions};
@@ -123,6 +124,9 @@ pub struct Parts {
     /// Points that follow colliders: by their places in the world at t = 0, and by places in the frames of their carriers.
     pub(super) followers: Vec<Follower>,
     pub(super) carried: Vec<Follower>,
+    /// Points that are held for some time, as rows; and such frames, as frames.
+    pub(super) holds: Vec<(usize, Times)>,
+    pub(super) frame_holds: Vec<(usize, Times)>,
     pub(super) objects: Vec<Draft>,
     pub(super) emitters: Vec<Emitter>,
     /// Forces on each mass by itself, with the objects that they act on, counted from the first that was begun.
@@ -316,9 +320,20 @@ impl Parts {
         self.points[point as usize].3 = true;
     }
 
-    /// Lets a point that is held follow a collider, counted from the first.
-    pub fn follow(&mut self, point: u32, collider: usize, carrier: Carrier) {
-        self.followers.push(Follower { row: point as usize, collider, carrier, place: self.position(point), frame: None });
+    /// Lets a point that is held for some time follow a collider, counted from the first.
+    pub fn follow(&mut self, point: u32, collider: usize, carrier: Carrier, times: Times) {
+        let place = self.position(point);
+        self.followers.push(Follower { row: point as usize, collider, carrier, place, frame: None, times });
+    }
+
+    /// Holds a point for some time.
+    pub fn hold(&mut self, point: u32, times: Times) {
+        self.holds.push((point as usize, times));
+    }
+
+    /// Holds a frame for some time.
+    pub fn hold_frame(&mut self, frame: u32, times: Times) {
+        self.frame_holds.push((frame as usize, times));
     }
 
     /// Holds a frame.
@@ -429,7 +444,14 @@ impl Parts {
 
     /// A collider carries a point, which is at `x` [m] in it, and a frame, whose turn in it is `q`. Both must be held.
     pub fn carry(&mut self, (collider, carrier): (usize, Carrier), point: u32, x: Vec3<f64>, frame: u32, q: Quat<f64>) {
-        self.carried.push(Follower { row: point as usize, collider, carrier, place: x, frame: Some((frame as usize, q)) });
+        self.carried.push(Follower {
+            row: point as usize,
+            collider,
+            carrier,
+            place: x,
+            frame: Some((frame as usize, q)),
+            times: Times::ALWAYS,
+        });
     }
 
     /// Makes the object under construction act on itself as a continuum.
@@ -480,7 +502,7 @@ impl Parts {
     }
 
     /// Long-range attachments of every object that has held points: ways go along links, seams, pieces of rods and the edges of membranes and fabrics.
-    pub(super) fn attachments(&self, slack: f64, state: &State) -> Vec<LongRangeAttachments> {
+    pub(super) fn attachments(&self, slack: f64, held: impl Fn(usize) -> bool) -> Vec<LongRangeAttachments> {
         let links = self.linear.members.iter().map(|m| (m.nodes, m.rest[0]));
         let links = links.chain(self.nonlinear.members.iter().map(|m| (m.nodes, m.rest[0])));
         let seams = self.vector.members.iter().map(|m| (m.nodes, 0.0));
@@ -489,7 +511,6 @@ impl Parts {
         let membranes = self.membranes.iter().flat_map(|m| edges(m.nodes, std::array::from_fn(|k| m.rest[k])));
         let woven = self.woven.iter().flat_map(|m| edges(m.nodes, std::array::from_fn(|k| m.rest[k])));
         let ways: Vec<_> = links.chain(seams).chain(rods).chain(membranes).chain(woven).collect();
-        let held = |i: usize| state.x[i][3] == 0.0;
         self.objects.iter().filter_map(|draft| LongRangeAttachments::new(draft.object.points.clone(), &ways, &held, slack)).collect()
     }
 

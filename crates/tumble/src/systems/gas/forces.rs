@@ -5,7 +5,7 @@ use super::fire::{excess, radiate};
 use super::fluid::Fluid;
 use crate::fluids::Failure;
 use crate::fluids::rows::{Face, runs};
-use crate::math::{Real, Row, functions};
+use crate::math::{Real, Row, Signal, functions};
 use crate::operators::each_row;
 use crate::state::{Field, Place};
 
@@ -85,23 +85,19 @@ impl Fluid {
             radiate(warmth, settings.ambient, settings.radiation, h);
         }
         for source in &settings.sources {
-            let time = (t + h).min(source.times[1]) - t.max(source.times[0]);
-            if time <= 0.0 {
+            let (from, to) = (t.max(source.times[0]), (t + h).min(source.times[1]));
+            if from >= to {
                 continue;
             }
             let cells = source.cover(Place::Cell);
-            if let Some(smoke) = &mut self.smoke {
-                feed(&mut smoke.data, cells, time * source.smoke);
-                source.density.iter().for_each(|density| pull(&mut smoke.data, cells, *density));
-            }
-            if let Some(warmth) = &mut self.temperature {
-                feed(&mut warmth.data, cells, time * source.heating);
-                source.temperature.iter().for_each(|temperature| pull(&mut warmth.data, cells, *temperature));
-            }
-            if let Some(flame) = &mut self.flame {
-                feed(&mut flame.fuel.data, cells, time * source.fuel);
-                source.fuel_density.iter().for_each(|fuel| pull(&mut flame.fuel.data, cells, *fuel));
-            }
+            let give = |carried: Option<&mut Field>, rate: &Signal, held: &Option<Signal>| {
+                let Some(carried) = carried else { return };
+                feed(&mut carried.data, cells, rate.integral(from, to));
+                held.iter().for_each(|held| pull(&mut carried.data, cells, held.value(to)));
+            };
+            give(self.smoke.as_mut(), &source.smoke, &source.density);
+            give(self.temperature.as_mut(), &source.heating, &source.temperature);
+            give(self.flame.as_mut().map(|flame| &mut flame.fuel), &source.fuel, &source.fuel_density);
             if let Some(velocity) = &source.velocity {
                 let v = <[f64; 3]>::from(velocity.value(t + h));
                 for part in &mut self.u.parts {

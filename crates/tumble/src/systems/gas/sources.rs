@@ -1,24 +1,24 @@
 //! Regions that give smoke, heat, fuel and velocity to a fluid.
 
 use crate::geometry::Collider;
-use crate::math::{Real, VectorSignal};
+use crate::math::{Real, Signal, VectorSignal};
 use crate::state::{Grid, Place};
 
 /// A region that gives smoke, warmth and velocity to the fluid in it.
-#[derive(Debug, Clone, Default)]
+#[derive(Debug, Clone)]
 pub struct Source {
     /// Smoke given off [kg/(m³ s)].
-    pub smoke: f64,
+    pub smoke: Signal,
     /// Smoke held [kg/m³].
-    pub density: Option<f64>,
+    pub density: Option<Signal>,
     /// Temperature held [K].
-    pub temperature: Option<f64>,
+    pub temperature: Option<Signal>,
     /// Warming [K/s].
-    pub heating: f64,
+    pub heating: Signal,
     /// Fuel given off [kg/(m³ s)].
-    pub fuel: f64,
+    pub fuel: Signal,
     /// Fuel held [kg/m³].
-    pub fuel_density: Option<f64>,
+    pub fuel_density: Option<Signal>,
     /// Velocity given [m/s].
     pub velocity: Option<VectorSignal>,
     /// When it works [s].

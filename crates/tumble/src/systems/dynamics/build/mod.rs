@@ -12,6 +12,7 @@ use super::features::Features;
 use super::followers::Followers;
 use super::fracture::Fracture;
 use super::hair_continuum::HairContinuum;
+use super::holds::Holds;
 use super::laws::{Acting, Laws};
 use super::parts::Parts;
 use super::scale::Scale;
@@ -41,12 +42,13 @@ impl Parts {
         self.count_rows(&settings.colliders);
         let lost = || SceneError::one(format!("system \"{}\"", settings.name), "an element refers to a mass that is not there");
         let projects = scheme::projects(&settings);
-        let (state, masses) = self.state();
+        let (mut state, mut masses) = self.state();
+        let holds = Holds::new(std::mem::take(&mut self.holds), &mut state, &mut masses);
         let (points, rows) = (masses.frames.start, masses.mass.len());
         let mut batches = Batches::new(&masses, projects);
         let clamp = settings.clamp.and_then(|ratio| self.clamp(ratio, rows));
         let lists = batches.fill(&mut self).map_err(|_| lost())?;
-        let scheme = self.scheme(&settings, &state);
+        let scheme = self.scheme(&settings, &state, &holds);
         let objects = Objects::new(std::mem::take(&mut self.objects), self.counts(), lists.springs, points);
         let sewn: Vec<[u32; 2]> = self.vector.members.iter().map(|m| m.nodes).collect();
         let (self_contact, intersection_counter) = contact::surfaces(&settings, &objects.list, &sewn, &state)?;
@@ -59,6 +61,7 @@ impl Parts {
         let features = Features {
             hair: self.hair.drain(..).map(hair).collect(),
             followers: Followers::new(self.followers, self.carried, &settings.colliders),
+            holds,
             self_contact,
             fracture: Fracture::new(tears),
             intersection_counter,
@@ -91,7 +94,7 @@ impl Parts {
             before_v: Vec::new(),
             scale: Scale::default(),
             broken: 0,
-            restored: 0,
+            regrouped: 0,
         };
         Dynamics::new(core, scheme, features, &settings)
     }
@@ -101,6 +104,7 @@ impl Parts {
         let points = self.points.len();
         self.carried.retain(|held| colliders.get(held.collider).is_some_and(|c| held.carrier != Carrier::Whole || c.motion.is_some()));
         self.carried.iter_mut().filter_map(|held| held.frame.as_mut()).for_each(|(frame, _)| *frame += points);
+        self.holds.extend(self.frame_holds.drain(..).map(|(frame, times)| (points + frame, times)));
         for nodes in self.stretches.iter_mut().map(|m| &mut m.nodes) {
             nodes[2] += points as u32;
         }
@@ -145,11 +149,14 @@ impl Parts {
     }
 
     /// The scheme of the settings.
-    fn scheme(&self, settings: &Settings, state: &State) -> Box<dyn Scheme> {
+    fn scheme(&self, settings: &Settings, state: &State, holds: &Holds) -> Box<dyn Scheme> {
         if !scheme::projects(settings) {
             return Box::new(Forces::new(settings));
         }
-        let attachments: Vec<LongRangeAttachments> = settings.sweeps.tethers.map_or_else(Vec::new, |slack| self.attachments(slack, state));
+        let attachments: Vec<LongRangeAttachments> = settings
+            .sweeps
+            .tethers
+            .map_or_else(Vec::new, |slack| self.attachments(slack, |row| state.x[row][3] == 0.0 && !holds.contain(row)));
         Box::new(Projected::new(settings, attachments))
     }
 

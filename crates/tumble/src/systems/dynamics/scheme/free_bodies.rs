@@ -39,7 +39,7 @@ pub struct FreeBodies {
 impl FreeBodies {
     /// Takes the momenta of predicted positions and velocities.
     pub fn begin(&mut self, core: &Core) {
-        let topology = Some([core.broken, core.restored]);
+        let topology = Some([core.broken, core.regrouped]);
         if self.found != topology {
             *self = Self { bodies: find(core), found: topology };
         }

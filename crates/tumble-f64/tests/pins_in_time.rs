@@ -1,0 +1,150 @@
+//! Pins that let go and take hold, each at the sub-step nearest to its time.
+
+#![allow(clippy::unwrap_used, clippy::panic)] // helpers of tests fail by panicking, too
+
+use crate::common;
+
+use common::*;
+use tumble_f64::scene::Simulation;
+use tumble_interface::Engine;
+use tumble_interface::scene::Integrator;
+
+const G: f64 = 9.8;
+
+fn system(integrator: Integrator, substeps: u32) -> String {
+    match integrator {
+        Integrator::PositionBased => format!("method = \"position_based\"\nsubsteps = {substeps}\n"),
+        adaptive if adaptive.is_adaptive() => format!("integrator = \"{}\"\nadaptive.tolerance = 1e-7\n", adaptive.name()),
+        fixed => format!("integrator = \"{}\"\nsubsteps = {substeps}\n", fixed.name()),
+    }
+}
+
+/// Two masses on a spring at rest, and one alone, held for these times.
+fn masses(integrator: Integrator, substeps: u32, times: &str) -> Simulation {
+    simulation(&format!(
+        "precision = \"double\"\ntime = {{ fps = 25, frames = 50 }}\n[[system]]\n{}\n[[particles]]\nname = \"p\"\nposition = [[0, 0, 0], [0.3, 0, 0], [5, 0, 0]]\n\
+         spring = [{{ between = [0, 1], stiffness = 10 }}]\npin = [{{ which = \"all\", {times} }}]\n",
+        system(integrator, substeps)
+    ))
+}
+
+#[test]
+fn what_is_let_go_falls_from_then_on_under_every_scheme() {
+    for integrator in every() {
+        // Not at the start of a frame: 0.5 s are 12.5 of them. The frame before, all stand.
+        let mut sim = masses(integrator, 200, "until = 0.5");
+        run(&mut sim, 12);
+        assert!(positions(&sim, "p").iter().all(|x| x.z == 0.0), "{integrator:?}");
+        run(&mut sim, 13);
+        let fall = -G / 2.0 * 0.25;
+        for x in positions(&sim, "p") {
+            // Schemes of first order are off by g t h/2.
+            let bound = if integrator == Integrator::DormandPrince { 1e-8 } else { 1.01 * G * 0.5 * (0.04 / 200.0) };
+            assert!((x.z - fall).abs() < bound, "{integrator:?}: {} {fall}", x.z);
+        }
+    }
+}
+
+#[test]
+fn what_is_taken_hold_of_stays_where_it_is_then() {
+    for integrator in every() {
+        let mut sim = masses(integrator, 200, "from = 0.5");
+        run(&mut sim, 13);
+        let before = positions(&sim, "p");
+        let bound = 1.01 * G * 0.5 * (0.04 / 200.0);
+        assert!((before[2].z + G / 2.0 * 0.25).abs() < bound, "{integrator:?}: {:?}", before[2]);
+        run(&mut sim, 12);
+        assert_eq!(positions(&sim, "p"), before, "{integrator:?}");
+        assert_eq!(velocities(&sim, "p"), [[0.0; 3].into(); 3], "{integrator:?}");
+    }
+}
+
+#[test]
+fn a_pin_may_let_go_and_take_hold_again() {
+    let mut sim = simulation(
+        "precision = \"double\"\ntime = { fps = 50, frames = 100 }\n[[system]]\nintegrator = \"velocity_verlet\"\nsubsteps = 10\n[[particles]]\nname = \"p\"\n\
+         position = [[0, 0, 0]]\npin = [{ which = \"all\", until = 0.4 }, { which = \"all\", from = 1 }]\n",
+    );
+    run(&mut sim, 50);
+    let fall = positions(&sim, "p")[0].z;
+    assert!((fall + G / 2.0 * 0.36).abs() < 1e-9, "{fall}");
+    run(&mut sim, 50);
+    assert_eq!(positions(&sim, "p")[0].z, fall);
+}
+
+/// A sheet that is carried along by an edge, from one time to another.
+fn carried(method: &str) -> Simulation {
+    simulation(&format!(
+        "precision = \"double\"\nworld.gravity = [0, 0, 0]\ntime = {{ fps = 50, frames = 100 }}\n[[system]]\n{method}\n[[collider]]\nname = \"hand\"\nfriction = 0\nshape.sphere = \
+         {{ radius = 0.1, center = [0, 0, 5] }}\nmotion.velocity = [0, 0, 2]\n[[particles]]\nname = \"p\"\nposition = [[0.2, 0, 0], [0.7, 0, 0]]\nvelocity = [[0.5, 0, 0]]\n\
+         pin = [{{ which = \"vertex 0\", from = 0.4, until = 1, follow.collider = \"hand\" }}]\n"
+    ))
+}
+
+#[test]
+fn what_is_taken_along_starts_where_it_was_and_leaves_with_the_velocity_of_its_carrier() {
+    for method in [
+        "integrator = \"symplectic_euler\"\nsubsteps = 10",
+        "integrator = \"implicit_euler\"\nsubsteps = 10",
+        "method = \"position_based\"\nsubsteps = 10",
+    ] {
+        let mut sim = carried(method);
+        run(&mut sim, 35);
+        let [held, free] = positions(&sim, "p")[..] else { panic!() };
+        assert!((held - [0.4, 0.0, 2.0 * 0.3].into()).norm() < 1e-9, "{method}: {held:?}");
+        assert!((free - [0.7 + 0.35, 0.0, 0.0].into()).norm() < 1e-9, "{method}: {free:?}");
+        run(&mut sim, 40);
+        let x = positions(&sim, "p")[0];
+        assert!((x - [0.4, 0.0, 2.0 * 1.1].into()).norm() < 1e-9, "{method}: {x:?}");
+    }
+}
+
+#[test]
+fn a_restored_run_holds_what_the_whole_one_holds() {
+    for method in
+        ["integrator = \"verlet\"\nsubsteps = 10", "method = \"position_based\"\nsubsteps = 10", "integrator = \"rk4\"\nsubsteps = 10"]
+    {
+        for at in [10, 30, 60] {
+            let mut whole = carried(method);
+            run(&mut whole, at);
+            let saved = whole.save(&[]);
+            run(&mut whole, 80 - at);
+            let mut again = carried(method);
+            again.restore(&saved).unwrap();
+            run(&mut again, 80 - at);
+            assert_eq!(whole.hash(), again.hash(), "{method}, from frame {at}");
+        }
+    }
+}
+
+#[test]
+fn a_rod_that_is_let_go_falls_as_a_whole() {
+    for words in ["integrator = \"symplectic_euler\"\nsubsteps = 400", "method = \"position_based\"\nsubsteps = 40"] {
+        let mut sim = simulation(&format!(
+            "precision = \"double\"\ntime = {{ fps = 25, frames = 20 }}\n[[system]]\n{words}\n[[rope]]\nname = \"rod\"\nfrom = [0, 0, 0]\nto = [0.5, 0, 0]\nsegments = 10\n\
+             density = 0.1\npin = [{{ which = \"start\", until = 0.2 }}, {{ which = \"end\", until = 0.2 }}]\nrod = {{ stretch = 500, bend = 0.05 }}\n"
+        ));
+        run(&mut sim, 5);
+        let sag = positions(&sim, "rod")[5].z;
+        assert!(sag < -1e-4 && sag > -0.01, "{words}: {sag}");
+        let momentum = sim.ledger().momentum[2];
+        run(&mut sim, 10);
+        let books = sim.ledger();
+        assert!((books.momentum[2] - momentum + books.mass * G * 0.4).abs() < 1e-9 * books.mass * G, "{words}: {:?}", books.momentum);
+        // Free, its ends turn with it: they are clamped no more.
+        let x = positions(&sim, "rod");
+        assert!(x.iter().all(|x| x.z < -0.7), "{words}: {x:?}");
+    }
+}
+
+#[test]
+fn times_that_mean_nothing_are_told() {
+    let wrong = |times: &str| {
+        let text = format!("version = 1\n[[particles]]\nname = \"p\"\nposition = [[0, 0, 0]]\npin = [{{ which = \"all\", {times} }}]\n");
+        let scene = tumble_interface::Scene::from_toml(&text).and_then(|scene| Simulation::new(scene, Default::default()).map(|_| ()));
+        scene.unwrap_err().to_string()
+    };
+    assert!(wrong("from = 2, until = 1").contains("expected an end after the start"), "{}", wrong("from = 2, until = 1"));
+    assert!(wrong("until = 0").contains("pin"), "{}", wrong("until = 0"));
+    assert!(wrong("from = -1").contains("pin"), "{}", wrong("from = -1"));
+}
