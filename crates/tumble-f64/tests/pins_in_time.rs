@@ -138,6 +138,29 @@ fn a_rod_that_is_let_go_falls_as_a_whole() {
 }
 
 #[test]
+fn an_end_of_a_rod_is_clamped_while_it_is_held() {
+    // A cantilever without gravity, loaded for a while by an acceleration; then free, and clamped again as it lies.
+    for words in ["integrator = \"implicit_euler\"\nsubsteps = 10", "method = \"position_based\"\nsubsteps = 40"] {
+        let tip = |pins: &str, frames: usize| {
+            let mut sim = simulation(&format!(
+                "precision = \"double\"\nworld.gravity = [0, 0, -1]\ntime = {{ fps = 25, frames = 100 }}\n[[system]]\n{words}\n[[rope]]\nname = \"rod\"\nfrom = [0, 0, 0]\n\
+                 to = [0.5, 0, 0]\nsegments = 20\ndensity = 0.1\npin = [{pins}]\nrod = {{ stretch = 500, bend = 0.05, damping = 0.02 }}\n"
+            ));
+            run(&mut sim, frames);
+            let x = positions(&sim, "rod");
+            // Turn of the first segment and fall of the last point, from the first.
+            [(x[1] - x[0]).z / (x[1] - x[0]).norm(), (x[20] - x[0]).z]
+        };
+        let always = tip("\"start\"", 50);
+        let passing = tip("{ which = \"start\", until = 3 }", 50);
+        assert!(always[1] < -0.01 && (passing[1] / always[1] - 1.0).abs() < 1e-3, "{words}: {always:?} {passing:?}");
+        // Held on without a gap, it stays clamped as it was.
+        let again = tip("{ which = \"start\", until = 0.5 }, { center = [0, 0, 0], radius = 0.001, from = 0.5 }", 50);
+        assert_eq!(again, passing, "{words}");
+    }
+}
+
+#[test]
 fn times_that_mean_nothing_are_told() {
     let wrong = |times: &str| {
         let text = format!("version = 1\n[[particles]]\nname = \"p\"\nposition = [[0, 0, 0]]\npin = [{{ which = \"all\", {times} }}]\n");

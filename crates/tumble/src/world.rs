@@ -114,8 +114,7 @@ impl World {
         let time = (self.frame + 1) as f64 * f64::from(self.exchanges) * self.dt;
         let error = self.each_mut().find_map(|s| s.breakdown(time));
         if let Some(error) = error {
-            let error = self.first_breakdown().unwrap_or(error);
-            return Err(self.explain(error, go_on));
+            return Err(self.first_breakdown(error, go_on));
         }
         self.frame += 1;
         self.keep();
@@ -219,10 +218,13 @@ impl World {
         self.disagreements.push(Warning::new(Code::Disagreement, path, message));
     }
 
-    /// Goes back to the last good frame and steps again, watching every sub-step.
-    fn first_breakdown(&mut self) -> Option<StepError> {
+    /// Goes back to the last good frame and steps again, watching every sub-step: the first breakdown, or this one at the end of the frame.
+    fn first_breakdown(&mut self, error: StepError, go_on: &(dyn Fn() -> bool + Sync)) -> StepError {
         self.roll_back();
-        let found = self.watched(&|| true, |_, _, _| {}).err();
+        self.each_mut().for_each(|s| s.watch(true));
+        let found = self.intervals(&|| true, |_, _, _| {}).err().unwrap_or(error);
+        let found = self.explain(found, go_on);
+        self.each_mut().for_each(|s| s.watch(false));
         self.roll_back();
         found
     }
@@ -230,7 +232,7 @@ impl World {
     /// A frame sub-step by sub-step, each of which is looked at.
     fn watched(&mut self, go_on: &(dyn Fn() -> bool + Sync), done: impl FnMut(usize, f64, &StepReport)) -> Result<StepReport, StepError> {
         self.each_mut().for_each(|s| s.watch(true));
-        let result = self.intervals(go_on, done);
+        let result = self.intervals(go_on, done).map_err(|error| self.explain(error, go_on));
         self.each_mut().for_each(|s| s.watch(false));
         result
     }
@@ -259,10 +261,10 @@ impl World {
             _ => None,
         };
         self.roll_back();
-        result.map(|_| seen).map_err(|error| self.explain(error, go_on))
+        result.map(|_| seen)
     }
 
-    /// Adds the step in use and the stable one, at the last good frame.
+    /// Adds the step in use and the stable one, in the state that there is.
     fn explain(&mut self, mut error: StepError, go_on: &(dyn Fn() -> bool + Sync)) -> StepError {
         if let StepError::NotFinite(b) | StepError::Exploded(b) = &mut error {
             let dt = self.dt;

@@ -60,6 +60,8 @@ struct Group {
     lambda: Vec<Real>,
     /// Numbers taken out of `stretch` and `bend` where a segment broke.
     whole: Option<Box<([Vec<Real>; 5], [Vec<Real>; 9])>>,
+    /// Ends that are let go: where their bends stand, and the numbers of these.
+    free: Vec<(usize, [Real; 7])>,
 }
 
 /// A chain: which of the stretches, and which of the bends before each of them and after the last.
@@ -220,6 +222,22 @@ impl Group {
             }
         }
         Some(group)
+    }
+
+    /// Clamps an end, or lets it go: the bend there, beside a segment, is there or not.
+    fn hold_end(&mut self, bend: usize, segment: usize, held: bool) {
+        let place = self.free.iter().position(|(at, _)| *at == bend);
+        let numbers = match (place, held) {
+            (None, false) => {
+                self.free.push((bend, std::array::from_fn(|c| self.bend[c][bend])));
+                [0.0; 7]
+            }
+            (Some(place), true) if self.stretch[2][segment] > 0.0 => self.free.remove(place).1,
+            _ => return,
+        };
+        for columns in [&mut self.bend].into_iter().chain(self.whole.iter_mut().map(|whole| &mut whole.1)) {
+            columns.iter_mut().zip(numbers).for_each(|(column, number)| column[bend] = number);
+        }
     }
 
     /// How much more the softest bend gives than it should, in sub-steps of length h [s].
@@ -788,5 +806,18 @@ impl Constraints for Strands {
         }
         self.broken.clear();
         broken.iter().for_each(|e| self.tear(*e));
+    }
+
+    fn set_inverse(&mut self, frame: usize, inverse: Real) {
+        for group in &mut self.groups {
+            let (n, count) = (group.n, group.count);
+            for at in (0..(n + 2) * count).filter(|at| group.frames.get()[*at] as usize == frame).collect::<Vec<_>>() {
+                match at / count {
+                    0 => group.hold_end(at, at, inverse == 0.0),
+                    i if i == n + 1 => group.hold_end(at - count, at - 2 * count, inverse == 0.0),
+                    _ => group.inertia[at] = inverse,
+                }
+            }
+        }
     }
 }

@@ -2,7 +2,7 @@
 
 use super::core::Core;
 use super::feature::{Feature, Span};
-use crate::math::ZERO;
+use crate::math::{Real, ZERO};
 use crate::state::{Masses, State};
 use crate::system::{Archive, Part};
 
@@ -30,19 +30,31 @@ impl Times {
     }
 }
 
-/// Rows and the times at which they are held; a row may have several.
+/// A row that is held for some time.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Hold {
+    /// The row.
+    pub row: usize,
+    /// When.
+    pub times: Times,
+    /// Of a frame at the end of a rod, that of the segment there, whose turn it has when it is taken hold of.
+    pub segment: Option<usize>,
+}
+
+/// Rows that are held for some time; a row may be there more than once.
 pub struct Holds {
-    list: Vec<(usize, Times)>,
+    list: Vec<Hold>,
     /// Which of them are in force.
     active: Vec<bool>,
 }
 
 impl Holds {
     /// For these rows, which it holds as at the start.
-    pub fn new(list: Vec<(usize, Times)>, state: &mut State, masses: &mut Masses) -> Self {
-        let active = list.iter().map(|(_, times)| times.contain(0.0)).collect::<Vec<_>>();
-        apply(&list, &active, state, masses);
-        Self { list, active }
+    pub fn new(list: Vec<Hold>, state: &mut State, masses: &mut Masses) -> Self {
+        let active = list.iter().map(|hold| hold.times.contain(0.0)).collect();
+        let holds = Self { list, active };
+        holds.apply(state, masses);
+        holds
     }
 
     /// Whether there are none.
@@ -52,31 +64,52 @@ impl Holds {
 
     /// Whether a row is held at times only.
     pub fn contain(&self, row: usize) -> bool {
-        self.list.iter().any(|(held, _)| *held == row)
+        self.list.iter().any(|hold| hold.row == row)
+    }
+
+    /// Whether a row is held.
+    fn held(&self, row: usize) -> bool {
+        self.list.iter().zip(&self.active).any(|(hold, active)| hold.row == row && *active)
     }
 
     /// The first time after t at which something is held or let go [s]; infinite if there is none.
     pub fn next_change(&self, t: f64) -> f64 {
-        let changes = self.list.iter().flat_map(|(_, times)| [times.from, times.until]);
+        let changes = self.list.iter().flat_map(|hold| [hold.times.from, hold.times.until]);
         // Not one that rounding puts beside t.
         changes.filter(|change| *change > t + 1e-9 * t.abs().max(1.0)).fold(f64::INFINITY, f64::min)
     }
-}
 
-/// Holds rows where that is in force, and lets the others go.
-fn apply(list: &[(usize, Times)], active: &[bool], state: &mut State, masses: &mut Masses) {
-    for held in [false, true] {
-        for (row, _) in list.iter().zip(active).filter(|(_, active)| **active == held).map(|(hold, _)| hold) {
-            let mass = masses.mass[*row];
-            let inverse = if held || mass == 0.0 { 0.0 } else { 1.0 / mass };
-            if masses.frames.contains(*row) {
+    /// Every row, the inverse of its mass or inertia, and whether it is held: those that are held come last.
+    fn rows(&self, masses: &Masses) -> Vec<(usize, Real, bool)> {
+        let one = |held: bool| {
+            let some = self.list.iter().zip(&self.active).filter(move |(_, active)| **active == held);
+            some.map(move |(hold, _)| {
+                let mass = masses.mass[hold.row];
+                (hold.row, if held || mass == 0.0 { 0.0 } else { 1.0 / mass }, held)
+            })
+        };
+        one(false).chain(one(true)).collect()
+    }
+
+    /// Holds rows where that is in force, and lets the others go.
+    fn apply(&self, state: &mut State, masses: &mut Masses) {
+        for (row, inverse, held) in self.rows(masses) {
+            if masses.frames.contains(row) {
                 masses.inverse_inertia[row - masses.frames.start] = inverse;
             } else {
-                state.x[*row][3] = inverse;
+                state.x[row][3] = inverse;
             }
             if held {
-                state.v[*row] = ZERO;
+                state.v[row] = ZERO;
             }
+        }
+    }
+
+    /// Tells constraints which frames are held.
+    pub fn tell(&self, core: &mut Core) {
+        let frames = core.laws.masses.frames;
+        for (row, inverse, _) in self.rows(&core.laws.masses).into_iter().filter(|(row, ..)| frames.contains(*row)) {
+            core.constraints.iter_mut().for_each(|constraints| constraints.set_inverse(row, inverse));
         }
     }
 }
@@ -86,13 +119,19 @@ impl Feature for Holds {
         if self.list.is_empty() {
             return;
         }
-        let active: Vec<bool> = self.list.iter().map(|(_, times)| times.cover(step)).collect();
+        let active: Vec<bool> = self.list.iter().map(|hold| hold.times.cover(step)).collect();
         if active != self.active {
+            for (hold, _) in self.list.iter().zip(&active).filter(|(hold, now)| **now && !self.held(hold.row)) {
+                if let Some(segment) = hold.segment {
+                    core.state.x[hold.row] = core.state.x[segment];
+                }
+            }
             self.active = active;
             core.memory.ready = false;
             core.regrouped += 1;
+            self.tell(core);
         }
-        apply(&self.list, &self.active, &mut core.state, &mut core.laws.masses);
+        self.apply(&mut core.state, &mut core.laws.masses);
     }
 
     fn save(&self, _core: &Core, archive: &mut Archive) {
@@ -103,9 +142,10 @@ impl Feature for Holds {
 
     fn restore(&mut self, core: &mut Core, archive: &mut Archive) -> Option<()> {
         if !self.list.is_empty() {
-            let numbers = archive.numbers("holds")?;
+            let numbers = archive.numbers("holds").filter(|numbers| numbers.len() == self.list.len())?;
             self.active = numbers.iter().map(|number| *number == 1.0).collect();
-            apply(&self.list, &self.active, &mut core.state, &mut core.laws.masses);
+            self.apply(&mut core.state, &mut core.laws.masses);
+            self.tell(core);
         }
         Some(())
     }

@@ -79,9 +79,9 @@ impl Dynamics {
             // Particles that have left are no scale for those that are there.
             self.core.scale.fade();
         }
-        if energy > self.core.scale.size {
-            self.core.scale.widen(energy, self.core.noise());
-        }
+        let mut scale = self.core.scale;
+        scale.take(energy, || self.core.noise());
+        self.core.scale = scale;
     }
 
     /// The ledger at time t [s], or the breakdown.
@@ -142,6 +142,22 @@ impl Dynamics {
             .iter()
             .find(owner)
             .map_or((String::new(), i), |o| (o.name.clone(), if o.points.contains(&i) { i - o.points.start } else { i - o.frames.start }))
+    }
+
+    /// The estimate of the sub-step that is watched, from the state before it or, where that is stiffer, after it; else of the state that there is.
+    pub(super) fn estimate_of_witness(&mut self, dt: f64, go_on: &(dyn Fn() -> bool + Sync)) -> Option<Stability> {
+        let finite = |rows: &[Row]| rows.iter().all(|row| is_finite(*row));
+        let here = finite(&self.core.state.x) && finite(&self.core.state.v);
+        let after = if here || self.witness.is_none() { self.estimate(dt, go_on) } else { None };
+        let Some((_, x, v)) = self.witness.clone().filter(|(_, x, _)| x.len() == self.core.state.x.len()) else { return after };
+        let now = (std::mem::replace(&mut self.core.state.x, x), std::mem::replace(&mut self.core.state.v, v));
+        let before = self.estimate(dt, go_on);
+        (self.core.state.x, self.core.state.v) = now;
+        let stiffer = |a: Stability, b: Stability| if b.frequency.max(b.damping_max) > a.frequency.max(a.damping_max) { b } else { a };
+        match (before, after) {
+            (Some(before), Some(after)) => Some(stiffer(before, after)),
+            (before, after) => before.or(after),
+        }
     }
 
     /// The pre-flight estimate.

@@ -374,6 +374,7 @@ impl System for Dynamics {
 
     fn watch(&mut self, on: bool) {
         self.watched = on;
+        self.witness = None;
     }
 
     fn reconsider(&mut self) {
@@ -383,7 +384,7 @@ impl System for Dynamics {
     }
 
     fn stability(&mut self, dt: f64, go_on: &(dyn Fn() -> bool + Sync)) -> Option<Stability> {
-        self.estimate(dt, go_on)
+        self.estimate_of_witness(dt, go_on)
     }
 
     fn save(&self, archive: &mut Archive) {

@@ -1,7 +1,7 @@
 //! Masses and elements of a system, as recipes collect them.
 
 use super::followers::Follower;
-use super::holds::Times;
+use super::holds::{Hold, Times};
 use super::tear::{Edges, TearPart};
 use crate::elements::{LongRangeAttachments, Members, Membrane};
 use crate::forces::{Air, Force};
@@ -98,6 +98,8 @@ pub struct Parts {
     /// Points that are spread out as Plummer's sphere, with its radius [m], in order.
     pub(super) halos: Vec<(u32, f64)>,
     pub(super) linear: Springs<1, 0>,
+    /// Linear springs that are chains, each from one row to the next.
+    pub(super) chains: Vec<Range<usize>>,
     pub(super) nonlinear: Springs<1, 2>,
     pub(super) vector: Springs<0, 0>,
     pub(super) dampers: Vec<Members<2, 1, 0>>,
@@ -125,8 +127,8 @@ pub struct Parts {
     pub(super) followers: Vec<Follower>,
     pub(super) carried: Vec<Follower>,
     /// Points that are held for some time, as rows; and such frames, as frames.
-    pub(super) holds: Vec<(usize, Times)>,
-    pub(super) frame_holds: Vec<(usize, Times)>,
+    pub(super) holds: Vec<Hold>,
+    pub(super) frame_holds: Vec<Hold>,
     pub(super) objects: Vec<Draft>,
     pub(super) emitters: Vec<Emitter>,
     /// Forces on each mass by itself, with the objects that they act on, counted from the first that was begun.
@@ -174,6 +176,7 @@ impl Parts {
 
     /// Makes two of every link along an edge that two triangles share, in surfaces that tear: one for each.
     pub(super) fn halve_links(&mut self) {
+        self.chains.clear();
         let mut drafts = std::mem::take(&mut self.objects);
         let ends: Vec<[usize; 3]> = drafts.iter().skip(1).map(|d| d.links).chain([self.counts()]).collect();
         let (mut linear, mut nonlinear) = (Springs::default(), Springs::default());
@@ -328,12 +331,12 @@ impl Parts {
 
     /// Holds a point for some time.
     pub fn hold(&mut self, point: u32, times: Times) {
-        self.holds.push((point as usize, times));
+        self.holds.push(Hold { row: point as usize, times, segment: None });
     }
 
-    /// Holds a frame for some time.
-    pub fn hold_frame(&mut self, frame: u32, times: Times) {
-        self.frame_holds.push((frame as usize, times));
+    /// Holds a frame at an end of a rod for some time; `segment` is that of the segment there.
+    pub fn hold_frame(&mut self, frame: u32, segment: u32, times: Times) {
+        self.frame_holds.push(Hold { row: frame as usize, times, segment: Some(segment as usize) });
     }
 
     /// Holds a frame.
@@ -375,6 +378,15 @@ impl Parts {
         } else {
             let law = [part.hardening / (part.rest * part.rest), if part.tension_only { 0.0 } else { 1.0 }];
             self.nonlinear.push(&part, [part.rest], law, part.damping);
+        }
+    }
+
+    /// Adds springs from each row to the next, a chain where they are linear.
+    pub fn chain(&mut self, parts: impl Iterator<Item = SpringPart>) {
+        let start = self.linear.members.len();
+        parts.for_each(|part| self.spring(part));
+        if self.linear.members.len() > start + 1 {
+            self.chains.push(start..self.linear.members.len());
         }
     }
 

@@ -9,16 +9,18 @@ pub struct Scale {
     pub start: f64,
     /// Potential energy of external forces at the start [J].
     pub external: f64,
-    /// Largest kinetic, elastic or external change of energy in any good frame [J].
+    /// Largest kinetic, elastic or external change of energy in any two good frames that follow each other [J].
     pub size: f64,
+    /// That of the last good frame [J]: a peak that one frame happens to see is no scale.
+    pub last: f64,
 }
 
 impl Scale {
     /// The scale of a system that starts with this ledger, which could gain `fall` [J] by falling through its own height.
     /// Energies up to `noise` [J] are no scale.
     pub fn new(ledger: &Ledger, fall: f64, noise: f64) -> Self {
-        let mut scale = Self { start: ledger.energy(), external: ledger.external, size: fall };
-        scale.widen(ledger.kinetic.max(ledger.elastic), noise);
+        let mut scale = Self { start: ledger.energy(), external: ledger.external, size: fall, last: ledger.kinetic.max(ledger.elastic) };
+        scale.widen(scale.last, noise);
         scale
     }
 
@@ -39,19 +41,28 @@ impl Scale {
         self.size = self.size.max(other.size);
     }
 
-    pub fn widen(&mut self, energy: f64, noise: f64) {
+    fn widen(&mut self, energy: f64, noise: f64) {
         if energy > noise {
             self.size = self.size.max(energy);
         }
     }
 
-    pub fn numbers(self) -> [f64; 3] {
-        [self.start, self.external, self.size]
+    /// Takes the energy of a good frame: widens to it, or to that of the frame before if that was less.
+    pub fn take(&mut self, energy: f64, noise: impl Fn() -> f64) {
+        let held = energy.min(self.last);
+        self.last = energy;
+        if held > self.size {
+            self.widen(held, noise());
+        }
+    }
+
+    pub fn numbers(self) -> [f64; 4] {
+        [self.start, self.external, self.size, self.last]
     }
 
     pub fn from_numbers(numbers: &[f64]) -> Option<Self> {
         match numbers {
-            [start, external, size] => Some(Self { start: *start, external: *external, size: *size }),
+            [start, external, size, last] => Some(Self { start: *start, external: *external, size: *size, last: *last }),
             _ => None,
         }
     }

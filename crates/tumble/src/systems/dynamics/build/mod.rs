@@ -12,7 +12,7 @@ use super::features::Features;
 use super::followers::Followers;
 use super::fracture::Fracture;
 use super::hair_continuum::HairContinuum;
-use super::holds::Holds;
+use super::holds::{Hold, Holds};
 use super::laws::{Acting, Laws};
 use super::parts::Parts;
 use super::scale::Scale;
@@ -43,9 +43,11 @@ impl Parts {
         let lost = || SceneError::one(format!("system \"{}\"", settings.name), "an element refers to a mass that is not there");
         let projects = scheme::projects(&settings);
         let (mut state, mut masses) = self.state();
-        let holds = Holds::new(std::mem::take(&mut self.holds), &mut state, &mut masses);
         let (points, rows) = (masses.frames.start, masses.mass.len());
+        let holds = Holds::new(std::mem::take(&mut self.holds), &mut state, &mut masses);
         let mut batches = Batches::new(&masses, projects);
+        // As if they were held for ever: constraints are told when they are not.
+        batches.hold(|row| holds.contain(row));
         let clamp = settings.clamp.and_then(|ratio| self.clamp(ratio, rows));
         let lists = batches.fill(&mut self).map_err(|_| lost())?;
         let scheme = self.scheme(&settings, &state, &holds);
@@ -79,7 +81,7 @@ impl Parts {
             colliders: settings.colliders.clone(),
             ..Default::default()
         };
-        let core = Core {
+        let mut core = Core {
             name: settings.name.clone(),
             integrator: settings.integrator,
             state,
@@ -96,6 +98,7 @@ impl Parts {
             broken: 0,
             regrouped: 0,
         };
+        features.holds.tell(&mut core);
         Dynamics::new(core, scheme, features, &settings)
     }
 
@@ -104,7 +107,8 @@ impl Parts {
         let points = self.points.len();
         self.carried.retain(|held| colliders.get(held.collider).is_some_and(|c| held.carrier != Carrier::Whole || c.motion.is_some()));
         self.carried.iter_mut().filter_map(|held| held.frame.as_mut()).for_each(|(frame, _)| *frame += points);
-        self.holds.extend(self.frame_holds.drain(..).map(|(frame, times)| (points + frame, times)));
+        let rows = |hold: Hold| Hold { row: points + hold.row, segment: hold.segment.map(|frame| points + frame), ..hold };
+        self.holds.extend(self.frame_holds.drain(..).map(rows));
         for nodes in self.stretches.iter_mut().map(|m| &mut m.nodes) {
             nodes[2] += points as u32;
         }
