@@ -265,7 +265,9 @@ def test_pins_let_go_when_their_time_is_over() -> None:
     tree = {
         "version": 1,
         "time": {"frames": 48},
-        "sheet": [{"name": "curtain", "size": [1, 1], "resolution": [10, 10], "pin": [{"which": "edge y+", "until": 1.0}]}],
+        "sheet": [
+            {"name": "curtain", "size": [1, 1], "resolution": [10, 10], "pin": [{"which": "edge y+", "until": 1.0}]}
+        ],
     }
     world = World(Scene(tree))
     world.step(24)
@@ -276,3 +278,48 @@ def test_pins_let_go_when_their_time_is_over() -> None:
     # The cloth below pulls the edge down with it: faster than a stone at first.
     assert fallen.min() > 0.5 * 9.8 / 2
     assert fallen.max() < 1.5 * 9.8
+
+
+def test_a_balloon_is_blown_up_over_time(tmp_path: Path) -> None:
+    tree = {
+        "version": 1,
+        "world": {"gravity": [0, 0, 0]},
+        "time": {"frames": 48},
+        "system": [{"method": "position_based", "substeps": 20}],
+        "net": [
+            {
+                "name": "balloon",
+                "mesh": {"path": balloon(tmp_path)},
+                "links": {"structural": {"modulus": 10}},
+                "pressure": {"volume": {"keys": [[0, 1], [1, 2]]}},
+            }
+        ],
+    }
+    world = World(Scene(tree, tmp_path))
+    before = world.ledger["volume"]
+    volumes = []
+    for _ in range(4):
+        world.step(12)
+        volumes.append(world.ledger["volume"] / before)
+    assert volumes == pytest.approx([1.5, 2.0, 2.0, 2.0], rel=2e-3)
+    with pytest.raises(tumble.SceneError, match=r"pressure.volume: 0 at t = 1 s, expected a number above 0"):
+        World(
+            Scene({**tree, "net": [{**tree["net"][0], "pressure": {"volume": {"keys": [[0, 1], [1, 0]]}}}]}, tmp_path)
+        )  # type: ignore[index,dict-item]
+
+
+@pytest.mark.parametrize(
+    ("path", "tree"),
+    [
+        ("world.gravity", {"world": {"gravity": {"keys": [[0, 0, 0, 0], [1, 0, 0, -9]]}}}),
+        (r"world.gravity\[2\]", {"world": {"gravity": [0, 0, "-9*t"]}}),
+        (
+            'collider "c".friction',
+            {"collider": [{"name": "c", "shape": {"sphere": {"radius": 1}}, "friction": "0.5*t"}]},
+        ),
+        ("camera.position", {"camera": {"position": {"keys": [[0, 0, 0, 0], [1, 1, 1, 1]]}}}),
+    ],
+)
+def test_a_word_that_cannot_be_animated_says_so(path: str, tree: Tree) -> None:
+    with pytest.raises(tumble.SceneError, match=rf"{path}: .*; it does not change in time"):
+        World(Scene({"version": 1, "particles": [{"name": "p", "position": [[0, 0, 0]]}], **tree}))

@@ -9,7 +9,7 @@ import pytest
 from conftest import Answer
 
 import tumble
-from tumble import emitters
+from tumble import Scene, SceneError, World, emitters
 
 Command = Callable[..., Answer]
 SceneFile = Callable[..., Path]
@@ -216,3 +216,34 @@ def test_the_lab_refuses_emitters_and_says_what_to_do(tumble: Command, scene_fil
     assert answer.code == 2
     assert 'emitter "p": the lab compares' in answer.err and "[[particles]]" in answer.err
     assert not list(Path("out").glob("lab/*"))
+
+
+def test_speed_and_cone_are_those_of_the_time_of_birth() -> None:
+    tree = {
+        "version": 1,
+        "world": {"gravity": [0, 0, 0]},
+        "time": {"fps": 24, "frames": 24},
+        "emitter": [
+            {
+                "name": "jet",
+                "from": {"point": {"at": [0, 0, 0]}},
+                "rate": 500,
+                "direction": [1, 0, 0],
+                "speed": {"keys": [[0, 1], [1, 3]]},
+                "cone": "60*t",
+            }
+        ],
+    }
+    world = World(Scene(tree))
+    world.step(24)
+    jet = world.frame["jet"]
+    born = 1.0 - jet["age"]
+    speed = np.linalg.norm(jet["velocity"], axis=1)
+    assert len(speed) > 400
+    assert np.allclose(speed, 1 + 2 * born, atol=1e-4)
+    angle = np.degrees(np.arccos(np.clip(jet["velocity"][:, 0] / speed, -1, 1)))
+    assert (angle <= 60 * born + 0.05).all()
+    # Late ones fill their cone.
+    assert angle[born > 0.9].max() > 50
+    with pytest.raises(SceneError, match=r"cone: .* at t = .*, expected 0 to 180"):
+        World(Scene({**tree, "emitter": [{**tree["emitter"][0], "cone": {"keys": [[0, 0], [0.5, 200]]}}]}))  # type: ignore[index,dict-item]

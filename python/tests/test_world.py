@@ -1,12 +1,14 @@
 """Looks inside a frame."""
 
+import itertools
+import re
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 
-from tumble import SceneError, StepError, World
+from tumble import Scene, SceneError, StepError, World
 
 Tree = dict[str, Any]
 
@@ -82,3 +84,58 @@ def test_what_breaks_leaves_nothing_behind(scheme: str, tmp_path: Path) -> None:
         world.step()
         assert world.hash() == after, f"after {far:.0e} m"
     assert broke > 1
+
+
+def test_an_explosion_can_be_watched() -> None:
+    """A stiff spring in steps far too long: an error by default; without it the masses fly apart, and further in each frame."""
+    tree = {
+        "version": 1,
+        "time": {"frames": 40},
+        "world": {"gravity": [0, 0, 0]},
+        "system": [{"integrator": "symplectic_euler", "substeps": 1}],
+        "particles": [
+            {
+                "name": "p",
+                "position": [[0, 0, 0], [1.1, 0, 0]],
+                "mass": [1],
+                "spring": [{"between": [0, 1], "stiffness": 2000, "rest_length": 1}],
+            }
+        ],
+    }
+    with pytest.raises(StepError, match="exploded"):
+        World(Scene(tree)).step(12)
+    world = World(Scene(tree))
+    assert world.stop_on_explosion
+    world.stop_on_explosion = False
+    reach = []
+    for _ in range(12):
+        world.step()
+        reach.append(float(np.abs(world.frame["p"]["position"]).max()))
+    assert reach[-1] > 1e3
+    assert all(b > a for a, b in itertools.pairwise(reach[4:]))
+    # What is no number any more is an error all the same.
+    with pytest.raises(StepError, match="finite"):
+        world.step(1000)
+
+
+def test_the_stable_step_that_is_told_is_that_of_the_state_that_broke() -> None:
+    """Two masses that fall onto each other: far apart, long steps would do; where they meet, the step is too long."""
+    tree = {
+        "version": 1,
+        "precision": "double",
+        "time": {"frames": 60},
+        "world": {"gravity": [0, 0, 0]},
+        "system": [{"integrator": "velocity_verlet", "substeps": 133}],
+        "particles": [
+            {"name": "p", "position": [[-1, 0, 0], [1, 0, 0]], "velocity": [[0, -0.01, 0], [0, 0.01, 0]], "mass": [1]}
+        ],
+        "force": [{"kind": "gravitation", "constant": 1}],
+    }
+    with pytest.raises(StepError) as raised:
+        World(Scene(tree)).step(60)
+    step, stable = (
+        float(re.search(p, str(raised.value))[1])
+        for p in (r"step ([\d.e+-]+) s", r"stable step by estimate: ([\d.e+-]+) s")
+    )  # type: ignore[index]
+    assert step == pytest.approx(1 / 24 / 133, rel=1e-3)
+    assert stable < step

@@ -254,6 +254,12 @@ class World:
         """Goes to a checkpoint of the same scene, with the same custom forces and integrators, or with `others` as well.
         Raises SceneError; the world then stays as it was."""
 
+    @property
+    def stop_on_explosion(self) -> bool:
+        """Whether a step whose energy has grown beyond a thousand times its scale raises StepError, which is the default. With
+        False the world goes on, to show the explosion, until a number is not finite."""
+    @stop_on_explosion.setter
+    def stop_on_explosion(self, stop: bool) -> None: ...
     def reconsider(self) -> None:
         """After the state of another scene was loaded: what was chosen from that scene, as how many sub-steps an interval
         gets and what energies are measured against, is chosen anew from the state as it is now."""

@@ -39,8 +39,12 @@ def sources(scene: Tree) -> list[str]:
 
 
 def _inflates(pressure: Tree | None) -> bool:
-    """Whether a closed surface is kept at another volume than it starts with, by a constraint that has no potential."""
-    return pressure is not None and pressure["stiffness"] is None and pressure["volume"] != 1.0
+    """Whether a closed surface is kept at another volume than it starts with, by a constraint that has no potential or one that
+    changes in time."""
+    if pressure is None:
+        return False
+    volume = pressure["volume"]
+    return not isinstance(volume, (int, float)) or (pressure["stiffness"] is None and volume != 1.0)
 
 
 def joined(scene: Tree) -> bool:

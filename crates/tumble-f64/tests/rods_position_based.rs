@@ -519,3 +519,29 @@ fn a_rod_breaks_where_it_is_pulled_too_far() {
     let told = Simulation::new(scene, Default::default()).map(|_| ()).unwrap_err().to_string();
     assert!(told.contains("break_strain"), "{told}");
 }
+
+#[test]
+fn a_rod_of_natural_curvature_curls_to_an_arc_from_either_end() {
+    for words in ["integrator = \"implicit_euler\"\nsubsteps = 4", "method = \"position_based\"\nsubsteps = 20"] {
+        for curvature in [[0.0, 2.0, 0.0], [-1.5, 0.0, 0.0]] {
+            let mut bulges = Vec::new();
+            for pin in ["start", "end"] {
+                let mut sim = simulation(&format!(
+                    "precision = \"double\"\nworld.gravity = [0, 0, 0]\ntime = {{ fps = 24, frames = 96 }}\n[[system]]\n{words}\n[[rope]]\nname = \"rod\"\nfrom = [0, 0, 0]\n\
+                     to = [1, 0, 0]\nsegments = 40\ndensity = 0.1\npin = [\"{pin}\"]\nrod = {{ stretch = 500, bend = 0.05, damping = 0.05, curvature = {curvature:?} }}\n[[force]]\n\
+                     kind = \"drag\"\nrate = 5\n"
+                ));
+                run(&mut sim, 96);
+                let x = positions(&sim, "rod");
+                // An arc of curvature k and length 1 has a chord of 2/k sin(k/2).
+                let k: f64 = curvature.iter().map(|k: &f64| k.abs()).sum();
+                let chord = 2.0 / k * (k / 2.0).sin();
+                let found = (x[40] - x[0]).norm();
+                assert!((found / chord - 1.0).abs() < 2e-3, "{words}, {curvature:?}, {pin}: {found} {chord}");
+                bulges.push((x[0] + x[40]) * 0.5 - x[20]);
+            }
+            // It bulges to the same side, seen from the chord, whichever end is held.
+            assert!(bulges[0].dot(bulges[1]) > 0.0 && bulges[0].norm() > 0.1, "{words}: {bulges:?}");
+        }
+    }
+}

@@ -277,7 +277,7 @@ fn a_projected_volume_moves_as_computed_by_hand() {
         [vector(0.0, 0.0, 0.0), vector(1.0, 0.0, 0.0), vector(0.0, 1.0, 0.0), vector(0.0, 0.0, 1.0)].map(|x| x + vector(5.0, -3.0, 8.0));
     let triangles = vec![[0, 2, 1], [0, 1, 3], [1, 2, 3], [0, 3, 2]];
     let (h, k) = (0.1, 40.0);
-    let mut soft = Volume::new(4, triangles.clone(), 0.2, k).unwrap();
+    let mut soft = Volume::new(4, triangles.clone(), 0.2, 1.0.into(), k).unwrap();
     let mut moved = rows(&x, &[1.0, 2.0, 3.0, 0.0]);
     let over: f64 = 1.0 / 6.0 - 0.2;
     assert!((soft.energy(&moved, Walls::default()) - 0.5 * k * over * over).abs() < 1e-15);
@@ -288,7 +288,7 @@ fn a_projected_volume_moves_as_computed_by_hand() {
     for i in 0..4 {
         assert!((xyz(moved[i]) - x[i] - exact[i] * (lambda / 6.0)).norm() < 1e-14, "{i}: {:?}", moved[i]);
     }
-    assert!(lambda > 0.01 && Volume::new(3, triangles, 0.2, k).is_none());
+    assert!(lambda > 0.01 && Volume::new(3, triangles, 0.2, 1.0.into(), k).is_none());
 }
 
 fn cloud(n: usize) -> (Vec<Vector>, Vec<f64>) {

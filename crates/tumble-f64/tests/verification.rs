@@ -22,6 +22,7 @@ mod hair;
 mod hand;
 mod layers;
 mod liquids;
+mod locking;
 mod mesh_contact;
 mod pattern;
 mod pinned_velocity;

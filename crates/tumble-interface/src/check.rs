@@ -41,7 +41,7 @@ impl<'a> Checker<'a> {
         }
         if !fits_type(node, schema) {
             let expected = self.describe(schema, unit);
-            return self.report(node, path, format!("{}, expected {expected}", show(node, unit)));
+            return self.report(node, path, format!("{}, expected {expected}{}", show(node, unit), rigid(node, schema)));
         }
         match &node.value {
             Value::Float(x) if !x.is_finite() => {
@@ -357,6 +357,17 @@ fn show(node: &Node, unit: Option<&str>) -> String {
         Value::List(items) => format!("a list of {}", items.len()),
         Value::Table(_) => "a table".to_string(),
     }
+}
+
+/// Of keyframes or a formula where there is one number for all times: that this is so.
+fn rigid(node: &Node, schema: &Schema) -> &'static str {
+    let numbers = types(schema).iter().any(|t| *t == "number" || *t == "array");
+    let animated = match &node.value {
+        Value::Table(entries) => entries.iter().any(|(key, _)| key == "keys"),
+        Value::Text(text) => text.chars().any(|c| c.is_alphanumeric()) && text.parse::<f64>().is_err() && !text.contains(','),
+        _ => false,
+    };
+    if numbers && animated { "; it does not change in time" } else { "" }
 }
 
 /// The strings that a schema admits, if it is a choice among strings.

@@ -173,6 +173,9 @@ pub trait Engine: Send {
     /// energies are measured against, is chosen anew from the state as it is now.
     fn reconsider(&mut self);
 
+    /// Whether a step whose energy has exploded is an error; a state that is not finite always is.
+    fn stop_on_explosion(&mut self, stop: bool);
+
     /// The largest stable steps, from the stiffest mode of each system as it is now; none of those for which `go_on` says no.
     fn stability(&mut self, go_on: &(dyn Fn() -> bool + Sync)) -> Vec<Stability>;
 

@@ -65,6 +65,8 @@ codes! {
     FoldedPattern = "folded-pattern",
     /// A mesh of soft matter with flaws.
     UnsoundMesh = "unsound-mesh",
+    /// Tetrahedra that cannot bend at constant volume.
+    Locking = "locking",
     /// Steps so short, places so far or rods so stiff that single precision does not suffice.
     RoundOff = "round-off",
     /// A surface or line heavier or lighter than any real one.

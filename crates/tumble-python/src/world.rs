@@ -34,6 +34,8 @@ pub struct World {
     raised: user::Raised,
     /// What solvers failed to solve so far.
     unsolved: Unsolved,
+    /// Whether an explosion is an error.
+    stops: bool,
 }
 
 /// A force or an integrator of a user, which no file holds.
@@ -223,7 +225,7 @@ impl World {
         let pool = thread_pool(py, threads)?;
         let engine = build(py, scene.bind(py).get(), pool.as_ref())?;
         let raised = user::Raised::default();
-        Ok(Self { scene, engine, pool, threads, custom: Vec::new(), raised, unsolved: Unsolved::default() })
+        Ok(Self { scene, engine, pool, threads, custom: Vec::new(), raised, unsolved: Unsolved::default(), stops: true })
     }
 
     #[getter]
@@ -433,6 +435,19 @@ impl World {
             self.fits(py, &path, about(&bytes).as_ref(), "add it to this world before")?;
         }
         self.engine.restore(&bytes).map_err(|e| scene_error(py, &e))
+    }
+
+    /// Whether a step whose energy has grown beyond a thousand times its scale raises StepError, which is the default. With False the world goes
+    /// on, to show the explosion, until a number is not finite.
+    #[getter]
+    fn stop_on_explosion(&self) -> bool {
+        self.stops
+    }
+
+    #[setter]
+    fn set_stop_on_explosion(&mut self, stop: bool) {
+        self.stops = stop;
+        self.engine.stop_on_explosion(stop);
     }
 
     /// After the state of another scene was loaded: what was chosen from that scene, as how many sub-steps an interval

@@ -26,6 +26,8 @@ pub struct World {
     disagreements: Vec<Warning>,
     /// Whether an interval is taken once more, in the sub-steps of which nobody looks.
     repeating: Arc<AtomicBool>,
+    /// Whether an explosion ends a step with an error.
+    pub stop_on_explosion: bool,
     /// Length of an exchange interval [s].
     dt: f64,
     exchanges: u32,
@@ -48,6 +50,7 @@ impl World {
             systems,
             exchange,
             coupling: None,
+            stop_on_explosion: true,
             disagreements: Vec::new(),
             repeating: Arc::default(),
             dt,
@@ -112,7 +115,9 @@ impl World {
             }
         };
         let time = (self.frame + 1) as f64 * f64::from(self.exchanges) * self.dt;
-        let error = self.each_mut().find_map(|s| s.breakdown(time));
+        let stop = self.stop_on_explosion;
+        let is_wrong = |error: &StepError| stop || !matches!(error, StepError::Exploded(_));
+        let error = self.each_mut().find_map(|s| s.breakdown(time).filter(is_wrong));
         if let Some(error) = error {
             return Err(self.first_breakdown(error, go_on));
         }

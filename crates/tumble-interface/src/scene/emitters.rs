@@ -44,10 +44,10 @@ pub struct Emitter {
     #[serde(default = "origin")]
     #[schemars(extend("x-unit" = "m/s"))]
     pub velocity: AnimatedVector,
-    /// Speed along `direction`, added to `velocity`.
-    #[serde(default)]
+    /// Speed along `direction`, added to `velocity`, of those born at a time.
+    #[serde(default = "nothing")]
     #[schemars(extend("x-unit" = "m/s"))]
-    pub speed: f64,
+    pub speed: Animated,
     /// Random variation of the speed, between speed (1 - this) and speed (1 + this).
     #[serde(default)]
     #[schemars(range(min = 0.0, max = 1.0), extend("x-unit" = "1"))]
@@ -56,9 +56,9 @@ pub struct Emitter {
     #[serde(default)]
     pub direction: Option<[f64; 3]>,
     /// Half-angle of the cone of directions, uniform over its solid angle; 180 is all directions.
-    #[serde(default)]
-    #[schemars(range(min = 0.0, max = 180.0), extend("x-unit" = "°"))]
-    pub cone: f64,
+    #[serde(default = "nothing")]
+    #[schemars(extend("x-unit" = "°"))]
+    pub cone: Animated,
     /// Fraction of the velocity of the parent, or of the moving source, that a particle inherits.
     #[serde(default)]
     #[schemars(extend("x-unit" = "1"))]

@@ -285,6 +285,11 @@ pub struct Rod {
     #[serde(default)]
     #[schemars(range(min = 0.0), extend("x-unit" = "N m²"))]
     pub twist: Option<f64>,
+    /// Natural curvature about the axis of `side`, about the axis across it, and natural twist: what the rod bends and twists to without load. Default:
+    /// straight.
+    #[serde(default)]
+    #[schemars(extend("x-unit" = "1/m"))]
+    pub curvature: [f64; 3],
     /// Rotational inertia per length, the same about every axis. Default: that of a round wire of the picture radius.
     #[serde(default)]
     #[schemars(extend("x-unit" = "kg m", "exclusiveMinimum" = 0.0))]

@@ -1,5 +1,6 @@
 //! Elastic surfaces, what they enclose, and bodies that keep their shape.
 
+use super::Animated;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -86,10 +87,10 @@ pub struct Weak {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Inflation {
-    /// Volume at zero pressure, relative to that of the mesh.
-    #[serde(default = "one")]
-    #[schemars(extend("x-unit" = "1", "exclusiveMinimum" = 0.0))]
-    pub volume: f64,
+    /// Volume at zero pressure, relative to that of the mesh; above 0.
+    #[serde(default = "whole")]
+    #[schemars(extend("x-unit" = "1"))]
+    pub volume: Animated,
     /// Bulk modulus: pressure per relative change of volume. Default: constant volume.
     #[serde(default)]
     #[schemars(extend("x-unit" = "Pa", "exclusiveMinimum" = 0.0))]
@@ -157,6 +158,6 @@ fn third() -> f64 {
     0.3
 }
 
-fn one() -> f64 {
-    1.0
+fn whole() -> Animated {
+    Animated::Value(1.0)
 }

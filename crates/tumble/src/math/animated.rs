@@ -126,6 +126,14 @@ impl VectorSignal {
         false
     }
 
+    /// Calls `each(i, value)` with one component at n points of a line along x, the i-th of which is at `x(i)`.
+    pub fn along(&self, component: usize, t: f64, n: usize, x: impl Fn(usize) -> f64, yz: [f64; 2], mut each: impl FnMut(usize, f64)) {
+        match self {
+            Self::Formula(formula) => formula.along(component, t, n, x, yz, each),
+            _ => (0..n).for_each(|i| each(i, <[f64; 3]>::from(self.value(t))[component])),
+        }
+    }
+
     /// How fast it changes at a time, where it is a function of time alone: by central differences, but keys that it jumps
     /// between are no motion.
     pub fn velocity(&self, t: f64) -> Vec3<f64> {

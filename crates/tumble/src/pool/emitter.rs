@@ -55,6 +55,10 @@ pub struct Course {
     pub rate: Signal,
     /// Velocity that all get [m/s].
     pub velocity: VectorSignal,
+    /// Speed along the direction [m/s].
+    pub speed: Signal,
+    /// Half-angle of the cone of directions [°].
+    pub cone: Signal,
     /// Way of the source [m].
     pub path: VectorSignal,
     /// When the scene ends [s].
@@ -386,13 +390,14 @@ impl Emitter {
     fn velocity(&self, t: f64, id: u32, normal: Vector, source: Vector) -> Vector {
         let words = &self.words;
         let base = self.course.velocity.value(t) + source * words.inherit;
-        if words.speed == 0.0 {
+        let speed = self.course.speed.value(t);
+        if speed == 0.0 {
             return base;
         }
         let [u, v, w, _] = self.draw(id, MOTION);
         let axis = words.direction.map_or(normal, Vector::from);
         let axis = if axis.norm_sq() > 0.0 { axis } else { self.up };
-        base + sampling::about(axis, u, v, words.cone.to_radians()) * spread(words.speed, words.speed_spread, || w)
+        base + sampling::about(axis, u, v, self.course.cone.value(t).to_radians()) * spread(speed, words.speed_spread, || w)
     }
 }
 

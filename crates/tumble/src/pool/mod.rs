@@ -537,7 +537,14 @@ mod tests {
                     [[emitter]]\nname = \"c\"\nfrom.point = {}\n";
         let words = Scene::from_toml(text).unwrap().emitter;
         let make = |w: &tumble_interface::scene::Emitter| {
-            let course = Course { rate: 0.0.into(), velocity: [0.0; 3].into(), path: [0.0; 3].into(), end: 1.0 };
+            let course = Course {
+                rate: 0.0.into(),
+                velocity: [0.0; 3].into(),
+                speed: 0.0.into(),
+                cone: 0.0.into(),
+                path: [0.0; 3].into(),
+                end: 1.0,
+            };
             Emitter::new(w.clone(), course, 1, Origin::Place(Sampler::Point(Vector::default())), Vec::new(), [0.0, 0.0, 1.0].into(), None)
         };
         let mut pool = Pool::new(5, words.iter().map(make).collect());

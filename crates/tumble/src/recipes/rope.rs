@@ -85,24 +85,25 @@ fn frames(site: &mut Site<'_>, thing: &Rope, rod: &Rod, places: &[Vector], first
             turn = shortest(turn.axis_z(), d) * turn;
         }
         let frame = site.parts.frame(turn.row(), inertia);
-        for (end, here) in ends.iter().zip([i == 0, i + 1 == n]) {
+        for (place, here) in [i == 0, i + 1 == n].into_iter().enumerate() {
             if here {
-                clamp(site, rod, end, (frame, inertia, turn), spacing, ratios);
+                clamp(site, rod, (&ends[place], place), (frame, inertia, turn), spacing, ratios);
             }
         }
         let k = rod.stretch * spacing;
         site.parts.rod_stretch([first + i as u32, first + i as u32 + 1], frame, [spacing, shear], k, k * rod.damping, rod.break_strain);
         if i > 0 && rod.bend > 0.0 {
-            bend(site, rod, [before, frame], spacing, ratios);
+            bend(site, rod, [before, frame], false, spacing, ratios);
         }
         before = frame;
     }
 }
 
-/// Bend and twist between two frames at a distance of l [m].
-fn bend(site: &mut Site<'_>, rod: &Rod, frames: [u32; 2], l: f64, [side, twist]: [f64; 2]) {
+/// Bend and twist between two frames at a distance of l [m], given in the order of the rod or backwards.
+fn bend(site: &mut Site<'_>, rod: &Rod, frames: [u32; 2], backwards: bool, l: f64, [side, twist]: [f64; 2]) {
     let k = rod.bend * l;
-    site.parts.rod_bend(frames, [2.0 / l, 0.0, 0.0, 0.0, side, twist], k, k * rod.damping);
+    let [x, y, z] = rod.curvature.map(|k| if backwards { -k } else { k });
+    site.parts.rod_bend(frames, [2.0 / l, x, y, z, side, twist], k, k * rod.damping);
 }
 
 /// The frame of a segment that goes along d: its first axis is the rod's side, or horizontal; `None` if that lies along d. Round rods have no
@@ -128,13 +129,20 @@ fn first_frame(rod: &Rod, d: Vector, up: Vector) -> Option<Quat<f64>> {
 
 /// Holds a frame at the very end of the rod, half a segment from that of its last segment: holding the latter itself would
 /// clamp the rod half a segment too far along, an error of order 1.    (rods.5)
-fn clamp(site: &mut Site<'_>, rod: &Rod, end: &Held, (frame, inertia, turn): (u32, f64, Quat<f64>), spacing: f64, ratios: [f64; 2]) {
+fn clamp(
+    site: &mut Site<'_>,
+    rod: &Rod,
+    (end, place): (&Held, usize),
+    (frame, inertia, turn): (u32, f64, Quat<f64>),
+    spacing: f64,
+    ratios: [f64; 2],
+) {
     let mut held = frame;
     let free = matches!(end, Held::At(times) if times.is_empty());
     if rod.bend > 0.0 && !free {
         // Of a frame that is let go the inertia of half a segment remains.
         held = site.parts.frame(turn.row(), if matches!(end, Held::Always) { 1.0 } else { inertia / 2.0 });
-        bend(site, rod, [held, frame], spacing / 2.0, ratios);
+        bend(site, rod, [held, frame], place == 1, spacing / 2.0, ratios);
     }
     match end {
         Held::Always => site.parts.clamp_frame(held),
@@ -234,6 +242,7 @@ mod tests {
             bend_side,
             side,
             twist: None,
+            curvature: [0.0; 3],
             inertia: None,
             damping: 0.0,
             break_strain: None,

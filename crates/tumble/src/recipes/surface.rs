@@ -3,9 +3,10 @@
 use super::Site;
 use crate::elements::{Element, Hinge, IsometricBend, Membrane, Moment, Woven, enclosed};
 use crate::geometry::Vector;
-use crate::math::functions;
+use crate::math::{Signal, functions};
 use crate::systems::dynamics::{Closed, TearPart};
 use std::ops::Range;
+use tumble_interface::check::plain;
 use tumble_interface::fault::Fault;
 use tumble_interface::repair::repair;
 use tumble_interface::scene::{FabricUse, FabricWords, Inflation, Membrane as Words, ShapeMatching, Tear};
@@ -301,7 +302,16 @@ impl Site<'_> {
         }
         let triangles = mesh.triangles.iter().map(|t| t.map(|i| i + first)).collect();
         let stiffness = words.stiffness.map_or(f64::INFINITY, |modulus| modulus / volume);
-        self.parts.closed(path, Closed { triangles, target: volume * words.volume, stiffness });
+        let target = match Signal::new(&words.volume) {
+            Ok(target) => target,
+            Err(message) => return self.wrong(format!("{path}.volume"), message),
+        };
+        let tried = [0.0].iter().chain(&self.parts.times).chain(target.key_times());
+        if let Some((t, value)) = tried.map(|t| (*t, target.value(*t))).find(|(_, value)| !(value.is_finite() && *value > 0.0)) {
+            let when = if target.is_constant() { String::new() } else { format!(" at t = {} s", plain(t)) };
+            return self.wrong(format!("{path}.volume"), format!("{}{when}, expected a number above 0", plain(value)));
+        }
+        self.parts.closed(path, Closed { triangles, volume, target, stiffness });
     }
 
     /// Keeps points in shape.

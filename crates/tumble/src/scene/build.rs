@@ -137,6 +137,8 @@ pub fn emit(site: &mut Site<'_>, scene: &Scene, thing: &Emitter) {
     let course = Course {
         rate: reader.signal(&at("rate"), &thing.rate, 0.0),
         velocity: reader.in_plane(&at("velocity"), &thing.velocity),
+        speed: reader.signal(&at("speed"), &thing.speed, f64::NEG_INFINITY),
+        cone: reader.signal_within(&at("cone"), &thing.cone, [0.0, 180.0]),
         path: reader.in_plane(&at("path"), &thing.path),
         end: scene.frame_time() * f64::from(scene.time.frames),
     };

@@ -217,7 +217,7 @@ fn check_plane(scene: &Scene, wrong: &mut impl FnMut(String, String)) {
                 // A disk in the plane, or a line.
                 if (0..3).any(|a| a != axis && normal[a] != 0.0) {
                     flat("from.disk.normal", normal);
-                } else if thing.direction.is_none() && thing.speed != 0.0 {
+                } else if thing.direction.is_none() && thing.speed.constant() != Some(0.0) {
                     let message = "missing: the normal of the disk points out of the plane of a scene of dimension 2";
                     wrong(format!("emitter \"{}\".direction", thing.name), message.into());
                 }

@@ -130,7 +130,7 @@ fn doubts(scene: &Scene, emitter: &Emitter, warnings: &mut Vec<Warning>) {
         AnimatedVector::Components(all) => all.iter().map(|c| if let Component::Value(v) = c { v * v } else { 0.0 }).sum::<f64>().sqrt(),
         _ => 0.0,
     };
-    let speed = given.max(emitter.speed.abs());
+    let speed = given.max(emitter.speed.constant().unwrap_or(0.0).abs());
     let way = speed / (scene.time.fps * f64::from(scene.time.exchanges));
     for (i, rule) in emitter.kill.iter().enumerate() {
         let thick = match rule {

@@ -32,15 +32,24 @@ impl<'a> Reader<'a> {
 
     /// A number, which must be at least `least` and finite during the run.
     pub fn signal(&mut self, path: &str, words: &Animated, least: f64) -> Signal {
+        self.signal_within(path, words, [least, f64::INFINITY])
+    }
+
+    /// The same, at most `most`.
+    pub fn signal_within(&mut self, path: &str, words: &Animated, [least, most]: [f64; 2]) -> Signal {
         let signal = match Signal::new(words) {
             Ok(signal) => signal,
             Err(message) => return self.wrong(path, message).into(),
         };
         let tried = if signal.is_constant() { &self.times[..1] } else { &self.times[..] };
         let tried = tried.iter().chain(signal.key_times());
-        let bad = tried.map(|t| (*t, signal.value(*t))).find(|(_, value)| !value.is_finite() || *value < least);
+        let bad = tried.map(|t| (*t, signal.value(*t))).find(|(_, value)| !value.is_finite() || *value < least || *value > most);
         if let Some((t, value)) = bad {
-            let expected = if least.is_finite() { format!(">= {least}") } else { "a finite number".into() };
+            let expected = match (least.is_finite(), most.is_finite()) {
+                (true, true) => format!("{least} to {most}"),
+                (true, false) => format!(">= {least}"),
+                _ => "a finite number".into(),
+            };
             let at = if signal.is_constant() { String::new() } else { format!(" at t = {} s", plain(t)) };
             self.wrong(path, format!("{}{at}, expected {expected}", plain(value)));
         }

@@ -10,6 +10,7 @@ mod grids;
 pub mod hand;
 mod hints;
 mod laws;
+mod locking;
 mod looks;
 mod memory;
 mod methods;

@@ -128,6 +128,10 @@ impl Engine for Simulation {
         self.world.reconsider();
     }
 
+    fn stop_on_explosion(&mut self, stop: bool) {
+        self.world.stop_on_explosion = stop;
+    }
+
     fn stability(&mut self, go_on: &(dyn Fn() -> bool + Sync)) -> Vec<Stability> {
         self.world.stability(go_on)
     }

@@ -9,7 +9,7 @@
 use super::{Constraints, Projection};
 use crate::geometry::Walls;
 use crate::math::parallel::{CHUNK, Tasks, fold};
-use crate::math::{Real, Row, Vec3, xyz64};
+use crate::math::{Real, Row, Signal, Vec3, xyz64};
 
 type Vector = Vec3<f64>;
 
@@ -21,8 +21,9 @@ pub struct Volume {
     start: Vec<u32>,
     /// For every point its triangles, as the two corners that follow it.
     around: Vec<[u32; 2]>,
-    /// Volume without pressure [m³].
-    target: f64,
+    /// Volume of the mesh [m³], and that without pressure, relative to it.
+    volume: f64,
+    target: Signal,
     /// 1/k, k = K/V0 [Pa/m³].
     compliance: f64,
     lambda: f64,
@@ -40,9 +41,9 @@ pub fn enclosed(triangles: &[[u32; 3]], x: impl Fn(u32) -> Vector + Sync) -> f64
 }
 
 impl Volume {
-    /// Closed triangles over rows 0..rows that hold V1 = `target` [m³] with the stiffness k = `stiffness` [Pa/m³], infinite to keep it;
+    /// Closed triangles over rows 0..rows that hold V1 = `volume` [m³] times `target` with the stiffness k = `stiffness` [Pa/m³], infinite to keep it;
     /// `None` if a corner is not a row.
-    pub fn new(rows: usize, triangles: Vec<[u32; 3]>, target: f64, stiffness: f64) -> Option<Self> {
+    pub fn new(rows: usize, triangles: Vec<[u32; 3]>, volume: f64, target: Signal, stiffness: f64) -> Option<Self> {
         if triangles.iter().flatten().any(|i| *i as usize >= rows) {
             return None;
         }
@@ -57,7 +58,7 @@ impl Volume {
         }
         start.push(corners.len() as u32);
         let around = corners.into_iter().map(|[_, b, c]| [b, c]).collect();
-        Some(Self { triangles, points, start, around, target, compliance: 1.0 / stiffness, lambda: 0.0, gradient: Vec::new() })
+        Some(Self { triangles, points, start, around, volume, target, compliance: 1.0 / stiffness, lambda: 0.0, gradient: Vec::new() })
     }
 
     /// dV/dx of the point in place k.
@@ -67,8 +68,8 @@ impl Volume {
         self.around[self.start[k] as usize..self.start[k + 1] as usize].iter().map(part).fold(Vector::default(), |s, g| s + g)
     }
 
-    fn over(&self, x: &[Row]) -> f64 {
-        enclosed(&self.triangles, |i| xyz64(x[i as usize])) - self.target
+    fn over(&self, x: &[Row], t: f64) -> f64 {
+        enclosed(&self.triangles, |i| xyz64(x[i as usize])) - self.volume * self.target.value(t)
     }
 }
 
@@ -85,11 +86,11 @@ impl Constraints for Volume {
         self.points.iter().skip(1).for_each(|i| join(self.points[0], *i));
     }
 
-    fn energy(&self, x: &[Row], _: Walls<'_>) -> f64 {
+    fn energy(&self, x: &[Row], walls: Walls<'_>) -> f64 {
         if self.compliance == 0.0 {
             return 0.0;
         }
-        let over = self.over(x);
+        let over = self.over(x, walls.t);
         0.5 * over * over / self.compliance
     }
 
@@ -97,7 +98,7 @@ impl Constraints for Volume {
         if step.iteration == 0 {
             self.lambda = 0.0;
         }
-        let over = self.over(x);
+        let over = self.over(x, step.walls.t);
         let mut gradient = std::mem::take(&mut self.gradient);
         gradient.resize(self.points.len(), Vector::default());
         let (this, rows) = (&*self, &*x);

@@ -10,7 +10,7 @@ mod table;
 use super::{Row, Vec3};
 use parse::{Tree, parse};
 use std::ops::Range;
-use table::{CONSTANTS, FUNCTIONS, Function};
+use table::{COMPARISONS, CONSTANTS, FUNCTIONS, Function};
 use tumble_interface::check::suggestion;
 
 /// The variables: time [s], position [m], velocity [m/s].
@@ -218,17 +218,37 @@ impl Formula {
     /// Calls `each(row, components)` for every row.
     pub fn rows(&self, t: f64, x: &[Row], v: &[Row], mut each: impl FnMut(usize, [f64; 3])) {
         let slots = self.slots(t);
-        let mut stack: Vec<[f64; BLOCK]> = Vec::new();
-        let mut results = [[0.0; BLOCK]; 3];
+        let mut stack: Vec<Values> = Vec::new();
+        let mut results = [Values::Same(0.0); 3];
         for (b, x) in x.chunks(BLOCK).enumerate() {
             let v = &v[b * BLOCK..b * BLOCK + x.len()];
+            let variable = |i: usize| {
+                let (rows, c) = if i < 4 { (x, i.wrapping_sub(1)) } else { (v, i - 4) };
+                if i == 0 { Values::Same(t) } else { of_each(rows.len(), |k| f64::from(rows[k][c])) }
+            };
             for (code, result) in self.components.iter().zip(&mut results) {
-                columns(code, t, x, v, &slots, &mut stack);
-                *result = stack.pop().unwrap_or([0.0; BLOCK]);
+                columns(code, x.len(), &variable, &slots, &mut stack);
+                *result = stack.pop().unwrap_or(Values::Same(0.0));
             }
             for k in 0..x.len() {
-                each(b * BLOCK + k, [results[0][k], results[1][k], results[2][k]]);
+                each(b * BLOCK + k, std::array::from_fn(|c| results[c].get(k)));
             }
+        }
+    }
+
+    /// Calls `each(i, value)` with one component at n points of a line along x, the i-th of which is at `x(i)`; what depends on the other
+    /// coordinates alone is computed once.
+    pub fn along(&self, component: usize, t: f64, n: usize, x: impl Fn(usize) -> f64, [y, z]: [f64; 2], mut each: impl FnMut(usize, f64)) {
+        let (slots, mut stack) = (self.slots(t), Vec::new());
+        for start in (0..n).step_by(BLOCK) {
+            let here = (n - start).min(BLOCK);
+            let variable = |i: usize| match i {
+                1 => of_each(here, |k| x(start + k)),
+                _ => Values::Same([t, 0.0, y, z, 0.0, 0.0, 0.0][i]),
+            };
+            columns(&self.components[component], here, &variable, &slots, &mut stack);
+            let values = stack.pop().unwrap_or(Values::Same(0.0));
+            (0..here).for_each(|k| each(start + k, values.get(k)));
         }
     }
 }
@@ -253,7 +273,8 @@ fn operation(name: &str, arguments: &[(DependsOn, Vec<Instruction>)], of: Of) ->
         ("pow", 2) if matches!(arguments[1].1[..], [Instruction::Constant(2.0)]) => Some(Instruction::Square),
         _ => None,
     };
-    if let Some(one) = one {
+    let compared = COMPARISONS.iter().find(|(known, _)| *known == name).map(|(_, f)| Instruction::Two(*f));
+    if let Some(one) = one.or(compared) {
         return Ok(vec![one]);
     }
     let Some((_, function)) = FUNCTIONS.iter().find(|(known, _)| *known == name) else {
@@ -347,34 +368,43 @@ fn pair(stack: &mut [f64; STACK + 1], top: &mut usize, f: impl Fn(f64, f64) -> f
     stack[*top] = f(stack[*top], stack[*top + 1]);
 }
 
-/// Runs the instructions for a block of rows and leaves the result on the stack: the same operations as `scalar`.
-fn columns(code: &[Instruction], t: f64, x: &[Row], v: &[Row], slots: &[f64], stack: &mut Vec<[f64; BLOCK]>) {
+/// A value for all masses of a block: the same for all, or one for each.
+#[derive(Clone, Copy)]
+enum Values {
+    Same(f64),
+    Each([f64; BLOCK]),
+}
+
+impl Values {
+    fn get(&self, k: usize) -> f64 {
+        match self {
+            Self::Same(value) => *value,
+            Self::Each(values) => values[k],
+        }
+    }
+}
+
+/// Runs the instructions for a block of n masses and leaves the result on the stack: the same operations as `scalar`.
+fn columns(code: &[Instruction], n: usize, variable: &impl Fn(usize) -> Values, slots: &[f64], stack: &mut Vec<Values>) {
     for instruction in code {
         match *instruction {
-            Instruction::Constant(c) => stack.push([c; BLOCK]),
-            Instruction::Slot(i) => stack.push([slots[i]; BLOCK]),
-            Instruction::Variable(0) => stack.push([t; BLOCK]),
-            Instruction::Variable(i) => {
-                let (rows, c) = if i < 4 { (x, i - 1) } else { (v, i - 4) };
-                let mut column = [0.0; BLOCK];
-                for (number, row) in column.iter_mut().zip(rows) {
-                    *number = f64::from(row[c]);
-                }
-                stack.push(column);
-            }
-            Instruction::Negate => each(stack, |a| -a),
-            Instruction::Square => each(stack, |a| a * a),
-            Instruction::One(f) => each(stack, f),
-            Instruction::Add => both(stack, |a, b| a + b),
-            Instruction::Subtract => both(stack, |a, b| a - b),
-            Instruction::Multiply => both(stack, |a, b| a * b),
-            Instruction::Divide => both(stack, |a, b| a / b),
-            Instruction::Two(f) => both(stack, f),
+            Instruction::Constant(c) => stack.push(Values::Same(c)),
+            Instruction::Slot(i) => stack.push(Values::Same(slots[i])),
+            Instruction::Variable(i) => stack.push(variable(i)),
+            Instruction::Negate => each(stack, n, |a| -a),
+            Instruction::Square => each(stack, n, |a| a * a),
+            Instruction::One(f) => each(stack, n, f),
+            Instruction::Add => both(stack, n, |a, b| a + b),
+            Instruction::Subtract => both(stack, n, |a, b| a - b),
+            Instruction::Multiply => both(stack, n, |a, b| a * b),
+            Instruction::Divide => both(stack, n, |a, b| a / b),
+            Instruction::Two(f) => both(stack, n, f),
             Instruction::Three(f) => {
                 if let (Some(c), Some(b), Some(a)) = (stack.pop(), stack.pop(), stack.last_mut()) {
-                    for k in 0..BLOCK {
-                        a[k] = f(a[k], b[k], c[k]);
-                    }
+                    *a = match (*a, b, c) {
+                        (Values::Same(a), Values::Same(b), Values::Same(c)) => Values::Same(f(a, b, c)),
+                        (a, b, c) => of_each(n, |k| f(a.get(k), b.get(k), c.get(k))),
+                    };
                 }
             }
         }
@@ -382,20 +412,34 @@ fn columns(code: &[Instruction], t: f64, x: &[Row], v: &[Row], slots: &[f64], st
 }
 
 #[inline(always)]
-fn each(stack: &mut [[f64; BLOCK]], f: impl Fn(f64) -> f64) {
-    if let Some(a) = stack.last_mut() {
-        for number in a {
-            *number = f(*number);
-        }
+fn of_each(n: usize, f: impl Fn(usize) -> f64) -> Values {
+    let mut out = [0.0; BLOCK];
+    for (k, out) in out[..n].iter_mut().enumerate() {
+        *out = f(k);
+    }
+    Values::Each(out)
+}
+
+#[inline(always)]
+fn each(stack: &mut [Values], n: usize, f: impl Fn(f64) -> f64) {
+    match stack.last_mut() {
+        Some(Values::Same(a)) => *a = f(*a),
+        Some(Values::Each(a)) => a[..n].iter_mut().for_each(|a| *a = f(*a)),
+        None => {}
     }
 }
 
 #[inline(always)]
-fn both(stack: &mut Vec<[f64; BLOCK]>, f: impl Fn(f64, f64) -> f64) {
-    if let (Some(b), Some(a)) = (stack.pop(), stack.last_mut()) {
-        for k in 0..BLOCK {
-            a[k] = f(a[k], b[k]);
+fn both(stack: &mut Vec<Values>, n: usize, f: impl Fn(f64, f64) -> f64) {
+    let (Some(b), Some(a)) = (stack.pop(), stack.last_mut()) else { return };
+    match (&mut *a, b) {
+        (Values::Each(a), Values::Each(b)) => a[..n].iter_mut().zip(&b[..n]).for_each(|(a, b)| *a = f(*a, *b)),
+        (Values::Each(a), Values::Same(b)) => a[..n].iter_mut().for_each(|a| *a = f(*a, b)),
+        (Values::Same(same), Values::Each(b)) => {
+            let same = *same;
+            *a = of_each(n, |k| f(same, b[k]));
         }
+        (Values::Same(a), Values::Same(b)) => *a = f(*a, b),
     }
 }
 

@@ -28,7 +28,9 @@ pub fn parse(text: &str) -> Result<Vec<Tree>, String> {
     let list = delimited((multispace0, '['), separated(1.., sum, ','), cut_err((']', multispace0)));
     alt((list, sum.map(|one| vec![one]))).parse(text).map_err(|e| {
         let rest = text.get(e.offset()..).unwrap_or_default().trim();
-        if rest.is_empty() {
+        if rest.starts_with(['<', '>', '=', '!']) {
+            "comparisons are <, <=, >, >=, ==, != of two values; write (0 < x)*(x < 1) for both of two".to_string()
+        } else if rest.is_empty() {
             "it ends too early; expected a number, a name or \"(\"".to_string()
         } else {
             format!("cannot be read from \"{}\" on", rest.chars().take(20).collect::<String>())
@@ -65,7 +67,7 @@ fn bounded(text: &str) -> Result<(), String> {
 
 type Parsed<T> = Result<T, ErrMode<ContextError>>;
 
-/// Terms and factors: `-x^2` is -(x²), `2^3^2` is 2^9.
+/// Comparisons, terms and factors: `-x^2` is -(x²), `2^3^2` is 2^9.
 fn sum(input: &mut &str) -> Parsed<Tree> {
     fn call<const N: usize>(name: &str, arguments: [Tree; N]) -> Parsed<Tree> {
         Ok(Tree::Call(name.into(), arguments.into()))
@@ -74,7 +76,14 @@ fn sum(input: &mut &str) -> Parsed<Tree> {
         '-' => Prefix(8, |_: &mut _, a| call("-", [a])),
         _ => Prefix(8, |_: &mut _, a| Ok(a)),
     });
-    let infix = alt(("**", "^", "+", "-", "*", "/")).map(|operator| match operator {
+    let comparison = alt(("<=", ">=", "==", "!=", "<", ">"));
+    let infix = alt((comparison, "**", "^", "+", "-", "*", "/")).map(|operator| match operator {
+        "<=" => Infix::Neither(3, |_: &mut _, a, b| call("<=", [a, b])),
+        ">=" => Infix::Neither(3, |_: &mut _, a, b| call(">=", [a, b])),
+        "==" => Infix::Neither(3, |_: &mut _, a, b| call("==", [a, b])),
+        "!=" => Infix::Neither(3, |_: &mut _, a, b| call("!=", [a, b])),
+        "<" => Infix::Neither(3, |_: &mut _, a, b| call("<", [a, b])),
+        ">" => Infix::Neither(3, |_: &mut _, a, b| call(">", [a, b])),
         "+" => Infix::Left(5, |_: &mut _, a, b| call("+", [a, b])),
         "-" => Infix::Left(5, |_: &mut _, a, b| call("-", [a, b])),
         "*" => Infix::Left(7, |_: &mut _, a, b| call("*", [a, b])),

@@ -16,7 +16,7 @@ pub enum Function {
 }
 
 /// All functions, by name.
-pub const FUNCTIONS: [(&str, Function); 27] = [
+pub const FUNCTIONS: [(&str, Function); 28] = [
     ("sin", Function::One(functions::sin)),
     ("cos", Function::One(functions::cos)),
     ("tan", Function::One(functions::tan)),
@@ -44,6 +44,17 @@ pub const FUNCTIONS: [(&str, Function); 27] = [
     ("smoothstep", Function::Three(smoothstep)),
     ("clamp", Function::Three(|x, low, high| x.max(low).min(high))),
     ("mix", Function::Three(|a, b, s| a + (b - a) * s)),
+    ("if", Function::Three(|holds, yes, no| if holds != 0.0 { yes } else { no })),
+];
+
+/// Comparisons, 1 where they hold and 0 where they do not.
+pub const COMPARISONS: [(&str, fn(f64, f64) -> f64); 6] = [
+    ("<=", |a, b| f64::from(u8::from(a <= b))),
+    (">=", |a, b| f64::from(u8::from(a >= b))),
+    ("==", |a, b| f64::from(u8::from(a == b))),
+    ("!=", |a, b| f64::from(u8::from(a != b))),
+    ("<", |a, b| f64::from(u8::from(a < b))),
+    (">", |a, b| f64::from(u8::from(a > b))),
 ];
 
 /// Constants, by name.

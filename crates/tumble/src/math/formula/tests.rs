@@ -35,6 +35,9 @@ fn operators_bind_as_in_mathematics() {
         ("vx*vy - vz", 14.0),
         ("tanh(x) - sinh(x)/cosh(x)", 0.0),
         ("z^2.5 - pow(z, 2.5) + e", std::f64::consts::E),
+        ("(x < 1) + 10*(x > 1) + 100*(x <= 0.3) + 1000*(x >= y) + 1e4*(x == y) + 1e5*(x != y)", 1.0 + 100.0 + 1000.0 + 1e5),
+        ("2*x + 1 < z*1", 1.0),
+        ("if(t < 0.5, 7, if(y < 0, 8, 9))", 8.0),
     ];
     for (text, expected) in cases {
         assert!((value(text) - expected).abs() < 1e-14 * (1.0 + expected.abs()), "{text} = {}, not {expected}", value(text));
@@ -61,6 +64,9 @@ fn faults_are_named() {
         ("2 x", "cannot be read from \"x\" on"),
         ("x $ 2", "cannot be read from \"$ 2\" on"),
         ("[x, y]", "2 components, expected one"),
+        ("0 < x < 1", "write (0 < x)*(x < 1) for both of two"),
+        ("x = 1", "comparisons are <, <=, >, >=, ==, !="),
+        ("if(x > 1, 2)", "if of 2 values, expected three"),
     ] {
         let found = fault(text);
         assert!(found.contains(message), "{text}: {found}");
@@ -89,9 +95,24 @@ fn columns_have_the_bits_of_single_places() {
     assert_eq!(seen, 300);
 }
 
+#[test]
+fn a_line_has_the_bits_of_its_points() {
+    let formula = Formula::new("[sin(t)*x^2 - y/(2 + cos(z)), if(x < 1.5, sin(3*y), x*z), 3*t + exp(z)]", 3, Of::Place).unwrap();
+    let x = |i: usize| 0.01 * i as f64;
+    for component in 0..3 {
+        let mut seen = 0;
+        formula.along(component, 0.4, 300, x, [0.7, -1.3], |i, value| {
+            let point = Vec3 { x: x(i), y: 0.7, z: -1.3 };
+            assert_eq!(value.to_bits(), formula.at(0.4, point, point)[component].to_bits());
+            seen += 1;
+        });
+        assert_eq!(seen, 300);
+    }
+}
+
 proptest! {
     #[test]
-    fn no_text_panics(text in "[-+*/^()x,y.0-9 e\\[\\]sin_µ]{0,60}") {
+    fn no_text_panics(text in "[-+*/^()<>=!x,y.0-9 e\\[\\]sin_µ]{0,60}") {
         if let Ok(formula) = Formula::new(&text, 1, Of::Motion) {
             formula.at(0.0, Vec3 { x: 1.0, y: 2.0, z: 3.0 }, Vec3 { x: 0.0, y: 0.0, z: 0.0 });
         }

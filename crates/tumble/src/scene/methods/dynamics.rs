@@ -9,7 +9,7 @@ use crate::scene::build::{Builder, ask_for_events, emit};
 use crate::scene::checks::others;
 use crate::scene::coupling::Link;
 use crate::scene::laws::Reader;
-use crate::scene::{Assets, coincident, far, hints, memory};
+use crate::scene::{Assets, coincident, far, hints, locking, memory};
 use crate::system::System;
 use crate::systems::dynamics::{Anchor, Dynamics, Parts, Settings, Stepping};
 use tumble_interface::check::short;
@@ -70,7 +70,7 @@ impl MethodRules for Rules {
         let idle = scene.collider.iter().filter(|thing| thing.edges && !meets);
         let message = "edges meet in systems with self_contact, and there is none; add it, or leave edges out";
         let idle = idle.map(|thing| Warning::new(Code::Unfelt, format!("collider \"{}\".edges", thing.name), message));
-        idle.chain(hints::thin(scene)).chain(hints::coupled(scene)).collect()
+        idle.chain(hints::thin(scene)).chain(hints::coupled(scene)).chain(locking::locking(scene)).collect()
     }
 
     fn looks(&self, scene: &Scene, plan: &Plan, colors: &mut Colors) -> Vec<Look> {

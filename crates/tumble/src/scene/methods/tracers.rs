@@ -144,7 +144,7 @@ fn refuse_motion(thing: &Emitter, issues: &mut Vec<Issue>) {
     }
     let given = [
         ("velocity", thing.velocity.constant() != Some([0.0; 3])),
-        ("speed", thing.speed != 0.0),
+        ("speed", thing.speed.constant() != Some(0.0)),
         ("mass", thing.mass != 1.0 || thing.mass_spread != 0.0),
         ("charge", thing.charge != 0.0),
     ];

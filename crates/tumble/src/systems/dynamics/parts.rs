@@ -6,7 +6,7 @@ use super::tear::{Edges, TearPart};
 use crate::elements::{LongRangeAttachments, Members, Membrane};
 use crate::forces::{Air, Force};
 use crate::geometry::Carrier;
-use crate::math::{Quat, Real, Vec3};
+use crate::math::{Quat, Real, Signal, Vec3};
 use crate::pool::Emitter;
 use crate::state::Object;
 use std::collections::HashMap;
@@ -34,12 +34,14 @@ pub struct SpringPart {
 }
 
 /// A closed surface that holds a volume.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone)]
 pub struct Closed {
     /// Its triangles, counter-clockwise from outside.
     pub triangles: Vec<[u32; 3]>,
-    /// Volume at which nothing presses [m³].
-    pub target: f64,
+    /// Volume that they enclose at rest [m³].
+    pub volume: f64,
+    /// That at which nothing presses, relative to it.
+    pub target: Signal,
     /// Pressure over the change of volume [Pa/m³]; infinite to keep it.
     pub stiffness: f64,
 }

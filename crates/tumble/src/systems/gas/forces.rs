@@ -5,7 +5,7 @@ use super::fire::{excess, radiate};
 use super::fluid::Fluid;
 use crate::fluids::Failure;
 use crate::fluids::rows::{Face, runs};
-use crate::math::{Real, Row, Signal, functions};
+use crate::math::{Real, Signal, functions};
 use crate::operators::each_row;
 use crate::state::{Field, Place};
 
@@ -155,9 +155,9 @@ impl Fluid {
             if !settings.acceleration.is_uniform() {
                 let (grid, place) = (part.grid, part.place);
                 each_row(part, |j, k, row| {
-                    let at = |i: usize| grid.point(place, [i, j, k]).map(|x| x as Real);
-                    let x: Vec<Row> = (0..row.len()).map(at).map(|[x, y, z]| [x, y, z, 0.0]).collect();
-                    settings.acceleration.rows(t, &x, &x, |i, a| row[i] += (h * <[f64; 3]>::from(a)[axis]) as Real);
+                    let at = |i: usize| grid.point(place, [i, j, k]).map(|x| f64::from(x as Real));
+                    let [_, y, z] = at(0);
+                    settings.acceleration.along(axis, t, row.len(), |i| at(i)[0], [y, z], |i, a| row[i] += (h * a) as Real);
                 });
             }
         }

@@ -178,8 +178,8 @@ impl Batches {
         shapes: &[(String, Range<usize>, f64)],
         liquids: &[(String, Range<usize>, Liquid)],
     ) -> Result<(), NotARow> {
-        for (_, Closed { triangles, target, stiffness }) in closed {
-            self.constraints.push(Box::new(Volume::new(self.points, triangles, target, stiffness).ok_or(NotARow)?));
+        for (_, Closed { triangles, volume, target, stiffness }) in closed {
+            self.constraints.push(Box::new(Volume::new(self.points, triangles, volume, target, stiffness).ok_or(NotARow)?));
         }
         for (_, range, kappa) in shapes {
             let (mass, places): (Vec<f64>, Vec<_>) =
