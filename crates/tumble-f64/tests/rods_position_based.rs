@@ -538,9 +538,10 @@ fn a_rod_of_natural_curvature_curls_to_an_arc_from_either_end() {
                 let chord = 2.0 / k * (k / 2.0).sin();
                 let found = (x[40] - x[0]).norm();
                 assert!((found / chord - 1.0).abs() < 2e-3, "{words}, {curvature:?}, {pin}: {found} {chord}");
-                bulges.push((x[0] + x[40]) * 0.5 - x[20]);
+                let bulge = (x[0] + x[40]) * 0.5 - x[20];
+                bulges.push(Vector { x: 0.0, ..bulge });
             }
-            // It bulges to the same side, seen from the chord, whichever end is held.
+            // It bulges to the same side of its line, whichever end is held.
             assert!(bulges[0].dot(bulges[1]) > 0.0 && bulges[0].norm() > 0.1, "{words}: {bulges:?}");
         }
     }
