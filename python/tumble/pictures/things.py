@@ -285,9 +285,7 @@ class Stage:
             share = np.nan_to_num((values - low) / (high - low), nan=1.0, posinf=1.0, neginf=0.0)
             glow = self._glow(thing, grid, columns)
             if grid.flat == 3:
-                if thing.name not in self._most:
-                    self._most[thing.name] = self._thickest(thing, grid, name, low, high)
-                most = self._most[thing.name] * (1.0 if glow is None else BURNING)
+                most = self._most_of(thing, grid, found) * (1.0 if glow is None else BURNING)
                 thick = (np.clip(share, 0.0, None) * most).astype(np.float32)
                 drawn.append(Smoke(thing.name, grid.origin, grid.spacing, thick, thing.color, glow=glow))
             else:
@@ -300,6 +298,26 @@ class Stage:
             line = np.stack([corners, np.roll(corners, -1, axis=0)], axis=1).reshape(-1, 3)
             drawn.append(Tubes(f"{thing.name} edges", line, np.full(4, 2), max(thinnest, 1e-9), SOLID))
         return drawn
+
+    def extinction(self, name: str) -> tuple[str, float, float, float] | None:
+        """Of what an object on a grid in space shows: the column, the value that is clear, the extinction [1/m] per unit above
+        it, and the highest temperature [K] if it glows, else 0; None where there is nothing to see, or in a plane."""
+        thing = next(o for o in self.objects if o.name == name)
+        grid = thing.grid
+        if grid is None or grid.flat != 3:
+            return None
+        found = self._range(thing, grid)
+        if found is None:
+            return None
+        column, low, high = found
+        glows = self._glow(thing, grid, self._start) is not None
+        most = self._most_of(thing, grid, found) * (BURNING if glows else 1.0)
+        return column, low, most / (high - low), self._hottest[name] if glows else 0.0
+
+    def _most_of(self, thing: Object, grid: Box, found: tuple[str, float, float]) -> float:
+        if thing.name not in self._most:
+            self._most[thing.name] = self._thickest(thing, grid, *found)
+        return self._most[thing.name]
 
     def _glow(self, thing: Object, grid: Box, columns: Columns) -> npt.NDArray[np.float32] | None:
         """Light of a hot gas: that of a black body, of which it sends out the share that it takes away (Kirchhoff's law)."""
