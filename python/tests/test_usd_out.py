@@ -1,11 +1,13 @@
 """What other programs need of a stage: quadrangles, texture coordinates, ids, rest, velocities, lights."""
 
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 import fake_run
 import numpy as np
 import pytest
+from conftest import Answer
 
 from tumble import Scene
 from tumble.export import usd
@@ -13,7 +15,7 @@ from tumble.export.parts import on_surface, squares
 from tumble.run import simulate
 
 pytest.importorskip("pxr")
-from pxr import Usd, UsdGeom, UsdLux, UsdShade  # noqa: E402
+from pxr import Usd, UsdGeom, UsdLux, UsdShade
 
 Tree = dict[str, Any]
 
@@ -148,7 +150,7 @@ def test_what_a_tear_makes_does_not_fly_in_from_afar(tmp_path: Path) -> None:
 
     def columns(t: float) -> Any:
         i = round(t * fake_run.FPS)
-        x, faces = spare + [0, 0, 0.3 * i / fake_run.FPS], triangles.copy()
+        x, faces = spare + np.array([0, 0, 0.3 * i / fake_run.FPS]), triangles.copy()
         if i >= 2:
             faces[0, 0] = n
             x[n] = x[triangles[0, 0]] + [0.1 * (i - 2) / fake_run.FPS, 0, 0]
@@ -197,3 +199,13 @@ def test_volumes_say_the_extinction_of_pictures(tmp_path: Path) -> None:
     drawn = next(t for t in Stage(run).things(3) if isinstance(t, Smoke))
     density = run.frame(3)["smoke"]["density"]
     assert np.isclose(drawn.extinction.max(), factor * density.max(), rtol=1e-4) and factor > 1
+
+
+def test_export_writes_the_script_for_blender(tmp_path: Path, tumble: Callable[..., Answer]) -> None:
+    tree = {"time": {"frames": 1}, "sheet": [SHEET], "output": {"plot": False}, "version": 1}
+    simulate(Scene(tree), tmp_path / "out" / "run")
+    answer = tumble("export", "run", "--blender", "--out", tmp_path / "there")
+    assert answer.code == 0, answer.err
+    assert [Path(line).name for line in answer.out.split()] == ["scene.usda", "blender.py"]
+    assert "'s':" in (tmp_path / "there" / "blender.py").read_text()
+    assert "--blender" in tumble("export", "run").err

@@ -74,7 +74,7 @@ def write(
                 old.unlink()
         for i, before, columns, after in _frames(run, start, made):
             ways = beginning if i == 0 else history.ways(run.time(i), columns)
-            now = Now(columns, ways, before, after, 1.0 / _rate(run))
+            now = Now(columns, ways, before, after, 1.0 / fps(run))
             first = first or now
             _save(_frame(made, now, i), layers / f"frame.{i:0{digits}d}.usdc")
             if progress is not None:
@@ -165,7 +165,7 @@ def _objects(run: Recording, made: list[Part], start: Now) -> Any:
     layer = Sdf.Layer.CreateAnonymous(".usdc")
     stage = Usd.Stage.Open(layer)
     _units(stage)
-    stage.SetTimeCodesPerSecond(_rate(run))
+    stage.SetTimeCodesPerSecond(fps(run))
     stage.SetDefaultPrim(UsdGeom.Xform.Define(stage, ROOT).GetPrim())
     prims.fill(stage, run, made, start)
     return layer
@@ -178,7 +178,7 @@ def _scene(run: Recording, hashes: str) -> Any:
     layer = Sdf.Layer.CreateAnonymous(".usda")
     stage = Usd.Stage.Open(layer)
     _units(stage)
-    rate = _rate(run)
+    rate = fps(run)
     stage.SetTimeCodesPerSecond(rate)
     stage.SetFramesPerSecond(rate)
     stage.SetStartTimeCode(0)
@@ -239,7 +239,7 @@ def surroundings(night: bool) -> tuple[float, tuple[float, float, float]]:
     return 1.0, (r, g, b)
 
 
-def _rate(run: Recording) -> float:
+def fps(run: Recording) -> float:
     """Frames, and so time codes, a second: a layer that says otherwise is stretched."""
     return float(run.scene.get("time", {}).get("fps", 24.0))
 
