@@ -43,7 +43,7 @@ def of_files(scene: "Scene") -> list[dict[str, str]]:
     return found
 
 
-_CURE = ": `tumble check SCENE --bake` writes a scene in which it moves"
+_CURE = "; `tumble check SCENE --bake` writes a scene in which they move"
 _START = "; only colliders can move as their file says"
 
 

@@ -39,19 +39,23 @@ def meshes(path: Path | str, duration: float) -> Iterator[tuple[float, Floats, I
     stage = open_stage(path)
     first, last = start(stage), end(stage)
     per_second = float(stage.GetTimeCodesPerSecond())
-    step = per_second / float(stage.GetFramesPerSecond() or per_second)
+    said = stage.HasAuthoredMetadata("framesPerSecond") and stage.GetFramesPerSecond() > 0
+    step = per_second / float(stage.GetFramesPerSecond()) if said else 1.0
     last = min(last, first + duration * per_second)
     n = int((last - first) / step + 1e-6) + 1
     if n > _MOST:
         raise ValueError(f"its motion has {n} frames, {_MOST} are taken at most; shorten it, or simulate less")
+    codes = [first + k * step for k in range(n)]
+    if last - codes[-1] > 1e-3 * step:
+        codes.append(last)
     pose(stage, first, last)
     whole = Reading(stage, first)
     triangles = _triangles(whole)
     used = np.unique(np.concatenate([s.corners + at for s, at in _each(whole)]))
-    for k in range(n):
-        now = Reading(stage, first + k * step)
+    for code in codes:
+        now = Reading(stage, code)
         _alike(whole, now)
-        yield k * step / per_second, np.concatenate([s.points for s in now.surfaces()])[used], triangles
+        yield (code - first) / per_second, np.concatenate([s.points for s in now.surfaces()])[used], triangles
 
 
 def _triangles(reading: Reading) -> Indices:

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from tumble.usd.shapes import SHAPES, polygons
+from tumble.usd.shapes import AROUND, SHAPES, polygons
 
 Floats = npt.NDArray[np.float64]
 Indices = npt.NDArray[np.int64]
@@ -143,18 +143,17 @@ class Reading:
         if self.unused:
             yield (
                 "unread-prims",
-                f"{names(self.unused)} cannot be used as a mesh and is left out; convert it to a polygon mesh if it matters",
+                f"left out, as they are no polygon meshes: {names(self.unused)}; convert them if they matter",
             )
         if self.shaped:
             yield (
                 "read-as-polygons",
-                f"{names(self.shaped)} is read as polygons, as fine as 32 around; a collider of its own with a sphere, box or "
-                "capsule is exact",
+                f"read as polygons, {AROUND} around: {names(self.shaped)}; a collider with a shape of its own is exact",
             )
         if self.smooth:
             yield (
                 "control-mesh",
-                f"{names(self.smooth)} is a subdivision surface, and its control mesh is read, which is larger; subdivide it "
+                f"subdivision surfaces, read as their control meshes, which are larger: {names(self.smooth)}; subdivide them "
                 "before the export",
             )
         if not UsdGeom.StageHasAuthoredMetersPerUnit(self.stage):
@@ -171,7 +170,7 @@ class Reading:
         if self.moving:
             yield (
                 "stands-still",
-                f"{names(self.moving)} is animated and stands still as at the start of the file, time code {self.code:g}",
+                f"animated in the file, and taken as at its start, time code {self.code:g}: {names(self.moving)}",
             )
 
     def _walk(self, prim: Any, place: Floats, moved: bool) -> Iterator[Surface]:
@@ -340,6 +339,8 @@ def pose(stage: Any, first: float, last: float | None = None) -> None:
     roots = [p for p in stage.Traverse(Usd.TraverseInstanceProxies()) if p.IsA(UsdSkel.Root)]
     if not roots:
         return
+    # A layer of another rate would stretch what is written to it.
+    stage.GetSessionLayer().timeCodesPerSecond = stage.GetTimeCodesPerSecond()
     stage.SetEditTarget(stage.GetSessionLayer())
     for prim in list(stage.Traverse()):
         if prim.IsInstance() and any(p.IsA(UsdSkel.Root) for p in Usd.PrimRange(prim, Usd.TraverseInstanceProxies())):
