@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 
 from tumble import Scene
+from tumble.bundled import shipped
 from tumble.export import blender, usd
 from tumble.pictures.things import Stage
 from tumble.run import simulate
@@ -51,7 +52,11 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.fixture(scope="module")
 def held(folder: Path) -> dict[str, Any]:
-    wanted = [("night", [3], []), ("fountain", [0, 3], [0]), ("smoke", [0, 3], [3]), ("real", [0, 4], [])]
+    return opened(folder, [("night", [3], []), ("fountain", [0, 3], [0]), ("smoke", [0, 3], [3]), ("real", [0, 4], [])])
+
+
+def opened(folder: Path, wanted: list[tuple[str, list[int], list[int]]]) -> dict[str, Any]:
+    """What Blender holds of stages below a folder: name, frames that are read, frames that are drawn of each."""
     words = [str(PYTHON), str(ROOT / "python/tests/in_blender.py"), str(folder), json.dumps(wanted)]
     done = subprocess.run(words, capture_output=True, text=True, timeout=300, env={**os.environ, "PYTHONPATH": ""})
     assert done.returncode == 0, done.stdout[-2000:] + done.stderr[-2000:]
@@ -117,6 +122,24 @@ def test_smoke_is_as_thick_as_in_pictures(held: dict[str, Any]) -> None:
     assert seen is not None and np.allclose(smoke["materials"]["smoke"][0]["factors"], [seen[2]])
     whole, middle = smoke["drawn"]["3"]
     assert middle < 0.8 * whole, "it hides what is behind it"
+
+
+@needs_blender
+@pytest.mark.long
+@pytest.mark.parametrize("name", shipped())
+def test_every_shipped_scene_opens_with_velocities(name: str, tmp_path: Path) -> None:
+    from pxr import Usd, UsdGeom
+
+    run = simulate(Scene.load(name, ["time.frames=2"]), tmp_path / "run")
+    write(run, tmp_path / "stage")
+    stage = Usd.Stage.Open(str(tmp_path / "stage" / "scene.usda"))
+    for prim in stage.GetDefaultPrim().GetChildren():
+        points = prim.GetAttribute("points")
+        if points and len(points.GetTimeSamples()) > 1:
+            assert len(points.Get(2)) == len(prim.GetAttribute("velocities").Get(2)), prim
+    held = opened(tmp_path, [("stage", [2], [2])])["stage"]
+    assert held["camera"] == "camera" and held["frames"] == [0, 2]
+    assert all(len(made) == 1 for thing, made in held["materials"].items() if thing not in held["volumes"])
 
 
 def test_the_script_is_python_and_stands_beside_the_stage(folder: Path) -> None:

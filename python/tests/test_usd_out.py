@@ -190,7 +190,7 @@ def test_cameras_have_no_depth_of_field_and_nights_stay_dark(tmp_path: Path) -> 
 
 
 def test_volumes_say_the_extinction_of_pictures(tmp_path: Path) -> None:
-    from tumble.pictures.drawn import Smoke
+    from tumble.pictures.drawn import Image, Smoke
     from tumble.pictures.things import Stage
 
     run = fake_run.plume(16)
@@ -199,6 +199,31 @@ def test_volumes_say_the_extinction_of_pictures(tmp_path: Path) -> None:
     drawn = next(t for t in Stage(run).things(3) if isinstance(t, Smoke))
     density = run.frame(3)["smoke"]["density"]
     assert np.isclose(drawn.extinction.max(), factor * density.max(), rtol=1e-4) and factor > 1
+    # Dye in a plane lets through what it does in pictures, in one cell.
+    ink = fake_run.ink(n=16)
+    seen = Stage(ink).extinction("dye")
+    assert seen is not None and seen[:2] == ("density", 0.0) and seen[3] == 0.0
+    most = max(float(ink.frame(i)["dye"]["density"].max()) for i in range(ink.n_frames))
+    image = next(t for t in Stage(ink).things(2) if isinstance(t, Image))
+    through = 1 - np.exp(-seen[2] * float(ink.frame(2)["dye"]["density"].max()) / 16)
+    assert most > 0.5 and np.isclose(image.cover.max(), through, atol=1e-4)
+
+
+def test_containers_are_guides_and_ways_stand(tmp_path: Path) -> None:
+    tree = {
+        "time": {"frames": 4},
+        "particles": [{"name": "p", "position": [[0, 0, 0]], "velocity": [[1, 0, 0]], "trail": 1.0}],
+        "collider": [
+            {"name": "room", "inside": True, "shape": {"box": {"size": [4, 4, 4]}}},
+            {"name": "ball", "shape": {"sphere": {"center": [0, 0, -1], "radius": 0.2}}},
+        ],
+    }
+    stage = stage_of(tree, tmp_path)
+    purposes = {n: UsdGeom.Imageable(stage.GetPrimAtPath(f"/scene/{n}")).ComputePurpose() for n in ("room", "ball")}
+    assert purposes == {"room": "guide", "ball": "default"}
+    way = UsdGeom.BasisCurves(stage.GetPrimAtPath("/scene/p_trail"))
+    assert len(way.GetPointsAttr().Get(4)) == len(way.GetVelocitiesAttr().Get(4)) == 5
+    assert not np.any(way.GetVelocitiesAttr().Get(4))
 
 
 def test_export_writes_the_script_for_blender(tmp_path: Path, tumble: Callable[..., Answer]) -> None:

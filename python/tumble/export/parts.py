@@ -294,6 +294,8 @@ def values(part: Part, now: Now) -> Iterator[tuple[str, str, Numbers]]:
         points, counts = now.ways[part.thing.name]
         yield "points", "point3f[]", points
         yield "curveVertexCounts", "int[]", counts
+        # What was passed stays where it is.
+        yield "velocities", "vector3f[]", np.zeros_like(points)
         yield "extent", "float3[]", _extent(points, np.float32(part.radius))
         return
     if part.taper is not None and part.thing.strands is not None:

@@ -62,6 +62,9 @@ def fill(stage: Any, run: Recording, parts: list[Part], start: Now) -> None:
         _place(prim, part, start)
         _constant(prim, part, start)
         _bind(stage, prim, part, start, shown.night)
+        if part.thing.form == "container":
+            # It would hide what it contains.
+            UsdGeom.Imageable(prim).CreatePurposeAttr(UsdGeom.Tokens.guide)
 
 
 def _place(prim: Any, part: Part, start: Now) -> None:

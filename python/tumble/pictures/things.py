@@ -301,15 +301,16 @@ class Stage:
 
     def extinction(self, name: str) -> tuple[str, float, float, float] | None:
         """Of what an object on a grid in space shows: the column, the value that is clear, the extinction [1/m] per unit above
-        it, and the highest temperature [K] if it glows, else 0; None where there is nothing to see, or in a plane."""
+        it, and the highest temperature [K] if it glows, else 0; in a plane, of a layer one cell thick. None where there is
+        nothing to see, or no extinction."""
         thing = next(o for o in self.objects if o.name == name)
         grid = thing.grid
-        if grid is None or grid.flat != 3:
-            return None
-        found = self._range(thing, grid)
-        if found is None:
+        found = None if grid is None else self._range(thing, grid)
+        if grid is None or found is None:
             return None
         column, low, high = found
+        if grid.flat < 3:
+            return (column, low, DYE / grid.spacing / high, 0.0) if column in FOG and low == 0.0 else None
         glows = self._glow(thing, grid, self._start) is not None
         most = self._most_of(thing, grid, found) * (BURNING if glows else 1.0)
         return column, low, most / (high - low), self._hottest[name] if glows else 0.0
