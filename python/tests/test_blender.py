@@ -128,7 +128,7 @@ def test_smoke_is_as_thick_as_in_pictures(held: dict[str, Any]) -> None:
 @pytest.mark.long
 @pytest.mark.parametrize("name", shipped())
 def test_every_shipped_scene_opens_with_velocities(name: str, tmp_path: Path) -> None:
-    from pxr import Usd, UsdGeom
+    from pxr import Usd
 
     run = simulate(Scene.load(name, ["time.frames=2"]), tmp_path / "run")
     write(run, tmp_path / "stage")

@@ -403,3 +403,32 @@ def test_the_camera_of_a_run_comes_back(tmp_path: Path, scene_file: Callable[...
     meant = np.array([-1.5, 4.25, -1.5])
     assert np.allclose(along / np.linalg.norm(along), meant / np.linalg.norm(meant), atol=1e-5)
     assert abs(words["view_angle"] - 40) < 1e-3 and words["resolution"] == [640, 400]
+
+
+def test_a_repair_keeps_the_motion(tmp_path: Path, scene_file: Callable[..., Path], tumble: Command) -> None:
+    """A tetrahedron that moves, one of whose faces has points of its own and one of which is there twice, inside out."""
+    body = """
+def Mesh "m" {
+    int[] faceVertexCounts = [3, 3, 3, 3, 3]
+    int[] faceVertexIndices = [0, 2, 1, 0, 1, 3, 0, 3, 2, 4, 5, 6, 6, 5, 4]
+    point3f[] points = [(0, 0, 0), (1, 0, 0), (0, 1, 0), (0, 0, 1), (1, 0, 0), (0, 1, 0), (0, 0, 1)]
+    double3 xformOp:translate.timeSamples = { 1: (0, 0, 0), 25: (0, 0, 2) }
+    uniform token[] xformOpOrder = ["xformOp:translate"]
+}
+"""
+    write(tmp_path, body, SPAN)
+    tree = scene("thing.usda")
+    tree["collider"][0] = {"name": "c", "shape": {"mesh": {"path": "thing.usda"}}}
+    file = scene_file(tree)
+    assert tumble("check", file).code == 2
+    still = tumble("check", file, "--repair")
+    assert "warning[stands-still]" in still.err and "--bake --repair mends it and keeps its motion" in still.err
+    # Broken meshes are baked, too, and mended all alike.
+    answer = tumble("check", file, "--bake", "--repair")
+    assert answer.code == 0 and "nothing to repair" not in answer.out, answer
+    world = World(Scene.load(tmp_path / "scene.baked.json"))
+    corners = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]])
+    for frame in (0, 12, 24):
+        x = world.frame["c"]["position"]
+        assert np.allclose(sorted(x.tolist()), sorted((corners + np.array([0, 0, frame / 12])).tolist()), atol=1e-5)
+        world.step(12)

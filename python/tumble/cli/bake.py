@@ -13,9 +13,10 @@ if TYPE_CHECKING:
 _ENDING = ".baked"
 
 
-def bake(file: Path, scene: "Scene", force: bool) -> Path:
+def bake(file: Path, scene: "Scene", force: bool, mended: bool) -> tuple[Path, set[str]]:
     """Writes the motion of the USD files that are colliders as sequences of meshes beside them, and a scene beside the
-    scene in which they move; returns its path, or that of the scene where nothing moves. Raises SceneError."""
+    scene in which they move; returns its path, or that of the scene where nothing moves,
+    and the new files as they stand in it, `mended` all alike. Raises SceneError."""
     from tumble import SceneError, usd
     from tumble.toml import toml
 
@@ -33,7 +34,7 @@ def bake(file: Path, scene: "Scene", force: bool) -> Path:
         if words["path"] not in written:
             folder = old.with_name(old.stem + _ENDING)
             try:
-                frames = usd.bake(old, folder, span)
+                frames = usd.bake(old, folder, span, mended)
             except ValueError as error:
                 raise SceneError(f"{old}: {error}") from None
             say(f"{old}: {counted(len(frames), 'file')} over {frames[-1][0]:.6g} s written to {folder}")
@@ -46,12 +47,12 @@ def bake(file: Path, scene: "Scene", force: bool) -> Path:
         collider["shape"] = {"animated_mesh": {"frames": written[words["path"]], **kept}}
     if not written:
         say("no collider of the scene is a USD file that moves")
-        return file
+        return file, set()
     text = json.dumps(tree, indent=1, ensure_ascii=False) if file.suffix == ".json" else toml(tree)
     new.write_text(text, encoding="utf-8")
     say(f"{new}: the scene in which they move")
     say()
-    return new
+    return new, {frame["path"] for frames in written.values() for frame in frames}
 
 
 def look_with(camera: str) -> list[str]:

@@ -2,6 +2,7 @@
 
 import math
 import time
+from collections.abc import Container
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -54,7 +55,8 @@ def check(
     scene is checked with them. The original meshes and the scene file are not modified; holes stay open.
 
     --bake writes the motion of colliders from animated USD files (points, transforms, skeletons, blend shapes) as one mesh
-    per frame of the file, NAME.usd as NAME.baked/000000.obj and so on, and SCENE.baked.toml, which uses them and is checked.
+    per frame of the file, NAME.usd as NAME.baked/000000.obj and so on, and SCENE.baked.toml, which uses them and is checked;
+    with --repair, the meshes are mended, all alike.
 
     \b
     Examples:
@@ -71,10 +73,12 @@ def check(
 
     with find.told_as_json(json):
         checked = find.scene(scene, set)
+        done: Container[str] = ()
         if bake:
             from tumble.cli.bake import bake as write_moving
 
-            scene = str(write_moving(scene_file(scene), checked, force))
+            moving, done = write_moving(scene_file(scene), checked, force, repair)
+            scene = str(moving)
             checked = find.scene(scene, set)
         if camera is not None:
             from tumble.cli.bake import look_with
@@ -84,7 +88,7 @@ def check(
         if repair:
             from tumble.cli.repair import mend
 
-            set = [*(set or ()), *mend(scene_file(scene), checked, force)]
+            set = [*(set or ()), *mend(scene_file(scene), checked, force, done)]
             checked = find.scene(scene, set)
         with find.naming(scene_file(scene), scene=checked):
             world = World(checked, threads)

@@ -43,12 +43,15 @@ def doubts(path: Path | str) -> list[tuple[str, str]]:
     return _told[key]
 
 
-def bake(path: Path | str, folder: Path | str, duration: float = float("inf")) -> list[tuple[float, Path]]:
+def bake(
+    path: Path | str, folder: Path | str, duration: float = float("inf"), mended: bool = False
+) -> list[tuple[float, Path]]:
     """Writes the meshes of an animated file into a folder, one for each frame of the file until `duration` [s] is over,
-    and returns time [s] and file of each, as `shape.animated_mesh` takes them. Raises ValueError."""
+    and returns time [s] and file of each, as `shape.animated_mesh` takes them; `mended` as `repair_mesh` does it, all
+    alike. Raises ValueError."""
     from tumble.usd.motion import bake
 
-    return bake(path, Path(folder), duration)
+    return bake(path, Path(folder), duration, mended)
 
 
 def camera(path: Path | str, prim: str | None = None) -> tuple[dict[str, Any], list[tuple[str, str]]]:

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 
-from tumble._engine import load_mesh
+from tumble._engine import load_mesh, repair_mesh
 from tumble.folder import write_whole
 from tumble.usd.stage import Floats, Indices, Reading, Surface, end, names, open_stage, pose, start
 
@@ -17,15 +17,16 @@ _MOST = 100_000
 """Meshes that are written of a file, at most."""
 
 
-def bake(path: Path | str, folder: Path, duration: float) -> list[tuple[float, Path]]:
+def bake(path: Path | str, folder: Path, duration: float, mended: bool = False) -> list[tuple[float, Path]]:
     """Writes the meshes of a file into a folder, one for each of its frames from its start on, until it ends or `duration`
-    [s] is over, and returns time [s] and file of each. Raises ValueError, also where faces come and go."""
+    [s] is over, and returns time [s] and file of each; `mended` as `repair_mesh` would the first. Raises ValueError, also
+    where faces come and go."""
     folder.mkdir(parents=True, exist_ok=True)
     for old in folder.glob("*.obj"):
         if old.stem.isdigit():
             old.unlink()
     frames = []
-    for k, (time, points, triangles) in enumerate(meshes(path, duration)):
+    for k, (time, points, triangles) in enumerate(meshes(path, duration, mended)):
         file = folder / f"{k:0{DIGITS}d}.obj"
         lines = [f"v {x!r} {y!r} {z!r}" for x, y, z in points.tolist()]
         lines += [f"f {a} {b} {c}" for a, b, c in (triangles + 1).tolist()]
@@ -34,7 +35,7 @@ def bake(path: Path | str, folder: Path, duration: float) -> list[tuple[float, P
     return frames
 
 
-def meshes(path: Path | str, duration: float) -> Iterator[tuple[float, Floats, Indices]]:
+def meshes(path: Path | str, duration: float, mended: bool = False) -> Iterator[tuple[float, Floats, Indices]]:
     """Time [s], points [m] and triangles, the same in all, of each frame. Raises ValueError."""
     stage = open_stage(path)
     first, last = start(stage), end(stage)
@@ -50,20 +51,33 @@ def meshes(path: Path | str, duration: float) -> Iterator[tuple[float, Floats, I
         codes.append(last)
     pose(stage, first, last)
     whole = Reading(stage, first)
-    triangles = _triangles(whole)
-    used = np.unique(np.concatenate([s.corners + at for s, at in _each(whole)]))
+    points = np.concatenate([s.points for s in whole.surfaces()] or [np.zeros((0, 3))])
+    used, triangles = _triangles(whole, points, mended)
     for code in codes:
         now = Reading(stage, code)
         _alike(whole, now)
         yield (code - first) / per_second, np.concatenate([s.points for s in now.surfaces()])[used], triangles
 
 
-def _triangles(reading: Reading) -> Indices:
-    """The triangles that the engine makes of the polygons, of the points that they use."""
+def _triangles(reading: Reading, points: Floats, mended: bool) -> tuple[Indices, Indices]:
+    """The points that are used, and the triangles between those that the engine makes of the polygons."""
     with tempfile.TemporaryDirectory() as folder:
         file = Path(folder) / "first.obj"
         file.write_text(reading.obj(), encoding="ascii")
-        return load_mesh(file)[1].astype(np.int64)
+        if mended and (text := repair_mesh(file)[0]) is not None:
+            file.write_text(text, encoding="ascii")
+        vertices, triangles = load_mesh(file)
+    # Vertices that were sewn are at one place, and so are those that were split.
+    where = {tuple(x): k for k, x in reversed(list(enumerate(points.tolist())))}
+    nearest = (where.get(tuple(x)) for x in vertices.tolist())
+    found = [
+        int(np.argmin(((points - x) ** 2).sum(axis=1))) if k is None else k
+        for x, k in zip(vertices, nearest, strict=True)
+    ]
+    if not mended:
+        # The engine drops what no polygon uses, and keeps the order; points at one place may part later.
+        found = np.unique(np.concatenate([s.corners + at for s, at in _each(reading)])).tolist()
+    return np.array(found, dtype=np.int64), triangles.astype(np.int64)
 
 
 def _each(reading: Reading) -> Iterator[tuple[Surface, int]]:
