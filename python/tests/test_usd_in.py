@@ -183,9 +183,20 @@ def test_instances_of_points_are_placed(tmp_path: Path) -> None:
     # A quarter turn about z: x becomes y.
     assert np.allclose(v[5], [12, 3, 0], atol=2e-3)
     assert codes(file) == {}
+    over = write(tmp_path, INSTANCER.replace('def Scope "kinds"', 'over "kinds"'), name="over.usda")
+    assert np.array_equal(load_mesh(over)[0], v)
     damaged = write(tmp_path, INSTANCER.replace("[0, 1, 0, 1]", "[0, 1, 0, 7]"), name="d.usda")
     with pytest.raises(SceneError, match=r"/rocks.*prototypes that are not there"):
         load_mesh(damaged)
+
+
+def test_instances_without_end_are_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    itself = write(tmp_path, INSTANCER.replace("[</rocks/kinds/small>, ", "[</rocks>, "), name="itself.usda")
+    with pytest.raises(SceneError, match=r"/rocks: is an instance of itself"):
+        load_mesh(itself)
+    monkeypatch.setattr("tumble.usd.stage._MOST", 11)
+    with pytest.raises(SceneError, match=r"more than 11 points, instances included"):
+        load_mesh(write(tmp_path, INSTANCER))
 
 
 def test_native_instances_are_read(tmp_path: Path) -> None:

@@ -16,6 +16,9 @@ Indices = npt.NDArray[np.int64]
 _NAMED = 6
 """Prims that are named in a message; of more the number is told."""
 
+_MOST = 20_000_000
+"""Points that are read of a file, at most: a few words can place instances of instances without end."""
+
 _SHOWN = ("default", "render")
 """Purposes of what is read."""
 
@@ -102,6 +105,8 @@ class Reading:
         self.hidden: list[str] = []
         self.moving: list[str] = []
         self.found: list[Surface] | None = None
+        self._points = 0
+        self._within: list[str] = []
 
     def surfaces(self) -> list[Surface]:
         """All that has polygons, in the order of the file. Raises ValueError."""
@@ -197,7 +202,9 @@ class Reading:
         surface = self._surface(prim, place, moved)
         if surface is not None:
             yield surface
-        for child in prim.GetFilteredChildren(Usd.TraverseInstanceProxies(Usd.PrimDefaultPredicate)):
+        # Prototypes may stand below what is no more than an "over".
+        there = Usd.PrimIsActive & Usd.PrimIsLoaded & ~Usd.PrimIsAbstract if self._within else Usd.PrimDefaultPredicate
+        for child in prim.GetFilteredChildren(Usd.TraverseInstanceProxies(there)):
             yield from self._walk(child, place, moved)
 
     def _instances(self, instancer: Any, place: Floats, moved: bool) -> Iterator[Surface]:
@@ -219,10 +226,14 @@ class Reading:
         mask = instancer.ComputeMaskAtTime(self.time) or [True] * len(kinds)
         if len(matrices) != len(kinds) or len(mask) != len(kinds):
             raise ValueError(f"{path}: its positions do not fit its indices; the file is damaged, export it again")
+        if path in self._within:
+            raise ValueError(f"{path}: is an instance of itself; the file is damaged, export it again")
         moved = moved or any(a.ValueMightBeTimeVarying() for a in instancer.GetPrim().GetAttributes())
+        self._within.append(path)
         for kind, matrix, there in zip(kinds, matrices, mask, strict=True):
             if there:
                 yield from self._walk(prims[kind], np.array(matrix) @ place, moved)
+        self._within.pop()
 
     def _surface(self, prim: Any, place: Floats, moved: bool) -> Surface | None:
         """The polygons of a prim itself, placed; None if it has none."""
@@ -253,6 +264,9 @@ class Reading:
             return None
         if moved or any(a.ValueMightBeTimeVarying() for a in attributes) or is_posed(prim):
             _note(self.moving, path)
+        self._points += len(points)
+        if self._points > _MOST:
+            raise ValueError(f"it has more than {_MOST} points, instances included; export fewer, or simplify the mesh")
         points = points @ place[:3, :3] + place[3, :3]
         kept = counts >= 3
         if mesh_holes := _holes(prim, self.time):
