@@ -59,7 +59,7 @@ def data(thing):
     if thing.type == "VOLUME":
         thing.data.grids.load()
         return {"file": Path(thing.data.grids.frame_filepath).name, "grids": [g.name for g in thing.data.grids]}
-    found = {"hidden": thing.hide_render}
+    found = {"hidden": thing.hide_render, "place": list(thing.matrix_world.translation)}
     for attribute in thing.data.attributes:
         if attribute.name in ("position", "velocity"):
             found[attribute.name] = [list(item.vector) for item in attribute.data]

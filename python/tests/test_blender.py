@@ -88,6 +88,7 @@ def test_points_velocities_and_ids_are_those_of_the_frame(held: dict[str, Any], 
     assert sprayed["id"] == now["id"].tolist() and np.allclose(sprayed["position"], now["position"], atol=1e-6)
     sheet = held["real"]["at"]["4"]["sheet"]
     assert sheet["sides"] == [4] and sheet["textures"] == ["st"]
+    assert np.allclose(held["real"]["at"]["4"]["bat"]["place"], [0, 0, 4 / 29.97], atol=1e-5)
     from tumble import Run
 
     assert np.allclose(sheet["position"], Run(folder / "run").frame(4)["sheet"]["position"], atol=1e-5)

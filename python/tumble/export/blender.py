@@ -15,7 +15,7 @@ from tumble.export.prims import GLOW, roughness
 from tumble.export.usd import fps, surroundings
 from tumble.folder import write_whole
 from tumble.pictures.framing import camera
-from tumble.pictures.things import EXPOSURE, Recording, Stage, objects
+from tumble.pictures.things import EXPOSURE, Recording, Stage, by_night, objects
 
 _DEVELOPED = 0.2
 """Light of a flame in Blender over that in pictures, whose film gathers more before it turns white."""
@@ -35,8 +35,8 @@ def write(run: Recording, folder: str | PathLike[str]) -> Path:
 
 
 def _scene(run: Recording) -> dict[str, Any]:
-    view, stage = camera(run), Stage(run)
-    strength, color = surroundings(stage.night)
+    view = camera(run)
+    strength, color = surroundings(by_night(run))
     return {
         "fps": fps(run),
         "frames": (0, run.n_frames - 1),
@@ -52,7 +52,7 @@ def _parts(run: Recording) -> list[Part]:
 def _looks(run: Recording) -> dict[str, dict[str, Any]]:
     """Prim -> colour in linear light, roughness, light that it sends out over its colour, whether its points have colours of
     their own, and from which frames on there are any points or none."""
-    night, start, made = Stage(run).night, run.frame(0), _parts(run)
+    night, start, made = by_night(run), run.frame(0), _parts(run)
     born = [part.thing.name for part in made if varying(part, start)]
     there = {name: list[tuple[int, bool]]() for name in born}
     for i in range(run.n_frames if born else 0):
@@ -77,12 +77,11 @@ def _looks(run: Recording) -> dict[str, dict[str, Any]]:
 def _volumes(run: Recording) -> dict[str, dict[str, Any]]:
     """Prim -> colour, the grid that is seen, the value that is clear, the extinction [1/m] per unit above it, the highest
     temperature [K] if it glows, and the grid of velocities."""
-    stage = Stage(run)
+    volumes = [part for part in _parts(run) if part.kind == "Volume"]
+    stage = Stage(run) if volumes else None
     found: dict[str, dict[str, Any]] = {}
-    for part in _parts(run):
-        if part.kind != "Volume":
-            continue
-        seen = stage.extinction(part.thing.name)
+    for part in volumes:
+        seen = stage and stage.extinction(part.thing.name)
         column, low, factor, hottest = seen or ("density", 0.0, 0.0, 0.0)
         table = run.frame(0).get(part.thing.name, {})
         found[part.name] = {

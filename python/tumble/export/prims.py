@@ -20,7 +20,7 @@ from tumble.export.parts import (
     values,
     varying,
 )
-from tumble.pictures.things import Recording, Stage
+from tumble.pictures.things import Recording, Stage, by_night
 
 GLOW = 1.2
 """Light of a particle by night, over its colour."""
@@ -43,13 +43,14 @@ def fill(stage: Any, run: Recording, parts: list[Part], start: Now) -> None:
 
     UsdGeom.Scope.Define(stage, f"{ROOT}/looks")
     files = vdb.paths(run)
-    shown = Stage(run)
+    shown = Stage(run) if any(part.kind == "Volume" for part in parts) else None
     for part in parts:
         prim = stage.DefinePrim(part.path, part.kind)
         prim.SetDisplayName(part.title)
         if part.kind == "Volume":
             _volume(stage, part, files[part.thing.name], run, start.columns.get(part.thing.name, {}))
-            if (seen := shown.extinction(part.thing.name)) is not None and seen[0] in FOG:
+            seen = shown and shown.extinction(part.thing.name)
+            if seen and seen[0] in FOG:
                 extinction = prim.CreateAttribute("extinction", Sdf.ValueTypeNames.Float)
                 extinction.Set(seen[2])
                 extinction.SetDocumentation(f"Of the field {seen[0]} in pictures [1/m per unit of the field].")
@@ -61,7 +62,7 @@ def fill(stage: Any, run: Recording, parts: list[Part], start: Now) -> None:
                 UsdGeom.Primvar(attribute).SetInterpolation(UsdGeom.Tokens.vertex)
         _place(prim, part, start)
         _constant(prim, part, start)
-        _bind(stage, prim, part, start, shown.night)
+        _bind(stage, prim, part, start, by_night(run))
         if part.thing.form == "container":
             # It would hide what it contains.
             UsdGeom.Imageable(prim).CreatePurposeAttr(UsdGeom.Tokens.guide)

@@ -40,7 +40,7 @@ from tumble.folder import writing
 from tumble.pictures.framing import camera
 from tumble.pictures.look import NIGHT, key_light
 from tumble.pictures.splats import DIM
-from tumble.pictures.things import Columns, Recording, objects
+from tumble.pictures.things import Columns, Recording, by_night, objects
 
 SENSOR = 0.36
 """Width of the camera's sensor [tenth of a metre], the unit that USD takes for lenses."""
@@ -201,7 +201,7 @@ def _scene(run: Recording, hashes: str) -> Any:
     lens.CreateVerticalApertureAttr(sensor * view.height / view.width)
     lens.CreateClippingRangeAttr(Gf.Vec2f(1e-3 * view.distance, 1e3 * view.distance))
 
-    night = run.scene.get("camera", {}).get("look") == "night"
+    night = by_night(run)
     key = UsdLux.DistantLight.Define(stage, f"{ROOT}/key_light")
     key.CreateIntensityAttr(DIM if night else 1.0)
     key.CreateNormalizeAttr(True)

@@ -218,6 +218,11 @@ def colors(columns: Columns, thing: Object) -> Floats:
     return np.tile(np.array(thing.color), (len(table.get("position", ())), 1))
 
 
+def by_night(run: Recording) -> bool:
+    """Whether its scene asks for pictures by night."""
+    return bool(run.scene.get("camera", {}).get("look") == "night")
+
+
 class Stage:
     """All that can be seen of a run."""
 
@@ -233,7 +238,7 @@ class Stage:
         self._cuts = {name: split(starts[name], o.triangles) for name, o in bodies.items()}
         self._closed = {name for name, o in bodies.items() if outward(starts[name], o.triangles)}
         self._anchors = run.looks.anchors
-        self.night = run.scene.get("camera", {}).get("look") == "night"
+        self.night = by_night(run)
         self._ways: dict[tuple[str, int], Floats] = {}
         self._pieces: dict[tuple[str, int], tuple[Floats, Floats]] = {}
         self._ranges: dict[str, tuple[str, float, float] | None] = {}
