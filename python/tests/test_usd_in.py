@@ -199,6 +199,33 @@ def test_instances_without_end_are_refused(tmp_path: Path, monkeypatch: pytest.M
         load_mesh(write(tmp_path, INSTANCER))
 
 
+@pytest.mark.parametrize(
+    ("body", "told"),
+    [
+        (TETRAHEDRON.replace("[3, 3, 3, 3]", "None"), r"/m: its faces do not fit"),
+        (TETRAHEDRON.replace("point3f[] points = [(0, 0, 0)", "point3f[] points = [(nan, 0, 0)"), r"not finite|numbers"),
+        (TETRAHEDRON.replace("[3, 3, 3, 3]", "[]"), r"no mesh in it.*/m \(Mesh without faces\)|do not fit"),
+        (TETRAHEDRON.replace("int[] faceVertexC", "string[] faceVertexC").replace("[3, 3, 3, 3]", '["x"]'), r"/m: has a value of the wrong type"),
+        (TETRAHEDRON.replace("[0, 2, 1,", "[0, 2, -1,"), r"/m: its faces do not fit"),
+        (TETRAHEDRON + 'float xformOp:transform = 3\nuniform token[] xformOpOrder = ["xformOp:transform"]', "OpenUSD cannot"),
+    ],
+)  # fmt: skip
+def test_values_that_do_not_belong_there_are_told(tmp_path: Path, body: str, told: str) -> None:
+    with pytest.raises(SceneError, match=told):
+        load_mesh(write(tmp_path, f'def Mesh "m" {{ {body} }}'))
+
+
+def test_an_axis_and_a_rate_that_there_are_not(tmp_path: Path) -> None:
+    with pytest.raises(SceneError, match=r"/c: has a value of the wrong type"):
+        load_mesh(write(tmp_path, 'def Cone "c" { uniform token axis = "W" }'))
+    with pytest.raises(ValueError, match="no numbers"):
+        usd.bake(write(tmp_path, ARM, SPAN.replace("= 24\n", "= 0\n")), tmp_path / "a")
+    with pytest.raises(ValueError, match="more than 100000 frames"):
+        usd.bake(write(tmp_path, ARM, SPAN.replace("= 25", "= 1e9"), "long.usda"), tmp_path / "a")
+    # A stage that ends before it starts has one frame.
+    assert len(usd.bake(write(tmp_path, ARM, SPAN.replace("= 25", "= -9"), "b.usda"), tmp_path / "a")) == 1
+
+
 def test_native_instances_are_read(tmp_path: Path) -> None:
     body = f"""
 class "kind" {{ def Mesh "m" {{ {TETRAHEDRON} }} }}

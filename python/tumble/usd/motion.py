@@ -1,5 +1,6 @@
 """The motion of a USD file as a sequence of meshes, which `shape.animated_mesh` takes."""
 
+import math
 import tempfile
 from collections.abc import Iterator
 from pathlib import Path
@@ -42,10 +43,14 @@ def meshes(path: Path | str, duration: float, mended: bool = False) -> Iterator[
     per_second = float(stage.GetTimeCodesPerSecond())
     said = stage.HasAuthoredMetadata("framesPerSecond") and stage.GetFramesPerSecond() > 0
     step = per_second / float(stage.GetFramesPerSecond()) if said else 1.0
-    last = min(last, first + duration * per_second)
+    last = max(first, min(last, first + duration * per_second))
+    if not (per_second > 0.0 and math.isfinite(per_second) and math.isfinite(step) and math.isfinite(last - first)):
+        raise ValueError(
+            "its time codes a second or its range of time are no numbers; the file is damaged, export it again"
+        )
+    if (last - first) / step > _MOST:
+        raise ValueError(f"its motion has more than {_MOST} frames; shorten it, or simulate less")
     n = int((last - first) / step + 1e-6) + 1
-    if n > _MOST:
-        raise ValueError(f"its motion has {n} frames, {_MOST} are taken at most; shorten it, or simulate less")
     codes = [first + k * step for k in range(n)]
     if last - codes[-1] > 1e-3 * step:
         codes.append(last)

@@ -111,8 +111,14 @@ class Reading:
     def surfaces(self) -> list[Surface]:
         """All that has polygons, in the order of the file. Raises ValueError."""
         if self.found is None:
-            pose(self.stage, self.code)
-            self.found = list(self._walk(self.stage.GetPseudoRoot(), upright(self.stage), False))
+            try:
+                pose(self.stage, self.code)
+                self.found = list(self._walk(self.stage.GetPseudoRoot(), upright(self.stage), False))
+            except RuntimeError as error:  # of the library
+                reasons = str(error).strip().splitlines()[-1].partition(" : ")[2].strip("'")
+                raise ValueError(
+                    f"OpenUSD cannot read it: {reasons or error}; it is damaged, export it again"
+                ) from None
         return self.found
 
     def obj(self) -> str:
@@ -199,7 +205,12 @@ class Reading:
         if prim.IsA(UsdGeom.PointInstancer):
             yield from self._instances(UsdGeom.PointInstancer(prim), place, moved)
             return
-        surface = self._surface(prim, place, moved)
+        try:
+            surface = self._surface(prim, place, moved)
+        except (TypeError, KeyError):
+            raise ValueError(
+                f"{prim.GetPath()}: has a value of the wrong type; the file is damaged, export it again"
+            ) from None
         if surface is not None:
             yield surface
         # Prototypes may stand below what is no more than an "over".
@@ -210,9 +221,11 @@ class Reading:
     def _instances(self, instancer: Any, place: Floats, moved: bool) -> Iterator[Surface]:
         """What a PointInstancer places."""
         path = str(instancer.GetPath())
-        kinds = instancer.GetProtoIndicesAttr().Get(self.time)
+        kinds = np.array(instancer.GetProtoIndicesAttr().Get(self.time) or [])
         prims = [self.stage.GetPrimAtPath(p) for p in instancer.GetPrototypesRel().GetForwardedTargets()]
-        if not kinds or not prims:
+        if kinds.dtype.kind not in "iu":
+            kinds = np.zeros(0, dtype=int)
+        if not len(kinds) or not prims:
             self.unused.append(f"{path} (PointInstancer without instances)")
             return
         if max(kinds) >= len(prims) or min(kinds) < 0 or not all(prims):
@@ -232,7 +245,7 @@ class Reading:
         self._within.append(path)
         for kind, matrix, there in zip(kinds, matrices, mask, strict=True):
             if there:
-                yield from self._walk(prims[kind], np.array(matrix) @ place, moved)
+                yield from self._walk(prims[int(kind)], np.array(matrix) @ place, moved)
         self._within.pop()
 
     def _surface(self, prim: Any, place: Floats, moved: bool) -> Surface | None:
@@ -289,9 +302,12 @@ def names(paths: list[str]) -> str:
 
 def _polygons(mesh: Any, time: Any) -> tuple[Floats, Indices, Indices]:
     """Points, and the polygons of a mesh. Raises ValueError if they do not fit."""
-    points = np.array(mesh.GetPointsAttr().Get(time) or [], dtype=float).reshape(-1, 3)
-    counts = np.array(mesh.GetFaceVertexCountsAttr().Get(time) or [], dtype=np.int64)
-    corners = np.array(mesh.GetFaceVertexIndicesAttr().Get(time) or [], dtype=np.int64)
+    try:
+        points = np.array(mesh.GetPointsAttr().Get(time) or [], dtype=float).reshape(-1, 3)
+        counts = np.array(mesh.GetFaceVertexCountsAttr().Get(time) or [], dtype=np.int64).ravel()
+        corners = np.array(mesh.GetFaceVertexIndicesAttr().Get(time) or [], dtype=np.int64).ravel()
+    except ValueError as error:
+        raise TypeError from error
     if counts.sum() != len(corners) or (counts < 0).any() or ((corners < 0) | (corners >= len(points))).any():
         raise ValueError(f"{mesh.GetPath()}: its faces do not fit its points; the file is damaged, export it again")
     return points, counts, corners
