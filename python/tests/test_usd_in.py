@@ -18,6 +18,7 @@ pytestmark = pytest.mark.filterwarnings("ignore::tumble.usd.UsdWarning")
 Command = Callable[..., Answer]
 
 HEAD = '#usda 1.0\n(\n    metersPerUnit = 1\n    upAxis = "Z"\n{more})\n'
+COUNTS = "int[] faceVertexCounts = [3, 3, 3, 3]"
 TETRAHEDRON = """
         int[] faceVertexCounts = [3, 3, 3, 3]
         int[] faceVertexIndices = [0, 2, 1, 0, 1, 3, 0, 3, 2, 1, 2, 3]
@@ -205,7 +206,7 @@ def test_instances_without_end_are_refused(tmp_path: Path, monkeypatch: pytest.M
         (TETRAHEDRON.replace("[3, 3, 3, 3]", "None"), r"/m: its faces do not fit"),
         (TETRAHEDRON.replace("point3f[] points = [(0, 0, 0)", "point3f[] points = [(nan, 0, 0)"), r"not finite|numbers"),
         (TETRAHEDRON.replace("[3, 3, 3, 3]", "[]"), r"no mesh in it.*/m \(Mesh without faces\)|do not fit"),
-        (TETRAHEDRON.replace("int[] faceVertexC", "string[] faceVertexC").replace("[3, 3, 3, 3]", '["x"]'), r"/m: has a value of the wrong type"),
+        (TETRAHEDRON.replace(COUNTS, 'string[] faceVertexCounts = ["x"]'), r"/m: has a value of the wrong type"),
         (TETRAHEDRON.replace("[0, 2, 1,", "[0, 2, -1,"), r"/m: its faces do not fit"),
         (TETRAHEDRON + 'float xformOp:transform = 3\nuniform token[] xformOpOrder = ["xformOp:transform"]', "OpenUSD cannot"),
     ],
