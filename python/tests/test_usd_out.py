@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from conftest import Answer
 
-from tumble import Scene
+from tumble import Run, Scene
 from tumble.export import usd
 from tumble.export.parts import on_surface, squares
 from tumble.run import simulate
@@ -53,6 +53,10 @@ def test_sheets_are_quadrangles_with_texture_in_metres(tmp_path: Path, more: Tre
     assert np.allclose(e[:, 0] * f[:, 1] - e[:, 1] * f[:, 0], 0.01)
     assert st.min() == 0 and np.allclose(st.max(axis=0), [0.6, 0.3])
     assert len({(int(c), *np.round(t, 6)) for c, t in zip(corners, st.tolist(), strict=True)}) == 28
+    # Fans around the first corners are the triangles that were simulated.
+    fans = corners.reshape(-1, 4)[:, [[0, 1, 2], [0, 2, 3]]].reshape(-1, 3)
+    simulated = Run(tmp_path / "run").static["s"]["triangles"].reshape(-1, 3)
+    assert {frozenset(t) for t in fans.tolist()} == {frozenset(t) for t in simulated.tolist()}
     rest, interpolation = primvar(stage, "/scene/s", "rest", 2)
     assert interpolation == "vertex" and np.array_equal(rest, np.array(mesh.GetPointsAttr().Get(0)))
     assert not np.array_equal(rest, np.array(mesh.GetPointsAttr().Get(2)))
@@ -75,7 +79,7 @@ def test_triangles_that_are_no_pairs_stay_triangles() -> None:
     assert squares(np.array([[0, 1, 2], [0, 2, 1]])) is not None  # two sides of one
     assert squares(np.array([[0, 1, 2]])) is None
     found = squares(np.array([[0, 1, 2], [2, 1, 3]]))
-    assert found is not None and np.array([0, 1, 2, 2, 1, 3])[found[0]].tolist() == [0, 1, 3, 2]
+    assert found is not None and np.array([0, 1, 2, 2, 1, 3])[found[0]].tolist() == [1, 3, 2, 0]
 
 
 def test_ids_are_whole_numbers_that_all_programs_read(tmp_path: Path) -> None:

@@ -198,7 +198,8 @@ def velocities(part: Part, now: Now) -> npt.NDArray[np.float64] | None:
 
 
 def squares(triangles: npt.NDArray[np.int64]) -> npt.NDArray[np.int64] | None:
-    """Pairs of triangles, one after another, as quadrangles: places of their corners among all; None unless all are pairs."""
+    """Pairs of triangles, one after another, as quadrangles whose fans they are: places of their corners among all; None
+    unless all are pairs."""
     if len(triangles) % 2:
         return None
     one, other = triangles[0::2], triangles[1::2]
@@ -208,7 +209,7 @@ def squares(triangles: npt.NDArray[np.int64]) -> npt.NDArray[np.int64] | None:
         for j in range(3):
             # The edge from i on, and backwards the one from j on.
             same = (one[:, i] == other[:, (j + 1) % 3]) & (one[:, (i + 1) % 3] == other[:, j])
-            turn = [(i + 2) % 3, i, 3 + (j + 2) % 3, (i + 1) % 3]
+            turn = [i, 3 + (j + 2) % 3, (i + 1) % 3, (i + 2) % 3]
             found[same] = (first[:, None] + turn)[same]
     return None if (found < 0).any() else found
 
