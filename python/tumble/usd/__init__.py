@@ -28,8 +28,9 @@ def as_obj(path: Path | str) -> str:
     reading = Reading(open_stage(path))
     text = reading.obj()
     told = _told[_key(path)] = reading.doubts()
-    for _, message in told:
-        warnings.warn(f"{path}: {message}", UsdWarning, stacklevel=2)
+    for code, message in told:
+        cure = "; tumble.usd.bake writes their motion" if code == "stands-still" else ""
+        warnings.warn(f"{path}: {message}{cure}", UsdWarning, stacklevel=2)
     return text
 
 
