@@ -240,6 +240,11 @@ def Xform "b" (instanceable = true
 """
     v, _ = load_mesh(write(tmp_path, body))
     assert len(v) == 8 and v[4:, 2].min() == 5
+    # What is animated within them moves, over the time of its samples.
+    moves = 'def Mesh "m" {\ndouble3 xformOp:translate.timeSamples = { 12: (0, 0, 0), 36: (1, 0, 0) }\n'
+    moves += 'uniform token[] xformOpOrder = ["xformOp:translate"]'
+    frames = usd.bake(write(tmp_path, body.replace('def Mesh "m" {', moves), name="moves.usda"), tmp_path / "moves")
+    assert len(frames) == 25 and np.allclose(load_mesh(frames[-1][1])[0] - v, [1, 0, 0])
 
 
 ARM = """

@@ -83,7 +83,9 @@ def end(stage: Any) -> float:
 
 
 def _spans(stage: Any) -> Iterator[tuple[float, float]]:
-    for prim in stage.Traverse():
+    from pxr import Usd
+
+    for prim in stage.Traverse(Usd.TraverseInstanceProxies()):
         for attribute in prim.GetAttributes():
             if attribute.ValueMightBeTimeVarying() and (times := attribute.GetTimeSamples()):
                 yield times[0], times[-1]
