@@ -12,7 +12,7 @@ VERSION := $(shell sed -n 's/^version = "\(.*\)"/\1/p' Cargo.toml | head -n 1)
 WEB := $(shell find web -path web/node_modules -prune -o -path web/dist -prune -o -path $(PKG) -prune -o -type f -print) \
 	$(shell find python/tumble/scenes docs/theory -type f)
 
-.PHONY: help setup demo test prepare rust-tests behind lint lint-rust test-rust test-python test-web web wasm wasm-target wheel debian chromium openvdb validate validate-rust validate-python validate-matrix validate-native audit bench clean
+.PHONY: help setup demo test prepare rust-tests behind lint lint-rust test-rust test-python test-web web wasm wasm-target wheel debian chromium openvdb blender validate validate-rust validate-python validate-matrix validate-native audit bench clean
 
 help:
 	@echo "make demo      set up, let a dress dance, show where the film is"
@@ -97,6 +97,11 @@ openvdb:
 		|| { command -v apt-get >/dev/null && apt-get update -qq && apt-get install -qq -y --no-install-recommends python3-openvdb; } \
 		|| echo "no python3-openvdb here: tests of VDB files need it where there is apt, and are skipped elsewhere"
 
+# What stages are opened in: Blender as a module, which needs a Python of its own and one version of it.
+blender:
+	@test -x .venv-blender/bin/python || { $(PYTHON) -m venv .venv-blender && .venv-blender/bin/python -m pip install --quiet bpy; } \
+		|| { rm -rf .venv-blender; echo "no bpy for this Python: tests of stages in Blender are skipped"; }
+
 # A worker per core: most tests keep one busy.
 PYTEST := $(BIN)/python -m pytest -n auto --dist worksteal --durations 10
 
@@ -164,7 +169,7 @@ COUNTS := $(CURDIR)/target/counts.jsonl
 validate: export TUMBLE_FUZZ = 30
 validate: export TUMBLE_WHOLE = 1
 validate: export TUMBLE_COUNTS = $(COUNTS)
-validate: setup openvdb wasm
+validate: setup openvdb blender wasm
 	@mkdir -p $(dir $(COUNTS)) && rm -f $(COUNTS)
 	@failed=; \
 	for part in validate-rust validate-python test-web validate-matrix validate-native; do \
@@ -194,4 +199,4 @@ bench: setup web chromium
 	$(PYTHON) benchmarks/bench.py
 
 clean:
-	rm -rf target out dist $(VENV) .venv-audit .venv-bench web/dist web/node_modules $(PKG) python/tumble/web
+	rm -rf target out dist $(VENV) .venv-audit .venv-bench .venv-blender web/dist web/node_modules $(PKG) python/tumble/web

@@ -323,3 +323,45 @@ def test_a_balloon_is_blown_up_over_time(tmp_path: Path) -> None:
 def test_a_word_that_cannot_be_animated_says_so(path: str, tree: Tree) -> None:
     with pytest.raises(tumble.SceneError, match=rf"{path}: .*; it does not change in time"):
         World(Scene({"version": 1, "particles": [{"name": "p", "position": [[0, 0, 0]]}], **tree}))
+
+
+CORNERS = [(x, y, z) for z in (0, 1) for y in (0, 1) for x in (0, 1)]
+FACES = "0, 2, 3, 1, 4, 5, 7, 6, 0, 1, 5, 4, 2, 6, 7, 3, 0, 4, 6, 2, 1, 3, 7, 5"
+
+
+def box_prim(name: str, edges: tuple[float, float, float], words: str = "") -> str:
+    points = ", ".join(f"({x * edges[0]!r}, {y * edges[1]!r}, {z * edges[2]!r})" for x, y, z in CORNERS)
+    lines = ["int[] faceVertexCounts = [4, 4, 4, 4, 4, 4]", f"int[] faceVertexIndices = [{FACES}]"]
+    return f'def Mesh "{name}" {{\n{words}\n' + "\n".join([*lines, f"point3f[] points = [{points}]"]) + "\n}\n"
+
+
+@pytest.mark.parametrize(
+    ("unit", "up", "edges"),
+    [
+        (0.01, "Y", (40.0, 210.0, 25.0)),
+        (0.0254, "Z", (0.4 / 0.0254, 0.25 / 0.0254, 2.1 / 0.0254)),
+        (0.3048, "Y", (0.4 / 0.3048, 2.1 / 0.3048, 0.25 / 0.3048)),
+        (1.0, "Z", (0.4, 0.25, 2.1)),
+    ],
+)
+@pytest.mark.filterwarnings("ignore::tumble.usd.UsdWarning")
+def test_pillars_of_usd_files_stand_in_metres(
+    tmp_path: Path, unit: float, up: str, edges: tuple[float, float, float]
+) -> None:
+    """Of 0.4 x 0.25 x 2.1 m, beside a box that is not to be seen; what falls on it lies on it."""
+    pytest.importorskip("pxr")
+    head = f'#usda 1.0\n(\nmetersPerUnit = {unit}\nupAxis = "{up}"\n)\n'
+    hidden = box_prim("old", (9e3, 9e3, 9e3), 'token visibility = "invisible"')
+    (tmp_path / "pillar.usda").write_text(f'{head}def Xform "root" {{\n{box_prim("pillar", edges)}{hidden}}}\n')
+    vertices, _ = tumble.load_mesh(tmp_path / "pillar.usda")
+    assert len(vertices) == 8 and np.allclose(np.ptp(vertices, axis=0), [0.4, 0.25, 2.1], atol=1e-6)
+    assert vertices[:, 2].min() > -1e-9
+    x, y, _ = vertices.mean(axis=0).tolist()
+    tree = {
+        "version": 1,
+        "particles": [{"name": "drop", "position": [[x, y, 2.2]]}],
+        "collider": [{"name": "pillar", "shape": {"mesh": {"path": "pillar.usda"}}}],
+    }
+    world = World(Scene(tree, tmp_path))
+    world.step(24)
+    assert abs(world.frame["drop"]["position"][0, 2] - 2.1) < 1e-3

@@ -173,6 +173,7 @@ def test_texture_of_nets_arrives_in_usd(scene_file: SceneFile, tumble: Command, 
 USDA = """#usda 1.0
 (
     upAxis = "Z"
+    metersPerUnit = 1
 )
 
 def Xform "body"

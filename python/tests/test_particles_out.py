@@ -17,7 +17,7 @@ from tumble.pictures.things import objects
 from tumble.recorder import describe
 from tumble.style import display
 
-KINDS = {"float": "f", "uint": "I", "uchar": "B"}
+KINDS = {"float": "f", "int": "i", "uchar": "B"}
 
 
 def nothing(done: int, total: int) -> None:

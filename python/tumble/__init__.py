@@ -50,7 +50,7 @@ __all__ = [
 
 _MODULES = (
     "branch", "columns", "compare", "emitters", "expect", "export", "fields", "film", "looks", "measures", "pictures", "plots",
-    "reader", "refine", "run", "slices",
+    "reader", "refine", "run", "slices", "usd",
 )  # fmt: skip
 """Modules for users."""
 

@@ -305,7 +305,8 @@ def looks(tree: Mapping[str, Any]) -> dict[str, Any]:
     its files is read. Raises SceneError."""
 
 def load_mesh(path: Path) -> tuple[npt.NDArray[np.float64], npt.NDArray[np.uint32]]:
-    """Vertices [file units] n x 3 and triangles m x 3 of an OBJ, PLY, STL, GLB or USD file. Raises SceneError."""
+    """Vertices [file units; of a USD file m, z up] n x 3 and triangles m x 3 of an OBJ, PLY, STL, GLB or USD file. Raises
+    SceneError."""
 
 def repair_mesh(path: Path) -> tuple[str | None, dict[str, int]]:
     """The mesh of a file mended, as the text of an OBJ file, or None if nothing had to be done; counts of vertices welded,

@@ -1,8 +1,10 @@
-"""Warnings about the ledger of a run; docs/warnings.md lists the codes."""
+"""Warnings about the files of a scene and about the ledger of a run; docs/warnings.md lists the codes."""
 
 import math
 from collections.abc import Iterator, Mapping
+from contextlib import suppress
 from dataclasses import dataclass
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -10,6 +12,7 @@ import numpy as np
 from tumble import energy, expect
 
 if TYPE_CHECKING:
+    from tumble._engine import Scene, World
     from tumble.reader import Run
 
 _COURANT = 2.0
@@ -17,6 +20,31 @@ _COURANT = 2.0
 
 _GAINS = ("forward_euler", "modified_euler", "midpoint", "heun")
 """Integrators that gain energy of oscillations at any step."""
+
+
+def of_scene(world: "World") -> list[dict[str, str]]:
+    """Code, path and message of each warning of a world, and of each doubt about the files of its scene."""
+    return [*world.warnings, *of_files(world.scene)]
+
+
+def of_files(scene: "Scene") -> list[dict[str, str]]:
+    """Code, path and message of what is not as it seems in the USD files of a scene."""
+    from tumble import usd
+
+    found: list[dict[str, str]] = []
+    for place, _, path in scene.mesh_files:
+        if not usd.is_usd(path):
+            continue
+        with suppress(OSError, ValueError):  # Files may be gone that were there when the scene was read.
+            for code, message in usd.doubts(Path(scene.folder) / path):
+                cure = _CURE if place.startswith("collider ") else _START
+                more = cure if code == "stands-still" else ""
+                found.append({"code": code, "path": place, "message": message + more})
+    return found
+
+
+_CURE = "; `tumble check SCENE --bake` writes a scene in which they move"
+_START = "; only colliders can move as their file says"
 
 
 def of_books(run: "Run") -> list[dict[str, str]]:

@@ -54,7 +54,7 @@ LOCK = ".lock"
 _WRITTEN = """
 checkpoints/*.safetensors frames/*.npz ledger.csv trials.csv static.npz columns.json
 film.mp4 .film.mp4.part energy.png ledger.png stills/*.png columns.npz
-scene.usda usd/frame.*.usdc usd/manifest.usda usd/objects.usdc ply/*.ply
+scene.usda blender.py usd/frame.*.usdc usd/manifest.usda usd/objects.usdc ply/*.ply
 volumes/*.vdb slices/*.png
 minimal.toml
 run.json

@@ -2,6 +2,7 @@
 
 import math
 import time
+from collections.abc import Container
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -32,8 +33,14 @@ def check(
     repair: Annotated[
         bool, typer.Option("--repair", help="Repair the scene's mesh files into new files beside them.")
     ] = False,
+    bake: Annotated[
+        bool, typer.Option("--bake", help="Write a scene in which animated USD files move, beside this one.")
+    ] = False,
+    camera: Annotated[
+        str | None, typer.Option(metavar="FILE[:PRIM]", help="Look with a camera of a USD file; print its lines.")
+    ] = None,
     force: Annotated[
-        bool, typer.Option("--force", help="With --repair: overwrite files of an earlier repair.")
+        bool, typer.Option("--force", help="With --repair or --bake: overwrite files of an earlier one.")
     ] = False,
     json: find.JsonOption = False,
 ) -> None:
@@ -47,23 +54,41 @@ def check(
     two triangles are split. NAME.ply becomes NAME.repaired.obj beside it, the scene lines to change are printed, and the
     scene is checked with them. The original meshes and the scene file are not modified; holes stay open.
 
+    --bake writes the motion of colliders from animated USD files (points, transforms, skeletons, blend shapes) as one mesh
+    per frame of the file, NAME.usd as NAME.baked/000000.obj and so on, and SCENE.baked.toml, which uses them and is checked;
+    with --repair, the meshes are mended, all alike.
+
     \b
     Examples:
       tumble check my.toml
       tumble check my.toml --set system.soft.integrator=forward_euler
       tumble check my.toml --repair
+      tumble check my.toml --bake
+      tumble check my.toml --camera shot.usda:/cameras/main
       tumble check my.toml --json
     """
-    from tumble import World
+    from tumble import World, doubts
     from tumble.emitters import forecast
     from tumble.expect import probes
 
     with find.told_as_json(json):
         checked = find.scene(scene, set)
+        done: Container[str] = ()
+        if bake:
+            from tumble.cli.bake import bake as write_moving
+
+            moving, done = write_moving(scene_file(scene), checked, force, repair)
+            scene = str(moving)
+            checked = find.scene(scene, set)
+        if camera is not None:
+            from tumble.cli.bake import look_with
+
+            set = [*(set or ()), *look_with(camera)]
+            checked = find.scene(scene, set)
         if repair:
             from tumble.cli.repair import mend
 
-            set = [*(set or ()), *mend(scene_file(scene), checked, force)]
+            set = [*(set or ()), *mend(scene_file(scene), checked, force, done)]
             checked = find.scene(scene, set)
         with find.naming(scene_file(scene), scene=checked):
             world = World(checked, threads)
@@ -77,7 +102,7 @@ def check(
     cures = [cure for estimate in estimates if predict(estimate)[0] == 2 for cure in _cures(tree, estimate)]
     if json:
         find.say_json(_as_tree(scene, world, estimates, judged, fault, cures))
-        warn_of(world.warnings)
+        warn_of(doubts.of_scene(world))
         raise typer.Exit(1 if cures or fault is not None else 0)
     for estimate in estimates:
         say()
@@ -86,7 +111,7 @@ def check(
     if without:
         say(f"\nno estimate for: {', '.join(without)}")
     say()
-    warn_of(world.warnings)
+    warn_of(doubts.of_scene(world))
     if fault is not None:
         say(f"will break down {fault}\n{find.command('run', scene, set)} searches for changes that help")
     if cures:
@@ -109,6 +134,8 @@ def _as_tree(
     cures: list[list[str]],
 ) -> dict[str, Any]:
     """What is printed, for programs: `systems` are the estimates of `World.stability`, each with a verdict."""
+    from tumble import doubts
+
     systems = []
     for estimate in estimates:
         level, verdict = predict(estimate)
@@ -122,7 +149,7 @@ def _as_tree(
         "systems": systems,
         "fault": fault,
         "cures": cures,
-        "warnings": world.warnings,
+        "warnings": doubts.of_scene(world),
     }
 
 

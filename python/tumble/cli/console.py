@@ -75,14 +75,14 @@ def warn(code: str, text: str) -> None:
 
 @contextmanager
 def lost_frames_told() -> Iterator[None]:
-    """Prints the warnings of `Run` like all others."""
+    """Prints the warnings of `Run` like all others; those of USD files are among the warnings of their scene."""
     with warnings.catch_warnings():
         other = warnings.showwarning
 
         def show(message: Warning | str, category: type[Warning], *rest: Any, **more: Any) -> None:
             if category.__name__ == "LostFrames":
                 warn("lost-frames", str(message))
-            else:
+            elif category.__name__ != "UsdWarning":
                 other(message, category, *rest, **more)
 
         warnings.showwarning = show

@@ -17,6 +17,9 @@ def export(
     usd: Annotated[
         bool, typer.Option("--usd", help="scene.usda with a layer per frame, for Blender, Houdini and usdview.")
     ] = False,
+    blender: Annotated[
+        bool, typer.Option("--blender", help="With blender.py, which imports scene.usda into Blender; implies --usd.")
+    ] = False,
     npz: Annotated[
         bool, typer.Option("--npz", help="columns.npz: every column of all frames, frames x rows x width.")
     ] = False,
@@ -36,12 +39,14 @@ def export(
     \b
     Examples:
       tumble export out/sheet-on-bunny --usd
+      tumble export out/plume --blender && blender --python out/plume/blender.py
       tumble export out/sheet-on-bunny --npz --out results
       tumble export out/fountain --ply
       tumble export out/plume --vdb --half
     """
+    usd = usd or blender
     if not (usd or npz or ply or vdb):
-        raise typer.BadParameter("choose at least one format: --usd, --npz, --ply, --vdb")
+        raise typer.BadParameter("choose at least one format: --usd, --blender, --npz, --ply, --vdb")
     if (half or zip) and not vdb:
         raise typer.BadParameter("--half and --zip say how to write --vdb")
     found = find.run(run)
@@ -56,6 +61,10 @@ def export(
 
         with Progress("usd") as progress:
             say(write(found, folder, progress, volumes=not vdb))
+    if blender:
+        from tumble.export.blender import write as write_script
+
+        say(write_script(found, folder))
     if npz:
         with Progress("npz") as progress:
             say(stack(found, folder, progress))

@@ -3,10 +3,11 @@
 import json
 import os
 import re
+from collections.abc import Container
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from tumble.cli.console import say
+from tumble.cli.console import say, warn
 
 if TYPE_CHECKING:
     from tumble import Scene
@@ -27,14 +28,14 @@ _LEFT = {
 }
 
 
-def mend(file: Path, scene: "Scene", force: bool) -> list[str]:
-    """Repairs the mesh files of a scene, prints the repairs, and returns the settings that use the new files. Raises
-    SceneError if a new file exists, unless `force` overwrites it."""
-    from tumble import SceneError, repair_mesh
+def mend(file: Path, scene: "Scene", force: bool, done: Container[str] = ()) -> list[str]:
+    """Repairs the mesh files of a scene but those that are `done`, prints the repairs, and returns the settings that use
+    the new files. Raises SceneError if a new file exists, unless `force` overwrites it."""
+    from tumble import SceneError, repair_mesh, usd
 
     changes: dict[str, Path] = {}
     seen: set[str] = set()
-    places = scene.mesh_files
+    places = [place for place in scene.mesh_files if place[2] not in done]
     for _, _, path in places:
         if path in seen:
             continue
@@ -56,6 +57,11 @@ def mend(file: Path, scene: "Scene", force: bool) -> list[str]:
         finally:
             part.unlink(missing_ok=True)
         say(f"  written to {new}")
+        if usd.is_usd(old) and usd.moves(old):
+            warn(
+                "stands-still",
+                f"{new}: has the shape of {old} at its start; --bake --repair mends it and keeps its motion",
+            )
         changes[path] = new.relative_to(scene.folder) if new.is_relative_to(scene.folder) else new
     if not seen:
         say("the scene has no mesh files")

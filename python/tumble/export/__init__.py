@@ -21,6 +21,6 @@ def file_names(names: list[str]) -> dict[str, str]:
 
 def __getattr__(name: str) -> ModuleType:
     """The formats, each loaded when it is first used."""
-    if name in ("ply", "usd", "vdb"):
+    if name in ("blender", "ply", "usd", "vdb"):
         return importlib.import_module(f"tumble.export.{name}")
     raise AttributeError(f"module 'tumble.export' has no attribute {name!r}")

@@ -19,8 +19,8 @@ from tumble.folder import write_whole, writing
 from tumble.pictures.things import Object, Recording, colors, objects, positions, radii
 from tumble.style import display
 
-TYPES = {"<f4": "float", "<u4": "uint", "|u1": "uchar"}
-"""Types of the format."""
+TYPES = {"<f4": "float", "<i4": "int", "|u1": "uchar"}
+"""Types of the format; readers, as Blender's, skip properties that are `uint`."""
 
 _OWN = ("position", "velocity", "id", "radius", "color")
 
@@ -58,7 +58,7 @@ def encode(thing: Object, columns: Mapping[str, Mapping[str, npt.NDArray[Any]]])
     if "velocity" in table:
         v = np.reshape(table["velocity"], (-1, 3))
         parts += [(f"v{axis}", "<f4", v[:, k]) for k, axis in enumerate("xyz")]
-    parts.append(("id", "<u4", table.get("id", np.arange(n))))
+    parts.append(("id", "<i4", table.get("id", np.arange(n))))
     parts.append(("radius", "<f4", radii(columns, thing)))
     shown = np.round(255 * display(colors(columns, thing))).astype(np.uint8)
     parts += [(name, "|u1", shown[:, k]) for k, name in enumerate(("red", "green", "blue"))]

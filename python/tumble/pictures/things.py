@@ -218,6 +218,11 @@ def colors(columns: Columns, thing: Object) -> Floats:
     return np.tile(np.array(thing.color), (len(table.get("position", ())), 1))
 
 
+def by_night(run: Recording) -> bool:
+    """Whether its scene asks for pictures by night."""
+    return bool(run.scene.get("camera", {}).get("look") == "night")
+
+
 class Stage:
     """All that can be seen of a run."""
 
@@ -233,7 +238,7 @@ class Stage:
         self._cuts = {name: split(starts[name], o.triangles) for name, o in bodies.items()}
         self._closed = {name for name, o in bodies.items() if outward(starts[name], o.triangles)}
         self._anchors = run.looks.anchors
-        self.night = run.scene.get("camera", {}).get("look") == "night"
+        self.night = by_night(run)
         self._ways: dict[tuple[str, int], Floats] = {}
         self._pieces: dict[tuple[str, int], tuple[Floats, Floats]] = {}
         self._ranges: dict[str, tuple[str, float, float] | None] = {}
@@ -285,9 +290,7 @@ class Stage:
             share = np.nan_to_num((values - low) / (high - low), nan=1.0, posinf=1.0, neginf=0.0)
             glow = self._glow(thing, grid, columns)
             if grid.flat == 3:
-                if thing.name not in self._most:
-                    self._most[thing.name] = self._thickest(thing, grid, name, low, high)
-                most = self._most[thing.name] * (1.0 if glow is None else BURNING)
+                most = self._most_of(thing, grid, found) * (1.0 if glow is None else BURNING)
                 thick = (np.clip(share, 0.0, None) * most).astype(np.float32)
                 drawn.append(Smoke(thing.name, grid.origin, grid.spacing, thick, thing.color, glow=glow))
             else:
@@ -300,6 +303,27 @@ class Stage:
             line = np.stack([corners, np.roll(corners, -1, axis=0)], axis=1).reshape(-1, 3)
             drawn.append(Tubes(f"{thing.name} edges", line, np.full(4, 2), max(thinnest, 1e-9), SOLID))
         return drawn
+
+    def extinction(self, name: str) -> tuple[str, float, float, float] | None:
+        """Of what an object on a grid in space shows: the column, the value that is clear, the extinction [1/m] per unit above
+        it, and the highest temperature [K] if it glows, else 0; in a plane, of a layer one cell thick. None where there is
+        nothing to see, or no extinction."""
+        thing = next(o for o in self.objects if o.name == name)
+        grid = thing.grid
+        found = None if grid is None else self._range(thing, grid)
+        if grid is None or found is None:
+            return None
+        column, low, high = found
+        if grid.flat < 3:
+            return (column, low, DYE / grid.spacing / high, 0.0) if column in FOG and low == 0.0 else None
+        glows = self._glow(thing, grid, self._start) is not None
+        most = self._most_of(thing, grid, found) * (BURNING if glows else 1.0)
+        return column, low, most / (high - low), self._hottest[name] if glows else 0.0
+
+    def _most_of(self, thing: Object, grid: Box, found: tuple[str, float, float]) -> float:
+        if thing.name not in self._most:
+            self._most[thing.name] = self._thickest(thing, grid, *found)
+        return self._most[thing.name]
 
     def _glow(self, thing: Object, grid: Box, columns: Columns) -> npt.NDArray[np.float32] | None:
         """Light of a hot gas: that of a black body, of which it sends out the share that it takes away (Kirchhoff's law)."""

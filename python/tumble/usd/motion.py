@@ -1,0 +1,109 @@
+"""The motion of a USD file as a sequence of meshes, which `shape.animated_mesh` takes."""
+
+import math
+import tempfile
+from collections.abc import Iterator
+from pathlib import Path
+
+import numpy as np
+
+from tumble._engine import load_mesh, repair_mesh
+from tumble.folder import write_whole
+from tumble.usd.stage import Floats, Indices, Reading, Surface, end, names, open_stage, pose, start
+
+DIGITS = 6
+"""Digits of the number of a mesh in the name of its file."""
+
+_MOST = 100_000
+"""Meshes that are written of a file, at most."""
+
+
+def bake(path: Path | str, folder: Path, duration: float, mended: bool = False) -> list[tuple[float, Path]]:
+    """Writes the meshes of a file into a folder, one for each of its frames from its start on, until it ends or `duration`
+    [s] is over, and returns time [s] and file of each; `mended` as `repair_mesh` would the first. Raises ValueError, also
+    where faces come and go."""
+    folder.mkdir(parents=True, exist_ok=True)
+    for old in folder.glob("*.obj"):
+        if old.stem.isdigit():
+            old.unlink()
+    frames = []
+    for k, (time, points, triangles) in enumerate(meshes(path, duration, mended)):
+        file = folder / f"{k:0{DIGITS}d}.obj"
+        lines = [f"v {x!r} {y!r} {z!r}" for x, y, z in points.tolist()]
+        lines += [f"f {a} {b} {c}" for a, b, c in (triangles + 1).tolist()]
+        write_whole(file, ("\n".join(lines) + "\n").encode("ascii"))
+        frames.append((time, file))
+    return frames
+
+
+def meshes(path: Path | str, duration: float, mended: bool = False) -> Iterator[tuple[float, Floats, Indices]]:
+    """Time [s], points [m] and triangles, the same in all, of each frame. Raises ValueError."""
+    stage = open_stage(path)
+    first, last = start(stage), end(stage)
+    per_second = float(stage.GetTimeCodesPerSecond())
+    said = stage.HasAuthoredMetadata("framesPerSecond") and stage.GetFramesPerSecond() > 0
+    step = per_second / float(stage.GetFramesPerSecond()) if said else 1.0
+    last = max(first, min(last, first + duration * per_second))
+    if not (per_second > 0.0 and math.isfinite(per_second) and math.isfinite(step) and math.isfinite(last - first)):
+        raise ValueError(
+            "its time codes a second or its range of time are no numbers; the file is damaged, export it again"
+        )
+    if (last - first) / step > _MOST:
+        raise ValueError(f"its motion has more than {_MOST} frames; shorten it, or simulate less")
+    n = int((last - first) / step + 1e-6) + 1
+    codes = [first + k * step for k in range(n)]
+    if last - codes[-1] > 1e-3 * step:
+        codes.append(last)
+    pose(stage, first, last)
+    whole = Reading(stage, first)
+    points = np.concatenate([s.points for s in whole.surfaces()] or [np.zeros((0, 3))])
+    used, triangles = _triangles(whole, points, mended)
+    for code in codes:
+        now = Reading(stage, code)
+        _alike(whole, now)
+        yield (code - first) / per_second, np.concatenate([s.points for s in now.surfaces()])[used], triangles
+
+
+def _triangles(reading: Reading, points: Floats, mended: bool) -> tuple[Indices, Indices]:
+    """The points that are used, and the triangles between those that the engine makes of the polygons."""
+    with tempfile.TemporaryDirectory() as folder:
+        file = Path(folder) / "first.obj"
+        file.write_text(reading.obj(), encoding="ascii")
+        if mended and (text := repair_mesh(file)[0]) is not None:
+            file.write_text(text, encoding="ascii")
+        vertices, triangles = load_mesh(file)
+    # Vertices that were sewn are at one place, and so are those that were split.
+    where = {tuple(x): k for k, x in reversed(list(enumerate(points.tolist())))}
+    nearest = (where.get(tuple(x)) for x in vertices.tolist())
+    found = [
+        int(np.argmin(((points - x) ** 2).sum(axis=1))) if k is None else k
+        for x, k in zip(vertices, nearest, strict=True)
+    ]
+    if not mended:
+        # The engine drops what no polygon uses, and keeps the order; points at one place may part later.
+        found = np.unique(np.concatenate([s.corners + at for s, at in _each(reading)])).tolist()
+    return np.array(found, dtype=np.int64), triangles.astype(np.int64)
+
+
+def _each(reading: Reading) -> Iterator[tuple[Surface, int]]:
+    """Surfaces, and how many points come before."""
+    at = 0
+    for surface in reading.surfaces():
+        yield surface, at
+        at += len(surface.points)
+
+
+def _alike(first: Reading, now: Reading) -> None:
+    """Raises ValueError if two frames are not made of the same faces."""
+
+    def faces(reading: Reading) -> dict[tuple[int, str], tuple[int, bytes, bytes]]:
+        found = enumerate(reading.surfaces())
+        return {(k, s.path): (len(s.points), s.counts.tobytes(), s.corners.tobytes()) for k, s in found}
+
+    old, new = faces(first), faces(now)
+    if old != new:
+        changed = [path for k, path in {**old, **new} if old.get((k, path)) != new.get((k, path))]
+        raise ValueError(
+            f"{names(list(dict.fromkeys(changed)))}: faces or points come and go by time code {now.code:g}; a solid that moves "
+            "keeps those it has: hold them fixed in the file, or leave these prims out"
+        )
