@@ -12,13 +12,15 @@ from typing import Any
 import fake_run
 import numpy as np
 import pytest
+import typer
 
 import tumble.film
 import tumble.pictures
 from tumble import ExportError
+from tumble.cli.render import look_for
+from tumble.cli.run import write_results
 from tumble.film import film
-from tumble.pictures import Studio, framing, picture, render, renderers, resolve, surfaces
-from tumble.pictures.denoise import denoise
+from tumble.pictures import Studio, framing, mitsuba_, picture, render, renderers, resolve, surfaces
 from tumble.pictures.drawn import Ground, Mesh, Spheres, Tubes
 from tumble.pictures.things import Recording, Stage
 from tumble.plots import energy, ledger, unit
@@ -132,6 +134,26 @@ def test_pictures_are_the_same_bytes_again(renderer: str) -> None:
     run = fake_run.studio()
     first, second = (picture(run, 1, renderer, (64, 36)) for _ in range(2))
     assert np.mean(first != second) < 1e-3  # rounding may differ where threads meet
+
+
+def test_edges_have_no_more_noise_than_surfaces(monkeypatch: pytest.MonkeyPatch) -> None:
+    if "mitsuba" not in renderers():
+        pytest.skip("mitsuba does not work here")
+    studio = Studio(fake_run.studio(), "mitsuba", (96, 54))
+    how = studio.things(2), studio.camera.unit()
+    few, more = (render("mitsuba", *how, n).astype(float) for n in (4, 16))
+    monkeypatch.setattr(mitsuba_, "denoise", lambda light, colors: light)
+    noisy, clean = (render("mitsuba", *how, n).astype(float) for n in (4, 256))
+    steps = [np.abs(np.diff(clean, axis=k, append=np.take(clean, [-1], axis=k))).max(axis=2) for k in (0, 1)]
+    edge = np.max([*steps, *(np.roll(s, 1, axis=k) for k, s in enumerate(steps))], axis=0) > 60
+    assert 150 < edge.sum() < 0.2 * edge.size
+
+    def error(image: Any, where: Any) -> float:
+        return float(np.sqrt(np.mean((image - clean)[where] ** 2)))
+
+    assert error(noisy, edge) > 20 and error(noisy, ~edge) > 10  # measured 25.1 and 13.3, of 255
+    assert error(few, edge) < 14.5 and error(few, ~edge) < 5  # measured 12.8 and 3.9
+    assert error(more, edge) < 9  # measured 7.6
 
 
 def test_what_cannot_be_drawn_is_told() -> None:
@@ -439,23 +461,6 @@ def test_rims_are_turned_to_the_eye() -> None:
     np.testing.assert_array_equal(turned[0][turned[1]], vertices[t])
 
 
-def test_noise_goes_and_edges_stay() -> None:
-    rng = np.random.default_rng(5)
-    clean = np.full((40, 60, 3), 0.3)
-    clean[:, 30:] = 0.6
-    noisy = clean + 0.03 * rng.standard_normal((40, 60, 1))
-    place = np.stack([*np.meshgrid(np.arange(60.0), np.arange(40.0)), np.zeros((40, 60))], -1)
-    place[:, 30:, 2] = 20.0  # another surface, far behind
-    normal = np.broadcast_to([0.0, 0.0, 1.0], place.shape)
-    smooth = denoise(noisy, normal, place, 1.0)
-    inside = np.ones((40, 60), dtype=bool)
-    inside[:, 29:31] = False  # the edge itself is left alone
-    error = np.abs(smooth - clean)[inside]
-    assert error.mean() < 0.15 * np.abs(noisy - clean)[inside].mean()  # measured 0.09
-    np.testing.assert_array_equal(smooth[:, 29:31], noisy[:, 29:31])
-    np.testing.assert_allclose(smooth[:, 40:].mean(), 0.6, atol=0.003)
-
-
 def test_display_and_linear_are_inverse() -> None:
     levels = np.arange(256) / 255
     np.testing.assert_allclose(display(linear(levels)), levels, atol=1e-12)
@@ -463,6 +468,28 @@ def test_display_and_linear_are_inverse() -> None:
 
 
 # Films
+
+
+def test_stills_are_written_before_the_film(monkeypatch: pytest.MonkeyPatch) -> None:
+    done: list[Any] = []
+    monkeypatch.setattr("tumble.cli.render.film", lambda run, path, *how, **more: done.append((path.name, more)))
+    monkeypatch.setattr("tumble.cli.render.still", lambda run, i, *how, **more: done.append((i, more)))
+    asked = dict.fromkeys(("usd", "ply", "vdb", "plot"), False) | {"film": True}
+    assert write_results(fake_run.studio(), asked, [0, 2, 9], PLAIN, 7) == []  # type: ignore[arg-type]
+    assert done == [(0, {"samples": 7}), (2, {"samples": 7}), ("film.mp4", {"samples": 7})]
+
+
+def test_samples_are_those_of_mitsuba(monkeypatch: pytest.MonkeyPatch) -> None:
+    taken: list[int] = []
+    monkeypatch.setattr(tumble.pictures, "_drawn", lambda renderer, things, camera, samples: taken.append(samples))
+    run = fake_run.studio()
+    picture(run, 0, PLAIN, SIZE)
+    picture(run, 0, PLAIN, SIZE, samples=99)
+    assert taken == [tumble.pictures.SAMPLES, 99]
+    with pytest.raises(ExportError, match="samples"):
+        picture(run, 0, PLAIN, SIZE, samples=0)
+    with pytest.raises(typer.BadParameter, match="only mitsuba takes samples"):
+        look_for(PLAIN, 4)
 
 
 def decoded(path: Path) -> tuple[dict[str, Any], list[Any]]:
