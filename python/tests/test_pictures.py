@@ -25,6 +25,7 @@ from tumble.pictures.drawn import Ground, Mesh, Spheres, Tubes
 from tumble.pictures.things import Recording, Stage
 from tumble.plots import energy, ledger, unit
 from tumble.run import simulate
+from tumble.slices import slices
 from tumble.style import display, linear, rgb
 
 SIZE = (160, 90)
@@ -605,6 +606,29 @@ def test_plots_are_pictures(tmp_path: Path) -> None:
         image = imread(path)
         assert image.shape[0] > 300 and image.shape[1] > 800 and image[..., :3].std() > 0.02
     assert ledger(run, "contacts", tmp_path / "l.svg").read_text().startswith("<?xml")
+
+
+@pytest.mark.parametrize(
+    "title", ["A dress", "A title longer than a figure is wide, as those of scenes are" * 2, "W " * 300, "M" * 99]
+)
+def test_titles_fit_the_figure(title: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    from matplotlib.figure import Figure
+    from matplotlib.text import Text
+
+    drawn: list[Figure] = []
+    write = Figure.savefig
+    monkeypatch.setattr(Figure, "savefig", lambda figure, *a, **k: (write(figure, *a, **k), drawn.append(figure)))
+    run, smoke = fake_run.studio(), fake_run.plume(8)
+    run.scene["title"] = smoke.scene["title"] = title
+    energy(run, tmp_path / "energy.png")
+    ledger(run, ["speed"], tmp_path / "ledger.png")
+    slices(smoke, tmp_path / "slices.png")
+    assert len(drawn) == 3
+    for figure in drawn:
+        (shown,) = (t for t in figure.findobj(Text) if t.get_text().startswith(title[:7]))
+        box = shown.get_window_extent()
+        assert box.width > 0.1 * figure.bbox.width and (len(title) < 60 or box.height > 40)  # of several lines
+        assert box.x0 >= 0 and box.x1 <= figure.bbox.x1 + 1 and box.y0 >= 0 and box.y1 <= figure.bbox.y1
 
 
 def test_the_total_energy_and_its_drift(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
