@@ -42,7 +42,7 @@ from tumble.looks import SPRING, TRAIL
 from tumble.pictures.framing import camera
 from tumble.pictures.look import key_light
 from tumble.pictures.surfaces import normals, split
-from tumble.pictures.things import Columns, Object, Recording, colors, objects, positions, radii, torn
+from tumble.pictures.things import Columns, Object, Recording, colors, hair, objects, positions, radii, torn, with_hair
 
 ROOT = "/scene"
 SENSOR = 0.36
@@ -72,6 +72,8 @@ class Part:
     """Result of `surfaces.split` for a solid with sharp edges."""
     taper: npt.NDArray[np.float64] | None = None
     """Radius of each point of a strand of hair."""
+    skin: Object | None = None
+    """What hair is rooted in."""
     trail: bool = False
     """Whether its curves are the ways of points, as long as `Object.trail` says."""
 
@@ -136,7 +138,7 @@ def write(
     goal = Path(folder)
     layers = goal / "usd"
     start = run.frame(0)
-    things = objects(run)
+    things = with_hair(run, objects(run))
     parts, history = _parts(things, start), History(things)
     beginning = history.ways(run.time(0), start)
     digits = max(DIGITS, len(str(run.n_frames - 1)))
@@ -194,7 +196,8 @@ def _parts(found: list[Object], start: Columns) -> list[Part]:
             counts = np.full(len(shown.guides), shown.points)
             taper = thing.radius * np.sqrt(1.0 - 0.96 * np.linspace(0.0, 1.0, shown.points))
             where = path(thing.name)
-            parts.append(Part(thing, where, thing.name, "BasisCurves", None, counts, thing.radius, taper=taper))
+            skin = next((t for t in found if t.name == thing.skin), None)
+            parts.append(Part(thing, where, thing.name, "BasisCurves", None, counts, thing.radius, None, taper, skin))
         elif thing.form in ("curve", "strands"):
             counts = np.array([len(thing.curve)])
             where = path(thing.name)
@@ -267,11 +270,12 @@ def _values(part: Part, columns: Columns, ways: Ways) -> Iterator[tuple[str, str
         return
     if part.taper is not None and part.thing.strands is not None:
         shown = part.thing.strands
-        points = np.ascontiguousarray(shown.of(positions(columns, part.thing)).reshape(-1, 3), dtype=np.float32)
+        curves = hair(part.thing, [part.skin] if part.skin else [], columns)
+        points = np.ascontiguousarray(curves.reshape(-1, 3), dtype=np.float32)
         yield "points", "point3f[]", points
         speeds = columns.get(part.thing.name, {}).get("velocity")
         if speeds is not None:
-            moved = shown.of(np.asarray(speeds, dtype=float)).reshape(-1, 3)
+            moved = shown.mean(speeds).reshape(-1, 3)
             yield "velocities", "vector3f[]", np.ascontiguousarray(moved, dtype=np.float32)
         yield "extent", "float3[]", _extent(points, np.float32(part.radius))
         return
