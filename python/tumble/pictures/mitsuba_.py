@@ -8,6 +8,7 @@ cover the ground is faded into the background without touching the edges in fron
 import functools
 import tempfile
 from collections.abc import Callable
+from dataclasses import replace
 from itertools import pairwise
 from pathlib import Path
 from typing import Any
@@ -15,7 +16,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from tumble.pictures.drawn import Body, Ground, Mesh, Smoke, Spheres, Thing, Tubes
+from tumble.pictures.drawn import Body, Ground, Mesh, Smoke, Spheres, Thing, Tubes, finished
 from tumble.pictures.framing import Camera
 from tumble.pictures.look import FADE, background, fading, key_light, soften
 from tumble.pictures.strands import Hair
@@ -58,12 +59,12 @@ def draw(things: list[Thing], camera: Camera, samples: int) -> Picture:
     mi.set_log_level(mi.LogLevel.Error)
     grounds = [t for t in things if isinstance(t, Ground)]
     floors = {f"ground {k}": _ground(mi, t, camera) for k, t in enumerate(grounds)}
-    bodies = [t for t in things if isinstance(t, Body)]
+    bodies = [_seen(t, camera) if isinstance(t, Mesh) else t for t in things if isinstance(t, Body)]
     with tempfile.TemporaryDirectory() as folder:
-        shapes = _shapes(mi, bodies, camera, Path(folder), _matter)
+        shapes = _shapes(mi, bodies, Path(folder), _matter)
         smoke = {f"smoke {k}": _smoke(mi, t) for k, t in enumerate(things) if isinstance(t, Smoke)}
         light = _render(mi, _studio(mi, camera, samples, THROUGH_SMOKE if smoke else PATHS) | shapes | floors | smoke)
-        glowing = _shapes(mi, bodies, camera, Path(folder), _glowing)
+        glowing = _shapes(mi, bodies, Path(folder), _glowing)
         colors = _render(mi, _sight(mi, camera, samples, COLORS) | glowing)
     sky = background(camera.size)
     behind = 1 - light[..., 3:]
@@ -166,7 +167,17 @@ def _sphere() -> tuple[Floats, Floats]:
     return d, np.sin(polar) * (np.pi / 64) * (2 * np.pi / 128)
 
 
-def _shapes(mi: Any, bodies: list[Body], camera: Camera, folder: Path, look: Look) -> dict[str, Any]:
+def _seen(thing: Mesh, camera: Camera) -> Mesh:
+    """A mesh as fine as its picture, without normals that contradict what is seen."""
+    if not camera.parallel:  # Seen head-on, in a plane, cloth is a line.
+        thing = finished(thing, camera.pixel)
+    if not len(thing.triangles):
+        return thing
+    x, triangles, n = turned(thing.vertices, thing.triangles, thing.normals, camera.eye)
+    return replace(thing, vertices=x, triangles=triangles, normals=n)
+
+
+def _shapes(mi: Any, bodies: list[Body], folder: Path, look: Look) -> dict[str, Any]:
     shapes: dict[str, Any] = {}
     for k, thing in enumerate(bodies):
         found: dict[str, Any] = {}
@@ -177,7 +188,7 @@ def _shapes(mi: Any, bodies: list[Body], camera: Camera, folder: Path, look: Loo
         elif isinstance(thing, Hair):
             found = _hair(thing, folder / f"{k}", look)
         elif isinstance(thing, Mesh) and len(thing.triangles):
-            surface = turned(thing.vertices, thing.triangles, thing.normals, camera.eye)
+            surface = thing.vertices, thing.triangles, thing.normals
             found = {"": _mesh(mi, *surface, look(thing.color, thing.fabric))}
         shapes |= {f"{k} {name}": shape for name, shape in found.items()}
     return shapes

@@ -137,6 +137,9 @@ DYE = 3.0
 THICKER = 3
 """An object of few masses is drawn at least this many times as thick as the thinnest."""
 
+ROOM = 1.8
+"""Thickness of a surface over its distance from colliders, at most: they do not show through it."""
+
 HAIR = 0.3
 """Radius of the thinnest strand, over that of the thinnest of other things."""
 
@@ -463,7 +466,8 @@ class Stage:
             source, triangles = self._cuts[thing.name]
             x = x[source]
         closed = whole and thing.name in self._closed
-        return Mesh(thing.name, x, triangles, normals(x, triangles), thing.color, thing.form == "surface", closed)
+        fabric, thick = thing.form == "surface", _thickness(self.run.scene, thing.name)
+        return Mesh(thing.name, x, triangles, normals(x, triangles), thing.color, fabric, thick, closed)
 
     def _edges(self, thing: Object, x: Floats, thinnest: float) -> Tubes:
         """The sharp edges of a container; of a round one a few of its rings."""
@@ -497,6 +501,15 @@ class Stage:
         if start is None or len(start) != len(strain):
             return none
         return np.ravel(np.isnan(strain) & ~np.isnan(start))
+
+
+def _thickness(scene: Mapping[str, Any], name: str) -> float:
+    """Thickness of a surface [m]: the room that contact leaves it beside others and over colliders."""
+    own = [words for kind in ("sheet", "net", "cloth") for words in scene.get(kind) or () if words.get("name") == name]
+    system = [s for s in scene.get("system") or () for words in own if s.get("name") == words.get("system")]
+    kept = max((float((s.get("self_contact") or {}).get("thickness") or 0.0) for s in system), default=0.0)
+    over = [float(c.get("thickness") or 0.0) for c in scene.get("collider") or ()]
+    return min([kept, *(ROOM * t for t in over if t > 0.0)])
 
 
 def _darker(color: Rgb, by: float) -> Rgb:
