@@ -10,7 +10,7 @@ from tumble.pictures.strands import Hair, prisms
 from tumble.pictures.surfaces import Floats, Indices, balls, rounded, thickened, tubes
 from tumble.style import Rgb
 
-ROUND = 6.0
+ROUND = 8.0
 """Pixels that a side of a triangle of fabric is long, at most,"""
 MOST = 150_000
 """as long as there are no more triangles than these, both sides of it counted."""
