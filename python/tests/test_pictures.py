@@ -157,6 +157,17 @@ def test_edges_have_no_more_noise_than_surfaces(monkeypatch: pytest.MonkeyPatch)
     assert error(more, edge) < 9  # measured 7.6
 
 
+def test_noise_goes_up_to_the_sides_of_the_picture() -> None:
+    pytest.importorskip("mitsuba_oidn")
+    colors = np.full((90, 160, 3), 0.3) * np.linspace(0.6, 1.0, 160)[:, None]
+    light = colors * np.random.default_rng(5).gamma(4.0, 0.25, (90, 160, 1))
+    error = np.sqrt(np.mean((mitsuba_.denoise(light, colors) - colors) ** 2, axis=2))
+    inner = error[4:-4, 4:-4].mean()
+    assert 0 < inner < 0.05 * np.abs(light - colors).mean()  # measured 0.03
+    # Measured 1.2; without a mirror beyond the sides 5: pictures whose height 16 does not divide end in dots.
+    assert error[-1].mean() < 2 * inner
+
+
 def test_what_cannot_be_drawn_is_told() -> None:
     run = fake_run.studio()
     with pytest.raises(ExportError, match="frames 0 to 4"):

@@ -44,6 +44,9 @@ PATHS = {"type": "path", "max_depth": 5, "hide_emitters": True}
 THROUGH_SMOKE = {"type": "volpath", "max_depth": 24, "rr_depth": 12, "hide_emitters": True}
 COLORS = {"type": "path", "max_depth": 1}
 
+MIRROR = 16
+"""Pixels that the denoiser is shown of a picture beyond its sides; its network halves sizes four times."""
+
 Picture = npt.NDArray[np.uint8]
 
 Look = Callable[[Rgb, bool], dict[str, Any]]
@@ -83,9 +86,16 @@ def denoise(light: Floats, colors: Floats) -> Floats:
     height x width x 3."""
     import mitsuba_oidn as oidn
 
+    height, width, _ = light.shape
+    # The network sees black beyond the sides, and leaves dots there: it gets a mirror instead.
+    beyond = [(MIRROR, MIRROR + -n % MIRROR) for n in (height, width)]
+    image, albedo = (
+        np.pad(np.asarray(x, dtype=np.float32), [*beyond, (0, 0)], mode="symmetric")
+        for x in (light, np.clip(colors, 0.0, 1.0))
+    )
     # The same processor for all pictures, whatever else there is: others round differently.
-    image, albedo = (np.ascontiguousarray(x, dtype=np.float32) for x in (light, np.clip(colors, 0.0, 1.0)))
-    return np.asarray(oidn.denoise(image, albedo, hdr=True, device=_processor()), dtype=np.float64)
+    clean = oidn.denoise(image, albedo, hdr=True, device=_processor())
+    return np.asarray(clean[MIRROR:][:height, MIRROR:][:, :width], dtype=np.float64)
 
 
 @functools.cache
