@@ -408,7 +408,7 @@ def test_results_are_written_alone_too(
     file = scene_file(spring)
     codes = []
 
-    def film(*_: object) -> None:
+    def film(*_: object, **__: object) -> None:
         again = subprocess.run([*PYTHON, "run", str(file), "--force"], capture_output=True, check=False)
         codes.append((again.returncode, b"a run is writing here" in again.stderr))
 

@@ -1,6 +1,7 @@
 """Clouds: many particles, and such that come and go, are where they should be in pictures by day and by night."""
 
 from collections.abc import Callable
+from dataclasses import replace
 from typing import Any
 
 import fake_run
@@ -128,6 +129,18 @@ def test_depths_are_those_of_a_plane_and_a_ball() -> None:
     assert depth[80, 20] == pytest.approx(0.1 / (35.5 / 160), rel=1e-3)
     hit = np.abs(depth[:58] - 0.95) < 0.06
     assert np.pi * 8**2 < hit.sum() < np.pi * 8.4**2  # without holes; rims reach 0.3 pixels farther
+
+
+def test_depths_of_a_wide_triangle_have_no_holes() -> None:
+    """Two triangles that go far beyond the picture, behind the camera, too."""
+    view = replace(HERE, size=(640, 360))
+    corners = np.array([[-9.0, -9, -0.1], [30, -9, -0.1], [30, 30, -0.1], [-9, 30, -0.1]])
+    bed = Mesh("", corners, np.array([[0, 1, 2], [0, 2, 3]]), np.tile([0.0, 0, 1], (4, 1)), (0.5, 0.5, 0.5))
+    plane = Ground("", corners[0], np.array([0.0, 0.0, 1.0]), (0.8, 0.8, 0.8))
+    depth, exact = splats.depths([bed], view), splats.depths([plane], view)
+    near = exact < 15
+    assert 0.3 < near.mean() < 0.6
+    np.testing.assert_allclose(depth[near], exact[near], rtol=1e-9)
 
 
 # Day

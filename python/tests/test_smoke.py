@@ -61,6 +61,20 @@ def test_what_is_in_front_is_not_dimmed_and_what_is_inside_in_part() -> None:
         assert got == pytest.approx(np.exp(-1.5 * share), abs=2e-3)
 
 
+def test_what_is_seen_beside_an_edge_is_behind_the_smoke() -> None:
+    """A black wall before black smoke covers half of a white picture, and 3/4 of a column of pixels: the rest is as dim."""
+    view, cloud = camera(np.array([0.0, 1.0, 0.0])), block()
+    height, width = view.size[1], view.size[0]
+    column = width // 2
+    light, depth = np.ones((height, width, 3)), np.full((height, width), np.inf)
+    light[:, :column], light[:, column] = 0.0, 0.25
+    depth[:, : column + 1] = 0.1
+    shown = volumes.smoke(light, depth, [cloud], view, night=True)[height // 2, :, 0]
+    beyond = shown[column + 1]
+    assert shown[column - 1] == 0.0 and 0.1 < beyond < 0.5
+    assert shown[column] == pytest.approx(0.25 * (0.75 + 0.25 * beyond), rel=0.02)  # without the mean 0.25, a bead
+
+
 @pytest.mark.parametrize("direction", [X, -Y, Z, X + 0.4 * Y - 0.3 * Z, -0.9 * X + 0.85 * Z - 0.03 * Y])
 def test_key_light_in_a_block(direction: np.ndarray) -> None:
     """exp(-s d), d the way from the middle of a cell to the side of the block towards the light."""

@@ -34,8 +34,8 @@ from tumble.pictures.things import Recording
 QUALITY = 18
 """Constant rate factor of the encoder; 18 cannot be told from the original."""
 
-SAMPLES = 8
-"""Samples per pixel; in motion, half those of a still do."""
+SAMPLES = 4
+"""Samples per pixel; in motion, fewer than those of a still do."""
 
 PLAYED = (10.0, 60.0)
 """Frame rates [1/s] at which a film plays as fast as the run."""
@@ -55,17 +55,18 @@ def film(
     size: tuple[int, int] | None = None,
     progress: Callable[[int, int], None] | None = None,
     processes: int | None = None,
+    samples: int = SAMPLES,
 ) -> Path:
     """Writes the film of a run at `rate(run)`; with `every` = n of each n-th frame, as fast.
 
     Odd sizes grow by a pixel, because of yuv420p. `progress(done, total)` is called after each picture. The file
-    appears when it is complete. Raises ExportError.
+    appears when it is complete. `samples` per pixel are what mitsuba takes. Raises ExportError.
     """
     every = whole(every, "every", 1, ExportError)
-    studio = Studio(run, renderer, size)
+    studio = Studio(run, renderer, size, samples)
     width, height = (n + n % 2 for n in studio.camera.size)
     if (width, height) != studio.camera.size:
-        studio = Studio(run, studio.renderer, (width, height))
+        studio = Studio(run, studio.renderer, (width, height), samples)
     frames = range(0, run.n_frames, every)
     processes = None if processes is None else whole(processes, "processes", 1, ExportError)
     pace = rate(run) / every
@@ -102,10 +103,9 @@ def _cores() -> int:
 def _pictures(studio: Studio, frames: range, processes: int) -> Generator[Picture, None, None]:
     """The pictures in order; at most a few of them exist at a time."""
     processes = min(processes, len(frames))
-    camera = studio.camera.unit()
+    how = studio.camera.unit(), studio.samples, studio.stage.night
     if processes <= 1:
-        night = studio.stage.night
-        yield from (render(studio.renderer, studio.things(i), camera, SAMPLES, night) for i in frames)
+        yield from (render(studio.renderer, studio.things(i), *how) for i in frames)
         return
     context = multiprocessing.get_context("spawn")
     pool = ProcessPoolExecutor(processes, mp_context=context, initializer=_worker, initargs=(studio.renderer,))
@@ -116,7 +116,7 @@ def _pictures(studio: Studio, frames: range, processes: int) -> Generator[Pictur
                 yield waiting.popleft().result()
             things = studio.things(i)
             with _no_main():
-                waiting.append(pool.submit(_draw, studio.renderer, things, camera, studio.stage.night))
+                waiting.append(pool.submit(_draw, studio.renderer, things, *how))
         while waiting:
             yield waiting.popleft().result()
     except BrokenProcessPool as error:
@@ -125,8 +125,8 @@ def _pictures(studio: Studio, frames: range, processes: int) -> Generator[Pictur
         pool.shutdown(wait=True, cancel_futures=True)
 
 
-def _draw(renderer: str, things: list[Thing], camera: Camera, night: bool) -> Picture:
-    return render(renderer, things, camera, SAMPLES, night)
+def _draw(renderer: str, things: list[Thing], camera: Camera, samples: int, night: bool) -> Picture:
+    return render(renderer, things, camera, samples, night)
 
 
 def _worker(renderer: str) -> None:

@@ -45,6 +45,10 @@ class Refined(Protocol):
 ROW = 1.4
 """Height of a pair of axes [inch], times its share."""
 
+LONGEST = 150
+"""Characters of a scene's title that stand over a figure, at most; and of a word in it, so that lines can be broken."""
+WORD = 30
+
 LABEL = 0.15
 """From one label beside a curve to the next [inch]."""
 
@@ -62,7 +66,7 @@ def energy(run: Recording, path: str | os.PathLike[str]) -> Path:
         curves = [(name, parts[name], color) for name, color in ENERGIES.items() if np.any(parts[name] != 0)]
         _draw(upper, 3.0, t, [*curves, ("total", total, INK)])
         upper.set_ylabel("energy [J]")
-        upper.set_title(figure_title(run, "energy"))
+        upper.set_title(figure_title(run, "energy"), wrap=True)
         drift = energy_changes({**parts, "energy": total})
         lower.axhline(0.0, color=FAINT, linewidth=0.8)
         lower.plot(t, drift, color=INK, linewidth=1.3)
@@ -89,7 +93,7 @@ def ledger(run: Recording, columns: str | Sequence[str], path: str | os.PathLike
             curves = [(n, _column(run, n), PALETTE[k % len(PALETTE)]) for k, n in enumerate(members)]
             _draw(ax, share, t, curves)
             ax.set_ylabel(_label(members, symbol))
-        axes[0].set_title(figure_title(run, ""))
+        axes[0].set_title(figure_title(run, ""), wrap=True)
         axes[-1].set_xlabel("time [s]")
         return save(figure, path)
 
@@ -124,7 +128,7 @@ def beside(
             for line in ax.lines[len(set(begins.values())) + len(PALETTE) :]:
                 line.set_linestyle((0, (4, 1.5)))
             ax.set_ylabel(_label([name], unit(name)))
-        axes[0].set_title(figure_title(first, ""))
+        axes[0].set_title(figure_title(first, ""), wrap=True)
         axes[-1].set_xlabel("time [s]")
         return save(figure, path)
 
@@ -145,7 +149,7 @@ def convergence(study: Refined, path: str | os.PathLike[str]) -> Path:
             _draw(axes[0], 1.8, times, curves)
             axes[0].set_ylabel(_label([name], unit(name)))
             axes[0].set_xlabel("time [s]")
-        axes[0].set_title(figure_title(next(iter(runs.values())), "refined"))
+        axes[0].set_title(figure_title(next(iter(runs.values())), "refined"), wrap=True)
         ax = axes[-1]
         ends: list[tuple[str, float, str]] = []
         finest, top = study.levels - 1, 0.0
@@ -209,10 +213,13 @@ def _label(names: Sequence[str], symbol: str) -> str:
     return f"{words} [{symbol}]".strip() if symbol else words
 
 
-def figure_title(run: Recording, subject: str, width: int = 72) -> str:
-    """The title of the scene and the subject, on as many lines as the figure is wide for."""
-    title = str(run.scene.get("title") or "")
-    return textwrap.fill(f"{title}: {subject}" if title and subject else title or subject, width)
+def figure_title(run: Recording, subject: str) -> str:
+    """The title of the scene, shortened if it is very long, and the subject; Matplotlib wraps it to the figure."""
+    words = str(run.scene.get("title") or "").split()
+    title = " ".join(part for word in words for part in textwrap.wrap(word, WORD))
+    if len(title) > LONGEST:
+        title = f"{title[:LONGEST].rsplit(' ', 1)[0]} …"
+    return f"{title}: {subject}" if title and subject else title or subject
 
 
 @contextlib.contextmanager

@@ -80,9 +80,7 @@ def slices(
             else:
                 ax.set_axis_off()
         plane = f", {AXES[across]} = {where:.3g} m" if grid.flat == 3 else ""
-        figure.suptitle(
-            figure_title(run, f"{name} at {run.time(frame):.3g} s{plane}", 34 * n_columns), x=0.01, ha="left"
-        )
+        figure.suptitle(figure_title(run, f"{name} at {run.time(frame):.3g} s{plane}"), x=0.01, ha="left", wrap=True)
         return save(figure, path, bbox_inches="tight")
 
 

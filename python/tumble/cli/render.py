@@ -12,6 +12,17 @@ from tumble.cli.console import Progress, say
 if TYPE_CHECKING:
     from tumble import Run
 
+SamplesOption = Annotated[
+    int | None,
+    typer.Option(
+        min=1,
+        max=65536,
+        metavar="N",
+        help="Samples per pixel of mitsuba: more are slower, and show finer things.",
+        show_default="16, of films 4",
+    ),
+]
+
 
 def render(
     run: find.RunArgument,
@@ -27,6 +38,7 @@ def render(
     ] = "auto",
     every: Annotated[int, typer.Option(min=1, metavar="N", help="Only every Nth frame of the film.")] = 1,
     size: Annotated[str | None, typer.Option(metavar="WxH", help="Pixels, instead of the scene's.")] = None,
+    samples: SamplesOption = None,
     out: Annotated[Path | None, typer.Option(metavar="FILE", help="The .png or .mp4 to write.")] = None,
 ) -> None:
     """Draw stills or a film of a run.
@@ -37,7 +49,7 @@ def render(
     Examples:
       tumble render out/sheet-on-bunny
       tumble render out/sheet-on-bunny --frame 0 --frame 60
-      tumble render out/sheet-on-bunny --film --size 1280x720
+      tumble render out/sheet-on-bunny --film --size 1280x720 --samples 16
     """
     if as_film and frame:
         raise typer.BadParameter("--film draws all frames and --frame a single one; choose one")
@@ -49,24 +61,28 @@ def render(
         if not -found.n_frames <= i < found.n_frames:
             text = f"frame {i}, expected 0 to {found.n_frames - 1}: the run has {found.n_frames} frames"
             raise typer.BadParameter(text, param_hint="--frame")
-    look_for(renderer)
+    look_for(renderer, samples)
     _ending(out, ".mp4" if as_film else ".png")
     if as_film:
         target = out or found.folder / "film.mp4"
-        film(found, target, renderer, every, pixels)
+        film(found, target, renderer, every, pixels, samples)
         say(target)
         return
     for i in frame or [-1]:
-        say(still(found, i % found.n_frames, out, renderer, pixels))
+        say(still(found, i % found.n_frames, out, renderer, pixels, samples))
 
 
-def look_for(renderer: str) -> None:
-    """Rejects unknown renderers. (One that does not work on this machine fails when it draws.)"""
-    from tumble.pictures import RENDERERS, TRACED
+def look_for(renderer: str, samples: int | None = None) -> None:
+    """Rejects unknown renderers, and samples of one that takes none. (One that does not work here fails when it draws.)"""
+    from tumble.pictures import RENDERERS, TRACED, resolve
 
     known = ["auto", *RENDERERS, TRACED]
     if renderer not in known:
         raise typer.BadParameter(unknown("renderer", renderer, known), param_hint="--renderer")
+    if samples is not None and not (drawn := resolve(renderer)).startswith("mitsuba"):
+        cure = "leave it out" if renderer != "auto" else "leave it out, or pip install 'tumble[pictures]'"
+        text = f"{drawn} would draw, and only mitsuba takes samples: {cure}"
+        raise typer.BadParameter(text, param_hint="--samples")
 
 
 def _ending(path: Path | None, ending: str) -> None:
@@ -88,16 +104,29 @@ def _pixels(text: str | None) -> tuple[int, int] | None:
     return width, height
 
 
-def film(run: "Run", path: Path, renderer: str = "auto", every: int = 1, size: tuple[int, int] | None = None) -> None:
+def film(
+    run: "Run",
+    path: Path,
+    renderer: str = "auto",
+    every: int = 1,
+    size: tuple[int, int] | None = None,
+    samples: int | None = None,
+) -> None:
     """Writes a film, showing progress."""
+    from tumble.film import SAMPLES
     from tumble.film import film as write
 
     with Progress("film") as progress:
-        write(run, path, renderer=renderer, every=every, size=size, progress=progress)
+        write(run, path, renderer, every, size, progress, samples=samples or SAMPLES)
 
 
 def still(
-    run: "Run", i: int, path: Path | None = None, renderer: str = "auto", size: tuple[int, int] | None = None
+    run: "Run",
+    i: int,
+    path: Path | None = None,
+    renderer: str = "auto",
+    size: tuple[int, int] | None = None,
+    samples: int | None = None,
 ) -> Path:
     """Writes a picture of a frame, by default to stills/NNNNNN.png."""
     import io
@@ -105,10 +134,10 @@ def still(
     from matplotlib.image import imsave
 
     from tumble.folder import write_whole, writing
-    from tumble.pictures import picture
+    from tumble.pictures import SAMPLES, picture
 
     path = path or run.folder / "stills" / f"{i:06}.png"
-    pixels = picture(run, i, renderer=renderer, size=size)
+    pixels = picture(run, i, renderer, size, samples or SAMPLES)
     buffer = io.BytesIO()
     imsave(buffer, pixels, format="png")
     with writing(path.parent):

@@ -9,6 +9,7 @@ import typer
 from tumble.bundled import scene_file
 from tumble.cli import find, report
 from tumble.cli.console import Progress, broke, complain, counted, say, stopped, warn_of
+from tumble.cli.render import SamplesOption, look_for
 
 if TYPE_CHECKING:
     from tumble import Run, TumbleError
@@ -31,6 +32,7 @@ def run(
     plot: Annotated[bool | None, typer.Option(help="Write energy.png.", show_default="as the scene says")] = None,
     stills: Annotated[bool, typer.Option(help="Write the stills requested by the scene.")] = True,
     renderer: Annotated[str, typer.Option(metavar="NAME", help="Renderer of film and stills.")] = "auto",
+    samples: SamplesOption = None,
     json: find.JsonOption = False,
 ) -> None:
     """Simulate a scene into a folder, out/NAME by default.
@@ -54,10 +56,9 @@ def run(
     overrides = list(set or ())
     if frames is not None:
         overrides.append(f"time.frames={frames}")
-    from tumble.cli.render import look_for
     from tumble.pictures import resolve
 
-    look_for(renderer)
+    look_for(renderer, samples)
     with find.told_as_json(json):
         checked = find.scene(scene, overrides)
     folder = out if out is not None else find.OUT / scene_file(scene).stem
@@ -84,18 +85,19 @@ def run(
                 checked, folder, resume=resume, threads=threads, progress=progress, overwrite=force, broke=broke
             )
     except StepError as error:
-        again = [*(["--out", str(out)] if out else []), *_flags(flags, renderer)]
+        again = [*(["--out", str(out)] if out else []), *_flags(flags, renderer, samples)]
         print(report.failure(Run(folder), error, scene, overrides, again), file=sys.stderr)
         if json:
             find.say_json(report.as_tree(Run(folder)))
         raise typer.Exit(1) from None
     except KeyboardInterrupt as stop:
-        again = [*(["--out", str(out)] if out else []), "--resume", *_flags(flags, renderer)]
+        again = [*(["--out", str(out)] if out else []), "--resume", *_flags(flags, renderer, samples)]
         _say_what_is_kept(folder, find.command("run", scene, overrides, *again))
         raise typer.Exit(stopped(stop)) from None
 
-    failures = present(done, asked, frames_to_draw, renderer, json)
-    if text := report.gained(done, scene, overrides, [*(["--out", str(out)] if out else []), *_flags(flags, renderer)]):
+    failures = present(done, asked, frames_to_draw, renderer, samples, json)
+    again = [*(["--out", str(out)] if out else []), *_flags(flags, renderer, samples)]
+    if text := report.gained(done, scene, overrides, again):
         print(text, file=sys.stderr)
     judge(done, failures)
 
@@ -117,7 +119,12 @@ def _refuse_empty(scene: dict[str, Any], ply: bool | None, vdb: bool | None) -> 
 
 
 def present(
-    done: "Run", asked: dict[str, bool], stills: list[int], renderer: str, json: bool = False
+    done: "Run",
+    asked: dict[str, bool],
+    stills: list[int],
+    renderer: str,
+    samples: int | None = None,
+    json: bool = False,
 ) -> "list[TumbleError]":
     """Prints the warnings of a finished run, writes the requested output and a summary; returns the outputs that failed."""
     from tumble.lock import alone
@@ -125,7 +132,7 @@ def present(
     warn_of(done.manifest["warnings"])
     try:
         with alone(done.folder):
-            failures = write_results(done, asked, stills, renderer)
+            failures = write_results(done, asked, stills, renderer, samples)
     except KeyboardInterrupt as stop:
         complain(
             f"stopped; the simulation in {done.folder} is complete, see `tumble render --help` and `tumble export --help`"
@@ -149,10 +156,11 @@ def judge(done: "Run", failures: "list[TumbleError]") -> None:
         raise typer.Exit(1)
 
 
-def _flags(asked: dict[str, bool | None], renderer: str) -> list[str]:
+def _flags(asked: dict[str, bool | None], renderer: str, samples: int | None) -> list[str]:
     """The output options, as given."""
     flags = [f"--{'' if wanted else 'no-'}{name}" for name, wanted in asked.items() if wanted is not None]
-    return [*flags, *(["--renderer", renderer] if renderer != "auto" else [])]
+    flags += ["--renderer", renderer] if renderer != "auto" else []
+    return [*flags, *(["--samples", str(samples)] if samples is not None else [])]
 
 
 def _say_what_is_kept(folder: Path, cure: str) -> None:
@@ -166,8 +174,10 @@ def _say_what_is_kept(folder: Path, cure: str) -> None:
     complain(f"stopped; {counted(kept, 'frame')} in {folder} can be read. Continue with\n  {cure}")
 
 
-def write_results(run: "Run", asked: dict[str, bool], stills: list[int], renderer: str) -> "list[TumbleError]":
-    """Writes the output requested by the scene. A failure does not prevent the rest."""
+def write_results(
+    run: "Run", asked: dict[str, bool], stills: list[int], renderer: str, samples: int | None = None
+) -> "list[TumbleError]":
+    """Writes the output requested by the scene, the film last. A failure does not prevent the rest."""
     from tumble import TumbleError
     from tumble.cli.render import film, still
 
@@ -198,16 +208,16 @@ def write_results(run: "Run", asked: dict[str, bool], stills: list[int], rendere
             energy(run, run.folder / "energy.png")
 
     def draw_film() -> None:
-        film(run, run.folder / "film.mp4", renderer)
+        film(run, run.folder / "film.mp4", renderer, samples=samples)
 
     def draw_stills() -> None:
         there = [i for i in stills if i < run.n_frames]
         with Progress("stills") as progress:
             for k, i in enumerate(there):
-                still(run, i, None, renderer)
+                still(run, i, None, renderer, samples=samples)
                 progress(k + 1, len(there))
 
-    tasks = {"plot": plot, "vdb": vdb, "usd": usd, "ply": ply, "film": draw_film, "stills": draw_stills}
+    tasks = {"plot": plot, "vdb": vdb, "usd": usd, "ply": ply, "stills": draw_stills, "film": draw_film}
     for name, task in tasks.items():
         if asked.get(name, True):
             try:

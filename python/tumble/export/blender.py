@@ -15,7 +15,7 @@ from tumble.export.prims import GLOW, roughness
 from tumble.export.usd import fps, surroundings
 from tumble.folder import write_whole
 from tumble.pictures.framing import camera
-from tumble.pictures.things import EXPOSURE, Recording, Stage, by_night, objects
+from tumble.pictures.things import EXPOSURE, Recording, Stage, by_night, objects, with_hair
 
 _DEVELOPED = 0.2
 """Light of a flame in Blender over that in pictures, whose film gathers more before it turns white."""
@@ -46,7 +46,7 @@ def _scene(run: Recording) -> dict[str, Any]:
 
 
 def _parts(run: Recording) -> list[Part]:
-    return parts(run, objects(run), run.frame(0))
+    return parts(run, with_hair(run, objects(run)), run.frame(0))
 
 
 def _looks(run: Recording) -> dict[str, dict[str, Any]]:

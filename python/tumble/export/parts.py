@@ -1,7 +1,7 @@
 """What a stage consists of: the parts of a run, and what each holds in a frame."""
 
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -9,7 +9,7 @@ import numpy.typing as npt
 
 from tumble.looks import SPRING, TRAIL
 from tumble.pictures.surfaces import normals, split
-from tumble.pictures.things import Columns, Object, Recording, colors, positions, radii, torn
+from tumble.pictures.things import Columns, Object, Recording, colors, hair, positions, radii, torn
 
 ROOT = "/scene"
 
@@ -41,6 +41,8 @@ class Part:
     """Result of `surfaces.split` for a solid with sharp edges."""
     taper: npt.NDArray[np.float64] | None = None
     """Radius of each point of a strand of hair."""
+    skin: Object | None = None
+    """What hair is rooted in."""
     trail: bool = False
     """Whether its curves are the ways of points, as long as `Object.trail` says."""
     squares: npt.NDArray[np.int64] | None = None
@@ -133,10 +135,10 @@ def parts(run: Recording, found: list[Object], start: Columns) -> list[Part]:
             counts = np.full(len(shown.guides), shown.points)
             taper = thing.radius * np.sqrt(1.0 - 0.96 * np.linspace(0.0, 1.0, shown.points))
             where = path(thing.name)
-            texture = roots(run, kinds[thing.name][1], thing, start) if thing.name in kinds else None
-            made.append(
-                Part(thing, where, thing.name, "BasisCurves", None, counts, thing.radius, taper=taper, texture=texture)
-            )
+            skin = next((other for other in found if other.name == thing.skin), None)
+            texture = roots(run, kinds[thing.name][1], thing, skin, start) if thing.name in kinds else None
+            own = Part(thing, where, thing.name, "BasisCurves", counts=counts, radius=thing.radius)
+            made.append(replace(own, taper=taper, skin=skin, texture=texture))
         elif thing.form in ("curve", "strands"):
             counts = np.array([len(thing.curve)])
             where = path(thing.name)
@@ -227,13 +229,14 @@ def lattice(words: Mapping[str, Any], thing: Object) -> npt.NDArray[np.float64]:
     return np.asarray(np.stack([u, v], axis=-1).reshape(-1, 2)[thing.triangles.ravel()])
 
 
-def roots(run: Recording, words: Mapping[str, Any], thing: Object, start: Columns) -> npt.NDArray[np.float64] | None:
+def roots(
+    run: Recording, words: Mapping[str, Any], thing: Object, skin: Object | None, start: Columns
+) -> npt.NDArray[np.float64] | None:
     """Texture coordinates of the roots of hair, where the collider that it grows on has some."""
     table = run.static.get(words.get("on") or "", {})
     if "texture" not in table or "position" not in table or thing.strands is None:
         return None
-    strands = thing.strands
-    points = strands.of(positions(start, thing))[:, 0]
+    points = hair(thing, [skin] if skin else [], start)[:, 0]
     vertices = np.asarray(table["position"], dtype=float).reshape(-1, 3)
     triangles = np.asarray(table["triangles"], dtype=np.int64).reshape(-1, 3)
     texture = np.asarray(table["texture"], dtype=float).reshape(-1, 3, 2)
@@ -301,11 +304,12 @@ def values(part: Part, now: Now) -> Iterator[tuple[str, str, Numbers]]:
         return
     if part.taper is not None and part.thing.strands is not None:
         shown = part.thing.strands
-        points = np.ascontiguousarray(shown.of(positions(columns, part.thing)).reshape(-1, 3), dtype=np.float32)
+        curves = hair(part.thing, [part.skin] if part.skin else [], columns)
+        points = np.ascontiguousarray(curves.reshape(-1, 3), dtype=np.float32)
         yield "points", "point3f[]", points
         speeds = velocities(part, now)
         if speeds is not None:
-            moved = shown.of(speeds).reshape(-1, 3)
+            moved = shown.mean(speeds).reshape(-1, 3)
             yield "velocities", "vector3f[]", np.ascontiguousarray(moved, dtype=np.float32)
         yield "extent", "float3[]", _extent(points, np.float32(part.radius))
         return

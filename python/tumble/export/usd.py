@@ -40,7 +40,7 @@ from tumble.folder import writing
 from tumble.pictures.framing import camera
 from tumble.pictures.look import NIGHT, key_light
 from tumble.pictures.splats import DIM
-from tumble.pictures.things import Columns, Recording, by_night, objects
+from tumble.pictures.things import Columns, Recording, by_night, objects, with_hair
 
 SENSOR = 0.36
 """Width of the camera's sensor [tenth of a metre], the unit that USD takes for lenses."""
@@ -60,7 +60,7 @@ def write(
     goal = Path(folder)
     layers = goal / "usd"
     start = run.frame(0)
-    things = objects(run)
+    things = with_hair(run, objects(run))
     made, history = parts(run, things, start), History(things)
     beginning = history.ways(run.time(0), start)
     digits = max(DIGITS, len(str(run.n_frames - 1)))

@@ -41,14 +41,14 @@ TRACED = "mitsuba-smoke"
 """Mitsuba for smoke, too."""
 
 PROBES = {
-    "mitsuba": "import mitsuba; mitsuba.set_variant('scalar_rgb')",
+    "mitsuba": "import mitsuba, mitsuba_oidn; mitsuba.set_variant('scalar_rgb')",
     "pyvista": "import pyvista as pv; p = pv.Plotter(off_screen=True, window_size=[32, 32]); p.add_mesh(pv.Sphere()); "
     "assert p.screenshot(return_img=True).std() > 0",
 }
 """Requirements of a renderer. They are tried in a separate process: without EGL, VTK ends the process."""
 
 SAMPLES = 16
-"""Samples per pixel of stills."""
+"""Samples per pixel of stills, as mitsuba takes them."""
 
 THINNEST = 0.0015
 """Spheres and tubes are drawn at least this thick, in pictures' widths of radius, so that nothing is lost."""
@@ -76,9 +76,12 @@ def resolve(renderer: str = "auto") -> str:
     return renderer
 
 
-def picture(run: Recording, i: int, renderer: str = "auto", size: tuple[int, int] | None = None) -> Picture:
-    """A picture of frame i, in sRGB; the size is that of the scene's camera if not given. Raises ExportError."""
-    return Studio(run, renderer, size).picture(i)
+def picture(
+    run: Recording, i: int, renderer: str = "auto", size: tuple[int, int] | None = None, samples: int = SAMPLES
+) -> Picture:
+    """A picture of frame i, in sRGB; the size is that of the scene's camera if not given. `samples` per pixel are what
+    mitsuba takes. Raises ExportError."""
+    return Studio(run, renderer, size, samples).picture(i)
 
 
 class Studio:
@@ -93,7 +96,7 @@ class Studio:
             raise ExportError("the run has no frames")
         self.run = run
         self.renderer = resolve(renderer)
-        self.samples = samples
+        self.samples = whole(samples, "samples", 1, ExportError)
         points = functools.cache(lambda: framing.outline(run))
         self.camera = framing.camera(run, size, points)
         self.stage = Stage(run, self.camera.axes[2])

@@ -7,8 +7,16 @@ import numpy as np
 import numpy.typing as npt
 
 from tumble.pictures.strands import Hair, prisms
-from tumble.pictures.surfaces import Floats, Indices, balls, tubes
+from tumble.pictures.surfaces import Floats, Indices, balls, rounded, thickened, tubes
 from tumble.style import Rgb
+
+ROUND = 8.0
+"""Pixels that a side of a triangle of fabric is long, at most,"""
+MOST = 150_000
+"""as long as there are no more triangles than these, both sides of it counted."""
+
+THIN = 0.8
+"""Pixels that fabric is thick, at least."""
 
 
 @dataclass(frozen=True)
@@ -21,6 +29,8 @@ class Mesh:
     normals: Floats
     color: Rgb
     fabric: bool = False
+    thickness: float = 0.0
+    """Of fabric; half of it on either side."""
     closed: bool = False
     """Whether only the side to which the normals point can be seen."""
 
@@ -114,7 +124,7 @@ def placed(things: list[Thing], origin: Floats, scale: float) -> list[Thing]:
     out: list[Thing] = []
     for t in things:
         if isinstance(t, Mesh):
-            out.append(replace(t, vertices=(t.vertices - origin) / scale))
+            out.append(replace(t, vertices=(t.vertices - origin) / scale, thickness=t.thickness / scale))
         elif isinstance(t, Spheres):
             out.append(replace(t, centers=(t.centers - origin) / scale, radii=t.radii / scale))
         elif isinstance(t, Tubes):
@@ -134,6 +144,20 @@ def placed(things: list[Thing], origin: Floats, scale: float) -> list[Thing]:
         else:
             out.append(replace(t, point=(t.point - origin) / scale))
     return out
+
+
+def finished(thing: Mesh, pixel: float) -> Mesh:
+    """Fabric, round to the size of a pixel and with its thickness; any other mesh as it is."""
+    if not thing.fabric or not len(thing.triangles):
+        return thing
+    x, triangles = thing.vertices, thing.triangles
+    corners = x[triangles]
+    side = float(np.mean(np.linalg.norm(corners - np.roll(corners, 1, axis=1), axis=2)))
+    while side > ROUND * pixel and 8 * len(triangles) <= MOST:
+        x, triangles = rounded(x, triangles)
+        side /= 2
+    x, triangles, n = thickened(x, triangles, max(thing.thickness, THIN * pixel))
+    return replace(thing, vertices=x, triangles=triangles, normals=n)
 
 
 def as_triangles(thing: Body, finer: int = 2) -> tuple[Floats, Indices, Floats]:

@@ -1,11 +1,14 @@
 """Pictures by path tracing (Mitsuba 3, `scalar_rgb`): soft key light, bright surroundings, cloth with a sheen.
 
-Three renders make a picture: the light itself; what covers the ground, by the same samples, so that the ground can
-be faded into the background without touching the edges in front of it; and normals and places, which guide `denoise`
-in taking out the noise of few samples per pixel.
+Two renders make a picture: the light itself; and colours and cover of all but the ground, by the same samples. By the
+cover the ground is faded into the background without touching the edges in front of it; the colours tell the denoiser
+(Intel Open Image Denoise) what is an edge and what is the noise of few samples per pixel.
 """
 
+import functools
 import tempfile
+from collections.abc import Callable
+from dataclasses import replace
 from itertools import pairwise
 from pathlib import Path
 from typing import Any
@@ -13,12 +16,11 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from tumble.pictures.denoise import denoise
-from tumble.pictures.drawn import Body, Ground, Mesh, Smoke, Spheres, Thing, Tubes, as_triangles
+from tumble.pictures.drawn import Body, Ground, Mesh, Smoke, Spheres, Thing, Tubes, finished
 from tumble.pictures.framing import Camera
 from tumble.pictures.look import FADE, background, fading, key_light, soften
 from tumble.pictures.strands import Hair
-from tumble.pictures.surfaces import Floats, Indices, balls, joined, turned, unit
+from tumble.pictures.surfaces import Floats, Indices, balls, turned, unit
 from tumble.style import Rgb, display
 
 MANY = 20_000
@@ -40,10 +42,15 @@ KEY_DISTANCE = 1000.0
 
 PATHS = {"type": "path", "max_depth": 5, "hide_emitters": True}
 THROUGH_SMOKE = {"type": "volpath", "max_depth": 24, "rr_depth": 12, "hide_emitters": True}
-COVER = {"type": "depth"}
-GUIDES = {"type": "aov", "aovs": "normal:sh_normal,place:position"}
+COLORS = {"type": "path", "max_depth": 1}
+
+MIRROR = 16
+"""Pixels that the denoiser is shown of a picture beyond its sides; its network halves sizes four times."""
 
 Picture = npt.NDArray[np.uint8]
+
+Look = Callable[[Rgb, bool], dict[str, Any]]
+"""What shapes of a colour, of fabric or not, are made with."""
 
 
 def draw(things: list[Thing], camera: Camera, samples: int) -> Picture:
@@ -55,32 +62,57 @@ def draw(things: list[Thing], camera: Camera, samples: int) -> Picture:
     mi.set_log_level(mi.LogLevel.Error)
     grounds = [t for t in things if isinstance(t, Ground)]
     floors = {f"ground {k}": _ground(mi, t, camera) for k, t in enumerate(grounds)}
-    bodies = [t for t in things if isinstance(t, Body)]
+    bodies = [_seen(t, camera) if isinstance(t, Mesh) else t for t in things if isinstance(t, Body)]
     with tempfile.TemporaryDirectory() as folder:
-        shapes = _shapes(mi, bodies, camera, Path(folder))
+        shapes = _shapes(mi, bodies, Path(folder), _matter)
         smoke = {f"smoke {k}": _smoke(mi, t) for k, t in enumerate(things) if isinstance(t, Smoke)}
-        light = _render(mi, camera, samples, THROUGH_SMOKE if smoke else PATHS, shapes | floors | smoke)
-        cover = _render(mi, camera, samples, COVER, shapes)[..., 3:] if grounds else None
-    guides = _render(mi, camera, 1, GUIDES, _proxies(mi, bodies) | floors)
-    shown = light[..., :3] + (1 - light[..., 3:]) * background(camera.size)
-    if cover is not None:
-        haze, gone = _haze(grounds, camera)
+        light = _render(mi, _studio(mi, camera, samples, THROUGH_SMOKE if smoke else PATHS) | shapes | floors | smoke)
+        glowing = _shapes(mi, bodies, Path(folder), _glowing)
+        colors = _render(mi, _sight(mi, camera, samples, COLORS) | glowing)
+    sky = background(camera.size)
+    behind = 1 - light[..., 3:]
+    shown, seen = light[..., :3] + behind * sky, colors[..., :3] + behind * sky
+    if grounds:
+        haze, paint, gone = _haze(grounds, camera)
+        cover = colors[..., 3:]
         shown += (light[..., 3:] - cover) * haze
-        shown = np.where(gone & (cover == 0), background(camera.size), shown)
-    shown = denoise(shown, unit(guides[..., -6:-3]), guides[..., -3:], camera.pixel)
-    return np.round(255 * display(soften(shown))).astype(np.uint8)
+        seen += (light[..., 3:] - cover) * paint
+        shown = np.where(gone & (cover == 0), sky, shown)
+    return np.round(255 * display(soften(denoise(shown, seen)))).astype(np.uint8)
 
 
-def _render(mi: Any, camera: Camera, samples: int, integrator: dict[str, Any], shapes: dict[str, Any]) -> Floats:
+def denoise(light: Floats, colors: Floats) -> Floats:
+    """The picture without noise. `colors` are those of what is seen, noisy, too, where edges run through pixels; both are
+    height x width x 3."""
+    import mitsuba_oidn as oidn
+
+    height, width, _ = light.shape
+    # The network sees black beyond the sides, and leaves dots there: it gets a mirror instead.
+    beyond = [(MIRROR, MIRROR + -n % MIRROR) for n in (height, width)]
+    image, albedo = (
+        np.pad(np.asarray(x, dtype=np.float32), [*beyond, (0, 0)], mode="symmetric")
+        for x in (light, np.clip(colors, 0.0, 1.0))
+    )
+    # The same processor for all pictures, whatever else there is: others round differently.
+    clean = oidn.denoise(image, albedo, hdr=True, device=_processor())
+    return np.asarray(clean[MIRROR:][:height, MIRROR:][:, :width], dtype=np.float64)
+
+
+@functools.cache
+def _processor() -> Any:
+    import mitsuba_oidn as oidn
+
+    return oidn.Device(oidn.DeviceType.CPU)
+
+
+def _render(mi: Any, scene: dict[str, Any]) -> Floats:
     """Layers of a picture. The same samples see the same points of the picture, whatever the integrator."""
-    scene = mi.load_dict(_studio(mi, camera, samples, integrator) | shapes)
-    return np.array(mi.render(scene, seed=0), dtype=np.float64)
+    return np.array(mi.render(mi.load_dict(scene), seed=0), dtype=np.float64)
 
 
-def _studio(mi: Any, camera: Camera, samples: int, integrator: dict[str, Any]) -> dict[str, Any]:
-    """Camera and lights."""
+def _sight(mi: Any, camera: Camera, samples: int, integrator: dict[str, Any]) -> dict[str, Any]:
+    """Camera without lights."""
     place = mi.ScalarTransform4f
-    light = key_light(camera)
     to_world = place().look_at(
         origin=camera.position.tolist(), target=camera.target.tolist(), up=camera.axes[1].tolist()
     )
@@ -103,10 +135,14 @@ def _studio(mi: Any, camera: Camera, samples: int, integrator: dict[str, Any]) -
         },
         "sampler": {"type": "multijitter" if samples > 1 else "independent", "sample_count": samples},
     }
-    return {
-        "type": "scene",
-        "integrator": integrator,
-        "sensor": sensor,
+    return {"type": "scene", "integrator": integrator, "sensor": sensor}
+
+
+def _studio(mi: Any, camera: Camera, samples: int, integrator: dict[str, Any]) -> dict[str, Any]:
+    """Camera and lights."""
+    place = mi.ScalarTransform4f
+    light = key_light(camera)
+    return _sight(mi, camera, samples, integrator) | {
         "surroundings": {
             "type": "envmap",
             "bitmap": mi.Bitmap(_surroundings(camera).astype(np.float32)),
@@ -141,19 +177,29 @@ def _sphere() -> tuple[Floats, Floats]:
     return d, np.sin(polar) * (np.pi / 64) * (2 * np.pi / 128)
 
 
-def _shapes(mi: Any, bodies: list[Body], camera: Camera, folder: Path) -> dict[str, Any]:
+def _seen(thing: Mesh, camera: Camera) -> Mesh:
+    """A mesh as fine as its picture, without normals that contradict what is seen."""
+    if not camera.parallel:  # Seen head-on, in a plane, cloth is a line.
+        thing = finished(thing, camera.pixel)
+    if not len(thing.triangles):
+        return thing
+    x, triangles, n = turned(thing.vertices, thing.triangles, thing.normals, camera.eye)
+    return replace(thing, vertices=x, triangles=triangles, normals=n)
+
+
+def _shapes(mi: Any, bodies: list[Body], folder: Path, look: Look) -> dict[str, Any]:
     shapes: dict[str, Any] = {}
     for k, thing in enumerate(bodies):
         found: dict[str, Any] = {}
         if isinstance(thing, Spheres):
-            found = _spheres(mi, thing)
+            found = _spheres(mi, thing, look)
         elif isinstance(thing, Tubes):
-            found = _tubes(mi, thing, folder / f"{k}.txt")
+            found = _tubes(thing, folder / f"{k}.txt", look)
         elif isinstance(thing, Hair):
-            found = _hair(mi, thing, folder / f"{k}")
+            found = _hair(thing, folder / f"{k}", look)
         elif isinstance(thing, Mesh) and len(thing.triangles):
-            look = mi.load_dict(_bsdf(thing.color, thing.fabric))
-            found = {"": _mesh(mi, *turned(thing.vertices, thing.triangles, thing.normals, camera.eye), look)}
+            surface = thing.vertices, thing.triangles, thing.normals
+            found = {"": _mesh(mi, *surface, look(thing.color, thing.fabric))}
         shapes |= {f"{k} {name}": shape for name, shape in found.items()}
     return shapes
 
@@ -178,39 +224,31 @@ def _smoke(mi: Any, thing: Smoke) -> dict[str, Any]:
     }
 
 
-def _proxies(mi: Any, bodies: list[Body]) -> dict[str, Any]:
-    """The same shapes as one mesh: the integrator for guides slows down with the number of shapes."""
-    vertices, triangles, normals = joined([as_triangles(t) for t in bodies])
-    if not len(triangles):
-        return {}
-    return {"bodies": _mesh(mi, vertices, triangles, normals, mi.load_dict({"type": "diffuse"}))}
-
-
-def _spheres(mi: Any, thing: Spheres) -> dict[str, Any]:
-    look = mi.load_dict(_bsdf(thing.color, False))
+def _spheres(mi: Any, thing: Spheres, look: Look) -> dict[str, Any]:
+    made = look(thing.color, False)
     if len(thing.centers) > MANY:
-        return {"": _mesh(mi, *balls(thing.centers, thing.radii, 1), look)}
+        return {"": _mesh(mi, *balls(thing.centers, thing.radii, 1), made)}
     pairs = zip(thing.centers.tolist(), thing.radii.tolist(), strict=True)
-    return {f"{j}": {"type": "sphere", "center": c, "radius": r, "bsdf": look} for j, (c, r) in enumerate(pairs)}
+    return {f"{j}": {"type": "sphere", "center": c, "radius": r, **made} for j, (c, r) in enumerate(pairs)}
 
 
-def _tubes(mi: Any, thing: Tubes, file: Path) -> dict[str, Any]:
+def _tubes(thing: Tubes, file: Path, look: Look) -> dict[str, Any]:
     starts = np.concatenate([[0], np.cumsum(thing.counts)])
     curves = [thing.points[a:b] for a, b in pairwise(starts.tolist()) if b - a > 1]
     if not curves:
         return {}
     rows = ("\n".join(f"{x:.9g} {y:.9g} {z:.9g} {thing.radius:.9g}" for x, y, z in c.tolist()) for c in curves)
     file.write_text("\n\n".join(rows) + "\n")
-    look = mi.load_dict(_bsdf(thing.color, False))
-    parts: dict[str, Any] = {"": {"type": "linearcurve", "filename": str(file), "bsdf": look}}
+    made = look(thing.color, False)
+    parts: dict[str, Any] = {"": {"type": "linearcurve", "filename": str(file), **made}}
     if len(curves) <= FEW:
         ends = [p for c in curves for p in (c[0].tolist(), c[-1].tolist())]
         for j, p in enumerate(ends):
-            parts[f"{j}"] = {"type": "sphere", "center": p, "radius": thing.radius, "bsdf": look}
+            parts[f"{j}"] = {"type": "sphere", "center": p, "radius": thing.radius, **made}
     return parts
 
 
-def _hair(mi: Any, thing: Hair, stem: Path) -> dict[str, Any]:
+def _hair(thing: Hair, stem: Path, look: Look) -> dict[str, Any]:
     """Strands in a few shades, as curves."""
     parts: dict[str, Any] = {}
     for j, shade in enumerate(SHADES):
@@ -222,8 +260,8 @@ def _hair(mi: Any, thing: Hair, stem: Path) -> dict[str, Any]:
         file = stem.with_name(f"{stem.name}-{j}.txt")
         file.write_text("".join(line % tuple(strand) for strand in rows.reshape(len(rows), -1).tolist()))
         r, g, b = thing.color
-        look = mi.load_dict(_bsdf((r * shade, g * shade, b * shade), False))
-        parts[f"{j}"] = {"type": "linearcurve", "filename": str(file), "bsdf": look}
+        made = look((r * shade, g * shade, b * shade), False)
+        parts[f"{j}"] = {"type": "linearcurve", "filename": str(file), **made}
     return parts
 
 
@@ -244,8 +282,8 @@ def _foot(thing: Ground, camera: Camera) -> Floats:
     return camera.target - thing.normal * float((camera.target - thing.point) @ thing.normal)
 
 
-def _haze(grounds: list[Ground], camera: Camera) -> tuple[Floats, npt.NDArray[np.bool_]]:
-    """Light to add to the ground so that it fades into the background, and the mask where it has.
+def _haze(grounds: list[Ground], camera: Camera) -> tuple[Floats, Floats, npt.NDArray[np.bool_]]:
+    """Light to add to the ground so that it fades into the background, its colours as it fades, and the mask where it has.
 
     Only the difference between the open ground and the background is added, so that no edge in front of it changes.
     """
@@ -253,8 +291,9 @@ def _haze(grounds: list[Ground], camera: Camera) -> tuple[Floats, npt.NDArray[np
     x, y = np.meshgrid((np.arange(width) + 0.5) / width - 0.5, 0.5 - (np.arange(height) + 0.5) / height)
     right, up, forward = camera.axes
     rays = forward * camera.distance + (x[..., None] * right * camera.width + y[..., None] * up * camera.height)
+    sky = background(camera.size)
     nearest = np.full((height, width), np.inf)
-    haze = np.zeros((height, width, 3))
+    haze, paint = np.zeros((height, width, 3)), sky.copy()
     fade = np.ones((height, width, 1))
     for ground in grounds:
         with np.errstate(divide="ignore", invalid="ignore"):
@@ -262,10 +301,10 @@ def _haze(grounds: list[Ground], camera: Camera) -> tuple[Floats, npt.NDArray[np
         hit = (depth > 0) & (depth < nearest)
         nearest[hit] = depth[hit]
         away = np.linalg.norm(camera.position + rays[hit] * depth[hit][:, None] - camera.target, axis=-1)
-        gap = background(camera.size)[hit] - _open_light(ground, camera)
         fade[hit] = fading(away / camera.width)[:, None]
-        haze[hit] = fade[hit] * gap
-    return haze, fade > 0.9999
+        haze[hit] = fade[hit] * (sky[hit] - _open_light(ground, camera))
+        paint[hit] = fade[hit] * sky[hit] + (1 - fade[hit]) * np.array(ground.color)
+    return haze, paint, fade > 0.9999
 
 
 def _open_light(ground: Ground, camera: Camera) -> Floats:
@@ -277,9 +316,10 @@ def _open_light(ground: Ground, camera: Camera) -> Floats:
     return np.asarray(np.array(ground.color) * (around + key) / np.pi)
 
 
-def _mesh(mi: Any, vertices: Floats, triangles: Indices, normals: Floats, look: Any) -> Any:
+def _mesh(mi: Any, vertices: Floats, triangles: Indices, normals: Floats, look: dict[str, Any]) -> Any:
     props = mi.Properties()
-    props["bsdf"] = look
+    for name, part in look.items():
+        props[name] = mi.load_dict(part) if isinstance(part, dict) else part
     mesh = mi.Mesh("mesh", len(vertices), len(triangles), has_vertex_normals=True, props=props)
     values = mi.traverse(mesh)
     values["vertex_positions"] = vertices.astype(np.float32).ravel()
@@ -289,10 +329,19 @@ def _mesh(mi: Any, vertices: Floats, triangles: Indices, normals: Floats, look: 
     return mesh
 
 
-def _bsdf(color: Rgb, fabric: bool) -> dict[str, Any]:
+def _matter(color: Rgb, fabric: bool) -> dict[str, Any]:
+    """What scatters light: one for all shapes of a thing."""
+    import mitsuba as mi
+
     base = {"type": "rgb", "value": np.clip(color, 0.0, 0.95).tolist()}
     if fabric:
         look = {"roughness": 0.85, "specular": 0.25, "sheen": 0.6, "sheen_tint": 0.6}
     else:
         look = {"roughness": 0.35, "specular": 0.5}
-    return {"type": "twosided", "bsdf": {"type": "principled", "base_color": base, **look}}
+    bsdf = {"type": "principled", "base_color": base, **look}
+    return {"bsdf": mi.load_dict({"type": "twosided", "bsdf": bsdf})}
+
+
+def _glowing(color: Rgb, fabric: bool) -> dict[str, Any]:
+    """What is seen in its colour without any light: one for each shape."""
+    return {"emitter": {"type": "area", "radiance": {"type": "rgb", "value": np.clip(color, 0.0, 1.0).tolist()}}}

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from tumble.pictures.drawn import Body, Ground, Mesh, Thing, as_triangles
+from tumble.pictures.drawn import Body, Ground, Mesh, Thing, as_triangles, finished
 from tumble.pictures.framing import Camera
 from tumble.pictures.look import SKY, key_light, painted
 from tumble.pictures.surfaces import Floats, Indices
@@ -35,6 +35,8 @@ def draw(things: list[Thing], camera: Camera) -> npt.NDArray[np.uint8]:
                 continue
             if not isinstance(thing, Body):
                 continue
+            if isinstance(thing, Mesh) and not camera.parallel:
+                thing = finished(thing, camera.pixel)
             vertices, triangles, normals = as_triangles(thing, 3)
             if not len(triangles):
                 continue

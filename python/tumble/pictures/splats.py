@@ -26,6 +26,11 @@ NEAR = 0.02
 THIN = 0.02
 """Scenery this much nearer than all around it, within two pixels, is thin; in distances of the camera."""
 
+LONG = 400.0
+"""Triangles with longer sides than these, in pixels, are wide."""
+WIDE = 100
+"""Up to so many wide triangles of a thing are met by each line of sight."""
+
 CHUNK = 1 << 21
 """Pieces of balls that are looked at together."""
 
@@ -92,12 +97,18 @@ def _hide(found: Floats, thing: Body, camera: Camera) -> None:
     width, height = camera.size
     corners = vertices[triangles]
     seen = camera.project(vertices)[triangles]
-    whole = (seen[..., 2] > NEAR).all(axis=1)
+    whole = np.asarray((seen[..., 2] > NEAR).all(axis=1))
     sides = np.linalg.norm((np.roll(seen, -1, axis=1) - seen)[..., :2], axis=2)
     # The longest side first: points lie in rows along it.
     turn = (np.argmax(sides, axis=1)[:, None] + np.arange(3)) % 3
     corners, seen = (np.take_along_axis(x, turn[..., None], axis=1) for x in (corners, seen))
     edges = sides.max(axis=1)
+    # Points on those that are wider would be too far apart, or too many.
+    wide = np.asarray(~whole | (edges > LONG))
+    if wide.sum() <= WIDE:
+        for triangle in corners[wide]:
+            _cut(found, triangle, camera)
+        whole, corners, seen, edges = whole[~wide], corners[~wide], seen[~wide], edges[~wide]
     (ax, ay), (bx, by) = (seen[:, 1] - seen[:, 0])[:, :2].T, (seen[:, 2] - seen[:, 0])[:, :2].T
     with np.errstate(invalid="ignore"):
         high = np.nan_to_num(np.abs(ax * by - ay * bx) / np.maximum(edges, 1e-12))
@@ -122,6 +133,19 @@ def _hide(found: Floats, thing: Body, camera: Camera) -> None:
             inside = (x >= 0) & (x < width) & (y >= 0) & (y < height) & (z > NEAR)
             inside &= (np.abs(x % 1 - 0.5) < 0.3) & (np.abs(y % 1 - 0.5) < 0.3)
             np.minimum.at(found, y[inside].astype(int) * width + x[inside].astype(int), z[inside])
+
+
+def _cut(found: Floats, triangle: Floats, camera: Camera) -> None:
+    """Lowers depths to where lines of sight go through a triangle."""
+    rays, start = (x.reshape(-1, 3) for x in sights(camera))
+    normal = np.cross(triangle[1] - triangle[0], triangle[2] - triangle[0])
+    with np.errstate(divide="ignore", invalid="ignore"):
+        away = (triangle[0] - start) @ normal / (rays @ normal)
+        place = start + rays * away[:, None]
+        inside = np.asarray(away > NEAR)
+        for a, b in zip(triangle, np.roll(triangle, -1, axis=0), strict=True):
+            inside &= (place - a) @ np.cross(normal, b - a) >= 0
+    found[inside] = np.minimum(found[inside], away[inside])
 
 
 # Day

@@ -16,6 +16,9 @@ SHARP = 40.0
 RIM = 0.08
 """Cosine by which normals face the eye at least, at rims."""
 
+RIM_ANGLES = (-90.0, -45.0, 0.0, 45.0, 90.0)
+"""Points around the rim of cloth [°], from its lower side to its upper one."""
+
 
 def unit(v: Floats) -> Floats:
     """Rows scaled to length 1; zero rows stay zero."""
@@ -46,7 +49,7 @@ def split(vertices: Floats, triangles: Indices) -> tuple[Indices, Indices]:
     belong together if they meet at a vertex and an edge that is not sharp leads from one to the other.
     """
     m = len(triangles)
-    edges = np.sort(np.stack([triangles, np.roll(triangles, -1, axis=1)], axis=-1), axis=-1).reshape(-1, 2)
+    edges = _sides(triangles)
     order = np.lexsort((edges[:, 1], edges[:, 0]))
     same = np.all(edges[order][1:] == edges[order][:-1], axis=1)
     first, second = order[:-1][same], order[1:][same]
@@ -76,6 +79,70 @@ def split(vertices: Floats, triangles: Indices) -> tuple[Indices, Indices]:
             break
     roots, fresh = np.unique(label, return_inverse=True)
     return corners[roots], fresh.reshape(-1, 3)
+
+
+def rounded(vertices: Floats, triangles: Indices) -> tuple[Floats, Indices]:
+    """Each triangle as four that lie on a smooth surface through the same vertices; vertices that there were come first.
+
+    Middles of edges are those of curved point-normal triangles; edges stay straight where the normals of their ends are
+    far from those of their triangles, as beside creases. Source: [vlachos2001].
+    """
+    edges, edge, _ = _edges(triangles)
+    ab, bc, ca = len(vertices) + edge.reshape(-1, 3).T
+    a, b = vertices[edges].transpose(1, 0, 2)
+    around = normals(vertices, triangles)
+    n, m = around[edges].transpose(1, 0, 2)
+    lift = n * np.sum((b - a) * n, axis=1, keepdims=True) + m * np.sum((a - b) * m, axis=1, keepdims=True)
+    leaning = np.einsum("mkc,mc->mk", around[triangles], unit(face_normals(vertices, triangles)))
+    most = np.ones(len(edges))
+    np.minimum.at(most, edge, np.minimum(leaning, np.roll(leaning, -1, axis=1)).ravel())
+    lift[most < np.cos(np.radians(SHARP))] = 0.0
+    i, j, k = triangles.T
+    parts = [(i, ab, ca), (j, bc, ab), (k, ca, bc), (ab, bc, ca)]
+    return np.concatenate([vertices, 0.5 * (a + b) - lift / 8]), np.concatenate([np.stack(p, axis=1) for p in parts])
+
+
+def thickened(vertices: Floats, triangles: Indices, thickness: float) -> tuple[Floats, Indices, Floats]:
+    """An open surface with half of a thickness on either side and a round rim: vertices, triangles and normals. A closed
+    one, whose thickness cannot be seen, as it is."""
+    n = normals(vertices, triangles)
+    _, edge, count = _edges(triangles)
+    rim = np.stack([triangles, np.roll(triangles, -1, axis=1)], axis=-1).reshape(-1, 2)[count[edge] == 1]
+    if not len(rim) or not thickness > 0.0:
+        return vertices, triangles, n
+    # Outward at the rim: across its edges, along the surface.
+    across = np.cross(vertices[rim[:, 1]] - vertices[rim[:, 0]], n[rim[:, 0]] + n[rim[:, 1]])
+    ends, place = np.unique(rim, return_inverse=True)
+    start, stop = place.reshape(-1, 2).T
+    out = np.zeros((len(ends), 3))
+    for end in (start, stop):
+        np.add.at(out, end, across)
+    out = unit(out)
+    angles = np.radians(RIM_ANGLES)
+    ring = np.sin(angles)[:, None, None] * n[ends] + np.cos(angles)[:, None, None] * out
+    around = vertices[ends] + 0.5 * thickness * ring
+    k, first = len(ends), 2 * len(vertices)
+    strips = []
+    for row in range(len(angles) - 1):
+        p, q = first + row * k + start, first + row * k + stop
+        strips += [np.stack([p, q, q + k], axis=1), np.stack([p, q + k, p + k], axis=1)]
+    up = 0.5 * thickness * n
+    shown = np.concatenate([vertices + up, vertices - up, around.reshape(-1, 3)])
+    faces = np.concatenate([triangles, triangles[:, ::-1] + len(vertices), *strips])
+    return shown, faces, np.concatenate([n, -n, ring.reshape(-1, 3)])
+
+
+def _edges(triangles: Indices) -> tuple[Indices, Indices, Indices]:
+    """Edges, n x 2; which of them each side of a triangle is; and how many triangles each has."""
+    sides = _sides(triangles)
+    size = int(triangles.max(initial=0)) + 1
+    keys, index, count = np.unique(sides[:, 0] * size + sides[:, 1], return_inverse=True, return_counts=True)
+    return np.stack([keys // size, keys % size], axis=1), index, count
+
+
+def _sides(triangles: Indices) -> Indices:
+    """The edges of triangles, one after the other, each from its lower vertex to its higher one."""
+    return np.sort(np.stack([triangles, np.roll(triangles, -1, axis=1)], axis=-1).reshape(-1, 2), axis=1)
 
 
 def turned(vertices: Floats, triangles: Indices, shading: Floats, eye: Floats) -> tuple[Floats, Indices, Floats]:
@@ -175,11 +242,6 @@ def _icosphere(finer: int) -> tuple[Floats, Indices]:
     points = unit(np.array(corners, dtype=float))
     triangles = np.array([[int(c, 16) for c in face] for face in faces.split()])
     for _ in range(finer):
-        t = triangles.T
-        pairs = np.sort(np.stack([t, np.roll(t, -1, axis=0)], axis=-1), axis=-1).reshape(-1, 2)
-        edges, edge = np.unique(pairs, axis=0, return_inverse=True)
-        ab, bc, ca = len(points) + edge.reshape(3, -1)
-        points = np.concatenate([points, unit(points[edges[:, 0]] + points[edges[:, 1]])])
-        parts = [(t[0], ab, ca), (t[1], bc, ab), (t[2], ca, bc), (ab, bc, ca)]
-        triangles = np.concatenate([np.stack(p, axis=1) for p in parts])
+        points, triangles = rounded(points, triangles)
+        points = unit(points)
     return points, triangles

@@ -20,7 +20,7 @@ from tumble.grids import Box
 from tumble.looks import CELLS, DRAWN_ON, GLOWING, MAPS, MASSES, SHADE, SHOWN, SOLID, SPRING, TRAIL, Looks
 from tumble.pictures.blackbody import developed, glow
 from tumble.pictures.drawn import Cloud, Ground, Image, Mesh, Smoke, Spheres, Thing, Tubes
-from tumble.pictures.strands import Strands, strands
+from tumble.pictures.strands import Skin, Strands, strands
 from tumble.pictures.surfaces import Floats, Indices, normals, outward, split
 from tumble.style import Rgb, linear
 
@@ -84,7 +84,9 @@ class Object:
     links: Indices = field(default_factory=lambda: np.zeros((0, 2), dtype=np.int64))
     curve: Indices = field(default_factory=lambda: np.zeros(0, dtype=np.int64))
     strands: Strands | None = None
-    """Hair: the curves that are drawn."""
+    """Hair: the curves that are drawn,"""
+    skin: str | None = None
+    """and the collider that they are rooted in."""
     position: Floats | None = None
     """Vertices [m] of what does not move."""
     plane: tuple[Floats, Floats] | None = None
@@ -135,20 +137,18 @@ DYE = 3.0
 THICKER = 3
 """An object of few masses is drawn at least this many times as thick as the thinnest."""
 
+ROOM = 1.8
+"""Thickness of a surface over its distance from colliders, at most: they do not show through it."""
+
 HAIR = 0.3
 """Radius of the thinnest strand, over that of the thinnest of other things."""
 
 
 def objects(run: Recording) -> list[Object]:
-    """The objects of a run, in its order."""
-    start = run.frame(0) if run.n_frames else {}
+    """The objects of a run, in its order; of hair without the curves that are drawn (`with_hair`)."""
     found: list[Object] = []
     for look in run.looks.objects:
         columns = run.static.get(look.object, {})
-        per_strand = int(np.ravel(columns.get("curve_points", 0))[0])
-        tufts = None
-        if per_strand > 0 and "position" in start.get(look.object, {}):
-            tufts = strands(start[look.object]["position"], per_strand, look.strands)
         found.append(
             Object(
                 name=look.object,
@@ -162,13 +162,43 @@ def objects(run: Recording) -> list[Object]:
                 texture=np.asarray(columns["texture"]).reshape(-1, 2) if "texture" in columns else None,
                 links=_indices(columns, "links", 2),
                 curve=_indices(columns, "curve", 1).ravel(),
-                strands=tufts,
                 position=np.asarray(columns["position"], dtype=float).reshape(-1, 3) if "position" in columns else None,
                 plane=None if look.plane is None else (np.array(look.plane[0]), np.array(look.plane[1])),
                 grid=grids.box(columns) if look.form in CELLS else None,
             )
         )
     return found
+
+
+def with_hair(run: Recording, found: list[Object]) -> list[Object]:
+    """The objects of a run, hair with the curves that are drawn."""
+    start = run.frame(0) if run.n_frames else {}
+    words = {str(h.get("name")): h for h in run.scene.get("hair", ())}
+    known = {o.name: o for o in found}
+    out = []
+    for thing, look in zip(found, run.looks.objects, strict=True):
+        per_strand = int(np.ravel(run.static.get(thing.name, {}).get("curve_points", 0))[0])
+        if per_strand > 0 and "position" in start.get(thing.name, {}):
+            own = words.get(thing.name, {})
+            ground = known.get(str(own.get("on")))
+            skin = None
+            if ground is not None and ground.position is not None and len(ground.triangles) and look.strands > 1:
+                above = own.get("above")
+                now = carried(ground, start, ground.position)
+                skin = Skin(ground.position, now, ground.triangles, -np.inf if above is None else float(above))
+            drawn = strands(positions(start, thing), per_strand, look.strands, skin)
+            thing = replace(thing, strands=drawn, skin=None if ground is None or skin is None else ground.name)
+        out.append(thing)
+    return out
+
+
+def hair(thing: Object, found: list[Object], columns: Columns) -> Floats:
+    """Points of all strands [m] of hair in a frame, m x points x 3."""
+    assert thing.strands is not None
+    skin = next(
+        (carried(o, columns, o.position) for o in found if o.name == thing.skin and o.position is not None), None
+    )
+    return thing.strands.of(positions(columns, thing), skin)
 
 
 def moving(found: list[Object]) -> list[Object]:
@@ -231,7 +261,7 @@ class Stage:
         self.run = run
         self._view = 1 if view is None else int(np.argmax(np.abs(view)))
         self.flat: str | None = str(run.scene.get("plane", "xz")) if run.scene.get("dimension", 3) == 2 else None
-        self.objects = objects(run)
+        self.objects = with_hair(run, objects(run))
         self._start: Columns = run.frame(0) if run.n_frames else {}
         bodies = {o.name: o for o in self.objects if o.form in ("solid", "container", "body") and len(o.triangles)}
         starts = {name: self._start_of(o) for name, o in bodies.items()}
@@ -433,7 +463,8 @@ class Stage:
         x = positions(columns, thing)
         broken = self._broken(thing, columns)
         if thing.strands is not None:
-            return [thing.strands.hair(thing.name, x, max(thing.radius, HAIR * thinnest), thing.color)]
+            curves = hair(thing, self.objects, columns)
+            return [thing.strands.hair(thing.name, curves, max(thing.radius, HAIR * thinnest), thing.color)]
         thing = replace(thing, radius=max(thing.radius, thinnest * (THICKER if thing.few else 1)))
         if thing.form in ("surface", "body"):
             now = torn(columns, thing)
@@ -459,7 +490,8 @@ class Stage:
             source, triangles = self._cuts[thing.name]
             x = x[source]
         closed = whole and thing.name in self._closed
-        return Mesh(thing.name, x, triangles, normals(x, triangles), thing.color, thing.form == "surface", closed)
+        fabric, thick = thing.form == "surface", _thickness(self.run.scene, thing.name)
+        return Mesh(thing.name, x, triangles, normals(x, triangles), thing.color, fabric, thick, closed)
 
     def _edges(self, thing: Object, x: Floats, thinnest: float) -> Tubes:
         """The sharp edges of a container; of a round one a few of its rings."""
@@ -493,6 +525,15 @@ class Stage:
         if start is None or len(start) != len(strain):
             return none
         return np.ravel(np.isnan(strain) & ~np.isnan(start))
+
+
+def _thickness(scene: Mapping[str, Any], name: str) -> float:
+    """Thickness of a surface [m]: the room that contact leaves it beside others and over colliders."""
+    own = [words for kind in ("sheet", "net", "cloth") for words in scene.get(kind) or () if words.get("name") == name]
+    system = [s for s in scene.get("system") or () for words in own if s.get("name") == words.get("system")]
+    kept = max((float((s.get("self_contact") or {}).get("thickness") or 0.0) for s in system), default=0.0)
+    over = [float(c.get("thickness") or 0.0) for c in scene.get("collider") or ()]
+    return min([kept, *(ROOM * t for t in over if t > 0.0)])
 
 
 def _darker(color: Rgb, by: float) -> Rgb:

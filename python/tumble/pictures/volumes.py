@@ -203,9 +203,24 @@ def _smoke(light: Floats, depth: Floats, cloud: Smoke, camera: Camera, bright: f
         left[some] *= through
     if cloud.glow is not None:
         shining = developed(shining)
-    out = light.reshape(-1, 3).copy()
-    out[pixels] = out[pixels] * left[:, None] + scattered[:, None] * np.array(cloud.color) + shining
-    return out.reshape(light.shape)
+    over = np.zeros((depth.size, 4))
+    over[:, 0] = 1.0
+    over[pixels, 0], over[pixels, 1:] = left, scattered[:, None] * np.array(cloud.color) + shining
+    over = _across_edges(over.reshape(*depth.shape, 4), depth, cloud.spacing)
+    return np.asarray(light * over[..., :1] + over[..., 1:])
+
+
+def _across_edges(over: Floats, depth: Floats, step: float) -> Floats:
+    """What is over each pixel, where a neighbour is farther away by more than a step a mean with all of them: something of
+    what is behind the edge is seen in such pixels, through all that is before it."""
+    height, width = depth.shape
+    far = np.pad(np.minimum(depth, 1e30), 1, mode="edge")
+    around = np.stack([far[i : i + height, j : j + width] for i in range(3) for j in range(3)])
+    edge = around.max(axis=0) - around[4] > step
+    wide = np.pad(over, [(1, 1), (1, 1), (0, 0)], mode="edge")
+    rows = 0.25 * (wide[:-2] + 2 * wide[1:-1] + wide[2:])
+    mean = 0.25 * (rows[:, :-2] + 2 * rows[:, 1:-1] + rows[:, 2:])
+    return np.where(edge[..., None], mean, over)
 
 
 def _soft(values: Array) -> Array:
