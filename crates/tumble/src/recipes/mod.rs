@@ -74,7 +74,7 @@ impl Site<'_> {
 /// A link of a family that stands for `measure` [m, m², m³], with a rest length [m]; `None` if that is zero.
 fn link_part(family: &Link, ends: [u32; 2], measure: f64, rest: f64) -> Option<SpringPart> {
     let (settings, share) = (family.settings(), measure / (rest * rest));
-    (rest > 0.0).then(|| SpringPart {
+    (rest > 0.0).then_some(SpringPart {
         ends,
         stiffness: settings.modulus * share,
         damping: settings.damping * share,

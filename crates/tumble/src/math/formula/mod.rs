@@ -370,6 +370,7 @@ fn pair(stack: &mut [f64; STACK + 1], top: &mut usize, f: impl Fn(f64, f64) -> f
 
 /// A value for all masses of a block: the same for all, or one for each.
 #[derive(Clone, Copy)]
+#[allow(clippy::large_enum_variant)] // a few of them, on a stack that is kept
 enum Values {
     Same(f64),
     Each([f64; BLOCK]),
