@@ -365,3 +365,13 @@ def test_pillars_of_usd_files_stand_in_metres(
     world = World(Scene(tree, tmp_path))
     world.step(24)
     assert abs(world.frame["drop"]["position"][0, 2] - 2.1) < 1e-3
+
+
+def test_a_word_that_is_no_formula_is_told_as_what_it_is() -> None:
+    for tree in (
+        {"sheet": [{"name": "s", "size": "big", "resolution": [3, 3]}]},
+        {"rope": [{"name": "r", "from": [0, 0, 0], "to": [1, 0, 0], "segments": 3, "density": "heavy"}]},
+    ):
+        with pytest.raises(tumble.SceneError) as raised:
+            World(Scene({"version": 1, **tree}))
+        assert "change in time" not in str(raised.value)

@@ -434,6 +434,23 @@ def Xform "rig" {
     assert "no such USD file" in tumble("check", scene, "--camera", "gone.usda").err
 
 
+@pytest.mark.parametrize("roll", [0.0, 30.0, 150.0, 180.0, -120.0])
+def test_rolls_of_cameras_are_told(tmp_path: Path, roll: float) -> None:
+    body = f"""
+def Camera "eye" {{
+    float focalLength = 30
+    float xformOp:rotateZ = {roll}
+    uniform token[] xformOpOrder = ["xformOp:rotateZ"]
+}}
+"""
+    file = write(tmp_path, body)
+    file.write_text(file.read_text().replace('"Z"', '"Y"'))
+    _, doubts = usd.camera(file)
+    assert [message for _, message in doubts] == [
+        message for message in [f"/eye is rolled by {abs(roll):.3g}°, and cameras of scenes stand upright"] if roll
+    ]
+
+
 def test_the_camera_of_a_run_comes_back(tmp_path: Path, scene_file: Callable[..., Path]) -> None:
     from tumble.export.usd import write as export
 

@@ -161,6 +161,88 @@ fn an_end_of_a_rod_is_clamped_while_it_is_held() {
 }
 
 #[test]
+fn what_is_held_for_ever_does_not_follow_for_some_time() {
+    let mut sim = simulation(
+        "precision = \"double\"\nworld.gravity = [0, 0, 0]\ntime = { fps = 50, frames = 100 }\n[[system]]\nsubsteps = 10\n[[collider]]\nname = \"hand\"\nshape.sphere = { radius = 0.1, \
+         center = [0, 0, 5] }\nmotion.velocity = [0, 0, 2]\n[[particles]]\nname = \"p\"\nposition = [[0.2, 0, 0]]\npin = [\"all\", { which = \"all\", until = 1, follow.collider = \
+         \"hand\" }]\n",
+    );
+    run(&mut sim, 100);
+    assert_eq!(positions(&sim, "p"), [[0.2, 0.0, 0.0].into()]);
+}
+
+#[test]
+fn sheets_that_are_let_go_touch_each_other() {
+    // All of both is held at first; then the upper one falls onto the lower one, which is held at its rim.
+    let mut sim = simulation(
+        "time = { fps = 24, frames = 48 }\n[[system]]\nmethod = \"position_based\"\nsubsteps = 10\nself_contact.thickness = 0.02\n[[sheet]]\nname = \"low\"\nsize = [1, 1]\n\
+         resolution = [12, 12]\npin = [\"edge x-\", \"edge x+\", \"edge y-\", \"edge y+\", { which = \"all\", until = 0.25 }]\n[[sheet]]\nname = \"high\"\nsize = [0.5, 0.5]\n\
+         resolution = [7, 7]\ncenter = [0.01, 0.02, 0.2]\npin = [{ which = \"all\", until = 0.25 }]\n",
+    );
+    run(&mut sim, 48);
+    let lowest = |name: &str| positions(&sim, name).iter().map(|x| x.z).fold(f64::INFINITY, f64::min);
+    assert!(lowest("low") < -1e-3, "{}", lowest("low"));
+    assert!(lowest("high") > lowest("low") - 0.02 && lowest("high") < 0.1, "{} {}", lowest("high"), lowest("low"));
+}
+
+#[test]
+fn the_clamp_of_a_rod_that_broke_comes_back_with_its_state() {
+    // Let go, then broken near its start, then taken back to a state in which it was whole and held.
+    let scene = |until: f64| {
+        simulation(&format!(
+            "precision = \"double\"\nworld.gravity = [0, 0, -1]\ntime = {{ fps = 25, frames = 100 }}\n[[system]]\nmethod = \"position_based\"\nsubsteps = 20\n[[rope]]\nname = \"rod\"\n\
+             from = [0, 0, 0]\nto = [0.5, 0, 0]\nsegments = 20\ndensity = 0.1\npin = [{{ which = \"start\", until = {until} }}]\nrod = {{ stretch = 500, bend = 0.05, damping = 0.02, break_strain \
+             = 0.05 }}\n"
+        ))
+    };
+    let snap = |sim: &mut Simulation| {
+        let mut v = velocities(sim, "rod");
+        v.iter_mut().take(2).for_each(|v| v.x = -400.0);
+        write(sim, "rod", "velocity", &v);
+        run(sim, 1);
+        assert!(sim.ledger().broken.unwrap() > 0);
+    };
+    for broken_first in [false, true] {
+        let (mut sim, mut whole) = (scene(0.4), scene(0.4));
+        run(&mut sim, 5);
+        let saved = sim.save(&[]);
+        if broken_first {
+            let mut v = velocities(&sim, "rod");
+            v.iter_mut().skip(1).for_each(|v| v.x = 400.0);
+            write(&mut sim, "rod", "velocity", &v);
+            run(&mut sim, 1);
+            assert!(sim.ledger().broken.unwrap() > 0);
+            run(&mut sim, 8);
+        } else {
+            run(&mut sim, 8);
+            snap(&mut sim);
+        }
+        sim.restore(&saved).unwrap();
+        run(&mut sim, 10);
+        run(&mut whole, 15);
+        assert_eq!(sim.hash(), whole.hash(), "broken first: {broken_first}");
+    }
+}
+
+#[test]
+fn a_curved_rod_is_taken_hold_of_as_it_lies() {
+    // It comes to rest along its natural curve, free, and keeps still when both of its ends are held there.
+    for words in ["integrator = \"implicit_euler\"\nsubsteps = 4", "method = \"position_based\"\nsubsteps = 20"] {
+        let mut sim = simulation(&format!(
+            "precision = \"double\"\nworld.gravity = [0, 0, 0]\ntime = {{ fps = 24, frames = 200 }}\n[[system]]\n{words}\n[[rope]]\nname = \"rod\"\nfrom = [0, 0, 0]\nto = [1, 0, 0]\n\
+             segments = 20\ndensity = 0.1\npin = [{{ which = \"start\", from = 6 }}, {{ which = \"end\", from = 6 }}]\nrod = {{ stretch = 500, bend = 0.05, damping = 0.05, curvature = [0, 2, \
+             0] }}\n[[force]]\nkind = \"drag\"\nrate = 5\n"
+        ));
+        run(&mut sim, 143);
+        let before = positions(&sim, "rod");
+        assert!((before[20] - before[0]).norm() < 0.85, "{words}");
+        run(&mut sim, 50);
+        let moved = positions(&sim, "rod").iter().zip(&before).map(|(a, b)| (*a - *b).norm()).fold(0.0, f64::max);
+        assert!(moved < 1e-4, "{words}: {moved}");
+    }
+}
+
+#[test]
 fn times_that_mean_nothing_are_told() {
     let wrong = |times: &str| {
         let text = format!("version = 1\n[[particles]]\nname = \"p\"\nposition = [[0, 0, 0]]\npin = [{{ which = \"all\", {times} }}]\n");

@@ -91,3 +91,34 @@ fn a_free_rope_keeps_its_momenta_and_a_broken_one_parts() {
     // The jerk takes a neighbour or two along.
     assert!(lengths(&x[..half - 3]) < 0.04 && lengths(&x[half + 3..]) < 0.04, "{x:?}");
 }
+
+#[test]
+fn a_taut_rope_between_two_pins_stays_between_them() {
+    // Too short, exact or a little long for its way; oblique, with and without weight.
+    for segments in [10, 64] {
+        for part in [0.9, 0.99, 1.0, 1.01] {
+            for (gravity, projection) in [(0.0, "plain"), (9.8, "plain"), (0.0, "compliant"), (9.8, "compliant")] {
+                let way = (1.0_f64 + 0.09 + 0.49).sqrt();
+                let mut sim = simulation(&format!(
+                    "world.gravity = [0, 0, -{gravity}]\ntime = {{ fps = 24, frames = 24 }}\n[[system]]\nmethod = \"position_based\"\nsubsteps = 10\nposition_based.projection = \
+                     \"{projection}\"\n[[rope]]\nname = \"r\"\nfrom = [0, 0, 0]\nto = [1, 0.3, 0.7]\nlength = {}\nsegments = {segments}\ndensity = 0.05\npin = [\"start\", \"end\"]\n\
+                     links.structural = 1e5\n",
+                    part * way
+                ));
+                for frame in 0..24 {
+                    step(&mut sim);
+                    for x in positions(&sim, "r") {
+                        // From the line between its ends, at most as far as a rope of that length may hang.
+                        let off = x - Vector::from([1.0, 0.3, 0.7]) * (x.dot([1.0, 0.3, 0.7].into()) / (way * way));
+                        let bound = 0.5 * ((part * way).powi(2) - way * way).max(0.0).sqrt() + 0.02;
+                        assert!(
+                            off.norm() < bound,
+                            "{segments} pieces, {part} of its way, {gravity} m/s², {projection}, frame {frame}: {}",
+                            off.norm()
+                        );
+                    }
+                }
+            }
+        }
+    }
+}

@@ -359,12 +359,13 @@ fn show(node: &Node, unit: Option<&str>) -> String {
     }
 }
 
-/// Of keyframes or a formula where there is one number for all times: that this is so.
+/// Of keyframes or a formula where there are numbers for all times: that this is so.
 fn rigid(node: &Node, schema: &Schema) -> &'static str {
-    let numbers = types(schema).iter().any(|t| *t == "number" || *t == "array");
+    let is_number = |schema: &Schema| types(schema).iter().any(|t| *t == "number");
+    let numbers = is_number(schema) || is_number(&schema["items"]);
     let animated = match &node.value {
         Value::Table(entries) => entries.iter().any(|(key, _)| key == "keys"),
-        Value::Text(text) => text.chars().any(|c| c.is_alphanumeric()) && text.parse::<f64>().is_err() && !text.contains(','),
+        Value::Text(text) => text == "t" || (text.contains(['+', '-', '*', '/', '^', '(']) && text.parse::<f64>().is_err()),
         _ => false,
     };
     if numbers && animated { "; it does not change in time" } else { "" }

@@ -57,6 +57,9 @@ pub trait System: Send + Sync {
     /// While watched, a system looks for a breakdown after every sub-step and returns the first as an error.
     fn watch(&mut self, on: bool);
 
+    /// Whether an explosion is no breakdown.
+    fn tolerate_explosions(&mut self, _on: bool) {}
+
     /// Forgets what it chose from a scene whose state it had before.
     fn reconsider(&mut self) {}
 

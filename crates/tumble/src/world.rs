@@ -26,8 +26,6 @@ pub struct World {
     disagreements: Vec<Warning>,
     /// Whether an interval is taken once more, in the sub-steps of which nobody looks.
     repeating: Arc<AtomicBool>,
-    /// Whether an explosion ends a step with an error.
-    pub stop_on_explosion: bool,
     /// Length of an exchange interval [s].
     dt: f64,
     exchanges: u32,
@@ -50,7 +48,6 @@ impl World {
             systems,
             exchange,
             coupling: None,
-            stop_on_explosion: true,
             disagreements: Vec::new(),
             repeating: Arc::default(),
             dt,
@@ -115,9 +112,7 @@ impl World {
             }
         };
         let time = (self.frame + 1) as f64 * f64::from(self.exchanges) * self.dt;
-        let stop = self.stop_on_explosion;
-        let is_wrong = |error: &StepError| stop || !matches!(error, StepError::Exploded(_));
-        let error = self.each_mut().find_map(|s| s.breakdown(time).filter(is_wrong));
+        let error = self.each_mut().find_map(|s| s.breakdown(time));
         if let Some(error) = error {
             return Err(self.first_breakdown(error, go_on));
         }
@@ -221,6 +216,11 @@ impl World {
             coupling.iterations
         );
         self.disagreements.push(Warning::new(Code::Disagreement, path, message));
+    }
+
+    /// Whether an explosion ends a step with an error.
+    pub fn stop_on_explosion(&mut self, stop: bool) {
+        self.each_mut().for_each(|s| s.tolerate_explosions(!stop));
     }
 
     /// Goes back to the last good frame and steps again, watching every sub-step: the first breakdown, or this one at the end of the frame.

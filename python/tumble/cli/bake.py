@@ -60,7 +60,9 @@ def look_with(camera: str) -> list[str]:
     from tumble import SceneError, usd
     from tumble.toml import toml
 
-    name, _, prim = camera.rpartition(":/") if ":/" in camera else (camera, "", "")
+    name, colon, prim = camera.rpartition(":/")
+    if not colon or not usd.is_usd(name):
+        name, prim = camera, ""
     if not usd.is_usd(name) or not Path(name).is_file():
         raise SceneError(
             f"{name}: there is no such USD file; give one that has a camera, as in shot.usda or shot.usda:/cameras/a"

@@ -56,8 +56,9 @@ def _doubts(prim: Any, up: Any, back: Any) -> Iterator[tuple[str, str]]:
 
     level = np.cross([0.0, 0.0, 1.0], back)
     across = float(np.linalg.norm(level))
-    roll = np.degrees(np.arcsin(np.clip(up @ level / across, -1, 1))) if across > 1e-3 else 0.0
-    if abs(roll) > _LEVEL or up[2] < 0:
+    # One that looks straight up or down has no roll.
+    roll = np.degrees(np.arctan2(up @ level, up @ np.cross(back, level))) if across > 1e-3 else 0.0
+    if abs(roll) > _LEVEL:
         yield ("camera-in", f"{prim.GetPath()} is rolled by {abs(roll):.3g}°, and cameras of scenes stand upright")
     xforms = [UsdGeom.Xformable(p) for p in _with_parents(prim) if p.IsA(UsdGeom.Xformable)]
     zooms = UsdGeom.Camera(prim).GetFocalLengthAttr().ValueMightBeTimeVarying()

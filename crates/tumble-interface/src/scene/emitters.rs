@@ -55,7 +55,7 @@ pub struct Emitter {
     /// Direction of the speed, of any length. Default: the normal of the source, or up if it has none.
     #[serde(default)]
     pub direction: Option<[f64; 3]>,
-    /// Half-angle of the cone of directions, uniform over its solid angle; 180 is all directions.
+    /// Half-angle of the cone of directions, uniform over its solid angle, 0 to 180; 180 is all directions.
     #[serde(default = "nothing")]
     #[schemars(extend("x-unit" = "°"))]
     pub cone: Animated,

@@ -300,11 +300,11 @@ pub struct GasSource {
     #[serde(default = "nothing")]
     #[schemars(extend("x-unit" = "kg/(m³ s)"))]
     pub smoke: Animated,
-    /// Fixed smoke density.
+    /// Fixed smoke density; at least 0.
     #[serde(default)]
     #[schemars(extend("x-unit" = "kg/m³"))]
     pub density: Option<Animated>,
-    /// Fixed temperature.
+    /// Fixed temperature; at least 0.
     #[serde(default)]
     #[schemars(extend("x-unit" = "K"))]
     pub temperature: Option<Animated>,
@@ -312,11 +312,11 @@ pub struct GasSource {
     #[serde(default = "nothing")]
     #[schemars(extend("x-unit" = "K/s"))]
     pub heating: Animated,
-    /// Fuel emitted.
+    /// Fuel emitted; at least 0.
     #[serde(default = "nothing")]
     #[schemars(extend("x-unit" = "kg/(m³ s)"))]
     pub fuel: Animated,
-    /// Fixed fuel density.
+    /// Fixed fuel density; at least 0.
     #[serde(default)]
     #[schemars(extend("x-unit" = "kg/m³"))]
     pub fuel_density: Option<Animated>,

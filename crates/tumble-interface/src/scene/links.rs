@@ -112,11 +112,11 @@ pub struct Region {
     /// Collider that they follow. Default: they are fixed.
     #[serde(default)]
     pub follow: Option<Follow>,
-    /// Time from which they are held, where they are then. Default: from the start.
+    /// Time from which they are held, where they are then; to the nearest sub-step. Default: from the start.
     #[serde(default)]
     #[schemars(range(min = 0.0), extend("x-unit" = "s"))]
     pub from: Option<f64>,
-    /// Time at which they are let go. Default: never.
+    /// Time at which they are let go, to the nearest sub-step. Default: never.
     #[serde(default)]
     #[schemars(extend("x-unit" = "s", "exclusiveMinimum" = 0.0))]
     pub until: Option<f64>,

@@ -9,7 +9,7 @@
 //! A wall through which a cell would reach counts as thicker, to both sides alike, so that it lets nothing through wherever it lies
 //! (gas.19).
 //!
-//! Source: [ng2009]. Degenerate: a solid that leaves a periodic box does not come back on the other side.
+//! Source: [ng2009]. Degenerate: wires and balls thinner than that obstruct like thicker ones; a solid that leaves a periodic box does not come back on the other side.
 //! Tests: crates/tumble-f64/tests/solids.rs.
 
 use super::balls::Ball;

@@ -29,6 +29,7 @@ pub struct Pinned {
 /// Holds the masses that the pins mean.
 pub fn pin(site: &mut Site<'_>, thing: &Pinnable<'_>, pins: &[Pin]) -> Pinned {
     let mut all = Pinned { always: Vec::new(), passing: Vec::new() };
+    let mut following = Vec::new();
     for (i, pin) in pins.iter().enumerate() {
         let (found, follow, times) = match pin {
             Pin::Words(words) => (in_words(thing, words), None, Ok(None)),
@@ -47,7 +48,7 @@ pub fn pin(site: &mut Site<'_>, thing: &Pinnable<'_>, pins: &[Pin]) -> Pinned {
                 for point in found {
                     let nearest = |solids: &[Collider]| solids[solid].carrier(site.parts.position(point));
                     let carrier = bone.map_or_else(|| site.solids.map_or(Carrier::Whole, nearest), Carrier::Bone);
-                    site.parts.follow(point, solid, carrier, times.unwrap_or(Times::ALWAYS));
+                    following.push((point, solid, carrier, times));
                 }
             }
             Err(message) => site.wrong(format!("{}.pin[{i}]", thing.path), message),
@@ -58,6 +59,12 @@ pub fn pin(site: &mut Site<'_>, thing: &Pinnable<'_>, pins: &[Pin]) -> Pinned {
     all.always.iter().for_each(|point| site.parts.pin(*point));
     all.passing.retain(|(point, _)| all.always.binary_search(point).is_err());
     all.passing.iter().for_each(|(point, times)| site.parts.hold(*point, *times));
+    for (point, solid, carrier, times) in following {
+        // What is held for ever follows for ever, or not at all.
+        if times.is_none() || all.always.binary_search(&point).is_err() {
+            site.parts.follow(point, solid, carrier, times.unwrap_or(Times::ALWAYS));
+        }
+    }
     all
 }
 

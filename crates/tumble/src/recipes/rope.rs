@@ -146,7 +146,14 @@ fn clamp(
     }
     match end {
         Held::Always => site.parts.clamp_frame(held),
-        Held::At(times) => times.iter().for_each(|times| site.parts.hold_frame(held, frame, *times)),
+        Held::At(times) => {
+            // Where the natural curvature over half a segment asks for nothing.
+            let sign = if place == 0 { -spacing / 4.0 } else { spacing / 4.0 };
+            let v = Vector::from(rod.curvature) * sign;
+            let v = if held == frame { Vector::default() } else { v };
+            let turn = Quat { v, w: (1.0 - v.norm_sq()).max(0.0).sqrt() }.normalized();
+            times.iter().for_each(|times| site.parts.hold_frame(held, (frame, turn), *times));
+        }
     }
 }
 

@@ -129,7 +129,7 @@ impl Engine for Simulation {
     }
 
     fn stop_on_explosion(&mut self, stop: bool) {
-        self.world.stop_on_explosion = stop;
+        self.world.stop_on_explosion(stop);
     }
 
     fn stability(&mut self, go_on: &(dyn Fn() -> bool + Sync)) -> Vec<Stability> {

@@ -334,6 +334,8 @@ pub struct Compressible {
     settings: Settings,
     gases: Vec<Gas>,
     watched: bool,
+    /// Whether an explosion is no breakdown.
+    tolerant: bool,
 }
 
 impl Compressible {
@@ -346,7 +348,7 @@ impl Compressible {
             let fall = ledger.mass * (0..3).map(|a| gas.fluid.gravity[a].abs() * grid.n[a] as f64 * grid.dx).sum::<f64>();
             gas.scale = ledger.kinetic + ledger.elastic + fall;
         }
-        Self { settings, gases, watched: false }
+        Self { settings, gases, watched: false, tolerant: false }
     }
 
     fn limit(&self) -> f64 {
@@ -363,7 +365,7 @@ impl Compressible {
 
     fn broken(&self, t: f64, h: f64) -> Option<StepError> {
         self.gases.iter().find_map(|gas| {
-            let (column, cell, energy_ratio) = gas.fault()?;
+            let (column, cell, energy_ratio) = gas.fault().filter(|(.., ratio)| ratio.is_none() || !self.tolerant)?;
             let points = gas.density.points();
             let about = Box::new(Breakdown {
                 system: self.settings.name.clone(),
@@ -484,6 +486,10 @@ impl System for Compressible {
 
     fn watch(&mut self, on: bool) {
         self.watched = on;
+    }
+
+    fn tolerate_explosions(&mut self, on: bool) {
+        self.tolerant = on;
     }
 
     fn stability(&mut self, dt: f64, _go_on: &(dyn Fn() -> bool + Sync)) -> Option<Stability> {

@@ -4,7 +4,8 @@
 //!   (J W J^T + alpha) dlambda = -(y + alpha lambda),   dx = W J^T dlambda                     (positions.7)
 //!
 //! with w_i + w_i+1 + alpha_i on its diagonal and -w_i+1 n_i . n_i+1 beside it. Elimination takes time in proportion to n and needs no pivots: the
-//! diagonal dominates.
+//! diagonal dominates, by a ridge where nothing gives way. Of a step that leaves more error than there was, the largest half, quarter, ... is
+//! taken that does not.
 //!
 //! Sources: [macklin2016] (multipliers), [deul2018] (direct solutions of chains). Verified in `tests/ropes_position_based.rs`.
 
@@ -14,6 +15,11 @@ use crate::geometry::{Vector, Walls};
 use crate::math::parallel::Tasks;
 use crate::math::{Real, Row, xyz64};
 use std::ops::Range;
+
+/// What stands on the diagonal in excess, relative to it: a rope that is taut between two pins has a singular system.
+const RIDGE: f64 = 1e-9;
+/// How often a step is halved.
+const HALVES: i32 = 24;
 
 type Links = Projected<Distance, Linear, 2, 1, 1, 0>;
 
@@ -40,6 +46,8 @@ struct Link {
     /// Reduced: what stands to the right of the diagonal, and on the right side, over the diagonal.
     beside: f64,
     right: f64,
+    /// Its multiplier's change.
+    delta: f64,
 }
 
 impl Chains {
@@ -62,65 +70,79 @@ impl Chains {
 }
 
 impl Chain {
-    /// Solves it for its rows, and those at the start of the sub-step.
-    fn solve(&mut self, columns: &Columns<2, 1, 0>, x: &mut [Row], step: &Projection<'_>) {
+    /// How far links are from where they are to be, and how much they give: y and alpha.
+    fn measure(&self, columns: &Columns<2, 1, 0>, x: &[Vector], step: &Projection<'_>, i: usize) -> (f64, f64) {
+        let place = self.places[i];
+        let rest = f64::from(columns.rest[0][place]);
+        let (soft, y) = (f64::from(columns.compliance[place]), (x[i + 1] - x[i]).norm() - rest);
+        let alpha = soft / (step.h * step.h);
+        match (step.plain, columns.damping.get(place)) {
+            (Some(_), _) => (y, if soft > 0.5 * LIMP { alpha } else { 0.0 }),
+            (None, Some(damping)) => {
+                let ratio = soft * f64::from(*damping) / step.h;
+                let was = (xyz64(step.before[self.first + i + 1]) - xyz64(step.before[self.first + i])).norm() - rest;
+                (y - ratio / (1.0 + ratio) * was, alpha / (1.0 + ratio))
+            }
+            _ => (y, alpha),
+        }
+    }
+
+    /// Sum of the squares of what the multipliers leave, but for broken links [m²].
+    fn left(&self, columns: &Columns<2, 1, 0>, x: &[Vector], step: &Projection<'_>, part: f64) -> f64 {
+        let one = |i: usize| {
+            let (y, alpha) = self.measure(columns, x, step, i);
+            let lambda = self.lambda.get(i).copied().unwrap_or(0.0) + part * self.system[i].delta;
+            if f64::from(columns.compliance[self.places[i]]) > 0.5 * LIMP { 0.0 } else { (y + alpha * lambda).powi(2) }
+        };
+        (0..self.places.len()).map(one).sum()
+    }
+
+    /// Solves it for its rows.
+    fn solve(&mut self, columns: &Columns<2, 1, 0>, rows: &mut [Row], step: &Projection<'_>) {
         let n = self.places.len();
         let many = step.iterations > 1 && step.plain.is_none();
         if many && step.iteration == 0 {
             self.lambda.clear();
             self.lambda.resize(n, 0.0);
         }
-        let weight = |x: &[Row], i: usize| f64::from(x[i][3]);
+        let x: Vec<Vector> = rows.iter().map(|row| xyz64(*row)).collect();
+        let weight = |i: usize| f64::from(rows[i][3]);
+        let direction = |i: usize| (x[i + 1] - x[i]).normalized();
         let mut before = Link::default();
-        for (i, place) in self.places.iter().enumerate() {
-            let way = xyz64(x[i + 1]) - xyz64(x[i]);
-            let (length, rest) = (way.norm(), f64::from(columns.rest[0][*place]));
-            let direction = if length > 0.0 { way * (1.0 / length) } else { Vector::default() };
-            let soft = f64::from(columns.compliance[*place]);
-            let (mut alpha, mut y) = (soft / (step.h * step.h), length - rest);
-            match (step.plain, columns.damping.get(*place)) {
-                (Some(_), _) => alpha = if soft > 0.5 * LIMP { alpha } else { 0.0 },
-                (None, Some(damping)) => {
-                    let ratio = soft * f64::from(*damping) / step.h;
-                    let was = (xyz64(step.before[self.first + i + 1]) - xyz64(step.before[self.first + i])).norm() - rest;
-                    (alpha, y) = (alpha / (1.0 + ratio), y - ratio / (1.0 + ratio) * was);
-                }
-                _ => {}
-            }
+        for i in 0..n {
+            let (y, alpha) = self.measure(columns, &x, step, i);
+            let own = direction(i);
             // What stands left of the diagonal is symmetric to what stands right of it in the row before.
-            let left = -weight(x, i) * before.direction.dot(direction);
-            let diagonal = weight(x, i) + weight(x, i + 1) + alpha - left * before.beside;
+            let left = -weight(i) * before.direction.dot(own);
+            let both = weight(i) + weight(i + 1);
+            let diagonal = both * (1.0 + RIDGE) + alpha - left * before.beside;
             let right = -(y + alpha * self.lambda.get(i).copied().unwrap_or(0.0)) - left * before.right;
-            let next = self.places.get(i + 1).map_or(0.0, |_| {
-                let way = xyz64(x[i + 2]) - xyz64(x[i + 1]);
-                let length = way.norm();
-                if length > 0.0 { -weight(x, i + 1) * direction.dot(way) / length } else { 0.0 }
-            });
-            let over = if diagonal > 0.0 { 1.0 / diagonal } else { 0.0 };
-            before = Link { direction, beside: next * over, right: right * over };
+            let next = if i + 1 < n { -weight(i + 1) * own.dot(direction(i + 1)) } else { 0.0 };
+            let over = if both > 0.0 && own.norm_sq() > 0.0 { 1.0 / diagonal } else { 0.0 };
+            before = Link { direction: own, beside: next * over, right: right * over, delta: 0.0 };
             self.system[i] = before;
         }
-        let (mut after, mut pull) = (0.0, Vector::default());
-        let part = step.plain.map_or(1.0, f64::from);
-        for i in (0..n).rev() {
-            let link = self.system[i];
-            let delta = link.right - link.beside * after;
-            if many {
-                self.lambda[i] += delta;
-            }
-            // On the point between this link and the next.
-            let force = link.direction * delta;
-            move_by(&mut x[i + 1], (force - pull) * part);
-            (after, pull) = (delta, force);
+        let mut after = 0.0;
+        for link in self.system.iter_mut().rev() {
+            link.delta = link.right - link.beside * after;
+            after = link.delta;
         }
-        move_by(&mut x[0], -pull * part);
+        let pull = |i: usize| self.system.get(i).map_or(Vector::default(), |link| link.direction * link.delta);
+        let moves: Vec<Vector> = (0..=n).map(|i| (if i > 0 { pull(i - 1) } else { Vector::default() } - pull(i)) * weight(i)).collect();
+        let moved = |part: f64| -> Vec<Vector> { x.iter().zip(&moves).map(|(x, by)| *x + *by * part).collect() };
+        // Of a step that leaves more than there was, as one far from where the system is linear, a part is taken.
+        let enough = self.left(columns, &x, step, 0.0) + 1e-20 * x[0].norm_sq().max(1.0);
+        let halves = (0..HALVES).map(|k| 0.5_f64.powi(k));
+        let part = halves.into_iter().find(|part| self.left(columns, &moved(*part), step, *part) <= enough).unwrap_or(0.0);
+        let share = part * step.plain.map_or(1.0, f64::from);
+        for (row, by) in rows.iter_mut().zip(&moves) {
+            let by = *by * share;
+            *row = [(f64::from(row[0]) + by.x) as Real, (f64::from(row[1]) + by.y) as Real, (f64::from(row[2]) + by.z) as Real, row[3]];
+        }
+        if many {
+            self.lambda.iter_mut().zip(&self.system).for_each(|(lambda, link)| *lambda += part * link.delta);
+        }
     }
-}
-
-/// Moves a point by its inverse mass times this.
-fn move_by(x: &mut Row, by: Vector) {
-    let by = by * f64::from(x[3]);
-    *x = [(f64::from(x[0]) + by.x) as Real, (f64::from(x[1]) + by.y) as Real, (f64::from(x[2]) + by.z) as Real, x[3]];
 }
 
 impl Constraints for Chains {

@@ -229,7 +229,8 @@ impl Group {
         let place = self.free.iter().position(|(at, _)| *at == bend);
         let numbers = match (place, held) {
             (None, false) => {
-                self.free.push((bend, std::array::from_fn(|c| self.bend[c][bend])));
+                let whole = self.whole.as_ref().map_or(&self.bend, |whole| &whole.1);
+                self.free.push((bend, std::array::from_fn(|c| whole[c][bend])));
                 [0.0; 7]
             }
             (Some(place), true) if self.stretch[2][segment] > 0.0 => self.free.remove(place).1,

@@ -77,14 +77,16 @@ impl Features {
 
     /// Writes their state.
     pub fn save(&self, core: &Core, archive: &mut Archive) {
+        self.fracture.save(core, archive);
         self.holds.save(core, archive);
         self.followers.save(core, archive);
-        self.fracture.save(core, archive);
     }
 
     /// Reads it back.
     pub fn restore(&mut self, core: &mut Core, archive: &mut Archive) -> Option<()> {
-        self.each().try_for_each(|f| f.restore(core, archive))?;
+        // What is held acts on links as they are then.
+        let Self { fracture, holds, followers, .. } = self;
+        [fracture as &mut dyn Feature, holds, followers].into_iter().try_for_each(|f| f.restore(core, archive))?;
         self.renew_surfaces(core);
         Some(())
     }

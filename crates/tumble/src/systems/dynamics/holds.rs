@@ -2,7 +2,7 @@
 
 use super::core::Core;
 use super::feature::{Feature, Span};
-use crate::math::{Real, ZERO};
+use crate::math::{Quat, Real, ZERO};
 use crate::state::{Masses, State};
 use crate::system::{Archive, Part};
 
@@ -37,8 +37,8 @@ pub struct Hold {
     pub row: usize,
     /// When.
     pub times: Times,
-    /// Of a frame at the end of a rod, that of the segment there, whose turn it has when it is taken hold of.
-    pub segment: Option<usize>,
+    /// Of a frame at the end of a rod, that of the segment there, and its turn relative to it when it is taken hold of.
+    pub segment: Option<(usize, Quat<f64>)>,
 }
 
 /// Rows that are held for some time; a row may be there more than once.
@@ -49,12 +49,10 @@ pub struct Holds {
 }
 
 impl Holds {
-    /// For these rows, which it holds as at the start.
-    pub fn new(list: Vec<Hold>, state: &mut State, masses: &mut Masses) -> Self {
-        let active = list.iter().map(|hold| hold.times.contain(0.0)).collect();
-        let holds = Self { list, active };
-        holds.apply(state, masses);
-        holds
+    /// For these rows, as they are held at the start.
+    pub fn new(mut list: Vec<Hold>) -> Self {
+        list.sort_by_key(|hold| hold.row);
+        Self { active: list.iter().map(|hold| hold.times.contain(0.0)).collect(), list }
     }
 
     /// Whether there are none.
@@ -64,7 +62,7 @@ impl Holds {
 
     /// Whether a row is held at times only.
     pub fn contain(&self, row: usize) -> bool {
-        self.list.iter().any(|hold| hold.row == row)
+        self.list.binary_search_by_key(&row, |hold| hold.row).is_ok()
     }
 
     /// Whether a row is held.
@@ -92,7 +90,7 @@ impl Holds {
     }
 
     /// Holds rows where that is in force, and lets the others go.
-    fn apply(&self, state: &mut State, masses: &mut Masses) {
+    pub fn apply(&self, state: &mut State, masses: &mut Masses) {
         for (row, inverse, held) in self.rows(masses) {
             if masses.frames.contains(row) {
                 masses.inverse_inertia[row - masses.frames.start] = inverse;
@@ -121,9 +119,10 @@ impl Feature for Holds {
         }
         let active: Vec<bool> = self.list.iter().map(|hold| hold.times.cover(step)).collect();
         if active != self.active {
-            for (hold, _) in self.list.iter().zip(&active).filter(|(hold, now)| **now && !self.held(hold.row)) {
-                if let Some(segment) = hold.segment {
-                    core.state.x[hold.row] = core.state.x[segment];
+            for (hold, _) in self.list.iter().zip(&active).filter(|(_, now)| **now) {
+                if let Some((segment, turn)) = hold.segment.filter(|_| !self.held(hold.row)) {
+                    let turned = Quat::from_row(core.state.x[segment].map(f64::from)) * turn;
+                    core.state.x[hold.row] = turned.row().map(|q| q as Real);
                 }
             }
             self.active = active;

@@ -94,7 +94,7 @@ impl Dynamics {
         let columns = [("position", &state.x), ("velocity", &state.v)];
         let search = || columns.into_iter().find_map(|(column, rows)| Some((column, bad(rows)?, None)));
         let mut found = if finite { None } else { search() };
-        if found.is_none() {
+        if found.is_none() && !self.tolerant {
             let ratio = self.core.scale.growth(&self.scheme.felt(&ledger)).filter(|g| *g > BLOW_UP || g.is_nan());
             if let Some(ratio) = ratio {
                 let points = self.core.laws.masses.points().flatten();

@@ -64,6 +64,8 @@ pub struct Dynamics {
     /// Whether other systems push masses of this one.
     pushed: bool,
     watched: bool,
+    /// Whether an explosion is no breakdown.
+    tolerant: bool,
     /// Time and state before the sub-step, while watched.
     witness: Option<(f64, Vec<Row>, Vec<Row>)>,
 }
@@ -97,6 +99,7 @@ impl Dynamics {
             anchors: Vec::new(),
             pushed: false,
             watched: false,
+            tolerant: false,
             witness: None,
         };
         system.set_scale();
@@ -375,6 +378,10 @@ impl System for Dynamics {
     fn watch(&mut self, on: bool) {
         self.watched = on;
         self.witness = None;
+    }
+
+    fn tolerate_explosions(&mut self, on: bool) {
+        self.tolerant = on;
     }
 
     fn reconsider(&mut self) {

@@ -178,6 +178,7 @@ impl Parts {
 
     /// Makes two of every link along an edge that two triangles share, in surfaces that tear: one for each.
     pub(super) fn halve_links(&mut self) {
+        // Their members are renumbered here, and rows of links later: all links are swept.
         self.chains.clear();
         let mut drafts = std::mem::take(&mut self.objects);
         let ends: Vec<[usize; 3]> = drafts.iter().skip(1).map(|d| d.links).chain([self.counts()]).collect();
@@ -336,9 +337,9 @@ impl Parts {
         self.holds.push(Hold { row: point as usize, times, segment: None });
     }
 
-    /// Holds a frame at an end of a rod for some time; `segment` is that of the segment there.
-    pub fn hold_frame(&mut self, frame: u32, segment: u32, times: Times) {
-        self.frame_holds.push(Hold { row: frame as usize, times, segment: Some(segment as usize) });
+    /// Holds a frame at an end of a rod for some time; `segment` is that of the segment there, and its turn relative to that.
+    pub fn hold_frame(&mut self, frame: u32, (segment, turn): (u32, Quat<f64>), times: Times) {
+        self.frame_holds.push(Hold { row: frame as usize, times, segment: Some((segment as usize, turn)) });
     }
 
     /// Holds a frame.

@@ -44,7 +44,7 @@ impl Parts {
         let projects = scheme::projects(&settings);
         let (mut state, mut masses) = self.state();
         let (points, rows) = (masses.frames.start, masses.mass.len());
-        let holds = Holds::new(std::mem::take(&mut self.holds), &mut state, &mut masses);
+        let holds = Holds::new(std::mem::take(&mut self.holds));
         let mut batches = Batches::new(&masses, projects);
         // As if they were held for ever: constraints are told when they are not.
         batches.hold(|row| holds.contain(row));
@@ -59,6 +59,8 @@ impl Parts {
         let tied = Tied { parts: &self, lists, projects, clamped: clamp.is_some(), sails: &sails };
         let tears = tied.tears(&objects, &masses.mass, &state.x[..points]);
         let grip = batches.grip(&state.x);
+        // From here on: contact and tears know what is held for ever.
+        holds.apply(&mut state, &mut masses);
         let hair = |(draft, words)| HairContinuum::new(objects.points_of(draft), words, &state.x);
         let features = Features {
             hair: self.hair.drain(..).map(hair).collect(),
@@ -107,7 +109,7 @@ impl Parts {
         let points = self.points.len();
         self.carried.retain(|held| colliders.get(held.collider).is_some_and(|c| held.carrier != Carrier::Whole || c.motion.is_some()));
         self.carried.iter_mut().filter_map(|held| held.frame.as_mut()).for_each(|(frame, _)| *frame += points);
-        let rows = |hold: Hold| Hold { row: points + hold.row, segment: hold.segment.map(|frame| points + frame), ..hold };
+        let rows = |hold: Hold| Hold { row: points + hold.row, segment: hold.segment.map(|(frame, turn)| (points + frame, turn)), ..hold };
         self.holds.extend(self.frame_holds.drain(..).map(rows));
         for nodes in self.stretches.iter_mut().map(|m| &mut m.nodes) {
             nodes[2] += points as u32;
