@@ -32,7 +32,6 @@ mod position_based_scenes;
 mod rod_loops;
 mod rods_and_emitters;
 mod rods_position_based;
-mod ropes_position_based;
 mod shells;
 mod solid_edges;
 mod statics;

@@ -14,14 +14,12 @@ use crate::math::{Lane, Quat, Real, Row, Vec3, xyz};
 use std::marker::PhantomData;
 use std::ops::Range;
 
-mod chains;
 mod density;
 mod neohookean;
 mod shape;
 mod strands;
 mod volume;
 
-pub use chains::Chains;
 pub use density::{Density, behind, spline};
 pub use neohookean::Neohookean;
 pub use shape::Shape;
@@ -163,15 +161,10 @@ fn compliance(stiffness: f64) -> Real {
 impl<const N: usize, const D: usize, const P: usize> Columns<N, D, P> {
     /// `None` if a node is not one of the rows; `inverse` are the inverse inertias of frames, the rows from `points` on.
     fn new(rows: usize, points: usize, inverse: &[Real], members: &[Members<N, D, P>]) -> Option<Self> {
-        Self::of(rows, points, inverse, members, |_| true)
-    }
-
-    /// The same; elements that `act` says no of stand behind all others, and no sweep takes them.
-    fn of(rows: usize, points: usize, inverse: &[Real], members: &[Members<N, D, P>], act: impl Fn(usize) -> bool) -> Option<Self> {
         if members.iter().flat_map(|m| m.nodes).any(|i| i as usize >= rows) || rows > points + inverse.len() {
             return None;
         }
-        let (given, order) = sorted(rows, members, act);
+        let (given, order) = sorted(rows, members);
         let of = |place: &u32| &members[*place as usize];
         let column = |f: &dyn Fn(&Members<N, D, P>) -> f64| -> Vec<Real> { given.iter().map(|e| f(of(e)) as Real).collect() };
         let mut nodes: [Index; N] = std::array::from_fn(|_| Index::default());
@@ -318,15 +311,11 @@ struct Order {
     between: Vec<Range<usize>>,
 }
 
-/// Elements in the order in which they are satisfied; those that do not act stand behind them.
-fn sorted<const N: usize, const D: usize, const P: usize>(
-    rows: usize,
-    members: &[Members<N, D, P>],
-    act: impl Fn(usize) -> bool,
-) -> (Vec<u32>, Order) {
+/// Elements in the order in which they are satisfied.
+fn sorted<const N: usize, const D: usize, const P: usize>(rows: usize, members: &[Members<N, D, P>]) -> (Vec<u32>, Order) {
     let mut inside: Vec<Vec<u32>> = vec![Vec::new(); rows.div_ceil(CLUSTER)];
     let mut between = Vec::new();
-    for (e, member) in members.iter().enumerate().filter(|(e, _)| act(*e)) {
+    for (e, member) in members.iter().enumerate() {
         let cluster = member.nodes[0] as usize / CLUSTER;
         let whole = member.nodes.iter().all(|i| *i as usize / CLUSTER == cluster);
         if whole { inside[cluster].push(e as u32) } else { between.push(e as u32) }
@@ -336,7 +325,6 @@ fn sorted<const N: usize, const D: usize, const P: usize>(
     let clusters = inside.iter().filter(|own| !own.is_empty()).map(|own| colored(own, members, &mut used, &mut given)).collect();
     used.fill(0);
     let between = colored(&between, members, &mut used, &mut given);
-    given.extend((0..members.len()).filter(|e| !act(*e)).map(|e| e as u32));
     (given, Order { clusters, between })
 }
 
@@ -401,13 +389,10 @@ impl<E: Element<N, M, D>, Y: Law<P>, const N: usize, const M: usize, const D: us
     /// Elements over rows 0..rows, of which those from `points` on are frames with the inverse inertias `inverse` [1/(kg m²)]; `None`
     /// if a node is not one of them. `limits` are the strains at which links break (infinite: never), or empty.
     pub fn new(rows: usize, points: usize, inverse: &[Real], members: &[Members<N, D, P>], limits: &[f64]) -> Option<Self> {
-        Some(Self::with(Columns::new(rows, points, inverse, members)?, limits))
-    }
-
-    fn with(columns: Columns<N, D, P>, limits: &[f64]) -> Self {
+        let columns = Columns::new(rows, points, inverse, members)?;
         let breaks = limits.iter().any(|l| l.is_finite());
         let limits = if breaks { columns.given.iter().map(|e| limits[*e as usize] as Real).collect() } else { Vec::new() };
-        Self { columns, lambda: Vec::new(), limits, broken: Vec::new(), kind: PhantomData }
+        Some(Self { columns, lambda: Vec::new(), limits, broken: Vec::new(), kind: PhantomData })
     }
 
     fn set(&mut self, place: usize, compliance: Real, damping: Real) {

@@ -67,20 +67,18 @@ impl Site<'_> {
 
     /// The same with a rest length [m]; nothing if that is zero.
     fn link_of(&mut self, family: &Link, ends: [u32; 2], measure: f64, rest: f64) {
-        link_part(family, ends, measure, rest).into_iter().for_each(|part| self.parts.spring(part));
+        let settings = family.settings();
+        if rest > 0.0 {
+            let share = measure / (rest * rest);
+            self.parts.spring(SpringPart {
+                ends,
+                stiffness: settings.modulus * share,
+                damping: settings.damping * share,
+                rest,
+                hardening: settings.hardening,
+                tension_only: settings.tension_only,
+                break_strain: settings.break_strain,
+            });
+        }
     }
-}
-
-/// A link of a family that stands for `measure` [m, m², m³], with a rest length [m]; `None` if that is zero.
-fn link_part(family: &Link, ends: [u32; 2], measure: f64, rest: f64) -> Option<SpringPart> {
-    let (settings, share) = (family.settings(), measure / (rest * rest));
-    (rest > 0.0).then_some(SpringPart {
-        ends,
-        stiffness: settings.modulus * share,
-        damping: settings.damping * share,
-        rest,
-        hardening: settings.hardening,
-        tension_only: settings.tension_only,
-        break_strain: settings.break_strain,
-    })
 }

@@ -1,12 +1,12 @@
 //! A chain of springs, or a rod, between two points.
 
+use super::Site;
 use super::pins::{Pinnable, Pinned, pin};
-use super::{Site, link_part};
 use crate::geometry::Vector;
 use crate::math::functions::{cos, sin};
 use crate::math::rotation::from_z_to;
 use crate::math::{Quat, bisect};
-use crate::systems::dynamics::{SpringPart, Times};
+use crate::systems::dynamics::Times;
 use tumble_interface::scene::{Links, Rod, Rope};
 
 /// Adds the masses, and links or rod elements.
@@ -53,12 +53,11 @@ pub fn rope(site: &mut Site<'_>, thing: &Rope) {
 
 /// Springs by the rest length, which a slack or a taut start does not have between its masses.
 fn chain(site: &mut Site<'_>, links: &Links, first: u32, n: u32, spacing: f64) {
-    if let Some(family) = &links.structural {
-        let parts: Vec<SpringPart> = (first..first + n).filter_map(|i| link_part(family, [i, i + 1], spacing, spacing)).collect();
-        site.parts.chain(parts.into_iter());
-    }
-    if let Some(family) = &links.bend {
-        (first..(first + n).saturating_sub(1)).for_each(|i| site.link_of(family, [i, i + 2], spacing, 2.0 * spacing));
+    for (family, step) in [(&links.structural, 1), (&links.bend, 2)] {
+        let Some(family) = family else { continue };
+        for i in 0..(n + 1).saturating_sub(step) {
+            site.link_of(family, [first + i, first + i + step], spacing, spacing * f64::from(step));
+        }
     }
 }
 

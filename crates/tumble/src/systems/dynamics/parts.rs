@@ -100,8 +100,6 @@ pub struct Parts {
     /// Points that are spread out as Plummer's sphere, with its radius [m], in order.
     pub(super) halos: Vec<(u32, f64)>,
     pub(super) linear: Springs<1, 0>,
-    /// Linear springs that are chains, each from one row to the next.
-    pub(super) chains: Vec<Range<usize>>,
     pub(super) nonlinear: Springs<1, 2>,
     pub(super) vector: Springs<0, 0>,
     pub(super) dampers: Vec<Members<2, 1, 0>>,
@@ -178,8 +176,6 @@ impl Parts {
 
     /// Makes two of every link along an edge that two triangles share, in surfaces that tear: one for each.
     pub(super) fn halve_links(&mut self) {
-        // Their members are renumbered here, and rows of links later: all links are swept.
-        self.chains.clear();
         let mut drafts = std::mem::take(&mut self.objects);
         let ends: Vec<[usize; 3]> = drafts.iter().skip(1).map(|d| d.links).chain([self.counts()]).collect();
         let (mut linear, mut nonlinear) = (Springs::default(), Springs::default());
@@ -381,15 +377,6 @@ impl Parts {
         } else {
             let law = [part.hardening / (part.rest * part.rest), if part.tension_only { 0.0 } else { 1.0 }];
             self.nonlinear.push(&part, [part.rest], law, part.damping);
-        }
-    }
-
-    /// Adds springs from each row to the next, a chain where they are linear.
-    pub fn chain(&mut self, parts: impl Iterator<Item = SpringPart>) {
-        let start = self.linear.members.len();
-        parts.for_each(|part| self.spring(part));
-        if self.linear.members.len() > start + 1 {
-            self.chains.push(start..self.linear.members.len());
         }
     }
 

@@ -2,9 +2,9 @@
 
 use super::super::parts::{Closed, Liquid, Parts, Point, Springs};
 use crate::elements::{
-    Area, Batch, BendTwist, Chains, Constraints, Density, Distance, Element, Elements, Hinge, IsometricBend, Law, Linear, Members,
-    Membrane, Moment, Neohookean, Nonlinear, Pair, Pairs, Projected, Shape, Strands, StretchShear, TetShear, TetStrain, TetVolume, Vector,
-    Volume, Weights, Woven,
+    Area, Batch, BendTwist, Constraints, Density, Distance, Element, Elements, Hinge, IsometricBend, Law, Linear, Members, Membrane,
+    Moment, Neohookean, Nonlinear, Pair, Pairs, Projected, Shape, Strands, StretchShear, TetShear, TetStrain, TetVolume, Vector, Volume,
+    Weights, Woven,
 };
 use crate::forces::{Near, Newtonian};
 use crate::math::{Real, Row};
@@ -65,7 +65,7 @@ impl Batches {
     /// Adds all elements of some parts.
     pub fn fill(&mut self, parts: &mut Parts) -> Result<Lists, NotARow> {
         let springs = [
-            self.links(&parts.linear, &parts.chains)?,
+            self.springs::<Distance, Linear, 1, 1, 0>(&parts.linear)?,
             self.springs::<Distance, Nonlinear, 1, 1, 2>(&parts.nonlinear)?,
             self.springs::<Vector, Linear, 3, 0, 0>(&parts.vector)?,
         ];
@@ -93,15 +93,6 @@ impl Batches {
         let mut grip: Vec<Real> = stiffness.iter().map(|k| (k[0] + k[1] + k[2]) / 3.0).collect();
         self.constraints.iter().for_each(|c| c.add_grip(x, &mut grip));
         grip
-    }
-
-    /// Adds linear springs, if there are any: as constraints, those of ropes are solved as a whole.
-    fn links(&mut self, springs: &Springs<1, 0>, chains: &[Range<usize>]) -> Result<Option<usize>, NotARow> {
-        if self.projected.is_none() || chains.is_empty() {
-            return self.springs::<Distance, Linear, 1, 1, 0>(springs);
-        }
-        self.constraints.push(Box::new(Chains::new(self.rows, &springs.members, &springs.limits, chains).ok_or(NotARow)?));
-        Ok(Some(self.constraints.len() - 1))
     }
 
     /// Adds springs, if there are any; returns the index of the batch.
