@@ -159,8 +159,8 @@ def _type(value: Schema, definitions: dict[str, Schema]) -> str:
         return f"[{name}](#{name.lower()}){unit}"
     for key in ("anyOf", "oneOf"):
         if key in value:
-            unit = {"x-unit": value["x-unit"]} if "x-unit" in value else {}
-            branches = [unit | branch for branch in value[key] if branch.get("type") != "null"]
+            own = {"x-unit": value["x-unit"]} if "x-unit" in value else {}
+            branches = [own | branch for branch in value[key] if branch.get("type") != "null"]
             return " or ".join(_type(branch, definitions) for branch in branches)
     unit = f" {value['x-unit']}" if value.get("x-unit", "1") != "1" else ""
     types = value.get("type", "")
