@@ -437,8 +437,8 @@ impl World {
         self.engine.restore(&bytes).map_err(|e| scene_error(py, &e))
     }
 
-    /// Whether a step whose energy has grown beyond a thousand times its scale raises StepError, which is the default. With False the world goes
-    /// on, to show the explosion, until a number is not finite.
+    /// Whether a step whose energy has grown beyond a thousand times its scale raises StepError, which is the default. With
+    /// False the world goes on, to show the explosion, until a number is not finite.
     #[getter]
     fn stop_on_explosion(&self) -> bool {
         self.stops

@@ -158,6 +158,10 @@ impl PressureProjection<'_> {
             solids.close(u);
         }
         let mut fastest = fastest(u, solids.as_deref());
+        if fastest == 0.0 {
+            // Solids that come in have cut faces only, and no fluid moves yet.
+            fastest = solids.as_deref().map_or(0.0, Solids::fastest_cut);
+        }
         let mass = density * solids.as_deref().map_or(0.0, Solids::area);
         let grid = pressure.grid;
         let dx = grid.dx;

@@ -298,6 +298,11 @@ impl Solids {
         self.bodies.iter().map(|body| body.state.velocity.norm()).fold(0.0, f64::max)
     }
 
+    /// The largest component of the velocity of a solid across a face that it cuts [m/s].
+    pub fn fastest_cut(&self) -> f64 {
+        self.cuts.iter().map(|cut| f64::from(cut.velocity.abs())).fold(0.0, f64::max)
+    }
+
     /// Signed distances at the nodes. Where all of a block is farther from the surface than its own size, one of them does for it.
     fn measure(&mut self, t: f64) {
         let (grid, l) = (self.grid, self.grid.lattice());
