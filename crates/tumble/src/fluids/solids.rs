@@ -9,13 +9,13 @@
 //! A wall through which a cell would reach counts as thicker, to both sides alike, so that it lets nothing through wherever it lies
 //! (gas.19).
 //!
-//! Source: [ng2009]. Degenerate: wires and balls thinner than that obstruct like thicker ones; a solid that leaves a periodic box does not come back on the other side.
+//! Source: [ng2009]. Degenerate: bars of meshes thinner than that obstruct like thicker ones; a solid that leaves a periodic box does not come back on the other side.
 //! Tests: crates/tumble-f64/tests/solids.rs.
 
 use super::balls::Ball;
 use super::rows::{Face, beside};
 use super::sides::Beyond;
-use crate::geometry::{Collider, Vector};
+use crate::geometry::{Collider, Shape, Vector};
 use crate::linalg::poisson::{Joint, Weight, byte};
 use crate::math::Real;
 use crate::math::parallel::Tasks;
@@ -206,12 +206,13 @@ impl Solids {
         x.into()
     }
 
-    /// The nearest surface of a collider, no wall of it thinner than a cell needs.                              (gas.19)
+    /// The nearest surface of a collider, no wall of it thinner than a cell needs; balls and capsules are none.                              (gas.19)
     fn thickened(&self, collider: &Collider, x: Vector, t: f64, within: f64) -> (f64, Vector, Vector) {
         let (d, n, v) = collider.surface(x, t, within);
         let through: f64 = self.grid.axes().map(|a| <[f64; 3]>::from(n)[a].abs()).sum();
         let least = WALL * self.grid.dx * through;
-        if d.abs() > (DEPTH + 1.0) * self.grid.dx || least == 0.0 {
+        let round = matches!(collider.shape, Shape::Sphere { .. } | Shape::Capsule { .. });
+        if round || d.abs() > (DEPTH + 1.0) * self.grid.dx || least == 0.0 {
             return (d, n, v);
         }
         // As far behind the surface, the way back to the wall is what it lacks.
