@@ -259,7 +259,9 @@ class World:
         """Whether a step whose energy has grown beyond a thousand times its scale raises StepError, which is the default. With
         False the world goes on, to show the explosion, until a number is not finite."""
     @stop_on_explosion.setter
-    def stop_on_explosion(self, stop: bool) -> None: ...
+    def stop_on_explosion(self, stop: bool) -> None:
+        """Whether a step whose energy has grown beyond a thousand times its scale raises StepError, which is the default. With
+        False the world goes on, to show the explosion, until a number is not finite."""
     def reconsider(self) -> None:
         """After the state of another scene was loaded: what was chosen from that scene, as how many sub-steps an interval
         gets and what energies are measured against, is chosen anew from the state as it is now."""
