@@ -2,6 +2,7 @@
 
 import importlib.util
 import os
+import platform
 import signal
 import subprocess
 import sys
@@ -135,6 +136,12 @@ def test_pictures_are_the_same_bytes_again(renderer: str) -> None:
     run = fake_run.studio()
     first, second = (picture(run, 1, renderer, (64, 36)) for _ in range(2))
     assert np.mean(first != second) < 1e-3  # rounding may differ where threads meet
+
+
+@pytest.mark.skipif((sys.platform, platform.machine()) == ("darwin", "x86_64"), reason="no wheels of mitsuba-oidn")
+def test_mitsuba_works() -> None:
+    """It needs no library of the system: where it does not, the tests below that skip would pass for nothing."""
+    assert "mitsuba" in renderers()
 
 
 def test_edges_have_no_more_noise_than_surfaces(monkeypatch: pytest.MonkeyPatch) -> None:

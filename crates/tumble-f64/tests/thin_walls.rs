@@ -8,6 +8,7 @@ use crate::common;
 
 use common::{grid, run, simulation};
 use std::f64::consts::PI;
+use tumble_interface::Engine;
 
 /// A room in two halves, in the left of which smoke is blown about; the wall passes through the middle, leans by an angle [°] and is as thick as given [m].
 fn room(dimension: usize, n: usize, thickness: f64, [lean, turn]: [f64; 2], shift: f64, more: &str) -> tumble::scene::Simulation {
@@ -120,4 +121,34 @@ fn a_can_of_sheet_metal_keeps_its_smoke() {
         }
     }
     assert!(inside > 0.9 && outside < 1e-12, "{inside} {outside}");
+}
+
+/// Cells of 1/16 m that a solid takes out of a cubic metre of smoke.
+fn taken(shape: &str) -> f64 {
+    let sim = simulation(&format!(
+        "precision = \"double\"\n[[gas]]\nname = \"air\"\nbox = {{ size = [1, 1, 1], resolution = 16 }}\nsmoke = {{ initial = \"1\", weight = 0 }}\n[[collider]]\nname = \"c\"\nshape.{shape}\n"
+    ));
+    (1.0 - sim.ledger().mass) * 16.0_f64.powi(3)
+}
+
+#[test]
+fn balls_keep_their_size_and_plates_grow_to_what_blocks() {
+    // A ball as wide as two cells has the volume of six, a plate of a millimetre takes a layer or two of 256.
+    let ball = taken("sphere = { center = [0.01, 0.02, 0.013], radius = 0.07 }");
+    assert!((1.0..8.5).contains(&ball), "{ball}");
+    let plate = taken("box = { center = [0.01, 0, 0], size = [0.001, 2, 2] }");
+    assert!((255.0..513.0).contains(&plate), "{plate}");
+}
+
+#[test]
+fn a_solid_that_comes_into_a_fluid_at_rest_is_met_by_a_pressure_that_converges() {
+    // Its tip is a third of a cell inside: it cuts faces and closes none, and nothing moves yet.
+    let mut sim = simulation(
+        "precision = \"double\"\ndimension = 2\ntime = { fps = 1000, frames = 2 }\n[[gas]]\nname = \"air\"\nbox = { size = [2, 1, 2], resolution = 32 }\nsides.x = [\"open\", \"open\"]\n\
+         [[collider]]\nname = \"c\"\nshape.sphere = { center = [-1.48, 0, 0], radius = 0.5 }\nmotion.velocity = [1, 0, 0]\n",
+    );
+    let report = run(&mut sim, 2);
+    assert_eq!(report.unconverged, 0);
+    let speed = sim.ledger().speed.unwrap();
+    assert!(speed > 1e-3 && speed < 1.0, "{speed}");
 }
