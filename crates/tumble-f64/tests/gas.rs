@@ -294,6 +294,29 @@ end = 1.0
 }
 
 #[test]
+fn a_fluid_takes_the_components_of_a_formula_each_along_its_own_axis() {
+    // Without divergence, so that pressure takes nothing of it; periodic, and from rest, so that nothing is carried yet.
+    let mut sim = simulation(
+        "precision = \"double\"\ntime = { fps = 1000, frames = 1 }\nworld.gravity = [0, 0, 0]\n[[system]]\nmethod = \"gas\"\nsubsteps = 1\n[[gas]]\nname = \"air\"\nbox = { size = [1, 1, 1], resolution = 10 }\n\
+         sides = { x = [\"periodic\", \"periodic\"], y = [\"periodic\", \"periodic\"], z = [\"periodic\", \"periodic\"] }\nacceleration = [\"sin(2*pi*z)\", \"2*cos(2*pi*x)\", \"3*sin(2*pi*y)\"]\n",
+    );
+    step(&mut sim);
+    for (axis, name) in ["velocity_x", "velocity_y", "velocity_z"].into_iter().enumerate() {
+        let (u, points) = grid(&sim, "air", name);
+        let mut most = 0.0_f64;
+        for (i, u) in u.iter().enumerate() {
+            let at = [i % points[0], i / points[0] % points[1], i / points[0] / points[1]];
+            let x: [f64; 3] = std::array::from_fn(|a| (at[a] as f64 + if a == axis { 0.0 } else { 0.5 }) / 10.0 - 0.5);
+            let turn = 2.0 * PI;
+            let a = [(turn * x[2]).sin(), 2.0 * (turn * x[0]).cos(), 3.0 * (turn * x[1]).sin()][axis];
+            assert!((u - 1e-3 * a).abs() < 1e-9, "{name} at {x:?}: {u} {}", 1e-3 * a);
+            most = most.max(u.abs());
+        }
+        assert!(most > 0.9e-3, "{name}: {most}");
+    }
+}
+
+#[test]
 fn sources_give_what_their_keys_and_formulas_integrate_to() {
     // A region of 0.4 x 0.4 x 0.4 m in a box at rest, and its rates over a second.
     let given = |words: &str| {
