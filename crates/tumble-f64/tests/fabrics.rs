@@ -4,10 +4,9 @@
 
 use crate::common;
 
-use common::{positions, run};
+use common::{Vector, positions, run, write};
 use std::collections::HashMap;
-use tumble_f64::elements::{Law, Linear, Membrane, Moment, Woven, energy, forces};
-use tumble_f64::geometry::Vector;
+use tumble_f64::elements::{Linear, Membrane, Woven, WovenBending, energy, forces, moment};
 use tumble_f64::scene::Simulation;
 use tumble_interface::{Assets, Engine, Fabric, Scene};
 
@@ -94,32 +93,75 @@ fn the_energy_is_the_work_that_the_record_tells() {
 fn the_moment_is_that_of_the_record_and_never_falls() {
     // Nothing is lost of samples that do not fall faster than 1/kappa.
     let b = [2.0, 1.5, 1.2, 1.8, 1.6];
-    let s = 12.0;
-    let (stiffness, law) = Moment::samples(b, s).unwrap();
-    let moment = |law, r: f64| s * Moment::stress(stiffness, law, r);
+    let row = WovenBending::samples(b).unwrap();
+    let at = |row, kappa: f64| 10.0 * moment(row, kappa / 10.0).0;
     for (i, b) in b.iter().enumerate().skip(1) {
         let kappa = 10.0 * i as f64;
-        assert!((moment(law, kappa / s) / (b * kappa) - 1.0).abs() < 1e-12, "{i}");
-        assert!((moment(law, -kappa / s) / (b * kappa) + 1.0).abs() < 1e-12, "{i}");
+        assert!((at(row, kappa) / (b * kappa) - 1.0).abs() < 1e-12, "{i}");
     }
     // Between samples, at the start and beyond the last.
     for (kappa, b) in [(1e-6, 2.0 - 0.05e-6), (14.0, 1.38), (36.0, 1.68), (70.0, 1.6)] {
-        assert!((moment(law, kappa / s) / (b * kappa) - 1.0).abs() < 1e-9, "{kappa}");
+        assert!((at(row, kappa) / (b * kappa) - 1.0).abs() < 1e-9, "{kappa}");
     }
     // A record that falls: the moment stays, until the last sample reaches it: 3 b3/b4 = 9.
-    let (stiffness, law) = Moment::samples([2.0, 2.0, 2.0, 1.5, 0.5], s).unwrap();
-    let moment = |kappa: f64| s * Moment::stress(stiffness, law, kappa / s);
+    let row = WovenBending::samples([2.0, 2.0, 2.0, 1.5, 0.5]).unwrap();
     for (kappa, exact) in [(30.0, 45.0), (40.0, 45.0), (88.0, 45.0), (100.0, 50.0)] {
-        assert!((moment(kappa) / exact - 1.0).abs() < 1e-12, "{kappa}: {}", moment(kappa));
+        assert!((at(row, kappa) / exact - 1.0).abs() < 1e-12, "{kappa}: {}", at(row, kappa));
     }
     for name in SHIPPED {
         for row in record(name).bending {
-            let (stiffness, law) = Moment::samples(row, s).unwrap();
-            let steps: Vec<f64> = (0..2000).map(|i| Moment::stress(stiffness, law, f64::from(i) * 0.005)).collect();
-            assert!(steps.windows(2).all(|w| w[1] - w[0] > -1e-15) && steps[1] > 0.0, "{name}");
+            let row = WovenBending::samples(row).unwrap();
+            let steps: Vec<(f64, f64)> = (0..2000).map(|i| moment(row, f64::from(i) * 0.005)).collect();
+            assert!(steps.windows(2).all(|w| w[1].0 - w[0].0 > -1e-15) && steps[1].0 > 0.0, "{name}");
+            // The work is the integral of the moment.
+            assert!(steps.windows(2).all(|w| (w[1].1 - w[0].1 - 0.0025 * (w[0].0 + w[1].0)).abs() < 1e-5 * w[1].0), "{name}");
         }
     }
-    assert!(Moment::samples([0.0, 1.0, 1.0, 1.0, 1.0], 1.0).is_none());
+    assert!(WovenBending::samples([0.0, 1.0, 1.0, 1.0, 1.0]).is_none());
+}
+
+/// The energy per area of a surface of a fabric that is bent to a cylinder of curvature kappa [1/m], whose creases run at an angle to the warp
+/// [degrees], along rows of cells of these sizes: the work of the record's moments.
+#[test]
+fn a_cylinder_of_any_cells_holds_the_work_of_the_moments_of_its_record() {
+    for name in SHIPPED {
+        let f = record(name);
+        for (row, angle) in [(2, 0.0), (1, 45.0), (0, 90.0), (2, 180.0), (0, -90.0)] {
+            let numbers = WovenBending::samples(f.bending[row]).unwrap();
+            for (cells, kappa) in [([0.01, 0.01], 3.0), ([0.002, 0.004], 14.0), ([0.003, 0.001], 27.0), ([0.001, 0.0013], 60.0)] {
+                let (n, m) = (9, 7);
+                let text = format!(
+                    "version = 1\nprecision = \"double\"\n[[sheet]]\nname = \"s\"\nsize = [{}, {}]\nresolution = [{n}, {m}]\n\
+                     fabric = {{ path = \"it\", angle = {angle} }}\n",
+                    cells[0] * f64::from(n - 1),
+                    cells[1] * f64::from(m - 1)
+                );
+                let mut sim = Simulation::new(Scene::from_toml(&text).unwrap(), assets_of(&f)).unwrap();
+                let x: Vec<Vector> = positions(&sim, "s")
+                    .into_iter()
+                    .map(|x| Vector { x: (kappa * x.x).sin() / kappa, y: x.y, z: (1.0 - (kappa * x.x).cos()) / kappa })
+                    .collect();
+                write(&mut sim, "s", "position", &x);
+                // Chords are shorter than arcs; that stretch by (kappa dx)²/24 is not bending.
+                let stretch = {
+                    let mut sim = Simulation::new(Scene::from_toml(&text.replace("angle", "bending = 1e-12, angle")).unwrap(), assets_of(&f)).unwrap();
+                    write(&mut sim, "s", "position", &x);
+                    sim.ledger().elastic
+                };
+                let area = cells[0] * cells[1] * f64::from((n - 1) * (m - 1));
+                let exact = 100.0 * moment(numbers, kappa / 10.0).1 * area;
+                let found = sim.ledger().elastic - stretch;
+                let ends = 1.0 - 1.0 / f64::from(n - 1);
+                println!("{name} at {angle}, {cells:?}, {kappa}/m: {:.4}", found / exact);
+                // Triangles at the sides may warp between the threads.
+                assert!(found / exact < 1.005 && found / exact > ends - 0.03, "{name} {angle} {cells:?} {kappa}: {}", found / exact);
+            }
+        }
+    }
+}
+
+fn assets_of(fabric: &Fabric) -> Assets {
+    Assets::default().with_fabrics(HashMap::from([("it".to_string(), fabric.clone())]))
 }
 
 /// Height over width of the chord of a heavy strip of length L [m] and weight w [N/m²] that is clamped horizontally, with the curvature [1/m]
@@ -147,7 +189,7 @@ fn elastica(length: f64, weight: f64, curvature: &dyn Fn(f64) -> f64) -> f64 {
 
 /// The same from a simulated strip that is cut at an angle to the warp.
 fn strip(fabric: &Fabric, length: f64, angle: f64, (n, m): (u32, u32), (system, still): (&str, f64)) -> f64 {
-    // Hinges stand for half a segment to either side: the clamp is half a segment before the last held row.
+    // Folds stand for half a segment to either side: the clamp is half a segment before the last held row.
     let d = length / (f64::from(n) + 0.5);
     let pins: Vec<String> = (0..2).flat_map(|i| (0..m).map(move |j| format!("\"vertex {i} {j}\""))).collect();
     let text = format!(
@@ -159,8 +201,7 @@ fn strip(fabric: &Fabric, length: f64, angle: f64, (n, m): (u32, u32), (system, 
         pins.join(", ")
     );
     let scene = Scene::from_toml(&text).unwrap_or_else(|e| panic!("{e}\n{text}"));
-    let assets = Assets::default().with_fabrics(HashMap::from([("it".to_string(), fabric.clone())]));
-    let mut sim = Simulation::new(scene, assets).unwrap_or_else(|e| panic!("{e}"));
+    let mut sim = Simulation::new(scene, assets_of(fabric)).unwrap_or_else(|e| panic!("{e}"));
     run(&mut sim, 100);
     let x = positions(&sim, "s");
     let (row, speed) = ((n + 2) as usize, sim.ledger().speed.unwrap());
@@ -196,7 +237,9 @@ fn strips_of_all_fabrics_hang_at_the_angle_of_the_cantilever_test() {
             let c = (across(&fabric, angle)[0] / (fabric.density * G)).cbrt();
             let found = strip(&fabric, 2.0 * c, angle, (16, 7), (IMPLICIT, 1e-3));
             println!("{name} at {angle}: overhang {:.2} cm, tangent {found:.4}, {:.2} %", 200.0 * c, 100.0 * (found / target - 1.0));
-            assert!((found / target - 1.0).abs() < 0.05, "{name} at {angle}: {found}");
+            // Measured: 0.1 % along the threads; between them the sides of a strip are free to warp, which makes it 3 % softer if it is narrow.
+            let bound = if angle == 45.0 { 0.025 } else { 0.01 };
+            assert!((found / target - 1.0).abs() < bound, "{name} at {angle}: {found}");
         }
     }
 }
@@ -206,13 +249,13 @@ fn strips_of_all_fabrics_hang_at_the_angle_of_the_cantilever_test() {
 fn strips_of_whole_records_hang_like_the_elastica_with_their_moments() {
     for name in SHIPPED {
         for (angle, mesh, system) in
-            [(0.0, (16, 7), IMPLICIT), (90.0, (16, 7), IMPLICIT), (90.0, (12, 5), "method = \"position_based\"\nsubsteps = 300")]
+            [(0.0, (32, 3), IMPLICIT), (90.0, (32, 3), IMPLICIT), (90.0, (12, 5), "method = \"position_based\"\nsubsteps = 300")]
         {
             let fabric = record(name);
             let b = across(&fabric, angle);
             let length = 1.6 * (b[0] / (fabric.density * G)).cbrt();
-            let (stiffness, law) = Moment::samples(b, 1.0).unwrap();
-            let moment = |kappa: f64| Moment::stress(stiffness, law, kappa);
+            let numbers = WovenBending::samples(b).unwrap();
+            let moment = |kappa: f64| 10.0 * moment(numbers, kappa / 10.0).0;
             let curvature = |m: f64| {
                 let (mut low, mut high) = (0.0, 1e4);
                 for _ in 0..40 {
@@ -221,9 +264,7 @@ fn strips_of_whole_records_hang_like_the_elastica_with_their_moments() {
                 }
                 low
             };
-            // A wide strip has the stiffness of the record, one whose sides are free to rise 8/9 of it.
             let exact = elastica(length, fabric.density * G, &curvature);
-            let free = elastica(length, fabric.density * G, &|m| curvature(m * 9.0 / 8.0));
             // Sweeps of position-based dynamics let it creep, and what is twenty times as stiff as knitwear and as light tremble.
             let still = if system == IMPLICIT {
                 1e-3
@@ -233,9 +274,10 @@ fn strips_of_whole_records_hang_like_the_elastica_with_their_moments() {
                 0.03
             };
             let found = strip(&fabric, length, angle, mesh, (system, still));
-            println!("{name} at {angle}, {system:?}: tangent {found:.4}, between {exact:.4} and {free:.4}");
-            // Measured: 5.5 % outside at most, where the record changes fast; hinges see 3/4 of the curvature only on the mean.
-            assert!(found > 0.94 * exact && found < 1.03 * free, "{name} at {angle}: {found} {exact} {free}");
+            println!("{name} at {angle}, {system:?}: tangent {found:.4}, {:.2} %", 100.0 * (found / exact - 1.0));
+            // Where the record lets the moment stay, curvature gathers at the clamp: 2.4 % in 16 cells, half of it in 32.
+            let bound = if system == IMPLICIT { 0.02 } else { 0.06 };
+            assert!((found / exact - 1.0).abs() < bound, "{name} at {angle}: {found} {exact}");
         }
     }
 }

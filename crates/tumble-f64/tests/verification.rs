@@ -7,6 +7,7 @@
 
 mod common;
 
+mod bending;
 mod broken;
 mod character;
 mod cloth;

@@ -62,7 +62,7 @@ def words(fabric: str, **more: Any) -> Words:
 
 
 def moment(samples: Floats, kappa: Floats) -> Floats:
-    """Moment per width [N] at curvatures [1/m]: (fabrics.8) with (fabrics.9), written anew."""
+    """Moment per width [N] at curvatures [1/m]: (fabrics.9) with (fabrics.10), written anew."""
     b = np.maximum(samples, 0.0)
     for i in range(3):
         b[i + 1] = max(b[i + 1], b[i] * (i + 1) / (i + 2))
@@ -167,7 +167,7 @@ def pull(fabric: str, record: Record, angle: int) -> Floats:
 
 def hang(fabric: str, length: float, angle: int) -> float:
     """Height over width of the chord of a strip that hangs over an edge."""
-    # A hinge stands for half a segment to either side: the clamp is half a segment before the last held masses.
+    # A fold stands for half a segment to either side: the clamp is half a segment before the last held masses.
     d = length / (SEGMENTS + 0.5)
     rows = 2 * round(WIDTH / d / 2) + 1
     pins = [f"vertex {i} {j}" for i in range(2) for j in range(rows)]

@@ -10,7 +10,7 @@ use crate::math::Lane;
 ///
 /// x [m]   K [1/m]   k [N m].   Without stretch |r| = 2 sin(theta/2), so that its energy is that of the dihedral hinge at every angle; its
 /// Hessian is constant. Three masses in a row are such a hinge, too: K_1 = 0 (bending.11). Rest: K_1, K_2, K_3.
-/// Source: [bergou2006], eq. 3. Differs: the factor, see (bending.6).
+/// Source: [bergou2006], eq. 3. Differs: the factor, see docs/theory/bending.md.
 pub struct IsometricBend;
 
 impl IsometricBend {

@@ -17,11 +17,6 @@ pub trait Law<const P: usize>: Send + Sync + 'static {
         }
         Self::stress(Dual::constant(k), constant, Dual { re: r, slope: k.like(1.0) }).slope
     }
-    /// The slope by which a projection steps: where stress grows less than r, it must be that from r = 0, or the step would go too far.
-    #[inline(always)]
-    fn descent<L: Lane>(k: L, p: [L; P], r: L) -> L {
-        Self::tangent(k, p, r)
-    }
 }
 
 /// E = k/2 r².

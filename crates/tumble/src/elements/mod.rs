@@ -27,7 +27,7 @@ mod woven;
 
 pub use crate::linalg::blocks::Block;
 pub use batch::{Batch, Elements, Incidence};
-pub use bend::Hinge;
+pub use bend::Bending;
 pub use constraints::{Constraints, Density, Neohookean, Projected, Projection, Shape, Strands, Volume, behind, enclosed, spline};
 pub use contact::PointPlane;
 pub use distance::{Distance, Limit};
@@ -40,7 +40,7 @@ pub use pairs::{Pair, Pairs};
 pub use rod::{BendTwist, StretchShear};
 pub use tetrahedron::{TetShear, TetStrain, TetVolume, rest_matrix};
 pub use vector::Vector;
-pub use woven::{Moment, Woven};
+pub use woven::{Woven, WovenBending, moment};
 
 use crate::math::{Dual, Lane, Quat, Vec3};
 
@@ -279,7 +279,7 @@ pub fn project<E: Element<N, M, D>, Y: Law<P>, L: Lane, const N: usize, const M:
     }
     let (mut c, mut slope) = (y[0], one);
     if M == 1 {
-        slope = Y::descent(one, law, r[0]);
+        slope = Y::tangent(one, law, r[0]);
         if before.is_some() {
             slope = (one - share) * slope + share;
         }

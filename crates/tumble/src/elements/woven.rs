@@ -1,7 +1,8 @@
-//! Triangles and hinges of measured cloth, whose stiffness changes with direction, strain and curvature.
+//! Triangles of measured cloth, whose stiffness changes with direction, strain and curvature.
 
+use super::bend::{folds, product, spread, transposed};
 use super::membrane::{edges, taut};
-use super::{Element, Law, force, point};
+use super::{Element, force, point};
 use crate::math::{Lane, Vec3};
 use tumble_interface::Fabric;
 
@@ -11,8 +12,6 @@ const MOST_STRAIN: f64 = 13.0 / 72.0;
 const NO_STRAIN: f64 = 1e-12;
 /// The mean of the weight v over the way to that strain, (fabrics.5).
 const MEAN_AT_MOST: f64 = 114.8 / 169.0;
-/// Samples of bending are this far apart [1/m].
-const CURVATURE: f64 = 10.0;
 
 /// The stretch of a measured fabric. F and e as for the membrane; C, the elastic matrix, is no constant:
 ///
@@ -26,14 +25,19 @@ const CURVATURE: f64 = 10.0;
 /// Degenerate: where the smaller stretch is a stretch, too, directions fade; unstrained m = 0.
 pub struct Woven;
 
-/// The moment of a measured fabric over r = 2 sin(theta/2), with kappa = s |r| the curvature over 10/m:
+/// The bending of a triangle of a measured fabric, with folds and nodes as in `Bending`. kappa = G t is its curvature (kuu, kvv, kuv) in the
+/// axes of the threads, in samples 10/m apart:
 ///
-///   stress = k M(kappa)/s sign(r),   M = b(kappa) kappa              (fabrics.8)
+///   r_i = sqrt(D_i(s)) kappa_i,   s² = kuu² + kvv² + 2 kuv²,   D = (B90, B0, 4 B45 - B0 - B90)        (fabrics.8)
 ///
-/// b is linear between samples at kappa = 0, 1, 2, 3, 4, constant beyond, and 1 at 0; where M would fall it stays as it is, (fabrics.9).
-/// Parameters: s [1/m over 10/m], b at 1, 2, 3; slope and curvature of M from 3 to k4, which is 4 or the end of a constant moment; k4; b beyond.
-/// Source: [wang2011].
-pub struct Moment;
+/// with B the mean over the way from rest of the b of the record, so that the energy is the work of its moments (fabrics.9); b is linear between
+/// samples, constant beyond, and such that moments do not fall (fabrics.10).
+/// x [m]   k = rest area times (10/m)².   Rest: G by rows, t0; for creases along the weft, at 45 degrees, along the warp the row of `samples`.
+/// Source: [wang2011].   Degenerate: where 4 B45 is below B0 + B90, which no plate has, twist resists by `LEAST` B45.
+pub struct WovenBending;
+
+/// Resistance to twist of a record without any, relative to that at 45 degrees.
+const LEAST: f64 = 0.05;
 
 impl Woven {
     /// The rest numbers from B and a record.
@@ -55,22 +59,31 @@ impl Woven {
     }
 }
 
-impl Moment {
-    /// The stiffness at no curvature [N m] and the parameters, for five samples [N m] and a hinge with s [1/m]; `None` if the first is not > 0.
-    pub fn samples(samples: [f64; 5], s: f64) -> Option<(f64, [f64; 8])> {
-        let first = samples[0];
-        if first.is_nan() || first <= 0.0 {
+impl WovenBending {
+    /// Samples are this far apart [1/m].
+    pub const SAMPLE: f64 = 10.0;
+
+    /// D without curvature [N m], for these rows.
+    pub fn flat(rows: &[[f64; 8]; 3]) -> [f64; 3] {
+        let root = stiffness(rows, 0.0).0;
+        root.map(|root| root * root)
+    }
+
+    /// The numbers of a row of the record for five samples [N m]: b at 0, 1, 2, 3; slope and curvature of the moment from 3 to k4, which is 4 or the
+    /// end of a constant moment; k4; b beyond. `None` if the first sample is not > 0.
+    pub fn samples(samples: [f64; 5]) -> Option<[f64; 8]> {
+        if samples[0].is_nan() || samples[0] <= 0.0 {
             return None;
         }
-        let mut b = samples.map(|b| b.max(0.0) / first);
-        // The slope of M at the end of a piece is b + kappa b'.
+        let mut b = samples.map(|b| b.max(1e-6 * samples[0]));
+        // The slope of the moment at the end of a piece is b + kappa b'.
         for i in 0..3 {
             let i_ = i as f64;
             b[i + 1] = b[i + 1].max(b[i] * (i_ + 1.0) / (i_ + 2.0));
         }
         let (t1, t2, k4) =
-            if b[4] < 0.8 * b[3] { (0.0, 0.0, 3.0 * b[3] / b[4].max(1e-6)) } else { (b[3] + 3.0 * (b[4] - b[3]), b[4] - b[3], 4.0) };
-        Some((first, [s / CURVATURE, b[1], b[2], b[3], t1, t2, k4, b[4].max(1e-6)]))
+            if b[4] < 0.8 * b[3] { (0.0, 0.0, 3.0 * b[3] / b[4]) } else { (b[3] + 3.0 * (b[4] - b[3]), b[4] - b[3], 4.0) };
+        Some([b[0], b[1], b[2], b[3], t1, t2, k4, b[4]])
     }
 }
 
@@ -215,38 +228,90 @@ impl Element<3, 3, 28> for Woven {
     }
 }
 
-/// The moment over s and k at a curvature, in samples, and the work up to there.
+/// The moment at a curvature, in samples, and the work up to there.
 #[inline(always)]
-fn moment<L: Lane>([_, b1, b2, b3, t1, t2, k4, b4]: [L; 8], kappa: L) -> (L, L) {
+pub fn moment<L: Lane>([b0, b1, b2, b3, t1, t2, k4, b4]: [L; 8], kappa: L) -> (L, L) {
     let (one, half, third) = (kappa.like(1.0), kappa.like(0.5), kappa.like(1.0 / 3.0));
     let near = least(kappa, kappa.like(3.0));
     let (from1, from2) = ((near - one).above_zero(), (near - kappa.like(2.0)).above_zero());
-    let (m0, m1, m2) = (b1 - one, b2 - b1 - b1 + one, b3 - b2 - b2 + b1);
-    let m = near * (one + m0 * near + m1 * from1 + m2 * from2);
-    let bend = |m: L, from: L, at: f64| m * from * from * (from * third + kappa.like(0.5 * at));
-    let e = near * near * (half + m0 * near * third) + bend(m1, from1, 1.0) + bend(m2, from2, 2.0);
+    let (m0, m1, m2) = (b1 - b0, b2 - b1 - b1 + b0, b3 - b2 - b2 + b1);
+    let mut m = near * (b0 + m0 * near + m1 * from1 + m2 * from2);
+    let mut e = near * near * (b0 * half + m0 * near * third);
+    for (bend, from, at) in [(m1, from1, 1.0), (m2, from2, 2.0)] {
+        e = e + bend * from * from * (from * third + kappa.like(0.5 * at));
+    }
     let u = (least(kappa, k4) - kappa.like(3.0)).above_zero();
-    let at3 = kappa.like(3.0) * b3;
     let beyond = (kappa - k4).above_zero();
-    (m + u * (t1 + t2 * u) + b4 * beyond, e + u * (at3 + u * (t1 * half + t2 * u * third)) + b4 * beyond * (k4 + beyond * half))
+    m = m + u * (t1 + t2 * u) + b4 * beyond;
+    e = e + u * (kappa.like(3.0) * b3 + u * (t1 * half + t2 * u * third)) + b4 * beyond * (k4 + beyond * half);
+    (m, e)
 }
 
-impl Law<8> for Moment {
+/// The mean of b over the way to a curvature, in samples, and its slope.                     (fabrics.9)
+#[inline(always)]
+fn mean<L: Lane>(row: [L; 8], s: L) -> (L, L) {
+    let (m, e) = moment(row, s);
+    let first = s.like(1.0) - s;
+    let inverse = first.positive(s.like(1.0), s.like(1.0) / s);
+    let far = (e + e) * inverse * inverse;
+    let rate = (row[1] - row[0]) * s.like(2.0 / 3.0);
+    let slope = (m * inverse - far) * inverse;
+    (first.positive(row[0] + rate * s, far), first.positive(rate, slope + slope))
+}
+
+#[inline(always)]
+fn rows<L: Lane>(rest: &[L; 36]) -> [[L; 8]; 3] {
+    let mut rows = [[rest[0]; 8]; 3];
+    for i in 0..24 {
+        rows[i / 8][i % 8] = rest[12 + i];
+    }
+    rows
+}
+
+/// Roots of D, and how they change with s.
+#[inline(always)]
+fn stiffness<L: Lane>(rows: &[[L; 8]; 3], s: L) -> ([L; 3], [L; 3]) {
+    let mut b = [(s, s); 3];
+    for i in 0..3 {
+        b[i] = mean(rows[i], s);
+    }
+    let [(weft, weft_slope), (between, between_slope), (warp, warp_slope)] = b;
+    let (four, low) = (s.like(4.0), s.like(LEAST));
+    let twist = four * between - weft - warp;
+    let above = twist - low * between;
+    let d = [(weft, weft_slope), (warp, warp_slope)];
+    let twist = (above.positive(twist, low * between), above.positive(four * between_slope - weft_slope - warp_slope, low * between_slope));
+    let (mut root, mut slope) = ([s; 3], [s; 3]);
+    for (i, (d, rate)) in [d[0], d[1], twist].into_iter().enumerate() {
+        root[i] = d.sqrt();
+        slope[i] = rate * s.like(0.5) / root[i];
+    }
+    (root, slope)
+}
+
+/// s, and its inverse, which is 0 at 0.
+#[inline(always)]
+fn size<L: Lane>([u, v, w]: [L; 3]) -> (L, L) {
+    let s = (u * u + v * v + (w + w) * w).sqrt();
+    (s, s.positive(s.like(1.0) / s, s.zero()))
+}
+
+impl<const N: usize> Element<N, 3, 36> for WovenBending {
+    const NAME: &'static str = "fabric hinge";
     #[inline(always)]
-    fn energy<L: Lane>(k: L, p: [L; 8], r: L) -> L {
-        let (_, e) = moment(p, r.positive(r, -r) * p[0]);
-        k * e / (p[0] * p[0])
+    fn residual<L: Lane>(rest: [L; 36], x: [[L; 4]; N]) -> [L; 3] {
+        let kappa = product(&rest, folds(&rest, &x));
+        let (root, _) = stiffness(&rows(&rest), size(kappa).0);
+        [root[0] * kappa[0], root[1] * kappa[1], root[2] * kappa[2]]
     }
     #[inline(always)]
-    fn stress<L: Lane>(k: L, p: [L; 8], r: L) -> L {
-        let (m, _) = moment(p, r.positive(r, -r) * p[0]);
-        let stress = k * m / p[0];
-        r.positive(stress, -stress)
-    }
-    #[inline(always)]
-    fn descent<L: Lane>(k: L, p: [L; 8], r: L) -> L {
-        let (tangent, stress) = (Self::tangent(k, p, r), Self::stress(k, p, r));
-        let secant = (r * r).positive(stress / r, tangent);
-        (secant - tangent).positive(secant, tangent)
+    fn pullback<L: Lane>(rest: [L; 36], x: [[L; 4]; N], y: [L; 3]) -> [[L; 4]; N] {
+        let kappa = product(&rest, folds(&rest, &x));
+        let (s, inverse) = size(kappa);
+        let (root, slope) = stiffness(&rows(&rest), s);
+        let along = (y[0] * kappa[0] * slope[0] + y[1] * kappa[1] * slope[1] + y[2] * kappa[2] * slope[2]) * inverse;
+        let twist = (kappa[2] + kappa[2]) * along;
+        let z = [y[0] * root[0] + kappa[0] * along, y[1] * root[1] + kappa[1] * along, y[2] * root[2] + twist];
+        spread(&x, transposed(&rest, z))
     }
 }

@@ -134,10 +134,11 @@ pub fn cloth(site: &mut Site<'_>, thing: &Cloth) {
             isometric: thing.isometric,
             membrane: thing.membrane.as_ref(),
             fabric: fabric.clone(),
-            squares: false,
-            area: thing.area,
+                area: thing.area,
         };
-        site.surface(&own, at, &words, &Rest::mesh(&own, Vector { x: 1.0, y: 0.0, z: 0.0 }));
+        let rest = Rest::mesh(&own, Vector { x: 1.0, y: 0.0, z: 0.0 });
+        site.bending(&own, at, &words, &rest);
+        site.stretch(&own, at, &words, &rest);
         cut_out.extend(own.triangles.iter().map(|t| t.map(|i| Vector::from(own.vertices[i as usize]))));
         all.triangles.extend(own.triangles.iter().map(|t| t.map(|i| i + start)));
         sides.push(piece.sides.into_iter().map(|side| side.into_iter().map(|i| at + i).collect()).collect());

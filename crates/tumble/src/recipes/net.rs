@@ -75,10 +75,10 @@ pub fn net(site: &mut Site<'_>, thing: &Net, mesh: &Mesh) {
         isometric: thing.isometric,
         membrane: thing.membrane.as_ref(),
         fabric,
-        squares: false,
         area: thing.area,
     };
-    site.surface(mesh, first, &words, &rest);
+    site.bending(mesh, first, &words, &rest);
+    site.stretch(mesh, first, &words, &rest);
     if let Some(words) = &thing.pressure {
         site.inflate(mesh, first, words, &path);
     }

@@ -23,16 +23,16 @@ pub fn sheet(site: &mut Site<'_>, thing: &Sheet) {
     lattice.links(site, &thing.links());
     let first = lattice.index([0; 3]);
     let warp = site.parts.position(lattice.index([1, 0, 0])) - site.parts.position(first);
+    // Triangles that stretch as a fabric prefer no direction if diagonals alternate. Bending does on rows of equal diagonals, where no edge but
+    // those of triangles can tear; links and drawings know the others.
+    let alternates = fabric.is_some() && thing.tear.is_none();
+    let mut straight = Vec::new();
     let mut triangles = Vec::new();
     for j in 1..lattice.n[1] {
         for i in 1..lattice.n[0] {
             let [a, b, c, d] = [[i - 1, j - 1], [i, j - 1], [i, j], [i - 1, j]].map(|[i, j]| lattice.index([i, j, 0]) - first);
-            // Alternating diagonals prefer no direction; links and drawings know the others.
-            if fabric.is_some() && (i + j) % 2 == 1 {
-                triangles.extend([[a, b, d], [b, c, d]]);
-            } else {
-                triangles.extend([[a, b, c], [a, c, d]]);
-            }
+            straight.extend([[a, b, c], [a, c, d]]);
+            triangles.extend(if alternates && (i + j) % 2 == 1 { [[a, b, d], [b, c, d]] } else { [[a, b, c], [a, c, d]] });
         }
     }
     pin(site, &Pinnable { path: &path, n: &lattice.n[..2], first, is_lattice: true }, &thing.pin);
@@ -41,18 +41,13 @@ pub fn sheet(site: &mut Site<'_>, thing: &Sheet) {
         lattice.plate(site, thing.isometric);
     }
     if thing.hinge > 0.0 || thing.area > 0.0 || thing.membrane.is_some() || fabric.is_some() {
-        let vertices = lattice.nodes().map(|node| site.parts.position(lattice.index(node)).into()).collect();
+        let vertices: Vec<_> = lattice.nodes().map(|node| site.parts.position(lattice.index(node)).into()).collect();
+        let words =
+            Surface { path: &path, hinge: thing.hinge, isometric: 0.0, membrane: thing.membrane.as_ref(), fabric, area: thing.area };
+        let rows = Mesh { vertices: vertices.clone(), triangles: straight, ..Mesh::default() };
+        site.bending(&rows, first, &words, &Rest::mesh(&rows, warp));
         let mesh = Mesh { vertices, triangles, ..Mesh::default() };
-        let words = Surface {
-            path: &path,
-            hinge: thing.hinge,
-            isometric: 0.0,
-            membrane: thing.membrane.as_ref(),
-            fabric,
-            squares: true,
-            area: thing.area,
-        };
-        site.surface(&mesh, first, &words, &Rest::mesh(&mesh, warp));
+        site.stretch(&mesh, first, &words, &Rest::mesh(&mesh, warp));
         triangles = mesh.triangles;
     }
     let corners: Vec<_> = triangles.iter().map(|t| t.map(|i| site.parts.position(i + first))).collect();

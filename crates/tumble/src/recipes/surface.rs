@@ -1,7 +1,7 @@
 //! What makes triangles of points elastic: bending across their edges, stretch and area of each, the volume that they enclose.
 
 use super::Site;
-use crate::elements::{Element, Hinge, IsometricBend, Membrane, Moment, Woven, enclosed};
+use crate::elements::{Bending, IsometricBend, Membrane, Woven, WovenBending, enclosed};
 use crate::geometry::Vector;
 use crate::math::{Signal, functions};
 use crate::systems::dynamics::{Closed, TearPart};
@@ -16,7 +16,7 @@ use tumble_interface::{Fabric, Mesh};
 pub struct Surface<'a> {
     /// Its place in the scene.
     pub path: &'a str,
-    /// Bending stiffness of dihedral hinges [N m].
+    /// Bending stiffness of a plate of any shape at rest [N m].
     pub hinge: f64,
     /// Bending stiffness of flat hinges [N m].
     pub isometric: f64,
@@ -24,8 +24,6 @@ pub struct Surface<'a> {
     pub membrane: Option<&'a Words>,
     /// Measured fabric.
     pub fabric: Option<Measured>,
-    /// Whether its triangles are squares with alternating diagonals, for fabrics.
-    pub squares: bool,
     /// Stiffness against changes of area [N/m].
     pub area: f64,
 }
@@ -37,7 +35,7 @@ pub struct Rest<'a> {
     warp: Vector,
 }
 
-/// Two triangles on both sides of an edge: its ends, what lies opposite on the left and on the right; the triangles; and where these four are at
+/// Two triangles on both sides of an edge: its ends, what lies opposite on the left and on the right; the triangles in that order; where those four are at
 /// rest.
 pub struct Wings {
     pub nodes: [u32; 4],
@@ -108,7 +106,7 @@ impl<'a> Rest<'a> {
             let end = |x: f64| Vector { x, y: 0.0, z: 0.0 };
             [end(-half), end(half), place(left, 1.0), place(right, -1.0)]
         };
-        Some(Wings { nodes: [a, b, left.0, right.0], faces: faces.map(|t| t as usize), at })
+        Some(Wings { nodes: [a, b, left.0, right.0], faces: [left.1, right.1], at })
     }
 }
 
@@ -119,52 +117,137 @@ pub struct Measured {
     words: FabricUse,
 }
 
-/// Sides of squares are folded by 3/4 of the curvature of the surface.
-const SQUARES: f64 = 4.0 / 3.0;
-
 impl Measured {
-    /// Bending stiffness [N m] of hinges along an edge with this direction in a triangle, at each curvature of the record; of a side of squares,
-    /// or of a diagonal, such that a surface bent along either side, or between them, has that of the record: (fabrics.11).
-    fn hinges(&self, edge: Vector, triangle: [Vector; 3], rest: &Rest<'_>, squares: Option<bool>) -> [f64; 5] {
-        let (warp, angle) = rest.warp(self.words.angle);
-        let (u, v) = Membrane::grain(triangle, warp, angle);
-        let at = functions::atan2(edge.dot(v), edge.dot(u)).to_degrees();
+    /// The rows of the record for creases along the weft, at 45 degrees and along the warp, as numbers of an element.
+    fn rows(&self) -> Option<[[f64; 8]; 3]> {
         let factor = self.words.thicken * self.words.bending;
-        std::array::from_fn(|i| {
-            let stiff = |turn: f64| factor * self.across(at + turn, i);
-            let Some(diagonal) = squares else { return stiff(0.0) };
-            let side = if diagonal { 45.0 } else { 0.0 };
-            let (own, other) = (stiff(side), stiff(side + 90.0));
-            let between = 0.5 * (stiff(side + 45.0) + stiff(side - 45.0));
-            let [side, _, diagonals] = of_squares([own, other, between]);
-            if diagonal { diagonals } else { side }
-        })
-    }
-
-    /// That of the record for creases at an angle to the warp [degrees], linear between 0, 45 and 90.
-    fn across(&self, angle: f64, sample: usize) -> f64 {
-        let at = angle.abs() % 180.0;
-        let at = if at > 90.0 { 180.0 - at } else { at } / 45.0;
-        let (row, part) = if at < 1.0 { (0, at) } else { (1, at - 1.0) };
         // What is not > 0 resists hardly.
-        let number = |row: usize| self.record.bending[row][sample].max(1e-3 * self.record.bending[row][0]);
-        number(row) + part * (number(row + 1) - number(row))
+        let row = |i: usize| {
+            let samples = self.record.bending[i];
+            WovenBending::samples(samples.map(|b| factor * b.max(1e-3 * samples[0])))
+        };
+        Some([row(2)?, row(1)?, row(0)?])
     }
 }
 
-/// Stiffness of both sides and of the diagonals of squares whose diagonals alternate, for that of creases along either side and between:
-///
-///   B_y = b_y - b_y²/s,  B_x = b_x - b_x²/s,  B_d = b_d (1 + (b_x + b_y)/s),  s = b_x + b_y + 4 b_d   (fabrics.11)
-fn of_squares([one, other, between]: [f64; 3]) -> [f64; 3] {
-    let mut b = [4.0 / 3.0 * one, 4.0 / 3.0 * other, 2.0 / 3.0 * between];
-    // Contracts by a half each time; where there is no solution it ends near by.
-    for _ in 0..40 {
-        let s = b[0] + b[1] + 4.0 * b[2];
-        let side = |stiff: f64| 0.5 * (s - (s * s - 4.0 * s * stiff).max(0.0).sqrt());
-        let next = [side(one), side(other), between * s / (s + b[0] + b[1])];
-        b = std::array::from_fn(|i| 0.5 * (b[i] + next[i]));
+/// What lies beside a triangle, across one of its edges.
+#[derive(Clone, Copy)]
+struct Beside {
+    node: u32,
+    /// Where its height stands on the edge, from the corner where the edge begins (0) to the next (1).
+    foot: f64,
+    /// Its height over the edge [m].
+    height: f64,
+}
+
+/// Pivots below this, of 1, leave a curvature undetermined: the six points lie nearly on one conic.
+const UNDETERMINED: f64 = 4e-3;
+
+/// A triangle at rest with those beside it, laid into its plane.
+#[derive(Clone)]
+struct Patch {
+    /// Its nodes; those that begin an edge with something beside it come first.
+    nodes: [u32; 3],
+    /// Its corners [m].
+    at: [[f64; 2]; 3],
+    beside: Vec<Beside>,
+}
+
+impl Patch {
+    fn new(nodes: [u32; 3], at: [[f64; 2]; 3], beside: &[Option<Beside>; 3]) -> Self {
+        let start = (0..3).find(|k| beside[*k].is_some() && beside[(k + 2) % 3].is_none()).unwrap_or(0);
+        let order = [0, 1, 2].map(|k| (start + k) % 3);
+        Self { nodes: order.map(|k| nodes[k]), at: order.map(|k| at[k]), beside: order.into_iter().map_while(|k| beside[k]).collect() }
     }
-    b
+
+    /// The nodes of its element, as points from `first` on.
+    fn all(&self, first: u32) -> Vec<u32> {
+        self.nodes.into_iter().chain(self.beside.iter().map(|b| b.node)).map(|i| i + first).collect()
+    }
+
+    /// Matrices with which folds give curvatures (kxx, kyy, kxy), of whom and for how much area [m²]: of the whole, by (bending.6); where six
+    /// points do not determine a surface, or two of them are one, each fold stands for half of the area on both sides of it.
+    fn curvatures(&self, d: [f64; 3]) -> Vec<(Self, [f64; 9], f64)> {
+        let [a, b, c] = self.at;
+        let area = ((b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0])) / 2.0;
+        let mut nodes = self.all(0);
+        nodes.sort_unstable();
+        let is_plain = nodes.windows(2).all(|w| w[0] != w[1]);
+        if self.beside.is_empty() {
+            return Vec::new();
+        }
+        if let Some(g) = is_plain.then(|| self.curvature(d)).flatten() {
+            return vec![(self.clone(), g, area)];
+        }
+        let alone = |(i, beside): (usize, &Beside)| {
+            let order = [0, 1, 2].map(|k| (i + k) % 3);
+            let one = Self { nodes: order.map(|k| self.nodes[k]), at: order.map(|k| self.at[k]), beside: vec![*beside] };
+            let e = [0, 1].map(|c| one.at[1][c] - one.at[0][c]);
+            let length_sq = e[0] * e[0] + e[1] * e[1];
+            let (own, other) = (2.0 * area, beside.height * length_sq.sqrt());
+            // theta = kappa (h2 + h3)/2, across the edge.
+            let (x, y, over) = (e[1], -e[0], 2.0 / (length_sq.sqrt() * (own + other)));
+            let mut g = [0.0; 9];
+            (g[0], g[3], g[6]) = (over * x * x, over * y * y, over * x * y);
+            (one, g, (own + other) / 4.0)
+        };
+        // What a fold would have for itself as its own neighbour is no fold.
+        let folds = self.beside.iter().enumerate().filter(|(_, b)| !self.nodes.contains(&b.node));
+        folds.map(alone).collect()
+    }
+
+    /// Folds t of the surface with the second derivatives kxx, kyy, kxy: a row for each edge that has a neighbour.     (bending.10)
+    fn folds(&self) -> Vec<[f64; 3]> {
+        let row = |(i, beside): (usize, &Beside)| {
+            let [a, b, c] = [0, 1, 2].map(|k| self.at[(i + k) % 3]);
+            let (e, to) = ([b[0] - a[0], b[1] - a[1]], [c[0] - a[0], c[1] - a[1]]);
+            let length_sq = e[0] * e[0] + e[1] * e[1];
+            let length = length_sq.sqrt();
+            let (foot, height) = ((to[0] * e[0] + to[1] * e[1]) / length_sq, (e[0] * to[1] - e[1] * to[0]) / length);
+            let out = beside.height / length;
+            let d = [a[0] + beside.foot * e[0] + out * e[1], a[1] + beside.foot * e[1] - out * e[0]];
+            let (k2, k3) = (-1.0 / height, -1.0 / beside.height);
+            let k1 = -foot * k2 - beside.foot * k3;
+            let slopes = [-k1 - k2 - k3, k1, k2, k3].into_iter().zip([a, b, c, d]);
+            slopes.fold([0.0; 3], |s, (k, [x, y])| [s[0] + k * x * x / 2.0, s[1] + k * y * y / 2.0, s[2] + k * x * y])
+        };
+        self.beside.iter().enumerate().map(row).collect()
+    }
+
+    /// The matrix of three rows with which folds give the curvature of least energy D/2 that has them; `None` if they leave one undetermined.
+    fn curvature(&self, d: [f64; 3]) -> Option<[f64; 9]> {
+        let folds = self.folds();
+        let n = folds.len();
+        let sizes: Vec<f64> = folds.iter().map(|a| (0..3).map(|c| a[c] * a[c] / d[c]).sum::<f64>().sqrt()).collect();
+        // Cholesky of S = A D^-1 A^T, scaled to a diagonal of 1.
+        let mut l = [[0.0; 3]; 3];
+        for i in 0..n {
+            for j in 0..=i {
+                let s: f64 = (0..3).map(|c| folds[i][c] * folds[j][c] / d[c]).sum::<f64>() / (sizes[i] * sizes[j]);
+                let rest = s - (0..j).map(|k| l[i][k] * l[j][k]).sum::<f64>();
+                l[i][j] = if i == j { rest.sqrt() } else { rest / l[j][j] };
+                if i == j && !(rest > UNDETERMINED) {
+                    return None;
+                }
+            }
+        }
+        // G = D^-1 A^T S^-1, column by column.
+        let mut g = [0.0; 9];
+        for column in 0..n {
+            let mut y = [0.0; 3];
+            for i in 0..n {
+                let own = if i == column { 1.0 / sizes[i] } else { 0.0 };
+                y[i] = (own - (0..i).map(|k| l[i][k] * y[k]).sum::<f64>()) / l[i][i];
+            }
+            for i in (0..n).rev() {
+                y[i] = (y[i] - (i + 1..n).map(|k| l[k][i] * y[k]).sum::<f64>()) / l[i][i];
+            }
+            for c in 0..3 {
+                g[3 * c + column] = (0..n).map(|i| folds[i][c] / d[c] * y[i] / sizes[i]).sum();
+            }
+        }
+        Some(g)
+    }
 }
 
 impl Site<'_> {
@@ -180,9 +263,8 @@ impl Site<'_> {
         Some((Some(Measured { record, words }), density))
     }
 
-    /// All elements of the triangles of a mesh whose vertices are points from `first` on; `rest` is where nothing is strained.
-    pub(super) fn surface(&mut self, mesh: &Mesh, first: u32, words: &Surface<'_>, rest: &Rest<'_>) {
-        self.bending(mesh, first, words, rest);
+    /// What keeps the triangles of a mesh in shape, whose vertices are points from `first` on; `rest` is where nothing is strained.
+    pub(super) fn stretch(&mut self, mesh: &Mesh, first: u32, words: &Surface<'_>, rest: &Rest<'_>) {
         if let Some(membrane) = words.membrane {
             let Some(root) = Membrane::root(membrane.warp, membrane.weft(), membrane.poisson, membrane.shear()) else {
                 let most = (membrane.warp / membrane.weft()).sqrt();
@@ -215,41 +297,76 @@ impl Site<'_> {
         }
     }
 
-    /// Hinges across every edge of a mesh that has two triangles; B is the bending stiffness per width [N m]. A dihedral hinge has the rest
-    /// angle of the mesh, or none if there is a pattern. k = B l²/(A1 + A2), which gives a sheet bent to a cylinder its stiffness B.      (bending.6)
-    fn bending(&mut self, mesh: &Mesh, first: u32, words: &Surface<'_>, rest: &Rest<'_>) {
+    /// Bending of the triangles of a mesh. Its rest angles are those of the mesh, or none if there is a pattern; flat hinges across edges have none.
+    pub(super) fn bending(&mut self, mesh: &Mesh, first: u32, words: &Surface<'_>, rest: &Rest<'_>) {
         if words.hinge == 0.0 && words.isometric == 0.0 && words.fabric.is_none() {
             return;
         }
+        let mut beside = vec![[None; 3]; mesh.triangles.len()];
         for ([a, b], faces) in mesh.edges() {
-            let Some(Wings { nodes: [_, _, c, d], faces: [t, u], at }) = rest.wings([a, b], &faces) else { continue };
-            let area = |t: usize| {
-                let [a, b, c] = rest.corners(t);
-                (b - a).cross(c - a).norm() / 2.0
+            let Some(Wings { nodes, faces, at }) = rest.wings([a, b], &faces) else { continue };
+            let e = at[1] - at[0];
+            let length_sq = e.norm_sq();
+            let [left, right] = [at[2], at[3]].map(|x| (e.dot(x - at[0]) / length_sq, e.cross(x - at[0]).norm() / length_sq.sqrt()));
+            if !(left.1 > 0.0 && right.1 > 0.0) {
+                continue;
+            }
+            for (t, node, (foot, height)) in [(faces[0], nodes[3], right), (faces[1], nodes[2], left)] {
+                let corners = mesh.triangles[t];
+                if let Some(k) = (0..3).find(|k| [a, b].contains(&corners[*k]) && [a, b].contains(&corners[(k + 1) % 3])) {
+                    let foot = if corners[k] == a { foot } else { 1.0 - foot };
+                    beside[t][k] = Some(Beside { node, foot, height });
+                }
+            }
+            if let (true, Some(flat)) = (words.isometric > 0.0, IsometricBend::rest(at)) {
+                // k = B l²/(A1 + A2): (bending.10).
+                let share = 2.0 * length_sq.sqrt() / (left.1 + right.1);
+                self.parts.isometric(nodes.map(|i| i + first), flat, words.isometric * share);
+            }
+        }
+        for (t, beside) in beside.iter().enumerate() {
+            self.bend(mesh, first, words, rest, t, beside);
+        }
+    }
+
+    /// Bending of one triangle with what lies beside it, across each of its edges.
+    fn bend(&mut self, mesh: &Mesh, first: u32, words: &Surface<'_>, rest: &Rest<'_>, t: usize, beside: &[Option<Beside>; 3]) {
+        let corners = rest.corners(t);
+        let (warp, turn) = rest.warp(words.fabric.as_ref().map_or(0.0, |f| f.words.angle));
+        let (u, v) = Membrane::grain(corners, warp, turn);
+        if !(u.norm_sq().is_finite() && v.norm_sq().is_finite()) {
+            return;
+        }
+        let patch = Patch::new(mesh.triangles[t], corners.map(|x| [(x - corners[0]).dot(u), (x - corners[0]).dot(v)]), beside);
+        let angles = |patch: &Patch| {
+            let x = |i: u32| mesh.vertices[i as usize];
+            let angle = |(i, b): (usize, &Beside)| {
+                let [p, q, r] = [0, 1, 2].map(|k| patch.nodes[(i + k) % 3]);
+                if rest.pattern.is_some() { 0.0 } else { Bending::angle([x(p), x(q), x(r), x(b.node)]) }
             };
-            let (areas, length_sq) = (area(t) + area(u), (at[1] - at[0]).norm_sq());
-            if areas > 0.0 && length_sq > 0.0 {
-                let nodes = [a, b, c, d].map(|i| i + first);
-                let share = length_sq / areas;
-                let [angle] = Hinge::residual([0.0], at.map(|x| [x.x, x.y, x.z, 0.0]));
-                if words.hinge > 0.0 {
-                    self.parts.hinge(nodes, angle, words.hinge * share);
-                }
-                if let Some(fabric) = &words.fabric {
-                    // A diagonal lies opposite to a right angle.
-                    let (to_a, to_b) = (at[0] - at[2], at[1] - at[2]);
-                    let squares = words.squares.then(|| to_a.dot(to_b).abs() < 1e-6 * to_a.norm() * to_b.norm());
-                    let sides = [t, u].map(|t| fabric.hinges(rest.edge(t, [a, b]), rest.corners(t), rest, squares));
-                    let samples = std::array::from_fn(|i| (sides[0][i] + sides[1][i]) / 2.0);
-                    if let Some((stiffness, law)) =
-                        Moment::samples(samples, if words.squares { SQUARES } else { 1.0 } * length_sq.sqrt() / areas)
-                    {
-                        self.parts.crease(nodes, angle, stiffness * share, law, fabric.words.damping);
-                    }
-                }
-                if let (true, Some(rest)) = (words.isometric > 0.0, IsometricBend::rest(at)) {
-                    self.parts.isometric(nodes, rest, words.isometric * share);
-                }
+            patch.beside.iter().enumerate().map(angle).collect::<Vec<_>>()
+        };
+        let numbers = |l: [f64; 9], patch: &Patch| {
+            let mut numbers = [0.0; 12];
+            numbers[..9].copy_from_slice(&l);
+            numbers[9..].iter_mut().zip(angles(patch)).for_each(|(t0, angle)| *t0 = angle);
+            numbers
+        };
+        if words.hinge > 0.0 {
+            // W = B/2 (kxx² + kyy² + 2 kxy²): (bending.13).
+            let d = [1.0, 1.0, 2.0];
+            for (patch, g, area) in patch.curvatures(d) {
+                let l = std::array::from_fn(|i| d[i / 3].sqrt() * g[i]);
+                self.parts.bending(&patch.all(first), numbers(l, &patch), words.hinge * area);
+            }
+        }
+        if let Some((fabric, rows)) = words.fabric.as_ref().and_then(|f| Some((f, f.rows()?))) {
+            for (patch, g, area) in patch.curvatures(WovenBending::flat(&rows)) {
+                let mut all = [0.0; 36];
+                all[..12].copy_from_slice(&numbers(g.map(|g| g / WovenBending::SAMPLE), &patch));
+                all[12..].copy_from_slice(rows.as_flattened());
+                let stiffness = area * WovenBending::SAMPLE * WovenBending::SAMPLE;
+                self.parts.woven_bending(&patch.all(first), all, stiffness, fabric.words.damping);
             }
         }
     }

@@ -46,8 +46,8 @@ const NONE: u32 = u32::MAX;
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Tie {
     element: u32,
-    corners: [u32; 4],
-    same: [[u32; 2]; 2],
+    corners: [u32; 6],
+    same: [[u32; 2]; 6],
 }
 
 /// Elements of one list that go with triangles.
@@ -124,7 +124,7 @@ impl<'a> Edges<'a> {
 
     /// The triangles of an element; `half` says to which triangle of its edge a link goes. `None` if it goes with no triangle.
     fn tie<const N: usize>(&self, element: u32, nodes: [u32; N], half: usize, x: &[Row]) -> Option<Tie> {
-        let (mut corners, mut same) = ([NONE; 4], [[0; 2]; 2]);
+        let (mut corners, mut same) = ([NONE; 6], [[0; 2]; 6]);
         match nodes[..] {
             [a, b] => {
                 if let Some(at) = self.at([a, b]).get(half) {
@@ -132,7 +132,7 @@ impl<'a> Edges<'a> {
                 } else if let Some([c, d]) = self.across.get(&sorted(a, b)) {
                     let [c, d] = if self.row(next(next(*c))) == a { [*c, *d] } else { [*d, *c] };
                     (corners[0], corners[1]) = (next(next(c)), next(next(d)));
-                    same = [[c, self.corner(d, self.row(c))?], [next(c), self.corner(d, self.row(next(c)))?]];
+                    (same[0], same[1]) = ([c, self.corner(d, self.row(c))?], [next(c), self.corner(d, self.row(next(c)))?]);
                 } else {
                     // Over a vertex between the two, the nearest to their middle.
                     let at = |i: u32| xyz64(x[i as usize]);
@@ -151,15 +151,26 @@ impl<'a> Edges<'a> {
             }
             [a, b, c, d] => {
                 if let Some((at, both)) = self.hinge([a, b, c, d]) {
-                    (corners, same) = (at, both);
+                    corners[..4].copy_from_slice(&at);
+                    same[..2].copy_from_slice(&both);
                 } else if let Some(([c, d, a, b], both)) = self.hinge([c, d, a, b]) {
-                    (corners, same) = ([a, b, c, d], both);
+                    corners[..4].copy_from_slice(&[a, b, c, d]);
+                    same[..2].copy_from_slice(&both);
                 } else {
                     // Three in a row, over the first; the second only makes up the number.
                     let [t, u, v] = [[a, c], [a, d], [a, b]].map(|edge| self.at(edge).first().copied());
                     let (t, u) = (t?, u?);
-                    corners = [self.corner(t, a)?, self.corner(v?, b)?, self.corner(t, c)?, self.corner(u, d)?];
+                    corners[..4].copy_from_slice(&[self.corner(t, a)?, self.corner(v?, b)?, self.corner(t, c)?, self.corner(u, d)?]);
                     same[0] = [corners[0], self.corner(u, a)?];
+                }
+            }
+            [a, b, c, ref beside @ ..] if beside.len() <= 3 => {
+                // A triangle that bends, with those across its edges.
+                for (i, d) in beside.iter().enumerate() {
+                    let [p, q, r] = [[a, b, c], [b, c, a], [c, a, b]][i];
+                    let ([p, q, r, d], both) = self.hinge([p, q, r, *d])?;
+                    (corners[i], corners[(i + 1) % 3], corners[(i + 2) % 3], corners[3 + i]) = (p, q, r, d);
+                    same[2 * i..2 * i + 2].copy_from_slice(&both);
                 }
             }
             _ => return None,
@@ -184,7 +195,7 @@ impl<'a> Edges<'a> {
 
     /// The ties of elements that are the triangles themselves.
     pub fn own(&self, elements: ElementList, first: usize) -> Ties {
-        let tie = |t: u32| Tie { element: first as u32 + t, corners: [3 * t, 3 * t + 1, 3 * t + 2, NONE], same: [[0; 2]; 2] };
+        let tie = |t: u32| Tie { element: first as u32 + t, corners: [3 * t, 3 * t + 1, 3 * t + 2, NONE, NONE, NONE], same: [[0; 2]; 6] };
         Ties { elements, ties: (0..self.triangles.len() as u32).map(tie).collect() }
     }
 }

@@ -1,10 +1,10 @@
 //! Elements of the parts: as batches of forces, or as constraints.
 
-use super::super::parts::{Closed, Liquid, Parts, Point, Springs};
+use super::super::parts::{Bends, Closed, Liquid, Parts, Point, Springs};
 use crate::elements::{
-    Area, Batch, BendTwist, Constraints, Density, Distance, Element, Elements, Hinge, IsometricBend, Law, Linear, Members, Membrane,
-    Moment, Neohookean, Nonlinear, Pair, Pairs, Projected, Shape, Strands, StretchShear, TetShear, TetStrain, TetVolume, Vector, Volume,
-    Weights, Woven,
+    Area, Batch, BendTwist, Bending, Constraints, Density, Distance, Element, Elements, IsometricBend, Law, Linear, Members, Membrane,
+    Neohookean, Nonlinear, Pair, Pairs, Projected, Shape, Strands, StretchShear, TetShear, TetStrain, TetVolume, Vector, Volume,
+    Weights, Woven, WovenBending,
 };
 use crate::forces::{Near, Newtonian};
 use crate::math::{Real, Row};
@@ -17,12 +17,13 @@ use tumble_interface::scene::Hessian;
 pub struct Lists {
     /// Linear springs, nonlinear ones, those of no rest length.
     pub springs: [Option<usize>; 3],
-    pub hinges: Option<usize>,
+    /// Triangles that bend, beside one other, two, three.
+    pub bending: [Option<usize>; 3],
     pub isometric: Option<usize>,
     pub membranes: Option<usize>,
     pub areas: Option<usize>,
     pub woven: Option<usize>,
-    pub creases: Option<usize>,
+    pub woven_bending: [Option<usize>; 3],
 }
 
 /// Elements in the order in which they act: as forces, or as constraints.
@@ -70,17 +71,17 @@ impl Batches {
             self.springs::<Vector, Linear, 3, 0, 0>(&parts.vector)?,
         ];
         self.add::<Distance, 2, 1, 1>(&parts.dampers, 0.0)?;
-        let hinges = self.add::<Hinge, 4, 1, 1>(&parts.hinges, 0.0)?;
+        let bending = self.bends::<Bending, 12>(&parts.bending)?;
         let isometric = self.add::<IsometricBend, 4, 3, 3>(&parts.isometric, 0.0)?;
         let membranes = self.add::<Membrane, 3, 3, 8>(&parts.membranes, 0.0)?;
         let areas = self.add::<Area, 3, 1, 1>(&parts.areas, 0.0)?;
         let woven = self.add::<Woven, 3, 3, 28>(&parts.woven, 0.0)?;
-        let creases = self.add_with::<Hinge, Moment, 4, 1, 1, 8>(&parts.creases, 0.0)?;
+        let woven_bending = self.bends::<WovenBending, 36>(&parts.woven_bending)?;
         self.solids(&parts.shears, &parts.volumes, parts.energy_at_rest)?;
         self.add::<TetStrain, 4, 6, 9>(&parts.strains, 0.0)?;
         self.rods(&parts.stretches, &mut parts.bends, &parts.rod_limits)?;
         self.global_constraints(&parts.points, std::mem::take(&mut parts.closed), &parts.shapes, &parts.liquids)?;
-        Ok(Lists { springs, hinges, isometric, membranes, areas, woven, creases })
+        Ok(Lists { springs, bending, isometric, membranes, areas, woven, woven_bending })
     }
 
     /// The stiffness with which elements hold each row [N/m].
@@ -119,26 +120,25 @@ impl Batches {
         members: &[Members<N, D, 0>],
         energy_at_rest: f64,
     ) -> Result<Option<usize>, NotARow> {
-        self.add_with::<E, Linear, N, M, D, 0>(members, energy_at_rest)
-    }
-
-    /// The same with a law of their own.
-    fn add_with<E: Element<N, M, D>, Y: Law<P>, const N: usize, const M: usize, const D: usize, const P: usize>(
-        &mut self,
-        members: &[Members<N, D, P>],
-        energy_at_rest: f64,
-    ) -> Result<Option<usize>, NotARow> {
         if members.is_empty() {
             return Ok(None);
         }
         if let Some(inverse) = &self.projected {
-            let elements = Projected::<E, Y, N, M, D, P>::new(self.rows, self.points, inverse, members, &[]).ok_or(NotARow)?;
+            let elements = Projected::<E, Linear, N, M, D, 0>::new(self.rows, self.points, inverse, members, &[]).ok_or(NotARow)?;
             self.constraints.push(Box::new(elements));
             return Ok(Some(self.constraints.len() - 1));
         }
-        let elements = Elements::<E, Y, N, M, D, P>::new(self.rows, members).ok_or(NotARow)?;
+        let elements = Elements::<E, Linear, N, M, D, 0>::new(self.rows, members).ok_or(NotARow)?;
         self.list.push(Box::new(elements.with_energy_at_rest(energy_at_rest)));
         Ok(Some(self.list.len() - 1))
+    }
+
+    /// Adds triangles that bend.
+    fn bends<E: Element<4, 3, D> + Element<5, 3, D> + Element<6, 3, D>, const D: usize>(
+        &mut self,
+        Bends { one, two, three }: &Bends<D>,
+    ) -> Result<[Option<usize>; 3], NotARow> {
+        Ok([self.add::<E, 4, 3, D>(one, 0.0)?, self.add::<E, 5, 3, D>(two, 0.0)?, self.add::<E, 6, 3, D>(three, 0.0)?])
     }
 
     /// Adds rods, if there are any: as constraints, chains are solved as a whole.
