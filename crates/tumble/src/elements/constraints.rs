@@ -66,6 +66,10 @@ pub trait Constraints: Send + Sync {
     fn leans(&self) -> Option<usize> {
         None
     }
+    /// The rows of a body that a sweep in a sub-step of length h [s] brings into shape: more than half of the way, or all of it.
+    fn matched(&self, _h: f64) -> Option<Range<usize>> {
+        None
+    }
     /// Potential energy [J], zero at rest; nothing of rigid elements.
     fn energy(&self, x: &[Row], walls: Walls<'_>) -> f64;
     /// Corrects points and frames once, element by element; x[i][3] are inverse masses of points.

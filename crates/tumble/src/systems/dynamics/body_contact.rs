@@ -1,0 +1,224 @@
+//! Contact of bodies whose shape is matched within a sub-step: solids act on the body as a whole, not on single masses, which the next match
+//! would turn into any motion of the body. The sub-step has moved it by a rigid motion; impulses (contact.24) change that motion, and all its masses
+//! with it, so that it stays in shape.
+//!
+//!   n.v >= min(0, n.v_1 + depth/h)                                                                    (contact.26)
+//!
+//! of every mass that ends too deep, or has passed a surface: it may come near, but not within the thickness. One that comes in faster than `resting`
+//! is an impact at a time s h: its normal speed is stopped then and comes back by restitution, and what it changes acts for the rest of
+//! the sub-step. What is still too deep is moved out, without speed. Verified in `tests/shape_contact.rs`.
+
+use super::contact::{Step, on_parabola};
+use super::impact::{Contact, solve};
+use super::inertia::Motion;
+use crate::geometry::{Collider, Friction, Vector};
+use crate::math::parallel::fold;
+use crate::math::{Quat, Real, Row, rotation, xyz64};
+
+/// Weight of a held mass over the mass of all.                                                           (shapes.4)
+const HELD: f64 = 1e4;
+/// How often masses that a body's new motion brings into touch join the others.
+const ROUNDS: usize = 4;
+/// How often a body that is too deep is moved.
+const PUSHES: usize = 8;
+/// Contacts with one solid whose normals have a smaller product are different ones.
+const APART: f64 = 0.9;
+
+/// The masses of a body in a sub-step.
+pub struct Body<'a> {
+    /// Their masses [kg].
+    pub mass: &'a [Real],
+    /// Positions and velocities when it began.
+    pub before: [&'a [Row]; 2],
+    /// The same at its end, before contact.
+    pub x: &'a [Row],
+    pub v: &'a [Row],
+}
+
+/// A rigid motion that contact adds to that of a body.
+#[derive(Debug, Clone, Copy)]
+pub struct Change {
+    /// Places turn about `from`, which goes to `to` [m].
+    from: Vector,
+    to: Vector,
+    turn: Quat<f64>,
+    /// Velocity of that point [m/s], and spin [rad/s].
+    velocity: Vector,
+    spin: Vector,
+}
+
+impl Change {
+    fn place(&self, x: Vector) -> Vector {
+        self.to + self.turn.turn(x - self.from)
+    }
+
+    /// A mass with it; held ones stay.
+    pub fn apply(&self, x: &mut Row, v: &mut Row) {
+        if x[3] > 0.0 {
+            let place = self.place(xyz64(*x));
+            let velocity = xyz64(*v) + self.velocity + self.spin.cross(place - self.to);
+            *x = [place.x as Real, place.y as Real, place.z as Real, x[3]];
+            *v = [velocity.x as Real, velocity.y as Real, velocity.z as Real, 0.0];
+        }
+    }
+}
+
+/// A mass that a solid does not let pass.
+#[derive(Clone, Copy)]
+struct Meeting {
+    k: usize,
+    collider: usize,
+    normal: Vector,
+    surface: Vector,
+    /// How deep it would be at the end of the sub-step [m].
+    depth: f64,
+    /// When it touches, as a part of the sub-step.
+    part: f64,
+    fast: bool,
+}
+
+impl Meeting {
+    fn is_at(&self, other: &Self) -> bool {
+        (self.k, self.collider) == (other.k, other.collider) && self.normal.dot(other.normal) > APART
+    }
+}
+
+impl Body<'_> {
+    fn len(&self) -> usize {
+        self.x.len()
+    }
+
+    fn end(&self, k: usize) -> Vector {
+        xyz64(self.x[k])
+    }
+
+    /// Where a mass is after a part of the sub-step, on a straight way.
+    fn place(&self, k: usize, part: f64) -> Vector {
+        let from = xyz64(self.before[0][k]);
+        from + (self.end(k) - from) * part
+    }
+
+    fn velocity(&self, k: usize, part: f64) -> Vector {
+        let from = xyz64(self.before[1][k]);
+        from + (xyz64(self.v[k]) - from) * part
+    }
+
+    /// Its rigid motion; held masses are as heavy as can be, so that it turns about them.
+    fn motion(&self, x: impl Fn(usize) -> Vector + Sync, v: impl Fn(usize) -> Vector + Sync) -> Motion {
+        let total: f64 = self.mass.iter().map(|m| f64::from(*m)).sum();
+        let mass = |k: usize| if self.x[k][3] > 0.0 { f64::from(self.mass[k]) } else { HELD * total };
+        Motion::of(self.len(), mass, x, v)
+    }
+
+    /// The meeting of a mass with a solid on its way, or at its end.
+    fn meet(&self, k: usize, collider: &Collider, at: usize, step: &Step) -> Option<Meeting> {
+        let (from, to) = (xyz64(self.before[0][k]), self.end(k));
+        let way = to - from;
+        if let Some(hit) = collider.sweep(from, to, step.t, step.t + step.h) {
+            let fall = (way - hit.velocity * step.h).dot(hit.normal);
+            if fall < 0.0 {
+                let pull = self.velocity(k, 1.0) - self.velocity(k, 0.0);
+                let part = on_parabola(hit.part, fall, 0.5 * step.h * pull.dot(hit.normal));
+                let fast = (self.velocity(k, part) - hit.velocity).dot(hit.normal) < -step.resting;
+                let depth = -fall * (1.0 - hit.part);
+                return Some(Meeting { k, collider: at, normal: hit.normal, surface: hit.velocity, depth, part, fast });
+            }
+        }
+        let touch = collider.touch(to, step.t + step.h)?;
+        let fall = (way - touch.velocity * step.h).dot(touch.normal);
+        let part = if fall < 0.0 { (1.0 + touch.depth / fall).max(0.0) } else { 0.0 };
+        let fast = (self.velocity(k, part) - touch.velocity).dot(touch.normal) < -step.resting;
+        Some(Meeting { k, collider: at, normal: touch.normal, surface: touch.velocity, depth: touch.depth, part, fast })
+    }
+
+    /// All of them.
+    fn meetings(&self, colliders: &[Collider], step: &Step) -> Vec<Meeting> {
+        let of = |k: usize| colliders.iter().enumerate().filter_map(move |(at, collider)| self.meet(k, collider, at, step));
+        fold(self.len(), |range| range.filter(|k| self.x[*k][3] > 0.0).flat_map(of).collect::<Vec<_>>()).concat()
+    }
+
+    /// The masses that are deeper than rounding explains once the body has moved on.
+    fn too_deep(&self, colliders: &[Collider], change: &Change, step: &Step) -> Vec<Meeting> {
+        let of = |k: usize| {
+            let place = change.place(self.end(k));
+            let round = 8.0 * f64::from(Real::EPSILON) * (1e-3 + place.norm());
+            let meeting = move |(at, collider): (usize, &Collider)| {
+                let touch = collider.touch(place, step.t + step.h).filter(|touch| touch.depth > round)?;
+                let (normal, surface, depth) = (touch.normal, touch.velocity, touch.depth);
+                Some(Meeting { k, collider: at, normal, surface, depth, part: 0.0, fast: false })
+            };
+            colliders.iter().enumerate().filter_map(meeting)
+        };
+        fold(self.len(), |range| range.filter(|k| self.x[*k][3] > 0.0).flat_map(of).collect::<Vec<_>>()).concat()
+    }
+}
+
+/// What contact with solids adds to the motion of a body in a sub-step, if there is any.
+pub fn resolve(body: &Body<'_>, colliders: &[Collider], step: &Step) -> Option<Change> {
+    let mut meetings = body.meetings(colliders, step);
+    if meetings.is_empty() {
+        return None;
+    }
+    let end = body.motion(|k| body.end(k), |k| body.velocity(k, 1.0));
+    // The first impact; without one, all acts as if from the start of the sub-step on.
+    let part = meetings.iter().filter(|m| m.fast).map(|m| m.part).reduce(f64::min);
+    let (motion, rest) = match part {
+        Some(part) => {
+            let motion = body.motion(|k| body.place(k, part), |k| body.velocity(k, part));
+            let start = body.motion(|k| body.place(k, 0.0), |k| body.velocity(k, 0.0));
+            // The velocity of the path is ahead of that of the scheme.                                 (contact.14)
+            let ahead = [end.velocity - start.velocity, end.spin - start.spin].map(|pull| pull * step.lead);
+            (Motion { velocity: motion.velocity + ahead[0], spin: motion.spin + ahead[1], ..motion }, (1.0 - part) * step.h)
+        }
+        None => (end, step.h),
+    };
+    let contact = |m: &Meeting| {
+        let Collider { restitution, friction, .. } = colliders[m.collider];
+        let arm = body.place(m.k, part.unwrap_or(1.0)) - motion.center;
+        let later = (end.at(body.end(m.k) - end.center) - m.surface).dot(m.normal);
+        let ahead = later - (motion.at(arm) - m.surface).dot(m.normal);
+        let least = if m.fast { 0.0 } else { (later + m.depth / rest).min(0.0) - ahead };
+        Contact { arm, normal: m.normal, surface: m.surface, least, restitution: if m.fast { restitution } else { 0.0 }, friction }
+    };
+    let mut contacts: Vec<Contact> = meetings.iter().map(contact).collect();
+    let mut change = None;
+    for _ in 0..ROUNDS {
+        let [velocity, spin] = solve(&motion, &contacts);
+        let found = Change { from: end.center, to: end.center + velocity * rest, turn: rotation::by(spin * rest), velocity, spin };
+        change = Some(found);
+        let mut deep = body.too_deep(colliders, &found, step);
+        deep.retain(|new| !meetings.iter().any(|old| old.is_at(new)));
+        if deep.is_empty() {
+            break;
+        }
+        for new in &mut deep {
+            new.depth += rest * (velocity + spin.cross(body.end(new.k) - end.center)).dot(new.normal);
+        }
+        contacts.extend(deep.iter().map(contact));
+        meetings.extend(deep);
+    }
+    change.map(|change| moved_out(body, colliders, step, &end, change))
+}
+
+/// A change that leaves no mass too deep, by a way that is no velocity.
+fn moved_out(body: &Body<'_>, colliders: &[Collider], step: &Step, end: &Motion, change: Change) -> Change {
+    let mut change = change;
+    for _ in 0..PUSHES {
+        let deep = body.too_deep(colliders, &change, step);
+        if deep.is_empty() {
+            break;
+        }
+        let (rest, none) = (Motion { velocity: Vector::default(), spin: Vector::default(), ..*end }, Vector::default());
+        let contact = |m: &Meeting| Contact {
+            arm: change.place(body.end(m.k)) - change.to,
+            normal: m.normal,
+            surface: none,
+            least: m.depth,
+            restitution: 0.0,
+            friction: Friction::default(),
+        };
+        let [way, turn] = solve(&rest, &deep.iter().map(contact).collect::<Vec<_>>());
+        change = Change { to: change.to + way, turn: rotation::by(turn) * change.turn, ..change };
+    }
+    change
+}
