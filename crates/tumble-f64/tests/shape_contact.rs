@@ -6,6 +6,7 @@ use crate::common;
 use common::{Numbers, Vector, positions, simulation, step, vector, velocities, write};
 use tumble_f64::math::Quat;
 use tumble_f64::scene::Simulation;
+use tumble_interface::Engine;
 
 const G: f64 = 9.81;
 /// Sub-steps of 1 ms, one a frame.
@@ -276,5 +277,142 @@ fn a_block_on_a_slope_rests_slides_or_tips_over() {
             let edge = x.iter().filter(|x| x.z.abs() < 1e-4).map(|x| (x.x - 0.5 * SIDE).abs()).fold(0.0, f64::max);
             assert!(w.y > 0.1 && edge < 1e-3, "{w:?} {edge}");
         }
+    }
+}
+
+/// A block held at an edge swings onto the floor like a door: its spin comes back by the restitution.
+#[test]
+fn a_held_block_rebounds_about_what_holds_it() {
+    for e in [0.0, 0.5, 1.0] {
+        let n = 3;
+        let mut sim = simulation(&format!(
+            "precision = \"double\"\ntime.fps = 1000\nworld.gravity = [0, 0, 0]\n[[system]]\nmethod = \"position_based\"\nsubsteps = 1\n\
+             [[block]]\nname = \"block\"\nsize = [{SIDE}, {SIDE}, {SIDE}]\nresolution = [{n}, {n}, {n}]\ncenter = [{0}, {0}, {1}]\nshape_matching = {{}}\n\
+             pin = [\"corner 0 0 0\", \"corner 0 1 0\"]\n[[collider]]\nname = \"floor\"\nshape.floor.height = 0\nrestitution = {e}\n",
+            0.5 * SIDE,
+            0.5 * SIDE + 0.2
+        ));
+        let spin = vector(0.0, 2.0, 0.0);
+        let v: Vec<Vector> = positions(&sim, "block").iter().map(|x| spin.cross(*x - vector(0.0, 0.0, 0.2))).collect();
+        write(&mut sim, "block", "velocity", &v);
+        let turning = |sim: &Simulation| {
+            let (x, v) = (positions(sim, "block")[n - 1], velocities(sim, "block")[n - 1]);
+            ((x - vector(0.0, 0.0, 0.2)).cross(v) * (1.0 / (SIDE * SIDE))).y
+        };
+        let (start, mut last) = (positions(&sim, "block"), turning(&sim));
+        let mut least = f64::INFINITY;
+        for _ in 0..300 {
+            step(&mut sim);
+            least = positions(&sim, "block").iter().map(|x| x.z).fold(least, f64::min);
+            let now = turning(&sim);
+            if now < 0.5 * last {
+                break;
+            }
+            last = now;
+        }
+        step(&mut sim);
+        let (now, x) = (turning(&sim), positions(&sim, "block"));
+        println!("e = {e}: {last:.5} rad/s before, {now:.5} rad/s after; lowest mass at {least:.1e} m");
+        assert!((now + e * last).abs() < 5e-3 * last && last > 1.9 && least > -1e-9, "{last} {now} {least}");
+        assert!(x[0] == start[0] && x[n * (n - 1)] == start[n * (n - 1)]);
+    }
+}
+
+#[test]
+fn a_moving_solid_hits_a_block_and_a_belt_carries_it() {
+    let up = 1.5;
+    for e in [0.0, 0.6, 1.0] {
+        let mut sim = blocks(&["block"], 3, "", &format!("restitution = {e}\nmotion.velocity = [0, 0, {up}]"), Vector::default());
+        let (none, down) = (Quat { v: Vector::default(), w: 1.0 }, 2.0);
+        throw(&mut sim, "block", none, vector(0.0, 0.0, 0.5 * SIDE + 0.1), vector(0.0, 0.0, -down), Vector::default());
+        (0..60).for_each(|_| {
+            step(&mut sim);
+        });
+        let [_, v, w] = body(&sim, "block");
+        println!("e = {e}: leaves with {:.9} m/s", v.z);
+        assert!((v.z - (up + e * (up + down))).abs() < 1e-9 && w.norm() < 1e-9, "{v:?}");
+    }
+    let (mu, belt, time) = (0.4, 1.0, 0.2);
+    let mut sim = falling(3, "", &format!("friction = {mu}\nbelt = [{belt}, 0, 0]"));
+    throw(&mut sim, "block", Quat { v: Vector::default(), w: 1.0 }, vector(0.0, 0.0, 0.5 * SIDE), Vector::default(), Vector::default());
+    (0..200).for_each(|_| {
+        step(&mut sim);
+    });
+    let [_, v, _] = body(&sim, "block");
+    assert!((v.x - mu * G * time).abs() < 1e-6 && v.y.abs() < 1e-9, "{v:?}");
+    (0..100).for_each(|_| {
+        step(&mut sim);
+    });
+    let [_, v, w] = body(&sim, "block");
+    assert!((v.x - belt).abs() < 1e-9 && w.norm() < 1e-9, "{v:?}");
+}
+
+/// In a box that contains them, and again from the middle of their way.
+#[test]
+fn blocks_come_to_rest_in_a_box_the_same_way_from_a_snapshot() {
+    let (n, names, mut numbers) = (3, ["a", "b", "c", "d", "e", "f"], Numbers(4));
+    let block = |name: &&str| {
+        format!("[[block]]\nname = \"{name}\"\nsize = [{SIDE}, {SIDE}, {SIDE}]\nresolution = [{n}, {n}, {n}]\nshape_matching = {{}}\n")
+    };
+    let mut sim = simulation(&format!(
+        "precision = \"double\"\ntime.fps = 100\nworld.gravity = [0, 0, -{G}]\n[[system]]\nmethod = \"position_based\"\nsubsteps = 10\n{}\
+         [[collider]]\nname = \"box\"\ninside = true\nshape.box = {{ center = [0, 0, 1], size = [1.4, 1.2, 2] }}\nrestitution = 0.4\nfriction = 0.4\n",
+        names.iter().map(block).collect::<String>()
+    ));
+    for name in names {
+        let (velocity, spin, turn) = (numbers.vector() * 5.0, numbers.vector() * 8.0, random_turn(&mut numbers));
+        throw(&mut sim, name, turn, vector(0.0, 0.0, 1.0), velocity, spin);
+    }
+    common::run(&mut sim, 60);
+    let kept = sim.save(&[]);
+    common::run(&mut sim, 240);
+    let hash = sim.hash();
+    for name in names {
+        let ([x, v, w], tilt) = (body(&sim, name), tilt(&sim, name, n));
+        println!("{name}: at {:.5} {:.5} {:.5}, tilt {tilt:.1e}, speed {:.1e}, spin {:.1e}", x.x, x.y, x.z, v.norm(), w.norm());
+        // Flat on the floor, or leaning on a wall with an edge on the floor.
+        assert!(v.norm() < 1e-3 && w.norm() < 1e-3, "{name}: {v:?} {w:?}");
+        let low = positions(&sim, name).iter().map(|x| x.z.min(0.7 - x.x.abs()).min(0.6 - x.y.abs())).fold(f64::MAX, f64::min);
+        assert!(low.abs() < 1e-6, "{name}: {low}");
+    }
+    sim.restore(&kept).unwrap();
+    common::run(&mut sim, 240);
+    assert_eq!(sim.hash(), hash);
+}
+
+/// A soft shape meets solids mass by mass: its own elasticity gives back what it does, and the solid adds nothing.
+#[test]
+fn a_soft_block_keeps_its_energy_but_for_the_damping_of_the_steps() {
+    for frequency in [5.0, 20.0, 60.0, 120.0] {
+        let rebound = [0.0, 0.5, 1.0].map(|e| {
+            let mut sim = falling(4, &format!("frequency = {frequency}"), &format!("restitution = {e}"));
+            let height = 0.4;
+            throw(
+                &mut sim,
+                "block",
+                Quat { v: Vector::default(), w: 1.0 },
+                vector(0.0, 0.0, 0.5 * SIDE + height),
+                Vector::default(),
+                Vector::default(),
+            );
+            let (mut up, mut least, mut rise, mut kept) = (0.0_f64, f64::INFINITY, 0.0_f64, 1.0);
+            let (arrival, start) = ((2.0 * G * height).sqrt(), sim.ledger());
+            for frame in 0..600 {
+                step(&mut sim);
+                let (v, now) = (body(&sim, "block")[1], sim.ledger());
+                let energy = (now.energy() - start.energy()) / now.mass;
+                (rise, least) = (rise.max(energy - least), least.min(energy));
+                if frame < 300 + (500.0 / frequency) as usize {
+                    up = up.max(v.z);
+                    kept = 1.0 + energy / (G * height);
+                }
+            }
+            println!(
+                "{frequency} Hz, e = {e}: rebounds with {:.3} of its speed, {kept:.3} of its energy; rises by {rise:.1e}",
+                up / arrival
+            );
+            up / arrival
+        });
+        println!("{rebound:?}");
     }
 }
