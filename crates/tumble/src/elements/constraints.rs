@@ -66,8 +66,8 @@ pub trait Constraints: Send + Sync {
     fn leans(&self) -> Option<usize> {
         None
     }
-    /// The rows of a body that a sweep in a sub-step of length h [s] brings into shape: more than half of the way, or all of it.
-    fn matched(&self, _h: f64) -> Option<Range<usize>> {
+    /// The rows of a body whose shape is matched, and the share of the way to it that a sub-step of length h [s] takes.
+    fn matched(&self, _h: f64) -> Option<(Range<usize>, f64)> {
         None
     }
     /// Potential energy [J], zero at rest; nothing of rigid elements.

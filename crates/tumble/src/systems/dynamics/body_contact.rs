@@ -1,6 +1,6 @@
-//! Contact of bodies whose shape is matched within a sub-step: solids act on the body as a whole, not on single masses, which the next match
-//! would turn into any motion of the body. The sub-step has moved it by a rigid motion; impulses (contact.24) change that motion, and all its masses
-//! with it, so that it stays in shape.
+//! Contact of bodies whose shape is matched: solids act on the body as a whole, as far as a sub-step matches it, and not on single masses, which the
+//! next match would turn into any motion of the body. The sub-step has moved it; impulses (contact.24) add a rigid motion to that, by which a rigid
+//! body stays in shape, and what single masses of a soft one yield.
 //!
 //!   n.v >= min(0, n.v_1 + depth/h)                                                                    (contact.26)
 //!
@@ -9,7 +9,7 @@
 //! the sub-step. What is still too deep is moved out, without speed. Verified in `tests/shape_contact.rs`.
 
 use super::contact::{Step, on_parabola};
-use super::impact::{Contact, solve};
+use super::impact::{Contact, Effect, solve};
 use super::inertia::Motion;
 use crate::geometry::{Collider, Friction, Vector};
 use crate::math::parallel::fold;
@@ -33,10 +33,12 @@ pub struct Body<'a> {
     /// The same at its end, before contact.
     pub x: &'a [Row],
     pub v: &'a [Row],
+    /// The share of the way to its shape that a sub-step takes.
+    pub share: f64,
 }
 
-/// A rigid motion that contact adds to that of a body.
-#[derive(Debug, Clone, Copy)]
+/// A motion that contact adds to that of a body.
+#[derive(Debug, Clone)]
 pub struct Change {
     /// Places turn about `from`, which goes to `to` [m].
     from: Vector,
@@ -45,18 +47,21 @@ pub struct Change {
     /// Velocity of that point [m/s], and spin [rad/s].
     velocity: Vector,
     spin: Vector,
+    /// Way [m] and velocity [m/s] of each mass beyond that; empty if it is rigid.
+    own: Vec<[Vector; 2]>,
 }
 
 impl Change {
-    fn place(&self, x: Vector) -> Vector {
-        self.to + self.turn.turn(x - self.from)
+    fn place(&self, k: usize, x: Vector) -> Vector {
+        self.to + self.turn.turn(x - self.from) + self.own.get(k).map_or(Vector::default(), |own| own[0])
     }
 
-    /// A mass with it; held ones stay.
-    pub fn apply(&self, x: &mut Row, v: &mut Row) {
+    /// Mass k with it; held ones stay.
+    pub fn apply(&self, k: usize, x: &mut Row, v: &mut Row) {
         if x[3] > 0.0 {
-            let place = self.place(xyz64(*x));
-            let velocity = xyz64(*v) + self.velocity + self.spin.cross(place - self.to);
+            let place = self.place(k, xyz64(*x));
+            let own = self.own.get(k).map_or(Vector::default(), |own| own[1]);
+            let velocity = xyz64(*v) + self.velocity + self.spin.cross(place - self.to) + own;
             *x = [place.x as Real, place.y as Real, place.z as Real, x[3]];
             *v = [velocity.x as Real, velocity.y as Real, velocity.z as Real, 0.0];
         }
@@ -110,6 +115,17 @@ impl Body<'_> {
         Motion::of(self.len(), mass, x, v)
     }
 
+    /// Adds what single masses of a soft body have of their own.
+    fn add_own(&self, sum: &mut Vec<[Vector; 2]>, contacts: &[Contact], own: impl Iterator<Item = [Vector; 2]>) {
+        if self.share < 1.0 {
+            sum.resize(self.len(), Default::default());
+            for (contact, [way, velocity]) in contacts.iter().zip(own) {
+                let [x, v] = sum[contact.k];
+                sum[contact.k] = [x + way, v + velocity];
+            }
+        }
+    }
+
     /// The meeting of a mass with a solid on its way, or at its end.
     fn meet(&self, k: usize, collider: &Collider, at: usize, step: &Step) -> Option<Meeting> {
         let (from, to) = (xyz64(self.before[0][k]), self.end(k));
@@ -140,7 +156,7 @@ impl Body<'_> {
     /// The masses that are deeper than rounding explains once the body has moved on.
     fn too_deep(&self, colliders: &[Collider], change: &Change, step: &Step) -> Vec<Meeting> {
         let of = |k: usize| {
-            let place = change.place(self.end(k));
+            let place = change.place(k, self.end(k));
             let round = 8.0 * f64::from(Real::EPSILON) * (1e-3 + place.norm());
             let meeting = move |(at, collider): (usize, &Collider)| {
                 let touch = collider.touch(place, step.t + step.h).filter(|touch| touch.depth > round)?;
@@ -153,72 +169,96 @@ impl Body<'_> {
     }
 }
 
+/// A rigid motion, and the time at which masses have it, as a part of the sub-step.
+struct Moment {
+    motion: Motion,
+    part: f64,
+    /// Of the scheme: the velocity of the path is ahead of its own by that part of the change in the sub-step.   (contact.14)
+    lead: f64,
+}
+
+impl Moment {
+    fn arm(&self, body: &Body<'_>, k: usize) -> Vector {
+        body.place(k, self.part) - self.motion.center
+    }
+
+    /// Velocity of a mass: that of the body, and its own as far as the shape leaves it.
+    fn velocity(&self, body: &Body<'_>, k: usize) -> Vector {
+        let own = body.velocity(k, self.part) + (body.velocity(k, 1.0) - body.velocity(k, 0.0)) * self.lead;
+        let rigid = self.motion.at(self.arm(body, k));
+        rigid + (own - rigid) * (1.0 - body.share)
+    }
+}
+
 /// What contact with solids adds to the motion of a body in a sub-step, if there is any.
 pub fn resolve(body: &Body<'_>, colliders: &[Collider], step: &Step) -> Option<Change> {
     let mut meetings = body.meetings(colliders, step);
     if meetings.is_empty() {
         return None;
     }
-    let end = body.motion(|k| body.end(k), |k| body.velocity(k, 1.0));
+    let motion = |part: f64| body.motion(|k| body.place(k, part), |k| body.velocity(k, part));
+    let end = Moment { motion: motion(1.0), part: 1.0, lead: 0.0 };
     // The first impact; without one, all acts as if from the start of the sub-step on.
-    let part = meetings.iter().filter(|m| m.fast).map(|m| m.part).reduce(f64::min);
-    let (motion, rest) = match part {
-        Some(part) => {
-            let motion = body.motion(|k| body.place(k, part), |k| body.velocity(k, part));
-            let start = body.motion(|k| body.place(k, 0.0), |k| body.velocity(k, 0.0));
-            // The velocity of the path is ahead of that of the scheme.                                 (contact.14)
-            let ahead = [end.velocity - start.velocity, end.spin - start.spin].map(|pull| pull * step.lead);
-            (Motion { velocity: motion.velocity + ahead[0], spin: motion.spin + ahead[1], ..motion }, (1.0 - part) * step.h)
-        }
-        None => (end, step.h),
-    };
+    let first = meetings.iter().filter(|m| m.fast).map(|m| m.part).reduce(f64::min);
+    let impact = first.map(|part| {
+        let (at, start) = (motion(part), motion(0.0));
+        let [velocity, spin] = [end.motion.velocity - start.velocity, end.motion.spin - start.spin].map(|pull| pull * step.lead);
+        Moment { motion: Motion { velocity: at.velocity + velocity, spin: at.spin + spin, ..at }, part, lead: step.lead }
+    });
+    let (now, rest) = impact.as_ref().map_or((&end, step.h), |at| (at, (1.0 - at.part) * step.h));
     let contact = |m: &Meeting| {
         let Collider { restitution, friction, .. } = colliders[m.collider];
-        let arm = body.place(m.k, part.unwrap_or(1.0)) - motion.center;
-        let later = (end.at(body.end(m.k) - end.center) - m.surface).dot(m.normal);
-        let ahead = later - (motion.at(arm) - m.surface).dot(m.normal);
-        let least = if m.fast { 0.0 } else { (later + m.depth / rest).min(0.0) - ahead };
-        Contact { arm, normal: m.normal, surface: m.surface, least, restitution: if m.fast { restitution } else { 0.0 }, friction }
+        let arrival = now.velocity(body, m.k) - m.surface;
+        let later = (end.velocity(body, m.k) - m.surface).dot(m.normal);
+        let least = if m.fast { 0.0 } else { (later + m.depth / rest).min(0.0) - later + arrival.dot(m.normal) };
+        let (mass, arm) = (f64::from(body.mass[m.k]), now.arm(body, m.k));
+        Contact { k: m.k, mass, arm, normal: m.normal, arrival, least, restitution: if m.fast { restitution } else { 0.0 }, friction }
     };
     let mut contacts: Vec<Contact> = meetings.iter().map(contact).collect();
     let mut change = None;
     for _ in 0..ROUNDS {
-        let [velocity, spin] = solve(&motion, &contacts);
-        let found = Change { from: end.center, to: end.center + velocity * rest, turn: rotation::by(spin * rest), velocity, spin };
-        change = Some(found);
+        let Effect { velocity, spin, own } = solve(&now.motion, body.share, &contacts);
+        let (from, turn) = (end.motion.center, rotation::by(spin * rest));
+        let mut found = Change { from, to: from + velocity * rest, turn, velocity, spin, own: Vec::new() };
+        body.add_own(&mut found.own, &contacts, own.iter().map(|own| [*own * rest, *own]));
         let mut deep = body.too_deep(colliders, &found, step);
         deep.retain(|new| !meetings.iter().any(|old| old.is_at(new)));
-        if deep.is_empty() {
-            break;
-        }
+        let done = deep.is_empty();
         for new in &mut deep {
-            new.depth += rest * (velocity + spin.cross(body.end(new.k) - end.center)).dot(new.normal);
+            let place = body.end(new.k);
+            new.depth += (found.place(new.k, place) - place).dot(new.normal);
+        }
+        change = Some(found);
+        if done {
+            break;
         }
         contacts.extend(deep.iter().map(contact));
         meetings.extend(deep);
     }
-    change.map(|change| moved_out(body, colliders, step, &end, change))
+    change.map(|change| moved_out(body, colliders, step, &end.motion, change))
 }
 
 /// A change that leaves no mass too deep, by a way that is no velocity.
-fn moved_out(body: &Body<'_>, colliders: &[Collider], step: &Step, end: &Motion, change: Change) -> Change {
-    let mut change = change;
+fn moved_out(body: &Body<'_>, colliders: &[Collider], step: &Step, end: &Motion, mut change: Change) -> Change {
     for _ in 0..PUSHES {
         let deep = body.too_deep(colliders, &change, step);
         if deep.is_empty() {
             break;
         }
-        let (rest, none) = (Motion { velocity: Vector::default(), spin: Vector::default(), ..*end }, Vector::default());
         let contact = |m: &Meeting| Contact {
-            arm: change.place(body.end(m.k)) - change.to,
+            k: m.k,
+            mass: f64::from(body.mass[m.k]),
+            arm: change.place(m.k, body.end(m.k)) - change.to,
             normal: m.normal,
-            surface: none,
+            arrival: Vector::default(),
             least: m.depth,
             restitution: 0.0,
             friction: Friction::default(),
         };
-        let [way, turn] = solve(&rest, &deep.iter().map(contact).collect::<Vec<_>>());
-        change = Change { to: change.to + way, turn: rotation::by(turn) * change.turn, ..change };
+        let contacts: Vec<Contact> = deep.iter().map(contact).collect();
+        let Effect { velocity: way, spin: turn, own } = solve(end, body.share, &contacts);
+        (change.to, change.turn) = (change.to + way, rotation::by(turn) * change.turn);
+        body.add_own(&mut change.own, &contacts, own.iter().map(|own| [*own, Vector::default()]));
     }
     change
 }

@@ -149,25 +149,25 @@ impl Core {
         }
     }
 
-    /// The contact of bodies that keep their shape within a sub-step; returns their rows, in order.
+    /// The contact of bodies whose shape is matched; returns their rows, in order.
     fn resolve_body_contact(&mut self, step: &Step) -> Vec<Range<usize>> {
-        let mut bodies: Vec<Range<usize>> = self.constraints.iter().filter_map(|c| c.matched(step.h)).collect();
-        bodies.sort_by_key(|rows| rows.start);
+        let mut bodies: Vec<(Range<usize>, f64)> = self.constraints.iter().filter_map(|c| c.matched(step.h)).collect();
+        bodies.sort_by_key(|(rows, _)| rows.start);
         let Self { state: State { x, v }, before, before_v, laws, .. } = self;
-        let changes = bodies.iter().map_in_parallel(|rows| {
+        let changes = bodies.iter().map_in_parallel(|(rows, share)| {
             let rows = rows.clone();
             let before = [&before[rows.clone()], &before_v[rows.clone()]];
-            let body = Body { mass: &laws.masses.mass[rows.clone()], before, x: &x[rows.clone()], v: &v[rows] };
+            let body = Body { mass: &laws.masses.mass[rows.clone()], before, x: &x[rows.clone()], v: &v[rows], share: *share };
             body_contact::resolve(&body, &laws.colliders, step)
         });
-        for (rows, change) in bodies.iter().zip(changes) {
+        for ((rows, _), change) in bodies.iter().zip(changes) {
             let Some(change) = change else { continue };
             self.memory.ready = false;
-            chunks2(&mut x[rows.clone()], &mut v[rows.clone()], |_, x, v| {
-                x.iter_mut().zip(v).for_each(|(x, v)| change.apply(x, v));
+            chunks2(&mut x[rows.clone()], &mut v[rows.clone()], |start, x, v| {
+                x.iter_mut().zip(v).enumerate().for_each(|(k, (x, v))| change.apply(start + k, x, v));
             });
         }
-        bodies
+        bodies.into_iter().map(|(rows, _)| rows).collect()
     }
 
     /// Breaks the links that are strained beyond their limit; returns how many.

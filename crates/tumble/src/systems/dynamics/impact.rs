@@ -1,6 +1,7 @@
-//! Impulses at the contacts of a rigid body: an impulse p at the arm r changes velocity and spin of the body as a whole,
+//! Impulses at the contacts of a body whose shape is matched by a share s in a sub-step: 1 if it is rigid, kappa h²/(1 + kappa h²) if it is soft. An
+//! impulse p on a mass at the arm r moves the body as a whole by that share, and the mass alone by the rest,
 //!
-//!   dV = p/M,   dw = I⁻¹ (r x p),   dv at r = p/M + (I⁻¹ (r x p)) x r                                 (contact.24)
+//!   dV = s p/M,   dw = s I⁻¹ (r x p),   dv = dV + dw x r + (1 - s) p/m                                (contact.24)
 //!
 //! First the impulses p of an inelastic impact: no contact comes nearer than it may, none pulls, and friction is Coulomb's. Then those that
 //! push are repeated by the restitution e, as Poisson's hypothesis has it, and friction is found anew for all of that, as much as takes most
@@ -19,21 +20,36 @@ use crate::geometry::{Friction, Vector};
 const SWEEPS: usize = 200;
 const EXACT: f64 = 1e-11;
 
-/// A place where a body meets a solid.
+/// A place where a mass of a body meets a solid.
 #[derive(Debug, Clone, Copy)]
 pub struct Contact {
+    /// The mass, counted from the first of the body.
+    pub k: usize,
+    /// It [kg].
+    pub mass: f64,
     /// From the centre of the body [m].
     pub arm: Vector,
     /// Unit normal out of the solid.
     pub normal: Vector,
-    /// Velocity of the solid there [m/s].
-    pub surface: Vector,
+    /// Its velocity before, relative to the solid [m/s].
+    pub arrival: Vector,
     /// Speed at which it has to leave the solid at least, before restitution; negative where it may still come nearer [m/s].
     pub least: f64,
     /// Part of the impulse that comes back.
     pub restitution: f64,
     /// Friction.
     pub friction: Friction,
+}
+
+/// What impulses give a body.
+#[derive(Debug, Clone, Default)]
+pub struct Effect {
+    /// Velocity of its centre [m/s].
+    pub velocity: Vector,
+    /// Spin [rad/s].
+    pub spin: Vector,
+    /// What single masses have beyond that [m/s], contact by contact.
+    pub own: Vec<Vector>,
 }
 
 /// How much an impulse at a contact moves it.
@@ -44,70 +60,86 @@ struct Yield {
 }
 
 struct Solver<'a> {
+    /// Mass and inertia of the body.
     body: &'a Motion,
+    share: f64,
     contacts: &'a [Contact],
+    /// For each contact, the first one of the same mass.
+    first: Vec<usize>,
     yields: Vec<Yield>,
     pushes: Vec<Vector>,
     /// Contacts at which friction has given way: they have the coefficient of what slides.
     slides: Vec<bool>,
-    /// Velocity and spin that all impulses give.
-    change: [Vector; 2],
+    effect: Effect,
 }
 
-/// The change of velocity [m/s] and spin [rad/s] of a body by its contacts.
-pub fn solve(body: &Motion, contacts: &[Contact]) -> [Vector; 2] {
-    let mut solver = Solver::new(body, contacts);
+/// What the contacts of a body give it whose shape is matched by that share.
+pub fn solve(body: &Motion, share: f64, contacts: &[Contact]) -> Effect {
+    let mut solver = Solver::new(body, share, contacts);
     solver.guess();
     solver.sweep(true);
     if contacts.iter().any(|c| c.restitution > 0.0) {
-        let (pushes, change) = (solver.pushes.clone(), solver.change);
+        let start = solver.pushes.clone();
         for (push, Contact { normal, restitution, .. }) in solver.pushes.iter_mut().zip(contacts) {
             *push = *push + *normal * (restitution * push.dot(*normal));
         }
-        solver.change = solver.effect(&solver.pushes);
+        solver.effect = solver.effect_of(&solver.pushes);
         solver.sweep(false);
-        let part = solver.affordable(&pushes, change);
-        let [velocity, spin] = [0, 1].map(|k| change[k] + (solver.change[k] - change[k]) * part);
-        return [velocity, spin];
+        let part = solver.affordable(&start);
+        let mixed: Vec<Vector> = start.iter().zip(&solver.pushes).map(|(a, b)| *a + (*b - *a) * part).collect();
+        solver.effect = solver.effect_of(&mixed);
     }
-    solver.change
+    // Of several contacts of a mass the first has all.
+    solver.effect
 }
 
 impl<'a> Solver<'a> {
-    fn new(body: &'a Motion, contacts: &'a [Contact]) -> Self {
-        let given = |r: Vector, n: Vector| n * (1.0 / body.mass) + body.inertia.spin(r.cross(n)).cross(r);
-        let of = |Contact { arm, normal, .. }: &Contact| {
+    fn new(body: &'a Motion, share: f64, contacts: &'a [Contact]) -> Self {
+        let given = |r: Vector, n: Vector, m: f64| {
+            (n * (1.0 / body.mass) + body.inertia.spin(r.cross(n)).cross(r)) * share + n * ((1.0 - share) / m)
+        };
+        let of = |Contact { arm, normal, mass, .. }: &Contact| {
             let [s, t] = across(*normal);
-            let [a, b] = [given(*arm, s), given(*arm, t)];
+            let [a, b] = [given(*arm, s, *mass), given(*arm, t, *mass)];
             let (ss, st, tt) = (a.dot(s), a.dot(t), b.dot(t));
-            Yield { normal: given(*arm, *normal).dot(*normal), tangent: 0.5 * (ss + tt) + (0.25 * (ss - tt) * (ss - tt) + st * st).sqrt() }
+            let tangent = 0.5 * (ss + tt) + (0.25 * (ss - tt) * (ss - tt) + st * st).sqrt();
+            Yield { normal: given(*arm, *normal, *mass).dot(*normal), tangent }
         };
         let n = contacts.len();
+        let mut seen = std::collections::BTreeMap::new();
+        let first = contacts.iter().enumerate().map(|(k, contact)| *seen.entry(contact.k).or_insert(k)).collect();
+        let effect = Effect { own: vec![Vector::default(); n], ..Effect::default() };
         let yields = contacts.iter().map(of).collect();
-        Self { body, contacts, yields, pushes: vec![Vector::default(); n], slides: vec![false; n], change: Default::default() }
+        Self { body, share, contacts, first, yields, pushes: vec![Vector::default(); n], slides: vec![false; n], effect }
     }
 
-    /// Velocity and spin that impulses give.
-    fn effect(&self, pushes: &[Vector]) -> [Vector; 2] {
-        let zero = [Vector::default(); 2];
-        let [push, turn] = self.contacts.iter().zip(pushes).fold(zero, |[p, l], (c, push)| [p + *push, l + c.arm.cross(*push)]);
-        [push * (1.0 / self.body.mass), self.body.inertia.spin(turn)]
+    /// What impulses give.
+    fn effect_of(&self, pushes: &[Vector]) -> Effect {
+        let (mut sum, mut turn, mut own) = (Vector::default(), Vector::default(), vec![Vector::default(); pushes.len()]);
+        for (k, (contact, push)) in self.contacts.iter().zip(pushes).enumerate() {
+            (sum, turn) = (sum + *push, turn + contact.arm.cross(*push));
+            own[self.first[k]] = own[self.first[k]] + *push * ((1.0 - self.share) / contact.mass);
+        }
+        Effect { velocity: sum * (self.share / self.body.mass), spin: self.body.inertia.spin(turn * self.share), own }
     }
 
-    /// Velocity of contact k relative to the solid, before the impulses or with them.
-    fn arrival(&self, k: usize) -> Vector {
-        self.body.at(self.contacts[k].arm) - self.contacts[k].surface
+    /// What contact k has of it.
+    fn given(&self, k: usize, effect: &Effect) -> Vector {
+        effect.velocity + effect.spin.cross(self.contacts[k].arm) + effect.own[self.first[k]]
     }
 
     fn velocity(&self, k: usize) -> Vector {
-        self.arrival(k) + self.change[0] + self.change[1].cross(self.contacts[k].arm)
+        self.contacts[k].arrival + self.given(k, &self.effect)
     }
 
     fn push(&mut self, k: usize, push: Vector) {
         let more = push - self.pushes[k];
         self.pushes[k] = push;
-        self.change[0] = self.change[0] + more * (1.0 / self.body.mass);
-        self.change[1] = self.change[1] + self.body.inertia.spin(self.contacts[k].arm.cross(more));
+        let Contact { arm, mass, .. } = self.contacts[k];
+        self.effect.velocity = self.effect.velocity + more * (self.share / self.body.mass);
+        self.effect.spin = self.effect.spin + self.body.inertia.spin(arm.cross(more) * self.share);
+        let own = &mut self.effect.own[self.first[k]];
+        *own = *own + more * ((1.0 - self.share) / mass);
     }
 
     /// A push that friction allows.
@@ -125,8 +157,8 @@ impl<'a> Solver<'a> {
         let n = self.contacts.len();
         let arm = |k: usize| self.contacts[k].arm;
         // Points of mass 1 at the contacts have the same equations as the body.
-        let places = Motion::of(n, |_| 1.0, arm, |k| self.contacts[k].normal * self.contacts[k].least - self.arrival(k));
-        if n < 3 || !places.inertia.is_round() {
+        let places = Motion::of(n, |_| 1.0, arm, |k| self.contacts[k].normal * self.contacts[k].least - self.contacts[k].arrival);
+        if n < 3 || self.share < 0.5 || !places.inertia.is_round() {
             return;
         }
         let wanted = [places.at(-places.center), places.spin];
@@ -139,13 +171,13 @@ impl<'a> Solver<'a> {
             self.pushes[k] = self.allowed(k, normal, along);
         }
         self.slides.fill(false);
-        self.change = self.effect(&self.pushes);
+        self.effect = self.effect_of(&self.pushes);
     }
 
     /// Sweeps over all contacts, over friction alone where normal impulses are given.
     fn sweep(&mut self, normals: bool) {
         let n = self.contacts.len();
-        let scale = (0..n).map(|k| self.arrival(k).norm().max(self.contacts[k].least.abs())).fold(0.0, f64::max);
+        let scale = (0..n).map(|k| self.contacts[k].arrival.norm().max(self.contacts[k].least.abs())).fold(0.0, f64::max);
         for _ in 0..SWEEPS {
             let mut changed = 0.0_f64;
             for k in 0..n {
@@ -167,20 +199,17 @@ impl<'a> Solver<'a> {
                 break;
             }
         }
-        self.change = self.effect(&self.pushes);
+        self.effect = self.effect_of(&self.pushes);
     }
 
-    /// How far impulses may go from `pushes` with the effect `change` to those found without adding energy. On the way b they do the work
-    /// a_0 + a_1 b + a_2 b².
-    fn affordable(&self, pushes: &[Vector], change: [Vector; 2]) -> f64 {
-        let (mut none, mut linear, mut square) = (0.0, 0.0, 0.0);
-        for (k, (from, to)) in pushes.iter().zip(&self.pushes).enumerate() {
-            let (arm, more) = (self.contacts[k].arm, *to - *from);
-            let given = change[0] + change[1].cross(arm);
-            let later = self.change[0] + self.change[1].cross(arm) - given;
-            none += from.dot(self.arrival(k) + given * 0.5);
-            linear += more.dot(self.arrival(k) + given);
-            square += 0.5 * more.dot(later);
+    /// How far impulses may go from `start` to those found without adding energy. On the way b they do the work a_0 + a_1 b + a_2 b².
+    fn affordable(&self, start: &[Vector]) -> f64 {
+        let (before, mut none, mut linear, mut square) = (self.effect_of(start), 0.0, 0.0, 0.0);
+        for (k, (from, to)) in start.iter().zip(&self.pushes).enumerate() {
+            let (given, more) = (self.given(k, &before), *to - *from);
+            none += from.dot(self.contacts[k].arrival + given * 0.5);
+            linear += more.dot(self.contacts[k].arrival + given);
+            square += 0.5 * more.dot(self.given(k, &self.effect) - given);
         }
         // What holding against a push takes is no gain of restitution.
         let start = none.min(0.0);
