@@ -380,39 +380,31 @@ fn blocks_come_to_rest_in_a_box_the_same_way_from_a_snapshot() {
     assert_eq!(sim.hash(), hash);
 }
 
-/// A soft shape meets solids mass by mass: its own elasticity gives back what it does, and the solid adds nothing.
+/// Of an impact on a soft shape the part e acts on the whole: with e = 1 it comes back as it came, with e = 0 its own elasticity gives back what
+/// it does, and a shape too stiff for the sub-steps is as good as rigid.
 #[test]
-fn a_soft_block_keeps_its_energy_but_for_the_damping_of_the_steps() {
-    for frequency in [5.0, 20.0, 60.0, 120.0] {
+fn a_soft_block_rebounds_by_restitution_and_its_own_elasticity() {
+    for (frequency, own) in [(5.0, [0.3, 0.5]), (20.0, [0.1, 0.6]), (60.0, [0.4, 0.7]), (120.0, [0.2, 0.5]), (5000.0, [0.0, 0.03])] {
         let rebound = [0.0, 0.5, 1.0].map(|e| {
             let mut sim = falling(4, &format!("frequency = {frequency}"), &format!("restitution = {e}"));
-            let height = 0.4;
-            throw(
-                &mut sim,
-                "block",
-                Quat { v: Vector::default(), w: 1.0 },
-                vector(0.0, 0.0, 0.5 * SIDE + height),
-                Vector::default(),
-                Vector::default(),
-            );
-            let (mut up, mut least, mut rise, mut kept) = (0.0_f64, f64::INFINITY, 0.0_f64, 1.0);
+            let (height, flat) = (0.4, Quat { v: Vector::default(), w: 1.0 });
+            throw(&mut sim, "block", flat, vector(0.0, 0.0, 0.5 * SIDE + height), Vector::default(), Vector::default());
+            let (mut up, mut least, mut rise) = (0.0_f64, f64::INFINITY, 0.0_f64);
             let (arrival, start) = ((2.0 * G * height).sqrt(), sim.ledger());
-            for frame in 0..600 {
+            for _ in 0..400 + (250.0 / frequency) as usize {
                 step(&mut sim);
                 let (v, now) = (body(&sim, "block")[1], sim.ledger());
                 let energy = (now.energy() - start.energy()) / now.mass;
                 (rise, least) = (rise.max(energy - least), least.min(energy));
-                if frame < 300 + (500.0 / frequency) as usize {
-                    up = up.max(v.z);
-                    kept = 1.0 + energy / (G * height);
-                }
+                up = up.max(v.z);
             }
-            println!(
-                "{frequency} Hz, e = {e}: rebounds with {:.3} of its speed, {kept:.3} of its energy; rises by {rise:.1e}",
-                up / arrival
-            );
+            println!("{frequency} Hz, e = {e}: rebounds with {:.4} of its speed; energy rises by {rise:.1e} J/kg", up / arrival);
+            // Of 3.9 J/kg; measured energies of a step are v a h/2 off, where a mass turns around.
+            assert!(rise < 0.12, "{rise}");
             up / arrival
         });
-        println!("{rebound:?}");
+        assert!((own[0]..own[1]).contains(&rebound[0]), "{rebound:?}");
+        assert!((rebound[2] - 1.0).abs() < 5e-3 && rebound[1] < 0.8, "{rebound:?}");
+        assert!(frequency < 1000.0 || (rebound[1] - 0.5).abs() < 0.02, "{rebound:?}");
     }
 }

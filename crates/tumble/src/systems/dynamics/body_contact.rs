@@ -1,8 +1,8 @@
 //! Contact of bodies whose shape is matched: solids act on the body as a whole, as far as a sub-step matches it, and not on single masses, which the
-//! next match would turn into any motion of the body. The sub-step has moved it; impulses (contact.24) add a rigid motion to that, by which a rigid
+//! next match would turn into any motion of the body. The sub-step has moved it; impulses (shapes.5) add a rigid motion to that, by which a rigid
 //! body stays in shape, and what single masses of a soft one yield.
 //!
-//!   n.v >= min(0, n.v_1 + depth/h)                                                                    (contact.26)
+//!   n.v >= min(0, n.v_1 + depth/h)                                                                    (shapes.7)
 //!
 //! of every mass that ends too deep, or has passed a surface: it may come near, but not within the thickness. One that comes in faster than `resting`
 //! is an impact at a time s h: its normal speed is stopped then and comes back by restitution, and what it changes acts for the rest of
@@ -169,12 +169,14 @@ impl Body<'_> {
     }
 }
 
-/// A rigid motion, and the time at which masses have it, as a part of the sub-step.
+/// A time in a sub-step, as a part of it, and the rigid motion of a body then.
 struct Moment {
     motion: Motion,
     part: f64,
-    /// Of the scheme: the velocity of the path is ahead of its own by that part of the change in the sub-step.   (contact.14)
-    lead: f64,
+    /// The velocity of the path is ahead of that of the scheme by this and by this spin; the motion has both.    (contact.14)
+    ahead: [Vector; 2],
+    /// The share of impulses that act on the body as a whole.
+    share: f64,
 }
 
 impl Moment {
@@ -182,11 +184,12 @@ impl Moment {
         body.place(k, self.part) - self.motion.center
     }
 
-    /// Velocity of a mass: that of the body, and its own as far as the shape leaves it.
+    /// Velocity of a mass: that of the body, and its own as far as that counts.
     fn velocity(&self, body: &Body<'_>, k: usize) -> Vector {
-        let own = body.velocity(k, self.part) + (body.velocity(k, 1.0) - body.velocity(k, 0.0)) * self.lead;
-        let rigid = self.motion.at(self.arm(body, k));
-        rigid + (own - rigid) * (1.0 - body.share)
+        let arm = self.arm(body, k);
+        let own = body.velocity(k, self.part) + self.ahead[0] + self.ahead[1].cross(arm);
+        let rigid = self.motion.at(arm);
+        rigid + (own - rigid) * (1.0 - self.share)
     }
 }
 
@@ -197,13 +200,16 @@ pub fn resolve(body: &Body<'_>, colliders: &[Collider], step: &Step) -> Option<C
         return None;
     }
     let motion = |part: f64| body.motion(|k| body.place(k, part), |k| body.velocity(k, part));
-    let end = Moment { motion: motion(1.0), part: 1.0, lead: 0.0 };
+    let restitution = meetings.iter().filter(|m| m.fast).map(|m| colliders[m.collider].restitution).fold(0.0, f64::max);
+    // What comes back of an impact acts on the whole.                                                    (shapes.8)
+    let share = body.share + (1.0 - body.share) * restitution;
+    let end = Moment { motion: motion(1.0), part: 1.0, ahead: Default::default(), share };
     // The first impact; without one, all acts as if from the start of the sub-step on.
     let first = meetings.iter().filter(|m| m.fast).map(|m| m.part).reduce(f64::min);
     let impact = first.map(|part| {
         let (at, start) = (motion(part), motion(0.0));
-        let [velocity, spin] = [end.motion.velocity - start.velocity, end.motion.spin - start.spin].map(|pull| pull * step.lead);
-        Moment { motion: Motion { velocity: at.velocity + velocity, spin: at.spin + spin, ..at }, part, lead: step.lead }
+        let ahead = [end.motion.velocity - start.velocity, end.motion.spin - start.spin].map(|pull| pull * step.lead);
+        Moment { motion: Motion { velocity: at.velocity + ahead[0], spin: at.spin + ahead[1], ..at }, part, ahead, share }
     });
     let (now, rest) = impact.as_ref().map_or((&end, step.h), |at| (at, (1.0 - at.part) * step.h));
     let contact = |m: &Meeting| {
@@ -217,7 +223,7 @@ pub fn resolve(body: &Body<'_>, colliders: &[Collider], step: &Step) -> Option<C
     let mut contacts: Vec<Contact> = meetings.iter().map(contact).collect();
     let mut change = None;
     for _ in 0..ROUNDS {
-        let Effect { velocity, spin, own } = solve(&now.motion, body.share, &contacts);
+        let Effect { velocity, spin, own } = solve(&now.motion, share, &contacts);
         let (from, turn) = (end.motion.center, rotation::by(spin * rest));
         let mut found = Change { from, to: from + velocity * rest, turn, velocity, spin, own: Vec::new() };
         body.add_own(&mut found.own, &contacts, own.iter().map(|own| [*own * rest, *own]));

@@ -1,13 +1,13 @@
 //! Impulses at the contacts of a body whose shape is matched by a share s in a sub-step: 1 if it is rigid, kappa h²/(1 + kappa h²) if it is soft. An
 //! impulse p on a mass at the arm r moves the body as a whole by that share, and the mass alone by the rest,
 //!
-//!   dV = s p/M,   dw = s I⁻¹ (r x p),   dv = dV + dw x r + (1 - s) p/m                                (contact.24)
+//!   dV = s p/M,   dw = s I⁻¹ (r x p),   dv = dV + dw x r + (1 - s) p/m                                (shapes.5)
 //!
 //! First the impulses p of an inelastic impact: no contact comes nearer than it may, none pulls, and friction is Coulomb's. Then those that
 //! push are repeated by the restitution e, as Poisson's hypothesis has it, and friction is found anew for all of that, as much as takes most
 //! energy:
 //!
-//!   p_n -> (1 + e) p_n,   p_t = argmin of the kinetic energy, |p_t| <= mu p_n                            (contact.25)
+//!   p_n -> (1 + e) p_n,   p_t = argmin of the kinetic energy, |p_t| <= mu p_n                            (shapes.6)
 //!
 //! With one e this cannot add energy: the impulses (1 + e) p are among those that friction chooses from. Where contacts have
 //! several, repeating ends where it would.
