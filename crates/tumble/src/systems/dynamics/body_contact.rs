@@ -116,12 +116,12 @@ impl Body<'_> {
     }
 
     /// Adds what single masses of a soft body have of their own.
-    fn add_own(&self, sum: &mut Vec<[Vector; 2]>, contacts: &[Contact], own: impl Iterator<Item = [Vector; 2]>) {
+    fn add_own(&self, sum: &mut Vec<[Vector; 2]>, own: impl Iterator<Item = (usize, [Vector; 2])>) {
         if self.share < 1.0 {
             sum.resize(self.len(), Default::default());
-            for (contact, [way, velocity]) in contacts.iter().zip(own) {
-                let [x, v] = sum[contact.k];
-                sum[contact.k] = [x + way, v + velocity];
+            for (k, [way, velocity]) in own {
+                let [x, v] = sum[k];
+                sum[k] = [x + way, v + velocity];
             }
         }
     }
@@ -175,8 +175,6 @@ struct Moment {
     part: f64,
     /// The velocity of the path is ahead of that of the scheme by this and by this spin; the motion has both.    (contact.14)
     ahead: [Vector; 2],
-    /// The share of impulses that act on the body as a whole.
-    share: f64,
 }
 
 impl Moment {
@@ -184,12 +182,55 @@ impl Moment {
         body.place(k, self.part) - self.motion.center
     }
 
-    /// Velocity of a mass: that of the body, and its own as far as that counts.
-    fn velocity(&self, body: &Body<'_>, k: usize) -> Vector {
+    /// Velocity of a mass of a body whose shape is matched by a share: what it has of its own is what the shape leaves.
+    fn velocity(&self, body: &Body<'_>, k: usize, share: f64) -> Vector {
         let arm = self.arm(body, k);
         let own = body.velocity(k, self.part) + self.ahead[0] + self.ahead[1].cross(arm);
         let rigid = self.motion.at(arm);
-        rigid + (own - rigid) * (1.0 - self.share)
+        rigid + (own - rigid) * (1.0 - share)
+    }
+}
+
+/// The meetings of a body in a sub-step, and when they act.
+struct Course<'a> {
+    body: &'a Body<'a>,
+    colliders: &'a [Collider],
+    now: Moment,
+    end: Moment,
+    /// The time left [s].
+    rest: f64,
+    /// The largest restitution of an impact; `None` without one.
+    restitution: Option<f64>,
+}
+
+impl Course<'_> {
+    fn contact(&self, m: &Meeting, share: f64) -> Contact {
+        let Collider { restitution, friction, .. } = self.colliders[m.collider];
+        let arrival = self.now.velocity(self.body, m.k, share) - m.surface;
+        let later = (self.end.velocity(self.body, m.k, share) - m.surface).dot(m.normal);
+        let least = if m.fast { 0.0 } else { (later + m.depth / self.rest).min(0.0) - later + arrival.dot(m.normal) };
+        let (mass, arm) = (f64::from(self.body.mass[m.k]), self.now.arm(self.body, m.k));
+        Contact { k: m.k, mass, arm, normal: m.normal, arrival, least, restitution: if m.fast { restitution } else { 0.0 }, friction }
+    }
+
+    /// What contact gives the body: of an impact a part as if it were rigid, of what is left all as far as its shape is matched.    (shapes.8)
+    fn effect(&self, meetings: &[Meeting]) -> Effect {
+        let share = self.body.share;
+        let mut whole = Effect { own: vec![Vector::default(); meetings.len()], ..Effect::default() };
+        if let Some(restitution) = self.restitution {
+            let contacts: Vec<Contact> = meetings.iter().map(|m| self.contact(m, 1.0)).collect();
+            let (part, rigid) = (share + (1.0 - share) * restitution, solve(&self.now.motion, 1.0, &contacts));
+            (whole.velocity, whole.spin) = (rigid.velocity * part, rigid.spin * part);
+            if share == 1.0 {
+                return whole;
+            }
+        }
+        let left = |m: &Meeting| {
+            let contact = self.contact(m, share);
+            Contact { arrival: contact.arrival + whole.velocity + whole.spin.cross(contact.arm), restitution: 0.0, ..contact }
+        };
+        let Effect { velocity, spin, own } = solve(&self.now.motion, share, &meetings.iter().map(left).collect::<Vec<_>>());
+        Effect { velocity: whole.velocity + velocity, spin: whole.spin + spin, own }
     }
 }
 
@@ -200,48 +241,40 @@ pub fn resolve(body: &Body<'_>, colliders: &[Collider], step: &Step) -> Option<C
         return None;
     }
     let motion = |part: f64| body.motion(|k| body.place(k, part), |k| body.velocity(k, part));
-    let restitution = meetings.iter().filter(|m| m.fast).map(|m| colliders[m.collider].restitution).fold(0.0, f64::max);
-    // What comes back of an impact acts on the whole.                                                    (shapes.8)
-    let share = body.share + (1.0 - body.share) * restitution;
-    let end = Moment { motion: motion(1.0), part: 1.0, ahead: Default::default(), share };
+    let at_end = || Moment { motion: motion(1.0), part: 1.0, ahead: Default::default() };
+    let (end, impacts) = (at_end(), || meetings.iter().filter(|m| m.fast));
+    let restitution = impacts().map(|m| colliders[m.collider].restitution).reduce(f64::max);
     // The first impact; without one, all acts as if from the start of the sub-step on.
-    let first = meetings.iter().filter(|m| m.fast).map(|m| m.part).reduce(f64::min);
-    let impact = first.map(|part| {
-        let (at, start) = (motion(part), motion(0.0));
-        let ahead = [end.motion.velocity - start.velocity, end.motion.spin - start.spin].map(|pull| pull * step.lead);
-        Moment { motion: Motion { velocity: at.velocity + ahead[0], spin: at.spin + ahead[1], ..at }, part, ahead, share }
-    });
-    let (now, rest) = impact.as_ref().map_or((&end, step.h), |at| (at, (1.0 - at.part) * step.h));
-    let contact = |m: &Meeting| {
-        let Collider { restitution, friction, .. } = colliders[m.collider];
-        let arrival = now.velocity(body, m.k) - m.surface;
-        let later = (end.velocity(body, m.k) - m.surface).dot(m.normal);
-        let least = if m.fast { 0.0 } else { (later + m.depth / rest).min(0.0) - later + arrival.dot(m.normal) };
-        let (mass, arm) = (f64::from(body.mass[m.k]), now.arm(body, m.k));
-        Contact { k: m.k, mass, arm, normal: m.normal, arrival, least, restitution: if m.fast { restitution } else { 0.0 }, friction }
+    let (now, rest) = match impacts().map(|m| m.part).reduce(f64::min) {
+        Some(part) => {
+            let (at, start) = (motion(part), motion(0.0));
+            let ahead = [end.motion.velocity - start.velocity, end.motion.spin - start.spin].map(|pull| pull * step.lead);
+            let motion = Motion { velocity: at.velocity + ahead[0], spin: at.spin + ahead[1], ..at };
+            (Moment { motion, part, ahead }, (1.0 - part) * step.h)
+        }
+        None => (at_end(), step.h),
     };
-    let mut contacts: Vec<Contact> = meetings.iter().map(contact).collect();
+    let course = Course { body, colliders, now, end, rest, restitution };
+    let from = course.end.motion.center;
     let mut change = None;
     for _ in 0..ROUNDS {
-        let Effect { velocity, spin, own } = solve(&now.motion, share, &contacts);
-        let (from, turn) = (end.motion.center, rotation::by(spin * rest));
+        let Effect { velocity, spin, own } = course.effect(&meetings);
+        let turn = rotation::by(spin * rest);
         let mut found = Change { from, to: from + velocity * rest, turn, velocity, spin, own: Vec::new() };
-        body.add_own(&mut found.own, &contacts, own.iter().map(|own| [*own * rest, *own]));
+        body.add_own(&mut found.own, meetings.iter().zip(own).map(|(m, own)| (m.k, [own * rest, own])));
         let mut deep = body.too_deep(colliders, &found, step);
         deep.retain(|new| !meetings.iter().any(|old| old.is_at(new)));
-        let done = deep.is_empty();
         for new in &mut deep {
             let place = body.end(new.k);
             new.depth += (found.place(new.k, place) - place).dot(new.normal);
         }
         change = Some(found);
-        if done {
+        if deep.is_empty() {
             break;
         }
-        contacts.extend(deep.iter().map(contact));
         meetings.extend(deep);
     }
-    change.map(|change| moved_out(body, colliders, step, &end.motion, change))
+    change.map(|change| moved_out(body, colliders, step, &course.end.motion, change))
 }
 
 /// A change that leaves no mass too deep, by a way that is no velocity.
@@ -264,7 +297,7 @@ fn moved_out(body: &Body<'_>, colliders: &[Collider], step: &Step, end: &Motion,
         let contacts: Vec<Contact> = deep.iter().map(contact).collect();
         let Effect { velocity: way, spin: turn, own } = solve(end, body.share, &contacts);
         (change.to, change.turn) = (change.to + way, rotation::by(turn) * change.turn);
-        body.add_own(&mut change.own, &contacts, own.iter().map(|own| [*own, Vector::default()]));
+        body.add_own(&mut change.own, deep.iter().zip(own).map(|(m, own)| (m.k, [own, Vector::default()])));
     }
     change
 }
