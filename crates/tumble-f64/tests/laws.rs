@@ -31,6 +31,7 @@ mod neighbours;
 mod operators;
 mod pressure;
 mod projections;
+mod shape_contact;
 mod sheets;
 mod single_steps;
 mod solids;

@@ -96,6 +96,10 @@ fn scenes() -> Vec<(&'static str, String, usize)> {
     let surface = "hinge = 1e-5\nisometric = 1e-5\nmembrane = { warp = 50, weft = 30, angle = 20, damping = 1e-4 }\narea = 5";
     let shape = "[[system]]\nmethod = \"position_based\"\nsubsteps = 4\nposition_based.iterations = 2\n[[block]]\nname = \"b\"\nsize = [0.3, 0.3, 0.3]\nresolution = [17, 17, 17]\n\
                  center = [0, 0, 0.2]\nrotate = [20, 30, 0]\nshape_matching.frequency = 5\n[[collider]]\nname = \"floor\"\nfriction = 0.3\nshape.floor.height = 0\n";
+    let thrown = "[[system]]\nmethod = \"position_based\"\nsubsteps = 10\n[[block]]\nname = \"large\"\nsize = [0.3, 0.3, 0.3]\nresolution = [17, 17, 17]\n\
+                  center = [0, 0, 0.3]\nrotate = [20, 30, 0]\nvelocity = [1, 0, -2]\nshape_matching = {}\n\
+                  [[block]]\nname = \"small\"\nsize = [0.2, 0.2, 0.2]\nresolution = [4, 4, 4]\ncenter = [1, 0, 0.2]\nrotate = [0, 10, 40]\nvelocity = [2, 0, -2]\nshape_matching = {}\n\
+                  [[collider]]\nname = \"floor\"\nfriction = 0.3\nrestitution = 0.4\nshape.floor.height = 0\n";
     let pool = "[[system]]\nmethod = \"position_based\"\nsubsteps = 8\n[[particles]]\nname = \"water\"\n\
                 fluid = { spacing = 0.02, viscosity = 0.5, fill = [{ center = [-0.1, 0, 0.2], size = [0.32, 0.36, 0.4] }] }\n\
                 [[collider]]\nname = \"tank\"\ninside = true\nshape.box = { center = [0, 0, 0.4], size = [0.6, 0.4, 0.8] }\n";
@@ -123,6 +127,7 @@ fn scenes() -> Vec<(&'static str, String, usize)> {
             6,
         ),
         ("block, shape", shape.to_string(), 10),
+        ("blocks, rigid, thrown", thrown.to_string(), 20),
         ("pool", pool.to_string(), 6),
         ("smoke", smoke.to_string(), 16),
         ("fire", fire, 6),

@@ -66,6 +66,10 @@ pub trait Constraints: Send + Sync {
     fn leans(&self) -> Option<usize> {
         None
     }
+    /// The rows of a body whose shape is matched, and the share of the way to it that a sub-step of length h [s] takes.
+    fn matched(&self, _h: f64) -> Option<(Range<usize>, f64)> {
+        None
+    }
     /// Potential energy [J], zero at rest; nothing of rigid elements.
     fn energy(&self, x: &[Row], walls: Walls<'_>) -> f64;
     /// Corrects points and frames once, element by element; x[i][3] are inverse masses of points.

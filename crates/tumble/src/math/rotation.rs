@@ -32,14 +32,18 @@ pub fn from_axes(x: Vec3<f64>, z: Vec3<f64>) -> Quat<f64> {
     (about * upright).normalized()
 }
 
-/// q exp(theta/2): the frame q turned by the rotation vector theta [rad], given in the frame's own axes.
-pub fn turn(q: Row, theta: Vec3<Real>) -> Row {
-    let t = Vec3 { x: f64::from(theta.x), y: f64::from(theta.y), z: f64::from(theta.z) };
-    let angle = t.norm();
+/// exp(theta/2): the turn by a rotation vector [rad].
+pub fn by(theta: Vec3<f64>) -> Quat<f64> {
+    let angle = theta.norm();
     let half = angle / 2.0;
     // sin(half)/angle, by its series where the quotient would lose digits.
     let c = if angle < 1e-4 { 0.5 - angle * angle / 48.0 } else { sin(half) / angle };
-    let step = Quat { v: t * c, w: cos(half) };
+    Quat { v: theta * c, w: cos(half) }
+}
+
+/// q exp(theta/2): the frame q turned by the rotation vector theta [rad], given in the frame's own axes.
+pub fn turn(q: Row, theta: Vec3<Real>) -> Row {
+    let step = by(Vec3 { x: f64::from(theta.x), y: f64::from(theta.y), z: f64::from(theta.z) });
     let turned = Quat::from_row(q.map(f64::from)) * step;
     turned.normalized().row().map(|x| x as Real)
 }

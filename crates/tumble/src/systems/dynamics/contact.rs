@@ -196,7 +196,7 @@ fn meet(
 
 /// When the plane that a straight way meets at `part` is met by the parabola with the same ends: the straight way changes
 /// its height by `fall` < 0, and the parabola lies lower than it by `bend` s (1 - s).
-fn on_parabola(part: f64, fall: f64, bend: f64) -> f64 {
+pub fn on_parabola(part: f64, fall: f64, bend: f64) -> f64 {
     // bend s² + (fall - bend) s - fall part = 0 has one root that is on the way down.
     let (b, c) = (fall - bend, -fall * part);
     let under = (b * b - 4.0 * bend * c).max(0.0).sqrt() - b;

@@ -1,5 +1,6 @@
 //! State and laws of a system of masses, on which schemes and features act.
 
+use super::body_contact::{self, Body};
 use super::contact::{Pass, Response, Step};
 use super::feature::Span;
 use super::laws::Laws;
@@ -7,10 +8,11 @@ use super::scale::Scale;
 use crate::elements::{Constraints, Limit, Linear, Projected};
 use crate::geometry::{Collider, Vector};
 use crate::integrators::Memory;
-use crate::math::parallel::{CHUNK, Tasks};
+use crate::math::parallel::{CHUNK, Tasks, chunks2};
 use crate::math::{Real, Row, Vec3, ZERO, axpy, row};
 use crate::pool::{Hit, Pool};
 use crate::state::{Object, State};
+use std::ops::Range;
 use tumble_interface::scene::Integrator;
 
 /// Rows of masses that do not feel each other which are stepped together: 24 KB in single precision, with accelerations.
@@ -130,8 +132,9 @@ impl Core {
         }
         let observed = self.pool.heeded();
         let step = Step { t, h, resting: self.resting_speed(h), lead, observed: false };
+        let bodies = self.resolve_body_contact(&step);
         let pass = Pass { colliders: &self.laws.colliders, step, penalty, observed: &observed };
-        for points in self.laws.masses.points() {
+        for points in self.laws.masses.points().flat_map(|points| without(points, &bodies)) {
             let (before, before_v) = (&self.before[points.clone()], &self.before_v[points.clone()]);
             let chunks = self.state.x[points.clone()].chunks_mut(CHUNK).zip(self.state.v[points.clone()].chunks_mut(CHUNK));
             let chunks = chunks.zip(before.chunks(CHUNK).zip(before_v.chunks(CHUNK))).enumerate();
@@ -146,10 +149,43 @@ impl Core {
         }
     }
 
+    /// The contact of bodies whose shape is matched; returns their rows, in order.
+    fn resolve_body_contact(&mut self, step: &Step) -> Vec<Range<usize>> {
+        let mut bodies: Vec<(Range<usize>, f64)> = self.constraints.iter().filter_map(|c| c.matched(step.h)).collect();
+        bodies.sort_by_key(|(rows, _)| rows.start);
+        let Self { state: State { x, v }, before, before_v, laws, .. } = self;
+        let changes = bodies.iter().map_in_parallel(|(rows, share)| {
+            let rows = rows.clone();
+            let before = [&before[rows.clone()], &before_v[rows.clone()]];
+            let body = Body { mass: &laws.masses.mass[rows.clone()], before, x: &x[rows.clone()], v: &v[rows], share: *share };
+            body_contact::resolve(&body, &laws.colliders, step)
+        });
+        for ((rows, _), change) in bodies.iter().zip(changes) {
+            let Some(change) = change else { continue };
+            self.memory.ready = false;
+            chunks2(&mut x[rows.clone()], &mut v[rows.clone()], |start, x, v| {
+                x.iter_mut().zip(v).enumerate().for_each(|(k, (x, v))| change.apply(start + k, x, v));
+            });
+        }
+        bodies.into_iter().map(|(rows, _)| rows).collect()
+    }
+
     /// Breaks the links that are strained beyond their limit; returns how many.
     pub fn break_links(&mut self) -> u64 {
         let x = &self.state.x;
         self.laws.batches.iter_mut().map(|b| b.break_links(x)).sum::<u64>()
             + self.constraints.iter_mut().map(|c| c.break_links(x)).sum::<u64>()
     }
+}
+
+/// A range without some others, which are in order.
+fn without(range: Range<usize>, others: &[Range<usize>]) -> Vec<Range<usize>> {
+    let (mut left, mut start) = (Vec::new(), range.start);
+    for other in others.iter().filter(|other| other.start < range.end && range.start < other.end) {
+        left.push(start..other.start.max(start));
+        start = other.end.max(start);
+    }
+    left.push(start.min(range.end)..range.end);
+    left.retain(|rows| !rows.is_empty());
+    left
 }

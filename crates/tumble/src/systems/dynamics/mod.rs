@@ -2,6 +2,7 @@
 //! any integrator, or by projecting positions.
 
 mod account;
+mod body_contact;
 mod build;
 mod columns;
 mod contact;
@@ -12,7 +13,9 @@ mod followers;
 mod fracture;
 mod hair_continuum;
 mod holds;
+mod impact;
 mod implicit;
+mod inertia;
 mod laws;
 mod ledger;
 mod life;

@@ -9,6 +9,7 @@
 
 use super::super::contact::real;
 use super::super::core::Core;
+use super::super::inertia::Inertia;
 use super::super::sums::Sums;
 use crate::elements::Constraints;
 use crate::math::parallel::{Tasks, fold};
@@ -16,9 +17,6 @@ use crate::math::{Quat, Row, Vec3, axpy, row, sub, xyz64};
 use std::ops::Range;
 
 type Vector = Vec3<f64>;
-
-/// Part of the inertia that is added to it, so that a body in a line has an inverse one.
-const LEAST: f64 = 1e-8;
 
 /// Rows that elements connect, none of them held.
 struct Body {
@@ -105,39 +103,18 @@ fn lost(core: &Core, body: &Body, sums: &Sums) -> Option<(Vector, Vector, Vector
     let push = body.target[0] - sums.momentum;
     let turn = body.target[1] - sums.angular - center.cross(push);
     let (x, masses) = (&core.state.x, &core.laws.masses);
-    let mut inertia = [0.0; 6];
+    let mut inertia = Inertia::default();
     for range in &body.points {
         let parts = fold(range.len(), |part| {
-            (range.start + part.start..range.start + part.end).fold([0.0; 6], |sum: [f64; 6], i| {
-                let (m, Vector { x, y, z }) = (f64::from(masses.mass[i]), xyz64(x[i]) - center);
-                let one = [y * y + z * z, z * z + x * x, x * x + y * y, -x * y, -y * z, -z * x];
-                std::array::from_fn(|k| sum[k] + m * one[k])
-            })
+            let rows = range.start + part.start..range.start + part.end;
+            rows.fold(Inertia::default(), |sum, i| sum.plus(Inertia::of(f64::from(masses.mass[i]), xyz64(x[i]) - center)))
         });
-        inertia = parts.into_iter().fold(inertia, |a, b| std::array::from_fn(|k| a[k] + b[k]));
+        inertia = parts.into_iter().fold(inertia, Inertia::plus);
     }
     let own: f64 = body.frames.iter().cloned().flatten().map(|i| f64::from(masses.mass[i])).sum();
-    (0..3).for_each(|k| inertia[k] += own);
-    let round = LEAST * (inertia[0] + inertia[1] + inertia[2]);
-    let rounded = std::array::from_fn(|k| if k < 3 { inertia[k] + round } else { inertia[k] });
-    // The second solution takes back what rounding has added.
-    let spin = solve(rounded, turn);
-    let spin = spin + solve(rounded, turn - times(inertia, spin));
+    let spin = inertia.plus_round(own).spin(turn);
     let finite = |v: Vector| v.norm_sq().is_finite();
     (finite(push) && finite(spin)).then_some((push * (1.0 / sums.mass), spin, center))
-}
-
-/// A x, as below.
-fn times([xx, yy, zz, xy, yz, zx]: [f64; 6], v: Vector) -> Vector {
-    Vector { x: xx * v.x + xy * v.y + zx * v.z, y: xy * v.x + yy * v.y + yz * v.z, z: zx * v.x + yz * v.y + zz * v.z }
-}
-
-/// x of A x = b; A = [xx, yy, zz, xy, yz, zx].
-fn solve([xx, yy, zz, xy, yz, zx]: [f64; 6], b: Vector) -> Vector {
-    let rows = [[xx, xy, zx], [xy, yy, yz], [zx, yz, zz]].map(Vector::from);
-    let columns = [rows[1].cross(rows[2]), rows[2].cross(rows[0]), rows[0].cross(rows[1])];
-    let det = rows[0].dot(columns[0]);
-    if det > 0.0 { (columns[0] * b.x + columns[1] * b.y + columns[2] * b.z) * (1.0 / det) } else { Vector::default() }
 }
 
 /// Bodies of two rows and more that hang together by elements that have not broken, and of which no row is held.
