@@ -11,6 +11,7 @@ mod broken;
 mod character;
 mod cloth;
 mod contact;
+mod contact_cost;
 mod contact_sweep;
 mod converged;
 mod draping;

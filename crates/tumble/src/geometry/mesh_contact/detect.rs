@@ -28,6 +28,8 @@ const LEAST: f64 = 64.0 * f64::EPSILON;
 /// How near neighbours must come to be a pair, over the distance of their contact, and over the whole thickness. The latter, as what vertices of
 /// those left out may go is a ball.
 const LEFT_OUT: (f64, f64) = (1.5, 0.25);
+/// Least distance of pairs that are held along a common way, relative to that from the origin: places there are rounded to single precision.
+const LEAST_ALONG: f64 = 64.0 * Real::EPSILON as f64;
 /// Leaves per task.
 const TASK: usize = 32;
 /// Vertices per task.
@@ -347,19 +349,48 @@ impl Detector {
         if !self.far(x) {
             return Held::default();
         }
-        if !self.common.is_empty() {
-            // Who is stopped by something else does not go along: what is held back is held to where it was, then.
-            let held = self.hold_those(topology, &mut x.to_vec());
-            if held.held == 0 {
-                return held;
-            }
-            self.common.clear();
-            self.find(topology);
-            if !self.far(x) {
-                return Held::default();
-            }
+        if self.common.is_empty() {
+            return self.hold_those(topology, x);
         }
-        self.hold_those(topology, x)
+        let mut along = x.to_vec();
+        let held = self.hold_those(topology, &mut along);
+        if held.held == 0 {
+            return held;
+        }
+        // Who is stopped by something else does not go along, and is held to where it was. Of both, what changes less.
+        let changed = |to: &[Row]| to.iter().zip(&*x).map(|(a, b)| (xyz64(*a) - xyz64(*b)).norm_sq()).sum::<f64>();
+        let size = self.at.iter().map(|p| p.norm_sq()).filter(|d| d.is_finite()).fold(0.0, f64::max).sqrt();
+        // The places that vertices are held to along the way are rounded.
+        let rounded = self.pairs.iter().any(|pair| f64::from(pair.distance) < LEAST_ALONG * size);
+        let mut there = self.at_start(topology);
+        let mut back = x.to_vec();
+        let otherwise = if there.far(&back) { there.hold_those(topology, &mut back) } else { Held::default() };
+        if rounded || changed(&back) <= changed(&along) {
+            *self = there;
+            x.copy_from_slice(&back);
+            return otherwise;
+        }
+        self.swap_lasting(&mut there);
+        x.copy_from_slice(&along);
+        held
+    }
+
+    /// One that has found pairs from where vertices were, without what they have in common.
+    fn at_start(&mut self, topology: &Topology) -> Self {
+        let mut other = Self { reach: self.reach, ..Self::default() };
+        other.swap_lasting(self);
+        other.find(topology);
+        other
+    }
+
+    /// Swaps what does not depend on the common motion.
+    fn swap_lasting(&mut self, other: &mut Self) {
+        std::mem::swap(&mut self.start, &mut other.start);
+        std::mem::swap(&mut self.predicted, &mut other.predicted);
+        std::mem::swap(&mut self.loose, &mut other.loose);
+        std::mem::swap(&mut self.points, &mut other.points);
+        std::mem::swap(&mut self.edges, &mut other.edges);
+        std::mem::swap(&mut self.triangles, &mut other.triangles);
     }
 
     /// Finds the vertices that went too far, and says whether there are any.
