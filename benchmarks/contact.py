@@ -2,9 +2,10 @@
 
 There is no peer in it. Shown are the bytes that a sheet of 512² holds, by the allocator's own count, and those that stay
 resident, with what the allocator keeps of the memory in which it was made; the time that self-contact adds to six layers
-that lie on each other, in three sizes; and frames of the shipped dress in three.
+that lie on each other, in three sizes; that of a free sheet by its thickness and its speed; and frames of the shipped dress
+in three sizes.
 
-python contact.py [threads [part ...]], with the parts memory, layers, dress"""
+python contact.py [threads [part ...]], with the parts memory, layers, free, dress"""
 
 import ctypes
 import sys
@@ -18,6 +19,8 @@ FPS = 60
 SUBSTEPS = 10
 LAYERS = 6
 SIZES = (24, 48, 96)
+# A free sheet: points at a side, and its edges [m].
+SIDE, EDGE = 64, 0.022
 # Edges of the dress's triangles [m]; the last makes 20,000 of them.
 EDGES = (0.03, 0.02, 0.0141)
 
@@ -99,6 +102,27 @@ def layers(n, touching):
     }
 
 
+def free(thickness, speed):
+    """A sheet that nothing touches but itself, of a thickness in edges; its speed [m/s] is along its plane."""
+    length = (SIDE - 1) * EDGE
+    held = {
+        "name": "sheet",
+        "size": [length, length],
+        "resolution": [SIDE, SIDE],
+        "rotate": [0.0, 0.0, 30.0],
+        "velocity": [speed, 0.0, 0.0],
+        "links": {"structural": 1e3, "shear": 200.0},
+    }
+    contact = {"self_contact": {"thickness": thickness * EDGE}}
+    return {
+        "version": 1,
+        "time": {"fps": FPS},
+        "world": {"gravity": [0.0, 0.0, 0.0]},
+        "system": [{"method": "position_based", "substeps": SUBSTEPS} | contact],
+        "sheet": [held],
+    }
+
+
 def frame(scene, warm):
     """Seconds of a frame, after some, and the books."""
     import tumble
@@ -138,6 +162,20 @@ def show_layers():
     show("self-contact, a particle", f"{LAYERS} x {SIZES[0]}²", costs[0] / counts[0] / SUBSTEPS, "s", "the smallest")
 
 
+def show_free():
+    def one(case, who, thickness, speed):
+        seconds, world = frame(free(thickness, speed), 2)
+        books = world.ledger
+        check = f"a frame; {thickness} edges thick, {books['speed']:.3f} m/s, {books['intersections']} intersections"
+        show(case, who, seconds, "s", check)
+
+    for case, thickness in [("sheet, near a diagonal", 0.73), ("sheet, 1.5 edges thick", 1.5)]:
+        one(case, "tumble", thickness, 0.0)
+        one(case, "0.65 edges", 0.65, 0.0)
+    one("sheet at 16 m/s", "tumble", 0.5, 16.0)
+    one("sheet at 16 m/s", "at rest", 0.5, 0.0)
+
+
 def show_dress():
     dress = tomllib.loads((Path(__file__).parent.parent / "python/tumble/scenes/cloth/dress.toml").read_text())
     dress["system"][0].update(substeps=20, position_based={"iterations": 4, "tethers": 1.05})
@@ -157,6 +195,6 @@ def show_dress():
     show("dress, a triangle", "the coarsest", costs[0] / counts[0], "s", f"{counts[0]} triangles")
 
 
-for part, run in {"memory": show_memory, "layers": show_layers, "dress": show_dress}.items():
+for part, run in {"memory": show_memory, "layers": show_layers, "free": show_free, "dress": show_dress}.items():
     if part in (sys.argv[2:] or [part]):
         run()

@@ -336,7 +336,7 @@ fn nothing_passes_beside_the_ways() {
         for _ in 0..12 {
             let together = random.vector() * 0.5;
             let ways: Vec<Vector> = (0..x.len()).map(|_| together + random.vector() * 0.2).collect();
-            detector.detect_along(&topology, &x, &ways, 0.1);
+            detector.detect_along(&topology, &x, &ways, &[], 0.1);
             // Some go on, some are stopped, some are thrown about.
             let part = |random: &mut Numbers, w: &Vector| match random.next() {
                 r if r < -0.5 => *w,
@@ -365,7 +365,7 @@ fn nothing_passes_beside_the_ways() {
     topology.add(THIN, &[lower, upper].concat(), &[], &[]);
     let fall = |lower: f64, upper: f64| (0..32).map(|v| vector(0.0, 0.0, if v < 16 { lower } else { upper })).collect::<Vec<Vector>>();
     let pairs = |detector: &mut Detector, ways: &[Vector]| {
-        detector.detect_along(&topology, &x, ways, 0.01);
+        detector.detect_along(&topology, &x, ways, &[], 0.01);
         detector.pairs().len()
     };
     assert_eq!(pairs(&mut detector, &fall(-0.015, -0.015)), 0);

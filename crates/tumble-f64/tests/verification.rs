@@ -12,6 +12,7 @@ mod broken;
 mod character;
 mod cloth;
 mod contact;
+mod contact_cost;
 mod contact_sweep;
 mod converged;
 mod draping;

@@ -310,7 +310,8 @@ impl Default for PositionBased {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct SelfContact {
-    /// Distance at which surfaces touch, less than the edge length. It also scales the safe motion per search, so larger values are faster.
+    /// Distance at which surfaces touch; half of the distance at rest for what is nearer than twice this along a surface. Time per frame
+    /// grows with it, beyond an edge length with its square; motion within a surface that is fast for it may be held back.
     #[schemars(extend("x-unit" = "m", "exclusiveMinimum" = 0.0))]
     pub thickness: f64,
     /// Kinetic friction coefficient (Coulomb).

@@ -6,8 +6,11 @@
 //! farther than the farthest of them, so that a pair at the distance d keeps at least (1 - 2 gamma) d > 0; nothing passes through.
 //! A plane between the two features of a pair says less: `hold` only stops what goes towards it.        (contact.17)
 //! Where it is known which way a vertex is about to go, it may go gamma reach off any part of that way.  (contact.20)
+//! What all do in common is done first: X is where that leads.                                            (contact.25)
 //!
-//! Source: [chen2025], whose bound is a ball; the planes and the ways are ours.
+//! Features that are neighbours at rest are left out as long as they are far from contact; their vertices may go less far off. (contact.24)
+//!
+//! Source: [chen2025], whose bound is a ball; the planes, the ways and the neighbours are ours.
 
 use super::crossing::crossings;
 use super::distance::{Nearest, edge_edge, point_triangle};
@@ -22,6 +25,11 @@ use std::sync::atomic::{AtomicU64, Ordering::Relaxed};
 pub const GAMMA: f64 = 0.45;
 /// Least remaining distance, relative to the distance from the origin: below it, planes would be noise.
 const LEAST: f64 = 64.0 * f64::EPSILON;
+/// How near neighbours must come to be a pair, over the distance of their contact, and over the whole thickness. The latter, as what vertices of
+/// those left out may go is a ball.
+const LEFT_OUT: (f64, f64) = (1.5, 0.25);
+/// Least distance of pairs that are held along a common way, relative to that from the origin: places there are rounded to single precision.
+const LEAST_ALONG: f64 = 64.0 * Real::EPSILON as f64;
 /// Leaves per task.
 const TASK: usize = 32;
 /// Vertices per task.
@@ -67,9 +75,18 @@ pub struct Held {
 #[derive(Debug, Default)]
 pub struct Detector {
     reach: f64,
+    /// Where vertices were, their predicted displacements, and what they have in common of these; the latter two are empty if none.
+    start: Vec<Vector>,
+    predicted: Vec<Vector>,
+    common: Vec<Vector>,
+    /// Where the common displacements lead, and those beside them.
     at: Vec<Vector>,
-    /// Predicted displacements of the vertices; empty if none.
     ways: Vec<Vector>,
+    /// The longest of them [m].
+    longest: f64,
+    /// How far off its way each vertex may go, over gamma: the reach, or less beside neighbours that are left out [m]. Bits of numbers that
+    /// are not negative, which sort like them.
+    radius: Vec<AtomicU64>,
     points: Tree,
     edges: Tree,
     triangles: Tree,
@@ -77,8 +94,8 @@ pub struct Detector {
     bounds: Vec<f64>,
     /// Vertices that may be on the wrong side of something: pairs with one on each side are left alone.
     loose: Vec<bool>,
-    /// Pairs of each vertex: those of v are `lists[start[v]..start[v + 1]]`. Empty until `hold` needs them.
-    start: Vec<u32>,
+    /// Pairs of each vertex: those of v are `lists[first[v]..first[v + 1]]`. Empty until `hold` needs them.
+    first: Vec<u32>,
     lists: Vec<u32>,
     /// Workspace of `hold`: vertices that went too far, and the plane of each pair.
     far: Vec<bool>,
@@ -108,32 +125,53 @@ impl Detector {
         &self.bounds
     }
 
-    /// Former positions of the vertices [m].
+    /// Former positions of the vertices, moved along with what they have in common [m].
     pub fn at(&self) -> &[Vector] {
         &self.at
     }
 
     /// Finds all pairs of features nearer than `reach` [m]. `x` has a row for each vertex of the topology, at least.
     pub fn detect(&mut self, topology: &Topology, x: &[Row], reach: f64) {
-        self.detect_along(topology, x, &[], reach);
+        self.detect_along(topology, x, &[], &[], reach);
     }
 
     /// Finds all pairs of features that could come nearer than `reach` [m] while each vertex goes some part of its way [m]; without
-    /// ways, none moves. Rows of both for each vertex of the topology, at least.
-    pub fn detect_along(&mut self, topology: &Topology, x: &[Row], ways: &[Vector], reach: f64) {
+    /// ways, none moves. `common` is the part of them that all are sure to go together, see `common_ways`; none of it if empty. Rows of all for
+    /// each vertex of the topology, at least. Neighbours at rest that stay away from contact are no pairs.
+    pub fn detect_along(&mut self, topology: &Topology, x: &[Row], ways: &[Vector], common: &[Vector], reach: f64) {
         self.reach = if reach.is_finite() { reach.max(0.0) } else { 0.0 };
-        self.start.clear();
+        self.first.clear();
         self.pairs.clear();
         let n = topology.vertices();
         if x.len() < n || ways.len() < n && !ways.is_empty() {
             self.bounds = vec![0.0; n];
             return;
         }
-        self.at.resize(n, Vector::default());
-        chunks(&mut self.at, |start, at| at.iter_mut().zip(&x[start..]).for_each(|(p, x)| *p = xyz64(*x)));
+        self.start.resize(n, Vector::default());
+        chunks(&mut self.start, |start, at| at.iter_mut().zip(&x[start..]).for_each(|(p, x)| *p = xyz64(*x)));
         // A way that is not finite is none.
-        self.ways.clear();
-        self.ways.extend(ways.iter().take(n).map(|w| if w.norm_sq().is_finite() { *w } else { Vector::default() }));
+        let finite = |w: &Vector| if w.norm_sq().is_finite() { *w } else { Vector::default() };
+        self.predicted.clear();
+        self.predicted.extend(ways.iter().take(n).map(finite));
+        self.common.clear();
+        if common.len() >= n && !ways.is_empty() {
+            self.common.extend(common.iter().take(n).map(finite));
+        }
+        self.find(topology);
+    }
+
+    /// Finds them beside the common displacements.
+    fn find(&mut self, topology: &Topology) {
+        let n = topology.vertices();
+        self.first.clear();
+        self.pairs.clear();
+        self.at.clone_from(&self.start);
+        self.ways.clone_from(&self.predicted);
+        self.at.iter_mut().zip(&self.common).for_each(|(p, common)| *p = *p + *common);
+        self.ways.iter_mut().zip(&self.common).for_each(|(w, common)| *w = *w - *common);
+        self.longest = self.ways.iter().map(|w| w.norm_sq()).fold(0.0, f64::max).sqrt();
+        self.radius.clear();
+        self.radius.resize_with(n, || AtomicU64::new(self.reach.to_bits()));
         self.fit(topology);
         let point_triangle = self.with_triangles(topology);
         let edge_edge = self.with_edges(topology);
@@ -210,8 +248,8 @@ impl Detector {
         rest: impl Fn(&[Vector]) -> f64,
         found: &mut Vec<Pair>,
     ) {
-        let far = self.ways.is_empty() && near.distance_sq >= self.reach * self.reach;
-        if far || near.distance_sq.is_nan() || self.is_tangled(kind, vertices) {
+        let far = self.reach + 2.0 * self.longest;
+        if near.distance_sq >= far * far || near.distance_sq.is_nan() || self.is_tangled(kind, vertices) {
             return;
         }
         let distance = near.distance_sq.sqrt();
@@ -225,7 +263,16 @@ impl Detector {
             };
         }
         let n = n.tamed().normalized();
-        if !n.norm_sq().is_finite() || distance - self.approach(kind, vertices, n) >= self.reach {
+        let left = distance - self.approach(kind, vertices, n);
+        if !n.norm_sq().is_finite() || left >= self.reach {
+            return;
+        }
+        let (thickness, whole) = match topology.neighbours(vertices, w, self.reach) {
+            Some((thickness, whole)) => (thickness, whole),
+            None => (topology.thickness(vertices[0], vertices[3], rest), f64::INFINITY),
+        };
+        if left >= (LEFT_OUT.0 * thickness).max(LEFT_OUT.1 * whole) {
+            lower(&self.radius, vertices, left);
             return;
         }
         found.push(Pair {
@@ -234,7 +281,7 @@ impl Detector {
             weights: [w[0] as Real, w[1] as Real, w[2] as Real, w[3] as Real],
             normal: [n.x as Real, n.y as Real, n.z as Real],
             distance: distance as Real,
-            thickness: topology.thickness(vertices[0], vertices[3], rest) as Real,
+            thickness: thickness as Real,
         });
     }
 
@@ -273,27 +320,25 @@ impl Detector {
         LEAST * p.x.abs().max(p.y.abs()).max(p.z.abs())
     }
 
+    /// How far off its way a vertex may go, over gamma [m].
+    #[inline(always)]
+    fn radius(&self, v: usize) -> f64 {
+        f64::from_bits(self.radius[v].load(Relaxed))
+    }
+
     /// The bound of each vertex. Distances that are not negative sort like their bits.
     fn bound(&mut self, n: usize) {
-        self.nearest.clear();
         let way = |v: usize| self.ways.get(v).map_or(0.0, |w| w.norm() / GAMMA);
-        self.nearest.extend((0..n).map(|v| AtomicU64::new((self.reach + way(v)).to_bits())));
-        let nearest = &self.nearest;
+        let nearest = (0..n).map(|v| AtomicU64::new((self.radius(v) + way(v)).to_bits())).collect();
+        self.nearest = nearest;
         let this = &*self;
-        let lower = |pair: &Pair| {
-            let d = (usable(pair) - this.least(pair)).max(0.0).to_bits();
-            for v in pair.vertices {
-                if nearest[v as usize].load(Relaxed) > d {
-                    nearest[v as usize].fetch_min(d, Relaxed);
-                }
-            }
-        };
+        let lower = |pair: &Pair| lower(&this.nearest, pair.vertices, (usable(pair) - this.least(pair)).max(0.0));
         this.pairs.chunks(CHUNK).in_parallel(|pairs| pairs.iter().for_each(lower));
         self.bounds.clear();
         self.bounds.extend(self.nearest.iter().map(|d| GAMMA * f64::from_bits(d.load(Relaxed))));
     }
 
-    /// Holds back every vertex that went too far from where it was when pairs were found: to gamma times the reach off its way, and
+    /// Holds back every vertex that went too far from where it was when pairs were found: to gamma times its radius off its way, and
     /// to its side of a plane between the features of each of its pairs. What goes along or away from a plane is not held back. As
     /// long as all positions since pairs were found have passed through here, or lie between ones that have, nothing has met.
     pub fn hold(&mut self, topology: &Topology, x: &mut [Row]) -> Held {
@@ -301,27 +346,76 @@ impl Detector {
         if x.len() < n || self.at.len() < n {
             return Held::default();
         }
+        if !self.far(x) {
+            return Held::default();
+        }
+        if self.common.is_empty() {
+            return self.hold_those(topology, x);
+        }
+        let mut along = x.to_vec();
+        let held = self.hold_those(topology, &mut along);
+        if held.held == 0 {
+            return held;
+        }
+        // Who is stopped by something else does not go along, and is held to where it was. Of both, what changes less.
+        let changed = |to: &[Row]| to.iter().zip(&*x).map(|(a, b)| (xyz64(*a) - xyz64(*b)).norm_sq()).sum::<f64>();
+        let size = self.at.iter().map(|p| p.norm_sq()).filter(|d| d.is_finite()).fold(0.0, f64::max).sqrt();
+        // The places that vertices are held to along the way are rounded.
+        let rounded = self.pairs.iter().any(|pair| f64::from(pair.distance) < LEAST_ALONG * size);
+        let mut there = self.at_start(topology);
+        let mut back = x.to_vec();
+        let otherwise = if there.far(&back) { there.hold_those(topology, &mut back) } else { Held::default() };
+        if rounded || changed(&back) <= changed(&along) {
+            *self = there;
+            x.copy_from_slice(&back);
+            return otherwise;
+        }
+        self.swap_lasting(&mut there);
+        x.copy_from_slice(&along);
+        held
+    }
+
+    /// One that has found pairs from where vertices were, without what they have in common.
+    fn at_start(&mut self, topology: &Topology) -> Self {
+        let mut other = Self { reach: self.reach, ..Self::default() };
+        other.swap_lasting(self);
+        other.find(topology);
+        other
+    }
+
+    /// Swaps what does not depend on the common motion.
+    fn swap_lasting(&mut self, other: &mut Self) {
+        std::mem::swap(&mut self.start, &mut other.start);
+        std::mem::swap(&mut self.predicted, &mut other.predicted);
+        std::mem::swap(&mut self.loose, &mut other.loose);
+        std::mem::swap(&mut self.points, &mut other.points);
+        std::mem::swap(&mut self.edges, &mut other.edges);
+        std::mem::swap(&mut self.triangles, &mut other.triangles);
+    }
+
+    /// Finds the vertices that went too far, and says whether there are any.
+    fn far(&mut self, x: &[Row]) -> bool {
         let mut far = std::mem::take(&mut self.far);
-        far.resize(n, false);
+        far.resize(self.at.len(), false);
         let is_far = |v: usize| {
             let way = xyz64(x[v]) - self.at[v];
-            let (length_sq, radius) = (way.norm_sq(), GAMMA * self.reach);
+            let (length_sq, radius) = (way.norm_sq(), GAMMA * self.radius(v));
             let off = || !self.ways.is_empty() && (way - self.on_way(v, way)).norm_sq() > radius * radius;
             // Non-finite values are left for other checks to find.
             length_sq.is_finite() && (length_sq > self.bounds[v] * self.bounds[v] || off())
         };
         chunks(&mut far, |start, far| far.iter_mut().enumerate().for_each(|(k, far)| *far = is_far(start + k)));
-        let held = if far.iter().any(|far| *far) { self.hold_those(topology, x, &far) } else { Held::default() };
         self.far = far;
-        held
+        self.far.iter().any(|far| *far)
     }
 
-    fn hold_those(&mut self, topology: &Topology, x: &mut [Row], far: &[bool]) -> Held {
-        if self.start.is_empty() {
-            self.list(far.len());
+    fn hold_those(&mut self, topology: &Topology, x: &mut [Row]) -> Held {
+        if self.first.is_empty() {
+            self.list(self.far.len());
         }
         let mut chosen = std::mem::take(&mut self.chosen);
         chosen.resize(self.pairs.len(), Plane::default());
+        let far = &*self.far;
         // Planes towards which the ways lead that are there before anyone is held: all sides of a pair must see the same one.
         let ways: &[Row] = x;
         chunks(&mut chosen, |start, chosen| {
@@ -350,14 +444,14 @@ impl Detector {
     }
 
     fn hold_one(&self, v: usize, x: &mut Row, chosen: &[Plane]) -> bool {
-        let lists = &self.lists[self.start[v] as usize..self.start[v + 1] as usize];
+        let lists = &self.lists[self.first[v] as usize..self.first[v + 1] as usize];
         let wall = |i: &u32| {
             let pair = &self.pairs[*i as usize];
             let place = pair.vertices.iter().position(|u| *u as usize == v).unwrap_or(0);
             chosen[*i as usize].wall(pair, place)
         };
         let walls: Vec<Wall> = lists.iter().map(wall).collect();
-        let radius = GAMMA * self.reach;
+        let radius = GAMMA * self.radius(v);
         let inside = |c: Vector| (c - self.on_way(v, c)).norm_sq() <= radius * radius && walls.iter().all(|w| w.allows(c));
         let way = xyz64(*x) - self.at[v];
         if inside(way) {
@@ -462,14 +556,14 @@ impl Detector {
 
     /// The pairs of each vertex.
     fn list(&mut self, n: usize) {
-        self.start.resize(n + 1, 0);
+        self.first.resize(n + 1, 0);
         for v in self.pairs.iter().flat_map(|p| p.vertices) {
-            self.start[v as usize + 1] += 1;
+            self.first[v as usize + 1] += 1;
         }
         for v in 0..n {
-            self.start[v + 1] += self.start[v];
+            self.first[v + 1] += self.first[v];
         }
-        let mut next = self.start.clone();
+        let mut next = self.first.clone();
         self.lists.clear();
         self.lists.resize(4 * self.pairs.len(), 0);
         for (i, p) in self.pairs.iter().enumerate() {
@@ -477,6 +571,17 @@ impl Detector {
                 self.lists[next[v as usize] as usize] = i as u32;
                 next[v as usize] += 1;
             }
+        }
+    }
+}
+
+/// Lowers the numbers of vertices to a distance [m].
+#[inline(always)]
+fn lower(of: &[AtomicU64], vertices: [u32; 4], distance: f64) {
+    let d = distance.to_bits();
+    for v in vertices {
+        if of[v as usize].load(Relaxed) > d {
+            of[v as usize].fetch_min(d, Relaxed);
         }
     }
 }

@@ -4,6 +4,7 @@
 //! A solver finds pairs (`Detector::detect`), moves vertices, holds them back where they went too far (`Detector::hold`), and
 //! finds pairs anew where many were held. `intersections` and `crossed` are the judges. docs/theory/contact.md.
 
+mod common;
 mod crossing;
 mod detect;
 mod distance;
@@ -12,6 +13,7 @@ mod tangle;
 mod topology;
 mod tree;
 
+pub use common::common_ways;
 pub use crossing::{crossed, intersections, passes, tangled};
 pub use detect::{Detector, GAMMA, Held, Pair, PairKind, truncate};
 pub use distance::{Nearest, edge_edge, point_triangle};

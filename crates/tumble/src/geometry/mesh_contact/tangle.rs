@@ -9,7 +9,7 @@
 //! Source: [volino2006].   Differs: the parts of edge and triangle stand apart, which makes the gradient exact; the ways are its
 //! sums over connected lines.
 
-use super::topology::Topology;
+use super::topology::{Topology, root};
 use crate::geometry::Vector;
 use crate::math::{Row, xyz64};
 
@@ -125,13 +125,6 @@ pub fn contour(topology: &Topology, x: &[Row], crossings: &[(u32, u32)]) -> (f64
 /// The number of vertices that hang together with each vertex without the edges that cross something, and which ones they are.
 fn parts(topology: &Topology, crossings: &[(u32, u32)]) -> (Vec<u32>, Vec<u32>) {
     let mut part: Vec<u32> = (0..topology.vertices() as u32).collect();
-    fn root(part: &mut [u32], mut v: u32) -> u32 {
-        while part[v as usize] != v {
-            part[v as usize] = part[part[v as usize] as usize];
-            v = part[v as usize];
-        }
-        v
-    }
     for (e, [a, b]) in topology.edges.iter().enumerate() {
         let first = crossings.partition_point(|c| (c.0 as usize) < e);
         if crossings.get(first).is_none_or(|c| c.0 as usize != e) {

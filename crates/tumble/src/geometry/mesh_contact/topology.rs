@@ -31,12 +31,30 @@ pub struct Topology {
     /// The first corner of what is no soft object.
     first_corner: Option<u32>,
     rest: Vec<Vector>,
+    /// Of each vertex there, its normal, zero where there is no surface; and the smallest vertex that edges and seams connect it to.
+    normals: Vec<Vector>,
+    piece: Vec<u32>,
     /// Triangles at each edge: those of edge e are `wings[wing[e]..wing[e + 1]]`.
     wing: Vec<u32>,
     wings: Vec<u32>,
 }
 
 const NOBODY: u32 = u32::MAX;
+
+/// The distance at which neighbours touch, over their distance at rest. In a fold as tight as the thickness allows, half a circle, places come as
+/// near as 2/pi of that.
+const NEIGHBOURS: f64 = 0.5;
+/// The largest square of the sine of the angle between a surface and the way to a neighbour: 45°.
+const STEEP: f64 = 0.5;
+
+/// The smallest of the vertices that are connected; shortens the way there.
+pub(super) fn root(parent: &mut [u32], mut v: u32) -> u32 {
+    while parent[v as usize] != v {
+        parent[v as usize] = parent[parent[v as usize] as usize];
+        v = parent[v as usize];
+    }
+    v
+}
 
 impl Topology {
     /// Nothing yet, over so many vertices.
@@ -121,9 +139,24 @@ impl Topology {
     }
 
     /// The state without stress: features of one object that are nearer than its thickness there, as in a fine mesh, touch only
-    /// when they are nearer than that. `x` has a row for each vertex, else there is none.
+    /// when they are nearer than that, and neighbours in one surface only when nearer than half of it. `x` has a row for each vertex, else there
+    /// is none. Last, after objects and seams.
     pub fn set_rest(&mut self, x: &[Row]) {
         self.rest = if x.len() == self.vertices { x.iter().map(|r| xyz64(*r)).collect() } else { Vec::new() };
+        let rest = &self.rest;
+        self.normals = vec![Vector::default(); rest.len()];
+        for t in self.triangles.iter().filter(|_| !rest.is_empty()) {
+            let [a, b, c] = t.map(|v| rest[v as usize]);
+            let n = (b - a).cross(c - a);
+            t.iter().for_each(|v| self.normals[*v as usize] = self.normals[*v as usize] + n);
+        }
+        self.normals.iter_mut().for_each(|n| *n = n.tamed().normalized());
+        self.piece = self.weld.clone();
+        for [a, b] in &self.edges {
+            let (a, b) = (root(&mut self.piece, *a), root(&mut self.piece, *b));
+            self.piece[a.max(b) as usize] = a.min(b);
+        }
+        (0..self.piece.len() as u32).for_each(|v| self.piece[v as usize] = root(&mut self.piece, v));
     }
 
     /// Vertices in any feature, in order.
@@ -200,6 +233,27 @@ impl Topology {
             }
         }
         share
+    }
+
+    /// Of features that are neighbours in one surface, or along one curve, the distance [m] at which they touch, and that at which others do:
+    ///
+    ///   c = min(thickness, |Σ w_i X_i|/2)                                               (contact.24)
+    ///
+    /// with the weights of the places that are nearest now. At rest the way between these is less than `reach` or two thicknesses long, and
+    /// leads along the surface rather than through it.
+    #[inline(always)]
+    pub(super) fn neighbours(&self, v: [u32; 4], w: [f64; 4], reach: f64) -> Option<(f64, f64)> {
+        let (a, b) = (v[0] as usize, v[3] as usize);
+        if self.rest.is_empty() || self.owner[a] != self.owner[b] || self.piece[a] != self.piece[b] {
+            return None;
+        }
+        let at = |k: usize| self.rest[v[k] as usize] * w[k];
+        let way = at(0) + at(1) + at(2) + at(3);
+        let (length_sq, whole) = (way.norm_sq(), 2.0 * self.owners[self.owner[a] as usize].radius);
+        let far = reach.max(whole / NEIGHBOURS);
+        let through = way.dot(self.normals[a]).abs().max(way.dot(self.normals[b]).abs());
+        let along = length_sq < far * far && through * through <= STEEP * length_sq;
+        along.then(|| (whole.min(NEIGHBOURS * length_sq.sqrt()), whole))
     }
 
     /// The distance [m] at which two features touch; `rest` finds that of the same features at rest.

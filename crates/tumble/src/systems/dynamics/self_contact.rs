@@ -8,17 +8,18 @@ use super::core::Core;
 use super::feature::{Feature, Span};
 use super::solid_features::SolidFeatures;
 use super::tear::Tear;
-use crate::geometry::mesh_contact::{Detector, Owner, Pair, Topology, crossed, tangled, untangle_directions};
+use crate::geometry::mesh_contact::{Detector, Owner, Pair, Topology, common_ways, crossed, tangled, untangle_directions};
 use crate::geometry::{Collider, Friction, Vector};
 use crate::math::{Real, Row, Vec3, axpy, row, sub, xyz, xyz64};
 use crate::state::{Object, State};
+use std::ops::Range;
 use std::sync::Arc;
 use tumble_interface::engine::StepReport;
 use tumble_interface::scene;
 use tumble_interface::warning::{Code, Warning};
 
 /// Pairs are looked for along the ways that vertices are about to go, within the thickness and this many times the way of the fastest
-/// one in a sub-step: elements turn vertices off their ways.
+/// one in a sub-step, beside what it has in common with all near it: elements turn vertices off their ways.
 const ASIDE: f64 = 0.5;
 /// That reach over the thickness, at least and at most.
 const REACH: (f64, f64) = (1.5, 8.0);
@@ -35,6 +36,8 @@ pub struct SelfContact {
     friction: Friction,
     thickness: f64,
     sewn: Vec<[u32; 2]>,
+    /// Points of each object that meets others, and the corners of solids.
+    parts: Vec<Range<usize>>,
     /// Places at the start, for surfaces that tear.
     rest: Vec<Row>,
     /// Displacements of vertices predicted for a sub-step [m].
@@ -81,12 +84,14 @@ impl SelfContact {
             friction: Friction { sliding: words.friction, resting: words.friction_static.unwrap_or(words.friction) },
             thickness: words.thickness,
             sewn: sewn.to_vec(),
+            parts: objects.iter().filter(|o| o.stream.is_none()).map(|o| o.points.clone()).collect(),
             rest: features.joined(&state.x, 0.0).into_owned(),
             ways: Vec::new(),
             old: Vec::new(),
             features,
         };
         contact.rest.truncate(contact.features.vertices());
+        contact.parts.push(points..contact.features.vertices());
         contact.topology = contact.meeting(objects, &[]);
         let soft = contact.topology.points().first().is_some_and(|i| (*i as usize) < points);
         soft.then_some(contact)
@@ -299,10 +304,13 @@ impl Feature for SelfContact {
         self.ways.extend(x.iter().zip(v).map(|(x, v)| (xyz64(*v) + if x[3] > 0.0 { gravity } else { Vector::default() }) * step.h));
         self.features.place(step);
         self.ways.extend(self.features.ways());
-        let farthest = self.ways.iter().map(|w| w.norm_sq()).fold(0.0, f64::max).sqrt();
         let thickness = self.topology.largest_thickness();
+        let start = self.features.at_start(x);
+        let common = common_ways(&self.parts, &start, &self.ways, REACH.1 * thickness);
+        let beside = |(v, w): (usize, &Vector)| (*w - common.get(v).copied().unwrap_or_default()).norm_sq();
+        let farthest = self.ways.iter().enumerate().map(beside).fold(0.0, f64::max).sqrt();
         let reach = (thickness + ASIDE * farthest).clamp(REACH.0 * thickness, REACH.1 * thickness);
-        self.detector.detect_along(&self.topology, &self.features.at_start(x), &self.ways, reach);
+        self.detector.detect_along(&self.topology, &start, &self.ways, &common, reach);
         self.features.run_belts(step);
     }
 
