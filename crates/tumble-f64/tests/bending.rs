@@ -54,7 +54,7 @@ fn chord(mut sim: Simulation, cell: f64, length: f64) -> f64 {
 fn a_strip_of_a_sheet_hangs_alike_in_cells_of_any_shape() {
     for (gamma, exact) in GAMMA {
         for words in ["hinge = 1e-4\nmembrane = { warp = 3000 }", "fabric = { path = \"it\" }", "fabric = { path = \"it\", angle = 30 }"] {
-            for (n, m, aspect) in [(16, 5, 1.0), (16, 2, 1.0), (16, 3, 3.0), (16, 4, 0.3), (24, 3, 2.0), (8, 3, 0.5)] {
+            for (n, m, aspect) in [(16, 5, 1.0), (16, 2, 1.0), (16, 3, 3.0), (16, 4, 0.3), (24, 3, 2.0), (8, 3, 0.5), (12, 3, 40.0)] {
                 let cell = length(gamma) / (f64::from(n) + 0.5);
                 let pins: Vec<String> = (0..2).flat_map(|i| (0..m).map(move |j| format!("\"vertex {i} {j}\""))).collect();
                 let text = format!(
@@ -123,7 +123,10 @@ fn a_strip_of_a_net_hangs_alike_with_any_triangles() {
             let found = chord(simulate(&text, &mesh, fabric([B; 3])), cell, 16.5 * cell);
             println!("{words:?}, {kind}, jitter {jitter}: {:+.3} %", 100.0 * (found / exact - 1.0));
             // The sides of rows of equilateral triangles are zigzags, which bend a little more easily, as do uneven meshes.
-            assert!((found / exact - 1.0).abs() < if kind == "equilateral" { 0.04 } else { 0.02 }, "{words} {kind} {jitter}: {found} {exact}");
+            assert!(
+                (found / exact - 1.0).abs() < if kind == "equilateral" { 0.04 } else { 0.02 },
+                "{words} {kind} {jitter}: {found} {exact}"
+            );
         }
     }
 }

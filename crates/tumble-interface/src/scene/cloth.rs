@@ -35,12 +35,13 @@ pub struct Cloth {
     /// Spring families, modulus in N/m: `structural` along edges, `bend` across them. Default: structural 500 with damping 0.5.
     #[serde(default)]
     pub links: Option<Links>,
-    /// Dihedral bending stiffness between neighbouring triangles. Default: 1e-5, or 0 with a fabric.
+    /// Bending stiffness of a plate without Poisson's ratio, the same on triangles of any shape; at rest its panels are flat. Default: 1e-5, or 0 with a
+    /// fabric.
     #[serde(default)]
     #[schemars(range(min = 0.0), extend("x-unit" = "N m"))]
     pub hinge: Option<f64>,
-    /// Additional bending stiffness, quadratic in the positions and flat at rest for any mesh: cheaper than a hinge, and equal to it for inextensible
-    /// surfaces.
+    /// Additional bending stiffness, quadratic in the positions and flat at rest for any mesh: cheaper than `hinge`, and equal to it for inextensible
+    /// surfaces of equilateral triangles.
     #[serde(default)]
     #[schemars(range(min = 0.0), extend("x-unit" = "N m"))]
     pub isometric: f64,
@@ -81,7 +82,7 @@ impl Cloth {
         given_or(&self.links, self.membrane.is_some() || self.fabric.is_some(), cloth_links)
     }
 
-    /// Its dihedral bending stiffness [N m].
+    /// Its bending stiffness [N m].
     pub fn hinge(&self) -> f64 {
         self.hinge.unwrap_or(if self.fabric.is_some() { 0.0 } else { 1e-5 })
     }

@@ -334,11 +334,11 @@ pub struct Sheet {
     /// Spring families, modulus in N/m. Default: structural 500, shear 200 and bend 10.
     #[serde(default)]
     pub links: Option<Links>,
-    /// Dihedral bending stiffness between neighbouring triangles.
+    /// Bending stiffness of a plate without Poisson's ratio, the same on triangles of any shape; at rest it is flat.
     #[serde(default)]
     #[schemars(range(min = 0.0), extend("x-unit" = "N m"))]
     pub hinge: f64,
-    /// Additional isotropic plate bending stiffness; quadratic in the positions, cheaper than hinges, and exact for inextensible sheets.
+    /// Additional isotropic plate bending stiffness; quadratic in the positions, cheaper than `hinge`, and exact for inextensible sheets.
     #[serde(default)]
     #[schemars(range(min = 0.0), extend("x-unit" = "N m"))]
     pub isometric: f64,
@@ -456,12 +456,13 @@ pub struct Net {
     /// Spring families, modulus in N/m: `structural` along edges, `bend` across them. Default: structural 500 and bend 10.
     #[serde(default)]
     pub links: Option<Links>,
-    /// Dihedral bending stiffness between neighbouring triangles.
+    /// Bending stiffness of a plate without Poisson's ratio, the same on triangles of any shape; at rest it is bent as it is made, or flat if it has a
+    /// pattern.
     #[serde(default)]
     #[schemars(range(min = 0.0), extend("x-unit" = "N m"))]
     pub hinge: f64,
-    /// Additional bending stiffness, quadratic in the positions and flat at rest for any mesh: cheaper than a hinge, and equal to it for inextensible
-    /// surfaces.
+    /// Additional bending stiffness, quadratic in the positions and flat at rest for any mesh: cheaper than `hinge`, and equal to it for inextensible
+    /// surfaces of equilateral triangles.
     #[serde(default)]
     #[schemars(range(min = 0.0), extend("x-unit" = "N m"))]
     pub isometric: f64,

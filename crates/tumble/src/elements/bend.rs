@@ -6,7 +6,7 @@ use crate::math::{Lane, Vec3};
 /// Bending of one triangle, x0 x1 x2 counter-clockwise, with the N - 3 triangles beside it: x3 lies across the edge x0 x1, x4 across x1 x2, x5
 /// across x2 x0. Their folds give its curvature, as three edges determine a quadratic surface:
 ///
-///   t_i = 2 sin(theta_i/2) - t0_i,   r = L t,   L^T L = G^T D G,   G t = (kxx, kyy, kxy)         (bending.1, bending.6)
+///   t_i = 2 sin(theta_i/2) - t0_i,   r = L t,   L^T L = A G^T D G/B,   G t = (kxx, kyy, kxy)     (bending.1, bending.6)
 ///
 /// ```text
 ///         x5---x2---x4       theta_i is the angle between the normals of both sides of an edge, 0 when flat.
@@ -15,7 +15,7 @@ use crate::math::{Lane, Vec3};
 ///             \  /
 ///              x3
 /// ```
-/// x [m]   L [1/m]   k = B A [N m m²].   Rest: L by rows, one column for each edge that has a neighbour; t0.
+/// x [m]   L [1]   k = B [N m].   A is the area at rest.   Rest: L by rows, one column for each edge that has a neighbour; t0.
 /// No trigonometry, smooth through flat, and bounded: |t + t0| <= 2.
 /// Degenerate: folded onto itself (theta = pi) the side of a fold, and with it the sign of t + t0, is anyone's guess. A triangle without area
 /// or an edge without length has no normal and folds nothing.

@@ -66,8 +66,8 @@ pub trait Constraints: Send + Sync {
     fn leans(&self) -> Option<usize> {
         None
     }
-    /// The rows of a body whose shape is matched, and the share of the way to it that a sub-step of length h [s] takes.
-    fn matched(&self, _h: f64) -> Option<(Range<usize>, f64)> {
+    /// The rows of a body whose shape is matched, and the share of the way to it that a sub-step of length h [s] takes; of plain elements, `plain`.
+    fn matched(&self, _h: f64, _plain: Option<f64>) -> Option<(Range<usize>, f64)> {
         None
     }
     /// Potential energy [J], zero at rest; nothing of rigid elements.

@@ -4,11 +4,11 @@ use super::{Element, force, point};
 use crate::geometry::Vector;
 use crate::math::Lane;
 
-/// The flat hinge. Edge x0 x1, opposite vertices x2 and x3, as for the dihedral hinge; the K_i are the slopes of its angle where it is flat:
+/// The flat hinge. Edge x0 x1, opposite vertices x2 and x3, as for a fold (bending.1); the K_i are the slopes of its angle where it is flat:
 ///
 ///   r = sum_i K_i x_i,   sum_i K_i = 0                               (bending.10)
 ///
-/// x [m]   K [1/m]   k [N m].   Without stretch |r| = 2 sin(theta/2), so that its energy is that of the dihedral hinge at every angle; its
+/// x [m]   K [1/m]   k [N m].   Without stretch |r| = 2 sin(theta/2), so that its energy is that of a fold at every angle; its
 /// Hessian is constant. Three masses in a row are such a hinge, too: K_1 = 0 (bending.11). Rest: K_1, K_2, K_3.
 /// Source: [bergou2006], eq. 3. Differs: the factor, see docs/theory/bending.md.
 pub struct IsometricBend;

@@ -134,7 +134,7 @@ pub fn cloth(site: &mut Site<'_>, thing: &Cloth) {
             isometric: thing.isometric,
             membrane: thing.membrane.as_ref(),
             fabric: fabric.clone(),
-                area: thing.area,
+            area: thing.area,
         };
         let rest = Rest::mesh(&own, Vector { x: 1.0, y: 0.0, z: 0.0 });
         site.bending(&own, at, &words, &rest);

@@ -141,7 +141,7 @@ struct Beside {
 }
 
 /// Pivots below this, of 1, leave a curvature undetermined: the six points lie nearly on one conic.
-const UNDETERMINED: f64 = 4e-3;
+const UNDETERMINED: f64 = 1e-5;
 
 /// A triangle at rest with those beside it, laid into its plane.
 #[derive(Clone)]
@@ -356,8 +356,8 @@ impl Site<'_> {
             // W = B/2 (kxx² + kyy² + 2 kxy²): (bending.13).
             let d = [1.0, 1.0, 2.0];
             for (patch, g, area) in patch.curvatures(d) {
-                let l = std::array::from_fn(|i| d[i / 3].sqrt() * g[i]);
-                self.parts.bending(&patch.all(first), numbers(l, &patch), words.hinge * area);
+                let l = std::array::from_fn(|i| (area * d[i / 3]).sqrt() * g[i]);
+                self.parts.bending(&patch.all(first), numbers(l, &patch), words.hinge);
             }
         }
         if let Some((fabric, rows)) = words.fabric.as_ref().and_then(|f| Some((f, f.rows()?))) {

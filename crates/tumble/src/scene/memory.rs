@@ -80,12 +80,12 @@ pub fn masses(scene: &Scene, assets: &Assets) -> f64 {
     }
     for thing in &scene.sheet {
         let n: f64 = thing.resolution.iter().map(|n| f64::from(*n)).product();
-        // Three edges and two triangles a mass; a hinge has the size of three links.
+        // Three edges and two triangles a mass; one that bends has the size of six links.
         let each = |there: bool, links: f64| if there { links } else { 0.0 };
-        let elements = each(thing.hinge > 0.0, 9.0)
+        let elements = each(thing.hinge > 0.0, 12.0)
             + each(thing.isometric > 0.0, 9.0)
             + each(thing.membrane.is_some(), 6.0)
-            + each(thing.fabric.is_some(), 20.0)
+            + each(thing.fabric.is_some(), 30.0)
             + each(thing.area > 0.0, 4.0);
         bytes += n * (MASS + (4.0 + diagonals(&thing.links().diagonals) + elements) * LINK + factors(&thing.system, FACTORS[1]));
     }
@@ -98,7 +98,7 @@ pub fn masses(scene: &Scene, assets: &Assets) -> f64 {
         let factor = factors(&thing.system, FACTORS[2] * (edges[0] * edges[1]).sqrt());
         bytes += n * (MASS + links * LINK + solids * TETRAHEDRON + factor);
     }
-    let woven = |there: bool| if there { 35.0 } else { 15.0 };
+    let woven = |there: bool| if there { 45.0 } else { 18.0 };
     for (thing, mesh) in scene.net.iter().filter_map(|thing| Some((thing, assets.get(&thing.mesh.path)?))) {
         bytes += mesh.vertices.len() as f64 * (MASS + woven(thing.fabric.is_some()) * LINK + factors(&thing.system, FACTORS[1]));
     }

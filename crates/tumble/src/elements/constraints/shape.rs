@@ -158,8 +158,9 @@ impl Constraints for Shape {
         self.rows.clone().skip(1).for_each(|i| join(self.rows.start as u32, i as u32));
     }
 
-    fn matched(&self, h: f64) -> Option<(Range<usize>, f64)> {
-        Some((self.rows.clone(), 1.0 / (1.0 + 1.0 / (self.kappa * h * h))))
+    fn matched(&self, h: f64, plain: Option<f64>) -> Option<(Range<usize>, f64)> {
+        let share = plain.unwrap_or_else(|| 1.0 / (1.0 + 1.0 / (self.kappa * h * h)));
+        Some((self.rows.clone(), share))
     }
 
     fn energy(&self, x: &[Row], _: Walls<'_>) -> f64 {

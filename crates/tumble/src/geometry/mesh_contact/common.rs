@@ -7,7 +7,6 @@
 
 use crate::geometry::Vector;
 use crate::math::{Row, xyz64};
-use std::ops::Range;
 
 /// The part of the longest way that may be left beside the common one: else it is not worth while.
 const LEFT: f64 = 0.5;
@@ -22,13 +21,13 @@ const AXES: [Vector; 3] = [Vector { x: 1.0, y: 0.0, z: 0.0 }, Vector { x: 0.0, y
 type Bounds = [Vector; 2];
 
 /// For each vertex, the part of its way that its neighbourhood has in common [m]: zero where that does not shorten the longest of them to less
-/// than half. `parts` are ranges of vertices; those that come nearer than `apart` [m] to each other in boxes are one neighbourhood. `x` and `ways`
+/// than half. `parts` are lists of vertices; those that come nearer than `apart` [m] to each other in boxes are one neighbourhood. `x` and `ways`
 /// have a row for each vertex of a part. Empty if there is nothing in common anywhere.
-pub fn common_ways(parts: &[Range<usize>], x: &[Row], ways: &[Vector], apart: f64) -> Vec<Vector> {
+pub fn common_ways(parts: &[&[u32]], x: &[Row], ways: &[Vector], apart: f64) -> Vec<Vector> {
     // Alone, each part would go along with itself; those that could meet on that way, or on their own, go together.
-    let mut groups: Vec<(Vec<Range<usize>>, Common, Bounds)> = Vec::new();
+    let mut groups: Vec<(Vec<u32>, Common, Bounds)> = Vec::new();
     for part in parts.iter().filter(|part| !part.is_empty()) {
-        let mut members = vec![part.clone()];
+        let mut members = part.to_vec();
         loop {
             let common = Common::of(&members, x, ways);
             let bounds = common.bounds(&members, x, ways, 0.5 * apart);
@@ -42,9 +41,13 @@ pub fn common_ways(parts: &[Range<usize>], x: &[Row], ways: &[Vector], apart: f6
     let mut all = Vec::new();
     for (members, common, _) in groups.iter().filter(|(_, common, _)| common.any) {
         all.resize(ways.len(), Vector::default());
-        members.iter().cloned().flatten().for_each(|v| all[v] = common.way(xyz64(x[v])));
+        vertices(members).for_each(|v| all[v] = common.way(xyz64(x[v])));
     }
     all
+}
+
+fn vertices(members: &[u32]) -> impl Iterator<Item = usize> {
+    members.iter().map(|v| *v as usize)
 }
 
 fn overlap(a: &Bounds, b: &Bounds) -> bool {
@@ -68,8 +71,8 @@ impl Common {
     }
 
     /// The best one for some vertices; none where it leaves much. What weighs nothing follows others, or does not.
-    fn of(members: &[Range<usize>], x: &[Row], ways: &[Vector]) -> Self {
-        let free = || members.iter().cloned().flatten().filter(|v| x[*v][3] > 0.0);
+    fn of(members: &[u32], x: &[Row], ways: &[Vector]) -> Self {
+        let free = || vertices(members).filter(|v| x[*v][3] > 0.0);
         let n = free().count() as f64;
         let mean = |f: &dyn Fn(usize) -> Vector| free().fold(Vector::default(), |sum, v| sum + f(v)) * (1.0 / n);
         let (centre, shift) = (mean(&|v| xyz64(x[v])), mean(&|v| ways[v]));
@@ -90,17 +93,16 @@ impl Common {
             Vector::default()
         };
         let common = Self { any: true, centre, shift, turn };
-        let longest =
-            |left: &dyn Fn(usize) -> Vector| members.iter().cloned().flatten().map(|v| left(v).norm_sq()).fold(0.0, f64::max).sqrt();
+        let longest = |left: &dyn Fn(usize) -> Vector| vertices(members).map(|v| left(v).norm_sq()).fold(0.0, f64::max).sqrt();
         let finite = (centre + shift + turn).norm_sq().is_finite();
         let any = finite && longest(&|v| ways[v] - common.way(xyz64(x[v]))) < LEFT * longest(&|v| ways[v]);
         Self { any, ..common }
     }
 
     /// A box around where vertices are, are about to go, and go in common.
-    fn bounds(&self, members: &[Range<usize>], x: &[Row], ways: &[Vector], beyond: f64) -> Bounds {
+    fn bounds(&self, members: &[u32], x: &[Row], ways: &[Vector], beyond: f64) -> Bounds {
         let mut bounds = [Vector { x: f64::MAX, y: f64::MAX, z: f64::MAX }, Vector { x: f64::MIN, y: f64::MIN, z: f64::MIN }];
-        for v in members.iter().cloned().flatten() {
+        for v in vertices(members) {
             let x = xyz64(x[v]);
             for p in [x, x + ways[v], x + self.way(x)] {
                 let each = |of: fn(f64, f64) -> f64, a: Vector| Vector { x: of(a.x, p.x), y: of(a.y, p.y), z: of(a.z, p.z) };

@@ -33,6 +33,8 @@ pub struct Topology {
     rest: Vec<Vector>,
     /// Of each vertex there, its normal, zero where there is no surface; and the smallest vertex that edges and seams connect it to.
     normals: Vec<Vector>,
+    /// Directions of curves at rest; zero in surfaces.
+    tangents: Vec<Vector>,
     piece: Vec<u32>,
     /// Triangles at each edge: those of edge e are `wings[wing[e]..wing[e + 1]]`.
     wing: Vec<u32>,
@@ -151,6 +153,16 @@ impl Topology {
             t.iter().for_each(|v| self.normals[*v as usize] = self.normals[*v as usize] + n);
         }
         self.normals.iter_mut().for_each(|n| *n = n.tamed().normalized());
+        self.tangents = vec![Vector::default(); rest.len()];
+        for [a, b] in self.edges.iter().filter(|_| !rest.is_empty()) {
+            let (a, b) = (*a as usize, *b as usize);
+            let along = rest[b] - rest[a];
+            for v in [a, b].into_iter().filter(|v| self.normals[*v].norm_sq() == 0.0) {
+                // Edges of a curve have the smaller vertex first.
+                self.tangents[v] = self.tangents[v] + along;
+            }
+        }
+        self.tangents.iter_mut().for_each(|t| *t = t.tamed().normalized());
         self.piece = self.weld.clone();
         for [a, b] in &self.edges {
             let (a, b) = (root(&mut self.piece, *a), root(&mut self.piece, *b));
@@ -251,8 +263,12 @@ impl Topology {
         let way = at(0) + at(1) + at(2) + at(3);
         let (length_sq, whole) = (way.norm_sq(), 2.0 * self.owners[self.owner[a] as usize].radius);
         let far = reach.max(whole / NEIGHBOURS);
-        let through = way.dot(self.normals[a]).abs().max(way.dot(self.normals[b]).abs());
-        let along = length_sq < far * far && through * through <= STEEP * length_sq;
+        let leads = |v: usize| {
+            let (through, along) = (way.dot(self.normals[v]), way.dot(self.tangents[v]));
+            let is_curve = self.tangents[v].norm_sq() > 0.0;
+            through * through <= STEEP * length_sq && (!is_curve || along * along >= (1.0 - STEEP) * length_sq)
+        };
+        let along = length_sq < far * far && leads(a) && leads(b);
         along.then(|| (whole.min(NEIGHBOURS * length_sq.sqrt()), whole))
     }
 

@@ -46,6 +46,8 @@ pub struct Response {
     pub lead: f64,
     /// Whether its stages have seen the solids as penalties.
     pub penalty: bool,
+    /// The share of the way to a matched shape that a sub-step takes, if that does not follow from the frequency of the shape.
+    pub plain: Option<f64>,
 }
 
 /// The contact pass over masses after a step.

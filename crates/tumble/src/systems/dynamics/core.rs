@@ -126,13 +126,13 @@ impl Core {
     }
 
     /// The contact pass after a sub-step.
-    pub fn resolve_contact(&mut self, Span { t, h }: Span, Response { lead, penalty }: Response) {
+    pub fn resolve_contact(&mut self, Span { t, h }: Span, Response { lead, penalty, plain }: Response) {
         if self.laws.colliders.is_empty() {
             return;
         }
         let observed = self.pool.heeded();
         let step = Step { t, h, resting: self.resting_speed(h), lead, observed: false };
-        let bodies = self.resolve_body_contact(&step);
+        let bodies = self.resolve_body_contact(&step, plain);
         let pass = Pass { colliders: &self.laws.colliders, step, penalty, observed: &observed };
         for points in self.laws.masses.points().flat_map(|points| without(points, &bodies)) {
             let (before, before_v) = (&self.before[points.clone()], &self.before_v[points.clone()]);
@@ -150,8 +150,8 @@ impl Core {
     }
 
     /// The contact of bodies whose shape is matched; returns their rows, in order.
-    fn resolve_body_contact(&mut self, step: &Step) -> Vec<Range<usize>> {
-        let mut bodies: Vec<(Range<usize>, f64)> = self.constraints.iter().filter_map(|c| c.matched(step.h)).collect();
+    fn resolve_body_contact(&mut self, step: &Step, plain: Option<f64>) -> Vec<Range<usize>> {
+        let mut bodies: Vec<(Range<usize>, f64)> = self.constraints.iter().filter_map(|c| c.matched(step.h, plain)).collect();
         bodies.sort_by_key(|(rows, _)| rows.start);
         let Self { state: State { x, v }, before, before_v, laws, .. } = self;
         let changes = bodies.iter().map_in_parallel(|(rows, share)| {

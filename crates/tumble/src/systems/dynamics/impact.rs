@@ -20,6 +20,9 @@ use crate::geometry::{Friction, Vector};
 const SWEEPS: usize = 200;
 const EXACT: f64 = 1e-11;
 
+/// Speed over the largest from which a contact slips.
+const SLIPS: f64 = 1e-6;
+
 /// A place where a mass of a body meets a solid.
 #[derive(Debug, Clone, Copy)]
 pub struct Contact {
@@ -143,11 +146,10 @@ impl<'a> Solver<'a> {
     }
 
     /// A push that friction allows.
-    fn allowed(&mut self, k: usize, normal: f64, along: Vector) -> Vector {
+    fn allowed(&self, k: usize, normal: f64, along: Vector) -> Vector {
         let Contact { normal: n, friction, .. } = self.contacts[k];
         let size = along.norm();
-        self.slides[k] |= size > friction.resting * normal;
-        let most = if self.slides[k] { friction.sliding * normal } else { size };
+        let most = if self.slides[k] { friction.sliding } else { friction.resting } * normal;
         n * normal + if size > most { along * (most / size) } else { along }
     }
 
@@ -170,14 +172,32 @@ impl<'a> Solver<'a> {
             let along = push - self.contacts[k].normal * push.dot(self.contacts[k].normal);
             self.pushes[k] = self.allowed(k, normal, along);
         }
-        self.slides.fill(false);
         self.effect = self.effect_of(&self.pushes);
     }
 
-    /// Sweeps over all contacts, over friction alone where normal impulses are given.
+    /// Sweeps over all contacts, over friction alone where normal impulses are given. What still slips where friction at rest is all that it can be
+    /// slides from then on.
     fn sweep(&mut self, normals: bool) {
         let n = self.contacts.len();
         let scale = (0..n).map(|k| self.contacts[k].arrival.norm().max(self.contacts[k].least.abs())).fold(0.0, f64::max);
+        loop {
+            self.converge(normals, scale);
+            let slips = |k: &usize| {
+                let Contact { normal, friction, .. } = self.contacts[*k];
+                let velocity = self.velocity(*k);
+                let slide = (velocity - normal * velocity.dot(normal)).norm();
+                !self.slides[*k] && friction.sliding < friction.resting && slide > SLIPS * scale
+            };
+            let slipping: Vec<usize> = (0..n).filter(slips).collect();
+            if slipping.is_empty() {
+                break;
+            }
+            slipping.into_iter().for_each(|k| self.slides[k] = true);
+        }
+    }
+
+    fn converge(&mut self, normals: bool, scale: f64) {
+        let n = self.contacts.len();
         for _ in 0..SWEEPS {
             let mut changed = 0.0_f64;
             for k in 0..n {

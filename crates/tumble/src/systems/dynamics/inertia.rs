@@ -33,7 +33,7 @@ impl Inertia {
         Vector { x: xx * v.x + xy * v.y + zx * v.z, y: xy * v.x + yy * v.y + yz * v.z, z: zx * v.x + yz * v.y + zz * v.z }
     }
 
-    /// The spin w of I w = L; about the axis of a body in a line there is none.
+    /// The spin w of I w = L; about the axis of a body in a line L is rounding, and so is w.
     pub fn spin(self, angular: Vector) -> Vector {
         let Self([xx, yy, zz, ..]) = self;
         let rounded = self.plus_round(LEAST * (xx + yy + zz));

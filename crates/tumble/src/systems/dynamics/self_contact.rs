@@ -306,9 +306,13 @@ impl Feature for SelfContact {
         self.ways.extend(self.features.ways());
         let thickness = self.topology.largest_thickness();
         let start = self.features.at_start(x);
-        let common = common_ways(&self.parts, &start, &self.ways, REACH.1 * thickness);
-        let beside = |(v, w): (usize, &Vector)| (*w - common.get(v).copied().unwrap_or_default()).norm_sq();
-        let farthest = self.ways.iter().enumerate().map(beside).fold(0.0, f64::max).sqrt();
+        // What is no part of a feature, as spare vertices of what tears, goes with none.
+        let points = self.topology.points();
+        let from = |v: usize| points.partition_point(|p| (*p as usize) < v);
+        let parts: Vec<&[u32]> = self.parts.iter().map(|part| &points[from(part.start)..from(part.end)]).collect();
+        let common = common_ways(&parts, &start, &self.ways, REACH.1 * thickness);
+        let beside = |v: usize| (self.ways[v] - common.get(v).copied().unwrap_or_default()).norm_sq();
+        let farthest = points.iter().map(|v| beside(*v as usize)).fold(0.0, f64::max).sqrt();
         let reach = (thickness + ASIDE * farthest).clamp(REACH.0 * thickness, REACH.1 * thickness);
         self.detector.detect_along(&self.topology, &start, &self.ways, &common, reach);
         self.features.run_belts(step);

@@ -3,8 +3,8 @@
 use super::super::parts::{Bends, Closed, Liquid, Parts, Point, Springs};
 use crate::elements::{
     Area, Batch, BendTwist, Bending, Constraints, Density, Distance, Element, Elements, IsometricBend, Law, Linear, Members, Membrane,
-    Neohookean, Nonlinear, Pair, Pairs, Projected, Shape, Strands, StretchShear, TetShear, TetStrain, TetVolume, Vector, Volume,
-    Weights, Woven, WovenBending,
+    Neohookean, Nonlinear, Pair, Pairs, Projected, Shape, Strands, StretchShear, TetShear, TetStrain, TetVolume, Vector, Volume, Weights,
+    Woven, WovenBending,
 };
 use crate::forces::{Near, Newtonian};
 use crate::math::{Real, Row};

@@ -141,7 +141,7 @@ impl Scheme for Forces {
         let penalty = self.implicit.sees_solids();
         // The path under a user's scheme is unknown, and masses that the penalty pushes have no constant acceleration.
         let lead = if self.user.is_some() || penalty { 0.0 } else { integrators::lead(core.integrator) };
-        Response { lead, penalty: penalty && self.user.is_none() }
+        Response { lead, penalty: penalty && self.user.is_none(), plain: None }
     }
 
     fn steps_alone(&self, core: &Core) -> bool {

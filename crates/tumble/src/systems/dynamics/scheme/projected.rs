@@ -176,7 +176,8 @@ impl Scheme for Projected {
     }
 
     fn response(&self, core: &Core) -> Response {
-        Response { lead: integrators::lead(core.integrator), penalty: false }
+        let plain = (self.words.projection == ProjectionMode::Plain).then_some(self.words.stiffness);
+        Response { lead: integrators::lead(core.integrator), penalty: false, plain }
     }
 
     fn steps_alone(&self, _: &Core) -> bool {
