@@ -226,7 +226,7 @@ impl Patch {
                 let s: f64 = (0..3).map(|c| folds[i][c] * folds[j][c] / d[c]).sum::<f64>() / (sizes[i] * sizes[j]);
                 let rest = s - (0..j).map(|k| l[i][k] * l[j][k]).sum::<f64>();
                 l[i][j] = if i == j { rest.sqrt() } else { rest / l[j][j] };
-                if i == j && !(rest > UNDETERMINED) {
+                if i == j && (rest.is_nan() || rest <= UNDETERMINED) {
                     return None;
                 }
             }
