@@ -238,6 +238,20 @@ fn a_thick_sheet_moves_as_without_contact() {
     }
 }
 
+/// What can tear flies on, too: its spare vertices, which stay behind, have no part in the motion in common.
+#[test]
+fn a_sheet_that_can_tear_is_not_braked_by_its_own_contact() {
+    let tearing = format!("[[sheet]]\nname = \"s\"\n{SHEET}tear = {{ strain = 5 }}\n");
+    let mut sims = [0.0, 1.5 / 16.0].map(|thickness| simulation(&scene(thickness, &tearing)));
+    for sim in &mut sims {
+        let v = positions(sim, "s").iter().map(|x| vector(16.0 + 0.3 * x.y, 0.2 * x.x * x.y, 0.0)).collect::<Vec<_>>();
+        write(sim, "s", "velocity", &v);
+        run(sim, 12);
+    }
+    let [without, with] = [0, 1].map(|k| positions(&sims[k], "s"));
+    assert!(with[..ALL] == without[..ALL] && with[0].x > 7.0, "{:?} {:?}", with[0], without[0]);
+}
+
 /// Two sheets shot at each other at 16 m/s each, beside 100 m/s in common: nothing passes, they go on together, and
 /// the common speed stays.
 #[test]
