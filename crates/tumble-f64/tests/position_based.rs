@@ -93,8 +93,8 @@ fn a_projected_hinge_moves_as_computed_by_hand() {
     let (k, h, height) = (3.0, 0.2, 1.0);
     let mut x = vec![[0.0, -1.0, 0.0, 1.0], [0.0, 1.0, 0.0, 1.0], [-height, 0.0, 0.0, 1.0], [0.0, 0.0, height, 1.0]];
     let start = x.clone();
-    let member = [Members { nodes: [0, 1, 2, 3], rest: Bending::fold(0.0), law: [], stiffness: k, damping: 0.0 }];
-    Projected::<Bending, Linear, 4, 3, 12, 0>::new(4, 4, &[], &member, &[]).unwrap().project(&mut x, &step_of(h, 0, 1, &[]));
+    let member = [Members { nodes: [0, 1, 2, 3, 1, 2], rest: Bending::fold(0.0), law: [], stiffness: k, damping: 0.0 }];
+    Projected::<Bending, Linear, 6, 3, 12, 0>::new(4, 4, &[], &member, &[]).unwrap().project(&mut x, &step_of(h, 0, 1, &[]));
     let half = std::f64::consts::FRAC_1_SQRT_2;
     // |grad theta|²: 1 for each wing, and (1/2)² (1 + 1) for each end, whose two parts are at right angles.
     let weight = half * half * (1.0 + 1.0 + 2.0 * 0.5);

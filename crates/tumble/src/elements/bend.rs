@@ -3,8 +3,8 @@
 use super::{Element, force, point};
 use crate::math::{Lane, Vec3};
 
-/// Bending of one triangle, x0 x1 x2 counter-clockwise, with the N - 3 triangles beside it: x3 lies across the edge x0 x1, x4 across x1 x2, x5
-/// across x2 x0. Their folds give its curvature, as three edges determine a quadratic surface:
+/// Bending of one triangle, x0 x1 x2 counter-clockwise, with the triangles beside it: x3 lies across the edge x0 x1, x4 across x1 x2, x5 across
+/// x2 x0; where nothing does, the node is that with which the edge begins. Their folds give its curvature, as three edges determine a quadratic surface:
 ///
 ///   t_i = 2 sin(theta_i/2) - t0_i,   r = L t,   L^T L = A G^T D G/B,   G t = (kxx, kyy, kxy)     (bending.1, bending.6)
 ///
@@ -15,7 +15,7 @@ use crate::math::{Lane, Vec3};
 ///             \  /
 ///              x3
 /// ```
-/// x [m]   L [1]   k = B [N m].   A is the area at rest.   Rest: L by rows, one column for each edge that has a neighbour; t0.
+/// x [m]   L [1]   k = B [N m].   A is the area at rest.   Rest: L by rows, a column for each edge, zero where it has no neighbour; t0.
 /// No trigonometry, smooth through flat, and bounded: |t + t0| <= 2.
 /// Degenerate: folded onto itself (theta = pi) the side of a fold, and with it the sign of t + t0, is anyone's guess. A triangle without area
 /// or an edge without length has no normal and folds nothing.
@@ -24,7 +24,7 @@ use crate::math::{Lane, Vec3};
 pub struct Bending;
 
 impl Bending {
-    /// The numbers of one fold alone, over the edge x0 x1 with x2 and x3 across it, and its t0: r = t.
+    /// The numbers of one fold alone, over the edge x0 x1 of nodes 0, 1, 2, 3, 1, 2, and its t0: r = t.
     pub fn fold(rest: f64) -> [f64; 12] {
         let mut numbers = [0.0; 12];
         (numbers[0], numbers[9]) = (1.0, rest);
@@ -33,7 +33,8 @@ impl Bending {
 
     /// t0 of the fold over the edge x0 x1 with x2 and x3 across it.
     pub fn angle(x: [[f64; 3]; 4]) -> f64 {
-        folds(&[0.0; 12], &x.map(|[x, y, z]| [x, y, z, 0.0]))[0]
+        let [a, b, c, d] = x.map(|[x, y, z]| [x, y, z, 0.0]);
+        folds(&[0.0; 12], &[a, b, c, d, b, c])[0]
     }
 }
 
@@ -53,16 +54,16 @@ fn half_angle<L: Lane>(n1: Vec3<L>, n2: Vec3<L>, e: Vec3<L>) -> (L, L, L) {
 
 /// The normal of a triangle, of length twice its area.
 #[inline(always)]
-fn normal<L: Lane, const N: usize>(x: &[[L; 4]; N]) -> Vec3<L> {
+fn normal<L: Lane>(x: &[[L; 4]; 6]) -> Vec3<L> {
     (point(x[1]) - point(x[0])).cross(point(x[2]) - point(x[0]))
 }
 
 /// t of each edge; 0 where there is no neighbour.
 #[inline(always)]
-pub(super) fn folds<L: Lane, const N: usize, const D: usize>(rest: &[L; D], x: &[[L; 4]; N]) -> [L; 3] {
+pub(super) fn folds<L: Lane, const D: usize>(rest: &[L; D], x: &[[L; 4]; 6]) -> [L; 3] {
     let n1 = normal(x);
     let mut t = [n1.x.zero(); 3];
-    for i in 0..N - 3 {
+    for i in 0..3 {
         let x0 = point(x[i]);
         let e = point(x[(i + 1) % 3]) - x0;
         let (twice_sin, _, scale) = half_angle(n1, (point(x[3 + i]) - x0).cross(e), e);
@@ -73,12 +74,12 @@ pub(super) fn folds<L: Lane, const N: usize, const D: usize>(rest: &[L; D], x: &
 
 /// The sum of z_i grad t_i.                                                             (bending.2 to bending.5)
 #[inline(always)]
-pub(super) fn spread<L: Lane, const N: usize>(x: &[[L; 4]; N], z: [L; 3]) -> [[L; 4]; N] {
+pub(super) fn spread<L: Lane>(x: &[[L; 4]; 6], z: [L; 3]) -> [[L; 4]; 6] {
     let n1 = normal(x);
     let zero = n1.x.zero();
     let a1 = n1.norm_sq();
-    let mut sums = [Vec3 { x: zero, y: zero, z: zero }; N];
-    for i in 0..N - 3 {
+    let mut sums = [Vec3 { x: zero, y: zero, z: zero }; 6];
+    for i in 0..3 {
         let (j, k) = ((i + 1) % 3, (i + 2) % 3);
         let [x0, x1, x2, x3] = [point(x[i]), point(x[j]), point(x[k]), point(x[3 + i])];
         let e = x1 - x0;
@@ -95,8 +96,8 @@ pub(super) fn spread<L: Lane, const N: usize>(x: &[[L; 4]; N], z: [L; 3]) -> [[L
         sums[k] = sums[k] - m1 * length;
         sums[3 + i] = -(m2 * length);
     }
-    let mut g = [[zero; 4]; N];
-    for i in 0..N {
+    let mut g = [[zero; 4]; 6];
+    for i in 0..6 {
         g[i] = force(sums[i]);
     }
     g
@@ -122,14 +123,14 @@ pub(super) fn transposed<L: Lane, const D: usize>(rest: &[L; D], y: [L; 3]) -> [
     z
 }
 
-impl<const N: usize> Element<N, 3, 12> for Bending {
+impl Element<6, 3, 12> for Bending {
     const NAME: &'static str = "hinge";
     #[inline(always)]
-    fn residual<L: Lane>(rest: [L; 12], x: [[L; 4]; N]) -> [L; 3] {
+    fn residual<L: Lane>(rest: [L; 12], x: [[L; 4]; 6]) -> [L; 3] {
         product(&rest, folds(&rest, &x))
     }
     #[inline(always)]
-    fn pullback<L: Lane>(rest: [L; 12], x: [[L; 4]; N], y: [L; 3]) -> [[L; 4]; N] {
+    fn pullback<L: Lane>(rest: [L; 12], x: [[L; 4]; 6], y: [L; 3]) -> [[L; 4]; 6] {
         spread(&x, transposed(&rest, y))
     }
 }
@@ -140,7 +141,8 @@ mod tests {
     use crate::math::Real;
 
     fn angle(x: [[f64; 3]; 4], size: f64) -> Real {
-        folds(&[0.0; 12], &x.map(|x| [x[0] * size, x[1] * size, x[2] * size, 0.0].map(|x| x as Real)))[0]
+        let [a, b, c, d] = x.map(|x| [x[0] * size, x[1] * size, x[2] * size, 0.0].map(|x| x as Real));
+        folds(&[0.0; 12], &[a, b, c, d, b, c])[0]
     }
 
     #[test]

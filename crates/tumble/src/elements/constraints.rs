@@ -506,7 +506,8 @@ impl<E: Element<N, M, D>, Y: Law<P>, const N: usize, const M: usize, const D: us
             }
         }
         let x = corrected(E::FRAMES, x, moves);
-        for a in 0..N {
+        // The first of several nodes that are one is the one that moves.
+        for a in (0..N).rev() {
             let index = &columns.nodes[a].get()[e..];
             // SAFETY: as above.
             unsafe { if RUN { w.put_rows(x[a], rows, index[0]) } else { w.put(x[a], rows, index) } };

@@ -295,16 +295,16 @@ fn size<L: Lane>([u, v, w]: [L; 3]) -> (L, L) {
     (s, s.positive(s.like(1.0) / s, s.zero()))
 }
 
-impl<const N: usize> Element<N, 3, 36> for WovenBending {
+impl Element<6, 3, 36> for WovenBending {
     const NAME: &'static str = "fabric hinge";
     #[inline(always)]
-    fn residual<L: Lane>(rest: [L; 36], x: [[L; 4]; N]) -> [L; 3] {
+    fn residual<L: Lane>(rest: [L; 36], x: [[L; 4]; 6]) -> [L; 3] {
         let kappa = product(&rest, folds(&rest, &x));
         let (root, _) = stiffness(&rows(&rest), size(kappa).0);
         [root[0] * kappa[0], root[1] * kappa[1], root[2] * kappa[2]]
     }
     #[inline(always)]
-    fn pullback<L: Lane>(rest: [L; 36], x: [[L; 4]; N], y: [L; 3]) -> [[L; 4]; N] {
+    fn pullback<L: Lane>(rest: [L; 36], x: [[L; 4]; 6], y: [L; 3]) -> [[L; 4]; 6] {
         let kappa = product(&rest, folds(&rest, &x));
         let (s, inverse) = size(kappa);
         let (root, slope) = stiffness(&rows(&rest), s);

@@ -160,9 +160,11 @@ impl Patch {
         Self { nodes: order.map(|k| nodes[k]), at: order.map(|k| at[k]), beside: order.into_iter().map_while(|k| beside[k]).collect() }
     }
 
-    /// The nodes of its element, as points from `first` on.
-    fn all(&self, first: u32) -> Vec<u32> {
-        self.nodes.into_iter().chain(self.beside.iter().map(|b| b.node)).map(|i| i + first).collect()
+    /// The nodes of its element, as points from `first` on; where nothing is beside an edge, that with which the edge begins.
+    fn all(&self, first: u32) -> [u32; 6] {
+        let node = |i: usize| self.beside.get(i).map_or(self.nodes[i], |beside| beside.node);
+        let [a, b, c] = self.nodes;
+        [a, b, c, node(0), node(1), node(2)].map(|i| i + first)
     }
 
     /// Matrices with which folds give curvatures (kxx, kyy, kxy), of whom and for how much area [m²]: of the whole, by (bending.6); where six
@@ -170,9 +172,8 @@ impl Patch {
     fn curvatures(&self, d: [f64; 3]) -> Vec<(Self, [f64; 9], f64)> {
         let [a, b, c] = self.at;
         let area = ((b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0])) / 2.0;
-        let mut nodes = self.all(0);
-        nodes.sort_unstable();
-        let is_plain = nodes.windows(2).all(|w| w[0] != w[1]);
+        let others: Vec<u32> = self.beside.iter().map(|b| b.node).collect();
+        let is_plain = (0..others.len()).all(|i| !self.nodes.contains(&others[i]) && !others[..i].contains(&others[i]));
         if self.beside.is_empty() {
             return Vec::new();
         }
@@ -357,7 +358,7 @@ impl Site<'_> {
             let d = [1.0, 1.0, 2.0];
             for (patch, g, area) in patch.curvatures(d) {
                 let l = std::array::from_fn(|i| (area * d[i / 3]).sqrt() * g[i]);
-                self.parts.bending(&patch.all(first), numbers(l, &patch), words.hinge);
+                self.parts.bending(patch.all(first), numbers(l, &patch), words.hinge);
             }
         }
         if let Some((fabric, rows)) = words.fabric.as_ref().and_then(|f| Some((f, f.rows()?))) {
@@ -366,7 +367,7 @@ impl Site<'_> {
                 all[..12].copy_from_slice(&numbers(g.map(|g| g / WovenBending::SAMPLE), &patch));
                 all[12..].copy_from_slice(rows.as_flattened());
                 let stiffness = area * WovenBending::SAMPLE * WovenBending::SAMPLE;
-                self.parts.woven_bending(&patch.all(first), all, stiffness, fabric.words.damping);
+                self.parts.woven_bending(patch.all(first), all, stiffness, fabric.words.damping);
             }
         }
     }

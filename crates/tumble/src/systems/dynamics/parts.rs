@@ -87,28 +87,6 @@ impl<const D: usize, const P: usize> Springs<D, P> {
     }
 }
 
-/// Triangles that bend, by how many others are beside them.
-#[derive(Default)]
-pub struct Bends<const D: usize> {
-    /// Beside one, as at a corner.
-    pub one: Vec<Members<4, D, 0>>,
-    /// Beside two, as at a side.
-    pub two: Vec<Members<5, D, 0>>,
-    /// Beside three.
-    pub three: Vec<Members<6, D, 0>>,
-}
-
-impl<const D: usize> Bends<D> {
-    fn push(&mut self, nodes: &[u32], rest: [f64; D], stiffness: f64, damping: f64) {
-        match *nodes {
-            [a, b, c, d] => self.one.push(Members { nodes: [a, b, c, d], rest, law: [], stiffness, damping }),
-            [a, b, c, d, e] => self.two.push(Members { nodes: [a, b, c, d, e], rest, law: [], stiffness, damping }),
-            [a, b, c, d, e, f] => self.three.push(Members { nodes: [a, b, c, d, e, f], rest, law: [], stiffness, damping }),
-            _ => {}
-        }
-    }
-}
-
 /// Position [m], velocity [m/s], mass [kg], whether it is held.
 pub type Point = (Vec3<f64>, Vec3<f64>, f64, bool);
 
@@ -125,12 +103,12 @@ pub struct Parts {
     pub(super) nonlinear: Springs<1, 2>,
     pub(super) vector: Springs<0, 0>,
     pub(super) dampers: Vec<Members<2, 1, 0>>,
-    pub(super) bending: Bends<12>,
+    pub(super) bending: Vec<Members<6, 12, 0>>,
     pub(super) isometric: Vec<Members<4, 3, 0>>,
     pub(super) membranes: Vec<Members<3, 8, 0>>,
     pub(super) areas: Vec<Members<3, 1, 0>>,
     pub(super) woven: Vec<Members<3, 28, 0>>,
-    pub(super) woven_bending: Bends<36>,
+    pub(super) woven_bending: Vec<Members<6, 36, 0>>,
     /// Closed surfaces and whole bodies, each with its place in the scene.
     pub(super) closed: Vec<(String, Closed)>,
     pub(super) shapes: Vec<(String, Range<usize>, f64)>,
@@ -402,9 +380,9 @@ impl Parts {
         }
     }
 
-    /// Adds the bending of a triangle: its corners, then what lies across its edges from the first on.
-    pub fn bending(&mut self, nodes: &[u32], rest: [f64; 12], stiffness: f64) {
-        self.bending.push(nodes, rest, stiffness, 0.0);
+    /// Adds the bending of a triangle: its corners, then what lies across its edges.
+    pub fn bending(&mut self, nodes: [u32; 6], rest: [f64; 12], stiffness: f64) {
+        self.bending.push(Members { nodes, rest, law: [], stiffness, damping: 0.0 });
     }
 
     /// Adds a flat hinge, quadratic in the positions, over edge 0 1 with opposite corners 2 and 3.
@@ -431,8 +409,8 @@ impl Parts {
     }
 
     /// The same of a measured fabric, with damping time [s].
-    pub fn woven_bending(&mut self, nodes: &[u32], rest: [f64; 36], stiffness: f64, damping: f64) {
-        self.woven_bending.push(nodes, rest, stiffness, stiffness * damping);
+    pub fn woven_bending(&mut self, nodes: [u32; 6], rest: [f64; 36], stiffness: f64, damping: f64) {
+        self.woven_bending.push(Members { nodes, rest, law: [], stiffness, damping: stiffness * damping });
     }
 
     /// Adds a closed surface, at this place of the scene.

@@ -164,13 +164,17 @@ impl<'a> Edges<'a> {
                     same[0] = [corners[0], self.corner(u, a)?];
                 }
             }
-            [a, b, c, ref beside @ ..] if beside.len() <= 3 => {
+            [a, b, c, d, e, f] => {
                 // A triangle that bends, with those across its edges.
-                for (i, d) in beside.iter().enumerate() {
-                    let [p, q, r] = [[a, b, c], [b, c, a], [c, a, b]][i];
-                    let ([p, q, r, d], both) = self.hinge([p, q, r, *d])?;
-                    (corners[i], corners[(i + 1) % 3], corners[(i + 2) % 3], corners[3 + i]) = (p, q, r, d);
-                    same[2 * i..2 * i + 2].copy_from_slice(&both);
+                let own = self.at([a, b]).iter().copied().find(|at| self.corner(*at, c).is_some())?;
+                for (i, [p, q, r, d]) in [[a, b, c, d], [b, c, a, e], [c, a, b, f]].into_iter().enumerate() {
+                    corners[i] = self.corner(own, p)?;
+                    corners[3 + i] = corners[i];
+                    if d != p {
+                        let ([.., d], both) = self.hinge([p, q, r, d])?;
+                        corners[3 + i] = d;
+                        same[2 * i..2 * i + 2].copy_from_slice(&both);
+                    }
                 }
             }
             _ => return None,

@@ -1,6 +1,6 @@
 //! Elements of the parts: as batches of forces, or as constraints.
 
-use super::super::parts::{Bends, Closed, Liquid, Parts, Point, Springs};
+use super::super::parts::{Closed, Liquid, Parts, Point, Springs};
 use crate::elements::{
     Area, Batch, BendTwist, Bending, Constraints, Density, Distance, Element, Elements, IsometricBend, Law, Linear, Members, Membrane,
     Neohookean, Nonlinear, Pair, Pairs, Projected, Shape, Strands, StretchShear, TetShear, TetStrain, TetVolume, Vector, Volume, Weights,
@@ -17,13 +17,12 @@ use tumble_interface::scene::Hessian;
 pub struct Lists {
     /// Linear springs, nonlinear ones, those of no rest length.
     pub springs: [Option<usize>; 3],
-    /// Triangles that bend, beside one other, two, three.
-    pub bending: [Option<usize>; 3],
+    pub bending: Option<usize>,
     pub isometric: Option<usize>,
     pub membranes: Option<usize>,
     pub areas: Option<usize>,
     pub woven: Option<usize>,
-    pub woven_bending: [Option<usize>; 3],
+    pub woven_bending: Option<usize>,
 }
 
 /// Elements in the order in which they act: as forces, or as constraints.
@@ -71,12 +70,12 @@ impl Batches {
             self.springs::<Vector, Linear, 3, 0, 0>(&parts.vector)?,
         ];
         self.add::<Distance, 2, 1, 1>(&parts.dampers, 0.0)?;
-        let bending = self.bends::<Bending, 12>(&parts.bending)?;
+        let bending = self.add::<Bending, 6, 3, 12>(&parts.bending, 0.0)?;
         let isometric = self.add::<IsometricBend, 4, 3, 3>(&parts.isometric, 0.0)?;
         let membranes = self.add::<Membrane, 3, 3, 8>(&parts.membranes, 0.0)?;
         let areas = self.add::<Area, 3, 1, 1>(&parts.areas, 0.0)?;
         let woven = self.add::<Woven, 3, 3, 28>(&parts.woven, 0.0)?;
-        let woven_bending = self.bends::<WovenBending, 36>(&parts.woven_bending)?;
+        let woven_bending = self.add::<WovenBending, 6, 3, 36>(&parts.woven_bending, 0.0)?;
         self.solids(&parts.shears, &parts.volumes, parts.energy_at_rest)?;
         self.add::<TetStrain, 4, 6, 9>(&parts.strains, 0.0)?;
         self.rods(&parts.stretches, &mut parts.bends, &parts.rod_limits)?;
@@ -131,14 +130,6 @@ impl Batches {
         let elements = Elements::<E, Linear, N, M, D, 0>::new(self.rows, members).ok_or(NotARow)?;
         self.list.push(Box::new(elements.with_energy_at_rest(energy_at_rest)));
         Ok(Some(self.list.len() - 1))
-    }
-
-    /// Adds triangles that bend.
-    fn bends<E: Element<4, 3, D> + Element<5, 3, D> + Element<6, 3, D>, const D: usize>(
-        &mut self,
-        Bends { one, two, three }: &Bends<D>,
-    ) -> Result<[Option<usize>; 3], NotARow> {
-        Ok([self.add::<E, 4, 3, D>(one, 0.0)?, self.add::<E, 5, 3, D>(two, 0.0)?, self.add::<E, 6, 3, D>(three, 0.0)?])
     }
 
     /// Adds rods, if there are any: as constraints, chains are solved as a whole.

@@ -34,16 +34,12 @@ impl Tied<'_> {
                 edges.ties(list(lists.springs[1]), &parts.nonlinear.members, 0, x),
                 edges.ties(clamp, &parts.linear.members, 0, x),
                 edges.ties(clamp, &parts.nonlinear.members, parts.linear.members.len(), x),
-                edges.ties(list(lists.bending[0]), &parts.bending.one, 0, x),
-                edges.ties(list(lists.bending[1]), &parts.bending.two, 0, x),
-                edges.ties(list(lists.bending[2]), &parts.bending.three, 0, x),
+                edges.ties(list(lists.bending), &parts.bending, 0, x),
                 edges.ties(list(lists.isometric), &parts.isometric, 0, x),
                 edges.ties(list(lists.membranes), &parts.membranes, 0, x),
                 edges.ties(list(lists.areas), &parts.areas, 0, x),
                 edges.ties(list(lists.woven), &parts.woven, 0, x),
-                edges.ties(list(lists.woven_bending[0]), &parts.woven_bending.one, 0, x),
-                edges.ties(list(lists.woven_bending[1]), &parts.woven_bending.two, 0, x),
-                edges.ties(list(lists.woven_bending[2]), &parts.woven_bending.three, 0, x),
+                edges.ties(list(lists.woven_bending), &parts.woven_bending, 0, x),
             ];
             let count = |i: &usize| objects.list[*i].triangles.len();
             let blown = self.sails.iter().filter_map(|(batch, on)| {
