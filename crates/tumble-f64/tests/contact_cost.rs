@@ -150,7 +150,7 @@ fn found(topology: &Topology, x: &[Row], ways: &[Vector], parts: usize) -> Detec
     let all: Vec<u32> = (0..(parts * ALL) as u32).collect();
     let parts: Vec<&[u32]> = all.chunks(ALL).collect();
     let mut detector = Detector::new();
-    detector.detect_along(topology, x, ways, &common_ways(&parts, x, ways, 3.0), 0.9);
+    detector.detect_along(topology, x, ways, &common_ways(&parts, x, ways, 3.0, &|_, _| false), 0.9);
     detector
 }
 
@@ -203,11 +203,13 @@ fn pairs_in_common_motion_are_those_at_rest() {
     let all: Vec<u32> = (0..2 * ALL as u32).collect();
     let parts: Vec<&[u32]> = all.chunks(ALL).collect();
     let ways = ways_of(&x, |v, _| vector(60.0, 0.0, if v < ALL { 10.0 } else { -10.0 }));
-    let common = common_ways(&parts, &x, &ways, 3.0);
+    let common = common_ways(&parts, &x, &ways, 3.0, &|_, _| false);
     assert!(common.iter().all(|c| (*c - vector(60.0, 0.0, 0.0)).norm() < 1.0), "{:?}", common[0]);
+    // Nothing is sure to be in common beside what may stop it.
+    assert!(common_ways(&parts, &x, &ways, 3.0, &|centre, radius| centre.x.abs() < radius).is_empty());
     // Nothing in common, nothing to take off.
     let ways = ways_of(&x, |v, _| vector(0.0, 0.0, if v < ALL { 10.0 } else { -10.0 }));
-    assert!(common_ways(&parts, &x, &ways, 3.0).is_empty());
+    assert!(common_ways(&parts, &x, &ways, 3.0, &|_, _| false).is_empty());
 }
 
 const SHEET: &str = "size = [1, 1]\nresolution = [17, 17]\nlinks = { structural = 200, shear = 50 }\nhinge = 1e-5\ndensity = 0.2\n";

@@ -87,8 +87,8 @@ fn cloth_stays_on_a_wire_that_passes_between_its_masses() {
         assert_eq!(crossed, 0, "{words}");
         // Half a second of free fall.
         assert!(highest(&gone) < -1.0, "{words}");
-        // It lies on the wire, and its sides hang down from it; where nothing damps them they swing and pull it some way to one side,
-        // to -0.286 m at most.
+        // It lies on the wire, and its sides hang down from it; where nothing damps them they swing and pull it some way to one side:
+        // measured -0.17 to -0.29 m, as its bending changes by a tenth.
         assert!((0.003..0.02).contains(&highest(&on)), "{words}");
         assert!((-0.3..-0.12).contains(&lowest(&on)), "{words}");
     }

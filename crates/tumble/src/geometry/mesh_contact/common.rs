@@ -21,9 +21,10 @@ const AXES: [Vector; 3] = [Vector { x: 1.0, y: 0.0, z: 0.0 }, Vector { x: 0.0, y
 type Bounds = [Vector; 2];
 
 /// For each vertex, the part of its way that its neighbourhood has in common [m]: zero where that does not shorten the longest of them to less
-/// than half. `parts` are lists of vertices; those that come nearer than `apart` [m] to each other in boxes are one neighbourhood. `x` and `ways`
-/// have a row for each vertex of a part. Empty if there is nothing in common anywhere.
-pub fn common_ways(parts: &[&[u32]], x: &[Row], ways: &[Vector], apart: f64) -> Vec<Vector> {
+/// than half. `parts` are lists of vertices; those that come nearer than `apart` [m] to each other in boxes are one neighbourhood. Who may be
+/// stopped does not go along: nothing is in common where `stops` says so of a ball, by centre and radius [m], that one keeps to.
+/// `x` and `ways` have a row for each vertex of a part. Empty if there is nothing in common anywhere.
+pub fn common_ways(parts: &[&[u32]], x: &[Row], ways: &[Vector], apart: f64, stops: &dyn Fn(Vector, f64) -> bool) -> Vec<Vector> {
     // Alone, each part would go along with itself; those that could meet on that way, or on their own, go together.
     let mut groups: Vec<(Vec<u32>, Common, Bounds)> = Vec::new();
     for part in parts.iter().filter(|part| !part.is_empty()) {
@@ -39,7 +40,8 @@ pub fn common_ways(parts: &[&[u32]], x: &[Row], ways: &[Vector], apart: f64) -> 
         }
     }
     let mut all = Vec::new();
-    for (members, common, _) in groups.iter().filter(|(_, common, _)| common.any) {
+    let is_free = |[low, high]: &Bounds| !stops((*low + *high) * 0.5, 0.5 * (*high - *low).norm());
+    for (members, common, _) in groups.iter().filter(|(_, common, bounds)| common.any && is_free(bounds)) {
         all.resize(ways.len(), Vector::default());
         vertices(members).for_each(|v| all[v] = common.way(xyz64(x[v])));
     }

@@ -310,7 +310,8 @@ impl Feature for SelfContact {
         let points = self.topology.points();
         let from = |v: usize| points.partition_point(|p| (*p as usize) < v);
         let parts: Vec<&[u32]> = self.parts.iter().map(|part| &points[from(part.start)..from(part.end)]).collect();
-        let common = common_ways(&parts, &start, &self.ways, REACH.1 * thickness);
+        let common =
+            common_ways(&parts, &start, &self.ways, REACH.1 * thickness, &|centre, radius| self.features.are_near(centre, radius, step));
         let beside = |v: usize| (self.ways[v] - common.get(v).copied().unwrap_or_default()).norm_sq();
         let farthest = points.iter().map(|v| beside(*v as usize)).fold(0.0, f64::max).sqrt();
         let reach = (thickness + ASIDE * farthest).clamp(REACH.0 * thickness, REACH.1 * thickness);

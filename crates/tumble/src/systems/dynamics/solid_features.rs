@@ -42,6 +42,12 @@ pub struct SolidFeatures {
 }
 
 impl SolidFeatures {
+    /// Whether any collider, with edges or without, is within a ball at the start of a sub-step or at its end.
+    pub fn are_near(&self, centre: Vector, radius: f64, step: Span) -> bool {
+        let within = |c: &Collider, t: f64| c.distance(centre, t, radius).0 < radius + c.thickness;
+        self.colliders.iter().any(|c| within(c, step.t) || c.moves() && within(c, step.end()))
+    }
+
     /// Features of the colliders that have edges.
     pub fn new(colliders: &Arc<Vec<Collider>>, points: usize) -> Self {
         let mut all = Self { colliders: colliders.clone(), points, ..Self::default() };
