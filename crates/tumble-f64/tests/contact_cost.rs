@@ -36,6 +36,36 @@ fn triangles(first: u32) -> Vec<[u32; 3]> {
     (0..N).flat_map(|j| (0..N).flat_map(move |i| square(i, j))).collect()
 }
 
+/// Windings of a coil are no neighbours, though they are of one curve: they touch at their distance at rest. The next pieces of a winding, just as
+/// near, are neighbours and no pairs at rest.                                                                        (contact.24)
+#[test]
+fn windings_of_a_coil_touch_at_their_distance_at_rest() {
+    let (turn, pitch, thickness) = (24_u32, 1.0, 1.2);
+    let place = |k: u32| {
+        let angle = 2.0 * PI * f64::from(k) / f64::from(turn);
+        vector(2.0 * angle.cos(), 2.0 * angle.sin(), pitch * angle / (2.0 * PI))
+    };
+    let n = 3 * turn;
+    let x: Vec<Row> = (0..=n).map(place).map(|v| [v.x, v.y, v.z, 1.0]).collect();
+    let mut topology = Topology::new(x.len());
+    let segments: Vec<[u32; 2]> = (0..n).map(|k| [k, k + 1]).collect();
+    topology.add(Owner { radius: 0.5 * thickness, itself: true }, &[], &segments, &[]);
+    topology.set_rest(&x);
+    let mut detector = Detector::new();
+    detector.detect(&topology, &x, 2.0 * thickness);
+    let mut across = 0;
+    for pair in detector.pairs() {
+        let [a, _, c, _] = pair.vertices;
+        if f64::from(pair.distance) > thickness {
+            assert!((f64::from(pair.thickness) - thickness).abs() < 1e-6, "{pair:?}");
+        } else {
+            across += 1;
+            assert!(a.abs_diff(c) > turn / 2 && f64::from(pair.thickness - pair.distance).abs() < 1e-6, "{pair:?}");
+        }
+    }
+    assert!(across > 100, "{across}");
+}
+
 /// Sheets of a thickness, each an object, flat at rest.
 fn topology(sheets: usize, thickness: f64) -> Topology {
     let mut topology = Topology::new(sheets * ALL);

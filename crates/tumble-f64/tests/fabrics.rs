@@ -274,14 +274,13 @@ fn strips_of_all_fabrics_hang_at_the_angle_of_the_cantilever_test() {
 }
 
 /// The whole record, whose stiffness changes with curvature, against the polygon with the same moments, and the elastica that it tends to. Where a
-/// record lets the moment stay, curvature jumps within a millimetre of the clamp, which coarse cells do not see.
+/// record lets the moment stay, curvature jumps within a millimetre of the clamp, which coarse cells do not see. Sweeps of position-based dynamics
+/// come to rest where Newton's method does in the same cells.
 #[test]
 fn strips_of_whole_records_hang_like_the_elastica_with_their_moments() {
     for name in SHIPPED {
-        for (angle, mesh, system) in
-            [(0.0, (32, 3), IMPLICIT), (90.0, (32, 3), IMPLICIT), (90.0, (12, 5), "method = \"position_based\"\nsubsteps = 300")]
-        {
-            let fabric = record(name);
+        let fabric = record(name);
+        for angle in [0.0, 90.0] {
             let b = across(&fabric, angle);
             let length = 1.6 * (b[0] / (fabric.density * G)).cbrt();
             let numbers = WovenBending::samples(b).unwrap();
@@ -295,21 +294,19 @@ fn strips_of_whole_records_hang_like_the_elastica_with_their_moments() {
                 low
             };
             let segments = |n: u32| polygon(n, length / (f64::from(n) + 0.5), fabric.density * G, &curvature);
-            let (exact, limit) = (segments(mesh.0), elastica(length, fabric.density * G, &curvature));
+            let (exact, limit) = (segments(32), elastica(length, fabric.density * G, &curvature));
             assert!((segments(4000) / limit - 1.0).abs() < 2e-3, "{} {limit}", segments(4000));
-            // Sweeps of position-based dynamics let it creep, and what is twenty times as stiff as knitwear and as light tremble.
-            let still = if system == IMPLICIT {
-                1e-3
-            } else if name == "tablecloth" {
-                0.15
-            } else {
-                0.03
-            };
-            let found = strip(&fabric, length, angle, mesh, (system, still));
-            println!("{name} at {angle}, {system:?}: tangent {found:.4}, {:.3} %, elastica {limit:.4}", 100.0 * (found / exact - 1.0));
-            // Measured: 1.6e-4; 1.2e-2 by sweeps, a third of it with twice the sub-steps.
-            let bound = if system == IMPLICIT { 1e-3 } else { 2e-2 };
-            assert!((found / exact - 1.0).abs() < bound, "{name} at {angle}: {found} {exact}");
+            let found = strip(&fabric, length, angle, (32, 3), (IMPLICIT, 1e-3));
+            println!("{name} at {angle}: tangent {found:.4}, {:.3} %, elastica {limit:.4}", 100.0 * (found / exact - 1.0));
+            assert!((found / exact - 1.0).abs() < 1e-3, "{name} at {angle}: {found} {exact}");
+            if angle == 90.0 {
+                // Sweeps let a strip creep, and one that is twenty times as stiff as knitwear and as light tremble.
+                let still = if name == "tablecloth" { 0.15 } else { 0.03 };
+                let swept = strip(&fabric, length, angle, (12, 5), ("method = \"position_based\"\nsubsteps = 300", still));
+                let exact = strip(&fabric, length, angle, (12, 5), (IMPLICIT, 1e-3));
+                println!("{name} at {angle}, by sweeps: {:.3} %", 100.0 * (swept / exact - 1.0));
+                assert!((swept / exact - 1.0).abs() < 1.5e-2, "{name} at {angle}: {swept} {exact}");
+            }
         }
     }
 }

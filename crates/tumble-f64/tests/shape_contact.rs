@@ -298,6 +298,25 @@ fn a_block_at_rest_holds_up_to_its_static_friction() {
     }
 }
 
+/// Plain projection takes a soft shape back as far as its stiffness says, whatever its frequency: so does contact.
+#[test]
+fn a_block_under_plain_projection_is_as_rigid_as_its_stiffness_says() {
+    for restitution in [0.3, 0.8] {
+        let mut sim = simulation(&format!(
+            "precision = \"double\"\ntime.fps = 1000\nworld.gravity = [0, 0, 0]\n[[system]]\nmethod = \"position_based\"\nsubsteps = 1\n\
+             position_based = {{ projection = \"plain\", stiffness = 1 }}\n[[block]]\nname = \"block\"\nsize = [{SIDE}, {SIDE}, {SIDE}]\n\
+             resolution = [3, 3, 3]\nshape_matching.frequency = 1\n[[collider]]\nname = \"floor\"\nshape.floor.height = 0\nrestitution = {restitution}\n"
+        ));
+        let still = Quat { v: Vector::default(), w: 1.0 };
+        throw(&mut sim, "block", still, vector(0.0, 0.0, 0.5 * SIDE + 0.1), vector(0.0, 0.0, -2.0), Vector::default());
+        (0..100).for_each(|_| {
+            step(&mut sim);
+        });
+        let [_, v, w] = body(&sim, "block");
+        assert!((v.z / (2.0 * restitution) - 1.0).abs() < 1e-6 && w.norm() < 1e-6, "{restitution}: {v:?} {w:?}");
+    }
+}
+
 /// A block held at an edge swings onto the floor like a door: its spin comes back by the restitution.
 #[test]
 fn a_held_block_rebounds_about_what_holds_it() {

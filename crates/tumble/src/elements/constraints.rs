@@ -22,7 +22,7 @@ mod volume;
 
 pub use density::{Density, behind, spline};
 pub use neohookean::Neohookean;
-pub use shape::Shape;
+pub use shape::{HELD, Shape};
 pub use strands::Strands;
 pub use volume::{Volume, enclosed};
 

@@ -17,7 +17,7 @@ type Vector = Vec3<f64>;
 
 /// Weight of a held mass of a rigid shape in the fit, over the mass of all: each sweep leaves one part in so many of how far it is off its
 /// place. By its own mass a corner of a block would lead as little as it weighs.                               (shapes.4)
-const HELD: f64 = 1e4;
+pub const HELD: f64 = 1e4;
 
 /// The points of one body.
 pub struct Shape {

@@ -11,12 +11,11 @@
 use super::contact::{Step, on_parabola};
 use super::impact::{Contact, Effect, solve};
 use super::inertia::Motion;
+use crate::elements::HELD;
 use crate::geometry::{Collider, Friction, Vector};
 use crate::math::parallel::fold;
 use crate::math::{Quat, Real, Row, rotation, xyz64};
 
-/// Weight of a held mass over the mass of all.                                                           (shapes.4)
-const HELD: f64 = 1e4;
 /// How often masses that a body's new motion brings into touch join the others.
 const ROUNDS: usize = 4;
 /// How often a body that is too deep is moved.
