@@ -56,11 +56,11 @@ fn windings_of_a_coil_touch_at_their_distance_at_rest() {
     let mut across = 0;
     for pair in detector.pairs() {
         let [a, _, c, _] = pair.vertices;
-        if f64::from(pair.distance) > thickness {
-            assert!((f64::from(pair.thickness) - thickness).abs() < 1e-6, "{pair:?}");
+        if pair.distance > thickness {
+            assert!((pair.thickness - thickness).abs() < 1e-6, "{pair:?}");
         } else {
             across += 1;
-            assert!(a.abs_diff(c) > turn / 2 && f64::from(pair.thickness - pair.distance).abs() < 1e-6, "{pair:?}");
+            assert!(a.abs_diff(c) > turn / 2 && (pair.thickness - pair.distance).abs() < 1e-6, "{pair:?}");
         }
     }
     assert!(across > 100, "{across}");
