@@ -9,6 +9,7 @@ mod common;
 
 mod bending;
 mod broken;
+mod chains;
 mod character;
 mod cloth;
 mod contact;

@@ -11,9 +11,11 @@ use crate::geometry::Walls;
 use crate::math::parallel::{self, Tasks, fold, worst};
 use crate::math::simd::{Index, Kernel, Sum, Width, dispatch, packs};
 use crate::math::{Lane, Quat, Real, Row, Vec3, xyz};
+use chains::Chain;
 use std::marker::PhantomData;
 use std::ops::Range;
 
+mod chains;
 mod density;
 mod neohookean;
 mod shape;
@@ -164,11 +166,12 @@ fn compliance(stiffness: f64) -> Real {
 
 impl<const N: usize, const D: usize, const P: usize> Columns<N, D, P> {
     /// `None` if a node is not one of the rows; `inverse` are the inverse inertias of frames, the rows from `points` on.
-    fn new(rows: usize, points: usize, inverse: &[Real], members: &[Members<N, D, P>]) -> Option<Self> {
+    /// The elements of `chains` stand at the end, in order and in no colour.
+    fn new(rows: usize, points: usize, inverse: &[Real], members: &[Members<N, D, P>], chains: &[Range<usize>]) -> Option<Self> {
         if members.iter().flat_map(|m| m.nodes).any(|i| i as usize >= rows) || rows > points + inverse.len() {
             return None;
         }
-        let (given, order) = sorted(rows, members);
+        let (given, order) = sorted(rows, members, chains);
         let of = |place: &u32| &members[*place as usize];
         let column = |f: &dyn Fn(&Members<N, D, P>) -> f64| -> Vec<Real> { given.iter().map(|e| f(of(e)) as Real).collect() };
         let mut nodes: [Index; N] = std::array::from_fn(|_| Index::default());
@@ -316,10 +319,16 @@ struct Order {
 }
 
 /// Elements in the order in which they are satisfied.
-fn sorted<const N: usize, const D: usize, const P: usize>(rows: usize, members: &[Members<N, D, P>]) -> (Vec<u32>, Order) {
+fn sorted<const N: usize, const D: usize, const P: usize>(
+    rows: usize,
+    members: &[Members<N, D, P>],
+    chains: &[Range<usize>],
+) -> (Vec<u32>, Order) {
+    let mut chained = vec![false; members.len()];
+    chains.iter().for_each(|chain| chained[chain.clone()].fill(true));
     let mut inside: Vec<Vec<u32>> = vec![Vec::new(); rows.div_ceil(CLUSTER)];
     let mut between = Vec::new();
-    for (e, member) in members.iter().enumerate() {
+    for (e, member) in members.iter().enumerate().filter(|(e, _)| !chained[*e]) {
         let cluster = member.nodes[0] as usize / CLUSTER;
         let whole = member.nodes.iter().all(|i| *i as usize / CLUSTER == cluster);
         if whole { inside[cluster].push(e as u32) } else { between.push(e as u32) }
@@ -329,6 +338,7 @@ fn sorted<const N: usize, const D: usize, const P: usize>(rows: usize, members: 
     let clusters = inside.iter().filter(|own| !own.is_empty()).map(|own| colored(own, members, &mut used, &mut given)).collect();
     used.fill(0);
     let between = colored(&between, members, &mut used, &mut given);
+    chains.iter().for_each(|chain| given.extend(chain.clone().map(|e| e as u32)));
     (given, Order { clusters, between })
 }
 
@@ -379,6 +389,7 @@ pub struct Projected<E, Y, const N: usize, const M: usize, const D: usize, const
     /// Strain at which each breaks, in place; empty if none does.
     limits: Vec<Real>,
     broken: Vec<Broken>,
+    chains: Vec<Chain>,
     kind: PhantomData<(E, Y)>,
 }
 
@@ -393,10 +404,28 @@ impl<E: Element<N, M, D>, Y: Law<P>, const N: usize, const M: usize, const D: us
     /// Elements over rows 0..rows, of which those from `points` on are frames with the inverse inertias `inverse` [1/(kg m²)]; `None`
     /// if a node is not one of them. `limits` are the strains at which links break (infinite: never), or empty.
     pub fn new(rows: usize, points: usize, inverse: &[Real], members: &[Members<N, D, P>], limits: &[f64]) -> Option<Self> {
-        let columns = Columns::new(rows, points, inverse, members)?;
+        Self::with_chains(rows, points, inverse, members, limits, &[])
+    }
+
+    /// The same, with `chains` of linear springs, each of which begins where the one before it ends.
+    pub fn with_chains(
+        rows: usize,
+        points: usize,
+        inverse: &[Real],
+        members: &[Members<N, D, P>],
+        limits: &[f64],
+        chains: &[Range<usize>],
+    ) -> Option<Self> {
+        let columns = Columns::new(rows, points, inverse, members, chains)?;
         let breaks = limits.iter().any(|l| l.is_finite());
         let limits = if breaks { columns.given.iter().map(|e| limits[*e as usize] as Real).collect() } else { Vec::new() };
-        Some(Self { columns, lambda: Vec::new(), limits, broken: Vec::new(), kind: PhantomData })
+        let mut start = members.len() - chains.iter().map(Range::len).sum::<usize>();
+        let places = |chain: &Range<usize>| {
+            start += chain.len();
+            Chain::new(start - chain.len()..start)
+        };
+        let chains = chains.iter().map(places).collect();
+        Some(Self { columns, lambda: Vec::new(), limits, broken: Vec::new(), chains, kind: PhantomData })
     }
 
     fn set(&mut self, place: usize, compliance: Real, damping: Real) {
@@ -410,6 +439,24 @@ impl<E: Element<N, M, D>, Y: Law<P>, const N: usize, const M: usize, const D: us
         let damping = self.columns.damping.get(place).copied().unwrap_or(0.0);
         self.broken.push(Broken { place, compliance: self.columns.compliance[place], damping });
         self.set(place, LIMP as Real, 0.0);
+    }
+
+    /// Solves the chains, each as a whole.
+    fn project_chains(&mut self, x: &mut [Row], step: &Projection<'_>) {
+        let (columns, Some(rest)) = (&self.columns, E::LENGTH) else { return };
+        let link = |place: usize| {
+            let soft = columns.compliance[place];
+            let damping = columns.damping.get(place).copied().unwrap_or(0.0);
+            chains::Given {
+                nodes: [0, 1].map(|a| columns.nodes[a].get()[place]),
+                rest: f64::from(columns.rest[rest][place]),
+                compliance: (soft < LIMP as Real).then(|| f64::from(soft)),
+                time: f64::from(soft) * f64::from(damping),
+            }
+        };
+        let rows = &*x;
+        self.chains.iter_mut().in_parallel(|chain| chain.solve(rows, step, link));
+        chains::correct(&self.chains, [columns.nodes[0].get(), columns.nodes[1].get()], x);
     }
 
     /// Lengthening over rest length; NaN of what is no link or has broken.
@@ -611,12 +658,13 @@ impl<E: Element<N, M, D>, Y: Law<P>, const N: usize, const M: usize, const D: us
         if many {
             self.lambda.resize(columns.len(), 0.0);
         }
-        let (x, first) = (Shared(x.as_mut_ptr()), step.iteration == 0);
-        let sweep = Sweep { h: step.h as Real, x, before: step.before, first, damped, plain: step.plain };
+        let (rows, first) = (Shared(x.as_mut_ptr()), step.iteration == 0);
+        let sweep = Sweep { h: step.h as Real, x: rows, before: step.before, first, damped, plain: step.plain };
         let lambda = if many { &mut self.lambda[..] } else { &mut [] };
         columns.sweep(usize::from(many), lambda, |range, lambda| {
             dispatch(Project::<_, _, N, M, D, P> { columns, range, lambda, sweep, kind });
         });
+        self.project_chains(x, step);
     }
 
     fn add_grip(&self, x: &[Row], grip: &mut [Real]) {

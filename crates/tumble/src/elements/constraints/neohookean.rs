@@ -33,7 +33,7 @@ impl Neohookean {
             damping: 0.0,
         };
         let members: Vec<_> = shears.iter().zip(volumes).map(pair).collect();
-        Some(Self { columns: Columns::new(rows, rows, &[], &members)?, lambda: Vec::new(), energy_at_rest })
+        Some(Self { columns: Columns::new(rows, rows, &[], &members, &[])?, lambda: Vec::new(), energy_at_rest })
     }
 }
 

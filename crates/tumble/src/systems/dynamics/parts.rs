@@ -191,6 +191,24 @@ impl Parts {
         (self.linear, self.nonlinear, self.objects) = (linear, nonlinear, drafts);
     }
 
+    /// Ranges of linear springs that go from point to point along a curve.
+    pub(super) fn chains(&self) -> Vec<Range<usize>> {
+        let ends: Vec<usize> = self.objects.iter().skip(1).map(|d| d.links[0]).chain([self.linear.members.len()]).collect();
+        let objects = self.objects.iter().zip(ends).filter(|(d, _)| !d.object.curve.is_empty());
+        let along = |nodes: [u32; 2]| nodes[1] == nodes[0] + 1;
+        let mut chains: Vec<Range<usize>> = Vec::new();
+        for e in objects.flat_map(|(draft, end)| draft.links[0]..end) {
+            let nodes = self.linear.members[e].nodes;
+            let joins = |chain: &&mut Range<usize>| chain.end == e && self.linear.members[e - 1].nodes[1] == nodes[0];
+            match chains.last_mut().filter(joins) {
+                Some(chain) if along(nodes) => chain.end = e + 1,
+                _ if along(nodes) => chains.push(e..e + 1),
+                _ => {}
+            }
+        }
+        chains
+    }
+
     /// The object under construction.
     pub fn object(&mut self) -> Option<&mut Object> {
         self.objects.last_mut().map(|d| &mut d.object)

@@ -65,9 +65,9 @@ impl Batches {
     /// Adds all elements of some parts.
     pub fn fill(&mut self, parts: &mut Parts) -> Result<Lists, NotARow> {
         let springs = [
-            self.springs::<Distance, Linear, 1, 1, 0>(&parts.linear)?,
-            self.springs::<Distance, Nonlinear, 1, 1, 2>(&parts.nonlinear)?,
-            self.springs::<Vector, Linear, 3, 0, 0>(&parts.vector)?,
+            self.springs::<Distance, Linear, 1, 1, 0>(&parts.linear, &parts.chains())?,
+            self.springs::<Distance, Nonlinear, 1, 1, 2>(&parts.nonlinear, &[])?,
+            self.springs::<Vector, Linear, 3, 0, 0>(&parts.vector, &[])?,
         ];
         self.add::<Distance, 2, 1, 1>(&parts.dampers, 0.0)?;
         let bending = self.add::<Bending, 6, 3, 12>(&parts.bending, 0.0)?;
@@ -95,17 +95,19 @@ impl Batches {
         grip
     }
 
-    /// Adds springs, if there are any; returns the index of the batch.
+    /// Adds springs, if there are any, as constraints with some `chains` of them; returns the index of the batch.
     fn springs<E: Pair<M, D>, Y: Law<P>, const M: usize, const D: usize, const P: usize>(
         &mut self,
         springs: &Springs<D, P>,
+        chains: &[Range<usize>],
     ) -> Result<Option<usize>, NotARow> {
         if springs.members.is_empty() {
             return Ok(None);
         }
         if let Some(inverse) = &self.projected {
+            let Springs { members, limits, .. } = springs;
             let springs =
-                Projected::<E, Y, 2, M, D, P>::new(self.rows, self.points, inverse, &springs.members, &springs.limits).ok_or(NotARow)?;
+                Projected::<E, Y, 2, M, D, P>::with_chains(self.rows, self.points, inverse, members, limits, chains).ok_or(NotARow)?;
             self.constraints.push(Box::new(springs));
             return Ok(Some(self.constraints.len() - 1));
         }
