@@ -124,7 +124,7 @@ fn pieces_keep_their_own() {
     // The halves fly apart, each turning.
     let x = positions(&sim, "b");
     let half = |i: usize| if i < 6 { (-1.0, 0.25) } else { (1.0, 0.8) };
-    let v = |i: usize| vector(half(i).0 * 2.0, 0.0, 0.0) + vector(0.0, 0.0, 3.0 * half(i).0).cross(x[i] - vector(half(i).1, 0.0, 0.0));
+    let v = |i: usize| vector(half(i).0 * 2.0, 0.0, 0.0) + vector(0.0, 0.0, 5.0 * half(i).0).cross(x[i] - vector(half(i).1, 0.0, 0.0));
     write(&mut sim, "b", "velocity", &(0..11).map(v).collect::<Vec<_>>());
     let whole = momenta(&sim);
     run(&mut sim, 12);
