@@ -50,14 +50,14 @@ class Way:
 
 
 def lengthening(plain: bool, substeps: int, sweeps: int, rate: int = FPS) -> float:
-    """By how much the chain is longer when it hangs still [m]. It is made of single springs: the links of a rope are solved as a whole."""
+    """By how much a chain of single springs is longer when it hangs still [m]; a rope's links would be solved as a whole."""
     part = LENGTH / LINKS
     springs = [{"between": [i, i + 1], "stiffness": MODULUS / part, "rest_length": part} for i in range(LINKS)]
     chain = {
         "name": "chain",
         "position": [[0, 0, -i * part] for i in range(LINKS + 1)],
         "mass": [DENSITY * part] * LINKS + [DENSITY * part / 2],
-        "pin": [0],
+        "pin": ["vertex 0"],
         "spring": springs,
     }
     words = {"iterations": sweeps, "projection": "plain" if plain else "compliant"}

@@ -168,6 +168,15 @@ impl Implicit {
         noise.sqrt()
     }
 
+    /// Round-off of the forces over the weight of everything, where steps of h [s] start; `None` without gravity.
+    pub fn noise_over_weight(&mut self, laws: &mut Laws, x: &[Row], v: &[Row], h: f64) -> Option<f64> {
+        let noise = self.linearize(laws, 0.0, x, v, h, self.solver.hessian);
+        let free = laws.masses.points().flatten().filter(|i| laws.masses.inverse(*i, x) > 0.0);
+        let mass: f64 = free.map(|i| f64::from(laws.masses.mass[i])).sum();
+        let weight = mass.sqrt() * Vector::from(laws.gravity).norm();
+        (weight > 0.0).then(|| noise / weight)
+    }
+
     fn solve(&mut self, laws: &mut Laws, x: &[Row], rhs: &[Row], out: &mut [Row], settings: &Solver) -> LinearSolve {
         if settings.linear == LinearMethod::Cholesky {
             let pinned = |i: usize| laws.masses.inverse(i, x) == 0.0;

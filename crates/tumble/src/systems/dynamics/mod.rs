@@ -139,10 +139,10 @@ impl Dynamics {
     }
 
     /// Warnings of round-off that shows in intervals of length dt [s].
-    pub fn round_off(&self, dt: f64) -> Vec<Warning> {
+    pub fn round_off(&mut self, dt: f64) -> Vec<Warning> {
         match self.stepping {
-            Stepping::Substeps(n) => self.scheme.round_off(&self.core, dt, f64::from(n)),
-            Stepping::Step(step) => self.scheme.round_off(&self.core, dt, integrators::equal_steps(dt, step)),
+            Stepping::Substeps(n) => self.scheme.round_off(&mut self.core, dt, f64::from(n)),
+            Stepping::Step(step) => self.scheme.round_off(&mut self.core, dt, integrators::equal_steps(dt, step)),
             Stepping::Automatic => Vec::new(),
         }
     }

@@ -58,7 +58,7 @@ pub trait Scheme: Send + Sync {
     }
 
     /// Warnings of round-off that shows in intervals of length dt [s] with so many sub-steps.
-    fn round_off(&self, _core: &Core, _dt: f64, _steps: f64) -> Vec<Warning> {
+    fn round_off(&mut self, _core: &mut Core, _dt: f64, _steps: f64) -> Vec<Warning> {
         Vec::new()
     }
 

@@ -194,7 +194,7 @@ impl Scheme for Projected {
     }
 
     /// A position x is known to eps |x|/2, and an acceleration to eps |x|/(2 h²).                              (positions.5)
-    fn round_off(&self, core: &Core, dt: f64, steps: f64) -> Vec<Warning> {
+    fn round_off(&mut self, core: &mut Core, dt: f64, steps: f64) -> Vec<Warning> {
         if core.constraints.is_empty() {
             return Vec::new();
         }
