@@ -175,6 +175,7 @@ def test_an_implicit_strand_that_single_precision_stiffens_is_told() -> None:
 
     def strand(segments: int, precision: str = "single", **system: Any) -> World:
         rod = {"stretch": 10.0, "bend": 5e-9}
+        floor = {"name": "floor", "shape": {"floor": {"height": -1}}}
         rope = {
             "name": "r",
             "from": [0, 0, 0],
@@ -184,7 +185,7 @@ def test_an_implicit_strand_that_single_precision_stiffens_is_told() -> None:
             "pin": ["start"],
             "rod": rod,
         }
-        return world(precision=precision, system=[system], rope=[rope | {"radius": 4e-5}])
+        return world(precision=precision, system=[system], rope=[rope | {"radius": 4e-5}], collider=[floor])
 
     def sinks(strand: World) -> float:
         strand.step(3)

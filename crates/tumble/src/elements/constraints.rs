@@ -32,6 +32,8 @@ pub use volume::{Volume, enclosed};
 const CLUSTER: usize = 4096;
 /// Elements per task, of those between clusters.
 const TASK: usize = 1024;
+/// Chains per task.
+const CHAINS: usize = 16;
 /// Compliance of what has broken, and of a damper without stiffness [m/N]: nothing that is there feels it.
 const LIMP: f64 = 1e18;
 
@@ -450,12 +452,12 @@ impl<E: Element<N, M, D>, Y: Law<P>, const N: usize, const M: usize, const D: us
             chains::Given {
                 nodes: [0, 1].map(|a| columns.nodes[a].get()[place]),
                 rest: f64::from(columns.rest[rest][place]),
-                compliance: (soft < LIMP as Real).then(|| f64::from(soft)),
+                compliance: (soft < LIMP as Real || damping > 0.0).then(|| f64::from(soft)),
                 time: f64::from(soft) * f64::from(damping),
             }
         };
         let rows = &*x;
-        self.chains.iter_mut().in_parallel(|chain| chain.solve(rows, step, link));
+        self.chains.chunks_mut(CHAINS).in_parallel(|chains| chains.iter_mut().for_each(|chain| chain.solve(rows, step, link)));
         chains::correct(&self.chains, [columns.nodes[0].get(), columns.nodes[1].get()], x);
     }
 

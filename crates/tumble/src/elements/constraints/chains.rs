@@ -1,5 +1,5 @@
 //! Links in a row, each chain solved as a whole. Sweeps from link to link carry a load along a chain of n links in n² of them; one linear
-//! system carries it at once, whatever n. Its unknowns are the ways d of the points and the multipliers of the links:
+//! system carries it at once, whatever n. Its unknowns are the displacements d of the points and the multipliers of the links:
 //!
 //!   m_i d_i + sum over links of g (I - n n^T)(d_i - d_j) = sum over links of ± n dlambda                    (positions.7)
 //!   n . (d_{i+1} - d_i) + alpha dlambda = -(C + alpha lambda),   g = max(0, -lambda/l)
@@ -8,16 +8,18 @@
 //! shakes itself to pieces. The tension is that of a first solution without g. Points and multipliers are eliminated in turn from one end to
 //! the other, in time proportional to n and with any compliance, in double precision.
 //!
+//! As in [macklin2016], later sweeps leave out what is left of the first line, of second order in the turn of a link in a sub-step.
+//!
 //! Source: [macklin2016], with the geometric stiffness of [tournier2015]. Verified in `tests/chains.rs`.
 
 use super::Projection;
 use crate::math::{Real, Row, Vec3, xyz64};
 use std::ops::Range;
 
-/// Compliance at least, over the inverse masses of both ends: rigid links between held points stay solvable.
+/// Compliance at least, h² k = 1e9 masses at most: rigid links stay solvable, also between held points.
 const RIDGE: f64 = 1e-9;
-/// Newton's method ends where no link is farther from its equation than this, over its length; or after so many steps. Mostly one is enough; the
-/// end of a whip takes more.
+/// Newton's method ends where no link is farther from its equation than this, over its length; or after so many steps. One is usually
+/// enough; the end of a whip takes more.
 const NEAR: f64 = 1e-6;
 const ROUNDS: usize = 5;
 
@@ -29,7 +31,7 @@ pub(super) struct Chain {
     links: Vec<Link>,
     /// Multipliers [kg m], kept from sweep to sweep.
     lambda: Vec<f64>,
-    /// Ways of its points [m]; scratch.
+    /// Displacements of its points [m]; scratch.
     ways: Vec<Vec3<f64>>,
     /// Where they go in this sweep [m].
     to: Vec<Vec3<f64>>,
@@ -95,7 +97,7 @@ impl Chain {
             let mut farthest = 0.0_f64;
             for (i, link) in self.links.iter_mut().enumerate() {
                 link.aim(self.to[i + 1] - self.to[i], self.lambda[i]);
-                farthest = farthest.max(if link.broken { 0.0 } else { link.c.abs() / link.rest });
+                farthest = farthest.max(if link.pulls() { link.c.abs() / link.rest } else { 0.0 });
             }
             if round > 0 && farthest < NEAR {
                 break;
@@ -122,7 +124,7 @@ impl Chain {
             let change = link.change - link.pivot * ahead;
             ahead = link.off * change;
             let tension = -(lambda + change);
-            link.g = if tension > 0.0 && link.length > 0.0 && !link.broken { tension / link.length } else { 0.0 };
+            link.g = if tension > 0.0 && link.pulls() { tension / link.length } else { 0.0 };
         }
     }
 
@@ -172,6 +174,11 @@ impl Link {
         Self { weights, rest, alpha, broken: given.compliance.is_none(), ..Self::default() }
     }
 
+    /// Whether it is there and has a direction.
+    fn pulls(&self) -> bool {
+        !self.broken && self.length > 0.0
+    }
+
     /// Its direction and error, of the way between its points.
     fn aim(&mut self, way: Vec3<f64>, lambda: f64) {
         self.length = way.norm();
@@ -179,10 +186,10 @@ impl Link {
         self.c = self.length - self.rest + self.alpha * lambda;
     }
 
-    /// Of a multiplier with this on the diagonal beside the compliance.
+    /// Of a multiplier with this on the diagonal beside the compliance; 0 of a link without a direction.
     fn inverse_pivot(&self, own: f64) -> f64 {
         let pivot = self.alpha + own;
-        if self.broken || pivot <= 0.0 { 0.0 } else { 1.0 / pivot }
+        if self.pulls() && pivot > 0.0 { 1.0 / pivot } else { 0.0 }
     }
 }
 
@@ -217,10 +224,17 @@ impl Symmetric {
         }
         let mut a = self.0;
         (0..6).for_each(|k| a[k] += other.0[k] + if k < 3 { 1.0 / w } else { 0.0 });
+        // By Cholesky's factor: cofactors cancel where the pull along a stiff rope is much more than the mass.
         let [xx, yy, zz, xy, xz, yz] = a;
-        let minors = [yy * zz - yz * yz, xx * zz - xz * xz, xx * yy - xy * xy, xz * yz - xy * zz, xy * yz - xz * yy, xy * xz - xx * yz];
-        let determinant = xx * minors[0] + xy * minors[3] + xz * minors[4];
-        Self(minors.map(|m| m / determinant))
+        let x = 1.0 / xx.sqrt();
+        let (lxy, lxz) = (xy * x, xz * x);
+        let y = 1.0 / (yy - lxy * lxy).sqrt();
+        let lyz = (yz - lxy * lxz) * y;
+        let z = 1.0 / (zz - lxz * lxz - lyz * lyz).sqrt();
+        // The inverse of the factor: rows (x, 0, 0), (yx, y, 0), (zx, zy, z).
+        let yx = -lxy * x * y;
+        let (zx, zy) = (-(lxz * x + lyz * yx) * z, -lyz * y * z);
+        Self([x * x + yx * yx + zx * zx, y * y + zy * zy, z * z, yx * y + zx * zy, zx * z, zy * z])
     }
 }
 
@@ -235,5 +249,75 @@ pub(super) fn correct(chains: &[Chain], nodes: [&[u32]; 2], x: &mut [Row]) {
                 *point = [to.x as Real, to.y as Real, to.z as Real, point[3]];
             }
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A crooked chain of unequal masses, one of them held, one link broken, half of them taut and some rigid.
+    fn crooked() -> Chain {
+        let mut seed = 1_u64;
+        let mut random = || {
+            seed = seed.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+            (seed >> 11) as f64 / (1_u64 << 53) as f64 - 0.5
+        };
+        let weights: Vec<f64> = (0..13).map(|i| if i == 5 { 0.0 } else { 100.0 * (random() + 0.6) }).collect();
+        let mut chain = Chain::new(0..12);
+        for (i, link) in chain.links.iter_mut().enumerate() {
+            let way = Vec3 { x: random(), y: random(), z: random() + 1.0 };
+            let alpha = if i % 3 == 0 { 1e-7 } else { 10.0 * (random() + 0.6) };
+            *link = Link { weights: [weights[i], weights[i + 1]], rest: 1.0, alpha, broken: i == 8, ..Link::default() };
+            link.aim(way, random());
+        }
+        chain.lambda.iter_mut().for_each(|lambda| *lambda = 0.01 * random());
+        chain
+    }
+
+    #[test]
+    fn elimination_solves_the_equations() {
+        let mut chain = crooked();
+        chain.pull();
+        let (taut, before) = (chain.links.iter().filter(|link| link.g > 0.0).count(), chain.lambda.clone());
+        assert!((3..11).contains(&taut), "{taut}");
+        chain.eliminate();
+        let mut left: Vec<Vec3<f64>> = (0..13)
+            .map(|i| chain.links.get(i).map_or_else(|| chain.links[11].weights[1], |link| link.weights[0]))
+            .zip(&chain.ways)
+            .map(|(w, d)| if w > 0.0 { *d * (1.0 / w) } else { *d })
+            .collect();
+        assert!(left[5].norm() == 0.0 && left[6].norm() > 1e-4);
+        for (i, link) in chain.links.iter().enumerate() {
+            let (way, change) = (chain.ways[i + 1] - chain.ways[i], chain.lambda[i] - before[i]);
+            let pull = (way - link.n * link.n.dot(way)) * link.g - link.n * change;
+            (left[i], left[i + 1]) = (left[i] - pull, left[i + 1] + pull);
+            let stays = if link.broken { change } else { link.n.dot(way) + link.alpha * change + link.c };
+            assert!(stays.abs() < 1e-11, "{i}: {stays:e}");
+        }
+        left[5] = Vec3::default();
+        let most = left.iter().map(|v| v.norm()).fold(0.0, f64::max);
+        assert!(most < 1e-12, "{most:e}");
+    }
+
+    #[test]
+    fn tension_is_that_of_a_solution_without_stiffness_across() {
+        let (mut across, mut without) = (crooked(), crooked());
+        across.pull();
+        without.eliminate();
+        for (link, lambda) in across.links.iter().zip(&without.lambda) {
+            let tension = if link.broken { 0.0 } else { (-lambda).max(0.0) / link.length };
+            assert!((link.g - tension).abs() < 1e-11, "{} {tension}", link.g);
+        }
+    }
+
+    #[test]
+    fn inverses_keep_what_is_soft_beside_what_is_stiff() {
+        let n = Vec3 { x: 0.6, y: 0.1, z: -0.79 }.normalized();
+        let mut stiff = Symmetric::default();
+        stiff.add_outer(n, n, 0.5e9);
+        let across = n.cross(Vec3 { x: 0.0, y: 0.0, z: 1.0 }).normalized();
+        let b = stiff.with(1.0, Symmetric::default());
+        assert!((n.dot(b.times(n)) * (1e9 + 1.0) - 1.0).abs() < 1e-5 && (across.dot(b.times(across)) - 1.0).abs() < 1e-6, "{b:?}");
     }
 }

@@ -168,9 +168,11 @@ impl Implicit {
         noise.sqrt()
     }
 
-    /// Round-off of the forces over the weight of everything, where steps of h [s] start; `None` without gravity.
+    /// Round-off of the forces, those of contact left out, over the weight of everything, where steps of h [s] start; `None` without gravity.
     pub fn noise_over_weight(&mut self, laws: &mut Laws, x: &[Row], v: &[Row], h: f64) -> Option<f64> {
+        let seen = std::mem::take(&mut self.contact.seen);
         let noise = self.linearize(laws, 0.0, x, v, h, self.solver.hessian);
+        self.contact.seen = seen;
         let free = laws.masses.points().flatten().filter(|i| laws.masses.inverse(*i, x) > 0.0);
         let mass: f64 = free.map(|i| f64::from(laws.masses.mass[i])).sum();
         let weight = mass.sqrt() * Vector::from(laws.gravity).norm();

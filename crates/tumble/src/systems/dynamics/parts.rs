@@ -191,7 +191,7 @@ impl Parts {
         (self.linear, self.nonlinear, self.objects) = (linear, nonlinear, drafts);
     }
 
-    /// Ranges of linear springs that go from point to point along a curve.
+    /// Ranges of at least two linear springs that follow one another along a curve, from each point to the next by number.
     pub(super) fn chains(&self) -> Vec<Range<usize>> {
         let ends: Vec<usize> = self.objects.iter().skip(1).map(|d| d.links[0]).chain([self.linear.members.len()]).collect();
         let objects = self.objects.iter().zip(ends).filter(|(d, _)| !d.object.curve.is_empty());
@@ -206,6 +206,7 @@ impl Parts {
                 _ => {}
             }
         }
+        chains.retain(|chain| chain.len() > 1);
         chains
     }
 

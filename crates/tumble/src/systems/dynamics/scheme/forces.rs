@@ -167,7 +167,7 @@ impl Scheme for Forces {
         let ratio = self.implicit.noise_over_weight(laws, x, v, dt / steps).filter(|ratio| *ratio > DROWNED);
         let warning = |ratio: f64| {
             let message = format!(
-                "round-off of the forces of its rods is {} times their weight, and implicit steps do not feel what they should; take method = \
+                "round-off of forces is {} times the weight of everything in it, and Newton's method ends before that weight shows; use method = \
                  \"position_based\", or precision = \"double\" with solver.linear = \"cholesky\"",
                 short(ratio)
             );
