@@ -137,9 +137,9 @@ describe("structures", () => {
     const bent: Record<string, number>[] = [];
     for (const on of [true, false]) {
       await page.selectOption("#structure", "block");
-      await page.waitForFunction(() => (window as any).tumble.session.info.scene.block);
+      await page.waitForFunction(() => (window as any).tumble.session.info.scene.block?.length);
       await page.selectOption("#structure", "sheet");
-      await page.waitForFunction(() => (window as any).tumble.session.info.scene.sheet);
+      await page.waitForFunction(() => (window as any).tumble.session.info.scene.sheet?.length);
       await page.getByRole("checkbox", { name: "Bend", exact: true }).setChecked(on);
       await page.waitForFunction((m) => (window as any).tumble.session.info.scene.sheet[0].links.bend.modulus > 0 === m, on);
       await page.click("[data-deed=bend]");
