@@ -105,6 +105,8 @@ blender:
 # A worker per core: most tests keep one busy.
 PYTEST := $(BIN)/python -m pytest -n auto --dist worksteal --durations 10
 
+# With it, what is lacking fails a test instead of skipping it.
+test-python: export TUMBLE_PREPARED := $(shell [ "$$(uname)" = Linux ] && command -v npm)
 test-python: setup openvdb wasm
 	$(PYTEST)
 

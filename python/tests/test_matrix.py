@@ -6,6 +6,7 @@ from pathlib import Path
 import matrix
 import numpy as np
 import pytest
+from needs import missing
 
 from tumble import World, _engine
 
@@ -33,7 +34,7 @@ def test_native_bits_are_the_same_on_any_count_of_threads_and_restored(tmp_path:
 
 def test_webassembly_was_there() -> None:
     if lacking := matrix.why_no_wasm():
-        pytest.skip(lacking)
+        missing(lacking)
 
 
 def test_a_single_bit_is_seen(tmp_path: Path) -> None:
@@ -59,7 +60,7 @@ def test_a_single_bit_is_seen(tmp_path: Path) -> None:
 
 def test_webassembly_that_does_something_else_is_seen(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     if lacking := matrix.why_no_wasm():
-        pytest.skip(lacking)
+        missing(lacking)
     case = matrix.Case("structures/rope", 3, 1)
     row, checkpoints = matrix.native(case, tmp_path)
     monkeypatch.setattr(matrix, "_overrides", lambda _: ['bits="portable"', "force.0.rate=0.2000001"])

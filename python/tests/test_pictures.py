@@ -14,6 +14,7 @@ import fake_run
 import numpy as np
 import pytest
 import typer
+from needs import missing
 
 import tumble.film
 import tumble.pictures
@@ -39,7 +40,7 @@ OPEN = (0.1, -0.45, 0.0)
 def renderer(request: pytest.FixtureRequest) -> str:
     name = str(request.param)
     if name not in renderers():
-        pytest.skip(f"{name} does not work here")
+        missing(f"{name} does not work here")
     return name
 
 
@@ -146,7 +147,7 @@ def test_mitsuba_works() -> None:
 
 def test_edges_have_no_more_noise_than_surfaces(monkeypatch: pytest.MonkeyPatch) -> None:
     if "mitsuba" not in renderers():
-        pytest.skip("mitsuba does not work here")
+        missing("mitsuba does not work here")
     studio = Studio(fake_run.studio(), "mitsuba", (96, 54))
     how = studio.things(2), studio.camera.unit()
     few, more = (render("mitsuba", *how, n).astype(float) for n in (4, 16))
@@ -499,7 +500,7 @@ def test_cloth_is_as_thick_as_contact_keeps_it_apart() -> None:
 @pytest.mark.parametrize("name", ["mitsuba", "pyvista"])
 def test_cloth_is_seen_from_the_side(name: str) -> None:
     if name not in renderers():
-        pytest.skip(f"{name} does not work here")
+        missing(f"{name} does not work here")
     x, triangles, _ = fake_run.lattice()
     run = fake_run.one(
         "cloth", "sheet", {"triangles": triangles}, x - x.mean(axis=0), world={"gravity": [0.0, 0.0, 0.0]}
