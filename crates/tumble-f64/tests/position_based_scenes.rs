@@ -175,7 +175,7 @@ fn tethers_hold_what_hangs() {
         format!("{sheet}density = 0.2\nlinks = {{}}\nmembrane.warp = 500\n"),
         format!("{sheet}fabric = \"interlock\"\n"),
         format!("{rope}links.structural = 5\n"),
-        format!("{rope}rod = {{ stretch = 10, bend = 1e-3 }}\n"),
+        format!("{rope}rod = {{ stretch = 10, bend = 1e-2 }}\n"),
     ] {
         let longest = |words: &str| {
             let text = format!(

@@ -28,6 +28,38 @@ fn cantilever(gamma: f64, segments: u32, extra: &str) -> Vec<Vector> {
     positions(&sim, "r")
 }
 
+/// A rod of 30 cm in 60 segments that hangs, with a = T h²/(m l) and b = B/(T l²) for its whole weight T: its speed after 8 s, and what is told.
+fn hanging(a: f64, b: f64, substeps: Option<u32>) -> (f64, Vec<String>) {
+    let (n, l, g, density) = (60_u32, 0.3, 10.0, 1e-5);
+    let h = (a * l / g).sqrt() / f64::from(n);
+    let bend = b * density * l * g * (l / f64::from(n)).powi(2);
+    let substeps = substeps.unwrap_or((1.0 / 24.0 / h).round() as u32);
+    let mut sim = simulation(&format!(
+        "{HEAD}substeps = {substeps}\n[[force]]\nkind = \"drag\"\nrate = 4\n[[rope]]\nname = \"r\"\nfrom = [0, 0, 0]\nto = [0.18, 0, -0.24]\n\
+         segments = {n}\ndensity = {density}\nradius = 4e-5\npin = [\"start\"]\nrod = {{ stretch = 100, bend = {bend:e} }}\n"
+    ));
+    let told = sim.warnings().iter().filter(|w| w.code.name() == "taut-rods").map(ToString::to_string).collect();
+    run(&mut sim, 24 * 8);
+    (sim.ledger().speed.unwrap(), told)
+}
+
+/// What shakes for ever is told, with a count of sub-steps in which it rests; what rests is not.                        (rods.10)
+#[test]
+fn a_limp_rod_that_would_shake_is_told() {
+    for (a, b) in [(0.25, 1e-3), (0.5, 0.4), (1.0, 1.0), (2.0, 3.0)] {
+        let (speed, told) = hanging(a, b, None);
+        assert!(speed < 1e-6 && told.is_empty(), "{a} {b}: {speed:e} m/s, {told:?}");
+    }
+    for (a, b) in [(0.5, 1e-3), (1.0, 0.03), (4.0, 0.3), (8.0, 1.0)] {
+        let (speed, told) = hanging(a, b, None);
+        println!("{a} {b}: {speed:.1e} m/s, {told:?}");
+        assert!(speed > 1e-3 && told.len() == 1, "{a} {b}: {speed:e} m/s, {told:?}");
+        let cure = told[0].split("take ").nth(1).and_then(|words| words.split(' ').next()).unwrap().parse().unwrap();
+        let (speed, told) = hanging(a, b, Some(cure));
+        assert!(speed < 1e-6 && told.is_empty(), "{a} {b} in {cure} sub-steps: {speed:e} m/s, {told:?}");
+    }
+}
+
 /// Drop and reach of the elastica under its own weight, by the boundary-value problem theta'' = -Gamma (1 - s) cos(theta)/L².
 #[test]
 fn a_cantilever_bends_as_the_elastica() {

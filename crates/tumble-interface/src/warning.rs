@@ -67,6 +67,8 @@ codes! {
     UnsoundMesh = "unsound-mesh",
     /// Tetrahedra that cannot bend at constant volume.
     Locking = "locking",
+    /// Rods that shake under their tension in sub-steps that long.
+    TautRods = "taut-rods",
     /// Steps so short, places so far or rods so stiff that single precision does not suffice.
     RoundOff = "round-off",
     /// A surface or line heavier or lighter than any real one.

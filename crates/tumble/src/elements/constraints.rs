@@ -82,6 +82,10 @@ pub trait Constraints: Send + Sync {
     fn softening(&self, _h: f64) -> f64 {
         1.0
     }
+    /// The longest sub-step [s] in which what hangs under this gravity [m/s²] does not shake; infinite if any is.
+    fn longest_step(&self, _x: &[Row], _gravity: f64) -> f64 {
+        f64::INFINITY
+    }
     /// Adds the stiffness with which the elements hold each row [N/m].
     fn add_grip(&self, x: &[Row], grip: &mut [Real]);
     /// Lengthening over rest length of every element that is a link, in the order in which they were given.

@@ -255,6 +255,26 @@ impl Group {
         (0..(self.n + 1) * self.count).map(bend).fold(1.0, f64::max)
     }
 
+    /// The longest sub-step in which a strand does not shake that hangs from what is held. Tension T acts in the direction of its predicted places, and
+    /// bending B implicitly: a wave across it, with s = 4 sin²(k l/2), is stable if a (3 s - b s²) < 4 for a = T h²/(m l), b = B/(T l²).  (rods.10)
+    fn longest_step(&self, x: &[Row], gravity: f64, s: usize) -> f64 {
+        let at = |i: usize| i * self.count + s;
+        let mass = |i: usize| Some(f64::from(x[self.points.get()[at(i)] as usize][3])).filter(|w| *w > 0.0).map(|w| 1.0 / w);
+        let weight: f64 = gravity * (0..=self.n).filter_map(mass).sum::<f64>();
+        if (0..=self.n).all(|i| mass(i).is_some()) {
+            return f64::INFINITY;
+        }
+        let longest = |i: usize| {
+            let (l, bend) = (1.0 / f64::from(self.stretch[0][at(i)]), at(i));
+            let soft = f64::from(self.bend[7][bend]) * l / f64::from(self.bend[4][bend]).powi(2).min(1.0);
+            let b = if self.bend[6][bend] > 0.0 { 1.0 / (soft * weight * l * l) } else { 0.0 };
+            // The largest of 3 s - b s² where s is at most 4.
+            let most = if b < 0.375 { 12.0 - 16.0 * b } else { 2.25 / b };
+            (4.0 / most * mass(i).unwrap_or(f64::INFINITY) * l / weight).sqrt()
+        };
+        (1..self.n).map(longest).fold(f64::INFINITY, f64::min)
+    }
+
     fn project(&mut self, x: Shared, step: &Projection<'_>) {
         let damped = self.damped && step.plain.is_none();
         let many = step.iterations > 1 && step.plain.is_none();
@@ -588,6 +608,11 @@ impl Constraints for Strands {
 
     fn softening(&self, h: f64) -> f64 {
         self.groups.iter().map(|group| group.softening(h)).fold(1.0, f64::max)
+    }
+
+    fn longest_step(&self, x: &[Row], gravity: f64) -> f64 {
+        let strands = self.groups.iter().flat_map(|group| (0..group.count).map(move |s| group.longest_step(x, gravity, s)));
+        strands.fold(f64::INFINITY, f64::min)
     }
 
     fn energy(&self, x: &[Row], _: Walls<'_>) -> f64 {

@@ -127,7 +127,7 @@ impl MethodRules for Rules {
             }
         };
         builder.warnings.extend(system.tangles());
-        builder.warnings.extend(system.round_off(interval));
+        builder.warnings.extend(system.doubts(interval));
         builder.warnings.extend(system.idle_attachments());
         if builder.exchange.has_bodies(builder.ids[index]) {
             system.expect_pushes();

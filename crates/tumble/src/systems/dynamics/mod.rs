@@ -138,11 +138,11 @@ impl Dynamics {
         self.features.self_contact.as_ref()?.tangled_start(&self.core)
     }
 
-    /// Warnings of round-off that shows in intervals of length dt [s].
-    pub fn round_off(&mut self, dt: f64) -> Vec<Warning> {
+    /// Warnings of what goes wrong in intervals of length dt [s].
+    pub fn doubts(&mut self, dt: f64) -> Vec<Warning> {
         match self.stepping {
-            Stepping::Substeps(n) => self.scheme.round_off(&mut self.core, dt, f64::from(n)),
-            Stepping::Step(step) => self.scheme.round_off(&mut self.core, dt, integrators::equal_steps(dt, step)),
+            Stepping::Substeps(n) => self.scheme.doubts(&mut self.core, dt, f64::from(n)),
+            Stepping::Step(step) => self.scheme.doubts(&mut self.core, dt, integrators::equal_steps(dt, step)),
             Stepping::Automatic => Vec::new(),
         }
     }

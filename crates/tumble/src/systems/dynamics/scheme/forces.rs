@@ -159,7 +159,7 @@ impl Scheme for Forces {
 
     /// Forces of stiff rods are differences of places that single precision rounds: where that is more than their weight, Newton's method cannot tell
     /// what the weight does.
-    fn round_off(&mut self, core: &mut Core, dt: f64, steps: f64) -> Vec<Warning> {
+    fn doubts(&mut self, core: &mut Core, dt: f64, steps: f64) -> Vec<Warning> {
         let Core { laws, state: State { x, v }, integrator, name, .. } = core;
         if !integrator.is_implicit() || laws.masses.frames.start == laws.masses.frames.end {
             return Vec::new();

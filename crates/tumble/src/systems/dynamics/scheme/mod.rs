@@ -57,8 +57,8 @@ pub trait Scheme: Send + Sync {
         ledger.clone()
     }
 
-    /// Warnings of round-off that shows in intervals of length dt [s] with so many sub-steps.
-    fn round_off(&mut self, _core: &mut Core, _dt: f64, _steps: f64) -> Vec<Warning> {
+    /// Warnings of what goes wrong in intervals of length dt [s] with so many sub-steps.
+    fn doubts(&mut self, _core: &mut Core, _dt: f64, _steps: f64) -> Vec<Warning> {
         Vec::new()
     }
 

@@ -31,6 +31,8 @@ use tumble_interface::{SceneError, StepError};
 /// Softening of rods by round-off, and the share of gravity that positions may lose to it, beyond which a scene is warned.
 const SOFTER: f64 = 1.05;
 const UNKNOWN: f64 = 0.1;
+/// The longest sub-step of hanging rods is that of their whole weight; what hangs lower has less.
+const SHAKES: f64 = 1.1;
 
 /// Sweeps over projected elements.
 pub struct Projected {
@@ -194,7 +196,7 @@ impl Scheme for Projected {
     }
 
     /// A position x is known to eps |x|/2, and an acceleration to eps |x|/(2 h²).                              (positions.5)
-    fn round_off(&mut self, core: &mut Core, dt: f64, steps: f64) -> Vec<Warning> {
+    fn doubts(&mut self, core: &mut Core, dt: f64, steps: f64) -> Vec<Warning> {
         if core.constraints.is_empty() {
             return Vec::new();
         }
@@ -214,6 +216,16 @@ impl Scheme for Projected {
         let far = points.filter(|x| x[3] > 0.0).map(|x| xyz64(*x).norm()).fold(0.0, f64::max);
         let unknown = 0.5 * f64::from(Real::EPSILON) * far / (h * h);
         let gravity = Vec3::from(core.laws.gravity).norm();
+        let longest = core.constraints.iter().map(|c| c.longest_step(&core.state.x, gravity)).fold(f64::INFINITY, f64::min);
+        let shakes = (h > SHAKES * longest).then(|| {
+            let message = format!(
+                "rods that hang in such short pieces shake in sub-steps of {} s, as their tension acts a sub-step late and their bending is too weak; \
+                 take {} sub-steps, longer pieces, or stiffer bend",
+                short(h),
+                (dt / longest).ceil()
+            );
+            Warning::new(Code::TautRods, format!("system \"{}\"", core.name), message)
+        });
         let lost = (gravity > 0.0 && unknown > UNKNOWN * gravity).then(|| {
             let fewer = (steps * (UNKNOWN * gravity / unknown).sqrt()).floor().max(1.0);
             warning(format!(
@@ -224,7 +236,7 @@ impl Scheme for Projected {
                 short(unknown)
             ))
         });
-        soft.into_iter().chain(lost).collect()
+        soft.into_iter().chain(lost).chain(shakes).collect()
     }
 
     fn idle_attachments(&self, core: &Core) -> Option<Warning> {
