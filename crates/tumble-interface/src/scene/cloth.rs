@@ -1,7 +1,7 @@
 //! Cloth cut from flat panels and sewn.
 
 use super::fabrics::FabricWords;
-use super::links::{Links, Pin, cloth_links, given_or};
+use super::links::{Links, Load, Pin, PointMass, cloth_links, given_or};
 use super::surfaces::{Membrane, Tear};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -66,6 +66,12 @@ pub struct Cloth {
     /// Masses that are fixed, or follow a collider.
     #[serde(default)]
     pub pin: Vec<Pin>,
+    /// Forces on some of its masses.
+    #[serde(default)]
+    pub load: Vec<Load>,
+    /// Extra masses on some of its masses.
+    #[serde(default)]
+    pub point_mass: Vec<PointMass>,
     /// Initial velocity.
     #[serde(default)]
     #[schemars(extend("x-unit" = "m/s"))]

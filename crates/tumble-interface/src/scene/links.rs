@@ -1,5 +1,6 @@
-//! Springs between neighbouring masses, and masses that are fixed: shared by ropes, sheets, blocks, nets and cloth.
+//! Springs between neighbouring masses, and masses that are fixed or loaded: shared by ropes, sheets, blocks, nets and cloth.
 
+use super::AnimatedVector;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -120,6 +121,54 @@ pub struct Region {
     #[serde(default)]
     #[schemars(extend("x-unit" = "s", "exclusiveMinimum" = 0.0))]
     pub until: Option<f64>,
+    /// Clamps the edges of the rim between them: the surface keeps its slope there, too. For sheets, nets and cloth with `hinge`, `isometric` or
+    /// `fabric`, for the whole run.
+    #[serde(default)]
+    pub clamp: bool,
+}
+
+/// Some masses of an object.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(untagged)]
+pub enum Place {
+    /// By name: `"all"`, `"start"`, `"corner 0 1"`, `"vertex 3 4"`, `"edge x-"`, `"face z+"`.
+    Words(String),
+    /// All within a radius of a point at the start.
+    Within(Within),
+}
+
+/// All masses within a radius of a point at the start.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Within {
+    /// The point.
+    #[schemars(extend("x-unit" = "m"))]
+    pub center: [f64; 3],
+    /// The radius.
+    #[schemars(extend("x-unit" = "m", "exclusiveMinimum" = 0.0))]
+    pub radius: f64,
+}
+
+/// A force on some masses of an object.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Load {
+    /// The masses.
+    pub at: Place,
+    /// The whole force, shared in proportion to their masses: along the edge of a sheet, a uniform line load. May change in time.
+    #[schemars(extend("x-unit" = "N"))]
+    pub force: AnimatedVector,
+}
+
+/// An extra mass that some masses of an object carry.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct PointMass {
+    /// The masses.
+    pub at: Place,
+    /// The whole extra mass, shared in proportion to their own.
+    #[schemars(extend("x-unit" = "kg", "exclusiveMinimum" = 0.0))]
+    pub mass: f64,
 }
 
 /// The springs that are given; otherwise none if something else makes the object elastic, or the default ones.

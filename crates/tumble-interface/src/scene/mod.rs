@@ -33,7 +33,7 @@ pub use gas::{
 pub use grids::GridBox;
 pub use hair::{Clump, Curl, Hair, HairCollisions};
 pub use heat::{Heat, HeatRegion, HeatScheme, HeatSide, HeatSides, HeatSource};
-pub use links::{Diagonals, Follow, Link, LinkSettings, Links, Pin, Region};
+pub use links::{Diagonals, Follow, Link, LinkSettings, Links, Load, Pin, Place, PointMass, Region, Within};
 pub use objects::{KINDS, Object};
 pub use output::{Camera, Expect, Look, Output, Probe};
 pub use shapes::{Collider, Figure, Mannequin, MeshFile, MeshFrame, MeshFrames, MeshRef, Motion, Moves, Pace, Pose, Shape};

@@ -1,7 +1,7 @@
 //! Structures of masses and links. Stiffness is independent of resolution: k_s = modulus x (length, area or volume that the link represents) / l0².
 
 use super::fabrics::FabricWords;
-use super::links::{Links, Pin, given_or, net_links, rope_links, sheet_links};
+use super::links::{Links, Load, Pin, PointMass, given_or, net_links, rope_links, sheet_links};
 use super::surfaces::{Fluid, Inflation, Membrane, ShapeMatching, Tear};
 use super::{MeshFile, items_above_zero};
 use schemars::JsonSchema;
@@ -38,6 +38,12 @@ pub struct Particles {
     /// Fixed masses.
     #[serde(default)]
     pub pin: Vec<Pin>,
+    /// Forces on some of its masses.
+    #[serde(default)]
+    pub load: Vec<Load>,
+    /// Extra masses on some of its masses.
+    #[serde(default)]
+    pub point_mass: Vec<PointMass>,
     /// Springs between them.
     #[serde(default)]
     pub spring: Vec<Spring>,
@@ -244,6 +250,12 @@ pub struct Rope {
     /// Fixed masses: `"start"`, `"end"`, `"vertex 3"`. A pinned end of a rod is clamped.
     #[serde(default)]
     pub pin: Vec<Pin>,
+    /// Forces on some of its masses.
+    #[serde(default)]
+    pub load: Vec<Load>,
+    /// Extra masses on some of its masses.
+    #[serde(default)]
+    pub point_mass: Vec<PointMass>,
     /// Radius in pictures.
     #[serde(default = "centimetre")]
     #[schemars(extend("x-unit" = "m", "exclusiveMinimum" = 0.0))]
@@ -359,6 +371,12 @@ pub struct Sheet {
     /// Fixed masses: `"corner 0 0"`, `"vertex 3 4"`, `"edge x-"`.
     #[serde(default)]
     pub pin: Vec<Pin>,
+    /// Forces on some of its masses.
+    #[serde(default)]
+    pub load: Vec<Load>,
+    /// Extra masses on some of its masses.
+    #[serde(default)]
+    pub point_mass: Vec<PointMass>,
     /// Initial velocity.
     #[serde(default)]
     #[schemars(extend("x-unit" = "m/s"))]
@@ -408,6 +426,12 @@ pub struct Block {
     /// Fixed masses: `"corner 0 0 0"`, `"vertex 1 2 3"`, `"face z-"`.
     #[serde(default)]
     pub pin: Vec<Pin>,
+    /// Forces on some of its masses.
+    #[serde(default)]
+    pub load: Vec<Load>,
+    /// Extra masses on some of its masses.
+    #[serde(default)]
+    pub point_mass: Vec<PointMass>,
     /// Initial velocity.
     #[serde(default)]
     #[schemars(extend("x-unit" = "m/s"))]
@@ -489,6 +513,12 @@ pub struct Net {
     /// Fixed masses: `"vertex 3"`, or all within a radius of a point.
     #[serde(default)]
     pub pin: Vec<Pin>,
+    /// Forces on some of its masses.
+    #[serde(default)]
+    pub load: Vec<Load>,
+    /// Extra masses on some of its masses.
+    #[serde(default)]
+    pub point_mass: Vec<PointMass>,
     /// Initial velocity.
     #[serde(default)]
     #[schemars(extend("x-unit" = "m/s"))]

@@ -2,6 +2,7 @@
 
 use super::Site;
 use super::lattice::Lattice;
+use super::loads::load;
 use super::pins::{Pinnable, pin};
 use crate::elements::rest_matrix;
 use tumble_interface::scene::{Block, Material};
@@ -22,7 +23,9 @@ pub fn block(site: &mut Site<'_>, thing: &Block) {
         (None, None) => site.wrong(path.as_str(), "expected links (springs), material (tetrahedra) or shape_matching"),
     }
     let first = lattice.index([0; 3]);
-    pin(site, &Pinnable { path: &path, n: &lattice.n, first, is_lattice: true }, &thing.pin);
+    let pinnable = Pinnable { path: &path, n: &lattice.n, first, is_lattice: true, clamps: false };
+    pin(site, &pinnable, &thing.pin);
+    load(site, &pinnable, &thing.load, &thing.point_mass);
     site.parts.launch(thing.velocity);
     if let Some(words) = &thing.shape_matching {
         let count: usize = lattice.n.iter().map(|n| *n as usize).product();

@@ -4,6 +4,7 @@
 use super::Site;
 use super::cut::{Cut, Stitch, cut};
 use super::dress::{beyond_sense, dress};
+use super::loads::load;
 use super::pins::{Pinnable, pin};
 use super::surface::{Rest, Surface};
 use crate::geometry::Vector;
@@ -65,7 +66,7 @@ pub fn cloth(site: &mut Site<'_>, thing: &Cloth) {
     // Corners of triangles in their panel.
     let mut cut_out: Vec<[Vector; 3]> = Vec::new();
     let mut sides: Vec<Vec<Vec<u32>>> = Vec::new();
-    let mut first = None;
+    let (mut first, mut panels) = (None, Vec::new());
     for (k, words) in cuts.iter().enumerate() {
         // Sewn sides take their count of edges from the mean of both.
         let count = |side: usize| {
@@ -128,19 +129,9 @@ pub fn cloth(site: &mut Site<'_>, thing: &Cloth) {
                 }
             }
         }
-        let words = Surface {
-            path: &path,
-            hinge: thing.hinge(),
-            isometric: thing.isometric,
-            membrane: thing.membrane.as_ref(),
-            fabric: fabric.clone(),
-            area: thing.area,
-        };
-        let rest = Rest::mesh(&own, Vector { x: 1.0, y: 0.0, z: 0.0 });
-        site.bending(&own, at, &words, &rest);
-        site.stretch(&own, at, &words, &rest);
         cut_out.extend(own.triangles.iter().map(|t| t.map(|i| Vector::from(own.vertices[i as usize]))));
         all.triangles.extend(own.triangles.iter().map(|t| t.map(|i| i + start)));
+        panels.push((own, at));
         sides.push(piece.sides.into_iter().map(|side| side.into_iter().map(|i| at + i).collect()).collect());
     }
     for (s, length) in stitches.iter().zip(&lengths) {
@@ -160,7 +151,25 @@ pub fn cloth(site: &mut Site<'_>, thing: &Cloth) {
         }
     }
     let first = first.unwrap_or(0);
-    pin(site, &Pinnable { path: &path, n: &[all.vertices.len() as u32], first, is_lattice: false }, &thing.pin);
+    let clamps = (thing.hinge() > 0.0 || thing.isometric > 0.0 || fabric.is_some()) && thing.tear.is_none();
+    let pinnable = Pinnable { path: &path, n: &[all.vertices.len() as u32], first, is_lattice: false, clamps };
+    let pins = pin(site, &pinnable, &thing.pin);
+    load(site, &pinnable, &thing.load, &thing.point_mass);
+    let words = Surface {
+        path: &path,
+        hinge: thing.hinge(),
+        isometric: thing.isometric,
+        membrane: thing.membrane.as_ref(),
+        fabric,
+        area: thing.area,
+        clamps: &pins.clamps,
+    };
+    for (own, at) in &panels {
+        let rest = Rest::mesh(own, Vector { x: 1.0, y: 0.0, z: 0.0 });
+        site.bending(own, *at, &words, &rest);
+        site.stretch(own, *at, &words, &rest);
+    }
+    pins.clamps.iter().for_each(|clamp| clamp.check(site));
     site.parts.launch(thing.velocity);
     let places: Vec<_> = all.triangles.iter().map(|t| t.map(|i| Vector::from(all.vertices[i as usize]))).collect();
     if let Some(object) = site.parts.object() {

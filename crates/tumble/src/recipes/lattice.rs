@@ -1,6 +1,7 @@
 //! Regular lattices of masses in one, two or three directions, x fastest, and their links.
 
 use super::Site;
+use super::pins::Clamp;
 use crate::geometry::Vector;
 use crate::math::rotation::from_degrees;
 use tumble_interface::scene::{Diagonals, Link, Links};
@@ -113,8 +114,9 @@ impl Lattice {
     ///
     ///   r = K2 (x2 - x0) + K3 (x3 - x0),  K2 = K3 = -1/a,  k = B w/a,  in each row of width w        (bending.11)
     ///   r of (bending.10) for the diagonal of each cell,  k = 2 B a b/(a² + b²)                       (bending.12)
-    pub fn plate(&self, site: &mut Site<'_>, stiffness: f64) {
+    pub fn plate(&self, site: &mut Site<'_>, stiffness: f64, clamps: &[Clamp]) {
         let [nx, ny, _] = self.n;
+        self.clamp(site, stiffness, clamps);
         for [i, j, _] in self.nodes() {
             // The second corner has no part: K1 = 0.
             for (a, at, n) in [(0, i, nx), (1, j, ny)] {
@@ -132,6 +134,35 @@ impl Lattice {
                 let (area, length_sq) = (self.spacing[0] * self.spacing[1], self.spacing[0].powi(2) + self.spacing[1].powi(2));
                 let k = length_sq.sqrt() / area;
                 site.parts.isometric(nodes, [k, -k, -k], 2.0 * stiffness * area / length_sq);
+            }
+        }
+    }
+
+    /// Rows that end at a clamp go on beyond it, as they are bent on this side alone: twice the stiffness.          (bending.14)
+    fn clamp(&self, site: &mut Site<'_>, stiffness: f64, clamps: &[Clamp]) {
+        for a in 0..2 {
+            let (b, along) = (1 - a, self.spacing[a]);
+            for (at, inner) in [(0, 1), (self.n[a] - 1, self.n[a] - 2)] {
+                let point = |at: u32, j: u32| {
+                    let mut node = [0; 3];
+                    (node[a], node[b]) = (at, j);
+                    self.index(node)
+                };
+                for j in 0..self.n[b] {
+                    let neighbours = [j.checked_sub(1), Some(j + 1).filter(|j| *j < self.n[b])];
+                    let held = |clamp: &Clamp| {
+                        let beside = neighbours.iter().flatten().filter(|k| clamp.holds(point(at, **k))).count();
+                        if clamp.holds(point(at, j)) { beside } else { 0 }
+                    };
+                    let Some(clamp) = clamps.iter().find(|clamp| held(clamp) > 0) else { continue };
+                    let width = 0.5 * self.spacing[b] * held(clamp) as f64;
+                    let [end, next] = [at, inner].map(|at| point(at, j));
+                    let [here, there] = [end, next].map(|point| site.parts.position(point));
+                    let ghost = clamp.ghost(site, here * 2.0 - there);
+                    let other = point(at, if j > 0 { j - 1 } else { 1 });
+                    let nodes = [end, other, ghost, next];
+                    site.parts.isometric(nodes, [0.0, -1.0 / along, -1.0 / along], 2.0 * stiffness * width / along);
+                }
             }
         }
     }

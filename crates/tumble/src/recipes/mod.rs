@@ -13,6 +13,7 @@ mod figures;
 mod galaxy;
 mod hair;
 mod lattice;
+mod loads;
 mod net;
 mod particles;
 mod pins;

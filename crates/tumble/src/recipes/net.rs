@@ -1,11 +1,12 @@
 //! Masses at the vertices of a mesh, springs along its edges.
 
 use super::Site;
+use super::loads::load;
 use super::pins::{Pinnable, pin};
 use super::surface::{Rest, Surface};
 use crate::geometry::Vector;
 use tumble_interface::fault::place;
-use tumble_interface::scene::{Net, Pattern, Pin};
+use tumble_interface::scene::{Net, Pattern, Pin, Place};
 use tumble_interface::warning::Code;
 use tumble_interface::{Mesh, Warning};
 
@@ -23,7 +24,7 @@ pub fn net(site: &mut Site<'_>, thing: &Net, mesh: &Mesh) {
     let path = format!("net \"{}\"", thing.name);
     site.parts.begin(&thing.name, 0.0);
     site.hints.extend(unsound(mesh, &path));
-    site.hints.extend(renumbered(mesh, &thing.pin, &path));
+    site.hints.extend(renumbered(mesh, thing, &path));
     let Some((fabric, density)) = site.fabric(&path, thing.fabric.as_ref(), thing.density) else { return };
     let Ok(panels) = thing.pattern.as_ref().map(|words| pattern(site, words, mesh, &path)).transpose() else { return };
     // The triangles' own planes have no axes in common; the x axis has a direction in most.
@@ -69,6 +70,10 @@ pub fn net(site: &mut Site<'_>, thing: &Net, mesh: &Mesh) {
             }
         }
     }
+    let clamps = (thing.hinge > 0.0 || thing.isometric > 0.0 || fabric.is_some()) && thing.tear.is_none();
+    let pinnable = Pinnable { path: &path, n: &[mesh.vertices.len() as u32], first, is_lattice: false, clamps };
+    let pins = pin(site, &pinnable, &thing.pin);
+    load(site, &pinnable, &thing.load, &thing.point_mass);
     let words = Surface {
         path: &path,
         hinge: thing.hinge,
@@ -76,8 +81,10 @@ pub fn net(site: &mut Site<'_>, thing: &Net, mesh: &Mesh) {
         membrane: thing.membrane.as_ref(),
         fabric,
         area: thing.area,
+        clamps: &pins.clamps,
     };
     site.bending(mesh, first, &words, &rest);
+    pins.clamps.iter().for_each(|clamp| clamp.check(site));
     site.stretch(mesh, first, &words, &rest);
     if let Some(words) = &thing.pressure {
         site.inflate(mesh, first, words, &path);
@@ -85,7 +92,6 @@ pub fn net(site: &mut Site<'_>, thing: &Net, mesh: &Mesh) {
     if let Some(words) = &thing.shape_matching {
         site.shape(first as usize..first as usize + mesh.vertices.len(), words, &path);
     }
-    pin(site, &Pinnable { path: &path, n: &[mesh.vertices.len() as u32], first, is_lattice: false }, &thing.pin);
     site.parts.launch(thing.velocity);
     if let Some(object) = site.parts.object() {
         object.triangles.clone_from(&mesh.triangles);
@@ -108,21 +114,24 @@ fn unsound(mesh: &Mesh, path: &str) -> Option<Warning> {
     mesh.unsound().map(|told| Warning::new(Code::UnsoundMesh, format!("{path}.mesh"), told))
 }
 
-/// That pins by number do not mean the numbers of the file, where those are others.
-fn renumbered(mesh: &Mesh, pins: &[Pin], path: &str) -> Option<Warning> {
+/// That places by number do not mean the numbers of the file, where those are others.
+fn renumbered(mesh: &Mesh, thing: &Net, path: &str) -> Option<Warning> {
     let [before, after] = mesh.renumbered?;
-    let is_number = |pin: &Pin| match pin {
-        Pin::Words(words) => words.trim_start().starts_with("vertex"),
-        Pin::Region(region) => region.which.as_ref().is_some_and(|words| words.trim_start().starts_with("vertex")),
+    let is_number = |words: &str| words.trim_start().starts_with("vertex");
+    let pinned = |pin: &Pin| match pin {
+        Pin::Words(words) => is_number(words),
+        Pin::Region(region) => region.which.as_deref().is_some_and(is_number),
     };
-    let told = |i: usize| {
-        let message = format!(
-            "vertices are counted from 0 without those of no triangle, and those of a seam once: vertex {before} of the file is vertex \
-             {after} here, and so on; pin by center and radius, or by these numbers, which `tumble check SCENE --repair` writes"
-        );
-        Warning::new(Code::UnsoundMesh, format!("{path}.pin[{i}]"), message)
-    };
-    pins.iter().position(is_number).map(told)
+    let at = |place: &Place| matches!(place, Place::Words(words) if is_number(words));
+    let pins = thing.pin.iter().position(pinned).map(|i| format!("pin[{i}]"));
+    let loads = || thing.load.iter().position(|load| at(&load.at)).map(|i| format!("load[{i}].at"));
+    let masses = || thing.point_mass.iter().position(|mass| at(&mass.at)).map(|i| format!("point_mass[{i}].at"));
+    let key = pins.or_else(loads).or_else(masses)?;
+    let message = format!(
+        "vertices are counted from 0 without those of no triangle, and those of a seam once: vertex {before} of the file is vertex {after} \
+         here, and so on; choose by center and radius, or by these numbers, which `tumble check SCENE --repair` writes"
+    );
+    Some(Warning::new(Code::UnsoundMesh, format!("{path}.{key}"), message))
 }
 
 fn area([a, b, c]: [Vector; 3]) -> f64 {

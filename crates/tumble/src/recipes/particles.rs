@@ -1,6 +1,7 @@
 //! Free masses, and springs between chosen ones.
 
 use super::Site;
+use super::loads::load;
 use super::pins::{Pinnable, pin};
 use crate::geometry::Vector;
 use crate::math::Random;
@@ -100,7 +101,9 @@ pub fn particles(site: &mut Site<'_>, thing: &Particles) {
             first = index;
         }
     }
-    pin(site, &Pinnable { path: &path, n: &[n as u32], first, is_lattice: false }, &thing.pin);
+    let pinnable = Pinnable { path: &path, n: &[n as u32], first, is_lattice: false, clamps: false };
+    pin(site, &pinnable, &thing.pin);
+    load(site, &pinnable, &thing.load, &thing.point_mass);
     if let Some(words) = &thing.shape_matching {
         site.shape(first as usize..first as usize + n, words, &path);
     }

@@ -3,8 +3,9 @@
 use super::Site;
 use crate::geometry::{Carrier, Collider, Vector};
 use crate::systems::dynamics::Times;
+use std::cell::Cell;
 use tumble_interface::check::plain;
-use tumble_interface::scene::{Follow, Pin, Region};
+use tumble_interface::scene::{Follow, Pin, Place, Region, Within};
 
 /// What a thing offers to pin.
 pub struct Pinnable<'a> {
@@ -16,6 +17,8 @@ pub struct Pinnable<'a> {
     pub first: u32,
     /// Whether it has a start and an end, corners and edges, or is only a list.
     pub is_lattice: bool,
+    /// Whether it is a surface whose slope a pin can hold.
+    pub clamps: bool,
 }
 
 /// The masses that pins hold for ever, in order, each once; those that they hold for some time are noted, with the times.
@@ -24,11 +27,25 @@ pub struct Pinned {
     pub always: Vec<u32>,
     /// For some time.
     pub passing: Vec<(u32, Times)>,
+    /// Where the slope is held, too.
+    pub clamps: Vec<Clamp>,
+}
+
+/// Masses at which a surface keeps its slope.
+pub struct Clamp {
+    /// The pin's place in the scene.
+    pub path: String,
+    /// The points.
+    pub points: Vec<u32>,
+    /// The collider that carries them, counted from the first, and its bone.
+    pub carrier: Option<(usize, Option<usize>)>,
+    /// Whether a slope is held.
+    used: Cell<bool>,
 }
 
 /// Holds the masses that the pins mean.
 pub fn pin(site: &mut Site<'_>, thing: &Pinnable<'_>, pins: &[Pin]) -> Pinned {
-    let mut all = Pinned { always: Vec::new(), passing: Vec::new() };
+    let mut all = Pinned { always: Vec::new(), passing: Vec::new(), clamps: Vec::new() };
     let mut following = Vec::new();
     for (i, pin) in pins.iter().enumerate() {
         let (found, follow, times) = match pin {
@@ -39,6 +56,20 @@ pub fn pin(site: &mut Site<'_>, thing: &Pinnable<'_>, pins: &[Pin]) -> Pinned {
         let carrier = follow.zip(site.solids).map(|(follow, solids)| carrier(solids, follow)).transpose();
         match found.and_then(|found| Ok((found, carrier?, times?))) {
             Ok((found, carrier, times)) => {
+                if let Pin::Region(Region { clamp: true, .. }) = pin {
+                    let path = format!("{}.pin[{i}].clamp", thing.path);
+                    match (thing.clamps, times) {
+                        (true, None) => {
+                            let points = found.iter().map(|p| p + thing.first).collect();
+                            all.clamps.push(Clamp { path, points, carrier, used: Cell::new(false) });
+                        }
+                        (true, Some(_)) => site.wrong(path, "a slope is held for the whole run; leave out from and until"),
+                        (false, _) => site.wrong(
+                            path,
+                            "only a sheet, net or cloth that has hinge, isometric or fabric, and does not tear, has a slope to hold; leave it out",
+                        ),
+                    }
+                }
                 let found = found.iter().map(|p| p + thing.first);
                 match times {
                     None => all.always.extend(found.clone()),
@@ -46,8 +77,7 @@ pub fn pin(site: &mut Site<'_>, thing: &Pinnable<'_>, pins: &[Pin]) -> Pinned {
                 }
                 let Some((solid, bone)) = carrier else { continue };
                 for point in found {
-                    let nearest = |solids: &[Collider]| solids[solid].carrier(site.parts.position(point));
-                    let carrier = bone.map_or_else(|| site.solids.map_or(Carrier::Whole, nearest), Carrier::Bone);
+                    let carrier = nearest(site.solids, (solid, bone), site.parts.position(point));
                     following.push((point, solid, carrier, times));
                 }
             }
@@ -66,6 +96,32 @@ pub fn pin(site: &mut Site<'_>, thing: &Pinnable<'_>, pins: &[Pin]) -> Pinned {
         }
     }
     all
+}
+
+/// What of a collider carries a point at x [m]: the bone, or what is nearest.
+fn nearest(solids: Option<&[Collider]>, (solid, bone): (usize, Option<usize>), x: Vector) -> Carrier {
+    bone.map_or_else(|| solids.map_or(Carrier::Whole, |solids| solids[solid].carrier(x)), Carrier::Bone)
+}
+
+impl Clamp {
+    /// Whether it holds a point.
+    pub fn holds(&self, point: u32) -> bool {
+        self.points.binary_search(&point).is_ok()
+    }
+
+    /// Whether it has an edge of the rim; told if not.
+    pub fn check(&self, site: &mut Site<'_>) {
+        if !self.used.get() {
+            site.wrong(self.path.as_str(), "no edge of the rim lies between these masses, so there is no slope to hold; leave it out");
+        }
+    }
+
+    /// A point that is held, or carried, at x [m]: what it lies beside keeps its slope.
+    pub fn ghost(&self, site: &mut Site<'_>, x: Vector) -> u32 {
+        self.used.set(true);
+        let carrier = self.carrier.map(|(solid, bone)| (solid, nearest(site.solids, (solid, bone), x)));
+        site.parts.ghost(x, carrier)
+    }
 }
 
 /// When a region is held, if not always.
@@ -98,6 +154,18 @@ fn in_table(site: &Site<'_>, thing: &Pinnable<'_>, region: &Region) -> Result<Ve
         (None, None, Some(words)) => return in_words(thing, words),
         _ => return Err("expected center and radius, or which".into()),
     };
+    within(site, thing, center, radius)
+}
+
+/// The masses of a place, counted from the first of the thing.
+pub fn masses_at(site: &Site<'_>, thing: &Pinnable<'_>, place: &Place) -> Result<Vec<u32>, String> {
+    match place {
+        Place::Words(words) => in_words(thing, words),
+        Place::Within(Within { center, radius }) => within(site, thing, *center, *radius),
+    }
+}
+
+fn within(site: &Site<'_>, thing: &Pinnable<'_>, center: [f64; 3], radius: f64) -> Result<Vec<u32>, String> {
     let count: u32 = thing.n.iter().product();
     let distance = |i: u32| (site.parts.position(thing.first + i) - Vector::from(center)).norm();
     let found: Vec<u32> = (0..count).filter(|i| distance(*i) <= radius).collect();

@@ -1,6 +1,7 @@
 //! A chain of springs, or a rod, between two points.
 
 use super::Site;
+use super::loads::load;
 use super::pins::{Pinnable, Pinned, pin};
 use crate::geometry::Vector;
 use crate::math::functions::{cos, sin};
@@ -33,7 +34,9 @@ pub fn rope(site: &mut Site<'_>, thing: &Rope) {
     if let Some(object) = site.parts.object() {
         object.curve = (0..=n).collect();
     }
-    let pins = pin(site, &Pinnable { path: &path, n: &[n + 1], first, is_lattice: true }, &thing.pin);
+    let pinnable = Pinnable { path: &path, n: &[n + 1], first, is_lattice: true, clamps: false };
+    let pins = pin(site, &pinnable, &thing.pin);
+    load(site, &pinnable, &thing.load, &thing.point_mass);
     site.parts.launch(thing.velocity);
     match (&thing.rod, &thing.links) {
         (Some(_), Some(_)) => site.wrong(format!("{path}.links"), "a rod has no links; leave out links or rod"),

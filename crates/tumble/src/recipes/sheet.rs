@@ -2,6 +2,7 @@
 
 use super::Site;
 use super::lattice::Lattice;
+use super::loads::load;
 use super::pins::{Pinnable, pin};
 use super::surface::{Rest, Surface};
 use tumble_interface::Mesh;
@@ -35,21 +36,32 @@ pub fn sheet(site: &mut Site<'_>, thing: &Sheet) {
             triangles.extend(if alternates && (i + j) % 2 == 1 { [[a, b, d], [b, c, d]] } else { [[a, b, c], [a, c, d]] });
         }
     }
-    pin(site, &Pinnable { path: &path, n: &lattice.n[..2], first, is_lattice: true }, &thing.pin);
+    let clamps = (thing.hinge > 0.0 || thing.isometric > 0.0 || fabric.is_some()) && thing.tear.is_none();
+    let pinnable = Pinnable { path: &path, n: &lattice.n[..2], first, is_lattice: true, clamps };
+    let pins = pin(site, &pinnable, &thing.pin);
+    load(site, &pinnable, &thing.load, &thing.point_mass);
     site.parts.launch(thing.velocity);
     if thing.isometric > 0.0 {
-        lattice.plate(site, thing.isometric);
+        lattice.plate(site, thing.isometric, &pins.clamps);
     }
     if thing.hinge > 0.0 || thing.area > 0.0 || thing.membrane.is_some() || fabric.is_some() {
         let vertices: Vec<_> = lattice.nodes().map(|node| site.parts.position(lattice.index(node)).into()).collect();
-        let words =
-            Surface { path: &path, hinge: thing.hinge, isometric: 0.0, membrane: thing.membrane.as_ref(), fabric, area: thing.area };
+        let words = Surface {
+            path: &path,
+            hinge: thing.hinge,
+            isometric: 0.0,
+            membrane: thing.membrane.as_ref(),
+            fabric,
+            area: thing.area,
+            clamps: &pins.clamps,
+        };
         let rows = Mesh { vertices: vertices.clone(), triangles: straight, ..Mesh::default() };
         site.bending(&rows, first, &words, &Rest::mesh(&rows, warp));
         let mesh = Mesh { vertices, triangles, ..Mesh::default() };
         site.stretch(&mesh, first, &words, &Rest::mesh(&mesh, warp));
         triangles = mesh.triangles;
     }
+    pins.clamps.iter().for_each(|clamp| clamp.check(site));
     let corners: Vec<_> = triangles.iter().map(|t| t.map(|i| site.parts.position(i + first))).collect();
     if let Some(object) = site.parts.object() {
         object.triangles = triangles;

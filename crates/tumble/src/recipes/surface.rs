@@ -1,6 +1,7 @@
 //! What makes triangles of points elastic: bending across their edges, stretch and area of each, the volume that they enclose.
 
 use super::Site;
+use super::pins::Clamp;
 use crate::elements::{Bending, IsometricBend, Membrane, Woven, WovenBending, enclosed};
 use crate::geometry::Vector;
 use crate::math::{Signal, functions};
@@ -26,6 +27,8 @@ pub struct Surface<'a> {
     pub fabric: Option<Measured>,
     /// Stiffness against changes of area [N/m].
     pub area: f64,
+    /// Where its rim keeps its slope.
+    pub clamps: &'a [Clamp],
 }
 
 /// Where nothing of a surface is strained, and the direction of its warp.
@@ -134,6 +137,8 @@ impl Measured {
 #[derive(Clone, Copy)]
 struct Beside {
     node: u32,
+    /// Whether the edge is clamped: what lies beside it is held, as the mirror image of the triangle in its plane.
+    clamped: bool,
     /// Where its height stands on the edge, from the corner where the edge begins (0) to the next (1).
     foot: f64,
     /// Its height over the edge [m].
@@ -164,7 +169,8 @@ impl Patch {
     fn all(&self, first: u32) -> [u32; 6] {
         let node = |i: usize| self.beside.get(i).map_or(self.nodes[i], |beside| beside.node);
         let [a, b, c] = self.nodes;
-        [a, b, c, node(0), node(1), node(2)].map(|i| i + first)
+        let [d, e, f] = [0, 1, 2].map(|i| if self.beside.get(i).is_some_and(|b| b.clamped) { node(i) } else { node(i) + first });
+        [a + first, b + first, c + first, d, e, f]
     }
 
     /// Matrices with which folds give curvatures (kxx, kyy, kxy), of whom and for how much area [m²]: of the whole, by (bending.6); where six
@@ -186,11 +192,12 @@ impl Patch {
             let e = [0, 1].map(|c| one.at[1][c] - one.at[0][c]);
             let length_sq = e[0] * e[0] + e[1] * e[1];
             let (own, other) = (2.0 * area, beside.height * length_sq.sqrt());
-            // theta = kappa (h2 + h3)/2, across the edge.
-            let (x, y, over) = (e[1], -e[0], 2.0 / (length_sq.sqrt() * (own + other)));
+            // theta = kappa (h2 + h3)/2, across the edge; at a clamp, half of that on this side alone.
+            let (sum, share) = if beside.clamped { (own, own / 2.0) } else { (own + other, (own + other) / 4.0) };
+            let (x, y, over) = (e[1], -e[0], 2.0 / (length_sq.sqrt() * sum));
             let mut g = [0.0; 9];
             (g[0], g[3], g[6]) = (over * x * x, over * y * y, over * x * y);
-            (one, g, (own + other) / 4.0)
+            (one, g, share)
         };
         // What a fold would have for itself as its own neighbour is no fold.
         let folds = self.beside.iter().enumerate().filter(|(_, b)| !self.nodes.contains(&b.node));
@@ -205,6 +212,11 @@ impl Patch {
             let length_sq = e[0] * e[0] + e[1] * e[1];
             let length = length_sq.sqrt();
             let (foot, height) = ((to[0] * e[0] + to[1] * e[1]) / length_sq, (e[0] * to[1] - e[1] * to[0]) / length);
+            if beside.clamped {
+                // Of w = k n²/2, n from the edge, the fold against the plane of the clamp.                 (bending.14)
+                let (x, y) = (-e[1] / length, e[0] / length);
+                return [-height / 2.0 * x * x, -height / 2.0 * y * y, -height * x * y];
+            }
             let out = beside.height / length;
             let d = [a[0] + beside.foot * e[0] + out * e[1], a[1] + beside.foot * e[1] - out * e[0]];
             let (k2, k3) = (-1.0 / height, -1.0 / beside.height);
@@ -305,6 +317,10 @@ impl Site<'_> {
         }
         let mut beside = vec![[None; 3]; mesh.triangles.len()];
         for ([a, b], faces) in mesh.edges() {
+            if let [t] = faces[..] {
+                self.clamp(mesh, first, (words, rest), [a, b], (t as usize, &mut beside[t as usize]));
+                continue;
+            }
             let Some(Wings { nodes, faces, at }) = rest.wings([a, b], &faces) else { continue };
             let e = at[1] - at[0];
             let length_sq = e.norm_sq();
@@ -316,7 +332,7 @@ impl Site<'_> {
                 let corners = mesh.triangles[t];
                 if let Some(k) = (0..3).find(|k| [a, b].contains(&corners[*k]) && [a, b].contains(&corners[(k + 1) % 3])) {
                     let foot = if corners[k] == a { foot } else { 1.0 - foot };
-                    beside[t][k] = Some(Beside { node, foot, height });
+                    beside[t][k] = Some(Beside { node, clamped: false, foot, height });
                 }
             }
             if let (true, Some(flat)) = (words.isometric > 0.0, IsometricBend::rest(at)) {
@@ -327,6 +343,43 @@ impl Site<'_> {
         }
         for (t, beside) in beside.iter().enumerate() {
             self.bend(mesh, first, words, rest, t, beside);
+        }
+    }
+
+    /// Lets the rim edge a b of a triangle keep its slope where it is clamped: beside it lies the mirror image of the triangle.
+    fn clamp(
+        &mut self,
+        mesh: &Mesh,
+        first: u32,
+        (words, rest): (&Surface<'_>, &Rest<'_>),
+        [a, b]: [u32; 2],
+        (t, beside): (usize, &mut [Option<Beside>; 3]),
+    ) {
+        let Some(clamp) = words.clamps.iter().find(|clamp| [a, b].iter().all(|i| clamp.holds(i + first))) else { return };
+        let nodes = mesh.triangles[t];
+        let Some(i) = (0..3).find(|i| nodes[(*i + 2) % 3] != a && nodes[(*i + 2) % 3] != b) else { return };
+        let order = [0, 1, 2].map(|c| (i + c) % 3);
+        // Foot of the third corner on the edge, from the first to the second, and its height [m].
+        let over = |[x, y, z]: [Vector; 3]| {
+            let (e, to) = (y - x, z - x);
+            (e.dot(to) / e.norm_sq(), e.cross(to).norm() / e.norm())
+        };
+        let flat = rest.corners(t);
+        let (foot, height) = over(order.map(|c| flat[c]));
+        let now = order.map(|c| self.parts.position(nodes[c] + first));
+        let on_edge = now[0] + (now[1] - now[0]) * over(now).0;
+        if height.is_nan() || height <= 0.0 {
+            return;
+        }
+        let node = clamp.ghost(self, on_edge * 2.0 - now[2]);
+        beside[i] = Some(Beside { node, clamped: true, foot, height });
+        let [x, y, z] = order.map(|c| flat[c]);
+        let mirrored = (x + (y - x) * foot) * 2.0 - z;
+        if let (true, Some(flat)) = (words.isometric > 0.0, IsometricBend::rest([x, y, z, mirrored])) {
+            // The fold stands for this side of the edge alone: k = B l²/A.                                (bending.14)
+            let length = (y - x).norm();
+            let [p, q, r] = order.map(|c| nodes[c] + first);
+            self.parts.isometric([p, q, r, node], flat, words.isometric * 2.0 * length / height);
         }
     }
 
@@ -343,7 +396,7 @@ impl Site<'_> {
             let x = |i: u32| mesh.vertices[i as usize];
             let angle = |(i, b): (usize, &Beside)| {
                 let [p, q, r] = [0, 1, 2].map(|k| patch.nodes[(i + k) % 3]);
-                if rest.pattern.is_some() { 0.0 } else { Bending::angle([x(p), x(q), x(r), x(b.node)]) }
+                if rest.pattern.is_some() || b.clamped { 0.0 } else { Bending::angle([x(p), x(q), x(r), x(b.node)]) }
             };
             patch.beside.iter().enumerate().map(angle).collect::<Vec<_>>()
         };

@@ -1,6 +1,7 @@
 //! Masses under forces, and position-based dynamics.
 
 use super::{MethodRules, emitted, is_in, particles};
+use crate::forces::Load;
 use crate::geometry::motion::Pose;
 use crate::geometry::{Carrier, Collider, Vector};
 use crate::math::parallel::fold;
@@ -11,7 +12,7 @@ use crate::scene::coupling::Link;
 use crate::scene::laws::Reader;
 use crate::scene::{Assets, coincident, far, hints, locking, memory};
 use crate::system::System;
-use crate::systems::dynamics::{Anchor, Dynamics, Parts, Settings, Stepping};
+use crate::systems::dynamics::{Anchor, Dynamics, On, Parts, Settings, Stepping};
 use tumble_interface::check::short;
 use tumble_interface::looks::{Colors, FEW, Form, Look, Rgb};
 use tumble_interface::scene::{Bits, Force as Words, Hair, Integrator, Method, Scene, Shape, System as Plan};
@@ -201,6 +202,14 @@ fn fill(builder: &mut Builder<'_>, index: usize, parts: &mut Parts) {
 fn act(builder: &mut Builder<'_>, parts: &mut Parts) {
     let scene = builder.scene;
     let mut reader = Reader::new(scene, &mut builder.issues);
+    for (path, mut points, words) in std::mem::take(&mut parts.loads) {
+        let force = reader.in_plane(&path, &words);
+        points.sort_by(|a, b| a.1.total_cmp(&b.1));
+        for same in points.chunk_by(|a, b| a.1 == b.1) {
+            let law = Load { force: force.clone(), share: same[0].1 };
+            parts.forces.push((path.clone(), Box::new(law), On::Points(same.iter().map(|(point, _)| *point).collect())));
+        }
+    }
     for (i, force) in scene.force.iter().enumerate() {
         let (path, others) = (format!("force[{i}]"), others(force));
         let other = |name: &str| others.is_some_and(|(_, others)| others.iter().any(|o| o == name));
@@ -216,7 +225,7 @@ fn act(builder: &mut Builder<'_>, parts: &mut Parts) {
         }
         match reader.law(&path, force) {
             _ if on.is_empty() => {}
-            Some(law) => parts.forces.push((path, law, on)),
+            Some(law) => parts.forces.push((path, law, On::Objects(on))),
             None => {
                 builder.warnings.extend(coincident::forces(parts, &path, force, &on, others.as_deref()));
                 parts.between.push((force.clone(), on, others));

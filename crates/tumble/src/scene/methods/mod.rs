@@ -113,6 +113,8 @@ fn words_of_masses(thing: &Particles) -> impl Iterator<Item = &'static str> {
         ("mass", thing.mass != [1.0]),
         ("charge", !thing.charge.is_empty()),
         ("pin", !thing.pin.is_empty()),
+        ("load", !thing.load.is_empty()),
+        ("point_mass", !thing.point_mass.is_empty()),
         ("spring", !thing.spring.is_empty()),
         ("shape_matching", thing.shape_matching.is_some()),
         ("fluid", thing.fluid.is_some()),

@@ -19,9 +19,9 @@ pub struct Acting {
     pub name: String,
     /// The force.
     pub law: Box<dyn Force>,
-    /// Objects that it acts on.
+    /// Objects that it acts on as a whole.
     pub objects: Vec<usize>,
-    /// Their rows.
+    /// Their rows, or those of some of their points.
     pub ranges: Vec<Range<usize>>,
 }
 

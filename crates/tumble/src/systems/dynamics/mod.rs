@@ -31,7 +31,7 @@ mod sums;
 mod tear;
 
 pub use holds::Times;
-pub use parts::{Closed, Liquid, Parts, SpringPart};
+pub use parts::{Closed, Liquid, On, Parts, SpringPart};
 pub use settings::{Settings, Stepping};
 pub use tear::TearPart;
 

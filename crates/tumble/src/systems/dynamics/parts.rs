@@ -11,7 +11,7 @@ use crate::pool::Emitter;
 use crate::state::Object;
 use std::collections::HashMap;
 use std::ops::Range;
-use tumble_interface::scene::{Force as Words, HairCollisions};
+use tumble_interface::scene::{AnimatedVector, Force as Words, HairCollisions};
 use tumble_interface::{Issue, SceneError};
 
 /// A spring as recipes give it.
@@ -129,16 +129,31 @@ pub struct Parts {
     /// Points that are held for some time, as rows; and such frames, as frames.
     pub(super) holds: Vec<Hold>,
     pub(super) frame_holds: Vec<Hold>,
+    /// Places [m] of points of no object that are held beside clamped edges.
+    pub(super) ghosts: Vec<Vec3<f64>>,
     pub(super) objects: Vec<Draft>,
     pub(super) emitters: Vec<Emitter>,
-    /// Forces on each mass by itself, with the objects that they act on, counted from the first that was begun.
-    pub forces: Vec<(String, Box<dyn Force>, Vec<usize>)>,
+    /// Forces on each mass by itself, and what they act on.
+    pub forces: Vec<(String, Box<dyn Force>, On)>,
+    /// Forces [N] on some points, with the share of each.
+    pub loads: Vec<(String, Vec<(u32, f64)>, AnimatedVector)>,
     /// The air around the surfaces of some objects.
     pub airs: Vec<(Air, Vec<usize>)>,
     /// Times of the run at which forces that change in time are tried [s].
     pub times: Vec<f64>,
     /// Forces between masses of some objects, and the other objects that the words name.
     pub between: Vec<(Words, Vec<usize>, Option<Vec<usize>>)>,
+}
+
+/// The number of the first point that belongs to no object, until all others are there.
+const GHOST: u32 = 1 << 31;
+
+/// What a force acts on.
+pub enum On {
+    /// Objects, counted from the first that was begun.
+    Objects(Vec<usize>),
+    /// Points.
+    Points(Vec<u32>),
 }
 
 /// An object and how many links of each kind there were before it.
@@ -302,6 +317,44 @@ impl Parts {
             object.points.end = n;
         }
         n as u32 - 1
+    }
+
+    /// Adds a point of no object, held at x [m] or carried by a collider, counted from the first.
+    pub fn ghost(&mut self, x: Vec3<f64>, carrier: Option<(usize, Carrier)>) -> u32 {
+        let point = GHOST + self.ghosts.len() as u32;
+        self.ghosts.push(x);
+        if let Some((collider, carrier)) = carrier {
+            self.followers.push(Follower { row: point as usize, collider, carrier, place: x, frame: None, times: Times::ALWAYS });
+        }
+        point
+    }
+
+    /// Counts the points of no object after those of all objects.
+    pub(super) fn place_ghosts(&mut self) {
+        let first = self.points.len() as u32;
+        let place = |node: &mut u32| *node = if *node >= GHOST { *node - GHOST + first } else { *node };
+        self.points.extend(self.ghosts.drain(..).map(|x| (x, Vec3::default(), 0.0, true)));
+        self.bending.iter_mut().flat_map(|m| &mut m.nodes).for_each(place);
+        self.isometric.iter_mut().flat_map(|m| &mut m.nodes).for_each(place);
+        self.woven_bending.iter_mut().flat_map(|m| &mut m.nodes).for_each(place);
+        for follower in self.followers.iter_mut().filter(|f| f.row >= GHOST as usize) {
+            follower.row = follower.row - GHOST as usize + first as usize;
+        }
+    }
+
+    /// Adds a force [N] on points, with the share of each.
+    pub fn load(&mut self, path: String, points: Vec<(u32, f64)>, force: AnimatedVector) {
+        self.loads.push((path, points, force));
+    }
+
+    /// Mass of a point [kg].
+    pub fn mass(&self, point: u32) -> f64 {
+        self.points[point as usize].2
+    }
+
+    /// Makes a point heavier [kg].
+    pub fn add_mass(&mut self, point: u32, mass: f64) {
+        self.points[point as usize].2 += mass;
     }
 
     /// Adds a frame with a moment of inertia [kg m²]; returns its index among the frames.

@@ -14,7 +14,7 @@ use super::fracture::Fracture;
 use super::hair_continuum::HairContinuum;
 use super::holds::{Hold, Holds};
 use super::laws::{Acting, Laws};
-use super::parts::Parts;
+use super::parts::{On, Parts};
 use super::scale::Scale;
 use super::scheme::{self, Forces, Projected, Scheme};
 use super::settings::Settings;
@@ -35,6 +35,7 @@ impl Parts {
     /// The system.
     pub fn build(mut self, settings: Settings) -> Result<Dynamics, SceneError> {
         self.check_range()?;
+        self.place_ghosts();
         scheme::check(&self, &settings)?;
         if self.tearing_surface().is_some() {
             self.halve_links();
@@ -70,9 +71,14 @@ impl Parts {
             fracture: Fracture::new(tears),
             intersection_counter,
         };
-        let forces = self.forces.into_iter().map(|(name, law, on)| {
-            let on = objects.placed(&on);
-            Acting { name, law, ranges: objects.rows(&on), objects: on }
+        let forces = self.forces.into_iter().map(|(name, law, on)| match on {
+            On::Objects(on) => {
+                let on = objects.placed(&on);
+                Acting { name, law, ranges: objects.rows(&on), objects: on }
+            }
+            On::Points(points) => {
+                Acting { name, law, ranges: points.into_iter().map(|i| i as usize..i as usize + 1).collect(), objects: Vec::new() }
+            }
         });
         let laws = Laws {
             grip,
