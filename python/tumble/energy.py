@@ -23,6 +23,9 @@ TOO_MUCH = 1.0
 NOISE = 1e-3
 """Of the largest energy of a kind, what may be gained by rounding."""
 
+LOADED = ("particles", "rope", "sheet", "block", "net", "cloth")
+"""Kinds of objects that can be loaded."""
+
 _GIVE = {"wind", "air", "flock", "acceleration", "electric", "vortex", "turbulence", "propulsion"}
 _ALIVE = {"animated_mesh", "character", "mannequin"}
 _TAKE = {"drag", "wind", "air", "viscosity", "flock", "propulsion"}
@@ -35,7 +38,23 @@ def sources(scene: Tree) -> list[str]:
     found += [f'emitter "{e["name"]}"' for e in scene["emitter"]]
     found += [f'gas "{g["name"]}"' for g in scene["gas"] if g.get("bodies") or g.get("sheet")]
     found += [f"{kind} {thing['name']}" for kind, thing in _things(scene) if _inflates(thing.get("pressure"))]
-    return found
+    return found + _driven(scene)
+
+
+def _driven(scene: Tree) -> list[str]:
+    """What has another potential at another time."""
+    gravity = ["world.gravity"] if _changes(scene["world"]["gravity"]) else []
+    loaded = [(kind, thing) for kind in LOADED for thing in scene[kind]]
+    loads = [
+        f'{kind} "{thing["name"]}"'
+        for kind, thing in loaded
+        if any(_changes([load["force"]]) for load in thing["load"])
+    ]
+    return (
+        gravity
+        + loads
+        + [f'anchor "{a["name"]}"' for a in scene["anchor"] if _changes([a["stiffness"], a["rest_length"]])]
+    )
 
 
 def _inflates(pressure: Tree | None) -> bool:
@@ -55,6 +74,7 @@ def joined(scene: Tree) -> bool:
 def sinks(scene: Tree) -> list[str]:
     """Sinks of energy."""
     found = [f"force.{i} ({f['kind']})" for i, f in enumerate(scene["force"]) if f["kind"] in _TAKE or _open(f)]
+    found += _driven(scene)
     found += [f'collider "{c["name"]}"' for c in scene["collider"]]
     found += [f'emitter "{e["name"]}"' for e in scene["emitter"] if e["lifetime"] is not None or e["kill"]]
     found += [f"{kind} {thing['name']}" for kind, thing in _things(scene) if _damped(thing)]

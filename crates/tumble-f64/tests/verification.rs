@@ -7,6 +7,7 @@
 
 mod common;
 
+mod animated;
 mod bending;
 mod broken;
 mod chains;

@@ -53,7 +53,7 @@ def field_matrix(fields: list[Tree]) -> tuple[Floats, Floats] | None:
     a, b = np.zeros((3, 3)), np.zeros(3)
     for field in fields:
         kind = field["kind"]
-        if kind not in ("uniform", "swirl", "sink") or not _is_constant(
+        if kind not in ("uniform", "swirl", "sink") or not is_constant(
             field["velocity" if kind == "uniform" else "rate"]
         ):
             return None
@@ -73,7 +73,7 @@ def field_matrix(fields: list[Tree]) -> tuple[Floats, Floats] | None:
     return a, b
 
 
-def _is_constant(value: Any) -> bool:
+def is_constant(value: Any) -> bool:
     """Whether an animated value is a number, or a vector of numbers, and neither formula nor keyframes."""
     parts = value if isinstance(value, list) else [value]
     return all(isinstance(part, int | float) for part in parts)
@@ -108,14 +108,20 @@ def springs(tree: Tree, world: World) -> Linear | None:
     pinned = np.zeros(len(x), dtype=bool)
     pinned[np.asarray(topology.get("pinned", []), dtype=int)] = True
     moving = np.flatnonzero(~pinned)
+    if not is_constant(tree["world"]["gravity"]) or thing["load"] or thing["point_mass"]:
+        return None
     constant = np.tile(np.asarray(tree["world"]["gravity"], dtype=float), (len(x), 1))
     drag = np.zeros(len(x))
     for force in tree["force"]:
         if force.get("on") is not None and name not in force["on"]:
             continue
-        if force["kind"] == "drag" and not force.get("quadratic"):
-            drag += force.get("coefficient", 0.0) / mass + force.get("rate", 0.0)
-        elif force["kind"] == "acceleration" and _is_constant(force["value"]):
+        if (
+            force["kind"] == "drag"
+            and not force.get("quadratic")
+            and is_constant([force["coefficient"], force["rate"]])
+        ):
+            drag += force["coefficient"] / mass + force["rate"]
+        elif force["kind"] == "acceleration" and is_constant(force["value"]):
             constant = constant + np.asarray(force["value"], dtype=float)
         else:
             return None

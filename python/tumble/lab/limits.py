@@ -9,7 +9,7 @@ import numpy as np
 
 from tumble._engine import StepError, World
 from tumble.lab.cells import BLEW_UP, MOST, SKIPPED, STOPPED, SURVIVED, Cell, Purse, run
-from tumble.lab.exact import Floats
+from tumble.lab.exact import Floats, is_constant
 from tumble.lab.schemes import BY_WORD, Scheme
 from tumble.lab.subject import GROWTH, PERIODS, Subject
 
@@ -143,7 +143,8 @@ def _growth(subject: Subject) -> Callable[[World], bool]:
             extent = max(extent, float(np.abs(solution.at(np.pi / subject.rate) - subject.start).max()) / 2)
     else:
         first = subject.world(BY_WORD["rk4"], 1.0, 1, 1).ledger
-        gravity = float(np.linalg.norm(subject.tree["world"]["gravity"]))
+        gravity = subject.tree["world"]["gravity"]
+        gravity = float(np.linalg.norm(gravity)) if is_constant(gravity) else 9.8
         scale = max(first["kinetic"], first["elastic"], first["mass"] * gravity * 2 * extent)
 
     def fine(world: World) -> bool:

@@ -121,18 +121,22 @@ class Studio:
         """Whether the camera is on the open side of a ground, not inside it."""
         return float((self.camera.position - ground.point) @ ground.normal) > 0
 
+    def _falls(self) -> bool:
+        """Whether gravity pulls down, or may."""
+        gravity = self.run.scene.get("world", {}).get("gravity", (0.0, 0.0, -9.8))
+        return not isinstance(gravity, (list, tuple)) or isinstance(gravity[2], str) or gravity[2] < 0
+
     def _grounds_below(self, points: Callable[[], Floats]) -> list[Thing]:
         """A neutral ground to catch shadows, in scenes in space where things fall and that have no ground of their own."""
         if any(o.plane is not None for o in self.stage.objects):
             return []
-        gravity = self.run.scene.get("world", {}).get("gravity", (0.0, 0.0, -9.8))
         weighs = any("mass" in columns for columns in self.run.static.values())  # Tracers do not.
         weighs = weighs or (
             any("id" in columns for columns in self.run.frame(0).values())
             and any(s.get("method") == "dynamics" for s in self.run.scene.get("system", ()))
         )
         weighs = weighs or any(o.grid is not None for o in self.stage.objects)
-        if self.stage.flat or self.stage.night or not gravity[2] < 0 or not weighs:
+        if self.stage.flat or self.stage.night or not self._falls() or not weighs:
             return []
         low, high = points().min(axis=0), points().max(axis=0)
         point = np.array([0.0, 0.0, low[2] - GAP * float(np.max(high - low))])

@@ -69,7 +69,19 @@ pub fn grid(sim: &Simulation, object: &str, name: &str) -> (Vec<f64>, Vec<usize>
 /// A solid at rest, without friction or restitution, that masses alone meet.
 pub fn solid(shape: Shape, inside: bool, thickness: f64) -> Collider {
     let (friction, belt) = (Friction::default(), Vector::default());
-    Collider { name: String::new(), shape, inside, thickness, friction, restitution: 0.0, belt, motion: None, rig: None, edges: None }
+    Collider {
+        name: String::new(),
+        shape,
+        inside,
+        thickness,
+        friction,
+        rubbing: None,
+        restitution: 0.0,
+        belt,
+        motion: None,
+        rig: None,
+        edges: None,
+    }
 }
 
 /// The largest magnitude.

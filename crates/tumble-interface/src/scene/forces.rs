@@ -10,36 +10,36 @@ use serde::{Deserialize, Serialize};
 pub enum Force {
     /// Viscous and quadratic damping f = -(k_d + c |v|) v.
     Drag {
-        /// k_d of each mass.
-        #[serde(default)]
-        #[schemars(range(min = 0.0), extend("x-unit" = "N s/m"))]
-        coefficient: f64,
+        /// k_d of each mass; may change in time.
+        #[serde(default = "nothing")]
+        #[schemars(extend("x-unit" = "N s/m"))]
+        coefficient: Animated,
         /// k_d per kilogram: independent of the resolution of an object.
-        #[serde(default)]
-        #[schemars(range(min = 0.0), extend("x-unit" = "1/s"))]
-        rate: f64,
+        #[serde(default = "nothing")]
+        #[schemars(extend("x-unit" = "1/s"))]
+        rate: Animated,
         /// c, the coefficient of the squared speed.
-        #[serde(default)]
-        #[schemars(range(min = 0.0), extend("x-unit" = "kg/m"))]
-        quadratic: f64,
+        #[serde(default = "nothing")]
+        #[schemars(extend("x-unit" = "kg/m"))]
+        quadratic: Animated,
         /// Names of objects. Default: all.
         #[serde(default)]
         on: Option<Vec<String>>,
     },
     /// Drag in moving air: f = -(k_d + c |v - u|) (v - u).
     Wind {
-        /// k_d of each mass.
-        #[serde(default)]
-        #[schemars(range(min = 0.0), extend("x-unit" = "N s/m"))]
-        coefficient: f64,
+        /// k_d of each mass; may change in time.
+        #[serde(default = "nothing")]
+        #[schemars(extend("x-unit" = "N s/m"))]
+        coefficient: Animated,
         /// k_d per kilogram.
-        #[serde(default)]
-        #[schemars(range(min = 0.0), extend("x-unit" = "1/s"))]
-        rate: f64,
+        #[serde(default = "nothing")]
+        #[schemars(extend("x-unit" = "1/s"))]
+        rate: Animated,
         /// c, the coefficient of the squared relative speed.
-        #[serde(default)]
-        #[schemars(range(min = 0.0), extend("x-unit" = "kg/m"))]
-        quadratic: f64,
+        #[serde(default = "nothing")]
+        #[schemars(extend("x-unit" = "kg/m"))]
+        quadratic: Animated,
         /// Velocity fields of the air; they are summed.
         air: Vec<Field>,
         /// Names of objects. Default: all.
@@ -494,17 +494,17 @@ pub struct Anchor {
     pub name: String,
     /// The two masses, as `"object index"`.
     pub between: [String; 2],
-    /// Spring constant.
-    #[schemars(range(min = 0.0), extend("x-unit" = "N/m"))]
-    pub stiffness: f64,
+    /// Spring constant; may change in time.
+    #[schemars(extend("x-unit" = "N/m"))]
+    pub stiffness: Animated,
     /// Damping along the spring.
     #[serde(default)]
     #[schemars(range(min = 0.0), extend("x-unit" = "N s/m"))]
     pub damping: f64,
-    /// Rest length. Default: the initial distance.
+    /// Rest length; may change in time, as that of a winch or a muscle. Default: the initial distance.
     #[serde(default)]
-    #[schemars(range(min = 0.0), extend("x-unit" = "m"))]
-    pub rest_length: Option<f64>,
+    #[schemars(extend("x-unit" = "m"))]
+    pub rest_length: Option<Animated>,
 }
 
 fn air_density() -> f64 {

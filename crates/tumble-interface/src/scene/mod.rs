@@ -202,9 +202,9 @@ impl Default for Time {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct WorldSettings {
-    /// Gravity, z up.
+    /// Gravity, z up; may change in time.
     #[schemars(extend("x-unit" = "m/s²"))]
-    pub gravity: [f64; 3],
+    pub gravity: AnimatedVector,
     /// Memory limit: a scene that needs more is refused before allocation.
     #[schemars(extend("x-unit" = "GiB", "exclusiveMinimum" = 0.0))]
     pub memory_limit: f64,
@@ -215,7 +215,7 @@ pub struct WorldSettings {
 
 impl Default for WorldSettings {
     fn default() -> Self {
-        Self { gravity: [0.0, 0.0, -9.8], memory_limit: 8.0, coupling: None }
+        Self { gravity: [0.0, 0.0, -9.8].into(), memory_limit: 8.0, coupling: None }
     }
 }
 

@@ -1,6 +1,6 @@
 //! Solid shapes and meshes from files.
 
-use super::items_above_zero;
+use super::{Animated, items_above_zero};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -16,14 +16,14 @@ pub struct Collider {
     #[serde(default)]
     #[schemars(range(min = 0.0), extend("x-unit" = "m"))]
     pub thickness: f64,
-    /// Kinetic friction coefficient (Coulomb).
-    #[serde(default)]
-    #[schemars(range(min = 0.0), extend("x-unit" = "1"))]
-    pub friction: f64,
+    /// Kinetic friction coefficient (Coulomb); may change in time.
+    #[serde(default = "smooth")]
+    #[schemars(extend("x-unit" = "1"))]
+    pub friction: Animated,
     /// Static friction coefficient, at least `friction`. Default: equal to `friction`.
     #[serde(default)]
-    #[schemars(range(min = 0.0), extend("x-unit" = "1"))]
-    pub friction_static: Option<f64>,
+    #[schemars(extend("x-unit" = "1"))]
+    pub friction_static: Option<Animated>,
     /// Speed after a bounce over speed before.
     #[serde(default)]
     #[schemars(range(min = 0.0, max = 1.0), extend("x-unit" = "1"))]
@@ -47,6 +47,10 @@ pub struct Collider {
     #[serde(default)]
     #[schemars(inner(range(min = 0.0, max = 1.0)))]
     pub color: Option<[f64; 3]>,
+}
+
+fn smooth() -> Animated {
+    0.0.into()
 }
 
 /// A rigid motion: along keyframes, then at constant velocity and spin. Without keyframes, the solid is at the position of its shape at t = 0.

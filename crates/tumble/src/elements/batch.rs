@@ -20,6 +20,10 @@ pub trait Batch: Send + Sync {
     }
     /// Potential energy [J], zero at rest (or far apart).
     fn energy(&self, x: &[Row]) -> f64;
+    /// The same at a time [s], of elements that change in time.
+    fn energy_at(&self, _t: f64, x: &[Row]) -> f64 {
+        self.energy(x)
+    }
     /// Whether that energy is stored in a deformation; else it counts among those of forces.
     fn is_elastic(&self) -> bool {
         true

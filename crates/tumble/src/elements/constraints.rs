@@ -74,6 +74,10 @@ pub trait Constraints: Send + Sync {
     fn matched(&self, _h: f64, _plain: Option<f64>) -> Option<(Range<usize>, f64)> {
         None
     }
+    /// Of elements that drive: the energy that they may bring the masses [J].
+    fn drives(&self) -> Option<f64> {
+        None
+    }
     /// Potential energy [J], zero at rest; nothing of rigid elements.
     fn energy(&self, x: &[Row], walls: Walls<'_>) -> f64;
     /// Corrects points and frames once, element by element; x[i][3] are inverse masses of points.

@@ -470,6 +470,7 @@ mod tests {
                 inside: false,
                 thickness: 0.0,
                 friction,
+                rubbing: None,
                 restitution: 0.0,
                 belt,
                 motion,

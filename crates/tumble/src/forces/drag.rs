@@ -4,7 +4,7 @@ use super::push::{Push, derivatives, push};
 use super::{Force, Group, One};
 use crate::elements::Block;
 use crate::math::rows::{self, Each};
-use crate::math::{Lane, Real, Row, Vec3, ZERO};
+use crate::math::{Lane, Real, Row, Signal, Vec3, ZERO};
 
 /// f = -(k_d + c |v|) v with k_d = coefficient + rate m.                          (particles.3)
 ///
@@ -33,20 +33,45 @@ impl Push for Drag {
     }
 }
 
-impl Force for Drag {
-    fn add(&self, _t: f64, group: Group<'_>, force: &mut [Row]) {
+impl Drag {
+    /// Adds the forces [N] on a group of masses.
+    pub fn add(&self, group: Group<'_>, force: &mut [Row]) {
         if self.quadratic == 0.0 {
             rows::each(force, group.mass, group.v, ZERO, self);
         } else {
             push(self, group, force);
         }
     }
+}
 
-    fn matrix(&self, _t: f64, one: &One) -> (Block, Block) {
-        if self.quadratic == 0.0 {
-            let d = (self.coefficient + self.rate * one.mass) as Real;
+/// Drag whose coefficients may change in time.
+pub struct Medium {
+    /// [N s/m]
+    pub coefficient: Signal,
+    /// [1/s]
+    pub rate: Signal,
+    /// [kg/m]
+    pub quadratic: Signal,
+}
+
+impl Medium {
+    /// The drag at a time [s].
+    pub fn at(&self, t: f64) -> Drag {
+        Drag { coefficient: self.coefficient.value(t), rate: self.rate.value(t), quadratic: self.quadratic.value(t) }
+    }
+}
+
+impl Force for Medium {
+    fn add(&self, t: f64, group: Group<'_>, force: &mut [Row]) {
+        self.at(t).add(group, force);
+    }
+
+    fn matrix(&self, t: f64, one: &One) -> (Block, Block) {
+        let drag = self.at(t);
+        if drag.quadratic == 0.0 {
+            let d = (drag.coefficient + drag.rate * one.mass) as Real;
             return ([0.0; 6], [d, d, d, 0.0, 0.0, 0.0]);
         }
-        derivatives(self, one.mass, one)
+        derivatives(&drag, one.mass, one)
     }
 }

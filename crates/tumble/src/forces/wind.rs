@@ -1,14 +1,14 @@
 //! Resistance of air that moves.
 
 use super::push::derivatives;
-use super::{Drag, Flow, Force, Group, One};
+use super::{Flow, Force, Group, Medium, One};
 use crate::elements::Block;
 use crate::math::{Row, ZERO, sub};
 
 /// f = -(k_d + c |v - u|) (v - u), the drag of (particles.3) in air of velocity u(x, t).      (particles.4)
 pub struct Wind {
     /// The resistance.
-    pub drag: Drag,
+    pub drag: Medium,
     /// The air.
     pub air: Flow,
 }
@@ -18,7 +18,7 @@ const BLOCK: usize = 128;
 
 impl Force for Wind {
     fn add(&self, t: f64, group: Group<'_>, force: &mut [Row]) {
-        let mut relative = [ZERO; BLOCK];
+        let (mut relative, drag) = ([ZERO; BLOCK], self.drag.at(t));
         for (b, force) in force.chunks_mut(BLOCK).enumerate() {
             let here = group.part(b * BLOCK..b * BLOCK + force.len());
             let relative = &mut relative[..force.len()];
@@ -26,12 +26,12 @@ impl Force for Wind {
             for (u, v) in relative.iter_mut().zip(here.v) {
                 *u = sub(*v, *u);
             }
-            self.drag.add(t, Group { v: relative, ..here }, force);
+            drag.add(Group { v: relative, ..here }, force);
         }
     }
 
     /// How the air differs from place to place is left out.
     fn matrix(&self, t: f64, one: &One) -> (Block, Block) {
-        derivatives(&self.drag, one.mass, &One { v: one.v - self.air.at(t, one.x), ..*one })
+        derivatives(&self.drag.at(t), one.mass, &One { v: one.v - self.air.at(t, one.x), ..*one })
     }
 }

@@ -2,6 +2,7 @@
 
 use super::motion::{Pose, Twist};
 use super::{Motion, Rig, Shape, Vector};
+use crate::math::Signal;
 use std::sync::Arc;
 use tumble_interface::Mesh;
 
@@ -21,8 +22,10 @@ pub struct Collider {
     pub inside: bool,
     /// Masses are kept this far from the surface [m].
     pub thickness: f64,
-    /// Coulomb friction.
+    /// Coulomb friction; `friction_at` has that of a time.
     pub friction: Friction,
+    /// Coefficients that change in time, of what slides and of what rests.
+    pub rubbing: Option<Arc<[Signal; 2]>>,
     /// Speed after a bounce over speed before.
     pub restitution: f64,
     /// Velocity of the surface along itself [m/s].
@@ -33,6 +36,15 @@ pub struct Collider {
     pub rig: Option<Arc<Rig>>,
     /// Its mesh at t = 0, before its motion, where edges and triangles meet those of what is soft; `None` for contact with masses only.
     pub edges: Option<Arc<Mesh>>,
+}
+
+impl Collider {
+    /// Coulomb friction at a time [s].
+    pub fn friction_at(&self, t: f64) -> Friction {
+        let Some(rubbing) = &self.rubbing else { return self.friction };
+        let [sliding, resting] = [0, 1].map(|k: usize| rubbing[k].value(t));
+        Friction { sliding, resting }
+    }
 }
 
 /// Coefficients of Coulomb friction.

@@ -229,7 +229,7 @@ fn bounds(shape: &Solid) -> Collider {
         name: String::new(),
         shape: shape.clone(),
         thickness: 0.0,
-        friction: 0.0,
+        friction: 0.0.into(),
         friction_static: None,
         restitution: 0.0,
         color: None,

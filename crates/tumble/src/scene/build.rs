@@ -11,6 +11,7 @@ use super::memory::memory;
 use super::methods::{is_in, rules};
 use super::plausible::implausible;
 use crate::exchange::{Exchange, Happening, SystemId};
+use crate::forces::Gravity;
 use crate::geometry::{Collider, Vector};
 use crate::pool::{self, Course, Origin};
 use crate::recipes::{self, Site};
@@ -35,7 +36,7 @@ pub struct Builder<'a> {
     pub scene: &'a Scene,
     pub assets: &'a Assets,
     /// Acceleration of gravity, in the plane of a scene of two dimensions [m/s²].
-    pub gravity: [f64; 3],
+    pub gravity: Gravity,
     /// Direction that counts as up.
     pub up: Vector,
     /// Length of an exchange interval [s].
@@ -83,7 +84,7 @@ pub fn build(scene: &Scene, assets: &Assets) -> Result<Built, SceneError> {
     let mut builder = Builder {
         scene,
         assets,
-        gravity: gravity(scene),
+        gravity: gravity(scene, &mut issues),
         up: if scene.dimension == 2 && scene.plane == Plane::Xy { [0.0, 1.0, 0.0] } else { [0.0, 0.0, 1.0] }.into(),
         interval: scene.frame_time() / f64::from(scene.time.exchanges),
         colliders,
@@ -179,13 +180,18 @@ fn with_clouds(scene: &Scene) -> Cow<'_, Scene> {
     Cow::Owned(scene)
 }
 
-/// The scene's gravity, without the part that points out of the plane of a two-dimensional scene.
-fn gravity(scene: &Scene) -> [f64; 3] {
-    let mut g = scene.world.gravity;
-    if scene.dimension == 2 {
-        g[if scene.plane == Plane::Xz { 1 } else { 2 }] = 0.0;
-    }
-    g
+/// The scene's gravity, without the part of a constant one that points out of the plane of a two-dimensional scene.
+fn gravity(scene: &Scene, issues: &mut Vec<Issue>) -> Gravity {
+    let mut reader = Reader::new(scene, issues);
+    let course = match scene.world.gravity.constant() {
+        Some(mut g) => {
+            flat(scene).into_iter().for_each(|axis| g[axis] = 0.0);
+            g.into()
+        }
+        None => reader.in_plane("world.gravity", &scene.world.gravity),
+    };
+    let largest = reader.times().iter().map(|t| course.value(*t).norm()).fold(0.0, f64::max);
+    Gravity { course, largest }
 }
 
 fn solids(scene: &Scene, assets: &Assets, issues: &mut Vec<Issue>) -> (Vec<Collider>, Vec<Column>, Vec<Mesh>) {
@@ -219,7 +225,10 @@ fn solids(scene: &Scene, assets: &Assets, issues: &mut Vec<Issue>) -> (Vec<Colli
         let solid = figure.transpose().and_then(|figure| recipes::solid(thing, &meshes, figure));
         let surface = recipes::scenery(thing, &meshes, solid.as_ref().ok());
         match solid {
-            Ok(collider) => colliders.push(collider),
+            Ok(collider) => {
+                let (friction, rubbing) = Reader::new(scene, issues).friction(thing);
+                colliders.push(Collider { friction, rubbing, ..collider });
+            }
             Err((key, message)) => issues.push(Issue::new(format!("collider \"{}\"{key}", thing.name), message)),
         }
         let mut add = |name: &str, data: Data| {

@@ -94,10 +94,9 @@ pub fn check(scene: &Scene) -> Vec<Issue> {
             wrong(format!("force[{i}].predators"), format!("\"{both}\" is in `on`, too; a predator is no prey of its own"));
         }
     }
-    let rubbing = scene.collider.iter().map(|c| (format!("collider \"{}\"", c.name), c.friction, c.friction_static));
     let touching = systems.iter().filter_map(|s| s.self_contact.as_ref().map(|c| (s, c)));
     let touching = touching.map(|(s, c)| (format!("system \"{}\".self_contact", s.name), c.friction, c.friction_static));
-    for (path, sliding, resting) in rubbing.chain(touching) {
+    for (path, sliding, resting) in touching {
         if let Some(resting) = resting.filter(|resting| *resting < sliding) {
             let message = format!("{resting}, expected >= {sliding}, the friction of what slides");
             wrong(format!("{path}.friction_static"), message);

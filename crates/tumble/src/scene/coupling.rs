@@ -1,7 +1,10 @@
 //! What joins systems: anchors between masses.
 
+use super::laws::Reader;
 use super::methods::place;
+use crate::elements::DrivenSpring;
 use crate::geometry::Vector;
+use crate::math::Signal;
 use crate::systems::dynamics::{Parts, SpringPart};
 use tumble_interface::Issue;
 use tumble_interface::check::suggestion;
@@ -11,9 +14,11 @@ use tumble_interface::scene::{Anchor, Scene};
 pub struct Link {
     pub name: String,
     pub ends: [(usize, u32); 2],
-    pub stiffness: f64,
+    pub stiffness: Signal,
     pub damping: f64,
-    pub rest_length: f64,
+    pub rest_length: Signal,
+    /// The largest stiffness [N/m].
+    pub stiffest: f64,
     /// 1/m1 + 1/m2 [1/kg].
     pub inverse_mass: f64,
 }
@@ -23,13 +28,17 @@ pub fn fasten(scene: &Scene, masses: &mut [Parts], issues: &mut Vec<Issue>) -> V
     let anchors: Vec<Link> = scene.anchor.iter().filter_map(|anchor| link(scene, anchor, masses, issues)).collect();
     for anchor in &anchors {
         let [(s, a), (t, b)] = anchor.ends;
-        if s == t {
+        if s == t && !(anchor.stiffness.is_constant() && anchor.rest_length.is_constant()) {
+            let Link { stiffness, damping, rest_length, stiffest, .. } = anchor;
+            let (stiffness, rest) = (stiffness.clone(), rest_length.clone());
+            masses[s].driven.push(DrivenSpring { nodes: [a, b], stiffness, rest, damping: *damping, stiffest: *stiffest });
+        } else if s == t {
             masses[s].begin(&anchor.name, 0.0);
             masses[s].spring(SpringPart {
                 ends: [a, b],
-                stiffness: anchor.stiffness,
+                stiffness: anchor.stiffest,
                 damping: anchor.damping,
-                rest: anchor.rest_length,
+                rest: anchor.rest_length.value(0.0),
                 hardening: 0.0,
                 tension_only: false,
                 break_strain: None,
@@ -77,12 +86,17 @@ fn link(scene: &Scene, anchor: &Anchor, parts: &[Parts], issues: &mut Vec<Issue>
     };
     let (a, b) = (end(0), end(1));
     let (a, b) = (a?, b?);
+    let path = |key: &str| format!("anchor \"{}\".{key}", anchor.name);
+    let mut reader = Reader::new(scene, issues);
+    let stiffness = reader.signal(&path("stiffness"), &anchor.stiffness, 0.0);
+    let rest_length = anchor.rest_length.as_ref().map(|words| reader.signal(&path("rest_length"), words, 0.0));
     Some(Link {
         name: anchor.name.clone(),
         ends: [(a.0, a.1), (b.0, b.1)],
-        stiffness: anchor.stiffness,
+        stiffest: reader.times().iter().map(|t| stiffness.value(*t)).fold(0.0, f64::max),
+        stiffness,
         damping: anchor.damping,
-        rest_length: anchor.rest_length.unwrap_or((a.2 - b.2).norm()),
+        rest_length: rest_length.unwrap_or_else(|| (a.2 - b.2).norm().into()),
         inverse_mass: a.3 + b.3,
     })
 }

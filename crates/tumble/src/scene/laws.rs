@@ -1,13 +1,15 @@
 //! From the words of forces and fields to laws: formulas are read, and what is wrong with them is told.
 
 use crate::forces::{
-    Acceleration, Air, Attraction, Current, Drag, Electric, Flow, Force, InPlane, Magnetic, OnGrid, Propulsion, Turbulence, Vortex, Wind,
+    Acceleration, Air, Attraction, Current, Electric, Flow, Force, InPlane, Magnetic, Medium, OnGrid, Propulsion, Turbulence, Vortex, Wind,
 };
+use crate::geometry::Friction;
 use crate::math::formula::Of;
 use crate::math::{Signal, Vec3, VectorSignal};
+use std::sync::Arc;
 use tumble_interface::Issue;
 use tumble_interface::check::plain;
-use tumble_interface::scene::{Animated, AnimatedVector, Field, Force as Words, Plane, Scene};
+use tumble_interface::scene::{Animated, AnimatedVector, Collider, Field, Force as Words, Plane, Scene};
 
 /// Times at which a value that changes is tried, at most.
 const TRIALS: u32 = 1000;
@@ -118,13 +120,10 @@ impl<'a> Reader<'a> {
             | Words::Viscosity { .. }
             | Words::Flock { .. }
             | Words::Air { .. } => return None,
-            Words::Drag { coefficient, rate, quadratic, .. } => {
-                Box::new(Drag { coefficient: *coefficient, rate: *rate, quadratic: *quadratic })
+            Words::Drag { coefficient, rate, quadratic, .. } => Box::new(self.medium(path, [coefficient, rate, quadratic])),
+            Words::Wind { coefficient, rate, quadratic, air, .. } => {
+                Box::new(Wind { drag: self.medium(path, [coefficient, rate, quadratic]), air: self.flow(&at("air"), air) })
             }
-            Words::Wind { coefficient, rate, quadratic, air, .. } => Box::new(Wind {
-                drag: Drag { coefficient: *coefficient, rate: *rate, quadratic: *quadratic },
-                air: self.flow(&at("air"), air),
-            }),
             Words::Attraction { center, gm, power, softening, radius, .. } => Box::new(Attraction {
                 center: self.vector(&at("center"), center, Of::Time),
                 gm: self.signal(&at("gm"), gm, ANY),
@@ -163,6 +162,29 @@ impl<'a> Reader<'a> {
     /// Times of the run at which what changes is tried [s].
     pub fn times(&self) -> &[f64] {
         &self.times
+    }
+
+    /// Friction of a collider, and its course in time if it has one.
+    pub fn friction(&mut self, thing: &Collider) -> (Friction, Option<Arc<[Signal; 2]>>) {
+        let path = |key: &str| format!("collider \"{}\".{key}", thing.name);
+        let sliding = self.signal(&path("friction"), &thing.friction, 0.0);
+        let still = thing.friction_static.as_ref().map(|words| self.signal(&path("friction_static"), words, 0.0));
+        let resting = still.unwrap_or_else(|| sliding.clone());
+        if let Some(t) = self.times.iter().copied().find(|t| resting.value(*t) < sliding.value(*t)) {
+            let at = if sliding.is_constant() && resting.is_constant() { String::new() } else { format!(" at t = {} s", plain(t)) };
+            let message = format!("{}{at}, expected >= {}, the friction of what slides", plain(resting.value(t)), plain(sliding.value(t)));
+            self.wrong(&path("friction_static"), message);
+        }
+        let friction = Friction { sliding: sliding.value(0.0), resting: resting.value(0.0) };
+        let changes = !(sliding.is_constant() && resting.is_constant());
+        (friction, changes.then(|| Arc::new([sliding, resting])))
+    }
+
+    fn medium(&mut self, path: &str, words: [&Animated; 3]) -> Medium {
+        let mut read = |key: &str, words| self.signal(&format!("{path}.{key}"), words, 0.0);
+        let [coefficient, rate, quadratic] =
+            [("coefficient", words[0]), ("rate", words[1]), ("quadratic", words[2])].map(|(key, words)| read(key, words));
+        Medium { coefficient, rate, quadratic }
     }
 
     fn vortex(&mut self, path: &str, center: &AnimatedVector, axis: [f64; 3], core: f64, values: [&Animated; 3]) -> Vortex {

@@ -15,7 +15,7 @@ pub fn looks(scene: &Scene) -> Looks {
     let mut objects: Vec<Look> = moved.collect();
     objects.extend(scene.collider.iter().map(solid));
     // One without stiffness and damping does nothing.
-    let pulling = scene.anchor.iter().filter(|anchor| anchor.stiffness > 0.0 || anchor.damping > 0.0);
+    let pulling = scene.anchor.iter().filter(|anchor| anchor.stiffness.constant() != Some(0.0) || anchor.damping > 0.0);
     let ends = pulling.filter_map(|anchor| Some([named(&anchor.between[0])?, named(&anchor.between[1])?]));
     let anchors = ends.map(|ends| ends.map(|(name, index)| (name.to_string(), index))).collect();
     Looks { objects, anchors }

@@ -78,7 +78,7 @@ pub fn implausible(scene: &Scene, assets: &Assets) -> Vec<Warning> {
         }
     }
 
-    let gravity = scene.world.gravity.iter().map(|g| g * g).sum::<f64>().sqrt();
+    let gravity = scene.world.gravity.constant().map_or(0.0, |g| g.iter().map(|g| g * g).sum::<f64>().sqrt());
     if gravity > STRONG * EARTH {
         let message = format!("{} m/s² is {} times that of the Earth; lengths are in metres", plain(gravity), short(gravity / EARTH));
         doubt(Code::ImplausibleGravity, "world.gravity".into(), message);

@@ -10,6 +10,7 @@
 //! Verified by crates/tumble-f64/tests/compressible.rs.
 
 use crate::exchange::Turn;
+use crate::forces::Gravity;
 use crate::integrators::equal_steps;
 use crate::math::functions::{cos, ln, sin};
 use crate::math::{Real, bisect};
@@ -259,8 +260,8 @@ impl Gas {
         of(0).min(of(1))
     }
 
-    /// Mass, momentum, kinetic energy and that of pressure; in a plane for a metre across it.
-    fn ledger(&self, t: f64) -> Ledger {
+    /// Mass, momentum, kinetic energy, and that of pressure and of gravity [m/s²]; in a plane for a metre across it.
+    fn ledger(&self, t: f64, gravity: [f64; 3]) -> Ledger {
         let grid = self.grid();
         let volume = grid.dx.powi(grid.dimension() as i32);
         let (c2, rho0) = (self.fluid.sound_speed * self.fluid.sound_speed, self.fluid.density);
@@ -269,7 +270,7 @@ impl Gas {
             let rho = f64::from(self.density.value(at));
             ledger.mass += volume * rho;
             ledger.elastic += volume * c2 * (rho * ln(rho / rho0) - (rho - rho0));
-            ledger.external -= volume * rho * (0..3).map(|a| self.fluid.gravity[a] * grid.point(Place::Cell, at)[a]).sum::<f64>();
+            ledger.external -= volume * rho * (0..3).map(|a| gravity[a] * grid.point(Place::Cell, at)[a]).sum::<f64>();
         }
         for (axis, part) in grid.axes().zip(&self.velocity.parts) {
             for at in part.each() {
@@ -302,7 +303,7 @@ impl Gas {
                 return Some(("velocity", std::array::from_fn(|a| at[a].min(points[a] - 1)), None));
             }
         }
-        let ledger = self.ledger(0.0);
+        let ledger = self.ledger(0.0, self.fluid.gravity);
         let ratio = (ledger.kinetic + ledger.elastic) / self.scale;
         if self.scale > 0.0 && ratio > BLOW_UP {
             let (mut worst, mut most) = ([0; 3], 0.0);
@@ -319,10 +320,12 @@ impl Gas {
 }
 
 /// How the system steps.
-#[derive(Debug, Clone, PartialEq, Default)]
+#[derive(Debug, Clone, Default)]
 pub struct Settings {
     /// Name in the scene.
     pub name: String,
+    /// Gravity.
+    pub gravity: Gravity,
     /// Sub-steps of an interval.
     pub substeps: Option<u32>,
     /// Longest sub-step [s].
@@ -342,10 +345,13 @@ impl Compressible {
     /// A system of gases.
     pub fn new(settings: Settings, mut gases: Vec<Gas>) -> Self {
         for gas in &mut gases {
-            let ledger = gas.ledger(0.0);
+            let ledger = gas.ledger(0.0, settings.gravity.at(0.0));
             // Gravity may set all of it going: as much as the fall of its mass through the box.
             let grid = gas.grid();
-            let fall = ledger.mass * (0..3).map(|a| gas.fluid.gravity[a].abs() * grid.n[a] as f64 * grid.dx).sum::<f64>();
+            let fall = match settings.gravity.course.is_constant() {
+                true => ledger.mass * (0..3).map(|a| gas.fluid.gravity[a].abs() * grid.n[a] as f64 * grid.dx).sum::<f64>(),
+                false => ledger.mass * settings.gravity.largest * grid.axes().map(|a| grid.n[a] as f64 * grid.dx).sum::<f64>(),
+            };
             gas.scale = ledger.kinetic + ledger.elastic + fall;
         }
         Self { settings, gases, watched: false, tolerant: false }
@@ -405,6 +411,7 @@ impl System for Compressible {
                 break;
             }
             for gas in &mut self.gases {
+                gas.fluid.gravity = self.settings.gravity.at(t + (i as f64 + 0.5) * h);
                 gas.step(h).map_err(|e| StepError::User(e.to_string()))?;
             }
             report.stepped(h);
@@ -471,12 +478,16 @@ impl System for Compressible {
 
     fn ledger(&self, t: f64) -> Ledger {
         let mut total = Ledger { time: t, ..Ledger::default() };
-        self.gases.iter().for_each(|gas| total.add_system(&gas.ledger(t)));
+        self.gases.iter().for_each(|gas| total.add_system(&gas.ledger(t, self.settings.gravity.at(t))));
         total
     }
 
     fn shares(&self, t: f64) -> Vec<Share> {
-        let share = |gas: &Gas| Share { system: self.settings.name.clone(), object: gas.name.clone(), ledger: gas.ledger(t) };
+        let share = |gas: &Gas| Share {
+            system: self.settings.name.clone(),
+            object: gas.name.clone(),
+            ledger: gas.ledger(t, self.settings.gravity.at(t)),
+        };
         self.gases.iter().map(share).collect()
     }
 

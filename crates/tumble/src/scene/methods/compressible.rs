@@ -50,14 +50,14 @@ impl MethodRules for Rules {
     }
 
     fn build(&self, builder: &mut Builder<'_>, index: usize) -> Option<Box<dyn System>> {
-        let (scene, plan, gravity) = (builder.scene, builder.plan(index), builder.gravity);
+        let (scene, plan, gravity) = (builder.scene, builder.plan(index), builder.gravity.clone());
         let mut gases = Vec::new();
         for words in scene.compressible.iter().filter(|words| is_in(&words.system, plan)) {
             let path = format!("compressible \"{}\"", words.name);
             let mut wrong = |key: &str, message: String| builder.issues.push(Issue::new(format!("{path}{key}"), message));
-            gases.extend(gas(words, flat(scene), gravity, &mut wrong));
+            gases.extend(gas(words, flat(scene), gravity.at(0.0), &mut wrong));
         }
-        let settings = Settings { name: plan.name.clone(), substeps: plan.substeps, step: plan.step };
+        let settings = Settings { name: plan.name.clone(), gravity, substeps: plan.substeps, step: plan.step };
         Some(Box::new(Compressible::new(settings, gases)))
     }
 }

@@ -107,7 +107,7 @@ impl MethodRules for Rules {
             self_contact: plan.self_contact.clone(),
             counted: scene.expect.max_intersections.is_some(),
             clamp: plan.clamp,
-            gravity: builder.gravity,
+            gravity: builder.gravity.clone(),
             native: scene.bits == Bits::Native,
             colliders: builder.colliders.clone(),
         };
@@ -324,11 +324,11 @@ fn hang(system: &mut Dynamics, index: usize, anchor: &Link, builder: &mut Builde
     system.add_anchor(Anchor {
         row: a as usize,
         other,
-        stiffness: anchor.stiffness,
+        stiffness: anchor.stiffness.clone(),
         damping: anchor.damping,
-        rest_length: anchor.rest_length,
+        rest_length: anchor.rest_length.clone(),
     });
-    let turn = dt * (anchor.stiffness * anchor.inverse_mass).sqrt();
+    let turn = dt * (anchor.stiffest * anchor.inverse_mass).sqrt();
     let damp = dt * anchor.damping * anchor.inverse_mass;
     if builder.scene.world.coupling.is_none() && (turn > 0.5 || damp > 0.5) {
         let times = (2.0 * turn.max(damp)).ceil();

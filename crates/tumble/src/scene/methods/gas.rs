@@ -2,6 +2,7 @@
 
 use super::{MethodRules, is_in, on_grid, place, rules};
 use crate::fluids::{Ball, Beyond, Sheet, Solids, hold};
+use crate::forces::Gravity;
 use crate::geometry::Collider;
 use crate::linalg::poisson::{Excess, Method as Solve, Params, Target};
 use crate::math::formula::{Formula, Of};
@@ -97,13 +98,14 @@ impl MethodRules for Rules {
     }
 
     fn build(&self, builder: &mut Builder<'_>, index: usize) -> Option<Box<dyn System>> {
-        let (scene, plan, gravity) = (builder.scene, builder.plan(index), builder.gravity);
+        let (scene, plan, gravity) = (builder.scene, builder.plan(index), builder.gravity.clone());
         let mut fluids = Vec::new();
         for words in scene.gas.iter().filter(|words| is_in(&words.system, plan)) {
             let (bodies, sheets) = moved(builder, words);
             let reader = Reader::new(scene, &mut builder.issues);
             let path = format!("gas \"{}\"", words.name);
-            fluids.extend(Read { words, path, reader, flat: flat(scene), solids: &builder.colliders, bodies, sheets }.fluid(gravity));
+            fluids
+                .extend(Read { words, path, reader, flat: flat(scene), solids: &builder.colliders, bodies, sheets }.fluid(gravity.clone()));
         }
         Some(Box::new(Gas::new(plan.name.clone(), plan.substeps, plan.step, fluids)))
     }
@@ -371,7 +373,7 @@ impl Read<'_, '_> {
         })
     }
 
-    fn fluid(mut self, gravity: [f64; 3]) -> Option<Fluid> {
+    fn fluid(mut self, gravity: Gravity) -> Option<Fluid> {
         let words = self.words;
         let before = self.reader.issues.len();
         let periodic = [&words.sides.x, &words.sides.y, &words.sides.z].map(|s| s[0] == GasSide::Periodic);
@@ -447,7 +449,8 @@ impl Read<'_, '_> {
             viscosity: words.viscosity.unwrap_or(0.0),
             viscous: words.viscous,
             sides,
-            gravity,
+            gravity: gravity.at(0.0),
+            course: gravity,
             acceleration,
             diffusivity: [smoke.diffusivity, warmth.diffusivity],
             dissipation: smoke.dissipation,

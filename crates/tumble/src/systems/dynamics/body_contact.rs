@@ -194,6 +194,8 @@ impl Moment {
 struct Course<'a> {
     body: &'a Body<'a>,
     colliders: &'a [Collider],
+    /// End of the sub-step [s].
+    time: f64,
     now: Moment,
     end: Moment,
     /// The time left [s].
@@ -204,7 +206,8 @@ struct Course<'a> {
 
 impl Course<'_> {
     fn contact(&self, m: &Meeting, share: f64) -> Contact {
-        let Collider { restitution, friction, .. } = self.colliders[m.collider];
+        let collider = &self.colliders[m.collider];
+        let (restitution, friction) = (collider.restitution, collider.friction_at(self.time));
         let arrival = self.now.velocity(self.body, m.k, share) - m.surface;
         let later = (self.end.velocity(self.body, m.k, share) - m.surface).dot(m.normal);
         let least = if m.fast { 0.0 } else { (later + m.depth / self.rest).min(0.0) - later + arrival.dot(m.normal) };
@@ -253,7 +256,7 @@ pub fn resolve(body: &Body<'_>, colliders: &[Collider], step: &Step) -> Option<C
         }
         None => (at_end(), step.h),
     };
-    let course = Course { body, colliders, now, end, rest, restitution };
+    let course = Course { body, colliders, time: step.t + step.h, now, end, rest, restitution };
     let from = course.end.motion.center;
     let mut change = None;
     for _ in 0..ROUNDS {

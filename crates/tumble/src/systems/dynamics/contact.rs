@@ -102,10 +102,11 @@ fn resolve(colliders: &[Collider], step: &Step, before: (Row, Row), x: &mut Row,
             touched = true;
             let way = position - xyz64(before.0) - surface * step.h;
             let along = way - normal * way.dot(normal);
-            let back = collider.friction.takes(along.norm(), depth);
+            let friction = collider.friction_at(step.end());
+            let back = friction.takes(along.norm(), depth);
             let position = position + normal * depth - along.normalized() * back;
             let approach = (velocity - surface).dot(normal);
-            let velocity = rebound(collider, velocity - surface, ahead, normal, step.resting) + surface;
+            let velocity = rebound((collider, friction), velocity - surface, ahead, normal, step.resting) + surface;
             if step.observed && approach < -step.resting {
                 hits(Hit { time: step.end(), x: position, v: velocity, normal });
             }
@@ -117,12 +118,12 @@ fn resolve(colliders: &[Collider], step: &Step, before: (Row, Row), x: &mut Row,
 }
 
 /// The velocity after an impact, relative to the surface; that of the path is `ahead` of it.      (contact.3, contact.14)
-fn rebound(collider: &Collider, velocity: Vector, ahead: Vector, normal: Vector, resting: f64) -> Vector {
+fn rebound((collider, friction): (&Collider, Friction), velocity: Vector, ahead: Vector, normal: Vector, resting: f64) -> Vector {
     let (approach, ahead, e) = (velocity.dot(normal), ahead.dot(normal), collider.restitution);
     let slide = velocity - normal * approach;
     let bounce = if e > 0.0 && approach < -resting { -e * (approach + ahead) - ahead } else { 0.0 };
     let after = approach.max(bounce);
-    slide - rubbed(slide, collider.friction, after - approach) + normal * after
+    slide - rubbed(slide, friction, after - approach) + normal * after
 }
 
 /// The part of a slide that friction takes.
@@ -166,7 +167,8 @@ fn meet(
         from = from + (to - from) * s - bend * (s * (1.0 - s));
         gone += left * s;
         let arriving = start + pull * (left * s) - surface;
-        start = rebound(collider, arriving, ahead, n, step.resting);
+        let friction = collider.friction_at(step.t + gone);
+        start = rebound((collider, friction), arriving, ahead, n, step.resting);
         if step.observed && arriving.dot(n) < -step.resting {
             hits(Hit { time: step.t + gone, x: from, v: start + surface, normal: n });
         }
@@ -176,7 +178,7 @@ fn meet(
             // It stays on the surface, which takes the pressing part, and rubs.
             let free = start + (pull - n * press) * rest;
             let slide = free - n * free.dot(n);
-            let after = free - rubbed(slide, collider.friction, -press * rest);
+            let after = free - rubbed(slide, friction, -press * rest);
             to = from + ((start + after) * 0.5 + surface) * rest;
             (start, end) = (start + surface, after + surface);
         } else {
@@ -261,7 +263,7 @@ pub fn stiffness(mass: Real, grip: Real, gh: f64) -> f64 {
 
 /// mu times the depth of a mass at time t.
 fn friction_depth(collider: &Collider, t: f64, (x, v): (Row, Row), resting: f64) -> f64 {
-    let Friction { sliding, resting: still } = collider.friction;
+    let Friction { sliding, resting: still } = collider.friction_at(t);
     if still == 0.0 {
         return 0.0;
     }

@@ -67,7 +67,12 @@ pub struct Core {
 impl Core {
     /// Speed that gravity gives in two steps: slower impacts do not bounce.
     pub fn resting_speed(&self, h: f64) -> f64 {
-        2.0 * h * Vec3::from(self.laws.gravity).norm()
+        2.0 * h * self.laws.gravity.largest
+    }
+
+    /// The energies up to which elements and forces that drive may bring the masses [J].
+    pub fn drives(&self) -> impl Iterator<Item = f64> {
+        self.laws.batches.iter().filter_map(|b| b.drives()).chain(self.constraints.iter().filter_map(|c| c.drives()))
     }
 
     /// Whether no mass feels another.

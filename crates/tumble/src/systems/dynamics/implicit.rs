@@ -4,7 +4,6 @@ use super::contact::{self, Penalty};
 use super::laws::{Acting, Laws};
 use crate::elements::{Batch, Weights};
 use crate::forces::Group;
-use crate::geometry::Vector;
 use crate::integrators::newton::{self, LinearSolve, Stiff};
 use crate::integrators::{Equation, Kinematics, Stage};
 use crate::linalg::blocks::{Block, Blocks};
@@ -54,7 +53,7 @@ impl Penalties {
         let stiffness = contact::stiffness(laws.masses.mass[i], laws.grip.get(i).copied().unwrap_or(0.0), gh);
         let [start_x, start_v] = &self.start;
         // Masses at rest have no normal force in the first stage yet: a speed that gravity gives in two stages is no slide.
-        let resting = 2.0 * gh * Vector::from(laws.gravity).norm();
+        let resting = 2.0 * gh * laws.gravity.largest;
         Penalty::of(&laws.colliders, (t - gh, t), stiffness, (x, v), (start_x[i], start_v[i]), resting)
     }
 }
@@ -175,7 +174,7 @@ impl Implicit {
         self.contact.seen = seen;
         let free = laws.masses.points().flatten().filter(|i| laws.masses.inverse(*i, x) > 0.0);
         let mass: f64 = free.map(|i| f64::from(laws.masses.mass[i])).sum();
-        let weight = mass.sqrt() * Vector::from(laws.gravity).norm();
+        let weight = mass.sqrt() * laws.gravity.largest;
         (weight > 0.0).then(|| noise / weight)
     }
 

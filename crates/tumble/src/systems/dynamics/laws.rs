@@ -1,7 +1,7 @@
 //! The right-hand side: accelerations of the masses at (t, x, v).
 
 use crate::elements::Batch;
-use crate::forces::{Force, Group};
+use crate::forces::{Force, Gravity, Group};
 use crate::geometry::{Collider, Vector};
 use crate::integrators::{Equation, Kinematics, Stage};
 use crate::math::parallel::{chunks, sum};
@@ -37,7 +37,7 @@ pub struct Laws {
     /// Forces of other systems [N] on rows, in their order, constant over an interval.
     pub steady: Vec<(usize, Vector)>,
     /// Gravity on points [m/s²].
-    pub gravity: [f64; 3],
+    pub gravity: Gravity,
     /// Masses and moments of inertia of the rows.
     pub masses: Masses,
     /// Solids.
@@ -109,8 +109,8 @@ impl Laws {
     }
 
     /// Turns the forces on the rows from `start` on into accelerations.
-    fn accelerate(&self, masses: &Masses, start: usize, x: &[Row], out: &mut [Row]) {
-        let [gx, gy, gz] = self.gravity.map(|g| g as Real);
+    fn accelerate(&self, t: f64, masses: &Masses, start: usize, x: &[Row], out: &mut [Row]) {
+        let [gx, gy, gz] = self.gravity.at(t).map(|g| g as Real);
         let [before, frames, after] = masses.frames.cut(start, x.len());
         for points in [before, after] {
             rows::each_by_last(&mut out[points.clone()], &x[points], [gx, gy, gz, 0.0], Weigh);
@@ -133,7 +133,7 @@ impl Laws {
         let laws = &*self;
         chunks(out, |start, out| {
             laws.sum(t, start, x, v, out);
-            laws.accelerate(&laws.masses, start, &x[start..start + out.len()], out);
+            laws.accelerate(t, &laws.masses, start, &x[start..start + out.len()], out);
         });
         Ok(())
     }
@@ -142,14 +142,14 @@ impl Laws {
     pub fn rate_alone(&self, t: f64, start: usize, x: &[Row], v: &[Row], out: &mut [Row]) {
         out.fill(ZERO);
         self.add_local(t, start, x, v, out);
-        self.accelerate(&self.masses, start, x, out);
+        self.accelerate(t, &self.masses, start, x, out);
     }
 
     /// Forces of everything but contact [N, N m].
     pub fn forces(&mut self, t: f64, x: &[Row], v: &[Row], out: &mut [Row]) -> Result<(), StepError> {
         self.begin(t, x, v)?;
         let laws = &*self;
-        let g = self.gravity.map(|g| g as Real);
+        let g = self.gravity.at(t).map(|g| g as Real);
         chunks(out, |start, out| {
             laws.sum(t, start, x, v, out);
             let [before, _, after] = laws.masses.frames.cut(start, out.len());
@@ -207,7 +207,7 @@ impl Equation for Local<'_> {
                 self.laws.forces.iter().filter(|f| f.objects.contains(&object)).for_each(|f| f.law.add(t, group, out));
             }
         }
-        self.laws.accelerate(self.masses, self.start, x, out);
+        self.laws.accelerate(t, self.masses, self.start, x, out);
         Ok(())
     }
 

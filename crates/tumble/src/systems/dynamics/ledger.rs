@@ -35,7 +35,7 @@ impl Dynamics {
             kinetic: total.kinetic,
             elastic: self.core.energy_between(true, t),
             external: self.core.energy_between(false, t) + self.core.laws.external_energy(t, x, v)
-                - Vec3::from(self.core.laws.gravity).dot(total.first_moment),
+                - Vec3::from(self.core.laws.gravity.at(t)).dot(total.first_moment),
             stretch,
             penetration: touching.then(|| max(x.len(), |range| range.flat_map(depths).fold(0.0, f64::max)).max(0.0)),
             intersections: self.features.surfaces().and_then(|surfaces| surfaces.intersections(x, t)),
@@ -57,9 +57,9 @@ impl Dynamics {
         let span =
             |points: Range<usize>| max(points.len(), |range| range.map(|i| far(xyz64(rows[points.start + i]), first)).fold(0.0, f64::max));
         let size = self.core.laws.masses.points().map(span).fold(0.0, f64::max);
-        let fall = ledger.mass * Vec3::from(self.core.laws.gravity).norm() * size;
+        let fall = ledger.mass * self.core.laws.gravity.largest * size;
         // The energy that holds masses together is a scale, too, even if they start at rest, and so is that of driving forces.
-        let driven: f64 = self.core.laws.batches.iter().filter_map(|b| b.drives()).sum();
+        let driven: f64 = self.core.drives().sum();
         // Masses that a moving solid hits leave with at most twice its velocity.
         let reach = self.core.laws.colliders.iter().filter_map(|c| c.motion.as_ref()).map(|m| far(m.pivot, first)).fold(size, |a, b| a + b);
         let fastest = self.core.laws.colliders.iter().map(|c| c.fastest(reach)).fold(0.0, f64::max);
@@ -70,8 +70,9 @@ impl Dynamics {
     /// Takes the scale of the energy from the ledger of a good frame. Energy that came from nowhere does not count, or a slow
     /// explosion would carry its scale along; pushes of other systems bring energy of unknown origin.
     pub(super) fn rescale(&mut self, ledger: &Ledger) {
-        let drives = self.core.laws.colliders.iter().any(|c| c.moves()) || self.core.laws.batches.iter().any(|b| b.drives().is_some());
-        let driven = self.pushed || !self.features.followers.is_empty() || drives || !self.core.laws.user.is_empty();
+        let drives = self.core.laws.colliders.iter().any(|c| c.moves()) || self.core.drives().next().is_some();
+        let changes = !self.core.laws.gravity.course.is_constant();
+        let driven = self.pushed || changes || !self.features.followers.is_empty() || drives || !self.core.laws.user.is_empty();
         let gain = if driven { 0.0 } else { (ledger.energy() - self.core.scale.start).max(0.0) };
         let external = (ledger.external - self.core.scale.external).abs();
         let energy = ledger.kinetic.max(ledger.elastic).max(external) - gain;

@@ -211,7 +211,7 @@ impl Core {
 
     /// The energy that masses bring with them, or take away.
     fn count_energy(&mut self, sign: f64, rows: impl Iterator<Item = usize>) {
-        let gravity = Vec3::from(self.laws.gravity);
+        let gravity = Vec3::from(self.laws.gravity.at(0.0));
         let (mut kinetic, mut potential) = (0.0, 0.0);
         for i in rows {
             let (mass, x, v) = (f64::from(self.laws.masses.mass[i]), xyz64(self.state.x[i]), xyz64(self.state.v[i]));

@@ -38,7 +38,7 @@ pub use tear::TearPart;
 use crate::exchange::{BodyRow, Exchange, Turn};
 use crate::geometry::{Collider, Vector};
 use crate::integrators;
-use crate::math::{Real, Row, xyz64};
+use crate::math::{Real, Row, Signal, xyz64};
 use crate::pool::Birth;
 use crate::system::{Archive, Part, System};
 use core::Core;
@@ -74,18 +74,18 @@ pub struct Dynamics {
 }
 
 /// A damped spring to a body of another system, as impulses at the start of each sub-step.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone)]
 pub struct Anchor {
     /// The mass of this system.
     pub row: usize,
     /// The row of the other.
     pub other: BodyRow,
     /// Spring constant [N/m].
-    pub stiffness: f64,
+    pub stiffness: Signal,
     /// Damping along the spring [N s/m].
     pub damping: f64,
     /// Rest length [m].
-    pub rest_length: f64,
+    pub rest_length: Signal,
 }
 
 type GoOn<'a> = &'a (dyn Fn() -> bool + Sync);
@@ -181,7 +181,7 @@ impl Dynamics {
             let d = other.position - x;
             let length = d.norm();
             let n = d.normalized();
-            let pull = anchor.stiffness * (length - anchor.rest_length) + anchor.damping * n.dot(other.velocity - v);
+            let pull = anchor.stiffness.value(t) * (length - anchor.rest_length.value(t)) + anchor.damping * n.dot(other.velocity - v);
             let impulse = n * (h * pull);
             if exchange.repeats() {
                 exchange.post_steady(anchor.other, other.position, -impulse);
@@ -355,7 +355,7 @@ impl System for Dynamics {
     fn energy_between(&self, t: f64, exchange: &Exchange) -> f64 {
         let of = |anchor: &Anchor| {
             let length = (exchange.state_at(anchor.other, t).position - xyz64(self.core.state.x[anchor.row])).norm();
-            0.5 * anchor.stiffness * (length - anchor.rest_length).powi(2)
+            0.5 * anchor.stiffness.value(t) * (length - anchor.rest_length.value(t)).powi(2)
         };
         self.anchors.iter().map(of).sum()
     }

@@ -3,7 +3,7 @@
 use super::followers::Follower;
 use super::holds::{Hold, Times};
 use super::tear::{Edges, TearPart};
-use crate::elements::{LongRangeAttachments, Members, Membrane};
+use crate::elements::{DrivenSpring, LongRangeAttachments, Members, Membrane};
 use crate::forces::{Air, Force};
 use crate::geometry::Carrier;
 use crate::math::{Quat, Real, Signal, Vec3};
@@ -103,6 +103,8 @@ pub struct Parts {
     pub(super) nonlinear: Springs<1, 2>,
     pub(super) vector: Springs<0, 0>,
     pub(super) dampers: Vec<Members<2, 1, 0>>,
+    /// Springs that change in time.
+    pub driven: Vec<DrivenSpring>,
     pub(super) bending: Vec<Members<6, 12, 0>>,
     pub(super) isometric: Vec<Members<4, 3, 0>>,
     pub(super) membranes: Vec<Members<3, 8, 0>>,
@@ -381,7 +383,8 @@ impl Parts {
     pub fn springs_with_rest_length(&self) -> impl Iterator<Item = [u32; 2]> {
         let linear = self.linear.members.iter().map(|m| (m.nodes, m.rest));
         let all = linear.chain(self.nonlinear.members.iter().map(|m| (m.nodes, m.rest)));
-        all.filter(|(_, [rest])| *rest > 0.0).map(|(nodes, _)| nodes)
+        let driven = self.driven.iter().map(|s| (s.nodes, [s.rest.value(0.0)]));
+        all.chain(driven).filter(|(_, [rest])| *rest > 0.0).map(|(nodes, _)| nodes)
     }
 
     /// Spreads a point out as Plummer's sphere of a radius [m].

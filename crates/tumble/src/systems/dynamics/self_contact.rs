@@ -298,7 +298,7 @@ impl Feature for SelfContact {
     /// Finds pairs of near features.
     fn before(&mut self, core: &mut Core, step: Span) {
         let n = self.features.points();
-        let gravity = Vector::from(core.laws.gravity) * step.h;
+        let gravity = Vector::from(core.laws.gravity.at(step.t)) * step.h;
         let (x, v) = (&core.state.x[..n], &core.state.v[..n]);
         self.ways.clear();
         self.ways.extend(x.iter().zip(v).map(|(x, v)| (xyz64(*v) + if x[3] > 0.0 { gravity } else { Vector::default() }) * step.h));

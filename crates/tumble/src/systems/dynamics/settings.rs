@@ -1,5 +1,6 @@
 //! How a system of masses steps.
 
+use crate::forces::Gravity;
 use crate::geometry::Collider;
 use std::sync::Arc;
 use tumble_interface::scene::{Adaptive, Integrator, PositionBased, SelfContact, Solver};
@@ -38,7 +39,7 @@ pub struct Settings {
     /// Springs longer than this many times their rest length are shortened.
     pub clamp: Option<f64>,
     /// Gravity [m/s²].
-    pub gravity: [f64; 3],
+    pub gravity: Gravity,
     /// Whether forces between all masses may use the fastest arithmetic of the machine.
     pub native: bool,
     /// Solids.

@@ -33,6 +33,8 @@ pub struct SolidFeatures {
     list: Vec<Solid>,
     /// Whether any of them ever moves.
     moving: bool,
+    /// End of the sub-step [s].
+    time: f64,
     /// Places of corners at the end of the sub-step.
     pub end: Vec<Row>,
     /// Their places at its start, less the way of belts: friction compares with these.
@@ -117,6 +119,7 @@ impl SolidFeatures {
 
     /// Finds the places of corners at both ends of a sub-step; belts, which friction compares with, have not run yet.
     pub fn place(&mut self, step: Span) {
+        self.time = step.end();
         if self.moving || self.end.is_empty() {
             self.start = self.at(step.t).collect();
             self.end = self.at(step.end()).collect();
@@ -195,9 +198,9 @@ impl SolidFeatures {
         self.colliders = colliders.clone();
     }
 
-    /// Friction of a pair with one of them.
+    /// Friction of a pair with one of them, at the end of the sub-step.
     pub fn friction(&self, pair: &Pair) -> Option<Friction> {
-        self.collider(&pair.vertices).map(|i| self.colliders[i].friction)
+        self.collider(&pair.vertices).map(|i| self.colliders[i].friction_at(self.time))
     }
 
     /// Whether a pair is a mass with a triangle of a solid: masses meet solids as all do, with restitution and as their scheme has it.

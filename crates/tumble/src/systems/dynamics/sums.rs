@@ -92,7 +92,7 @@ impl Core {
         let x = &self.state.x;
         let constraints = if elastic { &self.constraints[..] } else { &[] };
         let walls = Walls { colliders: &self.laws.colliders, t };
-        let forces = self.laws.batches.iter().filter(|b| b.is_elastic() == elastic).map(|b| b.energy(x));
+        let forces = self.laws.batches.iter().filter(|b| b.is_elastic() == elastic).map(|b| b.energy_at(t, x));
         forces.chain(constraints.iter().map(|c| c.energy(x, walls))).sum()
     }
 

@@ -99,6 +99,7 @@ impl System for Gas {
                 }
                 let h = self.next_step(&self.fluids[f], t + done, dt, dt - done)?;
                 let fluid = &mut self.fluids[f];
+                fluid.settings.gravity = fluid.settings.course.at(t + done + 0.5 * h);
                 fluid.step(t + done, h, t + (done + h), &mut report).map_err(|e| e.within(&self.name, t + done + h))?;
                 done += h;
                 report.stepped(h);

@@ -3,6 +3,7 @@
 use super::fire::Fire;
 use super::sources::Source;
 use crate::fluids::Beyond;
+use crate::forces::Gravity;
 use crate::linalg::poisson::Params;
 use crate::math::VectorSignal;
 use crate::operators::Advection;
@@ -18,8 +19,10 @@ pub struct Settings {
     pub viscous: Viscous,
     /// The lower and the upper side of each axis.
     pub sides: [[Beyond; 2]; 3],
-    /// Gravity [m/s²], in the plane.
+    /// Gravity [m/s²], in the plane, in the middle of a step.
     pub gravity: [f64; 3],
+    /// Gravity as a function of time.
+    pub course: Gravity,
     /// Acceleration [m/s²] by time and place.
     pub acceleration: VectorSignal,
     /// Diffusivity of smoke and of warmth [m²/s].

@@ -2,9 +2,9 @@
 
 use super::super::parts::{Closed, Liquid, Parts, Point, Springs};
 use crate::elements::{
-    Area, Batch, BendTwist, Bending, Constraints, Density, Distance, Element, Elements, IsometricBend, Law, Linear, Members, Membrane,
-    Neohookean, Nonlinear, Pair, Pairs, Projected, Shape, Strands, StretchShear, TetShear, TetStrain, TetVolume, Vector, Volume, Weights,
-    Woven, WovenBending,
+    Area, Batch, BendTwist, Bending, Constraints, Density, Distance, Driven, DrivenSpring, Element, Elements, IsometricBend, Law, Linear,
+    Members, Membrane, Neohookean, Nonlinear, Pair, Pairs, Projected, Shape, Strands, StretchShear, TetShear, TetStrain, TetVolume, Vector,
+    Volume, Weights, Woven, WovenBending,
 };
 use crate::forces::{Near, Newtonian};
 use crate::math::{Real, Row};
@@ -70,6 +70,7 @@ impl Batches {
             self.springs::<Vector, Linear, 3, 0, 0>(&parts.vector, &[])?,
         ];
         self.add::<Distance, 2, 1, 1>(&parts.dampers, 0.0)?;
+        self.driven(std::mem::take(&mut parts.driven))?;
         let bending = self.add::<Bending, 6, 3, 12>(&parts.bending, 0.0)?;
         let isometric = self.add::<IsometricBend, 4, 3, 3>(&parts.isometric, 0.0)?;
         let membranes = self.add::<Membrane, 3, 3, 8>(&parts.membranes, 0.0)?;
@@ -132,6 +133,19 @@ impl Batches {
         let elements = Elements::<E, Linear, N, M, D, 0>::new(self.rows, members).ok_or(NotARow)?;
         self.list.push(Box::new(elements.with_energy_at_rest(energy_at_rest)));
         Ok(Some(self.list.len() - 1))
+    }
+
+    /// Adds springs that change in time, if there are any.
+    fn driven(&mut self, springs: Vec<DrivenSpring>) -> Result<(), NotARow> {
+        if springs.is_empty() {
+            return Ok(());
+        }
+        let springs = Box::new(Driven::new(self.rows, springs).ok_or(NotARow)?);
+        match self.projected {
+            Some(_) => self.constraints.push(springs),
+            None => self.list.push(springs),
+        }
+        Ok(())
     }
 
     /// Adds rods, if there are any: as constraints, chains are solved as a whole.

@@ -84,7 +84,7 @@ impl Parts {
             grip,
             batches: batches.list,
             forces: forces.collect(),
-            gravity: settings.gravity,
+            gravity: settings.gravity.clone(),
             masses,
             colliders: settings.colliders.clone(),
             ..Default::default()

@@ -215,7 +215,7 @@ impl Scheme for Projected {
         let points = core.laws.masses.points().flat_map(|points| &core.state.x[points]);
         let far = points.filter(|x| x[3] > 0.0).map(|x| xyz64(*x).norm()).fold(0.0, f64::max);
         let unknown = 0.5 * f64::from(Real::EPSILON) * far / (h * h);
-        let gravity = Vec3::from(core.laws.gravity).norm();
+        let gravity = core.laws.gravity.largest;
         let longest = core.constraints.iter().map(|c| c.longest_step(&core.state.x, gravity)).fold(f64::INFINITY, f64::min);
         let shakes = (h > SHAKES * longest).then(|| {
             let message = format!(

@@ -1,0 +1,205 @@
+//! Words of a scene that change in time, by formulas and keyframes, against exact solutions.
+
+#![allow(clippy::unwrap_used, clippy::panic)] // helpers of tests fail by panicking, too
+
+use crate::common;
+
+use common::{Vector, column, every, grid, largest, positions, run, simulation, velocities};
+use tumble_f64::scene::Simulation;
+use tumble_interface::{Engine, Scene};
+
+fn told(text: &str) -> String {
+    let scene = Scene::from_toml(&format!("version = 1\n{text}")).unwrap();
+    Simulation::new(scene, Default::default()).err().map(|e| e.to_string()).unwrap_or_default()
+}
+
+/// The system of a scheme in steps of h.
+fn system(integrator: tumble_interface::scene::Integrator, h: f64) -> String {
+    match integrator {
+        tumble_interface::scene::Integrator::PositionBased => format!("[[system]]\nmethod = \"position_based\"\nstep = {h:e}\n"),
+        _ if integrator.is_adaptive() => format!("[[system]]\nintegrator = \"{}\"\n", integrator.name()),
+        _ => format!("[[system]]\nintegrator = \"{}\"\nstep = {h:e}\n", integrator.name()),
+    }
+}
+
+/// Of fixed steps; adaptive ones are as wrong as their tolerance lets them.
+fn bound(integrator: tumble_interface::scene::Integrator, fixed: f64) -> f64 {
+    if integrator.is_adaptive() { 0.03 } else { fixed }
+}
+
+/// z = -9.8 (1 - cos t) under the gravity -9.8 cos t, by every scheme; and along a parabola of third degree under keyframes.
+#[test]
+fn masses_fall_under_gravity_that_changes() {
+    for integrator in every() {
+        for (gravity, exact) in
+            [("[0, 0, \"-9.8*cos(t)\"]", -9.8 * (1.0 - 1_f64.cos())), ("{ keys = [[0, 0, 0, 0], [1, 0, 0, -6]] }", -1.0)]
+        {
+            let mut sim = simulation(&format!(
+                "precision = \"double\"\ntime.fps = 10\nworld.gravity = {gravity}\n{}[[particles]]\nname = \"p\"\nposition = [[1, 2, 0]]\n",
+                system(integrator, 1e-3)
+            ));
+            run(&mut sim, 10);
+            let z = positions(&sim, "p")[0].z;
+            assert!((z - exact).abs() < bound(integrator, 8e-3) * exact.abs(), "{integrator:?} {gravity}: {z} {exact}");
+        }
+    }
+}
+
+/// Warm gas in a box without an end rises by what gravity has been; sound in a column that falls with it feels none.
+#[test]
+fn gases_feel_gravity_that_changes() {
+    let mut sim = simulation(
+        "precision = \"double\"\ntime = { fps = 10, frames = 10 }\nworld.gravity = [0, 0, \"-10*t\"]\n[[system]]\nmethod = \"gas\"\nsubsteps = 4\n\
+         [[gas]]\nname = \"air\"\nbox = { size = [1, 1, 1], resolution = 4 }\n\
+         sides = { x = [\"periodic\", \"periodic\"], y = [\"periodic\", \"periodic\"], z = [\"periodic\", \"periodic\"] }\n\
+         temperature = { ambient = 300, initial = 330 }\n",
+    );
+    run(&mut sim, 10);
+    // 10 t x 30/300: a speed of t²/2.
+    let (velocity, _) = grid(&sim, "air", "velocity");
+    assert!((largest(&velocity) - 0.5).abs() < 1e-12, "{}", largest(&velocity));
+    let weight = |gravity: &str| {
+        let mut sim = simulation(&format!(
+            "precision = \"double\"\ndimension = 2\ntime = {{ fps = 100, frames = 10 }}\nworld.gravity = {gravity}\n\
+             [[compressible]]\nname = \"air\"\nbox = {{ size = [1, 1, 1], resolution = 8 }}\ndensity = 1.2\nsound_speed = 20\n"
+        ));
+        run(&mut sim, 10);
+        sim.ledger().momentum[2]
+    };
+    // Before sound has come from the walls, momentum is that of the whole less what the walls bear: it differs by the course alone.
+    let (steady, course) = (weight("[0, 0, -5]"), weight("{ keys = [[0, 0, 0, -5], [1, 0, 0, -5]] }"));
+    assert!(steady.abs() > 1e-3 && (course - steady).abs() < 1e-12, "{steady} {course}");
+    assert!((weight("[0, 0, \"-5 - 50*t\"]") - steady).abs() > 1e-3);
+}
+
+/// v = exp(-t²/2) under a drag of the rate t; and wind that dies away.
+#[test]
+fn drag_changes_in_time() {
+    for integrator in every() {
+        let mut sim = simulation(&format!(
+            "precision = \"double\"\ntime.fps = 10\nworld.gravity = [0, 0, 0]\n{}[[force]]\nkind = \"drag\"\nrate = \"t\"\non = [\"p\"]\n\
+             [[force]]\nkind = \"wind\"\nrate = {{ keys = [[0, 2], [0.5, 0]] }}\nair = [{{ kind = \"uniform\", velocity = [1, 0, 0] }}]\non = [\"q\"]\n\
+             [[particles]]\nname = \"p\"\nposition = [[0, 0, 0]]\nvelocity = [[1, 0, 0]]\n\
+             [[particles]]\nname = \"q\"\nposition = [[0, 0, 0]]\n",
+            system(integrator, 1e-3)
+        ));
+        run(&mut sim, 10);
+        let (v, u) = (velocities(&sim, "p")[0].x, velocities(&sim, "q")[0].x);
+        // The rate falls from 2 to 0 in half a second: its integral is a half.
+        assert!((v - (-0.5_f64).exp()).abs() < bound(integrator, 2e-3), "{integrator:?}: {v}");
+        assert!((u - (1.0 - (-0.5_f64).exp())).abs() < bound(integrator, 2e-3), "{integrator:?}: {u}");
+    }
+}
+
+/// A mass slides over a floor without friction, which is switched on after half a second: it stops after v²/(2 mu g).
+#[test]
+fn friction_changes_in_time() {
+    // An adaptive step that a jump falls into has the friction of its end.
+    for integrator in every().into_iter().filter(|i| !i.is_adaptive()) {
+        let mut sim = simulation(&format!(
+            "precision = \"double\"\ntime.fps = 50\n{}[[collider]]\nname = \"floor\"\nshape.floor = {{}}\n\
+             friction = {{ keys = [[0, 0], [0.5, 0.4]], interpolation = \"step\" }}\n\
+             [[particles]]\nname = \"p\"\nposition = [[0, 0, 0]]\nvelocity = [[1, 0, 0]]\n",
+            system(integrator, 1e-3)
+        ));
+        run(&mut sim, 24);
+        assert!((velocities(&sim, "p")[0].x - 1.0).abs() < 1e-12, "{integrator:?}");
+        run(&mut sim, 26);
+        let (x, exact) = (positions(&sim, "p")[0].x, 0.5 + 1.0 / (2.0 * 0.4 * 9.8));
+        assert!((x - exact).abs() < 4e-3 && velocities(&sim, "p")[0].x.abs() < 2e-3, "{integrator:?}: {x} {exact}");
+    }
+}
+
+/// A winch reels a weight in: its length less the stretch under the weight, within a system under every scheme, and between two systems.
+#[test]
+fn a_winch_reels_a_weight_in() {
+    let scene = |systems: &str, of: &str, stiffness: f64| {
+        format!(
+            "precision = \"double\"\ntime = {{ fps = 20, exchanges = 50 }}\n{systems}\
+             [[particles]]\nname = \"hook\"\nposition = [[0, 0, 2]]\npin = [\"all\"]\nmass = [1]\n\
+             [[particles]]\nname = \"weight\"\nposition = [[0, 0, 1]]\nmass = [2]\n{of}\
+             [[anchor]]\nname = \"winch\"\nbetween = [\"hook 0\", \"weight 0\"]\nstiffness = {stiffness:e}\ndamping = 60\n\
+             rest_length = {{ keys = [[0.5, 1.0], [2.5, 0.4]] }}\n"
+        )
+    };
+    let two = "[[system]]\nname = \"a\"\n[[system]]\nname = \"b\"\n";
+    let all = every().into_iter().map(|i| (format!("{i:?}"), system(i, 5e-4), "")).chain([(
+        "two systems".into(),
+        two.into(),
+        "system = \"b\"\n",
+    )]);
+    for (name, systems, of) in all {
+        // Forward Euler needs the damping.
+        let mut sim = simulation(&scene(&systems, of, 2e3));
+        run(&mut sim, 40);
+        let z = positions(&sim, "weight")[0].z;
+        // Moving steadily at t = 2.0 s, 0.55 m long and stretched by m g/k; the dashpot moves with the reel.
+        let speed = velocities(&sim, "weight")[0].z;
+        let exact = 2.0 - 0.55 - 2.0 * 9.8 / 2e3 - 60.0 * 0.3 / 2e3;
+        assert!((z - exact).abs() < 2e-3, "{name}: {z} {exact}");
+        assert!((speed - 0.3).abs() < 5e-3, "{name}: {speed}");
+        // What it has stored is in the ledger.
+        let stored = 0.5 * 2e3 * (2.0 - z - 0.55).powi(2);
+        let (elastic, between) = (sim.ledger().elastic, sim.ledger().external - 9.8 * (2.0 * z + 2.0));
+        assert!((elastic + between - stored).abs() < 1e-9 * (1.0 + stored), "{name}: {elastic} {between} {stored}");
+    }
+}
+
+/// A muscle: a mass on a spring of no length whose stiffness changes in time, against the equation itself by small steps of its own.
+#[test]
+fn a_muscle_pulls_as_its_stiffness_says() {
+    let (mut x, mut v, n) = (0.5_f64, 0.0, 200_000);
+    let (h, k) = (1.5 / f64::from(n), |t: f64| 20.0 + 15.0 * (3.0 * t).sin());
+    for i in 0..n {
+        // Leapfrog.
+        let t = f64::from(i) * h;
+        v -= 0.5 * h * k(t) * x;
+        x += h * v;
+        v -= 0.5 * h * k(t + h) * x;
+    }
+    for (name, h, bound) in
+        [("rk4", 1e-3, 1e-8), ("implicit_midpoint", 1e-3, 1e-5), ("implicit_euler", 1e-4, 2e-3), ("position_based", 1e-4, 2e-3)]
+    {
+        let words = if name == "position_based" { "method" } else { "integrator" };
+        let mut sim = simulation(&format!(
+            "precision = \"double\"\ntime.fps = 10\nworld.gravity = [0, 0, 0]\n[[system]]\n{words} = \"{name}\"\nstep = {h:e}\n\
+             [[particles]]\nname = \"a\"\nposition = [[0, 0, 0], [0.5, 0, 0]]\npin = [\"vertex 0\"]\n\
+             [[anchor]]\nname = \"muscle\"\nbetween = [\"a 0\", \"a 1\"]\nstiffness = \"20 + 15*sin(3*t)\"\nrest_length = 0\n"
+        ));
+        run(&mut sim, 15);
+        let found = positions(&sim, "a")[1].x;
+        assert!((found - x).abs() < bound, "{name}: {found} {x}");
+    }
+}
+
+/// Where it stands says so, all at once, and constants give the bits of before.
+#[test]
+fn what_is_wrong_in_time_is_told() {
+    let all = told(
+        "world.gravity = [0, 0, \"-1/t\"]\n[[force]]\nkind = \"drag\"\nrate = \"1 - t\"\n[[force]]\nkind = \"drag\"\nquadratic = -1\n\
+         [[collider]]\nname = \"floor\"\nshape.floor = {}\nfriction = \"0.5*t\"\nfriction_static = 0.2\n\
+         [[particles]]\nname = \"p\"\nposition = [[0, 0, 0], [1, 0, 0]]\n\
+         [[anchor]]\nname = \"w\"\nbetween = [\"p 0\", \"p 1\"]\nstiffness = \"x\"\nrest_length = { keys = [[0, 1], [1, -1]] }\n",
+    );
+    for part in [
+        "world.gravity: [0, 0, -inf] at t = 0 s",
+        "force[0].rate: ",
+        "force[1].quadratic: -1, expected >= 0",
+        "collider \"floor\".friction_static: 0.2 at t = ",
+        "anchor \"w\".stiffness: ",
+        "anchor \"w\".rest_length: -0.",
+    ] {
+        assert!(all.contains(part), "{part}: {all}");
+    }
+    let flat = told("dimension = 2\nworld.gravity = [0, \"t\", -9.8]\n[[particles]]\nname = \"p\"\nposition = [[0, 0, 0]]\n");
+    assert!(flat.contains("world.gravity: y = "), "{flat}");
+    let falls = |gravity: &str| {
+        let mut sim = simulation(&format!(
+            "world.gravity = {gravity}\n[[rope]]\nname = \"r\"\nfrom = [0, 0, 0]\nto = [1, 0, 0]\nsegments = 9\npin = [\"start\"]\n"
+        ));
+        run(&mut sim, 5);
+        column(&sim, "r", "position")
+    };
+    assert_eq!(falls("[0, 0, -9.8]"), falls("{ keys = [[0, 0, 0, -9.8]] }"));
+    assert_ne!(falls("[0, 0, -9.8]"), vec![Vector::default(); 10]);
+}
