@@ -82,13 +82,25 @@ def end(stage: Any) -> float:
     return float(max((t for _, t in _spans(stage)), default=0.0))
 
 
+def is_animated(stage: Any) -> bool:
+    """Whether any value of a stage, seen or not, varies with time."""
+    return next(_spans(stage), None) is not None
+
+
 def _spans(stage: Any) -> Iterator[tuple[float, float]]:
+    """Time codes of the first and the last sample of each attribute that has several."""
+    for attribute in _varying(stage):
+        if times := attribute.GetTimeSamples():
+            yield times[0], times[-1]
+
+
+def _varying(stage: Any) -> Iterator[Any]:
+    """All attributes that vary with time."""
     from pxr import Usd
 
-    for prim in stage.Traverse(Usd.TraverseInstanceProxies()):
-        for attribute in prim.GetAttributes():
-            if attribute.ValueMightBeTimeVarying() and (times := attribute.GetTimeSamples()):
-                yield times[0], times[-1]
+    # Prototypes may stand below what is no more than an "over".
+    for prim in Usd.PrimRange.Stage(stage, Usd.TraverseInstanceProxies(Usd.PrimIsActive & Usd.PrimIsLoaded)):
+        yield from (a for a in prim.GetAttributes() if a.ValueMightBeTimeVarying())
 
 
 class Reading:
@@ -378,5 +390,15 @@ def pose(stage: Any, first: float, last: float | None = None) -> None:
         if prim.IsInstance() and any(p.IsA(UsdSkel.Root) for p in Usd.PrimRange(prim, Usd.TraverseInstanceProxies())):
             # What stands in for an instance cannot be written to.
             prim.SetInstanceable(False)
+    span = Gf.Interval(*_around(stage, first, first if last is None else last))
     for root in [p for p in stage.Traverse() if p.IsA(UsdSkel.Root)]:
-        UsdSkel.BakeSkinning(UsdSkel.Root(root), Gf.Interval(first, first if last is None else last))
+        UsdSkel.BakeSkinning(UsdSkel.Root(root), span)
+
+
+def _around(stage: Any, first: float, last: float) -> tuple[float, float]:
+    """The interval from the last samples before to the first ones after: where it holds none, nothing is posed."""
+    low, high = first, last
+    for attribute in _varying(stage):
+        low = min([low, *attribute.GetBracketingTimeSamples(first)[:1]])
+        high = max([high, *attribute.GetBracketingTimeSamples(last)[1:2]])
+    return low, high
