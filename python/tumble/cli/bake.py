@@ -60,19 +60,12 @@ def look_with(camera: str) -> list[str]:
     from tumble import SceneError, usd
     from tumble.toml import toml
 
-    name, colon, prim = camera.rpartition(":/")
-    if not colon or not usd.is_usd(name):
-        name, prim = camera, ""
-    if not usd.is_usd(name) or not Path(name).is_file():
-        raise SceneError(
-            f"{name}: there is no such USD file; give one that has a camera, as in shot.usda or shot.usda:/cameras/a"
-        )
     try:
-        words, doubts = usd.camera(name, f"/{prim}" if prim else None)
+        words, doubts = usd.camera(camera)
     except ValueError as error:
-        raise SceneError(f"{name}: {error}") from None
+        raise SceneError(f"{camera}: {error}") from None
     for code, message in doubts:
-        warn(code, f"{name}: {message}")
+        warn(code, f"{camera}: {message}")
     say(toml({"camera": words}).strip() + "\n")
     return [f"camera.{key}={json.dumps(value)}" for key, value in words.items()]
 

@@ -40,8 +40,8 @@ def bake(
 
 
 def camera(path: Path | str, prim: str | None = None) -> tuple[dict[str, Any], list[tuple[str, str]]]:
-    """The words of `[camera]` for a file's camera at its start, by default for the only one, and code and message of what
-    they cannot say. Raises ValueError."""
+    """The words of `[camera]` for a file's camera at its start, and code and message of what they cannot say. The camera is
+    `prim`, or that of FILE:PRIM, by default the only one. Raises ValueError."""
     from tumble.usd.cameras import camera
 
     return camera(path, prim)
