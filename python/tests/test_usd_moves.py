@@ -1,4 +1,4 @@
-"""Colliders from animated USD files: the frames that the engine is given, and what moves in scenes, runs and checkpoints."""
+"""Animated USD files as frames, which the engine is given for colliders."""
 
 from pathlib import Path
 from typing import Any
@@ -43,7 +43,7 @@ def test_frames_of_a_file_are_what_baking_writes(tmp_path: Path) -> None:
         "scale": 2.0,
         "shell": True,
     }
-    assert {frame["hash"] for frame in shape["animated_mesh"]["frames"]} == {"abc"}
+    assert [frame.get("hash") for frame in shape["animated_mesh"]["frames"]] == ["abc", *[None] * 24]
     baked = usd.bake(file, tmp_path / "baked")
     assert len(frames(shape)) == len(baked) == 25
     for (time, name), (meant, mesh) in zip(frames(shape), baked, strict=True):
@@ -64,8 +64,12 @@ def test_frames_last_as_long_as_the_scene_and_change_with_it(tmp_path: Path) -> 
     [(_, again)] = usd.moved([{"name": "c", "shape": long}], tmp_path, 0.3)
     assert again == short
     # At times of somebody else's they are left as they are; a single one is a pose.
+    few = [{"time": 0.0, "path": "thing.usda/1.usda"}, {"time": 1.0, "path": "thing.usda/25.usda"}]
+    [(_, kept)] = usd.moved([{"name": "c", "shape": {"animated_mesh": {"frames": few}}}], tmp_path, 9.0)
+    assert len(frames(kept)) == 2
     slow = [{"time": 2 * time, "path": path} for time, path in frames(short)]
-    assert usd.moved([{"name": "c", "shape": {"animated_mesh": {"frames": slow}}}], tmp_path, 9.0) == []
+    [(_, kept)] = usd.moved([{"name": "c", "shape": {"animated_mesh": {"frames": slow}}}], tmp_path, 9.0)
+    assert frames(kept) == [(2 * time, path) for time, path in frames(short)]
     assert usd.moved([{"name": "c", "shape": {"animated_mesh": {"frames": slow[:1]}}}], tmp_path, 9.0) == []
     assert usd.moved(colliders("thing.usda/13.usda"), tmp_path, 9.0) == []
     assert "v 0.0 0.0 1.0\n" in usd.as_obj(tmp_path / "thing.usda" / "13.usda")

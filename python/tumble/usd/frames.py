@@ -8,6 +8,8 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from tumble.usd.motion import Motion, written
 from tumble.usd.stage import Floats, Indices, is_animated, open_stage
 from tumble.usd.told import STANDS, Key, doubts, is_usd, key, moves, stiff, warn
@@ -25,7 +27,7 @@ _read: dict[tuple[Key, float], tuple[Floats, Indices]] = {}
 def parted(path: Path | str) -> tuple[Path, float] | None:
     """File and time code of a frame; None for the name of a whole file."""
     path = Path(path)
-    if not (is_usd(path) and is_usd(path.parent) and path.parent.is_file()):
+    if not (is_usd(path) and is_usd(path.parent)) or path.parent.is_dir():
         return None
     try:
         code = float(path.stem)
@@ -53,21 +55,26 @@ def moved(colliders: Sequence[Mapping[str, Any]], folder: Path | str, span: floa
     also of one whose frames come from here, for a scene of another span. What cannot be read, or cannot move as faces come
     and go, is left as it is."""
     _read.clear()
-    known: dict[Path, Timing] = {}
+    known: dict[Path, tuple[Timing, float]] = {}
     found = []
     for k, collider in enumerate(colliders):
         words, given = _words(collider["shape"], Path(folder))
         if words is None or not is_usd(words["path"]):
             continue
         file = Path(folder) / words["path"]
-        timing = known[file] if file in known else known.setdefault(file, _timing(file, span))
-        if not timing or (given and not _same(given, timing)):
-            continue
         kept = {name: words[name] for name in _PLACED if name in words}
-        frames = [
-            {"time": time, "path": named(words["path"], code), "hash": words.get("hash")} for time, code in timing
-        ]
-        found.append((k, {"animated_mesh": {"frames": frames} | kept}))
+        if given and not file.exists():
+            # One fault instead of one for each frame.
+            found.append((k, {"mesh": {"path": words["path"]} | kept}))
+            continue
+        timing, step = known[file] if file in known else known.setdefault(file, _timing(file, span))
+        if given and not (len(timing) > 1 and _same(given, timing, step)):
+            timing = given
+        if timing:
+            frames = [{"time": time, "path": named(words["path"], code)} for time, code in timing]
+            # All have the content of one file: one fault if it has changed.
+            frames[0]["hash"] = words.get("hash")
+            found.append((k, {"animated_mesh": {"frames": frames} | kept}))
     return found
 
 
@@ -88,28 +95,33 @@ def _file(frame: Mapping[str, Any]) -> str:
     return str(frame["path"]).rpartition("/")[0]
 
 
-def _same(given: Timing, timing: Timing) -> bool:
-    """Whether frames are those of a file at its own times, of which the last may be that of another end."""
-    n = max(min(len(given), len(timing)) - 1, 1)
-    return all(a[1] == b[1] and abs(a[0] - b[0]) < 1e-9 for a, b in zip(given[:n], timing[:n], strict=True))
+def _same(given: Timing, timing: Timing, step: float) -> bool:
+    """Whether frames are those of a file, `step` time codes apart, at its own times, until this or another end, which may be
+    between two of them."""
+    (t, start), (later, code) = timing[0], timing[-1]
+    n = min(len(given), len(timing)) - 1
+    meant = [t + (one - start) * (later - t) / (code - start) for _, one in given]
+    regular = [one for _, one in given[:n]] == [one for _, one in timing[:n]]
+    whole = given[-1][1] - given[-2][1] < 1.001 * step
+    return regular and whole and np.allclose([time for time, _ in given], meant, rtol=0, atol=1e-9)
 
 
-def _timing(file: Path, span: float) -> Timing:
-    """The frames of a file, which are read; none if it does not move."""
+def _timing(file: Path, span: float) -> tuple[Timing, float]:
+    """The frames of a file, which are read, and the time codes between two; none if it does not move."""
     try:
         where = key(file)
         stiff.pop(where, None)
         if not (is_animated(open_stage(file)) and moves(file)):
-            return []
+            return [], 0.0
         motion = Motion(file, span)
         codes = motion.codes()
         read = [motion.points(code) for code in codes]
     except OSError:
-        return []
+        return [], 0.0
     except ValueError as error:
         # One that cannot be read at all is told when its mesh is.
         stiff[where] = str(error)
-        return []
+        return [], 0.0
     _read.update(((where, code), (points, motion.triangles)) for code, points in zip(codes, read, strict=True))
     warn(file, [doubt for doubt in doubts(file) if doubt[0] != STANDS])
-    return [(motion.time(code), code) for code in codes]
+    return [(motion.time(code), code) for code in codes], motion.step
