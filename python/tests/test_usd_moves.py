@@ -97,3 +97,11 @@ def test_a_file_that_starts_between_two_samples_is_posed(tmp_path: Path, code: f
     first, *_, last = usd.bake(file, tmp_path / "arm")
     assert abs(load_mesh(first[1])[0][0, 1] + (code - 1) / 24) < 1e-5
     assert abs(load_mesh(last[1])[0][0, 1] + 19 / 24) < 1e-5 and np.isclose(last[0], (20 - code) / 24)
+
+
+def test_characters_name_the_figure_of_a_file(tmp_path: Path) -> None:
+    figure = {"path": "thing.usda", "hash": "abc", "scale": 2.0}
+    found = usd.moved([{"name": "c", "shape": {"character": figure}}], tmp_path, 1.0)
+    assert found == [(0, {"character": figure | {"path": "thing.usda/figure.glb"}})]
+    assert usd.moved([{"name": "c", "shape": found[0][1]}], tmp_path, 1.0) == []
+    assert usd.moved([{"name": "c", "shape": {"character": {"path": "a.glb"}}}], tmp_path, 1.0) == []

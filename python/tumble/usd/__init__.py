@@ -11,7 +11,7 @@ from typing import Any
 from tumble.usd.stage import Reading, open_stage
 from tumble.usd.told import SUFFIXES, UsdWarning, doubts, is_usd, moves, note, warn
 
-__all__ = ["SUFFIXES", "UsdWarning", "as_obj", "bake", "camera", "doubts", "is_usd", "moved", "moves"]
+__all__ = ["SUFFIXES", "UsdWarning", "as_glb", "as_obj", "bake", "camera", "doubts", "is_usd", "moved", "moves"]
 
 
 def as_obj(path: Path | str) -> str:
@@ -26,6 +26,14 @@ def as_obj(path: Path | str) -> str:
     note(path, reading)
     warn(path, doubts(path), "tumble.usd.bake writes their motion")
     return text
+
+
+def as_glb(path: Path | str) -> bytes:
+    """The skinned figure of a file, with its bones and its animation, as GLB, which `shape.character` reads. Raises
+    ValueError."""
+    from tumble.usd.figures import as_glb
+
+    return as_glb(path)
 
 
 def bake(
@@ -48,8 +56,8 @@ def camera(path: Path | str, prim: str | None = None) -> tuple[dict[str, Any], l
 
 
 def moved(colliders: list[dict[str, Any]], folder: Path | str, span: float) -> list[tuple[int, dict[str, Any]]]:
-    """Number and shape of each collider of a scene that lasts for `span` [s] whose mesh is an animated USD file: an
-    `animated_mesh` of its frames. The engine asks for it when it reads a scene."""
+    """Number and shape of each collider of a scene that lasts for `span` [s] whose mesh is an animated USD file, an
+    `animated_mesh` of its frames; and of each `character` of one. The engine asks for it when it reads a scene."""
     from tumble.usd.frames import moved
 
     return moved(colliders, folder, span)

@@ -1,4 +1,5 @@
-"""Frames of an animated file by name: `walk.usda/24.usda` is what walk.usda shows at time code 24.
+"""Frames of an animated file by name: `walk.usda/24.usda` is what walk.usda shows at time code 24, and
+`walk.usda/figure.glb` its skinned figure.
 
 Nothing can stand below a file, so that such a name leads to no other file. A resolved scene names the frames of its
 colliders in this way, and so do its runs and checkpoints."""
@@ -13,6 +14,9 @@ import numpy as np
 from tumble.usd.motion import Motion, written
 from tumble.usd.stage import Floats, Indices, is_animated, open_stage
 from tumble.usd.told import STANDS, Key, doubts, is_usd, key, moves, stiff, warn
+
+FIGURE = "figure.glb"
+"""Name, below that of a file, of its skinned figure."""
 
 Timing = list[tuple[float, float]]
 """Time [s] and time code of each frame."""
@@ -52,12 +56,14 @@ def frame(path: Path, code: float) -> str:
 
 def moved(colliders: Sequence[Mapping[str, Any]], folder: Path | str, span: float) -> list[tuple[int, dict[str, Any]]]:
     """Number and new shape, an `animated_mesh`, of each collider of a scene of `span` [s] whose mesh is an animated USD file;
-    also of one whose frames come from here, for a scene of another span. What cannot be read, or cannot move as faces come
-    and go, is left as it is."""
+    also of one whose frames come from here, for a scene of another span; and a `character` of its figure by name. What cannot
+    be read, or cannot move as faces come and go, is left as it is."""
     _read.clear()
     known: dict[Path, tuple[Timing, float]] = {}
     found = []
     for k, collider in enumerate(colliders):
+        if is_usd((figure := collider["shape"].get("character", {})).get("path", "")):
+            found.append((k, {"character": {**figure, "path": f"{figure['path']}/{FIGURE}"}}))
         words, given = _words(collider["shape"], Path(folder))
         if words is None or not is_usd(words["path"]):
             continue
@@ -114,7 +120,7 @@ def _timing(file: Path, span: float) -> tuple[Timing, float]:
         if not (is_animated(open_stage(file)) and moves(file)):
             return [], 0.0
         motion = Motion(file, span)
-        codes = motion.codes()
+        codes = motion.line.codes()
         read = [motion.points(code) for code in codes]
     except OSError:
         return [], 0.0
@@ -124,4 +130,4 @@ def _timing(file: Path, span: float) -> tuple[Timing, float]:
         return [], 0.0
     _read.update(((where, code), (points, motion.triangles)) for code, points in zip(codes, read, strict=True))
     warn(file, [doubt for doubt in doubts(file) if doubt[0] != STANDS])
-    return [(motion.time(code), code) for code in codes], motion.step
+    return [(motion.line.time(code), code) for code in codes], motion.line.step

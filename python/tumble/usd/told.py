@@ -3,7 +3,7 @@
 import warnings
 from pathlib import Path
 
-from tumble.usd.stage import Reading, open_stage
+from tumble.usd.stage import Reading, has_shapes, names, open_stage
 
 Doubt = tuple[str, str]
 """Code, as in docs/warnings.md, and message."""
@@ -15,6 +15,8 @@ SUFFIXES = (".usd", ".usda", ".usdc", ".usdz")
 STANDS = "stands-still"
 
 _told: dict[Key, list[Doubt]] = {}
+
+_figures: dict[Key, list[Doubt]] = {}
 
 stiff: dict[Key, str] = {}
 """Why files that are animated cannot move."""
@@ -49,6 +51,25 @@ def doubts(path: Path | str) -> list[Doubt]:
 def note(path: Path | str, reading: Reading) -> None:
     """Remembers the doubts about a file, whose surfaces have been read."""
     _told[key(path)] = reading.doubts()
+
+
+def note_figure(path: Path | str, reading: Reading, skinned: set[str]) -> None:
+    """Remembers the doubts about the figure of a file, whose surfaces have been read; bones carry those that are `skinned`."""
+    found = [doubt for doubt in reading.doubts() if doubt[0] != STANDS]
+    shaped = [name for name in sorted(skinned) if has_shapes(reading.stage.GetPrimAtPath(name))]
+    if shaped:
+        message = f"blend shapes, of which figures have none: {names(shaped)}; in shape.mesh they move, without bones"
+        found.append(("unread-prims", message))
+    if still := [name for name in reading.moving if name not in skinned]:
+        found.append(
+            (STANDS, f"no bone carries them, so they stand in figures: {names(still)}; bind them to the skeleton")
+        )
+    _figures[key(path)] = found
+
+
+def of_figure(path: Path | str) -> list[Doubt]:
+    """All that is to be told of the figure of a file, once it has been read. Raises OSError."""
+    return _figures.get(key(path), [])
 
 
 def moves(path: Path | str) -> bool:
