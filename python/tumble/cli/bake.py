@@ -55,6 +55,13 @@ def bake(file: Path, scene: "Scene", force: bool, mended: bool) -> tuple[Path, s
     return new, {frame["path"] for frames in written.values() for frame in frames}
 
 
+def has_frames(scene: "Scene") -> bool:
+    """Whether a collider of a scene moves as its USD file says."""
+    from tumble.usd.frames import parted
+
+    return any(parted(Path(scene.folder) / path) for _, _, path in scene.mesh_files)
+
+
 def look_with(camera: str) -> list[str]:
     """Prints the lines of a scene for a camera, FILE or FILE:PRIM, and returns them as settings. Raises SceneError."""
     from tumble import SceneError, usd

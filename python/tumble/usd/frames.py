@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from tumble.usd.motion import Motion, written
-from tumble.usd.stage import Floats, Indices, is_animated, open_stage
+from tumble.usd.stage import Floats, is_animated, open_stage
 from tumble.usd.told import STANDS, Key, doubts, is_usd, key, moves, stiff, warn
 
 FIGURE = "figure.glb"
@@ -24,8 +24,8 @@ Timing = list[tuple[float, float]]
 _PLACED = ("scale", "rotate", "translate", "shell")
 """Words of a mesh that an animated one has, too."""
 
-_read: dict[tuple[Key, float], tuple[Floats, Indices]] = {}
-"""Points and triangles that `moved` has read, for `frame`, which is asked for them next."""
+_read: dict[tuple[Key, float], tuple[Floats, str]] = {}
+"""Points and faces that `moved` has read, for `frame`, which is asked for them next."""
 
 
 def parted(path: Path | str) -> tuple[Path, float] | None:
@@ -48,7 +48,7 @@ def named(path: str, code: float) -> str:
 def frame(path: Path, code: float) -> str:
     """The mesh of a file at a time code, in the triangles of its start, as OBJ in metres, z up. Raises ValueError."""
     if (found := _read.pop((key(path), code), None)) is not None:
-        return written(*found)
+        return written(found[0]) + found[1]
     told = [doubt for doubt in doubts(path) if doubt[0] != STANDS]
     warn(path, told)
     return Motion(path).obj(code)
@@ -128,6 +128,6 @@ def _timing(file: Path, span: float) -> tuple[Timing, float]:
         # One that cannot be read at all is told when its mesh is.
         stiff[where] = str(error)
         return [], 0.0
-    _read.update(((where, code), (points, motion.triangles)) for code, points in zip(codes, read, strict=True))
+    _read.update(((where, code), (points, motion.faces)) for code, points in zip(codes, read, strict=True))
     warn(file, [doubt for doubt in doubts(file) if doubt[0] != STANDS])
     return [(motion.line.time(code), code) for code in codes], motion.line.step

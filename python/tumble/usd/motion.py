@@ -3,6 +3,7 @@
 import math
 import tempfile
 from collections.abc import Iterator
+from functools import cached_property
 from pathlib import Path
 from typing import Any
 
@@ -84,16 +85,19 @@ class Motion:
         _alike(self.first, now)
         return _points(now)[self.used]
 
+    @cached_property
+    def faces(self) -> str:
+        """The triangles as lines of an OBJ."""
+        return "".join(f"f {a} {b} {c}\n" for a, b, c in (self.triangles + 1).tolist())
+
     def obj(self, code: float) -> str:
         """The mesh at a time code as an OBJ. Raises ValueError where faces come and go."""
-        return written(self.points(code), self.triangles)
+        return written(self.points(code)) + self.faces
 
 
-def written(points: Floats, triangles: Indices) -> str:
-    """A mesh as an OBJ."""
-    lines = [f"v {x!r} {y!r} {z!r}" for x, y, z in points.tolist()]
-    lines += [f"f {a} {b} {c}" for a, b, c in (triangles + 1).tolist()]
-    return "\n".join(lines) + "\n"
+def written(points: Floats) -> str:
+    """Points as lines of an OBJ."""
+    return "".join(f"v {x!r} {y!r} {z!r}\n" for x, y, z in points.tolist())
 
 
 def _points(reading: Reading) -> Floats:
