@@ -570,8 +570,9 @@ def test_stills_are_written_before_the_film(monkeypatch: pytest.MonkeyPatch) -> 
     monkeypatch.setattr("tumble.cli.render.film", lambda run, path, *how, **more: done.append((path.name, more)))
     monkeypatch.setattr("tumble.cli.render.still", lambda run, i, *how, **more: done.append((i, more)))
     asked = dict.fromkeys(("usd", "ply", "vdb", "plot"), False) | {"film": True}
-    assert write_results(fake_run.studio(), asked, [0, 2, 9], PLAIN, 7) == []  # type: ignore[arg-type]
-    assert done == [(0, {"samples": 7}), (2, {"samples": 7}), ("film.mp4", {"samples": 7})]
+    assert write_results(fake_run.studio(), asked, [0, 2, 9], PLAIN, 7, "a.usda") == []  # type: ignore[arg-type]
+    how = {"samples": 7, "camera": "a.usda"}
+    assert done == [(0, how), (2, how), ("film.mp4", how)]
 
 
 def test_samples_are_those_of_mitsuba(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -152,8 +152,8 @@ class Scene:
 
     @property
     def mesh_files(self) -> list[tuple[str, int | None, str]]:
-        """The mesh files that it names: place of the name in the scene, its line or None, and the path as it stands there.
-        Files of figures are left out."""
+        """The mesh files that it names: place of the name in the resolved scene, its line or None, and the path as it stands
+        there, FILE/CODE.usd for a frame of an animated USD file. Files of figures are left out."""
 
     @property
     def whole_frames(self) -> int:
@@ -195,7 +195,7 @@ class World:
 
     @property
     def warnings(self) -> list[dict[str, str]]:
-        """Warnings about the scene, and about solvers that missed their tolerance so far: code (as listed in
+        """Warnings about the scene, its USD files, and solvers that missed their tolerance so far: code (as listed in
         docs/warnings.md), path and message of each."""
 
     @property

@@ -1,7 +1,8 @@
 """Warnings about the files of a scene and about the ledger of a run; docs/warnings.md lists the codes."""
 
 import math
-from collections.abc import Iterator, Mapping
+import re
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
@@ -12,7 +13,7 @@ import numpy as np
 from tumble import energy, expect
 
 if TYPE_CHECKING:
-    from tumble._engine import Scene, World
+    from tumble._engine import Scene
     from tumble.reader import Run
 
 _COURANT = 2.0
@@ -22,29 +23,36 @@ _GAINS = ("forward_euler", "modified_euler", "midpoint", "heun")
 """Integrators that gain energy of oscillations at any step."""
 
 
-def of_scene(world: "World") -> list[dict[str, str]]:
-    """Code, path and message of each warning of a world, and of each doubt about the files of its scene."""
-    return [*world.warnings, *of_files(world.scene)]
+def of_files(scene: "Scene", figures: Sequence[tuple[str, str]] = ()) -> list[dict[str, str]]:
+    """Code, path and message of what is not as it seems in the USD files of a scene, and of its characters, of which `figures`
+    has place and path; `World.warnings` asks for it."""
+    from tumble.usd import told
+    from tumble.usd.frames import FIGURE, parted
 
-
-def of_files(scene: "Scene") -> list[dict[str, str]]:
-    """Code, path and message of what is not as it seems in the USD files of a scene."""
-    from tumble import usd
-
-    found: list[dict[str, str]] = []
+    found: dict[str, list[dict[str, str]]] = {}
     for place, _, path in scene.mesh_files:
-        if not usd.is_usd(path):
+        file = Path(scene.folder) / path
+        frame = parted(file)
+        # The scene has the file as a mesh; its frames are all alike.
+        place = re.sub(r"animated_mesh\.frames\[\d+\]", "mesh", place) if frame else place
+        if not told.is_usd(file) or place in found:
             continue
+        file = file if frame is None else frame[0]
         with suppress(OSError, ValueError):  # Files may be gone that were there when the scene was read.
-            for code, message in usd.doubts(Path(scene.folder) / path):
-                cure = _CURE if place.startswith("collider ") else _START
-                more = cure if code == "stands-still" else ""
-                found.append({"code": code, "path": place, "message": message + more})
-    return found
+            doubts = [doubt for doubt in told.doubts(file) if frame is None or doubt[0] != told.STANDS]
+            start = "" if place.startswith("collider ") else _START
+            found[place] = [
+                {"code": code, "path": place, "message": message + (start if code == told.STANDS else "")}
+                for code, message in doubts
+            ]
+    for place, path in figures:
+        if Path(path).name == FIGURE and told.is_usd(file := (Path(scene.folder) / path).parent):
+            with suppress(OSError):
+                found[place] = [{"code": code, "path": place, "message": text} for code, text in told.of_figure(file)]
+    return [warning for some in found.values() for warning in some]
 
 
-_CURE = "; `tumble check SCENE --bake` writes a scene in which they move"
-_START = "; only colliders can move as their file says"
+_START = "; only colliders move as their file says"
 
 
 def of_books(run: "Run") -> list[dict[str, str]]:

@@ -56,17 +56,19 @@ def film(
     progress: Callable[[int, int], None] | None = None,
     processes: int | None = None,
     samples: int = SAMPLES,
+    camera: str | None = None,
 ) -> Path:
-    """Writes the film of a run at `rate(run)`; with `every` = n of each n-th frame, as fast.
+    """Writes the film of a run at `rate(run)`; with `every` = n of each n-th frame, as fast. `camera`, FILE or FILE:PRIM, is
+    one of a USD file, which may move, instead of the scene's.
 
     Odd sizes grow by a pixel, because of yuv420p. `progress(done, total)` is called after each picture. The file
     appears when it is complete. `samples` per pixel are what mitsuba takes. Raises ExportError.
     """
     every = whole(every, "every", 1, ExportError)
-    studio = Studio(run, renderer, size, samples)
+    studio = Studio(run, renderer, size, samples, camera)
     width, height = (n + n % 2 for n in studio.camera.size)
     if (width, height) != studio.camera.size:
-        studio = Studio(run, studio.renderer, (width, height), samples)
+        studio = Studio(run, studio.renderer, (width, height), samples, camera)
     frames = range(0, run.n_frames, every)
     processes = None if processes is None else whole(processes, "processes", 1, ExportError)
     pace = rate(run) / every
@@ -103,9 +105,9 @@ def _cores() -> int:
 def _pictures(studio: Studio, frames: range, processes: int) -> Generator[Picture, None, None]:
     """The pictures in order; at most a few of them exist at a time."""
     processes = min(processes, len(frames))
-    how = studio.camera.unit(), studio.samples, studio.stage.night
+    how = studio.samples, studio.stage.night
     if processes <= 1:
-        yield from (render(studio.renderer, studio.things(i), *how) for i in frames)
+        yield from (render(studio.renderer, studio.things(i), studio.view(i).unit(), *how) for i in frames)
         return
     context = multiprocessing.get_context("spawn")
     pool = ProcessPoolExecutor(processes, mp_context=context, initializer=_worker, initargs=(studio.renderer,))
@@ -114,9 +116,9 @@ def _pictures(studio: Studio, frames: range, processes: int) -> Generator[Pictur
         for i in frames:
             if len(waiting) >= AHEAD * processes:
                 yield waiting.popleft().result()
-            things = studio.things(i)
+            things, camera = studio.things(i), studio.view(i).unit()
             with _no_main():
-                waiting.append(pool.submit(_draw, studio.renderer, things, *how))
+                waiting.append(pool.submit(_draw, studio.renderer, things, camera, *how))
         while waiting:
             yield waiting.popleft().result()
     except BrokenProcessPool as error:

@@ -110,7 +110,7 @@ class Recorder:
             "timings": self.timings,
             "custom": world.custom,
             "altered": altered,
-            "warnings": doubts.of_scene(world),
+            "warnings": world.warnings,
             # Of the state that the run began with.
             "stability": world.stability() if earlier is None else earlier.get("stability", []),
             "expectations": [],
@@ -243,7 +243,7 @@ class Recorder:
 
     def _doubt(self, run: Run) -> None:
         # The books know of all frames, the world of those that it has stepped.
-        own = [warning for warning in doubts.of_scene(self.world) if warning["code"] != "unconverged"]
+        own = [warning for warning in self.world.warnings if warning["code"] != "unconverged"]
         self.manifest["warnings"] = [*own, *doubts.of_books(run)]
 
     def _doubt_so_far(self) -> None:

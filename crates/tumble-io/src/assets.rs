@@ -62,6 +62,11 @@ impl File {
         Self { bytes: Mutex::new(obj.into_bytes()), format: Some(Format::Obj), converted: Some(name), ..self }
     }
 
+    /// The same, where its figure was written out as GLB.
+    pub fn figure(self, glb: Vec<u8>) -> Self {
+        Self { bytes: Mutex::new(glb), figure: true, format: Some(Format::Glb), ..self }
+    }
+
     /// Hash of its content.
     pub fn hash(&self) -> &str {
         &self.hash

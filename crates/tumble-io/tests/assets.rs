@@ -112,3 +112,10 @@ fn files_of_a_page_must_be_something() {
     let mesh = mesh_of(&mut shelf(&[("a.usd", "usd v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n")]), "a.usd").unwrap().0;
     assert_eq!(mesh.vertices[1], [1.0, 0.0, 0.0]);
 }
+
+#[test]
+fn a_figure_that_was_written_out_has_the_hash_of_its_file() {
+    let file = File::new("a.usd/figure.glb", b"usd".to_vec()).figure(Vec::new());
+    assert_eq!(file.hash(), File::new("a.usd", b"usd".to_vec()).hash());
+    assert_eq!(file.character().unwrap_err(), "the file is empty; export the character again");
+}

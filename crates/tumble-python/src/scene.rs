@@ -8,7 +8,7 @@ use pyo3::types::{PyBool, PyDict, PyFloat, PyInt, PyList, PyString, PyTuple, PyT
 use std::hash::{Hash, Hasher};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
-use tumble_interface::scene::{MeshRef, Precision};
+use tumble_interface::scene::{MeshRef, Precision, Shape};
 use tumble_interface::tree::{Node, Value};
 use tumble_interface::{Assets, Issue, Mesh, SceneError};
 use tumble_io::assets::{File, Files, fabric_of, mesh_of};
@@ -36,6 +36,7 @@ impl Scene {
     /// The scene of a tree.
     fn checked(node: &Node, folder: PathBuf, sets: Vec<String>, frames: Option<u64>) -> Result<Self, SceneError> {
         let mut scene = tumble_interface::Scene::from_tree(node)?;
+        move_meshes(&mut scene, &folder)?;
         let assets = tumble_io::assets::assets(&mut scene, &mut Folder(&folder))?;
         let frames = frames.unwrap_or(u64::from(scene.time.frames));
         Ok(Self { scene: tumble::scene::resolve(scene), assets, folder, node: node.clone(), sets, frames })
@@ -72,6 +73,27 @@ impl Scene {
     pub fn error(&self, py: Python<'_>, error: SceneError) -> PyErr {
         blamed(py, &self.node, &self.sets, error)
     }
+}
+
+/// Gives each collider whose mesh is an animated USD file the meshes of all its frames, and each character of one its figure.
+fn move_meshes(scene: &mut tumble_interface::Scene, folder: &Path) -> Result<(), SceneError> {
+    if !scene.mesh_files_mut().iter().any(|file| is_usd(Path::new(file.path))) {
+        return Ok(());
+    }
+    let span = scene.frame_time() * f64::from(scene.time.frames);
+    // OpenUSD is a library of Python.
+    let moved = Python::attach(|py| -> PyResult<Vec<(usize, Shape)>> {
+        let colliders = pythonize::pythonize(py, &scene.collider)?;
+        let moved = py.import("tumble.usd")?.call_method1("moved", (colliders, folder.to_path_buf(), span))?;
+        Ok(pythonize::depythonize(&moved)?)
+    });
+    let moved = moved.map_err(|e| SceneError::one("collider", Python::attach(|py| e.value(py).to_string())))?;
+    for (k, shape) in moved {
+        if let Some(collider) = scene.collider.get_mut(k) {
+            collider.shape = shape;
+        }
+    }
+    Ok(())
 }
 
 /// What is wrong with a text that is no TOML or JSON, in words for those who wrote it, and the line.
@@ -222,8 +244,8 @@ impl Scene {
         self.folder.display().to_string()
     }
 
-    /// The mesh files that it names: place of the name in the scene, its line or None, and the path as it stands there.
-    /// Files of figures are left out.
+    /// The mesh files that it names: place of the name in the resolved scene, its line or None, and the path as it stands
+    /// there, FILE/CODE.usd for a frame of an animated USD file. Files of figures are left out.
     #[getter]
     fn mesh_files(&self) -> Vec<(String, Option<usize>, String)> {
         let mut scene = self.scene.clone();
@@ -330,6 +352,10 @@ pub fn looks<'py>(py: Python<'py>, tree: &Bound<'_, PyAny>) -> PyResult<Bound<'p
 /// Suffixes of files that OpenUSD reads.
 const USD: [&str; 4] = ["usd", "usda", "usdc", "usdz"];
 
+fn is_usd(path: &Path) -> bool {
+    path.extension().is_some_and(|e| USD.iter().any(|usd| e.eq_ignore_ascii_case(usd)))
+}
+
 /// Files below a folder.
 struct Folder<'a>(&'a Path);
 
@@ -339,15 +365,24 @@ impl Files for Folder<'_> {
 
     fn open(&mut self, path: &str) -> Result<Arc<File>, String> {
         let whole = self.0.join(path);
-        let bytes = std::fs::read(&whole).map_err(|e| errors::file_error(&whole, &e))?;
+        let figure = whole.extension().is_some_and(|e| e.eq_ignore_ascii_case("glb"));
+        // Below the name of a USD file are its frames, walk.usda/24.usda, and its figure, walk.usda/figure.glb.
+        let home = whole.parent().filter(|home| (figure || is_usd(&whole)) && is_usd(home) && home.is_file());
+        let stored = home.unwrap_or(&whole);
+        let bytes = std::fs::read(stored).map_err(|e| errors::file_error(stored, &e))?;
         let file = File::new(path, bytes);
-        if !whole.extension().is_some_and(|e| USD.iter().any(|usd| e.eq_ignore_ascii_case(usd))) {
+        if !is_usd(stored) {
             return Ok(Arc::new(file));
         }
-        // OpenUSD is a library of Python.
+        let told = |e: PyErr| format!("\"{}\": {}", stored.display(), Python::attach(|py| e.value(py).to_string()));
+        if figure {
+            let glb = Python::attach(|py| -> PyResult<Vec<u8>> {
+                py.import("tumble.usd")?.call_method1("as_glb", (stored.to_path_buf(),))?.extract()
+            });
+            return Ok(Arc::new(file.figure(glb.map_err(told)?)));
+        }
         let text = Python::attach(|py| -> PyResult<String> { py.import("tumble.usd")?.call_method1("as_obj", (&whole,))?.extract() });
-        let text = text.map_err(|e| format!("\"{}\": {}", whole.display(), Python::attach(|py| e.value(py).to_string())))?;
-        Ok(Arc::new(file.converted("USD", text)))
+        Ok(Arc::new(file.converted("USD", text.map_err(told)?)))
     }
 
     fn shown(&self, path: &str) -> String {

@@ -15,7 +15,7 @@ use std::time::{Duration, Instant};
 use tumble_interface::check::suggestion;
 use tumble_interface::columns::COLUMNS;
 use tumble_interface::engine::{Engine, StepReport};
-use tumble_interface::scene::Precision;
+use tumble_interface::scene::{Precision, Shape};
 use tumble_interface::{Column, Issue, SceneError, StepError};
 
 /// How often a long call looks for Ctrl-C.
@@ -251,11 +251,19 @@ impl World {
         self.engine.systems()
     }
 
-    /// Warnings about the scene, and about solvers that missed their tolerance so far: code (as listed in
+    /// Warnings about the scene, its USD files, and solvers that missed their tolerance so far: code (as listed in
     /// docs/warnings.md), path and message of each.
     #[getter]
     fn warnings<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyList>> {
         let warnings = pythonize::pythonize(py, self.engine.warnings())?.cast_into::<PyList>()?;
+        let colliders = self.scene.bind(py).get().scene.collider.iter();
+        let figures = colliders.filter_map(|collider| match &collider.shape {
+            Shape::Character(figure) => Some((format!("collider \"{}\".shape.character.path", collider.name), figure.path.clone())),
+            _ => None,
+        });
+        let figures: Vec<(String, String)> = figures.collect();
+        let files = py.import("tumble.doubts")?.call_method1("of_files", (self.scene.clone_ref(py), figures))?;
+        warnings.call_method1("extend", (files,))?;
         let Unsolved { steps, unconverged, residual } = self.unsolved;
         if unconverged > 0 {
             let one = PyDict::new(py);

@@ -55,24 +55,24 @@ def bake(file: Path, scene: "Scene", force: bool, mended: bool) -> tuple[Path, s
     return new, {frame["path"] for frames in written.values() for frame in frames}
 
 
+def has_frames(scene: "Scene") -> bool:
+    """Whether a collider of a scene moves as its USD file says."""
+    from tumble.usd.frames import parted
+
+    return any(parted(Path(scene.folder) / path) for _, _, path in scene.mesh_files)
+
+
 def look_with(camera: str) -> list[str]:
     """Prints the lines of a scene for a camera, FILE or FILE:PRIM, and returns them as settings. Raises SceneError."""
     from tumble import SceneError, usd
     from tumble.toml import toml
 
-    name, colon, prim = camera.rpartition(":/")
-    if not colon or not usd.is_usd(name):
-        name, prim = camera, ""
-    if not usd.is_usd(name) or not Path(name).is_file():
-        raise SceneError(
-            f"{name}: there is no such USD file; give one that has a camera, as in shot.usda or shot.usda:/cameras/a"
-        )
     try:
-        words, doubts = usd.camera(name, f"/{prim}" if prim else None)
+        words, doubts = usd.camera(camera)
     except ValueError as error:
-        raise SceneError(f"{name}: {error}") from None
+        raise SceneError(f"{camera}: {error}") from None
     for code, message in doubts:
-        warn(code, f"{name}: {message}")
+        warn(code, f"{camera}: {message}")
     say(toml({"camera": words}).strip() + "\n")
     return [f"camera.{key}={json.dumps(value)}" for key, value in words.items()]
 

@@ -34,7 +34,8 @@ def check(
         bool, typer.Option("--repair", help="Repair the scene's mesh files into new files beside them.")
     ] = False,
     bake: Annotated[
-        bool, typer.Option("--bake", help="Write a scene in which animated USD files move, beside this one.")
+        bool,
+        typer.Option("--bake", help="Write the motion of animated USD files as meshes, and a scene that uses them."),
     ] = False,
     camera: Annotated[
         str | None, typer.Option(metavar="FILE[:PRIM]", help="Look with a camera of a USD file; print its lines.")
@@ -55,8 +56,8 @@ def check(
     scene is checked with them. The original meshes and the scene file are not modified; holes stay open.
 
     --bake writes the motion of colliders from animated USD files (points, transforms, skeletons, blend shapes) as one mesh
-    per frame of the file, NAME.usd as NAME.baked/000000.obj and so on, and SCENE.baked.toml, which uses them and is checked;
-    with --repair, the meshes are mended, all alike.
+    per frame of the file, NAME.usd as NAME.baked/000000.obj and so on, and SCENE.baked.toml, which uses them and is checked:
+    for other programs, and with --repair, which mends the meshes all alike.
 
     \b
     Examples:
@@ -67,19 +68,21 @@ def check(
       tumble check my.toml --camera shot.usda:/cameras/main
       tumble check my.toml --json
     """
-    from tumble import World, doubts
+    from tumble import World
     from tumble.emitters import forecast
     from tumble.expect import probes
 
     with find.told_as_json(json):
         checked = find.scene(scene, set)
         done: Container[str] = ()
-        if bake:
-            from tumble.cli.bake import bake as write_moving
+        if bake or repair:
+            from tumble.cli import bake as baking
 
-            moving, done = write_moving(scene_file(scene), checked, force, repair)
-            scene = str(moving)
-            checked = find.scene(scene, set)
+            # Frames are mended all alike, in files.
+            if bake or baking.has_frames(checked):
+                moving, done = baking.bake(scene_file(scene), checked, force, repair)
+                scene = str(moving)
+                checked = find.scene(scene, set)
         if camera is not None:
             from tumble.cli.bake import look_with
 
@@ -102,7 +105,7 @@ def check(
     cures = [cure for estimate in estimates if predict(estimate)[0] == 2 for cure in _cures(tree, estimate)]
     if json:
         find.say_json(_as_tree(scene, world, estimates, judged, fault, cures))
-        warn_of(doubts.of_scene(world))
+        warn_of(world.warnings)
         raise typer.Exit(1 if cures or fault is not None else 0)
     for estimate in estimates:
         say()
@@ -111,7 +114,7 @@ def check(
     if without:
         say(f"\nno estimate for: {', '.join(without)}")
     say()
-    warn_of(doubts.of_scene(world))
+    warn_of(world.warnings)
     if fault is not None:
         say(f"will break down {fault}\n{find.command('run', scene, set)} searches for changes that help")
     if cures:
@@ -134,8 +137,6 @@ def _as_tree(
     cures: list[list[str]],
 ) -> dict[str, Any]:
     """What is printed, for programs: `systems` are the estimates of `World.stability`, each with a verdict."""
-    from tumble import doubts
-
     systems = []
     for estimate in estimates:
         level, verdict = predict(estimate)
@@ -149,7 +150,7 @@ def _as_tree(
         "systems": systems,
         "fault": fault,
         "cures": cures,
-        "warnings": doubts.of_scene(world),
+        "warnings": world.warnings,
     }
 
 

@@ -7,6 +7,7 @@ import typer
 
 from tumble.cli import find
 from tumble.cli.console import Progress, say
+from tumble.cli.render import CameraOption, look_through
 
 if TYPE_CHECKING:
     from tumble import Run
@@ -30,6 +31,7 @@ def export(
     ] = False,
     half: Annotated[bool, typer.Option("--half", help="VDB in half precision.")] = False,
     zip: Annotated[bool, typer.Option("--zip", help="VDB compressed, except densities.")] = False,
+    camera: CameraOption = None,
     out: Annotated[
         Path | None, typer.Option(metavar="DIR", help="Folder to write into.", show_default="that of the run")
     ] = None,
@@ -39,6 +41,7 @@ def export(
     \b
     Examples:
       tumble export out/sheet-on-bunny --usd
+      tumble export out/sheet-on-bunny --usd --camera shot.usda:/cameras/main
       tumble export out/plume --blender && blender --python out/plume/blender.py
       tumble export out/sheet-on-bunny --npz --out results
       tumble export out/fountain --ply
@@ -49,7 +52,10 @@ def export(
         raise typer.BadParameter("choose at least one format: --usd, --blender, --npz, --ply, --vdb")
     if (half or zip) and not vdb:
         raise typer.BadParameter("--half and --zip say how to write --vdb")
+    if camera is not None and not usd:
+        raise typer.BadParameter("--camera says how to look in --usd")
     found = find.run(run)
+    look_through(camera, found.scene)
     folder = out or found.folder
     if vdb:
         from tumble.export.vdb import write as write_vdb
@@ -60,11 +66,11 @@ def export(
         from tumble.export.usd import write
 
         with Progress("usd") as progress:
-            say(write(found, folder, progress, volumes=not vdb))
+            say(write(found, folder, progress, volumes=not vdb, camera=camera))
     if blender:
         from tumble.export.blender import write as write_script
 
-        say(write_script(found, folder))
+        say(write_script(found, folder, camera))
     if npz:
         with Progress("npz") as progress:
             say(stack(found, folder, progress))

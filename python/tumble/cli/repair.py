@@ -32,10 +32,14 @@ def mend(file: Path, scene: "Scene", force: bool, done: Container[str] = ()) -> 
     """Repairs the mesh files of a scene but those that are `done`, prints the repairs, and returns the settings that use
     the new files. Raises SceneError if a new file exists, unless `force` overwrites it."""
     from tumble import SceneError, repair_mesh, usd
+    from tumble.usd.frames import parted
 
     changes: dict[str, Path] = {}
     seen: set[str] = set()
-    places = [place for place in scene.mesh_files if place[2] not in done]
+    moving = {path: frame[0] for _, _, path in scene.mesh_files if (frame := parted(Path(scene.folder) / path))}
+    for animated in dict.fromkeys(moving.values()):
+        say(f"{animated}: its frames, listed one by one, are not mended; name the file in shape.mesh")
+    places = [place for place in scene.mesh_files if place[2] not in done and place[2] not in moving]
     for _, _, path in places:
         if path in seen:
             continue
@@ -60,10 +64,10 @@ def mend(file: Path, scene: "Scene", force: bool, done: Container[str] = ()) -> 
         if usd.is_usd(old) and usd.moves(old):
             warn(
                 "stands-still",
-                f"{new}: has the shape of {old} at its start; --bake --repair mends it and keeps its motion",
+                f"{new}: has the shape of {old} at its start",
             )
         changes[path] = new.relative_to(scene.folder) if new.is_relative_to(scene.folder) else new
-    if not seen:
+    if not seen and not moving:
         say("the scene has no mesh files")
     tree, settings = scene.to_dict(), []
     for place, line, path in places:

@@ -9,7 +9,7 @@ import typer
 from tumble.bundled import scene_file
 from tumble.cli import find, report
 from tumble.cli.console import Progress, broke, complain, counted, say, stopped, warn_of
-from tumble.cli.render import SamplesOption, look_for
+from tumble.cli.render import CameraOption, SamplesOption, look_for, look_through
 
 if TYPE_CHECKING:
     from tumble import Run, TumbleError
@@ -33,6 +33,7 @@ def run(
     stills: Annotated[bool, typer.Option(help="Write the stills requested by the scene.")] = True,
     renderer: Annotated[str, typer.Option(metavar="NAME", help="Renderer of film and stills.")] = "auto",
     samples: SamplesOption = None,
+    camera: CameraOption = None,
     json: find.JsonOption = False,
 ) -> None:
     """Simulate a scene into a folder, out/NAME by default.
@@ -44,6 +45,7 @@ def run(
     Examples:
       tumble run sheet-on-bunny
       tumble run my.toml --frames 48 --set system.soft.step=0.001 --film
+      tumble run my.toml --film --camera shot.usda:/cameras/main
       tumble run my.toml --resume
       tumble run my.toml --json
     """
@@ -73,6 +75,11 @@ def run(
     _refuse_empty(checked.to_dict(), ply, vdb)
     frames_to_draw = wanted["stills"] if stills else []
     flags = {"film": film, "usd": usd, "ply": ply, "vdb": vdb, "plot": plot, "stills": None if stills else False}
+    if camera is not None and not (asked["film"] or asked["usd"] or frames_to_draw):
+        raise typer.BadParameter(
+            "nothing is looked at; ask for --film or --usd, or for stills in the scene", param_hint="--camera"
+        )
+    look_through(camera, checked.to_dict())
     if renderer != "auto" and (asked["film"] or frames_to_draw):
         resolve(renderer)  # Says now, rather than after the simulation, if it does not work here.
     try:
@@ -85,18 +92,18 @@ def run(
                 checked, folder, resume=resume, threads=threads, progress=progress, overwrite=force, broke=broke
             )
     except StepError as error:
-        again = [*(["--out", str(out)] if out else []), *_flags(flags, renderer, samples)]
+        again = [*(["--out", str(out)] if out else []), *_flags(flags, renderer, samples, camera)]
         print(report.failure(Run(folder), error, scene, overrides, again), file=sys.stderr)
         if json:
             find.say_json(report.as_tree(Run(folder)))
         raise typer.Exit(1) from None
     except KeyboardInterrupt as stop:
-        again = [*(["--out", str(out)] if out else []), "--resume", *_flags(flags, renderer, samples)]
+        again = [*(["--out", str(out)] if out else []), "--resume", *_flags(flags, renderer, samples, camera)]
         _say_what_is_kept(folder, find.command("run", scene, overrides, *again))
         raise typer.Exit(stopped(stop)) from None
 
-    failures = present(done, asked, frames_to_draw, renderer, samples, json)
-    again = [*(["--out", str(out)] if out else []), *_flags(flags, renderer, samples)]
+    failures = present(done, asked, frames_to_draw, renderer, samples, json, camera)
+    again = [*(["--out", str(out)] if out else []), *_flags(flags, renderer, samples, camera)]
     if text := report.gained(done, scene, overrides, again):
         print(text, file=sys.stderr)
     judge(done, failures)
@@ -125,6 +132,7 @@ def present(
     renderer: str,
     samples: int | None = None,
     json: bool = False,
+    camera: str | None = None,
 ) -> "list[TumbleError]":
     """Prints the warnings of a finished run, writes the requested output and a summary; returns the outputs that failed."""
     from tumble.lock import alone
@@ -132,7 +140,7 @@ def present(
     warn_of(done.manifest["warnings"])
     try:
         with alone(done.folder):
-            failures = write_results(done, asked, stills, renderer, samples)
+            failures = write_results(done, asked, stills, renderer, samples, camera)
     except KeyboardInterrupt as stop:
         complain(
             f"stopped; the simulation in {done.folder} is complete, see `tumble render --help` and `tumble export --help`"
@@ -156,10 +164,11 @@ def judge(done: "Run", failures: "list[TumbleError]") -> None:
         raise typer.Exit(1)
 
 
-def _flags(asked: dict[str, bool | None], renderer: str, samples: int | None) -> list[str]:
+def _flags(asked: dict[str, bool | None], renderer: str, samples: int | None, camera: str | None) -> list[str]:
     """The output options, as given."""
     flags = [f"--{'' if wanted else 'no-'}{name}" for name, wanted in asked.items() if wanted is not None]
     flags += ["--renderer", renderer] if renderer != "auto" else []
+    flags += ["--camera", camera] if camera is not None else []
     return [*flags, *(["--samples", str(samples)] if samples is not None else [])]
 
 
@@ -175,7 +184,12 @@ def _say_what_is_kept(folder: Path, cure: str) -> None:
 
 
 def write_results(
-    run: "Run", asked: dict[str, bool], stills: list[int], renderer: str, samples: int | None = None
+    run: "Run",
+    asked: dict[str, bool],
+    stills: list[int],
+    renderer: str,
+    samples: int | None = None,
+    camera: str | None = None,
 ) -> "list[TumbleError]":
     """Writes the output requested by the scene, the film last. A failure does not prevent the rest."""
     from tumble import TumbleError
@@ -187,7 +201,7 @@ def write_results(
         from tumble.export.usd import write
 
         with Progress("usd") as progress:
-            write(run, run.folder, progress, volumes=not asked["vdb"])
+            write(run, run.folder, progress, volumes=not asked["vdb"], camera=camera)
 
     def vdb() -> None:
         from tumble.export.vdb import write
@@ -208,13 +222,13 @@ def write_results(
             energy(run, run.folder / "energy.png")
 
     def draw_film() -> None:
-        film(run, run.folder / "film.mp4", renderer, samples=samples)
+        film(run, run.folder / "film.mp4", renderer, samples=samples, camera=camera)
 
     def draw_stills() -> None:
         there = [i for i in stills if i < run.n_frames]
         with Progress("stills") as progress:
             for k, i in enumerate(there):
-                still(run, i, None, renderer, samples=samples)
+                still(run, i, None, renderer, samples=samples, camera=camera)
                 progress(k + 1, len(there))
 
     tasks = {"plot": plot, "vdb": vdb, "usd": usd, "ply": ply, "stills": draw_stills, "film": draw_film}

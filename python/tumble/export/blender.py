@@ -14,7 +14,7 @@ from tumble.export.parts import Part, parts, varying
 from tumble.export.prims import GLOW, roughness
 from tumble.export.usd import fps, surroundings
 from tumble.folder import write_whole
-from tumble.pictures.framing import camera
+from tumble.pictures.framing import views
 from tumble.pictures.things import EXPOSURE, Recording, Stage, by_night, objects, with_hair
 
 _DEVELOPED = 0.2
@@ -24,23 +24,23 @@ _SCRIPT = Path(__file__).with_name("in_blender.py.txt")
 """The script without its first lines, which hold what differs from run to run."""
 
 
-def write(run: Recording, folder: str | PathLike[str]) -> Path:
-    """Writes blender.py into the folder of scene.usda and returns its path. Raises ExportError."""
+def write(run: Recording, folder: str | PathLike[str], camera: str | None = None) -> Path:
+    """Writes blender.py into the folder of scene.usda and returns its path; `camera` as scene.usda has it. Raises
+    ExportError."""
     goal = Path(folder) / "blender.py"
-    tables = {"SCENE": _scene(run), "LOOKS": _looks(run), "VOLUMES": _volumes(run)}
+    tables = {"SCENE": _scene(run, camera), "LOOKS": _looks(run), "VOLUMES": _volumes(run)}
     lines = [f"{name} = {pprint.pformat(table, width=110, sort_dicts=False)}" for name, table in tables.items()]
     text = _SCRIPT.read_text(encoding="utf-8").replace("# TABLES\n", "\n".join(lines) + "\n")
     write_whole(goal, text.encode())
     return goal
 
 
-def _scene(run: Recording) -> dict[str, Any]:
-    view = camera(run)
+def _scene(run: Recording, camera: str | None) -> dict[str, Any]:
     strength, color = surroundings(by_night(run))
     return {
         "fps": fps(run),
         "frames": (0, run.n_frames - 1),
-        "resolution": view.size,
+        "resolution": views(run, camera)(0).size,
         "world": (*color, strength),
     }
 

@@ -37,7 +37,7 @@ from tumble._engine import ExportError
 from tumble.export import DIGITS, prims, vdb
 from tumble.export.parts import ROOT, History, Now, Part, deforms, parts, placement, values, varying, velocities
 from tumble.folder import writing
-from tumble.pictures.framing import camera
+from tumble.pictures.framing import Camera, views
 from tumble.pictures.look import NIGHT, key_light
 from tumble.pictures.splats import DIM
 from tumble.pictures.things import Columns, Recording, by_night, objects, with_hair
@@ -51,12 +51,15 @@ def write(
     folder: str | os.PathLike[str],
     progress: Callable[[int, int], None] | None = None,
     volumes: bool = True,
+    camera: str | None = None,
 ) -> Path:
     """Writes scene.usda and usd/ into a folder and returns the path of scene.usda, which is written last; also volumes/,
-    if anything lies on a grid, unless told that it is there. `progress(done, total)` is called after each frame.
+    if anything lies on a grid, unless told that it is there. `progress(done, total)` is called after each frame. `camera`,
+    FILE or FILE:PRIM, is one of a USD file, which may move, instead of the scene's.
     Positions are single precision, bit for bit those of a run in single precision. Raises ExportError."""
     if run.n_frames < 1:
         raise ExportError("the run has no frames")
+    view = views(run, camera)
     goal = Path(folder)
     layers = goal / "usd"
     start = run.frame(0)
@@ -83,7 +86,7 @@ def write(
         _save(_manifest(made, first), layers / "manifest.usda")
         _save(_objects(run, made, first), layers / "objects.usdc")
         scene = goal / "scene.usda"
-        _save(_scene(run, "#" * digits), scene)
+        _save(_scene(run, "#" * digits, view), scene)
     return scene
 
 
@@ -171,7 +174,7 @@ def _objects(run: Recording, made: list[Part], start: Now) -> Any:
     return layer
 
 
-def _scene(run: Recording, hashes: str) -> Any:
+def _scene(run: Recording, hashes: str, view: Callable[[int], Camera]) -> Any:
     """The root: frame rate, camera, lights, and where the rest is."""
     from pxr import Gf, Sdf, Usd, UsdGeom, UsdLux
 
@@ -189,25 +192,14 @@ def _scene(run: Recording, hashes: str) -> Any:
     if run.scene.get("title"):
         root.SetDisplayName(str(run.scene["title"]))
 
-    view = camera(run)
-    lens = UsdGeom.Camera.Define(stage, f"{ROOT}/camera")
-    lens.AddTransformOp().Set(_placed(view.axes[0], view.axes[1], -view.axes[2], view.position))
-    sensor = 10 * view.width if view.parallel else SENSOR
-    if view.parallel:
-        lens.CreateProjectionAttr(UsdGeom.Tokens.orthographic)
-    else:
-        lens.CreateFocalLengthAttr(sensor * view.distance / view.width)
-    lens.CreateHorizontalApertureAttr(sensor)
-    lens.CreateVerticalApertureAttr(sensor * view.height / view.width)
-    lens.CreateClippingRangeAttr(Gf.Vec2f(1e-3 * view.distance, 1e3 * view.distance))
-
+    _look(UsdGeom.Camera.Define(stage, f"{ROOT}/camera"), [view(i) for i in range(run.n_frames)])
     night = by_night(run)
     key = UsdLux.DistantLight.Define(stage, f"{ROOT}/key_light")
     key.CreateIntensityAttr(DIM if night else 1.0)
     key.CreateNormalizeAttr(True)
     key.CreateAngleAttr(12.0)
-    toward = key_light(view)
-    across = np.cross(view.axes[1], toward)
+    toward = key_light(view(0))
+    across = np.cross(view(0).axes[1], toward)
     across /= np.linalg.norm(across)
     key.AddTransformOp().Set(_placed(across, np.cross(toward, across), toward, np.zeros(3)))
     sky = UsdLux.DomeLight.Define(stage, f"{ROOT}/sky")
@@ -229,6 +221,33 @@ def _scene(run: Recording, hashes: str) -> Any:
     }
     spec.SetInfo("clips", {"default": clips})
     return layer
+
+
+def _look(lens: Any, views: list[Camera]) -> None:
+    """Places a camera, at each frame if it moves."""
+    from pxr import Gf, UsdGeom
+
+    first = views[0]
+    place = lens.AddTransformOp()
+    sensor = 10 * first.width if first.parallel else SENSOR
+    if first.parallel:
+        lens.CreateProjectionAttr(UsdGeom.Tokens.orthographic)
+    lens.CreateHorizontalApertureAttr(sensor)
+    lens.CreateVerticalApertureAttr(sensor * first.height / first.width)
+    lens.CreateClippingRangeAttr(Gf.Vec2f(1e-3 * min(v.distance for v in views), 1e3 * max(v.distance for v in views)))
+    matrices = [_placed(v.axes[0], v.axes[1], -v.axes[2], v.position) for v in views]
+    _set(place, matrices)
+    if not first.parallel:
+        _set(lens.CreateFocalLengthAttr(), [sensor * v.distance / v.width for v in views])
+
+
+def _set(attribute: Any, values: list[Any]) -> None:
+    """The values of all frames; one for all if they are alike."""
+    if all(value == values[0] for value in values):
+        attribute.Set(values[0])
+        return
+    for i, value in enumerate(values):
+        attribute.Set(value, float(i))
 
 
 def surroundings(night: bool) -> tuple[float, tuple[float, float, float]]:

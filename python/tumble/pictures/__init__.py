@@ -77,56 +77,69 @@ def resolve(renderer: str = "auto") -> str:
 
 
 def picture(
-    run: Recording, i: int, renderer: str = "auto", size: tuple[int, int] | None = None, samples: int = SAMPLES
+    run: Recording,
+    i: int,
+    renderer: str = "auto",
+    size: tuple[int, int] | None = None,
+    samples: int = SAMPLES,
+    camera: str | None = None,
 ) -> Picture:
     """A picture of frame i, in sRGB; the size is that of the scene's camera if not given. `samples` per pixel are what
-    mitsuba takes. Raises ExportError."""
-    return Studio(run, renderer, size, samples).picture(i)
+    mitsuba takes. `camera` is one of a USD file, FILE or FILE:PRIM, instead of the scene's. Raises ExportError."""
+    return Studio(run, renderer, size, samples, camera).picture(i)
 
 
 class Studio:
     """Takes pictures of one run; what frames have in common, as the camera's place, is worked out once."""
 
     def __init__(
-        self, run: Recording, renderer: str = "auto", size: tuple[int, int] | None = None, samples: int = SAMPLES
+        self,
+        run: Recording,
+        renderer: str = "auto",
+        size: tuple[int, int] | None = None,
+        samples: int = SAMPLES,
+        camera: str | None = None,
     ) -> None:
-        """`samples` per pixel are what mitsuba takes. Raises ExportError if the renderer does not work here, or there
-        is nothing to draw."""
+        """`samples` per pixel are what mitsuba takes; `camera` is one of a USD file, which may move. Raises ExportError if the
+        renderer does not work here, there is nothing to draw, or no such camera."""
         if run.n_frames < 1:
             raise ExportError("the run has no frames")
         self.run = run
         self.renderer = resolve(renderer)
         self.samples = whole(samples, "samples", 1, ExportError)
         points = functools.cache(lambda: framing.outline(run))
-        self.camera = framing.camera(run, size, points)
+        self.view = framing.views(run, camera, size, points)
+        self.camera = self.view(0)
         self.stage = Stage(run, self.camera.axes[2])
         self._backdrop = self._grounds_below(points)
 
     def picture(self, i: int) -> Picture:
         """A picture of frame i."""
-        return render(self.renderer, self.things(i), self.camera.unit(), self.samples, self.stage.night)
+        return render(self.renderer, self.things(i), self.view(i).unit(), self.samples, self.stage.night)
 
     def things(self, i: int) -> list[Thing]:
         """Drawables of frame i, moved and scaled for `Camera.unit`."""
         if not 0 <= whole(i, "frame", error=ExportError) < self.run.n_frames:
             raise ExportError(f"there is no frame {i}; there are frames 0 to {self.run.n_frames - 1}")
-        things = self.stage.things(i, THINNEST * self.camera.width)
+        camera = self.view(i)
+        things = self.stage.things(i, THINNEST * camera.width)
         if self.stage.flat:
             things = [self._slab(t) if isinstance(t, Ground) else t for t in things]
         else:
-            things = [t for t in things if not isinstance(t, Ground) or self._in_front(t)] + self._backdrop
-        return placed(things, self.camera.target, self.camera.distance)
-
-    def _in_front(self, ground: Ground) -> bool:
-        """Whether the camera is on the open side of a ground, not inside it."""
-        return float((self.camera.position - ground.point) @ ground.normal) > 0
+            # No ground that the camera is inside of.
+            things = [
+                t
+                for t in [*things, *self._backdrop]
+                if not isinstance(t, Ground) or float((camera.position - t.point) @ t.normal) > 0
+            ]
+        return placed(things, camera.target, camera.distance)
 
     def _falls(self) -> bool:
         """Whether gravity pulls down, or may."""
         gravity = self.run.scene.get("world", {}).get("gravity", (0.0, 0.0, -9.8))
         return not isinstance(gravity, (list, tuple)) or isinstance(gravity[2], str) or gravity[2] < 0
 
-    def _grounds_below(self, points: Callable[[], Floats]) -> list[Thing]:
+    def _grounds_below(self, points: Callable[[], Floats]) -> list[Ground]:
         """A neutral ground to catch shadows, in scenes in space where things fall and that have no ground of their own."""
         if any(o.plane is not None for o in self.stage.objects):
             return []
@@ -140,8 +153,7 @@ class Studio:
             return []
         low, high = points().min(axis=0), points().max(axis=0)
         point = np.array([0.0, 0.0, low[2] - GAP * float(np.max(high - low))])
-        ground = Ground("", point, np.array([0.0, 0.0, 1.0]), GROUND)
-        return [ground] if self._in_front(ground) else []
+        return [Ground("", point, np.array([0.0, 0.0, 1.0]), GROUND)]
 
     def _slab(self, ground: Ground) -> Thing:
         """A ground of a plane scene, which is seen from the side: what lies below its line."""

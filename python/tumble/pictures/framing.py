@@ -1,4 +1,4 @@
-"""From where a run is seen: one camera for all frames, all renderers and the USD file.
+"""From where a run is seen: one camera for all frames, all renderers and the USD file; or one that moves, from a USD file.
 
 Where the scene's camera leaves something open, it stands far enough away for everything to fit in at every frame.
 What must fit are the points that lie farthest out in 26 directions, of each object, in up to 200 frames (fewer where
@@ -13,8 +13,11 @@ from itertools import product
 
 import numpy as np
 
+from tumble._engine import ExportError
 from tumble.pictures.surfaces import Floats, unit
 from tumble.pictures.things import Recording, moving, objects, positions
+from tumble.usd.cameras import Shot
+from tumble.usd.cameras import size as of_lens
 
 MARGIN = 1.12
 """Width of the picture over the width of what must fit."""
@@ -52,6 +55,13 @@ class Camera:
     size: tuple[int, int]
     """Width and height of the picture [pixel]."""
     parallel: bool = False
+    lit: "Camera | None" = None
+    """The camera by which the light falls, if this one moves and the light stands."""
+
+    @property
+    def zenith(self) -> Floats:
+        """Where the bright part of the sky is."""
+        return self.up if self.lit is None else self.lit.up
 
     @property
     def distance(self) -> float:
@@ -142,6 +152,42 @@ def camera(run: Recording, size: tuple[int, int] | None = None, points: Callable
         shift = 0.5 * (seen.min(axis=0) + seen.max(axis=0)) * distance
         goal = goal + shift[0] * right + shift[1] * up
     return Camera(goal - distance * forward, goal, np.array([0.0, 0.0, 1.0]), 2 * tan * distance, (width, height))
+
+
+def views(
+    run: Recording, source: str | None, size: tuple[int, int] | None = None, points: Callable[[], Floats] | None = None
+) -> Callable[[int], Camera]:
+    """The camera at each frame: the scene's, which stands, or that of a USD file (`follow`)."""
+    if source is not None:
+        return follow(run, source, size, points)
+    still = camera(run, size, points)
+    return lambda _: still
+
+
+def follow(
+    run: Recording, source: str, size: tuple[int, int] | None = None, points: Callable[[], Floats] | None = None
+) -> Callable[[int], Camera]:
+    """The camera of a USD file, FILE or FILE:PRIM, at each frame of a run, for pictures of that size; without one, as wide as
+    the scene asks for and as high as the camera has it. The light is that of frame 0. Raises ExportError."""
+    if run.scene.get("dimension", 3) == 2:
+        raise ExportError(f"{source}: the scene is two-dimensional, and seen head-on; leave the camera out")
+    try:
+        shot = Shot(source)
+    except ValueError as error:
+        raise ExportError(f"{source}: {error}") from None
+    extent = outline(run) if points is None else points()
+    low, high = extent.min(axis=0), extent.max(axis=0)
+    words = run.scene.get("camera", {}).get("resolution") or (640, 360)
+    pixels = size or of_lens(shot.at(run.time(0)), int(words[0]))
+
+    def taken(i: int) -> Camera:
+        lens = shot.at(run.time(i))
+        away = max(float((lens.position - 0.5 * (low + high)) @ lens.back), 0.5 * float(np.linalg.norm(high - low)))
+        return Camera(lens.position, lens.position - away * lens.back, lens.up, lens.spread * away, pixels)
+
+    first = taken(0)
+    lit = replace(first, up=_up(first.target - first.position))
+    return lambda i: replace(taken(i), lit=lit)
 
 
 def _head_on(

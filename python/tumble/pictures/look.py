@@ -38,6 +38,7 @@ def background(size: tuple[int, int]) -> Floats:
 
 def key_light(camera: Camera) -> Floats:
     """Direction to the key light: from the left and above, which brings out folds."""
+    camera = camera.lit or camera
     right, up, forward = camera.axes
     if camera.parallel:
         return unit(-0.45 * right + 0.7 * up - 0.8 * forward)

@@ -163,7 +163,7 @@ def _surroundings(camera: Camera) -> Floats:
     d, _ = _sphere()
     right, up, forward = camera.axes
     glow = np.clip(d @ unit(right + 0.55 * forward + 0.5 * up), 0, 1)[..., None] ** 6
-    height = 0.5 + 0.5 * (d @ (up if camera.parallel else camera.up))[..., None]
+    height = 0.5 + 0.5 * (d @ (up if camera.parallel else camera.zenith))[..., None]
     blue, warm = np.array([0.95, 1.0, 1.08]), np.array([1.0, 0.97, 0.92])
     return np.asarray((0.05 + 0.21 * height) * blue + 0.45 * glow * warm)
 

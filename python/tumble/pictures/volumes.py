@@ -120,7 +120,7 @@ def _smoke(light: Floats, depth: Floats, cloud: Smoke, camera: Camera, bright: f
     extinction = np.ascontiguousarray(cloud.extinction[part], dtype=np.float32)
     low = cloud.low + cloud.spacing * np.array([s.start for s in part])
     key = lit(extinction, cloud.spacing, key_light(camera))
-    sky = lit(extinction, cloud.spacing, camera.axes[1] if camera.parallel else camera.up)
+    sky = lit(extinction, cloud.spacing, camera.axes[1] if camera.parallel else camera.zenith)
     shade = np.float32(bright * KEY) * ((1 - SPREAD) * key + SPREAD * np.sqrt(np.sqrt(key)))
     shade += np.float32(bright * AMBIENT) * (0.35 + 0.65 * np.sqrt(sky))
     rays, start = sights(camera)

@@ -5,43 +5,35 @@ USD names (Sphere, Cube and so on) as polygons, native instances and those of a 
 pose. What is invisible, or of purpose guide or proxy, is left out. What else there is to tell is in `doubts`.
 """
 
-import warnings
 from pathlib import Path
 from typing import Any
 
 from tumble.usd.stage import Reading, open_stage
+from tumble.usd.told import SUFFIXES, UsdWarning, doubts, is_usd, moves, note, warn
 
-__all__ = ["SUFFIXES", "UsdWarning", "as_obj", "bake", "camera", "doubts", "is_usd", "moves"]
-
-_told: dict[tuple[str, int, int], list[tuple[str, str]]] = {}
-"""Doubts about files, by path, time of change and size."""
-
-SUFFIXES = (".usd", ".usda", ".usdc", ".usdz")
-
-
-class UsdWarning(UserWarning):
-    """What a USD file holds and is not as it seems in a scene."""
+__all__ = ["SUFFIXES", "UsdWarning", "as_glb", "as_obj", "bake", "camera", "doubts", "is_usd", "moved", "moves"]
 
 
 def as_obj(path: Path | str) -> str:
-    """All meshes of a file at its start time, as one OBJ in metres, z up. Warns of what is not used. Raises ValueError."""
+    """All meshes of a file at its start time, or of FILE/CODE.usd at a time code, as one OBJ in metres, z up. Warns of what is
+    not used. Raises ValueError."""
+    from tumble.usd import frames
+
+    if (part := frames.parted(path)) is not None:
+        return frames.frame(*part)
     reading = Reading(open_stage(path))
     text = reading.obj()
-    told = _told[_key(path)] = reading.doubts()
-    for code, message in told:
-        cure = "; tumble.usd.bake writes their motion" if code == "stands-still" else ""
-        warnings.warn(f"{path}: {message}{cure}", UsdWarning, stacklevel=2)
+    note(path, reading)
+    warn(path, doubts(path), "tumble.usd.bake writes their motion")
     return text
 
 
-def doubts(path: Path | str) -> list[tuple[str, str]]:
-    """Code, as in docs/warnings.md, and message of all that is to be told of a file. Raises ValueError."""
-    key = _key(path)
-    if key not in _told:
-        reading = Reading(open_stage(path))
-        reading.surfaces()
-        _told[key] = reading.doubts()
-    return _told[key]
+def as_glb(path: Path | str) -> bytes:
+    """The skinned figure of a file, with its bones and its animation, as GLB, which `shape.character` reads. Raises
+    ValueError."""
+    from tumble.usd.figures import as_glb
+
+    return as_glb(path)
 
 
 def bake(
@@ -56,23 +48,16 @@ def bake(
 
 
 def camera(path: Path | str, prim: str | None = None) -> tuple[dict[str, Any], list[tuple[str, str]]]:
-    """The words of `[camera]` for a file's camera at its start, by default for the only one, and code and message of what
-    they cannot say. Raises ValueError."""
+    """The words of `[camera]` for a file's camera at its start, and code and message of what they cannot say. The camera is
+    `prim`, or that of FILE:PRIM, by default the only one. Raises ValueError."""
     from tumble.usd.cameras import camera
 
     return camera(path, prim)
 
 
-def moves(path: Path | str) -> bool:
-    """Whether what a file shows is animated. Raises ValueError."""
-    return any(code == "stands-still" for code, _ in doubts(path))
+def moved(colliders: list[dict[str, Any]], folder: Path | str, span: float) -> list[tuple[int, dict[str, Any]]]:
+    """Number and shape of each collider of a scene that lasts for `span` [s] whose mesh is an animated USD file, an
+    `animated_mesh` of its frames; and of each `character` of one. The engine asks for it when it reads a scene."""
+    from tumble.usd.frames import moved
 
-
-def is_usd(path: Path | str) -> bool:
-    """Whether a file has one of the suffixes of USD."""
-    return Path(path).suffix.lower() in SUFFIXES
-
-
-def _key(path: Path | str) -> tuple[str, int, int]:
-    about = Path(path).stat()
-    return str(Path(path).resolve()), about.st_mtime_ns, about.st_size
+    return moved(colliders, folder, span)

@@ -82,13 +82,25 @@ def end(stage: Any) -> float:
     return float(max((t for _, t in _spans(stage)), default=0.0))
 
 
+def is_animated(stage: Any) -> bool:
+    """Whether any value of a stage, seen or not, varies with time."""
+    return next(_spans(stage), None) is not None
+
+
 def _spans(stage: Any) -> Iterator[tuple[float, float]]:
+    """Time codes of the first and the last sample of each attribute that has several."""
+    for attribute in _varying(stage):
+        if times := attribute.GetTimeSamples():
+            yield times[0], times[-1]
+
+
+def _varying(stage: Any) -> Iterator[Any]:
+    """All attributes that vary with time."""
     from pxr import Usd
 
-    for prim in stage.Traverse(Usd.TraverseInstanceProxies()):
-        for attribute in prim.GetAttributes():
-            if attribute.ValueMightBeTimeVarying() and (times := attribute.GetTimeSamples()):
-                yield times[0], times[-1]
+    # Prototypes may stand below what is no more than an "over".
+    for prim in Usd.PrimRange.Stage(stage, Usd.TraverseInstanceProxies(Usd.PrimIsActive & Usd.PrimIsLoaded)):
+        yield from (a for a in prim.GetAttributes() if a.ValueMightBeTimeVarying())
 
 
 class Reading:
@@ -125,26 +137,11 @@ class Reading:
 
     def obj(self) -> str:
         """The surfaces as one OBJ. Raises ValueError if there are none."""
-        lines: list[str] = []
-        first, first_texture = 1, 1
-        for s in self.surfaces():
-            lines += [f"v {x!r} {y!r} {z!r}" for x, y, z in s.points.tolist()]
-            lines += [f"vt {u!r} {v!r}" for u, v in s.texture.tolist()]
-            words = [f"{first + k}" for k in s.corners.tolist()]
-            if len(s.texture):
-                seams = range(len(s.corners)) if s.by_corner else s.corners.tolist()
-                words = [f"{word}/{first_texture + k}" for word, k in zip(words, seams, strict=True)]
-            at = 0
-            for n in s.counts.tolist():
-                lines.append("f " + " ".join(words[at : at + n]))
-                at += n
-            first += len(s.points)
-            first_texture += len(s.texture)
-        if first == 1:
+        if not self.surfaces():
             left = f"; what is in it cannot be used: {names(self.unused)}" if self.unused else ""
             left += f"; left out as invisible, guide or proxy: {names(self.hidden)}" if self.hidden else ""
             raise ValueError(f"there is no mesh in it{left}; export a polygon mesh that is visible")
-        return "\n".join(lines) + "\n"
+        return obj(self.surfaces())
 
     def doubts(self) -> list[tuple[str, str]]:
         """Code and message of all that is to be told, once the surfaces have been read."""
@@ -208,7 +205,7 @@ class Reading:
             yield from self._instances(UsdGeom.PointInstancer(prim), place, moved)
             return
         try:
-            surface = self._surface(prim, place, moved)
+            surface = self.surface(prim, place, moved)
         except (TypeError, KeyError):
             raise ValueError(
                 f"{prim.GetPath()}: has a value of the wrong type; the file is damaged, export it again"
@@ -250,7 +247,7 @@ class Reading:
                 yield from self._walk(prims[int(kind)], np.array(matrix) @ place, moved)
         self._within.pop()
 
-    def _surface(self, prim: Any, place: Floats, moved: bool) -> Surface | None:
+    def surface(self, prim: Any, place: Floats, moved: bool = False) -> Surface | None:
         """The polygons of a prim itself, placed; None if it has none."""
         from pxr import UsdGeom
 
@@ -288,6 +285,26 @@ class Reading:
             kept[[i for i in mesh_holes if 0 <= i < len(counts)]] = False
         order = _order(counts, kept, left != (np.linalg.det(place[:3, :3]) < 0))
         return Surface(path, points, counts[kept], corners[order], texture[order] if by_corner else texture, by_corner)
+
+
+def obj(surfaces: list[Surface]) -> str:
+    """Surfaces as one OBJ."""
+    lines: list[str] = []
+    first, first_texture = 1, 1
+    for s in surfaces:
+        lines += [f"v {x!r} {y!r} {z!r}" for x, y, z in s.points.tolist()]
+        lines += [f"vt {u!r} {v!r}" for u, v in s.texture.tolist()]
+        words = [f"{first + k}" for k in s.corners.tolist()]
+        if len(s.texture):
+            seams = range(len(s.corners)) if s.by_corner else s.corners.tolist()
+            words = [f"{word}/{first_texture + k}" for word, k in zip(words, seams, strict=True)]
+        at = 0
+        for n in s.counts.tolist():
+            lines.append("f " + " ".join(words[at : at + n]))
+            at += n
+        first += len(s.points)
+        first_texture += len(s.texture)
+    return "\n".join(lines) + "\n"
 
 
 def _note(where: list[str], what: str) -> None:
@@ -352,6 +369,13 @@ def _texture(prim: Any, time: Any, n_corners: int, n_points: int) -> tuple[Float
     return np.zeros((0, 2)), False
 
 
+def has_shapes(prim: Any) -> bool:
+    """Whether a mesh has blend shapes."""
+    from pxr import UsdSkel
+
+    return bool(UsdSkel.BindingAPI(prim).GetBlendShapesAttr().Get())
+
+
 def is_posed(prim: Any) -> bool:
     """Whether a skeleton or blend shapes that are animated deform a mesh."""
     from pxr import UsdSkel
@@ -378,5 +402,15 @@ def pose(stage: Any, first: float, last: float | None = None) -> None:
         if prim.IsInstance() and any(p.IsA(UsdSkel.Root) for p in Usd.PrimRange(prim, Usd.TraverseInstanceProxies())):
             # What stands in for an instance cannot be written to.
             prim.SetInstanceable(False)
+    span = Gf.Interval(*_around(stage, first, first if last is None else last))
     for root in [p for p in stage.Traverse() if p.IsA(UsdSkel.Root)]:
-        UsdSkel.BakeSkinning(UsdSkel.Root(root), Gf.Interval(first, first if last is None else last))
+        UsdSkel.BakeSkinning(UsdSkel.Root(root), span)
+
+
+def _around(stage: Any, first: float, last: float) -> tuple[float, float]:
+    """The interval from the last samples before to the first ones after: where it holds none, nothing is posed."""
+    low, high = first, last
+    for attribute in _varying(stage):
+        low = min([low, *attribute.GetBracketingTimeSamples(first)[:1]])
+        high = max([high, *attribute.GetBracketingTimeSamples(last)[1:2]])
+    return low, high
