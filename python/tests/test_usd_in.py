@@ -397,7 +397,7 @@ def test_python_is_warned(tmp_path: Path) -> None:
     with pytest.warns(usd.UsdWarning, match=r"left out.*: /dust \(Points\);"):
         tumble.load_mesh(file)
     with pytest.warns(usd.UsdWarning, match=r"animated.*: /arm/skin; tumble\.usd\.bake writes their motion"):
-        Scene(scene("arm.usda"), write(tmp_path, ARM, SPAN, "arm.usda").parent)
+        tumble.load_mesh(write(tmp_path, ARM, SPAN, "arm.usda"))
 
 
 def test_a_camera_of_a_file_is_the_scene_s(tmp_path: Path, scene_file: Callable[..., Path], tumble: Command) -> None:

@@ -144,3 +144,97 @@ fn light_cloth_in_a_storm_is_not_torn_off_by_round_numbers() {
         assert!(far < 4.0);
     }
 }
+
+fn thread(system: &str, words: &str, air: &str) -> Simulation {
+    simulation(&format!(
+        "precision = \"double\"\n[[system]]\n{system}\n[[rope]]\nname = \"r\"\n{words}\n[[force]]\nkind = \"air\"\n{air}\n"
+    ))
+}
+
+/// The momentum that a thread at rest takes up in a short step: drag by what blows across it, friction by its whole surface, at any angle; ropes of links
+/// and rods alike.
+#[test]
+fn the_force_on_a_thread_is_that_of_the_formula() {
+    let (rho, drag, friction, u, d, l) = (1.3, 1.1, 0.05, 7.0, 0.02, 0.8);
+    let air = format!("density = {rho}\ndrag = {drag}\nfriction = {friction}\nwind = [{{ kind = \"uniform\", velocity = [{u}, 0, 0] }}]");
+    for system in ["integrator = \"symplectic_euler\"\nsubsteps = 1", "method = \"position_based\"\nsubsteps = 1"] {
+        for kind in ["links = { structural = 1e-3 }", "rod = { stretch = 1e-3, bend = 0 }"] {
+            for turn in [0.0_f64, 20.0, 45.0, 90.0] {
+                let (sin, cos) = turn.to_radians().sin_cos();
+                let words = format!(
+                    "from = [0, 0, 0]\nto = [{}, 0, {}]\nsegments = 5\ndensity = 0.5\nradius = {}\n{kind}",
+                    l * cos,
+                    l * sin,
+                    d / 2.0
+                );
+                let mut sim = thread(system, &words, &format!("{air}\n[time]\nfps = 1e4\n[world]\ngravity = [0, 0, 0]"));
+                step(&mut sim);
+                let force = sim.ledger().momentum.map(|p| p * 1e4);
+                let q = 0.5 * rho * d * l;
+                // Across the thread lies (sin, 0, -cos), on which the wind has u sin.
+                let (across, along) = (q * drag * (u * sin).powi(2), q * std::f64::consts::FRAC_PI_2 * friction * u * u * cos);
+                let exact = [across * sin + along * cos, 0.0, -across * cos + along * sin];
+                let error = (0..3).map(|k| (force[k] - exact[k]).abs()).fold(0.0, f64::max) / (q * u * u);
+                println!("{system:?} {kind:?} {turn} deg: {force:?}, error {error:.1e}");
+                assert!(error < 1e-9, "{error:e}");
+            }
+        }
+    }
+}
+
+/// A thread that hangs in a steady wind is straight, at the angle at which the wind across it bears the weight across it:
+/// mu g sin a = rho/2 d C_D (u cos a)²; and a level one falls no faster than sqrt(2 mu g/(rho C_D d)).
+#[test]
+fn a_thread_hangs_straight_in_the_wind_and_falls_at_its_own_speed() {
+    let (mu, rho, drag, d, u): (f64, f64, f64, f64, f64) = (2e-3, 1.2, 1.2, 2e-3, 4.0);
+    let air = format!("density = {rho}\ndrag = {drag}\nfriction = 0\n");
+    // Under position-based dynamics, which hardly damps, its end still swings a little.
+    for (system, bound) in [("integrator = \"implicit_euler\"\nsubsteps = 4", 2e-3), ("method = \"position_based\"\nsubsteps = 40", 1e-2)] {
+        let words = |ends: &str| {
+            format!(
+                "{ends}\nsegments = 16\ndensity = {mu}\nradius = {}\nlinks = {{ structural = 200, bend = {{ modulus = 0, damping = 0.02 }} }}",
+                d / 2.0
+            )
+        };
+        let mut sim = thread(
+            system,
+            &words("from = [0, 0, 0]\nto = [0.3, 0, -0.4]\npin = [\"start\"]"),
+            &format!("{air}wind = [{{ kind = \"uniform\", velocity = [{u}, 0, 0] }}]"),
+        );
+        run(&mut sim, 240);
+        let x = positions(&sim, "r");
+        // By bisection.
+        let (mut low, mut high) = (0.0, std::f64::consts::FRAC_PI_2);
+        for _ in 0..60 {
+            let a: f64 = 0.5 * (low + high);
+            if mu * 9.8 * a.sin() < 0.5 * rho * d * drag * (u * a.cos()).powi(2) { low = a } else { high = a }
+        }
+        let straight = vector(low.sin(), 0.0, -low.cos());
+        for (i, x) in x.iter().enumerate().skip(1) {
+            let off = (x.normalized() - straight).norm();
+            assert!(off < bound, "{system:?} {i}: {off} {:?} {straight:?}", x.normalized());
+        }
+        assert!(low.to_degrees() > 30.0, "{low}");
+        let mut sim = thread(system, &words("from = [0, 0, 0]\nto = [0.5, 0, 0]"), &air);
+        run(&mut sim, 48);
+        let (fall, exact) = (velocities(&sim, "r")[8].z, -(2.0 * mu * 9.8 / (rho * drag * d)).sqrt());
+        assert!((fall / exact - 1.0).abs() < 5e-3, "{system:?}: {fall} {exact}");
+    }
+}
+
+/// Hair blows, too, and nothing is said of a force that finds no surface.
+#[test]
+fn hair_blows_in_the_wind() {
+    let tips = |force: &str| {
+        let mut sim = simulation(&format!(
+            "seed = 3\n[[system]]\nmethod = \"position_based\"\n[[collider]]\nname = \"ball\"\nshape.sphere = {{ radius = 0.1 }}\n\
+             [[hair]]\nname = \"h\"\non = \"ball\"\ncount = 20\nlength = 0.15\nsegments = 8\n{force}\n"
+        ));
+        assert!(sim.warnings().iter().all(|w| w.code.name() != "no-surface"));
+        run(&mut sim, 12);
+        let x = positions(&sim, "h");
+        x.iter().skip(8).step_by(9).fold(Vector::default(), |sum, x| sum + *x) * (1.0 / 20.0)
+    };
+    let (still, blown) = (tips(""), tips("[[force]]\nkind = \"air\"\ndrag = 5\nwind = [{ kind = \"uniform\", velocity = [0, 3, 0] }]"));
+    assert!(blown.y - still.y > 0.02, "{still:?} {blown:?}");
+}

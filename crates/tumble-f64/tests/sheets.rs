@@ -162,3 +162,37 @@ pin = ["all"]
         assert!((force(a) - expected[a]).abs() < 5e-3 * expected[2], "{a}: {} {expected:?}", force(a));
     }
 }
+
+/// A heavy rope in a stream in space takes the drag of a cylinder, by what flows across it, and what it gains the fluid loses.
+#[test]
+fn a_thread_in_space_takes_the_drag_of_a_cylinder() {
+    let scene = |to: [f64; 3], words: &str| {
+        let text = format!(
+            "precision = \"double\"\ntime = {{ fps = 1000, frames = 1 }}\nworld.gravity = [0, 0, 0]\n[[gas]]\nname = \"air\"\n\
+             box = {{ size = [2, 1, 1], center = [0, 0, 0.5], resolution = 16 }}\n\
+             sides = {{ x = [\"periodic\", \"periodic\"], y = [\"periodic\", \"periodic\"], z = [\"periodic\", \"periodic\"] }}\nvelocity = [2, 0, 0]\n\
+             [[gas.sheet]]\nobject = \"rope\"\n{words}\n\
+             [[rope]]\nname = \"rope\"\nfrom = [0.01, 0, 0.2]\nto = {to:?}\nsegments = 16\ndensity = 30\nradius = 0.005\n"
+        );
+        let mut sim = common::simulation(&text);
+        let before = sim.ledger().momentum;
+        step(&mut sim);
+        let after = sim.ledger().momentum;
+        assert!((0..3).all(|k| (after[k] - before[k]).abs() < 1e-12 * before[0]), "{before:?} {after:?}");
+        let v = column(&sim, "rope", "velocity");
+        let m = |i: usize| {
+            30.0 * (common::Vector::from(to) - common::vector(0.01, 0.0, 0.2)).norm() / 16.0 * if i == 0 || i == 16 { 0.5 } else { 1.0 }
+        };
+        v.iter().enumerate().fold(common::Vector::default(), |sum, (i, v)| sum + *v * (1e3 * m(i)))
+    };
+    // rho/2 C d L u²: across, and at 45 degrees; C is 1.2 unless it is given.
+    let q = 0.5 * 1.2 * 0.01 * 4.0;
+    let across = scene([0.01, 0.0, 0.7], "friction = 0");
+    assert!((across.x / (1.2 * q * 0.5) - 1.0).abs() < 0.01 && across.z.abs() < 1e-9, "{across:?}");
+    let slanted = scene([0.41, 0.0, 0.6], "friction = 0\nresistance = 2");
+    let exact = 2.0 * q * 0.4 * 2_f64.sqrt() / 2.0;
+    assert!((slanted.norm() / exact - 1.0).abs() < 0.01, "{slanted:?} {exact}");
+    assert!((slanted.x + slanted.z).abs() < 1e-3 * slanted.x, "{slanted:?}");
+    let along = scene([0.51, 0.0, 0.2], "friction = 0.1");
+    assert!((along.x / (0.1 * q * 0.5) - 1.0).abs() < 0.01, "{along:?}");
+}

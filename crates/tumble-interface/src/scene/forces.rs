@@ -46,14 +46,14 @@ pub enum Force {
         #[serde(default)]
         on: Option<Vec<String>>,
     },
-    /// Air on the triangles of sheets, nets and cloth: drag along the relative velocity, lift normal to it, friction along the surface, F = rho/2 A
+    /// Air on the triangles of sheets, nets and cloth, and on the pieces of ropes and hair: drag along the relative velocity, lift normal to it, friction along the surface, F = rho/2 A
     /// (C_D |s| w + C_L (s |w| n - s²/|w| w) + C_F |w| (w - s n)), w = u - v, s = w . n.
     Air {
         /// rho.
         #[serde(default = "air_density")]
         #[schemars(range(min = 0.0), extend("x-unit" = "kg/m³"))]
         density: f64,
-        /// C_D, for the projected area.
+        /// C_D, for the projected area; of threads, for the length across the air times the diameter, twice the radius. Hair in a breeze has 5.
         #[serde(default = "plate")]
         #[schemars(range(min = 0.0), extend("x-unit" = "1"))]
         drag: f64,
@@ -68,7 +68,7 @@ pub enum Force {
         /// Velocity fields of the air; they are summed. Default: air at rest.
         #[serde(default)]
         wind: Vec<Field>,
-        /// Names of objects. Default: all that have triangles.
+        /// Names of objects. Default: all that have triangles or are threads.
         #[serde(default)]
         on: Option<Vec<String>>,
     },

@@ -94,25 +94,22 @@ fn still() -> AnimatedVector {
     [0.0; 3].into()
 }
 
-/// A permeable surface of masses with a flow resistance: the fluid drags it along and is slowed by it.
+/// A permeable surface of masses with a flow resistance, or a thread, in three dimensions a rope or hair: the fluid drags it along and is slowed by it.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct GasSheet {
     /// The object, in a system of dynamics.
     pub object: String,
     /// Pressure loss across it, in units of half the density times the square of the speed through it. A net has 1, a dense fabric 100; values above
-    /// 2 over the Courant number of a sub-step act like that limit.
-    #[serde(default = "ten")]
+    /// 2 over the Courant number of a sub-step act like that limit. Of a thread, its drag coefficient, on its length times its diameter, twice the radius.
+    /// Default: 10, of a thread 1.2.
+    #[serde(default)]
     #[schemars(range(min = 0.0), extend("x-unit" = "1"))]
-    pub resistance: f64,
+    pub resistance: Option<f64>,
     /// Friction along it, both faces together, in units of half the density times the square of the speed.
     #[serde(default = "hundredth")]
     #[schemars(range(min = 0.0), extend("x-unit" = "1"))]
     pub friction: f64,
-}
-
-fn ten() -> f64 {
-    10.0
 }
 
 fn hundredth() -> f64 {

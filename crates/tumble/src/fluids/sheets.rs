@@ -1,8 +1,8 @@
-//! Sheets that hang in the fluid: cloth, and curves in the plane. They let fluid through, against a resistance.
+//! Sheets that hang in the fluid: cloth, curves in the plane, and threads in space. They let fluid through, against a resistance.
 //!
 //!   p_before - p_behind = K rho/2 |w_n| w_n,   friction c rho/2 |w_t| w_t,   w = u - v                (gas.18)
 //!
-//! for each mass of the sheet with its share of the area. An exchange is that of two bodies, the mass and the fluid in the cells around
+//! for each mass of the sheet with its share of the area; of a thread, w_n is what goes across it, and the area its length times its diameter. An exchange is that of two bodies, the mass and the fluid in the cells around
 //! it, that end a step with the w of the implicit law: it takes energy from them, whatever the step, and no momentum.
 //!
 //! Source: [taylor1944]. Limits: w of a step is at least w/(1 + K C/2) with the Courant number C of w, so that K above 2/C acts like
@@ -26,6 +26,8 @@ pub struct Sheet {
     triangles: Vec<[u32; 3]>,
     /// Of a curve.
     pieces: Vec<[u32; 2]>,
+    /// Diameter [m] of a curve in space; a curve in the plane is a metre wide.
+    diameter: Option<f64>,
     /// Loss of pressure over rho/2 w².
     resistance: f64,
     /// Over rho/2 w², of both faces together.
@@ -38,7 +40,7 @@ struct Mass {
     x: Vector,
     v: Vector,
     inverse: f64,
-    /// Its share of the area [m²], along the normal.
+    /// Its share of the area [m²], along the normal; of a thread, along it.
     area: Vector,
     impulse: Vector,
 }
@@ -49,10 +51,10 @@ impl Sheet {
         name: String,
         rows: Vec<BodyRow>,
         triangles: Vec<[u32; 3]>,
-        pieces: Vec<[u32; 2]>,
+        (pieces, diameter): (Vec<[u32; 2]>, Option<f64>),
         [resistance, friction]: [f64; 2],
     ) -> Self {
-        Self { name, rows, triangles, pieces, resistance, friction, masses: Vec::new() }
+        Self { name, rows, triangles, pieces, diameter, resistance, friction, masses: Vec::new() }
     }
 
     /// Takes its state from its system.
@@ -79,6 +81,14 @@ impl Sheet {
             let [a, b, c] = triangle.map(|i| masses[i as usize].x);
             let third = (b - a).cross(c - a) * (1.0 / 6.0);
             triangle.iter().for_each(|i| masses[*i as usize].area = masses[*i as usize].area + third);
+        }
+        if let Some(diameter) = self.diameter {
+            for piece in &self.pieces {
+                let [a, b] = piece.map(|i| masses[i as usize].x);
+                let half = (b - a) * (0.5 * diameter);
+                piece.iter().for_each(|i| masses[*i as usize].area = masses[*i as usize].area + half);
+            }
+            return;
         }
         let Some(flat) = flat else { return };
         let mut across = [0.0; 3];
@@ -107,7 +117,7 @@ impl Sheet {
             let x: [f64; 3] = x.into();
             grid.axes().all(|a| (0.0..=grid.n[a] as f64 * grid.dx).contains(&(x[a] - grid.origin[a])))
         };
-        let (resistance, friction) = (self.resistance, self.friction);
+        let (resistance, friction, is_thread) = (self.resistance, self.friction, self.diameter.is_some());
         for mass in self.masses.iter_mut().filter(|mass| inside(wrapped(mass.x))) {
             let area = mass.area.norm();
             if area == 0.0 {
@@ -132,8 +142,8 @@ impl Sheet {
             // One over each of the two masses.
             let both = mass.inverse + sharpest / cell;
             let w = Vector::from(w);
-            let across = n * n.dot(w);
-            let along = w - across;
+            let normal = n * n.dot(w);
+            let (across, along) = if is_thread { (w - normal, normal) } else { (normal, w - normal) };
             let law = |factor: f64, w: Vector| {
                 let force = 0.5 * density * factor * area * w.norm();
                 w * (h * force / (1.0 + h * force * both))

@@ -26,7 +26,7 @@ mod vortex;
 mod wind;
 
 pub use acceleration::Acceleration;
-pub use air::{Air, Sails};
+pub use air::{Air, Sails, Sheets, Threads};
 pub use attraction::Attraction;
 pub use cohesion::Cohesion;
 pub use direct_sum::{Attractor, DirectSum};

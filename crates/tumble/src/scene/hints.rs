@@ -48,12 +48,14 @@ pub fn unused(scene: &Scene) -> Vec<Warning> {
                 .chain(scene.net.iter().map(|t| &t.name))
                 .chain(scene.cloth.iter().map(|t| &t.name))
                 .chain(scene.block.iter().map(|t| &t.name))
+                .chain(scene.rope.iter().map(|t| &t.name))
+                .chain(scene.hair.iter().map(|t| &t.name))
                 .any(reached)
         {
             warnings.push(Warning::new(
                 Code::NoSurface,
                 at(),
-                "nothing in its reach has a surface; give it a sheet, a net, cloth or a block",
+                "nothing in its reach has a surface or is a thread; give it a sheet, a net, cloth, a block, a rope or hair",
             ));
         }
         if matches!(force, Words::Magnetic { .. } | Words::Electric { .. } | Words::Electrostatics { .. }) && !any {

@@ -113,6 +113,12 @@ pub struct Object {
 }
 
 impl Object {
+    /// The pieces of its curves: pairs of points, counted from its first.
+    pub fn pieces(&self) -> impl Iterator<Item = [u32; 2]> {
+        let each = if self.curve_points > 0 { self.curve_points as usize } else { self.curve.len().max(1) };
+        self.curve.chunks(each).flat_map(|curve| curve.windows(2).map(|ends| [ends[0], ends[1]]))
+    }
+
     /// A column of its own.
     pub fn column(&self, name: &str, data: impl Into<Data>) -> Column {
         Column::new(&self.name, name, data)

@@ -490,6 +490,10 @@ impl Read<'_, '_> {
     }
 }
 
+/// Drag of a cylinder across the flow, and resistance of a dense net.
+const THREAD: f64 = 1.2;
+const DENSE: f64 = 10.0;
+
 /// The balls and sheets that a fluid moves.
 fn moved(builder: &mut Builder<'_>, words: &Words) -> (Vec<Ball>, Vec<Sheet>) {
     let (scene, parts, ids) = (builder.scene, &builder.masses, &builder.ids);
@@ -520,15 +524,19 @@ fn moved(builder: &mut Builder<'_>, words: &Words) -> (Vec<Ball>, Vec<Sheet>) {
         let mut wrong = |message: String| issues.push(Issue::new(format!("gas \"{}\".sheet[{i}].object", words.name), message));
         let Some(system) = moved_by(scene, words, name, &mut wrong) else { continue };
         let Some(object) = parts[system].named(name) else { continue };
-        let curve = object.curve.windows(2).map(|ends| [ends[0], ends[1]]).collect();
-        let (triangles, pieces) = if scene.dimension == 2 { (Vec::new(), curve) } else { (object.triangles.clone(), Vec::new()) };
-        if triangles.is_empty() && pieces.is_empty() {
-            let what = if scene.dimension == 2 { "curve, which a sheet in the plane is" } else { "surface of triangles" };
-            wrong(format!("\"{name}\" has no {what}"));
+        let (triangles, curve) = match (scene.dimension, object.triangles.is_empty()) {
+            (2, _) => (Vec::new(), (object.pieces().collect(), None)),
+            (_, true) => (Vec::new(), (object.pieces().collect(), Some(2.0 * object.radius))),
+            _ => (object.triangles.clone(), (Vec::new(), None)),
+        };
+        if triangles.is_empty() && curve.0.is_empty() {
+            let what = if scene.dimension == 2 { "is no curve, which a sheet in the plane is" } else { "has no triangles and is no curve" };
+            wrong(format!("\"{name}\" {what}"));
             continue;
         }
         let rows = exchange.open(ids[system], object.points.clone(), false);
-        sheets.push(Sheet::new(name.clone(), rows, triangles, pieces, [sheet.resistance, sheet.friction]));
+        let resistance = sheet.resistance.unwrap_or(if curve.1.is_some() { THREAD } else { DENSE });
+        sheets.push(Sheet::new(name.clone(), rows, triangles, curve, [resistance, sheet.friction]));
     }
     (bodies, sheets)
 }

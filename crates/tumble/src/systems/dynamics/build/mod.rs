@@ -19,15 +19,16 @@ use super::scale::Scale;
 use super::scheme::{self, Forces, Projected, Scheme};
 use super::settings::Settings;
 use crate::elements::{LongRangeAttachments, Members};
-use crate::forces::Sails;
+use crate::forces::{Sails, Sheets, Threads};
 use crate::geometry::{Carrier, Collider};
 use crate::integrators::Memory;
 use crate::math::Real;
 use crate::pool::Pool;
-use crate::state::{Frames, Masses, State};
+use crate::state::{Frames, Masses, Object, State};
 use between::between;
 use elements::Batches;
 use objects::Objects;
+use std::sync::Arc;
 use tears::Tied;
 use tumble_interface::SceneError;
 
@@ -185,15 +186,23 @@ impl Parts {
         added
     }
 
-    /// Adds the air around surfaces, and returns each batch with its objects; `None` if a triangle has no rows.
+    /// Adds the air around surfaces and threads, and returns each batch of surfaces with its objects; `None` if an element has no rows.
     fn sails(&mut self, objects: &Objects, state: &State, masses: &Masses, batches: &mut Batches) -> Option<Vec<(usize, Vec<usize>)>> {
         let mut added = Vec::new();
         for (air, on) in std::mem::take(&mut self.airs) {
-            let on = objects.placed(&on);
+            let (air, on) = (Arc::new(air), objects.placed(&on));
             let triangles: Vec<[u32; 3]> = on.iter().flat_map(|i| objects.triangles(*i)).collect();
+            let threads = on.iter().map(|i| &objects.list[*i]).filter(|object| object.triangles.is_empty() && object.radius > 0.0);
+            let piece = |object: &Object, ends: [u32; 2]| (ends.map(|i| i + object.points.start as u32), 2.0 * object.radius);
+            let (pieces, diameters): (Vec<[u32; 2]>, Vec<f64>) =
+                threads.flat_map(|object| object.pieces().map(|ends| piece(object, ends)).collect::<Vec<_>>()).unzip();
+            let (x, mass) = (&state.x[..masses.frames.start], &masses.mass);
+            if !pieces.is_empty() {
+                batches.list.push(Box::new(Sails::new(air.clone(), Threads { diameters }, &pieces, x, mass, &self.times)?));
+            }
             if !triangles.is_empty() {
                 added.push((batches.list.len(), on));
-                batches.list.push(Box::new(Sails::new(air, &triangles, &state.x[..masses.frames.start], &masses.mass, &self.times)?));
+                batches.list.push(Box::new(Sails::new(air, Sheets, &triangles, x, mass, &self.times)?));
             }
         }
         Some(added)
