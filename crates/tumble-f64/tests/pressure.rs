@@ -365,6 +365,10 @@ fn a_right_hand_side_that_nothing_balances_is_refused_or_loses_its_mean() {
     let fault = empty::<u8>(lattice.n, [CLOSED; 3]).solve(&unfair, &mut q, &refuse).unwrap_err();
     assert!(matches!(fault, Fault::Excess { cells: 5760, mean, .. } if (mean - 0.01).abs() < 1e-12), "{fault:?}");
     assert!(fault.to_string().contains("open a side"));
+    // A mean that rounding may have left, and one that it cannot have.
+    let above = |least: f64| Params { excess: Excess::RefuseAbove(least), ..params(Method::MultigridGradients, 1e-8) };
+    assert!(empty::<u8>(lattice.n, [CLOSED; 3]).solve(&unfair, &mut q, &above(0.011)).unwrap().converged);
+    assert!(empty::<u8>(lattice.n, [CLOSED; 3]).solve(&unfair, &mut q, &above(0.009)).is_err());
     let removed = empty::<u8>(lattice.n, [CLOSED; 3]).solve(&unfair, &mut q, &params(Method::MultigridGradients, 1e-8)).unwrap();
     assert!(removed.converged);
     // An open side lets it out.

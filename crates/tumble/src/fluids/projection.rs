@@ -54,7 +54,7 @@ pub fn around(u: &Vectors, solids: Option<&Solids>, swelling: Option<&Field>, b:
 }
 
 /// u -= rho_0/rho_f grad q, on the sides of the box only where they are open.                      (pressure.1, gas.13)
-fn subtract_gradient(u: &mut Vectors, q: &[Real], open: [[bool; 2]; 3], light: Option<&Vectors>) {
+pub fn subtract_gradient(u: &mut Vectors, q: &[Real], open: [[bool; 2]; 3], light: Option<&Vectors>) {
     for (index, part) in u.parts.iter_mut().enumerate() {
         let light = light.and_then(|light| light.parts.get(index));
         let Place::Face(axis) = part.place else { continue };
@@ -170,12 +170,16 @@ impl PressureProjection<'_> {
             fastest = rows::worse(fastest, dx * rows::magnitude(swelling));
         }
         let asked = tolerance * dx * fastest;
+        let params = match params.excess {
+            Excess::Refuse => Params { excess: Excess::RefuseAbove(4.0 * f64::from(Real::EPSILON) * dx * fastest), ..params },
+            _ => params,
+        };
         let mut params = Params { target: Target::Largest(asked), ..params };
         if solids.as_deref().is_some_and(Solids::moves) {
             // Walls that come closer press out what no pressure can hold.
             params.excess = Excess::Remove;
         }
-        let open = sides.each_ref().map(|ends| ends.each_ref().map(|side| matches!(side, Beyond::Open)));
+        let open = Beyond::open(sides);
         pressure.data.fill(0.0);
         let to_pressure = (density / h) as Real;
         // Another equation in every step.

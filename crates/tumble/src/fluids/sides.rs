@@ -35,6 +35,11 @@ impl Beyond {
         }
     }
 
+    /// Which sides are open.
+    pub fn open(sides: &[[Self; 2]; 3]) -> [[bool; 2]; 3] {
+        sides.each_ref().map(|ends| ends.each_ref().map(|side| matches!(side, Self::Open)))
+    }
+
     /// Whether the velocity across it is given.
     pub fn is_held(&self) -> bool {
         !matches!(self, Self::Open | Self::Periodic)

@@ -164,6 +164,11 @@ impl Pockets {
         if let Some(at) = (totals.iter().any(|t| !t[1].is_finite())).then(|| self.first_bad(from)).flatten() {
             return Err(Fault::NotFinite { cell: grid.cell(at) });
         }
+        let allowed = match excess {
+            Excess::Refuse => 0.0,
+            Excess::RefuseAbove(least) => least,
+            Excess::Remove => f64::INFINITY,
+        };
         let mut means = vec![0.0; totals.len()];
         for ((mean, [sum, size]), component) in means.iter_mut().zip(&totals).zip(&self.components) {
             if component.held {
@@ -171,11 +176,13 @@ impl Pockets {
             }
             *mean = sum / component.cells as f64;
             // Rounding of b alone leaves some eps of its size.
-            if excess == Excess::Refuse && sum.abs() > 64.0 * f64::from(Real::EPSILON) * size {
+            if mean.abs() > allowed && sum.abs() > 64.0 * f64::from(Real::EPSILON) * size {
                 return Err(Fault::Excess { cell: grid.cell(component.at), cells: component.cells, mean: *mean });
             }
         }
-        if let (Excess::Refuse, Some(at)) = (excess, self.closed_excess(grid, from)) {
+        if excess != Excess::Remove
+            && let Some(at) = self.closed_excess(grid, from)
+        {
             return Err(Fault::Excess { cell: grid.cell(at), cells: 1, mean: f64::from(from[at]) });
         }
         let b = Rows::of(&mut grid.b);

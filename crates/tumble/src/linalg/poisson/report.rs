@@ -70,10 +70,12 @@ pub enum Target {
 }
 
 /// Treatment of a right-hand side that no pressure can balance.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Excess {
     /// An error: more flows in than out.
     Refuse,
+    /// The same if the mean is larger than this, which its rounding may be where nearly nothing else is left.
+    RefuseAbove(f64),
     /// The mean is taken from each component.
     Remove,
 }
