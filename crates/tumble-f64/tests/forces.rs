@@ -6,7 +6,9 @@ use crate::common;
 
 use common::{Numbers, Vector, fixed, orders, positions, run, show, simulation, vector, velocities};
 use tumble_f64::forces::Acceleration;
-use tumble_f64::forces::{Attraction, Current, Electric, Flow, Force, Group, Magnetic, Medium, One, Propulsion, Turbulence, Vortex, Wind};
+use tumble_f64::forces::{
+    Attraction, Current, Drag, Electric, Flow, Force, Group, Magnetic, Medium, One, Propulsion, Turbulence, Vortex, Wind,
+};
 use tumble_f64::math::formula::Of;
 use tumble_f64::math::{Row, VectorSignal};
 use tumble_interface::Scene;
@@ -225,7 +227,7 @@ fn whirl() -> Vortex {
 fn matrices_are_the_symmetric_derivatives_and_forces_those_of_the_energy() {
     let attraction =
         |power: f64, softening: f64, radius: f64| Attraction { center: [0.1, -0.2, 0.3].into(), gm: 1.3.into(), power, softening, radius };
-    let drag = || Medium { coefficient: 0.3.into(), rate: 0.2.into(), quadratic: 0.7.into() };
+    let drag = || Medium::from(Drag { coefficient: 0.3, rate: 0.2, quadratic: 0.7 });
     let laws: Vec<(&str, Box<dyn Force>)> = vec![
         ("drag", Box::new(drag())),
         ("wind", Box::new(Wind { drag: drag(), air: Flow { fields: vec![Current::Uniform([1.0, 2.0, 3.0].into())], flat: None } })),

@@ -39,6 +39,9 @@ def as_glb(path: Path | str) -> bytes:
     reading, posed = Reading(stage, line.start), Reading(open_stage(path), line.start)
     shown = {surface.path for surface in posed.surfaces()}
     skinned: set[str] = set()
+    for prim in list(Usd.PrimRange.Stage(stage, Usd.TraverseInstanceProxies())):
+        if not prim.IsInstanceProxy() and prim.IsInstance():
+            prim.SetInstanceable(False)
     for root in [p for p in stage.Traverse() if p.IsA(UsdSkel.Root)]:
         cache.Populate(UsdSkel.Root(root), Usd.PrimDefaultPredicate)
         for binding in cache.ComputeSkelBindings(UsdSkel.Root(root), Usd.PrimDefaultPredicate):

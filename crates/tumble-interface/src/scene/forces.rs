@@ -54,6 +54,7 @@ pub enum Force {
         #[schemars(range(min = 0.0), extend("x-unit" = "kg/m³"))]
         density: f64,
         /// C_D, for the projected area; of threads, for the length across the air times the diameter, twice the radius. Hair in a breeze has 5.
+        /// In two dimensions, too, a thread is as wide as its diameter, where a `gas.sheet` is a metre wide.
         #[serde(default = "plate")]
         #[schemars(range(min = 0.0), extend("x-unit" = "1"))]
         drag: f64,

@@ -47,6 +47,8 @@ pub trait Batch: Send + Sync {
     /// Adds the forces [N] and torques [N m], internal damping included, on the rows from `start` on, a multiple of CHUNK.
     /// x and v are those of all rows, as begun with.
     fn add_forces(&self, x: &[Row], v: &[Row], start: usize, force: &mut [Row]);
+    /// For estimates: the next matrix is to be the stiffest of elements that change in time.
+    fn foresee(&mut self, _x: &[Row]) {}
     /// Prepares products with the matrix at x.
     fn linearize(&mut self, x: &[Row], weights: Weights);
     /// Prepares the product with u.

@@ -25,6 +25,8 @@ pub struct DrivenSpring {
     pub damping: f64,
     /// The largest spring constant [N/m].
     pub stiffest: f64,
+    /// The longest of its rest lengths, and its length at the start [m].
+    pub reach: f64,
 }
 
 /// A spring at one time.
@@ -58,9 +60,9 @@ impl Driven {
         b - a
     }
 
-    /// What the drives may bring at once, from the largest stiffness and the length at the start [J].
+    /// What the drives may bring at once: the largest stiffness over the longest way [J].
     fn work(&self) -> f64 {
-        self.springs.iter().map(|s| s.stiffest * s.rest.value(0.0).powi(2)).sum()
+        self.springs.iter().map(|s| s.stiffest * s.reach * s.reach).sum()
     }
 
     /// Energy at a time [J].
@@ -118,6 +120,13 @@ impl Batch for Driven {
             if rows.contains(&b) {
                 force[b - start] = sub(force[b - start], now.force);
             }
+        }
+    }
+
+    /// Where it is it may be at rest, for all that is known.
+    fn foresee(&mut self, x: &[Row]) {
+        for e in 0..self.springs.len() {
+            (self.now[e].stiffness, self.now[e].rest) = (self.springs[e].stiffest, self.way(e, x).norm());
         }
     }
 

@@ -2,7 +2,8 @@
 //!
 //!   p_before - p_behind = K rho/2 |w_n| w_n,   friction c rho/2 |w_t| w_t,   w = u - v                (gas.18)
 //!
-//! for each mass of the sheet with its share of the area; of a thread, w_n is what goes across it, and the area its length times its diameter. An exchange is that of two bodies, the mass and the fluid in the cells around
+//! for each mass of the sheet with its share of the area; of a thread, w_n is what goes across it, and the area its length times its
+//! diameter. An exchange is that of two bodies, the mass and the fluid in the cells around
 //! it, that end a step with the w of the implicit law: it takes energy from them, whatever the step, and no momentum.
 //!
 //! Source: [taylor1944]. Limits: w of a step is at least w/(1 + K C/2) with the Courant number C of w, so that K above 2/C acts like
@@ -28,6 +29,8 @@ pub struct Sheet {
     pieces: Vec<[u32; 2]>,
     /// Diameter [m] of a curve in space; a curve in the plane is a metre wide.
     diameter: Option<f64>,
+    /// Length of a piece beyond which it has broken, and is none [m].
+    longest: f64,
     /// Loss of pressure over rho/2 w².
     resistance: f64,
     /// Over rho/2 w², of both faces together.
@@ -51,10 +54,10 @@ impl Sheet {
         name: String,
         rows: Vec<BodyRow>,
         triangles: Vec<[u32; 3]>,
-        (pieces, diameter): (Vec<[u32; 2]>, Option<f64>),
+        (pieces, diameter, longest): (Vec<[u32; 2]>, Option<f64>, f64),
         [resistance, friction]: [f64; 2],
     ) -> Self {
-        Self { name, rows, triangles, pieces, diameter, resistance, friction, masses: Vec::new() }
+        Self { name, rows, triangles, pieces, diameter, longest, resistance, friction, masses: Vec::new() }
     }
 
     /// Takes its state from its system.
@@ -85,6 +88,9 @@ impl Sheet {
         if let Some(diameter) = self.diameter {
             for piece in &self.pieces {
                 let [a, b] = piece.map(|i| masses[i as usize].x);
+                if (b - a).norm() > self.longest {
+                    continue;
+                }
                 let half = (b - a) * (0.5 * diameter);
                 piece.iter().for_each(|i| masses[*i as usize].area = masses[*i as usize].area + half);
             }
@@ -95,6 +101,9 @@ impl Sheet {
         across[flat] = 0.5;
         for piece in &self.pieces {
             let [a, b] = piece.map(|i| masses[i as usize].x);
+            if (b - a).norm() > self.longest {
+                continue;
+            }
             let half = (b - a).cross(across.into());
             piece.iter().for_each(|i| masses[*i as usize].area = masses[*i as usize].area + half);
         }

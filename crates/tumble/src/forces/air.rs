@@ -1,5 +1,5 @@
-//! Surfaces and threads in air that moves: drag along the air's velocity, lift across it, friction in the surface, triangle by triangle; drag across a
-//! thread and friction along it, piece by piece.
+//! Surfaces and threads in air that moves: drag along the air's velocity, lift across it, friction in the surface, triangle by triangle; drag
+//! across a thread and friction along it, piece by piece.
 //!
 //!   F = rho/2 A (C_D |s| w + C_L (s |w| n - s²/|w| w) + C_F |w| (w - s n)),   w = u - v,   s = w . n             (cloth.1)
 //!
@@ -7,7 +7,8 @@
 //! [m²]. Each corner takes a third. Turning n around changes nothing.
 //!   F = rho/2 d (C_D |w_n| w_n + pi/2 C_F |w| (w - w_n)) |e|,   w_n = w - e (w . e)/e²                          (cloth.4)
 //!
-//! of a piece e [m] of a thread of diameter d [m]: only what blows across it meets its width (the independence principle), and its whole surface rubs.
+//! of a piece e [m] of a thread of diameter d [m]: only what blows across it meets its width (the independence principle), and all of its
+//! surface rubs.
 //!
 //! Source: [ling1996] for drag on the area that the air sees, A |s|/|w|. Differs: lift is that of a plate that turns the air, sin a cos a
 //! at the angle a between air and surface, which has no jump at a = 0.
@@ -113,16 +114,22 @@ impl Blown<3> for Sheets {
 
 /// Pieces of threads.
 pub struct Threads {
-    /// Diameter of each piece [m].
-    pub diameters: Vec<f64>,
+    /// Diameter of each piece, and the length beyond which it has broken, and is none [m].
+    pub pieces: Vec<[f64; 2]>,
 }
 
 impl Threads {
-    /// What resists across the piece, what that grows by along w_n, and what resists along it [N s/m].
+    /// The diameter of a piece [m]; 0 if it has broken.
+    fn diameter(&self, e: usize, piece: Vec3<f64>) -> f64 {
+        let [diameter, longest] = self.pieces[e];
+        if piece.norm() > longest { 0.0 } else { diameter }
+    }
+
+    /// What resists across the piece, and along it [N s/m]; along w_n it is twice as much.
     fn slopes(&self, air: &Air, e: usize, piece: Vec3<f64>, w: Vec3<f64>) -> [f64; 2] {
         let t = piece.normalized();
         let across = (w - t * w.dot(t)).norm();
-        let scale = 0.5 * air.density * self.diameters[e] * piece.norm();
+        let scale = 0.5 * air.density * self.diameter(e, piece) * piece.norm();
         [scale * air.drag * across, scale * FRAC_PI_2 * air.friction * w.norm()]
     }
 }
@@ -133,7 +140,7 @@ impl Blown<2> for Threads {
     }
 
     fn force(&self, air: &Air, e: usize, piece: Vec3<f64>, w: Vec3<f64>) -> Vec3<f64> {
-        air.thread_force(self.diameters[e], piece, w)
+        air.thread_force(self.diameter(e, piece), piece, w)
     }
 
     fn matrix(&self, air: &Air, e: usize, piece: Vec3<f64>, w: Vec3<f64>) -> [f64; 6] {
@@ -402,7 +409,7 @@ mod tests {
         let along = Vec3 { x: 0.2, y: 0.3, z: 0.0 };
         assert!(along.dot(n).abs() < 1e-12 && level > 0.0 && steep > 0.0);
         // A thread, at any angle: the slope is the derivative of the force, symmetric where friction is none.
-        let threads = Threads { diameters: vec![0.02] };
+        let threads = Threads { pieces: vec![[0.02, f64::INFINITY]] };
         let law = Air { friction: 0.0, ..law };
         for (piece, w) in [(area, w + Vec3 { x: 1.0, y: 0.4, z: -0.3 }), (area, Vec3 { x: -0.2, y: 0.1, z: 4.0 })] {
             let matrix = threads.matrix(&law, 0, piece, w);

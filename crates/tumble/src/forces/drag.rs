@@ -42,6 +42,14 @@ impl Drag {
             push(self, group, force);
         }
     }
+
+    fn matrix(&self, one: &One) -> (Block, Block) {
+        if self.quadratic == 0.0 {
+            let d = (self.coefficient + self.rate * one.mass) as Real;
+            return ([0.0; 6], [d, d, d, 0.0, 0.0, 0.0]);
+        }
+        derivatives(self, one.mass, one)
+    }
 }
 
 /// Drag whose coefficients may change in time.
@@ -52,6 +60,15 @@ pub struct Medium {
     pub rate: Signal,
     /// [kg/m]
     pub quadratic: Signal,
+    /// The largest of each during the run.
+    pub largest: Drag,
+}
+
+impl From<Drag> for Medium {
+    fn from(drag: Drag) -> Self {
+        let Drag { coefficient, rate, quadratic } = drag;
+        Self { coefficient: coefficient.into(), rate: rate.into(), quadratic: quadratic.into(), largest: drag }
+    }
 }
 
 impl Medium {
@@ -67,11 +84,10 @@ impl Force for Medium {
     }
 
     fn matrix(&self, t: f64, one: &One) -> (Block, Block) {
-        let drag = self.at(t);
-        if drag.quadratic == 0.0 {
-            let d = (drag.coefficient + drag.rate * one.mass) as Real;
-            return ([0.0; 6], [d, d, d, 0.0, 0.0, 0.0]);
-        }
-        derivatives(&drag, one.mass, one)
+        self.at(t).matrix(one)
+    }
+
+    fn largest_matrix(&self, one: &One) -> (Block, Block) {
+        self.largest.matrix(one)
     }
 }

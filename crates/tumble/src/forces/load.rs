@@ -1,27 +1,40 @@
-//! A given force on some masses.
+//! A given force that some masses share.
 
 use super::{Force, Group, One};
 use crate::elements::Block;
-use crate::math::{Real, Row, Vec3, VectorSignal, add, row};
+use crate::math::rows::{self, Each};
+use crate::math::{Lane, Real, Row, VectorSignal};
 
-/// f = s F(t): a share s of a force that is a function of time.                 (particles.12)
+/// f = m/M F(t): a force that is a function of time, shared in proportion to masses of M together.              (particles.12)
 pub struct Load {
     /// F [N].
     pub force: VectorSignal,
-    /// The share of each mass [1].
-    pub share: f64,
+    /// M [kg].
+    pub mass: f64,
+}
+
+struct Share;
+
+impl Each for Share {
+    #[inline(always)]
+    fn at<L: Lane>(&self, mass: L, _: L, acceleration: L, force: L) -> L {
+        force + mass * acceleration
+    }
 }
 
 impl Force for Load {
-    fn add(&self, t: f64, _: Group<'_>, force: &mut [Row]) {
-        let f = self.force.value(t) * self.share;
-        let f = row(Vec3 { x: f.x as Real, y: f.y as Real, z: f.z as Real }, 0.0);
-        force.iter_mut().for_each(|force| *force = add(*force, f));
+    fn add(&self, t: f64, group: Group<'_>, force: &mut [Row]) {
+        let a = self.force.value(t) * (1.0 / self.mass);
+        rows::each(force, group.mass, group.x, [a.x as Real, a.y as Real, a.z as Real, 0.0], Share);
     }
 
     /// Known while it is the same at all times.
     fn energy(&self, t: f64, one: &One) -> Option<f64> {
-        self.force.is_constant().then(|| -self.share * self.force.value(t).dot(one.x))
+        self.force.is_constant().then(|| -one.mass / self.mass * self.force.value(t).dot(one.x))
+    }
+
+    fn drives(&self) -> bool {
+        !self.force.is_constant()
     }
 
     fn matrix(&self, _t: f64, _one: &One) -> (Block, Block) {

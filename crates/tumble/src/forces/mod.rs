@@ -118,8 +118,18 @@ pub trait Force: Send + Sync {
         None
     }
 
+    /// Whether it brings energy that has no other books.
+    fn drives(&self) -> bool {
+        false
+    }
+
     /// -df/dx [N/m] and -df/dv [N s/m] of one mass, for implicit schemes; a symmetric approximation will do.
     fn matrix(&self, t: f64, one: &One) -> (Block, Block);
+
+    /// The same for estimates: of a force that changes in time, the largest.
+    fn largest_matrix(&self, one: &One) -> (Block, Block) {
+        self.matrix(0.0, one)
+    }
 }
 
 /// A force in a scene of dimension 2: without what points out of the plane.
@@ -140,7 +150,15 @@ impl Force for InPlane {
         self.law.energy(t, one)
     }
 
+    fn drives(&self) -> bool {
+        self.law.drives()
+    }
+
     fn matrix(&self, t: f64, one: &One) -> (Block, Block) {
         self.law.matrix(t, one)
+    }
+
+    fn largest_matrix(&self, one: &One) -> (Block, Block) {
+        self.law.largest_matrix(one)
     }
 }

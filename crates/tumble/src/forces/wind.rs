@@ -34,4 +34,8 @@ impl Force for Wind {
     fn matrix(&self, t: f64, one: &One) -> (Block, Block) {
         derivatives(&self.drag.at(t), one.mass, &One { v: one.v - self.air.at(t, one.x), ..*one })
     }
+
+    fn largest_matrix(&self, one: &One) -> (Block, Block) {
+        derivatives(&self.drag.largest, one.mass, &One { v: one.v - self.air.at(0.0, one.x), ..*one })
+    }
 }

@@ -145,6 +145,11 @@ impl VectorSignal {
         }
     }
 
+    /// The times of its keys [s].
+    pub fn key_times(&self) -> &[f64] {
+        if let Self::Keys(curve) = self { &curve.times } else { &[] }
+    }
+
     /// Whether it is the same for all masses.
     pub fn is_uniform(&self) -> bool {
         !matches!(self, Self::Formula(formula) if formula.varies())

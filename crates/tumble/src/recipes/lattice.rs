@@ -150,12 +150,10 @@ impl Lattice {
                 };
                 for j in 0..self.n[b] {
                     let neighbours = [j.checked_sub(1), Some(j + 1).filter(|j| *j < self.n[b])];
-                    let held = |clamp: &Clamp| {
-                        let beside = neighbours.iter().flatten().filter(|k| clamp.holds(point(at, **k))).count();
-                        if clamp.holds(point(at, j)) { beside } else { 0 }
-                    };
-                    let Some(clamp) = clamps.iter().find(|clamp| held(clamp) > 0) else { continue };
-                    let width = 0.5 * self.spacing[b] * held(clamp) as f64;
+                    let edges = neighbours.into_iter().flatten().filter_map(|k| Clamp::of_edge(clamps, [point(at, j), point(at, k)]));
+                    let held: Vec<&Clamp> = edges.collect();
+                    let Some(clamp) = held.first() else { continue };
+                    let width = 0.5 * self.spacing[b] * held.len() as f64;
                     let [end, next] = [at, inner].map(|at| point(at, j));
                     let [here, there] = [end, next].map(|point| site.parts.position(point));
                     let ghost = clamp.ghost(site, here * 2.0 - there);

@@ -12,10 +12,7 @@ pub fn load(site: &mut Site<'_>, thing: &Pinnable<'_>, loads: &[Load], masses: &
             Ok(found) if found.iter().all(|p| site.parts.inverse_mass(p + thing.first) == 0.0) => {
                 site.wrong(format!("{path}.at"), "all of these masses are pinned, and feel no force; name others");
             }
-            Ok(found) => {
-                let shares = shares(site, thing, &found);
-                site.parts.load(format!("{path}.force"), shares, load.force.clone());
-            }
+            Ok(found) => site.parts.load(format!("{path}.force"), found.iter().map(|p| p + thing.first).collect(), load.force.clone()),
             Err(message) => site.wrong(format!("{path}.at"), message),
         }
     }

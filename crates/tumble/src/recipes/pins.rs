@@ -86,6 +86,13 @@ pub fn pin(site: &mut Site<'_>, thing: &Pinnable<'_>, pins: &[Pin]) -> Pinned {
     }
     all.always.sort_unstable();
     all.always.dedup();
+    for clamp in all.clamps.iter().filter(|clamp| clamp.carrier.is_none()) {
+        if following.iter().any(|(point, ..)| clamp.points.binary_search(point).is_ok()) {
+            let message =
+                "another pin lets some of these masses follow a collider; put its follow into this table, so that the slope goes along";
+            site.wrong(clamp.path.as_str(), message);
+        }
+    }
     all.always.iter().for_each(|point| site.parts.pin(*point));
     all.passing.retain(|(point, _)| all.always.binary_search(point).is_err());
     all.passing.iter().for_each(|(point, times)| site.parts.hold(*point, *times));
@@ -104,9 +111,15 @@ fn nearest(solids: Option<&[Collider]>, (solid, bone): (usize, Option<usize>), x
 }
 
 impl Clamp {
-    /// Whether it holds a point.
-    pub fn holds(&self, point: u32) -> bool {
-        self.points.binary_search(&point).is_ok()
+    /// The clamp of an edge of the rim, if its ends are held by one or by two.
+    pub fn of_edge<'a>(clamps: &'a [Self], ends: [u32; 2]) -> Option<&'a Self> {
+        let holds = |clamp: &&Self, point: u32| clamp.points.binary_search(&point).is_ok();
+        let all: Vec<&Self> = clamps.iter().filter(|clamp| ends.iter().any(|end| holds(clamp, *end))).collect();
+        if !ends.iter().all(|end| all.iter().any(|clamp| holds(clamp, *end))) {
+            return None;
+        }
+        all.iter().for_each(|clamp| clamp.used.set(true));
+        all.iter().find(|clamp| ends.iter().all(|end| holds(clamp, *end))).or(all.first()).copied()
     }
 
     /// Whether it has an edge of the rim; told if not.
@@ -118,7 +131,6 @@ impl Clamp {
 
     /// A point that is held, or carried, at x [m]: what it lies beside keeps its slope.
     pub fn ghost(&self, site: &mut Site<'_>, x: Vector) -> u32 {
-        self.used.set(true);
         let carrier = self.carrier.map(|(solid, bone)| (solid, nearest(site.solids, (solid, bone), x)));
         site.parts.ghost(x, carrier)
     }

@@ -33,6 +33,11 @@ pub fn rope(site: &mut Site<'_>, thing: &Rope) {
     }
     if let Some(object) = site.parts.object() {
         object.curve = (0..=n).collect();
+        let strain = match &thing.rod {
+            Some(rod) => rod.break_strain,
+            None => thing.links().structural.and_then(|family| family.settings().break_strain),
+        };
+        object.breaks = strain.map(|strain| spacing * (1.0 + strain));
     }
     let pinnable = Pinnable { path: &path, n: &[n + 1], first, is_lattice: true, clamps: false };
     let pins = pin(site, &pinnable, &thing.pin);

@@ -355,7 +355,7 @@ impl Site<'_> {
         [a, b]: [u32; 2],
         (t, beside): (usize, &mut [Option<Beside>; 3]),
     ) {
-        let Some(clamp) = words.clamps.iter().find(|clamp| [a, b].iter().all(|i| clamp.holds(i + first))) else { return };
+        let Some(clamp) = Clamp::of_edge(words.clamps, [a + first, b + first]) else { return };
         let nodes = mesh.triangles[t];
         let Some(i) = (0..3).find(|i| nodes[(*i + 2) % 3] != a && nodes[(*i + 2) % 3] != b) else { return };
         let order = [0, 1, 2].map(|c| (i + c) % 3);

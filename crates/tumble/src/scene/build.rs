@@ -190,7 +190,7 @@ fn gravity(scene: &Scene, issues: &mut Vec<Issue>) -> Gravity {
         }
         None => reader.in_plane("world.gravity", &scene.world.gravity),
     };
-    let largest = reader.times().iter().map(|t| course.value(*t).norm()).fold(0.0, f64::max);
+    let largest = reader.largest(|t| course.value(t).norm(), course.key_times());
     Gravity { course, largest }
 }
 

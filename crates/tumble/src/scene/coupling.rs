@@ -19,6 +19,8 @@ pub struct Link {
     pub rest_length: Signal,
     /// The largest stiffness [N/m].
     pub stiffest: f64,
+    /// The longest of its rest lengths, and its length at the start [m].
+    pub reach: f64,
     /// 1/m1 + 1/m2 [1/kg].
     pub inverse_mass: f64,
 }
@@ -29,9 +31,9 @@ pub fn fasten(scene: &Scene, masses: &mut [Parts], issues: &mut Vec<Issue>) -> V
     for anchor in &anchors {
         let [(s, a), (t, b)] = anchor.ends;
         if s == t && !(anchor.stiffness.is_constant() && anchor.rest_length.is_constant()) {
-            let Link { stiffness, damping, rest_length, stiffest, .. } = anchor;
+            let Link { stiffness, damping, rest_length, stiffest, reach, .. } = anchor;
             let (stiffness, rest) = (stiffness.clone(), rest_length.clone());
-            masses[s].driven.push(DrivenSpring { nodes: [a, b], stiffness, rest, damping: *damping, stiffest: *stiffest });
+            masses[s].driven.push(DrivenSpring { nodes: [a, b], stiffness, rest, damping: *damping, stiffest: *stiffest, reach: *reach });
         } else if s == t {
             masses[s].begin(&anchor.name, 0.0);
             masses[s].spring(SpringPart {
@@ -93,7 +95,8 @@ fn link(scene: &Scene, anchor: &Anchor, parts: &[Parts], issues: &mut Vec<Issue>
     Some(Link {
         name: anchor.name.clone(),
         ends: [(a.0, a.1), (b.0, b.1)],
-        stiffest: reader.times().iter().map(|t| stiffness.value(*t)).fold(0.0, f64::max),
+        stiffest: reader.largest(|t| stiffness.value(t), stiffness.key_times()),
+        reach: rest_length.iter().map(|rest| reader.largest(|t| rest.value(t), rest.key_times())).fold((a.2 - b.2).norm(), f64::max),
         stiffness,
         damping: anchor.damping,
         rest_length: rest_length.unwrap_or_else(|| (a.2 - b.2).norm().into()),

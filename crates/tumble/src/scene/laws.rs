@@ -1,7 +1,8 @@
 //! From the words of forces and fields to laws: formulas are read, and what is wrong with them is told.
 
 use crate::forces::{
-    Acceleration, Air, Attraction, Current, Electric, Flow, Force, InPlane, Magnetic, Medium, OnGrid, Propulsion, Turbulence, Vortex, Wind,
+    Acceleration, Air, Attraction, Current, Drag, Electric, Flow, Force, InPlane, Magnetic, Medium, OnGrid, Propulsion, Turbulence, Vortex,
+    Wind,
 };
 use crate::geometry::Friction;
 use crate::math::formula::Of;
@@ -13,6 +14,9 @@ use tumble_interface::scene::{Animated, AnimatedVector, Collider, Field, Force a
 
 /// Times at which a value that changes is tried, at most.
 const TRIALS: u32 = 1000;
+
+/// Times between two of them at which a largest value is looked for.
+const FINER: u32 = 7;
 
 /// Reads values that may change in time, and gathers what is wrong with them.
 pub struct Reader<'a> {
@@ -184,7 +188,17 @@ impl<'a> Reader<'a> {
         let mut read = |key: &str, words| self.signal(&format!("{path}.{key}"), words, 0.0);
         let [coefficient, rate, quadratic] =
             [("coefficient", words[0]), ("rate", words[1]), ("quadratic", words[2])].map(|(key, words)| read(key, words));
-        Medium { coefficient, rate, quadratic }
+        let [c, r, q] = [&coefficient, &rate, &quadratic].map(|signal| self.largest(|t| signal.value(t), signal.key_times()));
+        let largest = Drag { coefficient: c, rate: r, quadratic: q };
+        Medium { coefficient, rate, quadratic, largest }
+    }
+
+    /// The largest value of a function of time during the run, tried between frames, too, and at keys [s].
+    pub fn largest(&self, value: impl Fn(f64) -> f64, keys: &[f64]) -> f64 {
+        let between =
+            |pair: &[f64]| (0..FINER).map(|k| pair[0] + (pair[1] - pair[0]) * f64::from(k) / f64::from(FINER)).collect::<Vec<_>>();
+        let tried = self.times.windows(2).flat_map(between).chain(self.times.last().copied()).chain(keys.iter().copied());
+        tried.map(value).fold(0.0, f64::max)
     }
 
     fn vortex(&mut self, path: &str, center: &AnimatedVector, axis: [f64; 3], core: f64, values: [&Animated; 3]) -> Vortex {

@@ -62,6 +62,8 @@ pub struct Masses {
     pub charge: Vec<Real>,
     /// Which rows are frames.
     pub frames: Frames,
+    /// How many points before the frames, the last ones, belong to no object: they are held, and weigh nothing.
+    pub ghosts: usize,
 }
 
 impl Masses {
@@ -76,10 +78,15 @@ impl Masses {
         self.points().flat_map(|points| &rows[points]).flat_map(|r| [f64::from(r[0]), f64::from(r[1]), f64::from(r[2])]).collect()
     }
 
-    /// The rows of points, in one or two ranges.
+    /// The rows of points of objects, in ranges.
     pub fn points(&self) -> impl Iterator<Item = Range<usize>> + Clone {
         let [a, _, b] = self.frames.cut(0, self.mass.len());
-        [a, b].into_iter().filter(|range| !range.is_empty())
+        let (first, end) = (self.frames.start - self.ghosts, self.frames.start);
+        let ranges = match self.ghosts {
+            0 => [a, b, 0..0],
+            _ => [a.start..a.end.min(first), a.start.max(end)..a.end, b],
+        };
+        ranges.into_iter().filter(|range| !range.is_empty())
     }
 }
 
@@ -104,6 +111,8 @@ pub struct Object {
     pub curve: Vec<u32>,
     /// Of many curves, how many points each has; 0 if it is one.
     pub curve_points: u32,
+    /// Length of a piece of its curves beyond which it has broken [m], if any breaks.
+    pub breaks: Option<f64>,
     /// Its links: index of the batch and the elements in it.
     pub links: Vec<(usize, Range<usize>)>,
     /// The emitter in the system's pool whose particles these are; their number changes.

@@ -256,7 +256,7 @@ impl Group {
     }
 
     /// The longest sub-step in which a strand does not shake that hangs from what is held. Tension T acts in the direction of its predicted places, and
-    /// bending B implicitly: a wave across it, with s = 4 sin²(k l/2), is stable if a (3 s - b s²) < 4 for a = T h²/(m l), b = B/(T l²).  (rods.10)
+    /// bending B implicitly: a wave across it, with s = 4 sin²(k l/2), is stable if a (3 s - b s²) < 4 for a = T h²/(m l), b = B/(T l²).  (rods.11)
     fn longest_step(&self, x: &[Row], gravity: f64, s: usize) -> f64 {
         let at = |i: usize| i * self.count + s;
         let mass = |i: usize| Some(f64::from(x[self.points.get()[at(i)] as usize][3])).filter(|w| *w > 0.0).map(|w| 1.0 / w);

@@ -202,13 +202,10 @@ fn fill(builder: &mut Builder<'_>, index: usize, parts: &mut Parts) {
 fn act(builder: &mut Builder<'_>, parts: &mut Parts) {
     let scene = builder.scene;
     let mut reader = Reader::new(scene, &mut builder.issues);
-    for (path, mut points, words) in std::mem::take(&mut parts.loads) {
-        let force = reader.in_plane(&path, &words);
-        points.sort_by(|a, b| a.1.total_cmp(&b.1));
-        for same in points.chunk_by(|a, b| a.1 == b.1) {
-            let law = Load { force: force.clone(), share: same[0].1 };
-            parts.forces.push((path.clone(), Box::new(law), On::Points(same.iter().map(|(point, _)| *point).collect())));
-        }
+    for (path, points, words) in std::mem::take(&mut parts.loads) {
+        let mass = points.iter().map(|point| parts.mass(*point)).sum();
+        let law = Load { force: reader.in_plane(&path, &words), mass };
+        parts.forces.push((path, Box::new(law), On::Points(points)));
     }
     for (i, force) in scene.force.iter().enumerate() {
         let (path, others) = (format!("force[{i}]"), others(force));

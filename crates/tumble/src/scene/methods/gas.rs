@@ -546,10 +546,11 @@ fn moved(builder: &mut Builder<'_>, words: &Words) -> (Vec<Ball>, Vec<Sheet>) {
         let mut wrong = |message: String| issues.push(Issue::new(format!("gas \"{}\".sheet[{i}].object", words.name), message));
         let Some(system) = moved_by(scene, words, name, &mut wrong) else { continue };
         let Some(object) = parts[system].named(name) else { continue };
+        let longest = object.breaks.unwrap_or(f64::INFINITY);
         let (triangles, curve) = match (scene.dimension, object.triangles.is_empty()) {
-            (2, _) => (Vec::new(), (object.pieces().collect(), None)),
-            (_, true) => (Vec::new(), (object.pieces().collect(), Some(2.0 * object.radius))),
-            _ => (object.triangles.clone(), (Vec::new(), None)),
+            (2, _) => (Vec::new(), (object.pieces().collect(), None, longest)),
+            (_, true) => (Vec::new(), (object.pieces().collect(), Some(2.0 * object.radius), longest)),
+            _ => (object.triangles.clone(), (Vec::new(), None, longest)),
         };
         if triangles.is_empty() && curve.0.is_empty() {
             let what = if scene.dimension == 2 { "is no curve, which a sheet in the plane is" } else { "has no triangles and is no curve" };

@@ -98,7 +98,9 @@ impl Laws {
             force[row - start] = add(force[row - start], [push.x as Real, push.y as Real, push.z as Real, 0.0]);
         }
         for Acting { law, ranges, .. } in &self.forces {
-            for range in ranges {
+            let near = ranges.len() > 1;
+            let from = if near { ranges.partition_point(|range| range.end <= start) } else { 0 };
+            for range in ranges[from..].iter().take_while(|range| !near || range.start < end) {
                 let (a, b) = (range.start.max(start), range.end.min(end));
                 if a < b {
                     let (a, b) = (a - start, b - start);

@@ -57,7 +57,12 @@ impl Dynamics {
         let span =
             |points: Range<usize>| max(points.len(), |range| range.map(|i| far(xyz64(rows[points.start + i]), first)).fold(0.0, f64::max));
         let size = self.core.laws.masses.points().map(span).fold(0.0, f64::max);
-        let fall = ledger.mass * self.core.laws.gravity.largest * size;
+        // Gravity that changes gives and takes the energy of a height over the origin.
+        let gravity = &self.core.laws.gravity;
+        let high =
+            |points: Range<usize>| max(points.len(), |range| range.map(|i| xyz64(rows[points.start + i]).norm()).fold(0.0, f64::max));
+        let high = if gravity.course.is_constant() { 0.0 } else { self.core.laws.masses.points().map(high).fold(0.0, f64::max) };
+        let fall = ledger.mass * gravity.largest * (size + high);
         // The energy that holds masses together is a scale, too, even if they start at rest, and so is that of driving forces.
         let driven: f64 = self.core.drives().sum();
         // Masses that a moving solid hits leave with at most twice its velocity.
@@ -72,6 +77,7 @@ impl Dynamics {
     pub(super) fn rescale(&mut self, ledger: &Ledger) {
         let drives = self.core.laws.colliders.iter().any(|c| c.moves()) || self.core.drives().next().is_some();
         let changes = !self.core.laws.gravity.course.is_constant();
+        let changes = changes || self.core.laws.forces.iter().any(|force| force.law.drives());
         let driven = self.pushed || changes || !self.features.followers.is_empty() || drives || !self.core.laws.user.is_empty();
         let gain = if driven { 0.0 } else { (ledger.energy() - self.core.scale.start).max(0.0) };
         let external = (ledger.external - self.core.scale.external).abs();

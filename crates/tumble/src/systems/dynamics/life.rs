@@ -211,12 +211,14 @@ impl Core {
 
     /// The energy that masses bring with them, or take away.
     fn count_energy(&mut self, sign: f64, rows: impl Iterator<Item = usize>) {
+        // Of gravity that changes, the largest is a scale, and no energy to count from.
+        let course = &self.laws.gravity.course;
         let gravity = Vec3::from(self.laws.gravity.at(0.0));
         let (mut kinetic, mut potential) = (0.0, 0.0);
         for i in rows {
             let (mass, x, v) = (f64::from(self.laws.masses.mass[i]), xyz64(self.state.x[i]), xyz64(self.state.v[i]));
             kinetic += 0.5 * mass * v.norm_sq();
-            potential -= mass * gravity.dot(x);
+            potential -= if course.is_constant() { mass * gravity.dot(x) } else { -mass * self.laws.gravity.largest * x.norm() };
         }
         self.scale.count(sign, kinetic, potential);
     }
@@ -267,6 +269,7 @@ fn weigh(pool: &Pool, s: usize, ids: impl Iterator<Item = u32>, charged: bool) -
         inverse_inertia: Vec::new(),
         charge: if charged { vec![emitter.words().charge as Real; mass.len()] } else { Vec::new() },
         frames: Frames::default(),
+        ghosts: 0,
     }
 }
 

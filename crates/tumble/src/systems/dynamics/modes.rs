@@ -77,7 +77,7 @@ impl Core {
         let group = Group::new(masses, 0, x, &self.state.v);
         for Acting { law, ranges, .. } in &self.laws.forces {
             for i in ranges.iter().cloned().flatten() {
-                let (k, d) = law.matrix(0.0, &group.one(i));
+                let (k, d) = law.largest_matrix(&group.one(i));
                 let b: [Real; 6] = std::array::from_fn(|c| (weights.0 * f64::from(k[c]) + weights.1 * f64::from(d[c])) as Real);
                 let s = scaled[i];
                 out[i] = crate::math::add(
@@ -101,6 +101,7 @@ impl Core {
             if batch.feels_velocity() {
                 batch.begin_forces(0.0, &self.state.x, &self.state.v);
             }
+            batch.foresee(&self.state.x);
             batch.linearize(&self.state.x, weights);
         }
     }

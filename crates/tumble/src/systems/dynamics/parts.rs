@@ -137,8 +137,8 @@ pub struct Parts {
     pub(super) emitters: Vec<Emitter>,
     /// Forces on each mass by itself, and what they act on.
     pub forces: Vec<(String, Box<dyn Force>, On)>,
-    /// Forces [N] on some points, with the share of each.
-    pub loads: Vec<(String, Vec<(u32, f64)>, AnimatedVector)>,
+    /// Forces [N] that some points share.
+    pub loads: Vec<(String, Vec<u32>, AnimatedVector)>,
     /// The air around the surfaces of some objects.
     pub airs: Vec<(Air, Vec<usize>)>,
     /// Times of the run at which forces that change in time are tried [s].
@@ -331,8 +331,9 @@ impl Parts {
         point
     }
 
-    /// Counts the points of no object after those of all objects.
-    pub(super) fn place_ghosts(&mut self) {
+    /// Counts the points of no object after those of all objects; returns how many there are.
+    pub(super) fn place_ghosts(&mut self) -> usize {
+        let count = self.ghosts.len();
         let first = self.points.len() as u32;
         let place = |node: &mut u32| *node = if *node >= GHOST { *node - GHOST + first } else { *node };
         self.points.extend(self.ghosts.drain(..).map(|x| (x, Vec3::default(), 0.0, true)));
@@ -342,10 +343,11 @@ impl Parts {
         for follower in self.followers.iter_mut().filter(|f| f.row >= GHOST as usize) {
             follower.row = follower.row - GHOST as usize + first as usize;
         }
+        count
     }
 
-    /// Adds a force [N] on points, with the share of each.
-    pub fn load(&mut self, path: String, points: Vec<(u32, f64)>, force: AnimatedVector) {
+    /// Adds a force [N] that points share.
+    pub fn load(&mut self, path: String, points: Vec<u32>, force: AnimatedVector) {
         self.loads.push((path, points, force));
     }
 

@@ -119,6 +119,11 @@ impl Fluid {
         self.pressure.grid
     }
 
+    /// Gravity is that of a time [s].
+    pub fn set_gravity(&mut self, t: f64) {
+        self.settings.gravity = self.settings.course.at(t);
+    }
+
     /// One step of h seconds from t to `end` [s].
     pub fn step(&mut self, t: f64, h: f64, end: f64, report: &mut StepReport) -> Result<(), Box<Failed>> {
         report.passed(self.fastest() * h / self.grid().dx);

@@ -92,15 +92,17 @@ impl System for Gas {
         for f in 0..self.fluids.len() {
             let taken = self.fluids[f].take_surfaces(exchange.surfaces());
             taken.map_err(|failure| self.fluids[f].failed(failure).within(&self.name, t))?;
+            self.fluids[f].set_gravity(t);
             self.fluids[f].listen(exchange);
             let mut done = 0.0;
             while dt - done > 1e-9 * dt {
                 if !go_on() {
                     return Ok(report);
                 }
+                self.fluids[f].set_gravity(t + done);
                 let h = self.next_step(&self.fluids[f], t + done, dt, dt - done)?;
                 let fluid = &mut self.fluids[f];
-                fluid.settings.gravity = fluid.settings.course.at(t + done + 0.5 * h);
+                fluid.set_gravity(t + done + 0.5 * h);
                 fluid.step(t + done, h, t + (done + h), &mut report).map_err(|e| e.within(&self.name, t + done + h))?;
                 done += h;
                 report.stepped(h);

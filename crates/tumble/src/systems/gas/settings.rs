@@ -19,7 +19,7 @@ pub struct Settings {
     pub viscous: Viscous,
     /// The lower and the upper side of each axis.
     pub sides: [[Beyond; 2]; 3],
-    /// Gravity [m/s²], in the plane, in the middle of a step.
+    /// Gravity [m/s²], in the plane, at the time that is dealt with.
     pub gravity: [f64; 3],
     /// Gravity as a function of time.
     pub course: Gravity,

@@ -36,7 +36,7 @@ impl Parts {
     /// The system.
     pub fn build(mut self, settings: Settings) -> Result<Dynamics, SceneError> {
         self.check_range()?;
-        self.place_ghosts();
+        let ghosts = self.place_ghosts();
         scheme::check(&self, &settings)?;
         if self.tearing_surface().is_some() {
             self.halve_links();
@@ -45,6 +45,7 @@ impl Parts {
         let lost = || SceneError::one(format!("system \"{}\"", settings.name), "an element refers to a mass that is not there");
         let projects = scheme::projects(&settings);
         let (mut state, mut masses) = self.state();
+        masses.ghosts = ghosts;
         let (points, rows) = (masses.frames.start, masses.mass.len());
         let holds = Holds::new(std::mem::take(&mut self.holds));
         let mut batches = Batches::new(&masses, projects);
@@ -78,7 +79,8 @@ impl Parts {
                 Acting { name, law, ranges: objects.rows(&on), objects: on }
             }
             On::Points(points) => {
-                Acting { name, law, ranges: points.into_iter().map(|i| i as usize..i as usize + 1).collect(), objects: Vec::new() }
+                let runs = points.chunk_by(|a, b| a + 1 == *b);
+                Acting { name, law, ranges: runs.map(|run| run[0] as usize..run[0] as usize + run.len()).collect(), objects: Vec::new() }
             }
         });
         let laws = Laws {
@@ -193,12 +195,14 @@ impl Parts {
             let (air, on) = (Arc::new(air), objects.placed(&on));
             let triangles: Vec<[u32; 3]> = on.iter().flat_map(|i| objects.triangles(*i)).collect();
             let threads = on.iter().map(|i| &objects.list[*i]).filter(|object| object.triangles.is_empty() && object.radius > 0.0);
-            let piece = |object: &Object, ends: [u32; 2]| (ends.map(|i| i + object.points.start as u32), 2.0 * object.radius);
-            let (pieces, diameters): (Vec<[u32; 2]>, Vec<f64>) =
+            let piece = |object: &Object, ends: [u32; 2]| {
+                (ends.map(|i| i + object.points.start as u32), [2.0 * object.radius, object.breaks.unwrap_or(f64::INFINITY)])
+            };
+            let (ends, pieces): (Vec<[u32; 2]>, Vec<[f64; 2]>) =
                 threads.flat_map(|object| object.pieces().map(|ends| piece(object, ends)).collect::<Vec<_>>()).unzip();
             let (x, mass) = (&state.x[..masses.frames.start], &masses.mass);
-            if !pieces.is_empty() {
-                batches.list.push(Box::new(Sails::new(air.clone(), Threads { diameters }, &pieces, x, mass, &self.times)?));
+            if !ends.is_empty() {
+                batches.list.push(Box::new(Sails::new(air.clone(), Threads { pieces }, &ends, x, mass, &self.times)?));
             }
             if !triangles.is_empty() {
                 added.push((batches.list.len(), on));
