@@ -50,6 +50,7 @@ interface Choices {
   viscosity: number;
   confinement: number;
   advection: "linear" | "corrected" | "cubic";
+  order: "project_last" | "reflection";
   obstacle: string;
   particles: boolean;
   lifetime: number;
@@ -68,6 +69,7 @@ const START: Choices = {
   viscosity: 0,
   confinement: 0,
   advection: "corrected",
+  order: "project_last",
   obstacle: "none",
   particles: true,
   lifetime: 3,
@@ -118,6 +120,7 @@ fluid_density = 1
 ${c.viscosity > 0 ? `viscosity = ${c.viscosity}\n` : ""}confinement = ${c.confinement}
 velocity = ["1.1*exp(-60*((z - 0.1)^2)) - 1.1*exp(-60*((z + 0.1)^2))", ${c.space === "plane" ? 0 : '"0.1*sin(5*x)*cos(9*y)"'}, "0.25*sin(8*x)*exp(-20*z^2)"]
 smoke = { initial = "0.9*smoothstep(0.02, -0.02, abs(abs(z) - 0.12) - 0.05)", weight = 0, dissipation = 0.04 }
+order = "${c.order}"
 advection = { velocity = ${CARRIED[c.advection]} }
 pressure = { method = "${c.method}", iterations = ${c.iterations}, tolerance = ${c.tolerance} }
 ${
@@ -357,6 +360,23 @@ export const page: Page = async (main) => {
         "p",
         { class: "doc" },
         "Each step reads values at the point where the fluid came from. Linear interpolation smooths them like a viscosity: watch the kinetic energy.",
+      ),
+      choice(
+        "Step",
+        [
+          ["project_last", "first order: projection at its end"],
+          ["reflection", "second order: reflection in its middle"],
+        ],
+        choices.order,
+        (v) => {
+          choices.order = v as Choices["order"];
+          void set("gas.0.order", v);
+        },
+      ),
+      h(
+        "p",
+        { class: "doc" },
+        "A projection removes what advection has turned out of the flows without divergence, and with it energy. A reflection turns it back in, for the cost of two steps.",
       ),
       slide(
         "Viscosity [Pa s]",

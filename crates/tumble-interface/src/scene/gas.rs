@@ -67,7 +67,7 @@ pub struct Gas {
     #[serde(default)]
     #[schemars(range(min = 0.0), extend("x-unit" = "1"))]
     pub confinement: f64,
-    /// Order of the four parts of a step.
+    /// Order of the parts of a step.
     #[serde(default)]
     pub order: Order,
     /// Advection of velocities and scalars.
@@ -338,7 +338,7 @@ fn nothing() -> Animated {
     Animated::Value(0.0)
 }
 
-/// Order of the four parts of a step. Both are the same cycle with different starting points.
+/// Order of the parts of a step. The first two are the same cycle with different starting points, of first order in the step.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Order {
@@ -347,6 +347,9 @@ pub enum Order {
     ProjectLast,
     /// Forces, viscosity, projection, advection; one more projection at the end of each exchange.
     AdvectLast,
+    /// Advection for half a step, twice what pressure, viscosity and forces change in the middle, advection, projection: of second order in the
+    /// step, and close to conserving energy, at the cost of two steps. Needs implicit viscosity.
+    Reflection,
 }
 
 /// Advection of velocities and scalars.
@@ -359,13 +362,13 @@ pub struct Advections {
     pub scalars: Carriage,
 }
 
-/// Semi-Lagrangian advection: the value is that at the departure point.
+/// Semi-Lagrangian advection, by default: the value is that at the departure point.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct Carriage {
     /// Interpolation between points.
     pub interpolation: GridInterpolation,
-    /// Limited MacCormack correction: second order. Default: on for scalars, off for velocities.
+    /// Limited MacCormack correction: second order. Default: on for scalars, and for velocities with order = "reflection".
     pub corrected: Option<bool>,
     /// Backtracing scheme.
     pub trace: PathTrace,
@@ -374,6 +377,9 @@ pub struct Carriage {
     pub pieces: Option<u32>,
     /// Vectors rotate with the fluid; for velocities only.
     pub turning: bool,
+    /// Finite volumes with sharp limited fluxes through the faces instead of paths: keeps the sum over all cells and jumps, makes no new extrema; for
+    /// scalars only.
+    pub conservative: bool,
 }
 
 /// Interpolation between the points of a grid.

@@ -117,6 +117,12 @@ impl Ball {
         self.push(Vector::from(gravity) * (-h * density * self.displaced(grid)));
     }
 
+    /// Goes on from where it was, a velocity and an impulse, by twice what it has changed since.                 (gas.20)
+    pub fn reflect(&mut self, (velocity, impulse): (Vector, Vector)) {
+        self.state.velocity = self.state.velocity * 2.0 - velocity;
+        self.impulse = self.impulse * 2.0 - impulse;
+    }
+
     /// Its part of the matrix of the pressure, a row for each direction; `mass` is that of the fluid in a cell [kg].
     pub(super) fn joints(&self, mass: f64) -> impl Iterator<Item = Joint> + '_ {
         self.directions().into_iter().map(move |(way, free)| {

@@ -14,6 +14,11 @@ pub fn largest(field: &Field, f: impl Fn(usize, usize) -> f64 + Sync) -> f64 {
     fold_rows(field, 0.0, worse, f)
 }
 
+/// The same for the largest result of all.
+pub fn extreme(field: &Field, f: impl Fn(usize, usize) -> f64 + Sync) -> f64 {
+    fold_rows(field, f64::NEG_INFINITY, worse, f)
+}
+
 /// The larger of two numbers; a NaN wins.
 pub fn worse(a: f64, b: f64) -> f64 {
     if a >= b || a.is_nan() { a } else { b }

@@ -542,6 +542,14 @@ impl Solids {
         }
     }
 
+    /// Makes velocities what they carry through the open share of each face.
+    pub fn narrow(&self, u: &mut Vectors) {
+        for (axis, part) in self.grid.axes().zip(&mut u.parts) {
+            self.free(part);
+            self.cuts.iter().filter(|cut| cut.axis == axis).for_each(|cut| part.data[cut.at as usize] *= 1.0 - cut.shut);
+        }
+    }
+
     /// Sets a direction to zero where the velocity is given.
     pub fn free(&self, part: &mut Field) {
         let Place::Face(axis) = part.place else { return };

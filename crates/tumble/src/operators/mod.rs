@@ -10,6 +10,7 @@ pub mod diffuse;
 pub mod sample;
 mod stencil;
 mod transfer;
+mod transport;
 
 pub use advect::{Advection, Trace, advect, advect_vectors};
 pub use differences::{average, curl, directional, divergence, gradient, laplacian, upwind, vector_laplacian};
@@ -17,3 +18,4 @@ pub use diffuse::{diffuse, diffuse_step, diffusion_limit};
 pub use sample::{Interpolation, sample};
 pub use stencil::{each_row, each_row_of, ghosted};
 pub use transfer::{Nodes, Spot, Transfer};
+pub use transport::transport;

@@ -20,7 +20,7 @@ use tumble_interface::check::{plain, suggestion};
 use tumble_interface::looks::{Colors, Look};
 use tumble_interface::scene::{
     Animated, Carriage, Component, Densities, ExcessFlow, Field as Flow, Gas as Words, GasSide, GridInterpolation, Integrator, Method,
-    PathTrace, PressureMethod, Scene, Shape, Solid, System as Plan, Temperature,
+    Order, PathTrace, PressureMethod, Scene, Shape, Solid, System as Plan, Temperature, Viscous,
 };
 use tumble_interface::warning::Code;
 use tumble_interface::{Issue, Warning};
@@ -147,6 +147,11 @@ fn carriage(words: &Carriage, corrected: bool) -> Advection {
         corrected: words.corrected.unwrap_or(corrected),
         turning: words.turning,
     }
+}
+
+/// Whether velocities are corrected where the scene does not say it: reflection would waste what linear interpolation smears.
+fn is_corrected(words: &Words) -> bool {
+    words.order == Order::Reflection && !words.advection.velocity.turning
 }
 
 /// Reads the words of one fluid; everything wrong goes to the reader.
@@ -404,8 +409,24 @@ impl Read<'_, '_> {
         if words.advection.scalars.turning {
             self.wrong(".advection.scalars.turning", "true, expected false: numbers have no direction");
         }
+        if words.advection.velocity.conservative {
+            self.wrong(".advection.velocity.conservative", "true, expected false: for scalars only");
+        }
+        let scalars = &words.advection.scalars;
+        if scalars.conservative && (Carriage { conservative: false, ..scalars.clone() }) != Carriage::default() {
+            let message = "given with conservative, which follows no paths; leave out interpolation, corrected, trace and pieces";
+            self.wrong(".advection.scalars", message);
+        }
         if words.advection.velocity.turning && words.advection.velocity.corrected == Some(true) {
             self.wrong(".advection.velocity.corrected", "given with turning, which has no correction; leave out one of them");
+        }
+        let reflected = words.order == Order::Reflection;
+        if reflected && words.densities == Densities::Variable {
+            let message = "variable, expected boussinesq: order = \"reflection\" keeps the energy of one density alone";
+            self.wrong(".densities", message);
+        }
+        if reflected && words.viscous == Viscous::Explicit {
+            self.wrong(".viscous", "explicit, expected implicit: order = \"reflection\" takes both ends of a step alike; leave it out");
         }
         if self.reader.issues.len() > before {
             return None;
@@ -462,8 +483,9 @@ impl Read<'_, '_> {
             sources,
             confinement: words.confinement,
             order: words.order,
-            velocity: carriage(&words.advection.velocity, false),
+            velocity: carriage(&words.advection.velocity, is_corrected(words)),
             scalars: carriage(&words.advection.scalars, true),
+            conservative: words.advection.scalars.conservative,
             pressure: Params {
                 method: method(pressure.method),
                 target: Target::Relative(0.0),
@@ -575,8 +597,15 @@ fn bytes(words: &Words, flat: Option<usize>, solids: bool) -> f64 {
     let carried = f64::from(u8::from(words.smoke.is_some()))
         + f64::from(u8::from(words.temperature.is_some()))
         + f64::from(u8::from(words.fire.is_some()));
-    let corrected = words.advection.scalars.corrected.unwrap_or(true);
-    let scratch = if corrected { 3.0 * carried } else { 0.0 }.max(if words.advection.velocity.corrected == Some(true) { 3.0 } else { 0.0 });
+    let scalars = &words.advection.scalars;
+    let scratch = if scalars.conservative {
+        3.0 + axes
+    } else if scalars.corrected.unwrap_or(true) {
+        3.0 * carried
+    } else {
+        0.0
+    };
+    let scratch = scratch.max(if words.advection.velocity.corrected.unwrap_or(is_corrected(words)) { 3.0 } else { 0.0 });
     let conjugates = if words.viscosity.unwrap_or(0.0) > 0.0 { 3.0 } else { 0.0 };
     let confined = if words.confinement > 0.0 { 8.0 } else { 0.0 };
     // Two of each state and one in the snapshot; pressure, its snapshot, right-hand side twice, unknown; five of the solver with its
@@ -586,6 +615,8 @@ fn bytes(words: &Words, flat: Option<usize>, solids: bool) -> f64 {
     // Densities at cells and faces; weights, and a solver with coarse grids that has numbers for them.
     let varied = if words.densities == Densities::Variable { 1.0 + axes + 3.0 + 14.0 } else { 0.0 };
     let swelling = f64::from(u8::from(words.fire.is_some()));
-    let numbers = 3.0 * (axes + carried) + swelling + varied + 5.0 + 6.5 + scratch + conjugates + confined + solid;
+    // Velocities of the start, before the middle and before its viscosity, and the pressure.
+    let reflected = if words.order == Order::Reflection { 3.0 * axes + 1.0 } else { 0.0 };
+    let numbers = 3.0 * (axes + carried) + swelling + reflected + varied + 5.0 + 6.5 + scratch + conjugates + confined + solid;
     cells * numbers * real
 }

@@ -4,13 +4,13 @@ use super::densities::Densities;
 use super::fire::Flame;
 use super::settings::Settings;
 use crate::exchange::{Exchange, Turn};
-use crate::fluids::rows::{largest, worse};
+use crate::fluids::rows::{extreme, largest, sum, worse};
 use crate::fluids::{Ball, Beyond, Failure, PressureProjection, Sheet, Solids, Viscosity, hold, projection, spread};
 use crate::geometry::{Collider, Vector};
 use crate::linalg::poisson::Solver;
-use crate::math::Real;
-use crate::operators::{advect, advect_vectors};
-use crate::state::{Field, Grid, Place, Side, Vectors};
+use crate::math::{Real, Spare};
+use crate::operators::{advect, advect_vectors, each_row, transport};
+use crate::state::{Field, Grid, GridError, Place, Side, Vectors};
 use std::sync::Arc;
 use tumble_interface::StepError;
 use tumble_interface::engine::StepReport;
@@ -135,13 +135,14 @@ impl Fluid {
                 .and_then(|()| self.projection(t + h, h, report))
                 .and_then(|()| self.advection(t, h))
                 .and_then(|()| self.settle(end)),
+            Order::Reflection => self.reflected(t, h, end, report),
         };
         parts.map_err(|failure| self.failed(failure))
     }
 
     /// Work before a frame is taken.
     pub fn finish(&mut self, t: f64, report: &mut StepReport) -> Result<(), Box<Failed>> {
-        if self.settings.order == Order::ProjectLast {
+        if self.settings.order != Order::AdvectLast {
             return Ok(());
         }
         // The pressure of a frame is that of its last step, not what little this one adds.
@@ -156,6 +157,11 @@ impl Fluid {
         let Some(solids) = &mut self.solids else { return Ok(()) };
         // Sums of steps may end an ulp beside the next one's start.
         if solids.moves() && (solids.time - t).abs() > 1e-12 * t.abs() {
+            if self.settings.conservative {
+                // Cells that come out of a solid begin with what is beside them.
+                let fuel = self.flame.iter_mut().map(|flame| &mut flame.fuel);
+                self.smoke.iter_mut().chain(&mut self.temperature).chain(fuel).for_each(|carried| solids.shade(carried));
+            }
             let h = t - solids.time;
             solids.bodies.iter_mut().for_each(|body| body.state.position = body.state.position + body.state.velocity * h);
             solids.place(t);
@@ -210,28 +216,63 @@ impl Fluid {
 
     /// Everything goes with the fluid for h seconds from t on.                                             (gas.5)
     pub fn advection(&mut self, t: f64, h: f64) -> Result<(), Failure> {
+        self.advection_by(None, t, h)
+    }
+
+    /// The same with a flow other than its own velocity.
+    pub(super) fn advection_by(&mut self, mut flow: Option<&mut Vectors>, t: f64, h: f64) -> Result<(), Failure> {
         self.settle(t)?;
         hold(&mut self.u, &self.settings.sides, t);
+        flow.iter_mut().for_each(|flow| hold(flow, &self.settings.sides, t + h));
         if let Some(solids) = &self.solids {
             solids.extend(&mut self.u);
+            flow.iter_mut().for_each(|flow| solids.extend(flow));
             let fuel = self.flame.iter_mut().map(|flame| &mut flame.fuel);
             self.smoke.iter_mut().chain(&mut self.temperature).chain(fuel).for_each(|carried| solids.shade(carried));
         }
-        let Self { u, smoke, temperature, flame, settings, solver, .. } = self;
+        let mut lost = Vec::new();
+        let Self { u, smoke, temperature, flame, settings, solver, solids, .. } = self;
         let spare = &mut solver.spare;
         let fuel = flame.iter_mut().map(|flame| &mut flame.fuel);
-        let carried: Vec<&mut Field> = smoke.iter_mut().chain(temperature.iter_mut()).chain(fuel).collect();
-        let from: Vec<&Field> = carried.iter().map(|field| &**field).collect();
-        let new = advect(&from, u, h, &settings.scalars, spare)?;
-        carried.into_iter().zip(new).for_each(|(field, new)| spare.keep(std::mem::replace(field, new)));
-        let new = advect_vectors(u, u, h, &settings.velocity, spare)?;
+        let mut carried: Vec<&mut Field> = smoke.iter_mut().chain(temperature.iter_mut()).chain(fuel).collect();
+        let flow = flow.as_deref().unwrap_or(u);
+        if settings.conservative {
+            let mut through = copy(flow, spare)?;
+            solids.iter().for_each(|solids| solids.narrow(&mut through));
+            lost = transport(&mut carried, &through, h, spare)?;
+            through.parts.into_iter().for_each(|part| spare.keep(part));
+        } else {
+            let from: Vec<&Field> = carried.iter().map(|field| &**field).collect();
+            let new = advect(&from, flow, h, &settings.scalars, spare)?;
+            carried.into_iter().zip(new).for_each(|(field, new)| spare.keep(std::mem::replace(field, new)));
+        }
+        let new = advect_vectors(u, flow, h, &settings.velocity, spare)?;
         std::mem::replace(u, new).parts.into_iter().for_each(|part| spare.keep(part));
         hold(u, &settings.sides, t + h);
+        self.restore_contents(&lost);
         Ok(())
+    }
+
+    /// Gives back what the divergence that the pressure left has taken from what is carried, where it is mixed.            (gas.22)
+    fn restore_contents(&mut self, lost: &[f64]) {
+        let swells = self.flame.as_ref().is_some_and(|flame| flame.fire.expansion > 0.0);
+        if lost.is_empty() || swells || self.solids.as_ref().is_some_and(Solids::moves) {
+            return;
+        }
+        self.clear();
+        let fuel = self.flame.iter_mut().map(|flame| &mut flame.fuel);
+        let carried = self.smoke.iter_mut().chain(&mut self.temperature).chain(fuel);
+        carried.zip(lost).for_each(|(field, lost)| give_back(field, *lost));
     }
 
     /// Viscosity of the velocity, and diffusion of smoke and warmth, for h seconds from t on.             (gas.3)
     pub fn viscosity(&mut self, t: f64, h: f64, report: &mut StepReport) -> Result<(), Failure> {
+        self.diffusion(h)?;
+        self.friction(t + h, h, report)
+    }
+
+    /// Smoke and warmth spread for h seconds.
+    pub(super) fn diffusion(&mut self, h: f64) -> Result<(), Failure> {
         let spare = &mut self.solver.spare;
         for (carried, kappa) in [&mut self.smoke, &mut self.temperature].into_iter().zip(self.settings.diffusivity) {
             if let Some(carried) = carried
@@ -244,11 +285,16 @@ impl Fluid {
             }
         }
         self.clear();
+        Ok(())
+    }
+
+    /// Viscosity of the velocity for h seconds, with the sides as they are at time t.                    (gas.3)
+    pub(super) fn friction(&mut self, t: f64, h: f64, report: &mut StepReport) -> Result<(), Failure> {
         let viscosity = Viscosity { nu: self.settings.viscosity / self.settings.density, method: self.settings.viscous };
         if viscosity.nu == 0.0 {
             return Ok(());
         }
-        hold(&mut self.u, &self.settings.sides, t + h);
+        hold(&mut self.u, &self.settings.sides, t);
         viscosity.act(&mut self.u, self.solids.as_ref(), h, &mut self.solver.spare, report)
     }
 
@@ -301,7 +347,7 @@ impl Fluid {
     }
 
     /// Solids that it moves.
-    fn bodies(&mut self) -> &mut [Ball] {
+    pub(super) fn bodies(&mut self) -> &mut [Ball] {
         self.solids.as_mut().map_or(&mut [], |solids| &mut solids.bodies)
     }
 
@@ -330,6 +376,16 @@ impl Fluid {
     }
 }
 
+/// The same vectors in columns of `spare`.
+pub(super) fn copy(u: &Vectors, spare: &mut Spare) -> Result<Vectors, GridError> {
+    let one = |part: &Field| {
+        let mut same = Field { sides: part.sides, ..spare.field(part.grid, part.place, part.unit.clone())? };
+        same.data.copy_from_slice(&part.data);
+        Ok(same)
+    };
+    Ok(Vectors { parts: u.parts.iter().map(one).collect::<Result<_, GridError>>()? })
+}
+
 /// The pressure solver around solids.
 fn solver(grid: Grid, settings: &Settings, solids: Option<&Solids>) -> Result<Solver<u8>, Failure> {
     let lattice = grid.lattice();
@@ -342,6 +398,22 @@ fn solver(grid: Grid, settings: &Settings, solids: Option<&Solids>) -> Result<So
         None => Solver::empty(lattice, sides),
     };
     solver.map_err(Failure::Pressure)
+}
+
+/// Adds to a sum over cells, between the least and the largest of all values.                           (gas.22)
+fn give_back(field: &mut Field, sum_lost: f64) {
+    let range = |sign: f64| -> f64 {
+        let most = |at: usize, n: usize| field.data[at..at + n].iter().map(|f| sign * f64::from(*f)).fold(f64::NEG_INFINITY, f64::max);
+        sign * extreme(field, most)
+    };
+    let (low, high) = (range(-1.0), range(1.0));
+    let weight = |f: Real| (f64::from(f) - low) * (high - f64::from(f));
+    let all = sum(field, |at, n| field.data[at..at + n].iter().map(|f| weight(*f)).sum());
+    let share = sum_lost / all;
+    // More than that would lead beyond the range: nothing mixes there, or nothing is finite.
+    if (share * (high - low)).abs() < 1.0 {
+        each_row(field, |_, _, row| row.iter_mut().for_each(|f| *f = (f64::from(*f) + share * weight(*f)) as Real));
+    }
 }
 
 /// A field that is carried, with what comes in through the sides of its box.

@@ -46,12 +46,24 @@ fn push_by(part: &mut Field, axis: usize, cells: &Field, scale: f64, around: f64
 impl Fluid {
     /// Sources, fading, and everything that pushes, for h seconds from t on.                                  (gas.2)
     pub fn forces(&mut self, t: f64, h: f64) -> Result<(), Failure> {
+        self.supply(t, h);
+        self.accelerate(t, h)?;
+        self.trade(h);
+        Ok(())
+    }
+
+    /// Sources, fading and fire.
+    pub(super) fn supply(&mut self, t: f64, h: f64) {
         let before = self.excess();
         self.feed(t, h);
         self.clear();
         self.burn(h);
         let gained = self.excess() - before;
         self.flame.iter_mut().for_each(|flame| flame.heat[1] += gained);
+    }
+
+    /// Accelerations of the fluid at time t and of what floats in it, for h seconds.
+    pub(super) fn accelerate(&mut self, t: f64, h: f64) -> Result<(), Failure> {
         let grid = self.grid();
         if let Some(solids) = &mut self.solids {
             let settings = &self.settings;
@@ -61,10 +73,14 @@ impl Fluid {
         if let Some(solids) = self.solids.as_mut().filter(|_| self.settings.viscosity > 0.0) {
             solids.keep(&mut self.u);
         }
-        self.push(t, h)?;
+        self.push(t, h)
+    }
+
+    /// What sheets and the fluid give each other.
+    pub(super) fn trade(&mut self, h: f64) {
+        let grid = self.grid();
         let Self { sheets, u, settings, .. } = self;
         sheets.iter_mut().for_each(|sheet| sheet.trade(u, &grid, settings.density, h));
-        Ok(())
     }
 
     fn feed(&mut self, t: f64, h: f64) {

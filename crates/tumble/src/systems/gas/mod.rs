@@ -13,6 +13,7 @@ mod fire;
 mod fluid;
 mod forces;
 mod ledger;
+mod reflection;
 mod settings;
 mod sources;
 

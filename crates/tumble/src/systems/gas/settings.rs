@@ -52,6 +52,8 @@ pub struct Settings {
     pub velocity: Advection,
     /// How smoke and warmth are carried.
     pub scalars: Advection,
+    /// Whether they are carried by fluxes through faces instead.
+    pub conservative: bool,
     /// The pressure solver; its target is the tolerance.
     pub pressure: Params,
     /// Largest |div u| dx over the fastest velocity.
