@@ -39,8 +39,10 @@ def as_glb(path: Path | str) -> bytes:
     reading, posed = Reading(stage, line.start), Reading(open_stage(path), line.start)
     shown = {surface.path for surface in posed.surfaces()}
     skinned: set[str] = set()
-    for prim in list(Usd.PrimRange.Stage(stage, Usd.TraverseInstanceProxies())):
-        if not prim.IsInstanceProxy() and prim.IsInstance():
+    stage.SetEditTarget(stage.GetSessionLayer())
+    for prim in list(stage.Traverse()):
+        if prim.IsInstance():
+            # What stands in for an instance has no bindings of its own.
             prim.SetInstanceable(False)
     for root in [p for p in stage.Traverse() if p.IsA(UsdSkel.Root)]:
         cache.Populate(UsdSkel.Root(root), Usd.PrimDefaultPredicate)
