@@ -103,7 +103,11 @@ def test_no_ball_is_too_light(ratio: float) -> None:
             "radius of 0.12 m, expected >= 1.5 cells",
         ),
         ({"pressure": {"method": "sor"}}, 'gas "water".pressure.method', "expected a method of gradients"),
-        ({"bodies": [], "sheet": [{"object": "balls"}]}, 'gas "water".sheet[0].object', "has no triangles and is no curve"),
+        (
+            {"bodies": [], "sheet": [{"object": "balls"}]},
+            'gas "water".sheet[0].object',
+            "has no triangles and is no curve",
+        ),
         ({"bodies": ["balls", "balls"]}, 'gas "water".bodies[1]', '"balls" is named more than once'),
         ({"densities": "variable"}, 'gas "water".densities', "sheets know one density alone"),
         ({"sheet": [{"object": "cloth", "resistance": -1}]}, 'gas "water".sheet[0].resistance', "expected >= 0"),

@@ -287,3 +287,25 @@ def test_a_shortened_run_of_the_command_line_says_so(
     assert answer.code == 0 and "1 of 1 met" in answer.out and "other-end" not in answer.err
     answer = tumble("run", file, "--force", "--no-plot", "--frames", 12)
     assert "other-end" not in answer.err and "1 of 1 met" in answer.out
+
+
+def test_what_holds_a_clamp_is_no_mass_of_a_user() -> None:
+    """The points that keep a slope weigh nothing, and would break a division by the mass."""
+    sheet = {
+        "name": "s",
+        "size": [1, 1],
+        "resolution": [4, 5],
+        "hinge": 1e-3,
+        "pin": [{"which": "edge x-", "clamp": True}],
+    }
+    world = World(Scene({"version": 1, "world": {"gravity": [0, 0, 0]}, "sheet": [sheet]}))
+    seen = []
+
+    def lift(t: float, x: Any, v: Any, mass: Any) -> Any:
+        seen.append((x.shape, float(mass.min())))
+        return np.tile([0.0, 0.0, 0.1], (len(mass), 1)) * (mass / mass)[:, None]
+
+    world.add_force(lift)
+    world.step(3)
+    assert set(seen) == {((20, 3), min(m for _, m in seen))} and seen[0][1] > 0
+    assert world.columns("position")["s"]["position"][:, 2].max() > 0

@@ -238,3 +238,19 @@ fn hair_blows_in_the_wind() {
     let (still, blown) = (tips(""), tips("[[force]]\nkind = \"air\"\ndrag = 5\nwind = [{ kind = \"uniform\", velocity = [0, 3, 0] }]"));
     assert!(blown.y - still.y > 0.02, "{still:?} {blown:?}");
 }
+
+/// A piece that has broken is none: ends that fly apart are not joined by a thread that the wind blows at.
+#[test]
+fn broken_pieces_feel_no_air() {
+    let blown = |breaks: &str| {
+        let words = format!(
+            "from = [0, 0, 0]\nto = [1, 0, 0]\nlength = 0.5\nsegments = 1\ndensity = 1\nradius = 0.05\nlinks.structural = {{ modulus = 1{breaks} }}"
+        );
+        let air = "drag = 1.2\nwind = [{ kind = \"uniform\", velocity = [0, 3, 0] }]\n[time]\nfps = 100\n[world]\ngravity = [0, 0, 0]";
+        let mut sim = thread("integrator = \"symplectic_euler\"\nsubsteps = 4", &words, air);
+        run(&mut sim, 10);
+        (sim.ledger().momentum[1], sim.ledger().broken)
+    };
+    let ((whole, none), (broken, one)) = (blown(""), blown(", break_strain = 0.2"));
+    assert!(whole > 0.02 && none == Some(0) && broken < 1e-12 && one == Some(1), "{whole} {broken} {none:?} {one:?}");
+}

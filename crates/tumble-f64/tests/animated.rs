@@ -173,6 +173,59 @@ fn a_muscle_pulls_as_its_stiffness_says() {
     }
 }
 
+/// What changes by a jump brings energy, and is no explosion: gravity, also for what is born, a load, a muscle.
+#[test]
+fn a_jump_is_no_explosion() {
+    let gravity = "world.gravity = { keys = [[0, 0, 0, 0], [0.5, 0, 0, -9.8]], interpolation = \"step\" }\n";
+    let mut sim = simulation(&format!(
+        "precision = \"double\"\ntime.fps = 50\n{gravity}[[system]]\nsubsteps = 20\n[[particles]]\nname = \"p\"\nposition = [[0, 0, 10]]\nvelocity = [[0.1, 0, 0]]\n"
+    ));
+    run(&mut sim, 50);
+    assert!((velocities(&sim, "p")[0].z + 4.9).abs() < 0.02, "{:?}", velocities(&sim, "p"));
+    let mut sim = simulation(&format!(
+        "precision = \"double\"\ntime.fps = 50\n{gravity}[[system]]\nsubsteps = 20\n[[emitter]]\nname = \"e\"\nfrom.point = {{ center = [0, 0, 10] }}\nrate = 20\n\
+         velocity = [0.1, 0, 0]\nlifetime = 5\n"
+    ));
+    run(&mut sim, 50);
+    assert!(velocities(&sim, "e")[0].z < -4.0);
+    let mut sim = simulation(
+        "precision = \"double\"\ntime.fps = 50\nworld.gravity = [0, 0, 0]\n[[system]]\nsubsteps = 20\n\
+         [[particles]]\nname = \"p\"\nposition = [[0, 0, 0]]\nvelocity = [[0.01, 0, 0]]\nload = [{ at = \"all\", force = [\"10*t\", 0, 0] }]\n",
+    );
+    run(&mut sim, 50);
+    assert!((velocities(&sim, "p")[0].x - 5.01).abs() < 0.02);
+    for method in ["integrator = \"symplectic_euler\"", "method = \"position_based\""] {
+        let mut sim = simulation(&format!(
+            "precision = \"double\"\ntime.fps = 50\nworld.gravity = [0, 0, 0]\n[[system]]\n{method}\nsubsteps = 40\n\
+             [[particles]]\nname = \"p\"\nposition = [[0, 0, 0], [1, 0, 0]]\nvelocity = [[0, 0.1, 0]]\n\
+             [[anchor]]\nname = \"muscle\"\nbetween = [\"p 0\", \"p 1\"]\nrest_length = 0\n\
+             stiffness = {{ keys = [[0, 0], [0.3, 1e3]], interpolation = \"step\" }}\n"
+        ));
+        run(&mut sim, 40);
+        let x = positions(&sim, "p");
+        assert!((x[1] - x[0]).norm() < 1.05 && sim.ledger().speed.unwrap() > 1.0, "{method}: {x:?}");
+    }
+}
+
+/// Steps that nobody sets are short enough for the largest of what changes, wherever it falls between frames.
+#[test]
+fn automatic_steps_foresee_what_grows() {
+    let mut sim = simulation(
+        "precision = \"double\"\ntime.fps = 24\nworld.gravity = [0, 0, 0]\n[[force]]\nkind = \"drag\"\ncoefficient = \"1000*t\"\n\
+         [[particles]]\nname = \"p\"\nposition = [[0, 0, 0]]\nvelocity = [[1, 0, 0]]\n",
+    );
+    run(&mut sim, 48);
+    assert!(velocities(&sim, "p")[0].norm() < 1e-6 && positions(&sim, "p")[0].x < 0.1, "{:?}", velocities(&sim, "p"));
+    let mut sim = simulation(
+        "precision = \"double\"\ntime.fps = 24\nworld.gravity = [0, 0, 0]\n\
+         [[particles]]\nname = \"p\"\nposition = [[0, 0, 0], [0.5, 0, 0]]\npin = [\"vertex 0\"]\n\
+         [[anchor]]\nname = \"m\"\nbetween = [\"p 0\", \"p 1\"]\nrest_length = 0.4\nstiffness = \"1e4*abs(sin(pi*24*t))\"\n",
+    );
+    let report = run(&mut sim, 24);
+    // omega is 100/s: a step of 0.7 of 2/omega, three in a frame, where the stiffness of the start asks for one.
+    assert!(report.steps >= 3 * 24 && positions(&sim, "p")[1].norm() < 0.6, "{} {:?}", report.steps, positions(&sim, "p"));
+}
+
 /// Where it stands says so, all at once, and constants give the bits of before.
 #[test]
 fn what_is_wrong_in_time_is_told() {

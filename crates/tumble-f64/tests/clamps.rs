@@ -158,6 +158,17 @@ fn a_clamp_turns_with_the_solid_that_carries_it() {
     assert!((found - turned(0.0)).norm() > 0.1 * l);
 }
 
+/// Two pins that hold an edge between them clamp it as one does, and one that holds more clamps no less.
+#[test]
+fn an_edge_is_clamped_by_all_pins_together() {
+    let hung = |pin: &str| tip(simulate(&sheet(HINGE, [6, 2], length(1.0), pin), Mesh::default()).unwrap(), Vector::from([1.0, 0.0, 0.0]));
+    let each: Vec<String> = (0..3).map(|j| format!("{{ which = \"vertex 0 {j}\", clamp = true }}")).collect();
+    let one = hung(CLAMPED);
+    assert_eq!(hung(&each.join(", ")), one);
+    assert_eq!(hung(&format!("{CLAMPED}, {CLAMPED}")), one);
+    assert!(one.z < 0.0 && one.x > 0.1 * length(1.0));
+}
+
 /// What has no slope, or none that could be held, is told with a cure.
 #[test]
 fn a_clamp_without_a_slope_is_an_error() {
