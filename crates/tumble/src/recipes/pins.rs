@@ -261,7 +261,7 @@ mod tests {
     use super::*;
 
     fn found(n: &[u32], words: &str) -> Result<Vec<u32>, String> {
-        in_words(&Pinnable { path: "", n, first: 0, is_lattice: true }, words)
+        in_words(&Pinnable { path: "", n, first: 0, is_lattice: true, clamps: false }, words)
     }
 
     #[test]
