@@ -30,7 +30,7 @@ shape = { sphere = { radius = 0.3 } }
     )
     .unwrap();
     assert_eq!(scene.system[0].integrator, Integrator::ImplicitEuler);
-    assert_eq!(scene.world.gravity, [0.0, 0.0, -9.8]);
+    assert_eq!(scene.world.gravity, [0.0, 0.0, -9.8].into());
     assert_eq!(scene.sheet[0].links().shear.as_ref().unwrap().settings().damping, 0.1);
     assert!(scene.sheet[0].links().bend.is_none());
     assert!(matches!(scene.collider[0].shape, Shape::Sphere { radius: 0.3, .. }));

@@ -112,7 +112,7 @@ fn nearest(solids: Option<&[Collider]>, (solid, bone): (usize, Option<usize>), x
 
 impl Clamp {
     /// The clamp of an edge of the rim, if its ends are held by one or by two.
-    pub fn of_edge<'a>(clamps: &'a [Self], ends: [u32; 2]) -> Option<&'a Self> {
+    pub fn of_edge(clamps: &[Self], ends: [u32; 2]) -> Option<&Self> {
         let holds = |clamp: &&Self, point: u32| clamp.points.binary_search(&point).is_ok();
         let all: Vec<&Self> = clamps.iter().filter(|clamp| ends.iter().any(|end| holds(clamp, *end))).collect();
         if !ends.iter().all(|end| all.iter().any(|clamp| holds(clamp, *end))) {
