@@ -311,11 +311,17 @@ def test_a_balloon_is_blown_up_over_time(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("path", "tree"),
     [
-        ("world.gravity", {"world": {"gravity": {"keys": [[0, 0, 0, 0], [1, 0, 0, -9]]}}}),
-        (r"world.gravity\[2\]", {"world": {"gravity": [0, 0, "-9*t"]}}),
         (
-            'collider "c".friction',
-            {"collider": [{"name": "c", "shape": {"sphere": {"radius": 1}}, "friction": "0.5*t"}]},
+            'collider "c".restitution',
+            {"collider": [{"name": "c", "shape": {"sphere": {"radius": 1}}, "restitution": "0.5*t"}]},
+        ),
+        (
+            r'rope "r".velocity\[2\]',
+            {"rope": [{"name": "r", "from": [0, 0, 0], "to": [1, 0, 0], "segments": 2, "velocity": [0, 0, "-9*t"]}]},
+        ),
+        (
+            'rope "r".density',
+            {"rope": [{"name": "r", "from": [0, 0, 0], "to": [1, 0, 0], "segments": 2, "density": {"keys": [[0, 1]]}}]},
         ),
         ("camera.position", {"camera": {"position": {"keys": [[0, 0, 0, 0], [1, 1, 1, 1]]}}}),
     ],
