@@ -183,7 +183,7 @@ fn a_jump_is_no_explosion() {
     run(&mut sim, 50);
     assert!((velocities(&sim, "p")[0].z + 4.9).abs() < 0.02, "{:?}", velocities(&sim, "p"));
     let mut sim = simulation(&format!(
-        "precision = \"double\"\ntime.fps = 50\n{gravity}[[system]]\nsubsteps = 20\n[[emitter]]\nname = \"e\"\nfrom.point = {{ center = [0, 0, 10] }}\nrate = 20\n\
+        "precision = \"double\"\ntime.fps = 50\n{gravity}[[system]]\nsubsteps = 20\n[[emitter]]\nname = \"e\"\nfrom.point = {{ at = [0, 0, 10] }}\nrate = 20\n\
          velocity = [0.1, 0, 0]\nlifetime = 5\n"
     ));
     run(&mut sim, 50);
