@@ -3,8 +3,9 @@
 extern crate tumble_f64 as tumble;
 
 use crate::common;
+use crate::densities::wave;
 
-use common::{grid, noisy, orders, run, show, simulation, step, zeros};
+use common::{grid, noisy, orders, run, show, simulation, step};
 use std::f64::consts::PI;
 use tumble_f64::math::Spare;
 use tumble_f64::operators::{Advection, Interpolation, advect, curl, transport};
@@ -201,40 +202,11 @@ shape.sphere = {{ center = [0.7, 0, 0.45], radius = 0.12 }}
     }
 }
 
-/// Frequency of a standing wave between two layers of 1 m each, in a box of 1 m: see densities.rs.             (gas.15)
-fn wave(n: usize, words: &str) -> f64 {
-    let mut sim = simulation(&format!(
-        r#"
-dimension = 2
-time = {{ fps = 100, frames = 400 }}
-[[gas]]
-name = "air"
-box = {{ size = [1, 1, 2], center = [0.5, 0, 1], resolution = {} }}
-fluid_density = 1
-densities = "variable"
-smoke = {{ initial = "2*clamp(0.5 + {n}*(1 + 0.02*cos(pi*x) - z), 0, 1)" }}
-advection.velocity.corrected = true
-courant = 0.5
-{words}
-"#,
-        2 * n
-    ));
-    let mut samples = Vec::new();
-    for frame in 0..170 {
-        let (s, points) = grid(&sim, "air", "density");
-        let x = |i: usize| ((i % points[0]) as f64 + 0.5) / n as f64;
-        samples.push((frame, s.iter().enumerate().map(|(i, s)| s * (PI * x(i)).cos()).sum::<f64>()));
-        step(&mut sim);
-    }
-    let slopes: Vec<(f64, f64, f64)> = samples.windows(3).map(|s| (f64::from(s[1].0) / 100.0, s[1].1, 50.0 * (s[2].1 - s[0].1))).collect();
-    let crossings = zeros(&slopes);
-    PI / (crossings[1].0 - crossings[0].0) / (0.5 * 9.8 * PI * PI.tanh()).sqrt()
-}
-
 #[test]
 fn a_jump_between_layers_swings_closer_to_its_period() {
     // Paths smear the layer between two densities: -5.9 % and -4.4 % (densities.rs). Fluxes keep it thin: -2.9 % and -1.6 %.
-    let off = [32, 64].map(|n| wave(n, "advection.scalars.conservative = true") - 1.0);
+    let exact = (0.5 * 9.8 * PI * PI.tanh()).sqrt();
+    let off = [32, 64].map(|n| wave("variable", n, "advection.scalars.conservative = true") / exact - 1.0);
     println!("off by {off:?}");
     assert!(off[0].abs() < 0.032 && off[1].abs() < 0.018 && (off[0] / off[1]).log2() > 0.75, "{off:?}");
 }

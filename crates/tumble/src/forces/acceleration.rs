@@ -9,7 +9,8 @@ use crate::math::{Lane, Real, Row, Vec3, VectorSignal, row};
 /// f = m a(x, v, t)                                                            (particles.2)
 pub struct Acceleration(pub VectorSignal);
 
-struct Uniform;
+/// f + m a
+pub(super) struct Uniform;
 
 impl Each for Uniform {
     #[inline(always)]

@@ -1,9 +1,10 @@
 //! A given force that some masses share.
 
+use super::acceleration::Uniform;
 use super::{Force, Group, One};
 use crate::elements::Block;
-use crate::math::rows::{self, Each};
-use crate::math::{Lane, Real, Row, VectorSignal};
+use crate::math::rows;
+use crate::math::{Real, Row, VectorSignal};
 
 /// f = m/M F(t): a force that is a function of time, shared in proportion to masses of M together.              (particles.12)
 pub struct Load {
@@ -13,19 +14,10 @@ pub struct Load {
     pub mass: f64,
 }
 
-struct Share;
-
-impl Each for Share {
-    #[inline(always)]
-    fn at<L: Lane>(&self, mass: L, _: L, acceleration: L, force: L) -> L {
-        force + mass * acceleration
-    }
-}
-
 impl Force for Load {
     fn add(&self, t: f64, group: Group<'_>, force: &mut [Row]) {
         let a = self.force.value(t) * (1.0 / self.mass);
-        rows::each(force, group.mass, group.x, [a.x as Real, a.y as Real, a.z as Real, 0.0], Share);
+        rows::each(force, group.mass, group.x, [a.x as Real, a.y as Real, a.z as Real, 0.0], Uniform);
     }
 
     /// Known while it is the same at all times.
