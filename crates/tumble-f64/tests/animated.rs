@@ -207,6 +207,32 @@ fn a_jump_is_no_explosion() {
     }
 }
 
+/// A run that goes on from a checkpoint is bit for bit the whole one, whatever changes meanwhile and where its steps come from.
+#[test]
+fn a_restored_run_sees_what_the_whole_one_sees() {
+    let text = "precision = \"double\"\ntime = { fps = 10, frames = 20 }\nworld.gravity = [0, 0, \"-9.8*(1 + t)\"]\n\
+         [[system]]\nname = \"masses\"\n[[system]]\nname = \"air\"\nmethod = \"gas\"\n\
+         [[gas]]\nname = \"air\"\nbox = { size = [1, 1, 1], resolution = 8 }\nsmoke = {}\n\
+         temperature = { ambient = 300, initial = \"300 + 60*smoothstep(0.4, 0.1, hypot(x, y, z))\" }\n\
+         [[force]]\nkind = \"drag\"\nrate = \"0.1 + t\"\n[[collider]]\nname = \"floor\"\nshape.floor = { height = -2 }\nfriction = \"0.2*t\"\n\
+         [[rope]]\nname = \"r\"\nfrom = [3, 0, 0]\nto = [4, 0, 0]\nsegments = 6\nload = [{ at = \"end\", force = [\"sin(t)\", 0, 0] }]\n\
+         [[particles]]\nname = \"p\"\nposition = [[3, 0, 1]]\npin = [\"all\"]\n\
+         [[anchor]]\nname = \"winch\"\nbetween = [\"p 0\", \"r 0\"]\nstiffness = \"200 + 100*t\"\nrest_length = { keys = [[0, 1], [2, 0.5]] }\n";
+    let mut whole = simulation(text);
+    run(&mut whole, 8);
+    let saved = whole.save(&[]);
+    run(&mut whole, 5);
+    let mut again = simulation(text);
+    again.restore(&saved).unwrap();
+    run(&mut again, 5);
+    assert_eq!(whole.ledger(), again.ledger());
+    for (object, name) in [("r", "position"), ("r", "velocity")] {
+        assert_eq!(column(&whole, object, name), column(&again, object, name));
+    }
+    assert_eq!(grid(&whole, "air", "velocity_z"), grid(&again, "air", "velocity_z"));
+    assert!(largest(&grid(&whole, "air", "velocity_z").0) > 0.1);
+}
+
 /// Steps that nobody sets are short enough for the largest of what changes, wherever it falls between frames.
 #[test]
 fn automatic_steps_foresee_what_grows() {

@@ -89,6 +89,19 @@ fn an_extra_mass_swings_and_weighs() {
     assert!((x - exact).abs() < 1e-8, "{x} {exact}");
 }
 
+/// A load that stays the same has a potential: what it gives is in the ledger.
+#[test]
+fn a_steady_load_has_a_potential() {
+    let mut sim = simulation(
+        "precision = \"double\"\nworld.gravity = [0, 0, 0]\ntime.fps = 10\n[[system]]\nintegrator = \"rk4\"\nstep = 1e-2\n\
+         [[particles]]\nname = \"p\"\nposition = [[1, 0, 0], [0, 2, 0]]\nmass = [1, 2]\nload = [{ at = \"all\", force = [6, 0, 1] }]\n",
+    );
+    let start = sim.ledger();
+    run(&mut sim, 10);
+    let end = sim.ledger();
+    assert!(end.kinetic > 6.0 && (end.energy() - start.energy()).abs() < 1e-12 * end.kinetic, "{} {}", end.energy(), start.energy());
+}
+
 #[test]
 fn loads_on_nothing_are_told() {
     let particles = |words: &str| told(&format!("[[particles]]\nname = \"p\"\nposition = [[0, 0, 0], [1, 0, 0]]\n{words}\n"));
