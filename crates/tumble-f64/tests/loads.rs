@@ -102,6 +102,30 @@ fn a_steady_load_has_a_potential() {
     assert!(end.kinetic > 6.0 && (end.energy() - start.energy()).abs() < 1e-12 * end.kinetic, "{} {}", end.energy(), start.energy());
 }
 
+/// A force on all objects acts on each, wherever their masses stand: what is emitted stands behind all others, and loads on single masses between.
+#[test]
+fn forces_reach_objects_in_any_order() {
+    for method in [
+        "integrator = \"symplectic_euler\"\nstep = 1e-3",
+        "integrator = \"implicit_euler\"\nstep = 1e-3",
+        "method = \"position_based\"\nstep = 1e-3",
+    ] {
+        let mut sim = simulation(&format!(
+            "precision = \"double\"\nworld.gravity = [0, 0, 0]\ntime.fps = 10\n[[system]]\n{method}\n[[force]]\nkind = \"acceleration\"\nvalue = [0, 2, 0]\n\
+             [[particles]]\nname = \"p\"\nposition = [[5, 0, 0]]\n\
+             [[emitter]]\nname = \"e\"\nfrom.point = {{ at = [9, 0, 0] }}\nburst = [{{ time = 0, count = 3 }}]\n\
+             [[rope]]\nname = \"r\"\nfrom = [0, 0, 0]\nto = [1, 0, 0]\nsegments = 3\nload = [{{ at = \"start\", force = [0, 0, 1e-3] }}, {{ at = \"end\", force = [0, 0, 1e-3] }}]\n\
+             [[sheet]]\nname = \"s\"\nsize = [1, 1]\nresolution = [4, 4]\ncenter = [0, 0, 5]\n"
+        ));
+        run(&mut sim, 10);
+        for object in ["p", "e", "r", "s"] {
+            let v = velocities(&sim, object);
+            assert!(!v.is_empty() && v.iter().all(|v| (v.y - 2.0).abs() < 1e-6), "{method} {object}: {v:?}");
+        }
+        assert!(velocities(&sim, "r")[0].z > 1e-3 && velocities(&sim, "r")[3].z > 1e-3, "{method}");
+    }
+}
+
 #[test]
 fn loads_on_nothing_are_told() {
     let particles = |words: &str| told(&format!("[[particles]]\nname = \"p\"\nposition = [[0, 0, 0], [1, 0, 0]]\n{words}\n"));

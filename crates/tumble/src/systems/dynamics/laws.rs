@@ -97,10 +97,11 @@ impl Laws {
         for (row, push) in self.steady[first..].iter().take_while(|(row, _)| *row < end) {
             force[row - start] = add(force[row - start], [push.x as Real, push.y as Real, push.z as Real, 0.0]);
         }
-        for Acting { law, ranges, .. } in &self.forces {
-            let near = ranges.len() > 1;
-            let from = if near { ranges.partition_point(|range| range.end <= start) } else { 0 };
-            for range in ranges[from..].iter().take_while(|range| !near || range.start < end) {
+        for Acting { law, objects, ranges, .. } in &self.forces {
+            // Runs of points are in order; objects need not be, as what is emitted stands at the end.
+            let runs = objects.is_empty();
+            let from = if runs { ranges.partition_point(|range| range.end <= start) } else { 0 };
+            for range in ranges[from..].iter().take_while(|range| !runs || range.start < end) {
                 let (a, b) = (range.start.max(start), range.end.min(end));
                 if a < b {
                     let (a, b) = (a - start, b - start);
