@@ -49,7 +49,7 @@ fn windings_of_a_coil_touch_at_their_distance_at_rest() {
     let x: Vec<Row> = (0..=n).map(place).map(|v| [v.x, v.y, v.z, 1.0]).collect();
     let mut topology = Topology::new(x.len());
     let segments: Vec<[u32; 2]> = (0..n).map(|k| [k, k + 1]).collect();
-    topology.add(Owner { radius: 0.5 * thickness, itself: true }, &[], &segments, &[]);
+    topology.add(Owner { radius: 0.5 * thickness, itself: true, hair: false }, &[], &segments, &[]);
     topology.set_rest(&x);
     let mut detector = Detector::new();
     detector.detect(&topology, &x, 2.0 * thickness);
@@ -70,7 +70,7 @@ fn windings_of_a_coil_touch_at_their_distance_at_rest() {
 fn topology(sheets: usize, thickness: f64) -> Topology {
     let mut topology = Topology::new(sheets * ALL);
     for k in 0..sheets {
-        topology.add(Owner { radius: 0.5 * thickness, itself: true }, &triangles((k * ALL) as u32), &[], &[]);
+        topology.add(Owner { radius: 0.5 * thickness, itself: true, hair: false }, &triangles((k * ALL) as u32), &[], &[]);
     }
     let rest: Vec<Row> = (0..sheets).flat_map(|k| sheet(|u, v| vector(u, v, 100.0 * k as f64))).collect();
     topology.set_rest(&rest);

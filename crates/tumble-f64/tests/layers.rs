@@ -248,3 +248,47 @@ fn the_tip_of_a_strand_is_not_joined_to_the_next_root() {
     println!("a rope between strands moves them by {between:.1e} m, one at a strand by {beside:.1e} m");
     assert!(between < 1e-9 && beside > 1e-3, "{between} {beside}");
 }
+
+/// A brush of hair, stiff enough to stand, on a fixed plate.
+fn brush(system: &str, more: &str) -> Simulation {
+    let corner = |x: f64, y: f64| [x, y, 0.0];
+    let plate = Mesh {
+        vertices: vec![corner(-0.1, -0.1), corner(0.1, -0.1), corner(0.1, 0.1), corner(-0.1, 0.1)],
+        triangles: vec![[0, 1, 2], [0, 2, 3]],
+        ..Mesh::default()
+    };
+    let text = format!(
+        "version = 1\nprecision = \"double\"\ntime.fps = 60\n[[system]]\nmethod = \"position_based\"\nsubsteps = 20\n{system}\n\
+         [[hair]]\nname = \"h\"\nmesh.path = \"plate\"\ncount = 150\nlength = 0.06\nsegments = 6\nradius = 4e-4\n{more}"
+    );
+    let assets = Assets::new(HashMap::from([("plate".to_string(), plate)]), HashMap::new());
+    Simulation::new(Scene::from_toml(&text).unwrap(), assets).unwrap()
+}
+
+/// Strands hold a cloth up, and nothing passes: without contact the cloth falls through them.
+#[test]
+fn a_cloth_lies_on_hair() {
+    let cloth = "[[sheet]]\nname = \"c\"\nsize = [0.18, 0.18]\nresolution = [19, 19]\ncenter = [0, 0, 0.075]\ndensity = 0.1\nmembrane = { young = 2000 }\n\
+                 isometric = 1e-6\n[[force]]\nkind = \"drag\"\nrate = 2\n[expect]\nmax_intersections = 0\n";
+    let lowest = |system: &str| {
+        let mut sim = brush(system, cloth);
+        let crossed = (0..45).map(|_| { step(&mut sim); sim.ledger().intersections.unwrap() }).max().unwrap();
+        let x = positions(&sim, "c");
+        (x.iter().map(|x| x.z).sum::<f64>() / x.len() as f64, crossed)
+    };
+    let ((held, none), (fallen, some)) = (lowest("self_contact.thickness = 0.003"), lowest(""));
+    println!("cloth on hair at {held:.4} m, {none} crossings; without contact at {fallen:.4} m, {some}");
+    assert!(held > 0.03 && none == 0, "{held} {none}");
+    assert!(fallen < -0.1 && some > 100, "{fallen} {some}");
+}
+
+/// Strands pass each other: what they do to each other is the hair continuum's.
+#[test]
+fn hair_meets_no_hair() {
+    let ways = |system: &str| {
+        let mut sim = brush(system, "[[force]]\nkind = \"drag\"\nrate = 1\n[[force]]\nkind = \"vortex\"\n");
+        run(&mut sim, 30);
+        positions(&sim, "h")
+    };
+    assert_eq!(ways("self_contact.thickness = 0.02"), ways(""));
+}

@@ -49,7 +49,7 @@ fn at(x: &[Row], v: u32) -> Vector {
     vector(x, y, z)
 }
 
-const THIN: Owner = Owner { radius: 0.01, itself: true };
+const THIN: Owner = Owner { radius: 0.01, itself: true, hair: false };
 
 /// A sheet of n × n squares over the unit square, at a height.
 fn sheet(n: u32, first: u32, place: impl Fn(f64, f64) -> Vector) -> (Vec<Row>, Vec<[u32; 3]>) {
@@ -213,7 +213,7 @@ fn some_pairs_never_meet() {
         let (above, upper) = sheet(1, 4, |u, v| vector(u, v, 0.1));
         x.extend(above);
         let mut topology = Topology::new(8);
-        topology.add(Owner { radius: 0.02, itself }, &[lower, upper].concat(), &[], &[]);
+        topology.add(Owner { radius: 0.02, itself, hair: false }, &[lower, upper].concat(), &[], &[]);
         (topology, x)
     };
     let count = |topology: &Topology, x: &[Row]| {
@@ -243,8 +243,8 @@ fn some_pairs_never_meet() {
     // Each other, with the sum of their radii; at rest nearer than that.
     let (mut apart, mut detector) = (Topology::new(8), Detector::new());
     let triangles = two(true).0.triangles().to_vec();
-    apart.add(Owner { radius: 0.02, itself: false }, &triangles[..2], &[], &[]);
-    apart.add(Owner { radius: 0.03, itself: false }, &triangles[2..], &[], &[]);
+    apart.add(Owner { radius: 0.02, itself: false, hair: false }, &triangles[..2], &[], &[]);
+    apart.add(Owner { radius: 0.03, itself: false, hair: false }, &triangles[2..], &[], &[]);
     detector.detect(&apart, &x, 0.2);
     assert_eq!(detector.pairs().len(), all);
     assert!(detector.pairs().iter().all(|p| (p.thickness - 0.05).abs() < 1e-15 && (p.distance - 0.1).abs() < 1e-15));

@@ -26,6 +26,7 @@ mod free_bodies;
 mod hair;
 mod hand;
 mod layers;
+mod liquid_loads;
 mod liquids;
 mod loads;
 mod locking;

@@ -77,13 +77,25 @@ pub const COLUMNS: &[Described] = &[
     Described { name: "temperature", unit: "K", doc: "Absolute temperature.", signed: false, ..CELLS },
     Described { name: "fuel", unit: "kg/m³", doc: "Mass of fuel that has not burnt, in a volume.", signed: false, fog: true, ..CELLS },
     Described { name: "flux", unit: "W/m²", doc: "Heat that is conducted through an area.", width: 3, ..CELLS },
-    Described { name: "pressure", unit: "Pa", doc: "Pressure; of a gas that of the last solve.", ..CELLS },
+    Described {
+        name: "pressure",
+        unit: "Pa",
+        doc: "Pressure; of a gas that of the last solve, in a liquid of particles the mean over the last interval.",
+        places: &[Place::Cell, Place::Mass],
+        ..CELLS
+    },
     Described { name: "vorticity", unit: "1/s", doc: "Curl of the velocity: in a plane the component across it, in space three.", ..CELLS },
     Described { name: "divergence", unit: "1/s", doc: "Divergence of the velocity.", ..CELLS },
     Described { name: "velocity_x", unit: "m/s", doc: "Velocity along x, on the faces across x.", places: &[Place::Face], ..CELLS },
     Described { name: "velocity_y", unit: "m/s", doc: "Velocity along y, on the faces across y.", places: &[Place::Face], ..CELLS },
     Described { name: "velocity_z", unit: "m/s", doc: "Velocity along z, on the faces across z.", places: &[Place::Face], ..CELLS },
-    Described { name: "force", unit: "N", doc: "Force of a gas on each solid in it.", places: &[Place::Object, Place::Mass], ..VECTOR },
+    Described {
+        name: "force",
+        unit: "N",
+        doc: "Force of gases, by their last pressure, and of liquids of particles, the mean over the last interval, on each solid in them.",
+        places: &[Place::Object, Place::Mass],
+        ..VECTOR
+    },
     Described { name: "id", doc: "Number of an emitted particle, which it keeps.", ..ALWAYS },
     Described { name: "age", unit: "s", doc: "Time since its birth.", ..ALWAYS },
     Described { name: "color", doc: "Red, green and blue.", width: 3, ..ALWAYS },

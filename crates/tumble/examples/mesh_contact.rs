@@ -42,7 +42,7 @@ fn main() {
     for (name, flat, reach) in [("flat", true, 0.004), ("folded", false, 0.004), ("folded, far", false, 0.008)] {
         let x = folded(n, flat);
         let mut topology = Topology::new(x.len());
-        topology.add(Owner { radius: 0.001, itself: true }, &triangles(n), &[], &[]);
+        topology.add(Owner { radius: 0.001, itself: true, hair: false }, &triangles(n), &[], &[]);
         topology.set_rest(&folded(n, true));
         let mut detector = Detector::new();
         detector.detect(&topology, &x, reach);

@@ -10,7 +10,7 @@ use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use tumble_interface::engine::{Account, Ledger, Stability, StepReport, UserForce};
 use tumble_interface::scene::Coupling;
 use tumble_interface::warning::Code;
-use tumble_interface::{Column, SceneError, StepError, Warning};
+use tumble_interface::{Column, Data, SceneError, StepError, Warning};
 use twox_hash::XxHash3_64;
 
 /// A system, and its number at the exchange.
@@ -378,7 +378,7 @@ impl World {
     pub fn columns(&self, t: f64, names: &[&str]) -> Vec<Column> {
         let mut out = Vec::new();
         self.each().for_each(|s| s.columns(t, names, &mut out));
-        out
+        merged(out)
     }
 
     /// Constant columns of all objects.
@@ -472,6 +472,19 @@ fn bytes(part: &Part) -> &[u8] {
         Part::Indices(indices) => bytemuck::cast_slice(indices),
         Part::Bytes(bytes) => bytes,
     }
+}
+
+/// Columns of an object that several systems write, added up: forces of gases and liquids.
+fn merged(columns: Vec<Column>) -> Vec<Column> {
+    let mut out: Vec<Column> = Vec::with_capacity(columns.len());
+    for column in columns {
+        let same = |other: &&mut Column| column.name == "force" && (&other.object, &other.name) == (&column.object, &column.name);
+        match out.iter_mut().find(same) {
+            Some(Column { data: Data::F64(sums), .. }) => sums.iter_mut().zip(column.data.numbers()).for_each(|(sum, f)| *sum += f),
+            _ => out.push(column),
+        }
+    }
+    out
 }
 
 /// Reads the number of the frame, and the exchange.

@@ -74,6 +74,10 @@ pub trait Constraints: Send + Sync {
     fn matched(&self, _h: f64, _plain: Option<f64>) -> Option<(Range<usize>, f64)> {
         None
     }
+    /// The liquid that they are, if they are one.
+    fn liquid(&self) -> Option<&Density> {
+        None
+    }
     /// Of elements that drive: the energy that they may bring the masses [J].
     fn drives(&self) -> Option<f64> {
         None

@@ -107,15 +107,15 @@ pub struct Walls<'a> {
 }
 
 impl Walls<'_> {
-    /// Calls `f` with the distance [m] of p from where masses are stopped, and the direction away from there, of every surface that is
-    /// nearer than `within` [m]: of a solid the nearest one, of a box that contains each of its walls, of another container up to three, as if
-    /// each were flat. Solids count as having a thickness of at least `thickness` [m].
-    pub fn near(&self, p: Vector, thickness: f64, within: f64, mut f: impl FnMut(f64, Vector)) {
-        for collider in self.colliders {
+    /// Calls `f` with the number of the solid, the distance [m] of p from where masses are stopped, and the direction away from there, of every
+    /// surface that is nearer than `within` [m]: of a solid the nearest one, of a box that contains each of its walls, of another container up to
+    /// three, as if each were flat. Solids count as having a thickness of at least `thickness` [m].
+    pub fn near(&self, p: Vector, thickness: f64, within: f64, mut f: impl FnMut(usize, f64, Vector)) {
+        for (at, collider) in self.colliders.iter().enumerate() {
             let (mut from, thickness) = (p, thickness.max(collider.thickness));
             if let Some(walls) = collider.walls(p, self.t) {
                 for (distance, normal) in walls.into_iter().filter(|(distance, _)| *distance < within + thickness) {
-                    f(distance - thickness, normal);
+                    f(at, distance - thickness, normal);
                 }
                 continue;
             }
@@ -125,7 +125,7 @@ impl Walls<'_> {
                 if distance >= reach || normal.norm_sq() == 0.0 {
                     break;
                 }
-                f(distance - thickness + normal.dot(p - from), normal);
+                f(at, distance - thickness + normal.dot(p - from), normal);
                 // A point from which that surface is out of reach, whatever the rounding.
                 from = from + normal * (1.01 * reach - distance);
             }

@@ -10,7 +10,7 @@
 
 use super::{Constraints, Projection};
 use crate::geometry::{Meet, Neighbours, Vector, Walls};
-use crate::math::parallel::{chunks, sum};
+use crate::math::parallel::{chunks, chunks2, fold, sum};
 use crate::math::{Lane, Real, Row, xyz64};
 use std::f64::consts::PI;
 use std::ops::Range;
@@ -57,9 +57,18 @@ pub struct Density {
     /// Multipliers so far, and what this sweep adds.
     lambda: Vec<Real>,
     delta: Vec<Real>,
+    /// The solid whose walls are near each particle, `NONE` or `SEVERAL`.
+    near: Vec<u32>,
+    /// Impulses on every solid in this sub-step [N s].
+    pushes: Vec<Vector>,
     /// Whether walls have pushed in this sub-step.
     leans: bool,
 }
+
+/// No solid is near.
+const NONE: u32 = u32::MAX;
+/// More than one solid is near.
+const SEVERAL: u32 = u32::MAX - 1;
 
 /// x, w -> V sum of W, s V sum of grad W, s² V² sum of w |grad W|², over all others.
 struct Sums {
@@ -118,8 +127,25 @@ impl Density {
             against: Vec::new(),
             lambda: Vec::new(),
             delta: Vec::new(),
+            near: Vec::new(),
+            pushes: Vec::new(),
             leans: false,
         }
+    }
+
+    /// Its rows.
+    pub fn rows(&self) -> Range<usize> {
+        self.rows.clone()
+    }
+
+    /// Impulses on every solid in the last sub-step, in their order [N s].                                  (liquids.8)
+    pub fn pushes(&self) -> &[Vector] {
+        &self.pushes
+    }
+
+    /// The pressure of a particle in the last sub-step, of length h [Pa]: -lambda/(V h²), whose multiplier counts s² times here.  (liquids.9)
+    pub fn pressure(&self, particle: usize, h: f64) -> f64 {
+        self.lambda.get(particle).map_or(0.0, |lambda| -f64::from(*lambda) / (self.spacing * h * h))
     }
 
     /// Sums over the neighbours of each, place by place.
@@ -129,27 +155,62 @@ impl Density {
         grid.gather(&Sums { inverse: 1.0 / self.spacing }, points, sums);
     }
 
+    /// Calls `f` with every solid near a particle, and `behind` and the direction away of each of its walls.
+    fn walls_of(&self, x: Row, walls: Walls<'_>, mut f: impl FnMut(usize, [f64; 3], Vector)) {
+        let s = self.spacing;
+        // Deeper there is no more than that.
+        walls.near(xyz64(x), 0.5 * s, 2.0 * s, |solid, distance, normal| f(solid, behind((distance / s + BEGINS).max(0.0)), normal));
+    }
+
     /// Adds the share of walls. Where several are near, the liquid between them is the part that none of them takes.
-    fn add_walls(&self, x: &[Row], walls: Walls<'_>, against: &mut Vec<[Real; 5]>) {
+    fn add_walls(&self, x: &[Row], walls: Walls<'_>, near: &mut Vec<u32>, against: &mut Vec<[Real; 5]>) {
         against.clear();
         against.resize(x.len(), [0.0; 5]);
+        near.clear();
+        near.resize(x.len(), NONE);
         if walls.colliders.is_empty() {
             return;
         }
-        let s = self.spacing;
-        chunks(against, |start, against| {
-            for (against, x) in against.iter_mut().zip(&x[start..]) {
+        chunks2(against, near, |start, against, near| {
+            for ((against, near), x) in against.iter_mut().zip(near).zip(&x[start..]) {
                 let (mut free, mut slope, mut stiff) = (1.0, Vector::default(), 0.0);
-                walls.near(xyz64(*x), 0.5 * s, 2.0 * s, |distance, normal| {
-                    // Deeper there is no more than that.
-                    let [part, less, squares] = behind((distance / s + BEGINS).max(0.0));
+                self.walls_of(*x, walls, |solid, [part, less, squares], normal| {
                     stiff += squares;
                     slope = slope * (1.0 - part) - normal * (free * less);
                     free *= 1.0 - part;
+                    *near = if [NONE, solid as u32].contains(near) { solid as u32 } else { SEVERAL };
                 });
                 *against = [1.0 - free, slope.x, slope.y, slope.z, stiff * f64::from(x[3])].map(|c| c as Real);
             }
         });
+    }
+
+    /// Adds what this sweep's multipliers push the solids, in a sub-step of length h [s].                    (liquids.8)
+    fn add_pushes(&mut self, x: &[Row], walls: Walls<'_>, h: f64) {
+        let count = walls.colliders.len();
+        let of = |range: Range<usize>| {
+            let (mut pushes, mut found) = (vec![Vector::default(); count], Vec::new());
+            for i in range.filter(|i| self.near[*i] != NONE && self.delta[*i] != 0.0) {
+                let delta = f64::from(self.delta[i]);
+                if self.near[i] != SEVERAL {
+                    let [_, x, y, z, _] = self.against[i].map(f64::from);
+                    let push = &mut pushes[self.near[i] as usize];
+                    *push = *push - Vector { x, y, z } * delta;
+                    continue;
+                }
+                found.clear();
+                self.walls_of(x[i], walls, |solid, [part, less, _], normal| found.push((solid, 1.0 - part, normal * less)));
+                for (k, (solid, _, slope)) in found.iter().enumerate() {
+                    let free = found.iter().enumerate().filter(|(other, _)| *other != k).map(|(_, (_, free, _))| free).product::<f64>();
+                    pushes[*solid] = pushes[*solid] + *slope * (free * delta);
+                }
+            }
+            pushes
+        };
+        let scale = self.spacing / h;
+        for pushes in fold(x.len(), of) {
+            self.pushes.iter_mut().zip(pushes).for_each(|(sum, push)| *sum = *sum + push * scale);
+        }
     }
 }
 
@@ -175,14 +236,18 @@ impl Constraints for Density {
         self.leans.then_some(self.rows.start)
     }
 
+    fn liquid(&self) -> Option<&Density> {
+        Some(self)
+    }
+
     fn energy(&self, x: &[Row], walls: Walls<'_>) -> f64 {
         if self.compliance == 0.0 {
             return 0.0;
         }
         let (mut grid, mut points, mut sums) = (Neighbours::new(2.0 * self.spacing), Vec::new(), Vec::new());
-        let (x, mut against) = (&x[self.rows.clone()], Vec::new());
+        let (x, mut near, mut against) = (&x[self.rows.clone()], Vec::new(), Vec::new());
         self.gather(&mut grid, x, &mut points, &mut sums);
-        self.add_walls(x, walls, &mut against);
+        self.add_walls(x, walls, &mut near, &mut against);
         let of = |i: usize| grid.place(i).map_or(0.0, |place| f64::from(excess(&sums[place], &against[i])).max(0.0));
         sum(x.len(), |range| range.map(|i| 0.5 * of(i) * of(i) / self.compliance).sum())
     }
@@ -191,14 +256,16 @@ impl Constraints for Density {
         let rows = &mut x[self.rows.clone()];
         let mut grid = std::mem::take(&mut self.grid);
         let (mut points, mut sums) = (std::mem::take(&mut self.points), std::mem::take(&mut self.sums));
-        let mut against = std::mem::take(&mut self.against);
+        let (mut near, mut against) = (std::mem::take(&mut self.near), std::mem::take(&mut self.against));
         self.gather(&mut grid, rows, &mut points, &mut sums);
-        self.add_walls(rows, step.walls, &mut against);
+        self.add_walls(rows, step.walls, &mut near, &mut against);
         self.leans = (step.iteration > 0 && self.leans) || against.iter().any(|a| a[0] > 0.0);
-        (self.grid, self.points, self.sums, self.against) = (grid, points, sums, against);
+        (self.grid, self.points, self.sums, self.near, self.against) = (grid, points, sums, near, against);
         if step.iteration == 0 || self.lambda.len() != rows.len() {
             self.lambda.clear();
             self.lambda.resize(rows.len(), 0.0);
+            self.pushes.clear();
+            self.pushes.resize(step.walls.colliders.len(), Vector::default());
         }
         self.delta.resize(rows.len(), 0.0);
         // In units of s: weights count s² times, and so do multipliers.
@@ -225,7 +292,10 @@ impl Constraints for Density {
         for (lambda, delta) in self.lambda.iter_mut().zip(&self.delta) {
             *lambda += delta;
         }
-        let delta = &self.delta;
+        if self.leans {
+            self.add_pushes(rows, step.walls, step.h);
+        }
+        let (own, delta) = (&*rows, &self.delta);
         self.grid.sorted(|i| [own[i][0], own[i][1], own[i][2], delta[i]], &mut self.pushed);
         self.grid.gather(&Moves { inverse: 1.0 / self.spacing }, &self.pushed, &mut self.moves);
         let (grid, moves, against, delta) = (&self.grid, &self.moves, &self.against, &self.delta);

@@ -749,7 +749,7 @@ mod tests {
         let squares = (0..72).filter(|k| k % 6 < 5 && k % 36 < 30);
         let triangles: Vec<[u32; 3]> = squares.flat_map(|k| [[k, k + 1, k + 7], [k, k + 7, k + 6]]).collect();
         let mut topology = Topology::new(72);
-        topology.add(Owner { radius: 1e-3, itself: true }, &triangles, &[], &[]);
+        topology.add(Owner { radius: 1e-3, itself: true, hair: false }, &triangles, &[], &[]);
         let mut detector = Detector::new();
         let least = |detector: &Detector| detector.pairs().iter().map(|p| f64::from(p.distance)).fold(1.0, f64::min);
         for round in 0..60 {

@@ -10,6 +10,8 @@ pub struct Owner {
     pub radius: f64,
     /// Whether the object touches itself.
     pub itself: bool,
+    /// Whether it is hair, which meets no hair: what strands do to each other is the hair continuum's.
+    pub hair: bool,
 }
 
 /// Triangles, edges and points that can meet. Its indices are those of the column of positions that it belongs to.
@@ -222,7 +224,8 @@ impl Topology {
             return false;
         }
         let (of_a, of_b) = (self.owner[a[0] as usize], self.owner[b[0] as usize]);
-        if of_a == of_b && !self.owners[of_a as usize].itself {
+        let (owner_a, owner_b) = (&self.owners[of_a as usize], &self.owners[of_b as usize]);
+        if of_a == of_b && !owner_a.itself || owner_a.hair && owner_b.hair {
             return false;
         }
         let fixed = |v: &u32| self.fixed[*v as usize];

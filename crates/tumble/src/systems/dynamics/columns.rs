@@ -9,6 +9,11 @@ use tumble_interface::{Column, Data};
 
 impl Dynamics {
     pub(super) fn write_columns(&self, names: &[&str], out: &mut Vec<Column>) {
+        if names.contains(&"force") && self.core.liquids().next().is_some() {
+            let solids = self.core.laws.colliders.iter().enumerate();
+            let force = |solid: usize| <[f64; 3]>::from(self.features.liquid_loads.force(solid)).to_vec();
+            out.extend(solids.map(|(solid, collider)| Column::new(&collider.name, "force", force(solid))));
+        }
         for (index, object) in self.core.objects.iter().enumerate() {
             let tear = self.features.fracture.tears().iter().find(|tear| tear.object() == index);
             for name in names {
@@ -24,6 +29,10 @@ impl Dynamics {
                     "velocity" => numbers(&self.core.state.v[object.points.clone()], 3),
                     "orientation" if !object.frames.is_empty() => numbers(&self.core.state.x[object.frames.clone()], 4),
                     "angular_velocity" if !object.frames.is_empty() => numbers(&self.core.state.v[object.frames.clone()], 3),
+                    "pressure" => match self.features.liquid_loads.pressure(&self.core, &object.points) {
+                        Some(pressure) => pressure,
+                        None => continue,
+                    },
                     "link_strain" if !object.links.is_empty() => self.link_strain(object),
                     _ => continue,
                 };

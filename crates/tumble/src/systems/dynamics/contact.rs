@@ -60,26 +60,67 @@ pub struct Pass<'a> {
     pub penalty: bool,
     /// Rows whose impacts are observed.
     pub observed: &'a [Range<usize>],
+    /// Rows whose impulses on solids are counted.
+    pub counted: &'a [Range<usize>],
+}
+
+/// What a contact pass has found.
+#[derive(Debug, Default)]
+pub struct Found {
+    /// Whether a mass has touched a solid.
+    pub touched: bool,
+    /// Impacts of observed rows.
+    pub hits: Vec<(usize, Hit)>,
+    /// Impulses of counted rows on every solid [N s]; empty without any.
+    pub pushes: Vec<Vector>,
+}
+
+/// One mass, as the pass tells of it.
+struct Teller<'a> {
+    row: usize,
+    /// Its mass [kg], 0 if its impulses are not counted.
+    mass: f64,
+    found: &'a mut Found,
+}
+
+impl Teller<'_> {
+    fn hit(&mut self, hit: Hit) {
+        self.found.hits.push((self.row, hit));
+    }
+
+    /// A solid has changed its velocity by this much.
+    fn push(&mut self, solid: usize, change: Vector) {
+        if self.mass > 0.0 {
+            let push = &mut self.found.pushes[solid];
+            *push = *push - change * self.mass;
+        }
+    }
 }
 
 impl Pass<'_> {
     /// Resolves the contacts of one mass, `before` being its position and velocity when the step began; says whether it touched a solid.
-    pub fn mass(&self, row: usize, before: (Row, Row), x: &mut Row, v: &mut Row, hits: &mut Vec<(usize, Hit)>) -> bool {
+    pub fn mass(&self, row: usize, before: (Row, Row), x: &mut Row, v: &mut Row, found: &mut Found) -> bool {
         if x[3] <= 0.0 {
             return false;
         }
-        let step = Step { observed: self.observed.iter().any(|rows| rows.contains(&row)), ..self.step };
-        let hits = |hit| hits.push((row, hit));
-        if self.penalty { bounce(self.colliders, &step, before, x, v, hits) } else { resolve(self.colliders, &step, before, x, v, hits) }
+        let among = |ranges: &[Range<usize>]| ranges.iter().any(|rows| rows.contains(&row));
+        let step = Step { observed: among(self.observed), ..self.step };
+        let mass = if among(self.counted) { 1.0 / f64::from(x[3]) } else { 0.0 };
+        if mass > 0.0 {
+            found.pushes.resize(self.colliders.len(), Vector::default());
+        }
+        let teller = &mut Teller { row, mass, found };
+        let resolve = if self.penalty { bounce } else { resolve };
+        let touched = resolve(self.colliders, &step, before, x, v, teller);
+        found.touched |= touched;
+        touched
     }
 
     /// The same of the rows from `start` on.
-    pub fn rows(&self, start: usize, before: [&[Row]; 2], x: &mut [Row], v: &mut [Row], hits: &mut Vec<(usize, Hit)>) -> bool {
-        let mut touched = false;
+    pub fn rows(&self, start: usize, before: [&[Row]; 2], x: &mut [Row], v: &mut [Row], found: &mut Found) {
         for (k, (x, v)) in x.iter_mut().zip(v).enumerate() {
-            touched |= self.mass(start + k, (before[0][k], before[1][k]), x, v, hits);
+            self.mass(start + k, (before[0][k], before[1][k]), x, v, found);
         }
-        touched
     }
 }
 
@@ -88,13 +129,13 @@ impl Pass<'_> {
 ///
 /// First the solids on its way, impact by impact; then, where it ended too deep, position: out along the normal; of the
 /// way made along the surface as much is taken back as friction allows, mu times the depth. Velocity: v_n -> -e v_n, and
-/// v_t loses at most mu times the change of v_n, all relative to the surface. `hits` is told of impacts faster than
+/// v_t loses at most mu times the change of v_n, all relative to the surface. `teller` hears of impacts faster than
 /// `resting`.                                                                        (contact.2, contact.3)
-fn resolve(colliders: &[Collider], step: &Step, before: (Row, Row), x: &mut Row, v: &mut Row, mut hits: impl FnMut(Hit)) -> bool {
+fn resolve(colliders: &[Collider], step: &Step, before: (Row, Row), x: &mut Row, v: &mut Row, teller: &mut Teller<'_>) -> bool {
     let pull = (xyz64(*v) - xyz64(before.1)) * (1.0 / step.h);
     let ahead = pull * (step.lead * step.h);
-    let mut touched = meet(colliders, step, before, (pull, ahead), x, v, &mut hits);
-    for collider in colliders {
+    let mut touched = meet(colliders, step, before, (pull, ahead), x, v, teller);
+    for (solid, collider) in colliders.iter().enumerate() {
         // A container bends towards masses that go along its wall, and has corners where three walls meet.
         for _ in 0..if collider.inside { 3 } else { 1 } {
             let (position, velocity) = (xyz64(*x), xyz64(*v));
@@ -106,9 +147,11 @@ fn resolve(colliders: &[Collider], step: &Step, before: (Row, Row), x: &mut Row,
             let back = friction.takes(along.norm(), depth);
             let position = position + normal * depth - along.normalized() * back;
             let approach = (velocity - surface).dot(normal);
+            let arriving = velocity;
             let velocity = rebound((collider, friction), velocity - surface, ahead, normal, step.resting) + surface;
+            teller.push(solid, velocity - arriving);
             if step.observed && approach < -step.resting {
-                hits(Hit { time: step.end(), x: position, v: velocity, normal });
+                teller.hit(Hit { time: step.end(), x: position, v: velocity, normal });
             }
             *x = row(real(position), x[3]);
             *v = row(real(velocity), 0.0);
@@ -141,7 +184,7 @@ fn meet(
     (pull, ahead): (Vector, Vector),
     x: &mut Row,
     v: &mut Row,
-    hits: &mut impl FnMut(Hit),
+    teller: &mut Teller<'_>,
 ) -> bool {
     let (mut from, mut to) = (xyz64(before.0), xyz64(*x));
     let (mut start, mut end) = (xyz64(before.1), xyz64(*v));
@@ -149,18 +192,19 @@ fn meet(
     let mut touched = false;
     for bounce in 0..BOUNCES {
         let left = step.h - gone;
-        let mut first: Option<(Impact, &Collider)> = None;
-        for collider in colliders {
+        let mut first: Option<(Impact, usize)> = None;
+        for (solid, collider) in colliders.iter().enumerate() {
             let Some(hit) = collider.sweep(from, to, step.t + gone, step.end()) else { continue };
             let speeds = [start + (end - start) * hit.part, (to - from) * (1.0 / left), end];
             let approach = speeds.map(|v| (v - hit.velocity).dot(hit.normal)).into_iter().fold(f64::INFINITY, f64::min);
             let stays = || collider.touch(to, step.end()).is_some_and(|t| t.normal.dot(hit.normal) > 0.0);
             if first.as_ref().is_none_or(|(f, _)| hit.part < f.part) && (approach < -step.resting || !stays()) {
-                first = Some((hit, collider));
+                first = Some((hit, solid));
             }
         }
-        let Some((hit, collider)) = first else { break };
+        let Some((hit, solid)) = first else { break };
         touched = true;
+        let (collider, unhindered) = (&colliders[solid], end);
         let (n, surface) = (hit.normal, hit.velocity);
         let bend = pull * (0.5 * left * left);
         let s = on_parabola(hit.part, ((to - from) - surface * left).dot(n), bend.dot(n));
@@ -170,7 +214,7 @@ fn meet(
         let friction = collider.friction_at(step.t + gone);
         start = rebound((collider, friction), arriving, ahead, n, step.resting);
         if step.observed && arriving.dot(n) < -step.resting {
-            hits(Hit { time: step.t + gone, x: from, v: start + surface, normal: n });
+            teller.hit(Hit { time: step.t + gone, x: from, v: start + surface, normal: n });
         }
         let rest = step.h - gone;
         let (press, lift) = (pull.dot(n), start.dot(n) + ahead.dot(n).min(0.0));
@@ -188,8 +232,10 @@ fn meet(
         }
         if bounce + 1 == BOUNCES || rest <= 0.0 {
             (to, end) = (from, start);
+            teller.push(solid, end - unhindered);
             break;
         }
+        teller.push(solid, end - unhindered);
     }
     if touched {
         *x = row(real(to), x[3]);
@@ -217,7 +263,7 @@ pub fn on_parabola(part: f64, fall: f64, bend: f64) -> f64 {
 
 /// After an implicit step: a mass that came in faster than `resting` leaves with e times its speed. One that the penalty
 /// could not hold, deeper than gravity takes it in two steps or beyond the solid, is caught on its way.
-fn bounce(colliders: &[Collider], step: &Step, before: (Row, Row), x: &mut Row, v: &mut Row, mut hits: impl FnMut(Hit)) -> bool {
+fn bounce(colliders: &[Collider], step: &Step, before: (Row, Row), x: &mut Row, v: &mut Row, teller: &mut Teller<'_>) -> bool {
     let (from, to) = (xyz64(before.0), xyz64(*x));
     // An impact that the penalty slows down over some steps is one.
     let fresh = |collider: &Collider| step.observed && collider.touch(from, step.t).is_none();
@@ -227,12 +273,12 @@ fn bounce(colliders: &[Collider], step: &Step, before: (Row, Row), x: &mut Row, 
             // As if nothing had held it.
             *v = before.1;
             *x = row(real(from + xyz64(*v) * step.h), x[3]);
-            return resolve(colliders, &Step { observed: fresh(collider), ..*step }, before, x, v, hits);
+            return resolve(colliders, &Step { observed: fresh(collider), ..*step }, before, x, v, teller);
         }
         if let Some(hit) = collider.sweep(from, to, step.t, step.end())
             && !deep.is_some_and(|t| t.normal.dot(hit.normal) > 0.0)
         {
-            return resolve(colliders, &Step { observed: fresh(collider), ..*step }, before, x, v, hits);
+            return resolve(colliders, &Step { observed: fresh(collider), ..*step }, before, x, v, teller);
         }
     }
     let mut touched = false;
@@ -246,7 +292,7 @@ fn bounce(colliders: &[Collider], step: &Step, before: (Row, Row), x: &mut Row, 
             touched = true;
         }
         if approach < -step.resting && fresh(collider) {
-            hits(Hit { time: step.end(), x: to, v: xyz64(*v), normal });
+            teller.hit(Hit { time: step.end(), x: to, v: xyz64(*v), normal });
         }
     }
     touched

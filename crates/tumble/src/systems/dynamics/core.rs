@@ -1,16 +1,16 @@
 //! State and laws of a system of masses, on which schemes and features act.
 
 use super::body_contact::{self, Body};
-use super::contact::{Pass, Response, Step};
+use super::contact::{Found, Pass, Response, Step};
 use super::feature::Span;
 use super::laws::Laws;
 use super::scale::Scale;
-use crate::elements::{Constraints, Limit, Linear, Projected};
+use crate::elements::{Constraints, Density, Limit, Linear, Projected};
 use crate::geometry::{Collider, Vector};
 use crate::integrators::Memory;
 use crate::math::parallel::{CHUNK, Tasks, chunks2};
 use crate::math::{Real, Row, Vec3, ZERO, axpy, row};
-use crate::pool::{Hit, Pool};
+use crate::pool::Pool;
 use crate::state::{Object, State};
 use std::ops::Range;
 use tumble_interface::scene::Integrator;
@@ -56,6 +56,8 @@ pub struct Core {
     /// Positions and velocities at the start of a sub-step, for contact.
     pub before: Vec<Row>,
     pub before_v: Vec<Row>,
+    /// Impulses of liquids on every solid in the last contact pass [N s].
+    pub pushes: Vec<Vector>,
     /// Scale of the energy.
     pub scale: Scale,
     /// Links and vertices broken so far.
@@ -73,6 +75,11 @@ impl Core {
     /// The energies up to which elements and forces that drive may bring the masses [J].
     pub fn drives(&self) -> impl Iterator<Item = f64> {
         self.laws.batches.iter().filter_map(|b| b.drives()).chain(self.constraints.iter().filter_map(|c| c.drives()))
+    }
+
+    /// Its liquids.
+    pub fn liquids(&self) -> impl Iterator<Item = &Density> {
+        self.constraints.iter().filter_map(|c| c.liquid())
     }
 
     /// Whether no mass feels another.
@@ -138,18 +145,23 @@ impl Core {
         let observed = self.pool.heeded();
         let step = Step { t, h, resting: self.resting_speed(h), lead, observed: false };
         let bodies = self.resolve_body_contact(&step, plain);
-        let pass = Pass { colliders: &self.laws.colliders, step, penalty, observed: &observed };
+        let liquids: Vec<Range<usize>> = self.liquids().map(Density::rows).collect();
+        let pass = Pass { colliders: &self.laws.colliders, step, penalty, observed: &observed, counted: &liquids };
+        self.pushes.clear();
+        self.pushes.resize(self.laws.colliders.len(), Vector::default());
         for points in self.laws.masses.points().flat_map(|points| without(points, &bodies)) {
             let (before, before_v) = (&self.before[points.clone()], &self.before_v[points.clone()]);
             let chunks = self.state.x[points.clone()].chunks_mut(CHUNK).zip(self.state.v[points.clone()].chunks_mut(CHUNK));
             let chunks = chunks.zip(before.chunks(CHUNK).zip(before_v.chunks(CHUNK))).enumerate();
-            let touched: Vec<(bool, Vec<(usize, Hit)>)> = chunks.map_in_parallel(|(c, ((x, v), (before, before_v)))| {
-                let mut hits = Vec::new();
-                (pass.rows(points.start + c * CHUNK, [before, before_v], x, v, &mut hits), hits)
+            let all: Vec<Found> = chunks.map_in_parallel(|(c, ((x, v), (before, before_v)))| {
+                let mut found = Found::default();
+                pass.rows(points.start + c * CHUNK, [before, before_v], x, v, &mut found);
+                found
             });
-            for (any, hits) in touched {
-                self.memory.ready &= !any;
+            for Found { touched, hits, pushes } in all {
+                self.memory.ready &= !touched;
                 hits.into_iter().for_each(|(row, hit)| self.pool.note_row(row, hit));
+                self.pushes.iter_mut().zip(pushes).for_each(|(sum, push)| *sum = *sum + push);
             }
         }
     }

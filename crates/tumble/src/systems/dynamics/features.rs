@@ -6,6 +6,7 @@ use super::followers::Followers;
 use super::fracture::Fracture;
 use super::hair_continuum::HairContinuum;
 use super::holds::Holds;
+use super::liquid_loads::LiquidLoads;
 use super::self_contact::SelfContact;
 use crate::system::Archive;
 use tumble_interface::engine::StepReport;
@@ -22,16 +23,18 @@ pub struct Features {
     pub self_contact: Option<SelfContact>,
     /// Links that break and surfaces that tear.
     pub fracture: Fracture,
+    /// Pressures in liquids, and their forces on solids; never acts.
+    pub liquid_loads: LiquidLoads,
     /// Counts intersections where no contact prevents them, if a scene asks for the number; never acts.
     pub intersection_counter: Option<SelfContact>,
 }
 
 impl Features {
     fn each(&mut self) -> impl Iterator<Item = &mut dyn Feature> {
-        let Self { hair, holds, followers, self_contact, fracture, .. } = self;
+        let Self { hair, holds, followers, self_contact, fracture, liquid_loads, .. } = self;
         let hair = hair.iter_mut().map(|f| f as &mut dyn Feature);
         let contact = self_contact.iter_mut().map(|f| f as &mut dyn Feature);
-        hair.chain([holds as &mut dyn Feature, followers as &mut dyn Feature]).chain(contact).chain([fracture as &mut dyn Feature])
+        hair.chain([holds as &mut dyn Feature, followers as &mut dyn Feature]).chain(contact).chain([fracture as &mut dyn Feature, liquid_loads])
     }
 
     /// Whether none acts on masses without elements.
@@ -80,13 +83,14 @@ impl Features {
         self.fracture.save(core, archive);
         self.holds.save(core, archive);
         self.followers.save(core, archive);
+        self.liquid_loads.save(core, archive);
     }
 
     /// Reads it back.
     pub fn restore(&mut self, core: &mut Core, archive: &mut Archive) -> Option<()> {
         // What is held acts on links as they are then.
-        let Self { fracture, holds, followers, .. } = self;
-        [fracture as &mut dyn Feature, holds, followers].into_iter().try_for_each(|f| f.restore(core, archive))?;
+        let Self { fracture, holds, followers, liquid_loads, .. } = self;
+        [fracture as &mut dyn Feature, holds, followers, liquid_loads].into_iter().try_for_each(|f| f.restore(core, archive))?;
         self.renew_surfaces(core);
         Some(())
     }

@@ -4,7 +4,7 @@
 //! the midpoint rule (more where that is too long a step for the forces), under the forces on single masses; from there on it goes with all others. The dead leave when the
 //! exchange interval ends, and their children are born where and when they died.              (particles.11)
 
-use super::contact::{Pass, Step as Contact};
+use super::contact::{Found, Pass, Step as Contact};
 use super::core::{BLOCK, Between, Core};
 use super::laws::Local;
 use crate::forces::One;
@@ -90,14 +90,15 @@ impl Core {
         let every = 0..usize::MAX;
         let observed: &[Range<usize>] = if self.pool.heeds_hits(s) { std::slice::from_ref(&every) } else { &[] };
         let touch =
-            |i: usize, (t, h, lead): (f64, f64, f64), before: (Row, Row), x: &mut Row, v: &mut Row, hits: &mut Vec<(usize, Hit)>| {
-                let pass = Pass { colliders, step: Contact { t, h, resting, lead, observed: false }, penalty: false, observed };
-                !colliders.is_empty() && h > 0.0 && pass.mass(i, before, x, v, hits)
+            |i: usize, (t, h, lead): (f64, f64, f64), before: (Row, Row), x: &mut Row, v: &mut Row, found: &mut Found| {
+                let step = Contact { t, h, resting, lead, observed: false };
+                let pass = Pass { colliders, step, penalty: false, observed, counted: &[] };
+                !colliders.is_empty() && h > 0.0 && pass.mass(i, before, x, v, found)
             };
         let rate = self.stiffness_of(object, births, &masses);
         let scheme = if self.integrator.is_implicit() || self.integrator.is_adaptive() { Integrator::Midpoint } else { self.integrator };
         let one = |start: usize, births: &[Birth], x: &mut [Row], v: &mut [Row]| -> Result<Vec<(usize, Hit)>, StepError> {
-            let mut hits = Vec::new();
+            let mut found = Found::default();
             let mut motion = Local { laws, masses: &masses, start, newborn: object };
             let n = x.len();
             let (mut a, mut xm, mut vm) = (vec![ZERO; n], x.to_vec(), v.to_vec());
@@ -119,7 +120,7 @@ impl Core {
                     x[i] = axpy(x[i], tau(i), vm[i]);
                     v[i] = axpy(v[i], tau(i), a[i]);
                     let begun = until - span(i) * (1.0 - k as f64 / pieces);
-                    touch(start + i, (begun, f64::from(tau(i)), 0.0), before, &mut x[i], &mut v[i], &mut hits);
+                    touch(start + i, (begun, f64::from(tau(i)), 0.0), before, &mut x[i], &mut v[i], &mut found);
                 }
             }
             let mut memory = Memory::new(scheme, n);
@@ -131,10 +132,10 @@ impl Core {
                 integrators::step(scheme, Step { equation, t, h, x, v, memory, ready, scratch, report })?;
                 ready = true;
                 for i in 0..n {
-                    ready &= !touch(start + i, (t, h, integrators::lead(scheme)), before[i], &mut x[i], &mut v[i], &mut hits);
+                    ready &= !touch(start + i, (t, h, integrators::lead(scheme)), before[i], &mut x[i], &mut v[i], &mut found);
                 }
             }
-            Ok(hits)
+            Ok(found.hits)
         };
         let blocks = x.chunks_mut(BLOCK).zip(v.chunks_mut(BLOCK)).zip(births.chunks(BLOCK)).enumerate();
         let done: Vec<Result<Vec<_>, StepError>> = blocks.map_in_parallel(|(c, ((x, v), births))| one(c * BLOCK, births, x, v));

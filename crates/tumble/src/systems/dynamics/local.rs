@@ -1,6 +1,6 @@
 //! Masses that feel no other, stepped block by block.
 
-use super::contact::{Pass, Response, Step as Contact};
+use super::contact::{Found, Pass, Response, Step as Contact};
 use super::core::{BLOCK, Core};
 use super::feature::Span;
 use super::laws::Local;
@@ -38,10 +38,10 @@ impl Core {
                 let start = *c * BLOCK;
                 let mut motion = Local { laws, masses: &laws.masses, start, newborn: None };
                 let [first, _, last] = motion.kinematics().frames.cut(0, x.len());
-                let (mut ready, mut before, mut before_v, mut hits) = (was_ready, Vec::new(), Vec::new(), Vec::new());
+                let (mut ready, mut before, mut before_v, mut found) = (was_ready, Vec::new(), Vec::new(), Found::default());
                 for k in 0..substeps {
                     if k % 64 == 63 && !go_on() {
-                        return Ok((false, hits));
+                        return Ok((false, found.hits));
                     }
                     if !colliders.is_empty() {
                         before.clear();
@@ -54,15 +54,16 @@ impl Core {
                     ready = true;
                     if !colliders.is_empty() {
                         let step = Contact { t, h, resting, lead: response.lead, observed: false };
-                        let pass = Pass { colliders, step, penalty: response.penalty, observed: &observed };
+                        let pass = Pass { colliders, step, penalty: response.penalty, observed: &observed, counted: &[] };
                         for points in [&first, &last] {
                             let starts = [&before[points.clone()], &before_v[points.clone()]];
                             let (x, v) = (&mut x[points.clone()], &mut v[points.clone()]);
-                            ready &= !pass.rows(start + points.start, starts, x, v, &mut hits);
+                            pass.rows(start + points.start, starts, x, v, &mut found);
                         }
+                        ready &= !std::mem::take(&mut found.touched);
                     }
                 }
-                Ok((ready, hits))
+                Ok((ready, found.hits))
             });
             moved.collect::<Result<Vec<_>, StepError>>()
         });

@@ -19,6 +19,7 @@ mod inertia;
 mod laws;
 mod ledger;
 mod life;
+mod liquid_loads;
 mod local;
 mod modes;
 mod parts;

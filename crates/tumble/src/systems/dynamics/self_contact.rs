@@ -128,7 +128,8 @@ impl SelfContact {
             let strand = if object.curve_points > 0 { object.curve_points as usize } else { object.curve.len().max(1) };
             let strands = object.curve.chunks(strand);
             let segments: Vec<[u32; 2]> = strands.flat_map(|s| s.windows(2)).map(|c| [c[0] + first, c[1] + first]).collect();
-            topology.add(Owner { radius: 0.5 * self.thickness, itself: true }, &triangles, &segments, &[]);
+            let owner = Owner { radius: 0.5 * self.thickness, itself: true, hair: object.curve_points > 0 };
+            topology.add(owner, &triangles, &segments, &[]);
         }
         self.sewn.iter().for_each(|[a, b]| topology.weld(*a, *b));
         let mut rest = self.rest.clone();

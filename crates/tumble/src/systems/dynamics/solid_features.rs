@@ -87,7 +87,7 @@ impl SolidFeatures {
             let first = (self.points + solid.corners.start) as u32;
             let triangles: Vec<[u32; 3]> = mesh.triangles.iter().map(|t| t.map(|i| i + first)).collect();
             let radius = (NEARER * collider.thickness - 0.5 * thickness).max(0.0);
-            topology.add(Owner { radius, itself: false }, &triangles, &[], &[]);
+            topology.add(Owner { radius, itself: false, hair: false }, &triangles, &[], &[]);
         }
         if !self.list.is_empty() {
             topology.end_soft(self.points as u32);

@@ -40,6 +40,10 @@ pub enum ElementList {
 }
 
 const NONE: u32 = u32::MAX;
+/// Triangles of the smallest piece that comes off ...
+const PIECE: usize = 6;
+/// ... unless an edge is stretched to this many times the length at which it gives way.
+const TORN_OFF: f64 = 1.5;
 
 /// Which corners of triangles (triangle times 3 plus corner) the nodes of an element are, and which pairs of corners must be one vertex
 /// for it to hold.
@@ -215,6 +219,8 @@ pub struct Tear {
     used: usize,
     /// Triangles over rows, now and as elements know them.
     triangles: Vec<[u32; 3]>,
+    /// Corners at every vertex, in order.
+    fans: Vec<Vec<u32>>,
     known: Vec<[u32; 3]>,
     original: Vec<[u32; 3]>,
     rest: Vec<[Real; 3]>,
@@ -246,7 +252,7 @@ impl Tear {
         let own = |i: u32| (i - first) as usize;
         let share = |(t, rest): (&[u32; 3], &[f64; 3])| t.map(|i| f64::from(mass[i as usize]) * area(rest) / sums[own(i)]);
         let narrow = |all: &[[f64; 3]]| all.iter().map(|of| of.map(|x| x as Real)).collect();
-        Self {
+        let mut tear = Self {
             object,
             first,
             vertices,
@@ -256,11 +262,21 @@ impl Tear {
             known: triangles.clone(),
             original: triangles.clone(),
             triangles,
+            fans: Vec::new(),
             rest: narrow(&part.rest),
             limit: narrow(&part.limit),
             mass: mass[of.points.start..of.points.start + vertices].to_vec(),
             inverse: x[of.points.start..of.points.start + vertices].iter().map(|x| x[3]).collect(),
             ties,
+        };
+        tear.find_fans();
+        tear
+    }
+
+    fn find_fans(&mut self) {
+        self.fans = vec![Vec::new(); self.vertices + self.spare];
+        for (c, row) in self.triangles.as_flattened().iter().enumerate() {
+            self.fans[(row - self.first) as usize].push(c as u32);
         }
     }
 
@@ -305,11 +321,12 @@ impl Tear {
         }
         let last = flat.iter().copied().max().unwrap_or(0);
         self.used = (last + 1).saturating_sub(self.first + self.vertices as u32) as usize;
+        self.find_fans();
         Some(())
     }
 
-    /// Edges beyond their strength, as corners, the worst first.
-    fn strained(&self, x: &[Row]) -> Vec<u32> {
+    /// Edges beyond their strength: their lengths over that at which they give way, and corners, the worst first.
+    fn strained(&self, x: &[Row]) -> Vec<(f64, u32)> {
         let beyond = |t: usize| {
             let corners = self.triangles[t].map(|i| xyz64(x[i as usize]));
             (0..3).filter_map(move |k| {
@@ -320,13 +337,30 @@ impl Tear {
         };
         let mut found = fold(self.triangles.len(), |range| range.flat_map(beyond).collect::<Vec<_>>()).concat();
         found.sort_by(|a, b| b.0.total_cmp(&a.0).then(a.1.cmp(&b.1)));
-        found.into_iter().map(|(_, corner)| corner).collect()
+        found
     }
 
-    /// Corners that are that vertex.
-    fn fan(&self, row: u32) -> Vec<u32> {
-        let corners = |(t, triangle): (usize, &[u32; 3])| (0..3).find(|k| triangle[*k] == row).map(|k| (3 * t + k) as u32);
-        self.triangles.iter().enumerate().filter_map(corners).collect()
+    /// Corners that are that vertex, in order.
+    fn fan(&self, row: u32) -> &[u32] {
+        &self.fans[(row - self.first) as usize]
+    }
+
+    /// Whether fewer triangles than a piece has hang together by edges with that of a corner.
+    fn is_scrap(&self, corner: u32) -> bool {
+        let (mut found, mut k) = (vec![corner / 3], 0);
+        while k < found.len() && found.len() < PIECE {
+            let t = self.triangles[found[k] as usize];
+            for (a, b) in [(t[0], t[1]), (t[1], t[2]), (t[2], t[0])] {
+                let beyond = self.fan(a).iter().map(|c| c / 3).filter(|u| self.triangles[*u as usize].contains(&b));
+                for u in beyond {
+                    if !found.contains(&u) {
+                        found.push(u);
+                    }
+                }
+            }
+            k += 1;
+        }
+        found.len() < PIECE
     }
 
     fn others(&self, corner: u32) -> [u32; 2] {
@@ -340,6 +374,17 @@ impl Tear {
         ends.iter().any(|a| ends.iter().filter(|b| *b == a).count() == 1)
     }
 
+    /// Makes some corners of a vertex another vertex.
+    fn put(&mut self, corners: &[u32], row: u32) {
+        for corner in corners {
+            let old = std::mem::replace(&mut self.triangles[*corner as usize / 3][*corner as usize % 3], row);
+            self.fans[(old - self.first) as usize].retain(|c| c != corner);
+        }
+        let fan = &mut self.fans[(row - self.first) as usize];
+        fan.extend(corners);
+        fan.sort_unstable();
+    }
+
     /// Gives some corners of a vertex to a copy of it.
     fn move_to_copy(&mut self, corners: &[u32], x: &mut [Row], v: &mut [Row]) -> bool {
         if self.used == self.spare || corners.is_empty() {
@@ -348,9 +393,7 @@ impl Tear {
         let copy = self.first + (self.vertices + self.used) as u32;
         let of = self.triangles[corners[0] as usize / 3][corners[0] as usize % 3] as usize;
         self.used += 1;
-        for corner in corners {
-            self.triangles[*corner as usize / 3][*corner as usize % 3] = copy;
-        }
+        self.put(corners, copy);
         (x[copy as usize], v[copy as usize]) = (x[of], v[of]);
         true
     }
@@ -372,17 +415,18 @@ impl Tear {
         parts
     }
 
-    /// Takes a vertex apart across a direction; `None` if all of its triangles lie on one side or no copy is left. Returns the number of
-    /// splits and the vertices touched.
-    fn split(&mut self, row: u32, across: Vec3<f64>, x: &mut [Row], v: &mut [Row]) -> Option<(u64, Vec<u32>)> {
-        let fan = self.fan(row);
+    /// Takes a vertex apart across a direction; `None` if all of its triangles lie on one side, no copy is left, or, unless `torn_off`, a scrap would
+    /// come off. Returns the number of splits and the vertices touched.
+    fn split(&mut self, row: u32, across: Vec3<f64>, torn_off: bool, x: &mut [Row], v: &mut [Row]) -> Option<(u64, Vec<u32>)> {
+        let fan = self.fan(row).to_vec();
         let here = xyz64(x[row as usize]);
         let ahead = |c: &u32| self.others(*c).iter().map(|i| (xyz64(x[*i as usize]) - here).dot(across)).sum::<f64>() > 0.0;
         let (go, stay): (Vec<u32>, Vec<u32>) = fan.iter().copied().partition(|c| ahead(c));
+        let (used, small) = (self.used, fan.iter().all(|c| self.is_scrap(*c)));
         if go.is_empty() || stay.is_empty() || !self.move_to_copy(&go, x, v) {
             return None;
         }
-        let mut splits = 1;
+        let mut moved = vec![(go, row)];
         let mut touched: Vec<u32> = fan.iter().flat_map(|c| self.triangles[*c as usize / 3]).collect();
         touched.sort_unstable();
         touched.dedup();
@@ -390,28 +434,36 @@ impl Tear {
             if x[near as usize][3] == 0.0 {
                 continue;
             }
-            for part in self.parts(&self.fan(near)).into_iter().skip(1) {
-                splits += u64::from(self.move_to_copy(&part, x, v));
+            for part in self.parts(self.fan(near)).into_iter().skip(1) {
+                if self.move_to_copy(&part, x, v) {
+                    moved.push((part, near));
+                }
             }
         }
-        Some((splits, touched))
+        let pieces = moved.iter().flat_map(|(corners, _)| corners).chain(&fan);
+        if !torn_off && !small && pieces.into_iter().any(|c| self.is_scrap(*c)) {
+            moved.iter().rev().for_each(|(corners, row)| self.put(corners, *row));
+            self.used = used;
+            return None;
+        }
+        Some((moved.len() as u64, touched))
     }
 
     /// Splits vertices of edges beyond their strength; returns how many came apart.
     pub fn split_strained(&mut self, x: &mut [Row], v: &mut [Row]) -> u64 {
         let (mut done, mut touched): (u64, Vec<u32>) = (0, Vec::new());
-        for corner in self.strained(x) {
+        for (over, corner) in self.strained(x) {
             let [a, b] = [self.triangles[corner as usize / 3][corner as usize % 3], self.others(corner)[0]];
             if touched.contains(&a) || touched.contains(&b) || self.used == self.spare {
                 continue;
             }
             let along = xyz64(x[b as usize]) - xyz64(x[a as usize]);
             let mut ends = [a, b];
-            if !self.is_rim(&self.fan(a)) && self.is_rim(&self.fan(b)) {
+            if !self.is_rim(self.fan(a)) && self.is_rim(self.fan(b)) {
                 ends = [b, a];
             }
             for end in ends.into_iter().filter(|end| x[*end as usize][3] > 0.0).collect::<Vec<_>>() {
-                if let Some((splits, who)) = self.split(end, along, x, v) {
+                if let Some((splits, who)) = self.split(end, along, over > TORN_OFF, x, v) {
                     done += splits;
                     touched.extend(who);
                     touched.push(a);

@@ -105,11 +105,13 @@ impl Parts {
             memory: Memory::new(settings.integrator, rows),
             before: Vec::new(),
             before_v: Vec::new(),
+            pushes: Vec::new(),
             scale: Scale::default(),
             broken: 0,
             regrouped: 0,
         };
         features.holds.tell(&mut core);
+        features.liquid_loads.clear(&core);
         Dynamics::new(core, scheme, features, &settings)
     }
 
