@@ -88,6 +88,52 @@ fn a_wave_between_layers_has_its_period() {
     }
 }
 
+/// Froude number of a front of a lock exchange: the speed along the floor over sqrt(g' H), in a channel 1 m high with free-slip walls.
+fn front(n: usize, words: &str) -> [f64; 2] {
+    let mut sim = simulation(&format!(
+        r#"
+dimension = 2
+time = {{ fps = 20, frames = 100 }}
+[[gas]]
+name = "air"
+box = {{ size = [6, 1, 1], center = [0, 0, 0.5], resolution = {} }}
+fluid_density = 1
+densities = "variable"
+smoke = {{ initial = "0.04*step(x, 0)" }}
+advection = {{ velocity = {{ corrected = true }}, scalars = {{ conservative = true }} }}
+courant = 0.5
+{words}
+"#,
+        6 * n
+    ));
+    // Where the heavy layer at the floor ends, and the light one at the ceiling.
+    let places = |sim: &Simulation| {
+        let (s, points) = grid(sim, "air", "density");
+        let row = |k: usize| &s[points[0] * k..points[0] * (k + 1)];
+        let dx = 1.0 / n as f64;
+        // Between two cells, where the profile passes its middle.
+        let crossing = |row: &[f64]| {
+            let i = (0..row.len() - 1).rev().find(|i| row[*i] > 0.02 && row[i + 1] <= 0.02).unwrap();
+            (i as f64 + 0.5 + (row[i] - 0.02) / (row[i] - row[i + 1])) * dx - 3.0
+        };
+        [crossing(row(0)), crossing(row(points[1] - 1))]
+    };
+    run(&mut sim, 50);
+    let start = places(&sim);
+    run(&mut sim, 50);
+    let end = places(&sim);
+    let unit = (9.8 * 0.04 / 1.02_f64).sqrt() * 2.5;
+    [(end[0] - start[0]) / unit, (start[1] - end[1]) / unit]
+}
+
+#[test]
+fn a_lock_exchange_has_the_fronts_of_benjamin() {
+    // Half of sqrt(g' H) for both, without friction and mixing [benjamin1968].
+    let [heavy, light] = front(32, "");
+    println!("Froude numbers {heavy:.3} along the floor, {light:.3} along the ceiling");
+    assert!((heavy - 0.5).abs() < 0.03 && (light - 0.5).abs() < 0.03, "{heavy} {light}");
+}
+
 #[test]
 fn layers_begin_to_swing_as_their_densities_say() {
     // After a first step h from rest: w = -w² a h cos(k x) sinh(k z)/sinh(k H) in the lower layer. Nothing has been carried yet.

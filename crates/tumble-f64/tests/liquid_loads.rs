@@ -12,13 +12,14 @@ use tumble_interface::Engine;
 fn water(spacing: f64, [a, b, c]: [f64; 3], more: &str) -> String {
     let planes = [
         ("floor", [0.0, 0.0, 1.0], 0.0),
-        ("west", [1.0, 0.0, 0.0], -0.5 * a),
-        ("east", [-1.0, 0.0, 0.0], -0.5 * a),
-        ("south", [0.0, 1.0, 0.0], -0.5 * b),
-        ("north", [0.0, -1.0, 0.0], -0.5 * b),
+        ("west", [1.0, 0.0, 0.0], 0.5 * a),
+        ("east", [-1.0, 0.0, 0.0], 0.5 * a),
+        ("south", [0.0, 1.0, 0.0], 0.5 * b),
+        ("north", [0.0, -1.0, 0.0], 0.5 * b),
     ];
-    let plane = |(name, normal, offset): (&str, [f64; 3], f64)| {
-        format!("[[collider]]\nname = \"{name}\"\nfriction = 0.3\nshape.plane = {{ normal = {normal:?}, offset = {offset} }}\n")
+    let plane = |(name, normal, away): (&str, [f64; 3], f64)| {
+        let point = normal.map(|n| -n * away);
+        format!("[[collider]]\nname = \"{name}\"\nfriction = 0.3\nshape.plane = {{ normal = {normal:?}, point = {point:?} }}\n")
     };
     format!(
         "precision = \"double\"\ntime.fps = 50\noutput.columns = [\"position\", \"pressure\", \"force\"]\n\
@@ -38,7 +39,7 @@ fn force(sim: &tumble_f64::scene::Simulation, solid: &str) -> Vector {
 fn what_solids_feel_is_what_the_liquid_loses() {
     // Half of the tank, so that it sloshes, onto a ball that moves.
     let more = "[[collider]]\nname = \"ball\"\nrestitution = 0.4\nfriction = 0.5\nshape.sphere = { center = [0.3, 0, 0.2], radius = 0.1 }\n\
-                motion = { translate = [\"0.1*sin(8*t)\", 0, 0] }\n";
+                motion.velocity = [-0.2, 0, 0.05]\n";
     let mut sim = simulation(&water(0.05, [1.2, 0.4, 0.4], more).replace("center = [0, 0, 0.2], size = [1.2", "center = [-0.3, 0, 0.2], size = [0.6"));
     let solids = ["floor", "west", "east", "south", "north", "ball"];
     let weight = sim.ledger().mass * 9.81;

@@ -306,7 +306,8 @@ impl Default for PositionBased {
     }
 }
 
-/// Contact of soft surfaces with themselves and each other.
+/// Contact of soft surfaces and curves with themselves and each other. Hair meets surfaces and ropes, but no hair: strands act on each other by
+/// `collisions` of the hair.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct SelfContact {

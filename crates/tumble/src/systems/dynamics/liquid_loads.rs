@@ -66,8 +66,8 @@ impl Feature for LiquidLoads {
         }
         self.time += h;
         let pushes = core.liquids().map(Density::pushes).chain([&core.pushes[..]]);
-        for push in pushes.flat_map(|pushes| self.impulses.iter_mut().zip(pushes)) {
-            *push.0 = *push.0 + *push.1;
+        for pushes in pushes {
+            self.impulses.iter_mut().zip(pushes).for_each(|(sum, push)| *sum = *sum + *push);
         }
         for (liquid, sums) in core.liquids().zip(&mut self.pressures) {
             chunks(sums, |start, sums| {

@@ -14,6 +14,7 @@ use super::fracture::Fracture;
 use super::hair_continuum::HairContinuum;
 use super::holds::{Hold, Holds};
 use super::laws::{Acting, Laws};
+use super::liquid_loads::LiquidLoads;
 use super::parts::{On, Parts};
 use super::scale::Scale;
 use super::scheme::{self, Forces, Projected, Scheme};
@@ -65,12 +66,13 @@ impl Parts {
         // From here on: contact and tears know what is held for ever.
         holds.apply(&mut state, &mut masses);
         let hair = |(draft, words)| HairContinuum::new(objects.points_of(draft), words, &state.x);
-        let features = Features {
+        let mut features = Features {
             hair: self.hair.drain(..).map(hair).collect(),
             followers: Followers::new(self.followers, self.carried, &settings.colliders),
             holds,
             self_contact,
             fracture: Fracture::new(tears),
+            liquid_loads: LiquidLoads::default(),
             intersection_counter,
         };
         let forces = self.forces.into_iter().map(|(name, law, on)| match on {
