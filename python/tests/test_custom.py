@@ -309,3 +309,57 @@ def test_what_holds_a_clamp_is_no_mass_of_a_user() -> None:
     world.step(3)
     assert set(seen) == {((20, 3), min(m for _, m in seen))} and seen[0][1] > 0
     assert world.columns("position")["s"]["position"][:, 2].max() > 0
+
+
+STIFF: Tree = {
+    "version": 1,
+    "precision": "double",
+    "time": {"fps": 50, "frames": 10},
+    "world": {"gravity": [0, 0, 0]},
+    "system": [{"integrator": "implicit_euler", "substeps": 1, "solver": {"newton_iterations": 4}}],
+    "particles": [{"name": "p", "position": [[1, 0, 0], [0, 2, 0]]}],
+}
+
+
+def stiff(t: float, x: Any, v: Any, mass: Any) -> Any:
+    return -1e6 * x - 1e3 * v
+
+
+def derivatives(t: float, x: Any, v: Any, mass: Any) -> Any:
+    unit = np.tile(np.eye(3), (len(x), 1, 1))
+    return -1e6 * unit, -1e3 * unit
+
+
+def test_a_force_with_its_derivatives_is_solved_at_once() -> None:
+    # x_1 = x_0/(1 + h² k + h d): one step of implicit Euler.
+    h = 1 / 50
+    world, blind = World(STIFF), World(STIFF)
+    world.add_force(stiff, jacobian=derivatives)
+    blind.add_force(stiff)
+    told = world.step()
+    exact = (1 + h * 1e3) / (1 + h * h * 1e6 + h * 1e3)
+    np.testing.assert_allclose(world.frame["p"]["position"][0, 0], exact, rtol=1e-9)
+    assert told["newton"] <= 2 and told["unconverged"] == 0
+    assert blind.step()["unconverged"] == 1
+    other = copy.copy(world)
+    assert other == world
+    world.step(3)
+    other.step(3)
+    assert other.hash == world.hash
+
+
+@pytest.mark.parametrize(
+    ("wrong", "message"),
+    [
+        (lambda t, x, v, mass: np.zeros((2, 3)), r"shape \[2, 3\], expected \(2, 3, 3\)"),
+        (lambda t, x, v, mass: np.full((2, 3, 3), np.nan), "is NaN for particle 0, expected finite numbers"),
+        (lambda t, x, v, mass: 1 / 0, "the user's jacobian .* failed: ZeroDivisionError"),
+    ],
+)
+def test_a_wrong_jacobian_is_told(wrong: Any, message: str) -> None:
+    world = World(STIFF)
+    world.add_force(stiff, jacobian=wrong)
+    with pytest.raises(tumble.StepError, match=message):
+        world.step()
+    with pytest.raises(TypeError, match="jacobian must be callable"):
+        World(STIFF).add_force(stiff, jacobian=3)  # type: ignore[arg-type]

@@ -77,6 +77,9 @@ POINT = {"name": "p", "from": {"point": {"at": [0, 0, 1]}}}
         ({"rate": 100, "start": 0.5, "end": 1.25}, 75, 75),
         ({"rate": 100, "lifetime": 0.5}, 200, 50),
         ({"rate": 100, "lifetime": 0.5, "lifetime_spread": 0.9}, 200, 50),
+        # Of those born before t = 1 none is left at the end.
+        ({"rate": 100, "lifetime": {"keys": [[0, 0.5], [2, 1.5]]}}, 200, 100),
+        ({"rate": 100, "lifetime": "0.5 + 0.5*t"}, 200, 100),
         ({"rate": 100, "most": 30}, 200, 30),
         ({"rate": "100*t"}, 200, 200),
         ({"rate": {"keys": [[0, 0], [1, 100]]}}, 150, 150),

@@ -82,7 +82,11 @@ def forecast(tree: Tree) -> list[Forecast]:
 
 def rate(words: Tree, t: Floats) -> Floats:
     """Its rate at some times [1/s]; nan where that cannot be told."""
-    value = words["rate"]
+    return _course(words["rate"], t)
+
+
+def _course(value: Any, t: Floats) -> Floats:
+    """A number that may change, at some times; nan where that cannot be told."""
     if isinstance(value, int | float):
         return np.full_like(t, value)
     if isinstance(value, Mapping):
@@ -137,9 +141,14 @@ def _sums(words: Tree, t: Floats) -> tuple[Floats, Floats]:
 def _survived(words: Tree, t: Floats, born: Floats) -> Floats:
     """Dead of their age until each time: lifetimes lie evenly between lifetime (1 - spread) and lifetime (1 + spread)."""
     spread = words["lifetime_spread"]
-    ages = words["lifetime"] * np.linspace(1.0 - spread, 1.0 + spread, 9 if spread else 1)
+    parts = np.linspace(1.0 - spread, 1.0 + spread, 9 if spread else 1)
     # A burst is gone in an instant: what was born before t - age, not at it.
-    dead = [np.interp(t - age - 1e-9, t, born, left=0.0) for age in ages]
+    if isinstance(words["lifetime"], int | float):
+        dead = [np.interp(t - words["lifetime"] * part - 1e-9, t, born, left=0.0) for part in parts]
+    else:
+        # Those born in each part of the time have the lifetime of its end.
+        counts, lifetimes = np.diff(born, prepend=0.0), np.nan_to_num(_course(words["lifetime"], t), nan=np.inf)
+        dead = [counts @ (t + lifetimes * part + 1e-9 < t[:, None]).T for part in parts]
     return np.asarray(np.mean(dead, axis=0))
 
 

@@ -68,6 +68,13 @@ pub struct Inside {
 pub trait UserForce: Send + Sync {
     /// Forces [N] at time t [s] from positions [m], velocities [m/s] and masses [kg]; three numbers per mass, added to `force`.
     fn force(&mut self, t: f64, x: &[f64], v: &[f64], mass: &[f64], force: &mut [f64]) -> Result<(), String>;
+
+    /// Of every mass the derivatives of its force by its own position [N/m] and velocity [N s/m], three rows of three numbers each; `None` if the
+    /// force does not tell them. Implicit schemes converge faster with them; what they converge to is the same.
+    fn jacobian(&mut self, t: f64, x: &[f64], v: &[f64], mass: &[f64]) -> Result<Option<Vec<[[f64; 9]; 2]>>, String> {
+        let _ = (t, x, v, mass);
+        Ok(None)
+    }
 }
 
 /// Accelerations [m/s²] from time [s], positions [m] and velocities [m/s], three numbers per mass.

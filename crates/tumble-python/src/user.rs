@@ -33,8 +33,8 @@ pub fn name_of(function: &Bound<'_, PyAny>) -> String {
     own.unwrap_or_else(|_| function.get_type().name().map_or_else(|_| "without a name".into(), |n| n.to_string()))
 }
 
-/// force(t, x, v, mass) -> n x 3.
-pub struct Force(pub Py<PyAny>, pub Raised);
+/// force(t, x, v, mass) -> n x 3, and jacobian(t, x, v, mass) -> n x 3 x 3, or two of these.
+pub struct Force(pub Py<PyAny>, pub Option<Py<PyAny>>, pub Raised);
 
 /// step(t, h, x, v, acceleration) -> (x, v).
 pub struct Integrator(pub Py<PyAny>, pub Raised);
@@ -58,6 +58,23 @@ fn numbers(value: &Bound<'_, PyAny>, n: usize, what: &str) -> PyResult<Vec<f64>>
     Ok(array.to_vec()?)
 }
 
+/// The numbers of anything like an n x 3 x 3 array.
+fn matrices(value: &Bound<'_, PyAny>, n: usize) -> PyResult<Vec<[f64; 9]>> {
+    use pyo3::exceptions::PyValueError;
+    let py = value.py();
+    let array = py.import("numpy")?.call_method1("ascontiguousarray", (value, "float64"))?;
+    let array = array.cast_into::<numpy::PyArrayDyn<f64>>()?;
+    if array.shape() != [n, 3, 3] {
+        let message = format!("what it returned has shape {:?}, expected ({n}, 3, 3), or a pair of these: by position and by velocity", array.shape());
+        return Err(PyValueError::new_err(message));
+    }
+    let flat: Vec<f64> = array.to_vec()?;
+    if let Some(i) = flat.iter().position(|number| !number.is_finite()) {
+        return Err(PyValueError::new_err(format!("what it returned is {} for particle {}, expected finite numbers", flat[i], i / 9)));
+    }
+    Ok(flat.as_chunks().0.to_vec())
+}
+
 impl UserForce for Force {
     fn force(&mut self, t: f64, x: &[f64], v: &[f64], mass: &[f64], force: &mut [f64]) -> Result<(), String> {
         Python::attach(|py| {
@@ -72,9 +89,25 @@ impl UserForce for Force {
                 }
                 Ok(values)
             };
-            let values = call().map_err(|e| self.1.keep(py, "force", self.0.bind(py), e))?;
+            let values = call().map_err(|e| self.2.keep(py, "force", self.0.bind(py), e))?;
             force.iter_mut().zip(values).for_each(|(f, v)| *f += v);
             Ok(())
+        })
+    }
+
+    fn jacobian(&mut self, t: f64, x: &[f64], v: &[f64], mass: &[f64]) -> Result<Option<Vec<[[f64; 9]; 2]>>, String> {
+        let Some(function) = &self.1 else { return Ok(None) };
+        Python::attach(|py| {
+            let call = || -> PyResult<Vec<[[f64; 9]; 2]>> {
+                let result = function.bind(py).call1((t, array(py, x)?, array(py, v)?, PyArray1::from_slice(py, mass)))?;
+                let n = mass.len();
+                let [by_x, by_v] = match result.cast::<pyo3::types::PyTuple>() {
+                    Ok(both) if both.len() == 2 => [matrices(&both.get_item(0)?, n)?, matrices(&both.get_item(1)?, n)?],
+                    _ => [matrices(&result, n)?, vec![[0.0; 9]; n]],
+                };
+                Ok(by_x.into_iter().zip(by_v).map(|(k, d)| [k, d]).collect())
+            };
+            call().map(Some).map_err(|e| self.2.keep(py, "jacobian", function.bind(py), e))
         })
     }
 }

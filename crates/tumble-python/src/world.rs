@@ -43,6 +43,8 @@ struct Custom {
     integrator: bool,
     system: String,
     function: Py<PyAny>,
+    /// Of a force, what tells its derivatives.
+    jacobian: Option<Py<PyAny>>,
 }
 
 impl Custom {
@@ -482,14 +484,18 @@ impl World {
     }
 
     /// Adds a force: force(t, x, v, mass) -> n x 3 [N], from x [m] and v [m/s], n x 3, and mass [kg], n. Without
-    /// `system`, to the first. Raises SceneError.
-    #[pyo3(signature = (force, system=None))]
-    fn add_force(&mut self, py: Python<'_>, force: Py<PyAny>, system: Option<String>) -> PyResult<()> {
+    /// `system`, to the first. `jacobian(t, x, v, mass)` gives implicit integrators the derivatives of the force on each mass by its own
+    /// position, n x 3 x 3 [N/m], or a pair: these and those by its velocity [N s/m]. Raises SceneError.
+    #[pyo3(signature = (force, system=None, jacobian=None))]
+    fn add_force(&mut self, py: Python<'_>, force: Py<PyAny>, system: Option<String>, jacobian: Option<Py<PyAny>>) -> PyResult<()> {
         callable(py, &force, "force")?;
+        if let Some(jacobian) = &jacobian {
+            callable(py, jacobian, "jacobian")?;
+        }
         let system = self.system(system);
-        let added = Box::new(user::Force(force.clone_ref(py), self.raised.clone()));
+        let added = Box::new(user::Force(force.clone_ref(py), jacobian.as_ref().map(|j| j.clone_ref(py)), self.raised.clone()));
         self.engine.add_force(&system, added).map_err(|e| scene_error(py, &e))?;
-        self.custom.push(Custom { integrator: false, system, function: force });
+        self.custom.push(Custom { integrator: false, system, function: force, jacobian });
         Ok(())
     }
 
@@ -502,7 +508,7 @@ impl World {
         let own = Box::new(user::Integrator(step.clone_ref(py), self.raised.clone()));
         self.engine.replace_integrator(&system, own).map_err(|e| scene_error(py, &e))?;
         self.custom.retain(|other| !(other.integrator && other.system == system));
-        self.custom.push(Custom { integrator: true, system, function: step });
+        self.custom.push(Custom { integrator: true, system, function: step, jacobian: None });
         Ok(())
     }
 
@@ -530,7 +536,11 @@ impl World {
 
     /// Equal worlds have equal scenes and states, and the same custom functions: they go on alike.
     fn __eq__(&self, py: Python<'_>, other: PyRef<'_, Self>) -> bool {
-        let same = |(a, b): (&Custom, &Custom)| a.integrator == b.integrator && a.system == b.system && a.function.is(&b.function);
+        let alike = |(a, b): (&Py<PyAny>, &Py<PyAny>)| a.is(b);
+        let same = |(a, b): (&Custom, &Custom)| {
+            let jacobians = a.jacobian.is_some() == b.jacobian.is_some() && a.jacobian.iter().zip(&b.jacobian).all(alike);
+            a.integrator == b.integrator && a.system == b.system && a.function.is(&b.function) && jacobians
+        };
         self.engine.hash() == other.engine.hash()
             && self.scene.bind(py).get().scene.to_json() == other.scene.bind(py).get().scene.to_json()
             && self.custom.len() == other.custom.len()
@@ -539,7 +549,8 @@ impl World {
 
     fn __reduce__<'py>(slf: &Bound<'py, Self>) -> PyResult<(Bound<'py, PyType>, (Py<Scene>, Option<usize>), State<'py>)> {
         let (py, world) = (slf.py(), slf.borrow());
-        let functions = world.custom.iter().map(|c| (c.integrator, c.system.clone(), c.function.clone_ref(py))).collect();
+        let own = |f: &Py<PyAny>| f.clone_ref(py);
+        let functions = world.custom.iter().map(|c| (c.integrator, c.system.clone(), own(&c.function), c.jacobian.as_ref().map(own))).collect();
         let Unsolved { steps, unconverged, residual } = world.unsolved;
         let state = (PyBytes::new(py, &world.engine.save(&[])), functions, (steps, unconverged, residual));
         Ok((slf.get_type(), (world.scene.clone_ref(py), world.threads), state))
@@ -547,10 +558,10 @@ impl World {
 
     fn __setstate__(&mut self, py: Python<'_>, state: State<'_>) -> PyResult<()> {
         let (bytes, functions, (steps, unconverged, residual)) = state;
-        for (integrator, system, function) in functions {
+        for (integrator, system, function, jacobian) in functions {
             match integrator {
                 true => self.set_integrator(py, function, Some(system))?,
-                false => self.add_force(py, function, Some(system))?,
+                false => self.add_force(py, function, Some(system), jacobian)?,
             }
         }
         self.unsolved = Unsolved { steps, unconverged, residual };
@@ -559,7 +570,7 @@ impl World {
 }
 
 /// What a copy of a world begins with: its state, its custom functions, and what was not solved.
-type State<'py> = (Bound<'py, PyBytes>, Vec<(bool, String, Py<PyAny>)>, (u64, u64, f64));
+type State<'py> = (Bound<'py, PyBytes>, Vec<(bool, String, Py<PyAny>, Option<Py<PyAny>>)>, (u64, u64, f64));
 
 impl Unsolved {
     fn add(&mut self, report: &StepReport) {

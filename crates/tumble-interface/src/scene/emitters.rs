@@ -63,10 +63,10 @@ pub struct Emitter {
     #[serde(default)]
     #[schemars(extend("x-unit" = "1"))]
     pub inherit: f64,
-    /// Age at which particles die. Default: never.
+    /// Age at which particles die, of those born at a time; > 0. Default: never.
     #[serde(default)]
-    #[schemars(extend("x-unit" = "s", "exclusiveMinimum" = 0.0))]
-    pub lifetime: Option<f64>,
+    #[schemars(extend("x-unit" = "s"))]
+    pub lifetime: Option<Animated>,
     /// Random variation of the lifetime, between lifetime (1 - this) and lifetime (1 + this).
     #[serde(default)]
     #[schemars(range(min = 0.0, max = 1.0), extend("x-unit" = "1"))]
@@ -86,26 +86,23 @@ pub struct Emitter {
     #[serde(default)]
     #[schemars(extend("x-unit" = "C"))]
     pub charge: f64,
-    /// Radius in pictures.
+    /// Radius in pictures, of those born at a time; > 0.
     #[serde(default = "centimetre")]
-    #[schemars(extend("x-unit" = "m", "exclusiveMinimum" = 0.0))]
-    pub radius: f64,
+    #[schemars(extend("x-unit" = "m"))]
+    pub radius: Animated,
     /// Random variation of the radius, between radius (1 - this) and radius (1 + this).
     #[serde(default)]
     #[schemars(range(min = 0.0), extend("x-unit" = "1", "exclusiveMaximum" = 1.0))]
     pub radius_spread: f64,
-    /// Red, green and blue in pictures, 0 to 1, in linear light (0.5 is 188 of 255 in sRGB).
+    /// Red, green and blue in pictures, 0 to 1, in linear light (0.5 is 188 of 255 in sRGB), of those born at a time.
     #[serde(default)]
-    #[schemars(inner(range(min = 0.0, max = 1.0)))]
-    pub color: Option<[f64; 3]>,
-    /// Each particle has a random colour between `color` and this one.
+    pub color: Option<AnimatedVector>,
+    /// Each particle has a random colour between `color` and this one, of those born at a time.
     #[serde(default)]
-    #[schemars(inner(range(min = 0.0, max = 1.0)))]
-    pub color_to: Option<[f64; 3]>,
-    /// Colour at the end of life; needs a `lifetime`.
+    pub color_to: Option<AnimatedVector>,
+    /// Colour at the end of life, of those born at a time; needs a `lifetime`.
     #[serde(default)]
-    #[schemars(inner(range(min = 0.0, max = 1.0)))]
-    pub color_end: Option<[f64; 3]>,
+    pub color_end: Option<AnimatedVector>,
     /// Duration of the trail drawn behind each particle in pictures.
     #[serde(default)]
     #[schemars(range(min = 0.0), extend("x-unit" = "s"))]
@@ -293,8 +290,8 @@ fn one() -> f64 {
     1.0
 }
 
-fn centimetre() -> f64 {
-    0.01
+fn centimetre() -> Animated {
+    0.01.into()
 }
 
 fn up() -> [f64; 3] {

@@ -70,6 +70,10 @@ pub struct Motion {
     pub keys: Vec<Pose>,
     /// Interpolation between keyframes.
     pub interpolation: Pace,
+    /// Size relative to that of the shape, about the pivot; > 0. A sphere, box, capsule or lathe of another size is the mesh that pictures show. Between
+    /// its keys, or from frame to frame of a formula or smooth keys, it changes at a constant rate. Default: 1.
+    #[schemars(extend("x-unit" = "1"))]
+    pub scale: Option<Animated>,
 }
 
 /// A keyframe of a motion.

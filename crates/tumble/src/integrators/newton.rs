@@ -24,7 +24,7 @@ pub trait Stiff: Equation {
 
     /// Prepares the matrix M/gh² + D/gh + K at (t, x, v), and returns the size below which R is round-off, in the norm
     /// sqrt(sum |R|²/m).
-    fn linearize(&mut self, t: f64, x: &[Row], v: &[Row], gh: f64, hessian: Hessian) -> f64;
+    fn linearize(&mut self, t: f64, x: &[Row], v: &[Row], gh: f64, hessian: Hessian) -> Result<f64, StepError>;
 
     /// Solves with that matrix; rows held still get 0.
     fn solve_linear(&mut self, x: &[Row], rhs: &[Row], out: &mut [Row], settings: &Solver) -> LinearSolve;
@@ -88,7 +88,7 @@ pub fn solve(
         }
         let mut hessian = settings.hessian;
         let floor = loop {
-            let floor = equation.linearize(stage.t, x, v, stage.gh, hessian);
+            let floor = equation.linearize(stage.t, x, v, stage.gh, hessian)?;
             let info = equation.solve_linear(x, residual, direction, settings);
             report.linear += info.iterations as u64;
             if !info.indefinite || hessian == Hessian::Definite {

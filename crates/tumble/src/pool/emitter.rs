@@ -61,6 +61,12 @@ pub struct Course {
     pub cone: Signal,
     /// Way of the source [m].
     pub path: VectorSignal,
+    /// Age at which those born at a time die [s]; never, if it is missing.
+    pub lifetime: Option<Signal>,
+    /// Radius in pictures of those born at a time [m].
+    pub radius: Signal,
+    /// Colour of those born at a time, another up to which it lies at random, and that at the end of life.
+    pub colors: [Option<VectorSignal>; 3],
     /// When the scene ends [s].
     pub end: f64,
 }
@@ -153,7 +159,8 @@ impl Emitter {
     pub fn expected(&self) -> usize {
         let rate = if self.course.rate.is_constant() { self.course.rate.value(0.0) } else { 0.0 };
         // If the lifetime exceeds the scene, fewer particles exist than lifetime times rate.
-        let life = (self.words.lifetime.unwrap_or(0.0) * (1.0 + self.words.lifetime_spread)).min(self.course.end);
+        let lifetime = self.course.lifetime.as_ref().map_or(0.0, |lifetime| if lifetime.is_constant() { lifetime.value(0.0) } else { f64::INFINITY });
+        let life = (lifetime * (1.0 + self.words.lifetime_spread)).min(self.course.end);
         let bursts: f64 = self.words.burst.iter().map(|b| f64::from(b.count)).sum();
         (1.05 * rate * life + bursts).min(4e9) as usize
     }
@@ -191,19 +198,31 @@ impl Emitter {
         spread(self.words.mass, self.words.mass_spread, || self.draw(id, MOMENT)[1])
     }
 
-    /// Radius in pictures [m].
-    pub fn radius(&self, id: u32) -> f64 {
-        spread(self.words.radius, self.words.radius_spread, || self.draw(id, MOMENT)[2])
+    /// Whether what particles have depends on when they were born.
+    pub fn heeds_birth(&self) -> bool {
+        let Course { lifetime, radius, colors, .. } = &self.course;
+        !radius.is_constant() || lifetime.iter().any(|l| !l.is_constant()) || colors.iter().flatten().any(|c| !c.is_constant())
+    }
+
+    /// Radius in pictures of a particle that was born at a time [s] [m].
+    pub fn radius(&self, id: u32, born: f64) -> f64 {
+        spread(self.course.radius.value(born), self.words.radius_spread, || self.draw(id, MOMENT)[2])
+    }
+
+    /// Radius of the first, but for its spread [m].
+    pub fn first_radius(&self) -> f64 {
+        self.course.radius.value(self.words.start)
     }
 
     /// Whether each has a radius of its own.
     pub fn has_radii(&self) -> bool {
-        self.words.radius_spread > 0.0
+        self.words.radius_spread > 0.0 || !self.course.radius.is_constant()
     }
 
     /// Whether each has a colour of its own.
     pub fn has_colors(&self) -> bool {
-        self.words.color.is_some() && (self.words.color_to.is_some() || self.words.color_end.is_some())
+        let [color, others @ ..] = &self.course.colors;
+        color.as_ref().is_some_and(|color| !color.is_constant() || others.iter().any(Option::is_some))
     }
 
     /// Whether each has a mass of its own.
@@ -211,20 +230,19 @@ impl Emitter {
         self.words.mass_spread > 0.0
     }
 
-    /// Age at which it dies [s].
-    pub fn lifetime(&self, id: u32) -> f64 {
-        let Some(lifetime) = self.words.lifetime else { return f64::INFINITY };
-        spread(lifetime, self.words.lifetime_spread, || self.random.quick(id, LIFETIME))
+    /// Age at which a particle that was born at a time [s] dies [s].
+    pub fn lifetime(&self, id: u32, born: f64) -> f64 {
+        let Some(lifetime) = &self.course.lifetime else { return f64::INFINITY };
+        spread(lifetime.value(born), self.words.lifetime_spread, || self.random.quick(id, LIFETIME))
     }
 
-    /// Colour at an age [s]; `None` if the emitter has none, or one for all.
-    pub fn color(&self, id: u32, age: f64) -> Option<[f64; 3]> {
-        let Words { color, color_to, color_end, .. } = &self.words;
-        let color = (*color)?;
+    /// Colour at an age [s] of a particle that was born at a time [s]; `None` if the emitter has none.
+    pub fn color(&self, id: u32, born: f64, age: f64) -> Option<[f64; 3]> {
+        let [color, to, end] = self.course.colors.each_ref().map(|color| color.as_ref().map(|color| <[f64; 3]>::from(color.value(born))));
         let mix = |a: [f64; 3], b: [f64; 3], t: f64| std::array::from_fn(|c| a[c] + (b[c] - a[c]) * t);
-        let own = color_to.map(|to| mix(color, to, self.draw(id, MOMENT)[3]));
-        let end = color_end.map(|end| mix(own.unwrap_or(color), end, (age / self.lifetime(id)).clamp(0.0, 1.0)));
-        end.or(own)
+        let color = color?;
+        let own = to.map_or(color, |to| mix(color, to, self.draw(id, MOMENT)[3]));
+        Some(end.map_or(own, |end| mix(own, end, (age / self.lifetime(id, born)).clamp(0.0, 1.0))))
     }
 
     /// A number of a user's column, 0 if there is no such column.
@@ -246,7 +264,8 @@ impl Emitter {
 
     /// The age at which the first may die, if no rule kills them before.
     fn youngest(&self) -> f64 {
-        self.words.lifetime.unwrap_or(f64::INFINITY) * (1.0 - self.words.lifetime_spread)
+        let least = |lifetime: &Signal| if lifetime.is_constant() { lifetime.value(0.0) } else { 0.0 };
+        self.course.lifetime.as_ref().map_or(f64::INFINITY, least) * (1.0 - self.words.lifetime_spread)
     }
 
     /// Whether what happens to a parent makes a burst.
@@ -258,12 +277,13 @@ impl Emitter {
         }
     }
 
-    /// Cause of death of a particle at time t, the end of an interval of length dt [s]; `None` if it survives.
+    /// Cause of death of a particle, with the time of its birth and its age [s], at time t, the end of an interval of length dt [s]; `None` if it
+    /// survives.
     #[inline]
-    pub fn dies(&self, (t, dt): (f64, f64), (id, age): (u32, f64), (x, v): (Row, Row), near: &Near<'_>) -> Option<Cause> {
+    pub fn dies(&self, (t, dt): (f64, f64), (id, born, age): (u32, f64, f64), (x, v): (Row, Row), near: &Near<'_>) -> Option<Cause> {
         // Possible rounding error of a sum of intervals.
         let age = age + (age * age * (f64::from(Real::EPSILON) / dt)).min(SLACK * dt);
-        if age >= self.youngest() && age >= self.lifetime(id) {
+        if age >= self.youngest() && age >= self.lifetime(id, born) {
             return Some(Cause::Lifetime);
         }
         self.kill.iter().find_map(|rule| {

@@ -61,6 +61,8 @@ pub struct Pool {
     id: Vec<u32>,
     /// Ages at the end of the current exchange interval [s].
     age: Vec<Real>,
+    /// Times of birth [s]; empty if nothing depends on them.
+    born: Vec<f64>,
     /// Users' numbers, by name: one for each row, 0 where its stream has none.
     columns: Vec<(String, Vec<Real>)>,
     /// Length of the current exchange interval [s].
@@ -167,6 +169,16 @@ impl Pool {
     pub fn ages(&self, s: usize) -> &[Real] {
         let rows = self.rows(s);
         &self.age[rows.start - self.first..rows.end - self.first]
+    }
+
+    /// When the particle k of an emitter was born [s]; 0 if nothing depends on it.
+    fn born(&self, s: usize, k: usize) -> f64 {
+        self.born.get(self.rows(s).start - self.first + k).copied().unwrap_or(0.0)
+    }
+
+    /// Whether anything depends on times of birth.
+    fn heeds_births(&self) -> bool {
+        self.streams.iter().any(|stream| stream.emitter.heeds_birth())
     }
 
     /// A column of users' numbers.
@@ -297,12 +309,13 @@ impl Pool {
         let start = self.rows(s).end;
         self.resize(total + k, owned, &moves);
         self.streams[s].len += k;
-        let Self { first, streams, id, age, columns, .. } = self;
+        let Self { first, streams, id, age, born, columns, .. } = self;
         let emitter = &streams[s].emitter;
         for (i, birth) in births.iter().enumerate() {
             let row = start + i - *first;
             id[row] = birth.id;
             age[row] = (t - birth.time) as Real;
+            born.get_mut(row).into_iter().for_each(|born| *born = birth.time);
         }
         for (name, column) in columns {
             for (i, birth) in births.iter().enumerate() {
@@ -350,6 +363,9 @@ impl Pool {
         }
         arrange.apply(&mut self.id, total, first);
         arrange.apply(&mut self.age, total, first);
+        if self.heeds_births() {
+            arrange.apply(&mut self.born, total, first);
+        }
         for (_, column) in &mut self.columns {
             arrange.apply(column, total, first);
         }
@@ -365,7 +381,7 @@ impl Pool {
         let (x, v, ids, ages) = (&x[rows.clone()], &v[rows], self.ids(s), self.ages(s));
         let tasks: Vec<Range<usize>> = (0..x.len()).step_by(TASK).map(|a| a..(a + TASK).min(x.len())).collect();
         let safe = emitter.safe_until(t.1);
-        let dies = |i: usize| Some((i as u32, emitter.dies(t, (ids[i], f64::from(ages[i])), (x[i], v[i]), near)?));
+        let dies = |i: usize| Some((i as u32, emitter.dies(t, (ids[i], self.born(s, i), f64::from(ages[i])), (x[i], v[i]), near)?));
         let among = |task: Range<usize>| -> Vec<(u32, Cause)> {
             let old = ages[task.clone()].iter().zip(task).filter(|(age, _)| f64::from(**age) >= safe);
             old.filter_map(|(_, i)| dies(i)).collect()
@@ -442,7 +458,7 @@ impl Pool {
     /// as it is then, or as it was when it died, at the latest at the time `last`.
     fn until(&self, s: usize, k: usize, last: f64, (now, end): (f64, f64), x: Row, v: Row) -> Parent {
         let age = f64::from(self.ages(s)[k]);
-        let late = (age - self.streams[s].emitter.lifetime(self.ids(s)[k])).max(end - last).max(0.0);
+        let late = (age - self.streams[s].emitter.lifetime(self.ids(s)[k], self.born(s, k))).max(end - last).max(0.0);
         let v = xyz64(v);
         let ago = (late - (end - now)).max(0.0);
         Parent { time: end - late, x: xyz64(x) - v * ago, v, normal: v, age: age - late, before: age - self.interval }
@@ -462,7 +478,7 @@ impl Pool {
             self.until(s, k, f64::INFINITY, (t, t), x[row], v[row]).event(self.ids(s)[k], Happening::Death(*cause))
         });
         // Whoever had died before it met the solid met none.
-        let lived = |e: &&Stirred| e.death.is_some() || e.parent.age - (t - e.parent.time) <= emitter.lifetime(e.id);
+        let lived = |e: &&Stirred| e.death.is_some() || e.parent.age - (t - e.parent.time) <= emitter.lifetime(e.id, e.parent.time - e.parent.age);
         let stirred = self.stirred.iter().filter(|e| e.stream == s).filter(lived);
         let stirred = stirred.map(|e| e.parent.event(e.id, e.death.map_or(Happening::Contact, Happening::Death)));
         let mut all: Vec<Event> = died.chain(stirred).collect();
@@ -477,13 +493,14 @@ impl Pool {
         add("id", Data::U32(ids.to_vec()));
         add("age", Data::from(ages.to_vec()));
         if emitter.has_radii() {
-            add("radius", Data::from(ids.iter().map(|id| emitter.radius(*id) as Real).collect::<Vec<Real>>()));
+            add("radius", Data::from(ids.iter().enumerate().map(|(k, id)| emitter.radius(*id, self.born(s, k)) as Real).collect::<Vec<Real>>()));
         }
         if let (true, Some(mass)) = (emitter.has_masses(), mass.get(self.rows(s))) {
             add("mass", Data::from(mass.to_vec()));
         }
         if emitter.has_colors() {
-            let colors = ids.iter().zip(ages).flat_map(|(id, age)| emitter.color(*id, f64::from(*age)).unwrap_or_default());
+            let color = |(k, (id, age)): (usize, (&u32, &Real))| emitter.color(*id, self.born(s, k), f64::from(*age)).unwrap_or_default();
+            let colors = ids.iter().zip(ages).enumerate().flat_map(color);
             add("color", Data::from(colors.map(|c| c as Real).collect::<Vec<Real>>()));
         }
         for (name, _) in emitter.columns() {
@@ -497,6 +514,9 @@ impl Pool {
         archive.push("pool", Part::Numbers(counts.collect()));
         archive.push_indices("id", &self.id);
         archive.push_numbers("age", &self.age);
+        if self.heeds_births() {
+            archive.push("born", Part::Numbers(self.born.clone()));
+        }
         for (name, column) in &self.columns {
             archive.push_numbers(name, column);
         }
@@ -515,6 +535,9 @@ impl Pool {
         self.stirred.clear();
         self.id = archive.indices("id")?;
         archive.column("age", &mut self.age)?;
+        if self.heeds_births() {
+            self.born = archive.numbers("born").filter(|born| born.len() == total)?;
+        }
         let mut fits = self.id.len() == total && self.age.len() == total && self.age.iter().all(|age| age.is_finite());
         for (name, column) in &mut self.columns {
             archive.column(name, column)?;
@@ -543,6 +566,9 @@ mod tests {
                 speed: 0.0.into(),
                 cone: 0.0.into(),
                 path: [0.0; 3].into(),
+                lifetime: None,
+                radius: 0.01.into(),
+                colors: [None, None, None],
                 end: 1.0,
             };
             Emitter::new(w.clone(), course, 1, Origin::Place(Sampler::Point(Vector::default())), Vec::new(), [0.0, 0.0, 1.0].into(), None)

@@ -169,7 +169,7 @@ pub fn emitter<'a>(
         let mut region = |shape: &Solid| -> Option<crate::geometry::Collider> {
             let file: Vec<Mesh> =
                 if let Solid::Mesh(file) = shape { mesh(file).map(|mesh| placed(mesh, file)).into_iter().collect() } else { Vec::new() };
-            match solid(&bounds(shape), &file, None) {
+            match solid(&bounds(shape), &file, None, &[]) {
                 Ok(solid) => Some(solid),
                 Err((key, message)) => {
                     let key = key.trim_start_matches(".shape");
@@ -220,7 +220,7 @@ fn cause_of(rule: &Rule) -> Cause {
 
 /// A shape that only bounds a region: no mesh. `Err` says what is wrong with which key.
 pub fn region(shape: &Solid) -> Result<crate::geometry::Collider, (String, String)> {
-    solid(&bounds(shape), &[], None).map_err(|(key, message)| (key.trim_start_matches(".shape").to_string(), message))
+    solid(&bounds(shape), &[], None, &[]).map_err(|(key, message)| (key.trim_start_matches(".shape").to_string(), message))
 }
 
 /// A solid that only bounds a region.

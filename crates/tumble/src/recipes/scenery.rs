@@ -2,15 +2,19 @@
 
 use crate::geometry::motion::Key;
 use crate::geometry::{Collider, Facets, Friction, GridSdf, Motion, Rig, Shape, Vector, surface};
+use crate::math::Signal;
 use crate::math::rotation::from_degrees;
 use std::sync::Arc;
 use tumble_interface::Mesh;
+use tumble_interface::check::plain;
 use tumble_interface::fault::Fault;
 use tumble_interface::repair::repair;
-use tumble_interface::scene::{Collider as Thing, MeshFile, MeshFrames, Motion as Moves, Pace, Shape as Words};
+use tumble_interface::scene::{Animated, Collider as Thing, Interpolation, MeshFile, MeshFrames, Motion as Moves, Pace, Shape as Words};
 
 /// Half the side of the square that stands for an endless plane in pictures [m].
 const PLANE: f64 = 10.0;
+/// Vertices of all keyframes of a solid that changes its size, at most.
+const MOST_KEYS: usize = 100_000_000;
 
 /// A mesh put in its place: scaled, turned, moved.
 pub fn placed(mesh: &Mesh, file: &MeshFile) -> Mesh {
@@ -37,8 +41,8 @@ pub fn animated(meshes: &[&Mesh], frames: &MeshFrames) -> Vec<Mesh> {
 type Wrong = (String, String);
 
 /// The solid of a collider; its meshes, one for each keyframe, stand where they belong. `Err` says what is wrong with
-/// which key. A figure comes with its bones and the keyframes of its skin.
-pub fn solid(thing: &Thing, meshes: &[Mesh], figure: Option<(Arc<Rig>, Facets)>) -> Result<Collider, Wrong> {
+/// which key. A figure comes with its bones and the keyframes of its skin; `times` are those of the frames of the scene [s].
+pub fn solid(thing: &Thing, meshes: &[Mesh], figure: Option<(Arc<Rig>, Facets)>, times: &[f64]) -> Result<Collider, Wrong> {
     let (rig, figure) = figure.unzip();
     let wrong = |key: &str, message: String| Err((key.to_string(), message));
     let shape = match &thing.shape {
@@ -109,6 +113,10 @@ pub fn solid(thing: &Thing, meshes: &[Mesh], figure: Option<(Arc<Rig>, Facets)>)
             Shape::Animated { facets, shell }
         }
     };
+    let shape = match thing.motion.as_ref().and_then(size) {
+        Some((scale, pivot)) => resized(thing, (scale, pivot), meshes, times)?,
+        None => shape,
+    };
     let mesh = match &shape {
         _ if !thing.edges => None,
         Shape::Plane { .. } => {
@@ -117,7 +125,7 @@ pub fn solid(thing: &Thing, meshes: &[Mesh], figure: Option<(Arc<Rig>, Facets)>)
         Shape::Animated { facets, .. } => {
             Some(Mesh { vertices: facets.vertices(0.0), triangles: facets.triangles().to_vec(), ..Mesh::default() })
         }
-        _ => Some(scenery(thing, meshes, None)),
+        _ => Some(shown(thing, meshes)),
     };
     let shell = matches!(shape, Shape::Mesh { shell: true, .. } | Shape::Animated { shell: true, .. });
     if thing.inside && (shell || matches!(shape, Shape::Plane { .. })) {
@@ -181,6 +189,48 @@ fn motion(words: &Moves) -> Result<Motion, Wrong> {
     })
 }
 
+/// The size of a solid that is not always that of its shape, and the point that it keeps [m].
+fn size(motion: &Moves) -> Option<(&Animated, Vector)> {
+    motion.scale.as_ref().filter(|scale| scale.constant() != Some(1.0)).map(|scale| (scale, motion.pivot.into()))
+}
+
+/// A shape of changing size, as a mesh with keyframes at those of the size, or at every frame of the scene.
+fn resized(thing: &Thing, (scale, pivot): (&Animated, Vector), meshes: &[Mesh], times: &[f64]) -> Result<Shape, Wrong> {
+    let wrong = |key: &str, message: String| Err((format!(".motion.scale{key}"), message));
+    let shell = match &thing.shape {
+        Words::Mesh(file) => file.shell,
+        Words::Sphere { .. } | Words::Box { .. } | Words::Capsule { .. } | Words::Lathe { .. } => false,
+        Words::Plane { .. } | Words::Floor { .. } => return wrong("", "a plane has no size; leave it out".into()),
+        _ => return wrong("", "its own frames say how this shape deforms; scale them, and leave it out".into()),
+    };
+    let size = match Signal::new(scale) {
+        Ok(size) => size,
+        Err(message) => return wrong("", message),
+    };
+    let times: Vec<f64> = match scale {
+        Animated::Value(_) => vec![0.0],
+        Animated::Keys(keys) if keys.interpolation == Interpolation::Step => {
+            return wrong(".interpolation", "\"step\": a surface cannot jump; take \"linear\" or \"smooth\"".into());
+        }
+        Animated::Keys(keys) if keys.interpolation == Interpolation::Linear => keys.keys.iter().map(|key| key[0]).collect(),
+        _ => times.to_vec(),
+    };
+    let mesh = shown(thing, meshes);
+    if mesh.vertices.len() * times.len() > MOST_KEYS {
+        let (n, m) = (mesh.vertices.len(), times.len());
+        return wrong("", format!("{n} vertices at {m} frames are too many; give linear keys at fewer times, or a coarser mesh"));
+    }
+    if let Some((t, s)) = times.iter().map(|t| (t, size.value(*t))).find(|(_, s)| !s.is_finite() || *s <= 0.0) {
+        let at = if size.is_constant() { String::new() } else { format!(" at t = {} s", plain(*t)) };
+        return wrong("", format!("{}{at}, expected > 0", plain(s)));
+    }
+    let at = |t: &f64| mesh.vertices.iter().map(|v| pivot + (Vector::from(*v) - pivot) * size.value(*t)).collect();
+    match Facets::of(mesh.triangles.clone(), times.iter().map(at).collect(), times.clone(), None) {
+        Some(facets) => Ok(Shape::Animated { facets, shell }),
+        None => wrong("", "the shape has no triangle with an area".into()),
+    }
+}
+
 /// Whether a mesh has an inside, or needs none.
 fn whole(mesh: &Mesh, key: &str, shell: bool, thickness: f64) -> Result<(), Wrong> {
     let wrong = |key: &str, message: String| Err((key.to_string(), message));
@@ -213,6 +263,18 @@ fn volume(mesh: &Mesh) -> f64 {
 
 /// The surface of a collider for pictures.
 pub fn scenery(thing: &Thing, meshes: &[Mesh], solid: Option<&Collider>) -> Mesh {
+    let facets = solid.and_then(|solid| if let Shape::Animated { facets, .. } = &solid.shape { Some(facets) } else { None });
+    match (&thing.shape, facets) {
+        (Words::Character(_) | Words::Mannequin(_), Some(facets)) => {
+            Mesh { vertices: facets.vertices(0.0), triangles: facets.triangles().to_vec(), ..Mesh::default() }
+        }
+        (_, Some(facets)) if thing.motion.as_ref().and_then(size).is_some() => Mesh { vertices: facets.vertices(0.0), ..shown(thing, meshes) },
+        _ => shown(thing, meshes),
+    }
+}
+
+/// The surface of a shape without motion; nothing of a figure.
+fn shown(thing: &Thing, meshes: &[Mesh]) -> Mesh {
     match &thing.shape {
         Words::Sphere { center, radius } => surface::sphere(4, (*center).into(), *radius),
         Words::Box { center, size, rotate } => surface::cuboid((*center).into(), Vector::from(*size) * 0.5, from_degrees(*rotate)),
@@ -221,11 +283,6 @@ pub fn scenery(thing: &Thing, meshes: &[Mesh], solid: Option<&Collider>) -> Mesh
         Words::Capsule { from, to, radius } => surface::capsule((*from).into(), (*to).into(), *radius),
         Words::Lathe { center, profile, sides } => turned(*center, profile, *sides).unwrap_or_default(),
         Words::Mesh(_) | Words::AnimatedMesh(_) => meshes.first().cloned().unwrap_or_default(),
-        Words::Character(_) | Words::Mannequin(_) => match solid.map(|s| &s.shape) {
-            Some(Shape::Animated { facets, .. }) => {
-                Mesh { vertices: facets.vertices(0.0), triangles: facets.triangles().to_vec(), ..Mesh::default() }
-            }
-            _ => Mesh::default(),
-        },
+        Words::Character(_) | Words::Mannequin(_) => Mesh::default(),
     }
 }

@@ -141,6 +141,10 @@ pub fn emit(site: &mut Site<'_>, scene: &Scene, thing: &Emitter) {
         speed: reader.signal(&at("speed"), &thing.speed, f64::NEG_INFINITY),
         cone: reader.signal_within(&at("cone"), &thing.cone, [0.0, 180.0]),
         path: reader.in_plane(&at("path"), &thing.path),
+        lifetime: thing.lifetime.as_ref().map(|lifetime| reader.positive(&at("lifetime"), lifetime)),
+        radius: reader.positive(&at("radius"), &thing.radius),
+        colors: [("color", &thing.color), ("color_to", &thing.color_to), ("color_end", &thing.color_end)]
+            .map(|(key, words)| words.as_ref().map(|words| reader.color(&at(key), words))),
         end: scene.frame_time() * f64::from(scene.time.frames),
     };
     let parent = parent(scene, thing);
@@ -222,7 +226,8 @@ fn solids(scene: &Scene, assets: &Assets, issues: &mut Vec<Issue>) -> (Vec<Colli
             }),
             _ => None,
         };
-        let solid = figure.transpose().and_then(|figure| recipes::solid(thing, &meshes, figure));
+        let times: Vec<f64> = (0..=scene.time.frames).map(|frame| scene.frame_time() * f64::from(frame)).collect();
+        let solid = figure.transpose().and_then(|figure| recipes::solid(thing, &meshes, figure, &times));
         let surface = recipes::scenery(thing, &meshes, solid.as_ref().ok());
         match solid {
             Ok(collider) => {

@@ -285,7 +285,7 @@ fn check_plane(scene: &Scene, wrong: &mut impl FnMut(String, String)) {
         let stays = thing.belt[axis] == 0.0
             && thing.motion.as_ref().is_none_or(|m| {
                 let keys = m.keys.iter().all(|k| k.translate[axis] == 0.0 && about(&k.rotate));
-                m.velocity[axis] == 0.0 && about(&m.spin) && keys
+                m.velocity[axis] == 0.0 && about(&m.spin) && keys && m.scale.as_ref().is_none_or(|scale| scale.constant() == Some(1.0))
             });
         let fits = fits && stays;
         if !fits {

@@ -43,19 +43,29 @@ impl<'a> Reader<'a> {
 
     /// The same, at most `most`.
     pub fn signal_within(&mut self, path: &str, words: &Animated, [least, most]: [f64; 2]) -> Signal {
+        let expected = match (least.is_finite(), most.is_finite()) {
+            (true, true) => format!("{least} to {most}"),
+            (true, false) => format!(">= {least}"),
+            _ => "a finite number".into(),
+        };
+        self.signal_that(path, words, &expected, |value| value >= least && value <= most)
+    }
+
+    /// The same, greater than 0.
+    pub fn positive(&mut self, path: &str, words: &Animated) -> Signal {
+        self.signal_that(path, words, "> 0", |value| value > 0.0)
+    }
+
+    /// A number of which something holds at every time, besides that it is finite.
+    fn signal_that(&mut self, path: &str, words: &Animated, expected: &str, holds: impl Fn(f64) -> bool) -> Signal {
         let signal = match Signal::new(words) {
             Ok(signal) => signal,
             Err(message) => return self.wrong(path, message).into(),
         };
         let tried = if signal.is_constant() { &self.times[..1] } else { &self.times[..] };
         let tried = tried.iter().chain(signal.key_times());
-        let bad = tried.map(|t| (*t, signal.value(*t))).find(|(_, value)| !value.is_finite() || *value < least || *value > most);
+        let bad = tried.map(|t| (*t, signal.value(*t))).find(|(_, value)| !value.is_finite() || !holds(*value));
         if let Some((t, value)) = bad {
-            let expected = match (least.is_finite(), most.is_finite()) {
-                (true, true) => format!("{least} to {most}"),
-                (true, false) => format!(">= {least}"),
-                _ => "a finite number".into(),
-            };
             let at = if signal.is_constant() { String::new() } else { format!(" at t = {} s", plain(t)) };
             self.wrong(path, format!("{}{at}, expected {expected}", plain(value)));
         }
@@ -79,6 +89,18 @@ impl<'a> Reader<'a> {
                 let at = if signal.is_constant() { String::new() } else { format!(" at t = {} s", plain(t)) };
                 self.wrong(path, format!("[{}, {}, {}]{at}, expected {expected}", plain(v.x), plain(v.y), plain(v.z)));
             }
+        }
+        signal
+    }
+
+    /// A colour, 0 to 1.
+    pub fn color(&mut self, path: &str, words: &AnimatedVector) -> VectorSignal {
+        let signal = self.vector(path, words, Of::Time);
+        let tried = self.times.iter().chain(signal.key_times());
+        let bad = tried.map(|t| (*t, <[f64; 3]>::from(signal.value(*t)))).find(|(_, rgb)| rgb.iter().any(|c| !(0.0..=1.0).contains(c)));
+        if let Some((t, [x, y, z])) = bad.filter(|(_, rgb)| rgb.iter().all(|c| c.is_finite())) {
+            let at = if signal.is_constant() { String::new() } else { format!(" at t = {} s", plain(t)) };
+            self.wrong(path, format!("[{}, {}, {}]{at}, expected numbers from 0 to 1", plain(x), plain(y), plain(z)));
         }
         signal
     }

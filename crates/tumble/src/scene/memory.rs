@@ -4,7 +4,7 @@ use super::Assets;
 use super::methods::METHODS;
 use crate::geometry::GridSdf;
 use crate::math::Signal;
-use tumble_interface::scene::{Diagonals, Dress, Emitter, Fluid, Linear, Shape, Source, System};
+use tumble_interface::scene::{Animated, Diagonals, Dress, Emitter, Fluid, Linear, Shape, Source, System};
 use tumble_interface::{Mesh, Scene};
 
 /// Bytes for a mass: its rows in state, scratch, snapshot and history, in double precision.
@@ -169,11 +169,13 @@ fn corners(shape: &Shape, assets: &Assets) -> f64 {
 /// Particles of each emitter that may live at once until the last frame of the scene.
 fn alive(scene: &Scene) -> Vec<f64> {
     let duration = scene.frame_time() * f64::from(scene.time.frames);
-    // The largest rate that a changing one has at a hundred times; what is wrong with it is told elsewhere.
-    let rate_of = |thing: &Emitter| {
-        let Ok(rate) = Signal::new(&thing.rate) else { return 0.0 };
-        (0..=100).map(|i| rate.value(duration * f64::from(i) / 100.0)).filter(|rate| rate.is_finite()).fold(0.0, f64::max)
+    // The largest that a changing number is at a hundred times; what is wrong with it is told elsewhere.
+    let largest = |words: &Animated| {
+        let Ok(signal) = Signal::new(words) else { return 0.0 };
+        (0..=100).map(|i| signal.value(duration * f64::from(i) / 100.0)).filter(|value| value.is_finite()).fold(0.0, f64::max)
     };
+    let rate_of = |thing: &Emitter| largest(&thing.rate);
+    let longest = |thing: &Emitter| thing.lifetime.as_ref().map_or(duration, largest).min(duration);
     // Of every emitter: births a second, and all of its bursts.
     let mut births: Vec<(f64, f64)> = Vec::new();
     let mut counts = Vec::new();
@@ -184,7 +186,7 @@ fn alive(scene: &Scene) -> Vec<f64> {
                 let parent = scene.emitter.iter().zip(&births).find(|(parent, _)| parent.name == *of);
                 let each = |parent: f64| rate_of(thing) * parent + burst;
                 parent.map_or((0.0, 0.0), |(p, (rate, bursts))| {
-                    let each = each(p.lifetime.unwrap_or(duration).min(duration) * (1.0 + p.lifetime_spread));
+                    let each = each(longest(p) * (1.0 + p.lifetime_spread));
                     (rate * each, bursts * each)
                 })
             }
@@ -193,7 +195,7 @@ fn alive(scene: &Scene) -> Vec<f64> {
         births.push((rate, bursts));
         // All that are born in an exchange interval stand in a list before they live, however short.
         let interval = scene.frame_time() / f64::from(scene.time.exchanges);
-        let life = thing.lifetime.map_or(duration, |l| (l * (1.0 + thing.lifetime_spread)).min(duration));
+        let life = (longest(thing) * (1.0 + thing.lifetime_spread)).min(duration);
         counts.push((rate * life + bursts).min(thing.most.map_or(f64::INFINITY, f64::from)) + rate * interval);
     }
     counts

@@ -296,7 +296,7 @@ fn buried(scene: &Scene, parts: &Parts, colliders: &[Collider]) -> Vec<Warning> 
         (name, deepest(&|i| free(range.start + i), range.len(), 1e-6))
     });
     // A source may touch a surface: particles are not deep in it before they are all in it.
-    let sources = parts.emitters().map(|e| (e.words().name.as_str(), deepest(&|k| e.trial(k, TRIALS, end), TRIALS, e.words().radius)));
+    let sources = parts.emitters().map(|e| (e.words().name.as_str(), deepest(&|k| e.trial(k, TRIALS, end), TRIALS, e.first_radius())));
     let told = |(name, found): (&str, Option<(f64, f64, usize)>)| {
         let (deep, t, k) = found?;
         let (deep, solid) = (short(deep), &scene.collider[k].name);

@@ -10,6 +10,8 @@ mod vicsek;
 use super::Assets;
 use super::build::Builder;
 use super::laws::flat;
+use crate::math::VectorSignal;
+use crate::math::formula::Of;
 use crate::system::System;
 use tumble_interface::looks::{Colors, FEW, Form, LIQUID, Look, RADIUS, SMOKE};
 use tumble_interface::scene::{Emitter, Integrator, Method, Particles, Scene, System as Plan};
@@ -132,8 +134,11 @@ fn particles(thing: &Particles, colors: &mut Colors) -> Look {
 
 /// Emitted particles, as all methods draw them.
 fn emitted(thing: &Emitter, colors: &mut Colors) -> Look {
-    let radius = if thing.radius_spread > 0.0 { RADIUS } else { thing.radius };
-    Look { trail: thing.trail, ..Look::new(&thing.name, Form::Points, colors.pick(thing.color)).with_radius(radius) }
+    // A radius or colour that changes is in frames; for what has none yet, the first.
+    let radius = if thing.radius_spread > 0.0 { RADIUS } else { thing.radius.constant().unwrap_or(RADIUS) };
+    let first = |color| VectorSignal::new(color, Of::Time).map_or([0.0; 3], |color| color.value(thing.start).into());
+    let color = thing.color.as_ref().map(first);
+    Look { trail: thing.trail, ..Look::new(&thing.name, Form::Points, colors.pick(color)).with_radius(radius) }
 }
 
 /// What lies on a grid: an image in a plane, smoke in space, which has a colour of its own in a liquid only.

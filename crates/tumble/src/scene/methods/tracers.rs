@@ -102,7 +102,7 @@ impl MethodRules for Rules {
         ask_for_events(&mut builder.exchange, parts.emitters());
         let emitters = parts.take_emitters();
         for (stream, emitter) in emitters.iter().enumerate() {
-            let (name, radius) = (emitter.words().name.clone(), emitter.words().radius);
+            let (name, radius) = (emitter.words().name.clone(), emitter.first_radius());
             all.push(Object { name, points: x.len()..x.len(), radius, stream: Some(stream), ..Object::default() });
         }
         let settings = Settings {

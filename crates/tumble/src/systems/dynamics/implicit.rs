@@ -116,7 +116,7 @@ impl Implicit {
 
     /// Fills `local` with mass over gh², forces and contact, prepares the batches, and inverts the diagonal blocks.
     /// Returns the round-off of the forces in the norm sqrt(sum |.|²/m).
-    fn linearize(&mut self, laws: &mut Laws, t: f64, x: &[Row], v: &[Row], gh: f64, hessian: Hessian) -> f64 {
+    fn linearize(&mut self, laws: &mut Laws, t: f64, x: &[Row], v: &[Row], gh: f64, hessian: Hessian) -> Result<f64, StepError> {
         let n = x.len();
         self.local.resize(n, [0.0; 6]);
         self.inverse.resize(n, [0.0; 6]);
@@ -139,6 +139,10 @@ impl Implicit {
                 }
             }
         });
+        laws.add_user_stiffness(t, x, v, hessian == Hessian::Definite, |i, [k, d]| {
+            add_block(&mut self.local[i], k, 1.0);
+            add_block(&mut self.local[i], d, (1.0 / gh) as Real);
+        })?;
         self.inverse.copy_from_slice(&self.local);
         let weights = Weights { stiffness: 1.0, damping: (1.0 / gh) as Real, hessian };
         for batch in &mut laws.batches {
@@ -164,7 +168,7 @@ impl Implicit {
         }
         self.local_columns.set(&self.local);
         self.inverse_columns.set(&self.inverse);
-        noise.sqrt()
+        Ok(noise.sqrt())
     }
 
     /// Round-off of the forces, those of contact left out, over the weight of everything, where steps of h [s] start; `None` without gravity.
@@ -172,6 +176,7 @@ impl Implicit {
         let seen = std::mem::take(&mut self.contact.seen);
         let noise = self.linearize(laws, 0.0, x, v, h, self.solver.hessian);
         self.contact.seen = seen;
+        let noise = noise.ok()?;
         let free = laws.masses.points().flatten().filter(|i| laws.masses.inverse(*i, x) > 0.0);
         let mass: f64 = free.map(|i| f64::from(laws.masses.mass[i])).sum();
         let weight = mass.sqrt() * laws.gravity.largest;
@@ -263,7 +268,7 @@ impl Stiff for Motion<'_> {
         Ok(())
     }
 
-    fn linearize(&mut self, t: f64, x: &[Row], v: &[Row], gh: f64, hessian: Hessian) -> f64 {
+    fn linearize(&mut self, t: f64, x: &[Row], v: &[Row], gh: f64, hessian: Hessian) -> Result<f64, StepError> {
         self.implicit.linearize(self.laws, t, x, v, gh, hessian)
     }
 

@@ -4,6 +4,7 @@ use crate::elements::Batch;
 use crate::forces::{Force, Gravity, Group};
 use crate::geometry::{Collider, Vector};
 use crate::integrators::{Equation, Kinematics, Stage};
+use crate::linalg::blocks::Block;
 use crate::math::parallel::{chunks, sum};
 use crate::math::rows::{self, Each};
 use crate::math::{Lane, Real, Row, ZERO, add};
@@ -48,6 +49,16 @@ pub struct Laws {
     pub pushes: Vec<[f64; 3]>,
 }
 
+/// The symmetric part of minus a matrix; if it is to be definite, with as much on the diagonal as Gershgorin's circles ask for.
+fn resisting(m: [f64; 9], definite: bool) -> Block {
+    let [xy, yz, zx] = [m[1] + m[3], m[5] + m[7], m[2] + m[6]].map(|sum| -0.5 * sum);
+    let diagonal = [-m[0], -m[4], -m[8]];
+    let around = [xy.abs() + zx.abs(), xy.abs() + yz.abs(), yz.abs() + zx.abs()];
+    let least = (0..3).map(|c| diagonal[c] - around[c]).fold(0.0, f64::min);
+    let [xx, yy, zz] = diagonal.map(|d| if definite { d - least } else { d });
+    [xx, yy, zz, xy, yz, zx].map(|b| b as Real)
+}
+
 impl Laws {
     /// Whether no mass feels another, so that each can be stepped by itself.
     pub fn is_local(&self) -> bool {
@@ -62,17 +73,45 @@ impl Laws {
         if self.user.is_empty() {
             return Ok(());
         }
-        let masses = &self.masses;
-        let (xs, vs) = (masses.flat(x), masses.flat(v));
-        let mass: Vec<f64> = masses.points().flat_map(|points| &masses.mass[points]).map(|m| f64::from(*m)).collect();
+        let [xs, vs, mass] = self.points(x, v);
         let mut pushes = vec![0.0; xs.len()];
         for user in &mut self.user {
             user.force(t, &xs, &vs, &mass, &mut pushes).map_err(StepError::User)?;
         }
         self.pushes.clear();
         self.pushes.resize(x.len(), [0.0; 3]);
-        for (i, push) in masses.points().flatten().zip(pushes.as_chunks().0) {
+        for (i, push) in self.masses.points().flatten().zip(pushes.as_chunks().0) {
             self.pushes[i] = *push;
+        }
+        Ok(())
+    }
+
+    /// Positions, velocities and masses of all points, as users' forces take them.
+    fn points(&self, x: &[Row], v: &[Row]) -> [Vec<f64>; 3] {
+        let masses = &self.masses;
+        let mass = masses.points().flat_map(|points| &masses.mass[points]).map(|m| f64::from(*m)).collect();
+        [masses.flat(x), masses.flat(v), mass]
+    }
+
+    /// Calls `add` with every point and its own stiffness -df/dx [N/m] and damping -df/dv [N s/m] by users' forces, as far as they tell them. Of these the
+    /// symmetric parts; `definite` ones where that is asked for, stiffer by the least that makes them so.
+    pub fn add_user_stiffness(
+        &mut self,
+        t: f64,
+        x: &[Row],
+        v: &[Row],
+        definite: bool,
+        mut add: impl FnMut(usize, [Block; 2]),
+    ) -> Result<(), StepError> {
+        if self.user.is_empty() {
+            return Ok(());
+        }
+        let [xs, vs, mass] = self.points(x, v);
+        for user in &mut self.user {
+            let Some(all) = user.jacobian(t, &xs, &vs, &mass).map_err(StepError::User)? else { continue };
+            for (i, both) in self.masses.points().flatten().zip(all) {
+                add(i, both.map(|matrix| resisting(matrix, definite)));
+            }
         }
         Ok(())
     }

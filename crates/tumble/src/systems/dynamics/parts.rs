@@ -240,7 +240,7 @@ impl Parts {
 
     /// Begins an object whose particles an emitter makes.
     pub fn emitter(&mut self, emitter: Emitter) {
-        self.begin(&emitter.words().name.clone(), emitter.words().radius);
+        self.begin(&emitter.words().name.clone(), emitter.first_radius());
         let stream = self.emitters.len();
         if let Some(object) = self.object() {
             object.stream = Some(stream);
