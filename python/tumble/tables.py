@@ -265,7 +265,8 @@ def _dimensions(
 ) -> Iterator[str]:
     """Names of the axes of a column but for time; axes of one name are of one length."""
     rank = _rank(run, thing, column)
-    place = COLUMNS[column].places[0] if column in COLUMNS else "mass"
+    places = COLUMNS[column].places if column in COLUMNS else ("mass",)
+    place = "mass" if "mass" in places and shape[0] > 1 else places[0]
     for k, size in enumerate(shape):
         if k >= rank:
             name = "axis" if size == 3 else f"axis_{size}"

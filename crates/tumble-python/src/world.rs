@@ -54,7 +54,9 @@ impl Custom {
 
     /// As in a checkpoint.
     fn told(&self, py: Python<'_>) -> Told {
-        Told { what: self.what().into(), system: self.system.clone(), name: user::name_of(self.function.bind(py)) }
+        let name = |f: &Py<PyAny>| user::name_of(f.bind(py));
+        let (what, system, jacobian) = (self.what().into(), self.system.clone(), self.jacobian.as_ref().map(name));
+        Told { what, system, name: name(&self.function), jacobian }
     }
 }
 
@@ -64,11 +66,14 @@ struct Told {
     what: String,
     system: String,
     name: String,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    jacobian: Option<String>,
 }
 
 impl std::fmt::Display for Told {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        write!(f, "the {} {} on system \"{}\"", self.what, self.name, self.system)
+        write!(f, "the {} {} on system \"{}\"", self.what, self.name, self.system)?;
+        self.jacobian.iter().try_for_each(|jacobian| write!(f, " with jacobian {jacobian}"))
     }
 }
 

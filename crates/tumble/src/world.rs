@@ -478,8 +478,9 @@ fn bytes(part: &Part) -> &[u8] {
 fn merged(columns: Vec<Column>) -> Vec<Column> {
     let mut out: Vec<Column> = Vec::with_capacity(columns.len());
     for column in columns {
-        let same = |other: &&mut Column| column.name == "force" && (&other.object, &other.name) == (&column.object, &column.name);
-        match out.iter_mut().find(same) {
+        let same = |other: &&mut Column| other.name == column.name && other.object == column.object;
+        let known = if column.name == "force" { out.iter_mut().find(same) } else { None };
+        match known {
             Some(Column { data: Data::F64(sums), .. }) => sums.iter_mut().zip(column.data.numbers()).for_each(|(sum, f)| *sum += f),
             _ => out.push(column),
         }

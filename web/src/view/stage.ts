@@ -526,6 +526,9 @@ export class Stage {
       thing.body = new Surface(x, thing.topology.triangles.data, thing.color, { moving: false, plain: this.flat });
       this.add(thing.body);
     }
+    // A container that changes its size.
+    if (x && thing.body instanceof Pieces && thing.topology.triangles)
+      thing.body.pairs(x, sharp(x, thing.topology.triangles.data), thing.color);
     if (columns.turn) {
       const q = columns.turn.data;
       const t = columns.translation?.data ?? [0, 0, 0];

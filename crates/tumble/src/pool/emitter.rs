@@ -159,7 +159,7 @@ impl Emitter {
     pub fn expected(&self) -> usize {
         let rate = if self.course.rate.is_constant() { self.course.rate.value(0.0) } else { 0.0 };
         // If the lifetime exceeds the scene, fewer particles exist than lifetime times rate.
-        let lifetime = self.course.lifetime.as_ref().map_or(0.0, |lifetime| if lifetime.is_constant() { lifetime.value(0.0) } else { f64::INFINITY });
+        let lifetime = self.course.lifetime.as_ref().filter(|lifetime| lifetime.is_constant()).map_or(0.0, |lifetime| lifetime.value(0.0));
         let life = (lifetime * (1.0 + self.words.lifetime_spread)).min(self.course.end);
         let bursts: f64 = self.words.burst.iter().map(|b| f64::from(b.count)).sum();
         (1.05 * rate * life + bursts).min(4e9) as usize

@@ -477,8 +477,8 @@ impl Pool {
             let (k, row) = (*k as usize, start + *k as usize);
             self.until(s, k, f64::INFINITY, (t, t), x[row], v[row]).event(self.ids(s)[k], Happening::Death(*cause))
         });
-        // Whoever had died before it met the solid met none.
-        let lived = |e: &&Stirred| e.death.is_some() || e.parent.age - (t - e.parent.time) <= emitter.lifetime(e.id, e.parent.time - e.parent.age);
+        // Whoever had died before it met the solid met none; its age is that at the end.
+        let lived = |e: &&Stirred| e.death.is_some() || e.parent.age - (t - e.parent.time) <= emitter.lifetime(e.id, t - e.parent.age);
         let stirred = self.stirred.iter().filter(|e| e.stream == s).filter(lived);
         let stirred = stirred.map(|e| e.parent.event(e.id, e.death.map_or(Happening::Contact, Happening::Death)));
         let mut all: Vec<Event> = died.chain(stirred).collect();

@@ -226,7 +226,8 @@ fn solids(scene: &Scene, assets: &Assets, issues: &mut Vec<Issue>) -> (Vec<Colli
             }),
             _ => None,
         };
-        let times: Vec<f64> = (0..=scene.time.frames).map(|frame| scene.frame_time() * f64::from(frame)).collect();
+        // One beyond the end, so that surfaces still move there.
+        let times: Vec<f64> = (0..=scene.time.frames + 1).map(|frame| scene.frame_time() * f64::from(frame)).collect();
         let solid = figure.transpose().and_then(|figure| recipes::solid(thing, &meshes, figure, &times));
         let surface = recipes::scenery(thing, &meshes, solid.as_ref().ok());
         match solid {

@@ -285,8 +285,12 @@ fn check_plane(scene: &Scene, wrong: &mut impl FnMut(String, String)) {
         let stays = thing.belt[axis] == 0.0
             && thing.motion.as_ref().is_none_or(|m| {
                 let keys = m.keys.iter().all(|k| k.translate[axis] == 0.0 && about(&k.rotate));
-                m.velocity[axis] == 0.0 && about(&m.spin) && keys && m.scale.as_ref().is_none_or(|scale| scale.constant() == Some(1.0))
+                m.velocity[axis] == 0.0 && about(&m.spin) && keys
             });
+        if thing.motion.as_ref().and_then(|m| m.scale.as_ref()).is_some_and(|scale| scale.constant() != Some(1.0)) {
+            let message = "meshes, which solids of another size are, are not symmetric about the plane of a scene of dimension 2; leave it out, or use dimension = 3";
+            wrong(format!("collider \"{}\".motion.scale", thing.name), message.into());
+        }
         let fits = fits && stays;
         if !fits {
             wrong(

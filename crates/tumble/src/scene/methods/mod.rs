@@ -10,7 +10,7 @@ mod vicsek;
 use super::Assets;
 use super::build::Builder;
 use super::laws::flat;
-use crate::math::VectorSignal;
+use crate::math::{Signal, VectorSignal};
 use crate::math::formula::Of;
 use crate::system::System;
 use tumble_interface::looks::{Colors, FEW, Form, LIQUID, Look, RADIUS, SMOKE};
@@ -134,8 +134,9 @@ fn particles(thing: &Particles, colors: &mut Colors) -> Look {
 
 /// Emitted particles, as all methods draw them.
 fn emitted(thing: &Emitter, colors: &mut Colors) -> Look {
-    // A radius or colour that changes is in frames; for what has none yet, the first.
-    let radius = if thing.radius_spread > 0.0 { RADIUS } else { thing.radius.constant().unwrap_or(RADIUS) };
+    // A radius or colour that changes is in frames; what is drawn before has the first.
+    let first_radius = || Signal::new(&thing.radius).map_or(RADIUS, |radius| radius.value(thing.start));
+    let radius = if thing.radius_spread > 0.0 { RADIUS } else { first_radius() };
     let first = |color| VectorSignal::new(color, Of::Time).map_or([0.0; 3], |color| color.value(thing.start).into());
     let color = thing.color.as_ref().map(first);
     Look { trail: thing.trail, ..Look::new(&thing.name, Form::Points, colors.pick(color)).with_radius(radius) }

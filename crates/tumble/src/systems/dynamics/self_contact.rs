@@ -93,8 +93,10 @@ impl SelfContact {
         contact.rest.truncate(contact.features.vertices());
         contact.parts.push(points..contact.features.vertices());
         contact.topology = contact.meeting(objects, &[]);
+        // Hair alone meets nothing but the edges of solids.
+        let meets = contact.features.vertices() > points || objects.iter().any(|o| o.curve_points == 0 && o.stream.is_none());
         let soft = contact.topology.points().first().is_some_and(|i| (*i as usize) < points);
-        soft.then_some(contact)
+        (soft && meets).then_some(contact)
     }
 
     /// Takes the solids anew.

@@ -443,6 +443,11 @@ impl Tear {
         let pieces = moved.iter().flat_map(|(corners, _)| corners).chain(&fan);
         if !torn_off && !small && pieces.into_iter().any(|c| self.is_scrap(*c)) {
             moved.iter().rev().for_each(|(corners, row)| self.put(corners, *row));
+            // Nobody stands on the rows of the copies any more.
+            let first = self.first as usize + self.vertices;
+            for row in first + used..first + self.used {
+                (x[row][3], v[row]) = (0.0, [0.0; 4]);
+            }
             self.used = used;
             return None;
         }
