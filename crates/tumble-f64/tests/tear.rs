@@ -295,13 +295,12 @@ fn spare_vertices_run_out_and_weak_places_tear_first() {
 fn a_tear_leaves_no_scraps() {
     for (scheme, substeps) in [("position_based", 10), ("verlet", 40), ("implicit_euler", 4)] {
         let text = format!(
-            "version = 1\nprecision = \"double\"\ntime.fps = 60\nworld.gravity = [0, 0, -9.8]\n[[system]]\n{}\nsubsteps = {substeps}\n\
+            "time.fps = 60\nworld.gravity = [0, 0, -9.8]\n[[system]]\n{}\nsubsteps = {substeps}\n\
              [[sheet]]\nname = \"s\"\nsize = [1, 1]\nresolution = [15, 15]\ncenter = [0, 0, 3]\ndensity = 0.2\nlinks.structural = 300\nlinks.shear = 100\n\
              tear = {{ strain = 0.15, spread = 0.5 }}\n",
             if scheme == "position_based" { "method = \"position_based\"".into() } else { format!("integrator = \"{scheme}\"") }
         );
-        let make = || Simulation::new(tumble_interface::Scene::from_toml(&text).unwrap(), Default::default()).unwrap();
-        let mut sim = make();
+        let mut sim = simulation(&text);
         // Away from the middle, unevenly.
         let v: Vec<Vector> = positions(&sim, "s").iter().map(|x| vector(9.0 * x.x + 3.0 * x.y * x.y, 7.0 * x.y, 2.0 * x.x)).collect();
         write(&mut sim, "s", "velocity", &v);
@@ -314,9 +313,9 @@ fn a_tear_leaves_no_scraps() {
         }
         let triangles = triangles(&sim);
         let sizes = sizes(&triangles);
-        println!("{scheme}: {} splits, pieces {sizes:?}", sim.ledger().broken);
+        println!("{scheme}: pieces {sizes:?}");
         assert!(sizes.len() > 3 && sizes[0] >= 6, "{scheme}: {sizes:?}");
-        let mut fresh = make();
+        let mut fresh = simulation(&text);
         fresh.restore(&middle).unwrap();
         run(&mut fresh, 10);
         assert_eq!(fresh.hash(), sim.hash(), "{scheme}");

@@ -257,3 +257,18 @@ impl Equation for Local<'_> {
         Err(StepError::User("implicit stages are solved for a whole system".into()))
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_matrix_that_pushes_away_is_made_to_resist() {
+        // Eigenvalues -1 and 3 in a plane, and an antisymmetric part that does not count.
+        let m = [-1.0, 2.5, 0.0, 1.5, -1.0, 0.0, 0.0, 0.0, -4.0];
+        assert_eq!(resisting(m, false), [1.0, 1.0, 4.0, -2.0, 0.0, 0.0]);
+        // Stiffer by 1, so that the least eigenvalue is 0.
+        assert_eq!(resisting(m, true), [2.0, 2.0, 5.0, -2.0, 0.0, 0.0]);
+        assert_eq!(resisting([-3.0, 0.0, 0.0, 0.0, -1.0, 0.0, 0.0, 0.0, -2.0], true), [3.0, 1.0, 2.0, 0.0, 0.0, 0.0]);
+    }
+}
