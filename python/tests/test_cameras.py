@@ -93,9 +93,9 @@ def test_stages_have_its_samples(tmp_path: Path) -> None:
         assert lens.ratio == pytest.approx(0.6)
     # A lens that does not zoom has no samples, nor has one whose words never change.
     pans = simulate(TREE | {"camera": WORDS | {"view_angle": 40}}, tmp_path / "pans")
-    prim = Shot(stages.write(pans, tmp_path / "pan"), "/scene/camera").prim
-    assert prim.GetAttribute("xformOp:transform").GetNumTimeSamples() == 5
-    assert prim.GetAttribute("focalLength").GetNumTimeSamples() == 0
+    pan = Shot(stages.write(pans, tmp_path / "pan"), "/scene/camera")
+    assert pan.prim.GetAttribute("xformOp:transform").GetNumTimeSamples() == 5
+    assert pan.prim.GetAttribute("focalLength").GetNumTimeSamples() == 0
     still = {"position": {"keys": [[0, 0, -4, 0.5]]}, "target": "[0, 0, 0.5]"}
     stands = simulate(TREE | {"camera": still}, tmp_path / "stands")
     assert not Shot(stages.write(stands, tmp_path / "still"), "/scene/camera").moves
@@ -117,7 +117,8 @@ def test_in_a_plane_it_pans_and_zooms(tmp_path: Path) -> None:
 
     from tumble.export import usd as stages
 
-    lens = UsdGeom.Camera(Usd.Stage.Open(str(stages.write(run, tmp_path / "out"))).GetPrimAtPath("/scene/camera"))
+    stage = Usd.Stage.Open(str(stages.write(run, tmp_path / "out")))
+    lens = UsdGeom.Camera(stage.GetPrimAtPath("/scene/camera"))
     for i in (0, 4):
         # In tenths of a metre.
         assert lens.GetHorizontalApertureAttr().Get(i) == pytest.approx(10 * studio.view(i).width)
@@ -189,13 +190,12 @@ def test_on_the_way_to_the_top_it_does_not_flip() -> None:
 
 
 WRONG = [
-    ('camera.position=[0, "x", 1]', 'camera.position: unknown name "x"'),
+    ('camera.position=[0, "x", 1]', 'camera.position: "x": unknown name "x"'),
     ('camera.view_angle="200*t"', "camera.view_angle: 0 ° at t = 0 s, expected > 0 and < 170 °"),
     ("camera.view_angle=170", "camera.view_angle: 170 °, expected > 0 and < 170 °"),
-    ("camera.position={keys = [[0, 0, -1, nan]]}", "camera.position.keys[0][3]: nan, expected a finite number"),
+    ("camera.position={keys = [[0, 0, -1, nan]]}", "camera.position.keys[0][3]: NaN, expected a finite number"),
     ("camera.position={keys = [[0, 0, -1]]}", "camera.position.keys[0]: a list of 3, expected a list of 4"),
     ("camera.position={keys = [[1, 0, -1, 0], [0, 0, -2, 0]]}", "camera.position: key 1 at t = 0 s is not later"),
-    ("camera.resolution={keys = [[0, 640, 360]]}", "it does not change in time"),
     ('camera.look="t"', "expected one of studio, night"),
 ]
 

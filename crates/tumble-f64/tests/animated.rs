@@ -287,9 +287,8 @@ fn what_is_wrong_in_time_is_told() {
 /// A camera that moves is checked at all frames and keys, each word once, with the first time and a cure; one that stands as before.
 #[test]
 fn cameras_that_see_nothing_are_told() {
-    let camera = |words: &str| {
-        told(&format!("{words}\n[time]\nfps = 10\nframes = 20\n[[particles]]\nname = \"p\"\nposition = [[0, 0, 0]]\n"))
-    };
+    let camera =
+        |words: &str| told(&format!("{words}\n[time]\nfps = 10\nframes = 20\n[[particles]]\nname = \"p\"\nposition = [[0, 0, 0]]\n"));
     let fine = "camera = { position = \"[sin(t), -3, 1]\", target = { keys = [[0, 0, 0, 0], [3, 1, 0, 0]], interpolation = \"smooth\" }, \
                 view_angle = { keys = [[0, 35], [1, 20]] } }";
     assert_eq!(camera(fine), "");
@@ -301,9 +300,8 @@ fn cameras_that_see_nothing_are_told() {
     let always = camera("camera = { position = [1, 2, 3], target = [1, 2, 3] }");
     assert!(always.contains("camera.position: [1, 2, 3], which is the target, too"), "{always}");
     // All at once.
-    let all = camera(
-        "camera = { position = [\"1/(t-1)\", 0, 0], target = [0, \"x\", 0], view_angle = { keys = [[0, 35], [1, 170], [2, 35]] } }",
-    );
+    let all =
+        camera("camera = { position = [\"1/(t-1)\", 0, 0], target = [0, \"x\", 0], view_angle = { keys = [[0, 35], [1, 170], [2, 35]] } }");
     assert!(all.contains("camera.target: ") && all.contains("\"x\""), "{all}");
     let all = camera("camera = { position = [\"1/(t-1)\", 0, 0], view_angle = { keys = [[0, 35], [1, 170], [2, 35]] } }");
     assert!(all.contains("camera.position: [inf, 0, 0] at t = 1 s, expected finite numbers"), "{all}");
