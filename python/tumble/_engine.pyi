@@ -310,6 +310,12 @@ def looks(tree: Mapping[str, Any]) -> dict[str, Any]:
     """How the objects of a scene are drawn, in the order of their columns, and the ends of anchors; see `tumble.looks`. None of
     its files is read. Raises SceneError."""
 
+def sights(
+    camera: Mapping[str, Any], times: Sequence[float]
+) -> tuple[npt.NDArray[np.float64] | None, npt.NDArray[np.float64] | None, npt.NDArray[np.float64]]:
+    """The camera of a scene, given as its table, at each time [s]: positions n x 3 [m] and points that it looks at n x 3 [m],
+    where the scene says them, and angles of view n [°]. Raises SceneError."""
+
 def load_mesh(path: Path) -> tuple[npt.NDArray[np.float64], npt.NDArray[np.uint32]]:
     """Vertices [file units; of a USD file m, z up] n x 3 and triangles m x 3 of an OBJ, PLY, STL, GLB or USD file. Raises
     SceneError."""

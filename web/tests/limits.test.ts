@@ -209,6 +209,7 @@ test("frames stay within their memory, those of both ways", () => {
     report: null,
     ms: 0,
     kept: [],
+    sight: null,
   });
   const way = new Way(10_000);
   for (let i = 0; i <= 500; i++) {

@@ -345,4 +345,49 @@ fn a_size_that_cannot_be_is_told() {
         assert!(error.contains(expected), "{shape} {scale}: {error}");
     }
     assert_eq!(of(sphere, "{ keys = [[0, 1], [1, 2]], interpolation = \"smooth\" }"), "");
+
+/// A camera that moves is checked at all frames and keys, each word once, with the first time and a cure; one that stands as before.
+#[test]
+fn cameras_that_see_nothing_are_told() {
+    let camera =
+        |words: &str| told(&format!("{words}\n[time]\nfps = 10\nframes = 20\n[[particles]]\nname = \"p\"\nposition = [[0, 0, 0]]\n"));
+    let fine = "camera = { position = \"[sin(t), -3, 1]\", target = { keys = [[0, 0, 0, 0], [3, 1, 0, 0]], interpolation = \"smooth\" }, \
+                view_angle = { keys = [[0, 35], [1, 20]] } }";
+    assert_eq!(camera(fine), "");
+    // Through the target at t = 1 s, whatever the words; a key after the end counts, too.
+    let through = camera("camera = { position = { keys = [[0, -1, 0, 1], [2, 1, 0, 1]] }, target = [0, 0, 1] }");
+    assert!(through.contains("camera.position: [0, 0, 1] at t = 1 s, which is the target, too") && through.contains("keep them apart"));
+    let late = camera("camera = { position = { keys = [[0, 1, 0, 0], [7, 2, 0, 0]] }, target = [2, 0, 0] }");
+    assert!(late.contains("at t = 7 s"), "{late}");
+    let always = camera("camera = { position = [1, 2, 3], target = [1, 2, 3] }");
+    assert!(always.contains("camera.position: [1, 2, 3], which is the target, too"), "{always}");
+    // All at once.
+    let all =
+        camera("camera = { position = [\"1/(t-1)\", 0, 0], target = [0, \"x\", 0], view_angle = { keys = [[0, 35], [1, 170], [2, 35]] } }");
+    assert!(all.contains("camera.target: ") && all.contains("\"x\""), "{all}");
+    let all = camera("camera = { position = [\"1/(t-1)\", 0, 0], view_angle = { keys = [[0, 35], [1, 170], [2, 35]] } }");
+    assert!(all.contains("camera.position: [inf, 0, 0] at t = 1 s, expected finite numbers"), "{all}");
+    assert!(all.contains("camera.view_angle: 170 ° at t = 1 s, expected > 0 and < 170 °"), "{all}");
+    let closed = camera("camera.view_angle = \"35 - 35*t\"");
+    assert!(closed.contains("camera.view_angle: 0 ° at t = 1 s"), "{closed}");
+    assert!(camera("camera.view_angle = 0").contains("camera.view_angle: 0 °, expected > 0"));
+    // A plane is seen from the side, as much of it as the distance says, which 0 does not.
+    let flat = |words: &str| camera(&format!("dimension = 2\n{words}"));
+    let within = flat("camera.position = \"[0, t - 1, 0]\"");
+    assert!(within.contains("camera.position: [0, 0, 0] at t = 1 s, expected a y other than 0"), "{within}");
+    assert_eq!(flat("camera.position = [0, 0, 0]"), "");
+    assert_eq!(flat("camera.position = \"[t, -3, 0]\""), "");
+}
+
+/// What fronts ask for: keys exactly, half-way between them the mean, and formulas by their value.
+#[test]
+fn cameras_follow_their_words() {
+    use tumble_f64::scene::Camera;
+    let camera = |words: &str| Camera::new(&Scene::from_toml(&format!("version = 1\n{words}")).unwrap().camera).unwrap();
+    let moving = camera("camera = { position = { keys = [[1, 0, -3, 0], [3, 4, -3, 2]] }, view_angle = \"35 + 5*t\" }");
+    for (t, position) in [(0.0, [0.0, -3.0, 0.0]), (1.0, [0.0, -3.0, 0.0]), (2.0, [2.0, -3.0, 1.0]), (9.0, [4.0, -3.0, 2.0])] {
+        let sight = moving.at(t);
+        assert_eq!((sight.position, sight.target, sight.view_angle), (Some(position), None, 35.0 + 5.0 * t));
+    }
+    assert!(!moving.stands() && camera("camera.target = [1, 2, 3]").stands());
 }

@@ -361,7 +361,7 @@ fn show(node: &Node, unit: Option<&str>) -> String {
 
 /// Of keyframes or a formula where there are numbers for all times: that this is so.
 fn rigid(node: &Node, schema: &Schema) -> &'static str {
-    let is_number = |schema: &Schema| types(schema).contains(&"number");
+    let is_number = |schema: &Schema| types(schema).iter().any(|t| ["number", "integer"].contains(t));
     let numbers = is_number(schema) || is_number(&schema["items"]);
     let animated = match &node.value {
         Value::Table(entries) => entries.iter().any(|(key, _)| key == "keys"),

@@ -24,7 +24,7 @@ mod _engine {
     #[pymodule_export]
     use super::projection::{Projection, project};
     #[pymodule_export]
-    use super::scene::{Scene, load_fabric, load_mesh, looks, repair_mesh};
+    use super::scene::{Scene, load_fabric, load_mesh, looks, repair_mesh, sights};
     #[pymodule_export]
     use super::vdb::write_vdb;
     #[pymodule_export]

@@ -349,6 +349,26 @@ pub fn looks<'py>(py: Python<'py>, tree: &Bound<'_, PyAny>) -> PyResult<Bound<'p
     Ok(pythonize::pythonize(py, &tumble::scene::looks(&scene))?)
 }
 
+/// The camera of a scene, given as its table, at each time [s]: positions n x 3 [m] and points that it looks at n x 3 [m], where the scene says
+/// them, and angles of view n [°].
+#[pyfunction]
+#[allow(clippy::type_complexity)]
+pub fn sights<'py>(
+    py: Python<'py>,
+    camera: &Bound<'_, PyAny>,
+    times: Vec<f64>,
+) -> PyResult<(Option<Bound<'py, PyArray2<f64>>>, Option<Bound<'py, PyArray2<f64>>>, Bound<'py, PyArray1<f64>>)> {
+    let words = pythonize::depythonize(camera).map_err(|e| scene_error(py, &SceneError::one("camera", e.to_string())))?;
+    let camera = tumble::scene::Camera::new(&words).map_err(|e| scene_error(py, &e))?;
+    let all: Vec<_> = times.into_iter().map(|t| camera.at(t)).collect();
+    let points = |of: fn(&tumble::scene::Sight) -> Option<[f64; 3]>| {
+        let points: Option<Vec<[f64; 3]>> = all.iter().map(of).collect();
+        points.map(|points| PyArray1::from_vec(py, points.concat()).reshape([all.len(), 3])).transpose()
+    };
+    let angles = all.iter().map(|sight| sight.view_angle).collect();
+    Ok((points(|sight| sight.position)?, points(|sight| sight.target)?, PyArray1::from_vec(py, angles)))
+}
+
 /// Suffixes of files that OpenUSD reads.
 const USD: [&str; 4] = ["usd", "usda", "usdc", "usdz"];
 

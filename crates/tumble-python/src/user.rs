@@ -65,7 +65,10 @@ fn matrices(value: &Bound<'_, PyAny>, n: usize) -> PyResult<Vec<[f64; 9]>> {
     let array = py.import("numpy")?.call_method1("ascontiguousarray", (value, "float64"))?;
     let array = array.cast_into::<numpy::PyArrayDyn<f64>>()?;
     if array.shape() != [n, 3, 3] {
-        let message = format!("what it returned has shape {:?}, expected ({n}, 3, 3), or a pair of these: by position and by velocity", array.shape());
+        let message = format!(
+            "what it returned has shape {:?}, expected ({n}, 3, 3), or a pair of these: by position and by velocity",
+            array.shape()
+        );
         return Err(PyValueError::new_err(message));
     }
     let flat: Vec<f64> = array.to_vec()?;

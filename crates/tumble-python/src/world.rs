@@ -555,7 +555,8 @@ impl World {
     fn __reduce__<'py>(slf: &Bound<'py, Self>) -> PyResult<(Bound<'py, PyType>, (Py<Scene>, Option<usize>), State<'py>)> {
         let (py, world) = (slf.py(), slf.borrow());
         let own = |f: &Py<PyAny>| f.clone_ref(py);
-        let functions = world.custom.iter().map(|c| (c.integrator, c.system.clone(), own(&c.function), c.jacobian.as_ref().map(own))).collect();
+        let functions =
+            world.custom.iter().map(|c| (c.integrator, c.system.clone(), own(&c.function), c.jacobian.as_ref().map(own))).collect();
         let Unsolved { steps, unconverged, residual } = world.unsolved;
         let state = (PyBytes::new(py, &world.engine.save(&[])), functions, (steps, unconverged, residual));
         Ok((slf.get_type(), (world.scene.clone_ref(py), world.threads), state))

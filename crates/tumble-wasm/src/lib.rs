@@ -142,6 +142,11 @@ impl World {
         self.loaded.world.time()
     }
 
+    /// The scene's camera at a time [s]: JSON of position, target and angle of view, each as far as the scene says it; `null` if it stands.
+    pub fn sight(&self, time: f64) -> String {
+        json(&self.loaded.sight(time))
+    }
+
     /// The ledger now, as JSON.
     pub fn ledger(&self) -> String {
         json(&self.loaded.world.ledger())

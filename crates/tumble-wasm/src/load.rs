@@ -1,6 +1,6 @@
 //! From text and bytes to a world, within what a browser can hold.
 
-use crate::engine::scene::{Simulation, looks, memory, resolve, set, set_text};
+use crate::engine::scene::{Camera, Sight, Simulation, looks, memory, resolve, set, set_text};
 use crate::failure::Failure;
 use serde::Serialize;
 use std::collections::HashMap;
@@ -27,6 +27,7 @@ pub struct Loaded {
     pub world: Simulation,
     node: Node,
     scene: Scene,
+    camera: Camera,
     files: Given,
     memory: f64,
 }
@@ -109,7 +110,8 @@ impl Loaded {
             )));
         }
         let world = Simulation::new(scene.clone(), assets).map_err(lines)?;
-        Ok(Self { world, node, scene, files: page.files, memory: bytes })
+        let camera = Camera::new(&scene.camera).map_err(lines)?;
+        Ok(Self { world, node, scene, camera, files: page.files, memory: bytes })
     }
 
     /// Whether both are of scenes that say the same, defaults written out.
@@ -120,6 +122,11 @@ impl Loaded {
     /// Duration of a frame and its number of exchanges.
     pub fn clock(&self) -> (f64, u32) {
         (self.scene.time.fps, self.scene.time.exchanges)
+    }
+
+    /// The camera at a time [s], if it moves.
+    pub fn sight(&self, time: f64) -> Option<Sight> {
+        (!self.camera.stands()).then(|| self.camera.at(time))
     }
 
     /// An error as it is thrown, with its lines.

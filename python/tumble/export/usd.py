@@ -227,18 +227,18 @@ def _look(lens: Any, views: list[Camera]) -> None:
     """Places a camera, at each frame if it moves."""
     from pxr import Gf, UsdGeom
 
-    first = views[0]
     place = lens.AddTransformOp()
-    sensor = 10 * first.width if first.parallel else SENSOR
-    if first.parallel:
+    first, parallel = views[0], views[0].parallel
+    sensors = [10 * v.width if parallel else SENSOR for v in views]
+    if parallel:
         lens.CreateProjectionAttr(UsdGeom.Tokens.orthographic)
-    lens.CreateHorizontalApertureAttr(sensor)
-    lens.CreateVerticalApertureAttr(sensor * first.height / first.width)
+    _set(lens.CreateHorizontalApertureAttr(), sensors)
+    _set(lens.CreateVerticalApertureAttr(), [sensor * first.height / first.width for sensor in sensors])
     lens.CreateClippingRangeAttr(Gf.Vec2f(1e-3 * min(v.distance for v in views), 1e3 * max(v.distance for v in views)))
     matrices = [_placed(v.axes[0], v.axes[1], -v.axes[2], v.position) for v in views]
     _set(place, matrices)
-    if not first.parallel:
-        _set(lens.CreateFocalLengthAttr(), [sensor * v.distance / v.width for v in views])
+    if not parallel:
+        _set(lens.CreateFocalLengthAttr(), [float(np.float32(SENSOR * v.distance / v.width)) for v in views])
 
 
 def _set(attribute: Any, values: list[Any]) -> None:

@@ -37,7 +37,9 @@ class Cell:
     linear: int = 0
     unconverged: int = 0
     seconds: float = 0.0
-    """Time on the clock."""
+    """Time on the clock of its steps."""
+    spent: float = 0.0
+    """Time on the clock of all of it: its world is built, and looked at after each frame."""
     step_range: tuple[float, float] | None = None
     error: float = float("nan")
     """Largest distance from the true solution over the size of the motion."""
@@ -68,12 +70,18 @@ def run(
     each: Callable[[World], bool] = lambda world: True,
 ) -> Cell:
     """Runs `frames` of `interval` [s]. After each, `each` may say that it has seen enough: the run then counts as blown
-    up. One that takes longer than `patience` [s] is given up and counts as skipped."""
+    up. One that takes longer than `patience` [s], from before its world is built, is given up and counts as skipped."""
+    start = time.perf_counter()
     h = interval / subject.taken(interval, substeps)
     cell = Cell(experiment, scheme, h, tolerance, interval * frames)
-    if substeps > MOST:
+    if substeps > MOST or patience <= 0:
         cell.outcome = SKIPPED
         return cell
+
+    def spent() -> float:
+        cell.spent = time.perf_counter() - start
+        return cell.spent
+
     # An adaptive scheme may take very many steps in a frame; it is asked more often whether its time is over.
     parts = 16 if subject.crowded and tolerance is not None and tolerance < 1e-4 * subject.extent else 1
     world = subject.world(scheme, interval / parts, frames * parts, substeps, tolerance)
@@ -81,7 +89,7 @@ def run(
         for k in range(frames * parts):
             begin = time.perf_counter()
             try:
-                report = world.step(patience=max(patience - cell.seconds, 0.05))
+                report = world.step(patience=max(patience - spent(), 0.05))
             finally:
                 cell.seconds += time.perf_counter() - begin
             _add(cell, report)
@@ -89,7 +97,7 @@ def run(
             if (k + 1) % parts == 0 and not each(world):
                 cell.outcome = BLEW_UP
                 break
-            if cell.seconds > patience:
+            if spent() > patience:
                 cell.outcome = SKIPPED
                 break
     except TimeoutError:
@@ -99,6 +107,7 @@ def run(
         cell.outcome = BLEW_UP if blown else STOPPED
         cell.failure = dict(error.report)
         cell.reached = float(error.report.get("time") or world.time)
+    spent()
     if scheme.adaptive and cell.steps:
         cell.step = cell.reached / cell.steps
     return cell
@@ -137,8 +146,8 @@ class Purse:
 
     def pays(self, cost: float) -> bool:
         """Whether a run that is expected to take so long may start."""
-        return bool(np.isfinite(cost) and cost <= self.left)
+        return bool(np.isfinite(cost) and cost <= self.left and self.left > 0)
 
     def spend(self, cell: Cell) -> Cell:
-        self.left -= cell.seconds
+        self.left -= cell.spent
         return cell

@@ -1,5 +1,6 @@
 """A flock under each integrator: it has no conserved energy, but an order, a density and a speed."""
 
+import time
 from collections.abc import Iterator
 from functools import partial
 from typing import Any
@@ -51,6 +52,17 @@ def follow(results: Results, purse: Purse, tick: Tick) -> list[Observed]:
     subject = results.subject
     truth: tuple[list[float], list[Floats]] | None = None
     found = []
+
+    def seen(world: World) -> Floats:
+        columns = world.columns("position", "velocity")
+        names = birds(subject, world)
+        x, v = (np.concatenate([columns[n][c] for n in names]).astype(float) for c in ("position", "velocity"))
+        with np.errstate(over="ignore", invalid="ignore"):
+            return observe(x, v)
+
+    begin = time.perf_counter()
+    start = seen(subject.world(BY_WORD["rk4"], subject.duration, 1, 1))
+    purse.left -= time.perf_counter() - begin
     for share, z in ((0.7, SMALL), (1.0, LARGE)):
         rate = subject.rate or 1.0
         length = min(subject.duration, 40.0 / rate)
@@ -68,19 +80,13 @@ def follow(results: Results, purse: Purse, tick: Tick) -> list[Observed]:
             elif truth is not None:
                 observed.times[word], observed.values[word] = np.array(truth[0]), np.array(truth[1])
                 continue
-            times: list[float] = []
-            values: list[Floats] = []
+            times, values = [0.0], [start]
 
             def keep(world: World, times: list[float] = times, values: list[Floats] = values) -> bool:
-                columns = world.columns("position", "velocity")
-                names = birds(subject, world)
-                x, v = (np.concatenate([columns[n][c] for n in names]).astype(float) for c in ("position", "velocity"))
-                with np.errstate(over="ignore", invalid="ignore"):
-                    values.append(observe(x, v))
+                values.append(seen(world))
                 times.append(world.time)
                 return bool(np.isfinite(values[-1]).all())
 
-            keep(subject.world(scheme, per_frame * h, frames, per_frame, 1.0))
             own = part.part(rest)
             size = results.reference.size if results.reference else subject.extent
             tolerance = 10.0 * z * z * 1e-3 * size if scheme.adaptive else None

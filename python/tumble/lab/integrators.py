@@ -1,5 +1,6 @@
 """`tumble lab integrators`: one scene under every integrator, and what that says about accuracy, stability and cost."""
 
+import time
 from collections.abc import Callable, Iterator, Sequence
 from functools import partial
 from html import escape
@@ -37,8 +38,9 @@ def page(
 
     `steps` are sub-steps [s] (each is shortened to divide an eighth of `duration`); without them they are halved from
     above the predicted stability limits. `integrators` names some of them; without it, all that can move the scene.
-    `duration` [s] is the length of the runs whose errors are compared. Runs that would not fit into `budget` [s] are
-    left out, and the page says so. Raises SceneError, ExportError, ValueError for an unknown integrator.
+    `duration` [s] is the length of the runs whose errors are compared. Runs that would not fit into `budget` [s], which
+    all experiments share, are left out, and the page says so. Raises SceneError, ExportError, ValueError for an unknown
+    integrator.
     """
     results = study(scene, steps, integrators, duration, progress, budget)
     over_time = [flocks.section(results, o) for o in results.observed] or [_energy_section(results)]
@@ -68,13 +70,19 @@ def study(
     budget: float = 45.0,
 ) -> Results:
     """The measurements of a page."""
+    end = time.perf_counter() + budget
+
+    def purse(share: float) -> Purse:
+        """A share of the budget, or what is left of it."""
+        return Purse(max(0.0, min(share * budget, end - time.perf_counter())))
+
     tested = subject(scene, 0.1 * budget)
     words = list(integrators) if integrators else None
     results = Results(tested, chosen(words, tested.massless))
     _leave_out(results, words)
     given = duration
     if tested.crowded and duration is None:
-        given = results.horizon = measure.horizon(tested, Purse(0.1 * budget))
+        given = results.horizon = measure.horizon(tested, purse(0.1))
     results.duration = given or measure.default_duration(tested)
     ladder = [float(h) for h in steps] if steps is not None else measure.default_steps(tested, results.duration)
     adaptive = sum(s.adaptive for s in results.schemes)
@@ -90,7 +98,7 @@ def study(
 
     if progress is not None:
         progress(0, total)
-    results.reference = measure.reference(tested, results.duration, min(ladder), Purse(0.15 * budget))
+    results.reference = measure.reference(tested, results.duration, min(ladder), purse(0.15))
     tick()
     size = results.reference.size if results.reference else tested.extent
     if size == 0:
@@ -99,14 +107,14 @@ def study(
         results,
         ladder,
         {w: [size * 10.0**k for k in decades] for w, decades in DECADES.items()},
-        Purse(0.35 * budget),
+        purse(0.35),
         tick,
     )
     if tested.flock:
-        results.observed = flocks.follow(results, Purse(0.4 * budget), tick)
+        results.observed = flocks.follow(results, purse(0.4), tick)
     else:
-        measure.energy(results, 1e-3 * size, Purse(0.1 * budget), tick)
-    results.found = largest_steps(tested, results.schemes, Purse(0.4 * budget), tick)
+        measure.energy(results, 1e-3 * size, purse(0.1), tick)
+    results.found = largest_steps(tested, results.schemes, purse(0.4), tick)
     if progress is not None:
         progress(total, total)
     return results

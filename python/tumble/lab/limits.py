@@ -88,10 +88,12 @@ def _survives(subject: Subject, scheme: Scheme, found: Found, purse: Purse, h: f
     """Whether the scene as it is does; None if there is no time to find out."""
     per_frame, frames = _frames(subject, h)
     before = found.survivors[-1] if found.survivors else None
-    if not purse.pays(before.seconds * before.step / h if before else 0.0):
+    if not purse.pays(before.seconds * before.step / h + before.spent - before.seconds if before else 0.0):
         return None
-    cell = run(subject, scheme, "limit", per_frame * h, frames, per_frame, None, purse.left, _growth(subject))
-    purse.spend(cell)
+    begin = time.perf_counter()
+    grown = _growth(subject)
+    purse.left -= time.perf_counter() - begin
+    cell = purse.spend(run(subject, scheme, "limit", per_frame * h, frames, per_frame, None, purse.left, grown))
     found.largest_tried = max(found.largest_tried, h)
     if cell.outcome == SURVIVED:
         found.survivors.append(cell)
@@ -197,6 +199,7 @@ def _calm(subject: Subject, scheme: Scheme, mode: Floats, purse: Purse, h: float
     per_frame, frames = _frames(subject, h)
     if per_frame > MOST:
         return None
+    begin = time.perf_counter()
     plain, struck = (subject.world(scheme, per_frame * h, frames, per_frame) for _ in range(2))
     frequency, size = subject.frequency, 1e-7 * subject.extent
     subject.write(struck, "velocity", subject.velocities(struck) + size * frequency * mode)
@@ -209,6 +212,7 @@ def _calm(subject: Subject, scheme: Scheme, mode: Floats, purse: Purse, h: float
 
     first = energy()
     for _ in range(frames):
+        purse.left -= time.perf_counter() - begin
         if purse.left <= 0:
             return None
         begin = time.perf_counter()
@@ -219,11 +223,13 @@ def _calm(subject: Subject, scheme: Scheme, mode: Floats, purse: Purse, h: float
             purse.left = 0.0
             return None
         except StepError:
+            purse.left -= time.perf_counter() - begin
             return False
-        purse.left -= time.perf_counter() - begin
         with np.errstate(over="ignore", invalid="ignore"):
             if not energy() <= GROWTH * first:
+                purse.left -= time.perf_counter() - begin
                 return False
+    purse.left -= time.perf_counter() - begin
     return True
 
 

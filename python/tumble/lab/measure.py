@@ -85,24 +85,24 @@ def horizon(subject: Subject, purse: Purse) -> float | None:
     parts = 64
     interval = duration / parts
     n = max(1, round(interval * subject.rate / 0.2)) if subject.rate > 0 else 4
+    begin = time.perf_counter()
     worlds = [subject.world(BY_WORD["rk4"], interval, parts, n) for _ in range(2)]
     noise = np.random.default_rng(1).standard_normal(subject.start.shape)
     noise[:, np.ptp(subject.start, axis=0) == 0] = 0.0
     noise *= 1e-8 * subject.extent / rms(noise)
     subject.write(worlds[1], "position", subject.start + noise)
     first = rms(noise)
-    begin = time.perf_counter()
     for k in range(parts):
         try:
             for world in worlds:
-                world.step(patience=purse.left - (time.perf_counter() - begin))
+                world.step(patience=max(purse.left - (time.perf_counter() - begin), 0.0))
+            subject.consider(worlds[0], max(purse.left - (time.perf_counter() - begin), 0.0))
         except StepError:
             return interval * k or interval
         except TimeoutError:
             subject.notes.append("There was no time to see how soon paths drift apart over the whole length.")
             purse.left = 0.0
             return interval * max(k, 1)
-        subject.consider(worlds[0])
         spent = time.perf_counter() - begin
         if rms(subject.positions(worlds[1]) - subject.positions(worlds[0])) > APART * first:
             purse.left -= spent
@@ -191,7 +191,8 @@ def accuracy(
             results.accuracy.append(cell)
             usual = min(usual, each)
             # Halving the step doubles the work; so, about, does a hundredth of the tolerance.
-            cost = {SURVIVED: 2.2 * cell.seconds, SKIPPED: float("inf")}.get(cell.outcome, 0.0)
+            again = 2.2 * cell.seconds + cell.spent - cell.seconds
+            cost = {SURVIVED: again, SKIPPED: float("inf")}.get(cell.outcome, 0.0)
         purse.settle(part)
 
 
@@ -221,9 +222,11 @@ def _compared(
         cell.error = max(errors)
     for _ in range(2):
         work = max(1, cell.evaluations)
-        if cell.outcome == SURVIVED and (cell.seconds < 0.01 or cell.seconds > 2 * usual * work):
-            again = purse.spend(run(subject, scheme, "accuracy", interval, SAMPLES, substeps, tolerance))
-            cell.seconds = min(cell.seconds, again.seconds)
+        suspect = cell.seconds < 0.01 or cell.seconds > 2 * usual * work
+        if cell.outcome == SURVIVED and suspect and purse.pays(cell.spent):
+            again = run(subject, scheme, "accuracy", interval, SAMPLES, substeps, tolerance, purse.left)
+            if purse.spend(again).outcome == SURVIVED:
+                cell.seconds = min(cell.seconds, again.seconds)
     return cell, cell.seconds / max(1, cell.evaluations)
 
 

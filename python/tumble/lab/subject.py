@@ -84,9 +84,9 @@ class Subject:
         kinds = {"flock", "lennard_jones", "repulsion", "cohesion"}
         return not self.massless and any(force["kind"] in kinds for force in self.tree["force"])
 
-    def consider(self, world: World) -> None:
-        """Lets the state that a run has come to count for the limits, too."""
-        _mass_limits(self, [s for s in world.stability() if float(s["frequency"]) > self.frequency])
+    def consider(self, world: World, patience: float = np.inf) -> None:
+        """Lets the state that a run has come to count for the limits, too. Raises TimeoutError after `patience` [s]."""
+        _mass_limits(self, [s for s in world.stability(patience) if float(s["frequency"]) > self.frequency])
 
     @property
     def coupled(self) -> bool:

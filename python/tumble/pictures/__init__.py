@@ -124,7 +124,7 @@ class Studio:
         camera = self.view(i)
         things = self.stage.things(i, THINNEST * camera.width)
         if self.stage.flat:
-            things = [self._slab(t) if isinstance(t, Ground) else t for t in things]
+            things = [self._slab(t, camera) if isinstance(t, Ground) else t for t in things]
         else:
             # No ground that the camera is inside of.
             things = [
@@ -155,9 +155,8 @@ class Studio:
         point = np.array([0.0, 0.0, low[2] - GAP * float(np.max(high - low))])
         return [Ground("", point, np.array([0.0, 0.0, 1.0]), GROUND)]
 
-    def _slab(self, ground: Ground) -> Thing:
+    def _slab(self, ground: Ground, camera: Camera) -> Thing:
         """A ground of a plane scene, which is seen from the side: what lies below its line."""
-        camera = self.camera
         forward = camera.axes[2]
         normal = unit(ground.normal - forward * float(ground.normal @ forward))
         along = np.cross(normal, forward)

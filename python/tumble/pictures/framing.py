@@ -1,6 +1,8 @@
-"""From where a run is seen: one camera for all frames, all renderers and the USD file; or one that moves, from a USD file.
+"""From where a run is seen: one camera for all renderers and the USD file, the scene's or that of a USD file, at the time of
+each frame.
 
-Where the scene's camera leaves something open, it stands far enough away for everything to fit in at every frame.
+Where the scene's camera leaves something open, it stands far enough away for everything to fit in at every frame; where
+only its target moves, it moves along.
 What must fit are the points that lie farthest out in 26 directions, of each object, in up to 200 frames (fewer where
 they are large); of many particles those few that have strayed far from the others need not. Floors need not fit;
 colliders far larger than what moves need to fit only near it. A two-dimensional scene is seen head-on in parallel
@@ -10,10 +12,12 @@ projection.
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from itertools import product
+from typing import Any
 
 import numpy as np
 
-from tumble._engine import ExportError
+from tumble import _engine
+from tumble._engine import ExportError, SceneError
 from tumble.pictures.surfaces import Floats, unit
 from tumble.pictures.things import Recording, moving, objects, positions
 from tumble.usd.cameras import Shot
@@ -41,6 +45,9 @@ LOOKED_AT = 200
 
 READ = 2e7
 """Numbers that are read for it, about."""
+
+SHEER = 1e-6
+"""Sine of the angle to the zenith, up to which a view has no upright picture."""
 
 
 @dataclass(frozen=True)
@@ -114,54 +121,32 @@ class Camera:
 
 
 def camera(run: Recording, size: tuple[int, int] | None = None, points: Callable[[], Floats] | None = None) -> Camera:
-    """The camera of a run, for pictures of that size; without one, the size that the scene asks for. `points` stands
-    in for `outline(run)`, and is called only if the scene leaves something open."""
-    words: Mapping[str, object] = run.scene.get("camera", {})
-    resolution = words.get("resolution") or (640, 360)
-    width, height = size or (int(resolution[0]), int(resolution[1]))  # type: ignore[index]
-    wish = _point(words.get("position"))
-    target = _point(words.get("target"))
-    plane = run.scene.get("dimension", 3) == 2
-    extent = np.zeros((1, 3))
-    if plane or wish is None or target is None:
-        extent = outline(run) if points is None else points()
-    middle = 0.5 * (extent.min(axis=0) + extent.max(axis=0))
-    if plane:
-        return _head_on(run, extent, middle, wish, target, (width, height), _angle(words))
-    tan = np.tan(np.radians(0.5 * _angle(words)))
-    if wish is not None:
-        goal = middle if target is None else target
-        if not np.linalg.norm(goal - wish) > 0:
-            goal = wish + np.array([0.0, 1.0, 0.0])
-        distance = float(np.linalg.norm(goal - wish))
-        return Camera(wish, goal, _up(goal - wish), 2 * tan * distance, (width, height))
-    goal = middle if target is None else target
-    forward = -unit(np.array(FROM_FRONT))
-    right = unit(np.cross(forward, [0.0, 0.0, 1.0]))
-    up = np.cross(right, forward)
-    slopes = np.array([tan, tan * height / width]) / MARGIN
-    for _ in range(8):
-        d = extent - goal
-        depth = d @ forward
-        across = np.stack([d @ right, d @ up], axis=1)
-        distance = max(float(np.max(np.abs(across) / slopes - depth[:, None])), 1e-9)
-        if target is not None:
-            break
-        # Move the target so that what is seen lies in the middle of the picture.
-        seen = across / (depth[:, None] + distance)
-        shift = 0.5 * (seen.min(axis=0) + seen.max(axis=0)) * distance
-        goal = goal + shift[0] * right + shift[1] * up
-    return Camera(goal - distance * forward, goal, np.array([0.0, 0.0, 1.0]), 2 * tan * distance, (width, height))
+    """The camera of a run at its start, for pictures of that size; without one, the size that the scene asks for. `points`
+    stands in for `outline(run)`, and is called only if the scene leaves something open."""
+    return views(run, None, size, points)(0)
 
 
 def views(
     run: Recording, source: str | None, size: tuple[int, int] | None = None, points: Callable[[], Floats] | None = None
 ) -> Callable[[int], Camera]:
-    """The camera at each frame: the scene's, which stands, or that of a USD file (`follow`)."""
+    """The camera at each frame: the scene's, or that of a USD file (`follow`). The light is that of frame 0. Raises
+    ExportError."""
     if source is not None:
         return follow(run, source, size, points)
-    still = camera(run, size, points)
-    return lambda _: still
+    words: Mapping[str, Any] = run.scene.get("camera", {})
+    resolution = words.get("resolution") or (640, 360)
+    pixels = size or (int(resolution[0]), int(resolution[1]))
+    sights = _sights(run, words)
+    plane = run.scene.get("dimension", 3) == 2
+    extent = np.zeros((1, 3))
+    if plane or sights[0].position is None or sights[0].target is None:
+        extent = outline(run) if points is None else points()
+    taken = _head_on(run, extent, sights, pixels) if plane else _in_space(extent, sights, pixels)
+    first = taken(sights[0])
+    if all(sight == sights[0] for sight in sights):
+        return lambda _: first
+    lit = replace(first, up=first.up if plane else _up(first.target - first.position))
+    return lambda i: replace(taken(sights[i]), lit=lit)
 
 
 def follow(
@@ -190,34 +175,116 @@ def follow(
     return lambda i: replace(taken(i), lit=lit)
 
 
-def _head_on(
-    run: Recording,
-    extent: Floats,
-    middle: Floats,
-    wish: Floats | None,
-    target: Floats | None,
-    size: tuple[int, int],
-    angle: float,
-) -> Camera:
+@dataclass(frozen=True)
+class _Sight:
+    """What a scene says of its camera at one time."""
+
+    position: tuple[float, ...] | None
+    target: tuple[float, ...] | None
+    angle: float
+    """Horizontal angle of view [°]."""
+
+    @property
+    def slope(self) -> float:
+        """Half the width of the picture over the distance."""
+        return float(np.tan(np.radians(0.5 * self.angle)))
+
+    def goal(self, middle: Floats) -> Floats:
+        """The target, by default the middle of everything."""
+        return middle if self.target is None else np.array(self.target)
+
+
+def _sights(run: Recording, words: Mapping[str, Any]) -> list[_Sight]:
+    """The scene's camera at each frame, as the engine says it; at least one. Raises ExportError."""
+    own = {key: words[key] for key in ("position", "target", "view_angle") if words.get(key) is not None}
+    try:
+        *points, angles = _engine.sights(own, [run.time(i) for i in range(run.n_frames)] or [0.0])
+    except SceneError as error:
+        raise ExportError(str(error)) from None
+    positions, targets = ([None] * len(angles) if x is None else [tuple(row) for row in x.tolist()] for x in points)
+    return [_Sight(*sight) for sight in zip(positions, targets, angles.tolist(), strict=True)]
+
+
+def _in_space(extent: Floats, sights: list[_Sight], size: tuple[int, int]) -> Callable[[_Sight], Camera]:
+    """The camera of a sight. Without a position it goes along with its target, as far away as the narrowest view needs."""
+    middle = 0.5 * (extent.min(axis=0) + extent.max(axis=0))
+    if sights[0].position is not None:
+        # One that ever looks to the side has the zenith up throughout, so that it does not flip on its way to the top.
+        steep = all(_up(np.subtract(*_way(sight, middle)))[1] for sight in sights)
+
+        def placed(sight: _Sight) -> Camera:
+            goal, wish = _way(sight, middle)
+            up = np.array([0.0, 1.0, 0.0] if steep or _sheer(goal - wish) else [0.0, 0.0, 1.0])
+            return Camera(wish, goal, up, 2 * sight.slope * float(np.linalg.norm(goal - wish)), size)
+
+        return placed
+    slope = min(sight.slope for sight in sights)
+    if sights[0].target is None:
+        middle, distance = _fitted(extent, middle, slope, size, shift=True)
+    else:
+        distance = max(_fitted(extent, np.array(x), slope, size)[1] for x in {sight.target for sight in sights})
+    away = distance * unit(np.array(FROM_FRONT))
+
+    def fitted(sight: _Sight) -> Camera:
+        goal = sight.goal(middle)
+        return Camera(goal + away, goal, np.array([0.0, 0.0, 1.0]), 2 * sight.slope * distance, size)
+
+    return fitted
+
+
+def _way(sight: _Sight, middle: Floats) -> tuple[Floats, Floats]:
+    """Target and position of a sight that has one, apart in any case."""
+    goal, wish = sight.goal(middle), np.array(sight.position)
+    return (goal if np.linalg.norm(goal - wish) > 0 else wish + np.array([0.0, 1.0, 0.0])), wish
+
+
+def _fitted(
+    extent: Floats, goal: Floats, slope: float, size: tuple[int, int], shift: bool = False
+) -> tuple[Floats, float]:
+    """The target, shifted if asked so that what is seen lies in the middle of the picture, and the distance [m] from where
+    everything is seen."""
+    forward = -unit(np.array(FROM_FRONT))
+    right = unit(np.cross(forward, [0.0, 0.0, 1.0]))
+    up = np.cross(right, forward)
+    slopes = np.array([slope, slope * size[1] / size[0]]) / MARGIN
+    for _ in range(8):
+        d = extent - goal
+        depth = d @ forward
+        across = np.stack([d @ right, d @ up], axis=1)
+        distance = max(float(np.max(np.abs(across) / slopes - depth[:, None])), 1e-9)
+        if not shift:
+            break
+        seen = across / (depth[:, None] + distance)
+        move = 0.5 * (seen.min(axis=0) + seen.max(axis=0)) * distance
+        goal = goal + move[0] * right + move[1] * up
+    return goal, distance
+
+
+def _head_on(run: Recording, extent: Floats, sights: list[_Sight], size: tuple[int, int]) -> Callable[[_Sight], Camera]:
+    """The camera of a sight in a plane. Without a position everything fits at all times."""
     xy = run.scene.get("plane", "xz") == "xy"
     up = np.array([0.0, 1.0, 0.0] if xy else [0.0, 0.0, 1.0])
     back = np.array([0.0, 0.0, 1.0] if xy else [0.0, -1.0, 0.0])
-    goal = middle if target is None else target
-    d = np.abs(extent - goal)
-    width = 2 * MARGIN * max(float(d[:, 0].max()), float((d @ up).max()) * size[0] / size[1])
-    if wish is not None:
-        width = 2 * abs(float((wish - goal) @ back)) * np.tan(np.radians(0.5 * angle)) or width
-    width = max(width, 1e-9)
-    return Camera(goal + 2 * width * back, goal, up, width, size, parallel=True)
+    middle = 0.5 * (extent.min(axis=0) + extent.max(axis=0))
+
+    def fitting(goal: Floats) -> float:
+        d = np.abs(extent - goal)
+        return 2 * MARGIN * max(float(d[:, 0].max()), float((d @ up).max()) * size[0] / size[1])
+
+    whole = max(fitting(goal) for goal in {sight.target: sight.goal(middle) for sight in sights}.values())
+
+    def taken(sight: _Sight) -> Camera:
+        goal, width = sight.goal(middle), whole
+        if sight.position is not None:
+            width = 2 * abs(float((np.array(sight.position) - goal) @ back)) * sight.slope or width
+        width = max(width, 1e-9)
+        return Camera(goal + 2 * width * back, goal, up, width, size, parallel=True)
+
+    return taken
 
 
-def _angle(words: Mapping[str, object]) -> float:
-    angle = words.get("view_angle")
-    return float(angle) if isinstance(angle, int | float) else 35.0
-
-
-def _point(words: object) -> Floats | None:
-    return None if words is None else np.array(words, dtype=float)
+def _sheer(forward: Floats) -> bool:
+    return bool(np.linalg.norm(np.cross(unit(forward), [0.0, 0.0, 1.0])) <= SHEER)
 
 
 def _up(forward: Floats) -> Floats:

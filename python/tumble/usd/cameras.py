@@ -116,7 +116,7 @@ def size(lens: Lens, width: int) -> tuple[int, int]:
 
 
 def _unsaid(shot: Shot, lens: Lens) -> Iterator[Doubt]:
-    """What a camera of a scene, which is upright and stands, is not."""
+    """What is lost of a camera in the words of a scene, whose are upright, at its start."""
     level = np.cross([0.0, 0.0, 1.0], lens.back)
     across = float(np.linalg.norm(level))
     # One that looks straight up or down has no roll.
@@ -126,8 +126,8 @@ def _unsaid(shot: Shot, lens: Lens) -> Iterator[Doubt]:
     if shot.moves:
         yield (
             "camera-in",
-            f"{shot.name} moves, and cameras of scenes stand: it is taken as it is at the start; `tumble run`, `tumble render` "
-            "and `tumble export` follow it with --camera",
+            f"{shot.name} moves, and is taken as it is at the start; `tumble run`, `tumble render` and `tumble export` "
+            "follow it with --camera",
         )
 
 

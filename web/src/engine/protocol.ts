@@ -80,10 +80,20 @@ export interface SceneInfo {
   memory: number;
 }
 
+/** The scene's camera at one time; what is `null`, the page chooses. */
+export interface Sight {
+  position: Vector | null;
+  target: Vector | null;
+  /** Horizontal [°]. */
+  view_angle: number;
+}
+
 export interface Frame {
   index: number;
   time: number;
   columns: Columns;
+  /** The scene's camera at this time; `null` if it stands. */
+  sight: Sight | null;
   /** The books after each frame of this answer; at least the last. */
   ledgers: Ledger[];
   report: StepReport | null;

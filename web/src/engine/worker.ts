@@ -2,7 +2,7 @@
 
 import { Kept } from "./kept";
 import { together } from "./measures";
-import type { Answer, Columns, Failure, Files, Frame, Ledger, Notice, Request, SceneInfo, StepReport } from "./protocol";
+import type { Answer, Columns, Failure, Files, Frame, Ledger, Notice, Request, SceneInfo, Sight, StepReport } from "./protocol";
 import { readable } from "./worth";
 
 type Module = typeof import("./pkg/single");
@@ -73,6 +73,10 @@ function info(world: World): SceneInfo {
   return { ...(JSON.parse(world.info()) as SceneInfo), topology };
 }
 
+function sight(world: World, time: number): Sight | null {
+  return JSON.parse(world.sight(time)) as Sight | null;
+}
+
 function ledger(world: World): Ledger {
   return JSON.parse(world.ledger()) as Ledger;
 }
@@ -83,6 +87,7 @@ function frame(at: Running, asked: { columns?: string[]; hash?: boolean }, done?
     index: world.index(),
     time: world.time(),
     columns: world.columns(asked.columns ?? at.info.columns) as unknown as Columns,
+    sight: sight(world, world.time()),
     ledgers: done?.ledgers?.length ? done.ledgers : [ledger(world)],
     report: done?.report ?? null,
     ms: done?.ms ?? 0,
@@ -165,6 +170,7 @@ function inside(request: Request & { type: "inside" }): Frame | null {
     ...frame(at, { columns: [] }, { ledgers: [ledger], ms: performance.now() - start }),
     columns: found.columns,
     time,
+    sight: sight(at.world, time),
     inside: { substeps: request.substeps, system, step },
   };
 }

@@ -2,7 +2,7 @@
 import * as THREE from "three";
 import { OrbitControls } from "three/examples/jsm/controls/OrbitControls.js";
 import { DRAWN_ON, FOG, GLOWING, GROUND, MATTER, SHADE, SIGNED, SOLID, SPRING, TRAIL } from "../engine/looks";
-import type { Column, Form, Frame, Numbers, SceneInfo, Vector } from "../engine/protocol";
+import type { Column, Form, Frame, Numbers, SceneInfo, Sight, Vector } from "../engine/protocol";
 import { FAMILIES, familiesOf, isOn, linked } from "../links";
 import { Depths } from "./depths";
 import { type Grid, gridOf, type Layer, PIXELS, Pieces, PlaneField, Points, Range, type Rgb, SpaceField, Surface, scalars } from "./layers";
@@ -45,6 +45,12 @@ export class Stage {
   private reach = 1;
   /** The scene's camera: where it stands, what it looks at, the width that its picture shows there [m], and that over its height. */
   private home = { position: new THREE.Vector3(), target: new THREE.Vector3(), width: 1, shape: 16 / 9 };
+  /** All that must fit, as the camera was placed. */
+  private box = new THREE.Box3(new THREE.Vector3(-1, -1, -1), new THREE.Vector3(1, 1, 1));
+  /** The way to the light, in spans of what is seen: that of a camera that moves stands. */
+  private shine = new THREE.Vector3(0, 0, 1);
+  /** Whether the scene's camera moves that of the page, which nobody has turned. */
+  private follows = true;
   private dirty = false;
   private readonly light = new THREE.DirectionalLight(0xffffff, 2.1);
   private readonly sky = new THREE.HemisphereLight(0xffffff, 0xb8b2a8, 1.25);
@@ -99,7 +105,13 @@ export class Stage {
     const controls = new OrbitControls(this.camera, this.canvas);
     controls.enableDamping = false;
     controls.enabled = this.turns;
-    controls.addEventListener("change", () => this.touch());
+    let held = false;
+    controls.addEventListener("start", () => (held = true));
+    controls.addEventListener("end", () => (held = false));
+    controls.addEventListener("change", () => {
+      if (held) this.follows = false;
+      this.touch();
+    });
     return controls;
   }
 
@@ -334,29 +346,55 @@ export class Stage {
 
   private frameCamera(keep: boolean): void {
     if (!this.info) return;
-    const words = (this.info.scene.camera ?? {}) as Entry;
-    const box = this.bounds();
-    const middle = box.getCenter(new THREE.Vector3());
-    const size = box.getSize(new THREE.Vector3());
-    this.reach = Math.max(size.length() * 0.5, 1e-6);
-    const angle = Number(words.view_angle ?? 35);
-    const tan = Math.tan((0.5 * angle * Math.PI) / 180);
-    const wish = Array.isArray(words.position) ? new THREE.Vector3(...(words.position as Vector)) : null;
-    const goal = Array.isArray(words.target) ? new THREE.Vector3(...(words.target as Vector)) : middle;
-    const flat = this.info.dimension === 2;
-    const [w, hgt] = this.size();
-    const [across, down] = (words.resolution ?? [16, 9]) as [number, number];
-    const shape = across / down;
-    const wasFlat = (this.camera as THREE.OrthographicCamera).isOrthographicCamera;
-    if (keep && !!wasFlat === flat) return;
-    if (!!wasFlat !== flat) {
+    this.box = this.bounds();
+    this.reach = Math.max(this.box.getSize(new THREE.Vector3()).length() * 0.5, 1e-6);
+    const { flat } = this;
+    const wasFlat = !!(this.camera as THREE.OrthographicCamera).isOrthographicCamera;
+    if (keep && wasFlat === flat) return;
+    if (wasFlat !== flat) {
       this.controls.dispose();
       this.camera = flat ? new THREE.OrthographicCamera() : new THREE.PerspectiveCamera(35, 1, 0.01, 1000);
       this.controls = this.controlled();
       this.controls.enableRotate = !flat;
     }
-    if (flat) {
-      const top = this.info.plane === "xy";
+    this.place();
+    const away = this.home.position.clone().sub(this.home.target);
+    const left = new THREE.Vector3()
+      .crossVectors(new THREE.Vector3(0, 0, 1), away)
+      .normalize()
+      .negate();
+    this.shine
+      .copy(left)
+      .multiplyScalar(1.1)
+      .add(new THREE.Vector3(0, 0, 1.7))
+      .addScaledVector(away.normalize(), 0.45);
+    this.goHome();
+    this.resize();
+  }
+
+  /** What the scene says of its camera at the frame that is shown. */
+  private get sight(): Sight {
+    if (this.frame?.sight) return this.frame.sight;
+    const words = (this.info?.scene.camera ?? {}) as Entry;
+    // Keys and formulas are known once there is a frame.
+    const point = (of: unknown) => (Array.isArray(of) && of.every((x) => typeof x === "number") ? (of as Vector) : null);
+    const angle = typeof words.view_angle === "number" ? words.view_angle : 35;
+    return { position: point(words.position), target: point(words.target), view_angle: angle };
+  }
+
+  /** Finds where the scene's camera stands now. */
+  private place(): void {
+    const { box, sight } = this;
+    const middle = box.getCenter(new THREE.Vector3());
+    const size = box.getSize(new THREE.Vector3());
+    const tan = Math.tan((0.5 * sight.view_angle * Math.PI) / 180);
+    const wish = sight.position && new THREE.Vector3(...sight.position);
+    const goal = sight.target ? new THREE.Vector3(...sight.target) : middle;
+    const [w, hgt] = this.size();
+    const [across, down] = ((this.info?.scene.camera as Entry | undefined)?.resolution ?? [16, 9]) as [number, number];
+    const shape = across / down;
+    if (this.flat) {
+      const top = this.info?.plane === "xy";
       this.camera.up.set(0, top ? 1 : 0, top ? 0 : 1);
       const tall = top ? size.y : size.z;
       // With grids all of them must be seen, as large as they can.
@@ -369,44 +407,36 @@ export class Stage {
         // What is fitted is fitted to this window.
         shape: wish && !grids ? shape : w / hgt,
       };
-    } else {
-      this.camera.up.set(0, 0, 1);
-      let position = wish;
-      if (!position) {
-        const from = new THREE.Vector3(0.42, -1, 0.4).normalize();
-        const distance = (1.12 * Math.max(size.x * 0.55 + size.y * 0.25, (size.z * 0.55 + size.y * 0.2) * shape)) / tan + 0.35 * size.y;
-        position = goal.clone().addScaledVector(from, Math.max(distance, 1e-6));
-      }
-      if (position.distanceTo(goal) < 1e-9) position.y -= 1;
-      // Straight from above there is no up; a hair beside it there is.
-      const way = goal.clone().sub(position);
-      if (Math.hypot(way.x, way.y) < 1e-6 * way.length()) position = position.clone().add(new THREE.Vector3(0, -1e-3 * way.length(), 0));
-      const distance = position.distanceTo(goal);
-      this.home = { position: position.clone(), target: goal.clone(), width: 2 * tan * distance, shape };
-      (this.camera as THREE.PerspectiveCamera).near = distance * 0.01;
-      (this.camera as THREE.PerspectiveCamera).far = distance * 60;
+      return;
     }
-    this.goHome();
+    this.camera.up.set(0, 0, 1);
+    let position = wish;
+    if (!position) {
+      const from = new THREE.Vector3(0.42, -1, 0.4).normalize();
+      const distance = (1.12 * Math.max(size.x * 0.55 + size.y * 0.25, (size.z * 0.55 + size.y * 0.2) * shape)) / tan + 0.35 * size.y;
+      position = goal.clone().addScaledVector(from, Math.max(distance, 1e-6));
+    }
+    if (position.distanceTo(goal) < 1e-9) position.y -= 1;
+    // Straight from above there is no up; a hair beside it there is.
+    const way = goal.clone().sub(position);
+    if (Math.hypot(way.x, way.y) < 1e-6 * way.length()) position = position.clone().add(new THREE.Vector3(0, -1e-3 * way.length(), 0));
+    const distance = position.distanceTo(goal);
+    this.home = { position: position.clone(), target: goal.clone(), width: 2 * tan * distance, shape };
+    (this.camera as THREE.PerspectiveCamera).near = distance * 0.01;
+    (this.camera as THREE.PerspectiveCamera).far = distance * 60;
   }
 
-  /** Back to the camera of the scene. */
+  /** Back to the camera of the scene, which the picture then follows where it moves. */
   goHome(): void {
+    this.follows = true;
+    if (this.frame?.sight) this.place();
     this.camera.position.copy(this.home.position);
     this.controls.target.copy(this.home.target);
     this.camera.zoom = 1;
-    const shine = this.home.target;
+    const { target } = this.home;
     const span = Math.max(this.seen * 0.75, 1e-6);
-    const away = this.home.position.clone().sub(shine);
-    const left = new THREE.Vector3()
-      .crossVectors(new THREE.Vector3(0, 0, 1), away)
-      .normalize()
-      .negate();
-    this.light.position
-      .copy(shine)
-      .addScaledVector(left, span * 1.1)
-      .add(new THREE.Vector3(0, 0, span * 1.7))
-      .addScaledVector(away.normalize(), span * 0.45);
-    this.light.target.position.copy(shine);
+    this.light.position.copy(target).addScaledVector(this.shine, span);
+    this.light.target.position.copy(target);
     const s = this.light.shadow.camera;
     s.left = s.bottom = -span;
     s.right = s.top = span;
@@ -414,7 +444,7 @@ export class Stage {
     s.far = 5 * span;
     s.updateProjectionMatrix();
     this.controls.update();
-    this.resize();
+    this.lens();
   }
 
   /** Width that the window shows at the target [m]: all of the scene's picture, whose shape may be another. */
@@ -433,6 +463,12 @@ export class Stage {
     const ratio = Math.min(window.devicePixelRatio || 1, 2);
     this.renderer.setPixelRatio(ratio);
     this.renderer.setSize(w, hgt, false);
+    this.lens();
+  }
+
+  /** Shows as much as the scene's camera, in the shape of the window. */
+  private lens(): void {
+    const [w, hgt] = this.size();
     const aspect = w / hgt;
     if (this.camera instanceof THREE.OrthographicCamera) {
       const half = 0.5 * Math.max(this.seen, 1e-9);
@@ -479,6 +515,10 @@ export class Stage {
   show(frame: Frame): void {
     const first = this.frame === null;
     this.frame = frame;
+    if (frame.sight && this.follows) {
+      if (first) this.frameCamera(false);
+      else this.goHome();
+    }
     this.shades.take(this.things, frame, this.look.color, this.look.unseen, this.look.links);
     this.legend = this.shades.legend;
     const far = Math.max(this.seen * 1.6, 1e-6);
@@ -504,7 +544,7 @@ export class Stage {
       });
       this.anchors.pieces.pairs(Float32Array.from(ends.flat()), Uint32Array.from(ends.keys()), SOLID);
     }
-    if (first) {
+    if (first && !frame.sight) {
       const words = (this.info?.scene.camera ?? {}) as Entry;
       if (!words.position || this.flat) this.frameCamera(false);
     }
@@ -720,6 +760,7 @@ export class Stage {
 
   /** Moves the camera by keys: turns (or moves, in a plane) and zooms. */
   nudge(dx: number, dy: number, zoom: number): void {
+    this.follows = false;
     const away = this.camera.position.clone().sub(this.controls.target);
     if (this.camera instanceof THREE.OrthographicCamera) {
       this.camera.zoom *= zoom;

@@ -1,5 +1,6 @@
 //! Output, camera and expectations of a run.
 
+use super::{Animated, AnimatedVector};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -41,19 +42,19 @@ impl Default for Output {
     }
 }
 
-/// Camera of pictures.
+/// Camera of pictures, upright at all times. It may move: position, target and angle of view are taken at the time of each frame.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct Camera {
     /// Position. Default: far enough away to see everything.
     #[schemars(extend("x-unit" = "m"))]
-    pub position: Option<[f64; 3]>,
-    /// Point that it looks at. Default: the centre of the scene.
+    pub position: Option<AnimatedVector>,
+    /// Point that it looks at, never the position. Default: the centre of the scene.
     #[schemars(extend("x-unit" = "m"))]
-    pub target: Option<[f64; 3]>,
-    /// Horizontal angle of view.
-    #[schemars(extend("x-unit" = "°", "exclusiveMinimum" = 0.0, "exclusiveMaximum" = 170.0))]
-    pub view_angle: f64,
+    pub target: Option<AnimatedVector>,
+    /// Horizontal angle of view, above 0 and below 170.
+    #[schemars(extend("x-unit" = "°"))]
+    pub view_angle: Animated,
     /// Width and height of pictures.
     #[schemars(inner(range(min = 16, max = 8192)), extend("x-unit" = "pixel"))]
     pub resolution: [u32; 2],
@@ -63,7 +64,7 @@ pub struct Camera {
 
 impl Default for Camera {
     fn default() -> Self {
-        Self { position: None, target: None, view_angle: 35.0, resolution: [640, 360], look: Look::Studio }
+        Self { position: None, target: None, view_angle: 35.0.into(), resolution: [640, 360], look: Look::Studio }
     }
 }
 

@@ -493,7 +493,10 @@ impl Pool {
         add("id", Data::U32(ids.to_vec()));
         add("age", Data::from(ages.to_vec()));
         if emitter.has_radii() {
-            add("radius", Data::from(ids.iter().enumerate().map(|(k, id)| emitter.radius(*id, self.born(s, k)) as Real).collect::<Vec<Real>>()));
+            add(
+                "radius",
+                Data::from(ids.iter().enumerate().map(|(k, id)| emitter.radius(*id, self.born(s, k)) as Real).collect::<Vec<Real>>()),
+            );
         }
         if let (true, Some(mass)) = (emitter.has_masses(), mass.get(self.rows(s))) {
             add("mass", Data::from(mass.to_vec()));

@@ -268,7 +268,9 @@ pub fn scenery(thing: &Thing, meshes: &[Mesh], solid: Option<&Collider>) -> Mesh
         (Words::Character(_) | Words::Mannequin(_), Some(facets)) => {
             Mesh { vertices: facets.vertices(0.0), triangles: facets.triangles().to_vec(), ..Mesh::default() }
         }
-        (_, Some(facets)) if thing.motion.as_ref().and_then(size).is_some() => Mesh { vertices: facets.vertices(0.0), ..shown(thing, meshes) },
+        (_, Some(facets)) if thing.motion.as_ref().and_then(size).is_some() => {
+            Mesh { vertices: facets.vertices(0.0), ..shown(thing, meshes) }
+        }
         _ => shown(thing, meshes),
     }
 }

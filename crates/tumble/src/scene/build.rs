@@ -1,6 +1,7 @@
 //! From a resolved scene to a world: checks all, builds all, and tells all that is wrong in one list.
 
 use super::Assets;
+use super::camera;
 use super::checks::check;
 use super::coincident;
 use super::coupling;
@@ -103,6 +104,7 @@ pub fn build(scene: &Scene, assets: &Assets) -> Result<Built, SceneError> {
         builder.warnings.extend(far::solids(scene, &builder.colliders));
     }
     Reader::new(scene, &mut builder.issues).flow("field", &scene.field);
+    builder.issues.extend(camera::check(scene));
     builder.anchors = Arc::new(coupling::fasten(builder.scene, &mut builder.masses, &mut builder.issues));
     builder.warnings.extend(builder.anchors.iter().filter_map(|link| coincident::anchor(&builder.masses, link)));
     builder.sound = builder.issues.is_empty();

@@ -1,6 +1,7 @@
 //! L8: from a scene to a simulation.
 
 mod build;
+mod camera;
 mod checks;
 mod coincident;
 mod coupling;
@@ -18,6 +19,7 @@ mod overrides;
 mod plausible;
 mod simulation;
 
+pub use camera::{Camera, Sight};
 pub use looks::looks;
 pub use memory::memory;
 pub use methods::resolve;

@@ -34,7 +34,9 @@ impl Features {
         let Self { hair, holds, followers, self_contact, fracture, liquid_loads, .. } = self;
         let hair = hair.iter_mut().map(|f| f as &mut dyn Feature);
         let contact = self_contact.iter_mut().map(|f| f as &mut dyn Feature);
-        hair.chain([holds as &mut dyn Feature, followers as &mut dyn Feature]).chain(contact).chain([fracture as &mut dyn Feature, liquid_loads])
+        hair.chain([holds as &mut dyn Feature, followers as &mut dyn Feature])
+            .chain(contact)
+            .chain([fracture as &mut dyn Feature, liquid_loads])
     }
 
     /// Whether none acts on masses without elements.

@@ -89,12 +89,11 @@ impl Core {
         let (laws, colliders, resting) = (&self.laws, &self.laws.colliders[..], self.resting_speed(h));
         let every = 0..usize::MAX;
         let observed: &[Range<usize>] = if self.pool.heeds_hits(s) { std::slice::from_ref(&every) } else { &[] };
-        let touch =
-            |i: usize, (t, h, lead): (f64, f64, f64), before: (Row, Row), x: &mut Row, v: &mut Row, found: &mut Found| {
-                let step = Contact { t, h, resting, lead, observed: false, least_thickness: 0.0 };
-                let pass = Pass { colliders, step, penalty: false, observed, liquids: &[] };
-                !colliders.is_empty() && h > 0.0 && pass.mass(i, before, x, v, found)
-            };
+        let touch = |i: usize, (t, h, lead): (f64, f64, f64), before: (Row, Row), x: &mut Row, v: &mut Row, found: &mut Found| {
+            let step = Contact { t, h, resting, lead, observed: false, least_thickness: 0.0 };
+            let pass = Pass { colliders, step, penalty: false, observed, liquids: &[] };
+            !colliders.is_empty() && h > 0.0 && pass.mass(i, before, x, v, found)
+        };
         let rate = self.stiffness_of(object, births, &masses);
         let scheme = if self.integrator.is_implicit() || self.integrator.is_adaptive() { Integrator::Midpoint } else { self.integrator };
         let one = |start: usize, births: &[Birth], x: &mut [Row], v: &mut [Row]| -> Result<Vec<(usize, Hit)>, StepError> {
