@@ -345,6 +345,7 @@ fn a_size_that_cannot_be_is_told() {
         assert!(error.contains(expected), "{shape} {scale}: {error}");
     }
     assert_eq!(of(sphere, "{ keys = [[0, 1], [1, 2]], interpolation = \"smooth\" }"), "");
+}
 
 /// A camera that moves is checked at all frames and keys, each word once, with the first time and a cure; one that stands as before.
 #[test]

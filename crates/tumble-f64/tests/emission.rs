@@ -817,7 +817,8 @@ fn what_changes_in_time_is_that_of_the_birth() {
             assert!((0..3).all(|c| (color[3 * k + c] - expected[c]).abs() < 1e-6), "{id}: {expected:?} {:?}", &color[3 * k..3 * k + 3]);
         }
         let alive = (0..).map(|i| (i, born(i))).take_while(|(_, born)| *born < t + 1e-9);
-        let surely = |least: f64| alive.clone().filter(|(_, born)| t - born < lifetime(*born) + least).map(|(i, _)| i).collect::<HashSet<_>>();
+        let surely =
+            |least: f64| alive.clone().filter(|(_, born)| t - born < lifetime(*born) + least).map(|(i, _)| i).collect::<HashSet<_>>();
         let found: HashSet<u32> = ids.into_iter().collect();
         assert!(surely(-1e-6).is_subset(&found) && found.is_subset(&surely(1e-6)), "frame {frame}");
         found.len()
@@ -836,7 +837,10 @@ fn what_changes_in_time_is_that_of_the_birth() {
     other.restore(&saved).unwrap();
     check(&other, 20);
     run(&mut other, 28);
-    assert_eq!((numbers(&other, "p", "radius"), numbers(&other, "p", "color")), (numbers(&sim, "p", "radius"), numbers(&sim, "p", "color")));
+    assert_eq!(
+        (numbers(&other, "p", "radius"), numbers(&other, "p", "color")),
+        (numbers(&sim, "p", "radius"), numbers(&sim, "p", "color"))
+    );
 }
 
 #[test]

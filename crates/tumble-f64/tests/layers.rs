@@ -272,7 +272,13 @@ fn a_cloth_lies_on_hair() {
                  isometric = 1e-6\n[[force]]\nkind = \"drag\"\nrate = 2\n[expect]\nmax_intersections = 0\n";
     let lowest = |system: &str| {
         let mut sim = brush(system, cloth);
-        let crossed = (0..45).map(|_| { step(&mut sim); sim.ledger().intersections.unwrap() }).max().unwrap();
+        let crossed = (0..45)
+            .map(|_| {
+                step(&mut sim);
+                sim.ledger().intersections.unwrap()
+            })
+            .max()
+            .unwrap();
         let x = positions(&sim, "c");
         (x.iter().map(|x| x.z).sum::<f64>() / x.len() as f64, crossed)
     };

@@ -40,7 +40,9 @@ fn what_solids_feel_is_what_the_liquid_loses() {
     // Half of the tank, so that it sloshes, onto a ball that moves.
     let more = "[[collider]]\nname = \"ball\"\nrestitution = 0.4\nfriction = 0.5\nshape.sphere = { center = [0.3, 0, 0.2], radius = 0.1 }\n\
                 motion.velocity = [-0.2, 0, 0.05]\n";
-    let mut sim = simulation(&water(0.05, 0.3, [1.2, 0.4, 0.4], more).replace("center = [0, 0, 0.2], size = [1.2", "center = [-0.3, 0, 0.2], size = [0.6"));
+    let mut sim = simulation(
+        &water(0.05, 0.3, [1.2, 0.4, 0.4], more).replace("center = [0, 0, 0.2], size = [1.2", "center = [-0.3, 0, 0.2], size = [0.6"),
+    );
     let solids = ["floor", "west", "east", "south", "north", "ball"];
     let weight = sim.ledger().mass * 9.8;
     let (mut worst, mut most) = (0.0_f64, [0.0_f64; 6]);
@@ -110,7 +112,11 @@ fn the_pressure_of_water_at_rest_is_that_of_its_depth() {
         })
         .collect();
     let side = 0.5 * rho_g * height * height * size[0];
-    println!("height {height:.4}; layers {layers:.3?}\nfloor {:?} of the weight; sides {:.4?} of {side:.2}", floor * (1.0 / weight), sides.map(|s| s / side));
+    println!(
+        "height {height:.4}; layers {layers:.3?}\nfloor {:?} of the weight; sides {:.4?} of {side:.2}",
+        floor * (1.0 / weight),
+        sides.map(|s| s / side)
+    );
     assert!((floor - vector(0.0, 0.0, -weight)).norm() < 2e-3 * weight, "{floor:?} {weight}");
     assert!(sides.iter().all(|s| (s / side - 1.0).abs() < 0.05), "{sides:?} {side}");
     for [_, p, exact] in &layers[1..8] {
