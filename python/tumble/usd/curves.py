@@ -104,6 +104,7 @@ def _polylines(curves: Any, time: Any, most: int) -> list[Floats]:
         k = int(np.flatnonzero(~fits)[0])
         kind = f"{basis} curve" if cubic else "linear curve"
         more = ", 7, 10 and so on" if basis == "bezier" and cubic else " or more"
+        more += '; straight pieces have type = "linear"' if cubic else ""
         raise ValueError(
             f"{path}: curve {k + 1} has {counts[k]} points, a {kind} has {least}{more}; export it again, or leave it out"
         )

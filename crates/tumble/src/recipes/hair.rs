@@ -9,7 +9,7 @@
 use super::Site;
 use super::guides::{combed, guided};
 use crate::geometry::motion::Pose;
-use crate::geometry::{Carrier, Collider, Sampler, Vector};
+use crate::geometry::{Carrier, Collider, Sampler, Vector, spread};
 use crate::math::functions::{cos, sin};
 use crate::math::rotation::from_z_to;
 use crate::math::{Quat, Random};
@@ -19,6 +19,9 @@ use tumble_interface::scene::Hair;
 
 /// Roots that are tried for each that must be above a height.
 const TRIES: u32 = 4096;
+/// Random points for each root that is wanted, and in all as long as there are two for each.
+const CANDIDATES: u64 = 5;
+const MOST_CANDIDATES: u64 = 2_000_000;
 /// Times that a point is moved out of a solid.
 const COMB: usize = 6;
 /// Strands at most.
@@ -99,16 +102,10 @@ fn grown(site: &mut Site<'_>, thing: &Hair, seed: u32, mesh: Option<&Mesh>) -> O
             return wrong(".segments", message);
         }
     }
-    let count = wanted as u64;
     let random = Random::new(seed, &thing.name);
-    let mut roots: Vec<(Vector, Vector)> = Vec::with_capacity(count as usize);
-    for id in 0..count {
-        let found = (0..TRIES).map(|k| sampler.sample(&|j| random.uniform(id, k, j))).find(|(x, _)| thing.above.is_none_or(|z| x.z > z));
-        let Some(root) = found else {
-            return wrong(".above", "almost none of the surface is above this height; lower it".into());
-        };
-        roots.push(root);
-    }
+    let Some(roots) = sown(&sampler, &random, wanted as u64, (thing.above, area)) else {
+        return wrong(".above", "almost none of the surface is above this height; lower it".into());
+    };
     let grown: Vec<Vec<Vector>> = roots.iter().enumerate().map(|(i, root)| strand(thing, &random, i as u64, *root)).collect();
     let Some(clump) = &thing.clump else { return Some(grown) };
     let middles = (clump.count as usize).min(roots.len());
@@ -117,6 +114,22 @@ fn grown(site: &mut Site<'_>, thing: &Hair, seed: u32, mesh: Option<&Mesh>) -> O
         drawn(&grown[i], &grown[near], clump.strength)
     };
     Some((0..grown.len()).map(|i| if i < middles { grown[i].clone() } else { shape(i) }).collect())
+}
+
+/// Roots in blue noise above a height on a surface of that area, in an order in which the first ones of any number, centres of clumps, are in blue
+/// noise, too. `None` where almost nothing is above the height.
+fn sown(sampler: &Sampler, random: &Random, count: u64, (above, area): (Option<f64>, f64)) -> Option<Vec<(Vector, Vector)>> {
+    let candidates = (CANDIDATES * count).min(MOST_CANDIDATES).max(2 * count);
+    let mut tried = 0;
+    let mut one = |id: u64| {
+        let at = |k: u32| sampler.sample(&|j| random.uniform(id, k, j));
+        let (k, root) = (0..TRIES).map(|k| (k, at(k))).find(|(_, (x, _))| above.is_none_or(|z| x.z > z))?;
+        tried += u64::from(k) + 1;
+        Some(root)
+    };
+    let points: Vec<(Vector, Vector)> = (0..candidates).map(&mut one).collect::<Option<_>>()?;
+    let order = spread(&points, count as usize, area * candidates as f64 / tried as f64);
+    Some(order.into_iter().map(|i| points[i as usize]).collect())
 }
 
 /// The nearest of some roots.
