@@ -17,6 +17,13 @@ SEGMENTS = 24
 BEZIER = np.array([[0, 10, 0], [0, 13, 0], [4, 14, 1], [4, 8, 2], [4, 5, 2.5], [2, 4, 3], [0, 4, 3]], dtype=float)
 """Two spans in centimetres, y up."""
 
+TRIANGLE = """def Mesh "skin" {
+    int[] faceVertexCounts = [3]
+    int[] faceVertexIndices = [0, 1, 2]
+    point3f[] points = [(0, 0, 0), (1, 0, 0), (0, 1, 0)]
+}
+"""
+
 
 def tree(path: str, more: dict[str, Any] | None = None, **words: Any) -> dict[str, Any]:
     hair = {"name": "h", "guides": {"path": path, **(more or {})}, "segments": SEGMENTS} | words
@@ -53,7 +60,7 @@ def apart(x: Any, y: Any) -> float:
 
 def test_cubic_curves_below_a_transform_land_where_they_should(tmp_path: Path) -> None:
     pytest.importorskip("pxr")
-    other = BEZIER + [1.0, 0.5, -2.0]
+    other = BEZIER + np.array([1.0, 0.5, -2.0])
     inner = prim(np.concatenate([BEZIER, other]), [7, 7], type="cubic", basis="bezier")
     body = (
         'def Xform "groom" {\n    double3 xformOp:translate = (0, 100, 0)\n    float xformOp:rotateY = 90\n'
@@ -96,7 +103,9 @@ def test_splines_are_those_of_their_basis(tmp_path: Path, basis: str, wrap: str)
         exact = BSpline(np.arange(len(c) + 4), c, 3)(u)
     else:
         # Hermite pieces whose slopes are those of the chords beside them.
-        bezier = [[c[i], c[i] + (c[i + 1] - c[i - 1]) / 6, c[i + 1] - (c[i + 2] - c[i]) / 6] for i in range(1, len(c) - 2)]
+        bezier = [
+            [c[i], c[i] + (c[i + 1] - c[i - 1]) / 6, c[i + 1] - (c[i + 2] - c[i]) / 6] for i in range(1, len(c) - 2)
+        ]
         exact = spans(np.concatenate([np.concatenate(bezier), c[-2:-1]]), np.linspace(0, 1, 2500))
     np.testing.assert_allclose(found[[0, -1]], exact[[0, -1]], atol=1e-6)
     if wrap == "pinned":
@@ -111,8 +120,7 @@ def test_straight_curves_are_exact_and_what_cannot_be_used_is_named(tmp_path: Pa
     closed = prim(line, [3], type="linear", wrap="periodic").replace("strands", "ring")
     nurbs = prim(line, [3], kind="NurbsCurves").replace("strands", "nurbs")
     hidden = prim(line, [3], type="linear", purpose="proxy").replace("strands", "proxy")
-    mesh = 'def Mesh "skin" {\n    int[] faceVertexCounts = [3]\n    int[] faceVertexIndices = [0, 1, 2]\n    point3f[] points = [(0, 0, 0), (1, 0, 0), (0, 1, 0)]\n}\n'
-    name = write(tmp_path, prim(line, [3], type="linear") + closed + nurbs + hidden + mesh)
+    name = write(tmp_path, prim(line, [3], type="linear") + closed + nurbs + hidden + TRIANGLE)
     with pytest.warns(usd.UsdWarning, match="periodic"):
         scene = Scene(tree(name), tmp_path)
     world = World(scene)
@@ -133,15 +141,29 @@ def test_straight_curves_are_exact_and_what_cannot_be_used_is_named(tmp_path: Pa
 def test_bad_grooms_are_told_with_their_cure(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     pytest.importorskip("pxr")
     line = [[0, 0, 0], [0, 0, 1]]
-    triangle = 'def Mesh "skin" {\n    int[] faceVertexCounts = [3]\n    int[] faceVertexIndices = [0, 1, 2]\n    point3f[] points = [(0, 0, 0), (1, 0, 0), (0, 1, 0)]\n}\n'
     cases = [
-        (triangle, "there are no curves in it; export the strands as BasisCurves that are visible, or let hair grow on a mesh"),
-        (prim(line, [2], type="linear", wrap="periodic"), "what is in it cannot be used: /strands (BasisCurves, periodic"),
-        (prim(line, [2], type="linear", visibility="invisible").replace("uniform token vis", "token vis"), "left out as invisible"),
+        (
+            TRIANGLE,
+            "there are no curves in it; export the strands as BasisCurves that are visible, or let hair grow on a mesh",
+        ),
+        (
+            prim(line, [2], type="linear", wrap="periodic"),
+            "what is in it cannot be used: /strands (BasisCurves, periodic",
+        ),
+        (
+            prim(line, [2], type="linear", visibility="invisible").replace("uniform token vis", "token vis"),
+            "left out as invisible",
+        ),
         (prim(line, [2]), "/strands: curve 1 has 2 points, a bezier curve has 4, 7, 10 and so on"),
-        (prim([*line, *line], [2, 1, 1], type="linear"), "/strands: curve 2 has 1 points, a linear curve has 2 or more"),
+        (
+            prim([*line, *line], [2, 1, 1], type="linear"),
+            "/strands: curve 2 has 1 points, a linear curve has 2 or more",
+        ),
         (prim(line, [3], type="linear"), "/strands: its curves do not fit its points"),
-        (prim([*line, *line], [2, 2], type="linear").replace("(0.0, 0.0, 1.0)]", "(nan, 0, 1)]"), "/strands: curve 2 goes through"),
+        (
+            prim([*line, *line], [2, 2], type="linear").replace("(0.0, 0.0, 1.0)]", "(nan, 0, 1)]"),
+            "/strands: curve 2 goes through",
+        ),
         (prim([*line, [1, 1, 1], [1, 1, 1]], [2, 2], type="linear"), "curve 2 has no length"),
         ("", "there are no curves in it"),
     ]
@@ -157,7 +179,10 @@ def test_bad_grooms_are_told_with_their_cure(tmp_path: Path, monkeypatch: pytest
         Scene(tree("none.usda"), tmp_path)
     # Curves are no mesh.
     name = write(tmp_path, prim(line, [2], type="linear"))
-    with pytest.raises(SceneError, match="there is no mesh in it; what is in it cannot be used: /strands .*hair takes curves as guides"):
+    with pytest.raises(
+        SceneError,
+        match=r"there is no mesh in it; what is in it cannot be used: /strands .*hair takes curves as guides",
+    ):
         Scene({"version": 1, "net": [{"name": "n", "mesh": {"path": name}}]}, tmp_path)
     (tmp_path / "skin.obj").write_text("v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n")
     with pytest.raises(SceneError, match="it has faces and no curves"):
