@@ -94,8 +94,8 @@ pub struct Hair {
     pub color: Option<[f64; 3]>,
 }
 
-/// Strands as they were groomed: curves of a file, the polylines (`l`) of an OBJ, or outside the browser the `BasisCurves` of USD; scaled, rotated, then
-/// translated. Each is a strand that begins at its root. With `on`, they lie as on the collider before its motion.
+/// Strands as they were groomed: curves of a file, the polylines (`l`) of an OBJ, or outside the browser the `BasisCurves` of USD; scaled, rotated,
+/// then translated. Each is a strand that begins at its root. With `on`, they lie as on the collider before its motion.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Guides {

@@ -105,8 +105,8 @@ fn loose(site: &mut Site<'_>, thing: &Hair, grown: &[Vec<Vector>], ground: &Grou
     let Worst { count, strand, off } = far;
     let at: [f64; 3] = shape[0].into();
     let message = format!(
-        "{count} of {} roots are off the surface by more than {}% of their strands, that of curve {strand}, at [{}], by {} m; they stay there and move \
-         with the nearest part of it. Fit scale, rotate and translate, or attach the roots in the groom",
+        "{count} of {} roots are off the surface by more than {}% of their strands, that of curve {strand}, at [{}], by {} m; they stay there and \
+         move with the nearest part of it. Fit scale, rotate and translate, or attach the roots in the groom",
         grown.len(),
         100.0 * OFF,
         at.map(short).join(", "),
