@@ -195,7 +195,7 @@ def test_instances_without_end_are_refused(tmp_path: Path, monkeypatch: pytest.M
     itself = write(tmp_path, INSTANCER.replace("[</rocks/kinds/small>, ", "[</rocks>, "), name="itself.usda")
     with pytest.raises(SceneError, match=r"/rocks: is an instance of itself"):
         load_mesh(itself)
-    monkeypatch.setattr("tumble.usd.stage._MOST", 11)
+    monkeypatch.setattr("tumble.usd.stage.MOST", 11)
     with pytest.raises(SceneError, match=r"more than 11 points, instances included"):
         load_mesh(write(tmp_path, INSTANCER))
 

@@ -153,7 +153,7 @@ class Scene:
     @property
     def mesh_files(self) -> list[tuple[str, int | None, str]]:
         """The mesh files that it names: place of the name in the resolved scene, its line or None, and the path as it stands
-        there, FILE/CODE.usd for a frame of an animated USD file. Files of figures are left out."""
+        there, FILE/CODE.usd for a frame of an animated USD file. Files of figures and of guides are left out."""
 
     @property
     def whole_frames(self) -> int:

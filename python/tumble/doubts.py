@@ -23,9 +23,11 @@ _GAINS = ("forward_euler", "modified_euler", "midpoint", "heun")
 """Integrators that gain energy of oscillations at any step."""
 
 
-def of_files(scene: "Scene", figures: Sequence[tuple[str, str]] = ()) -> list[dict[str, str]]:
-    """Code, path and message of what is not as it seems in the USD files of a scene, and of its characters, of which `figures`
-    has place and path; `World.warnings` asks for it."""
+def of_files(
+    scene: "Scene", figures: Sequence[tuple[str, str]] = (), guides: Sequence[tuple[str, str]] = ()
+) -> list[dict[str, str]]:
+    """Code, path and message of what is not as it seems in the USD files of a scene, and of its characters and the guides of
+    hair, of which `figures` and `guides` have place and path; `World.warnings` asks for it."""
     from tumble.usd import told
     from tumble.usd.frames import FIGURE, parted
 
@@ -49,6 +51,10 @@ def of_files(scene: "Scene", figures: Sequence[tuple[str, str]] = ()) -> list[di
         if Path(path).name == FIGURE and told.is_usd(file := (Path(scene.folder) / path).parent):
             with suppress(OSError):
                 found[place] = [{"code": code, "path": place, "message": text} for code, text in told.of_figure(file)]
+    for place, path in guides:
+        if told.is_usd(file := Path(scene.folder) / path):
+            with suppress(OSError):
+                found[place] = [{"code": code, "path": place, "message": text} for code, text in told.of_strands(file)]
     return [warning for some in found.values() for warning in some]
 
 

@@ -36,6 +36,27 @@ fn strands_are_planted_evenly_and_as_long_as_said() {
     }
 }
 
+/// The first roots of any number, centres of clumps among them, keep apart; and above a height.
+#[test]
+fn roots_are_in_blue_noise() {
+    for above in ["", "above = 1.02\n"] {
+        let sim = simulation(&format!("{BALL}[[hair]]\nname = \"h\"\non = \"ball\"\ncount = 1000\nlength = 0.01\nsegments = 1\n{above}"));
+        let roots = roots(&positions(&sim, "h"), 2);
+        assert_eq!(roots.len(), 1000);
+        assert!(above.is_empty() || roots.iter().all(|x| x.z > 1.02));
+        // Zones of a ball have the area 2 pi R h.
+        let area = std::f64::consts::TAU * 0.1 * if above.is_empty() { 0.2 } else { 0.08 };
+        for (n, least) in [(1000, 0.6), (250, 0.5), (30, 0.5)] {
+            let lattice = (2.0 / 3.0_f64.sqrt() * area / n as f64).sqrt();
+            let pairs = (0..n).flat_map(|i| (0..i).map(move |j| (i, j)));
+            let closest = pairs.map(|(i, j)| (roots[i] - roots[j]).norm()).fold(f64::INFINITY, f64::min) / lattice;
+            // Of as many at random the closest are at 0.01 to 0.05 of it; a lattice has 1.
+            println!("{above:?}: the closest of the first {n} roots are at {closest:.3} of the distance in a lattice");
+            assert!(closest > least && closest < 1.0, "{n}: {closest}");
+        }
+    }
+}
+
 #[test]
 fn groomed_hair_is_at_rest() {
     // Curled, leaning and in clumps, without gravity: nothing moves, and nothing is stored.

@@ -23,6 +23,7 @@ mod emission;
 mod events;
 mod fabrics;
 mod free_bodies;
+mod guides;
 mod hair;
 mod hand;
 mod layers;

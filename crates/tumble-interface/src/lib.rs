@@ -22,7 +22,7 @@ pub mod tree;
 pub mod triples;
 pub mod warning;
 
-pub use assets::Assets;
+pub use assets::{Assets, Curves};
 pub use character::Character;
 pub use engine::Engine;
 pub use error::{Issue, SceneError, StepError};

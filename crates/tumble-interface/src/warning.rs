@@ -65,6 +65,12 @@ codes! {
     FoldedPattern = "folded-pattern",
     /// A mesh of soft matter with flaws.
     UnsoundMesh = "unsound-mesh",
+    /// Guides whose roots are off what they grow on.
+    FarRoots = "far-roots",
+    /// Guides with bends too fine for their pieces.
+    CoarseGuides = "coarse-guides",
+    /// Guides that were moved out of a collider.
+    CombedGuides = "combed-guides",
     /// Tetrahedra that cannot bend at constant volume.
     Locking = "locking",
     /// Rods that shake under their tension in sub-steps that long.

@@ -1,11 +1,11 @@
 //! The files that a scene names, resolved for every front: what is read of each, the hash of its content, and all that is wrong with them.
 //! Where bytes come from is the front's ([`Files`]). Verified by `tests/assets.rs`.
 
-use crate::{Format, character, fabric, mesh, record_is_json, shipped};
+use crate::{Format, character, curves, fabric, has_curves, mesh, record_is_json, shipped};
 use std::collections::HashMap;
 use std::sync::{Arc, Mutex, OnceLock, PoisonError};
-use tumble_interface::scene::FabricRef;
-use tumble_interface::{Assets, Character, Fabric, Issue, Mesh, Scene, SceneError};
+use tumble_interface::scene::{Content, FabricRef};
+use tumble_interface::{Assets, Character, Curves, Fabric, Issue, Mesh, Scene, SceneError};
 use twox_hash::XxHash3_64;
 
 /// Where a front finds the files of a scene.
@@ -18,6 +18,14 @@ pub trait Files {
     /// The file of a path, as it stands in the scene; or one line that says why there is none.
     fn open(&mut self, path: &str) -> Result<Arc<File>, String>;
 
+    /// The same of a file whose curves are wanted.
+    ///
+    /// # Errors
+    /// As [`open`](Self::open).
+    fn open_curves(&mut self, path: &str) -> Result<Arc<File>, String> {
+        self.open(path)
+    }
+
     /// The path as messages show it.
     fn shown(&self, path: &str) -> String {
         path.into()
@@ -27,11 +35,13 @@ pub trait Files {
 /// A file. What it holds is read when it is first asked for, and once.
 #[derive(Debug)]
 pub struct File {
-    /// Empty once they have been read, but for figures, which are meshes, too.
+    /// Empty once they have been read, unless they are `kept`.
     bytes: Mutex<Vec<u8>>,
     hash: String,
     /// Whether it may hold a figure.
     figure: bool,
+    /// Whether it may be read in two ways: figures are meshes, too, and meshes may have curves beside them.
+    kept: bool,
     format: Option<Format>,
     /// Name of the format that it was converted from.
     converted: Option<&'static str>,
@@ -39,32 +49,36 @@ pub struct File {
     mesh: OnceLock<Result<Mesh, String>>,
     character: OnceLock<Result<Character, String>>,
     fabric: OnceLock<Result<Fabric, String>>,
+    curves: OnceLock<Result<Curves, String>>,
 }
 
 impl File {
     /// A file of this path and content.
     pub fn new(path: &str, bytes: Vec<u8>) -> Self {
+        let figure = Format::from_path(path) == Some(Format::Glb) || path.to_lowercase().ends_with(".gltf");
         Self {
+            kept: figure || Format::from_path(path) == Some(Format::Obj) && has_curves(&bytes),
             hash: format!("{:016x}", XxHash3_64::oneshot(&bytes)),
             bytes: Mutex::new(bytes),
-            figure: Format::from_path(path) == Some(Format::Glb) || path.to_lowercase().ends_with(".gltf"),
+            figure,
             format: Format::from_path(path),
             converted: None,
             json: record_is_json(path),
             mesh: OnceLock::new(),
             character: OnceLock::new(),
             fabric: OnceLock::new(),
+            curves: OnceLock::new(),
         }
     }
 
-    /// The same, where its mesh was written out as OBJ from a format of that name.
+    /// The same, where its mesh or its curves were written out as OBJ from a format of that name.
     pub fn converted(self, name: &'static str, obj: String) -> Self {
         Self { bytes: Mutex::new(obj.into_bytes()), format: Some(Format::Obj), converted: Some(name), ..self }
     }
 
     /// The same, where its figure was written out as GLB.
     pub fn figure(self, glb: Vec<u8>) -> Self {
-        Self { bytes: Mutex::new(glb), figure: true, format: Some(Format::Glb), ..self }
+        Self { bytes: Mutex::new(glb), figure: true, kept: true, format: Some(Format::Glb), ..self }
     }
 
     /// Hash of its content.
@@ -76,7 +90,7 @@ impl File {
     fn read<T>(&self, read: impl FnOnce(&[u8]) -> T) -> T {
         let mut bytes = self.bytes.lock().unwrap_or_else(PoisonError::into_inner);
         let value = read(&bytes);
-        if !self.figure {
+        if !self.kept {
             *bytes = Vec::new();
         }
         value
@@ -84,12 +98,18 @@ impl File {
 
     /// Its mesh; or what is wrong, in one line.
     pub fn mesh(&self) -> Result<&Mesh, &str> {
-        let read = || {
-            let format = self.format.ok_or_else(|| format!("it has none of the suffixes {}", suffixes(&[])))?;
-            self.read(|bytes| mesh(bytes, format))
-                .map_err(|e| self.converted.map_or_else(|| e.clone(), |name| e.replacen(format.name(), name, 1)))
-        };
-        self.mesh.get_or_init(read).as_ref().map_err(String::as_str)
+        self.mesh.get_or_init(|| self.of_format(mesh)).as_ref().map_err(String::as_str)
+    }
+
+    /// Its curves; or what is wrong, in one line.
+    pub fn curves(&self) -> Result<&Curves, &str> {
+        self.curves.get_or_init(|| self.of_format(curves)).as_ref().map_err(String::as_str)
+    }
+
+    fn of_format<T>(&self, of: fn(&[u8], Format) -> Result<T, String>) -> Result<T, String> {
+        let format = self.format.ok_or_else(|| format!("it has none of the suffixes {}", suffixes(&[])))?;
+        self.read(|bytes| of(bytes, format))
+            .map_err(|e| self.converted.map_or_else(|| e.clone(), |name| e.replacen(format.name(), name, 1)))
     }
 
     /// Its figure; or what is wrong, in one line.
@@ -111,6 +131,7 @@ impl File {
         let read = match (self.json, self.mesh()) {
             (Some(_), _) => self.fabric().map(drop),
             (None, Err(e)) if self.figure => self.character().map(drop).map_err(|_| e),
+            (None, Err(_)) if self.kept => self.curves().map(drop),
             (None, mesh) => mesh.map(drop),
         };
         read.map_err(|e| format!("\"{path}\": {e}"))
@@ -127,16 +148,22 @@ fn suffixes(more: &[&str]) -> String {
     all.join(", ")
 }
 
-/// The mesh of a path, and the hash of the file.
-///
-/// # Errors
-/// One line: what is wrong with the file, and what to do.
-pub fn mesh_of<F: Files>(files: &mut F, path: &str) -> Result<(Mesh, String), String> {
+/// The path as messages show it; an error where it has none of the suffixes of meshes.
+fn known<F: Files>(files: &F, path: &str) -> Result<String, String> {
     let shown = files.shown(path);
     let suffix = path.rsplit_once('.').map_or("", |(_, suffix)| suffix);
     if Format::from_path(path).is_none() && !F::CONVERTED.iter().any(|known| known.eq_ignore_ascii_case(suffix)) {
         return Err(format!("\"{shown}\" has none of the suffixes {}", suffixes(F::CONVERTED)));
     }
+    Ok(shown)
+}
+
+/// The mesh of a path, and the hash of the file.
+///
+/// # Errors
+/// One line: what is wrong with the file, and what to do.
+pub fn mesh_of<F: Files>(files: &mut F, path: &str) -> Result<(Mesh, String), String> {
+    let shown = known(files, path)?;
     let file = files.open(path)?;
     let hash = file.hash().to_string();
     file.mesh().map_err(|e| format!("\"{shown}\": {e}"))?;
@@ -168,23 +195,31 @@ pub fn fabric_of<F: Files>(files: &mut F, path: &str) -> Result<(Fabric, Arc<Fil
 /// All that is wrong with them, at their places in the scene.
 pub fn assets<F: Files>(scene: &mut Scene, files: &mut F) -> Result<Assets, SceneError> {
     let mut issues = Vec::new();
-    // Of what has been opened, whether as a figure: its hash, or what is wrong with it.
-    let mut opened: HashMap<(bool, String), Result<String, String>> = HashMap::new();
-    let (mut meshes, mut characters, mut fabrics) = (HashMap::new(), HashMap::new(), HashMap::new());
+    // Of what has been opened, and what for: its hash, or what is wrong with it.
+    let mut opened: HashMap<(Content, String), Result<String, String>> = HashMap::new();
+    let (mut meshes, mut characters, mut guides, mut fabrics) = (HashMap::new(), HashMap::new(), HashMap::new(), HashMap::new());
     for file in scene.mesh_files_mut() {
         let path = file.path;
-        let open = || {
-            if file.skinned {
+        let open = || match file.content {
+            Content::Character => {
                 let read = files.open(path)?;
                 let figure = read.character().map_err(|e| format!("\"{}\": {e}", files.shown(path)))?;
                 characters.insert(path.to_string(), figure.clone());
-                return Ok(read.hash().to_string());
+                Ok(read.hash().to_string())
             }
-            let (mesh, hash) = mesh_of(files, path)?;
-            meshes.insert(path.to_string(), mesh);
-            Ok(hash)
+            Content::Curves => {
+                let shown = known(files, path)?;
+                let read = files.open_curves(path)?;
+                guides.insert(path.to_string(), read.curves().map_err(|e| format!("\"{shown}\": {e}"))?.clone());
+                Ok(read.hash().to_string())
+            }
+            Content::Mesh => {
+                let (mesh, hash) = mesh_of(files, path)?;
+                meshes.insert(path.to_string(), mesh);
+                Ok(hash)
+            }
         };
-        match opened.entry((file.skinned, path.to_string())).or_insert_with(open) {
+        match opened.entry((file.content, path.to_string())).or_insert_with(open) {
             Ok(hash) => issues.extend(noted::<F>(&file.place, path, file.hash, Some(hash.clone()))),
             Err(message) => issues.push(Issue::new(format!("{}.path", file.place), message.clone())),
         }
@@ -213,7 +248,11 @@ pub fn assets<F: Files>(scene: &mut Scene, files: &mut F) -> Result<Assets, Scen
             Err(message) => issues.push(Issue::new(format!("{place}{below}"), message.clone())),
         }
     }
-    if issues.is_empty() { Ok(Assets::new(meshes, characters).with_fabrics(fabrics)) } else { Err(SceneError { issues }) }
+    if issues.is_empty() {
+        Ok(Assets::new(meshes, characters).with_fabrics(fabrics).with_curves(guides))
+    } else {
+        Err(SceneError { issues })
+    }
 }
 
 /// Notes the hash that was found; an issue where another stands there.

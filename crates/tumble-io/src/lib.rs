@@ -21,9 +21,10 @@ mod stl;
 mod text;
 mod vdb;
 
-use tumble_interface::{Character, Mesh};
+use tumble_interface::{Character, Curves, Mesh};
 
 pub use fabric::{fabric, record_is_json, shipped};
+use obj::has_curves;
 pub use obj::write as obj;
 pub use tumble_interface::repair::{Repairs, repair};
 pub use vdb::{Class, Volume, vdb};
@@ -87,6 +88,22 @@ pub fn mesh(bytes: &[u8], format: Format) -> Result<Mesh, String> {
         (found.unused, found.renumbered) = (0, None);
     }
     Ok(found)
+}
+
+/// Reads the curves of a file.
+///
+/// There is at least one; each has two or more points, finite and not all alike.
+///
+/// # Errors
+/// One line: what is wrong with the file, where, and what to do.
+pub fn curves(bytes: &[u8], format: Format) -> Result<Curves, String> {
+    let read = match format {
+        _ if bytes.is_empty() => Err("the file is empty; export the curves again".to_owned()),
+        Format::Obj => obj::curves(bytes),
+        _ => Err("it holds a mesh, not curves; hair takes it as mesh = { path = ... }, and guides as OBJ with lines \"l i j\", or as USD"
+            .to_owned()),
+    };
+    read.map_err(|message| format!("{}: {}", format.name(), one_line(&message)))
 }
 
 /// Reads a skinned figure with its movements from a GLB file, or from the text of a glTF file with its data inside.

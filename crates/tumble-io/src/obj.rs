@@ -1,4 +1,4 @@
-//! Wavefront OBJ: `v x y z`, `vt u v` and `f i/j ...`, the rest of the format is skipped. What is wrong with texture coordinates only
+//! Wavefront OBJ: `v x y z`, `vt u v` and `f i/j ...`, or `l i j ...`, the rest of the format is skipped. What is wrong with texture coordinates only
 //! leaves them out: few scenes want them.
 //!
 //! Read here and not with the crate `tobj`, which renumbers vertices by first use, starts a new vertex list at each
@@ -8,29 +8,62 @@
 use crate::build::DAMAGED;
 use crate::polygon::Polygons;
 use crate::text::{comma, lines_of, number, unmarked};
-use tumble_interface::Mesh;
+use tumble_interface::{Curves, Mesh};
 
 pub fn read(bytes: &[u8]) -> Result<Mesh, String> {
+    let mut found = Found::default();
+    statements(bytes, |said, n| found.statement(said, n))?;
+    found.finish()
+}
+
+/// The polylines, `l i j ...`, of which those that go on from the last vertex of the one before are one: some programs write each piece
+/// by itself.
+pub fn curves(bytes: &[u8]) -> Result<Curves, String> {
+    let mut found = Lines::default();
+    statements(bytes, |said, n| found.statement(said, n))?;
+    found.finish()
+}
+
+/// Whether a text has polylines.
+pub fn has_curves(bytes: &[u8]) -> bool {
+    unmarked(bytes).windows(3).any(|w| matches!(w, [b'\n' | b'\r', b'l', b' ' | b'\t']))
+}
+
+/// Tells each statement and the number of its line.
+fn statements(bytes: &[u8], mut tell: impl FnMut(&str, usize) -> Result<(), String>) -> Result<(), String> {
     let bytes = unmarked(bytes);
     if bytes.contains(&0) {
         return Err("this is a binary file, not an OBJ text; check the file extension".to_owned());
     }
-    let mut found = Found::default();
     let mut joined = String::new();
     for (n, line) in (1_usize..).zip(lines_of(&bytes).lines().chain([""])) {
         let (said, comment) = line.split_once('#').map_or((line, false), |(said, _)| (said, true));
         joined.push_str(said.trim_end());
         // What ends in a backslash goes on in the next line; but comments end with theirs, and so do names, which may end in one: D:\maps\.
         let key = joined.split([' ', '\t', '\\']).find(|word| !word.is_empty());
-        if !comment && matches!(key, None | Some("v" | "vt" | "f")) && joined.ends_with('\\') {
+        if !comment && matches!(key, None | Some("v" | "vt" | "f" | "l")) && joined.ends_with('\\') {
             joined.pop();
             joined.push(' ');
             continue;
         }
-        found.statement(&joined, n).map_err(|e| format!("line {n}: {e}"))?;
+        tell(&joined, n).map_err(|e| format!("line {n}: {e}"))?;
         joined.clear();
     }
-    found.finish()
+    Ok(())
+}
+
+/// Three coordinates; a weight or a colour may follow.
+fn point<'a>(words: &mut impl Iterator<Item = &'a str>) -> Result<[f64; 3], String> {
+    let mut x = [0.0; 3];
+    for x in &mut x {
+        *x = number(words.next().ok_or_else(|| format!("a vertex needs 3 coordinates; {DAMAGED}"))?)?;
+    }
+    Ok(x)
+}
+
+/// Index of the vertex, counted from 1, that a corner names after `n` vertices.
+fn vertex(word: &str, n: usize) -> Result<u32, String> {
+    position(word, n).ok_or_else(|| format!("\"{word}\" is not a vertex index (the first is 1, the latest is -1); {DAMAGED}"))
 }
 
 /// What the file says, in the order of its lines.
@@ -46,19 +79,16 @@ struct Found {
     textured: Vec<Option<u32>>,
     /// Largest index in the file, counted from 1, and its line.
     largest: (u32, usize),
+    /// Number of polylines.
+    lines: usize,
 }
 
 impl Found {
     fn statement(&mut self, said: &str, line: usize) -> Result<(), String> {
         let mut words = said.split_ascii_whitespace();
         match words.next() {
-            Some("v") => {
-                let mut x = [0.0; 3]; // a weight or a colour may follow
-                for x in &mut x {
-                    *x = number(words.next().ok_or_else(|| format!("a vertex needs 3 coordinates; {DAMAGED}"))?)?;
-                }
-                self.mesh.vertices.push(x);
-            }
+            Some("v") => self.mesh.vertices.push(point(&mut words)?),
+            Some("l") => self.lines += 1,
             Some("vt") => {
                 if let Some(word) = words.clone().find(|word| comma(word).is_some()) {
                     number(word)?;
@@ -69,8 +99,7 @@ impl Found {
             Some("f") => {
                 let before = self.corners.len();
                 for word in words {
-                    let i = position(word, self.mesh.vertices.len())
-                        .ok_or_else(|| format!("\"{word}\" is not a vertex index (the first is 1, the latest is -1); {DAMAGED}"))?;
+                    let i = vertex(word, self.mesh.vertices.len())?;
                     if i > self.largest.0 {
                         self.largest = (i, line);
                     }
@@ -90,8 +119,11 @@ impl Found {
 
     /// Triangles of the faces, which may come before their vertices.
     fn finish(self) -> Result<Mesh, String> {
-        let Self { mut mesh, faces, corners, texture, textured, largest } = self;
+        let Self { mut mesh, faces, corners, texture, textured, largest, lines } = self;
         let n = mesh.vertices.len();
+        if faces.is_empty() && lines > 0 {
+            return Err(format!("it has curves ({lines} lines \"l i j\") and no faces; hair takes curves as guides = {{ path = ... }}"));
+        }
         if n == 0 && faces.is_empty() {
             return Err("neither vertices (lines \"v x y z\") nor faces (\"f i j k\") found; is this an OBJ file?".to_owned());
         }
@@ -109,6 +141,69 @@ impl Found {
             first += n;
         }
         Ok(mesh)
+    }
+}
+
+/// Polylines, in the order of their lines.
+#[derive(Default)]
+struct Lines {
+    vertices: Vec<[f64; 3]>,
+    /// Vertices of each, counted from 1, and the line.
+    lines: Vec<(Vec<u32>, usize)>,
+    faces: usize,
+}
+
+impl Lines {
+    fn statement(&mut self, said: &str, line: usize) -> Result<(), String> {
+        let mut words = said.split_ascii_whitespace();
+        match words.next() {
+            Some("v") => self.vertices.push(point(&mut words)?),
+            Some("f") => self.faces += 1,
+            Some("l") => {
+                let own = words.map(|word| vertex(word, self.vertices.len())).collect::<Result<Vec<u32>, _>>()?;
+                if own.len() < 2 {
+                    return Err(format!("a curve needs 2 vertices, this one has {}; {DAMAGED}", own.len()));
+                }
+                match self.lines.last_mut() {
+                    Some((before, _)) if before.last() == own.first() => before.extend(&own[1..]),
+                    _ => self.lines.push((own, line)),
+                }
+            }
+            _ => {}
+        }
+        Ok(())
+    }
+
+    /// Points of the curves, which may come before their vertices.
+    fn finish(self) -> Result<Curves, String> {
+        let Self { vertices, lines, faces } = self;
+        if lines.is_empty() && faces > 0 {
+            return Err(format!(
+                "it has faces and no curves (lines \"l i j\"); export the strands as curves, or let hair grow on this mesh as mesh = {{ path = ... }}"
+            ));
+        }
+        if lines.is_empty() {
+            return Err("there are no curves (lines \"l i j\") in it; export the strands as polylines".to_owned());
+        }
+        let mut curves = Vec::with_capacity(lines.len());
+        for (k, (corners, line)) in (1_usize..).zip(lines) {
+            let mut own = Vec::with_capacity(corners.len());
+            for i in corners {
+                let x = vertices.get(i as usize - 1).ok_or_else(|| {
+                    let n = vertices.len();
+                    format!("line {line}: the curve uses vertex {i}, but the file has {n}; it is truncated or damaged, export it again")
+                })?;
+                if x.iter().any(|x| !x.is_finite()) {
+                    return Err(format!("line {line}: curve {k} goes through {x:?}, which is not finite; export it again"));
+                }
+                own.push(*x);
+            }
+            if own.iter().all(|x| *x == own[0]) {
+                return Err(format!("line {line}: curve {k} has no length, all its points are {:?}; leave it out", own[0]));
+            }
+            curves.push(own);
+        }
+        Ok(curves)
     }
 }
 

@@ -120,3 +120,63 @@ fn a_figure_that_was_written_out_has_the_hash_of_its_file() {
     // It is read as a figure, and an empty one is none.
     assert!(file.character().is_err());
 }
+
+const CURVES: &str = "v 0 0 0\nv 0 0 1\nv 0 1 1\nv 5 0 0\nv 5 0 1 \nl 1 2\nl 2 3\nl -2 \\\n  -1\n";
+
+fn groomed(path: &str) -> String {
+    format!("[[hair]]\nname = \"h\"\nguides.path = \"{path}\"\n")
+}
+
+#[test]
+fn curves_are_read_beside_meshes_of_the_same_file() {
+    let both = Box::leak(format!("{CURVES}f 1 2 3\n").into_boxed_str());
+    let mut shelf = shelf(&[("a.obj", both), ("c.usd", "usd v 0 0 0\nv 1 0 0\nl 1 2\n")]);
+    let mut scene = scene(&[net("n", "a.obj", ""), groomed("a.obj"), groomed("c.usd").replace("\"h\"", "\"i\"")]);
+    let found = assets(&mut scene, &mut shelf).unwrap();
+    assert_eq!(found.get("a.obj").unwrap().triangles.len(), 1);
+    // Pieces that go on from each other are one curve.
+    let meant = vec![vec![[0.0; 3], [0.0, 0.0, 1.0], [0.0, 1.0, 1.0]], vec![[5.0, 0.0, 0.0], [5.0, 0.0, 1.0]]];
+    assert_eq!(found.curves("a.obj"), Some(&meant));
+    assert_eq!(found.curves("c.usd").unwrap().len(), 1);
+    let hash = File::new("a.obj", both.as_bytes().to_vec()).hash().to_string();
+    assert_eq!(scene.hair[0].guides.as_ref().unwrap().hash.as_deref(), Some(&*hash));
+    shelf.files.insert("a.obj", "v 0 0 0\nv 1 0 0\nl 1 2\n");
+    let stale = told(&assets(&mut scene, &mut shelf).unwrap_err());
+    assert!(stale.iter().any(|line| line.starts_with("hair \"h\".guides.hash: the content of \"a.obj\" has changed")), "{stale:?}");
+    // A file that a page keeps can be both.
+    let file = File::new("a.obj", both.as_bytes().to_vec());
+    assert!(file.mesh().is_ok() && file.curves().is_ok() && file.check("a.obj").is_ok());
+    assert_eq!(File::new("a.obj", CURVES.into()).check("a.obj"), Ok(()));
+}
+
+#[test]
+fn bad_curves_are_told_with_their_cure() {
+    for (path, text, expected) in [
+        (
+            "a.obj",
+            TRIANGLE,
+            "OBJ: it has faces and no curves (lines \"l i j\"); export the strands as curves, or let hair grow on this mesh",
+        ),
+        ("a.obj", "v 0 0 0\n", "OBJ: there are no curves"),
+        ("a.obj", "", "OBJ: the file is empty"),
+        ("a.obj", "v 0 0 0\nl 1\n", "OBJ: line 2: a curve needs 2 vertices, this one has 1"),
+        ("a.obj", "v 0 0 0\nl 1 2\n", "OBJ: line 2: the curve uses vertex 2, but the file has 1"),
+        ("a.obj", "v 0 0 0\nv 1 0 0\nl 1 2\nl 1 1 1\n", "OBJ: line 4: curve 2 has no length"),
+        ("a.obj", "v 0 0 0\nv 0 nan 0\nl 1 2\n", "OBJ: line 3: curve 1 goes through [0.0, NaN, 0.0], which is not finite"),
+        ("a.obj", "v 0 0 0\nl 0 1\n", "OBJ: line 2: \"0\" is not a vertex index"),
+        ("a.obj", "v 0 0\nl 1 2\n", "OBJ: line 1: a vertex needs 3 coordinates"),
+        ("a.usd", "usd v 0 0 0\nl 1\n", "USD: line 2: a curve needs 2 vertices"),
+        ("a.ply", "ply\n", "PLY: it holds a mesh, not curves; hair takes it as mesh = { path = ... }"),
+        ("a.abc", "", "\"shelf/a.abc\" has none of the suffixes .obj"),
+    ] {
+        let error = assets(&mut scene(&[groomed(path)]), &mut shelf(&[(path, text)])).unwrap_err();
+        let told = told(&error).remove(0);
+        assert!(told.starts_with("hair \"h\".guides.path: ") && told.contains(expected), "{text:?}: {told}");
+    }
+    let missing = told(&assets(&mut scene(&[groomed("none.obj")]), &mut shelf(&[])).unwrap_err());
+    assert_eq!(missing, ["hair \"h\".guides.path: \"none.obj\" is not on the shelf"]);
+    // Curves are no mesh.
+    let wrong = told(&assets(&mut scene(&[net("n", "a.obj", "")]), &mut shelf(&[("a.obj", CURVES)])).unwrap_err());
+    let expected = "OBJ: it has curves (3 lines \"l i j\") and no faces; hair takes curves as guides = { path = ... }";
+    assert!(wrong.len() == 1 && wrong[0].contains(expected), "{wrong:?}");
+}

@@ -10,7 +10,7 @@ use cases::{Outcome, cases, weighed};
 use files::*;
 use proptest::prelude::*;
 use proptest::sample::Index;
-use tumble_io::{Format, character, fabric, mesh, repair};
+use tumble_io::{Format, character, curves, fabric, mesh, repair};
 
 /// A file of every kind, with the formats that may read it.
 fn valid() -> Vec<(Vec<u8>, Format)> {
@@ -31,6 +31,7 @@ fn valid() -> Vec<(Vec<u8>, Format)> {
         (glb_textured(&skirt()), Format::Glb),
         (arm(), Format::Glb),
         (tumble_io::obj(&skirt()).into_bytes(), Format::Obj),
+        (b"v 0 0 0\nv 1 0 0\nv 0 1 0\nl 1 2 \\\n3\nl 3/1 1\nl -1 -2 # a comment\nf 1 2 3\n".to_vec(), Format::Obj),
     ]
 }
 
@@ -54,6 +55,20 @@ fn read(bytes: &[u8], format: Format) -> Outcome {
             assert!(mesh.texture.iter().flatten().flatten().flatten().all(|x| x.is_finite()));
             mesh.defects();
             repair(&mesh);
+        }
+        Err(message) => assert!(!message.is_empty() && !message.contains('\n') && message.chars().count() < 320, "{message}"),
+    }
+    all([outcome, read_curves(bytes, format)])
+}
+
+/// Reads curves; whatever comes out keeps the promises of [`curves`].
+fn read_curves(bytes: &[u8], format: Format) -> Outcome {
+    let (result, taken) = weighed(|| curves(bytes, format));
+    let outcome = Outcome { read: result.is_ok(), taken, expected: expected(bytes.len()) };
+    match result {
+        Ok(curves) => {
+            assert!(!curves.is_empty() && curves.iter().flatten().flatten().all(|x| x.is_finite()));
+            assert!(curves.iter().all(|curve| curve.len() > 1 && curve.iter().any(|x| *x != curve[0])));
         }
         Err(message) => assert!(!message.is_empty() && !message.contains('\n') && message.chars().count() < 320, "{message}"),
     }

@@ -8,7 +8,7 @@ use pyo3::types::{PyBool, PyDict, PyFloat, PyInt, PyList, PyString, PyTuple, PyT
 use std::hash::{Hash, Hasher};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
-use tumble_interface::scene::{MeshRef, Precision, Shape};
+use tumble_interface::scene::{Content, MeshRef, Precision, Shape};
 use tumble_interface::tree::{Node, Value};
 use tumble_interface::{Assets, Issue, Mesh, SceneError};
 use tumble_io::assets::{File, Files, fabric_of, mesh_of};
@@ -245,13 +245,13 @@ impl Scene {
     }
 
     /// The mesh files that it names: place of the name in the resolved scene, its line or None, and the path as it stands
-    /// there, FILE/CODE.usd for a frame of an animated USD file. Files of figures are left out.
+    /// there, FILE/CODE.usd for a frame of an animated USD file. Files of figures and of guides are left out.
     #[getter]
     fn mesh_files(&self) -> Vec<(String, Option<usize>, String)> {
         let mut scene = self.scene.clone();
         let files = scene.mesh_files_mut();
         let place = |file: &MeshRef<'_>| (format!("{}.path", file.place), file.path.to_string());
-        let places = files.iter().filter(|file| !file.skinned).map(place);
+        let places = files.iter().filter(|file| file.content == Content::Mesh).map(place);
         places.map(|(place, path)| (place.clone(), self.node.line_of(&place).filter(|line| *line < SET), path)).collect()
     }
 
@@ -376,6 +376,11 @@ fn is_usd(path: &Path) -> bool {
     path.extension().is_some_and(|e| USD.iter().any(|usd| e.eq_ignore_ascii_case(usd)))
 }
 
+/// What a function of `tumble.usd` makes of a file.
+fn as_text(function: &str, file: &Path) -> PyResult<String> {
+    Python::attach(|py| py.import("tumble.usd")?.call_method1(function, (file,))?.extract())
+}
+
 /// Files below a folder.
 struct Folder<'a>(&'a Path);
 
@@ -401,8 +406,18 @@ impl Files for Folder<'_> {
             });
             return Ok(Arc::new(file.figure(glb.map_err(told)?)));
         }
-        let text = Python::attach(|py| -> PyResult<String> { py.import("tumble.usd")?.call_method1("as_obj", (&whole,))?.extract() });
-        Ok(Arc::new(file.converted("USD", text.map_err(told)?)))
+        Ok(Arc::new(file.converted("USD", as_text("as_obj", &whole).map_err(told)?)))
+    }
+
+    fn open_curves(&mut self, path: &str) -> Result<Arc<File>, String> {
+        let whole = self.0.join(path);
+        let bytes = std::fs::read(&whole).map_err(|e| errors::file_error(&whole, &e))?;
+        let file = File::new(path, bytes);
+        if !is_usd(&whole) {
+            return Ok(Arc::new(file));
+        }
+        let told = |e: PyErr| format!("\"{}\": {}", whole.display(), Python::attach(|py| e.value(py).to_string()));
+        Ok(Arc::new(file.converted("USD", as_text("as_curves", &whole).map_err(told)?)))
     }
 
     fn shown(&self, path: &str) -> String {

@@ -269,7 +269,10 @@ impl World {
             _ => None,
         });
         let figures: Vec<(String, String)> = figures.collect();
-        let files = py.import("tumble.doubts")?.call_method1("of_files", (self.scene.clone_ref(py), figures))?;
+        let hair = self.scene.bind(py).get().scene.hair.iter();
+        let guides = hair.filter_map(|h| Some((format!("hair \"{}\".guides.path", h.name), h.guides.as_ref()?.path.clone())));
+        let guides: Vec<(String, String)> = guides.collect();
+        let files = py.import("tumble.doubts")?.call_method1("of_files", (self.scene.clone_ref(py), figures, guides))?;
         warnings.call_method1("extend", (files,))?;
         let Unsolved { steps, unconverged, residual } = self.unsolved;
         if unconverged > 0 {

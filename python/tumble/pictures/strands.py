@@ -7,9 +7,11 @@ on the same side of the surface (hair.7).
 Source: [mccool1992], [franke1980].
 """
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
+import numpy.typing as npt
 
 from tumble.pictures.surfaces import Floats, Indices, face_normals, unit
 from tumble.style import Rgb
@@ -30,11 +32,28 @@ CLOSER = 0.93
 
 AROUND = 6
 """Neighbours of a simulated strand between which others are drawn where there is no surface to root them in,"""
+COVER = 0.6
+"""How far from a root of a groom others may be, over the distance of its AROUND-th neighbour: a lattice has no gaps then."""
+
 FAR = 2.0
 """unless they are farther apart than this many times the usual distance of the last of them."""
 
+LEAST = -0.1
+"""Cosine between the normal of a surface and the strands of a groom on it, at least."""
+
+TRIES = 1000
+"""Times as many points as are wanted that are tried on a surface,"""
+TRIES_NEAR = 50
+"""and around a groom."""
+
 SEED = 7
 """Of the places of strands: every picture and export has the same."""
+
+
+Flags = npt.NDArray[np.bool_]
+
+Grows = Callable[[Indices, Floats], Flags]
+"""Whether hair grows at points of a surface, given corners of their triangles and shares of these."""
 
 
 @dataclass(frozen=True)
@@ -59,6 +78,8 @@ class Skin:
     triangles: Indices
     above: float = -np.inf
     """Least height of roots, without motion [m]."""
+    groomed: bool = False
+    """Whether hair grows only where simulated strands are near: elsewhere a groom has none."""
 
 
 @dataclass(frozen=True)
@@ -111,7 +132,19 @@ def strands(x: Floats, points: int, render: int, skin: Skin | None = None) -> St
         triangles, start, still, above = _between(roots), roots, roots, -np.inf
     else:
         triangles, start, still, above = skin.triangles, skin.start, skin.vertices, skin.above
-    corners, shares, area = _scattered(still, triangles, above, DARTS * render * n, random)
+
+    def high(corners: Indices, shares: Floats) -> Flags:
+        return np.asarray(np.einsum("mk,mk->m", shares, still[corners, 2]) > above)
+
+    grows: Grows = high
+    groomed = skin is not None and skin.groomed
+    if groomed:
+        triangles, grows = _groomed(curves, start, triangles)
+    tries = (TRIES_NEAR if groomed else TRIES) * DARTS * render * n
+    corners, shares, area = _scattered(still, triangles, grows, (DARTS * render * n, tries), random)
+    if skin is not None and len(corners) < render * n:
+        # The groom is off its surface.
+        return strands(x, points, render)
     if skin is None:
         area /= AROUND  # Each place is in about as many triangles.
     place = np.einsum("mk,mkc->mc", shares, start[corners])
@@ -119,14 +152,36 @@ def strands(x: Floats, points: int, render: int, skin: Skin | None = None) -> St
     side = SIDE * usual * unit(face_normals(start, corners)) if skin is not None else np.zeros_like(place)
     kept = _apart(place, render * n, np.sqrt(2 / np.sqrt(3) * area / (render * n)))
     there = np.concatenate([place, side], axis=1)
-    grows = SIDE * usual * unit(curves[:, 1] - roots) if skin is not None else np.zeros_like(roots)
-    below = _nearest(np.concatenate([roots, grows], axis=1), there, 1, usual)[0][:, 0]
+    ways = SIDE * usual * unit(curves[:, 1] - roots) if skin is not None else np.zeros_like(roots)
+    below = _nearest(np.concatenate([roots, ways], axis=1), there, 1, usual)[0][:, 0]
     guides, away = _nearest(there[kept], np.concatenate([roots, side[below]], axis=1), NEAR + 1, 2 * usual)
     # They fade to nothing where the next strand comes in (hair.7).
     away = np.maximum(away, 1e-9 * usual)
     weights = (np.maximum(away[:, NEAR:] - away[:, :NEAR], 1e-9 * usual) / away[:, :NEAR]) ** 2
     weights /= weights.sum(axis=1, keepdims=True)
     return Strands(points, guides[:, :NEAR], weights, corners[kept], shares[kept], skin is not None)
+
+
+def _groomed(curves: Floats, vertices: Floats, triangles: Indices) -> tuple[Indices, Grows]:
+    """Of the triangles of a surface those that hair may grow on between strands, and where on them it does: near a root, on
+    the side to which its strand goes."""
+    roots, ways = curves[:, 0], unit(curves[:, 1] - curves[:, 0])
+    size = float(np.ptp(roots, axis=0).max() or 1.0)
+    cover = COVER * _nearest(roots, roots, min(AROUND, len(roots) - 1) + 1, 1e-3 * size)[1][:, -1]
+    # One that stands alone has no more around it than others.
+    cover = np.minimum(cover, FAR * np.median(cover))
+    corners, reach = vertices[triangles], float(cover.max()) or 1e-3 * size
+    low, high = roots.min(axis=0) - reach, roots.max(axis=0) + reach
+    near = ((corners.max(axis=1) >= low) & (corners.min(axis=1) <= high)).all(axis=1)
+
+    def grows(corners: Indices, shares: Floats) -> Flags:
+        i, j, away = _pairs(np.einsum("mk,mkc->mc", shares, vertices[corners]), roots, reach)
+        along = np.sum(unit(face_normals(vertices, corners))[i] * ways[j], axis=1)
+        good = np.zeros(len(corners), dtype=bool)
+        good[i[(away <= cover[j]) & (along > LEAST)]] = True
+        return good
+
+    return triangles[near], grows
 
 
 def _between(roots: Floats) -> Indices:
@@ -141,14 +196,15 @@ def _between(roots: Floats) -> Indices:
 
 
 def _scattered(
-    vertices: Floats, triangles: Indices, above: float, count: int, random: np.random.Generator
+    vertices: Floats, triangles: Indices, grows: Grows, counts: tuple[int, int], random: np.random.Generator
 ) -> tuple[Indices, Floats, float]:
-    """Random points on a surface above a height, as many on each part as it is large: corners of their triangles, shares
-    of these, and the area [m²] that they are on."""
+    """Random points on a surface where it `grows`, as many on each part as it is large: corners of their triangles, shares
+    of these, and the area [m²] that they are on. `counts` are how many are wanted and how many are tried at most."""
+    count, most = counts
     areas = 0.5 * np.linalg.norm(face_normals(vertices, triangles), axis=1)
     corners, shares = np.zeros((0, 3), dtype=np.int64), np.zeros((0, 3))
     tried = 0
-    while len(corners) < count and tried < 1000 * count:
+    while len(triangles) and len(corners) < count and tried < most:
         t = (
             random.choice(len(triangles), count, p=areas / areas.sum())
             if areas.any()
@@ -156,10 +212,10 @@ def _scattered(
         )
         a, b = np.sqrt(random.random(count)), random.random(count)
         share = np.stack([1 - a, a * (1 - b), a * b], axis=1)
-        grows = np.einsum("mk,mk->m", share, vertices[triangles[t], 2]) > above
+        good = grows(triangles[t], share)
         tried += count
-        corners, shares = np.concatenate([corners, triangles[t][grows]]), np.concatenate([shares, share[grows]])
-    area = float(areas.sum()) * len(corners) / tried
+        corners, shares = np.concatenate([corners, triangles[t][good]]), np.concatenate([shares, share[good]])
+    area = float(areas.sum()) * len(corners) / max(tried, 1)
     return corners[:count], shares[:count], area
 
 

@@ -185,7 +185,13 @@ def with_hair(run: Recording, found: list[Object]) -> list[Object]:
             if ground is not None and ground.position is not None and len(ground.triangles) and look.strands > 1:
                 above = own.get("above")
                 now = carried(ground, start, ground.position)
-                skin = Skin(ground.position, now, ground.triangles, -np.inf if above is None else float(above))
+                skin = Skin(
+                    ground.position,
+                    now,
+                    ground.triangles,
+                    -np.inf if above is None else float(above),
+                    groomed=own.get("guides") is not None,
+                )
             drawn = strands(positions(start, thing), per_strand, look.strands, skin)
             thing = replace(thing, strands=drawn, skin=None if ground is None or skin is None else ground.name)
         out.append(thing)

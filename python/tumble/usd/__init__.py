@@ -1,4 +1,4 @@
-"""Meshes of USD files, by OpenUSD (package usd-core), as text that the engine reads.
+"""Meshes and curves of USD files, by OpenUSD (package usd-core), as text that the engine reads.
 
 Lengths become metres (`metersPerUnit`), z points up (`upAxis`). What is shown is read: polygon meshes, the shapes that
 USD names (Sphere, Cube and so on) as polygons, native instances and those of a PointInstancer, skinned meshes in their
@@ -11,7 +11,19 @@ from typing import Any
 from tumble.usd.stage import Reading, open_stage
 from tumble.usd.told import SUFFIXES, UsdWarning, doubts, is_usd, moves, note, warn
 
-__all__ = ["SUFFIXES", "UsdWarning", "as_glb", "as_obj", "bake", "camera", "doubts", "is_usd", "moved", "moves"]
+__all__ = [
+    "SUFFIXES",
+    "UsdWarning",
+    "as_curves",
+    "as_glb",
+    "as_obj",
+    "bake",
+    "camera",
+    "doubts",
+    "is_usd",
+    "moved",
+    "moves",
+]
 
 
 def as_obj(path: Path | str) -> str:
@@ -25,6 +37,19 @@ def as_obj(path: Path | str) -> str:
     text = reading.obj()
     note(path, reading)
     warn(path, doubts(path), "tumble.usd.bake writes their motion")
+    return text
+
+
+def as_curves(path: Path | str) -> str:
+    """All BasisCurves of a file at its start time, as polylines of one OBJ in metres, z up, for `hair.guides`. Warns of what is
+    not used. Raises ValueError."""
+    from tumble.usd.curves import Strands
+    from tumble.usd.told import note_strands, of_strands
+
+    reading = Strands(open_stage(path))
+    text = reading.obj()
+    note_strands(path, reading)
+    warn(path, of_strands(path))
     return text
 
 

@@ -16,7 +16,7 @@ Indices = npt.NDArray[np.int64]
 _NAMED = 6
 """Prims that are named in a message; of more the number is told."""
 
-_MOST = 20_000_000
+MOST = 20_000_000
 """Points that are read of a file, at most: a few words can place instances of instances without end."""
 
 _SHOWN = ("default", "render")
@@ -106,6 +106,9 @@ def _varying(stage: Any) -> Iterator[Any]:
 class Reading:
     """What a stage shows at a time code, by default its start."""
 
+    wanted, words = "polygon meshes", "mesh"
+    """What is read, and which words of a scene take it."""
+
     def __init__(self, stage: Any, time: float | None = None) -> None:
         from pxr import Usd, UsdGeom
 
@@ -119,7 +122,7 @@ class Reading:
         self.hidden: list[str] = []
         self.moving: list[str] = []
         self.found: list[Surface] | None = None
-        self._points = 0
+        self.points = 0
         self._within: list[str] = []
 
     def surfaces(self) -> list[Surface]:
@@ -140,6 +143,8 @@ class Reading:
         if not self.surfaces():
             left = f"; what is in it cannot be used: {names(self.unused)}" if self.unused else ""
             left += f"; left out as invisible, guide or proxy: {names(self.hidden)}" if self.hidden else ""
+            if any(name.endswith("(BasisCurves)") for name in self.unused):
+                left += "; hair takes curves as guides = { path = ... }"
             raise ValueError(f"there is no mesh in it{left}; export a polygon mesh that is visible")
         return obj(self.surfaces())
 
@@ -153,7 +158,7 @@ class Reading:
         if self.unused:
             yield (
                 "unread-prims",
-                f"left out, as they are no polygon meshes: {names(self.unused)}; convert them if they matter",
+                f"left out, as they are no {self.wanted}: {names(self.unused)}; convert them if they matter",
             )
         if self.shaped:
             yield (
@@ -170,7 +175,7 @@ class Reading:
             yield (
                 "unsaid-units",
                 'its lengths are read as centimetres, as OpenUSD has it for files without "metersPerUnit"; where they are '
-                "metres, give the mesh scale = 100, or add metersPerUnit = 1 to the file",
+                f"metres, give the {self.words} scale = 100, or add metersPerUnit = 1 to the file",
             )
         if broken := sorted({str(error) for error in self.stage.GetCompositionErrors()}):
             yield (
@@ -257,28 +262,28 @@ class Reading:
         if kind in SHAPES:
             points, counts, corners = polygons(prim, kind, self.time)
             texture, by_corner, left = np.zeros((0, 2)), False, False
-            _note(self.shaped, f"{path} ({kind})")
+            note(self.shaped, f"{path} ({kind})")
             attributes = prim.GetAttributes()
         elif prim.IsA(UsdGeom.Mesh):
             mesh = UsdGeom.Mesh(prim)
             points, counts, corners = _polygons(mesh, self.time)
             if not len(corners):
-                _note(self.unused, f"{path} (Mesh without faces)")
+                note(self.unused, f"{path} (Mesh without faces)")
                 return None
             texture, by_corner = _texture(prim, self.time, len(corners), len(points))
             left = mesh.GetOrientationAttr().Get(self.time) == UsdGeom.Tokens.leftHanded
             scheme = mesh.GetSubdivisionSchemeAttr()
             if scheme.HasAuthoredValue() and scheme.Get() != UsdGeom.Tokens.none:
-                _note(self.smooth, f"{path} ({scheme.Get()})")
+                note(self.smooth, f"{path} ({scheme.Get()})")
             attributes = [mesh.GetPointsAttr(), mesh.GetFaceVertexIndicesAttr()]
         else:
-            _note(self.unused, f"{path} ({kind})")
+            note(self.unused, f"{path} ({kind})")
             return None
         if moved or any(a.ValueMightBeTimeVarying() for a in attributes) or is_posed(prim):
-            _note(self.moving, path)
-        self._points += len(points)
-        if self._points > _MOST:
-            raise ValueError(f"it has more than {_MOST} points, instances included; export fewer, or simplify the mesh")
+            note(self.moving, path)
+        self.points += len(points)
+        if self.points > MOST:
+            raise ValueError(f"it has more than {MOST} points, instances included; export fewer, or simplify the mesh")
         points = points @ place[:3, :3] + place[3, :3]
         kept = counts >= 3
         if mesh_holes := _holes(prim, self.time):
@@ -307,7 +312,7 @@ def obj(surfaces: list[Surface]) -> str:
     return "\n".join(lines) + "\n"
 
 
-def _note(where: list[str], what: str) -> None:
+def note(where: list[str], what: str) -> None:
     """Of prototypes that are placed many times once."""
     if what not in where:
         where.append(what)

@@ -18,6 +18,8 @@ _told: dict[Key, list[Doubt]] = {}
 
 _figures: dict[Key, list[Doubt]] = {}
 
+_strands: dict[Key, list[Doubt]] = {}
+
 stiff: dict[Key, str] = {}
 """Why files that are animated cannot move."""
 
@@ -70,6 +72,16 @@ def note_figure(path: Path | str, reading: Reading, skinned: set[str]) -> None:
 def of_figure(path: Path | str) -> list[Doubt]:
     """All that is to be told of the figure of a file, once it has been read. Raises OSError."""
     return _figures.get(key(path), [])
+
+
+def note_strands(path: Path | str, reading: Reading) -> None:
+    """Remembers the doubts about the curves of a file, which have been read."""
+    _strands[key(path)] = reading.doubts()
+
+
+def of_strands(path: Path | str) -> list[Doubt]:
+    """All that is to be told of the curves of a file, once they have been read. Raises OSError."""
+    return _strands.get(key(path), [])
 
 
 def moves(path: Path | str) -> bool:

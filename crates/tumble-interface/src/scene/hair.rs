@@ -13,7 +13,7 @@ pub struct Hair {
     /// System that moves it. Default: the first that can.
     #[serde(default)]
     pub system: Option<String>,
-    /// Collider on which the hair grows and with which its roots move. Alternative: `mesh`.
+    /// Collider on which the hair grows and with which its roots move. Alternative: `mesh`; `guides` need neither.
     #[serde(default)]
     pub on: Option<String>,
     /// Bone that the roots follow, if `on` is a mannequin or a character: hair on its head, with `above`, follows `head`. Default: each root follows
@@ -23,6 +23,10 @@ pub struct Hair {
     /// Mesh on which the hair grows; its roots are fixed. Alternative: `on`.
     #[serde(default)]
     pub mesh: Option<MeshFile>,
+    /// Strands from a file of curves, a groom. Excludes what strands are otherwise made by: `count`, `per_area`, `above`, `length`, `spread`, `lean`,
+    /// `curl` and `clump`.
+    #[serde(default)]
+    pub guides: Option<Guides>,
     /// Number of strands. Alternative: `per_area`.
     #[serde(default)]
     #[schemars(range(min = 1, max = 10_000_000))]
@@ -35,9 +39,10 @@ pub struct Hair {
     #[serde(default)]
     #[schemars(extend("x-unit" = "m"))]
     pub above: Option<f64>,
-    /// Length of a strand.
+    /// Length of a strand; needed without `guides`.
+    #[serde(default)]
     #[schemars(range(min = 1e-6, max = 1000.0), extend("x-unit" = "m"))]
-    pub length: f64,
+    pub length: Option<f64>,
     /// Largest fraction by which a strand is shortened at random.
     #[serde(default)]
     #[schemars(range(min = 0.0, max = 0.95), extend("x-unit" = "1"))]
@@ -89,6 +94,30 @@ pub struct Hair {
     pub color: Option<[f64; 3]>,
 }
 
+/// Strands as they were groomed: curves of a file, the polylines (`l`) of an OBJ, or outside the browser the `BasisCurves` of USD; scaled, rotated,
+/// then translated. Each is a strand that begins at its root. With `on`, they lie as on the collider before its motion.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Guides {
+    /// File, relative to the scene file.
+    pub path: String,
+    /// Hash of the file's content. Default: any content is accepted.
+    #[serde(default)]
+    pub hash: Option<String>,
+    /// Scale factor.
+    #[serde(default = "single")]
+    #[schemars(extend("x-unit" = "1", "exclusiveMinimum" = 0.0))]
+    pub scale: f64,
+    /// Rotation about x, then y, then z.
+    #[serde(default)]
+    #[schemars(extend("x-unit" = "°"))]
+    pub rotate: [f64; 3],
+    /// Translation after scaling and rotation.
+    #[serde(default)]
+    #[schemars(extend("x-unit" = "m"))]
+    pub translate: [f64; 3],
+}
+
 /// The helix of a strand.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
@@ -135,6 +164,10 @@ pub struct HairCollisions {
     #[serde(default)]
     #[schemars(extend("x-unit" = "kg/m³", "exclusiveMinimum" = 0.0))]
     pub rest_density: Option<f64>,
+}
+
+fn single() -> f64 {
+    1.0
 }
 
 fn one() -> u32 {

@@ -31,12 +31,12 @@ pub use gas::{
     PressureMethod, Smoke, Solid, Temperature, Viscous,
 };
 pub use grids::GridBox;
-pub use hair::{Clump, Curl, Hair, HairCollisions};
+pub use hair::{Clump, Curl, Guides, Hair, HairCollisions};
 pub use heat::{Heat, HeatRegion, HeatScheme, HeatSide, HeatSides, HeatSource};
 pub use links::{Diagonals, Follow, Link, LinkSettings, Links, Load, Pin, Place, PointMass, Region, Within};
 pub use objects::{KINDS, Object};
 pub use output::{Camera, Expect, Look, Output, Probe};
-pub use shapes::{Collider, Figure, Mannequin, MeshFile, MeshFrame, MeshFrames, MeshRef, Motion, Moves, Pace, Pose, Shape};
+pub use shapes::{Collider, Content, Figure, Mannequin, MeshFile, MeshFrame, MeshFrames, MeshRef, Motion, Moves, Pace, Pose, Shape};
 pub use structures::{Block, Cloud, CloudShape, Galaxy, Halo, Material, Net, Particles, Pattern, Profile, Rod, Rope, Sheet, Spring};
 pub use surfaces::{Fill, Fluid, Inflation, Membrane, ShapeMatching, Tear, Weak};
 pub use systems::{Adaptive, Hessian, Integrator, Linear, Method, OnFailure, PositionBased, Projection, SelfContact, Solver, System};
@@ -300,15 +300,21 @@ impl Scene {
             .collect()
     }
 
-    /// References to meshes and characters, in order of appearance.
+    /// References to meshes, characters and guides, in order of appearance.
     pub fn mesh_files_mut(&mut self) -> Vec<MeshRef<'_>> {
         fn one(place: String, file: &mut MeshFile) -> MeshRef<'_> {
-            MeshRef { skinned: false, place, path: &file.path, hash: &mut file.hash }
+            MeshRef { content: Content::Mesh, place, path: &file.path, hash: &mut file.hash }
         }
         let mut all: Vec<MeshRef<'_>> = Vec::new();
         all.extend(self.net.iter_mut().map(|n| one(format!("net \"{}\".mesh", n.name), &mut n.mesh)));
-        for Hair { name, mesh, .. } in &mut self.hair {
+        for Hair { name, mesh, guides, .. } in &mut self.hair {
             all.extend(mesh.as_mut().map(|mesh| one(format!("hair \"{name}\".mesh"), mesh)));
+            all.extend(guides.as_mut().map(|g| MeshRef {
+                content: Content::Curves,
+                place: format!("hair \"{name}\".guides"),
+                path: &g.path,
+                hash: &mut g.hash,
+            }));
         }
         for thing in &mut self.collider {
             let place = format!("collider \"{}\".shape", thing.name);
@@ -317,14 +323,19 @@ impl Scene {
                 Shape::AnimatedMesh(mesh) => {
                     let frames = mesh.frames.iter_mut().enumerate();
                     all.extend(frames.map(|(i, f)| MeshRef {
-                        skinned: false,
+                        content: Content::Mesh,
                         place: format!("{place}.animated_mesh.frames[{i}]"),
                         path: &f.path,
                         hash: &mut f.hash,
                     }));
                 }
                 Shape::Character(file) => {
-                    all.push(MeshRef { skinned: true, place: format!("{place}.character"), path: &file.path, hash: &mut file.hash });
+                    all.push(MeshRef {
+                        content: Content::Character,
+                        place: format!("{place}.character"),
+                        path: &file.path,
+                        hash: &mut file.hash,
+                    });
                 }
                 _ => {}
             }

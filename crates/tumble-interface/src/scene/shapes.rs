@@ -334,11 +334,22 @@ pub struct MeshFrame {
     pub hash: Option<String>,
 }
 
+/// What a scene wants of a file.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub enum Content {
+    /// Triangles.
+    Mesh,
+    /// A skinned figure.
+    Character,
+    /// Curves: guides of hair.
+    Curves,
+}
+
 /// A reference to a file: its place in the scene, its path, and the hash of its content.
 #[derive(Debug)]
 pub struct MeshRef<'a> {
-    /// Whether it is a character, not just a mesh.
-    pub skinned: bool,
+    /// What is read of it.
+    pub content: Content,
     /// Place in the scene, for messages.
     pub place: String,
     /// File, relative to the scene file.

@@ -13,6 +13,7 @@ pub mod sampling;
 pub mod sdf;
 pub mod shape;
 pub mod skeleton;
+pub mod spread;
 pub mod surface;
 
 pub use affine::Affine;
@@ -25,6 +26,7 @@ pub use sampling::Sampler;
 pub use sdf::GridSdf;
 pub use shape::Shape;
 pub use skeleton::Rig;
+pub use spread::spread;
 
 /// A point or direction.
 pub type Vector = crate::math::Vec3<f64>;

@@ -7,8 +7,9 @@
 //! Its natural curvature is that of the shape in which it starts (hair.3). Verified in `tests/hair.rs`.
 
 use super::Site;
+use super::guides::{combed, guided};
 use crate::geometry::motion::Pose;
-use crate::geometry::{Carrier, Collider, Sampler, Vector};
+use crate::geometry::{Carrier, Collider, Sampler, Vector, spread};
 use crate::math::functions::{cos, sin};
 use crate::math::rotation::from_z_to;
 use crate::math::{Quat, Random};
@@ -18,15 +19,18 @@ use tumble_interface::scene::Hair;
 
 /// Roots that are tried for each that must be above a height.
 const TRIES: u32 = 4096;
+/// Random points for each root that is wanted, and in all as long as there are two for each.
+const CANDIDATES: u64 = 5;
+const MOST_CANDIDATES: u64 = 2_000_000;
 /// Times that a point is moved out of a solid.
 const COMB: usize = 6;
 /// Strands at most.
-const MOST: f64 = 1e7;
+pub(super) const MOST: f64 = 1e7;
 
 /// What a hair grows on.
 pub struct Ground<'a> {
-    /// Its surface, without motion.
-    pub mesh: &'a Mesh,
+    /// Its surface, without motion; guides need none.
+    pub mesh: Option<&'a Mesh>,
     /// Where that stands at the start.
     pub pose: Pose,
     /// The collider that strands are combed off and that carries the roots, counted from the first, and which of its bones does.
@@ -35,65 +39,97 @@ pub struct Ground<'a> {
 
 /// Adds the masses, frames and elements of all strands.
 pub fn hair(site: &mut Site<'_>, thing: &Hair, seed: u32, ground: &Ground<'_>) {
-    let path = format!("hair \"{}\"", thing.name);
-    let place = if thing.mesh.is_some() { ".mesh" } else { ".on" };
-    let Some(sampler) = Sampler::surface(ground.mesh) else {
-        return site.wrong(format!("{path}{place}"), "the surface has no triangle with an area, so nothing can grow on it");
+    let grown = match &thing.guides {
+        None => grown(site, thing, seed, ground.mesh),
+        Some(words) => match site.assets.curves(&words.path) {
+            Some(curves) => guided(site, thing, words, curves, ground),
+            None => return site.wrong(format!("hair \"{}\".guides", thing.name), "the curves have not been loaded"),
+        },
     };
-    let corner = |i: u32| Vector::from(ground.mesh.vertices[i as usize]);
+    let Some(grown) = grown else { return };
+    let groomed: Vec<Vec<Vector>> = grown.into_iter().map(|shape| shape.into_iter().map(|p| ground.pose.out(p)).collect()).collect();
+    let mut shapes = groomed.clone();
+    if let Some((solid, ..)) = ground.solid {
+        for shape in &mut shapes {
+            let length = thing.length.unwrap_or_else(|| shape.windows(2).map(|p| (p[1] - p[0]).norm()).sum());
+            comb(shape, solid, 1.02 * solid.thickness + 1e-4 * length);
+        }
+    }
+    if thing.guides.is_some() {
+        combed(site, thing, groomed.iter().zip(&shapes).map(|(was, is)| (&was[..], &is[..])));
+    }
+    site.parts.begin(&thing.name, thing.radius);
+    shapes.iter().for_each(|shape| plant(site, thing, shape, ground));
+    let n = thing.segments + 1;
+    if let Some(object) = site.parts.object() {
+        object.curve = (0..shapes.len() as u32 * n).collect();
+        object.curve_points = n;
+    }
+    if let Some(words) = &thing.collisions {
+        site.parts.hair_continuum(words.clone());
+    }
+}
+
+/// Points of strands that grow on a surface; `None` where they cannot.
+fn grown(site: &mut Site<'_>, thing: &Hair, seed: u32, mesh: Option<&Mesh>) -> Option<Vec<Vec<Vector>>> {
+    let path = format!("hair \"{}\"", thing.name);
+    let mut wrong = |key: &str, message: String| {
+        site.wrong(format!("{path}{key}"), message);
+        None
+    };
+    let place = if thing.mesh.is_some() { ".mesh" } else { ".on" };
+    let Some((mesh, sampler)) = mesh.and_then(|mesh| Some((mesh, Sampler::surface(mesh)?))) else {
+        return wrong(place, "the surface has no triangle with an area, so nothing can grow on it".into());
+    };
+    let length = thing.length.unwrap_or(0.0);
+    let corner = |i: u32| Vector::from(mesh.vertices[i as usize]);
     let twice = |t: &[u32; 3]| (corner(t[1]) - corner(t[0])).cross(corner(t[2]) - corner(t[0])).norm();
-    let area = ground.mesh.triangles.iter().map(twice).sum::<f64>() / 2.0;
+    let area = mesh.triangles.iter().map(twice).sum::<f64>() / 2.0;
     let wanted = thing.per_area.map_or(f64::from(thing.count.unwrap_or(1)), |n| (n * area).round());
     if !(1.0..=MOST).contains(&wanted) || wanted * f64::from(thing.segments) > 10.0 * MOST {
-        let (key, most) = (if thing.per_area.is_some() { "per_area" } else { "count" }, MOST);
+        let (key, most) = (if thing.per_area.is_some() { ".per_area" } else { ".count" }, MOST);
         let message = format!("{wanted} strands of {} segments, expected 1 to {most:.0e} strands and at most 1e8 segments", thing.segments);
-        return site.wrong(format!("{path}.{key}"), message);
+        return wrong(key, message);
     }
     if let Some(curl) = &thing.curl {
-        let turn = thing.length / f64::from(thing.segments) / curl.radius.hypot(curl.pitch / TAU);
+        let turn = length / f64::from(thing.segments) / curl.radius.hypot(curl.pitch / TAU);
         if turn > 1.5 {
             let least = (f64::from(thing.segments) * turn / 1.5).ceil();
             let message = format!(
                 "{} pieces of a strand turn by {turn:.1} rad each in its curl, expected at most 1.5 rad: {least} segments",
                 thing.segments
             );
-            return site.wrong(format!("{path}.segments"), message);
+            return wrong(".segments", message);
         }
     }
-    let count = wanted as u64;
     let random = Random::new(seed, &thing.name);
-    let mut roots: Vec<(Vector, Vector)> = Vec::with_capacity(count as usize);
-    for id in 0..count {
-        let found = (0..TRIES).map(|k| sampler.sample(&|j| random.uniform(id, k, j))).find(|(x, _)| thing.above.is_none_or(|z| x.z > z));
-        let Some(root) = found else {
-            return site.wrong(format!("{path}.above"), "almost none of the surface is above this height; lower it");
-        };
-        roots.push(root);
-    }
+    let Some(roots) = sown(&sampler, &random, wanted as u64, (thing.above, area)) else {
+        return wrong(".above", "almost none of the surface is above this height; lower it".into());
+    };
     let grown: Vec<Vec<Vector>> = roots.iter().enumerate().map(|(i, root)| strand(thing, &random, i as u64, *root)).collect();
-    site.parts.begin(&thing.name, thing.radius);
-    for (i, own) in grown.iter().enumerate() {
-        let shape = match &thing.clump {
-            Some(clump) if i >= clump.count as usize => {
-                let near = nearest(&roots[..(clump.count as usize).min(roots.len())], roots[i].0);
-                drawn(own, &grown[near], clump.strength)
-            }
-            _ => own.clone(),
-        };
-        let mut shape: Vec<Vector> = shape.into_iter().map(|p| ground.pose.out(p)).collect();
-        if let Some((solid, ..)) = ground.solid {
-            comb(&mut shape, solid, 1.02 * solid.thickness + 1e-4 * thing.length);
-        }
-        plant(site, thing, &shape, ground);
-    }
-    let n = thing.segments + 1;
-    if let Some(object) = site.parts.object() {
-        object.curve = (0..count as u32 * n).collect();
-        object.curve_points = n;
-    }
-    if let Some(words) = &thing.collisions {
-        site.parts.hair_continuum(words.clone());
-    }
+    let Some(clump) = &thing.clump else { return Some(grown) };
+    let middles = (clump.count as usize).min(roots.len());
+    let shape = |i: usize| {
+        let near = nearest(&roots[..middles], roots[i].0);
+        drawn(&grown[i], &grown[near], clump.strength)
+    };
+    Some((0..grown.len()).map(|i| if i < middles { grown[i].clone() } else { shape(i) }).collect())
+}
+
+/// Roots in blue noise above a height on a surface of that area, in an order in which the first ones of any number, centres of clumps, are in blue
+/// noise, too. `None` where almost nothing is above the height.
+fn sown(sampler: &Sampler, random: &Random, count: u64, (above, area): (Option<f64>, f64)) -> Option<Vec<(Vector, Vector)>> {
+    let candidates = (CANDIDATES * count).min(MOST_CANDIDATES).max(2 * count);
+    let mut tried = 0;
+    let mut one = |id: u64| {
+        let at = |k: u32| sampler.sample(&|j| random.uniform(id, k, j));
+        let (k, root) = (0..TRIES).map(|k| (k, at(k))).find(|(_, (x, _))| above.is_none_or(|z| x.z > z))?;
+        tried += u64::from(k) + 1;
+        Some(root)
+    };
+    let points: Vec<(Vector, Vector)> = (0..candidates).map(&mut one).collect::<Option<_>>()?;
+    let order = spread(&points, count as usize, area * candidates as f64 / tried as f64);
+    Some(order.into_iter().map(|i| points[i as usize]).collect())
 }
 
 /// The nearest of some roots.
@@ -146,7 +182,7 @@ fn comb(shape: &mut [Vector], solid: &Collider, clear: f64) {
 /// x(s) = (R (cos(a) - 1), R sin(a), b a),  a = s/sqrt(R² + b²),  b = pitch/(2 pi)                          (hair.2)
 fn strand(thing: &Hair, random: &Random, id: u64, (root, normal): (Vector, Vector)) -> Vec<Vector> {
     let [u, v, ..] = random.uniform(id, u32::MAX, 0);
-    let length = thing.length * (1.0 - thing.spread * u);
+    let length = thing.length.unwrap_or(0.0) * (1.0 - thing.spread * u);
     let n = thing.segments as usize;
     let grows = normal + Vector::from(thing.lean);
     let along = if grows.norm() > 1e-9 { grows.normalized() } else { normal };

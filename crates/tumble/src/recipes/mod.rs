@@ -11,6 +11,7 @@ mod dress;
 mod emitter;
 mod figures;
 mod galaxy;
+mod guides;
 mod hair;
 mod lattice;
 mod loads;

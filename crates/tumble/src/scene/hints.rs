@@ -95,7 +95,7 @@ pub fn thin(scene: &Scene) -> Vec<Warning> {
     let cloths = scene.cloth.iter().map(|t| (&t.name, t.resolution));
     let way = |t: &Rope| (0..3).map(|k| (t.to[k] - t.from[k]).powi(2)).sum::<f64>().sqrt();
     let ropes = scene.rope.iter().map(|t| (&t.name, t.length.unwrap_or_else(|| way(t)) / f64::from(t.segments)));
-    let hair = scene.hair.iter().map(|t| (&t.name, t.length / f64::from(t.segments)));
+    let hair = scene.hair.iter().filter_map(|t| Some((&t.name, t.length? / f64::from(t.segments))));
     let all = sheets.chain(cloths).chain(ropes).chain(hair);
     let Some((name, apart)) = all.max_by(|a, b| a.1.total_cmp(&b.1)) else { return Vec::new() };
     let doubt = |thing: &Collider| {

@@ -75,7 +75,9 @@ pub fn masses(scene: &Scene, assets: &Assets) -> f64 {
             }
             _ => file.and_then(|file| Some(of(assets.get(&file.path)?, file.scale))).unwrap_or(0.0),
         };
-        let strands = thing.per_area.map_or(f64::from(thing.count.unwrap_or(1)), |n| n * area);
+        let groomed = thing.guides.as_ref().and_then(|guides| assets.curves(&guides.path)).map(|curves| curves.len() as f64);
+        let sown = || thing.per_area.map_or(f64::from(thing.count.unwrap_or(1)), |n| n * area);
+        let strands = groomed.unwrap_or_else(sown);
         bytes += strands * (f64::from(thing.segments) + 2.0) * (2.0 * MASS + 4.0 * LINK + factors(&thing.system, FACTORS[0]));
     }
     for thing in &scene.sheet {

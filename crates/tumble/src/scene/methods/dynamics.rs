@@ -231,20 +231,45 @@ fn act(builder: &mut Builder<'_>, parts: &mut Parts) {
     }
 }
 
+/// What a hair says and cannot mean together: keys and messages.
+fn contradictions(thing: &Hair) -> Vec<(&'static str, String)> {
+    if thing.guides.is_none() {
+        let length = thing.length.is_none().then(|| (".length", "missing, expected a length of strands in m, or guides".into()));
+        let count = "expected either a count of strands or per_area, strands per area";
+        let count = (thing.count.is_some() == thing.per_area.is_some()).then(|| (".count", count.into()));
+        return count.into_iter().chain(length).collect();
+    }
+    let given = [
+        (".count", thing.count.is_some()),
+        (".per_area", thing.per_area.is_some()),
+        (".above", thing.above.is_some()),
+        (".length", thing.length.is_some()),
+        (".spread", thing.spread != 0.0),
+        (".lean", thing.lean != [0.0; 3]),
+        (".curl", thing.curl.is_some()),
+        (".clump", thing.clump.is_some()),
+    ];
+    let message = |key: &str| format!("strands are as their guides say; leave out {}, or guides", &key[1..]);
+    given.into_iter().filter(|(_, given)| *given).map(|(key, _)| (key, message(key))).collect()
+}
+
 /// Hair on its mesh or collider.
 fn planted(site: &mut Site<'_>, scene: &Scene, thing: &Hair, assets: &Assets, (colliders, surfaces): (&[Collider], &[Mesh])) {
     let path = format!("hair \"{}\"", thing.name);
     let mut wrong = |key: &str, message: String| site.issues.push(Issue::new(format!("{path}{key}"), message));
-    if thing.count.is_some() == thing.per_area.is_some() {
-        return wrong(".count", "expected either a count of strands or per_area, strands per area".into());
+    let contradictions = contradictions(thing);
+    if !contradictions.is_empty() {
+        return contradictions.into_iter().for_each(|(key, message)| wrong(key, message));
     }
+    let fixed = |mesh| recipes::Ground { mesh, pose: Pose::default(), solid: None };
     match (&thing.mesh, &thing.on) {
         (Some(file), None) => match assets.get(&file.path) {
-            Some(mesh) => {
-                let mesh = recipes::placed(mesh, file);
-                recipes::hair(site, thing, scene.seed, &recipes::Ground { mesh: &mesh, pose: Pose::default(), solid: None });
-            }
+            Some(mesh) => recipes::hair(site, thing, scene.seed, &fixed(Some(&recipes::placed(mesh, file)))),
             None => wrong(".mesh", "the mesh has not been loaded".into()),
+        },
+        (None, None) if thing.guides.is_some() => match &thing.bone {
+            Some(_) => wrong(".bone", "it is a bone of the collider that on names; name that, or leave out bone".into()),
+            None => recipes::hair(site, thing, scene.seed, &fixed(None)),
         },
         (None, Some(name)) => {
             let Some(k) = scene.collider.iter().position(|c| c.name == *name) else {
@@ -271,7 +296,7 @@ fn planted(site: &mut Site<'_>, scene: &Scene, thing: &Hair, assets: &Assets, (c
                 },
                 None => None,
             };
-            let ground = recipes::Ground { mesh, pose: solid.pose(Carrier::Whole, 0.0), solid: Some((solid, k, bone)) };
+            let ground = recipes::Ground { mesh: Some(mesh), pose: solid.pose(Carrier::Whole, 0.0), solid: Some((solid, k, bone)) };
             recipes::hair(site, thing, scene.seed, &ground);
         }
         _ => wrong(".on", "expected either the name of a collider, or a mesh".into()),
