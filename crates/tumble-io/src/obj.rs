@@ -178,9 +178,8 @@ impl Lines {
     fn finish(self) -> Result<Curves, String> {
         let Self { vertices, lines, faces } = self;
         if lines.is_empty() && faces > 0 {
-            return Err(format!(
-                "it has faces and no curves (lines \"l i j\"); export the strands as curves, or let hair grow on this mesh as mesh = {{ path = ... }}"
-            ));
+            let message = "it has faces and no curves (lines \"l i j\"); export the strands as curves, or let hair grow on this mesh as mesh = { path = ... }";
+            return Err(message.to_owned());
         }
         if lines.is_empty() {
             return Err("there are no curves (lines \"l i j\") in it; export the strands as polylines".to_owned());
