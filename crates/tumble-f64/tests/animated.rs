@@ -284,18 +284,18 @@ fn what_is_wrong_in_time_is_told() {
     assert_ne!(falls("[0, 0, -9.8]"), vec![Vector::default(); 10]);
 }
 
-/// A mass on a ball that grows is lifted at the speed of its top, whatever the scheme; it rests on one that has another size from the start.
+/// A mass on a box that grows is lifted at the speed of its top, whatever the scheme; it rests on one that has another size from the start.
 #[test]
 fn solids_change_their_size() {
     for integrator in every() {
-        let scene = |motion: &str| {
+        let scene = |height: f64, motion: &str| {
             simulation(&format!(
-                "precision = \"double\"\ntime = {{ fps = 50, frames = 100 }}\n{}[[particles]]\nname = \"p\"\nposition = [[0, 0, 0.5]]\n\
-                 [[collider]]\nname = \"ball\"\nshape.sphere = {{ center = [0, 0, 0.3], radius = 0.2 }}\nmotion = {{ pivot = [0, 0, 0.1], {motion} }}\n",
+                "precision = \"double\"\ntime = {{ fps = 50, frames = 100 }}\n{}[[particles]]\nname = \"p\"\nposition = [[0.03, 0.02, {height}]]\n\
+                 [[collider]]\nname = \"box\"\nshape.box = {{ center = [0, 0, 0.3], size = [0.4, 0.4, 0.4] }}\nmotion = {{ pivot = [0, 0, 0.1], {motion} }}\n",
                 system(integrator, 2e-3)
             ))
         };
-        let mut sim = scene("scale = { keys = [[0, 1], [1, 1.5], [2, 1.5]] }");
+        let mut sim = scene(0.5, "scale = { keys = [[0, 1], [1, 1.5], [2, 1.5]] }");
         run(&mut sim, 25);
         let (x, v) = (positions(&sim, "p")[0], velocities(&sim, "p")[0]);
         // The top is 0.4 m above the pivot. Implicit schemes let a mass sink in by fractions of a millimetre.
@@ -303,10 +303,9 @@ fn solids_change_their_size() {
         run(&mut sim, 75);
         // In flight for v²/2g = 2 mm at the end of the growth.
         assert!((positions(&sim, "p")[0].z - 0.7).abs() < 2e-3, "{integrator:?}: {:?}", positions(&sim, "p"));
-        let mut large = scene("scale = 2");
-        let start = positions(&large, "p")[0].z;
-        run(&mut large, 5);
-        assert!((positions(&large, "p")[0].z - 0.9).abs() < 2e-3 && start == 0.5, "{integrator:?}: {:?}", positions(&large, "p"));
+        let mut large = scene(0.91, "scale = 2");
+        run(&mut large, 10);
+        assert!((positions(&large, "p")[0].z - 0.9).abs() < 2e-3, "{integrator:?}: {:?}", positions(&large, "p"));
     }
 }
 

@@ -302,7 +302,7 @@ fn a_tear_leaves_no_scraps() {
         );
         let mut sim = simulation(&text);
         // Away from the middle, unevenly.
-        let v: Vec<Vector> = positions(&sim, "s").iter().map(|x| vector(9.0 * x.x + 3.0 * x.y * x.y, 7.0 * x.y, 2.0 * x.x)).collect();
+        let v: Vec<Vector> = positions(&sim, "s").iter().map(|x| vector(40.0 * x.x + 9.0 * x.y * x.y, 30.0 * x.y, 5.0 * x.x)).collect();
         write(&mut sim, "s", "velocity", &v);
         let mut middle = Vec::new();
         for frame in 0..16 {

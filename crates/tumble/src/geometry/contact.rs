@@ -181,16 +181,11 @@ impl Collider {
 
     /// The contact of a mass at p at time t, if it is closer than the thickness.
     pub fn touch(&self, p: Vector, t: f64) -> Option<Touch> {
-        self.touch_within(p, t, self.thickness)
-    }
-
-    /// The same with another thickness [m].
-    pub fn touch_within(&self, p: Vector, t: f64, thickness: f64) -> Option<Touch> {
         let place = self.at(t);
         let local = place.map_or(p, |(pose, _)| pose.back(p));
-        let (distance, normal, moves) = self.near(local, t, thickness);
+        let (distance, normal, moves) = self.near(local, t, self.thickness);
         let (distance, normal) = if self.inside { (-distance, -normal) } else { (distance, normal) };
-        let depth = thickness - distance;
+        let depth = self.thickness - distance;
         if depth <= 0.0 || normal.norm_sq() == 0.0 {
             return None;
         }
@@ -225,29 +220,24 @@ impl Collider {
     /// First contact with the solid of a mass that moves straight from `from` at time t0 to `to` at t1. A mass that starts touching hits at once if
     /// it moves inward; deeper starts are not handled here.
     pub fn sweep(&self, from: Vector, to: Vector, t0: f64, t1: f64) -> Option<Impact> {
-        self.sweep_within(from, to, (t0, t1), self.thickness)
-    }
-
-    /// The same with another thickness [m].
-    pub fn sweep_within(&self, from: Vector, to: Vector, times: (f64, f64), thickness: f64) -> Option<Impact> {
-        self.passage(from, to, times, thickness).or_else(|| self.landing(from, to, times, thickness))
+        self.passage(from, to, t0, t1).or_else(|| self.landing(from, to, t0, t1))
     }
 
     /// A way that ends in touch with a mesh but passes no triangle: the surface counts as flat.
-    fn landing(&self, from: Vector, to: Vector, (t0, t1): (f64, f64), thickness: f64) -> Option<Impact> {
+    fn landing(&self, from: Vector, to: Vector, t0: f64, t1: f64) -> Option<Impact> {
         if !matches!(self.shape, Shape::Mesh { .. } | Shape::Animated { .. }) {
             return None;
         }
-        let Touch { depth, normal, velocity } = self.touch_within(to, t1, thickness)?;
+        let Touch { depth, normal, velocity } = self.touch(to, t1)?;
         let fall = (velocity * (t1 - t0) - (to - from)).dot(normal);
         // Deeper at the start: no matter of a way.
-        let flat = fall > 0.0 && depth - fall <= thickness + 1e-6 * (1.0 + from.norm());
+        let flat = fall > 0.0 && depth - fall <= self.thickness + 1e-6 * (1.0 + from.norm());
         flat.then(|| Impact { part: (1.0 - depth / fall).max(0.0), normal, velocity })
     }
 
-    fn passage(&self, from: Vector, to: Vector, (t0, t1): (f64, f64), thickness: f64) -> Option<Impact> {
+    fn passage(&self, from: Vector, to: Vector, t0: f64, t1: f64) -> Option<Impact> {
         let Some((start, twist)) = self.at(t0) else {
-            let (part, normal, moves) = self.shape.sweep(from, to, (t0, t1), thickness, self.inside)?;
+            let (part, normal, moves) = self.shape.sweep(from, to, (t0, t1), self.thickness, self.inside)?;
             return Some(Impact { part, normal, velocity: moves + self.belt });
         };
         // Straight in the frame of the solid, piece by piece: the pieces join, so that nothing slips through.
@@ -262,7 +252,7 @@ impl Collider {
             let time = t0 + (t1 - t0) * e;
             let Some((pose, _)) = self.at(time) else { break };
             let b = pose.back(from + (to - from) * e);
-            if let Some((part, normal, moves)) = self.shape.sweep(a, b, (before, time), thickness, self.inside) {
+            if let Some((part, normal, moves)) = self.shape.sweep(a, b, (before, time), self.thickness, self.inside) {
                 let part = s + (e - s) * part;
                 let (pose, twist) = self.at(t0 + (t1 - t0) * part)?;
                 let velocity = twist.at(from + (to - from) * part) + pose.turn.turn(moves + self.belt);

@@ -138,11 +138,6 @@ impl Density {
         self.rows.clone()
     }
 
-    /// Distance of neighbouring particles at rest [m].
-    pub fn spacing(&self) -> f64 {
-        self.spacing
-    }
-
     /// Impulses on every solid in the last sub-step, in their order [N s].                                  (liquids.8)
     pub fn pushes(&self) -> &[Vector] {
         &self.pushes

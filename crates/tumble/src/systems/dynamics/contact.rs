@@ -31,17 +31,11 @@ pub struct Step {
     pub lead: f64,
     /// Whether impacts are observed.
     pub observed: bool,
-    /// Solids count as no thinner than this [m]: half a spacing for a liquid of particles, whose volume ends that far from them.
-    pub least_thickness: f64,
 }
 
 impl Step {
     fn end(&self) -> f64 {
         self.t + self.h
-    }
-
-    fn touch(&self, collider: &Collider, p: Vector) -> Option<Touch> {
-        collider.touch_within(p, self.end(), collider.thickness.max(self.least_thickness))
     }
 }
 
@@ -66,8 +60,8 @@ pub struct Pass<'a> {
     pub penalty: bool,
     /// Rows whose impacts are observed.
     pub observed: &'a [Range<usize>],
-    /// Rows of liquids, whose impulses on solids are counted, and half their spacings [m].
-    pub liquids: &'a [(Range<usize>, f64)],
+    /// Rows whose impulses on solids are counted.
+    pub counted: &'a [Range<usize>],
 }
 
 /// What a contact pass has found.
@@ -77,7 +71,7 @@ pub struct Found {
     pub touched: bool,
     /// Impacts of observed rows.
     pub hits: Vec<(usize, Hit)>,
-    /// Impulses of liquids on every solid [N s]; empty without any.
+    /// Impulses of counted rows on every solid [N s]; empty without any.
     pub pushes: Vec<Vector>,
 }
 
@@ -109,10 +103,9 @@ impl Pass<'_> {
         if x[3] <= 0.0 {
             return false;
         }
-        let liquid = self.liquids.iter().find(|(rows, _)| rows.contains(&row));
-        let least_thickness = liquid.map_or(0.0, |(_, half)| *half);
-        let step = Step { observed: self.observed.iter().any(|rows| rows.contains(&row)), least_thickness, ..self.step };
-        let mass = liquid.map_or(0.0, |_| 1.0 / f64::from(x[3]));
+        let among = |ranges: &[Range<usize>]| ranges.iter().any(|rows| rows.contains(&row));
+        let step = Step { observed: among(self.observed), ..self.step };
+        let mass = if among(self.counted) { 1.0 / f64::from(x[3]) } else { 0.0 };
         if mass > 0.0 {
             found.pushes.resize(self.colliders.len(), Vector::default());
         }
@@ -146,7 +139,7 @@ fn resolve(colliders: &[Collider], step: &Step, before: (Row, Row), x: &mut Row,
         // A container bends towards masses that go along its wall, and has corners where three walls meet.
         for _ in 0..if collider.inside { 3 } else { 1 } {
             let (position, velocity) = (xyz64(*x), xyz64(*v));
-            let Some(Touch { depth, normal, velocity: surface }) = step.touch(collider, position) else { break };
+            let Some(Touch { depth, normal, velocity: surface }) = collider.touch(position, step.end()) else { break };
             touched = true;
             let way = position - xyz64(before.0) - surface * step.h;
             let along = way - normal * way.dot(normal);
@@ -196,23 +189,27 @@ fn meet(
     let (mut from, mut to) = (xyz64(before.0), xyz64(*x));
     let (mut start, mut end) = (xyz64(before.1), xyz64(*v));
     let mut gone = 0.0;
-    let mut touched = false;
+    let (mut touched, mut held) = (false, None);
     for bounce in 0..BOUNCES {
         let left = step.h - gone;
         let mut first: Option<(Impact, usize)> = None;
         for (solid, collider) in colliders.iter().enumerate() {
-            let thickness = collider.thickness.max(step.least_thickness);
-            let Some(hit) = collider.sweep_within(from, to, (step.t + gone, step.end()), thickness) else { continue };
+            let Some(hit) = collider.sweep(from, to, step.t + gone, step.end()) else { continue };
             let speeds = [start + (end - start) * hit.part, (to - from) * (1.0 / left), end];
             let approach = speeds.map(|v| (v - hit.velocity).dot(hit.normal)).into_iter().fold(f64::INFINITY, f64::min);
-            let stays = || step.touch(collider, to).is_some_and(|t| t.normal.dot(hit.normal) > 0.0);
+            let stays = || collider.touch(to, step.end()).is_some_and(|t| t.normal.dot(hit.normal) > 0.0);
             if first.as_ref().is_none_or(|(f, _)| hit.part < f.part) && (approach < -step.resting || !stays()) {
                 first = Some((hit, solid));
             }
         }
         let Some((hit, solid)) = first else { break };
         touched = true;
-        let (collider, unhindered) = (&colliders[solid], end);
+        let collider = &colliders[solid];
+        // The path up to here is as if no solid had held it for the rest.
+        let unhindered = start + pull * left;
+        if let Some(before) = held.replace(solid) {
+            teller.push(before, unhindered - end);
+        }
         let (n, surface) = (hit.normal, hit.velocity);
         let bend = pull * (0.5 * left * left);
         let s = on_parabola(hit.part, ((to - from) - surface * left).dot(n), bend.dot(n));

@@ -143,10 +143,10 @@ impl Core {
             return;
         }
         let observed = self.pool.heeded();
-        let step = Step { t, h, resting: self.resting_speed(h), lead, observed: false, least_thickness: 0.0 };
+        let step = Step { t, h, resting: self.resting_speed(h), lead, observed: false };
         let bodies = self.resolve_body_contact(&step, plain);
-        let liquids: Vec<(Range<usize>, f64)> = self.liquids().map(|liquid| (liquid.rows(), 0.5 * liquid.spacing())).collect();
-        let pass = Pass { colliders: &self.laws.colliders, step, penalty, observed: &observed, liquids: &liquids };
+        let liquids: Vec<Range<usize>> = self.liquids().map(Density::rows).collect();
+        let pass = Pass { colliders: &self.laws.colliders, step, penalty, observed: &observed, counted: &liquids };
         self.pushes.clear();
         self.pushes.resize(self.laws.colliders.len(), Vector::default());
         for points in self.laws.masses.points().flat_map(|points| without(points, &bodies)) {

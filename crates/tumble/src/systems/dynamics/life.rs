@@ -90,8 +90,8 @@ impl Core {
         let every = 0..usize::MAX;
         let observed: &[Range<usize>] = if self.pool.heeds_hits(s) { std::slice::from_ref(&every) } else { &[] };
         let touch = |i: usize, (t, h, lead): (f64, f64, f64), before: (Row, Row), x: &mut Row, v: &mut Row, found: &mut Found| {
-            let step = Contact { t, h, resting, lead, observed: false, least_thickness: 0.0 };
-            let pass = Pass { colliders, step, penalty: false, observed, liquids: &[] };
+            let step = Contact { t, h, resting, lead, observed: false };
+            let pass = Pass { colliders, step, penalty: false, observed, counted: &[] };
             !colliders.is_empty() && h > 0.0 && pass.mass(i, before, x, v, found)
         };
         let rate = self.stiffness_of(object, births, &masses);

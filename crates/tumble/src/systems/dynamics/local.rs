@@ -53,8 +53,8 @@ impl Core {
                     integrators::step(scheme, Step { equation, t, h, x, v, memory, ready, scratch, report })?;
                     ready = true;
                     if !colliders.is_empty() {
-                        let step = Contact { t, h, resting, lead: response.lead, observed: false, least_thickness: 0.0 };
-                        let pass = Pass { colliders, step, penalty: response.penalty, observed: &observed, liquids: &[] };
+                        let step = Contact { t, h, resting, lead: response.lead, observed: false };
+                        let pass = Pass { colliders, step, penalty: response.penalty, observed: &observed, counted: &[] };
                         for points in [&first, &last] {
                             let starts = [&before[points.clone()], &before_v[points.clone()]];
                             let (x, v) = (&mut x[points.clone()], &mut v[points.clone()]);
