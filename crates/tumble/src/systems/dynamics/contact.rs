@@ -207,7 +207,8 @@ fn meet(
         let collider = &colliders[solid];
         // The path up to here is as if no solid had held it for the rest.
         let unhindered = start + pull * left;
-        if let Some(before) = held.replace(solid) {
+        let before = held.replace(solid);
+        if let Some(before) = before {
             teller.push(before, unhindered - end);
         }
         let (n, surface) = (hit.normal, hit.velocity);
@@ -236,8 +237,12 @@ fn meet(
             end = start + pull * rest;
         }
         if bounce + 1 == BOUNCES || rest <= 0.0 {
+            // It waits between this solid and that before, each of which holds it along its normal.
             (to, end) = (from, start);
-            teller.push(solid, end - unhindered);
+            let change = end - unhindered;
+            let own = n * change.dot(n);
+            teller.push(solid, own);
+            teller.push(before.unwrap_or(solid), change - own);
             break;
         }
         teller.push(solid, end - unhindered);
