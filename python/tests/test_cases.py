@@ -323,7 +323,7 @@ def test_a_balloon_is_blown_up_over_time(tmp_path: Path) -> None:
             'rope "r".density',
             {"rope": [{"name": "r", "from": [0, 0, 0], "to": [1, 0, 0], "segments": 2, "density": {"keys": [[0, 1]]}}]},
         ),
-        ("camera.position", {"camera": {"position": {"keys": [[0, 0, 0, 0], [1, 1, 1, 1]]}}}),
+        ("camera.resolution", {"camera": {"resolution": {"keys": [[0, 640, 480], [1, 320, 240]]}}}),
     ],
 )
 def test_a_word_that_cannot_be_animated_says_so(path: str, tree: Tree) -> None:

@@ -150,7 +150,7 @@ def test_wrong_input_ends_with_2_and_leaves_nothing(
         ),
         (
             "version = 1\n[[emitter]]\nname = 'e'\nfrom = { point = {} }\nburst = [{ count = 1 }]\ncolor = [255, 128, 0]\n",
-            "color[0]: 255, expected >= 0 and <= 1",
+            "color: [255, 128, 0], expected numbers from 0 to 1",
         ),
     ],
 )
