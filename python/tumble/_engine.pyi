@@ -278,11 +278,12 @@ class World:
         self,
         force: Callable[[float, Array, Array, Array], npt.ArrayLike],
         system: str | None = None,
-        jacobian: Callable[[float, Array, Array, Array], npt.ArrayLike | tuple[npt.ArrayLike, npt.ArrayLike]] | None = None,
+        jacobian: Callable[[float, Array, Array, Array], npt.ArrayLike | tuple[npt.ArrayLike, npt.ArrayLike]]
+        | None = None,
     ) -> None:
         """Adds a force: force(t, x, v, mass) -> n x 3 [N], from x [m] and v [m/s], n x 3, and mass [kg], n. Without
-        `system`, to the first. `jacobian(t, x, v, mass)` gives implicit integrators the derivatives of the force on each mass by its own
-        position, n x 3 x 3 [N/m], or a pair: these and those by its velocity [N s/m]. Raises SceneError."""
+        `system`, to the first. `jacobian(t, x, v, mass)` gives implicit integrators the derivatives of the force on each
+        mass by its own position, n x 3 x 3 [N/m], or a pair: these and those by its velocity [N s/m]. Raises SceneError."""
 
     def set_integrator(
         self,

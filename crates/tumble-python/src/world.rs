@@ -492,8 +492,8 @@ impl World {
     }
 
     /// Adds a force: force(t, x, v, mass) -> n x 3 [N], from x [m] and v [m/s], n x 3, and mass [kg], n. Without
-    /// `system`, to the first. `jacobian(t, x, v, mass)` gives implicit integrators the derivatives of the force on each mass by its own
-    /// position, n x 3 x 3 [N/m], or a pair: these and those by its velocity [N s/m]. Raises SceneError.
+    /// `system`, to the first. `jacobian(t, x, v, mass)` gives implicit integrators the derivatives of the force on each
+    /// mass by its own position, n x 3 x 3 [N/m], or a pair: these and those by its velocity [N s/m]. Raises SceneError.
     #[pyo3(signature = (force, system=None, jacobian=None))]
     fn add_force(&mut self, py: Python<'_>, force: Py<PyAny>, system: Option<String>, jacobian: Option<Py<PyAny>>) -> PyResult<()> {
         callable(py, &force, "force")?;
