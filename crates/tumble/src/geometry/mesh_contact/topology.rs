@@ -30,6 +30,7 @@ pub struct Topology {
     /// Whether there are any at all.
     has_welds: bool,
     has_fixed: bool,
+    has_hair: bool,
     /// The first corner of what is no soft object.
     first_corner: Option<u32>,
     rest: Vec<Vector>,
@@ -78,6 +79,7 @@ impl Topology {
     /// two triangles share are one. A vertex belongs to the first object that names it.
     pub fn add(&mut self, owner: Owner, triangles: &[[u32; 3]], segments: &[[u32; 2]], points: &[u32]) -> u32 {
         let number = self.owners.len() as u32;
+        self.has_hair |= owner.hair;
         self.owners.push(Owner { radius: if owner.radius > 0.0 { owner.radius } else { 0.0 }, ..owner });
         let exists = |v: &u32| (*v as usize) < self.vertices;
         let triangles: Vec<[u32; 3]> = triangles.iter().filter(|t| t.iter().all(exists)).copied().collect();
@@ -224,8 +226,10 @@ impl Topology {
             return false;
         }
         let (of_a, of_b) = (self.owner[a[0] as usize], self.owner[b[0] as usize]);
-        let (owner_a, owner_b) = (&self.owners[of_a as usize], &self.owners[of_b as usize]);
-        if of_a == of_b && !owner_a.itself || owner_a.hair && owner_b.hair {
+        if of_a == of_b && !self.owners[of_a as usize].itself {
+            return false;
+        }
+        if self.has_hair && self.owners[of_a as usize].hair && self.owners[of_b as usize].hair {
             return false;
         }
         let fixed = |v: &u32| self.fixed[*v as usize];
