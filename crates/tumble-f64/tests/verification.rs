@@ -20,6 +20,7 @@ mod contact_sweep;
 mod converged;
 mod draping;
 mod emission;
+mod emission_in_time;
 mod events;
 mod fabrics;
 mod free_bodies;

@@ -10,6 +10,7 @@ import { LOOK, type Look } from "./look";
 import { along, arrows, carry, outline, sharp, shownOf } from "./scenery";
 import { isLeft, type Legend, type Shaded, Shades } from "./shades";
 import { trails } from "./trails";
+import { fitting, lit } from "./vantage";
 
 interface Thing extends Shaded {
   form: Form;
@@ -358,16 +359,7 @@ export class Stage {
       this.controls.enableRotate = !flat;
     }
     this.place();
-    const away = this.home.position.clone().sub(this.home.target);
-    const left = new THREE.Vector3()
-      .crossVectors(new THREE.Vector3(0, 0, 1), away)
-      .normalize()
-      .negate();
-    this.shine
-      .copy(left)
-      .multiplyScalar(1.1)
-      .add(new THREE.Vector3(0, 0, 1.7))
-      .addScaledVector(away.normalize(), 0.45);
+    this.shine.copy(lit(this.home.position.clone().sub(this.home.target)));
     this.goHome();
     this.resize();
   }
@@ -410,12 +402,7 @@ export class Stage {
       return;
     }
     this.camera.up.set(0, 0, 1);
-    let position = wish;
-    if (!position) {
-      const from = new THREE.Vector3(0.42, -1, 0.4).normalize();
-      const distance = (1.12 * Math.max(size.x * 0.55 + size.y * 0.25, (size.z * 0.55 + size.y * 0.2) * shape)) / tan + 0.35 * size.y;
-      position = goal.clone().addScaledVector(from, Math.max(distance, 1e-6));
-    }
+    let position = wish ?? fitting(goal, size, tan, shape);
     if (position.distanceTo(goal) < 1e-9) position.y -= 1;
     // Straight from above there is no up; a hair beside it there is.
     const way = goal.clone().sub(position);
