@@ -141,7 +141,7 @@ mod tests {
     }
 
     fn ball() -> Mesh {
-        surface::sphere(24, Vector::default(), 1.0)
+        surface::sphere(5, Vector::default(), 1.0)
     }
 
     fn cuboid(half: [f64; 3]) -> Mesh {
