@@ -239,6 +239,16 @@ LARGE: dict[str, Tree] = {
         ],
         "system": [POSITIONS],
     },
+    "solid of changing size": cloud(
+        10,
+        collider=[
+            {
+                "name": "ball",
+                "shape": {"sphere": {"radius": 0.5, "center": [9, 0, 0]}},
+                "motion": {"scale": {"keys": [[0.01 * i, 1 + i % 2] for i in range(2000)]}},
+            }
+        ],
+    ),
     "gas in a plane": {"dimension": 2, "gas": [{"name": "g", "box": box(512), "smoke": {}}]},
     "gas": {"gas": [{"name": "g", "box": box(80), **SMOKE}]},
     "gas, double": {"gas": [{"name": "g", "box": box(80), **SMOKE}], **DOUBLE},
@@ -273,7 +283,7 @@ def compare_memory(trees: dict[str, tuple[Tree, str]]) -> None:
 
 
 def test_memory_is_estimated() -> None:
-    few = ["a million particles", "emitter", "sheet, direct", "solid, direct", "gas in a plane", "sound, double"]
+    few = ["a million particles", "emitter", "solid of changing size", "sheet, direct", "solid, direct", "gas in a plane", "sound, double"]
     compare_memory({name: ({"version": 1} | LARGE[name], ".") for name in few})
 
 

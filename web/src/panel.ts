@@ -335,7 +335,9 @@ export class Panel {
         return this.field(path, key, schema, "", (id) => this.select(id, path, value, schema));
       const found = branch(schema, value, this.schema);
       if (!found) return null;
-      kind = { ...found, description: schema.description ?? found.description, "x-unit": schema["x-unit"] ?? found["x-unit"] };
+      // What stands beside a choice counts for the branch, bounds among it.
+      const { oneOf: _, anyOf: __, ...beside } = schema;
+      kind = { ...found, ...beside };
     }
     const type = typeOf(kind);
     const units = unit || (kind["x-unit"] && kind["x-unit"] !== "1" ? String(kind["x-unit"]) : "");

@@ -18,7 +18,7 @@ pub struct Emitter {
     pub from: Source,
     /// Particles per second; for a source of particles, children of each per second.
     #[serde(default = "nothing")]
-    #[schemars(extend("x-unit" = "1/s"))]
+    #[schemars(extend("x-unit" = "1/s", "minimum" = 0.0))]
     pub rate: Animated,
     /// Particles born at once; for a source of particles, `count` children of each when it dies or bounces.
     #[serde(default)]
@@ -57,7 +57,7 @@ pub struct Emitter {
     pub direction: Option<[f64; 3]>,
     /// Half-angle of the cone of directions, uniform over its solid angle, 0 to 180; 180 is all directions.
     #[serde(default = "nothing")]
-    #[schemars(extend("x-unit" = "°"))]
+    #[schemars(extend("x-unit" = "°", "minimum" = 0.0, "maximum" = 180.0))]
     pub cone: Animated,
     /// Fraction of the velocity of the parent, or of the moving source, that a particle inherits.
     #[serde(default)]
@@ -65,7 +65,7 @@ pub struct Emitter {
     pub inherit: f64,
     /// Age at which particles die, of those born at a time; > 0. Default: never.
     #[serde(default)]
-    #[schemars(extend("x-unit" = "s"))]
+    #[schemars(extend("x-unit" = "s", "exclusiveMinimum" = 0.0))]
     pub lifetime: Option<Animated>,
     /// Random variation of the lifetime, between lifetime (1 - this) and lifetime (1 + this).
     #[serde(default)]
@@ -88,7 +88,7 @@ pub struct Emitter {
     pub charge: f64,
     /// Radius in pictures, of those born at a time; > 0.
     #[serde(default = "centimetre")]
-    #[schemars(extend("x-unit" = "m"))]
+    #[schemars(extend("x-unit" = "m", "exclusiveMinimum" = 0.0))]
     pub radius: Animated,
     /// Random variation of the radius, between radius (1 - this) and radius (1 + this).
     #[serde(default)]

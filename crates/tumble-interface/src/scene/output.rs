@@ -53,7 +53,7 @@ pub struct Camera {
     #[schemars(extend("x-unit" = "m"))]
     pub target: Option<AnimatedVector>,
     /// Horizontal angle of view, above 0 and below 170.
-    #[schemars(extend("x-unit" = "°"))]
+    #[schemars(extend("x-unit" = "°", "exclusiveMinimum" = 0.0, "exclusiveMaximum" = 170.0))]
     pub view_angle: Animated,
     /// Width and height of pictures.
     #[schemars(inner(range(min = 16, max = 8192)), extend("x-unit" = "pixel"))]

@@ -72,7 +72,7 @@ pub struct Motion {
     pub interpolation: Pace,
     /// Size relative to that of the shape, about the pivot; > 0. A sphere, box, capsule or lathe of another size is the mesh that pictures show. Between
     /// its keys, or from frame to frame of a formula or smooth keys, it changes at a constant rate. Default: 1.
-    #[schemars(extend("x-unit" = "1"))]
+    #[schemars(extend("x-unit" = "1", "exclusiveMinimum" = 0.0))]
     pub scale: Option<Animated>,
 }
 

@@ -89,7 +89,7 @@ pub struct Weak {
 pub struct Inflation {
     /// Volume at zero pressure, relative to that of the mesh; above 0.
     #[serde(default = "whole")]
-    #[schemars(extend("x-unit" = "1"))]
+    #[schemars(extend("x-unit" = "1", "exclusiveMinimum" = 0.0))]
     pub volume: Animated,
     /// Bulk modulus: pressure per relative change of volume. Default: constant volume.
     #[serde(default)]

@@ -4,7 +4,7 @@ use super::Assets;
 use super::methods::METHODS;
 use crate::geometry::GridSdf;
 use crate::math::Signal;
-use tumble_interface::scene::{Animated, Diagonals, Dress, Emitter, Fluid, Linear, Shape, Source, System};
+use tumble_interface::scene::{Animated, Diagonals, Dress, Emitter, Fluid, Interpolation, Linear, Shape, Source, System};
 use tumble_interface::{Mesh, Scene};
 
 /// Bytes for a mass: its rows in state, scratch, snapshot and history, in double precision.
@@ -18,6 +18,9 @@ const TETRAHEDRON: f64 = 1400.0;
 
 /// Bytes for a corner of a solid whose edges meet those of what is soft: its rows, features, their boxes, and pairs.
 const CORNER: f64 = 2000.0;
+
+/// Bytes for a vertex of a keyframe: its position, and two corners of the boxes, about one for each vertex.
+const KEYED: f64 = 160.0;
 
 /// Bytes for a mass of the factors of a direct solver: along curves, on surfaces, and in bodies for each mass along an edge of the smaller
 /// cross-section. Measured: 1.9 kB in ropes, 13.3 to 14.5 kB in sheets of 100 to 400 masses along a side, 2.0 to 2.7 kB in bodies of 10 to 30.
@@ -144,9 +147,16 @@ fn solids(scene: &Scene, assets: &Assets) -> f64 {
             _ => 0.0,
         };
         if let Shape::AnimatedMesh(frames) = &thing.shape {
-            // Vertices, and two corners of the boxes, about one for each vertex.
             let meshes = frames.frames.iter().filter_map(|f| assets.get(&f.path));
-            bytes += meshes.map(|mesh| mesh.vertices.len() as f64 * 160.0).sum::<f64>();
+            bytes += meshes.map(|mesh| mesh.vertices.len() as f64 * KEYED).sum::<f64>();
+        }
+        if let Some(size) = thing.motion.as_ref().and_then(|motion| motion.scale.as_ref()) {
+            let keyframes = match size {
+                Animated::Value(_) => 1.0,
+                Animated::Keys(keys) if keys.interpolation == Interpolation::Linear => keys.keys.len() as f64,
+                _ => f64::from(scene.time.frames) + 1.0,
+            };
+            bytes += corners(&thing.shape, assets) * keyframes * KEYED;
         }
     }
     bytes
