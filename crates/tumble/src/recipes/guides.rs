@@ -3,15 +3,17 @@
 //! Verified in `tests/guides.rs`.
 
 use super::Site;
-use super::hair::{Ground, MOST};
-use crate::geometry::{Bvh, Vector};
+use crate::geometry::motion::Pose;
+use crate::geometry::{Bvh, Collider, Vector};
 use crate::math::rotation::from_degrees;
 use std::ops::RangeInclusive;
 use tumble_interface::check::short;
 use tumble_interface::scene::{Guides, Hair};
 use tumble_interface::warning::Code;
-use tumble_interface::{Curves, Warning};
+use tumble_interface::{Curves, Mesh, Warning};
 
+/// Strands at most.
+pub const MOST: f64 = 1e7;
 /// Lengths that strands may have [m].
 const LENGTHS: RangeInclusive<f64> = 1e-6..=1000.0;
 /// Way of a piece from end to end over that along the curve, at least.
@@ -20,6 +22,16 @@ const FOLDED: f64 = 0.1;
 const OFF: f64 = 0.05;
 /// The same in radii of the strand.
 const RADII: f64 = 4.0;
+
+/// What a hair grows on.
+pub struct Ground<'a> {
+    /// Its surface, without motion; guides need none.
+    pub mesh: Option<&'a Mesh>,
+    /// Where that stands at the start.
+    pub pose: Pose,
+    /// The collider that strands are combed off and that carries the roots, counted from the first, and which of its bones does.
+    pub solid: Option<(&'a Collider, usize, Option<usize>)>,
+}
 
 /// The strand that is farthest off, and how many are too far.
 #[derive(Default)]
@@ -96,8 +108,7 @@ fn loose(site: &mut Site<'_>, thing: &Hair, grown: &[Vec<Vector>], ground: &Grou
         let (root, most) = (shape[0], tolerance(thing, shape));
         let off = surface.closest(root, f64::INFINITY).map_or(0.0, |c| c.distance_sq.sqrt());
         // The surface of a sphere is that of its triangles, nearly.
-        let exact =
-            |(solid, ..): (&crate::geometry::Collider, usize, Option<usize>)| solid.distance(ground.pose.out(root), 0.0, off).0.abs();
+        let exact = |(solid, ..): (&Collider, usize, Option<usize>)| solid.distance(ground.pose.out(root), 0.0, off).0.abs();
         let off = if off > most { ground.solid.map_or(off, |solid| exact(solid).min(off)) } else { off };
         far.meet(k, off, most);
     }

@@ -7,8 +7,7 @@
 //! Its natural curvature is that of the shape in which it starts (hair.3). Verified in `tests/hair.rs`.
 
 use super::Site;
-use super::guides::{combed, guided};
-use crate::geometry::motion::Pose;
+use super::guides::{Ground, MOST, combed, guided};
 use crate::geometry::{Carrier, Collider, Sampler, Vector, spread};
 use crate::math::functions::{cos, sin};
 use crate::math::rotation::from_z_to;
@@ -24,18 +23,6 @@ const CANDIDATES: u64 = 5;
 const MOST_CANDIDATES: u64 = 2_000_000;
 /// Times that a point is moved out of a solid.
 const COMB: usize = 6;
-/// Strands at most.
-pub(super) const MOST: f64 = 1e7;
-
-/// What a hair grows on.
-pub struct Ground<'a> {
-    /// Its surface, without motion; guides need none.
-    pub mesh: Option<&'a Mesh>,
-    /// Where that stands at the start.
-    pub pose: Pose,
-    /// The collider that strands are combed off and that carries the roots, counted from the first, and which of its bones does.
-    pub solid: Option<(&'a Collider, usize, Option<usize>)>,
-}
 
 /// Adds the masses, frames and elements of all strands.
 pub fn hair(site: &mut Site<'_>, thing: &Hair, seed: u32, ground: &Ground<'_>) {
