@@ -69,6 +69,7 @@ behind:
 
 rust-tests: $(VENV)/.engine
 	@cargo test $(RUST_TESTS) --no-run --quiet
+	@cargo test $(UNIT_TESTS) --no-run --quiet
 
 lint-rust:
 	cargo fmt --all --check
@@ -82,12 +83,15 @@ lint: setup lint-rust
 		else echo "no Node here: the source of the browser laboratory is not checked"; fi
 
 # Of the same packages as the build for Python, which shares the engine with these; those for WebAssembly have no tests.
-RUST_TESTS := --workspace --exclude tumble-wasm --exclude tumble-bindgen --release --tests
+RUST_TESTS := --workspace --exclude tumble-wasm --exclude tumble-bindgen --release --test '*'
+# Tests within the engine take seconds, and another build of all of it: a quick one.
+UNIT_TESTS := -p tumble --profile unit --lib
 
 # Tests tell their time only where RUSTC_BOOTSTRAP is set, as it is here when they run, not when they are built.
+TIMED := --config 'target."cfg(all())".runner = ["env", "RUSTC_BOOTSTRAP=1"]' -- -Zunstable-options --report-time
 test-rust:
-	@mkdir -p target; cargo test $(RUST_TESTS) --config 'target."cfg(all())".runner = ["env", "RUSTC_BOOTSTRAP=1"]' \
-		-- -Zunstable-options --report-time > target/rust-tests.txt 2>&1 || { cat target/rust-tests.txt; exit 1; }
+	@mkdir -p target; { cargo test $(UNIT_TESTS) $(TIMED) && cargo test $(RUST_TESTS) $(TIMED); } > target/rust-tests.txt 2>&1 \
+		|| { cat target/rust-tests.txt; exit 1; }
 	@grep "^test result" target/rust-tests.txt; echo "the ten longest"; \
 		sed -n 's/^test \(.*\) \.\.\. ok <\(.*\)s>$$/\2 s  \1/p' target/rust-tests.txt | sort -rn | head -n 10
 
@@ -181,7 +185,8 @@ validate: setup openvdb blender wasm
 
 validate-rust:
 	cargo test $(RUST_TESTS) --quiet --no-fail-fast -- --include-ignored --nocapture
-	cargo test -p tumble --features double --lib --release --quiet --no-fail-fast
+	cargo test $(UNIT_TESTS) --quiet --no-fail-fast
+	cargo test $(UNIT_TESTS) --features double --quiet --no-fail-fast
 
 validate-python:
 	$(PYTEST) -m "" -rfEP

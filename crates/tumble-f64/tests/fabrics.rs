@@ -201,7 +201,14 @@ fn polygon(n: u32, d: f64, weight: f64, curvature: &dyn Fn(f64) -> f64) -> f64 {
             pull += d * weight;
             // The moment of a fold is M(kappa) cos(theta/2), with kappa = 2 sin(theta/2)/d.
             let fold = |cos: f64| f64::asin((0.5 * d * curvature(moment / cos)).min(1.0));
-            angle -= 2.0 * (0..30).fold(0.0, |half, _| fold(f64::cos(half)));
+            let mut half = 0.0;
+            for _ in 0..30 {
+                let before = std::mem::replace(&mut half, fold(f64::cos(half)));
+                if (half - before).abs() < 1e-15 {
+                    break;
+                }
+            }
+            angle -= 2.0 * half;
         }
         (angle, z / (x + 0.5 * d))
     };

@@ -1,6 +1,6 @@
 //! Many elements of one kind behind one small trait, so that no system knows which kinds there are.
 
-use super::list::{List, Members, Weights};
+use super::list::{List, Members, Weights, unit};
 use super::{Element, Law};
 use crate::linalg::blocks::Block;
 use crate::math::parallel::{CHUNK, Tasks, chunks, fold};
@@ -210,11 +210,20 @@ impl<E: Element<N, M, D>, Y: Law<P>, const N: usize, const M: usize, const D: us
     }
 }
 
+/// What the matrices of elements are multiplied with.
+#[derive(Clone, Copy)]
+enum Factor<'a> {
+    /// A vector at every row.
+    Rows(&'a [Row]),
+    /// In every element one of length 1 at that node, along that axis.
+    Unit(usize, usize),
+}
+
 struct Products<'a, E, Y, const N: usize, const M: usize, const D: usize, const P: usize> {
     list: &'a List<E, Y, N, M, D, P>,
     range: Range<usize>,
     x: &'a [Row],
-    u: &'a [Row],
+    u: Factor<'a>,
     slots: &'a mut [Row],
 }
 
@@ -227,12 +236,42 @@ impl<E: Element<N, M, D>, Y: Law<P>, const N: usize, const M: usize, const D: us
         packs!(W, w, self.range, |e| {
             let p = self.list.pack(w, e);
             let rows = self.list.rows(w, self.x, e);
-            let f = self.list.product(&p, rows, self.list.vectors(w, self.u, e));
+            let u = match self.u {
+                Factor::Rows(u) => self.list.vectors(w, u, e),
+                Factor::Unit(a, c) => unit(w, a, c),
+            };
+            let f = self.list.product(&p, rows, u);
             for a in 0..N {
                 w.scatter([f[a].x, f[a].y, f[a].z, w.splat(0.0)], self.slots, (e - self.range.start) * N + a, N);
             }
         });
     }
+}
+
+/// The 3 x 3 blocks on the diagonal for the elements of a range: N blocks an element, as xx, yy, zz, xy, yz, zx.
+fn diagonal<E: Element<N, M, D>, Y: Law<P>, const N: usize, const M: usize, const D: usize, const P: usize>(
+    list: &List<E, Y, N, M, D, P>,
+    x: &[Row],
+    range: Range<usize>,
+) -> Vec<Block> {
+    // As many elements as leave their products in a cache.
+    const FEW: usize = 256;
+    let mut blocks = vec![[0.0; 6]; N * range.len()];
+    let mut products = vec![ZERO; N * FEW.min(range.len())];
+    for (start, blocks) in range.clone().step_by(FEW).zip(blocks.chunks_mut(N * FEW)) {
+        let few = start..(start + FEW).min(range.end);
+        for (a, c) in (0..N).flat_map(|a| (0..3).map(move |c| (a, c))) {
+            dispatch(Products { list, range: few.clone(), x, u: Factor::Unit(a, c), slots: &mut products });
+            for (block, product) in blocks.iter_mut().zip(&products).skip(a).step_by(N) {
+                match c {
+                    0 => (block[0], block[5]) = (product[0], product[2]),
+                    1 => (block[1], block[3]) = (product[1], product[0]),
+                    _ => (block[2], block[4]) = (product[2], product[1]),
+                }
+            }
+        }
+    }
+    blocks
 }
 
 impl<E: Element<N, M, D>, Y: Law<P>, const N: usize, const M: usize, const D: usize, const P: usize> Batch for Elements<E, Y, N, M, D, P> {
@@ -272,7 +311,7 @@ impl<E: Element<N, M, D>, Y: Law<P>, const N: usize, const M: usize, const D: us
 
     fn begin_product(&mut self, x: &[Row], u: &[Row]) {
         self.list.check(&[x, u]);
-        self.fill(|list, range, slots| dispatch(Products { list, range, x, u, slots }));
+        self.fill(|list, range, slots| dispatch(Products { list, range, x, u: Factor::Rows(u), slots }));
     }
 
     fn add_product(&self, _u: &[Row], start: usize, out: &mut [Row]) {
@@ -281,7 +320,7 @@ impl<E: Element<N, M, D>, Y: Law<P>, const N: usize, const M: usize, const D: us
 
     fn add_diagonal(&mut self, x: &[Row], blocks: &mut [Block]) {
         self.list.check(&[x]);
-        let slots = fold(self.len(), |range| self.list.diagonal(x, range)).concat();
+        let slots = fold(self.len(), |range| diagonal(&self.list, x, range)).concat();
         chunks(blocks, |start, blocks| {
             self.incidence.add(&slots, start, blocks, |o, f: Block| {
                 for i in 0..6 {

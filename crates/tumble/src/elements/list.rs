@@ -165,26 +165,9 @@ impl<E: Element<N, M, D>, Y: Law<P>, const N: usize, const M: usize, const D: us
         let rows = self.rows(Scalar, x, e);
         for a in 0..N {
             for c in 0..3 {
-                let mut u = [Vec3 { x: 0.0, y: 0.0, z: 0.0 }; N];
-                let mut unit = [0.0; 3];
-                unit[c] = 1.0;
-                u[a] = unit.into();
-                take(a, c, self.product(&p, rows, u));
+                take(a, c, self.product(&p, rows, unit(Scalar, a, c)));
             }
         }
-    }
-
-    /// The 3 x 3 blocks on the diagonal for the elements of a range: N blocks an element, as xx, yy, zz, xy, yz, zx.
-    pub fn diagonal(&self, x: &[Row], range: Range<usize>) -> Vec<[Real; 6]> {
-        let mut slots = vec![[0.0; 6]; N * range.len()];
-        for e in range.clone() {
-            let mut columns = [[Vec3 { x: 0.0, y: 0.0, z: 0.0 }; 3]; N];
-            self.matrix(x, e, |a, c, product| columns[a][c] = product[a]);
-            for (a, [cx, cy, cz]) in columns.iter().enumerate() {
-                slots[(e - range.start) * N + a] = [cx.x, cy.y, cz.z, cy.x, cz.y, cx.z];
-            }
-        }
-        slots
     }
 
     /// Every block of every element's matrix.
@@ -228,6 +211,19 @@ impl<E: Element<N, M, D>, Y: Law<P>, const N: usize, const M: usize, const D: us
         let (e, most) = worst(self.len(), strain)?;
         Some((most, [0, 1].map(|a| self.nodes[a.min(N - 1)].get()[e])))
     }
+}
+
+/// A vector of length 1 at node a along axis c, and none at the others.
+#[inline(always)]
+pub fn unit<W: Width, const N: usize>(w: W, a: usize, c: usize) -> [Vec3<W::L>; N] {
+    let (zero, one) = (w.splat(0.0), w.splat(1.0));
+    let mut out = [Vec3 { x: zero, y: zero, z: zero }; N];
+    match c {
+        0 => out[a].x = one,
+        1 => out[a].y = one,
+        _ => out[a].z = one,
+    }
+    out
 }
 
 struct Strains<'a, E, Y, const N: usize, const M: usize, const D: usize, const P: usize> {
