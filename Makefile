@@ -31,15 +31,15 @@ $(VENV)/.python: pyproject.toml
 	$(BIN)/python -m pip install --quiet --upgrade pip "maturin>=1.9,<2"
 	@touch $@
 
-# What the package, pictures and tests import: installed while the engine is built.
+# What the package, pictures and tests import. Byte code is left to the first import.
 $(VENV)/.imports: $(VENV)/.python
 	$(BIN)/python -c 'import tomllib; p = tomllib.load(open("pyproject.toml", "rb"))["project"]; \
 		print(*p["dependencies"], *sum(p["optional-dependencies"].values(), []), sep="\n")' > $(VENV)/imports.txt
-	$(BIN)/python -m pip install --quiet -r $(VENV)/imports.txt
+	$(BIN)/python -m pip install --quiet --no-compile -r $(VENV)/imports.txt
 	@touch $@
 
-# The engine and the package, editable.
-$(VENV)/.engine: $(VENV)/.python $(RUST)
+# The engine and the package, editable; maturin installs what is lacking, too, and two installations at a time break each other.
+$(VENV)/.engine: $(VENV)/.imports $(RUST)
 	$(BIN)/maturin develop --release --quiet --extras pictures,dev
 	@touch $@
 
