@@ -203,8 +203,10 @@ fn polygon(n: u32, d: f64, weight: f64, curvature: &dyn Fn(f64) -> f64) -> f64 {
             let fold = |cos: f64| f64::asin((0.5 * d * curvature(moment / cos)).min(1.0));
             let mut half = 0.0;
             for _ in 0..30 {
-                let before = std::mem::replace(&mut half, fold(f64::cos(half)));
-                if (half - before).abs() < 1e-15 {
+                let next = fold(f64::cos(half));
+                let done = (next - half).abs() < 1e-15;
+                half = next;
+                if done {
                     break;
                 }
             }
