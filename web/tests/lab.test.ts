@@ -369,7 +369,11 @@ describe("scenes", () => {
       [320, 640],
     ]) {
       await page.setViewportSize({ width, height });
-      await page.waitForTimeout(100);
+      // The stage follows the size of its element a frame later.
+      await page.waitForFunction((most) => {
+        const { canvas, renderer } = (window as any).tumble.stage;
+        return canvas.clientWidth <= most && Math.abs(canvas.width - canvas.clientWidth * renderer.getPixelRatio()) < 1.5;
+      }, width);
       const places: number[][] = await page.evaluate(() => {
         const { stage } = (window as any).tumble;
         return [
