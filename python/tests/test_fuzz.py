@@ -283,7 +283,15 @@ def compare_memory(trees: dict[str, tuple[Tree, str]]) -> None:
 
 
 def test_memory_is_estimated() -> None:
-    few = ["a million particles", "emitter", "solid of changing size", "sheet, direct", "solid, direct", "gas in a plane", "sound, double"]
+    few = [
+        "a million particles",
+        "emitter",
+        "solid of changing size",
+        "sheet, direct",
+        "solid, direct",
+        "gas in a plane",
+        "sound, double",
+    ]
     compare_memory({name: ({"version": 1} | LARGE[name], ".") for name in few})
 
 
