@@ -120,8 +120,8 @@ fn the_pressure_of_water_at_rest_is_that_of_its_depth() {
     );
     // All together bear the weight; in edges, where a particle touches two solids in one sub-step, the share of each is known less well.
     assert!((total + weight).abs() < 5e-3 * weight, "{total} {weight}");
-    assert!((floor - vector(0.0, 0.0, -weight)).norm() < 0.03 * weight, "{floor:?} {weight}");
-    assert!(sides.iter().all(|s| (s / side - 1.0).abs() < 0.12), "{sides:?} {side}");
+    assert!((floor - vector(0.0, 0.0, -weight)).norm() < 0.02 * weight, "{floor:?} {weight}");
+    assert!(sides.iter().all(|s| (s / side - 1.0).abs() < 0.05), "{sides:?} {side}");
     for [_, p, exact] in &layers[1..8] {
         assert!((p - exact).abs() < 0.03 * rho_g * height, "{layers:?}");
     }

@@ -365,3 +365,35 @@ impl<E: Element<N, M, D>, Y: Law<P>, const N: usize, const M: usize, const D: us
         self.break_elements(broken);
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::elements::{Distance, Linear};
+    use tumble_interface::scene::Hessian;
+
+    /// Products on wide registers, in runs of a few hundred elements and what is left of them, give the blocks that one element after the other
+    /// has, bit by bit.
+    #[test]
+    fn the_diagonal_is_that_of_the_entries() {
+        let n = 601_u32;
+        let wave = |i: u32, k: f64| (k * f64::from(i)).sin();
+        let x: Vec<Row> = (0..=n).map(|i| [wave(i, 1.3), wave(i, 0.7), wave(i, 2.1), 1.0].map(|c| c as Real)).collect();
+        let spring = |i: u32| Members { nodes: [i, i + 1], rest: [0.3], law: [], stiffness: 2.0 + wave(i, 0.9), damping: 0.1 };
+        let mut springs = Elements::<Distance, Linear, 2, 1, 1, 0>::new(x.len(), &(0..n).map(spring).collect::<Vec<_>>()).unwrap();
+        for hessian in [Hessian::Exact, Hessian::Definite] {
+            springs.linearize(&x, Weights { stiffness: 0.7, damping: 3.0, hessian });
+            let mut found = vec![[0.0; 6]; x.len()];
+            springs.add_diagonal(&x, &mut found);
+            let mut exact = vec![[0.0; 6]; x.len()];
+            springs.entries(&x, &mut |i, j, m| {
+                if i == j {
+                    let own = [m[0][0], m[1][1], m[2][2], m[0][1], m[1][2], m[2][0]];
+                    exact[i].iter_mut().zip(own).for_each(|(sum, k)| *sum += k as Real);
+                }
+            });
+            assert_eq!(found, exact, "{hessian:?}");
+            assert!(found.iter().all(|block| block.iter().all(|k| *k != 0.0)), "nothing is stiff");
+        }
+    }
+}
