@@ -8,7 +8,7 @@ import { lab, ready, STILL, WHOLE } from "./browser.ts";
 
 const ROOT = resolve(import.meta.dirname, "../..");
 const PYTHON = resolve(ROOT, ".venv/bin/python");
-const FRAMES = WHOLE ? 100 : 30;
+const FRAMES = WHOLE ? 100 : 12;
 /** Every method, explicit, implicit and adaptive steps, contact, both precisions; cheap ones. */
 const NAMES = [
   "springs/stiffening",

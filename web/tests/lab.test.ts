@@ -224,7 +224,7 @@ const FAILING = ["failures/stiff-sheet"];
 
 describe("scenes", () => {
   it("all load, move, and are seen, without an error", async () => {
-    const all = tried();
+    const all = [...new Set([...tried(1), ...FAILING, ...Object.keys(LATER)])];
     const { page, errors } = await own.open(`scene/${all[0]}`, { ...STILL, viewport: { width: 640, height: 480 } });
     await ready(page);
     const failures: string[] = [];

@@ -198,15 +198,16 @@ fn every_solid_holds_a_sheet() {
         ("floor", "shape.floor.height = 0.4"),
         ("mesh", "shape.mesh = { path = \"ball.obj\", resolution = 48 }"),
     ];
-    for (name, shape) in shapes {
-        for scheme in [
-            Integrator::SymplecticEuler,
-            Integrator::VelocityVerlet,
-            Integrator::Rk4,
-            Integrator::ImplicitEuler,
-            Integrator::Bdf2,
-            Integrator::PositionBased,
-        ] {
+    let schemes = [
+        Integrator::SymplecticEuler,
+        Integrator::VelocityVerlet,
+        Integrator::Rk4,
+        Integrator::ImplicitEuler,
+        Integrator::Bdf2,
+        Integrator::PositionBased,
+    ];
+    for (k, (name, shape)) in shapes.into_iter().enumerate() {
+        for scheme in common::cases(schemes.into_iter().cycle().skip(k).take(6), 3) {
             let mut sim = sheet_on(shape, scheme);
             let mut deepest = 0.0_f64;
             let mut contacts = 0;

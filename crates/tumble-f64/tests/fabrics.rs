@@ -265,8 +265,8 @@ fn strips_of_all_fabrics_hang_at_the_angle_of_the_cantilever_test() {
     // The test's own integrator first: Gamma = 8 is 41.5 degrees.
     let exact = elastica(2.0, 1.0, &|m| m);
     assert!((exact / target - 1.0).abs() < 5e-3, "{exact}");
-    for name in SHIPPED {
-        for angle in [0.0, 45.0, 90.0] {
+    for (k, name) in SHIPPED.into_iter().enumerate() {
+        for angle in common::cases([0.0, 45.0, 90.0].into_iter().cycle().skip(k).take(3), 3) {
             let mut fabric = record(name);
             fabric.bending = fabric.bending.map(|row| [row[0]; 5]);
             let c = (across(&fabric, angle)[0] / (fabric.density * G)).cbrt();
@@ -287,7 +287,7 @@ fn strips_of_all_fabrics_hang_at_the_angle_of_the_cantilever_test() {
 /// come to rest where Newton's method does in the same cells.
 #[test]
 fn strips_of_whole_records_hang_like_the_elastica_with_their_moments() {
-    for name in SHIPPED {
+    for name in common::cases(SHIPPED, 3) {
         let fabric = record(name);
         for angle in [0.0, 90.0] {
             let b = across(&fabric, angle);

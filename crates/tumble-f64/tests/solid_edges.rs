@@ -69,7 +69,7 @@ fn cloth_stays_on_a_wire_that_passes_between_its_masses() {
         "integrator = \"symplectic_euler\"\nsubsteps = 60",
         "integrator = \"dormand_prince\"",
     ];
-    for words in schemes {
+    for words in common::cases(schemes, 2) {
         let scene = |edges: bool| simulation(&format!("{}{}{}", system(words), sheet(ABOVE_WIRE), solid(WIRE, edges, "")));
         let (mut held, mut free, mut crossed) = (scene(true), scene(false), 0);
         for _ in 0..30 {
@@ -123,12 +123,13 @@ fn edges_of_every_kind_of_solid_are_met() {
     };
     let meshes = [("solid", prism(true, 0.0)), ("open", prism(false, 0.0)), ("higher", prism(true, 0.1))];
     let assets = Assets::new(meshes.map(|(name, mesh)| (name.to_string(), mesh)).into(), HashMap::new());
-    for (shape, above, at) in [
+    let shapes = [
         ("mesh = { path = \"solid\" }", ABOVE_WIRE, 0.0),
         ("mesh = { path = \"open\", shell = true }", ABOVE_WIRE, 0.0),
         ("animated_mesh = { frames = [{ time = 0, path = \"solid\" }, { time = 0.5, path = \"higher\" }] }", ABOVE_WIRE, 0.1),
         ("sphere = { center = [0, 0, 0], radius = 0.002 }", "center = [0.01, 0.01, 0.02]", 0.0),
-    ] {
+    ];
+    for (shape, above, at) in common::cases(shapes, 2) {
         let scene = |edges: bool| {
             let text = format!("version = 1\n{}{}{}", position_based(), sheet(above), solid(shape, edges, ""));
             Simulation::new(Scene::from_toml(&text).unwrap(), assets.clone()).unwrap_or_else(|e| panic!("{e}\n{text}"))
@@ -232,7 +233,7 @@ fn friction_holds_what_hangs_on_a_wire() {
         // It comes down slowly, as in water.
         let water = "[[force]]\nkind = \"drag\"\nrate = 8\n";
         let mut sim = simulation(&format!("{}{}{wire}{water}", position_based(), sheet("center = [0.03, 0, 0.012]")));
-        (0..120).for_each(|_| _ = step(&mut sim));
+        (0..if common::whole() { 120 } else { 80 }).for_each(|_| _ = step(&mut sim));
         highest(&positions(&sim, "cloth"))
     };
     let (held, free) = (top(0.5), top(0.0));

@@ -21,6 +21,16 @@ pub fn every() -> Vec<Integrator> {
     Integrator::ALL.into_iter().chain([Integrator::PositionBased]).collect()
 }
 
+/// Whether long tests run in full, as in `make validate`.
+pub fn whole() -> bool {
+    std::env::var_os("TUMBLE_WHOLE").is_some()
+}
+
+/// All cases of a long test in `make validate`, every `step`th of them otherwise.
+pub fn cases<T>(all: impl IntoIterator<Item = T>, step: usize) -> impl Iterator<Item = T> {
+    all.into_iter().step_by(if whole() { 1 } else { step })
+}
+
 /// A simulation of a scene in TOML; `version = 1` is added.
 pub fn simulation(text: &str) -> Simulation {
     let scene = Scene::from_toml(&format!("version = 1\n{text}")).unwrap_or_else(|e| panic!("{e}\n{text}"));
