@@ -7,6 +7,7 @@ use crate::common;
 use common::{Vector, intersections_after, positions, run, simulation, step, vector, write};
 use std::collections::HashMap;
 use tumble_f64::scene::Simulation;
+use tumble_interface::engine::StepReport;
 use tumble_interface::scene::Integrator;
 use tumble_interface::{Assets, Engine, Mesh, Scene};
 
@@ -78,15 +79,19 @@ fn a_pile_of_sheets_stays_apart_at_every_step_length() {
             "precision = \"double\"\ntime.fps = {fps}\n[[system]]\nintegrator = \"{scheme}\"\nsubsteps = {substeps}\nself_contact = {{ thickness = 0.01, friction = 0.2 }}\n{sheets}\
              [[collider]]\nname = \"floor\"\nthickness = 0.005\nfriction = 0.4\nshape.floor.height = 0\n"
         ));
-        let (mut crossed, mut fastest) = (0, 0.0_f64);
+        let (mut crossed, mut fastest, mut report) = (0, 0.0_f64, StepReport::default());
         for _ in 0..fps {
-            step(&mut sim);
+            report.add_interval(&step(&mut sim));
             let books = sim.ledger();
             crossed += books.intersections.unwrap();
             fastest = fastest.max(books.speed.unwrap());
         }
         let top = positions(&sim, "s5").iter().map(|x| x.z).fold(0.0, f64::max);
         println!("{scheme}, {fps} fps, {substeps} sub-steps: {crossed} crossings, fastest {fastest:.2} m/s, top at {top:.3} m");
+        let (steps, newton, left) = (report.steps, report.newton, report.unconverged);
+        println!("{newton} Newton iterations in {steps} steps, {left} not converged");
+        // With the exact matrix of friction nine of ten steps on the floor are not solved in twenty iterations (contact.26).
+        assert!(scheme != "implicit_euler" || 5 * left < steps && newton > steps, "{left} of {steps}");
         // Five thicknesses and what wrinkles; from 0.18 m nothing falls faster than 1.9 m/s.
         assert!(crossed == 0 && fastest < 3.0 && top > 0.04 && top < 0.15, "{crossed} {fastest} {top}");
     }

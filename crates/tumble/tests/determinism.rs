@@ -202,7 +202,7 @@ fn native_bits_agree_with_portable_ones_to_round_off() {
 /// All scenes in `make validate`. In `make test` every other one, counted from `shift`: those that one precision leaves out are the other's.
 fn part(shift: usize) -> Vec<(&'static str, String, usize)> {
     let (all, double) = (std::env::var_os("TUMBLE_WHOLE").is_some(), usize::from(size_of::<tumble::math::Real>() == 8));
-    scenes().into_iter().enumerate().filter(|(i, _)| all || (i + shift + double) % 2 == 0).map(|(_, scene)| scene).collect()
+    scenes().into_iter().enumerate().filter(|(i, _)| all || (i + shift + double).is_multiple_of(2)).map(|(_, scene)| scene).collect()
 }
 
 /// Frames of a scene in `make test`: a third of all, which `make validate` goes through.

@@ -329,6 +329,15 @@ fn friction_depth(collider: &Collider, t: f64, (x, v): (Row, Row), resting: f64)
     touch.depth * if still > sliding && slide.norm() <= resting { still } else { sliding }
 }
 
+/// What Newton's method has found out about the friction of a mass when it last linearized a stage.
+#[derive(Debug, Clone, Copy, Default)]
+pub struct Slip {
+    /// The velocity of the mass there [m/s].
+    pub velocity: Vector,
+    /// Friction against it, over mu N: a vector of length 1 at most.
+    pub share: Vector,
+}
+
 /// Penalty and friction of one mass in an implicit stage.
 pub struct Penalty {
     touch: Touch,
@@ -368,9 +377,28 @@ impl Penalty {
         })
     }
 
+    /// The part of a vector along the surface.
+    fn along(&self, v: Vector) -> Vector {
+        v - self.touch.normal * v.dot(self.touch.normal)
+    }
+
+    /// mu times the normal force at the start of the stage [N].
+    pub fn friction(&self) -> f64 {
+        self.friction
+    }
+
     /// mu N/|v_t|, finite where the mass rests [N s/m].
     fn drag(&self) -> f64 {
         self.friction / self.slide.norm().max(CREEP)
+    }
+
+    /// The share of friction that the last linear system has predicted for this slide, pulled back to the unit disk.      (contact.27)
+    pub fn share(&self, last: &Slip) -> Vector {
+        let (slide, before) = (self.along(last.velocity - self.touch.velocity), self.along(last.share));
+        let speed = slide.norm();
+        let turned = if speed > CREEP { before * (slide.dot(self.slide - slide) / speed) } else { Vector::default() };
+        let share = (self.slide - turned) * (1.0 / speed.max(CREEP));
+        share * (1.0 / share.norm().max(1.0))
     }
 
     /// The force [N]: the point-plane element and Coulomb friction.
@@ -379,19 +407,20 @@ impl Penalty {
         push - self.slide * self.drag()
     }
 
-    /// -df/dx - df/dv / gh, without its indefinite parts.
-    pub fn matrix(&self, gh: f64) -> Block {
+    /// -df/dx - df/dv / gh, of the primal-dual Newton method with this share of friction: positive semidefinite, and the exact matrix where the
+    /// share is the direction of the slide.                                                          (contact.26), [chan1999]
+    pub fn matrix(&self, gh: f64, share: Vector) -> Block {
         let n = self.touch.normal;
         let drag = self.drag() / gh;
-        let t = if self.slide.norm() > CREEP { self.slide.normalized() } else { Vector::default() };
+        let (t, w) = (if self.slide.norm() > CREEP { self.slide.normalized() } else { Vector::default() }, share * 0.5);
         let k = self.stiffness - drag;
         let block = [
-            k * n.x * n.x + drag * (1.0 - t.x * t.x),
-            k * n.y * n.y + drag * (1.0 - t.y * t.y),
-            k * n.z * n.z + drag * (1.0 - t.z * t.z),
-            k * n.x * n.y - drag * t.x * t.y,
-            k * n.y * n.z - drag * t.y * t.z,
-            k * n.z * n.x - drag * t.z * t.x,
+            k * n.x * n.x + drag * (1.0 - 2.0 * w.x * t.x),
+            k * n.y * n.y + drag * (1.0 - 2.0 * w.y * t.y),
+            k * n.z * n.z + drag * (1.0 - 2.0 * w.z * t.z),
+            k * n.x * n.y - drag * (w.x * t.y + w.y * t.x),
+            k * n.y * n.z - drag * (w.y * t.z + w.z * t.y),
+            k * n.z * n.x - drag * (w.z * t.x + w.x * t.z),
         ];
         block.map(|b| b as Real)
     }

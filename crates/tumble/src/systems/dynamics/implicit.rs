@@ -1,16 +1,17 @@
 //! The linear systems of implicit stages: (M/gh² + D/gh + K) dx = rhs.
 
-use super::contact::{self, Penalty};
+use super::contact::{self, Penalty, Slip};
 use super::laws::{Acting, Laws};
 use crate::elements::{Batch, Weights};
 use crate::forces::Group;
+use crate::geometry::Vector;
 use crate::integrators::newton::{self, LinearSolve, Stiff};
 use crate::integrators::{Equation, Kinematics, Stage};
 use crate::linalg::blocks::{Block, Blocks};
 use crate::linalg::cholesky::{Assembly, Cholesky};
 use crate::linalg::pcg::{self, Operator, Params};
-use crate::math::parallel::{chunks, sum};
-use crate::math::{Real, Row, ZERO};
+use crate::math::parallel::{chunks, chunks2, sum};
+use crate::math::{Real, Row, ZERO, xyz64};
 use tumble_interface::StepError;
 use tumble_interface::engine::StepReport;
 use tumble_interface::scene::{Hessian, Linear as LinearMethod, Solver};
@@ -40,6 +41,8 @@ struct Penalties {
     seen: bool,
     /// Positions and velocities at the start of the stage.
     start: [Vec<Row>; 2],
+    /// Of every mass, as Newton's method last linearized this stage.
+    slips: Vec<Slip>,
 }
 
 impl Penalties {
@@ -120,6 +123,7 @@ impl Implicit {
         let n = x.len();
         self.local.resize(n, [0.0; 6]);
         self.inverse.resize(n, [0.0; 6]);
+        let mut slips = std::mem::take(&mut self.contact.slips);
         let (all, masses, contact) = (&*laws, &laws.masses, &self.contact);
         let group = Group::new(masses, 0, x, v);
         // The stiffness of everything, without mass.
@@ -133,12 +137,25 @@ impl Implicit {
                     add_block(&mut local[i - start], d, (1.0 / gh) as Real);
                 }
             }
-            for i in (start..if contact.act(all) { end } else { start }).filter(|i| !masses.frames.contains(*i)) {
-                for touch in contact.of(all, i, t, gh, x[i], v[i]) {
-                    add_block(&mut local[i - start], touch.matrix(gh), 1.0);
-                }
-            }
         });
+        if contact.act(all) {
+            chunks2(&mut self.local, &mut slips, |start, local, slips| {
+                for (k, (local, slip)) in local.iter_mut().zip(slips).enumerate().filter(|(k, _)| !masses.frames.contains(start + k)) {
+                    let i = start + k;
+                    let mut now = Slip { velocity: xyz64(v[i]), share: Vector::default() };
+                    let mut most = 0.0;
+                    for touch in contact.of(all, i, t, gh, x[i], v[i]) {
+                        let share = touch.share(slip);
+                        add_block(local, touch.matrix(gh, share), 1.0);
+                        if touch.friction() > most {
+                            (most, now.share) = (touch.friction(), share);
+                        }
+                    }
+                    *slip = now;
+                }
+            });
+        }
+        self.contact.slips = slips;
         laws.add_user_stiffness(t, x, v, hessian == Hessian::Definite, |i, [k, d]| {
             add_block(&mut self.local[i], k, 1.0);
             add_block(&mut self.local[i], d, (1.0 / gh) as Real);
@@ -231,6 +248,9 @@ impl Equation for Motion<'_> {
                 start.clear();
                 start.extend_from_slice(now);
             }
+            let slips = &mut self.implicit.contact.slips;
+            slips.clear();
+            slips.extend(v.iter().map(|v| Slip { velocity: xyz64(*v), share: Vector::default() }));
         }
         let masses = &self.laws.masses;
         self.implicit.weights.clear();
