@@ -430,3 +430,78 @@ impl Penalty {
 pub fn real(v: Vector) -> crate::math::Vec3<Real> {
     crate::math::Vec3 { x: v.x as Real, y: v.y as Real, z: v.z as Real }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn penalty(friction: f64, slide: [f64; 2]) -> Penalty {
+        let normal = Vector { x: 0.0, y: 0.0, z: 1.0 };
+        let slide = Vector { x: slide[0], y: slide[1], z: 0.0 };
+        Penalty { touch: Touch { depth: 0.0, normal, velocity: Vector::default() }, rest: [0.0; 4], stiffness: 0.0, friction, slide }
+    }
+
+    /// Newton's iterations until the slide of 1 kg that starts with `v` and would have `free` without friction has an error below 1e-5 of the
+    /// residual's scale, and the slide; the exact matrix has the direction of the slide for the share.
+    fn solved(friction: f64, mut v: [f64; 2], free: [f64; 2], exact: bool) -> (usize, [f64; 2]) {
+        let gh = 0.01;
+        let vector = |v: [f64; 2]| Vector { x: v[0], y: v[1], z: 0.0 };
+        let mut slip = Slip { velocity: vector(v), share: Vector::default() };
+        for k in 0..30 {
+            let one = penalty(friction, v);
+            let push = one.slide * one.drag();
+            let r = [(v[0] - free[0]) / gh + push.x, (v[1] - free[1]) / gh + push.y];
+            if r[0].hypot(r[1]) < 1e-5 * (1.0 / gh + friction / CREEP) * CREEP {
+                return (k, v);
+            }
+            let share = if exact { one.slide * (1.0 / one.slide.norm().max(CREEP)) } else { one.share(&slip) };
+            slip = Slip { velocity: one.slide, share };
+            let [xx, yy, _, xy, ..] = one.matrix(gh, share).map(|b| f64::from(b) * gh * gh);
+            let (a, b) = (xx + 1.0, yy + 1.0);
+            let det = a * b - xy * xy;
+            v = [v[0] - gh * (b * r[0] - xy * r[1]) / det, v[1] - gh * (a * r[1] - xy * r[0]) / det];
+        }
+        (30, v)
+    }
+
+    #[test]
+    fn what_comes_to_rest_is_found_in_few_iterations() {
+        for friction in [200.0, 1000.0] {
+            for free in [[-0.3, 0.4], [0.3, 0.1], [5e-4, 0.2]] {
+                let (few, v) = solved(friction, [0.5, 0.1], free, false);
+                let (many, _) = solved(friction, [0.5, 0.1], free, true);
+                // It creeps with m v*/gh = mu N v/v_c + m v/gh.
+                let creep = f64::hypot(free[0], free[1]) / (1.0 + 0.01 * friction / CREEP);
+                assert!(few <= 8 && many == 30, "{few} {many}");
+                assert!((v[0].hypot(v[1]) / creep - 1.0).abs() < 1e-2 && creep < CREEP, "{v:?} {creep:e}");
+            }
+        }
+        // Where it goes on sliding, friction takes mu N gh/m of its speed.
+        let (few, v) = solved(10.0, [0.5, 0.1], [-0.3, 0.4], false);
+        assert!(few <= 6 && (v[0].hypot(v[1]) - 0.4).abs() < 1e-4, "{few} {v:?}");
+    }
+
+    #[test]
+    fn the_matrix_of_friction_is_exact_for_what_slides_on_and_never_indefinite() {
+        for slide in [[0.3, -0.1], [2e-4, 5e-4]] {
+            let one = penalty(7.0, slide);
+            let share = one.slide * (1.0 / one.slide.norm().max(CREEP));
+            let [xx, yy, zz, xy, ..] = one.matrix(0.5, share).map(f64::from);
+            let force = |a: f64, b: f64| {
+                let one = penalty(7.0, [slide[0] + a, slide[1] + b]);
+                one.slide * one.drag()
+            };
+            let e = 1e-6;
+            let (along_x, along_y) = ((force(e, 0.0) - force(-e, 0.0)) * (0.5 / e), (force(0.0, e) - force(0.0, -e)) * (0.5 / e));
+            let scale = 2.0 * one.drag();
+            for (found, wanted) in [(xx, 2.0 * along_x.x), (xy, 2.0 * along_x.y), (yy, 2.0 * along_y.y), (zz, 0.0)] {
+                assert!((found - wanted).abs() < 1e-4 * scale, "{slide:?}: {found} {wanted}");
+            }
+            for turn in 0..12 {
+                let (sin, cos) = f64::from(turn).sin_cos();
+                let [xx, yy, _, xy, ..] = one.matrix(0.5, Vector { x: cos, y: sin, z: 0.0 }).map(f64::from);
+                assert!(xx + yy > 0.0 && xx * yy - xy * xy > -1e-6 * scale * scale, "{turn}: {xx} {yy} {xy}");
+            }
+        }
+    }
+}
