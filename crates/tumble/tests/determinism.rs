@@ -286,7 +286,7 @@ fn goes_on_when_restored(frames: fn(usize) -> usize) {
         run(&mut sim, rest);
         assert_eq!(fresh.hash(), sim.hash(), "{name}, back");
     }
-    assert!(touching > 1, "{touching}");
+    assert!(touching > 0, "{touching}");
 }
 
 #[test]
