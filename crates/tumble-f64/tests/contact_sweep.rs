@@ -363,7 +363,7 @@ fn point(size: f64) -> impl Strategy<Value = Vector> {
 }
 
 proptest! {
-    #![proptest_config(ProptestConfig { cases: if common::whole() { 300 } else { 50 }, failure_persistence: None, ..ProptestConfig::default() })]
+    #![proptest_config(ProptestConfig { cases: 300, failure_persistence: None, ..ProptestConfig::default() })]
 
     /// The first contact is where a fine walk along the segment first finds the mass inside; a way that stays outside is free.
     #[test]
@@ -401,6 +401,11 @@ proptest! {
             }
         }
     }
+}
+
+// A mesh is sampled in each of these.
+proptest! {
+    #![proptest_config(ProptestConfig { cases: if common::whole() { 300 } else { 50 }, failure_persistence: None, ..ProptestConfig::default() })]
 
     /// Twelve triangles stop what the box stops, there and then; moving vertices stop what the moving box stops.
     #[test]
