@@ -498,7 +498,8 @@ mod tests {
                 assert!((found - wanted).abs() < 1e-4 * scale, "{slide:?}: {found} {wanted}");
             }
             // From a slide in the creeping range the linear system predicts more than there can be.
-            let far = penalty(7.0, [30.0 * slide[0], 30.0 * slide[1]]).share(&Slip { velocity: Vector { x: 1e-4, ..Vector::default() }, share });
+            let far =
+                penalty(7.0, [30.0 * slide[0], 30.0 * slide[1]]).share(&Slip { velocity: Vector { x: 1e-4, ..Vector::default() }, share });
             assert!((far.norm() - 1.0).abs() < 1e-12, "{far:?}");
             for turn in 0..12 {
                 let (sin, cos) = f64::from(turn).sin_cos();
