@@ -22,7 +22,7 @@ BALL = np.array([0.0, 0.0, 0.3])
 BALL_RADIUS = 0.3
 RADIUS = 0.06
 FORMS = {"rope": "curve", "hair": "strands", "sheet": "surface", "net": "surface", "cloth": "surface", "block": "body"}
-FORMS["collider"] = "solid"
+FORMS |= {"body": "instances", "collider": "solid"}
 N = 9
 """Vertices along each side of the sheet."""
 
@@ -191,6 +191,27 @@ def one(name: str, section: str, static: dict[str, Array], position: Array, **wo
     return FakeRun(
         scene(**{section: [{"name": name}]}) | words, {name: static}, lambda t: {name: {"position": position}}
     )
+
+
+def boxes(spin: float = 3.0, **words: Any) -> FakeRun:
+    """Two cubes that turn about the vertical through their centres, the second one rising; on a floor."""
+    vertices, triangles = cube()
+
+    def columns(t: float) -> Columns:
+        half = 0.5 * spin * t
+        position = np.array([[0.0, 0.0, 0.5], [3.0, 0.0, 0.5 + 2.0 * t]])
+        turn = np.array([[0.0, 0.0, np.sin(half), np.cos(half)], [0.0, 0.0, -np.sin(half), np.cos(half)]])
+        velocity, angular = np.array([[0.0, 0.0, 0.0], [0.0, 0.0, 2.0]]), np.array([[0, 0, spin], [0, 0, -spin]])
+        moves = {"position": position, "turn": turn, "velocity": velocity, "angular_velocity": angular}
+        return {"boxes": {name: f32(x) for name, x in moves.items()}}
+
+    floor = np.array([[-50.0, -50, 0], [50, -50, 0], [50, 50, 0], [-50, 50, 0]])
+    static: Columns = {
+        "boxes": {"vertices": f32(vertices), "triangles": triangles, "mass": np.ones(2)},
+        "floor": {"position": floor, "triangles": np.array([[0, 1, 2], [0, 2, 3]], dtype=np.uint32)},
+    }
+    named = scene(body=[{"name": "boxes", "color": GREEN}], collider=[{"name": "floor", "shape": {"floor": {}}}])
+    return FakeRun(named | words, static, columns)
 
 
 def f32(values: Array) -> Array:

@@ -22,6 +22,7 @@ NEEDED = {
     "strands": {"curve", "curve_points"},
     "surface": {"triangles"},
     "body": {"triangles"},
+    "instances": {"vertices", "triangles", "mass"},
     "solid": {"position", "triangles"},
     "container": {"position", "triangles"},
     "ground": {"position", "triangles"},

@@ -38,6 +38,7 @@ mod pinned_velocity;
 mod pins_in_time;
 mod position_based;
 mod position_based_scenes;
+mod rigid;
 mod rod_loops;
 mod rods_and_emitters;
 mod rods_position_based;

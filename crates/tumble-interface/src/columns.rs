@@ -64,7 +64,13 @@ pub const COLUMNS: &[Described] = &[
         ..VECTOR
     },
     Described { name: "orientation", doc: "Quaternion of a rod's material axes: x, y, z, w.", places: &[Place::Frame], width: 4, ..ASKED },
-    Described { name: "angular_velocity", unit: "rad/s", doc: "How they turn, in their own axes.", places: &[Place::Frame], ..VECTOR },
+    Described {
+        name: "angular_velocity",
+        unit: "rad/s",
+        doc: "How they turn: frames in their own axes, rigid bodies in those of the world.",
+        places: &[Place::Frame, Place::Mass],
+        ..VECTOR
+    },
     Described { name: "link_strain", doc: "Lengthening over rest length; nan of what is broken.", places: &[Place::Link], ..ASKED },
     Described {
         name: "density",
@@ -110,14 +116,23 @@ pub const COLUMNS: &[Described] = &[
     },
     Described {
         name: "turn",
-        doc: "Quaternion of a moving collider: x, y, z, w.",
-        places: &[Place::Object],
+        doc: "Quaternion of a moving collider, or of each rigid body: x, y, z, w.",
+        places: &[Place::Object, Place::Mass],
         signed: true,
         width: 4,
         ..ALWAYS
     },
     Described { name: "radius", unit: "m", doc: "Radius in pictures, of all or of each.", places: &[Place::Object, Place::Mass], ..STATIC },
     Described { name: "mass", unit: "kg", doc: "Mass.", ..STATIC },
+    Described {
+        name: "vertices",
+        unit: "m",
+        doc: "Corners of the mesh of a rigid body, in its own axes.",
+        places: &[Place::Object],
+        signed: true,
+        width: 3,
+        ..STATIC
+    },
     Described { name: "pinned", doc: "Indices of masses that stay where they are.", ..STATIC },
     Described { name: "triangles", doc: "Indices of the corners of each triangle.", places: &[Place::Triangle], width: 3, ..STATIC },
     Described {

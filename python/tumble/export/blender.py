@@ -70,7 +70,7 @@ def _looks(run: Recording) -> dict[str, dict[str, Any]]:
             "there": there[part.thing.name] if varying(part, start) else [],
         }
         for part in made
-        if part.kind != "Volume"
+        if part.kind not in ("Volume", "PointInstancer")
     }
 
 

@@ -8,15 +8,15 @@ import numpy as np
 import numpy.typing as npt
 
 from tumble.looks import SPRING, TRAIL
-from tumble.pictures.surfaces import normals, split
-from tumble.pictures.things import Columns, Object, Recording, colors, hair, positions, radii, torn
+from tumble.pictures.surfaces import normals, placed, split
+from tumble.pictures.things import Columns, Object, Recording, colors, hair, positions, radii, torn, turns
 
 ROOT = "/scene"
 
 KNOWN = ("position", "velocity", "id", "radius", "color", "triangles")
 """Columns that become something else than a primvar of their name."""
 
-Numbers = npt.NDArray[np.float32] | npt.NDArray[np.int64] | npt.NDArray[np.int32]
+Numbers = npt.NDArray[np.float32] | npt.NDArray[np.float16] | npt.NDArray[np.int64] | npt.NDArray[np.int32]
 
 
 Ways = dict[str, tuple[npt.NDArray[np.float32], npt.NDArray[np.int32]]]
@@ -31,7 +31,7 @@ class Part:
     path: str
     title: str
     kind: str
-    """Points, Mesh, BasisCurves or Volume."""
+    """Points, Mesh, BasisCurves, PointInstancer or Volume."""
     order: npt.NDArray[np.int64] | None = None
     """Masses in the order of the points; without it, all masses in theirs."""
     counts: npt.NDArray[np.int64] | None = None
@@ -53,7 +53,7 @@ class Part:
     @property
     def name(self) -> str:
         """Name of its prim."""
-        return self.path[len(ROOT) + 1 :]
+        return self.path.rpartition("/")[2]
 
 
 @dataclass(frozen=True)
@@ -143,6 +143,13 @@ def parts(run: Recording, found: list[Object], start: Columns) -> list[Part]:
             counts = np.array([len(thing.curve)])
             where = path(thing.name)
             made.append(Part(thing, where, thing.name, "BasisCurves", thing.curve, counts, thing.radius))
+        elif thing.vertices is not None:
+            where, title = path(thing.name), f"{thing.name} mesh"
+            inner = where + path(title).removeprefix(ROOT)
+            made.append(Part(thing, where, thing.name, "PointInstancer"))
+            # The columns of frames are not those of the mesh: no object has a name with a slash.
+            mesh = replace(thing, name=f"{thing.name}/mesh", position=thing.vertices, vertices=None)
+            made.append(Part(mesh, inner, title, "Mesh", cut=split(thing.vertices, thing.triangles)))
         elif len(thing.triangles):
             kind, words = kinds.get(thing.name, ("", {}))
             cut = None if thing.form == "surface" else split(places(thing, start), thing.triangles)
@@ -279,7 +286,7 @@ def placement(part: Part, columns: Columns) -> list[tuple[str, str, Any]]:
     from pxr import Gf
 
     own = columns.get(part.thing.name, {})
-    if "turn" not in own:
+    if "translation" not in own:
         return []
     x, y, z, w = (float(q) for q in np.ravel(own["turn"]))
     shift = Gf.Vec3d(*(float(c) for c in np.ravel(own["translation"])))
@@ -294,6 +301,9 @@ def varying(part: Part, columns: Columns) -> bool:
 def values(part: Part, now: Now) -> Iterator[tuple[str, str, Numbers]]:
     """Data of a part in a frame: attribute, type and values."""
     columns = now.columns
+    if part.thing.vertices is not None:
+        yield from _bodies(part.thing, part.thing.vertices, columns)
+        return
     if part.trail:
         points, counts = now.ways[part.thing.name]
         yield "points", "point3f[]", points
@@ -345,6 +355,21 @@ def values(part: Part, now: Now) -> Iterator[tuple[str, str, Numbers]]:
                 yield f"primvars:{identifier(name)}", "float[]", np.ascontiguousarray(numbers, dtype=np.float32)
     if len(points) or born:
         yield "extent", "float3[]", _extent(points, radius)
+
+
+def _bodies(thing: Object, vertices: npt.NDArray[np.float64], columns: Columns) -> Iterator[tuple[str, str, Numbers]]:
+    """Places of the bodies of an object, and how they move where the run kept it."""
+    x, turn = positions(columns, thing), turns(columns, thing)
+    yield "positions", "point3f[]", np.ascontiguousarray(x, dtype=np.float32)
+    # Some programs read only the former, of half precision.
+    yield "orientations", "quath[]", np.ascontiguousarray(turn, dtype=np.float16)
+    yield "orientationsf", "quatf[]", np.ascontiguousarray(turn, dtype=np.float32)
+    for column, name, unit in (("velocity", "velocities", 1.0), ("angular_velocity", "angularVelocities", 180 / np.pi)):
+        if column in columns[thing.name]:
+            v = unit * np.reshape(columns[thing.name][column], (-1, 3)).astype(float)
+            yield name, "vector3f[]", np.ascontiguousarray(v, dtype=np.float32)
+    corners = placed(vertices, x, turn).reshape(-1, 3).astype(np.float32)
+    yield "extent", "float3[]", _extent(corners, np.float32(0.0))
 
 
 def _extent(points: npt.NDArray[np.float32], radius: Any) -> npt.NDArray[np.float32]:

@@ -34,6 +34,10 @@ def array(numbers: Numbers) -> Any:
         return Vt.IntArray.FromNumpy(numbers)
     if numbers.dtype == np.int64:
         return Vt.Int64Array.FromNumpy(numbers)
+    if numbers.ndim == 2 and numbers.shape[1] == 4:
+        # Their memory has the real part last, as ours.
+        kind = Vt.QuathArray if numbers.dtype == np.float16 else Vt.QuatfArray
+        return kind.FromNumpy(numbers)
     return Vt.Vec3fArray.FromNumpy(numbers) if numbers.ndim == 2 else Vt.FloatArray.FromNumpy(numbers)
 
 
@@ -60,12 +64,25 @@ def fill(stage: Any, run: Recording, parts: list[Part], start: Now) -> None:
             attribute.Set(array(numbers))
             if name.startswith("primvars:"):
                 UsdGeom.Primvar(attribute).SetInterpolation(UsdGeom.Tokens.vertex)
+        if part.kind == "PointInstancer":
+            _instancer(prim)
+            continue
         _place(prim, part, start)
         _constant(prim, part, start)
         _bind(stage, prim, part, start, by_night(run))
         if part.thing.form == "container":
             # It would hide what it contains.
             UsdGeom.Imageable(prim).CreatePurposeAttr(UsdGeom.Tokens.guide)
+
+
+def _instancer(prim: Any) -> None:
+    """Bodies that all have one mesh, which comes after them (`_mesh`)."""
+    from pxr import UsdGeom, Vt
+
+    bodies = UsdGeom.PointInstancer(prim)
+    n = len(bodies.GetPositionsAttr().Get())
+    bodies.CreateProtoIndicesAttr(Vt.IntArray(n, 0))
+    bodies.CreateIdsAttr(Vt.Int64Array.FromNumpy(np.arange(n, dtype=np.int64)))
 
 
 def _place(prim: Any, part: Part, start: Now) -> None:
@@ -148,6 +165,8 @@ def _mesh(prim: Any, part: Part) -> None:
     if texture is not None and part.squares is not None and len(texture) == 3 * len(part.thing.triangles):
         texture = texture[part.squares.ravel()]
     _texture(prim, texture, len(flat), UsdGeom.Tokens.faceVarying)
+    if bodies := UsdGeom.PointInstancer(prim.GetParent()):
+        bodies.CreatePrototypesRel().SetTargets([prim.GetPath()])
 
 
 def _texture(prim: Any, texture: npt.NDArray[Any] | None, n: int, interpolation: str) -> None:
@@ -167,7 +186,7 @@ def _bind(stage: Any, prim: Any, part: Part, start: Now, night: bool) -> None:
     colored = prim.GetAttribute("primvars:displayColor").HasAuthoredValue()
     if not colored:
         UsdGeom.Gprim(prim).CreateDisplayColorAttr([color])
-    look = UsdShade.Material.Define(stage, f"{ROOT}/looks/{part.name}")
+    look = UsdShade.Material.Define(stage, f"{ROOT}/looks/{part.path.split('/')[2]}")
     shader = UsdShade.Shader.Define(stage, look.GetPath().AppendChild("surface"))
     shader.CreateIdAttr("UsdPreviewSurface")
     paints = [shader.CreateInput("diffuseColor", Sdf.ValueTypeNames.Color3f)]

@@ -6,7 +6,8 @@
     volumes/NAME.FRAME.vdb  what lies on grids; Volume prims in objects.usdc name the files of all frames
     usd/manifest.usda       which attributes the frames hold
     usd/frame.000000.usdc   points, velocities, normals and extents of a frame, at time code 0; and so on; of particles
-                            that come and go also ids, widths, colours and all other numbers that they have
+                            that come and go also ids, widths, colours and all other numbers that they have; of bodies,
+                            whose one mesh is in objects.usdc, where they are and how they are turned
     blender.py              if asked for: imports it into Blender and sets what a plain import loses
 
 Why value clips: sub-layers cannot do it (the strongest layer that has any time sample of an attribute hides the
@@ -97,7 +98,7 @@ def _frames(
     n = run.n_frames
     lone = Now(start, {})
     wide = n > 1 and any(
-        p.kind != "Volume"
+        p.kind not in ("Volume", "PointInstancer")
         and not p.trail
         and deforms(p, start)
         and not varying(p, start)

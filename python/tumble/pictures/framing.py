@@ -18,8 +18,8 @@ import numpy as np
 
 from tumble import _engine
 from tumble._engine import ExportError, SceneError
-from tumble.pictures.surfaces import Floats, unit
-from tumble.pictures.things import Recording, moving, objects, positions
+from tumble.pictures.surfaces import Floats, placed, unit
+from tumble.pictures.things import Object, Recording, moving, objects, positions, turns
 from tumble.usd.cameras import Shot
 from tumble.usd.cameras import size as of_lens
 
@@ -303,19 +303,36 @@ def together(x: Floats) -> Floats:
     return near
 
 
+def _corners(thing: Object) -> int:
+    """Points that are looked at for each of its positions."""
+    return 1 if thing.vertices is None else len(thing.vertices)
+
+
+def _outermost(vertices: Floats, x: Floats, turn: Floats) -> Floats:
+    """Vertices [m] of those bodies that may lie farthest out in a direction: no body reaches farther than its radius, and each
+    at least as far as its centre of mass."""
+    out = x @ DIRECTIONS.T
+    radius = np.linalg.norm(vertices, axis=1).max()
+    some = (out >= out.max(axis=0) - radius).any(axis=1)
+    return placed(vertices, x[some], turn[some]).reshape(-1, 3)
+
+
 def outline(run: Recording) -> Floats:
     """Points that must be in the picture; at least one."""
     found = objects(run)
     radius = {o.name: o.radius if o.form in ("points", "curve", "strands") else 0.0 for o in found}
     parts = []
     some = {0, run.n_frames // 2, run.n_frames - 1} if run.n_frames else set()
-    masses = max((sum(len(positions(run.frame(i), o)) for o in moving(found)) for i in some), default=0)
+    masses = max((sum(len(positions(run.frame(i), o)) * _corners(o) for o in moving(found)) for i in some), default=0)
     looks = int(min(run.n_frames, LOOKED_AT, max(5.0, READ / (3 * masses + 1))))
     for i in np.unique(np.linspace(0, run.n_frames - 1, looks).astype(int)):
         columns = run.frame(int(i))
         for o in moving(found):
             x = positions(columns, o)
-            x = x[np.isfinite(x).all(axis=1)]
+            finite = np.isfinite(x).all(axis=1)
+            x = x[finite]
+            if o.vertices is not None and len(x):
+                x = _outermost(o.vertices, x, turns(columns, o)[finite])
             if o.form == "points" and not len(o.links):
                 x = together(x)
             if len(x):

@@ -26,6 +26,14 @@ def unit(v: Floats) -> Floats:
     return np.asarray(np.divide(v, length, out=np.zeros_like(v), where=length > 0))
 
 
+def placed(vertices: Floats, position: Floats, turn: Floats) -> Floats:
+    """Points of a body at each of its places: turned by unit quaternions (x, y, z, w), n x 4, then moved, n x 3; n x m x 3."""
+    axis, w = turn[:, None, :3], turn[:, None, 3:]
+    t = 2.0 * np.cross(axis, np.eye(3))
+    axes = np.eye(3) + w * t + np.cross(axis, t)
+    return np.asarray(vertices @ axes + position[:, None], dtype=float)
+
+
 def face_normals(vertices: Floats, triangles: Indices) -> Floats:
     """Normals of triangles, as long as twice their area; m x 3."""
     a, b, c = (vertices[triangles[:, k]] for k in range(3))

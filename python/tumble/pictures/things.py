@@ -1,6 +1,6 @@
 """Visible content of a run: its objects, and for each frame what renderers draw of them (`drawn`).
 
-Ropes and anchors become tubes, sheets, blocks and nets meshes, floors
+Ropes and anchors become tubes, sheets, blocks and nets meshes, all bodies of an object one mesh, floors
 grounds; particles spheres, or, where many come and go, a cloud that `splats` paints over the picture; what lies on grids smoke
 or an image that `volumes` paints. Where a link broke, triangle or rope is left out (if `link_strain` is an output column).
 """
@@ -21,7 +21,7 @@ from tumble.looks import CELLS, DRAWN_ON, GLOWING, MAPS, MASSES, SHADE, SHOWN, S
 from tumble.pictures.blackbody import developed, glow
 from tumble.pictures.drawn import Cloud, Ground, Image, Mesh, Smoke, Spheres, Thing, Tubes
 from tumble.pictures.strands import Skin, Strands, strands
-from tumble.pictures.surfaces import Floats, Indices, normals, outward, split
+from tumble.pictures.surfaces import Floats, Indices, normals, outward, placed, split
 from tumble.style import Rgb, linear
 
 Array = npt.NDArray[Any]
@@ -89,6 +89,8 @@ class Object:
     """and the collider that they are rooted in."""
     position: Floats | None = None
     """Vertices [m] of what does not move."""
+    vertices: Floats | None = None
+    """Vertices of the mesh that all bodies of an object have [m], in the axes of each."""
     plane: tuple[Floats, Floats] | None = None
     """A point and the unit normal of a ground."""
     grid: Box | None = None
@@ -163,6 +165,7 @@ def objects(run: Recording) -> list[Object]:
                 links=_indices(columns, "links", 2),
                 curve=_indices(columns, "curve", 1).ravel(),
                 position=np.asarray(columns["position"], dtype=float).reshape(-1, 3) if "position" in columns else None,
+                vertices=np.asarray(columns["vertices"], dtype=float).reshape(-1, 3) if "vertices" in columns else None,
                 plane=None if look.plane is None else (np.array(look.plane[0]), np.array(look.plane[1])),
                 grid=grids.box(columns) if look.form in CELLS else None,
             )
@@ -220,6 +223,11 @@ def positions(columns: Columns, thing: Object) -> Floats:
     return np.asarray(column, dtype=float).reshape(-1, 3)
 
 
+def turns(columns: Columns, thing: Object) -> Floats:
+    """Turns of the bodies of an object in a frame, unit quaternions x, y, z, w; n x 4."""
+    return np.asarray(columns[thing.name]["turn"], dtype=float).reshape(-1, 4)
+
+
 def torn(columns: Columns, thing: Object) -> Indices | None:
     """Triangles of a surface that tears as they are in a frame, m x 3; None for any other, whose triangles stay."""
     column = columns.get(thing.name, {}).get("triangles")
@@ -233,9 +241,8 @@ def carried(thing: Object, columns: Columns, x: Floats) -> Floats:
         x = np.asarray(own["position"], dtype=float).reshape(-1, 3)
     if "turn" not in own:
         return x
-    q = np.ravel(own["turn"]).astype(float)
-    t = 2.0 * np.cross(q[:3], x)
-    return np.asarray(x + q[3] * t + np.cross(q[:3], t) + np.ravel(own["translation"]), dtype=float)
+    turn, shift = (np.asarray(own[name], dtype=float).reshape(1, -1) for name in ("turn", "translation"))
+    return np.asarray(placed(x, shift, turn)[0])
 
 
 def radii(columns: Columns, thing: Object) -> Floats:
@@ -269,7 +276,8 @@ class Stage:
         self.flat: str | None = str(run.scene.get("plane", "xz")) if run.scene.get("dimension", 3) == 2 else None
         self.objects = with_hair(run, objects(run))
         self._start: Columns = run.frame(0) if run.n_frames else {}
-        bodies = {o.name: o for o in self.objects if o.form in ("solid", "container", "body") and len(o.triangles)}
+        edged = ("solid", "container", "body", "instances")
+        bodies = {o.name: o for o in self.objects if o.form in edged and len(o.triangles)}
         starts = {name: self._start_of(o) for name, o in bodies.items()}
         self._cuts = {name: split(starts[name], o.triangles) for name, o in bodies.items()}
         self._closed = {name for name, o in bodies.items() if outward(starts[name], o.triangles)}
@@ -467,6 +475,8 @@ class Stage:
 
     def _moving(self, thing: Object, columns: Columns, thinnest: float) -> list[Thing]:
         x = positions(columns, thing)
+        if thing.vertices is not None:
+            return [self._instances(thing, thing.vertices, x, turns(columns, thing))]
         broken = self._broken(thing, columns)
         if thing.strands is not None:
             curves = hair(thing, self.objects, columns)
@@ -499,6 +509,15 @@ class Stage:
         fabric, thick = thing.form == "surface", _thickness(self.run.scene, thing.name)
         return Mesh(thing.name, x, triangles, normals(x, triangles), thing.color, fabric, thick, closed)
 
+    def _instances(self, thing: Object, vertices: Floats, x: Floats, turn: Floats) -> Mesh:
+        """All bodies of an object."""
+        source, triangles = self._cuts[thing.name]
+        own = vertices[source]
+        corners = placed(own, x, turn).reshape(-1, 3)
+        shading = placed(normals(own, triangles), np.zeros_like(x), turn).reshape(-1, 3)
+        faces = (triangles + len(own) * np.arange(len(x))[:, None, None]).reshape(-1, 3)
+        return Mesh(thing.name, corners, faces, shading, thing.color, closed=thing.name in self._closed)
+
     def _edges(self, thing: Object, x: Floats, thinnest: float) -> Tubes:
         """The sharp edges of a container; of a round one a few of its rings."""
         faces = np.cross(
@@ -519,7 +538,8 @@ class Stage:
         return Tubes(thing.name, x[links].reshape(-1, 3), np.full(len(links), 2), max(0.006, thinnest), thing.color)
 
     def _start_of(self, thing: Object) -> Floats:
-        return thing.position if thing.position is not None else positions(self._start, thing)
+        fixed = thing.position if thing.vertices is None else thing.vertices
+        return positions(self._start, thing) if fixed is None else fixed
 
     def _broken(self, thing: Object, columns: Columns) -> npt.NDArray[np.bool_]:
         """Which links have broken. Their strain is not a number; nor is that of links without a rest length, ever."""

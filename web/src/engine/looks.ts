@@ -12,6 +12,8 @@ export const MATTER = {
   surface: "masses",
   /** Triangles around a body that deforms, with sharp edges. */
   body: "masses",
+  /** One mesh with sharp edges for all bodies, each in its place and turned. */
+  instances: "masses",
   /** Triangles around a solid, with sharp edges. */
   solid: "solid",
   /** The edges of a solid that has others inside. */

@@ -66,7 +66,7 @@ export interface SceneInfo {
   systems: { name: string; method: string; integrator: string }[];
   /** Columns that the scene asks for, those of each frame unless others are asked for. */
   columns: string[];
-  /** Constant columns: triangles, links, curve, radius, mass, grid_cells, grid_origin, grid_spacing, grid_flat, mesh of colliders. */
+  /** Constant columns: triangles, vertices of the mesh of bodies, links, curve, radius, mass, grid_cells, grid_origin, grid_spacing, grid_flat, mesh of colliders. */
   topology: Columns;
   /** How the objects are drawn, in the order of their columns, and object and row of both ends of each anchor that pulls. */
   looks: { objects: Look[]; anchors: [[string, number], [string, number]][] };

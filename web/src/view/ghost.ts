@@ -2,6 +2,7 @@
 import * as THREE from "three";
 import { MATTER } from "../engine/looks";
 import type { Column, Frame, Look, SceneInfo } from "../engine/protocol";
+import { Instances } from "./instances";
 import { type Layer, Pieces, Points, type Rgb, Surface } from "./layers";
 import { along } from "./scenery";
 
@@ -52,6 +53,11 @@ export class Ghost {
           body.object.add(made.object);
         },
       };
+    }
+    if (form === "instances") {
+      const body = new Instances(topology, color);
+      body.veil(0.3);
+      return { body, set: (columns) => body.set(columns) };
     }
     if (form === "curve" || form === "strands") {
       const pairs = along(topology.curve.data, topology.curve_points?.data[0]);

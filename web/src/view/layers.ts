@@ -16,7 +16,7 @@ export interface Layer {
   dispose(): void;
 }
 
-function release(object: THREE.Object3D): void {
+export function release(object: THREE.Object3D): void {
   object.traverse((o) => {
     const mesh = o as THREE.Mesh;
     mesh.geometry?.dispose();
@@ -25,7 +25,7 @@ function release(object: THREE.Object3D): void {
 }
 
 /** A little farther away than it is. */
-const BEHIND = { polygonOffset: true, polygonOffsetFactor: 2, polygonOffsetUnits: 8 };
+export const BEHIND = { polygonOffset: true, polygonOffsetFactor: 2, polygonOffsetUnits: 8 };
 
 /** Grows by half as much again, so that a growing swarm seldom makes new buffers. */
 function room(attribute: THREE.BufferAttribute | undefined, count: number, width: number, instanced: boolean): THREE.BufferAttribute {
@@ -161,6 +161,20 @@ export class Pieces implements Layer {
   }
 }
 
+/** Edges that bend more than this are drawn sharp on solids [rad]. */
+const SHARP = 0.6;
+
+export function triangulated(position: Numbers, triangles: Numbers): THREE.BufferGeometry {
+  const geometry = new THREE.BufferGeometry();
+  geometry.setAttribute("position", new THREE.BufferAttribute(Float32Array.from(position), 3));
+  geometry.setIndex(new THREE.BufferAttribute(Uint32Array.from(triangles), 1));
+  return geometry;
+}
+
+/** Triangles with the normals of a solid. */
+export const edged = (position: Numbers, triangles: Numbers): THREE.BufferGeometry =>
+  toCreasedNormals(triangulated(position, triangles), SHARP);
+
 /** A surface of triangles, seen from both sides. */
 export class Surface implements Layer {
   readonly object: THREE.Mesh;
@@ -176,12 +190,8 @@ export class Surface implements Layer {
       this.material.emissive.copy(this.material.color);
       this.material.color.set(0);
     }
-    let geometry = new THREE.BufferGeometry();
-    geometry.setAttribute("position", new THREE.BufferAttribute(Float32Array.from(position), 3));
-    geometry.setIndex(new THREE.BufferAttribute(Uint32Array.from(triangles), 1));
-    if (!moving) {
-      geometry = toCreasedNormals(geometry, 0.6);
-    } else {
+    const geometry = moving ? triangulated(position, triangles) : edged(position, triangles);
+    if (moving) {
       geometry.computeVertexNormals();
       (geometry.getAttribute("position") as THREE.BufferAttribute).setUsage(THREE.DynamicDrawUsage);
     }

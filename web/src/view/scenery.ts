@@ -84,6 +84,26 @@ export function carry(columns: Record<string, Column>, point: THREE.Vector3, nor
   normal.applyQuaternion(q);
 }
 
+/** A disk of radius 1 that fades away towards its rim. */
+export function ground(): THREE.Mesh {
+  const material = new THREE.MeshStandardMaterial({ roughness: 1, transparent: true, side: THREE.FrontSide });
+  material.onBeforeCompile = (shader) => {
+    shader.vertexShader = shader.vertexShader
+      .replace("#include <common>", "#include <common>\nvarying vec2 vAway;")
+      .replace("#include <begin_vertex>", "#include <begin_vertex>\nvAway = position.xy;");
+    shader.fragmentShader = shader.fragmentShader
+      .replace("#include <common>", "#include <common>\nvarying vec2 vAway;")
+      .replace(
+        "#include <alphamap_fragment>",
+        "#include <alphamap_fragment>\ndiffuseColor.a *= 1.0 - smoothstep(0.30, 1.0, length(vAway));",
+      );
+  };
+  const disk = new THREE.Mesh(new THREE.CircleGeometry(1, 96), material);
+  disk.receiveShadow = true;
+  disk.renderOrder = -2;
+  return disk;
+}
+
 /** A line around a grid in a plane. */
 export function outline(line: Pieces, grid: Grid): void {
   const [a, b] = [0, 1, 2].filter((axis) => axis !== grid.flat);

@@ -5,9 +5,10 @@ import { DRAWN_ON, FOG, GLOWING, GROUND, MATTER, SHADE, SIGNED, SOLID, SPRING, T
 import type { Column, Form, Frame, Numbers, SceneInfo, Sight, Vector } from "../engine/protocol";
 import { FAMILIES, familiesOf, isOn, linked } from "../links";
 import { Depths } from "./depths";
+import { Instances } from "./instances";
 import { type Grid, gridOf, type Layer, PIXELS, Pieces, PlaneField, Points, Range, type Rgb, SpaceField, Surface, scalars } from "./layers";
 import { LOOK, type Look } from "./look";
-import { along, arrows, carry, outline, sharp, shownOf } from "./scenery";
+import { along, arrows, carry, ground, outline, sharp, shownOf } from "./scenery";
 import { isLeft, type Legend, type Shaded, Shades } from "./shades";
 import { trails } from "./trails";
 import { fitting, lit } from "./vantage";
@@ -19,7 +20,7 @@ interface Thing extends Shaded {
   trail: number;
   leap: number;
   grid: Grid | null;
-  body?: Points | Surface | PlaneField | SpaceField | Pieces;
+  body?: Points | Surface | Instances | PlaneField | SpaceField | Pieces;
   links?: Pieces;
   way?: Pieces;
   arrows?: Pieces;
@@ -233,13 +234,15 @@ export class Stage {
       } else if (form === "container" && position && triangles) {
         thing.body = new Pieces(0, { thinnest: 1, lit: false });
         thing.body.pairs(position.data, sharp(position.data, triangles.data), color);
+      } else if (form === "instances") {
+        thing.body = new Instances(topology, color, this.flat);
       } else if (form === "points") {
         thing.body = new Points(this.night, few ? 3.5 : 1.5);
         if (trail > 0) this.add((thing.way = new Pieces(TRAIL * radius, { lit: false, glow: this.night, thinnest: 0.8 })));
       } else if (isLine(form)) {
         thing.body = new Pieces(radius, { thinnest: 1.5 });
       } else if (form === "ground") {
-        this.ground(thing);
+        this.scene.add((thing.plane = ground()));
       }
       if (thing.body) this.add(thing.body);
       if (topology.links?.data.length)
@@ -295,25 +298,6 @@ export class Stage {
     return this.night || document.documentElement.dataset.theme === "dark";
   }
 
-  private ground(thing: Thing): void {
-    const material = new THREE.MeshStandardMaterial({ roughness: 1, transparent: true, side: THREE.FrontSide });
-    material.onBeforeCompile = (shader) => {
-      shader.vertexShader = shader.vertexShader
-        .replace("#include <common>", "#include <common>\nvarying vec2 vAway;")
-        .replace("#include <begin_vertex>", "#include <begin_vertex>\nvAway = position.xy;");
-      shader.fragmentShader = shader.fragmentShader
-        .replace("#include <common>", "#include <common>\nvarying vec2 vAway;")
-        .replace(
-          "#include <alphamap_fragment>",
-          "#include <alphamap_fragment>\ndiffuseColor.a *= 1.0 - smoothstep(0.30, 1.0, length(vAway));",
-        );
-    };
-    thing.plane = new THREE.Mesh(new THREE.CircleGeometry(1, 96), material);
-    thing.plane.receiveShadow = true;
-    thing.plane.renderOrder = -2;
-    this.scene.add(thing.plane);
-  }
-
   /** Bounds of what must fit. */
   private bounds(): THREE.Box3 {
     const box = new THREE.Box3();
@@ -337,8 +321,11 @@ export class Stage {
       } else if (isSolid(thing.form) && thing.topology.position) {
         take(thing.topology.position.data);
       } else {
-        const x = columns[thing.name]?.position;
-        if (x) take(x.data);
+        const own = columns[thing.name];
+        if (own?.position && thing.body instanceof Instances) {
+          thing.body.set(own);
+          thing.body.expand(box);
+        } else if (own?.position) take(own.position.data);
       }
     }
     if (box.isEmpty()) box.set(new THREE.Vector3(-1, -1, -1), new THREE.Vector3(1, 1, 1));
@@ -630,7 +617,10 @@ export class Stage {
         const p = 3 * pairs[2 * piece];
         return [colors![p], colors![p + 1], colors![p + 2]];
       };
-    if (isSkin(thing.form)) {
+    if (thing.body instanceof Instances) {
+      thing.body.set(columns);
+      thing.body.paint(colors);
+    } else if (isSkin(thing.form)) {
       if (!thing.body) {
         thing.body = new Surface(x, thing.topology.triangles.data, thing.color, {
           flat: thing.form === "body",
@@ -671,7 +661,7 @@ export class Stage {
     }
   }
 
-  /** The mass nearest to a point of the window, within some pixels. */
+  /** The mass nearest to a point of the window, within some pixels; of bodies the one that is seen there. */
   nearest(
     event: { clientX: number; clientY: number },
     within = 28,
@@ -681,6 +671,7 @@ export class Stage {
     const mx = event.clientX - box.left;
     const my = event.clientY - box.top;
     const matrix = new THREE.Matrix4().multiplyMatrices(this.camera.projectionMatrix, this.camera.matrixWorldInverse);
+    const ray = this.ray(event);
     const p = new THREE.Vector3();
     let best = within ** 2;
     let depth = Infinity;
@@ -690,12 +681,13 @@ export class Stage {
       const x = this.frame.columns[thing.name]?.position?.data;
       if (!x) continue;
       const masses = thing.topology.mass?.data;
+      const hit = thing.body instanceof Instances ? thing.body.hit(ray) : undefined;
       for (let i = 0; i < x.length / 3; i++) {
         p.set(x[3 * i], x[3 * i + 1], x[3 * i + 2]).applyMatrix4(matrix);
         if (p.z > 1) continue;
         const dx = (0.5 + 0.5 * p.x) * box.width - mx;
         const dy = (0.5 - 0.5 * p.y) * box.height - my;
-        const d = dx * dx + dy * dy;
+        const d = i === hit ? 0 : dx * dx + dy * dy;
         // Of those about as near, the one in front.
         if (d < best - 25 || (d < best + 25 && d < within ** 2 && p.z < depth)) {
           best = Math.min(best, d);
@@ -714,13 +706,18 @@ export class Stage {
 
   /** The point under the pointer in the plane through `through` that faces the camera. */
   under(event: { clientX: number; clientY: number }, through?: THREE.Vector3): THREE.Vector3 | null {
+    const normal = this.camera.getWorldDirection(new THREE.Vector3());
+    const plane = new THREE.Plane().setFromNormalAndCoplanarPoint(normal, through ?? this.home.target);
+    return this.ray(event).ray.intersectPlane(plane, new THREE.Vector3());
+  }
+
+  /** From the eye through a point of the window. */
+  private ray(event: { clientX: number; clientY: number }): THREE.Raycaster {
     const box = this.canvas.getBoundingClientRect();
     const at = new THREE.Vector2(((event.clientX - box.left) / box.width) * 2 - 1, 1 - ((event.clientY - box.top) / box.height) * 2);
     const ray = new THREE.Raycaster();
     ray.setFromCamera(at, this.camera);
-    const normal = this.camera.getWorldDirection(new THREE.Vector3());
-    const plane = new THREE.Plane().setFromNormalAndCoplanarPoint(normal, through ?? this.home.target);
-    return ray.ray.intersectPlane(plane, new THREE.Vector3());
+    return ray;
   }
 
   /** Width of what is seen [m]. */
@@ -789,7 +786,9 @@ export class Stage {
 
   /** Objects drawn as triangles. */
   get surfaces(): { name: string; mesh: THREE.Mesh }[] {
-    return this.things.flatMap((t) => (t.body instanceof Surface ? [{ name: t.name, mesh: t.body.object }] : []));
+    return this.things.flatMap((t) =>
+      t.body instanceof Surface || t.body instanceof Instances ? [{ name: t.name, mesh: t.body.object }] : [],
+    );
   }
 
   get background(): [string, string] {

@@ -14,6 +14,7 @@ mod heat;
 mod links;
 mod objects;
 mod output;
+mod rigid;
 mod shapes;
 mod structures;
 mod surfaces;
@@ -36,6 +37,7 @@ pub use heat::{Heat, HeatRegion, HeatScheme, HeatSide, HeatSides, HeatSource};
 pub use links::{Diagonals, Follow, Link, LinkSettings, Links, Load, Pin, Place, PointMass, Region, Within};
 pub use objects::{KINDS, Object};
 pub use output::{Camera, Expect, Look, Output, Probe};
+pub use rigid::{Arrange, Body, BodyShape, Rigid};
 pub use shapes::{Collider, Content, Figure, Mannequin, MeshFile, MeshFrame, MeshFrames, MeshRef, Motion, Moves, Pace, Pose, Shape};
 pub use structures::{Block, Cloud, CloudShape, Galaxy, Halo, Material, Net, Particles, Pattern, Profile, Rod, Rope, Sheet, Spring};
 pub use surfaces::{Fill, Fluid, Inflation, Membrane, ShapeMatching, Tear, Weak};
@@ -111,6 +113,9 @@ pub struct Scene {
     /// Stars at random positions, in dynamical equilibrium; needs a force of gravitation.
     #[serde(default)]
     pub galaxy: Vec<Galaxy>,
+    /// Rigid bodies, moved by systems of method `rigid`.
+    #[serde(default)]
+    pub body: Vec<Body>,
     /// Bodies that conduct heat.
     #[serde(default)]
     pub heat: Vec<Heat>,
@@ -315,6 +320,11 @@ impl Scene {
                 path: &g.path,
                 hash: &mut g.hash,
             }));
+        }
+        for Body { name, shape, .. } in &mut self.body {
+            if let BodyShape::Mesh(mesh) = shape {
+                all.push(one(format!("body \"{name}\".shape.mesh"), mesh));
+            }
         }
         for thing in &mut self.collider {
             let place = format!("collider \"{}\".shape", thing.name);

@@ -1,5 +1,6 @@
 //! Numerical methods and their settings.
 
+use super::rigid::Rigid;
 use super::vicsek::Vicsek;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -43,6 +44,9 @@ pub struct System {
     /// Contact of surfaces and curves with themselves and each other: in the sweeps of `position_based`, otherwise after each step.
     #[serde(default)]
     pub self_contact: Option<SelfContact>,
+    /// Settings of the `rigid` method.
+    #[serde(default)]
+    pub rigid: Option<Rigid>,
     /// Parameters of the `vicsek` method, which requires them.
     #[serde(default)]
     pub vicsek: Option<Vicsek>,
@@ -61,6 +65,7 @@ impl Default for System {
             solver: Solver::default(),
             position_based: PositionBased::default(),
             self_contact: None,
+            rigid: None,
             vicsek: None,
         }
     }
@@ -88,6 +93,8 @@ pub enum Method {
     Heat,
     /// A gas whose pressure follows from its density, stepped explicitly by `symplectic_euler`: the speed of sound limits the step.
     Compressible,
+    /// Rigid bodies with contact and friction, `[[body]]`. Sub-steps of at most 1/480 s unless given; there is no integrator.
+    Rigid,
     /// Stable Fluids: incompressible fluids that fill boxes of cells, `[[gas]]`. There is no integrator.
     Gas,
 }
@@ -102,6 +109,7 @@ impl Method {
             Self::Vicsek => "vicsek",
             Self::Heat => "heat",
             Self::Compressible => "compressible",
+            Self::Rigid => "rigid",
             Self::Gas => "gas",
         }
     }

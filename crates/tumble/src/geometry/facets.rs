@@ -186,6 +186,11 @@ impl Facets {
         (self.frames[m.interval][i as usize], self.frames[next][i as usize])
     }
 
+    /// Whether its vertices never move.
+    pub fn is_still(&self) -> bool {
+        self.times.len() == 1 && self.back.is_none()
+    }
+
     /// Lower and upper corner of everything at all times [m].
     pub fn bounds(&self) -> (Vector, Vector) {
         let none = Vector { x: f64::INFINITY, y: f64::INFINITY, z: f64::INFINITY };

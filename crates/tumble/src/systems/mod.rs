@@ -4,6 +4,7 @@ pub mod compressible;
 pub mod dynamics;
 pub mod gas;
 pub mod heat;
+pub mod rigid;
 pub mod scenery;
 pub mod tracers;
 pub mod vicsek;

@@ -4,6 +4,7 @@ mod compressible;
 mod dynamics;
 mod gas;
 mod heat;
+mod rigid;
 mod tracers;
 mod vicsek;
 
@@ -19,8 +20,8 @@ use tumble_interface::{Issue, Warning};
 
 /// All methods. Where several can move a kind of objects, the first is its default.
 /// A constant: as a static it would be compiled into the unit tests, with the whole engine behind it.
-pub const METHODS: [&dyn MethodRules; 6] =
-    [&dynamics::Rules, &tracers::Rules, &vicsek::Rules, &gas::Rules, &heat::Rules, &compressible::Rules];
+pub const METHODS: [&dyn MethodRules; 7] =
+    [&dynamics::Rules, &tracers::Rules, &vicsek::Rules, &rigid::Rules, &gas::Rules, &heat::Rules, &compressible::Rules];
 
 /// What the scene layer knows of a method. Scenes that it is given are resolved, but for `leads`.
 pub trait MethodRules: Sync {

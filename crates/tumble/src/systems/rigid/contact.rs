@@ -1,0 +1,216 @@
+//! Contacts between bodies: pairs by sorted bounds, points by Parry.
+
+use super::body::Body;
+use crate::geometry::{Friction, Vector};
+use crate::math::Quat;
+use crate::math::parallel::fold;
+use parry3d_f64::bounding_volume::Aabb;
+use parry3d_f64::math::{Pose, Rotation, Vector as V};
+use parry3d_f64::query::{ContactManifold, DefaultQueryDispatcher, PersistentQueryDispatcher, TrackedContact};
+use parry3d_f64::shape::SharedShape;
+
+/// Surfaces this close count as touching, over the reach of a body.
+const CLOSE: f64 = 1e-3;
+/// Points of contact of two faces, at most.
+const FACE: usize = 4;
+/// A contact that has moved less than this over the reach of a body is the same one.
+const NEAR: f64 = 0.1;
+
+type Point = TrackedContact<()>;
+
+/// The surface of bodies.
+#[derive(Clone)]
+pub struct Hull {
+    /// Its shape.
+    pub shape: SharedShape,
+    /// Where that is in the axes of the body.
+    pub place: Pose,
+    /// Distance that it keeps from others [m].
+    pub thickness: f64,
+    /// Coulomb friction.
+    pub friction: Friction,
+    /// Speed after a bounce over speed before.
+    pub restitution: f64,
+    /// Velocity of the surface along itself [m/s], in the axes of the body.
+    pub belt: Vector,
+    /// Greatest distance of the surface from the centre of mass [m].
+    pub reach: f64,
+}
+
+/// Bodies and their surfaces: first those that move, then solids.
+#[derive(Clone, Default)]
+pub struct Bodies {
+    /// Their states.
+    pub rows: Vec<Body>,
+    /// The surface of each.
+    pub hull: Vec<u32>,
+    /// All surfaces.
+    pub hulls: Vec<Hull>,
+    /// How many move.
+    pub moving: usize,
+}
+
+impl Bodies {
+    fn hull(&self, i: usize) -> &Hull {
+        &self.hulls[self.hull[i] as usize]
+    }
+
+    fn pose(&self, i: usize) -> Pose {
+        pose(self.rows[i].x, self.rows[i].q) * self.hull(i).place
+    }
+}
+
+/// A point of contact of two bodies.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Contact {
+    /// The two bodies.
+    pub pair: [u32; 2],
+    /// Where on the first, in its axes: what is kept of a contact is found again by it.
+    pub local: Vector,
+    /// Unit vector from the first to the second.
+    pub normal: Vector,
+    /// Arms from both centres of mass [m].
+    pub arms: [Vector; 2],
+    /// Distance of the surfaces [m], negative where they overlap.
+    pub gap: f64,
+    /// Coulomb friction.
+    pub friction: Friction,
+    /// Coefficient of restitution.
+    pub restitution: f64,
+    /// Velocity of the second surface along the first by belts [m/s].
+    pub belt: Vector,
+    /// Impulse along the normal [N s].
+    pub press: f64,
+    /// Impulse of friction on the second [N s].
+    pub drag: Vector,
+}
+
+impl Contact {
+    /// What a snapshot keeps of a contact: all that the next sub-step and the ledger read. `[press, gap]`.
+    pub fn kept(pair: [u32; 2], local: Vector, drag: Vector, normal: Vector, [press, gap]: [f64; 2]) -> Self {
+        let none = Vector::default();
+        Self { pair, local, normal, arms: [none; 2], gap, friction: Friction::default(), restitution: 0.0, belt: none, press, drag }
+    }
+}
+
+/// A pose in Parry's words.
+pub fn pose(x: Vector, q: Quat<f64>) -> Pose {
+    Pose { translation: V::new(x.x, x.y, x.z), rotation: Rotation::from_xyzw(q.v.x, q.v.y, q.v.z, q.w) }
+}
+
+fn vector(v: V) -> Vector {
+    Vector { x: v.x, y: v.y, z: v.z }
+}
+
+/// Pairs whose bounds overlap when each is let out by its margin [m], in order.
+fn pairs(bodies: &Bodies, margins: &[f64]) -> Vec<[u32; 2]> {
+    let n = bodies.rows.len();
+    let bounds = |i: usize| {
+        let Aabb { mins, maxs } = bodies.hull(i).shape.compute_aabb(&bodies.pose(i));
+        [mins - V::splat(margins[i]), maxs + V::splat(margins[i])]
+    };
+    let bounds: Vec<[V; 2]> = fold(n, |range| range.map(bounds).collect::<Vec<_>>()).concat();
+    let mut order: Vec<usize> = (0..n).collect();
+    order.sort_by(|a, b| bounds[*a][0].x.total_cmp(&bounds[*b][0].x).then(a.cmp(b)));
+    let mut found = Vec::new();
+    for (k, &i) in order.iter().enumerate() {
+        let [low, high] = bounds[i];
+        for &j in &order[k + 1..] {
+            let [bottom, top] = bounds[j];
+            if bottom.x > high.x {
+                break;
+            }
+            if i.min(j) < bodies.moving && bottom.y <= high.y && bottom.z <= high.z && low.y <= top.y && low.z <= top.z {
+                found.push([i.min(j) as u32, i.max(j) as u32]);
+            }
+        }
+    }
+    found.sort_unstable();
+    found
+}
+
+/// Of many points of contact of two faces the deepest and three more that span the largest area: as many as a face needs to rest.
+fn corners<'a>(points: &[&'a Point]) -> Vec<&'a Point> {
+    if points.len() <= FACE {
+        return points.to_vec();
+    }
+    let best = |of: &dyn Fn(&Point) -> f64| points.iter().copied().max_by(|a, b| of(a).total_cmp(&of(b))).unwrap_or(points[0]);
+    let a = best(&|p| -p.dist);
+    let b = best(&|p| (p.local_p1 - a.local_p1).length_squared());
+    let normal = (b.local_p1 - a.local_p1)
+        .cross(best(&|p| (b.local_p1 - a.local_p1).cross(p.local_p1 - a.local_p1).length_squared()).local_p1 - a.local_p1);
+    let area = |p: &Point| (b.local_p1 - a.local_p1).cross(p.local_p1 - a.local_p1).dot(normal);
+    vec![a, b, best(&area), best(&|p| -area(p))]
+}
+
+/// Points of contact of a pair that are closer than `within` [m].
+fn touch(bodies: &Bodies, pair: [u32; 2], within: f64, out: &mut Vec<Contact>) {
+    let [i, j] = pair.map(|i| i as usize);
+    let ([a, b], [one, two], [first, second]) =
+        ([&bodies.rows[i], &bodies.rows[j]], [bodies.hull(i), bodies.hull(j)], [bodies.pose(i), bodies.pose(j)]);
+    let mut manifolds: Vec<ContactManifold<(), ()>> = Vec::new();
+    let (skin, between) = (one.thickness + two.thickness, first.inv_mul(&second));
+    // Shapes that it cannot pair are refused when a scene is read.
+    let _ = DefaultQueryDispatcher.contact_manifolds(&between, &*one.shape.0, &*two.shape.0, within + skin, &mut manifolds, &mut None);
+    let friction =
+        Friction { sliding: one.friction.sliding.max(two.friction.sliding), resting: one.friction.resting.max(two.friction.resting) };
+    let belt = b.q.turn(two.belt) - a.q.turn(one.belt);
+    for manifold in &manifolds {
+        let part = manifold.subshape_pos1().map_or(first, |own| first * *own);
+        let normal = vector(part.rotation * manifold.local_n1);
+        let close = manifold.contacts().iter().filter(|point| point.dist <= within + skin);
+        for point in corners(&close.collect::<Vec<_>>()) {
+            let on = vector(part * point.local_p1);
+            let at = on + normal * (0.5 * point.dist);
+            out.push(Contact {
+                pair,
+                local: a.q.conj().turn(on - a.x),
+                normal,
+                arms: [at - a.x, at - b.x],
+                gap: point.dist - skin,
+                friction,
+                restitution: one.restitution.max(two.restitution),
+                belt: belt - normal * belt.dot(normal),
+                press: 0.0,
+                drag: Vector::default(),
+            });
+        }
+    }
+}
+
+/// All contacts that may close within h [s], in the order of their pairs.
+pub fn contacts(bodies: &Bodies, h: f64) -> Vec<Contact> {
+    let margin = |i: usize| {
+        let (body, hull) = (&bodies.rows[i], bodies.hull(i));
+        let close = if body.inverse_mass > 0.0 { CLOSE * hull.reach } else { 0.0 };
+        1.5 * h * (body.v.norm() + body.w.norm() * hull.reach) + hull.thickness + close
+    };
+    let margins: Vec<f64> = (0..bodies.rows.len()).map(margin).collect();
+    let pairs = pairs(bodies, &margins);
+    let found = fold(pairs.len(), |range| {
+        let mut found = Vec::new();
+        for pair in &pairs[range] {
+            touch(bodies, *pair, pair.iter().map(|i| margins[*i as usize]).sum(), &mut found);
+        }
+        found
+    });
+    found.concat()
+}
+
+/// Takes over the impulses of the contacts before; both lists are in the order of their pairs. The nearest point of a pair is the same one, if
+/// it has moved less on the first body than a tenth of that one's reach.
+pub fn carry(bodies: &Bodies, old: &[Contact], new: &mut [Contact]) {
+    let mut k = 0;
+    for contact in new {
+        while k < old.len() && old[k].pair < contact.pair {
+            k += 1;
+        }
+        let near = NEAR * bodies.hull(contact.pair[0] as usize).reach;
+        let same = old[k..].iter().take_while(|o| o.pair == contact.pair).map(|o| ((o.local - contact.local).norm_sq(), o));
+        let best = same.filter(|(distance, _)| *distance < near * near).min_by(|a, b| a.0.total_cmp(&b.0));
+        if let Some((_, o)) = best {
+            contact.press = o.press;
+            contact.drag = o.drag - contact.normal * o.drag.dot(contact.normal);
+        }
+    }
+}

@@ -1,0 +1,357 @@
+//! Rigid bodies with contact and friction.
+//!
+//!   m v' = m g + sum of p,   L' = sum of r × p,   x' = v,   q' = (0, ω) q / 2                                            (rigid.1)
+//!
+//! Each sub-step: gravity; contacts that may close; bounces; soft passes; bodies move and turn; rigid passes. Bodies are in double precision in
+//! both engines, and contacts in the order of their pairs, so that a far body changes no bit.
+
+mod body;
+mod contact;
+mod solids;
+mod solve;
+
+pub use body::Body;
+pub use contact::{Bodies, Hull, pose};
+pub use solids::refusal;
+
+use crate::exchange::Turn;
+use crate::forces::Gravity;
+use crate::geometry::{Collider, Vector};
+use crate::integrators::equal_steps;
+use crate::math::{Quat, Real};
+use crate::system::{Archive, Part, System};
+use contact::Contact;
+use solve::Pace;
+use std::ops::Range;
+use std::sync::Arc;
+use tumble_interface::engine::{Ledger, Share, Stability, StepReport, Worst};
+use tumble_interface::error::Breakdown;
+use tumble_interface::{Column, Mesh, StepError};
+
+/// Sub-steps are no longer than this, unless a scene says otherwise [s].
+const STEP: f64 = 1.0 / 480.0;
+/// Overlaps at the start that are told, over the reach of a body.
+const OVERLAP: f64 = 1e-3;
+/// Numbers of a body, and of a contact, in a snapshot.
+const BODY: usize = 13;
+const CONTACT: usize = 11;
+
+/// Bodies of one shape.
+pub struct Object {
+    /// Its name.
+    pub name: String,
+    /// Its bodies.
+    pub rows: Range<usize>,
+    /// Their surface for pictures, in their own axes.
+    pub mesh: Mesh,
+}
+
+/// How the system goes on.
+pub struct Settings {
+    /// Its name.
+    pub name: String,
+    /// Sub-steps of an interval, if the scene says so.
+    pub substeps: Option<u32>,
+    /// The longest sub-step, if the scene says so [s].
+    pub step: Option<f64>,
+    /// Passes over all contacts.
+    pub iterations: u32,
+    /// Gravity.
+    pub gravity: Gravity,
+}
+
+/// Rigid bodies.
+pub struct Rigid {
+    settings: Settings,
+    objects: Vec<Object>,
+    bodies: Bodies,
+    contacts: Vec<Contact>,
+    /// The solids of others, and of each body beyond those that move which one it is.
+    solids: Arc<Vec<Collider>>,
+    of: Vec<usize>,
+}
+
+impl Rigid {
+    /// Bodies that move, and their objects.
+    pub fn new(settings: Settings, objects: Vec<Object>, bodies: Bodies) -> Self {
+        Self { settings, objects, bodies, contacts: Vec::new(), solids: Arc::default(), of: Vec::new() }
+    }
+
+    /// The two surfaces that overlap most at the start, by more than round-off, and how deep [m].
+    pub fn overlap(&mut self) -> Option<(&str, &str, f64)> {
+        self.place_solids(0.0, 0.0);
+        let found = contact::contacts(&self.bodies, 0.0).into_iter().min_by(|a, b| a.gap.total_cmp(&b.gap))?;
+        let [a, b] = found.pair.map(|i| i as usize);
+        let least = OVERLAP * self.bodies.hulls[self.bodies.hull[a] as usize].reach;
+        (-found.gap > least).then_some((self.named(a)?, self.named(b)?, -found.gap))
+    }
+
+    /// Name of the object or solid of a body.
+    fn named(&self, row: usize) -> Option<&str> {
+        match self.owner(row) {
+            Some((object, _)) => Some(&object.name),
+            None => Some(&self.solids.get(*self.of.get(row - self.bodies.moving)?)?.name),
+        }
+    }
+
+    /// Object of a body that moves, and its index there.
+    fn owner(&self, row: usize) -> Option<(&Object, usize)> {
+        self.objects.iter().find(|object| object.rows.contains(&row)).map(|object| (object, row - object.rows.start))
+    }
+
+    fn steps(&self, dt: f64) -> u32 {
+        self.settings.substeps.unwrap_or_else(|| equal_steps(dt, self.settings.step.unwrap_or(STEP)) as u32)
+    }
+
+    /// Takes over solids that others have published.
+    pub fn meet(&mut self, solids: &Arc<Vec<Collider>>) {
+        if Arc::ptr_eq(solids, &self.solids) {
+            return;
+        }
+        let bodies = &mut self.bodies;
+        let own = bodies.hull[..bodies.moving].iter().max().map_or(0, |last| *last as usize + 1);
+        bodies.hulls.truncate(own);
+        bodies.hull.truncate(bodies.moving);
+        self.of.clear();
+        for (k, solid) in solids.iter().enumerate() {
+            for hull in solids::hulls(solid) {
+                bodies.hull.push(bodies.hulls.len() as u32);
+                bodies.hulls.push(hull);
+                self.of.push(k);
+            }
+        }
+        self.solids = solids.clone();
+    }
+
+    /// Puts solids where they are at a time [s].
+    fn place_solids(&mut self, t: f64, h: f64) {
+        let bodies = &mut self.bodies;
+        bodies.rows.truncate(bodies.moving);
+        for (place, k) in self.of.iter().enumerate() {
+            let solid = &self.solids[*k];
+            bodies.rows.push(solids::body(solid, t, h));
+            bodies.hulls[bodies.hull[bodies.moving + place] as usize].friction = solid.friction_at(t);
+        }
+    }
+
+    fn step(&mut self, t: f64, h: f64) {
+        self.place_solids(t, h);
+        let gravity = Vector::from(self.settings.gravity.at(t + 0.5 * h));
+        let moving = self.bodies.moving;
+        for body in &mut self.bodies.rows[..moving] {
+            body.orient();
+            body.v = body.v + gravity * h;
+        }
+        let mut contacts = contact::contacts(&self.bodies, h);
+        contact::carry(&self.bodies, &self.contacts, &mut contacts);
+        let pace = Pace { h, iterations: self.settings.iterations, still: 2.0 * gravity.norm() * h, gravity };
+        let rows = &mut self.bodies.rows;
+        solve::bounce(rows, &contacts, &pace);
+        solve::solve(rows, &mut contacts, &pace, |rows, contacts| {
+            // What nothing holds moves along the exact parabola.
+            let mut held = vec![false; rows.len()];
+            contacts.iter().filter(|c| c.press > 0.0).flat_map(|c| c.pair).for_each(|i| held[i as usize] = true);
+            for (body, held) in rows[..moving].iter_mut().zip(held) {
+                body.x = body.x + body.v * h - if held { Vector::default() } else { gravity * (0.5 * h * h) };
+                body.turn_freely(h);
+                body.orient();
+            }
+        });
+        self.contacts = contacts;
+    }
+
+    fn moving(&self) -> &[Body] {
+        &self.bodies.rows[..self.bodies.moving]
+    }
+
+    fn ledger_of(&self, rows: Range<usize>, t: f64) -> Ledger {
+        let gravity = Vector::from(self.settings.gravity.at(t));
+        let (mut momentum, mut spin, mut speed) = (Vector::default(), Vector::default(), 0.0_f64);
+        let mut ledger = Ledger { time: t, ..Ledger::default() };
+        for body in &self.moving()[rows.clone()] {
+            let mass = 1.0 / body.inverse_mass;
+            ledger.mass += mass;
+            momentum = momentum + body.v * mass;
+            spin = spin + body.x.cross(body.v * mass) + body.spin();
+            ledger.kinetic += body.kinetic();
+            ledger.external -= mass * gravity.dot(body.x);
+            speed = speed.max(body.v.norm());
+        }
+        let mine = |c: &&Contact| c.pair.iter().any(|i| rows.contains(&(*i as usize)));
+        let mut touching: Vec<u32> = self.contacts.iter().filter(mine).filter(|c| c.press > 0.0).flat_map(|c| c.pair).collect();
+        touching.sort_unstable();
+        touching.dedup();
+        let depth = self.contacts.iter().filter(mine).map(|c| -c.gap).fold(0.0, f64::max);
+        Ledger {
+            momentum: momentum.into(),
+            angular_momentum: Some(spin.into()),
+            speed: Some(speed),
+            penetration: Some(depth),
+            contacts: Some(touching.iter().filter(|i| rows.contains(&(**i as usize))).count() as u64),
+            ..ledger
+        }
+    }
+
+    /// The first body that is not finite.
+    fn lost(&self, t: f64) -> Option<StepError> {
+        let finite = |v: Vector| (v.x + v.y + v.z).is_finite();
+        let bad = |body: &Body| match (finite(body.x) && body.q.row().iter().all(|c| c.is_finite()), finite(body.v) && finite(body.w)) {
+            (false, _) => Some("position"),
+            (_, false) => Some("velocity"),
+            _ => None,
+        };
+        let (row, column) = self.moving().iter().enumerate().find_map(|(i, body)| Some((i, bad(body)?)))?;
+        let (object, index) = self.owner(row)?;
+        Some(StepError::NotFinite(Box::new(Breakdown {
+            system: self.settings.name.clone(),
+            object: object.name.clone(),
+            column: column.into(),
+            index,
+            id: None,
+            cell: None,
+            time: t,
+            integrator: "rigid".into(),
+            step: 0.0,
+            stable_step: f64::INFINITY,
+            energy_ratio: None,
+            cause: None,
+        })))
+    }
+}
+
+impl System for Rigid {
+    fn name(&self) -> &str {
+        &self.settings.name
+    }
+
+    fn absorb(&mut self, _exchange: &mut Turn<'_>) {}
+
+    fn advance(&mut self, t: f64, dt: f64, exchange: &mut Turn<'_>, go_on: &(dyn Fn() -> bool + Sync)) -> Result<StepReport, StepError> {
+        self.meet(&exchange.surfaces().clone());
+        let mut report = StepReport::default();
+        let n = self.steps(dt);
+        let h = dt / f64::from(n);
+        for k in 0..n {
+            if !go_on() {
+                return Ok(report);
+            }
+            self.step(t + f64::from(k) * h, h);
+            report.stepped(h);
+        }
+        Ok(report)
+    }
+
+    fn publish(&mut self, _t: f64, _exchange: &mut Turn<'_>) {}
+
+    fn columns(&self, _t: f64, names: &[&str], out: &mut Vec<Column>) {
+        for Object { name: object, rows, .. } in &self.objects {
+            let bodies = &self.moving()[rows.clone()];
+            let vectors = |f: fn(&Body) -> Vector| -> Vec<Real> {
+                bodies.iter().flat_map(|body| <[f64; 3]>::from(f(body)).map(|c| c as Real)).collect()
+            };
+            for name in names {
+                let data = match *name {
+                    "position" => vectors(|body| body.x),
+                    "velocity" => vectors(|body| body.v),
+                    "angular_velocity" => vectors(|body| body.w),
+                    _ => continue,
+                };
+                out.push(Column::new(object, name, data));
+            }
+            let turns: Vec<Real> = bodies.iter().flat_map(|body| body.q.row().map(|c| c as Real)).collect();
+            out.push(Column::new(object, "turn", turns));
+        }
+    }
+
+    fn topology(&self, out: &mut Vec<Column>) {
+        for Object { name, rows, mesh } in &self.objects {
+            out.push(Column::new(name, "vertices", mesh.vertices.concat()));
+            out.push(Column::new(name, "triangles", mesh.triangles.concat()));
+            let masses: Vec<Real> = self.moving()[rows.clone()].iter().map(|body| (1.0 / body.inverse_mass) as Real).collect();
+            out.push(Column::new(name, "mass", masses));
+        }
+    }
+
+    fn ledger(&self, t: f64) -> Ledger {
+        self.ledger_of(0..self.bodies.moving, t)
+    }
+
+    fn shares(&self, t: f64) -> Vec<Share> {
+        let share = |object: &Object| Share {
+            system: self.settings.name.clone(),
+            object: object.name.clone(),
+            ledger: self.ledger_of(object.rows.clone(), t),
+        };
+        self.objects.iter().map(share).collect()
+    }
+
+    fn worst(&self, _t: f64) -> Vec<Worst> {
+        let of = |measure, value, row: usize, other: Option<usize>| {
+            let (object, index) = self.owner(row)?;
+            let other = other.and_then(|row| self.named(row)).map(str::to_string);
+            Some(Worst { measure, value, object: object.name.clone(), other, particles: vec![index], id: None, cell: None })
+        };
+        let speeds = self.moving().iter().map(|body| body.v.norm()).enumerate();
+        let fastest = speeds.max_by(|a, b| a.1.total_cmp(&b.1)).and_then(|(row, speed)| of("speed", speed, row, None));
+        let deepest = self.contacts.iter().filter(|c| c.gap < 0.0).min_by(|a, b| a.gap.total_cmp(&b.gap));
+        let deepest = deepest.and_then(|c| of("penetration", -c.gap, c.pair[0] as usize, Some(c.pair[1] as usize)));
+        fastest.into_iter().chain(deepest).collect()
+    }
+
+    fn breakdown(&mut self, t: f64) -> Option<StepError> {
+        self.lost(t)
+    }
+
+    fn watch(&mut self, _on: bool) {}
+
+    fn stability(&mut self, _dt: f64, _go_on: &(dyn Fn() -> bool + Sync)) -> Option<Stability> {
+        None
+    }
+
+    fn save(&self, archive: &mut Archive) {
+        let three = <[f64; 3]>::from;
+        let rows = self.moving().iter().flat_map(|b| [&three(b.x)[..], &b.q.row(), &three(b.v), &three(b.w)].concat());
+        archive.push("bodies", Part::Numbers(rows.collect()));
+        let pairs: Vec<u32> = self.contacts.iter().flat_map(|c| c.pair).collect();
+        archive.push_indices("pairs", &pairs);
+        let contact = |c: &Contact| {
+            let kept = [three(c.local), three(c.drag), three(c.normal)].concat();
+            kept.into_iter().chain([c.press, c.gap])
+        };
+        archive.push("contacts", Part::Numbers(self.contacts.iter().flat_map(contact).collect()));
+    }
+
+    fn restore(&mut self, archive: &mut Archive) -> Option<()> {
+        let (bodies, pairs, contacts) = (archive.numbers("bodies")?, archive.indices("pairs")?, archive.numbers("contacts")?);
+        if bodies.len() != BODY * self.bodies.moving || contacts.len() * 2 != CONTACT * pairs.len() {
+            return None;
+        }
+        let three = |s: &[f64]| Vector { x: s[0], y: s[1], z: s[2] };
+        for (body, s) in self.bodies.rows.iter_mut().zip(bodies.chunks_exact(BODY)) {
+            body.x = three(s);
+            body.q = Quat { v: three(&s[3..]), w: s[6] };
+            (body.v, body.w) = (three(&s[7..]), three(&s[10..]));
+        }
+        let kept = pairs.chunks_exact(2).zip(contacts.chunks_exact(CONTACT));
+        self.contacts =
+            kept.map(|(pair, s)| Contact::kept([pair[0], pair[1]], three(s), three(&s[3..]), three(&s[6..]), [s[9], s[10]])).collect();
+        Some(())
+    }
+
+    fn write(&mut self, object: &str, column: &str, values: &[f64]) -> Option<bool> {
+        let rows = self.objects.iter().find(|o| o.name == object)?.rows.clone();
+        let width = if column == "turn" { 4 } else { 3 };
+        if !matches!(column, "position" | "velocity" | "angular_velocity" | "turn") || values.len() != width * rows.len() {
+            return Some(false);
+        }
+        for (body, s) in self.bodies.rows[rows].iter_mut().zip(values.chunks_exact(width)) {
+            match column {
+                "turn" => body.q = Quat { v: [s[0], s[1], s[2]].into(), w: s[3] }.normalized(),
+                "position" => body.x = [s[0], s[1], s[2]].into(),
+                "velocity" => body.v = [s[0], s[1], s[2]].into(),
+                _ => body.w = [s[0], s[1], s[2]].into(),
+            }
+        }
+        Some(true)
+    }
+}

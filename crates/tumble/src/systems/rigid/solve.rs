@@ -1,0 +1,290 @@
+//! Impulses of contacts: bounces, one after the other; then non-penetration and friction by sequential impulses, in soft passes that mend
+//! overlaps, too, and rigid ones after bodies have moved, which take away the speed of mending.
+//!
+//!   speed  u = v_b + ω_b × r_b - v_a - ω_a × r_a,   n·u ≥ -gap/h  ⊥  p ≥ 0,   |d| ≤ μ p,   d ∥ -u_t where it slides          (rigid.4)
+//!
+//! Sources: sequential impulses and soft constraints [catto2009], small steps [macklin2019], the step along the slide back to the cone
+//! [jourdan1998].
+
+use super::body::Body;
+use super::contact::Contact;
+use crate::geometry::Vector;
+use crate::math::parallel::fold;
+
+/// What the passes need.
+#[derive(Debug, Clone, Copy)]
+pub struct Pace {
+    /// Sub-step [s].
+    pub h: f64,
+    /// Passes of each sort.
+    pub iterations: u32,
+    /// Bodies that come closer more slowly do not bounce [m/s].
+    pub still: f64,
+    /// What moves a body that moves, but for contact [m/s²].
+    pub gravity: Vector,
+}
+
+/// Overlaps are mended as by springs of this frequency over that of sub-steps, twice as much against what nothing moves.
+const MEND: f64 = 0.25;
+/// Damping ratio of these.
+const DAMPING: f64 = 10.0;
+/// No faster than this [m/s].
+const FASTEST: f64 = 3.0;
+/// Rounds of bounces at most.
+const ROUNDS: usize = 200;
+
+/// What a pass reads and writes of a body.
+#[derive(Clone, Copy)]
+struct Twist {
+    v: Vector,
+    w: Vector,
+    inverse_mass: f64,
+}
+
+impl Twist {
+    fn of(body: &Body) -> Self {
+        Self { v: body.v, w: body.w, inverse_mass: body.inverse_mass }
+    }
+}
+
+/// A direction at a contact: what a unit impulse along it does to both bodies.
+#[derive(Clone, Copy)]
+struct Lever {
+    /// The direction, from the first to the second.
+    along: Vector,
+    /// r × direction, of each [m].
+    arms: [Vector; 2],
+    /// Change of angular velocity of each, without sign [1/(kg m)].
+    turns: [Vector; 2],
+}
+
+impl Lever {
+    fn new([a, b]: [&Body; 2], arms: [Vector; 2], along: Vector) -> Self {
+        let arms = arms.map(|r| r.cross(along));
+        Self { along, arms, turns: [a.turned(arms[0]), b.turned(arms[1])] }
+    }
+
+    /// Speed of the second along it, seen from the first [m/s].
+    #[inline(always)]
+    fn speed(&self, a: &Twist, b: &Twist) -> f64 {
+        self.along.dot(b.v - a.v) + self.arms[1].dot(b.w) - self.arms[0].dot(a.w)
+    }
+
+    /// Gives both an impulse [N s].
+    #[inline(always)]
+    fn push(&self, a: &mut Twist, b: &mut Twist, impulse: f64) {
+        a.v = a.v - self.along * (impulse * a.inverse_mass);
+        a.w = a.w - self.turns[0] * impulse;
+        b.v = b.v + self.along * (impulse * b.inverse_mass);
+        b.w = b.w + self.turns[1] * impulse;
+    }
+
+    /// Change of the speed along it by a unit impulse along another [1/kg].
+    fn compliance(&self, other: &Self, inverse_mass: f64) -> f64 {
+        inverse_mass * self.along.dot(other.along) + self.arms[0].dot(other.turns[0]) + self.arms[1].dot(other.turns[1])
+    }
+}
+
+/// A contact as the passes see it.
+#[derive(Clone)]
+struct Row {
+    pair: [u32; 2],
+    /// The normal, and two directions across it.
+    levers: [Lever; 3],
+    /// 1/(n K n) [kg].
+    mass: f64,
+    /// The inverse of K across the normal: xx, yy, xy [kg].
+    inverse: [f64; 3],
+    /// 1 over its largest eigenvalue [kg].
+    slide: f64,
+    /// Speed of belts across the normal [m/s].
+    belt: [f64; 2],
+    /// Coulomb's coefficients, of what rests and of what slides.
+    friction: [f64; 2],
+    /// Speed of approach that a soft pass leaves, negative where it parts; that of a rigid one [m/s].
+    bias: [f64; 2],
+    /// Of a soft pass: parts of the mass and of the impulse so far that count.
+    soft: [f64; 2],
+    /// Impulses along the three directions [N s].
+    press: f64,
+    drag: [f64; 2],
+}
+
+fn two<T>(bodies: &mut [T], [i, j]: [u32; 2]) -> (&mut T, &mut T) {
+    let (low, high) = bodies.split_at_mut(j as usize);
+    (&mut low[i as usize], &mut high[0])
+}
+
+impl Row {
+    fn new(bodies: &[Body], c: &Contact, pace: &Pace) -> Self {
+        let pair @ [a, b] = c.pair.map(|i| &bodies[i as usize]);
+        let n = c.normal;
+        let least = if n.x.abs() < 0.6 { [1.0, 0.0, 0.0] } else { [0.0, 1.0, 0.0] };
+        let t = n.cross(Vector::from(least)).normalized();
+        let levers = [n, t, n.cross(t)].map(|along| Lever::new(pair, c.arms, along));
+        let k = |i: usize, j: usize| levers[i].compliance(&levers[j], a.inverse_mass + b.inverse_mass);
+        let [xx, yy, xy] = [k(1, 1), k(2, 2), k(1, 2)];
+        let det = xx * yy - xy * xy;
+        let fixed = a.inverse_mass == 0.0 || b.inverse_mass == 0.0;
+        // h ω of the springs.
+        let rate = std::f64::consts::TAU * MEND * if fixed { 2.0 } else { 1.0 };
+        let damped = 2.0 * DAMPING + rate;
+        let left = 1.0 / (1.0 + rate * damped);
+        let (bias, soft) = if c.gap > 0.0 {
+            (c.gap / pace.h, [1.0, 0.0])
+        } else {
+            ((c.gap * rate / (pace.h * damped)).max(-FASTEST), [rate * damped * left, left])
+        };
+        Self {
+            pair: c.pair,
+            levers,
+            mass: 1.0 / k(0, 0),
+            inverse: [yy / det, xx / det, -xy / det],
+            slide: 2.0 / (xx + yy + ((xx - yy) * (xx - yy) + 4.0 * xy * xy).sqrt()),
+            belt: [c.belt.dot(levers[1].along), c.belt.dot(levers[2].along)],
+            friction: [c.friction.resting, c.friction.sliding],
+            bias: [bias, c.gap.max(0.0) / pace.h],
+            soft,
+            press: c.press,
+            drag: [c.drag.dot(levers[1].along), c.drag.dot(levers[2].along)],
+        }
+    }
+
+    /// The same contact of two bodies that have moved: it goes with the smaller one, and both still push at one point, so that no angular momentum
+    /// is lost.
+    fn moved(&mut self, bodies: &[Body], c: &Contact) {
+        let pair @ [a, b] = c.pair.map(|i| &bodies[i as usize]);
+        if a.inverse_mass == 0.0 || b.inverse_mass == 0.0 {
+            return;
+        }
+        let size = |body: &Body| body.inertia.iter().sum::<f64>();
+        let [ra, rb] = c.arms;
+        let arms = if size(a) <= size(b) { [ra, a.x + ra - b.x] } else { [b.x + rb - a.x, rb] };
+        self.levers = self.levers.map(|lever| Lever::new(pair, arms, lever.along));
+    }
+
+    /// Friction within Coulomb's cone.
+    #[inline(always)]
+    fn rub(&mut self, a: &mut Twist, b: &mut Twist) {
+        let [_, s, t] = &self.levers;
+        let (x, y) = (s.speed(a, b) + self.belt[0], t.speed(a, b) + self.belt[1]);
+        let ([xx, yy, xy], [p, q], [resting, sliding]) = (self.inverse, self.drag, self.friction);
+        let mut new = [p - (xx * x + xy * y), q - (xy * x + yy * y)];
+        let square = |[p, q]: [f64; 2]| p * p + q * q;
+        if square(new) > (resting * self.press) * (resting * self.press) {
+            // With the inverse of K, the impulse would not point against the slide: a step along that, and back to the cone.
+            new = [p - self.slide * x, q - self.slide * y];
+            let (most, length) = (sliding * self.press, square(new).sqrt());
+            if length > most {
+                new = new.map(|p| p * (most / length));
+            }
+        }
+        s.push(a, b, new[0] - p);
+        t.push(a, b, new[1] - q);
+        self.drag = new;
+    }
+
+    /// One pass over a contact.
+    #[inline(always)]
+    fn pass(&mut self, twists: &mut [Twist], soft: bool) {
+        let (a, b) = two(twists, self.pair);
+        let (bias, [mass, left]) = if soft { (self.bias[0], self.soft) } else { (self.bias[1], [1.0, 0.0]) };
+        let speed = self.levers[0].speed(a, b);
+        let press = (self.press - self.mass * mass * (speed + bias) - left * self.press).max(0.0);
+        self.levers[0].push(a, b, press - self.press);
+        self.press = press;
+        if self.friction[0] > 0.0 {
+            self.rub(a, b);
+        }
+    }
+}
+
+/// Arms of a contact to the middle between its points on both bodies, which are at these places: no angular momentum is lost.
+fn meeting([a, b]: [Vector; 2], arms: [Vector; 2]) -> [Vector; 2] {
+    let at = (a + arms[0] + b + arms[1]) * 0.5;
+    [at - a, at - b]
+}
+
+/// Bounces: each contact that closes within the sub-step turns its approach round, one after the other until none approaches.
+pub fn bounce(bodies: &mut [Body], contacts: &[Contact], pace: &Pace) {
+    let elastic: Vec<&Contact> = contacts.iter().filter(|c| c.restitution > 0.0).collect();
+    for round in 0..ROUNDS {
+        let mut any = false;
+        for c in &elastic {
+            let (a, b) = two(bodies, c.pair);
+            let speed = (b.velocity_at(c.arms[1]) - a.velocity_at(c.arms[0])).dot(c.normal);
+            if speed >= -pace.still || c.gap + speed * pace.h >= 0.0 {
+                continue;
+            }
+            any = true;
+            // The surfaces meet after t, at this speed; gravity has pulled for all of the sub-step.
+            let gap = if round == 0 { c.gap.max(0.0) } else { 0.0 };
+            let pull = |body: &Body| if body.inverse_mass > 0.0 { pace.gravity.dot(c.normal) } else { 0.0 };
+            let rate = if gap > 0.0 { pull(b) - pull(a) } else { 0.0 };
+            let first = speed - rate * pace.h;
+            let closing = if gap > 0.0 { (first * first - 2.0 * rate * gap).max(0.0).sqrt() } else { -speed };
+            let t = if gap > 0.0 { 2.0 * gap / (closing - first) } else { 0.0 };
+            let met = Contact { arms: meeting([a.x + a.v * t, b.x + b.v * t], c.arms), ..(*c).clone() };
+            let before = [a.v, b.v];
+            hit(bodies, &met, closing, pace);
+            // Until then they have moved as before.
+            for (i, before) in c.pair.into_iter().zip(before) {
+                let body = &mut bodies[i as usize];
+                body.x = body.x - (body.v - before) * t;
+            }
+        }
+        if !any {
+            break;
+        }
+    }
+}
+
+/// The impulse of a bounce at this speed of approach [m/s], with friction.
+fn hit(bodies: &mut [Body], c: &Contact, closing: f64, pace: &Pace) {
+    let mut row = Row::new(bodies, c, pace);
+    let mut pair = c.pair.map(|i| Twist::of(&bodies[i as usize]));
+    let [a, b] = &mut pair;
+    (row.press, row.drag) = ((1.0 + c.restitution) * closing * row.mass, [0.0; 2]);
+    row.levers[0].push(a, b, row.press);
+    row.rub(a, b);
+    for (i, twist) in c.pair.into_iter().zip(pair) {
+        (bodies[i as usize].v, bodies[i as usize].w) = (twist.v, twist.w);
+    }
+}
+
+/// One sub-step of contacts: speeds in, speeds and the impulses of contacts out; `go` moves bodies between the two sorts of passes.
+pub fn solve(bodies: &mut [Body], contacts: &mut [Contact], pace: &Pace, go: impl FnOnce(&mut [Body], &[Contact])) {
+    let made =
+        |bodies: &[Body]| fold(contacts.len(), |range| contacts[range].iter().map(|c| Row::new(bodies, c, pace)).collect::<Vec<_>>());
+    let mut rows: Vec<Row> = made(bodies).concat();
+    let mut twists: Vec<Twist> = bodies.iter().map(Twist::of).collect();
+    for row in &rows {
+        let (a, b) = two(&mut twists, row.pair);
+        row.levers.iter().zip([row.press, row.drag[0], row.drag[1]]).for_each(|(lever, impulse)| lever.push(a, b, impulse));
+    }
+    let passes = |rows: &mut [Row], twists: &mut [Twist], soft: bool| {
+        for _ in 0..pace.iterations {
+            rows.iter_mut().for_each(|row| row.pass(twists, soft));
+        }
+    };
+    let back = |bodies: &mut [Body], twists: &[Twist]| {
+        bodies.iter_mut().zip(twists).for_each(|(body, twist)| (body.v, body.w) = (twist.v, twist.w));
+    };
+    passes(&mut rows, &mut twists, true);
+    back(bodies, &twists);
+    keep(contacts, &rows);
+    go(bodies, contacts);
+    rows.iter_mut().zip(&*contacts).for_each(|(row, c)| row.moved(bodies, c));
+    twists.iter_mut().zip(&*bodies).for_each(|(twist, body)| *twist = Twist::of(body));
+    passes(&mut rows, &mut twists, false);
+    back(bodies, &twists);
+    keep(contacts, &rows);
+}
+
+/// What the passes have found.
+fn keep(contacts: &mut [Contact], rows: &[Row]) {
+    for (c, row) in contacts.iter_mut().zip(rows) {
+        c.press = row.press;
+        c.drag = row.levers[1].along * row.drag[0] + row.levers[2].along * row.drag[1];
+    }
+}
