@@ -24,8 +24,8 @@ BOXES = {
             "shape": {"box": {"size": [0.2, 0.2, 0.2]}},
             "position": [[0, 0, 0.1], [0, 0, 0.35]],
             "density": 500,
-            "velocity": [0, 0, 0],
-            "angular_velocity": [0, 0, 3],
+            "velocity": [[0, 0, 0]],
+            "angular_velocity": [[0, 0, 3]],
         }
     ],
     "collider": [{"name": "floor", "shape": {"floor": {}}}],

@@ -137,6 +137,7 @@ def test_every_column_is_described() -> None:
         },
         {"emitter": [emitter], "sheet": [{"name": "sheet", "size": [1, 1], "resolution": [3, 3]}]},
         {"gas": [GAS | {"fire": {}, "temperature": {}}]},
+        {"body": [{"name": "box", "shape": {"box": {"size": [1, 1, 1]}}}]},
         {"heat": [hot]},
         {"compressible": [GAS | {"sound_speed": 300.0, "density": 1.0}]},
     ]

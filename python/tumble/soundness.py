@@ -106,8 +106,12 @@ def fault_of_arrays(
                 return f'"{name}/{column}" has {len(array)} rows, not {least}'
             if least is None and array.ndim and count is not None and len(array) != count:
                 return f'"{name}/{column}" has {len(array)} rows for {count} particles'
-            if place == "static" and column in _INDICES and "mass" in columns.get(name, {}) and array.size:
-                most = len(columns[name]["mass"])
+            own = columns.get(name, {})
+            # The triangles of a rigid body are over the corners of its mesh.
+            of = "vertices" if "vertices" in own else "mass"
+            if place == "static" and column in _INDICES and of in own and array.size:
+                most = len(own[of])
                 if np.min(array) < 0 or np.max(array) >= most:
-                    return f'"{name}/{column}" names particles beyond the {most} that there are'
+                    what = "corners" if of == "vertices" else "particles"
+                    return f'"{name}/{column}" names {what} beyond the {most} that there are'
     return None

@@ -67,6 +67,7 @@ function inForce(key: string, system: Tree): boolean {
     position_based: positions,
     self_contact: masses,
     vicsek: method === "vicsek",
+    rigid: method === "rigid",
   };
   return rules[key] ?? true;
 }

@@ -36,6 +36,7 @@ const idOf = (path: string) =>
 const ROWS: Record<string, string> = {
   cloth: "Cloth and hair",
   drape: "Draped sheets",
+  rigid: "Rigid bodies",
   springs: "Springs",
   structures: "Structures",
   integrators: "Integrators",

@@ -187,6 +187,11 @@ def _refuse(tree: Tree) -> None:
     title = f"“{tree['title']}”" if tree["title"] else "this scene"
     if "vicsek" in methods:
         raise SceneError("the model of Vicsek is a map and has no integrator; there is nothing to compare")
+    if tree["body"]:
+        raise SceneError(
+            f"{title} has rigid bodies, which have a scheme of their own and no integrator; there is nothing to compare. "
+            "`tumble refine` shows how a scene converges"
+        )
     for kind, thing in on_grids(tree):
         instead = _INSTEAD.get(kind, f"see `tumble lab {kind}`")
         raise SceneError(

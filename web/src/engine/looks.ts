@@ -12,7 +12,7 @@ export const MATTER = {
   surface: "masses",
   /** Triangles around a body that deforms, with sharp edges. */
   body: "masses",
-  /** One mesh with sharp edges for all bodies, each in its place and turned. */
+  /** A mesh at each mass, turned as `turn` says, with sharp edges. */
   instances: "masses",
   /** Triangles around a solid, with sharp edges. */
   solid: "solid",

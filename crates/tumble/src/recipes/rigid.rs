@@ -29,7 +29,10 @@ fn solid(words: &BodyShape, file: Option<&Mesh>) -> Result<(SharedShape, Pose, M
     // Axes of y become those of z.
     let upright = pose(zero, from_degrees([90.0, 0.0, 0.0]));
     let still = Pose::IDENTITY;
-    let hull = |points: &[[f64; 3]]| SharedShape::convex_hull(&points.iter().map(|p| V::new(p[0], p[1], p[2])).collect::<Vec<_>>());
+    let hull = |points: &[[f64; 3]]| {
+        let shape = SharedShape::convex_hull(&points.iter().map(|p| V::new(p[0], p[1], p[2])).collect::<Vec<_>>());
+        shape.filter(|shape| shape.mass_properties(1.0).mass() > 0.0)
+    };
     let flat = |key: &str| (key.to_string(), "the points lie in a plane or too close together, expected a body with a volume".to_string());
     Ok(match words {
         BodyShape::Sphere { radius } => (SharedShape::ball(*radius), still, surface::sphere(3, zero, *radius)),

@@ -82,7 +82,9 @@ pub fn check(scene: &Scene) -> Vec<Issue> {
                 Some(object) => {
                     let method = place(systems, object.kind, object.system).map(|i| rules(systems[i].method));
                     if let Some(what) = method.and_then(|method| method.massless()) {
-                        let message = format!("\"{on}\" are {what}, which feel no force; put them into a dynamics system");
+                        let cure =
+                            if METHODS[0].kinds().contains(&object.kind) { "put them into a dynamics system" } else { "leave it out" };
+                        let message = format!("\"{on}\" are {what}, which feel no force; {cure}");
                         wrong(format!("force[{i}].{key}"), message);
                     }
                 }

@@ -6,17 +6,13 @@ use crate::math::Quat;
 use crate::math::parallel::fold;
 use parry3d_f64::bounding_volume::Aabb;
 use parry3d_f64::math::{Pose, Rotation, Vector as V};
-use parry3d_f64::query::{ContactManifold, DefaultQueryDispatcher, PersistentQueryDispatcher, TrackedContact};
+use parry3d_f64::query::{ContactManifold, DefaultQueryDispatcher, PersistentQueryDispatcher};
 use parry3d_f64::shape::SharedShape;
 
 /// Surfaces this close count as touching, over the reach of a body.
 const CLOSE: f64 = 1e-3;
-/// Points of contact of two faces, at most.
-const FACE: usize = 4;
 /// A contact that has moved less than this over the reach of a body is the same one.
 const NEAR: f64 = 0.1;
-
-type Point = TrackedContact<()>;
 
 /// The surface of bodies.
 #[derive(Clone)]
@@ -129,20 +125,6 @@ fn pairs(bodies: &Bodies, margins: &[f64]) -> Vec<[u32; 2]> {
     found
 }
 
-/// Of many points of contact of two faces the deepest and three more that span the largest area: as many as a face needs to rest.
-fn corners<'a>(points: &[&'a Point]) -> Vec<&'a Point> {
-    if points.len() <= FACE {
-        return points.to_vec();
-    }
-    let best = |of: &dyn Fn(&Point) -> f64| points.iter().copied().max_by(|a, b| of(a).total_cmp(&of(b))).unwrap_or(points[0]);
-    let a = best(&|p| -p.dist);
-    let b = best(&|p| (p.local_p1 - a.local_p1).length_squared());
-    let normal = (b.local_p1 - a.local_p1)
-        .cross(best(&|p| (b.local_p1 - a.local_p1).cross(p.local_p1 - a.local_p1).length_squared()).local_p1 - a.local_p1);
-    let area = |p: &Point| (b.local_p1 - a.local_p1).cross(p.local_p1 - a.local_p1).dot(normal);
-    vec![a, b, best(&area), best(&|p| -area(p))]
-}
-
 /// Points of contact of a pair that are closer than `within` [m].
 fn touch(bodies: &Bodies, pair: [u32; 2], within: f64, out: &mut Vec<Contact>) {
     let [i, j] = pair.map(|i| i as usize);
@@ -158,8 +140,7 @@ fn touch(bodies: &Bodies, pair: [u32; 2], within: f64, out: &mut Vec<Contact>) {
     for manifold in &manifolds {
         let part = manifold.subshape_pos1().map_or(first, |own| first * *own);
         let normal = vector(part.rotation * manifold.local_n1);
-        let close = manifold.contacts().iter().filter(|point| point.dist <= within + skin);
-        for point in corners(&close.collect::<Vec<_>>()) {
+        for point in manifold.contacts().iter().filter(|point| point.dist <= within + skin) {
             let on = vector(part * point.local_p1);
             let at = on + normal * (0.5 * point.dist);
             out.push(Contact {
