@@ -8,7 +8,7 @@ use common::{Vector, column, run, simulation, step, whole};
 use std::fmt::Write;
 use tumble_f64::math::Quat;
 use tumble_f64::scene::Simulation;
-use tumble_interface::{Data, Engine, Scene};
+use tumble_interface::{Assets, Data, Engine, Mesh, Scene};
 
 const G: f64 = 9.81;
 
@@ -166,10 +166,10 @@ fn a_ball_that_is_thrown_slides_and_then_rolls() {
     assert!((x - exact).abs() < 5e-3 * way, "{x} of {exact} m");
 }
 
-/// A box that is pushed along the diagonal, and 25 balls on it: an elliptic cone of friction lets it go, a pyramid does not [simbenchmark].
+/// A box that is pushed along the diagonal, and 25 balls on it: an elliptic cone of friction lets it go, a pyramid does not. Figures of SimBenchmark.
 #[test]
 fn balls_on_a_box_that_is_pulled_along_the_diagonal() {
-    // The pull as gravity along the diagonal would act on balls, too: a box whose velocity is raised at each frame.
+    // F pulls the box: its velocity is raised. The ground holds it back by f = 0.4 (M + 25 m) g, each ball by (F - f)/(M (3.5/m + 25/M)).
     let mut words = String::from("shape = { sphere = { radius = 0.5 } }\nmass = 1\nfriction = 0.8\nposition = [");
     (0..25).for_each(|k| write!(words, "[{}, {}, 0.7], ", 2 * (k % 5) - 4, 2 * (k / 5) - 4).unwrap());
     words.push(']');
@@ -188,6 +188,75 @@ fn balls_on_a_box_that_is_pulled_along_the_diagonal() {
     }
     let [tray, ball] = ["tray", "balls"].map(|name| column(&sim, name, "velocity").pop().unwrap().norm());
     assert!((tray - 2.954).abs() < 5e-3 * 2.954 && (ball - 0.844).abs() < 5e-3 * 0.844, "{tray} m/s, {ball} m/s");
+}
+
+#[test]
+fn slender_bodies_turn_without_gaining_energy() {
+    for (shape, w) in [
+        ("{ capsule = { radius = 0.002, length = 1 } }", [0.0, 10.0, 0.1]),
+        ("{ cylinder = { radius = 0.001, height = 1 } }", [3.0, 10.0, 40.0]),
+        ("{ box = { size = [0.002, 1, 0.003] } }", [10.0, 3.0, 7.0]),
+    ] {
+        let mut sim = scene(NONE, 5, &body("rod", &format!("shape = {shape}\nangular_velocity = [{w:?}]")));
+        let start = sim.ledger().kinetic;
+        let worst = (0..500).map(|_| (step(&mut sim), (sim.ledger().kinetic / start - 1.0).abs()).1).fold(0.0, f64::max);
+        assert!(worst < 1e-6 && start > 0.0, "{shape}: {worst:e}");
+    }
+}
+
+#[test]
+fn flat_and_oblique_blows_obey_the_restitution() {
+    // A box that falls flat on a face rises to e² of its height and does not turn.
+    for mu in [0.0, 0.5] {
+        let words =
+            format!("shape = {{ box = {{ size = [0.4, 0.4, 0.2] }} }}\nposition = [[0, 0, 1.1]]\nrestitution = 0.5\nfriction = {mu}");
+        let mut sim = scene(DOWN, 5, &(body("box", &words) + &floor(0.0, 0.0)));
+        run(&mut sim, 46);
+        let heights: Vec<f64> = (0..40).map(|_| (step(&mut sim), column(&sim, "box", "position")[0].z - 0.1).1).collect();
+        let top = heights.into_iter().fold(0.0, f64::max);
+        assert!((top - 0.25).abs() < 1e-3 && column(&sim, "box", "angular_velocity")[0].norm() < 1e-9, "mu = {mu}: {top} m");
+    }
+    // Without friction nothing changes the spin of a ball, and an elastic one keeps its energy.
+    let words = "shape = { sphere = { radius = 0.5 } }\nposition = [[0, 0, 0.5043]]\nvelocity = [[5, 0, -3]]\nangular_velocity = [[0, 40, 0]]\n\
+        restitution = 1\nfriction = 0";
+    let mut sim = scene(NONE, 1, &(body("ball", words) + &floor(0.0, 0.0)));
+    run(&mut sim, 10);
+    let (v, w) = (column(&sim, "ball", "velocity")[0], column(&sim, "ball", "angular_velocity")[0]);
+    assert!((v - Vector::from([5.0, 0.0, 3.0])).norm() < 1e-12 && (w.y - 40.0).abs() < 1e-12, "{v:?} {w:?}");
+}
+
+#[test]
+fn a_gas_of_elastic_balls_keeps_its_energy() {
+    let (mut position, mut velocity) = (String::new(), String::new());
+    for k in 0..27 {
+        write!(position, "[{}, {}, {}], ", 0.4 * f64::from(k % 3 - 1), 0.4 * f64::from(k / 3 % 3 - 1), 0.4 * f64::from(k / 9 - 1)).unwrap();
+        write!(velocity, "[{}, {}, {}], ", 1.3 - f64::from(k % 4), 0.7 - f64::from(k % 3), f64::from(k * 7 % 5) - 2.0).unwrap();
+    }
+    let words = format!(
+        "shape = {{ sphere = {{ radius = 0.1 }} }}\nposition = [{position}]\nvelocity = [{velocity}]\nrestitution = 1\nfriction = 0"
+    );
+    let room = "[[collider]]\nname = \"room\"\nshape = { box = { size = [2, 2, 2] } }\ninside = true\n";
+    let mut sim = scene(NONE, 5, &(body("balls", &words) + room));
+    let start = sim.ledger();
+    run(&mut sim, 500);
+    let end = sim.ledger();
+    assert!((end.kinetic / start.kinetic - 1.0).abs() < 1e-9, "{} of {} J", end.kinetic, start.kinetic);
+    assert!((Vector::from(end.momentum) - Vector::from(start.momentum)).norm() > 1e-3 * start.mass);
+}
+
+#[test]
+fn shells_are_met_from_both_sides() {
+    let vertices = vec![[-1.0, -1.0, 0.0], [1.0, -1.0, 0.0], [1.0, 1.0, 0.0], [-1.0, 1.0, 0.0]];
+    for triangles in [vec![[0, 1, 2], [0, 2, 3]], vec![[2, 1, 0], [3, 2, 0]]] {
+        let text = "version = 1\n[[body]]\nname = \"ball\"\nshape = { sphere = { radius = 0.1 } }\nposition = [[0.2, 0.1, 0.3]]\n\
+            [[collider]]\nname = \"plate\"\nshape = { mesh = { path = \"plate.obj\", shell = true } }\nthickness = 0.01\n";
+        let plate = Mesh { vertices: vertices.clone(), triangles, ..Mesh::default() };
+        let assets = Assets::new([("plate.obj".to_string(), plate)].into(), Default::default());
+        let mut sim = Simulation::new(Scene::from_toml(text).unwrap(), assets).unwrap();
+        run(&mut sim, 24);
+        let z = column(&sim, "ball", "position")[0].z;
+        assert!((z - 0.11).abs() < 1e-3, "{z} m");
+    }
 }
 
 #[test]
@@ -223,8 +292,7 @@ fn momentum_and_angular_momentum_stay_where_nothing_else_is() {
     words.push_str("]\nangular_velocity = [[1, 2, 3]]");
     let mut sim = scene(NONE, 5, &body("boxes", &words));
     let start = sim.ledger();
-    let touched = (0..200).map(|_| step(&mut sim)).fold(0, |most, _| most + 1);
-    assert_eq!(touched, 200);
+    run(&mut sim, 200);
     let end = sim.ledger();
     let [l, m] = [&start, &end].map(|ledger| Vector::from(ledger.angular_momentum.unwrap()));
     let scale = start.mass * 1.0;

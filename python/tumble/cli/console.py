@@ -135,7 +135,8 @@ def size(n: float) -> str:
 
 def counted(n: int, word: str) -> str:
     """`1 frame`, `2 frames`."""
-    return f"{n} {word}" if n == 1 else f"{n} {word}{'es' if word.endswith('s') else 's'}"
+    many = f"{word[:-1]}ies" if word.endswith("dy") else f"{word}{'es' if word.endswith('s') else 's'}"
+    return f"{n} {word if n == 1 else many}"
 
 
 class Progress:

@@ -4,7 +4,7 @@ use super::{MeshFile, items_above_zero};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-/// Rigid bodies of one shape, moved by systems of method `rigid`. They meet each other and colliders.
+/// Rigid bodies of one shape, moved by systems of method `rigid`. Those of a system meet each other and colliders.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Body {
@@ -121,7 +121,7 @@ pub enum BodyShape {
         #[schemars(length(min = 4), extend("x-unit" = "m"))]
         points: Vec<[f64; 3]>,
     },
-    /// The convex hull of a mesh from a file, which is what pictures show.
+    /// The convex hull of a mesh from a file; pictures show the mesh itself.
     Mesh(MeshFile),
 }
 

@@ -105,9 +105,14 @@ pub fn bodies(words: &Words, file: Option<&Mesh>) -> Result<Made, Wrong> {
     let reach = place.translation.length() + shape.compute_local_bounding_sphere().radius();
     let friction = Friction { sliding: words.friction, resting: words.friction_static.unwrap_or(words.friction) };
     let hull = Hull { shape, place, thickness: 0.0, friction, restitution: words.restitution, belt: Vector::default(), reach };
-    let height = mesh.vertices.iter().fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], v| [low.min(v[2]), high.max(v[2])]);
-    let width = mesh.vertices.iter().fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], v| [low.min(v[0]), high.max(v[0])]);
-    let places = places(words, [width[1] - width[0], height[1] - height[0]])?;
+    // Extents of the first body as it stands.
+    let stands = from_degrees(words.rotate.first().copied().unwrap_or_default());
+    let extent = |axis: usize| {
+        let along = mesh.vertices.iter().map(|p| <[f64; 3]>::from(stands.turn(Vector::from(*p)))[axis]);
+        let [low, high] = along.fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], p| [low.min(p), high.max(p)]);
+        high - low
+    };
+    let places = places(words, [extent(0), extent(2)])?;
     let n = places.len();
     let each = |key: &str, list: &[[f64; 3]], i: usize| match list {
         [] => Ok([0.0; 3]),

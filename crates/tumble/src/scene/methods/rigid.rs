@@ -64,6 +64,11 @@ impl MethodRules for Rules {
                 format!("rigid bodies meet each other and colliders, but not yet what [[{other}]] consists of, nor does that meet them");
             warnings.push(Warning::new(Code::Unfelt, "body", message));
         }
+        let own = |plan: &&Plan| plan.method == Method::Rigid && scene.body.iter().any(|thing| is_in(&thing.system, plan));
+        if let Some(second) = scene.system.iter().filter(own).nth(1) {
+            let message = "its bodies do not meet those of other systems; put all bodies that are to meet into one";
+            warnings.push(Warning::new(Code::Unfelt, format!("system \"{}\"", second.name), message));
+        }
         warnings
     }
 

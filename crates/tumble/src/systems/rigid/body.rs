@@ -2,7 +2,7 @@
 //!
 //!   L' = 0,   q' = q (0, J⁻¹ q* L q) / 2                                                                        (rigid.2)
 //!
-//! Source: splitting of the kinetic energy into those of turns about each axis [mclachlan1993].
+//! Source: splitting of the kinetic energy [mclachlan1993], into that of a symmetric top and the rest.
 
 use crate::geometry::Vector;
 use crate::math::Quat;
@@ -60,25 +60,27 @@ impl Body {
             [sum(|e| e.x * e.x), sum(|e| e.y * e.y), sum(|e| e.z * e.z), sum(|e| e.x * e.y), sum(|e| e.y * e.z), sum(|e| e.z * e.x)];
     }
 
-    /// Turns freely for h [s]: the flow of L_a²/(2 I_a) about each principal axis, forwards and backwards. Keeps the angular momentum to
-    /// round-off, the energy within O(h²), and is exact for bodies of three equal moments.                       (rigid.3)
+    /// Turns freely for h [s]: half a turn about one axis, a symmetric top's motion, which has a formula, and the other half. Keeps the angular
+    /// momentum to round-off and the energy within O(h²); exact for two equal moments.                             (rigid.3)
     pub fn turn_freely(&mut self, h: f64) {
-        let [a, b, c] = self.inertia;
-        if a == b && b == c {
-            self.q = (by(self.w * h) * self.q).normalized();
-            return;
-        }
+        let inverse = self.inertia.map(|moment| 1.0 / moment);
+        let apart = |a: usize, b: usize| (inverse[a] - inverse[b]).abs();
+        // The top has the two moments that differ least.
+        let [a, b, c] = [[0, 1, 2], [1, 2, 0], [2, 0, 1]]
+            .into_iter()
+            .fold([0, 1, 2], |best, pair| if apart(pair[0], pair[1]) < apart(best[0], best[1]) { pair } else { best });
         let momentum = self.spin();
-        let mut l = self.q.conj().turn(momentum);
-        for (axis, part) in [(0, 0.5), (1, 0.5), (2, 1.0), (1, 0.5), (0, 0.5)] {
+        let about = |q: Quat<f64>, axis: usize, rate: f64, s: f64| {
             let mut angle = [0.0; 3];
-            angle[axis] = <[f64; 3]>::from(l)[axis] / self.inertia[axis] * h * part;
-            let turn = by(angle.into());
-            self.q = self.q * turn;
-            l = turn.conj().turn(l);
-        }
-        self.q = self.q.normalized();
-        self.w = self.q.turn([l.x / a, l.y / b, l.z / c].into());
+            angle[axis] = rate * <[f64; 3]>::from(q.conj().turn(momentum))[axis] * s;
+            q * by(angle.into())
+        };
+        let rest = inverse[b] - inverse[a];
+        let mut q = about(self.q, b, rest, 0.5 * h);
+        q = by(momentum * (inverse[a] * h)) * about(q, c, inverse[c] - inverse[a], h);
+        self.q = about(q, b, rest, 0.5 * h).normalized();
+        let l = <[f64; 3]>::from(self.q.conj().turn(momentum));
+        self.w = self.q.turn([l[0] * inverse[0], l[1] * inverse[1], l[2] * inverse[2]].into());
     }
 
     /// Kinetic energy [J].

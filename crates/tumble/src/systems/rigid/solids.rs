@@ -30,9 +30,10 @@ pub fn refusal(solid: &Collider) -> Option<&'static str> {
 pub fn hulls(solid: &Collider) -> Vec<Hull> {
     let still = pose(Vector::default(), UPRIGHT);
     let plane = |normal: Vector, offset: f64, place: Pose| (SharedShape::halfspace(v(normal)), place * pose(normal * offset, UPRIGHT));
-    let mesh = |vertices: Vec<[f64; 3]>, triangles: &[[u32; 3]]| {
+    let mesh = |vertices: Vec<[f64; 3]>, triangles: &[[u32; 3]], shell: bool| {
+        let flags = if shell { TriMeshFlags::FIX_INTERNAL_EDGES_TWO_SIDED } else { TriMeshFlags::FIX_INTERNAL_EDGES };
         let vertices = vertices.into_iter().map(|p| V::new(p[0], p[1], p[2])).collect();
-        SharedShape::trimesh_with_flags(vertices, triangles.to_vec(), TriMeshFlags::FIX_INTERNAL_EDGES).ok()
+        SharedShape::trimesh_with_flags(vertices, triangles.to_vec(), flags).ok()
     };
     let shapes: Vec<(SharedShape, Pose)> = match &solid.shape {
         Shape::Sphere { center, radius } => vec![(SharedShape::ball(*radius), pose(*center, UPRIGHT))],
@@ -49,8 +50,8 @@ pub fn hulls(solid: &Collider) -> Vec<Hull> {
         Shape::Box { center, half, turn } => vec![(SharedShape::cuboid(half.x, half.y, half.z), pose(*center, *turn))],
         Shape::Plane { normal, offset } => vec![plane(*normal, *offset, still)],
         Shape::Capsule { from, to, radius } => vec![(SharedShape::capsule(v(*from), v(*to), *radius), still)],
-        Shape::Mesh { facets, .. } | Shape::Animated { facets, .. } => {
-            mesh(facets.vertices(0.0), facets.triangles()).into_iter().map(|shape| (shape, still)).collect()
+        Shape::Mesh { facets, shell, .. } | Shape::Animated { facets, shell } => {
+            mesh(facets.vertices(0.0), facets.triangles(), *shell).into_iter().map(|shape| (shape, still)).collect()
         }
     };
     let reach = |shape: &SharedShape, place: &Pose| {

@@ -32,6 +32,8 @@ const DAMPING: f64 = 10.0;
 const FASTEST: f64 = 3.0;
 /// Rounds of bounces at most.
 const ROUNDS: usize = 200;
+/// Sweeps over the points of a pair that bounces, at most.
+const SWEEPS: usize = 100;
 
 /// What a pass reads and writes of a body.
 #[derive(Clone, Copy)]
@@ -150,17 +152,13 @@ impl Row {
         }
     }
 
-    /// The same contact of two bodies that have moved: it goes with the smaller one, and both still push at one point, so that no angular momentum
-    /// is lost.
+    /// The same contact of two bodies that have moved.
     fn moved(&mut self, bodies: &[Body], c: &Contact) {
         let pair @ [a, b] = c.pair.map(|i| &bodies[i as usize]);
-        if a.inverse_mass == 0.0 || b.inverse_mass == 0.0 {
-            return;
+        if a.inverse_mass > 0.0 && b.inverse_mass > 0.0 {
+            let arms = meeting(pair, [a.x, b.x], c.arms);
+            self.levers = self.levers.map(|lever| Lever::new(pair, arms, lever.along));
         }
-        let size = |body: &Body| body.inertia.iter().sum::<f64>();
-        let [ra, rb] = c.arms;
-        let arms = if size(a) <= size(b) { [ra, a.x + ra - b.x] } else { [b.x + rb - a.x, rb] };
-        self.levers = self.levers.map(|lever| Lever::new(pair, arms, lever.along));
     }
 
     /// Friction within Coulomb's cone.
@@ -199,57 +197,84 @@ impl Row {
     }
 }
 
-/// Arms of a contact to the middle between its points on both bodies, which are at these places: no angular momentum is lost.
-fn meeting([a, b]: [Vector; 2], arms: [Vector; 2]) -> [Vector; 2] {
-    let at = (a + arms[0] + b + arms[1]) * 0.5;
-    [at - a, at - b]
+/// Arms of a contact of two bodies at other places: it goes with the smaller one, and both still push at one point, so that no angular momentum is
+/// lost.
+fn meeting(pair: [&Body; 2], [a, b]: [Vector; 2], [ra, rb]: [Vector; 2]) -> [Vector; 2] {
+    let [one, two] = pair.map(|body| body.inertia.iter().sum::<f64>());
+    if one <= two { [ra, a + ra - b] } else { [b + rb - a, rb] }
 }
 
-/// Bounces: each contact that closes within the sub-step turns its approach round, one after the other until none approaches.
+/// Bounces: each pair that closes within the sub-step turns its approach round, one pair after the other until none approaches.
 pub fn bounce(bodies: &mut [Body], contacts: &[Contact], pace: &Pace) {
-    let elastic: Vec<&Contact> = contacts.iter().filter(|c| c.restitution > 0.0).collect();
+    let elastic: Vec<&[Contact]> = contacts.chunk_by(|a, b| a.pair == b.pair).filter(|points| points[0].restitution > 0.0).collect();
     for round in 0..ROUNDS {
-        let mut any = false;
-        for c in &elastic {
-            let (a, b) = two(bodies, c.pair);
-            let speed = (b.velocity_at(c.arms[1]) - a.velocity_at(c.arms[0])).dot(c.normal);
-            if speed >= -pace.still || c.gap + speed * pace.h >= 0.0 {
-                continue;
-            }
-            any = true;
-            // The surfaces meet after t, at this speed; gravity has pulled for all of the sub-step.
-            let gap = if round == 0 { c.gap.max(0.0) } else { 0.0 };
-            let pull = |body: &Body| if body.inverse_mass > 0.0 { pace.gravity.dot(c.normal) } else { 0.0 };
-            let rate = if gap > 0.0 { pull(b) - pull(a) } else { 0.0 };
-            let first = speed - rate * pace.h;
-            let closing = if gap > 0.0 { (first * first - 2.0 * rate * gap).max(0.0).sqrt() } else { -speed };
-            let t = if gap > 0.0 { 2.0 * gap / (closing - first) } else { 0.0 };
-            let met = Contact { arms: meeting([a.x + a.v * t, b.x + b.v * t], c.arms), ..(*c).clone() };
-            let before = [a.v, b.v];
-            hit(bodies, &met, closing, pace);
-            // Until then they have moved as before.
-            for (i, before) in c.pair.into_iter().zip(before) {
-                let body = &mut bodies[i as usize];
-                body.x = body.x - (body.v - before) * t;
-            }
-        }
-        if !any {
+        let hits = elastic.iter().map(|points| u32::from(hit(bodies, points, round == 0, pace))).sum::<u32>();
+        if hits == 0 {
             break;
         }
     }
 }
 
-/// The impulse of a bounce at this speed of approach [m/s], with friction.
-fn hit(bodies: &mut [Body], c: &Contact, closing: f64, pace: &Pace) {
-    let mut row = Row::new(bodies, c, pace);
-    let mut pair = c.pair.map(|i| Twist::of(&bodies[i as usize]));
-    let [a, b] = &mut pair;
-    (row.press, row.drag) = ((1.0 + c.restitution) * closing * row.mass, [0.0; 2]);
-    row.levers[0].push(a, b, row.press);
-    row.rub(a, b);
-    for (i, twist) in c.pair.into_iter().zip(pair) {
-        (bodies[i as usize].v, bodies[i as usize].w) = (twist.v, twist.w);
+/// A bounce of a pair at all its points that close within the sub-step; `false` if there are none. In the first round it has its time.
+fn hit(bodies: &mut [Body], points: &[Contact], first: bool, pace: &Pace) -> bool {
+    let index = points[0].pair;
+    let pair = index.map(|i| bodies[i as usize]);
+    let [a, b] = &pair;
+    let pull = |body: &Body, n: Vector| if body.inverse_mass > 0.0 { pace.gravity.dot(n) } else { 0.0 };
+    // Points that close: the time of their meeting, from gap + u t + a t²/2 = 0 with the speed and the gravity of the start.
+    let closing = points.iter().filter_map(|c| {
+        let speed = (b.velocity_at(c.arms[1]) - a.velocity_at(c.arms[0])).dot(c.normal);
+        let gap = if first { c.gap.max(0.0) } else { 0.0 };
+        if speed >= -pace.still || gap + speed * pace.h >= 0.0 {
+            return None;
+        }
+        let rate = pull(b, c.normal) - pull(a, c.normal);
+        let start = speed - rate * pace.h;
+        let root = (start * start - 2.0 * rate * gap).max(0.0).sqrt();
+        Some((c, if gap > 0.0 { 2.0 * gap / (root - start) } else { 0.0 }))
+    });
+    let closing: Vec<(&Contact, f64)> = closing.collect();
+    let Some(t) = closing.iter().map(|(_, t)| *t).min_by(f64::total_cmp) else { return false };
+    let met = closing.iter().map(|(c, _)| {
+        let arms = meeting([a, b], [a.x + a.v * t, b.x + b.v * t], c.arms);
+        Row { press: 0.0, drag: [0.0; 2], ..Row::new(bodies, &Contact { arms, ..(*c).clone() }, pace) }
+    });
+    let mut rows: Vec<Row> = met.collect();
+    let [mut one, mut two] = [Twist::of(a), Twist::of(b)];
+    // Speeds after: gravity has pulled for all of the sub-step, the part after the meeting comes on top of what bounces.
+    let after: Vec<f64> = rows
+        .iter()
+        .zip(&closing)
+        .map(|(row, (c, _))| {
+            let (speed, late) = (row.levers[0].speed(&one, &two), if first { pace.h - t } else { 0.0 });
+            let rate = pull(b, c.normal) - pull(a, c.normal);
+            speed - (1.0 + c.restitution) * (speed - rate * late).min(0.0)
+        })
+        .collect();
+    for _ in 0..SWEEPS {
+        let mut change = 0.0_f64;
+        for (row, after) in rows.iter_mut().zip(&after) {
+            let lever = &row.levers[0];
+            let press = (row.press + row.mass * (after - lever.speed(&one, &two))).max(0.0);
+            change = change.max((press - row.press).abs() / press.max(f64::MIN_POSITIVE));
+            lever.push(&mut one, &mut two, press - row.press);
+            row.press = press;
+            if row.friction[0] > 0.0 {
+                row.rub(&mut one, &mut two);
+            }
+        }
+        if change < 1e-13 {
+            break;
+        }
     }
+    // Until they met, they have moved as before.
+    let t = if first { t } else { 0.0 };
+    for (i, twist) in index.into_iter().zip([one, two]) {
+        let body = &mut bodies[i as usize];
+        body.x = body.x - (twist.v - body.v) * t;
+        (body.v, body.w) = (twist.v, twist.w);
+    }
+    true
 }
 
 /// One sub-step of contacts: speeds in, speeds and the impulses of contacts out; `go` moves bodies between the two sorts of passes.
