@@ -163,6 +163,7 @@ fn the_schema_gives_every_number_a_unit() {
         "Between",
         "kind",
         "Shape.oneOf",
+        "Arrange.oneOf",
         "Source.oneOf",
         "Kill.oneOf",
         "GasSide.oneOf",

@@ -159,6 +159,7 @@ fn colours_are_handed_out_in_turn_and_all_forms_described() {
         Form::Strands,
         Form::Surface,
         Form::Body,
+        Form::Instances,
         Form::Solid,
         Form::Container,
         Form::Ground,
