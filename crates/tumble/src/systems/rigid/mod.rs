@@ -194,7 +194,8 @@ impl Rigid {
 
     /// The first body that is not finite.
     fn lost(&self, t: f64) -> Option<StepError> {
-        let finite = |v: Vector| (v.x + v.y + v.z).is_finite();
+        // As columns have them, too.
+        let finite = |v: Vector| <[f64; 3]>::from(v).iter().all(|c| (*c as Real).is_finite());
         let bad = |body: &Body| match (finite(body.x) && body.q.row().iter().all(|c| c.is_finite()), finite(body.v) && finite(body.w)) {
             (false, _) => Some("position"),
             (_, false) => Some("velocity"),
