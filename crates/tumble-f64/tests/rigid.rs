@@ -283,7 +283,12 @@ fn as_many_balls_leave_a_row_as_come_in() {
 
 #[test]
 fn momentum_and_angular_momentum_stay_where_nothing_else_is() {
-    let mut words = String::from("restitution = 0.4\nshape = { box = { size = [0.3, 0.2, 0.25] } }\nposition = [");
+    [0.0, 0.4].into_iter().for_each(conserved);
+}
+
+/// Twelve boxes that meet, by passes and by bounces.
+fn conserved(restitution: f64) {
+    let mut words = format!("restitution = {restitution}\nshape = {{ box = {{ size = [0.3, 0.2, 0.25] }} }}\nposition = [");
     (0..12).for_each(|k| {
         write!(words, "[{}, {}, {}], ", 0.4 * f64::from(k % 3), 0.37 * f64::from(k / 3 % 2), 0.41 * f64::from(k / 6)).unwrap()
     });
@@ -300,6 +305,17 @@ fn momentum_and_angular_momentum_stay_where_nothing_else_is() {
     assert!((m - l).norm() < 1e-11 * scale, "{l:?} {m:?}");
     // They have met: energy is lost.
     assert!(end.kinetic < 0.9 * start.kinetic, "{} of {} J", end.kinetic, start.kinetic);
+}
+
+#[test]
+fn what_starts_in_a_floor_is_pushed_out_without_a_launch() {
+    let words = "shape = { box = { size = [0.4, 0.4, 0.4] } }\nposition = [[0, 0, 0.15]]";
+    let mut sim = scene(NONE, 5, &(body("box", words) + &floor(0.5, 0.0)));
+    step(&mut sim);
+    assert!(column(&sim, "box", "position")[0].z > 0.151);
+    run(&mut sim, 200);
+    let (z, v) = (column(&sim, "box", "position")[0].z, column(&sim, "box", "velocity")[0]);
+    assert!((z - 0.2).abs() < 1e-3 && v.norm() < 1e-3, "{z} m, {v:?} m/s");
 }
 
 #[test]

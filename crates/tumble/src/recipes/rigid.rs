@@ -4,7 +4,6 @@ use crate::geometry::{Friction, Vector, surface};
 use crate::math::Quat;
 use crate::math::rotation::from_degrees;
 use crate::systems::rigid::{Body, Hull, pose};
-use parry3d_f64::mass_properties::MassProperties;
 use parry3d_f64::math::{Pose, Vector as V};
 use parry3d_f64::shape::SharedShape;
 use tumble_interface::Mesh;
@@ -81,8 +80,7 @@ pub fn bodies(words: &Words, file: Option<&Mesh>) -> Result<Made, Wrong> {
     if let Some(resting) = words.friction_static.filter(|resting| *resting < words.friction) {
         return wrong(".friction_static", format!("{resting}, expected >= {}, the friction of what slides", words.friction));
     }
-    let one = shape.mass_properties(1.0);
-    let own = MassProperties { ..one }.transform_by(&place);
+    let own = shape.mass_properties(1.0).transform_by(&place);
     let volume = own.mass();
     let mass = words.mass.unwrap_or_else(|| words.density.unwrap_or(1000.0) * volume);
     // Principal axes in those of the words.
@@ -95,7 +93,8 @@ pub fn bodies(words: &Words, file: Option<&Mesh>) -> Result<Made, Wrong> {
         None => (axes, [moments.x, moments.y, moments.z]),
     };
     if !(mass > 0.0 && mass.is_finite() && inertia.iter().all(|i| *i > 0.0 && i.is_finite())) {
-        return wrong(".shape", format!("a body of {mass:e} kg with moments of inertia {inertia:?} kg m²; expected a volume"));
+        let key = if words.mass.is_some() { ".mass" } else { ".shape" };
+        return wrong(key, format!("a body of {mass:e} kg with moments of inertia {inertia:?} kg m²; expected a volume"));
     }
     if let Some([a, b, c]) = words.inertia.filter(|[a, b, c]| *a > b + c || *b > c + a || *c > a + b) {
         return wrong(".inertia", format!("[{a}, {b}, {c}] kg m²: no body has a moment larger than the sum of the others"));

@@ -71,9 +71,9 @@ pub fn hulls(solid: &Collider) -> Vec<Hull> {
 
 /// A solid at a time [s]: its axes are at the origin of its pose, its twist is that of the point there.
 pub fn body(solid: &Collider, t: f64, h: f64) -> Body {
-    let (place, _) = solid.motion.as_ref().map_or((Place::default(), Twist::default()), |motion| motion.at(t));
-    // The mean over the sub-step.
-    let (_, twist) = solid.motion.as_ref().map_or((Place::default(), Twist::default()), |motion| motion.at(t + 0.5 * h));
+    let at = |t: f64| solid.motion.as_ref().map_or((Place::default(), Twist::default()), |motion| motion.at(t));
+    // The twist is the mean over the sub-step.
+    let ((place, _), (_, twist)) = (at(t), at(t + 0.5 * h));
     Body {
         x: place.shift,
         q: place.turn,

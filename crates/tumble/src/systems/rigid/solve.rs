@@ -20,7 +20,7 @@ pub struct Pace {
     pub iterations: u32,
     /// Bodies that come closer more slowly do not bounce [m/s].
     pub still: f64,
-    /// What moves a body that moves, but for contact [m/s²].
+    /// Gravity [m/s²].
     pub gravity: Vector,
 }
 
@@ -103,9 +103,9 @@ struct Row {
     belt: [f64; 2],
     /// Coulomb's coefficients, of what rests and of what slides.
     friction: [f64; 2],
-    /// Speed of approach that a soft pass leaves, negative where it parts; that of a rigid one [m/s].
+    /// Speed of approach that is left by a soft pass, negative to part what overlaps, and by a rigid pass [m/s].
     bias: [f64; 2],
-    /// Of a soft pass: parts of the mass and of the impulse so far that count.
+    /// Factors of a soft pass on the effective mass and on the accumulated impulse.
     soft: [f64; 2],
     /// Impulses along the three directions [N s].
     press: f64,
