@@ -176,6 +176,11 @@ def sprung(end: list[float], rest_length: float, **words: Any) -> Tree:
     return {"particles": [{"name": "p", "position": [[0, 0, 1], end], "spring": [spring]}]}
 
 
+def hooked(x: float) -> Tree:
+    body = {"name": "b", "shape": {"sphere": {"radius": 0.1}}}
+    return {"body": [body], "joint": [{"name": "hook", "between": ["b"], "at": [x, 0, 0], "kind": {"ball": {}}}]}
+
+
 def together(x: float, **words: Any) -> Tree:
     scene = anchored(1.0)
     scene["particles"][1]["position"] = [[x, 0, 0]]
@@ -288,6 +293,7 @@ VAIN: list[tuple[str, str, Tree, Tree]] = [
         {"particles": [POINT], "collider": [ball([0, 9e5, 0])]},
         {"particles": [POINT], "collider": [ball([0, 0, -9])]},
     ),
+    ("far-joint", 'joint "hook"', hooked(40.0), hooked(0.4)),
     ("coincident", 'anchor "tie"', together(0.0, rest_length=1), together(0.5, rest_length=1)),
     ("coincident", '"p"', sprung([0, 0, 1], 0.3), sprung([0, 0, 1.1], 0.3)),
     ("coincident", '"p"', sprung([0, 0, 1], 0.3, hardening=2), sprung([0, 1, 1], 0.3, hardening=2)),

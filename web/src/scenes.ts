@@ -37,6 +37,7 @@ const ROWS: Record<string, string> = {
   cloth: "Cloth and hair",
   drape: "Draped sheets",
   rigid: "Rigid bodies",
+  coupled: "Everything with everything",
   springs: "Springs",
   structures: "Structures",
   integrators: "Integrators",

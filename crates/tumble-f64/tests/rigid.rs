@@ -463,3 +463,21 @@ fn all_mistakes_of_bodies_are_told_at_once() {
     ];
     assert_eq!(paths, expected, "{error}");
 }
+
+#[test]
+fn words_that_say_nothing_are_refused_and_overlaps_are_named() {
+    let ball = "shape = { sphere = { radius = 0.1 } }\nposition = [[0, 0, 1], [0, 0, 0.07]]";
+    for words in [
+        "clamp = 1.1",
+        "self_contact = { thickness = 0.01 }",
+        "solver = { newton_tolerance = 1e-3 }",
+        "position_based = { iterations = 3 }",
+    ] {
+        let text = format!("version = 1\n[[system]]\nmethod = \"rigid\"\n{words}\n{}", body("balls", ball));
+        let told = Simulation::new(Scene::from_toml(&text).unwrap(), Default::default()).map(|_| ()).unwrap_err().to_string();
+        assert!(told.contains("says nothing to rigid bodies"), "{words}: {told}");
+    }
+    let sim = scene(DOWN, 5, &(body("balls", ball) + &floor(0.5, 0.0)));
+    let told: Vec<String> = sim.warnings().iter().map(ToString::to_string).collect();
+    assert!(told.iter().any(|line| line.contains("body \"balls\": number 1 starts 0.03 m deep in \"floor\"")), "{told:?}");
+}

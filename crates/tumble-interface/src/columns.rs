@@ -98,7 +98,8 @@ pub const COLUMNS: &[Described] = &[
     Described {
         name: "force",
         unit: "N",
-        doc: "Force of gases, by their last pressure, and of liquids of particles, the mean over the last interval, on each solid in them.",
+        doc: "Force of gases, by their last pressure, and of liquids of particles, the mean over the last interval, on each solid in them; \
+              of joints, on the first body, and on the second or the world.",
         places: &[Place::Object, Place::Mass],
         ..VECTOR
     },

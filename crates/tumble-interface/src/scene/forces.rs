@@ -487,14 +487,18 @@ pub enum Field {
     },
 }
 
-/// A spring between two masses of any objects, possibly in different systems.
+/// A spring between two masses of any objects, possibly in different systems, or between a mass and a rigid body.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Anchor {
     /// Name in reports.
     pub name: String,
-    /// The two masses, as `"object index"`.
+    /// The two masses, as `"object index"`; one of them may be a rigid body.
     pub between: [String; 2],
+    /// Where it holds the rigid body, a place in the world at the start. Default: its centre of mass.
+    #[serde(default)]
+    #[schemars(extend("x-unit" = "m"))]
+    pub at: Option<[f64; 3]>,
     /// Spring constant; may change in time.
     #[schemars(extend("x-unit" = "N/m"))]
     pub stiffness: Animated,

@@ -11,6 +11,7 @@ mod gas;
 mod grids;
 mod hair;
 mod heat;
+mod joints;
 mod links;
 mod objects;
 mod output;
@@ -34,6 +35,7 @@ pub use gas::{
 pub use grids::GridBox;
 pub use hair::{Clump, Curl, Guides, Hair, HairCollisions};
 pub use heat::{Heat, HeatRegion, HeatScheme, HeatSide, HeatSides, HeatSource};
+pub use joints::{Joint, JointKind, JointMotor};
 pub use links::{Diagonals, Follow, Link, LinkSettings, Links, Load, Pin, Place, PointMass, Region, Within};
 pub use objects::{KINDS, Object};
 pub use output::{Camera, Expect, Look, Output, Probe};
@@ -116,6 +118,9 @@ pub struct Scene {
     /// Rigid bodies, moved by systems of method `rigid`.
     #[serde(default)]
     pub body: Vec<Body>,
+    /// What holds rigid bodies to each other and to the world.
+    #[serde(default)]
+    pub joint: Vec<Joint>,
     /// Bodies that conduct heat.
     #[serde(default)]
     pub heat: Vec<Heat>,

@@ -66,6 +66,11 @@ impl Default for BodyState {
 }
 
 impl BodyState {
+    /// Where a point of it is, from the centre of mass in its own axes [m].
+    pub fn place(&self, own: Vector) -> Vector {
+        if own == Vector::default() { self.position } else { self.position + self.orientation.turn(own) }
+    }
+
     /// Velocity of its point at x [m/s].
     pub fn velocity_at(&self, x: Vector) -> Vector {
         self.velocity + self.spin.cross(x - self.position)

@@ -28,7 +28,7 @@ pub fn from_axes(x: Vec3<f64>, z: Vec3<f64>) -> Quat<f64> {
     let before = upright.turn(Vec3 { x: 1.0, y: 0.0, z: 0.0 });
     // About z, by its half angle.
     let half = ((1.0 + before.dot(x)) / 2.0).max(0.0).sqrt();
-    let about = if half < 1e-8 { Quat { v: z, w: 0.0 } } else { Quat { v: z * (z.dot(before.cross(x)) / (2.0 * half)), w: half } };
+    let about = if half < 1e-7 { Quat { v: z, w: 0.0 } } else { Quat { v: z * (z.dot(before.cross(x)) / (2.0 * half)), w: half } };
     (about * upright).normalized()
 }
 

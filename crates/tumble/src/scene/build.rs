@@ -105,7 +105,7 @@ pub fn build(scene: &Scene, assets: &Assets) -> Result<Built, SceneError> {
     }
     Reader::new(scene, &mut builder.issues).flow("field", &scene.field);
     builder.issues.extend(camera::check(scene));
-    builder.anchors = Arc::new(coupling::fasten(builder.scene, &mut builder.masses, &mut builder.issues));
+    builder.anchors = Arc::new(coupling::fasten(builder.scene, builder.assets, &mut builder.masses, &mut builder.issues));
     builder.warnings.extend(builder.anchors.iter().filter_map(|link| coincident::anchor(&builder.masses, link)));
     builder.sound = builder.issues.is_empty();
     let systems: Vec<Option<Box<dyn System>>> =

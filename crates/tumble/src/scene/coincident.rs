@@ -68,7 +68,8 @@ pub fn springs(parts: &Parts) -> Vec<Warning> {
 /// An anchor between systems with a rest length whose ends start at one place.
 pub fn anchor(masses: &[Parts], anchor: &Link) -> Option<Warning> {
     let [(s, a), (t, b)] = anchor.ends;
-    let met = s != t && anchor.rest_length.value(0.0) > 0.0 && place(&masses[s], a as usize) == place(&masses[t], b as usize);
+    let one_place = if anchor.on_body { anchor.distance == 0.0 } else { place(&masses[s], a as usize) == place(&masses[t], b as usize) };
+    let met = s != t && anchor.rest_length.value(0.0) > 0.0 && one_place;
     let message =
         "its ends start at one place: it has no direction and pushes nothing, for ever; move one of them, or set rest_length to 0";
     met.then(|| Warning::new(Code::Coincident, format!("anchor \"{}\"", anchor.name), message))

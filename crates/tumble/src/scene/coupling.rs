@@ -1,10 +1,11 @@
-//! What joins systems: anchors between masses.
+//! What joins systems: anchors between masses, and between a mass and a rigid body.
 
 use super::laws::Reader;
-use super::methods::place;
+use super::methods::{body_of, place};
 use crate::elements::DrivenSpring;
 use crate::geometry::Vector;
 use crate::math::Signal;
+use crate::scene::Assets;
 use crate::systems::dynamics::{Parts, SpringPart};
 use tumble_interface::Issue;
 use tumble_interface::check::suggestion;
@@ -14,6 +15,12 @@ use tumble_interface::scene::{Anchor, Scene};
 pub struct Link {
     pub name: String,
     pub ends: [(usize, u32); 2],
+    /// Whether the second end is a rigid body.
+    pub on_body: bool,
+    /// Where on it, from its centre of mass in its axes [m].
+    pub at: Vector,
+    /// From one end to the other at the start [m].
+    pub distance: f64,
     pub stiffness: Signal,
     pub damping: f64,
     pub rest_length: Signal,
@@ -26,8 +33,8 @@ pub struct Link {
 }
 
 /// Finds the ends of all anchors; within a system they are springs of its own.
-pub fn fasten(scene: &Scene, masses: &mut [Parts], issues: &mut Vec<Issue>) -> Vec<Link> {
-    let anchors: Vec<Link> = scene.anchor.iter().filter_map(|anchor| link(scene, anchor, masses, issues)).collect();
+pub fn fasten(scene: &Scene, assets: &Assets, masses: &mut [Parts], issues: &mut Vec<Issue>) -> Vec<Link> {
+    let anchors: Vec<Link> = scene.anchor.iter().filter_map(|anchor| link(scene, assets, anchor, masses, issues)).collect();
     for anchor in &anchors {
         let [(s, a), (t, b)] = anchor.ends;
         if s == t && !(anchor.stiffness.is_constant() && anchor.rest_length.is_constant()) {
@@ -55,13 +62,26 @@ pub fn named(words: &str) -> Option<(&str, usize)> {
     words.rsplit_once(' ').and_then(|(name, index)| Some((name.trim(), index.parse().ok()?)))
 }
 
+/// An end of an anchor.
+struct End {
+    system: usize,
+    row: u32,
+    /// Where in the world [m].
+    place: Vector,
+    /// How much it yields [1/kg].
+    inverse_mass: f64,
+    /// Where on a rigid body, from its centre of mass in its axes, if it is one [m].
+    on: Option<Vector>,
+}
+
 /// The two ends of an anchor.
-fn link(scene: &Scene, anchor: &Anchor, parts: &[Parts], issues: &mut Vec<Issue>) -> Option<Link> {
-    let mut end = |k: usize| -> Option<(usize, u32, Vector, f64)> {
+fn link(scene: &Scene, assets: &Assets, anchor: &Anchor, parts: &[Parts], issues: &mut Vec<Issue>) -> Option<Link> {
+    let mut end = |k: usize| -> Option<End> {
         let path = format!("anchor \"{}\".between[{k}]", anchor.name);
         let words = &anchor.between[k];
         let mut wrong = |message: String| issues.push(Issue::new(path.clone(), message));
-        let Some((name, index)) = named(words) else {
+        let alone = || scene.body.iter().any(|thing| thing.name == *words).then_some((words.as_str(), 0));
+        let Some((name, index)) = named(words).or_else(alone) else {
             wrong(format!("\"{words}\", expected an object and an index: \"flag 3\""));
             return None;
         };
@@ -71,6 +91,18 @@ fn link(scene: &Scene, anchor: &Anchor, parts: &[Parts], issues: &mut Vec<Issue>
             return None;
         };
         let s = place(&scene.system, object.kind, object.system)?;
+        if object.kind == "body" {
+            let (row, count, body) = body_of(scene, assets, name, index)?;
+            let Some(body) = body else {
+                wrong(format!("there is no body {index} in \"{name}\"; the last one is {}", count.saturating_sub(1)));
+                return None;
+            };
+            let at = anchor.at.map_or(body.x, Vector::from);
+            let arm = at - body.x;
+            let least = body.inertia.into_iter().fold(f64::INFINITY, f64::min);
+            let inverse_mass = body.inverse_mass + arm.norm_sq() / least;
+            return Some(End { system: s, row, place: at, inverse_mass, on: Some(body.q.conj().turn(arm)) });
+        }
         let Some(range) = parts[s].ranges().find(|(n, _)| *n == name).map(|(_, r)| r) else {
             wrong(format!("\"{name}\" has no masses to pull"));
             return None;
@@ -84,22 +116,38 @@ fn link(scene: &Scene, anchor: &Anchor, parts: &[Parts], issues: &mut Vec<Issue>
             return None;
         }
         let i = (range.start + index) as u32;
-        Some((s, i, parts[s].position(i), parts[s].inverse_mass(i)))
+        Some(End { system: s, row: i, place: parts[s].position(i), inverse_mass: parts[s].inverse_mass(i), on: None })
     };
     let (a, b) = (end(0), end(1));
     let (a, b) = (a?, b?);
+    // The system of masses owns the spring.
+    let (a, b) = if a.on.is_some() { (b, a) } else { (a, b) };
+    if a.on.is_some() {
+        let message = "both ends are rigid bodies; take a [[joint]] of kind spring";
+        issues.push(Issue::new(format!("anchor \"{}\".between", anchor.name), message));
+        return None;
+    }
+    if b.on.is_none() && anchor.at.is_some() {
+        let message = "given without a rigid body in `between`; leave it out";
+        issues.push(Issue::new(format!("anchor \"{}\".at", anchor.name), message));
+        return None;
+    }
+    let distance = (a.place - b.place).norm();
     let path = |key: &str| format!("anchor \"{}\".{key}", anchor.name);
     let mut reader = Reader::new(scene, issues);
     let stiffness = reader.signal(&path("stiffness"), &anchor.stiffness, 0.0);
     let rest_length = anchor.rest_length.as_ref().map(|words| reader.signal(&path("rest_length"), words, 0.0));
     Some(Link {
         name: anchor.name.clone(),
-        ends: [(a.0, a.1), (b.0, b.1)],
+        ends: [(a.system, a.row), (b.system, b.row)],
+        on_body: b.on.is_some(),
+        at: b.on.unwrap_or_default(),
+        distance,
         stiffest: reader.largest(|t| stiffness.value(t), stiffness.key_times()),
-        reach: rest_length.iter().map(|rest| reader.largest(|t| rest.value(t), rest.key_times())).fold((a.2 - b.2).norm(), f64::max),
+        reach: rest_length.iter().map(|rest| reader.largest(|t| rest.value(t), rest.key_times())).fold(distance, f64::max),
         stiffness,
         damping: anchor.damping,
-        rest_length: rest_length.unwrap_or_else(|| (a.2 - b.2).norm().into()),
-        inverse_mass: a.3 + b.3,
+        rest_length: rest_length.unwrap_or_else(|| distance.into()),
+        inverse_mass: a.inverse_mass + b.inverse_mass,
     })
 }

@@ -346,6 +346,7 @@ fn hang(system: &mut Dynamics, index: usize, anchor: &Link, builder: &mut Builde
     system.add_anchor(Anchor {
         row: a as usize,
         other,
+        at: anchor.at,
         stiffness: anchor.stiffness.clone(),
         damping: anchor.damping,
         rest_length: anchor.rest_length.clone(),

@@ -8,6 +8,8 @@ mod rigid;
 mod tracers;
 mod vicsek;
 
+pub use rigid::body_of;
+
 use super::Assets;
 use super::build::Builder;
 use super::laws::flat;

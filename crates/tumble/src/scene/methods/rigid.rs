@@ -4,14 +4,17 @@ use super::{MethodRules, is_in};
 use crate::recipes;
 use crate::scene::Assets;
 use crate::scene::build::Builder;
+use crate::scene::coupling::named;
+use crate::scene::laws::Reader;
 use crate::scene::plausible::odd_density;
 use crate::system::System;
-use crate::systems::rigid::{Bodies, Object, Rigid, Settings, refusal};
+use crate::systems::rigid::{Bodies, Body as State, Ends, Joint, Object, Rigid, Settings, refusal};
+use std::ops::Range;
 use tumble_interface::check::short;
-use tumble_interface::looks::{Colors, FEW, Form, Look};
+use tumble_interface::looks::{Colors, FEW, Form, Look, SOLID};
 use tumble_interface::scene::{Body, BodyShape, Integrator, Method, Scene, System as Plan};
 use tumble_interface::warning::Code;
-use tumble_interface::{Issue, Warning};
+use tumble_interface::{Issue, Mesh, Warning};
 
 /// Bytes for a body: its state, contacts with some ten neighbours, and a snapshot.
 const BODY: f64 = 12_000.0;
@@ -28,7 +31,7 @@ impl MethodRules for Rules {
     }
 
     fn kinds(&self) -> &'static [&'static str] {
-        &["body"]
+        &["body", "joint"]
     }
 
     fn massless(&self) -> Option<&'static str> {
@@ -50,6 +53,39 @@ impl MethodRules for Rules {
                 issues.push(Issue::new(format!("system \"{}\".rigid", plan.name), message));
             }
         }
+        for plan in scene.system.iter().filter(|plan| plan.method == Method::Rigid) {
+            let plain = Plan::default();
+            let given = [
+                ("clamp", plan.clamp != plain.clamp),
+                ("adaptive", plan.adaptive != plain.adaptive),
+                ("solver", plan.solver != plain.solver),
+                ("position_based", plan.position_based != plain.position_based),
+                ("self_contact", plan.self_contact != plain.self_contact),
+            ];
+            for (key, _) in given.into_iter().filter(|(_, given)| *given) {
+                let message = "says nothing to rigid bodies; leave it out, `substeps`, `step` and `rigid` are theirs";
+                issues.push(Issue::new(format!("system \"{}\".{key}", plan.name), message));
+            }
+        }
+        for joint in &scene.joint {
+            let object = |words: &String| {
+                let name = named(words).map_or(words.as_str(), |(name, _)| name);
+                scene.body.iter().find(|thing| thing.name == *words || thing.name == name)
+            };
+            let systems: Vec<&str> = joint.between.iter().filter_map(object).filter_map(|thing| thing.system.as_deref()).collect();
+            let (path, own) = (format!("joint \"{}\"", joint.name), joint.system.as_deref());
+            match systems[..] {
+                [a, b] if a != b => {
+                    let message = format!("its bodies are moved by systems \"{a}\" and \"{b}\"; put both into one");
+                    issues.push(Issue::new(format!("{path}.between"), message));
+                }
+                [other, ..] if own.is_some_and(|own| own != other) => {
+                    let message = format!("its bodies are moved by system \"{other}\"; set system = \"{other}\"");
+                    issues.push(Issue::new(format!("{path}.system"), message));
+                }
+                _ => {}
+            }
+        }
         if scene.dimension == 2 && !scene.body.is_empty() {
             issues.push(Issue::new("dimension", "2, but rigid bodies move in space; set dimension = 3"));
         }
@@ -58,7 +94,16 @@ impl MethodRules for Rules {
     fn hints(&self, scene: &Scene) -> Vec<Warning> {
         let odd = |thing: &Body| odd_density(format!("body \"{}\".density", thing.name), thing.density?, 0.0);
         let mut warnings: Vec<Warning> = scene.body.iter().filter_map(odd).collect();
-        let kinds: Vec<&str> = scene.objects().iter().map(|o| o.kind).filter(|kind| *kind != "body").collect();
+        // What an anchor ties to a body is meant to be there.
+        let ends = |words: &[String; 2]| words.each_ref().map(|end| named(end).map_or(end.clone(), |(name, _)| name.to_string()));
+        let tied =
+            |name: &str| {
+                scene.anchor.iter().map(|anchor| ends(&anchor.between)).any(|ends| {
+                    ends.iter().any(|end| end == name) && ends.iter().any(|end| scene.body.iter().any(|thing| thing.name == *end))
+                })
+            };
+        let others = scene.objects().into_iter().filter(|o| !matches!(o.kind, "body" | "joint") && !tied(o.name));
+        let kinds: Vec<&str> = others.map(|o| o.kind).collect();
         if let (Some(other), false) = (kinds.first(), scene.body.is_empty()) {
             let message =
                 format!("rigid bodies meet each other and colliders, but not yet what [[{other}]] consists of, nor does that meet them");
@@ -75,22 +120,24 @@ impl MethodRules for Rules {
     fn looks(&self, scene: &Scene, plan: &Plan, colors: &mut Colors) -> Vec<Look> {
         let own = scene.body.iter().filter(|t| is_in(&t.system, plan));
         let look = |t: &Body| Look { few: count(t) < FEW, ..Look::new(&t.name, Form::Instances, colors.pick(t.color)) };
-        own.map(look).collect()
+        let joints = scene.joint.iter().filter(|t| is_in(&t.system, plan));
+        let held = |t: &tumble_interface::scene::Joint| Look { few: true, ..Look::new(&t.name, Form::Points, t.color.unwrap_or(SOLID)) };
+        own.map(look).chain(joints.map(held)).collect()
     }
 
     fn memory(&self, scene: &Scene, _assets: &Assets) -> f64 {
-        scene.body.iter().map(|thing| BODY * count(thing)).sum()
+        let of = |words: &tumble_interface::scene::Joint| {
+            let chain = scene.body.iter().find(|thing| words.chain && words.between.first() == Some(&thing.name));
+            chain.map_or(1.0, count)
+        };
+        BODY * (scene.body.iter().map(count).sum::<f64>() + scene.joint.iter().map(of).sum::<f64>())
     }
 
     fn build(&self, builder: &mut Builder<'_>, index: usize) -> Option<Box<dyn System>> {
         let (scene, plan) = (builder.scene, builder.plan(index));
         let (mut objects, mut bodies) = (Vec::new(), Bodies::default());
         for thing in scene.body.iter().filter(|t| is_in(&t.system, plan)) {
-            let file = match &thing.shape {
-                BodyShape::Mesh(file) => builder.assets.get(&file.path).map(|mesh| recipes::placed(mesh, file)),
-                _ => None,
-            };
-            match recipes::bodies(thing, file.as_ref()) {
+            match recipes::bodies(thing, file_of(thing, builder.assets).as_ref()) {
                 Ok(made) => {
                     let first = bodies.rows.len();
                     bodies.hull.resize(first + made.bodies.len(), bodies.hulls.len() as u32);
@@ -114,7 +161,8 @@ impl MethodRules for Rules {
             iterations: plan.rigid.clone().unwrap_or_default().iterations,
             gravity: builder.gravity.clone(),
         };
-        let mut system = Rigid::new(settings, objects, bodies);
+        let (ends, joints) = joined(builder, plan, &objects, &bodies);
+        let mut system = Rigid::new(settings, objects, bodies, ends, joints);
         if builder.issues.is_empty() {
             system.meet(&builder.colliders);
             builder.warnings.extend(deepest(&mut system));
@@ -123,11 +171,57 @@ impl MethodRules for Rules {
     }
 }
 
+/// The row of a body in its system, how many its object has, and the body, unless there is none of that index or its words are wrong.
+pub fn body_of(scene: &Scene, assets: &Assets, name: &str, index: usize) -> Option<(u32, usize, Option<State>)> {
+    let thing = scene.body.iter().find(|thing| thing.name == name)?;
+    let before = scene.body.iter().take_while(|other| other.name != name).filter(|other| other.system == thing.system);
+    let first = before.map(count).sum::<f64>() as usize;
+    let made = recipes::bodies(thing, file_of(thing, assets).as_ref()).ok()?;
+    Some(((first + index) as u32, made.bodies.len(), made.bodies.get(index).copied()))
+}
+
+/// The mesh of a body, if it has one.
+fn file_of(thing: &Body, assets: &Assets) -> Option<Mesh> {
+    match &thing.shape {
+        BodyShape::Mesh(file) => assets.get(&file.path).map(|mesh| recipes::placed(mesh, file)),
+        _ => None,
+    }
+}
+
+/// The joints of a system.
+fn joined(builder: &mut Builder<'_>, plan: &Plan, objects: &[Object], bodies: &Bodies) -> (Vec<Ends>, Vec<Joint>) {
+    let named: Vec<(&str, Range<usize>)> = objects.iter().map(|object| (object.name.as_str(), object.rows.clone())).collect();
+    let (mut ends, mut all) = (Vec::new(), Vec::new());
+    for words in builder.scene.joint.iter().filter(|t| is_in(&t.system, plan)) {
+        let path = format!("joint \"{}\"", words.name);
+        let mut reader = Reader::new(builder.scene, &mut builder.issues);
+        let made =
+            recipes::joints(words, &named, bodies, &mut |key, value, range| reader.signal_within(&format!("{path}{key}"), value, range));
+        match made {
+            Ok(made) => {
+                if let Some([away, reach]) = made.far {
+                    let message = format!(
+                        "{} m from the centre of a body that reaches {} m; check `at` and `to`, which are places in the world",
+                        short(away),
+                        short(reach)
+                    );
+                    builder.warnings.push(Warning::new(Code::FarJoint, path, message));
+                }
+                ends.push(Ends { name: words.name.clone(), joints: all.len()..all.len() + made.joints.len() });
+                all.extend(made.joints);
+            }
+            Err((key, message)) => builder.issues.push(Issue::new(format!("{path}{key}"), message)),
+        }
+    }
+    (ends, all)
+}
+
 /// The two surfaces that overlap most at the start.
 fn deepest(system: &mut Rigid) -> Option<Warning> {
-    let (a, b, depth) = system.overlap()?;
+    let (a, row, b, depth) = system.overlap()?;
+    let which = row.map_or(String::new(), |row| format!("number {row} "));
     let message = format!(
-        "starts {} m deep in \"{b}\"; it is pushed out at no more than 3 m/s. Move one of them, unless that is meant",
+        "{which}starts {} m deep in \"{b}\"; it is pushed out at no more than 3 m/s. Move one of them, unless that is meant",
         short(depth)
     );
     Some(Warning::new(Code::StartsInside, format!("body \"{a}\""), message))

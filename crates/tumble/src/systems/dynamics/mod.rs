@@ -81,6 +81,8 @@ pub struct Anchor {
     pub row: usize,
     /// The row of the other.
     pub other: BodyRow,
+    /// Where on it, from its centre of mass in its axes [m].
+    pub at: Vector,
     /// Spring constant [N/m].
     pub stiffness: Signal,
     /// Damping along the spring [N s/m].
@@ -179,15 +181,17 @@ impl Dynamics {
         for anchor in &self.anchors {
             let (other, state) = (exchange.state_at(anchor.other, t), &self.core.state);
             let (x, v) = (xyz64(state.x[anchor.row]), xyz64(state.v[anchor.row]));
-            let d = other.position - x;
+            let point = other.place(anchor.at);
+            let d = point - x;
             let length = d.norm();
             let n = d.normalized();
-            let pull = anchor.stiffness.value(t) * (length - anchor.rest_length.value(t)) + anchor.damping * n.dot(other.velocity - v);
+            let pull =
+                anchor.stiffness.value(t) * (length - anchor.rest_length.value(t)) + anchor.damping * n.dot(other.velocity_at(point) - v);
             let impulse = n * (h * pull);
             if exchange.repeats() {
-                exchange.post_steady(anchor.other, other.position, -impulse);
+                exchange.post_steady(anchor.other, point, -impulse);
             } else {
-                exchange.post(anchor.other, other.position, -impulse);
+                exchange.post(anchor.other, point, -impulse);
             }
             self.core.kick(anchor.row, impulse);
         }
@@ -355,7 +359,7 @@ impl System for Dynamics {
 
     fn energy_between(&self, t: f64, exchange: &Exchange) -> f64 {
         let of = |anchor: &Anchor| {
-            let length = (exchange.state_at(anchor.other, t).position - xyz64(self.core.state.x[anchor.row])).norm();
+            let length = (exchange.state_at(anchor.other, t).place(anchor.at) - xyz64(self.core.state.x[anchor.row])).norm();
             0.5 * anchor.stiffness.value(t) * (length - anchor.rest_length.value(t)).powi(2)
         };
         self.anchors.iter().map(of).sum()

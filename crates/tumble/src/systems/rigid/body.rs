@@ -28,6 +28,13 @@ pub struct Body {
 }
 
 impl Body {
+    /// What nothing moves, at the origin.
+    pub const WORLD: Self = {
+        let zero = Vector { x: 0.0, y: 0.0, z: 0.0 };
+        let q = Quat { v: zero, w: 1.0 };
+        Self { x: zero, q, v: zero, w: zero, inverse_mass: 0.0, inertia: [f64::INFINITY; 3], inverse_inertia: [0.0; 6] }
+    };
+
     /// Angular momentum about the centre of mass [N m s].
     pub fn spin(&self) -> Vector {
         let w = self.q.conj().turn(self.w);

@@ -159,15 +159,16 @@ fn touch(bodies: &Bodies, pair: [u32; 2], within: f64, out: &mut Vec<Contact>) {
     }
 }
 
-/// All contacts that may close within h [s], in the order of their pairs.
-pub fn contacts(bodies: &Bodies, h: f64) -> Vec<Contact> {
+/// All contacts that may close within h [s], in the order of their pairs, but for pairs that stay apart.
+pub fn contacts(bodies: &Bodies, h: f64, apart: &[[u32; 2]]) -> Vec<Contact> {
     let margin = |i: usize| {
         let (body, hull) = (&bodies.rows[i], bodies.hull(i));
         let close = if body.inverse_mass > 0.0 { CLOSE * hull.reach } else { 0.0 };
         1.5 * h * (body.v.norm() + body.w.norm() * hull.reach) + hull.thickness + close
     };
     let margins: Vec<f64> = (0..bodies.rows.len()).map(margin).collect();
-    let pairs = pairs(bodies, &margins);
+    let mut pairs = pairs(bodies, &margins);
+    pairs.retain(|pair| apart.binary_search(pair).is_err());
     let found = fold(pairs.len(), |range| {
         let mut found = Vec::new();
         for pair in &pairs[range] {

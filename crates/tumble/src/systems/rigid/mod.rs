@@ -2,25 +2,30 @@
 //!
 //!   m v' = m g + sum of p,   L' = sum of r × p,   x' = v,   q' = (0, ω) q / 2                                            (rigid.1)
 //!
-//! Each sub-step: gravity; contacts that may close; bounces; soft passes; bodies move and turn; rigid passes. Bodies are in double precision in
-//! both engines, and contacts in the order of their pairs, so that a far body changes no bit.
+//! Each sub-step: gravity; contacts that may close; bounces; soft passes; bodies move and turn; rigid passes. Of bodies that joints hold and no
+//! contact, half of gravity acts before they move, half after (see `joint`). Bodies are in double precision in both engines, and contacts in the
+//! order of their pairs, so that a far body changes no bit.
 
 mod body;
 mod contact;
+mod direct;
+mod joint;
 mod solids;
 mod solve;
 
 pub use body::Body;
 pub use contact::{Bodies, Hull, pose};
+pub use joint::{Drive, Joint, Kind, Motor, WORLD};
 pub use solids::refusal;
 
-use crate::exchange::Turn;
+use crate::exchange::{BodyState, Push, Turn};
 use crate::forces::Gravity;
 use crate::geometry::{Collider, Vector};
 use crate::integrators::equal_steps;
 use crate::math::{Quat, Real};
 use crate::system::{Archive, Part, System};
 use contact::Contact;
+use joint::Joints;
 use solve::Pace;
 use std::ops::Range;
 use std::sync::Arc;
@@ -35,6 +40,8 @@ const OVERLAP: f64 = 1e-3;
 /// Numbers of a body, and of a contact, in a snapshot.
 const BODY: usize = 13;
 const CONTACT: usize = 11;
+/// Numbers of a joint in a snapshot.
+const JOINT: usize = 7;
 
 /// Bodies of one shape.
 pub struct Object {
@@ -44,6 +51,14 @@ pub struct Object {
     pub rows: Range<usize>,
     /// Their surface for pictures, in their own axes.
     pub mesh: Mesh,
+}
+
+/// Joints of one kind.
+pub struct Ends {
+    /// Their name.
+    pub name: String,
+    /// Which they are.
+    pub joints: Range<usize>,
 }
 
 /// How the system goes on.
@@ -65,25 +80,32 @@ pub struct Rigid {
     settings: Settings,
     objects: Vec<Object>,
     bodies: Bodies,
+    ends: Vec<Ends>,
+    joints: Joints,
     contacts: Vec<Contact>,
+    /// Of constant forces, over this interval.
+    steady: Vec<Push>,
     /// The solids of others, and of each body beyond those that move which one it is.
     solids: Arc<Vec<Collider>>,
     of: Vec<usize>,
 }
 
 impl Rigid {
-    /// Bodies that move, and their objects.
-    pub fn new(settings: Settings, objects: Vec<Object>, bodies: Bodies) -> Self {
-        Self { settings, objects, bodies, contacts: Vec::new(), solids: Arc::default(), of: Vec::new() }
+    /// Bodies that move, and their objects; joints, and theirs.
+    pub fn new(settings: Settings, objects: Vec<Object>, bodies: Bodies, ends: Vec<Ends>, joints: Vec<Joint>) -> Self {
+        let joints = Joints::new(joints, bodies.moving);
+        Self { settings, objects, bodies, ends, joints, contacts: Vec::new(), steady: Vec::new(), solids: Arc::default(), of: Vec::new() }
     }
 
-    /// The two surfaces that overlap most at the start, by more than round-off, and how deep [m].
-    pub fn overlap(&mut self) -> Option<(&str, &str, f64)> {
+    /// The two surfaces that overlap most at the start, by more than round-off, the index of the first, if its object has several, and how deep [m].
+    pub fn overlap(&mut self) -> Option<(&str, Option<usize>, &str, f64)> {
         self.place_solids(0.0, 0.0);
-        let found = contact::contacts(&self.bodies, 0.0).into_iter().min_by(|a, b| a.gap.total_cmp(&b.gap))?;
+        let found = contact::contacts(&self.bodies, 0.0, &self.joints.apart()).into_iter().min_by(|a, b| a.gap.total_cmp(&b.gap))?;
         let [a, b] = found.pair.map(|i| i as usize);
         let least = OVERLAP * self.bodies.hulls[self.bodies.hull[a] as usize].reach;
-        (-found.gap > least).then_some((self.named(a)?, self.named(b)?, -found.gap))
+        let (object, index) = self.owner(a)?;
+        let index = (object.rows.len() > 1).then_some(index);
+        (-found.gap > least).then_some((&object.name, index, self.named(b)?, -found.gap))
     }
 
     /// Name of the object or solid of a body.
@@ -134,6 +156,17 @@ impl Rigid {
         }
     }
 
+    /// Gives bodies a part of their impulses.
+    fn push(&mut self, pushes: &[Push], part: f64) {
+        for push in pushes {
+            let body = &mut self.bodies.rows[push.row];
+            body.orient();
+            let impulse = push.impulse * part;
+            body.v = body.v + impulse * body.inverse_mass;
+            body.w = body.w + body.turned(push.moment * part - body.x.cross(impulse));
+        }
+    }
+
     fn step(&mut self, t: f64, h: f64) {
         self.place_solids(t, h);
         let gravity = Vector::from(self.settings.gravity.at(t + 0.5 * h));
@@ -142,19 +175,27 @@ impl Rigid {
             body.orient();
             body.v = body.v + gravity * h;
         }
-        let mut contacts = contact::contacts(&self.bodies, h);
+        let mut contacts = contact::contacts(&self.bodies, h, &self.joints.apart());
         contact::carry(&self.bodies, &self.contacts, &mut contacts);
-        let pace = Pace { h, iterations: self.settings.iterations, still: 2.0 * gravity.norm() * h, gravity };
+        let pace = Pace { t, h, iterations: self.settings.iterations, still: 2.0 * gravity.norm() * h, gravity };
         let rows = &mut self.bodies.rows;
         solve::bounce(rows, &contacts, &pace);
-        solve::solve(rows, &mut contacts, &pace, |rows, contacts| {
+        // What joints hold and no contact has half of gravity before it moves.
+        let mut hangs = vec![false; rows.len()];
+        self.joints.held().for_each(|i| hangs[i as usize] = true);
+        contacts.iter().filter(|c| c.press > 0.0).flat_map(|c| c.pair).for_each(|i| hangs[i as usize] = false);
+        let half = gravity * (0.5 * h);
+        rows.iter_mut().zip(&hangs).filter(|(_, hangs)| **hangs).for_each(|(body, _)| body.v = body.v - half);
+        solve::solve(rows, &mut contacts, &mut self.joints, &pace, |rows, contacts, joints| {
             // What nothing holds moves along the exact parabola.
             let mut held = vec![false; rows.len()];
+            joints.held().for_each(|i| held[i as usize] = true);
             contacts.iter().filter(|c| c.press > 0.0).flat_map(|c| c.pair).for_each(|i| held[i as usize] = true);
-            for (body, held) in rows[..moving].iter_mut().zip(held) {
+            for ((body, held), hangs) in rows[..moving].iter_mut().zip(held).zip(hangs) {
                 body.x = body.x + body.v * h - if held { Vector::default() } else { gravity * (0.5 * h * h) };
                 body.turn_freely(h);
                 body.orient();
+                body.v = body.v + if hangs { half } else { Vector::default() };
             }
         });
         self.contacts = contacts;
@@ -225,7 +266,11 @@ impl System for Rigid {
         &self.settings.name
     }
 
-    fn absorb(&mut self, _exchange: &mut Turn<'_>) {}
+    fn absorb(&mut self, exchange: &mut Turn<'_>) {
+        let (steady, kicks): (Vec<Push>, Vec<Push>) = exchange.take().into_iter().partition(|push| push.steady);
+        self.push(&kicks, 1.0);
+        self.steady.extend(steady);
+    }
 
     fn advance(&mut self, t: f64, dt: f64, exchange: &mut Turn<'_>, go_on: &(dyn Fn() -> bool + Sync)) -> Result<StepReport, StepError> {
         self.meet(&exchange.surfaces().clone());
@@ -236,13 +281,34 @@ impl System for Rigid {
             if !go_on() {
                 return Ok(report);
             }
+            let steady = std::mem::take(&mut self.steady);
+            self.push(&steady, 1.0 / f64::from(n));
+            self.steady = steady;
             self.step(t + f64::from(k) * h, h);
             report.stepped(h);
         }
+        self.steady.clear();
         Ok(report)
     }
 
-    fn publish(&mut self, _t: f64, _exchange: &mut Turn<'_>) {}
+    fn publish(&mut self, t: f64, exchange: &mut Turn<'_>) {
+        for body in exchange.bodies() {
+            body.time = t;
+            for (state, i) in body.states.iter_mut().zip(body.rows.clone()) {
+                let row = &mut self.bodies.rows[i];
+                row.orient();
+                *state = BodyState {
+                    position: row.x,
+                    orientation: row.q,
+                    velocity: row.v,
+                    spin: row.w,
+                    inverse_mass: row.inverse_mass,
+                    inverse_inertia: row.inverse_inertia,
+                    ..*state
+                };
+            }
+        }
+    }
 
     fn columns(&self, _t: f64, names: &[&str], out: &mut Vec<Column>) {
         for Object { name: object, rows, .. } in &self.objects {
@@ -262,6 +328,25 @@ impl System for Rigid {
             let turns: Vec<Real> = bodies.iter().flat_map(|body| body.q.row().map(|c| c as Real)).collect();
             out.push(Column::new(object, "turn", turns));
         }
+        for Ends { name: object, joints } in &self.ends {
+            // The first body's end comes first. Those of what has broken are in one place, where nobody sees them.
+            let ends = |joint: &Joint| {
+                let [a, b] = joint.ends(&self.bodies.rows);
+                if joint.broken { [b, b] } else { [b, a] }
+            };
+            for name in names {
+                let of: Vec<[Vector; 2]> = match *name {
+                    "position" => self.joints.all[joints.clone()].iter().map(ends).collect(),
+                    "force" => self.joints.all[joints.clone()].iter().map(|joint| [joint.load[0], -joint.load[0]]).collect(),
+                    _ => continue,
+                };
+                out.push(Column::new(
+                    object,
+                    name,
+                    of.into_iter().flatten().flat_map(|v| <[f64; 3]>::from(v).map(|c| c as Real)).collect::<Vec<_>>(),
+                ));
+            }
+        }
     }
 
     fn topology(&self, out: &mut Vec<Column>) {
@@ -271,10 +356,18 @@ impl System for Rigid {
             let masses: Vec<Real> = self.moving()[rows.clone()].iter().map(|body| (1.0 / body.inverse_mass) as Real).collect();
             out.push(Column::new(name, "mass", masses));
         }
+        for Ends { name, joints } in &self.ends {
+            let lines = |joint: &Joint| matches!(joint.kind, Kind::Rope(_) | Kind::Spring(_) | Kind::Slider);
+            if self.joints.all[joints.clone()].iter().all(lines) {
+                out.push(Column::new(name, "links", (0..2 * joints.len() as u32).collect::<Vec<u32>>()));
+            }
+        }
     }
 
     fn ledger(&self, t: f64) -> Ledger {
-        self.ledger_of(0..self.bodies.moving, t)
+        let elastic = self.joints.all.iter().map(|joint| joint.energy(&self.bodies.rows, t)).sum();
+        let broken = self.joints.all.iter().filter(|joint| joint.broken).count() as u64;
+        Ledger { elastic, broken: (!self.ends.is_empty()).then_some(broken), ..self.ledger_of(0..self.bodies.moving, t) }
     }
 
     fn shares(&self, t: f64) -> Vec<Share> {
@@ -320,11 +413,17 @@ impl System for Rigid {
             kept.into_iter().chain([c.press, c.gap])
         };
         archive.push("contacts", Part::Numbers(self.contacts.iter().flat_map(contact).collect()));
+        let joint = |j: &Joint| [&[f64::from(u8::from(j.broken))][..], &three(j.load[0]), &three(j.load[1])].concat();
+        archive.push("joints", Part::Numbers(self.joints.all.iter().flat_map(joint).collect()));
     }
 
     fn restore(&mut self, archive: &mut Archive) -> Option<()> {
         let (bodies, pairs, contacts) = (archive.numbers("bodies")?, archive.indices("pairs")?, archive.numbers("contacts")?);
-        if bodies.len() != BODY * self.bodies.moving || contacts.len() * 2 != CONTACT * pairs.len() {
+        let joints = archive.numbers("joints")?;
+        if bodies.len() != BODY * self.bodies.moving
+            || contacts.len() * 2 != CONTACT * pairs.len()
+            || joints.len() != JOINT * self.joints.all.len()
+        {
             return None;
         }
         let three = |s: &[f64]| Vector { x: s[0], y: s[1], z: s[2] };
@@ -332,6 +431,9 @@ impl System for Rigid {
             body.x = three(s);
             body.q = Quat { v: three(&s[3..]), w: s[6] };
             (body.v, body.w) = (three(&s[7..]), three(&s[10..]));
+        }
+        for (joint, s) in self.joints.all.iter_mut().zip(joints.chunks_exact(JOINT)) {
+            (joint.broken, joint.load) = (s[0] == 1.0, [three(&s[1..]), three(&s[4..])]);
         }
         let kept = pairs.chunks_exact(2).zip(contacts.chunks_exact(CONTACT));
         self.contacts =

@@ -8,13 +8,17 @@
 
 use super::body::Body;
 use super::contact::Contact;
+use super::direct::Rows;
+use super::joint::Joints;
 use crate::geometry::Vector;
 use crate::math::parallel::fold;
 
 /// What the passes need.
 #[derive(Debug, Clone, Copy)]
 pub struct Pace {
-    /// Sub-step [s].
+    /// Start of the sub-step [s].
+    pub t: f64,
+    /// Its length [s].
     pub h: f64,
     /// Passes of each sort.
     pub iterations: u32,
@@ -28,8 +32,8 @@ pub struct Pace {
 const MEND: f64 = 0.25;
 /// Damping ratio of these.
 const DAMPING: f64 = 10.0;
-/// No faster than this [m/s].
-const FASTEST: f64 = 3.0;
+/// What is out of place is mended no faster than this [m/s], of turns [rad/s].
+pub const FASTEST: f64 = 3.0;
 /// Rounds of bounces at most.
 const ROUNDS: usize = 200;
 /// Sweeps over the points of a pair that bounces, at most.
@@ -37,10 +41,13 @@ const SWEEPS: usize = 100;
 
 /// What a pass reads and writes of a body.
 #[derive(Clone, Copy)]
-struct Twist {
-    v: Vector,
-    w: Vector,
-    inverse_mass: f64,
+pub struct Twist {
+    /// Velocity [m/s].
+    pub v: Vector,
+    /// Angular velocity [rad/s].
+    pub w: Vector,
+    /// 1/mass [1/kg].
+    pub inverse_mass: f64,
 }
 
 impl Twist {
@@ -51,30 +58,46 @@ impl Twist {
 
 /// A direction at a contact: what a unit impulse along it does to both bodies.
 #[derive(Clone, Copy)]
-struct Lever {
-    /// The direction, from the first to the second.
-    along: Vector,
-    /// r × direction, of each [m].
-    arms: [Vector; 2],
+pub struct Lever {
+    /// The direction, from the first to the second; zero for a turn.
+    pub along: Vector,
+    /// r × direction, of each [m]; of a turn its axis.
+    pub arms: [Vector; 2],
     /// Change of angular velocity of each, without sign [1/(kg m)].
-    turns: [Vector; 2],
+    pub turns: [Vector; 2],
 }
 
 impl Lever {
-    fn new([a, b]: [&Body; 2], arms: [Vector; 2], along: Vector) -> Self {
+    /// Along a direction at the arms r.
+    pub fn new([a, b]: [&Body; 2], arms: [Vector; 2], along: Vector) -> Self {
         let arms = arms.map(|r| r.cross(along));
         Self { along, arms, turns: [a.turned(arms[0]), b.turned(arms[1])] }
     }
 
+    /// About an axis.
+    pub fn about([a, b]: [&Body; 2], axis: Vector) -> Self {
+        Self { along: Vector::default(), arms: [axis; 2], turns: [a.turned(axis), b.turned(axis)] }
+    }
+
+    /// Whether it is about an axis.
+    pub fn is_about(&self) -> bool {
+        self.along == Vector::default()
+    }
+
     /// Speed of the second along it, seen from the first [m/s].
     #[inline(always)]
-    fn speed(&self, a: &Twist, b: &Twist) -> f64 {
+    pub fn speed(&self, a: &Twist, b: &Twist) -> f64 {
         self.along.dot(b.v - a.v) + self.arms[1].dot(b.w) - self.arms[0].dot(a.w)
+    }
+
+    /// The same of a pair of all twists.
+    pub fn speed_of(&self, twists: &[Twist], [i, j]: [u32; 2]) -> f64 {
+        self.speed(&twists[i as usize], &twists[j as usize])
     }
 
     /// Gives both an impulse [N s].
     #[inline(always)]
-    fn push(&self, a: &mut Twist, b: &mut Twist, impulse: f64) {
+    pub fn push(&self, a: &mut Twist, b: &mut Twist, impulse: f64) {
         a.v = a.v - self.along * (impulse * a.inverse_mass);
         a.w = a.w - self.turns[0] * impulse;
         b.v = b.v + self.along * (impulse * b.inverse_mass);
@@ -82,7 +105,7 @@ impl Lever {
     }
 
     /// Change of the speed along it by a unit impulse along another [1/kg].
-    fn compliance(&self, other: &Self, inverse_mass: f64) -> f64 {
+    pub fn compliance(&self, other: &Self, inverse_mass: f64) -> f64 {
         inverse_mass * self.along.dot(other.along) + self.arms[0].dot(other.turns[0]) + self.arms[1].dot(other.turns[1])
     }
 }
@@ -112,9 +135,11 @@ struct Row {
     drag: [f64; 2],
 }
 
-fn two<T>(bodies: &mut [T], [i, j]: [u32; 2]) -> (&mut T, &mut T) {
-    let (low, high) = bodies.split_at_mut(j as usize);
-    (&mut low[i as usize], &mut high[0])
+/// Two of many.
+pub fn two<T>(all: &mut [T], pair: [u32; 2]) -> (&mut T, &mut T) {
+    let [i, j] = pair.map(|i| i as usize);
+    let (low, high) = all.split_at_mut(i.max(j));
+    if i < j { (&mut low[i], &mut high[0]) } else { (&mut high[0], &mut low[j]) }
 }
 
 impl Row {
@@ -277,33 +302,46 @@ fn hit(bodies: &mut [Body], points: &[Contact], first: bool, pace: &Pace) -> boo
     true
 }
 
-/// One sub-step of contacts: speeds in, speeds and the impulses of contacts out; `go` moves bodies between the two sorts of passes.
-pub fn solve(bodies: &mut [Body], contacts: &mut [Contact], pace: &Pace, go: impl FnOnce(&mut [Body], &[Contact])) {
+/// One sub-step of contacts and joints: speeds in, speeds and what contacts and joints hold out; `go` moves bodies between the two sorts of passes.
+pub fn solve(
+    bodies: &mut [Body],
+    contacts: &mut [Contact],
+    joints: &mut Joints,
+    pace: &Pace,
+    go: impl FnOnce(&mut [Body], &[Contact], &Joints),
+) {
     let made =
         |bodies: &[Body]| fold(contacts.len(), |range| contacts[range].iter().map(|c| Row::new(bodies, c, pace)).collect::<Vec<_>>());
     let mut rows: Vec<Row> = made(bodies).concat();
-    let mut twists: Vec<Twist> = bodies.iter().map(Twist::of).collect();
+    let mut first = Rows::new(joints, bodies, pace, None);
+    // The last one is the world.
+    let now = |bodies: &[Body]| -> Vec<Twist> { bodies.iter().chain([&Body::WORLD]).map(Twist::of).collect() };
+    let mut twists = now(bodies);
     for row in &rows {
         let (a, b) = two(&mut twists, row.pair);
         row.levers.iter().zip([row.press, row.drag[0], row.drag[1]]).for_each(|(lever, impulse)| lever.push(a, b, impulse));
     }
-    let passes = |rows: &mut [Row], twists: &mut [Twist], soft: bool| {
+    let passes = |joints: &mut Rows, rows: &mut [Row], twists: &mut [Twist], soft: bool| {
         for _ in 0..pace.iterations {
+            joints.pass(twists);
             rows.iter_mut().for_each(|row| row.pass(twists, soft));
         }
     };
     let back = |bodies: &mut [Body], twists: &[Twist]| {
         bodies.iter_mut().zip(twists).for_each(|(body, twist)| (body.v, body.w) = (twist.v, twist.w));
     };
-    passes(&mut rows, &mut twists, true);
+    passes(&mut first, &mut rows, &mut twists, true);
     back(bodies, &twists);
     keep(contacts, &rows);
-    go(bodies, contacts);
+    go(bodies, contacts, joints);
     rows.iter_mut().zip(&*contacts).for_each(|(row, c)| row.moved(bodies, c));
-    twists.iter_mut().zip(&*bodies).for_each(|(twist, body)| *twist = Twist::of(body));
-    passes(&mut rows, &mut twists, false);
+    let mut last = Rows::new(joints, bodies, pace, Some(&first.all));
+    let mut twists = now(bodies);
+    last.give(&mut twists);
+    passes(&mut last, &mut rows, &mut twists, false);
     back(bodies, &twists);
     keep(contacts, &rows);
+    joints.load([&first.all, &last.all], pace.h);
 }
 
 /// What the passes have found.
