@@ -435,7 +435,7 @@ describe("scenes that ship", () => {
     const [single, double] = await Promise.all(["single", "double"].map((name) => import(`${pkg}/${name}.js`)));
     single.initSync({ module: readFileSync(`${pkg}/single_bg.wasm`) });
     double.initSync({ module: readFileSync(`${pkg}/double_bg.wasm`) });
-    const ids = [...new Set([...tried(0), "drape/sheet-on-bunny"])];
+    const ids = [...new Set([...tried(0), "drape/sheet-on-bunny", "structures/others"])];
     const failures: string[] = [];
     let meshes = 0;
     for (const id of ids) {
