@@ -3,7 +3,6 @@
 use crate::geometry::Vector;
 use crate::math::rotation::from_z_to;
 use crate::math::{Quat, Signal};
-use crate::scene::named;
 use crate::systems::rigid::{Bodies, Body, Drive, Joint, Kind, Motor, WORLD};
 use std::ops::Range;
 use tumble_interface::check::{short, suggestion};
@@ -27,6 +26,11 @@ pub struct Made {
 
 /// Objects by name, and their rows.
 pub type Named<'a> = [(&'a str, Range<usize>)];
+
+/// Object and index of an end: "flag 3".
+pub fn named(words: &str) -> Option<(&str, usize)> {
+    words.rsplit_once(' ').and_then(|(name, index)| Some((name.trim(), index.parse().ok()?)))
+}
 
 /// The row of an end: "link 3", or "door", if there is one.
 fn row(words: &str, k: usize, objects: &Named<'_>) -> Result<usize, Wrong> {

@@ -32,7 +32,7 @@ pub use figures::{MANNEQUIN, bytes as figure_bytes, character, mannequin};
 pub use galaxy::galaxy;
 pub use guides::Ground;
 pub use hair::hair;
-pub use joints::{Made as Joined, joints};
+pub use joints::{joints, named};
 pub use net::net;
 pub use particles::{draw_cloud, particles};
 pub use rigid::bodies;

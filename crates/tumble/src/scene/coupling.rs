@@ -5,6 +5,7 @@ use super::methods::{body_of, place};
 use crate::elements::DrivenSpring;
 use crate::geometry::Vector;
 use crate::math::Signal;
+use crate::recipes::named;
 use crate::scene::Assets;
 use crate::systems::dynamics::{Parts, SpringPart};
 use tumble_interface::Issue;
@@ -55,11 +56,6 @@ pub fn fasten(scene: &Scene, assets: &Assets, masses: &mut [Parts], issues: &mut
         }
     }
     anchors
-}
-
-/// Object and index of an end: "flag 3".
-pub fn named(words: &str) -> Option<(&str, usize)> {
-    words.rsplit_once(' ').and_then(|(name, index)| Some((name.trim(), index.parse().ok()?)))
 }
 
 /// An end of an anchor.

@@ -1,7 +1,7 @@
 //! What a scene says in vain, and what it hardly means.
 
-use super::coupling::named;
 use super::methods::{METHODS, present};
+use crate::recipes::named;
 use tumble_interface::Warning;
 use tumble_interface::check::{plain, short};
 use tumble_interface::scene::{

@@ -1,8 +1,8 @@
 //! How the objects of a scene are drawn.
 
-use super::coupling::named;
 use super::methods::{resolve, rules};
 use crate::geometry::Vector;
+use crate::recipes::named;
 use tumble_interface::Scene;
 use tumble_interface::looks::{Colors, Form, GROUND, Look, Looks, SOLID};
 use tumble_interface::scene::{Collider, Shape};

@@ -5,7 +5,6 @@ mod camera;
 mod checks;
 mod coincident;
 mod coupling;
-pub use coupling::named;
 mod cures;
 mod far;
 mod grids;

@@ -4,7 +4,6 @@ use super::{MethodRules, is_in};
 use crate::recipes;
 use crate::scene::Assets;
 use crate::scene::build::Builder;
-use crate::scene::coupling::named;
 use crate::scene::laws::Reader;
 use crate::scene::plausible::odd_density;
 use crate::system::System;
@@ -69,7 +68,7 @@ impl MethodRules for Rules {
         }
         for joint in &scene.joint {
             let object = |words: &String| {
-                let name = named(words).map_or(words.as_str(), |(name, _)| name);
+                let name = recipes::named(words).map_or(words.as_str(), |(name, _)| name);
                 scene.body.iter().find(|thing| thing.name == *words || thing.name == name)
             };
             let systems: Vec<&str> = joint.between.iter().filter_map(object).filter_map(|thing| thing.system.as_deref()).collect();
@@ -95,7 +94,7 @@ impl MethodRules for Rules {
         let odd = |thing: &Body| odd_density(format!("body \"{}\".density", thing.name), thing.density?, 0.0);
         let mut warnings: Vec<Warning> = scene.body.iter().filter_map(odd).collect();
         // What an anchor ties to a body is meant to be there.
-        let ends = |words: &[String; 2]| words.each_ref().map(|end| named(end).map_or(end.clone(), |(name, _)| name.to_string()));
+        let ends = |words: &[String; 2]| words.each_ref().map(|end| recipes::named(end).map_or(end.clone(), |(name, _)| name.to_string()));
         let tied =
             |name: &str| {
                 scene.anchor.iter().map(|anchor| ends(&anchor.between)).any(|ends| {

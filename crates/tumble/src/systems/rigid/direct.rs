@@ -2,11 +2,11 @@
 //!
 //!   (J M⁻¹ Jᵀ + γ) p = u* - J v                                                                              (joints.3)
 //!
-//! by L D Lᵀ within the envelope, joints in the order of Cuthill and McKee [cuthill1969]. A row that others imply gets no impulse.
+//! by L D Lᵀ within the envelope, joints in the order of Cuthill and McKee [cuthill1969]. Rows that others imply share what they hold.
 
 use super::body::Body;
 use super::joint::{Joints, Row};
-use super::solve::{Pace, Twist, two};
+use super::lever::{Pace, Twist, two};
 use crate::geometry::Vector;
 use std::ops::Range;
 

@@ -7,7 +7,7 @@
 //! Sources: RATTLE [andersen1983]; what long sub-steps make of tension [tournier2015].
 
 use super::body::Body;
-use super::solve::{FASTEST, Lever, Pace, Twist};
+use super::lever::{FASTEST, Lever, Pace, Twist};
 use crate::geometry::Vector;
 use crate::math::functions::atan2;
 use crate::math::{Quat, Signal};

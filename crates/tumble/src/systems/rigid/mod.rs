@@ -10,6 +10,7 @@ mod body;
 mod contact;
 mod direct;
 mod joint;
+mod lever;
 mod solids;
 mod solve;
 
@@ -26,7 +27,7 @@ use crate::math::{Quat, Real};
 use crate::system::{Archive, Part, System};
 use contact::Contact;
 use joint::Joints;
-use solve::Pace;
+use lever::Pace;
 use std::ops::Range;
 use std::sync::Arc;
 use tumble_interface::engine::{Ledger, Share, Stability, StepReport, Worst};
