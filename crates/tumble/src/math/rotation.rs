@@ -80,6 +80,17 @@ mod tests {
     }
 
     #[test]
+    fn axes_are_found_where_the_shortest_way_is_half_a_turn() {
+        // Across e_x the shortest rotation takes e_x to -e_z, up to round-off.
+        let unit = |x, y, z| Vec3 { x, y, z };
+        for tilt in [0.0, 1e-9, 1e-8, 3e-8, 1e-7, 1e-6] {
+            let (x, z) = (unit(0.0, tilt, 1.0).normalized(), unit(1.0, 0.0, 0.0));
+            let q = from_axes(x, z);
+            assert!((q.turn(unit(1.0, 0.0, 0.0)) - x).norm() < 1e-6 && (q.axis_z() - z).norm() < 1e-6, "{tilt}");
+        }
+    }
+
+    #[test]
     fn turning_a_frame_integrates_its_rate() {
         let q: Row = from_degrees([10.0, 20.0, 30.0]).row().map(|x| x as Real);
         let omega = Vec3 { x: 0.3, y: -0.7, z: 0.4 };
