@@ -453,3 +453,47 @@ fn a_rotor_on_an_arm_keeps_turning_and_broken_joints_come_back() {
     assert_eq!(column(&again, "block", "position"), expected);
     assert_eq!(again.ledger().broken, Some(1));
 }
+
+#[test]
+fn a_small_ball_on_a_long_arm_keeps_turning() {
+    // Its own moment is far below that of its load in a sub-step; but nothing else holds it.
+    let ball = "[[body]]\nname = \"block\"\nshape = { sphere = { radius = 0.02 } }\nposition = [[1, 0, 0]]\nvelocity = [[0, 20, 0]]\n\
+        angular_velocity = [[0, 0, 20]]\n";
+    for kind in ["hinge = { axis = [0, 0, 1] }", "ball = {}"] {
+        let words = format!("between = [\"block\"]\nat = [0, 0, 0]\nkind = {{ {kind} }}");
+        let mut sim = scene(NONE, 5, &(ball.to_string() + &joint(&words)));
+        run(&mut sim, 100);
+        let speed = column(&sim, "block", "velocity")[0].norm();
+        assert!((speed / 20.0 - 1.0).abs() < 5e-3, "{kind}: {speed}");
+    }
+}
+
+#[test]
+fn joined_bodies_touch_only_where_they_are_told_to() {
+    let boxes = "[[body]]\nname = \"block\"\nshape = { box = { size = [0.2, 0.2, 0.2] } }\nposition = [[0, 0, 0], [0.15, 0, 0]]\n";
+    for (words, contacts) in [("", 0), ("collide = true\n", 2)] {
+        let words = format!("between = [\"block 0\", \"block 1\"]\nat = [0.075, 0, 0]\nkind = {{ ball = {{}} }}\n{words}");
+        let mut sim = scene(NONE, 5, &(boxes.to_string() + &joint(&words)));
+        run(&mut sim, 1);
+        assert_eq!(sim.ledger().contacts, Some(contacts), "{words}");
+    }
+}
+
+#[test]
+fn a_taut_chain_goes_on_to_the_same_bits() {
+    let words = "[[body]]\nname = \"block\"\nshape = { sphere = { radius = 0.01 } }\nposition = [[0.05, 0, 0]]\n\
+        arrange = { row = { count = 8, step = [0.1, 0, 0] } }\n[[body]]\nname = \"ball\"\nshape = { sphere = { radius = 0.05 } }\nmass = 50\n\
+        position = [[0.85, 0, 0]]\n[[joint]]\nname = \"top\"\nbetween = [\"block 0\"]\nat = [0, 0, 0]\nkind = { ball = {} }\n\
+        [[joint]]\nname = \"chain\"\nbetween = [\"block\"]\nchain = true\nkind = { ball = {} }\n\
+        [[joint]]\nname = \"hook\"\nbetween = [\"ball\", \"block 7\"]\nat = [0.8, 0, 0]\nkind = { ball = {} }\n";
+    let mut sim = scene(DOWN, 5, words);
+    run(&mut sim, 40);
+    let saved = sim.save(&[]);
+    run(&mut sim, 20);
+    let expected = column(&sim, "block", "position");
+    let mut again = scene(DOWN, 5, words);
+    again.restore(&saved).unwrap();
+    run(&mut again, 20);
+    assert_eq!(column(&again, "block", "position"), expected);
+    assert!(column(&sim, "hook", "force")[0].norm() > 100.0);
+}

@@ -39,7 +39,7 @@ impl Twist {
     }
 }
 
-/// A direction at a contact: what a unit impulse along it does to both bodies.
+/// A direction at a contact or joint: what a unit impulse along it does to both bodies.
 #[derive(Clone, Copy)]
 pub struct Lever {
     /// The direction, from the first to the second; zero for a turn.

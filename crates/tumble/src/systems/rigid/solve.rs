@@ -236,6 +236,7 @@ pub fn solve(
     let back = |bodies: &mut [Body], twists: &[Twist]| {
         bodies.iter_mut().zip(twists).for_each(|(body, twist)| (body.v, body.w) = (twist.v, twist.w));
     };
+    first.give(&mut twists);
     passes(&mut first, &mut rows, &mut twists, true);
     back(bodies, &twists);
     keep(contacts, &rows);
