@@ -62,6 +62,7 @@ TARGETS = {
         (f"web {task}", "real time"): (1.0, "at least")
         for task in ("fluid 256² to 1e-3", "sheet 128², 10 sub-steps", "1e6 ballistic particles")
     },
+    ("web first picture", "what a visitor waits for"): (1.0, "at least"),
     **{(f"cloth {n}", peer): (10.0, "at least") for n in (128, 256) for peer in ("pypbd", "taichi")},
     **{(f"cloth {n}, stretch", "the fastest peer"): (1.0, "at most") for n in (128, 256)},
     **{(f"cloth, memory, {bending}", "300 bytes"): (1.0, "at most") for bending in ("links", "isometric")},
