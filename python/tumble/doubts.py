@@ -92,7 +92,7 @@ def remedy(run: "Run") -> Remedy | None:
         cause, changes = "; ".join(map(energy.told, met)), energy.changes(run.scene, met, k)
     elif energy.joined(run.scene):
         exchanges = 4 * run.scene["time"]["exchanges"]
-        cause, changes = "systems exchange the impulses of anchors too rarely", [f"time.exchanges={exchanges}"]
+        cause, changes = "systems exchange impulses too rarely", [f"time.exchanges={exchanges}"]
     elif own in _GAINS:
         cause, changes = f"{own} gains energy where things oscillate", [f"system.{k}.integrator=symplectic_euler"]
     elif own in energy.ADAPTIVE:

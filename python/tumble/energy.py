@@ -67,8 +67,9 @@ def _inflates(pressure: Tree | None) -> bool:
 
 
 def joined(scene: Tree) -> bool:
-    """Whether anchors join systems."""
-    return len(scene["system"]) > 1 and bool(scene["anchor"])
+    """Whether anchors join systems, or masses touch rigid bodies more rarely than they should."""
+    rarely = scene["time"]["fps"] * scene["time"]["exchanges"] < 240
+    return len(scene["system"]) > 1 and bool(scene["anchor"] or (scene["body"] and rarely))
 
 
 def sinks(scene: Tree) -> list[str]:

@@ -40,6 +40,7 @@ mod pinned_velocity;
 mod pins_in_time;
 mod position_based;
 mod position_based_scenes;
+mod reaction;
 mod rigid;
 mod rod_loops;
 mod rods_and_emitters;

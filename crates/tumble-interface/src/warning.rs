@@ -57,6 +57,8 @@ codes! {
     TangledStart = "tangled-start",
     /// An anchor too stiff for the rate at which systems exchange impulses.
     StiffAnchor = "stiff-anchor",
+    /// Masses whose springs pull them into the rigid bodies that they bear.
+    YieldingMasses = "yielding-masses",
     /// A joint far from the bodies that it holds.
     FarJoint = "far-joint",
     /// Systems that do not come to agree about the impulses between them.

@@ -121,7 +121,7 @@ impl Loaded {
 
     /// Duration of a frame and its number of exchanges.
     pub fn clock(&self) -> (f64, u32) {
-        (self.scene.time.fps, self.scene.time.exchanges)
+        (self.scene.time.fps, self.scene.exchanges())
     }
 
     /// The camera at a time [s], if it moves.

@@ -90,8 +90,8 @@ class Subject:
 
     @property
     def coupled(self) -> bool:
-        """Whether its systems pull on each other."""
-        return len(self.tree["system"]) > 1 and bool(self.tree["anchor"])
+        """Whether its systems pull or push each other."""
+        return len(self.tree["system"]) > 1 and bool(self.tree["anchor"] or self.tree["body"])
 
     @property
     def limited(self) -> bool:

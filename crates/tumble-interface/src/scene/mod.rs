@@ -197,14 +197,14 @@ pub struct Time {
     /// Frames to simulate after the first.
     #[schemars(range(min = 1, max = 100_000_000))]
     pub frames: u32,
-    /// Exchanges between systems per frame.
+    /// Exchanges between systems per frame. Default: 1; where masses and rigid bodies touch, 240 a second.
     #[schemars(range(min = 1, max = 100_000))]
-    pub exchanges: u32,
+    pub exchanges: Option<u32>,
 }
 
 impl Default for Time {
     fn default() -> Self {
-        Self { fps: 24.0, frames: 120, exchanges: 1 }
+        Self { fps: 24.0, frames: 120, exchanges: None }
     }
 }
 
@@ -298,6 +298,16 @@ impl Scene {
     /// Duration of one frame [s].
     pub fn frame_time(&self) -> f64 {
         1.0 / self.time.fps
+    }
+
+    /// Exchanges between systems per frame, in a resolved scene.
+    pub fn exchanges(&self) -> u32 {
+        self.time.exchanges.unwrap_or(1)
+    }
+
+    /// Time from one exchange to the next [s].
+    pub fn interval(&self) -> f64 {
+        self.frame_time() / f64::from(self.exchanges())
     }
 
     /// References to fabric records, in order of appearance.

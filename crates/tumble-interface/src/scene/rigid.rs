@@ -46,6 +46,10 @@ pub struct Body {
     #[serde(default)]
     #[schemars(transform = items_above_zero, extend("x-unit" = "kg m²"))]
     pub inertia: Option<[f64; 3]>,
+    /// Distance kept between the surface and masses of other systems: cloth, ropes, particles. Bodies and colliders touch without it.
+    #[serde(default)]
+    #[schemars(range(min = 0.0), extend("x-unit" = "m"))]
+    pub thickness: f64,
     /// Kinetic friction coefficient (Coulomb). Of two surfaces that touch, the larger coefficient holds.
     #[serde(default = "rough")]
     #[schemars(range(min = 0.0), extend("x-unit" = "1"))]

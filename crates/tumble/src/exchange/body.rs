@@ -43,6 +43,9 @@ pub struct BodyState {
     pub acceleration: Vector,
     /// Away from the solid of its own system that it touches, where the body is detailed; zero if it touches none.
     pub normal: Vector,
+    /// Where that solid bears it: the centre of the points of contact [m], and the mean square of their distances from it, as xx, yy, zz, xy, yz,
+    /// zx [m²].
+    pub footing: (Vector, [f64; 6]),
     /// 1/mass [1/kg], 0 for what is held.
     pub inverse_mass: f64,
     /// Inverse of the inertia about the centre of mass, in the axes of the world: xx, yy, zz, xy, yz, zx [1/(kg m²)].
@@ -59,6 +62,7 @@ impl Default for BodyState {
             spin: zero,
             acceleration: zero,
             normal: zero,
+            footing: (zero, [0.0; 6]),
             inverse_mass: 0.0,
             inverse_inertia: [0.0; 6],
         }
@@ -87,6 +91,16 @@ impl BodyState {
         let [xx, yy, zz, xy, yz, zx] = self.inverse_inertia;
         let Vector { x, y, z } = angular;
         Vector { x: xx * x + xy * y + zx * z, y: xy * x + yy * y + yz * z, z: zx * x + yz * y + zz * z }
+    }
+
+    /// Whether a push into what bears it finds that below the point, and does not turn it.
+    pub fn is_borne_at(&self, point: Vector) -> bool {
+        let (foot, [xx, yy, zz, xy, yz, zx]) = self.footing;
+        let arm = point - foot;
+        let Vector { x, y, z } = arm - self.normal * arm.dot(self.normal);
+        let square = x * x + y * y + z * z;
+        let spread = xx * x * x + yy * y * y + zz * z * z + 2.0 * (xy * x * y + yz * y * z + zx * z * x);
+        square * square <= spread
     }
 
     /// Takes an impulse [N s] at a point [m].
@@ -133,6 +147,19 @@ mod tests {
         // What the impulse does is half its product with the velocities before and after.
         let energy = 0.5 * 2.0 * state.velocity.norm_sq() + 0.5 * (0.5 * 16.0 + 0.2 * 900.0);
         assert!((energy - 0.5 * impulse.dot(state.velocity_at(point))).abs() < 1e-12 && energy > 90.0);
+    }
+
+    #[test]
+    fn a_body_is_borne_between_its_feet() {
+        // On two feet 0.2 m left and right of the middle.
+        let state = BodyState {
+            normal: [0.0, 0.0, 1.0].into(),
+            footing: (Vector::default(), [0.04, 0.0, 0.0, 0.0, 0.0, 0.0]),
+            ..BodyState::default()
+        };
+        let borne = [[0.0, 0.0, 1.0], [0.19, 0.0, 0.5], [-0.19, 0.0, 0.5]];
+        let not = [[0.21, 0.0, 0.5], [0.0, 0.01, 0.5], [0.1, 0.2, 0.5]];
+        assert!(borne.iter().all(|p| state.is_borne_at((*p).into())) && !not.iter().any(|p| state.is_borne_at((*p).into())));
     }
 
     #[test]

@@ -6,10 +6,12 @@
 //! everyone has advanced would conserve momentum too, and multiply the energy (see `docs/theory/coupling.md`).
 
 mod body;
+mod body_surface;
 mod event;
 mod repeat;
 
 pub use body::{Body, BodyRow, BodyState};
+pub use body_surface::BodySurface;
 pub use event::{Event, Happening};
 
 use crate::geometry::{Collider, Vector};
@@ -103,6 +105,7 @@ struct PublishedField {
 pub struct Exchange {
     systems: Vec<String>,
     bodies: Vec<Body>,
+    body_surfaces: Vec<BodySurface>,
     surfaces: Surfaces,
     fields: Vec<PublishedField>,
     fluxes: Vec<Flux>,
@@ -171,6 +174,12 @@ impl Exchange {
         &self.bodies[at.body].states[at.row]
     }
 
+    /// The state of a row from which its next interval goes on, whichever of two systems has its turn first; where the interval is repeated, at its
+    /// start.
+    pub fn state_before(&self, at: BodyRow) -> &BodyState {
+        self.repeat.as_ref().map_or(self.state(at), |repeat| &repeat.start[at.body][at.row])
+    }
+
     /// The state of a row at a time within the interval [s], where that is repeated; else as published: carrying it on would deliver a partner's
     /// kick an interval late.
     pub fn state_at(&self, at: BodyRow, t: f64) -> BodyState {
@@ -184,6 +193,22 @@ impl Exchange {
     /// Whether this interval is repeated until systems agree. Post what acts throughout it as steady then.
     pub fn repeats(&self) -> bool {
         self.repeat.is_some()
+    }
+
+    /// Gives rows of a body a surface, which systems of masses visit.
+    pub fn cover(&mut self, surface: BodySurface) {
+        self.body_surfaces.push(surface);
+    }
+
+    /// Whether two rows of bodies are the same row of a system.
+    pub fn is_same(&self, a: BodyRow, b: BodyRow) -> bool {
+        let [a, b] = [a, b].map(|at| (self.bodies[at.body].system, self.bodies[at.body].rows.start + at.row));
+        a == b
+    }
+
+    /// The surfaces of bodies.
+    pub fn body_surfaces(&self) -> &[BodySurface] {
+        &self.body_surfaces
     }
 
     /// Solids that systems have published, in the order in which systems have entered: the scenery is the first.
@@ -322,6 +347,12 @@ impl Turn<'_> {
     /// forces as steady: as a kick they would set resting bodies in motion.                                     (coupling.6)
     pub fn post_steady(&mut self, to: BodyRow, point: Vector, impulse: Vector) {
         self.send((to, true), point, impulse);
+    }
+
+    /// The same of a sum of impulses [N s] with their moment about the origin [N m s].
+    pub fn post_sum(&mut self, to: BodyRow, impulse: Vector, moment: Vector) {
+        self.exchange.posted = self.exchange.posted + impulse;
+        self.exchange.mail.push(Letter { address: (to, true), wrench: Wrench { impulse, moment }, from: self.system });
     }
 
     fn send(&mut self, address: Address, point: Vector, impulse: Vector) {

@@ -1,6 +1,6 @@
 //! Rigid bodies: shapes, masses and inertia, and where copies stand.
 
-use crate::geometry::{Friction, Vector, surface};
+use crate::geometry::{Collider, Facets, Friction, Shape, Vector, surface};
 use crate::math::Quat;
 use crate::math::rotation::from_degrees;
 use crate::systems::rigid::{Body, Hull, pose};
@@ -12,9 +12,10 @@ use tumble_interface::scene::{Arrange, Body as Words, BodyShape};
 /// Flat sides around what is round, in pictures.
 const SIDES: u32 = 48;
 
-/// Bodies of an object: their surface, that for pictures, and their states.
+/// Bodies of an object: their surface, that which masses of other systems touch, that for pictures, and their states.
 pub struct Made {
     pub hull: Hull,
+    pub solid: Collider,
     pub mesh: Mesh,
     pub bodies: Vec<Body>,
 }
@@ -68,6 +69,24 @@ fn drawn(shape: &SharedShape) -> Mesh {
     let Some(hull) = shape.as_convex_polyhedron() else { return Mesh::default() };
     let (points, triangles) = hull.to_trimesh();
     Mesh { vertices: points.iter().map(|p| [p.x, p.y, p.z]).collect(), triangles, ..Mesh::default() }
+}
+
+/// The surface of a body that masses touch: `back` and `turn` lead from the axes of its words to its own.
+fn touched(words: &BodyShape, shape: &SharedShape, mesh: &Mesh, back: impl Fn(Vector) -> Vector, turn: Quat<f64>) -> Option<Shape> {
+    let zero = Vector::default();
+    Some(match words {
+        BodyShape::Sphere { radius } => Shape::Sphere { center: back(zero), radius: *radius },
+        BodyShape::Box { size: [x, y, z] } => Shape::Box { center: back(zero), half: Vector { x: 0.5 * x, y: 0.5 * y, z: 0.5 * z }, turn },
+        BodyShape::Capsule { radius, length } => {
+            let tip = Vector { x: 0.0, y: 0.0, z: 0.5 * length };
+            Shape::Capsule { from: back(-tip), to: back(tip), radius: *radius }
+        }
+        _ => {
+            let hull = if let BodyShape::Mesh(_) = words { drawn(shape) } else { mesh.clone() };
+            let vertices = hull.vertices.iter().map(|p| back(Vector::from(*p)).into()).collect();
+            Shape::Animated { facets: Facets::new(&[&Mesh { vertices, ..hull }], &[0.0])?, shell: false }
+        }
+    })
 }
 
 /// Bodies of an object; `file` is the mesh of its shape, if that is one.
@@ -131,8 +150,24 @@ pub fn bodies(words: &Words, file: Option<&Mesh>) -> Result<Made, Wrong> {
         })
     };
     let bodies = places.iter().enumerate().map(body).collect::<Result<Vec<_>, Wrong>>()?;
+    let Some(shape) = touched(&words.shape, &hull.shape, &mesh, back, axes.conj()) else {
+        return wrong(".shape", "its surface has no triangle with an area".into());
+    };
+    let solid = Collider {
+        name: words.name.clone(),
+        shape,
+        inside: false,
+        thickness: words.thickness,
+        friction,
+        rubbing: None,
+        restitution: words.restitution,
+        belt: Vector::default(),
+        motion: None,
+        rig: None,
+        edges: None,
+    };
     let mesh = Mesh { vertices: mesh.vertices.iter().map(|p| back(Vector::from(*p)).into()).collect(), ..mesh };
-    Ok(Made { hull, mesh, bodies })
+    Ok(Made { hull, solid, mesh, bodies })
 }
 
 /// Where bodies of this width and height [m] stand.

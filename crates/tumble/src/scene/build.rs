@@ -87,7 +87,7 @@ pub fn build(scene: &Scene, assets: &Assets) -> Result<Built, SceneError> {
         assets,
         gravity: gravity(scene, &mut issues),
         up: if scene.dimension == 2 && scene.plane == Plane::Xy { [0.0, 1.0, 0.0] } else { [0.0, 0.0, 1.0] }.into(),
-        interval: scene.frame_time() / f64::from(scene.time.exchanges),
+        interval: scene.interval(),
         colliders,
         surfaces,
         masses: scene.system.iter().map(|_| Parts::default()).collect(),
@@ -114,7 +114,7 @@ pub fn build(scene: &Scene, assets: &Assets) -> Result<Built, SceneError> {
     match systems.into_iter().collect::<Option<Vec<_>>>() {
         Some(systems) if issues.is_empty() => {
             let systems = ids.into_iter().zip(systems).chain([scenery]).collect();
-            let mut world = World::new(systems, exchange, scene.frame_time(), scene.time.exchanges);
+            let mut world = World::new(systems, exchange, scene.frame_time(), scene.exchanges());
             world.repeat_until_agreed(scene.world.coupling.clone());
             Ok(Built { world, warnings })
         }

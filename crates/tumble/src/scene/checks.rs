@@ -35,7 +35,7 @@ pub fn check(scene: &Scene) -> Vec<Issue> {
             wrong(format!("{path}.name"), "another system has this name; names must differ".into());
         }
         check_system(system, &path, &mut wrong);
-        let interval = scene.frame_time() / f64::from(scene.time.exchanges);
+        let interval = scene.interval();
         if let Some(step) = system.step.filter(|step| interval / step > MOST_SUBSTEPS) {
             wrong(
                 format!("{path}.step"),

@@ -22,7 +22,7 @@ pub fn cures<E: Engine>(
     usable: &[(Integrator, f64)],
     go_on: &(dyn Fn() -> bool + Sync),
 ) -> Vec<Cure> {
-    let dt = scene.frame_time() / f64::from(scene.time.exchanges);
+    let dt = scene.interval();
     let plan = &scene.system[system];
     let (own, method) = (plan.integrator, rules(plan.method));
     let usable_step = |i: Integrator| usable.iter().find(|(integrator, _)| *integrator == i).map_or(0.0, |(_, step)| *step);
@@ -62,7 +62,7 @@ fn attempt<E: Engine>(
     if plan.integrator != integrator {
         set.push(format!("system.{system}.integrator={}", integrator.name()));
     }
-    let dt = scene.frame_time() / f64::from(scene.time.exchanges);
+    let dt = scene.interval();
     if plan.step.is_some() {
         plan.step = Some(dt / f64::from(n));
         set.push(format!("system.{system}.step={:e}", dt / f64::from(n)));

@@ -1,5 +1,6 @@
 //! What a scene says in vain, and what it hardly means.
 
+use super::methods::touches;
 use super::methods::{METHODS, present};
 use crate::recipes::named;
 use tumble_interface::Warning;
@@ -17,7 +18,7 @@ pub fn coupled(scene: &Scene) -> Option<Warning> {
     };
     let joins = scene.anchor.iter().any(|anchor| of(&anchor.between[0]) != of(&anchor.between[1]));
     let message = "no anchor joins two systems, so that each interval is taken again for nothing; leave it out";
-    (scene.world.coupling.is_some() && !joins).then(|| Warning::new(Code::Unfelt, "world.coupling", message))
+    (scene.world.coupling.is_some() && !joins && !touches(scene)).then(|| Warning::new(Code::Unfelt, "world.coupling", message))
 }
 
 /// What a resolved scene says and nothing heeds.
@@ -133,7 +134,7 @@ fn doubts(scene: &Scene, emitter: &Emitter, warnings: &mut Vec<Warning>) {
         _ => 0.0,
     };
     let speed = given.max(emitter.speed.constant().unwrap_or(0.0).abs());
-    let way = speed / (scene.time.fps * f64::from(scene.time.exchanges));
+    let way = speed / (scene.time.fps * f64::from(scene.exchanges()));
     for (i, rule) in emitter.kill.iter().enumerate() {
         let thick = match rule {
             Kill::Inside(Shape::Sphere { radius, .. } | Shape::Capsule { radius, .. }) => 2.0 * radius,
@@ -141,7 +142,7 @@ fn doubts(scene: &Scene, emitter: &Emitter, warnings: &mut Vec<Warning>) {
             _ => continue,
         };
         if way > thick {
-            let enough = (f64::from(scene.time.exchanges) * way / thick).ceil();
+            let enough = (f64::from(scene.exchanges()) * way / thick).ceil();
             let message = format!(
                 "at {} m/s particles may pass {} m unseen, for rules are looked at when an exchange \
                  interval ends; set time.exchanges to {enough} or more",

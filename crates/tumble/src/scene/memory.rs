@@ -206,7 +206,7 @@ fn alive(scene: &Scene) -> Vec<f64> {
         };
         births.push((rate, bursts));
         // All that are born in an exchange interval stand in a list before they live, however short.
-        let interval = scene.frame_time() / f64::from(scene.time.exchanges);
+        let interval = scene.interval();
         let life = (longest(thing) * (1.0 + thing.lifetime_spread)).min(duration);
         counts.push((rate * life + bursts).min(thing.most.map_or(f64::INFINITY, f64::from)) + rate * interval);
     }

@@ -1,6 +1,6 @@
 //! Masses under forces, and position-based dynamics.
 
-use super::{MethodRules, emitted, is_in, particles};
+use super::{MethodRules, emitted, is_in, particles, surfaces, touches};
 use crate::forces::Load;
 use crate::geometry::motion::Pose;
 use crate::geometry::{Carrier, Collider, Vector};
@@ -111,7 +111,8 @@ impl MethodRules for Rules {
             native: scene.bits == Bits::Native,
             colliders: builder.colliders.clone(),
         };
-        builder.warnings.extend(buried(scene, &parts, &builder.colliders));
+        let inside = buried(builder, &parts, index);
+        builder.warnings.extend(inside);
         builder.warnings.extend(coincident::springs(&parts));
         let known = builder.issues.len();
         far::objects(&parts, &mut builder.issues, &mut builder.warnings);
@@ -129,6 +130,11 @@ impl MethodRules for Rules {
         };
         builder.warnings.extend(system.tangles());
         builder.warnings.extend(system.doubts(interval));
+        // What anchors tie to bodies hangs on them, and is not there to bear them.
+        let tied = builder.anchors.iter().any(|anchor| anchor.on_body && anchor.ends[0].0 == index);
+        if touches(scene) && !tied {
+            builder.warnings.extend(system.yields(interval));
+        }
         builder.warnings.extend(system.idle_attachments());
         if builder.exchange.has_bodies(builder.ids[index]) {
             system.expect_pushes();
@@ -303,34 +309,49 @@ fn planted(site: &mut Site<'_>, scene: &Scene, thing: &Hair, assets: &Assets, (c
     }
 }
 
-/// What starts inside a collider.
-fn buried(scene: &Scene, parts: &Parts, colliders: &[Collider]) -> Vec<Warning> {
+/// What starts inside a collider, or a rigid body that no anchor ties it to.
+fn buried(builder: &Builder<'_>, parts: &Parts, index: usize) -> Vec<Warning> {
     type Start = (f64, Vector);
+    let scene = builder.scene;
     let deeper = |a: (f64, f64, usize), b: (f64, f64, usize)| if b.0 > a.0 { b } else { a };
-    let deepest = |start: &(dyn Fn(usize) -> Option<Start> + Sync), n: usize, spare: f64| {
+    let deepest = |solids: &[Collider], start: &(dyn Fn(usize) -> Option<Start> + Sync), n: usize, spare: f64| {
         let one = |i: usize| {
             let (t, x) = start(i)?;
             let depth = |(k, c): (usize, &Collider)| Some((c.touch(x, t)?.depth - c.thickness, t, k));
-            colliders.iter().enumerate().filter_map(depth).filter(|found| found.0 > spare).reduce(deeper)
+            solids.iter().enumerate().filter_map(depth).filter(|found| found.0 > spare).reduce(deeper)
         };
         fold(n, |range| range.filter_map(one).reduce(deeper)).into_iter().flatten().reduce(deeper)
     };
+    let (colliders, bodies) = (&builder.colliders[..], if touches(scene) { surfaces(scene, builder.assets) } else { Vec::new() });
+    let ends = builder.anchors.iter().filter(|anchor| anchor.on_body).map(|anchor| anchor.ends[0]);
+    let tied: Vec<usize> = ends.filter(|(system, _)| *system == index).map(|(_, row)| row as usize).collect();
+    let wet = |name: &str| scene.particles.iter().any(|thing| thing.name == name && thing.fluid.is_some());
     let end = scene.frame_time() * f64::from(scene.time.frames);
-    let masses = parts.ranges().map(|(name, range)| {
+    let mut found = Vec::new();
+    for (name, range) in parts.ranges() {
         let free = |i: usize| (parts.inverse_mass(i as u32) > 0.0).then(|| (0.0, parts.position(i as u32)));
-        (name, deepest(&|i| free(range.start + i), range.len(), 1e-6))
-    });
+        found.push((name, "collider", deepest(colliders, &|i| free(range.start + i), range.len(), 1e-6), colliders));
+        // Held masses throw out the body.
+        let loose = |i: usize| (!tied.contains(&i)).then(|| (0.0, parts.position(i as u32)));
+        if !wet(name) {
+            found.push((name, "body", deepest(&bodies, &|i| loose(range.start + i), range.len(), 1e-6), &bodies[..]));
+        }
+    }
     // A source may touch a surface: particles are not deep in it before they are all in it.
-    let sources = parts.emitters().map(|e| (e.words().name.as_str(), deepest(&|k| e.trial(k, TRIALS, end), TRIALS, e.first_radius())));
-    let told = |(name, found): (&str, Option<(f64, f64, usize)>)| {
+    for e in parts.emitters() {
+        let deep = deepest(colliders, &|k| e.trial(k, TRIALS, end), TRIALS, e.first_radius());
+        found.push((e.words().name.as_str(), "collider", deep, colliders));
+    }
+    let told = |(name, kind, found, solids): (&str, &str, Option<(f64, f64, usize)>, &[Collider])| {
         let (deep, t, k) = found?;
-        let (deep, solid) = (short(deep), &scene.collider[k].name);
+        let (deep, solid) = (short(deep), &solids[k].name);
+        let out = if kind == "body" { "each other" } else { "it" };
         let when = if t > 0.0 { format!(" at t = {} s", short(t)) } else { String::new() };
         let message =
-            format!("masses start{when} up to {deep} m inside collider \"{solid}\", and will be thrown out of it; move one of them");
+            format!("masses start{when} up to {deep} m inside {kind} \"{solid}\", and will be thrown out of {out}; move one of them");
         Some(Warning::new(Code::StartsInside, format!("\"{name}\""), message))
     };
-    masses.chain(sources).filter_map(told).collect()
+    found.into_iter().filter_map(told).collect()
 }
 
 /// Between systems the one of the first end owns the spring; the other gives a body.

@@ -8,7 +8,7 @@ mod rigid;
 mod tracers;
 mod vicsek;
 
-pub use rigid::body_of;
+pub use rigid::{body_of, surfaces};
 
 use super::Assets;
 use super::build::Builder;
@@ -24,6 +24,9 @@ use tumble_interface::{Issue, Warning};
 /// A constant: as a static it would be compiled into the unit tests, with the whole engine behind it.
 pub const METHODS: [&dyn MethodRules; 7] =
     [&dynamics::Rules, &tracers::Rules, &vicsek::Rules, &rigid::Rules, &gas::Rules, &heat::Rules, &compressible::Rules];
+
+/// Exchanges a second where masses and rigid bodies touch: in one interval a body falls 0.1 mm before what bears it says so.
+const RATE: f64 = 240.0;
 
 /// What the scene layer knows of a method. Scenes that it is given are resolved, but for `leads`.
 pub trait MethodRules: Sync {
@@ -173,7 +176,21 @@ pub fn resolve(mut scene: Scene) -> Scene {
         }
     }
     scene.system = systems;
+    let often = if touches(&scene) { (RATE / scene.time.fps).ceil().clamp(1.0, 1e5) as u32 } else { 1 };
+    scene.time.exchanges.get_or_insert(often);
     scene
+}
+
+/// Whether masses and rigid bodies may touch, in a scene whose systems are written out.
+pub fn touches(scene: &Scene) -> bool {
+    let moves = |method, kind: &dyn Fn(&str) -> bool| {
+        let own = |o: &tumble_interface::scene::Object<'_>| {
+            kind(o.kind) && place(&scene.system, o.kind, o.system).is_some_and(|i| scene.system[i].method == method)
+        };
+        scene.objects().iter().any(own)
+    };
+    let dry = || scene.particles.iter().any(|thing| thing.fluid.is_none());
+    moves(Method::Rigid, &|kind| kind == "body") && moves(Method::Dynamics, &|kind| kind != "particles" || dry())
 }
 
 /// A system for each method that objects of the scene need.

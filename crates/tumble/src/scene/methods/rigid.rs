@@ -1,6 +1,9 @@
 //! Rigid bodies: words to shapes, masses and states.
 
-use super::{MethodRules, is_in};
+use super::{MethodRules, is_in, place, touches};
+use crate::exchange::BodySurface;
+use crate::geometry::motion::Key;
+use crate::geometry::{Collider, Motion, Vector};
 use crate::recipes;
 use crate::scene::Assets;
 use crate::scene::build::Builder;
@@ -9,6 +12,7 @@ use crate::scene::plausible::odd_density;
 use crate::system::System;
 use crate::systems::rigid::{Bodies, Body as State, Ends, Joint, Object, Rigid, Settings, refusal};
 use std::ops::Range;
+use std::sync::Arc;
 use tumble_interface::check::short;
 use tumble_interface::looks::{Colors, FEW, Form, Look, SOLID};
 use tumble_interface::scene::{Body, BodyShape, Integrator, Method, Scene, System as Plan};
@@ -101,11 +105,18 @@ impl MethodRules for Rules {
                     ends.iter().any(|end| end == name) && ends.iter().any(|end| scene.body.iter().any(|thing| thing.name == *end))
                 })
             };
-        let others = scene.objects().into_iter().filter(|o| !matches!(o.kind, "body" | "joint") && !tied(o.name));
+        // Masses of dynamics touch bodies; in a liquid contact alone would carry them wrongly.
+        let wet = |name: &str| scene.particles.iter().any(|thing| thing.name == name && thing.fluid.is_some());
+        let visits = |o: &tumble_interface::scene::Object<'_>| {
+            let mover = place(&scene.system, o.kind, o.system).map(|i| scene.system[i].method);
+            mover == Some(Method::Dynamics) && !wet(o.name)
+        };
+        let others = scene.objects().into_iter().filter(|o| !matches!(o.kind, "body" | "joint") && !tied(o.name) && !visits(o));
         let kinds: Vec<&str> = others.map(|o| o.kind).collect();
         if let (Some(other), false) = (kinds.first(), scene.body.is_empty()) {
-            let message =
-                format!("rigid bodies meet each other and colliders, but not yet what [[{other}]] consists of, nor does that meet them");
+            let message = format!(
+                "rigid bodies meet each other, colliders, and masses of dynamics systems, but not yet what [[{other}]] consists of, nor does that meet them"
+            );
             warnings.push(Warning::new(Code::Unfelt, "body", message));
         }
         let own = |plan: &&Plan| plan.method == Method::Rigid && scene.body.iter().any(|thing| is_in(&thing.system, plan));
@@ -134,12 +145,13 @@ impl MethodRules for Rules {
 
     fn build(&self, builder: &mut Builder<'_>, index: usize) -> Option<Box<dyn System>> {
         let (scene, plan) = (builder.scene, builder.plan(index));
-        let (mut objects, mut bodies) = (Vec::new(), Bodies::default());
+        let (mut objects, mut bodies, mut solids) = (Vec::new(), Bodies::default(), Vec::new());
         for thing in scene.body.iter().filter(|t| is_in(&t.system, plan)) {
             match recipes::bodies(thing, file_of(thing, builder.assets).as_ref()) {
                 Ok(made) => {
                     let first = bodies.rows.len();
                     bodies.hull.resize(first + made.bodies.len(), bodies.hulls.len() as u32);
+                    solids.push((first..first + made.bodies.len(), Arc::new(made.solid), made.hull.reach));
                     bodies.hulls.push(made.hull);
                     bodies.rows.extend(made.bodies);
                     objects.push(Object { name: thing.name.clone(), rows: first..bodies.rows.len(), mesh: made.mesh });
@@ -148,6 +160,12 @@ impl MethodRules for Rules {
             }
         }
         bodies.moving = bodies.rows.len();
+        if touches(scene) {
+            let rows = builder.exchange.open(builder.ids[index], 0..bodies.moving, true);
+            for (range, solid, reach) in solids {
+                builder.exchange.cover(BodySurface { rows: rows[range].to_vec(), solid, reach });
+            }
+        }
         for solid in builder.colliders.iter() {
             if let Some(message) = refusal(solid) {
                 builder.issues.push(Issue::new(format!("collider \"{}\"", solid.name), message));
@@ -177,6 +195,17 @@ pub fn body_of(scene: &Scene, assets: &Assets, name: &str, index: usize) -> Opti
     let first = before.map(count).sum::<f64>() as usize;
     let made = recipes::bodies(thing, file_of(thing, assets).as_ref()).ok()?;
     Some(((first + index) as u32, made.bodies.len(), made.bodies.get(index).copied()))
+}
+
+/// The surfaces of all bodies that masses touch, where they start.
+pub fn surfaces(scene: &Scene, assets: &Assets) -> Vec<Collider> {
+    let made = scene.body.iter().filter_map(|thing| recipes::bodies(thing, file_of(thing, assets).as_ref()).ok());
+    let zero = Vector::default();
+    let placed = |solid: &Collider, body: &State| {
+        let keys = vec![Key { time: 0.0, shift: body.x, turn: body.q }];
+        Collider { motion: Some(Motion { velocity: zero, spin: zero, pivot: zero, keys, smooth: false }), ..solid.clone() }
+    };
+    made.flat_map(|made| made.bodies.iter().map(|body| placed(&made.solid, body)).collect::<Vec<_>>()).collect()
 }
 
 /// The mesh of a body, if it has one.

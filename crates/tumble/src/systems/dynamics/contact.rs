@@ -73,6 +73,8 @@ pub struct Found {
     pub hits: Vec<(usize, Hit)>,
     /// Impulses of counted rows on every solid [N s]; empty without any.
     pub pushes: Vec<Vector>,
+    /// The normal of the contact that has changed the velocity most, and by how much [m/s].
+    pub normal: (Vector, f64),
 }
 
 /// One mass, as the pass tells of it.
@@ -86,6 +88,14 @@ struct Teller<'a> {
 impl Teller<'_> {
     fn hit(&mut self, hit: Hit) {
         self.found.hits.push((self.row, hit));
+    }
+
+    /// A contact with this normal has changed its velocity by this much.
+    fn met(&mut self, normal: Vector, change: Vector) {
+        let size = change.norm();
+        if self.found.normal.1 <= size {
+            self.found.normal = (normal, size);
+        }
     }
 
     /// A solid has changed its velocity by this much.
@@ -150,6 +160,7 @@ fn resolve(colliders: &[Collider], step: &Step, before: (Row, Row), x: &mut Row,
             let arriving = velocity;
             let velocity = rebound((collider, friction), velocity - surface, ahead, normal, step.resting) + surface;
             teller.push(solid, velocity - arriving);
+            teller.met(normal, velocity - arriving);
             if step.observed && approach < -step.resting {
                 teller.hit(Hit { time: step.end(), x: position, v: velocity, normal });
             }
@@ -219,6 +230,7 @@ fn meet(
         let arriving = start + pull * (left * s) - surface;
         let friction = collider.friction_at(step.t + gone);
         start = rebound((collider, friction), arriving, ahead, n, step.resting);
+        teller.met(n, start - arriving);
         if step.observed && arriving.dot(n) < -step.resting {
             teller.hit(Hit { time: step.t + gone, x: from, v: start + surface, normal: n });
         }

@@ -56,6 +56,8 @@ pub struct Core {
     /// Positions and velocities at the start of a sub-step, for contact.
     pub before: Vec<Row>,
     pub before_v: Vec<Row>,
+    /// Whether bodies of other systems are there to be touched.
+    pub visits: bool,
     /// Impulses of liquids on every solid in the last contact pass [N s].
     pub pushes: Vec<Vector>,
     /// Scale of the energy.
@@ -123,6 +125,11 @@ impl Core {
         done.map_or(Vec::new(), |()| out)
     }
 
+    /// Whether there is a solid to touch.
+    pub fn meets_solids(&self) -> bool {
+        self.visits || !self.laws.colliders.is_empty()
+    }
+
     /// Keeps the positions at the start of a sub-step.
     pub fn keep_positions(&mut self) {
         self.before.resize(self.state.x.len(), ZERO);
@@ -131,7 +138,7 @@ impl Core {
 
     /// Keeps the velocities at the start of a sub-step, if contact will ask for them.
     pub fn keep_velocities(&mut self) {
-        if !self.laws.colliders.is_empty() {
+        if self.meets_solids() {
             self.before_v.resize(self.state.x.len(), ZERO);
             self.before_v.copy_from_slice(&self.state.v);
         }
@@ -158,7 +165,7 @@ impl Core {
                 pass.rows(points.start + c * CHUNK, [before, before_v], x, v, &mut found);
                 found
             });
-            for Found { touched, hits, pushes } in all {
+            for Found { touched, hits, pushes, .. } in all {
                 self.memory.ready &= !touched;
                 hits.into_iter().for_each(|(row, hit)| self.pool.note_row(row, hit));
                 self.pushes.iter_mut().zip(pushes).for_each(|(sum, push)| *sum = *sum + push);
@@ -196,7 +203,7 @@ impl Core {
 }
 
 /// A range without some others, which are in order.
-fn without(range: Range<usize>, others: &[Range<usize>]) -> Vec<Range<usize>> {
+pub fn without(range: Range<usize>, others: &[Range<usize>]) -> Vec<Range<usize>> {
     let (mut left, mut start) = (Vec::new(), range.start);
     for other in others.iter().filter(|other| other.start < range.end && range.start < other.end) {
         left.push(start..other.start.max(start));

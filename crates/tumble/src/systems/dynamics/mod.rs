@@ -23,6 +23,7 @@ mod liquid_loads;
 mod local;
 mod modes;
 mod parts;
+mod reaction;
 mod scale;
 mod scheme;
 mod self_contact;
@@ -41,24 +42,33 @@ use crate::geometry::{Collider, Vector};
 use crate::integrators;
 use crate::math::{Real, Row, Signal, xyz64};
 use crate::pool::Birth;
+use crate::state::State;
 use crate::system::{Archive, Part, System};
 use core::Core;
 use feature::Span;
 use features::Features;
+use reaction::Reaction;
 use scale::Scale;
 use scheme::Scheme;
 use std::sync::Arc;
+use tumble_interface::check::short;
 use tumble_interface::engine::{Ledger, Share, Stability, StepReport, UserForce, UserIntegrator, Worst};
+use tumble_interface::scene::Integrator;
+use tumble_interface::warning::Code;
 use tumble_interface::{Column, SceneError, StepError, Warning};
 
 /// Sub-steps of an exchange interval beyond which a step counts as too small.
 pub const MOST_SUBSTEPS: f64 = 1e7;
+
+/// h² k/m of masses beyond which they bear rigid bodies too weakly.                                 (coupling.8)
+const YIELDING: f64 = 1.0;
 
 /// A system of masses.
 pub struct Dynamics {
     core: Core,
     scheme: Box<dyn Scheme>,
     features: Features,
+    reaction: Reaction,
     stepping: Stepping,
     /// Sub-steps that automatic stepping has chosen; 0 before the first interval.
     automatic: u32,
@@ -99,6 +109,7 @@ impl Dynamics {
             core,
             scheme,
             features,
+            reaction: Reaction::default(),
             stepping: settings.stepping,
             automatic: 0,
             measured: 0,
@@ -150,6 +161,34 @@ impl Dynamics {
         }
     }
 
+    /// A warning of springs that pull masses far into the rigid bodies which they bear, in intervals of length dt [s].
+    pub fn yields(&self, dt: f64) -> Option<Warning> {
+        let Core { laws, state: State { x, .. }, integrator, name, .. } = &self.core;
+        let steps = match self.stepping {
+            Stepping::Substeps(n) => f64::from(n),
+            Stepping::Step(step) => integrators::equal_steps(dt, step),
+            Stepping::Automatic => return None,
+        };
+        // Rods are stiff along themselves, and yield to what lies on them.
+        if self.scheme.is_adaptive(&self.core) || laws.masses.frames.start < laws.masses.frames.end {
+            return None;
+        }
+        let h = dt / steps;
+        let stiff = |(x, (grip, mass)): (&Row, (&Real, &Real))| if x[3] > 0.0 { f64::from(*grip) / f64::from(*mass) } else { 0.0 };
+        let most = h * h * x.iter().zip(laws.grip.iter().zip(&laws.masses.mass)).map(stiff).fold(0.0, f64::max);
+        // It evaluates forces where masses are held.
+        (most > YIELDING && *integrator != Integrator::SymplecticEuler).then(|| {
+            let message = format!(
+                "h² k/m of its masses is up to {}: in sub-steps of {} s springs pull masses into the rigid bodies that they bear, which then hang too low; take \
+                 {} sub-steps, or softer springs",
+                short(most),
+                short(h),
+                (steps * most.sqrt()).ceil()
+            );
+            Warning::new(Code::YieldingMasses, format!("system \"{name}\""), message)
+        })
+    }
+
     /// A warning of long-range attachments that attach nothing.
     pub fn idle_attachments(&self) -> Option<Warning> {
         self.scheme.idle_attachments(&self.core)
@@ -197,6 +236,18 @@ impl Dynamics {
         }
     }
 
+    /// Takes the bodies of other systems as they are now. What they may do to masses at first is a scale of the energy; later, masses that explode
+    /// would fling bodies, and hide it.
+    fn visit(&mut self, exchange: &Exchange) {
+        self.reaction.begin(exchange, self.anchors.iter().map(|anchor| (anchor.row, anchor.other)));
+        if !self.reaction.is_empty() && !std::mem::replace(&mut self.core.visits, true) {
+            self.pushed = true;
+            let fastest = self.reaction.fastest();
+            let hit = 2.0 * self.core.total().mass * fastest * fastest;
+            self.core.scale.size = self.core.scale.size.max(hit);
+        }
+    }
+
     /// All sub-steps of an interval.
     fn advance_interval(&mut self, t: f64, dt: f64, exchange: &mut Turn<'_>, go_on: GoOn<'_>) -> Result<StepReport, StepError> {
         let mut births = self.core.pool.schedule_births(&self.core.name, t, dt)?;
@@ -209,7 +260,8 @@ impl Dynamics {
             return Err(StepError::StepTooSmall { system: self.core.name.clone(), time: t, step: dt / substeps });
         }
         let (substeps, h) = (substeps as u32, dt / substeps);
-        let alone = self.core.is_local() && self.features.are_idle() && self.anchors.is_empty() && !self.watched;
+        let alone =
+            self.core.is_local() && self.features.are_idle() && self.anchors.is_empty() && self.reaction.is_empty() && !self.watched;
         if alone && self.scheme.steps_alone(&self.core) {
             let response = self.scheme.response(&self.core);
             let done = self.core.advance_blocks(Span { t, h }, substeps, response, go_on);
@@ -287,7 +339,10 @@ impl Dynamics {
     /// Ends a sub-step: corrections of positions, contact with solids, features.
     fn finish(&mut self, step: Span, report: &mut StepReport) {
         self.scheme.correct(&mut self.core, &mut self.features, step, report);
-        self.core.resolve_contact(step, self.scheme.response(&self.core));
+        let response = self.scheme.response(&self.core);
+        // Solids have the last word: what lies between one and a body stays out of the solid.
+        self.reaction.resolve(&mut self.core, step, response.lead);
+        self.core.resolve_contact(step, response);
         self.features.after(&mut self.core, step, report);
     }
 
@@ -322,7 +377,9 @@ impl System for Dynamics {
     fn advance(&mut self, t: f64, dt: f64, exchange: &mut Turn<'_>, go_on: &(dyn Fn() -> bool + Sync)) -> Result<StepReport, StepError> {
         // Impulses until here.
         self.core.laws.steady.iter_mut().for_each(|(_, force)| *force = *force * (1.0 / dt));
+        self.visit(exchange);
         let report = self.advance_interval(t, dt, exchange, go_on);
+        self.reaction.end(exchange);
         self.core.memory.ready &= self.core.laws.steady.is_empty();
         self.core.laws.steady.clear();
         self.core.pool.tell(exchange);

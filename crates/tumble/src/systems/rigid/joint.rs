@@ -436,6 +436,11 @@ impl Joints {
         self.all.iter().filter(|joint| !joint.broken).flat_map(|joint| joint.pair).filter(|i| *i != WORLD)
     }
 
+    /// The two that each holds together; one may be the world.
+    pub fn pairs(&self) -> impl Iterator<Item = [u32; 2]> {
+        self.all.iter().filter(|joint| !joint.broken).map(|joint| joint.pair)
+    }
+
     /// Pairs of bodies that do not touch, in order.
     pub fn apart(&self) -> Vec<[u32; 2]> {
         let joined = self.all.iter().filter(|joint| !joint.broken && !joint.collides && joint.pair[0] != WORLD);

@@ -202,6 +202,56 @@ impl Rigid {
         self.contacts = contacts;
     }
 
+    /// Which bodies a solid or the world holds, directly or by other bodies; all others fall, whatever they do to each other.
+    fn borne(&self) -> Vec<bool> {
+        let moving = self.bodies.moving;
+        let contacts = self.contacts.iter().filter(|contact| contact.press > 0.0).map(|contact| contact.pair);
+        let pairs: Vec<[usize; 2]> = contacts.chain(self.joints.pairs()).map(|pair| pair.map(|i| i as usize)).collect();
+        let mut beside = vec![Vec::new(); moving];
+        for [a, b] in &pairs {
+            for (one, other) in [(*a, *b), (*b, *a)] {
+                if one < moving {
+                    beside[one].push(other);
+                }
+            }
+        }
+        let (mut borne, mut next) = (vec![false; moving], Vec::new());
+        next.extend((0..moving).filter(|i| beside[*i].iter().any(|other| *other >= moving)));
+        while let Some(i) = next.pop() {
+            if !std::mem::replace(&mut borne[i], true) {
+                next.extend(beside[i].iter().copied().filter(|other| *other < moving));
+            }
+        }
+        borne
+    }
+
+    /// What bears each body: the direction away from it, by the loads of its contacts, zero if joints alone do, or nothing; and its footing.
+    fn supports(&self, borne: &[bool]) -> Vec<(Vector, (Vector, [f64; 6]))> {
+        let mut feet: Vec<Vec<(Vector, Vector)>> = vec![Vec::new(); borne.len()];
+        let holds = |i: usize| borne.get(i).is_none_or(|borne| *borne);
+        for contact in self.contacts.iter().filter(|contact| contact.press > 0.0) {
+            let [a, b] = contact.pair.map(|i| i as usize);
+            for (k, one, other, away) in [(0, a, b, -contact.normal), (1, b, a, contact.normal)] {
+                if one < feet.len() && holds(other) {
+                    feet[one].push((self.bodies.rows[one].x + contact.arms[k], away * contact.press));
+                }
+            }
+        }
+        let support = |feet: Vec<(Vector, Vector)>| {
+            let normal = feet.iter().fold(Vector::default(), |sum, (_, load)| sum + *load).normalized();
+            // Those that press on it from the other side do not bear it.
+            let below: Vec<Vector> = feet.iter().filter(|(_, load)| load.dot(normal) > 0.0).map(|(place, _)| *place).collect();
+            let share = 1.0 / below.len().max(1) as f64;
+            let foot = below.iter().fold(Vector::default(), |sum, place| sum + *place * share);
+            let mut spread = [0.0; 6];
+            for Vector { x, y, z } in below.into_iter().map(|place| place - foot) {
+                spread.iter_mut().zip([x * x, y * y, z * z, x * y, y * z, z * x]).for_each(|(sum, part)| *sum += part * share);
+            }
+            (normal, (foot, spread))
+        };
+        feet.into_iter().map(support).collect()
+    }
+
     fn moving(&self) -> &[Body] {
         &self.bodies.rows[..self.bodies.moving]
     }
@@ -293,9 +343,15 @@ impl System for Rigid {
     }
 
     fn publish(&mut self, t: f64, exchange: &mut Turn<'_>) {
+        let asked = exchange.bodies().any(|body| body.detailed);
+        let borne = if asked { self.borne() } else { Vec::new() };
+        let bears = if asked { self.supports(&borne) } else { Vec::new() };
+        let gravity = Vector::from(self.settings.gravity.at(t));
         for body in exchange.bodies() {
             body.time = t;
             for (state, i) in body.states.iter_mut().zip(body.rows.clone()) {
+                let falls = body.detailed && !borne[i];
+                let (normal, footing) = if body.detailed { bears[i] } else { Default::default() };
                 let row = &mut self.bodies.rows[i];
                 row.orient();
                 *state = BodyState {
@@ -305,7 +361,9 @@ impl System for Rigid {
                     spin: row.w,
                     inverse_mass: row.inverse_mass,
                     inverse_inertia: row.inverse_inertia,
-                    ..*state
+                    acceleration: if falls { gravity } else { Vector::default() },
+                    normal,
+                    footing,
                 };
             }
         }
@@ -421,6 +479,8 @@ impl System for Rigid {
     fn restore(&mut self, archive: &mut Archive) -> Option<()> {
         let (bodies, pairs, contacts) = (archive.numbers("bodies")?, archive.indices("pairs")?, archive.numbers("contacts")?);
         let joints = archive.numbers("joints")?;
+        // Of an interval that was cut short.
+        self.steady.clear();
         if bodies.len() != BODY * self.bodies.moving
             || contacts.len() * 2 != CONTACT * pairs.len()
             || joints.len() != JOINT * self.joints.all.len()

@@ -107,6 +107,7 @@ impl Parts {
             memory: Memory::new(settings.integrator, rows),
             before: Vec::new(),
             before_v: Vec::new(),
+            visits: false,
             pushes: Vec::new(),
             scale: Scale::default(),
             broken: 0,

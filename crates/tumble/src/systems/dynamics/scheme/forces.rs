@@ -64,7 +64,7 @@ impl Forces {
 
     /// Keeps the start of a step for contact.
     fn keep_start(core: &mut Core, features: &Features) {
-        if !core.laws.colliders.is_empty() || features.self_contact.is_some() {
+        if core.meets_solids() || features.self_contact.is_some() {
             core.keep_positions();
         }
         core.keep_velocities();
