@@ -11,7 +11,10 @@ const assets = import.meta.glob("../../python/tumble/scenes/assets/*.{ply,obj,st
   import: "default",
   eager: true,
 }) as Record<string, string>;
-const pictures = import.meta.glob("../pictures/*.webp", { query: "?url", import: "default", eager: true }) as Record<string, string>;
+const pictures = import.meta.glob("../pictures/*.webp", { query: "?url&no-inline", import: "default", eager: true }) as Record<
+  string,
+  string
+>;
 const pages = import.meta.glob("../../docs/theory/*.md", { query: "?raw", import: "default" }) as Record<string, () => Promise<string>>;
 
 export interface Shipped {
