@@ -340,24 +340,23 @@ impl Exchange {
 impl Turn<'_> {
     /// Posts an impulse [N s] to a row at a point [m]: a kick before it moves on.
     pub fn post(&mut self, to: BodyRow, point: Vector, impulse: Vector) {
-        self.send((to, false), point, impulse);
+        self.send((to, false), impulse, point.cross(impulse));
     }
 
     /// Posts an impulse [N s] to a row at a point [m]: that of a constant force while it moves through its next interval. Post reaction
     /// forces as steady: as a kick they would set resting bodies in motion.                                     (coupling.6)
     pub fn post_steady(&mut self, to: BodyRow, point: Vector, impulse: Vector) {
-        self.send((to, true), point, impulse);
+        self.send((to, true), impulse, point.cross(impulse));
     }
 
     /// The same of a sum of impulses [N s] with their moment about the origin [N m s].
     pub fn post_sum(&mut self, to: BodyRow, impulse: Vector, moment: Vector) {
-        self.exchange.posted = self.exchange.posted + impulse;
-        self.exchange.mail.push(Letter { address: (to, true), wrench: Wrench { impulse, moment }, from: self.system });
+        self.send((to, true), impulse, moment);
     }
 
-    fn send(&mut self, address: Address, point: Vector, impulse: Vector) {
+    fn send(&mut self, address: Address, impulse: Vector, moment: Vector) {
         self.exchange.posted = self.exchange.posted + impulse;
-        self.exchange.mail.push(Letter { address, wrench: Wrench { impulse, moment: point.cross(impulse) }, from: self.system });
+        self.exchange.mail.push(Letter { address, wrench: Wrench { impulse, moment }, from: self.system });
     }
 
     /// Takes its mail, in the order in which it was posted.

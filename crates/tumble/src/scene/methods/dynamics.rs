@@ -1,6 +1,6 @@
 //! Masses under forces, and position-based dynamics.
 
-use super::{MethodRules, emitted, is_in, particles, surfaces, touches};
+use super::{MethodRules, emitted, is_in, particles, surfaces, touches, visits_bodies};
 use crate::forces::Load;
 use crate::geometry::motion::Pose;
 use crate::geometry::{Carrier, Collider, Vector};
@@ -325,7 +325,7 @@ fn buried(builder: &Builder<'_>, parts: &Parts, index: usize) -> Vec<Warning> {
     let (colliders, bodies) = (&builder.colliders[..], if touches(scene) { surfaces(scene, builder.assets) } else { Vec::new() });
     let ends = builder.anchors.iter().filter(|anchor| anchor.on_body).map(|anchor| anchor.ends[0]);
     let tied: Vec<usize> = ends.filter(|(system, _)| *system == index).map(|(_, row)| row as usize).collect();
-    let wet = |name: &str| scene.particles.iter().any(|thing| thing.name == name && thing.fluid.is_some());
+    let visits = |name: &str| scene.objects().iter().any(|o| o.name == name && visits_bodies(scene, o));
     let end = scene.frame_time() * f64::from(scene.time.frames);
     let mut found = Vec::new();
     for (name, range) in parts.ranges() {
@@ -333,7 +333,7 @@ fn buried(builder: &Builder<'_>, parts: &Parts, index: usize) -> Vec<Warning> {
         found.push((name, "collider", deepest(colliders, &|i| free(range.start + i), range.len(), 1e-6), colliders));
         // Held masses throw out the body.
         let loose = |i: usize| (!tied.contains(&i)).then(|| (0.0, parts.position(i as u32)));
-        if !wet(name) {
+        if visits(name) {
             found.push((name, "body", deepest(&bodies, &|i| loose(range.start + i), range.len(), 1e-6), &bodies[..]));
         }
     }

@@ -17,7 +17,7 @@ use crate::math::formula::Of;
 use crate::math::{Signal, VectorSignal};
 use crate::system::System;
 use tumble_interface::looks::{Colors, FEW, Form, LIQUID, Look, RADIUS, SMOKE};
-use tumble_interface::scene::{Emitter, Integrator, Method, Particles, Scene, System as Plan};
+use tumble_interface::scene::{Emitter, Integrator, Method, Object, Particles, Scene, System as Plan};
 use tumble_interface::{Issue, Warning};
 
 /// All methods. Where several can move a kind of objects, the first is its default.
@@ -183,14 +183,13 @@ pub fn resolve(mut scene: Scene) -> Scene {
 
 /// Whether masses and rigid bodies may touch, in a scene whose systems are written out.
 pub fn touches(scene: &Scene) -> bool {
-    let moves = |method, kind: &dyn Fn(&str) -> bool| {
-        let own = |o: &tumble_interface::scene::Object<'_>| {
-            kind(o.kind) && place(&scene.system, o.kind, o.system).is_some_and(|i| scene.system[i].method == method)
-        };
-        scene.objects().iter().any(own)
-    };
-    let dry = || scene.particles.iter().any(|thing| thing.fluid.is_none());
-    moves(Method::Rigid, &|kind| kind == "body") && moves(Method::Dynamics, &|kind| kind != "particles" || dry())
+    !scene.body.is_empty() && scene.objects().iter().any(|o| visits_bodies(scene, o))
+}
+
+/// Whether an object consists of masses that touch rigid bodies. Contact alone would carry a body wrongly in a liquid.
+pub fn visits_bodies(scene: &Scene, object: &Object<'_>) -> bool {
+    let mover = place(&scene.system, object.kind, object.system).map(|i| scene.system[i].method);
+    mover == Some(Method::Dynamics) && !scene.particles.iter().any(|thing| thing.name == object.name && thing.fluid.is_some())
 }
 
 /// A system for each method that objects of the scene need.

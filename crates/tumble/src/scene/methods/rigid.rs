@@ -1,6 +1,6 @@
 //! Rigid bodies: words to shapes, masses and states.
 
-use super::{MethodRules, is_in, place, touches};
+use super::{MethodRules, is_in, touches, visits_bodies};
 use crate::exchange::BodySurface;
 use crate::geometry::motion::Key;
 use crate::geometry::{Collider, Motion, Vector};
@@ -105,13 +105,8 @@ impl MethodRules for Rules {
                     ends.iter().any(|end| end == name) && ends.iter().any(|end| scene.body.iter().any(|thing| thing.name == *end))
                 })
             };
-        // Masses of dynamics touch bodies; in a liquid contact alone would carry them wrongly.
-        let wet = |name: &str| scene.particles.iter().any(|thing| thing.name == name && thing.fluid.is_some());
-        let visits = |o: &tumble_interface::scene::Object<'_>| {
-            let mover = place(&scene.system, o.kind, o.system).map(|i| scene.system[i].method);
-            mover == Some(Method::Dynamics) && !wet(o.name)
-        };
-        let others = scene.objects().into_iter().filter(|o| !matches!(o.kind, "body" | "joint") && !tied(o.name) && !visits(o));
+        let others =
+            scene.objects().into_iter().filter(|o| !matches!(o.kind, "body" | "joint") && !tied(o.name) && !visits_bodies(scene, o));
         let kinds: Vec<&str> = others.map(|o| o.kind).collect();
         if let (Some(other), false) = (kinds.first(), scene.body.is_empty()) {
             let message = format!(
