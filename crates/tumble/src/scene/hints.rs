@@ -17,7 +17,8 @@ pub fn coupled(scene: &Scene) -> Option<Warning> {
         scene.objects().into_iter().find(|object| object.name == name)?.system.map(str::to_string)
     };
     let joins = scene.anchor.iter().any(|anchor| of(&anchor.between[0]) != of(&anchor.between[1]));
-    let message = "no anchor joins two systems and no mass meets a rigid body, so that each interval is taken again for nothing; leave it out";
+    let message =
+        "no anchor joins two systems and no mass meets a rigid body, so that each interval is taken again for nothing; leave it out";
     (scene.world.coupling.is_some() && !joins && !touches(scene)).then(|| Warning::new(Code::Unfelt, "world.coupling", message))
 }
 
