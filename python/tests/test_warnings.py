@@ -176,6 +176,11 @@ def sprung(end: list[float], rest_length: float, **words: Any) -> Tree:
     return {"particles": [{"name": "p", "position": [[0, 0, 1], end], "spring": [spring]}]}
 
 
+def sandy(position: list[list[float]] | None = None, **system: Any) -> Tree:
+    grains = {"name": "g", "radius": 0.01, "position": position or [[0, 0, 0.1]]}
+    return {"grains": [grains], "system": [{"name": "main"}, {"name": "sand", "method": "grains"} | system]}
+
+
 def hooked(x: float) -> Tree:
     body = {"name": "b", "shape": {"sphere": {"radius": 0.1}}}
     return {"body": [body], "joint": [{"name": "hook", "between": ["b"], "at": [x, 0, 0], "kind": {"ball": {}}}]}
@@ -293,6 +298,9 @@ VAIN: list[tuple[str, str, Tree, Tree]] = [
         {"particles": [POINT], "collider": [ball([0, 9e5, 0])]},
         {"particles": [POINT], "collider": [ball([0, 0, -9])]},
     ),
+    ("stiff-contact", 'system "sand".step', sandy(step=1e-2), sandy(step=1e-4)),
+    ("starts-inside", 'system "sand"', sandy([[0, 0, 0.1], [0, 0, 0.11]]), sandy([[0, 0, 0.1], [0, 0, 0.13]])),
+    ("unfelt", "grains", sandy() | {"particles": [POINT]}, sandy()),
     ("far-joint", 'joint "hook"', hooked(40.0), hooked(0.4)),
     ("coincident", 'anchor "tie"', together(0.0, rest_length=1), together(0.5, rest_length=1)),
     ("coincident", '"p"', sprung([0, 0, 1], 0.3), sprung([0, 0, 1.1], 0.3)),

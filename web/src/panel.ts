@@ -68,6 +68,7 @@ function inForce(key: string, system: Tree): boolean {
     self_contact: masses,
     vicsek: method === "vicsek",
     rigid: method === "rigid",
+    grains: method === "grains",
   };
   return rules[key] ?? true;
 }

@@ -40,6 +40,7 @@ const ROWS: Record<string, string> = {
   cloth: "Cloth and hair",
   drape: "Draped sheets",
   rigid: "Rigid bodies",
+  grains: "Sand and grains",
   coupled: "Everything with everything",
   springs: "Springs",
   structures: "Structures",

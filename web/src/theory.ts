@@ -56,6 +56,7 @@ export function topics(info: SceneInfo): Topic[] {
   if (has("compressible")) found.push({ page: "compressible", tags: ["compressible.1"] });
   if (has("body")) found.push({ page: "rigid", tags: ["rigid.1", "rigid.4"] });
   if (has("joint")) found.push({ page: "joints", tags: ["joints.1", "joints.2"] });
+  if (has("grains")) found.push({ page: "grains", tags: ["grains.1", "grains.2"] });
   if (info.systems.some((s) => s.method === "vicsek")) found.push({ page: "flocks", tags: ["flocks.1"] });
   for (const force of [...(scene.force ?? []), ...(scene.field ?? [])])
     if (FORCES[force.kind] && force.kind !== "drag") found.push(FORCES[force.kind]);

@@ -25,6 +25,8 @@ mod emission_in_time;
 mod events;
 mod fabrics;
 mod free_bodies;
+mod grains;
+mod granular;
 mod guides;
 mod hair;
 mod hand;

@@ -59,6 +59,8 @@ codes! {
     StiffAnchor = "stiff-anchor",
     /// Masses whose springs pull them into the rigid bodies that they bear.
     YieldingMasses = "yielding-masses",
+    /// Steps too long for the contacts of grains.
+    StiffContact = "stiff-contact",
     /// A joint far from the bodies that it holds.
     FarJoint = "far-joint",
     /// Systems that do not come to agree about the impulses between them.

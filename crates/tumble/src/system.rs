@@ -268,6 +268,14 @@ impl Archive {
         }
     }
 
+    /// Reads numbers in the engine's scalar, so many to a row.
+    pub fn table_of(&mut self, width: usize, name: &str) -> Option<Vec<Real>> {
+        match self.pop(name)? {
+            Part::Table(columns, numbers) if *columns == width => Some(numbers.clone()),
+            _ => None,
+        }
+    }
+
     /// Reads the points of a field.
     pub fn field(&mut self, name: &str, into: &mut Field) -> Option<()> {
         match self.pop(name)? {

@@ -29,6 +29,15 @@ fn sheet(system: &str, links: &str) -> String {
 
 /// Name, scene, frames: every kind of element, contact, memory and solver.
 fn scenes() -> Vec<(&'static str, String, usize)> {
+    // More than one chunk, two materials, a wall that moves, and a body that yields.
+    let sand = "time.fps = 60
+        [[system]]\nname = \"sand\"\nmethod = \"grains\"\nstep = 4e-4\n[[system]]\nname = \"bodies\"\nmethod = \"rigid\"
+        [[grains]]\nname = \"fine\"\nradius = 0.02\nradius_spread = 0.2\nrolling_friction = 0.1\nyoung = 1e6
+        fill = [{ center = [0, 0, 0.3], size = [0.6, 0.6, 0.5] }]
+        [[grains]]\nname = \"coarse\"\nradius = 0.03\ncohesion = 2\nyoung = 1e6\nfill = [{ center = [0, 0, 0.7], size = [0.5, 0.5, 0.3] }]
+        [[body]]\nname = \"brick\"\nshape = { box = { size = [0.3, 0.2, 0.1] } }\nposition = [[0, 0, 1]]\nrotate = [[10, 20, 0]]\nvelocity = [[0, 0, -3]]
+        [[collider]]\nname = \"bin\"\nshape = { box = { center = [0, 0, 1], size = [0.64, 0.64, 2] } }\ninside = true
+        [[collider]]\nname = \"rod\"\nshape = { capsule = { from = [-0.2, -0.5, 0.1], to = [-0.2, 0.5, 0.1], radius = 0.03 } }\nmotion = { velocity = [0.5, 0, 0] }\n";
     let hinges = "hinge = 2e-5\nlinks = { structural = { modulus = 50, damping = 0.005 }, shear = 20 }";
     let links = "links = { structural = { modulus = 50, damping = 0.005 }, shear = 20, bend = 2 }";
     let air = "[[force]]\nkind = \"air\"\nwind = [{ kind = \"uniform\", velocity = [\"6*sin(9*t)\", 3, 2] }, { kind = \"turbulence\", strength = 2, scale = 0.3 }]\n";
@@ -164,6 +173,7 @@ fn scenes() -> Vec<(&'static str, String, usize)> {
         ("rope, cholesky", rope.to_string(), 20),
         ("plume", plume.to_string(), 4),
         ("plume, stirred", stirring, 4),
+        ("sand", sand.to_string(), 8),
     ]
 }
 

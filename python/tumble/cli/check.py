@@ -284,7 +284,8 @@ def _contents(scene: "Scene", world: "World", expected: "list[Forecast]") -> str
     for name, table in topology.items():
         if name in born:
             continue
-        own = words | ({"mass": "rigid body"} if "vertices" in table else {})
+        grains = any(thing["name"] == name for thing in tree["grains"])
+        own = words | ({"mass": "rigid body"} if "vertices" in table else {"mass": "grain"} if grains else {})
         parts = [counted(len(table[key]), word) for key, word in own.items() if key in table]
         if "position" in positions.get(name, {}) and "mass" not in table and name not in solid:
             word = "particle" if _is_of(tree, name, "vicsek") else "tracer"

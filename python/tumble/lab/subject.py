@@ -187,9 +187,11 @@ def _refuse(tree: Tree) -> None:
     title = f"“{tree['title']}”" if tree["title"] else "this scene"
     if "vicsek" in methods:
         raise SceneError("the model of Vicsek is a map and has no integrator; there is nothing to compare")
-    if tree["body"]:
+    for kind, things in [("body", "rigid bodies"), ("grains", "grains")]:
+        if not tree[kind]:
+            continue
         raise SceneError(
-            f"{title} has rigid bodies, which have a scheme of their own and no integrator; there is nothing to compare. "
+            f"{title} has {things}, which have a scheme of their own and no integrator; there is nothing to compare. "
             "`tumble refine` shows how a scene converges"
         )
     for kind, thing in on_grids(tree):

@@ -8,6 +8,7 @@ mod emitters;
 mod fabrics;
 mod forces;
 mod gas;
+mod grains;
 mod grids;
 mod hair;
 mod heat;
@@ -32,6 +33,7 @@ pub use gas::{
     Advections, Carriage, Densities, ExcessFlow, Fire, Gas, GasSide, GasSides, GasSource, GridInterpolation, Order, PathTrace, Pressure,
     PressureMethod, Smoke, Solid, Temperature, Viscous,
 };
+pub use grains::{FillShape, GrainFill, Grains, Granular, NormalLaw};
 pub use grids::GridBox;
 pub use hair::{Clump, Curl, Guides, Hair, HairCollisions};
 pub use heat::{Heat, HeatRegion, HeatScheme, HeatSide, HeatSides, HeatSource};
@@ -121,6 +123,9 @@ pub struct Scene {
     /// What holds rigid bodies to each other and to the world.
     #[serde(default)]
     pub joint: Vec<Joint>,
+    /// Grains, moved by systems of method `grains`.
+    #[serde(default)]
+    pub grains: Vec<Grains>,
     /// Bodies that conduct heat.
     #[serde(default)]
     pub heat: Vec<Heat>,

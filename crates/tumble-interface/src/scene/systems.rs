@@ -1,5 +1,6 @@
 //! Numerical methods and their settings.
 
+use super::grains::Granular;
 use super::rigid::Rigid;
 use super::vicsek::Vicsek;
 use schemars::JsonSchema;
@@ -47,6 +48,9 @@ pub struct System {
     /// Settings of the `rigid` method.
     #[serde(default)]
     pub rigid: Option<Rigid>,
+    /// Settings of the `grains` method.
+    #[serde(default)]
+    pub grains: Option<Granular>,
     /// Parameters of the `vicsek` method, which requires them.
     #[serde(default)]
     pub vicsek: Option<Vicsek>,
@@ -66,6 +70,7 @@ impl Default for System {
             position_based: PositionBased::default(),
             self_contact: None,
             rigid: None,
+            grains: None,
             vicsek: None,
         }
     }
@@ -95,6 +100,8 @@ pub enum Method {
     Compressible,
     /// Rigid bodies with contact and friction, `[[body]]`. Sub-steps of at most 1/480 s unless given; there is no integrator.
     Rigid,
+    /// Grains with contact and friction, `[[grains]]`, in steps that resolve each bounce, and by default are as long as that allows; there is no integrator.
+    Grains,
     /// Stable Fluids: incompressible fluids that fill boxes of cells, `[[gas]]`. There is no integrator.
     Gas,
 }
@@ -110,6 +117,7 @@ impl Method {
             Self::Heat => "heat",
             Self::Compressible => "compressible",
             Self::Rigid => "rigid",
+            Self::Grains => "grains",
             Self::Gas => "gas",
         }
     }

@@ -9,10 +9,12 @@ mod body;
 mod body_surface;
 mod event;
 mod repeat;
+mod visit;
 
 pub use body::{Body, BodyRow, BodyState};
 pub use body_surface::BodySurface;
 pub use event::{Event, Happening};
+pub use visit::Visit;
 
 use crate::geometry::{Collider, Vector};
 use crate::state::Vectors;

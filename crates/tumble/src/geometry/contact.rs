@@ -112,23 +112,8 @@ impl Walls<'_> {
     /// three, as if each were flat. Solids count as having a thickness of at least `thickness` [m].
     pub fn near(&self, p: Vector, thickness: f64, within: f64, mut f: impl FnMut(usize, f64, Vector)) {
         for (at, collider) in self.colliders.iter().enumerate() {
-            let (mut from, thickness) = (p, thickness.max(collider.thickness));
-            if let Some(walls) = collider.walls(p, self.t) {
-                for (distance, normal) in walls.into_iter().filter(|(distance, _)| *distance < within + thickness) {
-                    f(at, distance - thickness, normal);
-                }
-                continue;
-            }
-            for _ in 0..if collider.inside { 3 } else { 1 } {
-                let reach = within + thickness;
-                let (distance, normal) = collider.distance(from, self.t, reach);
-                if distance >= reach || normal.norm_sq() == 0.0 {
-                    break;
-                }
-                f(at, distance - thickness + normal.dot(p - from), normal);
-                // A point from which that surface is out of reach, whatever the rounding.
-                from = from + normal * (1.01 * reach - distance);
-            }
+            let surfaces = if collider.inside { 3 } else { 1 };
+            collider.each_near(p, self.t, thickness, within, surfaces, |distance, normal| f(at, distance, normal));
         }
     }
 }
@@ -156,6 +141,28 @@ impl Collider {
         let Shape::Animated { facets, .. } = &self.shape else { return Carrier::Whole };
         let local = self.at(0.0).map_or(p, |(pose, _)| pose.back(p));
         facets.carrier(local).map_or(Carrier::Whole, |(triangle, weights)| Carrier::Facet(triangle, weights))
+    }
+
+    /// Calls `f` with the distance [m] of p from where masses are stopped, and the direction away from there, of its surfaces nearer than `within`
+    /// [m], as if each were flat: of a box that contains each wall, else up to so many. It counts as having a thickness of at least `thickness` [m].
+    pub fn each_near(&self, p: Vector, t: f64, thickness: f64, within: f64, surfaces: usize, mut f: impl FnMut(f64, Vector)) {
+        let (mut from, thickness) = (p, thickness.max(self.thickness));
+        if let Some(walls) = self.walls(p, t) {
+            for (distance, normal) in walls.into_iter().filter(|(distance, _)| *distance < within + thickness) {
+                f(distance - thickness, normal);
+            }
+            return;
+        }
+        for _ in 0..surfaces {
+            let reach = within + thickness;
+            let (distance, normal) = self.distance(from, t, reach);
+            if distance >= reach || normal.norm_sq() == 0.0 {
+                break;
+            }
+            f(distance - thickness + normal.dot(p - from), normal);
+            // A point from which that surface is out of reach, whatever the rounding.
+            from = from + normal * (1.01 * reach - distance);
+        }
     }
 
     /// Distance [m] of a point from every wall of a box that contains, and the direction away from it, the nearest first.
@@ -274,6 +281,11 @@ impl Collider {
         }
     }
 
+    /// Angular velocity of the rigid whole at time t [rad/s].
+    pub fn spin(&self, t: f64) -> Vector {
+        self.at(t).map_or(Vector::default(), |(_, twist)| twist.angular)
+    }
+
     /// How fast its surface moves along itself at time t [m/s].
     pub fn slip(&self, t: f64) -> Vector {
         self.pose(Carrier::Whole, t).turn.turn(self.belt)
@@ -304,6 +316,18 @@ impl Collider {
     /// Whether it, or its surface, ever moves.
     pub fn moves(&self) -> bool {
         self.motion.is_some() || self.belt.norm_sq() > 0.0 || matches!(self.shape, Shape::Animated { .. })
+    }
+
+    /// Largest speed of its surface across itself within `size` [m] of its pivot, from the time t on for h [s].
+    pub fn speed(&self, t: f64, h: f64, size: f64) -> f64 {
+        let own = if let Shape::Animated { facets, .. } = &self.shape { facets.fastest() } else { 0.0 };
+        let Some(motion) = &self.motion else { return own };
+        let reach = self.shape.reach(motion.pivot).min(size);
+        let at = |t: f64| {
+            let (pose, twist) = motion.at(t);
+            twist.at(pose.out(motion.pivot)).norm() + twist.angular.norm() * reach
+        };
+        own + [t, t + 0.5 * h, t + h].into_iter().map(at).fold(0.0, f64::max)
     }
 
     /// Largest velocity of its surface within `size` [m] of its pivot, over all times [m/s].

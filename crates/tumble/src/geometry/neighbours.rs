@@ -374,6 +374,11 @@ impl Neighbours {
         self.order.is_empty()
     }
 
+    /// The point at each place.
+    pub fn order(&self) -> &[u32] {
+        &self.order
+    }
+
     /// The place of a point, if it has one.
     pub fn place(&self, point: usize) -> Option<usize> {
         self.place.get(point).map(|p| p.load(Relaxed)).filter(|p| *p != NOWHERE).map(|p| p as usize)

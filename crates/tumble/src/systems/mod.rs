@@ -3,6 +3,7 @@
 pub mod compressible;
 pub mod dynamics;
 pub mod gas;
+pub mod grains;
 pub mod heat;
 pub mod rigid;
 pub mod scenery;

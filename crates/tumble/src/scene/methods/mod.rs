@@ -3,6 +3,7 @@
 mod compressible;
 mod dynamics;
 mod gas;
+mod grains;
 mod heat;
 mod rigid;
 mod tracers;
@@ -22,8 +23,8 @@ use tumble_interface::{Issue, Warning};
 
 /// All methods. Where several can move a kind of objects, the first is its default.
 /// A constant: as a static it would be compiled into the unit tests, with the whole engine behind it.
-pub const METHODS: [&dyn MethodRules; 7] =
-    [&dynamics::Rules, &tracers::Rules, &vicsek::Rules, &rigid::Rules, &gas::Rules, &heat::Rules, &compressible::Rules];
+pub const METHODS: [&dyn MethodRules; 8] =
+    [&dynamics::Rules, &tracers::Rules, &vicsek::Rules, &rigid::Rules, &grains::Rules, &gas::Rules, &heat::Rules, &compressible::Rules];
 
 /// Exchanges a second where masses and rigid bodies touch: in one interval a body falls 0.1 mm before what bears it says so.
 const RATE: f64 = 240.0;
@@ -186,10 +187,11 @@ pub fn touches(scene: &Scene) -> bool {
     !scene.body.is_empty() && scene.objects().iter().any(|o| visits_bodies(scene, o))
 }
 
-/// Whether an object consists of masses that touch rigid bodies. Contact alone would carry a body wrongly in a liquid.
+/// Whether an object consists of masses or grains that touch rigid bodies. Contact alone would carry a body wrongly in a liquid.
 pub fn visits_bodies(scene: &Scene, object: &Object<'_>) -> bool {
     let mover = place(&scene.system, object.kind, object.system).map(|i| scene.system[i].method);
-    mover == Some(Method::Dynamics) && !scene.particles.iter().any(|thing| thing.name == object.name && thing.fluid.is_some())
+    let dry = || !scene.particles.iter().any(|thing| thing.name == object.name && thing.fluid.is_some());
+    mover == Some(Method::Grains) || mover == Some(Method::Dynamics) && dry()
 }
 
 /// A system for each method that objects of the scene need.

@@ -10,11 +10,11 @@ use super::contact::{Found, Pass, Step};
 use super::core::{Core, without};
 use super::feature::Span;
 use crate::elements::Density;
-use crate::exchange::{BodyRow, BodyState, Exchange, Turn};
+use crate::exchange::{BodyRow, BodyState, Exchange, Turn, Visit};
 use crate::geometry::motion::Key;
 use crate::geometry::{Collider, Friction, Motion, Vector};
 use crate::math::parallel::fold;
-use crate::math::{Real, Row, rotation, xyz64};
+use crate::math::{Real, Row, xyz64};
 use crate::pool::Hit;
 use std::ops::Range;
 
@@ -22,21 +22,11 @@ use std::ops::Range;
 const PART: f64 = 0.2;
 /// How fast they do so at most [m/s].
 const FASTEST: f64 = 0.3;
-/// Least product of two normals at which a push goes into what bears the body.
-const INTO: f64 = 0.1;
-
 /// A body of another system, as masses of this one have changed it.
 struct Visited {
-    at: BodyRow,
+    body: Visit,
     /// Its surface.
     solid: usize,
-    /// Greatest distance of its surface, with the thickness, from the centre of mass [m].
-    reach: f64,
-    /// The copy of its state.
-    state: BodyState,
-    /// What it has got in this interval [N s], and the moment about the origin [N m s].
-    impulse: Vector,
-    moment: Vector,
 }
 
 /// The bodies of other systems, and their surfaces.
@@ -51,36 +41,17 @@ pub struct Reaction {
 impl Visited {
     /// Moves its surface as it moves in a sub-step that begins at the time 0.
     fn lead(&self, solid: &mut Collider) {
-        let BodyState { position, orientation, velocity, spin, .. } = self.state;
+        let BodyState { position, orientation, velocity, spin, .. } = self.body.state;
         if let Some(motion) = &mut solid.motion {
             (motion.velocity, motion.spin) = (velocity, spin);
             motion.keys[0] = Key { time: 0.0, shift: position, turn: orientation };
         }
     }
 
-    /// Change of velocity [m/s] and spin [rad/s] by an impulse at a point; `normal` points away from the body. Of a push into what bears the body
-    /// below that point, the bearing takes the part along its own normal, and keeps the body from turning.
-    fn response(&self, point: Vector, impulse: Vector, normal: Vector) -> (Vector, Vector) {
-        let bears = self.state.normal;
-        if normal.dot(bears) > INTO && self.state.is_borne_at(point) {
-            return ((impulse - bears * impulse.dot(bears)) * self.state.inverse_mass, Vector::default());
-        }
-        self.state.response(point, impulse)
-    }
-
-    /// Takes an impulse at a point, with that moment about the origin.
-    fn take(&mut self, point: Vector, impulse: Vector, moment: Vector, normal: Vector) {
-        let (velocity, spin) = self.response(point, impulse, normal);
-        (self.state.velocity, self.state.spin) = (self.state.velocity + velocity, self.state.spin + spin);
-        (self.impulse, self.moment) = (self.impulse + impulse, self.moment + moment);
-    }
-
     /// K of its point and a mass of this inverse [1/kg], column by column.
     fn yields(&self, point: Vector, inverse: f64, normal: Vector) -> [Vector; 3] {
-        [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]].map(|e| {
-            let (velocity, spin) = self.response(point, e.into(), normal);
-            velocity + spin.cross(point - self.state.position) + Vector::from(e) * inverse
-        })
+        [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]]
+            .map(|e| self.body.yields_to(point, e.into(), normal) + Vector::from(e) * inverse)
     }
 }
 
@@ -114,18 +85,12 @@ impl Reaction {
         }
         self.bodies.clear();
         for (solid, surface) in surfaces.iter().enumerate() {
-            let visited = |at: &BodyRow| Visited {
-                at: *at,
-                solid,
-                reach: surface.reach + surface.solid.thickness,
-                state: *exchange.state_before(*at),
-                impulse: Vector::default(),
-                moment: Vector::default(),
-            };
-            self.bodies.extend(surface.rows.iter().map(visited));
+            let reach = surface.reach + surface.solid.thickness;
+            self.bodies.extend(surface.rows.iter().map(|at| Visited { body: Visit::new(exchange, *at, reach), solid }));
         }
         let bodies = &self.bodies;
-        let tied = |(row, other): (usize, BodyRow)| Some((row, bodies.iter().position(|body| exchange.is_same(body.at, other))?));
+        let tied =
+            |(row, other): (usize, BodyRow)| Some((row, bodies.iter().position(|visited| exchange.is_same(visited.body.at, other))?));
         self.tied = if bodies.is_empty() { Vec::new() } else { anchors.filter_map(tied).collect() };
         self.tied.sort_unstable();
     }
@@ -137,7 +102,7 @@ impl Reaction {
 
     /// The largest speed of a point of a body [m/s].
     pub fn fastest(&self) -> f64 {
-        self.bodies.iter().map(|body| body.state.velocity.norm() + body.state.spin.norm() * body.reach).fold(0.0, f64::max)
+        self.bodies.iter().map(|visited| visited.body.fastest()).fold(0.0, f64::max)
     }
 
     /// The contact pass of a sub-step: masses that touch a body, in the order of their rows.
@@ -145,9 +110,7 @@ impl Reaction {
         if self.bodies.is_empty() {
             return;
         }
-        for body in &mut self.bodies {
-            body.state.velocity = body.state.velocity + body.state.acceleration * h;
-        }
+        self.bodies.iter_mut().for_each(|visited| visited.body.accelerate(h));
         let observed = core.pool.heeded();
         let step = Step { t: 0.0, h, resting: core.resting_speed(h), lead, observed: false };
         let mut hits = Vec::new();
@@ -159,10 +122,7 @@ impl Reaction {
             }
         }
         hits.into_iter().for_each(|(row, hit)| core.pool.note_row(row, Hit { time: t + hit.time, ..hit }));
-        for Visited { state, .. } in &mut self.bodies {
-            state.position = state.position + state.velocity * h;
-            state.orientation = (rotation::by(state.spin * h) * state.orientation).normalized();
-        }
+        self.bodies.iter_mut().for_each(|visited| visited.body.advance(h));
     }
 
     /// Masses whose way in a sub-step comes within the reach of a body's, and that body.
@@ -170,7 +130,7 @@ impl Reaction {
         let Core { state, before, laws, .. } = core;
         // Where a body is at both ends of the step, in the order of the lower ends of x.
         let mut order: Vec<(f64, f64, usize)> = Vec::with_capacity(self.bodies.len());
-        for (k, body) in self.bodies.iter().enumerate() {
+        for (k, Visited { body, .. }) in self.bodies.iter().enumerate() {
             let (x, way) = (body.state.position.x, body.state.velocity.x * h);
             order.push((x.min(x + way) - body.reach, x.max(x + way) + body.reach, k));
         }
@@ -183,7 +143,7 @@ impl Reaction {
             let candidates = order[first..].iter().take_while(move |(start, ..)| *start <= high);
             let mut found: Vec<(usize, usize)> = Vec::new();
             for (_, end, k) in candidates {
-                let body = &self.bodies[*k];
+                let Visited { body, solid } = &self.bodies[*k];
                 // In the frame of the body's centre the mass moves straight.
                 let (a, b) = (from - body.state.position, to - body.state.position - body.state.velocity * h);
                 let way = b - a;
@@ -192,7 +152,7 @@ impl Reaction {
                     continue;
                 }
                 // No point of the surface comes nearer than the mass and the turn of the body go.
-                let solid = &self.solids[body.solid];
+                let solid = &self.solids[*solid];
                 let within = way.norm() + body.state.spin.norm() * h * body.reach + solid.thickness;
                 if solid.shape.near(body.state.orientation.conj().turn(a), 0.0, within).0 <= within {
                     found.push((i, *k));
@@ -245,7 +205,7 @@ impl Reaction {
         (state.x[i], state.v[i]) = (real(place, x[3]), real(after, 0.0));
         // From what states hold, so that nothing is lost.
         let [(x0, v0), (x1, v1)] = [(from, arrives), (state.x[i], state.v[i])].map(|(x, v)| (xyz64(x), xyz64(v)));
-        body.take(point, (v0 - v1) * mass, (x0.cross(v0) - x1.cross(v1)) * mass, normal);
+        body.body.take(point, (v0 - v1) * mass, (x0.cross(v0) - x1.cross(v1)) * mass, normal);
         true
     }
 
@@ -265,14 +225,12 @@ impl Reaction {
         let change = n * lack - slide.normalized() * solid.friction.takes(slide.norm(), lack);
         let push = -impulse(body.yields(point, 0.0, n), change, n, solid.friction);
         if push.norm_sq().is_finite() {
-            body.take(point, push, point.cross(push), n);
+            body.body.take(point, push, point.cross(push), n);
         }
     }
 
     /// Posts what bodies have got.
     pub fn end(&self, exchange: &mut Turn<'_>) {
-        for body in self.bodies.iter().filter(|body| body.impulse != Vector::default() || body.moment != Vector::default()) {
-            exchange.post_sum(body.at, body.impulse, body.moment);
-        }
+        self.bodies.iter().for_each(|visited| visited.body.post(exchange));
     }
 }

@@ -1,0 +1,175 @@
+//! Grains.
+
+use super::items_above_zero;
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+/// Spheres of a granular material, moved by systems of method `grains`: they touch, slide and roll on each other, on colliders and on rigid bodies.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Grains {
+    /// Name in frames and pictures.
+    pub name: String,
+    /// The system that moves them. Default: the first of method `grains`.
+    #[serde(default)]
+    pub system: Option<String>,
+    /// Radius of a grain, the mean if they differ.
+    #[schemars(extend("x-unit" = "m", "exclusiveMinimum" = 0.0))]
+    pub radius: f64,
+    /// How far radii differ from that, at most, as a part of it: they are uniformly distributed.
+    #[serde(default)]
+    #[schemars(range(min = 0.0, max = 0.5), extend("x-unit" = "1"))]
+    pub radius_spread: f64,
+    /// Initial positions. Alternative: `fill`.
+    #[serde(default)]
+    #[schemars(extend("x-unit" = "m"))]
+    pub position: Vec<[f64; 3]>,
+    /// Volumes that are filled at the start, loosely: grains settle to two thirds of the height.
+    #[serde(default)]
+    pub fill: Vec<GrainFill>,
+    /// Initial velocity: one for all grains, or one for each position.
+    #[serde(default)]
+    #[schemars(extend("x-unit" = "m/s"))]
+    pub velocity: Vec<[f64; 3]>,
+    /// Initial angular velocity, along the axis by the right-hand rule: one for all grains, or one for each position.
+    #[serde(default)]
+    #[schemars(extend("x-unit" = "rad/s"))]
+    pub angular_velocity: Vec<[f64; 3]>,
+    /// Density of the material of a grain.
+    #[serde(default = "stone")]
+    #[schemars(extend("x-unit" = "kg/m³", "exclusiveMinimum" = 0.0))]
+    pub density: f64,
+    /// Young's modulus. Real stone has some 5e10 Pa; softer grains flow alike as long as they overlap little, in longer steps.
+    #[serde(default = "soft")]
+    #[schemars(extend("x-unit" = "Pa", "exclusiveMinimum" = 0.0))]
+    pub young: f64,
+    /// Poisson's ratio.
+    #[serde(default = "quarter")]
+    #[schemars(range(min = 0.0, max = 0.5), extend("x-unit" = "1"))]
+    pub poisson: f64,
+    /// Friction coefficient (Coulomb). Of two surfaces that touch, the larger coefficient holds.
+    #[serde(default = "half")]
+    #[schemars(range(min = 0.0), extend("x-unit" = "1"))]
+    pub friction: f64,
+    /// Largest moment against rolling, over the normal force and the radius: a grain rests on slopes up to that tangent. Angular grains have 0.1 to
+    /// 0.5. Of two surfaces that touch, the larger coefficient holds.
+    #[serde(default)]
+    #[schemars(range(min = 0.0), extend("x-unit" = "1"))]
+    pub rolling_friction: f64,
+    /// The same about the line through both centres.
+    #[serde(default)]
+    #[schemars(range(min = 0.0), extend("x-unit" = "1"))]
+    pub twisting_friction: f64,
+    /// Speed after a bounce over speed before. Of two surfaces that touch, the larger one holds.
+    #[serde(default = "half")]
+    #[schemars(range(min = 0.05, max = 1.0), extend("x-unit" = "1"))]
+    pub restitution: f64,
+    /// Work of adhesion of two touching surfaces: spheres are pulled off by 2 pi cohesion R1 R2/(R1 + R2). Moist sand sticks with about 0.1 N/m.
+    #[serde(default)]
+    #[schemars(range(min = 0.0), extend("x-unit" = "J/m²"))]
+    pub cohesion: f64,
+    /// Red, green and blue in pictures, 0 to 1, in linear light (0.5 is 188 of 255 in sRGB).
+    #[serde(default)]
+    #[schemars(inner(range(min = 0.0, max = 1.0)))]
+    pub color: Option<[f64; 3]>,
+}
+
+impl Grains {
+    /// Distance of the places in a fill [m].
+    pub fn spacing(&self) -> f64 {
+        /// Free space between grains of the largest size, over their diameter.
+        const GAP: f64 = 0.1;
+        2.0 * self.radius * (1.0 + self.radius_spread) * (1.0 + GAP)
+    }
+
+    /// How many grains there are, at most.
+    pub fn count(&self) -> f64 {
+        let of = |fill: &GrainFill| fill.places(self.spacing()).iter().product::<f64>().min(fill.count.map_or(f64::INFINITY, f64::from));
+        self.position.len() as f64 + self.fill.iter().map(of).sum::<f64>()
+    }
+}
+
+/// A volume that is filled with grains.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct GrainFill {
+    /// Centre.
+    #[schemars(extend("x-unit" = "m"))]
+    pub center: [f64; 3],
+    /// Edges of the box around it, which no grain leaves.
+    #[schemars(transform = items_above_zero, extend("x-unit" = "m"))]
+    pub size: [f64; 3],
+    /// Its shape.
+    #[serde(default)]
+    pub shape: FillShape,
+    /// How many grains, from the bottom up. Default: as many as fit.
+    #[serde(default)]
+    #[schemars(range(min = 1, max = 100_000_000))]
+    pub count: Option<u32>,
+}
+
+impl GrainFill {
+    /// Places along each axis, of a box.
+    pub fn places(&self, spacing: f64) -> [f64; 3] {
+        // A box of exactly so many diameters holds them.
+        self.size.map(|size| (size / spacing * (1.0 + 1e-9)).floor().max(0.0))
+    }
+}
+
+/// Shape of a fill.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum FillShape {
+    /// A box.
+    #[default]
+    Box,
+    /// A cylinder along z, or an elliptic one.
+    Cylinder,
+    /// A ball, or an ellipsoid.
+    Sphere,
+}
+
+/// Settings of the `grains` method.
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields, default)]
+pub struct Granular {
+    /// Force of a contact.
+    pub law: NormalLaw,
+}
+
+/// How the force of a contact follows from the overlap.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "snake_case")]
+pub enum NormalLaw {
+    /// As of elastic spheres (Hertz; along the surface Mindlin).
+    #[default]
+    Hertz,
+    /// Proportional to it: bounces take the same time at any speed.
+    Linear,
+}
+
+impl NormalLaw {
+    /// The word in the scene.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Hertz => "hertz",
+            Self::Linear => "linear",
+        }
+    }
+}
+
+fn stone() -> f64 {
+    2500.0
+}
+
+fn soft() -> f64 {
+    1e7
+}
+
+fn quarter() -> f64 {
+    0.25
+}
+
+fn half() -> f64 {
+    0.5
+}

@@ -1,0 +1,90 @@
+//! A visitor's copy of a body that it touches: all impulses so far have changed it, and their sum is posted at the end of the interval.
+//!                                                                                                                     (coupling.8)
+
+use super::{BodyRow, BodyState, Exchange, Turn};
+use crate::geometry::Vector;
+use crate::math::rotation;
+
+/// Least product of two normals at which a push goes into what bears the body.
+const INTO: f64 = 0.1;
+
+/// A body of another system, as this one has changed it.
+#[derive(Debug, Clone)]
+pub struct Visit {
+    /// The body.
+    pub at: BodyRow,
+    /// Greatest distance of its surface, with the thickness, from the centre of mass [m].
+    pub reach: f64,
+    /// The copy of its state.
+    pub state: BodyState,
+    /// What it has got in this interval [N s], and the moment about the origin [N m s].
+    impulse: Vector,
+    moment: Vector,
+}
+
+impl Visit {
+    /// A body as it is at the start of an interval.
+    pub fn new(exchange: &Exchange, at: BodyRow, reach: f64) -> Self {
+        Self { at, reach, state: *exchange.state_before(at), impulse: Vector::default(), moment: Vector::default() }
+    }
+
+    /// The largest speed of a point of it [m/s].
+    pub fn fastest(&self) -> f64 {
+        self.state.velocity.norm() + self.state.spin.norm() * self.reach
+    }
+
+    /// Whether a push along the normal, which points away from the body, goes into what bears it below that point.
+    fn is_into(&self, point: Vector, normal: Vector) -> bool {
+        normal.dot(self.state.normal) > INTO && self.state.is_borne_at(point)
+    }
+
+    /// Change of velocity [m/s] and spin [rad/s] by an impulse at a point; `normal` points away from the body. Of a push into what bears the body
+    /// below that point, the bearing takes the part along its own normal, and keeps the body from turning.
+    fn response(&self, point: Vector, impulse: Vector, normal: Vector) -> (Vector, Vector) {
+        if self.is_into(point, normal) {
+            let bears = self.state.normal;
+            return ((impulse - bears * impulse.dot(bears)) * self.state.inverse_mass, Vector::default());
+        }
+        self.state.response(point, impulse)
+    }
+
+    /// Takes an impulse at a point, with that moment about the origin.
+    pub fn take(&mut self, point: Vector, impulse: Vector, moment: Vector, normal: Vector) {
+        let (velocity, spin) = self.response(point, impulse, normal);
+        (self.state.velocity, self.state.spin) = (self.state.velocity + velocity, self.state.spin + spin);
+        (self.impulse, self.moment) = (self.impulse + impulse, self.moment + moment);
+    }
+
+    /// Takes an impulse at a point and a couple [N m s].
+    pub fn take_couple(&mut self, point: Vector, impulse: Vector, couple: Vector, normal: Vector) {
+        self.take(point, impulse, point.cross(impulse) + couple, normal);
+        if couple != Vector::default() && !self.is_into(point, normal) {
+            self.state.spin = self.state.spin + self.state.turned(couple);
+        }
+    }
+
+    /// Change of the velocity of its point by an impulse e there [m/s].
+    pub fn yields_to(&self, point: Vector, e: Vector, normal: Vector) -> Vector {
+        let (velocity, spin) = self.response(point, e, normal);
+        velocity + spin.cross(point - self.state.position)
+    }
+
+    /// Has its own acceleration for h [s].
+    pub fn accelerate(&mut self, h: f64) {
+        self.state.velocity = self.state.velocity + self.state.acceleration * h;
+    }
+
+    /// Moves for h [s].
+    pub fn advance(&mut self, h: f64) {
+        let BodyState { position, orientation, velocity, spin, .. } = &mut self.state;
+        *position = *position + *velocity * h;
+        *orientation = (rotation::by(*spin * h) * *orientation).normalized();
+    }
+
+    /// Posts what it has got.
+    pub fn post(&self, exchange: &mut Turn<'_>) {
+        if self.impulse != Vector::default() || self.moment != Vector::default() {
+            exchange.post_sum(self.at, self.impulse, self.moment);
+        }
+    }
+}

@@ -1,0 +1,191 @@
+//! Grains: words to materials and places.
+
+use super::{MethodRules, is_in, surfaces, touches};
+use crate::geometry::Friction;
+use crate::recipes;
+use crate::scene::Assets;
+use crate::scene::build::Builder;
+use crate::scene::plausible::odd_density;
+use crate::system::System;
+use crate::systems::grains::{Grains as Bed, Material, Object, Overlaps, Settings, longest_step};
+use std::sync::Arc;
+use tumble_interface::check::short;
+use tumble_interface::looks::{Colors, FEW, Form, Look};
+use tumble_interface::scene::{Grains, Integrator, Method, NormalLaw, Scene, System as Plan};
+use tumble_interface::warning::Code;
+use tumble_interface::{Issue, Warning};
+
+/// Bytes for a grain: its rows, some eight candidates, contacts that remember, and a snapshot.
+const GRAIN: f64 = 1000.0;
+/// How much longer than the default a step may be without a word.
+const LONG: f64 = 1.5;
+
+pub struct Rules;
+
+fn material(thing: &Grains) -> Material {
+    Material {
+        young: thing.young,
+        poisson: thing.poisson,
+        friction: Friction { sliding: thing.friction, resting: thing.friction },
+        resists: [thing.rolling_friction, thing.twisting_friction],
+        restitution: thing.restitution,
+        cohesion: thing.cohesion,
+    }
+}
+
+fn law(plan: &Plan) -> NormalLaw {
+    plan.grains.clone().unwrap_or_default().law
+}
+
+/// The longest step that resolves all contacts of a system [s].
+fn step(scene: &Scene, plan: &Plan) -> f64 {
+    let own = scene.grains.iter().filter(|t| is_in(&t.system, plan));
+    let of = |t: &Grains| longest_step(law(plan), &material(t), t.radius * (1.0 - t.radius_spread), t.density);
+    own.map(of).fold(f64::INFINITY, f64::min)
+}
+
+impl MethodRules for Rules {
+    fn words(&self) -> &'static [Method] {
+        &[Method::Grains]
+    }
+
+    fn kinds(&self) -> &'static [&'static str] {
+        &["grains"]
+    }
+
+    fn massless(&self) -> Option<&'static str> {
+        Some("grains")
+    }
+
+    fn meets_colliders(&self) -> bool {
+        true
+    }
+
+    fn refusal(&self, integrator: Integrator) -> Option<String> {
+        (integrator != Integrator::default()).then(|| "grains have a scheme of their own and no integrator; leave it out".into())
+    }
+
+    fn check(&self, scene: &Scene, issues: &mut Vec<Issue>) {
+        for plan in &scene.system {
+            let path = |key: &str| format!("system \"{}\".{key}", plan.name);
+            if plan.method != Method::Grains {
+                if plan.grains.is_some() {
+                    let message = format!("given with method \"{}\"; leave it out, or set method = \"grains\"", plan.method.name());
+                    issues.push(Issue::new(path("grains"), message));
+                }
+                continue;
+            }
+            let plain = Plan::default();
+            let given = [
+                ("clamp", plan.clamp != plain.clamp),
+                ("adaptive", plan.adaptive != plain.adaptive),
+                ("solver", plan.solver != plain.solver),
+                ("position_based", plan.position_based != plain.position_based),
+                ("self_contact", plan.self_contact != plain.self_contact),
+            ];
+            for (key, _) in given.into_iter().filter(|(_, given)| *given) {
+                let message = "says nothing to grains; leave it out, `substeps`, `step` and `grains` are theirs";
+                issues.push(Issue::new(path(key), message));
+            }
+        }
+        if scene.dimension == 2 && !scene.grains.is_empty() {
+            issues.push(Issue::new("dimension", "2, but grains move in space; set dimension = 3, and take a slice between two planes"));
+        }
+    }
+
+    fn hints(&self, scene: &Scene) -> Vec<Warning> {
+        let odd = |thing: &Grains| odd_density(format!("grains \"{}\".density", thing.name), thing.density, 0.0);
+        let mut warnings: Vec<Warning> = scene.grains.iter().filter_map(odd).collect();
+        let interval = scene.interval();
+        for plan in scene.system.iter().filter(|plan| plan.method == Method::Grains) {
+            let given = plan.substeps.map(|n| ("substeps", interval / f64::from(n)));
+            let Some((key, given)) = given.or(plan.step.map(|step| ("step", step.min(interval)))) else { continue };
+            let longest = step(scene, plan);
+            if given > LONG * longest {
+                let cure =
+                    if key == "substeps" { format!("{} of them", (interval / longest).ceil()) } else { format!("{} s", short(longest)) };
+                let message = format!(
+                    "sub-steps of {} s are too long for contacts as stiff as these; take {cure}, leave it out for that, or lower young",
+                    short(given)
+                );
+                warnings.push(Warning::new(Code::StiffContact, format!("system \"{}\".{key}", plan.name), message));
+            }
+        }
+        // What grains do not meet.
+        let mut of = scene.objects().into_iter().filter(|o| !matches!(o.kind, "grains" | "body" | "joint"));
+        if let (Some(other), false) = (of.next(), scene.grains.is_empty()) {
+            let message = format!("grains meet each other, colliders and rigid bodies, but not yet what [[{}]] consists of", other.kind);
+            warnings.push(Warning::new(Code::Unfelt, "grains", message));
+        }
+        let own = |plan: &&Plan| plan.method == Method::Grains && scene.grains.iter().any(|thing| is_in(&thing.system, plan));
+        if let Some(second) = scene.system.iter().filter(own).nth(1) {
+            let message = "its grains do not meet those of other systems; put all grains that are to meet into one";
+            warnings.push(Warning::new(Code::Unfelt, format!("system \"{}\"", second.name), message));
+        }
+        warnings
+    }
+
+    fn looks(&self, scene: &Scene, plan: &Plan, colors: &mut Colors) -> Vec<Look> {
+        let own = scene.grains.iter().filter(|t| is_in(&t.system, plan));
+        let look =
+            |t: &Grains| Look { few: t.count() < FEW, ..Look::new(&t.name, Form::Points, colors.pick(t.color)).with_radius(t.radius) };
+        own.map(look).collect()
+    }
+
+    fn memory(&self, scene: &Scene, _assets: &Assets) -> f64 {
+        GRAIN * scene.grains.iter().map(Grains::count).sum::<f64>()
+    }
+
+    fn build(&self, builder: &mut Builder<'_>, index: usize) -> Option<Box<dyn System>> {
+        let (scene, plan) = (builder.scene, builder.plan(index));
+        let (mut objects, mut all) = (Vec::new(), Vec::new());
+        for thing in scene.grains.iter().filter(|t| is_in(&t.system, plan)) {
+            match recipes::grains(thing, scene.seed) {
+                Ok(grains) => {
+                    let range = all.len()..all.len() + grains.len();
+                    objects.push((Object { name: thing.name.clone(), grains: range }, material(thing)));
+                    all.extend(grains);
+                }
+                Err(wrong) => {
+                    let issue = |(key, message): (String, String)| Issue::new(format!("grains \"{}\"{key}", thing.name), message);
+                    builder.issues.extend(wrong.into_iter().map(issue));
+                }
+            }
+        }
+        let settings = Settings {
+            name: plan.name.clone(),
+            substeps: plan.substeps,
+            step: plan.step,
+            longest: step(scene, plan),
+            law: law(plan),
+            gravity: builder.gravity.clone(),
+        };
+        let mut system = Bed::new(settings, objects, &all);
+        if builder.issues.is_empty() {
+            // Bodies, too, where they start.
+            let bodies = if touches(scene) { surfaces(scene, builder.assets) } else { Vec::new() };
+            system.meet(&Arc::new(builder.colliders.iter().cloned().chain(bodies).collect()));
+            if let Some(overlaps) = system.part() {
+                tell(builder, plan, &overlaps);
+            }
+            system.meet(&builder.colliders);
+        }
+        Some(Box::new(system))
+    }
+}
+
+/// Tells that grains overlap at the start.
+fn tell(builder: &mut Builder<'_>, plan: &Plan, overlaps: &Overlaps) {
+    let Overlaps { count, deepest, left, most } = overlaps;
+    let path = format!("system \"{}\"", plan.name);
+    let what = format!("{count} contacts, of grains with each other or with solids, overlap at the start by up to {} m", short(*deepest));
+    if left > most {
+        builder.issues.push(Issue::new(path, format!("{what}, and cannot be moved apart; take fewer grains, or give them more room")));
+    } else {
+        let message = format!(
+            "{what}; they have been moved apart, to {} m. Take fewer grains, or a larger volume, unless that is meant",
+            short(*left)
+        );
+        builder.warnings.push(Warning::new(Code::StartsInside, path, message));
+    }
+}

@@ -1,0 +1,222 @@
+//! Grains and their motion.
+
+use super::law::Pair;
+use super::list::{Four, Kept, List, Part, point};
+use super::press::Rows;
+use super::walls::{Walls, add};
+use crate::geometry::Vector;
+use crate::math::parallel::{CHUNK, Tasks, chunks2, fold};
+use crate::math::{Real, Row};
+
+/// Moment of inertia of a ball over m R².
+const BALL: f64 = 0.4;
+
+/// Grains in the order of their cells.
+#[derive(Debug, Default)]
+pub struct Bed {
+    /// Places and radii [m].
+    pub x: Vec<Four>,
+    /// Velocities [m/s], and 1/mass [1/kg].
+    pub v: Vec<Four>,
+    /// Angular velocities [rad/s], and kinds.
+    pub w: Vec<Four>,
+    /// The grain of each row.
+    pub grain: Vec<u32>,
+    /// Forces [N] and torques [N m] of contacts, by the last pass.
+    pub force: Vec<Four>,
+    pub torque: Vec<Four>,
+    /// Velocities and 1/mass, angular velocities and radii, in the engine's scalar.
+    pub quick: [Vec<Row>; 2],
+    /// The pair of each kind with each.
+    pub pairs: Vec<Pair>,
+    pub kinds: usize,
+    pub list: List,
+    /// How far any grain or surface may have gone since candidates were sought [m].
+    pub travel: f64,
+}
+
+impl Bed {
+    /// Whether contacts remember turns.
+    fn turns(&self) -> bool {
+        self.pairs.iter().any(Pair::resists_turns)
+    }
+
+    /// Puts rows into the order of their cells and seeks candidates: at the start of each interval, so that the order of sums does not depend on
+    /// when candidates run out.
+    pub fn sort(&mut self, walls: &mut Walls, t: f64) {
+        let order = self.list.order(&self.x);
+        if order.len() < self.x.len() {
+            // What is not finite is told after the interval.
+            return self.rebuild(walls, t, None);
+        }
+        for rows in [&mut self.x, &mut self.v, &mut self.w] {
+            *rows = order.iter().map(|row| rows[*row as usize]).collect();
+        }
+        self.grain = order.iter().map(|row| self.grain[*row as usize]).collect();
+        self.rebuild(walls, t, Some(&order));
+    }
+
+    /// Seeks candidates anew; rows may have come from others.
+    fn rebuild(&mut self, walls: &mut Walls, t: f64, from: Option<&[u32]>) {
+        let same: Vec<u32> = (0..self.x.len() as u32).collect();
+        let from = from.unwrap_or(&same);
+        let mut to = vec![0; self.x.len()];
+        from.iter().enumerate().for_each(|(row, old)| to[*old as usize] = row as u32);
+        self.list.rebuild(&self.x, from, self.turns());
+        // Both may go that far.
+        walls.rebuild(self, t, 2.0 * self.list.slack, &to);
+        self.travel = 0.0;
+        self.force.resize(self.x.len(), [0.0; 4]);
+        self.torque.resize(self.x.len(), [0.0; 4]);
+    }
+
+    /// Forces of all contacts at a time; what contacts remember goes on by h [s].
+    pub fn press(&mut self, walls: &mut Walls, t: f64, h: f64) {
+        let mut parts = std::mem::take(&mut self.list.parts);
+        let Self { x, v, w, force, torque, quick, pairs, kinds, .. } = self;
+        let [velocities, spins] = &mut *quick;
+        velocities.resize(x.len(), [0.0; 4]);
+        spins.resize(x.len(), [0.0; 4]);
+        chunks2(velocities, spins, |start, velocities, spins| {
+            let rows = x[start..].iter().zip(&v[start..]).zip(&w[start..]);
+            for ((velocity, spin), ((x, v), w)) in velocities.iter_mut().zip(spins).zip(rows) {
+                *velocity = v.map(|c| c as Real);
+                *spin = [w[0] as Real, w[1] as Real, w[2] as Real, x[3] as Real];
+            }
+        });
+        let rows = Rows { x, w, quick: [velocities, spins], pairs, kinds: *kinds, h };
+        let chunk = self.list.chunk;
+        parts.iter_mut().zip(force.chunks_mut(chunk)).zip(torque.chunks_mut(chunk)).enumerate().in_parallel(
+            |(c, ((part, force), torque))| {
+                rows.press(part, c * chunk, force, torque);
+            },
+        );
+        self.list.parts = parts;
+        walls.press(self, t, h);
+    }
+
+    /// Velocities change by forces and gravity over h [s].
+    pub fn kick(&mut self, gravity: Vector, h: f64) {
+        let Self { x, v, w, force, torque, .. } = self;
+        let (x, force, torque) = (&*x, &*force, &*torque);
+        v.chunks_mut(CHUNK).zip(w.chunks_mut(CHUNK)).enumerate().in_parallel(|(c, (v, w))| {
+            for (k, (v, w)) in v.iter_mut().zip(w).enumerate() {
+                let i = c * CHUNK + k;
+                add(v, gravity * h + point(&force[i]) * (v[3] * h));
+                add(w, point(&torque[i]) * (v[3] * h / (BALL * x[i][3] * x[i][3])));
+            }
+        });
+    }
+
+    /// Grains move for h [s].
+    pub fn drift(&mut self, walls: &mut Walls, t: f64, h: f64) {
+        let v = &self.v;
+        let parts: Vec<(f64, f64)> = self.x.chunks_mut(CHUNK).enumerate().map_in_parallel(|(c, x)| {
+            let (mut fastest, mut farthest) = (0.0_f64, 0.0_f64);
+            for (x, v) in x.iter_mut().zip(&v[c * CHUNK..]) {
+                let v = point(v);
+                add(x, v * h);
+                fastest = fastest.max(v.norm_sq());
+                farthest = farthest.max(point(x).norm_sq());
+            }
+            (fastest, farthest)
+        });
+        let [fastest, farthest] = [|p: &(f64, f64)| p.0, |p: &(f64, f64)| p.1].map(|of| parts.iter().map(of).fold(0.0, f64::max).sqrt());
+        self.travel += h * fastest.max(walls.fastest(t, h, farthest));
+        if self.travel > self.list.slack {
+            self.rebuild(walls, t + h, None);
+        }
+    }
+
+    /// Takes contacts over.
+    pub fn remember(&mut self, contacts: &[([u32; 2], Kept)]) {
+        let same: Vec<u32> = (0..self.x.len() as u32).collect();
+        self.list.remember(self.x.len(), contacts, self.turns());
+        self.list.rebuild(&self.x, &same, self.turns());
+    }
+
+    /// Moves candidates that overlap, and those in solids, apart: how many did, and how deep the deepest was [m].
+    pub fn part(&mut self, walls: &Walls) -> (usize, f64) {
+        let (mut count, mut deepest) = (0, 0.0_f64);
+        for [a, b] in self.list.parts.iter().flat_map(|part| &part.own.rows).map(|pair| pair.map(|row| row as usize)) {
+            let (x, y) = (point(&self.x[a]), point(&self.x[b]));
+            let way = y - x;
+            let depth = self.x[a][3] + self.x[b][3] - way.norm();
+            if depth > 0.0 {
+                let normal = if way.norm() > 0.0 { way.normalized() } else { Vector { x: 0.0, y: 0.0, z: 1.0 } };
+                let share = self.v[a][3] / (self.v[a][3] + self.v[b][3]);
+                add(&mut self.x[a], normal * (-depth * share));
+                add(&mut self.x[b], normal * (depth * (1.0 - share)));
+                (count, deepest) = (count + 1, deepest.max(depth));
+            }
+        }
+        for x in &mut self.x {
+            for surface in 0..walls.solids() {
+                let (p, mut shift) = (point(x), Vector::default());
+                walls.each_near(surface, p, 0.0, x[3], |distance, normal| {
+                    let depth = x[3] - distance - shift.dot(normal);
+                    if depth > 0.0 {
+                        (shift, count, deepest) = (shift + normal * depth, count + 1, deepest.max(depth));
+                    }
+                });
+                add(x, shift);
+            }
+        }
+        (count, deepest)
+    }
+
+    /// Elastic energy of contacts [J] and the deepest overlap [m], with its rows.
+    pub fn stored(&self) -> (f64, Option<(f64, [u32; 2])>, u64) {
+        let of = |part: &Part| {
+            let (mut energy, mut deepest, mut count) = (0.0, None::<(f64, [u32; 2])>, 0);
+            for (k, pair) in part.own.rows.iter().enumerate() {
+                let [a, b] = pair.map(|i| i as usize);
+                let radii = [self.x[a][3], self.x[b][3]];
+                let depth = radii[0] + radii[1] - (point(&self.x[b]) - point(&self.x[a])).norm();
+                if depth <= 0.0 {
+                    continue;
+                }
+                let memory = part.own.memory(k);
+                energy += self.pairs[self.w[a][3] as usize * self.kinds + self.w[b][3] as usize].energy(depth, radii, &memory);
+                count += 1;
+                if deepest.is_none_or(|(most, _)| depth > most) {
+                    deepest = Some((depth, *pair));
+                }
+            }
+            (energy, deepest, count)
+        };
+        let larger = |a: Option<(f64, [u32; 2])>, b: Option<(f64, [u32; 2])>| if b.map(|b| b.0) > a.map(|a| a.0) { b } else { a };
+        self.list.parts.iter().map_in_parallel(of).into_iter().fold((0.0, None, 0), |a, b| (a.0 + b.0, larger(a.1, b.1), a.2 + b.2))
+    }
+
+    /// Kinetic energy of a row [J].
+    pub fn kinetic(&self, row: usize) -> f64 {
+        let [radius, inverse] = [self.x[row][3], self.v[row][3]];
+        0.5 / inverse * (point(&self.v[row]).norm_sq() + BALL * radius * radius * point(&self.w[row]).norm_sq())
+    }
+
+    /// Momentum [N s], and angular momentum about the origin [N m s].
+    pub fn momenta(&self, row: usize) -> [Vector; 2] {
+        let (mass, radius) = (1.0 / self.v[row][3], self.x[row][3]);
+        let momentum = point(&self.v[row]) * mass;
+        [momentum, point(&self.x[row]).cross(momentum) + point(&self.w[row]) * (BALL * mass * radius * radius)]
+    }
+
+    /// The row of each grain.
+    pub fn rows(&self) -> Vec<u32> {
+        let mut rows = vec![0; self.grain.len()];
+        self.grain.iter().enumerate().for_each(|(row, grain)| rows[*grain as usize] = row as u32);
+        rows
+    }
+
+    /// The first row that is not finite.
+    pub fn lost(&self) -> Option<(usize, &'static str)> {
+        let finite = |row: &Four| row[..3].iter().all(|c| (*c as Real).is_finite());
+        let first = |range: std::ops::Range<usize>| {
+            range.into_iter().find(|i| !(finite(&self.x[*i]) && finite(&self.v[*i]) && finite(&self.w[*i])))
+        };
+        let row = fold(self.x.len(), first).into_iter().flatten().next()?;
+        let column = [("position", &self.x), ("velocity", &self.v)].into_iter().find(|(_, rows)| !finite(&rows[row]));
+        Some((row, column.map_or("angular_velocity", |(name, _)| name)))
+    }
+}

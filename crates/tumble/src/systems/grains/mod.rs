@@ -1,0 +1,411 @@
+//! Grains: spheres that touch each other, solids and rigid bodies, each contact a spring with friction that remembers how far it has slipped.
+//!
+//!   m v' = m g + sum of F,   I ω' = sum of r × F + M,   x' = v                                                         (grains.4)
+//!
+//! Velocity Verlet: half a kick, a drift, the forces of all contacts, half a kick. Places, velocities and sums are in double precision in both engines:
+//! an overlap is a millionth of a place. The force of a pair is in the engine's scalar.
+
+mod bed;
+mod law;
+mod list;
+mod press;
+mod walls;
+
+pub use law::{Material, longest_step};
+
+use crate::exchange::Turn;
+use crate::forces::Gravity;
+use crate::geometry::{Collider, Vector};
+use crate::integrators::equal_steps;
+use crate::math::Real;
+use crate::system::{Archive, Part, System};
+use bed::Bed;
+use law::{Dampings, Memory, Pair};
+use list::{Kept, List, point};
+use std::ops::Range;
+use std::sync::Arc;
+use tumble_interface::engine::{Ledger, Share, Stability, StepReport, Worst};
+use tumble_interface::error::Breakdown;
+use tumble_interface::scene::NormalLaw;
+use tumble_interface::{Column, StepError};
+use walls::{WallContact, Walls};
+
+/// Numbers of a row, of a contact of two grains, and of one with a wall, in a snapshot.
+const ROW: usize = 9;
+const CONTACT: usize = 8;
+const WALL: usize = 10;
+/// Overlap at the start, over the least radius, that is taken apart, and what is left of it.
+const OVERLAP: f64 = 0.1;
+const LEFT: f64 = 0.01;
+/// Passes that take overlaps apart, with the candidates of a sort, and sorts.
+const PASSES: usize = 20;
+const SORTS: usize = 50;
+
+/// A grain at the start.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Grain {
+    /// Its place [m].
+    pub x: Vector,
+    /// Its radius [m].
+    pub radius: f64,
+    /// Its mass [kg].
+    pub mass: f64,
+    /// Its velocity [m/s].
+    pub v: Vector,
+    /// Its angular velocity [rad/s].
+    pub w: Vector,
+}
+
+/// Grains of one material.
+pub struct Object {
+    /// Its name.
+    pub name: String,
+    /// Its grains.
+    pub grains: Range<usize>,
+}
+
+/// How the system goes on.
+pub struct Settings {
+    /// Its name.
+    pub name: String,
+    /// Sub-steps of an interval, if the scene says so.
+    pub substeps: Option<u32>,
+    /// The longest sub-step, if the scene says so [s].
+    pub step: Option<f64>,
+    /// The longest that resolves contacts [s].
+    pub longest: f64,
+    /// The force of a contact.
+    pub law: NormalLaw,
+    /// Gravity.
+    pub gravity: Gravity,
+}
+
+/// Grains.
+pub struct Grains {
+    settings: Settings,
+    objects: Vec<Object>,
+    bed: Bed,
+    walls: Walls,
+    /// The last sub-step [s].
+    h: f64,
+}
+
+/// Overlaps at the start.
+pub struct Overlaps {
+    /// How many there are.
+    pub count: usize,
+    /// The deepest [m].
+    pub deepest: f64,
+    /// What is left of it [m].
+    pub left: f64,
+    /// What may be left [m].
+    pub most: f64,
+}
+
+impl Grains {
+    /// Objects with the materials of their grains; grains in the order of the objects.
+    pub fn new(settings: Settings, objects: Vec<(Object, Material)>, grains: &[Grain]) -> Self {
+        let (objects, kinds): (Vec<Object>, Vec<Material>) = objects.into_iter().unzip();
+        let mut dampings = Dampings::default();
+        let mut pairs = Vec::new();
+        for a in &kinds {
+            pairs.extend(kinds.iter().map(|b| Pair::new(settings.law, a, b, &mut dampings)));
+        }
+        let radii =
+            grains.iter().fold([f64::INFINITY, 0.0_f64], |[least, largest], grain| [least.min(grain.radius), largest.max(grain.radius)]);
+        let row = |v: Vector, number: f64| [v.x, v.y, v.z, number];
+        let kind = |i: usize| objects.iter().position(|object| object.grains.contains(&i)).unwrap_or_default() as f64;
+        let bed = Bed {
+            x: grains.iter().map(|grain| row(grain.x, grain.radius)).collect(),
+            v: grains.iter().map(|grain| row(grain.v, 1.0 / grain.mass)).collect(),
+            w: grains.iter().enumerate().map(|(i, grain)| row(grain.w, kind(i))).collect(),
+            grain: (0..grains.len() as u32).collect(),
+            pairs,
+            kinds: kinds.len(),
+            list: List::new(grains.len(), radii),
+            ..Bed::default()
+        };
+        let walls = Walls::new(settings.law, kinds);
+        Self { settings, objects, bed, walls, h: 0.0 }
+    }
+
+    /// Takes over solids that others have published.
+    pub fn meet(&mut self, solids: &Arc<Vec<Collider>>) {
+        self.walls.meet(solids);
+    }
+
+    /// Moves grains that overlap, each other or solids, apart, if any do by more than they may.
+    pub fn part(&mut self) -> Option<Overlaps> {
+        let least = self.bed.x.iter().map(|x| x[3]).fold(f64::INFINITY, f64::min);
+        self.bed.sort(&mut self.walls, 0.0);
+        let given = self.bed.x.clone();
+        let (count, deepest) = self.bed.part(&self.walls);
+        if deepest <= OVERLAP * least {
+            self.bed.x = given;
+            return None;
+        }
+        let mut left = deepest;
+        for _ in 0..SORTS {
+            self.bed.sort(&mut self.walls, 0.0);
+            left = self.bed.part(&self.walls).1;
+            if left <= LEFT * least {
+                break;
+            }
+            (1..PASSES).for_each(|_| _ = self.bed.part(&self.walls));
+        }
+        Some(Overlaps { count, deepest, left, most: OVERLAP * least })
+    }
+
+    fn steps(&self, dt: f64) -> u32 {
+        self.settings.substeps.unwrap_or_else(|| equal_steps(dt, self.settings.step.unwrap_or(self.settings.longest)) as u32)
+    }
+
+    /// Object of a row, and the index of its grain there.
+    fn owner(&self, row: usize) -> Option<(&Object, usize)> {
+        let grain = *self.bed.grain.get(row)? as usize;
+        self.objects.iter().find(|object| object.grains.contains(&grain)).map(|object| (object, grain - object.grains.start))
+    }
+
+    fn kick(&mut self, t: f64, h: f64) {
+        self.bed.kick(Vector::from(self.settings.gravity.at(t)), h);
+        self.walls.kick(h);
+    }
+
+    /// The state of rows of some grains.
+    fn ledger_of(&self, rows: &[u32], t: f64) -> Ledger {
+        let gravity = Vector::from(self.settings.gravity.at(t));
+        let (mut momentum, mut spin, mut speed) = (Vector::default(), Vector::default(), 0.0_f64);
+        let mut ledger = Ledger { time: t, ..Ledger::default() };
+        for row in rows.iter().map(|row| *row as usize) {
+            let mass = 1.0 / self.bed.v[row][3];
+            let [linear, angular] = self.bed.momenta(row);
+            ledger.mass += mass;
+            (momentum, spin) = (momentum + linear, spin + angular);
+            ledger.kinetic += self.bed.kinetic(row);
+            ledger.external -= mass * gravity.dot(point(&self.bed.x[row]));
+            speed = speed.max(point(&self.bed.v[row]).norm());
+        }
+        Ledger { momentum: momentum.into(), angular_momentum: Some(spin.into()), speed: Some(speed), ..ledger }
+    }
+}
+
+impl System for Grains {
+    fn name(&self) -> &str {
+        &self.settings.name
+    }
+
+    /// Grains are no bodies that others push: they visit.
+    fn absorb(&mut self, _exchange: &mut Turn<'_>) {}
+
+    fn advance(&mut self, t: f64, dt: f64, exchange: &mut Turn<'_>, go_on: &(dyn Fn() -> bool + Sync)) -> Result<StepReport, StepError> {
+        self.meet(&exchange.surfaces().clone());
+        self.walls.visit(exchange);
+        let mut report = StepReport::default();
+        let n = self.steps(dt);
+        let h = dt / f64::from(n);
+        self.h = h;
+        self.bed.sort(&mut self.walls, t);
+        self.bed.press(&mut self.walls, t, 0.0);
+        self.kick(t, 0.5 * h);
+        for k in 1..=n {
+            if !go_on() {
+                return Ok(report);
+            }
+            let time = t + f64::from(k) * h;
+            self.walls.drift(h);
+            self.bed.drift(&mut self.walls, time - h, h);
+            self.bed.press(&mut self.walls, time, h);
+            self.kick(time, if k < n { h } else { 0.5 * h });
+            report.stepped(h);
+        }
+        self.walls.post(exchange);
+        Ok(report)
+    }
+
+    /// Looks at what it meets, so that its books are whole after a restore.
+    fn publish(&mut self, _t: f64, exchange: &mut Turn<'_>) {
+        self.meet(&exchange.surfaces().clone());
+        self.walls.visit(exchange);
+    }
+
+    fn columns(&self, _t: f64, names: &[&str], out: &mut Vec<Column>) {
+        let rows = self.bed.rows();
+        for Object { name, grains } in &self.objects {
+            for column in names {
+                let of = match *column {
+                    "position" => &self.bed.x,
+                    "velocity" => &self.bed.v,
+                    "angular_velocity" => &self.bed.w,
+                    _ => continue,
+                };
+                let numbers = rows[grains.clone()].iter().flat_map(|row| of[*row as usize][..3].iter().map(|c| *c as Real));
+                out.push(Column::new(name, column, numbers.collect::<Vec<_>>()));
+            }
+        }
+    }
+
+    fn topology(&self, out: &mut Vec<Column>) {
+        let rows = self.bed.rows();
+        for Object { name, grains } in &self.objects {
+            let of =
+                |number: &dyn Fn(usize) -> f64| rows[grains.clone()].iter().map(|row| number(*row as usize) as Real).collect::<Vec<_>>();
+            out.push(Column::new(name, "radius", of(&|row| self.bed.x[row][3])));
+            out.push(Column::new(name, "mass", of(&|row| 1.0 / self.bed.v[row][3])));
+        }
+    }
+
+    fn ledger(&self, t: f64) -> Ledger {
+        let all: Vec<u32> = self.bed.rows();
+        let (energy, deepest, count) = self.bed.stored();
+        let of = |contact: &WallContact| {
+            let row = contact.row as usize;
+            self.walls.energy(contact, self.bed.x[row][3], self.bed.w[row][3], t)
+        };
+        let walls: f64 = self.walls.contacts().map(of).sum();
+        let depth = self.walls.contacts().map(|contact| contact.depth).fold(deepest.map_or(0.0, |(depth, _)| depth), f64::max);
+        Ledger {
+            elastic: energy + walls,
+            penetration: Some(depth),
+            contacts: Some(count + self.walls.contacts().count() as u64),
+            ..self.ledger_of(&all, t)
+        }
+    }
+
+    fn shares(&self, t: f64) -> Vec<Share> {
+        let rows = self.bed.rows();
+        let share = |object: &Object| Share {
+            system: self.settings.name.clone(),
+            object: object.name.clone(),
+            ledger: self.ledger_of(&rows[object.grains.clone()], t),
+        };
+        self.objects.iter().map(share).collect()
+    }
+
+    fn worst(&self, _t: f64) -> Vec<Worst> {
+        let of = |measure, value, row: usize, other: Option<String>| {
+            let (object, index) = self.owner(row)?;
+            Some(Worst { measure, value, object: object.name.clone(), other, particles: vec![index], id: None, cell: None })
+        };
+        let speeds = self.bed.v.iter().map(|v| point(v).norm()).enumerate();
+        let fastest = speeds.max_by(|a, b| a.1.total_cmp(&b.1)).and_then(|(row, speed)| of("speed", speed, row, None));
+        let grains = self.bed.stored().1;
+        let wall = self.walls.contacts().max_by(|a, b| a.depth.total_cmp(&b.depth));
+        let deepest = match (grains, wall) {
+            (Some((depth, [a, b])), wall) if wall.is_none_or(|wall| wall.depth <= depth) => {
+                of("penetration", depth, a as usize, self.owner(b as usize).map(|(object, _)| object.name.clone()))
+            }
+            (_, Some(wall)) => of("penetration", wall.depth, wall.row as usize, self.walls.name(wall.surface).map(str::to_string)),
+            _ => None,
+        };
+        fastest.into_iter().chain(deepest).collect()
+    }
+
+    fn breakdown(&mut self, t: f64) -> Option<StepError> {
+        let (row, column) = self.bed.lost()?;
+        let (object, index) = self.owner(row)?;
+        Some(StepError::NotFinite(Box::new(Breakdown {
+            system: self.settings.name.clone(),
+            object: object.name.clone(),
+            column: column.into(),
+            index,
+            id: None,
+            cell: None,
+            time: t,
+            integrator: "grains".into(),
+            step: self.h,
+            stable_step: self.settings.longest,
+            energy_ratio: None,
+            cause: None,
+        })))
+    }
+
+    fn watch(&mut self, _on: bool) {}
+
+    fn stability(&mut self, _dt: f64, _go_on: &(dyn Fn() -> bool + Sync)) -> Option<Stability> {
+        None
+    }
+
+    fn save(&self, archive: &mut Archive) {
+        let Bed { x, v, w, grain, list, .. } = &self.bed;
+        archive.push_indices("grains", grain);
+        let rows = x.iter().zip(v).zip(w).flat_map(|((x, v), w)| [&x[..3], &v[..3], &w[..3]].concat());
+        archive.push("rows", Part::Numbers(rows.collect()));
+        let three = <[f64; 3]>::from;
+        let (mut pairs, mut memories) = (Vec::new(), Vec::new());
+        for (pair, memory) in list.kept() {
+            pairs.extend(pair);
+            memories.extend(memory.concat());
+        }
+        archive.push_indices("pairs", &pairs);
+        archive.push("contacts", Part::Table(CONTACT, memories));
+        let keys: Vec<u32> = self.walls.contacts().flat_map(|c| [c.row, c.surface]).collect();
+        archive.push_indices("keys", &keys);
+        let kept =
+            self.walls.contacts().flat_map(|c| [&three(c.normal)[..], &three(c.memory.slip), &three(c.memory.turn), &[c.depth]].concat());
+        archive.push("walls", Part::Numbers(kept.collect()));
+    }
+
+    fn restore(&mut self, archive: &mut Archive) -> Option<()> {
+        let (grain, rows) = (archive.indices("grains")?, archive.numbers("rows")?);
+        let (pairs, memories) = (archive.indices("pairs")?, archive.table_of(CONTACT, "contacts")?);
+        let (keys, kept) = (archive.indices("keys")?, archive.numbers("walls")?);
+        let count = self.bed.x.len();
+        let mut sorted = grain.clone();
+        sorted.sort_unstable();
+        let whole = sorted.iter().enumerate().all(|(i, grain)| i == *grain as usize) && sorted.len() == count;
+        let ordered =
+            |keys: &[u32]| keys.chunks_exact(2).all(|key| (key[0] as usize) < count) && keys.chunks_exact(2).is_sorted_by_key(|key| key[0]);
+        let fits = rows.len() == ROW * count && memories.len() * 2 == CONTACT * pairs.len() && kept.len() * 2 == WALL * keys.len();
+        if !(whole && fits && ordered(&pairs) && ordered(&keys)) {
+            return None;
+        }
+        // What does not change goes along with its grain.
+        let bed = &mut self.bed;
+        let place = bed.rows();
+        let constant: Vec<[f64; 3]> = grain
+            .iter()
+            .map(|grain| {
+                let row = place[*grain as usize] as usize;
+                [bed.x[row][3], bed.v[row][3], bed.w[row][3]]
+            })
+            .collect();
+        for (row, (s, constant)) in rows.chunks_exact(ROW).zip(constant).enumerate() {
+            bed.x[row] = [s[0], s[1], s[2], constant[0]];
+            bed.v[row] = [s[3], s[4], s[5], constant[1]];
+            bed.w[row] = [s[6], s[7], s[8], constant[2]];
+        }
+        bed.grain = grain;
+        let three = |s: &[f64]| Vector { x: s[0], y: s[1], z: s[2] };
+        let contacts = pairs.chunks_exact(2).zip(memories.chunks_exact(CONTACT));
+        let contacts: Vec<([u32; 2], Kept)> =
+            contacts.map(|(pair, s)| ([pair[0], pair[1]], [[s[0], s[1], s[2], s[3]], [s[4], s[5], s[6], s[7]]])).collect();
+        bed.remember(&contacts);
+        let contact = |(key, s): (&[u32], &[f64])| WallContact {
+            row: key[0],
+            surface: key[1],
+            normal: three(s),
+            memory: Memory { slip: three(&s[3..]), turn: three(&s[6..]) },
+            depth: s[9],
+        };
+        self.walls.remember(keys.chunks_exact(2).zip(kept.chunks_exact(WALL)).map(contact).collect());
+        Some(())
+    }
+
+    fn write(&mut self, object: &str, column: &str, values: &[f64]) -> Option<bool> {
+        let grains = self.objects.iter().find(|o| o.name == object)?.grains.clone();
+        let rows = self.bed.rows();
+        let into = match column {
+            "position" => &mut self.bed.x,
+            "velocity" => &mut self.bed.v,
+            "angular_velocity" => &mut self.bed.w,
+            _ => return Some(false),
+        };
+        if values.len() != 3 * grains.len() {
+            return Some(false);
+        }
+        for (grain, value) in grains.zip(values.chunks_exact(3)) {
+            into[rows[grain] as usize][..3].copy_from_slice(value);
+        }
+        Some(true)
+    }
+}
