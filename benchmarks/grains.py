@@ -1,7 +1,8 @@
-"""50,653 grains that have settled in a box: particle-steps per second, with Hertz's law, Mindlin's friction with its history, and walls.
+"""50,653 grains that have settled in a box: particle-steps per second by Hertz's law, with friction that remembers, and walls.
 
-lammps goes on from the same places at rest, with the same stiffness, friction and step, as many steps until it is timed. It has a linear damping of its own kind,
-which does not matter at rest. Both must hold the weight of all grains: the check compares the heights of the middle of mass and the contacts of a grain."""
+lammps goes on from the same places at rest, with the same stiffness, friction and step. Its damping is of another kind,
+which does not matter at rest. Both must bear the grains: the check compares the height of their middle of mass, and the
+contacts of a grain."""
 
 import sys
 
@@ -108,7 +109,13 @@ def bench_lammps(x):
 
 def main():
     rate, settled, (height, touching) = bench_tumble(start())
-    show("grains", "tumble", rate, "particle-steps/s", f"middle of mass at {height:.4f} m, {touching:.2f} contacts a grain")
+    show(
+        "grains",
+        "tumble",
+        rate,
+        "particle-steps/s",
+        f"middle of mass at {height:.4f} m, {touching:.2f} contacts a grain",
+    )
     try:
         rate, (other, contacts) = bench_lammps(settled)
     except ImportError:
