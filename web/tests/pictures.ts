@@ -33,7 +33,7 @@ const AT: Record<string, number> = {
   "coupled/trampoline": 20,
   "grains/column": 22,
   "grains/heaps": 20,
-  "grains/hourglass": 40,
+  "grains/hopper": 30,
   "integrators/overshoot": 5,
   "rigid/arch": 18,
   "rigid/cradle": 12,
