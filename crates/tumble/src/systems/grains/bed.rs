@@ -3,7 +3,7 @@
 use super::law::Pair;
 use super::list::{Four, Kept, List, Part, point};
 use super::press::Rows;
-use super::walls::{Walls, add};
+use super::walls::{Touched, Walls, add};
 use crate::geometry::Vector;
 use crate::math::parallel::{CHUNK, Tasks, chunks2, fold};
 use crate::math::{Real, Row};
@@ -64,7 +64,7 @@ impl Bed {
         from.iter().enumerate().for_each(|(row, old)| to[*old as usize] = row as u32);
         self.list.rebuild(&self.x, from, self.turns());
         // Both may go that far.
-        walls.rebuild(self, t, 2.0 * self.list.slack, &to);
+        walls.rebuild(&self.x, self.list.chunk, t, 2.0 * self.list.slack, &to);
         self.travel = 0.0;
         self.force.resize(self.x.len(), [0.0; 4]);
         self.torque.resize(self.x.len(), [0.0; 4]);
@@ -92,7 +92,8 @@ impl Bed {
             },
         );
         self.list.parts = parts;
-        walls.press(self, t, h);
+        let Self { x, v, w, force, torque, .. } = self;
+        walls.press(Touched { x, v, w, force, torque, chunk }, t, h);
     }
 
     /// Velocities change by forces and gravity over h [s].

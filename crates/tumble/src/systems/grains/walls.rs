@@ -1,8 +1,7 @@
 //! Contact of grains with solids, and with rigid bodies, which yield.
 
-use super::bed::Bed;
 use super::law::{Dampings, Material, Memory, Overlap, Pair};
-use super::list::point;
+use super::list::{Four, point};
 use crate::exchange::{Exchange, Turn, Visit};
 use crate::geometry::{Collider, Friction, Shape, Vector};
 use crate::math::parallel::Tasks;
@@ -42,6 +41,17 @@ struct Part {
     candidates: Vec<[u32; 2]>,
     contacts: Vec<WallContact>,
     pushes: Vec<Push>,
+}
+
+/// Rows of grains that walls touch, and what walls add to.
+pub struct Touched<'a> {
+    pub x: &'a [Four],
+    pub v: &'a [Four],
+    pub w: &'a [Four],
+    pub force: &'a mut [Four],
+    pub torque: &'a mut [Four],
+    /// Rows of a chunk.
+    pub chunk: usize,
 }
 
 /// Solids and bodies that grains meet. Surfaces are counted through: first solids, then bodies.
@@ -164,18 +174,17 @@ impl Walls {
     }
 
     /// Seeks candidates anew; `places` are the rows of grains that had others before.
-    pub fn rebuild(&mut self, bed: &Bed, t: f64, slack: f64, places: &[u32]) {
+    pub fn rebuild(&mut self, x: &[Four], rows_each: usize, t: f64, slack: f64, places: &[u32]) {
         let mut kept: Vec<WallContact> = self.contacts().map(|c| WallContact { row: places[c.row as usize], ..*c }).collect();
         // Of several contacts with one surface the order stays.
         kept.sort_by_key(|contact| [contact.row, contact.surface]);
         let surfaces = self.solids.len() + self.bodies.len();
         let walls = &*self;
-        let rows_each = bed.list.chunk;
         let chunk = |start: usize| {
-            let rows = start..(start + rows_each).min(bed.x.len());
+            let rows = start..(start + rows_each).min(x.len());
             let mut part = Part::default();
             for row in rows.clone() {
-                let (p, radius) = (point(&bed.x[row]), bed.x[row][3]);
+                let (p, radius) = (point(&x[row]), x[row][3]);
                 for surface in 0..surfaces {
                     let body = surface.checked_sub(walls.solids.len()).map(|k| &walls.bodies[k].0);
                     let reach = radius + slack;
@@ -193,14 +202,13 @@ impl Walls {
             part.contacts = kept[first..end].to_vec();
             part
         };
-        self.parts = (0..bed.x.len()).step_by(rows_each).map_in_parallel(chunk);
+        self.parts = (0..x.len()).step_by(rows_each).map_in_parallel(chunk);
     }
 
     /// The contact pass: adds what surfaces do to grains.
-    pub fn press(&mut self, bed: &mut Bed, t: f64, h: f64) {
+    pub fn press(&mut self, rows: Touched<'_>, t: f64, h: f64) {
         let mut parts = std::mem::take(&mut self.parts);
-        let (walls, Bed { x, v, w, force, torque, list, .. }) = (&*self, bed);
-        let (x, v, w, each) = (&*x, &*v, &*w, list.chunk);
+        let (walls, Touched { x, v, w, force, torque, chunk: each }) = (&*self, rows);
         parts.iter_mut().zip(force.chunks_mut(each)).zip(torque.chunks_mut(each)).enumerate().in_parallel(
             |(c, ((part, force), torque))| {
                 let before = std::mem::take(&mut part.contacts);
@@ -304,7 +312,7 @@ impl Walls {
 
 /// Adds a vector to the first three numbers.
 #[inline(always)]
-pub fn add(to: &mut super::list::Four, v: Vector) {
+pub fn add(to: &mut Four, v: Vector) {
     to[0] += v.x;
     to[1] += v.y;
     to[2] += v.z;
