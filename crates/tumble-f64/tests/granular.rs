@@ -1,14 +1,12 @@
-//! Grains in bulk against what is measured of heaps, columns, silos and hoppers. See docs/theory/grains.md.
+//! Grains in bulk against what is measured of columns and packings. See docs/theory/grains.md.
 
 #![allow(clippy::unwrap_used, clippy::panic)] // helpers of tests fail by panicking, too
 
 use crate::common;
 
-use common::{Vector, column, positions, run, simulation, slope};
+use common::{Vector, positions, run, simulation};
 use std::f64::consts::PI;
-use std::fmt::Write;
 use tumble_f64::scene::Simulation;
-use tumble_interface::Engine;
 
 /// Radius of the grains [m], density [kg/m³].
 const R: f64 = 0.0025;
@@ -91,77 +89,4 @@ fn poured_balls_pack_as_densely_as_random_ones() {
     let count = positions(&sim, "sand").iter().filter(within).count() as f64;
     let part = count * 4.0 / 3.0 * PI * R.powi(3) / (4.0 * inner * inner * 16.0 * R);
     assert!(count > 100.0 && (0.6..0.66).contains(&part), "{part}, {count}");
-}
-
-/// The load on the plate under a silo that is filled so high, over the weight of the grains: a rigid body that a joint holds.
-fn load(height: f64) -> f64 {
-    let width = 20.0 * R;
-    let wall = |name: &str, x: f64, y: f64| {
-        let size = if x == 0.0 { [width + 0.04, 0.02, 2.0] } else { [0.02, width + 0.04, 2.0] };
-        block(name, [x, y, 1.0], size, "friction = 0.6")
-    };
-    let away = 0.5 * width + 0.01;
-    let walls = [wall("a", away, 0.0), wall("b", -away, 0.0), wall("c", 0.0, away), wall("d", 0.0, -away)].concat();
-    let plate = format!(
-        "[[system]]\nname = \"sand\"\nmethod = \"grains\"\n[[system]]\nname = \"plate\"\nmethod = \"rigid\"\n\
-         [[body]]\nname = \"plate\"\nshape = {{ box = {{ size = [{w}, {w}, 0.02] }} }}\nposition = [[0, 0, -0.01]]\nfriction = 0.6\nmass = 1\n\
-         [[joint]]\nname = \"scale\"\nbetween = [\"plate\"]\nat = [0, 0, -0.01]\nkind = {{ fixed = {{}} }}\n",
-        w = 0.999 * width
-    );
-    let mut sim =
-        scene(&[sand(0.6, "rolling_friction = 0.1", &[[[0.0, 0.0, 0.5 * height], [width, width, height]]]), walls, plate].concat());
-    run(&mut sim, 75);
-    let weight = (sim.ledger().mass - 1.0) * 9.81;
-    (column(&sim, "scale", "force")[0].z - 9.81) / weight
-}
-
-#[test]
-#[ignore = "long"]
-fn a_silo_bears_its_filling_by_its_walls() {
-    // Janssen: the load is D/(4 mu K) times (1 - exp(-4 mu K z/D)) of weight.
-    let width = 20.0 * R;
-    let heights = [2.0, 4.0, 8.0, 16.0].map(|n| n * width);
-    let parts = heights.map(load);
-    let loads: Vec<f64> = parts.iter().zip(heights).map(|(part, height)| part * height / width).collect();
-    let mut text = String::new();
-    write!(text, "parts {parts:?}, loads {loads:?}").unwrap();
-    // The last doubling adds little, and the first filling is not borne.
-    assert!(parts[0] > 0.5 && parts[3] < 0.35 && loads[3] < 1.15 * loads[2], "{text}");
-    assert!(parts.is_sorted_by(|a, b| a > b), "{text}");
-}
-
-/// Grains a second that leave a flat hopper through a square hole of this width, from a filling of this height.
-fn flow(hole: f64, height: f64) -> f64 {
-    let side = 30.0 * R;
-    let rim = 0.25 * (side - hole) + 0.005;
-    let at = 0.5 * hole + rim;
-    let bottom = |name: &str, x: f64, y: f64| {
-        let size = if y == 0.0 { [2.0 * rim, side + 0.02, 0.01] } else { [hole, 2.0 * rim, 0.01] };
-        block(name, [x, y, -0.005], size, "friction = 0.5")
-    };
-    let rims = [bottom("a", at, 0.0), bottom("b", -at, 0.0), bottom("c", 0.0, at), bottom("d", 0.0, -at)].concat();
-    let lid =
-        block("lid", [0.0, 0.0, -0.005], [hole, hole, 0.01], "motion.keys = [{ time = 0.5 }, { time = 0.52, translate = [0, 0, -0.9] }]");
-    let walls =
-        format!("[[collider]]\nname = \"walls\"\nshape = {{ box = {{ size = [{side}, {side}, 4] }} }}\ninside = true\nfriction = 0.5\n");
-    let words = sand(0.5, "rolling_friction = 0.05\nradius_spread = 0.1", &[[[0.0, 0.0, 0.5 * height], [side, side, height]]]);
-    let mut sim = scene(&[words, rims, lid, walls].concat());
-    run(&mut sim, 40);
-    let above = |sim: &Simulation| positions(sim, "sand").iter().filter(|p| p.z > -0.01).count() as f64;
-    let before = above(&sim);
-    run(&mut sim, 20);
-    (before - above(&sim)) / 0.4
-}
-
-#[test]
-#[ignore = "long"]
-fn a_hopper_flows_with_the_power_of_beverloo_and_as_fast_from_any_height() {
-    let d = 2.0 * R;
-    let holes = [5.0, 6.5, 8.0].map(|n| n * d);
-    let flows = holes.map(|hole| flow(hole, 0.25));
-    let points: Vec<(f64, f64)> = holes.iter().zip(flows).map(|(hole, flow)| ((hole - 1.4 * d).ln(), flow.ln())).collect();
-    let power = slope(&points);
-    assert!((2.2..2.8).contains(&power), "{power}: {flows:?}");
-    let higher = flow(holes[1], 0.4);
-    assert!((higher / flows[1] - 1.0).abs() < 0.1, "{higher} {flows:?}");
 }
