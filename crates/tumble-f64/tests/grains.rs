@@ -428,3 +428,16 @@ fn a_far_fast_grain_changes_no_bit_where_a_grain_and_a_body_close_in() {
         );
     }
 }
+
+#[test]
+fn a_heap_that_explodes_by_too_long_steps_ends_the_run() {
+    let heap = "radius = 0.01\nfill = [{ center = [0, 0, 0.2], size = [0.2, 0.2, 0.3] }]";
+    let last = |step: f64| {
+        let mut sim = scene([0.0, 0.0, -G], &format!("step = {step}"), &(grains("heap", heap) + FLOOR));
+        (0..40).find_map(|_| sim.step(&|| true).err())
+    };
+    let (told, healthy) = (last(5e-3), last(1.6e-4));
+    let text = told.map(|error| error.to_string()).unwrap_or_default();
+    assert!(text.contains("exploded") && text.contains("stable step"), "{text}");
+    assert!(healthy.is_none(), "{healthy:?}");
+}

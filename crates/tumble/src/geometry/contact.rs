@@ -97,6 +97,19 @@ pub struct Impact {
     pub velocity: Vector,
 }
 
+/// What is looked for around a point.
+#[derive(Debug, Clone, Copy)]
+pub struct Search {
+    /// Surfaces nearer than this [m].
+    pub within: f64,
+    /// A solid counts as having at least this thickness [m].
+    pub thickness: f64,
+    /// How many of its surfaces at most.
+    pub surfaces: usize,
+    /// Whether what lies deep inside a mesh looks for its surface, however far.
+    pub deep: bool,
+}
+
 /// Solids at a time.
 #[derive(Debug, Clone, Copy, Default)]
 pub struct Walls<'a> {
@@ -112,8 +125,8 @@ impl Walls<'_> {
     /// three, as if each were flat. Solids count as having a thickness of at least `thickness` [m].
     pub fn near(&self, p: Vector, thickness: f64, within: f64, mut f: impl FnMut(usize, f64, Vector)) {
         for (at, collider) in self.colliders.iter().enumerate() {
-            let surfaces = if collider.inside { 3 } else { 1 };
-            collider.each_near(p, self.t, thickness, within, surfaces, |distance, normal| f(at, distance, normal));
+            let search = Search { within, thickness, surfaces: if collider.inside { 3 } else { 1 }, deep: true };
+            collider.each_near(p, self.t, search, |distance, normal| f(at, distance, normal));
         }
     }
 }
@@ -143,22 +156,20 @@ impl Collider {
         facets.carrier(local).map_or(Carrier::Whole, |(triangle, weights)| Carrier::Facet(triangle, weights))
     }
 
-    /// Calls `f` with the distance [m] of p from where masses are stopped, and the direction away from there, of its surfaces nearer than `within`
-    /// [m], as if each were flat: of a box that contains each wall, else up to so many. It counts as having a thickness of at least `thickness` [m].
-    pub fn each_near(&self, p: Vector, t: f64, thickness: f64, within: f64, surfaces: usize, mut f: impl FnMut(f64, Vector)) {
-        let (mut from, thickness) = (p, thickness.max(self.thickness));
+    /// Calls `f` with the distance [m] of p from where masses are stopped, and the direction away from there, of its surfaces nearer than that of
+    /// the search, as if each were flat: of a box that contains each wall, else up to so many.
+    pub fn each_near(&self, p: Vector, t: f64, search: Search, mut f: impl FnMut(f64, Vector)) {
+        let (mut from, thickness) = (p, search.thickness.max(self.thickness));
+        let reach = search.within + thickness;
         if let Some(walls) = self.walls(p, t) {
-            for (distance, normal) in walls.into_iter().filter(|(distance, _)| *distance < within + thickness) {
+            for (distance, normal) in walls.into_iter().filter(|(distance, _)| *distance < reach) {
                 f(distance - thickness, normal);
             }
             return;
         }
-        for _ in 0..surfaces {
-            let reach = within + thickness;
-            let (distance, normal) = self.distance(from, t, reach);
-            if distance >= reach || normal.norm_sq() == 0.0 {
-                break;
-            }
+        for _ in 0..search.surfaces {
+            let found = if search.deep { Some(self.distance(from, t, reach)) } else { self.distance_near(from, t, reach) };
+            let Some((distance, normal)) = found.filter(|(distance, normal)| *distance < reach && normal.norm_sq() > 0.0) else { break };
             f(distance - thickness + normal.dot(p - from), normal);
             // A point from which that surface is out of reach, whatever the rounding.
             from = from + normal * (1.01 * reach - distance);
@@ -208,6 +219,19 @@ impl Collider {
     pub fn distance(&self, p: Vector, t: f64, within: f64) -> (f64, Vector) {
         let place = self.at(t);
         let (distance, normal, _) = self.near(place.map_or(p, |(pose, _)| pose.back(p)), t, within);
+        self.outwards(place, distance, normal)
+    }
+
+    /// The same of a surface that is nearer than `within` [m]: deep inside a mesh nothing is.
+    fn distance_near(&self, p: Vector, t: f64, within: f64) -> Option<(f64, Vector)> {
+        let place = self.at(t);
+        let local = place.map_or(p, |(pose, _)| pose.back(p));
+        let near = self.shape.near_surface(local, t, within);
+        near.map(|(distance, normal, _)| self.outwards(place, distance, normal))
+    }
+
+    /// What is near its shape, towards where masses may be.
+    fn outwards(&self, place: Option<(Pose, Twist)>, distance: f64, normal: Vector) -> (f64, Vector) {
         let normal = place.map_or(normal, |(pose, _)| pose.turn.turn(normal));
         if self.inside { (-distance, -normal) } else { (distance, normal) }
     }

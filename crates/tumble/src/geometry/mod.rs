@@ -18,7 +18,7 @@ pub mod surface;
 
 pub use affine::Affine;
 pub use bvh::Bvh;
-pub use contact::{Carrier, Collider, Friction, Impact, Touch, Walls};
+pub use contact::{Carrier, Collider, Friction, Impact, Search, Touch, Walls};
 pub use facets::Facets;
 pub use motion::Motion;
 pub use neighbours::{Meet, Neighbours};

@@ -106,6 +106,14 @@ impl Shape {
         (d, n, Vector::default())
     }
 
+    /// The same of a surface that is nearer than `within` [m]: deep inside a mesh nothing is, and nothing is looked for.
+    pub fn near_surface(&self, p: Vector, t: f64, within: f64) -> Option<Near> {
+        match self {
+            Self::Animated { facets, shell } => facets.nearest(p, t, within).map(|found| signed(p, &found, *shell)),
+            _ => Some(self.near(p, t, within)),
+        }
+    }
+
     /// The same for what is to stay in: beyond the edge of a box the nearest wall counts, and not the edge, so that every wall pushes
     /// along its own normal.
     pub fn near_walls(&self, p: Vector, t: f64, within: f64) -> Near {

@@ -159,7 +159,9 @@ fn turned(center: [f64; 3], profile: &[[f64; 2]], sides: u32) -> Result<Mesh, Wr
     for i in 0..n {
         for j in i + 2..n.min(i + n - 1) {
             let ((a, b), (c, d)) = (edge(i), edge(j));
-            if side(a, b, c) * side(a, b, d) <= 0.0 && side(c, d, a) * side(c, d, b) <= 0.0 {
+            // Two on one line may lie apart.
+            let apart = (0..2).any(|k| a[k].max(b[k]) < c[k].min(d[k]) || c[k].max(d[k]) < a[k].min(b[k]));
+            if !apart && side(a, b, c) * side(a, b, d) <= 0.0 && side(c, d, a) * side(c, d, b) <= 0.0 {
                 return wrong(format!("[{j}]"), "the side from here touches another; go around the cut once");
             }
         }

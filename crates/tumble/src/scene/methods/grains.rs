@@ -1,6 +1,6 @@
 //! Grains: words to materials and places.
 
-use super::{MethodRules, is_in, surfaces, touches};
+use super::{MethodRules, is_in, scheme_of_its_own, surfaces, touches};
 use crate::geometry::Friction;
 use crate::recipes;
 use crate::scene::Assets;
@@ -66,28 +66,7 @@ impl MethodRules for Rules {
     }
 
     fn check(&self, scene: &Scene, issues: &mut Vec<Issue>) {
-        for plan in &scene.system {
-            let path = |key: &str| format!("system \"{}\".{key}", plan.name);
-            if plan.method != Method::Grains {
-                if plan.grains.is_some() {
-                    let message = format!("given with method \"{}\"; leave it out, or set method = \"grains\"", plan.method.name());
-                    issues.push(Issue::new(path("grains"), message));
-                }
-                continue;
-            }
-            let plain = Plan::default();
-            let given = [
-                ("clamp", plan.clamp != plain.clamp),
-                ("adaptive", plan.adaptive != plain.adaptive),
-                ("solver", plan.solver != plain.solver),
-                ("position_based", plan.position_based != plain.position_based),
-                ("self_contact", plan.self_contact != plain.self_contact),
-            ];
-            for (key, _) in given.into_iter().filter(|(_, given)| *given) {
-                let message = "says nothing to grains; leave it out, `substeps`, `step` and `grains` are theirs";
-                issues.push(Issue::new(path(key), message));
-            }
-        }
+        scheme_of_its_own(scene, Method::Grains, "grains", |plan| plan.grains.is_some(), issues);
         if scene.dimension == 2 && !scene.grains.is_empty() {
             issues.push(Issue::new("dimension", "2, but grains move in space; set dimension = 3, and take a slice between two planes"));
         }
@@ -157,6 +136,7 @@ impl MethodRules for Rules {
             substeps: plan.substeps,
             step: plan.step,
             longest: step(scene, plan),
+            sound: scene.grains.iter().map(|t| (t.young / t.density).sqrt()).fold(0.0, f64::max),
             law: law(plan),
             gravity: builder.gravity.clone(),
         };

@@ -116,6 +116,33 @@ pub fn is_in(system: &Option<String>, plan: &Plan) -> bool {
     system.as_ref() == Some(&plan.name)
 }
 
+/// What is wrong with systems of a method that has a table of its own name for its settings, and heeds no words for integrators.
+fn scheme_of_its_own(scene: &Scene, method: Method, what: &str, given: fn(&Plan) -> bool, issues: &mut Vec<Issue>) {
+    let name = method.name();
+    for plan in &scene.system {
+        let at = |key: &str| format!("system \"{}\".{key}", plan.name);
+        if plan.method != method {
+            if given(plan) {
+                let message = format!("given with method \"{}\"; leave it out, or set method = \"{name}\"", plan.method.name());
+                issues.push(Issue::new(at(name), message));
+            }
+            continue;
+        }
+        let plain = Plan::default();
+        let idle = [
+            ("clamp", plan.clamp != plain.clamp),
+            ("adaptive", plan.adaptive != plain.adaptive),
+            ("solver", plan.solver != plain.solver),
+            ("position_based", plan.position_based != plain.position_based),
+            ("self_contact", plan.self_contact != plain.self_contact),
+        ];
+        for (key, _) in idle.into_iter().filter(|(_, idle)| *idle) {
+            let message = format!("says nothing to {what}; leave it out, `substeps`, `step` and `{name}` are theirs");
+            issues.push(Issue::new(at(key), message));
+        }
+    }
+}
+
 /// Words of particles that only masses have, and that are given.
 fn words_of_masses(thing: &Particles) -> impl Iterator<Item = &'static str> {
     let given = [

@@ -1,6 +1,6 @@
 //! Rigid bodies: words to shapes, masses and states.
 
-use super::{MethodRules, is_in, touches, visits_bodies};
+use super::{MethodRules, is_in, scheme_of_its_own, touches, visits_bodies};
 use crate::exchange::BodySurface;
 use crate::geometry::motion::Key;
 use crate::geometry::{Collider, Motion, Vector};
@@ -50,26 +50,7 @@ impl MethodRules for Rules {
     }
 
     fn check(&self, scene: &Scene, issues: &mut Vec<Issue>) {
-        for plan in &scene.system {
-            if plan.method != Method::Rigid && plan.rigid.is_some() {
-                let message = format!("given with method \"{}\"; leave it out, or set method = \"rigid\"", plan.method.name());
-                issues.push(Issue::new(format!("system \"{}\".rigid", plan.name), message));
-            }
-        }
-        for plan in scene.system.iter().filter(|plan| plan.method == Method::Rigid) {
-            let plain = Plan::default();
-            let given = [
-                ("clamp", plan.clamp != plain.clamp),
-                ("adaptive", plan.adaptive != plain.adaptive),
-                ("solver", plan.solver != plain.solver),
-                ("position_based", plan.position_based != plain.position_based),
-                ("self_contact", plan.self_contact != plain.self_contact),
-            ];
-            for (key, _) in given.into_iter().filter(|(_, given)| *given) {
-                let message = "says nothing to rigid bodies; leave it out, `substeps`, `step` and `rigid` are theirs";
-                issues.push(Issue::new(format!("system \"{}\".{key}", plan.name), message));
-            }
-        }
+        scheme_of_its_own(scene, Method::Rigid, "rigid bodies", |plan| plan.rigid.is_some(), issues);
         for joint in &scene.joint {
             let object = |words: &String| {
                 let name = recipes::named(words).map_or(words.as_str(), |(name, _)| name);

@@ -154,7 +154,7 @@ impl Bed {
         for x in &mut self.x {
             for surface in 0..walls.solids() {
                 let (p, mut shift) = (point(x), Vector::default());
-                walls.each_near(surface, p, 0.0, x[3], |distance, normal| {
+                walls.each_near(surface, p, 0.0, (x[3], true), |distance, normal| {
                     let depth = x[3] - distance - shift.dot(normal);
                     if depth > 0.0 {
                         (shift, count, deepest) = (shift + normal * depth, count + 1, deepest.max(depth));

@@ -102,7 +102,8 @@ impl List {
         let skin = SKIN * least;
         Self {
             skin,
-            grid: Neighbours::new(2.0 * largest + skin), // A tenth less than half: cells are found by rounded places.
+            grid: Neighbours::new(2.0 * largest + skin),
+            // A tenth less than half: cells are found by rounded places.
             slack: 0.45 * skin,
             chunk: count.div_ceil(CHUNKS).max(LEAST),
             ..Self::default()

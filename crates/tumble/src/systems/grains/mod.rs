@@ -24,7 +24,7 @@ use law::{Dampings, Memory, Pair};
 use list::{Kept, List, point};
 use std::ops::Range;
 use std::sync::Arc;
-use tumble_interface::engine::{Ledger, Share, Stability, StepReport, Worst};
+use tumble_interface::engine::{BLOW_UP, Ledger, Share, Stability, StepReport, Worst};
 use tumble_interface::error::Breakdown;
 use tumble_interface::scene::NormalLaw;
 use tumble_interface::{Column, StepError};
@@ -74,6 +74,8 @@ pub struct Settings {
     pub step: Option<f64>,
     /// The longest that resolves contacts [s].
     pub longest: f64,
+    /// The largest speed of sound of a material [m/s].
+    pub sound: f64,
     /// The force of a contact.
     pub law: NormalLaw,
     /// Gravity.
@@ -88,6 +90,9 @@ pub struct Grains {
     walls: Walls,
     /// The last sub-step [s].
     h: f64,
+    /// The largest kinetic energy that was found healthy [J].
+    scale: f64,
+    tolerant: bool,
 }
 
 /// Overlaps at the start.
@@ -126,7 +131,7 @@ impl Grains {
             ..Bed::default()
         };
         let walls = Walls::new(settings.law, kinds);
-        Self { settings, objects, bed, walls, h: 0.0 }
+        Self { settings, objects, bed, walls, h: 0.0, scale: 0.0, tolerant: false }
     }
 
     /// Takes over solids that others have published.
@@ -164,6 +169,25 @@ impl Grains {
     fn owner(&self, row: usize) -> Option<(&Object, usize)> {
         let grain = *self.bed.grain.get(row)? as usize;
         self.objects.iter().find(|object| object.grains.contains(&grain)).map(|object| (object, grain - object.grains.start))
+    }
+
+    /// What is told of a row that broke.
+    fn broken(&self, row: usize, column: &str, t: f64, energy_ratio: Option<f64>) -> Option<Box<Breakdown>> {
+        let (object, index) = self.owner(row)?;
+        Some(Box::new(Breakdown {
+            system: self.settings.name.clone(),
+            object: object.name.clone(),
+            column: column.into(),
+            index,
+            id: None,
+            cell: None,
+            time: t,
+            integrator: "grains".into(),
+            step: self.h,
+            stable_step: self.settings.longest,
+            energy_ratio,
+            cause: None,
+        }))
     }
 
     fn kick(&mut self, t: f64, h: f64) {
@@ -301,22 +325,23 @@ impl System for Grains {
     }
 
     fn breakdown(&mut self, t: f64) -> Option<StepError> {
-        let (row, column) = self.bed.lost()?;
-        let (object, index) = self.owner(row)?;
-        Some(StepError::NotFinite(Box::new(Breakdown {
-            system: self.settings.name.clone(),
-            object: object.name.clone(),
-            column: column.into(),
-            index,
-            id: None,
-            cell: None,
-            time: t,
-            integrator: "grains".into(),
-            step: self.h,
-            stable_step: self.settings.longest,
-            energy_ratio: None,
-            cause: None,
-        })))
+        if let Some((row, column)) = self.bed.lost() {
+            return Some(StepError::NotFinite(self.broken(row, column, t, None)?));
+        }
+        // Contacts make no grain faster than sound, unless steps are too long for them.
+        let fastest = self.bed.v.iter().map(|v| point(v).norm_sq()).enumerate().max_by(|a, b| a.1.total_cmp(&b.1));
+        let kinetic = (0..self.bed.x.len()).map(|row| self.bed.kinetic(row)).sum::<f64>();
+        let (row, square) = fastest?;
+        let sudden = self.scale > 0.0 && kinetic > BLOW_UP * self.scale;
+        if sudden && square > self.settings.sound * self.settings.sound && !self.tolerant {
+            return Some(StepError::Exploded(self.broken(row, "velocity", t, Some(kinetic / self.scale))?));
+        }
+        self.scale = self.scale.max(kinetic);
+        None
+    }
+
+    fn tolerate_explosions(&mut self, on: bool) {
+        self.tolerant = on;
     }
 
     fn watch(&mut self, _on: bool) {}

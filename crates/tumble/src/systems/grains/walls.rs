@@ -3,7 +3,7 @@
 use super::law::{Dampings, Material, Memory, Overlap, Pair};
 use super::list::{Four, point};
 use crate::exchange::{Exchange, Turn, Visit};
-use crate::geometry::{Collider, Friction, Shape, Vector};
+use crate::geometry::{Collider, Friction, Search, Shape, Vector};
 use crate::math::parallel::Tasks;
 use std::sync::Arc;
 use tumble_interface::scene::NormalLaw;
@@ -143,17 +143,21 @@ impl Walls {
         solids.chain(self.bodies.iter().map(|(visit, _)| visit.fastest())).fold(0.0, f64::max)
     }
 
-    /// Calls `f` with the distance [m] of a point from each side of a surface that is nearer than `within` [m], and the direction away from it.
-    pub fn each_near(&self, surface: usize, p: Vector, t: f64, within: f64, mut f: impl FnMut(f64, Vector)) {
-        let count = |solid: &Collider| if solid.inside || matches!(solid.shape, Shape::Animated { .. }) { SURFACES } else { 1 };
+    /// Calls `f` with the distance [m] of a point from each side of a surface that is nearer than `within` [m], and the direction away from it; see
+    /// [`Search`] for `deep`.
+    pub fn each_near(&self, surface: usize, p: Vector, t: f64, (within, deep): (f64, bool), mut f: impl FnMut(f64, Vector)) {
+        let search = |solid: &Collider| {
+            let corners = solid.inside || matches!(solid.shape, Shape::Animated { .. });
+            Search { within, thickness: 0.0, surfaces: if corners { SURFACES } else { 1 }, deep }
+        };
         if let Some(solid) = self.solids.get(surface) {
-            return solid.each_near(p, t, 0.0, within, count(solid), f);
+            return solid.each_near(p, t, search(solid), f);
         }
         let (visit, shape) = &self.bodies[surface - self.solids.len()];
         let state = &visit.state;
         let local = state.orientation.conj().turn(p - state.position);
         let shape = &self.shapes[*shape];
-        shape.each_near(local, 0.0, 0.0, within, count(shape), |distance, normal| f(distance, state.orientation.turn(normal)));
+        shape.each_near(local, 0.0, search(shape), |distance, normal| f(distance, state.orientation.turn(normal)));
     }
 
     /// Velocity of a surface at a point on it [m/s].
@@ -192,7 +196,7 @@ impl Walls {
                         continue;
                     }
                     let mut near = false;
-                    walls.each_near(surface, p, t, reach, |distance, _| near |= distance < reach);
+                    walls.each_near(surface, p, t, (reach, false), |distance, _| near |= distance < reach);
                     if near {
                         part.candidates.push([row as u32, surface as u32]);
                     }
@@ -223,7 +227,7 @@ impl Walls {
                     old = &old[end..];
                     let mut taken = 0_u32;
                     let (p, radius, [inverse, kind]) = (point(&x[i]), x[i][3], [v[i][3], w[i][3]]);
-                    walls.each_near(s, p, t, radius, |distance, normal| {
+                    walls.each_near(s, p, t, (radius, false), |distance, normal| {
                         let depth = radius - distance;
                         if depth <= 0.0 {
                             return;
