@@ -28,6 +28,7 @@ def lab() -> None:
       tumble lab pressure
       tumble lab positions
       tumble lab fabric denim
+      tumble lab contact
     """
 
 
@@ -185,3 +186,31 @@ def pressure(
             out or find.OUT / "lab" / "pressure", cells, budget, "single" if single else "double", progress=progress
         )
     say(written)
+
+
+@app.command(cls=Verb)
+def contact(
+    case: Annotated[
+        list[str] | None, typer.Option(metavar="NAME", help="Only this experiment. Repeatable.", show_default="all")
+    ] = None,
+    out: OutOption = None,
+) -> None:
+    """Compare rigid bodies and grains with exact and measured figures.
+
+    Blocks and balls on slopes, Newton's cradle, a bouncing ball, a card house, a stone arch, a tumbling wing nut, a hopper and
+    a column that collapses. It takes about a minute. The last line says how many figures hold, and which do not.
+
+    \b
+    Examples:
+      tumble lab contact
+      tumble lab contact --case arch --case cards
+    """
+    from tumble.lab.contact import CASES, page
+
+    for name in case or ():
+        if name not in CASES:
+            raise typer.BadParameter(unknown("case", name, CASES), param_hint="--case")
+    with Progress("lab") as progress:
+        written, text = page(out or find.OUT / "lab" / "contact", case or (), progress=progress)
+    say(written)
+    say(text)
