@@ -30,6 +30,7 @@ if TYPE_CHECKING:
     )
     from tumble.reader import Run
     from tumble.run import simulate
+    from tumble.sweeps.study import sweep
 
     __version__: str
 
@@ -46,11 +47,12 @@ __all__ = [
     "load_mesh",
     "repair_mesh",
     "simulate",
+    "sweep",
 ]
 
 _MODULES = (
     "branch", "columns", "compare", "emitters", "expect", "export", "fields", "film", "looks", "measures", "pictures", "plots",
-    "reader", "refine", "run", "slices", "usd",
+    "reader", "refine", "run", "slices", "sweeps", "usd",
 )  # fmt: skip
 """Modules for users."""
 
@@ -59,6 +61,7 @@ _MODULES = (
 _HOMES = {name: ("tumble._engine", name) for name in __all__}
 _HOMES["Run"] = ("tumble.reader", "Run")
 _HOMES["simulate"] = ("tumble.run", "simulate")
+_HOMES["sweep"] = ("tumble.sweeps.study", "sweep")
 _HOMES["__version__"] = ("tumble._engine", "version")
 
 

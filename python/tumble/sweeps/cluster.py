@@ -1,0 +1,221 @@
+"""Runs on a cluster, by Dask: on processes of this machine that Dask keeps, or at a scheduler that is there.
+
+Dask carries what names a run, and a row of numbers back. Where a worker does not see the folder of the sweep, the files of
+runs that are kept come back as archives. Nothing else travels: no field, no frame.
+"""
+
+import importlib
+import logging
+import math
+import os
+import pickle
+from collections.abc import Iterable, Iterator
+from contextlib import ExitStack, contextmanager, suppress
+from functools import lru_cache
+from itertools import islice
+from typing import Any
+
+from tumble import _engine
+from tumble._engine import ExportError
+from tumble.arguments import wrong
+from tumble.film import _no_main
+from tumble.sweeps.task import DIED, Answer, Context, Task, perform
+
+PATIENCE = float(os.environ.get("TUMBLE_CLUSTER_TIMEOUT", "10"))
+"""How long a scheduler may take to answer, and its first worker to come [s]."""
+
+AHEAD = 3
+"""Runs that wait at each worker, so that none is idle while the answer travels."""
+
+_EXTRA = "needs Dask: pip install 'tumble[cluster]'"
+
+
+class Refused(Exception):
+    """A worker of another version."""
+
+
+def compute(context: bytes, task: Task) -> Answer:
+    """What a worker of Dask does. Raises Refused where it is of another version, as one that joins later may be."""
+    version, own = _loaded(context)
+    if version != _engine.version:
+        raise Refused(f"a worker has tumble {_engine.version}, and this is {version}; install that version there")
+    return perform(own, task)
+
+
+@lru_cache(maxsize=4)
+def _loaded(context: bytes) -> tuple[str, Context]:
+    found: tuple[str, bytes] = pickle.loads(context)
+    # Of another version it may not even be readable.
+    own: Context = pickle.loads(found[1]) if found[0] == _engine.version else None  # type: ignore[assignment]
+    return found[0], own
+
+
+def _dask(on: str, part: str = "") -> Any:
+    """The library, which has no types. Raises SceneError where it is not installed."""
+    try:
+        return importlib.import_module(f"distributed{part}")
+    except ImportError:
+        raise wrong(f"--on {on}", _EXTRA) from None
+
+
+@contextmanager
+def cluster(context: Context, on: str, workers: int, threads: int, memory: float | None) -> Iterator["Cluster"]:
+    """An engine: `on` is "dask" for a LocalCluster, or the address of a scheduler. Raises SceneError where there is none that
+    answers, none that has workers, or one of another version."""
+    distributed = _dask(on)
+    with ExitStack() as stack:
+        # Processes that start, also later in the place of dead ones, need no main module, and may not be able to load it.
+        stack.enter_context(_no_main())
+        stack.enter_context(_quiet())
+        if on == "dask":
+            local = distributed.LocalCluster(
+                n_workers=workers,
+                threads_per_worker=1,
+                processes=True,
+                dashboard_address=None,
+                memory_limit=int(memory) if memory else "auto",
+                env={"RAYON_NUM_THREADS": str(threads)},
+                silence_logs=logging.CRITICAL,
+            )
+            stack.enter_context(local)
+            client = stack.enter_context(distributed.Client(local))
+        else:
+            client = stack.enter_context(_connected(on))
+        _wait_for_workers(client, on)
+        refuse_others(on, _versions(client))
+        yield Cluster(client, context)
+
+
+@contextmanager
+def _quiet() -> Iterator[None]:
+    """Keeps the library from telling what happens to workers, which is told as it matters."""
+    names = (
+        "distributed",
+        "distributed.nanny",
+        "distributed.worker",
+        "distributed.scheduler",
+        "distributed.comm",
+        "tornado",
+    )
+    former = {name: logging.getLogger(name).level for name in names}
+    try:
+        for name in names:
+            logging.getLogger(name).setLevel(logging.CRITICAL)
+        yield
+    finally:
+        for name, level in former.items():
+            logging.getLogger(name).setLevel(level)
+
+
+@contextmanager
+def _connected(address: str) -> Iterator[Any]:
+    try:
+        client = _dask(address).Client(address, timeout=PATIENCE, set_as_default=False)
+    except (OSError, TimeoutError, ValueError) as error:
+        said = str(error).splitlines()
+        text = f"no Dask scheduler answers within {PATIENCE:g} s{f' ({said[0]})' if said and said[0] else ''}"
+        raise wrong(f"--on {address}", f"{text}; start one with `dask scheduler`, or use --on cores") from None
+    with client:
+        yield client
+
+
+def _wait_for_workers(client: Any, on: str) -> None:
+    try:
+        client.wait_for_workers(1, timeout=PATIENCE)
+    except TimeoutError:
+        text = f"the scheduler has no workers after {PATIENCE:g} s; start some with `dask worker {on}`"
+        raise wrong(f"--on {on}", text) from None
+
+
+def _versions(client: Any) -> dict[str, str]:
+    """Address -> version of tumble of each worker, empty where it has none."""
+
+    # A function inside another one travels by value: this module may not be there.
+    def version() -> str:
+        try:
+            from tumble._engine import version as found
+        except ImportError:
+            return ""
+        return found
+
+    answers: dict[str, str] = client.run(version)
+    return answers
+
+
+def refuse_others(on: str, versions: dict[str, str]) -> None:
+    """Raises SceneError where workers have another version than this, or none."""
+    wrong_ones = {where: v for where, v in sorted(versions.items()) if v != _engine.version}
+    if wrong_ones:
+        where, found = next(iter(wrong_ones.items()))
+        has = f"tumble {found}" if found else "no tumble"
+        text = f"{len(wrong_ones)} of {len(versions)} workers are of another version: {where} has {has}, and this is"
+        raise wrong(f"--on {on}", f"{text} {_engine.version}; install that version there: the bits could differ")
+
+
+class Cluster:
+    """An engine: computes runs at the workers of a scheduler."""
+
+    def __init__(self, client: Any, context: Context) -> None:
+        self.client = client
+        # With each run, for what is kept at a worker dies with it.
+        self.context = pickle.dumps((context.version, pickle.dumps(context)))
+        self.workers = max(1, len(client.ncores()))
+        self.deaths = 0
+        self._open: dict[Any, Task] = {}
+
+    @property
+    def running(self) -> int:
+        """Runs that are being computed."""
+        return min(len(self._open), self._threads())
+
+    def _threads(self) -> int:
+        return max(1, sum(map(int, self.client.ncores().values())))
+
+    def run(self, tasks: Iterable[Task]) -> Iterator[Answer]:
+        """Computes runs; answers come as they end. Runs whose workers died again and again are tried once more at the end, by
+        themselves: others may have been the cause. Raises SceneError for workers of another version, ExportError where the
+        scheduler is lost."""
+        suspects: list[Task] = []
+        try:
+            yield from self._all(iter(tasks), AHEAD * self._threads(), suspects, "")
+            last: list[Task] = []
+            yield from self._all(iter(list(suspects)), 1, last, "-alone")
+            for task in last:
+                text = (
+                    "its worker died again and again, also when it ran alone; it may need more memory than a worker has"
+                )
+                yield Answer(task.key, DIED, text, seconds=math.nan)
+        finally:
+            if self._open:
+                with suppress(Exception):
+                    self.client.cancel(list(self._open))
+                self._open.clear()
+
+    def _all(self, todo: Iterator[Task], most: int, suspects: list[Task], mark: str) -> Iterator[Answer]:
+        """Keeps so many runs at the scheduler; those whose workers died become suspects."""
+        killed = _dask("", ".scheduler").KilledWorker
+        done = _dask("").as_completed()
+        while True:
+            for task in islice(todo, most - len(self._open)):
+                future = self.client.submit(
+                    compute, self.context, task, key=f"tumble-{task.key}{mark}-{id(self):x}", pure=False
+                )
+                self._open[future] = task
+                done.add(future)
+            if not self._open:
+                return
+            future = next(done)
+            task = self._open.pop(future)
+            if future.status == "finished":
+                answer: Answer = future.result()
+                yield answer
+                continue
+            error = future.exception() if future.status == "error" else None
+            if isinstance(error, killed):
+                self.deaths += 1
+                suspects.append(task)
+            elif isinstance(error, Refused):
+                raise wrong("--on", str(error))
+            else:
+                text = f"{error}" if error else "the scheduler was lost"
+                raise ExportError(f"the cluster stopped: {text}; every finished row is kept, continue with --resume")
