@@ -117,7 +117,7 @@ def _pictures(studio: Studio, frames: range, processes: int) -> Generator[Pictur
             if len(waiting) >= AHEAD * processes:
                 yield waiting.popleft().result()
             things, camera = studio.things(i), studio.view(i).unit()
-            with _no_main():
+            with no_main():
                 waiting.append(pool.submit(_draw, studio.renderer, things, camera, *how))
         while waiting:
             yield waiting.popleft().result()
@@ -141,7 +141,7 @@ def _worker(renderer: str) -> None:
 
 
 @contextlib.contextmanager
-def _no_main() -> Iterator[None]:
+def no_main() -> Iterator[None]:
     """Hides the main module while processes start: they need only this one, and a script without a guard
     (`if __name__ == "__main__"`) would start them again and again."""
     main = sys.modules["__main__"]

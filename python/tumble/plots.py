@@ -178,7 +178,7 @@ def convergence(study: Refined, path: str | os.PathLike[str]) -> Path:
         ax.set_xlabel("level")
         ax.set_ylabel("relative change")
         low, high = np.log(ax.get_ylim())
-        places = _apart([(np.log(value) - low) / (high - low) for _, value, _ in ends], LABEL / (ROW * 2.6))
+        places = apart([(np.log(value) - low) / (high - low) for _, value, _ in ends], LABEL / (ROW * 2.6))
         for (label, _, color), place in zip(ends, places, strict=True):
             ax.annotate(label, (1.015, place), xycoords="axes fraction", va="center", color=color, fontsize=9)
         return save(figure, path)
@@ -253,13 +253,13 @@ def _draw(ax: "Axes", share: float, t: Floats | Sequence[Floats], curves: Sequen
     ends = [(float(v[np.isfinite(v)][-1]) if np.isfinite(v).any() else 0.0) for _, v, _ in curves]
     ax.margins(x=0.01)
     low, high = ax.get_ylim()
-    places = _apart([(e - low) / (high - low) for e in ends], LABEL / (ROW * share))
+    places = apart([(e - low) / (high - low) for e in ends], LABEL / (ROW * share))
     for (name, _, color), place in zip(curves, places, strict=True):
         label = name.replace("_", " ")
         ax.annotate(label, (1.015, place), xycoords="axes fraction", va="center", color=color, fontsize=9)
 
 
-def _apart(wanted: Sequence[float], gap: float) -> list[float]:
+def apart(wanted: Sequence[float], gap: float) -> list[float]:
     """Places near the wanted ones, at least `gap` from each other."""
     order = sorted(range(len(wanted)), key=lambda k: wanted[k])
     places = list(wanted)

@@ -112,7 +112,7 @@ def to_pandas(run: Stored, thing: str | None = None, columns: Iterable[str] | No
     """A pandas.DataFrame of the ledger, a row for each frame; or of an object, a row for each frame and element (of particles
     that come and go: id), a column for each number: position_x. Without `columns`, of an object all that belong to the same
     elements as the first. Units are in `attrs["units"]`. Raises ExportError."""
-    pandas = _library("pandas", "to_pandas")
+    pandas = library("pandas", "to_pandas")
     times = np.array([run.time(i) for i in range(run.n_frames)])
     if thing is None:
         known = [name for name in LEDGER[:-1] if name not in ("frame", "time")]
@@ -163,7 +163,7 @@ def to_xarray(run: Stored, things: Iterable[str] | None = None, columns: Iterabl
     """An xarray.Dataset of the ledger (`energy`) and of the columns of objects (`rope.position`) over time, all of those named
     or all there are, with units and meanings in `attrs`. Particles that come and go have a coordinate `NAME.id`, and nan in
     frames in which they do not live. Raises ExportError."""
-    xarray = _library("xarray", "to_xarray")
+    xarray = library("xarray", "to_xarray")
     there = {name: _in_frames(run, name) for name in run.columns if _in_frames(run, name)}
     wanted = list(there) if things is None else list(things)
     for name in wanted:
@@ -202,7 +202,7 @@ def to_xarray(run: Stored, things: Iterable[str] | None = None, columns: Iterabl
     return xarray.Dataset(variables, coordinates, {"title": str(run.scene.get("title") or "")})
 
 
-def _library(name: str, what: str) -> ModuleType:
+def library(name: str, what: str) -> ModuleType:
     import importlib
 
     try:

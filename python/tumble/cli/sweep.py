@@ -64,6 +64,7 @@ def sweep(
         bool, typer.Option("--stills", help="Draw the last frames of the first seed, on one sheet.")
     ] = False,
     films: Annotated[bool, typer.Option("--films", help="Films of the first seed, side by side.")] = False,
+    renderer: Annotated[str, typer.Option(metavar="NAME", help="Renderer of stills and films.")] = "auto",
     out: Annotated[
         Path | None, typer.Option(metavar="DIR", help="Folder of the sweep.", show_default="out/sweep/NAME")
     ] = None,
@@ -92,12 +93,15 @@ def sweep(
       tumble sweep vicsek --vary system.0.vicsek.noise=0:5:11 --seeds 10 --measure "mean probe walkers.velocity[order]"
       tumble sweep my.toml --design sobol --samples 64 --vary world.gravity.2=-9.8:-1.6
     """
+    from tumble.cli.render import look_for
     from tumble.sweeps.mistakes import Mistakes
     from tumble.sweeps.study import Options, as_tree, carry_out, prepared
     from tumble.sweeps.words import design as read
 
     if resume and force:
         raise typer.BadParameter("--resume keeps what is finished and --force replaces it; choose one")
+    if stills or films:
+        look_for(renderer)
     overrides = [*(set or ()), *([f"time.frames={frames}"] if frames is not None else [])]
     folder = out if out is not None else find.OUT / "sweep" / scene_file(scene).stem
     with find.told_as_json(json):
@@ -114,10 +118,10 @@ def sweep(
             found = made  # type: ignore[assignment]
         words = prepared(checked, found, measure or (), seeds, places, mistakes)
         bytes_ = None if memory is None else memory * 1e9
-        options = Options(on, workers, keep == "runs", stills, films, resume, force, bytes_)
+        options = Options(on, workers, keep == "runs", stills, films, resume, force, bytes_, renderer)
         try:
             with Shown() as shown:
-                done = carry_out(words, folder, options, lambda plan: _agree(plan, yes, shown), shown)
+                done = carry_out(words, folder, options, lambda plan: _agree(plan, yes, shown), shown, shown.drawn)
         except KeyboardInterrupt as stop:
             _say_what_is_kept(folder)
             raise typer.Exit(stopped(stop)) from None
@@ -222,9 +226,18 @@ class Shown:
             self.said, self.when = share, now
             print(f"sweep     {at.done:6} / {at.total}  {share:4.0%}  {told}".rstrip(), file=sys.stderr, flush=True)
 
+    def drawn(self, what: str, done: int, total: int) -> None:
+        """How far stills or films are."""
+        if self.bar is not None:
+            self.bar.update(self.task, description=f"{what} {done} / {total}")
+        else:
+            print(f"{what:9} {done:6} / {total}", file=sys.stderr, flush=True)
+
 
 def _told(found: "Sweep") -> list[str]:
     """The result in lines."""
+    from tumble.sweeps.design import short
+
     timings = found.manifest["timings"]
     there = len(found.rows) - found.computed
     counts = ", ".join(f"{n} {end}" for end, n in found.manifest["ends"].items())
@@ -233,11 +246,12 @@ def _told(found: "Sweep") -> list[str]:
         f"{duration(timings['wall'])}, table {found.hash}"
     ]
     lines += _means(found)
-    for row in found.failed[:3]:
-        words = ", ".join([*(f"{k}={v}" for k, v in row.parameters.items()), f"seed={row.seed}"])
-        lines.append(f"  run {row.run} ({words}) {row.status}: {row.reason}")
-    if (more := len(found.failed) - 3) > 0:
-        lines.append(f"  {more} more, see the column reason of sweep.csv")
+    for end in dict.fromkeys(row.status for row in found.failed):
+        row = next(row for row in found.failed if row.status == end)
+        words = ", ".join([*(f"{k}={short(v)}" for k, v in row.parameters.items()), f"seed={row.seed}"])
+        lines.append(f"  {end}, the first of {found.manifest['ends'][end]}: run {row.run} ({words}): {row.reason}")
+    if found.failed:
+        lines.append("  all reasons: the column reason of sweep.csv")
     if found.manifest.get("transferred"):
         lines.append(f"  {size(found.manifest['transferred'])} of run folders came back as archives")
     names = ("sweep.html", "sweep.csv", "summary.csv", "stills.png", "films.mp4")
@@ -246,10 +260,12 @@ def _told(found: "Sweep") -> list[str]:
 
 def _means(found: "Sweep") -> list[str]:
     """Means over seeds, with their confidence."""
+    from tumble.sweeps.design import short
+
     head = [*found.design.paths, *(m.name + (f" [{m.unit}]" if m.unit else "") for m in found.measures)]
     table = [head]
     for point, rows in list(found.points.items())[:ROWS]:
-        cells = list(rows[0].parameters.values())
+        cells = [short(value) for value in rows[0].parameters.values()]
         for m in found.measures:
             s = found.spreads[point, m.name]
             near = f" ({s.low:.4g} to {s.high:.4g})" if s.n > 1 and s.low < s.high else ""

@@ -90,7 +90,7 @@ def write(
             _poster(folder / f"{name}.png", title, [d for d in drawn if d], width)
         pictures = [d.tag if d else "" for d in drawn]
         path = folder / f"{name}.html"
-        path.write_text(_document(title, lead, points, sections, pictures, notes), encoding="utf-8")
+        path.write_text(document(title, lead, points, sections, pictures, notes), encoding="utf-8")
     except OSError as error:
         raise ExportError(f"{folder}: {error.strerror or error}") from error
     return path
@@ -176,7 +176,7 @@ def _fewer_colors(picture: Image.Image) -> bytes:
     return smaller.getvalue()
 
 
-def _document(
+def document(
     title: str,
     lead: str,
     points: Sequence[str],

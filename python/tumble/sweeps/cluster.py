@@ -18,7 +18,7 @@ from typing import Any
 from tumble import _engine
 from tumble._engine import ExportError
 from tumble.arguments import wrong
-from tumble.film import _no_main
+from tumble.film import no_main
 from tumble.sweeps.task import DIED, Answer, Context, Task, perform
 
 PATIENCE = float(os.environ.get("TUMBLE_CLUSTER_TIMEOUT", "10"))
@@ -65,7 +65,7 @@ def cluster(context: Context, on: str, workers: int, threads: int, memory: float
     distributed = _dask(on)
     with ExitStack() as stack:
         # Processes that start, also later in the place of dead ones, need no main module, and may not be able to load it.
-        stack.enter_context(_no_main())
+        stack.enter_context(no_main())
         stack.enter_context(_quiet())
         if on == "dask":
             local = distributed.LocalCluster(

@@ -128,6 +128,12 @@ def number(value: str) -> float:
         return math.nan
 
 
+def short(value: str) -> str:
+    """A value for people: numbers with six digits."""
+    x = number(value)
+    return value if math.isnan(x) or len(value) <= 8 else f"{x:.6g}"
+
+
 # From Python
 
 

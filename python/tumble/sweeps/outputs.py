@@ -1,11 +1,22 @@
 """What is made of a sweep's table: statistics, plots, pictures, the page."""
 
+from pathlib import Path
+
+from tumble.sweeps import figures, page, sheets
 from tumble.sweeps.result import Sweep
 from tumble.sweeps.store import Store, write_csv
 
 
-def write(found: Sweep, store: Store, stills: bool, films: bool) -> None:
+def write(
+    found: Sweep, store: Store, stills: bool, films: bool, renderer: str = "auto", progress: sheets.Told | None = None
+) -> Path:
+    """Writes summary.csv, effects.csv, plots/, what is asked for of stills and films, and sweep.html, which is returned.
+    Raises ExportError."""
     head, lines = found.summary()
     write_csv(store.summary, [head, *lines])
     head, lines = found.effects_table()
     write_csv(store.folder / "effects.csv", [head, *lines])
+    drawn = figures.draw(found)
+    sheet = sheets.stills(found, store, renderer, progress) if stills else None
+    made = sheets.films(found, store, renderer, progress) if films else []
+    return page.write(found, drawn, sheet, made)

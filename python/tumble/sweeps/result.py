@@ -122,7 +122,7 @@ class Sweep:
 
     def to_pandas(self) -> Any:
         """A pandas.DataFrame, a row for each run. Raises ExportError where pandas is not installed."""
-        from tumble.tables import _library as library
+        from tumble.tables import library
 
         pandas = library("pandas", "to_pandas")
         table = pandas.DataFrame(self.records(), columns=self.head)
@@ -150,10 +150,18 @@ class Sweep:
         """Of all points and measures."""
         return {(p, m.name): self.spread(p, m.name) for p in self.points for m in self.measures}
 
+    def spreads_of(self, measure: str) -> list[Spread]:
+        """Of a measure at all points."""
+        return [self.spreads[point, measure] for point in self.points]
+
+    def effect(self, measure: str, path: str) -> Effect:
+        """The main effect of a parameter."""
+        values = [row.values.get(measure, math.nan) for row in self.rows]
+        return effect(path, [row.parameters[path] for row in self.rows], values, measure)
+
     def effects(self, measure: str) -> list[Effect]:
         """The main effects of all parameters."""
-        values = [row.values.get(measure, math.nan) for row in self.rows]
-        return [effect(p, [row.parameters[p] for row in self.rows], values, measure) for p in self.design.paths]
+        return [self.effect(measure, path) for path in self.design.paths]
 
     def summary(self) -> tuple[list[str], list[list[Any]]]:
         """summary.csv: a row for each point and measure."""

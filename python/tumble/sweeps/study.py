@@ -19,6 +19,7 @@ from tumble.lock import alone
 from tumble.recorder import machine, tier
 from tumble.sweeps import design as designs
 from tumble.sweeps import measures as measuring
+from tumble.sweeps import outputs
 from tumble.sweeps import store as stores
 from tumble.sweeps import task as tasks
 from tumble.sweeps.design import Design, override
@@ -87,6 +88,7 @@ class Options:
     resume: bool = False
     overwrite: bool = False
     memory: float | None = None
+    renderer: str = "auto"
 
 
 class Engine(Protocol):
@@ -173,8 +175,10 @@ def carry_out(
     options: Options,
     agree: Callable[[Plan], bool] | None = None,
     progress: Callable[[Progress], object] | None = None,
+    drawn: Callable[[str, int, int], None] | None = None,
 ) -> Sweep:
-    """A sweep whose words are checked, as `sweep`."""
+    """A sweep whose words are checked, as `sweep`; `drawn` is called with what is drawn, how many are done, and how many there
+    are."""
     resolved = words.scene.to_dict()
     store = Store(folder)
     if options.resume and options.overwrite:
@@ -187,7 +191,7 @@ def carry_out(
         store.admit(resolved, options.resume, options.overwrite)
         if options.overwrite and store.is_sweep():
             store.clear()
-        return _Sweeping(words, store, plan, engine, options, progress).run()
+        return _Sweeping(words, store, plan, engine, options, progress, drawn).run()
 
 
 def _name(scene: object) -> str:
@@ -350,7 +354,9 @@ class _Sweeping:
         engine: EngineWords,
         options: Options,
         progress: Callable[[Progress], object] | None,
+        drawn: Callable[[str, int, int], None] | None,
     ) -> None:
+        self.drawn = drawn
         self.words, self.store, self.plan, self.options = words, store, plan, options
         self.progress = progress
         self.engine_words = engine
@@ -406,9 +412,8 @@ class _Sweeping:
             with suppress(OSError):
                 (self.store.folder / tasks.TOKEN).unlink()
         found = self._end("finished")
-        from tumble.sweeps import outputs
-
-        outputs.write(found, self.store, self.options.stills, self.options.films)
+        options = self.options
+        outputs.write(found, self.store, options.stills, options.films, options.renderer, self.drawn)
         return found
 
     def _compute(self) -> None:

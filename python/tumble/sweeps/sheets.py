@@ -1,0 +1,188 @@
+"""Pictures of runs side by side: a sheet of last frames, and a film of films."""
+
+import io
+import math
+import subprocess
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from tumble._engine import ExportError, TumbleError
+from tumble.folder import write_whole, writing
+from tumble.reader import Run
+from tumble.sweeps.figures import told
+from tumble.sweeps.result import Row, Sweep
+from tumble.sweeps.store import Store
+
+Told = Callable[[str, int, int], None]
+"""Called with what is drawn, how many are done and how many there are."""
+
+WIDTH = 320
+"""Of each picture [pixels]."""
+
+MOST = 64
+"""Pictures of a sheet: of more runs, some that are spread over the design."""
+
+FILMS = 16
+"""Films side by side, in the same way."""
+
+CAPTION = 22
+"""Height of the line of text under a picture [pixels]."""
+
+
+def shown(found: Sweep, most: int) -> list[Row]:
+    """The first run of each point, of many points some."""
+    first = [rows[0] for rows in found.points.values()]
+    if len(first) <= most:
+        return first
+    return [first[round(k)] for k in np.linspace(0, len(first) - 1, most)]
+
+
+def stills(found: Sweep, store: Store, renderer: str = "auto", progress: Told | None = None) -> Path | None:
+    """Draws the last frames of the first seed into stills/, and all of them on one sheet, stills.png. Raises ExportError."""
+    from matplotlib.image import imread, imsave
+
+    rows = shown(found, MOST)
+    pictures: list[tuple[str, Any]] = []
+    for k, row in enumerate(rows):
+        path = found.folder / "stills" / f"{row.key}.png"
+        if not path.is_file() and (pixels := _last(store, row, renderer)) is not None:
+            buffer = io.BytesIO()
+            imsave(buffer, pixels, format="png")
+            with writing(path.parent):
+                path.parent.mkdir(exist_ok=True)
+            write_whole(path, buffer.getvalue())
+        if path.is_file():
+            shape = imread(path)[..., :3]
+            pictures.append((caption(row), (shape * 255).round().astype(np.uint8)))
+        if progress is not None:
+            progress("stills", k + 1, len(rows))
+    if not pictures:
+        return None
+    goal = found.folder / "stills.png"
+    buffer = io.BytesIO()
+    imsave(buffer, sheet(pictures), format="png")
+    write_whole(goal, buffer.getvalue())
+    return goal
+
+
+def caption(row: Row) -> str:
+    """What is written under a picture."""
+    text = told(row.parameters) or f"seed {row.seed}"
+    return text if row.status == "finished" else f"{text}: {row.status} at frame {row.frame}"
+
+
+def _last(store: Store, row: Row, renderer: str) -> npt.NDArray[np.uint8] | None:
+    """The last frame of a run; None where there is none to be drawn."""
+    from tumble.pictures import SAMPLES, picture
+
+    try:
+        run = Run(store.runs(row.key))
+        if not run.n_frames:
+            return None
+        return np.asarray(picture(run, run.n_frames - 1, renderer, size_of(run.scene, WIDTH), SAMPLES))
+    except TumbleError:
+        # An exploded run may have nothing that can be seen.
+        return None
+
+
+def size_of(scene: Any, width: int) -> tuple[int, int]:
+    """Pixels of a small picture, of the shape of the scene's camera; both even, for films."""
+    across, down = scene["camera"]["resolution"]
+    return width, max(2, round(width * down / across / 2) * 2)
+
+
+def sheet(pictures: Sequence[tuple[str, npt.NDArray[np.uint8]]]) -> npt.NDArray[np.uint8]:
+    """Pictures with their captions, in rows."""
+    from PIL import Image, ImageDraw
+
+    height, width = (max(picture.shape[k] for _, picture in pictures) for k in (0, 1))
+    across = columns(len(pictures))
+    down = math.ceil(len(pictures) / across)
+    paper = Image.new("RGB", (across * (width + 8) + 8, down * (height + CAPTION + 8) + 8), "white")
+    pen = ImageDraw.Draw(paper)
+    font = _font(12)
+    for k, (text, pixels) in enumerate(pictures):
+        x, y = 8 + k % across * (width + 8), 8 + k // across * (height + CAPTION + 8)
+        paper.paste(Image.fromarray(pixels), (x, y))
+        while text and pen.textlength(text, font=font) > width:
+            text = text[:-2].rstrip("…") + "…"
+        pen.text((x, y + height + 3), text, fill="#22272e", font=font)
+    return np.asarray(paper)
+
+
+def columns(n: int) -> int:
+    """How many of n pictures stand beside each other."""
+    return min(n, max(1, math.ceil(math.sqrt(n * 1.2))))
+
+
+def _font(size: int) -> Any:
+    """The one that plots have."""
+    from matplotlib.font_manager import findfont
+    from PIL import ImageFont
+
+    return ImageFont.truetype(findfont("DejaVu Sans"), size)
+
+
+# Films
+
+
+def films(found: Sweep, store: Store, renderer: str = "auto", progress: Told | None = None) -> list[Path]:
+    """Draws films of the first seed into films/, and all of them side by side into films.mp4; returns the single ones. Raises
+    ExportError."""
+    from tumble.film import film
+
+    rows = [row for row in shown(found, FILMS) if (store.runs(row.key) / "run.json").is_file()]
+    made = []
+    for k, row in enumerate(rows):
+        path = found.folder / "films" / f"{row.key}.mp4"
+        if not path.is_file():
+            run = Run(store.runs(row.key))
+            if run.n_frames < 2:
+                continue
+            film(run, path, renderer, 1, size_of(run.scene, WIDTH))
+        made.append(path)
+        if progress is not None:
+            progress("films", k + 1, len(rows))
+    if len(made) > 1:
+        beside(made, found.folder / "films.mp4")
+    return made
+
+
+def beside(files: Sequence[Path], goal: Path) -> Path:
+    """Films in rows, in one; those that end earlier stay at their last picture. Raises ExportError."""
+    import imageio_ffmpeg
+
+    across = columns(len(files))
+    down = math.ceil(len(files) / across)
+    inputs = [word for file in files for word in ("-i", str(file))]
+    sizes = [imageio_ffmpeg.count_frames_and_secs(str(file)) for file in files]
+    longest = max(seconds for _, seconds in sizes)
+    parts = [
+        f"[{k}:v]tpad=stop_mode=clone:stop_duration={max(longest - seconds, 0.0):.6f},pad=iw+8:ih+8:4:4:white[v{k}]"
+        for k, (_, seconds) in enumerate(sizes)
+    ]
+    names = "".join(f"[v{k}]" for k in range(len(files)))
+    places = "|".join(
+        f"{'+'.join(['w0'] * (k % across)) or '0'}_{'+'.join(['h0'] * (k // across)) or '0'}" for k in range(len(files))
+    )
+    stack = (
+        f"{names}xstack=inputs={len(files)}:layout={places}:fill=white[out]"
+        if down * across > 1
+        else f"{names}null[out]"
+    )
+    unfinished = goal.with_name(f".{goal.name}.part")
+    command = [imageio_ffmpeg.get_ffmpeg_exe(), "-hide_banner", "-loglevel", "error", "-y", *inputs]
+    command += ["-filter_complex", ";".join([*parts, stack]), "-map", "[out]", "-c:v", "libx264", "-crf", "18"]
+    command += ["-pix_fmt", "yuv420p", "-movflags", "+faststart", "-f", "mp4", str(unfinished)]
+    found = subprocess.run(command, stdin=subprocess.DEVNULL, capture_output=True, check=False)
+    if found.returncode:
+        unfinished.unlink(missing_ok=True)
+        said = found.stderr.decode(errors="replace").strip().splitlines()
+        raise ExportError(f"{goal}: ffmpeg failed: {said[-1] if said else f'exit code {found.returncode}'}")
+    with writing(goal):
+        unfinished.replace(goal)
+    return goal
