@@ -3,7 +3,7 @@
 from collections.abc import Callable
 from dataclasses import dataclass
 
-from tumble.lab.contact import slopes
+from tumble.lab.contact import blows, slopes, statics, tumbling
 from tumble.lab.contact.figure import Result
 
 
@@ -23,6 +23,11 @@ CASES = {
         Case("block", "A block on a slope", slopes.block),
         Case("rolling", "A ball that rolls down a slope", slopes.rolling),
         Case("slipping", "A ball that starts slipping", slopes.slipping),
+        Case("cradle", "Newton's cradle", blows.cradle),
+        Case("bounce", "A bouncing ball", blows.bounce),
+        Case("cards", "A card house", statics.cards),
+        Case("arch", "An arch of stones", statics.arch),
+        Case("wing-nut", "A wing nut that turns over", tumbling.wing_nut),
     )
 }
 """By name."""

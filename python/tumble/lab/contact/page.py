@@ -63,14 +63,17 @@ def verdict(results: Mapping[str, Result]) -> str:
 
 def text(results: Mapping[str, Result]) -> str:
     """For a console: a line for each figure, and how many hold."""
-    lines = []
-    for name, result in results.items():
-        for figure in result.figures:
-            word = "holds" if figure.holds else "DOES NOT HOLD"
-            lines.append(
-                f"{name:9} {figure.what:44} {_number(figure.measured, figure.unit):>14}  {_expected(figure):30} {word}"
-            )
-    broken = [f"{name}: {f.what}" for name, result in results.items() for f in result.figures if not f.holds]
+    found = [(name, figure) for name, result in results.items() for figure in result.figures]
+    cells = [
+        (name, f.what, _number(f.measured, f.unit), _expected(f), "holds" if f.holds else "DOES NOT HOLD")
+        for name, f in found
+    ]
+    widths = [max(len(row[k]) for row in cells) for k in range(len(cells[0]))]
+    lines = [
+        f"{name:{widths[0]}}  {what:{widths[1]}}  {measured:>{widths[2]}}  {expected:{widths[3]}}  {word}"
+        for name, what, measured, expected, word in cells
+    ]
+    broken = [f"{name}: {figure.what}" for name, figure in found if not figure.holds]
     lines.append(verdict(results) + (f"; does not hold: {'; '.join(broken)}" if broken else ""))
     return "\n".join(lines)
 

@@ -24,9 +24,12 @@ def world(
     gravity: float = GRAVITY,
     fps: float = 100.0,
     precision: str = "double",
+    step: float | None = None,
     **system: Any,
 ) -> World:
     """A world of bodies or grains, on a slope of this angle [rad]: z is normal to it, x points down."""
+    if step is not None:
+        system["step"] = step
     method = "grains" if "grains" in things else "rigid"
     return World(
         Scene(
