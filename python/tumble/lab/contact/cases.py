@@ -3,7 +3,7 @@
 from collections.abc import Callable
 from dataclasses import dataclass
 
-from tumble.lab.contact import blows, slopes, statics, tumbling
+from tumble.lab.contact import blows, flows, slopes, statics, tumbling
 from tumble.lab.contact.figure import Result
 
 
@@ -28,6 +28,8 @@ CASES = {
         Case("cards", "A card house", statics.cards),
         Case("arch", "An arch of stones", statics.arch),
         Case("wing-nut", "A wing nut that turns over", tumbling.wing_nut),
+        Case("hopper", "A hopper", flows.hopper),
+        Case("column", "A column that collapses", flows.column),
     )
 }
 """By name."""

@@ -1,5 +1,6 @@
 """The page of `tumble lab contact`."""
 
+import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from html import escape
 from pathlib import Path
@@ -80,6 +81,10 @@ def text(results: Mapping[str, Result]) -> str:
 
 def _expected(figure: Figure) -> str:
     """`3.468 m/s² ± 0.5 %`, or a band."""
+    if math.isinf(figure.high):
+        return f"more than {_number(figure.low, figure.unit)}"
+    if math.isinf(figure.low):
+        return f"less than {_number(figure.high, figure.unit)}"
     if figure.exact is None:
         return f"{_number(figure.low)} to {_number(figure.high, figure.unit)}"
     if figure.exact == 0.0:
