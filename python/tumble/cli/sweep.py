@@ -64,6 +64,7 @@ def sweep(
         bool, typer.Option("--stills", help="Draw the last frames of the first seed, on one sheet.")
     ] = False,
     films: Annotated[bool, typer.Option("--films", help="Films of the first seed, side by side.")] = False,
+    plots: Annotated[bool, typer.Option(help="Plot each measure over each parameter.")] = True,
     renderer: Annotated[str, typer.Option(metavar="NAME", help="Renderer of stills and films.")] = "auto",
     out: Annotated[
         Path | None, typer.Option(metavar="DIR", help="Folder of the sweep.", show_default="out/sweep/NAME")
@@ -118,7 +119,7 @@ def sweep(
             found = made  # type: ignore[assignment]
         words = prepared(checked, found, measure or (), seeds, places, mistakes)
         bytes_ = None if memory is None else memory * 1e9
-        options = Options(on, workers, keep == "runs", stills, films, resume, force, bytes_, renderer)
+        options = Options(on, workers, keep == "runs", stills, films, plots, resume, force, bytes_, renderer)
         try:
             with Shown() as shown:
                 done = carry_out(words, folder, options, lambda plan: _agree(plan, yes, shown), shown, shown.drawn)

@@ -78,7 +78,7 @@ def cluster(context: Context, on: str, workers: int, threads: int, memory: float
                 silence_logs=logging.CRITICAL,
             )
             stack.enter_context(local)
-            client = stack.enter_context(distributed.Client(local))
+            client = stack.enter_context(distributed.Client(local, set_as_default=False))
         else:
             client = stack.enter_context(_connected(on))
         _wait_for_workers(client, on)
@@ -194,7 +194,7 @@ class Cluster:
     def _all(self, todo: Iterator[Task], most: int, suspects: list[Task], mark: str) -> Iterator[Answer]:
         """Keeps so many runs at the scheduler; those whose workers died become suspects."""
         killed = _dask("", ".scheduler").KilledWorker
-        done = _dask("").as_completed()
+        done = _dask("").as_completed(loop=self.client.loop)
         while True:
             for task in islice(todo, most - len(self._open)):
                 future = self.client.submit(

@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 
 Floats = npt.NDArray[np.float64]
 
-CURVES = 6
+CURVES = 12
 """Combinations of other parameters that get a curve each; of more, the mean over them is drawn."""
 
 SPAN = 30.0
@@ -97,20 +97,28 @@ def over(found: Sweep, measure: Measure, path: str) -> "Figure":
     axis = Axis(values)
     others = [p for p in found.design.paths if p != path]
     combinations = {tuple(row.parameters[p] for p in others): None for row in found.rows}
+    curves: list[Curve] = []
     if len(combinations) <= CURVES and len(values) <= 8 * BINS:
         curves = _curves(found, measure, path, others, axis)
         _draw_curves(ax, curves, axis)
     else:
         _draw_cloud(ax, found, measure, path, axis)
-    _mark_failures(ax, found.rows, path, axis)
     axis.apply(ax, path)
     _scale(ax, measure, [s.mean for s in found.spreads_of(measure.name)])
-    if others and len(combinations) <= CURVES and len(combinations) > 1:
-        ax.set_title(f"{measure.name}, by {', '.join(_short(p) for p in others)}", wrap=True)
-    else:
-        ax.set_title(measure.name, wrap=True)
-    _label_curves(ax, curves if len(combinations) <= CURVES and len(values) <= 8 * BINS else [])
+    _mark_failures(ax, found.rows, path, axis)
+    by = f", by {', '.join(_short(p) for p in others)}" if len(curves) > 1 else ""
+    ax.set_title(measure.name + by, wrap=True)
+    _label_curves(ax, curves)
     return figure
+
+
+def _color(k: int, of: int) -> Any:
+    """Of one of several curves: many are in the order of a map."""
+    if of <= len(PALETTE):
+        return PALETTE[k]
+    from matplotlib import colormaps
+
+    return colormaps["viridis"](0.92 * k / (of - 1))
 
 
 class Axis:
@@ -130,10 +138,11 @@ class Axis:
             ax.set_xscale("log")
         if not self.numeric:
             ax.set_xticks(range(len(self.words)), [_shortened(word) for word in self.words])
-        elif len(self.words) <= BINS and not self.log:
-            from matplotlib.ticker import FixedLocator
+        elif len(self.words) <= BINS:
+            from matplotlib.ticker import NullLocator
 
-            ax.xaxis.set_major_locator(FixedLocator(sorted(self.place.values())))
+            ax.set_xticks(list(self.place.values()), [short(word) for word in self.words])
+            ax.xaxis.set_minor_locator(NullLocator())
 
 
 def _curves(found: Sweep, measure: Measure, path: str, others: Sequence[str], axis: Axis) -> list[Curve]:
@@ -149,17 +158,19 @@ def _curves(found: Sweep, measure: Measure, path: str, others: Sequence[str], ax
     return curves
 
 
-def _draw_curves(ax: "Axes", curves: Sequence[Curve], axis: Axis) -> None:
+def _draw_curves(ax: "Axes", curves: Sequence[Curve], axis: Axis, bands: bool = True) -> None:
+    """`bands` are left out where values of a grid are averaged over: how far they are spread is by choice, not by chance."""
     for k, curve in enumerate(curves):
-        color = PALETTE[k % len(PALETTE)]
+        color = _color(k, len(curves))
         x, mean = np.array(curve.x), np.array([s.mean for s in curve.spreads])
         low, high = (np.array([getattr(s, name) for s in curve.spreads]) for name in ("low", "high"))
         if axis.numeric:
             ax.plot(x, mean, color=color, marker="o", markersize=4)
-            ax.fill_between(x, low, high, color=color, alpha=0.18, linewidth=0)
+            if bands:
+                ax.fill_between(x, low, high, color=color, alpha=0.18, linewidth=0)
         else:
             side = (k - (len(curves) - 1) / 2) * 0.8 / max(len(curves), 2)
-            bars = np.array([np.nan_to_num(mean - low), np.nan_to_num(high - mean)])
+            bars = np.array([np.nan_to_num(mean - low), np.nan_to_num(high - mean)]) * bands
             ax.errorbar(x + side, mean, bars, color=color, marker="o", markersize=5, linestyle="none", capsize=3)
 
 
@@ -173,7 +184,7 @@ def _label_curves(ax: "Axes", curves: Sequence[Curve]) -> None:
         shown = ax.transData.transform((1.0 if ax.get_xscale() == "log" else 0.0, ends[-1])) if ends else (0.0, 0.0)
         places.append(float(ax.transAxes.inverted().transform(shown)[1]))
     for k, place in enumerate(plots.apart(places, plots.LABEL / 3.0)):
-        color = PALETTE[k % len(PALETTE)]
+        color = _color(k, len(curves))
         ax.annotate(curves[k].label, (1.015, place), xycoords="axes fraction", va="center", color=color, fontsize=9)
 
 
@@ -184,7 +195,7 @@ def _draw_cloud(ax: "Axes", found: Sweep, measure: Measure, path: str, axis: Axi
     ax.plot(x, y, ".", color=FAINT, markersize=4, alpha=0.7)
     about = found.effect(measure.name, path)
     levels = [axis.place.get(level, number(level)) for level in about.levels]
-    _draw_curves(ax, [Curve("", levels, about.spreads)], axis)
+    _draw_curves(ax, [Curve("", levels, about.spreads)], axis, found.design.kind != "grid")
 
 
 def _mark_failures(ax: "Axes", rows: Sequence[Row], path: str, axis: Axis) -> None:
@@ -197,6 +208,7 @@ def _mark_failures(ax: "Axes", rows: Sequence[Row], path: str, axis: Axis) -> No
     bad = {x: count for x, count in counts.items() if count[0]}
     if not bad:
         return
+    _make_room(ax)
     trans = ax.get_xaxis_transform()
     ax.plot(list(bad), [0.03] * len(bad), "x", color=PALETTE[1], markersize=6, transform=trans, clip_on=False)
     if len(counts) <= 2 * BINS:
@@ -222,6 +234,15 @@ def _mark_failures(ax: "Axes", rows: Sequence[Row], path: str, axis: Axis) -> No
     )
 
 
+def _make_room(ax: "Axes") -> None:
+    """Of a sixth of the height below what is drawn."""
+    low, high = ax.get_ylim()
+    if ax.get_yscale() == "log":
+        ax.set_ylim(low * (low / high) ** 0.2, high)
+    else:
+        ax.set_ylim(low - 0.2 * (high - low), high)
+
+
 # All parameters at once
 
 
@@ -239,7 +260,7 @@ def effects(found: Sweep, measure: Measure) -> "Figure":
         if k >= len(paths):
             ax.set_visible(False)
             continue
-        _draw_effect(ax, found.effect(measure.name, paths[k]), paths[k])
+        _draw_effect(ax, found.effect(measure.name, paths[k]), paths[k], found.design.kind != "grid")
         if k % across == 0:
             ax.set_ylabel(_quantity(measure))
     _scale(grid[0, 0], measure, [s.mean for s in found.spreads_of(measure.name)], label=False)
@@ -247,15 +268,18 @@ def effects(found: Sweep, measure: Measure) -> "Figure":
     return figure
 
 
-def _draw_effect(ax: "Axes", about: Effect, path: str) -> None:
+def _draw_effect(ax: "Axes", about: Effect, path: str, bands: bool) -> None:
     axis = Axis(about.levels)
-    _draw_curves(ax, [Curve("", [axis.place[level] for level in about.levels], about.spreads)], axis)
+    _draw_curves(ax, [Curve("", [axis.place[level] for level in about.levels], about.spreads)], axis, bands)
     axis.apply(ax, path)
     ax.set_xlabel(_wrapped(path), fontsize=8)
-    if axis.numeric and not axis.log:
-        from matplotlib.ticker import MaxNLocator
+    if axis.numeric and len(about.levels) > 4:
+        from matplotlib.ticker import NullLocator
 
-        ax.xaxis.set_major_locator(MaxNLocator(4))
+        levels = sorted(axis.place, key=axis.place.__getitem__)
+        few = [levels[0], levels[len(levels) // 2], levels[-1]]
+        ax.set_xticks([axis.place[level] for level in few], [short(level) for level in few])
+        ax.xaxis.set_minor_locator(NullLocator())
     share = "" if math.isnan(about.share) else f"{about.share:.0%} of the variance"
     ax.set_title(share, fontsize=8.5, fontweight="normal")
 
@@ -333,7 +357,8 @@ def _figure(rows: float) -> "tuple[Figure, Axes]":
 def _scale(ax: "Axes", measure: Measure, means: Sequence[float], label: bool = True) -> None:
     """A logarithmic axis where all is positive and differs by much."""
     values = [x for x in means if math.isfinite(x)]
-    if values and min(values) > 0 and max(values) / min(values) >= TALL:
+    most = SPAN if ax.get_xscale() == "log" else TALL
+    if values and min(values) > 0 and max(values) / min(values) >= most:
         ax.set_yscale("log")
     if label:
         ax.set_ylabel(_quantity(measure))

@@ -19,7 +19,7 @@ from contextlib import suppress
 from typing import IO
 
 from tumble._engine import ExportError
-from tumble.sweeps.task import DIED, Answer, Context, Task
+from tumble.sweeps.task import DIED, MEMORY, Answer, Context, Task
 
 KILLS, DEATHS = 6, 2
 """How often a run is tried whose worker was killed from outside, which may have had nothing to do with it, and of one that died
@@ -29,6 +29,9 @@ ALONE = 3
 """From which try on a run has the machine for itself: it may be that it needs the memory of all."""
 
 _READY = b"ready"
+
+_NO_MEMORY = "memory allocation of"
+"""What the engine says last where there is none: how many bytes it wanted."""
 
 
 class Died(Exception):
@@ -61,7 +64,7 @@ class Worker:
         self.said = tempfile.TemporaryFile()  # noqa: SIM115
         # What this process can import, the worker can: it may be embedded in another program.
         paths = os.pathsep.join(path for path in sys.path if path)
-        environment = {**os.environ, "RAYON_NUM_THREADS": str(threads), "PYTHONPATH": paths}
+        environment = {**os.environ, "RAYON_NUM_THREADS": str(threads), "PYTHONPATH": paths, "RUST_BACKTRACE": "0"}
         command = [sys.executable, "-P", "-m", "tumble.sweeps.worker", str(int(memory or 0))]
         self.process = subprocess.Popen(
             command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=self.said, env=environment
@@ -97,8 +100,7 @@ class Worker:
             self.process.wait(10.0)
         self.kill()
         self.said.seek(0)
-        lines = self.said.read().decode(errors="replace").strip().splitlines()
-        return Died(self.process.returncode, lines[-1] if lines else "")
+        return Died(self.process.returncode, _last_words(self.said.read().decode(errors="replace")))
 
     def kill(self) -> None:
         """Ends it."""
@@ -107,6 +109,13 @@ class Worker:
         for stream in (self.sink, self.source):
             with suppress(OSError):
                 stream.close()
+
+
+def _last_words(said: str) -> str:
+    """The line that says why, of what a process wrote before it died."""
+    lines = [line.strip() for line in said.splitlines() if line.strip()]
+    telling = [line for line in lines if _NO_MEMORY in line]
+    return (telling or lines or [""])[-1]
 
 
 def send(sink: IO[bytes], data: bytes) -> None:
@@ -250,6 +259,8 @@ class Pool:
 def died(task: Task, deaths: Iterable[Died]) -> Answer:
     """The answer to a run whose workers died."""
     found = list(deaths)
+    if _NO_MEMORY in found[-1].words:
+        return Answer(task.key, MEMORY, found[-1].words, {"deaths": [str(one) for one in found]}, seconds=math.nan)
     times = "twice" if len(found) == 2 else f"{len(found)} times"
     text = f"its worker died {times} ({found[-1]})"
     if found[-1].killed:

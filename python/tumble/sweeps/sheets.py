@@ -29,8 +29,8 @@ MOST = 64
 FILMS = 16
 """Films side by side, in the same way."""
 
-CAPTION = 22
-"""Height of the line of text under a picture [pixels]."""
+LINE = 15
+"""Height of a line of text under a picture [pixels]."""
 
 
 def shown(found: Sweep, most: int) -> list[Row]:
@@ -100,18 +100,35 @@ def sheet(pictures: Sequence[tuple[str, npt.NDArray[np.uint8]]]) -> npt.NDArray[
     from PIL import Image, ImageDraw
 
     height, width = (max(picture.shape[k] for _, picture in pictures) for k in (0, 1))
+    font = _font(12)
+    texts = [_broken(text, width, font) for text, _ in pictures]
+    below = LINE * max(map(len, texts)) + 6
     across = columns(len(pictures))
     down = math.ceil(len(pictures) / across)
-    paper = Image.new("RGB", (across * (width + 8) + 8, down * (height + CAPTION + 8) + 8), "white")
+    paper = Image.new("RGB", (across * (width + 8) + 8, down * (height + below + 8) + 8), "white")
     pen = ImageDraw.Draw(paper)
-    font = _font(12)
-    for k, (text, pixels) in enumerate(pictures):
-        x, y = 8 + k % across * (width + 8), 8 + k // across * (height + CAPTION + 8)
+    for k, (_, pixels) in enumerate(pictures):
+        x, y = 8 + k % across * (width + 8), 8 + k // across * (height + below + 8)
         paper.paste(Image.fromarray(pixels), (x, y))
-        while text and pen.textlength(text, font=font) > width:
-            text = text[:-2].rstrip("…") + "…"
-        pen.text((x, y + height + 3), text, fill="#22272e", font=font)
+        for i, line in enumerate(texts[k]):
+            pen.text((x, y + height + 3 + LINE * i), line, fill="#22272e", font=font)
     return np.asarray(paper)
+
+
+def _broken(text: str, width: int, font: Any) -> list[str]:
+    """A caption in lines of words; a word that is too long is cut."""
+    lines = [""]
+    for word in text.split(" "):
+        longer = f"{lines[-1]} {word}".strip()
+        if font.getlength(longer) <= width or not lines[-1]:
+            lines[-1] = longer
+        else:
+            lines.append(word)
+    cut = [line for line in lines if line]
+    for k in range(len(cut)):
+        while font.getlength(cut[k]) > width:
+            cut[k] = cut[k][:-2].rstrip("…") + "…"
+    return cut
 
 
 def columns(n: int) -> int:

@@ -85,6 +85,7 @@ class Options:
     keep: bool = False
     stills: bool = False
     films: bool = False
+    plots: bool = True
     resume: bool = False
     overwrite: bool = False
     memory: float | None = None
@@ -141,6 +142,7 @@ def sweep(
     keep: bool = False,
     stills: bool = False,
     films: bool = False,
+    plots: bool = True,
     resume: bool = False,
     overwrite: bool = False,
     memory: float | None = None,
@@ -157,15 +159,16 @@ def sweep(
 
     `on` is "cores", "dask" (a LocalCluster) or the address of a Dask scheduler, tcp://HOST:PORT. `workers` are as many as
     there are cores; `memory` is the most that one may take [bytes]. With `keep` each run leaves its run folder in runs/;
-    `stills` and `films` draw the runs of the first seed. `resume` computes only what is not there yet, `overwrite` starts
-    anew. `agree` is asked about designs of 10,000 runs or 12 hours; without it they run. `progress` is called after each run.
+    `stills` and `films` draw the runs of the first seed, `plots` each measure over each parameter. `resume` computes only
+    what is not there yet, `overwrite` starts anew. `agree` is asked before anything runs, and answers with the `Plan` at hand;
+    `progress` is called after each run.
 
     Raises SceneError if anything is wrong with what was asked for, with all mistakes, before anything runs; ExportError if
     files cannot be written, with every finished row kept. Runs that fail are rows, and raise nothing.
     """
     words = prepared(scene, design, measures, seeds)
     place = Path(folder) if folder is not None else Path("out") / "sweep" / _name(scene)
-    options = Options(on, workers, keep, stills, films, resume, overwrite, memory)
+    options = Options(on, workers, keep, stills, films, plots, resume, overwrite, memory)
     return carry_out(words, place, options, agree, progress)
 
 
@@ -413,7 +416,7 @@ class _Sweeping:
                 (self.store.folder / tasks.TOKEN).unlink()
         found = self._end("finished")
         options = self.options
-        outputs.write(found, self.store, options.stills, options.films, options.renderer, self.drawn)
+        outputs.write(found, self.store, options.plots, options.stills, options.films, options.renderer, self.drawn)
         return found
 
     def _compute(self) -> None:
