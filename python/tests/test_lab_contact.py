@@ -109,7 +109,7 @@ def test_a_figure_holds_within_its_bounds_alone() -> None:
         (slopes.block, partial(slopes.block, 0.45), "block: angle of friction"),
         (slopes.rolling, partial(slopes.rolling, 0.05), "rigid body rolls: acceleration at 25°"),
         (slopes.slipping, partial(slopes.slipping, 0.25), "rigid body: time until it rolls"),
-        (blows.cradle, partial(blows.cradle, 0.9), "1 in: height of the last 1, the least"),
+        (blows.cradle, partial(blows.cradle, 0.9), "1 in: height of the lowest ball out"),
         (blows.bounce, partial(blows.bounce, (0.52, 0.8, 0.9)), "rigid body, e = 0.5: time until it rests"),
         (statics.cards, partial(statics.cards, 0.95), "least friction at which it stands"),
         (tumbling.wing_nut, partial(tumbling.wing_nut, (0.012, 1.0, 0.0)), "first zero of ω₂"),

@@ -79,13 +79,13 @@ def cradle(restitution: float = 1.0) -> Result:
         # Balls meet after a quarter of a period, 0.5 s, and those that leave have their highest place at half a period.
         after = (swing.times > 0.6) & (swing.times < 1.4)
         leaves = swing.heights[after][:, BALLS - count :].max(axis=0)
-        figures.append(near(f"{count} in: height of the last {count}, the least", float(leaves.min()), top, 1e-2, "m"))
+        figures.append(near(f"{count} in: height of the lowest ball out", float(leaves.min()), top, 1e-2, "m"))
         stays = swing.along[after][:, : BALLS - count]
-        figures.append(small(f"{count} in: way of the others", 1e3 * float(np.abs(stays).max()), 5.0, "mm"))
+        figures.append(small(f"{count} in: displacement of the others", 1e3 * float(np.abs(stays).max()), 5.0, "mm"))
     first = swings[1]
     at = (first.times > 0.52) & (first.times < 0.7)
     kinetic = first.speeds[at, -1] ** 2 + 2 * GRAVITY * first.heights[at, -1]
-    figures.append(near("1 in: speed of the last", float(np.sqrt(kinetic.max())), fastest, 1e-2, "m/s"))
+    figures.append(near("1 in: speed of the ball out", float(np.sqrt(kinetic.max())), fastest, 1e-2, "m/s"))
     text = (
         f"<p>{BALLS} elastic balls hang side by side, {1e3 * GAP:.1g} mm apart, on pendulums of {LENGTH:g} m. One, two or "
         f"three are let go {ASIDE:.0f}° aside. As many leave at the other end, as fast, and rise to the same height.</p>"
@@ -176,7 +176,7 @@ def _bounce(figure: FigureBase, falls: dict[float, Bounces]) -> None:
         axes.plot(fall.times[shown], fall.heights[shown], color=ink, lw=1.3, label=f"e = {e:g}")
         if total(e) < 4.5:
             axes.axvline(total(e), color=ink, lw=0.9, ls=":")
-        numbers = np.arange(1, min(len(fall.tops), 12) + 1)
+        numbers = np.arange(1, min(sum(top > 1e-4 for top in fall.tops), 12) + 1)
         beside.semilogy(numbers, HEIGHT * e ** (2.0 * numbers), color=ink, lw=1.0)
         beside.semilogy(numbers, fall.tops[: len(numbers)], "o", color=ink, ms=4, label=f"e = {e:g}")
     axes.set_title("Rigid body: height; dotted, when it is to rest")

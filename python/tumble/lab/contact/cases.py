@@ -28,7 +28,7 @@ CASES = {
         Case("cards", "A card house", statics.cards),
         Case("arch", "An arch of stones", statics.arch),
         Case("wing-nut", "A wing nut that turns over", tumbling.wing_nut),
-        Case("hopper", "A hopper", flows.hopper),
+        Case("hopper", "A hopper with a flat bottom", flows.hopper),
         Case("column", "A column that collapses", flows.column),
     )
 }

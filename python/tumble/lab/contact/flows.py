@@ -115,7 +115,10 @@ def hopper(friction: float = 0.5) -> Result:
     figures = [
         within(f"power of (D − {LOST:g} d) in the flow", float(power), 2.2, 2.8),
         near(
-            f"flow at {tall.height / usual.height:.1f} times the height, over before", tall.rate / usual.rate, 1.0, 0.1
+            f"flow at {tall.height / usual.height:.1f} times the height, relative to before",
+            tall.rate / usual.rate,
+            1.0,
+            0.1,
         ),
     ]
     text = (
@@ -234,14 +237,14 @@ def column(friction: float = GLASS[0], rolling: float = GLASS[1]) -> Result:
             within(f"glass, height {one.aspect:.2f} times the width: run-out", one.runout, *band(one.aspect))
         )
     figures += [
-        within(f"glass, {columns[1].aspect:.2f} times: height in the end", columns[1].height, 0.8, 1.7),
+        within(f"glass, {columns[1].aspect:.2f} times: final height over the width", columns[1].height, 0.8, 1.7),
         within("control, no friction: run-out is longer", smooth.runout, band(smooth.aspect)[1], np.inf),
         within("control, angular grains: run-out is shorter", angular.runout, -np.inf, band(angular.aspect)[0]),
     ]
     text = (
         f"<p>Columns of grains, {COLUMN / (2 * RADIUS):.0f} diameters wide between two panes, collapse when a gate is pulled "
-        "away. Run-out: the way of the edge, to where it is a grain deep, over the width of the column; heights are over "
-        f"that width, too. Glass has μ = {GLASS[0]:g}. The band lies between the laws that Lube et al. and Lajeunesse et al. "
+        "away. The run-out is the advance of the front, where the deposit is one grain deep, over the width of the column. "
+        f"Glass has μ = {GLASS[0]:g}. The band lies between the laws that Lube et al. and Lajeunesse et al. "
         "fitted to their measurements. Controls must lie outside it: grains without friction, and angular ones with "
         f"μ = {ANGULAR[0]:g} and rolling friction {ANGULAR[1]:g}.</p>"
     )

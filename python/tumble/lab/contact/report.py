@@ -103,7 +103,7 @@ def _bound(figure: Figure) -> str:
 def _number(value: float, unit: str = "") -> str:
     if value != value:
         return "none"
-    number = f"{value:.2e}" if 0 < abs(value) < 1e-3 else f"{value:.5g}"
+    number = f"{value:.3g}" if 0 < abs(value) < 1e-3 else f"{value:.5g}"
     return f"{number.replace('-', '−')} {unit}".rstrip()
 
 

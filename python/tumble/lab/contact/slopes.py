@@ -89,7 +89,7 @@ def block(friction: float = MU) -> Result:
             near(f"{name}: angle of friction", angle_of_friction(things, friction), limit, 5e-3, "°"),
         ]
     held = creep(_block(BODY, friction), 25.0, friction, 5)
-    figures.append(small("block: way at 25° in 5 s", 1e3 * held, 0.01, "mm"))
+    figures.append(small("block: creep at 25° in 5 s", 1e3 * held, 0.01, "mm"))
     text = (
         f"<p>A block of 40 × 40 × 20 cm with μ = {MU} on slopes. It stays where tan a ≤ μ, and slides with "
         "g (sin a − μ cos a) where it is steeper. Of grains there are balls alone: one whose rolling friction is larger "

@@ -131,7 +131,7 @@ def cards(share: float = 1.0) -> Result:
         small(
             "friction 10 % above: centre sinks in 10 s", 1e3 * float(stays.heights[0] - stays.heights[-1]), 1.0, "mm"
         ),
-        within("friction 10 % below: height in the end, over before", float(last[-1] / last[0]), 0.0, 0.05),
+        within("friction 10 % below: final height over initial height", float(last[-1] / last[0]), 0.0, 0.05),
     ]
     text = (
         f"<p>Two cards of {CARD:g} m lean on each other at {LEAN:.0f}° on a floor; their tops are cut upright, "

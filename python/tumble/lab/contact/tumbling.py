@@ -113,7 +113,7 @@ def wing_nut(start: Sequence[float] = START) -> Result:
 def _components(figure: FigureBase, times: Floats, spins: Floats, whole: Floats) -> None:
     axes, beside = figure.subplots(1, 2, gridspec_kw={"width_ratios": [1.7, 1]})
     for k, name in enumerate(("ω₁, least moment", "ω₂, middle", "ω₃, greatest")):
-        axes.plot(times, whole[:, k], color=INK, lw=4.0, alpha=0.2, label="exact" if k == 2 else None)
+        axes.plot(times, whole[:, k], color=INK, lw=4.0, alpha=0.2, label="exact" if k == 0 else None)
         axes.plot(times, spins[:, k], color=PALETTE[k], lw=1.4, label=name)
         beside.plot(times, 1e3 * (spins - whole)[:, k], color=PALETTE[k], lw=1.2, label=name)
     axes.axvline(ZERO, color=FAINT, lw=0.8, ls=":")
