@@ -532,6 +532,7 @@ def test_every_verb_teaches_by_example(tumble: Command) -> None:
         "lab",
         "scenes",
         "schema",
+        "sweep",
         "view",
     }
     for verb in [[v] for v in verbs] + [["lab", "integrators"], ["lab", "structures"]]:

@@ -13,6 +13,7 @@ from runs import Tree
 from tumble import Scene, SceneError, World, sweep
 from tumble.run import simulate
 from tumble.sweeps import design, measures
+from tumble.sweeps.against import published
 from tumble.sweeps.mistakes import Mistakes
 from tumble.sweeps.statistics import RESAMPLES, binned, confidence, effect, spread
 from tumble.sweeps.words import design as from_words
@@ -255,6 +256,25 @@ def test_texts_that_are_no_measure_are_told(text: str, message: str) -> None:
 def test_measures_of_what_is_not_there_are_told(spring: Tree, text: str, message: str) -> None:
     with pytest.raises(SceneError, match=message):
         measures.check(measures.read(text), World(spring))
+
+
+# Values from elsewhere
+
+
+def test_values_from_elsewhere_stand_in_the_plots(tmp_path: Path) -> None:
+    file = tmp_path / "published.csv"
+    file.write_text("a,energy\n1,2.5\n2,3.5\n")
+    found = published(file, ["a", "b"], ["energy"])
+    assert found.name == "published" and found.beside("a", "energy") == ([1.0, 2.0], [2.5, 3.5])
+    assert found.beside("b", "energy") is None
+    for text, message in (
+        ("a,enrgy\n1,2\n", "no parameter or measure 'enrgy'; did you mean energy"),
+        ("a,b\n1,2\n", "expected a column of a parameter and one of a measure"),
+        ("a,energy\n1,x\n", "energy: row 1 has no number there"),
+    ):
+        file.write_text(text)
+        with pytest.raises(SceneError, match=rf"--against .*published\.csv: .*{message}"):
+            published(file, ["a", "b"], ["energy"])
 
 
 # Statistics

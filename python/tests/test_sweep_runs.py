@@ -237,15 +237,8 @@ def test_eight_workers_and_twenty_kills_make_the_same_table(
     def kill() -> None:
         if on == "cores":
             kill_one(pools[-1])
-        else:
-            there = list(made[0].scheduler_info(n_workers=-1)["workers"].values())
-            if there:
-                os.kill(
-                    moments.choice([w["id"] and w["pid"] for w in there if "pid" in w] or processes()), signal.SIGKILL
-                )
-
-    def processes() -> list[int]:
-        return list(made[0].run(os.getpid, on_error="ignore").values())
+        elif there := list(made[0].run(os.getpid, on_error="ignore").values()):
+            os.kill(moments.choice(there), signal.SIGKILL)
 
     killer = Killer(sorted(moments.sample(range(2, 6 * seeds - 10), 20)), kill)
     found = swept(FLOCK, NOISE, ORDER, tmp_path / "s", seeds=seeds, on=on, workers=8, progress=killer)

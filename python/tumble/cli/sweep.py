@@ -64,6 +64,10 @@ def sweep(
         bool, typer.Option("--stills", help="Draw the last frames of the first seed, on one sheet.")
     ] = False,
     films: Annotated[bool, typer.Option("--films", help="Films of the first seed, side by side.")] = False,
+    against: Annotated[
+        Path | None,
+        typer.Option(metavar="FILE", help="A .csv file of a parameter and measures from elsewhere, for the plots."),
+    ] = None,
     plots: Annotated[bool, typer.Option(help="Plot each measure over each parameter.")] = True,
     renderer: Annotated[str, typer.Option(metavar="NAME", help="Renderer of stills and films.")] = "auto",
     out: Annotated[
@@ -96,7 +100,8 @@ def sweep(
     """
     from tumble.cli.render import look_for
     from tumble.sweeps.mistakes import Mistakes
-    from tumble.sweeps.study import Options, as_tree, carry_out, prepared
+    from tumble.sweeps.options import Options
+    from tumble.sweeps.study import as_tree, carry_out, prepared
     from tumble.sweeps.words import design as read
 
     if resume and force:
@@ -117,7 +122,7 @@ def sweep(
         else:
             made, places = read(mistakes, vary or (), zip or (), table, design, samples)
             found = made  # type: ignore[assignment]
-        words = prepared(checked, found, measure or (), seeds, places, mistakes)
+        words = prepared(checked, found, measure or (), seeds, places, mistakes, against)
         bytes_ = None if memory is None else memory * 1e9
         options = Options(on, workers, keep == "runs", stills, films, plots, resume, force, bytes_, renderer)
         try:

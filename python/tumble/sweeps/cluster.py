@@ -4,6 +4,7 @@ Dask carries what names a run, and a row of numbers back. Where a worker does no
 runs that are kept come back as archives. Nothing else travels: no field, no frame.
 """
 
+import asyncio
 import importlib
 import logging
 import math
@@ -206,16 +207,17 @@ class Cluster:
                 return
             future = next(done)
             task = self._open.pop(future)
-            if future.status == "finished":
+            try:
+                # Whose worker died in the meantime is computed again, and waited for.
                 answer: Answer = future.result()
-                yield answer
-                continue
-            error = future.exception() if future.status == "error" else None
-            if isinstance(error, killed):
+            except killed:
                 self.deaths += 1
                 suspects.append(task)
-            elif isinstance(error, Refused):
-                raise wrong("--on", str(error))
+            except Refused as error:
+                raise wrong("--on", str(error)) from None
+            except (Exception, asyncio.CancelledError) as error:
+                words = "the scheduler was lost" if future.status in ("cancelled", "lost") else str(error)
+                text = f"the cluster stopped: {words}; every finished row is kept, continue with --resume"
+                raise ExportError(text) from error
             else:
-                text = f"{error}" if error else "the scheduler was lost"
-                raise ExportError(f"the cluster stopped: {text}; every finished row is kept, continue with --resume")
+                yield answer

@@ -282,20 +282,20 @@ def together(values: Mapping[str, Sequence[str]]) -> Axis:
     return Axis(tuple(values), tuple(zip(*values.values(), strict=True)))
 
 
-def read(file: str | os.PathLike[str]) -> Axis:
-    """The rows of a CSV file. Raises SceneError."""
+def read(file: str | os.PathLike[str], place: str | None = None) -> Axis:
+    """The rows of a CSV file. Raises SceneError, at `place`."""
     path = Path(file)
-    place = f"--table {path}"
+    place = place or f"--table {path}"
     try:
         with path.open(encoding="utf-8-sig", newline="") as lines:
             found = [[word.strip() for word in row] for row in csv.reader(lines) if any(map(str.strip, row))]
     except (OSError, UnicodeDecodeError, csv.Error) as error:
         raise wrong(place, f"cannot be read ({getattr(error, 'strerror', None) or error})") from None
     if len(found) < 2:
-        raise wrong(place, "has no rows, expected a head with keys of the scene, and a row for each run")
+        raise wrong(place, "has no rows, expected a head, and a row for each point")
     head, rows = found[0], found[1:]
     if not all(head) or len(set(head)) < len(head):
-        raise wrong(place, f"line 1: {','.join(head)}: expected a different key of the scene over each column")
+        raise wrong(place, f"line 1: {','.join(head)}: expected a different name over each column")
     for i, row in enumerate(rows):
         if len(row) != len(head) or not all(row):
             raise wrong(

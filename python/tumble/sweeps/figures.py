@@ -12,6 +12,7 @@ import numpy.typing as npt
 
 from tumble import plots
 from tumble.style import FAINT, INK, PALETTE
+from tumble.sweeps.against import Published
 from tumble.sweeps.design import number, short
 from tumble.sweeps.measures import Measure
 from tumble.sweeps.result import Row, Sweep
@@ -41,8 +42,11 @@ MOST = 400
 class Plot:
     """A figure that was written."""
 
+    measure: str
     title: str
     path: Path
+    width: float
+    """[inch]"""
 
 
 @dataclass(frozen=True)
@@ -59,38 +63,43 @@ def slug(text: str) -> str:
     return re.sub(r"[^A-Za-z0-9.]+", "-", text).strip("-.") or "x"
 
 
-def draw(found: Sweep) -> list[Plot]:
-    """Writes all plots into the folder of the sweep. Raises ExportError."""
+def draw(found: Sweep, against: Published | None = None) -> list[Plot]:
+    """Writes all plots into the folder of the sweep, with values from elsewhere where there are some. Raises ExportError."""
     folder = found.folder / "plots"
     drawn: list[Plot] = []
     names: set[str] = set()
 
-    def keep(figure: "Figure | None", title: str, name: str) -> None:
+    def keep(figure: "Figure | None", measure: str, title: str, name: str) -> None:
         if figure is None or len(drawn) >= MOST:
             return
         # Two measures may differ in marks alone.
         while name in names:
             name += "-"
         names.add(name)
-        drawn.append(Plot(title, plots.save(figure, folder / f"{name}.png")))
+        drawn.append(Plot(measure, title, plots.save(figure, folder / f"{name}.png"), float(figure.get_figwidth())))
 
     with plots.settings():
         for measure in found.measures:
             base = slug(measure.name)
             for path in found.design.paths:
-                keep(over(found, measure, path), f"{measure.name} over {path}", f"{base}--{slug(path)}")
+                keep(
+                    over(found, measure, path, against),
+                    measure.name,
+                    f"{measure.name} over {path}",
+                    f"{base}--{slug(path)}",
+                )
             if len(found.design.paths) > 1:
-                keep(effects(found, measure), f"Main effects on {measure.name}", f"{base}--effects")
-                keep(chart(found, measure), f"{measure.name} over two parameters", f"{base}--map")
+                keep(effects(found, measure), measure.name, f"Main effects on {measure.name}", f"{base}--effects")
+                keep(chart(found, measure), measure.name, f"{measure.name} over two parameters", f"{base}--map")
             if not found.design.paths:
-                keep(histogram(found, measure), f"{measure.name} over seeds", f"{base}--seeds")
+                keep(histogram(found, measure), measure.name, f"{measure.name} over seeds", f"{base}--seeds")
     return drawn
 
 
 # One measure over one parameter
 
 
-def over(found: Sweep, measure: Measure, path: str) -> "Figure":
+def over(found: Sweep, measure: Measure, path: str, against: Published | None = None) -> "Figure":
     """Curves with bands where there are few combinations of other parameters; else all points, and the mean over them."""
     figure, ax = _figure(3.4)
     values = found.design.values(path)
@@ -103,6 +112,10 @@ def over(found: Sweep, measure: Measure, path: str) -> "Figure":
         _draw_curves(ax, curves, axis)
     else:
         _draw_cloud(ax, found, measure, path, axis)
+    other = against.beside(path, measure.name) if against else None
+    if against and other and axis.numeric:
+        ax.plot(*other, "D", markerfacecolor="none", markeredgecolor=INK, markersize=7, label=against.name)
+        ax.legend(loc="best")
     axis.apply(ax, path)
     _scale(ax, measure, [s.mean for s in found.spreads_of(measure.name)])
     _mark_failures(ax, found.rows, path, axis)

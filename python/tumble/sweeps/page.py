@@ -12,6 +12,9 @@ from tumble.sweeps.result import Sweep, status_counts
 from tumble.sweeps.sheets import caption, shown
 from tumble.sweeps.statistics import CONFIDENCE
 
+DOTS = 86.0
+"""Pixels per inch of a plot."""
+
 ROWS = 200
 """Points, and failed runs, that are listed."""
 
@@ -19,14 +22,21 @@ ROWS = 200
 def write(found: Sweep, drawn: Sequence[Plot], sheet: Path | None, films: Sequence[Path]) -> Path:
     """Writes sweep.html into the folder of the sweep. Raises ExportError."""
     sections: list[tuple[Section, str]] = []
-    for plot in drawn:
-        place = plot.path.relative_to(found.folder).as_posix()
-        sections.append((Section(plot.title, ""), _picture(place, plot.title)))
     if sheet is not None:
         text = "<p>The last frame of the first seed at each point.</p>"
         sections.append((Section("Stills", text), _picture(sheet.name, "last frames", "100%")))
     if films:
         sections.append((Section("Films", "<p>Of the first seed at each point.</p>"), _films(found, films)))
+    for measure in dict.fromkeys(plot.measure for plot in drawn):
+        own = "".join(
+            _picture(
+                plot.path.relative_to(found.folder).as_posix(), plot.title, f"min(100%, {plot.width * DOTS:.0f}px)"
+            )
+            for plot in drawn
+            if plot.measure == measure
+        )
+        grid = f'<div style="display:flex; flex-wrap:wrap; gap:0 1.5rem; align-items:flex-start">{own}</div>'
+        sections.append((Section(measure, ""), grid))
     sections.append((_values(found), ""))
     if found.failed:
         sections.append((_failures(found), ""))

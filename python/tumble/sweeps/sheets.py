@@ -29,6 +29,9 @@ MOST = 64
 FILMS = 16
 """Films side by side, in the same way."""
 
+BESIDE = 8
+"""Pictures of a row, at most, where its length is that of an axis."""
+
 LINE = 15
 """Height of a line of text under a picture [pixels]."""
 
@@ -64,7 +67,7 @@ def stills(found: Sweep, store: Store, renderer: str = "auto", progress: Told | 
         return None
     goal = found.folder / "stills.png"
     buffer = io.BytesIO()
-    imsave(buffer, sheet(pictures), format="png")
+    imsave(buffer, sheet(pictures, across(found, len(pictures))), format="png")
     write_whole(goal, buffer.getvalue())
     return goal
 
@@ -95,15 +98,14 @@ def size_of(scene: Any, width: int) -> tuple[int, int]:
     return width, max(2, round(width * down / across / 2) * 2)
 
 
-def sheet(pictures: Sequence[tuple[str, npt.NDArray[np.uint8]]]) -> npt.NDArray[np.uint8]:
-    """Pictures with their captions, in rows."""
+def sheet(pictures: Sequence[tuple[str, npt.NDArray[np.uint8]]], across: int) -> npt.NDArray[np.uint8]:
+    """Pictures with their captions, in rows of so many."""
     from PIL import Image, ImageDraw
 
     height, width = (max(picture.shape[k] for _, picture in pictures) for k in (0, 1))
     font = _font(12)
     texts = [_broken(text, width, font) for text, _ in pictures]
     below = LINE * max(map(len, texts)) + 6
-    across = columns(len(pictures))
     down = math.ceil(len(pictures) / across)
     paper = Image.new("RGB", (across * (width + 8) + 8, down * (height + below + 8) + 8), "white")
     pen = ImageDraw.Draw(paper)
@@ -131,8 +133,11 @@ def _broken(text: str, width: int, font: Any) -> list[str]:
     return cut
 
 
-def columns(n: int) -> int:
-    """How many of n pictures stand beside each other."""
+def across(found: Sweep, n: int) -> int:
+    """How many of n pictures stand beside each other: of a grid the values of its last axis."""
+    axes = found.design.axes
+    if len(axes) > 1 and n == len(found.design) and len(axes[-1].rows) <= BESIDE:
+        return len(axes[-1].rows)
     return min(n, max(1, math.ceil(math.sqrt(n * 1.2))))
 
 
@@ -165,15 +170,14 @@ def films(found: Sweep, store: Store, renderer: str = "auto", progress: Told | N
         if progress is not None:
             progress("films", k + 1, len(rows))
     if len(made) > 1:
-        beside(made, found.folder / "films.mp4")
+        beside(made, found.folder / "films.mp4", across(found, len(made)))
     return made
 
 
-def beside(files: Sequence[Path], goal: Path) -> Path:
-    """Films in rows, in one; those that end earlier stay at their last picture. Raises ExportError."""
+def beside(files: Sequence[Path], goal: Path, across: int) -> Path:
+    """Films in rows of so many, in one; those that end earlier stay at their last picture. Raises ExportError."""
     import imageio_ffmpeg
 
-    across = columns(len(files))
     down = math.ceil(len(files) / across)
     inputs = [word for file in files for word in ("-i", str(file))]
     sizes = [imageio_ffmpeg.count_frames_and_secs(str(file)) for file in files]

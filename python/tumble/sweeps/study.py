@@ -22,9 +22,11 @@ from tumble.sweeps import measures as measuring
 from tumble.sweeps import outputs
 from tumble.sweeps import store as stores
 from tumble.sweeps import task as tasks
+from tumble.sweeps.against import Published, published
 from tumble.sweeps.design import Design, override
 from tumble.sweeps.measures import Measure
 from tumble.sweeps.mistakes import Mistakes
+from tumble.sweeps.options import Options
 from tumble.sweeps.pool import Pool, cores
 from tumble.sweeps.result import Row, Sweep, status_counts
 from tumble.sweeps.store import Store
@@ -76,22 +78,6 @@ class Plan:
         return self.runs - self.there >= MANY or self.seconds > LONG
 
 
-@dataclass(frozen=True)
-class Options:
-    """How a sweep is carried out; see `sweep`."""
-
-    on: str = "cores"
-    workers: int | None = None
-    keep: bool = False
-    stills: bool = False
-    films: bool = False
-    plots: bool = True
-    resume: bool = False
-    overwrite: bool = False
-    memory: float | None = None
-    renderer: str = "auto"
-
-
 class Engine(Protocol):
     """Where runs are computed."""
 
@@ -119,6 +105,7 @@ class Words:
     hash: str
     world: World
     """Of the first point, at its start."""
+    against: Published | None = None
 
     @property
     def runs(self) -> int:
@@ -146,6 +133,7 @@ def sweep(
     resume: bool = False,
     overwrite: bool = False,
     memory: float | None = None,
+    against: str | os.PathLike[str] | None = None,
     agree: Callable[[Plan], bool] | None = None,
     progress: Callable[[Progress], object] | None = None,
 ) -> Sweep:
@@ -160,13 +148,14 @@ def sweep(
     `on` is "cores", "dask" (a LocalCluster) or the address of a Dask scheduler, tcp://HOST:PORT. `workers` are as many as
     there are cores; `memory` is the most that one may take [bytes]. With `keep` each run leaves its run folder in runs/;
     `stills` and `films` draw the runs of the first seed, `plots` each measure over each parameter. `resume` computes only
-    what is not there yet, `overwrite` starts anew. `agree` is asked before anything runs, and answers with the `Plan` at hand;
+    what is not there yet, `overwrite` starts anew. `against` is a CSV file with values from elsewhere for the plots, whose head
+    names parameters and measures. `agree` is asked before anything runs, and answers with the `Plan` at hand;
     `progress` is called after each run.
 
     Raises SceneError if anything is wrong with what was asked for, with all mistakes, before anything runs; ExportError if
     files cannot be written, with every finished row kept. Runs that fail are rows, and raise nothing.
     """
-    words = prepared(scene, design, measures, seeds)
+    words = prepared(scene, design, measures, seeds, against=against)
     place = Path(folder) if folder is not None else Path("out") / "sweep" / _name(scene)
     options = Options(on, workers, keep, stills, films, plots, resume, overwrite, memory)
     return carry_out(words, place, options, agree, progress)
@@ -211,6 +200,7 @@ def prepared(
     seeds: int | Sequence[int],
     places: Mapping[str, str] | None = None,
     mistakes: Mistakes | None = None,
+    against: str | os.PathLike[str] | None = None,
 ) -> Words:
     """Checks all that was asked for. `places` says how a parameter was typed: path -> "--vary path"; `mistakes` are those that
     were found already, maybe instead of a design. Raises SceneError with all of them."""
@@ -237,11 +227,15 @@ def prepared(
         for measure in wanted:
             with mistakes.gathered():
                 measuring.check(measure, world)
+    other = None
+    if against is not None and found is not None:
+        with mistakes.gathered():
+            other = published(against, found.paths, [m.name for m in wanted])
     mistakes.tell()
     assert found is not None and world is not None
     names = [m.name for m in wanted]
     unique = [m for k, m in enumerate(wanted) if m.name not in names[:k]]
-    return Words(base, found, chosen, unique, stores.scene_hash(base.to_dict()), world)
+    return Words(base, found, chosen, unique, stores.scene_hash(base.to_dict()), world, other)
 
 
 def _scene(scene: Scene | Mapping[str, Any] | str | os.PathLike[str]) -> Scene:
@@ -416,7 +410,7 @@ class _Sweeping:
                 (self.store.folder / tasks.TOKEN).unlink()
         found = self._end("finished")
         options = self.options
-        outputs.write(found, self.store, options.plots, options.stills, options.films, options.renderer, self.drawn)
+        outputs.write(found, self.store, options, self.words.against, self.drawn)
         return found
 
     def _compute(self) -> None:
