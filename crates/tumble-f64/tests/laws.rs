@@ -2,7 +2,7 @@
 //! many small ones take minutes to link. Those of structures, cloth, hair, rods, solids, contact and particles are in `verification.rs`; two
 //! programs keep both cores busy.
 //!
-//! `cargo test --release -p tumble-f64 --test laws heat::` runs one file of them.
+//! `cargo test --release -p tumble-verification --test laws heat::` runs one file of them.
 
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)] // a test fails by panicking
 

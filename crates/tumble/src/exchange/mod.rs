@@ -27,19 +27,34 @@ use std::sync::Arc;
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub struct SystemId(usize);
 
-/// Where an impulse goes, and whether it is that of a constant force.
-type Address = (BodyRow, bool);
+/// When an impulse acts.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+pub enum When {
+    /// At once, before its row moves on.
+    Kick,
+    /// As that of a constant force over the interval to come.
+    Steady,
+    /// Like a steady one, with the displacement that it has given to the visitor's copy.                   (coupling.9)
+    Timed,
+}
+
+/// Where an impulse goes, and when it acts.
+type Address = (BodyRow, When);
 
 /// An impulse [N s], and its moment about the origin [N m s].
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 struct Wrench {
     impulse: Vector,
     moment: Vector,
+    /// Time integrals until the end of the interval of what of the impulse [N s²], and of its moment about the body's centre [N m s²], has acted;
+    /// of timed impulses.
+    ways: [Vector; 2],
 }
 
 impl Wrench {
     fn add(&mut self, other: Self, weight: f64) {
         (self.impulse, self.moment) = (self.impulse + other.impulse * weight, self.moment + other.moment * weight);
+        self.ways = [0, 1].map(|k| self.ways[k] + other.ways[k] * weight);
     }
 }
 
@@ -52,19 +67,24 @@ struct Letter {
 }
 
 /// Numbers of a letter in a snapshot.
-const LETTER: usize = 10;
+const LETTER: usize = 16;
 
 impl Letter {
     fn numbers(&self) -> [f64; LETTER] {
-        let ((to, steady), [j, l]) = (self.address, [self.wrench.impulse, self.wrench.moment].map(<[f64; 3]>::from));
-        [to.body as f64, to.row as f64, f64::from(u8::from(steady)), j[0], j[1], j[2], l[0], l[1], l[2], self.from.0 as f64]
+        let ((to, when), Wrench { impulse, moment, ways: [a, b] }) = (self.address, self.wrench);
+        let mut numbers = [0.0; LETTER];
+        numbers[..4].copy_from_slice(&[to.body as f64, to.row as f64, f64::from(when as u8), self.from.0 as f64]);
+        let vectors = [impulse, moment, a, b].map(<[f64; 3]>::from);
+        numbers[4..].copy_from_slice(vectors.as_flattened());
+        numbers
     }
 
     fn of(numbers: &[f64]) -> Self {
         let v = |s: &[f64]| Vector { x: s[0], y: s[1], z: s[2] };
         let to = BodyRow { body: numbers[0] as usize, row: numbers[1] as usize };
-        let wrench = Wrench { impulse: v(&numbers[3..6]), moment: v(&numbers[6..9]) };
-        Self { address: (to, numbers[2] == 1.0), wrench, from: SystemId(numbers[9] as usize) }
+        let wrench = Wrench { impulse: v(&numbers[4..]), moment: v(&numbers[7..]), ways: [v(&numbers[10..]), v(&numbers[13..])] };
+        let when = [When::Kick, When::Steady, When::Timed][(numbers[2] as usize).min(2)];
+        Self { address: (to, when), wrench, from: SystemId(numbers[3] as usize) }
     }
 }
 
@@ -77,8 +97,10 @@ pub struct Push {
     pub impulse: Vector,
     /// Its moment about the origin [N m s].
     pub moment: Vector,
-    /// Whether it is that of a constant force over the interval to come, and not a kick before it.
-    pub steady: bool,
+    /// When it acts.
+    pub when: When,
+    /// Of a timed one, the time integrals of what of the impulse [N s²], and of its moment about the body's centre [N m s²], has acted.
+    pub ways: [Vector; 2],
 }
 
 /// Flux through a surface of a system.
@@ -342,23 +364,29 @@ impl Exchange {
 impl Turn<'_> {
     /// Posts an impulse [N s] to a row at a point [m]: a kick before it moves on.
     pub fn post(&mut self, to: BodyRow, point: Vector, impulse: Vector) {
-        self.send((to, false), impulse, point.cross(impulse));
+        self.send((to, When::Kick), Wrench { impulse, moment: point.cross(impulse), ..Wrench::default() });
     }
 
     /// Posts an impulse [N s] to a row at a point [m]: that of a constant force while it moves through its next interval. Post reaction
     /// forces as steady: as a kick they would set resting bodies in motion.                                     (coupling.6)
     pub fn post_steady(&mut self, to: BodyRow, point: Vector, impulse: Vector) {
-        self.send((to, true), impulse, point.cross(impulse));
+        self.post_sum(to, impulse, point.cross(impulse));
     }
 
     /// The same of a sum of impulses [N s] with their moment about the origin [N m s].
     pub fn post_sum(&mut self, to: BodyRow, impulse: Vector, moment: Vector) {
-        self.send((to, true), impulse, moment);
+        self.send((to, When::Steady), Wrench { impulse, moment, ..Wrench::default() });
     }
 
-    fn send(&mut self, address: Address, impulse: Vector, moment: Vector) {
-        self.exchange.posted = self.exchange.posted + impulse;
-        self.exchange.mail.push(Letter { address, wrench: Wrench { impulse, moment }, from: self.system });
+    /// The same, with the time integrals of what of the impulse [N s²], and of its moment about the body's centre [N m s²], has acted, from which
+    /// the body takes its displacement.                                                                      (coupling.9)
+    pub fn post_timed(&mut self, to: BodyRow, impulse: Vector, moment: Vector, ways: [Vector; 2]) {
+        self.send((to, When::Timed), Wrench { impulse, moment, ways });
+    }
+
+    fn send(&mut self, address: Address, wrench: Wrench) {
+        self.exchange.posted = self.exchange.posted + wrench.impulse;
+        self.exchange.mail.push(Letter { address, wrench, from: self.system });
     }
 
     /// Takes its mail, in the order in which it was posted.
@@ -366,11 +394,9 @@ impl Turn<'_> {
         let Exchange { bodies, mail, repeat, delivered, .. } = &mut *self.exchange;
         let (bodies, system) = (&*bodies, self.system);
         let owner = |letter: &Letter| bodies[letter.address.0.body].system;
-        let push = |(to, steady): Address, wrench: Wrench| Push {
-            row: bodies[to.body].rows.start + to.row,
-            impulse: wrench.impulse,
-            moment: wrench.moment,
-            steady,
+        let push = |(to, when): Address, Wrench { impulse, moment, ways }: Wrench| {
+            let row = bodies[to.body].rows.start + to.row;
+            Push { row, impulse, moment, when, ways }
         };
         if let Some(repeat) = repeat {
             return repeat.take(system, mail, owner).into_iter().map(|(address, wrench)| push(address, wrench)).collect();
@@ -447,16 +473,24 @@ mod tests {
         exchange.turn(second).post(a, point, [1.0, 0.0, 0.0].into());
         exchange.turn(first).post(b, point, [0.0, 2.0, 0.0].into());
         exchange.turn(first).post_steady(b, point, [0.0, 0.0, 3.0].into());
+        exchange.turn(first).post_timed(b, [0.0, 0.0, 1.0].into(), [5.0; 3].into(), [[6.0, 7.0, 8.0].into(), [9.0; 3].into()]);
         let mut copy = exchange.clone();
         copy.turn(first).take();
         copy.turn(second).flow(flux, 9.0, 9.0);
         assert!(copy.restore(&exchange.save()).is_some() && copy == exchange);
         assert!(copy.restore(&exchange.save()[1..]).is_none());
-        let push = |row, impulse: [f64; 3], moment: [f64; 3], steady| Push { row, impulse: impulse.into(), moment: moment.into(), steady };
-        let arrived = vec![push(7, [0.0, 2.0, 0.0], [-4.0, 0.0, 0.0], false), push(7, [0.0, 0.0, 3.0], [0.0; 3], true)];
+        let push = |row, impulse: [f64; 3], moment: [f64; 3], when| {
+            let ways = if when == When::Timed { [[6.0, 7.0, 8.0].into(), [9.0; 3].into()] } else { <[Vector; 2]>::default() };
+            Push { row, impulse: impulse.into(), moment: moment.into(), when, ways }
+        };
+        let arrived = vec![
+            push(7, [0.0, 2.0, 0.0], [-4.0, 0.0, 0.0], When::Kick),
+            push(7, [0.0, 0.0, 3.0], [0.0; 3], When::Steady),
+            push(7, [0.0, 0.0, 1.0], [5.0; 3], When::Timed),
+        ];
         assert_eq!(exchange.turn(second).take(), arrived);
         assert_eq!(exchange.turn(second).take(), vec![]);
-        assert_eq!(exchange.turn(first).take(), vec![push(5, [1.0, 0.0, 0.0], [0.0, 2.0, 0.0], false)]);
+        assert_eq!(exchange.turn(first).take(), vec![push(5, [1.0, 0.0, 0.0], [0.0, 2.0, 0.0], When::Kick)]);
         assert_eq!(exchange.posted, exchange.delivered);
     }
 

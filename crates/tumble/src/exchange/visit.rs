@@ -20,12 +20,16 @@ pub struct Visit {
     /// What it has got in this interval [N s], and the moment about the origin [N m s].
     impulse: Vector,
     moment: Vector,
+    /// The moment about its own centre [N m s], and time integrals of the impulse [N s²] and of that.
+    angular: Vector,
+    ways: [Vector; 2],
 }
 
 impl Visit {
     /// A body as it is at the start of an interval.
     pub fn new(exchange: &Exchange, at: BodyRow, reach: f64) -> Self {
-        Self { at, reach, state: *exchange.state_before(at), impulse: Vector::default(), moment: Vector::default() }
+        let zero = Vector::default();
+        Self { at, reach, state: *exchange.state_before(at), impulse: zero, moment: zero, angular: zero, ways: [zero; 2] }
     }
 
     /// The largest speed of a point of it [m/s].
@@ -53,11 +57,13 @@ impl Visit {
         let (velocity, spin) = self.response(point, impulse, normal);
         (self.state.velocity, self.state.spin) = (self.state.velocity + velocity, self.state.spin + spin);
         (self.impulse, self.moment) = (self.impulse + impulse, self.moment + moment);
+        self.angular = self.angular + (point - self.state.position).cross(impulse);
     }
 
     /// Takes an impulse at a point and a couple [N m s].
     pub fn take_couple(&mut self, point: Vector, impulse: Vector, couple: Vector, normal: Vector) {
         self.take(point, impulse, point.cross(impulse) + couple, normal);
+        self.angular = self.angular + couple;
         if couple != Vector::default() && !self.is_into(point, normal) {
             self.state.spin = self.state.spin + self.state.turned(couple);
         }
@@ -79,12 +85,20 @@ impl Visit {
         let BodyState { position, orientation, velocity, spin, .. } = &mut self.state;
         *position = *position + *velocity * h;
         *orientation = (rotation::by(*spin * h) * *orientation).normalized();
+        self.ways = [self.ways[0] + self.impulse * h, self.ways[1] + self.angular * h];
     }
 
     /// Posts what it has got.
     pub fn post(&self, exchange: &mut Turn<'_>) {
         if self.impulse != Vector::default() || self.moment != Vector::default() {
             exchange.post_sum(self.at, self.impulse, self.moment);
+        }
+    }
+
+    /// Posts what it has got, and how far that has moved the copy.                                           (coupling.9)
+    pub fn post_timed(&self, exchange: &mut Turn<'_>) {
+        if self.impulse != Vector::default() || self.moment != Vector::default() {
+            exchange.post_timed(self.at, self.impulse, self.moment, self.ways);
         }
     }
 }

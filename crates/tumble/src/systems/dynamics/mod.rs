@@ -37,7 +37,7 @@ pub use parts::{Closed, Liquid, On, Parts, SpringPart};
 pub use settings::{Settings, Stepping};
 pub use tear::TearPart;
 
-use crate::exchange::{BodyRow, Exchange, Turn};
+use crate::exchange::{BodyRow, Exchange, Turn, When};
 use crate::geometry::{Collider, Vector};
 use crate::integrators;
 use crate::math::{Real, Row, Signal, xyz64};
@@ -366,7 +366,7 @@ impl System for Dynamics {
         self.take_surfaces(exchange.surfaces());
         self.core.pool.listen(exchange);
         for push in exchange.take() {
-            if push.steady {
+            if push.when != When::Kick {
                 self.core.push_steadily(push.row, push.impulse);
             } else {
                 self.core.kick(push.row, push.impulse);

@@ -55,8 +55,9 @@ impl Visited {
     }
 }
 
-/// The impulse that changes the velocity of a mass relative to the surface by `change` = K J, its part along the surface being no more than
-/// friction can. Where a slide makes the body yield along the normal, a quarter of what K has there keeps the divisor above zero.
+/// The impulse that changes the velocity of a mass relative to the surface by `change` = K J, which ends its slide, where friction holds that. Else
+/// friction is against the slide, against which J need not point. Where a slide makes the body yield along the normal, a quarter of what K has there
+/// keeps the divisor above zero.
 fn impulse(k: [Vector; 3], change: Vector, normal: Vector, friction: Friction) -> Vector {
     let [a, b, c] = k;
     let (bc, ca, ab) = (b.cross(c), c.cross(a), a.cross(b));
@@ -67,7 +68,8 @@ fn impulse(k: [Vector; 3], change: Vector, normal: Vector, friction: Friction) -
     if along.norm() <= friction.takes(along.norm(), press.max(0.0)) {
         return full;
     }
-    let direction = normal + along.normalized() * friction.sliding;
+    let slide = change - normal * change.dot(normal);
+    let direction = normal + slide.normalized() * friction.sliding;
     let gives = a * direction.x + b * direction.y + c * direction.z;
     let least = a * normal.x + b * normal.y + c * normal.z;
     direction * (change.dot(normal).max(0.0) / gives.dot(normal).max(0.25 * least.dot(normal)))
@@ -194,7 +196,15 @@ impl Reaction {
         }
         let (mass, point, normal) = (f64::from(laws.masses.mass[i]), xyz64(x), found.normal.0);
         let k = body.yields(point, 1.0 / mass, normal);
-        let after = xyz64(arrives) + impulse(k, xyz64(v) - xyz64(arrives), normal, solid.friction) * (1.0 / mass);
+        // What a solid that does not yield leaves of the slide is for friction, too.
+        let left = xyz64(v) - body.body.state.velocity_at(point);
+        let change = xyz64(v) - xyz64(arrives);
+        let push = if change.dot(normal) > 0.0 {
+            impulse(k, change - (left - normal * left.dot(normal)), normal, solid.friction)
+        } else {
+            Vector::default()
+        };
+        let after = xyz64(arrives) + push * (1.0 / mass);
         if !after.norm_sq().is_finite() {
             return false;
         }
@@ -221,8 +231,7 @@ impl Reaction {
         if lack <= 0.0 {
             return;
         }
-        let slide = relative - n * relative.dot(n);
-        let change = n * lack - slide.normalized() * solid.friction.takes(slide.norm(), lack);
+        let change = n * lack - (relative - n * relative.dot(n));
         let push = -impulse(body.yields(point, 0.0, n), change, n, solid.friction);
         if push.norm_sq().is_finite() {
             body.body.take(point, push, point.cross(push), n);

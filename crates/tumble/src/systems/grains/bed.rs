@@ -1,15 +1,12 @@
 //! Grains and their motion.
 
-use super::law::Pair;
+use super::law::{BALL, Pair};
 use super::list::{Four, Kept, List, Part, point};
 use super::press::Rows;
 use super::walls::{Touched, Walls, add};
 use crate::geometry::Vector;
 use crate::math::parallel::{CHUNK, Tasks, chunks2, fold};
 use crate::math::{Real, Row};
-
-/// Moment of inertia of a ball over m R².
-const BALL: f64 = 0.4;
 
 /// Grains in the order of their cells.
 #[derive(Debug, Default)]

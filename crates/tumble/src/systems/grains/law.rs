@@ -34,7 +34,7 @@ pub struct Pair<L = f64> {
     /// E* [Pa] of Hertz, or the compliances 1/(2 E) of both [1/Pa].
     elastic: L,
     compliance: [L; 2],
-    /// Stiffness along the surface over that across it, 4 G*/E*, and its root.
+    /// Stiffness along the surface over that across it, 4 G*/E*, and the root of its product with the mass that a slip moves, over m*.
     shear: [L; 2],
     /// Damping over √(k m*).
     damping: L,
@@ -49,12 +49,18 @@ pub const NUMBERS: usize = 11;
 
 /// Part of critical damping of what resists rolling and twisting.
 const ROLLING: f64 = 0.3;
+/// Moment of inertia of a ball over m R².
+pub const BALL: f64 = 0.4;
+/// Mass that a slip moves over m*: balls turn, too.
+const SLIP: f64 = BALL / (1.0 + BALL);
 
 /// What a contact remembers, of the second grain against the first: slip [m] and turn [rad].
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Memory<L = f64> {
     pub slip: Vec3<L>,
     pub turn: Vec3<L>,
+    /// 1 if friction gave way in the last step, 0 if it held.
+    pub slides: L,
 }
 
 /// Two surfaces that overlap.
@@ -110,7 +116,7 @@ impl Pair {
             law,
             elastic,
             compliance: [0.5 / a.young, 0.5 / b.young],
-            shear: [shear, shear.sqrt()],
+            shear: [shear, (SLIP * shear).sqrt()],
             damping: 2.0 * dampings.of(law, larger(|m| m.restitution)),
             friction: [larger(|m| m.friction.sliding), larger(|m| m.friction.resting)],
             resists: [larger(|m| m.resists[0]), larger(|m| m.resists[1])],
@@ -200,16 +206,19 @@ impl<L: Lane> Pair<L> {
         let shear = self.shear[0] * stiffness;
         let drag = along * (damping * self.shear[1]);
         let force = slip * shear + drag;
-        // Cohesion presses surfaces together, too: friction follows the force without it.
-        let (taken, limit) = (force.norm_sq(), self.friction[1] * press);
+        // Cohesion presses surfaces together, too: friction follows the force without it. What slides goes on until sliding friction holds it.
+        let [slides, rests] = self.friction;
+        let (taken, limit) = (force.norm_sq(), memory.slides.positive(slides, rests) * press);
         let over = taken - limit * limit;
-        let cut = over.positive(self.friction[0] * press / taken.sqrt(), h.like(1.0));
+        let cut = over.positive(slides * press / taken.sqrt(), h.like(1.0));
+        memory.slides = over.positive(h.like(1.0), h.zero());
         let force = force * cut;
-        let (held, inverse) = ((force - drag), h.like(1.0) / shear);
+        // With the drag, so that forces of the same place and another velocity are at the limit, too.
+        let inverse = h.like(1.0) / shear;
         memory.slip = Vec3 {
-            x: over.positive(held.x * inverse, slip.x),
-            y: over.positive(held.y * inverse, slip.y),
-            z: over.positive(held.z * inverse, slip.z),
+            x: over.positive(force.x * inverse, slip.x),
+            y: over.positive(force.y * inverse, slip.y),
+            z: over.positive(force.z * inverse, slip.z),
         };
         let moment = if turns { self.resist(at, h, memory, shear, press) } else { n * h.zero() };
         Answer { force: force - n * (press - pull), moment }
@@ -247,14 +256,36 @@ impl<L: Lane> Pair<L> {
 }
 
 /// The longest step that resolves contact of grains of a material [s]: a fifth of the time in which a Rayleigh wave crosses half a grain, or a
-/// twentieth of a bounce.                                                                                            (grains.6)
+/// twentieth of a bounce; less where dampers need shorter ones.                                                      (grains.6)
 pub fn longest_step(law: NormalLaw, material: &Material, radius: f64, density: f64) -> f64 {
     use std::f64::consts::PI;
-    let Material { young, poisson, .. } = material;
-    match law {
-        NormalLaw::Hertz => 0.2 * PI * radius * (2.0 * (1.0 + poisson) * density / young).sqrt() / (0.1631 * poisson + 0.8766),
-        NormalLaw::Linear => 0.05 * PI * radius * (2.0 / 3.0 * PI * density / young).sqrt(),
-    }
+    /// Overlap over the radius up to which steps are to be stable.
+    const DEEP: f64 = 0.05;
+    let Material { young, poisson, restitution, .. } = material;
+    let (resolved, stiffness) = match law {
+        NormalLaw::Hertz => (
+            0.2 * PI * radius * (2.0 * (1.0 + poisson) * density / young).sqrt() / (0.1631 * poisson + 0.8766),
+            young / (1.0 - poisson * poisson) * radius * (0.5 * DEEP).sqrt(),
+        ),
+        NormalLaw::Linear => (0.05 * PI * radius * (2.0 / 3.0 * PI * density / young).sqrt(), young * radius),
+    };
+    let shear = 2.0 * (1.0 - poisson) / (2.0 - poisson);
+    let mass = 4.0 / 3.0 * PI * density * radius.powi(3);
+    resolved.min(stable(damping(law, *restitution), shear) * (mass / stiffness).sqrt())
+}
+
+/// The longest stable step, over √(m/k), of a grain between others that all move, or all turn, against it. With forces by the velocities of half a
+/// step before, ω² h² + 2 c h < 4.                                                                                   (grains.7)
+fn stable(damping: f64, shear: f64) -> f64 {
+    /// Contacts of a grain.
+    const CONTACTS: f64 = 8.0;
+    let c = 2.0 * damping * 0.5_f64.sqrt();
+    let drag = c * (SLIP * shear).sqrt();
+    // A third of contacts bears each direction, two thirds resist slips along it, or a turn about it.
+    let moves = [1.0 + 2.0 * shear, c + 2.0 * drag].map(|sum| 2.0 / 3.0 * CONTACTS * sum);
+    let turns = [shear, drag].map(|one| 4.0 / 3.0 * CONTACTS / BALL * one);
+    let longest = |[k, c]: [f64; 2]| ((c * c + 4.0 * k).sqrt() - c) / k;
+    longest(moves).min(longest(turns))
 }
 
 /// The part of critical damping that leaves this part of the speed after a bounce. The contact ends where its force does, so that it never pulls;

@@ -27,7 +27,7 @@ pub struct Pairs {
     pub turns: Vec<Row>,
 }
 
-/// What a contact remembers: slip and turn.
+/// What a contact remembers: slip, with whether it slides, and turn.
 pub type Kept = [Row; 2];
 
 /// The pairs of a chunk.
@@ -80,7 +80,7 @@ impl Pairs {
     pub fn memory(&self, k: usize) -> Memory {
         let [slip, turn] = self.kept(k);
         let wide = |v: Row| point(&v.map(f64::from));
-        Memory { slip: wide(slip), turn: wide(turn) }
+        Memory { slip: wide(slip), turn: wide(turn), slides: f64::from(slip[3]) }
     }
 }
 
@@ -148,7 +148,7 @@ impl List {
             let [a, b] = pair.map(|row| before[row as usize]);
             let lower = a.min(b) as usize / chunk;
             let kept = old.get(lower)?.kept(lower * chunk, [a.min(b), a.max(b)])?;
-            Some(if a < b { kept } else { kept.map(|v| v.map(|c| -c)) })
+            Some(if a < b { kept } else { kept.map(|[x, y, z, slides]| [-x, -y, -z, slides]) })
         };
         let part = |c: usize| {
             let rows = c * chunk..((c + 1) * chunk).min(x.len());

@@ -33,7 +33,7 @@ use walls::{WallContact, Walls};
 /// Numbers of a row, of a contact of two grains, and of one with a wall, in a snapshot.
 const ROW: usize = 9;
 const CONTACT: usize = 8;
-const WALL: usize = 10;
+const WALL: usize = 11;
 /// Overlap at the start, over the least radius, that is taken apart, and what is left of it.
 const OVERLAP: f64 = 0.1;
 const LEFT: f64 = 0.01;
@@ -218,6 +218,10 @@ impl System for Grains {
         &self.settings.name
     }
 
+    fn version(&self) -> u32 {
+        1
+    }
+
     /// Grains are no bodies that others push: they visit.
     fn absorb(&mut self, _exchange: &mut Turn<'_>) {}
 
@@ -365,8 +369,10 @@ impl System for Grains {
         archive.push("contacts", Part::Table(CONTACT, memories));
         let keys: Vec<u32> = self.walls.contacts().flat_map(|c| [c.row, c.surface]).collect();
         archive.push_indices("keys", &keys);
-        let kept =
-            self.walls.contacts().flat_map(|c| [&three(c.normal)[..], &three(c.memory.slip), &three(c.memory.turn), &[c.depth]].concat());
+        let kept = self.walls.contacts().flat_map(|c| {
+            let Memory { slip, turn, slides } = c.memory;
+            [&three(c.normal)[..], &three(slip), &three(turn), &[c.depth, slides]].concat()
+        });
         archive.push("walls", Part::Numbers(kept.collect()));
     }
 
@@ -409,7 +415,7 @@ impl System for Grains {
             row: key[0],
             surface: key[1],
             normal: three(s),
-            memory: Memory { slip: three(&s[3..]), turn: three(&s[6..]) },
+            memory: Memory { slip: three(&s[3..]), turn: three(&s[6..]), slides: s[10] },
             depth: s[9],
         };
         self.walls.remember(keys.chunks_exact(2).zip(kept.chunks_exact(WALL)).map(contact).collect());

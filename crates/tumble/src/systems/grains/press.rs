@@ -186,15 +186,15 @@ impl Pass<'_> {
             lever: arms[0] * arms[1] / (arms[0] + arms[1]),
             mass: one / (first[3] + second[3]),
         };
-        let mut memory = Memory { slip: three(slip), turn: three(turn) };
+        let mut memory = Memory { slip: three(slip), turn: three(turn), slides: slip[3] };
         let law = Pair::from_numbers(pairs[0].law(), laws);
         let answer = law.answer(&at_contact, w.splat(self.rows.h as Real), &mut memory, turns);
         let turning = normal.cross(answer.force);
-        put(w, answer.force, &mut batch.forces[0]);
-        put(w, turning * arms[0] + answer.moment, &mut batch.forces[1]);
-        put(w, turning * arms[1] - answer.moment, &mut batch.forces[2]);
-        put(w, memory.slip, &mut batch.slips);
-        put(w, memory.turn, &mut batch.turns);
+        put(w, answer.force, one.zero(), &mut batch.forces[0]);
+        put(w, turning * arms[0] + answer.moment, one.zero(), &mut batch.forces[1]);
+        put(w, turning * arms[1] - answer.moment, one.zero(), &mut batch.forces[2]);
+        put(w, memory.slip, memory.slides, &mut batch.slips);
+        put(w, memory.turn, one.zero(), &mut batch.turns);
         for l in 0..count {
             let k = found.candidates[at + l] as usize;
             self.list.slips[k] = batch.slips[l];
@@ -223,11 +223,11 @@ fn three<L: Lane>(rows: [L; 4]) -> Vec3<L> {
     Vec3 { x: rows[0], y: rows[1], z: rows[2] }
 }
 
-/// Vectors as rows of a batch.
+/// Vectors and a number as rows of a batch.
 #[inline(always)]
-fn put<W: Width>(w: W, v: Vec3<W::L>, rows: &mut [Row; LANES]) {
+fn put<W: Width>(w: W, v: Vec3<W::L>, last: W::L, rows: &mut [Row; LANES]) {
     // SAFETY: there is a row for every lane.
-    unsafe { w.put([v.x, v.y, v.z, v.x.zero()], rows.as_mut_ptr(), &ALL) };
+    unsafe { w.put([v.x, v.y, v.z, last], rows.as_mut_ptr(), &ALL) };
 }
 
 /// A row in double precision.

@@ -294,7 +294,7 @@ impl Walls {
 
     /// Posts what bodies have got.
     pub fn post(&self, exchange: &mut Turn<'_>) {
-        self.bodies.iter().for_each(|(visit, _)| visit.post(exchange));
+        self.bodies.iter().for_each(|(visit, _)| visit.post_timed(exchange));
     }
 
     /// All contacts, by rows.

@@ -55,6 +55,15 @@ impl Body {
         self.v + self.w.cross(r)
     }
 
+    /// Moves [m] and turns it by little [rad]; its angular momentum about the origin stays.
+    pub fn displace(&mut self, way: Vector, turn: Vector) {
+        let spin = self.spin() - way.cross(self.v * (1.0 / self.inverse_mass));
+        self.x = self.x + way;
+        self.q = (by(turn) * self.q).normalized();
+        self.orient();
+        self.w = self.turned(spin);
+    }
+
     /// Puts the inverse inertia into the axes of the world.
     pub fn orient(&mut self) {
         if self.inverse_mass == 0.0 {

@@ -14,6 +14,9 @@ const CLOSE: f64 = 1e-3;
 /// A contact that has moved less than this over the reach of a body is the same one.
 const NEAR: f64 = 0.1;
 
+/// Numbers of a contact in a snapshot.
+pub const CONTACT: usize = 17;
+
 /// The surface of bodies.
 #[derive(Clone)]
 pub struct Hull {
@@ -82,10 +85,30 @@ pub struct Contact {
 }
 
 impl Contact {
-    /// What a snapshot keeps of a contact: all that the next sub-step and the ledger read. `[press, gap]`.
-    pub fn kept(pair: [u32; 2], local: Vector, drag: Vector, normal: Vector, [press, gap]: [f64; 2]) -> Self {
-        let none = Vector::default();
-        Self { pair, local, normal, arms: [none; 2], gap, friction: Friction::default(), restitution: 0.0, belt: none, press, drag }
+    /// What a snapshot keeps of a contact: all that the next sub-step, the ledger and what is published read.
+    pub fn numbers(&self) -> [f64; CONTACT] {
+        let vectors = [self.local, self.drag, self.normal, self.arms[0], self.arms[1]].map(<[f64; 3]>::from);
+        let mut numbers = [0.0; CONTACT];
+        numbers[..2].copy_from_slice(&[self.press, self.gap]);
+        numbers[2..].copy_from_slice(vectors.as_flattened());
+        numbers
+    }
+
+    /// A contact from what a snapshot has kept.
+    pub fn kept(pair: [u32; 2], numbers: &[f64]) -> Self {
+        let at = |k: usize| Vector { x: numbers[k], y: numbers[k + 1], z: numbers[k + 2] };
+        Self {
+            pair,
+            local: at(2),
+            normal: at(8),
+            arms: [at(11), at(14)],
+            gap: numbers[1],
+            friction: Friction::default(),
+            restitution: 0.0,
+            belt: Vector::default(),
+            press: numbers[0],
+            drag: at(5),
+        }
     }
 }
 

@@ -19,13 +19,13 @@ pub use contact::{Bodies, Hull, pose};
 pub use joint::{Drive, Joint, Kind, Motor, WORLD};
 pub use solids::refusal;
 
-use crate::exchange::{BodyState, Push, Turn};
+use crate::exchange::{BodyState, Push, Turn, When};
 use crate::forces::Gravity;
 use crate::geometry::{Collider, Vector};
 use crate::integrators::equal_steps;
 use crate::math::{Quat, Real};
 use crate::system::{Archive, Part, System};
-use contact::Contact;
+use contact::{CONTACT, Contact};
 use joint::Joints;
 use lever::Pace;
 use std::ops::Range;
@@ -38,9 +38,8 @@ use tumble_interface::{Column, Mesh, StepError};
 const STEP: f64 = 1.0 / 480.0;
 /// Overlaps at the start that are told, over the reach of a body.
 const OVERLAP: f64 = 1e-3;
-/// Numbers of a body, and of a contact, in a snapshot.
+/// Numbers of a body in a snapshot.
 const BODY: usize = 13;
-const CONTACT: usize = 11;
 /// Numbers of a joint in a snapshot.
 const JOINT: usize = 7;
 
@@ -165,6 +164,25 @@ impl Rigid {
             let impulse = push.impulse * part;
             body.v = body.v + impulse * body.inverse_mass;
             body.w = body.w + body.turned(push.moment * part - body.x.cross(impulse));
+        }
+    }
+
+    /// Displaces free bodies by what timed impulses have done to a visitor's copy beyond what they do here: over the interval each of their
+    /// sub-steps gets an equal part, which then acts for `mean` seconds.                                              (coupling.9)
+    fn shift(&mut self, mean: f64) {
+        if self.steady.iter().all(|push| push.when != When::Timed) {
+            return;
+        }
+        let (mut held, moving) = (self.borne(), self.bodies.moving);
+        for i in self.joints.pairs().flatten().filter(|i| (*i as usize) < moving) {
+            held[i as usize] = true;
+        }
+        for push in self.steady.iter().filter(|push| push.when == When::Timed && !held[push.row]) {
+            let body = &mut self.bodies.rows[push.row];
+            let [way, turn] = push.ways;
+            body.orient();
+            let angular = push.moment - body.x.cross(push.impulse);
+            body.displace((way - push.impulse * mean) * body.inverse_mass, body.turned(turn - angular * mean));
         }
     }
 
@@ -317,8 +335,12 @@ impl System for Rigid {
         &self.settings.name
     }
 
+    fn version(&self) -> u32 {
+        1
+    }
+
     fn absorb(&mut self, exchange: &mut Turn<'_>) {
-        let (steady, kicks): (Vec<Push>, Vec<Push>) = exchange.take().into_iter().partition(|push| push.steady);
+        let (steady, kicks): (Vec<Push>, Vec<Push>) = exchange.take().into_iter().partition(|push| push.when != When::Kick);
         self.push(&kicks, 1.0);
         self.steady.extend(steady);
     }
@@ -328,6 +350,7 @@ impl System for Rigid {
         let mut report = StepReport::default();
         let n = self.steps(dt);
         let h = dt / f64::from(n);
+        self.shift(0.5 * (dt + h));
         for k in 0..n {
             if !go_on() {
                 return Ok(report);
@@ -467,11 +490,7 @@ impl System for Rigid {
         archive.push("bodies", Part::Numbers(rows.collect()));
         let pairs: Vec<u32> = self.contacts.iter().flat_map(|c| c.pair).collect();
         archive.push_indices("pairs", &pairs);
-        let contact = |c: &Contact| {
-            let kept = [three(c.local), three(c.drag), three(c.normal)].concat();
-            kept.into_iter().chain([c.press, c.gap])
-        };
-        archive.push("contacts", Part::Numbers(self.contacts.iter().flat_map(contact).collect()));
+        archive.push("contacts", Part::Numbers(self.contacts.iter().flat_map(Contact::numbers).collect()));
         let joint = |j: &Joint| [&[f64::from(u8::from(j.broken))][..], &three(j.load[0]), &three(j.load[1])].concat();
         archive.push("joints", Part::Numbers(self.joints.all.iter().flat_map(joint).collect()));
     }
@@ -497,8 +516,7 @@ impl System for Rigid {
             (joint.broken, joint.load) = (s[0] == 1.0, [three(&s[1..]), three(&s[4..])]);
         }
         let kept = pairs.chunks_exact(2).zip(contacts.chunks_exact(CONTACT));
-        self.contacts =
-            kept.map(|(pair, s)| Contact::kept([pair[0], pair[1]], three(s), three(&s[3..]), three(&s[6..]), [s[9], s[10]])).collect();
+        self.contacts = kept.map(|(pair, numbers)| Contact::kept([pair[0], pair[1]], numbers)).collect();
         Some(())
     }
 
