@@ -8,6 +8,7 @@ import re
 import signal
 import subprocess
 import sys
+import tracemalloc
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -170,6 +171,24 @@ def test_tables_for_python(reference: Sweep, monkeypatch: pytest.MonkeyPatch) ->
     assert reference.column(ORDER[1]).tolist() == table[ORDER[1]].tolist()
     monkeypatch.setitem(sys.modules, "pandas", None)
     assert reference.table == reference.records() and reference.table[0]["seed"] == 3
+
+
+def test_rows_of_many_runs_take_little_memory(tmp_path: Path) -> None:
+    words = study.prepared(FLOCK, NOISE, ORDER, 500)
+    store = Store(tmp_path / "s")
+    store.make()
+    for i in range(words.runs):
+        one = words.task(i, False)
+        store.add(task.Answer(one.key, "finished", frame=40, hash=one.key, values=dict.fromkeys(ORDER, float(i))).row())
+    tracemalloc.start()
+    try:
+        found = study.collected(words, store)
+        size, _ = tracemalloc.get_traced_memory()
+    finally:
+        tracemalloc.stop()
+    assert len(found) == 3000 and found.rows[-1].values[ORDER[0]] == 2999.0
+    # Measured 620.
+    assert 200 < size / 3000 < 1000
 
 
 # Whoever computes
@@ -479,6 +498,51 @@ def test_dask_that_is_not_there_is_told(spring: Tree, tmp_path: Path, monkeypatc
     monkeypatch.setitem(sys.modules, "distributed", None)
     with pytest.raises(SceneError, match=r"--on dask: needs Dask: pip install 'tumble\[cluster\]'"):
         swept(spring, {"time.fps": [24, 25]}, folder=tmp_path / "s", on="dask")
+
+
+SCHEDULER, WORKER = "dask scheduler --port 8786", "--nthreads 1 --nworkers 1 --no-dashboard"
+
+
+def test_the_guide_starts_clusters_that_there_are() -> None:
+    import yaml
+
+    guide = (Path(__file__).parents[2] / "docs" / "sweeps.md").read_text(encoding="utf-8")
+    assert f"{SCHEDULER} &" in guide and f'dask worker "tcp://$(hostname):8786" {WORKER} &' in guide
+    pods = yaml.safe_load_all(re.findall(r"```yaml\n(.*?)```", guide, re.S)[0])
+    kinds = {one["metadata"]["name"] + " " + one["kind"]: one["spec"] for one in pods}
+    assert set(kinds) == {"tumble-scheduler Deployment", "tumble-scheduler Service", "tumble-worker Deployment"}
+    (one,) = kinds["tumble-scheduler Deployment"]["template"]["spec"]["containers"]
+    assert one["command"] == SCHEDULER.split()
+    (one,) = kinds["tumble-worker Deployment"]["template"]["spec"]["containers"]
+    assert one["command"][:3] == ["dask", "worker", "tcp://tumble-scheduler:8786"]
+    known = subprocess.run(
+        [sys.executable, "-m", "dask", "worker", "--help"], capture_output=True, text=True, check=True
+    )
+    for word in [*one["command"], *WORKER.split()]:
+        assert not word.startswith("--") or word in known.stdout or word.replace("no-", "") in known.stdout
+
+
+@pytest.mark.long
+def test_the_commands_of_the_guide_make_a_cluster(reference: Sweep, tmp_path: Path) -> None:
+    import socket
+
+    with socket.socket() as free:
+        free.bind(("127.0.0.1", 0))
+        port = free.getsockname()[1]
+    words = [sys.executable, "-m", "dask"]
+    environment = {**os.environ, "RAYON_NUM_THREADS": "1"}
+    commands = [[*words, *SCHEDULER.replace("8786", str(port)).split()[1:], "--no-dashboard"]]
+    commands += [[*words, "worker", f"tcp://127.0.0.1:{port}", *WORKER.split()]] * 2
+    quiet: dict[str, Any] = {"stdout": subprocess.DEVNULL, "stderr": subprocess.DEVNULL, "cwd": tmp_path}
+    processes = [subprocess.Popen(command, env=environment, **quiet) for command in commands]
+    try:
+        found = flock(tmp_path / "s", on=f"tcp://127.0.0.1:{port}")
+    finally:
+        for process in processes:
+            process.terminate()
+        for process in processes:
+            process.wait()
+    assert found.hash == reference.hash
 
 
 # The command

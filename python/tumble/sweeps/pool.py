@@ -42,7 +42,7 @@ class Died(Exception):
 
     @property
     def killed(self) -> bool:
-        return self.code == -signal.SIGKILL
+        return hasattr(signal, "SIGKILL") and self.code == -signal.SIGKILL
 
     def __str__(self) -> str:
         how = f"exit code {self.code}"

@@ -18,7 +18,7 @@ from tumble.sweeps.store import table_hash
 from tumble.sweeps.task import FINISHED
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, slots=True)
 class Row:
     """A run."""
 
@@ -26,6 +26,7 @@ class Row:
     """Its number in the design, from 0."""
     point: int
     parameters: dict[str, str]
+    """The same for all runs of a point."""
     seed: int
     key: str
     status: str

@@ -66,9 +66,11 @@ class Store:
         return self.manifest.is_file()
 
     def is_free(self) -> bool:
-        """Whether a new sweep can go here."""
+        """Whether a new sweep can go here: nothing is here yet, but for what one leaves that is killed before its manifest."""
         try:
             there = [path.name for path in self.folder.iterdir()]
+            if self._rows.is_dir() and not any(self._rows.iterdir()):
+                there.remove(self._rows.name)
         except FileNotFoundError:
             return True
         except OSError as error:

@@ -3,6 +3,7 @@
 import math
 import os
 import secrets
+import sys
 import time
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import closing, suppress
@@ -533,16 +534,20 @@ class _Sweeping:
 
 def collected(words: Words, store: Store) -> Sweep:
     """The rows of a design that are there, in its order."""
-    rows = []
+    rows: list[Row] = []
     there = store.keys()
+    # Not one for each run: there may be a million.
+    names = {m.name: m.name for m in words.measures}
     for i in range(words.runs):
         task = words.task(i, False)
         row = store.read(task.key) if task.key in there else None
         if row is None:
             continue
         point = i // len(words.seeds)
-        kept = (row["status"], row["reason"], row["report"], int(row["frame"]), row["hash"], row["values"])
-        rows.append(Row(i, point, words.design.point(point), task.seed, task.key, *kept, seconds=float(row["seconds"])))
+        parameters = rows[-1].parameters if rows and rows[-1].point == point else words.design.point(point)
+        values = {names[name]: value for name, value in row["values"].items() if name in names}
+        kept = (sys.intern(row["status"]), row["reason"], row["report"], int(row["frame"]), row["hash"], values)
+        rows.append(Row(i, point, parameters, task.seed, task.key, *kept, seconds=float(row["seconds"])))
     title = str(words.scene.to_dict().get("title") or "")
     return Sweep(store.folder, title, words.design, words.seeds, words.measures, rows)
 
