@@ -28,6 +28,9 @@ PATIENCE = float(os.environ.get("TUMBLE_CLUSTER_TIMEOUT", "10"))
 AHEAD = 3
 """Runs that wait at each worker, so that none is idle while the answer travels."""
 
+_DEAF = "import signal\nsignal.signal(signal.SIGINT, signal.SIG_IGN)\n"
+"""Leaves Ctrl-C to this process: a terminal sends it to all."""
+
 _EXTRA = "needs Dask: pip install 'tumble[cluster]'"
 
 
@@ -75,6 +78,7 @@ def cluster(context: Context, on: str, workers: int, threads: int, memory: float
                 processes=True,
                 dashboard_address=None,
                 memory_limit=int(memory) if memory else "auto",
+                preload=[_DEAF],
                 env={"RAYON_NUM_THREADS": str(threads)},
                 silence_logs=logging.CRITICAL,
             )

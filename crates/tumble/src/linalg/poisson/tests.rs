@@ -51,12 +51,12 @@ fn bits(column: &[Real]) -> Vec<u64> {
 
 #[test]
 fn bits_depend_on_neither_threads_nor_registers() {
-    for (sides, n) in [(CLOSED, [46, 70, 37]), (MIXED, [30, 66, 34]), (CLOSED, [150, 200, 1])] {
+    for (sides, n) in [(CLOSED, [30, 34, 20]), (MIXED, [18, 40, 22]), (CLOSED, [110, 100, 1])] {
         for method in Method::ALL {
             let of = |threads: usize, level: Level| {
                 let mut solver = if method == Method::Cosine {
                     // No solid, and lengths that it has.
-                    let lattice = Lattice::new([45, 60, 40]);
+                    let lattice = Lattice::new([45, 30, 20]);
                     let w = vec![u8::OPEN; lattice.len()];
                     Solver::new(lattice, CLOSED, [&w, &w, &w], None).unwrap()
                 } else {
@@ -65,14 +65,14 @@ fn bits_depend_on_neither_threads_nor_registers() {
                 .with_registers(level);
                 let b = random(solver.lattice(), 2);
                 let mut q = vec![0.0; b.len()];
-                let params = Params { method, target: Target::Relative(1e-5), iterations: 8, excess: Excess::Remove };
+                let params = Params { method, target: Target::Relative(1e-5), iterations: 3, excess: Excess::Remove };
                 let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
                 let info = pool.install(|| solver.solve(&b, &mut q, &params)).unwrap();
                 (bits(&q), info)
             };
             let one = of(1, Level::Scalar);
             assert!(one.1.iterations > 0 && one.1.residual() < 3.0, "{} {:?}", method.name(), one.1);
-            for (threads, level) in [(1, Level::Avx2), (2, Level::Avx512), (8, Level::Scalar), (8, Level::Avx512)] {
+            for (threads, level) in [(3, Level::Scalar), (1, Level::Avx2), (8, Level::Avx512)] {
                 let other = of(threads, level);
                 assert!(one == other, "{} {n:?}, {threads} threads, {level:?}", method.name());
             }
@@ -175,9 +175,9 @@ fn refinement_reaches_what_the_recursion_only_says() {
     #[cfg(not(feature = "double"))]
     assert!(plain > 3e-5 && refined.refinements >= 2, "{plain:e} {refined:?}");
     // Accuracy below the rounding of the evaluation is not claimed.
-    let never = Params { target: Target::Relative(1e-22), ..Params::default() };
+    let never = Params { target: Target::Relative(1e-22), iterations: 40, ..Params::default() };
     let given_up = solver.solve_double(&b, &mut double, &never).unwrap();
-    assert!(!given_up.converged && given_up.iterations <= 200 && given_up.residual() > 1e-22, "{given_up:?}");
+    assert!(!given_up.converged && given_up.iterations <= 40 && given_up.residual() > 1e-22, "{given_up:?}");
 }
 
 #[test]
