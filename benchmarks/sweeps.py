@@ -1,11 +1,13 @@
 """1,000 small runs of a scene by `tumble.sweep`, against the same runs in bare loops, one process for each worker.
 
-    python benchmarks/sweeps.py [threads [runs]]
+    python benchmarks/sweeps.py [threads [runs [repeats]]]
 
 The loops do what a run is (build the scene, step, measure) and nothing else; neither their start nor any checks, files or
-tables count. A sweep is timed from its call to its tables, without plots.
+tables count. A sweep is timed from its call to its tables, without plots. Beside the time stands that of the processors,
+which depends less on what else the machine does.
 """
 
+import resource
 import subprocess
 import sys
 import tempfile
@@ -15,6 +17,7 @@ import numpy as np
 from common import THREADS, show
 
 RUNS = int(sys.argv[2]) if len(sys.argv) > 2 else 1000
+REPEATS = int(sys.argv[3]) if len(sys.argv) > 3 else 3
 SCENE = {
     "version": 1,
     "dimension": 2,
@@ -51,13 +54,18 @@ def loop(part: int) -> None:
 
 def bare() -> tuple[float, float]:
     """The longest of the loops [s], and the mean over all runs."""
-    words = [sys.executable, __file__, str(THREADS), str(RUNS), "--part"]
+    words = [sys.executable, __file__, str(THREADS), str(RUNS), "1", "--part"]
     processes = [
         subprocess.Popen([*words, str(part)], stdout=subprocess.PIPE, text=True, env=ENVIRONMENT)
         for part in range(THREADS)
     ]
     said = [list(map(float, process.communicate()[0].split())) for process in processes]
     return max(seconds for seconds, _ in said), float(np.mean([mean for _, mean in said]))
+
+
+def processors() -> float:
+    """Time that this process and its children that ended have spent on processors [s]."""
+    return sum(sum(resource.getrusage(who)[:2]) for who in (resource.RUSAGE_SELF, resource.RUSAGE_CHILDREN))
 
 
 def swept(on: str) -> tuple[float, float]:
@@ -87,10 +95,13 @@ if __name__ == "__main__":
         except ImportError:
             del tried["dask"]
         # One after another, so that each meets the same load of the machine.
-        for _ in range(3):
+        for _ in range(REPEATS):
             for who, times in tried.items():
-                times.append(bare() if who == "loops" else swept(who))
-        found = {who: float(np.median([t for t, _ in times])) for who, times in tried.items()}
+                before = processors()
+                seconds, mean = bare() if who == "loops" else swept(who)
+                times.append((seconds, processors() - before, mean))
+        found = {who: np.median(np.array(times), axis=0) for who, times in tried.items()}
         for on in [who for who in tried if who != "loops"]:
-            show(f"{RUNS} runs, {on}", "tumble", found[on], "s", f"mean order {tried[on][0][1]:.6f}")
-            show(f"{RUNS} runs, {on}", "bare loops", found["loops"], "s", f"mean order {tried['loops'][0][1]:.6f}")
+            for who, name in ((on, "tumble"), ("loops", "bare loops")):
+                seconds, busy, mean = found[who].tolist()
+                show(f"{RUNS} runs, {on}", name, seconds, "s", f"mean order {mean:.6f}, {busy:.1f} s of processors")
