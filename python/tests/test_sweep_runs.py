@@ -491,7 +491,7 @@ def test_a_worker_that_joins_later_refuses_itself() -> None:
     import pickle
 
     with pytest.raises(cluster.Refused, match=r"a worker has tumble \S+, and this is 9\.9\.9"):
-        cluster.compute(pickle.dumps(("9.9.9", b"not readable here")), task.Task("k", (), 0))
+        cluster.compute(pickle.dumps(("9.9.9", b"not readable here")), [task.Task("k", (), 0)])
 
 
 def test_dask_that_is_not_there_is_told(spring: Tree, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -572,9 +572,12 @@ def test_the_command_tells_what_it_found(stiff: Tree, scene_file: SceneFile, tum
     assert nothing.code == 1 and "no run reached its end: energy exploded" in nothing.err
 
 
-def test_stills_and_films_stand_side_by_side(sheet: Tree, scene_file: SceneFile, tumble: Command) -> None:
+def test_stills_and_films_stand_side_by_side(
+    sheet: Tree, scene_file: SceneFile, tumble: Command, monkeypatch: pytest.MonkeyPatch
+) -> None:
     from matplotlib.image import imread
 
+    monkeypatch.setattr("tumble.film._cores", lambda: 1)  # Processes take longer to start than such films.
     sheet["time"]["frames"] = 2
     sheet["camera"] = {"resolution": [64, 48]}
     words = ["--vary", "sheet.sheet.center=[0,0,0.35],[0.2,0,0.5]", "--seeds", "2", "--renderer", "matplotlib"]

@@ -10,7 +10,7 @@ import logging
 import math
 import os
 import pickle
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from contextlib import ExitStack, contextmanager, suppress
 from functools import lru_cache
 from itertools import islice
@@ -28,6 +28,12 @@ PATIENCE = float(os.environ.get("TUMBLE_CLUSTER_TIMEOUT", "10"))
 AHEAD = 3
 """Runs that wait at each worker, so that none is idle while the answer travels."""
 
+PIECE = 0.4
+"""Time of the runs that are sent together [s]: shorter ones would take less time than it takes to send them."""
+
+MOST = 64
+"""Runs that are sent together, at most."""
+
 _DEAF = "import signal\nsignal.signal(signal.SIGINT, signal.SIG_IGN)\n"
 """Leaves Ctrl-C to this process: a terminal sends it to all."""
 
@@ -38,12 +44,13 @@ class Refused(Exception):
     """A worker of another version."""
 
 
-def compute(context: bytes, task: Task) -> Answer:
-    """What a worker of Dask does. Raises Refused where it is of another version, as one that joins later may be."""
+def compute(context: bytes, tasks: Sequence[Task]) -> list[Answer]:
+    """What a worker of Dask does: some runs, one after another. Raises Refused where it is of another version, as one that
+    joins later may be."""
     version, own = _loaded(context)
     if version != _engine.version:
         raise Refused(f"a worker has tumble {_engine.version}, and this is {version}; install that version there")
-    return perform(own, task)
+    return [perform(own, task) for task in tasks]
 
 
 @lru_cache(maxsize=4)
@@ -166,7 +173,9 @@ class Cluster:
         self.context = pickle.dumps((context.version, pickle.dumps(context)))
         self.workers = max(1, len(client.ncores()))
         self.deaths = 0
-        self._open: dict[Any, Task] = {}
+        self._open: dict[Any, list[Task]] = {}
+        self._each = math.inf
+        """Time of the last run [s]."""
 
     @property
     def running(self) -> int:
@@ -184,6 +193,7 @@ class Cluster:
         try:
             yield from self._all(iter(tasks), AHEAD * self._threads(), suspects, "")
             last: list[Task] = []
+            self._each = math.inf
             yield from self._all(iter(list(suspects)), 1, last, "-alone")
             for task in last:
                 text = (
@@ -201,22 +211,21 @@ class Cluster:
         killed = _dask("", ".scheduler").KilledWorker
         done = _dask("").as_completed(loop=self.client.loop)
         while True:
-            for task in islice(todo, most - len(self._open)):
-                future = self.client.submit(
-                    compute, self.context, task, key=f"tumble-{task.key}{mark}-{id(self):x}", pure=False
-                )
-                self._open[future] = task
+            while len(self._open) < most and (tasks := self._together(todo)):
+                key = f"tumble-{tasks[0].key}{mark}-{id(self):x}"
+                future = self.client.submit(compute, self.context, tasks, key=key, pure=False)
+                self._open[future] = tasks
                 done.add(future)
             if not self._open:
                 return
             future = next(done)
-            task = self._open.pop(future)
+            tasks = self._open.pop(future)
             try:
-                # Whose worker died in the meantime is computed again, and waited for.
-                answer: Answer = future.result()
+                # What a worker computed that died in the meantime is computed again, and waited for.
+                answers: list[Answer] = future.result()
             except killed:
                 self.deaths += 1
-                suspects.append(task)
+                suspects += tasks
             except Refused as error:
                 raise wrong("--on", str(error)) from None
             except (Exception, asyncio.CancelledError) as error:
@@ -224,4 +233,12 @@ class Cluster:
                 text = f"the cluster stopped: {words}; every finished row is kept, continue with --resume"
                 raise ExportError(text) from error
             else:
-                yield answer
+                self._each = answers[-1].seconds if not mark else math.inf
+                yield from answers
+
+    def _together(self, todo: Iterator[Task]) -> list[Task]:
+        """The next runs to send: one, or some where they are short and leave no files."""
+        tasks = list(islice(todo, 1))
+        if tasks and not tasks[0].keep:
+            tasks += islice(todo, max(0, min(int(PIECE / max(self._each, 1e-6)), MOST) - 1))
+        return tasks
