@@ -316,6 +316,7 @@ def test_order_spacing_and_speed_of_a_flock() -> None:
     assert flocks.observe(x, v) == pytest.approx([math.sqrt(2) / 3, 11 / 3, 7 / 3])
 
 
+@pytest.mark.long
 def test_a_flock_is_compared_as_long_as_paths_stay_close() -> None:
     words = ["forward_euler", "heun", "verlet", "dormand_prince"]
     results = studied(birds(), integrators=words, steps=[0.04, 0.02, 0.01, 0.005, 0.0025], budget=30.0)
@@ -384,6 +385,7 @@ def test_a_map_has_no_integrators_to_compare() -> None:
         subject(Scene(tree))
 
 
+@pytest.mark.long
 def test_molecules_show_the_orders_of_schemes() -> None:
     tree = {
         "version": 1,
@@ -450,6 +452,7 @@ def slope(errors: list[float]) -> float:
     return math.log2(errors[0] / errors[-1]) / (1 - len(errors))
 
 
+@pytest.mark.long
 def test_a_hanging_chain_converges_to_its_compliance_at_every_frame_rate() -> None:
     """(positions.2): of second order in sub-steps, of first in sweeps until these reach from end to end."""
     steps, sweeps = (
