@@ -86,7 +86,7 @@ def cluster(context: Context, on: str, workers: int, threads: int, memory: float
                 dashboard_address=None,
                 memory_limit=int(memory) if memory else "auto",
                 preload=[_DEAF],
-                env={"RAYON_NUM_THREADS": str(threads)},
+                env={"RAYON_NUM_THREADS": str(threads), "DASK_DISTRIBUTED__WORKER__PROFILE__ENABLED": "False"},
                 silence_logs=logging.CRITICAL,
             )
             stack.enter_context(local)
