@@ -13,8 +13,9 @@ from tumble.cli import find
 from tumble.cli.console import complain, counted, say, size, stopped
 
 if TYPE_CHECKING:
+    from tumble.sweeps.options import Options
     from tumble.sweeps.result import Sweep
-    from tumble.sweeps.study import Plan, Progress
+    from tumble.sweeps.study import Plan, Progress, Words
 
 ROWS = 24
 """Points of a design that are told on the console."""
@@ -99,9 +100,10 @@ def sweep(
       tumble sweep my.toml --design sobol --samples 64 --vary world.gravity.2=-9.8:-1.6
     """
     from tumble.cli.render import look_for
+    from tumble.sweeps.design import Design
     from tumble.sweeps.mistakes import Mistakes
     from tumble.sweeps.options import Options
-    from tumble.sweeps.study import as_tree, carry_out, prepared
+    from tumble.sweeps.study import prepared
     from tumble.sweeps.words import design as read
 
     if resume and force:
@@ -116,21 +118,33 @@ def sweep(
         if keep not in ("measures", "runs"):
             mistakes.add("--keep", f"{keep!r}, expected measures or runs")
         if seeds > 1 and not (vary or zip or table or design != "grid"):
-            from tumble.sweeps.design import Design
-
-            found, places = Design("grid", ()), dict[str, str]()
+            found: Design | None = Design("grid", ())
+            places: dict[str, str] = {}
         else:
-            made, places = read(mistakes, vary or (), zip or (), table, design, samples)
-            found = made  # type: ignore[assignment]
+            found, places = read(mistakes, vary or (), zip or (), table, design, samples)
         words = prepared(checked, found, measure or (), seeds, places, mistakes, against)
         bytes_ = None if memory is None else memory * 1e9
         options = Options(on, workers, keep == "runs", stills, films, plots, resume, force, bytes_, renderer)
-        try:
-            with Shown() as shown:
-                done = carry_out(words, folder, options, lambda plan: _agree(plan, yes, shown), shown, shown.drawn)
-        except KeyboardInterrupt as stop:
-            _say_what_is_kept(folder)
-            raise typer.Exit(stopped(stop)) from None
+        done = _carried_out(words, folder, options, yes)
+    _say(done, json)
+
+
+def _carried_out(words: "Words", folder: Path, options: "Options", yes: bool) -> "Sweep":
+    """Runs the sweep with its progress shown; a stop exits."""
+    from tumble.sweeps.study import carry_out
+
+    try:
+        with Shown() as shown:
+            return carry_out(words, folder, options, lambda plan: _agree(plan, yes, shown), shown, shown.drawn)
+    except KeyboardInterrupt as stop:
+        _say_what_is_kept(folder)
+        raise typer.Exit(stopped(stop)) from None
+
+
+def _say(done: "Sweep", json: bool) -> None:
+    """Prints the result; exits with 1 where no run reached its end."""
+    from tumble.sweeps.study import as_tree
+
     if json:
         find.say_json(as_tree(done))
     else:
