@@ -20,7 +20,6 @@ from tumble.lock import alone
 from tumble.recorder import machine, tier
 from tumble.sweeps import design as designs
 from tumble.sweeps import measures as measuring
-from tumble.sweeps import outputs
 from tumble.sweeps import store as stores
 from tumble.sweeps import task as tasks
 from tumble.sweeps.against import Published, published
@@ -411,6 +410,8 @@ class _Sweeping:
                 (self.store.folder / tasks.TOKEN).unlink()
         found = self._end("finished")
         options = self.options
+        from tumble.sweeps import outputs  # Loads what draws, which takes a second: mistakes are told before.
+
         outputs.write(found, self.store, options, self.words.against, self.drawn)
         return found
 
