@@ -82,12 +82,17 @@ impl<'a> Checker<'a> {
     }
 
     fn visit_table(&mut self, node: &Node, entries: &[(String, Node)], schema: &'a Schema, path: &str) {
-        let Some(properties) = schema["properties"].as_object() else {
-            // Keys of the author's own, all alike.
-            if schema["additionalProperties"].is_object() {
-                entries.iter().for_each(|(key, value)| self.visit(value, &schema["additionalProperties"], &join(path, key), None));
+        let none = serde_json::Map::new();
+        let properties = match (schema["properties"].as_object(), &schema["additionalProperties"]) {
+            (Some(properties), _) => properties,
+            (None, serde_json::Value::Bool(false)) => &none,
+            (None, of) => {
+                // Keys of the author's own, all alike.
+                if of.is_object() {
+                    entries.iter().for_each(|(key, value)| self.visit(value, of, &join(path, key), None));
+                }
+                return;
             }
-            return;
         };
         for (key, value) in entries {
             let below = join(path, key);
@@ -96,7 +101,11 @@ impl<'a> Checker<'a> {
                 None => {
                     let known = properties.keys().map(String::as_str).filter(|k| *k != "kind");
                     let hint = suggestion(key, known.clone());
-                    let list = if hint.is_empty() { format!("; known here: {}", known.collect::<Vec<_>>().join(", ")) } else { hint };
+                    let list = match &known.collect::<Vec<_>>()[..] {
+                        _ if !hint.is_empty() => hint,
+                        [] => "; no key is known here".into(),
+                        known => format!("; known here: {}", known.join(", ")),
+                    };
                     self.report(value, &below, format!("unknown key{list}"));
                 }
             }

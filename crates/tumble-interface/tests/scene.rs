@@ -59,6 +59,12 @@ fn default_links_are_written_out_where_nothing_else_makes_a_thing_elastic() {
 }
 
 #[test]
+fn a_key_where_none_is_known_has_its_place() {
+    let text = "version = 1\n[[body]]\nname = \"a\"\nshape = { sphere = { radius = 1 } }\n[[joint]]\nname = \"j\"\nbetween = [\"a\"]\nkind = { ball = { axis = 1 } }\n";
+    assert_eq!(errors(text), ["line 8: joint \"j\".kind.ball.axis: unknown key; no key is known here"]);
+}
+
+#[test]
 fn every_error_is_reported_at_once() {
     let found = errors(
         r#"version = 1
