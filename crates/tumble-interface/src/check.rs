@@ -4,6 +4,7 @@
 use crate::error::Issue;
 use crate::tree::{Node, Value};
 use serde_json::Value as Schema;
+use std::sync::LazyLock;
 
 /// All the places where `node` does not fit `schema`; the schema's definitions are looked up in `root`.
 pub fn check(node: &Node, root: &Schema) -> Vec<Issue> {
@@ -82,10 +83,10 @@ impl<'a> Checker<'a> {
     }
 
     fn visit_table(&mut self, node: &Node, entries: &[(String, Node)], schema: &'a Schema, path: &str) {
-        let none = serde_json::Map::new();
+        static NONE: LazyLock<serde_json::Map<String, Schema>> = LazyLock::new(serde_json::Map::new);
         let properties = match (schema["properties"].as_object(), &schema["additionalProperties"]) {
             (Some(properties), _) => properties,
-            (None, serde_json::Value::Bool(false)) => &none,
+            (None, Schema::Bool(false)) => &*NONE,
             (None, of) => {
                 // Keys of the author's own, all alike.
                 if of.is_object() {
