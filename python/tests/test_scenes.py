@@ -39,6 +39,7 @@ BEGINNINGS = {
     "gas/plume": 16,
     "gas/vortex_street": 4,
     "grains/hopper": 16,
+    "grains/hourglass": 24,
     "gravity/encounter": 48,
     "gravity/galaxy": 24,
     "heat/finned_plate": 30,

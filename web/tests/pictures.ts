@@ -34,6 +34,7 @@ const AT: Record<string, number> = {
   "grains/column": 22,
   "grains/heaps": 20,
   "grains/hopper": 30,
+  "grains/hourglass": 30,
   "integrators/overshoot": 5,
   "rigid/arch": 18,
   "rigid/cradle": 12,
