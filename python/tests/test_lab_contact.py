@@ -16,9 +16,6 @@ from tumble.lab.contact import CASES, Case, blows, flows, page, slopes, statics,
 from tumble.lab.contact.figure import Result, near, small, within
 from tumble.lab.contact.report import run, text
 
-KNOWN = {"grain: time until it rolls"}
-"""Figures that need not hold: grains that slip and slow down have too little friction in short exchange intervals."""
-
 Command = Callable[..., Answer]
 
 
@@ -119,7 +116,7 @@ def test_a_figure_holds_within_its_bounds_alone() -> None:
 def test_figures_hold_and_fail_where_the_scene_is_false(
     right: Callable[[], Result], wrong: Callable[[], Result], seen: str
 ) -> None:
-    assert broken(right()) <= KNOWN
+    assert broken(right()) == set()
     assert seen in broken(wrong())
 
 
@@ -190,7 +187,7 @@ def test_help_of_the_command_says_what_there_is(tumble: Command) -> None:
 def test_all_figures_of_the_page_hold(tmp_path: Path) -> None:
     path, lines = page(tmp_path)
     failed = {row["figure"] for row in table(path) if row["holds"] == "no"}
-    assert failed <= KNOWN, lines
+    assert failed == set(), lines
     assert {row["case"] for row in table(path)} == set(CASES)
     assert path.read_text(encoding="utf-8").count("<img") == len(CASES)
 

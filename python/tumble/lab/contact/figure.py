@@ -17,8 +17,6 @@ class Figure:
     unit: str = ""
     exact: float | None = None
     """None where a band is all that is known."""
-    known: str = ""
-    """A known weakness that explains it where it does not hold."""
 
     @property
     def holds(self) -> bool:
@@ -31,15 +29,15 @@ class Figure:
         return self.measured / self.exact - 1.0 if self.exact else None
 
 
-def near(what: str, measured: float, exact: float, share: float, unit: str = "", known: str = "") -> Figure:
+def near(what: str, measured: float, exact: float, share: float, unit: str = "") -> Figure:
     """A figure that has an exact value, and may be off by this share of it."""
     slack = share * abs(exact)
-    return Figure(what, measured, exact - slack, exact + slack, unit, exact, known)
+    return Figure(what, measured, exact - slack, exact + slack, unit, exact)
 
 
-def within(what: str, measured: float, low: float, high: float, unit: str = "", known: str = "") -> Figure:
+def within(what: str, measured: float, low: float, high: float, unit: str = "") -> Figure:
     """A figure that is to lie in a band."""
-    return Figure(what, measured, low, high, unit, known=known)
+    return Figure(what, measured, low, high, unit)
 
 
 def small(what: str, measured: float, bound: float, unit: str = "") -> Figure:

@@ -115,7 +115,6 @@ def _points(results: Mapping[str, Result]) -> list[str]:
                 points.append(
                     f"<b>Does not hold:</b> {escape(CASES[name].title)}, {escape(figure.what)}: "
                     f"{_number(figure.measured, figure.unit)}, expected {_expected(figure)}."
-                    + (f" {escape(figure.known)}" if figure.known else "")
                 )
     return points
 
