@@ -1,7 +1,9 @@
 """Sweeps that run: the same table whoever computes it, after kills, on full disks, after Ctrl-C."""
 
 import csv
+import io
 import json
+import math
 import os
 import random
 import re
@@ -9,6 +11,7 @@ import signal
 import subprocess
 import sys
 import tracemalloc
+import zipfile
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -23,7 +26,7 @@ from test_disks import fill_disk
 
 from tumble import ExportError, Run, Scene, SceneError, sweep
 from tumble.run import simulate
-from tumble.sweeps import cluster, pool, study, task
+from tumble.sweeps import cluster, measures, pool, study, task
 from tumble.sweeps.result import Sweep
 from tumble.sweeps.store import Store
 
@@ -488,10 +491,35 @@ def test_workers_of_another_version_are_refused(
 
 
 def test_a_worker_that_joins_later_refuses_itself() -> None:
-    import pickle
+    with pytest.raises(task.Refused, match=r"a worker has tumble \S+, and this is 9\.9\.9"):
+        cluster.compute(json.dumps({"version": "9.9.9", "scene": "of another kind"}).encode(), [task.Task("k", (), 0)])
 
-    with pytest.raises(cluster.Refused, match=r"a worker has tumble \S+, and this is 9\.9\.9"):
-        cluster.compute(pickle.dumps(("9.9.9", b"not readable here")), [task.Task("k", (), 0)])
+
+def test_messages_between_processes_come_back_as_they_were(tmp_path: Path) -> None:
+    """As JSON, to the bit: what another machine sends is read, and never run."""
+    given = task.Context(Scene(FLOCK | {"seed": 2**32 - 1}), (measures.read(ORDER[0]),), str(tmp_path), "t")
+    found = task.Context.of(given.message())
+    assert found.scene.to_dict() == given.scene.to_dict() and found.scene.folder == given.scene.folder
+    assert (found.measures, found.folder, found.token) == (given.measures, given.folder, given.token)
+    one = task.Task("k", ("particles.p.name=Stäbe", "time.fps=0.1"), 7, True)
+    assert task.Task.of(one.message()) == one
+    values = {"a": 0.1 + 0.2, "b": -math.inf, "c": 5e-324}
+    answer = task.Answer("k", "finished", "1\n2", {"at": [1, 2]}, 3, "ff", values, 1.5, b"\n\0PK\n", "full")
+    assert task.Answer.of(answer.message()) == answer
+
+
+@pytest.mark.parametrize("name", ["../evil", "/tmp/tumble-evil", "a/../../evil", "a\\..\\..\\evil", "C:evil"])
+def test_files_that_a_worker_sends_stay_in_the_folder_of_their_run(name: str, tmp_path: Path) -> None:
+    buffer = io.BytesIO()
+    with zipfile.ZipFile(buffer, "w") as archive:
+        archive.writestr("good", b"1")
+        archive.writestr(name, b"2")
+    with pytest.raises(OSError, match="leads out of the folder of its run"):
+        task.unpack(buffer.getvalue(), tmp_path / "a" / "run")
+    assert [path.name for path in tmp_path.rglob("*") if path.is_file()] == ["good"]
+    assert not Path("/tmp/tumble-evil").exists()
+    with pytest.raises(OSError, match="a worker sent a damaged archive"):
+        task.unpack(b"PK", tmp_path / "b")
 
 
 def test_dask_that_is_not_there_is_told(spring: Tree, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

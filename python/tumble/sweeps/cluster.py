@@ -9,7 +9,6 @@ import importlib
 import logging
 import math
 import os
-import pickle
 from collections.abc import Iterable, Iterator, Sequence
 from contextlib import ExitStack, contextmanager, suppress
 from functools import lru_cache
@@ -20,7 +19,7 @@ from tumble import _engine
 from tumble._engine import ExportError
 from tumble.arguments import wrong
 from tumble.film import no_main
-from tumble.sweeps.task import DIED, Answer, Context, Task, perform
+from tumble.sweeps.task import DIED, Answer, Context, Refused, Task, perform
 
 PATIENCE = float(os.environ.get("TUMBLE_CLUSTER_TIMEOUT", "10"))
 """How long a scheduler may take to answer, and its first worker to come [s]."""
@@ -40,25 +39,16 @@ _DEAF = "import signal\nsignal.signal(signal.SIGINT, signal.SIG_IGN)\n"
 _EXTRA = "needs Dask: pip install 'tumble[cluster]'"
 
 
-class Refused(Exception):
-    """A worker of another version."""
-
-
 def compute(context: bytes, tasks: Sequence[Task]) -> list[Answer]:
     """What a worker of Dask does: some runs, one after another. Raises Refused where it is of another version, as one that
     joins later may be."""
-    version, own = _loaded(context)
-    if version != _engine.version:
-        raise Refused(f"a worker has tumble {_engine.version}, and this is {version}; install that version there")
+    own = _loaded(context)
     return [perform(own, task) for task in tasks]
 
 
 @lru_cache(maxsize=4)
-def _loaded(context: bytes) -> tuple[str, Context]:
-    found: tuple[str, bytes] = pickle.loads(context)
-    # Of another version it may not even be readable.
-    own: Context = pickle.loads(found[1]) if found[0] == _engine.version else None  # type: ignore[assignment]
-    return found[0], own
+def _loaded(context: bytes) -> Context:
+    return Context.of(context)
 
 
 def _dask(on: str, part: str = "") -> Any:
@@ -170,7 +160,7 @@ class Cluster:
     def __init__(self, client: Any, context: Context) -> None:
         self.client = client
         # With each run, for what is kept at a worker dies with it.
-        self.context = pickle.dumps((context.version, pickle.dumps(context)))
+        self.context = context.message()
         self.workers = max(1, len(client.ncores()))
         self.deaths = 0
         self._open: dict[Any, list[Task]] = {}

@@ -6,7 +6,6 @@ again: what became of a run does not depend on how often that was.
 
 import math
 import os
-import pickle
 import queue
 import signal
 import struct
@@ -82,11 +81,10 @@ class Worker:
     def ask(self, task: Task) -> Answer:
         """Has a run computed. Raises Died."""
         try:
-            send(self.sink, pickle.dumps(task))
+            send(self.sink, task.message())
         except OSError:
             raise self.end() from None
-        answer: Answer = pickle.loads(self._receive())
-        return answer
+        return Answer.of(self._receive())
 
     def _receive(self) -> bytes:
         found = receive(self.source)
@@ -140,7 +138,7 @@ class Pool:
 
     def __init__(self, context: Context, workers: int, threads: int, memory: float | None = None) -> None:
         """`memory` is the most that a worker may take [bytes]."""
-        self.context = pickle.dumps(context)
+        self.context = context.message()
         self.workers, self.threads, self.memory = workers, threads, memory
         self.deaths = 0
         """Workers that died."""

@@ -1,13 +1,17 @@
 """One run of a sweep, where it is computed: in a worker on this machine, or on another."""
 
+import errno
 import io
+import json
+import re
 import shutil
 import tempfile
 import time
 import zipfile
+import zlib
 from collections.abc import Mapping
-from dataclasses import dataclass, field
-from pathlib import Path
+from dataclasses import asdict, dataclass, field
+from pathlib import Path, PurePosixPath
 from typing import Any
 
 from tumble import _engine
@@ -44,6 +48,32 @@ class Context:
     """In the file `token` of that folder, by which a worker knows whether it sees it."""
     version: str = _engine.version
 
+    def message(self) -> bytes:
+        """For a worker, as JSON: what comes from another machine is read, never run."""
+        tree = {
+            "version": self.version,
+            "scene": self.scene.to_dict(),
+            "home": self.scene.folder,
+            "measures": [measure.name for measure in self.measures],
+            "folder": self.folder,
+            "token": self.token,
+        }
+        return json.dumps(tree).encode()
+
+    @staticmethod
+    def of(message: bytes) -> "Context":
+        """Raises Refused where it is of another version, whose scenes may not be readable here."""
+        tree = json.loads(message)
+        if tree["version"] != _engine.version:
+            text = f"a worker has tumble {_engine.version}, and this is {tree['version']}"
+            raise Refused(f"{text}; install that version there")
+        scene = Scene(tree["scene"], tree["home"] or None)
+        return Context(scene, tuple(map(measures.read, tree["measures"])), tree["folder"], tree["token"])
+
+
+class Refused(Exception):
+    """A worker of another version."""
+
 
 @dataclass(frozen=True)
 class Task:
@@ -59,6 +89,15 @@ class Task:
     @property
     def sets(self) -> tuple[str, ...]:
         return (*self.overrides, f"seed={self.seed}")
+
+    def message(self) -> bytes:
+        """For a worker."""
+        return json.dumps(asdict(self)).encode()
+
+    @staticmethod
+    def of(message: bytes) -> "Task":
+        tree = json.loads(message)
+        return Task(**{**tree, "overrides": tuple(tree["overrides"])})
 
 
 @dataclass
@@ -85,6 +124,15 @@ class Answer:
         """For the file of its row."""
         kept = ("key", "status", "reason", "report", "frame", "hash", "values", "seconds")
         return {name: plain(getattr(self, name)) for name in kept}
+
+    def message(self) -> bytes:
+        """From a worker: a line, and the archive."""
+        return json.dumps({**self.row(), "values": self.values, "full": self.full}).encode() + b"\n" + self.archive
+
+    @staticmethod
+    def of(message: bytes) -> "Answer":
+        line, _, archive = message.partition(b"\n")
+        return Answer(**json.loads(line), archive=archive)
 
 
 def perform(context: Context, task: Task) -> Answer:
@@ -193,6 +241,23 @@ def pack(folder: Path) -> bytes:
 
 
 def unpack(archive: bytes, folder: Path) -> None:
-    """Writes the files of `pack`. Raises OSError."""
-    with zipfile.ZipFile(io.BytesIO(archive)) as packed:
-        packed.extractall(folder)
+    """Writes the files of `pack`. Raises OSError, also where a name leads out of the folder."""
+    try:
+        with zipfile.ZipFile(io.BytesIO(archive)) as packed:
+            for name in packed.namelist():
+                goal = folder / _inside(name)
+                if name.endswith("/"):
+                    goal.mkdir(parents=True, exist_ok=True)
+                else:
+                    goal.parent.mkdir(parents=True, exist_ok=True)
+                    goal.write_bytes(packed.read(name))
+    except (zipfile.BadZipFile, zlib.error) as error:
+        raise OSError(errno.EIO, f"a worker sent a damaged archive ({error})") from None
+
+
+def _inside(name: str) -> str:
+    """A name of an archive, which is that of a file below a folder."""
+    path = PurePosixPath(name)
+    if path.is_absolute() or ".." in path.parts or re.search(r"[\\:\0]", name):
+        raise OSError(errno.EIO, f"a worker sent a file {name!r}, which leads out of the folder of its run")
+    return name

@@ -5,7 +5,6 @@ standard output. It ends when its input does, in the midst of a run, too: whoeve
 """
 
 import os
-import pickle
 import queue
 import signal
 import sys
@@ -27,17 +26,17 @@ def main() -> None:
     first = receive(source)
     if first is None:
         return
-    context: Context = pickle.loads(first)
+    context = Context.of(first)
     send(sink, _READY)
     tasks: queue.SimpleQueue[Task] = queue.SimpleQueue()
     threading.Thread(target=_read, args=(source, tasks), daemon=True).start()
     while True:
-        send(sink, pickle.dumps(perform(context, tasks.get())))
+        send(sink, perform(context, tasks.get()).message())
 
 
 def _read(source: IO[bytes], tasks: "queue.SimpleQueue[Task]") -> None:
     while (message := receive(source)) is not None:
-        tasks.put(pickle.loads(message))
+        tasks.put(Task.of(message))
     os._exit(0)
 
 
