@@ -26,7 +26,7 @@ from test_disks import fill_disk
 
 from tumble import ExportError, Run, Scene, SceneError, sweep
 from tumble.run import simulate
-from tumble.sweeps import cluster, measures, pool, study, task
+from tumble.sweeps import cluster, design, measures, pool, study, task
 from tumble.sweeps.result import Sweep
 from tumble.sweeps.store import Store
 
@@ -414,6 +414,15 @@ def test_a_sweep_grows_by_values_seeds_and_measures(reference: Sweep, tmp_path: 
         swept(Scene(FLOCK).replace("time.frames=41"), {key: [0.5]}, ORDER[0], folder, resume=True)
 
 
+def test_points_that_are_the_same_are_computed_once(spring: Tree, tmp_path: Path) -> None:
+    pytest.importorskip("scipy")
+    seen: list[study.Progress] = []
+    drawn = design.latin({"system.0.substeps": (1, 2)}, 8)
+    found = swept(spring, drawn, folder=tmp_path / "s", keep=True, progress=seen.append)
+    assert len(found) == 8 and found.computed == 2 == len(list((tmp_path / "s" / "runs").iterdir()))
+    assert (seen[-1].done, seen[-1].total) == (8, 8) and not found.failed
+
+
 def test_a_folder_of_someone_else_is_left_alone(tmp_path: Path) -> None:
     (tmp_path / "notes.txt").write_text("mine")
     for how in ({}, {"resume": True}, {"overwrite": True}):
@@ -474,6 +483,12 @@ def test_a_scheduler_that_does_not_answer_is_told(
     answer = tumble("sweep", scene_file(spring), "--vary", "time.fps=24,25", "--on", "tcp://127.0.0.1:9")
     assert answer.code == 2
     assert "--on tcp://127.0.0.1:9: no Dask scheduler answers within 0.5 s" in answer.err and "--on cores" in answer.err
+    assert not Path("out").exists()
+    # A sweep that was to be replaced is still there.
+    before = swept(spring, {"time.fps": [24]}, folder="s")
+    with pytest.raises(SceneError, match="no Dask scheduler answers"):
+        swept(spring, {"time.fps": [25]}, folder="s", overwrite=True, on="tcp://127.0.0.1:9")
+    assert swept(spring, {"time.fps": [24]}, folder="s", resume=True).hash == before.hash
 
 
 def test_workers_of_another_version_are_refused(

@@ -107,6 +107,11 @@ class Design:
         found = sorted({*found, len(self) - 1})
         return found if len(found) <= most else [found[round(k)] for k in np.linspace(0, len(found) - 1, most)]
 
+    @property
+    def repeats(self) -> bool:
+        """Whether some points are the same: drawn whole numbers may be."""
+        return any(len(set(axis.rows)) < len(axis.rows) for axis in self.axes)
+
     def to_dict(self) -> dict[str, Any]:
         """For sweep.json."""
         return {
@@ -118,6 +123,22 @@ class Design:
 def override(path: str, value: str) -> str:
     """As `--set` takes it."""
     return f"{path}={value}"
+
+
+def located(scene: Mapping[str, Any], path: str) -> tuple[str | int, ...]:
+    """The parts of a key, with indices in place of names: a key may be written in several ways."""
+    found: list[str | int] = []
+    node: Any = scene
+    for part in path.split("."):
+        step: str | int = part
+        if isinstance(node, list):
+            names = [item.get("name") if isinstance(item, Mapping) else None for item in node]
+            step = int(part) if part.isdigit() else names.index(part) if part in names else part
+            node = node[step] if isinstance(step, int) and step < len(node) else None
+        else:
+            node = node.get(part) if isinstance(node, Mapping) else None
+        found.append(step)
+    return tuple(found)
 
 
 def number(value: str) -> float:
@@ -162,7 +183,7 @@ def sobol(ranges: Mapping[str, Any], samples: int) -> Design:
 
 def table(file: str | os.PathLike[str]) -> Design:
     """The rows of a CSV file, whose head names keys of the scene. Raises SceneError."""
-    return Design("table", (read(file),))
+    return Design("table", (points(file),))
 
 
 def product(first: Design, *others: Design) -> Design:
@@ -282,6 +303,18 @@ def together(values: Mapping[str, Sequence[str]]) -> Axis:
     return Axis(tuple(values), tuple(zip(*values.values(), strict=True)))
 
 
+def points(file: str | os.PathLike[str]) -> Axis:
+    """The points of a table. Raises SceneError, also where two are the same."""
+    axis = read(file)
+    first: dict[tuple[str, ...], int] = {}
+    for i, row in enumerate(axis.rows, 1):
+        if row in first:
+            text = f"row {i}: {','.join(row)}: is the same as row {first[row]}"
+            raise wrong(f"--table {Path(file)}", f"{text}; leave one of both out, and use --seeds to repeat runs")
+        first[row] = i
+    return axis
+
+
 def read(file: str | os.PathLike[str], place: str | None = None) -> Axis:
     """The rows of a CSV file. Raises SceneError, at `place`."""
     path = Path(file)
@@ -294,6 +327,9 @@ def read(file: str | os.PathLike[str], place: str | None = None) -> Axis:
     if len(found) < 2:
         raise wrong(place, "has no rows, expected a head, and a row for each point")
     head, rows = found[0], found[1:]
+    if len(head) == 1 and (sign := next((c for c in ";\t" if c in head[0]), "")):
+        told = "semicolons" if sign == ";" else "tabs"
+        raise wrong(place, f"line 1: {head[0]}: {told} between the columns, expected commas")
     if not all(head) or len(set(head)) < len(head):
         raise wrong(place, f"line 1: {','.join(head)}: expected a different name over each column")
     for i, row in enumerate(rows):

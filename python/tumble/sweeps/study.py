@@ -6,7 +6,7 @@ import secrets
 import sys
 import time
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from contextlib import closing, suppress
+from contextlib import AbstractContextManager, ExitStack, closing, nullcontext, suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Protocol
@@ -43,6 +43,8 @@ LONG = 12 * 3600.0
 
 TIMED = 20
 """Runs of fewer than these are started at once, however long they take."""
+
+LAST_SEED = 2**32 - 1
 
 MEASURES = ("ledger.energy@last",)
 """What is measured where nothing is asked for."""
@@ -181,8 +183,6 @@ def carry_out(
         raise KeyboardInterrupt
     with alone(store.folder):
         store.admit(resolved, options.resume, options.overwrite)
-        if options.overwrite and store.is_sweep():
-            store.clear()
         return _Sweeping(words, store, plan, engine, options, progress, drawn).run()
 
 
@@ -257,6 +257,8 @@ def _seeds(seeds: int | Sequence[int], scene: Scene, design: Design | None) -> l
             raise wrong("seeds", f"{list(seeds)}, expected different seeds")
     else:
         chosen = [first + k for k in range(whole(seeds, "--seeds", 1))]
+    if (last := max(chosen)) > LAST_SEED:
+        raise wrong("--seeds", f"the last seed would be {last}, expected at most {LAST_SEED}; set a smaller seed")
     if design is not None and "seed" in design.paths and len(chosen) > 1:
         raise wrong("--seeds", "the design varies seed itself; leave one of both out")
     return chosen
@@ -269,6 +271,15 @@ def _check_points(scene: Scene, design: Design, mistakes: Mistakes, places: Mapp
         root = path.split(".")[0]
         if root in ("expect", "output", "camera", "title", "version"):
             mistakes.add(places.get(path, path), f"[{root}] changes nothing that a sweep measures; vary another key")
+    tree = scene.to_dict()
+    keys: dict[tuple[str | int, ...], str] = {}
+    for path in design.paths:
+        key = designs.located(tree, path)
+        for other, typed in keys.items():
+            if key[: len(other)] == other or other[: len(key)] == key:
+                text = f"is the same key as {typed}" if key == other else f"changes the same values as {typed}"
+                mistakes.add(places.get(path, path), f"{text}, which is varied, too; leave one of both out")
+        keys[key] = path
     for i in design.covering(CHECKED):
         sets = {override(path, v): f"{places.get(path, path)}={v}" for path, v in design.point(i).items()}
         try:
@@ -391,12 +402,16 @@ class _Sweeping:
 
     def run(self) -> Sweep:
         """Computes what is missing, and writes what is made of it."""
-        with held():
-            self.store.make()
-            self.store.write_manifest(self.manifest)
-            write_whole(self.store.folder / tasks.TOKEN, self.token.encode())
+        todo = self._todo()
+        with ExitStack() as stack:
+            # Before anything is written or deleted: a scheduler that does not answer leaves the folder as it was.
+            engine = None if todo is None else stack.enter_context(self._engine())
+            self._begin()
+            opened = stack.pop_all()
         try:
-            self._compute()
+            with opened:
+                if todo is not None and engine is not None:
+                    self._compute(todo, engine)
         except KeyboardInterrupt:
             with held():
                 self._end("interrupted", "stopped by the user")
@@ -415,21 +430,34 @@ class _Sweeping:
         outputs.write(found, self.store, options, self.words.against, self.drawn)
         return found
 
-    def _compute(self) -> None:
-        there = self.store.keys()
+    def _begin(self) -> None:
+        with held():
+            if self.options.overwrite and self.store.is_sweep():
+                self.store.clear()
+            self.store.make()
+            self.store.write_manifest(self.manifest)
+            write_whole(self.store.folder / tasks.TOKEN, self.token.encode())
+
+    def _todo(self) -> Iterator[tasks.Task] | None:
+        """The runs that are missing; None where there are none."""
+        there = set() if self.options.overwrite else self.store.keys()
+        repeats = self.words.design.repeats
         names = [m.name for m in self.words.measures]
 
         def missing() -> Iterator[tasks.Task]:
+            asked = set()
             for i in range(self.words.runs):
                 task = self.words.task(i, self._kept(i))
-                if task.key in there and self._is_done(task, names):
+                if task.key in asked or (task.key in there and self._is_done(task, names)):
                     continue
+                if repeats:
+                    asked.add(task.key)
                 yield task
 
-        todo = self._counted(missing(), len(there) > 0)
-        if todo is None:
-            return
-        with self._engine() as engine, closing(engine.run(todo)) as answers:
+        return self._counted(missing(), repeats or len(there) > 0)
+
+    def _compute(self, todo: Iterator[tasks.Task], engine: Engine) -> None:
+        with closing(engine.run(todo)) as answers:  # type: ignore[type-var]
             self._tell(engine)
             for answer in answers:
                 with held():
@@ -461,9 +489,7 @@ class _Sweeping:
         self.failed += row["status"] != tasks.FINISHED
         return True
 
-    def _engine(self) -> Any:
-        from contextlib import nullcontext
-
+    def _engine(self) -> AbstractContextManager[Engine]:
         words = self.engine_words
         context = tasks.Context(
             self.words.scene, tuple(self.words.measures), str(self.store.folder.resolve()), self.token

@@ -41,7 +41,7 @@ def design(
     read = None
     if table is not None:
         with mistakes.gathered():
-            read = designs.read(table)
+            read = designs.points(table)
             for key in read.paths:
                 if key in places:
                     mistakes.add(
@@ -54,7 +54,7 @@ def design(
     with mistakes.gathered():
         if drawn and samples is not None:
             found = _drawn(mistakes, kind, pairs, samples)
-        elif not drawn:
+        elif kind == KINDS[0]:
             found = _grid(mistakes, pairs, read)
     return (found if len(mistakes.found) == before else None), places
 
