@@ -381,6 +381,10 @@ def test_all_mistakes_are_told_before_anything_runs(spring: Tree, scene_file: Sc
         ),
         (["--vary", "q.0.x=1"], "--vary q.0.x=1: q: unknown key"),
         (["--vary", "time.fps=24", "--on", "gpu"], "--on: 'gpu', expected cores, dask or the address"),
+        (["--vary", "time.fps=24", "--on", "tcp://"], "--on: 'tcp://', expected cores, dask or the address"),
+        (["--vary", "time.fps=24", "--on", "http://host:8786"], "--on: 'http://host:8786', expected cores"),
+        (["--vary", "time.fps=24", "--on", "tcp://host:65536"], "--on: 'tcp://host:65536', expected cores"),
+        (["--vary", "time.fps=24", "--memory", "inf"], "Invalid value for '--memory': 'inf'"),
         (["--vary", "time.fps=24", "--resume", "--force"], "choose one"),
         (["--vary", "time.fps=24", "--frames", "2", "--measure", "ledger.energy@3"], "the run ends with frame 2"),
     ],
@@ -408,6 +412,9 @@ def test_python_tells_the_same(spring: Tree, tmp_path: Path) -> None:
         'system.0.substep=1: system "main".substep',
         "ledger.enrgy",
     ]
+    for memory in (math.inf, math.nan, -1.0):
+        with pytest.raises(SceneError, match=r"memory: .*expected a finite number >= 1e6 bytes"):
+            sweep(spring, {"time.fps": [24]}, folder=tmp_path / "s", memory=memory)
     with pytest.raises(SceneError, match="expected a mapping of keys"):
         sweep(spring, ["a"], folder=tmp_path / "s")  # type: ignore[arg-type]
     assert not (tmp_path / "s").exists()

@@ -56,7 +56,7 @@ def sweep(
         int | None, typer.Option(min=1, metavar="N", help="Runs at a time.", show_default="as many as cores")
     ] = None,
     memory: Annotated[
-        float | None, typer.Option(min=0.01, metavar="GB", help="The most memory that a run may take.")
+        float | None, typer.Option(min=0.01, max=1e6, metavar="GB", help="The most memory that a run may take.")
     ] = None,
     keep: Annotated[
         str, typer.Option(metavar="WHAT", help="measures; or runs: a run folder of each run, too.")

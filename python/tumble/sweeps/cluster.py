@@ -111,6 +111,9 @@ def _quiet() -> Iterator[None]:
 
 @contextmanager
 def _connected(address: str) -> Iterator[Any]:
+    if address.startswith("tls:") and _dask(address).Security().get_connection_args("client")["ssl_context"] is None:
+        text = "needs certificates; name them under distributed.comm.tls in the configuration of Dask"
+        raise wrong(f"--on {address}", text)
     try:
         client = _dask(address).Client(address, timeout=PATIENCE, set_as_default=False)
     except (OSError, TimeoutError, ValueError) as error:

@@ -223,7 +223,8 @@ class Pool:
         except Died as death:
             if self._stopping or death.killed:
                 raise
-            raise ExportError(f"a worker of the sweep did not start ({death})") from None
+            cure = f"; --memory {self.memory / 1e9:g} may be too little" if self.memory else ""
+            raise ExportError(f"a worker of the sweep did not start ({death}){cure}") from None
         except OSError as error:
             raise ExportError(f"a worker of the sweep did not start ({error.strerror or error})") from None
         with self._change:

@@ -2,6 +2,7 @@
 
 import math
 import os
+import re
 import secrets
 import sys
 import time
@@ -43,6 +44,8 @@ LONG = 12 * 3600.0
 
 TIMED = 20
 """Runs of fewer than these are started at once, however long they take."""
+
+_ADDRESS = re.compile(r"(?:tcp|tls)://(?:[^\s/:\[\]]+|\[[0-9a-fA-F:.]+\]):([0-9]{1,5})")
 
 LAST_SEED = 2**32 - 1
 
@@ -305,8 +308,11 @@ class EngineWords:
 def planned(words: Words, store: Store | None, options: Options) -> tuple[Plan, EngineWords]:
     """Looks at what is there, and estimates how long the rest will take. Raises SceneError."""
     on, workers = options.on, options.workers
-    if on not in ("cores", "dask") and "://" not in on:
+    address = _ADDRESS.fullmatch(on)
+    if on not in ("cores", "dask") and (address is None or int(address[1]) > 65535):
         raise wrong("--on", f"{on!r}, expected cores, dask or the address of a Dask scheduler such as tcp://host:8786")
+    if options.memory is not None and not (math.isfinite(options.memory) and options.memory >= 1e6):
+        raise wrong("memory", f"{options.memory!r}, expected a finite number >= 1e6 bytes")
     n = cores()
     chosen = n if workers is None else whole(workers, "--workers", 1)
     chosen = max(1, min(chosen, words.runs))

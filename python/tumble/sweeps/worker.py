@@ -27,9 +27,9 @@ def main() -> None:
     if first is None:
         return
     context = Context.of(first)
-    send(sink, _READY)
     tasks: queue.SimpleQueue[Task] = queue.SimpleQueue()
     threading.Thread(target=_read, args=(source, tasks), daemon=True).start()
+    send(sink, _READY)
     while True:
         send(sink, perform(context, tasks.get()).message())
 
