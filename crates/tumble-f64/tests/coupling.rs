@@ -87,7 +87,7 @@ fn exchange(sim: &Simulation) -> ([f64; 3], [f64; 3], [f64; 3]) {
         tensors.tensor(&name).unwrap().data().chunks_exact(8).map(|b| f64::from_le_bytes(b.try_into().unwrap())).collect();
     let rest = &numbers[1..];
     let three = |s: &[f64]| [s[0], s[1], s[2]];
-    let mail = rest[6..].chunks_exact(10).fold([0.0; 3], |sum, m| [sum[0] + m[3], sum[1] + m[4], sum[2] + m[5]]);
+    let mail = rest[6..].chunks_exact(16).fold([0.0; 3], |sum, m| [sum[0] + m[4], sum[1] + m[5], sum[2] + m[6]]);
     (three(rest), three(&rest[3..]), mail)
 }
 
