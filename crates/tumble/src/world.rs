@@ -37,7 +37,7 @@ pub struct World {
 }
 
 /// Version of the parts of world and exchange.
-const VERSION: u32 = 1;
+const VERSION: u32 = 2;
 
 impl World {
     /// A world of systems at t = 0; a frame of `frame_time` [s] has `exchanges` exchange intervals.
