@@ -328,6 +328,24 @@ fn a_heavy_load_on_a_light_plate_rests_on_the_floor() {
 }
 
 #[test]
+fn a_plate_is_borne_beside_its_centre_after_a_restore() {
+    let words = points(&[[0.3, 0.1, 0.1]], 1.0, [0.0; 3])
+        + &body("box = { size = [1, 1, 0.1] }", 0.5, [0.0, 0.0, 0.05], "")
+        + "[[collider]]\nname = \"floor\"\nshape = { floor = {} }\n";
+    let build = || scene("velocity_verlet", G, &words);
+    let mut whole = build();
+    run(&mut whole, 10);
+    let kept = whole.save(&[]);
+    let mut cut = build();
+    cut.restore(&kept).unwrap();
+    run(&mut whole, 1);
+    run(&mut cut, 1);
+    for (name, what) in [("p", "position"), ("p", "velocity"), ("b", "position"), ("b", "angular_velocity")] {
+        assert!(column(&whole, name, what) == column(&cut, name, what), "{name} {what}");
+    }
+}
+
+#[test]
 fn masses_that_are_held_bear_a_body_and_a_led_one_pushes_it() {
     let places: Vec<[f64; 3]> = (0..9).map(|i| [0.15 * f64::from(i % 3) - 0.15, 0.15 * f64::from(i / 3) - 0.15, 0.0]).collect();
     let words = points(&places, 0.1, [0.0; 3]).replace("mass =", "pin = [\"all\"]\nmass =") + &body(CUBE, 3.0, [0.0, 0.0, 0.25], "");

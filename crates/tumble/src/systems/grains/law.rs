@@ -211,7 +211,8 @@ impl<L: Lane> Pair<L> {
         let (taken, limit) = (force.norm_sq(), memory.slides.positive(slides, rests) * press);
         let over = taken - limit * limit;
         let cut = over.positive(slides * press / taken.sqrt(), h.like(1.0));
-        memory.slides = over.positive(h.like(1.0), h.zero());
+        // Forces that are only evaluated anew decide nothing.
+        memory.slides = over.positive(h.like(1.0), h.positive(h.zero(), memory.slides));
         let force = force * cut;
         // With the drag, so that forces of the same place and another velocity are at the limit, too.
         let inverse = h.like(1.0) / shear;
