@@ -667,6 +667,11 @@ describe("files", () => {
       cures.join("; "),
     );
     await page.locator(".cures button").first().click();
+    // The run that failed had its frames, too: those of the new one are waited for.
+    await page.waitForFunction(() => {
+      const { session } = (window as any).tumble;
+      return session.overrides.size > 0 && session.playing;
+    });
     await frame(page, 4);
     assert.ok(
       await page.evaluate(
