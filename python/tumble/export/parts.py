@@ -49,6 +49,8 @@ class Part:
     """Of each quadrangle which corners it has of those of all triangles, one after another; m x 4."""
     texture: npt.NDArray[np.float64] | None = None
     """Texture coordinates of the corners of triangles, 3 m x 2, or of roots of strands, n x 2."""
+    body: tuple[str, int] | None = None
+    """Object and index of the body that it is, which moves as a whole."""
 
     @property
     def name(self) -> str:
@@ -116,7 +118,8 @@ def parts(run: Recording, found: list[Object], start: Columns) -> list[Part]:
 
     kinds = {thing["name"]: (kind, thing) for kind in ("sheet", "block", "hair") for thing in run.scene.get(kind, ())}
 
-    taken = {"camera", "key_light", "sky", "looks"}
+    taken = {"camera", "key_light", "sky", "looks", "physics", "joints"}
+    held = jointed(run.scene)
 
     def path(name: str) -> str:
         stem = Tf.MakeValidIdentifier(name)
@@ -144,12 +147,18 @@ def parts(run: Recording, found: list[Object], start: Columns) -> list[Part]:
             where = path(thing.name)
             made.append(Part(thing, where, thing.name, "BasisCurves", thing.curve, counts, thing.radius))
         elif thing.vertices is not None:
+            # The columns of frames are not those of the mesh: no object has a name with a slash.
+            mesh = replace(thing, name=f"{thing.name}/mesh", position=thing.vertices, vertices=None)
+            edges = split(thing.vertices, thing.triangles)
+            if (n := len(positions(start, thing))) == 1 or thing.name in held:
+                for k in range(n):
+                    title = f"{thing.name} {k}" if n > 1 else thing.name
+                    made.append(Part(mesh, path(title), title, "Mesh", cut=edges, body=(thing.name, k)))
+                continue
             where, title = path(thing.name), f"{thing.name} mesh"
             inner = where + path(title).removeprefix(ROOT)
             made.append(Part(thing, where, thing.name, "PointInstancer"))
-            # The columns of frames are not those of the mesh: no object has a name with a slash.
-            mesh = replace(thing, name=f"{thing.name}/mesh", position=thing.vertices, vertices=None)
-            made.append(Part(mesh, inner, title, "Mesh", cut=split(thing.vertices, thing.triangles)))
+            made.append(Part(mesh, inner, title, "Mesh", cut=edges))
         elif len(thing.triangles):
             kind, words = kinds.get(thing.name, ("", {}))
             cut = None if thing.form == "surface" else split(places(thing, start), thing.triangles)
@@ -178,6 +187,19 @@ def parts(run: Recording, found: list[Object], start: Columns) -> list[Part]:
     return made
 
 
+def jointed(scene: Mapping[str, Any]) -> set[str]:
+    """Names of the objects that joints hold: each of their bodies is a prim of its own, which a joint can name."""
+    return {joint_end(scene, text)[0] for joint in scene.get("joint", ()) for text in joint["between"]}
+
+
+def joint_end(scene: Mapping[str, Any], text: str) -> tuple[str, int | None]:
+    """Object and index of an end of a joint, "NAME" or "NAME INDEX"."""
+    if any(body["name"] == text for body in scene.get("body", ())):
+        return text, None
+    name, _, index = text.rpartition(" ")
+    return name, int(index)
+
+
 def places(thing: Object, columns: Columns) -> npt.NDArray[np.float64]:
     """Vertices; of a collider that moves as a whole, before it is turned and moved."""
     still = thing.position
@@ -192,7 +214,9 @@ def velocities(part: Part, now: Now) -> npt.NDArray[np.float64] | None:
     own = now.columns.get(name, {}).get("velocity")
     if own is not None:
         return np.asarray(own, dtype=float).reshape(-1, 3)
-    if (now.before is None and now.after is None) or varying(part, now.columns) or np.isfinite(part.thing.leap):
+    if part.body is not None or varying(part, now.columns) or np.isfinite(part.thing.leap):
+        return None
+    if now.before is None and now.after is None:
         return None
     x = places(part.thing, now.columns)
     first, last = (x if c is None else places(part.thing, c) for c in (now.before, now.after))
@@ -282,14 +306,16 @@ def deforms(part: Part, columns: Columns) -> bool:
 
 
 def placement(part: Part, columns: Columns) -> list[tuple[str, str, Any]]:
-    """Translation and turn of a collider that moves as a whole: attribute, type and value."""
+    """Translation and turn of a collider or body that moves as a whole: attribute, type and value."""
     from pxr import Gf
 
-    own = columns.get(part.thing.name, {})
-    if "translation" not in own:
+    name, row = part.body or (part.thing.name, 0)
+    own = columns.get(name, {})
+    shifts = own.get("position" if part.body else "translation")
+    if shifts is None:
         return []
-    x, y, z, w = (float(q) for q in np.ravel(own["turn"]))
-    shift = Gf.Vec3d(*(float(c) for c in np.ravel(own["translation"])))
+    x, y, z, w = (float(q) for q in np.reshape(own["turn"], (-1, 4))[row])
+    shift = Gf.Vec3d(*(float(c) for c in np.reshape(shifts, (-1, 3))[row]))
     return [("xformOp:translate", "double3", shift), ("xformOp:orient", "quatd", Gf.Quatd(w, x, y, z))]
 
 

@@ -7,7 +7,7 @@
     usd/manifest.usda       which attributes the frames hold
     usd/frame.000000.usdc   points, velocities, normals and extents of a frame, at time code 0; and so on; of particles
                             that come and go also ids, widths, colours and all other numbers that they have; of bodies,
-                            whose one mesh is in objects.usdc, where they are and how they are turned
+                            whose mesh is in objects.usdc, where they are and how they are turned
     blender.py              if asked for: imports it into Blender and sets what a plain import loses
 
 Why value clips: sub-layers cannot do it (the strongest layer that has any time sample of an attribute hides the
@@ -35,7 +35,7 @@ from typing import Any
 import numpy as np
 
 from tumble._engine import ExportError
-from tumble.export import DIGITS, prims, vdb
+from tumble.export import DIGITS, physics, prims, vdb
 from tumble.export.parts import ROOT, History, Now, Part, deforms, parts, placement, values, varying, velocities
 from tumble.folder import writing
 from tumble.pictures.framing import Camera, views
@@ -172,6 +172,7 @@ def _objects(run: Recording, made: list[Part], start: Now) -> Any:
     stage.SetTimeCodesPerSecond(fps(run))
     stage.SetDefaultPrim(UsdGeom.Xform.Define(stage, ROOT).GetPrim())
     prims.fill(stage, run, made, start)
+    physics.fill(stage, run, made, start)
     return layer
 
 
