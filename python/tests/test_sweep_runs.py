@@ -651,3 +651,26 @@ def test_stills_and_films_stand_side_by_side(
     assert picture.shape[1] == 2 * 328 + 8 and picture[..., :3].std() > 0.05
     page = (folder / "sweep.html").read_text()
     assert 'src="stills.png"' in page and 'src="films.mp4"' in page and (folder / "films.mp4").stat().st_size > 1000
+    # Another camera draws the same runs anew.
+    sheet["camera"] = {"resolution": [64, 48], "look": "night"}
+    again = tumble("sweep", scene_file(sheet), *words, "--stills", "--no-plots", "--resume", "--json")
+    assert again.code == 0 and json.loads(again.out)["timings"]["computed"] == 0, again.err
+    night = imread(folder / "stills.png")
+    assert len(list(folder.glob("stills/*.png"))) == 4 and np.abs(night - picture).max() > 0.5
+
+
+def test_a_film_needs_two_frames_and_the_page_says_so(sheet: Tree, scene_file: SceneFile, tumble: Command) -> None:
+    sheet["time"]["frames"] = 2
+    sheet["camera"] = {"resolution": [64, 48]}
+    words = ["--vary", "sheet.sheet.links.structural=500,1e25", "--renderer", "matplotlib", "--films", "--no-plots"]
+    answer = tumble("sweep", scene_file(sheet), *words)
+    assert answer.code == 0, answer.err
+    folder = Path("out/sweep/scene")
+    page = (folder / "sweep.html").read_text()
+    ends = [row["status"] for row in csv.DictReader((folder / "sweep.csv").open())]
+    assert "finished" in ends and len(set(ends)) == 2, ends
+    (film,) = folder.glob("films/*.mp4")
+    assert f'src="films/{film.name}"' in page
+    words[1] = "sheet.sheet.links.structural=1e25"
+    assert tumble("sweep", scene_file(sheet), *words, "--force").code == 1
+    assert "No run has the two frames of a film." in (folder / "sweep.html").read_text()

@@ -20,5 +20,5 @@ def write(
     write_csv(store.folder / "effects.csv", [head, *lines])
     drawn = figures.draw(found, against) if options.plots else []
     sheet = sheets.stills(found, store, options.renderer, progress) if options.stills else None
-    made = sheets.films(found, store, options.renderer, progress) if options.films else []
+    made = sheets.films(found, store, options.renderer, progress) if options.films else None
     return page.write(found, drawn, sheet, made)

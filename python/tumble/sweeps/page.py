@@ -8,8 +8,8 @@ from tumble.folder import write_whole
 from tumble.lab.page import Section, document, table
 from tumble.sweeps.design import short
 from tumble.sweeps.figures import Plot
-from tumble.sweeps.result import Sweep, status_counts
-from tumble.sweeps.sheets import caption, shown
+from tumble.sweeps.result import Row, Sweep, status_counts
+from tumble.sweeps.sheets import caption
 from tumble.sweeps.statistics import CONFIDENCE
 
 DOTS = 86.0
@@ -19,14 +19,17 @@ ROWS = 200
 """Points, and failed runs, that are listed."""
 
 
-def write(found: Sweep, drawn: Sequence[Plot], sheet: Path | None, films: Sequence[Path]) -> Path:
-    """Writes sweep.html into the folder of the sweep. Raises ExportError."""
+def write(
+    found: Sweep, drawn: Sequence[Plot], sheet: Path | None, films: Sequence[tuple[Row, Path]] | None = None
+) -> Path:
+    """Writes sweep.html into the folder of the sweep; `films` could be drawn, None were not asked for. Raises ExportError."""
     sections: list[tuple[Section, str]] = []
     if sheet is not None:
         text = "<p>The last frame of the first seed at each point.</p>"
         sections.append((Section("Stills", text), _picture(sheet.name, "last frames", "100%")))
-    if films:
-        sections.append((Section("Films", "<p>Of the first seed at each point.</p>"), _films(found, films)))
+    if films is not None:
+        text = "<p>Of the first seed at each point.</p>" if films else "<p>No run has the two frames of a film.</p>"
+        sections.append((Section("Films", text), _films(found, films)))
     for measure in dict.fromkeys(plot.measure for plot in drawn):
         own = "".join(
             _picture(
@@ -53,19 +56,17 @@ def _picture(place: str, title: str, width: str = "760px") -> str:
     return f'<img src="{escape(place, quote=True)}" alt="{escape(title, quote=True)}" style="max-width:{width}">'
 
 
-def _films(found: Sweep, films: Sequence[Path]) -> str:
-    together = found.folder / "films.mp4"
-    if together.is_file():
-        return f'<video src="{together.name}" controls loop muted style="max-width:100%"></video>' + _names(found)
-    place = films[0].relative_to(found.folder).as_posix()
+def _films(found: Sweep, films: Sequence[tuple[Row, Path]]) -> str:
+    if not films:
+        return ""
+    if len(films) > 1:
+        listed = "; ".join(escape(caption(row)) for row, _ in films)
+        return (
+            '<video src="films.mp4" controls loop muted style="max-width:100%"></video>'
+            f"<p>In rows from the top left: {listed}.</p>"
+        )
+    place = films[0][1].relative_to(found.folder).as_posix()
     return f'<video src="{escape(place, quote=True)}" controls loop muted></video>'
-
-
-def _names(found: Sweep) -> str:
-    from tumble.sweeps.sheets import FILMS
-
-    listed = "; ".join(escape(caption(row)) for row in shown(found, FILMS))
-    return f"<p>In rows from the top left: {listed}.</p>"
 
 
 def _lead(found: Sweep) -> str:

@@ -1,6 +1,8 @@
 """Pictures of runs side by side: a sheet of last frames, and a film of films."""
 
+import hashlib
 import io
+import json
 import math
 import subprocess
 from collections.abc import Callable, Sequence
@@ -51,8 +53,8 @@ def stills(found: Sweep, store: Store, renderer: str = "auto", progress: Told | 
     rows = shown(found, MOST)
     pictures: list[tuple[str, Any]] = []
     for k, row in enumerate(rows):
-        path = found.folder / "stills" / f"{row.key}.png"
-        if not path.is_file() and (pixels := _last(store, row, renderer)) is not None:
+        path = found.folder / "stills" / f"{_name(found, row)}.png"
+        if not path.is_file() and (pixels := _last(found, store, row, renderer)) is not None:
             buffer = io.BytesIO()
             imsave(buffer, pixels, format="png")
             with writing(path.parent):
@@ -78,12 +80,26 @@ def caption(row: Row) -> str:
     return text if row.status == "finished" else f"{text}: {row.status} at frame {row.frame}"
 
 
-def _last(store: Store, row: Row, renderer: str) -> npt.NDArray[np.uint8] | None:
+def _name(found: Sweep, row: Row) -> str:
+    """Of a picture: the run's key and a hash of the camera, which the key does not tell apart."""
+    camera = json.dumps(found.manifest["scene"].get("camera"), sort_keys=True)
+    return f"{row.key}-{hashlib.sha256(camera.encode()).hexdigest()[:8]}"
+
+
+def _run(found: Sweep, store: Store, row: Row) -> Run:
+    """A run as the camera of the sweep's scene sees it; the run may be older than that camera."""
+    run = Run(store.runs(row.key))
+    if camera := found.manifest["scene"].get("camera"):
+        run.scene["camera"] = camera
+    return run
+
+
+def _last(found: Sweep, store: Store, row: Row, renderer: str) -> npt.NDArray[np.uint8] | None:
     """The last frame of a run; None where there is none to be drawn."""
     from tumble.pictures import SAMPLES, picture
 
     try:
-        run = Run(store.runs(row.key))
+        run = _run(found, store, row)
         if not run.n_frames:
             return None
         return np.asarray(picture(run, run.n_frames - 1, renderer, size_of(run.scene, WIDTH), SAMPLES))
@@ -152,25 +168,24 @@ def _font(size: int) -> Any:
 # Films
 
 
-def films(found: Sweep, store: Store, renderer: str = "auto", progress: Told | None = None) -> list[Path]:
-    """Draws films of the first seed into films/, and all of them side by side into films.mp4; returns the single ones. Raises
-    ExportError."""
+def films(found: Sweep, store: Store, renderer: str = "auto", progress: Told | None = None) -> list[tuple[Row, Path]]:
+    """Draws films of the first seed into films/, and all of them side by side into films.mp4; returns the single ones, of the
+    runs that have two frames. Raises ExportError."""
     from tumble.film import film
 
     rows = [row for row in shown(found, FILMS) if (store.runs(row.key) / "run.json").is_file()]
     made = []
     for k, row in enumerate(rows):
-        path = found.folder / "films" / f"{row.key}.mp4"
-        if not path.is_file():
-            run = Run(store.runs(row.key))
-            if run.n_frames < 2:
-                continue
-            film(run, path, renderer, 1, size_of(run.scene, WIDTH))
-        made.append(path)
+        path = found.folder / "films" / f"{_name(found, row)}.mp4"
+        run = _run(found, store, row)
+        if run.n_frames > 1:
+            if not path.is_file():
+                film(run, path, renderer, 1, size_of(run.scene, WIDTH))
+            made.append((row, path))
         if progress is not None:
             progress("films", k + 1, len(rows))
     if len(made) > 1:
-        beside(made, found.folder / "films.mp4", across(found, len(made)))
+        beside([path for _, path in made], found.folder / "films.mp4", across(found, len(made)))
     return made
 
 
