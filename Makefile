@@ -185,8 +185,8 @@ validate: setup openvdb blender wasm
 
 validate-rust:
 	cargo test $(RUST_TESTS) --quiet --no-fail-fast -- --include-ignored --nocapture
-	cargo test $(UNIT_TESTS) --quiet --no-fail-fast
-	cargo test $(UNIT_TESTS) --features double --quiet --no-fail-fast
+	cargo test $(UNIT_TESTS) --quiet --no-fail-fast -- --include-ignored
+	cargo test $(UNIT_TESTS) --features double --quiet --no-fail-fast -- --include-ignored
 
 validate-python:
 	$(PYTEST) -m "" -rfEP

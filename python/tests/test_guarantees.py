@@ -97,6 +97,19 @@ def unseen(items: list[str]) -> list[str]:
     return [name for place, _, name in tests if place not in words or (name in marked and not everything)]
 
 
+def test_every_test_that_the_suite_leaves_out_is_named() -> None:
+    """What only `make validate` runs holds a promise, too."""
+    ignored = r"#\[ignore[^\n]*\]\n(?:\s*#\[.*\]\n)*\s*fn (\w+)\("
+    marked = r"@pytest\.mark\.long\n(?:@[^\n]*\n|[ )][^\n]*\n)*def (\w+)\("
+    left = [
+        f"`{file.relative_to(ROOT).as_posix()}::{name}`"
+        for pattern, files in ((ignored, "crates/**/*.rs"), (marked, "python/tests/*.py"))
+        for file in sorted(ROOT.glob(files))
+        for name in re.findall(pattern, file.read_text(encoding="utf-8"))
+    ]
+    assert len(left) > 25 and [test for test in left if test not in TESTS] == []
+
+
 @pytest.mark.parametrize("promise", PROMISES)
 def test_a_command_runs_the_tests_that_it_shows(promise: str) -> None:
     assert unseen(PROMISES[promise]) == []

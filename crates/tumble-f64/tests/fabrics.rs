@@ -286,6 +286,7 @@ fn strips_of_all_fabrics_hang_at_the_angle_of_the_cantilever_test() {
 /// record lets the moment stay, curvature jumps within a millimetre of the clamp, which coarse cells do not see. Sweeps of position-based dynamics
 /// come to rest where Newton's method does in the same cells.
 #[test]
+#[ignore = "long: make validate"]
 fn strips_of_whole_records_hang_like_the_elastica_with_their_moments() {
     for name in common::cases(SHIPPED, 3) {
         let fabric = record(name);

@@ -448,6 +448,7 @@ const LID: [(f64, [f64; 3]); 15] = [
 ];
 
 #[test]
+#[ignore = "long: make validate"]
 fn the_cavity_of_ghia_at_re_100() {
     let mut sim = cavity(64, 0.01, 0.5, 1e-10);
     run(&mut sim, 30);

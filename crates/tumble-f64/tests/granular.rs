@@ -65,6 +65,7 @@ fn collapse(friction: f64, rolling: f64) -> [f64; 3] {
 }
 
 #[test]
+#[ignore = "long: make validate"]
 fn a_column_of_glass_beads_collapses_as_far_as_measured_and_others_do_not() {
     // [lube2005]: 1.2 a, [lajeunesse2005]: 1.8 a; the height about a^0.4, between 0.8 and 1.7.
     let [a, far, high] = collapse(0.3, 0.0);

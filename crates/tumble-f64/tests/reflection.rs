@@ -138,6 +138,7 @@ pressure.tolerance = 1e-6
 }
 
 #[test]
+#[ignore = "long: make validate"]
 fn what_is_steady_does_not_depend_on_the_step() {
     let cycle: Vec<f64> = common::cases([4.0, 2.0], 2).map(|courant| cavity(courant, CUBIC)).collect();
     let reflected = [4.0, 2.0].map(|courant| cavity(courant, BOTH));

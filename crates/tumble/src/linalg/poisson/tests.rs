@@ -158,6 +158,7 @@ fn left(solver: &mut Solver<u8>, b: &[Real], q: &[f64]) -> f64 {
 }
 
 #[test]
+#[ignore = "long: make validate"]
 fn refinement_reaches_what_the_recursion_only_says() {
     let mut solver = around_a_sphere([96, 96, 96], CLOSED, |w| w);
     let b = smooth(solver.lattice());
